@@ -1,0 +1,71 @@
+//! What can stand in a tree.
+
+use std::fmt::Debug;
+use std::sync::Arc;
+
+use lumbre_geometry::{Aabb, PlacedShape, Ray, Root, Roots, Surface};
+use lumbre_math::{DVec3, Transform, Vec3};
+
+use crate::Accel;
+
+/// Something that rays can hit, under a name of the caller's.
+#[derive(Clone, Debug)]
+pub struct Geometry {
+    /// Returned in every [`crate::Hit`] on it; the caller's own, not necessarily unique. For an instance it joins the hit's
+    /// path.
+    pub id: u32,
+    /// What it is.
+    pub kind: GeometryKind,
+}
+
+/// The kinds of geometry.
+#[derive(Clone, Debug)]
+pub enum GeometryKind {
+    /// One exact shape, tested in double precision.
+    Shape(PlacedShape),
+    /// Triangles, watertight.
+    Mesh(Arc<TriangleMesh>),
+    /// A whole tree, placed.
+    Instance(Instance),
+    /// A stranger's geometry.
+    Custom(Arc<dyn CustomGeometry>),
+}
+
+/// A tree under an invertible affine map; trees may hold instances in turn.
+#[derive(Clone, Debug)]
+pub struct Instance {
+    /// What is placed.
+    pub accel: Arc<Accel>,
+    /// Where.
+    pub world_from_object: Transform,
+}
+
+/// Triangles by index. Vertex `i` stands at `origin + positions[i]`, so that single precision holds what is small and
+/// far away.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TriangleMesh {
+    /// What the positions are relative to.
+    pub origin: DVec3,
+    /// Vertices.
+    pub positions: Vec<Vec3>,
+    /// Three vertices each; the front is where they run counter-clockwise.
+    pub indices: Vec<[u32; 3]>,
+}
+
+/// Geometry that the kernel does not know, at one indirect call a test.
+pub trait CustomGeometry: Debug + Send + Sync {
+    /// How many primitives it has.
+    fn primitive_count(&self) -> u32;
+    /// A box around one of them; `None` when it is infinite.
+    fn bounds(&self, primitive: u32) -> Option<Aabb>;
+    /// The first crossing in the ray's range.
+    fn closest(&self, primitive: u32, ray: &Ray) -> Option<Root>;
+    /// Every crossing in the ray's range, appended in ascending order.
+    fn roots(&self, primitive: u32, ray: &Ray, out: &mut Roots);
+    /// The surface at a crossing.
+    fn surface(&self, primitive: u32, ray: &Ray, root: &Root) -> Surface;
+    /// Whether anything is crossed in the ray's range.
+    fn any(&self, primitive: u32, ray: &Ray) -> bool {
+        self.closest(primitive, ray).is_some()
+    }
+}

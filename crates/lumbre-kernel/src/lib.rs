@@ -1,0 +1,11 @@
+//! Closest, any and every hit of a ray among exact shapes, triangle meshes, instances and custom geometry, in one tree.
+//!
+//! The kernel knows nothing of light: every geometry carries an `id` of the caller's, and a hit returns it.
+
+mod accel;
+mod geometry;
+mod hit;
+
+pub use accel::{Accel, BuildError, BuildOptions};
+pub use geometry::{CustomGeometry, Geometry, GeometryKind, Instance, TriangleMesh};
+pub use hit::{Hit, InstancePath};
