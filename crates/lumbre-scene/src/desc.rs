@@ -1,0 +1,353 @@
+//! A scene as a reader describes it: plain data, no files, nothing resolved.
+
+use std::sync::Arc;
+
+use lumbre_geometry::Shape;
+use lumbre_image::Rgb;
+use lumbre_math::{DVec3, Transform, Vec2, Vec3};
+use lumbre_shading::{FloatTexture, Material, MipMap};
+
+use crate::{Camera, MaterialId, ObjectId};
+
+/// Everything that a scene file says.
+#[derive(Clone, Debug, Default)]
+pub struct SceneDesc {
+    /// Cameras, the one to use first; none asks for an automatic one.
+    pub cameras: Vec<Camera>,
+    /// The picture's size, crop and exposure.
+    pub film: FilmDesc,
+    /// The pixel filter.
+    pub filter: FilterDesc,
+    /// The sampler.
+    pub sampler: SamplerDesc,
+    /// The integrator.
+    pub integrator: IntegratorDesc,
+    /// Materials; shapes name them by position.
+    pub materials: Vec<NamedMaterial>,
+    /// Shapes that stand in the world, in the order of the file.
+    pub shapes: Vec<ShapeDesc>,
+    /// Objects to be instanced.
+    pub objects: Vec<ObjectDesc>,
+    /// Objects placed in the world.
+    pub instances: Vec<InstanceDesc>,
+    /// Lights that are not shapes.
+    pub lights: Vec<LightDesc>,
+}
+
+/// A material under its name.
+#[derive(Clone, Debug)]
+pub struct NamedMaterial {
+    /// Its name, where the file gives one.
+    pub name: Option<String>,
+    /// The material.
+    pub material: Arc<Material>,
+}
+
+/// A shape and what it is made of.
+#[derive(Clone, Debug)]
+pub struct ShapeDesc {
+    /// Its 0-based position among all shapes of its file, by which answers name it.
+    pub index: u32,
+    /// Its form.
+    pub geometry: GeometryDesc,
+    /// Where it stands.
+    pub world_from_object: Transform,
+    /// Whether the outside is the inside.
+    pub reverse_orientation: bool,
+    /// What it is made of; `None` for an interface, which is no surface at all.
+    pub material: Option<MaterialId>,
+    /// The light it gives.
+    pub area_light: Option<AreaLightDesc>,
+    /// Coverage in [0, 1]; `None` is opaque.
+    pub alpha: Option<Arc<FloatTexture>>,
+}
+
+/// The forms of a shape.
+#[derive(Clone, Debug)]
+pub enum GeometryDesc {
+    /// One exact shape.
+    Exact(Shape),
+    /// Triangles and quads.
+    Mesh(Arc<MeshDesc>),
+    /// Bilinear patches (p00, p10, p01, p11 each) with shared vertices.
+    BilinearMesh(Arc<MeshDesc>),
+    /// A combination of solids, each surface keeping its own material.
+    Csg(CsgDesc),
+}
+
+/// A combination of solids.
+#[derive(Clone, Debug)]
+pub struct CsgDesc {
+    /// What is done with them.
+    pub operation: CsgOperation,
+    /// Two or more; each is the union of its shapes (whose transforms are relative to the CSG's own space).
+    pub operands: Vec<Vec<ShapeDesc>>,
+}
+
+/// The operations on solids.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CsgOperation {
+    /// What any holds.
+    Union,
+    /// What all hold.
+    Intersection,
+    /// What the first holds and no other does.
+    Difference,
+}
+
+/// A mesh as files have it. Every list that is there is as long as `positions`, unless it says otherwise.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MeshDesc {
+    /// Vertices.
+    pub positions: Vec<Vec3>,
+    /// Triangles, counter-clockwise from the front.
+    pub triangles: Vec<[u32; 3]>,
+    /// Quads, counter-clockwise from the front. (A bilinear mesh has its patches here, in its own order.)
+    pub quads: Vec<[u32; 4]>,
+    /// Shading normals.
+    pub normals: Option<Vec<Vec3>>,
+    /// Texture coordinates.
+    pub uvs: Option<Vec<Vec2>>,
+    /// Tangents.
+    pub tangents: Option<Vec<Vec3>>,
+    /// Linear colours.
+    pub colours: Option<Vec<Rgb>>,
+    /// A number for each face: triangles first, then quads.
+    pub face_indices: Option<Vec<u32>>,
+}
+
+/// Shapes to be placed many times.
+#[derive(Clone, Debug, Default)]
+pub struct ObjectDesc {
+    /// Its name.
+    pub name: String,
+    /// Its shapes, in its own space.
+    pub shapes: Vec<ShapeDesc>,
+    /// Other objects inside it, in its own space. No object holds itself at any depth.
+    pub instances: Vec<InstanceDesc>,
+}
+
+/// An object, placed.
+#[derive(Clone, Debug)]
+pub struct InstanceDesc {
+    /// Which.
+    pub object: ObjectId,
+    /// Where.
+    pub world_from_object: Transform,
+}
+
+/// The light that a shape gives off. Photometric units are already resolved but for `power`.
+#[derive(Clone, Debug)]
+pub struct AreaLightDesc {
+    /// Radiance.
+    pub radiance: Rgb,
+    /// A factor on the radiance, over the surface's uv.
+    pub image: Option<Arc<MipMap>>,
+    /// Whether the back shines too.
+    pub two_sided: bool,
+    /// Total power in lumens; when there, `radiance` gives only the colour (luminance 1).
+    pub power: Option<f32>,
+}
+
+/// Lights that are not shapes. All in world space, photometric units resolved.
+#[derive(Clone, Debug)]
+pub enum LightDesc {
+    /// The same in all directions from a point.
+    Point {
+        /// Where.
+        from: DVec3,
+        /// Radiant intensity.
+        intensity: Rgb,
+    },
+    /// A cone from a point.
+    Spot {
+        /// Where; the cone opens along +z of this space.
+        world_from_light: Transform,
+        /// Radiant intensity along the axis.
+        intensity: Rgb,
+        /// Half-angle in degrees beyond which there is nothing.
+        cone_angle: f32,
+        /// Degrees inside it over which it fades (smoothstep).
+        cone_delta_angle: f32,
+    },
+    /// Parallel light.
+    Distant {
+        /// Unit vector towards the light.
+        towards: DVec3,
+        /// Irradiance on a surface that faces it.
+        irradiance: Rgb,
+    },
+    /// Light from all around.
+    Infinite {
+        /// Where its poles are: z of this space is up.
+        world_from_light: Transform,
+        /// Radiance, or a factor on the image.
+        radiance: Rgb,
+        /// Radiance by direction, where it varies.
+        image: Option<EnvironmentDesc>,
+    },
+}
+
+/// An environment map: linear radiance by direction.
+#[derive(Clone, Debug)]
+pub struct EnvironmentDesc {
+    /// Its pixels.
+    pub image: Arc<lumbre_image::Image>,
+    /// How directions fall on it.
+    pub mapping: EnvironmentMapping,
+}
+
+/// How an environment map covers the sphere.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EnvironmentMapping {
+    /// Square, equal areas, octahedral, z up (Clarberg 2008), as pbrt-v4.
+    EqualArea,
+    /// Twice as wide as high, z up, the middle of the picture towards +x.
+    LatitudeLongitude,
+}
+
+/// The picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FilmDesc {
+    /// The name to save under, where the file gives one.
+    pub filename: Option<String>,
+    /// Pixels across; `None` leaves the choice to the program.
+    pub width: Option<u32>,
+    /// Pixels down.
+    pub height: Option<u32>,
+    /// Pixels to render: x0, x1, y0, y1 (upper ends excluded).
+    pub pixel_bounds: Option<[u32; 4]>,
+    /// Part of the picture to render in [0, 1]: x0, x1, y0, y1.
+    pub crop_window: Option<[f64; 4]>,
+    /// Factor from radiance to pixel values: shutter time × ISO / 100.
+    pub exposure: f32,
+    /// Largest component of one sample; infinite by default.
+    pub max_component: f32,
+}
+
+impl Default for FilmDesc {
+    fn default() -> Self {
+        Self {
+            filename: None,
+            width: None,
+            height: None,
+            pixel_bounds: None,
+            crop_window: None,
+            exposure: 1.0,
+            max_component: f32::INFINITY,
+        }
+    }
+}
+
+/// The pixel filter, radii in pixels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FilterDesc {
+    /// Truncated Gaussian.
+    Gaussian {
+        /// Half-widths.
+        radius: Vec2,
+        /// Standard deviation.
+        sigma: f32,
+    },
+    /// All alike.
+    Box {
+        /// Half-widths.
+        radius: Vec2,
+    },
+    /// Mitchell and Netravali 1988.
+    Mitchell {
+        /// Half-widths.
+        radius: Vec2,
+        /// B.
+        b: f32,
+        /// C.
+        c: f32,
+    },
+    /// Lanczos-windowed sinc.
+    Sinc {
+        /// Half-widths.
+        radius: Vec2,
+        /// Lobes of the window.
+        tau: f32,
+    },
+    /// A tent.
+    Triangle {
+        /// Half-widths.
+        radius: Vec2,
+    },
+}
+
+impl Default for FilterDesc {
+    fn default() -> Self {
+        Self::Gaussian { radius: Vec2::splat(1.5), sigma: 0.5 }
+    }
+}
+
+/// The sampler.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SamplerDesc {
+    /// Which numbers.
+    pub kind: SamplerKind,
+    /// Samples a pixel; `None` leaves the choice to the program.
+    pub spp: Option<u32>,
+    /// The seed.
+    pub seed: u64,
+}
+
+impl Default for SamplerDesc {
+    fn default() -> Self {
+        Self { kind: SamplerKind::Sobol, spp: None, seed: 0 }
+    }
+}
+
+/// The kinds of sampler.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SamplerKind {
+    /// Owen-scrambled Sobol points.
+    #[default]
+    Sobol,
+    /// Independent uniform numbers.
+    Independent,
+}
+
+/// The integrator with its parameters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct IntegratorDesc {
+    /// Which.
+    pub kind: IntegratorKind,
+    /// Bounces at most.
+    pub max_depth: u32,
+}
+
+impl Default for IntegratorDesc {
+    fn default() -> Self {
+        Self { kind: IntegratorKind::Path { regularize: false }, max_depth: 5 }
+    }
+}
+
+/// The kinds of integrator.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum IntegratorKind {
+    /// Path tracing with next-event estimation and multiple importance sampling.
+    Path {
+        /// Whether to roughen surfaces after the first diffuse bounce.
+        regularize: bool,
+    },
+    /// Whitted 1980: direct light, perfect reflection and refraction.
+    Whitted,
+    /// Ambient occlusion.
+    AmbientOcclusion {
+        /// By the cosine, or uniformly.
+        cosine: bool,
+        /// How far to look.
+        max_distance: f64,
+    },
+    /// The shading normal, (n + 1) / 2.
+    Normals,
+    /// Distance along the camera's axis.
+    Depth,
+    /// Reflectance.
+    Albedo,
+    /// Surface parameters.
+    Uv,
+}
