@@ -1,1 +1,12 @@
-//! Skeleton.
+//! Scene, mesh and image files, read and written.
+//!
+//! Every reader is handed a [`Budget`], which it asks before any allocation whose size the input chose, and a
+//! [`Diagnostics`], where it puts its warnings. Its errors are [`FormatError`]s with a place.
+
+pub mod budget;
+pub mod diagnostic;
+pub mod input;
+
+pub use budget::{Budget, Hold, LimitError, LimitKind, Limits};
+pub use diagnostic::{Diagnostic, Diagnostics, FormatError, Place, Position, Severity, Strictness};
+pub use input::Input;

@@ -1,0 +1,353 @@
+//! What reading may cost: one [`Budget`] is handed to every reader and asked before any allocation whose size
+//! the input chose.
+//!
+//! Every limit names the program flag that raises it, and so does the error that it causes.
+
+use std::mem::size_of;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use thiserror::Error;
+
+/// How much may be read, each limit with the flag that raises it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Bytes held at one time by everything that was read (`--max-memory`).
+    pub memory: u64,
+    /// Vertices, faces, pixels' rows, shapes, tokens and the like over the whole run (`--max-elements`).
+    pub elements: u64,
+    /// Levels of nesting: includes, attribute blocks, objects in objects, JSON (`--max-nesting`).
+    pub nesting: u32,
+    /// Files opened over the whole run, includes and textures counted each time (`--max-files`).
+    pub files: u64,
+    /// Bytes that one compressed byte may become once a stream has given [`Limits::FREE_EXPANSION`] bytes
+    /// (`--max-expansion`).
+    pub expansion: u64,
+}
+
+impl Limits {
+    /// A compressed stream may grow to this many bytes whatever its ratio.
+    pub const FREE_EXPANSION: u64 = 64 << 20;
+
+    /// No limit but what an allocation can ask for.
+    pub const UNLIMITED: Self =
+        Self { memory: u64::MAX, elements: u64::MAX, nesting: 10_000, files: u64::MAX, expansion: u64::MAX };
+}
+
+impl Default for Limits {
+    /// 8 GiB, 2³² elements, 256 levels, 100,000 files and an expansion of 200.
+    fn default() -> Self {
+        Self { memory: 8 << 30, elements: 1 << 32, nesting: 256, files: 100_000, expansion: 200 }
+    }
+}
+
+/// Which limit was met.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum LimitKind {
+    /// [`Limits::memory`].
+    Memory,
+    /// [`Limits::elements`].
+    Elements,
+    /// [`Limits::nesting`].
+    Nesting,
+    /// [`Limits::files`].
+    Files,
+    /// [`Limits::expansion`].
+    Expansion,
+}
+
+impl LimitKind {
+    /// The program flag that raises this limit.
+    pub const fn flag(self) -> &'static str {
+        match self {
+            Self::Memory => "--max-memory",
+            Self::Elements => "--max-elements",
+            Self::Nesting => "--max-nesting",
+            Self::Files => "--max-files",
+            Self::Expansion => "--max-expansion",
+        }
+    }
+
+    const fn noun(self) -> &'static str {
+        match self {
+            Self::Memory => "bytes of memory",
+            Self::Elements => "elements",
+            Self::Nesting => "levels of nesting",
+            Self::Files => "files",
+            Self::Expansion => "bytes from each compressed byte",
+        }
+    }
+}
+
+/// A limit that the input would exceed. Its text names the flag that raises the limit.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("{what}: needs {needed} {}, limit {limit}; raise it with {}", .kind.noun(), .kind.flag())]
+pub struct LimitError {
+    /// What was being read.
+    pub what: String,
+    /// Which limit.
+    pub kind: LimitKind,
+    /// What all that was read so far and this would come to.
+    pub needed: u64,
+    /// What is allowed.
+    pub limit: u64,
+}
+
+/// The running account of what reading has cost. Threads may share it.
+#[derive(Debug, Default)]
+pub struct Budget {
+    limits: Limits,
+    memory: AtomicU64,
+    peak: AtomicU64,
+    elements: AtomicU64,
+    files: AtomicU64,
+}
+
+impl Budget {
+    /// An account with nothing spent.
+    pub fn new(limits: Limits) -> Self {
+        Self { limits, ..Self::default() }
+    }
+
+    /// The limits it keeps.
+    pub fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    /// Charges `bytes` that stay with what is read; [`Budget::release`] gives them back.
+    ///
+    /// # Errors
+    /// When more than [`Limits::memory`] would be held; nothing is charged then.
+    pub fn bytes(&self, bytes: u64, what: &str) -> Result<(), LimitError> {
+        let held = spend(&self.memory, bytes, self.limits.memory, LimitKind::Memory, what)?;
+        self.peak.fetch_max(held, Ordering::Relaxed);
+        Ok(())
+    }
+
+    /// Gives back `bytes` that [`Budget::bytes`] charged.
+    pub fn release(&self, bytes: u64) {
+        let _ = self
+            .memory
+            .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |held| Some(held.saturating_sub(bytes)));
+    }
+
+    /// Charges `bytes` for as long as the answer lives.
+    ///
+    /// # Errors
+    /// As [`Budget::bytes`].
+    pub fn hold(&self, bytes: u64, what: &str) -> Result<Hold<'_>, LimitError> {
+        self.bytes(bytes, what)?;
+        Ok(Hold { budget: self, bytes })
+    }
+
+    /// Charges for `count` values of `T` that stay, and answers `count` as a length that memory can have.
+    ///
+    /// # Errors
+    /// As [`Budget::bytes`].
+    pub fn array<T>(&self, count: u64, what: &str) -> Result<usize, LimitError> {
+        self.bytes(count.saturating_mul(size_of::<T>() as u64), what)?;
+        usize::try_from(count).map_err(|_| LimitError {
+            what: what.to_owned(),
+            kind: LimitKind::Memory,
+            needed: count.saturating_mul(size_of::<T>() as u64),
+            limit: self.limits.memory.min(usize::MAX as u64),
+        })
+    }
+
+    /// An empty vector with room for `count` values, charged as [`Budget::array`] does.
+    ///
+    /// The caller has first made sure that the input can hold `count` values: room that nothing fills is waste.
+    ///
+    /// # Errors
+    /// As [`Budget::bytes`], and when the allocator refuses.
+    pub fn vec<T>(&self, count: u64, what: &str) -> Result<Vec<T>, LimitError> {
+        let len = self.array::<T>(count, what)?;
+        let mut vec = Vec::new();
+        vec.try_reserve_exact(len).map_err(|_| {
+            let needed = count.saturating_mul(size_of::<T>() as u64);
+            self.release(needed);
+            LimitError { what: what.to_owned(), kind: LimitKind::Memory, needed, limit: self.limits.memory }
+        })?;
+        Ok(vec)
+    }
+
+    /// Counts `count` more elements.
+    ///
+    /// # Errors
+    /// When there would be more than [`Limits::elements`].
+    pub fn elements(&self, count: u64, what: &str) -> Result<(), LimitError> {
+        spend(&self.elements, count, self.limits.elements, LimitKind::Elements, what).map(drop)
+    }
+
+    /// Counts one more file.
+    ///
+    /// # Errors
+    /// When there would be more than [`Limits::files`].
+    pub fn file(&self, name: &str) -> Result<(), LimitError> {
+        spend(&self.files, 1, self.limits.files, LimitKind::Files, name).map(drop)
+    }
+
+    /// Checks that `depth` levels may stand in each other. Readers keep their own depth, as each is on its own path.
+    ///
+    /// # Errors
+    /// When `depth` is more than [`Limits::nesting`].
+    pub fn nesting(&self, depth: usize, what: &str) -> Result<(), LimitError> {
+        if depth <= self.limits.nesting as usize {
+            return Ok(());
+        }
+        Err(LimitError {
+            what: what.to_owned(),
+            kind: LimitKind::Nesting,
+            needed: depth as u64,
+            limit: u64::from(self.limits.nesting),
+        })
+    }
+
+    /// Checks that `packed` compressed bytes may have become `unpacked` bytes.
+    ///
+    /// # Errors
+    /// When there are more than [`Limits::FREE_EXPANSION`] and more than [`Limits::expansion`] for each.
+    pub fn expansion(&self, packed: u64, unpacked: u64, what: &str) -> Result<(), LimitError> {
+        if unpacked <= Limits::FREE_EXPANSION.max(packed.saturating_mul(self.limits.expansion)) {
+            return Ok(());
+        }
+        Err(LimitError {
+            what: what.to_owned(),
+            kind: LimitKind::Expansion,
+            needed: unpacked.div_ceil(packed.max(1)),
+            limit: self.limits.expansion,
+        })
+    }
+
+    /// Bytes charged and not given back.
+    pub fn memory_held(&self) -> u64 {
+        self.memory.load(Ordering::Relaxed)
+    }
+
+    /// The most bytes that were charged at one time.
+    pub fn memory_peak(&self) -> u64 {
+        self.peak.load(Ordering::Relaxed)
+    }
+
+    /// Bytes that may still be charged.
+    pub fn memory_left(&self) -> u64 {
+        self.limits.memory.saturating_sub(self.memory_held())
+    }
+}
+
+/// Bytes charged to a [`Budget`] until this is dropped.
+#[derive(Debug)]
+pub struct Hold<'a> {
+    budget: &'a Budget,
+    bytes: u64,
+}
+
+impl Hold<'_> {
+    /// Charges `bytes` more.
+    ///
+    /// # Errors
+    /// As [`Budget::bytes`].
+    pub fn grow(&mut self, bytes: u64, what: &str) -> Result<(), LimitError> {
+        self.budget.bytes(bytes, what)?;
+        self.bytes += bytes;
+        Ok(())
+    }
+
+    /// Leaves the bytes charged: what they pay for stays.
+    pub fn keep(mut self) {
+        self.bytes = 0;
+    }
+}
+
+impl Drop for Hold<'_> {
+    fn drop(&mut self) {
+        self.budget.release(self.bytes);
+    }
+}
+
+/// Adds `amount` to `account` unless that passes `limit`, and answers the new sum.
+fn spend(
+    account: &AtomicU64,
+    amount: u64,
+    limit: u64,
+    kind: LimitKind,
+    what: &str,
+) -> Result<u64, LimitError> {
+    let add = |spent: u64| spent.checked_add(amount).filter(|&sum| sum <= limit);
+    match account.fetch_update(Ordering::Relaxed, Ordering::Relaxed, add) {
+        Ok(before) => Ok(before + amount),
+        Err(spent) => {
+            Err(LimitError { what: what.to_owned(), kind, needed: spent.saturating_add(amount), limit })
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn small() -> Budget {
+        Budget::new(Limits { memory: 1000, elements: 7, nesting: 3, files: 2, expansion: 10 })
+    }
+
+    #[test]
+    fn each_limit_names_the_flag_that_raises_it() {
+        let b = small();
+        b.elements(5, "vertices").unwrap();
+        b.file("a").unwrap();
+        b.file("b").unwrap();
+        let errors = [
+            (b.bytes(1001, "pixels").unwrap_err(), "--max-memory"),
+            (b.elements(3, "vertices").unwrap_err(), "--max-elements"),
+            (b.nesting(4, "Include").unwrap_err(), "--max-nesting"),
+            (b.file("c").unwrap_err(), "--max-files"),
+            (b.expansion(100 << 20, 2000 << 20, "x.gz").unwrap_err(), "--max-expansion"),
+        ];
+        for (error, flag) in errors {
+            assert!(error.to_string().contains(flag), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_refused_charge_costs_nothing() {
+        let b = small();
+        b.bytes(900, "kept").unwrap();
+        assert!(b.bytes(101, "too much").is_err());
+        assert_eq!(b.memory_held(), 900);
+        b.bytes(100, "just fits").unwrap();
+        assert_eq!((b.memory_left(), b.memory_peak()), (0, 1000));
+    }
+
+    #[test]
+    fn a_hold_gives_back_what_it_grew_to_unless_kept() {
+        let b = small();
+        let mut hold = b.hold(300, "text").unwrap();
+        hold.grow(200, "more text").unwrap();
+        assert_eq!(b.memory_held(), 500);
+        drop(hold);
+        assert_eq!(b.memory_held(), 0);
+        b.hold(300, "mesh").unwrap().keep();
+        assert_eq!(b.memory_held(), 300);
+    }
+
+    #[test]
+    fn sizes_that_overflow_are_refused_rather_than_wrapped() {
+        let b = Budget::default();
+        let error = b.vec::<[u64; 4]>(u64::MAX / 2, "vertices").unwrap_err();
+        assert_eq!(error.kind, LimitKind::Memory);
+        assert_eq!(error.needed, u64::MAX);
+        assert_eq!(b.memory_held(), 0);
+    }
+
+    #[test]
+    fn threads_never_spend_more_than_there_is() {
+        let b = small();
+        let spent = std::thread::scope(|s| {
+            let workers: Vec<_> = (0..4)
+                .map(|_| s.spawn(|| (0..200).filter(|_| b.bytes(3, "piece").is_ok()).count()))
+                .collect();
+            workers.into_iter().map(|w| w.join().unwrap()).sum::<usize>()
+        });
+        assert_eq!(spent, 333);
+        assert_eq!(b.memory_held(), 999);
+    }
+}

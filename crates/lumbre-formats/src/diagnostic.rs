@@ -1,0 +1,639 @@
+//! What is wrong with an input, and where: places, diagnostics, their collector and the error of every reader.
+
+use std::collections::HashMap;
+use std::fmt::{self, Display, Formatter, Write as _};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use thiserror::Error;
+
+use crate::budget::LimitError;
+
+/// A place in an input file.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Place {
+    /// The file as the user named it.
+    pub file: Arc<str>,
+    /// Where in it.
+    pub position: Position,
+}
+
+/// Where in a file.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub enum Position {
+    /// The file as a whole.
+    Whole,
+    /// In a text, both counted from 1; the column in characters.
+    Text {
+        /// The line.
+        line: u64,
+        /// The column.
+        column: u64,
+    },
+    /// In binary data.
+    Binary {
+        /// Bytes from the start of the (unpacked) file.
+        offset: u64,
+        /// The element's path, such as `/vertex/3/x`; empty when there is none.
+        path: String,
+    },
+}
+
+impl Place {
+    /// A file as a whole.
+    pub fn whole(file: impl Into<Arc<str>>) -> Self {
+        Self { file: file.into(), position: Position::Whole }
+    }
+
+    /// A line and a column of a text, both counted from 1.
+    pub fn text(file: impl Into<Arc<str>>, line: u64, column: u64) -> Self {
+        Self { file: file.into(), position: Position::Text { line, column } }
+    }
+
+    /// A byte of binary data, with the path of the element that it belongs to.
+    pub fn binary(file: impl Into<Arc<str>>, offset: u64, path: impl Into<String>) -> Self {
+        Self { file: file.into(), position: Position::Binary { offset, path: path.into() } }
+    }
+
+    /// The place of byte `offset` in `text`, by line and column.
+    ///
+    /// Lines end with LF, CRLF or a lone CR. This walks the text: it is for errors.
+    pub fn of_offset(file: impl Into<Arc<str>>, text: &[u8], offset: usize) -> Self {
+        let before = &text[..offset.min(text.len())];
+        let mut line = 1;
+        let mut start = 0;
+        for (i, &byte) in before.iter().enumerate() {
+            let ends = byte == b'\n' || (byte == b'\r' && text.get(i + 1) != Some(&b'\n'));
+            if ends {
+                line += 1;
+                start = i + 1;
+            }
+        }
+        // UTF-8 continuation bytes belong to the character before them.
+        let column = 1 + before[start..].iter().filter(|&&b| b & 0xC0 != 0x80).count() as u64;
+        Self::text(file, line, column)
+    }
+}
+
+impl Display for Place {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.file)?;
+        match &self.position {
+            Position::Whole => Ok(()),
+            Position::Text { line, column } => write!(f, ":{line}:{column}"),
+            Position::Binary { offset, path } if path.is_empty() => write!(f, ":byte {offset}"),
+            Position::Binary { offset, path } => write!(f, ":byte {offset} {path}"),
+        }
+    }
+}
+
+/// How bad it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Severity {
+    /// The input can be used, though something in it was not.
+    Warning,
+    /// The input cannot be used.
+    Error,
+}
+
+impl Display for Severity {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Warning => "warning",
+            Self::Error => "error",
+        })
+    }
+}
+
+/// One thing that is wrong with an input.
+///
+/// Displayed as `error: FILE:LINE:COL: what (found X; expected Y)`, followed by a line for each file that included
+/// this one.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Diagnostic {
+    /// How bad it is.
+    pub severity: Severity,
+    /// Where it is, if it has a place.
+    pub place: Option<Place>,
+    /// What is wrong.
+    pub message: String,
+    /// What stood there.
+    pub found: Option<String>,
+    /// What would have been accepted.
+    pub expected: Option<String>,
+    /// The right name that is nearest to a wrong one.
+    pub suggestion: Option<String>,
+    /// The places of the includes that led to the file, innermost first.
+    pub included_from: Vec<Place>,
+}
+
+impl Diagnostic {
+    /// Something without which the input cannot be used.
+    pub fn error(message: impl Into<String>) -> Self {
+        Self::new(Severity::Error, message.into())
+    }
+
+    /// Something that was not used.
+    pub fn warning(message: impl Into<String>) -> Self {
+        Self::new(Severity::Warning, message.into())
+    }
+
+    fn new(severity: Severity, message: String) -> Self {
+        Self {
+            severity,
+            place: None,
+            message,
+            found: None,
+            expected: None,
+            suggestion: None,
+            included_from: vec![],
+        }
+    }
+
+    /// The same, at a place.
+    #[must_use]
+    pub fn at(self, place: Place) -> Self {
+        Self { place: Some(place), ..self }
+    }
+
+    /// The same, with what stood there. Text from the input should have gone through [`quoted`].
+    #[must_use]
+    pub fn found(self, found: impl Display) -> Self {
+        Self { found: Some(found.to_string()), ..self }
+    }
+
+    /// The same, with what would have been accepted.
+    #[must_use]
+    pub fn expected(self, expected: impl Display) -> Self {
+        Self { expected: Some(expected.to_string()), ..self }
+    }
+
+    /// The same, with the nearest of the `known` names to `name`, where one is near.
+    #[must_use]
+    pub fn suggest<'a>(self, name: &str, known: impl IntoIterator<Item = &'a str>) -> Self {
+        Self { suggestion: nearest_name(name, known).map(str::to_owned), ..self }
+    }
+
+    /// The same, with the include that led here; call it from the innermost include outwards.
+    #[must_use]
+    pub fn included_from(mut self, place: Place) -> Self {
+        self.included_from.push(place);
+        self
+    }
+
+    /// The text without its `error: ` or `warning: `.
+    pub fn body(&self) -> String {
+        let mut text = String::new();
+        if let Some(place) = &self.place {
+            let _ = write!(text, "{place}: ");
+        }
+        text.push_str(&self.message);
+        let details: Vec<String> = [
+            self.found.as_ref().map(|found| format!("found {found}")),
+            self.expected.as_ref().map(|expected| format!("expected {expected}")),
+            self.suggestion.as_ref().map(|name| format!("did you mean {}?", quoted(name))),
+        ]
+        .into_iter()
+        .flatten()
+        .collect();
+        if !details.is_empty() {
+            let _ = write!(text, " ({})", details.join("; "));
+        }
+        for place in &self.included_from {
+            let _ = write!(text, "\n  included from {place}");
+        }
+        text
+    }
+}
+
+impl Display for Diagnostic {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.severity, self.body())
+    }
+}
+
+/// Why an input could not be read or an output not be written.
+///
+/// Displayed without `error: ` in front, as errors are; [`FormatError::to_diagnostic`] has the whole line.
+#[derive(Debug, Error)]
+pub enum FormatError {
+    /// The input is wrong.
+    #[error("{}", .0.body())]
+    Input(Box<Diagnostic>),
+    /// The system refused.
+    #[error("{}: {action}: {source}", .path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What was being done, such as `cannot open`.
+        action: &'static str,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The input asks for more than is allowed.
+    #[error("{}{source}", place_prefix(.place))]
+    Limit {
+        /// Where, if it has a place.
+        place: Option<Place>,
+        /// Which limit, and the flag that raises it.
+        source: LimitError,
+    },
+}
+
+fn place_prefix(place: &Option<Place>) -> String {
+    place.as_ref().map_or_else(String::new, |place| format!("{place}: "))
+}
+
+impl FormatError {
+    /// The system refused to do `action` with the file `path`.
+    pub fn io(path: &Path, action: &'static str, source: io::Error) -> Self {
+        Self::Io { path: path.to_owned(), action, source }
+    }
+
+    /// The same as a diagnostic, whose text starts with `error: `.
+    pub fn to_diagnostic(&self) -> Diagnostic {
+        match self {
+            Self::Input(diagnostic) => (**diagnostic).clone(),
+            Self::Io { path, action, source } => {
+                Diagnostic::error(format!("{action}: {source}")).at(Place::whole(path.display().to_string()))
+            }
+            Self::Limit { place, source } => {
+                Diagnostic { place: place.clone(), ..Diagnostic::error(source.to_string()) }
+            }
+        }
+    }
+
+    /// The same at a place, unless it has one.
+    #[must_use]
+    pub fn or_at(mut self, at: impl FnOnce() -> Place) -> Self {
+        match &mut self {
+            Self::Input(diagnostic) if diagnostic.place.is_none() => diagnostic.place = Some(at()),
+            Self::Limit { place, .. } if place.is_none() => *place = Some(at()),
+            _ => {}
+        }
+        self
+    }
+}
+
+impl From<Diagnostic> for FormatError {
+    /// A warning becomes an error.
+    fn from(diagnostic: Diagnostic) -> Self {
+        Self::Input(Box::new(Diagnostic { severity: Severity::Error, ..diagnostic }))
+    }
+}
+
+impl From<LimitError> for FormatError {
+    fn from(source: LimitError) -> Self {
+        Self::Limit { place: None, source }
+    }
+}
+
+/// What to do about input that is not as it should be.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Strictness {
+    /// Drop what cannot be used, such as a face with a vertex at NaN, with a warning (`--lenient`).
+    Lenient,
+    /// Errors are errors, and warnings are warnings.
+    #[default]
+    Normal,
+    /// Warnings are errors too (`--strict`).
+    Strict,
+}
+
+/// Collects diagnostics: everything is counted, and the first few of each kind are kept.
+///
+/// Two are of a kind when they have the same severity and message, whatever their places and what was found.
+#[derive(Clone, Debug, Default)]
+pub struct Diagnostics {
+    strictness: Strictness,
+    kept: Vec<Diagnostic>,
+    kinds: HashMap<(Severity, String), u64>,
+    warnings: u64,
+    errors: u64,
+}
+
+impl Diagnostics {
+    /// So many of one kind are kept.
+    pub const KEPT_OF_A_KIND: u64 = 8;
+    /// So many are kept in all.
+    pub const KEPT_IN_ALL: usize = 1000;
+
+    /// Nothing collected yet, and [`Strictness::Normal`].
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Nothing collected yet.
+    pub fn with_strictness(strictness: Strictness) -> Self {
+        Self { strictness, ..Self::default() }
+    }
+
+    /// What to do about input that is not as it should be.
+    pub fn strictness(&self) -> Strictness {
+        self.strictness
+    }
+
+    /// Whether what cannot be used should be dropped with a warning.
+    pub fn is_lenient(&self) -> bool {
+        self.strictness == Strictness::Lenient
+    }
+
+    /// Adds one.
+    pub fn push(&mut self, diagnostic: Diagnostic) {
+        match diagnostic.severity {
+            Severity::Warning => self.warnings += 1,
+            Severity::Error => self.errors += 1,
+        }
+        let room = self.kinds.len() < Self::KEPT_IN_ALL;
+        let key = (diagnostic.severity, diagnostic.message.clone());
+        let count = match self.kinds.get_mut(&key) {
+            Some(count) => {
+                *count += 1;
+                *count
+            }
+            None if room => {
+                self.kinds.insert(key, 1);
+                1
+            }
+            None => return,
+        };
+        if count <= Self::KEPT_OF_A_KIND && self.kept.len() < Self::KEPT_IN_ALL {
+            self.kept.push(diagnostic);
+        }
+    }
+
+    /// Adds all that another one collected, after those of this one. Readers in parallel collect apart and are
+    /// joined in a fixed order.
+    pub fn append(&mut self, other: Self) {
+        let (warnings, errors) = (self.warnings + other.warnings, self.errors + other.errors);
+        let mut kept_of_kind: HashMap<(Severity, String), u64> = HashMap::new();
+        for diagnostic in other.kept {
+            *kept_of_kind.entry((diagnostic.severity, diagnostic.message.clone())).or_default() += 1;
+            self.push(diagnostic);
+        }
+        for (kind, count) in other.kinds {
+            let pushed = kept_of_kind.get(&kind).copied().unwrap_or(0);
+            if let Some(mine) = self.kinds.get_mut(&kind) {
+                *mine += count - pushed;
+            } else if self.kinds.len() < Self::KEPT_IN_ALL {
+                self.kinds.insert(kind, count);
+            }
+        }
+        (self.warnings, self.errors) = (warnings, errors);
+    }
+
+    /// Those kept, in the order in which they came.
+    pub fn kept(&self) -> &[Diagnostic] {
+        &self.kept
+    }
+
+    /// How many warnings there were, kept or not.
+    pub fn warnings(&self) -> u64 {
+        self.warnings
+    }
+
+    /// How many errors there were, kept or not.
+    pub fn errors(&self) -> u64 {
+        self.errors
+    }
+
+    /// How many had this severity and message, kept or not.
+    pub fn count(&self, severity: Severity, message: &str) -> u64 {
+        self.kinds.get(&(severity, message.to_owned())).copied().unwrap_or(0)
+    }
+
+    /// Every line to print: those kept, and for each kind that came more often how many more there were.
+    pub fn lines(&self) -> Vec<String> {
+        let mut lines: Vec<String> = self.kept.iter().map(Diagnostic::to_string).collect();
+        let mut more: Vec<_> = self
+            .kinds
+            .iter()
+            .filter(|&(_, &count)| count > Self::KEPT_OF_A_KIND)
+            .map(|((severity, message), count)| (severity, message, count - Self::KEPT_OF_A_KIND))
+            .collect();
+        more.sort();
+        lines.extend(
+            more.into_iter().map(|(severity, message, count)| format!("{severity}: {message} ({count} more)")),
+        );
+        let said: u64 = self.kinds.values().sum();
+        let unsaid = self.warnings + self.errors - said;
+        if unsaid > 0 {
+            lines.push(format!("warning: {unsaid} more of other kinds"));
+        }
+        lines
+    }
+
+    /// The first error, or under [`Strictness::Strict`] the first of any.
+    ///
+    /// # Errors
+    /// That one.
+    pub fn check(&self) -> Result<(), FormatError> {
+        let strict = self.strictness == Strictness::Strict;
+        let first = self.kept.iter().find(|d| strict || d.severity == Severity::Error);
+        first.map_or(Ok(()), |diagnostic| Err(diagnostic.clone().into()))
+    }
+}
+
+/// Text from an input, fit for a message: in double quotes, without control characters, and cut after 60 characters.
+pub fn quoted(text: &str) -> String {
+    let mut out = String::from("\"");
+    for (i, c) in text.chars().enumerate() {
+        if i == 60 {
+            out.push('…');
+            break;
+        }
+        match c {
+            '"' | '\\' => out.extend(['\\', c]),
+            // Controls could drive the terminal, and bidirectional marks could disguise the message.
+            c if c.is_control() || matches!(c, '\u{200E}' | '\u{200F}' | '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{2069}') => {
+                out.extend(c.escape_default());
+            }
+            c => out.push(c),
+        }
+    }
+    out.push('"');
+    out
+}
+
+/// [`quoted`] for bytes that should have been text.
+pub fn quoted_bytes(bytes: &[u8]) -> String {
+    quoted(&String::from_utf8_lossy(&bytes[..bytes.len().min(256)]))
+}
+
+/// The nearest of `known` to `name`, if it is near: at most a third of the longer name's letters are wrong, where a
+/// letter too many, too few or changed and two neighbours exchanged count one each (the optimal string alignment
+/// distance of F. J. Damerau, "A technique for computer detection and correction of spelling errors", CACM 1964).
+/// Upper and lower case are the same. The first one wins a tie.
+pub fn nearest_name<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let letters = |s: &str| s.chars().take(65).flat_map(char::to_lowercase).collect::<Vec<_>>();
+    let wrong = letters(name);
+    if wrong.len() > 64 {
+        return None;
+    }
+    let mut best: Option<(usize, &str)> = None;
+    for candidate in known {
+        let right = letters(candidate);
+        let allowed = (wrong.len().max(right.len()) / 3).max(1);
+        let distance = edit_distance(&wrong, &right);
+        let nearer = best.is_none_or(|(least, _)| distance < least);
+        if distance <= allowed && distance < right.len() && nearer {
+            best = Some((distance, candidate));
+        }
+    }
+    best.map(|(_, name)| name)
+}
+
+fn edit_distance(a: &[char], b: &[char]) -> usize {
+    let mut before_last: Vec<usize>;
+    let mut last = vec![0; b.len() + 1];
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for i in 1..=a.len() {
+        before_last = std::mem::replace(&mut last, row);
+        row = vec![i; b.len() + 1];
+        for j in 1..=b.len() {
+            let change = last[j - 1] + usize::from(a[i - 1] != b[j - 1]);
+            row[j] = change.min(last[j] + 1).min(row[j - 1] + 1);
+            let exchanged = i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1];
+            if exchanged {
+                row[j] = row[j].min(before_last[j - 2] + 1);
+            }
+        }
+    }
+    row[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::budget::{Budget, Limits};
+
+    #[test]
+    fn a_diagnostic_reads_as_the_contract_says() {
+        let d = Diagnostic::error("wrong number of values")
+            .at(Place::text("a/b.pbrt", 12, 7))
+            .found(3)
+            .expected("a multiple of 2");
+        assert_eq!(
+            d.to_string(),
+            "error: a/b.pbrt:12:7: wrong number of values (found 3; expected a multiple of 2)"
+        );
+        let w = Diagnostic::warning("unknown parameter")
+            .at(Place::text("x.pbrt", 4, 2))
+            .found(quoted("rougness"))
+            .suggest("rougness", ["reflectance", "roughness"])
+            .included_from(Place::text("top.pbrt", 9, 1));
+        assert_eq!(
+            w.to_string(),
+            "warning: x.pbrt:4:2: unknown parameter (found \"rougness\"; did you mean \"roughness\"?)\n  \
+             included from top.pbrt:9:1"
+        );
+        let b = Diagnostic::error("not finite").at(Place::binary("m.ply", 812, "/vertex/3/x")).found("NaN");
+        assert_eq!(b.to_string(), "error: m.ply:byte 812 /vertex/3/x: not finite (found NaN)");
+        assert_eq!(Diagnostic::error("nothing to render").to_string(), "error: nothing to render");
+    }
+
+    #[test]
+    fn an_error_is_shown_as_its_diagnostic_without_the_prefix() {
+        let input: FormatError = Diagnostic::warning("odd").at(Place::text("f", 2, 3)).into();
+        let limit = FormatError::from(
+            Budget::new(Limits { memory: 9, ..Limits::default() }).bytes(10, "pixels").unwrap_err(),
+        )
+        .or_at(|| Place::whole("big.png"));
+        let io = FormatError::io(Path::new("a/b.obj"), "cannot open", io::ErrorKind::NotFound.into());
+        assert_eq!(input.to_string(), "f:2:3: odd");
+        assert!(limit.to_string().starts_with("big.png: pixels: needs 10 bytes of memory, limit 9"));
+        assert!(io.to_string().starts_with("a/b.obj: cannot open: "));
+        for error in [input, limit, io] {
+            assert_eq!(error.to_diagnostic().to_string(), format!("error: {error}"));
+        }
+    }
+
+    #[test]
+    fn lines_and_columns_count_characters_and_every_kind_of_line_end() {
+        let text = "ab\r\nçd\rx\n\nyz".as_bytes();
+        let at = |needle: u8| {
+            let offset = text.iter().position(|&b| b == needle).unwrap();
+            let Position::Text { line, column } = Place::of_offset("t", text, offset).position else { panic!() };
+            (line, column)
+        };
+        assert_eq!(at(b'b'), (1, 2));
+        assert_eq!(at(b'd'), (2, 2));
+        assert_eq!(at(b'x'), (3, 1));
+        assert_eq!(at(b'z'), (5, 2));
+        assert_eq!(Place::of_offset("t", text, 10_000), Place::text("t", 5, 3));
+    }
+
+    #[test]
+    fn repeats_are_counted_though_not_kept() {
+        let mut all = Diagnostics::new();
+        for i in 0..50 {
+            all.push(Diagnostic::warning("dropped face").at(Place::text("m.obj", i, 1)).found(i));
+        }
+        all.push(Diagnostic::error("bad"));
+        assert_eq!((all.warnings(), all.errors()), (50, 1));
+        assert_eq!(all.kept().len(), 9);
+        assert_eq!(all.count(Severity::Warning, "dropped face"), 50);
+        assert!(all.lines().contains(&"warning: dropped face (42 more)".to_owned()));
+
+        let mut joined = Diagnostics::new();
+        joined.push(Diagnostic::warning("dropped face"));
+        joined.append(all);
+        assert_eq!((joined.warnings(), joined.errors()), (51, 1));
+        assert_eq!(joined.count(Severity::Warning, "dropped face"), 51);
+        assert_eq!(joined.count(Severity::Error, "bad"), 1);
+    }
+
+    #[test]
+    fn endless_kinds_are_counted_in_bounded_memory() {
+        let mut all = Diagnostics::new();
+        for i in 0..5000 {
+            all.push(Diagnostic::warning(format!("unknown thing {i}")));
+        }
+        assert_eq!(all.warnings(), 5000);
+        assert_eq!(all.kept().len(), Diagnostics::KEPT_IN_ALL);
+        assert_eq!(all.lines().last().unwrap(), "warning: 4000 more of other kinds");
+    }
+
+    #[test]
+    fn strict_turns_the_first_warning_into_an_error() {
+        let mut normal = Diagnostics::new();
+        let mut strict = Diagnostics::with_strictness(Strictness::Strict);
+        for all in [&mut normal, &mut strict] {
+            all.push(Diagnostic::warning("first"));
+            all.push(Diagnostic::warning("second"));
+        }
+        assert!(normal.check().is_ok());
+        assert_eq!(strict.check().unwrap_err().to_diagnostic().to_string(), "error: first");
+    }
+
+    #[test]
+    fn the_nearest_name_is_found_only_when_it_is_near() {
+        let known = ["roughness", "uroughness", "reflectance", "eta", "k"];
+        assert_eq!(nearest_name("rougness", known), Some("roughness"));
+        assert_eq!(nearest_name("rouhgness", known), Some("roughness"));
+        assert_eq!(nearest_name("Reflectence", known), Some("reflectance"));
+        assert_eq!(nearest_name("etta", known), Some("eta"));
+        assert_eq!(nearest_name("x", known), None);
+        assert_eq!(nearest_name("subsurface", known), None);
+        assert_eq!(nearest_name(&"a".repeat(1_000_000), known), None);
+    }
+
+    #[test]
+    fn exchanged_neighbours_count_once() {
+        let d = |a: &str, b: &str| {
+            edit_distance(&a.chars().collect::<Vec<_>>(), &b.chars().collect::<Vec<_>>())
+        };
+        assert_eq!(d("speher", "sphere"), 2);
+        assert_eq!(d("ab", "ba"), 1);
+        assert_eq!(d("", "abc"), 3);
+        assert_eq!(d("kitten", "sitting"), 3);
+    }
+
+    #[test]
+    fn text_from_an_input_cannot_drive_the_terminal() {
+        assert_eq!(quoted("a\x1b[31m\"b\"\n"), r#""a\u{1b}[31m\"b\"\n""#);
+        assert_eq!(quoted(&"y".repeat(1000)).chars().count(), 63);
+        assert_eq!(quoted_bytes(&[0xFF, b'a']), "\"\u{FFFD}a\"");
+    }
+}

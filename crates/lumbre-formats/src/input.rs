@@ -1,0 +1,319 @@
+//! Opening inputs: regular files only, unpacked when they are gzip, and never more than the budget allows.
+
+use std::borrow::Cow;
+use std::fs::File;
+use std::io::{self, Read};
+use std::ops::Deref;
+use std::path::Path;
+use std::sync::Arc;
+
+use flate2::bufread::MultiGzDecoder;
+
+use crate::budget::{Budget, Hold};
+use crate::diagnostic::{Diagnostic, FormatError, Place};
+
+/// The bytes of a file, charged to the budget for as long as they live.
+#[derive(Debug)]
+pub struct Input<'b> {
+    name: Arc<str>,
+    bytes: Vec<u8>,
+    hold: Hold<'b>,
+}
+
+impl<'b> Input<'b> {
+    /// Reads the file `path`, taken as it is: no variable, `~` or `%2e` in it is expanded. A file that starts as gzip
+    /// does is unpacked.
+    ///
+    /// # Errors
+    /// [`FormatError::Io`] when the system refuses or `path` is not a regular file (a folder, a pipe, a device),
+    /// [`FormatError::Limit`] when there is more than the budget allows, and [`FormatError::Input`] when gzip data
+    /// is damaged.
+    pub fn open(path: &Path, budget: &'b Budget) -> Result<Self, FormatError> {
+        let name: Arc<str> = path.display().to_string().into();
+        budget.file(&name)?;
+        let refuse = |action, source| FormatError::io(path, action, source);
+        let not_regular = |kind: std::fs::FileType| {
+            let what = if kind.is_dir() { "it is a folder" } else { "it is not a regular file" };
+            refuse("cannot read", io::Error::new(io::ErrorKind::InvalidInput, what))
+        };
+        // Looked at before it is opened, as opening a pipe would wait for its writer; and after, as it may have been
+        // exchanged in between.
+        let before = std::fs::metadata(path).map_err(|e| refuse("cannot open", e))?;
+        if !before.is_file() {
+            return Err(not_regular(before.file_type()));
+        }
+        let file = File::open(path).map_err(|e| refuse("cannot open", e))?;
+        let meta = file.metadata().map_err(|e| refuse("cannot open", e))?;
+        if !meta.is_file() {
+            return Err(not_regular(meta.file_type()));
+        }
+        let mut bytes = Vec::new();
+        let mut hold = budget.hold(0, &name)?;
+        read_within(file, meta.len(), &mut bytes, &mut hold, &name, |_| Ok(()))
+            .map_err(|e| e.into_format_error(path, &name))?;
+        let input = Self { name, bytes, hold };
+        if input.bytes.starts_with(&[0x1F, 0x8B]) { input.unpacked(path, budget) } else { Ok(input) }
+    }
+
+    /// Bytes that come from elsewhere, such as standard input, under a name for messages.
+    ///
+    /// # Errors
+    /// As [`Input::open`].
+    pub fn from_reader(name: &str, reader: impl Read, budget: &'b Budget) -> Result<Self, FormatError> {
+        let name: Arc<str> = name.into();
+        let path = Path::new(&*name);
+        budget.file(&name)?;
+        let mut bytes = Vec::new();
+        let mut hold = budget.hold(0, &name)?;
+        read_within(reader, 0, &mut bytes, &mut hold, &name, |_| Ok(()))
+            .map_err(|e| e.into_format_error(path, &name))?;
+        let input = Self { name: name.clone(), bytes, hold };
+        if input.bytes.starts_with(&[0x1F, 0x8B]) { input.unpacked(path, budget) } else { Ok(input) }
+    }
+
+    fn unpacked(self, path: &Path, budget: &'b Budget) -> Result<Self, FormatError> {
+        let packed = self.bytes.len() as u64;
+        let mut bytes = Vec::new();
+        let mut hold = budget.hold(0, &self.name)?;
+        let within = |unpacked| budget.expansion(packed, unpacked, &self.name);
+        read_within(MultiGzDecoder::new(&self.bytes[..]), 0, &mut bytes, &mut hold, &self.name, within).map_err(
+            |e| match e {
+                ReadError::Limit(limit) => FormatError::from(limit),
+                ReadError::Io(source) => match source.kind() {
+                    io::ErrorKind::InvalidInput
+                    | io::ErrorKind::InvalidData
+                    | io::ErrorKind::UnexpectedEof => {
+                        Diagnostic::error("damaged gzip data").at(Place::whole(self.name.clone())).found(source).into()
+                    }
+                    _ => FormatError::io(path, "cannot unpack", source),
+                },
+            },
+        )?;
+        Ok(Self { name: self.name, bytes, hold })
+    }
+
+    /// The name for messages: the path as it was given.
+    pub fn name(&self) -> &Arc<str> {
+        &self.name
+    }
+
+    /// The bytes as text, without a byte order mark.
+    ///
+    /// # Errors
+    /// As [`text`].
+    pub fn text(&self) -> Result<&str, FormatError> {
+        text(&self.bytes, &self.name)
+    }
+
+    /// The bytes themselves, which the budget goes on being charged for.
+    pub fn into_bytes(self) -> Vec<u8> {
+        self.hold.keep();
+        self.bytes
+    }
+}
+
+impl Deref for Input<'_> {
+    type Target = [u8];
+
+    fn deref(&self) -> &[u8] {
+        &self.bytes
+    }
+}
+
+/// `bytes` as UTF-8 text, without a byte order mark.
+///
+/// # Errors
+/// When they are UTF-16 or UTF-32 by their byte order mark, and with the place of the first byte that is not UTF-8.
+pub fn text<'a>(bytes: &'a [u8], name: &Arc<str>) -> Result<&'a str, FormatError> {
+    let foreign = if bytes.starts_with(&[0xFF, 0xFE, 0, 0]) || bytes.starts_with(&[0, 0, 0xFE, 0xFF]) {
+        Some("UTF-32")
+    } else if bytes.starts_with(&[0xFF, 0xFE]) || bytes.starts_with(&[0xFE, 0xFF]) {
+        Some("UTF-16")
+    } else {
+        None
+    };
+    if let Some(found) = foreign {
+        let wrong = Diagnostic::error("unsupported text encoding").at(Place::text(name.clone(), 1, 1));
+        return Err(wrong.found(found).expected("UTF-8").into());
+    }
+    let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
+    std::str::from_utf8(bytes).map_err(|e| {
+        let offset = e.valid_up_to();
+        Diagnostic::error("text is not UTF-8")
+            .at(Place::of_offset(name.clone(), bytes, offset))
+            .found(format!("byte 0x{:02x}", bytes[offset]))
+            .into()
+    })
+}
+
+/// `bytes` as text whatever they are: bytes that are not UTF-8 become U+FFFD. For formats of a time before UTF-8,
+/// where such bytes stand in names and comments.
+pub fn lossy_text(bytes: &[u8]) -> Cow<'_, str> {
+    String::from_utf8_lossy(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes))
+}
+
+enum ReadError {
+    Io(io::Error),
+    Limit(crate::budget::LimitError),
+}
+
+impl ReadError {
+    fn into_format_error(self, path: &Path, name: &Arc<str>) -> FormatError {
+        match self {
+            Self::Io(source) => FormatError::io(path, "cannot read", source),
+            Self::Limit(limit) => FormatError::from(limit).or_at(|| Place::whole(name.clone())),
+        }
+    }
+}
+
+impl From<crate::budget::LimitError> for ReadError {
+    fn from(limit: crate::budget::LimitError) -> Self {
+        Self::Limit(limit)
+    }
+}
+
+/// Reads to the end, charging for room before it is made. The room grows by half, never by what a header says.
+fn read_within(
+    mut reader: impl Read,
+    expected: u64,
+    bytes: &mut Vec<u8>,
+    hold: &mut Hold<'_>,
+    name: &str,
+    within: impl Fn(u64) -> Result<(), crate::budget::LimitError>,
+) -> Result<(), ReadError> {
+    const LEAST: usize = 64 << 10;
+    let mut filled = 0;
+    loop {
+        if filled == bytes.len() {
+            // One more than expected, so that the end shows without growing again. Files of a system folder say 0.
+            let first = usize::try_from(expected).unwrap_or(usize::MAX).saturating_add(1).max(LEAST);
+            let more = if filled == 0 { first } else { (filled / 2).max(LEAST) };
+            hold.grow(more as u64, name)?;
+            let refused = |_| crate::budget::LimitError {
+                what: name.to_owned(),
+                kind: crate::budget::LimitKind::Memory,
+                needed: (filled + more) as u64,
+                limit: filled as u64,
+            };
+            bytes.try_reserve_exact(more).map_err(refused)?;
+            bytes.resize(filled + more, 0);
+        }
+        match reader.read(&mut bytes[filled..]) {
+            Ok(0) => break,
+            Ok(read) => filled += read,
+            Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+            Err(e) => return Err(ReadError::Io(e)),
+        }
+        within(filled as u64)?;
+    }
+    bytes.truncate(filled);
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+
+    use flate2::Compression;
+    use flate2::write::GzEncoder;
+
+    use super::*;
+    use crate::budget::Limits;
+
+    fn gzip(bytes: &[u8]) -> Vec<u8> {
+        let mut packer = GzEncoder::new(Vec::new(), Compression::best());
+        packer.write_all(bytes).unwrap();
+        packer.finish().unwrap()
+    }
+
+    #[test]
+    fn a_file_and_its_gzip_read_the_same_and_give_back_their_bytes() {
+        let dir = tempfile::tempdir().unwrap();
+        let budget = Budget::default();
+        let text: Vec<u8> = (0..300_000u32).flat_map(|i| i.to_le_bytes()).collect();
+        for (name, contents) in [("plain.bin", text.clone()), ("packed.bin.gz", gzip(&text))] {
+            let path = dir.path().join(name);
+            std::fs::write(&path, contents).unwrap();
+            let input = Input::open(&path, &budget).unwrap();
+            assert!(*input == text[..], "{name}");
+            assert!(budget.memory_held() >= text.len() as u64);
+            drop(input);
+            assert_eq!(budget.memory_held(), 0);
+        }
+    }
+
+    #[test]
+    fn only_regular_files_are_read() {
+        let dir = tempfile::tempdir().unwrap();
+        let budget = Budget::default();
+        let cases = [
+            (dir.path().to_owned(), "it is a folder"),
+            ("/dev/zero".into(), "it is not a regular file"),
+            (dir.path().join("absent.ply"), "cannot open"),
+            ("$HOME/.profile".into(), "cannot open"),
+        ];
+        for (path, expected) in cases {
+            let error = Input::open(&path, &budget).unwrap_err();
+            assert!(matches!(error, FormatError::Io { .. }));
+            assert!(error.to_string().contains(expected), "{error}");
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_pipe_is_refused_rather_than_waited_for() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("pipe");
+        let made = std::process::Command::new("mkfifo").arg(&path).status();
+        if !made.is_ok_and(|status| status.success()) {
+            println!("skipped: no mkfifo here");
+            return;
+        }
+        let error = Input::open(&path, &Budget::default()).unwrap_err();
+        assert!(error.to_string().contains("it is not a regular file"), "{error}");
+    }
+
+    #[test]
+    fn a_gzip_bomb_is_refused_by_ratio_and_by_memory() {
+        let bomb = gzip(&vec![0; 80 << 20]);
+        assert!(bomb.len() < 100_000);
+        let by_ratio = Budget::default();
+        let error = Input::from_reader("bomb.gz", &bomb[..], &by_ratio).unwrap_err();
+        assert!(error.to_string().contains("--max-expansion"), "{error}");
+        assert!(by_ratio.memory_peak() < 160 << 20);
+        let by_memory = Budget::new(Limits { memory: 1 << 20, ..Limits::default() });
+        let error = Input::from_reader("bomb.gz", &bomb[..], &by_memory).unwrap_err();
+        assert!(error.to_string().contains("--max-memory"), "{error}");
+        assert!(by_memory.memory_peak() <= 1 << 20);
+        assert_eq!(by_memory.memory_held(), 0);
+    }
+
+    #[test]
+    fn damaged_gzip_data_is_an_error_of_the_input() {
+        let whole = gzip(b"ply\nformat ascii 1.0\n");
+        for cut in 2..whole.len() {
+            let error = Input::from_reader("m.ply.gz", &whole[..cut], &Budget::default()).unwrap_err();
+            assert!(error.to_string().starts_with("m.ply.gz: damaged gzip data"), "{error}");
+        }
+    }
+
+    #[test]
+    fn files_are_counted() {
+        let budget = Budget::new(Limits { files: 3, ..Limits::default() });
+        for _ in 0..3 {
+            Input::from_reader("part", &b"text"[..], &budget).unwrap();
+        }
+        let error = Input::from_reader("part", &b"text"[..], &budget).unwrap_err();
+        assert!(error.to_string().contains("--max-files"), "{error}");
+    }
+
+    #[test]
+    fn text_may_have_a_byte_order_mark_and_must_be_utf8() {
+        let name: Arc<str> = "a.pbrt".into();
+        assert_eq!(text(b"\xEF\xBB\xBFShape", &name).unwrap(), "Shape");
+        let utf16 = text(b"\xFF\xFES\0", &name).unwrap_err().to_string();
+        assert_eq!(utf16, "a.pbrt:1:1: unsupported text encoding (found UTF-16; expected UTF-8)");
+        let latin1 = text(b"ok\nna\xEFve", &name).unwrap_err().to_string();
+        assert_eq!(latin1, "a.pbrt:2:3: text is not UTF-8 (found byte 0xef)");
+    }
+}
