@@ -13,7 +13,7 @@ use thiserror::Error;
 pub struct Limits {
     /// Bytes held at one time by everything that was read (`--max-memory`).
     pub memory: u64,
-    /// Vertices, faces, pixels' rows, shapes, tokens and the like over the whole run (`--max-elements`).
+    /// Vertices, faces, shapes, parameters and the like over the whole run (`--max-elements`).
     pub elements: u64,
     /// Levels of nesting: includes, attribute blocks, objects in objects, JSON (`--max-nesting`).
     pub nesting: u32,

@@ -414,7 +414,8 @@ impl Diagnostics {
             .collect();
         more.sort();
         lines.extend(
-            more.into_iter().map(|(severity, message, count)| format!("{severity}: {message} ({count} more)")),
+            more.into_iter()
+                .map(|(severity, message, count)| format!("{severity}: {message} ({count} more)")),
         );
         let said: u64 = self.kinds.values().sum();
         let unsaid = self.warnings + self.errors - said;
@@ -446,7 +447,9 @@ pub fn quoted(text: &str) -> String {
         match c {
             '"' | '\\' => out.extend(['\\', c]),
             // Controls could drive the terminal, and bidirectional marks could disguise the message.
-            c if c.is_control() || matches!(c, '\u{200E}' | '\u{200F}' | '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{2069}') => {
+            c if c.is_control()
+                || matches!(c, '\u{200E}' | '\u{200F}' | '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{2069}') =>
+            {
                 out.extend(c.escape_default());
             }
             c => out.push(c),
@@ -554,7 +557,9 @@ mod tests {
         let text = "ab\r\nçd\rx\n\nyz".as_bytes();
         let at = |needle: u8| {
             let offset = text.iter().position(|&b| b == needle).unwrap();
-            let Position::Text { line, column } = Place::of_offset("t", text, offset).position else { panic!() };
+            let Position::Text { line, column } = Place::of_offset("t", text, offset).position else {
+                panic!()
+            };
             (line, column)
         };
         assert_eq!(at(b'b'), (1, 2));
@@ -621,9 +626,8 @@ mod tests {
 
     #[test]
     fn exchanged_neighbours_count_once() {
-        let d = |a: &str, b: &str| {
-            edit_distance(&a.chars().collect::<Vec<_>>(), &b.chars().collect::<Vec<_>>())
-        };
+        let d =
+            |a: &str, b: &str| edit_distance(&a.chars().collect::<Vec<_>>(), &b.chars().collect::<Vec<_>>());
         assert_eq!(d("speher", "sphere"), 2);
         assert_eq!(d("ab", "ba"), 1);
         assert_eq!(d("", "abc"), 3);

@@ -76,19 +76,19 @@ impl<'b> Input<'b> {
         let mut bytes = Vec::new();
         let mut hold = budget.hold(0, &self.name)?;
         let within = |unpacked| budget.expansion(packed, unpacked, &self.name);
-        read_within(MultiGzDecoder::new(&self.bytes[..]), 0, &mut bytes, &mut hold, &self.name, within).map_err(
-            |e| match e {
+        read_within(MultiGzDecoder::new(&self.bytes[..]), 0, &mut bytes, &mut hold, &self.name, within)
+            .map_err(|e| match e {
                 ReadError::Limit(limit) => FormatError::from(limit),
                 ReadError::Io(source) => match source.kind() {
                     io::ErrorKind::InvalidInput
                     | io::ErrorKind::InvalidData
-                    | io::ErrorKind::UnexpectedEof => {
-                        Diagnostic::error("damaged gzip data").at(Place::whole(self.name.clone())).found(source).into()
-                    }
+                    | io::ErrorKind::UnexpectedEof => Diagnostic::error("damaged gzip data")
+                        .at(Place::whole(self.name.clone()))
+                        .found(source)
+                        .into(),
                     _ => FormatError::io(path, "cannot unpack", source),
                 },
-            },
-        )?;
+            })?;
         Ok(Self { name: self.name, bytes, hold })
     }
 

@@ -1,7 +1,13 @@
 //! Colours and rectangles of colours. No files here: reading and writing them is another floor's work.
 
+mod bitmap;
+mod encoding;
+mod half;
 mod image;
 mod rgb;
 
+pub use crate::half::{f32_to_half, half_to_f32};
 pub use crate::image::Image;
+pub use bitmap::{Bitmap, Channels, PixelData};
+pub use encoding::{Encoded, Encoding, linear_to_srgb, srgb_to_linear, unit_to_u8, unit_to_u16};
 pub use rgb::Rgb;

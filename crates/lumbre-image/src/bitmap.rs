@@ -1,0 +1,276 @@
+//! A picture as its file has it: one to four channels in the file's own number format.
+
+use crate::half::half_to_f32;
+use crate::{Encoding, Image, Rgb};
+
+/// The numbers of a [`Bitmap`], channels innermost, row by row from the top left.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PixelData {
+    /// Bytes that stand for `[0, 1]`.
+    U8(Vec<u8>),
+    /// 16 bits that stand for `[0, 1]`.
+    U16(Vec<u16>),
+    /// Half-precision numbers as their bits.
+    F16(Vec<u16>),
+    /// Single-precision numbers.
+    F32(Vec<f32>),
+}
+
+impl PixelData {
+    /// How many numbers there are.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::U8(v) => v.len(),
+            Self::U16(v) | Self::F16(v) => v.len(),
+            Self::F32(v) => v.len(),
+        }
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Bytes that one number takes.
+    pub fn bytes_each(&self) -> usize {
+        match self {
+            Self::U8(_) => 1,
+            Self::U16(_) | Self::F16(_) => 2,
+            Self::F32(_) => 4,
+        }
+    }
+}
+
+/// What the channels of a [`Bitmap`] are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Channels {
+    /// Grey.
+    Y,
+    /// Grey and coverage.
+    Ya,
+    /// Red, green, blue.
+    Rgb,
+    /// Red, green, blue, coverage.
+    Rgba,
+}
+
+impl Channels {
+    /// How many there are.
+    pub const fn count(self) -> usize {
+        match self {
+            Self::Y => 1,
+            Self::Ya => 2,
+            Self::Rgb => 3,
+            Self::Rgba => 4,
+        }
+    }
+
+    /// Those that are so many, from 1 to 4.
+    pub const fn from_count(count: usize) -> Option<Self> {
+        match count {
+            1 => Some(Self::Y),
+            2 => Some(Self::Ya),
+            3 => Some(Self::Rgb),
+            4 => Some(Self::Rgba),
+            _ => None,
+        }
+    }
+
+    /// Which one is coverage.
+    pub const fn alpha(self) -> Option<usize> {
+        match self {
+            Self::Y | Self::Rgb => None,
+            Self::Ya => Some(1),
+            Self::Rgba => Some(3),
+        }
+    }
+}
+
+/// A picture as its file has it, so that a texture of bytes takes bytes.
+///
+/// Colours are on the file's primaries (Rec. 709 unless something says otherwise) and multiplied by coverage or not, as
+/// the file has them: PNG, TGA, BMP and QOI not, EXR multiplied.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bitmap {
+    // `data.len() == width * height * channels.count()`, and neither side is 0.
+    width: u32,
+    height: u32,
+    channels: Channels,
+    data: PixelData,
+    encoding: Encoding,
+}
+
+impl Bitmap {
+    /// A picture from its numbers; `None` unless there are `width * height * channels` of them and at least one.
+    pub fn new(
+        width: u32,
+        height: u32,
+        channels: Channels,
+        data: PixelData,
+        encoding: Encoding,
+    ) -> Option<Self> {
+        let expected = u128::from(width) * u128::from(height) * channels.count() as u128;
+        let fits = !data.is_empty() && data.len() as u128 == expected;
+        fits.then_some(Self { width, height, channels, data, encoding })
+    }
+
+    /// Pixels across, at least 1.
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Pixels down, at least 1.
+    pub fn height(&self) -> u32 {
+        self.height
+    }
+
+    /// What the channels are.
+    pub fn channels(&self) -> Channels {
+        self.channels
+    }
+
+    /// The stored numbers.
+    pub fn data(&self) -> &PixelData {
+        &self.data
+    }
+
+    /// How the colour channels stand for light.
+    pub fn encoding(&self) -> Encoding {
+        self.encoding
+    }
+
+    /// The same numbers taken to stand for light in another way, as a scene may say of a texture.
+    #[must_use]
+    pub fn with_encoding(self, encoding: Encoding) -> Self {
+        Self { encoding, ..self }
+    }
+
+    /// Bytes of memory that the numbers take.
+    pub fn bytes(&self) -> usize {
+        self.data.len() * self.data.bytes_each()
+    }
+
+    /// Channel `c` of the pixel `x` from the left and `y` from the top, as light (coverage as it is).
+    ///
+    /// # Panics
+    /// When it lies outside the picture.
+    pub fn texel(&self, x: u32, y: u32, c: usize) -> f32 {
+        let i = self.index(x, y, c);
+        let encoding = if self.channels.alpha() == Some(c) { Encoding::Linear } else { self.encoding };
+        match &self.data {
+            PixelData::U8(v) => encoding.decode_u8(v[i]),
+            PixelData::U16(v) => encoding.decode_u16(v[i]),
+            PixelData::F16(v) => encoding.decode(half_to_f32(v[i])),
+            PixelData::F32(v) => encoding.decode(v[i]),
+        }
+    }
+
+    /// Channel `c` of the pixel `x` from the left and `y` from the top, as it is stored: whole numbers as parts of 1.
+    ///
+    /// # Panics
+    /// When it lies outside the picture.
+    pub fn stored(&self, x: u32, y: u32, c: usize) -> f32 {
+        let i = self.index(x, y, c);
+        match &self.data {
+            PixelData::U8(v) => f32::from(v[i]) / 255.0,
+            PixelData::U16(v) => f32::from(v[i]) / 65535.0,
+            PixelData::F16(v) => half_to_f32(v[i]),
+            PixelData::F32(v) => v[i],
+        }
+    }
+
+    /// The light of the pixel `x` from the left and `y` from the top, grey in all three channels.
+    ///
+    /// # Panics
+    /// When it lies outside the picture.
+    pub fn rgb(&self, x: u32, y: u32) -> Rgb {
+        match self.channels {
+            Channels::Y | Channels::Ya => Rgb::splat(self.texel(x, y, 0)),
+            Channels::Rgb | Channels::Rgba => {
+                Rgb::new(self.texel(x, y, 0), self.texel(x, y, 1), self.texel(x, y, 2))
+            }
+        }
+    }
+
+    /// The coverage of the pixel `x` from the left and `y` from the top; 1 when the picture has none.
+    ///
+    /// # Panics
+    /// When it lies outside the picture.
+    pub fn alpha(&self, x: u32, y: u32) -> f32 {
+        self.channels.alpha().map_or(1.0, |c| self.texel(x, y, c))
+    }
+
+    /// The picture as light.
+    pub fn to_image(&self) -> Image {
+        let places = || (0..self.height).flat_map(|y| (0..self.width).map(move |x| (x, y)));
+        let colours = places().map(|(x, y)| self.rgb(x, y)).collect();
+        let image = Image::from_pixels(self.width, self.height, colours).expect("one colour a pixel");
+        match self.channels.alpha() {
+            None => image,
+            Some(c) => {
+                let alpha = places().map(|(x, y)| self.texel(x, y, c)).collect();
+                image.with_alpha(alpha).expect("one coverage a pixel")
+            }
+        }
+    }
+
+    fn index(&self, x: u32, y: u32, c: usize) -> usize {
+        assert!(
+            x < self.width && y < self.height && c < self.channels.count(),
+            "no channel {c} of pixel ({x}, {y}) in {} by {} of {:?}",
+            self.width,
+            self.height,
+            self.channels
+        );
+        (y as usize * self.width as usize + x as usize) * self.channels.count() + c
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::half::f32_to_half;
+
+    #[test]
+    fn texels_are_light_in_every_number_format() {
+        let stored = [0.2f32, 0.4, 0.6, 0.8, 0.0, 1.0, 0.2, 0.6, 0.8, 0.4, 0.6, 0.2];
+        let formats = [
+            (PixelData::U8(stored.map(|v| (v * 255.0) as u8).to_vec()), 1e-6),
+            (PixelData::U16(stored.map(|v| (v * 65535.0) as u16).to_vec()), 1e-6),
+            (PixelData::F16(stored.map(f32_to_half).to_vec()), 1e-3),
+            (PixelData::F32(stored.to_vec()), 1e-6),
+        ];
+        for (data, tolerance) in formats {
+            let bitmap = Bitmap::new(3, 2, Channels::Ya, data, Encoding::Srgb).unwrap();
+            for (i, &v) in stored.iter().enumerate() {
+                let (x, y, c) = (i as u32 / 2 % 3, i as u32 / 6, i % 2);
+                let expected = if c == 1 { v } else { Encoding::Srgb.decode(v) };
+                assert!((bitmap.texel(x, y, c) - expected).abs() < tolerance, "{x} {y} {c}");
+                assert!((bitmap.stored(x, y, c) - v).abs() < tolerance);
+            }
+            let image = bitmap.to_image();
+            assert_eq!(image.pixel(2, 1), bitmap.rgb(2, 1));
+            assert_eq!(image.alpha().unwrap()[5], bitmap.alpha(2, 1));
+        }
+    }
+
+    #[test]
+    fn a_picture_has_all_its_numbers_and_at_least_one() {
+        let make = |w, h, n| Bitmap::new(w, h, Channels::Rgb, PixelData::U8(vec![9; n]), Encoding::Srgb);
+        assert!(make(4, 3, 36).is_some());
+        assert!(make(4, 3, 35).is_none());
+        assert!(make(0, 3, 0).is_none());
+        assert!(make(u32::MAX, u32::MAX, 3).is_none());
+    }
+
+    #[test]
+    fn another_encoding_changes_light_and_not_numbers() {
+        let data = PixelData::U8(vec![10, 128, 250, 64, 32, 16]);
+        let srgb = Bitmap::new(2, 1, Channels::Rgb, data, Encoding::Srgb).unwrap();
+        let linear = srgb.clone().with_encoding(Encoding::Linear);
+        assert_eq!(srgb.stored(0, 0, 1), linear.stored(0, 0, 1));
+        assert_eq!(linear.texel(0, 0, 1), 128.0 / 255.0);
+        assert!(srgb.texel(0, 0, 1) < 0.22);
+        assert_eq!(srgb.bytes(), 6);
+    }
+}
