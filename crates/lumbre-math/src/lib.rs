@@ -9,6 +9,7 @@ pub use glam::{DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, DVec4, Vec2, Vec3};
 
 pub mod frame;
 pub mod random;
+pub mod sobol;
 pub mod transform;
 
 pub use frame::{Frame, orthonormal_basis, orthonormal_basis_f32};
