@@ -18,6 +18,14 @@ pub struct Root {
     pub local: DVec2,
 }
 
+impl Root {
+    /// A simple crossing of part 0.
+    #[inline]
+    pub fn at(t: f64) -> Self {
+        Self { t, part: 0, multiplicity: 1, local: DVec2::ZERO }
+    }
+}
+
 /// Crossings in ascending order of `t`.
 pub type Roots = SmallVec<[Root; 4]>;
 
@@ -40,6 +48,25 @@ pub struct Surface {
     pub dndu: DVec3,
     /// ∂normal/∂v.
     pub dndv: DVec3,
+}
+
+impl Surface {
+    /// An origin for a ray that leaves along `direction`: on that side of the surface, past the error of `point`, so that
+    /// the ray does not meet the surface where it starts.
+    ///
+    /// M. Pharr, W. Jakob, G. Humphreys, "Physically Based Rendering", 3rd edition, 2016, section 3.9.
+    pub fn offset_origin(&self, direction: DVec3) -> DVec3 {
+        let distance = self.normal.abs().dot(self.point_error);
+        let side = if self.normal.dot(direction) < 0.0 { -self.normal } else { self.normal };
+        let moved = self.point + distance * side;
+        // Away from the surface, whatever the last addition rounded off.
+        let outward = |axis: usize| match side[axis] {
+            s if s > 0.0 => moved[axis].next_up(),
+            s if s < 0.0 => moved[axis].next_down(),
+            _ => moved[axis],
+        };
+        DVec3::new(outward(0), outward(1), outward(2))
+    }
 }
 
 /// A point chosen on a surface.

@@ -1,8 +1,9 @@
 //! A shape and where it stands.
 
-use lumbre_math::{DVec2, DVec3, Transform};
+use lumbre_math::{DMat3, DVec2, DVec3, Transform};
 
-use crate::{Aabb, DirectionSample, Ray, Root, Roots, Shape, Surface, SurfaceSample};
+use crate::support::gamma;
+use crate::{Aabb, DirectionSample, Ray, Root, Roots, Shape, Surface, SurfaceSample, measure};
 
 /// An exact shape under any invertible affine map. The ray goes to the shape, not the shape to the ray, and `t` stays.
 #[derive(Clone, Debug)]
@@ -54,8 +55,13 @@ impl PlacedShape {
     }
 
     /// The surface, in world space, where `root` was found along `ray`.
-    pub fn surface(&self, _ray: &Ray, _root: &Root) -> Surface {
-        unimplemented!("skeleton")
+    ///
+    /// `point_error` covers the rounding of the way to world space and of the way back that the next ray takes.
+    pub fn surface(&self, ray: &Ray, root: &Root) -> Surface {
+        match &self.world_from_object {
+            None => self.shape.surface(ray, root),
+            Some(m) => into_world(m, &self.shape.surface(&ray.into_object(m), root)),
+        }
     }
 
     /// The tightest box around it, rounded outward; `None` when it is infinite.
@@ -65,22 +71,95 @@ impl PlacedShape {
 
     /// Area in world space; infinite for infinite shapes.
     pub fn area(&self) -> f64 {
-        unimplemented!("skeleton")
+        match &self.world_from_object {
+            None => self.shape.area(),
+            Some(m) => match measure::similarity_factor(m) {
+                Some(factor) => factor * factor * self.shape.area(),
+                None => self.shape.area_under(m),
+            },
+        }
     }
 
-    /// A point uniform by world-space area; `None` for infinite shapes.
-    pub fn sample_area(&self, _u: DVec2) -> Option<SurfaceSample> {
-        unimplemented!("skeleton")
+    /// A point on the surface; `None` for infinite shapes.
+    ///
+    /// Its density `pdf` is per unit of world-space area. It is uniform under similarities (rotations, moves, mirrors and
+    /// uniform scales); under other maps the choice is uniform in object space, and `pdf` says exactly how dense it is in
+    /// the world.
+    pub fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
+        let sample = self.shape.sample_area(u)?;
+        let Some(m) = &self.world_from_object else {
+            return Some(sample);
+        };
+        let pdf = sample.pdf / (measure::area_stretch(m) * sample.surface.normal).length();
+        Some(SurfaceSample { surface: into_world(m, &sample.surface), pdf })
     }
 
-    /// A point as seen from `from` in world space, by solid angle where there is a method, else by area.
-    pub fn sample_direction(&self, _from: DVec3, _u: DVec2) -> Option<DirectionSample> {
-        unimplemented!("skeleton")
+    /// A point as seen from `from` in world space, by solid angle where there is a method, else by area; `None` where the
+    /// point chosen is seen edge-on, and for infinite shapes.
+    pub fn sample_direction(&self, from: DVec3, u: DVec2) -> Option<DirectionSample> {
+        let Some(m) = &self.world_from_object else {
+            return self.shape.sample_direction(from, u);
+        };
+        let object_from = m.inverse_point(from);
+        let sample = self.shape.sample_direction(object_from, u)?;
+        let pdf = sample.pdf * solid_angle_shrink(m, sample.surface.point - object_from);
+        Some(DirectionSample { surface: into_world(m, &sample.surface), pdf })
     }
 
     /// The density, per unit solid angle at `ray.origin`, with which [`PlacedShape::sample_direction`] chooses the
-    /// point `surface` (in world space) on the ray.
-    pub fn pdf_direction(&self, _ray: &Ray, _surface: &Surface) -> f64 {
-        unimplemented!("skeleton")
+    /// point `surface` (in world space) on the ray; 0 for points that it never chooses.
+    pub fn pdf_direction(&self, ray: &Ray, surface: &Surface) -> f64 {
+        let Some(m) = &self.world_from_object else {
+            return self.shape.pdf_direction(ray, surface);
+        };
+        let object_ray = ray.into_object(m);
+        let object_surface = Surface {
+            point: m.inverse_point(surface.point),
+            normal: m.inverse_normal(surface.normal).normalize(),
+            dpdu: m.inverse_vector(surface.dpdu),
+            dpdv: m.inverse_vector(surface.dpdv),
+            ..*surface
+        };
+        let pdf = self.shape.pdf_direction(&object_ray, &object_surface);
+        pdf * solid_angle_shrink(m, object_surface.point - object_ray.origin)
     }
+}
+
+/// A surface in object space, as it is in the world.
+fn into_world(m: &Transform, surface: &Surface) -> Surface {
+    let linear = m.linear();
+    let size = DMat3::from_cols(linear.x_axis.abs(), linear.y_axis.abs(), linear.z_axis.abs());
+    let offset = m.affine().translation;
+    let point = m.point(surface.point);
+    let back = m.inverse_affine();
+    let back_size =
+        DMat3::from_cols(back.matrix3.x_axis.abs(), back.matrix3.y_axis.abs(), back.matrix3.z_axis.abs());
+    let object_error = surface.point_error + gamma(4) * (back_size * point.abs() + back.translation.abs());
+    let point_error = size * object_error + gamma(4) * (size * surface.point.abs() + offset.abs());
+
+    let scaled_normal = m.normal(surface.normal);
+    let length = scaled_normal.length();
+    let normal = scaled_normal / length;
+    // The derivative of a vector divided by its length.
+    let turned = |dn: DVec3| {
+        let moved = m.normal(dn) / length;
+        moved - normal * normal.dot(moved)
+    };
+    Surface {
+        point,
+        point_error,
+        normal,
+        uv: surface.uv,
+        dpdu: m.vector(surface.dpdu),
+        dpdv: m.vector(surface.dpdv),
+        dndu: turned(surface.dndu),
+        dndv: turned(surface.dndv),
+    }
+}
+
+/// Solid angle in object space over solid angle in the world, about a direction `d` in object space: |L d|³ / |det L| for
+/// a unit `d`.
+fn solid_angle_shrink(m: &Transform, d: DVec3) -> f64 {
+    let stretch = m.vector(d).length() / d.length();
+    stretch * stretch * stretch / m.determinant().abs()
 }

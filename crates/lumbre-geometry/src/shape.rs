@@ -2,11 +2,110 @@
 
 use lumbre_math::{DVec2, DVec3, Transform};
 
-use crate::{Aabb, DirectionSample, Ray, Root, Roots, Surface, SurfaceSample};
+use crate::{Aabb, DirectionSample, Ray, Root, Roots, Sphere, Surface, SurfaceSample, Triangle};
 
-/// An exact shape in its own space. Adding one is a new file, a variant and its arms here.
-#[derive(Clone, Debug)]
-pub enum Shape {}
+/// Makes the enum and hands every method to the variant's method of the same name. To add a shape, write its file with
+/// these methods and add one line where this is called; `in Box<..>` keeps a large shape out of line.
+macro_rules! shapes {
+    ($($(#[$doc:meta])* $variant:ident($shape:ty) in $stored:ty,)+) => {
+        /// An exact shape in its own space. Adding one is a new file, and a line here.
+        #[derive(Clone, Debug)]
+        pub enum Shape {
+            $($(#[$doc])* $variant($stored),)+
+        }
+
+        $(impl From<$shape> for Shape {
+            fn from(shape: $shape) -> Self {
+                Self::$variant(shape.into())
+            }
+        })+
+
+        impl Shape {
+            /// The first crossing in the ray's range.
+            #[inline]
+            pub fn closest(&self, ray: &Ray) -> Option<Root> {
+                match self { $(Self::$variant(shape) => shape.closest(ray),)+ }
+            }
+
+            /// Every crossing in the ray's range, appended in ascending order.
+            pub fn roots(&self, ray: &Ray, out: &mut Roots) {
+                match self { $(Self::$variant(shape) => shape.roots(ray, out),)+ }
+            }
+
+            /// The surface where `root` was found along `ray`.
+            pub fn surface(&self, ray: &Ray, root: &Root) -> Surface {
+                match self { $(Self::$variant(shape) => shape.surface(ray, root),)+ }
+            }
+
+            /// The surface at `uv` of a part (see [`Root::part`]); `None` for a part that the shape does not have, and for
+            /// shapes without a parametrisation that can be run forwards.
+            pub fn surface_at(&self, part: u32, uv: DVec2) -> Option<Surface> {
+                match self { $(Self::$variant(shape) => shape.surface_at(part, uv),)+ }
+            }
+
+            /// The tightest box around the shape under `world_from_object`, rounded outward; `None` for infinite shapes.
+            pub fn bounds(&self, world_from_object: &Transform) -> Option<Aabb> {
+                match self { $(Self::$variant(shape) => shape.bounds(world_from_object),)+ }
+            }
+
+            /// Area before any transform; infinite for infinite shapes.
+            pub fn area(&self) -> f64 {
+                match self { $(Self::$variant(shape) => shape.area(),)+ }
+            }
+
+            /// Area after `world_from_object`; infinite for infinite shapes.
+            pub fn area_under(&self, world_from_object: &Transform) -> f64 {
+                match self { $(Self::$variant(shape) => shape.area_under(world_from_object),)+ }
+            }
+
+            /// Whether the surface encloses a solid, so that CSG can use it.
+            pub fn is_solid(&self) -> bool {
+                match self { $(Self::$variant(shape) => shape.is_solid(),)+ }
+            }
+
+            /// Whether the closed solid holds `p`; false for shapes that are not solid.
+            pub fn contains(&self, p: DVec3) -> bool {
+                match self { $(Self::$variant(shape) => shape.contains(p),)+ }
+            }
+
+            /// The name in the scene language.
+            pub fn name(&self) -> &'static str {
+                match self { $(Self::$variant(shape) => shape.name(),)+ }
+            }
+
+            /// A point uniform by area from two uniform numbers; `None` for infinite shapes.
+            pub fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
+                match self { $(Self::$variant(shape) => shape.sample_area(u),)+ }
+            }
+
+            /// A point as seen from `from`, by solid angle where the shape has a method, else by area; `None` where the
+            /// point chosen is seen edge-on, and for infinite shapes.
+            pub fn sample_direction(&self, from: DVec3, u: DVec2) -> Option<DirectionSample> {
+                match self { $(Self::$variant(shape) => shape.sample_direction(from, u),)+ }
+            }
+
+            /// The density, per unit solid angle at `ray.origin`, with which [`Shape::sample_direction`] chooses the point
+            /// `surface` on the ray; 0 for points that it never chooses.
+            pub fn pdf_direction(&self, ray: &Ray, surface: &Surface) -> f64 {
+                match self { $(Self::$variant(shape) => shape.pdf_direction(ray, surface),)+ }
+            }
+        }
+    };
+}
+
+shapes! {
+    /// A sphere, or the part of one between two heights and two meridians.
+    Sphere(Sphere) in Sphere,
+    /// A triangle.
+    Triangle(Triangle) in Triangle,
+}
+
+impl Shape {
+    /// Whether anything is crossed in the ray's range.
+    pub fn any(&self, ray: &Ray) -> bool {
+        self.closest(ray).is_some()
+    }
+}
 
 /// Why a shape cannot be made.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,60 +124,63 @@ pub enum ShapeError {
     Degenerate(&'static str),
 }
 
-impl Shape {
-    /// The first crossing in the ray's range.
-    pub fn closest(&self, _ray: &Ray) -> Option<Root> {
-        match *self {}
+impl std::fmt::Display for ShapeError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::OutOfRange { parameter, found, expected } => {
+                write!(f, "{parameter} out of range (found {found}; expected {expected})")
+            }
+            Self::Degenerate(why) => f.write_str(why),
+        }
+    }
+}
+
+impl std::error::Error for ShapeError {}
+
+/// The checks that constructors share.
+pub(crate) mod check {
+    use super::ShapeError;
+    use lumbre_math::DVec3;
+
+    /// A length that is finite and greater than zero.
+    pub(crate) fn positive(parameter: &'static str, found: f64) -> Result<f64, ShapeError> {
+        within(parameter, found, found > 0.0 && found.is_finite(), "a finite number greater than 0")
     }
 
-    /// Whether anything is crossed in the ray's range.
-    pub fn any(&self, ray: &Ray) -> bool {
-        self.closest(ray).is_some()
+    /// A point without NaN and infinities.
+    pub(crate) fn finite(parameter: &'static str, found: DVec3) -> Result<DVec3, ShapeError> {
+        match found.to_array().into_iter().find(|x| !x.is_finite()) {
+            None => Ok(found),
+            Some(found) => Err(ShapeError::OutOfRange { parameter, found, expected: "finite coordinates" }),
+        }
     }
 
-    /// Every crossing in the ray's range, appended in ascending order.
-    pub fn roots(&self, _ray: &Ray, _out: &mut Roots) {
-        match *self {}
+    /// A direction of any length but zero, as a unit vector.
+    pub(crate) fn direction(parameter: &'static str, found: DVec3) -> Result<DVec3, ShapeError> {
+        let found = finite(parameter, found)?;
+        let largest = found.abs().max_element();
+        if largest == 0.0 {
+            let expected = "a direction of a length other than 0";
+            return Err(ShapeError::OutOfRange { parameter, found: 0.0, expected });
+        }
+        // Scaled first, so that no length of direction over- or underflows.
+        let scaled = found / largest;
+        Ok(scaled / scaled.length())
     }
 
-    /// The surface where `root` was found along `ray`.
-    pub fn surface(&self, _ray: &Ray, _root: &Root) -> Surface {
-        match *self {}
+    /// A sweep about the axis in (0°, 360°], in radians.
+    pub(crate) fn sweep(degrees: f64) -> Result<f64, ShapeError> {
+        within("phimax", degrees, 0.0 < degrees && degrees <= 360.0, "degrees in (0, 360]")
+            .map(f64::to_radians)
     }
 
-    /// The tightest box around the shape under `world_from_object`, rounded outward; `None` for infinite shapes.
-    pub fn bounds(&self, _world_from_object: &Transform) -> Option<Aabb> {
-        match *self {}
-    }
-
-    /// Area before any transform; infinite for infinite shapes.
-    pub fn area(&self) -> f64 {
-        match *self {}
-    }
-
-    /// Whether the surface encloses a solid, so that CSG can use it.
-    pub fn is_solid(&self) -> bool {
-        match *self {}
-    }
-
-    /// The name in the scene language.
-    pub fn name(&self) -> &'static str {
-        match *self {}
-    }
-
-    /// A point uniform by area from two uniform numbers; `None` for infinite shapes.
-    pub fn sample_area(&self, _u: DVec2) -> Option<SurfaceSample> {
-        match *self {}
-    }
-
-    /// A point as seen from `from`, by solid angle where the shape has a method, else by area.
-    pub fn sample_direction(&self, _from: DVec3, _u: DVec2) -> Option<DirectionSample> {
-        match *self {}
-    }
-
-    /// The density, per unit solid angle at `ray.origin`, with which [`Shape::sample_direction`] chooses the point
-    /// `surface` on the ray.
-    pub fn pdf_direction(&self, _ray: &Ray, _surface: &Surface) -> f64 {
-        match *self {}
+    /// `found`, if `accepted`.
+    pub(crate) fn within(
+        parameter: &'static str,
+        found: f64,
+        accepted: bool,
+        expected: &'static str,
+    ) -> Result<f64, ShapeError> {
+        if accepted { Ok(found) } else { Err(ShapeError::OutOfRange { parameter, found, expected }) }
     }
 }

@@ -1,0 +1,305 @@
+//! Spheres, and the parts of them between two heights and two meridians.
+
+use std::f64::consts::{PI, TAU};
+
+use lumbre_math::quadratic::quadratic;
+use lumbre_math::{DVec2, DVec3, Transform};
+
+use crate::shape::check;
+use crate::support::{arc_support, azimuth, bounds_from_support, frame, gamma};
+use crate::{Aabb, DirectionSample, Ray, Root, Roots, ShapeError, Surface, SurfaceSample, density, measure};
+
+/// The points at distance `radius` from `center`.
+///
+/// Parametrised as pbrt does it: `u` is the azimuth about z from x towards y over `phimax`, and `v` is the polar angle,
+/// 0 at the low end and 1 at the high end. A clipped sphere is a surface with an edge, and a ray can meet its inside.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sphere {
+    center: DVec3,
+    radius: f64,
+    // Relative to the centre, -radius <= z_min < z_max <= radius.
+    z_min: f64,
+    z_max: f64,
+    // Angles from +z of z_min and z_max: theta_min > theta_max.
+    theta_min: f64,
+    theta_max: f64,
+    phi_max: f64,
+}
+
+impl Sphere {
+    /// The whole sphere.
+    ///
+    /// # Errors
+    /// [`ShapeError`] unless the centre is finite and the radius finite and greater than 0.
+    pub fn new(center: DVec3, radius: f64) -> Result<Self, ShapeError> {
+        let center = check::finite("center", center)?;
+        let radius = check::positive("radius", radius)?;
+        let (z_min, z_max) = (-radius, radius);
+        Ok(Self { center, radius, z_min, z_max, theta_min: PI, theta_max: 0.0, phi_max: TAU })
+    }
+
+    /// The part with `zmin <= z <= zmax`, measured from the centre, and azimuth up to `phimax` degrees.
+    ///
+    /// Heights outside the sphere mean its poles, and come in either order, as in pbrt.
+    ///
+    /// # Errors
+    /// [`ShapeError`] when nothing is left, a height is NaN, or `phimax` is not in (0, 360].
+    pub fn partial(self, zmin: f64, zmax: f64, phimax: f64) -> Result<Self, ShapeError> {
+        let any = "a number";
+        let zmin = check::within("zmin", zmin, !zmin.is_nan(), any)?;
+        let zmax = check::within("zmax", zmax, !zmax.is_nan(), any)?;
+        let phi_max = check::sweep(phimax)?;
+        let z_min = zmin.min(zmax).clamp(-self.radius, self.radius);
+        let z_max = zmin.max(zmax).clamp(-self.radius, self.radius);
+        if z_min == z_max {
+            return Err(ShapeError::Degenerate("nothing of the sphere lies between zmin and zmax"));
+        }
+        let theta = |z: f64| ((self.radius - z) * (self.radius + z)).sqrt().atan2(z);
+        Ok(Self { z_min, z_max, theta_min: theta(z_min), theta_max: theta(z_max), phi_max, ..self })
+    }
+
+    /// The centre.
+    pub fn center(&self) -> DVec3 {
+        self.center
+    }
+
+    /// The radius.
+    pub fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    fn is_whole(&self) -> bool {
+        self.z_min <= -self.radius && self.z_max >= self.radius && self.phi_max >= TAU
+    }
+
+    /// Whether a point of the whole sphere, relative to the centre, belongs to this part of it.
+    fn keeps(&self, w: DVec3) -> bool {
+        // A pole's height may come out a little inside the pole.
+        (self.z_min <= -self.radius || self.z_min <= w.z)
+            && (self.z_max >= self.radius || w.z <= self.z_max)
+            && (self.phi_max >= TAU || azimuth(w.y, w.x) <= self.phi_max)
+    }
+
+    /// Both crossings of the whole sphere, in order.
+    ///
+    /// The discriminant is that of E. Haines, J. Günther, T. Akenine-Möller, "Precision improvements for ray/sphere
+    /// intersection", Ray Tracing Gems, 2019: the textbook's loses all digits for a small sphere far away.
+    #[inline]
+    fn crossings(&self, ray: &Ray) -> Option<(f64, f64)> {
+        let w = ray.origin - self.center;
+        let a = ray.direction.length_squared();
+        let h = w.dot(ray.direction);
+        let nearest = w - (h / a) * ray.direction;
+        let delta = a * (self.radius * self.radius - nearest.length_squared());
+        let distance = w.length();
+        let c = (distance - self.radius) * (distance + self.radius);
+        quadratic(a, h, c, delta)
+    }
+
+    /// The point of the whole sphere at `t`, relative to the centre.
+    fn arm(&self, ray: &Ray, t: f64) -> DVec3 {
+        let w = (ray.origin - self.center) + t * ray.direction;
+        w * (self.radius / w.length())
+    }
+
+    /// The first crossing in the ray's range.
+    #[inline]
+    pub fn closest(&self, ray: &Ray) -> Option<Root> {
+        let (first, second) = self.crossings(ray)?;
+        let hits = |t: f64| ray.contains(t) && (self.is_whole() || self.keeps(self.arm(ray, t)));
+        let t = if hits(first) {
+            first
+        } else if hits(second) {
+            second
+        } else {
+            return None;
+        };
+        Some(Root { multiplicity: 1 + u8::from(first == second), ..Root::at(t) })
+    }
+
+    /// Every crossing in the ray's range, appended in ascending order.
+    pub fn roots(&self, ray: &Ray, out: &mut Roots) {
+        let Some((first, second)) = self.crossings(ray) else {
+            return;
+        };
+        let hits = |t: f64| ray.contains(t) && (self.is_whole() || self.keeps(self.arm(ray, t)));
+        if first == second {
+            out.extend(hits(first).then_some(Root { multiplicity: 2, ..Root::at(first) }));
+        } else {
+            out.extend([first, second].into_iter().filter(|&t| hits(t)).map(Root::at));
+        }
+    }
+
+    /// The surface at a crossing.
+    pub fn surface(&self, ray: &Ray, root: &Root) -> Surface {
+        self.surface_on(self.arm(ray, root.t))
+    }
+
+    /// The surface at `uv`.
+    pub fn surface_at(&self, part: u32, uv: DVec2) -> Option<Surface> {
+        let (phi_sin, phi_cos) = (uv.x * self.phi_max).sin_cos();
+        let (sin, cos) = (self.theta_min + uv.y * (self.theta_max - self.theta_min)).sin_cos();
+        let w = self.radius * DVec3::new(sin * phi_cos, sin * phi_sin, cos);
+        (part == 0).then(|| Surface { uv, ..self.surface_on(w) })
+    }
+
+    /// The surface at a point given relative to the centre.
+    fn surface_on(&self, w: DVec3) -> Surface {
+        let normal = w / w.length();
+        let rho = w.x.hypot(w.y);
+        let phi = azimuth(w.y, w.x);
+        let v_range = self.theta_max - self.theta_min;
+        // At a pole every meridian will do; u is 0 there, and the parallel is as good as a point.
+        let (x, y) = if rho > 0.0 { (w.x, w.y) } else { (1e-10 * self.radius, 0.0) };
+        let hypotenuse = x.hypot(y);
+        let dpdu = self.phi_max * DVec3::new(-y, x, 0.0);
+        let dpdv = v_range * DVec3::new(w.z * x / hypotenuse, w.z * y / hypotenuse, -rho);
+        let point = self.center + w;
+        Surface {
+            point,
+            point_error: gamma(8) * w.abs() + gamma(2) * (point.abs() + self.center.abs()),
+            normal,
+            uv: DVec2::new(
+                (phi / self.phi_max).min(1.0),
+                ((rho.atan2(w.z) - self.theta_min) / v_range).clamp(0.0, 1.0),
+            ),
+            dpdu,
+            dpdv,
+            dndu: dpdu / self.radius,
+            dndv: dpdv / self.radius,
+        }
+    }
+
+    /// The box under a transform; tight for parts of a sphere too.
+    pub fn bounds(&self, world_from_object: &Transform) -> Option<Aabb> {
+        let support = |d: DVec3| {
+            let from_center = {
+                let length = d.length();
+                if self.is_whole() || self.keeps(d * (self.radius / length)) {
+                    self.radius * length
+                } else {
+                    // The whole sphere has its extreme point elsewhere, so this part has it on its edge: two parallels
+                    // and two meridians.
+                    let parallel = |theta: f64| {
+                        let (sin, cos) = theta.sin_cos();
+                        self.radius * (sin * arc_support(d.x, d.y, 0.0, self.phi_max) + cos * d.z)
+                    };
+                    let meridian = |phi: f64| {
+                        let outward = d.x * phi.cos() + d.y * phi.sin();
+                        self.radius * arc_support(d.z, outward, self.theta_max, self.theta_min)
+                    };
+                    let parallels = parallel(self.theta_min).max(parallel(self.theta_max));
+                    parallels.max(meridian(0.0)).max(meridian(self.phi_max))
+                }
+            };
+            d.dot(self.center) + from_center
+        };
+        let magnitude = self.center.abs() + DVec3::splat(self.radius);
+        Some(bounds_from_support(world_from_object, magnitude, support))
+    }
+
+    /// The area: by Archimedes, that of the cylinder around it.
+    pub fn area(&self) -> f64 {
+        self.phi_max * self.radius * (self.z_max - self.z_min)
+    }
+
+    /// The area after a transform: an ellipsoid's by elliptic integrals, a part of one by quadrature.
+    pub fn area_under(&self, world_from_object: &Transform) -> f64 {
+        if self.is_whole() {
+            return measure::ellipsoid_area(self.radius, world_from_object);
+        }
+        measure::patch_area(world_from_object, |u, v| {
+            let (phi_sin, phi_cos) = (u * self.phi_max).sin_cos();
+            let (sin, cos) = (self.theta_min + v * (self.theta_max - self.theta_min)).sin_cos();
+            let density = self.radius * self.radius * sin * self.phi_max * (self.theta_min - self.theta_max);
+            density * DVec3::new(sin * phi_cos, sin * phi_sin, cos)
+        })
+    }
+
+    /// Whether it is whole.
+    pub fn is_solid(&self) -> bool {
+        self.is_whole()
+    }
+
+    /// Whether the ball holds `p`.
+    pub fn contains(&self, p: DVec3) -> bool {
+        self.is_whole() && (p - self.center).length() <= self.radius
+    }
+
+    /// "sphere".
+    pub fn name(&self) -> &'static str {
+        "sphere"
+    }
+
+    /// A point uniform by area.
+    pub fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
+        let z = (self.z_min + u.x * (self.z_max - self.z_min)).min(self.z_max);
+        let rho = ((self.radius - z) * (self.radius + z)).max(0.0).sqrt();
+        let (sin, cos) = (u.y * self.phi_max).sin_cos();
+        let w = DVec3::new(rho * cos, rho * sin, z);
+        let surface = self.surface_on(w * (self.radius / w.length()));
+        Some(SurfaceSample { surface, pdf: 1.0 / self.area() })
+    }
+
+    /// A point uniform by solid angle: in the cone that the sphere fills, or all around for a place inside. Parts of a
+    /// sphere are sampled by area.
+    ///
+    /// In the cone it is the point of the near side, found from the angles and not by intersecting a ray that may miss;
+    /// the small differences 1 − cos are computed as such, so that no distance is too far.
+    pub fn sample_direction(&self, from: DVec3, u: DVec2) -> Option<DirectionSample> {
+        if !self.is_whole() {
+            return density::seen_from(from, self.sample_area(u)?);
+        }
+        let to_center = self.center - from;
+        let distance = to_center.length();
+        if distance <= self.radius {
+            let z = 1.0 - 2.0 * u.x;
+            let rho = 2.0 * (u.x * (1.0 - u.x)).sqrt();
+            let (sin, cos) = (TAU * u.y).sin_cos();
+            let direction = DVec3::new(rho * cos, rho * sin, z);
+            let (_, t) = self.crossings(&Ray::new(from, direction))?;
+            let surface = self.surface_on(self.arm(&Ray::new(from, direction), t));
+            return Some(DirectionSample { surface, pdf: 1.0 / (4.0 * PI) });
+        }
+        let (sin_max, versine_max) = self.cone(distance);
+        let versine = u.x * versine_max;
+        let sin_squared = versine * (2.0 - versine);
+        let ratio = sin_squared / (sin_max * sin_max);
+        // The angle at the centre, between the direction to `from` and the arm to the point.
+        let cos_alpha = (sin_squared / sin_max + (1.0 - versine) * (1.0 - ratio).max(0.0).sqrt()).min(1.0);
+        let sin_alpha = {
+            // sin α = sin θ (distance cos θ - sqrt(radius² - distance² sin² θ)) / radius, without cancellation.
+            let near = (1.0 - versine) - (sin_max * sin_max - sin_squared).max(0.0).sqrt();
+            (sin_squared.sqrt() * near / sin_max).clamp(0.0, 1.0)
+        };
+        let axis = -to_center / distance;
+        let (e1, e2) = frame(axis);
+        let (sin, cos) = (TAU * u.y).sin_cos();
+        let w = sin_alpha * cos * e1 + sin_alpha * sin * e2 + cos_alpha * axis;
+        let surface = self.surface_on(w * (self.radius / w.length()));
+        Some(DirectionSample { surface, pdf: 1.0 / (TAU * versine_max) })
+    }
+
+    /// The sine of the cone's half-angle and one minus its cosine, from a place outside at `distance` from the centre.
+    fn cone(&self, distance: f64) -> (f64, f64) {
+        let sin = self.radius / distance;
+        let cos = ((distance - self.radius) * (distance + self.radius)).sqrt() / distance;
+        (sin, sin * sin / (1.0 + cos))
+    }
+
+    /// The density of [`Sphere::sample_direction`].
+    pub fn pdf_direction(&self, ray: &Ray, surface: &Surface) -> f64 {
+        if !self.is_whole() {
+            return density::pdf_seen_from(ray, surface, 1.0 / self.area());
+        }
+        let distance = (self.center - ray.origin).length();
+        let is_near_side = surface.normal.dot(ray.direction) <= 0.0;
+        if distance <= self.radius {
+            1.0 / (4.0 * PI)
+        } else if is_near_side {
+            1.0 / (TAU * self.cone(distance).1)
+        } else {
+            0.0
+        }
+    }
+}

@@ -1,0 +1,66 @@
+//! What the shapes share: bounds from support functions, azimuths, arcs, and error bounds.
+
+use std::f64::consts::TAU;
+
+use lumbre_math::{DVec3, Transform};
+
+use crate::Aabb;
+
+/// The unit roundoff of binary64.
+const ROUNDOFF: f64 = 0.5 * f64::EPSILON;
+
+/// A bound on the relative error of `n` rounded operations, γₙ = n u / (1 − n u).
+pub(crate) const fn gamma(n: u32) -> f64 {
+    let nu = n as f64 * ROUNDOFF;
+    nu / (1.0 - nu)
+}
+
+/// The box of a body under a transform, from its support function h(d) = max d·x over the body in object space.
+///
+/// `magnitude` bounds |x| of every point of the body, component by component, and sets how far the box is rounded
+/// outward: the error of h, which may cancel, is proportional to it.
+pub(crate) fn bounds_from_support(
+    world_from_object: &Transform,
+    magnitude: DVec3,
+    support: impl Fn(DVec3) -> f64,
+) -> Aabb {
+    let linear = world_from_object.linear();
+    let offset = world_from_object.affine().translation;
+    let side = |axis: usize| {
+        let row = linear.row(axis);
+        let slack = gamma(16) * (offset[axis].abs() + row.abs().dot(magnitude));
+        let low = offset[axis] - support(-row) - slack;
+        let high = offset[axis] + support(row) + slack;
+        (low, high)
+    };
+    let [(x0, x1), (y0, y1), (z0, z1)] = [side(0), side(1), side(2)];
+    Aabb { min: DVec3::new(x0, y0, z0), max: DVec3::new(x1, y1, z1) }.outward(2)
+}
+
+/// The greatest value of `a cos φ + b sin φ` for φ from `from` to `to`.
+pub(crate) fn arc_support(a: f64, b: f64, from: f64, to: f64) -> f64 {
+    if to - from >= TAU || (b.atan2(a) - from).rem_euclid(TAU) <= to - from {
+        return a.hypot(b);
+    }
+    let at = |phi: f64| a * phi.cos() + b * phi.sin();
+    at(from).max(at(to))
+}
+
+/// The azimuth of (x, y), from 0 to 2π.
+pub(crate) fn azimuth(y: f64, x: f64) -> f64 {
+    let phi = y.atan2(x);
+    // A tiny negative angle plus 2π rounds to 2π; -0.0 is no less than 0.
+    if phi < 0.0 { phi + TAU } else { phi }
+}
+
+/// Two unit vectors that make a right-handed frame with the unit vector `n`: e1 × e2 = n.
+///
+/// T. Duff et al., "Building an orthonormal basis, revisited", Journal of Computer Graphics Techniques, 2017.
+pub(crate) fn frame(n: DVec3) -> (DVec3, DVec3) {
+    let sign = 1.0_f64.copysign(n.z);
+    let a = -1.0 / (sign + n.z);
+    let b = n.x * n.y * a;
+    let e1 = DVec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x);
+    let e2 = DVec3::new(b, sign + n.y * n.y * a, -n.y);
+    (e1, e2)
+}

@@ -1,0 +1,305 @@
+//! Triangles: two tests for a ray, one of them watertight, and one exact shape.
+
+use std::f64::consts::PI;
+
+use lumbre_math::quadratic::dop;
+use lumbre_math::{DVec2, DVec3, Transform};
+
+use crate::shape::check;
+use crate::support::{bounds_from_support, gamma};
+use crate::{Aabb, DirectionSample, Ray, Root, Roots, ShapeError, Surface, SurfaceSample, density, measure};
+
+/// Where a line meets a triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TriangleHit {
+    /// Where, in units of the ray's direction; the tests leave it to the caller whether that is in range.
+    pub t: f64,
+    /// The weight of the second vertex.
+    pub b1: f64,
+    /// The weight of the third vertex.
+    pub b2: f64,
+    /// A positive multiple of −D·((p1−p0)×(p2−p0)). Positive when the ray meets the front, the face whose vertices run
+    /// counter-clockwise as seen from the ray's origin; a caller that culls back faces drops the negative ones. Never 0.
+    pub determinant: f64,
+}
+
+/// The test of T. Möller, B. Trumbore, "Fast, minimum storage ray/triangle intersection", Journal of Graphics Tools,
+/// 1997, which solves O + tD = (1−b1−b2) p0 + b1 p1 + b2 p2 by Cramer's rule.
+///
+/// Fast, but not watertight: rounding in the barycentrics is not the same for two triangles that share a side, and a ray
+/// at the side may miss both.
+#[inline]
+pub fn moller_trumbore(
+    origin: DVec3,
+    direction: DVec3,
+    p0: DVec3,
+    p1: DVec3,
+    p2: DVec3,
+) -> Option<TriangleHit> {
+    let (edge1, edge2) = (p1 - p0, p2 - p0);
+    let s = origin - p0;
+    let s1 = direction.cross(edge2);
+    let determinant = s1.dot(edge1);
+    let inverse = determinant.recip();
+    let b1 = s1.dot(s) * inverse;
+    let s2 = s.cross(edge1);
+    let b2 = s2.dot(direction) * inverse;
+    let inside = determinant != 0.0 && b1 >= 0.0 && b2 >= 0.0 && b1 + b2 <= 1.0;
+    inside.then(|| TriangleHit { t: s2.dot(edge2) * inverse, b1, b2, determinant })
+}
+
+/// A ray made ready for [`WatertightRay::hit`]: an axis that it mostly follows, and the shear that makes it follow that
+/// axis exactly. Made once a ray, for any number of triangles.
+#[derive(Clone, Copy, Debug)]
+pub struct WatertightRay {
+    origin: DVec3,
+    // A cyclic order of the axes, mirrored when the ray goes down the last, which is the one of the largest component.
+    axes: [usize; 3],
+    shear: DVec3,
+}
+
+impl WatertightRay {
+    /// The shear of a ray. A direction of zero, or a NaN, makes a ray that hits nothing.
+    #[inline]
+    pub fn new(origin: DVec3, direction: DVec3) -> Self {
+        let size = direction.abs();
+        let kz = if size.x > size.y {
+            if size.x > size.z { 0 } else { 2 }
+        } else if size.y > size.z {
+            1
+        } else {
+            2
+        };
+        let (mut kx, mut ky) = ([1, 2, 0][kz], [2, 0, 1][kz]);
+        if direction[kz] < 0.0 {
+            std::mem::swap(&mut kx, &mut ky);
+        }
+        let along = direction[kz];
+        let shear = DVec3::new(direction[kx] / along, direction[ky] / along, 1.0 / along);
+        Self { origin, axes: [kx, ky, kz], shear }
+    }
+
+    /// The test of S. Woop, C. Benthin, I. Wald, "Watertight ray/triangle intersection", Journal of Computer Graphics
+    /// Techniques, 2013.
+    ///
+    /// The line goes through a side on the same hand for both triangles that share it, so that it cannot slip between:
+    /// the edge functions of a shared side are the same two rounded products subtracted in the opposite order. Their
+    /// sign is right unless the products round to the same number; then they are taken again with their rounding
+    /// errors, which settles the sign. Nothing here may be contracted into a fused multiply-add.
+    ///
+    /// Vertices in single precision may be given as they are, promoted.
+    #[inline]
+    pub fn hit(&self, p0: DVec3, p1: DVec3, p2: DVec3) -> Option<TriangleHit> {
+        let [kx, ky, kz] = self.axes;
+        let (a, b, c) = (p0 - self.origin, p1 - self.origin, p2 - self.origin);
+        let flat = |p: DVec3| (p[kx] - self.shear.x * p[kz], p[ky] - self.shear.y * p[kz]);
+        let ((ax, ay), (bx, by), (cx, cy)) = (flat(a), flat(b), flat(c));
+        let mut u = cx * by - cy * bx;
+        let mut v = ax * cy - ay * cx;
+        let mut w = bx * ay - by * ax;
+        if u == 0.0 || v == 0.0 || w == 0.0 {
+            (u, v, w) = (dop(cx, by, cy, bx), dop(ax, cy, ay, cx), dop(bx, ay, by, ax));
+        }
+        if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
+            return None;
+        }
+        let determinant = u + v + w;
+        if determinant == 0.0 || determinant.is_nan() {
+            return None;
+        }
+        let inverse = determinant.recip();
+        let t = self.shear.z * (u * a[kz] + v * b[kz] + w * c[kz]) * inverse;
+        Some(TriangleHit { t, b1: v * inverse, b2: w * inverse, determinant })
+    }
+}
+
+/// The triangle p0, p1, p2 with its sides, facing where its vertices run counter-clockwise.
+///
+/// Its `root.local` and its `uv` are the weights (b1, b2) of p1 and p2. One of no area is never hit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Triangle {
+    p0: DVec3,
+    p1: DVec3,
+    p2: DVec3,
+}
+
+/// Solid angles outside this range are sampled by area: in small ones the sine and cosine of the spherical excess lose
+/// their digits, in those of almost half the sky the corners run into great circles.
+const SPHERICAL_SAMPLING: std::ops::Range<f64> = 1e-5..6.2;
+
+impl Triangle {
+    /// A triangle, possibly of no area.
+    ///
+    /// # Errors
+    /// [`ShapeError`] unless all coordinates are finite.
+    pub fn new(p0: DVec3, p1: DVec3, p2: DVec3) -> Result<Self, ShapeError> {
+        let (p0, p1, p2) = (check::finite("p0", p0)?, check::finite("p1", p1)?, check::finite("p2", p2)?);
+        Ok(Self { p0, p1, p2 })
+    }
+
+    /// The three corners.
+    pub fn corners(&self) -> [DVec3; 3] {
+        [self.p0, self.p1, self.p2]
+    }
+
+    /// (p1−p0)×(p2−p0), zero exactly when the rounded edges are parallel.
+    fn cross(&self) -> DVec3 {
+        let (a, b) = (self.p1 - self.p0, self.p2 - self.p0);
+        DVec3::new(dop(a.y, b.z, a.z, b.y), dop(a.z, b.x, a.x, b.z), dop(a.x, b.y, a.y, b.x))
+    }
+
+    /// The first crossing in the ray's range: the watertight test, so that triangles placed side by side have no gap.
+    #[inline]
+    pub fn closest(&self, ray: &Ray) -> Option<Root> {
+        let hit = WatertightRay::new(ray.origin, ray.direction).hit(self.p0, self.p1, self.p2)?;
+        let hits = ray.contains(hit.t) && self.cross() != DVec3::ZERO;
+        hits.then(|| Root { local: DVec2::new(hit.b1, hit.b2), ..Root::at(hit.t) })
+    }
+
+    /// The one crossing, if it is in the ray's range.
+    pub fn roots(&self, ray: &Ray, out: &mut Roots) {
+        out.extend(self.closest(ray));
+    }
+
+    /// The surface at a crossing.
+    pub fn surface(&self, _ray: &Ray, root: &Root) -> Surface {
+        self.surface_on(root.local)
+    }
+
+    /// The surface at the weights (b1, b2), which may lie outside the triangle.
+    pub fn surface_at(&self, part: u32, uv: DVec2) -> Option<Surface> {
+        (part == 0).then(|| self.surface_on(uv))
+    }
+
+    fn surface_on(&self, uv: DVec2) -> Surface {
+        let b0 = 1.0 - uv.x - uv.y;
+        let cross = self.cross();
+        let size = cross.abs().max_element();
+        let sum = b0.abs() * self.p0.abs() + uv.x.abs() * self.p1.abs() + uv.y.abs() * self.p2.abs();
+        Surface {
+            point: b0 * self.p0 + uv.x * self.p1 + uv.y * self.p2,
+            point_error: gamma(9) * sum,
+            normal: (cross / size).normalize(),
+            uv,
+            dpdu: self.p1 - self.p0,
+            dpdv: self.p2 - self.p0,
+            dndu: DVec3::ZERO,
+            dndv: DVec3::ZERO,
+        }
+    }
+
+    /// The box under a transform: that of the three corners.
+    pub fn bounds(&self, world_from_object: &Transform) -> Option<Aabb> {
+        let magnitude = self.p0.abs().max(self.p1.abs()).max(self.p2.abs());
+        let support = |d: DVec3| d.dot(self.p0).max(d.dot(self.p1)).max(d.dot(self.p2));
+        Some(bounds_from_support(world_from_object, magnitude, support))
+    }
+
+    /// Half the length of the cross product.
+    pub fn area(&self) -> f64 {
+        0.5 * self.cross().length()
+    }
+
+    /// The area after a transform.
+    pub fn area_under(&self, world_from_object: &Transform) -> f64 {
+        0.5 * (measure::area_stretch(world_from_object) * self.cross()).length()
+    }
+
+    /// It is not.
+    pub fn is_solid(&self) -> bool {
+        false
+    }
+
+    /// It holds no volume.
+    pub fn contains(&self, _p: DVec3) -> bool {
+        false
+    }
+
+    /// "triangle".
+    pub fn name(&self) -> &'static str {
+        "triangle"
+    }
+
+    /// A point uniform by area; `None` for a triangle of no area.
+    ///
+    /// E. Heitz, "A low-distortion map between triangle and square", 2019.
+    pub fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
+        let pdf = 1.0 / self.area();
+        let uv = if u.y > u.x {
+            DVec2::new(0.5 * u.x, u.y - 0.5 * u.x)
+        } else {
+            DVec2::new(u.x - 0.5 * u.y, 0.5 * u.y)
+        };
+        pdf.is_finite().then(|| SurfaceSample { surface: self.surface_on(uv), pdf })
+    }
+
+    /// The solid angle that the triangle fills as seen from `from`.
+    ///
+    /// A. van Oosterom, J. Strackee, "The solid angle of a plane triangle", IEEE Transactions on Biomedical
+    /// Engineering, 1983.
+    pub fn solid_angle(&self, from: DVec3) -> f64 {
+        let (a, b, c) = (self.p0 - from, self.p1 - from, self.p2 - from);
+        let (la, lb, lc) = (a.length(), b.length(), c.length());
+        // a·(b×c) by the height over the plane, which does not cancel for a small triangle far away.
+        let volume = a.dot(self.cross()).abs();
+        let denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+        2.0 * volume.atan2(denominator)
+    }
+
+    /// A point uniform by solid angle, or by area where the triangle looks tiny or fills half the sky.
+    ///
+    /// J. Arvo, "Stratified sampling of spherical triangles", SIGGRAPH 1995.
+    pub fn sample_direction(&self, from: DVec3, u: DVec2) -> Option<DirectionSample> {
+        let solid_angle = self.solid_angle(from);
+        if !SPHERICAL_SAMPLING.contains(&solid_angle) {
+            return density::seen_from(from, self.sample_area(u)?);
+        }
+        let [a, b, c] = self.corners().map(|p| (p - from).normalize());
+        let side_ab = a.cross(b).normalize();
+        let side_ca = c.cross(a).normalize();
+        let alpha = angle_between(side_ab, -side_ca);
+        let (sin_alpha, cos_alpha) = alpha.sin_cos();
+        let cos_c = a.dot(b);
+
+        // A smaller triangle with the same corner A, whose area is the share u.x of the whole.
+        let (sin_phi, cos_phi) = (PI + u.x * solid_angle - alpha).sin_cos();
+        let k1 = cos_phi + cos_alpha;
+        let k2 = sin_phi - sin_alpha * cos_c;
+        let numerator = k2 + (k2 * cos_phi - k1 * sin_phi) * cos_alpha;
+        let cos_b = (numerator / ((k2 * sin_phi + k1 * cos_phi) * sin_alpha)).clamp(-1.0, 1.0);
+        let sin_b = (1.0 - cos_b * cos_b).sqrt();
+        let moved_c = cos_b * a + sin_b * (c - c.dot(a) * a).normalize();
+
+        // A point between B and the moved corner.
+        let versine = u.y * (1.0 - moved_c.dot(b));
+        let sin_theta = (versine * (2.0 - versine)).max(0.0).sqrt();
+        let direction = (1.0 - versine) * b + sin_theta * (moved_c - moved_c.dot(b) * b).normalize();
+
+        // Where it meets the plane, without the test for the sides: rounding may put it a little outside.
+        let (edge1, edge2) = (self.p1 - self.p0, self.p2 - self.p0);
+        let s = from - self.p0;
+        let s1 = direction.cross(edge2);
+        let determinant = s1.dot(edge1);
+        let b1 = (s1.dot(s) / determinant).clamp(0.0, 1.0);
+        let b2 = (s.cross(edge1).dot(direction) / determinant).clamp(0.0, 1.0 - b1);
+        let surface = self.surface_on(DVec2::new(b1, b2));
+        (b1.is_finite() && b2.is_finite()).then_some(DirectionSample { surface, pdf: 1.0 / solid_angle })
+    }
+
+    /// The density of [`Triangle::sample_direction`].
+    pub fn pdf_direction(&self, ray: &Ray, surface: &Surface) -> f64 {
+        let solid_angle = self.solid_angle(ray.origin);
+        if SPHERICAL_SAMPLING.contains(&solid_angle) {
+            1.0 / solid_angle
+        } else {
+            density::pdf_seen_from(ray, surface, 1.0 / self.area())
+        }
+    }
+}
+
+/// The angle between two unit vectors, exact for small angles and for those near π too.
+///
+/// W. Kahan, "How futile are mindless assessments of roundoff in floating-point computation?", 2006.
+fn angle_between(a: DVec3, b: DVec3) -> f64 {
+    2.0 * (a - b).length().atan2((a + b).length())
+}
