@@ -10,6 +10,7 @@ pub use glam::{DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, DVec4, Vec2, Vec3};
 pub mod frame;
 pub mod quadratic;
 pub mod random;
+pub mod roots;
 pub mod sobol;
 pub mod transform;
 
