@@ -7,12 +7,15 @@
 pub use glam;
 pub use glam::{DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, DVec4, Vec2, Vec3};
 
+pub mod distribution;
 pub mod frame;
 pub mod quadratic;
 pub mod random;
 pub mod roots;
 pub mod sobol;
 pub mod transform;
+pub mod warp;
+pub mod warp64;
 
 pub use frame::{Frame, orthonormal_basis, orthonormal_basis_f32};
 pub use transform::{SingularTransform, Transform};

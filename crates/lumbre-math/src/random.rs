@@ -196,7 +196,8 @@ mod tests {
 
     #[test]
     fn each_single_argument_alone_makes_uniform_numbers() {
-        let make: [(&str, fn(u32) -> f64); 5] = [
+        type Number = fn(u32) -> f64;
+        let make: [(&str, Number); 5] = [
             ("seed", |i| PixelRandom::new(u64::from(i), 3, 5).sample(2).f64(9)),
             ("x", |i| PixelRandom::new(11, i, 5).sample(2).f64(9)),
             ("y", |i| PixelRandom::new(11, 3, i).sample(2).f64(9)),
