@@ -4,10 +4,17 @@
 //! on which part); [`Shape::surface`] computes the rest once, for the winner.
 
 mod aabb;
+mod axial;
+mod cone;
+mod cuboid;
+mod cylinder;
 mod density;
+mod disk;
 mod hit;
 mod measure;
+mod patch;
 mod placed;
+mod plane;
 mod ray;
 mod shape;
 mod sphere;
@@ -15,8 +22,14 @@ mod support;
 mod triangle;
 
 pub use aabb::Aabb;
+pub use cone::Cone;
+pub use cuboid::Cuboid;
+pub use cylinder::Cylinder;
+pub use disk::Disk;
 pub use hit::{DirectionSample, Root, Roots, Surface, SurfaceSample};
+pub use patch::BilinearPatch;
 pub use placed::PlacedShape;
+pub use plane::Plane;
 pub use ray::Ray;
 pub use shape::{Shape, ShapeError};
 pub use sphere::Sphere;
