@@ -3,8 +3,8 @@
 use lumbre_math::{DVec2, DVec3, Transform};
 
 use crate::{
-    Aabb, BilinearPatch, Cone, Cuboid, Cylinder, DirectionSample, Disk, Plane, Ray, Root, Roots, Sphere,
-    Surface, SurfaceSample, Triangle,
+    Aabb, BilinearPatch, Cone, Cuboid, Cylinder, DirectionSample, Disk, Hyperboloid, Paraboloid, Plane, Quadric, Ray,
+    Root, Roots, Sphere, Surface, SurfaceSample, Torus, Triangle,
 };
 
 /// Makes the enum and hands every method to the variant's method of the same name. To add a shape, write its file with
@@ -113,6 +113,14 @@ shapes! {
     BilinearPatch(BilinearPatch) in BilinearPatch,
     /// A triangle.
     Triangle(Triangle) in Triangle,
+    /// A torus: ring, horn or spindle.
+    Torus(Torus) in Box<Torus>,
+    /// A paraboloid of revolution.
+    Paraboloid(Paraboloid) in Paraboloid,
+    /// A hyperboloid of revolution.
+    Hyperboloid(Hyperboloid) in Box<Hyperboloid>,
+    /// A general quadric, in a box if it is to be bounded.
+    Quadric(Quadric) in Box<Quadric>,
 }
 
 impl Shape {
