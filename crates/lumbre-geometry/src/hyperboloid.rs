@@ -143,10 +143,7 @@ impl Hyperboloid {
             point: p,
             point_error: gamma(8) * size + DVec3::splat(implicit.uncertainty()),
             normal: side * implicit.normal(),
-            uv: DVec2::new(
-                (azimuth(turn.y, turn.x) / self.phi_max).min(1.0),
-                self.v_of(p.z).clamp(0.0, 1.0),
-            ),
+            uv: DVec2::new((azimuth(turn.y, turn.x) / self.phi_max).min(1.0), self.v_of(p.z).clamp(0.0, 1.0)),
             dpdu,
             dpdv,
             dndu: bend(dpdu),

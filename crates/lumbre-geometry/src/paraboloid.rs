@@ -121,7 +121,8 @@ impl Paraboloid {
         let dpdu = self.phi_max * DVec3::new(-round.y, round.x, 0.0);
         let rise = 0.5 / (self.bend * round.length_squared());
         let dpdv = height * DVec3::new(rise * round.x, rise * round.y, 1.0);
-        let bend = |dp: DVec3| implicit.turning(DVec3::new(2.0 * self.bend * dp.x, 2.0 * self.bend * dp.y, 0.0));
+        let bend =
+            |dp: DVec3| implicit.turning(DVec3::new(2.0 * self.bend * dp.x, 2.0 * self.bend * dp.y, 0.0));
         Surface {
             point: p,
             point_error: gamma(8) * p.abs() + DVec3::splat(implicit.uncertainty()),

@@ -4,6 +4,7 @@ use lumbre_math::quadratic::{dop, quadratic};
 use lumbre_math::{DAffine3, DMat3, DVec2, DVec3, Transform};
 
 use crate::line::{Implicit, NearLine};
+use crate::placed::into_world;
 use crate::shape::check;
 use crate::support::{bounds_from_support, gamma};
 use crate::{
@@ -122,15 +123,14 @@ impl Quadric {
         let depth = -sign * (0.5 * self.linear.dot(center) + self.constant);
         let depth_is_rounding = depth <= 8.0 * f64::EPSILON * (0.5 * self.linear.dot(center)).abs();
         if depth_is_rounding {
-            return Err(ShapeError::Degenerate("no real point, or a single one, satisfies the quadric's equation"));
+            return Err(ShapeError::Degenerate(
+                "no real point, or a single one, satisfies the quadric's equation",
+            ));
         }
         (self.matrix, self.linear, self.constant) = (m, sign * self.linear, sign * self.constant);
         // Gᵀ (p - centre)/√depth is on the unit sphere.
-        let transposed = DMat3::from_cols(
-            DVec3::new(g00, 0.0, 0.0),
-            DVec3::new(g10, g11, 0.0),
-            DVec3::new(g20, g21, g22),
-        );
+        let transposed =
+            DMat3::from_cols(DVec3::new(g00, 0.0, 0.0), DVec3::new(g10, g11, 0.0), DVec3::new(g20, g21, g22));
         let sphere_from_object = transposed * (1.0 / depth.sqrt());
         let linear = Transform::from_affine(DAffine3::from_mat3(sphere_from_object));
         Ok(linear.ok().map(|map| Transform::translate(center) * map.inverse()))
@@ -179,7 +179,9 @@ impl Quadric {
         Implicit {
             value: quadratic + linear + self.constant,
             gradient: 2.0 * mp + self.linear,
-            terms: p.abs().dot(size(self.matrix) * p.abs()) + self.linear.abs().dot(p.abs()) + self.constant.abs(),
+            terms: p.abs().dot(size(self.matrix) * p.abs())
+                + self.linear.abs().dot(p.abs())
+                + self.constant.abs(),
         }
     }
 
@@ -194,7 +196,9 @@ impl Quadric {
 
     /// `None`: the projections overlap, and a point cannot be told from its `uv`. Closed quadrics are run forwards.
     pub fn surface_at(&self, part: u32, uv: DVec2) -> Option<Surface> {
-        self.ellipsoid.as_ref()?.surface_at(part, uv)
+        let ellipsoid = self.ellipsoid.as_ref()?;
+        let on_sphere = ellipsoid.shape().surface_at(part, uv)?;
+        Some(into_world(&ellipsoid.world_from_object(), &on_sphere))
     }
 
     fn surface_on(&self, p: DVec3) -> Surface {

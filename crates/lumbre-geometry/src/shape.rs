@@ -3,8 +3,8 @@
 use lumbre_math::{DVec2, DVec3, Transform};
 
 use crate::{
-    Aabb, BilinearPatch, Cone, Cuboid, Cylinder, DirectionSample, Disk, Hyperboloid, Paraboloid, Plane, Quadric, Ray,
-    Root, Roots, Sphere, Surface, SurfaceSample, Torus, Triangle,
+    Aabb, BilinearPatch, Cone, Cuboid, Cylinder, DirectionSample, Disk, Hyperboloid, Paraboloid, Plane,
+    Quadric, Ray, Root, Roots, Sphere, Surface, SurfaceSample, Torus, Triangle,
 };
 
 /// Makes the enum and hands every method to the variant's method of the same name. To add a shape, write its file with

@@ -3,10 +3,10 @@
 use std::f64::consts::{PI, TAU};
 
 use lumbre_math::roots::{bracketed_root, depressed_cubic_roots};
-use lumbre_math::{DVec2, DVec3, Transform};
+use lumbre_math::{DVec2, DVec3, Transform, orthonormal_basis};
 
 use crate::shape::check;
-use crate::support::{azimuth, bounds_from_support, frame, gamma};
+use crate::support::{azimuth, bounds_from_support, gamma};
 use crate::{Aabb, DirectionSample, Ray, Root, Roots, ShapeError, Surface, SurfaceSample, density, measure};
 
 /// The points at distance `minor` from a circle of radius `major`.
@@ -63,7 +63,7 @@ impl Torus {
         let axis = check::direction("axis", axis)?;
         let major = check::positive("majorradius", major)?;
         let minor = check::positive("minorradius", minor)?;
-        let (e1, e2) = frame(axis);
+        let (e1, e2) = orthonormal_basis(axis);
         Ok(Self { center, e1, e2, axis, upright: axis == DVec3::Z, major, minor })
     }
 

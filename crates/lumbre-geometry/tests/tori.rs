@@ -197,7 +197,7 @@ fn lines_that_almost_touch_cross_an_even_number_of_times() {
         let mut roots = Roots::new();
         torus.roots(&ray, &mut roots);
         let crossings: usize = roots.iter().map(|r| usize::from(r.multiplicity)).sum();
-        assert!(crossings % 2 == 0, "{ray:?} {roots:?}");
+        assert!(crossings.is_multiple_of(2), "{ray:?} {roots:?}");
         assert!(roots.windows(2).all(|w| w[0].t < w[1].t));
         counts[crossings.min(4)] += 1;
     }
