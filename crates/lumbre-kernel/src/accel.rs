@@ -6,11 +6,27 @@ use std::ops::ControlFlow;
 use lumbre_geometry::{Aabb, Ray, Surface};
 use lumbre_math::Transform;
 
-use crate::{Geometry, Hit};
+use crate::collapse::{Entry, Packed};
+use crate::lanes::Level;
+use crate::node::Units;
+use crate::query::{All, Any, Batch, Closest, Count, If};
+use crate::{Geometry, Hit, prepare, surface, traverse};
 
 /// A bounding volume hierarchy over geometries, ready for queries from any number of threads.
+///
+/// The same geometries give the same tree from any number of threads, and every query the same answer on any machine:
+/// hits do not depend on the order of the visit, nor on the instruction set.
 #[derive(Debug)]
-pub struct Accel {}
+pub struct Accel {
+    pub(crate) geometries: Vec<Geometry>,
+    pub(crate) units: Units,
+    pub(crate) tree: Packed,
+    // Kept out of the tree, and asked by every ray.
+    pub(crate) infinite: Vec<Entry>,
+    pub(crate) bounds: Aabb,
+    pub(crate) primitives: usize,
+    pub(crate) level: Level,
+}
 
 /// How a tree is built.
 #[derive(Clone, Debug, Default)]
@@ -34,7 +50,7 @@ pub enum BuildError {
         /// The vertex or primitive.
         element: usize,
     },
-    /// More primitives than a tree can name (2^32 - 1).
+    /// More primitives than a tree can name (2^29 - 1).
     TooMany,
 }
 
@@ -47,7 +63,7 @@ impl fmt::Display for BuildError {
             Self::NotFinite { geometry, element } => {
                 write!(f, "element {element} of geometry {geometry} has a coordinate that is not finite")
             }
-            Self::TooMany => f.write_str("more than 4294967295 primitives in one tree"),
+            Self::TooMany => write!(f, "more than {} primitives in one tree", prepare::MOST_PRIMITIVES),
         }
     }
 }
@@ -58,70 +74,120 @@ impl Accel {
     /// Builds a tree over `geometries`. Zero-area triangles are kept out: they are never hit.
     ///
     /// # Errors
-    /// [`BuildError`] when a mesh names vertices that it lacks, or a coordinate is not finite.
-    pub fn build(_geometries: Vec<Geometry>, _options: &BuildOptions) -> Result<Self, BuildError> {
-        unimplemented!("skeleton")
+    /// [`BuildError`] when a mesh names vertices that it lacks, a coordinate is not finite, or there are 2^29 primitives
+    /// or more.
+    pub fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result<Self, BuildError> {
+        let BuildOptions {} = options;
+        prepare::build(geometries)
     }
 
     /// The nearest hit in the ray's range. Of hits at the same `t`, the one whose (path, geometry, primitive) comes
-    /// first.
+    /// first, by positions in the lists that the trees were built from.
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
-        self.closest_filtered(ray, |_| true)
+        self.closest_at(self.level, ray)
+    }
+
+    pub(crate) fn closest_at(&self, level: Level, ray: &Ray) -> Option<Hit> {
+        let mut search = Closest::new(ray, All);
+        traverse::search(level, self, ray, &mut search);
+        search.best
     }
 
     /// The nearest hit that `accept` takes; it may be asked in any order of `t`, and its answer must depend on the hit
     /// alone.
-    pub fn closest_filtered(&self, _ray: &Ray, _accept: impl FnMut(&Hit) -> bool) -> Option<Hit> {
-        unimplemented!("skeleton")
+    pub fn closest_filtered(&self, ray: &Ray, accept: impl FnMut(&Hit) -> bool) -> Option<Hit> {
+        let mut search = Closest::new(ray, If(accept));
+        traverse::search(self.level, self, ray, &mut search);
+        search.best
     }
 
     /// Whether anything is hit in the ray's range.
     pub fn any(&self, ray: &Ray) -> bool {
-        self.any_filtered(ray, |_| true)
+        self.any_at(self.level, ray)
+    }
+
+    pub(crate) fn any_at(&self, level: Level, ray: &Ray) -> bool {
+        let mut search = Any::new(ray, All);
+        traverse::search(level, self, ray, &mut search);
+        search.is_hit
     }
 
     /// Whether anything that `accept` takes is hit in the ray's range.
-    pub fn any_filtered(&self, _ray: &Ray, _accept: impl FnMut(&Hit) -> bool) -> bool {
-        unimplemented!("skeleton")
+    pub fn any_filtered(&self, ray: &Ray, accept: impl FnMut(&Hit) -> bool) -> bool {
+        let mut search = Any::new(ray, If(accept));
+        traverse::search(self.level, self, ray, &mut search);
+        search.is_hit
     }
 
     /// Every hit in the ray's range in ascending order of `t` (ties by path, geometry, primitive), until `visit` breaks.
-    pub fn all(&self, _ray: &Ray, _visit: impl FnMut(&Hit) -> ControlFlow<()>) {
-        unimplemented!("skeleton")
+    ///
+    /// Hits are sought in batches of 32, 128, 512 and so on, so that an early end costs little and memory is at most
+    /// proportional to the hits visited.
+    pub fn all(&self, ray: &Ray, mut visit: impl FnMut(&Hit) -> ControlFlow<()>) {
+        let mut size = 32;
+        let mut last = None;
+        loop {
+            let mut search = Batch::new(ray, size, last.as_ref());
+            traverse::search(self.level, self, ray, &mut search);
+            let (mut hits, may_go_on) = search.into_hits();
+            if hits.iter().any(|ranked| visit(&ranked.hit).is_break()) || !may_go_on {
+                return;
+            }
+            last = hits.pop();
+            size = size.saturating_mul(4);
+        }
     }
 
     /// How many hits the ray's range holds.
     pub fn count(&self, ray: &Ray) -> usize {
-        let mut n = 0;
-        self.all(ray, |_| {
-            n += 1;
-            ControlFlow::Continue(())
-        });
-        n
+        let mut search = Count::new(ray);
+        traverse::search(self.level, self, ray, &mut search);
+        search.hits
     }
 
     /// The surface at a hit of this tree, in the space of this tree. For triangles `uv` are the barycentrics (b1, b2).
-    pub fn surface(&self, _ray: &Ray, _hit: &Hit) -> Surface {
-        unimplemented!("skeleton")
+    ///
+    /// # Panics
+    /// When `hit` comes from another tree and names what is not in this one.
+    pub fn surface(&self, ray: &Ray, hit: &Hit) -> Surface {
+        surface::surface(self, ray, hit)
     }
 
     /// The map from the space of the hit's innermost instance to the space of this tree.
-    pub fn world_from_object(&self, _hit: &Hit) -> Transform {
-        unimplemented!("skeleton")
+    ///
+    /// # Panics
+    /// When `hit` comes from another tree and names what is not in this one.
+    pub fn world_from_object(&self, hit: &Hit) -> Transform {
+        surface::world_from_object(self, hit)
     }
 
     /// A box around everything finite in it.
     pub fn bounds(&self) -> Aabb {
-        unimplemented!("skeleton")
+        self.bounds
     }
 
     /// How many primitives it holds itself, those of its instances not counted.
     pub fn primitive_count(&self) -> usize {
-        unimplemented!("skeleton")
+        self.primitives
     }
 
     /// Bytes of the tree itself: nodes, leaves and references, not the meshes and not the instances' trees.
     pub fn memory_bytes(&self) -> usize {
-        unimplemented!("skeleton")
+        fn bytes<T>(v: &Vec<T>) -> usize {
+            v.capacity() * size_of::<T>()
+        }
+        size_of::<Self>()
+            + bytes(&self.geometries)
+            + bytes(&self.tree.nodes)
+            + bytes(&self.tree.blocks)
+            + bytes(&self.tree.entries)
+            + bytes(&self.infinite)
+    }
+
+    /// The entry of an instance: those in the tree count first, then those outside it.
+    #[inline(always)]
+    pub(crate) fn instance_entry(&self, index: usize) -> &Entry {
+        let inside = &self.tree.entries;
+        inside.get(index).unwrap_or_else(|| &self.infinite[index - inside.len()])
     }
 }

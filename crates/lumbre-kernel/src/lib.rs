@@ -3,8 +3,17 @@
 //! The kernel knows nothing of light: every geometry carries an `id` of the caller's, and a hit returns it.
 
 mod accel;
+mod build;
+mod collapse;
 mod geometry;
 mod hit;
+mod lanes;
+mod node;
+mod prepare;
+mod query;
+mod surface;
+mod traverse;
+mod triangles;
 
 pub use accel::{Accel, BuildError, BuildOptions};
 pub use geometry::{CustomGeometry, Geometry, GeometryKind, Instance, TriangleMesh};

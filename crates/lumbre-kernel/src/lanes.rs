@@ -1,0 +1,191 @@
+//! The fence around SIMD: the only module with `unsafe`. Outside it, a search is written once, over [`Lanes`].
+//!
+//! [`Level::run`] chooses the instruction set once a ray. The code between is generic and `#[inline(always)]` without a
+//! target feature of its own, so that it takes on the features of the root that it is inlined into.
+
+#![allow(unsafe_code)]
+
+use crate::node::{BoxRay, Node, WIDTH};
+use crate::triangles::{BLOCK, Shear, TriangleBlock};
+
+/// What a search does eight boxes or four triangles at a time.
+pub(crate) trait Lanes {
+    /// One bit for each child whose box the ray meets; its entry goes to `near`.
+    fn meet_boxes(node: &Node, ray: &BoxRay, near: &mut [f32; WIDTH]) -> u32;
+
+    /// One bit for each triangle whose rounded edge functions do not have differing signs: every triangle that is hit,
+    /// and a few others.
+    fn meet_triangles(block: &TriangleBlock, shear: &Shear, origin: &[f64; 3]) -> u32;
+}
+
+/// Work to be done with whichever lanes the machine has.
+pub(crate) trait Task {
+    /// What it gives.
+    type Output;
+    /// Does it. To be `#[inline(always)]`, with everything that it calls in its inner loop.
+    fn run<L: Lanes>(self) -> Self::Output;
+}
+
+/// An instruction set that this machine has: there is no other way to one than asking it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Level(Set);
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Set {
+    Portable,
+    #[cfg(target_arch = "x86_64")]
+    Avx2,
+}
+
+impl Level {
+    /// What every machine has.
+    #[cfg(test)]
+    pub(crate) const PORTABLE: Self = Self(Set::Portable);
+
+    /// The best that this machine has.
+    pub(crate) fn best() -> Self {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2")
+            && std::arch::is_x86_feature_detected!("fma")
+            && std::arch::is_x86_feature_detected!("bmi1")
+            && std::arch::is_x86_feature_detected!("bmi2")
+            && std::arch::is_x86_feature_detected!("lzcnt")
+            && std::arch::is_x86_feature_detected!("popcnt")
+        {
+            return Self(Set::Avx2);
+        }
+        Self(Set::Portable)
+    }
+
+    /// Runs the task with these lanes.
+    #[inline(always)]
+    pub(crate) fn run<T: Task>(self, task: T) -> T::Output {
+        match self.0 {
+            Set::Portable => task.run::<Portable>(),
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: `best` alone makes this value, after finding on this machine all the features of `run_avx2`.
+            Set::Avx2 => unsafe { run_avx2(task) },
+        }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+fn run_avx2<T: Task>(task: T) -> T::Output {
+    task.run::<Avx2>()
+}
+
+/// Plain loops over arrays.
+pub(crate) struct Portable;
+
+impl Lanes for Portable {
+    #[inline(always)]
+    fn meet_boxes(node: &Node, ray: &BoxRay, near: &mut [f32; WIDTH]) -> u32 {
+        let mut enter = [ray.s_min; WIDTH];
+        let mut leave = [ray.s_max; WIDTH];
+        for axis in 0..3 {
+            let near_planes = &node.planes[ray.near_planes[axis]];
+            let far_planes = &node.planes[ray.near_planes[axis] ^ 1];
+            for lane in 0..WIDTH {
+                let first = near_planes[lane] * ray.inverse[axis] + ray.near_offset[axis];
+                let last = far_planes[lane] * ray.inverse[axis] + ray.far_offset[axis];
+                enter[lane] = if first > enter[lane] { first } else { enter[lane] };
+                leave[lane] = if last < leave[lane] { last } else { leave[lane] };
+            }
+        }
+        *near = enter;
+        let mut mask = 0;
+        for lane in 0..WIDTH {
+            mask |= u32::from(enter[lane] <= leave[lane]) << lane;
+        }
+        mask & ((1 << node.len) - 1)
+    }
+
+    #[inline(always)]
+    fn meet_triangles(block: &TriangleBlock, shear: &Shear, origin: &[f64; 3]) -> u32 {
+        let mut x = [[0.0; BLOCK]; 3];
+        let mut y = [[0.0; BLOCK]; 3];
+        for corner in 0..3 {
+            let axes = &block.corners[corner];
+            for lane in 0..BLOCK {
+                let z = f64::from(axes[shear.axes[2]][lane]) - origin[2];
+                x[corner][lane] = (f64::from(axes[shear.axes[0]][lane]) - origin[0]) - shear.x * z;
+                y[corner][lane] = (f64::from(axes[shear.axes[1]][lane]) - origin[1]) - shear.y * z;
+            }
+        }
+        let mut mask = 0;
+        for lane in 0..BLOCK {
+            let edge = |p: usize, q: usize| x[p][lane] * y[q][lane] - y[p][lane] * x[q][lane];
+            let (u, v, w) = (edge(2, 1), edge(0, 2), edge(1, 0));
+            let inside = (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
+            mask |= u32::from(inside) << lane;
+        }
+        mask
+    }
+}
+
+/// AVX2 with FMA.
+#[cfg(target_arch = "x86_64")]
+pub(crate) struct Avx2;
+
+#[cfg(target_arch = "x86_64")]
+impl Lanes for Avx2 {
+    #[inline(always)]
+    fn meet_boxes(node: &Node, ray: &BoxRay, near: &mut [f32; WIDTH]) -> u32 {
+        use std::arch::x86_64::*;
+        // SAFETY: only `run_avx2` instantiates this, so the machine has AVX2 and FMA. Every load and store is of eight
+        // f32 in an array of eight; `near_planes` is checked by the index into `planes`.
+        unsafe {
+            let mut enter = _mm256_set1_ps(ray.s_min);
+            let mut leave = _mm256_set1_ps(ray.s_max);
+            for axis in 0..3 {
+                let inverse = _mm256_set1_ps(ray.inverse[axis]);
+                let near_index = ray.near_planes[axis];
+                let near_planes = _mm256_loadu_ps(node.planes[near_index].as_ptr());
+                let far_planes = _mm256_loadu_ps(node.planes[near_index ^ 1].as_ptr());
+                let first = _mm256_fmadd_ps(near_planes, inverse, _mm256_set1_ps(ray.near_offset[axis]));
+                let last = _mm256_fmadd_ps(far_planes, inverse, _mm256_set1_ps(ray.far_offset[axis]));
+                enter = _mm256_max_ps(first, enter);
+                leave = _mm256_min_ps(last, leave);
+            }
+            _mm256_storeu_ps(near.as_mut_ptr(), enter);
+            let mask = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(enter, leave)) as u32;
+            mask & ((1 << node.len) - 1)
+        }
+    }
+
+    #[inline(always)]
+    fn meet_triangles(block: &TriangleBlock, shear: &Shear, origin: &[f64; 3]) -> u32 {
+        use std::arch::x86_64::*;
+        // SAFETY: only `run_avx2` instantiates this, so the machine has AVX2. Every load is of four f32 in an array of
+        // four; the axes are checked by the index.
+        unsafe {
+            let [kx, ky, kz] = shear.axes;
+            let (shear_x, shear_y) = (_mm256_set1_pd(shear.x), _mm256_set1_pd(shear.y));
+            let (ox, oy, oz) =
+                (_mm256_set1_pd(origin[0]), _mm256_set1_pd(origin[1]), _mm256_set1_pd(origin[2]));
+            let mut x = [_mm256_setzero_pd(); 3];
+            let mut y = [_mm256_setzero_pd(); 3];
+            for corner in 0..3 {
+                let axes = &block.corners[corner];
+                let z = _mm256_sub_pd(_mm256_cvtps_pd(_mm_loadu_ps(axes[kz].as_ptr())), oz);
+                let across = _mm256_sub_pd(_mm256_cvtps_pd(_mm_loadu_ps(axes[kx].as_ptr())), ox);
+                let up = _mm256_sub_pd(_mm256_cvtps_pd(_mm_loadu_ps(axes[ky].as_ptr())), oy);
+                // No fused multiply-add: the bits are to be those of the scalar test.
+                x[corner] = _mm256_sub_pd(across, _mm256_mul_pd(shear_x, z));
+                y[corner] = _mm256_sub_pd(up, _mm256_mul_pd(shear_y, z));
+            }
+            let u = _mm256_sub_pd(_mm256_mul_pd(x[2], y[1]), _mm256_mul_pd(y[2], x[1]));
+            let v = _mm256_sub_pd(_mm256_mul_pd(x[0], y[2]), _mm256_mul_pd(y[0], x[2]));
+            let w = _mm256_sub_pd(_mm256_mul_pd(x[1], y[0]), _mm256_mul_pd(y[1], x[0]));
+            let zero = _mm256_setzero_pd();
+            let least = _mm256_min_pd(_mm256_min_pd(u, v), w);
+            let most = _mm256_max_pd(_mm256_max_pd(u, v), w);
+            let sided = _mm256_or_pd(
+                _mm256_cmp_pd::<_CMP_GE_OQ>(least, zero),
+                _mm256_cmp_pd::<_CMP_LE_OQ>(most, zero),
+            );
+            _mm256_movemask_pd(sided) as u32
+        }
+    }
+}

@@ -1,0 +1,272 @@
+//! The queries as searches: closest, any, every and how many.
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+use lumbre_geometry::Ray;
+
+use crate::Hit;
+use crate::traverse::{Ask, Found, Search};
+
+impl Found<'_> {
+    fn to_hit(&self) -> Hit {
+        Hit {
+            root: self.root,
+            id: self.accel.geometries[self.geometry as usize].id,
+            primitive: self.primitive,
+            geometry: self.geometry,
+            instances: self.place.ids.clone(),
+            route: self.place.route.clone(),
+        }
+    }
+
+    /// The order of hits: by t, then by where they are in the lists.
+    fn order(&self, hit: &Hit) -> Ordering {
+        by_t(self.root.t, hit.root.t)
+            .then_with(|| self.place.route.cmp(&hit.route))
+            .then_with(|| (self.geometry, self.primitive).cmp(&(hit.geometry, hit.primitive)))
+    }
+}
+
+// No NaN comes this far, and the two zeros are one place.
+fn by_t(a: f64, b: f64) -> Ordering {
+    a.partial_cmp(&b).unwrap_or(Ordering::Equal)
+}
+
+/// What a query takes.
+pub(crate) trait Filter {
+    /// Whether it takes everything, so that nothing has to be asked.
+    const TAKES_ALL: bool;
+    /// Whether it takes this.
+    fn takes(&mut self, hit: &Hit) -> bool;
+}
+
+/// Takes everything.
+pub(crate) struct All;
+
+impl Filter for All {
+    const TAKES_ALL: bool = true;
+    #[inline(always)]
+    fn takes(&mut self, _: &Hit) -> bool {
+        true
+    }
+}
+
+/// Takes what the closure takes.
+pub(crate) struct If<F>(pub(crate) F);
+
+impl<F: FnMut(&Hit) -> bool> Filter for If<F> {
+    const TAKES_ALL: bool = false;
+    fn takes(&mut self, hit: &Hit) -> bool {
+        (self.0)(hit)
+    }
+}
+
+/// The nearest hit.
+pub(crate) struct Closest<F> {
+    pub(crate) best: Option<Hit>,
+    limit: f64,
+    floor: f64,
+    filter: F,
+}
+
+impl<F> Closest<F> {
+    #[inline(always)]
+    pub(crate) fn new(ray: &Ray, filter: F) -> Self {
+        Self { best: None, limit: ray.t_max, floor: ray.t_min, filter }
+    }
+}
+
+impl<F: Filter> Search for Closest<F> {
+    const ASK: Ask = if F::TAKES_ALL { Ask::First } else { Ask::Every };
+    const ORDERED: bool = true;
+
+    #[inline(always)]
+    fn limit(&self) -> f64 {
+        self.limit
+    }
+
+    #[inline(always)]
+    fn floor(&self) -> f64 {
+        self.floor
+    }
+
+    #[inline(always)]
+    fn offer(&mut self, found: &Found) -> bool {
+        if found.root.t > self.limit {
+            return false;
+        }
+        if let Some(best) = &self.best
+            && found.order(best) != Ordering::Less
+        {
+            return false;
+        }
+        let hit = found.to_hit();
+        if F::TAKES_ALL || self.filter.takes(&hit) {
+            self.limit = hit.root.t;
+            self.best = Some(hit);
+        }
+        false
+    }
+}
+
+/// Whether there is a hit.
+pub(crate) struct Any<F> {
+    pub(crate) is_hit: bool,
+    limit: f64,
+    floor: f64,
+    filter: F,
+}
+
+impl<F> Any<F> {
+    #[inline(always)]
+    pub(crate) fn new(ray: &Ray, filter: F) -> Self {
+        Self { is_hit: false, limit: ray.t_max, floor: ray.t_min, filter }
+    }
+}
+
+impl<F: Filter> Search for Any<F> {
+    const ASK: Ask = if F::TAKES_ALL { Ask::Whether } else { Ask::Every };
+    const ORDERED: bool = false;
+
+    #[inline(always)]
+    fn limit(&self) -> f64 {
+        self.limit
+    }
+
+    #[inline(always)]
+    fn floor(&self) -> f64 {
+        self.floor
+    }
+
+    #[inline(always)]
+    fn offer(&mut self, found: &Found) -> bool {
+        self.is_hit = F::TAKES_ALL || self.filter.takes(&found.to_hit());
+        self.is_hit
+    }
+
+    #[inline(always)]
+    fn settle(&mut self) {
+        self.is_hit = true;
+    }
+}
+
+/// How many hits.
+pub(crate) struct Count {
+    pub(crate) hits: usize,
+    limit: f64,
+    floor: f64,
+}
+
+impl Count {
+    pub(crate) fn new(ray: &Ray) -> Self {
+        Self { hits: 0, limit: ray.t_max, floor: ray.t_min }
+    }
+}
+
+impl Search for Count {
+    const ASK: Ask = Ask::Every;
+    const ORDERED: bool = false;
+
+    fn limit(&self) -> f64 {
+        self.limit
+    }
+
+    fn floor(&self) -> f64 {
+        self.floor
+    }
+
+    fn offer(&mut self, _: &Found) -> bool {
+        self.hits += 1;
+        false
+    }
+}
+
+/// The next hits after a given one, nearest first: a batch of bounded size.
+pub(crate) struct Batch<'a> {
+    nearest: BinaryHeap<Ranked>,
+    size: usize,
+    after: Option<&'a Ranked>,
+    limit: f64,
+    floor: f64,
+}
+
+/// A hit with all that its place in the order depends on.
+#[derive(Debug)]
+pub(crate) struct Ranked {
+    pub(crate) hit: Hit,
+    // Which of the primitive's crossings: a shape may be crossed twice at the same t.
+    order: u32,
+}
+
+impl Ord for Ranked {
+    fn cmp(&self, other: &Self) -> Ordering {
+        by_t(self.hit.root.t, other.hit.root.t)
+            .then_with(|| self.hit.route.cmp(&other.hit.route))
+            .then_with(|| {
+                let place = |ranked: &Self| (ranked.hit.geometry, ranked.hit.primitive, ranked.order);
+                place(self).cmp(&place(other))
+            })
+    }
+}
+
+impl PartialOrd for Ranked {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Ranked {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Ranked {}
+
+impl<'a> Batch<'a> {
+    pub(crate) fn new(ray: &Ray, size: usize, after: Option<&'a Ranked>) -> Self {
+        let floor = after.map_or(ray.t_min, |after| after.hit.root.t);
+        Self { nearest: BinaryHeap::new(), size, after, limit: ray.t_max, floor }
+    }
+
+    /// The hits in order, and whether there may be more.
+    pub(crate) fn into_hits(self) -> (Vec<Ranked>, bool) {
+        let is_full = self.nearest.len() == self.size;
+        (self.nearest.into_sorted_vec(), is_full)
+    }
+}
+
+impl Search for Batch<'_> {
+    const ASK: Ask = Ask::Every;
+    const ORDERED: bool = true;
+
+    fn limit(&self) -> f64 {
+        self.limit
+    }
+
+    fn floor(&self) -> f64 {
+        self.floor
+    }
+
+    fn offer(&mut self, found: &Found) -> bool {
+        let t = found.root.t;
+        if t < self.floor || self.limit < t {
+            return false;
+        }
+        let ranked = Ranked { hit: found.to_hit(), order: found.order };
+        if self.after.is_some_and(|after| ranked <= *after) {
+            return false;
+        }
+        self.nearest.push(ranked);
+        if self.nearest.len() > self.size {
+            self.nearest.pop();
+        }
+        if self.nearest.len() == self.size
+            && let Some(farthest) = self.nearest.peek()
+        {
+            self.limit = farthest.hit.root.t;
+        }
+        false
+    }
+}

@@ -1,0 +1,103 @@
+//! What is computed once, for the hit that was chosen.
+
+use lumbre_geometry::{Ray, Surface};
+use lumbre_math::{DMat3, DVec2, DVec3, Transform};
+
+use crate::{Accel, GeometryKind, Hit, Instance, TriangleMesh};
+
+const U: f64 = 0.5 * f64::EPSILON;
+
+/// Higham's bound on the relative error of n roundings: n u / (1 - n u).
+const fn gamma(n: f64) -> f64 {
+    n * U / (1.0 - n * U)
+}
+
+/// The instances along a hit's route, outermost first, and the tree within the last.
+fn along<'a>(accel: &'a Accel, hit: &Hit) -> (Vec<&'a Instance>, &'a Accel) {
+    let mut inner = accel;
+    let mut instances = Vec::with_capacity(hit.route.len());
+    for &position in &hit.route {
+        let GeometryKind::Instance(instance) = &inner.geometries[position as usize].kind else {
+            panic!("a hit of another tree");
+        };
+        instances.push(instance);
+        inner = &instance.accel;
+    }
+    (instances, inner)
+}
+
+/// The map from the innermost instance of a hit.
+pub(crate) fn world_from_object(accel: &Accel, hit: &Hit) -> Transform {
+    let (instances, _) = along(accel, hit);
+    instances.iter().fold(Transform::IDENTITY, |outer, instance| outer * instance.world_from_object)
+}
+
+/// The surface at a hit, in the space of `accel`.
+pub(crate) fn surface(accel: &Accel, ray: &Ray, hit: &Hit) -> Surface {
+    let (instances, inner) = along(accel, hit);
+    // The same steps as the search took, for the same bits.
+    let ray = instances.iter().fold(*ray, |ray, instance| ray.into_object(&instance.world_from_object));
+    let surface = match &inner.geometries[hit.geometry as usize].kind {
+        GeometryKind::Shape(shape) => shape.surface(&ray, &hit.root),
+        GeometryKind::Mesh(mesh) => triangle_surface(mesh, hit.primitive, hit.root.local),
+        GeometryKind::Custom(custom) => custom.surface(hit.primitive, &ray, &hit.root),
+        GeometryKind::Instance(_) => panic!("a hit of another tree"),
+    };
+    instances.iter().rev().fold(surface, |surface, instance| place(&surface, &instance.world_from_object))
+}
+
+/// A point of a triangle from its barycentrics (b1, b2).
+///
+/// The error is that of the combination, γ₇ Σ|bᵢ pᵢ| (M. Pharr, W. Jakob, G. Humphreys, "Physically Based Rendering",
+/// 3rd edition, 2016, section 3.9), and one rounding for the mesh's origin.
+fn triangle_surface(mesh: &TriangleMesh, triangle: u32, uv: DVec2) -> Surface {
+    let [p0, p1, p2] = mesh.indices[triangle as usize].map(|vertex| mesh.positions[vertex as usize].as_dvec3());
+    let b0 = 1.0 - uv.x - uv.y;
+    let (dpdu, dpdv) = (p1 - p0, p2 - p0);
+    let terms = [b0 * p0, uv.x * p1, uv.y * p2];
+    let point = mesh.origin + (terms[0] + terms[1] + terms[2]);
+    let sizes = terms[0].abs() + terms[1].abs() + terms[2].abs();
+    Surface {
+        point,
+        point_error: gamma(7.0) * sizes + U * point.abs(),
+        normal: unit(dpdu.cross(dpdv)),
+        uv,
+        dpdu,
+        dpdv,
+        dndu: DVec3::ZERO,
+        dndv: DVec3::ZERO,
+    }
+}
+
+/// The surface under a map. Its error grows by |L| and by the rounding of the product, γ₃ (|L| |p| + |τ|).
+fn place(surface: &Surface, world_from_object: &Transform) -> Surface {
+    let affine = world_from_object.affine();
+    let linear = affine.matrix3;
+    let sizes = DMat3::from_cols(linear.x_axis.abs(), linear.y_axis.abs(), linear.z_axis.abs());
+    let point_error = (1.0 + gamma(3.0)) * (sizes * surface.point_error)
+        + gamma(4.0) * (sizes * surface.point.abs() + affine.translation.abs());
+    // The normal is N/|N| with N = L⁻ᵀ n, and its change is what N's has across it.
+    let scaled = world_from_object.normal(surface.normal);
+    let length = scaled.length();
+    let normal = unit(scaled);
+    let change = |dn: DVec3| {
+        let dn = world_from_object.normal(dn) / length;
+        dn - normal * normal.dot(dn)
+    };
+    Surface {
+        point: world_from_object.point(surface.point),
+        point_error,
+        normal,
+        uv: surface.uv,
+        dpdu: world_from_object.vector(surface.dpdu),
+        dpdv: world_from_object.vector(surface.dpdv),
+        dndu: change(surface.dndu),
+        dndv: change(surface.dndv),
+    }
+}
+
+/// The direction of `v`, also where its square would leave the range of f64.
+fn unit(v: DVec3) -> DVec3 {
+    let v = v / v.abs().max_element();
+    v / v.length()
+}
