@@ -18,3 +18,8 @@ mod triangles;
 pub use accel::{Accel, BuildError, BuildOptions};
 pub use geometry::{CustomGeometry, Geometry, GeometryKind, Instance, TriangleMesh};
 pub use hit::{Hit, InstancePath};
+
+#[cfg(test)]
+mod brute;
+#[cfg(test)]
+mod tests;

@@ -130,7 +130,8 @@ impl BoxRay {
         let t_shift = -start.dot(direction) / direction.length_squared();
         let anchor = start + t_shift * direction;
         let reach = (ray.origin.abs() + units.origin.abs()).max_element() * units.scale + 1.0;
-        let slop = f64::from_bits((1023 - 40) << 52) + f64::from_bits((1023 - 47) << 52) * units.condition * reach;
+        let slop =
+            f64::from_bits((1023 - 40) << 52) + f64::from_bits((1023 - 47) << 52) * units.condition * reach;
 
         let anchor_distance = anchor.length();
         let fits = t_scale.is_normal() && slop < 1e6 && anchor_distance.is_finite();

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use crate::build::{Bounds, Kind, Primitive, Traits, binary_tree};
 use crate::collapse::{Entry, Packed, pack};
 use crate::lanes::Level;
-use crate::node::{Units, WIDTH};
+use crate::node::{Node, Units, tag};
 use crate::{Accel, BuildError, Geometry, GeometryKind, Instance, TriangleMesh};
 
 /// References have 29 bits of place.
@@ -103,8 +103,7 @@ fn take_apart(geometries: &[Geometry]) -> Result<Parts, BuildError> {
                 }
             }
             GeometryKind::Instance(instance) => {
-                let (is_infinite, bounds) =
-                    (!instance.accel.infinite.is_empty(), instance_bounds(instance));
+                let (is_infinite, bounds) = (!instance.accel.infinite.is_empty(), instance_bounds(instance));
                 if is_infinite {
                     parts.bounds = parts.bounds.union(bounds);
                     parts.add(position, 0, None, room)?;
@@ -164,10 +163,7 @@ fn triangles_of(mesh: &TriangleMesh) -> impl ParallelIterator<Item = (u32, Aabb)
     mesh.indices.par_iter().enumerate().filter_map(|(triangle, vertices)| {
         let [p0, p1, p2] = vertices.map(|vertex| mesh.positions[vertex as usize].as_dvec3());
         let has_area = (p1 - p0).cross(p2 - p0) != DVec3::ZERO;
-        let bounds = Aabb {
-            min: mesh.origin + p0.min(p1).min(p2),
-            max: mesh.origin + p0.max(p1).max(p2),
-        };
+        let bounds = Aabb { min: mesh.origin + p0.min(p1).min(p2), max: mesh.origin + p0.max(p1).max(p2) };
         has_area.then_some((triangle as u32, bounds))
     })
 }
@@ -211,28 +207,41 @@ fn condition_of(map: &Transform) -> f64 {
     by_norm.min(by_component).max(1.0)
 }
 
-/// A box around an instance of what is finite. The boxes of the root's children, each taken over by itself, are tighter
-/// than the whole.
+/// A box around an instance of what is finite: of boxes two levels down the inner tree, each taken over by itself, which
+/// is tighter than the image of the whole.
 fn instance_bounds(instance: &Instance) -> Aabb {
     let inner = &instance.accel;
     let map = &instance.world_from_object;
     let whole = placed_bounds(&inner.bounds, map);
-    let root = inner.tree.root.filter(|_| inner.infinite.is_empty()).and_then(|root| inner.tree.nodes.get(root as usize));
-    let Some(root) = root else {
+    let node = |reference: u32| {
+        (reference >> tag::SHIFT == tag::INNER).then(|| &inner.tree.nodes[reference as usize])
+    };
+    let Some(root) = inner.tree.root.filter(|_| inner.infinite.is_empty()).and_then(node) else {
         return whole;
     };
-    let children = (0..WIDTH.min(root.len as usize)).map(|lane| {
-        let plane = |side: usize| {
-            DVec3::from_array([0, 2, 4].map(|axis| f64::from(root.planes[axis + side][lane])))
-                / inner.units.scale
-                + inner.units.origin
-        };
-        // Rounded once more than the planes were.
-        placed_bounds(&Aabb { min: plane(0), max: plane(1) }.outward(2), map)
-    });
-    let joined = children.fold(Aabb::EMPTY, Aabb::union);
+    let mut joined = Aabb::EMPTY;
+    for lane in 0..root.len as usize {
+        match node(root.children[lane]) {
+            Some(child) => {
+                for lane in 0..child.len as usize {
+                    joined = joined.union(placed_bounds(&box_in_space(&inner.units, child, lane), map));
+                }
+            }
+            None => joined = joined.union(placed_bounds(&box_in_space(&inner.units, root, lane), map)),
+        }
+    }
     // Each bounds it, so that their common part does.
     Aabb { min: joined.min.max(whole.min), max: joined.max.min(whole.max) }
+}
+
+/// A node's box, back from tree units.
+fn box_in_space(units: &Units, node: &Node, lane: usize) -> Aabb {
+    let plane = |side: usize| {
+        let planes = [0, 2, 4].map(|axis| f64::from(node.planes[axis + side][lane]));
+        DVec3::from_array(planes) / units.scale + units.origin
+    };
+    // Rounded once more than the planes were.
+    Aabb { min: plane(0), max: plane(1) }.outward(2)
 }
 
 /// A box around the image of a box (J. Arvo, "Transforming axis-aligned bounding boxes", Graphics Gems, 1990).

@@ -201,12 +201,12 @@ pub(crate) struct Ranked {
 
 impl Ord for Ranked {
     fn cmp(&self, other: &Self) -> Ordering {
-        by_t(self.hit.root.t, other.hit.root.t)
-            .then_with(|| self.hit.route.cmp(&other.hit.route))
-            .then_with(|| {
+        by_t(self.hit.root.t, other.hit.root.t).then_with(|| self.hit.route.cmp(&other.hit.route)).then_with(
+            || {
                 let place = |ranked: &Self| (ranked.hit.geometry, ranked.hit.primitive, ranked.order);
                 place(self).cmp(&place(other))
-            })
+            },
+        )
     }
 }
 

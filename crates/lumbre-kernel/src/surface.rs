@@ -51,7 +51,8 @@ pub(crate) fn surface(accel: &Accel, ray: &Ray, hit: &Hit) -> Surface {
 /// The error is that of the combination, γ₇ Σ|bᵢ pᵢ| (M. Pharr, W. Jakob, G. Humphreys, "Physically Based Rendering",
 /// 3rd edition, 2016, section 3.9), and one rounding for the mesh's origin.
 fn triangle_surface(mesh: &TriangleMesh, triangle: u32, uv: DVec2) -> Surface {
-    let [p0, p1, p2] = mesh.indices[triangle as usize].map(|vertex| mesh.positions[vertex as usize].as_dvec3());
+    let [p0, p1, p2] =
+        mesh.indices[triangle as usize].map(|vertex| mesh.positions[vertex as usize].as_dvec3());
     let b0 = 1.0 - uv.x - uv.y;
     let (dpdu, dpdv) = (p1 - p0, p2 - p0);
     let terms = [b0 * p0, uv.x * p1, uv.y * p2];

@@ -278,12 +278,7 @@ fn enter<S: Search>(
 }
 
 #[inline(always)]
-fn meet_blocks<L: Lanes, S: Search>(
-    frame: &mut Frame,
-    first: usize,
-    place: &Place,
-    search: &mut S,
-) -> bool {
+fn meet_blocks<L: Lanes, S: Search>(frame: &mut Frame, first: usize, place: &Place, search: &mut S) -> bool {
     let mut found_any = false;
     for block in &frame.accel.tree.blocks[first..] {
         let origin = frame.shear.local_origin(frame.ray.origin, &block.origin);

@@ -109,7 +109,12 @@ struct Corner {
 /// The one crossing of a triangle within the ray's range. `corners` are relative to the mesh, as is `origin`, which has
 /// the order of the shear's axes.
 #[inline(always)]
-pub(crate) fn intersect(ray: &Ray, shear: &Shear, origin: &[f64; 3], corners: &[[f32; 3]; 3]) -> Option<Root> {
+pub(crate) fn intersect(
+    ray: &Ray,
+    shear: &Shear,
+    origin: &[f64; 3],
+    corners: &[[f32; 3]; 3],
+) -> Option<Root> {
     let [a, b, c] = [
         shear.corner(origin, &corners[0]),
         shear.corner(origin, &corners[1]),

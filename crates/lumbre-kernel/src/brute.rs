@@ -1,0 +1,71 @@
+//! The plain version of every query: one loop over everything. The tests' oracle.
+
+use lumbre_geometry::Ray;
+
+use crate::query::{All, Batch, Closest};
+use crate::traverse::{Found, Place, Search, is_sound, meet_kind};
+use crate::triangles::{Shear, intersect};
+use crate::{Accel, GeometryKind, Hit};
+
+pub(crate) fn closest(accel: &Accel, ray: &Ray) -> Option<Hit> {
+    let mut search = Closest::new(ray, All);
+    visit(accel, ray, &mut search);
+    search.best
+}
+
+pub(crate) fn every(accel: &Accel, ray: &Ray) -> Vec<Hit> {
+    let mut search = Batch::new(ray, usize::MAX, None);
+    visit(accel, ray, &mut search);
+    search.into_hits().0.into_iter().map(|ranked| ranked.hit).collect()
+}
+
+fn visit<S: Search>(accel: &Accel, ray: &Ray, search: &mut S) {
+    let mut pending = vec![(accel, *ray, Place::default())];
+    while let Some((accel, ray, place)) = pending.pop() {
+        if !is_sound(&ray) {
+            continue;
+        }
+        for (position, geometry) in accel.geometries.iter().enumerate() {
+            let position = position as u32;
+            match &geometry.kind {
+                GeometryKind::Mesh(mesh) => {
+                    let shear = Shear::new(ray.direction);
+                    let origin = shear.local_origin(ray.origin, &mesh.origin.to_array());
+                    for (primitive, triangle) in mesh.indices.iter().enumerate() {
+                        let corners = triangle.map(|vertex| mesh.positions[vertex as usize].to_array());
+                        let [a, b, c] =
+                            corners.map(|corner| lumbre_math::Vec3::from_array(corner).as_dvec3());
+                        if (b - a).cross(c - a) == lumbre_math::DVec3::ZERO {
+                            continue;
+                        }
+                        if let Some(root) = intersect(&ray, &shear, &origin, &corners) {
+                            let primitive = primitive as u32;
+                            search.offer(&Found {
+                                root,
+                                geometry: position,
+                                primitive,
+                                order: 0,
+                                accel,
+                                place: &place,
+                            });
+                        }
+                    }
+                }
+                GeometryKind::Instance(instance) => {
+                    let mut inner = place.clone();
+                    inner.route.push(position);
+                    inner.ids.push(geometry.id);
+                    pending.push((&instance.accel, ray.into_object(&instance.world_from_object), inner));
+                }
+                GeometryKind::Shape(_) => {
+                    meet_kind(accel, &geometry.kind, &ray, position, 0, &place, search);
+                }
+                GeometryKind::Custom(custom) => {
+                    for primitive in 0..custom.primitive_count() {
+                        meet_kind(accel, &geometry.kind, &ray, position, primitive, &place, search);
+                    }
+                }
+            }
+        }
+    }
+}

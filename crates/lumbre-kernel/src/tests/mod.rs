@@ -1,0 +1,7 @@
+//! What the kernel promises, against a loop over everything.
+
+mod build;
+mod oracle;
+mod scenes;
+mod surfaces;
+mod watertight;

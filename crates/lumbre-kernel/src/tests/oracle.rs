@@ -1,0 +1,228 @@
+//! Every query against the loop over everything.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use lumbre_geometry::Ray;
+use lumbre_math::{DVec3, Transform};
+
+use super::scenes::{Random, balls, build, cube, mixture, ray, soup};
+use crate::lanes::Level;
+use crate::{Accel, GeometryKind, Hit, Instance, brute};
+
+fn every(accel: &Accel, ray: &Ray) -> Vec<Hit> {
+    let mut hits = Vec::new();
+    accel.all(ray, |hit| {
+        hits.push(hit.clone());
+        ControlFlow::Continue(())
+    });
+    hits
+}
+
+/// All queries on one ray; returns how many hits there were.
+fn check(accel: &Accel, ray: &Ray) -> usize {
+    let expected = brute::every(accel, ray);
+    let closest = accel.closest_at(Level::best(), ray);
+    assert_eq!(closest, brute::closest(accel, ray), "{ray:?}");
+    assert_eq!(
+        closest.as_ref().map(|hit| hit.root.t.to_bits()),
+        brute::closest(accel, ray).map(|hit| hit.root.t.to_bits()),
+    );
+    assert_eq!(closest, accel.closest_at(Level::PORTABLE, ray), "{ray:?}");
+    assert_eq!(closest, expected.first().cloned(), "{ray:?}");
+    assert_eq!(accel.any_at(Level::best(), ray), closest.is_some(), "{ray:?}");
+    assert_eq!(accel.any_at(Level::PORTABLE, ray), closest.is_some(), "{ray:?}");
+    assert_eq!(every(accel, ray), expected, "{ray:?}");
+    assert_eq!(accel.count(ray), expected.len(), "{ray:?}");
+
+    let accept = |hit: &Hit| (hit.id / 7 + hit.primitive + hit.instances.len() as u32) % 3 != 0;
+    let filtered = expected.iter().find(|hit| accept(hit)).cloned();
+    assert_eq!(accel.closest_filtered(ray, accept), filtered, "{ray:?}");
+    assert_eq!(accel.any_filtered(ray, accept), filtered.is_some(), "{ray:?}");
+    expected.len()
+}
+
+fn check_many(accel: &Accel, random: &mut Random, center: DVec3, extent: f64, rays: usize) {
+    let hits: usize = (0..rays).map(|_| check(accel, &ray(random, center, extent))).sum();
+    assert!(hits > rays / 4, "only {hits} hits of {rays} rays");
+}
+
+const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
+
+#[test]
+fn a_tree_finds_what_a_loop_finds() {
+    let mut random = Random(1);
+    let accel = mixture(&mut random, CENTER, 3.0, 0, false);
+    check_many(&accel, &mut random, CENTER, 3.0, 40_000);
+}
+
+#[test]
+fn nested_instances_are_found_as_by_a_loop() {
+    let mut random = Random(2);
+    let accel = mixture(&mut random, CENTER, 3.0, 2, false);
+    check_many(&accel, &mut random, CENTER, 3.0, 2_000);
+}
+
+#[test]
+fn infinite_things_are_found_within_instances_and_without() {
+    let mut random = Random(3);
+    let accel = mixture(&mut random, CENTER, 3.0, 1, true);
+    assert!(!accel.infinite.is_empty());
+    check_many(&accel, &mut random, CENTER, 3.0, 5_000);
+}
+
+#[test]
+fn a_scene_far_from_the_origin_loses_nothing() {
+    for (seed, offset) in [(4, 1e6), (5, 1e8), (6, 1e10)] {
+        let mut random = Random(seed);
+        let center = DVec3::new(offset, -0.5 * offset, 0.25 * offset);
+        let accel = mixture(&mut random, center, 3.0, 1, false);
+        check_many(&accel, &mut random, center, 3.0, 2_000);
+    }
+}
+
+#[test]
+fn scenes_of_any_scale_lose_nothing() {
+    for (seed, extent) in [(7, 1e-12), (8, 1e12), (9, 1e-30), (10, 1e30)] {
+        let mut random = Random(seed);
+        let accel = mixture(&mut random, CENTER * extent, extent, 1, false);
+        check_many(&accel, &mut random, CENTER * extent, extent, 2_000);
+    }
+}
+
+#[test]
+fn many_seeds_agree_with_the_loop() {
+    for seed in 100..140 {
+        let mut random = Random(seed);
+        let (depth, infinite) = (random.below(2) as u32, random.unit() < 0.3);
+        let accel = mixture(&mut random, CENTER, 3.0, depth, infinite);
+        check_many(&accel, &mut random, CENTER, 3.0, 300);
+    }
+}
+
+/// A million rays: minutes, not seconds.
+#[test]
+#[ignore = "minutes; run before a release"]
+fn a_million_rays_agree_with_the_loop() {
+    for seed in 1000..1100 {
+        let mut random = Random(seed);
+        let accel = mixture(&mut random, CENTER, 3.0, (seed % 3 == 0).into(), seed % 5 == 0);
+        check_many(&accel, &mut random, CENTER, 3.0, 10_000);
+    }
+}
+
+#[test]
+fn ill_conditioned_instances_lose_nothing() {
+    let mut random = Random(11);
+    let inner = Arc::new(mixture(&mut random, CENTER, 3.0, 0, false));
+    for squeeze in [1e-4, 1e-8, 1e-12] {
+        let map = Transform::rotate(random.vector(), 37.0).unwrap()
+            * Transform::scale(DVec3::new(1.0, squeeze, 1.0)).unwrap()
+            * Transform::rotate(random.vector(), 53.0).unwrap();
+        let center = map.point(CENTER);
+        let accel = build(vec![GeometryKind::Instance(Instance {
+            accel: Arc::clone(&inner),
+            world_from_object: map,
+        })]);
+        check_many(&accel, &mut random, center, 3.0, 3_000);
+    }
+}
+
+#[test]
+fn ties_go_to_the_first_in_the_lists() {
+    let cube = Arc::new(cube());
+    let inner = Arc::new(build(vec![GeometryKind::Mesh(cube.clone()), GeometryKind::Mesh(cube.clone())]));
+    let instance =
+        || GeometryKind::Instance(Instance { accel: inner.clone(), world_from_object: Transform::IDENTITY });
+    let accel = build(vec![
+        instance(),
+        GeometryKind::Mesh(cube.clone()),
+        GeometryKind::Mesh(cube.clone()),
+        instance(),
+    ]);
+    let ray = Ray::new(DVec3::new(1.25, 0.5, -7.0), DVec3::new(0.01, 0.02, 1.0));
+    check(&accel, &ray);
+    let places: Vec<_> = every(&accel, &ray).iter().map(|hit| (hit.route.to_vec(), hit.geometry)).collect();
+    let expected = [(vec![], 1), (vec![], 2), (vec![0], 0), (vec![0], 1), (vec![3], 0), (vec![3], 1)];
+    assert_eq!(places[..6], expected);
+    assert_eq!(places[6..], expected);
+    assert_eq!(accel.closest(&ray).unwrap().geometry, 1);
+}
+
+#[test]
+fn both_ends_of_the_range_count() {
+    let accel = build(vec![GeometryKind::Mesh(Arc::new(cube()))]);
+    let ray = Ray::new(DVec3::new(1.25, 0.5, -7.0), DVec3::new(0.0, 0.0, 2.0));
+    let ts: Vec<f64> = every(&accel, &ray).iter().map(|hit| hit.root.t).collect();
+    assert_eq!(ts, [5.0, 6.25]);
+    assert_eq!(accel.count(&ray.with_range(5.0, 6.25)), 2);
+    assert_eq!(accel.count(&ray.with_range(5.0f64.next_up(), 6.25)), 1);
+    assert_eq!(accel.count(&ray.with_range(5.0, 6.25f64.next_down())), 1);
+    assert!(accel.any(&ray.with_range(5.0, 5.0)));
+    assert!(!accel.any(&ray.with_range(6.0, 5.5)));
+}
+
+#[test]
+fn an_unusable_ray_misses() {
+    let accel = build(vec![
+        GeometryKind::Mesh(Arc::new(cube())),
+        GeometryKind::Custom(Arc::new(balls(&mut Random(3), 5, CENTER, 2.0, Some(-9.0)))),
+    ]);
+    let good = Ray::new(DVec3::new(1.25, 0.5, -7.0), DVec3::new(0.1, -0.3, 1.0));
+    assert!(accel.any(&good));
+    let nan = f64::NAN;
+    for bad in [
+        Ray { direction: DVec3::ZERO, ..good },
+        Ray { direction: -DVec3::ZERO, ..good },
+        Ray { direction: DVec3::new(0.0, nan, 1.0), ..good },
+        Ray { direction: DVec3::new(0.0, f64::INFINITY, 1.0), ..good },
+        Ray { origin: DVec3::new(nan, 0.5, -7.0), ..good },
+        Ray { t_min: nan, ..good },
+        Ray { t_max: nan, ..good },
+        good.with_range(2.0, 1.0),
+    ] {
+        assert_eq!(check(&accel, &bad), 0, "{bad:?}");
+    }
+}
+
+#[test]
+fn rays_of_absurd_size_are_answered_as_by_the_loop() {
+    let mut random = Random(21);
+    let accel = mixture(&mut random, CENTER, 3.0, 1, true);
+    let mut hits = 0;
+    for _ in 0..500 {
+        let origin = CENTER + random.vector();
+        for size in [1e-320, 1e-300, 1e-150, 1e150, 1e300] {
+            hits += check(&accel, &Ray::new(origin, random.vector() * size));
+            check(&accel, &Ray::new(random.vector() * size, random.vector()));
+            check(&accel, &Ray::new(random.vector() * size, random.vector() * size));
+        }
+    }
+    assert!(hits > 500, "{hits}");
+}
+
+#[test]
+fn all_stops_where_told() {
+    let accel = build(vec![GeometryKind::Mesh(Arc::new(soup(&mut Random(8), 250_000, CENTER, 3.0)))]);
+    let ray = Ray::new(CENTER + DVec3::new(0.3, -9.0, 0.2), DVec3::new(0.01, 1.0, -0.02));
+    let hits = every(&accel, &ray);
+    assert!(hits.len() > 300, "{}", hits.len());
+    assert_eq!(hits, brute::every(&accel, &ray));
+    for stop in [1, 31, 32, 33, 160, 161, hits.len()] {
+        let mut seen = Vec::new();
+        accel.all(&ray, |hit| {
+            seen.push(hit.clone());
+            if seen.len() == stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
+        assert_eq!(seen, hits[..stop]);
+    }
+}
+
+#[test]
+fn a_thousand_hits_in_one_place_are_all_listed() {
+    let cube = Arc::new(cube());
+    let accel = build((0..1000).map(|_| GeometryKind::Mesh(cube.clone())).collect());
+    let ray = Ray::new(DVec3::new(1.25, 0.5, -7.0), DVec3::new(0.01, 0.02, 1.0));
+    check(&accel, &ray);
+    assert_eq!(accel.count(&ray), 2000);
+}
