@@ -2,6 +2,8 @@
 
 use glam::{DMat3, DVec3, Vec3};
 
+use crate::vector::unit;
+
 /// Two unit vectors that complete the unit vector `n` to a right-handed frame, `e1 × e2 = n`.
 ///
 /// Continuous but for the plane `n.z = 0`, without a singular direction; for `n = z` it gives `x, y`, for `n = y` it
@@ -91,13 +93,6 @@ impl Frame {
     pub fn matrix(&self) -> DMat3 {
         DMat3::from_cols(self.x, self.y, self.z)
     }
-}
-
-/// `v / |v|` without overflow or underflow on the way; `None` for zero and for what is not finite.
-fn unit(v: DVec3) -> Option<DVec3> {
-    let scaled = v / v.abs().max_element();
-    let unit = scaled / scaled.length();
-    unit.is_finite().then_some(unit)
 }
 
 #[cfg(test)]

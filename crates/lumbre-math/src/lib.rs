@@ -1,19 +1,85 @@
-//! The mathematics under Lumbre: transforms, frames, quaternions, projections, warps, distributions, random numbers and
-//! polynomial roots, over [`glam`] wherever glam has it.
+//! The mathematics under Lumbre: vectors, matrices, transforms, frames, quaternions, projections, warps, distributions,
+//! random numbers and polynomial roots, over [`glam`] wherever glam has it.
 //!
-//! Conventions: vectors are columns and a matrix acts from the left, `p' = M p`; a positive rotation about z turns x
-//! towards y (and so on cyclically); the parameter `t` of a ray is in units of its direction as given.
+//! ```
+//! use lumbre_math::{DVec3, Transform};
+//!
+//! # fn main() -> Result<(), lumbre_math::SingularTransform> {
+//! let world_from_part = Transform::translate(DVec3::new(5.0, 0.0, 0.0)) * Transform::rotate(DVec3::Z, 90.0)?;
+//! assert_eq!(world_from_part.point(DVec3::X), DVec3::new(5.0, 1.0, 0.0));
+//! assert_eq!(world_from_part.vector(DVec3::X), DVec3::Y);
+//! assert_eq!(world_from_part.inverse_point(DVec3::new(5.0, 1.0, 0.0)), DVec3::X);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Conventions
+//!
+//! Vectors are columns and a matrix acts from the left, `p' = M p`, so that a product reads right to left: `T * R`
+//! rotates first. Points carry w = 1, directions w = 0. Angles in the interfaces are in degrees, unless a name says
+//! otherwise, and exact at the right angles; a positive rotation about z turns x towards y, about x y towards z, about
+//! y z towards x, whatever the hand in which the axes are drawn. The parameter `t` of a ray is in units of its direction
+//! as given. Row vectors and other hands enter at the boundary: see [`matrix`].
+//!
+//! Nothing here does input or output or keeps a state, and nothing panics on any number.
+//!
+//! # Where to find what
+//!
+//! | topic | call |
+//! |---|---|
+//! | dot product, length | `a.dot(b)`, `a.length()` of glam; with all digits [`vector::dot`], [`vector::length`] |
+//! | unit vector | `a.normalize()` of glam; of any length [`vector::unit`] |
+//! | cross product | `a.cross(b)` of glam; with all digits [`vector::cross`]; as a matrix [`vector::cross_matrix`] |
+//! | mixed product, determinant | [`vector::mixed_product`] |
+//! | angle between vectors | [`vector::angle`] |
+//! | projection, its signed length, the rest | [`vector::project`], [`vector::projected_length`], [`vector::reject`] |
+//! | some perpendicular vector | [`vector::perpendicular`] |
+//! | frame from one direction, from two | [`orthonormal_basis`], [`Frame::from_z`], [`Frame::from_two`] |
+//! | change of coordinates | [`Frame::to_local`], [`Frame::to_world`], [`Transform::from_frame`] |
+//! | product and transpose of matrices | `*` and `transpose` of glam; of any size [`matrix::product`], [`matrix::transpose`] |
+//! | inverse of an affine matrix | [`Transform::from_matrix`] and [`Transform::inverse`] |
+//! | scale, shear, rotation, mirror of the plane | [`matrix::scale2`], [`matrix::shear2`], [`matrix::rotation2`], [`matrix::mirror2_about_y`] |
+//! | scale, shear, translation of space | [`Transform::scale`], [`Transform::shear`], [`Transform::translate`] |
+//! | rotation about x, y, z | [`matrix::rotation_x`], [`matrix::rotation_y`], [`matrix::rotation_z`] |
+//! | rotation about any axis | [`Transform::rotate`], [`matrix::axis_angle`], [`matrix::rotate_vector`] |
+//! | composition, its inverse | `a * b` of [`Transform`], [`Transform::inverse`] |
+//! | scale, rotate about x, y, z, translate | [`matrix::standard_chain`] |
+//! | points and directions | [`Transform::point`], [`Transform::vector`] |
+//! | homogeneous coordinates | [`matrix::homogeneous_point`], [`matrix::homogeneous_direction`], [`matrix::point_of_homogeneous`] |
+//! | rows or columns | [`matrix::from_row_convention`], [`matrix::rows4`], [`matrix::row_chain_with_column_rotations`] |
+//! | left or right hand | [`Transform::change_handedness`], [`matrix::mirror_z`] |
+//! | normals | [`Transform::normal`], [`matrix::transform_normal`] |
+//! | area under a transform | [`Transform::area_factor`] |
+//! | quaternions: sum, product, conjugate | `+`, `*`, `conjugate()` of glam's [`DQuat`] |
+//! | inverse, rotation of a vector, matrix both ways | [`quaternion::inverse`], [`quaternion::rotate`], [`quaternion::to_matrix`], [`quaternion::from_matrix`] |
+//! | Euler angles both ways | [`quaternion::Euler`] |
+//! | look-at of either hand | [`Transform::look_at_right`], [`Transform::look_at_left`], [`view::View`] |
+//! | rays of a camera | [`view::View::perspective_direction`], [`view::View::orthographic_origin`] |
+//! | projection matrices | [`projection::orthographic`], [`projection::perspective`], [`projection::simple_perspective`] |
+//! | reflection, refraction | [`optics::reflect`], [`optics::refract`], [`optics::facing`] |
+//! | rounding errors, leaving a surface | [`rounding::gamma`], [`Transform::point_error`], [`rounding::offset_point`] |
+//! | roots of polynomials | [`quadratic`], [`roots`] |
+//! | random numbers | [`random`], evenly spread [`sobol`] |
+//! | random points of disks, spheres, triangles | [`warp`], [`warp64`] |
+//! | random choice by weight | [`distribution`] |
 
 pub use glam;
 pub use glam::{DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, DVec4, Vec2, Vec3};
 
 pub mod distribution;
 pub mod frame;
+pub mod matrix;
+pub mod optics;
+pub mod projection;
 pub mod quadratic;
+pub mod quaternion;
 pub mod random;
 pub mod roots;
+pub mod rounding;
 pub mod sobol;
 pub mod transform;
+pub mod vector;
+pub mod view;
 pub mod warp;
 pub mod warp64;
 

@@ -1,0 +1,229 @@
+//! Quaternions as rotations, of any length but zero, and Euler angles that stay right at the poles.
+//!
+//! The type is glam's [`DQuat`], which lists `x, y, z, w`; most texts list the real part first, as [`from_wxyz`] does.
+//! glam has the sum `p + q`, the product `p * q` ("first q"), `q.conjugate()`, `q.length()` and the interpolation
+//! `p.slerp(q, s)`. Its `inverse`, `q * v` and `from_quat` want unit quaternions; those here do not.
+
+use glam::{DMat3, DQuat, DVec3};
+
+use crate::transform::sin_cos_degrees;
+use crate::vector::unit;
+
+/// The quaternion `w + x i + y j + z k`.
+pub fn from_wxyz(wxyz: [f64; 4]) -> DQuat {
+    let [w, x, y, z] = wxyz;
+    DQuat::from_xyzw(x, y, z, w)
+}
+
+/// The parts of `w + x i + y j + z k`, real part first.
+pub fn to_wxyz(q: DQuat) -> [f64; 4] {
+    [q.w, q.x, q.y, q.z]
+}
+
+/// `q⁻¹ = conj q / |q|²`; `None` when it is not finite, as for zero.
+pub fn inverse(q: DQuat) -> Option<DQuat> {
+    let inverse = q.conjugate() * (1.0 / q.length_squared());
+    inverse.is_finite().then_some(inverse)
+}
+
+/// The rotation by `degrees` about `axis`, of any length but zero, x towards y when it is z: `(cos θ/2, a sin θ/2)`.
+/// `None` when the axis is zero or anything is not finite.
+pub fn from_axis_angle(axis: DVec3, degrees: f64) -> Option<DQuat> {
+    let a = unit(axis)?;
+    // Two turns, 720°, bring a quaternion back; one turn gives -1.
+    let (sin, cos) = sin_cos_degrees(0.5 * degrees);
+    let q = DQuat::from_xyzw(a.x * sin, a.y * sin, a.z * sin, cos);
+    q.is_finite().then_some(q)
+}
+
+/// `v` turned by `q`: `q v q⁻¹`, for `q` of any length but zero. `q` and `-q` turn alike.
+pub fn rotate(q: DQuat, v: DVec3) -> DVec3 {
+    let r = q.xyz();
+    let across = 2.0 * r.cross(v) / q.length_squared();
+    v + q.w * across + r.cross(across)
+}
+
+/// The rotation matrix of `q`, of any length but zero.
+pub fn to_matrix(q: DQuat) -> DMat3 {
+    let square = q.length_squared();
+    let [a, b, c, d] = to_wxyz(q);
+    let (aa, bb, cc, dd) = (a * a, b * b, c * c, d * d);
+    DMat3::from_cols(
+        DVec3::new(aa + bb - cc - dd, 2.0 * (b * c + a * d), 2.0 * (b * d - a * c)),
+        DVec3::new(2.0 * (b * c - a * d), aa - bb + cc - dd, 2.0 * (c * d + a * b)),
+        DVec3::new(2.0 * (b * d + a * c), 2.0 * (c * d - a * b), aa - bb - cc + dd),
+    ) * (1.0 / square)
+}
+
+/// A unit quaternion of a rotation matrix, with its largest part positive.
+///
+/// Each part comes from the largest one, so that nothing cancels: Shepperd, "Quaternion from Rotation Matrix", Journal
+/// of Guidance and Control 1(3), 1978.
+pub fn from_matrix(m: &DMat3) -> DQuat {
+    let at = |row: usize, column: usize| m.col(column)[row];
+    let trace = at(0, 0) + at(1, 1) + at(2, 2);
+    // 4w², 4x², 4y², 4z².
+    let squares = [
+        1.0 + trace,
+        1.0 + 2.0 * at(0, 0) - trace,
+        1.0 + 2.0 * at(1, 1) - trace,
+        1.0 + 2.0 * at(2, 2) - trace,
+    ];
+    let largest = (1..4).fold(0, |best, i| if squares[i] > squares[best] { i } else { best });
+    let square = squares[largest];
+    // 4 times the products of the parts by twos.
+    let (wx, wy, wz) = (at(2, 1) - at(1, 2), at(0, 2) - at(2, 0), at(1, 0) - at(0, 1));
+    let (xy, yz, zx) = (at(1, 0) + at(0, 1), at(2, 1) + at(1, 2), at(0, 2) + at(2, 0));
+    let parts = match largest {
+        0 => [square, wx, wy, wz],
+        1 => [wx, square, xy, zx],
+        2 => [wy, xy, square, yz],
+        _ => [wz, zx, yz, square],
+    };
+    from_wxyz(parts.map(|part| part / (2.0 * square.sqrt()))).normalize()
+}
+
+/// A rotation as three turns, in degrees: bank about x first, then attitude about z, then heading about y,
+/// `R = Ry(heading) Rz(attitude) Rx(bank)`.
+///
+/// At the poles, attitude ±90°, heading and bank turn about the same axis and only their sum (north, +90°) or
+/// difference (south) exists; next to them the single angles are uncertain by about 1e-16 / cos(attitude).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Euler {
+    /// The turn about y, in degrees.
+    pub heading: f64,
+    /// The turn about z, in degrees.
+    pub attitude: f64,
+    /// The turn about x, in degrees.
+    pub bank: f64,
+}
+
+impl Euler {
+    /// The unit quaternion of these turns.
+    pub fn to_quaternion(self) -> DQuat {
+        let (s1, c1) = sin_cos_degrees(0.5 * self.heading);
+        let (s2, c2) = sin_cos_degrees(0.5 * self.attitude);
+        let (s3, c3) = sin_cos_degrees(0.5 * self.bank);
+        from_wxyz([
+            c1 * c2 * c3 - s1 * s2 * s3,
+            s1 * s2 * c3 + c1 * c2 * s3,
+            s1 * c2 * c3 + c1 * s2 * s3,
+            c1 * s2 * c3 - s1 * c2 * s3,
+        ])
+    }
+
+    /// The turns of a quaternion of any length but zero: heading and bank in (-180°, 180°], attitude in [-90°, 90°]; at
+    /// a pole the bank is 0.
+    ///
+    /// By sums and differences of the parts, which keeps all digits at the poles: Bernardes, Viollet, "Quaternion to
+    /// Euler Angles Conversion: A Direct, General and Computationally Efficient Method", PLoS ONE 17(11), 2022.
+    pub fn from_quaternion(q: DQuat) -> Self {
+        let [a, b, c, d] = to_wxyz(q);
+        let (sum, difference) = ((a + d).hypot(b + c), (a - d).hypot(c - b));
+        let attitude = 2.0 * sum.atan2(difference).to_degrees() - 90.0;
+        let half_sum = || (b + c).atan2(a + d).to_degrees();
+        let half_difference = || (c - b).atan2(a - d).to_degrees();
+        let (heading, bank) = if difference <= 1e-15 * sum {
+            (2.0 * half_sum(), 0.0)
+        } else if sum <= 1e-15 * difference {
+            (2.0 * half_difference(), 0.0)
+        } else {
+            (half_sum() + half_difference(), half_sum() - half_difference())
+        };
+        Self { heading: wrap_degrees(heading), attitude, bank: wrap_degrees(bank) }
+    }
+}
+
+/// The same angle in (-180°, 180°], for one within a turn of it.
+fn wrap_degrees(degrees: f64) -> f64 {
+    if degrees > 180.0 {
+        degrees - 360.0
+    } else if degrees <= -180.0 {
+        degrees + 360.0
+    } else {
+        degrees
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::RandomStream;
+
+    fn largest(m: DMat3) -> f64 {
+        m.to_cols_array().into_iter().fold(0.0, |most, e| most.max(e.abs()))
+    }
+
+    #[test]
+    fn the_units_multiply_as_they_should() {
+        let [i, j, k] = [[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]].map(from_wxyz);
+        assert_eq!([i * j, j * k, k * i], [k, i, j]);
+        assert_eq!([j * i, k * j, i * k], [-k, -i, -j]);
+        assert_eq!([i * i, i * j * k], [-DQuat::IDENTITY; 2]);
+    }
+
+    #[test]
+    fn rotations_of_any_length_agree_with_their_matrix_and_come_back() {
+        let mut random = RandomStream::new(14);
+        let mut number = || 4.0 * random.next_f64() - 2.0;
+        for _ in 0..1_000 {
+            let q = from_wxyz([number(), number(), number(), number()]);
+            let v = DVec3::new(number(), number(), number());
+            let m = to_matrix(q);
+            assert!((m * v - rotate(q, v)).length() < 2e-15 * (1.0 + v.length()) * 4.0);
+            assert!((m.determinant() - 1.0).abs() < 1e-14);
+            assert!((rotate(inverse(q).unwrap(), rotate(q, v)) - v).length() < 1e-14);
+            assert_eq!(rotate(-q, v), rotate(q, v));
+            let again = from_matrix(&m);
+            assert!((again.length() - 1.0).abs() < 1e-15);
+            assert!(largest(to_matrix(again) - m) < 2e-15);
+            let p = from_wxyz([number(), number(), number(), number()]);
+            assert!((rotate(p * q, v) - rotate(p, rotate(q, v))).length() < 2e-14);
+            assert!(((p * q).length() - p.length() * q.length()).abs() < 1e-14);
+        }
+        assert_eq!(inverse(from_wxyz([0.0; 4])), None);
+    }
+
+    #[test]
+    fn half_turns_come_back_from_their_matrix() {
+        for axis in [DVec3::X, DVec3::Y, DVec3::Z, DVec3::new(1.0, -2.0, 3.0)] {
+            for degrees in [180.0, 179.999_999, -180.0, 1e-7, 0.0] {
+                let q = from_axis_angle(axis, degrees).unwrap();
+                assert!(largest(to_matrix(from_matrix(&to_matrix(q))) - to_matrix(q)) < 2e-15);
+            }
+        }
+        assert!(from_axis_angle(DVec3::ZERO, 20.0).is_none());
+        assert!(from_axis_angle(DVec3::X, f64::NAN).is_none());
+    }
+
+    #[test]
+    fn euler_angles_are_three_turns_in_order() {
+        use crate::matrix::{rotation_x, rotation_y, rotation_z};
+        let e = Euler { heading: 25.0, attitude: -50.0, bank: 110.0 };
+        let m = rotation_y(e.heading) * rotation_z(e.attitude) * rotation_x(e.bank);
+        assert!(largest(to_matrix(e.to_quaternion()) - m) < 1e-15);
+    }
+
+    #[test]
+    fn the_rotation_survives_euler_angles_at_and_next_to_the_poles() {
+        let mut count = 0;
+        for pole in [90.0, -90.0] {
+            for away in [0.0, 1e-14, 1e-10, 1e-7, 1e-4, 0.1, 3.6, 30.0, 90.0] {
+                for heading in [-170.0, -90.0, 0.0, 33.0, 180.0] {
+                    for bank in [-100.0, 0.0, 90.0, 179.0] {
+                        let attitude = pole - f64::signum(pole) * away;
+                        let q = Euler { heading, attitude, bank }.to_quaternion();
+                        let found = Euler::from_quaternion(q * -3.5);
+                        let error = largest(to_matrix(found.to_quaternion()) - to_matrix(q));
+                        assert!(error < 3e-15, "{heading} {attitude} {bank}: {found:?}, {error}");
+                        assert!(found.heading > -180.0 && found.heading <= 180.0);
+                        assert!(found.bank > -180.0 && found.bank <= 180.0);
+                        assert!(found.attitude.abs() <= 90.0);
+                        count += 1;
+                    }
+                }
+            }
+        }
+        assert_eq!(count, 360);
+    }
+}

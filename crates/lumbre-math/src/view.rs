@@ -1,0 +1,140 @@
+//! Where an observer stands and looks: the look-at frame of either hand, and the rays through its picture.
+
+use glam::{DVec2, DVec3};
+
+use crate::frame::Frame;
+use crate::transform::{Transform, sin_cos_degrees};
+
+/// How the axes of a camera are drawn: x right, y up, and z towards the observer or away.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Handedness {
+    /// z points at the observer; the camera looks along -z. As in OpenGL and glTF.
+    Right,
+    /// z points away; the camera looks along +z. As in RenderMan, POV-Ray and pbrt.
+    ///
+    /// With the same eye, target and up, its picture is the mirror image of the right-handed one.
+    Left,
+}
+
+/// An observer: the place of the eye and the frame of the camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// The origin of the camera.
+    pub eye: DVec3,
+    /// x to the right of the picture, y up, z as the handedness says.
+    pub frame: Frame,
+    /// Which way z points.
+    pub handedness: Handedness,
+}
+
+impl View {
+    /// The view from `eye` to `target` with `up` as near to upwards as it can be. `None` when the eye is at the target,
+    /// when `up` is parallel to the view, or when something is not finite.
+    pub fn look_at(eye: DVec3, target: DVec3, up: DVec3, handedness: Handedness) -> Option<Self> {
+        let z = match handedness {
+            Handedness::Right => eye - target,
+            Handedness::Left => target - eye,
+        };
+        let frame = Frame::from_two(z, up)?;
+        eye.is_finite().then_some(Self { eye, frame, handedness })
+    }
+
+    /// The unit direction of the view.
+    pub fn forward(&self) -> DVec3 {
+        match self.handedness {
+            Handedness::Right => -self.frame.z,
+            Handedness::Left => self.frame.z,
+        }
+    }
+
+    /// The map from world to camera coordinates: first moves the eye to the origin, then turns.
+    pub fn camera_from_world(&self) -> Transform {
+        Transform::from_frame(self.eye, &self.frame).inverse()
+    }
+
+    /// The direction from the eye through a point of the picture, with depth 1: the parameter of the ray is the
+    /// distance along the view.
+    ///
+    /// `fovy` is the full vertical opening in degrees; `film` is in pixels from the upper left corner, the centre of
+    /// pixel (0, 0) at (½, ½).
+    pub fn perspective_direction(&self, fovy: f64, size: DVec2, film: DVec2) -> DVec3 {
+        let (sin, cos) = sin_cos_degrees(0.5 * fovy);
+        let slope = (sin / cos) * DVec2::new(size.x / size.y, 1.0) * centred(size, film);
+        self.forward() + slope.x * self.frame.x + slope.y * self.frame.y
+    }
+
+    /// The origin of the ray, parallel to [`View::forward`], through a point of the picture in parallel projection.
+    /// `half` is half the width and half the height of the picture in the world; `size` and `film` are in pixels.
+    pub fn orthographic_origin(&self, half: DVec2, size: DVec2, film: DVec2) -> DVec3 {
+        let place = half * centred(size, film);
+        self.eye + place.x * self.frame.x + place.y * self.frame.y
+    }
+}
+
+/// Pixels from the upper left to [-1, 1]², y up.
+fn centred(size: DVec2, film: DVec2) -> DVec2 {
+    DVec2::new(2.0 * film.x / size.x - 1.0, 1.0 - 2.0 * film.y / size.y)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::projection::{orthographic, perspective, project};
+
+    fn views() -> impl Iterator<Item = View> {
+        [Handedness::Right, Handedness::Left].into_iter().filter_map(|hand| {
+            View::look_at(
+                DVec3::new(2.0, -3.0, 5.0),
+                DVec3::new(-4.0, 1.0, 2.5),
+                DVec3::new(0.2, 0.1, 3.0),
+                hand,
+            )
+        })
+    }
+
+    #[test]
+    fn the_eye_goes_to_the_origin_and_the_target_straight_ahead() {
+        let mut count = 0;
+        for view in views() {
+            let camera = view.camera_from_world();
+            assert!(camera.point(view.eye).length() < 1e-15);
+            let ahead = camera.vector(view.forward());
+            let expected = if view.handedness == Handedness::Right { -1.0 } else { 1.0 };
+            assert!((ahead - DVec3::Z * expected).length() < 1e-15);
+            assert!(camera.vector(DVec3::Z).y > 0.0 && camera.vector(DVec3::Z).x.abs() < 0.2);
+            assert!((camera.determinant() - 1.0).abs() < 1e-15);
+            count += 1;
+        }
+        assert_eq!(count, 2);
+        let eye = DVec3::new(1.0, 2.0, 3.0);
+        assert!(View::look_at(eye, eye, DVec3::Y, Handedness::Left).is_none());
+        assert!(View::look_at(eye, eye + DVec3::Y, DVec3::Y, Handedness::Right).is_none());
+        assert!(View::look_at(eye, DVec3::NAN, DVec3::Y, Handedness::Right).is_none());
+    }
+
+    #[test]
+    fn rays_project_back_to_the_pixel_they_were_made_for() {
+        let (size, fovy) = (DVec2::new(60.0, 45.0), 40.0);
+        let lens = perspective(fovy, size.x / size.y, 0.25, 90.0).unwrap();
+        let half = DVec2::new(4.0, 3.0);
+        let flat = orthographic(-half.x, half.x, -half.y, half.y, 0.0, 50.0).unwrap();
+        let mut count = 0;
+        for view in views() {
+            // The matrices are those of a camera that looks along -z.
+            let to_right = if view.handedness == Handedness::Right { 1.0 } else { -1.0 };
+            let camera = view.camera_from_world();
+            let pixel_of =
+                |image: DVec3| 0.5 * (DVec2::ONE + image.truncate() * DVec2::new(1.0, -1.0)) * size;
+            for film in [DVec2::new(0.5, 0.5), DVec2::new(59.5, 0.5), DVec2::new(13.25, 40.0)] {
+                let turn = |p: DVec3| DVec3::new(p.x, p.y, p.z * to_right);
+                let p = view.eye + 7.5 * view.perspective_direction(fovy, size, film);
+                assert!((camera.point(p).z.abs() - 7.5).abs() < 1e-14);
+                assert!((pixel_of(project(&lens, turn(camera.point(p))).unwrap()) - film).length() < 1e-12);
+                let p = view.orthographic_origin(half, size, film) + 7.5 * view.forward();
+                assert!((pixel_of(project(&flat, turn(camera.point(p))).unwrap()) - film).length() < 1e-12);
+                count += 1;
+            }
+        }
+        assert_eq!(count, 6);
+    }
+}
