@@ -1,6 +1,6 @@
 //! The shading frame, and directions in it.
 
-use lumbre_math::Vec3;
+use lumbre_math::{Vec3, frame::orthonormal_basis_f32};
 
 /// A unit direction in a shading frame, whose z axis is the shading normal. Only a [`ShadingFrame`] and the samplers of
 /// this crate make one.
@@ -27,6 +27,11 @@ impl LocalDir {
     pub fn same_hemisphere(self, other: Self) -> bool {
         self.0.z * other.0.z > 0.0
     }
+
+    /// The direction that a mirror in the surface gives.
+    pub(crate) fn mirrored(self) -> Self {
+        Self(Vec3::new(-self.0.x, -self.0.y, self.0.z))
+    }
 }
 
 impl std::ops::Neg for LocalDir {
@@ -36,21 +41,33 @@ impl std::ops::Neg for LocalDir {
     }
 }
 
-/// An orthonormal frame about a shading normal.
+/// A right-handed orthonormal frame about a shading normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShadingFrame {
     /// x: along ∂p/∂u where there is one.
     pub s: Vec3,
-    /// y.
+    /// y: n × s.
     pub t: Vec3,
     /// z: the shading normal.
     pub n: Vec3,
 }
 
 impl ShadingFrame {
-    /// A frame about unit `n` with `s` as near to `tangent` as it can be; any `s` where the tangent says nothing.
-    pub fn new(_n: Vec3, _tangent: Vec3) -> Self {
-        unimplemented!("skeleton")
+    /// A frame about unit `n` with `s` as near to `tangent` as it can be; any `s` where the tangent says nothing
+    /// (zero, along the normal, or not finite).
+    pub fn new(n: Vec3, tangent: Vec3) -> Self {
+        // Scaled first: the derivative of a position may be of any size.
+        let tangent = tangent / tangent.abs().max_element();
+        let across = tangent - n * n.dot(tangent);
+        // Below a sine of 2⁻¹⁰ the direction that is left is mostly rounding.
+        if across.length_squared() > 1e-6 * tangent.length_squared() && across.is_finite() {
+            // Once more: the first subtraction leaves rounding along n.
+            let s = across.normalize();
+            let s = (s - n * n.dot(s)).normalize();
+            return Self { s, t: n.cross(s), n };
+        }
+        let (s, t) = orthonormal_basis_f32(n);
+        Self { s, t, n }
     }
 
     /// A unit direction of the world, in the frame.
@@ -61,5 +78,57 @@ impl ShadingFrame {
     /// A direction of the frame, in the world.
     pub fn to_world(&self, local: LocalDir) -> Vec3 {
         self.s * local.0.x + self.t * local.0.y + self.n * local.0.z
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lumbre_math::random::RandomStream;
+
+    fn assert_orthonormal(frame: &ShadingFrame) {
+        let ShadingFrame { s, t, n } = *frame;
+        for unit in [s, t, n] {
+            assert!((unit.length() - 1.0).abs() < 1e-6, "{frame:?}");
+        }
+        assert!(s.dot(t).abs() < 1e-6 && s.dot(n).abs() < 1e-6 && t.dot(n).abs() < 1e-6, "{frame:?}");
+        assert!((s.cross(t) - n).length() < 1e-6, "{frame:?}");
+    }
+
+    #[test]
+    fn a_frame_is_orthonormal_and_follows_its_tangent() {
+        let mut random = RandomStream::new(12);
+        let mut signed = || 2.0 * random.next_f32() - 1.0;
+        let mut count = 0;
+        for _ in 0..2_000 {
+            let (n, tangent) =
+                (Vec3::new(signed(), signed(), signed()), Vec3::new(signed(), signed(), signed()));
+            let Some(n) = n.try_normalize() else { continue };
+            for size in [1e-20, 3.0, 1e20] {
+                let frame = ShadingFrame::new(n, tangent * size);
+                assert_orthonormal(&frame);
+                assert!(frame.s.dot(tangent) >= 0.0);
+                assert!(frame.t.dot(tangent).abs() < 1e-6);
+                count += 1;
+            }
+        }
+        assert!(count > 5_000);
+    }
+
+    #[test]
+    fn a_tangent_that_says_nothing_leaves_a_frame_all_the_same() {
+        let n = Vec3::new(2.0, -1.0, 0.5).normalize();
+        for tangent in [Vec3::ZERO, n * 3.0, n * -1e-4, Vec3::NAN, Vec3::splat(f32::INFINITY)] {
+            assert_orthonormal(&ShadingFrame::new(n, tangent));
+        }
+    }
+
+    #[test]
+    fn a_direction_goes_into_the_frame_and_back() {
+        let frame = ShadingFrame::new(Vec3::new(0.6, 0.0, -0.8), Vec3::new(1.0, 2.0, 3.0));
+        let world = Vec3::new(3.0, -4.0, 12.0) / 13.0;
+        let local = frame.to_local(world);
+        assert!((frame.to_world(local) - world).length() < 1e-6);
+        assert!((local.cos_theta() - frame.n.dot(world)).abs() < 1e-7);
     }
 }

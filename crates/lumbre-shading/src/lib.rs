@@ -4,18 +4,32 @@
 //! carried on the lanes of [`Spectrum`].
 
 mod bsdf;
+pub mod coated;
+pub mod conductor;
+pub mod dielectric;
+pub mod diffuse;
 mod frame;
+pub mod fresnel;
 mod material;
+pub mod microfacet;
 mod mipmap;
+pub mod spectrum;
 mod texture;
 
 pub use bsdf::{Bsdf, BsdfSample, Scatter};
 pub use frame::{LocalDir, ShadingFrame};
 pub use material::{LocalSurface, Material, MaterialKind, Roughness};
-pub use mipmap::{ImageFilter, MipMap, Wrap};
+pub use mipmap::{ImageFilter, MipMap, MipMapOptions, Wrap};
+pub use spectrum::{NamedSpectrum, SpectrumValue};
 pub use texture::{
-    FloatTexture, ImageTexture, Mapping2d, SpectrumTexture, Texture, TextureContext, TextureValue,
+    FloatTexture, ImageTexture, Mapping2d, SpectrumTexture, Texture, TextureContext, TexturePoint,
+    TextureValue,
 };
 
 /// Values on the lanes that light transport carries: linear Rec. 709 today.
 pub type Spectrum = lumbre_image::Rgb;
+
+/// The number held within [0, 1]; 0 for what is not one.
+fn unit(c: f32) -> f32 {
+    if c > 0.0 { c.min(1.0) } else { 0.0 }
+}

@@ -1,5 +1,8 @@
 //! Filtered image lookups.
 
+use std::sync::Arc;
+
+use lumbre_image::{Bitmap, Channels, Encoding, PixelData, f32_to_half, unit_to_u8, unit_to_u16};
 use lumbre_math::Vec2;
 
 use crate::Spectrum;
@@ -28,17 +31,299 @@ pub enum ImageFilter {
     Bilinear,
     /// Between four texels of two levels.
     Trilinear,
-    /// Elliptically weighted (Heckbert 1989), with this largest ratio of the axes.
+    /// Elliptically weighted (Heckbert 1989), with this largest ratio of the axes; more than 64 counts as 64.
     Ewa(f32),
 }
 
-/// A pyramid of ever smaller images.
+/// How to look up an image.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MipMapOptions {
+    /// What lies beyond its edge.
+    pub wrap: Wrap,
+    /// How texels become a value.
+    pub filter: ImageFilter,
+}
+
+/// A pyramid of ever smaller images, each half as large as the one before and in the same number format.
 #[derive(Debug)]
-pub struct MipMap {}
+pub struct MipMap {
+    // The finest first, the last of one texel.
+    levels: Vec<Arc<Bitmap>>,
+    // Whether any texel has a coverage other than 1.
+    has_coverage: bool,
+    options: MipMapOptions,
+}
+
+/// The value about a texel, and how much of it is colour.
+trait Texel: Copy + std::ops::Add<Output = Self> + std::ops::Mul<f32, Output = Self> {
+    const ZERO: Self;
+    fn fetch(map: &MipMap, level: usize, x: u32, y: u32) -> Self;
+}
+
+impl Texel for Spectrum {
+    const ZERO: Self = Spectrum::BLACK;
+    fn fetch(map: &MipMap, level: usize, x: u32, y: u32) -> Self {
+        map.levels[level].rgb(x, y)
+    }
+}
+
+impl Texel for f32 {
+    const ZERO: Self = 0.0;
+    fn fetch(map: &MipMap, level: usize, x: u32, y: u32) -> Self {
+        if map.has_coverage {
+            return map.levels[level].alpha(x, y);
+        }
+        map.levels[level].rgb(x, y).average()
+    }
+}
 
 impl MipMap {
-    /// The value about `st`, with (0, 0) at the lower left, over a footprint of the two derivatives.
-    pub fn lookup(&self, _st: Vec2, _dst_dx: Vec2, _dst_dy: Vec2) -> Spectrum {
-        unimplemented!("skeleton")
+    /// The pyramid over an image. The finest level is the image itself; the coarser ones are its means over areas, and
+    /// take a third of its memory again.
+    pub fn new(bitmap: Arc<Bitmap>, options: MipMapOptions) -> Self {
+        let has_coverage = bitmap.channels().alpha().is_some_and(|c| {
+            (0..bitmap.height()).any(|y| (0..bitmap.width()).any(|x| bitmap.stored(x, y, c) != 1.0))
+        });
+        let mut levels = vec![bitmap];
+        while let Some(smaller) = half_size(levels.last().expect("there is a finest level")) {
+            levels.push(Arc::new(smaller));
+        }
+        Self { levels, has_coverage, options }
     }
+
+    /// The image itself.
+    pub fn bitmap(&self) -> &Arc<Bitmap> {
+        &self.levels[0]
+    }
+
+    /// How many levels there are, at least 1.
+    pub fn level_count(&self) -> usize {
+        self.levels.len()
+    }
+
+    /// A level as an image, 0 the finest.
+    pub fn level(&self, level: usize) -> Option<&Bitmap> {
+        self.levels.get(level).map(|level| &**level)
+    }
+
+    /// How it is looked up.
+    pub fn options(&self) -> MipMapOptions {
+        self.options
+    }
+
+    /// Bytes of memory that all levels take.
+    pub fn bytes(&self) -> usize {
+        self.levels.iter().map(|level| level.bytes()).sum()
+    }
+
+    /// The colour about `st`, with (0, 0) at the lower left, over a footprint of the two derivatives; grey for an image
+    /// without colour. Coverage plays no part. A footprint of zero gives the finest level.
+    pub fn lookup(&self, st: Vec2, dst_dx: Vec2, dst_dy: Vec2) -> Spectrum {
+        self.filtered(st, dst_dx, dst_dy)
+    }
+
+    /// The same as one number: the coverage, where the image has a coverage that is not 1 everywhere (a leaf's outline);
+    /// else its grey, or the mean of its colour channels.
+    pub fn lookup_float(&self, st: Vec2, dst_dx: Vec2, dst_dy: Vec2) -> f32 {
+        self.filtered(st, dst_dx, dst_dy)
+    }
+
+    fn filtered<T: Texel>(&self, st: Vec2, dst_dx: Vec2, dst_dy: Vec2) -> T {
+        let finite = |v: Vec2| if v.is_finite() { v } else { Vec2::ZERO };
+        // Rows are counted from the top.
+        let flip = Vec2::new(1.0, -1.0);
+        let st = self.within_reach(Vec2::new(st.x, 1.0 - st.y));
+        let (major, minor) = (finite(dst_dx) * flip, finite(dst_dy) * flip);
+        if let ImageFilter::Ewa(max_ratio) = self.options.filter {
+            return self.elliptic(st, major, minor, max_ratio);
+        }
+        // Twice the largest derivative: a texel as wide as the footprint is half its filter's width.
+        let width = 2.0 * major.abs().max(minor.abs()).max_element();
+        let last = self.levels.len() - 1;
+        let level = last as f32 + width.max(1e-8).log2();
+        if level >= last as f32 {
+            return T::fetch(self, last, 0, 0);
+        }
+        let finer = level.max(0.0).floor() as usize;
+        match self.options.filter {
+            ImageFilter::Point => {
+                let (x, y) = self.to_texels(finer, st);
+                self.texel(finer, (x + 0.5).floor() as i64, (y + 0.5).floor() as i64)
+            }
+            ImageFilter::Trilinear if level > 0.0 => {
+                let amount = level - finer as f32;
+                self.bilinear::<T>(finer, st) * (1.0 - amount) + self.bilinear::<T>(finer + 1, st) * amount
+            }
+            _ => self.bilinear(finer, st),
+        }
+    }
+
+    /// Greene and Heckbert, "Creating Raster Omnimax Images from Multiple Perspective Views Using the Elliptical Weighted
+    /// Average Filter", IEEE Computer Graphics and Applications 6(6), 1986; Heckbert, "Fundamentals of Texture Mapping and
+    /// Image Warping", Berkeley, 1989.
+    fn elliptic<T: Texel>(&self, st: Vec2, dx: Vec2, dy: Vec2, max_ratio: f32) -> T {
+        let (major, minor) = if dx.length_squared() >= dy.length_squared() { (dx, dy) } else { (dy, dx) };
+        let max_ratio = if max_ratio >= 1.0 { max_ratio.min(64.0) } else { 1.0 };
+        let (long, short) = (major.length(), minor.length());
+        if short == 0.0 {
+            return self.bilinear(0, st);
+        }
+        // Too thin an ellipse is made wider: more blurred, but bounded in cost.
+        let widen = (long / (short * max_ratio)).max(1.0);
+        let (minor, short) = (minor * widen, short * widen);
+        let last = self.levels.len() - 1;
+        let level = (last as f32 + short.log2()).max(0.0);
+        if level >= last as f32 {
+            return T::fetch(self, last, 0, 0);
+        }
+        let finer = level.floor();
+        let amount = level - finer;
+        let finer = finer as usize;
+        self.ellipse::<T>(finer, st, major, minor) * (1.0 - amount)
+            + self.ellipse::<T>(finer + 1, st, major, minor) * amount
+    }
+
+    /// The mean of a level's texels within an ellipse, weighted by a Gaussian.
+    fn ellipse<T: Texel>(&self, level: usize, st: Vec2, major: Vec2, minor: Vec2) -> T {
+        let size = Vec2::new(self.levels[level].width() as f32, self.levels[level].height() as f32);
+        let (s, t) = self.to_texels(level, st);
+        let (major, minor) = (major * size, minor * size);
+        // A s² + B s t + C t² < 1, one texel wider than the footprint so that it is never without texels.
+        let a = major.y * major.y + minor.y * minor.y + 1.0;
+        let b = -2.0 * (major.x * major.y + minor.x * minor.y);
+        let c = major.x * major.x + minor.x * minor.x + 1.0;
+        let inverse = 1.0 / (a * c - 0.25 * b * b);
+        let (half_s, half_t) = (c.sqrt(), a.sqrt());
+        let (a, b, c) = (a * inverse, b * inverse, c * inverse);
+        let mut sum = T::ZERO;
+        let mut weights = 0.0;
+        for y in (t - half_t).ceil() as i64..=(t + half_t).floor() as i64 {
+            for x in (s - half_s).ceil() as i64..=(s + half_s).floor() as i64 {
+                let (ds, dt) = (x as f32 - s, y as f32 - t);
+                let r2 = a * ds * ds + b * ds * dt + c * dt * dt;
+                if r2 < 1.0 {
+                    let weight = (-2.0 * r2).exp() - (-2.0_f32).exp();
+                    sum = sum + self.texel::<T>(level, x, y) * weight;
+                    weights += weight;
+                }
+            }
+        }
+        if weights > 0.0 { sum * (1.0 / weights) } else { self.bilinear(level, st) }
+    }
+
+    fn bilinear<T: Texel>(&self, level: usize, st: Vec2) -> T {
+        let (x, y) = self.to_texels(level, st);
+        let (x0, y0) = (x.floor(), y.floor());
+        let (dx, dy) = (x - x0, y - y0);
+        let (x0, y0) = (x0 as i64, y0 as i64);
+        let row =
+            |y: i64| self.texel::<T>(level, x0, y) * (1.0 - dx) + self.texel::<T>(level, x0 + 1, y) * dx;
+        row(y0) * (1.0 - dy) + row(y0 + 1) * dy
+    }
+
+    /// `st` brought near the image, where texels can be told apart: by whole images where it repeats.
+    fn within_reach(&self, st: Vec2) -> Vec2 {
+        match self.options.wrap {
+            _ if !st.is_finite() => Vec2::ZERO,
+            Wrap::Repeat => st - st.floor(),
+            Wrap::Clamp | Wrap::Black => st.clamp(Vec2::splat(-4.0), Vec2::splat(5.0)),
+            Wrap::OctahedralSphere => st.clamp(Vec2::ZERO, Vec2::ONE),
+        }
+    }
+
+    /// The place in texels of a level, whole numbers at their centres, (0, 0) the upper left one.
+    fn to_texels(&self, level: usize, st: Vec2) -> (f32, f32) {
+        let level = &self.levels[level];
+        (st.x * level.width() as f32 - 0.5, st.y * level.height() as f32 - 0.5)
+    }
+
+    /// The texel at a place that may lie beyond the edge.
+    fn texel<T: Texel>(&self, level: usize, x: i64, y: i64) -> T {
+        let (width, height) = (i64::from(self.levels[level].width()), i64::from(self.levels[level].height()));
+        let (x, y) = if (0..width).contains(&x) && (0..height).contains(&y) {
+            (x, y)
+        } else {
+            match self.options.wrap {
+                Wrap::Repeat => (x.rem_euclid(width), y.rem_euclid(height)),
+                Wrap::Clamp => (x.clamp(0, width - 1), y.clamp(0, height - 1)),
+                Wrap::Black => return T::ZERO,
+                Wrap::OctahedralSphere => octahedral(x, y, width, height),
+            }
+        };
+        T::fetch(self, level, x as u32, y as u32)
+    }
+}
+
+/// The texel of an equal-area octahedral image that lies where one up to an image beyond its edge would: each edge meets
+/// itself, mirrored about its middle.
+fn octahedral(x: i64, y: i64, width: i64, height: i64) -> (i64, i64) {
+    let (mut x, mut y) = (x.clamp(-width, 2 * width - 1), y.clamp(-height, 2 * height - 1));
+    if !(0..width).contains(&x) {
+        x = if x < 0 { -1 - x } else { 2 * width - 1 - x };
+        y = height - 1 - y;
+    }
+    if !(0..height).contains(&y) {
+        y = if y < 0 { -1 - y } else { 2 * height - 1 - y };
+        x = width - 1 - x;
+    }
+    (x, y)
+}
+
+/// The image at half its size, rounded up: each texel the mean over its area. `None` for an image of one texel.
+fn half_size(image: &Bitmap) -> Option<Bitmap> {
+    let (width, height) = (image.width(), image.height());
+    if width == 1 && height == 1 {
+        return None;
+    }
+    let (new_width, new_height) = (width.div_ceil(2), height.div_ceil(2));
+    let (columns, rows) = (coverages(width, new_width), coverages(height, new_height));
+    let channels = image.channels();
+    let count = channels.count();
+    let mut light = Vec::with_capacity(new_width as usize * new_height as usize * count);
+    for row in &rows {
+        for column in &columns {
+            for c in 0..count {
+                let mut sum = 0.0;
+                for &(y, weight_y) in row.iter().filter(|part| part.1 > 0.0) {
+                    for &(x, weight_x) in column.iter().filter(|part| part.1 > 0.0) {
+                        sum += weight_x * weight_y * image.texel(x, y, c);
+                    }
+                }
+                light.push(sum);
+            }
+        }
+    }
+    let data = encode(&light, channels, image);
+    Bitmap::new(new_width, new_height, channels, data, image.encoding())
+}
+
+/// Light in the number format and encoding of an image.
+fn encode(light: &[f32], channels: Channels, like: &Bitmap) -> PixelData {
+    let stored = light.iter().enumerate().map(|(i, &v)| {
+        let is_alpha = channels.alpha() == Some(i % channels.count());
+        if is_alpha { Encoding::Linear } else { like.encoding() }.encode(v)
+    });
+    match like.data() {
+        PixelData::U8(_) => PixelData::U8(stored.map(unit_to_u8).collect()),
+        PixelData::U16(_) => PixelData::U16(stored.map(unit_to_u16).collect()),
+        PixelData::F16(_) => PixelData::F16(stored.map(f32_to_half).collect()),
+        PixelData::F32(_) => PixelData::F32(stored.collect()),
+    }
+}
+
+/// Which of `from` texels in a row each of `to` ≤ `from` ≤ 2 `to` covers, with its share: three at most.
+fn coverages(from: u32, to: u32) -> Vec<[(u32, f32); 3]> {
+    let size = f64::from(from) / f64::from(to);
+    (0..to)
+        .map(|i| {
+            let (start, end) = (f64::from(i) * size, f64::from(i + 1) * size);
+            std::array::from_fn(|k| {
+                let texel = start.floor() + k as f64;
+                let covered = ((texel + 1.0).min(end) - texel.max(start)).max(0.0);
+                // Rounding may leave a sliver of the texel beyond the last.
+                let share = if texel < f64::from(from) { covered / size } else { 0.0 };
+                ((texel as u32).min(from - 1), share as f32)
+            })
+        })
+        .collect()
 }

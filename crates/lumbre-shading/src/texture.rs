@@ -1,8 +1,10 @@
 //! Values that vary over a surface.
 
+use std::f64::consts::{PI, TAU};
+use std::ops::{Add, Mul};
 use std::sync::Arc;
 
-use lumbre_math::{DVec3, Transform, Vec2, Vec3};
+use lumbre_math::{DVec2, DVec3, Transform, Vec2, Vec3};
 
 use crate::{MipMap, Spectrum};
 
@@ -58,10 +60,117 @@ pub enum Mapping2d {
     },
 }
 
+impl Mapping2d {
+    /// The surface's own parameters, unchanged.
+    pub const IDENTITY: Self = Self::Uv { scale: Vec2::ONE, delta: Vec2::ZERO };
+
+    /// The place on the plane, with its derivatives over one pixel.
+    ///
+    /// Spherical: s = θ / π from the north pole (+z), t = φ / 2π in [0, 1) from x towards y. Cylindrical: s = (π + φ) / 2π
+    /// with φ in (-π, π], t = z. On the axis of either the derivatives, which are infinite there, count as zero.
+    pub fn map(&self, at: &TextureContext) -> TexturePoint {
+        match self {
+            Self::Uv { scale, delta } => TexturePoint {
+                st: *scale * at.uv + *delta,
+                dst_dx: *scale * at.duv_dx,
+                dst_dy: *scale * at.duv_dy,
+            },
+            Self::Spherical { texture_from_world } => {
+                let p = texture_from_world.point(at.point);
+                let across = p.truncate().length();
+                let phi = p.y.atan2(p.x);
+                let phi = if phi < 0.0 { phi + TAU } else { phi };
+                let st = DVec2::new(across.atan2(p.z) / PI, phi / TAU);
+                let ds =
+                    DVec3::new(p.x * p.z / across, p.y * p.z / across, -across) / (PI * p.length_squared());
+                let dt = DVec3::new(-p.y, p.x, 0.0) / (TAU * across * across);
+                TexturePoint::by_gradients(st, ds, dt, texture_from_world, at)
+            }
+            Self::Cylindrical { texture_from_world } => {
+                let p = texture_from_world.point(at.point);
+                let st = DVec2::new((PI + p.y.atan2(p.x)) / TAU, p.z);
+                let ds = DVec3::new(-p.y, p.x, 0.0) / (TAU * p.truncate().length_squared());
+                TexturePoint::by_gradients(st, ds, DVec3::Z, texture_from_world, at)
+            }
+            Self::Planar { texture_from_world, vs, vt, delta } => {
+                let p = texture_from_world.point(at.point);
+                let st = DVec2::new(p.dot(*vs), p.dot(*vt)) + delta.as_dvec2();
+                TexturePoint::by_gradients(st, *vs, *vt, texture_from_world, at)
+            }
+        }
+    }
+}
+
+/// A place on the plane of a texture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TexturePoint {
+    /// (s, t).
+    pub st: Vec2,
+    /// (∂s/∂x, ∂t/∂x).
+    pub dst_dx: Vec2,
+    /// (∂s/∂y, ∂t/∂y).
+    pub dst_dy: Vec2,
+}
+
+impl TexturePoint {
+    /// From the gradients of s and t in texture space.
+    fn by_gradients(
+        st: DVec2,
+        ds: DVec3,
+        dt: DVec3,
+        texture_from_world: &Transform,
+        at: &TextureContext,
+    ) -> Self {
+        let along = |dp: Vec3| {
+            let dp = texture_from_world.vector(dp.as_dvec3());
+            let dst = DVec2::new(ds.dot(dp), dt.dot(dp)).as_vec2();
+            if dst.is_finite() { dst } else { Vec2::ZERO }
+        };
+        Self { st: st.as_vec2(), dst_dx: along(at.dpdx), dst_dy: along(at.dpdy) }
+    }
+}
+
 /// A value that textures can have: a float or a spectrum.
-pub trait TextureValue: Copy + Send + Sync + std::fmt::Debug + 'static {}
-impl TextureValue for f32 {}
-impl TextureValue for Spectrum {}
+pub trait TextureValue:
+    Copy + Send + Sync + std::fmt::Debug + Add<Output = Self> + Mul<f32, Output = Self> + 'static
+{
+    /// The value of an image about a place.
+    fn from_image(image: &MipMap, at: &TexturePoint) -> Self;
+
+    /// One minus the value.
+    fn complement(self) -> Self;
+
+    /// The value, with zero for what is negative or not a number.
+    fn clamp_negative(self) -> Self;
+}
+
+impl TextureValue for f32 {
+    fn from_image(image: &MipMap, at: &TexturePoint) -> Self {
+        image.lookup_float(at.st, at.dst_dx, at.dst_dy)
+    }
+
+    fn complement(self) -> Self {
+        1.0 - self
+    }
+
+    fn clamp_negative(self) -> Self {
+        self.max(0.0)
+    }
+}
+
+impl TextureValue for Spectrum {
+    fn from_image(image: &MipMap, at: &TexturePoint) -> Self {
+        image.lookup(at.st, at.dst_dx, at.dst_dy)
+    }
+
+    fn complement(self) -> Self {
+        Self::WHITE - self
+    }
+
+    fn clamp_negative(self) -> Self {
+        self.map(|c| c.max(0.0))
+    }
+}
 
 /// An image over a surface. Its value is `scale * texel`, or `1 - scale * texel` when inverted.
 #[derive(Clone, Debug)]
@@ -74,6 +183,14 @@ pub struct ImageTexture {
     pub scale: f32,
     /// Whether to take one minus the value.
     pub invert: bool,
+}
+
+impl ImageTexture {
+    /// The value at a place, never negative.
+    pub fn evaluate<T: TextureValue>(&self, at: &TextureContext) -> T {
+        let value = T::from_image(&self.image, &self.mapping.map(at)) * self.scale;
+        if self.invert { value.complement() } else { value }.clamp_negative()
+    }
 }
 
 /// The closed set of textures. Trees are shallow: whoever makes one bounds its depth by [`Texture::MAX_DEPTH`].
@@ -136,8 +253,65 @@ impl<T: TextureValue> Texture<T> {
     /// How deep a tree of textures may be.
     pub const MAX_DEPTH: usize = 64;
 
-    /// The value at a place.
-    pub fn evaluate(&self, _at: &TextureContext) -> T {
-        unimplemented!("skeleton")
+    /// The value at a place. What has no weight is not evaluated.
+    pub fn evaluate(&self, at: &TextureContext) -> T {
+        match self {
+            Self::Constant(value) => *value,
+            Self::Scale { texture, scale } => texture.evaluate(at) * scale.evaluate(at),
+            Self::Mix { textures, amount } => blend(textures, amount.evaluate(at), at),
+            Self::DirectionMix { textures, direction } => {
+                blend(textures, 1.0 - at.normal.dot(*direction).abs(), at)
+            }
+            Self::Bilerp { mapping, corners: [v00, v01, v10, v11] } => {
+                let Vec2 { x: s, y: t } = mapping.map(at).st;
+                (*v00 * (1.0 - t) + *v01 * t) * (1.0 - s) + (*v10 * (1.0 - t) + *v11 * t) * s
+            }
+            Self::Checkerboard2d { mapping, textures } => {
+                let place = mapping.map(at);
+                let radius = 1.5 * place.dst_dx.abs().max(place.dst_dy.abs());
+                let s = filtered_square_wave(place.st.x.into(), radius.x.into());
+                let t = filtered_square_wave(place.st.y.into(), radius.y.into());
+                blend(textures, (0.5 - 0.5 * s * t) as f32, at)
+            }
+            Self::Checkerboard3d { texture_from_world, textures } => {
+                let cell = texture_from_world.point(at.point).floor();
+                let odd = (cell.x + cell.y + cell.z).rem_euclid(2.0) == 1.0;
+                textures[usize::from(odd)].evaluate(at)
+            }
+            Self::Image(image) => image.evaluate(at),
+        }
     }
+}
+
+/// (1 - amount) · first + amount · second.
+fn blend<T: TextureValue>(textures: &[Arc<Texture<T>>; 2], amount: f32, at: &TextureContext) -> T {
+    if amount == 0.0 {
+        textures[0].evaluate(at)
+    } else if amount == 1.0 {
+        textures[1].evaluate(at)
+    } else {
+        textures[0].evaluate(at) * (1.0 - amount) + textures[1].evaluate(at) * amount
+    }
+}
+
+/// The wave that is 1 on [0, 1), -1 on [1, 2) and so on, under a tent of half-width `radius`: the second difference of
+/// its second integral, over the square of the radius.
+///
+/// Quilez, "Filtering the Checkerboard Pattern", 2017.
+fn filtered_square_wave(x: f64, radius: f64) -> f64 {
+    let x = x.rem_euclid(2.0);
+    if !x.is_finite() {
+        return 0.0;
+    }
+    let crosses_an_edge = (x - radius).floor() != (x + radius).floor();
+    // Below this the second difference is mostly rounding, and no picture shows it.
+    if !crosses_an_edge || radius < 1e-6 {
+        return if x < 1.0 { 1.0 } else { -1.0 };
+    }
+    let second_integral = |x: f64| {
+        let half = 0.5 * x;
+        let y = half - half.floor() - 0.5;
+        half + y * (1.0 - 2.0 * y.abs())
+    };
+    (second_integral(x + radius) - 2.0 * second_integral(x) + second_integral(x - radius)) / (radius * radius)
 }

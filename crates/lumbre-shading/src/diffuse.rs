@@ -1,0 +1,130 @@
+//! Lambert's surfaces: light leaves in all directions alike.
+
+use std::f32::consts::{FRAC_1_PI, PI};
+
+use lumbre_math::{Vec2, Vec3};
+
+use crate::{BsdfSample, LocalDir, Scatter, Spectrum};
+
+/// Reflects in all directions alike, on the side where the light is. Conserves energy at a reflectance of 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Diffuse {
+    /// The share reflected, in [0, 1].
+    pub reflectance: Spectrum,
+}
+
+impl Diffuse {
+    /// f · |cos θi|.
+    pub fn eval(&self, wo: LocalDir, wi: LocalDir) -> Spectrum {
+        if wo.same_hemisphere(wi) {
+            self.reflectance * (FRAC_1_PI * wi.abs_cos_theta())
+        } else {
+            Spectrum::BLACK
+        }
+    }
+
+    /// The density of [`Diffuse::sample`].
+    pub fn pdf(&self, wo: LocalDir, wi: LocalDir) -> f32 {
+        if wo.same_hemisphere(wi) { FRAC_1_PI * wi.abs_cos_theta() } else { 0.0 }
+    }
+
+    /// A direction by the cosine law.
+    pub fn sample(&self, wo: LocalDir, u: Vec2) -> Option<BsdfSample> {
+        let wi = cosine_direction(u, wo.cos_theta())?;
+        Some(BsdfSample {
+            wi,
+            weight: self.reflectance,
+            scatter: Scatter::Density(FRAC_1_PI * wi.abs_cos_theta()),
+            transmitted: false,
+            eta: 1.0,
+        })
+    }
+}
+
+/// Lambert on both sides: a share comes back, a share goes through. Conserves energy where the two sum to 1; it is up to
+/// the scene that they do not sum to more.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DiffuseTransmission {
+    /// The share reflected, in [0, 1].
+    pub reflectance: Spectrum,
+    /// The share transmitted, in [0, 1].
+    pub transmittance: Spectrum,
+}
+
+impl DiffuseTransmission {
+    /// f · |cos θi|.
+    pub fn eval(&self, wo: LocalDir, wi: LocalDir) -> Spectrum {
+        let side = wo.cos_theta() * wi.cos_theta();
+        let share = if side > 0.0 {
+            self.reflectance
+        } else if side < 0.0 {
+            self.transmittance
+        } else {
+            return Spectrum::BLACK;
+        };
+        share * (FRAC_1_PI * wi.abs_cos_theta())
+    }
+
+    /// The probability of a reflection.
+    fn reflection_probability(&self) -> f32 {
+        let (r, t) = (self.reflectance.max_component(), self.transmittance.max_component());
+        if r + t > 0.0 { r / (r + t) } else { 0.5 }
+    }
+
+    /// The density of [`DiffuseTransmission::sample`].
+    pub fn pdf(&self, wo: LocalDir, wi: LocalDir) -> f32 {
+        let side = wo.cos_theta() * wi.cos_theta();
+        let reflection = self.reflection_probability();
+        let probability = if side > 0.0 {
+            reflection
+        } else if side < 0.0 {
+            1.0 - reflection
+        } else {
+            return 0.0;
+        };
+        probability * FRAC_1_PI * wi.abs_cos_theta()
+    }
+
+    /// A direction by the cosine law on either side.
+    pub fn sample(&self, wo: LocalDir, lobe: f32, u: Vec2) -> Option<BsdfSample> {
+        let reflection = self.reflection_probability();
+        let transmitted = lobe >= reflection;
+        let (share, probability) =
+            if transmitted { (self.transmittance, 1.0 - reflection) } else { (self.reflectance, reflection) };
+        let wi = cosine_direction(u, if transmitted { -wo.cos_theta() } else { wo.cos_theta() })?;
+        Some(BsdfSample {
+            wi,
+            weight: share / probability,
+            scatter: Scatter::Density(probability * FRAC_1_PI * wi.abs_cos_theta()),
+            transmitted,
+            eta: 1.0,
+        })
+    }
+}
+
+/// A direction with density cos θ / π on the side of the sign of `side`; `None` when that is neither.
+pub(crate) fn cosine_direction(u: Vec2, side: f32) -> Option<LocalDir> {
+    let disk = square_to_disk(u);
+    // 2⁻¹³ at the least: never in the surface, where no side is left. (Four in a hundred million go there.)
+    let z = (1.0 - disk.length_squared()).max(1.5e-8).sqrt();
+    if side == 0.0 || side.is_nan() {
+        return None;
+    }
+    Some(LocalDir(Vec3::new(disk.x, disk.y, z.copysign(side))))
+}
+
+/// The unit square onto the unit disk, equal areas to equal areas, squares to rings.
+///
+/// Shirley and Chiu, "A Low Distortion Map Between Disk and Square", Journal of Graphics Tools 2(3), 1997.
+fn square_to_disk(u: Vec2) -> Vec2 {
+    let p = 2.0 * u - Vec2::ONE;
+    if p == Vec2::ZERO {
+        return p;
+    }
+    let (radius, angle) = if p.x.abs() > p.y.abs() {
+        (p.x, 0.25 * PI * (p.y / p.x))
+    } else {
+        (p.y, 0.5 * PI - 0.25 * PI * (p.x / p.y))
+    };
+    radius * Vec2::from_angle(angle)
+}

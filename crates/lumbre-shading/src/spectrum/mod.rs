@@ -1,0 +1,334 @@
+//! Spectra, and what becomes of them on the lanes of light transport.
+//!
+//! Light is carried as linear Rec. 709. A spectrum that a scene gives by wavelength is weighed once, when the scene is
+//! read, by what the CIE 1931 standard observer sees of it between 360 and 830 nm.
+
+mod fluorescent;
+mod named;
+mod observer;
+
+use std::sync::LazyLock;
+
+pub use named::NamedSpectrum;
+use observer::{FIRST_NM, LAST_NM, MATCHING, STEP_NM};
+
+use crate::Spectrum;
+
+/// A spectrum as a scene gives it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SpectrumValue {
+    /// A colour, already linear Rec. 709.
+    Rgb(Spectrum),
+    /// A black body by its temperature in kelvin, its greatest value scaled to 1.
+    Blackbody(f64),
+    /// Values by wavelength in nm, ascending; linear between them, and constant beyond the first and last. None is 0.
+    Sampled(Vec<(f64, f64)>),
+    /// A built-in one.
+    Named(NamedSpectrum),
+}
+
+impl SpectrumValue {
+    /// Its value at a wavelength in nm; for a colour, `None`.
+    pub fn at(&self, nm: f64) -> Option<f64> {
+        match self {
+            Self::Rgb(_) => None,
+            Self::Blackbody(kelvin) => Some(blackbody(nm, *kelvin)),
+            Self::Sampled(pairs) => Some(interpolate(pairs, nm)),
+            Self::Named(named) => Some(named.at(nm)),
+        }
+    }
+
+    /// The colour of a surface that reflects this share by wavelength: as seen under D65, so that a constant gives equal
+    /// channels. Within [0, 1]; what no surface on these primaries can be is clipped.
+    pub fn reflectance_rgb(&self) -> Spectrum {
+        self.weighed().map(crate::unit)
+    }
+
+    /// A coefficient (of refraction, absorption or scattering) for each lane: the mean over the wavelengths that the lane
+    /// stands for. Not negative.
+    pub fn unbounded_rgb(&self) -> Spectrum {
+        self.weighed().map(|c| c.max(0.0))
+    }
+
+    /// The colour of a light. A colour is itself; a spectrum has its luminance (CIE Y) normalised to 1, as photometric
+    /// units ask, with colours outside the gamut clipped at no loss of luminance. Black stays black.
+    pub fn illuminant_rgb(&self) -> Spectrum {
+        if let Self::Rgb(colour) = self {
+            return *colour;
+        }
+        let xyz = observe(|nm| self.at(nm).unwrap_or(0.0));
+        let lights = xyz[1] > 0.0 && xyz[1].is_finite();
+        if !lights {
+            return Spectrum::BLACK;
+        }
+        let rgb = rec709_from_xyz(xyz.map(|c| c / xyz[1])).map(|c| c.max(0.0));
+        let luminance = 0.212_639 * rgb[0] + 0.715_168_7 * rgb[1] + 0.072_192_32 * rgb[2];
+        spectrum(rgb.map(|c| c / luminance))
+    }
+
+    /// An index of refraction for a material that bends all light alike: its value at 587.6 nm (the helium d line, where
+    /// catalogues give n_d). For a colour the mean of its channels.
+    pub fn index_of_refraction(&self) -> f32 {
+        match self {
+            Self::Rgb(colour) => colour.average(),
+            _ => self.at(587.6).unwrap_or(1.0) as f32,
+        }
+    }
+
+    /// The mean of each lane under D65.
+    fn weighed(&self) -> Spectrum {
+        match self {
+            Self::Rgb(colour) => *colour,
+            _ => weigh(|nm| self.at(nm).unwrap_or(0.0)),
+        }
+    }
+}
+
+/// The index of refraction of a metal, (η, k), on the lanes of light transport.
+///
+/// Colour by wavelength is lost on three lanes, but what a metal reflects head on need not be: η is the mean over each
+/// lane's wavelengths, and k is then solved for so that the lane reflects at normal incidence exactly the colour of the
+/// metal's reflectance by wavelength, ((η − 1)² + k²) / ((η + 1)² + k²), under D65. Where no k can (η alone reflects more)
+/// k is 0 and η gives way. When either is a colour, both are taken lane by lane.
+pub fn conductor_rgb(eta: &SpectrumValue, k: &SpectrumValue) -> (Spectrum, Spectrum) {
+    if matches!(eta, SpectrumValue::Rgb(_)) || matches!(k, SpectrumValue::Rgb(_)) {
+        return (eta.unbounded_rgb(), k.unbounded_rgb());
+    }
+    let reflected = weigh(|nm| {
+        let (eta, k) = (eta.at(nm).unwrap_or(1.0), k.at(nm).unwrap_or(0.0));
+        let denominator = (eta + 1.0).powi(2) + k * k;
+        if denominator > 0.0 { ((eta - 1.0).powi(2) + k * k) / denominator } else { 0.0 }
+    });
+    let mean = eta.unbounded_rgb();
+    let solve = |eta: f32, r: f32| {
+        let (eta, r) = (f64::from(eta), f64::from(r).clamp(0.0, 0.9999));
+        let k2 = (r * (eta + 1.0).powi(2) - (eta - 1.0).powi(2)) / (1.0 - r);
+        if k2 >= 0.0 {
+            (eta as f32, k2.sqrt() as f32)
+        } else {
+            let root = r.sqrt();
+            let above = (1.0 + root) / (1.0 - root);
+            ((if eta >= 1.0 { above } else { 1.0 / above }) as f32, 0.0)
+        }
+    };
+    (mean.zip(reflected, |eta, r| solve(eta, r).0), mean.zip(reflected, |eta, r| solve(eta, r).1))
+}
+
+/// The spectral radiance of a black body over its greatest value, at a wavelength in nm. 0 for temperatures that are not
+/// positive.
+fn blackbody(nm: f64, kelvin: f64) -> f64 {
+    if !(kelvin > 0.0 && kelvin.is_finite()) {
+        return 0.0;
+    }
+    // hc/k in nm K, with the constants of the SI of 2019; the greatest value is where x = hc/(λkT) is this.
+    const SECOND: f64 = 1.438_776_877e7;
+    const X_PEAK: f64 = 4.965_114_231_744_276;
+    let shape = |x: f64| x.powi(5) / x.exp_m1();
+    let x = SECOND / (nm * kelvin);
+    if x > 700.0 { 0.0 } else { shape(x) / shape(X_PEAK) }
+}
+
+/// Linear between pairs of ascending wavelengths, constant beyond them.
+fn interpolate(pairs: &[(f64, f64)], nm: f64) -> f64 {
+    let after = pairs.partition_point(|pair| pair.0 <= nm);
+    match (after.checked_sub(1).map(|i| pairs[i]), pairs.get(after)) {
+        (None, None) => 0.0,
+        (Some((_, v)), None) | (None, Some(&(_, v))) => v,
+        (Some((nm0, v0)), Some(&(nm1, v1))) => v0 + (v1 - v0) * ((nm - nm0) / (nm1 - nm0)),
+    }
+}
+
+/// (x̄, ȳ, z̄) at a wavelength in nm within the table.
+fn matching(nm: f64) -> [f64; 3] {
+    let place = ((nm - FIRST_NM) / STEP_NM).clamp(0.0, (MATCHING.len() - 1) as f64);
+    let i = (place as usize).min(MATCHING.len() - 2);
+    let t = place - i as f64;
+    std::array::from_fn(|c| MATCHING[i][c] * (1.0 - t) + MATCHING[i + 1][c] * t)
+}
+
+/// XYZ of a spectrum: the sum over every nanometre.
+fn observe(mut value: impl FnMut(f64) -> f64) -> [f64; 3] {
+    let mut xyz = [0.0; 3];
+    for i in 0..=(LAST_NM - FIRST_NM) as u32 {
+        let nm = FIRST_NM + f64::from(i);
+        let (v, weights) = (value(nm), matching(nm));
+        for c in 0..3 {
+            xyz[c] += v * weights[c];
+        }
+    }
+    xyz
+}
+
+/// The mean of a spectrum over what each lane sees of D65.
+fn weigh(mut value: impl FnMut(f64) -> f64) -> Spectrum {
+    static WHITE: LazyLock<[f64; 3]> = LazyLock::new(|| rec709_from_xyz(observe(named::d65)));
+    let rgb = rec709_from_xyz(observe(|nm| value(nm) * named::d65(nm)));
+    spectrum(std::array::from_fn(|c| rgb[c] / WHITE[c]))
+}
+
+/// Linear Rec. 709 from XYZ: the inverse of the matrix of the primaries of ITU-R BT.709 with D65 at (0.3127, 0.3290).
+fn rec709_from_xyz([x, y, z]: [f64; 3]) -> [f64; 3] {
+    [
+        3.240_969_941_904_521 * x - 1.537_383_177_570_093 * y - 0.498_610_760_293_003 * z,
+        -0.969_243_636_280_88 * x + 1.875_967_501_507_72 * y + 0.041_555_057_407_176 * z,
+        0.055_630_079_696_994 * x - 0.203_976_958_888_977 * y + 1.056_971_514_242_879 * z,
+    ]
+}
+
+fn spectrum(rgb: [f64; 3]) -> Spectrum {
+    let finite = |c: f64| if c.is_finite() { c as f32 } else { 0.0 };
+    Spectrum::new(finite(rgb[0]), finite(rgb[1]), finite(rgb[2]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn named(name: &str) -> SpectrumValue {
+        SpectrumValue::Named(NamedSpectrum::from_name(name).unwrap_or_else(|| panic!("{name} is missing")))
+    }
+
+    fn chromaticity(value: &SpectrumValue) -> (f64, f64) {
+        let [x, y, z] = observe(|nm| value.at(nm).unwrap());
+        (x / (x + y + z), y / (x + y + z))
+    }
+
+    fn close(a: Spectrum, b: [f32; 3], tolerance: f32) -> bool {
+        a.to_array().iter().zip(b).all(|(a, b)| (a - b).abs() <= tolerance)
+    }
+
+    #[test]
+    fn the_observer_sees_equal_energy_as_white() {
+        let [x, y, z] = observe(|_| 1.0);
+        assert!((y - 106.857).abs() < 0.01, "{y}");
+        assert!((x / y - 1.0).abs() < 4e-4 && (z / y - 1.0).abs() < 4e-4, "{x} {y} {z}");
+    }
+
+    #[test]
+    fn the_standard_illuminants_have_their_published_chromaticity() {
+        let published = [
+            ("stdillum-A", 0.44758, 0.40745),
+            ("stdillum-D50", 0.34567, 0.35851),
+            ("stdillum-D65", 0.31272, 0.32903),
+            ("illum-acesD60", 0.32168, 0.33767),
+            ("stdillum-F1", 0.3131, 0.3371),
+            ("stdillum-F2", 0.3721, 0.3751),
+            ("stdillum-F3", 0.4091, 0.3941),
+            ("stdillum-F4", 0.4402, 0.4031),
+            ("stdillum-F5", 0.3138, 0.3452),
+            ("stdillum-F6", 0.3779, 0.3882),
+            ("stdillum-F7", 0.3129, 0.3292),
+            ("stdillum-F8", 0.3458, 0.3586),
+            ("stdillum-F9", 0.3741, 0.3727),
+            ("stdillum-F10", 0.3458, 0.3588),
+            ("stdillum-F11", 0.3805, 0.3769),
+            ("stdillum-F12", 0.4370, 0.4042),
+        ];
+        for (name, x, y) in published {
+            let (our_x, our_y) = chromaticity(&named(name));
+            // (The published ones are sums every 5 nm, which the lines of a lamp are not quite the same over.)
+            assert!((our_x - x).abs() < 6e-4 && (our_y - y).abs() < 6e-4, "{name}: {our_x} {our_y}");
+        }
+    }
+
+    #[test]
+    fn glass_bends_the_d_line_as_its_catalogue_says() {
+        let published = [
+            ("glass-BK7", 1.5168),
+            ("glass-BAF10", 1.67003),
+            ("glass-FK51A", 1.48656),
+            ("glass-LASF9", 1.85025),
+            ("glass-F5", 1.6727),
+            ("glass-F10", 1.72825),
+            ("glass-F11", 1.78472),
+            ("metal-MgO-eta", 1.7375),
+            ("metal-TiO2-eta", 2.614),
+        ];
+        for (name, n) in published {
+            let ours = named(name).index_of_refraction();
+            assert!((ours - n).abs() < 1e-3, "{name}: {ours}");
+        }
+    }
+
+    #[test]
+    fn every_built_in_spectrum_is_found_by_name_and_has_finite_values() {
+        let mut count = 0;
+        for name in NamedSpectrum::names() {
+            let spectrum = NamedSpectrum::from_name(name).unwrap();
+            assert_eq!(spectrum.name(), name);
+            for nm in (360..=830).step_by(5) {
+                let value = spectrum.at(f64::from(nm));
+                assert!(value.is_finite() && value >= 0.0, "{name} at {nm}: {value}");
+            }
+            count += 1;
+        }
+        assert_eq!(count, 7 + 14 + 3 + 12 + 1);
+        assert_eq!(NamedSpectrum::from_name("glass-BK8"), None);
+    }
+
+    #[test]
+    fn a_constant_reflectance_has_equal_channels_and_d65_is_white_light() {
+        let grey = SpectrumValue::Sampled(vec![(500.0, 0.37)]);
+        assert!(close(grey.reflectance_rgb(), [0.37; 3], 1e-6));
+        assert!(close(grey.unbounded_rgb(), [0.37; 3], 1e-6));
+        let white = named("stdillum-D65").illuminant_rgb();
+        assert!(close(white, [1.0; 3], 1.5e-3), "{white:?}");
+    }
+
+    #[test]
+    fn light_by_wavelength_has_luminance_one_and_a_colour_stays_itself() {
+        let mut count = 0;
+        for kelvin in [900.0, 1500.0, 2700.0, 4000.0, 6500.0, 20_000.0] {
+            let colour = SpectrumValue::Blackbody(kelvin).illuminant_rgb();
+            assert!((colour.luminance() - 1.0).abs() < 1e-4, "{kelvin}: {colour:?}");
+            assert!(colour.min_component() >= 0.0);
+            count += 1;
+        }
+        assert_eq!(count, 6);
+        let warm = SpectrumValue::Blackbody(2700.0).illuminant_rgb();
+        assert!(warm.r > warm.g && warm.g > warm.b);
+        // 6504 K on the Planckian locus: (0.3135, 0.3236), a little less green than D65.
+        let (x, y) = chromaticity(&SpectrumValue::Blackbody(6504.0));
+        assert!((x - 0.3135).abs() < 3e-4 && (y - 0.3237).abs() < 3e-4, "{x} {y}");
+        let colour = Spectrum::new(3.0, 0.5, 7.0);
+        assert_eq!(SpectrumValue::Rgb(colour).illuminant_rgb(), colour);
+        assert_eq!(SpectrumValue::Sampled(vec![]).illuminant_rgb(), Spectrum::BLACK);
+        assert_eq!(SpectrumValue::Blackbody(-3.0).illuminant_rgb(), Spectrum::BLACK);
+    }
+
+    #[test]
+    fn metals_reflect_their_colour_head_on() {
+        // Reflectance by wavelength, weighed as a surface's colour is: what the three lanes must give back.
+        let mut count = 0;
+        for metal in ["Ag", "Al", "Au", "Cu", "CuZn", "MgO", "TiO2"] {
+            let (eta, k) = (named(&format!("metal-{metal}-eta")), named(&format!("metal-{metal}-k")));
+            let expected = SpectrumValue::Sampled(
+                (360..=830)
+                    .map(|nm| {
+                        let nm = f64::from(nm);
+                        let (eta, k) = (eta.at(nm).unwrap(), k.at(nm).unwrap());
+                        (nm, ((eta - 1.0).powi(2) + k * k) / ((eta + 1.0).powi(2) + k * k))
+                    })
+                    .collect(),
+            )
+            .reflectance_rgb();
+            let (eta, k) = conductor_rgb(&eta, &k);
+            let ours = crate::fresnel::conductor(1.0, eta, k);
+            assert!(close(ours, expected.to_array(), 2e-4), "{metal}: {ours:?} {expected:?}");
+            count += 1;
+        }
+        assert_eq!(count, 7);
+        let (eta, k) = conductor_rgb(&named("metal-Au-eta"), &named("metal-Au-k"));
+        let gold = crate::fresnel::conductor(1.0, eta, k);
+        assert!(gold.r > 0.95 && (0.7..0.82).contains(&gold.g) && gold.b < 0.42, "{gold:?}");
+    }
+
+    #[test]
+    fn samples_are_linear_between_and_constant_beyond() {
+        let ramp = SpectrumValue::Sampled(vec![(400.0, 2.0), (500.0, 4.0)]);
+        for (nm, value) in [(300.0, 2.0), (400.0, 2.0), (425.0, 2.5), (500.0, 4.0), (900.0, 4.0)] {
+            assert_eq!(ramp.at(nm), Some(value));
+        }
+        assert_eq!(SpectrumValue::Rgb(Spectrum::WHITE).at(500.0), None);
+    }
+}
