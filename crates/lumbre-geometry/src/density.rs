@@ -24,3 +24,20 @@ fn per_solid_angle(pdf_area: f64, to_point: DVec3, surface: &Surface) -> f64 {
     let projected = surface.normal.dot(to_point).abs() / distance_squared.sqrt();
     pdf_area * distance_squared / projected
 }
+
+/// One of some shares, chosen in proportion by `u` in [0, 1), and what is left of `u`, again uniform in [0, 1).
+pub(crate) fn choose(shares: &[f64], u: f64) -> (usize, f64) {
+    let mut left = u * shares.iter().sum::<f64>();
+    let mut last = 0;
+    for (i, &share) in shares.iter().enumerate() {
+        if share <= 0.0 {
+            continue;
+        }
+        if left < share {
+            return (i, left / share);
+        }
+        left -= share;
+        last = i;
+    }
+    (last, 1.0 - f64::EPSILON)
+}

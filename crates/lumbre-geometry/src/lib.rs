@@ -4,20 +4,42 @@
 //! on which part); [`Shape::surface`] computes the rest once, for the winner.
 
 mod aabb;
+mod axial;
+mod cone;
+mod cuboid;
+mod cylinder;
 mod density;
+mod disk;
 mod hit;
+mod hyperboloid;
+mod line;
 mod measure;
+mod paraboloid;
+mod patch;
 mod placed;
+mod plane;
+mod quadric;
 mod ray;
 mod shape;
 mod sphere;
 mod support;
+mod torus;
 mod triangle;
 
 pub use aabb::Aabb;
+pub use cone::Cone;
+pub use cuboid::Cuboid;
+pub use cylinder::Cylinder;
+pub use disk::Disk;
 pub use hit::{DirectionSample, Root, Roots, Surface, SurfaceSample};
+pub use hyperboloid::Hyperboloid;
+pub use paraboloid::Paraboloid;
+pub use patch::BilinearPatch;
 pub use placed::PlacedShape;
+pub use plane::Plane;
+pub use quadric::Quadric;
 pub use ray::Ray;
 pub use shape::{Shape, ShapeError};
 pub use sphere::Sphere;
+pub use torus::Torus;
 pub use triangle::{Triangle, TriangleHit, WatertightRay, moller_trumbore};

@@ -126,7 +126,7 @@ impl PlacedShape {
 }
 
 /// A surface in object space, as it is in the world.
-fn into_world(m: &Transform, surface: &Surface) -> Surface {
+pub(crate) fn into_world(m: &Transform, surface: &Surface) -> Surface {
     let linear = m.linear();
     let size = DMat3::from_cols(linear.x_axis.abs(), linear.y_axis.abs(), linear.z_axis.abs());
     let offset = m.affine().translation;

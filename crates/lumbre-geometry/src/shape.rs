@@ -2,7 +2,10 @@
 
 use lumbre_math::{DVec2, DVec3, Transform};
 
-use crate::{Aabb, DirectionSample, Ray, Root, Roots, Sphere, Surface, SurfaceSample, Triangle};
+use crate::{
+    Aabb, BilinearPatch, Cone, Cuboid, Cylinder, DirectionSample, Disk, Hyperboloid, Paraboloid, Plane,
+    Quadric, Ray, Root, Roots, Sphere, Surface, SurfaceSample, Torus, Triangle,
+};
 
 /// Makes the enum and hands every method to the variant's method of the same name. To add a shape, write its file with
 /// these methods and add one line where this is called; `in Box<..>` keeps a large shape out of line.
@@ -96,8 +99,28 @@ macro_rules! shapes {
 shapes! {
     /// A sphere, or the part of one between two heights and two meridians.
     Sphere(Sphere) in Sphere,
+    /// An infinite plane.
+    Plane(Plane) in Plane,
+    /// A disk, an annulus, or a sector of one.
+    Disk(Disk) in Disk,
+    /// A box along the axes.
+    Cuboid(Cuboid) in Cuboid,
+    /// A cylinder, open, capped or infinite.
+    Cylinder(Cylinder) in Cylinder,
+    /// A cone, pointed or cut off, open, capped or infinite.
+    Cone(Cone) in Cone,
+    /// A bilinear patch.
+    BilinearPatch(BilinearPatch) in BilinearPatch,
     /// A triangle.
     Triangle(Triangle) in Triangle,
+    /// A torus: ring, horn or spindle.
+    Torus(Torus) in Box<Torus>,
+    /// A paraboloid of revolution.
+    Paraboloid(Paraboloid) in Paraboloid,
+    /// A hyperboloid of revolution.
+    Hyperboloid(Hyperboloid) in Box<Hyperboloid>,
+    /// A general quadric, in a box if it is to be bounded.
+    Quadric(Quadric) in Box<Quadric>,
 }
 
 impl Shape {
@@ -166,6 +189,15 @@ pub(crate) mod check {
         // Scaled first, so that no length of direction over- or underflows.
         let scaled = found / largest;
         Ok(scaled / scaled.length())
+    }
+
+    /// A direction of any length but zero, times the power of two that brings it next to length 1.
+    pub(crate) fn scaled_direction(parameter: &'static str, found: DVec3) -> Result<DVec3, ShapeError> {
+        direction(parameter, found)?;
+        let exponent = found.abs().max_element().log2().floor();
+        // In two steps, since 2^1074 overflows where its square root does not.
+        let half = (-0.5 * exponent).floor();
+        Ok(found * half.exp2() * (-exponent - half).exp2())
     }
 
     /// A sweep about the axis in (0°, 360°], in radians.

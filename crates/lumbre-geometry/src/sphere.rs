@@ -3,10 +3,10 @@
 use std::f64::consts::{PI, TAU};
 
 use lumbre_math::quadratic::quadratic;
-use lumbre_math::{DVec2, DVec3, Transform};
+use lumbre_math::{DVec2, DVec3, Transform, orthonormal_basis};
 
 use crate::shape::check;
-use crate::support::{arc_support, azimuth, bounds_from_support, frame, gamma};
+use crate::support::{arc_support, azimuth, bounds_from_support, gamma};
 use crate::{Aabb, DirectionSample, Ray, Root, Roots, ShapeError, Surface, SurfaceSample, density, measure};
 
 /// The points at distance `radius` from `center`.
@@ -273,7 +273,7 @@ impl Sphere {
             (sin_squared.sqrt() * near / sin_max).clamp(0.0, 1.0)
         };
         let axis = -to_center / distance;
-        let (e1, e2) = frame(axis);
+        let (e1, e2) = orthonormal_basis(axis);
         let (sin, cos) = (TAU * u.y).sin_cos();
         let w = sin_alpha * cos * e1 + sin_alpha * sin * e2 + cos_alpha * axis;
         let surface = self.surface_on(w * (self.radius / w.length()));

@@ -53,14 +53,13 @@ pub(crate) fn azimuth(y: f64, x: f64) -> f64 {
     if phi < 0.0 { phi + TAU } else { phi }
 }
 
-/// Two unit vectors that make a right-handed frame with the unit vector `n`: e1 × e2 = n.
-///
-/// T. Duff et al., "Building an orthonormal basis, revisited", Journal of Computer Graphics Techniques, 2017.
-pub(crate) fn frame(n: DVec3) -> (DVec3, DVec3) {
-    let sign = 1.0_f64.copysign(n.z);
-    let a = -1.0 / (sign + n.z);
-    let b = n.x * n.y * a;
-    let e1 = DVec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x);
-    let e2 = DVec3::new(b, sign + n.y * n.y * a, -n.y);
-    (e1, e2)
+/// What rounding can do to `d·x`, in units of the relative error of one operation.
+pub(crate) fn dot_size(d: DVec3, x: DVec3) -> f64 {
+    d.abs().dot(x.abs())
+}
+
+/// What rounding can do to the length of `a × b`, in units of the relative error of one operation.
+pub(crate) fn cross_size(a: DVec3, b: DVec3) -> f64 {
+    let (a, b) = (a.abs(), b.abs());
+    DVec3::new(a.y * b.z + a.z * b.y, a.z * b.x + a.x * b.z, a.x * b.y + a.y * b.x).length()
 }

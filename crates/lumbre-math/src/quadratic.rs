@@ -55,11 +55,12 @@ pub fn quadratic(a: f64, h: f64, c: f64, delta: f64) -> Option<(f64, f64)> {
     if delta.is_nan() || delta < 0.0 {
         return None;
     }
-    let q = -(h + delta.sqrt().copysign(h));
-    if q == 0.0 {
-        // h = 0 and delta = 0, hence a = 0 or c = 0.
-        return (a != 0.0).then_some((0.0, 0.0));
+    if delta == 0.0 {
+        // The mean of the roots is both of them; c, which may carry rounding errors of its own, is not asked.
+        let double = -h / a;
+        return double.is_finite().then_some((double, double));
     }
+    let q = -(h + delta.sqrt().copysign(h));
     let (first, second) = (q / a, c / q);
     if first.is_nan() || second.is_nan() {
         return None;

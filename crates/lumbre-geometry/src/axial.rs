@@ -1,0 +1,446 @@
+//! Bodies about an axis whose radius changes linearly along it: what cylinders and cones share.
+
+use std::f64::consts::TAU;
+
+use lumbre_math::quadratic::quadratic;
+use lumbre_math::{DVec2, DVec3, Transform, orthonormal_basis};
+
+use crate::support::{arc_support, azimuth, bounds_from_support, cross_size, dot_size, gamma};
+use crate::{Aabb, DirectionSample, Ray, Root, Roots, Surface, SurfaceSample, density, measure};
+
+/// The points at distance ρ(z) = r1 + k z from an axis, z being the distance along it, between two planes across it.
+///
+/// With caps it is a convex solid, and its crossings are the ends of one interval: that of the lateral surface cut by that
+/// of the two planes. No computed point is tested against a rim, so that there is no crack along it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Axial {
+    /// The points of the axis at z = 0 and z = length; both the same when the length is infinite.
+    pub(crate) p1: DVec3,
+    pub(crate) p2: DVec3,
+    /// Unit.
+    pub(crate) axis: DVec3,
+    pub(crate) length: f64,
+    pub(crate) r1: f64,
+    pub(crate) r2: f64,
+    /// (r2 − r1) / length.
+    pub(crate) k: f64,
+    /// Whether the planes through p1 and p2 cut the body. They need not where it ends in an apex.
+    pub(crate) cut1: bool,
+    pub(crate) cut2: bool,
+    /// Whether disks close the body where it is cut.
+    pub(crate) caps: bool,
+    pub(crate) phi_max: f64,
+}
+
+const LATERAL: u32 = 0;
+const CAP1: u32 = 1;
+const CAP2: u32 = 2;
+
+/// Where a line is in a convex set: from the first to the second `t`, each with the part that bounds it there.
+type Span = [(f64, u32); 2];
+
+impl Axial {
+    fn is_whole(&self) -> bool {
+        self.phi_max >= TAU
+    }
+
+    fn is_bounded(&self) -> bool {
+        self.length.is_finite()
+    }
+
+    fn has_cap(&self, part: u32) -> bool {
+        self.caps && if part == CAP1 { self.cut1 } else { part == CAP2 && self.cut2 }
+    }
+
+    fn cap(&self, part: u32) -> (DVec3, f64) {
+        if part == CAP1 { (self.p1, self.r1) } else { (self.p2, self.r2) }
+    }
+
+    /// Where the line is within the lateral surface (of one nappe), cut nowhere.
+    ///
+    /// F(t) = |B + tA|² − (e + g t)² with A = D×V, B = W×V. Its discriminant is taken at the point of the line next to p1
+    /// and as a difference of two lengths, which keeps its digits where a thin cone is far away.
+    #[inline]
+    fn lateral_span(&self, ray: &Ray) -> Option<Span> {
+        let (w, d) = (ray.origin - self.p1, ray.direction);
+        let across = d.cross(self.axis);
+        let offset = w.cross(self.axis);
+        let e = self.r1 + self.k * w.dot(self.axis);
+        let g = self.k * d.dot(self.axis);
+
+        let (across_length, offset_length) = (across.length(), offset.length());
+        let a = (across_length - g.abs()) * (across_length + g.abs());
+        let h = across.dot(offset) - e * g;
+        let c = (offset_length - e) * (offset_length + e);
+        let delta = {
+            let near = w - (w.dot(d) / d.length_squared()) * d;
+            let near_offset = near.cross(self.axis);
+            let near_e = self.r1 + self.k * near.dot(self.axis);
+            let m = self.axis.dot(across.cross(near_offset)).abs();
+            let n = (near_e * across - g * near_offset).length();
+            (n - m) * (n + m)
+        };
+        let whole = (f64::NEG_INFINITY, f64::INFINITY);
+        let (low, high) = if a > 0.0 {
+            let roots = quadratic(a, h, c, delta)?;
+            let is_on_this_nappe = e - g * (h / a) >= 0.0;
+            is_on_this_nappe.then_some(roots)?
+        } else if a < 0.0 {
+            let (first, second) = quadratic(a, h, c, delta.max(0.0))?;
+            if g > 0.0 { (second, whole.1) } else { (whole.0, first) }
+        } else if h != 0.0 {
+            let t = -c / (2.0 * h);
+            match (h < 0.0, g > 0.0) {
+                (true, true) => (t, whole.1),
+                (false, false) if g < 0.0 => (whole.0, t),
+                _ => return None,
+            }
+        } else if g == 0.0 {
+            (c <= 0.0).then_some(whole)?
+        } else {
+            // Along a generator: the line is in the body from the apex on, and in an open surface it meets nothing.
+            let apex = (self.caps && c <= 0.0).then_some(-e / g)?;
+            if g > 0.0 { (apex, whole.1) } else { (whole.0, apex) }
+        };
+        Some([(low, LATERAL), (high, LATERAL)])
+    }
+
+    /// Where the line is between the planes that cut the body.
+    #[inline]
+    fn slab_span(&self, ray: &Ray) -> Option<Span> {
+        let along = ray.direction.dot(self.axis);
+        let z1 = (ray.origin - self.p1).dot(self.axis);
+        let z2 = (ray.origin - self.p2).dot(self.axis);
+        let mut span = [(f64::NEG_INFINITY, CAP1), (f64::INFINITY, CAP2)];
+        if along == 0.0 {
+            let is_between = (!self.cut1 || z1 >= 0.0) && (!self.cut2 || z2 <= 0.0);
+            return is_between.then_some(span);
+        }
+        let (enters_at_1, leaves_at_2) = if along > 0.0 { (0, 1) } else { (1, 0) };
+        if self.cut1 {
+            span[enters_at_1] = (-z1 / along, CAP1);
+        }
+        if self.cut2 {
+            span[leaves_at_2] = (-z2 / along, CAP2);
+        }
+        Some(span)
+    }
+
+    #[inline]
+    fn crossings(&self, ray: &Ray) -> [Option<Root>; 2] {
+        let none = [None, None];
+        let Some(side) = self.lateral_span(ray) else {
+            return none;
+        };
+        let Some(slab) = self.slab_span(ray) else {
+            return none;
+        };
+        let root = |(t, part): (f64, u32), multiplicity| {
+            let hits = t.is_finite() && ray.contains(t) && (self.is_whole() || self.keeps(ray, t, part));
+            hits.then_some(Root { part, multiplicity, ..Root::at(t) })
+        };
+        if self.caps {
+            let near = if slab[0].0 > side[0].0 { slab[0] } else { side[0] };
+            let far = if slab[1].0 < side[1].0 { slab[1] } else { side[1] };
+            if near.0 < far.0 {
+                [root(near, 1), root(far, 1)]
+            } else if near.0 == far.0 {
+                [root(near, 2), None]
+            } else {
+                none
+            }
+        } else {
+            let between = |end: (f64, u32)| slab[0].0 <= end.0 && end.0 <= slab[1].0;
+            let [near, far] = side;
+            if near.0 == far.0 {
+                [between(near).then(|| root(near, 2)).flatten(), None]
+            } else {
+                [near, far].map(|end| between(end).then(|| root(end, 1)).flatten())
+            }
+        }
+    }
+
+    /// Whether the point at `t` lies within the sweep.
+    fn keeps(&self, ray: &Ray, t: f64, part: u32) -> bool {
+        let (_, arm) = self.arm(ray, t, part);
+        self.phi(arm) <= self.phi_max
+    }
+
+    fn phi(&self, arm: DVec3) -> f64 {
+        let (e1, e2) = orthonormal_basis(self.axis);
+        azimuth(arm.dot(e2), arm.dot(e1))
+    }
+
+    /// The height over p1 of the point at `t`, and its arm from the axis.
+    fn arm(&self, ray: &Ray, t: f64, part: u32) -> (f64, DVec3) {
+        let base = if part == CAP2 { self.p2 } else { self.p1 };
+        let w = (ray.origin - base) + t * ray.direction;
+        let z = w.dot(self.axis);
+        (z, w - z * self.axis)
+    }
+
+    /// The first crossing in the ray's range.
+    #[inline]
+    pub(crate) fn closest(&self, ray: &Ray) -> Option<Root> {
+        let [near, far] = self.crossings(ray);
+        near.or(far)
+    }
+
+    /// Every crossing in the ray's range, appended in ascending order.
+    pub(crate) fn roots(&self, ray: &Ray, out: &mut Roots) {
+        out.extend(self.crossings(ray).into_iter().flatten());
+    }
+
+    /// The surface at a crossing.
+    pub(crate) fn surface(&self, ray: &Ray, root: &Root) -> Surface {
+        let (z, arm) = self.arm(ray, root.t, root.part);
+        let rho = arm.length();
+        let outward = if rho > 0.0 { arm / rho } else { orthonormal_basis(self.axis).0 };
+        let u = (self.phi(arm) / self.phi_max).min(1.0);
+        if root.part == LATERAL {
+            let z = if self.is_bounded() { z.clamp(0.0, self.length) } else { z };
+            self.on_side(z, outward, u)
+        } else {
+            self.on_cap(root.part, rho, outward, u)
+        }
+    }
+
+    /// The surface at `uv` of a part.
+    pub(crate) fn surface_at(&self, part: u32, uv: DVec2) -> Option<Surface> {
+        let (e1, e2) = orthonormal_basis(self.axis);
+        let (sin, cos) = (uv.x * self.phi_max).sin_cos();
+        let outward = cos * e1 + sin * e2;
+        if part == LATERAL {
+            let z = if self.is_bounded() { uv.y * self.length } else { uv.y };
+            Some(self.on_side(z, outward, uv.x))
+        } else {
+            let rho = uv.y * self.cap(part).1;
+            self.has_cap(part).then(|| self.on_cap(part, rho, outward, uv.x))
+        }
+    }
+
+    fn on_side(&self, z: f64, outward: DVec3, u: f64) -> Surface {
+        let rho = (self.r1 + self.k * z).max(0.0);
+        let slant = self.k.hypot(1.0);
+        let w = z * self.axis + rho * outward;
+        let point = self.p1 + w;
+        let rise = if self.is_bounded() { self.length } else { 1.0 };
+        // The arm and the radius are each known up to the rounding of the products that make them.
+        let error = gamma(10)
+            * (cross_size(w, self.axis) + rho + (self.r1 + self.k.abs() * dot_size(w, self.axis)) / slant);
+        let is_apex = rho == 0.0;
+        let around = self.axis.cross(outward);
+        Surface {
+            point,
+            point_error: DVec3::splat(error) + gamma(2) * (point.abs() + self.p1.abs() + w.abs()),
+            normal: if is_apex {
+                -self.axis * self.k.signum()
+            } else {
+                (outward - self.k * self.axis) / slant
+            },
+            uv: DVec2::new(u, if self.is_bounded() { z / self.length } else { z }),
+            dpdu: self.phi_max * rho.max(1e-10 * self.r1.max(self.r2).min(1.0)) * around,
+            dpdv: rise * (self.axis + self.k * outward),
+            dndu: self.phi_max / slant * around,
+            dndv: DVec3::ZERO,
+        }
+    }
+
+    fn on_cap(&self, part: u32, rho: f64, outward: DVec3, u: f64) -> Surface {
+        let (center, radius) = self.cap(part);
+        let w = rho.min(radius) * outward;
+        let point = center + w;
+        Surface {
+            point,
+            point_error: DVec3::splat(gamma(8) * dot_size(w, self.axis))
+                + gamma(2) * (point.abs() + center.abs() + w.abs()),
+            normal: if part == CAP1 { -self.axis } else { self.axis },
+            uv: DVec2::new(u, (rho / radius).min(1.0)),
+            dpdu: self.phi_max * rho.max(1e-10 * radius) * self.axis.cross(outward),
+            dpdv: radius * outward,
+            dndu: DVec3::ZERO,
+            dndv: DVec3::ZERO,
+        }
+    }
+
+    /// The box under a transform, tight for every sweep; `None` when infinite.
+    pub(crate) fn bounds(&self, world_from_object: &Transform) -> Option<Aabb> {
+        if !self.is_bounded() {
+            return None;
+        }
+        let (e1, e2) = orthonormal_basis(self.axis);
+        let has_wedges = self.has_cap(CAP1) || self.has_cap(CAP2);
+        let support = |d: DVec3| {
+            let end = |center: DVec3, radius: f64| {
+                let reach = if self.is_whole() {
+                    radius * d.cross(self.axis).length()
+                } else {
+                    let rim = radius * arc_support(d.dot(e1), d.dot(e2), 0.0, self.phi_max);
+                    if has_wedges { rim.max(0.0) } else { rim }
+                };
+                d.dot(center) + reach
+            };
+            end(self.p1, self.r1).max(end(self.p2, self.r2))
+        };
+        let reach = DVec3::splat(self.r1.max(self.r2));
+        let magnitude = self.p1.abs().max(self.p2.abs()) + reach;
+        Some(bounds_from_support(world_from_object, magnitude, support))
+    }
+
+    /// The areas of the lateral surface and the two caps, 0 for a cap that is not there.
+    fn part_areas(&self) -> [f64; 3] {
+        let cap = |part| {
+            let radius = self.cap(part).1;
+            if self.has_cap(part) { 0.5 * self.phi_max * radius * radius } else { 0.0 }
+        };
+        let slant = self.length.hypot(self.r2 - self.r1);
+        [0.5 * self.phi_max * (self.r1 + self.r2) * slant, cap(CAP1), cap(CAP2)]
+    }
+
+    /// The area; infinite for infinite bodies.
+    pub(crate) fn area(&self) -> f64 {
+        if self.is_bounded() { self.part_areas().iter().sum() } else { f64::INFINITY }
+    }
+
+    /// The area after a transform: one quadrature over the azimuth, since along the axis the integrand is linear.
+    pub(crate) fn area_under(&self, world_from_object: &Transform) -> f64 {
+        if !self.is_bounded() {
+            return f64::INFINITY;
+        }
+        let stretch = measure::area_stretch(world_from_object);
+        let (e1, e2) = orthonormal_basis(self.axis);
+        let side = measure::integrate(0.0, self.phi_max, |phi| {
+            let (sin, cos) = phi.sin_cos();
+            (stretch * (cos * e1 + sin * e2 - self.k * self.axis)).length()
+        });
+        let [_, cap1, cap2] = self.part_areas();
+        0.5 * (self.r1 + self.r2) * self.length * side + (cap1 + cap2) * (stretch * self.axis).length()
+    }
+
+    /// Whether it is all around and closed wherever it is cut.
+    pub(crate) fn is_solid(&self) -> bool {
+        self.is_whole() && (self.caps || !(self.cut1 || self.cut2))
+    }
+
+    /// Whether the closed solid holds `p`.
+    pub(crate) fn contains(&self, p: DVec3) -> bool {
+        let w = p - self.p1;
+        let radius = self.r1 + self.k * w.dot(self.axis);
+        self.is_solid()
+            && (!self.cut1 || w.dot(self.axis) >= 0.0)
+            && (!self.cut2 || (p - self.p2).dot(self.axis) <= 0.0)
+            && w.cross(self.axis).length() <= radius
+    }
+
+    /// A point uniform by area: a part, then a point of it; `None` when infinite.
+    pub(crate) fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
+        if !self.is_bounded() {
+            return None;
+        }
+        let (part, left) = density::choose(&self.part_areas(), u.x);
+        let part = part as u32;
+        let v = if part == LATERAL {
+            let (r1, r2) = (self.r1, self.r2);
+            let rho = ((1.0 - left) * r1 * r1 + left * r2 * r2).sqrt();
+            // From the apex on, the fraction is √ξ; the general form has 0/0 there.
+            if rho + r1 > 0.0 { (left * (r1 + r2) / (rho + r1)).min(1.0) } else { 0.0 }
+        } else {
+            left.sqrt()
+        };
+        let surface = self.surface_at(part, DVec2::new(u.y, v))?;
+        Some(SurfaceSample { surface, pdf: 1.0 / self.area() })
+    }
+
+    /// A point uniform by area, as seen from `from`; `None` when it is seen edge-on, or the body is infinite.
+    pub(crate) fn sample_direction(&self, from: DVec3, u: DVec2) -> Option<DirectionSample> {
+        density::seen_from(from, self.sample_area(u)?)
+    }
+
+    /// The density of [`Axial::sample_direction`]; 0 when infinite.
+    pub(crate) fn pdf_direction(&self, ray: &Ray, surface: &Surface) -> f64 {
+        let area = self.area();
+        if area.is_finite() { density::pdf_seen_from(ray, surface, 1.0 / area) } else { 0.0 }
+    }
+}
+
+/// Gives a shape that wraps an [`Axial`] in its field `body` the methods of a shape.
+macro_rules! axial_shape {
+    ($shape:ident, $name:literal) => {
+        impl $shape {
+            /// The part with azimuth up to `phimax` degrees, of the caps too.
+            ///
+            /// # Errors
+            /// [`ShapeError`] when `phimax` is not in (0, 360].
+            pub fn partial(self, phimax: f64) -> Result<Self, ShapeError> {
+                Ok(Self { body: Axial { phi_max: check::sweep(phimax)?, ..self.body } })
+            }
+
+            /// The first crossing in the ray's range.
+            #[inline]
+            pub fn closest(&self, ray: &Ray) -> Option<Root> {
+                self.body.closest(ray)
+            }
+
+            /// Every crossing in the ray's range, appended in ascending order.
+            pub fn roots(&self, ray: &Ray, out: &mut Roots) {
+                self.body.roots(ray, out);
+            }
+
+            /// The surface at a crossing.
+            pub fn surface(&self, ray: &Ray, root: &Root) -> Surface {
+                self.body.surface(ray, root)
+            }
+
+            /// The surface at `uv` of a part: 0 lateral, 1 and 2 the caps, `None` where there is no such cap.
+            pub fn surface_at(&self, part: u32, uv: DVec2) -> Option<Surface> {
+                self.body.surface_at(part, uv)
+            }
+
+            /// The box under a transform, tight for every sweep; `None` when infinite.
+            pub fn bounds(&self, world_from_object: &Transform) -> Option<Aabb> {
+                self.body.bounds(world_from_object)
+            }
+
+            /// The area, caps included; infinite when it is.
+            pub fn area(&self) -> f64 {
+                self.body.area()
+            }
+
+            /// The area after a transform, by quadrature over the azimuth.
+            pub fn area_under(&self, world_from_object: &Transform) -> f64 {
+                self.body.area_under(world_from_object)
+            }
+
+            /// Whether it is all around, and closed wherever it is cut.
+            pub fn is_solid(&self) -> bool {
+                self.body.is_solid()
+            }
+
+            /// Whether the closed solid holds `p`; false when open.
+            pub fn contains(&self, p: DVec3) -> bool {
+                self.body.contains(p)
+            }
+
+            #[doc = concat!("\"", $name, "\".")]
+            pub fn name(&self) -> &'static str {
+                $name
+            }
+
+            /// A point uniform by area; `None` when infinite.
+            pub fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
+                self.body.sample_area(u)
+            }
+
+            /// A point uniform by area, as seen from `from`; `None` when it is seen edge-on, or the shape is infinite.
+            pub fn sample_direction(&self, from: DVec3, u: DVec2) -> Option<DirectionSample> {
+                self.body.sample_direction(from, u)
+            }
+
+            /// The density with which `sample_direction` chooses the point `surface` on the ray; 0 when infinite.
+            pub fn pdf_direction(&self, ray: &Ray, surface: &Surface) -> f64 {
+                self.body.pdf_direction(ray, surface)
+            }
+        }
+    };
+}
+pub(crate) use axial_shape;

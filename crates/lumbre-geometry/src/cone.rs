@@ -1,0 +1,92 @@
+//! Cones: pointed or cut off, open, capped, infinite.
+
+use std::f64::consts::TAU;
+
+use lumbre_math::transform::sin_cos_degrees;
+use lumbre_math::{DVec2, DVec3, Transform};
+
+use crate::axial::{Axial, axial_shape};
+use crate::shape::check;
+use crate::{Aabb, DirectionSample, Ray, Root, Roots, ShapeError, Surface, SurfaceSample};
+
+/// The points whose distance from an axis changes linearly along it.
+///
+/// `u` is the azimuth over `phimax` and `v` the fraction along the axis, or the distance from the apex where the cone has
+/// no end. On the caps `v` is the fraction of the radius. With caps and all around it is a convex solid. The normal at an
+/// apex points along the axis, outward. A ray along a generator of an open cone meets nothing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cone {
+    body: Axial,
+}
+
+impl Cone {
+    /// The frustum with radius `r0` at `p0` and `r1` at `p1`, one of which may be 0, with disks at its ends (of radius
+    /// other than 0) if `caps`.
+    ///
+    /// # Errors
+    /// [`ShapeError`] unless the ends are finite and differ and the radii are finite, not negative, and not both 0.
+    pub fn new(p0: DVec3, p1: DVec3, r0: f64, r1: f64, caps: bool) -> Result<Self, ShapeError> {
+        let (p1, p2, r1, r2) = (check::finite("p0", p0)?, check::finite("p1", p1)?, r0, r1);
+        let expected = "a finite number, 0 or greater";
+        let r1 = check::within("radius", r1, 0.0 <= r1 && r1.is_finite(), expected)?;
+        let r2 = check::within("topradius", r2, 0.0 <= r2 && r2.is_finite(), expected)?;
+        if p1 == p2 {
+            return Err(ShapeError::Degenerate("p0 and p1 of the cone are the same point"));
+        }
+        if r1 == 0.0 && r2 == 0.0 {
+            return Err(ShapeError::Degenerate("both radii of the cone are 0"));
+        }
+        let axis = check::direction("p1", p2 - p1)?;
+        let length = check::positive("p1", (p2 - p1).length())?;
+        let (cut1, cut2) = (r1 > 0.0, r2 > 0.0);
+        let k = (r2 - r1) / length;
+        Ok(Self { body: Axial { p1, p2, axis, length, r1, r2, k, cut1, cut2, caps, phi_max: TAU } })
+    }
+
+    /// The pointed cone that opens from `apex` along `axis` (of any length but zero), up to `height` along it, which may be
+    /// infinite. The angle between the axis and the side is `half_angle` in degrees, between 0 and 90.
+    ///
+    /// # Errors
+    /// [`ShapeError`] unless the apex is finite, the axis finite and not zero, the angle within its range, and the height
+    /// greater than 0.
+    pub fn nappe(
+        apex: DVec3,
+        axis: DVec3,
+        half_angle: f64,
+        height: f64,
+        caps: bool,
+    ) -> Result<Self, ShapeError> {
+        let apex = check::finite("apex", apex)?;
+        let axis = check::direction("axis", axis)?;
+        let is_sharp = 0.0 < half_angle && half_angle < 90.0;
+        let half_angle = check::within("angle", half_angle, is_sharp, "degrees between 0 and 90")?;
+        let height = check::within("height", height, height > 0.0, "greater than 0, or inf")?;
+        // From the half-angle of 45° on, by that of the complement: exact at 45°, accurate at both ends.
+        let acute_tan = |degrees: f64| {
+            let (sin, cos) = sin_cos_degrees(2.0 * degrees);
+            sin / (1.0 + cos)
+        };
+        let k = if half_angle <= 45.0 { acute_tan(half_angle) } else { 1.0 / acute_tan(90.0 - half_angle) };
+        let pointed = Axial {
+            p1: apex,
+            p2: apex,
+            axis,
+            length: height,
+            r1: 0.0,
+            r2: f64::INFINITY,
+            k,
+            cut1: false,
+            cut2: false,
+            caps,
+            phi_max: TAU,
+        };
+        if height.is_infinite() {
+            return Ok(Self { body: Axial { caps: false, ..pointed } });
+        }
+        let p2 = check::finite("height", apex + height * axis)?;
+        let r2 = check::positive("height", k * height)?;
+        Ok(Self { body: Axial { p2, r2, cut2: true, ..pointed } })
+    }
+}
+
+axial_shape!(Cone, "cone");

@@ -1,0 +1,196 @@
+//! Boxes along the axes.
+
+use lumbre_math::{DVec2, DVec3, Transform};
+
+use crate::shape::check;
+use crate::support::{bounds_from_support, gamma};
+use crate::{Aabb, DirectionSample, Ray, Root, Roots, ShapeError, Surface, SurfaceSample, density, measure};
+
+/// The box between two corners, "box" in the scene language. A solid, closed: a ray that slides in a face enters and
+/// leaves through the faces at its ends.
+///
+/// Parts 0 to 5 are the faces −x, +x, −y, +y, −z, +z. On the faces of axis i, `u` is the fraction along axis i+1 and `v`
+/// along axis i+2, cyclically.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cuboid {
+    low: DVec3,
+    high: DVec3,
+}
+
+impl Cuboid {
+    /// The box between any two opposite corners, possibly flat along one axis.
+    ///
+    /// # Errors
+    /// [`ShapeError`] unless the corners are finite and differ along two axes at least.
+    pub fn new(p0: DVec3, p1: DVec3) -> Result<Self, ShapeError> {
+        let (p0, p1) = (check::finite("p0", p0)?, check::finite("p1", p1)?);
+        let (low, high) = (p0.min(p1), p0.max(p1));
+        let flat_axes = (0..3).filter(|&axis| low[axis] == high[axis]).count();
+        if flat_axes > 1 {
+            return Err(ShapeError::Degenerate("p0 and p1 of the box must differ along two axes at least"));
+        }
+        Ok(Self { low, high })
+    }
+
+    /// The corner of the least coordinates and that of the greatest.
+    pub fn corners(&self) -> [DVec3; 2] {
+        [self.low, self.high]
+    }
+
+    /// Where the line enters and leaves the closed box, and through which faces.
+    ///
+    /// T. L. Kay, J. T. Kajiya, "Ray tracing complex scenes", SIGGRAPH 1986. The division, rather than a reciprocal, keeps
+    /// a ray in a face's plane from multiplying zero by infinity.
+    #[inline]
+    fn span(&self, ray: &Ray) -> Option<[(f64, u32); 2]> {
+        let mut near = (f64::NEG_INFINITY, 0);
+        let mut far = (f64::INFINITY, 0);
+        for axis in 0..3 {
+            let (o, d) = (ray.origin[axis], ray.direction[axis]);
+            if d == 0.0 {
+                if !(self.low[axis] <= o && o <= self.high[axis]) {
+                    return None;
+                }
+                continue;
+            }
+            let face = 2 * axis as u32;
+            let (low, high) = ((self.low[axis] - o) / d, (self.high[axis] - o) / d);
+            let (enter, leave) =
+                if d > 0.0 { ((low, face), (high, face + 1)) } else { ((high, face + 1), (low, face)) };
+            if enter.0 > near.0 {
+                near = enter;
+            }
+            if leave.0 < far.0 {
+                far = leave;
+            }
+            if low.is_nan() || high.is_nan() {
+                return None;
+            }
+        }
+        (near.0 <= far.0).then_some([near, far])
+    }
+
+    #[inline]
+    fn crossings(&self, ray: &Ray) -> [Option<Root>; 2] {
+        let Some([near, far]) = self.span(ray) else {
+            return [None, None];
+        };
+        let root = |(t, part): (f64, u32), multiplicity| {
+            (t.is_finite() && ray.contains(t)).then_some(Root { part, multiplicity, ..Root::at(t) })
+        };
+        if near.0 == far.0 { [root(near, 2), None] } else { [root(near, 1), root(far, 1)] }
+    }
+
+    /// The first crossing in the ray's range.
+    #[inline]
+    pub fn closest(&self, ray: &Ray) -> Option<Root> {
+        let [near, far] = self.crossings(ray);
+        near.or(far)
+    }
+
+    /// Every crossing in the ray's range, appended in ascending order.
+    pub fn roots(&self, ray: &Ray, out: &mut Roots) {
+        out.extend(self.crossings(ray).into_iter().flatten());
+    }
+
+    /// The surface at a crossing.
+    pub fn surface(&self, ray: &Ray, root: &Root) -> Surface {
+        self.surface_on(root.part, ray.at(root.t))
+    }
+
+    /// The surface at `uv` of a face.
+    pub fn surface_at(&self, part: u32, uv: DVec2) -> Option<Surface> {
+        if part > 5 {
+            return None;
+        }
+        let axis = part as usize / 2;
+        let mut p = self.low;
+        for (axis, fraction) in [((axis + 1) % 3, uv.x), ((axis + 2) % 3, uv.y)] {
+            p[axis] = (1.0 - fraction) * self.low[axis] + fraction * self.high[axis];
+        }
+        Some(Surface { uv, ..self.surface_on(part, p) })
+    }
+
+    /// The surface at the point of a face next to `p`.
+    fn surface_on(&self, part: u32, p: DVec3) -> Surface {
+        let axis = part as usize / 2;
+        let is_high = part % 2 == 1;
+        let size = self.high - self.low;
+        let mut point = p.clamp(self.low, self.high);
+        point[axis] = if is_high { self.high[axis] } else { self.low[axis] };
+        let (s, t) = ((axis + 1) % 3, (axis + 2) % 3);
+        // Along a flat axis the face is a line, and every fraction is the same point.
+        let fraction = |i: usize| if size[i] > 0.0 { (point[i] - self.low[i]) / size[i] } else { 0.5 };
+        Surface {
+            point,
+            point_error: gamma(4) * self.low.abs().max(self.high.abs()),
+            normal: if is_high { DVec3::AXES[axis] } else { -DVec3::AXES[axis] },
+            uv: DVec2::new(fraction(s), fraction(t)),
+            dpdu: size[s] * DVec3::AXES[s],
+            dpdv: size[t] * DVec3::AXES[t],
+            dndu: DVec3::ZERO,
+            dndv: DVec3::ZERO,
+        }
+    }
+
+    /// The box around it under a transform.
+    ///
+    /// J. Arvo, "Transforming axis-aligned bounding boxes", Graphics Gems, 1990.
+    pub fn bounds(&self, world_from_object: &Transform) -> Option<Aabb> {
+        let magnitude = self.low.abs().max(self.high.abs());
+        let support = |d: DVec3| (d * self.low).max(d * self.high).element_sum();
+        Some(bounds_from_support(world_from_object, magnitude, support))
+    }
+
+    /// The areas of the faces across x, y and z, with their normals stretched by `stretch`; one face of each pair.
+    fn face_areas(&self, stretch: impl Fn(DVec3) -> f64) -> [f64; 3] {
+        let s = self.high - self.low;
+        [s.y * s.z * stretch(DVec3::X), s.z * s.x * stretch(DVec3::Y), s.x * s.y * stretch(DVec3::Z)]
+    }
+
+    /// The area of the six faces.
+    pub fn area(&self) -> f64 {
+        2.0 * self.face_areas(|_| 1.0).iter().sum::<f64>()
+    }
+
+    /// The area of the six faces after a transform.
+    pub fn area_under(&self, world_from_object: &Transform) -> f64 {
+        let stretch = measure::area_stretch(world_from_object);
+        2.0 * self.face_areas(|n| (stretch * n).length()).iter().sum::<f64>()
+    }
+
+    /// It is.
+    pub fn is_solid(&self) -> bool {
+        true
+    }
+
+    /// Whether the closed box holds `p`.
+    pub fn contains(&self, p: DVec3) -> bool {
+        self.low.cmple(p).all() && p.cmple(self.high).all()
+    }
+
+    /// "box".
+    pub fn name(&self) -> &'static str {
+        "box"
+    }
+
+    /// A point uniform by area: a face, then a point of it.
+    pub fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
+        let areas = self.face_areas(|_| 1.0);
+        let area = 2.0 * areas.iter().sum::<f64>();
+        let shares = [areas[0], areas[0], areas[1], areas[1], areas[2], areas[2]];
+        let (part, left) = density::choose(&shares, u.x);
+        let surface = self.surface_at(part as u32, DVec2::new(left, u.y))?;
+        Some(SurfaceSample { surface, pdf: 1.0 / area })
+    }
+
+    /// A point uniform by area, as seen from `from`; `None` when it is seen edge-on.
+    pub fn sample_direction(&self, from: DVec3, u: DVec2) -> Option<DirectionSample> {
+        density::seen_from(from, self.sample_area(u)?)
+    }
+
+    /// The density of [`Cuboid::sample_direction`].
+    pub fn pdf_direction(&self, ray: &Ray, surface: &Surface) -> f64 {
+        density::pdf_seen_from(ray, surface, 1.0 / self.area())
+    }
+}

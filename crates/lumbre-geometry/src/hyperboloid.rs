@@ -1,0 +1,260 @@
+//! Hyperboloids of one sheet, by turning a segment.
+
+use std::f64::consts::TAU;
+
+use lumbre_math::quadratic::{dop, quadratic};
+use lumbre_math::roots::bracketed_root;
+use lumbre_math::{DVec2, DVec3, Transform};
+
+use crate::line::{Implicit, NearLine};
+use crate::shape::check;
+use crate::support::{arc_support, azimuth, bounds_from_support, gamma};
+use crate::{Aabb, DirectionSample, Ray, Root, Roots, ShapeError, Surface, SurfaceSample, density, measure};
+
+/// What the segment from `p1` to `p2` sweeps when it turns about the z axis.
+///
+/// As in pbrt-v3: `u` is the angle turned over `phimax`, `v` runs along the segment from `p1` to `p2`, and the normal is
+/// that of ∂p/∂u × ∂p/∂v: away from the axis when `p2` is the higher end, towards it when `p1` is. Cylinders and cones are
+/// among them; two ends at one height make a disk instead, which is a shape of its own.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hyperboloid {
+    p1: DVec3,
+    // From p1 to p2; its z is not 0.
+    along: DVec3,
+    phi_max: f64,
+    // The squared radius at v is start + 2 middle v + end v².
+    start: f64,
+    middle: f64,
+    end: f64,
+}
+
+impl Hyperboloid {
+    /// The surface swept by the segment from `p1` to `p2` turning by `phimax` degrees, x towards y.
+    ///
+    /// # Errors
+    /// [`ShapeError`] unless the ends are finite, at different heights, not both on the axis, and `phimax` is in (0, 360].
+    pub fn new(p1: DVec3, p2: DVec3, phimax: f64) -> Result<Self, ShapeError> {
+        let p1 = check::finite("p1", p1)?;
+        let p2 = check::finite("p2", p2)?;
+        let phi_max = check::sweep(phimax)?;
+        let along = p2 - p1;
+        if along.z == 0.0 || !along.is_finite() {
+            return Err(ShapeError::Degenerate(
+                "p1 and p2 of the hyperboloid are at the same height: what they sweep is a disk",
+            ));
+        }
+        let (flat, flat_along) = (p1.truncate(), along.truncate());
+        if flat == DVec2::ZERO && flat_along == DVec2::ZERO {
+            return Err(ShapeError::Degenerate("p1 and p2 of the hyperboloid are both on the axis"));
+        }
+        let (start, middle, end) = (flat.length_squared(), flat.dot(flat_along), flat_along.length_squared());
+        Ok(Self { p1, along, phi_max, start, middle, end })
+    }
+
+    /// The segment's point at `v`, before it turns.
+    fn segment(&self, v: f64) -> DVec3 {
+        self.p1 + v * self.along
+    }
+
+    fn v_of(&self, z: f64) -> f64 {
+        (z - self.p1.z) / self.along.z
+    }
+
+    /// Cosine and sine of how far the segment has turned when it passes through `p`.
+    fn turn(&self, p: DVec3) -> DVec2 {
+        let q = self.segment(self.v_of(p.z));
+        let turn = DVec2::new(p.x * q.x + p.y * q.y, p.y * q.x - p.x * q.y);
+        // Where the segment meets the axis, every angle is as good.
+        turn.try_normalize().unwrap_or(DVec2::X)
+    }
+
+    fn keeps(&self, p: DVec3) -> bool {
+        let v = self.v_of(p.z);
+        let turn = self.turn(p);
+        (0.0..=1.0).contains(&v) && (self.phi_max >= TAU || azimuth(turn.y, turn.x) <= self.phi_max)
+    }
+
+    fn line(&self, ray: &Ray) -> NearLine {
+        NearLine::new(ray, DVec3::new(0.0, 0.0, self.p1.z + 0.5 * self.along.z))
+    }
+
+    fn crossings(&self, line: &NearLine) -> Option<(f64, f64)> {
+        let (p, d) = (line.p, line.d);
+        let v = self.v_of(p.z);
+        let climb = d.z / self.along.z;
+        let swept = self.segment(v).truncate().length();
+        let rho = p.truncate().length();
+        let a = d.x * d.x + d.y * d.y - self.end * climb * climb;
+        let h = p.x * d.x + p.y * d.y - (self.middle + self.end * v) * climb;
+        let c = (rho - swept) * (rho + swept);
+        quadratic(a, h, c, dop(h, h, a, c))
+    }
+
+    /// The first crossing in the ray's range.
+    pub fn closest(&self, ray: &Ray) -> Option<Root> {
+        let line = self.line(ray);
+        line.accepted(ray, self.crossings(&line), |p| self.keeps(p)).next()
+    }
+
+    /// Every crossing in the ray's range, appended in ascending order.
+    pub fn roots(&self, ray: &Ray, out: &mut Roots) {
+        let line = self.line(ray);
+        out.extend(line.accepted(ray, self.crossings(&line), |p| self.keeps(p)));
+    }
+
+    fn implicit(&self, p: DVec3) -> Implicit {
+        let v = self.v_of(p.z);
+        let swept = self.segment(v).truncate().length();
+        let rho = p.truncate().length();
+        let spread = (self.middle + self.end * v) / self.along.z;
+        Implicit {
+            value: (rho - swept) * (rho + swept),
+            gradient: 2.0 * DVec3::new(p.x, p.y, -spread),
+            terms: rho * rho + swept * swept + (spread * p.z).abs() + (spread * self.p1.z).abs(),
+        }
+    }
+
+    /// The surface at a crossing.
+    pub fn surface(&self, ray: &Ray, root: &Root) -> Surface {
+        let near = self.line(ray).at_t(root.t);
+        self.surface_on(near + self.implicit(near).to_surface())
+    }
+
+    /// The surface at `uv`.
+    pub fn surface_at(&self, part: u32, uv: DVec2) -> Option<Surface> {
+        (part == 0).then(|| Surface { uv, ..self.surface_on(self.point_at(uv)) })
+    }
+
+    fn point_at(&self, uv: DVec2) -> DVec3 {
+        let q = self.segment(uv.y);
+        DVec2::from_angle(self.phi_max * uv.x).rotate(q.truncate()).extend(q.z)
+    }
+
+    fn surface_on(&self, p: DVec3) -> Surface {
+        let implicit = self.implicit(p);
+        let side = self.along.z.signum();
+        let turn = self.turn(p);
+        let dpdu = self.phi_max * DVec3::new(-p.y, p.x, 0.0);
+        let dpdv = turn.rotate(self.along.truncate()).extend(self.along.z);
+        let flatness = self.end / (self.along.z * self.along.z);
+        let bend = |dp: DVec3| side * implicit.turning(2.0 * DVec3::new(dp.x, dp.y, -flatness * dp.z));
+        let size = p.abs() + self.p1.abs() + self.along.abs();
+        Surface {
+            point: p,
+            point_error: gamma(8) * size + DVec3::splat(implicit.uncertainty()),
+            normal: side * implicit.normal(),
+            uv: DVec2::new((azimuth(turn.y, turn.x) / self.phi_max).min(1.0), self.v_of(p.z).clamp(0.0, 1.0)),
+            dpdu,
+            dpdv,
+            dndu: bend(dpdu),
+            dndv: bend(dpdv),
+        }
+    }
+
+    /// The box under a transform, tight: at every angle the segment has its extreme point at an end.
+    pub fn bounds(&self, world_from_object: &Transform) -> Option<Aabb> {
+        let ends = [self.p1, self.p1 + self.along];
+        let support = |d: DVec3| {
+            let circle = |q: DVec3| {
+                let (straight, across) = (d.x * q.x + d.y * q.y, d.y * q.x - d.x * q.y);
+                arc_support(straight, across, 0.0, self.phi_max) + d.z * q.z
+            };
+            circle(ends[0]).max(circle(ends[1]))
+        };
+        let radius = ends[0].truncate().length().max(ends[1].truncate().length());
+        let height = ends[0].z.abs().max(ends[1].z.abs());
+        Some(bounds_from_support(world_from_object, DVec3::new(radius, radius, height), support))
+    }
+
+    /// The area element is √(square v² + 2 linear v + constant) dφ dv: the three coefficients.
+    fn element(&self) -> (f64, f64, f64) {
+        let climb = self.along.z * self.along.z;
+        (
+            self.end * (self.end + climb),
+            self.middle * (self.end + climb),
+            self.middle * self.middle + climb * self.start,
+        )
+    }
+
+    /// The integral of the area element from the segment's start to `v`, per radian, and its slope.
+    fn swept(&self, v: f64) -> (f64, f64) {
+        let (square, linear, constant) = self.element();
+        let element = |v: f64| ((square * v + 2.0 * linear) * v + constant).max(0.0).sqrt();
+        if square <= 1e-4 * constant {
+            // Nearly a cylinder: the closed form would subtract large numbers, and quadrature is as good as exact.
+            return (measure::integrate(0.0, v, element), element(v));
+        }
+        let offset = linear / square;
+        let root = square.sqrt();
+        // With w = v + offset, the element is √(square w² + rest).
+        let rest = (constant - linear * offset).max(0.0);
+        let antiderivative = |w: f64| {
+            let curved = if rest > 0.0 { 0.5 * rest / root * (w * root / rest.sqrt()).asinh() } else { 0.0 };
+            0.5 * w * (square * w * w + rest).sqrt() + curved
+        };
+        (antiderivative(v + offset) - antiderivative(offset), element(v))
+    }
+
+    /// The area.
+    pub fn area(&self) -> f64 {
+        self.phi_max * self.swept(1.0).0
+    }
+
+    /// The area after a transform, by quadrature.
+    pub fn area_under(&self, world_from_object: &Transform) -> f64 {
+        let along = self.along;
+        // A segment through the axis has a kink there.
+        let split = (-self.middle / self.end).clamp(0.0, 1.0);
+        let split = if split.is_nan() { 0.0 } else { split };
+        let piece = |(from, to): (f64, f64)| {
+            if to <= from {
+                return 0.0;
+            }
+            measure::patch_area(world_from_object, |u, v| {
+                let v = from + v * (to - from);
+                let turn = DVec2::from_angle(self.phi_max * u);
+                let (q, slant) = (turn.rotate(self.segment(v).truncate()), turn.rotate(along.truncate()));
+                let dpdu = DVec3::new(-q.y, q.x, 0.0);
+                self.phi_max * (to - from) * dpdu.cross(slant.extend(along.z))
+            })
+        };
+        piece((0.0, split)) + piece((split, 1.0))
+    }
+
+    /// Never: it has no lids.
+    pub fn is_solid(&self) -> bool {
+        false
+    }
+
+    /// Nothing.
+    pub fn contains(&self, _p: DVec3) -> bool {
+        false
+    }
+
+    /// "hyperboloid".
+    pub fn name(&self) -> &'static str {
+        "hyperboloid"
+    }
+
+    /// A point uniform by area: the swept area is inverted numerically.
+    pub fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
+        let total = self.swept(1.0).0;
+        let goal = u.y * total;
+        let v = bracketed_root(0.0, 1.0, u.y, true, |v| {
+            let (value, slope) = self.swept(v);
+            (value - goal, slope)
+        });
+        let surface = self.surface_on(self.point_at(DVec2::new(u.x, v)));
+        Some(SurfaceSample { surface, pdf: 1.0 / (self.phi_max * total) })
+    }
+
+    /// A point uniform by area, as seen from `from`.
+    pub fn sample_direction(&self, from: DVec3, u: DVec2) -> Option<DirectionSample> {
+        density::seen_from(from, self.sample_area(u)?)
+    }
+
+    /// The density of [`Hyperboloid::sample_direction`].
+    pub fn pdf_direction(&self, ray: &Ray, surface: &Surface) -> f64 {
+        density::pdf_seen_from(ray, surface, 1.0 / self.area())
+    }
+}

@@ -1,0 +1,210 @@
+//! Paraboloids of revolution.
+
+use std::f64::consts::TAU;
+
+use lumbre_math::quadratic::{dop, quadratic};
+use lumbre_math::{DVec2, DVec3, Transform};
+
+use crate::line::{Implicit, NearLine};
+use crate::shape::check;
+use crate::support::{arc_support, azimuth, bounds_from_support, gamma};
+use crate::{Aabb, DirectionSample, Ray, Root, Roots, ShapeError, Surface, SurfaceSample, density, measure};
+
+/// The surface `z = zmax (x² + y²)/radius²` between two heights: the bowl, open upwards, whose rim at `zmax` has the given
+/// radius.
+///
+/// As in pbrt-v3: `u` is the azimuth over `phimax`, `v` the height as a fraction of the way from `zmin` to `zmax`, and the
+/// normal points out of the bowl, downwards at its bottom.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Paraboloid {
+    // z = bend (x² + y²), bend > 0.
+    bend: f64,
+    z_min: f64,
+    z_max: f64,
+    phi_max: f64,
+}
+
+impl Paraboloid {
+    /// The bowl with a rim of `radius` at the greater of the two heights, down to the lesser, with azimuth up to `phimax`
+    /// degrees.
+    ///
+    /// # Errors
+    /// [`ShapeError`] unless the heights are finite, different, and the greater one above 0, `radius` is greater than 0 and
+    /// `phimax` in (0, 360].
+    pub fn new(radius: f64, zmin: f64, zmax: f64, phimax: f64) -> Result<Self, ShapeError> {
+        let radius = check::positive("radius", radius)?;
+        let zmin = check::within("zmin", zmin, zmin.is_finite(), "a finite number")?;
+        let zmax = check::within("zmax", zmax, zmax.is_finite(), "a finite number")?;
+        let phi_max = check::sweep(phimax)?;
+        let (z_min, z_max) = (zmin.min(zmax), zmin.max(zmax));
+        let z_max = check::positive("zmax", z_max)?;
+        let bend = z_max / radius / radius;
+        if z_min == z_max || !bend.is_normal() {
+            return Err(ShapeError::Degenerate("nothing of the paraboloid lies between zmin and zmax"));
+        }
+        Ok(Self { bend, z_min, z_max, phi_max })
+    }
+
+    /// Where the surface begins: it has nothing below 0.
+    fn bottom(&self) -> f64 {
+        self.z_min.max(0.0)
+    }
+
+    fn radius_at(&self, z: f64) -> f64 {
+        (z / self.bend).sqrt()
+    }
+
+    fn keeps(&self, p: DVec3) -> bool {
+        let is_bottom = self.z_min <= 0.0;
+        (is_bottom || self.z_min <= p.z)
+            && p.z <= self.z_max
+            && (self.phi_max >= TAU || azimuth(p.y, p.x) <= self.phi_max)
+    }
+
+    fn line(&self, ray: &Ray) -> NearLine {
+        NearLine::new(ray, DVec3::new(0.0, 0.0, 0.5 * (self.bottom() + self.z_max)))
+    }
+
+    fn crossings(&self, line: &NearLine) -> Option<(f64, f64)> {
+        let (p, d) = (line.p, line.d);
+        let a = self.bend * (d.x * d.x + d.y * d.y);
+        let h = self.bend * (p.x * d.x + p.y * d.y) - 0.5 * d.z;
+        let c = self.bend * (p.x * p.x + p.y * p.y) - p.z;
+        quadratic(a, h, c, dop(h, h, a, c))
+    }
+
+    /// The first crossing in the ray's range.
+    pub fn closest(&self, ray: &Ray) -> Option<Root> {
+        let line = self.line(ray);
+        line.accepted(ray, self.crossings(&line), |p| self.keeps(p)).next()
+    }
+
+    /// Every crossing in the ray's range, appended in ascending order.
+    pub fn roots(&self, ray: &Ray, out: &mut Roots) {
+        let line = self.line(ray);
+        out.extend(line.accepted(ray, self.crossings(&line), |p| self.keeps(p)));
+    }
+
+    fn implicit(&self, p: DVec3) -> Implicit {
+        let round = self.bend * (p.x * p.x + p.y * p.y);
+        Implicit {
+            value: round - p.z,
+            gradient: DVec3::new(2.0 * self.bend * p.x, 2.0 * self.bend * p.y, -1.0),
+            terms: round + p.z.abs(),
+        }
+    }
+
+    /// The surface at a crossing.
+    pub fn surface(&self, ray: &Ray, root: &Root) -> Surface {
+        let near = self.line(ray).at_t(root.t);
+        self.surface_on(near + self.implicit(near).to_surface())
+    }
+
+    /// The surface at `uv`; `None` below z = 0, where there is none.
+    pub fn surface_at(&self, part: u32, uv: DVec2) -> Option<Surface> {
+        let z = self.z_min + uv.y * (self.z_max - self.z_min);
+        if part != 0 || z < 0.0 {
+            return None;
+        }
+        let round = self.radius_at(z) * DVec2::from_angle(self.phi_max * uv.x);
+        Some(Surface { uv, ..self.surface_on(round.extend(z)) })
+    }
+
+    fn surface_on(&self, p: DVec3) -> Surface {
+        let implicit = self.implicit(p);
+        let height = self.z_max - self.z_min;
+        let phi = azimuth(p.y, p.x);
+        // At the bottom every meridian will do, and none has a finite derivative by height: take one close by.
+        let floor = 1e-10 * self.radius_at(self.z_max);
+        let rho = p.x.hypot(p.y);
+        let round = if rho > floor { DVec2::new(p.x, p.y) } else { floor * DVec2::from_angle(phi) };
+        let dpdu = self.phi_max * DVec3::new(-round.y, round.x, 0.0);
+        let rise = 0.5 / (self.bend * round.length_squared());
+        let dpdv = height * DVec3::new(rise * round.x, rise * round.y, 1.0);
+        let bend =
+            |dp: DVec3| implicit.turning(DVec3::new(2.0 * self.bend * dp.x, 2.0 * self.bend * dp.y, 0.0));
+        Surface {
+            point: p,
+            point_error: gamma(8) * p.abs() + DVec3::splat(implicit.uncertainty()),
+            normal: implicit.normal(),
+            uv: DVec2::new((phi / self.phi_max).min(1.0), ((p.z - self.z_min) / height).clamp(0.0, 1.0)),
+            dpdu,
+            dpdv,
+            dndu: bend(dpdu),
+            dndv: bend(dpdv),
+        }
+    }
+
+    /// The box under a transform, tight.
+    pub fn bounds(&self, world_from_object: &Transform) -> Option<Aabb> {
+        let (inner, outer) = (self.radius_at(self.bottom()), self.radius_at(self.z_max));
+        let support = |d: DVec3| {
+            let outward = arc_support(d.x, d.y, 0.0, self.phi_max);
+            // A parabola in the radius.
+            let at = |rho: f64| outward * rho + d.z * self.bend * rho * rho;
+            let ends = at(inner).max(at(outer));
+            let turn = -0.5 * outward / (self.bend * d.z);
+            if inner < turn && turn < outer { ends.max(at(turn)) } else { ends }
+        };
+        Some(bounds_from_support(world_from_object, DVec3::new(outer, outer, self.z_max), support))
+    }
+
+    /// The slopes of the surface's normal cone at the two ends, √(1 + 4 bend z): what areas are made of.
+    fn slants(&self) -> (f64, f64) {
+        let slant = |z: f64| (1.0 + 4.0 * self.bend * z).sqrt();
+        (slant(self.bottom()), slant(self.z_max))
+    }
+
+    /// The area: phimax (B³ - A³)/(12 bend²) with the slants A and B, arranged so that a flat bowl loses no digits.
+    pub fn area(&self) -> f64 {
+        let (a, b) = self.slants();
+        let height = self.z_max - self.bottom();
+        self.phi_max * height / (3.0 * self.bend) * (a * a + a * b + b * b) / (a + b)
+    }
+
+    /// The area after a transform, by quadrature.
+    pub fn area_under(&self, world_from_object: &Transform) -> f64 {
+        let (inner, outer) = (self.radius_at(self.bottom()), self.radius_at(self.z_max));
+        measure::patch_area(world_from_object, |u, v| {
+            let rho = inner + v * (outer - inner);
+            let round = 2.0 * self.bend * rho * DVec2::from_angle(self.phi_max * u);
+            self.phi_max * (outer - inner) * rho * round.extend(-1.0)
+        })
+    }
+
+    /// Never: it has no lid.
+    pub fn is_solid(&self) -> bool {
+        false
+    }
+
+    /// Nothing.
+    pub fn contains(&self, _p: DVec3) -> bool {
+        false
+    }
+
+    /// "paraboloid".
+    pub fn name(&self) -> &'static str {
+        "paraboloid"
+    }
+
+    /// A point uniform by area: the cube of the slant is uniform.
+    pub fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
+        let (a, b) = self.slants();
+        let c = (a * a * a + u.y * (b * b * b - a * a * a)).cbrt();
+        // z - bottom = (c² - a²)/(4 bend), without the differences.
+        let shares = (a * a + a * b + b * b) * (c + a) / ((a + b) * (c * c + c * a + a * a));
+        let z = (self.bottom() + u.y * (self.z_max - self.bottom()) * shares).min(self.z_max);
+        let round = self.radius_at(z) * DVec2::from_angle(self.phi_max * u.x);
+        Some(SurfaceSample { surface: self.surface_on(round.extend(z)), pdf: 1.0 / self.area() })
+    }
+
+    /// A point uniform by area, as seen from `from`.
+    pub fn sample_direction(&self, from: DVec3, u: DVec2) -> Option<DirectionSample> {
+        density::seen_from(from, self.sample_area(u)?)
+    }
+
+    /// The density of [`Paraboloid::sample_direction`].
+    pub fn pdf_direction(&self, ray: &Ray, surface: &Surface) -> f64 {
+        density::pdf_seen_from(ray, surface, 1.0 / self.area())
+    }
+}

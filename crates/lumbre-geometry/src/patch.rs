@@ -1,0 +1,274 @@
+//! Bilinear patches.
+
+use std::f64::consts::TAU;
+
+use lumbre_math::quadratic::{dop, quadratic};
+use lumbre_math::{DVec2, DVec3, Transform};
+
+use crate::shape::check;
+use crate::support::{bounds_from_support, gamma};
+use crate::{
+    Aabb, DirectionSample, Ray, Root, Roots, ShapeError, Surface, SurfaceSample, Triangle, density, measure,
+};
+
+/// The surface (1−u)(1−v) p00 + u(1−v) p10 + (1−u)v p01 + uv p11 with u and v in [0, 1]: doubly ruled, and flat when the
+/// corners are. It faces along ∂p/∂u × ∂p/∂v.
+///
+/// Its `root.local` and its `uv` are (u, v). A ray along one of its lines does not meet it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BilinearPatch {
+    p00: DVec3,
+    p10: DVec3,
+    p01: DVec3,
+    p11: DVec3,
+    is_rectangle: bool,
+}
+
+/// Solid angles outside this range are sampled by area: small ones lose their digits in the sum of four angles.
+const SPHERICAL_SAMPLING: std::ops::Range<f64> = 1e-4..6.2;
+
+impl BilinearPatch {
+    /// The patch with four corners, of which two may coincide.
+    ///
+    /// # Errors
+    /// [`ShapeError`] unless the corners are finite and do not all lie on a line.
+    pub fn new(p00: DVec3, p10: DVec3, p01: DVec3, p11: DVec3) -> Result<Self, ShapeError> {
+        let (p00, p10) = (check::finite("p00", p00)?, check::finite("p10", p10)?);
+        let (p01, p11) = (check::finite("p01", p01)?, check::finite("p11", p11)?);
+        let (along_u, along_v) = (p10 - p00, p01 - p00);
+        let size = along_u.length() * along_v.length();
+        let is_rectangle = (p11 - p01 - along_u).length() <= 1e-14 * along_u.length()
+            && along_u.dot(along_v).abs() <= 1e-14 * size
+            && size > 0.0;
+        let patch = Self { p00, p10, p01, p11, is_rectangle };
+        let is_flat_line = patch.corner_crosses().iter().all(|&cross| cross == DVec3::ZERO);
+        if is_flat_line {
+            return Err(ShapeError::Degenerate("the corners of the bilinear patch lie on a line"));
+        }
+        Ok(patch)
+    }
+
+    /// The corners p00, p10, p01, p11.
+    pub fn corners(&self) -> [DVec3; 4] {
+        [self.p00, self.p10, self.p01, self.p11]
+    }
+
+    fn dpdu(&self, v: f64) -> DVec3 {
+        (1.0 - v) * (self.p10 - self.p00) + v * (self.p11 - self.p01)
+    }
+
+    fn dpdv(&self, u: f64) -> DVec3 {
+        (1.0 - u) * (self.p01 - self.p00) + u * (self.p11 - self.p10)
+    }
+
+    /// ∂p/∂u × ∂p/∂v at the corners 00, 10, 01, 11; in between it is linear in u and in v.
+    fn corner_crosses(&self) -> [DVec3; 4] {
+        [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)].map(|(u, v)| self.dpdu(v).cross(self.dpdv(u)))
+    }
+
+    /// Both crossings, in order.
+    ///
+    /// A. Reshetov, "Cool patches: a geometric approach to ray/bilinear patch intersections", Ray Tracing Gems, 2019: the
+    /// lines of constant u that the ray meets are the roots of a quadratic, and on each of them the rest is linear.
+    #[inline]
+    fn crossings(&self, ray: &Ray) -> [Option<Root>; 2] {
+        let d = ray.direction;
+        let (q00, q10) = (self.p00 - ray.origin, self.p10 - ray.origin);
+        let (side0, side1) = (self.p01 - self.p00, self.p11 - self.p10);
+        let a = q00.cross(d).dot(side0);
+        let c = (self.p10 - self.p00).cross(self.p01 - self.p11).dot(d);
+        let h = 0.5 * (q10.cross(d).dot(side1) - a - c);
+        // a + 2 h u + c u² = 0.
+        let Some((first, second)) = quadratic(c, h, a, dop(h, h, a, c)) else {
+            return [None, None];
+        };
+        let on_line = |u: f64, multiplicity: u8| {
+            if !(0.0..=1.0).contains(&u) {
+                return None;
+            }
+            let start = (1.0 - u) * q00 + u * q10;
+            let side = (1.0 - u) * side0 + u * side1;
+            let n = d.cross(side);
+            let size = n.length_squared();
+            let turned = n.cross(start);
+            let (t, v) = (turned.dot(side) / size, turned.dot(d) / size);
+            let hits = (0.0..=1.0).contains(&v) && t.is_finite() && ray.contains(t);
+            hits.then_some(Root { t, part: 0, multiplicity, local: DVec2::new(u, v) })
+        };
+        if first == second {
+            return [on_line(first, 2), None];
+        }
+        match (on_line(first, 1), on_line(second, 1)) {
+            (Some(a), Some(b)) if b.t < a.t => [Some(b), Some(a)],
+            pair => pair.into(),
+        }
+    }
+
+    /// The first crossing in the ray's range.
+    #[inline]
+    pub fn closest(&self, ray: &Ray) -> Option<Root> {
+        let [near, far] = self.crossings(ray);
+        near.or(far)
+    }
+
+    /// Every crossing in the ray's range, appended in ascending order.
+    pub fn roots(&self, ray: &Ray, out: &mut Roots) {
+        out.extend(self.crossings(ray).into_iter().flatten());
+    }
+
+    /// The surface at a crossing.
+    pub fn surface(&self, _ray: &Ray, root: &Root) -> Surface {
+        self.surface_on(root.local)
+    }
+
+    /// The surface at `uv`.
+    pub fn surface_at(&self, part: u32, uv: DVec2) -> Option<Surface> {
+        (part == 0).then(|| self.surface_on(uv))
+    }
+
+    fn surface_on(&self, uv: DVec2) -> Surface {
+        let (u, v) = (uv.x, uv.y);
+        let weights = [(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v];
+        let weigh = |p: [DVec3; 4]| (0..4).map(|i| weights[i] * p[i]).sum::<DVec3>();
+        let (dpdu, dpdv) = (self.dpdu(v), self.dpdv(u));
+        let mut cross = dpdu.cross(dpdv);
+        if cross == DVec3::ZERO {
+            // Two corners in one: the limit from the middle of the patch.
+            let inside = |x: f64| x + 1e-8 * (0.5 - x);
+            cross = self.dpdu(inside(v)).cross(self.dpdv(inside(u)));
+        }
+        let normal = (cross / cross.abs().max_element()).normalize();
+        // The equations of Weingarten, with ∂²p/∂u∂v the only second derivative that is not 0.
+        let twist = normal.dot(self.p11 - self.p01 - self.p10 + self.p00);
+        let (e, f, g) = (dpdu.length_squared(), dpdu.dot(dpdv), dpdv.length_squared());
+        let bend = twist / (e * g - f * f);
+        let bend = if bend.is_finite() { bend } else { 0.0 };
+        Surface {
+            point: weigh(self.corners()),
+            point_error: gamma(10) * weigh(self.corners().map(DVec3::abs)),
+            normal,
+            uv,
+            dpdu,
+            dpdv,
+            dndu: bend * (f * dpdu - e * dpdv),
+            dndv: bend * (f * dpdv - g * dpdu),
+        }
+    }
+
+    /// The box under a transform: that of the corners, since every point is a mean of them.
+    pub fn bounds(&self, world_from_object: &Transform) -> Option<Aabb> {
+        let corners = self.corners();
+        let magnitude = corners.map(DVec3::abs).into_iter().fold(DVec3::ZERO, DVec3::max);
+        let support = |d: DVec3| corners.iter().map(|&p| d.dot(p)).fold(f64::NEG_INFINITY, f64::max);
+        Some(bounds_from_support(world_from_object, magnitude, support))
+    }
+
+    /// The area, of one side, by quadrature.
+    pub fn area(&self) -> f64 {
+        self.area_under(&Transform::IDENTITY)
+    }
+
+    /// The area after a transform, of one side, by quadrature.
+    pub fn area_under(&self, world_from_object: &Transform) -> f64 {
+        measure::patch_area(world_from_object, |u, v| self.dpdu(v).cross(self.dpdv(u)))
+    }
+
+    /// It is not.
+    pub fn is_solid(&self) -> bool {
+        false
+    }
+
+    /// It holds no volume.
+    pub fn contains(&self, _p: DVec3) -> bool {
+        false
+    }
+
+    /// "bilinear".
+    pub fn name(&self) -> &'static str {
+        "bilinear"
+    }
+
+    /// A point with a density that is uniform by area when the corners lie in a plane and follow each other around a convex
+    /// quadrilateral, and nearly so otherwise; `pdf` is exact.
+    ///
+    /// (u, v) are chosen in proportion to the area elements at the corners, interpolated bilinearly.
+    pub fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
+        let w = self.corner_crosses().map(DVec3::length);
+        let v = sample_linear(u.y, w[0] + w[1], w[2] + w[3]);
+        let lerp = |a: f64, b: f64| (1.0 - v) * a + v * b;
+        let uv = DVec2::new(sample_linear(u.x, lerp(w[0], w[2]), lerp(w[1], w[3])), v);
+        let surface = self.surface_on(uv);
+        let pdf = self.pdf_area(&surface);
+        (pdf > 0.0 && pdf.is_finite()).then_some(SurfaceSample { surface, pdf })
+    }
+
+    fn pdf_area(&self, surface: &Surface) -> f64 {
+        let [w00, w10, w01, w11] = self.corner_crosses().map(DVec3::length);
+        let DVec2 { x: u, y: v } = surface.uv;
+        let here = (1.0 - v) * ((1.0 - u) * w00 + u * w10) + v * ((1.0 - u) * w01 + u * w11);
+        let mean = 0.25 * (w00 + w10 + w01 + w11);
+        here / mean / self.dpdu(v).cross(self.dpdv(u)).length()
+    }
+
+    /// The solid angle of a rectangle that is sampled by it, seen from `from`.
+    fn sampled_solid_angle(&self, from: DVec3) -> Option<f64> {
+        if !self.is_rectangle {
+            return None;
+        }
+        let halves = [(self.p00, self.p10, self.p11), (self.p00, self.p11, self.p01)];
+        let solid_angle =
+            halves.iter().map(|&(a, b, c)| Triangle::new(a, b, c).map_or(0.0, |half| half.solid_angle(from)));
+        let solid_angle = solid_angle.sum::<f64>();
+        SPHERICAL_SAMPLING.contains(&solid_angle).then_some(solid_angle)
+    }
+
+    /// A point as seen from `from`: uniform by solid angle for a rectangle that looks neither tiny nor fills half the sky,
+    /// else as in [`BilinearPatch::sample_area`]; `None` when it is seen edge-on.
+    ///
+    /// C. Ureña, M. Fajardo, A. King, "An area-preserving parametrization for spherical rectangles", Eurographics Symposium
+    /// on Rendering, 2013.
+    pub fn sample_direction(&self, from: DVec3, u: DVec2) -> Option<DirectionSample> {
+        let Some(solid_angle) = self.sampled_solid_angle(from) else {
+            return density::seen_from(from, self.sample_area(u)?);
+        };
+        // In a frame on the sides, the rectangle spans x0..x1, y0..y1 at depth z0 below the eye.
+        let (ex, ey) = (self.p10 - self.p00, self.p01 - self.p00);
+        let (width, height) = (ex.length(), ey.length());
+        let (x, y) = (ex / width, ey / height);
+        let corner = self.p00 - from;
+        let (x0, y0) = (corner.dot(x), corner.dot(y));
+        let (x1, y1) = (x0 + width, y0 + height);
+        let z0 = -corner.dot(x.cross(y)).abs();
+
+        // The z components of the outward normals of the planes through the eye and the sides y0, x1, y1, x0; the rest of
+        // neighbouring ones is orthogonal, so that their product alone gives the angle between the planes.
+        let [n0, n1, n2, n3] = [-y0, x1, y1, -x0].map(|s| s / s.hypot(z0));
+        let angle = |a: f64, b: f64| (-a * b).acos();
+        let k = TAU - angle(n2, n3) - angle(n3, n0);
+        debug_assert!((angle(n0, n1) + angle(n1, n2) - k - solid_angle).abs() < 1e-6);
+
+        let (sin, cos) = (u.x * solid_angle + k).sin_cos();
+        let fu = (cos * n0 - n2) / sin;
+        let cu = (1.0_f64.copysign(fu) / (fu * fu + n0 * n0).sqrt()).clamp(-1.0, 1.0);
+        let xu = (-cu * z0 / (1.0 - cu * cu).sqrt()).clamp(x0, x1);
+        let depth = xu.hypot(z0);
+        let (h0, h1) = (y0 / depth.hypot(y0), y1 / depth.hypot(y1));
+        let hv = h0 + u.y * (h1 - h0);
+        let yv = (hv * depth / (1.0 - hv * hv).sqrt()).clamp(y0, y1);
+        let uv = DVec2::new((xu - x0) / width, (yv - y0) / height);
+        uv.is_finite().then(|| DirectionSample { surface: self.surface_on(uv), pdf: 1.0 / solid_angle })
+    }
+
+    /// The density of [`BilinearPatch::sample_direction`].
+    pub fn pdf_direction(&self, ray: &Ray, surface: &Surface) -> f64 {
+        match self.sampled_solid_angle(ray.origin) {
+            Some(solid_angle) => 1.0 / solid_angle,
+            None => density::pdf_seen_from(ray, surface, self.pdf_area(surface)),
+        }
+    }
+}
+
+/// A number in [0, 1] with a density that goes linearly from `a` at 0 to `b` at 1, both ≥ 0 and not both 0.
+fn sample_linear(u: f64, a: f64, b: f64) -> f64 {
+    (u * (a + b) / (a + ((1.0 - u) * a * a + u * b * b).sqrt())).clamp(0.0, 1.0)
+}

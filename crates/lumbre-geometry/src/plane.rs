@@ -1,0 +1,125 @@
+//! Infinite planes.
+
+use lumbre_math::{DVec2, DVec3, Transform, orthonormal_basis};
+
+use crate::shape::check;
+use crate::support::{dot_size, gamma};
+use crate::{Aabb, DirectionSample, Ray, Root, Roots, ShapeError, Surface, SurfaceSample};
+
+/// The plane through a point, facing along its normal; as a solid, the half-space below it.
+///
+/// `uv` are lengths along the two axes that complete the normal to a frame. A ray in the plane does not meet it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plane {
+    point: DVec3,
+    // As given but for a power of two, so that small whole numbers stay exact; its length is of the order of 1.
+    normal: DVec3,
+}
+
+impl Plane {
+    /// The plane through `point` across `normal`, of any length but zero.
+    ///
+    /// # Errors
+    /// [`ShapeError`] unless both are finite and the normal is not zero.
+    pub fn new(point: DVec3, normal: DVec3) -> Result<Self, ShapeError> {
+        let point = check::finite("point", point)?;
+        Ok(Self { point, normal: check::scaled_direction("normal", normal)? })
+    }
+
+    /// The unit normal.
+    pub fn normal(&self) -> DVec3 {
+        self.normal.normalize()
+    }
+
+    /// The first crossing in the ray's range.
+    #[inline]
+    pub fn closest(&self, ray: &Ray) -> Option<Root> {
+        let along = ray.direction.dot(self.normal);
+        // No threshold: next to zero `t` grows beyond the ray's range by itself.
+        if along == 0.0 {
+            return None;
+        }
+        let t = (self.point - ray.origin).dot(self.normal) / along;
+        (t.is_finite() && ray.contains(t)).then(|| Root::at(t))
+    }
+
+    /// The one crossing, if it is in the ray's range.
+    pub fn roots(&self, ray: &Ray, out: &mut Roots) {
+        out.extend(self.closest(ray));
+    }
+
+    /// The surface at a crossing.
+    pub fn surface(&self, ray: &Ray, root: &Root) -> Surface {
+        let n = self.normal();
+        let w = (ray.origin - self.point) + root.t * ray.direction;
+        self.surface_on(w - w.dot(n) * n)
+    }
+
+    /// The surface at `uv`.
+    pub fn surface_at(&self, part: u32, uv: DVec2) -> Option<Surface> {
+        let (e1, e2) = orthonormal_basis(self.normal());
+        (part == 0).then(|| self.surface_on(uv.x * e1 + uv.y * e2))
+    }
+
+    fn surface_on(&self, w: DVec3) -> Surface {
+        let normal = self.normal();
+        let (e1, e2) = orthonormal_basis(normal);
+        let point = self.point + w;
+        Surface {
+            point,
+            point_error: DVec3::splat(gamma(8) * dot_size(normal, w))
+                + gamma(2) * (point.abs() + self.point.abs() + w.abs()),
+            normal,
+            uv: DVec2::new(w.dot(e1), w.dot(e2)),
+            dpdu: e1,
+            dpdv: e2,
+            dndu: DVec3::ZERO,
+            dndv: DVec3::ZERO,
+        }
+    }
+
+    /// It has none.
+    pub fn bounds(&self, _world_from_object: &Transform) -> Option<Aabb> {
+        None
+    }
+
+    /// Infinite.
+    pub fn area(&self) -> f64 {
+        f64::INFINITY
+    }
+
+    /// Infinite.
+    pub fn area_under(&self, _world_from_object: &Transform) -> f64 {
+        f64::INFINITY
+    }
+
+    /// It bounds the half-space below it.
+    pub fn is_solid(&self) -> bool {
+        true
+    }
+
+    /// Whether `p` lies in the plane or below it.
+    pub fn contains(&self, p: DVec3) -> bool {
+        (p - self.point).dot(self.normal) <= 0.0
+    }
+
+    /// "plane".
+    pub fn name(&self) -> &'static str {
+        "plane"
+    }
+
+    /// None: there is no uniform choice from an infinite area.
+    pub fn sample_area(&self, _u: DVec2) -> Option<SurfaceSample> {
+        None
+    }
+
+    /// None, as for [`Plane::sample_area`].
+    pub fn sample_direction(&self, _from: DVec3, _u: DVec2) -> Option<DirectionSample> {
+        None
+    }
+
+    /// 0: no point is ever chosen.
+    pub fn pdf_direction(&self, _ray: &Ray, _surface: &Surface) -> f64 {
+        0.0
+    }
+}

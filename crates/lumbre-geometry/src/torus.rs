@@ -1,0 +1,509 @@
+//! Tori: ring, horn and spindle.
+
+use std::f64::consts::{PI, TAU};
+
+use lumbre_math::roots::{bracketed_root, depressed_cubic_roots};
+use lumbre_math::{DVec2, DVec3, Transform, orthonormal_basis};
+
+use crate::shape::check;
+use crate::support::{azimuth, bounds_from_support, gamma};
+use crate::{Aabb, DirectionSample, Ray, Root, Roots, ShapeError, Surface, SurfaceSample, density, measure};
+
+/// The points at distance `minor` from a circle of radius `major`.
+///
+/// With `minor < major` it is a ring; with `minor = major` a horn, whose hole is a point; with `minor > major` a spindle,
+/// whose surface crosses itself on the axis. A spindle has an inner sheet too, the lemon around its centre, and a ray
+/// meets both. As a solid it is even-odd: the lemon is outside, and the normals of the inner sheet point into it.
+///
+/// `u` is the azimuth φ about the axis over 2π, counted from the first of the two directions of T. Duff's frame about the
+/// axis (from x towards y for the axis z), and `v` is the angle ϑ around the tube over 2π, 0 where it is farthest from the
+/// axis and a quarter on its top: the point is `(major + minor cos ϑ)(cos φ, sin φ, 0) + (0, 0, minor sin ϑ)`. On the
+/// inner sheet the factor is negative.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Torus {
+    center: DVec3,
+    // Orthonormal and right-handed.
+    e1: DVec3,
+    e2: DVec3,
+    axis: DVec3,
+    // The frame is the coordinate axes', and nothing need be turned.
+    upright: bool,
+    major: f64,
+    minor: f64,
+}
+
+/// A ray's line in the torus's frame: the points `p + s u` with a unit `u` perpendicular to `p`, at t = (shift + s)/speed.
+struct Line {
+    p: DVec3,
+    u: DVec3,
+    shift: f64,
+    speed: f64,
+    // All crossings lie strictly in between, and both ends outside.
+    low: f64,
+    high: f64,
+}
+
+impl Line {
+    fn t(&self, s: f64) -> f64 {
+        (self.shift + s) / self.speed
+    }
+}
+
+/// How far beyond the torus its bounds lie, relatively: enough that their ends are outside whatever the rounding.
+const MARGIN: f64 = 1e-9;
+
+impl Torus {
+    /// A torus around the circle of radius `major` about `center`, in the plane perpendicular to `axis` (of any length but
+    /// zero), with a tube of radius `minor`.
+    ///
+    /// # Errors
+    /// [`ShapeError`] unless everything is finite, both radii are greater than 0 and the axis is not zero.
+    pub fn new(center: DVec3, axis: DVec3, major: f64, minor: f64) -> Result<Self, ShapeError> {
+        let center = check::finite("center", center)?;
+        let axis = check::direction("axis", axis)?;
+        let major = check::positive("majorradius", major)?;
+        let minor = check::positive("minorradius", minor)?;
+        let (e1, e2) = orthonormal_basis(axis);
+        Ok(Self { center, e1, e2, axis, upright: axis == DVec3::Z, major, minor })
+    }
+
+    /// The centre.
+    pub fn center(&self) -> DVec3 {
+        self.center
+    }
+
+    /// The axis, a unit vector.
+    pub fn axis(&self) -> DVec3 {
+        self.axis
+    }
+
+    /// The radius of the circle inside the tube.
+    pub fn major(&self) -> f64 {
+        self.major
+    }
+
+    /// The radius of the tube.
+    pub fn minor(&self) -> f64 {
+        self.minor
+    }
+
+    fn is_ring(&self) -> bool {
+        self.minor < self.major
+    }
+
+    fn framed(&self, v: DVec3) -> DVec3 {
+        if self.upright { v } else { DVec3::new(v.dot(self.e1), v.dot(self.e2), v.dot(self.axis)) }
+    }
+
+    fn unframed(&self, v: DVec3) -> DVec3 {
+        if self.upright { v } else { v.x * self.e1 + v.y * self.e2 + v.z * self.axis }
+    }
+
+    /// The line, moved to where it is nearest to the centre: there the quartic has no cubic term, and its coefficients
+    /// know nothing of how far away the ray began. `None` when a bound of the torus is missed.
+    #[inline]
+    fn line(&self, ray: &Ray) -> Option<Line> {
+        let (w, d) = (ray.origin - self.center, ray.direction);
+        let dd = d.length_squared();
+        let near = w - (w.dot(d) / dd) * d;
+        let reach = (self.major + self.minor) * (1.0 + MARGIN);
+        let within_sphere = near.length_squared() <= reach * reach;
+        // Not finite for a direction of zero, nor for a NaN anywhere.
+        if !within_sphere || !dd.is_finite() {
+            return None;
+        }
+        let speed = dd.sqrt();
+        let unit = d / speed;
+        let first = -w.dot(unit);
+        let near = w + first * unit;
+        let second = -near.dot(unit);
+        let (p, u) = (self.framed(near + second * unit), self.framed(unit));
+        let (low, high) = self.span(p, u, reach)?;
+        let line = Line { p, u, shift: first + second, speed, low, high };
+        let overlaps = line.t(high) >= ray.t_min && line.t(low) <= ray.t_max;
+        overlaps.then_some(line)
+    }
+
+    /// Where the line is inside the flat cylinder around the torus; `None` when it is nowhere, or only in the hole.
+    #[inline]
+    fn span(&self, p: DVec3, u: DVec3, reach: f64) -> Option<(f64, f64)> {
+        let flat = self.minor * (1.0 + MARGIN);
+        let (mut low, mut high) = (-2.0 * reach, 2.0 * reach);
+        if u.z == 0.0 {
+            if p.z.abs() > flat {
+                return None;
+            }
+        } else {
+            let middle = -p.z / u.z;
+            let half = (flat / u.z).abs();
+            (low, high) = (low.max(middle - half), high.min(middle + half));
+        }
+        let a = u.x * u.x + u.y * u.y;
+        let h = p.x * u.x + p.y * u.y;
+        let c = p.x * p.x + p.y * p.y - reach * reach;
+        let delta = h * h - a * c;
+        if delta < 0.0 {
+            return None;
+        }
+        if a > 1e-30 {
+            let (middle, half) = (-h / a, delta.sqrt() / a);
+            (low, high) = (low.max(middle - half), high.min(middle + half));
+        } else if c > 0.0 {
+            return None;
+        }
+        if low > high {
+            return None;
+        }
+        // The distance from the axis is convex along the line, so that it is greatest at an end.
+        let hole = (self.major - self.minor) * (1.0 - MARGIN);
+        let rho_squared = |s: f64| (p.x + s * u.x).powi(2) + (p.y + s * u.y).powi(2);
+        let in_hole = hole > 0.0 && rho_squared(low).max(rho_squared(high)) < hole * hole;
+        (!in_hole).then_some((low, high))
+    }
+
+    /// The function that vanishes on the torus, and its slope along the line: negative inside, positive outside.
+    ///
+    /// For a ring it is (ρ - R)² + z² - r²; the quartic has a second factor (ρ + R)² + z² - r², which is positive, and
+    /// would only add rounding. For the others it is the product.
+    #[inline]
+    fn value_and_slope(&self, line: &Line, s: f64) -> (f64, f64) {
+        let p = line.p + s * line.u;
+        let rho = (p.x * p.x + p.y * p.y).sqrt();
+        let outward = p.x * line.u.x + p.y * line.u.y;
+        if self.is_ring() {
+            let from_circle = rho - self.major;
+            let value = (from_circle - self.minor) * (from_circle + self.minor) + p.z * p.z;
+            return (value, 2.0 * (from_circle * outward / rho + p.z * line.u.z));
+        }
+        let (outer, inner) = self.factors(rho, p.z);
+        let (big, small) = (self.major * self.major, self.minor * self.minor);
+        let along = p.dot(line.u);
+        (outer * inner, 4.0 * (p.length_squared() + big - small) * along - 8.0 * big * outward)
+    }
+
+    /// (ρ - R)² + z² - r² and (ρ + R)² + z² - r².
+    #[inline]
+    fn factors(&self, rho: f64, z: f64) -> (f64, f64) {
+        let (near, far) = (rho - self.major, rho + self.major);
+        let outer = (near - self.minor) * (near + self.minor) + z * z;
+        let inner = (far - self.minor) * (far + self.minor) + z * z;
+        (outer, inner)
+    }
+
+    /// The quartic at `s`, without the positive factor of a ring's: 0 where it is 0 up to rounding; and the quartic itself.
+    #[inline]
+    fn sign_and_quartic(&self, line: &Line, s: f64) -> (f64, f64) {
+        let p = line.p + s * line.u;
+        let (outer, inner) = self.factors((p.x * p.x + p.y * p.y).sqrt(), p.z);
+        let size = self.major + self.minor;
+        let rounding = 16.0 * f64::EPSILON * size;
+        let (value, uncertain) = if self.is_ring() {
+            (outer, rounding * self.minor)
+        } else {
+            let rounding = rounding * size;
+            (outer * inner, rounding * (outer.abs() + inner.abs() + rounding))
+        };
+        let sign = if value.abs() <= uncertain { 0.0 } else { value.signum() };
+        (sign, outer * inner)
+    }
+
+    /// Every crossing of the whole line in order, `emit(t, multiplicity)`, until `emit` returns false. Those before
+    /// `t_min` may be left out.
+    ///
+    /// The quartic s⁴ + p s² + q s + w is monotone between the roots of its derivative; where its signs differ at the ends
+    /// of a piece there is a root. Where it vanishes at such an end the line touches.
+    #[inline]
+    fn crossings(&self, line: &Line, t_min: f64, mut emit: impl FnMut(f64, u8) -> bool) {
+        let (big, small) = (self.major * self.major, self.minor * self.minor);
+        let half_p = line.p.length_squared() - big - small + 2.0 * big * line.u.z * line.u.z;
+        let splits = depressed_cubic_roots(half_p, 2.0 * big * line.p.z * line.u.z);
+        // The last place with a sign: where, which, and the quartic there.
+        let mut left = (line.low, 1.0, 0.0);
+        // Splits since then at which the quartic vanishes: the first, the last, how many.
+        let mut touching: Option<(f64, f64, u8)> = None;
+        let inner = splits.iter().copied().filter(|&s| line.low < s && s < line.high).map(Some);
+        for split in inner.chain(std::iter::once(None)) {
+            let (s, (sign, quartic)) = match split {
+                Some(s) => (s, self.sign_and_quartic(line, s)),
+                None => (line.high, (1.0, 0.0)),
+            };
+            if sign == 0.0 {
+                touching = Some(touching.map_or((s, s, 1), |(first, _, n)| (first, s, n + 1)));
+                continue;
+            }
+            if let Some((first, last, n)) = touching.take() {
+                let middle = 0.5 * (first + last);
+                let is_flat = (12.0 * middle * middle + 4.0 * half_p).abs() <= 1e-7 * (big + small);
+                let multiplicity = match (sign == left.1, n) {
+                    (true, 1 | 2) if !is_flat => 2,
+                    (true, _) => 4,
+                    (false, 2) => 3,
+                    (false, _) => 1,
+                };
+                if !emit(line.t(middle), multiplicity) {
+                    return;
+                }
+            } else if sign != left.1 && line.t(s) >= t_min {
+                // The negative end is a minimum of the quartic: there its parabola is a good guess.
+                let (minimum, depth, outwards) =
+                    if sign < 0.0 { (s, quartic, -1.0) } else { (left.0, left.2, 1.0) };
+                let curvature = 12.0 * minimum * minimum + 4.0 * half_p;
+                let guess = minimum + outwards * (-2.0 * depth / curvature).sqrt();
+                let root = bracketed_root(left.0, s, guess, sign > 0.0, |s| self.value_and_slope(line, s));
+                if !emit(line.t(root), 1) {
+                    return;
+                }
+            }
+            left = (s, sign, quartic);
+        }
+    }
+
+    /// The first crossing in the ray's range.
+    #[inline]
+    pub fn closest(&self, ray: &Ray) -> Option<Root> {
+        let line = self.line(ray)?;
+        let mut found = None;
+        self.crossings(&line, ray.t_min, |t, multiplicity| {
+            if ray.contains(t) {
+                found = Some(Root { multiplicity, ..Root::at(t) });
+            }
+            found.is_none() && t <= ray.t_max
+        });
+        found
+    }
+
+    /// Every crossing in the ray's range, appended in ascending order.
+    pub fn roots(&self, ray: &Ray, out: &mut Roots) {
+        let Some(line) = self.line(ray) else {
+            return;
+        };
+        self.crossings(&line, ray.t_min, |t, multiplicity| {
+            if ray.contains(t) {
+                out.push(Root { multiplicity, ..Root::at(t) });
+            }
+            t <= ray.t_max
+        });
+    }
+
+    /// The surface at a crossing.
+    pub fn surface(&self, ray: &Ray, root: &Root) -> Surface {
+        // From the point nearest to the centre, which is as exact as the torus is small.
+        let d = ray.direction;
+        let w = ray.origin - self.center;
+        let near_t = -w.dot(d) / d.length_squared();
+        let p = self.framed((w + near_t * d) + (root.t - near_t) * d);
+        let rho = p.x.hypot(p.y);
+        let outward = if rho > 0.0 { DVec2::new(p.x, p.y) / rho } else { DVec2::X };
+        let (outer, inner) = self.factors(rho, p.z);
+        if !self.is_ring() && inner.abs() < outer.abs() {
+            self.surface_on(-outward, DVec2::new(-rho - self.major, p.z))
+        } else {
+            self.surface_on(outward, DVec2::new(rho - self.major, p.z))
+        }
+    }
+
+    /// The surface at `uv`.
+    pub fn surface_at(&self, part: u32, uv: DVec2) -> Option<Surface> {
+        let meridian = DVec2::from_angle(TAU * uv.x);
+        let tube = DVec2::from_angle(TAU * uv.y);
+        (part == 0).then(|| Surface { uv, ..self.surface_on(meridian, tube) })
+    }
+
+    /// The surface on the half-plane of the unit vector `meridian`, in the direction `tube` from the circle's point there:
+    /// its first component along the meridian, its second along the axis.
+    fn surface_on(&self, meridian: DVec2, tube: DVec2) -> Surface {
+        let tube = if tube == DVec2::ZERO { DVec2::X } else { tube.normalize() };
+        let rho = self.major + self.minor * tube.x;
+        let radial = DVec3::new(meridian.x, meridian.y, 0.0);
+        let tangent = DVec3::new(-meridian.y, meridian.x, 0.0);
+        let side = if rho < 0.0 { -1.0 } else { 1.0 };
+        let around = DVec3::new(-tube.y * radial.x, -tube.y * radial.y, tube.x);
+        let local = DVec3::new(rho * radial.x, rho * radial.y, self.minor * tube.y);
+        let point = self.center + self.unframed(local);
+        let size = DVec3::splat(self.major + self.minor);
+        Surface {
+            point,
+            point_error: gamma(24) * size + gamma(2) * (point.abs() + self.center.abs()),
+            normal: self.unframed(side * DVec3::new(tube.x * radial.x, tube.x * radial.y, tube.y)),
+            uv: DVec2::new(
+                (azimuth(meridian.y, meridian.x) / TAU).min(1.0),
+                (azimuth(tube.y, tube.x) / TAU).min(1.0),
+            ),
+            dpdu: self.unframed(TAU * rho * tangent),
+            dpdv: self.unframed(TAU * self.minor * around),
+            dndu: self.unframed(side * TAU * tube.x * tangent),
+            dndv: self.unframed(side * TAU * around),
+        }
+    }
+
+    /// The box under a transform, tight.
+    pub fn bounds(&self, world_from_object: &Transform) -> Option<Aabb> {
+        let support = |d: DVec3| {
+            let across = d.dot(self.e1).hypot(d.dot(self.e2));
+            d.dot(self.center) + self.major * across + self.minor * d.length()
+        };
+        let magnitude = self.center.abs() + DVec3::splat(self.major + self.minor);
+        Some(bounds_from_support(world_from_object, magnitude, support))
+    }
+
+    /// Where the tube meets the axis: ϑ beyond it, up to π, belongs to the inner sheet; π for a ring.
+    fn crossing_angle(&self) -> f64 {
+        (-self.major / self.minor).max(-1.0).acos()
+    }
+
+    /// The integral of |major + minor cos ϑ| from 0 to `theta`, for an angle up to π, and its slope.
+    fn swept(&self, theta: f64) -> (f64, f64) {
+        let signed = |theta: f64| self.major * theta + self.minor * theta.sin();
+        let split = self.crossing_angle();
+        let slope = (self.major + self.minor * theta.cos()).abs();
+        if theta <= split { (signed(theta), slope) } else { (2.0 * signed(split) - signed(theta), slope) }
+    }
+
+    /// The area: 4π² major minor for a ring. A spindle's inner sheet counts as well.
+    pub fn area(&self) -> f64 {
+        2.0 * TAU * self.minor * self.swept(PI).0
+    }
+
+    /// The area after a transform, by quadrature.
+    pub fn area_under(&self, world_from_object: &Transform) -> f64 {
+        let split = self.crossing_angle() / TAU;
+        // A spindle's area element has a kink where the sheets cross.
+        let pieces = [(0.0, split), (split, 1.0 - split), (1.0 - split, 1.0)];
+        let piece = |(from, to): (f64, f64)| {
+            if to <= from {
+                return 0.0;
+            }
+            measure::patch_area(world_from_object, |u, v| {
+                let (meridian, tube) =
+                    (DVec2::from_angle(TAU * u), DVec2::from_angle(TAU * (from + v * (to - from))));
+                let density = TAU * TAU * self.minor * (self.major + self.minor * tube.x) * (to - from);
+                density * self.unframed(DVec3::new(tube.x * meridian.x, tube.x * meridian.y, tube.y))
+            })
+        };
+        pieces.into_iter().map(piece).sum()
+    }
+
+    /// Always: a spindle is taken even-odd.
+    pub fn is_solid(&self) -> bool {
+        true
+    }
+
+    /// Whether the closed solid holds `p`.
+    pub fn contains(&self, p: DVec3) -> bool {
+        let p = self.framed(p - self.center);
+        let (outer, inner) = self.factors(p.x.hypot(p.y), p.z);
+        outer <= 0.0 && (self.is_ring() || inner >= 0.0)
+    }
+
+    /// "torus".
+    pub fn name(&self) -> &'static str {
+        "torus"
+    }
+
+    /// A point uniform by area.
+    pub fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
+        // The upper half of the tube for one half of the numbers, the lower for the other.
+        let (upper, fraction) = if u.y < 0.5 { (true, 2.0 * u.y) } else { (false, 2.0 * u.y - 1.0) };
+        let goal = fraction * self.swept(PI).0;
+        let theta = bracketed_root(0.0, PI, fraction * PI, true, |theta| {
+            let (value, slope) = self.swept(theta);
+            (value - goal, slope)
+        });
+        let (sin, cos) = theta.sin_cos();
+        let tube = DVec2::new(cos, if upper { sin } else { -sin });
+        let surface = self.surface_on(DVec2::from_angle(TAU * u.x), tube);
+        Some(SurfaceSample { surface, pdf: 1.0 / self.area() })
+    }
+
+    /// A point uniform by area, as seen from `from`.
+    pub fn sample_direction(&self, from: DVec3, u: DVec2) -> Option<DirectionSample> {
+        density::seen_from(from, self.sample_area(u)?)
+    }
+
+    /// The density of [`Torus::sample_direction`].
+    pub fn pdf_direction(&self, ray: &Ray, surface: &Surface) -> f64 {
+        density::pdf_seen_from(ray, surface, 1.0 / self.area())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn hits(torus: &Torus, origin: [f64; 3], direction: [f64; 3]) -> Vec<(f64, u8)> {
+        let ray = Ray::new(DVec3::from(origin), DVec3::from(direction)).with_range(-1e9, 1e9);
+        let mut roots = Roots::new();
+        torus.roots(&ray, &mut roots);
+        roots.iter().map(|r| (r.t, r.multiplicity)).collect()
+    }
+
+    #[track_caller]
+    fn agree(found: &[(f64, u8)], expected: &[(f64, u8)]) {
+        assert_eq!(found.len(), expected.len(), "{found:?} {expected:?}");
+        for (f, e) in found.iter().zip(expected) {
+            assert!((f.0 - e.0).abs() < 1e-6 && f.1 == e.1, "{found:?} {expected:?}");
+        }
+    }
+
+    #[test]
+    fn multiple_roots_come_with_their_multiplicity() {
+        let ring = Torus::new(DVec3::ZERO, DVec3::Z, 3.0, 1.0).unwrap();
+        let inside = 2.0 * 3f64.sqrt();
+        agree(&hits(&ring, [4.0, -5.0, 0.0], [0.0, 1.0, 0.0]), &[(5.0, 2)]);
+        agree(
+            &hits(&ring, [2.0, -5.0, 0.0], [0.0, 1.0, 0.0]),
+            &[(5.0 - inside, 1), (5.0, 2), (5.0 + inside, 1)],
+        );
+        agree(&hits(&ring, [-5.0, 0.0, 1.0], [1.0, 0.0, 0.0]), &[(2.0, 2), (8.0, 2)]);
+        agree(&hits(&ring, [3.0, -5.0, 1.0], [0.0, 1.0, 0.0]), &[(5.0, 4)]);
+        let bitangent = Torus::new(DVec3::ZERO, DVec3::Z, 5.0, 3.0).unwrap();
+        agree(&hits(&bitangent, [-8.0, 0.0, -6.0], [4.0, 0.0, 3.0]), &[(1.2, 2), (2.8, 2)]);
+    }
+
+    #[test]
+    fn the_same_multiple_roots_come_out_wherever_the_torus_stands() {
+        let (center, axis) = (DVec3::new(1.5, -2.25, 7.0), DVec3::new(2.0, -1.0, 3.0));
+        let moved = Torus::new(center, axis, 3.0, 1.0).unwrap();
+        let place = |v: [f64; 3]| v[0] * moved.e1 + v[1] * moved.e2 + v[2] * moved.axis;
+        let line = |origin: [f64; 3], direction: [f64; 3]| {
+            hits(&moved, (center + place(origin)).to_array(), place(direction).to_array())
+        };
+        agree(&line([-5.0, 0.0, 1.0], [1.0, 0.0, 0.0]), &[(2.0, 2), (8.0, 2)]);
+        let inside = 2.0 * 3f64.sqrt();
+        agree(&line([2.0, -5.0, 0.0], [0.0, 1.0, 0.0]), &[(5.0 - inside, 1), (5.0, 2), (5.0 + inside, 1)]);
+    }
+
+    #[test]
+    fn a_horn_is_touched_at_its_point_and_a_spindle_crossed_on_both_sheets() {
+        let horn = Torus::new(DVec3::ZERO, DVec3::Z, 1.0, 1.0).unwrap();
+        agree(&hits(&horn, [-3.0, 0.0, 0.0], [1.0, 0.0, 0.0]), &[(1.0, 1), (3.0, 2), (5.0, 1)]);
+        let spindle = Torus::new(DVec3::ZERO, DVec3::Z, 1.0, 2.0).unwrap();
+        agree(&hits(&spindle, [-5.0, 0.0, 0.0], [1.0, 0.0, 0.0]), &[(2.0, 1), (4.0, 1), (6.0, 1), (8.0, 1)]);
+        let ray = Ray::new(DVec3::new(-5.0, 0.0, 0.0), DVec3::X);
+        let at = |t: f64| spindle.surface(&ray, &Root::at(t));
+        for (t, x) in [(2.0, -1.0), (4.0, 1.0), (6.0, -1.0), (8.0, 1.0)] {
+            assert!((at(t).normal - x * DVec3::X).length() < 1e-15);
+            assert!((spindle.surface_at(0, at(t).uv).unwrap().point - ray.at(t)).length() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn the_area_of_a_spindle_counts_both_sheets() {
+        let spindle = Torus::new(DVec3::ONE, DVec3::X, 1.5, 2.0).unwrap();
+        let by_quadrature = spindle.area_under(&Transform::IDENTITY);
+        assert!((spindle.area() / by_quadrature - 1.0).abs() < 1e-10);
+        let ring = Torus::new(DVec3::ONE, DVec3::X, 2.5, 0.75).unwrap();
+        assert!((ring.area() - 4.0 * PI * PI * 2.5 * 0.75).abs() < 1e-12);
+    }
+
+    #[test]
+    fn rays_that_are_none_miss() {
+        let ring = Torus::new(DVec3::ONE, DVec3::Y, 3.0, 1.0).unwrap();
+        assert!(ring.closest(&Ray::new(DVec3::ONE, DVec3::ZERO)).is_none());
+        assert!(ring.closest(&Ray::new(DVec3::new(f64::NAN, 0.0, 0.0), DVec3::X)).is_none());
+        assert!(ring.closest(&Ray::new(DVec3::ZERO, DVec3::new(1.0, f64::NAN, 0.0))).is_none());
+        assert!(ring.closest(&Ray::new(DVec3::ZERO, DVec3::X).with_range(f64::NAN, 9.0)).is_none());
+        assert!(ring.closest(&Ray::new(DVec3::ZERO, DVec3::X).with_range(9.0, 0.1)).is_none());
+        assert!(ring.closest(&Ray::new(DVec3::ZERO, DVec3::X)).is_some());
+    }
+}
