@@ -102,8 +102,7 @@ pub struct Encoded {
 impl Encoded {
     /// Channels on some display's curve, held within `[0, 1]`; NaN becomes 0.
     pub fn new(r: f32, g: f32, b: f32) -> Self {
-        // `max` first: it answers the other operand when one is NaN.
-        Self { channels: [r, g, b].map(|c| c.max(0.0).min(1.0)) }
+        Self { channels: [r, g, b].map(|c| if c.is_nan() { 0.0 } else { c.clamp(0.0, 1.0) }) }
     }
 
     /// Light on the sRGB curve.

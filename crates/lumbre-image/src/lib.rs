@@ -1,13 +1,19 @@
 //! Colours and rectangles of colours. No files here: reading and writing them is another floor's work.
 
 mod bitmap;
+mod colour_space;
 mod encoding;
 mod half;
 mod image;
+mod layers;
 mod rgb;
+mod tonemap;
 
 pub use crate::half::{f32_to_half, half_to_f32};
-pub use crate::image::Image;
+pub use crate::image::{Image, Window};
 pub use bitmap::{Bitmap, Channels, PixelData};
+pub use colour_space::ColourSpace;
 pub use encoding::{Encoded, Encoding, linear_to_srgb, srgb_to_linear, unit_to_u8, unit_to_u16};
+pub use layers::{Layer, Layers};
 pub use rgb::Rgb;
+pub use tonemap::ToneMap;
