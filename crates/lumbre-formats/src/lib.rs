@@ -3,10 +3,14 @@
 //! Every reader is handed a [`Budget`], which it asks before any allocation whose size the input chose, and a
 //! [`Diagnostics`], where it puts its warnings. Its errors are [`FormatError`]s with a place.
 
+pub mod atomic;
 pub mod budget;
+mod contained;
 pub mod diagnostic;
+pub mod image;
 pub mod input;
 
+pub use atomic::{atomic_write, probe_writable};
 pub use budget::{Budget, Hold, LimitError, LimitKind, Limits};
 pub use diagnostic::{Diagnostic, Diagnostics, FormatError, Place, Position, Severity, Strictness};
 pub use input::Input;

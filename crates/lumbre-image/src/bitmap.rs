@@ -88,8 +88,8 @@ impl Channels {
 
 /// A picture as its file has it, so that a texture of bytes takes bytes.
 ///
-/// Colours are on the file's primaries (Rec. 709 unless something says otherwise) and multiplied by coverage or not, as
-/// the file has them: PNG, TGA, BMP and QOI not, EXR multiplied.
+/// Colours are on the file's primaries (Rec. 709 unless something says otherwise). Those of whole numbers are not
+/// multiplied by coverage, as in PNG, TGA and QOI; floating ones are, as in EXR.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bitmap {
     // `data.len() == width * height * channels.count()`, and neither side is 0.
@@ -200,10 +200,17 @@ impl Bitmap {
         self.channels.alpha().map_or(1.0, |c| self.texel(x, y, c))
     }
 
-    /// The picture as light.
+    /// Whether the colours are multiplied by coverage.
+    pub fn is_premultiplied(&self) -> bool {
+        matches!(self.data, PixelData::F16(_) | PixelData::F32(_))
+    }
+
+    /// The picture as light, multiplied by coverage where it has it.
     pub fn to_image(&self) -> Image {
         let places = || (0..self.height).flat_map(|y| (0..self.width).map(move |x| (x, y)));
-        let colours = places().map(|(x, y)| self.rgb(x, y)).collect();
+        let multiply = self.channels.alpha().is_some() && !self.is_premultiplied();
+        let colour = |(x, y)| if multiply { self.rgb(x, y) * self.alpha(x, y) } else { self.rgb(x, y) };
+        let colours = places().map(colour).collect();
         let image = Image::from_pixels(self.width, self.height, colours).expect("one colour a pixel");
         match self.channels.alpha() {
             None => image,
@@ -249,7 +256,8 @@ mod tests {
                 assert!((bitmap.stored(x, y, c) - v).abs() < tolerance);
             }
             let image = bitmap.to_image();
-            assert_eq!(image.pixel(2, 1), bitmap.rgb(2, 1));
+            let coverage = if bitmap.is_premultiplied() { 1.0 } else { bitmap.alpha(2, 1) };
+            assert_eq!(image.pixel(2, 1), bitmap.rgb(2, 1) * coverage);
             assert_eq!(image.alpha().unwrap()[5], bitmap.alpha(2, 1));
         }
     }

@@ -2,7 +2,8 @@
 
 use crate::Rgb;
 
-/// A rectangle of linear colours with optional coverage, row by row from the top left.
+/// A rectangle of linear colours with optional coverage, row by row from the top left. Where there is coverage, colours
+/// are multiplied by it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {
     // `pixels.len() == width * height`, and so for `alpha` where it is there.

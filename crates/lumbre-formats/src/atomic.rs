@@ -1,0 +1,404 @@
+//! Writing a file so that its path holds the old complete file or the new complete file, and never a part of one.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use crate::diagnostic::FormatError;
+
+/// Writes the file `path` by what `write` writes: into a temporary file in the same folder, which is brought to disk and
+/// then takes the path's place.
+///
+/// The permissions of a file that is replaced stay, and a symbolic link goes on pointing at the file that it names. A
+/// pipe or a device is written to directly, as there is no file to keep.
+///
+/// # Errors
+/// [`FormatError::Io`]; the path holds what it held then, unless all that failed was to bring the folder's entry to
+/// disk. A process that is killed may leave a file `.NAME.….part` beside it.
+pub fn atomic_write(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), FormatError> {
+    atomic_write_on(&RealDisk, path, write)
+}
+
+/// Checks that [`atomic_write`] could write `path`, by making its temporary file and removing it. For before a long
+/// render.
+///
+/// # Errors
+/// [`FormatError::Io`] when it could not.
+pub fn probe_writable(path: &Path) -> Result<(), FormatError> {
+    let target = target_of(path).map_err(|e| FormatError::io(path, CANNOT_WRITE, e))?;
+    let Target::File { path: real, .. } = target else { return Ok(()) };
+    let part = part_of(&real);
+    let made = RealDisk.create(&part).map_err(|e| FormatError::io(path, CANNOT_WRITE, e))?;
+    drop(made);
+    RealDisk.remove(&part).map_err(|e| FormatError::io(path, CANNOT_WRITE, e))
+}
+
+const CANNOT_WRITE: &str = "cannot write";
+
+/// The calls that [`atomic_write`] makes, so that a test can make any of them fail.
+pub trait Disk {
+    /// A file open for writing.
+    type File: Write;
+    /// Makes a file that was not there.
+    ///
+    /// # Errors
+    /// As the system's.
+    fn create(&self, path: &Path) -> io::Result<Self::File>;
+    /// Brings a file's bytes to disk.
+    ///
+    /// # Errors
+    /// As the system's.
+    fn sync(&self, file: &mut Self::File) -> io::Result<()>;
+    /// Lets `from` take the place of `to`, in one step.
+    ///
+    /// # Errors
+    /// As the system's.
+    fn rename(&self, from: &Path, to: &Path) -> io::Result<()>;
+    /// Brings a folder's entries to disk.
+    ///
+    /// # Errors
+    /// As the system's.
+    fn sync_folder(&self, folder: &Path) -> io::Result<()>;
+    /// Removes a file.
+    ///
+    /// # Errors
+    /// As the system's.
+    fn remove(&self, path: &Path) -> io::Result<()>;
+}
+
+/// The system's own.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct RealDisk;
+
+impl Disk for RealDisk {
+    type File = File;
+
+    fn create(&self, path: &Path) -> io::Result<File> {
+        OpenOptions::new().write(true).create_new(true).open(path)
+    }
+
+    fn sync(&self, file: &mut File) -> io::Result<()> {
+        file.sync_all()
+    }
+
+    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
+        fs::rename(from, to)
+    }
+
+    fn sync_folder(&self, folder: &Path) -> io::Result<()> {
+        // Elsewhere folders cannot be opened, and renaming is journalled.
+        if cfg!(unix) { File::open(folder)?.sync_all() } else { Ok(()) }
+    }
+
+    fn remove(&self, path: &Path) -> io::Result<()> {
+        fs::remove_file(path)
+    }
+}
+
+/// [`atomic_write`] by the calls of another [`Disk`].
+///
+/// # Errors
+/// As [`atomic_write`].
+pub fn atomic_write_on<D: Disk>(
+    disk: &D,
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), FormatError> {
+    let refuse = |e| FormatError::io(path, CANNOT_WRITE, e);
+    let (real, permissions) = match target_of(path).map_err(refuse)? {
+        Target::File { path, permissions } => (path, permissions),
+        Target::Stream => {
+            let mut stream = OpenOptions::new().write(true).open(path).map_err(refuse)?;
+            return write(&mut stream).map_err(refuse);
+        }
+    };
+    let part = part_of(&real);
+    let mut file = disk.create(&part).map_err(refuse)?;
+    let written = (|| {
+        let mut buffered = BufWriter::with_capacity(256 << 10, &mut file);
+        write(&mut buffered)?;
+        buffered.flush()?;
+        // A writer that failed must not be flushed once more as it is dropped.
+        drop(buffered.into_parts());
+        disk.sync(&mut file)?;
+        if let Some(permissions) = permissions {
+            // A file system without permissions is none the worse for it.
+            let _ = fs::set_permissions(&part, permissions);
+        }
+        disk.rename(&part, &real)
+    })();
+    drop(file);
+    if let Err(e) = written {
+        // The error that matters is the first one.
+        let _ = disk.remove(&part);
+        return Err(refuse(e));
+    }
+    disk.sync_folder(folder_of(&real)).map_err(refuse)
+}
+
+enum Target {
+    File { path: PathBuf, permissions: Option<fs::Permissions> },
+    Stream,
+}
+
+fn target_of(path: &Path) -> io::Result<Target> {
+    if path.file_name().is_none() {
+        return Err(io::Error::new(io::ErrorKind::IsADirectory, "it names no file"));
+    }
+    match fs::metadata(path) {
+        Ok(meta) if meta.is_dir() => Err(io::Error::new(io::ErrorKind::IsADirectory, "it is a folder")),
+        Ok(meta) if meta.is_file() => {
+            if meta.permissions().readonly() {
+                return Err(io::Error::new(io::ErrorKind::PermissionDenied, "it is read-only"));
+            }
+            Ok(Target::File { path: fs::canonicalize(path)?, permissions: Some(meta.permissions()) })
+        }
+        Ok(_) => Ok(Target::Stream),
+        Err(e) if e.kind() == io::ErrorKind::NotFound => {
+            // A link that points at nothing yet: the file goes where it points.
+            let real = fs::read_link(path).map_or(path.to_owned(), |to| folder_of(path).join(to));
+            Ok(Target::File { path: real, permissions: None })
+        }
+        Err(e) => Err(e),
+    }
+}
+
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// A name that no other write of this or another process uses.
+fn part_of(path: &Path) -> PathBuf {
+    static COUNT: AtomicU32 = AtomicU32::new(0);
+    let count = COUNT.fetch_add(1, Ordering::Relaxed);
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    // Long names are cut so that the whole stays within what file systems allow.
+    let name: String = name.chars().take(40).collect();
+    folder_of(path).join(format!(".{name}.{}-{count}.part", std::process::id()))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+    use std::io::ErrorKind;
+
+    use super::*;
+
+    /// What goes wrong at the chosen call.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    enum Fault {
+        Full,
+        Broken,
+        Short,
+        Interrupted,
+    }
+
+    impl Fault {
+        fn error(self) -> io::Error {
+            match self {
+                Self::Full | Self::Short => ErrorKind::StorageFull.into(),
+                Self::Broken => io::Error::other("input/output error"),
+                Self::Interrupted => ErrorKind::Interrupted.into(),
+            }
+        }
+    }
+
+    /// The real disk, but that call number `at` goes wrong.
+    struct FaultyDisk {
+        at: u32,
+        fault: Fault,
+        calls: Cell<u32>,
+    }
+
+    impl FaultyDisk {
+        fn call(&self) -> io::Result<()> {
+            let this = self.calls.get();
+            self.calls.set(this + 1);
+            if this == self.at { Err(self.fault.error()) } else { Ok(()) }
+        }
+    }
+
+    struct FaultyFile<'a> {
+        disk: &'a FaultyDisk,
+        file: File,
+        full: bool,
+    }
+
+    impl Write for FaultyFile<'_> {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            if self.full {
+                return Err(Fault::Full.error());
+            }
+            match self.disk.call() {
+                Ok(()) => self.file.write(bytes),
+                // A few bytes fit, and then no more.
+                Err(_) if self.disk.fault == Fault::Short => {
+                    self.full = true;
+                    self.file.write(&bytes[..bytes.len().div_ceil(3)])
+                }
+                Err(e) => Err(e),
+            }
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            self.file.flush()
+        }
+    }
+
+    /// A disk's reference, so that its files can point at it.
+    struct On<'a>(&'a FaultyDisk);
+
+    impl<'a> Disk for On<'a> {
+        type File = FaultyFile<'a>;
+
+        fn create(&self, path: &Path) -> io::Result<FaultyFile<'a>> {
+            self.0.call()?;
+            Ok(FaultyFile { disk: self.0, file: RealDisk.create(path)?, full: false })
+        }
+
+        fn sync(&self, file: &mut FaultyFile<'a>) -> io::Result<()> {
+            self.0.call()?;
+            RealDisk.sync(&mut file.file)
+        }
+
+        fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
+            self.0.call()?;
+            RealDisk.rename(from, to)
+        }
+
+        fn sync_folder(&self, folder: &Path) -> io::Result<()> {
+            self.0.call()?;
+            RealDisk.sync_folder(folder)
+        }
+
+        fn remove(&self, path: &Path) -> io::Result<()> {
+            self.0.call()?;
+            RealDisk.remove(path)
+        }
+    }
+
+    /// Renaming before the bytes are on disk, removing nothing after a failure or writing in place makes this fail; each
+    /// was tried.
+    #[test]
+    fn whichever_call_fails_the_path_holds_a_complete_file() {
+        let old = vec![b'o'; 1234];
+        // More than two buffers, so that there are several writes.
+        let new: Vec<u8> = (0..700_000u32).map(|i| (i % 251) as u8).collect();
+        let mut kept_old = 0;
+        for fault in [Fault::Full, Fault::Broken, Fault::Short, Fault::Interrupted] {
+            for at in 0..40 {
+                let folder = tempfile::tempdir().unwrap();
+                let path = folder.path().join("picture.png");
+                fs::write(&path, &old).unwrap();
+                let disk = FaultyDisk { at, fault, calls: Cell::new(0) };
+                let done = atomic_write_on(&On(&disk), &path, |w| {
+                    new.chunks(10_000).try_for_each(|chunk| w.write_all(chunk))
+                });
+                let held = fs::read(&path).unwrap();
+                assert!(held == old || held == new, "{fault:?} at call {at}");
+                assert!(done.is_err() || held == new, "{fault:?} at call {at}: said done");
+                kept_old += u32::from(held == old);
+                let entries = fs::read_dir(folder.path()).unwrap().count();
+                assert_eq!(entries, 1, "{fault:?} at call {at} left its part");
+                if disk.calls.get() <= at {
+                    assert!(done.is_ok() && at >= 6, "{fault:?}: only {at} calls");
+                    break;
+                }
+            }
+        }
+        assert!(kept_old >= 12, "{kept_old}");
+    }
+
+    #[test]
+    fn bytes_reach_the_disk_before_the_name_does() {
+        struct Log(Cell<Vec<&'static str>>);
+        impl Log {
+            fn add(&self, call: &'static str) {
+                let mut calls = self.0.take();
+                calls.push(call);
+                self.0.set(calls);
+            }
+        }
+        impl Disk for Log {
+            type File = File;
+            fn create(&self, path: &Path) -> io::Result<File> {
+                self.add("create");
+                RealDisk.create(path)
+            }
+            fn sync(&self, file: &mut File) -> io::Result<()> {
+                self.add("sync");
+                RealDisk.sync(file)
+            }
+            fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
+                self.add("rename");
+                RealDisk.rename(from, to)
+            }
+            fn sync_folder(&self, folder: &Path) -> io::Result<()> {
+                self.add("sync folder");
+                RealDisk.sync_folder(folder)
+            }
+            fn remove(&self, path: &Path) -> io::Result<()> {
+                self.add("remove");
+                RealDisk.remove(path)
+            }
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let log = Log(Cell::default());
+        atomic_write_on(&log, &folder.path().join("a.exr"), |w| w.write_all(b"light")).unwrap();
+        assert_eq!(log.0.take(), ["create", "sync", "rename", "sync folder"]);
+    }
+
+    #[test]
+    fn a_writer_that_gives_up_leaves_the_old_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.pfm");
+        fs::write(&path, "old").unwrap();
+        let error = atomic_write(&path, |w| {
+            w.write_all(b"half of")?;
+            Err(io::Error::other("the encoder gave up"))
+        })
+        .unwrap_err();
+        assert!(error.to_string().contains("cannot write: the encoder gave up"), "{error}");
+        assert_eq!(fs::read(&path).unwrap(), b"old");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn folders_and_missing_folders_are_refused_before_and_while_writing() {
+        let folder = tempfile::tempdir().unwrap();
+        let places = [folder.path().to_owned(), folder.path().join("absent/a.png"), "..".into()];
+        for path in places {
+            assert!(matches!(probe_writable(&path), Err(FormatError::Io { .. })), "{path:?}");
+            assert!(matches!(atomic_write(&path, |_| Ok(())), Err(FormatError::Io { .. })), "{path:?}");
+        }
+        let fine = folder.path().join("a.png");
+        probe_writable(&fine).unwrap();
+        assert!(!fine.exists());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_permissions_and_devices_stay_what_they_are() {
+        use std::os::unix::fs::{FileTypeExt, PermissionsExt, symlink};
+        let folder = tempfile::tempdir().unwrap();
+        let (file, link) = (folder.path().join("real.png"), folder.path().join("link.png"));
+        let (dangling, later) = (folder.path().join("dangling.png"), folder.path().join("later.png"));
+        fs::write(&file, "old").unwrap();
+        fs::set_permissions(&file, fs::Permissions::from_mode(0o640)).unwrap();
+        symlink("real.png", &link).unwrap();
+        symlink("later.png", &dangling).unwrap();
+        atomic_write(&link, |w| w.write_all(b"new")).unwrap();
+        atomic_write(&dangling, |w| w.write_all(b"first")).unwrap();
+        assert_eq!(fs::read(&file).unwrap(), b"new");
+        assert_eq!(fs::read(&later).unwrap(), b"first");
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(fs::metadata(&file).unwrap().permissions().mode() & 0o777, 0o640);
+
+        atomic_write(Path::new("/dev/null"), |w| w.write_all(b"gone")).unwrap();
+        assert!(fs::metadata("/dev/null").unwrap().file_type().is_char_device());
+    }
+}

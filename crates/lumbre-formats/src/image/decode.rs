@@ -1,0 +1,120 @@
+//! PNG, JPEG, TGA, BMP and QOI, by the decoders of the `image` crate behind our checks.
+
+use std::io::Cursor;
+use std::sync::Arc;
+
+use image::codecs::{bmp::BmpDecoder, jpeg::JpegDecoder, png::PngDecoder, qoi::QoiDecoder, tga::TgaDecoder};
+use image::{ColorType, ImageDecoder, ImageError, Limits};
+use lumbre_image::{Bitmap, Channels, Encoding, PixelData};
+
+use super::{ImageFile, ImageFormat};
+use crate::budget::Budget;
+use crate::contained::contained;
+use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, quoted};
+
+pub(super) fn read(
+    format: ImageFormat,
+    bytes: &[u8],
+    name: &Arc<str>,
+    budget: &Budget,
+    diagnostics: &mut Diagnostics,
+) -> Result<ImageFile, FormatError> {
+    let place = Place::whole(name.clone());
+    if format == ImageFormat::Jpeg && !bytes.windows(2).any(|pair| pair == [0xFF, 0xD9]) {
+        // Its decoder fills what is missing with grey and says nothing.
+        diagnostics.push(
+            Diagnostic::warning("JPEG image without an end: its last rows may be missing").at(place.clone()),
+        );
+    }
+    contained(&format!("{} image", format.name()), &place, || {
+        let source = Cursor::new(bytes);
+        let fault = |e| fault(format, &place, e);
+        match format {
+            // Its chunks may ask for memory before there is a decoder to set limits on.
+            ImageFormat::Png => decode(
+                format,
+                PngDecoder::with_limits(source, limits(budget)).map_err(fault)?,
+                bytes,
+                &place,
+                budget,
+            ),
+            ImageFormat::Jpeg => {
+                decode(format, JpegDecoder::new(source).map_err(fault)?, bytes, &place, budget)
+            }
+            ImageFormat::Tga => {
+                decode(format, TgaDecoder::new(source).map_err(fault)?, bytes, &place, budget)
+            }
+            ImageFormat::Bmp => {
+                decode(format, BmpDecoder::new(source).map_err(fault)?, bytes, &place, budget)
+            }
+            _ => decode(format, QoiDecoder::new(source).map_err(fault)?, bytes, &place, budget),
+        }
+    })
+}
+
+fn decode(
+    format: ImageFormat,
+    mut decoder: impl ImageDecoder,
+    bytes: &[u8],
+    place: &Place,
+    budget: &Budget,
+) -> Result<ImageFile, FormatError> {
+    let (width, height) = decoder.dimensions();
+    let pixels = u64::from(width) * u64::from(height);
+    // So many pixels at most can come from one byte: a larger header is damage or malice, and not worth its memory.
+    let most_per_byte = match format {
+        ImageFormat::Png => 1032 * 8,
+        ImageFormat::Jpeg => 1024,
+        ImageFormat::Tga | ImageFormat::Bmp => 128,
+        _ => 62,
+    };
+    if pixels == 0 || pixels > (1 << 16) + most_per_byte * bytes.len() as u64 {
+        let wrong =
+            Diagnostic::error(format!("{} image of an impossible size", format.name())).at(place.clone());
+        let found = format!("{width} by {height} pixels in {} bytes", bytes.len());
+        return Err(wrong.found(found).into());
+    }
+    let colour = decoder.color_type();
+    let channels = Channels::from_count(usize::from(colour.channel_count())).expect("one to four");
+    let count = pixels * channels.count() as u64;
+    let fault = |e| fault(format, place, e);
+    // A progressive JPEG keeps all its coefficients, two bytes each, beside the pixels.
+    let scratch = if format == ImageFormat::Jpeg { count * 2 } else { 0 };
+    let _scratch = budget.hold(scratch, "decoding an image")?;
+    let data = match colour {
+        ColorType::L8 | ColorType::La8 | ColorType::Rgb8 | ColorType::Rgba8 => {
+            let mut data = vec![0u8; budget.array::<u8>(count, "image")?];
+            decoder.set_limits(limits(budget)).map_err(fault)?;
+            decoder.read_image(&mut data).map_err(fault)?;
+            PixelData::U8(data)
+        }
+        ColorType::L16 | ColorType::La16 | ColorType::Rgb16 | ColorType::Rgba16 => {
+            let mut data = vec![0u16; budget.array::<u16>(count, "image")?];
+            decoder.set_limits(limits(budget)).map_err(fault)?;
+            decoder.read_image(bytemuck::cast_slice_mut(&mut data)).map_err(fault)?;
+            PixelData::U16(data)
+        }
+        other => {
+            let wrong = Diagnostic::error(format!("unsupported {} image", format.name())).at(place.clone());
+            return Err(wrong.found(format!("{other:?}")).expected("8 or 16 bits a channel").into());
+        }
+    };
+    let bitmap = Bitmap::new(width, height, channels, data, Encoding::Srgb).expect("counted above");
+    Ok(ImageFile::new(format, bitmap))
+}
+
+fn limits(budget: &Budget) -> Limits {
+    let mut limits = Limits::no_limits();
+    limits.max_alloc = Some(budget.memory_left());
+    limits
+}
+
+fn fault(format: ImageFormat, place: &Place, error: ImageError) -> FormatError {
+    let kind = match error {
+        ImageError::Unsupported(_) => "unsupported",
+        ImageError::Limits(_) => "too large",
+        _ => "damaged",
+    };
+    let wrong = Diagnostic::error(format!("{kind} {} image", format.name())).at(place.clone());
+    wrong.found(quoted(&error.to_string())).into()
+}

@@ -1,0 +1,245 @@
+//! Image files come back as they were written, and as others wrote them.
+
+mod common;
+
+use std::sync::Arc;
+
+use common::{Random, files_below, shared};
+use lumbre_formats::image::{
+    ExrCompression, ExrPrecision, ImageFormat, PngDepth, WriteOptions, encode_image, encode_layers,
+    open_image, read_image, read_layers, write_image,
+};
+use lumbre_formats::{Budget, Diagnostics, FormatError};
+use lumbre_image::{
+    Channels, ColourSpace, Encoding, Image, Layer, Layers, PixelData, Rgb, ToneMap, f32_to_half, half_to_f32,
+    linear_to_srgb, srgb_to_linear,
+};
+
+fn name(text: &str) -> Arc<str> {
+    text.into()
+}
+
+/// Light over several stops, with a pixel at each end.
+fn picture(width: u32, height: u32) -> Image {
+    let mut random = Random(7);
+    let colours = (0..width * height)
+        .map(|i| match i {
+            0 => Rgb::BLACK,
+            1 => Rgb::WHITE,
+            _ => Rgb::new(random.unit(), random.unit() * 0.1, random.unit().powi(3)),
+        })
+        .collect();
+    Image::from_pixels(width, height, colours).unwrap()
+}
+
+fn covered(width: u32, height: u32) -> Image {
+    let image = picture(width, height);
+    let alpha: Vec<f32> = (0..width * height).map(|i| (i % 6) as f32 / 5.0).collect();
+    let colours = image.pixels().iter().zip(&alpha).map(|(&c, &a)| c * a).collect();
+    Image::from_pixels(width, height, colours).unwrap().with_alpha(alpha).unwrap()
+}
+
+fn back(bytes: &[u8], file: &str) -> Image {
+    let mut said = Diagnostics::new();
+    let read = read_image(bytes, &name(file), &Budget::default(), &mut said).unwrap();
+    assert_eq!(said.lines(), Vec::<String>::new());
+    read.to_image(&Budget::default()).unwrap()
+}
+
+fn worst(a: &Image, b: &Image) -> f32 {
+    assert_eq!((a.width(), a.height()), (b.width(), b.height()));
+    a.pixels()
+        .iter()
+        .zip(b.pixels())
+        .map(|(&a, &b)| (a - b).map(f32::abs).max_component())
+        .fold(0.0, f32::max)
+}
+
+#[test]
+fn png_comes_back_to_half_a_step_of_its_curve() {
+    for (depth, steps) in [(PngDepth::Eight, 255.0), (PngDepth::Sixteen, 65535.0)] {
+        let options = WriteOptions { png_depth: depth, ..WriteOptions::default() };
+        let image = picture(23, 11);
+        let bytes = encode_image(&image, ImageFormat::Png, &options).unwrap();
+        let read = back(&bytes, "a.png");
+        for (a, b) in image.pixels().iter().zip(read.pixels()) {
+            for c in 0..3 {
+                let error = (linear_to_srgb(a[c]) - linear_to_srgb(b[c])).abs();
+                assert!(error <= 0.5 / steps + 1e-6, "{depth:?} {a:?} {b:?}");
+            }
+        }
+        assert!(bytes.windows(4).any(|w| w == b"sRGB"));
+    }
+}
+
+#[test]
+fn png_keeps_coverage_apart_from_colour() {
+    let image = covered(9, 5);
+    let options = WriteOptions { png_depth: PngDepth::Sixteen, ..WriteOptions::default() };
+    let bytes = encode_image(&image, ImageFormat::Png, &options).unwrap();
+    let read = back(&bytes, "a.png");
+    assert!(worst(&image, &read) < 1e-4);
+    assert!(image.alpha().unwrap().iter().zip(read.alpha().unwrap()).all(|(a, b)| (a - b).abs() < 1e-5));
+}
+
+#[test]
+fn exr_comes_back_exactly_in_every_packing() {
+    for compression in [ExrCompression::None, ExrCompression::Rle, ExrCompression::Zip, ExrCompression::Piz] {
+        for precision in [ExrPrecision::Half, ExrPrecision::Float] {
+            let options = WriteOptions {
+                exr_compression: compression,
+                exr_precision: precision,
+                ..WriteOptions::default()
+            };
+            let image = covered(37, 35);
+            let image = image.map(|c| c * 300.0);
+            let read = back(&encode_image(&image, ImageFormat::Exr, &options).unwrap(), "a.exr");
+            let expected = match precision {
+                ExrPrecision::Float => image.clone(),
+                ExrPrecision::Half => image.clone().map(|c| c.map(|v| half_to_f32(f32_to_half(v)))),
+            };
+            assert_eq!(read.pixels(), expected.pixels(), "{compression:?} {precision:?}");
+            assert!(worst(&image, &read) > 0.0 || precision == ExrPrecision::Float);
+        }
+    }
+}
+
+#[test]
+fn exr_keeps_layers_and_the_digits_that_they_need() {
+    let mut layers = Layers::from_image(&picture(6, 4));
+    layers.push_image("albedo", &Image::filled(6, 4, Rgb::new(0.25, 0.5, 0.75))).unwrap();
+    let depths: Vec<f32> = (0..24).map(|i| 1e5 + i as f32 / 8.0).collect();
+    layers.push(Layer { name: "Z".into(), samples: depths.clone(), full_precision: true }).unwrap();
+    let bytes = encode_layers(&layers, &WriteOptions::default()).unwrap();
+    let read = read_layers(&bytes, &name("a.exr"), &Budget::default(), &mut Diagnostics::new()).unwrap();
+    assert_eq!(read.get("Z").unwrap().samples, depths);
+    assert!(read.get("Z").unwrap().full_precision && !read.get("albedo.R").unwrap().full_precision);
+    assert_eq!(read.image("albedo"), layers.image("albedo"));
+    assert_eq!(read.iter().len(), 7);
+}
+
+#[test]
+fn exr_parts_lie_where_they_belong() {
+    let part = picture(8, 6);
+    let options = WriteOptions {
+        exr_window: Some((5, 2, 20, 10)),
+        exr_precision: ExrPrecision::Float,
+        ..WriteOptions::default()
+    };
+    let bytes = encode_image(&part, ImageFormat::Exr, &options).unwrap();
+    let whole = back(&bytes, "a.exr");
+    assert_eq!(whole, part.placed(5, 2, 20, 10));
+}
+
+#[test]
+fn hdr_and_pfm_come_back_and_jpeg_nearly() {
+    let bright = picture(33, 7).map(|c| c * 1000.0);
+    let pfm = back(&encode_image(&bright, ImageFormat::Pfm, &WriteOptions::default()).unwrap(), "a.pfm");
+    assert_eq!(pfm, bright);
+    for width in [5, 33, 200] {
+        let bright = picture(width, 7).map(|c| c * 1000.0);
+        let hdr = back(&encode_image(&bright, ImageFormat::Hdr, &WriteOptions::default()).unwrap(), "a.hdr");
+        for (a, b) in bright.pixels().iter().zip(hdr.pixels()) {
+            assert!((*a - *b).map(f32::abs).max_component() <= a.max_component() * 0.004, "{a:?} {b:?}");
+        }
+    }
+    let ramp = (0..64 * 40).map(|i| Rgb::new((i % 64) as f32 / 64.0, 0.3, (i / 64) as f32 / 40.0)).collect();
+    let ramp = Image::from_pixels(64, 40, ramp).unwrap();
+    let jpeg = back(&encode_image(&ramp, ImageFormat::Jpeg, &WriteOptions::default()).unwrap(), "a.jpg");
+    let error = ramp.pixels().iter().zip(jpeg.pixels()).map(|(a, b)| (*a - *b).map(f32::abs).max_component());
+    assert!(error.sum::<f32>() / 2560.0 < 0.02);
+}
+
+#[test]
+fn bytes_stay_bytes_and_scenes_may_say_what_they_mean() {
+    let bytes = encode_image(&picture(7, 3), ImageFormat::Png, &WriteOptions::default()).unwrap();
+    let budget = Budget::default();
+    let file = read_image(&bytes, &name("t.png"), &budget, &mut Diagnostics::new()).unwrap();
+    assert!(matches!(file.bitmap.data(), PixelData::U8(_)));
+    assert_eq!(file.bitmap.encoding(), Encoding::Srgb);
+    assert_eq!(file.bitmap.channels(), Channels::Rgb);
+    assert_eq!(budget.memory_held(), 7 * 3 * 3);
+    assert_eq!(file.colour_space, ColourSpace::REC709);
+}
+
+#[test]
+fn display_formats_are_tone_mapped_and_others_are_not() {
+    let image = Image::filled(4, 3, Rgb::new(2.0, 1.0, 0.5));
+    let options = WriteOptions { tone_map: ToneMap::Neutral, exposure: 1.0, ..WriteOptions::default() };
+    let png = back(&encode_image(&image, ImageFormat::Png, &options).unwrap(), "a.png");
+    let expected = ToneMap::Neutral.apply(Rgb::new(4.0, 2.0, 1.0));
+    assert!((png.pixel(3, 2) - expected).map(f32::abs).max_component() < 0.01);
+    let exr = back(&encode_image(&image, ImageFormat::Exr, &options).unwrap(), "a.exr");
+    assert_eq!(exr, image);
+}
+
+#[test]
+fn a_path_says_its_format_and_writing_is_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let image = picture(5, 4);
+    for ending in ["png", "JPG", "exr", "hdr", "pfm"] {
+        let path = folder.path().join(format!("a.{ending}"));
+        write_image(&path, &image, &WriteOptions::default()).unwrap();
+        let file = open_image(&path, &Budget::default(), &mut Diagnostics::new()).unwrap();
+        assert_eq!(file.bitmap.width(), 5, "{ending}");
+    }
+    let wrong = write_image(&folder.path().join("a.gif"), &image, &WriteOptions::default()).unwrap_err();
+    assert!(wrong.to_string().contains("unknown format to write (found \"gif\"; expected .png"), "{wrong}");
+    let absent = write_image(&folder.path().join("no/a.png"), &image, &WriteOptions::default()).unwrap_err();
+    assert!(matches!(absent, FormatError::Io { .. }));
+}
+
+#[test]
+fn the_same_image_makes_the_same_bytes() {
+    let image = covered(61, 47);
+    for format in [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::Exr, ImageFormat::Hdr, ImageFormat::Pfm]
+    {
+        let options = WriteOptions::default();
+        assert_eq!(
+            encode_image(&image, format, &options).unwrap(),
+            encode_image(&image, format, &options).unwrap()
+        );
+    }
+}
+
+#[test]
+fn srgb_numbers_mean_the_light_of_the_standard() {
+    // A PNG of one known byte, through the file: 188 is the light 0.5 to its nearest step.
+    let image = Image::filled(3, 2, Rgb::splat(0.5));
+    let bytes = encode_image(&image, ImageFormat::Png, &WriteOptions::default()).unwrap();
+    let file = read_image(&bytes, &name("a.png"), &Budget::default(), &mut Diagnostics::new()).unwrap();
+    assert_eq!(file.bitmap.data(), &PixelData::U8(vec![188; 18]));
+    assert_eq!(file.bitmap.texel(2, 1, 1), srgb_to_linear(188.0 / 255.0));
+}
+
+#[test]
+fn images_of_others_are_read() {
+    let Some(folder) = shared("images") else { return };
+    let mut files = files_below(&folder, &[".exr"]);
+    if let Some(folder) = shared("hdri") {
+        files.extend(files_below(&folder, &[".exr", ".hdr"]));
+    }
+    let mut read = 0;
+    for path in &files {
+        let budget = Budget::default();
+        let mut said = Diagnostics::new();
+        match open_image(path, &budget, &mut said) {
+            Ok(file) => {
+                let image = file.to_image(&budget).unwrap();
+                let light = image.pixels().iter().filter(|c| !c.is_black()).count();
+                assert!(light > 0, "{} is black", path.display());
+                println!(
+                    "{}: {} by {}, mean {:?}, {:?}",
+                    path.display(),
+                    image.width(),
+                    image.height(),
+                    image.mean(),
+                    said.lines()
+                );
+                read += 1;
+            }
+            Err(e) => panic!("{e}"),
+        }
+    }
+    assert!(read > 30, "{read} of {}", files.len());
+}
