@@ -24,8 +24,9 @@ pub struct BilinearPatch {
     is_rectangle: bool,
 }
 
-/// Solid angles outside this range are sampled by area: small ones lose their digits in the sum of four angles.
-const SPHERICAL_SAMPLING: std::ops::Range<f64> = 1e-4..6.2;
+/// Solid angles outside this range are sampled by area: small ones lose their digits in the sum of four angles, and from
+/// (almost) within the plane the rectangle has no depth.
+const SPHERICAL_SAMPLING: std::ops::Range<f64> = 1e-4..TAU - 1e-6;
 
 impl BilinearPatch {
     /// The patch with four corners, of which two may coincide.
@@ -92,8 +93,12 @@ impl BilinearPatch {
             let size = n.length_squared();
             let turned = n.cross(start);
             let (t, v) = (turned.dot(side) / size, turned.dot(d) / size);
-            let hits = (0.0..=1.0).contains(&v) && t.is_finite() && ray.contains(t);
-            hits.then_some(Root { t, part: 0, multiplicity, local: DVec2::new(u, v) })
+            if !(0.0..=1.0).contains(&v) {
+                return None;
+            }
+            let (t, local) =
+                if multiplicity == 1 { self.refined(ray, t, u, v) } else { (t, DVec2::new(u, v)) };
+            (t.is_finite() && ray.contains(t)).then_some(Root { t, part: 0, multiplicity, local })
         };
         if first == second {
             return [on_line(first, 2), None];
@@ -101,6 +106,28 @@ impl BilinearPatch {
         match (on_line(first, 1), on_line(second, 1)) {
             (Some(a), Some(b)) if b.t < a.t => [Some(b), Some(a)],
             pair => pair.into(),
+        }
+    }
+
+    /// One step of Newton's method on p(u, v) = O + tD. The lines of constant u are ill-placed to say where a ray crosses
+    /// that runs almost along one; this makes the error as small as the angle with the surface lets it be.
+    #[inline]
+    fn refined(&self, ray: &Ray, t: f64, u: f64, v: f64) -> (f64, DVec2) {
+        let [q00, q10, q01, q11] = self.corners().map(|p| p - ray.origin);
+        let low = (1.0 - u) * q00 + u * q10;
+        let high = (1.0 - u) * q01 + u * q11;
+        let residual = (1.0 - v) * low + v * high - t * ray.direction;
+        let (dpdu, dpdv) = (self.dpdu(v), self.dpdv(u));
+        let cross = dpdu.cross(dpdv);
+        let dt = cross.dot(residual) / cross.dot(ray.direction);
+        let in_plane = residual - dt * ray.direction;
+        let size = cross.length_squared();
+        let (du, dv) = (-in_plane.cross(dpdv).dot(cross) / size, -dpdu.cross(in_plane).dot(cross) / size);
+        // Where the ray (almost) touches, a step may lead anywhere.
+        if du.abs() + dv.abs() < 1e-6 && dt.is_finite() {
+            (t + dt, DVec2::new(u + du, v + dv).clamp(DVec2::ZERO, DVec2::ONE))
+        } else {
+            (t, DVec2::new(u, v))
         }
     }
 
@@ -145,7 +172,7 @@ impl BilinearPatch {
         let bend = if bend.is_finite() { bend } else { 0.0 };
         Surface {
             point: weigh(self.corners()),
-            point_error: gamma(10) * weigh(self.corners().map(DVec3::abs)),
+            point_error: gamma(16) * weigh(self.corners().map(DVec3::abs)),
             normal,
             uv,
             dpdu,

@@ -1,6 +1,6 @@
 //! Triangles: two tests for a ray, one of them watertight, and one exact shape.
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
 use lumbre_math::quadratic::dop;
 use lumbre_math::{DVec2, DVec3, Transform};
@@ -124,8 +124,8 @@ pub struct Triangle {
 }
 
 /// Solid angles outside this range are sampled by area: in small ones the sine and cosine of the spherical excess lose
-/// their digits, in those of almost half the sky the corners run into great circles.
-const SPHERICAL_SAMPLING: std::ops::Range<f64> = 1e-5..6.2;
+/// their digits, and from (almost) within the plane the corners make a great circle.
+const SPHERICAL_SAMPLING: std::ops::Range<f64> = 1e-5..TAU - 1e-5;
 
 impl Triangle {
     /// A triangle, possibly of no area.
