@@ -37,6 +37,7 @@
 //! | frame from one direction, from two | [`orthonormal_basis`], [`Frame::from_z`], [`Frame::from_two`] |
 //! | change of coordinates | [`Frame::to_local`], [`Frame::to_world`], [`Transform::from_frame`] |
 //! | product and transpose of matrices | `*` and `transpose` of glam; of any size [`matrix::product`], [`matrix::transpose`] |
+//! | linear equations, Cramer's rule | [`matrix::solve`] |
 //! | inverse of an affine matrix | [`Transform::from_matrix`] and [`Transform::inverse`] |
 //! | scale, shear, rotation, mirror of the plane | [`matrix::scale2`], [`matrix::shear2`], [`matrix::rotation2`], [`matrix::mirror2_about_y`] |
 //! | scale, shear, translation of space | [`Transform::scale`], [`Transform::shear`], [`Transform::translate`] |
@@ -54,7 +55,7 @@
 //! | inverse, rotation of a vector, matrix both ways | [`quaternion::inverse`], [`quaternion::rotate`], [`quaternion::to_matrix`], [`quaternion::from_matrix`] |
 //! | Euler angles both ways | [`quaternion::Euler`] |
 //! | look-at of either hand | [`Transform::look_at_right`], [`Transform::look_at_left`], [`view::View`] |
-//! | rays of a camera | [`view::View::perspective_direction`], [`view::View::orthographic_origin`] |
+//! | rays of a camera | [`view::View::perspective_direction`], [`view::View::orthographic_origin`], [`view::View::cylindrical_direction`] |
 //! | projection matrices | [`projection::orthographic`], [`projection::perspective`], [`projection::simple_perspective`] |
 //! | reflection, refraction | [`optics::reflect`], [`optics::refract`], [`optics::facing`] |
 //! | rounding errors, leaving a surface | [`rounding::gamma`], [`Transform::point_error`], [`rounding::offset_point`] |

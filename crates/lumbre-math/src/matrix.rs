@@ -21,7 +21,7 @@
 use glam::{DMat2, DMat3, DMat4, DVec2, DVec3, DVec4};
 
 use crate::transform::sin_cos_degrees;
-use crate::vector::{cross, unit};
+use crate::vector::{cross, dot, mixed_product, unit};
 
 /// The product of an R×K and a K×C matrix: `product[i][j] = Σ_k a[i][k] b[k][j]`.
 pub fn product<const R: usize, const K: usize, const C: usize>(
@@ -190,12 +190,25 @@ pub fn normal_matrix(linear: &DMat3) -> DMat3 {
     let [a, b, c] = [linear.x_axis, linear.y_axis, linear.z_axis];
     let cofactors = DMat3::from_cols(cross(b, c), cross(c, a), cross(a, b));
     // cof(L) = det(L) L⁻ᵀ has the sign of the determinant.
-    if crate::vector::dot(a, cofactors.x_axis) < 0.0 { -cofactors } else { cofactors }
+    if dot(a, cofactors.x_axis) < 0.0 { -cofactors } else { cofactors }
 }
 
 /// `n` carried along with the surface that `linear` moves, with length 1; `None` when it has no direction left.
 pub fn transform_normal(linear: &DMat3, n: DVec3) -> Option<DVec3> {
     unit(normal_matrix(linear) * n)
+}
+
+/// The `x` with `m x = b`, by Cramer's rule: each component is the determinant of `m` with that column replaced by `b`,
+/// over that of `m`. `None` when the quotient is not finite, as for a singular matrix.
+///
+/// In three dimensions it needs no more work than elimination, and with determinants to full precision it loses no
+/// digits; in many dimensions it is hopeless.
+pub fn solve(m: &DMat3, b: DVec3) -> Option<DVec3> {
+    let [c0, c1, c2] = [m.x_axis, m.y_axis, m.z_axis];
+    let determinants =
+        DVec3::new(mixed_product(b, c1, c2), mixed_product(c0, b, c2), mixed_product(c0, c1, b));
+    let x = determinants / mixed_product(c0, c1, c2);
+    x.is_finite().then_some(x)
 }
 
 /// A matrix for the world seen in a mirror, z to -z: turns right-handed coordinates into left-handed ones and back.
@@ -325,6 +338,18 @@ mod tests {
             assert_eq!(moved.dot(map * d) > 0.0, n.dot(d) > 0.0);
         }
         assert!(transform_normal(&DMat3::ZERO, DVec3::Y).is_none());
+    }
+
+    #[test]
+    fn cramers_rule_solves_what_has_a_solution() {
+        let m = rows3([2.0, -1.0, 0.5, 0.0, 3.0, 7.0, -4.0, 1.0, 1.5]);
+        let x = DVec3::new(3.0, -0.25, 8.0);
+        assert!((solve(&m, m * x).unwrap() - x).length() < 1e-14);
+        // Nearly singular: the determinant is 2⁻⁴⁰.
+        let tiny = f64::powi(2.0, -40);
+        let m = rows3([1.0, 1.0, 0.0, 1.0, 1.0 + tiny, 0.0, 0.0, 0.0, 3.0]);
+        assert_eq!(solve(&m, DVec3::new(2.0, 2.0 + tiny, 6.0)), Some(DVec3::new(1.0, 1.0, 2.0)));
+        assert_eq!(solve(&rows3([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]), x), None);
     }
 
     #[test]

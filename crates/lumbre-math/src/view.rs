@@ -63,6 +63,16 @@ impl View {
         self.forward() + slope.x * self.frame.x + slope.y * self.frame.y
     }
 
+    /// The direction from the eye through a point of a picture on a cylinder about the upwards axis, unrolled: across
+    /// the picture the view turns by `degrees`, to the right and evenly; along it, depth 1 rises by the height that
+    /// makes pixels square.
+    pub fn cylindrical_direction(&self, degrees: f64, size: DVec2, film: DVec2) -> DVec3 {
+        let place = centred(size, film);
+        let (sin, cos) = sin_cos_degrees(0.5 * degrees * place.x);
+        let height = 0.5 * degrees.to_radians() * (size.y / size.x) * place.y;
+        cos * self.forward() + sin * self.frame.x + height * self.frame.y
+    }
+
     /// The origin of the ray, parallel to [`View::forward`], through a point of the picture in parallel projection.
     /// `half` is half the width and half the height of the picture in the world; `size` and `film` are in pixels.
     pub fn orthographic_origin(&self, half: DVec2, size: DVec2, film: DVec2) -> DVec3 {
@@ -80,6 +90,7 @@ fn centred(size: DVec2, film: DVec2) -> DVec2 {
 mod tests {
     use super::*;
     use crate::projection::{orthographic, perspective, project};
+    use crate::vector;
 
     fn views() -> impl Iterator<Item = View> {
         [Handedness::Right, Handedness::Left].into_iter().filter_map(|hand| {
@@ -110,6 +121,24 @@ mod tests {
         assert!(View::look_at(eye, eye, DVec3::Y, Handedness::Left).is_none());
         assert!(View::look_at(eye, eye + DVec3::Y, DVec3::Y, Handedness::Right).is_none());
         assert!(View::look_at(eye, DVec3::NAN, DVec3::Y, Handedness::Right).is_none());
+    }
+
+    #[test]
+    fn a_cylinder_is_unrolled_evenly() {
+        let mut count = 0;
+        for view in views() {
+            let (size, degrees) = (DVec2::new(360.0, 90.0), 240.0);
+            let at = |x, y| view.cylindrical_direction(degrees, size, DVec2::new(x, y));
+            assert!((at(180.0, 45.0) - view.forward()).length() < 1e-15);
+            assert!(at(190.0, 45.0).dot(view.frame.x) > 0.0 && at(180.0, 40.0).dot(view.frame.y) > 0.0);
+            let step = vector::angle(at(0.0, 45.0), at(1.0, 45.0));
+            assert!((step - vector::angle(at(200.0, 45.0), at(201.0, 45.0))).abs() < 1e-15);
+            assert!((step - (degrees / size.x).to_radians()).abs() < 1e-15);
+            // Square pixels where the cylinder touches the horizon.
+            assert!(((at(180.0, 44.0) - at(180.0, 45.0)).length() - step).abs() < 1e-15);
+            count += 1;
+        }
+        assert_eq!(count, 2);
     }
 
     #[test]
