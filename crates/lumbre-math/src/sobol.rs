@@ -111,13 +111,17 @@ pub const fn sobol_2d(index: u64) -> (u64, u64) {
 /// constants of Vegdahl, "Building a Better LK Hash", 2021, which flip more evenly.
 #[inline]
 pub const fn owen_scramble(bits: u32, seed: u32) -> u32 {
-    let x = bits.reverse_bits();
+    reversed_scramble(bits.reverse_bits(), seed).reverse_bits()
+}
+
+/// [`owen_scramble`] of binary places in reversed order, to reversed order.
+#[inline]
+const fn reversed_scramble(x: u32, seed: u32) -> u32 {
     let x = x ^ x.wrapping_mul(0x3d20_adea);
     let x = x.wrapping_add(seed);
     let x = x.wrapping_mul((seed >> 16) | 1);
     let x = x ^ x.wrapping_mul(0x0552_6c56);
-    let x = x ^ x.wrapping_mul(0x53a2_2864);
-    x.reverse_bits()
+    x ^ x.wrapping_mul(0x53a2_2864)
 }
 
 /// The number in `[0, 1)` with these binary places, cut after the 24th.
@@ -158,8 +162,10 @@ impl OwenSobol {
     #[inline]
     pub const fn bits_1d(&self, pixel: u64, index: u32, dimension: u32) -> u32 {
         let key = self.key(pixel, dimension);
+        // The radical inverse of the shuffled index is the shuffled index before its last reversal, and the scramble
+        // begins by reversing it again.
         let shuffled = owen_scramble(index, key as u32);
-        owen_scramble(shuffled.reverse_bits(), (key >> 32) as u32)
+        reversed_scramble(shuffled, (key >> 32) as u32).reverse_bits()
     }
 
     /// The 32 binary places of [`OwenSobol::get_2d`].
@@ -167,10 +173,18 @@ impl OwenSobol {
     pub const fn bits_2d(&self, pixel: u64, index: u32, dimension: u32) -> [u32; 2] {
         let key = self.key(pixel, dimension);
         let scrambles = mix(key ^ 0x2d2d_2d2d);
-        // The upper half of what a 64-bit index gives.
-        let (x, y) = sobol_2d(owen_scramble(index, key as u32) as u64);
-        let [x, y] = [(x >> 32) as u32, (y >> 32) as u32];
-        [owen_scramble(x, scrambles as u32), owen_scramble(y, (scrambles >> 32) as u32)]
+        let shuffled = owen_scramble(index, key as u32);
+        // The upper half of the second dimension, see `sobol_2d`.
+        let y = shuffled.reverse_bits();
+        let y = y ^ ((y & 0x5555_5555) << 1);
+        let y = y ^ ((y & 0x3333_3333) << 2);
+        let y = y ^ ((y & 0x0f0f_0f0f) << 4);
+        let y = y ^ ((y & 0x00ff_00ff) << 8);
+        let y = y ^ (y << 16);
+        [
+            reversed_scramble(shuffled, scrambles as u32).reverse_bits(),
+            owen_scramble(y, (scrambles >> 32) as u32),
+        ]
     }
 
     /// A point of the unit cube of `N` ≤ [`DIMENSIONS`] dimensions, even in all of them taken together. It takes one
@@ -246,19 +260,21 @@ impl ZOrderSobol {
     fn shuffle(&self, ordered: u64, key: u64) -> u64 {
         let digits = self.log2_side + self.log2_samples / 2;
         let odd = self.log2_samples % 2;
+        // A node of the tree of digits has a hash of its own: the digits above it, after a 1 that marks how many.
+        let hash = |node: u64| mix(key.wrapping_add(node.wrapping_mul(0x9e37_79b9_7f4a_7c15)));
         let mut shuffled = 0;
         for digit in (0..digits).rev() {
             let shift = 2 * digit + odd;
             let value = (ordered >> shift) & 3;
             // In two steps, for the topmost digit can stand at bit 62.
             let above = (ordered >> shift) >> 2;
-            let hash = mix(key ^ mix(above.wrapping_add(u64::from(digit) << 58)));
-            let permutation = PERMUTATIONS[(((hash >> 32) * 24) >> 32) as usize];
+            let bits = hash(1 << (2 * (digits - 1 - digit)) | above);
+            let permutation = PERMUTATIONS[(((bits >> 32) * 24) >> 32) as usize];
             shuffled |= u64::from(permutation[value as usize]) << shift;
         }
         if odd == 1 {
-            let hash = mix(key ^ mix((ordered >> 1).wrapping_add(63 << 58)));
-            shuffled |= (ordered ^ (hash >> 63)) & 1;
+            let bits = hash(1 << (2 * digits) | ordered >> 1);
+            shuffled |= (ordered ^ (bits >> 63)) & 1;
         }
         shuffled
     }
@@ -389,6 +405,26 @@ mod tests {
         let sampler = OwenSobol::new(2);
         let points: Vec<_> = (u32::MAX - 255..=u32::MAX).map(|i| sampler.bits_2d(9, i, 3)).collect();
         assert!(is_net(&points));
+    }
+
+    #[test]
+    fn fewer_reversals_give_the_same_points() {
+        let sampler = OwenSobol::new(8);
+        let mut random = RandomStream::new(5);
+        for _ in 0..2_000 {
+            let (pixel, index, dimension) =
+                (random.next_u64(), random.next_u64() as u32, random.next_u64() as u32);
+            let key = sampler.key(pixel, dimension);
+            let shuffled = owen_scramble(index, key as u32);
+            let plain = owen_scramble(sobol(shuffled, 0), (key >> 32) as u32);
+            assert_eq!(sampler.bits_1d(pixel, index, dimension), plain);
+            let scrambles = mix(key ^ 0x2d2d_2d2d);
+            let plain = [
+                owen_scramble(sobol(shuffled, 0), scrambles as u32),
+                owen_scramble(sobol(shuffled, 1), (scrambles >> 32) as u32),
+            ];
+            assert_eq!(sampler.bits_2d(pixel, index, dimension), plain);
+        }
     }
 
     #[test]
