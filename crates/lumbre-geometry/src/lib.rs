@@ -6,6 +6,7 @@
 mod aabb;
 mod axial;
 mod cone;
+mod csg;
 mod cuboid;
 mod cylinder;
 mod density;
@@ -28,6 +29,7 @@ mod triangle;
 
 pub use aabb::Aabb;
 pub use cone::Cone;
+pub use csg::{Crossing, Crossings, Csg, Leaf, LeafPart, Solid};
 pub use cuboid::Cuboid;
 pub use cylinder::Cylinder;
 pub use disk::Disk;

@@ -3,7 +3,7 @@
 use lumbre_math::{DVec2, DVec3, Transform};
 
 use crate::{
-    Aabb, BilinearPatch, Cone, Cuboid, Cylinder, DirectionSample, Disk, Hyperboloid, Paraboloid, Plane,
+    Aabb, BilinearPatch, Cone, Csg, Cuboid, Cylinder, DirectionSample, Disk, Hyperboloid, Paraboloid, Plane,
     Quadric, Ray, Root, Roots, Sphere, Surface, SurfaceSample, Torus, Triangle,
 };
 
@@ -121,6 +121,8 @@ shapes! {
     Hyperboloid(Hyperboloid) in Box<Hyperboloid>,
     /// A general quadric, in a box if it is to be bounded.
     Quadric(Quadric) in Box<Quadric>,
+    /// Unions, intersections and differences of solids.
+    Csg(Csg) in Box<Csg>,
 }
 
 impl Shape {
