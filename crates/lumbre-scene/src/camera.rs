@@ -1,6 +1,10 @@
 //! The closed set of cameras.
 
-use lumbre_math::Transform;
+use lumbre_geometry::Ray;
+use lumbre_math::warp::{equal_area_square_to_sphere, square_to_disk};
+use lumbre_math::{DVec2, DVec3, Transform};
+
+use crate::Footprint;
 
 /// How the sphere of directions fills the picture of a spherical camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -55,4 +59,122 @@ pub struct Camera {
     pub shutter_open: f64,
     /// When it closes.
     pub shutter_close: f64,
+}
+
+/// A ray from the camera, and how far apart its neighbours are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CameraRay {
+    /// The ray; its direction is unit.
+    pub ray: Ray,
+    /// The rays through neighbouring points of the film.
+    pub footprint: Footprint,
+}
+
+/// A camera before a picture of a certain size: it knows the ray of every point of the film.
+///
+/// Points of the film are in pixels, (0, 0) at the upper left corner of the upper left pixel, whose middle is (½, ½).
+#[derive(Clone, Debug)]
+pub struct View {
+    kind: CameraKind,
+    world_from_camera: Transform,
+    // Where (0, 0) of the film lies on the screen, and how far a pixel goes there. For a perspective camera the screen
+    // stands at z = 1, for a spherical one it is the unit square.
+    corner: DVec2,
+    step: DVec2,
+}
+
+impl View {
+    /// `camera` before a picture of `width` × `height` pixels, both at least 1.
+    pub fn new(camera: &Camera, width: u32, height: u32) -> Self {
+        let pixels = DVec2::new(f64::from(width.max(1)), f64::from(height.max(1)));
+        let aspect = camera.frame_aspect.unwrap_or(pixels.x / pixels.y);
+        let half = if aspect > 1.0 { DVec2::new(aspect, 1.0) } else { DVec2::new(1.0, 1.0 / aspect) };
+        let [x0, x1, y0, y1] = camera.screen_window.unwrap_or([-half.x, half.x, -half.y, half.y]);
+        let (corner, opposite) = match camera.kind {
+            CameraKind::Perspective { fov, .. } => {
+                let slope = (0.5 * fov.to_radians()).tan();
+                (slope * DVec2::new(x0, y1), slope * DVec2::new(x1, y0))
+            }
+            CameraKind::Orthographic { .. } => (DVec2::new(x0, y1), DVec2::new(x1, y0)),
+            CameraKind::Spherical { .. } => (DVec2::ZERO, DVec2::ONE),
+        };
+        Self {
+            kind: camera.kind.clone(),
+            world_from_camera: camera.world_from_camera,
+            corner,
+            step: (opposite - corner) / pixels,
+        }
+    }
+
+    /// The ray through a point of the film and a point of the lens (two uniform numbers), with the rays through the
+    /// points `spacing` pixels to the right and below as its footprint.
+    pub fn ray(&self, film: DVec2, lens: DVec2, spacing: f64) -> CameraRay {
+        let (origin, direction) = self.line(film, lens);
+        let (x_origin, x_direction) = self.line(film + DVec2::new(spacing, 0.0), lens);
+        let (y_origin, y_direction) = self.line(film + DVec2::new(0.0, spacing), lens);
+        CameraRay {
+            ray: Ray::new(origin, direction),
+            footprint: Footprint::Neighbours { x_origin, x_direction, y_origin, y_direction },
+        }
+    }
+
+    /// How far a point of the world is along the camera's axis; for a spherical camera, from its place.
+    pub fn depth(&self, point: DVec3) -> f64 {
+        let local = self.world_from_camera.inverse_point(point);
+        match self.kind {
+            CameraKind::Spherical { .. } => self.world_from_camera.vector(local).length(),
+            _ => self.world_from_camera.vector(DVec3::Z).length() * local.z,
+        }
+    }
+
+    /// Origin and unit direction in the world.
+    fn line(&self, film: DVec2, lens: DVec2) -> (DVec3, DVec3) {
+        let on_screen = self.corner + self.step * film;
+        let (origin, direction) = match self.kind {
+            CameraKind::Perspective { lens_radius, focal_distance, .. } => {
+                let towards = on_screen.extend(1.0);
+                through_lens(DVec3::ZERO, towards, lens_radius, focal_distance, lens)
+            }
+            CameraKind::Orthographic { lens_radius, focal_distance } => {
+                through_lens(on_screen.extend(0.0), DVec3::Z, lens_radius, focal_distance, lens)
+            }
+            CameraKind::Spherical { mapping: SphericalMapping::Equirectangular } => {
+                let (sin_theta, cos_theta) = (std::f64::consts::PI * on_screen.y).sin_cos();
+                let (sin_phi, cos_phi) = (std::f64::consts::TAU * on_screen.x).sin_cos();
+                (DVec3::ZERO, DVec3::new(sin_theta * cos_phi, cos_theta, sin_theta * sin_phi))
+            }
+            CameraKind::Spherical { mapping: SphericalMapping::EqualArea } => {
+                let d = equal_area_square_to_sphere(wrap_equal_area(on_screen));
+                (DVec3::ZERO, DVec3::new(d.x, d.z, d.y))
+            }
+        };
+        (self.world_from_camera.point(origin), self.world_from_camera.vector(direction).normalize())
+    }
+}
+
+/// The line from a point of the lens to where the line through the middle of the lens meets the plane in focus.
+/// `towards.z` is 1.
+fn through_lens(
+    center: DVec3,
+    towards: DVec3,
+    lens_radius: f64,
+    focal_distance: f64,
+    lens: DVec2,
+) -> (DVec3, DVec3) {
+    if lens_radius <= 0.0 {
+        return (center, towards);
+    }
+    let offset = (lens_radius * square_to_disk(lens)).extend(0.0);
+    (center + offset, focal_distance * towards - offset)
+}
+
+/// A point beside the unit square of the equal-area map, on the square: where the sphere goes on beyond the edge.
+fn wrap_equal_area(mut uv: DVec2) -> DVec2 {
+    if uv.x < 0.0 || uv.x > 1.0 {
+        uv = DVec2::new(if uv.x < 0.0 { -uv.x } else { 2.0 - uv.x }, 1.0 - uv.y);
+    }
+    if uv.y < 0.0 || uv.y > 1.0 {
+        uv = DVec2::new(1.0 - uv.x, if uv.y < 0.0 { -uv.y } else { 2.0 - uv.y });
+    }
+    uv.clamp(DVec2::ZERO, DVec2::ONE)
 }
