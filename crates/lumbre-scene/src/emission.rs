@@ -1,0 +1,50 @@
+//! Light that a surface gives off.
+
+use std::sync::Arc;
+
+use lumbre_math::Vec2;
+use lumbre_shading::{MipMap, Spectrum};
+
+/// The radiance that leaves a surface, in every direction alike.
+#[derive(Clone, Debug)]
+pub struct Emission {
+    /// Radiance, or a factor on the image.
+    pub radiance: Spectrum,
+    /// A factor over the surface's uv.
+    pub image: Option<Arc<MipMap>>,
+    /// Whether the back shines too.
+    pub two_sided: bool,
+}
+
+impl Emission {
+    /// The radiance that leaves the front or the back at `uv`.
+    pub fn at(&self, front: bool, uv: Vec2) -> Spectrum {
+        if !front && !self.two_sided {
+            return Spectrum::BLACK;
+        }
+        match &self.image {
+            None => self.radiance,
+            Some(image) => self.radiance * positive(image.lookup(uv, Vec2::ZERO, Vec2::ZERO)),
+        }
+    }
+
+    /// The mean radiance over the unit square of uv, from a grid of points.
+    pub fn mean(&self) -> Spectrum {
+        const SIDE: u32 = 32;
+        if self.image.is_none() {
+            return self.radiance;
+        }
+        let grid = |i: u32| (i as f32 + 0.5) / SIDE as f32;
+        let points = (0..SIDE * SIDE).map(|i| Vec2::new(grid(i % SIDE), grid(i / SIDE)));
+        points.map(|uv| self.at(true, uv)).sum::<Spectrum>() / (SIDE * SIDE) as f32
+    }
+
+    /// How many sides shine.
+    pub fn sides(&self) -> f32 {
+        if self.two_sided { 2.0 } else { 1.0 }
+    }
+}
+
+fn positive(colour: Spectrum) -> Spectrum {
+    colour.map(|c| c.max(0.0))
+}

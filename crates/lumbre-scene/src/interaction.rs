@@ -1,0 +1,104 @@
+//! A place where light meets a surface, with all that a path needs to go on from there.
+
+use lumbre_geometry::{Ray, Surface};
+use lumbre_math::{DVec3, Vec2};
+use lumbre_shading::{Bsdf, LocalSurface, Material, ShadingFrame, Spectrum, TextureContext};
+
+use crate::light::{LightId, LightSample};
+use crate::{Emission, Footprint};
+
+/// Where a ray meets a surface.
+#[derive(Clone, Debug)]
+pub struct Interaction<'s> {
+    /// The surface; its normal is geometric and points to the outside.
+    pub surface: Surface,
+    /// The shading surface; its normal is on the side of the geometric one.
+    pub shading: LocalSurface,
+    /// Unit, towards where the ray came from.
+    pub towards_origin: DVec3,
+    /// Whether the ray met the outside.
+    pub front: bool,
+    /// Where textures are looked up.
+    pub at: TextureContext,
+    /// What it is made of; `None` for an interface.
+    pub material: Option<&'s Material>,
+    /// The light that it gives off.
+    pub emission: Option<&'s Emission>,
+    /// The light that samples it.
+    pub light: Option<LightId>,
+    /// [`crate::ShapeDesc::index`] of the shape.
+    pub shape: u32,
+    /// The triangle or patch of a mesh, else 0.
+    pub primitive: u32,
+    /// The bare surface of the tree, which the densities of lights are asked with.
+    pub(crate) bare: Surface,
+    /// Width of the footprint across the ray, and its growth with distance.
+    pub(crate) width: f64,
+    pub(crate) spread: f64,
+}
+
+impl Interaction<'_> {
+    /// Surface parameters, as textures see them.
+    pub fn uv(&self) -> Vec2 {
+        self.at.uv
+    }
+
+    /// The radiance that it gives off towards the ray's origin.
+    pub fn emitted(&self) -> Spectrum {
+        self.emission.map_or(Spectrum::BLACK, |emission| emission.at(self.front, self.at.uv))
+    }
+
+    /// The shading frame and how the surface scatters; `None` for an interface.
+    pub fn scattering(&self) -> Option<(ShadingFrame, Bsdf)> {
+        let material = self.material?.resolve(&self.at, self.towards_origin.as_vec3());
+        let bsdf = material.bsdf(&self.at)?;
+        Some((material.frame(&self.at, &self.shading), bsdf))
+    }
+
+    /// The ray that leaves along a unit direction, from beyond the error of the point.
+    pub fn leave(&self, direction: DVec3) -> Ray {
+        Ray::new(self.start(direction), direction)
+    }
+
+    /// The segment to where the light comes from, short of it by its own error.
+    pub fn shadow_ray(&self, sample: &LightSample) -> Ray {
+        let Some(end) = sample.end else { return self.leave(sample.towards) };
+        let start = self.start(sample.towards);
+        let stop = offset(end.point, end.error, end.normal, -sample.towards);
+        // What rounds in the direction and in t.
+        Ray::new(start, stop - start).with_range(0.0, 1.0 - f64::powi(2.0, -40))
+    }
+
+    /// The footprint of a ray that leaves: as wide as that of the ray that came, and spreading as much.
+    pub fn footprint(&self) -> Footprint {
+        if self.width > 0.0 {
+            Footprint::Cone { width: self.width, spread: self.spread }
+        } else {
+            Footprint::Point
+        }
+    }
+
+    fn start(&self, direction: DVec3) -> DVec3 {
+        offset(self.surface.point, self.surface.point_error, self.surface.normal, direction)
+    }
+}
+
+/// The point moved along the normal, to the side of `direction`, out of the box of its error, and rounded away from
+/// the surface.
+///
+/// Pharr, Jakob, Humphreys, "Physically Based Rendering", 4th edition, 2023, 6.8.6.
+pub fn offset(point: DVec3, error: DVec3, normal: DVec3, direction: DVec3) -> DVec3 {
+    let distance = normal.abs().dot(error);
+    let along = if normal.dot(direction) < 0.0 { -normal } else { normal };
+    let moved = point + distance * along;
+    let away = |p: f64, n: f64| {
+        if n > 0.0 {
+            p.next_up()
+        } else if n < 0.0 {
+            p.next_down()
+        } else {
+            p
+        }
+    };
+    DVec3::new(away(moved.x, along.x), away(moved.y, along.y), away(moved.z, along.z))
+}

@@ -1,0 +1,144 @@
+//! The closed set of lights: sampled from a point, and asked for the density of what a ray found.
+
+mod area;
+mod delta;
+mod environment;
+mod mesh;
+
+use lumbre_geometry::{Ray, Surface};
+use lumbre_math::{DVec2, DVec3};
+use lumbre_shading::{Scatter, Spectrum};
+
+pub use area::ShapeLight;
+pub use delta::{DistantLight, PointLight, SpotLight};
+pub use environment::{Environment, UniformLight};
+pub use mesh::MeshLight;
+
+use crate::surface::SurfaceEntry;
+
+/// A light of a [`crate::Scene`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct LightId(pub u32);
+
+/// The kinds of light.
+#[derive(Clone, Debug)]
+pub enum Light {
+    /// The same in all directions from a point.
+    Point(PointLight),
+    /// A cone from a point.
+    Spot(SpotLight),
+    /// Parallel light.
+    Distant(DistantLight),
+    /// The same from all around.
+    Uniform(UniformLight),
+    /// A picture all around.
+    Environment(Environment),
+    /// One exact shape.
+    Shape(ShapeLight),
+    /// Triangles.
+    Mesh(MeshLight),
+}
+
+/// Light that arrives at a point, from a direction that a light chose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightSample {
+    /// Unit, towards the light.
+    pub towards: DVec3,
+    /// Where it comes from; `None` for what is infinitely far away.
+    pub end: Option<LightPoint>,
+    /// The radiance that arrives, if nothing stands in its way; for [`Scatter::Delta`], the irradiance on a surface that
+    /// faces it.
+    pub radiance: Spectrum,
+    /// How the direction was chosen, per unit solid angle.
+    pub scatter: Scatter,
+}
+
+/// Where a shadow ray ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightPoint {
+    /// The point.
+    pub point: DVec3,
+    /// A bound on the error of each component of it; zero for points given exactly.
+    pub error: DVec3,
+    /// The normal there; zero where there is no surface.
+    pub normal: DVec3,
+}
+
+impl LightPoint {
+    fn on(surface: &Surface) -> Self {
+        Self { point: surface.point, error: surface.point_error, normal: surface.normal }
+    }
+
+    fn bare(point: DVec3) -> Self {
+        Self { point, error: DVec3::ZERO, normal: DVec3::ZERO }
+    }
+}
+
+impl Light {
+    /// Light that arrives at `from`, by two uniform numbers. `None` where the light chose a direction from which nothing
+    /// comes.
+    pub(crate) fn sample(&self, entries: &[SurfaceEntry], from: DVec3, u: DVec2) -> Option<LightSample> {
+        match self {
+            Self::Point(light) => light.sample(from),
+            Self::Spot(light) => light.sample(from),
+            Self::Distant(light) => Some(light.sample()),
+            Self::Uniform(light) => Some(light.sample(u)),
+            Self::Environment(light) => light.sample(u),
+            Self::Shape(light) => light.sample(&entries[light.entry as usize], from, u),
+            Self::Mesh(light) => light.sample(&entries[light.entry as usize], from, u),
+        }
+    }
+
+    /// The density per unit solid angle with which the light chooses what `ray` hit: a surface for lights that have one.
+    /// 0 for lights that no ray can hit.
+    pub(crate) fn pdf(&self, ray: &Ray, surface: Option<(&Surface, u32)>) -> f64 {
+        match (self, surface) {
+            (Self::Uniform(_), None) => UniformLight::pdf(),
+            (Self::Environment(light), None) => light.pdf(ray.direction),
+            (Self::Shape(light), Some((surface, _))) => light.pdf(ray, surface),
+            (Self::Mesh(light), Some((surface, triangle))) => light.pdf(ray, surface, triangle),
+            _ => 0.0,
+        }
+    }
+
+    /// The radiance that arrives along the unit `direction` from infinitely far away.
+    pub fn escaped(&self, direction: DVec3) -> Spectrum {
+        match self {
+            Self::Uniform(light) => light.radiance,
+            Self::Environment(light) => light.radiance(direction),
+            _ => Spectrum::BLACK,
+        }
+    }
+
+    /// Whether rays that leave the scene meet it.
+    pub fn is_infinite(&self) -> bool {
+        matches!(self, Self::Uniform(_) | Self::Environment(_))
+    }
+
+    /// An estimate of the power that it sends into a scene of this radius, by which it is chosen.
+    pub fn power(&self, scene_radius: f64) -> f64 {
+        use std::f64::consts::PI;
+        let disk = PI * scene_radius * scene_radius;
+        let mean = |colour: Spectrum| f64::from(colour.average());
+        match self {
+            Self::Point(light) => 4.0 * PI * mean(light.intensity),
+            Self::Spot(light) => light.solid_angle() * mean(light.intensity),
+            Self::Distant(light) => disk * mean(light.irradiance),
+            Self::Uniform(light) => PI * disk * mean(light.radiance),
+            Self::Environment(light) => PI * disk * light.mean(),
+            Self::Shape(light) => light.power,
+            Self::Mesh(light) => light.power,
+        }
+    }
+
+    /// The name in the scene language.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Point(_) => "point",
+            Self::Spot(_) => "spot",
+            Self::Distant(_) => "distant",
+            Self::Uniform(_) | Self::Environment(_) => "infinite",
+            Self::Shape(_) | Self::Mesh(_) => "diffuse",
+        }
+    }
+}

@@ -1,0 +1,80 @@
+//! Light from one exact shape.
+
+use lumbre_geometry::{PlacedShape, Ray, Surface};
+use lumbre_math::{DVec2, DVec3, Vec2};
+use lumbre_shading::{FloatTexture, Scatter, Spectrum, TextureContext};
+
+use super::{LightPoint, LightSample};
+use crate::surface::SurfaceEntry;
+
+/// A bounded exact shape that shines.
+#[derive(Clone, Debug)]
+pub struct ShapeLight {
+    /// Which surface of the scene it is.
+    pub(crate) entry: u32,
+    pub(crate) shape: PlacedShape,
+    pub(crate) power: f64,
+}
+
+impl ShapeLight {
+    pub(super) fn sample(&self, entry: &SurfaceEntry, from: DVec3, u: DVec2) -> Option<LightSample> {
+        let sample = self.shape.sample_direction(from, u)?;
+        // The coordinates of a face are its uv until its vertices say otherwise.
+        arriving(entry, &sample.surface, 0, sample.surface.uv, from, sample.pdf)
+    }
+
+    pub(super) fn pdf(&self, ray: &Ray, surface: &Surface) -> f64 {
+        self.shape.pdf_direction(ray, surface)
+    }
+}
+
+/// The light that arrives at `from` from a point of a surface.
+pub(super) fn arriving(
+    entry: &SurfaceEntry,
+    bare: &Surface,
+    primitive: u32,
+    local: DVec2,
+    from: DVec3,
+    pdf: f64,
+) -> Option<LightSample> {
+    let dressed = entry.dress(bare, primitive, local, None);
+    let towards = (dressed.surface.point - from).try_normalize()?;
+    let front = dressed.surface.normal.dot(towards) < 0.0;
+    let emission = entry.emission.as_ref()?;
+    let uv = dressed.surface.uv.as_vec2();
+    let mut radiance = emission.at(front, uv);
+    let mut scatter = Scatter::Density(pdf as f32);
+    if let Some(alpha) = &entry.alpha {
+        if matches!(**alpha, FloatTexture::Constant(0.0)) {
+            // Cut out altogether it still shines, but no ray finds it.
+            radiance = radiance * (1.0 / pdf) as f32;
+            scatter = Scatter::Delta;
+        } else {
+            radiance = radiance * alpha.evaluate(&bare_context(&dressed.surface, uv)).clamp(0.0, 1.0);
+        }
+    }
+    (pdf > 0.0 && !radiance.is_black()).then(|| LightSample {
+        towards,
+        end: Some(LightPoint::on(&dressed.surface)),
+        radiance,
+        scatter,
+    })
+}
+
+/// The context of a lookup at a point, without a footprint.
+pub(crate) fn bare_context(surface: &Surface, uv: Vec2) -> TextureContext {
+    TextureContext {
+        point: surface.point,
+        normal: surface.normal.as_vec3(),
+        uv,
+        dpdx: lumbre_math::Vec3::ZERO,
+        dpdy: lumbre_math::Vec3::ZERO,
+        duv_dx: Vec2::ZERO,
+        duv_dy: Vec2::ZERO,
+    }
+}
+
+/// The power of a surface of some area that emits this in the mean.
+pub(crate) fn power(mean: Spectrum, sides: f32, area: f64) -> f64 {
+    std::f64::consts::PI * area * f64::from(sides * mean.average())
+}

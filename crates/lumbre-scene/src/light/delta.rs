@@ -1,0 +1,109 @@
+//! Lights that no ray can hit: they shine from a point or from one direction.
+
+use lumbre_math::{DVec3, Transform};
+use lumbre_shading::{Scatter, Spectrum};
+
+use super::{LightPoint, LightSample};
+
+/// The same in all directions from a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointLight {
+    /// Where.
+    pub from: DVec3,
+    /// Radiant intensity.
+    pub intensity: Spectrum,
+}
+
+impl PointLight {
+    pub(super) fn sample(&self, at: DVec3) -> Option<LightSample> {
+        from_point(self.from, at, self.intensity)
+    }
+}
+
+/// A cone from a point, with a smooth edge.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpotLight {
+    /// Where.
+    pub from: DVec3,
+    /// Unit, along the cone.
+    pub axis: DVec3,
+    /// Radiant intensity along the axis.
+    pub intensity: Spectrum,
+    /// The cosine of the angle at which it begins to fade.
+    pub cos_start: f64,
+    /// The cosine of the angle beyond which there is nothing.
+    pub cos_end: f64,
+}
+
+impl SpotLight {
+    /// A spot along +z of a space.
+    pub fn new(
+        world_from_light: &Transform,
+        intensity: Spectrum,
+        cone_degrees: f32,
+        delta_degrees: f32,
+    ) -> Self {
+        let cone = f64::from(cone_degrees).to_radians();
+        let start = (cone - f64::from(delta_degrees).to_radians()).max(0.0);
+        Self {
+            from: world_from_light.point(DVec3::ZERO),
+            axis: world_from_light.vector(DVec3::Z).normalize(),
+            intensity,
+            cos_start: start.cos(),
+            cos_end: cone.cos(),
+        }
+    }
+
+    pub(super) fn sample(&self, at: DVec3) -> Option<LightSample> {
+        let cosine = (at - self.from).try_normalize()?.dot(self.axis);
+        let share = self.falloff(cosine);
+        (share > 0.0).then(|| from_point(self.from, at, self.intensity * share as f32))?
+    }
+
+    /// The share of the intensity at an angle with this cosine.
+    pub fn falloff(&self, cosine: f64) -> f64 {
+        if self.cos_start <= self.cos_end {
+            return if cosine >= self.cos_end { 1.0 } else { 0.0 };
+        }
+        let x = ((cosine - self.cos_end) / (self.cos_start - self.cos_end)).clamp(0.0, 1.0);
+        x * x * (3.0 - 2.0 * x)
+    }
+
+    /// The integral of the falloff over all directions.
+    pub(super) fn solid_angle(&self) -> f64 {
+        // The smooth step is ½ in the mean.
+        std::f64::consts::TAU * ((1.0 - self.cos_start) + 0.5 * (self.cos_start - self.cos_end))
+    }
+}
+
+/// Parallel light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DistantLight {
+    /// Unit, towards the light.
+    pub towards: DVec3,
+    /// Irradiance on a surface that faces it.
+    pub irradiance: Spectrum,
+}
+
+impl DistantLight {
+    pub(super) fn sample(&self) -> LightSample {
+        LightSample {
+            towards: self.towards,
+            end: None,
+            radiance: self.irradiance,
+            scatter: Scatter::Delta,
+        }
+    }
+}
+
+fn from_point(from: DVec3, at: DVec3, intensity: Spectrum) -> Option<LightSample> {
+    let apart = from - at;
+    let towards = apart.try_normalize()?;
+    let radiance = intensity * (1.0 / apart.length_squared()) as f32;
+    radiance.is_finite().then(|| LightSample {
+        towards,
+        end: Some(LightPoint::bare(from)),
+        radiance,
+        scatter: Scatter::Delta,
+    })
+}

@@ -1,0 +1,187 @@
+//! Light from infinitely far away, from all around.
+
+use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
+
+use lumbre_image::Image;
+use lumbre_math::distribution::PiecewiseConstant2D;
+use lumbre_math::{DVec2, DVec3, Transform, warp64};
+use lumbre_shading::{Scatter, Spectrum};
+
+use super::LightSample;
+use crate::EnvironmentMapping;
+
+/// The same radiance from everywhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UniformLight {
+    /// The radiance.
+    pub radiance: Spectrum,
+}
+
+impl UniformLight {
+    pub(super) fn sample(&self, u: DVec2) -> LightSample {
+        LightSample {
+            towards: warp64::square_to_sphere(u),
+            end: None,
+            radiance: self.radiance,
+            scatter: Scatter::Density(Self::pdf() as f32),
+        }
+    }
+
+    pub(super) fn pdf() -> f64 {
+        1.0 / (4.0 * PI)
+    }
+}
+
+/// A picture of radiance all around, interpolated between its pixels, and chosen by its brightness.
+#[derive(Clone, Debug)]
+pub struct Environment {
+    image: Arc<Image>,
+    mapping: EnvironmentMapping,
+    world_from_light: Transform,
+    scale: Spectrum,
+    // One cell a pixel: the mean over the pixel of what the interpolation gives there, times its solid angle. It is
+    // nowhere zero where the interpolation is not.
+    by_brightness: PiecewiseConstant2D,
+    // The mean over the sphere of the mean of the channels.
+    mean: f64,
+}
+
+impl Environment {
+    /// `None` for a picture that is black, empty or not finite.
+    pub(crate) fn new(
+        image: Arc<Image>,
+        mapping: EnvironmentMapping,
+        world_from_light: Transform,
+        scale: Spectrum,
+    ) -> Option<Self> {
+        let (width, height) = (image.width() as usize, image.height() as usize);
+        if width == 0 || height == 0 || !image.pixels().iter().all(|c| c.is_finite()) {
+            return None;
+        }
+        // The mean of a linear interpolation over a pixel: 1/8, 6/8, 1/8 of it and its neighbours, both ways.
+        let brightness = |x: i64, y: i64| f64::from(texel(&image, mapping, x, y).average());
+        let smooth = |x: i64, y: i64| {
+            let row = |y| 0.125 * (brightness(x - 1, y) + brightness(x + 1, y)) + 0.75 * brightness(x, y);
+            0.125 * (row(y - 1) + row(y + 1)) + 0.75 * row(y)
+        };
+        let mut weights = Vec::with_capacity(width * height);
+        let (mut sum, mut whole) = (0.0, 0.0);
+        for y in 0..height {
+            let solid_angle = match mapping {
+                EnvironmentMapping::EqualArea => 1.0,
+                EnvironmentMapping::LatitudeLongitude => {
+                    let edge = |y: usize| (PI * y as f64 / height as f64).cos();
+                    edge(y) - edge(y + 1)
+                }
+            };
+            for x in 0..width {
+                let weight = solid_angle * smooth(x as i64, y as i64);
+                weights.push(weight as f32);
+                sum += weight;
+                whole += solid_angle;
+            }
+        }
+        let by_brightness = PiecewiseConstant2D::new(&weights, width)?;
+        let mean = sum / whole * f64::from(scale.average());
+        Some(Self { image, mapping, world_from_light, scale, by_brightness, mean })
+    }
+
+    pub(super) fn mean(&self) -> f64 {
+        self.mean
+    }
+
+    /// The radiance from the unit `direction` of the world.
+    pub fn radiance(&self, direction: DVec3) -> Spectrum {
+        self.scale * self.lookup(self.square(self.to_light(direction)))
+    }
+
+    pub(super) fn sample(&self, u: DVec2) -> Option<LightSample> {
+        let (uv, density) = self.by_brightness.sample(u);
+        let local = match self.mapping {
+            EnvironmentMapping::EqualArea => warp64::equal_area_square_to_sphere(uv),
+            EnvironmentMapping::LatitudeLongitude => {
+                warp64::latlong_to_sphere(uv + DVec2::new(0.5, 0.0))
+            }
+        };
+        let pdf = density * self.density_of_map(local);
+        let radiance = self.scale * self.lookup(uv);
+        (pdf > 0.0 && pdf.is_finite() && !radiance.is_black()).then(|| LightSample {
+            towards: self.world_from_light.vector(local).normalize(),
+            end: None,
+            radiance,
+            scatter: Scatter::Density(pdf as f32),
+        })
+    }
+
+    pub(super) fn pdf(&self, direction: DVec3) -> f64 {
+        let local = self.to_light(direction);
+        self.by_brightness.pdf(self.square(local)) * self.density_of_map(local)
+    }
+
+    fn to_light(&self, direction: DVec3) -> DVec3 {
+        self.world_from_light.inverse_vector(direction).normalize()
+    }
+
+    /// Where a unit direction of the light's space falls in the unit square, (0, 0) at the upper left of the picture.
+    fn square(&self, local: DVec3) -> DVec2 {
+        match self.mapping {
+            EnvironmentMapping::EqualArea => warp64::equal_area_sphere_to_square(local),
+            EnvironmentMapping::LatitudeLongitude => {
+                let uv = warp64::sphere_to_latlong(local);
+                DVec2::new(if uv.x < 0.5 { uv.x + 0.5 } else { uv.x - 0.5 }, uv.y)
+            }
+        }
+    }
+
+    /// Area of the square over solid angle in the world.
+    fn density_of_map(&self, local: DVec3) -> f64 {
+        let in_light = match self.mapping {
+            EnvironmentMapping::EqualArea => 1.0 / (4.0 * PI),
+            EnvironmentMapping::LatitudeLongitude => {
+                1.0 / (TAU * PI * local.truncate().length())
+            }
+        };
+        // A solid angle under a linear map; exactly 1 for a rotation, up to rounding.
+        let stretch = self.world_from_light.vector(local).length();
+        in_light * (stretch * stretch * stretch / self.world_from_light.determinant().abs())
+    }
+
+    /// Between the four pixels about a point of the unit square.
+    fn lookup(&self, uv: DVec2) -> Spectrum {
+        let size = DVec2::new(f64::from(self.image.width()), f64::from(self.image.height()));
+        let at = uv * size - 0.5;
+        let cell = at.floor();
+        let (x, y) = (cell.x as i64, cell.y as i64);
+        let part = (at - cell).as_vec2();
+        let texel = |x, y| texel(&self.image, self.mapping, x, y);
+        let above = texel(x, y).lerp(texel(x + 1, y), part.x);
+        let below = texel(x, y + 1).lerp(texel(x + 1, y + 1), part.x);
+        above.lerp(below, part.y)
+    }
+}
+
+/// The pixel, or the one that it stands for when it lies beyond an edge. Negative light is none.
+fn texel(image: &Image, mapping: EnvironmentMapping, x: i64, y: i64) -> Spectrum {
+    let (width, height) = (i64::from(image.width()), i64::from(image.height()));
+    let (x, y) = match mapping {
+        EnvironmentMapping::EqualArea => {
+            let (mut x, mut y) = (x, y);
+            // Each edge meets itself, mirrored about its middle.
+            if x < 0 || x >= width {
+                (x, y) = (if x < 0 { -1 - x } else { 2 * width - 1 - x }, height - 1 - y);
+            }
+            if y < 0 || y >= height {
+                (x, y) = (width - 1 - x, if y < 0 { -1 - y } else { 2 * height - 1 - y });
+            }
+            (x.clamp(0, width - 1), y.clamp(0, height - 1))
+        }
+        // Beyond a pole lies the other side.
+        EnvironmentMapping::LatitudeLongitude => {
+            let beyond = y < 0 || y >= height;
+            let y = if y < 0 { -1 - y } else if y >= height { 2 * height - 1 - y } else { y };
+            ((if beyond { x + width / 2 } else { x }).rem_euclid(width), y.clamp(0, height - 1))
+        }
+    };
+    image.pixels()[(y * width + x) as usize].map(|c| c.max(0.0))
+}

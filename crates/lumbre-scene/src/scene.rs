@@ -1,0 +1,265 @@
+//! What there is, resolved for rendering, and the questions that light transport asks.
+
+use std::sync::Arc;
+
+use lumbre_geometry::{Aabb, Ray};
+use lumbre_kernel::{Accel, Hit};
+use lumbre_math::distribution::AliasTable;
+use lumbre_math::random::{combine, hash_dvec3, uniform_f32};
+use lumbre_math::{DVec2, DVec3, Transform};
+use lumbre_shading::{FloatTexture, Scatter, Spectrum, TextureContext};
+
+use crate::light::{Light, LightId, LightSample, bare_context};
+use crate::surface::{Dressed, Form, SurfaceEntry};
+use crate::{Camera, FilmDesc, FilterDesc, Footprint, IntegratorDesc, Interaction, SamplerDesc};
+
+/// A scene, ready to be rendered from any number of threads. Nothing changes it.
+#[derive(Debug)]
+pub struct Scene {
+    pub(crate) accel: Arc<Accel>,
+    pub(crate) entries: Vec<SurfaceEntry>,
+    pub(crate) lights: Vec<Light>,
+    // By power; `None` where there is no light.
+    pub(crate) light_choice: Option<AliasTable>,
+    pub(crate) infinite: Vec<LightId>,
+    pub(crate) cameras: Vec<Camera>,
+    pub(crate) film: FilmDesc,
+    pub(crate) filter: FilterDesc,
+    pub(crate) sampler: SamplerDesc,
+    pub(crate) integrator: IntegratorDesc,
+    pub(crate) bounds: Aabb,
+    pub(crate) warnings: Vec<BuildWarning>,
+    // Whether rays of light must ask every hit if it counts: something is cut out, or is an interface.
+    pub(crate) has_holes: bool,
+    pub(crate) has_instances: bool,
+}
+
+/// Something in a description that was left out of the scene, or is slower or noisier than it could be.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BuildWarning {
+    /// The area light of an interface is dropped, for an interface is no surface.
+    #[error("shape {shape}: an area light on an interface gives no light")]
+    LightOnInterface {
+        /// Which shape.
+        shape: u32,
+    },
+    /// Light in an object that is instanced, or on a CSG, is found only by rays that happen to hit it.
+    #[error("shape {shape}: its light is found by chance only, for it is in an instance or a CSG (slow to converge)")]
+    UnsampledLight {
+        /// Which shape.
+        shape: u32,
+    },
+    /// A shape has no area, and was left out.
+    #[error("shape {shape}: without area, nothing can be seen of it")]
+    Empty {
+        /// Which shape.
+        shape: u32,
+    },
+    /// An environment that is black or not finite gives no light.
+    #[error("light {light}: its picture is black or not finite, it gives no light")]
+    DarkEnvironment {
+        /// Its position among the lights.
+        light: usize,
+    },
+}
+
+impl Scene {
+    /// The tree, for queries that are not about light. The id of a hit leads to [`Scene::shape_index`].
+    pub fn accel(&self) -> &Accel {
+        &self.accel
+    }
+
+    /// Cameras, the one to use first. There is always one.
+    pub fn cameras(&self) -> &[Camera] {
+        &self.cameras
+    }
+
+    /// What the description says of the film.
+    pub fn film(&self) -> &FilmDesc {
+        &self.film
+    }
+
+    /// What the description says of the pixel filter.
+    pub fn filter(&self) -> FilterDesc {
+        self.filter
+    }
+
+    /// What the description says of the sampler.
+    pub fn sampler(&self) -> SamplerDesc {
+        self.sampler
+    }
+
+    /// What the description says of the integrator.
+    pub fn integrator(&self) -> IntegratorDesc {
+        self.integrator
+    }
+
+    /// A box around everything finite; empty where there is nothing.
+    pub fn bounds(&self) -> Aabb {
+        self.bounds
+    }
+
+    /// Every light.
+    pub fn lights(&self) -> &[Light] {
+        &self.lights
+    }
+
+    /// What was left out or will be slow.
+    pub fn warnings(&self) -> &[BuildWarning] {
+        &self.warnings
+    }
+
+    /// The position in its file of the shape that was hit.
+    pub fn shape_index(&self, hit: &Hit) -> u32 {
+        self.leaf(hit).shape
+    }
+
+    /// The nearest hit that light sees: cut-outs and interfaces let it pass.
+    pub fn closest(&self, ray: &Ray) -> Option<Hit> {
+        if self.has_holes {
+            self.accel.closest_filtered(ray, |hit| self.is_solid(ray, hit))
+        } else {
+            self.accel.closest(ray)
+        }
+    }
+
+    /// Whether something stands in the way of light.
+    pub fn is_occluded(&self, ray: &Ray) -> bool {
+        if self.has_holes {
+            self.accel.any_filtered(ray, |hit| self.is_solid(ray, hit))
+        } else {
+            self.accel.any(ray)
+        }
+    }
+
+    /// What there is at a hit.
+    pub fn interaction(&self, ray: &Ray, hit: &Hit, footprint: &Footprint) -> Interaction<'_> {
+        let entry = self.leaf(hit);
+        let bare = self.accel.surface(ray, hit);
+        let (dressed, primitive) = self.dressed(entry, &bare, hit);
+        let length = ray.direction.length();
+        let direction = ray.direction / length;
+        let front = dressed.surface.normal.dot(direction) < 0.0;
+        let surface = dressed.surface;
+        let spot = footprint.on_plane(
+            surface.point,
+            surface.normal,
+            surface.dpdu,
+            surface.dpdv,
+            direction,
+            hit.root.t * length,
+        );
+        Interaction {
+            at: TextureContext {
+                point: surface.point,
+                normal: dressed.shading.normal,
+                uv: surface.uv.as_vec2(),
+                dpdx: spot.dpdx,
+                dpdy: spot.dpdy,
+                duv_dx: spot.duv_dx,
+                duv_dy: spot.duv_dy,
+            },
+            surface,
+            shading: dressed.shading,
+            towards_origin: -direction,
+            front,
+            material: entry.material.as_deref(),
+            emission: entry.emission.as_ref(),
+            light: if hit.instances.is_empty() { entry.light } else { None },
+            shape: entry.shape,
+            primitive,
+            bare,
+            width: spot.width,
+            spread: spot.spread,
+        }
+    }
+
+    /// Light that arrives at `from` from a light chosen by `choose`, in a direction chosen by `u`. Its density, or its
+    /// radiance where it has none, counts the choice.
+    pub fn sample_light(&self, from: DVec3, choose: f64, u: DVec2) -> Option<LightSample> {
+        let choice = self.light_choice.as_ref()?.sample(choose);
+        let mut sample = self.lights[choice.index].sample(&self.entries, from, u)?;
+        match &mut sample.scatter {
+            Scatter::Density(pdf) => *pdf *= choice.probability as f32,
+            Scatter::Delta => sample.radiance = sample.radiance * (1.0 / choice.probability) as f32,
+        }
+        Some(sample)
+    }
+
+    /// Light that arrives at `from` from one light, in a direction chosen by `u`.
+    pub fn sample_one_light(&self, light: LightId, from: DVec3, u: DVec2) -> Option<LightSample> {
+        self.lights[light.0 as usize].sample(&self.entries, from, u)
+    }
+
+    /// The density per unit solid angle with which [`Scene::sample_light`] chooses the place that `ray` (with a unit
+    /// direction) hit; 0 where it never does.
+    pub fn light_pdf(&self, ray: &Ray, hit: &Interaction) -> f32 {
+        let Some(light) = hit.light else { return 0.0 };
+        let surface = Some((&hit.bare, hit.primitive));
+        (self.light_probability(light) * self.lights[light.0 as usize].pdf(ray, surface)) as f32
+    }
+
+    /// What arrives along the unit direction of a ray that leaves the scene: for each light at infinity its radiance, and
+    /// the density with which [`Scene::sample_light`] chooses the direction for it.
+    pub fn escaped<'s>(&'s self, ray: &'s Ray) -> impl Iterator<Item = (Spectrum, f32)> + 's {
+        self.infinite.iter().map(move |&id| {
+            let light = &self.lights[id.0 as usize];
+            let pdf = self.light_probability(id) * light.pdf(ray, None);
+            (light.escaped(ray.direction), pdf as f32)
+        })
+    }
+
+    fn light_probability(&self, light: LightId) -> f64 {
+        self.light_choice.as_ref().map_or(0.0, |choice| choice.probability(light.0 as usize))
+    }
+
+    /// The surface that was hit: that of a leaf, for a CSG.
+    fn leaf(&self, hit: &Hit) -> &SurfaceEntry {
+        let entry = &self.entries[hit.id as usize];
+        match &entry.form {
+            Form::Csg(csg) => csg.leaf(hit.root.part),
+            _ => entry,
+        }
+    }
+
+    fn dressed(
+        &self,
+        entry: &SurfaceEntry,
+        bare: &lumbre_geometry::Surface,
+        hit: &Hit,
+    ) -> (Dressed, u32) {
+        let placement: Option<Transform> = (self.has_instances && !hit.instances.is_empty())
+            .then(|| self.accel.world_from_object(hit));
+        let dressed = entry.dress(bare, hit.primitive, hit.root.local, placement.as_ref());
+        let primitive = match &entry.form {
+            Form::Patch { primitive, .. } => *primitive,
+            _ => hit.primitive,
+        };
+        (dressed, primitive)
+    }
+
+    /// Whether a hit stops light. Where coverage is partial, a hash of the ray and of the place decides: the same
+    /// wherever it is asked.
+    fn is_solid(&self, ray: &Ray, hit: &Hit) -> bool {
+        let entry = self.leaf(hit);
+        if !entry.is_visible() {
+            return false;
+        }
+        let Some(alpha) = &entry.alpha else { return true };
+        let coverage = match **alpha {
+            FloatTexture::Constant(coverage) => coverage,
+            _ => {
+                let bare = self.accel.surface(ray, hit);
+                let (dressed, _) = self.dressed(entry, &bare, hit);
+                alpha.evaluate(&bare_context(&dressed.surface, dressed.surface.uv.as_vec2()))
+            }
+        };
+        if coverage >= 1.0 {
+            return true;
+        }
+        let line = combine(hash_dvec3(ray.origin), hash_dvec3(ray.direction));
+        let place = combine(u64::from(hit.id) << 32 | u64::from(hit.primitive), hit.root.t.to_bits());
+        uniform_f32(combine(line, place)) < coverage
+    }
+}

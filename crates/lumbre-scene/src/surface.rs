@@ -1,0 +1,243 @@
+//! What the scene knows of a geometry of the tree: what it is made of, and how its vertices dress it.
+
+use std::sync::Arc;
+
+use lumbre_geometry::Surface;
+use lumbre_math::{DVec2, DVec3, Transform, Vec2, Vec3};
+use lumbre_shading::{FloatTexture, LocalSurface, Material};
+
+use crate::Emission;
+use crate::light::LightId;
+
+/// What stands behind one id of the tree.
+#[derive(Clone, Debug)]
+pub(crate) struct SurfaceEntry {
+    /// [`crate::ShapeDesc::index`].
+    pub shape: u32,
+    /// `None` for an interface, which rays of light do not see.
+    pub material: Option<Arc<Material>>,
+    pub emission: Option<Emission>,
+    /// The light that samples it; `None` where its light is only found by rays that hit it.
+    pub light: Option<LightId>,
+    pub alpha: Option<Arc<FloatTexture>>,
+    pub reverse: bool,
+    pub form: Form,
+}
+
+/// What dresses the bare surface that the tree knows.
+#[derive(Clone, Debug)]
+pub(crate) enum Form {
+    /// Nothing: the surface is as geometry has it.
+    Exact,
+    /// A triangle mesh.
+    Mesh(Arc<MeshDress>),
+    /// The patch of a mesh that is a quad which is not flat.
+    Patch { dress: Arc<MeshDress>, corners: [u32; 4], primitive: u32 },
+    /// Parts of a CSG: the surface of each leaf, by its id within the CSG.
+    Csg(Arc<Vec<SurfaceEntry>>),
+}
+
+/// What a mesh has at its vertices, in the space of the tree that it stands in.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct MeshDress {
+    pub triangles: Vec<[u32; 3]>,
+    /// From this triangle on, two triangles are halves of a quad.
+    pub first_half: u32,
+    pub normals: Option<Vec<Vec3>>,
+    pub uvs: Option<Vec<Vec2>>,
+    pub tangents: Option<Vec<Vec3>>,
+}
+
+/// A surface with what its vertices say of it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Dressed {
+    /// The surface, its normal turned to the outside, its uv and derivatives those that textures see.
+    pub surface: Surface,
+    pub shading: LocalSurface,
+}
+
+/// A value at three or four corners of a face, as a function of the face's own coordinates.
+struct Blend<const N: usize> {
+    weights: [f64; N],
+    /// Derivatives of the weights by the two coordinates of the face.
+    along: [[f64; N]; 2],
+}
+
+impl<const N: usize> Blend<N> {
+    fn value(&self, corners: [DVec3; N]) -> DVec3 {
+        (0..N).map(|i| self.weights[i] * corners[i]).sum()
+    }
+
+    fn slopes(&self, corners: [DVec3; N]) -> [DVec3; 2] {
+        self.along.map(|weights| (0..N).map(|i| weights[i] * corners[i]).sum())
+    }
+}
+
+fn triangle_blend(b: DVec2) -> Blend<3> {
+    Blend { weights: [1.0 - b.x - b.y, b.x, b.y], along: [[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]] }
+}
+
+/// Corners in the order p00, p10, p01, p11.
+fn patch_blend(uv: DVec2) -> Blend<4> {
+    let (u, v) = (uv.x, uv.y);
+    Blend {
+        weights: [(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v],
+        along: [[v - 1.0, 1.0 - v, -v, v], [u - 1.0, -u, 1.0 - u, u]],
+    }
+}
+
+impl SurfaceEntry {
+    /// Whether rays of light see it: an interface only parts media.
+    pub fn is_visible(&self) -> bool {
+        self.material.is_some()
+    }
+
+    /// Dresses a bare surface of the tree. `local` are the coordinates of the face that it lies on, `placement` leads
+    /// from the space of the mesh to that of `surface`.
+    pub fn dress(
+        &self,
+        surface: &Surface,
+        primitive: u32,
+        local: DVec2,
+        placement: Option<&Transform>,
+    ) -> Dressed {
+        let mut dressed = match &self.form {
+            Form::Exact | Form::Csg(_) => plain(surface),
+            Form::Mesh(mesh) => {
+                let corners = mesh.triangles[primitive as usize];
+                let uvs = match &mesh.uvs {
+                    Some(uvs) => corners.map(|i| uvs[i as usize]),
+                    None => mesh.default_uvs(primitive),
+                };
+                mesh.dress(surface, corners, uvs, &triangle_blend(local), placement)
+            }
+            Form::Patch { dress, corners, .. } => {
+                let uvs = match &dress.uvs {
+                    Some(uvs) => corners.map(|i| uvs[i as usize]),
+                    None => [Vec2::ZERO, Vec2::X, Vec2::Y, Vec2::ONE],
+                };
+                dress.dress(surface, *corners, uvs, &patch_blend(local), placement)
+            }
+        };
+        if self.reverse {
+            dressed.turn();
+        }
+        dressed
+    }
+}
+
+impl Dressed {
+    fn turn(&mut self) {
+        self.surface.normal = -self.surface.normal;
+        self.surface.dndu = -self.surface.dndu;
+        self.surface.dndv = -self.surface.dndv;
+        self.shading.normal = -self.shading.normal;
+        self.shading.dndu = -self.shading.dndu;
+        self.shading.dndv = -self.shading.dndv;
+    }
+}
+
+fn plain(surface: &Surface) -> Dressed {
+    Dressed {
+        surface: *surface,
+        shading: LocalSurface {
+            normal: surface.normal.as_vec3(),
+            dpdu: surface.dpdu.as_vec3(),
+            dpdv: surface.dpdv.as_vec3(),
+            dndu: surface.dndu.as_vec3(),
+            dndv: surface.dndv.as_vec3(),
+        },
+    }
+}
+
+impl MeshDress {
+    /// pbrt's parameters for triangles without any: (0, 0), (1, 0), (1, 1), and those of a quad for its halves.
+    fn default_uvs(&self, triangle: u32) -> [Vec2; 3] {
+        let second_half = triangle >= self.first_half && (triangle - self.first_half) % 2 == 1;
+        if second_half { [Vec2::ZERO, Vec2::ONE, Vec2::Y] } else { [Vec2::ZERO, Vec2::X, Vec2::ONE] }
+    }
+
+    fn dress<const N: usize>(
+        &self,
+        bare: &Surface,
+        corners: [u32; N],
+        uvs: [Vec2; N],
+        blend: &Blend<N>,
+        placement: Option<&Transform>,
+    ) -> Dressed {
+        let mut surface = *bare;
+        let uvs = uvs.map(|uv| DVec3::new(f64::from(uv.x), f64::from(uv.y), 0.0));
+        let uv = blend.value(uvs);
+        surface.uv = DVec2::new(uv.x, uv.y);
+
+        // From derivatives by the coordinates of the face to derivatives by uv.
+        let [by_a, by_b] = blend.slopes(uvs);
+        let determinant = by_a.x * by_b.y - by_a.y * by_b.x;
+        let by_uv = |along_a: DVec3, along_b: DVec3| {
+            let along_u = (along_a * by_b.y - along_b * by_a.y) / determinant;
+            let along_v = (along_b * by_a.x - along_a * by_b.x) / determinant;
+            (along_u, along_v)
+        };
+        let (dpdu, dpdv) = by_uv(bare.dpdu, bare.dpdv);
+        let has_parameters = determinant != 0.0
+            && dpdu.is_finite()
+            && dpdv.is_finite()
+            && dpdu.cross(dpdv).length_squared() > 0.0;
+        (surface.dpdu, surface.dpdv) =
+            if has_parameters { (dpdu, dpdv) } else { bare.normal.any_orthonormal_pair() };
+        (surface.dndu, surface.dndv) =
+            if has_parameters { by_uv(bare.dndu, bare.dndv) } else { (DVec3::ZERO, DVec3::ZERO) };
+
+        let Some(normals) = &self.normals else {
+            let mut dressed = plain(&surface);
+            self.align(&mut dressed, corners, blend, placement);
+            return dressed;
+        };
+        let normals = corners.map(|i| normals[i as usize].as_dvec3());
+        let moved = |n: DVec3| placement.map_or(n, |m| m.normal(n));
+        let sum = moved(blend.value(normals));
+        let length = sum.length();
+        if length.is_nan() || length <= 0.0 {
+            let mut dressed = plain(&surface);
+            self.align(&mut dressed, corners, blend, placement);
+            return dressed;
+        }
+        let normal = sum / length;
+        // The vertices say which side is out (pbrt does so, and meshes whose faces run the wrong way are many).
+        if surface.normal.dot(normal) < 0.0 {
+            surface.normal = -surface.normal;
+            surface.dndu = -surface.dndu;
+            surface.dndv = -surface.dndv;
+        }
+        let mut dressed = plain(&surface);
+        dressed.shading.normal = normal.as_vec3();
+        let turned = |dn: DVec3| {
+            let dn = moved(dn) / length;
+            dn - normal * normal.dot(dn)
+        };
+        let [by_a, by_b] = blend.slopes(normals);
+        let (dndu, dndv) =
+            if has_parameters { by_uv(turned(by_a), turned(by_b)) } else { (DVec3::ZERO, DVec3::ZERO) };
+        dressed.shading.dndu = dndu.as_vec3();
+        dressed.shading.dndv = dndv.as_vec3();
+        self.align(&mut dressed, corners, blend, placement);
+        dressed
+    }
+
+    /// Lays ∂p/∂u of the shading surface along the tangents, where the mesh has them.
+    fn align<const N: usize>(
+        &self,
+        dressed: &mut Dressed,
+        corners: [u32; N],
+        blend: &Blend<N>,
+        placement: Option<&Transform>,
+    ) {
+        let Some(tangents) = &self.tangents else { return };
+        let tangent = blend.value(corners.map(|i| tangents[i as usize].as_dvec3()));
+        let tangent = placement.map_or(tangent, |m| m.vector(tangent)).as_vec3();
+        let n = dressed.shading.normal;
+        if let Some(unit) = (tangent - n * n.dot(tangent)).try_normalize() {
+            dressed.shading.dpdu = unit * dressed.shading.dpdu.length();
+        }
+    }
+}
