@@ -1,7 +1,7 @@
 //! The closed set of cameras.
 
 use lumbre_geometry::Ray;
-use lumbre_math::warp::{equal_area_square_to_sphere, square_to_disk};
+use lumbre_math::warp64::{equal_area_square_to_sphere, equal_area_wrap, square_to_disk};
 use lumbre_math::{DVec2, DVec3, Transform};
 
 use crate::Footprint;
@@ -144,7 +144,7 @@ impl View {
                 (DVec3::ZERO, DVec3::new(sin_theta * cos_phi, cos_theta, sin_theta * sin_phi))
             }
             CameraKind::Spherical { mapping: SphericalMapping::EqualArea } => {
-                let d = equal_area_square_to_sphere(wrap_equal_area(on_screen));
+                let d = equal_area_square_to_sphere(equal_area_wrap(on_screen));
                 (DVec3::ZERO, DVec3::new(d.x, d.z, d.y))
             }
         };
@@ -166,15 +166,4 @@ fn through_lens(
     }
     let offset = (lens_radius * square_to_disk(lens)).extend(0.0);
     (center + offset, focal_distance * towards - offset)
-}
-
-/// A point beside the unit square of the equal-area map, on the square: where the sphere goes on beyond the edge.
-fn wrap_equal_area(mut uv: DVec2) -> DVec2 {
-    if uv.x < 0.0 || uv.x > 1.0 {
-        uv = DVec2::new(if uv.x < 0.0 { -uv.x } else { 2.0 - uv.x }, 1.0 - uv.y);
-    }
-    if uv.y < 0.0 || uv.y > 1.0 {
-        uv = DVec2::new(1.0 - uv.x, if uv.y < 0.0 { -uv.y } else { 2.0 - uv.y });
-    }
-    uv.clamp(DVec2::ZERO, DVec2::ONE)
 }

@@ -30,8 +30,20 @@ pub struct SceneDesc {
     pub objects: Vec<ObjectDesc>,
     /// Objects placed in the world.
     pub instances: Vec<InstanceDesc>,
-    /// Lights that are not shapes.
+    /// Lights that are not shapes. A description without any light at all gets a studio's.
     pub lights: Vec<LightDesc>,
+    /// The axis that the automatic camera and the automatic light take for up.
+    pub up: UpAxis,
+}
+
+/// Which axis points up.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum UpAxis {
+    /// y, as in most meshes and in glTF.
+    #[default]
+    Y,
+    /// z, as in most of engineering (STL).
+    Z,
 }
 
 /// A material under its name.
@@ -202,7 +214,7 @@ pub struct EnvironmentDesc {
 pub enum EnvironmentMapping {
     /// Square, equal areas, octahedral, z up (Clarberg 2008), as pbrt-v4.
     EqualArea,
-    /// Twice as wide as high, z up, the middle of the picture towards +x.
+    /// Twice as wide as high, z up, the middle of the picture towards +x, three quarters of its width towards +y.
     LatitudeLongitude,
 }
 

@@ -1,9 +1,27 @@
-//! What is there: first described ([`SceneDesc`], plain data that any reader can make), then resolved for rendering.
+//! What is there: first described ([`SceneDesc`], plain data that any reader can make), then resolved for rendering
+//! ([`Scene`]).
 
+mod auto;
+mod build;
 mod camera;
+mod csg;
 mod desc;
+mod emission;
+mod error;
+mod footprint;
 mod id;
+mod interaction;
+pub mod light;
+mod mesh;
+mod scene;
+mod surface;
 
-pub use camera::{Camera, CameraKind, SphericalMapping};
+pub use camera::{Camera, CameraKind, CameraRay, SphericalMapping, View};
 pub use desc::*;
+pub use emission::Emission;
+pub use error::BuildError;
+pub use footprint::Footprint;
 pub use id::{MaterialId, ObjectId};
+pub use interaction::{Interaction, offset};
+pub use light::{Light, LightId, LightSample};
+pub use scene::{BuildWarning, Scene};

@@ -218,7 +218,7 @@ impl Scene {
     fn leaf(&self, hit: &Hit) -> &SurfaceEntry {
         let entry = &self.entries[hit.id as usize];
         match &entry.form {
-            Form::Csg(csg) => csg.leaf(hit.root.part),
+            Form::Csg(csg) => &csg[0],
             _ => entry,
         }
     }

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use lumbre_geometry::Surface;
+use lumbre_kernel::TriangleMesh;
 use lumbre_math::{DVec2, DVec3, Transform, Vec2, Vec3};
 use lumbre_shading::{FloatTexture, LocalSurface, Material};
 
@@ -33,14 +34,16 @@ pub(crate) enum Form {
     Mesh(Arc<MeshDress>),
     /// The patch of a mesh that is a quad which is not flat.
     Patch { dress: Arc<MeshDress>, corners: [u32; 4], primitive: u32 },
-    /// Parts of a CSG: the surface of each leaf, by its id within the CSG.
+    /// A CSG: the surface of each leaf.
     Csg(Arc<Vec<SurfaceEntry>>),
 }
 
 /// What a mesh has at its vertices, in the space of the tree that it stands in.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct MeshDress {
-    pub triangles: Vec<[u32; 3]>,
+    pub mesh: Arc<TriangleMesh>,
+    /// Whether each face runs the other way than in the file, because the mesh was baked through a mirror.
+    pub swapped: bool,
     /// From this triangle on, two triangles are halves of a quad.
     pub first_half: u32,
     pub normals: Option<Vec<Vec3>>,
@@ -92,6 +95,22 @@ impl SurfaceEntry {
         self.material.is_some()
     }
 
+    /// Whether it gives off light.
+    pub fn shines(&self) -> bool {
+        match &self.form {
+            Form::Csg(leaves) => leaves.iter().any(Self::shines),
+            _ => self.emission.is_some(),
+        }
+    }
+
+    /// Whether light may pass through some of it.
+    pub fn has_holes(&self) -> bool {
+        match &self.form {
+            Form::Csg(leaves) => leaves.iter().any(Self::has_holes),
+            _ => self.alpha.is_some() || !self.is_visible(),
+        }
+    }
+
     /// Dresses a bare surface of the tree. `local` are the coordinates of the face that it lies on, `placement` leads
     /// from the space of the mesh to that of `surface`.
     pub fn dress(
@@ -104,7 +123,7 @@ impl SurfaceEntry {
         let mut dressed = match &self.form {
             Form::Exact | Form::Csg(_) => plain(surface),
             Form::Mesh(mesh) => {
-                let corners = mesh.triangles[primitive as usize];
+                let corners = mesh.mesh.indices[primitive as usize];
                 let uvs = match &mesh.uvs {
                     Some(uvs) => corners.map(|i| uvs[i as usize]),
                     None => mesh.default_uvs(primitive),
@@ -114,6 +133,7 @@ impl SurfaceEntry {
             Form::Patch { dress, corners, .. } => {
                 let uvs = match &dress.uvs {
                     Some(uvs) => corners.map(|i| uvs[i as usize]),
+                    None if dress.swapped => [Vec2::ZERO, Vec2::Y, Vec2::X, Vec2::ONE],
                     None => [Vec2::ZERO, Vec2::X, Vec2::Y, Vec2::ONE],
                 };
                 dress.dress(surface, *corners, uvs, &patch_blend(local), placement)
@@ -154,7 +174,9 @@ impl MeshDress {
     /// pbrt's parameters for triangles without any: (0, 0), (1, 0), (1, 1), and those of a quad for its halves.
     fn default_uvs(&self, triangle: u32) -> [Vec2; 3] {
         let second_half = triangle >= self.first_half && (triangle - self.first_half) % 2 == 1;
-        if second_half { [Vec2::ZERO, Vec2::ONE, Vec2::Y] } else { [Vec2::ZERO, Vec2::X, Vec2::ONE] }
+        let [a, b, c] =
+            if second_half { [Vec2::ZERO, Vec2::ONE, Vec2::Y] } else { [Vec2::ZERO, Vec2::X, Vec2::ONE] };
+        if self.swapped { [a, c, b] } else { [a, b, c] }
     }
 
     fn dress<const N: usize>(

@@ -1,1 +1,16 @@
-//! Skeleton.
+//! Radiance along a ray: no threads, no files, no clock.
+
+mod ambient_occlusion;
+mod direct;
+mod features;
+mod integrator;
+mod path;
+mod sampler;
+mod whitted;
+
+pub use ambient_occlusion::AmbientOcclusion;
+pub use features::{Feature, FeatureIntegrator, Features};
+pub use integrator::{Integrator, RayCounts, Sight, integrator};
+pub use path::{Path, Strategy};
+pub use sampler::{Draw, Sampler};
+pub use whitted::Whitted;

@@ -1,0 +1,490 @@
+//! From a description to a scene.
+
+use std::sync::Arc;
+
+use lumbre_geometry::{Aabb, BilinearPatch, PlacedShape, Shape};
+use lumbre_kernel::{Accel, BuildOptions, Geometry, GeometryKind, Instance};
+use lumbre_math::distribution::AliasTable;
+use lumbre_math::{DVec3, Transform};
+use lumbre_shading::{Material, MaterialKind};
+
+use crate::light::{
+    DistantLight, Environment, Light, LightId, MeshLight, PointLight, ShapeLight, SpotLight, UniformLight,
+    power,
+};
+use crate::mesh::{self, QuadOrder};
+use crate::surface::{Form, SurfaceEntry};
+use crate::{
+    AreaLightDesc, BuildError, BuildWarning, Camera, CameraKind, Emission, GeometryDesc, InstanceDesc,
+    LightDesc, MeshDesc, ObjectDesc, Scene, SceneDesc, ShapeDesc, auto, csg,
+};
+
+/// How deep objects may hold objects.
+const MAX_NESTING: usize = 64;
+
+impl Scene {
+    /// Resolves a description: one tree over everything, lights ready to be sampled. A description without cameras gets
+    /// one that sees all of it, one without any light gets a studio's.
+    ///
+    /// # Errors
+    /// [`BuildError`], naming the shape, camera or light at fault.
+    pub fn build(desc: SceneDesc) -> Result<Self, BuildError> {
+        let SceneDesc { cameras, film, filter, sampler, integrator, materials, shapes, objects, instances, lights, up } =
+            desc;
+        check_cameras(&cameras)?;
+        let mut builder = Builder {
+            materials: materials.into_iter().map(|named| named.material).collect(),
+            ..Builder::default()
+        };
+
+        let objects = builder.objects(objects)?;
+        let accel = Arc::new(builder.tree(shapes, &instances, &objects, true)?);
+        let bounds = accel.bounds();
+
+        let cameras = if cameras.is_empty() { vec![auto::camera(&bounds, up)] } else { cameras };
+        let is_dark = lights.is_empty() && !builder.entries.iter().any(SurfaceEntry::shines);
+        let lights = if is_dark { vec![auto::light(up)] } else { lights };
+        for (position, light) in lights.into_iter().enumerate() {
+            builder.light(position, light)?;
+        }
+
+        let radius = if bounds.is_empty() { 1.0 } else { 0.5 * bounds.size().length() };
+        let powers: Vec<f64> = builder.lights.iter().map(|light| light.power(radius)).collect();
+        let infinite = (0..builder.lights.len() as u32).map(LightId);
+        let infinite = infinite.filter(|id| builder.lights[id.0 as usize].is_infinite()).collect();
+        let has_holes = builder.entries.iter().any(SurfaceEntry::has_holes);
+        Ok(Self {
+            accel,
+            light_choice: AliasTable::new(&powers),
+            infinite,
+            cameras,
+            film,
+            filter,
+            sampler,
+            integrator,
+            bounds,
+            has_holes,
+            has_instances: !objects.is_empty(),
+            entries: builder.entries,
+            lights: builder.lights,
+            warnings: builder.warnings,
+        })
+    }
+}
+
+/// What grows while trees are built.
+#[derive(Default)]
+pub(crate) struct Builder {
+    pub materials: Vec<Arc<Material>>,
+    pub entries: Vec<SurfaceEntry>,
+    lights: Vec<Light>,
+    pub warnings: Vec<BuildWarning>,
+}
+
+impl Builder {
+    /// The trees of all objects, those inside others first.
+    fn objects(&mut self, objects: Vec<ObjectDesc>) -> Result<Vec<Arc<Accel>>, BuildError> {
+        let order = inside_out(&objects)?;
+        let mut objects: Vec<Option<ObjectDesc>> = objects.into_iter().map(Some).collect();
+        let mut trees: Vec<Option<Arc<Accel>>> = vec![None; objects.len()];
+        for position in order {
+            let Some(object) = objects[position].take() else { continue };
+            let inner = |trees: &[Option<Arc<Accel>>], i: &InstanceDesc| trees[i.object.0 as usize].clone();
+            let built: Vec<Arc<Accel>> =
+                object.instances.iter().filter_map(|i| inner(&trees, i)).collect();
+            let tree = self.tree_of(object.shapes, &object.instances, &built, false)?;
+            trees[position] = Some(Arc::new(tree));
+        }
+        Ok(trees.into_iter().flatten().collect())
+    }
+
+    /// The tree of the world, whose instances name any of the objects.
+    fn tree(
+        &mut self,
+        shapes: Vec<ShapeDesc>,
+        instances: &[InstanceDesc],
+        objects: &[Arc<Accel>],
+        in_world: bool,
+    ) -> Result<Accel, BuildError> {
+        let find = |i: &InstanceDesc| {
+            objects.get(i.object.0 as usize).cloned().ok_or(BuildError::NoSuchObject {
+                object: i.object.0,
+                count: objects.len(),
+            })
+        };
+        let accels = instances.iter().map(find).collect::<Result<Vec<_>, _>>()?;
+        self.tree_of(shapes, instances, &accels, in_world)
+    }
+
+    fn tree_of(
+        &mut self,
+        shapes: Vec<ShapeDesc>,
+        instances: &[InstanceDesc],
+        accels: &[Arc<Accel>],
+        in_world: bool,
+    ) -> Result<Accel, BuildError> {
+        let origin = origin(&shapes, instances, accels);
+        let mut geometries = Vec::new();
+        for shape in shapes {
+            self.shape(shape, origin, in_world, &mut geometries)?;
+        }
+        for ((id, instance), accel) in (0..).zip(instances).zip(accels) {
+            let kind = GeometryKind::Instance(Instance {
+                accel: accel.clone(),
+                world_from_object: instance.world_from_object,
+            });
+            geometries.push(Geometry { id, kind });
+        }
+        Ok(Accel::build(geometries, &BuildOptions::default())?)
+    }
+
+    fn shape(
+        &mut self,
+        desc: ShapeDesc,
+        origin: DVec3,
+        in_world: bool,
+        geometries: &mut Vec<Geometry>,
+    ) -> Result<(), BuildError> {
+        let mut entry = self.entry(&desc)?;
+        let area_light = self.wanted_light(&desc, &entry);
+        match desc.geometry {
+            GeometryDesc::Exact(shape) => {
+                let placed = PlacedShape::new(shape, desc.world_from_object);
+                if area_light.is_some() && placed.bounds().is_none() {
+                    let name = placed.shape().name();
+                    return Err(BuildError::InfiniteLight { shape: desc.index, name });
+                }
+                entry.emission = area_light.map(|light| emission(light, || placed.area()));
+                let id = self.push(entry, geometries, GeometryKind::Shape(placed.clone()))?;
+                self.shape_light(id, placed, in_world);
+            }
+            GeometryDesc::Mesh(mesh) => {
+                let order = QuadOrder::Around;
+                self.mesh(entry, mesh, order, &desc.world_from_object, origin, area_light, in_world, geometries)?;
+            }
+            GeometryDesc::BilinearMesh(mesh) => {
+                let order = QuadOrder::Patch;
+                self.mesh(entry, mesh, order, &desc.world_from_object, origin, area_light, in_world, geometries)?;
+            }
+            GeometryDesc::Csg(csg) => {
+                let (solid, leaves) = csg::build(self, desc.index, csg, &desc.world_from_object, desc.reverse_orientation)?;
+                if leaves.iter().any(SurfaceEntry::shines) {
+                    self.warnings.push(BuildWarning::UnsampledLight { shape: desc.index });
+                }
+                entry.form = Form::Csg(Arc::new(leaves));
+                self.push(entry, geometries, solid)?;
+            }
+        }
+        Ok(())
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "one call for each order of corners")]
+    fn mesh(
+        &mut self,
+        entry: SurfaceEntry,
+        desc: Arc<MeshDesc>,
+        order: QuadOrder,
+        placement: &Transform,
+        origin: DVec3,
+        area_light: Option<AreaLightDesc>,
+        in_world: bool,
+        geometries: &mut Vec<Geometry>,
+    ) -> Result<(), BuildError> {
+        let shape = entry.shape;
+        let baked = mesh::bake(shape, desc, placement, origin, order)?;
+        let dress = baked.dress;
+        let mesh = dress.mesh.clone();
+        let corner = |i: u32| mesh.origin + mesh.positions[i as usize].as_dvec3();
+        let patches = baked.patches.iter().map(|corners| {
+            let [p00, p10, p01, p11] = corners.map(corner);
+            BilinearPatch::new(p00, p10, p01, p11)
+                .map(|patch| PlacedShape::new(Shape::from(patch), Transform::IDENTITY))
+                .map_err(|source| BuildError::Shape { shape, source })
+        });
+        let patches = patches.collect::<Result<Vec<_>, _>>()?;
+
+        // The entry of the triangles comes first, if there are any; its light knows the area of all of them.
+        let first = self.entries.len() as u32;
+        let light = MeshLight::new(first, mesh.clone());
+        let emission = area_light.map(|light_desc| {
+            let triangles = light.as_ref().map_or(0.0, |(_, area)| *area);
+            emission(light_desc, || triangles + patches.iter().map(PlacedShape::area).sum::<f64>())
+        });
+        if !mesh.indices.is_empty() {
+            let form = Form::Mesh(dress.clone());
+            let entry = SurfaceEntry { emission: emission.clone(), form, ..entry.clone() };
+            let id = self.push(entry, geometries, GeometryKind::Mesh(mesh.clone()))?;
+            self.mesh_light(id, light, in_world);
+        }
+        let triangle_count = mesh.indices.len() as u32;
+        for ((i, placed), &corners) in (0..).zip(patches).zip(&baked.patches) {
+            let form = Form::Patch { dress: dress.clone(), corners, primitive: triangle_count + i };
+            let entry = SurfaceEntry { emission: emission.clone(), form, ..entry.clone() };
+            let id = self.push(entry, geometries, GeometryKind::Shape(placed.clone()))?;
+            self.shape_light(id, placed, in_world);
+        }
+        Ok(())
+    }
+
+    /// What a shape is made of, without its form and its light.
+    pub fn entry(&self, desc: &ShapeDesc) -> Result<SurfaceEntry, BuildError> {
+        let material = match desc.material {
+            None => None,
+            Some(id) => {
+                let material = self.materials.get(id.0 as usize).ok_or(BuildError::NoSuchMaterial {
+                    shape: desc.index,
+                    material: id.0,
+                    count: self.materials.len(),
+                })?;
+                (!matches!(material.kind, MaterialKind::Interface)).then(|| material.clone())
+            }
+        };
+        Ok(SurfaceEntry {
+            shape: desc.index,
+            material,
+            emission: None,
+            light: None,
+            alpha: desc.alpha.clone(),
+            reverse: desc.reverse_orientation,
+            form: Form::Exact,
+        })
+    }
+
+    /// The area light of a shape, unless there is nothing for it to shine from.
+    pub fn wanted_light(&mut self, desc: &ShapeDesc, entry: &SurfaceEntry) -> Option<AreaLightDesc> {
+        let light = desc.area_light.clone()?;
+        if !entry.is_visible() {
+            self.warnings.push(BuildWarning::LightOnInterface { shape: desc.index });
+            return None;
+        }
+        Some(light)
+    }
+
+    fn push(
+        &mut self,
+        entry: SurfaceEntry,
+        geometries: &mut Vec<Geometry>,
+        kind: GeometryKind,
+    ) -> Result<u32, BuildError> {
+        let id = u32::try_from(self.entries.len()).map_err(|_| BuildError::TooMany)?;
+        self.entries.push(entry);
+        geometries.push(Geometry { id, kind });
+        Ok(id)
+    }
+
+    fn shape_light(&mut self, id: u32, shape: PlacedShape, in_world: bool) {
+        let Some(emission) = &self.entries[id as usize].emission else { return };
+        let power = power(emission.mean(), emission.sides(), shape.area());
+        self.area_light(id, Light::Shape(ShapeLight { entry: id, shape, power }), in_world);
+    }
+
+    fn mesh_light(&mut self, id: u32, light: Option<(MeshLight, f64)>, in_world: bool) {
+        let Some(emission) = &self.entries[id as usize].emission else { return };
+        let Some((light, area)) = light else {
+            self.warnings.push(BuildWarning::Empty { shape: self.entries[id as usize].shape });
+            return;
+        };
+        let power = power(emission.mean(), emission.sides(), area);
+        self.area_light(id, Light::Mesh(MeshLight { power, ..light }), in_world);
+    }
+
+    fn area_light(&mut self, entry: u32, light: Light, in_world: bool) {
+        let entry = &mut self.entries[entry as usize];
+        if !in_world {
+            let warning = BuildWarning::UnsampledLight { shape: entry.shape };
+            if self.warnings.last() != Some(&warning) {
+                self.warnings.push(warning);
+            }
+            return;
+        }
+        entry.light = Some(LightId(self.lights.len() as u32));
+        self.lights.push(light);
+    }
+
+    fn light(&mut self, position: usize, desc: LightDesc) -> Result<(), BuildError> {
+        let wrong = |reason| BuildError::Light { light: position, reason };
+        let light = match desc {
+            LightDesc::Point { from, intensity } => {
+                if !from.is_finite() || !intensity.is_finite() {
+                    return Err(wrong("its place or intensity is not finite"));
+                }
+                Light::Point(PointLight { from, intensity })
+            }
+            LightDesc::Spot { world_from_light, intensity, cone_angle, cone_delta_angle } => {
+                if !intensity.is_finite() || !(0.0..=180.0).contains(&cone_angle) || !cone_delta_angle.is_finite() {
+                    return Err(wrong("its intensity is not finite, or its angle not between 0 and 180 degrees"));
+                }
+                Light::Spot(SpotLight::new(&world_from_light, intensity, cone_angle, cone_delta_angle))
+            }
+            LightDesc::Distant { towards, irradiance } => {
+                let towards = towards.try_normalize().ok_or(wrong("its direction is zero or not finite"))?;
+                if !irradiance.is_finite() {
+                    return Err(wrong("its irradiance is not finite"));
+                }
+                Light::Distant(DistantLight { towards, irradiance })
+            }
+            LightDesc::Infinite { radiance, .. } if !radiance.is_finite() => {
+                return Err(wrong("its radiance is not finite"));
+            }
+            LightDesc::Infinite { radiance, image: None, .. } => Light::Uniform(UniformLight { radiance }),
+            LightDesc::Infinite { world_from_light, radiance, image: Some(picture) } => {
+                match Environment::new(picture.image, picture.mapping, world_from_light, radiance) {
+                    Some(environment) => Light::Environment(environment),
+                    None => {
+                        self.warnings.push(BuildWarning::DarkEnvironment { light: position });
+                        return Ok(());
+                    }
+                }
+            }
+        };
+        self.lights.push(light);
+        Ok(())
+    }
+}
+
+/// An area light's emission, its power turned into radiance.
+pub(crate) fn emission(desc: AreaLightDesc, area: impl FnOnce() -> f64) -> Emission {
+    let AreaLightDesc { radiance, image, two_sided, power } = desc;
+    let mut emission = Emission { radiance, image, two_sided };
+    if let Some(power) = power {
+        let per_radiance =
+            std::f64::consts::PI * area() * f64::from(emission.sides() * emission.mean().luminance());
+        let factor = f64::from(power) / per_radiance;
+        emission.radiance = if factor.is_finite() { radiance * factor as f32 } else { lumbre_image::Rgb::BLACK };
+    }
+    emission
+}
+
+/// The order in which objects are built so that what is inside another is there before it.
+fn inside_out(objects: &[ObjectDesc]) -> Result<Vec<usize>, BuildError> {
+    #[derive(Clone, Copy, PartialEq)]
+    enum Mark {
+        New,
+        Open,
+        Done,
+    }
+    let mut marks = vec![Mark::New; objects.len()];
+    let mut order = Vec::with_capacity(objects.len());
+    for start in 0..objects.len() {
+        // The objects being looked into, and how far each is.
+        let mut open = vec![(start, 0)];
+        if marks[start] != Mark::New {
+            continue;
+        }
+        marks[start] = Mark::Open;
+        while let Some((object, next)) = open.last_mut() {
+            let Some(instance) = objects[*object].instances.get(*next) else {
+                marks[*object] = Mark::Done;
+                order.push(*object);
+                open.pop();
+                continue;
+            };
+            *next += 1;
+            let inner = instance.object.0 as usize;
+            match marks.get(inner) {
+                None => {
+                    return Err(BuildError::NoSuchObject {
+                        object: instance.object.0,
+                        count: objects.len(),
+                    });
+                }
+                Some(Mark::Done) => {}
+                Some(Mark::Open) => {
+                    return Err(BuildError::ObjectCycle { name: objects[inner].name.clone() });
+                }
+                Some(Mark::New) => {
+                    marks[inner] = Mark::Open;
+                    open.push((inner, 0));
+                }
+            }
+        }
+    }
+    let mut depths = vec![0_usize; objects.len()];
+    for &object in &order {
+        let inner = objects[object].instances.iter().map(|i| depths[i.object.0 as usize] + 1);
+        depths[object] = inner.max().unwrap_or(0);
+        if depths[object] >= MAX_NESTING {
+            let name = objects[object].name.clone();
+            return Err(BuildError::NestedTooDeeply { name, limit: MAX_NESTING });
+        }
+    }
+    Ok(order)
+}
+
+/// A place near everything, about which single precision is fine enough: the origin itself where that is near, else a
+/// multiple of a power of two, so that a scene moved as a whole keeps its vertices to within their own rounding.
+fn origin(shapes: &[ShapeDesc], instances: &[InstanceDesc], accels: &[Arc<Accel>]) -> DVec3 {
+    let mut bounds = Aabb::EMPTY;
+    for shape in shapes {
+        match &shape.geometry {
+            GeometryDesc::Exact(exact) => {
+                bounds = exact.bounds(&shape.world_from_object).map_or(bounds, |b| bounds.union(b));
+            }
+            GeometryDesc::Mesh(mesh) | GeometryDesc::BilinearMesh(mesh) => {
+                let corners = mesh.positions.iter().filter(|p| p.is_finite());
+                let own = Aabb::around(corners.map(|p| p.as_dvec3()));
+                bounds = bounds.union(moved(&own, &shape.world_from_object));
+            }
+            GeometryDesc::Csg(_) => {}
+        }
+    }
+    for (instance, accel) in instances.iter().zip(accels) {
+        bounds = bounds.union(moved(&accel.bounds(), &instance.world_from_object));
+    }
+    let size = bounds.size().max_element();
+    if bounds.is_empty() || !size.is_finite() || size <= 0.0 {
+        return if bounds.is_empty() { DVec3::ZERO } else { finite_or_zero(bounds.center()) };
+    }
+    let grid = f64::powi(2.0, size.log2().ceil().clamp(-1000.0, 1000.0) as i32);
+    finite_or_zero((bounds.center() / grid).round() * grid)
+}
+
+fn finite_or_zero(p: DVec3) -> DVec3 {
+    if p.is_finite() { p } else { DVec3::ZERO }
+}
+
+/// The box around a moved box.
+fn moved(bounds: &Aabb, placement: &Transform) -> Aabb {
+    if bounds.is_empty() {
+        return *bounds;
+    }
+    let corners = (0..8).map(|i| {
+        let pick = |bit: usize| if i >> bit & 1 == 1 { bounds.max } else { bounds.min };
+        placement.point(DVec3::new(pick(0).x, pick(1).y, pick(2).z))
+    });
+    Aabb::around(corners)
+}
+
+fn check_cameras(cameras: &[Camera]) -> Result<(), BuildError> {
+    for (position, camera) in cameras.iter().enumerate() {
+        let wrong = |parameter, found, expected| BuildError::Camera { camera: position, parameter, found, expected };
+        let lens = match camera.kind {
+            CameraKind::Perspective { fov, lens_radius, focal_distance } => {
+                if !(fov > 0.0 && fov < 180.0) {
+                    return Err(wrong("fov", fov, "more than 0 and less than 180 degrees"));
+                }
+                Some((lens_radius, focal_distance))
+            }
+            CameraKind::Orthographic { lens_radius, focal_distance } => Some((lens_radius, focal_distance)),
+            CameraKind::Spherical { .. } => None,
+        };
+        if let Some((radius, distance)) = lens {
+            if !(radius >= 0.0 && radius.is_finite()) {
+                return Err(wrong("lensradius", radius, "0 or more"));
+            }
+            if radius > 0.0 && !(distance > 0.0 && distance.is_finite()) {
+                return Err(wrong("focaldistance", distance, "more than 0"));
+            }
+        }
+        if let Some(aspect) = camera.frame_aspect.filter(|a| !(*a > 0.0 && a.is_finite())) {
+            return Err(wrong("frameaspectratio", aspect, "more than 0"));
+        }
+        if let Some([x0, x1, y0, y1]) = camera.screen_window {
+            let window = (x1 - x0) * (y1 - y0);
+            if !window.is_finite() || window == 0.0 {
+                return Err(wrong("screenwindow", window, "a window with an area"));
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,201 @@
+//! Meshes made ready for the tree: in single precision about an origin near them, their quads split where they are flat.
+
+use std::sync::Arc;
+
+use lumbre_kernel::TriangleMesh;
+use lumbre_math::{DVec3, Transform, Vec3};
+
+use crate::surface::MeshDress;
+use crate::{BuildError, MeshDesc};
+
+/// A mesh in the space of a tree.
+pub(crate) struct BakedMesh {
+    pub dress: Arc<MeshDress>,
+    /// Quads that are not flat, their corners in the order p00, p10, p01, p11.
+    pub patches: Vec<[u32; 4]>,
+}
+
+/// Which corners a face of four has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum QuadOrder {
+    /// Counter-clockwise.
+    Around,
+    /// p00, p10, p01, p11.
+    Patch,
+}
+
+/// Moves a mesh into the space of its tree.
+///
+/// # Errors
+/// Lists of the wrong length, faces that name vertices that are not there, and vertices that are not finite.
+pub(crate) fn bake(
+    shape: u32,
+    desc: Arc<MeshDesc>,
+    tree_from_object: &Transform,
+    origin: DVec3,
+    order: QuadOrder,
+) -> Result<BakedMesh, BuildError> {
+    check(shape, &desc)?;
+    let desc = Arc::try_unwrap(desc).unwrap_or_else(|shared| (*shared).clone());
+    let MeshDesc { mut positions, mut triangles, quads, mut normals, uvs, mut tangents, .. } = desc;
+
+    let stays = tree_from_object.is_identity() && origin == DVec3::ZERO;
+    if !stays {
+        for p in &mut positions {
+            *p = (tree_from_object.point(p.as_dvec3()) - origin).as_vec3();
+        }
+    }
+    if let Some(vertex) = positions.iter().position(|p| !p.is_finite()) {
+        return Err(BuildError::NotFinite { shape, vertex });
+    }
+    if !tree_from_object.is_identity() {
+        let unit = |v: DVec3| v.try_normalize().unwrap_or(DVec3::ZERO).as_vec3();
+        for n in normals.iter_mut().flatten() {
+            *n = unit(tree_from_object.normal(n.as_dvec3()));
+        }
+        for t in tangents.iter_mut().flatten() {
+            *t = unit(tree_from_object.vector(t.as_dvec3()));
+        }
+    }
+
+    // The front face travels with the object: behind a mirror its vertices run the other way.
+    let swapped = tree_from_object.is_mirror();
+    let first_half = triangles.len() as u32;
+    let mut patches = Vec::new();
+    for [a, b, c, d] in quads {
+        let [a, b, c, d] = if order == QuadOrder::Patch { [a, b, d, c] } else { [a, b, c, d] };
+        let corners = [a, b, c, d].map(|i| positions[i as usize]);
+        let splits = is_parallelogram(corners) || (order == QuadOrder::Around && is_flat_and_convex(corners));
+        if splits {
+            triangles.extend([[a, b, c], [a, c, d]]);
+        } else {
+            patches.push(if swapped { [a, d, b, c] } else { [a, b, d, c] });
+        }
+    }
+    if swapped {
+        for triangle in &mut triangles {
+            triangle.swap(1, 2);
+        }
+    }
+    let mesh = Arc::new(TriangleMesh { origin, positions, indices: triangles });
+    let dress = Arc::new(MeshDress { mesh, swapped, first_half, normals, uvs, tangents });
+    Ok(BakedMesh { dress, patches })
+}
+
+fn check(shape: u32, desc: &MeshDesc) -> Result<(), BuildError> {
+    let expected = desc.positions.len();
+    let lists = [
+        ("normals", desc.normals.as_ref().map(Vec::len)),
+        ("texture coordinates", desc.uvs.as_ref().map(Vec::len)),
+        ("tangents", desc.tangents.as_ref().map(Vec::len)),
+    ];
+    for (list, found) in lists {
+        if let Some(found) = found.filter(|&found| found != expected) {
+            return Err(BuildError::ListLength { shape, list, found, expected });
+        }
+    }
+    let faces = (desc.triangles.iter().map(|t| &t[..])).chain(desc.quads.iter().map(|q| &q[..]));
+    for (face, corners) in faces.enumerate() {
+        if let Some(&vertex) = corners.iter().find(|&&i| i as usize >= expected) {
+            return Err(BuildError::NoSuchVertex { shape, face, vertex, count: expected });
+        }
+    }
+    match desc.positions.iter().position(|p| !p.is_finite()) {
+        Some(vertex) => Err(BuildError::NotFinite { shape, vertex }),
+        None => Ok(()),
+    }
+}
+
+/// How much rounding to single precision can move a corner, as a share of the largest coordinate.
+const ROUNDING: f64 = 4.0 / (1_u64 << 23) as f64;
+
+/// Whether the corners (counter-clockwise) make a parallelogram, up to rounding: then two triangles are the patch.
+fn is_parallelogram(corners: [Vec3; 4]) -> bool {
+    let [a, b, c, d] = corners.map(Vec3::as_dvec3);
+    let gap = ((a - b) + (c - d)).abs().max_element();
+    let size = [a, b, c, d].iter().map(|p| p.abs().max_element()).fold(0.0, f64::max);
+    let edge = (b - a).length().min((d - a).length());
+    gap <= ROUNDING * size && gap <= 1e-3 * edge
+}
+
+fn is_flat_and_convex(corners: [Vec3; 4]) -> bool {
+    let [a, b, c, d] = corners.map(Vec3::as_dvec3);
+    let normal = (c - a).cross(d - b);
+    let length = normal.length();
+    let longest = (c - a).length().max((d - b).length());
+    if length.is_nan() || length <= 0.0 {
+        // No area, or a patch folded onto itself: as triangles it is what is left of it.
+        return true;
+    }
+    let height = normal.dot(b - a).abs() / length;
+    let turns = [(a, b, c), (b, c, d), (c, d, a), (d, a, b)];
+    let convex = turns.iter().all(|&(p, q, r)| (q - p).cross(r - q).dot(normal) >= 0.0);
+    height <= 1e-6 * longest && convex
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lumbre_math::Vec2;
+
+    fn quad(last: Vec3) -> Arc<MeshDesc> {
+        Arc::new(MeshDesc {
+            positions: vec![Vec3::new(2.0, 3.0, 4.0), Vec3::new(5.0, 3.0, 4.0), Vec3::new(5.0, 7.0, 4.0), last],
+            quads: vec![[0, 1, 2, 3]],
+            ..MeshDesc::default()
+        })
+    }
+
+    #[test]
+    fn a_flat_quad_splits_and_a_bent_one_does_not() {
+        let flat = bake(7, quad(Vec3::new(2.0, 7.0, 4.0)), &Transform::IDENTITY, DVec3::ZERO, QuadOrder::Around)
+            .unwrap();
+        assert_eq!((flat.dress.mesh.indices.len(), flat.patches.len()), (2, 0));
+        let trapezium =
+            bake(7, quad(Vec3::new(3.0, 7.0, 4.0)), &Transform::IDENTITY, DVec3::ZERO, QuadOrder::Around).unwrap();
+        assert_eq!((trapezium.dress.mesh.indices.len(), trapezium.patches.len()), (2, 0));
+        let bent = bake(7, quad(Vec3::new(2.0, 7.0, 4.5)), &Transform::IDENTITY, DVec3::ZERO, QuadOrder::Around)
+            .unwrap();
+        assert_eq!((bent.dress.mesh.indices.len(), bent.patches), (0, vec![[0, 1, 3, 2]]));
+        let dented = bake(7, quad(Vec3::new(4.5, 4.0, 4.0)), &Transform::IDENTITY, DVec3::ZERO, QuadOrder::Around)
+            .unwrap();
+        assert_eq!((dented.dress.mesh.indices.len(), dented.patches.len()), (0, 1));
+    }
+
+    #[test]
+    fn a_mesh_baked_through_a_mirror_keeps_its_front() {
+        let desc = || {
+            Arc::new(MeshDesc {
+                positions: vec![Vec3::new(2.0, 3.0, 4.0), Vec3::new(5.0, 3.5, 4.0), Vec3::new(5.0, 7.0, 6.0)],
+                triangles: vec![[0, 1, 2]],
+                ..MeshDesc::default()
+            })
+        };
+        let front = |baked: &BakedMesh| {
+            let [a, b, c] = baked.dress.mesh.indices[0].map(|i| baked.dress.mesh.positions[i as usize].as_dvec3());
+            (b - a).cross(c - a).normalize()
+        };
+        let plain = bake(0, desc(), &Transform::IDENTITY, DVec3::ZERO, QuadOrder::Around).unwrap();
+        let mirror = Transform::scale(DVec3::new(-2.0, 3.0, 0.5)).unwrap();
+        let mirrored = bake(0, desc(), &mirror, DVec3::ZERO, QuadOrder::Around).unwrap();
+        let expected = mirror.normal(front(&plain)).normalize();
+        assert!((front(&mirrored) - expected).length() < 1e-6);
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_mesh_is_said() {
+        let bake = |desc: MeshDesc| bake(9, Arc::new(desc), &Transform::IDENTITY, DVec3::ZERO, QuadOrder::Around).err();
+        let whole = (*quad(Vec3::new(2.0, 7.0, 4.0))).clone();
+        assert_eq!(
+            bake(MeshDesc { triangles: vec![[0, 1, 4]], ..whole.clone() }),
+            Some(BuildError::NoSuchVertex { shape: 9, face: 0, vertex: 4, count: 4 })
+        );
+        assert_eq!(
+            bake(MeshDesc { uvs: Some(vec![Vec2::ZERO; 3]), ..whole.clone() }),
+            Some(BuildError::ListLength { shape: 9, list: "texture coordinates", found: 3, expected: 4 })
+        );
+        let mut broken = whole;
+        broken.positions[2].y = f32::NAN;
+        assert_eq!(bake(broken), Some(BuildError::NotFinite { shape: 9, vertex: 2 }));
+    }
+}

@@ -1,0 +1,43 @@
+//! How open each place is.
+
+use lumbre_math::warp;
+use lumbre_scene::{Scene, View};
+use lumbre_shading::{ShadingFrame, Spectrum};
+
+use crate::{Draw, Integrator, RayCounts, Sight};
+
+/// The share of the sky over a surface that is open, weighed by the cosine: white where nothing is near.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AmbientOcclusion {
+    /// Whether directions are chosen by the cosine, or uniformly.
+    pub cosine: bool,
+    /// How far to look.
+    pub max_distance: f64,
+}
+
+impl Integrator for AmbientOcclusion {
+    fn radiance(
+        &self,
+        scene: &Scene,
+        _: &View,
+        sight: Sight<'_>,
+        draw: &Draw,
+        rays: &mut RayCounts,
+    ) -> Spectrum {
+        let Some(met) = &sight.met else { return Spectrum::BLACK };
+        let normal = met.shading.normal;
+        let facing = if normal.dot(met.towards_origin.as_vec3()) < 0.0 { -normal } else { normal };
+        let frame = ShadingFrame::new(facing, met.shading.dpdu);
+        let u = draw.direction(0);
+        let (local, weight) = if self.cosine {
+            (warp::square_to_cosine_hemisphere(u), 1.0)
+        } else {
+            let w = warp::square_to_hemisphere(u);
+            (w, 2.0 * w.z)
+        };
+        let direction = (frame.s * local.x + frame.t * local.y + frame.n * local.z).as_dvec3().normalize();
+        let ray = met.leave(direction).with_range(0.0, self.max_distance);
+        rays.shadow += 1;
+        if scene.is_occluded(&ray) { Spectrum::BLACK } else { Spectrum::splat(weight) }
+    }
+}

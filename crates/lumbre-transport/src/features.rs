@@ -1,0 +1,74 @@
+//! What a picture can show besides light: reflectance, normals, depth and surface parameters.
+
+use lumbre_math::{Vec2, Vec3};
+use lumbre_scene::{Scene, View};
+use lumbre_shading::Spectrum;
+
+use crate::{Draw, Integrator, RayCounts, Sight};
+
+/// One of the features.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Feature {
+    /// Reflectance.
+    Albedo,
+    /// The shading normal in world space.
+    Normal,
+    /// Distance along the camera's axis.
+    Depth,
+    /// Surface parameters.
+    Uv,
+}
+
+/// What a line of sight meets. All are zero where it meets nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Features {
+    /// Reflectance; emission, cut off at 1, for what shines and is black.
+    pub albedo: Spectrum,
+    /// The shading normal in world space, on the side of the viewer.
+    pub normal: Vec3,
+    /// Distance along the camera's axis.
+    pub depth: f32,
+    /// Surface parameters.
+    pub uv: Vec2,
+}
+
+impl Features {
+    /// The features of what is met, if anything is.
+    pub fn of(view: &View, sight: &Sight) -> Option<Self> {
+        let met = sight.met.as_ref()?;
+        let scattering = met.scattering();
+        let (normal, albedo) = match &scattering {
+            Some((frame, bsdf)) => (frame.n, bsdf.albedo()),
+            None => (met.shading.normal, Spectrum::BLACK),
+        };
+        let towards = met.towards_origin.as_vec3();
+        Some(Self {
+            albedo: if albedo.is_black() { met.emitted().clamp(0.0, 1.0) } else { albedo },
+            normal: if normal.dot(towards) < 0.0 { -normal } else { normal },
+            depth: view.depth(met.surface.point) as f32,
+            uv: met.uv(),
+        })
+    }
+
+    /// One of them as a colour: the normal as it is, with signs; uv in red and green.
+    pub fn get(&self, feature: Feature) -> Spectrum {
+        match feature {
+            Feature::Albedo => self.albedo,
+            Feature::Normal => self.normal.to_array().into(),
+            Feature::Depth => Spectrum::splat(self.depth),
+            Feature::Uv => Spectrum::new(self.uv.x, self.uv.y, 0.0),
+        }
+    }
+}
+
+/// A picture of one feature; no light is needed. The normal is shown as (n + 1) / 2.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FeatureIntegrator(pub Feature);
+
+impl Integrator for FeatureIntegrator {
+    fn radiance(&self, _: &Scene, view: &View, sight: Sight<'_>, _: &Draw, _: &mut RayCounts) -> Spectrum {
+        let Some(features) = Features::of(view, &sight) else { return Spectrum::BLACK };
+        let value = features.get(self.0);
+        if self.0 == Feature::Normal { (value + Spectrum::WHITE) * 0.5 } else { value }
+    }
+}

@@ -1,0 +1,75 @@
+//! What every integrator does: the radiance along a ray from the camera.
+
+use std::fmt::Debug;
+use std::ops::AddAssign;
+
+use lumbre_scene::{CameraRay, IntegratorDesc, IntegratorKind, Interaction, Scene, View};
+use lumbre_shading::Spectrum;
+
+use crate::{AmbientOcclusion, Draw, Feature, FeatureIntegrator, Path, Whitted};
+
+/// An estimator of the radiance that arrives along a ray. It is called once a path.
+pub trait Integrator: Debug + Send + Sync {
+    /// An estimate of the radiance that arrives at the camera along a line of sight.
+    fn radiance(
+        &self,
+        scene: &Scene,
+        view: &View,
+        sight: Sight<'_>,
+        draw: &Draw,
+        rays: &mut RayCounts,
+    ) -> Spectrum;
+}
+
+/// A ray from the camera, and what it meets first.
+#[derive(Clone, Debug)]
+pub struct Sight<'s> {
+    /// The ray.
+    pub ray: CameraRay,
+    /// What it meets; `None` when it leaves the scene.
+    pub met: Option<Interaction<'s>>,
+}
+
+impl<'s> Sight<'s> {
+    /// Follows a ray to the first thing that light sees.
+    pub fn new(scene: &'s Scene, ray: CameraRay, rays: &mut RayCounts) -> Self {
+        rays.camera += 1;
+        let met = scene.closest(&ray.ray).map(|hit| scene.interaction(&ray.ray, &hit, &ray.footprint));
+        Self { ray, met }
+    }
+}
+
+/// How many rays were traced, by what for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RayCounts {
+    /// From the camera.
+    pub camera: u64,
+    /// On from a surface.
+    pub bounce: u64,
+    /// Towards a light, or to see how open a place is.
+    pub shadow: u64,
+}
+
+impl AddAssign for RayCounts {
+    fn add_assign(&mut self, other: Self) {
+        self.camera += other.camera;
+        self.bounce += other.bounce;
+        self.shadow += other.shadow;
+    }
+}
+
+/// The integrator that a description asks for.
+pub fn integrator(desc: &IntegratorDesc) -> Box<dyn Integrator> {
+    let max_depth = desc.max_depth;
+    match desc.kind {
+        IntegratorKind::Path { regularize } => Box::new(Path { regularize, ..Path::new(max_depth) }),
+        IntegratorKind::Whitted => Box::new(Whitted { max_depth }),
+        IntegratorKind::AmbientOcclusion { cosine, max_distance } => {
+            Box::new(AmbientOcclusion { cosine, max_distance })
+        }
+        IntegratorKind::Normals => Box::new(FeatureIntegrator(Feature::Normal)),
+        IntegratorKind::Depth => Box::new(FeatureIntegrator(Feature::Depth)),
+        IntegratorKind::Albedo => Box::new(FeatureIntegrator(Feature::Albedo)),
+        IntegratorKind::Uv => Box::new(FeatureIntegrator(Feature::Uv)),
+    }
+}
