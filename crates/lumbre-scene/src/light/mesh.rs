@@ -15,8 +15,8 @@ use crate::surface::SurfaceEntry;
 pub struct MeshLight {
     pub(crate) entry: u32,
     pub(crate) power: f64,
-    mesh: Arc<TriangleMesh>,
-    by_area: AliasTable,
+    pub(crate) mesh: Arc<TriangleMesh>,
+    pub(crate) by_area: AliasTable,
 }
 
 impl MeshLight {

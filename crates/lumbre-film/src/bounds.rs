@@ -1,0 +1,97 @@
+//! A rectangle of pixels.
+
+/// The pixels `x0 <= x < x1`, `y0 <= y < y1`, from the upper left of the whole picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PixelBounds {
+    /// The first column.
+    pub x0: u32,
+    /// The first row.
+    pub y0: u32,
+    /// Beyond the last column.
+    pub x1: u32,
+    /// Beyond the last row.
+    pub y1: u32,
+}
+
+impl PixelBounds {
+    /// A whole picture.
+    pub fn whole(width: u32, height: u32) -> Self {
+        Self { x0: 0, y0: 0, x1: width, y1: height }
+    }
+
+    /// Pixels across.
+    pub fn width(&self) -> u32 {
+        self.x1.saturating_sub(self.x0)
+    }
+
+    /// Pixels down.
+    pub fn height(&self) -> u32 {
+        self.y1.saturating_sub(self.y0)
+    }
+
+    /// How many pixels.
+    pub fn area(&self) -> u64 {
+        u64::from(self.width()) * u64::from(self.height())
+    }
+
+    /// Whether it holds no pixel.
+    pub fn is_empty(&self) -> bool {
+        self.area() == 0
+    }
+
+    /// What both hold.
+    #[must_use]
+    pub fn intersection(&self, other: &Self) -> Self {
+        Self {
+            x0: self.x0.max(other.x0),
+            y0: self.y0.max(other.y0),
+            x1: self.x1.min(other.x1),
+            y1: self.y1.min(other.y1),
+        }
+    }
+
+    /// Squares of `side` pixels that cover it, row by row; those at the right and below may be smaller.
+    pub fn tiles(&self, side: u32) -> Vec<Self> {
+        let side = side.max(1) as usize;
+        let rows = (self.y0..self.y1).step_by(side);
+        let whole = *self;
+        rows.flat_map(|y0| {
+            (whole.x0..whole.x1).step_by(side).map(move |x0| Self {
+                x0,
+                y0,
+                x1: x0.saturating_add(side as u32).min(whole.x1),
+                y1: y0.saturating_add(side as u32).min(whole.y1),
+            })
+        })
+        .collect()
+    }
+
+    /// Every pixel, row by row.
+    pub fn pixels(&self) -> impl Iterator<Item = (u32, u32)> + use<> {
+        let whole = *self;
+        (whole.y0..whole.y1).flat_map(move |y| (whole.x0..whole.x1).map(move |x| (x, y)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiles_hold_every_pixel_once() {
+        let whole = PixelBounds { x0: 5, y0: 3, x1: 42, y1: 70 };
+        let mut pixels: Vec<_> = whole.tiles(16).iter().flat_map(PixelBounds::pixels).collect();
+        pixels.sort_unstable_by_key(|&(x, y)| (y, x));
+        assert_eq!(pixels, whole.pixels().collect::<Vec<_>>());
+        assert_eq!(pixels.len() as u64, whole.area());
+        assert_eq!(whole.area(), 37 * 67);
+    }
+
+    #[test]
+    fn bounds_that_do_not_meet_hold_nothing() {
+        let a = PixelBounds { x0: 2, y0: 2, x1: 9, y1: 9 };
+        let b = PixelBounds { x0: 12, y0: 3, x1: 20, y1: 5 };
+        assert!(a.intersection(&b).is_empty());
+        assert_eq!(a.intersection(&PixelBounds::whole(5, 30)).area(), 21);
+    }
+}

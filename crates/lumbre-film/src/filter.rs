@@ -1,0 +1,185 @@
+//! Pixel filters, sampled.
+
+use std::f64::consts::PI;
+
+use lumbre_math::DVec2;
+use lumbre_math::distribution::PiecewiseConstant1D;
+
+/// The closed set of filters: all are products of the same function along x and along y. Radii are in pixels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FilterShape {
+    /// A Gaussian of this standard deviation, less its value at the radius.
+    Gaussian {
+        /// Standard deviation.
+        sigma: f64,
+    },
+    /// The same everywhere.
+    Box,
+    /// Mitchell, Netravali, "Reconstruction Filters in Computer Graphics", SIGGRAPH 1988.
+    Mitchell {
+        /// Blur.
+        b: f64,
+        /// Ringing.
+        c: f64,
+    },
+    /// A sinc within the main lobe of a wider one (Lanczos).
+    Sinc {
+        /// Width of the wider one.
+        tau: f64,
+    },
+    /// A tent.
+    Triangle,
+}
+
+impl FilterShape {
+    /// Its value at a distance from the middle of the pixel.
+    pub fn value(&self, x: f64, radius: f64) -> f64 {
+        let x = x.abs();
+        if x > radius {
+            return 0.0;
+        }
+        match *self {
+            Self::Gaussian { sigma } => {
+                let bell = |x: f64| (-x * x / (2.0 * sigma * sigma)).exp();
+                (bell(x) - bell(radius)).max(0.0)
+            }
+            Self::Box => 1.0,
+            Self::Mitchell { b, c } => mitchell(2.0 * x / radius, b, c),
+            Self::Sinc { tau } => sinc(x) * sinc(x / tau),
+            Self::Triangle => radius - x,
+        }
+    }
+}
+
+fn mitchell(x: f64, b: f64, c: f64) -> f64 {
+    let cubic = |c3: f64, c2: f64, c1: f64, c0: f64| (((c3 * x + c2) * x + c1) * x + c0) / 6.0;
+    if x <= 1.0 {
+        cubic(12.0 - 9.0 * b - 6.0 * c, -18.0 + 12.0 * b + 6.0 * c, 0.0, 6.0 - 2.0 * b)
+    } else if x <= 2.0 {
+        cubic(-b - 6.0 * c, 6.0 * b + 30.0 * c, -12.0 * b - 48.0 * c, 8.0 * b + 24.0 * c)
+    } else {
+        0.0
+    }
+}
+
+fn sinc(x: f64) -> f64 {
+    if x.abs() < 1e-5 { 1.0 } else { (PI * x).sin() / (PI * x) }
+}
+
+/// A place in the filter, and what a sample there counts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FilterSample {
+    /// From the middle of the pixel, in pixels.
+    pub offset: DVec2,
+    /// Value over density: almost the same everywhere but for its sign.
+    pub weight: f64,
+}
+
+/// A filter, ready to be sampled.
+#[derive(Clone, Debug)]
+pub struct Filter {
+    shape: FilterShape,
+    radius: DVec2,
+    x: PiecewiseConstant1D,
+    y: PiecewiseConstant1D,
+}
+
+/// Cells of the tables from which places are chosen.
+const CELLS: usize = 512;
+
+impl Filter {
+    /// A filter of these half-widths. `None` unless they are positive and finite, and the function is not zero.
+    pub fn new(shape: FilterShape, radius: DVec2) -> Option<Self> {
+        let is_sound = radius.is_finite() && radius.min_element() > 0.0;
+        let table = |radius: f64| {
+            let cell = |i: usize| ((i as f64 + 0.5) / CELLS as f64 * 2.0 - 1.0) * radius;
+            let weights: Vec<f64> = (0..CELLS).map(|i| shape.value(cell(i), radius).abs()).collect();
+            PiecewiseConstant1D::new(&weights)
+        };
+        if !is_sound {
+            return None;
+        }
+        Some(Self { shape, radius, x: table(radius.x)?, y: table(radius.y)? })
+    }
+
+    /// Half-widths in pixels.
+    pub fn radius(&self) -> DVec2 {
+        self.radius
+    }
+
+    /// A place in the filter, from two uniform numbers.
+    pub fn sample(&self, u: DVec2) -> FilterSample {
+        let axis = |table: &PiecewiseConstant1D, u: f64, radius: f64| {
+            let (x, density) = table.sample(u);
+            let x = (2.0 * x - 1.0) * radius;
+            (x, self.shape.value(x, radius) * 2.0 * radius / density)
+        };
+        let (x, x_weight) = axis(&self.x, u.x, self.radius.x);
+        let (y, y_weight) = axis(&self.y, u.y, self.radius.y);
+        FilterSample { offset: DVec2::new(x, y), weight: x_weight * y_weight }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SHAPES: [(FilterShape, f64); 5] = [
+        (FilterShape::Gaussian { sigma: 0.5 }, 1.5),
+        (FilterShape::Box, 0.5),
+        (FilterShape::Mitchell { b: 1.0 / 3.0, c: 1.0 / 3.0 }, 2.0),
+        (FilterShape::Sinc { tau: 3.0 }, 4.0),
+        (FilterShape::Triangle, 2.0),
+    ];
+
+    /// ∫ g f / ∫ f by samples and by a fine grid.
+    fn both_means(shape: FilterShape, radius: DVec2, g: impl Fn(DVec2) -> f64) -> (f64, f64) {
+        const SIDE: usize = 700;
+        let filter = Filter::new(shape, radius).unwrap();
+        let grid = |i: usize| (i as f64 + 0.5) / SIDE as f64;
+        let (mut sampled, mut weights, mut exact, mut whole) = (0.0, 0.0, 0.0, 0.0);
+        for i in 0..SIDE * SIDE {
+            let u = DVec2::new(grid(i % SIDE), grid(i / SIDE));
+            let sample = filter.sample(u);
+            sampled += sample.weight * g(sample.offset);
+            weights += sample.weight;
+            let p = (2.0 * u - 1.0) * radius;
+            let value = shape.value(p.x, radius.x) * shape.value(p.y, radius.y);
+            exact += value * g(p);
+            whole += value;
+        }
+        (sampled / weights, exact / whole)
+    }
+
+    #[test]
+    fn samples_integrate_like_the_filter() {
+        for (shape, radius) in SHAPES {
+            let radius = DVec2::new(radius, 0.75 * radius);
+            for k in [0.4, 1.0, 2.5] {
+                let wave = |p: DVec2| (k * p.x).cos() * (0.7 * k * p.y).cos() + 0.3 * (p.x + 0.2 * p.y);
+                let (sampled, exact) = both_means(shape, radius, wave);
+                assert!((sampled - exact).abs() < 1e-3, "{shape:?} {k}: {sampled} {exact}");
+            }
+        }
+    }
+
+    #[test]
+    fn filters_with_negative_lobes_have_negative_samples_and_the_others_have_none() {
+        for (shape, radius) in SHAPES {
+            let filter = Filter::new(shape, DVec2::splat(radius)).unwrap();
+            let weight = |i: usize| {
+                filter.sample(DVec2::new(i as f64 / 4096.0, 0.37)).weight
+            };
+            let negative = (0..4096).filter(|&i| weight(i) < 0.0).count();
+            let has_lobes = matches!(shape, FilterShape::Mitchell { .. } | FilterShape::Sinc { .. });
+            assert_eq!(negative > 40, has_lobes, "{shape:?} {negative}");
+        }
+    }
+
+    #[test]
+    fn a_filter_without_width_is_none() {
+        assert!(Filter::new(FilterShape::Box, DVec2::new(0.0, 1.0)).is_none());
+        assert!(Filter::new(FilterShape::Box, DVec2::new(f64::NAN, 1.0)).is_none());
+        assert!(Filter::new(FilterShape::Gaussian { sigma: 0.5 }, DVec2::splat(1.5)).is_some());
+    }
+}

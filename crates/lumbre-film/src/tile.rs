@@ -1,0 +1,124 @@
+//! A part of the film that one thread owns at a time.
+
+use lumbre_image::Rgb;
+
+use crate::{FeatureSample, FeatureSums, Pixel, PixelBounds};
+
+/// How radiance becomes the colour of a pixel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Exposure {
+    /// A factor on every sample.
+    pub factor: f32,
+    /// The largest component that a sample may have; a brighter one keeps its hue. Infinite to leave all as they are.
+    pub max_component: f32,
+}
+
+impl Default for Exposure {
+    fn default() -> Self {
+        Self { factor: 1.0, max_component: f32::INFINITY }
+    }
+}
+
+impl Exposure {
+    /// The colour that a sample of this radiance adds.
+    pub fn colour(&self, radiance: Rgb) -> Rgb {
+        let colour = radiance * self.factor;
+        let most = colour.max_component();
+        if most > self.max_component { colour * (self.max_component / most) } else { colour }
+    }
+}
+
+/// What one sample adds to its pixel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// Radiance.
+    pub radiance: Rgb,
+    /// What it counts: the weight of the filter.
+    pub weight: f64,
+    /// What it met first, if features are wanted and it met anything.
+    pub features: Option<FeatureSample>,
+}
+
+/// The pixels of a rectangle.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tile {
+    bounds: PixelBounds,
+    pixels: Vec<Pixel>,
+    // Empty unless features are wanted; else as many as pixels.
+    features: Vec<FeatureSums>,
+}
+
+impl Tile {
+    /// No samples yet.
+    pub fn new(bounds: PixelBounds, with_features: bool) -> Self {
+        let count = bounds.area() as usize;
+        Self {
+            bounds,
+            pixels: vec![Pixel::default(); count],
+            features: vec![FeatureSums::default(); if with_features { count } else { 0 }],
+        }
+    }
+
+    /// Which pixels.
+    pub fn bounds(&self) -> PixelBounds {
+        self.bounds
+    }
+
+    /// The sums of every pixel, row by row.
+    pub fn pixels(&self) -> &[Pixel] {
+        &self.pixels
+    }
+
+    /// The features of every pixel, row by row; empty where they are not wanted.
+    pub fn features(&self) -> &[FeatureSums] {
+        &self.features
+    }
+
+    /// Adds a sample to the pixel in column `x` and row `y` of the picture. False, and nothing is added, when the sample
+    /// is not finite or the pixel is elsewhere.
+    pub fn add(&mut self, x: u32, y: u32, sample: &Sample, exposure: &Exposure) -> bool {
+        let b = &self.bounds;
+        if !(b.x0 <= x && x < b.x1 && b.y0 <= y && y < b.y1) {
+            return false;
+        }
+        let colour = exposure.colour(sample.radiance);
+        if !colour.is_finite() || !sample.weight.is_finite() {
+            return false;
+        }
+        let position = (y - b.y0) as usize * b.width() as usize + (x - b.x0) as usize;
+        self.pixels[position].add(colour, sample.weight);
+        if let Some(sums) = self.features.get_mut(position) {
+            sums.add(sample.features.as_ref(), sample.weight);
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sample_goes_to_its_own_pixel_and_one_that_is_not_finite_to_none() {
+        let mut tile = Tile::new(PixelBounds { x0: 5, y0: 7, x1: 9, y1: 10 }, true);
+        let sample = |radiance| Sample { radiance, weight: 1.0, features: None };
+        let exposure = Exposure { factor: 2.0, max_component: 6.0 };
+        assert!(tile.add(6, 9, &sample(Rgb::new(1.0, 2.0, 3.0)), &exposure));
+        assert!(!tile.add(9, 9, &sample(Rgb::WHITE), &exposure));
+        assert!(!tile.add(6, 6, &sample(Rgb::WHITE), &exposure));
+        assert!(!tile.add(6, 9, &sample(Rgb::new(1.0, f32::NAN, 1.0)), &exposure));
+        assert!(!tile.add(6, 9, &sample(Rgb::new(f32::INFINITY, 1.0, 1.0)), &exposure));
+        let lit: Vec<_> = tile.pixels().iter().map(Pixel::colour).collect();
+        for (i, colour) in lit.into_iter().enumerate() {
+            let expected = if i == 2 * 4 + 1 { Rgb::new(2.0, 4.0, 6.0) } else { Rgb::BLACK };
+            assert_eq!(colour, expected, "{i}");
+        }
+    }
+
+    #[test]
+    fn a_bright_sample_is_dimmed_and_keeps_its_hue() {
+        let exposure = Exposure { factor: 1.0, max_component: 10.0 };
+        assert_eq!(exposure.colour(Rgb::new(40.0, 20.0, 4.0)), Rgb::new(10.0, 5.0, 1.0));
+        assert_eq!(exposure.colour(Rgb::new(4.0, 2.0, 0.5)), Rgb::new(4.0, 2.0, 0.5));
+    }
+}
