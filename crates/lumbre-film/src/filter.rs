@@ -167,9 +167,7 @@ mod tests {
     fn filters_with_negative_lobes_have_negative_samples_and_the_others_have_none() {
         for (shape, radius) in SHAPES {
             let filter = Filter::new(shape, DVec2::splat(radius)).unwrap();
-            let weight = |i: usize| {
-                filter.sample(DVec2::new(i as f64 / 4096.0, 0.37)).weight
-            };
+            let weight = |i: usize| filter.sample(DVec2::new(i as f64 / 4096.0, 0.37)).weight;
             let negative = (0..4096).filter(|&i| weight(i) < 0.0).count();
             let has_lobes = matches!(shape, FilterShape::Mitchell { .. } | FilterShape::Sinc { .. });
             assert_eq!(negative > 40, has_lobes, "{shape:?} {negative}");

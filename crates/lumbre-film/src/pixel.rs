@@ -148,7 +148,8 @@ mod tests {
     fn depth_does_not_mix_with_the_background() {
         let mut sums = FeatureSums::default();
         sums.add(None, 2.0);
-        let sample = FeatureSample { albedo: Rgb::WHITE, normal: [0.0, 0.0, 1.0], depth: 7.0, uv: [0.25, 0.5] };
+        let sample =
+            FeatureSample { albedo: Rgb::WHITE, normal: [0.0, 0.0, 1.0], depth: 7.0, uv: [0.25, 0.5] };
         sums.add(Some(&sample), 2.0);
         assert_eq!((sums.depth(), sums.uv()), (7.0, [0.25, 0.5]));
         assert_eq!((sums.albedo(), sums.normal()), (Rgb::splat(0.5), Rgb::new(0.0, 0.0, 0.5)));

@@ -34,10 +34,8 @@ pub(crate) fn camera(bounds: &Aabb, up: UpAxis) -> Camera {
         .fold(0.0, f64::max);
     let distance = if distance > 0.0 { distance } else { 1.0 };
 
-    let placement = DAffine3::from_mat3_translation(
-        DMat3::from_cols(x, y, forward),
-        center - distance * forward,
-    );
+    let placement =
+        DAffine3::from_mat3_translation(DMat3::from_cols(x, y, forward), center - distance * forward);
     Camera {
         name: None,
         kind: CameraKind::Perspective { fov: FOV, lens_radius: 0.0, focal_distance: distance },

@@ -29,8 +29,19 @@ impl Scene {
     /// # Errors
     /// [`BuildError`], naming the shape, camera or light at fault.
     pub fn build(desc: SceneDesc) -> Result<Self, BuildError> {
-        let SceneDesc { cameras, film, filter, sampler, integrator, materials, shapes, objects, instances, lights, up } =
-            desc;
+        let SceneDesc {
+            cameras,
+            film,
+            filter,
+            sampler,
+            integrator,
+            materials,
+            shapes,
+            objects,
+            instances,
+            lights,
+            up,
+        } = desc;
         check_cameras(&cameras)?;
         let mut builder = Builder {
             materials: materials.into_iter().map(|named| named.material).collect(),
@@ -90,8 +101,7 @@ impl Builder {
         for position in order {
             let Some(object) = objects[position].take() else { continue };
             let inner = |trees: &[Option<Arc<Accel>>], i: &InstanceDesc| trees[i.object.0 as usize].clone();
-            let built: Vec<Arc<Accel>> =
-                object.instances.iter().filter_map(|i| inner(&trees, i)).collect();
+            let built: Vec<Arc<Accel>> = object.instances.iter().filter_map(|i| inner(&trees, i)).collect();
             let tree = self.tree_of(object.shapes, &object.instances, &built, false)?;
             trees[position] = Some(Arc::new(tree));
         }
@@ -107,10 +117,10 @@ impl Builder {
         in_world: bool,
     ) -> Result<Accel, BuildError> {
         let find = |i: &InstanceDesc| {
-            objects.get(i.object.0 as usize).cloned().ok_or(BuildError::NoSuchObject {
-                object: i.object.0,
-                count: objects.len(),
-            })
+            objects
+                .get(i.object.0 as usize)
+                .cloned()
+                .ok_or(BuildError::NoSuchObject { object: i.object.0, count: objects.len() })
         };
         let accels = instances.iter().map(find).collect::<Result<Vec<_>, _>>()?;
         self.tree_of(shapes, instances, &accels, in_world)
@@ -160,14 +170,33 @@ impl Builder {
             }
             GeometryDesc::Mesh(mesh) => {
                 let order = QuadOrder::Around;
-                self.mesh(entry, mesh, order, &desc.world_from_object, origin, area_light, in_world, geometries)?;
+                self.mesh(
+                    entry,
+                    mesh,
+                    order,
+                    &desc.world_from_object,
+                    origin,
+                    area_light,
+                    in_world,
+                    geometries,
+                )?;
             }
             GeometryDesc::BilinearMesh(mesh) => {
                 let order = QuadOrder::Patch;
-                self.mesh(entry, mesh, order, &desc.world_from_object, origin, area_light, in_world, geometries)?;
+                self.mesh(
+                    entry,
+                    mesh,
+                    order,
+                    &desc.world_from_object,
+                    origin,
+                    area_light,
+                    in_world,
+                    geometries,
+                )?;
             }
             GeometryDesc::Csg(csg) => {
-                let (solid, leaves) = csg::build(self, desc.index, csg, &desc.world_from_object, desc.reverse_orientation)?;
+                let (solid, leaves) =
+                    csg::build(self, desc.index, csg, &desc.world_from_object, desc.reverse_orientation)?;
                 if leaves.iter().any(SurfaceEntry::shines) {
                     self.warnings.push(BuildWarning::UnsampledLight { shape: desc.index });
                 }
@@ -311,8 +340,13 @@ impl Builder {
                 Light::Point(PointLight { from, intensity })
             }
             LightDesc::Spot { world_from_light, intensity, cone_angle, cone_delta_angle } => {
-                if !intensity.is_finite() || !(0.0..=180.0).contains(&cone_angle) || !cone_delta_angle.is_finite() {
-                    return Err(wrong("its intensity is not finite, or its angle not between 0 and 180 degrees"));
+                if !intensity.is_finite()
+                    || !(0.0..=180.0).contains(&cone_angle)
+                    || !cone_delta_angle.is_finite()
+                {
+                    return Err(wrong(
+                        "its intensity is not finite, or its angle not between 0 and 180 degrees",
+                    ));
                 }
                 Light::Spot(SpotLight::new(&world_from_light, intensity, cone_angle, cone_delta_angle))
             }
@@ -350,7 +384,8 @@ pub(crate) fn emission(desc: AreaLightDesc, area: impl FnOnce() -> f64) -> Emiss
         let per_radiance =
             std::f64::consts::PI * area() * f64::from(emission.sides() * emission.mean().luminance());
         let factor = f64::from(power) / per_radiance;
-        emission.radiance = if factor.is_finite() { radiance * factor as f32 } else { lumbre_image::Rgb::BLACK };
+        emission.radiance =
+            if factor.is_finite() { radiance * factor as f32 } else { lumbre_image::Rgb::BLACK };
     }
     emission
 }
@@ -383,10 +418,7 @@ fn inside_out(objects: &[ObjectDesc]) -> Result<Vec<usize>, BuildError> {
             let inner = instance.object.0 as usize;
             match marks.get(inner) {
                 None => {
-                    return Err(BuildError::NoSuchObject {
-                        object: instance.object.0,
-                        count: objects.len(),
-                    });
+                    return Err(BuildError::NoSuchObject { object: instance.object.0, count: objects.len() });
                 }
                 Some(Mark::Done) => {}
                 Some(Mark::Open) => {
@@ -457,7 +489,8 @@ fn moved(bounds: &Aabb, placement: &Transform) -> Aabb {
 
 fn check_cameras(cameras: &[Camera]) -> Result<(), BuildError> {
     for (position, camera) in cameras.iter().enumerate() {
-        let wrong = |parameter, found, expected| BuildError::Camera { camera: position, parameter, found, expected };
+        let wrong =
+            |parameter, found, expected| BuildError::Camera { camera: position, parameter, found, expected };
         let lens = match camera.kind {
             CameraKind::Perspective { fov, lens_radius, focal_distance } => {
                 if !(fov > 0.0 && fov < 180.0) {

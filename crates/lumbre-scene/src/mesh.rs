@@ -140,7 +140,12 @@ mod tests {
 
     fn quad(last: Vec3) -> Arc<MeshDesc> {
         Arc::new(MeshDesc {
-            positions: vec![Vec3::new(2.0, 3.0, 4.0), Vec3::new(5.0, 3.0, 4.0), Vec3::new(5.0, 7.0, 4.0), last],
+            positions: vec![
+                Vec3::new(2.0, 3.0, 4.0),
+                Vec3::new(5.0, 3.0, 4.0),
+                Vec3::new(5.0, 7.0, 4.0),
+                last,
+            ],
             quads: vec![[0, 1, 2, 3]],
             ..MeshDesc::default()
         })
@@ -148,17 +153,21 @@ mod tests {
 
     #[test]
     fn a_flat_quad_splits_and_a_bent_one_does_not() {
-        let flat = bake(7, quad(Vec3::new(2.0, 7.0, 4.0)), &Transform::IDENTITY, DVec3::ZERO, QuadOrder::Around)
-            .unwrap();
+        let flat =
+            bake(7, quad(Vec3::new(2.0, 7.0, 4.0)), &Transform::IDENTITY, DVec3::ZERO, QuadOrder::Around)
+                .unwrap();
         assert_eq!((flat.dress.mesh.indices.len(), flat.patches.len()), (2, 0));
         let trapezium =
-            bake(7, quad(Vec3::new(3.0, 7.0, 4.0)), &Transform::IDENTITY, DVec3::ZERO, QuadOrder::Around).unwrap();
+            bake(7, quad(Vec3::new(3.0, 7.0, 4.0)), &Transform::IDENTITY, DVec3::ZERO, QuadOrder::Around)
+                .unwrap();
         assert_eq!((trapezium.dress.mesh.indices.len(), trapezium.patches.len()), (2, 0));
-        let bent = bake(7, quad(Vec3::new(2.0, 7.0, 4.5)), &Transform::IDENTITY, DVec3::ZERO, QuadOrder::Around)
-            .unwrap();
+        let bent =
+            bake(7, quad(Vec3::new(2.0, 7.0, 4.5)), &Transform::IDENTITY, DVec3::ZERO, QuadOrder::Around)
+                .unwrap();
         assert_eq!((bent.dress.mesh.indices.len(), bent.patches), (0, vec![[0, 1, 3, 2]]));
-        let dented = bake(7, quad(Vec3::new(4.5, 4.0, 4.0)), &Transform::IDENTITY, DVec3::ZERO, QuadOrder::Around)
-            .unwrap();
+        let dented =
+            bake(7, quad(Vec3::new(4.5, 4.0, 4.0)), &Transform::IDENTITY, DVec3::ZERO, QuadOrder::Around)
+                .unwrap();
         assert_eq!((dented.dress.mesh.indices.len(), dented.patches.len()), (0, 1));
     }
 
@@ -172,7 +181,8 @@ mod tests {
             })
         };
         let front = |baked: &BakedMesh| {
-            let [a, b, c] = baked.dress.mesh.indices[0].map(|i| baked.dress.mesh.positions[i as usize].as_dvec3());
+            let [a, b, c] =
+                baked.dress.mesh.indices[0].map(|i| baked.dress.mesh.positions[i as usize].as_dvec3());
             (b - a).cross(c - a).normalize()
         };
         let plain = bake(0, desc(), &Transform::IDENTITY, DVec3::ZERO, QuadOrder::Around).unwrap();
@@ -184,7 +194,9 @@ mod tests {
 
     #[test]
     fn what_is_wrong_with_a_mesh_is_said() {
-        let bake = |desc: MeshDesc| bake(9, Arc::new(desc), &Transform::IDENTITY, DVec3::ZERO, QuadOrder::Around).err();
+        let bake = |desc: MeshDesc| {
+            bake(9, Arc::new(desc), &Transform::IDENTITY, DVec3::ZERO, QuadOrder::Around).err()
+        };
         let whole = (*quad(Vec3::new(2.0, 7.0, 4.0))).clone();
         assert_eq!(
             bake(MeshDesc { triangles: vec![[0, 1, 4]], ..whole.clone() }),

@@ -45,7 +45,9 @@ pub enum BuildWarning {
         shape: u32,
     },
     /// Light in an object that is instanced, or on a CSG, is found only by rays that happen to hit it.
-    #[error("shape {shape}: its light is found by chance only, for it is in an instance or a CSG (slow to converge)")]
+    #[error(
+        "shape {shape}: its light is found by chance only, for it is in an instance or a CSG (slow to converge)"
+    )]
     UnsampledLight {
         /// Which shape.
         shape: u32,
@@ -223,14 +225,9 @@ impl Scene {
         }
     }
 
-    fn dressed(
-        &self,
-        entry: &SurfaceEntry,
-        bare: &lumbre_geometry::Surface,
-        hit: &Hit,
-    ) -> (Dressed, u32) {
-        let placement: Option<Transform> = (self.has_instances && !hit.instances.is_empty())
-            .then(|| self.accel.world_from_object(hit));
+    fn dressed(&self, entry: &SurfaceEntry, bare: &lumbre_geometry::Surface, hit: &Hit) -> (Dressed, u32) {
+        let placement: Option<Transform> =
+            (self.has_instances && !hit.instances.is_empty()).then(|| self.accel.world_from_object(hit));
         let dressed = entry.dress(bare, hit.primitive, hit.root.local, placement.as_ref());
         let primitive = match &entry.form {
             Form::Patch { primitive, .. } => *primitive,

@@ -165,7 +165,12 @@ mod tests {
         for kind in [SamplerKind::Sobol, SamplerKind::Independent] {
             let sampler = |seed| Sampler::new(&SamplerDesc { kind, spp: None, seed });
             let base = sampler(3).draw(5, 7, 11);
-            let others = [sampler(4).draw(5, 7, 11), sampler(3).draw(6, 7, 11), sampler(3).draw(5, 8, 11), sampler(3).draw(5, 7, 12)];
+            let others = [
+                sampler(4).draw(5, 7, 11),
+                sampler(3).draw(6, 7, 11),
+                sampler(3).draw(5, 8, 11),
+                sampler(3).draw(5, 7, 12),
+            ];
             for other in others {
                 assert_ne!(base.filter(), other.filter());
                 assert_ne!(base.light_choice(2), other.light_choice(2));

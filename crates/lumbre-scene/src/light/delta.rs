@@ -87,12 +87,7 @@ pub struct DistantLight {
 
 impl DistantLight {
     pub(super) fn sample(&self) -> LightSample {
-        LightSample {
-            towards: self.towards,
-            end: None,
-            radiance: self.irradiance,
-            scatter: Scatter::Delta,
-        }
+        LightSample { towards: self.towards, end: None, radiance: self.irradiance, scatter: Scatter::Delta }
     }
 }
 

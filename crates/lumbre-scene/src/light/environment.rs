@@ -100,9 +100,7 @@ impl Environment {
         let (uv, density) = self.by_brightness.sample(u);
         let local = match self.mapping {
             EnvironmentMapping::EqualArea => warp64::equal_area_square_to_sphere(uv),
-            EnvironmentMapping::LatitudeLongitude => {
-                warp64::latlong_to_sphere(uv + DVec2::new(0.5, 0.0))
-            }
+            EnvironmentMapping::LatitudeLongitude => warp64::latlong_to_sphere(uv + DVec2::new(0.5, 0.0)),
         };
         let pdf = density * self.density_of_map(local);
         let radiance = self.scale * self.lookup(uv);
@@ -138,9 +136,7 @@ impl Environment {
     fn density_of_map(&self, local: DVec3) -> f64 {
         let in_light = match self.mapping {
             EnvironmentMapping::EqualArea => 1.0 / (4.0 * PI),
-            EnvironmentMapping::LatitudeLongitude => {
-                1.0 / (TAU * PI * local.truncate().length())
-            }
+            EnvironmentMapping::LatitudeLongitude => 1.0 / (TAU * PI * local.truncate().length()),
         };
         // A solid angle under a linear map; exactly 1 for a rotation, up to rounding.
         let stretch = self.world_from_light.vector(local).length();
@@ -179,7 +175,13 @@ fn texel(image: &Image, mapping: EnvironmentMapping, x: i64, y: i64) -> Spectrum
         // Beyond a pole lies the other side.
         EnvironmentMapping::LatitudeLongitude => {
             let beyond = y < 0 || y >= height;
-            let y = if y < 0 { -1 - y } else if y >= height { 2 * height - 1 - y } else { y };
+            let y = if y < 0 {
+                -1 - y
+            } else if y >= height {
+                2 * height - 1 - y
+            } else {
+                y
+            };
             ((if beyond { x + width / 2 } else { x }).rem_euclid(width), y.clamp(0, height - 1))
         }
     };

@@ -1,0 +1,32 @@
+//! Why nothing can be rendered.
+
+/// Why a render cannot begin.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RenderError {
+    /// The picture has no pixels, or too many.
+    #[error("a picture of {width} by {height} pixels cannot be made (1 to 65536 each way, 2^30 in all)")]
+    Size {
+        /// Pixels across.
+        width: u32,
+        /// Pixels down.
+        height: u32,
+    },
+    /// The crop holds no pixel of the picture.
+    #[error("the crop holds no pixel of the picture")]
+    EmptyCrop,
+    /// There is no such camera.
+    #[error("there is no camera {index}, there are {count}")]
+    NoSuchCamera {
+        /// Which was asked for.
+        index: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// The pixel filter has no width.
+    #[error("the pixel filter needs a positive radius, and more than zero inside it")]
+    Filter,
+    /// Threads cannot be started.
+    #[error("threads cannot be started: {0}")]
+    Threads(String),
+}

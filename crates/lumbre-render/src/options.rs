@@ -1,0 +1,124 @@
+//! What to render, and when to stop.
+
+use std::time::Duration;
+
+use lumbre_film::{Exposure, Filter, FilterShape, PixelBounds};
+use lumbre_math::DVec2;
+use lumbre_scene::{FilterDesc, IntegratorDesc, SamplerDesc, Scene};
+
+use crate::RenderError;
+
+/// Everything about a picture that is not in the scene. [`RenderOptions::of`] has what the scene's description says.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RenderOptions {
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// Which of them to render; the others are not in the result.
+    pub crop: Option<PixelBounds>,
+    /// Position of the camera among those of the scene.
+    pub camera: usize,
+    /// The integrator.
+    pub integrator: IntegratorDesc,
+    /// The sampler; its `spp` is not looked at.
+    pub sampler: SamplerDesc,
+    /// The pixel filter.
+    pub filter: FilterDesc,
+    /// Factor from radiance to pixel values, and the limit of a sample.
+    pub exposure: Exposure,
+    /// When to stop.
+    pub stop: Stop,
+    /// Whether to gather albedo, normals, depth and uv too.
+    pub features: bool,
+    /// Threads; 0 for one a core.
+    pub threads: usize,
+}
+
+/// When a render has done enough: at whichever comes first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stop {
+    /// At this many samples a pixel.
+    pub spp: u32,
+    /// After this much time.
+    pub time: Option<Duration>,
+    /// When the noise of the picture is estimated to be below this: the root mean square, over pixels, of the standard
+    /// error of the luminance divided by luminance (plus a tenth of the picture's mean, so that black pixels do not
+    /// count for much).
+    pub noise: Option<f64>,
+}
+
+/// Samples a pixel, where nobody says how many.
+const DEFAULT_SPP: u32 = 64;
+/// Pixels across and down, where nobody says how many.
+const DEFAULT_SIZE: (u32, u32) = (1280, 720);
+const MAX_SIDE: u32 = 65_536;
+const MAX_PIXELS: u64 = 1 << 30;
+
+impl RenderOptions {
+    /// What the description of the scene asks for; 1280 by 720 pixels of 64 samples where it does not say.
+    pub fn of(scene: &Scene) -> Self {
+        let film = scene.film();
+        let (width, height) = (film.width.unwrap_or(DEFAULT_SIZE.0), film.height.unwrap_or(DEFAULT_SIZE.1));
+        let mut options = Self {
+            width,
+            height,
+            crop: None,
+            camera: 0,
+            integrator: scene.integrator(),
+            sampler: scene.sampler(),
+            filter: scene.filter(),
+            exposure: Exposure { factor: film.exposure, max_component: film.max_component },
+            stop: Stop { spp: scene.sampler().spp.unwrap_or(DEFAULT_SPP), time: None, noise: None },
+            features: false,
+            threads: 0,
+        };
+        let window = film.crop_window.map(|window| options.pixels_of(window));
+        let bounds = film.pixel_bounds.map(|[x0, x1, y0, y1]| PixelBounds { x0, y0, x1, y1 });
+        options.crop = match (bounds, window) {
+            (Some(a), Some(b)) => Some(a.intersection(&b)),
+            (a, b) => a.or(b),
+        };
+        options
+    }
+
+    /// The pixels whose upper left corners lie in a window x0, x1, y0, y1 of the picture, as shares in [0, 1].
+    pub fn pixels_of(&self, [x0, x1, y0, y1]: [f64; 4]) -> PixelBounds {
+        // A cast from a float saturates; NaN gives 0.
+        let along =
+            |share: f64, count: u32| (share * f64::from(count)).ceil().clamp(0.0, f64::from(count)) as u32;
+        PixelBounds {
+            x0: along(x0, self.width),
+            y0: along(y0, self.height),
+            x1: along(x1, self.width),
+            y1: along(y1, self.height),
+        }
+    }
+
+    /// The pixels to render.
+    ///
+    /// # Errors
+    /// [`RenderError::Size`] and [`RenderError::EmptyCrop`].
+    pub fn bounds(&self) -> Result<PixelBounds, RenderError> {
+        let (width, height) = (self.width, self.height);
+        let whole = PixelBounds::whole(width, height);
+        if whole.is_empty() || width.max(height) > MAX_SIDE || whole.area() > MAX_PIXELS {
+            return Err(RenderError::Size { width, height });
+        }
+        let bounds = self.crop.map_or(whole, |crop| crop.intersection(&whole));
+        if bounds.is_empty() { Err(RenderError::EmptyCrop) } else { Ok(bounds) }
+    }
+
+    pub(crate) fn pixel_filter(&self) -> Result<Filter, RenderError> {
+        let (shape, radius) = match self.filter {
+            FilterDesc::Gaussian { radius, sigma } => (FilterShape::Gaussian { sigma: sigma.into() }, radius),
+            FilterDesc::Box { radius } => (FilterShape::Box, radius),
+            FilterDesc::Mitchell { radius, b, c } => {
+                (FilterShape::Mitchell { b: b.into(), c: c.into() }, radius)
+            }
+            FilterDesc::Sinc { radius, tau } => (FilterShape::Sinc { tau: tau.into() }, radius),
+            FilterDesc::Triangle { radius } => (FilterShape::Triangle, radius),
+        };
+        Filter::new(shape, DVec2::new(radius.x.into(), radius.y.into())).ok_or(RenderError::Filter)
+    }
+}
