@@ -80,16 +80,32 @@ impl Axial {
             let n = (near_e * across - g * near_offset).length();
             (n - m) * (n + m)
         };
+        // On a cone all three coefficients cancel for a ray from far along a generator. One step of Newton's method on F
+        // itself, at the point found, gives the digits back; next to a double root it is not to be trusted.
+        let refined = |t: f64, limit: f64| {
+            if self.k == 0.0 || t.is_infinite() {
+                return t;
+            }
+            let there = w + t * d;
+            let radius = self.r1 + self.k * there.dot(self.axis);
+            let arm = there.cross(self.axis);
+            let distance = arm.length();
+            let step = (distance - radius) * (distance + radius) / (2.0 * (across.dot(arm) - g * radius));
+            if step.abs() < limit { t - step } else { t }
+        };
         let whole = (f64::NEG_INFINITY, f64::INFINITY);
         let (low, high) = if a > 0.0 {
-            let roots = quadratic(a, h, c, delta)?;
+            let (first, second) = quadratic(a, h, c, delta)?;
             let is_on_this_nappe = e - g * (h / a) >= 0.0;
-            is_on_this_nappe.then_some(roots)?
+            let limit = 1e-3 * (second - first);
+            is_on_this_nappe.then(|| (refined(first, limit), refined(second, limit)))?
         } else if a < 0.0 {
             let (first, second) = quadratic(a, h, c, delta.max(0.0))?;
-            if g > 0.0 { (second, whole.1) } else { (whole.0, first) }
+            let limit = 1e-3 * (second - first);
+            if g > 0.0 { (refined(second, limit), whole.1) } else { (whole.0, refined(first, limit)) }
         } else if h != 0.0 {
             let t = -c / (2.0 * h);
+            let t = refined(t, 1e-6 * t.abs());
             match (h < 0.0, g > 0.0) {
                 (true, true) => (t, whole.1),
                 (false, false) if g < 0.0 => (whole.0, t),
