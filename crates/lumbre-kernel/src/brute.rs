@@ -3,8 +3,9 @@
 use lumbre_geometry::Ray;
 
 use crate::query::{All, Batch, Closest};
+use crate::touch::{Touch, offer_borders_of_all};
 use crate::traverse::{Found, Place, Search, is_sound, meet_kind};
-use crate::triangles::{Shear, intersect};
+use crate::triangles::{Meeting, Shear, intersect};
 use crate::{Accel, GeometryKind, Hit};
 
 pub(crate) fn closest(accel: &Accel, ray: &Ray) -> Option<Hit> {
@@ -20,6 +21,7 @@ pub(crate) fn every(accel: &Accel, ray: &Ray) -> Vec<Hit> {
 }
 
 fn visit<S: Search>(accel: &Accel, ray: &Ray, search: &mut S) {
+    let mut touches = Vec::new();
     let mut pending = vec![(accel, *ray, Place::default())];
     while let Some((accel, ray, place)) = pending.pop() {
         if !is_sound(&ray) {
@@ -38,17 +40,30 @@ fn visit<S: Search>(accel: &Accel, ray: &Ray, search: &mut S) {
                         if (b - a).cross(c - a) == lumbre_math::DVec3::ZERO {
                             continue;
                         }
-                        if let Some(root) = intersect(&ray, &shear, &origin, &corners) {
-                            let primitive = primitive as u32;
-                            search.offer(&Found {
-                                root,
-                                geometry: position,
-                                primitive,
-                                order: 0,
-                                accel,
-                                place: &place,
-                            });
-                        }
+                        let primitive = primitive as u32;
+                        let geometry = position;
+                        let root = match intersect(&ray, &shear, &origin, &corners) {
+                            Meeting::Miss => continue,
+                            Meeting::Hit(root) => root,
+                            Meeting::Touch { root, is_owned, feature } => {
+                                let place = place.clone();
+                                touches.push(Touch {
+                                    root,
+                                    is_owned,
+                                    feature,
+                                    corners,
+                                    geometry,
+                                    primitive,
+                                    accel,
+                                    place,
+                                });
+                                if !is_owned || !ray.contains(root.t) {
+                                    continue;
+                                }
+                                root
+                            }
+                        };
+                        search.offer(&Found { root, geometry, primitive, order: 0, accel, place: &place });
                     }
                 }
                 GeometryKind::Instance(instance) => {
@@ -68,4 +83,5 @@ fn visit<S: Search>(accel: &Accel, ray: &Ray, search: &mut S) {
             }
         }
     }
+    offer_borders_of_all(ray, &touches, search);
 }

@@ -189,3 +189,26 @@ impl Lanes for Avx2 {
         }
     }
 }
+
+/// AVX2 on a machine that has it, for tests that call the lanes themselves.
+#[cfg(test)]
+pub(crate) struct Avx2OrPortable;
+
+#[cfg(test)]
+impl Lanes for Avx2OrPortable {
+    fn meet_boxes(node: &Node, ray: &BoxRay, near: &mut [f32; WIDTH]) -> u32 {
+        struct Boxes<'a>(&'a Node, &'a BoxRay, &'a mut [f32; WIDTH]);
+        impl Task for Boxes<'_> {
+            type Output = u32;
+            #[inline(always)]
+            fn run<L: Lanes>(self) -> u32 {
+                L::meet_boxes(self.0, self.1, self.2)
+            }
+        }
+        Level::best().run(Boxes(node, ray, near))
+    }
+
+    fn meet_triangles(block: &TriangleBlock, shear: &Shear, origin: &[f64; 3]) -> u32 {
+        Portable::meet_triangles(block, shear, origin)
+    }
+}

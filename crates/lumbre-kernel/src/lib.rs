@@ -12,6 +12,7 @@ mod node;
 mod prepare;
 mod query;
 mod surface;
+mod touch;
 mod traverse;
 mod triangles;
 

@@ -10,12 +10,15 @@ use smallvec::SmallVec;
 use crate::collapse::Entry;
 use crate::lanes::{Lanes, Level, Task};
 use crate::node::{BoxRay, WIDTH, tag};
-use crate::triangles::{self, BLOCK, Shear};
+use crate::touch::{self, AllTouches, Touch};
+use crate::triangles::{self, BLOCK, Meeting, Shear};
 use crate::{Accel, GeometryKind, InstancePath};
 
 /// What a search asks of a primitive that may be crossed more than once.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Ask {
+    /// Nothing: triangles alone are of interest.
+    Nothing,
     /// Whether it is crossed.
     Whether,
     /// The first crossing.
@@ -77,14 +80,28 @@ pub(crate) fn is_sound(ray: &Ray) -> bool {
 #[inline(always)]
 pub(crate) fn search<S: Search>(level: Level, accel: &Accel, ray: &Ray, search: &mut S) {
     if is_sound(ray) {
-        level.run(Traversal { accel, ray, search });
+        let mut touches = Vec::new();
+        let is_over = level.run(Traversal { accel, ray, search, touches: &mut touches });
+        if !is_over && !touches.is_empty() {
+            touch::offer_borders(accel, ray, &touches, search);
+        }
     }
 }
 
-struct Traversal<'a, S> {
+/// Collects what the whole line touches.
+pub(crate) fn search_touches<'a>(level: Level, accel: &'a Accel, ray: &Ray, search: &mut AllTouches<'a>) {
+    let line = ray.with_range(f64::NEG_INFINITY, f64::INFINITY);
+    let mut touches = Vec::new();
+    level.run(Traversal { accel, ray: &line, search, touches: &mut touches });
+    search.touches = touches;
+}
+
+struct Traversal<'a, 's, S> {
     accel: &'a Accel,
-    ray: &'a Ray,
-    search: &'a mut S,
+    ray: &'s Ray,
+    search: &'s mut S,
+    /// The triangles met at an edge or a corner.
+    touches: &'s mut Vec<Touch<'a>>,
 }
 
 /// A tree in progress, with the ray in its space.
@@ -143,19 +160,20 @@ impl<'a> Frame<'a> {
     }
 }
 
-impl<S: Search> Task for Traversal<'_, S> {
-    type Output = ();
+impl<S: Search> Task for Traversal<'_, '_, S> {
+    /// Whether the search ended before it had seen everything.
+    type Output = bool;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) {
-        let Self { accel, ray, search } = self;
+    fn run<L: Lanes>(self) -> bool {
+        let Self { accel, ray, search, touches } = self;
         let mut stack = Entries::new();
         let mut suspended: SmallVec<[Frame; 2]> = SmallVec::new();
         let mut place = Place::default();
 
         let (mut frame, meets_tree) = Frame::new(accel, *ray, search);
         if enter(&mut frame, meets_tree, &place, &mut stack, search) {
-            return;
+            return true;
         }
         while let Some(entry) = stack.pop() {
             if (entry >> 32) as i32 > frame.limit_key {
@@ -203,14 +221,14 @@ impl<S: Search> Task for Traversal<'_, S> {
             let first = (reference & tag::PLACE) as usize;
             match reference >> tag::SHIFT {
                 tag::TRIANGLES => {
-                    if meet_blocks::<L, S>(&mut frame, first, &place, search) {
-                        return;
+                    if meet_blocks::<L, S>(&mut frame, first, &place, search, touches) {
+                        return true;
                     }
                 }
                 tag::SHAPES | tag::CUSTOM => {
                     for entry in &frame.accel.tree.entries[first..] {
                         if meet_entry(&frame, entry, &place, search) {
-                            return;
+                            return true;
                         }
                         if entry.is_last() {
                             break;
@@ -237,7 +255,7 @@ impl<S: Search> Task for Traversal<'_, S> {
                     stack.push(stack_entry(ALWAYS, tag::reference(tag::RETURN, 0)));
                     suspended.push(std::mem::replace(&mut frame, inner));
                     if enter(&mut frame, meets_tree, &place, &mut stack, search) {
-                        return;
+                        return true;
                     }
                 }
                 tag::RETURN => {
@@ -250,6 +268,7 @@ impl<S: Search> Task for Traversal<'_, S> {
                 _ => {}
             }
         }
+        false
     }
 }
 
@@ -278,28 +297,46 @@ fn enter<S: Search>(
 }
 
 #[inline(always)]
-fn meet_blocks<L: Lanes, S: Search>(frame: &mut Frame, first: usize, place: &Place, search: &mut S) -> bool {
+fn meet_blocks<'a, L: Lanes, S: Search>(
+    frame: &mut Frame<'a>,
+    first: usize,
+    place: &Place,
+    search: &mut S,
+    touches: &mut Vec<Touch<'a>>,
+) -> bool {
     let mut found_any = false;
-    for block in &frame.accel.tree.blocks[first..] {
+    let accel = frame.accel;
+    for block in &accel.tree.blocks[first..] {
         let origin = frame.shear.local_origin(frame.ray.origin, &block.origin);
         let mut mask = L::meet_triangles(block, &frame.shear, &origin);
         while mask != 0 {
             let lane = mask.trailing_zeros() as usize % BLOCK;
             mask &= mask - 1;
-            let triangle = block.triangle(lane);
-            let Some(root) = triangles::intersect(&frame.ray, &frame.shear, &origin, &triangle) else {
-                continue;
+            let corners = block.triangle(lane);
+            let (geometry, primitive) = (block.geometry, block.primitives[lane]);
+            let root = match triangles::intersect(&frame.ray, &frame.shear, &origin, &corners) {
+                Meeting::Miss => continue,
+                Meeting::Hit(root) => root,
+                Meeting::Touch { root, is_owned, feature } => {
+                    let place = place.clone();
+                    touches.push(Touch {
+                        root,
+                        is_owned,
+                        feature,
+                        corners,
+                        geometry,
+                        primitive,
+                        accel,
+                        place,
+                    });
+                    if !is_owned || !frame.ray.contains(root.t) {
+                        continue;
+                    }
+                    root
+                }
             };
             found_any = true;
-            let found = Found {
-                root,
-                geometry: block.geometry,
-                primitive: block.primitives[lane],
-                order: 0,
-                accel: frame.accel,
-                place,
-            };
-            if search.offer(&found) {
+            if search.offer(&Found { root, geometry, primitive, order: 0, accel, place }) {
                 return true;
             }
         }
@@ -338,6 +375,7 @@ pub(crate) fn meet_kind<S: Search>(
         ray.contains(root.t) && search.offer(&Found { root, geometry, primitive, order, accel, place })
     };
     match S::ASK {
+        Ask::Nothing => false,
         Ask::Whether => {
             let is_hit = match kind {
                 GeometryKind::Shape(shape) => shape.any(ray),

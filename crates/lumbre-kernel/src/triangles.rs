@@ -11,6 +11,8 @@
 use lumbre_geometry::{Ray, Root};
 use lumbre_math::{DVec2, DVec3};
 
+use crate::touch::Feature;
+
 /// Triangles in a block.
 pub(crate) const BLOCK: usize = 4;
 
@@ -106,43 +108,92 @@ struct Corner {
     z: f64,
 }
 
-/// The one crossing of a triangle within the ray's range. `corners` are relative to the mesh, as is `origin`, which has
-/// the order of the shear's axes.
+/// How a ray meets a triangle.
+pub(crate) enum Meeting {
+    /// Not at all, or out of the range.
+    Miss,
+    /// Within the range, away from its edges.
+    Hit(Root),
+    /// Exactly at an edge or a corner, in range or not.
+    Touch {
+        /// The crossing.
+        root: Root,
+        /// Whether this triangle owns the crossing.
+        is_owned: bool,
+        /// Where.
+        feature: Feature,
+    },
+}
+
+/// How the ray meets a triangle. `corners` are relative to the mesh, as is `origin`, which has the order of the shear's
+/// axes.
 #[inline(always)]
-pub(crate) fn intersect(
-    ray: &Ray,
-    shear: &Shear,
-    origin: &[f64; 3],
-    corners: &[[f32; 3]; 3],
-) -> Option<Root> {
+pub(crate) fn intersect(ray: &Ray, shear: &Shear, origin: &[f64; 3], corners: &[[f32; 3]; 3]) -> Meeting {
     let [a, b, c] = [
         shear.corner(origin, &corners[0]),
         shear.corner(origin, &corners[1]),
         shear.corner(origin, &corners[2]),
     ];
-    let edges = [edge(c, b), edge(a, c), edge(b, a)];
-    let all_positive = edges.iter().all(|e| e.is_positive);
-    let all_negative = edges.iter().all(|e| !e.is_positive && e.is_sided);
-    if !all_positive && !all_negative {
-        return None;
+    let (bc, ca, ab) = (edge(c, b), edge(a, c), edge(b, a));
+    let [u, v, w] = [bc, ca, ab].map(|edge| edge.value);
+    let is_inside = (u > 0.0 && v > 0.0 && w > 0.0) || (u < 0.0 && v < 0.0 && w < 0.0);
+    if !is_inside {
+        return touch(shear, [a, b, c], [bc, ca, ab]);
     }
-    let [mut u, mut v, mut w] = edges.map(|e| e.value);
-    let mut det = u + v + w;
-    let largest_product = edges.iter().fold(0.0, |m: f64, e| m.max(e.product));
+    let det = u + v + w;
+    let largest_product = bc.product.max(ca.product).max(ab.product);
     // Seen on edge, a triangle's edge functions cancel; left so, t would be anywhere within the triangle.
-    if det.abs() < largest_product * (1.0 / 64.0) {
-        [u, v, w] =
-            [difference_of_products(c, b), difference_of_products(a, c), difference_of_products(b, a)];
-        det = u + v + w;
-    }
-    let t = (u * a.z + v * b.z + w * c.z) / det / shear.direction_z;
+    let root = if det.abs() < largest_product * (1.0 / 64.0) {
+        root_of(
+            shear,
+            [a, b, c],
+            [difference_of_products(c, b), difference_of_products(a, c), difference_of_products(b, a)],
+        )
+    } else {
+        root_of(shear, [a, b, c], [u, v, w])
+    };
     // A NaN is not in the range; an infinity is no place.
-    (ray.contains(t) && t.is_finite()).then(|| Root {
-        t,
-        part: 0,
-        multiplicity: 1,
-        local: DVec2::new(v / det, w / det),
-    })
+    if ray.contains(root.t) && root.t.is_finite() { Meeting::Hit(root) } else { Meeting::Miss }
+}
+
+#[inline(always)]
+fn root_of(shear: &Shear, [a, b, c]: [Corner; 3], [u, v, w]: [f64; 3]) -> Root {
+    let det = u + v + w;
+    let t = (u * a.z + v * b.z + w * c.z) / det / shear.direction_z;
+    Root { t, part: 0, multiplicity: 1, local: DVec2::new(v / det, w / det) }
+}
+
+/// A triangle whose edge functions are not all of one sign.
+#[inline(always)]
+fn touch(shear: &Shear, corners: [Corner; 3], edges: [Edge; 3]) -> Meeting {
+    let values = edges.map(|edge| edge.value);
+    let is_weakly_inside =
+        values.iter().all(|&value| value >= 0.0) || values.iter().all(|&value| value <= 0.0);
+    if is_weakly_inside { touch_at_zero(shear, corners, edges) } else { Meeting::Miss }
+}
+
+#[cold]
+#[inline(never)]
+fn touch_at_zero(shear: &Shear, corners: [Corner; 3], edges: [Edge; 3]) -> Meeting {
+    let [a, b, c] = corners;
+    let values = [difference_of_products(c, b), difference_of_products(a, c), difference_of_products(b, a)];
+    let feature = match values.map(|value| value == 0.0) {
+        [true, false, false] => Feature::Edge(0),
+        [false, true, false] => Feature::Edge(1),
+        [false, false, true] => Feature::Edge(2),
+        [false, true, true] => Feature::Vertex(0),
+        [true, false, true] => Feature::Vertex(1),
+        [true, true, false] => Feature::Vertex(2),
+        [true, true, true] => Feature::EdgeOn,
+        [false, false, false] => return Meeting::Miss,
+    };
+    let root = root_of(shear, corners, values);
+    if feature != Feature::EdgeOn && !root.t.is_finite() {
+        return Meeting::Miss;
+    }
+    let is_sided = edges.iter().all(|edge| edge.is_sided);
+    let is_one_sign = edges.iter().all(|edge| edge.is_positive == edges[0].is_positive);
+    Meeting::Touch { root, is_owned: feature != Feature::EdgeOn && is_sided && is_one_sign, feature }
 }
 
 #[derive(Clone, Copy)]

@@ -1,5 +1,7 @@
 //! What the kernel promises, against a loop over everything.
 
+mod borders;
+mod boxes;
 mod build;
 mod oracle;
 mod scenes;

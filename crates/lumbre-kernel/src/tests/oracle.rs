@@ -20,7 +20,7 @@ fn every(accel: &Accel, ray: &Ray) -> Vec<Hit> {
 }
 
 /// All queries on one ray; returns how many hits there were.
-fn check(accel: &Accel, ray: &Ray) -> usize {
+pub(crate) fn check(accel: &Accel, ray: &Ray) -> usize {
     let expected = brute::every(accel, ray);
     let closest = accel.closest_at(Level::best(), ray);
     assert_eq!(closest, brute::closest(accel, ray), "{ray:?}");

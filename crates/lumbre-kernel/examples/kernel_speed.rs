@@ -1,0 +1,234 @@
+//! How many rays a second: `cargo run --release -p lumbre-kernel --example kernel_speed [-- --quick]`.
+//!
+//! Scenes: bumpy spheres of triangles, a field of spheres, the field of mixed shapes on a plane, and an instanced field.
+//! Rays: primary (scanlines of a pinhole camera), bounce (from the primary hits, at random), shadow (from the primary hits
+//! to a light). Each figure is the best of several passes, in millions of rays a second.
+
+use std::hint::black_box;
+use std::sync::Arc;
+use std::time::Instant;
+
+use lumbre_geometry::{PlacedShape, Ray, Shape, Sphere, Triangle};
+use lumbre_kernel::{Accel, BuildOptions, Geometry, GeometryKind, Instance, TriangleMesh};
+use lumbre_math::{DVec3, Transform};
+
+struct Random(u64);
+
+impl Random {
+    fn unit(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn direction(&mut self) -> DVec3 {
+        loop {
+            let v = DVec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0;
+            if v.length_squared() <= 1.0 && v.length_squared() > 1e-6 {
+                return v.normalize();
+            }
+        }
+    }
+}
+
+fn main() {
+    let is_quick = std::env::args().any(|argument| argument == "--quick");
+    println!(
+        "{:<22} {:>9} {:>7} {:>8} {:>6}  {:<8} {:>9} {:>9} {:>9} {:>9}",
+        "scene", "prims", "build", "Mprim/s", "B/prim", "rays", "closest×1", "any×1", "closest×2", "any×2"
+    );
+    let mut scenes: Vec<(&str, Vec<GeometryKind>)> = vec![
+        ("mesh 100k", vec![mesh(224)]),
+        ("mixed field 625", field(25, |random, i, at| mixed(random, i, at))),
+        ("sphere field 625", field(25, |random, _, at| sphere(random, at))),
+        ("sphere field 40k", field(200, |random, _, at| sphere(random, at))),
+        ("instances 10k × 100k", instances(100)),
+    ];
+    if !is_quick {
+        scenes.insert(1, ("mesh 1M", vec![mesh(708)]));
+    }
+    for (name, kinds) in scenes {
+        measure(name, kinds, if is_quick { 1 } else { 5 });
+    }
+}
+
+fn measure(name: &str, kinds: Vec<GeometryKind>, passes: usize) {
+    let geometries = || {
+        let geometry = |(i, kind): (usize, &GeometryKind)| Geometry { id: i as u32, kind: kind.clone() };
+        kinds.iter().enumerate().map(geometry).collect::<Vec<_>>()
+    };
+    let mut seconds = f64::INFINITY;
+    let mut accel = None;
+    for _ in 0..passes.min(3) {
+        let geometries = geometries();
+        let start = Instant::now();
+        accel = Some(Accel::build(geometries, &BuildOptions::default()).expect("a sound scene"));
+        seconds = seconds.min(start.elapsed().as_secs_f64());
+    }
+    let accel = accel.expect("at least one pass");
+    let count = accel.primitive_count();
+    let primary = primary_rays(512);
+    let mut random = Random(9);
+    let light = DVec3::new(30.0, 40.0, 20.0);
+    let (mut bounce, mut shadow) = (Vec::new(), Vec::new());
+    for ray in &primary {
+        let Some(hit) = accel.closest(ray) else { continue };
+        let surface = accel.surface(ray, &hit);
+        let out = random.direction();
+        let normal = if surface.normal.dot(ray.direction) < 0.0 { surface.normal } else { -surface.normal };
+        let out = if out.dot(normal) < 0.0 { -out } else { out };
+        let from = surface.point + 1e-6 * normal;
+        bounce.push(Ray::new(from, out));
+        shadow.push(Ray::new(from, light - from).with_range(0.0, 1.0));
+    }
+    for (i, (work, rays)) in
+        [("primary", &primary), ("bounce", &bounce), ("shadow", &shadow)].iter().enumerate()
+    {
+        let closest = |ray: &Ray| {
+            black_box(accel.closest(ray));
+        };
+        let any = |ray: &Ray| {
+            black_box(accel.any(ray));
+        };
+        let figures =
+            [1, 2].map(|threads| (speed(rays, threads, passes, closest), speed(rays, threads, passes, any)));
+        let head = if i == 0 {
+            let bytes = accel.memory_bytes() as f64 / count as f64;
+            format!(
+                "{name:<22} {count:>9} {seconds:>6.3}s {:>8.2} {bytes:>6.0}",
+                count as f64 / seconds / 1e6
+            )
+        } else {
+            format!("{:<56}", "")
+        };
+        println!(
+            "{head}  {work:<8} {:>9.2} {:>9.2} {:>9.2} {:>9.2}",
+            figures[0].0, figures[0].1, figures[1].0, figures[1].1
+        );
+    }
+}
+
+/// Millions of rays a second, the best of some passes.
+fn speed(rays: &[Ray], threads: usize, passes: usize, query: impl Fn(&Ray) + Sync) -> f64 {
+    let best = (0..passes)
+        .map(|_| {
+            let start = Instant::now();
+            std::thread::scope(|scope| {
+                for part in rays.chunks(rays.len().div_ceil(threads).max(1)) {
+                    let query = &query;
+                    scope.spawn(move || part.iter().for_each(query));
+                }
+            });
+            start.elapsed().as_secs_f64()
+        })
+        .fold(f64::INFINITY, f64::min);
+    rays.len() as f64 / best / 1e6
+}
+
+fn primary_rays(size: usize) -> Vec<Ray> {
+    let eye = DVec3::new(9.0, 7.0, 14.0);
+    let forward = (DVec3::new(0.0, 0.5, 0.0) - eye).normalize();
+    let right = forward.cross(DVec3::Y).normalize();
+    let up = right.cross(forward);
+    let pixel = |i: usize| (i as f64 + 0.5) / size as f64 * 2.0 - 1.0;
+    (0..size * size)
+        .map(|i| Ray::new(eye, forward + 0.5 * (pixel(i % size) * right - pixel(i / size) * up)))
+        .collect()
+}
+
+/// A bumpy sphere of 2 n² triangles, radius about 6.
+fn mesh(n: u32) -> GeometryKind {
+    let at = |i: u32, j: u32| (i % n) * (n + 1) + j;
+    let mut positions = Vec::new();
+    let mut indices = Vec::new();
+    for i in 0..n {
+        for j in 0..=n {
+            let azimuth = std::f64::consts::TAU * f64::from(i) / f64::from(n);
+            let polar = std::f64::consts::PI * f64::from(j) / f64::from(n);
+            let radius = 5.5
+                + 0.5 * (9.0 * azimuth).sin() * (11.0 * polar).sin()
+                + 0.1 * (53.0 * azimuth + 71.0 * polar).sin();
+            let point =
+                DVec3::new(polar.sin() * azimuth.cos(), polar.cos(), polar.sin() * azimuth.sin()) * radius;
+            positions.push(point.as_vec3());
+            if j < n {
+                indices.extend([
+                    [at(i, j), at(i + 1, j), at(i + 1, j + 1)],
+                    [at(i, j), at(i + 1, j + 1), at(i, j + 1)],
+                ]);
+            }
+        }
+    }
+    GeometryKind::Mesh(Arc::new(TriangleMesh { origin: DVec3::ZERO, positions, indices }))
+}
+
+/// Things on a square of 18, in rows, and the ground under them.
+fn field(n: usize, make: impl Fn(&mut Random, usize, Transform) -> PlacedShape) -> Vec<GeometryKind> {
+    let mut random = Random(4);
+    let step = 18.0 / n as f64;
+    let mut kinds = Vec::new();
+    for i in 0..n * n {
+        let center =
+            DVec3::new(((i % n) as f64 + 0.5) * step - 9.0, 0.4 * step, ((i / n) as f64 + 0.5) * step - 9.0);
+        let place =
+            Transform::translate(center) * Transform::scale(DVec3::splat(0.4 * step)).expect("not flat");
+        kinds.push(GeometryKind::Shape(make(&mut random, i, place)));
+    }
+    kinds.push(ground());
+    kinds
+}
+
+fn ground() -> GeometryKind {
+    let positions = [(-40.0, -40.0), (-40.0, 40.0), (40.0, 40.0), (40.0, -40.0)]
+        .map(|(x, z)| DVec3::new(x, 0.0, z).as_vec3())
+        .to_vec();
+    let indices = vec![[0, 1, 2], [0, 2, 3]];
+    GeometryKind::Mesh(Arc::new(TriangleMesh { origin: DVec3::ZERO, positions, indices }))
+}
+
+fn sphere(random: &mut Random, place: Transform) -> PlacedShape {
+    let size = 0.5 + 0.5 * random.unit();
+    // In world space: no ray is moved for it.
+    let radius = size * place.vector(DVec3::X).x;
+    PlacedShape::new(
+        Sphere::new(place.point(DVec3::ZERO), radius).expect("a radius").into(),
+        Transform::IDENTITY,
+    )
+}
+
+fn mixed(random: &mut Random, i: usize, place: Transform) -> PlacedShape {
+    let turn = Transform::rotate(random.direction(), 360.0 * random.unit()).expect("an axis");
+    let shape: Shape = match i % 2 {
+        0 => return sphere(random, place),
+        _ => {
+            Triangle::new(DVec3::new(-0.9, -0.5, 0.1), DVec3::new(0.9, -0.6, 0.0), DVec3::new(0.1, 0.9, -0.2))
+                .expect("three corners")
+                .into()
+        }
+    };
+    PlacedShape::new(shape, place * turn)
+}
+
+/// n² copies of a mesh in a field.
+fn instances(n: usize) -> Vec<GeometryKind> {
+    let ball = vec![Geometry { id: 3, kind: mesh(224) }];
+    let accel = Arc::new(Accel::build(ball, &BuildOptions::default()).expect("a sound mesh"));
+    let mut random = Random(6);
+    let step = 18.0 / n as f64;
+    let mut kinds: Vec<GeometryKind> = (0..n * n)
+        .map(|i| {
+            let center = DVec3::new(
+                ((i % n) as f64 + 0.5) * step - 9.0,
+                0.4 * step,
+                ((i / n) as f64 + 0.5) * step - 9.0,
+            );
+            let world_from_object = Transform::translate(center)
+                * Transform::rotate(random.direction(), 360.0 * random.unit()).expect("an axis")
+                * Transform::scale(DVec3::splat(0.07 * step)).expect("not flat");
+            GeometryKind::Instance(Instance { accel: Arc::clone(&accel), world_from_object })
+        })
+        .collect();
+    kinds.push(ground());
+    kinds
+}

@@ -1,0 +1,126 @@
+//! The proof in `node`, put to the test: a box that a ray reaches within its range is never passed by.
+
+use lumbre_geometry::{Aabb, Ray};
+use lumbre_math::DVec3;
+
+use super::scenes::Random;
+use crate::build::Bounds;
+use crate::lanes::{Avx2OrPortable, Lanes, Portable};
+use crate::node::{BoxRay, Node, Units, WIDTH};
+
+fn units(bounds: &Aabb) -> Units {
+    let half = 0.5 * bounds.size();
+    let scale = half.max_element().log2().ceil().exp2().recip();
+    Units { origin: bounds.center(), scale, radius: (half * scale).length(), condition: 1.0 }
+}
+
+/// A component such as makes trouble.
+fn component(random: &mut Random) -> f64 {
+    match random.below(8) {
+        0 => 0.0,
+        1 => -0.0,
+        2 => 5e-324,
+        3 => -1e-310,
+        4 => random.between(-1.0, 1.0) * 10f64.powf(random.between(-30.0, 0.0)),
+        _ => random.between(-1.0, 1.0),
+    }
+}
+
+fn reached_boxes_are_met<L: Lanes>(seed: u64, rounds: usize) {
+    let mut random = Random(seed);
+    let mut met = 0;
+    for _ in 0..rounds {
+        let size = 10f64.powf(random.between(-20.0, 20.0));
+        let offset = random.vector() * size * 10f64.powf(random.between(-2.0, 6.0));
+        let whole = Aabb { min: offset - size * random.between(0.1, 1.0), max: offset + size };
+        let units = units(&whole);
+        let mut node = Node { len: WIDTH as u32, ..Node::EMPTY };
+        let mut boxes = Vec::new();
+        for lane in 0..WIDTH {
+            // Small, flat, or the whole.
+            let inside = |random: &mut Random| {
+                whole.min + whole.size() * DVec3::new(random.unit(), random.unit(), random.unit())
+            };
+            let (a, mut b) = (inside(&mut random), inside(&mut random));
+            b = a.lerp(b, 10f64.powf(random.between(-9.0, 0.0)));
+            if random.unit() < 0.3 {
+                b[lane % 3] = a[lane % 3];
+            }
+            let bounds = Aabb::around([a, b]);
+            let Bounds { min, max } = Bounds::around(&units, &bounds);
+            for axis in 0..3 {
+                node.planes[2 * axis][lane] = min[axis];
+                node.planes[2 * axis + 1][lane] = max[axis];
+            }
+            boxes.push(bounds);
+        }
+        for (lane, bounds) in boxes.iter().enumerate() {
+            // A point of the box, often on its corners, edges and faces.
+            let mut target = bounds.min;
+            for axis in 0..3 {
+                let along = [0.0, 1.0, random.unit()][random.below(3)];
+                target[axis] = (bounds.min[axis] + along * (bounds.max[axis] - bounds.min[axis]))
+                    .clamp(bounds.min[axis], bounds.max[axis]);
+            }
+            let direction =
+                DVec3::new(component(&mut random), component(&mut random), component(&mut random))
+                    * 10f64.powf(random.between(-100.0, 100.0));
+            if direction.abs().max_element() == 0.0 {
+                continue;
+            }
+            // From where t leads to the target, up to rounding. Origins on the planes too.
+            let distance = size * 10f64.powf(random.between(-8.0, 4.0));
+            let t = if random.unit() < 0.1 { 0.0 } else { distance / direction.abs().max_element() };
+            if !t.is_finite() || t > 1e250 {
+                continue;
+            }
+            let ray = Ray::new(target - t * direction, direction);
+            let (t_min, t_max) =
+                [(t, t), (0.0, t), (t, f64::INFINITY), (f64::NEG_INFINITY, f64::INFINITY)][random.below(4)];
+            let ray = ray.with_range(t_min, t_max);
+            let mut near = [0.0; WIDTH];
+            let boxes = BoxRay::new(&units, &ray).unwrap_or_else(|| panic!("{ray:?} misses {units:?}"));
+            let mask = L::meet_boxes(&node, &boxes, &mut near);
+            assert!(mask & (1 << lane) != 0, "{ray:?} at {t} misses {bounds:?} of {units:?}");
+            // A hit at t must not be culled by a limit of t either.
+            let mut ended = boxes.clone();
+            ended.end_at(t);
+            assert!(near[lane] <= ended.s_max, "{ray:?} at {t}");
+            met += 1;
+        }
+    }
+    assert!(met > rounds * 5);
+}
+
+#[test]
+fn a_box_that_holds_the_point_at_t_is_always_met() {
+    reached_boxes_are_met::<Portable>(51, 100_000);
+    reached_boxes_are_met::<Avx2OrPortable>(52, 100_000);
+}
+
+#[test]
+fn boxes_far_from_the_ray_are_not_met() {
+    // Else the test above would prove nothing.
+    let mut random = Random(53);
+    let whole = Aabb { min: DVec3::new(1.0, 2.0, 3.0), max: DVec3::new(5.0, 6.0, 7.0) };
+    let units = units(&whole);
+    let mut node = Node { len: 1, ..Node::EMPTY };
+    let bounds = Aabb { min: DVec3::new(2.0, 3.0, 4.0), max: DVec3::new(2.5, 3.5, 4.5) };
+    let Bounds { min, max } = Bounds::around(&units, &bounds);
+    for axis in 0..3 {
+        node.planes[2 * axis][0] = min[axis];
+        node.planes[2 * axis + 1][0] = max[axis];
+    }
+    let mut missed = 0;
+    for _ in 0..10_000 {
+        let center = bounds.center();
+        let direction = random.vector();
+        // Past the box, further than its half diagonal but by little.
+        let aside = direction.cross(random.vector()).normalize() * 0.434;
+        let ray = Ray::new(center + aside - 20.0 * direction, direction);
+        let mut near = [0.0; WIDTH];
+        let mask = BoxRay::new(&units, &ray).map_or(0, |ray| Portable::meet_boxes(&node, &ray, &mut near));
+        missed += u32::from(mask == 0);
+    }
+    assert_eq!(missed, 10_000);
+}

@@ -1,0 +1,170 @@
+//! Rays exactly through edges and vertices: the borders of open meshes.
+//!
+//! Inside a mesh the rule for zeros (see `triangles`) gives each crossing one owner, but at a border it may give it none:
+//! the ray, moved by its ε, passes by the mesh. A triangle is closed, so such a crossing counts all the same, once. Which
+//! edges are borders is seen from the triangles that the ray touches at that place, so that no mesh needs a table of its
+//! neighbours; corners are compared by position, so that a mesh whose corners are split for their normals or texture
+//! coordinates stays closed.
+
+use std::collections::HashMap;
+
+use lumbre_geometry::{Ray, Root};
+
+use crate::Accel;
+use crate::lanes::Level;
+use crate::traverse::{self, Ask, Found, Place, Search};
+
+/// Where a ray meets a triangle that it touches.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Feature {
+    /// The edge opposite this corner.
+    Edge(usize),
+    /// This corner.
+    Vertex(usize),
+    /// Seen on edge: never hit, but a neighbour of others.
+    EdgeOn,
+}
+
+/// A triangle whose edges or corners a ray meets exactly.
+#[derive(Clone, Debug)]
+pub(crate) struct Touch<'a> {
+    /// The crossing; it may lie out of the ray's range.
+    pub(crate) root: Root,
+    /// Whether the rule for zeros gives the crossing to this triangle, so that it was offered already.
+    pub(crate) is_owned: bool,
+    pub(crate) feature: Feature,
+    pub(crate) corners: [[f32; 3]; 3],
+    pub(crate) geometry: u32,
+    pub(crate) primitive: u32,
+    pub(crate) accel: &'a Accel,
+    pub(crate) place: Place,
+}
+
+/// A corner by position; the two zeros are one.
+type Position = [u32; 3];
+
+fn position(corner: [f32; 3]) -> Position {
+    corner.map(|x| (x + 0.0).to_bits())
+}
+
+/// What is known of an edge from the triangles around a touched place.
+struct Shared {
+    third: Position,
+    is_shared: bool,
+}
+
+/// What is known of a vertex.
+struct Fan {
+    is_owned: bool,
+    is_open: bool,
+    first: usize,
+}
+
+/// Of the touches that nobody owns, those that count because they lie at a border. `touches` are to be all that the line
+/// has, or those for which that makes no difference.
+fn at_borders(touches: &[Touch]) -> Vec<usize> {
+    // Meshes by where they are.
+    let mut order: Vec<usize> = (0..touches.len()).collect();
+    let mesh = |i: usize| (touches[i].place.route.as_slice(), touches[i].geometry);
+    order.sort_by(|&a, &b| mesh(a).cmp(&mesh(b)).then(touches[a].primitive.cmp(&touches[b].primitive)));
+    let mut result = Vec::new();
+    for group in order.chunk_by(|&a, &b| mesh(a) == mesh(b)) {
+        let mut edges: HashMap<[Position; 2], Shared> = HashMap::new();
+        let key = |a: Position, b: Position| if a < b { [a, b] } else { [b, a] };
+        for &i in group {
+            let corners = touches[i].corners.map(position);
+            for opposite in 0..3 {
+                let third = corners[opposite];
+                let edge = key(corners[(opposite + 1) % 3], corners[(opposite + 2) % 3]);
+                let shared = edges.entry(edge).or_insert(Shared { third, is_shared: false });
+                shared.is_shared |= shared.third != third;
+            }
+        }
+        let mut fans: HashMap<Position, Fan> = HashMap::new();
+        for &i in group {
+            let corners = touches[i].corners.map(position);
+            match touches[i].feature {
+                Feature::Edge(opposite) => {
+                    let edge = key(corners[(opposite + 1) % 3], corners[(opposite + 2) % 3]);
+                    if !touches[i].is_owned && !edges[&edge].is_shared {
+                        result.push(i);
+                    }
+                }
+                Feature::Vertex(corner) => {
+                    let around = [corners[(corner + 1) % 3], corners[(corner + 2) % 3]];
+                    let is_open = around.iter().any(|&other| !edges[&key(corners[corner], other)].is_shared);
+                    let fan = fans.entry(corners[corner]).or_insert(Fan {
+                        is_owned: false,
+                        is_open: false,
+                        first: i,
+                    });
+                    fan.is_owned |= touches[i].is_owned;
+                    fan.is_open |= is_open;
+                }
+                Feature::EdgeOn => {}
+            }
+        }
+        result.extend(fans.into_values().filter(|fan| fan.is_open && !fan.is_owned).map(|fan| fan.first));
+    }
+    result
+}
+
+/// Offers what lies at borders, once the search has met `touches`.
+#[cold]
+#[inline(never)]
+pub(crate) fn offer_borders<S: Search>(accel: &Accel, ray: &Ray, touches: &[Touch], search: &mut S) {
+    let matters = |touch: &Touch, search: &S| {
+        let t = touch.root.t;
+        !touch.is_owned && ray.contains(t) && search.floor() <= t && t <= search.limit()
+    };
+    // More triangles can only make fewer borders: without any now, there are none.
+    if !at_borders(touches).iter().any(|&i| matters(&touches[i], search)) {
+        return;
+    }
+    // A part of the neighbours may lie beyond what was searched.
+    let mut all = AllTouches::default();
+    traverse::search_touches(Level::best(), accel, ray, &mut all);
+    for i in at_borders(&all.touches) {
+        let touch = &all.touches[i];
+        let Touch { root, geometry, primitive, accel, ref place, .. } = *touch;
+        if matters(touch, search)
+            && search.offer(&Found { root, geometry, primitive, order: 0, accel, place })
+        {
+            return;
+        }
+    }
+}
+
+/// The same for a loop over everything, which has met all touches.
+#[cfg(test)]
+pub(crate) fn offer_borders_of_all<S: Search>(ray: &Ray, touches: &[Touch], search: &mut S) {
+    for i in at_borders(touches) {
+        let Touch { root, geometry, primitive, accel, ref place, .. } = touches[i];
+        if ray.contains(root.t) {
+            search.offer(&Found { root, geometry, primitive, order: 0, accel, place });
+        }
+    }
+}
+
+/// Looks along the whole line for touches alone.
+#[derive(Default)]
+pub(crate) struct AllTouches<'a> {
+    pub(crate) touches: Vec<Touch<'a>>,
+}
+
+impl Search for AllTouches<'_> {
+    const ASK: Ask = Ask::Nothing;
+    const ORDERED: bool = false;
+
+    fn limit(&self) -> f64 {
+        f64::INFINITY
+    }
+
+    fn floor(&self) -> f64 {
+        f64::NEG_INFINITY
+    }
+
+    fn offer(&mut self, _: &Found) -> bool {
+        false
+    }
+}
