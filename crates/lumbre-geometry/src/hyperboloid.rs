@@ -141,7 +141,8 @@ impl Hyperboloid {
         let size = p.abs() + self.p1.abs() + self.along.abs();
         Surface {
             point: p,
-            point_error: gamma(8) * size + DVec3::splat(implicit.uncertainty()),
+            // The next ray's crossing is found to the rounding of the whole surface.
+            point_error: DVec3::splat(gamma(16) * size.max_element() + implicit.uncertainty()),
             normal: side * implicit.normal(),
             uv: DVec2::new((azimuth(turn.y, turn.x) / self.phi_max).min(1.0), self.v_of(p.z).clamp(0.0, 1.0)),
             dpdu,

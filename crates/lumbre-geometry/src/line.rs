@@ -82,7 +82,9 @@ impl Implicit {
     pub(crate) fn turning(&self, hessian_times_tangent: DVec3) -> DVec3 {
         let length = self.gradient.length();
         let normal = self.gradient / length;
-        let turned = (hessian_times_tangent - normal * normal.dot(hessian_times_tangent)) / length;
+        let across = (hessian_times_tangent - normal * normal.dot(hessian_times_tangent)) / length;
+        // Once more: where the normal hardly turns, what is left is rounding.
+        let turned = across - normal * normal.dot(across);
         if turned.is_finite() { turned } else { DVec3::ZERO }
     }
 

@@ -125,7 +125,10 @@ impl Paraboloid {
             |dp: DVec3| implicit.turning(DVec3::new(2.0 * self.bend * dp.x, 2.0 * self.bend * dp.y, 0.0));
         Surface {
             point: p,
-            point_error: gamma(8) * p.abs() + DVec3::splat(implicit.uncertainty()),
+            // The next ray's crossing is found to the rounding of the whole bowl.
+            point_error: DVec3::splat(
+                gamma(16) * self.z_max.max(self.radius_at(self.z_max)) + implicit.uncertainty(),
+            ),
             normal: implicit.normal(),
             uv: DVec2::new((phi / self.phi_max).min(1.0), ((p.z - self.z_min) / height).clamp(0.0, 1.0)),
             dpdu,

@@ -222,10 +222,13 @@ impl Quadric {
         };
         let (dpdu, dpdv) = (tangent(i), tangent(j));
         let place = (p - corner) / size;
+        let extent = self.clip.map_or((p - self.place).length(), |clip| clip.size().max_element());
         let bend = |dp: DVec3| implicit.turning(2.0 * (self.matrix * dp));
         Surface {
             point: p,
-            point_error: gamma(8) * (p.abs() + self.place.abs()) + DVec3::splat(implicit.uncertainty()),
+            // The next ray's crossing is found to the rounding of the whole box.
+            point_error: gamma(8) * (p.abs() + self.place.abs())
+                + DVec3::splat(gamma(16) * extent + implicit.uncertainty()),
             normal,
             uv: DVec2::new(place[i], place[j]),
             dpdu,

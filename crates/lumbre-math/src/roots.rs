@@ -205,6 +205,8 @@ pub fn bracketed_root(low: f64, high: f64, guess: f64, rising: bool, at: impl Fn
     let scale = low.abs().max(high.abs());
     let mut x = if low < guess && guess < high { guess } else { 0.5 * (low + high) };
     let mut previous = high - low;
+    // The last step, if it was one of Newton's.
+    let mut newtons = 0.0;
     for _ in 0..200 {
         let (value, slope) = at(x);
         if value == 0.0 {
@@ -219,17 +221,18 @@ pub fn bracketed_root(low: f64, high: f64, guess: f64, rising: bool, at: impl Fn
         let step = (newton - x).abs();
         // Newton's steps shrink quadratically: this predicts the next one. They end in rounding noise; bisecting then
         // would only walk back.
-        let done = step * step * step <= 0.25 * f64::EPSILON * x.abs() * previous * previous
-            && step <= 0.1 * previous;
+        let negligible = step * step * step <= 0.25 * f64::EPSILON * x.abs() * newtons * newtons;
+        let done = negligible && step <= 0.1 * newtons;
         if done || step <= f64::EPSILON * x.abs() || (step <= 1e-13 * scale && step >= 0.25 * previous) {
             return newton.clamp(low, high);
         }
-        let next =
-            if low < newton && newton < high && step <= 0.5 * previous { newton } else { 0.5 * (low + high) };
+        let is_newton = low < newton && newton < high && step <= 0.5 * previous;
+        let next = if is_newton { newton } else { 0.5 * (low + high) };
         if next <= low || next >= high {
             return x;
         }
         previous = (next - x).abs();
+        newtons = if is_newton { previous } else { 0.0 };
         x = next;
     }
     x
