@@ -264,6 +264,87 @@ impl Drop for Hold<'_> {
     }
 }
 
+/// A vector that asks the [`Budget`] before it grows. What it was charged stays charged with [`BudgetVec::into_vec`], and is
+/// given back when it is dropped.
+#[derive(Debug)]
+pub struct BudgetVec<'b, T> {
+    vec: Vec<T>,
+    hold: Hold<'b>,
+    what: &'static str,
+}
+
+impl<'b, T> BudgetVec<'b, T> {
+    /// An empty one; `what` names its values in errors.
+    pub fn new(budget: &'b Budget, what: &'static str) -> Self {
+        Self { vec: Vec::new(), hold: Hold { budget, bytes: 0 }, what }
+    }
+
+    /// Makes room for `count` more values, which the caller knows that the input can hold.
+    ///
+    /// # Errors
+    /// As [`Budget::bytes`], and when the allocator refuses.
+    pub fn reserve(&mut self, count: usize) -> Result<(), LimitError> {
+        if count <= self.vec.capacity() - self.vec.len() {
+            return Ok(());
+        }
+        self.grow(count)
+    }
+
+    /// Adds a value.
+    ///
+    /// # Errors
+    /// As [`BudgetVec::reserve`].
+    #[inline]
+    pub fn push(&mut self, value: T) -> Result<(), LimitError> {
+        if self.vec.len() == self.vec.capacity() {
+            self.grow(self.vec.len().max(16))?;
+        }
+        self.vec.push(value);
+        Ok(())
+    }
+
+    /// Room for `count` more, charged first. The old room is charged until it is gone.
+    #[cold]
+    fn grow(&mut self, count: usize) -> Result<(), LimitError> {
+        let size = size_of::<T>() as u64;
+        let capacity = (self.vec.len() as u64).saturating_add(count as u64).saturating_mul(size);
+        let old = self.hold.bytes;
+        self.hold.grow(capacity, self.what)?;
+        let made = self.vec.try_reserve_exact(count);
+        self.hold.budget.release(old);
+        self.hold.bytes = capacity;
+        made.map_err(|_| LimitError {
+            what: self.what.to_owned(),
+            kind: LimitKind::Memory,
+            needed: capacity,
+            limit: self.hold.budget.limits.memory,
+        })
+    }
+
+    /// The values, without the room that they do not need.
+    pub fn into_vec(mut self) -> Vec<T> {
+        self.vec.shrink_to_fit();
+        let kept = (self.vec.capacity() * size_of::<T>()) as u64;
+        self.hold.budget.release(self.hold.bytes.saturating_sub(kept));
+        self.hold.keep();
+        self.vec
+    }
+}
+
+impl<T> std::ops::Deref for BudgetVec<'_, T> {
+    type Target = [T];
+
+    fn deref(&self) -> &[T] {
+        &self.vec
+    }
+}
+
+impl<T> std::ops::DerefMut for BudgetVec<'_, T> {
+    fn deref_mut(&mut self) -> &mut [T] {
+        &mut self.vec
+    }
+}
+
 /// Adds `amount` to `account` unless that passes `limit`, and answers the new sum.
 fn spend(
     account: &AtomicU64,
@@ -327,6 +408,25 @@ mod tests {
         assert_eq!(b.memory_held(), 0);
         b.hold(300, "mesh").unwrap().keep();
         assert_eq!(b.memory_held(), 300);
+    }
+
+    #[test]
+    fn a_vector_pays_for_its_room_and_gives_back_what_it_does_not_keep() {
+        let b = small();
+        let mut kept = BudgetVec::new(&b, "faces");
+        for i in 0..40u32 {
+            kept.push(i).unwrap();
+        }
+        assert_eq!(b.memory_held(), 64 * 4);
+        let kept = kept.into_vec();
+        assert_eq!((kept.len(), b.memory_held()), (40, 160));
+
+        let mut too_many = BudgetVec::new(&b, "faces");
+        let error = (0..1000u32).find_map(|i| too_many.push(i).err()).unwrap();
+        assert!(error.to_string().starts_with("faces: needs "), "{error}");
+        assert!(b.memory_peak() <= 1000);
+        drop(too_many);
+        assert_eq!(b.memory_held(), 160);
     }
 
     #[test]

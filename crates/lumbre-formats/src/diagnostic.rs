@@ -308,7 +308,8 @@ pub enum Strictness {
 pub struct Diagnostics {
     strictness: Strictness,
     kept: Vec<Diagnostic>,
-    kinds: HashMap<(Severity, String), u64>,
+    /// How many of each kind, by message: warnings, then errors.
+    kinds: [HashMap<String, u64>; 2],
     warnings: u64,
     errors: u64,
 }
@@ -341,25 +342,36 @@ impl Diagnostics {
 
     /// Adds one.
     pub fn push(&mut self, diagnostic: Diagnostic) {
-        match diagnostic.severity {
+        let severity = diagnostic.severity;
+        let message = diagnostic.message.clone();
+        self.push_with(severity, &message, || diagnostic);
+    }
+
+    /// Adds a warning of this kind, which `make` makes only when it is kept: finding a place can take long.
+    pub fn warn(&mut self, message: &str, make: impl FnOnce(Diagnostic) -> Diagnostic) {
+        self.push_with(Severity::Warning, message, || make(Diagnostic::warning(message)));
+    }
+
+    fn push_with(&mut self, severity: Severity, message: &str, make: impl FnOnce() -> Diagnostic) {
+        match severity {
             Severity::Warning => self.warnings += 1,
             Severity::Error => self.errors += 1,
         }
-        let room = self.kinds.len() < Self::KEPT_IN_ALL;
-        let key = (diagnostic.severity, diagnostic.message.clone());
-        let count = match self.kinds.get_mut(&key) {
+        let room = self.kinds.iter().map(HashMap::len).sum::<usize>() < Self::KEPT_IN_ALL;
+        let kinds = &mut self.kinds[severity as usize];
+        let count = match kinds.get_mut(message) {
             Some(count) => {
                 *count += 1;
                 *count
             }
             None if room => {
-                self.kinds.insert(key, 1);
+                kinds.insert(message.to_owned(), 1);
                 1
             }
             None => return,
         };
         if count <= Self::KEPT_OF_A_KIND && self.kept.len() < Self::KEPT_IN_ALL {
-            self.kept.push(diagnostic);
+            self.kept.push(make());
         }
     }
 
@@ -367,17 +379,20 @@ impl Diagnostics {
     /// joined in a fixed order.
     pub fn append(&mut self, other: Self) {
         let (warnings, errors) = (self.warnings + other.warnings, self.errors + other.errors);
-        let mut kept_of_kind: HashMap<(Severity, String), u64> = HashMap::new();
+        let mut pushed: [HashMap<String, u64>; 2] = Default::default();
         for diagnostic in other.kept {
-            *kept_of_kind.entry((diagnostic.severity, diagnostic.message.clone())).or_default() += 1;
+            *pushed[diagnostic.severity as usize].entry(diagnostic.message.clone()).or_default() += 1;
             self.push(diagnostic);
         }
-        for (kind, count) in other.kinds {
-            let pushed = kept_of_kind.get(&kind).copied().unwrap_or(0);
-            if let Some(mine) = self.kinds.get_mut(&kind) {
-                *mine += count - pushed;
-            } else if self.kinds.len() < Self::KEPT_IN_ALL {
-                self.kinds.insert(kind, count);
+        for (severity, kinds) in other.kinds.into_iter().enumerate() {
+            for (message, count) in kinds {
+                let pushed = pushed[severity].get(&message).copied().unwrap_or(0);
+                let room = self.kinds.iter().map(HashMap::len).sum::<usize>() < Self::KEPT_IN_ALL;
+                if let Some(mine) = self.kinds[severity].get_mut(&message) {
+                    *mine += count - pushed;
+                } else if room {
+                    self.kinds[severity].insert(message, count);
+                }
             }
         }
         (self.warnings, self.errors) = (warnings, errors);
@@ -400,24 +415,20 @@ impl Diagnostics {
 
     /// How many had this severity and message, kept or not.
     pub fn count(&self, severity: Severity, message: &str) -> u64 {
-        self.kinds.get(&(severity, message.to_owned())).copied().unwrap_or(0)
+        self.kinds[severity as usize].get(message).copied().unwrap_or(0)
     }
 
     /// Every line to print: those kept, and for each kind that came more often how many more there were.
     pub fn lines(&self) -> Vec<String> {
         let mut lines: Vec<String> = self.kept.iter().map(Diagnostic::to_string).collect();
-        let mut more: Vec<_> = self
-            .kinds
-            .iter()
-            .filter(|&(_, &count)| count > Self::KEPT_OF_A_KIND)
-            .map(|((severity, message), count)| (severity, message, count - Self::KEPT_OF_A_KIND))
-            .collect();
-        more.sort();
-        lines.extend(
-            more.into_iter()
-                .map(|(severity, message, count)| format!("{severity}: {message} ({count} more)")),
-        );
-        let said: u64 = self.kinds.values().sum();
+        for (severity, kinds) in [Severity::Warning, Severity::Error].into_iter().zip(&self.kinds) {
+            let mut more: Vec<_> = kinds.iter().filter(|&(_, &count)| count > Self::KEPT_OF_A_KIND).collect();
+            more.sort();
+            lines.extend(more.into_iter().map(|(message, count)| {
+                format!("{severity}: {message} ({} more)", count - Self::KEPT_OF_A_KIND)
+            }));
+        }
+        let said: u64 = self.kinds.iter().flat_map(HashMap::values).sum();
         let unsaid = self.warnings + self.errors - said;
         if unsaid > 0 {
             lines.push(format!("warning: {unsaid} more of other kinds"));

@@ -9,8 +9,10 @@ mod contained;
 pub mod diagnostic;
 pub mod image;
 pub mod input;
+pub mod ply;
+mod polygon;
 
 pub use atomic::{atomic_write, probe_writable};
-pub use budget::{Budget, Hold, LimitError, LimitKind, Limits};
+pub use budget::{Budget, BudgetVec, Hold, LimitError, LimitKind, Limits};
 pub use diagnostic::{Diagnostic, Diagnostics, FormatError, Place, Position, Severity, Strictness};
 pub use input::Input;
