@@ -68,17 +68,14 @@ impl Axial {
         let e = self.r1 + self.k * w.dot(self.axis);
         let g = self.k * d.dot(self.axis);
 
-        let (across_length, offset_length) = (across.length(), offset.length());
-        let a = (across_length - g.abs()) * (across_length + g.abs());
-        let h = across.dot(offset) - e * g;
-        let c = (offset_length - e) * (offset_length + e);
+        let (a, h) = (across.length_squared() - g * g, across.dot(offset) - e * g);
+        let c = offset.length_squared() - e * e;
         let delta = {
             let near = w - (w.dot(d) / d.length_squared()) * d;
             let near_offset = near.cross(self.axis);
             let near_e = self.r1 + self.k * near.dot(self.axis);
-            let m = self.axis.dot(across.cross(near_offset)).abs();
-            let n = (near_e * across - g * near_offset).length();
-            (n - m) * (n + m)
+            let m = self.axis.dot(across.cross(near_offset));
+            (near_e * across - g * near_offset).length_squared() - m * m
         };
         // On a cone all three coefficients cancel for a ray from far along a generator. One step of Newton's method on F
         // itself, at the point found, gives the digits back; next to a double root it is not to be trusted.

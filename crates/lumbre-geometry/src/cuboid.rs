@@ -43,31 +43,33 @@ impl Cuboid {
     /// a ray in a face's plane from multiplying zero by infinity.
     #[inline]
     fn span(&self, ray: &Ray) -> Option<[(f64, u32); 2]> {
-        let mut near = (f64::NEG_INFINITY, 0);
-        let mut far = (f64::INFINITY, 0);
-        for axis in 0..3 {
-            let (o, d) = (ray.origin[axis], ray.direction[axis]);
-            if d == 0.0 {
-                if !(self.low[axis] <= o && o <= self.high[axis]) {
-                    return None;
-                }
-                continue;
+        let (to_low, to_high) = (self.low - ray.origin, self.high - ray.origin);
+        let d = ray.direction;
+        let (at_low, at_high) = (to_low / d, to_high / d);
+        let (mut enter, mut leave) = (at_low.min(at_high), at_low.max(at_high));
+        let is_across = d.cmpeq(DVec3::ZERO);
+        if is_across.any() {
+            // Between two faces that it runs along the ray is bounded by the others alone.
+            let is_between = to_low.cmple(DVec3::ZERO) & to_high.cmpge(DVec3::ZERO);
+            if !(is_between | !is_across).all() {
+                return None;
             }
-            let face = 2 * axis as u32;
-            let (low, high) = ((self.low[axis] - o) / d, (self.high[axis] - o) / d);
-            let (enter, leave) =
-                if d > 0.0 { ((low, face), (high, face + 1)) } else { ((high, face + 1), (low, face)) };
-            if enter.0 > near.0 {
-                near = enter;
-            }
-            if leave.0 < far.0 {
-                far = leave;
-            }
-            if low.is_nan() || high.is_nan() {
+            enter = DVec3::select(is_across, DVec3::NEG_INFINITY, enter);
+            leave = DVec3::select(is_across, DVec3::INFINITY, leave);
+        }
+        if at_low.is_nan() || at_high.is_nan() {
+            let comes_from_zero = is_across.all() || !(ray.origin.is_finite() && d.is_finite());
+            if comes_from_zero {
                 return None;
             }
         }
-        (near.0 <= far.0).then_some([near, far])
+        let first = |a: (f64, u32), b: (f64, u32)| if b.0 < a.0 { b } else { a };
+        let last = |a: (f64, u32), b: (f64, u32)| if b.0 > a.0 { b } else { a };
+        let near = last(last((enter.x, 0), (enter.y, 2)), (enter.z, 4));
+        let far = first(first((leave.x, 1), (leave.y, 3)), (leave.z, 5));
+        // Down an axis the high face comes first.
+        let turned = |(t, face): (f64, u32)| (t, face ^ u32::from(d[face as usize / 2] < 0.0));
+        (near.0 <= far.0).then(|| [turned(near), turned(far)])
     }
 
     #[inline]

@@ -91,8 +91,7 @@ impl Sphere {
         let h = w.dot(ray.direction);
         let nearest = w - (h / a) * ray.direction;
         let delta = a * (self.radius * self.radius - nearest.length_squared());
-        let distance = w.length();
-        let c = (distance - self.radius) * (distance + self.radius);
+        let c = w.length_squared() - self.radius * self.radius;
         quadratic(a, h, c, delta)
     }
 

@@ -53,9 +53,33 @@ pub fn moller_trumbore(
 #[derive(Clone, Copy, Debug)]
 pub struct WatertightRay {
     origin: DVec3,
-    // A cyclic order of the axes, mirrored when the ray goes down the last, which is the one of the largest component.
-    axes: [usize; 3],
+    order: Order,
     shear: DVec3,
+}
+
+/// A cyclic order of the axes that ends with the one of the ray's largest component, mirrored when the ray goes down it.
+#[derive(Clone, Copy, Debug)]
+enum Order {
+    Yzx,
+    Zyx,
+    Zxy,
+    Xzy,
+    Xyz,
+    Yxz,
+}
+
+impl Order {
+    #[inline(always)]
+    fn apply(self, v: DVec3) -> DVec3 {
+        match self {
+            Self::Yzx => DVec3::new(v.y, v.z, v.x),
+            Self::Zyx => DVec3::new(v.z, v.y, v.x),
+            Self::Zxy => DVec3::new(v.z, v.x, v.y),
+            Self::Xzy => DVec3::new(v.x, v.z, v.y),
+            Self::Xyz => v,
+            Self::Yxz => DVec3::new(v.y, v.x, v.z),
+        }
+    }
 }
 
 impl WatertightRay {
@@ -63,20 +87,16 @@ impl WatertightRay {
     #[inline]
     pub fn new(origin: DVec3, direction: DVec3) -> Self {
         let size = direction.abs();
-        let kz = if size.x > size.y {
-            if size.x > size.z { 0 } else { 2 }
+        let pick = |goes_down: bool, up: Order, down: Order| if goes_down { down } else { up };
+        let order = if size.x > size.y && size.x > size.z {
+            pick(direction.x < 0.0, Order::Yzx, Order::Zyx)
         } else if size.y > size.z {
-            1
+            pick(direction.y < 0.0, Order::Zxy, Order::Xzy)
         } else {
-            2
+            pick(direction.z < 0.0, Order::Xyz, Order::Yxz)
         };
-        let (mut kx, mut ky) = ([1, 2, 0][kz], [2, 0, 1][kz]);
-        if direction[kz] < 0.0 {
-            std::mem::swap(&mut kx, &mut ky);
-        }
-        let along = direction[kz];
-        let shear = DVec3::new(direction[kx] / along, direction[ky] / along, 1.0 / along);
-        Self { origin, axes: [kx, ky, kz], shear }
+        let along = order.apply(direction);
+        Self { origin, order, shear: DVec3::new(along.x / along.z, along.y / along.z, 1.0 / along.z) }
     }
 
     /// The test of S. Woop, C. Benthin, I. Wald, "Watertight ray/triangle intersection", Journal of Computer Graphics
@@ -90,9 +110,21 @@ impl WatertightRay {
     /// Vertices in single precision may be given as they are, promoted.
     #[inline]
     pub fn hit(&self, p0: DVec3, p1: DVec3, p2: DVec3) -> Option<TriangleHit> {
-        let [kx, ky, kz] = self.axes;
-        let (a, b, c) = (p0 - self.origin, p1 - self.origin, p2 - self.origin);
-        let flat = |p: DVec3| (p[kx] - self.shear.x * p[kz], p[ky] - self.shear.y * p[kz]);
+        // One branch, which all triangles of a ray take alike, is cheaper than nine look-ups.
+        match self.order {
+            Order::Yzx => self.hit_in(Order::Yzx, p0, p1, p2),
+            Order::Zyx => self.hit_in(Order::Zyx, p0, p1, p2),
+            Order::Zxy => self.hit_in(Order::Zxy, p0, p1, p2),
+            Order::Xzy => self.hit_in(Order::Xzy, p0, p1, p2),
+            Order::Xyz => self.hit_in(Order::Xyz, p0, p1, p2),
+            Order::Yxz => self.hit_in(Order::Yxz, p0, p1, p2),
+        }
+    }
+
+    #[inline(always)]
+    fn hit_in(&self, order: Order, p0: DVec3, p1: DVec3, p2: DVec3) -> Option<TriangleHit> {
+        let [a, b, c] = [p0, p1, p2].map(|p| order.apply(p - self.origin));
+        let flat = |p: DVec3| (p.x - self.shear.x * p.z, p.y - self.shear.y * p.z);
         let ((ax, ay), (bx, by), (cx, cy)) = (flat(a), flat(b), flat(c));
         let mut u = cx * by - cy * bx;
         let mut v = ax * cy - ay * cx;
@@ -108,7 +140,7 @@ impl WatertightRay {
             return None;
         }
         let inverse = determinant.recip();
-        let t = self.shear.z * (u * a[kz] + v * b[kz] + w * c[kz]) * inverse;
+        let t = self.shear.z * (u * a.z + v * b.z + w * c.z) * inverse;
         Some(TriangleHit { t, b1: v * inverse, b2: w * inverse, determinant })
     }
 }
@@ -121,6 +153,8 @@ pub struct Triangle {
     p0: DVec3,
     p1: DVec3,
     p2: DVec3,
+    // Whether it has no area.
+    is_flat: bool,
 }
 
 /// Solid angles outside this range are sampled by area: in small ones the sine and cosine of the spherical excess lose
@@ -134,7 +168,8 @@ impl Triangle {
     /// [`ShapeError`] unless all coordinates are finite.
     pub fn new(p0: DVec3, p1: DVec3, p2: DVec3) -> Result<Self, ShapeError> {
         let (p0, p1, p2) = (check::finite("p0", p0)?, check::finite("p1", p1)?, check::finite("p2", p2)?);
-        Ok(Self { p0, p1, p2 })
+        let triangle = Self { p0, p1, p2, is_flat: false };
+        Ok(Self { is_flat: triangle.cross() == DVec3::ZERO, ..triangle })
     }
 
     /// The three corners.
@@ -152,7 +187,7 @@ impl Triangle {
     #[inline]
     pub fn closest(&self, ray: &Ray) -> Option<Root> {
         let hit = WatertightRay::new(ray.origin, ray.direction).hit(self.p0, self.p1, self.p2)?;
-        let hits = ray.contains(hit.t) && self.cross() != DVec3::ZERO;
+        let hits = ray.contains(hit.t) && !self.is_flat;
         hits.then(|| Root { local: DVec2::new(hit.b1, hit.b2), ..Root::at(hit.t) })
     }
 
