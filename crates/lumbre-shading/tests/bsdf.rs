@@ -1,0 +1,582 @@
+//! What every BSDF promises: it samples what its density says, its weights are values over densities, it is reciprocal
+//! (radiance in a denser medium counted by η²), it makes no energy, and it never answers NaN.
+//!
+//! Teeth: with the density of a rough metal, glass, coat or of Lambert multiplied by 1.005, the test of integrals fails,
+//! and with half of one sector moved to the next the χ² test does; with the Jacobian of refraction inverted, or η² left
+//! out of a transmission, the tests of weights or of reciprocity do.
+
+use std::f64::consts::{PI, TAU};
+
+use lumbre_math::random::RandomStream;
+use lumbre_math::{Vec2, Vec3};
+use lumbre_shading::coated::CoatedDiffuse;
+use lumbre_shading::conductor::Conductor;
+use lumbre_shading::dielectric::{Dielectric, ThinDielectric};
+use lumbre_shading::diffuse::{Diffuse, DiffuseTransmission};
+use lumbre_shading::microfacet::Microfacets;
+use lumbre_shading::{Bsdf, LocalDir, Scatter, ShadingFrame, Spectrum, fresnel};
+
+const GLASS: f32 = 1.5;
+
+fn local(v: Vec3) -> LocalDir {
+    ShadingFrame { s: Vec3::X, t: Vec3::Y, n: Vec3::Z }.to_local(v.normalize())
+}
+
+/// Head on, at moderate and at grazing angles, from both sides.
+fn views() -> Vec<LocalDir> {
+    [
+        Vec3::new(0.0, 0.0, 1.0),
+        Vec3::new(0.5, 0.3, 0.7),
+        Vec3::new(-0.8, 0.5, 0.25),
+        Vec3::new(0.3, -0.95, 0.06),
+        Vec3::new(0.0, 0.0, -1.0),
+        Vec3::new(0.35, 0.2, -0.8),
+        Vec3::new(-0.7, -0.6, -0.3),
+    ]
+    .map(local)
+    .to_vec()
+}
+
+fn gold(alpha: (f32, f32)) -> Bsdf {
+    Bsdf::Conductor(Conductor {
+        eta: Spectrum::new(0.16, 0.42, 1.45),
+        k: Spectrum::new(3.5, 2.5, 1.9),
+        facets: Microfacets::new(alpha.0, alpha.1),
+    })
+}
+
+fn glass(eta: f32, alpha: (f32, f32)) -> Bsdf {
+    Bsdf::Dielectric(Dielectric { eta, facets: Microfacets::new(alpha.0, alpha.1) })
+}
+
+fn coated(alpha: (f32, f32), albedo: f32, samples: u32) -> CoatedDiffuse {
+    CoatedDiffuse {
+        reflectance: Spectrum::new(0.8, 0.5, 0.1),
+        coat: Dielectric { eta: GLASS, facets: Microfacets::new(alpha.0, alpha.1) },
+        thickness: 0.3,
+        g: 0.4,
+        albedo: Spectrum::splat(albedo),
+        max_depth: 10,
+        samples,
+    }
+}
+
+/// A BSDF under its name.
+fn all() -> Vec<(String, Bsdf)> {
+    let mut list = vec![
+        ("diffuse".into(), Bsdf::Diffuse(Diffuse { reflectance: Spectrum::new(1.0, 0.4, 0.0) })),
+        (
+            "diffusetransmission".into(),
+            Bsdf::DiffuseTransmission(DiffuseTransmission {
+                reflectance: Spectrum::new(0.3, 0.2, 0.1),
+                transmittance: Spectrum::new(0.1, 0.7, 0.2),
+            }),
+        ),
+        ("thindielectric".into(), Bsdf::ThinDielectric(ThinDielectric { eta: GLASS })),
+        ("smooth conductor".into(), gold((0.0, 0.0))),
+        ("no border".into(), glass(1.0, (0.3, 0.3))),
+    ];
+    for alpha in [(0.05, 0.05), (0.3, 0.3), (0.1, 0.6), (0.9, 0.4)] {
+        list.push((format!("conductor {alpha:?}"), gold(alpha)));
+    }
+    for eta in [GLASS, 1.0 / GLASS, 2.4] {
+        for alpha in [(0.0, 0.0), (0.1, 0.1), (0.4, 0.2), (1.0, 1.0)] {
+            list.push((format!("dielectric {eta} {alpha:?}"), glass(eta, alpha)));
+        }
+    }
+    for alpha in [(0.0, 0.0), (0.1, 0.3), (0.6, 0.6)] {
+        for albedo in [0.0, 0.7] {
+            let bsdf = Bsdf::CoatedDiffuse(coated(alpha, albedo, 1));
+            list.push((format!("coateddiffuse {alpha:?} {albedo}"), bsdf));
+        }
+    }
+    list
+}
+
+fn numbers(random: &mut RandomStream) -> (f32, Vec2) {
+    (random.next_f32(), Vec2::new(random.next_f32(), random.next_f32()))
+}
+
+/// ∫ over a cell of (cos θ, φ), halved where the rule on it and on its quarters differ.
+fn integrate(f: &dyn Fn(LocalDir) -> f64, z: (f64, f64), phi: (f64, f64), depth: u32) -> f64 {
+    let rule = |z: (f64, f64), phi: (f64, f64)| {
+        // Gauss–Legendre, three points each way.
+        let nodes =
+            [(-0.774_596_669_241_483_4, 5.0 / 9.0), (0.0, 8.0 / 9.0), (0.774_596_669_241_483_4, 5.0 / 9.0)];
+        let at = |(a, b): (f64, f64), x: f64| 0.5 * (a + b) + 0.5 * (b - a) * x;
+        let mut sum = 0.0;
+        for (x, wx) in nodes {
+            for (y, wy) in nodes {
+                let (z, phi) = (at(z, x), at(phi, y));
+                let r = (1.0 - z * z).max(0.0).sqrt();
+                let v = Vec3::new((r * phi.cos()) as f32, (r * phi.sin()) as f32, z as f32);
+                sum += wx * wy * f(local(v));
+            }
+        }
+        sum * 0.25 * (z.1 - z.0) * (phi.1 - phi.0)
+    };
+    let (mid_z, mid_phi) = (0.5 * (z.0 + z.1), 0.5 * (phi.0 + phi.1));
+    let quarters = [
+        ((z.0, mid_z), (phi.0, mid_phi)),
+        ((z.0, mid_z), (mid_phi, phi.1)),
+        ((mid_z, z.1), (phi.0, mid_phi)),
+        ((mid_z, z.1), (mid_phi, phi.1)),
+    ];
+    let fine: f64 = quarters.iter().map(|&(z, phi)| rule(z, phi)).sum();
+    let agrees = (fine - rule(z, phi)).abs() <= 2e-7 + 1e-4 * fine;
+    if depth == 0 || agrees {
+        return fine;
+    }
+    quarters.iter().map(|&(z, phi)| integrate(f, z, phi, depth - 1)).sum()
+}
+
+const RINGS: usize = 20;
+const SECTORS: usize = 24;
+const SAMPLES: u32 = 200_000;
+
+/// The probability of each cell of the sphere by the density, and the counts of each by sampling.
+fn histogram(bsdf: &Bsdf, wo: LocalDir, seed: u64) -> (Vec<f64>, Vec<u32>, u32) {
+    let mut probabilities = Vec::with_capacity(RINGS * SECTORS);
+    for ring in 0..RINGS {
+        for sector in 0..SECTORS {
+            let edge = |i: usize, n: usize, from: f64, size: f64| from + size * i as f64 / n as f64;
+            let z = (edge(ring, RINGS, -1.0, 2.0), edge(ring + 1, RINGS, -1.0, 2.0));
+            let phi = (edge(sector, SECTORS, -PI, TAU), edge(sector + 1, SECTORS, -PI, TAU));
+            probabilities.push(integrate(&|wi| f64::from(bsdf.pdf(wo, wi)), z, phi, 6));
+        }
+    }
+    let mut counts = vec![0; RINGS * SECTORS];
+    let mut rest = 0;
+    let mut random = RandomStream::new(seed);
+    for _ in 0..SAMPLES {
+        let (lobe, u) = numbers(&mut random);
+        match bsdf.sample(wo, lobe, u) {
+            Some(sample) if sample.scatter != Scatter::Delta => {
+                let v = sample.wi.vec().as_dvec3();
+                let ring = ((v.z + 1.0) / 2.0 * RINGS as f64) as usize;
+                let sector = ((v.y.atan2(v.x) + PI) / TAU * SECTORS as f64) as usize;
+                counts[ring.min(RINGS - 1) * SECTORS + sector.min(SECTORS - 1)] += 1;
+            }
+            _ => rest += 1,
+        }
+    }
+    (probabilities, counts, rest)
+}
+
+/// ln Γ(x) for x > 0 (Lanczos, g = 7).
+fn ln_gamma(x: f64) -> f64 {
+    const C: [f64; 9] = [
+        0.999_999_999_999_809_9,
+        676.520_368_121_885_1,
+        -1_259.139_216_722_402_8,
+        771.323_428_777_653_1,
+        -176.615_029_162_140_6,
+        12.507_343_278_686_905,
+        -0.138_571_095_265_720_12,
+        9.984_369_578_019_572e-6,
+        1.505_632_735_149_311_6e-7,
+    ];
+    let x = x - 1.0;
+    let t = x + 7.5;
+    let sum = (1..9).fold(C[0], |sum, i| sum + C[i] / (x + i as f64));
+    0.5 * TAU.ln() + (x + 0.5) * t.ln() - t + sum.ln()
+}
+
+/// The probability that χ² with so many degrees of freedom is at least this: Q(k/2, x/2).
+fn chi_square_tail(chi: f64, freedom: f64) -> f64 {
+    let (a, x) = (0.5 * freedom, 0.5 * chi);
+    if x <= 0.0 {
+        return 1.0;
+    }
+    let front = (a * x.ln() - x - ln_gamma(a)).exp();
+    if x < a + 1.0 {
+        let (mut term, mut sum, mut n) = (1.0 / a, 1.0 / a, a);
+        while term > sum * 1e-15 {
+            n += 1.0;
+            term *= x / n;
+            sum += term;
+        }
+        return 1.0 - front * sum;
+    }
+    // Lentz's continued fraction.
+    let mut b = x + 1.0 - a;
+    let (mut c, mut d) = (1e300, 1.0 / b);
+    let mut h = d;
+    for i in 1..1000 {
+        let an = -f64::from(i) * (f64::from(i) - a);
+        b += 2.0;
+        d = 1.0 / (an * d + b);
+        c = b + an / c;
+        h *= d * c;
+        if (d * c - 1.0).abs() < 1e-14 {
+            break;
+        }
+    }
+    front * h
+}
+
+#[test]
+fn the_tail_of_chi_square_is_that_of_the_tables() {
+    for (freedom, chi, tail) in
+        [(1.0, 3.841, 0.05), (10.0, 18.307, 0.05), (100.0, 149.449, 0.001), (5.0, 1.145, 0.95)]
+    {
+        assert!((chi_square_tail(chi, freedom) - tail).abs() < 1e-4, "{freedom} {chi}");
+    }
+}
+
+#[test]
+fn sampling_follows_the_density_and_the_density_integrates_to_what_is_sampled() {
+    let list = all();
+    let tests = (list.len() * views().len()) as f64;
+    // Šidák: all tests together fail by chance once in a thousand.
+    let significance = 1.0 - (1.0_f64 - 1e-3).powf(1.0 / tests);
+    let mut compared = 0;
+    for (b, (name, bsdf)) in list.iter().enumerate() {
+        for (v, &wo) in views().iter().enumerate() {
+            let (probabilities, counts, rest) = histogram(bsdf, wo, (b * 100 + v) as u64);
+            let total = f64::from(SAMPLES);
+            let integral: f64 = probabilities.iter().sum();
+            let sampled = 1.0 - f64::from(rest) / total;
+            let deviation = (sampled * (1.0 - sampled) / total).sqrt();
+            assert!(
+                (integral - sampled).abs() < 4.5 * deviation + 1e-3,
+                "{name} from {:?}: the density integrates to {integral}, {sampled} are sampled",
+                wo.vec()
+            );
+            // Cells with few expected are counted together with their neighbours.
+            let (mut chi, mut cells) = (0.0, 0);
+            let (mut expected, mut observed) = (0.0, 0.0);
+            for (p, &n) in probabilities.iter().zip(&counts) {
+                expected += p * total;
+                observed += f64::from(n);
+                if expected >= 8.0 {
+                    chi += (observed - expected).powi(2) / expected;
+                    cells += 1;
+                    compared += 1;
+                    (expected, observed) = (0.0, 0.0);
+                }
+            }
+            assert!(
+                observed <= expected + 8.0 * expected.sqrt() + 8.0,
+                "{name}: {observed} where {expected} are expected"
+            );
+            if cells < 2 {
+                continue;
+            }
+            let tail = chi_square_tail(chi, f64::from(cells - 1));
+            assert!(
+                tail > significance,
+                "{name} from {:?}: χ² {chi} over {cells} cells, p {tail:e}",
+                wo.vec()
+            );
+        }
+    }
+    assert!(compared > 10_000, "{compared}");
+}
+
+#[test]
+fn a_weight_is_the_value_over_the_density() {
+    let mut random = RandomStream::new(5);
+    let mut count = 0;
+    for (name, bsdf) in all() {
+        for wo in views() {
+            for _ in 0..2_000 {
+                let (lobe, u) = numbers(&mut random);
+                let Some(sample) = bsdf.sample(wo, lobe, u) else { continue };
+                let Scatter::Density(density) = sample.scatter else { continue };
+                let (value, pdf) = (bsdf.eval(wo, sample.wi), bsdf.pdf(wo, sample.wi));
+                assert!(
+                    (density / pdf - 1.0).abs() < 2e-2,
+                    "{name} from {:?} to {:?}: {density} {pdf}",
+                    wo.vec(),
+                    sample.wi.vec()
+                );
+                let expected = value / pdf;
+                let difference = (expected - sample.weight).map(f32::abs).max_component();
+                assert!(
+                    difference <= 2e-2 * (sample.weight.max_component() + 1e-3),
+                    "{name} from {:?} to {:?}: {:?} {expected:?}",
+                    wo.vec(),
+                    sample.wi.vec(),
+                    sample.weight
+                );
+                let crosses = !wo.same_hemisphere(sample.wi);
+                assert_eq!(sample.transmitted, crosses, "{name}");
+                count += 1;
+            }
+        }
+    }
+    assert!(count > 100_000, "{count}");
+}
+
+#[test]
+fn light_goes_back_the_way_it_came() {
+    let mut random = RandomStream::new(17);
+    let mut count = 0;
+    for (name, bsdf) in all() {
+        // A random walk is reciprocal in the mean.
+        let (bsdf, pairs, tolerance, floor) = match bsdf {
+            Bsdf::CoatedDiffuse(coat) => {
+                (Bsdf::CoatedDiffuse(CoatedDiffuse { samples: 40_000, ..coat }), 6, 0.05, 1e-4)
+            }
+            // Next to the critical angle the little that crosses is a difference of nearly equal numbers.
+            other => (other, 3_000, 2e-3, 1e-2),
+        };
+        let eta = if let Bsdf::Dielectric(glass) = bsdf { glass.eta } else { 1.0 };
+        for _ in 0..pairs {
+            let mut direction = || {
+                let z = 2.0 * random.next_f32() - 1.0;
+                let (sin, cos) = (std::f32::consts::TAU * random.next_f32()).sin_cos();
+                let r = (1.0 - z * z).sqrt();
+                local(Vec3::new(r * cos, r * sin, z))
+            };
+            let (a, mut b) = (direction(), direction());
+            if matches!(bsdf, Bsdf::CoatedDiffuse(_)) && !a.same_hemisphere(b) {
+                b = -b;
+            }
+            if a.abs_cos_theta() < 0.05 || b.abs_cos_theta() < 0.05 {
+                continue;
+            }
+            let index2 = |w: LocalDir| if w.cos_theta() < 0.0 { eta * eta } else { 1.0 };
+            let there = bsdf.eval(a, b) / (b.abs_cos_theta() * index2(a));
+            let back = bsdf.eval(b, a) / (a.abs_cos_theta() * index2(b));
+            let difference = (there - back).map(f32::abs).max_component();
+            assert!(
+                difference <= tolerance * there.max_component().max(floor),
+                "{name} {:?} {:?}: {there:?} {back:?}",
+                a.vec(),
+                b.vec()
+            );
+            count += usize::from(!there.is_black());
+        }
+    }
+    assert!(count > 10_000, "{count}");
+}
+
+/// The share of the power from `wo` that leaves again, brightest lane; radiance that crossed counted by η².
+fn furnace(bsdf: &Bsdf, wo: LocalDir, samples: u32, seed: u64) -> f64 {
+    let mut random = RandomStream::new(seed);
+    let mut sum = [0.0; 3];
+    for _ in 0..samples {
+        let (lobe, u) = numbers(&mut random);
+        let Some(sample) = bsdf.sample(wo, lobe, u) else { continue };
+        let denser = f64::from(sample.eta * sample.eta);
+        for (sum, weight) in sum.iter_mut().zip(sample.weight.to_array()) {
+            *sum += f64::from(weight) * denser;
+        }
+    }
+    sum.into_iter().fold(0.0, f64::max) / f64::from(samples)
+}
+
+#[test]
+fn no_surface_makes_light() {
+    let mut count = 0;
+    for (name, bsdf) in all() {
+        for (v, wo) in views().into_iter().enumerate() {
+            let share = furnace(&bsdf, wo, 100_000, v as u64);
+            assert!(share <= 1.002, "{name} from {:?}: {share}", wo.vec());
+            assert!(share > 0.05, "{name} from {:?}: {share}", wo.vec());
+            count += 1;
+        }
+    }
+    assert!(count > 150);
+}
+
+#[test]
+fn what_promises_to_conserve_energy_does() {
+    let grey = Spectrum::splat;
+    let mut list = vec![
+        ("diffuse", Bsdf::Diffuse(Diffuse { reflectance: grey(1.0) })),
+        (
+            "diffusetransmission",
+            Bsdf::DiffuseTransmission(DiffuseTransmission {
+                reflectance: grey(0.3),
+                transmittance: grey(0.7),
+            }),
+        ),
+        ("mirror", Bsdf::Conductor(Conductor::from_reflectance(grey(1.0), Microfacets::SMOOTH))),
+    ];
+    for eta in [GLASS, 1.0 / GLASS, 2.4, 1.0] {
+        list.push(("dielectric", glass(eta, (0.0, 0.0))));
+        list.push(("thindielectric", Bsdf::ThinDielectric(ThinDielectric { eta })));
+    }
+    let mut count = 0;
+    for (name, bsdf) in &list {
+        for (v, wo) in views().into_iter().enumerate() {
+            let share = furnace(bsdf, wo, 20_000, v as u64);
+            assert!((share - 1.0).abs() < 2e-3, "{name} from {:?}: {share}", wo.vec());
+            count += 1;
+        }
+    }
+    assert_eq!(count, 11 * 7);
+}
+
+#[test]
+fn rough_glass_and_metal_lose_only_what_bounces_twice() {
+    for (alpha, least) in [(0.05, 0.985), (0.2, 0.93), (0.5, 0.65)] {
+        let mirror =
+            Bsdf::Conductor(Conductor::from_reflectance(Spectrum::WHITE, Microfacets::new(alpha, alpha)));
+        for bsdf in [mirror, glass(GLASS, (alpha, alpha))] {
+            let share = furnace(&bsdf, local(Vec3::new(0.3, 0.2, 0.9)), 100_000, 3);
+            assert!((least..1.001).contains(&share), "{bsdf:?}: {share}");
+        }
+    }
+}
+
+#[test]
+fn directions_without_a_side_and_grazing_ones_give_finite_answers() {
+    let odd: Vec<LocalDir> = [
+        Vec3::X,
+        Vec3::Z,
+        -Vec3::Z,
+        Vec3::new(1.0, 0.0, 1e-7),
+        Vec3::new(0.0, 1.0, -1e-7),
+        Vec3::new(0.6, -0.8, 1e-30),
+        Vec3::new(1e-20, 0.0, 1.0),
+    ]
+    .map(local)
+    .into_iter()
+    // Of no length at all, which no frame should give.
+    .chain([ShadingFrame { s: Vec3::X, t: Vec3::Y, n: Vec3::Z }.to_local(Vec3::ZERO)])
+    .collect();
+    let edge = [0.0, 0.5, 1.0 - f32::EPSILON / 2.0];
+    let mut count = 0;
+    let finite = |c: Spectrum| c.is_finite() && c.min_component() >= 0.0;
+    for (name, bsdf) in all() {
+        for &wo in &odd {
+            for &wi in &odd {
+                let pdf = bsdf.pdf(wo, wi);
+                assert!(pdf.is_finite() && pdf >= 0.0, "{name} {:?} {:?}: {pdf}", wo.vec(), wi.vec());
+                assert!(finite(bsdf.eval(wo, wi)), "{name} {:?} {:?}", wo.vec(), wi.vec());
+            }
+            for lobe in edge {
+                for x in edge {
+                    for y in edge {
+                        let Some(sample) = bsdf.sample(wo, lobe, Vec2::new(x, y)) else { continue };
+                        assert!(finite(sample.weight), "{name} {:?} {sample:?}", wo.vec());
+                        assert!(
+                            (sample.wi.vec().length() - 1.0).abs() < 1e-4,
+                            "{name} {:?} {sample:?}",
+                            wo.vec()
+                        );
+                        if let Scatter::Density(pdf) = sample.scatter {
+                            assert!(pdf > 0.0 && pdf.is_finite(), "{name} {:?} {sample:?}", wo.vec());
+                        }
+                        count += 1;
+                    }
+                }
+            }
+        }
+    }
+    assert!(count > 2_000, "{count}");
+}
+
+#[test]
+fn a_delta_has_no_density_and_says_so() {
+    let mut deltas = 0;
+    for (name, bsdf) in all() {
+        let mut random = RandomStream::new(2);
+        for wo in views() {
+            for _ in 0..100 {
+                let (lobe, u) = numbers(&mut random);
+                let Some(sample) = bsdf.sample(wo, lobe, u) else { continue };
+                if bsdf.is_delta() {
+                    assert_eq!(sample.scatter, Scatter::Delta, "{name}");
+                    assert_eq!(bsdf.pdf(wo, sample.wi), 0.0, "{name}");
+                    assert!(bsdf.eval(wo, sample.wi).is_black(), "{name}");
+                    deltas += 1;
+                }
+            }
+        }
+    }
+    assert!(deltas > 1_000);
+    assert!(!Bsdf::CoatedDiffuse(coated((0.0, 0.0), 0.0, 1)).is_delta());
+}
+
+#[test]
+fn glass_refracts_by_snell_s_law() {
+    let bsdf = glass(GLASS, (0.0, 0.0));
+    let wo = local(Vec3::new(0.6, 0.0, 0.8));
+    let sample = bsdf.sample(wo, 0.999, Vec2::new(0.3, 0.4)).unwrap();
+    assert!(sample.transmitted && sample.eta == GLASS);
+    assert!((sample.wi.vec() - Vec3::new(-0.4, 0.0, -(1.0_f32 - 0.16).sqrt())).length() < 1e-6);
+    assert!((sample.weight.r - 1.0 / (GLASS * GLASS)).abs() < 1e-6);
+    // And beyond the critical angle everything comes back.
+    let inside = local(Vec3::new(0.8, 0.0, -0.6));
+    let back = bsdf.sample(inside, 0.999, Vec2::new(0.3, 0.4)).unwrap();
+    assert!(!back.transmitted && back.eta == 1.0 && back.weight == Spectrum::WHITE);
+}
+
+/// The mean over the hemisphere, by the cosine law, of what the coat reflects back from below.
+fn internal_reflectance(eta: f32) -> f64 {
+    (0..20_000)
+        .map(|i| {
+            // cos² uniform.
+            let cos = ((f64::from(i) + 0.5) / 20_000.0).sqrt();
+            f64::from(fresnel::dielectric(-cos as f32, eta))
+        })
+        .sum::<f64>()
+        / 20_000.0
+}
+
+#[test]
+fn a_smooth_clear_coat_has_the_value_of_the_closed_form() {
+    // All the bounces between a diffuse base and a smooth face: T(o) T(i) ρ / (π η² (1 − ρ R)).
+    let inner = internal_reflectance(GLASS);
+    let mut coat = coated((0.0, 0.0), 0.0, 100_000);
+    (coat.thickness, coat.max_depth) = (0.0, 200);
+    let mut count = 0;
+    for (wo, wi) in [
+        (Vec3::new(0.1, 0.2, 0.9), Vec3::new(-0.5, 0.3, 0.6)),
+        (Vec3::new(-0.8, 0.1, 0.4), Vec3::new(0.3, 0.3, 0.5)),
+        (Vec3::new(0.2, 0.1, -0.7), Vec3::new(0.5, 0.4, -0.6)),
+    ] {
+        let (wo, wi) = (local(wo), local(wi));
+        let through = |w: LocalDir| 1.0 - f64::from(fresnel::dielectric(w.abs_cos_theta(), GLASS));
+        let ours = coat.eval(wo, wi).to_array();
+        for (ours, rho) in ours.into_iter().zip(coat.reflectance.to_array()) {
+            let rho = f64::from(rho);
+            let expected = through(wo) * through(wi) * rho * f64::from(wi.abs_cos_theta())
+                / (PI * f64::from(GLASS * GLASS) * (1.0 - rho * inner));
+            assert!((f64::from(ours) / expected - 1.0).abs() < 1e-2, "{ours} {expected}");
+            count += 1;
+        }
+    }
+    assert_eq!(count, 9);
+}
+
+#[test]
+fn a_nearly_smooth_coat_is_nearly_the_smooth_one() {
+    let (wo, wi) = (local(Vec3::new(0.1, 0.2, 0.9)), local(Vec3::new(-0.5, 0.3, 0.6)));
+    for albedo in [0.0, 0.8] {
+        let smooth = coated((0.0, 0.0), albedo, 60_000).eval(wo, wi);
+        let rough = coated((0.02, 0.02), albedo, 60_000).eval(wo, wi);
+        for (a, b) in smooth.to_array().into_iter().zip(rough.to_array()) {
+            assert!((a / b - 1.0).abs() < 0.02, "{smooth:?} {rough:?}");
+        }
+    }
+}
+
+#[test]
+fn a_medium_without_base_scatters_as_its_phase_function_says() {
+    // A thin layer under no border at all over a black base: single scattering, whose closed form is known.
+    let mut coat = coated((0.0, 0.0), 1.0, 400_000);
+    coat.coat.eta = 1.0;
+    coat.reflectance = Spectrum::BLACK;
+    (coat.thickness, coat.g, coat.max_depth) = (0.01, 0.6, 1);
+    let (wo, wi) = (local(Vec3::new(0.1, 0.2, 0.9)), local(Vec3::new(-0.5, 0.3, 0.6)));
+    let (cos_o, cos_i) = (f64::from(wo.cos_theta()), f64::from(wi.cos_theta()));
+    let cos = -f64::from(wo.vec().dot(wi.vec()));
+    let g = 0.6_f64;
+    let phase = (1.0 - g * g) / (4.0 * PI * (1.0 + g * g - 2.0 * g * cos).powf(1.5));
+    // ∫ p e^(−τ(1/μo + 1/μi)) dτ / μo: Chandrasekhar's single scattering, times μi / μi.
+    let paths = 1.0 / cos_o + 1.0 / cos_i;
+    let expected = phase * (1.0 - (-0.01 * paths).exp()) / (paths * cos_o);
+    let ours = f64::from(coat.eval(wo, wi).r);
+    assert!((ours / expected - 1.0).abs() < 0.05, "{ours} {expected}");
+}
+
+#[test]
+fn a_bsdf_stays_small() {
+    assert!(size_of::<Bsdf>() <= 80, "{}", size_of::<Bsdf>());
+}
