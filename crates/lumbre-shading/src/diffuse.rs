@@ -1,7 +1,8 @@
 //! Lambert's surfaces: light leaves in all directions alike.
 
-use std::f32::consts::{FRAC_1_PI, PI};
+use std::f32::consts::FRAC_1_PI;
 
+use lumbre_math::warp::square_to_cosine_hemisphere;
 use lumbre_math::{Vec2, Vec3};
 
 use crate::{BsdfSample, LocalDir, Scatter, Spectrum};
@@ -104,27 +105,10 @@ impl DiffuseTransmission {
 
 /// A direction with density cos θ / π on the side of the sign of `side`; `None` when that is neither.
 pub(crate) fn cosine_direction(u: Vec2, side: f32) -> Option<LocalDir> {
-    let disk = square_to_disk(u);
-    // 2⁻¹³ at the least: never in the surface, where no side is left. (Four in a hundred million go there.)
-    let z = (1.0 - disk.length_squared()).max(1.5e-8).sqrt();
     if side == 0.0 || side.is_nan() {
         return None;
     }
-    Some(LocalDir(Vec3::new(disk.x, disk.y, z.copysign(side))))
-}
-
-/// The unit square onto the unit disk, equal areas to equal areas, squares to rings.
-///
-/// Shirley and Chiu, "A Low Distortion Map Between Disk and Square", Journal of Graphics Tools 2(3), 1997.
-fn square_to_disk(u: Vec2) -> Vec2 {
-    let p = 2.0 * u - Vec2::ONE;
-    if p == Vec2::ZERO {
-        return p;
-    }
-    let (radius, angle) = if p.x.abs() > p.y.abs() {
-        (p.x, 0.25 * PI * (p.y / p.x))
-    } else {
-        (p.y, 0.5 * PI - 0.25 * PI * (p.x / p.y))
-    };
-    radius * Vec2::from_angle(angle)
+    let up = square_to_cosine_hemisphere(u);
+    // 2⁻¹³ at the least: never in the surface, where no side is left. (Four in a hundred million go there.)
+    Some(LocalDir(Vec3::new(up.x, up.y, up.z.max(1.2e-4).copysign(side))))
 }

@@ -334,3 +334,160 @@ fn bumped(displacement: &FloatTexture, at: &TextureContext, surface: &LocalSurfa
         derivative(step_v, Vec2::Y, surface.dpdv, surface.dndv),
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{ImageFilter, Mapping2d, MipMap, MipMapOptions, Wrap};
+    use lumbre_image::{Bitmap, Channels, Encoding, PixelData};
+    use lumbre_math::{DVec3, Transform};
+
+    fn at(point: DVec3, uv: Vec2) -> TextureContext {
+        TextureContext {
+            point,
+            normal: Vec3::Z,
+            uv,
+            dpdx: Vec3::ZERO,
+            dpdy: Vec3::ZERO,
+            duv_dx: Vec2::splat(1e-3),
+            duv_dy: Vec2::splat(1e-3),
+        }
+    }
+
+    fn diffuse(albedo: f32) -> Arc<Material> {
+        let reflectance = Arc::new(Texture::Constant(Spectrum::splat(albedo)));
+        Arc::new(Material::new(MaterialKind::Diffuse { reflectance }))
+    }
+
+    fn mix(a: &Arc<Material>, b: &Arc<Material>, amount: f32) -> Arc<Material> {
+        let amount = Arc::new(Texture::Constant(amount));
+        Arc::new(Material::new(MaterialKind::Mix { materials: [Arc::clone(a), Arc::clone(b)], amount }))
+    }
+
+    fn surface() -> LocalSurface {
+        LocalSurface {
+            normal: Vec3::new(0.6, 0.0, 0.8),
+            dpdu: Vec3::new(0.8, 0.0, -0.6) * 2.0,
+            dpdv: Vec3::Y * 3.0,
+            dndu: Vec3::ZERO,
+            dndv: Vec3::ZERO,
+        }
+    }
+
+    #[test]
+    fn a_mixture_has_the_share_it_says_and_answers_the_same_twice() {
+        let (a, b, c) = (diffuse(0.1), diffuse(0.2), diffuse(0.3));
+        let nested = mix(&mix(&a, &b, 0.5), &c, 0.25);
+        let mut counts = [0; 3];
+        let wo = Vec3::new(0.3, -0.4, 0.8).normalize();
+        for i in 0..40_000 {
+            let here = at(DVec3::new(f64::from(i) * 0.37, 2.0, -f64::from(i)), Vec2::ZERO);
+            let resolved = nested.resolve(&here, wo);
+            assert!(std::ptr::eq(resolved, nested.resolve(&here, wo)));
+            for (count, material) in counts.iter_mut().zip([&a, &b, &c]) {
+                *count += usize::from(std::ptr::eq(resolved, &**material));
+            }
+        }
+        for (count, share) in counts.into_iter().zip([0.375, 0.375, 0.25]) {
+            assert!((count as f64 / 40_000.0 - share).abs() < 0.01, "{counts:?}");
+        }
+        for (amount, expected) in [(0.0, &a), (-2.0, &a), (1.0, &b), (7.0, &b)] {
+            let all = mix(&a, &b, amount);
+            for i in 0..100 {
+                let here = at(DVec3::new(f64::from(i), 2.0, 3.0), Vec2::ZERO);
+                assert!(std::ptr::eq(all.resolve(&here, wo), &**expected));
+            }
+        }
+    }
+
+    #[test]
+    fn a_slope_turns_the_normal_against_it() {
+        // Displacement 0.5 u: the surface rises along ∂p/∂u, which is 2 long, by a quarter of the way.
+        let ramp = Texture::Bilerp { mapping: Mapping2d::IDENTITY, corners: [0.0, 0.0, 0.5, 0.5] };
+        let material = Material { displacement: Some(Arc::new(ramp)), ..(*diffuse(0.5)).clone() };
+        let frame = material.frame(&at(DVec3::ONE, Vec2::new(0.3, 0.6)), &surface());
+        let (n, u) = (surface().normal, surface().dpdu.normalize());
+        let expected = (n - 0.25 * u).normalize();
+        assert!((frame.n - expected).length() < 1e-3, "{:?} {expected:?}", frame.n);
+        assert!(frame.s.dot(frame.n).abs() < 1e-6 && frame.s.dot(u) > 0.9);
+        let plain = diffuse(0.5).frame(&at(DVec3::ONE, Vec2::ZERO), &surface());
+        assert_eq!(plain.n, n);
+    }
+
+    #[test]
+    fn a_bump_in_space_follows_the_point() {
+        // Displacement 0.3 y of the world, on a surface whose ∂p/∂v is 3 y: slope 0.3 along y.
+        let ramp = Texture::Bilerp {
+            mapping: Mapping2d::Planar {
+                texture_from_world: Transform::IDENTITY,
+                vs: DVec3::Y * 0.01,
+                vt: DVec3::X * 0.01,
+                delta: Vec2::ZERO,
+            },
+            corners: [0.0, 0.0, 30.0, 30.0],
+        };
+        let material = Material { displacement: Some(Arc::new(ramp)), ..(*diffuse(0.5)).clone() };
+        let flat = LocalSurface { dpdv: Vec3::Y * 3.0, ..surface() };
+        let frame = material.frame(&at(DVec3::new(2.0, 0.0, 1.0), Vec2::new(0.3, 0.6)), &flat);
+        let expected = (flat.normal - 0.3 * Vec3::Y).normalize();
+        assert!((frame.n - expected).length() < 2e-3, "{:?} {expected:?}", frame.n);
+    }
+
+    fn normal_map(texel: [f32; 3]) -> Material {
+        let data = PixelData::F32(texel.repeat(4));
+        let bitmap = Bitmap::new(2, 2, Channels::Rgb, data, Encoding::Linear).unwrap();
+        let options = MipMapOptions { wrap: Wrap::Repeat, filter: ImageFilter::Bilinear };
+        let image = Arc::new(MipMap::new(Arc::new(bitmap), options));
+        let map = ImageTexture { mapping: Mapping2d::IDENTITY, image, scale: 1.0, invert: false };
+        Material { normal_map: Some(map), ..(*diffuse(0.5)).clone() }
+    }
+
+    #[test]
+    fn a_normal_map_is_in_the_tangent_frame() {
+        let local = Vec3::new(0.48, -0.6, 0.64);
+        let texel = (0.5 * (local + Vec3::ONE)).to_array();
+        let frame = normal_map(texel).frame(&at(DVec3::ONE, Vec2::new(0.3, 0.6)), &surface());
+        let plain = ShadingFrame::new(surface().normal, surface().dpdu);
+        let expected = plain.s * local.x + plain.t * local.y + plain.n * local.z;
+        assert!((frame.n - expected).length() < 1e-5, "{:?} {expected:?}", frame.n);
+    }
+
+    #[test]
+    fn a_normal_stays_on_its_side_and_a_map_that_says_nothing_changes_nothing() {
+        let here = at(DVec3::ONE, Vec2::new(0.3, 0.6));
+        let down = normal_map([0.6, 0.5, 0.0]).frame(&here, &surface());
+        assert!(down.n.dot(surface().normal) > 0.0);
+        for texel in [[0.5; 3], [f32::NAN; 3], [f32::INFINITY; 3]] {
+            let frame = normal_map(texel).frame(&here, &surface());
+            assert!(frame.n.is_finite() && (frame.n.length() - 1.0).abs() < 1e-5, "{texel:?}: {frame:?}");
+        }
+    }
+
+    #[test]
+    fn bsdfs_hold_their_parameters_within_what_is_possible() {
+        let here = at(DVec3::ONE, Vec2::ZERO);
+        let Some(Bsdf::Diffuse(bright)) = diffuse(3.0).bsdf(&here) else { panic!() };
+        assert_eq!(bright.reflectance, Spectrum::WHITE);
+        let glass = Material::new(MaterialKind::Dielectric {
+            eta: -1.0,
+            roughness: Roughness::isotropic(0.25, true),
+        });
+        let Some(Bsdf::Dielectric(glass)) = glass.bsdf(&here) else { panic!() };
+        assert_eq!((glass.eta, glass.facets.alpha()), (1.0, Vec2::splat(0.5)));
+        assert!(Material::new(MaterialKind::Interface).bsdf(&here).is_none());
+        assert!(mix(&diffuse(0.1), &diffuse(0.2), 0.5).bsdf(&here).is_none());
+    }
+
+    #[test]
+    fn every_kind_has_a_name_of_the_list() {
+        let kinds = [
+            diffuse(0.5).kind.clone(),
+            mix(&diffuse(0.1), &diffuse(0.2), 0.5).kind.clone(),
+            MaterialKind::Interface,
+            MaterialKind::ThinDielectric { eta: 1.5 },
+        ];
+        for kind in kinds {
+            assert!(MaterialKind::NAMES.contains(&kind.name()));
+        }
+    }
+}

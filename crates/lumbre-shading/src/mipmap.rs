@@ -327,3 +327,204 @@ fn coverages(from: u32, to: u32) -> Vec<[(u32, f32); 3]> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NONE: Vec2 = Vec2::ZERO;
+
+    /// A picture of 6 by 4 whose texel (x, y from the top) is (x / 8, y / 8, 0.5).
+    fn ramp() -> Arc<Bitmap> {
+        let data =
+            (0..4).flat_map(|y| (0..6).flat_map(move |x| [x as f32 / 8.0, y as f32 / 8.0, 0.5])).collect();
+        Arc::new(Bitmap::new(6, 4, Channels::Rgb, PixelData::F32(data), Encoding::Linear).unwrap())
+    }
+
+    fn noise(width: u32, height: u32) -> Arc<Bitmap> {
+        let mut random = lumbre_math::random::RandomStream::new(8);
+        let data = (0..width * height * 3).map(|_| random.next_f32()).collect();
+        Arc::new(Bitmap::new(width, height, Channels::Rgb, PixelData::F32(data), Encoding::Linear).unwrap())
+    }
+
+    fn map(wrap: Wrap, filter: ImageFilter) -> MipMap {
+        MipMap::new(ramp(), MipMapOptions { wrap, filter })
+    }
+
+    fn assert_close(a: Spectrum, b: Spectrum) {
+        assert!((a - b).map(f32::abs).max_component() < 1e-5, "{a:?} {b:?}");
+    }
+
+    /// st of the centre of a texel counted from the top left.
+    fn centre(x: i32, y: i32) -> Vec2 {
+        Vec2::new((x as f32 + 0.5) / 6.0, 1.0 - (y as f32 + 0.5) / 4.0)
+    }
+
+    #[test]
+    fn the_lower_left_is_the_last_row() {
+        for filter in
+            [ImageFilter::Point, ImageFilter::Bilinear, ImageFilter::Trilinear, ImageFilter::Ewa(8.0)]
+        {
+            let map = map(Wrap::Clamp, filter);
+            for (x, y) in [(0, 3), (2, 1), (5, 0)] {
+                let expected = Spectrum::new(x as f32 / 8.0, y as f32 / 8.0, 0.5);
+                assert_close(map.lookup(centre(x, y), NONE, NONE), expected);
+            }
+        }
+    }
+
+    #[test]
+    fn between_texels_bilinear_is_linear_and_point_takes_the_nearest() {
+        let place = centre(2, 1).lerp(centre(3, 2), 0.25);
+        assert_close(
+            map(Wrap::Clamp, ImageFilter::Bilinear).lookup(place, NONE, NONE),
+            Spectrum::new(2.25 / 8.0, 1.25 / 8.0, 0.5),
+        );
+        assert_close(
+            map(Wrap::Clamp, ImageFilter::Point).lookup(place, NONE, NONE),
+            Spectrum::new(2.0 / 8.0, 1.0 / 8.0, 0.5),
+        );
+    }
+
+    #[test]
+    fn beyond_the_edge_each_wrap_does_what_it_says() {
+        let red = |wrap, x, y| {
+            let c = map(wrap, ImageFilter::Bilinear).lookup(centre(x, y), NONE, NONE);
+            (c.r * 8.0, c.g * 8.0, c.b)
+        };
+        let near = |a: (f32, f32, f32), b: (f32, f32, f32)| {
+            assert!((a.0 - b.0).abs() + (a.1 - b.1).abs() + (a.2 - b.2).abs() < 1e-4, "{a:?} {b:?}");
+        };
+        near(red(Wrap::Repeat, 7, 2), (1.0, 2.0, 0.5));
+        near(red(Wrap::Repeat, -13, -3), (5.0, 1.0, 0.5));
+        near(red(Wrap::Clamp, 7, 2), (5.0, 2.0, 0.5));
+        near(red(Wrap::Clamp, -3, 9), (0.0, 3.0, 0.5));
+        near(red(Wrap::Black, 7, 2), (0.0, 0.0, 0.0));
+        near(red(Wrap::Black, 3, -2), (0.0, 0.0, 0.0));
+        // Half-way across a black edge half is left.
+        let edge = map(Wrap::Black, ImageFilter::Bilinear).lookup(Vec2::new(0.0, 0.5), NONE, NONE);
+        assert!((edge.b - 0.25).abs() < 1e-6, "{edge:?}");
+    }
+
+    #[test]
+    fn an_octahedral_edge_meets_itself_mirrored() {
+        use lumbre_math::warp::equal_area_wrap;
+        let size = 8;
+        let mut count = 0;
+        for y in 0..size {
+            for x in [-2, -1, size, size + 1] {
+                for (x, y) in [(x, y), (y, x)] {
+                    let st = Vec2::new((x as f32 + 0.5) / 8.0, (y as f32 + 0.5) / 8.0);
+                    let wrapped = equal_area_wrap(st) * 8.0 - 0.5;
+                    let ours = octahedral(x, y, size, size);
+                    assert_eq!(ours, (wrapped.x.round() as i64, wrapped.y.round() as i64), "{x} {y}");
+                    count += 1;
+                }
+            }
+        }
+        assert_eq!(count, 64);
+    }
+
+    #[test]
+    fn every_level_keeps_the_mean_and_the_number_format() {
+        let image = noise(37, 12);
+        let mean = |level: &Bitmap| {
+            level.to_image().pixels().iter().copied().sum::<Spectrum>()
+                / (level.width() * level.height()) as f32
+        };
+        let map = MipMap::new(Arc::clone(&image), MipMapOptions::default());
+        let sizes: Vec<_> = (0..map.level_count())
+            .map(|i| map.level(i).map(|level| (level.width(), level.height())).unwrap())
+            .collect();
+        assert_eq!(sizes, [(37, 12), (19, 6), (10, 3), (5, 2), (3, 1), (2, 1), (1, 1)]);
+        for i in 0..map.level_count() {
+            assert_close(mean(map.level(i).unwrap()), mean(&image));
+        }
+        let bytes = Bitmap::new(5, 3, Channels::Rgba, PixelData::U8(vec![77; 60]), Encoding::Srgb).unwrap();
+        let map = MipMap::new(Arc::new(bytes), MipMapOptions::default());
+        assert_eq!(map.level(1).unwrap().data(), &PixelData::U8(vec![77; 3 * 2 * 4]));
+        assert_eq!(map.bytes(), 60 + 24 + 8 + 4);
+        assert!(map.level(4).is_none());
+    }
+
+    #[test]
+    fn a_footprint_of_everything_gives_the_mean() {
+        let image = noise(64, 64);
+        let mean = image.to_image().pixels().iter().copied().sum::<Spectrum>() / 4096.0;
+        for filter in
+            [ImageFilter::Point, ImageFilter::Bilinear, ImageFilter::Trilinear, ImageFilter::Ewa(8.0)]
+        {
+            let map = MipMap::new(Arc::clone(&image), MipMapOptions { filter, wrap: Wrap::Repeat });
+            for size in [1.0, 50.0, 1e30] {
+                let wide = map.lookup(Vec2::new(0.3, 0.7), Vec2::X * size, Vec2::Y * size);
+                assert_close(wide, mean);
+            }
+        }
+    }
+
+    #[test]
+    fn an_elliptic_footprint_blurs_along_its_axis_alone() {
+        // Stripes along the diagonal s + t: sharp across a footprint that follows them, grey where it crosses them.
+        let size = 128_u32;
+        let data = (0..size * size)
+            .map(|i| {
+                let (x, y) = (i % size, size - 1 - i / size);
+                if (x + y) % 16 < 8 { 1.0 } else { 0.0 }
+            })
+            .collect();
+        let image = Bitmap::new(size, size, Channels::Y, PixelData::F32(data), Encoding::Linear).unwrap();
+        let options = MipMapOptions { wrap: Wrap::Repeat, filter: ImageFilter::Ewa(16.0) };
+        let map = MipMap::new(Arc::new(image), options);
+        // In the middle of a white stripe: x + y ≡ 3.5 (mod 16) in texels, whose centres lie at halves.
+        let st = Vec2::splat(66.25) / size as f32;
+        let (along, across) = (Vec2::new(1.0, -1.0) / size as f32, Vec2::new(1.0, 1.0) / size as f32);
+        let sharp = map.lookup_float(st, along * 12.0, across * 1.0);
+        let grey = map.lookup_float(st, along * 1.0, across * 12.0);
+        assert!(sharp > 0.95, "{sharp}");
+        assert!((grey - 0.5).abs() < 0.1, "{grey}");
+    }
+
+    #[test]
+    fn a_number_is_the_coverage_where_there_is_one_and_the_mean_of_colours_otherwise() {
+        let lookup = |channels: Channels, texel: &[u8]| {
+            let data = PixelData::U8(texel.repeat(6));
+            let bitmap = Bitmap::new(3, 2, channels, data, Encoding::Linear).unwrap();
+            MipMap::new(Arc::new(bitmap), MipMapOptions::default()).lookup_float(
+                Vec2::new(0.4, 0.6),
+                NONE,
+                NONE,
+            )
+        };
+        assert!((lookup(Channels::Y, &[51]) - 0.2).abs() < 1e-6);
+        assert!((lookup(Channels::Rgb, &[51, 102, 0]) - 0.2).abs() < 1e-6);
+        assert!((lookup(Channels::Rgba, &[51, 102, 0, 255]) - 0.2).abs() < 1e-6);
+        assert!((lookup(Channels::Rgba, &[51, 102, 0, 204]) - 0.8).abs() < 1e-6);
+        assert!((lookup(Channels::Ya, &[51, 204]) - 0.8).abs() < 1e-6);
+    }
+
+    #[test]
+    fn places_that_are_no_places_give_finite_values() {
+        let odd = [0.0, 1.0, -1e30, 1e30, f32::NAN, f32::INFINITY, 1e-40];
+        let mut count = 0;
+        for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Black, Wrap::OctahedralSphere] {
+            for filter in [
+                ImageFilter::Point,
+                ImageFilter::Bilinear,
+                ImageFilter::Trilinear,
+                ImageFilter::Ewa(f32::INFINITY),
+                ImageFilter::Ewa(f32::NAN),
+            ] {
+                let map = map(wrap, filter);
+                for a in odd {
+                    for b in odd {
+                        let value = map.lookup(Vec2::new(a, b), Vec2::new(b, 1e-3), Vec2::new(0.2, a));
+                        assert!(value.is_finite(), "{wrap:?} {filter:?} {a} {b}");
+                        assert!(map.lookup(Vec2::new(b, a), Vec2::new(a, b), Vec2::ZERO).is_finite());
+                        count += 1;
+                    }
+                }
+            }
+        }
+        assert_eq!(count, 4 * 5 * 49);
+    }
+}

@@ -315,3 +315,203 @@ fn filtered_square_wave(x: f64, radius: f64) -> f64 {
     };
     (second_integral(x + radius) - 2.0 * second_integral(x) + second_integral(x - radius)) / (radius * radius)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{ImageFilter, MipMapOptions, Wrap};
+    use lumbre_image::{Bitmap, Channels, Encoding, PixelData};
+
+    fn at(point: DVec3, uv: Vec2) -> TextureContext {
+        TextureContext {
+            point,
+            normal: Vec3::Z,
+            uv,
+            dpdx: Vec3::ZERO,
+            dpdy: Vec3::ZERO,
+            duv_dx: Vec2::ZERO,
+            duv_dy: Vec2::ZERO,
+        }
+    }
+
+    fn constant(v: f32) -> Arc<FloatTexture> {
+        Arc::new(Texture::Constant(v))
+    }
+
+    fn moved() -> Transform {
+        let turn = Transform::rotate(DVec3::new(1.0, 2.0, -0.5), 40.0).unwrap();
+        (Transform::translate(DVec3::new(3.0, -2.0, 5.0)) * turn).inverse()
+    }
+
+    #[test]
+    fn values_scale_and_mix() {
+        let here = at(DVec3::new(2.0, 3.0, 4.0), Vec2::new(0.3, 0.6));
+        let scaled = Texture::Scale { texture: constant(3.0), scale: constant(0.25) };
+        assert_eq!(scaled.evaluate(&here), 0.75);
+        let mixed = Texture::Mix { textures: [constant(2.0), constant(4.0)], amount: constant(0.25) };
+        assert_eq!(mixed.evaluate(&here), 2.5);
+        let by_direction = Texture::DirectionMix {
+            textures: [constant(2.0), constant(4.0)],
+            direction: Vec3::new(0.8, 0.0, -0.6),
+        };
+        assert!((by_direction.evaluate(&here) - (0.6 * 2.0 + 0.4 * 4.0)).abs() < 1e-6);
+        let corners = [1.0, 2.0, 3.0, 5.0];
+        let bilerp = Texture::Bilerp { mapping: Mapping2d::IDENTITY, corners };
+        for (st, value) in
+            [((0.0, 0.0), 1.0), ((0.0, 1.0), 2.0), ((1.0, 0.0), 3.0), ((1.0, 1.0), 5.0), ((0.5, 0.5), 2.75)]
+        {
+            assert!((bilerp.evaluate(&at(DVec3::ONE, Vec2::new(st.0, st.1))) - value).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn mappings_give_the_angles_and_products_they_promise() {
+        let transform = moved();
+        let world = |p: DVec3| at(transform.inverse_point(p), Vec2::new(0.3, 0.6));
+        let uv = Mapping2d::Uv { scale: Vec2::new(4.0, -2.0), delta: Vec2::new(0.5, 3.0) };
+        assert!((uv.map(&world(DVec3::ONE)).st - Vec2::new(1.7, 1.8)).length() < 1e-6);
+
+        let spherical = Mapping2d::Spherical { texture_from_world: transform };
+        for (p, st) in [
+            (DVec3::new(2.0, 0.0, 0.0), (0.5, 0.0)),
+            (DVec3::new(0.0, 3.0, 0.0), (0.5, 0.25)),
+            (DVec3::new(0.0, -2.0, 2.0), (0.25, 0.75)),
+            (DVec3::new(-1.0, 0.0, -1.0), (0.75, 0.5)),
+        ] {
+            let ours = spherical.map(&world(p)).st;
+            // (t wraps about the x axis.)
+            let apart = (ours - Vec2::new(st.0, st.1)).abs();
+            assert!(apart.x < 1e-6 && apart.y.min(1.0 - apart.y) < 1e-6, "{p}: {ours}");
+        }
+        let cylindrical = Mapping2d::Cylindrical { texture_from_world: transform };
+        for (p, st) in [(DVec3::new(2.0, 0.0, -7.0), (0.5, -7.0)), (DVec3::new(0.0, 3.0, 1.5), (0.75, 1.5))] {
+            assert!((cylindrical.map(&world(p)).st - Vec2::new(st.0, st.1)).length() < 1e-5);
+        }
+        let planar = Mapping2d::Planar {
+            texture_from_world: transform,
+            vs: DVec3::new(2.0, 0.0, 1.0),
+            vt: DVec3::new(0.0, -1.0, 0.0),
+            delta: Vec2::new(0.25, 0.5),
+        };
+        let ours = planar.map(&world(DVec3::new(1.0, 2.0, 3.0))).st;
+        assert!((ours - Vec2::new(5.25, -1.5)).length() < 1e-5);
+    }
+
+    #[test]
+    fn derivatives_of_mappings_are_those_of_differences() {
+        let transform = moved();
+        let mappings = [
+            Mapping2d::Spherical { texture_from_world: transform },
+            Mapping2d::Cylindrical { texture_from_world: transform },
+            Mapping2d::Planar {
+                texture_from_world: transform,
+                vs: DVec3::new(2.0, 0.0, 1.0),
+                vt: DVec3::new(0.0, -1.0, 0.5),
+                delta: Vec2::ZERO,
+            },
+        ];
+        let step = 1e-3;
+        let (dx, dy) = (DVec3::new(0.6, -0.2, 0.7) * step, DVec3::new(-0.1, 0.9, 0.3) * step);
+        for mapping in &mappings {
+            for p in [DVec3::new(1.0, 2.0, 0.5), DVec3::new(-2.0, 0.7, -1.0), DVec3::new(0.4, -0.9, 3.0)] {
+                let p = transform.inverse_point(p);
+                let here = TextureContext { dpdx: dx.as_vec3(), dpdy: dy.as_vec3(), ..at(p, Vec2::ONE) };
+                let ours = mapping.map(&here);
+                for (d, derivative) in [(dx, ours.dst_dx), (dy, ours.dst_dy)] {
+                    let st = |p| mapping.map(&at(p, Vec2::ONE)).st;
+                    let difference = st(p + 0.5 * d) - st(p - 0.5 * d);
+                    assert!(
+                        (difference - derivative).length() < 2e-6,
+                        "{mapping:?} {difference} {derivative}"
+                    );
+                }
+            }
+        }
+        // On the axis they are infinite and count as none.
+        let pole = TextureContext {
+            dpdx: dx.as_vec3(),
+            ..at(transform.inverse_point(DVec3::new(0.0, 0.0, 2.0)), Vec2::ONE)
+        };
+        assert!(mappings[0].map(&pole).dst_dx.is_finite());
+    }
+
+    #[test]
+    fn a_checkerboard_is_its_mean_from_afar_and_its_squares_from_near() {
+        let board = Texture::Checkerboard2d {
+            mapping: Mapping2d::Uv { scale: Vec2::splat(4.0), delta: Vec2::ZERO },
+            textures: [constant(1.0), constant(0.0)],
+        };
+        let value = |uv: (f32, f32), size: f32| {
+            let here = at(DVec3::ONE, Vec2::new(uv.0, uv.1));
+            board.evaluate(&TextureContext { duv_dx: Vec2::X * size, duv_dy: Vec2::Y * size, ..here })
+        };
+        for (uv, expected) in
+            [((0.1, 0.1), 1.0), ((0.3, 0.1), 0.0), ((0.3, 0.3), 1.0), ((-0.1, 0.1), 0.0), ((-0.1, -0.3), 0.0)]
+        {
+            assert_eq!(value(uv, 0.0), expected, "{uv:?}");
+            assert_eq!(value(uv, 0.01), expected, "{uv:?}");
+            assert!((value(uv, 30.0) - 0.5).abs() < 1e-3, "{uv:?}");
+        }
+        // On an edge, half of each.
+        assert!((value((0.25, 0.1), 0.01) - 0.5).abs() < 1e-5);
+        assert!((0.0..=1.0).contains(&value((f32::NAN, 0.1), 0.01)));
+    }
+
+    #[test]
+    fn the_filtered_wave_is_the_wave_under_a_tent() {
+        let mut count = 0;
+        for x in [0.1, 0.95, 1.5, 1.999, -0.3, 17.2] {
+            for radius in [0.01, 0.3, 0.9, 2.7] {
+                let steps = 200_000;
+                let mut sum = 0.0;
+                for i in 0..steps {
+                    let t = 2.0 * (f64::from(i) + 0.5) / f64::from(steps) - 1.0;
+                    let wave = if (x + radius * t).rem_euclid(2.0) < 1.0 { 1.0 } else { -1.0 };
+                    sum += wave * (1.0 - t.abs()) * 2.0 / f64::from(steps);
+                }
+                let ours = filtered_square_wave(x, radius);
+                assert!((ours - sum).abs() < 1e-4, "{x} {radius}: {ours} {sum}");
+                count += 1;
+            }
+        }
+        assert_eq!(count, 24);
+    }
+
+    #[test]
+    fn cubes_alternate_along_every_axis() {
+        let transform = moved();
+        let board = Texture::Checkerboard3d {
+            texture_from_world: transform,
+            textures: [constant(1.0), constant(0.0)],
+        };
+        for (p, expected) in [
+            ((0.5, 0.5, 0.5), 1.0),
+            ((1.5, 0.5, 0.5), 0.0),
+            ((0.5, -0.5, 0.5), 0.0),
+            ((0.5, -0.5, -0.5), 1.0),
+            ((-7.5, 2.5, 0.5), 1.0),
+        ] {
+            let here = at(transform.inverse_point(DVec3::new(p.0, p.1, p.2)), Vec2::ONE);
+            assert_eq!(board.evaluate(&here), expected, "{p:?}");
+        }
+    }
+
+    #[test]
+    fn an_image_is_scaled_then_inverted_and_never_negative() {
+        let data = PixelData::F32(vec![0.2, 0.4, 1.5, 0.2, 0.4, 1.5]);
+        let bitmap = Bitmap::new(2, 1, Channels::Rgb, data, Encoding::Linear).unwrap();
+        let options = MipMapOptions { wrap: Wrap::Repeat, filter: ImageFilter::Bilinear };
+        let image = Arc::new(MipMap::new(Arc::new(bitmap), options));
+        let texture = |scale, invert| ImageTexture {
+            mapping: Mapping2d::IDENTITY,
+            image: Arc::clone(&image),
+            scale,
+            invert,
+        };
+        let here = at(DVec3::ONE, Vec2::new(0.3, 0.6));
+        let colour: Spectrum = Texture::Image(texture(2.0, true)).evaluate(&here);
+        assert!((colour - Spectrum::new(0.6, 0.2, 0.0)).map(f32::abs).max_component() < 1e-6, "{colour:?}");
+        let number: f32 = Texture::Image(texture(0.5, false)).evaluate(&here);
+        assert!((number - 0.35).abs() < 1e-6);
+    }
+}

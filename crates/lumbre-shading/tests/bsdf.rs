@@ -1,9 +1,9 @@
 //! What every BSDF promises: it samples what its density says, its weights are values over densities, it is reciprocal
 //! (radiance in a denser medium counted by η²), it makes no energy, and it never answers NaN.
 //!
-//! Teeth: with the density of a rough metal, glass, coat or of Lambert multiplied by 1.005, the test of integrals fails,
-//! and with half of one sector moved to the next the χ² test does; with the Jacobian of refraction inverted, or η² left
-//! out of a transmission, the tests of weights or of reciprocity do.
+//! Teeth: with the density of rough metal or glass multiplied by 1.005 the test of densities fails; with the Jacobian of
+//! refraction taken the wrong way round those of densities, weights and reciprocity do; with η² left out of the values of
+//! a transmission those of weights and reciprocity.
 
 use std::f64::consts::{PI, TAU};
 

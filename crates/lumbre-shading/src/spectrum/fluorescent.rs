@@ -7,6 +7,7 @@ pub(super) const STEP_NM: f64 = 5.0;
 
 /// F1 to F12.
 #[rustfmt::skip]
+#[allow(clippy::approx_constant)]
 pub(super) const LAMPS: [[f64; 81]; 12] = [
     [
         1.87, 2.36, 2.94, 3.47, 5.17, 19.49, 6.13, 6.24, 7.01, 7.79, 8.56, 43.67, 16.94, 10.72,
