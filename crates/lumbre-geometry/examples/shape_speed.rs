@@ -7,8 +7,8 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use lumbre_geometry::{
-    BilinearPatch, Cone, Cuboid, Cylinder, Disk, PlacedShape, Plane, Ray, Roots, Shape, ShapeError, Sphere,
-    Triangle, WatertightRay, moller_trumbore,
+    Aabb, BilinearPatch, Cone, Csg, Cuboid, Cylinder, Disk, Hyperboloid, Paraboloid, PlacedShape, Plane,
+    Quadric, Ray, Roots, Shape, ShapeError, Sphere, Torus, Triangle, WatertightRay, moller_trumbore,
 };
 use lumbre_math::random::RandomStream;
 use lumbre_math::{DVec3, Transform};
@@ -39,6 +39,32 @@ fn shapes() -> Result<Vec<Shape>, ShapeError> {
         Cone::new(a, d, 1.1, 0.4, true)?.into(),
         BilinearPatch::new(a, b, c, d)?.into(),
         Triangle::new(a, b, c)?.into(),
+        Torus::new(v(0.1, 0.0, 0.2), v(1.0, 2.0, 3.0), 1.2, 0.4)?.into(),
+        Paraboloid::new(1.5, 0.0, 1.2, 360.0)?.into(),
+        Hyperboloid::new(v(1.2, 0.5, -1.0), v(0.2, 1.1, 1.1), 360.0)?.into(),
+        Quadric::new([1.0, 2.5, 0.75, 0.6, -0.4, 0.3, 0.0, 0.0, 0.0, -1.5], None)?.into(),
+        Quadric::new(
+            [1.0, -1.4, 0.1, 0.3, 0.0, 0.2, 0.1, 0.0, -1.0, 0.15],
+            Some(Aabb { min: v(-1.1, -1.2, -1.3), max: v(1.2, 1.1, 1.3) }),
+        )?
+        .into(),
+        bored_box()?.into(),
+    ])
+}
+
+/// Five leaves: a box with rounded corners, bored along two axes, and a torus taken away.
+fn bored_box() -> Result<Csg, ShapeError> {
+    let v = DVec3::new;
+    let solid = |shape: Shape| Csg::leaf(PlacedShape::new(shape, Transform::IDENTITY));
+    let body = Csg::intersection(vec![
+        solid(Cuboid::new(v(-1.0, -1.1, -0.9), v(1.2, 0.8, 1.0))?.into())?,
+        solid(Sphere::new(v(0.1, -0.1, 0.1), 1.35)?.into())?,
+    ])?;
+    Csg::difference(vec![
+        body,
+        solid(Cylinder::new(v(0.1, 0.0, -3.0), v(0.1, 0.0, 3.0), 0.4, true)?.into())?,
+        solid(Cylinder::new(v(-3.0, 0.0, 0.1), v(3.0, 0.0, 0.1), 0.3, true)?.into())?,
+        solid(Torus::new(v(0.1, 0.0, 1.0), v(0.0, 0.0, 1.0), 0.8, 0.25)?.into())?,
     ])
 }
 

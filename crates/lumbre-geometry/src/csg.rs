@@ -130,6 +130,8 @@ struct Event {
     enters: bool,
 }
 
+type Events = SmallVec<[Event; 16]>;
+
 /// How deep CSG shapes nest.
 const MAX_DEPTH: usize = 64;
 
@@ -352,9 +354,10 @@ impl Csg {
     /// Every crossing of the result in the ray's range in order, until `emit` returns false.
     fn sweep(&self, ray: &Ray, mut emit: impl FnMut(Root) -> bool) {
         let mut state = State::new(self);
-        let Some(events) = self.gather(ray, &mut state) else {
+        let mut events = Events::new();
+        if self.gather(ray, &mut state, &mut events).is_none() {
             return;
-        };
+        }
         let (origin, direction) = (ray.origin.abs().max_element(), ray.direction.abs().max_element());
         let mut rest = &events[..];
         while let Some(first) = rest.first() {
@@ -375,17 +378,16 @@ impl Csg {
         }
     }
 
-    /// All crossings of all leaves that matter, in order; `None` when the result is nowhere in the ray's range.
+    /// Collects all crossings of all leaves that matter, in order; `None` when the result is nowhere in the ray's range.
     ///
     /// A leaf whose box the ray's range misses is outside throughout it, and takes every intersection with it.
-    fn gather(&self, ray: &Ray, state: &mut State) -> Option<SmallVec<[Event; 16]>> {
-        let mut events = SmallVec::new();
+    fn gather(&self, ray: &Ray, state: &mut State, events: &mut Events) -> Option<()> {
         let inverse = ray.direction.recip();
         let mut i = 0;
         while let Some(node) = self.nodes.get(i) {
             let is_absent = match (node.bounds, node.kind) {
                 (Some(bounds), _) if !overlaps(&bounds, ray, inverse) => true,
-                (_, NodeKind::Leaf(leaf)) => !self.cross(leaf, ray, state, &mut events),
+                (_, NodeKind::Leaf(leaf)) => !self.cross(leaf, ray, state, events),
                 _ => false,
             };
             i = if is_absent {
@@ -397,7 +399,7 @@ impl Csg {
             };
         }
         events.sort_by(|a: &Event, b: &Event| a.root.t.total_cmp(&b.root.t).then(a.leaf.cmp(&b.leaf)));
-        Some(events)
+        Some(())
     }
 
     /// Where to go on when node `i` holds nowhere; `None` when then nothing does.
@@ -418,7 +420,7 @@ impl Csg {
     }
 
     /// Appends the crossings of a leaf; false when the whole line is outside of it.
-    fn cross(&self, leaf: u32, ray: &Ray, state: &mut State, events: &mut SmallVec<[Event; 16]>) -> bool {
+    fn cross(&self, leaf: u32, ray: &Ray, state: &mut State, events: &mut Events) -> bool {
         let first_part = self.first_part[leaf as usize];
         let flipped = self.places[leaf as usize].1;
         let encode = |root: &Root| Root {

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use lumbre_math::roots::{bracketed_root, depressed_cubic_roots};
+use lumbre_math::roots::{DepressedCubic, bracketed_root};
 use lumbre_math::{DVec2, DVec3, Transform, orthonormal_basis};
 
 use crate::shape::check;
@@ -46,6 +46,130 @@ struct Line {
 impl Line {
     fn t(&self, s: f64) -> f64 {
         (self.shift + s) / self.speed
+    }
+}
+
+/// The quartic of which the crossings are the roots: s⁴ + p s² + q s + w. Away from them it is as good as the torus's own
+/// equation, and quicker.
+#[derive(Clone, Copy)]
+struct Quartic {
+    p: f64,
+    q: f64,
+    w: f64,
+}
+
+impl Quartic {
+    #[inline]
+    fn new(torus: &Torus, line: &Line) -> Self {
+        let (big, small) = (torus.major * torus.major, torus.minor * torus.minor);
+        let (p, u) = (line.p, line.u);
+        let reach = p.length_squared() - small;
+        let sum = reach + big;
+        Self {
+            p: 2.0 * (reach - big + 2.0 * big * u.z * u.z),
+            q: 8.0 * big * p.z * u.z,
+            w: sum * sum - 4.0 * big * (p.x * p.x + p.y * p.y),
+        }
+    }
+
+    #[inline]
+    fn at(&self, s: f64) -> (f64, f64) {
+        let square = s * s;
+        let value = (square + self.p) * square + (self.q * s + self.w);
+        (value, (4.0 * square + 2.0 * self.p) * s + self.q)
+    }
+
+    fn curvature(&self, s: f64) -> f64 {
+        12.0 * s * s + 2.0 * self.p
+    }
+}
+
+/// The monotone pieces of the quartic, met in order.
+struct Pieces<'a, F> {
+    torus: &'a Torus,
+    line: &'a Line,
+    quartic: Quartic,
+    t_min: f64,
+    emit: F,
+    // The last place with a sign: where, which, and the quartic there.
+    left: (f64, f64, f64),
+    // Splits since then at which the quartic vanishes: the first, the last, how many.
+    touching: Option<(f64, f64, u8)>,
+}
+
+impl<F: FnMut(f64, u8) -> bool> Pieces<'_, F> {
+    /// Goes on to a root of the derivative; `None` when no more crossings are wanted.
+    #[inline]
+    fn until(&mut self, split: f64) -> Option<()> {
+        let is_within = self.line.low < split && split < self.line.high;
+        if !is_within {
+            return Some(());
+        }
+        let (sign, quartic) = self.torus.sign_and_quartic(self.line, split);
+        if sign == 0.0 {
+            self.touching =
+                Some(self.touching.map_or((split, split, 1), |(first, _, n)| (first, split, n + 1)));
+            return Some(());
+        }
+        self.until_sign(split, sign, quartic)
+    }
+
+    /// Goes on to where the quartic has a sign.
+    #[inline]
+    fn until_sign(&mut self, s: f64, sign: f64, quartic: f64) -> Option<()> {
+        let left = std::mem::replace(&mut self.left, (s, sign, quartic));
+        let (root, multiplicity) = if let Some((first, last, n)) = self.touching.take() {
+            let middle = 0.5 * (first + last);
+            let size = self.torus.major + self.torus.minor;
+            let is_flat = self.quartic.curvature(middle).abs() <= 1e-7 * size * size;
+            let multiplicity = match (sign == left.1, n) {
+                (true, 1 | 2) if !is_flat => 2,
+                (true, _) => 4,
+                (false, 2) => 3,
+                (false, _) => 1,
+            };
+            (middle, multiplicity)
+        } else if sign != left.1 && self.line.t(s) >= self.t_min {
+            // The negative end is a minimum of the quartic: there its parabola is a good guess.
+            let (minimum, depth, outwards) =
+                if sign < 0.0 { (s, quartic, -1.0) } else { (left.0, left.2, 1.0) };
+            let half_width = (-2.0 * depth / self.quartic.curvature(minimum)).sqrt();
+            (self.root(left.0, s, minimum + outwards * half_width, sign > 0.0), 1)
+        } else {
+            return Some(());
+        };
+        (self.emit)(self.line.t(root), multiplicity).then_some(())
+    }
+
+    /// The root in a monotone piece: by the quartic as far as that goes, then by the torus's own equation.
+    #[inline]
+    fn root(&self, low: f64, high: f64, guess: f64, rising: bool) -> f64 {
+        let mut s = guess;
+        for _ in 0..8 {
+            let (value, slope) = self.quartic.at(s);
+            let next = s - value / slope;
+            // Also when it is not a number.
+            let is_within = low < next && next < high;
+            if !is_within {
+                break;
+            }
+            let step = (next - s).abs();
+            s = next;
+            if step <= 1e-6 * self.torus.minor {
+                break;
+            }
+        }
+        if low < s && s < high {
+            let (value, slope) = self.torus.value_and_slope(self.line, s);
+            let step = value / slope;
+            let next = s - step;
+            // What Newton's method leaves is this step squared, times how fast the slope changes.
+            let left_over = step * step * self.quartic.curvature(s) / self.quartic.at(s).1;
+            if low < next && next < high && left_over.abs() <= 0.25 * f64::EPSILON * self.torus.minor {
+                return next;
+            }
+        }
+        bracketed_root(low, high, s, rising, |s| self.torus.value_and_slope(self.line, s))
     }
 }
 
@@ -213,49 +337,23 @@ impl Torus {
     /// The quartic s⁴ + p s² + q s + w is monotone between the roots of its derivative; where its signs differ at the ends
     /// of a piece there is a root. Where it vanishes at such an end the line touches.
     #[inline]
-    fn crossings(&self, line: &Line, t_min: f64, mut emit: impl FnMut(f64, u8) -> bool) {
-        let (big, small) = (self.major * self.major, self.minor * self.minor);
-        let half_p = line.p.length_squared() - big - small + 2.0 * big * line.u.z * line.u.z;
-        let splits = depressed_cubic_roots(half_p, 2.0 * big * line.p.z * line.u.z);
-        // The last place with a sign: where, which, and the quartic there.
-        let mut left = (line.low, 1.0, 0.0);
-        // Splits since then at which the quartic vanishes: the first, the last, how many.
-        let mut touching: Option<(f64, f64, u8)> = None;
-        let inner = splits.iter().copied().filter(|&s| line.low < s && s < line.high).map(Some);
-        for split in inner.chain(std::iter::once(None)) {
-            let (s, (sign, quartic)) = match split {
-                Some(s) => (s, self.sign_and_quartic(line, s)),
-                None => (line.high, (1.0, 0.0)),
-            };
-            if sign == 0.0 {
-                touching = Some(touching.map_or((s, s, 1), |(first, _, n)| (first, s, n + 1)));
-                continue;
-            }
-            if let Some((first, last, n)) = touching.take() {
-                let middle = 0.5 * (first + last);
-                let is_flat = (12.0 * middle * middle + 4.0 * half_p).abs() <= 1e-7 * (big + small);
-                let multiplicity = match (sign == left.1, n) {
-                    (true, 1 | 2) if !is_flat => 2,
-                    (true, _) => 4,
-                    (false, 2) => 3,
-                    (false, _) => 1,
-                };
-                if !emit(line.t(middle), multiplicity) {
-                    return;
-                }
-            } else if sign != left.1 && line.t(s) >= t_min {
-                // The negative end is a minimum of the quartic: there its parabola is a good guess.
-                let (minimum, depth, outwards) =
-                    if sign < 0.0 { (s, quartic, -1.0) } else { (left.0, left.2, 1.0) };
-                let curvature = 12.0 * minimum * minimum + 4.0 * half_p;
-                let guess = minimum + outwards * (-2.0 * depth / curvature).sqrt();
-                let root = bracketed_root(left.0, s, guess, sign > 0.0, |s| self.value_and_slope(line, s));
-                if !emit(line.t(root), 1) {
-                    return;
+    fn crossings(&self, line: &Line, t_min: f64, emit: impl FnMut(f64, u8) -> bool) {
+        let quartic = Quartic::new(self, line);
+        let mut pieces =
+            Pieces { torus: self, line, quartic, t_min, emit, left: (line.low, 1.0, 0.0), touching: None };
+        let _: Option<()> = (|| {
+            match DepressedCubic::new(0.5 * quartic.p, 0.25 * quartic.q) {
+                DepressedCubic::OneRoot(split) => pieces.until(split)?,
+                DepressedCubic::ThreeRoots(three) => {
+                    let left = three.left();
+                    pieces.until(left)?;
+                    let (middle, right) = three.others(left);
+                    pieces.until(middle)?;
+                    pieces.until(right)?;
                 }
             }
-            left = (s, sign, quartic);
-        }
+            pieces.until_sign(line.high, 1.0, 0.0)
+        })();
     }
 
     /// The first crossing in the ray's range.

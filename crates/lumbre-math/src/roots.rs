@@ -45,8 +45,8 @@ impl<const N: usize> Deref for RealRoots<N> {
 /// zeros are welcome. An infinite end stands for Cauchy's bound on the roots. Empty when the interval is empty, when
 /// anything is NaN, and for the zero polynomial.
 ///
-/// Nothing is allocated. With all roots real and in the interval it takes 0.77 to 0.92 of the time of the crate polycool
-/// 0.4 from quartics to octics, but 2.5 times as long on cubics, where that crate deflates: `examples/roots_speed.rs`.
+/// Nothing is allocated. From quartics to octics it takes 0.72 to 0.84 of the time of the crate polycool 0.4; on cubics with
+/// three real roots, where that crate deflates, 2.3 times as long: `examples/roots_speed.rs`.
 pub fn roots_between<const N: usize>(c: &[f64; N], low: f64, high: f64) -> RealRoots<N> {
     let Some((low, high)) = finite_interval(c, low, high) else {
         return RealRoots::NONE;
@@ -99,7 +99,7 @@ pub fn roots_between<const N: usize>(c: &[f64; N], low: f64, high: f64) -> RealR
 /// The distinct real roots in `[low, high]` of the quartic `c[0] + c[1] x + … + c[4] x⁴`, in ascending order: as
 /// [`roots_between`], with the split points from the closed form of the cubic.
 ///
-/// 0.87 to 0.89 of the time of polycool's quartic: `examples/roots_speed.rs`.
+/// 0.80 to 0.85 of the time of polycool's quartic: `examples/roots_speed.rs`.
 pub fn quartic_roots_between(c: &[f64; 5], low: f64, high: f64) -> RealRoots<5> {
     let Some((low, high)) = finite_interval(c, low, high) else {
         return RealRoots::NONE;
@@ -135,46 +135,91 @@ fn cubic_roots_between<const N: usize>(c: &[f64], low: f64, high: f64) -> Option
 }
 
 /// All real roots of `x³ + a x + b`, in ascending order: one or three, a double one counted twice up to rounding.
-///
-/// Viète's trigonometric form replaced by an approximation of it and Newton steps, each root from the side on which they
-/// converge monotonically.
 pub fn depressed_cubic_roots(a: f64, b: f64) -> RealRoots<3> {
-    let mut roots = RealRoots::NONE;
-    let e = (-a / 3.0).max(0.0).sqrt();
-    // In units of e: x³ - 3x + 2h.
-    let h = 0.5 * b / (e * e * e);
-    if h.abs() <= 1.0 {
-        let outer = |h: f64| {
-            // -2 cos(acos(h)/3) to about 1e-3, exact at both ends.
-            let half = (0.5 * (1.0 + h)).sqrt();
-            let mut x = 1.0 + half * (1.154_700_538 - 0.154_700_538 * half);
-            for _ in 0..3 {
-                let slope = 3.0 * (x - 1.0) * (x + 1.0);
-                // At the double root, x = 1, there is nothing left to improve.
-                if slope <= 1e-9 {
-                    break;
-                }
-                x -= ((x * x - 3.0) * x - 2.0 * h) / slope;
-            }
-            x
-        };
-        let (left, right) = (-outer(h), outer(-h));
-        let middle = {
-            let x = -(left + right);
-            let slope = 3.0 * (x - 1.0) * (x + 1.0);
-            let polished = x - ((x * x - 3.0) * x + 2.0 * h) / slope;
-            if (polished - x).abs() <= 1e-6 { polished.clamp(left, right) } else { x }
-        };
-        roots.roots = [e * left, e * middle, e * right];
-        roots.count = 3;
-        return roots;
+    match DepressedCubic::new(a, b) {
+        DepressedCubic::OneRoot(root) => RealRoots { roots: [root, 0.0, 0.0], count: 1 },
+        DepressedCubic::ThreeRoots(three) => {
+            let left = three.left();
+            let (middle, right) = three.others(left);
+            // One more step of Newton's each, which goes astray only where a root is double already.
+            let polish = |x: f64| {
+                let polished = x - ((x * x + a) * x + b) / (3.0 * x * x + a);
+                if (polished - x).abs() <= 1e-7 * three.e { polished } else { x }
+            };
+            RealRoots { roots: [polish(left), polish(middle), polish(right)], count: 3 }
+        }
     }
-    // One real root. With the sign of b taken out, x³ + a x = |b| has it on the right of every turning point, where the
-    // cubic is convex: Newton's method descends to it from any point beyond.
+}
+
+/// `x³ + a x + b` on the way to its real roots, for those who may not need them all, nor to the last digits.
+///
+/// Viète's trigonometric form, with a polynomial and a step of Newton's in place of the cosines.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum DepressedCubic {
+    /// The only real root.
+    OneRoot(f64),
+    /// Three, two of which may be equal.
+    ThreeRoots(ThreeRoots),
+}
+
+/// The three real roots of a depressed cubic: see [`DepressedCubic`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ThreeRoots {
+    // In units of `e` the cubic is x³ - 3x + 2h, with |h| <= 1.
+    e: f64,
+    h: f64,
+}
+
+impl DepressedCubic {
+    /// Tells how many roots there are, and finds the root if there is one.
+    #[inline]
+    pub fn new(a: f64, b: f64) -> Self {
+        let e = (-a / 3.0).max(0.0).sqrt();
+        let h = 0.5 * b / (e * e * e);
+        if h.abs() <= 1.0 { Self::ThreeRoots(ThreeRoots { e, h }) } else { Self::OneRoot(only_root(a, b)) }
+    }
+}
+
+impl ThreeRoots {
+    /// The least, to about ten digits.
+    #[inline]
+    pub fn left(&self) -> f64 {
+        -self.e * Self::outer(self.h)
+    }
+
+    /// The middle and the greatest one, given the least, to about ten digits.
+    #[inline]
+    pub fn others(&self, left: f64) -> (f64, f64) {
+        let right = Self::outer(-self.h);
+        let left = left / self.e;
+        let x = -(left + right);
+        let slope = 3.0 * (x - 1.0) * (x + 1.0);
+        let polished = x - ((x * x - 3.0) * x + 2.0 * self.h) / slope;
+        let middle = if (polished - x).abs() <= 1e-6 { polished.clamp(left, right) } else { x };
+        (self.e * middle, self.e * right)
+    }
+
+    /// 2 cos(acos(h)/3), the root of x³ - 3x - 2h from 1 to 2, to about 1e-10.
+    #[inline]
+    fn outer(h: f64) -> f64 {
+        // (x - 1)/c is smooth in c = cos(acos(h)/2): a polynomial through its values, to 6e-6 and exact at both ends.
+        let c = (0.5 * (1.0 + h)).sqrt();
+        let high = 0.105_781_913 + c * (-0.058_513_870 + c * (0.026_063_998 - c * 0.005_843_958));
+        let x = 1.0 + c * (1.154_700_538 + c * (-0.222_188_622 + c * high));
+        // At the double root, x = 1, there is nothing left to improve.
+        if c < 1e-6 { x } else { x - ((x * x - 3.0) * x - 2.0 * h) / (3.0 * (x - 1.0) * (x + 1.0)) }
+    }
+}
+
+/// The real root of `x³ + a x + b` when there is one.
+///
+/// With the sign of b taken out, x³ + a x = |b| has it on the right of every turning point, where the cubic is convex:
+/// Newton's method descends to it from any point beyond.
+#[inline]
+fn only_root(a: f64, b: f64) -> f64 {
     let goal = b.abs();
     if goal == 0.0 {
-        roots.push(0.0);
-        return roots;
+        return 0.0;
     }
     let mut x = if a > 0.0 { goal.cbrt().min(goal / a) } else { goal.cbrt() + (-a).max(0.0).sqrt() };
     for _ in 0..60 {
@@ -182,16 +227,14 @@ pub fn depressed_cubic_roots(a: f64, b: f64) -> RealRoots<3> {
         if next.is_nan() || next >= x {
             break;
         }
-        let done = x - next <= 1e-9 * x;
+        // Quadratic convergence: one more step would be lost in rounding.
+        let done = x - next <= 1e-8 * x;
         x = next;
         if done {
-            // Quadratic convergence: one more step would be lost in rounding.
-            x -= ((x * x + a) * x - goal) / (3.0 * x * x + a);
             break;
         }
     }
-    roots.push(-x.copysign(b));
-    roots
+    -x.copysign(b)
 }
 
 /// The root of a function that is monotone between `low` and `high` and has different signs there: Newton's method from
