@@ -2,7 +2,7 @@
 
 use lumbre_math::Vec2;
 
-use crate::coated::CoatedDiffuse;
+use crate::coated::{Coat, CoatedConductor, CoatedDiffuse};
 use crate::conductor::Conductor;
 use crate::dielectric::{Dielectric, ThinDielectric};
 use crate::diffuse::{Diffuse, DiffuseTransmission};
@@ -51,6 +51,8 @@ pub enum Bsdf {
     ThinDielectric(ThinDielectric),
     /// Paint under varnish.
     CoatedDiffuse(CoatedDiffuse),
+    /// Metal under varnish.
+    CoatedConductor(CoatedConductor),
 }
 
 impl Bsdf {
@@ -63,6 +65,7 @@ impl Bsdf {
             Self::Dielectric(bsdf) => Spectrum::splat(bsdf.eval(wo, wi)),
             Self::ThinDielectric(_) => Spectrum::BLACK,
             Self::CoatedDiffuse(bsdf) => bsdf.eval(wo, wi),
+            Self::CoatedConductor(bsdf) => bsdf.eval(wo, wi),
         }
     }
 
@@ -76,6 +79,7 @@ impl Bsdf {
             Self::Dielectric(bsdf) => bsdf.pdf(wo, wi),
             Self::ThinDielectric(_) => 0.0,
             Self::CoatedDiffuse(bsdf) => bsdf.pdf(wo, wi),
+            Self::CoatedConductor(bsdf) => bsdf.pdf(wo, wi),
         }
     }
 
@@ -88,6 +92,7 @@ impl Bsdf {
             Self::Dielectric(bsdf) => bsdf.sample(wo, lobe, u),
             Self::ThinDielectric(bsdf) => bsdf.sample(wo, lobe),
             Self::CoatedDiffuse(bsdf) => bsdf.sample(wo, lobe, u),
+            Self::CoatedConductor(bsdf) => bsdf.sample(wo, lobe, u),
         }
     }
 
@@ -98,6 +103,7 @@ impl Bsdf {
             Self::Conductor(bsdf) => bsdf.facets.is_smooth(),
             Self::Dielectric(bsdf) => bsdf.is_delta(),
             Self::ThinDielectric(_) => true,
+            Self::CoatedConductor(bsdf) => bsdf.is_delta(),
         }
     }
 
@@ -110,6 +116,7 @@ impl Bsdf {
             Self::Conductor(bsdf) => bsdf.fresnel(1.0),
             Self::Dielectric(_) | Self::ThinDielectric(_) => Spectrum::WHITE,
             Self::CoatedDiffuse(bsdf) => bsdf.albedo_estimate(),
+            Self::CoatedConductor(bsdf) => bsdf.albedo_estimate(),
         }
     }
 
@@ -118,16 +125,19 @@ impl Bsdf {
     /// 0.3. A thin pane stays as it is: light goes straight through it.
     #[must_use]
     pub fn regularized(self) -> Self {
+        let metal = |bsdf: Conductor| Conductor { facets: bsdf.facets.regularized(), ..bsdf };
+        let glass = |bsdf: Dielectric| Dielectric { facets: bsdf.facets.regularized(), ..bsdf };
+        let coated = |coat: Coat| Coat { face: glass(coat.face), ..coat };
         match self {
             Self::Diffuse(_) | Self::DiffuseTransmission(_) | Self::ThinDielectric(_) => self,
-            Self::Conductor(bsdf) => Self::Conductor(Conductor { facets: bsdf.facets.regularized(), ..bsdf }),
-            Self::Dielectric(bsdf) => {
-                Self::Dielectric(Dielectric { facets: bsdf.facets.regularized(), ..bsdf })
+            Self::Conductor(bsdf) => Self::Conductor(metal(bsdf)),
+            Self::Dielectric(bsdf) => Self::Dielectric(glass(bsdf)),
+            Self::CoatedDiffuse(bsdf) => {
+                Self::CoatedDiffuse(CoatedDiffuse { coat: coated(bsdf.coat), ..bsdf })
             }
-            Self::CoatedDiffuse(bsdf) => Self::CoatedDiffuse(CoatedDiffuse {
-                coat: Dielectric { facets: bsdf.coat.facets.regularized(), ..bsdf.coat },
-                ..bsdf
-            }),
+            Self::CoatedConductor(bsdf) => {
+                Self::CoatedConductor(CoatedConductor { base: metal(bsdf.base), coat: coated(bsdf.coat) })
+            }
         }
     }
 }

@@ -18,7 +18,7 @@ mod texture;
 
 pub use bsdf::{Bsdf, BsdfSample, Scatter};
 pub use frame::{LocalDir, ShadingFrame};
-pub use material::{LocalSurface, Material, MaterialKind, Roughness};
+pub use material::{LocalSurface, Material, MaterialKind, Metal, Roughness};
 pub use mipmap::{ImageFilter, MipMap, MipMapOptions, Wrap};
 pub use spectrum::{NamedSpectrum, SpectrumValue};
 pub use texture::{

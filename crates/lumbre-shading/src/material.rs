@@ -5,7 +5,7 @@ use std::sync::Arc;
 use lumbre_math::random::{combine, hash_dvec3, hash_vec3, uniform_f32};
 use lumbre_math::{Vec2, Vec3};
 
-use crate::coated::CoatedDiffuse;
+use crate::coated::{Coat, CoatedConductor, CoatedDiffuse};
 use crate::conductor::Conductor;
 use crate::dielectric::{Dielectric, ThinDielectric};
 use crate::diffuse::{Diffuse, DiffuseTransmission};
@@ -23,6 +23,30 @@ pub struct Roughness {
     pub v: Arc<FloatTexture>,
     /// Whether α is the square root of the given value, or the value.
     pub remap: bool,
+}
+
+/// A metal under a coat: by its index of refraction, or by its reflectance at normal incidence. Both are meant against
+/// vacuum; under the coat, the index over that of the coat counts.
+#[derive(Clone, Debug)]
+pub enum Metal {
+    /// By its index of refraction.
+    Index {
+        /// Real part.
+        eta: Arc<SpectrumTexture>,
+        /// Imaginary part.
+        k: Arc<SpectrumTexture>,
+    },
+    /// By its reflectance.
+    Reflectance(Arc<SpectrumTexture>),
+}
+
+impl Metal {
+    fn conductor(&self, at: &TextureContext, facets: Microfacets) -> Conductor {
+        match self {
+            Self::Index { eta, k } => by_index(eta, k, at, facets),
+            Self::Reflectance(reflectance) => by_reflectance(reflectance, at, facets),
+        }
+    }
 }
 
 /// How a surface looks, as a function of place.
@@ -91,6 +115,27 @@ pub enum MaterialKind {
         /// Random walks an evaluation.
         samples: u32,
     },
+    /// A metal under a rough dielectric coat with a medium between.
+    CoatedConductor {
+        /// The base.
+        metal: Metal,
+        /// Of the base.
+        roughness: Roughness,
+        /// Of the coat.
+        interface_roughness: Roughness,
+        /// Of the coat.
+        thickness: Arc<FloatTexture>,
+        /// Of the coat.
+        interface_eta: f32,
+        /// Henyey–Greenstein asymmetry of the medium.
+        g: Arc<FloatTexture>,
+        /// Single-scattering albedo of the medium.
+        albedo: Arc<SpectrumTexture>,
+        /// Bounces of the random walk.
+        max_depth: u32,
+        /// Random walks an evaluation.
+        samples: u32,
+    },
     /// Lambert on both sides.
     DiffuseTransmission {
         /// Albedo of reflection.
@@ -113,12 +158,13 @@ pub enum MaterialKind {
 
 impl MaterialKind {
     /// The names of the kinds in the scene language, in the order of this enum.
-    pub const NAMES: [&str; 8] = [
+    pub const NAMES: [&str; 9] = [
         "diffuse",
         "conductor",
         "dielectric",
         "thindielectric",
         "coateddiffuse",
+        "coatedconductor",
         "diffusetransmission",
         "mix",
         "interface",
@@ -132,6 +178,7 @@ impl MaterialKind {
             Self::Dielectric { .. } => "dielectric",
             Self::ThinDielectric { .. } => "thindielectric",
             Self::CoatedDiffuse { .. } => "coateddiffuse",
+            Self::CoatedConductor { .. } => "coatedconductor",
             Self::DiffuseTransmission { .. } => "diffusetransmission",
             Self::Mix { .. } => "mix",
             Self::Interface => "interface",
@@ -215,14 +262,12 @@ impl Material {
             MaterialKind::Diffuse { reflectance } => {
                 Bsdf::Diffuse(Diffuse { reflectance: albedo(reflectance.evaluate(at)) })
             }
-            MaterialKind::Conductor { eta, k, roughness } => Bsdf::Conductor(Conductor {
-                eta: eta.evaluate(at).map(|eta| eta.max(0.0)),
-                k: k.evaluate(at).map(|k| k.max(0.0)),
-                facets: roughness.facets(at),
-            }),
-            MaterialKind::ConductorReflectance { reflectance, roughness } => Bsdf::Conductor(
-                Conductor::from_reflectance(albedo(reflectance.evaluate(at)), roughness.facets(at)),
-            ),
+            MaterialKind::Conductor { eta, k, roughness } => {
+                Bsdf::Conductor(by_index(eta, k, at, roughness.facets(at)))
+            }
+            MaterialKind::ConductorReflectance { reflectance, roughness } => {
+                Bsdf::Conductor(by_reflectance(reflectance, at, roughness.facets(at)))
+            }
             MaterialKind::Dielectric { eta, roughness } => {
                 Bsdf::Dielectric(Dielectric { eta: index(*eta), facets: roughness.facets(at) })
             }
@@ -237,14 +282,42 @@ impl Material {
                 max_depth,
                 samples,
             } => Bsdf::CoatedDiffuse(CoatedDiffuse {
-                reflectance: albedo(reflectance.evaluate(at)),
-                coat: Dielectric { eta: index(*eta), facets: roughness.facets(at) },
-                thickness: thickness.evaluate(at).max(0.0),
-                g: asymmetry(g.evaluate(at)),
-                albedo: albedo(medium.evaluate(at)),
-                max_depth: *max_depth,
-                samples: *samples,
+                base: Diffuse { reflectance: albedo(reflectance.evaluate(at)) },
+                coat: Coat {
+                    face: Dielectric { eta: index(*eta), facets: roughness.facets(at) },
+                    thickness: thickness.evaluate(at).max(0.0),
+                    g: asymmetry(g.evaluate(at)),
+                    albedo: albedo(medium.evaluate(at)),
+                    max_depth: *max_depth,
+                    samples: *samples,
+                },
             }),
+            MaterialKind::CoatedConductor {
+                metal,
+                roughness,
+                interface_roughness,
+                thickness,
+                interface_eta,
+                g,
+                albedo: medium,
+                max_depth,
+                samples,
+            } => {
+                let interface_eta = index(*interface_eta);
+                let base = metal.conductor(at, roughness.facets(at));
+                Bsdf::CoatedConductor(CoatedConductor {
+                    // Both parts of the index were given against vacuum.
+                    base: Conductor { eta: base.eta / interface_eta, k: base.k / interface_eta, ..base },
+                    coat: Coat {
+                        face: Dielectric { eta: interface_eta, facets: interface_roughness.facets(at) },
+                        thickness: thickness.evaluate(at).max(0.0),
+                        g: asymmetry(g.evaluate(at)),
+                        albedo: albedo(medium.evaluate(at)),
+                        max_depth: *max_depth,
+                        samples: *samples,
+                    },
+                })
+            }
             MaterialKind::DiffuseTransmission { reflectance, transmittance, scale } => {
                 Bsdf::DiffuseTransmission(DiffuseTransmission {
                     reflectance: albedo(reflectance.evaluate(at) * *scale),
@@ -286,6 +359,20 @@ impl Roughness {
         let v = if Arc::ptr_eq(&self.u, &self.v) { u } else { alpha(&self.v) };
         Microfacets::new(u, v)
     }
+}
+
+fn by_index(
+    eta: &SpectrumTexture,
+    k: &SpectrumTexture,
+    at: &TextureContext,
+    facets: Microfacets,
+) -> Conductor {
+    let not_negative = |c: Spectrum| c.map(|c| c.max(0.0));
+    Conductor { eta: not_negative(eta.evaluate(at)), k: not_negative(k.evaluate(at)), facets }
+}
+
+fn by_reflectance(reflectance: &SpectrumTexture, at: &TextureContext, facets: Microfacets) -> Conductor {
+    Conductor::from_reflectance(albedo(reflectance.evaluate(at)), facets)
 }
 
 /// Each lane within [0, 1]; 0 for what is not a number.

@@ -9,7 +9,7 @@ use std::f64::consts::{PI, TAU};
 
 use lumbre_math::random::RandomStream;
 use lumbre_math::{Vec2, Vec3};
-use lumbre_shading::coated::CoatedDiffuse;
+use lumbre_shading::coated::{Coat, CoatedConductor, CoatedDiffuse};
 use lumbre_shading::conductor::Conductor;
 use lumbre_shading::dielectric::{Dielectric, ThinDielectric};
 use lumbre_shading::diffuse::{Diffuse, DiffuseTransmission};
@@ -49,16 +49,25 @@ fn glass(eta: f32, alpha: (f32, f32)) -> Bsdf {
     Bsdf::Dielectric(Dielectric { eta, facets: Microfacets::new(alpha.0, alpha.1) })
 }
 
-fn coated(alpha: (f32, f32), albedo: f32, samples: u32) -> CoatedDiffuse {
-    CoatedDiffuse {
-        reflectance: Spectrum::new(0.8, 0.5, 0.1),
-        coat: Dielectric { eta: GLASS, facets: Microfacets::new(alpha.0, alpha.1) },
+fn coat(alpha: (f32, f32), albedo: f32, samples: u32) -> Coat {
+    Coat {
+        face: Dielectric { eta: GLASS, facets: Microfacets::new(alpha.0, alpha.1) },
         thickness: 0.3,
         g: 0.4,
         albedo: Spectrum::splat(albedo),
         max_depth: 10,
         samples,
     }
+}
+
+fn coated(alpha: (f32, f32), albedo: f32, samples: u32) -> CoatedDiffuse {
+    let base = Diffuse { reflectance: Spectrum::new(0.8, 0.5, 0.1) };
+    CoatedDiffuse { base, coat: coat(alpha, albedo, samples) }
+}
+
+fn coated_metal(alpha: (f32, f32), metal: (f32, f32), albedo: f32) -> CoatedConductor {
+    let Bsdf::Conductor(base) = gold(metal) else { unreachable!() };
+    CoatedConductor { base, coat: coat(alpha, albedo, 1) }
 }
 
 /// A BSDF under its name.
@@ -90,7 +99,28 @@ fn all() -> Vec<(String, Bsdf)> {
             list.push((format!("coateddiffuse {alpha:?} {albedo}"), bsdf));
         }
     }
+    for alpha in [(0.0, 0.0), (0.1, 0.2)] {
+        for metal in [(0.0, 0.0), (0.05, 0.3), (0.4, 0.4)] {
+            for albedo in [0.0, 0.6] {
+                let bsdf = Bsdf::CoatedConductor(coated_metal(alpha, metal, albedo));
+                list.push((format!("coatedconductor {alpha:?} {metal:?} {albedo}"), bsdf));
+            }
+        }
+    }
     list
+}
+
+/// The same with so many walks an evaluation; `None` for a BSDF without walks.
+fn with_walks(bsdf: Bsdf, samples: u32) -> Option<Bsdf> {
+    match bsdf {
+        Bsdf::CoatedDiffuse(b) => {
+            Some(Bsdf::CoatedDiffuse(CoatedDiffuse { coat: Coat { samples, ..b.coat }, ..b }))
+        }
+        Bsdf::CoatedConductor(b) => {
+            Some(Bsdf::CoatedConductor(CoatedConductor { coat: Coat { samples, ..b.coat }, ..b }))
+        }
+        _ => None,
+    }
 }
 
 fn numbers(random: &mut RandomStream) -> (f32, Vec2) {
@@ -132,7 +162,7 @@ fn integrate(f: &dyn Fn(LocalDir) -> f64, z: (f64, f64), phi: (f64, f64), depth:
 
 const RINGS: usize = 20;
 const SECTORS: usize = 24;
-const SAMPLES: u32 = 200_000;
+const SAMPLES: u32 = 100_000;
 
 /// The probability of each cell of the sphere by the density, and the counts of each by sampling.
 fn histogram(bsdf: &Bsdf, wo: LocalDir, seed: u64) -> (Vec<f64>, Vec<u32>, u32) {
@@ -315,13 +345,12 @@ fn light_goes_back_the_way_it_came() {
     let mut count = 0;
     for (name, bsdf) in all() {
         // A random walk is reciprocal in the mean.
-        let (bsdf, pairs, tolerance, floor) = match bsdf {
-            Bsdf::CoatedDiffuse(coat) => {
-                (Bsdf::CoatedDiffuse(CoatedDiffuse { samples: 40_000, ..coat }), 6, 0.05, 1e-4)
-            }
+        let (bsdf, pairs, tolerance, floor) = match with_walks(bsdf, 120_000) {
+            Some(walks) => (walks, 3, 0.08, 1e-2),
             // Next to the critical angle the little that crosses is a difference of nearly equal numbers.
-            other => (other, 3_000, 2e-3, 1e-2),
+            None => (bsdf, 3_000, 2e-3, 1e-2),
         };
+        let opaque = with_walks(bsdf, 1).is_some();
         let eta = if let Bsdf::Dielectric(glass) = bsdf { glass.eta } else { 1.0 };
         for _ in 0..pairs {
             let mut direction = || {
@@ -331,7 +360,7 @@ fn light_goes_back_the_way_it_came() {
                 local(Vec3::new(r * cos, r * sin, z))
             };
             let (a, mut b) = (direction(), direction());
-            if matches!(bsdf, Bsdf::CoatedDiffuse(_)) && !a.same_hemisphere(b) {
+            if opaque && !a.same_hemisphere(b) {
                 b = -b;
             }
             if a.abs_cos_theta() < 0.05 || b.abs_cos_theta() < 0.05 {
@@ -524,7 +553,7 @@ fn a_smooth_clear_coat_has_the_value_of_the_closed_form() {
     // All the bounces between a diffuse base and a smooth face: T(o) T(i) ρ / (π η² (1 − ρ R)).
     let inner = internal_reflectance(GLASS);
     let mut coat = coated((0.0, 0.0), 0.0, 100_000);
-    (coat.thickness, coat.max_depth) = (0.0, 200);
+    (coat.coat.thickness, coat.coat.max_depth) = (0.0, 200);
     let mut count = 0;
     for (wo, wi) in [
         (Vec3::new(0.1, 0.2, 0.9), Vec3::new(-0.5, 0.3, 0.6)),
@@ -534,7 +563,7 @@ fn a_smooth_clear_coat_has_the_value_of_the_closed_form() {
         let (wo, wi) = (local(wo), local(wi));
         let through = |w: LocalDir| 1.0 - f64::from(fresnel::dielectric(w.abs_cos_theta(), GLASS));
         let ours = coat.eval(wo, wi).to_array();
-        for (ours, rho) in ours.into_iter().zip(coat.reflectance.to_array()) {
+        for (ours, rho) in ours.into_iter().zip(coat.base.reflectance.to_array()) {
             let rho = f64::from(rho);
             let expected = through(wo) * through(wi) * rho * f64::from(wi.abs_cos_theta())
                 / (PI * f64::from(GLASS * GLASS) * (1.0 - rho * inner));
@@ -561,9 +590,9 @@ fn a_nearly_smooth_coat_is_nearly_the_smooth_one() {
 fn a_medium_without_base_scatters_as_its_phase_function_says() {
     // A thin layer under no border at all over a black base: single scattering, whose closed form is known.
     let mut coat = coated((0.0, 0.0), 1.0, 400_000);
-    coat.coat.eta = 1.0;
-    coat.reflectance = Spectrum::BLACK;
-    (coat.thickness, coat.g, coat.max_depth) = (0.01, 0.6, 1);
+    coat.coat.face.eta = 1.0;
+    coat.base.reflectance = Spectrum::BLACK;
+    (coat.coat.thickness, coat.coat.g, coat.coat.max_depth) = (0.01, 0.6, 1);
     let (wo, wi) = (local(Vec3::new(0.1, 0.2, 0.9)), local(Vec3::new(-0.5, 0.3, 0.6)));
     let (cos_o, cos_i) = (f64::from(wo.cos_theta()), f64::from(wi.cos_theta()));
     let cos = -f64::from(wo.vec().dot(wi.vec()));
@@ -577,6 +606,47 @@ fn a_medium_without_base_scatters_as_its_phase_function_says() {
 }
 
 #[test]
+fn two_smooth_layers_are_a_mirror_and_their_bounces_the_geometric_series() {
+    let metal = coated_metal((0.0, 0.0), (0.0, 0.0), 0.0);
+    let mut endless = metal;
+    (endless.coat.thickness, endless.coat.max_depth) = (0.2, 200);
+    let mut count = 0;
+    for wo in views() {
+        let sample = Bsdf::CoatedConductor(endless).sample(wo, 0.4, Vec2::new(0.3, 0.6)).unwrap();
+        assert_eq!(sample.scatter, Scatter::Delta);
+        let v = wo.vec();
+        assert!((sample.wi.vec() - Vec3::new(-v.x, -v.y, v.z)).length() < 1e-6);
+        let cos_o = wo.abs_cos_theta();
+        let cos_t = (1.0 - (1.0 - cos_o * cos_o) / (GLASS * GLASS)).sqrt();
+        let f = f64::from(fresnel::dielectric(cos_o, GLASS));
+        let pass = f64::from((-0.4 / cos_t).exp());
+        let channels = sample.weight.to_array().into_iter().zip(metal.base.fresnel(cos_t).to_array());
+        for (ours, r) in channels {
+            let r = f64::from(r) * pass;
+            let expected = f + (1.0 - f).powi(2) * r / (1.0 - r * f);
+            assert!((f64::from(ours) - expected).abs() < 1e-4, "{ours} {expected}");
+            count += 1;
+        }
+    }
+    assert_eq!(count, 21);
+}
+
+#[test]
+fn a_slightly_rough_coated_metal_reflects_as_much_as_a_smooth_one() {
+    for wo in [Vec3::new(0.1, 0.2, 0.9), Vec3::new(-0.5, 0.3, 0.6)].map(local) {
+        let share = |coat, metal| {
+            let bsdf = Bsdf::CoatedConductor(coated_metal((coat, coat), (metal, metal), 0.0));
+            furnace(&bsdf, wo, 400_000, 11)
+        };
+        let smooth = share(0.0, 0.0);
+        for (coat, metal) in [(0.0, 0.02), (0.02, 0.0), (0.02, 0.02)] {
+            let rough = share(coat, metal);
+            assert!((rough / smooth - 1.0).abs() < 0.015, "{coat} {metal}: {rough} {smooth}");
+        }
+    }
+}
+
+#[test]
 fn a_bsdf_stays_small() {
-    assert!(size_of::<Bsdf>() <= 80, "{}", size_of::<Bsdf>());
+    assert!(size_of::<Bsdf>() <= 96, "{}", size_of::<Bsdf>());
 }
