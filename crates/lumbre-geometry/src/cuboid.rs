@@ -48,6 +48,9 @@ impl Cuboid {
         let (at_low, at_high) = (to_low / d, to_high / d);
         let (mut enter, mut leave) = (at_low.min(at_high), at_low.max(at_high));
         let is_across = d.cmpeq(DVec3::ZERO);
+        if ray.origin.is_nan() || d.is_nan() || is_across.all() {
+            return None;
+        }
         if is_across.any() {
             // Between two faces that it runs along the ray is bounded by the others alone.
             let is_between = to_low.cmple(DVec3::ZERO) & to_high.cmpge(DVec3::ZERO);
@@ -56,12 +59,6 @@ impl Cuboid {
             }
             enter = DVec3::select(is_across, DVec3::NEG_INFINITY, enter);
             leave = DVec3::select(is_across, DVec3::INFINITY, leave);
-        }
-        if at_low.is_nan() || at_high.is_nan() {
-            let comes_from_zero = is_across.all() || !(ray.origin.is_finite() && d.is_finite());
-            if comes_from_zero {
-                return None;
-            }
         }
         let first = |a: (f64, u32), b: (f64, u32)| if b.0 < a.0 { b } else { a };
         let last = |a: (f64, u32), b: (f64, u32)| if b.0 > a.0 { b } else { a };

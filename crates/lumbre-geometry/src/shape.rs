@@ -218,3 +218,11 @@ pub(crate) mod check {
         if accepted { Ok(found) } else { Err(ShapeError::OutOfRange { parameter, found, expected }) }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn a_shape_fits_in_two_cache_lines_and_a_word() {
+        assert!(size_of::<super::Shape>() <= 136, "{}", size_of::<super::Shape>());
+    }
+}

@@ -1,11 +1,11 @@
 //! The quadratic equation without cancellation.
 
-/// `a * b - c * d` with a relative error of at most 2 units in the last place, however nearly the products cancel.
+/// `a * b - c * d` with a relative error of at most 2⁻⁵², however nearly the products cancel; its sign is always right.
 ///
-/// After W. Kahan, "On the cost of floating-point computation without extra-precise arithmetic", 2004; see also C.-P.
-/// Jeannerod, N. Louvet, J.-M. Muller, "Further analysis of Kahan's algorithm for the accurate computation of 2 × 2
-/// determinants", Mathematics of Computation, 2013. We take the rounding errors of *both* products, which are exact
-/// numbers, so that builds with and without a fused multiply-add return the same bits.
+/// The rounding errors of both products, which are exact numbers, are added to the difference of the rounded products: the
+/// method of Cornea, Harrison and Tang, whose bound is that of C.-P. Jeannerod, "A radix-independent error analysis of the
+/// Cornea–Harrison–Tang method", ACM Transactions on Mathematical Software, 2016. Kahan's better known form is a little
+/// cheaper, but needs a fused multiply-add; this returns the same bits with one and without.
 #[inline]
 pub fn dop(a: f64, b: f64, c: f64, d: f64) -> f64 {
     let (ab, ab_error) = two_product(a, b);
