@@ -424,7 +424,7 @@ impl Csg {
         let first_part = self.first_part[leaf as usize];
         let flipped = self.places[leaf as usize].1;
         let encode = |root: &Root| Root {
-            part: (first_part + root.part) << 1 | u32::from(flipped),
+            part: first_part.saturating_add(root.part) << 1 | u32::from(flipped),
             multiplicity: 1,
             ..*root
         };

@@ -47,7 +47,7 @@ impl NearLine {
         let root = |s: f64, multiplicity: u8| {
             let t = self.shift + s;
             // An infinite root is one that the quadratic does not have.
-            let counts = s.is_finite() && ray.contains(t) && keeps(self.at(s));
+            let counts = t.is_finite() && ray.contains(t) && keeps(self.at(s));
             counts.then_some(Root { multiplicity, ..Root::at(t) })
         };
         let near = root(first, if touches { 2 } else { 1 });

@@ -181,12 +181,16 @@ impl Torus {
     /// zero), with a tube of radius `minor`.
     ///
     /// # Errors
-    /// [`ShapeError`] unless everything is finite, both radii are greater than 0 and the axis is not zero.
+    /// [`ShapeError`] unless everything is finite, both radii are from 1e-70 to 1e70 and the axis is not zero.
     pub fn new(center: DVec3, axis: DVec3, major: f64, minor: f64) -> Result<Self, ShapeError> {
         let center = check::finite("center", center)?;
         let axis = check::direction("axis", axis)?;
-        let major = check::positive("majorradius", major)?;
-        let minor = check::positive("minorradius", minor)?;
+        let radius = |name, found: f64| {
+            let fourth_powers_are_numbers = (1e-70..=1e70).contains(&found);
+            check::within(name, found, fourth_powers_are_numbers, "a number from 1e-70 to 1e70")
+        };
+        let major = radius("majorradius", major)?;
+        let minor = radius("minorradius", minor)?;
         let (e1, e2) = orthonormal_basis(axis);
         Ok(Self { center, e1, e2, axis, upright: axis == DVec3::Z, major, minor })
     }
@@ -362,7 +366,7 @@ impl Torus {
         let line = self.line(ray)?;
         let mut found = None;
         self.crossings(&line, ray.t_min, |t, multiplicity| {
-            if ray.contains(t) {
+            if ray.contains(t) && t.is_finite() {
                 found = Some(Root { multiplicity, ..Root::at(t) });
             }
             found.is_none() && t <= ray.t_max
@@ -376,7 +380,7 @@ impl Torus {
             return;
         };
         self.crossings(&line, ray.t_min, |t, multiplicity| {
-            if ray.contains(t) {
+            if ray.contains(t) && t.is_finite() {
                 out.push(Root { multiplicity, ..Root::at(t) });
             }
             t <= ray.t_max

@@ -195,7 +195,7 @@ impl ThreeRoots {
         let x = -(left + right);
         let slope = 3.0 * (x - 1.0) * (x + 1.0);
         let polished = x - ((x * x - 3.0) * x + 2.0 * self.h) / slope;
-        let middle = if (polished - x).abs() <= 1e-6 { polished.clamp(left, right) } else { x };
+        let middle = if (polished - x).abs() <= 1e-6 { polished.max(left).min(right) } else { x };
         (self.e * middle, self.e * right)
     }
 
@@ -267,7 +267,7 @@ pub fn bracketed_root(low: f64, high: f64, guess: f64, rising: bool, at: impl Fn
         let negligible = step * step * step <= 0.25 * f64::EPSILON * x.abs() * newtons * newtons;
         let done = negligible && step <= 0.1 * newtons;
         if done || step <= f64::EPSILON * x.abs() || (step <= 1e-13 * scale && step >= 0.25 * previous) {
-            return newton.clamp(low, high);
+            return newton.max(low).min(high);
         }
         let is_newton = low < newton && newton < high && step <= 0.5 * previous;
         let next = if is_newton { newton } else { 0.5 * (low + high) };
