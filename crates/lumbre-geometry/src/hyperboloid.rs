@@ -32,7 +32,8 @@ impl Hyperboloid {
     /// The surface swept by the segment from `p1` to `p2` turning by `phimax` degrees, x towards y.
     ///
     /// # Errors
-    /// [`ShapeError`] unless the ends are finite, at different heights, not both on the axis, and `phimax` is in (0, 360].
+    /// [`ShapeError`] unless the ends are finite, at different heights, not both on the axis, and `phimax` is in (0, 360];
+    /// and when the fourth powers of its lengths are beyond all numbers.
     pub fn new(p1: DVec3, p2: DVec3, phimax: f64) -> Result<Self, ShapeError> {
         let p1 = check::finite("p1", p1)?;
         let p2 = check::finite("p2", p2)?;
@@ -48,7 +49,13 @@ impl Hyperboloid {
             return Err(ShapeError::Degenerate("p1 and p2 of the hyperboloid are both on the axis"));
         }
         let (start, middle, end) = (flat.length_squared(), flat.dot(flat_along), flat_along.length_squared());
-        Ok(Self { p1, along, phi_max, start, middle, end })
+        let hyperboloid = Self { p1, along, phi_max, start, middle, end };
+        let (square, _, constant) = hyperboloid.element();
+        let is_measurable = square.is_finite() && constant.is_finite() && square.max(constant).is_normal();
+        if !is_measurable {
+            return Err(ShapeError::Degenerate("the hyperboloid is too large or too small to have an area"));
+        }
+        Ok(hyperboloid)
     }
 
     /// The segment's point at `v`, before it turns.

@@ -42,7 +42,11 @@ impl Paraboloid {
         if z_min == z_max || !bend.is_normal() {
             return Err(ShapeError::Degenerate("nothing of the paraboloid lies between zmin and zmax"));
         }
-        Ok(Self { bend, z_min, z_max, phi_max })
+        let paraboloid = Self { bend, z_min, z_max, phi_max };
+        if !paraboloid.area().is_normal() {
+            return Err(ShapeError::Degenerate("the paraboloid is too large or too small to have an area"));
+        }
+        Ok(paraboloid)
     }
 
     /// Where the surface begins: it has nothing below 0.

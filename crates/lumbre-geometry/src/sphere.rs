@@ -105,7 +105,8 @@ impl Sphere {
     #[inline]
     pub fn closest(&self, ray: &Ray) -> Option<Root> {
         let (first, second) = self.crossings(ray)?;
-        let hits = |t: f64| ray.contains(t) && (self.is_whole() || self.keeps(self.arm(ray, t)));
+        let hits =
+            |t: f64| t.is_finite() && ray.contains(t) && (self.is_whole() || self.keeps(self.arm(ray, t)));
         let t = if hits(first) {
             first
         } else if hits(second) {
@@ -121,7 +122,8 @@ impl Sphere {
         let Some((first, second)) = self.crossings(ray) else {
             return;
         };
-        let hits = |t: f64| ray.contains(t) && (self.is_whole() || self.keeps(self.arm(ray, t)));
+        let hits =
+            |t: f64| t.is_finite() && ray.contains(t) && (self.is_whole() || self.keeps(self.arm(ray, t)));
         if first == second {
             out.extend(hits(first).then_some(Root { multiplicity: 2, ..Root::at(first) }));
         } else {
