@@ -650,3 +650,31 @@ fn a_slightly_rough_coated_metal_reflects_as_much_as_a_smooth_one() {
 fn a_bsdf_stays_small() {
     assert!(size_of::<Bsdf>() <= 96, "{}", size_of::<Bsdf>());
 }
+
+#[test]
+fn regularizing_roughens_mirrors_and_leaves_rough_surfaces_alone() {
+    let Bsdf::Conductor(metal) = gold((0.0, 0.0)).regularized() else { unreachable!() };
+    assert_eq!(metal.facets.alpha(), Vec2::splat(0.1));
+    let Bsdf::Dielectric(rough) = glass(GLASS, (0.12, 0.25)).regularized() else { unreachable!() };
+    assert_eq!(rough.facets.alpha(), Vec2::new(0.24, 0.3));
+    assert_eq!(glass(GLASS, (0.4, 0.5)).regularized(), glass(GLASS, (0.4, 0.5)));
+    let mirror = Bsdf::CoatedConductor(coated_metal((0.0, 0.0), (0.0, 0.0), 0.0));
+    assert!(mirror.is_delta() && !mirror.regularized().is_delta());
+}
+
+#[test]
+fn a_coat_looks_the_same_from_both_sides() {
+    let mut count = 0;
+    for bsdf in all().into_iter().filter_map(|(_, bsdf)| with_walks(bsdf, 3)) {
+        for wo in views() {
+            let (lobe, u) = (0.97, Vec2::new(0.3, 0.6));
+            let (Some(above), Some(below)) = (bsdf.sample(wo, lobe, u), bsdf.sample(-wo, lobe, u)) else {
+                continue;
+            };
+            assert_eq!((above.wi.vec(), above.weight), (-below.wi.vec(), below.weight));
+            assert_eq!(bsdf.eval(wo, above.wi), bsdf.eval(-wo, -above.wi));
+            count += 1;
+        }
+    }
+    assert!(count > 60, "{count}");
+}
