@@ -8,7 +8,7 @@ use std::hint::black_box;
 use std::sync::Arc;
 use std::time::Instant;
 
-use lumbre_geometry::{PlacedShape, Ray, Shape, Sphere, Triangle};
+use lumbre_geometry::{Cone, Cuboid, Cylinder, PlacedShape, Plane, Ray, Shape, Sphere, Torus, Triangle};
 use lumbre_kernel::{Accel, BuildOptions, Geometry, GeometryKind, Instance, TriangleMesh};
 use lumbre_math::{DVec3, Transform};
 
@@ -40,9 +40,9 @@ fn main() {
     );
     let mut scenes: Vec<(&str, Vec<GeometryKind>)> = vec![
         ("mesh 100k", vec![mesh(224)]),
-        ("mixed field 625", field(25, |random, i, at| mixed(random, i, at))),
-        ("sphere field 625", field(25, |random, _, at| sphere(random, at))),
-        ("sphere field 40k", field(200, |random, _, at| sphere(random, at))),
+        ("mixed field 625", field(25, mixed)),
+        ("sphere field 625", field(25, sphere)),
+        ("sphere field 40k", field(200, sphere)),
         ("instances 10k × 100k", instances(100)),
     ];
     if !is_quick {
@@ -175,7 +175,8 @@ fn field(n: usize, make: impl Fn(&mut Random, usize, Transform) -> PlacedShape) 
             Transform::translate(center) * Transform::scale(DVec3::splat(0.4 * step)).expect("not flat");
         kinds.push(GeometryKind::Shape(make(&mut random, i, place)));
     }
-    kinds.push(ground());
+    let ground = Plane::new(DVec3::ZERO, DVec3::Y).expect("a normal");
+    kinds.push(GeometryKind::Shape(PlacedShape::new(ground.into(), Transform::IDENTITY)));
     kinds
 }
 
@@ -187,7 +188,7 @@ fn ground() -> GeometryKind {
     GeometryKind::Mesh(Arc::new(TriangleMesh { origin: DVec3::ZERO, positions, indices }))
 }
 
-fn sphere(random: &mut Random, place: Transform) -> PlacedShape {
+fn sphere(random: &mut Random, _: usize, place: Transform) -> PlacedShape {
     let size = 0.5 + 0.5 * random.unit();
     // In world space: no ray is moved for it.
     let radius = size * place.vector(DVec3::X).x;
@@ -199,8 +200,13 @@ fn sphere(random: &mut Random, place: Transform) -> PlacedShape {
 
 fn mixed(random: &mut Random, i: usize, place: Transform) -> PlacedShape {
     let turn = Transform::rotate(random.direction(), 360.0 * random.unit()).expect("an axis");
-    let shape: Shape = match i % 2 {
-        0 => return sphere(random, place),
+    let (low, high) = (DVec3::new(0.0, -0.8, 0.0), DVec3::new(0.0, 0.8, 0.0));
+    let shape: Shape = match i % 6 {
+        0 => return sphere(random, i, place),
+        1 => Cuboid::new(DVec3::splat(-0.6), DVec3::new(0.6, 0.5, 0.7)).expect("a size").into(),
+        2 => Cylinder::new(low, high, 0.5, true).expect("a radius").into(),
+        3 => Cone::new(low, high, 0.7, 0.0, true).expect("a radius").into(),
+        4 => Torus::new(DVec3::ZERO, DVec3::Y, 0.7, 0.25).expect("two radii").into(),
         _ => {
             Triangle::new(DVec3::new(-0.9, -0.5, 0.1), DVec3::new(0.9, -0.6, 0.0), DVec3::new(0.1, 0.9, -0.2))
                 .expect("three corners")

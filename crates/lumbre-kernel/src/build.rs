@@ -54,10 +54,7 @@ impl Bounds {
 
     #[inline(always)]
     fn grow_to(&mut self, point: [f32; 3]) {
-        for axis in 0..3 {
-            self.min[axis] = lesser(self.min[axis], point[axis]);
-            self.max[axis] = greater(self.max[axis], point[axis]);
-        }
+        self.grow(&Self { min: point, max: point });
     }
 
     /// Half the area; 0 when empty.

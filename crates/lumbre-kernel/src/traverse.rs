@@ -221,7 +221,8 @@ impl<S: Search> Task for Traversal<'_, '_, S> {
             let first = (reference & tag::PLACE) as usize;
             match reference >> tag::SHIFT {
                 tag::TRIANGLES => {
-                    if meet_blocks::<L, S>(&mut frame, first, &place, search, touches) {
+                    let is_over = meet_blocks::<L, S>(&mut frame, first, &place, search, touches);
+                    if is_over {
                         return true;
                     }
                 }

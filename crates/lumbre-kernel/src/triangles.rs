@@ -200,7 +200,7 @@ fn touch_at_zero(shear: &Shear, corners: [Corner; 3], edges: [Edge; 3]) -> Meeti
 struct Edge {
     value: f64,
     product: f64,
-    // With `is_sided`, the sign for the ray moved by (ε, ε²). Without it the edge is a point (or NaN): no side.
+    // With `is_sided`, the sign for the ray moved by (ε, ε²). Without it the edge is a point: no side.
     is_positive: bool,
     is_sided: bool,
 }
@@ -211,7 +211,7 @@ struct Edge {
 fn edge(p: Corner, q: Corner) -> Edge {
     let (first, second) = (p.x * q.y, p.y * q.x);
     let value = first - second;
-    if value > 0.0 || value < 0.0 {
+    if value != 0.0 {
         return Edge { value, product: first.abs(), is_positive: value > 0.0, is_sided: true };
     }
     edge_at_zero(p, q, first)
@@ -222,7 +222,7 @@ fn edge_at_zero(p: Corner, q: Corner, product: f64) -> Edge {
     let value = p.x.mul_add(q.y, -product) - p.y.mul_add(q.x, -product);
     // (p - m) × (q - m) with m = (ε, ε²) is value + ε (p.y - q.y) + ε² (q.x - p.x).
     let side = [value, p.y - q.y, q.x - p.x].into_iter().find(|&term| term != 0.0).unwrap_or(0.0);
-    Edge { value, product: product.abs(), is_positive: side > 0.0, is_sided: side > 0.0 || side < 0.0 }
+    Edge { value, product: product.abs(), is_positive: side > 0.0, is_sided: side != 0.0 }
 }
 
 /// px qy - py qx within 1.5 ulp (W. Kahan; C.-P. Jeannerod, N. Louvet, J.-M. Muller, Mathematics of Computation 82, 2013).

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use lumbre_geometry::Ray;
 use lumbre_math::{DVec3, Transform};
 
-use super::scenes::{Random, balls, build, cube, mixture, ray, soup};
+use super::scenes::{Random, balls, build, cube, icosphere, mixture, ray, soup};
 use crate::lanes::Level;
 use crate::{Accel, GeometryKind, Hit, Instance, brute};
 
@@ -35,7 +35,7 @@ pub(crate) fn check(accel: &Accel, ray: &Ray) -> usize {
     assert_eq!(every(accel, ray), expected, "{ray:?}");
     assert_eq!(accel.count(ray), expected.len(), "{ray:?}");
 
-    let accept = |hit: &Hit| (hit.id / 7 + hit.primitive + hit.instances.len() as u32) % 3 != 0;
+    let accept = |hit: &Hit| !(hit.id / 7 + hit.primitive + hit.instances.len() as u32).is_multiple_of(3);
     let filtered = expected.iter().find(|hit| accept(hit)).cloned();
     assert_eq!(accel.closest_filtered(ray, accept), filtered, "{ray:?}");
     assert_eq!(accel.any_filtered(ray, accept), filtered.is_some(), "{ray:?}");
@@ -188,17 +188,28 @@ fn an_unusable_ray_misses() {
 #[test]
 fn rays_of_absurd_size_are_answered_as_by_the_loop() {
     let mut random = Random(21);
-    let accel = mixture(&mut random, CENTER, 3.0, 1, true);
-    let mut hits = 0;
-    for _ in 0..500 {
-        let origin = CENTER + random.vector();
-        for size in [1e-320, 1e-300, 1e-150, 1e150, 1e300] {
-            hits += check(&accel, &Ray::new(origin, random.vector() * size));
-            check(&accel, &Ray::new(random.vector() * size, random.vector()));
-            check(&accel, &Ray::new(random.vector() * size, random.vector() * size));
+    let everything = mixture(&mut random, CENTER, 3.0, 1, true);
+    let mut ball = icosphere(2, DVec3::ZERO, 1.2);
+    ball.origin = CENTER;
+    let meshes = build(vec![
+        GeometryKind::Mesh(Arc::new(soup(&mut random, 60, CENTER, 3.0))),
+        GeometryKind::Mesh(Arc::new(ball)),
+        GeometryKind::Custom(Arc::new(balls(&mut random, 10, CENTER, 3.0, None))),
+    ]);
+    for (accel, sizes) in
+        [(&everything, [1e-60, 1e-30, 1e30, 1e60]), (&meshes, [1e-320, 1e-300, 1e150, 1e300])]
+    {
+        let mut hits = 0;
+        for _ in 0..500 {
+            let origin = CENTER + random.vector();
+            for size in sizes {
+                hits += check(accel, &Ray::new(origin, random.vector() * size));
+                check(accel, &Ray::new(random.vector() * size, random.vector()));
+                check(accel, &Ray::new(random.vector() * size, random.vector() * size));
+            }
         }
+        assert!(hits > 1000, "{hits}");
     }
-    assert!(hits > 500, "{hits}");
 }
 
 #[test]

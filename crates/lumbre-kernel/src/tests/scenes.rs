@@ -2,7 +2,10 @@
 
 use std::sync::Arc;
 
-use lumbre_geometry::{Aabb, PlacedShape, Ray, Root, Roots, Shape, Sphere, Surface, Triangle};
+use lumbre_geometry::{
+    Aabb, BilinearPatch, Cone, Cuboid, Cylinder, Disk, Paraboloid, PlacedShape, Plane, Ray, Root, Roots,
+    Shape, Sphere, Surface, Torus, Triangle,
+};
 use lumbre_math::{DVec2, DVec3, Transform, Vec3};
 
 use crate::{Accel, BuildOptions, CustomGeometry, Geometry, GeometryKind, Instance, TriangleMesh};
@@ -246,10 +249,21 @@ pub(crate) fn balls(
 
 /// An exact shape somewhere.
 pub(crate) fn shape(random: &mut Random, center: DVec3, extent: f64) -> PlacedShape {
-    let shape: Shape = if random.unit() < 0.5 {
-        Sphere::new(0.2 * random.vector(), random.between(0.3, 1.3)).unwrap().into()
-    } else {
-        Triangle::new(random.vector(), random.vector(), random.vector()).unwrap().into()
+    let shape: Shape = match random.below(10) {
+        0 => Sphere::new(0.2 * random.vector(), random.between(0.3, 1.3)).unwrap().into(),
+        1 => Triangle::new(random.vector(), random.vector(), random.vector()).unwrap().into(),
+        2 => Cuboid::new(DVec3::new(-0.7, -0.4, -0.9), DVec3::new(0.6, 0.8, 0.3)).unwrap().into(),
+        3 => Cylinder::new(random.vector(), random.vector(), 0.4, random.unit() < 0.5).unwrap().into(),
+        4 => Cone::new(random.vector(), random.vector(), 0.6, random.between(0.0, 0.5), true).unwrap().into(),
+        5 => {
+            Torus::new(0.2 * random.vector(), random.vector(), 0.9, random.between(0.1, 0.5)).unwrap().into()
+        }
+        6 => Disk::new(0.2 * random.vector(), random.vector(), 1.1, random.between(0.0, 0.6)).unwrap().into(),
+        7 => BilinearPatch::new(random.vector(), random.vector(), random.vector(), random.vector())
+            .unwrap()
+            .into(),
+        8 => Paraboloid::new(0.8, 0.1, 1.2, 300.0).unwrap().into(),
+        _ => Sphere::new(DVec3::ZERO, 1.1).unwrap().partial(-0.6, 0.9, 250.0).unwrap().into(),
     };
     let placement = random.placement(center, extent, 0.15 * extent);
     PlacedShape::new(shape, placement)
@@ -267,6 +281,10 @@ pub(crate) fn mixture(random: &mut Random, center: DVec3, extent: f64, depth: u3
     let mut ball = icosphere(1, DVec3::ZERO, 0.4 * extent);
     ball.origin = center;
     kinds.push(GeometryKind::Mesh(Arc::new(ball)));
+    if infinite {
+        let plane = Plane::new(center - 0.6 * extent, random.vector()).unwrap();
+        kinds.push(GeometryKind::Shape(PlacedShape::new(plane.into(), Transform::IDENTITY)));
+    }
     if depth > 0 {
         let inner_center = DVec3::new(3.0, -2.0, 5.0);
         let inner = Arc::new(mixture(random, inner_center, 2.0, depth - 1, infinite && depth == 1));
