@@ -1,4 +1,5 @@
-//! How many rays a second: `cargo run --release -p lumbre-kernel --example kernel_speed [-- --quick]`.
+//! How many rays a second: `cargo run --release -p lumbre-kernel --example kernel_speed [-- [--quick] [NAME]]`, where NAME is a
+//! part of a scene's name.
 //!
 //! Scenes: bumpy spheres of triangles, a field of spheres, the field of mixed shapes on a plane, and an instanced field.
 //! Rays: primary (scanlines of a pinhole camera), bounce (from the primary hits, at random), shadow (from the primary hits
@@ -48,7 +49,8 @@ fn main() {
     if !is_quick {
         scenes.insert(1, ("mesh 1M", vec![mesh(708)]));
     }
-    for (name, kinds) in scenes {
+    let wanted = std::env::args().skip(1).find(|argument| !argument.starts_with("--")).unwrap_or_default();
+    for (name, kinds) in scenes.into_iter().filter(|(name, _)| name.contains(&wanted)) {
         measure(name, kinds, if is_quick { 1 } else { 5 });
     }
 }

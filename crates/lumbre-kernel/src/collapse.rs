@@ -87,6 +87,12 @@ impl<'a> Packer<'a> {
             len += 1;
         }
 
+        // The largest first: where any hit will do, it is the likeliest to have one.
+        children[..len].sort_by(|&a, &b| {
+            let area = |child: usize| self.binary[child].bounds.half_area();
+            area(b).total_cmp(&area(a))
+        });
+
         let place = self.packed.nodes.len();
         let mut node = Node { len: len as u32, ..Node::EMPTY };
         for (lane, &child) in children[..len].iter().enumerate() {

@@ -6,17 +6,35 @@
 #![allow(unsafe_code)]
 
 use crate::node::{BoxRay, Node, WIDTH};
+use crate::stack::{Entries, STACK, stack_entry};
 use crate::triangles::{BLOCK, Shear, TriangleBlock};
 
 /// What a search does eight boxes or four triangles at a time.
 pub(crate) trait Lanes {
-    /// One bit for each child whose box the ray meets; its entry goes to `near`.
-    fn meet_boxes(node: &Node, ray: &BoxRay, near: &mut [f32; WIDTH]) -> u32;
+    /// Where the ray enters each of eight boxes, in an order of integers: see [`key`].
+    type Keys: Copy;
+
+    /// One bit for each child whose box the ray meets, and where it enters.
+    fn meet_boxes(node: &Node, ray: &BoxRay) -> (u32, Self::Keys);
+
+    /// Puts the children in `mask` onto the stack from `top` on, the nearest last.
+    fn push_by_distance(node: &Node, mask: u32, keys: Self::Keys, stack: &mut Entries, top: usize);
 
     /// One bit for each triangle whose rounded edge functions do not have differing signs: every triangle that is hit,
     /// and a few others.
     fn meet_triangles(block: &TriangleBlock, shear: &Shear, origin: &[f64; 3]) -> u32;
 }
+
+/// Integers in the order of the floats.
+#[inline(always)]
+pub(crate) fn key(s: f32) -> i32 {
+    let bits = s.to_bits() as i32;
+    bits ^ (((bits >> 31) as u32) >> 1) as i32
+}
+
+/// In the last bits of a child's key stands its lane, so that no two are equal. To be compared with a limit that has all
+/// these bits set.
+pub(crate) const LANE_BITS: i32 = WIDTH as i32 - 1;
 
 /// Work to be done with whichever lanes the machine has.
 pub(crate) trait Task {
@@ -79,8 +97,10 @@ fn run_avx2<T: Task>(task: T) -> T::Output {
 pub(crate) struct Portable;
 
 impl Lanes for Portable {
+    type Keys = [i32; WIDTH];
+
     #[inline(always)]
-    fn meet_boxes(node: &Node, ray: &BoxRay, near: &mut [f32; WIDTH]) -> u32 {
+    fn meet_boxes(node: &Node, ray: &BoxRay) -> (u32, [i32; WIDTH]) {
         let mut enter = [ray.s_min; WIDTH];
         let mut leave = [ray.s_max; WIDTH];
         for axis in 0..3 {
@@ -93,12 +113,23 @@ impl Lanes for Portable {
                 leave[lane] = if last < leave[lane] { last } else { leave[lane] };
             }
         }
-        *near = enter;
         let mut mask = 0;
+        let mut keys = [0; WIDTH];
         for lane in 0..WIDTH {
             mask |= u32::from(enter[lane] <= leave[lane]) << lane;
+            keys[lane] = key(enter[lane]) & !LANE_BITS | lane as i32;
         }
-        mask & ((1 << node.len) - 1)
+        (mask & ((1 << node.len) - 1), keys)
+    }
+
+    #[inline(always)]
+    fn push_by_distance(node: &Node, mask: u32, keys: [i32; WIDTH], stack: &mut Entries, top: usize) {
+        let count = mask.count_ones() as usize;
+        for lane in (0..WIDTH).filter(|lane| mask >> lane & 1 != 0) {
+            let is_before = |other: &usize| mask >> other & 1 != 0 && keys[*other] < keys[lane];
+            let rank = (0..WIDTH).filter(is_before).count();
+            stack[(top + count - 1 - rank) % STACK] = stack_entry(keys[lane], node.children[lane]);
+        }
     }
 
     #[inline(always)]
@@ -130,11 +161,13 @@ pub(crate) struct Avx2;
 
 #[cfg(target_arch = "x86_64")]
 impl Lanes for Avx2 {
+    type Keys = std::arch::x86_64::__m256i;
+
     #[inline(always)]
-    fn meet_boxes(node: &Node, ray: &BoxRay, near: &mut [f32; WIDTH]) -> u32 {
+    fn meet_boxes(node: &Node, ray: &BoxRay) -> (u32, Self::Keys) {
         use std::arch::x86_64::*;
-        // SAFETY: only `run_avx2` instantiates this, so the machine has AVX2 and FMA. Every load and store is of eight
-        // f32 in an array of eight; `near_planes` is checked by the index into `planes`.
+        // SAFETY: only `run_avx2` instantiates this, so the machine has AVX2 and FMA. Every load is of eight f32 in an
+        // array of eight; `near_planes` is checked by the index into `planes`.
         unsafe {
             let mut enter = _mm256_set1_ps(ray.s_min);
             let mut leave = _mm256_set1_ps(ray.s_max);
@@ -148,9 +181,35 @@ impl Lanes for Avx2 {
                 enter = _mm256_max_ps(first, enter);
                 leave = _mm256_min_ps(last, leave);
             }
-            _mm256_storeu_ps(near.as_mut_ptr(), enter);
             let mask = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(enter, leave)) as u32;
-            mask & ((1 << node.len) - 1)
+            (mask & ((1 << node.len) - 1), _mm256_castps_si256(enter))
+        }
+    }
+
+    #[inline(always)]
+    fn push_by_distance(node: &Node, mask: u32, enter: Self::Keys, stack: &mut Entries, top: usize) {
+        use std::arch::x86_64::*;
+        // SAFETY: only `run_avx2` instantiates this, so the machine has AVX2. The store is of eight i32 into an array of
+        // eight.
+        unsafe {
+            let turn = _mm256_srli_epi32::<1>(_mm256_srai_epi32::<31>(enter));
+            let ordered = _mm256_xor_si256(enter, turn);
+            let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+            let low_bits = _mm256_set1_epi32(LANE_BITS);
+            let keys = _mm256_or_si256(_mm256_andnot_si256(low_bits, ordered), lanes);
+            let mut scalar_keys = [0; WIDTH];
+            _mm256_storeu_si256(scalar_keys.as_mut_ptr().cast(), keys);
+            // Where each goes is how many are farther.
+            let mut rest = mask;
+            while rest != 0 {
+                let lane = rest.trailing_zeros() as usize % WIDTH;
+                rest &= rest - 1;
+                let this = scalar_keys[lane];
+                let farther = _mm256_cmpgt_epi32(keys, _mm256_set1_epi32(this));
+                let farther = _mm256_movemask_ps(_mm256_castsi256_ps(farther)) as u32 & mask;
+                let place = top + farther.count_ones() as usize;
+                stack[place % STACK] = stack_entry(this, node.children[lane]);
+            }
         }
     }
 
@@ -190,25 +249,24 @@ impl Lanes for Avx2 {
     }
 }
 
-/// AVX2 on a machine that has it, for tests that call the lanes themselves.
+/// What [`Lanes::meet_boxes`] gives at a level, and where the ray enters each box, for tests.
 #[cfg(test)]
-pub(crate) struct Avx2OrPortable;
-
-#[cfg(test)]
-impl Lanes for Avx2OrPortable {
-    fn meet_boxes(node: &Node, ray: &BoxRay, near: &mut [f32; WIDTH]) -> u32 {
-        struct Boxes<'a>(&'a Node, &'a BoxRay, &'a mut [f32; WIDTH]);
-        impl Task for Boxes<'_> {
-            type Output = u32;
-            #[inline(always)]
-            fn run<L: Lanes>(self) -> u32 {
-                L::meet_boxes(self.0, self.1, self.2)
+pub(crate) fn meet_boxes_at(level: Level, node: &Node, ray: &BoxRay) -> (u32, [i32; WIDTH]) {
+    struct Boxes<'a>(&'a Node, &'a BoxRay);
+    impl Task for Boxes<'_> {
+        type Output = (u32, [i32; WIDTH]);
+        #[inline(always)]
+        fn run<L: Lanes>(self) -> Self::Output {
+            let (mask, keys) = L::meet_boxes(self.0, self.1);
+            let mut stack = [0; STACK];
+            L::push_by_distance(self.0, mask, keys, &mut stack, 0);
+            let mut by_lane = [i32::MAX; WIDTH];
+            for entry in &stack[..mask.count_ones() as usize] {
+                let key = (entry >> 32) as i32;
+                by_lane[(key & LANE_BITS) as usize] = key;
             }
+            (mask, by_lane)
         }
-        Level::best().run(Boxes(node, ray, near))
     }
-
-    fn meet_triangles(block: &TriangleBlock, shear: &Shear, origin: &[f64; 3]) -> u32 {
-        Portable::meet_triangles(block, shear, origin)
-    }
+    level.run(Boxes(node, ray))
 }

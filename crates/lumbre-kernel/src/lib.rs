@@ -11,6 +11,7 @@ mod lanes;
 mod node;
 mod prepare;
 mod query;
+mod stack;
 mod surface;
 mod touch;
 mod traverse;

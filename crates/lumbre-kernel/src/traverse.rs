@@ -8,8 +8,9 @@ use lumbre_geometry::{Ray, Root, Roots};
 use smallvec::SmallVec;
 
 use crate::collapse::Entry;
-use crate::lanes::{Lanes, Level, Task};
+use crate::lanes::{LANE_BITS, Lanes, Level, Task, key};
 use crate::node::{BoxRay, WIDTH, tag};
+use crate::stack::{STACK, Stack, stack_entry};
 use crate::touch::{self, AllTouches, Touch};
 use crate::triangles::{self, BLOCK, Meeting, Shear};
 use crate::{Accel, GeometryKind, InstancePath};
@@ -115,21 +116,6 @@ struct Frame<'a> {
     limit: f64,
 }
 
-// A stack entry: the key of the distance above, the reference below.
-type Entries = SmallVec<[i64; 192]>;
-
-#[inline(always)]
-fn stack_entry(key: i32, reference: u32) -> i64 {
-    (i64::from(key) << 32) | i64::from(reference)
-}
-
-/// Integers in the order of the floats.
-#[inline(always)]
-fn key(s: f32) -> i32 {
-    let bits = s.to_bits() as i32;
-    bits ^ (((bits >> 31) as u32) >> 1) as i32
-}
-
 const ALWAYS: i32 = i32::MIN;
 
 impl<'a> Frame<'a> {
@@ -138,7 +124,7 @@ impl<'a> Frame<'a> {
         let boxes = accel.tree.root.and_then(|_| BoxRay::new(&accel.units, &ray));
         let meets_tree = boxes.is_some();
         let boxes = boxes.unwrap_or_else(BoxRay::passing_all);
-        let limit_key = key(boxes.s_max);
+        let limit_key = key(boxes.s_max) | LANE_BITS;
         let mut frame =
             Self { accel, ray, shear: Shear::new(ray.direction), boxes, limit_key, limit: ray.t_max };
         if search.floor() > ray.t_min {
@@ -155,7 +141,7 @@ impl<'a> Frame<'a> {
         if limit < self.limit {
             self.limit = limit;
             self.boxes.end_at(limit);
-            self.limit_key = key(self.boxes.s_max);
+            self.limit_key = key(self.boxes.s_max) | LANE_BITS;
         }
     }
 }
@@ -167,7 +153,7 @@ impl<S: Search> Task for Traversal<'_, '_, S> {
     #[inline(always)]
     fn run<L: Lanes>(self) -> bool {
         let Self { accel, ray, search, touches } = self;
-        let mut stack = Entries::new();
+        let mut stack = Stack::new();
         let mut suspended: SmallVec<[Frame; 2]> = SmallVec::new();
         let mut place = Place::default();
 
@@ -182,40 +168,29 @@ impl<S: Search> Task for Traversal<'_, '_, S> {
             let mut reference = entry as u32;
             while reference >> tag::SHIFT == tag::INNER {
                 let node = &frame.accel.tree.nodes[reference as usize];
-                let mut near = [0.0; WIDTH];
-                let mut mask = L::meet_boxes(node, &frame.boxes, &mut near);
-                if mask == 0 {
-                    break;
-                }
-                let lane = mask.trailing_zeros() as usize;
-                mask &= mask - 1;
-                reference = node.children[lane];
-                if mask == 0 {
+                let (mask, keys) = L::meet_boxes(node, &frame.boxes);
+                if mask & mask.wrapping_sub(1) == 0 {
+                    if mask == 0 {
+                        break;
+                    }
+                    reference = node.children[mask.trailing_zeros() as usize % WIDTH];
                     continue;
                 }
-                let mut nearest = stack_entry(key(near[lane]), reference);
-                let bottom = stack.len();
-                while mask != 0 {
-                    let lane = mask.trailing_zeros() as usize;
-                    mask &= mask - 1;
-                    let other = stack_entry(key(near[lane]), node.children[lane]);
-                    let farther = if S::ORDERED && other < nearest {
-                        std::mem::replace(&mut nearest, other)
-                    } else {
-                        other
-                    };
-                    stack.push(farther);
-                    if S::ORDERED {
-                        // Farthest at the bottom.
-                        let mut at = stack.len() - 1;
-                        while at > bottom && stack[at - 1] < farther {
-                            stack[at] = stack[at - 1];
-                            at -= 1;
-                        }
-                        stack[at] = farther;
+                stack.make_room();
+                if S::ORDERED {
+                    L::push_by_distance(node, mask, keys, &mut stack.entries, stack.top);
+                    stack.top += mask.count_ones() as usize - 1;
+                    reference = stack.entries[stack.top % STACK] as u32;
+                } else {
+                    // The first children are the largest.
+                    let mut rest = mask & (mask - 1);
+                    while rest != 0 {
+                        let lane = (31 - rest.leading_zeros()) as usize % WIDTH;
+                        rest ^= 1 << lane;
+                        stack.push(stack_entry(ALWAYS, node.children[lane]));
                     }
+                    reference = node.children[mask.trailing_zeros() as usize % WIDTH];
                 }
-                reference = nearest as u32;
             }
 
             let first = (reference & tag::PLACE) as usize;
@@ -253,6 +228,7 @@ impl<S: Search> Task for Traversal<'_, '_, S> {
                     }
                     place.route.push(geometry);
                     place.ids.push(standing.id);
+                    stack.make_room();
                     stack.push(stack_entry(ALWAYS, tag::reference(tag::RETURN, 0)));
                     suspended.push(std::mem::replace(&mut frame, inner));
                     if enter(&mut frame, meets_tree, &place, &mut stack, search) {
@@ -279,15 +255,17 @@ fn enter<S: Search>(
     frame: &mut Frame,
     meets_tree: bool,
     place: &Place,
-    stack: &mut Entries,
+    stack: &mut Stack,
     search: &mut S,
 ) -> bool {
+    stack.make_room();
     if let Some(root) = frame.accel.tree.root.filter(|_| meets_tree) {
         stack.push(stack_entry(ALWAYS, root));
     }
     for (i, entry) in frame.accel.infinite.iter().enumerate() {
         if matches!(frame.accel.geometries[entry.geometry as usize].kind, GeometryKind::Instance(_)) {
             let index = frame.accel.tree.entries.len() + i;
+            stack.make_room();
             stack.push(stack_entry(ALWAYS, tag::reference(tag::INSTANCE, index as u32)));
         } else if meet_entry(frame, entry, place, search) {
             return true;

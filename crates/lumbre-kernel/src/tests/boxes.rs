@@ -5,7 +5,7 @@ use lumbre_math::DVec3;
 
 use super::scenes::Random;
 use crate::build::Bounds;
-use crate::lanes::{Avx2OrPortable, Lanes, Portable};
+use crate::lanes::{LANE_BITS, Level, key, meet_boxes_at};
 use crate::node::{BoxRay, Node, Units, WIDTH};
 
 fn units(bounds: &Aabb) -> Units {
@@ -26,7 +26,7 @@ fn component(random: &mut Random) -> f64 {
     }
 }
 
-fn reached_boxes_are_met<L: Lanes>(seed: u64, rounds: usize) {
+fn reached_boxes_are_met(level: Level, seed: u64, rounds: usize) {
     let mut random = Random(seed);
     let mut met = 0;
     for _ in 0..rounds {
@@ -78,14 +78,13 @@ fn reached_boxes_are_met<L: Lanes>(seed: u64, rounds: usize) {
             let (t_min, t_max) =
                 [(t, t), (0.0, t), (t, f64::INFINITY), (f64::NEG_INFINITY, f64::INFINITY)][random.below(4)];
             let ray = ray.with_range(t_min, t_max);
-            let mut near = [0.0; WIDTH];
             let boxes = BoxRay::new(&units, &ray).unwrap_or_else(|| panic!("{ray:?} misses {units:?}"));
-            let mask = L::meet_boxes(&node, &boxes, &mut near);
+            let (mask, keys) = meet_boxes_at(level, &node, &boxes);
             assert!(mask & (1 << lane) != 0, "{ray:?} at {t} misses {bounds:?} of {units:?}");
             // A hit at t must not be culled by a limit of t either.
             let mut ended = boxes.clone();
             ended.end_at(t);
-            assert!(near[lane] <= ended.s_max, "{ray:?} at {t}");
+            assert!(keys[lane] <= key(ended.s_max) | LANE_BITS, "{ray:?} at {t}");
             met += 1;
         }
     }
@@ -94,8 +93,8 @@ fn reached_boxes_are_met<L: Lanes>(seed: u64, rounds: usize) {
 
 #[test]
 fn a_box_that_holds_the_point_at_t_is_always_met() {
-    reached_boxes_are_met::<Portable>(51, 100_000);
-    reached_boxes_are_met::<Avx2OrPortable>(52, 100_000);
+    reached_boxes_are_met(Level::PORTABLE, 51, 100_000);
+    reached_boxes_are_met(Level::best(), 52, 100_000);
 }
 
 #[test]
@@ -118,8 +117,7 @@ fn boxes_far_from_the_ray_are_not_met() {
         // Past the box, further than its half diagonal but by little.
         let aside = direction.cross(random.vector()).normalize() * 0.434;
         let ray = Ray::new(center + aside - 20.0 * direction, direction);
-        let mut near = [0.0; WIDTH];
-        let mask = BoxRay::new(&units, &ray).map_or(0, |ray| Portable::meet_boxes(&node, &ray, &mut near));
+        let mask = BoxRay::new(&units, &ray).map_or(0, |ray| meet_boxes_at(Level::PORTABLE, &node, &ray).0);
         missed += u32::from(mask == 0);
     }
     assert_eq!(missed, 10_000);

@@ -53,7 +53,7 @@ const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
 fn a_tree_finds_what_a_loop_finds() {
     let mut random = Random(1);
     let accel = mixture(&mut random, CENTER, 3.0, 0, false);
-    check_many(&accel, &mut random, CENTER, 3.0, 40_000);
+    check_many(&accel, &mut random, CENTER, 3.0, 15_000);
 }
 
 #[test]
@@ -68,7 +68,7 @@ fn infinite_things_are_found_within_instances_and_without() {
     let mut random = Random(3);
     let accel = mixture(&mut random, CENTER, 3.0, 1, true);
     assert!(!accel.infinite.is_empty());
-    check_many(&accel, &mut random, CENTER, 3.0, 5_000);
+    check_many(&accel, &mut random, CENTER, 3.0, 2_000);
 }
 
 #[test]
@@ -92,7 +92,7 @@ fn scenes_of_any_scale_lose_nothing() {
 
 #[test]
 fn many_seeds_agree_with_the_loop() {
-    for seed in 100..140 {
+    for seed in 100..120 {
         let mut random = Random(seed);
         let (depth, infinite) = (random.below(2) as u32, random.unit() < 0.3);
         let accel = mixture(&mut random, CENTER, 3.0, depth, infinite);
@@ -200,7 +200,7 @@ fn rays_of_absurd_size_are_answered_as_by_the_loop() {
         [(&everything, [1e-60, 1e-30, 1e30, 1e60]), (&meshes, [1e-320, 1e-300, 1e150, 1e300])]
     {
         let mut hits = 0;
-        for _ in 0..500 {
+        for _ in 0..150 {
             let origin = CENTER + random.vector();
             for size in sizes {
                 hits += check(accel, &Ray::new(origin, random.vector() * size));
@@ -208,7 +208,7 @@ fn rays_of_absurd_size_are_answered_as_by_the_loop() {
                 check(accel, &Ray::new(random.vector() * size, random.vector() * size));
             }
         }
-        assert!(hits > 1000, "{hits}");
+        assert!(hits > 300, "{hits}");
     }
 }
 

@@ -108,7 +108,7 @@ fn bombard_all(rays: usize) {
 
 #[test]
 fn no_aimed_ray_leaks_and_every_crossing_has_one_owner() {
-    // 2 points × 5 meshes: a hundred thousand at edges, as many at vertices, each from outside and from within.
+    // 2 points × 5 meshes: a hundred thousand at edges, as many at vertices, each from without and from within.
     bombard_all(20_000);
 }
 
