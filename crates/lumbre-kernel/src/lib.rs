@@ -1,6 +1,4 @@
-//! Closest, any and every hit of a ray among exact shapes, triangle meshes, instances and custom geometry, in one tree.
-//!
-//! The kernel knows nothing of light: every geometry carries an `id` of the caller's, and a hit returns it.
+#![doc = include_str!("../README.md")]
 
 mod accel;
 mod build;
