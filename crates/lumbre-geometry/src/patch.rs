@@ -7,9 +7,8 @@ use lumbre_math::{DVec2, DVec3, Transform};
 
 use crate::shape::check;
 use crate::support::{bounds_from_support, gamma};
-use crate::{
-    Aabb, DirectionSample, Ray, Root, Roots, ShapeError, Surface, SurfaceSample, Triangle, density, measure,
-};
+use crate::triangle::solid_angle_of;
+use crate::{Aabb, DirectionSample, Ray, Root, Roots, ShapeError, Surface, SurfaceSample, density, measure};
 
 /// The surface (1−u)(1−v) p00 + u(1−v) p10 + (1−u)v p01 + uv p11 with u and v in [0, 1]: doubly ruled, and flat when the
 /// corners are. It faces along ∂p/∂u × ∂p/∂v.
@@ -24,9 +23,12 @@ pub struct BilinearPatch {
     is_rectangle: bool,
 }
 
-/// Solid angles outside this range are sampled by area: small ones lose their digits in the sum of four angles, and from
-/// (almost) within the plane the rectangle has no depth.
+/// Solid angles outside this range are sampled by area: small ones lose their digits in the sum of four angles, and right
+/// over the rectangle it has no depth.
 const SPHERICAL_SAMPLING: std::ops::Range<f64> = 1e-4..TAU - 1e-6;
+
+/// The least height over the plane, in sizes of the rectangle, for sampling by solid angle.
+const CLEARANCE: f64 = 1e-7;
 
 impl BilinearPatch {
     /// The patch with four corners, of which two may coincide.
@@ -242,11 +244,14 @@ impl BilinearPatch {
         if !self.is_rectangle {
             return None;
         }
+        let (ex, ey) = (self.p10 - self.p00, self.p01 - self.p00);
+        let cross = ex.cross(ey);
+        let height = (self.p00 - from).dot(cross).abs() / cross.length();
+        let is_clear = height > CLEARANCE * (ex.length() + ey.length());
         let halves = [(self.p00, self.p10, self.p11), (self.p00, self.p11, self.p01)];
-        let solid_angle =
-            halves.iter().map(|&(a, b, c)| Triangle::new(a, b, c).map_or(0.0, |half| half.solid_angle(from)));
+        let solid_angle = halves.into_iter().map(|(a, b, c)| solid_angle_of(a - from, b - from, c - from));
         let solid_angle = solid_angle.sum::<f64>();
-        SPHERICAL_SAMPLING.contains(&solid_angle).then_some(solid_angle)
+        (is_clear && SPHERICAL_SAMPLING.contains(&solid_angle)).then_some(solid_angle)
     }
 
     /// A point as seen from `from`: uniform by solid angle for a rectangle that looks neither tiny nor fills half the sky,
@@ -277,11 +282,11 @@ impl BilinearPatch {
         let (sin, cos) = (u.x * solid_angle + k).sin_cos();
         let fu = (cos * n0 - n2) / sin;
         let cu = (1.0_f64.copysign(fu) / (fu * fu + n0 * n0).sqrt()).clamp(-1.0, 1.0);
-        let xu = (-cu * z0 / (1.0 - cu * cu).sqrt()).clamp(x0, x1);
+        let xu = (-cu * z0 / (1.0 - cu * cu).sqrt()).max(x0).min(x1);
         let depth = xu.hypot(z0);
         let (h0, h1) = (y0 / depth.hypot(y0), y1 / depth.hypot(y1));
         let hv = h0 + u.y * (h1 - h0);
-        let yv = (hv * depth / (1.0 - hv * hv).sqrt()).clamp(y0, y1);
+        let yv = (hv * depth / (1.0 - hv * hv).sqrt()).max(y0).min(y1);
         let uv = DVec2::new((xu - x0) / width, (yv - y0) / height);
         uv.is_finite().then(|| DirectionSample { surface: self.surface_on(uv), pdf: 1.0 / solid_angle })
     }

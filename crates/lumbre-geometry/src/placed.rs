@@ -103,7 +103,7 @@ impl PlacedShape {
         let object_from = m.inverse_point(from);
         let sample = self.shape.sample_direction(object_from, u)?;
         let pdf = sample.pdf * solid_angle_shrink(m, sample.surface.point - object_from);
-        Some(DirectionSample { surface: into_world(m, &sample.surface), pdf })
+        pdf.is_finite().then(|| DirectionSample { surface: into_world(m, &sample.surface), pdf })
     }
 
     /// The density, per unit solid angle at `ray.origin`, with which [`PlacedShape::sample_direction`] chooses the

@@ -149,6 +149,10 @@ impl WatertightRay {
 /// The triangle p0, p1, p2 with its sides, facing where its vertices run counter-clockwise.
 ///
 /// Its `root.local` and its `uv` are the weights (b1, b2) of p1 and p2. One of no area is never hit.
+///
+/// It uses [`WatertightRay`] and not [`moller_trumbore`]: of 20,000 rays in double precision aimed at the sides and corners
+/// of a closed mesh, 837 slipped through the latter and none through the former (`tests/triangles.rs`), for about twice the
+/// time (`examples/shape_speed.rs`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Triangle {
     p0: DVec3,
@@ -159,8 +163,11 @@ pub struct Triangle {
 }
 
 /// Solid angles outside this range are sampled by area: in small ones the sine and cosine of the spherical excess lose
-/// their digits, and from (almost) within the plane the corners make a great circle.
+/// their digits, and right over the triangle the corners make a great circle.
 const SPHERICAL_SAMPLING: std::ops::Range<f64> = 1e-5..TAU - 1e-5;
+
+/// The least height over the plane, in sizes of the triangle, for sampling by solid angle.
+const CLEARANCE: f64 = 1e-7;
 
 impl Triangle {
     /// A triangle, possibly of no area.
@@ -274,22 +281,25 @@ impl Triangle {
     /// A. van Oosterom, J. Strackee, "The solid angle of a plane triangle", IEEE Transactions on Biomedical
     /// Engineering, 1983.
     pub fn solid_angle(&self, from: DVec3) -> f64 {
-        let (a, b, c) = (self.p0 - from, self.p1 - from, self.p2 - from);
-        let (la, lb, lc) = (a.length(), b.length(), c.length());
-        // a·(b×c) by the height over the plane, which does not cancel for a small triangle far away.
-        let volume = a.dot(self.cross()).abs();
-        let denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
-        2.0 * volume.atan2(denominator)
+        solid_angle_of(self.p0 - from, self.p1 - from, self.p2 - from)
+    }
+
+    /// The solid angle, if it is to be sampled by it.
+    fn sampled_solid_angle(&self, from: DVec3) -> Option<f64> {
+        let cross = self.cross();
+        let height = (self.p0 - from).dot(cross).abs() / cross.length();
+        let is_clear = height > CLEARANCE * ((self.p1 - self.p0).length() + (self.p2 - self.p0).length());
+        let solid_angle = self.solid_angle(from);
+        (is_clear && SPHERICAL_SAMPLING.contains(&solid_angle)).then_some(solid_angle)
     }
 
     /// A point uniform by solid angle, or by area where the triangle looks tiny or fills half the sky.
     ///
     /// J. Arvo, "Stratified sampling of spherical triangles", SIGGRAPH 1995.
     pub fn sample_direction(&self, from: DVec3, u: DVec2) -> Option<DirectionSample> {
-        let solid_angle = self.solid_angle(from);
-        if !SPHERICAL_SAMPLING.contains(&solid_angle) {
+        let Some(solid_angle) = self.sampled_solid_angle(from) else {
             return density::seen_from(from, self.sample_area(u)?);
-        }
+        };
         let [a, b, c] = self.corners().map(|p| (p - from).normalize());
         let side_ab = a.cross(b).normalize();
         let side_ca = c.cross(a).normalize();
@@ -316,21 +326,32 @@ impl Triangle {
         let s = from - self.p0;
         let s1 = direction.cross(edge2);
         let determinant = s1.dot(edge1);
-        let b1 = (s1.dot(s) / determinant).clamp(0.0, 1.0);
-        let b2 = (s.cross(edge1).dot(direction) / determinant).clamp(0.0, 1.0 - b1);
-        let surface = self.surface_on(DVec2::new(b1, b2));
-        (b1.is_finite() && b2.is_finite()).then_some(DirectionSample { surface, pdf: 1.0 / solid_angle })
+        let (b1, b2) = (s1.dot(s) / determinant, s.cross(edge1).dot(direction) / determinant);
+        if !(b1.is_finite() && b2.is_finite()) {
+            return None;
+        }
+        let b1 = b1.clamp(0.0, 1.0);
+        let surface = self.surface_on(DVec2::new(b1, b2.clamp(0.0, 1.0 - b1)));
+        Some(DirectionSample { surface, pdf: 1.0 / solid_angle })
     }
 
     /// The density of [`Triangle::sample_direction`].
     pub fn pdf_direction(&self, ray: &Ray, surface: &Surface) -> f64 {
-        let solid_angle = self.solid_angle(ray.origin);
-        if SPHERICAL_SAMPLING.contains(&solid_angle) {
-            1.0 / solid_angle
-        } else {
-            density::pdf_seen_from(ray, surface, 1.0 / self.area())
+        match self.sampled_solid_angle(ray.origin) {
+            Some(solid_angle) => 1.0 / solid_angle,
+            None => density::pdf_seen_from(ray, surface, 1.0 / self.area()),
         }
     }
+}
+
+/// The solid angle of a triangle, its corners given relative to the eye.
+///
+/// The mixed product is taken over the sides, so that a small triangle far away does not cancel.
+pub(crate) fn solid_angle_of(a: DVec3, b: DVec3, c: DVec3) -> f64 {
+    let (la, lb, lc) = (a.length(), b.length(), c.length());
+    let volume = a.dot((b - a).cross(c - a)).abs();
+    let denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+    2.0 * volume.atan2(denominator)
 }
 
 /// The angle between two unit vectors, exact for small angles and for those near π too.

@@ -731,6 +731,49 @@ fn rays_that_are_none_miss() {
     });
 }
 
+#[test]
+fn from_any_place_and_with_any_numbers_a_sample_is_a_point_of_the_surface_or_none() {
+    hold(12, 0, |subject, random| {
+        let on_surface = subject.placed.sample_area(random.uv()).map_or(DVec3::ZERO, |s| s.surface.point);
+        let corner = subject
+            .placed
+            .shape()
+            .surface_at(0, DVec2::ZERO)
+            .map_or(DVec3::ZERO, |s| subject.placed.world_from_object().point(s.point));
+        let reach = subject.reach();
+        let places = [
+            subject.center(),
+            subject.aim.min,
+            subject.aim.max,
+            on_surface,
+            corner,
+            on_surface + DVec3::splat(1e-13 * reach),
+            subject.center() + DVec3::splat(1e9 * reach),
+            subject.center() + DVec3::splat(1e100 * reach),
+            DVec3::splat(f64::INFINITY),
+            DVec3::splat(f64::NAN),
+        ];
+        let numbers = [0.0, f64::MIN_POSITIVE, 0.5, 1.0 - 0.5 * f64::EPSILON];
+        let mut samples = 0;
+        for u in numbers.into_iter().flat_map(|x| numbers.map(|y| DVec2::new(x, y))) {
+            if let Some(sample) = subject.placed.sample_area(u) {
+                let is_good = sample.surface.point.is_finite() && sample.surface.normal.is_normalized();
+                assert!(is_good && sample.pdf > 0.0, "{}: {sample:?} of {u}", subject.name);
+            }
+            for from in places {
+                let Some(sample) = subject.placed.sample_direction(from, u) else {
+                    continue;
+                };
+                samples += 1;
+                let is_good = sample.surface.point.is_finite() && sample.surface.normal.is_normalized();
+                let is_good = is_good && sample.pdf > 0.0 && sample.pdf.is_finite();
+                assert!(is_good || !from.is_finite(), "{}: {sample:?} from {from} of {u}", subject.name);
+            }
+        }
+        Some(samples)
+    });
+}
+
 /// A running mean and its standard error.
 #[derive(Clone, Copy, Default)]
 struct Mean {
