@@ -9,6 +9,8 @@ mod contained;
 pub mod diagnostic;
 pub mod image;
 pub mod input;
+pub mod open;
+pub mod pbrt;
 pub mod ply;
 mod polygon;
 
@@ -16,3 +18,4 @@ pub use atomic::{atomic_write, probe_writable};
 pub use budget::{Budget, BudgetVec, Hold, LimitError, LimitKind, Limits};
 pub use diagnostic::{Diagnostic, Diagnostics, FormatError, Place, Position, Severity, Strictness};
 pub use input::Input;
+pub use open::{ReadOptions, open_scene, open_scenes};

@@ -37,20 +37,6 @@ pub fn render(
     progress: &dyn Progress,
     cancel: &CancelToken,
 ) -> Result<Rendered, RenderError> {
-    render_with(scene, options, &*integrator(&options.integrator), progress, cancel)
-}
-
-/// [`render`] with an integrator of one's own; that of the options is not looked at.
-///
-/// # Errors
-/// As [`render`].
-pub fn render_with(
-    scene: &Scene,
-    options: &RenderOptions,
-    integrator: &dyn Integrator,
-    progress: &dyn Progress,
-    cancel: &CancelToken,
-) -> Result<Rendered, RenderError> {
     let start = Instant::now();
     let bounds = options.bounds()?;
     let camera = scene
@@ -66,7 +52,7 @@ pub fn render_with(
         scene,
         options,
         view: View::new(camera, options.width, options.height),
-        integrator,
+        integrator: integrator(&options.integrator),
         sampler: Sampler::new(&options.sampler),
         filter: options.pixel_filter()?,
         // Textures may be looked up more finely the more samples there are to average them (pbrt does likewise).
@@ -138,7 +124,7 @@ struct Job<'a> {
     scene: &'a Scene,
     options: &'a RenderOptions,
     view: View,
-    integrator: &'a dyn Integrator,
+    integrator: Box<dyn Integrator>,
     sampler: Sampler,
     filter: Filter,
     spacing: f64,

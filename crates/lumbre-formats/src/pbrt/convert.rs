@@ -1,0 +1,379 @@
+//! From the entities of a scene file to a [`SceneDesc`]: the tables of what has a name, and what is put off to the end.
+
+use std::collections::HashMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use lumbre_math::Transform;
+use lumbre_scene::{
+    FilmDesc, GeometryDesc, InstanceDesc, MaterialId, MeshDesc, NamedMaterial, ObjectDesc, ObjectId,
+    SamplerDesc, SceneDesc, ShapeDesc,
+};
+use lumbre_shading::{FloatTexture, Material, MipMap, Spectrum, SpectrumTexture, Texture, TextureValue};
+
+use super::images::ImageKey;
+use super::params::Params;
+use super::parser;
+use super::source::{Fault, Files, Result, Spot};
+use crate::diagnostic::quoted;
+use crate::{Budget, Diagnostic, Diagnostics, FormatError};
+
+/// Turns entities into the description of the scene.
+pub(super) struct Converter<'b, 'd> {
+    pub budget: &'b Budget,
+    pub diagnostics: &'d mut Diagnostics,
+    pub files: Files,
+    /// Where relative file names start; `None` where there are no files to be had.
+    pub directory: Option<PathBuf>,
+    pub scene: SceneDesc,
+    pub shape_count: u32,
+    /// Each with the place of its first use while it is not defined.
+    pub materials: Vec<MaterialSlot>,
+    pub material_names: HashMap<String, MaterialId>,
+    pub objects: Vec<ObjectSlot>,
+    pub object_names: HashMap<String, ObjectId>,
+    pub open_object: Option<ObjectId>,
+    pub float_textures: HashMap<String, Known<f32>>,
+    pub spectrum_textures: HashMap<String, Known<Spectrum>>,
+    pub media: HashMap<String, ()>,
+    pub media_used: Vec<(String, Spot)>,
+    pub images: HashMap<ImageKey, Arc<MipMap>>,
+    /// Mesh files that are to be read, and by path which they are.
+    pub mesh_files: Vec<MeshFile>,
+    pub mesh_paths: HashMap<PathBuf, usize>,
+    /// Lights on shapes whose material is not known yet to be a surface.
+    pub lights_to_check: Vec<(MaterialId, Spot)>,
+    /// CSG shapes, whose mesh operands can only be looked at when they are read.
+    pub meshes_to_close: Vec<(Arc<MeshDesc>, Spot)>,
+    pub sampler_seed: Option<u64>,
+    pub exposure: Exposure,
+    upgraded: Option<Spot>,
+}
+
+/// A material, by its place in the table.
+pub(super) struct MaterialSlot {
+    pub name: Option<String>,
+    pub material: Option<Arc<Material>>,
+    pub first_use: Spot,
+    /// How many mixtures stand in each other here.
+    pub depth: usize,
+}
+
+/// An object, by its place in the table.
+pub(super) struct ObjectSlot {
+    pub object: Option<ObjectDesc>,
+    pub name: String,
+    pub first_use: Spot,
+    /// How many shapes it comes to once every CSG in it is written out, and how deep they nest.
+    pub leaves: u64,
+    pub depth: usize,
+}
+
+/// A mesh file that is to be read: shapes hold `placeholder` until it is.
+pub(super) struct MeshFile {
+    pub path: PathBuf,
+    pub spot: Spot,
+    pub placeholder: Arc<MeshDesc>,
+}
+
+/// What decides the exposure, which camera and film share.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Exposure {
+    pub shutter: f64,
+    pub iso: f64,
+    /// The factor that pbrt-v3 writes as `scale` of its film.
+    pub scale: f64,
+}
+
+/// A texture with what bounds the work of its evaluation.
+#[derive(Clone, Debug)]
+pub(super) struct Known<T: TextureValue> {
+    pub texture: Arc<Texture<T>>,
+    /// How many textures stand in each other.
+    pub depth: usize,
+    /// How many one evaluation may come to, shared ones counted each time.
+    pub leaves: u64,
+}
+
+impl<T: TextureValue> Known<T> {
+    pub fn constant(value: T) -> Self {
+        Self { texture: Arc::new(Texture::Constant(value)), depth: 1, leaves: 1 }
+    }
+
+    /// The value, where it is the same everywhere.
+    pub fn value(&self) -> Option<T> {
+        match *self.texture {
+            Texture::Constant(value) => Some(value),
+            _ => None,
+        }
+    }
+}
+
+/// The most evaluations that one texture may come to.
+pub(super) const MAX_TEXTURE_LEAVES: u64 = 4096;
+
+pub(super) type FloatArc = Arc<FloatTexture>;
+pub(super) type SpectrumArc = Arc<SpectrumTexture>;
+
+impl<'b, 'd> Converter<'b, 'd> {
+    pub fn new(budget: &'b Budget, diagnostics: &'d mut Diagnostics, directory: Option<PathBuf>) -> Self {
+        // What the language says where the scene does not.
+        let film = FilmDesc { width: Some(1280), height: Some(720), ..FilmDesc::default() };
+        let sampler = SamplerDesc { spp: Some(16), ..SamplerDesc::default() };
+        Self {
+            budget,
+            diagnostics,
+            files: Files::default(),
+            directory,
+            scene: SceneDesc { film, sampler, ..SceneDesc::default() },
+            shape_count: 0,
+            materials: vec![],
+            material_names: HashMap::new(),
+            objects: vec![],
+            object_names: HashMap::new(),
+            open_object: None,
+            float_textures: HashMap::new(),
+            spectrum_textures: HashMap::new(),
+            media: HashMap::new(),
+            media_used: vec![],
+            images: HashMap::new(),
+            mesh_files: vec![],
+            mesh_paths: HashMap::new(),
+            lights_to_check: vec![],
+            meshes_to_close: vec![],
+            sampler_seed: None,
+            exposure: Exposure { shutter: 1.0, iso: 100.0, scale: 1.0 },
+            upgraded: None,
+        }
+    }
+
+    /// Says something about the input that does not stop the reading.
+    pub fn warn(&mut self, spot: Spot, diagnostic: Diagnostic) {
+        self.diagnostics.push(self.files.locate(spot, diagnostic));
+    }
+
+    /// Says that something is left out or replaced.
+    pub fn note(&mut self, spot: Spot, message: impl Into<String>) {
+        self.warn(spot, Diagnostic::warning(message));
+    }
+
+    /// Says that a type is not known, with the nearest one that is.
+    pub fn unknown(&mut self, spot: Spot, noun: &str, ty: &str, known: &[&str], instead: &str) {
+        let message = format!("unknown {noun} {}: {instead}", quoted(ty));
+        self.warn(spot, Diagnostic::warning(message).suggest(ty, known.iter().copied()));
+    }
+
+    /// Says which parameters were given in vain.
+    pub fn done(&mut self, params: &Params) {
+        for (spot, warning) in params.unused() {
+            self.warn(spot, warning);
+        }
+    }
+
+    /// Remembers that something of pbrt-v3 was met; said once.
+    pub fn upgraded(&mut self, spot: Spot) {
+        if self.upgraded.is_none() {
+            self.upgraded = Some(spot);
+            self.note(spot, "this is of pbrt-v3: the scene is upgraded to pbrt-v4 while it is read");
+        }
+    }
+
+    pub fn is_upgraded(&self) -> bool {
+        self.upgraded.is_some()
+    }
+
+    /// The path of a file that the scene asks for.
+    pub fn resolve(&self, name: &str, at: Spot) -> Result<PathBuf> {
+        match &self.directory {
+            Some(directory) => Ok(parser::resolve(directory, name)),
+            None => Err(at.error(format!("no file can be read from here, and the scene asks for {}", quoted(name)))),
+        }
+    }
+
+    // Materials and objects by name; uses may stand before definitions.
+
+    pub fn add_material(&mut self, name: Option<String>, material: Option<Material>, depth: usize, spot: Spot) -> MaterialId {
+        let id = MaterialId(self.materials.len() as u32);
+        self.materials.push(MaterialSlot { name, material: material.map(Arc::new), first_use: spot, depth });
+        id
+    }
+
+    /// The material that shapes have before the first `Material`.
+    pub fn default_material(&mut self) -> MaterialId {
+        let nowhere = Spot { file: 0, line: 1, column: 1 };
+        self.add_material(None, Some(Material::default_diffuse()), 1, nowhere)
+    }
+
+    pub fn material_named(&mut self, name: &str, at: Spot) -> MaterialId {
+        if let Some(id) = self.material_names.get(name) {
+            return *id;
+        }
+        let id = self.add_material(Some(name.to_owned()), None, 1, at);
+        self.material_names.insert(name.to_owned(), id);
+        id
+    }
+
+    fn object_named(&mut self, name: &str, at: Spot) -> ObjectId {
+        if let Some(id) = self.object_names.get(name) {
+            return *id;
+        }
+        let id = ObjectId(self.objects.len() as u32);
+        let slot = ObjectSlot { object: None, name: name.to_owned(), first_use: at, leaves: 0, depth: 0 };
+        self.objects.push(slot);
+        self.object_names.insert(name.to_owned(), id);
+        id
+    }
+
+    pub fn begin_object(&mut self, name: &str, spot: Spot, at: Spot) -> Result<()> {
+        if let Some(open) = self.open_object {
+            let open = &self.objects[open.0 as usize].name;
+            return Err(spot.error(format!("ObjectBegin inside the object {}", quoted(open))));
+        }
+        let id = self.object_named(name, at);
+        let slot = &mut self.objects[id.0 as usize];
+        if slot.object.is_some() {
+            return Err(at.error(format!("object {} is defined twice", quoted(name))));
+        }
+        slot.object = Some(ObjectDesc { name: name.to_owned(), ..ObjectDesc::default() });
+        self.open_object = Some(id);
+        Ok(())
+    }
+
+    pub fn end_object(&mut self) {
+        self.open_object = None;
+    }
+
+    pub fn instance(&mut self, name: &str, spot: Spot, at: Spot, ctm: Transform) -> Result<()> {
+        if let Some(open) = self.open_object {
+            let open = &self.objects[open.0 as usize].name;
+            return Err(spot.error(format!("ObjectInstance inside the object {}", quoted(open))));
+        }
+        let object = self.object_named(name, at);
+        self.scene.instances.push(InstanceDesc { object, world_from_object: ctm });
+        Ok(())
+    }
+
+    /// Puts a shape into the object that is open, else into the world. `leaves` and `depth` are those of a CSG.
+    pub fn push_shape(&mut self, shape: ShapeDesc, leaves: u64, depth: usize) {
+        match self.open_object {
+            None => self.scene.shapes.push(shape),
+            Some(id) => {
+                let slot = &mut self.objects[id.0 as usize];
+                slot.leaves = slot.leaves.saturating_add(leaves);
+                slot.depth = slot.depth.max(depth);
+                slot.object.as_mut().expect("it is open").shapes.push(shape);
+            }
+        }
+    }
+
+    // Media.
+
+    pub fn medium(&mut self, name: &str, at: Spot, params: Params) -> Result<()> {
+        if self.media.insert(name.to_owned(), ()).is_some() {
+            return Err(at.error(format!("medium {} is defined twice", quoted(name))));
+        }
+        params.ignore_all();
+        self.note(params.spot, "media are not rendered yet: this one is left out");
+        Ok(())
+    }
+
+    pub fn medium_interface(&mut self, spot: Spot, names: Vec<(String, Spot)>) {
+        let used = names.into_iter().filter(|(name, _)| !name.is_empty());
+        let before = self.media_used.len();
+        self.media_used.extend(used);
+        if self.media_used.len() > before {
+            self.note(spot, "media are not rendered yet: this border of one is left out");
+        }
+    }
+
+    // The end.
+
+    /// Checks what was put off: names, mesh files, lights on interfaces; and puts the tables into the scene.
+    pub fn finish(&mut self) -> Result<()> {
+        self.check_names()?;
+        let meshes = self.read_meshes()?;
+        let is_interface: Vec<bool> = self
+            .materials
+            .iter()
+            .map(|slot| {
+                let material = slot.material.as_deref().expect("names are checked");
+                matches!(material.kind, lumbre_shading::MaterialKind::Interface)
+            })
+            .collect();
+        for (id, spot) in std::mem::take(&mut self.lights_to_check) {
+            if is_interface[id.0 as usize] {
+                self.note(spot, "an interface gives no light: the area light of this shape is left out");
+            }
+        }
+        let mut lists: Vec<&mut Vec<ShapeDesc>> = vec![&mut self.scene.shapes];
+        lists.extend(self.objects.iter_mut().filter_map(|slot| slot.object.as_mut()).map(|o| &mut o.shapes));
+        while let Some(shapes) = lists.pop() {
+            for shape in shapes {
+                if shape.material.is_some_and(|id| is_interface[id.0 as usize]) {
+                    shape.material = None;
+                    shape.area_light = None;
+                }
+                match &mut shape.geometry {
+                    GeometryDesc::Mesh(mesh) => {
+                        if let Some(read) = meshes.get(&Arc::as_ptr(mesh)) {
+                            *mesh = read.clone();
+                        }
+                    }
+                    GeometryDesc::Csg(csg) => lists.extend(csg.operands.iter_mut()),
+                    GeometryDesc::Exact(_) | GeometryDesc::BilinearMesh(_) => {}
+                }
+            }
+        }
+        for (mesh, spot) in std::mem::take(&mut self.meshes_to_close) {
+            let mesh = meshes.get(&Arc::as_ptr(&mesh)).unwrap_or(&mesh);
+            if !super::shapes::is_closed(mesh) {
+                let message = "a csg operand has a mesh that is not closed: it is no solid";
+                return Err(spot.error(message));
+            }
+        }
+        let materials = std::mem::take(&mut self.materials).into_iter();
+        self.scene.materials = materials
+            .map(|slot| NamedMaterial {
+                name: slot.name,
+                material: slot.material.expect("names are checked"),
+            })
+            .collect();
+        let objects = std::mem::take(&mut self.objects).into_iter();
+        self.scene.objects = objects.map(|slot| slot.object.expect("names are checked")).collect();
+        self.finish_settings()
+    }
+
+    fn check_names(&mut self) -> Result<()> {
+        if let Some(slot) = self.materials.iter().find(|slot| slot.material.is_none()) {
+            let name = slot.name.as_deref().unwrap_or_default();
+            let defined = self.materials.iter().filter(|slot| slot.material.is_some());
+            let known = defined.filter_map(|slot| slot.name.as_deref());
+            let wrong = Diagnostic::error(format!("material {} is not defined", quoted(name)));
+            return Err(slot.first_use.wrong(wrong.suggest(name, known)));
+        }
+        if let Some(slot) = self.objects.iter().find(|slot| slot.object.is_none()) {
+            let known = self.objects.iter().filter(|slot| slot.object.is_some()).map(|slot| &*slot.name);
+            let wrong = Diagnostic::error(format!("object {} is not defined", quoted(&slot.name)));
+            return Err(slot.first_use.wrong(wrong.suggest(&slot.name, known)));
+        }
+        for (name, spot) in std::mem::take(&mut self.media_used) {
+            if !self.media.contains_key(&name) {
+                let unknown = Diagnostic::warning(format!("medium {} is not defined", quoted(&name)));
+                let unknown = unknown.suggest(&name, self.media.keys().map(String::as_str));
+                self.warn(spot, unknown);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// An error about a file that the scene asks for, at the place that asks.
+pub(super) fn file_fault(at: Spot, error: FormatError) -> Fault {
+    match error {
+        FormatError::Io { path, action, source } => {
+            at.error(format!("{action} {}: {source}", quoted(&path.display().to_string())))
+        }
+        FormatError::Limit { place: None, source } => Fault::Limit(at, source),
+        other => other.into(),
+    }
+}

@@ -1,0 +1,61 @@
+//! Pictures that a scene asks for, each read once.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use lumbre_image::Encoding;
+use lumbre_shading::{ImageFilter, MipMap, MipMapOptions, Wrap};
+
+use super::convert::{Converter, file_fault};
+use super::source::{AtSpot, Result, Spot};
+use crate::image::{ImageFile, open_image};
+
+/// What tells one looked-up picture from another: its path, and how it is read and looked up.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub(super) struct ImageKey {
+    path: PathBuf,
+    // The encoding and the options as text, as their numbers have no hash.
+    how: String,
+}
+
+impl Converter<'_, '_> {
+    /// The picture of this name; `encoding` replaces what the file says.
+    pub fn mip_map(
+        &mut self,
+        name: &str,
+        at: Spot,
+        encoding: Option<Encoding>,
+        wrap: Wrap,
+        filter: ImageFilter,
+    ) -> Result<Arc<MipMap>> {
+        let path = self.resolve(name, at)?;
+        let options = MipMapOptions { wrap, filter };
+        let key = ImageKey { path: path.clone(), how: format!("{encoding:?} {options:?}") };
+        if let Some(image) = self.images.get(&key) {
+            return Ok(image.clone());
+        }
+        // The same pixels under other options are shared.
+        let same = self.images.iter().find(|(other, _)| other.path == path);
+        let bitmap = match same.map(|(_, image)| image.bitmap().clone()) {
+            Some(bitmap) if encoding.is_none_or(|e| e == bitmap.encoding()) => bitmap,
+            _ => {
+                let bitmap = self.image_file(name, at)?.bitmap;
+                Arc::new(match encoding {
+                    Some(encoding) => bitmap.with_encoding(encoding),
+                    None => bitmap,
+                })
+            }
+        };
+        // The smaller levels take a third again.
+        self.budget.bytes(bitmap.bytes() as u64 / 3, name).at(at)?;
+        let image = Arc::new(MipMap::new(bitmap, options));
+        self.images.insert(key, image.clone());
+        Ok(image)
+    }
+
+    /// The picture of this name as its file has it.
+    pub fn image_file(&mut self, name: &str, at: Spot) -> Result<ImageFile> {
+        let path = self.resolve(name, at)?;
+        open_image(&path, self.budget, self.diagnostics).map_err(|e| file_fault(at, e))
+    }
+}

@@ -1,0 +1,292 @@
+//! Lights, with the photometric rules of pbrt: emission is divided by the luminance of its spectrum, which for `rgb` is
+//! that of the colour space's white; a power or an illuminance in photometric units multiplies that.
+
+use std::f64::consts::PI;
+
+use lumbre_image::Image;
+use lumbre_math::{DAffine3, DMat3, DVec3, Transform};
+use lumbre_scene::{AreaLightDesc, EnvironmentDesc, EnvironmentMapping, LightDesc};
+use lumbre_shading::{ImageFilter, Spectrum, SpectrumValue, Wrap};
+
+use super::colour;
+use super::convert::{Converter, file_fault};
+use super::params::{Params, Type};
+use super::source::{AtSpot, Result};
+use super::state::{AreaLight, State};
+use super::textures::{SpectrumUse, single};
+use crate::Diagnostic;
+use crate::diagnostic::quoted;
+
+const KNOWN: [&str; 6] = ["point", "spot", "distant", "infinite", "goniometric", "projection"];
+
+impl Converter<'_, '_> {
+    pub fn light(&mut self, ty: &str, params: Params, state: &State) -> Result<()> {
+        let spot = params.spot;
+        let ctm = state.ctm[0];
+        // pbrt-v3.
+        for old in ["nsamples", "samples"] {
+            if params.has(old) {
+                self.upgraded(params.spot_of(old));
+                params.ignore(&[old]);
+            }
+        }
+        if self.open_object.is_some() {
+            self.note(spot, "a light inside an object stands in the world, once");
+        }
+        let light = match ty {
+            "point" => {
+                let scale = self.light_scale(&params)?;
+                let intensity = self.emission(&params, "I", state)? * scale * power(&params, 4.0 * PI)?;
+                let from = ctm.point(params.triple("from", Type::Point3, DVec3::ZERO)?);
+                LightDesc::Point { from, intensity }
+            }
+            "spot" => {
+                let scale = self.light_scale(&params)?;
+                let angle = params.float("coneangle", 30.0)?;
+                if !(0.0 < angle && angle < 180.0) {
+                    return params.out_of_range("coneangle", angle, "more than 0 and less than 180 degrees");
+                }
+                let delta = params.float("conedeltaangle", 5.0)?;
+                if !(0.0 <= delta && delta <= angle) {
+                    return params.out_of_range("conedeltaangle", delta, "0 to coneangle");
+                }
+                let (inner, outer) = ((angle - delta).to_radians().cos(), angle.to_radians().cos());
+                let around = 2.0 * PI * ((1.0 - inner) + 0.5 * (inner - outer));
+                let intensity = self.emission(&params, "I", state)? * scale * power(&params, around)?;
+                let from = params.triple("from", Type::Point3, DVec3::ZERO)?;
+                let to = params.triple("to", Type::Point3, DVec3::Z)?;
+                let Some(turn) = frame_along(to - from) else {
+                    return Err(params.spot_of("to").error("a spot shines from a point to itself: from and to are equal"));
+                };
+                LightDesc::Spot {
+                    world_from_light: ctm * Transform::translate(from) * turn,
+                    intensity,
+                    cone_angle: angle as f32,
+                    cone_delta_angle: delta as f32,
+                }
+            }
+            "distant" => {
+                let scale = self.light_scale(&params)?;
+                let emission = self.emission(&params, "L", state)?;
+                let lux = positive(&params, "illuminance")?.unwrap_or(1.0);
+                let from = params.triple("from", Type::Point3, DVec3::ZERO)?;
+                let to = params.triple("to", Type::Point3, DVec3::Z)?;
+                let towards = unit(ctm.vector(from - to));
+                if !towards.is_finite() {
+                    let message = "a distant light shines from a point to itself: from and to are equal";
+                    return Err(params.spot_of("to").error(message));
+                }
+                LightDesc::Distant { towards, irradiance: emission * scale * lux as f32 }
+            }
+            "infinite" => self.infinite(&params, state)?,
+            "goniometric" | "projection" => {
+                params.ignore_all();
+                self.note(spot, format!("light {} is not rendered yet: it is left out", quoted(ty)));
+                return Ok(());
+            }
+            _ => {
+                params.ignore_all();
+                self.unknown(spot, "light", ty, &KNOWN, "it is left out");
+                return Ok(());
+            }
+        };
+        self.done(&params);
+        self.budget.elements(1, "lights").at(spot)?;
+        self.scene.lights.push(light);
+        Ok(())
+    }
+
+    /// The colour of a light: the parameter of this name, else the white of the colour space.
+    fn emission(&mut self, params: &Params, name: &'static str, state: &State) -> Result<Spectrum> {
+        let given = self.light_colour(params, name)?;
+        Ok(given.unwrap_or_else(|| colour::light(&state.space, [1.0; 3])))
+    }
+
+    /// `scale`, a number; a colour in pbrt-v3.
+    fn light_scale(&mut self, params: &Params) -> Result<Spectrum> {
+        let types = [Type::Float, Type::Integer, Type::Rgb, Type::Spectrum];
+        let param = params.typed("scale", &types)?;
+        if param.is_some_and(|p| matches!(p.ty, Type::Rgb | Type::Spectrum)) {
+            self.upgraded(params.spot_of("scale"));
+            let value = self.spectrum_value(params, "scale", SpectrumUse::Coefficient)?;
+            return Ok(value.as_ref().map_or(Spectrum::WHITE, SpectrumValue::unbounded_rgb));
+        }
+        let scale = single(params, "scale", 1.0)?;
+        if scale < 0.0 {
+            return params.out_of_range("scale", f64::from(scale), "0 or more");
+        }
+        Ok(Spectrum::splat(scale))
+    }
+
+    fn infinite(&mut self, params: &Params, state: &State) -> Result<LightDesc> {
+        let spot = params.spot;
+        let world_from_light = state.ctm[0];
+        let mut scale = self.light_scale(params)?;
+        let given = self.light_colour(params, "L")?;
+        let lux = positive(params, "illuminance")?;
+        if params.find("portal").is_some() {
+            let message = "portals are not rendered yet: the light comes from all around";
+            self.note(params.spot_of("portal"), message);
+        }
+        let is_old = params.has("mapname");
+        if is_old {
+            self.upgraded(params.spot_of("mapname"));
+        }
+        let key = if is_old { "mapname" } else { "filename" };
+        let Some(filename) = params.string(key)?.map(str::to_owned) else {
+            let white = || colour::light(&state.space, [1.0; 3]);
+            let radiance = given.unwrap_or_else(white) * scale * lux.map_or(1.0, |lux| lux / PI) as f32;
+            return Ok(LightDesc::Infinite { world_from_light, radiance, image: None });
+        };
+        let at = params.spot_of(key);
+        match given {
+            // A factor in pbrt-v3.
+            Some(l) if is_old => scale *= l,
+            Some(_) => return Err(spot.error("an infinite light has both L and filename: give one of them")),
+            None => {}
+        }
+        let file = self.image_file(&filename, at)?;
+        let image = file.to_image(self.budget).map_err(|e| file_fault(at, e))?;
+        self.budget.release(file.bitmap.bytes() as u64);
+        let (width, height) = (image.width(), image.height());
+        let mapping = if width == height {
+            EnvironmentMapping::EqualArea
+        } else if width == height.saturating_mul(2) {
+            EnvironmentMapping::LatitudeLongitude
+        } else {
+            let wrong = Diagnostic::error(format!("{} is no environment map", quoted(&filename)));
+            let wrong = wrong.found(format!("{width} by {height} pixels"));
+            return Err(at.wrong(wrong.expected("a square (equal area) or twice as wide as high")));
+        };
+        if let Some(lux) = lux {
+            let found = upper_illuminance(&image, mapping);
+            if !(found > 0.0 && found.is_finite()) {
+                let message = "an illuminance is asked of an environment whose upper half is black";
+                return Err(params.spot_of("illuminance").error(message));
+            }
+            scale *= (lux / found) as f32;
+        }
+        // The edge of a latitude-longitude map is towards +x, as tools that convert maps for pbrt have it; in our
+        // description it is the middle.
+        let world_from_light = match mapping {
+            EnvironmentMapping::EqualArea => world_from_light,
+            EnvironmentMapping::LatitudeLongitude => world_from_light * half_turn(),
+        };
+        let image = Some(EnvironmentDesc { image: image.into(), mapping });
+        Ok(LightDesc::Infinite { world_from_light, radiance: scale, image })
+    }
+
+    /// The light of the next shapes.
+    pub fn area_light(&mut self, ty: &str, params: Params, state: &State) -> Result<Option<AreaLight>> {
+        let spot = params.spot;
+        match ty {
+            "diffuse" => {}
+            "area" => self.upgraded(spot),
+            _ => {
+                params.ignore_all();
+                self.unknown(spot, "area light", ty, &["diffuse"], "it is left out");
+                return Ok(None);
+            }
+        }
+        for old in ["nsamples", "samples"] {
+            if params.has(old) {
+                self.upgraded(params.spot_of(old));
+                params.ignore(&[old]);
+            }
+        }
+        let scale = self.light_scale(&params)?;
+        let given = self.light_colour(&params, "L")?;
+        let filename = params.string("filename")?.map(str::to_owned);
+        let (colour, image) = match (given, filename) {
+            (Some(_), Some(_)) => {
+                return Err(spot.error("an area light has both L and filename: give one of them"));
+            }
+            (None, Some(filename)) => {
+                let at = params.spot_of("filename");
+                let image = self.mip_map(&filename, at, None, Wrap::Clamp, ImageFilter::Bilinear)?;
+                (Spectrum::WHITE, Some(image))
+            }
+            (given, None) => (given.unwrap_or_else(|| colour::light(&state.space, [1.0; 3])), None),
+        };
+        let desc = AreaLightDesc {
+            radiance: colour * scale,
+            image,
+            two_sided: params.boolean("twosided", false)?,
+            power: positive(&params, "power")?.map(|lumens| lumens as f32),
+        };
+        self.done(&params);
+        Ok(Some(AreaLight { desc, spot }))
+    }
+}
+
+/// The factor that a total power in lumens asks for, where a factor of 1 gives `around` lumens.
+fn power(params: &Params, around: f64) -> Result<f32> {
+    Ok(positive(params, "power")?.map_or(1.0, |lumens| lumens / around) as f32)
+}
+
+/// A photometric quantity, which counts when it is more than 0.
+fn positive(params: &Params, name: &'static str) -> Result<Option<f64>> {
+    let value = f64::from(single(params, name, -1.0)?);
+    Ok((value > 0.0).then_some(value))
+}
+
+fn unit(v: DVec3) -> DVec3 {
+    (v / v.abs().max_element()).normalize()
+}
+
+/// A rotation that takes +z along `v`.
+fn frame_along(v: DVec3) -> Option<Transform> {
+    let z = unit(v);
+    let x = unit(z.any_orthogonal_vector());
+    let axes = DMat3::from_cols(x, z.cross(x), z);
+    axes.is_finite().then(|| Transform::from_affine(DAffine3::from_mat3(axes)).ok()).flatten()
+}
+
+/// Half a turn about z.
+fn half_turn() -> Transform {
+    Transform::rotate(DVec3::Z, 180.0).unwrap_or_default()
+}
+
+/// Illuminance, in units of the picture, of a horizontal surface under the upper half of an environment.
+fn upper_illuminance(image: &Image, mapping: EnvironmentMapping) -> f64 {
+    let (width, height) = (f64::from(image.width()), f64::from(image.height()));
+    let mut sum = 0.0;
+    for y in 0..image.height() {
+        let v = (f64::from(y) + 0.5) / height;
+        // The part of a row of latitudes that lies above the horizon, by its projection.
+        let edge = |y: u32| (PI * f64::from(y) / height).min(0.5 * PI).sin().powi(2);
+        let row = PI * (edge(y + 1) - edge(y)) / width;
+        for x in 0..image.width() {
+            let u = (f64::from(x) + 0.5) / width;
+            let projected = match mapping {
+                EnvironmentMapping::EqualArea => 4.0 * PI * equal_area_cos(u, v).max(0.0) / (width * height),
+                EnvironmentMapping::LatitudeLongitude => row,
+            };
+            sum += f64::from(image.pixel(x, y).luminance()) * projected;
+        }
+    }
+    sum
+}
+
+/// The height on the unit sphere of a point of the equal-area square (P. Clarberg, "Fast equal-area mapping of the
+/// (hemi)sphere using SIMD", Journal of Graphics Tools, 2008).
+fn equal_area_cos(u: f64, v: f64) -> f64 {
+    let signed = 1.0 - ((2.0 * u - 1.0).abs() + (2.0 * v - 1.0).abs());
+    let r = 1.0 - signed.abs();
+    (1.0 - r * r).copysign(signed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_uniform_sky_of_one_gives_pi() {
+        for (mapping, width) in
+            [(EnvironmentMapping::EqualArea, 64), (EnvironmentMapping::LatitudeLongitude, 128)]
+        {
+            let found = upper_illuminance(&Image::filled(width, 64, Spectrum::WHITE), mapping);
+            assert!((found - PI).abs() < 4e-3, "{mapping:?}: {found}");
+        }
+    }
+}

@@ -1,0 +1,468 @@
+//! Materials, those of pbrt-v3 upgraded.
+
+use std::sync::Arc;
+
+use lumbre_image::Encoding;
+use lumbre_math::Vec2;
+use lumbre_scene::MaterialId;
+use lumbre_shading::spectrum::conductor_rgb;
+use lumbre_shading::{
+    ImageFilter, ImageTexture, Mapping2d, Material, MaterialKind, Metal, NamedSpectrum, Roughness, Spectrum,
+    SpectrumTexture, SpectrumValue, Texture, Wrap,
+};
+
+use super::convert::{Converter, FloatArc, SpectrumArc};
+use super::params::{Params, Type, Values};
+use super::source::{Result, Spot};
+use super::textures::{SpectrumUse, single};
+use crate::Diagnostic;
+use crate::diagnostic::quoted;
+
+/// The materials of pbrt-v4 that have a name there.
+const KNOWN: [&str; 13] = [
+    "diffuse",
+    "coateddiffuse",
+    "coatedconductor",
+    "conductor",
+    "dielectric",
+    "thindielectric",
+    "diffusetransmission",
+    "mix",
+    "interface",
+    "hair",
+    "measured",
+    "subsurface",
+    "principled",
+];
+
+/// Mixtures may stand in each other so deep.
+const MAX_MIX_DEPTH: usize = 64;
+
+impl Converter<'_, '_> {
+    /// The current material from here on; `None` for an interface.
+    pub fn material(&mut self, ty: &str, params: Params) -> Result<Option<MaterialId>> {
+        let (material, depth) = self.build_material(ty, &params)?;
+        self.done(&params);
+        if matches!(material.kind, MaterialKind::Interface) {
+            return Ok(None);
+        }
+        Ok(Some(self.add_material(None, Some(material), depth, params.spot)))
+    }
+
+    pub fn named_material(&mut self, name: &str, at: Spot, params: Params) -> Result<()> {
+        let id = self.material_named(name, at);
+        if self.materials[id.0 as usize].material.is_some() {
+            return Err(at.error(format!("material {} is defined twice", quoted(name))));
+        }
+        let Some(ty) = params.string("type")?.map(str::to_owned) else {
+            return Err(params.spot.error(format!("material {} has no \"string type\"", quoted(name))));
+        };
+        let (material, depth) = self.build_material(&ty, &params)?;
+        self.done(&params);
+        let slot = &mut self.materials[id.0 as usize];
+        slot.material = Some(Arc::new(material));
+        slot.depth = depth;
+        Ok(())
+    }
+
+    /// A material, and how many mixtures stand in each other in it.
+    fn build_material(&mut self, ty: &str, params: &Params) -> Result<(Material, usize)> {
+        let spot = params.spot;
+        let mut depth = 1;
+        let kind = match ty {
+            "diffuse" => self.diffuse(params)?,
+            "conductor" => {
+                let roughness = self.roughness(params, ROUGHNESS, 0.0)?;
+                match self.metal(params, ["eta", "k", "reflectance"])? {
+                    Metal::Index { eta, k } => MaterialKind::Conductor { eta, k, roughness },
+                    Metal::Reflectance(reflectance) => {
+                        MaterialKind::ConductorReflectance { reflectance, roughness }
+                    }
+                }
+            }
+            "dielectric" => MaterialKind::Dielectric {
+                eta: self.index_of_refraction(params, "eta", 1.5)?,
+                roughness: self.roughness(params, ROUGHNESS, 0.0)?,
+            },
+            "thindielectric" => {
+                MaterialKind::ThinDielectric { eta: self.index_of_refraction(params, "eta", 1.5)? }
+            }
+            "coateddiffuse" => {
+                let roughness = self.roughness(params, ROUGHNESS, 0.0)?;
+                self.coated_diffuse(params, "reflectance", 0.5, roughness)?
+            }
+            "coatedconductor" => {
+                let names = ["conductor.roughness", "conductor.uroughness", "conductor.vroughness"];
+                let coat = ["interface.roughness", "interface.uroughness", "interface.vroughness"];
+                MaterialKind::CoatedConductor {
+                    metal: self.metal(params, ["conductor.eta", "conductor.k", "reflectance"])?,
+                    roughness: self.roughness(params, names, 0.0)?,
+                    interface_roughness: self.roughness(params, coat, 0.0)?,
+                    thickness: self.float_texture_or(params, "thickness", 0.01)?,
+                    interface_eta: self.index_of_refraction(params, "interface.eta", 1.5)?,
+                    g: self.float_texture_or(params, "g", 0.0)?,
+                    albedo: self.reflectance(params, "albedo", 0.0)?,
+                    max_depth: params.count("maxdepth", 10, 1)?,
+                    samples: params.count("nsamples", 1, 1)?,
+                }
+            }
+            "diffusetransmission" => MaterialKind::DiffuseTransmission {
+                reflectance: self.reflectance(params, "reflectance", 0.25)?,
+                transmittance: self.reflectance(params, "transmittance", 0.25)?,
+                scale: single(params, "scale", 1.0)?,
+            },
+            "mix" => {
+                let (kind, mixed) = self.mix(params)?;
+                depth = mixed;
+                kind
+            }
+            "interface" => MaterialKind::Interface,
+            "" | "none" => {
+                let message = format!("material {} is an old name of \"interface\"", quoted(ty));
+                self.note(spot, message);
+                MaterialKind::Interface
+            }
+            "hair" | "measured" | "subsurface" | "principled" | "openpbr" => {
+                let kind = match ty {
+                    "principled" | "openpbr" => {
+                        let reflectance =
+                            self.spectrum_texture(params, "base_color", SpectrumUse::Reflectance)?;
+                        match reflectance {
+                            Some(known) => MaterialKind::Diffuse { reflectance: known.texture },
+                            None => self.diffuse(params)?,
+                        }
+                    }
+                    _ => self.diffuse(params)?,
+                };
+                params.ignore_all();
+                let message =
+                    format!("material {} is not rendered yet: a diffuse one takes its place", quoted(ty));
+                self.note(spot, message);
+                kind
+            }
+            _ => match self.old_material(ty, params)? {
+                Some(kind) => {
+                    self.upgraded(spot);
+                    kind
+                }
+                None => {
+                    params.ignore_all();
+                    self.unknown(spot, "material", ty, &KNOWN, "a diffuse one takes its place");
+                    return Ok((Material::default_diffuse(), 1));
+                }
+            },
+        };
+        // Names that pbrt-v4 gives to the shape and the medium, and `MakeNamedMaterial` to the type.
+        params.ignore(&["type"]);
+        let mut material = Material::new(kind);
+        if !matches!(material.kind, MaterialKind::Mix { .. } | MaterialKind::Interface) {
+            material.displacement = self.float_texture(params, "displacement")?;
+            if params.has("bumpmap") {
+                self.upgraded(params.spot_of("bumpmap"));
+                material.displacement = self.float_texture(params, "bumpmap")?;
+            }
+            if let Some(filename) = params.string("normalmap")?.map(str::to_owned) {
+                let at = params.spot_of("normalmap");
+                let image = self.mip_map(
+                    &filename,
+                    at,
+                    Some(Encoding::Linear),
+                    Wrap::Repeat,
+                    ImageFilter::Bilinear,
+                )?;
+                let mapping = Mapping2d::Uv { scale: Vec2::ONE, delta: Vec2::ZERO };
+                material.normal_map = Some(ImageTexture { mapping, image, scale: 1.0, invert: false });
+            }
+        }
+        Ok((material, depth))
+    }
+
+    // Parts.
+
+    fn reflectance(&mut self, params: &Params, name: &'static str, default: f32) -> Result<SpectrumArc> {
+        self.spectrum_texture_or(params, name, SpectrumUse::Reflectance, default)
+    }
+
+    fn diffuse(&mut self, params: &Params) -> Result<MaterialKind> {
+        Ok(MaterialKind::Diffuse { reflectance: self.reflectance(params, "reflectance", 0.5)? })
+    }
+
+    /// The roughness group; `names` are of both axes, of u and of v.
+    fn roughness(&mut self, params: &Params, names: [&'static str; 3], default: f32) -> Result<Roughness> {
+        let both = self.float_texture_or(params, names[0], default)?;
+        let u = self.float_texture(params, names[1])?.unwrap_or_else(|| both.clone());
+        let v = self.float_texture(params, names[2])?.unwrap_or(both);
+        Ok(Roughness { u, v, remap: params.boolean("remaproughness", true)? })
+    }
+
+    /// An index of refraction: a number, or a spectrum's value at the yellow helium line.
+    fn index_of_refraction(&mut self, params: &Params, name: &'static str, default: f32) -> Result<f32> {
+        let types = [Type::Float, Type::Integer, Type::Rgb, Type::Blackbody, Type::Spectrum];
+        let eta = match params.typed(name, &types)? {
+            None => default,
+            Some(param) if matches!(param.ty, Type::Float | Type::Integer) => {
+                single(params, name, default)?
+            }
+            Some(_) => match self.spectrum_value(params, name, SpectrumUse::Coefficient)? {
+                Some(value) => value.index_of_refraction(),
+                None => default,
+            },
+        };
+        if 0.0 < eta && eta.is_finite() {
+            return Ok(eta);
+        }
+        params.out_of_range(name, f64::from(eta), "more than 0")
+    }
+
+    /// A metal, by the parameters of these names: η, k and the reflectance that excludes them.
+    fn metal(&mut self, params: &Params, [eta, k, reflectance]: [&'static str; 3]) -> Result<Metal> {
+        if let Some(known) = self.spectrum_texture(params, reflectance, SpectrumUse::Reflectance)? {
+            for other in [eta, k] {
+                if params.find(other).is_some() {
+                    let message = format!("{} excludes {}", quoted(reflectance), quoted(other));
+                    return Err(params.spot_of(other).error(message));
+                }
+            }
+            return Ok(Metal::Reflectance(known.texture));
+        }
+        let (eta, k) = self.conductor_indices(params, eta, k)?;
+        Ok(Metal::Index { eta, k })
+    }
+
+    fn conductor_indices(
+        &mut self,
+        params: &Params,
+        eta: &'static str,
+        k: &'static str,
+    ) -> Result<(SpectrumArc, SpectrumArc)> {
+        let is_texture = |name| params.find(name).is_some_and(|p| p.ty == Type::Texture);
+        let copper = |name| {
+            NamedSpectrum::from_name(name).map_or(SpectrumValue::Rgb(Spectrum::WHITE), SpectrumValue::Named)
+        };
+        if is_texture(eta) || is_texture(k) {
+            let mut one = |name, default| -> Result<SpectrumArc> {
+                let known = self.spectrum_texture(params, name, SpectrumUse::Coefficient)?;
+                Ok(known
+                    .map_or_else(|| constant(copper(default).unbounded_rgb()), |known| known.texture))
+            };
+            return Ok((one(eta, "metal-Cu-eta")?, one(k, "metal-Cu-k")?));
+        }
+        let usage = SpectrumUse::Coefficient;
+        let eta = self.spectrum_value(params, eta, usage)?.unwrap_or_else(|| copper("metal-Cu-eta"));
+        let k = self.spectrum_value(params, k, usage)?.unwrap_or_else(|| copper("metal-Cu-k"));
+        let (eta, k) = conductor_rgb(&eta, &k);
+        Ok((constant(eta), constant(k)))
+    }
+
+    fn coated_diffuse(
+        &mut self,
+        params: &Params,
+        reflectance: &'static str,
+        default: f32,
+        roughness: Roughness,
+    ) -> Result<MaterialKind> {
+        Ok(MaterialKind::CoatedDiffuse {
+            reflectance: self.reflectance(params, reflectance, default)?,
+            roughness,
+            thickness: self.float_texture_or(params, "thickness", 0.01)?,
+            eta: self.index_of_refraction(params, "eta", 1.5)?,
+            g: self.float_texture_or(params, "g", 0.0)?,
+            albedo: self.reflectance(params, "albedo", 0.0)?,
+            max_depth: params.count("maxdepth", 10, 1)?,
+            samples: params.count("nsamples", 1, 1)?,
+        })
+    }
+
+    fn mix(&mut self, params: &Params) -> Result<(MaterialKind, usize)> {
+        let old = params.has("namedmaterial1") || params.has("namedmaterial2");
+        let names: [String; 2] = if old {
+            self.upgraded(params.spot);
+            let one = |name| -> Result<String> {
+                let given = params.string(name)?.map(str::to_owned);
+                given.ok_or_else(|| params.spot.error(format!("a mix has no \"string {name}\"")))
+            };
+            [one("namedmaterial1")?, one("namedmaterial2")?]
+        } else {
+            let Some(param) = params.typed("materials", &[Type::String])? else {
+                return Err(params.spot.error("a mix has no \"string materials\""));
+            };
+            match param.strings()? {
+                [a, b] => [a.clone(), b.clone()],
+                _ => return Err(param.refuse("the names of two materials")),
+            }
+        };
+        let at = params.spot_of(if old { "namedmaterial1" } else { "materials" });
+        let mut depth = 1;
+        let mut find = |name: &str| -> Result<Arc<Material>> {
+            let slot = self.material_names.get(name).map(|id| &self.materials[id.0 as usize]);
+            let Some((material, slot)) = slot.and_then(|slot| Some((slot.material.clone()?, slot))) else {
+                let wrong =
+                    Diagnostic::error(format!("material {} is not defined before this mix", quoted(name)));
+                return Err(at.wrong(wrong.suggest(name, self.material_names.keys().map(String::as_str))));
+            };
+            if matches!(material.kind, MaterialKind::Interface) {
+                return Err(at.error(format!("an interface such as {} cannot be mixed", quoted(name))));
+            }
+            depth = depth.max(1 + slot.depth);
+            Ok(material)
+        };
+        let materials = [find(&names[0])?, find(&names[1])?];
+        if depth > MAX_MIX_DEPTH {
+            let message = format!("mixtures stand in each other more than {MAX_MIX_DEPTH} deep");
+            return Err(params.spot.error(message));
+        }
+        let amount = if old { self.old_amount(params)? } else { self.float_texture_or(params, "amount", 0.5)? };
+        Ok((MaterialKind::Mix { materials, amount }, depth))
+    }
+
+    // pbrt-v3.
+
+    /// pbrt-v3's weight of the first material, as a colour: the weight of the second as a number.
+    fn old_amount(&mut self, params: &Params) -> Result<FloatArc> {
+        let types = [Type::Float, Type::Rgb, Type::Spectrum, Type::Texture];
+        let Some(param) = params.typed("amount", &types)? else { return Ok(number(0.5)) };
+        let first = match param.ty {
+            Type::Float => number(single(params, "amount", 0.5)?),
+            Type::Texture if matches!(&param.values, Values::Strings(v) if v.len() == 1 && self.float_textures.contains_key(&v[0])) => {
+                self.float_texture_or(params, "amount", 0.5)?
+            }
+            Type::Texture => {
+                self.note(param.spot, "a coloured amount of a mix is not rendered: one half takes its place");
+                number(0.5)
+            }
+            _ => {
+                let value = self.spectrum_value(params, "amount", SpectrumUse::Reflectance)?;
+                number(value.map_or(0.5, |v| v.reflectance_rgb().average()))
+            }
+        };
+        Ok(match *first {
+            Texture::Constant(v) => number(1.0 - v),
+            _ => Arc::new(Texture::Mix { textures: [number(1.0), number(0.0)], amount: first }),
+        })
+    }
+
+    /// A material of pbrt-v3 by one of pbrt-v4; `None` when there is none of this name.
+    fn old_material(&mut self, ty: &str, params: &Params) -> Result<Option<MaterialKind>> {
+        let spot = params.spot;
+        // What no material of pbrt-v4 has a place for.
+        let dropped = |converter: &mut Self, names: &[&'static str]| {
+            for name in names.iter().filter(|name| params.has(name)) {
+                params.ignore(&[name]);
+                let message = format!("{} of pbrt-v3's material {} is left out", quoted(name), quoted(ty));
+                converter.note(params.spot_of(name), message);
+            }
+        };
+        Ok(Some(match ty {
+            "matte" => {
+                dropped(self, &["sigma"]);
+                MaterialKind::Diffuse { reflectance: self.reflectance(params, "Kd", 0.5)? }
+            }
+            "plastic" | "substrate" | "uber" => {
+                dropped(self, &["Ks", "Kr", "Kt", "opacity"]);
+                params.ignore(&["index"]);
+                let kd = if ty == "substrate" { 0.5 } else { 0.25 };
+                let roughness = self.roughness(params, ROUGHNESS, 0.1)?;
+                self.coated_diffuse(params, "Kd", kd, roughness)?
+            }
+            "mirror" => {
+                let roughness = Roughness { u: number(0.0), v: number(0.0), remap: false };
+                let reflectance = self.reflectance(params, "Kr", 0.9)?;
+                MaterialKind::ConductorReflectance { reflectance, roughness }
+            }
+            "metal" => {
+                let roughness = self.roughness(params, ROUGHNESS, 0.01)?;
+                let (eta, k) = self.conductor_indices(params, "eta", "k")?;
+                MaterialKind::Conductor { eta, k, roughness }
+            }
+            "glass" => {
+                dropped(self, &["Kr", "Kt"]);
+                let name = if params.has("index") { "index" } else { "eta" };
+                MaterialKind::Dielectric {
+                    eta: self.index_of_refraction(params, name, 1.5)?,
+                    roughness: self.roughness(params, ROUGHNESS, 0.0)?,
+                }
+            }
+            "translucent" => {
+                dropped(self, &["Ks", "roughness"]);
+                params.ignore(&["remaproughness"]);
+                let base = self.spectrum_texture(params, "Kd", SpectrumUse::Reflectance)?;
+                let mut share = |name| -> Result<Spectrum> {
+                    let known = self.spectrum_texture(params, name, SpectrumUse::Reflectance)?;
+                    Ok(known.map_or(Some(Spectrum::splat(0.5)), |known| known.value()).unwrap_or_else(|| {
+                        // A texture of it has no place here.
+                        Spectrum::splat(0.5)
+                    }))
+                };
+                let (reflect, transmit) = (share("reflect")?, share("transmit")?);
+                match base.as_ref().map_or(Some(Spectrum::splat(0.25)), |known| known.value()) {
+                    Some(kd) => MaterialKind::DiffuseTransmission {
+                        reflectance: constant(kd * reflect),
+                        transmittance: constant(kd * transmit),
+                        scale: 1.0,
+                    },
+                    None => {
+                        let texture = base.map_or_else(|| constant(Spectrum::splat(0.25)), |known| known.texture);
+                        let by = |share: Spectrum| -> SpectrumArc {
+                            let scale = number(share.average());
+                            Arc::new(Texture::Scale { texture: texture.clone(), scale })
+                        };
+                        MaterialKind::DiffuseTransmission {
+                            reflectance: by(reflect),
+                            transmittance: by(transmit),
+                            scale: 1.0,
+                        }
+                    }
+                }
+            }
+            "disney" => {
+                let color = self.reflectance(params, "color", 0.5)?;
+                let metallic = self.float_texture_or(params, "metallic", 0.0)?;
+                let rough = self.float_texture_or(params, "roughness", 0.5)?;
+                // Disney's α is the square of the roughness; of a texture the square has no place here.
+                let alpha = match *rough {
+                    Texture::Constant(r) => number(r * r),
+                    _ => rough,
+                };
+                let roughness = Roughness { u: alpha.clone(), v: alpha, remap: false };
+                let eta = self.index_of_refraction(params, "eta", 1.5)?;
+                params.ignore_all();
+                self.note(spot, "material \"disney\" is approximated by a coated diffuse or a conductor");
+                match *metallic {
+                    Texture::Constant(m) if m >= 0.5 => {
+                        MaterialKind::ConductorReflectance { reflectance: color, roughness }
+                    }
+                    _ => MaterialKind::CoatedDiffuse {
+                        reflectance: color,
+                        roughness,
+                        thickness: number(0.01),
+                        eta,
+                        g: number(0.0),
+                        albedo: constant(Spectrum::BLACK),
+                        max_depth: 10,
+                        samples: 1,
+                    },
+                }
+            }
+            "fourier" | "kdsubsurface" => {
+                let reflectance = self.reflectance(params, "Kd", 0.5)?;
+                params.ignore_all();
+                let message =
+                    format!("material {} is not rendered yet: a diffuse one takes its place", quoted(ty));
+                self.note(spot, message);
+                MaterialKind::Diffuse { reflectance }
+            }
+            _ => return Ok(None),
+        }))
+    }
+}
+
+/// The names of the roughness group.
+const ROUGHNESS: [&str; 3] = ["roughness", "uroughness", "vroughness"];
+
+fn number(v: f32) -> FloatArc {
+    Arc::new(Texture::Constant(v))
+}
+
+fn constant(colour: Spectrum) -> SpectrumArc {
+    Arc::new(SpectrumTexture::Constant(colour))
+}

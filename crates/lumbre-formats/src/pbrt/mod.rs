@@ -1,0 +1,99 @@
+//! Scenes in the language of pbrt-v4, with Lumbre's additions to it.
+//!
+//! Everything that the grammar has is read. What is not rendered yet is left out or replaced by what is nearest, with a
+//! warning at its place. Scenes of pbrt-v3 are upgraded while they are read, with one line that says so.
+//!
+//! Lumbre is kinder than pbrt in this: parameters and types that it does not know are warnings, numbers of a directive may
+//! stand in brackets, integers are taken for floats, latitude-longitude environment maps are taken beside equal-area ones,
+//! and reflectances above 1 are held to 1. `strict` makes each warning an error.
+//!
+//! [`ShapeDesc::index`](lumbre_scene::ShapeDesc::index) counts the `Shape` directives in the order in which they are read,
+//! those inside objects, in included files and those left out among them.
+
+mod colour;
+mod convert;
+mod images;
+mod lexer;
+mod lights;
+mod materials;
+mod params;
+mod parser;
+mod settings;
+mod shapes;
+mod source;
+mod state;
+mod subdivision;
+mod textures;
+
+use std::path::{Path, PathBuf};
+
+use lumbre_scene::SceneDesc;
+
+use crate::{Budget, Diagnostics, FormatError, Input};
+use convert::Converter;
+use parser::Parser;
+use source::Result;
+
+/// Reads scene files, one after another as if they were one; `-` is standard input.
+///
+/// Relative names of other files start at the folder of the first one.
+///
+/// # Errors
+/// What is wrong, with its place; see the [module](self).
+pub fn read_files(
+    paths: &[impl AsRef<Path>],
+    budget: &Budget,
+    diagnostics: &mut Diagnostics,
+) -> std::result::Result<SceneDesc, FormatError> {
+    let directory = paths.first().map(|path| match path.as_ref().parent() {
+        Some(parent) => parent.to_owned(),
+        None => PathBuf::new(),
+    });
+    read(directory, budget, diagnostics, |parser| {
+        for path in paths {
+            let path = path.as_ref();
+            if path.as_os_str() == "-" {
+                let input = Input::from_reader("standard input", std::io::stdin().lock(), budget)?;
+                parser.read(input, None)?;
+            } else {
+                parser.read(Input::open(path, budget)?, path.canonicalize().ok())?;
+            }
+        }
+        Ok(())
+    })
+}
+
+/// Reads a scene from bytes that come from elsewhere, such as standard input, under a name for messages.
+///
+/// Relative names of other files start at `directory`; without one, no other file is read, and a scene that asks for one is
+/// in error.
+///
+/// # Errors
+/// What is wrong, with its place; see the [module](self).
+pub fn read_bytes(
+    name: &str,
+    bytes: &[u8],
+    directory: Option<&Path>,
+    budget: &Budget,
+    diagnostics: &mut Diagnostics,
+) -> std::result::Result<SceneDesc, FormatError> {
+    read(directory.map(Path::to_owned), budget, diagnostics, |parser| {
+        parser.read(Input::from_reader(name, bytes, budget)?, None)
+    })
+}
+
+fn read<'b>(
+    directory: Option<PathBuf>,
+    budget: &'b Budget,
+    diagnostics: &mut Diagnostics,
+    inputs: impl FnOnce(&mut Parser<'b, '_>) -> Result<()>,
+) -> std::result::Result<SceneDesc, FormatError> {
+    let mut parser = Parser::new(Converter::new(budget, diagnostics, directory));
+    let outcome = inputs(&mut parser).and_then(|()| parser.finish());
+    let scene = match outcome {
+        Ok(()) => std::mem::take(&mut parser.converter.scene),
+        Err(fault) => return Err(fault.into_format_error(&parser.converter.files)),
+    };
+    diagnostics.check()?;
+    Ok(scene)
+}

@@ -1,0 +1,394 @@
+//! Parameter lists: what was given, what was asked for, and what is left over.
+
+use std::cell::{Cell, RefCell};
+use std::sync::Arc;
+
+use lumbre_image::ColourSpace;
+use lumbre_math::DVec3;
+
+use super::source::{Result, Spot};
+use crate::Diagnostic;
+use crate::diagnostic::quoted;
+
+/// The types of the scene language.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Type {
+    Bool,
+    Float,
+    Integer,
+    Point2,
+    Vector2,
+    Point3,
+    Vector3,
+    Normal,
+    String,
+    Texture,
+    Rgb,
+    Blackbody,
+    Spectrum,
+}
+
+impl Type {
+    /// The types under their names, those of pbrt-v3 that went away last.
+    const NAMES: [(&'static str, Self); 17] = [
+        ("bool", Self::Bool),
+        ("float", Self::Float),
+        ("integer", Self::Integer),
+        ("point2", Self::Point2),
+        ("vector2", Self::Vector2),
+        ("point3", Self::Point3),
+        ("vector3", Self::Vector3),
+        ("normal", Self::Normal),
+        ("string", Self::String),
+        ("texture", Self::Texture),
+        ("rgb", Self::Rgb),
+        ("blackbody", Self::Blackbody),
+        ("spectrum", Self::Spectrum),
+        ("point", Self::Point3),
+        ("vector", Self::Vector3),
+        ("color", Self::Rgb),
+        ("xyz", Self::Rgb),
+    ];
+    /// How many of the names are of pbrt-v4.
+    const CURRENT: usize = 13;
+
+    /// The type of this name, and whether the name is one of pbrt-v3 only.
+    pub fn from_name(name: &str) -> Option<(Self, bool)> {
+        let i = Self::NAMES.iter().position(|(n, _)| *n == name)?;
+        Some((Self::NAMES[i].1, i >= Self::CURRENT))
+    }
+
+    pub fn names() -> impl Iterator<Item = &'static str> {
+        Self::NAMES[..Self::CURRENT].iter().map(|(name, _)| *name)
+    }
+
+    pub fn name(self) -> &'static str {
+        Self::NAMES[self as usize].0
+    }
+
+    /// What its values are in the file.
+    pub fn wants(self) -> Wants {
+        match self {
+            Self::Bool => Wants::Bools,
+            Self::Integer => Wants::Integers,
+            Self::String | Self::Texture => Wants::Strings,
+            Self::Spectrum => Wants::NumbersOrStrings,
+            _ => Wants::Numbers,
+        }
+    }
+}
+
+/// What values a type takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Wants {
+    Bools,
+    Numbers,
+    Integers,
+    Strings,
+    NumbersOrStrings,
+}
+
+/// The values of one parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Values {
+    Bools(Vec<bool>),
+    /// Not NaN; infinite only where the file says `inf`.
+    Numbers(Vec<f64>),
+    Integers(Vec<i32>),
+    Strings(Vec<String>),
+}
+
+impl Values {
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Bools(v) => v.len(),
+            Self::Numbers(v) => v.len(),
+            Self::Integers(v) => v.len(),
+            Self::Strings(v) => v.len(),
+        }
+    }
+
+    /// What they are, for a message.
+    pub fn shown(&self) -> String {
+        match self {
+            Self::Bools(v) if v.len() == 1 => format!("bool {}", v[0]),
+            Self::Numbers(v) if v.len() == 1 => format!("{}", v[0]),
+            Self::Integers(v) if v.len() == 1 => format!("integer {}", v[0]),
+            Self::Strings(v) if v.len() == 1 => format!("string {}", quoted(&v[0])),
+            Self::Bools(v) => format!("{} bools", v.len()),
+            Self::Numbers(v) => format!("{} numbers", v.len()),
+            Self::Integers(v) => format!("{} integers", v.len()),
+            Self::Strings(v) => format!("{} strings", v.len()),
+        }
+    }
+}
+
+/// One parameter as given.
+#[derive(Clone, Debug)]
+pub(super) struct Param {
+    pub ty: Type,
+    pub name: Box<str>,
+    pub spot: Spot,
+    pub values: Values,
+    /// The colour space of its scope, for `rgb`.
+    pub space: ColourSpace,
+    pub used: Cell<bool>,
+}
+
+impl Param {
+    fn wrong(&self, found: impl std::fmt::Display, expected: &str) -> super::source::Fault {
+        let message = format!("wrong value for parameter {}", quoted(&self.name));
+        self.spot.wrong(Diagnostic::error(message).found(found).expected(expected))
+    }
+
+    /// An error at this parameter, with what was given.
+    pub fn refuse(&self, expected: &str) -> super::source::Fault {
+        self.wrong(self.values.shown(), expected)
+    }
+
+    fn of_type(&self, types: &[Type]) -> Result<&Self> {
+        if types.contains(&self.ty) {
+            return Ok(self);
+        }
+        let expected: Vec<&str> = types.iter().map(|t| t.name()).collect();
+        let message = format!("wrong type of parameter {}", quoted(&self.name));
+        let found = match self.values.len() {
+            1 if self.ty.wants() == Wants::Strings => format!("{} {}", self.ty.name(), self.text_shown()),
+            _ => self.ty.name().to_owned(),
+        };
+        Err(self.spot.wrong(Diagnostic::error(message).found(found).expected(expected.join(" or "))))
+    }
+
+    fn text_shown(&self) -> String {
+        match &self.values {
+            Values::Strings(v) => v.first().map_or_else(String::new, |s| quoted(s)),
+            _ => String::new(),
+        }
+    }
+
+    /// The numbers, which must be finite.
+    pub fn numbers(&self) -> Result<&[f64]> {
+        let numbers = self.numbers_or_infinite()?;
+        match numbers.iter().position(|v| !v.is_finite()) {
+            None => Ok(numbers),
+            Some(i) => Err(self.wrong(format!("{} at position {i}", numbers[i]), "finite numbers")),
+        }
+    }
+
+    fn numbers_or_infinite(&self) -> Result<&[f64]> {
+        match &self.values {
+            Values::Numbers(v) => Ok(v),
+            other => Err(self.wrong(other.shown(), "numbers")),
+        }
+    }
+
+    pub fn strings(&self) -> Result<&[String]> {
+        match &self.values {
+            Values::Strings(v) => Ok(v),
+            other => Err(self.wrong(other.shown(), "a string")),
+        }
+    }
+
+    /// The one string that it must have.
+    pub fn one_string(&self) -> Result<&str> {
+        match self.strings()? {
+            [one] => Ok(one),
+            other => Err(self.wrong(format!("{} strings", other.len()), "one string")),
+        }
+    }
+
+    /// The one number that it must have, infinite or not.
+    fn one_number(&self) -> Result<f64> {
+        match &self.values {
+            Values::Numbers(v) if v.len() == 1 => Ok(v[0]),
+            Values::Integers(v) if v.len() == 1 => Ok(f64::from(v[0])),
+            other => Err(self.wrong(other.shown(), "one number")),
+        }
+    }
+
+    /// The `N` finite numbers that it must have.
+    pub fn exactly<const N: usize>(&self) -> Result<[f64; N]> {
+        let numbers = self.numbers()?;
+        numbers.try_into().map_err(|_| self.wrong(self.values.shown(), &format!("{N} numbers")))
+    }
+}
+
+/// Defaults that `Attribute` set for one kind of entity, one of each name.
+pub(super) type Defaults = Arc<Vec<Arc<Param>>>;
+
+/// The parameters of one entity. Each question marks what answers it as used and remembers the name, so that what was
+/// given in vain is found with the nearest right name.
+#[derive(Debug)]
+pub(super) struct Params {
+    /// What they belong to, such as `shape "sphere"`.
+    pub owner: String,
+    /// Where that stands.
+    pub spot: Spot,
+    pub own: Vec<Param>,
+    pub defaults: Defaults,
+    asked: RefCell<Vec<&'static str>>,
+}
+
+impl Params {
+    pub fn new(owner: String, spot: Spot, own: Vec<Param>, defaults: Defaults) -> Self {
+        Self { owner, spot, own, defaults, asked: RefCell::default() }
+    }
+
+    /// The parameter of this name that counts: the last one given, else the default of the scope.
+    pub fn find(&self, name: &'static str) -> Option<&Param> {
+        self.asked.borrow_mut().push(name);
+        let mut found = None;
+        for param in self.own.iter().filter(|p| *p.name == *name) {
+            param.used.set(true);
+            found = Some(param);
+        }
+        found.or_else(|| self.defaults.iter().map(|p| &**p).find(|p| *p.name == *name))
+    }
+
+    /// The parameter of this name, which must be of one of these types.
+    pub fn typed(&self, name: &'static str, types: &[Type]) -> Result<Option<&Param>> {
+        self.find(name).map(|p| p.of_type(types)).transpose()
+    }
+
+    /// Whether there is one of this name, without a use of it.
+    pub fn has(&self, name: &str) -> bool {
+        self.own.iter().any(|p| *p.name == *name) || self.defaults.iter().any(|p| *p.name == *name)
+    }
+
+    /// The place of this parameter, else of the entity.
+    pub fn spot_of(&self, name: &str) -> Spot {
+        self.own.iter().rev().find(|p| *p.name == *name).map_or(self.spot, |p| p.spot)
+    }
+
+    /// Names that are known but change nothing.
+    pub fn ignore(&self, names: &[&'static str]) {
+        for name in names {
+            self.find(name);
+        }
+    }
+
+    /// Marks all as used, for an entity that is left out as a whole.
+    pub fn ignore_all(&self) {
+        self.own.iter().for_each(|p| p.used.set(true));
+    }
+
+    /// A finite number.
+    pub fn float(&self, name: &'static str, default: f64) -> Result<f64> {
+        Ok(self.float_opt(name)?.unwrap_or(default))
+    }
+
+    pub fn float_opt(&self, name: &'static str) -> Result<Option<f64>> {
+        let Some(param) = self.typed(name, &[Type::Float, Type::Integer])? else { return Ok(None) };
+        let value = param.one_number()?;
+        if value.is_finite() { Ok(Some(value)) } else { Err(param.wrong(value, "a finite number")) }
+    }
+
+    /// A number that may be `inf`.
+    pub fn float_or_infinite(&self, name: &'static str, default: f64) -> Result<f64> {
+        let param = self.typed(name, &[Type::Float, Type::Integer])?;
+        param.map_or(Ok(default), Param::one_number)
+    }
+
+    /// A number that f32 can hold, greater than `above`.
+    pub fn float_above(&self, name: &'static str, default: f64, above: f64) -> Result<f64> {
+        let value = self.float(name, default)?;
+        if above < value && value <= f64::from(f32::MAX) {
+            return Ok(value);
+        }
+        self.out_of_range(name, value, &format!("more than {above}"))
+    }
+
+    /// A number that is not negative.
+    pub fn float_at_least_zero(&self, name: &'static str, default: f64) -> Result<f64> {
+        let value = self.float(name, default)?;
+        if 0.0 <= value && value <= f64::from(f32::MAX) {
+            return Ok(value);
+        }
+        self.out_of_range(name, value, "0 or more")
+    }
+
+    /// An error about the value of a parameter.
+    pub fn out_of_range<T>(&self, name: &str, found: f64, expected: &str) -> Result<T> {
+        let message = format!("parameter {} of {} is out of range", quoted(name), self.owner);
+        Err(self.spot_of(name).wrong(Diagnostic::error(message).found(found).expected(expected)))
+    }
+
+    pub fn integer(&self, name: &'static str, default: i32) -> Result<i32> {
+        let Some(param) = self.typed(name, &[Type::Integer])? else { return Ok(default) };
+        match &param.values {
+            Values::Integers(v) if v.len() == 1 => Ok(v[0]),
+            other => Err(param.wrong(other.shown(), "one integer")),
+        }
+    }
+
+    /// An integer of at least `least`.
+    pub fn count(&self, name: &'static str, default: u32, least: u32) -> Result<u32> {
+        let value = self.integer(name, default as i32)?;
+        match u32::try_from(value) {
+            Ok(count) if least <= count => Ok(count),
+            _ => self.out_of_range(name, f64::from(value), &format!("{least} or more")),
+        }
+    }
+
+    pub fn boolean(&self, name: &'static str, default: bool) -> Result<bool> {
+        let Some(param) = self.typed(name, &[Type::Bool])? else { return Ok(default) };
+        match &param.values {
+            Values::Bools(v) if v.len() == 1 => Ok(v[0]),
+            other => Err(param.wrong(other.shown(), "true or false")),
+        }
+    }
+
+    pub fn string(&self, name: &'static str) -> Result<Option<&str>> {
+        self.typed(name, &[Type::String])?.map(Param::one_string).transpose()
+    }
+
+    /// One of some words.
+    pub fn choice<T: Copy>(
+        &self,
+        name: &'static str,
+        choices: &[(&'static str, T)],
+        default: T,
+    ) -> Result<T> {
+        let Some(param) = self.typed(name, &[Type::String])? else { return Ok(default) };
+        let word = param.one_string()?;
+        match choices.iter().find(|(choice, _)| *choice == word) {
+            Some((_, value)) => Ok(*value),
+            None => {
+                let names: Vec<&str> = choices.iter().map(|(name, _)| *name).collect();
+                let message = format!("wrong value for parameter {}", quoted(name));
+                let wrong = Diagnostic::error(message).found(format!("string {}", quoted(word)));
+                let wrong = wrong.suggest(word, names.iter().copied());
+                Err(param.spot.wrong(wrong.expected(format!("one of {}", names.join(", ")))))
+            }
+        }
+    }
+
+    /// One point, vector or normal.
+    pub fn triple(&self, name: &'static str, ty: Type, default: DVec3) -> Result<DVec3> {
+        Ok(self.triple_opt(name, ty)?.unwrap_or(default))
+    }
+
+    pub fn triple_opt(&self, name: &'static str, ty: Type) -> Result<Option<DVec3>> {
+        let Some(param) = self.typed(name, &[ty])? else { return Ok(None) };
+        Ok(Some(DVec3::from_array(param.exactly::<3>()?)))
+    }
+
+    pub fn integers(&self, name: &'static str) -> Result<Option<&[i32]>> {
+        let Some(param) = self.typed(name, &[Type::Integer])? else { return Ok(None) };
+        match &param.values {
+            Values::Integers(v) => Ok(Some(v)),
+            other => Err(param.wrong(other.shown(), "integers")),
+        }
+    }
+
+    /// The parameters that nothing asked for, each as a warning.
+    pub fn unused(&self) -> Vec<(Spot, Diagnostic)> {
+        let asked = self.asked.borrow();
+        let left = self.own.iter().filter(|p| !p.used.get());
+        left.map(|p| {
+            let message = format!("unknown parameter {} of {}", quoted(&p.name), self.owner);
+            (p.spot, Diagnostic::warning(message).suggest(&p.name, asked.iter().copied()))
+        })
+        .collect()
+    }
+}

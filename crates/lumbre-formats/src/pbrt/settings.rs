@@ -1,0 +1,392 @@
+//! Camera, film, filter, sampler, integrator and options.
+
+use lumbre_image::ColourSpace;
+use lumbre_math::{Transform, Vec2};
+use lumbre_scene::{
+    Camera, CameraKind, FilterDesc, IntegratorDesc, IntegratorKind, SamplerDesc, SamplerKind, SphericalMapping,
+};
+
+use super::convert::Converter;
+use super::params::{Params, Type};
+use super::source::{Result, Spot};
+use crate::Diagnostic;
+use crate::diagnostic::quoted;
+
+impl Converter<'_, '_> {
+    pub fn camera(&mut self, ty: &str, params: Params, world_from_camera: Transform) -> Result<()> {
+        let spot = params.spot;
+        let shutter_open = params.float("shutteropen", 0.0)?;
+        let shutter_close = params.float("shutterclose", 1.0)?;
+        if shutter_close <= shutter_open {
+            let wrong = Diagnostic::error("the shutter closes before it opens").found(shutter_close);
+            let at = params.spot_of("shutterclose");
+            return Err(at.wrong(wrong.expected(format!("shutterclose after shutteropen = {shutter_open}"))));
+        }
+        self.exposure.shutter = shutter_close - shutter_open;
+        let frame_aspect = params.float_opt("frameaspectratio")?;
+        if let Some(aspect) = frame_aspect.filter(|a| *a <= 0.0) {
+            return params.out_of_range("frameaspectratio", aspect, "more than 0");
+        }
+        let screen_window = match params.typed("screenwindow", &[Type::Float])? {
+            None => None,
+            Some(param) => {
+                let window = param.exactly::<4>()?;
+                if window[0] == window[1] || window[2] == window[3] {
+                    return Err(param.refuse("xmin, xmax, ymin, ymax of a window with an area"));
+                }
+                Some(window)
+            }
+        };
+        let lens_radius = params.float_at_least_zero("lensradius", 0.0)?;
+        let focal_distance = params.float_above("focaldistance", 1e6, 0.0)?;
+        let perspective = |fov| CameraKind::Perspective { fov, lens_radius, focal_distance };
+        let kind = match ty {
+            "perspective" => {
+                let half = params.float_opt("halffov")?;
+                let fov = params.float("fov", half.map_or(90.0, |half| 2.0 * half))?;
+                if half.is_some() {
+                    self.upgraded(params.spot_of("halffov"));
+                }
+                if !(0.0 < fov && fov < 180.0) {
+                    return params.out_of_range("fov", fov, "more than 0 and less than 180 degrees");
+                }
+                perspective(fov)
+            }
+            "orthographic" => CameraKind::Orthographic { lens_radius, focal_distance },
+            "spherical" => {
+                let mappings = [
+                    ("equalarea", SphericalMapping::EqualArea),
+                    ("equirectangular", SphericalMapping::Equirectangular),
+                ];
+                CameraKind::Spherical { mapping: params.choice("mapping", &mappings, SphericalMapping::EqualArea)? }
+            }
+            "environment" => {
+                self.upgraded(spot);
+                CameraKind::Spherical { mapping: SphericalMapping::Equirectangular }
+            }
+            "realistic" => {
+                params.ignore_all();
+                self.note(spot, "camera \"realistic\" is not rendered yet: a perspective one takes its place");
+                perspective(90.0)
+            }
+            _ => {
+                params.ignore_all();
+                let known = ["perspective", "orthographic", "spherical", "realistic"];
+                self.unknown(spot, "camera", ty, &known, "a perspective one takes its place");
+                perspective(90.0)
+            }
+        };
+        self.done(&params);
+        self.scene.cameras = vec![Camera {
+            name: None,
+            kind,
+            world_from_camera,
+            frame_aspect,
+            screen_window,
+            shutter_open,
+            shutter_close,
+        }];
+        Ok(())
+    }
+
+    pub fn film(&mut self, ty: &str, params: Params, space: ColourSpace) -> Result<()> {
+        let spot = params.spot;
+        match ty {
+            "rgb" => {}
+            "image" => self.upgraded(spot),
+            "gbuffer" | "spectral" => {
+                params.ignore(&["coordinatesystem", "nbuckets", "lambdamin", "lambdamax"]);
+                let message = format!("film {} is not rendered yet: an rgb one takes its place", quoted(ty));
+                self.note(spot, message);
+            }
+            _ => self.unknown(spot, "film", ty, &["rgb", "gbuffer", "spectral"], "an rgb one takes its place"),
+        }
+        let width = params.count("xresolution", 1280, 1)?;
+        let height = params.count("yresolution", 720, 1)?;
+        let pixel_bounds = match params.integers("pixelbounds")? {
+            None => None,
+            Some(&[x0, x1, y0, y1]) => {
+                let clip = |v: i32, size: u32| u32::try_from(v).unwrap_or(0).min(size);
+                let clipped = [clip(x0, width), clip(x1, width), clip(y0, height), clip(y1, height)];
+                if clipped[0] >= clipped[1] || clipped[2] >= clipped[3] {
+                    let wrong = Diagnostic::error("pixelbounds hold no pixel of the film");
+                    let wrong = wrong.found(format!("{x0} {x1} {y0} {y1}"));
+                    let expected = format!("x0 x1 y0 y1 within 0 {width} 0 {height}");
+                    return Err(params.spot_of("pixelbounds").wrong(wrong.expected(expected)));
+                }
+                Some(clipped)
+            }
+            Some(other) => {
+                let wrong = Diagnostic::error("wrong value for parameter \"pixelbounds\"");
+                let wrong = wrong.found(format!("{} integers", other.len())).expected("4 integers");
+                return Err(params.spot_of("pixelbounds").wrong(wrong));
+            }
+        };
+        let crop_window = match params.typed("cropwindow", &[Type::Float])? {
+            None => None,
+            Some(param) => {
+                let [x0, x1, y0, y1] = param.exactly::<4>()?.map(|v| v.clamp(0.0, 1.0));
+                // pbrt takes either end first.
+                let window = [x0.min(x1), x0.max(x1), y0.min(y1), y0.max(y1)];
+                if window[0] == window[1] || window[2] == window[3] {
+                    return Err(param.refuse("x0 x1 y0 y1 in [0, 1] of a window with an area"));
+                }
+                Some(window)
+            }
+        };
+        self.exposure.iso = params.float_above("iso", 100.0, 0.0)?;
+        // pbrt-v3: a factor on the picture, and the largest luminance of a sample.
+        self.exposure.scale = params.float_above("scale", 1.0, 0.0)?;
+        params.ignore(&["maxsampleluminance"]);
+        for old in ["scale", "maxsampleluminance"] {
+            if params.has(old) {
+                self.upgraded(params.spot_of(old));
+            }
+        }
+        if let Some(sensor) = params.string("sensor")?.filter(|s| *s != "cie1931") {
+            let message = format!("sensor {} is not rendered yet: cie1931 takes its place", quoted(sensor));
+            self.note(params.spot_of("sensor"), message);
+        }
+        if params.float("whitebalance", 0.0)? != 0.0 {
+            self.note(params.spot_of("whitebalance"), "white balance is not rendered yet: it is left out");
+        }
+        let max_component = params.float_or_infinite("maxcomponentvalue", f64::INFINITY)?;
+        if max_component <= 0.0 {
+            return params.out_of_range("maxcomponentvalue", max_component, "more than 0");
+        }
+        // The diagonal is for the realistic camera alone, and files are as precise as their format.
+        params.ignore(&["diagonal", "savefp16"]);
+        if space != ColourSpace::REC709 {
+            self.note(spot, "a film in another colour space is not made yet: the picture is in that of sRGB");
+        }
+        let filename = params.string("filename")?.map(str::to_owned);
+        self.done(&params);
+        let film = &mut self.scene.film;
+        film.filename = filename;
+        (film.width, film.height) = (Some(width), Some(height));
+        (film.pixel_bounds, film.crop_window) = (pixel_bounds, crop_window);
+        film.max_component = max_component as f32;
+        Ok(())
+    }
+
+    pub fn sampler(&mut self, ty: &str, params: Params) -> Result<()> {
+        let spot = params.spot;
+        let known = ["zsobol", "paddedsobol", "sobol", "halton", "pmj02bn", "independent", "stratified"];
+        let kind = match ty {
+            "independent" => SamplerKind::Independent,
+            "random" => {
+                self.upgraded(spot);
+                SamplerKind::Independent
+            }
+            "02sequence" | "lowdiscrepancy" | "maxmindist" => {
+                self.upgraded(spot);
+                SamplerKind::Sobol
+            }
+            _ if known.contains(&ty) => SamplerKind::Sobol,
+            _ => {
+                self.unknown(spot, "sampler", ty, &known, "zsobol takes its place");
+                SamplerKind::Sobol
+            }
+        };
+        let spp = if ty == "stratified" {
+            let (x, y) = (params.count("xsamples", 4, 1)?, params.count("ysamples", 4, 1)?);
+            params.ignore(&["dimensions"]);
+            x.saturating_mul(y)
+        } else {
+            params.count("pixelsamples", if kind == SamplerKind::Independent { 4 } else { 16 }, 1)?
+        };
+        if let Some(how) = params.string("randomization")? {
+            let choices = ["fastowen", "owen", "permutedigits", "none"];
+            if !choices.contains(&how) {
+                let wrong = Diagnostic::error("wrong value for parameter \"randomization\"");
+                let wrong = wrong.found(quoted(how)).suggest(how, choices).expected(choices.join(", "));
+                return Err(params.spot_of("randomization").wrong(wrong));
+            }
+            if how == "none" {
+                let message = "samples are always randomised: randomization \"none\" is left out";
+                self.note(params.spot_of("randomization"), message);
+            }
+        }
+        if !params.boolean("jitter", true)? {
+            self.note(params.spot_of("jitter"), "samples are always randomised: jitter false is left out");
+        }
+        let seed = params.integer("seed", 0)?;
+        self.done(&params);
+        // The bits of the number, so that -1 is a seed too.
+        self.scene.sampler = SamplerDesc { kind, spp: Some(spp), seed: u64::from(seed as u32) };
+        Ok(())
+    }
+
+    pub fn filter(&mut self, ty: &str, params: Params) -> Result<()> {
+        let spot = params.spot;
+        let radius = |default: f64| -> Result<Vec2> {
+            let x = params.float_above("xradius", params_v3(&params, "xwidth", default)?, 0.0)?;
+            let y = params.float_above("yradius", params_v3(&params, "ywidth", default)?, 0.0)?;
+            Ok(Vec2::new(x as f32, y as f32))
+        };
+        let filter = match ty {
+            "gaussian" => {
+                // pbrt-v3 writes exp(-alpha x²).
+                let sigma = match params.float_opt("alpha")? {
+                    Some(alpha) if alpha > 0.0 => (0.5 / alpha).sqrt(),
+                    Some(alpha) => return params.out_of_range("alpha", alpha, "more than 0"),
+                    None => 0.5,
+                };
+                let sigma = params.float_above("sigma", sigma, 0.0)?;
+                FilterDesc::Gaussian { radius: radius(1.5)?, sigma: sigma as f32 }
+            }
+            "box" => FilterDesc::Box { radius: radius(0.5)? },
+            "mitchell" => {
+                let (b, c) = (params.float("B", 1.0 / 3.0)?, params.float("C", 1.0 / 3.0)?);
+                FilterDesc::Mitchell { radius: radius(2.0)?, b: b as f32, c: c as f32 }
+            }
+            "sinc" => {
+                let tau = params.float_above("tau", 3.0, 0.0)?;
+                FilterDesc::Sinc { radius: radius(4.0)?, tau: tau as f32 }
+            }
+            "triangle" => FilterDesc::Triangle { radius: radius(2.0)? },
+            _ => {
+                params.ignore_all();
+                let known = ["gaussian", "box", "mitchell", "sinc", "triangle"];
+                self.unknown(spot, "filter", ty, &known, "gaussian takes its place");
+                FilterDesc::default()
+            }
+        };
+        for old in ["alpha", "xwidth", "ywidth"] {
+            if params.has(old) {
+                self.upgraded(params.spot_of(old));
+            }
+        }
+        self.done(&params);
+        self.scene.filter = filter;
+        Ok(())
+    }
+
+    pub fn integrator(&mut self, ty: &str, params: Params) -> Result<()> {
+        let spot = params.spot;
+        let path = |params: &Params| -> Result<IntegratorKind> {
+            Ok(IntegratorKind::Path { regularize: params.boolean("regularize", false)? })
+        };
+        let kind = match ty {
+            "path" | "volpath" | "simplepath" | "simplevolpath" => path(&params)?,
+            "whitted" => IntegratorKind::Whitted,
+            "directlighting" => {
+                self.upgraded(spot);
+                IntegratorKind::Whitted
+            }
+            "ambientocclusion" => {
+                let max_distance = params.float_or_infinite("maxdistance", f64::INFINITY)?;
+                if max_distance <= 0.0 {
+                    return params.out_of_range("maxdistance", max_distance, "more than 0");
+                }
+                IntegratorKind::AmbientOcclusion { cosine: params.boolean("cossample", true)?, max_distance }
+            }
+            "normals" => IntegratorKind::Normals,
+            "depth" => IntegratorKind::Depth,
+            "albedo" => IntegratorKind::Albedo,
+            "uv" => IntegratorKind::Uv,
+            "bdpt" | "mlt" | "sppm" | "lightpath" | "randomwalk" | "function" => {
+                let kind = path(&params)?;
+                params.ignore_all();
+                let message = format!("integrator {} is not rendered yet: path takes its place", quoted(ty));
+                self.note(spot, message);
+                kind
+            }
+            _ => {
+                let kind = path(&params)?;
+                let known = [
+                    "path", "volpath", "simplepath", "simplevolpath", "whitted", "ambientocclusion", "normals",
+                    "depth", "albedo", "uv", "bdpt", "mlt", "sppm", "lightpath", "randomwalk",
+                ];
+                self.unknown(spot, "integrator", ty, &known, "path takes its place");
+                kind
+            }
+        };
+        let max_depth = params.count("maxdepth", 5, 0)?;
+        // They change how fast the picture gets there, and not the picture.
+        params.ignore(&["lightsampler", "samplelights", "samplebsdf"]);
+        for old in ["lightsamplestrategy", "rrthreshold", "strategy"] {
+            if params.has(old) {
+                params.ignore(&[old]);
+                self.upgraded(params.spot_of(old));
+            }
+        }
+        self.done(&params);
+        self.scene.integrator = IntegratorDesc { kind, max_depth };
+        Ok(())
+    }
+
+    pub fn accelerator(&mut self, ty: &str, params: Params) -> Result<()> {
+        // Lumbre builds its own tree, and every tree gives the same picture.
+        params.ignore_all();
+        let known = ["bvh", "kdtree"];
+        if !known.contains(&ty) {
+            self.unknown(params.spot, "accelerator", ty, &known, "none is needed");
+        }
+        Ok(())
+    }
+
+    pub fn option(&mut self, name: &str, at: Spot, value: &str) -> Result<()> {
+        let plain: String = name.chars().filter(|c| !matches!(c, '-' | '_')).collect();
+        match plain.to_ascii_lowercase().as_str() {
+            "seed" => match value.parse::<i64>() {
+                Ok(seed) if i32::try_from(seed).is_ok() => self.sampler_seed = Some(u64::from(seed as i32 as u32)),
+                _ => {
+                    let wrong = Diagnostic::error("wrong value of the option \"seed\"").found(quoted(value));
+                    return Err(at.wrong(wrong.expected("an integer")));
+                }
+            },
+            // They change nothing here: there is no pass on a GPU, and no precision to win from another space.
+            "wavefront" | "rendercoordsys" | "displacementedgescale" => {}
+            "pixelstats" | "msereferenceimage" | "msereferenceout" => {
+                self.note(at, format!("the option {} is left out: it is not of the picture", quoted(name)));
+            }
+            "disablepixeljitter" | "disabletexturefiltering" | "disablewavelengthjitter" | "forcediffuse" => {
+                match value {
+                    "false" => {}
+                    "true" => self.note(at, format!("the option {} is not rendered yet", quoted(name))),
+                    _ => {
+                        let wrong = Diagnostic::error(format!("wrong value of the option {}", quoted(name)));
+                        return Err(at.wrong(wrong.found(quoted(value)).expected("true or false")));
+                    }
+                }
+            }
+            other => {
+                let known = [
+                    "seed", "wavefront", "rendercoordsys", "displacementedgescale", "pixelstats",
+                    "msereferenceimage", "msereferenceout", "disablepixeljitter", "disabletexturefiltering",
+                    "disablewavelengthjitter", "forcediffuse",
+                ];
+                let unknown = Diagnostic::warning(format!("unknown option {}", quoted(name)));
+                self.warn(at, unknown.suggest(other, known));
+            }
+        }
+        Ok(())
+    }
+
+    /// What needs more than one directive: exposure, the seed, and the camera of a scene without one.
+    pub fn finish_settings(&mut self) -> Result<()> {
+        let exposure = self.exposure.shutter * self.exposure.iso / 100.0 * self.exposure.scale;
+        self.scene.film.exposure = exposure as f32;
+        if let Some(seed) = self.sampler_seed {
+            self.scene.sampler.seed = seed;
+        }
+        if self.scene.cameras.is_empty() {
+            self.scene.cameras.push(Camera {
+                name: None,
+                kind: CameraKind::Perspective { fov: 90.0, lens_radius: 0.0, focal_distance: 1e6 },
+                world_from_camera: Transform::IDENTITY,
+                frame_aspect: None,
+                screen_window: None,
+                shutter_open: 0.0,
+                shutter_close: 1.0,
+            });
+        }
+        Ok(())
+    }
+}
+
+/// The value under the name that pbrt-v3 gave it, else the default.
+fn params_v3(params: &Params, name: &'static str, default: f64) -> Result<f64> {
+    if params.has(name) { params.float_above(name, default, 0.0) } else { Ok(default) }
+}

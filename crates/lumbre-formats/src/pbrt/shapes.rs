@@ -1,0 +1,610 @@
+//! Shapes: exact ones in double precision, meshes, and combinations of solids.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use lumbre_geometry::{
+    Aabb, Cone, Cuboid, Cylinder, Disk, Hyperboloid, Paraboloid, Plane, Quadric, Shape, ShapeError,
+    Sphere, Torus, Triangle,
+};
+use lumbre_math::{DVec3, Transform, Vec2, Vec3};
+use lumbre_scene::{CsgDesc, CsgOperation, GeometryDesc, MeshDesc, ShapeDesc};
+use lumbre_shading::Texture;
+
+use super::convert::{Converter, MeshFile, file_fault};
+use super::params::{Params, Type};
+use super::source::{AtSpot, Result, Spot};
+use super::state::State;
+use super::subdivision;
+use super::textures::vec3;
+use crate::diagnostic::quoted;
+use crate::ply::read_ply;
+use crate::{Diagnostic, Diagnostics, Input};
+
+const KNOWN: [&str; 17] = [
+    "sphere",
+    "plane",
+    "disk",
+    "triangle",
+    "box",
+    "cylinder",
+    "cone",
+    "torus",
+    "paraboloid",
+    "hyperboloid",
+    "quadric",
+    "csg",
+    "trianglemesh",
+    "bilinearmesh",
+    "plymesh",
+    "loopsubdiv",
+    "curve",
+];
+
+/// Solids may be combined so deep.
+const MAX_CSG_DEPTH: usize = 64;
+
+/// A form, with what a CSG comes to: its leaves and its depth.
+struct Form {
+    geometry: GeometryDesc,
+    leaves: u64,
+    depth: usize,
+}
+
+impl From<GeometryDesc> for Form {
+    fn from(geometry: GeometryDesc) -> Self {
+        Self { geometry, leaves: 1, depth: 0 }
+    }
+}
+
+impl Converter<'_, '_> {
+    pub fn shape(&mut self, ty: &str, params: Params, state: &State) -> Result<()> {
+        let spot = params.spot;
+        let index = self.shape_count;
+        self.shape_count = index.checked_add(1).ok_or_else(|| spot.error("more than 2^32 shapes"))?;
+        self.budget.elements(1, "shapes").at(spot)?;
+        let alpha = self.float_texture(&params, "alpha")?;
+        let alpha = alpha.filter(|alpha| !matches!(**alpha, Texture::Constant(v) if v == 1.0));
+        let Some(form) = self.form(ty, &params)? else {
+            params.ignore_all();
+            return Ok(());
+        };
+        // pbrt-v3.
+        if params.has("shadowalpha") {
+            params.ignore(&["shadowalpha"]);
+            self.upgraded(params.spot_of("shadowalpha"));
+        }
+        self.done(&params);
+        let area_light = self.area_light_of(&form.geometry, spot, state)?;
+        let shape = ShapeDesc {
+            index,
+            geometry: form.geometry,
+            world_from_object: state.ctm[0],
+            reverse_orientation: state.reverse_orientation,
+            material: state.material,
+            area_light,
+            alpha,
+        };
+        self.push_shape(shape, form.leaves, form.depth);
+        Ok(())
+    }
+
+    /// The light of the state, where this shape can give it.
+    fn area_light_of(
+        &mut self,
+        geometry: &GeometryDesc,
+        spot: Spot,
+        state: &State,
+    ) -> Result<Option<lumbre_scene::AreaLightDesc>> {
+        let Some(light) = &state.area_light else { return Ok(None) };
+        if self.open_object.is_some() {
+            self.note(spot, "a shape inside an object gives no light: its area light is left out");
+            return Ok(None);
+        }
+        let lightless = match geometry {
+            GeometryDesc::Exact(shape) if shape.bounds(&Transform::IDENTITY).is_none() => "an infinite shape",
+            GeometryDesc::Csg(_) => "a csg",
+            _ => "",
+        };
+        if !lightless.is_empty() {
+            let from = self.files.place(light.spot);
+            return Err(spot.error(format!("{lightless} cannot be an area light (that of {from})")));
+        }
+        match state.material {
+            None => {
+                self.note(spot, "an interface gives no light: the area light of this shape is left out");
+                return Ok(None);
+            }
+            Some(id) => {
+                let is_known = self.materials[id.0 as usize].material.is_some();
+                let is_interface = self.materials[id.0 as usize]
+                    .material
+                    .as_ref()
+                    .is_some_and(|m| matches!(m.kind, lumbre_shading::MaterialKind::Interface));
+                if !is_known || is_interface {
+                    self.lights_to_check.push((id, spot));
+                }
+            }
+        }
+        Ok(Some(light.desc.clone()))
+    }
+
+    /// The form of a shape; `None` for one that is left out, which has been said.
+    fn form(&mut self, ty: &str, params: &Params) -> Result<Option<Form>> {
+        let point = |name, default| params.triple(name, Type::Point3, default);
+        let exact = match ty {
+            "sphere" => {
+                let radius = params.float("radius", 1.0)?;
+                let sphere = Sphere::new(point("center", DVec3::ZERO)?, radius);
+                let zmin = params.float_or_infinite("zmin", -radius)?;
+                let zmax = params.float_or_infinite("zmax", radius)?;
+                let phimax = params.float("phimax", 360.0)?;
+                let is_whole = zmin <= -radius && radius <= zmax && phimax == 360.0;
+                let part = |s: Sphere| if is_whole { Ok(s) } else { s.partial(zmin, zmax, phimax) };
+                sphere.and_then(part).map(Shape::from)
+            }
+            "plane" => {
+                let normal = params.triple("normal", Type::Normal, DVec3::Z)?;
+                Plane::new(point("point", DVec3::ZERO)?, normal).map(Shape::from)
+            }
+            "disk" => {
+                let normal = params.triple("normal", Type::Normal, DVec3::Z)?;
+                let height = params.float("height", 0.0)?;
+                let up = if height == 0.0 { DVec3::ZERO } else { height * normal.normalize_or_zero() };
+                let center = point("center", DVec3::ZERO)? + up;
+                let (radius, inner) = (params.float("radius", 1.0)?, params.float("innerradius", 0.0)?);
+                let disk = Disk::new(center, normal, radius, inner);
+                let phimax = params.float("phimax", 360.0)?;
+                disk.and_then(|d| d.partial(phimax)).map(Shape::from)
+            }
+            "triangle" => {
+                let corner = |name| -> Result<DVec3> {
+                    let given = params.triple_opt(name, Type::Point3)?;
+                    given.ok_or_else(|| params.spot.error(format!("a triangle has no \"point3 {name}\"")))
+                };
+                Triangle::new(corner("p0")?, corner("p1")?, corner("p2")?).map(Shape::from)
+            }
+            "box" => {
+                Cuboid::new(point("p0", DVec3::NEG_ONE)?, point("p1", DVec3::ONE)?).map(Shape::from)
+            }
+            "cylinder" => {
+                let radius = params.float("radius", 1.0)?;
+                let caps = params.boolean("caps", false)?;
+                let cylinder = match ends(params)? {
+                    Some((p0, p1)) => Cylinder::new(p0, p1, radius, caps),
+                    None => {
+                        let zmin = params.float_or_infinite("zmin", -1.0)?;
+                        let zmax = params.float_or_infinite("zmax", 1.0)?;
+                        Cylinder::along_z(radius, zmin, zmax, caps)
+                    }
+                };
+                let phimax = params.float("phimax", 360.0)?;
+                cylinder.and_then(|c| c.partial(phimax)).map(Shape::from)
+            }
+            "cone" => {
+                let caps = params.boolean("caps", false)?;
+                let cone = if params.has("apex") || params.has("axis") || params.has("angle") {
+                    let Some(angle) = params.float_opt("angle")? else {
+                        return Err(params.spot.error("a cone with an apex or an axis has no \"float angle\""));
+                    };
+                    let axis = params.triple("axis", Type::Vector3, DVec3::Z)?;
+                    let height = params.float_or_infinite("height", f64::INFINITY)?;
+                    Cone::nappe(point("apex", DVec3::ZERO)?, axis, angle, height, caps)
+                } else {
+                    let (radius, top) = (params.float("radius", 1.0)?, params.float("topradius", 0.0)?);
+                    let (p0, p1) = match ends(params)? {
+                        Some(ends) => ends,
+                        None => (DVec3::ZERO, DVec3::new(0.0, 0.0, params.float("height", 1.0)?)),
+                    };
+                    Cone::new(p0, p1, radius, top, caps)
+                };
+                let phimax = params.float("phimax", 360.0)?;
+                cone.and_then(|c| c.partial(phimax)).map(Shape::from)
+            }
+            "torus" => {
+                let axis = params.triple("axis", Type::Vector3, DVec3::Z)?;
+                let (major, minor) = (params.float("majorradius", 1.0)?, params.float("minorradius", 0.25)?);
+                Torus::new(point("center", DVec3::ZERO)?, axis, major, minor).map(Shape::from)
+            }
+            "paraboloid" => {
+                let radius = params.float("radius", 1.0)?;
+                let (zmin, zmax) = (params.float("zmin", 0.0)?, params.float("zmax", 1.0)?);
+                Paraboloid::new(radius, zmin, zmax, params.float("phimax", 360.0)?).map(Shape::from)
+            }
+            "hyperboloid" => {
+                let (p1, p2) = (point("p1", DVec3::ZERO)?, point("p2", DVec3::ONE)?);
+                Hyperboloid::new(p1, p2, params.float("phimax", 360.0)?).map(Shape::from)
+            }
+            "quadric" => {
+                let Some(param) = params.typed("coefficients", &[Type::Float])? else {
+                    return Err(params.spot.error("a quadric has no \"float coefficients\""));
+                };
+                let clip = ends(params)?.map(|(p0, p1)| Aabb::around([p0, p1]));
+                Quadric::new(param.exactly::<10>()?, clip).map(Shape::from)
+            }
+            "csg" => return self.csg(params).map(Some),
+            "trianglemesh" => return Ok(self.triangle_mesh(params)?.map(Form::from)),
+            "bilinearmesh" => return Ok(self.bilinear_mesh(params)?.map(Form::from)),
+            "plymesh" => return self.ply_mesh(params).map(|g| Some(g.into())),
+            "loopsubdiv" => return self.loop_subdivision(params).map(|g| Some(g.into())),
+            "curve" => {
+                self.note(params.spot, "shape \"curve\" is not rendered yet: it is left out");
+                return Ok(None);
+            }
+            "heightfield" | "nurbs" => {
+                self.upgraded(params.spot);
+                let message = format!("shape {} of pbrt-v3 is not rendered: it is left out", quoted(ty));
+                self.note(params.spot, message);
+                return Ok(None);
+            }
+            _ => {
+                self.unknown(params.spot, "shape", ty, &KNOWN, "it is left out");
+                return Ok(None);
+            }
+        };
+        match exact {
+            Ok(shape) => Ok(Some(GeometryDesc::Exact(shape).into())),
+            Err(ShapeError::OutOfRange { parameter, found, expected }) => {
+                params.out_of_range(parameter, found, expected)
+            }
+            Err(ShapeError::Degenerate(why)) => Err(params.spot.error(why)),
+            Err(other) => Err(params.spot.error(format!("this shape cannot be made: {other:?}"))),
+        }
+    }
+
+    // Combinations of solids.
+
+    fn csg(&mut self, params: &Params) -> Result<Form> {
+        let operations = [
+            ("union", CsgOperation::Union),
+            ("intersection", CsgOperation::Intersection),
+            ("difference", CsgOperation::Difference),
+        ];
+        let operation = params.choice("operation", &operations, CsgOperation::Union)?;
+        let Some(param) = params.typed("operands", &[Type::String])? else {
+            return Err(params.spot.error("a csg has no \"string operands\""));
+        };
+        let names = param.strings()?;
+        if names.len() < 2 {
+            return Err(param.refuse("the names of two objects or more"));
+        }
+        let at = param.spot;
+        let (mut leaves, mut depth) = (0u64, 1);
+        let mut operands = vec![];
+        for name in names {
+            let id = self.object_names.get(name).copied();
+            let slot = id.map(|id| &self.objects[id.0 as usize]);
+            let Some((slot, object)) = slot.and_then(|slot| Some((slot, slot.object.as_ref()?))) else {
+                let wrong = Diagnostic::error(format!("object {} is not defined before this csg", quoted(name)));
+                return Err(at.wrong(wrong.suggest(name, self.object_names.keys().map(String::as_str))));
+            };
+            if id == self.open_object {
+                return Err(at.error(format!("object {} is an operand of a csg inside it", quoted(name))));
+            }
+            if object.shapes.is_empty() {
+                return Err(at.error(format!("object {} has no shape: it is no operand of a csg", quoted(name))));
+            }
+            for shape in &object.shapes {
+                let not_solid = match &shape.geometry {
+                    GeometryDesc::Exact(exact) if !exact.is_solid() => exact.name(),
+                    GeometryDesc::BilinearMesh(_) => "bilinearmesh",
+                    GeometryDesc::Mesh(mesh) => {
+                        self.meshes_to_close.push((mesh.clone(), at));
+                        continue;
+                    }
+                    _ => continue,
+                };
+                let message = format!("object {} has a {not_solid} that is no solid", quoted(name));
+                let expected = "a sphere, box, torus, capped cylinder or cone, closed quadric, plane, closed mesh or csg";
+                return Err(at.wrong(Diagnostic::error(message).expected(expected)));
+            }
+            leaves = leaves.saturating_add(slot.leaves);
+            depth = depth.max(1 + slot.depth);
+            // Each operand is written out: objects in objects in a csg may come to very many.
+            self.budget.elements(slot.leaves, "operands of a csg").at(at)?;
+            let bytes = slot.leaves.saturating_mul(size_of::<ShapeDesc>() as u64);
+            self.budget.bytes(bytes, "operands of a csg").at(at)?;
+            if depth > MAX_CSG_DEPTH {
+                return Err(at.error(format!("solids are combined more than {MAX_CSG_DEPTH} deep")));
+            }
+            operands.push(object.shapes.clone());
+        }
+        Ok(Form { geometry: GeometryDesc::Csg(CsgDesc { operation, operands }), leaves, depth })
+    }
+
+    // Meshes.
+
+    /// Vertices in single precision.
+    fn positions(&mut self, params: &Params, shape: &str) -> Result<Vec<Vec3>> {
+        let Some(param) = params.typed("P", &[Type::Point3])? else {
+            return Err(params.spot.error(format!("a {shape} has no \"point3 P\"")));
+        };
+        let positions = triples(params, "P", Type::Point3)?.unwrap_or_default();
+        if positions.is_empty() {
+            return Err(param.refuse("points"));
+        }
+        let bytes = positions.len() as u64 * 12;
+        self.budget.bytes(bytes, "vertices").at(param.spot)?;
+        Ok(positions)
+    }
+
+    /// The indices, `N` a face, checked; faces that cannot be used are dropped where the reader is lenient.
+    fn faces<const N: usize>(
+        &mut self,
+        params: &Params,
+        vertices: usize,
+        shape: &str,
+    ) -> Result<(Vec<[u32; N]>, Vec<usize>)> {
+        let Some(indices) = params.integers("indices")? else {
+            if vertices == N {
+                return Ok((vec![std::array::from_fn(|i| i as u32)], vec![0]));
+            }
+            let message = format!("a {shape} of other than {N} points has no \"integer indices\"");
+            return Err(params.spot.error(message));
+        };
+        let spot = params.spot_of("indices");
+        let indices = if indices.len() % N == 0 {
+            indices
+        } else if N == 3 && self.diagnostics.is_lenient() {
+            self.note(spot, "indices that make no whole triangle are dropped");
+            &indices[..indices.len() - indices.len() % N]
+        } else {
+            let wrong = Diagnostic::error("wrong number of indices").found(indices.len());
+            return Err(spot.wrong(wrong.expected(format!("a multiple of {N}"))));
+        };
+        self.budget.elements((indices.len() / N) as u64, "faces").at(spot)?;
+        self.budget.bytes(indices.len() as u64 * 4, "faces").at(spot)?;
+        let mut faces = Vec::with_capacity(indices.len() / N);
+        let mut kept = vec![];
+        let mut dropped = 0u64;
+        for (i, face) in indices.chunks_exact(N).enumerate() {
+            let bad = face.iter().position(|&v| usize::try_from(v).map_or(true, |v| v >= vertices));
+            match bad {
+                None => {
+                    faces.push(std::array::from_fn(|k| face[k] as u32));
+                    kept.push(i);
+                }
+                Some(_) if self.diagnostics.is_lenient() => dropped += 1,
+                Some(k) => {
+                    let wrong = Diagnostic::error(format!("index {} of the {shape} is out of range", i * N + k));
+                    let wrong = wrong.found(face[k]).expected(format!("0 to {}", vertices as i64 - 1));
+                    return Err(spot.wrong(wrong));
+                }
+            }
+        }
+        if dropped > 0 {
+            let message = "faces with an index out of range are dropped";
+            self.warn(spot, Diagnostic::warning(message).found(format!("{dropped} of them")));
+        }
+        Ok((faces, kept))
+    }
+
+    /// Normals, uv, tangents and face numbers.
+    fn mesh_parts(&mut self, params: &Params, mesh: &mut MeshDesc, kept: &[usize], faces: usize) -> Result<()> {
+        let vertices = mesh.positions.len();
+        let same = |name: &'static str, found: usize| -> Result<()> {
+            if found == vertices {
+                return Ok(());
+            }
+            let wrong = Diagnostic::error(format!("wrong number of values for parameter {}", quoted(name)));
+            let expected = format!("{vertices}, as many as points");
+            Err(params.spot_of(name).wrong(wrong.found(found).expected(expected)))
+        };
+        mesh.normals = triples(params, "N", Type::Normal)?;
+        if let Some(normals) = &mesh.normals {
+            same("N", normals.len())?;
+        }
+        mesh.tangents = triples(params, "S", Type::Vector3)?;
+        if let Some(tangents) = &mesh.tangents {
+            same("S", tangents.len())?;
+        }
+        // pbrt-v3 has `float uv` and `float st` too.
+        let uv = ["uv", "st"].into_iter().find(|name| params.has(name));
+        if let Some(name) = uv {
+            let Some(param) = params.typed(name, &[Type::Point2, Type::Float])? else { return Ok(()) };
+            if param.ty == Type::Float || name == "st" {
+                self.upgraded(param.spot);
+            }
+            let numbers = param.numbers()?;
+            if numbers.len() % 2 != 0 {
+                return Err(param.refuse("pairs of numbers"));
+            }
+            same(name, numbers.len() / 2)?;
+            mesh.uvs = Some(numbers.chunks_exact(2).map(|c| Vec2::new(c[0] as f32, c[1] as f32)).collect());
+            if mesh.uvs.iter().flatten().any(|uv| !uv.is_finite()) {
+                return Err(param.refuse("numbers of single precision"));
+            }
+        }
+        if let Some(indices) = params.integers("faceIndices")? {
+            let spot = params.spot_of("faceIndices");
+            if indices.len() != faces {
+                let wrong = Diagnostic::error("wrong number of values for parameter \"faceIndices\"");
+                let expected = format!("{faces}, as many as faces");
+                return Err(spot.wrong(wrong.found(indices.len()).expected(expected)));
+            }
+            // The bits of the number: what it means is the writer's business.
+            mesh.face_indices = Some(kept.iter().map(|&i| indices[i] as u32).collect());
+        }
+        let numbers = [3 * mesh.normals.as_ref().map_or(0, Vec::len), 3 * mesh.tangents.as_ref().map_or(0, Vec::len)];
+        let bytes = 4 * (numbers[0] + numbers[1] + 2 * mesh.uvs.as_ref().map_or(0, Vec::len)) as u64;
+        self.budget.bytes(bytes, "vertices").at(params.spot)
+    }
+
+    fn triangle_mesh(&mut self, params: &Params) -> Result<Option<GeometryDesc>> {
+        let positions = self.positions(params, "trianglemesh")?;
+        let (triangles, kept) = self.faces::<3>(params, positions.len(), "trianglemesh")?;
+        let given = params.integers("indices")?.map_or(1, |indices| indices.len() / 3);
+        let mut mesh = MeshDesc { positions, triangles, ..MeshDesc::default() };
+        self.mesh_parts(params, &mut mesh, &kept, given)?;
+        if params.has("discarddegenerateUVs") {
+            params.ignore(&["discarddegenerateUVs"]);
+            self.upgraded(params.spot_of("discarddegenerateUVs"));
+        }
+        if mesh.triangles.is_empty() {
+            self.note(params.spot_of("indices"), "a mesh without a face is left out");
+            params.ignore_all();
+            return Ok(None);
+        }
+        Ok(Some(GeometryDesc::Mesh(Arc::new(mesh))))
+    }
+
+    fn bilinear_mesh(&mut self, params: &Params) -> Result<Option<GeometryDesc>> {
+        let positions = self.positions(params, "bilinearmesh")?;
+        let (quads, kept) = self.faces::<4>(params, positions.len(), "bilinearmesh")?;
+        let given = params.integers("indices")?.map_or(1, |indices| indices.len() / 4);
+        let mut mesh = MeshDesc { positions, quads, ..MeshDesc::default() };
+        self.mesh_parts(params, &mut mesh, &kept, given)?;
+        if params.find("emissionfilename").is_some() {
+            let message = "an emission picture is not rendered yet: the patches shine evenly";
+            self.note(params.spot_of("emissionfilename"), message);
+        }
+        if mesh.quads.is_empty() {
+            self.note(params.spot_of("indices"), "a mesh without a face is left out");
+            params.ignore_all();
+            return Ok(None);
+        }
+        Ok(Some(GeometryDesc::BilinearMesh(Arc::new(mesh))))
+    }
+
+    fn loop_subdivision(&mut self, params: &Params) -> Result<GeometryDesc> {
+        let positions = self.positions(params, "loopsubdiv")?;
+        let (faces, _) = self.faces::<3>(params, positions.len(), "loopsubdiv")?;
+        if params.has("nlevels") {
+            self.upgraded(params.spot_of("nlevels"));
+        }
+        let levels = params.count("nlevels", 3, 0)?;
+        let levels = params.count("levels", levels, 0)?;
+        params.ignore(&["scheme"]);
+        // Each level has four times the faces: this stops the tenth level of a big mesh before it is made.
+        let at = params.spot_of("levels");
+        let growth = 4u64.checked_pow(levels).unwrap_or(u64::MAX);
+        let last = growth.saturating_mul(faces.len() as u64);
+        self.budget.elements(last, "faces of a loopsubdiv").at(at)?;
+        let held = self.budget.hold(last.saturating_mul(160), "faces of a loopsubdiv").at(at)?;
+        let mesh = subdivision::subdivide(&positions, &faces, levels).map_err(|wrong| {
+            let spot = params.spot_of("indices");
+            spot.error(format!("a loopsubdiv needs a mesh whose faces join two by two: {wrong}"))
+        })?;
+        drop(held);
+        self.budget.bytes((mesh.positions.len() * 24 + mesh.triangles.len() * 12) as u64, "faces").at(at)?;
+        Ok(GeometryDesc::Mesh(Arc::new(mesh)))
+    }
+
+    /// A mesh from a file, which is read at the end, with the others.
+    fn ply_mesh(&mut self, params: &Params) -> Result<GeometryDesc> {
+        let Some(filename) = params.string("filename")?.map(str::to_owned) else {
+            return Err(params.spot.error("a plymesh has no \"string filename\""));
+        };
+        let at = params.spot_of("filename");
+        let path = self.resolve(&filename, at)?;
+        if params.find("displacement").is_some() {
+            let message = "displacement of a plymesh is not rendered yet: the mesh stays as it is";
+            self.note(params.spot_of("displacement"), message);
+        }
+        params.ignore(&["edgelength"]);
+        let file = *self.mesh_paths.entry(path.clone()).or_insert_with(|| {
+            self.mesh_files.push(MeshFile { path, spot: at, placeholder: Arc::default() });
+            self.mesh_files.len() - 1
+        });
+        Ok(GeometryDesc::Mesh(self.mesh_files[file].placeholder.clone()))
+    }
+
+    /// Reads the mesh files, several at a time; answers each under its placeholder.
+    pub fn read_meshes(&mut self) -> Result<HashMap<*const MeshDesc, Arc<MeshDesc>>> {
+        let files = std::mem::take(&mut self.mesh_files);
+        let strictness = self.diagnostics.strictness();
+        let budget = self.budget;
+        let next = std::sync::atomic::AtomicUsize::new(0);
+        let threads = std::thread::available_parallelism().map_or(1, |n| n.get()).min(files.len());
+        // Each file keeps what was said of it, so that warnings come in the order of the scene.
+        let read = |file: &MeshFile| {
+            let mut diagnostics = Diagnostics::with_strictness(strictness);
+            let mesh = Input::open(&file.path, budget)
+                .and_then(|input| read_ply(&input, input.name(), budget, &mut diagnostics));
+            (mesh, diagnostics)
+        };
+        let mut results: Vec<_> = files.iter().map(|_| None).collect();
+        std::thread::scope(|scope| {
+            let work = || {
+                let mut done = vec![];
+                loop {
+                    let i = next.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+                    let Some(file) = files.get(i) else { return done };
+                    done.push((i, read(file)));
+                }
+            };
+            let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
+            for worker in workers {
+                for (i, result) in worker.join().unwrap_or_default() {
+                    results[i] = Some(result);
+                }
+            }
+        });
+        let mut meshes = HashMap::new();
+        for (file, result) in files.iter().zip(results) {
+            // A worker that died has left no answer: the file is read again here.
+            let (mesh, diagnostics) = result.unwrap_or_else(|| read(file));
+            self.diagnostics.append(diagnostics);
+            let mesh = mesh.map_err(|e| file_fault(file.spot, e))?;
+            meshes.insert(Arc::as_ptr(&file.placeholder), Arc::new(mesh));
+        }
+        // Pointers stand for placeholders as long as these live.
+        self.mesh_files = files;
+        Ok(meshes)
+    }
+}
+
+/// The two corners or ends, both or none.
+fn ends(params: &Params) -> Result<Option<(DVec3, DVec3)>> {
+    let p0 = params.triple_opt("p0", Type::Point3)?;
+    let p1 = params.triple_opt("p1", Type::Point3)?;
+    match (p0, p1) {
+        (Some(p0), Some(p1)) => Ok(Some((p0, p1))),
+        (None, None) => Ok(None),
+        (Some(_), None) => Err(params.spot_of("p0").error("p0 without p1")),
+        (None, Some(_)) => Err(params.spot_of("p1").error("p1 without p0")),
+    }
+}
+
+/// A list of points, vectors or normals in single precision.
+fn triples(params: &Params, name: &'static str, ty: Type) -> Result<Option<Vec<Vec3>>> {
+    let Some(param) = params.typed(name, &[ty])? else { return Ok(None) };
+    let numbers = param.numbers()?;
+    if numbers.len() % 3 != 0 {
+        return Err(param.refuse("three numbers each"));
+    }
+    let list: Option<Vec<Vec3>> = numbers.chunks_exact(3).map(vec3).collect();
+    list.map(Some).ok_or_else(|| param.refuse("numbers of single precision"))
+}
+
+/// Whether each edge of a mesh is shared by exactly two faces that run along it in opposite directions, where vertices at
+/// the same place count as one.
+pub(super) fn is_closed(mesh: &MeshDesc) -> bool {
+    let mut places = HashMap::new();
+    let vertex: Vec<u32> = mesh
+        .positions
+        .iter()
+        .map(|p| {
+            // Adding 0 makes one zero of two.
+            let key = (*p + Vec3::ZERO).to_array().map(f32::to_bits);
+            let next = places.len() as u32;
+            *places.entry(key).or_insert(next)
+        })
+        .collect();
+    let mut balance: HashMap<(u32, u32), (u32, u32)> = HashMap::new();
+    let triangles = mesh.triangles.iter().map(|f| &f[..]);
+    let mut any = false;
+    for face in triangles.chain(mesh.quads.iter().map(|f| &f[..])) {
+        for (i, &a) in face.iter().enumerate() {
+            let (a, b) = (vertex[a as usize], vertex[face[(i + 1) % face.len()] as usize]);
+            if a == b {
+                // An edge without a length borders nothing.
+                continue;
+            }
+            any = true;
+            let count = balance.entry((a.min(b), a.max(b))).or_default();
+            *if a < b { &mut count.0 } else { &mut count.1 } += 1;
+        }
+    }
+    any && balance.values().all(|count| *count == (1, 1))
+}

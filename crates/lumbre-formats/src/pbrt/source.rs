@@ -1,0 +1,97 @@
+//! Where words of a scene stand: files, the includes that led to them, and faults with their place.
+
+use std::sync::Arc;
+
+use crate::{Diagnostic, FormatError, LimitError, Place};
+
+/// A line and a column of one of the [`Files`], both counted from 1, the column in characters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Spot {
+    pub file: u32,
+    pub line: u32,
+    pub column: u32,
+}
+
+/// The files read so far, with the place that asked for each.
+#[derive(Debug, Default)]
+pub(super) struct Files {
+    list: Vec<(Arc<str>, Option<Spot>)>,
+}
+
+impl Files {
+    pub fn add(&mut self, name: Arc<str>, from: Option<Spot>) -> u32 {
+        self.list.push((name, from));
+        self.list.len() as u32 - 1
+    }
+
+    pub fn name(&self, file: u32) -> &Arc<str> {
+        &self.list[file as usize].0
+    }
+
+    pub fn place(&self, spot: Spot) -> Place {
+        Place::text(self.name(spot.file).clone(), u64::from(spot.line), u64::from(spot.column))
+    }
+
+    /// `diagnostic` at `spot`, with the chain of includes that led there.
+    pub fn locate(&self, spot: Spot, diagnostic: Diagnostic) -> Diagnostic {
+        let mut located = diagnostic.at(self.place(spot));
+        let mut from = self.list[spot.file as usize].1;
+        while let Some(include) = from {
+            located = located.included_from(self.place(include));
+            from = self.list[include.file as usize].1;
+        }
+        located
+    }
+}
+
+/// Why reading stops.
+#[derive(Debug)]
+pub(super) enum Fault {
+    /// The scene is wrong here.
+    Input(Spot, Box<Diagnostic>),
+    /// A limit is met here.
+    Limit(Spot, LimitError),
+    /// Another reader has already said what and where.
+    Other(Box<FormatError>),
+}
+
+pub(super) type Result<T, E = Fault> = std::result::Result<T, E>;
+
+impl Fault {
+    pub fn into_format_error(self, files: &Files) -> FormatError {
+        match self {
+            Self::Input(spot, diagnostic) => files.locate(spot, *diagnostic).into(),
+            Self::Limit(spot, source) => FormatError::Limit { place: Some(files.place(spot)), source },
+            Self::Other(error) => *error,
+        }
+    }
+}
+
+impl From<FormatError> for Fault {
+    fn from(error: FormatError) -> Self {
+        Self::Other(Box::new(error))
+    }
+}
+
+impl Spot {
+    /// An error here.
+    pub fn wrong(self, diagnostic: Diagnostic) -> Fault {
+        Fault::Input(self, Box::new(diagnostic))
+    }
+
+    /// An error here that is only a message.
+    pub fn error(self, message: impl Into<String>) -> Fault {
+        self.wrong(Diagnostic::error(message))
+    }
+}
+
+/// Puts a limit at its place.
+pub(super) trait AtSpot<T> {
+    fn at(self, spot: Spot) -> Result<T>;
+}
+
+impl<T> AtSpot<T> for std::result::Result<T, LimitError> {
+    fn at(self, spot: Spot) -> Result<T> {
+        self.map_err(|limit| Fault::Limit(spot, limit))
+    }
+}

@@ -1,0 +1,106 @@
+//! What directives change: the graphics state, and the scopes that save it.
+
+use std::sync::Arc;
+
+use lumbre_image::ColourSpace;
+use lumbre_math::Transform;
+use lumbre_scene::{AreaLightDesc, MaterialId};
+
+use super::params::Defaults;
+use super::source::Spot;
+
+/// The kinds of entity that `Attribute` can set defaults for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum EntityKind {
+    Shape,
+    Light,
+    Material,
+    Medium,
+    Texture,
+}
+
+impl EntityKind {
+    pub const NAMES: [(&'static str, Self); 5] = [
+        ("shape", Self::Shape),
+        ("light", Self::Light),
+        ("material", Self::Material),
+        ("medium", Self::Medium),
+        ("texture", Self::Texture),
+    ];
+}
+
+/// The light that the next shapes give.
+#[derive(Clone, Debug)]
+pub(super) struct AreaLight {
+    pub desc: AreaLightDesc,
+    pub spot: Spot,
+}
+
+/// The graphics state.
+#[derive(Clone, Debug)]
+pub(super) struct State {
+    /// The current transforms at the start and at the end of the motion.
+    pub ctm: [Transform; 2],
+    /// Which of the two the next transform changes.
+    pub active: [bool; 2],
+    pub reverse_orientation: bool,
+    pub space: ColourSpace,
+    /// `None` for an interface.
+    pub material: Option<MaterialId>,
+    pub area_light: Option<Arc<AreaLight>>,
+    /// Defaults of `Attribute`, by [`EntityKind`].
+    pub defaults: [Defaults; 5],
+}
+
+impl State {
+    pub fn new(material: MaterialId) -> Self {
+        Self {
+            ctm: [Transform::IDENTITY; 2],
+            active: [true; 2],
+            reverse_orientation: false,
+            space: ColourSpace::REC709,
+            material: Some(material),
+            area_light: None,
+            defaults: Default::default(),
+        }
+    }
+
+    /// Defaults for a kind of entity.
+    pub fn defaults_for(&self, kind: EntityKind) -> Defaults {
+        self.defaults[kind as usize].clone()
+    }
+}
+
+/// What opened a scope.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum ScopeKind {
+    Attribute,
+    Transform,
+    Object,
+}
+
+impl ScopeKind {
+    pub fn begin(self) -> &'static str {
+        match self {
+            Self::Attribute => "AttributeBegin",
+            Self::Transform => "TransformBegin",
+            Self::Object => "ObjectBegin",
+        }
+    }
+
+    pub fn end(self) -> &'static str {
+        match self {
+            Self::Attribute => "AttributeEnd",
+            Self::Transform => "TransformEnd",
+            Self::Object => "ObjectEnd",
+        }
+    }
+}
+
+/// A scope that is open, and the state that comes back at its end.
+#[derive(Debug)]
+pub(super) struct Scope {
+    pub kind: ScopeKind,
+    pub spot: Spot,
+    pub saved: State,
+}
