@@ -2,7 +2,9 @@
 
 use std::fs;
 
-use lumbre_formats::{Budget, Diagnostics, FormatError, Limits, ReadOptions, Strictness, open_scene, open_scenes, pbrt};
+use lumbre_formats::{
+    Budget, Diagnostics, FormatError, Limits, ReadOptions, Strictness, open_scene, open_scenes, pbrt,
+};
 use lumbre_geometry::Shape;
 use lumbre_image::Rgb;
 use lumbre_math::{DVec3, Transform, Vec2, Vec3};
@@ -144,7 +146,8 @@ fn motion_stays_where_it_starts_and_is_said() {
 
 #[test]
 fn numbers_stay_double_into_exact_shapes_and_transforms() {
-    let scene = world("Translate 0.1234567890123456 0 0 Shape \"sphere\" \"float radius\" 0.1234567890123456");
+    let scene =
+        world("Translate 0.1234567890123456 0 0 Shape \"sphere\" \"float radius\" 0.1234567890123456");
     assert_eq!(origin(&scene.shapes[0]).x, 0.1234567890123456);
     let bounds = exact(&scene.shapes[0]).bounds(&Transform::IDENTITY).unwrap();
     assert!((bounds.max.x - 0.1234567890123456).abs() < 1e-15);
@@ -238,7 +241,10 @@ fn objects_keep_their_own_transform_and_instances_add_theirs() {
 #[test]
 fn every_exact_shape_is_read() {
     let cases = [
-        ("sphere", r#""point3 center" [1 2 3] "float radius" 2 "float zmin" -1 "float zmax" 1 "float phimax" 90"#),
+        (
+            "sphere",
+            r#""point3 center" [1 2 3] "float radius" 2 "float zmin" -1 "float zmax" 1 "float phimax" 90"#,
+        ),
         ("plane", r#""point3 point" [0 0 5] "normal normal" [0 1 1]"#),
         ("disk", r#""float height" 2 "float radius" 3 "float innerradius" 1 "float phimax" 180"#),
         ("triangle", r#""point3 p0" [0 0 1] "point3 p1" [2 0 1] "point3 p2" [0 3 1]"#),
@@ -247,10 +253,16 @@ fn every_exact_shape_is_read() {
         ("cylinder", r#""point3 p0" [1 1 1] "point3 p1" [2 3 4] "float radius" .5 "bool caps" true"#),
         ("cone", r#""float radius" 2 "float height" 3 "float topradius" .5 "bool caps" true"#),
         ("cone", r#""point3 apex" [0 0 4] "vector3 axis" [0 0 -2] "float angle" 30 "float height" inf"#),
-        ("torus", r#""float majorradius" 2 "float minorradius" .5 "point3 center" [1 1 1] "vector3 axis" [0 1 0]"#),
+        (
+            "torus",
+            r#""float majorradius" 2 "float minorradius" .5 "point3 center" [1 1 1] "vector3 axis" [0 1 0]"#,
+        ),
         ("paraboloid", r#""float radius" 2 "float zmin" .5 "float zmax" 3 "float phimax" 270"#),
         ("hyperboloid", r#""point3 p1" [1 0 0] "point3 p2" [0 1 2] "float phimax" 200"#),
-        ("quadric", r#""float coefficients" [1 2 3 0 0 0 0 0 0 -4] "point3 p0" [-1 -1 -1] "point3 p1" [1 1 1]"#),
+        (
+            "quadric",
+            r#""float coefficients" [1 2 3 0 0 0 0 0 0 -4] "point3 p0" [-1 -1 -1] "point3 p1" [1 1 1]"#,
+        ),
     ];
     for (name, parameters) in cases {
         let scene = world(&format!("Shape \"{name}\" {parameters}"));
@@ -263,7 +275,8 @@ fn placement_parameters_stand_before_the_transform() {
     let scene = world("Scale 2 2 2 Shape \"sphere\" \"point3 center\" [1 2 3] \"float radius\" 2");
     let bounds = exact(&scene.shapes[0]).bounds(&scene.shapes[0].world_from_object).unwrap();
     assert!((bounds.min - DVec3::new(-2.0, 0.0, 2.0)).length() < 1e-9);
-    let scene = world("Shape \"disk\" \"float height\" 3 \"normal normal\" [0 2 0] \"point3 center\" [1 1 1]");
+    let scene =
+        world("Shape \"disk\" \"float height\" 3 \"normal normal\" [0 2 0] \"point3 center\" [1 1 1]");
     let bounds = exact(&scene.shapes[0]).bounds(&Transform::IDENTITY).unwrap();
     assert!((bounds.center() - DVec3::new(1.0, 4.0, 1.0)).length() < 1e-9);
 }
@@ -377,9 +390,13 @@ fn every_material_is_read() {
     let MaterialKind::Dielectric { eta, .. } = kind(&scene, 3) else { panic!() };
     assert!((eta - 1.5168).abs() < 1e-3, "{eta}");
     assert!(matches!(kind(&scene, 4), MaterialKind::ThinDielectric { eta } if *eta == 1.4));
-    let MaterialKind::CoatedDiffuse { thickness, eta, max_depth, samples, .. } = kind(&scene, 5) else { panic!() };
+    let MaterialKind::CoatedDiffuse { thickness, eta, max_depth, samples, .. } = kind(&scene, 5) else {
+        panic!()
+    };
     assert_eq!((constant(thickness), *eta, *max_depth, *samples), (0.02, 1.5, 20, 3));
-    let MaterialKind::DiffuseTransmission { reflectance, transmittance, scale } = kind(&scene, 6) else { panic!() };
+    let MaterialKind::DiffuseTransmission { reflectance, transmittance, scale } = kind(&scene, 6) else {
+        panic!()
+    };
     assert_eq!(constant(reflectance), Rgb::splat(0.25));
     assert_eq!(constant(transmittance), Rgb::new(0.1, 0.1, 0.2));
     assert_eq!(*scale, 0.5);
@@ -445,10 +462,14 @@ fn textures_remember_where_they_were_made() {
     assert_eq!(constant(&textures[1]), Rgb::splat(0.8));
     let id = scene.shapes[0].material.unwrap().0 as usize;
     let bump = scene.materials[id].material.displacement.clone().unwrap();
-    let Texture::Bilerp { mapping: Mapping2d::Planar { vs, vt, delta, .. }, corners } = &*bump else { panic!() };
+    let Texture::Bilerp { mapping: Mapping2d::Planar { vs, vt, delta, .. }, corners } = &*bump else {
+        panic!()
+    };
     assert_eq!((*vs, *vt, *delta), (DVec3::new(2.0, 0.0, 0.0), DVec3::Y, Vec2::new(0.5, 0.0)));
     assert_eq!(corners, &[1.0, 2.0, 3.0, 4.0]);
-    let Texture::DirectionMix { direction, .. } = &**scene.shapes[0].alpha.as_ref().unwrap() else { panic!() };
+    let Texture::DirectionMix { direction, .. } = &**scene.shapes[0].alpha.as_ref().unwrap() else {
+        panic!()
+    };
     assert!((*direction - Vec3::new(0.0, 0.6, 0.8)).length() < 1e-6);
     let alpha = scene.shapes[1].alpha.as_ref().unwrap();
     let Texture::Checkerboard2d { mapping: Mapping2d::Uv { scale, delta }, .. } = &**alpha else { panic!() };
@@ -560,7 +581,9 @@ fn a_spot_opens_along_z_of_its_space() {
         r#"Translate 10 0 0 LightSource "spot" "point3 from" [1 2 3] "point3 to" [4 2 3] "rgb I" [2 2 2]
            "float coneangle" 40 "float conedeltaangle" 10"#,
     );
-    let LightDesc::Spot { world_from_light, cone_angle, cone_delta_angle, .. } = scene.lights[0] else { panic!() };
+    let LightDesc::Spot { world_from_light, cone_angle, cone_delta_angle, .. } = scene.lights[0] else {
+        panic!()
+    };
     near(world_from_light.point(DVec3::ZERO), DVec3::new(11.0, 2.0, 3.0));
     near(world_from_light.vector(DVec3::Z), DVec3::X);
     assert_eq!((cone_angle, cone_delta_angle), (40.0, 10.0));
@@ -583,7 +606,9 @@ fn environments_are_equal_area_or_latitude_longitude() {
     .unwrap();
     let (scene, _) = open_scene(&path, &ReadOptions::default()).unwrap();
     let light = |i: usize| match &scene.lights[i] {
-        LightDesc::Infinite { world_from_light, radiance, image: Some(image) } => (world_from_light, *radiance, image),
+        LightDesc::Infinite { world_from_light, radiance, image: Some(image) } => {
+            (world_from_light, *radiance, image)
+        }
         other => panic!("{other:?}"),
     };
     assert_eq!(light(0).2.mapping, EnvironmentMapping::EqualArea);
@@ -618,7 +643,9 @@ fn what_a_scene_leaves_open_is_what_the_language_says() {
     assert_eq!(scene.sampler, SamplerDesc { kind: SamplerKind::Sobol, spp: Some(16), seed: 0 });
     assert_eq!(scene.integrator, IntegratorDesc::default());
     assert_eq!(scene.filter, FilterDesc::default());
-    let CameraKind::Perspective { fov, lens_radius, focal_distance } = scene.cameras[0].kind else { panic!() };
+    let CameraKind::Perspective { fov, lens_radius, focal_distance } = scene.cameras[0].kind else {
+        panic!()
+    };
     assert_eq!((fov, lens_radius, focal_distance), (90.0, 0.0, 1e6));
 }
 
@@ -637,7 +664,8 @@ fn cameras_are_read() {
         ),
     ];
     for (text, kind) in cases {
-        let window = r#""float screenwindow" [-2 3 -1 1] "float frameaspectratio" 2.5 "float shutterclose" .5"#;
+        let window =
+            r#""float screenwindow" [-2 3 -1 1] "float frameaspectratio" 2.5 "float shutterclose" .5"#;
         let scene = read(&format!("Camera {text} {window} WorldBegin"));
         let camera = &scene.cameras[0];
         assert_eq!(camera.kind, kind);
@@ -744,7 +772,8 @@ fn several_files_are_read_as_one_and_gzip_is_unpacked() {
     let dir = tempfile::tempdir().unwrap();
     let (a, b) = (dir.path().join("a.pbrt"), dir.path().join("b.pbrt.gz"));
     fs::write(&a, "Camera \"orthographic\" WorldBegin Translate 1 2 3").unwrap();
-    let mut packer = flate2::write::GzEncoder::new(fs::File::create(&b).unwrap(), flate2::Compression::fast());
+    let mut packer =
+        flate2::write::GzEncoder::new(fs::File::create(&b).unwrap(), flate2::Compression::fast());
     packer.write_all(b"Shape \"sphere\"").unwrap();
     packer.finish().unwrap();
     let (scene, _) = open_scenes(&[a, b], &ReadOptions::default()).unwrap();
@@ -874,7 +903,9 @@ WorldEnd"#,
     assert!(matches!(kind(&scene, 3), MaterialKind::Dielectric { eta, .. } if *eta == 1.6));
     let MaterialKind::Conductor { eta, roughness, .. } = kind(&scene, 4) else { panic!() };
     assert!(constant(eta).b > constant(eta).r && constant(&roughness.u) == 0.01);
-    let MaterialKind::DiffuseTransmission { reflectance, transmittance, .. } = kind(&scene, 5) else { panic!() };
+    let MaterialKind::DiffuseTransmission { reflectance, transmittance, .. } = kind(&scene, 5) else {
+        panic!()
+    };
     near_rgb(constant(reflectance), [0.4, 0.4, 0.2]);
     near_rgb(constant(transmittance), [0.2, 0.2, 0.1]);
     let MaterialKind::Mix { amount, materials } = kind(&scene, 6) else { panic!() };

@@ -186,13 +186,22 @@ impl<'b, 'd> Converter<'b, 'd> {
     pub fn resolve(&self, name: &str, at: Spot) -> Result<PathBuf> {
         match &self.directory {
             Some(directory) => Ok(parser::resolve(directory, name)),
-            None => Err(at.error(format!("no file can be read from here, and the scene asks for {}", quoted(name)))),
+            None => {
+                Err(at
+                    .error(format!("no file can be read from here, and the scene asks for {}", quoted(name))))
+            }
         }
     }
 
     // Materials and objects by name; uses may stand before definitions.
 
-    pub fn add_material(&mut self, name: Option<String>, material: Option<Material>, depth: usize, spot: Spot) -> MaterialId {
+    pub fn add_material(
+        &mut self,
+        name: Option<String>,
+        material: Option<Material>,
+        depth: usize,
+        spot: Spot,
+    ) -> MaterialId {
         let id = MaterialId(self.materials.len() as u32);
         self.materials.push(MaterialSlot { name, material: material.map(Arc::new), first_use: spot, depth });
         id

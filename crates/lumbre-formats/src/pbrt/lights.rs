@@ -56,7 +56,9 @@ impl Converter<'_, '_> {
                 let from = params.triple("from", Type::Point3, DVec3::ZERO)?;
                 let to = params.triple("to", Type::Point3, DVec3::Z)?;
                 let Some(turn) = frame_along(to - from) else {
-                    return Err(params.spot_of("to").error("a spot shines from a point to itself: from and to are equal"));
+                    return Err(params
+                        .spot_of("to")
+                        .error("a spot shines from a point to itself: from and to are equal"));
                 };
                 LightDesc::Spot {
                     world_from_light: ctm * Transform::translate(from) * turn,

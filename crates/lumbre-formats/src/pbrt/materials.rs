@@ -163,13 +163,8 @@ impl Converter<'_, '_> {
             }
             if let Some(filename) = params.string("normalmap")?.map(str::to_owned) {
                 let at = params.spot_of("normalmap");
-                let image = self.mip_map(
-                    &filename,
-                    at,
-                    Some(Encoding::Linear),
-                    Wrap::Repeat,
-                    ImageFilter::Bilinear,
-                )?;
+                let image =
+                    self.mip_map(&filename, at, Some(Encoding::Linear), Wrap::Repeat, ImageFilter::Bilinear)?;
                 let mapping = Mapping2d::Uv { scale: Vec2::ONE, delta: Vec2::ZERO };
                 material.normal_map = Some(ImageTexture { mapping, image, scale: 1.0, invert: false });
             }
@@ -200,9 +195,7 @@ impl Converter<'_, '_> {
         let types = [Type::Float, Type::Integer, Type::Rgb, Type::Blackbody, Type::Spectrum];
         let eta = match params.typed(name, &types)? {
             None => default,
-            Some(param) if matches!(param.ty, Type::Float | Type::Integer) => {
-                single(params, name, default)?
-            }
+            Some(param) if matches!(param.ty, Type::Float | Type::Integer) => single(params, name, default)?,
             Some(_) => match self.spectrum_value(params, name, SpectrumUse::Coefficient)? {
                 Some(value) => value.index_of_refraction(),
                 None => default,
@@ -242,8 +235,7 @@ impl Converter<'_, '_> {
         if is_texture(eta) || is_texture(k) {
             let mut one = |name, default| -> Result<SpectrumArc> {
                 let known = self.spectrum_texture(params, name, SpectrumUse::Coefficient)?;
-                Ok(known
-                    .map_or_else(|| constant(copper(default).unbounded_rgb()), |known| known.texture))
+                Ok(known.map_or_else(|| constant(copper(default).unbounded_rgb()), |known| known.texture))
             };
             return Ok((one(eta, "metal-Cu-eta")?, one(k, "metal-Cu-k")?));
         }
@@ -311,7 +303,8 @@ impl Converter<'_, '_> {
             let message = format!("mixtures stand in each other more than {MAX_MIX_DEPTH} deep");
             return Err(params.spot.error(message));
         }
-        let amount = if old { self.old_amount(params)? } else { self.float_texture_or(params, "amount", 0.5)? };
+        let amount =
+            if old { self.old_amount(params)? } else { self.float_texture_or(params, "amount", 0.5)? };
         Ok((MaterialKind::Mix { materials, amount }, depth))
     }
 
@@ -401,7 +394,8 @@ impl Converter<'_, '_> {
                         scale: 1.0,
                     },
                     None => {
-                        let texture = base.map_or_else(|| constant(Spectrum::splat(0.25)), |known| known.texture);
+                        let texture =
+                            base.map_or_else(|| constant(Spectrum::splat(0.25)), |known| known.texture);
                         let by = |share: Spectrum| -> SpectrumArc {
                             let scale = number(share.average());
                             Arc::new(Texture::Scale { texture: texture.clone(), scale })

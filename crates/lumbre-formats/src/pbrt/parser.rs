@@ -445,8 +445,7 @@ impl<'b, 'd> Parser<'b, 'd> {
                     None => {
                         let wrong =
                             Diagnostic::warning(format!("unknown coordinate system {}", quoted(&name)));
-                        let wrong =
-                            wrong.suggest(&name, self.coordinate_systems.keys().map(String::as_str));
+                        let wrong = wrong.suggest(&name, self.coordinate_systems.keys().map(String::as_str));
                         self.converter.warn(at, wrong);
                     }
                 }
@@ -696,7 +695,9 @@ impl<'b, 'd> Parser<'b, 'd> {
             });
         };
         if self.scopes.len() < base {
-            return Err(spot.error(format!("{} in an imported file closes what its importer opened", kind.end())));
+            return Err(
+                spot.error(format!("{} in an imported file closes what its importer opened", kind.end()))
+            );
         }
         // pbrt-v3's saves the transform alone; pbrt-v4 takes it for AttributeBegin.
         if kind == ScopeKind::Transform && self.converter.is_upgraded() {

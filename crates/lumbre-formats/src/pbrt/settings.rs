@@ -3,7 +3,8 @@
 use lumbre_image::ColourSpace;
 use lumbre_math::{Transform, Vec2};
 use lumbre_scene::{
-    Camera, CameraKind, FilterDesc, IntegratorDesc, IntegratorKind, SamplerDesc, SamplerKind, SphericalMapping,
+    Camera, CameraKind, FilterDesc, IntegratorDesc, IntegratorKind, SamplerDesc, SamplerKind,
+    SphericalMapping,
 };
 
 use super::convert::Converter;
@@ -58,7 +59,9 @@ impl Converter<'_, '_> {
                     ("equalarea", SphericalMapping::EqualArea),
                     ("equirectangular", SphericalMapping::Equirectangular),
                 ];
-                CameraKind::Spherical { mapping: params.choice("mapping", &mappings, SphericalMapping::EqualArea)? }
+                CameraKind::Spherical {
+                    mapping: params.choice("mapping", &mappings, SphericalMapping::EqualArea)?,
+                }
             }
             "environment" => {
                 self.upgraded(spot);
@@ -66,7 +69,10 @@ impl Converter<'_, '_> {
             }
             "realistic" => {
                 params.ignore_all();
-                self.note(spot, "camera \"realistic\" is not rendered yet: a perspective one takes its place");
+                self.note(
+                    spot,
+                    "camera \"realistic\" is not rendered yet: a perspective one takes its place",
+                );
                 perspective(90.0)
             }
             _ => {
@@ -99,7 +105,9 @@ impl Converter<'_, '_> {
                 let message = format!("film {} is not rendered yet: an rgb one takes its place", quoted(ty));
                 self.note(spot, message);
             }
-            _ => self.unknown(spot, "film", ty, &["rgb", "gbuffer", "spectral"], "an rgb one takes its place"),
+            _ => {
+                self.unknown(spot, "film", ty, &["rgb", "gbuffer", "spectral"], "an rgb one takes its place")
+            }
         }
         let width = params.count("xresolution", 1280, 1)?;
         let height = params.count("yresolution", 720, 1)?;
@@ -295,8 +303,21 @@ impl Converter<'_, '_> {
             _ => {
                 let kind = path(&params)?;
                 let known = [
-                    "path", "volpath", "simplepath", "simplevolpath", "whitted", "ambientocclusion", "normals",
-                    "depth", "albedo", "uv", "bdpt", "mlt", "sppm", "lightpath", "randomwalk",
+                    "path",
+                    "volpath",
+                    "simplepath",
+                    "simplevolpath",
+                    "whitted",
+                    "ambientocclusion",
+                    "normals",
+                    "depth",
+                    "albedo",
+                    "uv",
+                    "bdpt",
+                    "mlt",
+                    "sppm",
+                    "lightpath",
+                    "randomwalk",
                 ];
                 self.unknown(spot, "integrator", ty, &known, "path takes its place");
                 kind
@@ -330,7 +351,9 @@ impl Converter<'_, '_> {
         let plain: String = name.chars().filter(|c| !matches!(c, '-' | '_')).collect();
         match plain.to_ascii_lowercase().as_str() {
             "seed" => match value.parse::<i64>() {
-                Ok(seed) if i32::try_from(seed).is_ok() => self.sampler_seed = Some(u64::from(seed as i32 as u32)),
+                Ok(seed) if i32::try_from(seed).is_ok() => {
+                    self.sampler_seed = Some(u64::from(seed as i32 as u32))
+                }
                 _ => {
                     let wrong = Diagnostic::error("wrong value of the option \"seed\"").found(quoted(value));
                     return Err(at.wrong(wrong.expected("an integer")));
@@ -353,9 +376,17 @@ impl Converter<'_, '_> {
             }
             other => {
                 let known = [
-                    "seed", "wavefront", "rendercoordsys", "displacementedgescale", "pixelstats",
-                    "msereferenceimage", "msereferenceout", "disablepixeljitter", "disabletexturefiltering",
-                    "disablewavelengthjitter", "forcediffuse",
+                    "seed",
+                    "wavefront",
+                    "rendercoordsys",
+                    "displacementedgescale",
+                    "pixelstats",
+                    "msereferenceimage",
+                    "msereferenceout",
+                    "disablepixeljitter",
+                    "disabletexturefiltering",
+                    "disablewavelengthjitter",
+                    "forcediffuse",
                 ];
                 let unknown = Diagnostic::warning(format!("unknown option {}", quoted(name)));
                 self.warn(at, unknown.suggest(other, known));

@@ -4,8 +4,8 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use lumbre_geometry::{
-    Aabb, Cone, Cuboid, Cylinder, Disk, Hyperboloid, Paraboloid, Plane, Quadric, Shape, ShapeError,
-    Sphere, Torus, Triangle,
+    Aabb, Cone, Cuboid, Cylinder, Disk, Hyperboloid, Paraboloid, Plane, Quadric, Shape, ShapeError, Sphere,
+    Torus, Triangle,
 };
 use lumbre_math::{DVec3, Transform, Vec2, Vec3};
 use lumbre_scene::{CsgDesc, CsgOperation, GeometryDesc, MeshDesc, ShapeDesc};
@@ -164,9 +164,7 @@ impl Converter<'_, '_> {
                 };
                 Triangle::new(corner("p0")?, corner("p1")?, corner("p2")?).map(Shape::from)
             }
-            "box" => {
-                Cuboid::new(point("p0", DVec3::NEG_ONE)?, point("p1", DVec3::ONE)?).map(Shape::from)
-            }
+            "box" => Cuboid::new(point("p0", DVec3::NEG_ONE)?, point("p1", DVec3::ONE)?).map(Shape::from),
             "cylinder" => {
                 let radius = params.float("radius", 1.0)?;
                 let caps = params.boolean("caps", false)?;
@@ -185,7 +183,9 @@ impl Converter<'_, '_> {
                 let caps = params.boolean("caps", false)?;
                 let cone = if params.has("apex") || params.has("axis") || params.has("angle") {
                     let Some(angle) = params.float_opt("angle")? else {
-                        return Err(params.spot.error("a cone with an apex or an axis has no \"float angle\""));
+                        return Err(params
+                            .spot
+                            .error("a cone with an apex or an axis has no \"float angle\""));
                     };
                     let axis = params.triple("axis", Type::Vector3, DVec3::Z)?;
                     let height = params.float_or_infinite("height", f64::INFINITY)?;
@@ -275,14 +275,17 @@ impl Converter<'_, '_> {
             let id = self.object_names.get(name).copied();
             let slot = id.map(|id| &self.objects[id.0 as usize]);
             let Some((slot, object)) = slot.and_then(|slot| Some((slot, slot.object.as_ref()?))) else {
-                let wrong = Diagnostic::error(format!("object {} is not defined before this csg", quoted(name)));
+                let wrong =
+                    Diagnostic::error(format!("object {} is not defined before this csg", quoted(name)));
                 return Err(at.wrong(wrong.suggest(name, self.object_names.keys().map(String::as_str))));
             };
             if id == self.open_object {
                 return Err(at.error(format!("object {} is an operand of a csg inside it", quoted(name))));
             }
             if object.shapes.is_empty() {
-                return Err(at.error(format!("object {} has no shape: it is no operand of a csg", quoted(name))));
+                return Err(
+                    at.error(format!("object {} has no shape: it is no operand of a csg", quoted(name)))
+                );
             }
             for shape in &object.shapes {
                 let not_solid = match &shape.geometry {
@@ -366,7 +369,8 @@ impl Converter<'_, '_> {
                 }
                 Some(_) if self.diagnostics.is_lenient() => dropped += 1,
                 Some(k) => {
-                    let wrong = Diagnostic::error(format!("index {} of the {shape} is out of range", i * N + k));
+                    let wrong =
+                        Diagnostic::error(format!("index {} of the {shape} is out of range", i * N + k));
                     let wrong = wrong.found(face[k]).expected(format!("0 to {}", vertices as i64 - 1));
                     return Err(spot.wrong(wrong));
                 }
@@ -380,7 +384,13 @@ impl Converter<'_, '_> {
     }
 
     /// Normals, uv, tangents and face numbers.
-    fn mesh_parts(&mut self, params: &Params, mesh: &mut MeshDesc, kept: &[usize], faces: usize) -> Result<()> {
+    fn mesh_parts(
+        &mut self,
+        params: &Params,
+        mesh: &mut MeshDesc,
+        kept: &[usize],
+        faces: usize,
+    ) -> Result<()> {
         let vertices = mesh.positions.len();
         let same = |name: &'static str, found: usize| -> Result<()> {
             if found == vertices {
@@ -425,7 +435,8 @@ impl Converter<'_, '_> {
             // The bits of the number: what it means is the writer's business.
             mesh.face_indices = Some(kept.iter().map(|&i| indices[i] as u32).collect());
         }
-        let numbers = [3 * mesh.normals.as_ref().map_or(0, Vec::len), 3 * mesh.tangents.as_ref().map_or(0, Vec::len)];
+        let numbers =
+            [3 * mesh.normals.as_ref().map_or(0, Vec::len), 3 * mesh.tangents.as_ref().map_or(0, Vec::len)];
         let bytes = 4 * (numbers[0] + numbers[1] + 2 * mesh.uvs.as_ref().map_or(0, Vec::len)) as u64;
         self.budget.bytes(bytes, "vertices").at(params.spot)
     }

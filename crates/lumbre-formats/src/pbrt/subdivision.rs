@@ -21,8 +21,10 @@ pub(super) fn subdivide(positions: &[Vec3], faces: &[[u32; 3]], levels: u32) -> 
         (points, faces) = refine(&points, &faces)?;
     }
     let rings = rings(points.len(), &faces)?;
-    let limit: Vec<DVec3> = points.iter().zip(&rings).map(|(p, ring)| limit_point(*p, ring, &points)).collect();
-    let normals = limit.iter().zip(&rings).map(|(p, ring)| limit_normal(*p, ring, &limit).as_vec3()).collect();
+    let limit: Vec<DVec3> =
+        points.iter().zip(&rings).map(|(p, ring)| limit_point(*p, ring, &points)).collect();
+    let normals =
+        limit.iter().zip(&rings).map(|(p, ring)| limit_normal(*p, ring, &limit).as_vec3()).collect();
     Ok(MeshDesc {
         positions: limit.iter().map(|p| p.as_vec3()).collect(),
         triangles: faces,
@@ -56,7 +58,9 @@ fn rings(vertices: usize, faces: &[[u32; 3]]) -> Result<Vec<Ring>, String> {
         for &(a, b) in &steps {
             let twice = next.insert(a, b).is_some() || has_before.insert(b, ()).is_some();
             if twice {
-                return Err(format!("more than two faces, or two that disagree about the front, meet at an edge of vertex {v}"));
+                return Err(format!(
+                    "more than two faces, or two that disagree about the front, meet at an edge of vertex {v}"
+                ));
             }
         }
         let Some(&(first, _)) = steps.first() else { return Ok(Ring::default()) };
@@ -109,7 +113,8 @@ fn refine(points: &[DVec3], faces: &[[u32; 3]]) -> Result<(Vec<DVec3>, Vec<[u32;
         })
         .collect();
     // The vertex of each edge, in the order of the faces, with the corners across it.
-    let mut across: HashMap<(u32, u32), (u32, [Option<u32>; 2])> = HashMap::with_capacity(faces.len() * 3 / 2);
+    let mut across: HashMap<(u32, u32), (u32, [Option<u32>; 2])> =
+        HashMap::with_capacity(faces.len() * 3 / 2);
     let mut edges = vec![];
     for face in faces {
         for i in 0..3 {
@@ -118,7 +123,8 @@ fn refine(points: &[DVec3], faces: &[[u32; 3]]) -> Result<(Vec<DVec3>, Vec<[u32;
             match across.get_mut(&edge) {
                 Some((_, corners)) => corners[1] = Some(c),
                 None => {
-                    let number = u32::try_from(points.len() + edges.len()).map_err(|_| "too many vertices")?;
+                    let number =
+                        u32::try_from(points.len() + edges.len()).map_err(|_| "too many vertices")?;
                     across.insert(edge, (number, [Some(c), None]));
                     edges.push(edge);
                 }
@@ -143,7 +149,9 @@ fn refine(points: &[DVec3], faces: &[[u32; 3]]) -> Result<(Vec<DVec3>, Vec<[u32;
 fn limit_point(p: DVec3, ring: &Ring, points: &[DVec3]) -> DVec3 {
     match ring.neighbours[..] {
         [] => p,
-        [first, .., last] if ring.is_border => 0.6 * p + 0.2 * (points[first as usize] + points[last as usize]),
+        [first, .., last] if ring.is_border => {
+            0.6 * p + 0.2 * (points[first as usize] + points[last as usize])
+        }
         _ => {
             let n = ring.neighbours.len();
             let gamma = 1.0 / (n as f64 + 3.0 / (8.0 * beta(n)));
@@ -188,8 +196,7 @@ mod tests {
 
     fn octahedron(radius: f32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
         let axes = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
-        let faces =
-            [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
+        let faces = [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
         (axes.map(|a| radius * a).to_vec(), faces.to_vec())
     }
 
@@ -226,8 +233,9 @@ mod tests {
     fn a_flat_sheet_stays_flat_up_to_its_border() {
         // Four by three squares with a bump of none: every normal is +z, borders and corners among them.
         let at = |x: u32, y: u32| y * 5 + x;
-        let points: Vec<Vec3> =
-            (0..4).flat_map(|y| (0..5).map(move |x| Vec3::new(x as f32 - 1.5, 2.0 * y as f32, 3.0))).collect();
+        let points: Vec<Vec3> = (0..4)
+            .flat_map(|y| (0..5).map(move |x| Vec3::new(x as f32 - 1.5, 2.0 * y as f32, 3.0)))
+            .collect();
         let faces: Vec<[u32; 3]> = (0..3)
             .flat_map(|y| (0..4).map(move |x| (x, y)))
             .flat_map(|(x, y)| {

@@ -39,7 +39,11 @@ pub(super) trait SceneValue: TextureValue {
     /// The number that it is, where it is the same on all lanes.
     fn as_number(self) -> Option<f32>;
     fn table<'a>(converter: &'a mut Converter<'_, '_>) -> &'a mut HashMap<String, Known<Self>>;
-    fn get(converter: &mut Converter<'_, '_>, params: &Params, name: &'static str) -> Result<Option<Known<Self>>>;
+    fn get(
+        converter: &mut Converter<'_, '_>,
+        params: &Params,
+        name: &'static str,
+    ) -> Result<Option<Known<Self>>>;
 }
 
 impl SceneValue for f32 {
@@ -57,7 +61,11 @@ impl SceneValue for f32 {
         &mut converter.float_textures
     }
 
-    fn get(converter: &mut Converter<'_, '_>, params: &Params, name: &'static str) -> Result<Option<Known<Self>>> {
+    fn get(
+        converter: &mut Converter<'_, '_>,
+        params: &Params,
+        name: &'static str,
+    ) -> Result<Option<Known<Self>>> {
         let Some(param) = params.typed(name, &[Type::Float, Type::Integer, Type::Texture])? else {
             return Ok(None);
         };
@@ -83,7 +91,11 @@ impl SceneValue for Spectrum {
         &mut converter.spectrum_textures
     }
 
-    fn get(converter: &mut Converter<'_, '_>, params: &Params, name: &'static str) -> Result<Option<Known<Self>>> {
+    fn get(
+        converter: &mut Converter<'_, '_>,
+        params: &Params,
+        name: &'static str,
+    ) -> Result<Option<Known<Self>>> {
         converter.spectrum_texture(params, name, SpectrumUse::Coefficient)
     }
 }
@@ -241,7 +253,12 @@ impl Converter<'_, '_> {
         Ok(f32::get(self, params, name)?.map(|known| known.texture))
     }
 
-    pub fn float_texture_or(&mut self, params: &Params, name: &'static str, default: f32) -> Result<FloatArc> {
+    pub fn float_texture_or(
+        &mut self,
+        params: &Params,
+        name: &'static str,
+        default: f32,
+    ) -> Result<FloatArc> {
         Ok(self.float_texture(params, name)?.unwrap_or_else(|| Arc::new(Texture::Constant(default))))
     }
 
@@ -253,7 +270,8 @@ impl Converter<'_, '_> {
         }
         let in_floats = self.float_textures.contains_key(name);
         let in_spectra = self.spectrum_textures.contains_key(name);
-        let wrong = Diagnostic::error(format!("{} texture {} is not defined before this", T::NAME, quoted(name)));
+        let wrong =
+            Diagnostic::error(format!("{} texture {} is not defined before this", T::NAME, quoted(name)));
         let wrong = match (in_floats, in_spectra) {
             (true, _) => wrong.found("a float texture of this name").expected("a spectrum texture"),
             (_, true) => wrong.found("a spectrum texture of this name").expected("a float texture"),
@@ -287,7 +305,13 @@ impl Converter<'_, '_> {
         }
     }
 
-    fn typed_texture<T: SceneValue>(&mut self, name: &str, ty: &str, params: Params, ctm: Transform) -> Result<()> {
+    fn typed_texture<T: SceneValue>(
+        &mut self,
+        name: &str,
+        ty: &str,
+        params: Params,
+        ctm: Transform,
+    ) -> Result<()> {
         let spot = params.spot;
         if T::table(self).contains_key(name) {
             return Err(spot.error(format!("{} texture {} is defined twice", T::NAME, quoted(name))));
@@ -317,7 +341,8 @@ impl Converter<'_, '_> {
             "bilerp" => {
                 let mut corner = |name, default| -> Result<T> {
                     let part = self.part::<T>(&params, name, default)?;
-                    part.value().ok_or_else(|| params.spot_of(name).error("a bilerp is between values, not textures"))
+                    part.value()
+                        .ok_or_else(|| params.spot_of(name).error("a bilerp is between values, not textures"))
                 };
                 let corners =
                     [corner("v00", 0.0)?, corner("v01", 1.0)?, corner("v10", 0.0)?, corner("v11", 1.0)?];
@@ -349,14 +374,26 @@ impl Converter<'_, '_> {
                     _ => Known::constant(T::grey(0.0)),
                 };
                 params.ignore_all();
-                let message = format!("texture {} is not rendered yet: a constant takes its place", quoted(ty));
+                let message =
+                    format!("texture {} is not rendered yet: a constant takes its place", quoted(ty));
                 self.note(spot, message);
                 mean
             }
             _ => {
                 let known = [
-                    "constant", "scale", "mix", "directionmix", "bilerp", "imagemap", "checkerboard", "dots", "fbm",
-                    "wrinkled", "windy", "marble", "ptex",
+                    "constant",
+                    "scale",
+                    "mix",
+                    "directionmix",
+                    "bilerp",
+                    "imagemap",
+                    "checkerboard",
+                    "dots",
+                    "fbm",
+                    "wrinkled",
+                    "windy",
+                    "marble",
+                    "ptex",
                 ];
                 params.ignore_all();
                 self.unknown(spot, "texture", ty, &known, "the constant 0.5 takes its place");
@@ -396,7 +433,11 @@ impl Converter<'_, '_> {
         whole(Texture::Scale { texture: value.texture, scale: factor.texture }, &size, params.spot)
     }
 
-    fn image_texture<T: SceneValue>(&mut self, params: &Params, texture_from_world: Transform) -> Result<Known<T>> {
+    fn image_texture<T: SceneValue>(
+        &mut self,
+        params: &Params,
+        texture_from_world: Transform,
+    ) -> Result<Known<T>> {
         let mapping = mapping(params, texture_from_world)?;
         let anisotropy = params.float_above("maxanisotropy", 8.0, 0.0)?;
         let filters = [
@@ -467,9 +508,8 @@ fn mapping(params: &Params, texture_from_world: Transform) -> Result<Mapping2d> 
         ("cylindrical", Kind::Cylindrical),
         ("planar", Kind::Planar),
     ];
-    let delta = || -> Result<Vec2> {
-        Ok(Vec2::new(single(params, "udelta", 0.0)?, single(params, "vdelta", 0.0)?))
-    };
+    let delta =
+        || -> Result<Vec2> { Ok(Vec2::new(single(params, "udelta", 0.0)?, single(params, "vdelta", 0.0)?)) };
     Ok(match params.choice("mapping", &kinds, Kind::Uv)? {
         Kind::Uv => {
             let scale = Vec2::new(single(params, "uscale", 1.0)?, single(params, "vscale", 1.0)?);
@@ -524,4 +564,3 @@ pub(super) fn vec3(numbers: &[f64]) -> Option<Vec3> {
     let v = Vec3::new(numbers[0] as f32, numbers[1] as f32, numbers[2] as f32);
     v.is_finite().then_some(v)
 }
-
