@@ -376,7 +376,7 @@ fn a_ray_that_leaves_a_hit_does_not_find_it_again_but_finds_a_wall_close_by() {
     leave(6000);
 }
 
-/// Takes a minute or two in a release build: 30 million rays.
+/// Takes about a minute: some hundred thousand rays a shape and placement.
 #[test]
 #[ignore = "slow"]
 fn a_ray_that_leaves_a_hit_does_not_find_it_again_among_very_many() {

@@ -74,7 +74,7 @@ fn no_ray_aimed_at_a_side_or_a_corner_slips_through_the_watertight_test() {
     }
 }
 
-/// Takes some minutes: four million rays at every edge and corner.
+/// Takes some ten seconds: four million rays at sides and corners.
 #[test]
 #[ignore = "slow"]
 fn no_ray_slips_through_among_very_many() {
