@@ -37,6 +37,20 @@ pub fn render(
     progress: &dyn Progress,
     cancel: &CancelToken,
 ) -> Result<Rendered, RenderError> {
+    render_with(scene, options, &*integrator(&options.integrator), progress, cancel)
+}
+
+/// [`render`] with an integrator of one's own; that of the options is not looked at.
+///
+/// # Errors
+/// As [`render`].
+pub fn render_with(
+    scene: &Scene,
+    options: &RenderOptions,
+    integrator: &dyn Integrator,
+    progress: &dyn Progress,
+    cancel: &CancelToken,
+) -> Result<Rendered, RenderError> {
     let start = Instant::now();
     let bounds = options.bounds()?;
     let camera = scene
@@ -52,7 +66,7 @@ pub fn render(
         scene,
         options,
         view: View::new(camera, options.width, options.height),
-        integrator: integrator(&options.integrator),
+        integrator,
         sampler: Sampler::new(&options.sampler),
         filter: options.pixel_filter()?,
         // Textures may be looked up more finely the more samples there are to average them (pbrt does likewise).
@@ -124,7 +138,7 @@ struct Job<'a> {
     scene: &'a Scene,
     options: &'a RenderOptions,
     view: View,
-    integrator: Box<dyn Integrator>,
+    integrator: &'a dyn Integrator,
     sampler: Sampler,
     filter: Filter,
     spacing: f64,

@@ -12,10 +12,10 @@ mod rendered;
 
 pub use cancel::CancelToken;
 pub use error::RenderError;
-pub use job::render;
+pub use job::{render, render_with};
 pub use options::{RenderOptions, Stop};
 pub use progress::{NoProgress, Progress, Snapshot, State};
 pub use rendered::{DroppedSample, Rendered, Stats};
 
 pub use lumbre_film::PixelBounds;
-pub use lumbre_transport::{Feature, RayCounts};
+pub use lumbre_transport::{Feature, Integrator, RayCounts};

@@ -156,7 +156,8 @@ impl Builder {
         geometries: &mut Vec<Geometry>,
     ) -> Result<(), BuildError> {
         let mut entry = self.entry(&desc)?;
-        let area_light = self.wanted_light(&desc, &entry);
+        let is_csg = matches!(desc.geometry, GeometryDesc::Csg(_));
+        let area_light = if is_csg { None } else { self.wanted_light(&desc, &entry) };
         match desc.geometry {
             GeometryDesc::Exact(shape) => {
                 let placed = PlacedShape::new(shape, desc.world_from_object);
@@ -195,13 +196,14 @@ impl Builder {
                 )?;
             }
             GeometryDesc::Csg(csg) => {
-                let (solid, leaves) =
-                    csg::build(self, desc.index, csg, &desc.world_from_object, desc.reverse_orientation)?;
-                if leaves.iter().any(SurfaceEntry::shines) {
+                let placement = desc.world_from_object;
+                let form = csg::build(self, desc.index, csg, &placement, desc.reverse_orientation)?;
+                if form.leaves.iter().any(SurfaceEntry::shines) {
                     self.warnings.push(BuildWarning::UnsampledLight { shape: desc.index });
                 }
-                entry.form = Form::Csg(Arc::new(leaves));
-                self.push(entry, geometries, solid)?;
+                let placed = csg::shape_of(&form);
+                entry.form = Form::Csg(Arc::new(form));
+                self.push(entry, geometries, GeometryKind::Shape(placed))?;
             }
         }
         Ok(())
@@ -443,7 +445,7 @@ fn inside_out(objects: &[ObjectDesc]) -> Result<Vec<usize>, BuildError> {
     Ok(order)
 }
 
-/// A place near everything, about which single precision is fine enough: the origin itself where that is near, else a
+/// A place near all meshes and exact shapes, about which single precision is fine enough: the origin itself where that is near, else a
 /// multiple of a power of two, so that a scene moved as a whole keeps its vertices to within their own rounding.
 fn origin(shapes: &[ShapeDesc], instances: &[InstanceDesc], accels: &[Arc<Accel>]) -> DVec3 {
     let mut bounds = Aabb::EMPTY;
@@ -453,9 +455,7 @@ fn origin(shapes: &[ShapeDesc], instances: &[InstanceDesc], accels: &[Arc<Accel>
                 bounds = exact.bounds(&shape.world_from_object).map_or(bounds, |b| bounds.union(b));
             }
             GeometryDesc::Mesh(mesh) | GeometryDesc::BilinearMesh(mesh) => {
-                let corners = mesh.positions.iter().filter(|p| p.is_finite());
-                let own = Aabb::around(corners.map(|p| p.as_dvec3()));
-                bounds = bounds.union(moved(&own, &shape.world_from_object));
+                bounds = bounds.union(mesh_bounds(mesh, &shape.world_from_object));
             }
             GeometryDesc::Csg(_) => {}
         }
@@ -463,6 +463,17 @@ fn origin(shapes: &[ShapeDesc], instances: &[InstanceDesc], accels: &[Arc<Accel>
     for (instance, accel) in instances.iter().zip(accels) {
         bounds = bounds.union(moved(&accel.bounds(), &instance.world_from_object));
     }
+    near(&bounds)
+}
+
+/// The box around a mesh, moved.
+pub(crate) fn mesh_bounds(mesh: &MeshDesc, placement: &Transform) -> Aabb {
+    let corners = mesh.positions.iter().filter(|p| p.is_finite());
+    moved(&Aabb::around(corners.map(|p| p.as_dvec3())), placement)
+}
+
+/// The origin for what fills a box: see [`origin`].
+pub(crate) fn near(bounds: &Aabb) -> DVec3 {
     let size = bounds.size().max_element();
     if bounds.is_empty() || !size.is_finite() || size <= 0.0 {
         return if bounds.is_empty() { DVec3::ZERO } else { finite_or_zero(bounds.center()) };

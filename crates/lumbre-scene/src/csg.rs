@@ -1,18 +1,134 @@
-//! Combinations of solids.
+//! Combinations of solids, each surface with its own material.
 
-use lumbre_kernel::GeometryKind;
+use std::sync::Arc;
+
+use lumbre_geometry::{Csg, LeafPart, PlacedShape, Shape};
 use lumbre_math::Transform;
 
-use crate::build::Builder;
-use crate::surface::SurfaceEntry;
-use crate::{BuildError, CsgDesc};
+use crate::build::{Builder, emission};
+use crate::mesh::QuadOrder;
+use crate::solid::MeshSolid;
+use crate::surface::{Form, SurfaceEntry};
+use crate::{BuildError, CsgDesc, CsgOperation, GeometryDesc, ShapeDesc, mesh};
 
+/// How deep combinations may hold combinations: as deep as geometry nests them.
+const MAX_NESTING: usize = 60;
+
+/// A CSG, and the surface of each of its leaves.
+#[derive(Clone, Debug)]
+pub(crate) struct CsgForm {
+    pub csg: Csg,
+    /// In the order of the leaves.
+    pub leaves: Vec<SurfaceEntry>,
+}
+
+impl CsgForm {
+    /// Whose surface a root lies on.
+    pub fn leaf(&self, root: &lumbre_geometry::Root) -> Option<(&SurfaceEntry, LeafPart)> {
+        let part = self.csg.leaf_of(root)?;
+        Some((self.leaves.get(part.leaf)?, part))
+    }
+}
+
+/// Resolves a combination in the space of its tree. What the materials of its parts are, `builder` knows.
+///
+/// # Errors
+/// [`BuildError::Csg`], naming the part at fault, and what [`crate::mesh::bake`] finds wrong with a mesh.
 pub(crate) fn build(
-    _: &mut Builder,
+    builder: &mut Builder,
     shape: u32,
-    _: CsgDesc,
-    _: &Transform,
-    _: bool,
-) -> Result<(GeometryKind, Vec<SurfaceEntry>), BuildError> {
-    Err(BuildError::Csg { shape, reason: "combinations of solids are not supported".to_owned() })
+    desc: CsgDesc,
+    tree_from_csg: &Transform,
+    reverse: bool,
+) -> Result<CsgForm, BuildError> {
+    let mut leaves = Vec::new();
+    let csg = combine(builder, shape, desc, tree_from_csg, reverse, &mut leaves, 0)?;
+    debug_assert_eq!(csg.leaves().len(), leaves.len());
+    Ok(CsgForm { csg, leaves })
+}
+
+fn combine(
+    builder: &mut Builder,
+    shape: u32,
+    desc: CsgDesc,
+    tree_from_csg: &Transform,
+    reverse: bool,
+    leaves: &mut Vec<SurfaceEntry>,
+    depth: usize,
+) -> Result<Csg, BuildError> {
+    let wrong = |reason: String| BuildError::Csg { shape, reason };
+    if depth > MAX_NESTING {
+        return Err(wrong(format!("csg shapes hold csg shapes to a depth of more than {MAX_NESTING}")));
+    }
+    if desc.operands.len() < 2 {
+        return Err(wrong(format!("found {} operands, expected two or more", desc.operands.len())));
+    }
+    let mut operands = Vec::with_capacity(desc.operands.len());
+    for (position, parts) in desc.operands.into_iter().enumerate() {
+        let mut solids = Vec::with_capacity(parts.len());
+        for part in parts {
+            solids.push(solid(builder, part, tree_from_csg, reverse, leaves, depth)?);
+        }
+        let operand = match solids.len() {
+            0 => return Err(wrong(format!("operand {position} holds no shape"))),
+            1 => solids.swap_remove(0),
+            _ => Csg::union(solids).map_err(|e| wrong(e.to_string()))?,
+        };
+        operands.push(operand);
+    }
+    let combined = match desc.operation {
+        CsgOperation::Union => Csg::union(operands),
+        CsgOperation::Intersection => Csg::intersection(operands),
+        CsgOperation::Difference => Csg::difference(operands),
+    };
+    combined.map_err(|e| wrong(e.to_string()))
+}
+
+/// One shape of an operand. Its surfaces join `leaves` in the order in which geometry counts them.
+fn solid(
+    builder: &mut Builder,
+    desc: ShapeDesc,
+    tree_from_csg: &Transform,
+    reverse: bool,
+    leaves: &mut Vec<SurfaceEntry>,
+    depth: usize,
+) -> Result<Csg, BuildError> {
+    let shape = desc.index;
+    let wrong = |reason: String| BuildError::Csg { shape, reason };
+    let mut entry = builder.entry(&desc)?;
+    entry.reverse ^= reverse;
+    if let Some(light) = builder.wanted_light(&desc, &entry) {
+        if light.power.is_some() {
+            return Err(wrong("a part of a csg cannot shine by power, for its area is not known".to_owned()));
+        }
+        entry.emission = Some(emission(light, || 0.0));
+    }
+    let placement = *tree_from_csg * desc.world_from_object;
+    match desc.geometry {
+        GeometryDesc::Exact(exact) => {
+            let leaf = Csg::leaf(PlacedShape::new(exact, placement)).map_err(|e| wrong(e.to_string()))?;
+            leaves.extend(std::iter::repeat_n(entry, leaf.leaves().len()));
+            Ok(leaf)
+        }
+        GeometryDesc::Mesh(mesh) => {
+            let origin = crate::build::near(&crate::build::mesh_bounds(&mesh, &placement));
+            let baked = mesh::bake(shape, mesh, &placement, origin, QuadOrder::Around)?;
+            if !baked.patches.is_empty() {
+                return Err(wrong("a mesh in a csg must have flat faces".to_owned()));
+            }
+            let solid = MeshSolid::new(baked.dress.mesh.clone()).map_err(|e| wrong(e.to_string()))?;
+            leaves.push(SurfaceEntry { form: Form::Mesh(baked.dress), ..entry });
+            Csg::solid(Arc::new(solid)).map_err(|e| wrong(e.to_string()))
+        }
+        GeometryDesc::BilinearMesh(_) => Err(wrong("a bilinear mesh is no solid".to_owned())),
+        GeometryDesc::Csg(inner) => {
+            let reverse = entry.reverse;
+            combine(builder, shape, inner, &placement, reverse, leaves, depth + 1)
+        }
+    }
+}
+
+/// The exact shape that a form is, for the tree.
+pub(crate) fn shape_of(form: &CsgForm) -> PlacedShape {
+    PlacedShape::new(Shape::from(form.csg.clone()), Transform::IDENTITY)
 }

@@ -69,6 +69,12 @@ impl Interaction<'_> {
         Ray::new(start, stop - start).with_range(0.0, 1.0 - f64::powi(2.0, -40))
     }
 
+    /// Where lights are sampled from: off the surface, on the side that the ray came from, so that a surface which shines
+    /// is not in doubt about which side of itself it is on.
+    pub fn lit_from(&self) -> DVec3 {
+        self.start(self.towards_origin)
+    }
+
     /// The footprint of a ray that leaves: as wide as that of the ray that came, and spreading as much.
     pub fn footprint(&self) -> Footprint {
         if self.width > 0.0 {
@@ -86,9 +92,12 @@ impl Interaction<'_> {
 /// The point moved along the normal, to the side of `direction`, out of the box of its error, and rounded away from
 /// the surface.
 ///
-/// Pharr, Jakob, Humphreys, "Physically Based Rendering", 4th edition, 2023, 6.8.6.
+/// Pharr, Jakob, Humphreys, "Physically Based Rendering", 4th edition, 2023, 6.8.6. There, tests for hits refuse a `t`
+/// within its own error; here they do not, and the point goes farther instead: by the error of the coordinate that has
+/// most of it, which is what rounds into `t`. (On a face in the plane z = 0 the point itself has no error along z at all,
+/// and half of all rays from it hit that face again.)
 pub fn offset(point: DVec3, error: DVec3, normal: DVec3, direction: DVec3) -> DVec3 {
-    let distance = normal.abs().dot(error);
+    let distance = normal.abs().dot(error) + 4.0 * error.max_element();
     let along = if normal.dot(direction) < 0.0 { -normal } else { normal };
     let moved = point + distance * along;
     let away = |p: f64, n: f64| {

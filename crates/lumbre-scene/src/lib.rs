@@ -14,6 +14,7 @@ mod interaction;
 pub mod light;
 mod mesh;
 mod scene;
+mod solid;
 mod surface;
 
 pub use camera::{Camera, CameraKind, CameraRay, SphericalMapping, View};

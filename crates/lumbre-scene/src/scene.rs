@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use lumbre_geometry::{Aabb, Ray};
+use lumbre_geometry::{Aabb, Ray, Surface};
 use lumbre_kernel::{Accel, Hit};
 use lumbre_math::distribution::AliasTable;
 use lumbre_math::random::{combine, hash_dvec3, uniform_f32};
@@ -114,7 +114,7 @@ impl Scene {
 
     /// The position in its file of the shape that was hit.
     pub fn shape_index(&self, hit: &Hit) -> u32 {
-        self.leaf(hit).shape
+        self.leaf(hit).0.shape
     }
 
     /// The nearest hit that light sees: cut-outs and interfaces let it pass.
@@ -137,9 +137,14 @@ impl Scene {
 
     /// What there is at a hit.
     pub fn interaction(&self, ray: &Ray, hit: &Hit, footprint: &Footprint) -> Interaction<'_> {
-        let entry = self.leaf(hit);
+        let (entry, part, turned) = self.leaf(hit);
         let bare = self.accel.surface(ray, hit);
-        let (dressed, primitive) = self.dressed(entry, &bare, hit);
+        let dressed = self.dressed(entry, &bare, hit, part, turned);
+        let primitive = match entry.form {
+            Form::Patch { primitive, .. } => primitive,
+            Form::Mesh(_) => part,
+            Form::Exact | Form::Csg(_) => 0,
+        };
         let length = ray.direction.length();
         let direction = ray.direction / length;
         let front = dressed.surface.normal.dot(direction) < 0.0;
@@ -184,7 +189,7 @@ impl Scene {
         let mut sample = self.lights[choice.index].sample(&self.entries, from, u)?;
         match &mut sample.scatter {
             Scatter::Density(pdf) => *pdf *= choice.probability as f32,
-            Scatter::Delta => sample.radiance = sample.radiance * (1.0 / choice.probability) as f32,
+            Scatter::Delta => sample.radiance *= (1.0 / choice.probability) as f32,
         }
         Some(sample)
     }
@@ -194,12 +199,13 @@ impl Scene {
         self.lights[light.0 as usize].sample(&self.entries, from, u)
     }
 
-    /// The density per unit solid angle with which [`Scene::sample_light`] chooses the place that `ray` (with a unit
-    /// direction) hit; 0 where it never does.
-    pub fn light_pdf(&self, ray: &Ray, hit: &Interaction) -> f32 {
+    /// The density per unit solid angle with which [`Scene::sample_light`] chooses at `from` what a ray from there hit; 0
+    /// where it never does.
+    pub fn light_pdf(&self, from: DVec3, hit: &Interaction) -> f32 {
         let Some(light) = hit.light else { return 0.0 };
         let surface = Some((&hit.bare, hit.primitive));
-        (self.light_probability(light) * self.lights[light.0 as usize].pdf(ray, surface)) as f32
+        let ray = Ray::new(from, -hit.towards_origin);
+        (self.light_probability(light) * self.lights[light.0 as usize].pdf(&ray, surface)) as f32
     }
 
     /// What arrives along the unit direction of a ray that leaves the scene: for each light at infinity its radiance, and
@@ -216,30 +222,42 @@ impl Scene {
         self.light_choice.as_ref().map_or(0.0, |choice| choice.probability(light.0 as usize))
     }
 
-    /// The surface that was hit: that of a leaf, for a CSG.
-    fn leaf(&self, hit: &Hit) -> &SurfaceEntry {
+    /// The surface that was hit, that of a leaf for a CSG; which primitive of it; and whether it was turned inside out
+    /// because the leaf was taken away.
+    fn leaf(&self, hit: &Hit) -> (&SurfaceEntry, u32, bool) {
         let entry = &self.entries[hit.id as usize];
         match &entry.form {
-            Form::Csg(csg) => &csg[0],
-            _ => entry,
+            Form::Csg(csg) => match csg.leaf(&hit.root) {
+                Some((leaf, part)) => (leaf, part.part, part.flipped),
+                None => (entry, 0, false),
+            },
+            _ => (entry, hit.primitive, false),
         }
     }
 
-    fn dressed(&self, entry: &SurfaceEntry, bare: &lumbre_geometry::Surface, hit: &Hit) -> (Dressed, u32) {
+    fn dressed(
+        &self,
+        entry: &SurfaceEntry,
+        bare: &Surface,
+        hit: &Hit,
+        primitive: u32,
+        turned: bool,
+    ) -> Dressed {
         let placement: Option<Transform> =
             (self.has_instances && !hit.instances.is_empty()).then(|| self.accel.world_from_object(hit));
-        let dressed = entry.dress(bare, hit.primitive, hit.root.local, placement.as_ref());
-        let primitive = match &entry.form {
-            Form::Patch { primitive, .. } => *primitive,
-            _ => hit.primitive,
-        };
-        (dressed, primitive)
+        if !turned {
+            return entry.dress(bare, primitive, hit.root.local, placement.as_ref());
+        }
+        let outward = Surface { normal: -bare.normal, dndu: -bare.dndu, dndv: -bare.dndv, ..*bare };
+        let mut dressed = entry.dress(&outward, primitive, hit.root.local, placement.as_ref());
+        dressed.turn();
+        dressed
     }
 
     /// Whether a hit stops light. Where coverage is partial, a hash of the ray and of the place decides: the same
     /// wherever it is asked.
     fn is_solid(&self, ray: &Ray, hit: &Hit) -> bool {
-        let entry = self.leaf(hit);
+        let (entry, part, turned) = self.leaf(hit);
         if !entry.is_visible() {
             return false;
         }
@@ -248,7 +266,7 @@ impl Scene {
             FloatTexture::Constant(coverage) => coverage,
             _ => {
                 let bare = self.accel.surface(ray, hit);
-                let (dressed, _) = self.dressed(entry, &bare, hit);
+                let dressed = self.dressed(entry, &bare, hit, part, turned);
                 alpha.evaluate(&bare_context(&dressed.surface, dressed.surface.uv.as_vec2()))
             }
         };

@@ -8,6 +8,7 @@ use lumbre_math::{DVec2, DVec3, Transform, Vec2, Vec3};
 use lumbre_shading::{FloatTexture, LocalSurface, Material};
 
 use crate::Emission;
+use crate::csg::CsgForm;
 use crate::light::LightId;
 
 /// What stands behind one id of the tree.
@@ -35,7 +36,7 @@ pub(crate) enum Form {
     /// The patch of a mesh that is a quad which is not flat.
     Patch { dress: Arc<MeshDress>, corners: [u32; 4], primitive: u32 },
     /// A CSG: the surface of each leaf.
-    Csg(Arc<Vec<SurfaceEntry>>),
+    Csg(Arc<CsgForm>),
 }
 
 /// What a mesh has at its vertices, in the space of the tree that it stands in.
@@ -98,7 +99,7 @@ impl SurfaceEntry {
     /// Whether it gives off light.
     pub fn shines(&self) -> bool {
         match &self.form {
-            Form::Csg(leaves) => leaves.iter().any(Self::shines),
+            Form::Csg(csg) => csg.leaves.iter().any(Self::shines),
             _ => self.emission.is_some(),
         }
     }
@@ -106,7 +107,7 @@ impl SurfaceEntry {
     /// Whether light may pass through some of it.
     pub fn has_holes(&self) -> bool {
         match &self.form {
-            Form::Csg(leaves) => leaves.iter().any(Self::has_holes),
+            Form::Csg(csg) => csg.leaves.iter().any(Self::has_holes),
             _ => self.alpha.is_some() || !self.is_visible(),
         }
     }
@@ -147,7 +148,8 @@ impl SurfaceEntry {
 }
 
 impl Dressed {
-    fn turn(&mut self) {
+    /// Turns the inside out.
+    pub fn turn(&mut self) {
         self.surface.normal = -self.surface.normal;
         self.surface.dndu = -self.surface.dndu;
         self.surface.dndv = -self.surface.dndv;

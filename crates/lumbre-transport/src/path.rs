@@ -17,6 +17,8 @@ pub struct Path {
     pub regularize: bool,
     /// How light is found.
     pub strategy: Strategy,
+    /// Bounces that every path may take before Russian roulette.
+    pub sure_bounces: u32,
 }
 
 /// How a path finds light. All give the same picture in the mean, but [`Strategy::Bsdf`] does not find lights that no ray
@@ -44,7 +46,7 @@ enum Chosen {
 impl Path {
     /// A path tracer of so many bounces.
     pub fn new(max_depth: u32) -> Self {
-        Self { max_depth, regularize: false, strategy: Strategy::Both }
+        Self { max_depth, regularize: false, strategy: Strategy::Both, sure_bounces: 1 }
     }
 
     /// The weight of light that a ray found by itself, against a sample of the light with this density.
@@ -88,6 +90,8 @@ impl Integrator for Path {
         let mut chosen = Chosen::Only;
         let mut has_scattered = false;
         let (mut ray, mut met): (Ray, _) = (sight.ray.ray, sight.met);
+        // Where the last vertex sampled lights from.
+        let mut lit_from = ray.origin;
         let mut depth = 0;
         loop {
             let Some(here) = &met else {
@@ -98,7 +102,7 @@ impl Integrator for Path {
             };
             let emitted = here.emitted();
             if !emitted.is_black() {
-                let pdf = if chosen == Chosen::Only { 0.0 } else { scene.light_pdf(&ray, here) };
+                let pdf = if chosen == Chosen::Only { 0.0 } else { scene.light_pdf(lit_from, here) };
                 radiance += throughput * emitted * self.weight_of_found(chosen, pdf);
             }
             if depth == self.max_depth {
@@ -109,9 +113,9 @@ impl Integrator for Path {
                 vertex.bsdf = vertex.bsdf.regularized();
             }
 
+            lit_from = here.lit_from();
             if !vertex.bsdf.is_delta() {
-                let light =
-                    scene.sample_light(here.surface.point, draw.light_choice(depth), draw.light_point(depth));
+                let light = scene.sample_light(lit_from, draw.light_choice(depth), draw.light_point(depth));
                 if let Some(light) = light {
                     let weigh = |light_pdf, bsdf_pdf| self.weight_of_sampled(light_pdf, bsdf_pdf);
                     radiance += throughput * vertex.scattered(scene, &light, weigh, rays);
@@ -136,7 +140,7 @@ impl Integrator for Path {
             depth += 1;
 
             let likely = (throughput * eta_scale).max_component();
-            if depth > 1 && likely < 1.0 {
+            if depth > self.sure_bounces && likely < 1.0 {
                 if draw.survival(depth) >= likely {
                     return radiance;
                 }

@@ -58,7 +58,7 @@ impl Integrator for Whitted {
 }
 
 fn direct(scene: &Scene, vertex: &Vertex, depth: u32, draw: &Draw, rays: &mut RayCounts) -> Spectrum {
-    let from = vertex.met.surface.point;
+    let from = vertex.met.lit_from();
     let by_light_alone = |_, _| 1.0;
     let count = scene.lights().len();
     if count > EVERY_LIGHT_UP_TO {

@@ -47,10 +47,10 @@ pub(super) fn arriving(
     if let Some(alpha) = &entry.alpha {
         if matches!(**alpha, FloatTexture::Constant(0.0)) {
             // Cut out altogether it still shines, but no ray finds it.
-            radiance = radiance * (1.0 / pdf) as f32;
+            radiance *= (1.0 / pdf) as f32;
             scatter = Scatter::Delta;
         } else {
-            radiance = radiance * alpha.evaluate(&bare_context(&dressed.surface, uv)).clamp(0.0, 1.0);
+            radiance *= alpha.evaluate(&bare_context(&dressed.surface, uv)).clamp(0.0, 1.0);
         }
     }
     (pdf > 0.0 && !radiance.is_black()).then(|| LightSample {

@@ -1,0 +1,309 @@
+//! A picture is a function of the scene, the options and the seed.
+
+mod common;
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::Duration;
+
+use common::*;
+use lumbre_geometry::{Cuboid, Sphere, Torus};
+use lumbre_image::{Image, Rgb};
+use lumbre_math::{DVec3, Transform, Vec2, Vec3};
+use lumbre_render::{
+    CancelToken, Feature, Integrator, NoProgress, PixelBounds, Progress, RayCounts, RenderError,
+    RenderOptions, Snapshot, State, render, render_with,
+};
+use lumbre_scene::{
+    FilterDesc, GeometryDesc, InstanceDesc, LightDesc, ObjectDesc, ObjectId, SamplerKind, Scene, SceneDesc,
+    ShapeDesc, View,
+};
+use lumbre_shading::{Material, MaterialKind, Roughness, Spectrum};
+use lumbre_transport::{Draw, Path, Sight};
+
+/// A bit of everything, `offset` away from where it usually is.
+fn still_life(offset: DVec3) -> SceneDesc {
+    let mut desc = empty();
+    desc.filter = FilterDesc::Gaussian { radius: Vec2::splat(1.5), sigma: 0.5 };
+    let grey = add_material(&mut desc, diffuse(0.6));
+    let glass = add_material(
+        &mut desc,
+        Material::new(MaterialKind::Dielectric { eta: 1.5, roughness: Roughness::smooth() }),
+    );
+    let at = Transform::translate(offset);
+    let ground = mesh(
+        vec![
+            Vec3::new(-4.0, -4.0, 0.0),
+            Vec3::new(5.0, -4.0, 0.0),
+            Vec3::new(5.0, 6.0, 0.0),
+            Vec3::new(-4.0, 6.0, 0.0),
+        ],
+        vec![],
+        vec![[0, 1, 2, 3]],
+    );
+    add(&mut desc, ground, grey).world_from_object = at;
+    add(
+        &mut desc,
+        exact(Torus::new(DVec3::new(0.5, 0.25, 0.6), DVec3::new(0.1, 0.3, 1.0), 0.9, 0.35).unwrap()),
+        grey,
+    )
+    .world_from_object = at;
+    add(&mut desc, exact(Sphere::new(DVec3::new(-1.25, -0.75, 0.7), 0.7).unwrap()), glass)
+        .world_from_object = at;
+    let lamp = add(
+        &mut desc,
+        exact(Cuboid::new(DVec3::new(1.0, -2.0, 3.0), DVec3::new(2.5, -0.5, 3.25)).unwrap()),
+        grey,
+    );
+    lamp.world_from_object = at;
+    lamp.area_light = Some(glow(9.0));
+    desc.lights.push(LightDesc::Infinite {
+        world_from_light: Transform::IDENTITY,
+        radiance: Rgb::splat(0.2),
+        image: None,
+    });
+    desc.objects.push(ObjectDesc {
+        name: "ball".into(),
+        shapes: vec![ShapeDesc {
+            geometry: exact(Sphere::new(DVec3::new(0.1, 0.0, 0.2), 0.3).unwrap()),
+            world_from_object: Transform::IDENTITY,
+            ..desc.shapes[1].clone()
+        }],
+        instances: vec![],
+    });
+    for x in [-1.5, 0.0, 1.75] {
+        let place = at * Transform::translate(DVec3::new(x, 1.75, 0.3));
+        desc.instances.push(InstanceDesc { object: ObjectId(0), world_from_object: place });
+    }
+    desc.cameras = vec![look(offset + DVec3::new(-3.0, -5.0, 4.0), offset + DVec3::new(0.2, 0.3, 0.4), 42.0)];
+    desc
+}
+
+fn bytes(image: &Image) -> Vec<u32> {
+    image.pixels().iter().flat_map(|c| c.to_array().map(f32::to_bits)).collect()
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bytes() {
+    let scene = Scene::build(still_life(DVec3::ZERO)).unwrap();
+    let with = |threads, features| {
+        picture(&scene, &RenderOptions { threads, features, ..options(&scene, 75, 50, 7) })
+    };
+    let one = with(1, true);
+    assert!(one.stats.rays.bounce > 10_000 && one.stats.rays.shadow > 5_000, "{:?}", one.stats.rays);
+    assert!(one.image.pixels().iter().filter(|c| c.g > 0.05).count() > 3000);
+    for threads in [2, 3, 16] {
+        let many = with(threads, true);
+        assert_eq!(many.stats.threads, threads);
+        assert_eq!(bytes(&one.image), bytes(&many.image), "{threads} threads");
+        assert_eq!(one.features, many.features, "{threads} threads");
+        assert_eq!(one.stats.rays, many.stats.rays, "{threads} threads");
+    }
+    assert_eq!(bytes(&one.image), bytes(&with(2, false).image), "features change nothing");
+}
+
+#[test]
+fn every_pixel_depends_on_its_own_samples_alone() {
+    let scene = Scene::build(still_life(DVec3::ZERO)).unwrap();
+    let whole = options(&scene, 61, 47, 5);
+    let full = picture(&scene, &whole).image;
+    let crop = PixelBounds { x0: 13, y0: 7, x1: 52, y1: 40 };
+    let part = picture(&scene, &RenderOptions { crop: Some(crop), ..whole });
+    assert_eq!(part.bounds, crop);
+    for (x, y) in crop.pixels() {
+        assert_eq!(part.image.pixel(x - crop.x0, y - crop.y0), full.pixel(x, y), "({x}, {y})");
+    }
+}
+
+#[test]
+fn seeds_and_samplers_change_the_noise_and_nothing_else() {
+    let scene = Scene::build(still_life(DVec3::ZERO)).unwrap();
+    let base = options(&scene, 40, 30, 64);
+    let reference = picture(&scene, &base).image;
+    for (kind, seed) in [(SamplerKind::Sobol, 5), (SamplerKind::Independent, 0)] {
+        let mut other = base.clone();
+        other.sampler.kind = kind;
+        other.sampler.seed = seed;
+        let image = picture(&scene, &other).image;
+        assert_ne!(bytes(&image), bytes(&reference));
+        assert_close(mean(&image)[1], mean(&reference)[1], 0.02, &format!("{kind:?} {seed}"));
+    }
+}
+
+#[test]
+fn a_scene_far_from_the_origin_looks_the_same() {
+    let near = Scene::build(still_life(DVec3::ZERO)).unwrap();
+    let reference = picture(&near, &options(&near, 60, 40, 16)).image;
+    for distance in [1e5, 1e6] {
+        let offset = distance * DVec3::new(1.0, -1.0, 0.75);
+        let far = Scene::build(still_life(offset)).unwrap();
+        let image = picture(&far, &options(&far, 60, 40, 16)).image;
+        // What rounding of the input to 1e-10 may change is which side of an edge a sample falls on.
+        let differs = |a: &Rgb, b: &Rgb| (a.g - b.g).abs() > 1e-3 * (a.g + b.g);
+        let changed = reference.pixels().iter().zip(image.pixels()).filter(|(a, b)| differs(a, b)).count();
+        assert!(changed <= 24, "{distance}: {changed} of 2400 pixels");
+        assert_close(mean(&image)[1], mean(&reference)[1], 1e-3, "far away");
+    }
+}
+
+/// Gives light that is no number to one sample in 97, by pixel.
+#[derive(Debug)]
+struct Broken(AtomicU32);
+
+impl Integrator for Broken {
+    fn radiance(&self, _: &Scene, _: &View, _: Sight<'_>, draw: &Draw, _: &mut RayCounts) -> Spectrum {
+        if draw.lobe(7) < 1.0 / 97.0 {
+            let count = self.0.fetch_add(1, Ordering::Relaxed);
+            Spectrum::new(1.0, if count.is_multiple_of(2) { f32::NAN } else { f32::INFINITY }, 1.0)
+        } else {
+            Spectrum::splat(0.25)
+        }
+    }
+}
+
+#[test]
+fn samples_that_are_no_numbers_are_dropped_counted_and_named() {
+    let scene = Scene::build(still_life(DVec3::ZERO)).unwrap();
+    let broken = Broken(AtomicU32::new(0));
+    let options = options(&scene, 40, 30, 16);
+    let rendered = render_with(&scene, &options, &broken, &NoProgress, &CancelToken::new()).unwrap();
+    let given = u64::from(broken.0.load(Ordering::Relaxed));
+    assert!(given > 50, "{given}");
+    assert_eq!(rendered.stats.dropped, given);
+    assert_eq!(rendered.stats.first_dropped.len(), 16);
+    assert!(rendered.image.pixels().iter().all(|&c| c == Rgb::splat(0.25)));
+    let first = rendered.stats.first_dropped[0];
+    let sampler = lumbre_transport::Sampler::new(&options.sampler);
+    assert!(sampler.draw(first.x, first.y, first.sample).lobe(7) < 1.0 / 97.0);
+}
+
+/// Cancels after a number of passes, and writes down what it is told.
+struct Impatient {
+    cancel: CancelToken,
+    after_spp: u32,
+    told: Mutex<Vec<(u32, Option<f64>, f32)>>,
+}
+
+impl Progress for Impatient {
+    fn pass(&self, snapshot: &Snapshot<'_>) {
+        let green = mean(&snapshot.image())[1] as f32;
+        self.told.lock().unwrap().push((snapshot.spp, snapshot.noise, green));
+        if snapshot.spp >= self.after_spp {
+            self.cancel.cancel();
+        }
+    }
+
+    fn state(&self, state: &State) {
+        assert!(state.samples <= state.total);
+    }
+}
+
+#[test]
+fn a_cancelled_render_returns_what_it_has() {
+    let scene = Scene::build(still_life(DVec3::ZERO)).unwrap();
+    let cancel = CancelToken::new();
+    let impatient = Impatient { cancel: cancel.clone(), after_spp: 8, told: Mutex::default() };
+    let partial = render(&scene, &options(&scene, 40, 30, 1 << 20), &impatient, &cancel).unwrap();
+    assert!(partial.stats.cancelled);
+    assert_eq!((partial.stats.spp, partial.stats.samples), (8, 8 * 1200));
+    let told = impatient.told.into_inner().unwrap();
+    assert_eq!(told.iter().map(|t| t.0).collect::<Vec<_>>(), [1, 2, 4, 8]);
+    assert!(told[0].1.is_none() && told[3].1 < told[1].1 && told[3].1 > Some(0.0), "{told:?}");
+    assert_eq!(told[3].2, mean(&partial.image)[1] as f32);
+    // The same samples as a render that wanted no more; only the textures' footprint knows how many there were to be.
+    let whole = picture(&scene, &options(&scene, 40, 30, 8));
+    assert_eq!(bytes(&partial.image), bytes(&whole.image));
+    assert!(!whole.stats.cancelled);
+}
+
+#[test]
+fn time_and_noise_end_a_render() {
+    let scene = Scene::build(still_life(DVec3::ZERO)).unwrap();
+    let mut timed = options(&scene, 40, 30, 1 << 20);
+    timed.stop.time = Some(Duration::from_millis(300));
+    let rendered = picture(&scene, &timed);
+    assert!(rendered.stats.elapsed < Duration::from_secs(10), "{:?}", rendered.stats.elapsed);
+    assert!(rendered.stats.samples > 0 && !rendered.stats.cancelled);
+    let mut quiet = options(&scene, 40, 30, 1 << 20);
+    quiet.stop.noise = Some(0.25);
+    let rendered = picture(&scene, &quiet);
+    assert!(rendered.stats.spp >= 8 && rendered.stats.noise.unwrap() <= 0.25, "{:?}", rendered.stats);
+}
+
+#[test]
+fn features_are_what_they_are_called() {
+    let scene = Scene::build(still_life(DVec3::new(50.0, 20.0, -10.0))).unwrap();
+    let rendered = picture(&scene, &RenderOptions { features: true, ..options(&scene, 90, 60, 4) });
+    let get = |wanted| &rendered.features.iter().find(|(f, _)| *f == wanted).unwrap().1;
+    // The middle of the picture is on the torus or the ground before it; the lower edge is ground.
+    let (x, y) = (45, 58);
+    let normal = get(Feature::Normal).pixel(x, y);
+    assert!((normal.b - 1.0).abs() < 1e-5 && normal.r.abs() < 1e-5, "{normal:?}");
+    assert!((get(Feature::Albedo).pixel(x, y).g - 0.6).abs() < 1e-6);
+    let view = View::new(&scene.cameras()[0], 90, 60);
+    let ray = view.ray(lumbre_math::DVec2::new(45.5, 58.5), lumbre_math::DVec2::splat(0.5), 1.0).ray;
+    let hit = scene.closest(&ray).unwrap();
+    let depth = view.depth(ray.at(hit.root.t));
+    assert_close(get(Feature::Depth).pixel(x, y).g.into(), depth, 0.03, "depth");
+    let uv = get(Feature::Uv).pixel(x, y);
+    assert!(uv.r > 0.0 && uv.r < 1.0 && uv.g > 0.0 && uv.g < 1.0 && uv.b == 0.0, "{uv:?}");
+}
+
+#[test]
+fn options_that_make_no_picture_are_refused() {
+    let scene = Scene::build(still_life(DVec3::ZERO)).unwrap();
+    let refused =
+        |options: RenderOptions| render(&scene, &options, &NoProgress, &CancelToken::new()).unwrap_err();
+    let base = options(&scene, 40, 30, 1);
+    assert_eq!(
+        refused(RenderOptions { width: 0, ..base.clone() }),
+        RenderError::Size { width: 0, height: 30 }
+    );
+    let crop = Some(PixelBounds { x0: 40, y0: 0, x1: 50, y1: 9 });
+    assert_eq!(refused(RenderOptions { crop, ..base.clone() }), RenderError::EmptyCrop);
+    assert_eq!(
+        refused(RenderOptions { camera: 3, ..base.clone() }),
+        RenderError::NoSuchCamera { index: 3, count: 1 }
+    );
+    let filter = FilterDesc::Box { radius: Vec2::ZERO };
+    assert_eq!(refused(RenderOptions { filter, ..base }), RenderError::Filter);
+}
+
+#[test]
+fn an_instanced_light_is_found_by_chance_and_as_bright_as_a_plain_one() {
+    let lamp = || ShapeDesc {
+        area_light: Some(glow(3.0)),
+        ..{
+            let mut desc = empty();
+            let black = add_material(&mut desc, diffuse(0.0));
+            add(&mut desc, exact(Sphere::new(DVec3::new(0.3, 0.2, 0.1), 1.5).unwrap()), black).clone()
+        }
+    };
+    let place = Transform::translate(DVec3::new(0.0, 1.0, 3.0));
+    let scene = |instanced: bool| {
+        let mut desc = empty();
+        add_material(&mut desc, diffuse(0.0));
+        let grey = add_material(&mut desc, diffuse(0.8));
+        let ground: GeometryDesc =
+            exact(Cuboid::new(DVec3::new(-9.0, -9.0, -1.0), DVec3::new(9.0, 9.0, 0.0)).unwrap());
+        add(&mut desc, ground, grey);
+        if instanced {
+            desc.objects.push(ObjectDesc { name: "lamp".into(), shapes: vec![lamp()], instances: vec![] });
+            desc.instances.push(InstanceDesc { object: ObjectId(0), world_from_object: place });
+        } else {
+            desc.shapes.push(ShapeDesc { world_from_object: place, ..lamp() });
+        }
+        desc.cameras = vec![look(DVec3::new(-4.0, -6.0, 5.0), DVec3::ZERO, 50.0)];
+        Scene::build(desc).unwrap()
+    };
+    let path = Path::new(2);
+    let light = |scene: &Scene| {
+        let options = options(scene, 32, 24, 128);
+        let rendered = render_with(scene, &options, &path, &NoProgress, &CancelToken::new()).unwrap();
+        mean(&rendered.image)[1]
+    };
+    let (plain, instanced) = (scene(false), scene(true));
+    assert!(plain.warnings().is_empty());
+    assert_eq!(instanced.warnings().len(), 1);
+    assert_close(light(&instanced), light(&plain), 0.02, "instanced");
+}

@@ -1,0 +1,104 @@
+//! White furnaces: in a closed room that emits as much as it absorbs, and around whatever conserves energy, everything
+//! is equally bright. Sizes are not 1 and places not 0, so that missing squares and offsets show.
+
+mod common;
+
+use std::sync::Arc;
+
+use common::*;
+use lumbre_geometry::{Cuboid, Shape, Sphere, Torus};
+use lumbre_image::Rgb;
+use lumbre_math::DVec3;
+use lumbre_render::{CancelToken, NoProgress, render_with};
+use lumbre_scene::{Scene, SceneDesc};
+use lumbre_shading::{Material, MaterialKind, Roughness, SpectrumTexture};
+use lumbre_transport::{Path, Strategy};
+
+const CENTER: DVec3 = DVec3::new(3.0, -7.0, 11.0);
+
+/// A room that emits E = 1 - ρ and reflects ρ: the radiance everywhere in it is 1.
+fn room(shape: Shape, reflectance: f32) -> SceneDesc {
+    let mut desc = empty();
+    let material = add_material(&mut desc, diffuse(reflectance));
+    let walls = add(&mut desc, exact(shape), material);
+    walls.reverse_orientation = true;
+    walls.area_light = Some(glow(1.0 - reflectance));
+    desc
+}
+
+/// The mean of the picture is 1 however light is found: by paths of 40 bounces without roulette, and with roulette too,
+/// whose noise asks for more samples.
+fn assert_white(desc: SceneDesc, what: &str) {
+    let scene = Scene::build(desc).unwrap();
+    // Lights alone are noisy where they are near: the tolerance is that of the noise.
+    for (strategy, share) in [(Strategy::Both, 2e-3), (Strategy::Lights, 1.5e-2), (Strategy::Bsdf, 2e-3)] {
+        let path = Path { strategy, sure_bounces: 1000, ..Path::new(40) };
+        let options = options(&scene, 8, 8, 36);
+        let rendered = render_with(&scene, &options, &path, &NoProgress, &CancelToken::new()).unwrap();
+        assert_eq!(rendered.stats.dropped, 0);
+        assert!(rendered.stats.rays.bounce > 20_000, "{what}: {:?}", rendered.stats.rays);
+        for channel in mean(&rendered.image) {
+            assert_close(channel, 1.0, share, &format!("{what}, {strategy:?}"));
+        }
+    }
+}
+
+#[test]
+fn a_sphere_a_box_and_a_torus_are_white_from_inside() {
+    let torus_tube = CENTER + DVec3::new(4.0, 0.0, 0.0);
+    let rooms: [(&str, Shape, DVec3); 3] = [
+        ("sphere", Sphere::new(CENTER, 2.5).unwrap().into(), CENTER + DVec3::new(0.4, -0.3, 0.9)),
+        ("box", Cuboid::new(CENTER - DVec3::new(2.0, 1.5, 3.0), CENTER + 2.5).unwrap().into(), CENTER),
+        ("torus", Torus::new(CENTER, DVec3::Z, 4.0, 1.5).unwrap().into(), torus_tube),
+    ];
+    for (name, shape, from) in rooms {
+        let mut desc = room(shape, 0.5);
+        desc.cameras = vec![look(from, from + DVec3::new(0.3, 1.0, -0.2), 70.0)];
+        assert_white(desc, name);
+    }
+}
+
+fn smooth_conductor() -> Material {
+    Material::new(MaterialKind::ConductorReflectance {
+        reflectance: Arc::new(SpectrumTexture::Constant(Rgb::WHITE)),
+        roughness: Roughness::smooth(),
+    })
+}
+
+/// Materials that absorb nothing.
+fn conserving() -> Vec<(&'static str, Material)> {
+    let texture = |value: f32| Arc::new(SpectrumTexture::Constant(Rgb::splat(value)));
+    vec![
+        ("diffuse", diffuse(1.0)),
+        (
+            "diffuse transmission",
+            Material::new(MaterialKind::DiffuseTransmission {
+                reflectance: texture(0.375),
+                transmittance: texture(0.625),
+                scale: 1.0,
+            }),
+        ),
+        ("glass", Material::new(MaterialKind::Dielectric { eta: 1.5, roughness: Roughness::smooth() })),
+        ("thin glass", Material::new(MaterialKind::ThinDielectric { eta: 1.7 })),
+        ("mirror", smooth_conductor()),
+    ]
+}
+
+#[test]
+fn what_absorbs_nothing_cannot_be_seen_in_a_white_room() {
+    for (name, material) in conserving() {
+        let shapes: [Shape; 3] = [
+            Sphere::new(CENTER + DVec3::new(0.5, 0.25, -0.25), 0.75).unwrap().into(),
+            Cuboid::new(CENTER - DVec3::new(0.5, 0.75, 0.6), CENTER + 0.4).unwrap().into(),
+            Torus::new(CENTER, DVec3::new(0.2, 1.0, 0.4), 0.8, 0.3).unwrap().into(),
+        ];
+        for shape in shapes {
+            let what = format!("{name} {}", shape.name());
+            let mut desc = room(Sphere::new(CENTER, 2.5).unwrap().into(), 0.25);
+            let material = add_material(&mut desc, material.clone());
+            add(&mut desc, exact(shape), material);
+            desc.cameras = vec![look(CENTER - DVec3::new(0.3, 2.2, 0.4), CENTER, 60.0)];
+            assert_white(desc, &what);
+        }
+    }
+}
