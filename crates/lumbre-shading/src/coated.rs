@@ -351,12 +351,24 @@ impl Coat {
         // Seen from its end the way carries importance, which does not gather in the denser medium.
         let exit_weight = exit.weight * (exit.eta * exit.eta * wi.abs_cos_theta() / exit.wi.abs_cos_theta());
 
-        // Under a smooth face a mirror sends scattered light out by directions that no walk finds: the last scattering is
-        // then joined to the end by way of it too.
-        let mirror = (!rough && base.is_delta()).then(|| base.sample(-exit.wi, Vec2::ZERO)).flatten();
+        // A mirror below joins what is scattered down to the end as well as what is scattered up: without it, a smooth face
+        // would let out nothing of that, and a rough one would seldom.
+        let mirror = if base.is_delta() { base.sample(-exit.wi, Vec2::ZERO) } else { None };
+        let mirror = mirror.map_or(Spectrum::BLACK, |mirror| mirror.weight);
+        let by_mirror = rough && base.is_delta();
+        // The way down that the mirror turns into the way out, and what is left of it from face to face.
+        let way_down = exit.wi.mirrored();
+        let from_face = exit_weight * mirror * Self::transmittance(2.0 * self.thickness, exit.wi);
+
         let mut sum = Spectrum::BLACK;
+        if by_mirror && self.max_depth > 0 {
+            let share = balance(exit_density, self.face.pdf_of(wo, way_down, Ways::Transmission));
+            sum += from_face * (self.face.eval(wo, way_down) * share);
+        }
         let mut throughput = entry.weight;
         let mut w = entry.wi;
+        // The density with which `w` was chosen where it last had a choice: a mirror leaves it as it is.
+        let mut chosen = density(&entry);
         let mut height = self.thickness;
         for depth in 0..self.max_depth {
             let brightest = throughput.max_component();
@@ -377,19 +389,25 @@ impl Coat {
                     let to_face = self.thickness - height;
                     let direct = henyey_greenstein(w.vec().dot(-exit.wi.vec()), self.g);
                     let share = balance(exit_density, direct);
-                    let straight = Spectrum::splat(direct * share * Self::transmittance(to_face, exit.wi));
-                    let out = mirror.map_or(straight, |mirror| {
-                        straight + self.by_mirror(w, exit.wi, height, straight, mirror.weight)
-                    });
+                    let mut out = Spectrum::splat(direct * share * Self::transmittance(to_face, exit.wi));
+                    if base.is_delta() {
+                        let turned = henyey_greenstein(w.vec().dot(way_down.vec()), self.g);
+                        let share = balance(exit_density, turned);
+                        let way = Self::transmittance(height + self.thickness, exit.wi);
+                        out += mirror * (turned * share * way);
+                        if !rough {
+                            out *= self.bounces(mirror, exit.wi);
+                        }
+                    }
                     sum += throughput * exit_weight * out;
                     let u = Vec2::new(random.next_f32(), random.next_f32());
-                    let (scattered, chosen) = sample_henyey_greenstein(w.vec(), self.g, u);
+                    let (scattered, pdf) = sample_henyey_greenstein(w.vec(), self.g, u);
                     if scattered.cos_theta() == 0.0 {
                         break;
                     }
-                    w = scattered;
+                    (w, chosen) = (scattered, Some(pdf));
                     if rough && w.cos_theta() > 0.0 {
-                        let left = self.leave(w, wi, Some(chosen)) * Self::transmittance(to_face, w);
+                        let left = self.leave(w, wi, chosen) * Self::transmittance(to_face, w);
                         sum += throughput * left;
                     }
                     continue;
@@ -400,9 +418,13 @@ impl Coat {
             let u = Vec2::new(random.next_f32(), random.next_f32());
             if !down {
                 height = self.thickness;
+                if by_mirror {
+                    let share = balance(exit_density, self.face.pdf_of(-w, way_down, Ways::Reflection));
+                    sum += throughput * from_face * (self.face.eval(-w, way_down) * share);
+                }
                 let Some(back) = self.face.sample_of(-w, 0.0, u, Ways::Reflection) else { break };
                 throughput *= back.weight;
-                w = back.wi;
+                (w, chosen) = (back.wi, density(&back));
                 continue;
             }
             height = 0.0;
@@ -417,37 +439,24 @@ impl Coat {
             let Some(up) = base.sample(-w, u) else { break };
             throughput *= up.weight;
             w = up.wi;
+            chosen = if base.is_delta() { chosen } else { density(&up) };
             if rough {
-                let left = self.leave(w, wi, density(&up)) * Self::transmittance(self.thickness, w);
+                let left = self.leave(w, wi, chosen) * Self::transmittance(self.thickness, w);
                 sum += throughput * left;
             }
         }
         sum
     }
 
-    /// What is scattered at a height from `w` and leaves by way of a mirror below against the direction `exit`, all bounces
-    /// between mirror and face summed, beside the part `straight` that meets neither on its first way.
-    fn by_mirror(
-        &self,
-        w: LocalDir,
-        exit: LocalDir,
-        height: f32,
-        straight: Spectrum,
-        mirror: Spectrum,
-    ) -> Spectrum {
-        // Downwards first; the mirror turns it into -exit.
-        let down = exit.mirrored().vec();
-        let first = mirror
-            * (henyey_greenstein(w.vec().dot(down), self.g)
-                * Self::transmittance(height + self.thickness, exit));
+    /// The bounces between a mirror below and a smooth face that a way out along `exit` may have had, summed.
+    fn bounces(&self, mirror: Spectrum, exit: LocalDir) -> Spectrum {
         let face = fresnel::dielectric(-exit.abs_cos_theta(), self.face.eta);
         let again = mirror * (face * Self::transmittance(2.0 * self.thickness, exit));
-        let bounces = again.map(|again| 1.0 / (1.0 - again.min(0.999_999)));
-        (straight + first) * bounces - straight
+        again.map(|again| 1.0 / (1.0 - again.min(0.999_999)))
     }
 
-    /// What a walk that goes up along `w`, chosen with density `chosen` or as the only direction possible, sends out of a
-    /// rough face to `wi`, weighted against having been found from `wi`.
+    /// What a walk that goes up along `w`, chosen with density `chosen`, sends out of a rough face to `wi`, weighted against
+    /// having been found from `wi`.
     fn leave(&self, w: LocalDir, wi: LocalDir, chosen: Option<f32>) -> f32 {
         let found = if chosen.is_some() { self.face.pdf_of(wi, -w, Ways::Transmission) } else { 0.0 };
         self.face.eval(-w, wi) * balance(chosen, found)
