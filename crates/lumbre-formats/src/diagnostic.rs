@@ -264,6 +264,17 @@ impl FormatError {
         }
     }
 
+    /// The same, in a file that the one at `place` includes or names; call it from the innermost include outwards.
+    #[must_use]
+    pub fn included_from(mut self, place: Place) -> Self {
+        match &mut self {
+            Self::Input(diagnostic) => diagnostic.included_from.push(place),
+            Self::Limit { place: at @ None, .. } => *at = Some(place),
+            Self::Limit { .. } | Self::Io { .. } => {}
+        }
+        self
+    }
+
     /// The same at a place, unless it has one.
     #[must_use]
     pub fn or_at(mut self, at: impl FnOnce() -> Place) -> Self {

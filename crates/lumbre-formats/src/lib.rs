@@ -9,10 +9,12 @@ mod contained;
 pub mod diagnostic;
 pub mod image;
 pub mod input;
+pub mod obj;
 pub mod open;
 pub mod pbrt;
 pub mod ply;
 mod polygon;
+pub mod stl;
 
 pub use atomic::{atomic_write, probe_writable};
 pub use budget::{Budget, BudgetVec, Hold, LimitError, LimitKind, Limits};

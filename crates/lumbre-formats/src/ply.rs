@@ -1,13 +1,16 @@
 //! PLY meshes (G. Turk, "The PLY polygon file format", 1994): text or binary of either byte order.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use lumbre_image::{Rgb, srgb_to_linear};
-use lumbre_math::{Vec2, Vec3};
-use lumbre_scene::MeshDesc;
+use lumbre_math::{Transform, Vec2, Vec3};
+use lumbre_scene::{GeometryDesc, MaterialId, MeshDesc, NamedMaterial, SceneDesc, ShapeDesc, UpAxis};
+use lumbre_shading::Material;
 
 use crate::budget::{Budget, BudgetVec};
 use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, nearest_name, quoted, quoted_bytes};
+use crate::input::Input;
 use crate::polygon;
 
 /// Reads a mesh from the bytes of a PLY file.
@@ -36,6 +39,36 @@ pub fn read_ply(
     }
     .map_err(|e| e.or_at(|| Place::whole(name.clone())))?;
     mesh.finish()
+}
+
+/// Reads the PLY file `path` as a scene of one shape, of the default material.
+///
+/// # Errors
+/// As [`Input::open`] and [`read_ply`].
+pub fn open_ply(
+    path: &Path,
+    budget: &Budget,
+    diagnostics: &mut Diagnostics,
+) -> Result<SceneDesc, FormatError> {
+    let input = Input::open(path, budget)?;
+    let mesh = read_ply(&input, input.name(), budget, diagnostics)?;
+    Ok(scene_of_meshes([mesh], UpAxis::Y))
+}
+
+/// Meshes as shapes of the default material, in their own space.
+pub(crate) fn scene_of_meshes(meshes: impl IntoIterator<Item = MeshDesc>, up: UpAxis) -> SceneDesc {
+    let material = NamedMaterial { name: None, material: Arc::new(Material::default_diffuse()) };
+    let shape = |(index, mesh): (usize, MeshDesc)| ShapeDesc {
+        index: index as u32,
+        geometry: GeometryDesc::Mesh(Arc::new(mesh)),
+        world_from_object: Transform::IDENTITY,
+        reverse_orientation: false,
+        material: Some(MaterialId(0)),
+        area_light: None,
+        alpha: None,
+    };
+    let shapes = meshes.into_iter().enumerate().map(shape).collect();
+    SceneDesc { materials: vec![material], shapes, up, ..SceneDesc::default() }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -808,15 +841,15 @@ impl<'a> Mesh<'a> {
             }
             _ => {
                 // Where its corners stand, and the cutting of them.
-                let _while_cut = self.budget.hold(corners.len() as u64 * 80, "corners of a face")?;
+                let _while_cut = self.budget.hold(corners.len() as u64 * 160, "corners of a face")?;
                 let places: Vec<Vec3> = corners.iter().map(|&c| self.positions[c as usize]).collect();
                 let Some(triangles) = polygon::triangulate(&places) else {
                     let at = self.encoding.start(self.bytes, at);
                     let place = self.place(at, &element.name, index, "vertex_indices");
-                    let wrong = Diagnostic::error("concave face with too many corners")
+                    let wrong = Diagnostic::error("face too large and winding to be cut into triangles")
                         .at(place)
-                        .found(corners.len());
-                    return Err(wrong.expected(format!("at most {}", polygon::MOST_CONCAVE_CORNERS)).into());
+                        .found(format!("{} corners", corners.len()));
+                    return Err(wrong.into());
                 };
                 for t in triangles {
                     self.triangle(t.map(|i| corners[i] as u32), number)?;

@@ -2,8 +2,8 @@
 
 use lumbre_math::{DVec2, DVec3, Vec3};
 
-/// A concave polygon may have so many corners. Cutting one takes time by the square of their number.
-pub(crate) const MOST_CONCAVE_CORNERS: usize = 20_000;
+/// A polygon is given up after so many tests of a corner against a triangle, less than a second's worth.
+const MOST_TESTS: u64 = 100_000_000;
 
 /// Whether the corners, which need not lie in one plane, turn one way all along as seen along their mean normal.
 pub(crate) fn is_convex(corners: &[Vec3]) -> bool {
@@ -11,8 +11,8 @@ pub(crate) fn is_convex(corners: &[Vec3]) -> bool {
     turns_one_way(&flat)
 }
 
-/// `corners.len() - 2` triangles, by positions in `corners`, that go round as the polygon does; `None` when it is concave
-/// with more than [`MOST_CONCAVE_CORNERS`] corners.
+/// `corners.len() - 2` triangles, by positions in `corners`, that go round as the polygon does; `None` when it is so large
+/// and winding that they take more than a moment to find: it needs tens of thousands of corners for that.
 ///
 /// Convex polygons become a fan about their first corner. Others lose one ear after the other (G. H. Meisters,
 /// "Polygons have ears", American Mathematical Monthly, 1975). A polygon that crosses itself has no right answer: its
@@ -26,7 +26,7 @@ pub(crate) fn triangulate(corners: &[Vec3]) -> Option<Vec<[usize; 3]>> {
     if count == 3 || turns_one_way(&flat) {
         return Some((1..count - 1).map(|i| [0, i, i + 1]).collect());
     }
-    (count <= MOST_CONCAVE_CORNERS).then(|| cut_ears(&flat))
+    cut_ears(&flat)
 }
 
 /// The corners as seen against their mean normal, so that they go round counter-clockwise; by leaving out one
@@ -68,32 +68,85 @@ fn turns_one_way(flat: &[DVec2]) -> bool {
     left && (1..count - 1).all(|i| area(flat[0], flat[i], flat[i + 1]) >= 0.0)
 }
 
-fn cut_ears(flat: &[DVec2]) -> Vec<[usize; 3]> {
+/// The corners that turn right, by where they are: a square grid over the polygon, of about as many cells as corners.
+struct Reflex {
+    least: DVec2,
+    cells_per_length: DVec2,
+    side: usize,
+    /// Corners by cell; those that turn right no longer are still there.
+    cells: Vec<Vec<u32>>,
+    is_reflex: Vec<bool>,
+}
+
+impl Reflex {
+    fn new(flat: &[DVec2], is_reflex: Vec<bool>) -> Self {
+        let least = flat.iter().copied().reduce(DVec2::min).unwrap_or_default();
+        let most = flat.iter().copied().reduce(DVec2::max).unwrap_or_default();
+        let side = (is_reflex.iter().filter(|r| **r).count() as f64).sqrt().ceil().max(1.0) as usize;
+        let cells_per_length = (side as f64 / (most - least)).map(|c| if c.is_finite() { c } else { 0.0 });
+        let mut grid = Self { least, cells_per_length, side, cells: vec![vec![]; side * side], is_reflex };
+        for (i, p) in flat.iter().enumerate() {
+            if grid.is_reflex[i] {
+                let [x, y] = grid.cell(*p);
+                grid.cells[y * side + x].push(i as u32);
+            }
+        }
+        grid
+    }
+
+    /// The cast holds what is outside at the border, and NaN at 0.
+    fn cell(&self, p: DVec2) -> [usize; 2] {
+        let at = (p - self.least) * self.cells_per_length;
+        [at.x, at.y].map(|c| (c as usize).min(self.side - 1))
+    }
+
+    /// Whether a corner that turns right lies in the triangle, its sides included. A corner at the same place as one of
+    /// the triangle's does not stand in the way of it.
+    fn any_in(&self, flat: &[DVec2], [a, b, c]: [DVec2; 3], tests: &mut u64) -> bool {
+        let low = self.cell(a.min(b).min(c));
+        let high = self.cell(a.max(b).max(c));
+        for y in low[1]..=high[1] {
+            for cell in &self.cells[y * self.side + low[0]..=y * self.side + high[0]] {
+                *tests += 1 + cell.len() as u64;
+                let holds = |&r: &u32| {
+                    let p = flat[r as usize];
+                    self.is_reflex[r as usize]
+                        && area(a, b, p) >= 0.0
+                        && area(b, c, p) >= 0.0
+                        && area(c, a, p) >= 0.0
+                        && p != a
+                        && p != b
+                        && p != c
+                };
+                if cell.iter().any(holds) {
+                    return true;
+                }
+            }
+        }
+        false
+    }
+}
+
+fn cut_ears(flat: &[DVec2]) -> Option<Vec<[usize; 3]>> {
     let count = flat.len();
     let mut next: Vec<usize> = (0..count).map(|i| (i + 1) % count).collect();
     let mut before: Vec<usize> = (0..count).map(|i| (i + count - 1) % count).collect();
     let turn = |before: &[usize], next: &[usize], i: usize| area(flat[before[i]], flat[i], flat[next[i]]);
     // Only a corner that turns right can lie in an ear. Corners never begin to turn right by a cut.
-    let mut reflex: Vec<usize> = (0..count).filter(|&i| turn(&before, &next, i) <= 0.0).collect();
+    let mut reflex = Reflex::new(flat, (0..count).map(|i| turn(&before, &next, i) <= 0.0).collect());
     let mut triangles = Vec::with_capacity(count - 2);
     let mut at = 0;
     let mut left = count;
     let mut tried = 0;
+    let mut tests = 0;
     let mut least_bad: Option<(f64, usize)> = None;
     while left > 3 {
-        let [a, b, c] = [before[at], at, next[at]];
-        let bulge = area(flat[a], flat[b], flat[c]);
-        let holds = |&r: &usize| {
-            let p = flat[r];
-            // A corner at the same place as one of these does not stand in the way of it.
-            let inside = area(flat[a], flat[b], p) >= 0.0
-                && area(flat[b], flat[c], p) >= 0.0
-                && area(flat[c], flat[a], p) >= 0.0;
-            inside && p != flat[a] && p != flat[b] && p != flat[c]
-        };
-        let is_ear = bulge > 0.0 && !reflex.iter().any(holds);
-        // A corner on a straight line or a spike is cut as well: it takes no area with it.
-        let is_flat = bulge == 0.0 && (flat[a] == flat[b] || flat[b] == flat[c] || flat[a] == flat[c]);
+        let corners = [flat[before[at]], flat[at], flat[next[at]]];
+        let [a, b, c] = corners;
+        let bulge = area(a, b, c);
+        let is_ear = bulge > 0.0 && !reflex.any_in(flat, corners, &mut tests);
+        // A corner that returns to where its neighbour is takes no area with it.
+        let is_flat = bulge == 0.0 && (a == b || b == c || a == c);
         if least_bad.is_none_or(|(most, _)| bulge > most) {
             least_bad = Some((bulge, at));
         }
@@ -102,7 +155,10 @@ fn cut_ears(flat: &[DVec2]) -> Vec<[usize; 3]> {
             Some((_, worst)) if tried + 1 >= left => worst,
             _ => {
                 tried += 1;
-                at = c;
+                at = next[at];
+                if tests > MOST_TESTS {
+                    return None;
+                }
                 continue;
             }
         };
@@ -113,12 +169,19 @@ fn cut_ears(flat: &[DVec2]) -> Vec<[usize; 3]> {
         left -= 1;
         tried = 0;
         least_bad = None;
-        reflex.retain(|&r| r != cut && ((r != a && r != c) || turn(&before, &next, r) <= 0.0));
+        reflex.is_reflex[cut] = false;
+        for neighbour in [a, c] {
+            reflex.is_reflex[neighbour] &= turn(&before, &next, neighbour) <= 0.0;
+        }
+        tests += 1;
+        if tests > MOST_TESTS {
+            return None;
+        }
         // Going on past the cut keeps long polygons from becoming one fan of slivers.
         at = next[c];
     }
     triangles.push([before[at], at, next[at]]);
-    triangles
+    Some(triangles)
 }
 
 #[cfg(test)]
@@ -243,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn a_long_concave_polygon_ends_and_a_longer_one_is_refused() {
+    fn long_polygons_are_covered_and_endless_ones_given_up() {
         let comb = |count: usize| -> Vec<Vec3> {
             let tooth = |i: usize| Vec3::new(i as f32, if i % 2 == 0 { 0.5 } else { 9.0 }, 4.0);
             (0..count - 2)
@@ -252,6 +315,22 @@ mod tests {
                 .collect()
         };
         covers(&comb(3000));
-        assert!(triangulate(&comb(MOST_CONCAVE_CORNERS + 1)).is_none());
+        // Round, but not convex once its corners are rounded.
+        let wheel: Vec<Vec3> = (0..100_000)
+            .map(|i| {
+                let a = f64::from(i) * std::f64::consts::TAU / 1e5;
+                Vec3::new((9.0 * a.cos()) as f32, 4.0, (9.0 * a.sin()) as f32)
+            })
+            .collect();
+        assert!(!is_convex(&wheel));
+        assert_eq!(triangulate(&wheel).unwrap().len(), 99_998);
+        let mut random = 1u64;
+        let tangle: Vec<Vec3> = (0..200_000)
+            .map(|_| {
+                random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                Vec3::new((random >> 40) as f32, (random >> 20 & 0xFF_FFFF) as f32, 1.0)
+            })
+            .collect();
+        assert!(triangulate(&tangle).is_none());
     }
 }

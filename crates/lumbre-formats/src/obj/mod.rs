@@ -1,0 +1,629 @@
+//! Wavefront OBJ meshes with MTL materials (Wavefront Technologies, "Advanced Visualizer manual", appendices B1 and the MTL
+//! file format, version 4.2, 1995; colours of vertices and physical keys as programs since have it).
+
+mod mtl;
+mod scene;
+mod words;
+
+use std::cell::Cell;
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use lumbre_image::Rgb;
+use lumbre_math::{Vec2, Vec3};
+use lumbre_scene::MeshDesc;
+
+use crate::budget::{Budget, BudgetVec};
+use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place};
+use crate::polygon;
+use words::{Source, Word, Words};
+
+pub use mtl::{MtlMaterial, MtlTexture, read_mtl};
+pub use scene::open_obj;
+
+/// What an OBJ file holds.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ObjFile {
+    /// Its meshes, in the order of their first faces.
+    pub meshes: Vec<ObjMesh>,
+    /// The material files that it names, where it names them.
+    pub libraries: Vec<(String, Place)>,
+}
+
+/// The faces of an OBJ file that have a name, a material and a set of attributes in common.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ObjMesh {
+    /// The object (`o`) or, in a file without objects, the group (`g`); empty where there is none.
+    pub name: String,
+    /// The material (`usemtl`), with where it was first used for this mesh.
+    pub material: Option<(String, Place)>,
+    /// Triangles only. Corners that differ in texture coordinate or normal are vertices of their own.
+    pub mesh: MeshDesc,
+}
+
+/// Reads meshes from the bytes of an OBJ file. Material files are named and not opened: see [`open_obj`].
+///
+/// Colours of vertices (`v x y z r g b`) are taken as light. Lines, points, curves and surfaces are passed over with a
+/// warning.
+///
+/// # Errors
+/// [`FormatError::Input`] with line and column; [`FormatError::Limit`]. When lenient, faces that cannot be used are dropped
+/// with a warning instead.
+pub fn read_obj(
+    bytes: &[u8],
+    name: &Arc<str>,
+    budget: &Budget,
+    diagnostics: &mut Diagnostics,
+) -> Result<ObjFile, FormatError> {
+    let source = Source { name, bytes };
+    let mut reader = Reader::new(source, budget, diagnostics);
+    for line in source.lines() {
+        let mut words = line.words();
+        if let Some(keyword) = words.next() {
+            reader.line(keyword, words).map_err(|e| e.or_at(|| source.place(keyword.start)))?;
+        }
+    }
+    reader.finish().map_err(|e| e.or_at(|| Place::whole(name.clone())))
+}
+
+/// A corner of a face: position, texture coordinate, normal; `NONE` where it has none.
+type Corner = [u32; 3];
+
+const NONE: u32 = u32::MAX;
+
+/// What a mesh's faces have in common; names by their numbers.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+struct Key {
+    object: u32,
+    group: u32,
+    material: u32,
+    has_uvs: bool,
+    has_normals: bool,
+}
+
+struct Part<'a> {
+    key: Key,
+    /// Where its material was named.
+    material_at: usize,
+    triangles: BudgetVec<'a, [Corner; 3]>,
+}
+
+/// A face to be read when all is there, with the state that it stands in.
+#[derive(Clone)]
+struct Later<'a> {
+    keyword: Word<'a>,
+    words: Words<'a>,
+    state: Key,
+    material_at: usize,
+    counts: [usize; 3],
+}
+
+struct Reader<'a> {
+    source: Source<'a>,
+    budget: &'a Budget,
+    diagnostics: &'a mut Diagnostics,
+    positions: BudgetVec<'a, Vec3>,
+    /// As many as positions once any has a colour.
+    colours: BudgetVec<'a, Rgb>,
+    uvs: BudgetVec<'a, Vec2>,
+    normals: BudgetVec<'a, Vec3>,
+    /// When lenient, positions that are not finite.
+    unusable: Vec<u32>,
+    /// Every name that was given, 0 for none.
+    names: Vec<String>,
+    numbers: HashMap<String, u32>,
+    /// The state that the next face has.
+    state: Key,
+    material_at: usize,
+    has_objects: bool,
+    is_smooth: bool,
+    /// Whether it was said that this is not applied.
+    said_smooth: bool,
+    parts: Vec<Part<'a>>,
+    part_of: HashMap<Key, usize>,
+    /// The part of the last face.
+    current: Option<usize>,
+    libraries: Vec<(String, Place)>,
+    /// Faces that name what comes after them.
+    later: BudgetVec<'a, Later<'a>>,
+    /// Whether all is read, and the counts from which those count backwards.
+    at_end: Option<[usize; 3]>,
+    /// Whether faces name texture coordinates, and normals, of which there are none.
+    missing: [Cell<bool>; 2],
+    /// The corners of one face, kept for their room.
+    face: Vec<Corner>,
+    places: Vec<Vec3>,
+}
+
+impl<'a> Reader<'a> {
+    fn new(source: Source<'a>, budget: &'a Budget, diagnostics: &'a mut Diagnostics) -> Self {
+        Self {
+            source,
+            budget,
+            diagnostics,
+            positions: BudgetVec::new(budget, "vertices"),
+            colours: BudgetVec::new(budget, "colours"),
+            uvs: BudgetVec::new(budget, "texture coordinates"),
+            normals: BudgetVec::new(budget, "normals"),
+            unusable: vec![],
+            names: vec![String::new()],
+            numbers: HashMap::new(),
+            state: Key { object: 0, group: 0, material: 0, has_uvs: false, has_normals: false },
+            material_at: 0,
+            has_objects: false,
+            is_smooth: false,
+            said_smooth: false,
+            parts: vec![],
+            part_of: HashMap::new(),
+            current: None,
+            libraries: vec![],
+            later: BudgetVec::new(budget, "faces"),
+            at_end: None,
+            missing: Default::default(),
+            face: vec![],
+            places: vec![],
+        }
+    }
+
+    #[inline]
+    fn line(&mut self, keyword: Word<'a>, words: Words<'a>) -> Result<(), FormatError> {
+        match keyword.bytes {
+            b"v" => self.position(keyword, words),
+            b"vt" => {
+                let ([u, v, _], count, word) = self.numbers(keyword, words)?;
+                if count == 0 || count > 3 {
+                    return Err(self.wrong_count(keyword, count, "1 to 3").into());
+                }
+                let uv = self.finite_or_zero(Vec2::new(u, v), Vec2::is_finite, word, WRONG_UV);
+                Ok(self.uvs.push(uv)?)
+            }
+            b"vn" => {
+                let (n, count, word) = self.numbers(keyword, words)?;
+                if count != 3 {
+                    return Err(self.wrong_count(keyword, count, "3").into());
+                }
+                let n = self.finite_or_zero(Vec3::from(n), Vec3::is_finite, word, WRONG_NORMAL);
+                Ok(self.normals.push(n)?)
+            }
+            b"f" | b"fo" => self.face(keyword, words),
+            b"usemtl" => {
+                let (at, name) = words.rest();
+                self.state.material = self.number_of(&name)?;
+                self.material_at = at;
+                Ok(())
+            }
+            b"o" => {
+                self.state.object = self.number_of(&words.rest().1)?;
+                self.has_objects = true;
+                Ok(())
+            }
+            b"g" => {
+                self.state.group = self.number_of(&words.rest().1)?;
+                Ok(())
+            }
+            b"mtllib" => {
+                let (at, name) = words.rest();
+                self.budget.elements(1, "material files")?;
+                if name.is_empty() {
+                    self.diagnostics.warn("mtllib without a name", |said| said.at(self.source.place(at)));
+                } else {
+                    self.libraries.push((name.into_owned(), self.source.place(at)));
+                }
+                Ok(())
+            }
+            b"s" => {
+                let group = { words }.next();
+                self.is_smooth = group.is_some_and(|w| !matches!(w.bytes, b"off" | b"0"));
+                Ok(())
+            }
+            b"l" => Ok(self.pass_over(keyword, "line is no surface, passed over")),
+            b"p" => Ok(self.pass_over(keyword, "point is no surface, passed over")),
+            b"vp" | b"cstype" | b"deg" | b"bmat" | b"step" | b"curv" | b"curv2" | b"surf" | b"parm"
+            | b"trim" | b"hole" | b"scrv" | b"sp" | b"end" | b"con" | b"ctech" | b"stech" => {
+                Ok(self.pass_over(keyword, "free-form curves and surfaces are not supported, passed over"))
+            }
+            // How other programs would show it.
+            b"mg" | b"bevel" | b"c_interp" | b"d_interp" | b"lod" | b"usemap" | b"maplib" | b"shadow_obj"
+            | b"trace_obj" | b"mm_color" | b"vw" => Ok(()),
+            _ => {
+                let known = ["v", "vt", "vn", "f", "usemtl", "mtllib"];
+                let text = String::from_utf8_lossy(&keyword.bytes[..keyword.bytes.len().min(64)]);
+                let source = self.source;
+                self.diagnostics.warn("unknown keyword, line passed over", |said| {
+                    Diagnostic { severity: said.severity, ..source.wrong(keyword, said.message) }
+                        .suggest(&text, known)
+                });
+                Ok(())
+            }
+        }
+    }
+
+    fn pass_over(&mut self, keyword: Word<'_>, what: &str) {
+        let source = self.source;
+        self.diagnostics.warn(what, |said| said.at(source.place(keyword.start)));
+    }
+
+    fn wrong_count(&self, keyword: Word<'_>, count: usize, expected: &str) -> Diagnostic {
+        let name = String::from_utf8_lossy(keyword.bytes);
+        let wrong = Diagnostic::error(format!("wrong number of values after {name}"));
+        wrong.at(self.source.place(keyword.start)).found(count).expected(expected)
+    }
+
+    /// The first numbers of a line, how many there are, and the first word for messages.
+    #[inline]
+    fn numbers<const N: usize>(
+        &self,
+        keyword: Word<'a>,
+        words: Words<'a>,
+    ) -> Result<([f32; N], usize, Word<'a>), FormatError> {
+        let mut numbers = [0.0; N];
+        let mut count = 0;
+        let mut first = keyword;
+        for word in words {
+            if count == 0 {
+                first = word;
+            }
+            let number = self.source.number(word)?;
+            if let Some(slot) = numbers.get_mut(count) {
+                *slot = number;
+            }
+            count += 1;
+        }
+        Ok((numbers, count, first))
+    }
+
+    fn position(&mut self, keyword: Word<'a>, words: Words<'a>) -> Result<(), FormatError> {
+        let ([x, y, z, a, b, c, d], count, first) = self.numbers::<7>(keyword, words)?;
+        let colour = match count {
+            // A weight, which only curves use.
+            3 | 4 => None,
+            6 => Some(Rgb::new(a, b, c)),
+            7 => Some(Rgb::new(b, c, d)),
+            _ => return Err(self.wrong_count(keyword, count, "3, 4, 6 or 7").into()),
+        };
+        let mut position = Vec3::new(x, y, z);
+        if self.positions.len() >= NONE as usize {
+            return Err(Diagnostic::error("more vertices than a mesh can have")
+                .at(self.source.place(first.start))
+                .into());
+        }
+        if !position.is_finite() {
+            let number = self.positions.len() + 1;
+            let wrong = Diagnostic::error(format!("vertex {number} is not finite"))
+                .at(self.source.place(first.start));
+            if !self.diagnostics.is_lenient() {
+                return Err(wrong.found(format!("({x}, {y}, {z})")).into());
+            }
+            self.budget.bytes(4, "vertices")?;
+            self.unusable.push(self.positions.len() as u32);
+            position = Vec3::ZERO;
+        }
+        if let Some(colour) = colour {
+            // Those before it are white.
+            while self.colours.len() < self.positions.len() {
+                self.colours.push(Rgb::WHITE)?;
+            }
+            let colour = self.finite_or_zero(colour, Rgb::is_finite, first, WRONG_COLOUR);
+            self.colours.push(colour)?;
+        } else if !self.colours.is_empty() {
+            self.colours.push(Rgb::WHITE)?;
+        }
+        self.budget.elements(1, "vertices")?;
+        Ok(self.positions.push(position)?)
+    }
+
+    #[inline]
+    fn finite_or_zero<T: Copy + Default>(
+        &mut self,
+        v: T,
+        is_finite: impl FnOnce(T) -> bool,
+        at: Word<'_>,
+        what: &str,
+    ) -> T {
+        if is_finite(v) {
+            return v;
+        }
+        let source = self.source;
+        self.diagnostics.warn(what, |said| said.at(source.place(at.start)));
+        T::default()
+    }
+
+    fn number_of(&mut self, name: &str) -> Result<u32, FormatError> {
+        if name.is_empty() {
+            return Ok(0);
+        }
+        if let Some(&number) = self.numbers.get(name) {
+            return Ok(number);
+        }
+        self.budget.bytes(2 * name.len() as u64 + 64, "names")?;
+        let number = self.names.len() as u32;
+        self.names.push(name.to_owned());
+        self.numbers.insert(name.to_owned(), number);
+        Ok(number)
+    }
+
+    fn face(&mut self, keyword: Word<'a>, words: Words<'a>) -> Result<(), FormatError> {
+        self.face.clear();
+        let mut face = std::mem::take(&mut self.face);
+        let read = self.corners(words.clone(), &mut face);
+        self.face = face;
+        match read {
+            Ok(()) => {}
+            Err(Unusable::No(e)) => return Err(e),
+            Err(Unusable::Later) => {
+                let (state, material_at, counts) = (self.state, self.material_at, self.counts());
+                return Ok(self.later.push(Later { keyword, words, state, material_at, counts })?);
+            }
+            Err(Unusable::Drop(what)) => {
+                self.pass_over(keyword, what);
+                return Ok(());
+            }
+        }
+        if self.face.len() < 3 {
+            self.pass_over(keyword, "face with fewer than three corners, dropped");
+            return Ok(());
+        }
+        let is_unusable = |c: &Corner| self.unusable.binary_search(&c[0]).is_ok();
+        if !self.unusable.is_empty() && self.face.iter().any(is_unusable) {
+            self.pass_over(keyword, "face with a vertex that is not finite, dropped");
+            return Ok(());
+        }
+        let has = |slot: usize| self.face.iter().all(|c| c[slot] != NONE);
+        let key = Key { has_uvs: has(1), has_normals: has(2), ..self.state };
+        if self.is_smooth && !key.has_normals && !self.said_smooth {
+            self.said_smooth = true;
+            self.pass_over(keyword, "smoothing groups are not applied: faces without normals are flat");
+        }
+        let part = match self.current {
+            Some(current) if self.parts[current].key == key => current,
+            _ => self.part(key)?,
+        };
+        self.current = Some(part);
+        let part = &mut self.parts[part];
+        if let [a, b, c] = self.face[..] {
+            return Ok(part.triangles.push([a, b, c])?);
+        }
+        // Where its corners stand, and the cutting of them.
+        let _while_cut = self.budget.hold(self.face.len() as u64 * 160, "corners of a face")?;
+        self.places.clear();
+        self.places.extend(self.face.iter().map(|c| self.positions[c[0] as usize]));
+        let Some(triangles) = polygon::triangulate(&self.places) else {
+            let wrong = Diagnostic::error("face too large and winding to be cut into triangles")
+                .at(self.source.place(keyword.start));
+            return Err(wrong.found(format!("{} corners", self.face.len())).into());
+        };
+        for t in triangles {
+            part.triangles.push(t.map(|i| self.face[i]))?;
+        }
+        Ok(())
+    }
+
+    fn part(&mut self, key: Key) -> Result<usize, FormatError> {
+        if let Some(&part) = self.part_of.get(&key) {
+            return Ok(part);
+        }
+        self.budget.elements(1, "meshes")?;
+        self.budget.bytes(size_of::<Part<'_>>() as u64 + size_of::<ObjMesh>() as u64 + 64, "meshes")?;
+        let part = self.parts.len();
+        let triangles = BudgetVec::new(self.budget, "triangles");
+        self.parts.push(Part { key, material_at: self.material_at, triangles });
+        self.part_of.insert(key, part);
+        Ok(part)
+    }
+
+    fn corners(&self, words: Words<'a>, face: &mut Vec<Corner>) -> Result<(), Unusable> {
+        let mut room = self.budget.hold(0, "corners of a face")?;
+        for word in words {
+            if face.len() == face.capacity() {
+                room.grow((face.len().max(16) * size_of::<Corner>()) as u64, "corners of a face")?;
+            }
+            face.push(self.corner(word)?);
+        }
+        Ok(())
+    }
+
+    /// `v`, `v/vt`, `v//vn` or `v/vt/vn`, each counted from 1, or backwards from -1.
+    #[inline]
+    fn corner(&self, word: Word<'a>) -> Result<Corner, Unusable> {
+        let mut corner = [NONE; 3];
+        let mut start = 0;
+        for (slot, index) in corner.iter_mut().enumerate() {
+            let rest = &word.bytes[start..];
+            let length = rest.iter().position(|&b| b == b'/').unwrap_or(rest.len());
+            if slot == 0 || length > 0 {
+                *index =
+                    self.index(Word { start: word.start + start, bytes: &rest[..length] }, slot, word)?;
+            }
+            start += length + 1;
+            if length == rest.len() {
+                return Ok(corner);
+            }
+        }
+        Err(self.source.wrong(word, "wrong corner of a face").expected("v, v/vt, v//vn or v/vt/vn").into())
+    }
+
+    #[inline]
+    fn index(&self, digits: Word<'a>, slot: usize, corner: Word<'a>) -> Result<u32, Unusable> {
+        let count = self.counts()[slot];
+        // Most are a few digits.
+        let plain = digits.bytes.len() < 10
+            && !digits.bytes.is_empty()
+            && digits.bytes.iter().all(u8::is_ascii_digit);
+        if plain {
+            let index = digits.bytes.iter().fold(0usize, |n, d| n * 10 + usize::from(d - b'0'));
+            if 0 < index && index <= count {
+                return Ok(index as u32 - 1);
+            }
+        }
+        let what = ["vertex", "texture coordinate", "normal"][slot];
+        let text = String::from_utf8_lossy(digits.bytes);
+        let Ok(index) = text.parse::<i64>() else {
+            let overflows =
+                text.len() > 1 && text.trim_start_matches(['-', '+']).bytes().all(|b| b.is_ascii_digit());
+            if overflows && !text.trim_start_matches(['-', '+']).is_empty() {
+                return self.absent(digits, what, count);
+            }
+            let wrong = self.source.wrong(corner, "wrong corner of a face");
+            return Err(wrong.expected("v, v/vt, v//vn or v/vt/vn").into());
+        };
+        let from = self.at_end.map_or(count, |counts| counts[slot]);
+        let counted = if index < 0 { from as i64 + 1 + index } else { index };
+        if 1 <= counted && counted <= count as i64 {
+            return Ok(counted as u32 - 1);
+        }
+        if self.at_end.is_none() && counted > 0 {
+            return Err(Unusable::Later);
+        }
+        if slot > 0 && count == 0 && index > 0 {
+            // All of them are missing: the surface is whole without.
+            self.missing[slot - 1].set(true);
+            return Ok(NONE);
+        }
+        self.absent(digits, what, count)
+    }
+
+    /// How many positions, texture coordinates and normals there are.
+    #[inline]
+    fn counts(&self) -> [usize; 3] {
+        [self.positions.len(), self.uvs.len(), self.normals.len()]
+    }
+
+    #[cold]
+    fn absent(&self, digits: Word<'a>, what: &str, count: usize) -> Result<u32, Unusable> {
+        if self.diagnostics.is_lenient() {
+            return Err(Unusable::Drop("face with a corner that is not there, dropped"));
+        }
+        let wrong = Diagnostic::error(format!("face with a {what} that is not there"))
+            .at(self.source.place(digits.start));
+        let wrong = wrong.found(String::from_utf8_lossy(&digits.bytes[..digits.bytes.len().min(24)]));
+        Err(match count {
+            0 => wrong.expected(format!("none, as there is no {what}")),
+            _ => wrong.expected(format!("1 to {count}, or backwards from -1")),
+        }
+        .into())
+    }
+
+    fn finish(mut self) -> Result<ObjFile, FormatError> {
+        let later = std::mem::replace(&mut self.later, BudgetVec::new(self.budget, "faces"));
+        for face in later.iter() {
+            self.at_end = Some(face.counts);
+            (self.state, self.material_at) = (face.state, face.material_at);
+            self.face(face.keyword, face.words.clone())
+                .map_err(|e| e.or_at(|| self.source.place(face.keyword.start)))?;
+        }
+        for (missing, what) in self.missing.iter().zip(["texture coordinates", "normals"]) {
+            if missing.get() {
+                let said = Diagnostic::warning(format!("faces name {what}, and the file has none"));
+                self.diagnostics.push(said.at(Place::whole(self.source.name.clone())));
+            }
+        }
+        if self.parts.is_empty() {
+            let found = format!("{} vertices", self.positions.len());
+            let said =
+                Diagnostic::warning("OBJ file without faces").at(Place::whole(self.source.name.clone()));
+            self.diagnostics.push(said.found(found));
+        }
+        // Which vertex of the mesh in hand was last made from each position.
+        let count = self.positions.len() as u64;
+        let _scratch = self.budget.hold(count * 4, "vertices")?;
+        let mut newest = vec![0u32; self.positions.len()];
+        let parts = std::mem::take(&mut self.parts);
+        let meshes = parts.into_iter().map(|part| {
+            let key = part.key;
+            let object = if self.has_objects { key.object } else { key.group };
+            let material = (key.material != 0)
+                .then(|| (self.names[key.material as usize].clone(), self.source.place(part.material_at)));
+            let mesh = self.mesh(&part.triangles, key, &mut newest)?;
+            Ok(ObjMesh { name: self.names[object as usize].clone(), material, mesh })
+        });
+        let meshes = meshes.collect::<Result<_, FormatError>>()?;
+        Ok(ObjFile { meshes, libraries: self.libraries })
+    }
+
+    /// Makes a vertex of each corner that differs.
+    fn mesh(&self, corners: &[[Corner; 3]], key: Key, newest: &mut [u32]) -> Result<MeshDesc, FormatError> {
+        /// Vertices of one position are a chain; one that is too long goes on in a table.
+        const LONGEST_CHAIN: usize = 16;
+        let mut vertices: BudgetVec<'_, Corner> = BudgetVec::new(self.budget, "vertices");
+        let mut older: BudgetVec<'_, u32> = BudgetVec::new(self.budget, "vertices");
+        let mut table: HashMap<Corner, u32> = HashMap::new();
+        let mut triangles = BudgetVec::new(self.budget, "triangles");
+        triangles.reserve(corners.len())?;
+        let mut vertex_of = |mut corner: Corner| -> Result<u32, FormatError> {
+            // What only some corners of a face have counts for nothing.
+            corner[1] = if key.has_uvs { corner[1] } else { NONE };
+            corner[2] = if key.has_normals { corner[2] } else { NONE };
+            let position = corner[0] as usize;
+            let mut at = newest[position];
+            // An entry of another mesh points at a vertex of another position, or at none.
+            let is_ours = vertices.get(at as usize).is_some_and(|v| v[0] == corner[0]);
+            let mut length = 0;
+            while is_ours {
+                if vertices[at as usize] == corner {
+                    return Ok(at);
+                }
+                length += 1;
+                if older[at as usize] == NONE {
+                    break;
+                }
+                at = older[at as usize];
+            }
+            let number = vertices.len() as u32;
+            if length >= LONGEST_CHAIN {
+                if let Some(&found) = table.get(&corner) {
+                    return Ok(found);
+                }
+                self.budget.bytes(48, "vertices")?;
+                table.insert(corner, number);
+                older.push(NONE)?;
+            } else {
+                older.push(if is_ours { newest[position] } else { NONE })?;
+                newest[position] = number;
+            }
+            vertices.push(corner)?;
+            Ok(number)
+        };
+        for &[a, b, c] in corners {
+            triangles.push([vertex_of(a)?, vertex_of(b)?, vertex_of(c)?])?;
+        }
+        self.budget.release(table.len() as u64 * 48);
+        let count = vertices.len() as u64;
+        let mut positions = self.budget.vec(count, "vertices")?;
+        positions.extend(vertices.iter().map(|v| self.positions[v[0] as usize]));
+        let mut mesh = MeshDesc { positions, triangles: triangles.into_vec(), ..MeshDesc::default() };
+        if key.has_uvs {
+            let mut uvs = self.budget.vec(count, "texture coordinates")?;
+            uvs.extend(vertices.iter().map(|v| self.uvs[v[1] as usize]));
+            mesh.uvs = Some(uvs);
+        }
+        if key.has_normals {
+            let mut normals = self.budget.vec(count, "normals")?;
+            normals.extend(vertices.iter().map(|v| self.normals[v[2] as usize]));
+            mesh.normals = Some(normals);
+        }
+        if !self.colours.is_empty() {
+            let mut colours = self.budget.vec(count, "colours")?;
+            colours.extend(vertices.iter().map(|v| self.colours[v[0] as usize]));
+            mesh.colours = Some(colours);
+        }
+        Ok(mesh)
+    }
+}
+
+const WRONG_UV: &str = "texture coordinate that is not finite, taken for 0";
+const WRONG_NORMAL: &str = "normal that is not finite, taken for 0";
+const WRONG_COLOUR: &str = "colour that is not finite, taken for 0";
+
+/// Why a face cannot be used: the file is wrong, or the face is to be dropped, or to be read when all is there.
+enum Unusable {
+    No(FormatError),
+    Drop(&'static str),
+    /// It names what is not there yet.
+    Later,
+}
+
+impl<E: Into<FormatError>> From<E> for Unusable {
+    fn from(error: E) -> Self {
+        Self::No(error.into())
+    }
+}

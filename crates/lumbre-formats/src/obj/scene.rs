@@ -1,0 +1,301 @@
+//! OBJ files as scenes.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use lumbre_image::{Encoding, Rgb};
+use lumbre_math::{Transform, Vec2};
+use lumbre_scene::{AreaLightDesc, GeometryDesc, MaterialId, NamedMaterial, SceneDesc, ShapeDesc, UpAxis};
+use lumbre_shading::{
+    FloatTexture, ImageFilter, ImageTexture, Mapping2d, Material, MaterialKind, MipMap, MipMapOptions,
+    Roughness, Spectrum, SpectrumTexture, Texture, Wrap,
+};
+
+use super::{MtlMaterial, MtlTexture, read_mtl, read_obj};
+use crate::budget::Budget;
+use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, nearest_name, quoted};
+use crate::image::open_image;
+use crate::input::Input;
+
+/// Reads the OBJ file `path` with its materials and textures, each mesh a shape; y is up.
+///
+/// A material becomes glass when `illum` is 6 or 7; a metal when `Pm` is at least one half, or when it has only specular
+/// colour; a coated diffuse one when it has `Pr`, or specular colour with `illum` 2 or more; else a diffuse one. `Pr` is
+/// the square root of the microfacet roughness, for which `Ns` stands otherwise (α² = 2 / (Ns + 2), as B. Walter and
+/// others, "Microfacet models for refraction", EGSR 2007). `Ke` shines to both sides. Files and textures that are not there
+/// are warned about.
+///
+/// # Errors
+/// As [`Input::open`], [`read_obj`] and [`read_mtl`]; of textures only limits.
+pub fn open_obj(
+    path: &Path,
+    budget: &Budget,
+    diagnostics: &mut Diagnostics,
+) -> Result<SceneDesc, FormatError> {
+    let input = Input::open(path, budget)?;
+    let obj = read_obj(&input, input.name(), budget, diagnostics)?;
+    drop(input);
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut builder = Builder { budget, diagnostics, images: HashMap::new() };
+    let mut finished: Vec<Finished> = vec![];
+    let mut names: HashMap<String, usize> = HashMap::new();
+    for (library, place) in &obj.libraries {
+        for (folder, material) in builder.library(folder, library, place)? {
+            // The first definition of a name counts, as for the library that is named first.
+            if names.contains_key(&material.name) {
+                continue;
+            }
+            names.insert(material.name.clone(), finished.len());
+            finished.push(builder.material(&folder, &material)?);
+        }
+    }
+    let mut scene = SceneDesc { up: UpAxis::Y, ..SceneDesc::default() };
+    for finished in &finished {
+        let material = finished.material.clone();
+        scene.materials.push(NamedMaterial { name: Some(finished.name.clone()), material });
+    }
+    let mut default = None;
+    for (index, mesh) in obj.meshes.into_iter().enumerate() {
+        let named = mesh.material.as_ref().and_then(|(name, place)| {
+            let found = names.get(name).copied();
+            if found.is_none() {
+                let near = nearest_name(name, names.keys().map(String::as_str));
+                builder.diagnostics.warn("unknown material, taken for grey", |said| {
+                    let said = said.at(place.clone()).found(quoted(name));
+                    Diagnostic { suggestion: near.map(str::to_owned), ..said }
+                });
+            }
+            found
+        });
+        let id = named.unwrap_or_else(|| {
+            *default.get_or_insert_with(|| {
+                let material = Arc::new(Material::default_diffuse());
+                scene.materials.push(NamedMaterial { name: None, material });
+                scene.materials.len() - 1
+            })
+        });
+        let finished = named.map(|i| &finished[i]);
+        scene.shapes.push(ShapeDesc {
+            index: index as u32,
+            geometry: GeometryDesc::Mesh(Arc::new(mesh.mesh)),
+            world_from_object: Transform::IDENTITY,
+            reverse_orientation: false,
+            material: Some(MaterialId(id as u32)),
+            area_light: finished.and_then(|f| f.light.clone()),
+            alpha: finished.and_then(|f| f.alpha.clone()),
+        });
+    }
+    Ok(scene)
+}
+
+struct Finished {
+    name: String,
+    material: Arc<Material>,
+    light: Option<AreaLightDesc>,
+    alpha: Option<Arc<FloatTexture>>,
+}
+
+struct Builder<'a> {
+    budget: &'a Budget,
+    diagnostics: &'a mut Diagnostics,
+    /// Those opened so far, by file, whether they hold numbers rather than colours, and whether they are clamped.
+    images: HashMap<(PathBuf, bool, bool), Option<Arc<MipMap>>>,
+}
+
+impl Builder<'_> {
+    /// The materials of the files that `mtllib` names, each with its folder: one name with blanks, or several names.
+    fn library(
+        &mut self,
+        folder: &Path,
+        names: &str,
+        place: &Place,
+    ) -> Result<Vec<(PathBuf, MtlMaterial)>, FormatError> {
+        let whole = existing(folder, names);
+        let paths = if whole.is_file() {
+            vec![whole]
+        } else {
+            names.split_ascii_whitespace().map(|name| existing(folder, name)).collect()
+        };
+        let mut materials = vec![];
+        for path in paths {
+            let input = match Input::open(&path, self.budget) {
+                Ok(input) => input,
+                Err(FormatError::Io { source, .. }) => {
+                    let said = Diagnostic::warning("cannot read a material file").at(place.clone());
+                    self.diagnostics
+                        .push(said.found(format!("{}: {source}", quoted(&path.to_string_lossy()))));
+                    continue;
+                }
+                Err(e) => return Err(e.included_from(place.clone())),
+            };
+            let read = read_mtl(&input, input.name(), self.budget, self.diagnostics);
+            let read = read.map_err(|e| e.included_from(place.clone()))?;
+            let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+            materials.extend(read.into_iter().map(|material| (folder.clone(), material)));
+        }
+        Ok(materials)
+    }
+
+    fn material(&mut self, folder: &Path, m: &MtlMaterial) -> Result<Finished, FormatError> {
+        let diffuse = m.diffuse.unwrap_or(if m.diffuse_map.is_some() { Rgb::WHITE } else { Rgb::splat(0.5) });
+        let specular = m.specular.unwrap_or(Rgb::BLACK);
+        let illumination = m.illumination.unwrap_or(2);
+        let reflectance = match &m.diffuse_map {
+            // Some programs leave black where an image decides.
+            Some(map) if diffuse.is_black() => self.colours(folder, map, Rgb::WHITE)?,
+            Some(map) => self.colours(folder, map, diffuse)?,
+            None => Arc::new(Texture::Constant(diffuse.clamp(0.0, 1.0))),
+        };
+        let is_metal = m.metallic.is_some_and(|metallic| metallic >= 0.5);
+        let is_mirror = diffuse.is_black() && m.diffuse_map.is_none() && !specular.is_black();
+        let is_glossy =
+            m.roughness.is_some() || m.roughness_map.is_some() || (!specular.is_black() && illumination >= 2);
+        let eta = m.refraction.filter(|&eta| 1.0 < eta && eta <= 10.0).unwrap_or(1.5);
+        let roughness = self.roughness(folder, m)?;
+        let kind = if matches!(illumination, 6 | 7) {
+            let perfect = Roughness { u: constant(0.0), v: constant(0.0), remap: false };
+            let is_rough = m.roughness.is_some() || m.roughness_map.is_some();
+            MaterialKind::Dielectric { eta, roughness: if is_rough { roughness } else { perfect } }
+        } else if is_metal {
+            MaterialKind::ConductorReflectance { reflectance, roughness }
+        } else if is_mirror && illumination >= 2 {
+            let reflectance = Arc::new(Texture::Constant(specular.clamp(0.0, 1.0)));
+            MaterialKind::ConductorReflectance { reflectance, roughness }
+        } else if is_glossy {
+            MaterialKind::CoatedDiffuse {
+                reflectance,
+                roughness,
+                thickness: constant(0.01),
+                eta,
+                g: constant(0.0),
+                albedo: Arc::new(Texture::Constant(Spectrum::BLACK)),
+                max_depth: 10,
+                samples: 1,
+            }
+        } else {
+            MaterialKind::Diffuse { reflectance }
+        };
+        let mut material = Material::new(kind);
+        if let Some(map) = &m.bump_map {
+            let heights = self.image(folder, map, true)?;
+            material.displacement = heights.map(|image| {
+                let scale = map.bump_multiplier * map.range[1];
+                Arc::new(Texture::Image(ImageTexture { scale, ..image }))
+            });
+        }
+        if let Some(map) = &m.normal_map {
+            material.normal_map = self.image(folder, map, true)?;
+        }
+        let alpha = match &m.opacity_map {
+            Some(map) => self.image(folder, map, true)?.map(|image| Arc::new(Texture::Image(image))),
+            None => m.opacity.filter(|&d| d < 1.0).map(|d| constant(d.max(0.0))),
+        };
+        let radiance = m.emission.unwrap_or(if m.emission_map.is_some() { Rgb::WHITE } else { Rgb::BLACK });
+        let radiance = radiance.map(|c| c.max(0.0));
+        let light = if radiance.is_black() {
+            None
+        } else {
+            let image = match &m.emission_map {
+                Some(map) => self.image(folder, map, false)?.map(|texture| texture.image),
+                None => None,
+            };
+            Some(AreaLightDesc { radiance, image, two_sided: true, power: None })
+        };
+        Ok(Finished { name: m.name.clone(), material: Arc::new(material), light, alpha })
+    }
+
+    fn roughness(&mut self, folder: &Path, m: &MtlMaterial) -> Result<Roughness, FormatError> {
+        if let Some(map) = &m.roughness_map {
+            if let Some(image) = self.image(folder, map, true)? {
+                let image = Arc::new(Texture::Image(image));
+                let squared = Arc::new(Texture::Scale { texture: image.clone(), scale: image });
+                return Ok(Roughness { u: squared.clone(), v: squared, remap: false });
+            }
+        }
+        let alpha = match (m.roughness, m.shininess) {
+            (Some(roughness), _) => roughness.clamp(0.0, 1.0).powi(2),
+            (None, Some(shininess)) => (2.0 / (shininess.max(0.0) + 2.0)).sqrt(),
+            (None, None) => 0.0,
+        };
+        Ok(Roughness { u: constant(alpha), v: constant(alpha), remap: false })
+    }
+
+    fn colours(
+        &mut self,
+        folder: &Path,
+        map: &MtlTexture,
+        factor: Rgb,
+    ) -> Result<Arc<SpectrumTexture>, FormatError> {
+        let Some(image) = self.image(folder, map, false)? else {
+            return Ok(Arc::new(Texture::Constant(factor.clamp(0.0, 1.0))));
+        };
+        let scale = factor.max_component();
+        if factor != Rgb::splat(scale) {
+            self.diagnostics
+                .warn("Kd tints its image by its largest channel only", |said| said.at(map.place.clone()));
+        }
+        Ok(Arc::new(Texture::Image(ImageTexture { scale: scale * image.scale, ..image })))
+    }
+
+    /// A texture by its image; `None`, with a warning, when that cannot be read.
+    fn image(
+        &mut self,
+        folder: &Path,
+        map: &MtlTexture,
+        holds_numbers: bool,
+    ) -> Result<Option<ImageTexture>, FormatError> {
+        if map.range[0] != 0.0 {
+            self.diagnostics.warn("base of -mm of a texture is not used", |said| said.at(map.place.clone()));
+        }
+        let path = existing(folder, &map.file);
+        let key = (path, holds_numbers, map.clamp);
+        let image = match self.images.get(&key) {
+            Some(image) => image.clone(),
+            None => {
+                let image = self.open(&key.0, holds_numbers, map)?;
+                self.images.insert(key, image.clone());
+                image
+            }
+        };
+        Ok(image.map(|image| ImageTexture {
+            mapping: Mapping2d::Uv { scale: Vec2::from(map.scale), delta: Vec2::from(map.offset) },
+            image,
+            scale: map.range[1],
+            invert: false,
+        }))
+    }
+
+    fn open(
+        &mut self,
+        path: &Path,
+        holds_numbers: bool,
+        map: &MtlTexture,
+    ) -> Result<Option<Arc<MipMap>>, FormatError> {
+        let file = match open_image(path, self.budget, self.diagnostics) {
+            Ok(file) => file,
+            Err(e @ FormatError::Limit { .. }) => return Err(e.included_from(map.place.clone())),
+            Err(e) => {
+                let said = Diagnostic::warning("cannot use a texture").at(map.place.clone());
+                self.diagnostics.push(said.found(e.to_string()));
+                return Ok(None);
+            }
+        };
+        // The pyramid takes a third more.
+        self.budget.bytes(file.bitmap.bytes() as u64 / 3, "texture")?;
+        let bitmap = if holds_numbers { file.bitmap.with_encoding(Encoding::Linear) } else { file.bitmap };
+        let wrap = if map.clamp { Wrap::Clamp } else { Wrap::Repeat };
+        let options = MipMapOptions { wrap, filter: ImageFilter::Trilinear };
+        Ok(Some(Arc::new(MipMap::new(Arc::new(bitmap), options))))
+    }
+}
+
+fn constant(value: f32) -> Arc<FloatTexture> {
+    Arc::new(Texture::Constant(value))
+}
+
+/// The file of a name, where `\` may part folders as in files of Windows.
+fn existing(folder: &Path, name: &str) -> PathBuf {
+    let path = folder.join(name);
+    if !path.exists() && name.contains('\\') { folder.join(name.replace('\\', "/")) } else { path }
+}

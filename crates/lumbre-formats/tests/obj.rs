@@ -1,0 +1,301 @@
+//! OBJ and MTL files: everything that faces, names and materials can say.
+
+mod common;
+
+use std::sync::Arc;
+
+use common::{files_below, shared};
+use lumbre_formats::obj::{ObjFile, open_obj, read_mtl, read_obj};
+use lumbre_formats::{Budget, Diagnostics, FormatError, Input, Strictness};
+use lumbre_image::Rgb;
+use lumbre_scene::GeometryDesc;
+use lumbre_shading::{MaterialKind, Texture};
+
+fn name() -> Arc<str> {
+    "m.obj".into()
+}
+
+fn read(text: &str) -> Result<ObjFile, FormatError> {
+    read_obj(text.as_bytes(), &name(), &Budget::default(), &mut Diagnostics::new())
+}
+
+fn said(text: &str, strictness: Strictness) -> (ObjFile, Vec<String>) {
+    let mut said = Diagnostics::with_strictness(strictness);
+    let file = read_obj(text.as_bytes(), &name(), &Budget::default(), &mut said).unwrap();
+    (file, said.lines())
+}
+
+const SQUARE: &str = "v 1 1 5\nv 4 1 5\nv 4 3 5\nv 1 3 5\n";
+
+#[test]
+fn corners_that_differ_in_any_attribute_are_vertices_of_their_own() {
+    let file = read(
+        "v 1 1 5\nv 4 1 5\nv 4 3 5\nv 1 3 5\nvt 0.25 0.5\nvt 0.75 0.5 9\nvt 0.5\nvn 0 0 1\nvn 0 1 0\n\
+         f 1/1/1 2/2/1 3/3/1\nf 1/1/1 3/3/1 4/2/1\nf 1/1/2 2/2/1 4/2/1\n",
+    )
+    .unwrap();
+    let mesh = &file.meshes[0].mesh;
+    assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3], [4, 1, 3]]);
+    assert_eq!(mesh.positions[4].to_array(), [1.0, 1.0, 5.0]);
+    assert_eq!(mesh.normals.as_ref().unwrap()[4].to_array(), [0.0, 1.0, 0.0]);
+    assert_eq!(mesh.uvs.as_ref().unwrap()[2].to_array(), [0.5, 0.0]);
+}
+
+#[test]
+fn negative_indices_count_backwards_from_where_they_stand() {
+    let file = read(&format!("{SQUARE}f -4 -3 -2\nv 9 9 9\nf -5 -3 -1\n")).unwrap();
+    let mesh = &file.meshes[0].mesh;
+    let places: Vec<_> = mesh.triangles[1].iter().map(|&i| mesh.positions[i as usize].to_array()).collect();
+    assert_eq!(places, [[1., 1., 5.], [4., 3., 5.], [9., 9., 9.]]);
+}
+
+#[test]
+fn many_corners_lines_that_go_on_and_comments_are_read() {
+    let file =
+        read("# a\nv 0 0 2 # b\nv 4 0 2\nv 1 1 2\nv 0 4 2\n\tf 1 \\\r\n 2 3 \\\n4 # c\nf 1 2 3").unwrap();
+    assert_eq!(file.meshes[0].mesh.triangles.len(), 3);
+    let areas: f32 = file.meshes[0].mesh.triangles[..2]
+        .iter()
+        .map(|t| {
+            let [a, b, c] = t.map(|i| file.meshes[0].mesh.positions[i as usize]);
+            (b - a).cross(c - a).z / 2.0
+        })
+        .sum();
+    assert_eq!(areas, 4.0);
+}
+
+#[test]
+fn meshes_part_by_object_material_and_attributes() {
+    let text = format!(
+        "mtllib a.mtl b.mtl\n{SQUARE}vt 0.5 0.5\no first thing\nusemtl red paint\nf 1 2 3\ng ignored\nf 1 3 4\n\
+         usemtl blue\nf 1 2 4\no second\nf 1/1 2/1 3/1\nf 2 3 4\no first thing\nusemtl red paint\nf 2 3 4\n"
+    );
+    let file = read(&text.replace("g ignored\n", "")).unwrap();
+    let parts: Vec<_> = file
+        .meshes
+        .iter()
+        .map(|m| (m.name.as_str(), m.material.as_ref().unwrap().0.as_str(), m.mesh.triangles.len()))
+        .collect();
+    assert_eq!(
+        parts,
+        [
+            ("first thing", "red paint", 3),
+            ("first thing", "blue", 1),
+            ("second", "blue", 1),
+            ("second", "blue", 1)
+        ]
+    );
+    assert!(file.meshes[2].mesh.uvs.is_some() && file.meshes[3].mesh.uvs.is_none());
+    assert_eq!(file.libraries[0].0, "a.mtl b.mtl");
+    assert_eq!(file.meshes[1].material.as_ref().unwrap().1.to_string(), "m.obj:11:8");
+}
+
+#[test]
+fn a_file_without_any_normals_may_name_them() {
+    let (file, lines) = said(&format!("{SQUARE}f 1//1 2//2 3//3\nf 1/4/1 3/4/2 4/4/7\n"), Strictness::Normal);
+    assert_eq!(file.meshes[0].mesh.triangles.len(), 2);
+    assert!(file.meshes[0].mesh.normals.is_none());
+    assert_eq!(
+        lines,
+        [
+            "warning: m.obj: faces name texture coordinates, and the file has none",
+            "warning: m.obj: faces name normals, and the file has none",
+        ]
+    );
+}
+
+#[test]
+fn faces_may_stand_before_what_they_name() {
+    let early = read(
+        "v 9 9 9\no a\nf 2//1 3//-1 -1//1\nf 2//1 3//1 4//1 5//1\nvn 0 0 1\no b\nv 1 1 5\nv 4 1 5\nv 4 3 5\nv 1 3 5\n",
+    );
+    let wrong = early.unwrap_err().to_string();
+    assert_eq!(
+        wrong,
+        "m.obj:3:11: face with a normal that is not there (found -1; expected 1 to 1, or backwards from -1)"
+    );
+    let file = read(
+        "v 9 9 9\no a\nf 2//1 3//1 -1//1\nf 2//1 3//1 4//1 5//1\nvn 0 0 1\no b\nv 1 1 5\nv 4 1 5\nv 4 3 5\nv 1 3 5\n",
+    );
+    let file = file.unwrap();
+    assert_eq!((file.meshes.len(), file.meshes[0].name.as_str()), (1, "a"));
+    let mesh = &file.meshes[0].mesh;
+    let third = mesh.positions[mesh.triangles[0][2] as usize];
+    assert_eq!(third.to_array(), [9.0, 9.0, 9.0], "-1 counts from where it stands");
+    assert_eq!(mesh.triangles.len(), 3);
+}
+
+#[test]
+fn groups_name_meshes_where_there_are_no_objects() {
+    let file = read(&format!("{SQUARE}g wheel left\nf 1 2 3\ng\nf 1 3 4\n")).unwrap();
+    let names: Vec<_> = file.meshes.iter().map(|m| m.name.as_str()).collect();
+    assert_eq!(names, ["wheel left", ""]);
+}
+
+#[test]
+fn colours_of_vertices_are_light_and_others_white() {
+    let file =
+        read("v 1 2 3\nv 2 2 3 0.25 0.5 0.75\nv 1 4 3 1\nv 1 2 9 1 0.125 0 0\nf 1 2 3\nf 2 3 4\n").unwrap();
+    let colours = file.meshes[0].mesh.colours.as_ref().unwrap();
+    assert_eq!(colours[..], [Rgb::WHITE, Rgb::new(0.25, 0.5, 0.75), Rgb::WHITE, Rgb::new(0.125, 0.0, 0.0)]);
+}
+
+#[test]
+fn a_long_line_and_many_attributes_of_one_vertex_take_no_more_than_their_time() {
+    let corners = 200_000;
+    let mut text = String::new();
+    for i in 0..corners {
+        let a = i as f64 * std::f64::consts::TAU / f64::from(corners);
+        text += &format!("v {} {} 3\n", 100.0 * a.cos(), 100.0 * a.sin());
+    }
+    text += "f";
+    for i in 1..=corners {
+        text += &format!(" {i}");
+    }
+    text += "\nvt 0.5 0.5\n";
+    for i in 0..100_000 {
+        text += &format!("vt {i} 1\n");
+    }
+    for i in 1..=100_000 {
+        text += &format!("f 1/{i} 2/1 3/1\n");
+    }
+    let start = std::time::Instant::now();
+    let file = read(&text).unwrap();
+    assert!(file.meshes[0].mesh.triangles.len() >= 190_000);
+    assert_eq!(file.meshes[1].mesh.positions.len(), 100_002);
+    assert!(start.elapsed().as_secs() < 10, "{:?}", start.elapsed());
+}
+
+#[test]
+fn what_is_dropped_is_said() {
+    let (file, lines) = said(
+        &format!("{SQUARE}l 1 2\np 1\nf 1 2\nfaces 1 2 3\ncurv 0 1\ns 1\nf 1 2 3\n"),
+        Strictness::Normal,
+    );
+    assert_eq!(file.meshes[0].mesh.triangles.len(), 1);
+    assert_eq!(
+        lines,
+        [
+            "warning: m.obj:5:1: line is no surface, passed over",
+            "warning: m.obj:6:1: point is no surface, passed over",
+            "warning: m.obj:7:1: face with fewer than three corners, dropped",
+            "warning: m.obj:8:1: unknown keyword, line passed over (found \"faces\")",
+            "warning: m.obj:9:1: free-form curves and surfaces are not supported, passed over",
+            "warning: m.obj:11:1: smoothing groups are not applied: faces without normals are flat",
+        ]
+    );
+}
+
+#[test]
+fn lenient_drops_what_cannot_be_used_and_counts_it() {
+    let text =
+        format!("{SQUARE}v nan 0 0\nvt inf 0\nf 1 2 5\nf 1 2 9\nf 0 1 2\nf 1/1 2/1 3/1\nf 1/2 2/2 3/2\n");
+    assert_eq!(read(&text).unwrap_err().to_string(), "m.obj:5:3: vertex 5 is not finite (found (NaN, 0, 0))");
+    let (file, lines) = said(&text, Strictness::Lenient);
+    assert_eq!(file.meshes.len(), 1);
+    assert_eq!(file.meshes[0].mesh.triangles.len(), 1);
+    assert_eq!(lines.len(), 5, "{lines:#?}");
+    assert!(lines.iter().filter(|l| l.contains("with a corner that is not there, dropped")).count() == 3);
+}
+
+#[test]
+fn every_key_of_a_material_is_read() {
+    let text = "newmtl first one\nKd 0.1 0.2 0.3\nKs 0.5\nKe 1 2 3\nNs 100\nNi 1.33\nd 0.75\nillum 7\nPr 0.4\nPm 1\n\
+        map_Kd -s 2 3 -o 0.25 0.5 0 -mm 0 0.5 -clamp on my tex\\a b.png\nmap_bump -bm 0.02 b.png\nnorm n.png\nmap_d d.png\n\
+        map_Pr 2 3.png -bm 1.5 -clamp on\nmap_Ke e.png\nKa 1 1 1\n\nnewmtl second\nTr 0.25\nmap_Kd -s 4 4.png\n";
+    let mut said = Diagnostics::new();
+    let materials = read_mtl(text.as_bytes(), &"m.mtl".into(), &Budget::default(), &mut said).unwrap();
+    assert_eq!(said.lines(), Vec::<String>::new());
+    let m = &materials[0];
+    assert_eq!(m.name, "first one");
+    assert_eq!((m.diffuse, m.specular), (Some(Rgb::new(0.1, 0.2, 0.3)), Some(Rgb::splat(0.5))));
+    assert_eq!(
+        (m.emission, m.shininess, m.refraction),
+        (Some(Rgb::new(1.0, 2.0, 3.0)), Some(100.0), Some(1.33))
+    );
+    assert_eq!((m.opacity, m.illumination), (Some(0.75), Some(7)));
+    assert_eq!((m.roughness, m.metallic), (Some(0.4), Some(1.0)));
+    let map = m.diffuse_map.as_ref().unwrap();
+    assert_eq!((map.scale, map.offset), ([2.0, 3.0], [0.25, 0.5]));
+    assert_eq!((map.range, map.clamp, map.file.as_str()), ([0.0, 0.5], true, "my tex\\a b.png"));
+    assert_eq!(map.place.to_string(), "m.mtl:11:49");
+    assert_eq!(m.bump_map.as_ref().unwrap().bump_multiplier, 0.02);
+    let behind = m.roughness_map.as_ref().unwrap();
+    assert_eq!((behind.file.as_str(), behind.bump_multiplier, behind.clamp), ("2 3.png", 1.5, true));
+    let second = materials[1].diffuse_map.as_ref().unwrap();
+    assert_eq!((second.scale, second.file.as_str()), ([4.0, 1.0], "4.png"), "a file may look like a number");
+    assert_eq!(materials[1].opacity, Some(0.75));
+}
+
+#[test]
+fn a_scene_has_its_materials_and_says_what_is_missing() {
+    let folder = tempfile::tempdir().unwrap();
+    let put = |file: &str, text: &str| std::fs::write(folder.path().join(file), text).unwrap();
+    put(
+        "my scene.mtl",
+        "newmtl lamp\nKe 5 4 3\nnewmtl glass\nillum 7\nNi 1.7\nnewmtl gold\nPm 1\nPr 0.5\nKd 1 0.8 0.3\nnewmtl matte\n\
+         Kd 0.2 0.4 0.6\nmap_Kd absent.png\nd 0.5\nnewmtl gloss\nKs 0.5 0.5 0.5\nNs 48\n",
+    );
+    let faces = ["lamp", "glass", "gold", "matte", "gloss", "mate"]
+        .map(|m| format!("usemtl {m}\nf 1 2 3\n"))
+        .concat();
+    put("a.obj", &format!("mtllib my scene.mtl\nmtllib absent.mtl\n{SQUARE}{faces}"));
+    let mut said = Diagnostics::new();
+    let path = folder.path().join("a.obj");
+    let scene = open_obj(&path, &Budget::default(), &mut said).unwrap();
+    assert_eq!(scene.shapes.len(), 6);
+    let kind =
+        |shape: usize| &scene.materials[scene.shapes[shape].material.unwrap().0 as usize].material.kind;
+    assert_eq!(scene.shapes[0].area_light.as_ref().unwrap().radiance, Rgb::new(5.0, 4.0, 3.0));
+    assert!(matches!(kind(1), MaterialKind::Dielectric { eta: 1.7, .. }));
+    assert!(matches!(kind(2), MaterialKind::ConductorReflectance { .. }));
+    assert!(matches!(kind(3), MaterialKind::Diffuse { .. }));
+    let MaterialKind::CoatedDiffuse { roughness, .. } = kind(4) else { panic!() };
+    assert!(
+        matches!(*roughness.u, Texture::Constant(alpha) if (alpha - 0.2).abs() < 1e-6),
+        "2 / (48 + 2) is 0.2 squared"
+    );
+    assert!(matches!(kind(5), MaterialKind::Diffuse { .. }));
+    assert!(matches!(scene.shapes[3].alpha.as_deref(), Some(Texture::Constant(0.5))));
+    let lines = said.lines();
+    assert_eq!(lines.len(), 3, "{lines:#?}");
+    assert!(lines[0].contains("my scene.mtl:12:8: cannot use a texture"), "{}", lines[0]);
+    assert!(lines[1].contains("a.obj:2:8: cannot read a material file"), "{}", lines[1]);
+    assert!(
+        lines[2].contains(
+            "a.obj:17:8: unknown material, taken for grey (found \"mate\"; did you mean \"matte\"?)"
+        )
+    );
+    let GeometryDesc::Mesh(mesh) = &scene.shapes[2].geometry else { panic!() };
+    assert_eq!(mesh.triangles.len(), 1);
+}
+
+#[test]
+fn files_of_others_are_read_or_refused_with_a_place() {
+    let mut read = 0;
+    let mut refused = vec![];
+    for part in ["formats/tinyobjloader", "formats/tobj", "meshes"] {
+        let Some(folder) = shared(part) else { continue };
+        for path in files_below(&folder, &[".obj"]) {
+            let budget = Budget::default();
+            let mut said = Diagnostics::new();
+            match open_obj(&path, &budget, &mut said) {
+                Ok(_) => read += 1,
+                Err(e) => refused.push(e.to_string()),
+            }
+            let input = Input::open(&path, &budget).unwrap();
+            let start = std::time::Instant::now();
+            let _ = read_obj(&input, input.name(), &budget, &mut Diagnostics::new());
+            if input.len() > 1 << 20 {
+                println!("{:.0} MB/s", input.len() as f64 / 1e6 / start.elapsed().as_secs_f64());
+            }
+        }
+    }
+    if read > 0 {
+        assert!(read > 40, "{read}");
+        for wrong in ["invalid-relative-vertex-index", "issue-140-zero-face-idx", "test-nan", "invalid_index"]
+        {
+            assert!(refused.iter().any(|r| r.contains(wrong)), "{wrong} {refused:#?}");
+        }
+    }
+}
