@@ -1,15 +1,14 @@
 //! Opening any scene by the ending of its name.
 
 use std::path::Path;
-use std::sync::Arc;
 
-use lumbre_math::Transform;
-use lumbre_scene::{GeometryDesc, MaterialId, NamedMaterial, SceneDesc, ShapeDesc};
-use lumbre_shading::Material;
+use lumbre_scene::SceneDesc;
 
 use crate::diagnostic::quoted;
-use crate::ply::read_ply;
-use crate::{Budget, Diagnostic, Diagnostics, FormatError, Input, Limits, Place, Strictness, pbrt};
+use crate::obj::open_obj;
+use crate::ply::open_ply;
+use crate::stl::open_stl;
+use crate::{Budget, Diagnostic, Diagnostics, FormatError, Limits, Place, Strictness, pbrt};
 
 /// How a scene is read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -106,35 +105,20 @@ fn format_of(path: &Path) -> Result<SceneFormat, FormatError> {
     }
 }
 
-/// A mesh file as a scene: one shape of the default material, without a camera.
+/// A mesh file as a scene without a camera.
 fn read_mesh(
     path: &Path,
     format: SceneFormat,
     budget: &Budget,
     diagnostics: &mut Diagnostics,
 ) -> Result<SceneDesc, FormatError> {
-    let input = Input::open(path, budget)?;
-    let name = input.name();
-    let mesh = match format {
-        SceneFormat::Ply => read_ply(&input, name, budget, diagnostics)?,
-        SceneFormat::Pbrt | SceneFormat::Gltf | SceneFormat::Obj | SceneFormat::Stl => {
+    match format {
+        SceneFormat::Ply => open_ply(path, budget, diagnostics),
+        SceneFormat::Obj => open_obj(path, budget, diagnostics),
+        SceneFormat::Stl => open_stl(path, budget, diagnostics),
+        SceneFormat::Pbrt | SceneFormat::Gltf => {
             let wrong = Diagnostic::error("this kind of scene file is not read yet").at(whole(path));
-            return Err(wrong.expected(ENDINGS).into());
+            Err(wrong.expected(ENDINGS).into())
         }
-    };
-    let material = Arc::new(Material::default_diffuse());
-    let shape = ShapeDesc {
-        index: 0,
-        geometry: GeometryDesc::Mesh(Arc::new(mesh)),
-        world_from_object: Transform::IDENTITY,
-        reverse_orientation: false,
-        material: Some(MaterialId(0)),
-        area_light: None,
-        alpha: None,
-    };
-    Ok(SceneDesc {
-        materials: vec![NamedMaterial { name: None, material }],
-        shapes: vec![shape],
-        ..SceneDesc::default()
-    })
+    }
 }
