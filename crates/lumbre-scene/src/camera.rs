@@ -167,3 +167,119 @@ fn through_lens(
     let offset = (lens_radius * square_to_disk(lens)).extend(0.0);
     (center + offset, focal_distance * towards - offset)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn camera(kind: CameraKind) -> Camera {
+        Camera {
+            name: None,
+            kind,
+            world_from_camera: Transform::translate(DVec3::new(7.0, -2.0, 3.0)),
+            frame_aspect: None,
+            screen_window: None,
+            shutter_open: 0.0,
+            shutter_close: 1.0,
+        }
+    }
+
+    fn perspective(fov: f64, lens_radius: f64, focal_distance: f64) -> CameraKind {
+        CameraKind::Perspective { fov, lens_radius, focal_distance }
+    }
+
+    const MIDDLE: DVec2 = DVec2::new(0.5, 0.5);
+
+    #[test]
+    fn the_field_of_view_spans_the_shorter_side() {
+        let direction = |width, height, x, y| {
+            let view = View::new(&camera(perspective(60.0, 0.0, 1.0)), width, height);
+            view.ray(DVec2::new(x, y), MIDDLE, 1.0).ray.direction
+        };
+        let slope = 30_f64.to_radians().tan();
+        // Wide: the upper edge is at half the angle, the right edge at 1.5 times its slope; y goes up and x right.
+        let top = direction(300, 200, 150.0, 0.0);
+        assert!((top / top.z - DVec3::new(0.0, slope, 1.0)).length() < 1e-12, "{top}");
+        let right = direction(300, 200, 300.0, 100.0);
+        assert!((right / right.z - DVec3::new(1.5 * slope, 0.0, 1.0)).length() < 1e-12, "{right}");
+        let right = direction(200, 300, 200.0, 150.0);
+        assert!((right / right.z - DVec3::new(slope, 0.0, 1.0)).length() < 1e-12, "{right}");
+    }
+
+    #[test]
+    fn every_point_of_a_lens_looks_at_the_plane_in_focus() {
+        let view = View::new(&camera(perspective(40.0, 0.25, 6.0)), 120, 80);
+        let film = DVec2::new(31.0, 62.0);
+        let pinhole = View::new(&camera(perspective(40.0, 0.0, 6.0)), 120, 80).ray(film, MIDDLE, 1.0).ray;
+        let target = pinhole.at(6.0 / pinhole.direction.z);
+        let mut widest: f64 = 0.0;
+        for i in 0..100 {
+            let lens = DVec2::new(f64::from(i % 10) + 0.5, f64::from(i / 10) + 0.5) / 10.0;
+            let ray = view.ray(film, lens, 1.0).ray;
+            assert!((ray.at(6.0 / ray.direction.z) - target).length() < 1e-12);
+            widest = widest.max((ray.origin - pinhole.origin).length());
+        }
+        assert!(widest > 0.2 && widest <= 0.25, "{widest}");
+    }
+
+    #[test]
+    fn orthographic_rays_are_parallel_and_depth_runs_along_them() {
+        let kind = CameraKind::Orthographic { lens_radius: 0.0, focal_distance: 1.0 };
+        let view = View::new(&Camera { screen_window: Some([-3.0, 5.0, -2.0, 4.0]), ..camera(kind) }, 80, 60);
+        let ray = view.ray(DVec2::new(20.0, 15.0), MIDDLE, 1.0).ray;
+        assert_eq!(ray.direction, DVec3::Z);
+        assert!((ray.origin - DVec3::new(7.0 - 1.0, -2.0 + 2.5, 3.0)).length() < 1e-12, "{}", ray.origin);
+        assert!((view.depth(ray.at(4.25)) - 4.25).abs() < 1e-12);
+    }
+
+    #[test]
+    fn spherical_cameras_see_every_direction_once() {
+        for mapping in [SphericalMapping::EqualArea, SphericalMapping::Equirectangular] {
+            let view = View::new(&camera(CameraKind::Spherical { mapping }), 256, 256);
+            let mut sum = DVec3::ZERO;
+            let mut squares = DVec3::ZERO;
+            let mut weights = 0.0;
+            for i in 0..256 * 256 {
+                let film = DVec2::new(f64::from(i % 256) + 0.5, f64::from(i / 256) + 0.5);
+                let direction = view.ray(film, MIDDLE, 1.0).ray.direction;
+                assert!((direction.length() - 1.0).abs() < 1e-12);
+                // A row of the equirectangular picture covers less of the sphere towards the poles, which are at y.
+                let weight = match mapping {
+                    SphericalMapping::EqualArea => 1.0,
+                    SphericalMapping::Equirectangular => (1.0 - direction.y * direction.y).sqrt(),
+                };
+                sum += weight * direction;
+                squares += weight * direction * direction;
+                weights += weight;
+            }
+            assert!((sum / weights).length() < 1e-6, "{mapping:?}");
+            assert!((squares / weights - DVec3::splat(1.0 / 3.0)).length() < 1e-4, "{mapping:?}");
+        }
+    }
+
+    #[test]
+    fn the_footprint_is_as_wide_as_the_pixels_are_apart() {
+        let view = View::new(&camera(perspective(60.0, 0.0, 1.0)), 200, 200);
+        let at = view.ray(DVec2::new(100.0, 100.0), MIDDLE, 0.25);
+        let distance = 8.0;
+        let point = at.ray.at(distance);
+        let spot = at.footprint.on_plane(
+            point,
+            -DVec3::Z,
+            2.0 * DVec3::X,
+            4.0 * DVec3::Y,
+            at.ray.direction,
+            distance,
+        );
+        let pixel = 8.0 * 2.0 * 30_f64.to_radians().tan() / 200.0 * 0.25;
+        assert!((spot.dpdx.x as f64 / pixel - 1.0).abs() < 1e-5 && spot.dpdx.y.abs() < 1e-7, "{spot:?}");
+        assert!((spot.dpdy.y as f64 / -pixel - 1.0).abs() < 1e-5, "{spot:?}");
+        assert!((spot.duv_dx.x as f64 / (pixel / 2.0) - 1.0).abs() < 1e-5, "{spot:?}");
+        assert!((spot.duv_dy.y as f64 / (-pixel / 4.0) - 1.0).abs() < 1e-5, "{spot:?}");
+        // A cone of the same width gives a spot of the same size.
+        let cone = Footprint::Cone { width: 0.0, spread: spot.spread };
+        let round =
+            cone.on_plane(point, -DVec3::Z, 2.0 * DVec3::X, 4.0 * DVec3::Y, at.ray.direction, distance);
+        assert!((round.dpdx.length() as f64 / pixel - 1.0).abs() < 1e-3, "{round:?}");
+    }
+}
