@@ -1,3 +1,50 @@
-//! What the project runs on itself.
+//! What the project runs on itself: `cargo xtask test`, `cargo xtask scenes`, `cargo xtask bench …`.
 
-fn main() {}
+use anyhow::Result;
+use clap::{Parser, Subcommand};
+
+mod assets;
+mod bench;
+mod command;
+mod field;
+mod pictures;
+mod suite;
+
+#[derive(Parser)]
+#[command(name = "cargo xtask", about = "What the project runs on itself")]
+struct Arguments {
+    #[command(subcommand)]
+    task: Task,
+}
+
+#[derive(Subcommand)]
+enum Task {
+    /// Everything that must hold before a change lands: format, lint, unit, contract and doc tests, docs, licences.
+    /// Installs what it needs.
+    Test,
+    /// Renders every scene under scenes/ to the picture beside it.
+    Scenes {
+        /// Only scenes whose path contains this.
+        filter: Option<String>,
+    },
+    /// Writes the meshes, textures and environments that scenes/ are made of.
+    Assets,
+    /// Prints the field of exact shapes of scenes/field as a pbrt scene.
+    Field,
+    /// Measures Lumbre, against peers where they are found.
+    #[command(subcommand)]
+    Bench(bench::Bench),
+}
+
+fn main() -> Result<()> {
+    match Arguments::parse().task {
+        Task::Test => suite::run(),
+        Task::Scenes { filter } => pictures::render_all(filter.as_deref()),
+        Task::Assets => assets::write(),
+        Task::Field => {
+            print!("{}", field::scene());
+            Ok(())
+        }
+        Task::Bench(bench) => bench.run(),
+    }
+}

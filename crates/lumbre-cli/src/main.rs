@@ -1,3 +1,60 @@
-//! The program.
+//! The `lumbre` program: render, cast, info, diff.
 
-fn main() {}
+use std::io::Write;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+mod cast;
+mod diff;
+mod failure;
+mod info;
+mod progress;
+mod reading;
+mod render;
+mod units;
+
+
+
+/// Renders scenes, casts rays into them, says what is in them, and compares pictures.
+#[derive(Parser)]
+#[command(name = "lumbre", version, about, max_term_width = 110)]
+#[command(after_help = "Examples:
+  lumbre render scene.pbrt                      a picture under the scene's own film name
+  lumbre render model.obj --size 800x600        a model, framed and lit
+  lumbre cast scene.pbrt --rays rays.csv        what each ray hits first
+  lumbre info scene.pbrt --json                 what is in a scene
+  lumbre diff a.exr b.exr --metric relmse       how different two pictures are
+
+Exit status: 0 done, 1 a comparison failed, 2 usage, 3 input, 4 files, 5 a limit, 130 or 143 a signal.")]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Render(render::Arguments),
+    Cast(cast::Arguments),
+    Info(info::Arguments),
+    Diff(diff::Arguments),
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let outcome = match arguments.command {
+        Command::Render(arguments) => render::run(&arguments),
+        Command::Cast(arguments) => cast::run(&arguments),
+        Command::Info(arguments) => info::run(&arguments),
+        Command::Diff(arguments) => diff::run(&arguments),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            if !failure.is_silent() {
+                let _ = writeln!(std::io::stderr(), "error: {failure}");
+            }
+            failure.exit_code()
+        }
+    }
+}

@@ -363,3 +363,19 @@ pub enum IntegratorKind {
     /// Surface parameters.
     Uv,
 }
+
+impl IntegratorKind {
+    /// The integrator of a name in the scene language, with its default parameters.
+    pub fn from_name(name: &str) -> Option<Self> {
+        match name {
+            "path" => Some(Self::Path { regularize: false }),
+            "whitted" => Some(Self::Whitted),
+            "ambientocclusion" => Some(Self::AmbientOcclusion { cosine: true, max_distance: f64::INFINITY }),
+            "normals" => Some(Self::Normals),
+            "depth" => Some(Self::Depth),
+            "albedo" => Some(Self::Albedo),
+            "uv" => Some(Self::Uv),
+            _ => None,
+        }
+    }
+}

@@ -19,6 +19,26 @@ pub enum Feature {
     Uv,
 }
 
+impl Feature {
+    /// Every feature.
+    pub const ALL: [Self; 4] = [Self::Albedo, Self::Normal, Self::Depth, Self::Uv];
+
+    /// Its name in file layers and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Albedo => "albedo",
+            Self::Normal => "normal",
+            Self::Depth => "depth",
+            Self::Uv => "uv",
+        }
+    }
+
+    /// The feature of that name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|feature| feature.name() == name)
+    }
+}
+
 /// What a line of sight meets. All are zero where it meets nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Features {

@@ -1,1 +1,56 @@
-//! Skeleton.
+//! Lumbre: an exact, fast, reproducible ray tracer.
+//!
+//! Open a scene, cast rays, render:
+//!
+//! ```no_run
+//! let scene = lumbre::open("scene.pbrt")?;
+//! let hit = scene.closest(&lumbre::Ray::new(lumbre::DVec3::new(0.0, -5.0, 1.0), lumbre::DVec3::Y));
+//! println!("{hit:?}");
+//! scene.render(&scene.options())?.save("picture.png")?;
+//! # Ok::<(), lumbre::Error>(())
+//! ```
+//!
+//! Or describe one:
+//!
+//! ```
+//! use lumbre::{DVec3, Ray, SceneBuilder, ShapeBuilder, geometry::Sphere};
+//!
+//! let ball = Sphere::new(DVec3::new(0.0, 0.0, 2.0), 1.5)?;
+//! let scene = SceneBuilder::new().shape(ShapeBuilder::exact(ball)).build()?;
+//! let hit = scene.closest(&Ray::new(DVec3::new(0.0, -9.0, 2.0), DVec3::Y)).expect("the ball is hit");
+//! assert_eq!(hit.t, 7.5);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! The floors below are here too, under their own names: [`math`], [`image`], [`geometry`], [`kernel`], [`shading`],
+//! [`formats`] and [`description`].
+
+mod builder;
+mod cast;
+mod error;
+mod files;
+mod info;
+mod picture;
+mod scene;
+
+pub use lumbre_formats as formats;
+pub use lumbre_geometry as geometry;
+pub use lumbre_image as image;
+pub use lumbre_kernel as kernel;
+pub use lumbre_math as math;
+pub use lumbre_scene as description;
+pub use lumbre_shading as shading;
+
+pub use builder::{SceneBuilder, ShapeBuilder};
+pub use cast::CastHit;
+pub use error::{Error, ErrorKind};
+pub use files::{SaveOptions, read_image, write_image};
+pub use info::SceneInfo;
+pub use lumbre_formats::ReadOptions;
+pub use lumbre_geometry::Ray;
+pub use lumbre_math::{DVec2, DVec3, Transform};
+pub use lumbre_render::{
+    CancelToken, Feature, NoProgress, PixelBounds, Progress, RayCounts, RenderOptions, Snapshot, State, Stats, Stop,
+};
+pub use picture::Picture;
+pub use scene::{Scene, open, open_with};

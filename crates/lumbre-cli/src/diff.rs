@@ -1,0 +1,71 @@
+//! `lumbre diff`: how different two pictures are.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use lumbre::image::{Metric, compare};
+
+use crate::failure::Failure;
+
+/// Compares two pictures of the same size.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  lumbre diff out.exr reference.exr
+  lumbre diff out.png golden.png --metric flip --fail-above 0.02 -o heat.png
+
+Prints the difference alone, so that scripts can read it. Exit status 1 when it is above --fail-above.")]
+pub struct Arguments {
+    /// A picture: .exr, .png, .hdr, .pfm, .jpg and others.
+    a: PathBuf,
+    /// The picture to compare it with; relmse and flip take it as the reference.
+    b: PathBuf,
+    /// How to measure: rmse (root mean square), relmse (squares relative to the reference's), mae (mean of absolute
+    /// values), max (the largest), or flip (what a person notices when the two alternate, 0 to 1).
+    #[arg(long, value_name = "NAME", default_value = "rmse", value_parser = metric)]
+    metric: Metric,
+    /// Fail when the difference is above this.
+    #[arg(long, value_name = "X", value_parser = limit)]
+    fail_above: Option<f64>,
+    /// Where to write a picture of the differences.
+    #[arg(short, long, value_name = "HEAT.png")]
+    output: Option<PathBuf>,
+}
+
+fn metric(name: &str) -> Result<Metric, String> {
+    Metric::from_name(name).ok_or_else(|| "expected rmse, relmse, mae, max or flip".to_owned())
+}
+
+fn limit(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|x: &f64| *x >= 0.0).ok_or_else(|| "expected a number from 0 up".to_owned())
+}
+
+/// Runs the command.
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let read = |path: &PathBuf| lumbre::read_image(path).map_err(Failure::from);
+    let (a, b) = (read(&arguments.a)?, read(&arguments.b)?);
+    let Some(comparison) = compare(&a, &b, arguments.metric) else {
+        return Err(Failure::input(format!(
+            "{} is {}x{} and {} is {}x{} (expected pictures of the same size)",
+            arguments.a.display(),
+            a.width(),
+            a.height(),
+            arguments.b.display(),
+            b.width(),
+            b.height()
+        )));
+    };
+    let difference = comparison.value;
+    println!("{difference}");
+    if let Some(path) = &arguments.output {
+        let heat = comparison.heat_map(arguments.metric);
+        lumbre::write_image(path, &heat, &lumbre::SaveOptions::default()).map_err(Failure::from)?;
+    }
+    match arguments.fail_above {
+        // A difference that is not a number is above every limit.
+        Some(limit) if difference.is_nan() || difference > limit => {
+            eprintln!("{difference} is above {limit}");
+            Err(Failure::Different)
+        }
+        _ => Ok(()),
+    }
+}

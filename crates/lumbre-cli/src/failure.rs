@@ -1,0 +1,58 @@
+//! How the program fails: what it says, and the status that it ends with.
+
+use std::fmt;
+use std::process::ExitCode;
+
+/// Why a command ended without doing what was asked.
+#[derive(Debug)]
+pub enum Failure {
+    /// A comparison was beyond its limit (1).
+    Different,
+    /// The command line asks for something that there is not (2).
+    Usage(String),
+    /// A file says something wrong (3).
+    Input(String),
+    /// A file cannot be read or written (4).
+    Io(String),
+    /// A limit was reached (5).
+    Limit(String),
+    /// A signal stopped the work (130 or 143, as given).
+    Interrupted(u8),
+}
+
+impl Failure {
+    /// A file says something wrong.
+    pub fn input(message: impl Into<String>) -> Self {
+        Self::Input(message.into())
+    }
+
+    /// The status for the shell.
+    pub fn exit_code(&self) -> ExitCode {
+        ExitCode::from(match self {
+            Self::Different => 1,
+            Self::Usage(_) => 2,
+            Self::Input(_) => 3,
+            Self::Io(_) => 4,
+            Self::Limit(_) => 5,
+            Self::Interrupted(status) => *status,
+        })
+    }
+
+    /// Whether there is something left to say.
+    pub fn is_silent(&self) -> bool {
+        matches!(self, Self::Interrupted(_) | Self::Different)
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Usage(message)
+            | Self::Input(message)
+            | Self::Io(message)
+            | Self::Limit(message) => f.write_str(message),
+            Self::Interrupted(_) => f.write_str("interrupted"),
+            Self::Different => f.write_str("the difference is above its limit"),
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! `lumbre info`: what is in a scene.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::json;
+
+use crate::failure::Failure;
+use crate::reading::{ReadingArguments, print_warnings};
+
+/// Says what is in a scene, and what of it would not be rendered.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  lumbre info scene.pbrt
+  lumbre info model.ply --json | python3 -m json.tool
+
+Exit status 3 when the scene would not load.")]
+pub struct Arguments {
+    /// The scene.
+    #[arg(required = true)]
+    scene: Vec<PathBuf>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    reading: ReadingArguments,
+}
+
+/// Runs the command.
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let (scene, diagnostics) = arguments.reading.open(&arguments.scene)?;
+    let info = scene.info();
+    if arguments.json {
+        let bounds = info.bounds.map(|b| json!({ "min": b.min.to_array(), "max": b.max.to_array() }));
+        let report = json!({
+            "shapes": info.shapes,
+            "materials": info.materials,
+            "lights": info.lights,
+            "triangles": info.triangles,
+            "instances": info.instances,
+            "cameras": info.cameras,
+            "bounds": bounds,
+            "memory_bytes": info.memory_bytes,
+            "warnings": diagnostics.lines(),
+        });
+        println!("{report:#}");
+        return Ok(());
+    }
+    let count = |title: &str, counts: &BTreeMap<String, u64>| {
+        let total: u64 = counts.values().sum();
+        let each: Vec<String> = counts.iter().map(|(name, n)| format!("{n} {name}")).collect();
+        println!("{title:<11}{total}{}", if each.is_empty() { String::new() } else { format!(": {}", each.join(", ")) });
+    };
+    count("shapes", &info.shapes);
+    println!("{:<11}{}", "triangles", info.triangles);
+    println!("{:<11}{}", "instances", info.instances);
+    count("materials", &info.materials);
+    count("lights", &info.lights);
+    println!("{:<11}{}", "cameras", if info.cameras.is_empty() { "none: one is made".into() } else { info.cameras.join(", ") });
+    match info.bounds {
+        Some(b) => println!("{:<11}{} to {}", "bounds", b.min, b.max),
+        None => println!("{:<11}nothing finite", "bounds"),
+    }
+    println!("{:<11}{:.1} MiB", "memory", info.memory_bytes as f64 / f64::from(1 << 20));
+    print_warnings(&diagnostics);
+    Ok(())
+}

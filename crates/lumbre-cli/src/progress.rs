@@ -1,0 +1,106 @@
+//! Showing how far a render is.
+
+use std::io::IsTerminal;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+use clap::ValueEnum;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use lumbre::{Progress, State};
+
+use crate::units::spoken;
+
+/// How to show progress.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Style {
+    /// A bar on a terminal, else lines.
+    Auto,
+    /// A bar.
+    Bar,
+    /// A line now and then.
+    Plain,
+    /// A JSON object a line.
+    Json,
+    /// Nothing.
+    None,
+}
+
+/// Progress on standard error.
+pub enum Display {
+    /// A bar.
+    Bar(ProgressBar),
+    /// Lines, with when the last one was written.
+    Lines {
+        /// Whether they are JSON.
+        json: bool,
+        /// When the last one was written.
+        last: Mutex<Option<Instant>>,
+    },
+    /// Nothing.
+    None,
+}
+
+/// Time between two lines.
+const INTERVAL: Duration = Duration::from_secs(2);
+
+impl Display {
+    /// Shows nothing yet.
+    pub fn new(style: Style) -> Self {
+        match style {
+            Style::None => Self::None,
+            Style::Auto if std::io::stderr().is_terminal() => Self::bar(),
+            Style::Bar => Self::bar(),
+            Style::Auto | Style::Plain => Self::Lines { json: false, last: Mutex::new(None) },
+            Style::Json => Self::Lines { json: true, last: Mutex::new(None) },
+        }
+    }
+
+    fn bar() -> Self {
+        let bar = ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::stderr());
+        if let Ok(style) = ProgressStyle::with_template("{bar:40} {percent:>3}%  {msg}") {
+            bar.set_style(style);
+        }
+        Self::Bar(bar)
+    }
+
+    /// Clears a bar.
+    pub fn finish(&self) {
+        if let Self::Bar(bar) = self {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+impl Progress for Display {
+    fn state(&self, state: &State) {
+        let left = state.left.map_or_else(String::new, |left| format!(", {} left", spoken(left)));
+        match self {
+            Self::None => {}
+            Self::Bar(bar) => {
+                bar.set_length(state.total);
+                bar.set_position(state.samples);
+                bar.set_message(format!("{}{left}", spoken(state.elapsed)));
+            }
+            Self::Lines { json, last } => {
+                let Ok(mut last) = last.lock() else { return };
+                let due = last.is_none_or(|at| at.elapsed() >= INTERVAL) || state.samples == state.total;
+                if !due {
+                    return;
+                }
+                *last = Some(Instant::now());
+                if *json {
+                    let line = serde_json::json!({
+                        "samples": state.samples,
+                        "total": state.total,
+                        "seconds": state.elapsed.as_secs_f64(),
+                        "seconds_left": state.left.map(|left| left.as_secs_f64()),
+                    });
+                    eprintln!("{line}");
+                } else {
+                    let percent = 100.0 * state.samples as f64 / state.total.max(1) as f64;
+                    eprintln!("{percent:5.1} %  {}{left}", spoken(state.elapsed));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,345 @@
+//! `lumbre render`: a picture of a scene.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use lumbre::description::{CameraKind, IntegratorKind};
+use lumbre::formats::image::ImageFormat;
+use lumbre::formats::probe_writable;
+use lumbre::image::ToneMap;
+use lumbre::{CancelToken, Feature, Picture, PixelBounds, RenderOptions, SaveOptions, Scene};
+use serde_json::json;
+
+use crate::failure::Failure;
+use crate::progress::{Display, Style};
+use crate::reading::{ReadingArguments, print_warnings};
+use crate::units::{self, Crop, spoken};
+
+/// Renders a scene to a picture.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  lumbre render scene.pbrt
+  lumbre render scene.pbrt -o out.exr --spp 1024 --time 10m
+  lumbre render model.obj --size 1920x1080 --tonemap agx --exposure 0.5
+  lumbre render scene.pbrt -o part.exr --crop 100,50,300,200
+  lumbre render scene.pbrt -o all.exr --aov albedo,normal,depth
+
+Ctrl-C stops and saves what is there; a second one stops at once and saves nothing.")]
+pub struct Arguments {
+    /// The scene: .pbrt, .obj, .ply or .stl, also packed by gzip. Several .pbrt files are read one after another.
+    #[arg(required = true)]
+    scene: Vec<PathBuf>,
+    /// The picture: .exr, .png, .hdr, .pfm or .jpg. By default the scene's own film name, else the scene's name with .png.
+    #[arg(short, long, value_name = "OUT")]
+    output: Option<PathBuf>,
+    /// Samples a pixel.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    spp: Option<u32>,
+    /// Stop after this time, as 90s, 2m or 1h30m.
+    #[arg(long, value_name = "DUR", value_parser = units::duration)]
+    time: Option<Duration>,
+    /// Stop when the noise is estimated to be below this share of the luminance.
+    #[arg(long, value_name = "R", value_parser = noise)]
+    noise: Option<f64>,
+    /// Pixels across and down.
+    #[arg(long, value_name = "WxH", value_parser = units::size)]
+    size: Option<(u32, u32)>,
+    /// Render this part only: pixels, or fractions of the picture.
+    #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = units::crop)]
+    crop: Option<Crop>,
+    /// A camera by name or 0-based position.
+    #[arg(long, value_name = "NAME|INDEX")]
+    camera: Option<String>,
+    /// path, whitted, ambientocclusion, normals, depth, albedo or uv.
+    #[arg(long, value_name = "NAME", value_parser = integrator)]
+    integrator: Option<IntegratorKind>,
+    /// Bounces at most.
+    #[arg(long, value_name = "N")]
+    max_depth: Option<u32>,
+    /// Seed of the random numbers.
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Threads; all cores by default. The picture does not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+    /// Stops brighter, for .png and .jpg.
+    #[arg(long, value_name = "EV", default_value_t = 0.0, allow_negative_numbers = true)]
+    exposure: f32,
+    /// How light is brought within what a display shows, for .png and .jpg: none, agx, aces or neutral.
+    #[arg(long, value_name = "NAME", default_value = "none", value_parser = tone_map)]
+    tonemap: ToneMap,
+    /// Feature layers in an .exr: albedo, normal, depth, uv.
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = feature)]
+    aov: Vec<Feature>,
+    /// Write what the render took, as JSON.
+    #[arg(long, value_name = "FILE.json")]
+    stats: Option<PathBuf>,
+    /// How to show progress.
+    #[arg(long, value_enum, value_name = "STYLE", default_value_t = Style::Auto)]
+    progress: Style,
+    /// Say more.
+    #[arg(short, long)]
+    verbose: bool,
+    /// Say nothing but errors.
+    #[arg(short, long, conflicts_with = "verbose")]
+    quiet: bool,
+    #[command(flatten)]
+    reading: ReadingArguments,
+}
+
+fn noise(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|x: &f64| *x > 0.0 && x.is_finite())
+        .ok_or_else(|| "expected a number above 0, such as 0.02".to_owned())
+}
+
+fn integrator(name: &str) -> Result<IntegratorKind, String> {
+    IntegratorKind::from_name(name)
+        .ok_or_else(|| "expected path, whitted, ambientocclusion, normals, depth, albedo or uv".to_owned())
+}
+
+fn tone_map(name: &str) -> Result<ToneMap, String> {
+    ToneMap::from_name(name).ok_or_else(|| "expected none, agx, aces or neutral".to_owned())
+}
+
+fn feature(name: &str) -> Result<Feature, String> {
+    Feature::from_name(name).ok_or_else(|| "expected albedo, normal, depth or uv".to_owned())
+}
+
+/// Runs the command.
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    // An impossible name is found before the scene is read, an impossible folder before it is rendered.
+    if let Some(output) = &arguments.output {
+        check_format(output, !arguments.aov.is_empty())?;
+    }
+    let start = Instant::now();
+    let (scene, diagnostics) = arguments.reading.open(&arguments.scene)?;
+    let load_time = start.elapsed().saturating_sub(scene.build_time());
+    if !arguments.quiet {
+        print_warnings(&diagnostics);
+    }
+    let output = arguments.output.clone().unwrap_or_else(|| default_output(&scene, &arguments.scene[0]));
+    check_format(&output, !arguments.aov.is_empty())?;
+    for path in std::iter::once(&output).chain(&arguments.stats) {
+        probe_writable(path).map_err(|e| Failure::from(lumbre::Error::from(e)))?;
+    }
+    let options = options(arguments, &scene)?;
+
+    let cancel = CancelToken::new();
+    let signals = Signals::listen(&cancel).map_err(|e| Failure::Io(format!("cannot listen for signals: {e}")))?;
+    let style = if arguments.quiet { Style::None } else { arguments.progress };
+    let display = Display::new(style);
+    let render_start = Instant::now();
+    let picture = scene.render_with(&options, &display, &cancel)?;
+    let render_time = render_start.elapsed();
+    display.finish();
+
+    let save_start = Instant::now();
+    let save = SaveOptions { tone_map: arguments.tonemap, exposure: arguments.exposure, ..SaveOptions::default() };
+    picture.save_with(&output, &save, &arguments.aov)?;
+    let save_time = save_start.elapsed();
+    report_dropped(&picture);
+    if let Some(path) = &arguments.stats {
+        let seconds = json!({
+            "load": load_time.as_secs_f64(),
+            "build": scene.build_time().as_secs_f64(),
+            "render": render_time.as_secs_f64(),
+            "save": save_time.as_secs_f64(),
+        });
+        let report = statistics(&scene, &picture, seconds, diagnostics.lines());
+        lumbre::formats::atomic_write(path, |file| writeln!(file, "{report:#}"))
+            .map_err(|e| Failure::from(lumbre::Error::from(e)))?;
+    }
+    if !arguments.quiet {
+        summary(arguments.verbose, &scene, &picture, &output, render_time);
+    }
+    match signals.received() {
+        Some(status) => Err(Failure::Interrupted(status)),
+        None => Ok(()),
+    }
+}
+
+/// Whether the program can write what the path's extension names.
+fn check_format(path: &Path, layers: bool) -> Result<(), Failure> {
+    let format = ImageFormat::from_path(path).filter(|format| format.is_writable());
+    match format {
+        None => Err(Failure::Usage(format!(
+            "{}: unknown kind of picture (expected a name that ends in .exr, .png, .hdr, .pfm or .jpg)",
+            path.display()
+        ))),
+        Some(format) if layers && format != ImageFormat::Exr => {
+            Err(Failure::Usage(format!("{}: --aov needs an .exr file", path.display())))
+        }
+        Some(_) => Ok(()),
+    }
+}
+
+/// The scene's own name for its picture, else the scene's with .png.
+fn default_output(scene: &Scene, path: &Path) -> PathBuf {
+    let own = scene.resolved().film().filename.as_deref().map(PathBuf::from);
+    own.filter(|name| check_format(name, false).is_ok()).unwrap_or_else(|| {
+        let stem = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        let stem = stem.strip_suffix(".gz").unwrap_or(&stem);
+        let stem = Path::new(stem).file_stem().map_or_else(|| "picture".into(), |s| s.to_os_string());
+        if stem == "-" { PathBuf::from("picture.png") } else { PathBuf::from(stem).with_added_extension("png") }
+    })
+}
+
+fn options(arguments: &Arguments, scene: &Scene) -> Result<RenderOptions, Failure> {
+    let mut options = scene.options();
+    if let Some((width, height)) = arguments.size {
+        // The scene's own crop is in its own pixels.
+        (options.width, options.height, options.crop) = (width, height, None);
+    }
+    options.crop = match arguments.crop {
+        None => options.crop,
+        Some(Crop::Pixels([x0, y0, x1, y1])) => Some(PixelBounds { x0, y0, x1, y1 }),
+        Some(Crop::Fractions([x0, y0, x1, y1])) => Some(options.pixels_of([x0, x1, y0, y1])),
+    };
+    if let Some(wanted) = &arguments.camera {
+        options.camera = camera(scene, wanted)?;
+    }
+    options.integrator.kind = arguments.integrator.unwrap_or(options.integrator.kind);
+    options.integrator.max_depth = arguments.max_depth.unwrap_or(options.integrator.max_depth);
+    options.sampler.seed = arguments.seed.unwrap_or(options.sampler.seed);
+    options.stop.time = arguments.time;
+    options.stop.noise = arguments.noise;
+    let open_ended = arguments.time.is_some() || arguments.noise.is_some();
+    options.stop.spp = match arguments.spp {
+        Some(spp) => spp,
+        // Whoever names a time or a quality wants all that it buys.
+        None if open_ended => u32::MAX,
+        None => options.stop.spp,
+    };
+    options.threads = arguments.threads.map_or(0, usize::from);
+    options.features = !arguments.aov.is_empty();
+    Ok(options)
+}
+
+fn camera(scene: &Scene, wanted: &str) -> Result<usize, Failure> {
+    let cameras = scene.resolved().cameras();
+    let by_name = cameras.iter().position(|camera| camera.name.as_deref() == Some(wanted));
+    let by_index = wanted.parse().ok().filter(|index| *index < cameras.len());
+    by_name.or(by_index).ok_or_else(|| {
+        let known: Vec<String> = cameras
+            .iter()
+            .enumerate()
+            .map(|(i, camera)| match (&camera.name, &camera.kind) {
+                (Some(name), _) => name.clone(),
+                (None, CameraKind::Perspective { .. }) => format!("{i} (perspective)"),
+                (None, CameraKind::Orthographic { .. }) => format!("{i} (orthographic)"),
+                (None, CameraKind::Spherical { .. }) => format!("{i} (spherical)"),
+            })
+            .collect();
+        Failure::Usage(format!("--camera: there is no \"{wanted}\" (expected one of: {})", known.join(", ")))
+    })
+}
+
+/// SIGINT and SIGTERM: the first asks the render to end, a second interrupt ends the program.
+struct Signals {
+    last: Arc<AtomicUsize>,
+}
+
+impl Signals {
+    fn listen(cancel: &CancelToken) -> std::io::Result<Self> {
+        let last = Arc::new(AtomicUsize::new(0));
+        let again = Arc::new(AtomicBool::new(false));
+        for (signal, status) in [(signal_hook::consts::SIGINT, 130), (signal_hook::consts::SIGTERM, 143)] {
+            signal_hook::flag::register_conditional_shutdown(signal, status, again.clone())?;
+            signal_hook::flag::register(signal, again.clone())?;
+            signal_hook::flag::register_usize(signal, last.clone(), status as usize)?;
+        }
+        let (seen, cancel) = (last.clone(), cancel.clone());
+        // A signal handler may do next to nothing, so a thread passes the word on.
+        std::thread::spawn(move || {
+            while seen.load(Ordering::Relaxed) == 0 {
+                std::thread::sleep(Duration::from_millis(20));
+            }
+            cancel.cancel();
+        });
+        Ok(Self { last })
+    }
+
+    /// The exit status of the signal that came, if one did.
+    fn received(&self) -> Option<u8> {
+        u8::try_from(self.last.load(Ordering::Relaxed)).ok().filter(|status| *status != 0)
+    }
+}
+
+fn report_dropped(picture: &Picture) {
+    let stats = picture.stats();
+    for sample in &stats.first_dropped {
+        eprintln!("warning: pixel ({}, {}), sample {}: not finite, dropped", sample.x, sample.y, sample.sample);
+    }
+    let unsaid = stats.dropped.saturating_sub(stats.first_dropped.len() as u64);
+    if unsaid > 0 {
+        eprintln!("warning: {unsaid} more samples were not finite and dropped");
+    }
+}
+
+fn statistics(scene: &Scene, picture: &Picture, seconds: serde_json::Value, warnings: Vec<String>) -> serde_json::Value {
+    let stats = picture.stats();
+    let accel = scene.resolved().accel();
+    let primitives = accel.primitive_count();
+    let build_seconds = scene.build_time().as_secs_f64();
+    json!({
+        "seconds": seconds,
+        "threads": stats.threads,
+        "width": picture.image().width(),
+        "height": picture.image().height(),
+        "spp": stats.spp,
+        "rays": { "camera": stats.rays.camera, "bounce": stats.rays.bounce, "shadow": stats.rays.shadow },
+        "paths_per_second": stats.paths_per_second(),
+        "noise": stats.noise,
+        "build": {
+            "primitives": primitives,
+            "primitives_per_second": primitives as f64 / build_seconds.max(1e-9),
+            "bytes_per_primitive": accel.memory_bytes() as f64 / primitives.max(1) as f64,
+        },
+        "peak_memory_bytes": peak_memory(),
+        "dropped_samples": stats.dropped,
+        "warnings": warnings,
+    })
+}
+
+/// The most memory that the process has held; `None` where the system does not say.
+fn peak_memory() -> Option<u64> {
+    let status = fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kib| kib * 1024)
+}
+
+fn summary(verbose: bool, scene: &Scene, picture: &Picture, output: &Path, render_time: Duration) {
+    let stats = picture.stats();
+    let image = picture.image();
+    eprintln!(
+        "{}: {}x{}, {} samples a pixel, {}",
+        output.display(),
+        image.width(),
+        image.height(),
+        stats.spp,
+        spoken(render_time)
+    );
+    if verbose {
+        let rays = stats.rays;
+        let total = rays.camera + rays.bounce + rays.shadow;
+        eprintln!(
+            "{} threads, {:.2} M paths/s, {:.2} M rays/s ({} camera, {} bounce, {} shadow)",
+            stats.threads,
+            stats.paths_per_second() / 1e6,
+            total as f64 / render_time.as_secs_f64().max(1e-9) / 1e6,
+            rays.camera,
+            rays.bounce,
+            rays.shadow
+        );
+        eprintln!("{} primitives, tree built in {}", scene.resolved().accel().primitive_count(), spoken(scene.build_time()));
+        if let Some(noise) = stats.noise {
+            eprintln!("noise {noise:.4}");
+        }
+    }
+}

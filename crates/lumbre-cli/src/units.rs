@@ -1,0 +1,138 @@
+//! Arguments with units: sizes, durations, bytes and rectangles.
+
+use std::time::Duration;
+
+/// `640x480`.
+///
+/// # Errors
+/// What was expected.
+pub fn size(text: &str) -> Result<(u32, u32), String> {
+    let wrong = || format!("found \"{text}\"; expected WIDTHxHEIGHT in pixels, each from 1 to 65536, as 640x480");
+    let (width, height) = text.split_once(['x', 'X']).ok_or_else(wrong)?;
+    let side = |s: &str| s.trim().parse().ok().filter(|n| (1..=65_536).contains(n));
+    Ok((side(width).ok_or_else(wrong)?, side(height).ok_or_else(wrong)?))
+}
+
+/// `x0,y0,x1,y1` in pixels, or in fractions of the picture when a number has a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Crop {
+    /// Left, top, right, bottom in pixels, right and bottom excluded.
+    Pixels([u32; 4]),
+    /// The same in [0, 1].
+    Fractions([f64; 4]),
+}
+
+/// `x0,y0,x1,y1`.
+///
+/// # Errors
+/// What was expected.
+pub fn crop(text: &str) -> Result<Crop, String> {
+    let wrong = || {
+        format!("found \"{text}\"; expected x0,y0,x1,y1 with x0 < x1 and y0 < y1, in pixels (10,20,110,95) or in fractions (0.25,0.25,0.5,0.5)")
+    };
+    let parts: Vec<&str> = text.split(',').map(str::trim).collect();
+    if parts.len() != 4 {
+        return Err(wrong());
+    }
+    if parts.iter().any(|part| part.contains('.')) {
+        let mut f = [0.0; 4];
+        for (value, part) in f.iter_mut().zip(&parts) {
+            *value = part.parse().ok().filter(|v| (0.0..=1.0).contains(v)).ok_or_else(wrong)?;
+        }
+        return if f[0] < f[2] && f[1] < f[3] { Ok(Crop::Fractions(f)) } else { Err(wrong()) };
+    }
+    let mut p = [0; 4];
+    for (value, part) in p.iter_mut().zip(&parts) {
+        *value = part.parse().map_err(|_| wrong())?;
+    }
+    if p[0] < p[2] && p[1] < p[3] { Ok(Crop::Pixels(p)) } else { Err(wrong()) }
+}
+
+/// `90s`, `2m`, `1h30m`, `500ms`; a bare number is seconds.
+///
+/// # Errors
+/// What was expected.
+pub fn duration(text: &str) -> Result<Duration, String> {
+    let wrong = || format!("found \"{text}\"; expected a time such as 90s, 2m, 1h30m or 500ms");
+    let mut rest = text.trim();
+    let mut seconds = 0.0;
+    while !rest.is_empty() {
+        let number_end = rest.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(rest.len());
+        let value: f64 = rest[..number_end].parse().map_err(|_| wrong())?;
+        let unit_end = rest[number_end..].find(|c: char| c.is_ascii_digit()).map_or(rest.len(), |n| number_end + n);
+        seconds += value
+            * match rest[number_end..unit_end].trim() {
+                "" | "s" => 1.0,
+                "ms" => 0.001,
+                "m" | "min" => 60.0,
+                "h" => 3600.0,
+                "d" => 86_400.0,
+                _ => return Err(wrong()),
+            };
+        rest = &rest[unit_end..];
+    }
+    if text.trim().is_empty() { Err(wrong()) } else { Duration::try_from_secs_f64(seconds).map_err(|_| wrong()) }
+}
+
+/// `8G`, `512M`, `100k`; a bare number is bytes. Powers of 1024.
+///
+/// # Errors
+/// What was expected.
+pub fn bytes(text: &str) -> Result<u64, String> {
+    let wrong = || format!("found \"{text}\"; expected a size such as 8G, 512M or 100k");
+    let lower = text.trim().to_ascii_lowercase();
+    let lower = lower.trim_end_matches('b').trim_end_matches('i');
+    let (number, factor) = match lower.chars().last() {
+        Some('k') => (&lower[..lower.len() - 1], 1u64 << 10),
+        Some('m') => (&lower[..lower.len() - 1], 1 << 20),
+        Some('g') => (&lower[..lower.len() - 1], 1 << 30),
+        Some('t') => (&lower[..lower.len() - 1], 1 << 40),
+        _ => (lower, 1),
+    };
+    let value: f64 = number.trim().parse().map_err(|_| wrong())?;
+    if value > 0.0 && value.is_finite() { Ok((value * factor as f64) as u64) } else { Err(wrong()) }
+}
+
+/// A duration as people say it.
+pub fn spoken(duration: Duration) -> String {
+    let seconds = duration.as_secs();
+    match seconds {
+        0..=9 => format!("{:.1} s", duration.as_secs_f64()),
+        10..=99 => format!("{seconds} s"),
+        100..=5999 => format!("{} min {:02} s", seconds / 60, seconds % 60),
+        _ => format!("{} h {:02} min", seconds / 3600, seconds % 3600 / 60),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_are_understood() {
+        assert_eq!(size("640x480"), Ok((640, 480)));
+        assert_eq!(crop("10,20,110,95"), Ok(Crop::Pixels([10, 20, 110, 95])));
+        assert_eq!(crop("0.25,0,0.5,1"), Ok(Crop::Fractions([0.25, 0.0, 0.5, 1.0])));
+        assert_eq!(duration("1h30m"), Ok(Duration::from_secs(5400)));
+        assert_eq!(duration("500ms"), Ok(Duration::from_millis(500)));
+        assert_eq!(duration("2.5"), Ok(Duration::from_millis(2500)));
+        assert_eq!(bytes("1.5k"), Ok(1536));
+        assert_eq!(bytes("8GiB"), Ok(8 << 30));
+    }
+
+    #[test]
+    fn nonsense_is_refused() {
+        for text in ["", "640", "0x480", "-3x4", "640x480x3", "99999999x2"] {
+            assert!(size(text).is_err(), "{text}");
+        }
+        for text in ["", "1,2,3", "5,5,5,9", "0.5,0.5,0.25,1", "a,b,c,d", "0.1,0.1,0.2,1.5"] {
+            assert!(crop(text).is_err(), "{text}");
+        }
+        for text in ["", "soon", "3x", "m"] {
+            assert!(duration(text).is_err(), "{text}");
+        }
+        for text in ["", "much", "-1G", "0"] {
+            assert!(bytes(text).is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,350 @@
+//! The program as a person or a script meets it.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+const SPHERE: &str = r#"
+Film "rgb" "integer xresolution" 48 "integer yresolution" 32 "string filename" "sphere.png"
+Sampler "sobol" "integer pixelsamples" 4
+LookAt 0 -8 3  0 0 0  0 0 1
+Camera "perspective" "float fov" 40
+WorldBegin
+LightSource "infinite" "rgb L" [0.6 0.7 0.8]
+Material "diffuse" "rgb reflectance" [0.7 0.4 0.2]
+Shape "sphere" "float radius" 1.75 "point3 center" [0.25 0 0.5]
+"#;
+
+struct Desk {
+    folder: TempDir,
+}
+
+impl Desk {
+    fn new() -> Self {
+        Self { folder: tempfile::tempdir().unwrap() }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn write(&self, name: &str, text: &str) -> PathBuf {
+        fs::write(self.path(name), text).unwrap();
+        self.path(name)
+    }
+
+    fn lumbre(&self, arguments: &[&str]) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_lumbre"))
+            .args(arguments)
+            .current_dir(self.folder.path())
+            .stdin(Stdio::null())
+            .output()
+            .unwrap()
+    }
+}
+
+fn code(output: &Output) -> i32 {
+    output.status.code().expect("no signal ended it")
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn stdout(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+#[test]
+fn every_command_has_help_with_an_example() {
+    let desk = Desk::new();
+    for command in ["render", "cast", "info", "diff"] {
+        let help = desk.lumbre(&[command, "--help"]);
+        assert_eq!(code(&help), 0);
+        assert!(stdout(&help).contains(&format!("  lumbre {command} ")), "{command}: {}", stdout(&help));
+    }
+}
+
+#[test]
+fn a_scene_renders_under_its_own_film_name() {
+    let desk = Desk::new();
+    desk.write("scene.pbrt", SPHERE);
+    let out = desk.lumbre(&["render", "scene.pbrt"]);
+    assert_eq!(code(&out), 0, "{}", stderr(&out));
+    assert!(fs::read(desk.path("sphere.png")).unwrap().starts_with(b"\x89PNG"));
+}
+
+#[test]
+fn each_extension_makes_its_format_and_all_hold_the_same_picture() {
+    let desk = Desk::new();
+    desk.write("scene.pbrt", SPHERE);
+    for name in ["a.exr", "a.png", "a.hdr", "a.pfm", "a.jpg"] {
+        let out = desk.lumbre(&["render", "scene.pbrt", "-o", name, "-q"]);
+        assert_eq!(code(&out), 0, "{name}: {}", stderr(&out));
+        let difference = desk.lumbre(&["diff", name, "a.exr", "--metric", "mae"]);
+        assert_eq!(code(&difference), 0, "{name}: {}", stderr(&difference));
+        let value: f64 = stdout(&difference).trim().parse().unwrap();
+        assert!(value < 0.02, "{name}: {value}");
+    }
+    let out = desk.lumbre(&["render", "scene.pbrt", "-o", "a.gif"]);
+    assert_eq!(code(&out), 2, "{}", stderr(&out));
+    assert!(stderr(&out).contains(".exr"), "{}", stderr(&out));
+}
+
+#[test]
+fn statistics_have_what_scripts_rely_on() {
+    let desk = Desk::new();
+    desk.write("scene.pbrt", SPHERE);
+    let out = desk.lumbre(&["render", "scene.pbrt", "-o", "a.png", "--stats", "stats.json", "--threads", "2"]);
+    assert_eq!(code(&out), 0, "{}", stderr(&out));
+    let stats: Value = serde_json::from_slice(&fs::read(desk.path("stats.json")).unwrap()).unwrap();
+    for phase in ["load", "build", "render", "save"] {
+        assert!(stats["seconds"][phase].as_f64().unwrap() >= 0.0, "{stats}");
+    }
+    assert_eq!((stats["width"].as_u64(), stats["height"].as_u64()), (Some(48), Some(32)));
+    assert_eq!((stats["spp"].as_u64(), stats["threads"].as_u64()), (Some(4), Some(2)));
+    assert_eq!(stats["rays"]["camera"].as_u64(), Some(48 * 32 * 4));
+    assert!(stats["rays"]["bounce"].as_u64().unwrap() > 0 && stats["rays"]["shadow"].as_u64().unwrap() > 0);
+    assert!(stats["paths_per_second"].as_f64().unwrap() > 0.0);
+    assert_eq!(stats["build"]["primitives"].as_u64(), Some(1));
+    assert!(stats["build"]["primitives_per_second"].as_f64().is_some());
+    assert!(stats["build"]["bytes_per_primitive"].as_f64().is_some());
+    assert!(stats["peak_memory_bytes"].as_u64().unwrap() > 100_000);
+    assert_eq!(stats["dropped_samples"].as_u64(), Some(0));
+    assert!(stats["warnings"].as_array().unwrap().is_empty());
+}
+
+#[test]
+fn options_win_over_the_scene() {
+    let desk = Desk::new();
+    desk.write("scene.pbrt", SPHERE);
+    let out = desk.lumbre(&[
+        "render", "scene.pbrt", "-o", "a.exr", "--size", "30x20", "--spp", "2", "--integrator", "normals", "--stats", "s.json",
+    ]);
+    assert_eq!(code(&out), 0, "{}", stderr(&out));
+    let stats: Value = serde_json::from_slice(&fs::read(desk.path("s.json")).unwrap()).unwrap();
+    assert_eq!((stats["width"].as_u64(), stats["height"].as_u64()), (Some(30), Some(20)));
+    assert_eq!((stats["spp"].as_u64(), stats["rays"]["shadow"].as_u64()), (Some(2), Some(0)));
+    let out = desk.lumbre(&["render", "scene.pbrt", "-o", "a.exr", "--integrator", "normal"]);
+    assert_eq!(code(&out), 2);
+    assert!(stderr(&out).contains("normals"), "{}", stderr(&out));
+}
+
+#[test]
+fn a_crop_has_the_pixels_of_the_whole() {
+    let desk = Desk::new();
+    desk.write("scene.pbrt", SPHERE);
+    assert_eq!(code(&desk.lumbre(&["render", "scene.pbrt", "-o", "whole.pfm", "-q"])), 0);
+    assert_eq!(code(&desk.lumbre(&["render", "scene.pbrt", "-o", "part.pfm", "--crop", "10,5,31,19", "-q"])), 0);
+    let read = |name: &str| {
+        let image = lumbre::read_image(&desk.path(name)).unwrap();
+        (image.width(), image.height(), image)
+    };
+    let (_, _, whole) = read("whole.pfm");
+    let (width, height, part) = read("part.pfm");
+    assert_eq!((width, height), (21, 14));
+    for y in 0..height {
+        for x in 0..width {
+            assert_eq!(part.pixel(x, y), whole.pixel(x + 10, y + 5), "({x}, {y})");
+        }
+    }
+}
+
+#[test]
+fn a_broken_scene_is_refused_with_its_place() {
+    let desk = Desk::new();
+    desk.write("broken.pbrt", "WorldBegin\n  Shape \"sphere\" \"float radius\" -2\n");
+    for command in ["render", "info"] {
+        let out = desk.lumbre(&[command, "broken.pbrt"]);
+        assert_eq!(code(&out), 3, "{}", stderr(&out));
+        let first = stderr(&out).lines().next().unwrap_or_default().to_owned();
+        assert!(first.starts_with("error: broken.pbrt:2:"), "{first}");
+    }
+}
+
+#[test]
+fn an_unknown_parameter_is_a_warning_unless_strict() {
+    let desk = Desk::new();
+    desk.write("scene.pbrt", &SPHERE.replace("\"float radius\"", "\"float raduis\" 2 \"float radius\""));
+    let out = desk.lumbre(&["render", "scene.pbrt", "-o", "a.png"]);
+    assert_eq!(code(&out), 0);
+    let warning = stderr(&out).lines().find(|line| line.starts_with("warning: ")).unwrap_or_default().to_owned();
+    assert!(warning.starts_with("warning: scene.pbrt:9:"), "{}", stderr(&out));
+    assert!(warning.contains("raduis") && warning.contains("radius"), "{warning}");
+    assert_eq!(code(&desk.lumbre(&["render", "scene.pbrt", "-o", "a.png", "--strict"])), 3);
+}
+
+#[test]
+fn files_that_cannot_be_read_or_written_end_with_four() {
+    let desk = Desk::new();
+    desk.write("scene.pbrt", SPHERE);
+    fs::create_dir(desk.path("folder.png")).unwrap();
+    for arguments in [
+        &["render", "missing.pbrt"][..],
+        &["render", "scene.pbrt", "-o", "nowhere/at/all.png"],
+        &["render", "scene.pbrt", "-o", "folder.png"],
+        &["info", "missing.pbrt"],
+        &["diff", "missing.exr", "missing.exr"],
+        &["cast", "scene.pbrt", "--rays", "missing.csv"],
+    ] {
+        let start = Instant::now();
+        let out = desk.lumbre(arguments);
+        assert_eq!(code(&out), 4, "{arguments:?}: {}", stderr(&out));
+        assert!(stderr(&out).starts_with("error: "), "{arguments:?}: {}", stderr(&out));
+        assert!(start.elapsed() < Duration::from_secs(20));
+    }
+}
+
+#[test]
+fn wrong_usage_ends_with_two() {
+    let desk = Desk::new();
+    for arguments in [
+        &["rendr", "scene.pbrt"][..],
+        &["render"],
+        &["render", "scene.pbrt", "--spp", "0"],
+        &["render", "scene.pbrt", "--size", "12"],
+        &["render", "scene.pbrt", "--time", "soon"],
+        &["diff", "a.png"],
+        &["cast", "scene.pbrt"],
+    ] {
+        let out = desk.lumbre(arguments);
+        assert_eq!(code(&out), 2, "{arguments:?}: {}", stderr(&out));
+    }
+}
+
+#[test]
+fn info_counts_what_is_there() {
+    let desk = Desk::new();
+    desk.write("scene.pbrt", &format!("{SPHERE}\nShape \"box\"\nShape \"sphere\" \"float radius\" 2\nLightSource \"point\"\n"));
+    let out = desk.lumbre(&["info", "scene.pbrt", "--json"]);
+    assert_eq!(code(&out), 0, "{}", stderr(&out));
+    let info: Value = serde_json::from_str(&stdout(&out)).unwrap();
+    assert_eq!(info["shapes"]["sphere"].as_u64(), Some(2), "{info}");
+    assert_eq!(info["shapes"]["box"].as_u64(), Some(1));
+    assert_eq!((info["lights"]["infinite"].as_u64(), info["lights"]["point"].as_u64()), (Some(1), Some(1)));
+    assert_eq!(info["materials"]["diffuse"].as_u64(), Some(1));
+    assert_eq!((info["triangles"].as_u64(), info["instances"].as_u64()), (Some(0), Some(0)));
+    assert_eq!(info["cameras"].as_array().map(Vec::len), Some(1));
+    assert_eq!(info["bounds"]["max"][0].as_f64().map(f64::round), Some(2.0));
+    assert!(info["warnings"].as_array().unwrap().is_empty());
+    let plain = desk.lumbre(&["info", "scene.pbrt"]);
+    assert!(stdout(&plain).contains("2 sphere"), "{}", stdout(&plain));
+}
+
+#[test]
+fn a_difference_above_its_limit_ends_with_one() {
+    let desk = Desk::new();
+    desk.write("scene.pbrt", SPHERE);
+    for (name, seed) in [("a.exr", "1"), ("b.exr", "2")] {
+        assert_eq!(code(&desk.lumbre(&["render", "scene.pbrt", "-o", name, "--seed", seed, "-q"])), 0);
+    }
+    for metric in ["rmse", "relmse", "mae", "max", "flip"] {
+        let same = desk.lumbre(&["diff", "a.exr", "a.exr", "--metric", metric, "--fail-above", "0"]);
+        assert_eq!((code(&same), stdout(&same).trim()), (0, "0"), "{metric}");
+        let other = desk.lumbre(&["diff", "a.exr", "b.exr", "--metric", metric, "--fail-above", "1e-9", "-o", "heat.png"]);
+        assert_eq!(code(&other), 1, "{metric}: {}", stdout(&other));
+        assert!(stdout(&other).trim().parse::<f64>().unwrap() > 0.0);
+        assert!(desk.path("heat.png").exists());
+    }
+}
+
+#[test]
+fn rays_are_answered_from_text_and_arrays_alike() {
+    let desk = Desk::new();
+    desk.write("scene.pbrt", "WorldBegin\nShape \"sphere\" \"point3 center\" [1 2 3] \"float radius\" 2\n");
+    desk.write("rays.csv", "ox,oy,oz,dx,dy,dz\n1,2,-5,0,0,2\n1,2,3,0,0.5,0\n9,9,9,0,0,1\n");
+    let closest = desk.lumbre(&["cast", "scene.pbrt", "--rays", "rays.csv"]);
+    assert_eq!(
+        stdout(&closest).lines().collect::<Vec<_>>()[0],
+        "ray,hit,t,px,py,pz,nx,ny,nz,u,v,front,shape,prim,instance"
+    );
+    let rows: Vec<Vec<String>> =
+        stdout(&closest).lines().skip(1).map(|l| l.split(',').map(str::to_owned).collect()).collect();
+    assert_eq!(rows[0][..9], ["0", "1", "3.0", "1.0", "2.0", "1.0", "0.0", "0.0", "-1.0"].map(str::to_owned));
+    assert_eq!((rows[0][11].as_str(), rows[1][2].as_str(), rows[1][11].as_str()), ("1", "4.0", "0"));
+    assert_eq!(stdout(&closest).lines().nth(3), Some("2,0,,,,,,,,,,,,,"));
+    let count = desk.lumbre(&["cast", "scene.pbrt", "--rays", "rays.csv", "--query", "count"]);
+    assert_eq!(stdout(&count), "ray,count\n0,2\n1,1\n2,0\n");
+    let any = desk.lumbre(&["cast", "scene.pbrt", "--rays", "rays.csv", "--query", "any"]);
+    assert_eq!(stdout(&any), "ray,hit\n0,1\n1,1\n2,0\n");
+    let all = desk.lumbre(&["cast", "scene.pbrt", "--rays", "rays.csv", "--query", "all"]);
+    assert_eq!(stdout(&all).lines().count(), 4);
+
+    let mut npy = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
+    let header = "{'descr': '<f8', 'fortran_order': False, 'shape': (3, 6), }";
+    npy.extend(format!("{header:<117}\n").bytes());
+    for v in [1.0, 2.0, -5.0, 0.0, 0.0, 2.0, 1.0, 2.0, 3.0, 0.0, 0.5, 0.0, 9.0, 9.0, 9.0, 0.0, 0.0, 1.0f64] {
+        npy.extend(v.to_le_bytes());
+    }
+    fs::write(desk.path("rays.npy"), npy).unwrap();
+    let array = desk.lumbre(&["cast", "scene.pbrt", "--rays", "rays.npy"]);
+    assert_eq!(stdout(&array), stdout(&closest), "{}", stderr(&array));
+    for name in ["hits.npy", "hits.npz", "hits.csv"] {
+        let out = desk.lumbre(&["cast", "scene.pbrt", "--rays", "rays.npy", "-o", name]);
+        assert_eq!(code(&out), 0, "{}", stderr(&out));
+        assert!(fs::metadata(desk.path(name)).unwrap().len() > 100);
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_render_saves_what_is_there() {
+    for (signal, status) in [("INT", 130), ("TERM", 143)] {
+        let desk = Desk::new();
+        desk.write("scene.pbrt", SPHERE);
+        let mut child = Command::new(env!("CARGO_BIN_EXE_lumbre"))
+            .args(["render", "scene.pbrt", "-o", "a.png", "--spp", "100000000", "--progress", "plain"])
+            .current_dir(desk.folder.path())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        std::thread::sleep(Duration::from_millis(1500));
+        let sent = Command::new("kill").args([format!("-{signal}"), child.id().to_string()]).status().unwrap();
+        assert!(sent.success());
+        let start = Instant::now();
+        let ended = loop {
+            if let Some(ended) = child.try_wait().unwrap() {
+                break ended;
+            }
+            assert!(start.elapsed() < Duration::from_secs(30), "it goes on after SIG{signal}");
+            std::thread::sleep(Duration::from_millis(20));
+        };
+        assert_eq!(ended.code(), Some(status));
+        let image = lumbre::read_image(&desk.path("a.png")).unwrap();
+        assert!(image.pixels().iter().any(|p| p.max_component() > 0.1), "the picture is black");
+    }
+}
+
+#[test]
+fn every_scene_has_the_same_bytes_from_any_number_of_threads() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
+    let mut scenes = Vec::new();
+    for folder in fs::read_dir(&root).unwrap() {
+        for file in fs::read_dir(folder.unwrap().path()).unwrap() {
+            let path = file.unwrap().path();
+            if path.extension().is_some_and(|e| e == "pbrt") {
+                scenes.push(path);
+            }
+        }
+    }
+    assert!(scenes.len() >= 6, "{scenes:?}");
+    let desk = Desk::new();
+    for scene in scenes {
+        let bytes: Vec<Vec<u8>> = ["1", "2", "3", "16"]
+            .iter()
+            .map(|threads| {
+                let scene = scene.to_string_lossy();
+                let out = desk.lumbre(&[
+                    "render", &scene, "-o", "a.exr", "--size", "66x50", "--spp", "3", "--threads", threads, "-q", "--strict",
+                ]);
+                assert_eq!(code(&out), 0, "{scene}: {}", stderr(&out));
+                fs::read(desk.path("a.exr")).unwrap()
+            })
+            .collect();
+        assert!(bytes.iter().all(|b| *b == bytes[0]), "{}", scene.display());
+    }
+}

@@ -1,0 +1,31 @@
+//! Image files.
+
+use std::path::Path;
+
+use lumbre_formats::image::{WriteOptions, open_image};
+use lumbre_formats::{Budget, Diagnostics, Limits};
+use lumbre_image::Image;
+
+use crate::Error;
+
+/// How images are written.
+pub type SaveOptions = WriteOptions;
+
+/// Reads an image file: EXR, PNG, HDR, PFM, JPEG, TGA, BMP or QOI.
+///
+/// # Errors
+/// [`Error::Format`].
+pub fn read_image(path: &Path) -> Result<Image, Error> {
+    let budget = Budget::new(Limits::default());
+    let file = open_image(path, &budget, &mut Diagnostics::new())?;
+    Ok(file.to_image(&budget)?)
+}
+
+/// Writes an image in the format that the path's extension names. The path holds the old file or the whole new one, never
+/// a part.
+///
+/// # Errors
+/// [`Error::Format`].
+pub fn write_image(path: &Path, image: &Image, options: &SaveOptions) -> Result<(), Error> {
+    Ok(lumbre_formats::image::write_image(path, image, options)?)
+}

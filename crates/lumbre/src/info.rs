@@ -1,0 +1,102 @@
+//! What is in a scene, in numbers.
+
+use std::collections::BTreeMap;
+use std::mem::size_of_val;
+
+use lumbre_geometry::Aabb;
+use lumbre_scene::{AreaLightDesc, CameraKind, GeometryDesc, LightDesc, MeshDesc, SceneDesc, ShapeDesc};
+
+/// What is in a scene. Counts are of what the file describes: a shape inside an object counts once, however often the
+/// object is placed.
+#[derive(Clone, Debug, Default)]
+pub struct SceneInfo {
+    /// Shapes by type.
+    pub shapes: BTreeMap<String, u64>,
+    /// Materials by type.
+    pub materials: BTreeMap<String, u64>,
+    /// Lights by type; shapes that shine are `area`.
+    pub lights: BTreeMap<String, u64>,
+    /// Triangles of all meshes, a quad counting as two.
+    pub triangles: u64,
+    /// Objects placed, at any level.
+    pub instances: u64,
+    /// Cameras, by name where they have one, else by type.
+    pub cameras: Vec<String>,
+    /// A box around everything finite, instances included.
+    pub bounds: Option<Aabb>,
+    /// Bytes that the description holds, and the trees over it.
+    pub memory_bytes: u64,
+}
+
+impl SceneInfo {
+    /// Counts what a description holds; bounds and trees are known only once it is built.
+    pub(crate) fn of(desc: &SceneDesc) -> Self {
+        let mut info = Self::default();
+        let objects = desc.objects.iter().flat_map(|object| &object.shapes);
+        for shape in desc.shapes.iter().chain(objects) {
+            info.add_shape(shape);
+        }
+        info.instances =
+            desc.instances.len() as u64 + desc.objects.iter().map(|o| o.instances.len() as u64).sum::<u64>();
+        for material in &desc.materials {
+            *info.materials.entry(material.material.kind.name().to_owned()).or_default() += 1;
+        }
+        for light in &desc.lights {
+            let name = match light {
+                LightDesc::Point { .. } => "point",
+                LightDesc::Spot { .. } => "spot",
+                LightDesc::Distant { .. } => "distant",
+                LightDesc::Infinite { .. } => "infinite",
+            };
+            *info.lights.entry(name.to_owned()).or_default() += 1;
+        }
+        info.cameras = desc
+            .cameras
+            .iter()
+            .map(|camera| {
+                let kind = match camera.kind {
+                    CameraKind::Perspective { .. } => "perspective",
+                    CameraKind::Orthographic { .. } => "orthographic",
+                    CameraKind::Spherical { .. } => "spherical",
+                };
+                camera.name.clone().unwrap_or_else(|| kind.to_owned())
+            })
+            .collect();
+        info
+    }
+
+    fn add_shape(&mut self, shape: &ShapeDesc) {
+        let name = match &shape.geometry {
+            GeometryDesc::Exact(exact) => exact.name(),
+            GeometryDesc::Mesh(mesh) => {
+                self.triangles += mesh.triangles.len() as u64 + 2 * mesh.quads.len() as u64;
+                self.memory_bytes += mesh_bytes(mesh);
+                "mesh"
+            }
+            GeometryDesc::BilinearMesh(mesh) => {
+                self.memory_bytes += mesh_bytes(mesh);
+                "bilinearmesh"
+            }
+            GeometryDesc::Csg(_) => "csg",
+        };
+        *self.shapes.entry(name.to_owned()).or_default() += 1;
+        if let Some(AreaLightDesc { .. }) = shape.area_light {
+            *self.lights.entry("area".to_owned()).or_default() += 1;
+        }
+    }
+}
+
+fn mesh_bytes(mesh: &MeshDesc) -> u64 {
+    fn list<T>(items: &Option<Vec<T>>) -> usize {
+        items.as_ref().map_or(0, |items| size_of_val(items.as_slice()))
+    }
+    let bytes = size_of_val(mesh.positions.as_slice())
+        + size_of_val(mesh.triangles.as_slice())
+        + size_of_val(mesh.quads.as_slice())
+        + list(&mesh.normals)
+        + list(&mesh.uvs)
+        + list(&mesh.tangents)
+        + list(&mesh.colours)
+        + list(&mesh.face_indices);
+    bytes as u64
+}

@@ -1,0 +1,89 @@
+//! A picture that was rendered.
+
+use std::path::Path;
+
+use lumbre_formats::image::{WriteOptions, write_image, write_layers};
+use lumbre_image::{Image, Layer, Layers};
+use lumbre_render::{Feature, PixelBounds, Rendered, Stats};
+
+use crate::{Error, SaveOptions};
+
+/// A picture that was rendered, with what it took.
+#[derive(Clone, Debug)]
+pub struct Picture {
+    pub(crate) rendered: Rendered,
+    pub(crate) whole: (u32, u32),
+}
+
+impl Picture {
+    /// Its pixels, linear.
+    pub fn image(&self) -> &Image {
+        &self.rendered.image
+    }
+
+    /// A feature image, if it was asked for.
+    pub fn feature(&self, feature: Feature) -> Option<&Image> {
+        self.rendered.features.iter().find(|(kind, _)| *kind == feature).map(|(_, image)| image)
+    }
+
+    /// Which pixels of the whole picture it has.
+    pub fn bounds(&self) -> PixelBounds {
+        self.rendered.bounds
+    }
+
+    /// What it took.
+    pub fn stats(&self) -> &Stats {
+        &self.rendered.stats
+    }
+
+    /// Saves it, by the path's extension: .exr, .png, .hdr, .pfm or .jpg.
+    ///
+    /// # Errors
+    /// [`Error::Format`].
+    pub fn save(&self, path: impl AsRef<Path>) -> Result<(), Error> {
+        self.save_with(path.as_ref(), &SaveOptions::default(), &[])
+    }
+
+    /// Saves it with options, and with feature images as layers of an .exr file: `albedo.R`, `normal.X`, `depth.Z`,
+    /// `uv.U` and so on.
+    ///
+    /// # Errors
+    /// [`Error::Format`]; [`Error::Options`] when layers are asked of another format, or were not rendered.
+    pub fn save_with(&self, path: &Path, options: &SaveOptions, layers: &[Feature]) -> Result<(), Error> {
+        let PixelBounds { x0, y0, .. } = self.bounds();
+        let part = (self.image().width(), self.image().height()) != self.whole;
+        let window = part.then_some((x0 as i32, y0 as i32, self.whole.0, self.whole.1));
+        let options = WriteOptions { exr_window: window, ..*options };
+        if layers.is_empty() {
+            return Ok(write_image(path, self.image(), &options)?);
+        }
+        if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("exr")) {
+            return Err(Error::Options(format!("{}: only .exr files hold feature layers", path.display())));
+        }
+        let mut all = Layers::from_image(self.image());
+        for feature in layers {
+            let image = self
+                .feature(*feature)
+                .ok_or_else(|| Error::Options(format!("the {} layer was not rendered", feature.name())))?;
+            for (channel, letter) in channels(*feature).iter().enumerate() {
+                let layer = Layer {
+                    name: format!("{}.{letter}", feature.name()),
+                    samples: image.channel(channel).collect(),
+                    full_precision: true,
+                };
+                all.push(layer).map_err(|layer| Error::Options(format!("layer {} stands twice", layer.name)))?;
+            }
+        }
+        Ok(write_layers(path, &all, &options)?)
+    }
+}
+
+/// The names of a feature's channels.
+fn channels(feature: Feature) -> &'static [&'static str] {
+    match feature {
+        Feature::Albedo => &["R", "G", "B"],
+        Feature::Normal => &["X", "Y", "Z"],
+        Feature::Depth => &["Z"],
+        Feature::Uv => &["U", "V"],
+    }
+}

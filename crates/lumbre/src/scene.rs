@@ -1,0 +1,135 @@
+//! A scene that was opened or built: rays into it, pictures of it.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use lumbre_formats::{Diagnostic, Diagnostics, ReadOptions, open_scenes};
+use lumbre_geometry::Ray;
+use lumbre_kernel::Hit;
+use lumbre_render::{CancelToken, NoProgress, Progress, RenderOptions, render};
+use lumbre_scene::{Footprint, SceneDesc};
+
+use crate::{CastHit, Error, Picture, SceneInfo};
+
+/// A scene, ready for rays and pictures from any number of threads.
+#[derive(Debug)]
+pub struct Scene {
+    resolved: lumbre_scene::Scene,
+    info: SceneInfo,
+    build_time: Duration,
+}
+
+/// Opens a scene file: .pbrt (also .gz), .obj, .ply or .stl. Warnings are dropped; [`open_with`] returns them.
+///
+/// # Errors
+/// [`Error::Format`] with the place of what is wrong, and [`Error::Build`].
+pub fn open(path: impl AsRef<Path>) -> Result<Scene, Error> {
+    Ok(open_with(&[path.as_ref()], &ReadOptions::default())?.0)
+}
+
+/// Opens one or more files as one scene, read one after another, and returns what there was to say about them.
+///
+/// # Errors
+/// As [`open`]; with [`lumbre_formats::Strictness::Strict`], warnings too.
+pub fn open_with(paths: &[&Path], options: &ReadOptions) -> Result<(Scene, Diagnostics), Error> {
+    let (desc, mut diagnostics) = open_scenes(paths, options)?;
+    let scene = Scene::from_description(desc)?;
+    for warning in scene.resolved.warnings() {
+        diagnostics.push(Diagnostic::warning(warning.to_string()));
+    }
+    Ok((scene, diagnostics))
+}
+
+impl Scene {
+    /// Resolves a description.
+    ///
+    /// # Errors
+    /// [`Error::Build`], naming the shape, camera or light at fault.
+    pub fn from_description(desc: SceneDesc) -> Result<Self, Error> {
+        let mut info = SceneInfo::of(&desc);
+        let start = Instant::now();
+        let resolved = lumbre_scene::Scene::build(desc)?;
+        let build_time = start.elapsed();
+        let bounds = resolved.bounds();
+        info.bounds = (!bounds.is_empty()).then_some(bounds);
+        info.memory_bytes += resolved.accel().memory_bytes() as u64;
+        Ok(Self { resolved, info, build_time })
+    }
+
+    /// The nearest hit in the ray's range.
+    pub fn closest(&self, ray: &Ray) -> Option<CastHit> {
+        self.resolved.accel().closest(ray).map(|hit| self.cast_hit(ray, &hit))
+    }
+
+    /// Whether the ray's range holds a hit.
+    pub fn any(&self, ray: &Ray) -> bool {
+        self.resolved.accel().any(ray)
+    }
+
+    /// Every hit in the ray's range, by t, until `visit` breaks.
+    pub fn all(&self, ray: &Ray, mut visit: impl FnMut(CastHit) -> ControlFlow<()>) {
+        self.resolved.accel().all(ray, |hit| visit(self.cast_hit(ray, hit)));
+    }
+
+    /// How many hits the ray's range holds.
+    pub fn count(&self, ray: &Ray) -> usize {
+        self.resolved.accel().count(ray)
+    }
+
+    fn cast_hit(&self, ray: &Ray, hit: &Hit) -> CastHit {
+        let at = self.resolved.interaction(ray, hit, &Footprint::Point);
+        CastHit {
+            t: hit.root.t,
+            point: at.surface.point,
+            normal: at.surface.normal,
+            uv: at.surface.uv,
+            front: at.front,
+            shape: at.shape,
+            primitive: at.primitive,
+            instance: hit.instances.first().copied(),
+        }
+    }
+
+    /// What the scene itself asks a picture of it to be.
+    pub fn options(&self) -> RenderOptions {
+        RenderOptions::of(&self.resolved)
+    }
+
+    /// A picture.
+    ///
+    /// # Errors
+    /// [`Error::Options`] when the options make no picture.
+    pub fn render(&self, options: &RenderOptions) -> Result<Picture, Error> {
+        self.render_with(options, &NoProgress, &CancelToken::new())
+    }
+
+    /// A picture, with someone watching; `cancel` ends it with what is there.
+    ///
+    /// # Errors
+    /// As [`Scene::render`].
+    pub fn render_with(
+        &self,
+        options: &RenderOptions,
+        progress: &dyn Progress,
+        cancel: &CancelToken,
+    ) -> Result<Picture, Error> {
+        let rendered = render(&self.resolved, options, progress, cancel).map_err(|e| Error::Options(e.to_string()))?;
+        Ok(Picture { rendered, whole: (options.width, options.height) })
+    }
+
+    /// What is in the scene, in numbers.
+    pub fn info(&self) -> &SceneInfo {
+        &self.info
+    }
+
+    /// How long it took to build the trees and the lights.
+    pub fn build_time(&self) -> Duration {
+        self.build_time
+    }
+
+    /// The scene as light transport sees it.
+    pub fn resolved(&self) -> &lumbre_scene::Scene {
+        &self.resolved
+    }
+}

@@ -1,0 +1,89 @@
+//! Benchmarks against peers, alternating in one run.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Instant;
+
+use anyhow::{Context, Result, bail};
+use clap::Subcommand;
+
+use crate::command::{release_program, root, run, succeeds};
+
+/// What can be measured.
+#[derive(Subcommand)]
+pub enum Bench {
+    /// Rays a second of the kernel on meshes and exact shapes.
+    Kernel,
+    /// The field of exact shapes, against POV-Ray where it is on the PATH.
+    Field {
+        /// A POV-Ray scene of the same field.
+        #[arg(long)]
+        pov: Option<PathBuf>,
+        /// How often each program runs.
+        #[arg(long, default_value_t = 3)]
+        runs: usize,
+        /// Threads of each program.
+        #[arg(long, default_value_t = 2)]
+        threads: usize,
+    },
+}
+
+impl Bench {
+    /// Measures and prints a table.
+    pub fn run(self) -> Result<()> {
+        match self {
+            Self::Kernel => {
+                run("cargo", &["run", "--release", "--package", "lumbre-kernel", "--example", "kernel_speed"])
+            }
+            Self::Field { pov, runs, threads } => field(pov.as_deref(), runs, threads),
+        }
+    }
+}
+
+/// Times whole commands: reading, building, rendering and writing all count.
+fn field(pov: Option<&Path>, runs: usize, threads: usize) -> Result<()> {
+    let program = release_program()?;
+    let folder = root().join("target").join("bench");
+    std::fs::create_dir_all(&folder)?;
+    let threads_text = threads.to_string();
+    let lumbre = |_: usize| {
+        let mut command = Command::new(&program);
+        command.arg("render").arg(root().join("scenes/field/field.pbrt"));
+        command.arg("-o").arg(folder.join("lumbre.png"));
+        command.args(["--threads", &threads_text, "--progress", "none", "-q"]);
+        seconds(&mut command)
+    };
+    let peer = pov.filter(|_| succeeds("povray", &["--version"]));
+    if peer.is_none() {
+        println!("POV-Ray is left out: it needs povray on the PATH and a scene by --pov");
+    }
+    let mut ratios = Vec::new();
+    for turn in 0..runs {
+        let ours = lumbre(turn)?;
+        let Some(scene) = peer else {
+            println!("run {turn}: Lumbre {ours:.2} s");
+            continue;
+        };
+        let mut command = Command::new("povray");
+        command.arg(format!("+I{}", scene.display()));
+        command.arg(format!("+O{}", folder.join("povray.png").display()));
+        command.args(["+W1280", "+H720", &format!("+WT{threads}"), "+A0.1", "+AM2", "+R3", "-D"]);
+        let theirs = seconds(&mut command)?;
+        ratios.push(theirs / ours);
+        println!("run {turn}: Lumbre {ours:.2} s, POV-Ray {theirs:.2} s, ratio {:.2}", theirs / ours);
+    }
+    ratios.sort_by(f64::total_cmp);
+    if let (Some(first), Some(last)) = (ratios.first(), ratios.last()) {
+        println!("median ratio {:.2} ({first:.2} to {last:.2})", ratios[ratios.len() / 2]);
+    }
+    Ok(())
+}
+
+fn seconds(command: &mut Command) -> Result<f64> {
+    let start = Instant::now();
+    let out = command.output().with_context(|| format!("cannot start {:?}", command.get_program()))?;
+    if !out.status.success() {
+        bail!("{:?} failed: {}", command.get_program(), String::from_utf8_lossy(&out.stderr));
+    }
+    Ok(start.elapsed().as_secs_f64())
+}

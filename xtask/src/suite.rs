@@ -1,0 +1,41 @@
+//! The test command: everything that must hold before a change lands.
+
+use anyhow::Result;
+
+use crate::command::{self, root, run_with, succeeds};
+
+/// The version of cargo-deny that the gate was written for.
+const CARGO_DENY: &str = "0.20.2";
+
+/// Runs it all, cheapest first, and stops at the first failure.
+pub fn run() -> Result<()> {
+    for component in ["rustfmt", "clippy"] {
+        let subcommand = if component == "rustfmt" { "fmt" } else { component };
+        if !succeeds("cargo", &[subcommand, "--version"]) {
+            command::run("rustup", &["component", "add", component])?;
+        }
+    }
+    command::run("cargo", &["fmt", "--all", "--check"])?;
+    command::run("cargo", &["clippy", "--workspace", "--all-targets", "--", "--deny", "warnings"])?;
+    command::run("cargo", &["test", "--workspace", "--all-targets"])?;
+    command::run("cargo", &["test", "--workspace", "--doc"])?;
+    run_with("cargo", &["doc", "--workspace", "--no-deps"], &[("RUSTDOCFLAGS", "--deny warnings")])?;
+    deny()
+}
+
+/// Licences, sources and bans of every dependency.
+fn deny() -> Result<()> {
+    let check = ["check", "licenses", "bans", "sources"];
+    if succeeds("cargo", &["deny", "--version"]) {
+        return command::run("cargo", &[&["deny"], &check[..]].concat());
+    }
+    let tools = root().join("target").join("tools");
+    let tools_argument = tools.to_string_lossy().into_owned();
+    let program = tools.join("bin").join("cargo-deny");
+    let program = program.to_string_lossy().into_owned();
+    if !succeeds(&program, &["--version"]) {
+        let version = format!("cargo-deny@{CARGO_DENY}");
+        command::run("cargo", &["install", "--locked", "--root", &tools_argument, &version])?;
+    }
+    command::run(&program, &check)
+}
