@@ -34,7 +34,8 @@ fn picture(width: u32, height: u32, at: impl Fn(f64, f64) -> Rgb) -> Image {
         let (x, y) = (i % width, i / width);
         at((f64::from(x) + 0.5) / f64::from(width), 1.0 - (f64::from(y) + 0.5) / f64::from(height))
     };
-    Image::from_pixels(width, height, (0..width * height).map(pixel).collect()).expect("as many pixels as the image has")
+    Image::from_pixels(width, height, (0..width * height).map(pixel).collect())
+        .expect("as many pixels as the image has")
 }
 
 /// Radius and height of the vase's outline, from the foot over the lip to the inside.
@@ -64,7 +65,10 @@ fn outline(s: f64) -> (f64, f64) {
     let f = x - i as f64;
     let point = |k: isize| OUTLINE[(i as isize + k).clamp(0, last as isize) as usize];
     let spline = |a: f64, b: f64, c: f64, d: f64| {
-        0.5 * (2.0 * b + (c - a) * f + (2.0 * a - 5.0 * b + 4.0 * c - d) * f * f + (3.0 * b - a - 3.0 * c + d) * f * f * f)
+        0.5 * (2.0 * b
+            + (c - a) * f
+            + (2.0 * a - 5.0 * b + 4.0 * c - d) * f * f
+            + (3.0 * b - a - 3.0 * c + d) * f * f * f)
     };
     let (a, b, c, d) = (point(-1), point(0), point(1), point(2));
     (spline(a.0, b.0, c.0, d.0).max(0.0), spline(a.1, b.1, c.1, d.1))
@@ -127,7 +131,9 @@ fn inks(u: f64, v: f64) -> (f64, f64) {
 
 fn tile_colour(u: f64, v: f64) -> Rgb {
     let (blue, ochre) = inks(u, v);
-    Rgb::new(0.8, 0.77, 0.69).lerp(Rgb::new(0.82, 0.42, 0.07), ochre as f32).lerp(Rgb::new(0.03, 0.11, 0.36), blue as f32)
+    Rgb::new(0.8, 0.77, 0.69)
+        .lerp(Rgb::new(0.82, 0.42, 0.07), ochre as f32)
+        .lerp(Rgb::new(0.03, 0.11, 0.36), blue as f32)
 }
 
 /// A glaze that stands a little proud where there is ink, as a tangent-space normal in [0, 1].
@@ -152,7 +158,8 @@ fn dusk(u: f64, v: f64) -> Rgb {
     let up = elevation.sin();
     let horizon = (-(up.max(0.0) * 5.0)).exp();
     let warm = (-from_sun * 1.3).exp();
-    let sky = Rgb::new(0.1, 0.19, 0.42).lerp(Rgb::new(1.0, 0.42, 0.16), (horizon * (0.35 + 0.65 * warm)) as f32);
+    let sky =
+        Rgb::new(0.1, 0.19, 0.42).lerp(Rgb::new(1.0, 0.42, 0.16), (horizon * (0.35 + 0.65 * warm)) as f32);
     let glow = Rgb::new(3.2, 1.7, 0.7) * (-(from_sun / 0.16).powi(2)).exp() as f32;
     let sun = Rgb::new(230.0, 150.0, 75.0) * if from_sun < 0.045 { 1.0 } else { 0.0 };
     let ground = Rgb::new(0.07, 0.055, 0.045);

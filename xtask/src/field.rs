@@ -21,7 +21,10 @@ impl Random {
     fn material(&mut self) -> String {
         let colour = [0; 3].map(|_| self.next() * 0.8 + 0.2);
         let mirror = 0.2 * self.next();
-        mirrored(&format!("\"rgb reflectance\" [{}]", triple(colour.map(|c| 0.7 * c / (1.0 - mirror)))), mirror)
+        mirrored(
+            &format!("\"rgb reflectance\" [{}]", triple(colour.map(|c| 0.7 * c / (1.0 - mirror)))),
+            mirror,
+        )
     }
 }
 

@@ -44,7 +44,10 @@ fn arrows(metadata: &serde_json::Value) -> BTreeMap<String, Vec<String>> {
         .collect()
 }
 
-fn upward<'a>(arrows: &'a BTreeMap<String, Vec<String>>, floors: &BTreeMap<&str, u32>) -> Vec<(&'a str, &'a str)> {
+fn upward<'a>(
+    arrows: &'a BTreeMap<String, Vec<String>>,
+    floors: &BTreeMap<&str, u32>,
+) -> Vec<(&'a str, &'a str)> {
     let mut found = Vec::new();
     for (from, targets) in arrows {
         for to in targets {

@@ -47,10 +47,9 @@ impl Failure {
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Usage(message)
-            | Self::Input(message)
-            | Self::Io(message)
-            | Self::Limit(message) => f.write_str(message),
+            Self::Usage(message) | Self::Input(message) | Self::Io(message) | Self::Limit(message) => {
+                f.write_str(message)
+            }
             Self::Interrupted(_) => f.write_str("interrupted"),
             Self::Different => f.write_str("the difference is above its limit"),
         }

@@ -50,14 +50,21 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let count = |title: &str, counts: &BTreeMap<String, u64>| {
         let total: u64 = counts.values().sum();
         let each: Vec<String> = counts.iter().map(|(name, n)| format!("{n} {name}")).collect();
-        println!("{title:<11}{total}{}", if each.is_empty() { String::new() } else { format!(": {}", each.join(", ")) });
+        println!(
+            "{title:<11}{total}{}",
+            if each.is_empty() { String::new() } else { format!(": {}", each.join(", ")) }
+        );
     };
     count("shapes", &info.shapes);
     println!("{:<11}{}", "triangles", info.triangles);
     println!("{:<11}{}", "instances", info.instances);
     count("materials", &info.materials);
     count("lights", &info.lights);
-    println!("{:<11}{}", "cameras", if info.cameras.is_empty() { "none: one is made".into() } else { info.cameras.join(", ") });
+    println!(
+        "{:<11}{}",
+        "cameras",
+        if info.cameras.is_empty() { "none: one is made".into() } else { info.cameras.join(", ") }
+    );
     match info.bounds {
         Some(b) => println!("{:<11}{} to {}", "bounds", b.min, b.max),
         None => println!("{:<11}nothing finite", "bounds"),

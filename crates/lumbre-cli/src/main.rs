@@ -14,8 +14,6 @@ mod reading;
 mod render;
 mod units;
 
-
-
 /// Renders scenes, casts rays into them, says what is in them, and compares pictures.
 #[derive(Parser)]
 #[command(name = "lumbre", version, about, max_term_width = 110)]

@@ -131,7 +131,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let options = options(arguments, &scene)?;
 
     let cancel = CancelToken::new();
-    let signals = Signals::listen(&cancel).map_err(|e| Failure::Io(format!("cannot listen for signals: {e}")))?;
+    let signals =
+        Signals::listen(&cancel).map_err(|e| Failure::Io(format!("cannot listen for signals: {e}")))?;
     let style = if arguments.quiet { Style::None } else { arguments.progress };
     let display = Display::new(style);
     let render_start = Instant::now();
@@ -140,7 +141,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     display.finish();
 
     let save_start = Instant::now();
-    let save = SaveOptions { tone_map: arguments.tonemap, exposure: arguments.exposure, ..SaveOptions::default() };
+    let save =
+        SaveOptions { tone_map: arguments.tonemap, exposure: arguments.exposure, ..SaveOptions::default() };
     picture.save_with(&output, &save, &arguments.aov)?;
     let save_time = save_start.elapsed();
     report_dropped(&picture);
@@ -186,7 +188,11 @@ fn default_output(scene: &Scene, path: &Path) -> PathBuf {
         let stem = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
         let stem = stem.strip_suffix(".gz").unwrap_or(&stem);
         let stem = Path::new(stem).file_stem().map_or_else(|| "picture".into(), |s| s.to_os_string());
-        if stem == "-" { PathBuf::from("picture.png") } else { PathBuf::from(stem).with_added_extension("png") }
+        if stem == "-" {
+            PathBuf::from("picture.png")
+        } else {
+            PathBuf::from(stem).with_added_extension("png")
+        }
     })
 }
 
@@ -274,7 +280,10 @@ impl Signals {
 fn report_dropped(picture: &Picture) {
     let stats = picture.stats();
     for sample in &stats.first_dropped {
-        eprintln!("warning: pixel ({}, {}), sample {}: not finite, dropped", sample.x, sample.y, sample.sample);
+        eprintln!(
+            "warning: pixel ({}, {}), sample {}: not finite, dropped",
+            sample.x, sample.y, sample.sample
+        );
     }
     let unsaid = stats.dropped.saturating_sub(stats.first_dropped.len() as u64);
     if unsaid > 0 {
@@ -282,7 +291,12 @@ fn report_dropped(picture: &Picture) {
     }
 }
 
-fn statistics(scene: &Scene, picture: &Picture, seconds: serde_json::Value, warnings: Vec<String>) -> serde_json::Value {
+fn statistics(
+    scene: &Scene,
+    picture: &Picture,
+    seconds: serde_json::Value,
+    warnings: Vec<String>,
+) -> serde_json::Value {
     let stats = picture.stats();
     let accel = scene.resolved().accel();
     let primitives = accel.primitive_count();
@@ -337,7 +351,11 @@ fn summary(verbose: bool, scene: &Scene, picture: &Picture, output: &Path, rende
             rays.bounce,
             rays.shadow
         );
-        eprintln!("{} primitives, tree built in {}", scene.resolved().accel().primitive_count(), spoken(scene.build_time()));
+        eprintln!(
+            "{} primitives, tree built in {}",
+            scene.resolved().accel().primitive_count(),
+            spoken(scene.build_time())
+        );
         if let Some(noise) = stats.noise {
             eprintln!("noise {noise:.4}");
         }

@@ -7,7 +7,8 @@ use std::time::Duration;
 /// # Errors
 /// What was expected.
 pub fn size(text: &str) -> Result<(u32, u32), String> {
-    let wrong = || format!("found \"{text}\"; expected WIDTHxHEIGHT in pixels, each from 1 to 65536, as 640x480");
+    let wrong =
+        || format!("found \"{text}\"; expected WIDTHxHEIGHT in pixels, each from 1 to 65536, as 640x480");
     let (width, height) = text.split_once(['x', 'X']).ok_or_else(wrong)?;
     let side = |s: &str| s.trim().parse().ok().filter(|n| (1..=65_536).contains(n));
     Ok((side(width).ok_or_else(wrong)?, side(height).ok_or_else(wrong)?))
@@ -28,7 +29,9 @@ pub enum Crop {
 /// What was expected.
 pub fn crop(text: &str) -> Result<Crop, String> {
     let wrong = || {
-        format!("found \"{text}\"; expected x0,y0,x1,y1 with x0 < x1 and y0 < y1, in pixels (10,20,110,95) or in fractions (0.25,0.25,0.5,0.5)")
+        format!(
+            "found \"{text}\"; expected x0,y0,x1,y1 with x0 < x1 and y0 < y1, in pixels (10,20,110,95) or in fractions (0.25,0.25,0.5,0.5)"
+        )
     };
     let parts: Vec<&str> = text.split(',').map(str::trim).collect();
     if parts.len() != 4 {
@@ -59,7 +62,8 @@ pub fn duration(text: &str) -> Result<Duration, String> {
     while !rest.is_empty() {
         let number_end = rest.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(rest.len());
         let value: f64 = rest[..number_end].parse().map_err(|_| wrong())?;
-        let unit_end = rest[number_end..].find(|c: char| c.is_ascii_digit()).map_or(rest.len(), |n| number_end + n);
+        let unit_end =
+            rest[number_end..].find(|c: char| c.is_ascii_digit()).map_or(rest.len(), |n| number_end + n);
         seconds += value
             * match rest[number_end..unit_end].trim() {
                 "" | "s" => 1.0,
@@ -71,7 +75,11 @@ pub fn duration(text: &str) -> Result<Duration, String> {
             };
         rest = &rest[unit_end..];
     }
-    if text.trim().is_empty() { Err(wrong()) } else { Duration::try_from_secs_f64(seconds).map_err(|_| wrong()) }
+    if text.trim().is_empty() {
+        Err(wrong())
+    } else {
+        Duration::try_from_secs_f64(seconds).map_err(|_| wrong())
+    }
 }
 
 /// `8G`, `512M`, `100k`; a bare number is bytes. Powers of 1024.

@@ -50,7 +50,9 @@ fn scene(record: &Value) -> String {
     }
     let p = |name: &str| text(&record["params"][name]);
     let shape = match record["shape"].as_str().unwrap() {
-        "sphere" => format!("\"sphere\" \"point3 center\" [{}] \"float radius\" {}", p("center"), p("radius")),
+        "sphere" => {
+            format!("\"sphere\" \"point3 center\" [{}] \"float radius\" {}", p("center"), p("radius"))
+        }
         "plane" => format!("\"plane\" \"point3 point\" [{}] \"normal normal\" [{}]", p("point"), p("normal")),
         "disk" => format!(
             "\"disk\" \"point3 center\" [{}] \"normal normal\" [{}] \"float radius\" {} \"float innerradius\" {}",
@@ -90,7 +92,12 @@ fn scene(record: &Value) -> String {
             p("minor")
         ),
         "triangle" => {
-            format!("\"triangle\" \"point3 p0\" [{}] \"point3 p1\" [{}] \"point3 p2\" [{}]", p("a"), p("b"), p("c"))
+            format!(
+                "\"triangle\" \"point3 p0\" [{}] \"point3 p1\" [{}] \"point3 p2\" [{}]",
+                p("a"),
+                p("b"),
+                p("c")
+            )
         }
         other => panic!("unknown shape {other}"),
     };

@@ -99,7 +99,8 @@ fn each_extension_makes_its_format_and_all_hold_the_same_picture() {
 fn statistics_have_what_scripts_rely_on() {
     let desk = Desk::new();
     desk.write("scene.pbrt", SPHERE);
-    let out = desk.lumbre(&["render", "scene.pbrt", "-o", "a.png", "--stats", "stats.json", "--threads", "2"]);
+    let out =
+        desk.lumbre(&["render", "scene.pbrt", "-o", "a.png", "--stats", "stats.json", "--threads", "2"]);
     assert_eq!(code(&out), 0, "{}", stderr(&out));
     let stats: Value = serde_json::from_slice(&fs::read(desk.path("stats.json")).unwrap()).unwrap();
     for phase in ["load", "build", "render", "save"] {
@@ -123,7 +124,18 @@ fn options_win_over_the_scene() {
     let desk = Desk::new();
     desk.write("scene.pbrt", SPHERE);
     let out = desk.lumbre(&[
-        "render", "scene.pbrt", "-o", "a.exr", "--size", "30x20", "--spp", "2", "--integrator", "normals", "--stats", "s.json",
+        "render",
+        "scene.pbrt",
+        "-o",
+        "a.exr",
+        "--size",
+        "30x20",
+        "--spp",
+        "2",
+        "--integrator",
+        "normals",
+        "--stats",
+        "s.json",
     ]);
     assert_eq!(code(&out), 0, "{}", stderr(&out));
     let stats: Value = serde_json::from_slice(&fs::read(desk.path("s.json")).unwrap()).unwrap();
@@ -139,7 +151,10 @@ fn a_crop_has_the_pixels_of_the_whole() {
     let desk = Desk::new();
     desk.write("scene.pbrt", SPHERE);
     assert_eq!(code(&desk.lumbre(&["render", "scene.pbrt", "-o", "whole.pfm", "-q"])), 0);
-    assert_eq!(code(&desk.lumbre(&["render", "scene.pbrt", "-o", "part.pfm", "--crop", "10,5,31,19", "-q"])), 0);
+    assert_eq!(
+        code(&desk.lumbre(&["render", "scene.pbrt", "-o", "part.pfm", "--crop", "10,5,31,19", "-q"])),
+        0
+    );
     let read = |name: &str| {
         let image = lumbre::read_image(&desk.path(name)).unwrap();
         (image.width(), image.height(), image)
@@ -172,7 +187,8 @@ fn an_unknown_parameter_is_a_warning_unless_strict() {
     desk.write("scene.pbrt", &SPHERE.replace("\"float radius\"", "\"float raduis\" 2 \"float radius\""));
     let out = desk.lumbre(&["render", "scene.pbrt", "-o", "a.png"]);
     assert_eq!(code(&out), 0);
-    let warning = stderr(&out).lines().find(|line| line.starts_with("warning: ")).unwrap_or_default().to_owned();
+    let warning =
+        stderr(&out).lines().find(|line| line.starts_with("warning: ")).unwrap_or_default().to_owned();
     assert!(warning.starts_with("warning: scene.pbrt:9:"), "{}", stderr(&out));
     assert!(warning.contains("raduis") && warning.contains("radius"), "{warning}");
     assert_eq!(code(&desk.lumbre(&["render", "scene.pbrt", "-o", "a.png", "--strict"])), 3);
@@ -219,7 +235,10 @@ fn wrong_usage_ends_with_two() {
 #[test]
 fn info_counts_what_is_there() {
     let desk = Desk::new();
-    desk.write("scene.pbrt", &format!("{SPHERE}\nShape \"box\"\nShape \"sphere\" \"float radius\" 2\nLightSource \"point\"\n"));
+    desk.write(
+        "scene.pbrt",
+        &format!("{SPHERE}\nShape \"box\"\nShape \"sphere\" \"float radius\" 2\nLightSource \"point\"\n"),
+    );
     let out = desk.lumbre(&["info", "scene.pbrt", "--json"]);
     assert_eq!(code(&out), 0, "{}", stderr(&out));
     let info: Value = serde_json::from_str(&stdout(&out)).unwrap();
@@ -245,7 +264,17 @@ fn a_difference_above_its_limit_ends_with_one() {
     for metric in ["rmse", "relmse", "mae", "max", "flip"] {
         let same = desk.lumbre(&["diff", "a.exr", "a.exr", "--metric", metric, "--fail-above", "0"]);
         assert_eq!((code(&same), stdout(&same).trim()), (0, "0"), "{metric}");
-        let other = desk.lumbre(&["diff", "a.exr", "b.exr", "--metric", metric, "--fail-above", "1e-9", "-o", "heat.png"]);
+        let other = desk.lumbre(&[
+            "diff",
+            "a.exr",
+            "b.exr",
+            "--metric",
+            metric,
+            "--fail-above",
+            "1e-9",
+            "-o",
+            "heat.png",
+        ]);
         assert_eq!(code(&other), 1, "{metric}: {}", stdout(&other));
         assert!(stdout(&other).trim().parse::<f64>().unwrap() > 0.0);
         assert!(desk.path("heat.png").exists());
@@ -303,7 +332,8 @@ fn an_interrupted_render_saves_what_is_there() {
             .spawn()
             .unwrap();
         std::thread::sleep(Duration::from_millis(1500));
-        let sent = Command::new("kill").args([format!("-{signal}"), child.id().to_string()]).status().unwrap();
+        let sent =
+            Command::new("kill").args([format!("-{signal}"), child.id().to_string()]).status().unwrap();
         assert!(sent.success());
         let start = Instant::now();
         let ended = loop {
@@ -339,7 +369,18 @@ fn every_scene_has_the_same_bytes_from_any_number_of_threads() {
             .map(|threads| {
                 let scene = scene.to_string_lossy();
                 let out = desk.lumbre(&[
-                    "render", &scene, "-o", "a.exr", "--size", "66x50", "--spp", "3", "--threads", threads, "-q", "--strict",
+                    "render",
+                    &scene,
+                    "-o",
+                    "a.exr",
+                    "--size",
+                    "66x50",
+                    "--spp",
+                    "3",
+                    "--threads",
+                    threads,
+                    "-q",
+                    "--strict",
                 ]);
                 assert_eq!(code(&out), 0, "{scene}: {}", stderr(&out));
                 fs::read(desk.path("a.exr")).unwrap()

@@ -35,7 +35,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .shape(ShapeBuilder::exact(ring).material(diffuse(0.15, 0.4, 0.5)))
         .shape(ShapeBuilder::exact(floor))
         .shape(ShapeBuilder::exact(lamp).shining(Rgb::splat(30.0)))
-        .light(LightDesc::Infinite { world_from_light: Transform::IDENTITY, radiance: Rgb::splat(0.3), image: None })
+        .light(LightDesc::Infinite {
+            world_from_light: Transform::IDENTITY,
+            radiance: Rgb::splat(0.3),
+            image: None,
+        })
         .camera(camera)
         .film(FilmDesc { width: Some(640), height: Some(400), ..FilmDesc::default() })
         .build()?;

@@ -6,8 +6,8 @@ use lumbre_geometry::Shape;
 use lumbre_image::Rgb;
 use lumbre_math::Transform;
 use lumbre_scene::{
-    AreaLightDesc, Camera, FilmDesc, GeometryDesc, IntegratorDesc, LightDesc, MaterialId, MeshDesc, NamedMaterial,
-    SamplerDesc, SceneDesc, ShapeDesc,
+    AreaLightDesc, Camera, FilmDesc, GeometryDesc, IntegratorDesc, LightDesc, MaterialId, MeshDesc,
+    NamedMaterial, SamplerDesc, SceneDesc, ShapeDesc,
 };
 use lumbre_shading::Material;
 

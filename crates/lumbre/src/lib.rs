@@ -50,7 +50,8 @@ pub use lumbre_formats::ReadOptions;
 pub use lumbre_geometry::Ray;
 pub use lumbre_math::{DVec2, DVec3, Transform};
 pub use lumbre_render::{
-    CancelToken, Feature, NoProgress, PixelBounds, Progress, RayCounts, RenderOptions, Snapshot, State, Stats, Stop,
+    CancelToken, Feature, NoProgress, PixelBounds, Progress, RayCounts, RenderOptions, Snapshot, State,
+    Stats, Stop,
 };
 pub use picture::Picture;
 pub use scene::{Scene, open, open_with};

@@ -71,7 +71,8 @@ impl Picture {
                     samples: image.channel(channel).collect(),
                     full_precision: true,
                 };
-                all.push(layer).map_err(|layer| Error::Options(format!("layer {} stands twice", layer.name)))?;
+                all.push(layer)
+                    .map_err(|layer| Error::Options(format!("layer {} stands twice", layer.name)))?;
             }
         }
         Ok(write_layers(path, &all, &options)?)

@@ -114,7 +114,8 @@ impl Scene {
         progress: &dyn Progress,
         cancel: &CancelToken,
     ) -> Result<Picture, Error> {
-        let rendered = render(&self.resolved, options, progress, cancel).map_err(|e| Error::Options(e.to_string()))?;
+        let rendered =
+            render(&self.resolved, options, progress, cancel).map_err(|e| Error::Options(e.to_string()))?;
         Ok(Picture { rendered, whole: (options.width, options.height) })
     }
 

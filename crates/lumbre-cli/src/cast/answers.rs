@@ -95,7 +95,8 @@ pub fn write(out: &mut dyn Write, form: Form, answers: &[Answer]) -> io::Result<
     match form {
         Form::Csv => csv(out, answers),
         Form::Npy => {
-            let fields: Vec<String> = COLUMNS.iter().map(|c| format!("('{}', '{}')", c.name, c.kind)).collect();
+            let fields: Vec<String> =
+                COLUMNS.iter().map(|c| format!("('{}', '{}')", c.name, c.kind)).collect();
             let mut bytes = Vec::new();
             for answer in answers {
                 COLUMNS.iter().for_each(|column| (column.bytes)(answer, &mut bytes));

@@ -70,7 +70,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         Some(Some(extension)) if extension == "csv" => Form::Csv,
         Some(Some(extension)) if extension == "npy" => Form::Npy,
         Some(Some(extension)) if extension == "npz" => Form::Npz,
-        Some(_) => return Err(Failure::Usage("-o: expected a name that ends in .csv, .npy or .npz".to_owned())),
+        Some(_) => {
+            return Err(Failure::Usage("-o: expected a name that ends in .csv, .npy or .npz".to_owned()));
+        }
     };
     let rays = read_rays(&arguments.rays)?;
     let (scene, diagnostics) = arguments.reading.open(std::slice::from_ref(&arguments.scene))?;
@@ -86,12 +88,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut bytes = Vec::new();
     answers.write(&mut bytes, form).map_err(|e| Failure::Io(e.to_string()))?;
     match &arguments.output {
-        Some(path) => {
-            atomic_write(path, |file| file.write_all(&bytes)).map_err(|e| Failure::from(lumbre::Error::from(e)))
-        }
+        Some(path) => atomic_write(path, |file| file.write_all(&bytes))
+            .map_err(|e| Failure::from(lumbre::Error::from(e))),
         None => match std::io::stdout().lock().write_all(&bytes) {
             // Whoever reads may stop reading: `lumbre cast … | head`.
-            Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Failure::Io(format!("standard output: {e}"))),
+            Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
+                Err(Failure::Io(format!("standard output: {e}")))
+            }
             _ => Ok(()),
         },
     }
@@ -142,6 +145,8 @@ fn answer(scene: &Scene, query: Query, rays: &[Ray]) -> Answers {
                 })
                 .collect(),
         ),
-        Query::Count => Answers::Numbers("count", numbered().map(|(_, ray)| scene.count(ray) as u64).collect()),
+        Query::Count => {
+            Answers::Numbers("count", numbered().map(|(_, ray)| scene.count(ray) as u64).collect())
+        }
     }
 }

@@ -18,13 +18,15 @@ pub struct Array {
 /// # Errors
 /// A message that says what was found and what is accepted.
 pub fn read(bytes: &[u8]) -> Result<Array, String> {
-    let version = bytes.strip_prefix(b"\x93NUMPY").ok_or("not a .npy file (its first bytes are not \\x93NUMPY)")?;
+    let version =
+        bytes.strip_prefix(b"\x93NUMPY").ok_or("not a .npy file (its first bytes are not \\x93NUMPY)")?;
     let (header_len, start) = match version {
         [1, _, a, b, ..] => (usize::from(u16::from_le_bytes([*a, *b])), 10),
         [2 | 3, _, a, b, c, d, ..] => (u32::from_le_bytes([*a, *b, *c, *d]) as usize, 12),
         _ => return Err("unknown .npy version (expected 1.0, 2.0 or 3.0)".into()),
     };
-    let header = bytes.get(start..).and_then(|rest| rest.get(..header_len)).ok_or("the .npy header is cut off")?;
+    let header =
+        bytes.get(start..).and_then(|rest| rest.get(..header_len)).ok_or("the .npy header is cut off")?;
     let header = std::str::from_utf8(header).map_err(|_| "the .npy header is not text")?;
     let data = &bytes[start + header_len..];
 
@@ -83,7 +85,8 @@ fn entry<'a>(header: &'a str, key: &str) -> Option<&'a str> {
 /// Those of the writer.
 pub fn write(mut out: impl Write, descr: &str, shape: &[usize], bytes: &[u8]) -> io::Result<()> {
     let sizes: String = shape.iter().map(|size| format!("{size}, ")).collect();
-    let mut header = format!("{{'descr': {descr}, 'fortran_order': False, 'shape': ({}), }}", sizes.trim_end());
+    let mut header =
+        format!("{{'descr': {descr}, 'fortran_order': False, 'shape': ({}), }}", sizes.trim_end());
     // The format wants data to begin at a multiple of 64, and the header to end in a line feed.
     let padding = 63 - (10 + header.len()) % 64;
     header.extend(std::iter::repeat_n(' ', padding));
@@ -119,7 +122,8 @@ mod tests {
         let rows = vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
         let big: Vec<u8> = rows.iter().flat_map(|v: &f64| v.to_be_bytes()).collect();
         assert_eq!(read(&file(">f8", "False", big)).unwrap().values, rows);
-        let by_columns: Vec<u8> = [1f32, 4.0, 2.0, 5.0, 3.0, 6.0].iter().flat_map(|v| v.to_le_bytes()).collect();
+        let by_columns: Vec<u8> =
+            [1f32, 4.0, 2.0, 5.0, 3.0, 6.0].iter().flat_map(|v| v.to_le_bytes()).collect();
         assert_eq!(read(&file("<f4", "True", by_columns)).unwrap().values, rows);
     }
 
@@ -134,8 +138,14 @@ mod tests {
             (b"\x93NUMPY\x01\x00\xff\xff{".to_vec(), "cut off"),
             (file("{'descr': '<i8', 'fortran_order': False, 'shape': (1, 6), }"), "element type <i8"),
             (file("{'descr': '<f8', 'fortran_order': False, 'shape': (6,), }"), "two dimensions"),
-            (file("{'descr': '<f8', 'fortran_order': False, 'shape': (9999999999999, 6), }"), "0 bytes of data"),
-            (file("{'descr': '<f8', 'fortran_order': False, 'shape': (4611686018427387904, 6), }"), "0 bytes"),
+            (
+                file("{'descr': '<f8', 'fortran_order': False, 'shape': (9999999999999, 6), }"),
+                "0 bytes of data",
+            ),
+            (
+                file("{'descr': '<f8', 'fortran_order': False, 'shape': (4611686018427387904, 6), }"),
+                "0 bytes",
+            ),
             (file("{'fortran_order': False}"), "no 'descr'"),
         ] {
             let message = read(&bytes).unwrap_err();

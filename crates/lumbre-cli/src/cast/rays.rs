@@ -104,7 +104,9 @@ mod tests {
 
     #[test]
     fn columns_may_stand_in_any_order_and_ranges_are_optional() {
-        let rays = read("rays.csv", b"dx, dy,dz,ox,oy,oz,tmax\r\n0,0,1, 2,3,-4.5,inf\r\n\r\n1,2,3,4,5,6,7e1\r\n").unwrap();
+        let rays =
+            read("rays.csv", b"dx, dy,dz,ox,oy,oz,tmax\r\n0,0,1, 2,3,-4.5,inf\r\n\r\n1,2,3,4,5,6,7e1\r\n")
+                .unwrap();
         assert_eq!(
             rays,
             [
@@ -121,7 +123,10 @@ mod tests {
             ("ox,oy,oz,dx,dy\n", "rays.csv:1:1: no column \"dz\""),
             ("ox,oy,oz,dx,dy,dz,time\n", "rays.csv:1:19: unknown column \"time\""),
             ("ox,oy,oz,dx,dy,dz,ox\n", "rays.csv:1:19: column \"ox\" stands twice"),
-            ("ox,oy,oz,dx,dy,dz\n1,2,3,4,5,6\n1,2,3, four,5,6\n", "rays.csv:3:8: expected a number, found \"four\""),
+            (
+                "ox,oy,oz,dx,dy,dz\n1,2,3,4,5,6\n1,2,3, four,5,6\n",
+                "rays.csv:3:8: expected a number, found \"four\"",
+            ),
             ("ox,oy,oz,dx,dy,dz\n1,2,3\n", "rays.csv:2:6: 3 values (expected 6)"),
             ("ox,oy,oz,dx,dy,dz\n1,2,3,4,5,6,7\n", "rays.csv:2:13: more than the 6 values"),
         ] {
