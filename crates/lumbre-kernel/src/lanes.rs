@@ -1,12 +1,14 @@
-//! The fence around SIMD: the only module with `unsafe`. Outside it, a search is written once, over [`Lanes`].
+//! The fence around SIMD, and around the one array that is not cleared: the only module with `unsafe`. Outside it, a search is written once, over [`Lanes`].
 //!
 //! [`Level::run`] chooses the instruction set once a ray. The code between is generic and `#[inline(always)]` without a
 //! target feature of its own, so that it takes on the features of the root that it is inlined into.
 
 #![allow(unsafe_code)]
 
+use std::mem::MaybeUninit;
+
 use crate::node::{BoxRay, Node, WIDTH};
-use crate::stack::{Entries, STACK, stack_entry};
+use crate::stack::{STACK, stack_entry};
 use crate::triangles::{BLOCK, Shear, TriangleBlock};
 
 /// What a search does eight boxes or four triangles at a time.
@@ -17,8 +19,8 @@ pub(crate) trait Lanes {
     /// One bit for each child whose box the ray meets, and where it enters.
     fn meet_boxes(node: &Node, ray: &BoxRay) -> (u32, Self::Keys);
 
-    /// Puts the children in `mask` onto the stack from `top` on, the nearest last.
-    fn push_by_distance(node: &Node, mask: u32, keys: Self::Keys, stack: &mut Entries, top: usize);
+    /// Puts the children in `mask` onto the stack, the nearest last. There must be room for eight.
+    fn push_by_distance(node: &Node, mask: u32, keys: Self::Keys, slots: &mut Slots);
 
     /// One bit for each triangle whose rounded edge functions do not have differing signs: every triangle that is hit,
     /// and a few others.
@@ -35,6 +37,55 @@ pub(crate) fn key(s: f32) -> i32 {
 /// In the last bits of a child's key stands its lane, so that no two are equal. To be compared with a limit that has all
 /// these bits set.
 pub(crate) const LANE_BITS: i32 = WIDTH as i32 - 1;
+
+/// The array of a stack, which is not cleared for every ray.
+pub(crate) struct Slots {
+    // The first `len` are initialised, and `len <= STACK`.
+    entries: [MaybeUninit<i64>; STACK],
+    len: usize,
+}
+
+impl Slots {
+    #[inline(always)]
+    pub(crate) fn new() -> Self {
+        Self { entries: [const { MaybeUninit::uninit() }; STACK], len: 0 }
+    }
+
+    #[inline(always)]
+    pub(crate) fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Adds one.
+    ///
+    /// # Panics
+    /// When it is full.
+    #[inline(always)]
+    pub(crate) fn push(&mut self, entry: i64) {
+        self.entries[self.len] = MaybeUninit::new(entry);
+        self.len += 1;
+    }
+
+    #[inline(always)]
+    pub(crate) fn pop(&mut self) -> Option<i64> {
+        if self.len == 0 {
+            return None;
+        }
+        self.len -= 1;
+        // SAFETY: it was one of the first `len`, which are initialised.
+        Some(unsafe { self.entries[self.len % STACK].assume_init() })
+    }
+
+    /// The next eight, to be written before `len` takes them in.
+    ///
+    /// # Panics
+    /// When there are not as many.
+    #[inline(always)]
+    fn next_eight(&mut self) -> &mut [MaybeUninit<i64>; WIDTH] {
+        let window = &mut self.entries[self.len..self.len + WIDTH];
+        window.try_into().expect("eight")
+    }
+}
 
 /// Work to be done with whichever lanes the machine has.
 pub(crate) trait Task {
@@ -123,13 +174,15 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
-    fn push_by_distance(node: &Node, mask: u32, keys: [i32; WIDTH], stack: &mut Entries, top: usize) {
-        let count = mask.count_ones() as usize;
+    fn push_by_distance(node: &Node, mask: u32, keys: [i32; WIDTH], slots: &mut Slots) {
+        let window = slots.next_eight();
+        // Where each goes is how many are farther: no two have one key, so that the first places are all written.
         for lane in (0..WIDTH).filter(|lane| mask >> lane & 1 != 0) {
-            let is_before = |other: &usize| mask >> other & 1 != 0 && keys[*other] < keys[lane];
-            let rank = (0..WIDTH).filter(is_before).count();
-            stack[(top + count - 1 - rank) % STACK] = stack_entry(keys[lane], node.children[lane]);
+            let is_farther = |other: &usize| mask >> other & 1 != 0 && keys[*other] > keys[lane];
+            let place = (0..WIDTH).filter(is_farther).count();
+            window[place % WIDTH] = MaybeUninit::new(stack_entry(keys[lane], node.children[lane]));
         }
+        slots.len += (mask & 0xff).count_ones() as usize;
     }
 
     #[inline(always)]
@@ -187,8 +240,9 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    fn push_by_distance(node: &Node, mask: u32, enter: Self::Keys, stack: &mut Entries, top: usize) {
+    fn push_by_distance(node: &Node, mask: u32, enter: Self::Keys, slots: &mut Slots) {
         use std::arch::x86_64::*;
+        let window = slots.next_eight();
         // SAFETY: only `run_avx2` instantiates this, so the machine has AVX2. The store is of eight i32 into an array of
         // eight.
         unsafe {
@@ -199,18 +253,19 @@ impl Lanes for Avx2 {
             let keys = _mm256_or_si256(_mm256_andnot_si256(low_bits, ordered), lanes);
             let mut scalar_keys = [0; WIDTH];
             _mm256_storeu_si256(scalar_keys.as_mut_ptr().cast(), keys);
-            // Where each goes is how many are farther.
-            let mut rest = mask;
+            // Where each goes is how many are farther: no two have one key, so that the first places are all written.
+            let mut rest = mask & 0xff;
             while rest != 0 {
                 let lane = rest.trailing_zeros() as usize % WIDTH;
                 rest &= rest - 1;
                 let this = scalar_keys[lane];
                 let farther = _mm256_cmpgt_epi32(keys, _mm256_set1_epi32(this));
                 let farther = _mm256_movemask_ps(_mm256_castsi256_ps(farther)) as u32 & mask;
-                let place = top + farther.count_ones() as usize;
-                stack[place % STACK] = stack_entry(this, node.children[lane]);
+                let place = farther.count_ones() as usize % WIDTH;
+                window[place] = MaybeUninit::new(stack_entry(this, node.children[lane]));
             }
         }
+        slots.len += (mask & 0xff).count_ones() as usize;
     }
 
     #[inline(always)]
@@ -258,10 +313,10 @@ pub(crate) fn meet_boxes_at(level: Level, node: &Node, ray: &BoxRay) -> (u32, [i
         #[inline(always)]
         fn run<L: Lanes>(self) -> Self::Output {
             let (mask, keys) = L::meet_boxes(self.0, self.1);
-            let mut stack = [0; STACK];
-            L::push_by_distance(self.0, mask, keys, &mut stack, 0);
+            let mut slots = Slots::new();
+            L::push_by_distance(self.0, mask, keys, &mut slots);
             let mut by_lane = [i32::MAX; WIDTH];
-            for entry in &stack[..mask.count_ones() as usize] {
+            while let Some(entry) = slots.pop() {
                 let key = (entry >> 32) as i32;
                 by_lane[(key & LANE_BITS) as usize] = key;
             }

@@ -133,12 +133,13 @@ impl BoxRay {
         let slop =
             f64::from_bits((1023 - 40) << 52) + f64::from_bits((1023 - 47) << 52) * units.condition * reach;
 
-        let anchor_distance = anchor.length();
-        let fits = t_scale.is_normal() && slop < 1e6 && anchor_distance.is_finite();
+        let distance_squared = anchor.length_squared();
+        let fits = t_scale.is_normal() && slop < 1e6 && distance_squared.is_finite();
         if !fits {
             return Some(Self::passing_all());
         }
-        if anchor_distance > 1.001 * units.radius + 4.0 * slop {
+        let reach = 1.001 * units.radius + 4.0 * slop;
+        if distance_squared > reach * reach {
             return None;
         }
 

@@ -1,10 +1,9 @@
 //! The stack of a search: a short array, and the heap for what no longer fits.
 
+use crate::lanes::Slots;
+
 /// Entries in the array: a power of two, many more than a search usually has.
 pub(crate) const STACK: usize = 128;
-
-/// The array.
-pub(crate) type Entries = [i64; STACK];
 
 /// The key of a distance above, a reference below: entries have the order of their distances.
 #[inline(always)]
@@ -14,9 +13,7 @@ pub(crate) fn stack_entry(key: i32, reference: u32) -> i64 {
 
 /// Last in, first out.
 pub(crate) struct Stack {
-    pub(crate) entries: Entries,
-    /// How many are in the array.
-    pub(crate) top: usize,
+    slots: Slots,
     // The ones below them.
     spilled: Vec<i64>,
 }
@@ -24,49 +21,48 @@ pub(crate) struct Stack {
 impl Stack {
     #[inline(always)]
     pub(crate) fn new() -> Self {
-        Self { entries: [0; STACK], top: 0, spilled: Vec::new() }
+        Self { slots: Slots::new(), spilled: Vec::new() }
     }
 
-    /// Makes room for eight more in the array.
+    /// Somewhere for eight more.
     #[inline(always)]
-    pub(crate) fn make_room(&mut self) {
-        if self.top > STACK - 8 {
+    pub(crate) fn with_room(&mut self) -> &mut Slots {
+        if self.slots.len() > STACK - 8 {
             self.spill();
         }
+        &mut self.slots
     }
 
-    /// Adds one. There must be room.
     #[inline(always)]
     pub(crate) fn push(&mut self, entry: i64) {
-        self.entries[self.top % STACK] = entry;
-        self.top += 1;
+        self.with_room().push(entry);
     }
 
     #[inline(always)]
     pub(crate) fn pop(&mut self) -> Option<i64> {
-        if self.top == 0 && !self.refill() {
-            return None;
-        }
-        self.top -= 1;
-        Some(self.entries[self.top % STACK])
+        self.slots.pop().or_else(|| self.pop_spilled())
     }
 
     #[cold]
     #[inline(never)]
     fn spill(&mut self) {
-        self.spilled.extend_from_slice(&self.entries[..self.top]);
-        self.top = 0;
+        let bottom = self.spilled.len();
+        while let Some(entry) = self.slots.pop() {
+            self.spilled.push(entry);
+        }
+        self.spilled[bottom..].reverse();
     }
 
     #[cold]
     #[inline(never)]
-    fn refill(&mut self) -> bool {
+    fn pop_spilled(&mut self) -> Option<i64> {
         let count = self.spilled.len().min(STACK / 2);
         let rest = self.spilled.len() - count;
-        self.entries[..count].copy_from_slice(&self.spilled[rest..]);
+        for &entry in &self.spilled[rest..] {
+            self.slots.push(entry);
+        }
         self.spilled.truncate(rest);
-        self.top = count;
-        count > 0
+        self.slots.pop()
     }
 }
 
@@ -80,7 +76,6 @@ mod tests {
         let mut mirror = Vec::new();
         let mut deepest = 0;
         for i in 0..20_000i64 {
-            stack.make_room();
             for j in 0..(i * 7 % 9).min(8) {
                 let entry = stack_entry((i % 100) as i32 - 50, (i * 8 + j) as u32);
                 stack.push(entry);

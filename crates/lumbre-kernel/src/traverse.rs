@@ -10,7 +10,7 @@ use smallvec::SmallVec;
 use crate::collapse::Entry;
 use crate::lanes::{LANE_BITS, Lanes, Level, Task, key};
 use crate::node::{BoxRay, WIDTH, tag};
-use crate::stack::{STACK, Stack, stack_entry};
+use crate::stack::{Stack, stack_entry};
 use crate::touch::{self, AllTouches, Touch};
 use crate::triangles::{self, BLOCK, Meeting, Shear};
 use crate::{Accel, GeometryKind, InstancePath};
@@ -176,18 +176,18 @@ impl<S: Search> Task for Traversal<'_, '_, S> {
                     reference = node.children[mask.trailing_zeros() as usize % WIDTH];
                     continue;
                 }
-                stack.make_room();
+                let slots = stack.with_room();
                 if S::ORDERED {
-                    L::push_by_distance(node, mask, keys, &mut stack.entries, stack.top);
-                    stack.top += mask.count_ones() as usize - 1;
-                    reference = stack.entries[stack.top % STACK] as u32;
+                    L::push_by_distance(node, mask, keys, slots);
+                    let Some(nearest) = slots.pop() else { break };
+                    reference = nearest as u32;
                 } else {
                     // The first children are the largest.
                     let mut rest = mask & (mask - 1);
                     while rest != 0 {
                         let lane = (31 - rest.leading_zeros()) as usize % WIDTH;
                         rest ^= 1 << lane;
-                        stack.push(stack_entry(ALWAYS, node.children[lane]));
+                        slots.push(stack_entry(ALWAYS, node.children[lane]));
                     }
                     reference = node.children[mask.trailing_zeros() as usize % WIDTH];
                 }
@@ -228,7 +228,6 @@ impl<S: Search> Task for Traversal<'_, '_, S> {
                     }
                     place.route.push(geometry);
                     place.ids.push(standing.id);
-                    stack.make_room();
                     stack.push(stack_entry(ALWAYS, tag::reference(tag::RETURN, 0)));
                     suspended.push(std::mem::replace(&mut frame, inner));
                     if enter(&mut frame, meets_tree, &place, &mut stack, search) {
@@ -258,14 +257,12 @@ fn enter<S: Search>(
     stack: &mut Stack,
     search: &mut S,
 ) -> bool {
-    stack.make_room();
     if let Some(root) = frame.accel.tree.root.filter(|_| meets_tree) {
         stack.push(stack_entry(ALWAYS, root));
     }
     for (i, entry) in frame.accel.infinite.iter().enumerate() {
         if matches!(frame.accel.geometries[entry.geometry as usize].kind, GeometryKind::Instance(_)) {
             let index = frame.accel.tree.entries.len() + i;
-            stack.make_room();
             stack.push(stack_entry(ALWAYS, tag::reference(tag::INSTANCE, index as u32)));
         } else if meet_entry(frame, entry, place, search) {
             return true;

@@ -1,4 +1,6 @@
 //! The proof in `node`, put to the test: a box that a ray reaches within its range is never passed by.
+//!
+//! Tried by hand: without the margin for single precision, this fails.
 
 use lumbre_geometry::{Aabb, Ray};
 use lumbre_math::DVec3;
