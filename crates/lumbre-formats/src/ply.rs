@@ -561,7 +561,8 @@ impl<'a> Mesh<'a> {
                 continue;
             }
             // The last number of a text needs no space after it.
-            let most = (source.left() as u64 + 1) / least;
+            let last = u64::from(self.encoding == Encoding::Text);
+            let most = (source.left() as u64 + last) / least;
             if element.count > most {
                 let wrong =
                     Diagnostic::error(format!("more elements {} than the file holds", quoted(&element.name)));

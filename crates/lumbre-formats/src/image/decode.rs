@@ -8,7 +8,7 @@ use image::{ColorType, ImageDecoder, ImageError, Limits};
 use lumbre_image::{Bitmap, Channels, Encoding, PixelData};
 
 use super::{ImageFile, ImageFormat};
-use crate::budget::Budget;
+use crate::budget::{Budget, LimitError, LimitKind};
 use crate::contained::contained;
 use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, quoted};
 
@@ -26,9 +26,16 @@ pub(super) fn read(
             Diagnostic::warning("JPEG image without an end: its last rows may be missing").at(place.clone()),
         );
     }
+    if let (ImageFormat::Png, Some(&[a, b, c, d, e, f, g, h])) =
+        (format, bytes.get(16..).and_then(<[u8]>::first_chunk))
+    {
+        // Its decoder makes room for a row before it can be asked.
+        let (width, height) = (u32::from_be_bytes([a, b, c, d]), u32::from_be_bytes([e, f, g, h]));
+        check_size(format, width, height, bytes, &place)?;
+    }
     contained(&format!("{} image", format.name()), &place, || {
         let source = Cursor::new(bytes);
-        let fault = |e| fault(format, &place, e);
+        let fault = |e| fault(format, &place, budget, e);
         match format {
             // Its chunks may ask for memory before there is a decoder to set limits on.
             ImageFormat::Png => decode(
@@ -60,24 +67,11 @@ fn decode(
     budget: &Budget,
 ) -> Result<ImageFile, FormatError> {
     let (width, height) = decoder.dimensions();
-    let pixels = u64::from(width) * u64::from(height);
-    // So many pixels at most can come from one byte: a larger header is damage or malice, and not worth its memory.
-    let most_per_byte = match format {
-        ImageFormat::Png => 1032 * 8,
-        ImageFormat::Jpeg => 1024,
-        ImageFormat::Tga | ImageFormat::Bmp => 128,
-        _ => 62,
-    };
-    if pixels == 0 || pixels > (1 << 16) + most_per_byte * bytes.len() as u64 {
-        let wrong =
-            Diagnostic::error(format!("{} image of an impossible size", format.name())).at(place.clone());
-        let found = format!("{width} by {height} pixels in {} bytes", bytes.len());
-        return Err(wrong.found(found).into());
-    }
+    let pixels = check_size(format, width, height, bytes, place)?;
     let colour = decoder.color_type();
     let channels = Channels::from_count(usize::from(colour.channel_count())).expect("one to four");
     let count = pixels * channels.count() as u64;
-    let fault = |e| fault(format, place, e);
+    let fault = |e| fault(format, place, budget, e);
     // A progressive JPEG keeps all its coefficients, two bytes each, beside the pixels.
     let scratch = if format == ImageFormat::Jpeg { count * 2 } else { 0 };
     let _scratch = budget.hold(scratch, "decoding an image")?;
@@ -103,16 +97,44 @@ fn decode(
     Ok(ImageFile::new(format, bitmap))
 }
 
+/// How many pixels there are. So many at most can come from one byte: a larger header is damage or malice, and not worth
+/// its memory.
+fn check_size(
+    format: ImageFormat,
+    width: u32,
+    height: u32,
+    bytes: &[u8],
+    place: &Place,
+) -> Result<u64, FormatError> {
+    let most_per_byte = match format {
+        ImageFormat::Png => 1032 * 8,
+        ImageFormat::Jpeg => 1024,
+        ImageFormat::Tga | ImageFormat::Bmp => 128,
+        _ => 62,
+    };
+    let pixels = u64::from(width) * u64::from(height);
+    if 0 < pixels && pixels <= (1 << 16) + most_per_byte * bytes.len() as u64 {
+        return Ok(pixels);
+    }
+    let wrong = Diagnostic::error(format!("{} image of an impossible size", format.name())).at(place.clone());
+    Err(wrong.found(format!("{width} by {height} pixels in {} bytes", bytes.len())).into())
+}
+
 fn limits(budget: &Budget) -> Limits {
     let mut limits = Limits::no_limits();
     limits.max_alloc = Some(budget.memory_left());
     limits
 }
 
-fn fault(format: ImageFormat, place: &Place, error: ImageError) -> FormatError {
+fn fault(format: ImageFormat, place: &Place, budget: &Budget, error: ImageError) -> FormatError {
     let kind = match error {
         ImageError::Unsupported(_) => "unsupported",
-        ImageError::Limits(_) => "too large",
+        ImageError::Limits(_) => {
+            let limit = budget.limits().memory;
+            let what = format!("decoding a {} image", format.name());
+            let source = LimitError { what, kind: LimitKind::Memory, needed: limit.saturating_add(1), limit };
+            return FormatError::Limit { place: Some(place.clone()), source };
+        }
         _ => "damaged",
     };
     let wrong = Diagnostic::error(format!("{kind} {} image", format.name())).at(place.clone());
