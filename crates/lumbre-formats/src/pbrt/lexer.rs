@@ -162,11 +162,8 @@ impl<B: Deref<Target = [u8]>> Lexer<B> {
     pub fn string(&mut self, token: Token) -> Result<Cow<'_, str>> {
         debug_assert_eq!(token.kind, TokenKind::String);
         let (start, end) = (token.start + 1, token.end - 1);
-        let wrong = match unescape(&self.bytes[start..end]) {
-            // Looked up again, as a borrow that leaves in one arm would last for the whole function.
-            Ok(_) => None,
-            Err(wrong) => Some(wrong),
-        };
+        // Looked up again below, as a borrow that leaves in one arm would last for the whole function.
+        let wrong = unescape(&self.bytes[start..end]).err();
         if let Some(wrong) = wrong {
             return Err(self.spot_at(token.start).wrong(*wrong));
         }

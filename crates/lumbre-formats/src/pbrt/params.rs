@@ -1,7 +1,7 @@
 //! Parameter lists: what was given, what was asked for, and what is left over.
 
 use std::cell::{Cell, RefCell};
-use std::sync::Arc;
+use std::rc::Rc;
 
 use lumbre_image::ColourSpace;
 use lumbre_math::DVec3;
@@ -214,7 +214,7 @@ impl Param {
 }
 
 /// Defaults that `Attribute` set for one kind of entity, one of each name.
-pub(super) type Defaults = Arc<Vec<Arc<Param>>>;
+pub(super) type Defaults = Rc<Vec<Rc<Param>>>;
 
 /// The parameters of one entity. Each question marks what answers it as used and remembers the name, so that what was
 /// given in vain is found with the nearest right name.

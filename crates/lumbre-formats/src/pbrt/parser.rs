@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::cell::Cell;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 use std::sync::Arc;
 
 use lumbre_image::ColourSpace;
@@ -476,7 +477,7 @@ impl<'b, 'd> Parser<'b, 'd> {
                 self.state.reverse_orientation = !self.state.reverse_orientation;
                 Ok(())
             }
-            "Option" => self.option(spot),
+            "Option" => self.option(),
             "Camera" => {
                 let (ty, params) = self.entity("Camera", "camera", None, spot)?;
                 self.animated(spot, "camera");
@@ -717,9 +718,9 @@ impl<'b, 'd> Parser<'b, 'd> {
             let wrong = Diagnostic::error("unknown kind of Attribute").found(quoted(&kind));
             return Err(at.wrong(wrong.suggest(&kind, names).expected(names.join(", "))));
         };
-        let defaults = Arc::make_mut(&mut self.state.defaults[*kind as usize]);
+        let defaults = Rc::make_mut(&mut self.state.defaults[*kind as usize]);
         for param in params {
-            let param = Arc::new(param);
+            let param = Rc::new(param);
             match defaults.iter().position(|p| p.name == param.name) {
                 Some(same) => defaults[same] = param,
                 None if defaults.len() < MAX_DEFAULTS => defaults.push(param),
@@ -732,7 +733,7 @@ impl<'b, 'd> Parser<'b, 'd> {
         Ok(())
     }
 
-    fn option(&mut self, spot: Spot) -> Result<()> {
+    fn option(&mut self) -> Result<()> {
         let (name, at) = self.string("Option", "a name in quotes")?;
         let token = self.expect("a value")?;
         let value: Cow<'_, str> = match token.kind {
@@ -740,7 +741,6 @@ impl<'b, 'd> Parser<'b, 'd> {
             TokenKind::Bare => self.bare(token).into(),
             _ => return self.unexpected(token, "wrong value of Option", "a word, a number or a string"),
         };
-        let _ = spot;
         // pbrt writes the bare name; a type before it does no harm.
         let name = name.split_ascii_whitespace().last().unwrap_or("").to_owned();
         self.converter.option(&name, at, &value)

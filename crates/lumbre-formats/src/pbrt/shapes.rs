@@ -346,7 +346,7 @@ impl Converter<'_, '_> {
             return Err(params.spot.error(message));
         };
         let spot = params.spot_of("indices");
-        let indices = if indices.len() % N == 0 {
+        let indices = if indices.len().is_multiple_of(N) {
             indices
         } else if N == 3 && self.diagnostics.is_lenient() {
             self.note(spot, "indices that make no whole triangle are dropped");
@@ -416,7 +416,7 @@ impl Converter<'_, '_> {
                 self.upgraded(param.spot);
             }
             let numbers = param.numbers()?;
-            if numbers.len() % 2 != 0 {
+            if !numbers.len().is_multiple_of(2) {
                 return Err(param.refuse("pairs of numbers"));
             }
             same(name, numbers.len() / 2)?;
@@ -581,7 +581,7 @@ fn ends(params: &Params) -> Result<Option<(DVec3, DVec3)>> {
 fn triples(params: &Params, name: &'static str, ty: Type) -> Result<Option<Vec<Vec3>>> {
     let Some(param) = params.typed(name, &[ty])? else { return Ok(None) };
     let numbers = param.numbers()?;
-    if numbers.len() % 3 != 0 {
+    if !numbers.len().is_multiple_of(3) {
         return Err(param.refuse("three numbers each"));
     }
     let list: Option<Vec<Vec3>> = numbers.chunks_exact(3).map(vec3).collect();

@@ -86,6 +86,12 @@ fn rings(vertices: usize, faces: &[[u32; 3]]) -> Result<Vec<Ring>, String> {
     steps.into_iter().enumerate().map(ring).collect()
 }
 
+/// An edge: the vertex that becomes its middle, and the corners of the one or two faces beside it.
+struct Edge {
+    middle: u32,
+    across: [Option<u32>; 2],
+}
+
 fn sum(points: &[DVec3], which: &[u32]) -> DVec3 {
     which.iter().map(|i| points[*i as usize]).sum()
 }
@@ -113,19 +119,18 @@ fn refine(points: &[DVec3], faces: &[[u32; 3]]) -> Result<(Vec<DVec3>, Vec<[u32;
         })
         .collect();
     // The vertex of each edge, in the order of the faces, with the corners across it.
-    let mut across: HashMap<(u32, u32), (u32, [Option<u32>; 2])> =
-        HashMap::with_capacity(faces.len() * 3 / 2);
+    let mut across: HashMap<(u32, u32), Edge> = HashMap::with_capacity(faces.len() * 3 / 2);
     let mut edges = vec![];
     for face in faces {
         for i in 0..3 {
             let (a, b, c) = (face[i], face[(i + 1) % 3], face[(i + 2) % 3]);
             let edge = (a.min(b), a.max(b));
             match across.get_mut(&edge) {
-                Some((_, corners)) => corners[1] = Some(c),
+                Some(edge) => edge.across[1] = Some(c),
                 None => {
                     let number =
                         u32::try_from(points.len() + edges.len()).map_err(|_| "too many vertices")?;
-                    across.insert(edge, (number, [Some(c), None]));
+                    across.insert(edge, Edge { middle: number, across: [Some(c), None] });
                     edges.push(edge);
                 }
             }
@@ -133,12 +138,12 @@ fn refine(points: &[DVec3], faces: &[[u32; 3]]) -> Result<(Vec<DVec3>, Vec<[u32;
     }
     for edge in &edges {
         let ends = points[edge.0 as usize] + points[edge.1 as usize];
-        new.push(match across[edge].1 {
+        new.push(match across[edge].across {
             [Some(c), Some(d)] => 0.375 * ends + 0.125 * (points[c as usize] + points[d as usize]),
             _ => 0.5 * ends,
         });
     }
-    let middle = |a: u32, b: u32| across[&(a.min(b), a.max(b))].0;
+    let middle = |a: u32, b: u32| across[&(a.min(b), a.max(b))].middle;
     let split = faces.iter().flat_map(|&[a, b, c]| {
         let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
         [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]

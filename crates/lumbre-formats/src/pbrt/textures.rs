@@ -547,7 +547,7 @@ fn whole<T: TextureValue>(texture: Texture<T>, parts: &[(usize, u64)], spot: Spo
 /// Wavelengths with their values, or what is wrong with them.
 fn pairs(numbers: &[f64]) -> std::result::Result<Vec<(f64, f64)>, &'static str> {
     let pairs: Vec<(f64, f64)> = numbers.chunks_exact(2).map(|c| (c[0], c[1])).collect();
-    if numbers.len() % 2 != 0 || pairs.is_empty() {
+    if !numbers.len().is_multiple_of(2) || pairs.is_empty() {
         return Err("pairs of a wavelength and a value");
     }
     if pairs.windows(2).any(|w| w[0].0 >= w[1].0) {

@@ -1,0 +1,19 @@
+//! Any bytes are a picture or an error; the first byte chooses the ending of the name.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use lumbre_formats::image::{read_image, read_layers};
+use lumbre_formats::{Budget, Diagnostics, Limits};
+
+const ENDINGS: [&str; 8] = ["png", "jpg", "exr", "hdr", "pfm", "tga", "bmp", "qoi"];
+
+fuzz_target!(|bytes: &[u8]| {
+    let [choice, bytes @ ..] = bytes else { return };
+    let name = format!("fuzz.{}", ENDINGS[usize::from(*choice) % ENDINGS.len()]).into();
+    let limits = Limits { memory: 64 << 20, ..Limits::default() };
+    let mut diagnostics = Diagnostics::new();
+    if let Ok(file) = read_image(bytes, &name, &Budget::new(limits), &mut diagnostics) {
+        let _ = file.to_image(&Budget::new(limits));
+    }
+    let _ = read_layers(bytes, &name, &Budget::new(limits), &mut diagnostics);
+});

@@ -1,0 +1,17 @@
+//! Any bytes are a scene or an error at a place of it.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use lumbre_formats::{Budget, Diagnostics, Limits, Strictness, pbrt};
+
+fuzz_target!(|bytes: &[u8]| {
+    let limits = Limits { memory: 64 << 20, elements: 100_000, files: 100, ..Limits::default() };
+    for strictness in [Strictness::Normal, Strictness::Lenient] {
+        let mut diagnostics = Diagnostics::with_strictness(strictness);
+        let scene = pbrt::read_bytes("fuzz.pbrt", bytes, None, &Budget::new(limits), &mut diagnostics);
+        if let Err(error) = scene {
+            assert!(error.to_diagnostic().to_string().starts_with("error: fuzz.pbrt"));
+        }
+        diagnostics.lines();
+    }
+});
