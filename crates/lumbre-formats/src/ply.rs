@@ -724,7 +724,7 @@ impl<'a> Mesh<'a> {
     }
 
     #[inline]
-    fn finite_or_zero<T: Default>(
+    fn finite_or_zero<T: Copy + Default>(
         &mut self,
         value: T,
         is_finite: impl FnOnce(T) -> bool,
@@ -732,10 +732,7 @@ impl<'a> Mesh<'a> {
         element: &Element,
         index: u64,
         at: usize,
-    ) -> T
-    where
-        T: Copy,
-    {
+    ) -> T {
         if is_finite(value) {
             return value;
         }

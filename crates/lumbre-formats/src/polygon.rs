@@ -308,7 +308,7 @@ mod tests {
     #[test]
     fn long_polygons_are_covered_and_endless_ones_given_up() {
         let comb = |count: usize| -> Vec<Vec3> {
-            let tooth = |i: usize| Vec3::new(i as f32, if i % 2 == 0 { 0.5 } else { 9.0 }, 4.0);
+            let tooth = |i: usize| Vec3::new(i as f32, if i.is_multiple_of(2) { 0.5 } else { 9.0 }, 4.0);
             (0..count - 2)
                 .map(tooth)
                 .chain([Vec3::new(count as f32, -2., 4.), Vec3::new(0., -2., 4.)])

@@ -286,7 +286,7 @@ mod tests {
     fn equal_pictures_have_none_and_the_order_does_not_matter() {
         let noisy = |seed: u32| {
             let value = |i: u32| {
-                (i.wrapping_mul(2_654_435_761).wrapping_add(seed * 40_503 << 16) >> 24) as f32 / 255.0
+                (i.wrapping_mul(2_654_435_761).wrapping_add((seed * 40_503) << 16) >> 24) as f32 / 255.0
             };
             let colours = (0..1200).map(|i| Rgb::new(value(i), value(i + 7), value(i + 13))).collect();
             Image::from_pixels(40, 30, colours).unwrap()

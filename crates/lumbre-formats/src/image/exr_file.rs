@@ -125,23 +125,12 @@ pub(super) fn read_layers(bytes: &[u8], name: &Arc<str>, budget: &Budget) -> Res
             samples.extend(channel.sample_data.values_as_f32());
             let full_precision = !matches!(channel.sample_data, FlatSamples::F16(_));
             layers.push(Layer { name, samples, full_precision }).map_err(|layer| {
-                damaged("EXR channels of one name or of different sizes")
-                    .or_at(|| place.clone())
-                    .with_found(&layer.name)
+                let wrong = Diagnostic::error("EXR channels of one name or of different sizes");
+                FormatError::from(wrong.at(place.clone()).found(quoted(&layer.name)))
             })?;
         }
     }
     Ok(layers)
-}
-
-impl FormatError {
-    /// The same, with what was found.
-    fn with_found(mut self, text: &str) -> Self {
-        if let Self::Input(diagnostic) = &mut self {
-            diagnostic.found = Some(quoted(text));
-        }
-        self
-    }
 }
 
 /// The headers, once they are known to ask for no more than the file can hold and the budget allows; with the charge for

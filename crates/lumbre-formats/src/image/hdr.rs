@@ -154,14 +154,14 @@ impl<'a> Reader<'a> {
                     let wrong = Diagnostic::error("unsupported HDR format").at(here());
                     return Err(wrong.found(quoted(&format)).expected("32-bit_rle_rgbe").into());
                 }
-            } else if let Some(exposure) = value(b"EXPOSURE=") {
-                if exposure.parse::<f64>() != Ok(1.0) {
-                    diagnostics.push(
-                        Diagnostic::warning("EXPOSURE of an HDR image is not applied")
-                            .at(here())
-                            .found(quoted(&exposure)),
-                    );
-                }
+            } else if let Some(exposure) = value(b"EXPOSURE=")
+                && exposure.parse::<f64>() != Ok(1.0)
+            {
+                diagnostics.push(
+                    Diagnostic::warning("EXPOSURE of an HDR image is not applied")
+                        .at(here())
+                        .found(quoted(&exposure)),
+                );
             }
         }
         let start = self.at;
@@ -169,10 +169,10 @@ impl<'a> Reader<'a> {
         let text = String::from_utf8_lossy(line);
         let words: Vec<&str> = text.split_ascii_whitespace().collect();
         let size = |word: &str| word.parse::<u32>().ok().filter(|&n| n > 0);
-        if let [y @ ("-Y" | "+Y"), height, x @ ("+X" | "-X"), width] = words[..] {
-            if let (Some(width), Some(height)) = (size(width), size(height)) {
-                return Ok((width, height, x == "-X", y == "+Y"));
-            }
+        if let [y @ ("-Y" | "+Y"), height, x @ ("+X" | "-X"), width] = words[..]
+            && let (Some(width), Some(height)) = (size(width), size(height))
+        {
+            return Ok((width, height, x == "-X", y == "+Y"));
         }
         let wrong = Diagnostic::error("unsupported HDR resolution");
         let wrong = wrong.at(Place::binary(self.name.clone(), start as u64, ""));

@@ -216,11 +216,18 @@ impl<'a> Reader<'a> {
                 self.is_smooth = group.is_some_and(|w| !matches!(w.bytes, b"off" | b"0"));
                 Ok(())
             }
-            b"l" => Ok(self.pass_over(keyword, "line is no surface, passed over")),
-            b"p" => Ok(self.pass_over(keyword, "point is no surface, passed over")),
+            b"l" => {
+                self.pass_over(keyword, "line is no surface, passed over");
+                Ok(())
+            }
+            b"p" => {
+                self.pass_over(keyword, "point is no surface, passed over");
+                Ok(())
+            }
             b"vp" | b"cstype" | b"deg" | b"bmat" | b"step" | b"curv" | b"curv2" | b"surf" | b"parm"
             | b"trim" | b"hole" | b"scrv" | b"sp" | b"end" | b"con" | b"ctech" | b"stech" => {
-                Ok(self.pass_over(keyword, "free-form curves and surfaces are not supported, passed over"))
+                self.pass_over(keyword, "free-form curves and surfaces are not supported, passed over");
+                Ok(())
             }
             // How other programs would show it.
             b"mg" | b"bevel" | b"c_interp" | b"d_interp" | b"lod" | b"usemap" | b"maplib" | b"shadow_obj"
@@ -554,19 +561,16 @@ impl<'a> Reader<'a> {
             corner[1] = if key.has_uvs { corner[1] } else { NONE };
             corner[2] = if key.has_normals { corner[2] } else { NONE };
             let position = corner[0] as usize;
-            let mut at = newest[position];
             // An entry of another mesh points at a vertex of another position, or at none.
-            let is_ours = vertices.get(at as usize).is_some_and(|v| v[0] == corner[0]);
+            let is_ours = vertices.get(newest[position] as usize).is_some_and(|v| v[0] == corner[0]);
             let mut length = 0;
-            while is_ours {
-                if vertices[at as usize] == corner {
-                    return Ok(at);
+            let mut next = if is_ours { newest[position] } else { NONE };
+            while next != NONE {
+                if vertices[next as usize] == corner {
+                    return Ok(next);
                 }
                 length += 1;
-                if older[at as usize] == NONE {
-                    break;
-                }
-                at = older[at as usize];
+                next = older[next as usize];
             }
             let number = vertices.len() as u32;
             if length >= LONGEST_CHAIN {

@@ -206,12 +206,12 @@ impl Builder<'_> {
     }
 
     fn roughness(&mut self, folder: &Path, m: &MtlMaterial) -> Result<Roughness, FormatError> {
-        if let Some(map) = &m.roughness_map {
-            if let Some(image) = self.image(folder, map, true)? {
-                let image = Arc::new(Texture::Image(image));
-                let squared = Arc::new(Texture::Scale { texture: image.clone(), scale: image });
-                return Ok(Roughness { u: squared.clone(), v: squared, remap: false });
-            }
+        if let Some(map) = &m.roughness_map
+            && let Some(image) = self.image(folder, map, true)?
+        {
+            let image = Arc::new(Texture::Image(image));
+            let squared = Arc::new(Texture::Scale { texture: image.clone(), scale: image });
+            return Ok(Roughness { u: squared.clone(), v: squared, remap: false });
         }
         let alpha = match (m.roughness, m.shininess) {
             (Some(roughness), _) => roughness.clamp(0.0, 1.0).powi(2),
