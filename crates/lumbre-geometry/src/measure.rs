@@ -71,7 +71,7 @@ fn settle(on_panels: impl Fn(u32) -> f64, most: u32) -> f64 {
 }
 
 /// The nodes and weights of the 16-point Gauss–Legendre rule on [0, 1], by Newton's method on the Legendre polynomial.
-fn gauss_legendre() -> [(f64, f64); 16] {
+pub(crate) fn gauss_legendre() -> [(f64, f64); 16] {
     const N: usize = 16;
     std::array::from_fn(|i| {
         let mut x = (std::f64::consts::PI * (i as f64 + 0.75) / (N as f64 + 0.5)).cos();

@@ -1,7 +1,12 @@
 //! General quadrics.
 
+use std::f64::consts::PI;
+use std::sync::OnceLock;
+
 use lumbre_math::quadratic::{dop, quadratic};
 use lumbre_math::{DAffine3, DMat3, DVec2, DVec3, Transform};
+
+use smallvec::SmallVec;
 
 use crate::line::{Implicit, NearLine};
 use crate::placed::into_world;
@@ -9,6 +14,7 @@ use crate::shape::check;
 use crate::support::{bounds_from_support, gamma};
 use crate::{
     Aabb, DirectionSample, PlacedShape, Ray, Root, Roots, Shape, ShapeError, Sphere, Surface, SurfaceSample,
+    density, measure,
 };
 
 /// The points where `A x² + B y² + C z² + D xy + E xz + F yz + G x + H y + I z + J` is 0, all of them or those in a box.
@@ -18,10 +24,9 @@ use crate::{
 /// of its Cholesky factor.
 ///
 /// Every other quadric is a surface whose normal is the gradient: it points to where the polynomial is positive. A box
-/// clips the surface and leaves it open. Such a quadric has no sampling and an infinite area, clipped or not: it cannot be
-/// a light. It is parametrised like a box, by projection along the axis that its normal is nearest to: axis k of the
-/// three, counted cyclically, gives u along axis k + 1 and v along axis k + 2, as fractions of the clipping box, or as
-/// plain coordinates where there is none.
+/// clips the surface and leaves it open; without a box it is infinite, and cannot be a light. It is parametrised like a
+/// box, by projection along the axis that its normal is nearest to: axis k of the three, counted cyclically, gives u along
+/// axis k + 1 and v along axis k + 2, as fractions of the clipping box, or as plain coordinates where there is none.
 #[derive(Clone, Debug)]
 pub struct Quadric {
     // p·matrix p + linear·p + constant; the largest coefficient is between 1 and 2.
@@ -33,6 +38,8 @@ pub struct Quadric {
     place: DVec3,
     // The unit sphere's image that it is, when it is closed.
     ellipsoid: Option<PlacedShape>,
+    // Of a clipped one, once somebody has asked.
+    clipped_area: OnceLock<f64>,
 }
 
 impl Quadric {
@@ -71,6 +78,7 @@ impl Quadric {
             clip,
             place: DVec3::ZERO,
             ellipsoid: None,
+            clipped_area: OnceLock::new(),
         };
         let center = quadric.center();
         if let Some(sphere_from) = quadric.closed_form(center)? {
@@ -249,17 +257,139 @@ impl Quadric {
         Some(bounds_from_support(world_from_object, clip.min.abs().max(clip.max.abs()), support))
     }
 
-    /// The area of a closed quadric; infinite for others.
+    /// The area of a closed or clipped quadric; infinite for others. A clipped one's is known to about five digits.
     pub fn area(&self) -> f64 {
-        self.ellipsoid.as_ref().map_or(f64::INFINITY, PlacedShape::area)
+        match (&self.ellipsoid, self.clip) {
+            (Some(ellipsoid), _) => ellipsoid.area(),
+            (None, Some(clip)) => *self.clipped_area.get_or_init(|| self.sum_over(&clip, |_| 1.0)),
+            (None, None) => f64::INFINITY,
+        }
     }
 
-    /// The area after a transform of a closed quadric; infinite for others.
+    /// The area after a transform, as [`Quadric::area`].
     pub fn area_under(&self, world_from_object: &Transform) -> f64 {
-        let Some(ellipsoid) = &self.ellipsoid else {
-            return f64::INFINITY;
+        match (&self.ellipsoid, self.clip) {
+            (Some(ellipsoid), _) => {
+                let placed = *world_from_object * ellipsoid.world_from_object();
+                PlacedShape::new(ellipsoid.shape().clone(), placed).area()
+            }
+            (None, Some(clip)) => {
+                let stretch = measure::area_stretch(world_from_object);
+                self.sum_over(&clip, |normal| (stretch * normal).length())
+            }
+            (None, None) => f64::INFINITY,
+        }
+    }
+
+    /// The nearer or farther of the two points above a point `p` of the box, on a line through it along axis `k`.
+    fn above(&self, clip: &Aabb, k: usize, mut p: DVec3, is_far: bool) -> Option<DVec3> {
+        p[k] = clip.center()[k];
+        let line = NearLine { p, d: DVec3::AXES[k], shift: 0.0 };
+        let (near, far) = self.crossings(&line)?;
+        let q = line.at(if is_far { far } else { near });
+        (clip.min[k] <= q[k] && q[k] <= clip.max[k]).then_some(q)
+    }
+
+    /// The integral of a function of the normal n over the clipped surface.
+    ///
+    /// Of the surface as seen along the three axes, each point counts with the share n_k²: together all of it. An area
+    /// element seen along axis k is |n_k| times as large, so that |n_k| is left to be integrated, which is smooth, and
+    /// vanishes where the surface turns its edge.
+    fn sum_over(&self, clip: &Aabb, f: impl Fn(DVec3) -> f64) -> f64 {
+        let rule = measure::gauss_legendre();
+        let row = |k: usize, x: f64| {
+            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+            let mut p = clip.min;
+            p[i] = x;
+            let mut sum = 0.0;
+            for ends in self.breaks(clip, k, j, p).windows(2) {
+                let (middle, half) = (0.5 * (ends[0] + ends[1]), 0.5 * (ends[1] - ends[0]));
+                for (y, weight) in rule {
+                    // At its ends the surface may turn vertical like a root, which the sine smooths.
+                    let (sin, cos) = (PI * (y - 0.5)).sin_cos();
+                    p[j] = middle + half * sin;
+                    for q in [false, true].into_iter().filter_map(|far| self.above(clip, k, p, far)) {
+                        let normal = self.implicit(q).normal();
+                        sum += weight * half * PI * cos * f(normal) * normal[k].abs();
+                    }
+                }
+            }
+            sum
         };
-        PlacedShape::new(ellipsoid.shape().clone(), *world_from_object * ellipsoid.world_from_object()).area()
+        // How many pieces a row has, and how many points stand above the middle of each.
+        let structure = |k: usize, x: f64| {
+            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+            let mut p = clip.min;
+            p[i] = x;
+            let mut counts: SmallVec<[usize; 8]> = SmallVec::new();
+            for ends in self.breaks(clip, k, j, p).windows(2) {
+                p[j] = 0.5 * (ends[0] + ends[1]);
+                counts.push([false, true].into_iter().filter_map(|far| self.above(clip, k, p, far)).count());
+            }
+            counts
+        };
+        let mut total = 0.0;
+        for k in 0..3 {
+            let i = (k + 1) % 3;
+            let rows = |from: f64, to: f64| {
+                rule.iter()
+                    .map(|&(x, weight)| weight * (to - from) * row(k, from + x * (to - from)))
+                    .sum::<f64>()
+            };
+            // Rows begin and end to meet the surface with a jump: halve the strips that have not settled.
+            let mut strips = vec![(clip.min[i], clip.max[i], rows(clip.min[i], clip.max[i]), 0)];
+            // A bound on the work that absurd coefficients can make.
+            let mut budget = 256;
+            while let Some((from, to, coarse, depth)) = strips.pop() {
+                budget -= 1;
+                let middle = 0.5 * (from + to);
+                let (first, second) = (rows(from, middle), rows(middle, to));
+                let alike =
+                    structure(k, from) == structure(k, middle) && structure(k, middle) == structure(k, to);
+                let settled = alike && (first + second - coarse).abs() <= 1e-6 * (first + second).abs();
+                if settled || depth == 16 || budget <= 0 {
+                    total += first + second;
+                } else {
+                    strips.push((middle, to, second, depth + 1));
+                    strips.push((from, middle, first, depth + 1));
+                }
+            }
+        }
+        total
+    }
+
+    /// Where, along axis `j` from `p` on, the points above the row along axis `k` appear and disappear; and the row's ends.
+    fn breaks(&self, clip: &Aabb, k: usize, j: usize, p: DVec3) -> SmallVec<[f64; 8]> {
+        let along_j = |height: f64| {
+            let mut at = p;
+            (at[j], at[k]) = (0.0, height);
+            self.crossings(&NearLine { p: at, d: DVec3::AXES[j], shift: 0.0 })
+        };
+        // Where the two points above meet: their discriminant is a quadratic along the row.
+        let meeting = {
+            let mut at = p;
+            (at[j], at[k]) = (0.0, 0.0);
+            let gradient = 2.0 * (self.matrix * at) + self.linear;
+            let value = at.dot(self.matrix * at) + self.linear.dot(at) + self.constant;
+            let (m_kk, m_jk, m_jj) = (self.matrix.col(k)[k], self.matrix.col(k)[j], self.matrix.col(j)[j]);
+            let (g_k, g_j) = (0.5 * gradient[k], 0.5 * gradient[j]);
+            let (a, h, c) =
+                (dop(m_jk, m_jk, m_kk, m_jj), dop(g_k, m_jk, m_kk, g_j), dop(g_k, g_k, m_kk, value));
+            quadratic(a, h, c, dop(h, h, a, c))
+        };
+        let (low, high) = (clip.min[j], clip.max[j]);
+        let mut breaks: SmallVec<[f64; 8]> = SmallVec::new();
+        breaks.extend([low, high]);
+        for pair in [along_j(clip.min[k]), along_j(clip.max[k]), meeting].into_iter().flatten() {
+            breaks.extend([pair.0, pair.1].into_iter().filter(|y| low < *y && *y < high));
+        }
+        breaks.sort_by(f64::total_cmp);
+        breaks
+    }
+
+    /// The density of choosing a point of the clipped surface, from the normal there.
+    fn clipped_pdf(clip: &Aabb, normal: DVec3) -> f64 {
+        normal.abs().element_sum() / (2.0 * clip.half_area())
     }
 
     /// Whether it is closed.
@@ -277,19 +407,103 @@ impl Quadric {
         "quadric"
     }
 
-    /// A point on a closed quadric: uniform on the sphere that it is the image of, with the exact density; `None` for
-    /// others.
+    /// A point on a closed or clipped quadric, with its exact density; `None` for others.
+    ///
+    /// A closed one is sampled as the sphere that it is the image of. A clipped one is looked at along a random axis, from a
+    /// random point of the box's face: its density is proportional to |n_x| + |n_y| + |n_z|, uniform up to a factor of
+    /// √3. Where nothing is seen there the answer is `None`, which counts as a sample of nothing.
     pub fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
-        self.ellipsoid.as_ref()?.sample_area(u)
+        let clip = match (&self.ellipsoid, self.clip) {
+            (Some(ellipsoid), _) => return ellipsoid.sample_area(u),
+            (None, clip) => clip?,
+        };
+        let size = clip.size();
+        let mut x = u.x * 2.0 * clip.half_area();
+        for k in 0..3 {
+            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+            let face = size[i] * size[j];
+            for is_far in [false, true] {
+                if x >= face {
+                    x -= face;
+                    continue;
+                }
+                let mut p = clip.min;
+                p[i] += x / face * size[i];
+                p[j] += u.y * size[j];
+                let q = self.above(&clip, k, p, is_far)?;
+                let surface = self.surface_on(q + self.implicit(q).to_surface());
+                return Some(SurfaceSample { surface, pdf: Self::clipped_pdf(&clip, surface.normal) });
+            }
+        }
+        None
     }
 
-    /// A point on a closed quadric, by the solid angle of its sphere; `None` for others.
+    /// A point on a closed quadric by the solid angle of its sphere, on a clipped one as by [`Quadric::sample_area`];
+    /// `None` for others.
     pub fn sample_direction(&self, from: DVec3, u: DVec2) -> Option<DirectionSample> {
-        self.ellipsoid.as_ref()?.sample_direction(from, u)
+        match &self.ellipsoid {
+            Some(ellipsoid) => ellipsoid.sample_direction(from, u),
+            None => density::seen_from(from, self.sample_area(u)?),
+        }
     }
 
     /// The density of [`Quadric::sample_direction`].
     pub fn pdf_direction(&self, ray: &Ray, surface: &Surface) -> f64 {
-        self.ellipsoid.as_ref().map_or(0.0, |ellipsoid| ellipsoid.pdf_direction(ray, surface))
+        match (&self.ellipsoid, self.clip) {
+            (Some(ellipsoid), _) => ellipsoid.pdf_direction(ray, surface),
+            (None, Some(clip)) => {
+                density::pdf_seen_from(ray, surface, Self::clipped_pdf(&clip, surface.normal))
+            }
+            (None, None) => 0.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[track_caller]
+    fn assert_area(coefficients: [f64; 10], clip: Aabb, expected: f64) {
+        let quadric = Quadric::new(coefficients, Some(clip)).unwrap();
+        assert!(!quadric.is_solid());
+        assert!((quadric.area() / expected - 1.0).abs() < 2e-5, "{} {expected}", quadric.area());
+        // The whole measured again under a transform, a similarity.
+        let twice = Transform::scale(DVec3::new(2.0, -2.0, 2.0)).unwrap();
+        assert!((quadric.area_under(&twice) / expected / 4.0 - 1.0).abs() < 2e-5);
+    }
+
+    #[test]
+    fn clipped_quadrics_have_the_areas_of_the_shapes_that_they_are() {
+        let clip = Aabb { min: DVec3::new(-2.0, -2.5, 0.25), max: DVec3::new(2.25, 2.0, 1.5) };
+        // A cylinder of radius 1.5, a sphere's zone of radius 2, a cone, a slanted plane, two planes.
+        assert_area([1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -2.25], clip, 3.0 * PI * 1.25);
+        let zone = Aabb { min: DVec3::new(-2.5, -2.5, 0.25), max: DVec3::new(2.5, 2.5, 1.5) };
+        assert_area([1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -4.0], zone, 4.0 * PI * 1.25);
+        let cone = PI * 2f64.sqrt() * (1.5 * 1.5 - 0.25 * 0.25);
+        assert_area([1.0, 1.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], clip, cone);
+        let slanted = 4.25 * 1.25 * 1.25f64.sqrt();
+        assert_area([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0, 1.0, -0.5], clip, slanted);
+        assert_area([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0], clip, 2.0 * 4.5 * 1.25);
+    }
+
+    #[test]
+    fn equations_without_a_surface_are_refused() {
+        let refused = |c: [f64; 10]| Quadric::new(c, None).is_err();
+        assert!(refused([1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 4.0]));
+        assert!(refused([1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]));
+        assert!(refused([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 4.0]));
+        assert!(refused([1.0, f64::NAN, 3.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -4.0]));
+        assert!(!refused([-1.0, -2.0, -3.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 4.0]));
+        let flat = Aabb { min: DVec3::ZERO, max: DVec3::new(1.0, 2.0, 0.0) };
+        assert!(Quadric::new([1.0; 10], Some(flat)).is_err());
+    }
+
+    #[test]
+    fn a_box_that_cuts_nothing_leaves_a_quadric_closed() {
+        let c = [1.0, 2.0, 3.0, 0.0, 0.0, 0.0, -2.0, 0.0, 0.0, -4.0];
+        let wide = Aabb { min: DVec3::splat(-4.0), max: DVec3::splat(4.0) };
+        let quadric = Quadric::new(c, Some(wide)).unwrap();
+        assert!(quadric.is_solid() && quadric.clip().is_none());
     }
 }

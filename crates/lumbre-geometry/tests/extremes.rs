@@ -59,7 +59,8 @@ fn no_parameter_and_no_ray_makes_a_solid_panic() {
         let placed = PlacedShape::new(shape, Transform::IDENTITY);
         let csg = Csg::leaf(placed.clone()).ok().map(|csg| PlacedShape::new(csg.into(), Transform::IDENTITY));
         for placed in [Some(placed), csg].into_iter().flatten() {
-            let _ = (placed.bounds(), placed.shape().area());
+            // A clipped quadric's area takes milliseconds.
+            let _ = (placed.bounds(), (made % 512 == 0).then(|| placed.shape().area()));
             let u = DVec2::new(random.next_f64(), random.next_f64());
             let _ = (
                 placed.sample_area(u),
