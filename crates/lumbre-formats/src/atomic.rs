@@ -281,8 +281,7 @@ mod tests {
         }
     }
 
-    /// Renaming before the bytes are on disk, removing nothing after a failure or writing in place makes this fail; each
-    /// was tried.
+    /// Removing nothing after a failure makes this fail, and so does writing in place: both were tried.
     #[test]
     fn whichever_call_fails_the_path_holds_a_complete_file() {
         let old = vec![b'o'; 1234];
@@ -313,6 +312,7 @@ mod tests {
         assert!(kept_old >= 12, "{kept_old}");
     }
 
+    /// Bringing the bytes to disk after the renaming makes this fail: it was tried.
     #[test]
     fn bytes_reach_the_disk_before_the_name_does() {
         struct Log(Cell<Vec<&'static str>>);
