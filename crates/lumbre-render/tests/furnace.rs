@@ -33,10 +33,10 @@ fn assert_white(desc: SceneDesc, what: &str) {
     // Lights alone are noisy where they are near: the tolerance is that of the noise.
     for (strategy, share) in [(Strategy::Both, 2e-3), (Strategy::Lights, 1.5e-2), (Strategy::Bsdf, 2e-3)] {
         let path = Path { strategy, sure_bounces: 1000, ..Path::new(40) };
-        let options = options(&scene, 8, 8, 36);
+        let options = options(&scene, 12, 12, 64);
         let rendered = render_with(&scene, &options, &path, &NoProgress, &CancelToken::new()).unwrap();
         assert_eq!(rendered.stats.dropped, 0);
-        assert!(rendered.stats.rays.bounce > 20_000, "{what}: {:?}", rendered.stats.rays);
+        assert!(rendered.stats.rays.bounce > 100_000, "{what}: {:?}", rendered.stats.rays);
         for channel in mean(&rendered.image) {
             assert_close(channel, 1.0, share, &format!("{what}, {strategy:?}"));
         }

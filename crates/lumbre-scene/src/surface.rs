@@ -68,13 +68,30 @@ struct Blend<const N: usize> {
 }
 
 impl<const N: usize> Blend<N> {
+    #[inline]
     fn value(&self, corners: [DVec3; N]) -> DVec3 {
-        (0..N).map(|i| self.weights[i] * corners[i]).sum()
+        weighted(&self.weights, &corners)
     }
 
+    #[inline]
     fn slopes(&self, corners: [DVec3; N]) -> [DVec3; 2] {
-        self.along.map(|weights| (0..N).map(|i| weights[i] * corners[i]).sum())
+        [weighted(&self.along[0], &corners), weighted(&self.along[1], &corners)]
     }
+}
+
+#[inline]
+fn weighted<const N: usize>(weights: &[f64; N], corners: &[DVec3; N]) -> DVec3 {
+    let mut sum = weights[0] * corners[0];
+    for i in 1..N {
+        sum += weights[i] * corners[i];
+    }
+    sum
+}
+
+/// What a list has at some corners. (`map` on an array is not inlined here, and showed in profiles.)
+#[inline]
+fn at<T: Copy, const N: usize>(list: &[T], corners: [u32; N]) -> [T; N] {
+    std::array::from_fn(|i| list[corners[i] as usize])
 }
 
 fn triangle_blend(b: DVec2) -> Blend<3> {
@@ -126,14 +143,14 @@ impl SurfaceEntry {
             Form::Mesh(mesh) => {
                 let corners = mesh.mesh.indices[primitive as usize];
                 let uvs = match &mesh.uvs {
-                    Some(uvs) => corners.map(|i| uvs[i as usize]),
+                    Some(uvs) => at(uvs, corners),
                     None => mesh.default_uvs(primitive),
                 };
                 mesh.dress(surface, corners, uvs, &triangle_blend(local), placement)
             }
             Form::Patch { dress, corners, .. } => {
                 let uvs = match &dress.uvs {
-                    Some(uvs) => corners.map(|i| uvs[i as usize]),
+                    Some(uvs) => at(uvs, *corners),
                     None if dress.swapped => [Vec2::ZERO, Vec2::Y, Vec2::X, Vec2::ONE],
                     None => [Vec2::ZERO, Vec2::X, Vec2::Y, Vec2::ONE],
                 };
@@ -190,7 +207,7 @@ impl MeshDress {
         placement: Option<&Transform>,
     ) -> Dressed {
         let mut surface = *bare;
-        let uvs = uvs.map(|uv| DVec3::new(f64::from(uv.x), f64::from(uv.y), 0.0));
+        let uvs = std::array::from_fn(|i| DVec3::new(f64::from(uvs[i].x), f64::from(uvs[i].y), 0.0));
         let uv = blend.value(uvs);
         surface.uv = DVec2::new(uv.x, uv.y);
 
@@ -217,7 +234,8 @@ impl MeshDress {
             self.align(&mut dressed, corners, blend, placement);
             return dressed;
         };
-        let normals = corners.map(|i| normals[i as usize].as_dvec3());
+        let normals = at(normals, corners);
+        let normals = std::array::from_fn(|i| normals[i].as_dvec3());
         let moved = |n: DVec3| placement.map_or(n, |m| m.normal(n));
         let sum = moved(blend.value(normals));
         let length = sum.length();

@@ -47,6 +47,6 @@ impl MeshLight {
 /// A triangle of a mesh, in the space of its tree.
 fn triangle(mesh: &TriangleMesh, index: u32) -> Option<Triangle> {
     let corner = |i: u32| mesh.origin + mesh.positions[i as usize].as_dvec3();
-    let [a, b, c] = mesh.indices[index as usize].map(corner);
-    Triangle::new(a, b, c).ok()
+    let [a, b, c] = mesh.indices[index as usize];
+    Triangle::new(corner(a), corner(b), corner(c)).ok()
 }
