@@ -17,7 +17,7 @@ pub fn write() -> Result<()> {
     let save = |name: &str, image: &Image| {
         lumbre::write_image(&folder.join(name), image, &lumbre::SaveOptions::default())
     };
-    save("tiles.png", &picture(512, 512, |u, v| tile_colour(u, v)))?;
+    save("tiles.png", &picture(512, 512, tile_colour))?;
     // A normal map holds numbers, not light: the file's transfer function must give back what is stored.
     save("tiles-normal.png", &picture(512, 512, |u, v| tile_normal(u, v).map(decode_srgb)))?;
     save("dusk.hdr", &picture(256, 128, dusk))?;
@@ -159,9 +159,9 @@ fn dusk(u: f64, v: f64) -> Rgb {
     let horizon = (-(up.max(0.0) * 5.0)).exp();
     let warm = (-from_sun * 1.3).exp();
     let sky =
-        Rgb::new(0.1, 0.19, 0.42).lerp(Rgb::new(1.0, 0.42, 0.16), (horizon * (0.35 + 0.65 * warm)) as f32);
-    let glow = Rgb::new(3.2, 1.7, 0.7) * (-(from_sun / 0.16).powi(2)).exp() as f32;
-    let sun = Rgb::new(230.0, 150.0, 75.0) * if from_sun < 0.045 { 1.0 } else { 0.0 };
+        Rgb::new(0.24, 0.42, 0.85).lerp(Rgb::new(1.9, 0.85, 0.34), (horizon * (0.35 + 0.65 * warm)) as f32);
+    let glow = Rgb::new(5.0, 2.6, 1.1) * (-(from_sun / 0.16).powi(2)).exp() as f32;
+    let sun = Rgb::new(420.0, 290.0, 160.0) * if from_sun < 0.045 { 1.0 } else { 0.0 };
     let ground = Rgb::new(0.07, 0.055, 0.045);
     if up > 0.0 { sky + glow + sun } else { ground }
 }

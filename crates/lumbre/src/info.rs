@@ -1,10 +1,12 @@
 //! What is in a scene, in numbers.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::mem::size_of_val;
 
 use lumbre_geometry::Aabb;
-use lumbre_scene::{AreaLightDesc, CameraKind, GeometryDesc, LightDesc, MeshDesc, SceneDesc, ShapeDesc};
+use lumbre_scene::{
+    AreaLightDesc, CameraKind, GeometryDesc, LightDesc, MaterialId, MeshDesc, SceneDesc, ShapeDesc,
+};
 
 /// What is in a scene. Counts are of what the file describes: a shape inside an object counts once, however often the
 /// object is placed.
@@ -32,13 +34,19 @@ impl SceneInfo {
     /// Counts what a description holds; bounds and trees are known only once it is built.
     pub(crate) fn of(desc: &SceneDesc) -> Self {
         let mut info = Self::default();
-        let objects = desc.objects.iter().flat_map(|object| &object.shapes);
-        for shape in desc.shapes.iter().chain(objects) {
+        let objects = || desc.objects.iter().flat_map(|object| &object.shapes);
+        for shape in desc.shapes.iter().chain(objects()) {
             info.add_shape(shape);
         }
         info.instances =
             desc.instances.len() as u64 + desc.objects.iter().map(|o| o.instances.len() as u64).sum::<u64>();
-        for material in &desc.materials {
+        let used: HashSet<MaterialId> =
+            desc.shapes.iter().chain(objects()).filter_map(|s| s.material).collect();
+        for (i, material) in desc.materials.iter().enumerate() {
+            // Readers keep their default at hand, whether or not a shape wears it.
+            if material.name.is_none() && !used.contains(&MaterialId(i as u32)) {
+                continue;
+            }
             *info.materials.entry(material.material.kind.name().to_owned()).or_default() += 1;
         }
         for light in &desc.lights {
