@@ -31,6 +31,15 @@ pub enum Position {
         /// The column.
         column: u64,
     },
+    /// An element of a structured text.
+    Element {
+        /// The line.
+        line: u64,
+        /// The column.
+        column: u64,
+        /// The element's path, such as `/accessors/3/count`.
+        path: String,
+    },
     /// In binary data.
     Binary {
         /// Bytes from the start of the (unpacked) file.
@@ -54,6 +63,18 @@ impl Place {
     /// A byte of binary data, with the path of the element that it belongs to.
     pub fn binary(file: impl Into<Arc<str>>, offset: u64, path: impl Into<String>) -> Self {
         Self { file: file.into(), position: Position::Binary { offset, path: path.into() } }
+    }
+
+    /// The same line and column of a text, with the path of the element that stands there; other places, and with an empty
+    /// path, as they are.
+    #[must_use]
+    pub fn with_path(self, path: String) -> Self {
+        match self.position {
+            Position::Text { line, column } if !path.is_empty() => {
+                Self { position: Position::Element { line, column, path }, ..self }
+            }
+            _ => self,
+        }
     }
 
     /// The place of byte `offset` in `text`, by line and column.
@@ -82,6 +103,7 @@ impl Display for Place {
         match &self.position {
             Position::Whole => Ok(()),
             Position::Text { line, column } => write!(f, ":{line}:{column}"),
+            Position::Element { line, column, path } => write!(f, ":{line}:{column} {path}"),
             Position::Binary { offset, path } if path.is_empty() => write!(f, ":byte {offset}"),
             Position::Binary { offset, path } => write!(f, ":byte {offset} {path}"),
         }

@@ -1,0 +1,404 @@
+//! Accessors: numbers out of buffers, whatever their types, strides and gaps.
+
+use super::file::{File, List, View};
+use super::json::{Read, Value};
+use crate::diagnostic::{Diagnostic, quoted};
+
+/// The types of numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Component {
+    I8,
+    U8,
+    I16,
+    U16,
+    U32,
+    F32,
+}
+
+impl Component {
+    fn read(value: Value<'_>) -> Read<Self> {
+        Ok(match value.whole(0)? {
+            5120 => Self::I8,
+            5121 => Self::U8,
+            5122 => Self::I16,
+            5123 => Self::U16,
+            5125 => Self::U32,
+            5126 => Self::F32,
+            _ => return Err(value.unexpected("unknown type of number", "5120, 5121, 5122, 5123, 5125 or 5126")),
+        })
+    }
+
+    fn bytes(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::U32 | Self::F32 => 4,
+        }
+    }
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::I8 => "signed bytes",
+            Self::U8 => "unsigned bytes",
+            Self::I16 => "signed shorts",
+            Self::U16 => "unsigned shorts",
+            Self::U32 => "unsigned integers",
+            Self::F32 => "floats",
+        }
+    }
+}
+
+/// How many numbers an element has, and how they lie.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Element {
+    Scalar,
+    Vec2,
+    Vec3,
+    Vec4,
+    Mat2,
+    Mat3,
+    Mat4,
+}
+
+impl Element {
+    const NAMES: [(&'static str, Self); 7] = [
+        ("SCALAR", Self::Scalar),
+        ("VEC2", Self::Vec2),
+        ("VEC3", Self::Vec3),
+        ("VEC4", Self::Vec4),
+        ("MAT2", Self::Mat2),
+        ("MAT3", Self::Mat3),
+        ("MAT4", Self::Mat4),
+    ];
+
+    fn read(value: Value<'_>) -> Read<Self> {
+        let text = value.string()?;
+        let known = Self::NAMES.iter().find(|(name, _)| *name == text).map(|&(_, element)| element);
+        known.ok_or_else(|| {
+            let wrong = value.wrong("unknown type of element").found(quoted(&text));
+            wrong.suggest(&text, Self::NAMES.iter().map(|(name, _)| *name)).into()
+        })
+    }
+
+    pub fn name(self) -> &'static str {
+        Self::NAMES[self as usize].0
+    }
+
+    /// Columns, and numbers in each.
+    fn columns(self) -> (usize, usize) {
+        match self {
+            Self::Scalar => (1, 1),
+            Self::Vec2 => (1, 2),
+            Self::Vec3 => (1, 3),
+            Self::Vec4 => (1, 4),
+            Self::Mat2 => (2, 2),
+            Self::Mat3 => (3, 3),
+            Self::Mat4 => (4, 4),
+        }
+    }
+
+    fn numbers(self) -> usize {
+        let (columns, rows) = self.columns();
+        columns * rows
+    }
+}
+
+/// An accessor whose every byte is known to be there.
+#[derive(Clone, Copy)]
+pub(super) struct Accessor<'a> {
+    /// The accessor itself, for messages.
+    pub value: Value<'a>,
+    /// The type of its numbers.
+    pub component: Component,
+    /// The numbers of one element.
+    pub element: Element,
+    /// Whether whole numbers stand for parts of 1.
+    pub normalized: bool,
+    /// How many elements it has, at least 1.
+    pub count: usize,
+    /// The elements; `None` where all are zero.
+    data: Option<Strided<'a>>,
+    sparse: Option<Sparse<'a>>,
+    /// Whether it says its least and its largest values.
+    pub has_bounds: bool,
+    /// The view it looks through, and whether that has a stride.
+    pub view: Option<(usize, bool)>,
+    /// Where elements start in the buffer, for alignment.
+    pub start: u64,
+    /// Bytes from one element to the next.
+    pub stride: usize,
+}
+
+#[derive(Clone, Copy)]
+struct Strided<'a> {
+    bytes: &'a [u8],
+    stride: usize,
+}
+
+#[derive(Clone, Copy)]
+struct Sparse<'a> {
+    value: Value<'a>,
+    count: usize,
+    component: Component,
+    indices: &'a [u8],
+    values: &'a [u8],
+}
+
+/// A range of `count` elements of `size` bytes, `stride` apart, from `offset` on, of which a view has all bytes.
+fn strided<'a>(
+    culprit: Value<'_>,
+    view: &View<'a>,
+    offset: u64,
+    count: u64,
+    stride: usize,
+    size: usize,
+) -> Read<&'a [u8]> {
+    let end = (count - 1).checked_mul(stride as u64).and_then(|n| n.checked_add(size as u64)?.checked_add(offset));
+    let found = view.bytes.len() as u64;
+    match end {
+        Some(end) if end <= found => Ok(&view.bytes[offset as usize..end as usize]),
+        _ => {
+            let wrong = culprit.wrong("accessor past the end of its buffer view");
+            let needs = end.map_or("more bytes than can be".to_owned(), |end| format!("{end} bytes"));
+            Err(wrong.found(format!("{count} elements, which need {needs}")).expected(format!("{found} bytes at most")).into())
+        }
+    }
+}
+
+/// Whether an accessor is of a kind that is known; those of others may stand unused.
+pub(super) fn is_known(value: Value<'_>) -> Read<bool> {
+    let component = value.need("componentType")?;
+    let element = value.need("type")?;
+    component.whole(0)?;
+    element.string()?;
+    Ok(Component::read(component).is_ok() && Element::read(element).is_ok())
+}
+
+impl<'a> Accessor<'a> {
+    /// The accessor that `value` names.
+    pub fn named(file: &'a File<'_>, value: Value<'_>) -> Read<Self> {
+        let index = value.index(file.list(List::Accessors).len(), "an accessor")?;
+        Self::at(file, index)
+    }
+
+    /// The accessor at a position.
+    pub fn at(file: &'a File<'_>, index: usize) -> Read<Self> {
+        let value = file.list(List::Accessors)[index];
+        let component = Component::read(value.need("componentType")?)?;
+        let element = Element::read(value.need("type")?)?;
+        let count_value = value.need("count")?;
+        let count = count_value.whole(1)?;
+        let normalized = value.bool_or("normalized", false)?;
+        if normalized && matches!(component, Component::F32 | Component::U32) {
+            let culprit = value.need("normalized")?;
+            file.breach(culprit.wrong("normalized numbers of a wrong type").found(component.name()))?;
+        }
+        for bound in ["min", "max"] {
+            if let Some(bound) = value.get(bound)?
+                && bound.array()?.count() != element.numbers()
+            {
+                file.breach(bound.wrong("bound of a wrong length").expected(element.numbers()))?;
+            }
+        }
+        let has_bounds = value.get("min")?.is_some() && value.get("max")?.is_some();
+        let offset_value = value.get("byteOffset")?;
+        let offset = offset_value.map_or(Ok(0), |v| v.whole(0))?;
+        let (columns, rows) = element.columns();
+        let column = if columns > 1 { (rows * component.bytes()).next_multiple_of(4) } else { rows * component.bytes() };
+        // The last column needs no padding behind it.
+        let size = columns * column;
+        let least = size - column + rows * component.bytes();
+
+        let mut at = Self {
+            value,
+            component,
+            element,
+            normalized,
+            count: 0,
+            data: None,
+            sparse: None,
+            has_bounds,
+            view: None,
+            start: offset,
+            stride: size,
+        };
+        if let Some(name) = value.get("bufferView")? {
+            let (index, view) = file.view(name)?;
+            let stride = view.stride.unwrap_or(size);
+            if stride < least {
+                let wrong = value.wrong("stride shorter than an element").found(stride);
+                return Err(wrong.expected(format!("{least} or more")).into());
+            }
+            let bytes = strided(count_value, &view, offset, count, stride, least)?;
+            at.data = Some(Strided { bytes, stride });
+            at.view = Some((index, view.stride.is_some()));
+            at.start = offset + view.offset;
+            at.stride = stride;
+            let step = if columns > 1 { 4 } else { component.bytes() as u64 };
+            for (start, culprit) in [(offset, offset_value.unwrap_or(value)), (at.start, value)] {
+                if !start.is_multiple_of(step) {
+                    let wrong = culprit.wrong("accessor out of step with its numbers").found(format!("byte {start}"));
+                    file.breach(wrong.expected(format!("a multiple of {step}")))?;
+                    break;
+                }
+            }
+        } else {
+            if let Some(culprit) = offset_value {
+                file.breach(culprit.wrong("byteOffset without a buffer view"))?;
+            }
+            // All zeros, but for what is sparse: nothing in the file pays for so many.
+            let most = 65_536_u64.saturating_add(file.buffer_bytes());
+            if count > most {
+                let wrong = count_value.wrong("accessor without data has too many elements").found(count);
+                return Err(wrong.expected(format!("{most} or less, for the buffers there are")).into());
+            }
+        }
+        at.count = count as usize;
+        if let Some(sparse) = value.get("sparse")? {
+            at.sparse = Some(Sparse::read(file, sparse, count, size)?);
+        }
+        file.budget.elements(0, "accessors")?;
+        Ok(at)
+    }
+
+    /// What it has, in words.
+    pub fn said(&self) -> String {
+        format!("{} of {}", self.element.name(), self.component.name())
+    }
+
+    /// An error unless it has elements of one of these kinds.
+    pub fn expect(&self, culprit: Value<'_>, elements: &[Element], components: &[Component]) -> Read<()> {
+        if elements.contains(&self.element) && components.contains(&self.component) {
+            return Ok(());
+        }
+        let elements: Vec<&str> = elements.iter().map(|e| e.name()).collect();
+        let components: Vec<&str> = components.iter().map(|c| c.name()).collect();
+        let wrong = culprit.wrong("accessor of a wrong type").found(self.said());
+        Err(wrong.expected(format!("{} of {}", elements.join(" or "), components.join(" or "))).into())
+    }
+
+    /// All elements as numbers, made into what is wanted. `N` numbers are read of each: an element has at least so many.
+    pub fn floats<const N: usize, T>(&self, file: &File<'_>, make: impl Fn([f32; N]) -> T) -> Read<Vec<T>> {
+        debug_assert!(N <= self.element.numbers());
+        match (self.component, self.normalized) {
+            (Component::F32, _) => self.decoded(file, |b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]), make),
+            (Component::I8, false) => self.decoded(file, |b| f32::from(b[0] as i8), make),
+            (Component::I8, true) => self.decoded(file, |b| (f32::from(b[0] as i8) / 127.0).max(-1.0), make),
+            (Component::U8, false) => self.decoded(file, |b| f32::from(b[0]), make),
+            (Component::U8, true) => self.decoded(file, |b| f32::from(b[0]) / 255.0, make),
+            (Component::I16, false) => self.decoded(file, |b| f32::from(i16::from_le_bytes([b[0], b[1]])), make),
+            (Component::I16, true) => {
+                self.decoded(file, |b| (f32::from(i16::from_le_bytes([b[0], b[1]])) / 32767.0).max(-1.0), make)
+            }
+            (Component::U16, false) => self.decoded(file, |b| f32::from(u16::from_le_bytes([b[0], b[1]])), make),
+            (Component::U16, true) => {
+                self.decoded(file, |b| f32::from(u16::from_le_bytes([b[0], b[1]])) / 65535.0, make)
+            }
+            (Component::U32, _) => {
+                self.decoded(file, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as f32, make)
+            }
+        }
+    }
+
+    /// All elements as whole numbers; numbers of other types are an error of whoever did not look.
+    pub fn wholes<const N: usize>(&self, file: &File<'_>) -> Read<Vec<[u32; N]>> {
+        debug_assert!(N <= self.element.numbers());
+        match self.component {
+            Component::U8 => self.decoded(file, |b| u32::from(b[0]), |n| n),
+            Component::U16 => self.decoded(file, |b| u32::from(u16::from_le_bytes([b[0], b[1]])), |n| n),
+            Component::U32 => self.decoded(file, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]), |n| n),
+            Component::I8 | Component::I16 | Component::F32 => {
+                Err(self.value.wrong("accessor of a wrong type").found(self.said()).expected("unsigned numbers").into())
+            }
+        }
+    }
+
+    fn decoded<N1: Copy + Default, const N: usize, T>(
+        &self,
+        file: &File<'_>,
+        decode: impl Fn(&[u8]) -> N1,
+        make: impl Fn([N1; N]) -> T,
+    ) -> Read<Vec<T>> {
+        let size = self.component.bytes();
+        let (columns, rows) = self.element.columns();
+        let column = if columns > 1 { (rows * size).next_multiple_of(4) } else { rows * size };
+        let element = |bytes: &[u8]| {
+            let mut numbers = [N1::default(); N];
+            for (i, number) in numbers.iter_mut().enumerate() {
+                let at = i / rows * column + i % rows * size;
+                *number = decode(&bytes[at..at + size]);
+            }
+            make(numbers)
+        };
+        file.budget.elements(self.count as u64, "elements of accessors")?;
+        let mut elements = file.budget.vec(self.count as u64, "elements of accessors")?;
+        match self.data {
+            None => elements.extend((0..self.count).map(|_| make([N1::default(); N]))),
+            Some(Strided { bytes, stride }) => elements.extend(bytes.chunks(stride).map(element)),
+        }
+        if let Some(sparse) = &self.sparse {
+            let value_size = columns * column;
+            sparse.each_index(self.count, |k, index| {
+                elements[index] = element(&sparse.values[k * value_size..]);
+            })?;
+        }
+        Ok(elements)
+    }
+}
+
+impl<'a> Sparse<'a> {
+    fn read(file: &'a File<'_>, value: Value<'a>, of: u64, size: usize) -> Read<Self> {
+        let count_value = value.need("count")?;
+        let count = count_value.whole(1)?;
+        if count > of {
+            let expected = format!("at most {of}, the elements of the accessor");
+            return Err(count_value.unexpected("too many sparse elements", &expected));
+        }
+        let part = |name: &str, size: Option<usize>| -> Read<(&'a [u8], Component)> {
+            let part = value.need(name)?;
+            let component = match size {
+                Some(_) => Component::F32,
+                None => Component::read(part.need("componentType")?)?,
+            };
+            if !matches!(component, Component::U8 | Component::U16 | Component::U32) && size.is_none() {
+                let expected = "5121, 5123 or 5125";
+                return Err(part.need("componentType")?.unexpected("wrong type of sparse indices", expected));
+            }
+            let size = size.unwrap_or(component.bytes());
+            let (_, view) = file.view(part.need("bufferView")?)?;
+            if view.stride.is_some() {
+                file.breach(part.wrong("sparse data in a buffer view with a stride"))?;
+            }
+            let offset = part.get("byteOffset")?.map_or(Ok(0), |v| v.whole(0))?;
+            Ok((strided(part, &view, offset, count, size, size)?, component))
+        };
+        let (indices, component) = part("indices", None)?;
+        let (values, _) = part("values", Some(size))?;
+        Ok(Self { value, count: count as usize, component, indices, values })
+    }
+
+    /// Hands over each index below `count` with its position in the list.
+    fn each_index(&self, count: usize, mut f: impl FnMut(usize, usize)) -> Read<()> {
+        let size = self.component.bytes();
+        let mut before = None;
+        for (k, b) in self.indices.chunks_exact(size).take(self.count).enumerate() {
+            let index = match self.component {
+                Component::U8 => usize::from(b[0]),
+                Component::U16 => usize::from(u16::from_le_bytes([b[0], b[1]])),
+                _ => u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize,
+            };
+            let wrong = |message: &str, expected: String| -> Diagnostic {
+                self.value.wrong(message).found(format!("{index} as element {k}")).expected(expected)
+            };
+            if index >= count {
+                return Err(wrong("sparse index out of range", format!("0 to {}", count - 1)).into());
+            }
+            if let Some(before) = before.filter(|&before| index <= before) {
+                return Err(wrong("sparse indices out of order", format!("more than {before}")).into());
+            }
+            before = Some(index);
+            f(k, index);
+        }
+        Ok(())
+    }
+}

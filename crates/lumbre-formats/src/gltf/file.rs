@@ -1,0 +1,384 @@
+//! A glTF with its lists and its buffers at hand.
+
+use std::borrow::Cow;
+use std::cell::RefCell;
+use std::path::Path;
+use std::sync::Arc;
+
+use super::json::{Read, Value};
+use super::uri::{DataUri, Target, base64_decoded, percent_decoded_bytes, target};
+use crate::budget::Budget;
+use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, quoted};
+use crate::input::Input;
+
+/// The top-level lists, and those that extensions keep there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum List {
+    Accessors,
+    Animations,
+    Buffers,
+    BufferViews,
+    Cameras,
+    Images,
+    Materials,
+    Meshes,
+    Nodes,
+    Samplers,
+    Scenes,
+    Skins,
+    Textures,
+    Lights,
+    Variants,
+}
+
+impl List {
+    const ALL: [Self; 15] = [
+        Self::Accessors,
+        Self::Animations,
+        Self::Buffers,
+        Self::BufferViews,
+        Self::Cameras,
+        Self::Images,
+        Self::Materials,
+        Self::Meshes,
+        Self::Nodes,
+        Self::Samplers,
+        Self::Scenes,
+        Self::Skins,
+        Self::Textures,
+        Self::Lights,
+        Self::Variants,
+    ];
+
+    /// The extension that has it, if one does, its name, and what one of it is called.
+    fn names(self) -> (Option<&'static str>, &'static str, &'static str) {
+        match self {
+            Self::Accessors => (None, "accessors", "an accessor"),
+            Self::Animations => (None, "animations", "an animation"),
+            Self::Buffers => (None, "buffers", "a buffer"),
+            Self::BufferViews => (None, "bufferViews", "a buffer view"),
+            Self::Cameras => (None, "cameras", "a camera"),
+            Self::Images => (None, "images", "an image"),
+            Self::Materials => (None, "materials", "a material"),
+            Self::Meshes => (None, "meshes", "a mesh"),
+            Self::Nodes => (None, "nodes", "a node"),
+            Self::Samplers => (None, "samplers", "a sampler"),
+            Self::Scenes => (None, "scenes", "a scene"),
+            Self::Skins => (None, "skins", "a skin"),
+            Self::Textures => (None, "textures", "a texture"),
+            Self::Lights => (Some("KHR_lights_punctual"), "lights", "a light"),
+            Self::Variants => (Some("KHR_materials_variants"), "variants", "a variant"),
+        }
+    }
+}
+
+/// A glTF that is being read.
+pub(super) struct File<'a> {
+    /// The whole.
+    pub root: Value<'a>,
+    /// The name for messages.
+    pub name: Arc<str>,
+    /// Where the files that it names are.
+    pub folder: &'a Path,
+    /// What it may cost.
+    pub budget: &'a Budget,
+    diagnostics: RefCell<&'a mut Diagnostics>,
+    lists: [Vec<Value<'a>>; List::ALL.len()],
+    buffers: Vec<Option<Cow<'a, [u8]>>>,
+    /// Bytes of buffer views that were compressed.
+    unpacked: Vec<Option<Vec<u8>>>,
+    /// Bytes of all buffers together.
+    buffer_bytes: u64,
+}
+
+/// The bytes of a buffer view.
+#[derive(Clone, Copy)]
+pub(super) struct View<'a> {
+    /// The bytes.
+    pub bytes: &'a [u8],
+    /// Bytes from one element to the next, where the view says.
+    pub stride: Option<usize>,
+    /// Where the bytes start in their buffer.
+    pub offset: u64,
+}
+
+impl<'a> File<'a> {
+    /// Finds the lists; the buffers come with [`File::load`].
+    pub fn new(
+        root: Value<'a>,
+        name: &Arc<str>,
+        folder: &'a Path,
+        budget: &'a Budget,
+        diagnostics: &'a mut Diagnostics,
+    ) -> Read<Self> {
+        let mut lists: [Vec<Value<'a>>; List::ALL.len()] = Default::default();
+        for list in List::ALL {
+            let (extension, key, _) = list.names();
+            let holder = match extension {
+                None => Some(root),
+                Some(extension) => root.extension(extension)?,
+            };
+            let Some(holder) = holder else { continue };
+            let array = match (holder.get(key)?, extension) {
+                (Some(array), _) => array,
+                (None, None) => continue,
+                (None, Some(_)) => holder.need(key)?,
+            };
+            let mut values = crate::budget::BudgetVec::new(budget, "lists of a glTF");
+            for value in array.array()? {
+                values.push(value.object()?)?;
+            }
+            lists[list as usize] = values.into_vec();
+            if lists[list as usize].is_empty() {
+                breach(diagnostics, array.wrong("empty list").expected("one element or more, or no list"))?;
+            }
+        }
+        Ok(Self {
+            root,
+            name: name.clone(),
+            folder,
+            budget,
+            diagnostics: RefCell::new(diagnostics),
+            lists,
+            buffers: vec![],
+            unpacked: vec![],
+            buffer_bytes: 0,
+        })
+    }
+
+    /// The values of a list.
+    pub fn list(&self, list: List) -> &[Value<'a>] {
+        &self.lists[list as usize]
+    }
+
+    /// The element of a list that `value` names by its position, with the position.
+    pub fn at(&self, list: List, value: Value<'_>) -> Read<(usize, Value<'a>)> {
+        let index = value.index(self.list(list).len(), list.names().2)?;
+        Ok((index, self.list(list)[index]))
+    }
+
+    /// The element of a list that a member of `value` names, where it has that member.
+    pub fn named(&self, list: List, value: Value<'_>, member: &str) -> Read<Option<(usize, Value<'a>)>> {
+        value.get(member)?.map(|index| self.at(list, index)).transpose()
+    }
+
+    /// Whether what cannot be used should be dropped with a warning.
+    pub fn is_lenient(&self) -> bool {
+        self.diagnostics.borrow().is_lenient()
+    }
+
+    /// Adds a warning of this kind.
+    pub fn warn(&self, value: Value<'_>, message: &str) {
+        value.warn(&mut self.diagnostics.borrow_mut(), message);
+    }
+
+    /// Adds a warning.
+    pub fn push(&self, warning: Diagnostic) {
+        self.diagnostics.borrow_mut().push(warning);
+    }
+
+    /// The collector, for readers of other formats.
+    pub fn with_diagnostics<T>(&self, f: impl FnOnce(&mut Diagnostics) -> T) -> T {
+        f(&mut self.diagnostics.borrow_mut())
+    }
+
+    /// Something that glTF forbids though its meaning is plain: an error, or a warning when lenient.
+    pub fn breach(&self, wrong: Diagnostic) -> Read<()> {
+        breach(&mut self.diagnostics.borrow_mut(), wrong)
+    }
+
+    /// Loads every buffer. `binary` is the one inside a GLB.
+    pub fn load(&mut self, binary: Option<&'a [u8]>, is_glb: bool) -> Read<()> {
+        for (index, &value) in self.lists[List::Buffers as usize].iter().enumerate() {
+            let bytes = self.buffer(index, value, binary, is_glb)?;
+            self.buffer_bytes += bytes.as_ref().map_or(0, |bytes| bytes.len() as u64);
+            self.buffers.push(bytes);
+        }
+        for &value in &self.lists[List::BufferViews as usize] {
+            let bytes = super::meshopt::unpacked(self, value)?;
+            self.buffer_bytes += bytes.as_ref().map_or(0, |bytes| bytes.len() as u64);
+            self.unpacked.push(bytes);
+        }
+        Ok(())
+    }
+
+    fn buffer(
+        &self,
+        index: usize,
+        value: Value<'a>,
+        binary: Option<&'a [u8]>,
+        is_glb: bool,
+    ) -> Read<Option<Cow<'a, [u8]>>> {
+        let length = value.need("byteLength")?;
+        let length_value = length;
+        let length = length.whole(1)?;
+        let bytes: Cow<'a, [u8]> = match value.get("uri")? {
+            None if index == 0 && binary.is_some() => Cow::Borrowed(binary.unwrap_or_default()),
+            None => {
+                // Another program is to fill it, or it stands in for one that extensions unpack.
+                if index == 0 && is_glb && value.get("extensions")?.is_none() {
+                    let wrong = value.wrong("buffer without data").expected("a binary chunk in the GLB file");
+                    return Err(wrong.into());
+                }
+                return Ok(None);
+            }
+            Some(uri) => Cow::Owned(self.data(uri, &["application/octet-stream", "application/gltf-buffer"])?.1),
+        };
+        let found = bytes.len() as u64;
+        if found < length {
+            let wrong = length_value.wrong("buffer longer than its data").found(length);
+            return Err(wrong.expected(format!("{found} or less")).into());
+        }
+        if matches!(bytes, Cow::Borrowed(_)) && found > length + 3 {
+            let warning = Diagnostic::warning("binary chunk longer than its buffer").at(length_value.place());
+            self.push(warning.found(format!("{found} bytes")).expected(length));
+        }
+        let bytes = match bytes {
+            Cow::Borrowed(bytes) => Cow::Borrowed(&bytes[..length as usize]),
+            Cow::Owned(mut bytes) => {
+                bytes.truncate(length as usize);
+                Cow::Owned(bytes)
+            }
+        };
+        Ok(Some(bytes))
+    }
+
+    /// The bytes behind a URI, with a name for messages. Data in the URI itself must be of one of the media types, unless
+    /// there are none to choose from.
+    pub fn data(&self, uri: Value<'_>, media_types: &[&str]) -> Read<(Arc<str>, Vec<u8>)> {
+        let text = uri.string()?;
+        match target(&text) {
+            Target::Data(DataUri { media_type, is_base64, data }) => {
+                if !media_types.is_empty() && !media_types.contains(&media_type) {
+                    let wrong = uri.wrong("wrong media type of data").found(quoted(media_type));
+                    self.breach(wrong.expected(media_types.join(" or ")))?;
+                }
+                let name: Arc<str> = uri.place().to_string().into();
+                self.budget.bytes(data.len() as u64, "data URI")?;
+                if !is_base64 {
+                    return Ok((name, percent_decoded_bytes(data)));
+                }
+                let data = if data.contains('%') { Cow::Owned(super::uri::percent_decoded(data)) } else { Cow::Borrowed(data) };
+                let decoded = base64_decoded(&data).map_err(|at| {
+                    let found = data.get(at..).and_then(|rest| rest.chars().next());
+                    let found = found.map_or_else(
+                        || format!("{} characters", data.len()),
+                        |c| format!("{} as character {}", quoted(&c.to_string()), at + 1),
+                    );
+                    FormatError::from(uri.wrong("wrong base64 data").found(found))
+                })?;
+                Ok((name, decoded))
+            }
+            Target::File(path) => {
+                if path.as_os_str().is_empty() {
+                    return Err(uri.unexpected("wrong URI", "the name of a file or data"));
+                }
+                let path = self.folder.join(path);
+                let input = Input::open(&path, self.budget).map_err(|error| match error {
+                    FormatError::Io { source, action, .. } => {
+                        let wrong = uri.wrong(format!("{action}: {source}"));
+                        FormatError::from(wrong.found(quoted(&path.display().to_string())))
+                    }
+                    other => other,
+                })?;
+                Ok((input.name().clone(), input.into_bytes()))
+            }
+            Target::Scheme(scheme) => {
+                let wrong = uri.wrong("unsupported scheme of a URI").found(quoted(scheme));
+                Err(wrong.expected("the name of a file, or data").into())
+            }
+        }
+    }
+
+    /// The bytes of all buffers together.
+    pub fn buffer_bytes(&self) -> u64 {
+        self.buffer_bytes
+    }
+
+    /// The bytes of the buffer that a member of `value` names.
+    pub fn buffer_slice(&self, value: Value<'_>) -> Read<(&[u8], u64)> {
+        let (index, buffer) = self.at(List::Buffers, value.need("buffer")?)?;
+        let offset_value = value.get("byteOffset")?;
+        let offset = offset_value.map_or(Ok(0), |v| v.whole(0))?;
+        let length_value = value.need("byteLength")?;
+        let length = length_value.whole(1)?;
+        // Before the buffers are loaded there is only what they say.
+        let bytes = match self.buffers.get(index) {
+            Some(Some(bytes)) => &bytes[..],
+            _ => {
+                let said = buffer.need("byteLength")?.whole(1)?;
+                let wrong = value.wrong("view of a buffer without data").found(format!("buffer {index} of {said} bytes"));
+                return Err(wrong.into());
+            }
+        };
+        let size = bytes.len() as u64;
+        let fits = offset.checked_add(length).is_some_and(|end| end <= size);
+        if !fits {
+            let culprit = if offset < size { length_value } else { offset_value.unwrap_or(length_value) };
+            let wrong = culprit.wrong("buffer view past the end of its buffer");
+            let found = format!("{length} bytes from byte {offset}");
+            return Err(wrong.found(found).expected(format!("at most {size} bytes in all")).into());
+        }
+        Ok((&bytes[offset as usize..(offset + length) as usize], offset))
+    }
+
+    /// The buffer view that `value` names.
+    pub fn view(&self, value: Value<'_>) -> Read<(usize, View<'_>)> {
+        let (index, view) = self.at(List::BufferViews, value)?;
+        Ok((index, self.view_at(index, view)?))
+    }
+
+    /// A buffer view.
+    pub fn view_at(&self, index: usize, value: Value<'_>) -> Read<View<'_>> {
+        let stride = match value.get("byteStride")? {
+            None => None,
+            Some(value) => {
+                let stride = value.whole(0)?;
+                if !(4..=252).contains(&stride) || !stride.is_multiple_of(4) {
+                    return Err(value.unexpected("wrong stride", "a multiple of 4 from 4 to 252"));
+                }
+                Some(stride as usize)
+            }
+        };
+        if let Some(target) = value.get("target")? {
+            match target.whole(0)? {
+                34962 => {}
+                34963 => {
+                    if stride.is_some() {
+                        self.breach(value.wrong("buffer view of indices with a stride"))?;
+                    }
+                }
+                _ => {
+                    let warning = Diagnostic::warning("unknown target of a buffer view").at(target.place());
+                    self.push(warning.expected("34962 or 34963"));
+                }
+            }
+        }
+        if let Some(Some(bytes)) = self.unpacked.get(index) {
+            let stride = super::meshopt::stride(value)?;
+            return Ok(View { bytes, stride, offset: 0 });
+        }
+        let (bytes, offset) = self.buffer_slice(value)?;
+        if let (Some(stride), Some(value)) = (stride, value.get("byteStride")?)
+            && stride > bytes.len()
+        {
+            let wrong = value.wrong("stride longer than the buffer view").found(stride);
+            self.breach(wrong.expected(format!("at most {}", bytes.len())))?;
+        }
+        Ok(View { bytes, stride, offset })
+    }
+
+    /// A place for messages about the file as a whole.
+    pub fn whole(&self) -> Place {
+        Place::whole(self.name.clone())
+    }
+}
+
+fn breach(diagnostics: &mut Diagnostics, wrong: Diagnostic) -> Read<()> {
+    if !diagnostics.is_lenient() {
+        return Err(wrong.into());
+    }
+    let Diagnostic { place, message, found, expected, .. } = wrong;
+    diagnostics.push(Diagnostic { place, found, expected, ..Diagnostic::warning(message) });
+    Ok(())
+}

@@ -1,0 +1,611 @@
+//! Meshes: the primitives of a file, and triangles, points and segments out of them.
+
+use std::collections::HashMap;
+
+use lumbre_image::Rgb;
+use lumbre_math::{DMat3, DMat4, DVec3, Vec2, Vec3};
+
+use super::accessor::{Accessor, Component, Element};
+use super::file::{File, List};
+use super::json::{Read, Value};
+use crate::diagnostic::quoted;
+
+/// How vertices make shapes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) enum Mode {
+    Points,
+    Lines,
+    LineLoop,
+    LineStrip,
+    Triangles,
+    TriangleStrip,
+    TriangleFan,
+}
+
+impl Mode {
+    fn read(value: Value<'_>) -> Read<Self> {
+        let Some(mode) = value.get("mode")? else { return Ok(Self::Triangles) };
+        Ok(match mode.whole(0)? {
+            0 => Self::Points,
+            1 => Self::Lines,
+            2 => Self::LineLoop,
+            3 => Self::LineStrip,
+            4 => Self::Triangles,
+            5 => Self::TriangleStrip,
+            6 => Self::TriangleFan,
+            _ => return Err(mode.unexpected("unknown mode of a primitive", "a whole number from 0 to 6")),
+        })
+    }
+
+    /// Whether it makes a surface.
+    pub fn is_surface(self) -> bool {
+        matches!(self, Self::Triangles | Self::TriangleStrip | Self::TriangleFan)
+    }
+
+    /// How many of `count` vertices make whole shapes.
+    fn whole(self, count: usize) -> usize {
+        match self {
+            Self::Points => count,
+            Self::Lines => count - count % 2,
+            Self::LineLoop | Self::LineStrip => if count < 2 { 0 } else { count },
+            Self::Triangles => count - count % 3,
+            Self::TriangleStrip | Self::TriangleFan => if count < 3 { 0 } else { count },
+        }
+    }
+}
+
+/// One of the attributes that are read, with its set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Attribute {
+    Position,
+    Normal,
+    Tangent,
+    TexCoord(usize),
+    Colour(usize),
+    Joints(usize),
+    Weights(usize),
+    /// Of an application, by the underscore before its name.
+    Own,
+}
+
+impl Attribute {
+    fn read(name: &str) -> Option<Self> {
+        let set = |text: &str| {
+            let plain = text == "0" || (!text.starts_with('0') && text.len() <= 3 && !text.is_empty());
+            (plain && text.bytes().all(|b| b.is_ascii_digit())).then(|| text.parse::<usize>().ok()).flatten()
+        };
+        Some(match name {
+            "POSITION" => Self::Position,
+            "NORMAL" => Self::Normal,
+            "TANGENT" => Self::Tangent,
+            _ if name.starts_with('_') => Self::Own,
+            _ => match name.rsplit_once('_')? {
+                ("TEXCOORD", n) => Self::TexCoord(set(n)?),
+                ("COLOR", n) => Self::Colour(set(n)?),
+                ("JOINTS", n) => Self::Joints(set(n)?),
+                ("WEIGHTS", n) => Self::Weights(set(n)?),
+                _ => return None,
+            },
+        })
+    }
+}
+
+/// The attributes of vertices, or what a morph target adds to them.
+#[derive(Clone, Default)]
+pub(super) struct Attributes<'a> {
+    pub position: Option<Accessor<'a>>,
+    pub normal: Option<Accessor<'a>>,
+    pub tangent: Option<Accessor<'a>>,
+    pub uvs: Vec<Option<Accessor<'a>>>,
+    pub colour: Option<Accessor<'a>>,
+    pub joints: Vec<Option<Accessor<'a>>>,
+    pub weights: Vec<Option<Accessor<'a>>>,
+}
+
+/// A part of a mesh with one material.
+#[derive(Clone)]
+pub(super) struct Primitive<'a> {
+    pub value: Value<'a>,
+    pub mode: Mode,
+    pub attributes: Attributes<'a>,
+    pub targets: Vec<Attributes<'a>>,
+    pub indices: Option<Accessor<'a>>,
+    pub material: Option<usize>,
+}
+
+/// Sets of attributes beyond this one are of no use to anyone.
+const MOST_SETS: usize = 16;
+
+impl<'a> Attributes<'a> {
+    fn read(file: &'a File<'_>, value: Value<'a>, is_target: bool) -> Read<Self> {
+        let quantized = file.uses("KHR_mesh_quantization")?;
+        let mut attributes = Self::default();
+        let mut count: Option<(usize, String)> = None;
+        // Views that more than one attribute looks through must say their stride.
+        let mut views: Vec<usize> = vec![];
+        for (name, index) in value.members()? {
+            let Some(attribute) = Attribute::read(&name) else {
+                let wrong = index.wrong("unknown attribute").found(quoted(&name));
+                let known = ["POSITION", "NORMAL", "TANGENT", "TEXCOORD_0", "COLOR_0", "JOINTS_0", "WEIGHTS_0"];
+                file.breach(wrong.expected("one of glTF's, or a name that starts with an underscore").suggest(&name, known))?;
+                continue;
+            };
+            let accessor = Accessor::named(file, index)?;
+            use Component::{F32, I8, I16, U8, U16};
+            use Element::{Vec2, Vec3, Vec4};
+            let (elements, components): (&[Element], &[Component]) = match (attribute, is_target, quantized) {
+                (Attribute::Own, ..) => {
+                    if accessor.component == Component::U32 {
+                        file.breach(index.wrong("attribute of unsigned integers"))?;
+                    }
+                    continue;
+                }
+                (Attribute::Position, _, false) => (&[Vec3], &[F32]),
+                (Attribute::Position, _, true) => (&[Vec3], &[F32, I8, U8, I16, U16]),
+                (Attribute::Normal, _, false) => (&[Vec3], &[F32]),
+                (Attribute::Normal, _, true) => (&[Vec3], &[F32, I8, I16]),
+                (Attribute::Tangent, false, false) => (&[Vec4], &[F32]),
+                (Attribute::Tangent, false, true) => (&[Vec4], &[F32, I8, I16]),
+                (Attribute::Tangent, true, false) => (&[Vec3], &[F32]),
+                (Attribute::Tangent, true, true) => (&[Vec3], &[F32, I8, I16]),
+                (Attribute::TexCoord(_), false, false) => (&[Vec2], &[F32, U8, U16]),
+                (Attribute::TexCoord(_), ..) => (&[Vec2], &[F32, I8, U8, I16, U16]),
+                (Attribute::Colour(_), false, _) => (&[Vec3, Vec4], &[F32, U8, U16]),
+                (Attribute::Colour(_), true, _) => (&[Vec3, Vec4], &[F32, I8, U8, I16, U16]),
+                (Attribute::Joints(_), ..) => (&[Vec4], &[U8, U16]),
+                (Attribute::Weights(_), ..) => (&[Vec4], &[F32, U8, U16]),
+            };
+            accessor.expect(index, elements, components)?;
+            if let Some((view, has_stride)) = accessor.view {
+                if views.contains(&view) && !has_stride {
+                    file.breach(index.wrong("attributes share a buffer view that says no stride"))?;
+                }
+                views.push(view);
+                if !accessor.start.is_multiple_of(4) || (!accessor.stride.is_multiple_of(4) && accessor.count > 1) {
+                    let found = format!("byte {}, {} bytes apart", accessor.start, accessor.stride);
+                    file.breach(index.wrong("attribute out of step").found(found).expected("multiples of 4"))?;
+                }
+            }
+            match &count {
+                Some((count, first)) if *count != accessor.count => {
+                    let wrong = index.wrong("attributes of different lengths").found(format!("{} elements", accessor.count));
+                    return Err(wrong.expected(format!("{count}, as {first} has")).into());
+                }
+                Some(_) => {}
+                None => count = Some((accessor.count, name.clone().into_owned())),
+            }
+            let put = |list: &mut Vec<Option<Accessor<'a>>>, set: usize| {
+                if set >= MOST_SETS {
+                    file.warn(index, "attribute beyond the sixteenth set was left out");
+                    return;
+                }
+                if list.len() <= set {
+                    list.resize(set + 1, None);
+                }
+                list[set] = Some(accessor);
+            };
+            match attribute {
+                Attribute::Position => {
+                    if !accessor.has_bounds && !is_target_only_of_zeros(&accessor) {
+                        file.breach(accessor.value.wrong("accessor of positions without \"min\" and \"max\""))?;
+                    }
+                    attributes.position = Some(accessor);
+                }
+                Attribute::Normal => attributes.normal = Some(accessor),
+                Attribute::Tangent => attributes.tangent = Some(accessor),
+                Attribute::TexCoord(set) => put(&mut attributes.uvs, set),
+                Attribute::Colour(0) => attributes.colour = Some(accessor),
+                Attribute::Colour(_) => file.warn(index, "colours beyond the first set were left out"),
+                Attribute::Joints(_) | Attribute::Weights(_) if is_target => {
+                    file.breach(index.wrong("attribute that a morph target cannot have").found(quoted(&name)))?;
+                }
+                Attribute::Joints(set) => put(&mut attributes.joints, set),
+                Attribute::Weights(set) => put(&mut attributes.weights, set),
+                Attribute::Own => {}
+            }
+        }
+        let sets: [(&str, &[Option<Accessor<'_>>]); 3] =
+            [("TEXCOORD", &attributes.uvs), ("JOINTS", &attributes.joints), ("WEIGHTS", &attributes.weights)];
+        for (name, sets) in sets {
+            if let Some(missing) = sets.iter().position(Option::is_none)
+                && !is_target
+            {
+                file.breach(value.wrong(format!("{name}_{missing} is missing")).expected("sets that count from 0"))?;
+            }
+        }
+        if attributes.joints.len() != attributes.weights.len() {
+            let wrong = value.wrong("as many sets of joints as of weights are needed");
+            file.breach(wrong.found(format!("{} and {}", attributes.joints.len(), attributes.weights.len())))?;
+        }
+        Ok(attributes)
+    }
+
+    /// How many vertices there are.
+    fn count(&self) -> Option<usize> {
+        self.position.as_ref().map(|p| p.count)
+    }
+}
+
+/// Whether an accessor has no data at all, of which there is nothing to say.
+fn is_target_only_of_zeros(accessor: &Accessor<'_>) -> bool {
+    accessor.view.is_none()
+}
+
+impl<'a> Primitive<'a> {
+    /// A primitive, all of which is there and fits together.
+    pub fn read(file: &'a File<'_>, value: Value<'a>, variant: Option<usize>) -> Read<Self> {
+        let mode = Mode::read(value)?;
+        let attributes_value = value.need("attributes")?;
+        let attributes = Attributes::read(file, attributes_value, false)?;
+        if attributes_value.members()?.next().is_none() {
+            file.breach(attributes_value.wrong("primitive without attributes"))?;
+        }
+        let indices = match value.get("indices")? {
+            None => None,
+            Some(index) => {
+                let accessor = Accessor::named(file, index)?;
+                accessor.expect(index, &[Element::Scalar], &[Component::U8, Component::U16, Component::U32])?;
+                if accessor.normalized {
+                    file.breach(index.wrong("normalized indices"))?;
+                }
+                if accessor.view.is_some_and(|(_, has_stride)| has_stride) {
+                    file.breach(index.wrong("indices in a buffer view with a stride"))?;
+                }
+                Some(accessor)
+            }
+        };
+        let count = indices.as_ref().map(|i| i.count).or(attributes.count());
+        if let Some(count) = count.filter(|&count| mode.whole(count) != count) {
+            let warning = value.wrong("vertices that make no whole shape were left out").found(format!("{count} of {mode:?}"));
+            file.push(crate::Diagnostic { severity: crate::Severity::Warning, ..warning });
+        }
+        let mut targets = vec![];
+        if let Some(list) = value.get("targets")? {
+            for target in list.array()? {
+                let read = Attributes::read(file, target, true)?;
+                let pairs = [
+                    (&read.position, &attributes.position, "POSITION"),
+                    (&read.normal, &attributes.normal, "NORMAL"),
+                    (&read.tangent, &attributes.tangent, "TANGENT"),
+                    (&read.colour, &attributes.colour, "COLOR_0"),
+                ];
+                let sets = read.uvs.iter().enumerate().map(|(set, uv)| (uv, attributes.uvs.get(set).unwrap_or(&None), "TEXCOORD"));
+                for (added, base, name) in pairs.into_iter().chain(sets) {
+                    let Some(added) = added else { continue };
+                    let Some(base) = base else {
+                        return Err(target.wrong("morph target of an attribute that is not there").found(name).into());
+                    };
+                    if added.count != base.count {
+                        let wrong = target.wrong("morph target of another length than its base");
+                        let found = format!("{} elements of {name}", added.count);
+                        return Err(wrong.found(found).expected(base.count).into());
+                    }
+                }
+                targets.push(read);
+            }
+            if targets.is_empty() {
+                file.breach(list.wrong("empty list").expected("one morph target or more, or no list"))?;
+            }
+        }
+        let material = Self::material(file, value, variant)?;
+        Ok(Self { value, mode, attributes, targets, indices, material })
+    }
+
+    fn material(file: &File<'_>, value: Value<'_>, variant: Option<usize>) -> Read<Option<usize>> {
+        let own = file.named(List::Materials, value, "material")?.map(|(index, _)| index);
+        let Some(variants) = value.extension("KHR_materials_variants")? else { return Ok(own) };
+        let mut chosen = own;
+        for mapping in variants.need("mappings")?.array()? {
+            let (material, _) = file.at(List::Materials, mapping.need("material")?)?;
+            for name in mapping.need("variants")?.array()? {
+                let (index, _) = file.at(List::Variants, name)?;
+                if variant == Some(index) {
+                    chosen = Some(material);
+                }
+            }
+        }
+        Ok(chosen)
+    }
+}
+
+/// How a mesh stands at one moment.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Pose<'p> {
+    /// How much of each morph target; those that are missing are 0.
+    pub weights: &'p [f64],
+    /// Where each joint takes the vertices; none leaves them where they are.
+    pub joints: Option<&'p [DMat4]>,
+}
+
+/// The vertices of a primitive.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Vertices {
+    pub positions: Vec<Vec3>,
+    pub normals: Option<Vec<Vec3>>,
+    pub tangents: Option<Vec<Vec3>>,
+    pub uvs: Vec<Option<Vec<Vec2>>>,
+    /// Linear colours and coverages.
+    pub colours: Option<Vec<(Rgb, f32)>>,
+}
+
+/// Reads the vertices of a primitive in a pose. Only the sets of texture coordinates for which `wants` says so are read.
+pub(super) fn vertices(file: &File<'_>, primitive: &Primitive<'_>, pose: Pose<'_>, wants: impl Fn(usize) -> bool) -> Read<Vertices> {
+    let attributes = &primitive.attributes;
+    let Some(position) = &attributes.position else { return Ok(Vertices::default()) };
+    let vec3 = |accessor: &Accessor<'_>| accessor.floats(file, Vec3::from_array);
+    let mut vertices = Vertices {
+        positions: vec3(position)?,
+        normals: attributes.normal.as_ref().map(vec3).transpose()?,
+        // The last number, which side the bitangent is on, follows from the texture coordinates.
+        tangents: attributes.tangent.as_ref().map(vec3).transpose()?,
+        uvs: vec![],
+        colours: attributes.colour.as_ref().map(|colour| colours(file, colour)).transpose()?,
+    };
+    for (set, accessor) in attributes.uvs.iter().enumerate() {
+        let accessor = accessor.as_ref().filter(|_| wants(set));
+        vertices.uvs.push(accessor.map(|a| a.floats(file, Vec2::from_array)).transpose()?);
+    }
+    morph(file, primitive, pose.weights, &mut vertices)?;
+    if let Some(joints) = pose.joints {
+        bend(file, primitive, joints, &mut vertices)?;
+    }
+    Ok(vertices)
+}
+
+fn colours(file: &File<'_>, accessor: &Accessor<'_>) -> Read<Vec<(Rgb, f32)>> {
+    match accessor.element {
+        Element::Vec4 => accessor.floats(file, |[r, g, b, a]| (Rgb::new(r, g, b), a)),
+        _ => accessor.floats(file, |[r, g, b]| (Rgb::new(r, g, b), 1.0)),
+    }
+}
+
+/// Gives back what numbers were charged that are no longer needed.
+fn release<T>(file: &File<'_>, numbers: Vec<T>) {
+    file.budget.release((numbers.len() * size_of::<T>()) as u64);
+}
+
+fn morph(file: &File<'_>, primitive: &Primitive<'_>, weights: &[f64], vertices: &mut Vertices) -> Read<()> {
+    for (target, &weight) in primitive.targets.iter().zip(weights).filter(|(_, weight)| **weight != 0.0) {
+        let weight = weight as f32;
+        let vec3 = |accessor: &Accessor<'_>, to: &mut [Vec3]| -> Read<()> {
+            let added = accessor.floats(file, Vec3::from_array)?;
+            to.iter_mut().zip(&added).for_each(|(to, added)| *to += weight * *added);
+            release(file, added);
+            Ok(())
+        };
+        if let Some(accessor) = &target.position {
+            vec3(accessor, &mut vertices.positions)?;
+        }
+        if let (Some(accessor), Some(normals)) = (&target.normal, &mut vertices.normals) {
+            vec3(accessor, normals)?;
+        }
+        if let (Some(accessor), Some(tangents)) = (&target.tangent, &mut vertices.tangents) {
+            vec3(accessor, tangents)?;
+        }
+        for (accessor, uvs) in target.uvs.iter().zip(&mut vertices.uvs) {
+            if let (Some(accessor), Some(uvs)) = (accessor, uvs) {
+                let added = accessor.floats(file, Vec2::from_array)?;
+                uvs.iter_mut().zip(&added).for_each(|(to, added)| *to += weight * *added);
+                release(file, added);
+            }
+        }
+        if let (Some(accessor), Some(colours)) = (&target.colour, &mut vertices.colours) {
+            let added = self::colours(file, accessor)?;
+            let has_coverage = accessor.element == Element::Vec4;
+            for (to, (colour, coverage)) in colours.iter_mut().zip(&added) {
+                to.0 = (to.0 + *colour * weight).clamp(0.0, 1.0);
+                if has_coverage {
+                    to.1 = (to.1 + coverage * weight).clamp(0.0, 1.0);
+                }
+            }
+            release(file, added);
+        }
+    }
+    for directions in [&mut vertices.normals, &mut vertices.tangents].into_iter().flatten() {
+        directions.iter_mut().for_each(|d| *d = d.normalize_or_zero());
+    }
+    Ok(())
+}
+
+/// Moves vertices with their joints.
+fn bend(file: &File<'_>, primitive: &Primitive<'_>, joints: &[DMat4], vertices: &mut Vertices) -> Read<()> {
+    let count = vertices.positions.len();
+    let mut sets = vec![];
+    for (indices, weights) in primitive.attributes.joints.iter().zip(&primitive.attributes.weights) {
+        if let (Some(indices), Some(weights)) = (indices, weights) {
+            let read = indices.wholes::<4>(file)?;
+            let wrong = read.iter().position(|four| four.iter().any(|&j| j as usize >= joints.len()));
+            let weights = weights.floats(file, |w: [f32; 4]| w)?;
+            // A joint without weight may be any.
+            let used = |i: usize| (0..4).find(|&k| weights[i][k] != 0.0 && read[i][k] as usize >= joints.len());
+            if let Some((i, k)) = wrong.and_then(|from| (from..count).find_map(|i| Some((i, used(i)?)))) {
+                let wrong = indices.value.wrong("joint that the skin does not have");
+                let found = format!("{} at vertex {i}", read[i][k]);
+                return Err(wrong.found(found).expected(format!("0 to {}", joints.len().saturating_sub(1))).into());
+            }
+            sets.push((read, weights));
+        }
+    }
+    for i in 0..count {
+        let mut matrix = DMat4::ZERO;
+        let mut sum = 0.0;
+        for (indices, weights) in &sets {
+            for (&joint, &weight) in indices[i].iter().zip(&weights[i]) {
+                if weight != 0.0 && weight.is_finite() {
+                    let weight = f64::from(weight);
+                    matrix += joints[joint as usize] * weight;
+                    sum += weight;
+                }
+            }
+        }
+        if sum <= 0.0 {
+            continue;
+        }
+        let matrix = matrix * (1.0 / sum);
+        let linear = DMat3::from_mat4(matrix);
+        vertices.positions[i] = matrix.transform_point3(vertices.positions[i].as_dvec3()).as_vec3();
+        if let Some(normals) = &mut vertices.normals {
+            normals[i] = (cofactors(&linear) * normals[i].as_dvec3()).normalize_or_zero().as_vec3();
+        }
+        if let Some(tangents) = &mut vertices.tangents {
+            tangents[i] = (linear * tangents[i].as_dvec3()).normalize_or_zero().as_vec3();
+        }
+    }
+    for (indices, weights) in sets {
+        release(file, indices);
+        release(file, weights);
+    }
+    Ok(())
+}
+
+/// The matrix that takes normals along, whether or not `m` has an inverse; mirrored like `m` itself where it mirrors.
+pub(super) fn cofactors(m: &DMat3) -> DMat3 {
+    let [x, y, z] = [m.x_axis, m.y_axis, m.z_axis];
+    let sign = if m.determinant() < 0.0 { -1.0 } else { 1.0 };
+    DMat3::from_cols(sign * y.cross(z), sign * z.cross(x), sign * x.cross(y))
+}
+
+/// What the vertices of a primitive make, by their positions in the list of vertices.
+#[derive(Clone, Debug)]
+pub(super) enum Assembly {
+    Points(Vec<u32>),
+    /// Segments, and whether the next one goes on where this one ends.
+    Segments(Vec<([u32; 2], bool)>),
+    Triangles(Vec<[u32; 3]>),
+}
+
+/// Puts shapes together from a primitive's vertices. Shapes that are not there, or whose vertices are not finite, are an
+/// error; when lenient they are dropped with a warning.
+pub(super) fn assemble(file: &File<'_>, primitive: &Primitive<'_>, positions: &[Vec3]) -> Read<Assembly> {
+    let listed = match &primitive.indices {
+        Some(accessor) => {
+            let indices: Vec<u32> = accessor.wholes::<1>(file)?.into_iter().map(|[i]| i).collect();
+            Some((accessor, indices))
+        }
+        None => None,
+    };
+    let count = listed.as_ref().map_or(positions.len(), |(_, indices)| indices.len());
+    let count = primitive.mode.whole(count);
+    let vertex = |i: usize| listed.as_ref().map_or(i as u32, |(_, indices)| indices[i]);
+    // Whether a vertex is of use.
+    let check = |i: usize| -> Read<bool> {
+        let v = vertex(i);
+        let (message, culprit, found, expected) = match positions.get(v as usize) {
+            Some(p) if p.is_finite() => return Ok(true),
+            Some(p) => {
+                let culprit = primitive.attributes.position.as_ref().map_or(primitive.value, |a| a.value);
+                ("vertex that is not finite", culprit, format!("{p} as vertex {v}"), "finite numbers".to_owned())
+            }
+            None => {
+                let culprit = listed.as_ref().map_or(primitive.value, |(accessor, _)| accessor.value);
+                let expected = match positions.len() {
+                    0 => "vertices".to_owned(),
+                    n => format!("0 to {}", n - 1),
+                };
+                ("index of a vertex that is not there", culprit, format!("{v} as index {i}"), expected)
+            }
+        };
+        let wrong = culprit.wrong(message).found(found).expected(expected);
+        file.breach(wrong).map(|()| false)
+    };
+    let all = |corners: &[usize]| -> Read<bool> {
+        for &corner in corners {
+            if !check(corner)? {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    };
+    let assembly = match primitive.mode {
+        Mode::Points => {
+            let mut points = file.budget.vec(count as u64, "points")?;
+            for i in 0..count {
+                if check(i)? {
+                    points.push(vertex(i));
+                }
+            }
+            Assembly::Points(points)
+        }
+        Mode::Lines | Mode::LineStrip | Mode::LineLoop => {
+            let segments = match primitive.mode {
+                Mode::Lines => count / 2,
+                Mode::LineStrip => count.saturating_sub(1),
+                _ => count,
+            };
+            let mut list = file.budget.vec(segments as u64, "lines")?;
+            for k in 0..segments {
+                let (a, b, goes_on) = match primitive.mode {
+                    Mode::Lines => (2 * k, 2 * k + 1, false),
+                    Mode::LineStrip => (k, k + 1, k + 1 < segments),
+                    _ => (k, (k + 1) % count, true),
+                };
+                if all(&[a, b])? {
+                    list.push(([vertex(a), vertex(b)], goes_on));
+                }
+            }
+            Assembly::Segments(list)
+        }
+        Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan => {
+            let triangles = match primitive.mode {
+                Mode::Triangles => count / 3,
+                _ => count.saturating_sub(2),
+            };
+            let mut list = file.budget.vec(triangles as u64, "triangles")?;
+            for k in 0..triangles {
+                let corners = match primitive.mode {
+                    Mode::Triangles => [3 * k, 3 * k + 1, 3 * k + 2],
+                    Mode::TriangleStrip => [k, k + 1 + k % 2, k + 2 - k % 2],
+                    _ => [k + 1, k + 2, 0],
+                };
+                if all(&corners)? {
+                    list.push(corners.map(vertex));
+                }
+            }
+            Assembly::Triangles(list)
+        }
+    };
+    if let Some((_, indices)) = listed {
+        release(file, indices);
+    }
+    Ok(assembly)
+}
+
+/// Leaves out the vertices that no triangle uses, where these are many: exporters let parts of a mesh share one long list.
+pub(super) fn compact(vertices: &mut Vertices, triangles: &mut [[u32; 3]]) {
+    let count = vertices.positions.len();
+    if triangles.len() * 3 >= count / 2 {
+        return;
+    }
+    let mut new_of: HashMap<u32, u32> = HashMap::new();
+    let mut old: Vec<u32> = vec![];
+    for corner in triangles.iter_mut().flatten() {
+        *corner = *new_of.entry(*corner).or_insert_with(|| {
+            old.push(*corner);
+            old.len() as u32 - 1
+        });
+    }
+    fn pick<T: Copy>(old: &[u32], list: &mut Vec<T>) {
+        *list = old.iter().map(|&i| list[i as usize]).collect();
+    }
+    pick(&old, &mut vertices.positions);
+    for list in [&mut vertices.normals, &mut vertices.tangents].into_iter().flatten() {
+        pick(&old, list);
+    }
+    for list in vertices.uvs.iter_mut().flatten() {
+        pick(&old, list);
+    }
+    if let Some(list) = &mut vertices.colours {
+        pick(&old, list);
+    }
+}
+
+/// The length of the diagonal of the box around points.
+pub(super) fn diagonal(points: impl Iterator<Item = Vec3>) -> f64 {
+    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for p in points.filter(|p| p.is_finite()) {
+        low = low.min(p.as_dvec3());
+        high = high.max(p.as_dvec3());
+    }
+    let size = high - low;
+    if size.is_finite() { size.length() } else { 0.0 }
+}
