@@ -7,6 +7,7 @@ pub mod atomic;
 pub mod budget;
 mod contained;
 pub mod diagnostic;
+pub mod gltf;
 pub mod image;
 pub mod input;
 pub mod obj;

@@ -5,18 +5,23 @@ use std::path::Path;
 use lumbre_scene::SceneDesc;
 
 use crate::diagnostic::quoted;
+use crate::gltf::{GltfOptions, open_gltf};
 use crate::obj::open_obj;
 use crate::ply::open_ply;
 use crate::stl::open_stl;
 use crate::{Budget, Diagnostic, Diagnostics, FormatError, Limits, Place, Strictness, pbrt};
 
 /// How a scene is read.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct ReadOptions {
     /// What to do about input that is not as it should be.
     pub strictness: Strictness,
     /// How much may be read.
     pub limits: Limits,
+    /// The time in seconds at which animations stand; `None` leaves them alone.
+    pub frame: Option<f64>,
+    /// The material variant of a glTF to wear.
+    pub variant: Option<String>,
 }
 
 /// The kinds of scene file that are read, by the ending of their name.
@@ -30,7 +35,7 @@ enum SceneFormat {
 }
 
 /// The endings of [`open_scene`].
-const ENDINGS: &str = ".pbrt, .pbrt.gz, .obj, .ply, .ply.gz, .stl, .stl.gz";
+const ENDINGS: &str = ".pbrt, .pbrt.gz, .gltf, .glb, .obj, .ply, .ply.gz, .stl, .stl.gz";
 
 impl SceneFormat {
     /// The kind of the file `path`, by its ending in any case.
@@ -48,7 +53,8 @@ impl SceneFormat {
     }
 }
 
-/// Reads the scene or the mesh in the file `path`: `.pbrt`, `.ply` and `.stl`, with `.gz` behind or without, and `.obj`.
+/// Reads the scene or the mesh in the file `path`: `.pbrt`, `.ply` and `.stl`, with `.gz` behind or without, `.gltf`, `.glb`
+/// and `.obj`.
 /// `-` is a scene in the language of pbrt from standard input.
 ///
 /// Answers the description with all that was said about the file on the way: its warnings, and how many of each there were.
@@ -73,7 +79,7 @@ pub fn open_scenes(
     let scene = match formats?[..] {
         [] => return Err(Diagnostic::error("no scene is given").into()),
         [SceneFormat::Pbrt, ..] => pbrt::read_files(paths, &budget, &mut diagnostics)?,
-        [format] => read_mesh(paths[0].as_ref(), format, &budget, &mut diagnostics)?,
+        [format] => read_one(paths[0].as_ref(), format, options, &budget, &mut diagnostics)?,
         [_, ..] => {
             let wrong = Diagnostic::error("only pbrt scenes can be read one after another");
             return Err(wrong.at(whole(paths[0].as_ref())).into());
@@ -92,10 +98,6 @@ fn format_of(path: &Path) -> Result<SceneFormat, FormatError> {
         return Ok(SceneFormat::Pbrt);
     }
     match SceneFormat::from_path(path) {
-        Some(SceneFormat::Gltf) => {
-            let wrong = Diagnostic::error("glTF is not read yet").at(whole(path));
-            Err(wrong.expected(ENDINGS).into())
-        }
         Some(format) => Ok(format),
         None => {
             let found = path.extension().map_or("no ending".to_owned(), |e| quoted(&e.to_string_lossy()));
@@ -105,10 +107,11 @@ fn format_of(path: &Path) -> Result<SceneFormat, FormatError> {
     }
 }
 
-/// A mesh file as a scene without a camera.
-fn read_mesh(
+/// A file of a kind that is read alone.
+fn read_one(
     path: &Path,
     format: SceneFormat,
+    options: &ReadOptions,
     budget: &Budget,
     diagnostics: &mut Diagnostics,
 ) -> Result<SceneDesc, FormatError> {
@@ -116,9 +119,10 @@ fn read_mesh(
         SceneFormat::Ply => open_ply(path, budget, diagnostics),
         SceneFormat::Obj => open_obj(path, budget, diagnostics),
         SceneFormat::Stl => open_stl(path, budget, diagnostics),
-        SceneFormat::Pbrt | SceneFormat::Gltf => {
-            let wrong = Diagnostic::error("this kind of scene file is not read yet").at(whole(path));
-            Err(wrong.expected(ENDINGS).into())
+        SceneFormat::Gltf => {
+            let gltf = GltfOptions { frame: options.frame, variant: options.variant.clone() };
+            open_gltf(path, &gltf, budget, diagnostics)
         }
+        SceneFormat::Pbrt => pbrt::read_files(&[path], budget, diagnostics),
     }
 }

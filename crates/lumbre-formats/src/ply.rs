@@ -943,7 +943,9 @@ impl<'a> Mesh<'a> {
             normals: self.normals,
             uvs: self.uvs,
             tangents: None,
+            second_uvs: None,
             colours: self.colours,
+            coverages: None,
             face_indices,
         })
     }

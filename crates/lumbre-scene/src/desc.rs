@@ -122,8 +122,12 @@ pub struct MeshDesc {
     pub uvs: Option<Vec<Vec2>>,
     /// Tangents.
     pub tangents: Option<Vec<Vec3>>,
+    /// A second set of texture coordinates.
+    pub second_uvs: Option<Vec<Vec2>>,
     /// Linear colours.
     pub colours: Option<Vec<Rgb>>,
+    /// Coverages, which go with the colours.
+    pub coverages: Option<Vec<f32>>,
     /// A number for each face: triangles first, then quads.
     pub face_indices: Option<Vec<u32>>,
 }

@@ -10,7 +10,7 @@ use lumbre_math::{DVec2, DVec3};
 use lumbre_shading::{Scatter, Spectrum};
 
 pub use area::ShapeLight;
-pub(crate) use area::{bare_context, power};
+pub(crate) use area::power;
 pub use delta::{DistantLight, PointLight, SpotLight};
 pub use environment::{Environment, UniformLight};
 pub use mesh::MeshLight;

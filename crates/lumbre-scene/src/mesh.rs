@@ -37,7 +37,18 @@ pub(crate) fn bake(
 ) -> Result<BakedMesh, BuildError> {
     check(shape, &desc)?;
     let desc = Arc::try_unwrap(desc).unwrap_or_else(|shared| (*shared).clone());
-    let MeshDesc { mut positions, mut triangles, quads, mut normals, uvs, mut tangents, .. } = desc;
+    let MeshDesc {
+        mut positions,
+        mut triangles,
+        quads,
+        mut normals,
+        uvs,
+        mut tangents,
+        second_uvs,
+        colours,
+        coverages,
+        face_indices: _,
+    } = desc;
 
     let stays = tree_from_object.is_identity() && origin == DVec3::ZERO;
     if !stays {
@@ -78,7 +89,17 @@ pub(crate) fn bake(
         }
     }
     let mesh = Arc::new(TriangleMesh { origin, positions, indices: triangles });
-    let dress = Arc::new(MeshDress { mesh, swapped, first_half, normals, uvs, tangents });
+    let dress = Arc::new(MeshDress {
+        mesh,
+        swapped,
+        first_half,
+        normals,
+        uvs,
+        tangents,
+        second_uvs,
+        colours,
+        coverages,
+    });
     Ok(BakedMesh { dress, patches })
 }
 
@@ -88,6 +109,9 @@ fn check(shape: u32, desc: &MeshDesc) -> Result<(), BuildError> {
         ("normals", desc.normals.as_ref().map(Vec::len)),
         ("texture coordinates", desc.uvs.as_ref().map(Vec::len)),
         ("tangents", desc.tangents.as_ref().map(Vec::len)),
+        ("second texture coordinates", desc.second_uvs.as_ref().map(Vec::len)),
+        ("colours", desc.colours.as_ref().map(Vec::len)),
+        ("coverages", desc.coverages.as_ref().map(Vec::len)),
     ];
     for (list, found) in lists {
         if let Some(found) = found.filter(|&found| found != expected) {

@@ -7,9 +7,9 @@ use lumbre_kernel::{Accel, Hit};
 use lumbre_math::distribution::AliasTable;
 use lumbre_math::random::{combine, hash_dvec3, uniform_f32};
 use lumbre_math::{DVec2, DVec3, Transform};
-use lumbre_shading::{FloatTexture, Scatter, Spectrum, TextureContext};
+use lumbre_shading::{FloatTexture, Scatter, Spectrum};
 
-use crate::light::{Light, LightId, LightSample, bare_context};
+use crate::light::{Light, LightId, LightSample};
 use crate::surface::{Dressed, Form, SurfaceEntry};
 use crate::{Camera, FilmDesc, FilterDesc, Footprint, IntegratorDesc, Interaction, SamplerDesc};
 
@@ -158,15 +158,7 @@ impl Scene {
             hit.root.t * length,
         );
         Interaction {
-            at: TextureContext {
-                point: surface.point,
-                normal: dressed.shading.normal,
-                uv: surface.uv.as_vec2(),
-                dpdx: spot.dpdx,
-                dpdy: spot.dpdy,
-                duv_dx: spot.duv_dx,
-                duv_dy: spot.duv_dy,
-            },
+            at: dressed.context(spot.dpdx, spot.dpdy, spot.duv_dx, spot.duv_dy),
             surface,
             shading: dressed.shading,
             towards_origin: -direction,
@@ -267,7 +259,7 @@ impl Scene {
             _ => {
                 let bare = self.accel.surface(ray, hit);
                 let dressed = self.dressed(entry, &bare, hit, part, turned);
-                alpha.evaluate(&bare_context(&dressed.surface, dressed.surface.uv.as_vec2()))
+                alpha.evaluate(&dressed.bare_context())
             }
         };
         if coverage >= 1.0 {

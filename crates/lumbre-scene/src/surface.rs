@@ -5,7 +5,7 @@ use std::sync::Arc;
 use lumbre_geometry::Surface;
 use lumbre_kernel::TriangleMesh;
 use lumbre_math::{DVec2, DVec3, Transform, Vec2, Vec3};
-use lumbre_shading::{FloatTexture, LocalSurface, Material};
+use lumbre_shading::{FloatTexture, LocalSurface, Material, Spectrum, TextureContext, VertexData};
 
 use crate::Emission;
 use crate::csg::CsgForm;
@@ -50,6 +50,9 @@ pub(crate) struct MeshDress {
     pub normals: Option<Vec<Vec3>>,
     pub uvs: Option<Vec<Vec2>>,
     pub tangents: Option<Vec<Vec3>>,
+    pub second_uvs: Option<Vec<Vec2>>,
+    pub colours: Option<Vec<Spectrum>>,
+    pub coverages: Option<Vec<f32>>,
 }
 
 /// A surface with what its vertices say of it.
@@ -58,6 +61,8 @@ pub(crate) struct Dressed {
     /// The surface, its normal turned to the outside, its uv and derivatives those that textures see.
     pub surface: Surface,
     pub shading: LocalSurface,
+    /// What vertices say besides; its derivatives are not by pixels, but by u and v.
+    pub vertex: VertexData,
 }
 
 /// A value at three or four corners of a face, as a function of the face's own coordinates.
@@ -165,6 +170,33 @@ impl SurfaceEntry {
 }
 
 impl Dressed {
+    /// Where textures are looked up, with derivatives of u and v over a pixel.
+    pub fn context(&self, dpdx: Vec3, dpdy: Vec3, duv_dx: Vec2, duv_dy: Vec2) -> TextureContext {
+        let (by_u, by_v) = (self.vertex.duv_dx, self.vertex.duv_dy);
+        TextureContext {
+            point: self.surface.point,
+            normal: self.shading.normal,
+            uv: self.surface.uv.as_vec2(),
+            dpdx,
+            dpdy,
+            duv_dx,
+            duv_dy,
+            vertex: VertexData {
+                duv_dx: by_u * duv_dx.x + by_v * duv_dx.y,
+                duv_dy: by_u * duv_dy.x + by_v * duv_dy.y,
+                ..self.vertex
+            },
+        }
+    }
+
+    /// Where textures are looked up, without a footprint.
+    pub fn bare_context(&self) -> TextureContext {
+        TextureContext {
+            normal: self.surface.normal.as_vec3(),
+            ..self.context(Vec3::ZERO, Vec3::ZERO, Vec2::ZERO, Vec2::ZERO)
+        }
+    }
+
     /// Turns the inside out.
     pub fn turn(&mut self) {
         self.surface.normal = -self.surface.normal;
@@ -186,6 +218,7 @@ fn plain(surface: &Surface) -> Dressed {
             dndu: surface.dndu.as_vec3(),
             dndv: surface.dndv.as_vec3(),
         },
+        vertex: VertexData::NONE,
     }
 }
 
@@ -199,6 +232,44 @@ impl MeshDress {
     }
 
     fn dress<const N: usize>(
+        &self,
+        bare: &Surface,
+        corners: [u32; N],
+        uvs: [Vec2; N],
+        blend: &Blend<N>,
+        placement: Option<&Transform>,
+    ) -> Dressed {
+        let mut dressed = self.shape(bare, corners, uvs, blend, placement);
+        if let Some(colours) = &self.colours {
+            let colour = blend.value(corners.map(|i| {
+                let Spectrum { r, g, b } = colours[i as usize];
+                Vec3::new(r, g, b).as_dvec3()
+            }));
+            dressed.vertex.colour = Spectrum::new(colour.x as f32, colour.y as f32, colour.z as f32);
+        }
+        if let Some(coverages) = &self.coverages {
+            let coverages = corners.map(|i| DVec3::splat(f64::from(coverages[i as usize])));
+            dressed.vertex.coverage = blend.value(coverages).x as f32;
+        }
+        if let Some(second) = &self.second_uvs {
+            let flat = |uv: Vec2| uv.as_dvec2().extend(0.0);
+            let second = corners.map(|i| flat(second[i as usize]));
+            dressed.vertex.uv = blend.value(second).truncate().as_vec2();
+            // From derivatives by the coordinates of the face to derivatives by uv.
+            let [by_a, by_b] = blend.slopes(uvs.map(flat));
+            let [second_a, second_b] = blend.slopes(second);
+            let determinant = by_a.x * by_b.y - by_a.y * by_b.x;
+            let by_u = ((second_a * by_b.y - second_b * by_a.y) / determinant).truncate().as_vec2();
+            let by_v = ((second_b * by_a.x - second_a * by_b.x) / determinant).truncate().as_vec2();
+            if by_u.is_finite() && by_v.is_finite() {
+                dressed.vertex.duv_dx = by_u;
+                dressed.vertex.duv_dy = by_v;
+            }
+        }
+        dressed
+    }
+
+    fn shape<const N: usize>(
         &self,
         bare: &Surface,
         corners: [u32; N],

@@ -19,11 +19,11 @@ mod texture;
 pub use bsdf::{Bsdf, BsdfSample, Scatter};
 pub use frame::{LocalDir, ShadingFrame};
 pub use material::{LocalSurface, Material, MaterialKind, Metal, Roughness};
-pub use mipmap::{ImageFilter, MipMap, MipMapOptions, Wrap};
+pub use mipmap::{AxisWrap, ImageFilter, MipMap, MipMapOptions, Wrap};
 pub use spectrum::{NamedSpectrum, SpectrumValue};
 pub use texture::{
     FloatTexture, ImageTexture, Mapping2d, SpectrumTexture, Texture, TextureContext, TexturePoint,
-    TextureValue,
+    TextureValue, UvSet, VertexData,
 };
 
 /// Values on the lanes that light transport carries: linear Rec. 709 today.

@@ -438,6 +438,7 @@ mod tests {
             dpdy: Vec3::ZERO,
             duv_dx: Vec2::splat(1e-3),
             duv_dy: Vec2::splat(1e-3),
+            vertex: crate::VertexData::NONE,
         }
     }
 

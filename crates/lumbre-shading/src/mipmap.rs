@@ -19,6 +19,43 @@ pub enum Wrap {
     Black,
     /// The image is an equal-area octahedral sphere, and its edge goes on where the sphere does.
     OctahedralSphere,
+    /// Across and up, each in its own way.
+    Axes([AxisWrap; 2]),
+}
+
+/// What lies beyond two opposite edges of an image.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum AxisWrap {
+    /// The image again.
+    #[default]
+    Repeat,
+    /// Its last texel.
+    Clamp,
+    /// The image again, every other time mirrored.
+    Mirror,
+}
+
+impl AxisWrap {
+    /// `s` brought near the image.
+    fn within_reach(self, s: f32) -> f32 {
+        match self {
+            Self::Repeat => s - s.floor(),
+            Self::Clamp => s.clamp(-4.0, 5.0),
+            Self::Mirror => s - 2.0 * (0.5 * s).floor(),
+        }
+    }
+
+    /// The texel of an image of this size.
+    fn texel(self, i: i64, size: i64) -> i64 {
+        match self {
+            Self::Repeat => i.rem_euclid(size),
+            Self::Clamp => i.clamp(0, size - 1),
+            Self::Mirror => {
+                let i = i.rem_euclid(2 * size);
+                if i < size { i } else { 2 * size - 1 - i }
+            }
+        }
+    }
 }
 
 /// How texels become a value.
@@ -228,6 +265,8 @@ impl MipMap {
             Wrap::Repeat => st - st.floor(),
             Wrap::Clamp | Wrap::Black => st.clamp(Vec2::splat(-4.0), Vec2::splat(5.0)),
             Wrap::OctahedralSphere => st.clamp(Vec2::ZERO, Vec2::ONE),
+            // `st` counts rows downwards here; the mirrored image is its own mirror image.
+            Wrap::Axes([s, t]) => Vec2::new(s.within_reach(st.x), t.within_reach(st.y)),
         }
     }
 
@@ -248,6 +287,7 @@ impl MipMap {
                 Wrap::Clamp => (x.clamp(0, width - 1), y.clamp(0, height - 1)),
                 Wrap::Black => return T::ZERO,
                 Wrap::OctahedralSphere => octahedral(x, y, width, height),
+                Wrap::Axes([s, t]) => (s.texel(x, width), t.texel(y, height)),
             }
         };
         T::fetch(self, level, x as u32, y as u32)

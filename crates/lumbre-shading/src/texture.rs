@@ -25,6 +25,44 @@ pub struct TextureContext {
     pub duv_dx: Vec2,
     /// (∂u/∂y, ∂v/∂y).
     pub duv_dy: Vec2,
+    /// What the vertices of a mesh say besides.
+    pub vertex: VertexData,
+}
+
+/// What the vertices of a mesh may say of a place besides its surface parameters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VertexData {
+    /// Their colour, white where they have none.
+    pub colour: Spectrum,
+    /// Their coverage, 1 where they have none.
+    pub coverage: f32,
+    /// A second set of parameters, zero where they have none.
+    pub uv: Vec2,
+    /// Its derivatives over one pixel to the right.
+    pub duv_dx: Vec2,
+    /// Its derivatives over one pixel down.
+    pub duv_dy: Vec2,
+}
+
+impl VertexData {
+    /// Of a surface whose vertices say nothing.
+    pub const NONE: Self = Self {
+        colour: Spectrum::WHITE,
+        coverage: 1.0,
+        uv: Vec2::ZERO,
+        duv_dx: Vec2::ZERO,
+        duv_dy: Vec2::ZERO,
+    };
+}
+
+/// Which of a mesh's sets of parameters.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum UvSet {
+    /// The first, which every surface has.
+    #[default]
+    First,
+    /// The second, [`VertexData::uv`].
+    Second,
 }
 
 /// From a surface to the plane of an image.
@@ -36,6 +74,15 @@ pub enum Mapping2d {
         scale: Vec2,
         /// Offsets.
         delta: Vec2,
+    },
+    /// (u, v) of either set under an affine map.
+    Affine {
+        /// Which parameters.
+        set: UvSet,
+        /// Where (1, 0) and (0, 1) go.
+        axes: [Vec2; 2],
+        /// Where (0, 0) goes.
+        origin: Vec2,
     },
     /// Angles about the origin of texture space.
     Spherical {
@@ -75,6 +122,14 @@ impl Mapping2d {
                 dst_dx: *scale * at.duv_dx,
                 dst_dy: *scale * at.duv_dy,
             },
+            Self::Affine { set, axes, origin } => {
+                let (uv, duv_dx, duv_dy) = match set {
+                    UvSet::First => (at.uv, at.duv_dx, at.duv_dy),
+                    UvSet::Second => (at.vertex.uv, at.vertex.duv_dx, at.vertex.duv_dy),
+                };
+                let turned = |v: Vec2| axes[0] * v.x + axes[1] * v.y;
+                TexturePoint { st: turned(uv) + *origin, dst_dx: turned(duv_dx), dst_dy: turned(duv_dy) }
+            }
             Self::Spherical { texture_from_world } => {
                 let p = texture_from_world.point(at.point);
                 let across = p.truncate().length();
@@ -132,10 +187,20 @@ impl TexturePoint {
 
 /// A value that textures can have: a float or a spectrum.
 pub trait TextureValue:
-    Copy + Send + Sync + std::fmt::Debug + Add<Output = Self> + Mul<f32, Output = Self> + 'static
+    Copy
+    + Send
+    + Sync
+    + std::fmt::Debug
+    + Add<Output = Self>
+    + Mul<f32, Output = Self>
+    + Mul<Output = Self>
+    + 'static
 {
     /// The value of an image about a place.
     fn from_image(image: &MipMap, at: &TexturePoint) -> Self;
+
+    /// What the vertices of a mesh say: their colour, or their coverage.
+    fn from_vertices(vertex: &VertexData) -> Self;
 
     /// One minus the value.
     fn complement(self) -> Self;
@@ -147,6 +212,10 @@ pub trait TextureValue:
 impl TextureValue for f32 {
     fn from_image(image: &MipMap, at: &TexturePoint) -> Self {
         image.lookup_float(at.st, at.dst_dx, at.dst_dy)
+    }
+
+    fn from_vertices(vertex: &VertexData) -> Self {
+        vertex.coverage
     }
 
     fn complement(self) -> Self {
@@ -161,6 +230,10 @@ impl TextureValue for f32 {
 impl TextureValue for Spectrum {
     fn from_image(image: &MipMap, at: &TexturePoint) -> Self {
         image.lookup(at.st, at.dst_dx, at.dst_dy)
+    }
+
+    fn from_vertices(vertex: &VertexData) -> Self {
+        vertex.colour
     }
 
     fn complement(self) -> Self {
@@ -205,6 +278,19 @@ pub enum Texture<T: TextureValue> {
         /// Its factor.
         scale: Arc<Texture<f32>>,
     },
+    /// A product of two alike, lane by lane.
+    Product([Arc<Texture<T>>; 2]),
+    /// One value below an edge, another from it on.
+    Step {
+        /// What is compared.
+        input: Arc<Texture<f32>>,
+        /// With what.
+        edge: f32,
+        /// Below the edge, and from it on.
+        values: [T; 2],
+    },
+    /// What the vertices of a mesh say: their colour, or their coverage.
+    Vertices,
     /// Between two values.
     Mix {
         /// At amount 0 and 1.
@@ -258,6 +344,9 @@ impl<T: TextureValue> Texture<T> {
         match self {
             Self::Constant(value) => *value,
             Self::Scale { texture, scale } => texture.evaluate(at) * scale.evaluate(at),
+            Self::Product([first, second]) => first.evaluate(at) * second.evaluate(at),
+            Self::Step { input, edge, values } => values[usize::from(input.evaluate(at) >= *edge)],
+            Self::Vertices => T::from_vertices(&at.vertex),
             Self::Mix { textures, amount } => blend(textures, amount.evaluate(at), at),
             Self::DirectionMix { textures, direction } => {
                 blend(textures, 1.0 - at.normal.dot(*direction).abs(), at)
@@ -331,6 +420,7 @@ mod tests {
             dpdy: Vec3::ZERO,
             duv_dx: Vec2::ZERO,
             duv_dy: Vec2::ZERO,
+            vertex: VertexData::NONE,
         }
     }
 
@@ -362,6 +452,38 @@ mod tests {
         {
             assert!((bilerp.evaluate(&at(DVec3::ONE, Vec2::new(st.0, st.1))) - value).abs() < 1e-6);
         }
+    }
+
+    #[test]
+    fn vertices_tint_and_second_parameters_turn() {
+        let vertex = VertexData {
+            colour: Spectrum::new(0.5, 0.25, 2.0),
+            coverage: 0.75,
+            uv: Vec2::new(0.2, 0.7),
+            duv_dx: Vec2::new(0.01, 0.02),
+            duv_dy: Vec2::new(-0.03, 0.04),
+        };
+        let here = TextureContext { vertex, ..at(DVec3::new(2.0, 3.0, 4.0), Vec2::new(0.3, 0.6)) };
+        let tint: Texture<Spectrum> = Texture::Product([
+            Arc::new(Texture::Vertices),
+            Arc::new(Texture::Constant(Spectrum::new(0.5, 2.0, 3.0))),
+        ]);
+        assert_eq!(tint.evaluate(&here), Spectrum::new(0.25, 0.5, 6.0));
+        let coverage: Arc<Texture<f32>> = Arc::new(Texture::Vertices);
+        for (edge, value) in [(0.75, 1.0), (0.76, 0.0)] {
+            let step = Texture::Step { input: coverage.clone(), edge, values: [0.0, 1.0] };
+            assert_eq!(step.evaluate(&here), value);
+        }
+        let mapping = |set| Mapping2d::Affine {
+            set,
+            axes: [Vec2::new(0.0, 2.0), Vec2::new(-3.0, 0.0)],
+            origin: Vec2::new(0.5, 0.25),
+        };
+        let second = mapping(UvSet::Second).map(&here);
+        assert!((second.st - Vec2::new(-1.6, 0.65)).length() < 1e-6);
+        assert!((second.dst_dx - Vec2::new(-0.06, 0.02)).length() < 1e-6);
+        assert!((second.dst_dy - Vec2::new(-0.12, -0.06)).length() < 1e-6);
+        assert!((mapping(UvSet::First).map(&here).st - Vec2::new(-1.3, 0.85)).length() < 1e-6);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::file::{File, List, View};
 use super::json::{Read, Value};
-use crate::diagnostic::{Diagnostic, quoted};
+use crate::diagnostic::{Diagnostic, FormatError, quoted};
 
 /// The types of numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,7 +24,11 @@ impl Component {
             5123 => Self::U16,
             5125 => Self::U32,
             5126 => Self::F32,
-            _ => return Err(value.unexpected("unknown type of number", "5120, 5121, 5122, 5123, 5125 or 5126")),
+            _ => {
+                return Err(
+                    value.unexpected("unknown type of number", "5120, 5121, 5122, 5123, 5125 or 5126")
+                );
+            }
         })
     }
 
@@ -131,7 +135,8 @@ pub(super) struct Accessor<'a> {
 
 #[derive(Clone, Copy)]
 struct Strided<'a> {
-    bytes: &'a [u8],
+    /// `None` where the buffer has none.
+    bytes: Option<&'a [u8]>,
     stride: usize,
 }
 
@@ -140,8 +145,8 @@ struct Sparse<'a> {
     value: Value<'a>,
     count: usize,
     component: Component,
-    indices: &'a [u8],
-    values: &'a [u8],
+    indices: Option<&'a [u8]>,
+    values: Option<&'a [u8]>,
 }
 
 /// A range of `count` elements of `size` bytes, `stride` apart, from `offset` on, of which a view has all bytes.
@@ -152,17 +157,27 @@ fn strided<'a>(
     count: u64,
     stride: usize,
     size: usize,
-) -> Read<&'a [u8]> {
-    let end = (count - 1).checked_mul(stride as u64).and_then(|n| n.checked_add(size as u64)?.checked_add(offset));
-    let found = view.bytes.len() as u64;
+) -> Read<Option<&'a [u8]>> {
+    let end =
+        (count - 1).checked_mul(stride as u64).and_then(|n| n.checked_add(size as u64)?.checked_add(offset));
+    let found = view.length;
     match end {
-        Some(end) if end <= found => Ok(&view.bytes[offset as usize..end as usize]),
+        Some(end) if end <= found => {
+            Ok(view.bytes.and_then(|bytes| bytes.get(offset as usize..end as usize)))
+        }
         _ => {
             let wrong = culprit.wrong("accessor past the end of its buffer view");
             let needs = end.map_or("more bytes than can be".to_owned(), |end| format!("{end} bytes"));
-            Err(wrong.found(format!("{count} elements, which need {needs}")).expected(format!("{found} bytes at most")).into())
+            Err(wrong
+                .found(format!("{count} elements, which need {needs}"))
+                .expected(format!("{found} bytes at most"))
+                .into())
         }
     }
+}
+
+fn without_data(value: Value<'_>) -> FormatError {
+    value.wrong("the buffer of what is needed here has no data").into()
 }
 
 /// Whether an accessor is of a kind that is known; those of others may stand unused.
@@ -204,7 +219,11 @@ impl<'a> Accessor<'a> {
         let offset_value = value.get("byteOffset")?;
         let offset = offset_value.map_or(Ok(0), |v| v.whole(0))?;
         let (columns, rows) = element.columns();
-        let column = if columns > 1 { (rows * component.bytes()).next_multiple_of(4) } else { rows * component.bytes() };
+        let column = if columns > 1 {
+            (rows * component.bytes()).next_multiple_of(4)
+        } else {
+            rows * component.bytes()
+        };
         // The last column needs no padding behind it.
         let size = columns * column;
         let least = size - column + rows * component.bytes();
@@ -237,7 +256,8 @@ impl<'a> Accessor<'a> {
             let step = if columns > 1 { 4 } else { component.bytes() as u64 };
             for (start, culprit) in [(offset, offset_value.unwrap_or(value)), (at.start, value)] {
                 if !start.is_multiple_of(step) {
-                    let wrong = culprit.wrong("accessor out of step with its numbers").found(format!("byte {start}"));
+                    let wrong =
+                        culprit.wrong("accessor out of step with its numbers").found(format!("byte {start}"));
                     file.breach(wrong.expected(format!("a multiple of {step}")))?;
                     break;
                 }
@@ -286,11 +306,17 @@ impl<'a> Accessor<'a> {
             (Component::I8, true) => self.decoded(file, |b| (f32::from(b[0] as i8) / 127.0).max(-1.0), make),
             (Component::U8, false) => self.decoded(file, |b| f32::from(b[0]), make),
             (Component::U8, true) => self.decoded(file, |b| f32::from(b[0]) / 255.0, make),
-            (Component::I16, false) => self.decoded(file, |b| f32::from(i16::from_le_bytes([b[0], b[1]])), make),
-            (Component::I16, true) => {
-                self.decoded(file, |b| (f32::from(i16::from_le_bytes([b[0], b[1]])) / 32767.0).max(-1.0), make)
+            (Component::I16, false) => {
+                self.decoded(file, |b| f32::from(i16::from_le_bytes([b[0], b[1]])), make)
             }
-            (Component::U16, false) => self.decoded(file, |b| f32::from(u16::from_le_bytes([b[0], b[1]])), make),
+            (Component::I16, true) => self.decoded(
+                file,
+                |b| (f32::from(i16::from_le_bytes([b[0], b[1]])) / 32767.0).max(-1.0),
+                make,
+            ),
+            (Component::U16, false) => {
+                self.decoded(file, |b| f32::from(u16::from_le_bytes([b[0], b[1]])), make)
+            }
             (Component::U16, true) => {
                 self.decoded(file, |b| f32::from(u16::from_le_bytes([b[0], b[1]])) / 65535.0, make)
             }
@@ -307,9 +333,12 @@ impl<'a> Accessor<'a> {
             Component::U8 => self.decoded(file, |b| u32::from(b[0]), |n| n),
             Component::U16 => self.decoded(file, |b| u32::from(u16::from_le_bytes([b[0], b[1]])), |n| n),
             Component::U32 => self.decoded(file, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]), |n| n),
-            Component::I8 | Component::I16 | Component::F32 => {
-                Err(self.value.wrong("accessor of a wrong type").found(self.said()).expected("unsigned numbers").into())
-            }
+            Component::I8 | Component::I16 | Component::F32 => Err(self
+                .value
+                .wrong("accessor of a wrong type")
+                .found(self.said())
+                .expected("unsigned numbers")
+                .into()),
         }
     }
 
@@ -334,12 +363,16 @@ impl<'a> Accessor<'a> {
         let mut elements = file.budget.vec(self.count as u64, "elements of accessors")?;
         match self.data {
             None => elements.extend((0..self.count).map(|_| make([N1::default(); N]))),
-            Some(Strided { bytes, stride }) => elements.extend(bytes.chunks(stride).map(element)),
+            Some(Strided { bytes, stride }) => {
+                let bytes = bytes.ok_or_else(|| without_data(self.value))?;
+                elements.extend(bytes.chunks(stride).map(element));
+            }
         }
         if let Some(sparse) = &self.sparse {
             let value_size = columns * column;
+            let values = sparse.values.ok_or_else(|| without_data(sparse.value))?;
             sparse.each_index(self.count, |k, index| {
-                elements[index] = element(&sparse.values[k * value_size..]);
+                elements[index] = element(&values[k * value_size..]);
             })?;
         }
         Ok(elements)
@@ -354,7 +387,7 @@ impl<'a> Sparse<'a> {
             let expected = format!("at most {of}, the elements of the accessor");
             return Err(count_value.unexpected("too many sparse elements", &expected));
         }
-        let part = |name: &str, size: Option<usize>| -> Read<(&'a [u8], Component)> {
+        let part = |name: &str, size: Option<usize>| -> Read<(Option<&'a [u8]>, Component)> {
             let part = value.need(name)?;
             let component = match size {
                 Some(_) => Component::F32,
@@ -381,7 +414,8 @@ impl<'a> Sparse<'a> {
     fn each_index(&self, count: usize, mut f: impl FnMut(usize, usize)) -> Read<()> {
         let size = self.component.bytes();
         let mut before = None;
-        for (k, b) in self.indices.chunks_exact(size).take(self.count).enumerate() {
+        let indices = self.indices.ok_or_else(|| without_data(self.value))?;
+        for (k, b) in indices.chunks_exact(size).take(self.count).enumerate() {
             let index = match self.component {
                 Component::U8 => usize::from(b[0]),
                 Component::U16 => usize::from(u16::from_le_bytes([b[0], b[1]])),

@@ -45,7 +45,8 @@ pub(super) fn read<'a>(bytes: &'a [u8], name: &Arc<str>, diagnostics: &mut Diagn
     }
     if length < bytes.len() {
         let found = format!("{} bytes", bytes.len() - length);
-        diagnostics.push(Diagnostic::warning("data after the end of the GLB file").at(place(length)).found(found));
+        diagnostics
+            .push(Diagnostic::warning("data after the end of the GLB file").at(place(length)).found(found));
     }
 
     let bytes = &bytes[..length];
@@ -71,15 +72,21 @@ pub(super) fn read<'a>(bytes: &'a [u8], name: &Arc<str>, diagnostics: &mut Diagn
         if json.is_none() {
             if *kind != JSON {
                 let found = quoted_bytes(kind);
-                return Err(wrong(at + 4, "GLB file does not begin with JSON").found(found).expected("\"JSON\"").into());
+                return Err(wrong(at + 4, "GLB file does not begin with JSON")
+                    .found(found)
+                    .expected("\"JSON\"")
+                    .into());
             }
             json = Some((data, at as u64 + 8));
         } else if *kind == JSON || (*kind == BINARY && binary.is_some()) {
             return Err(wrong(at + 4, "second GLB chunk of one kind").found(quoted_bytes(kind)).into());
         } else if *kind == BINARY {
-            let follows_json = json.is_some_and(|(data, start): (&[u8], u64)| start + data.len() as u64 == at as u64);
+            let follows_json =
+                json.is_some_and(|(data, start): (&[u8], u64)| start + data.len() as u64 == at as u64);
             if !follows_json {
-                return Err(wrong(at + 4, "GLB binary chunk out of place").expected("it right after the JSON").into());
+                return Err(wrong(at + 4, "GLB binary chunk out of place")
+                    .expected("it right after the JSON")
+                    .into());
             }
             binary = Some(data);
         } else {

@@ -7,8 +7,8 @@ use std::sync::Arc;
 
 use super::json::{Read, Value};
 use super::uri::{DataUri, Target, base64_decoded, percent_decoded_bytes, target};
-use crate::budget::Budget;
-use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, quoted};
+use crate::budget::{Budget, BudgetVec};
+use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, Severity, quoted};
 use crate::input::Input;
 
 /// The top-level lists, and those that extensions keep there.
@@ -82,7 +82,7 @@ pub(super) struct File<'a> {
     pub folder: &'a Path,
     /// What it may cost.
     pub budget: &'a Budget,
-    diagnostics: RefCell<&'a mut Diagnostics>,
+    diagnostics: RefCell<Diagnostics>,
     lists: [Vec<Value<'a>>; List::ALL.len()],
     buffers: Vec<Option<Cow<'a, [u8]>>>,
     /// Bytes of buffer views that were compressed.
@@ -94,8 +94,10 @@ pub(super) struct File<'a> {
 /// The bytes of a buffer view.
 #[derive(Clone, Copy)]
 pub(super) struct View<'a> {
-    /// The bytes.
-    pub bytes: &'a [u8],
+    /// The bytes; `None` where the buffer has none, because something else is to fill it.
+    pub bytes: Option<&'a [u8]>,
+    /// How many bytes there are, or would be.
+    pub length: u64,
     /// Bytes from one element to the next, where the view says.
     pub stride: Option<usize>,
     /// Where the bytes start in their buffer.
@@ -103,20 +105,38 @@ pub(super) struct View<'a> {
 }
 
 impl<'a> File<'a> {
-    /// Finds the lists; the buffers come with [`File::load`].
+    /// Nothing is looked at yet: that is what [`File::load`] does.
     pub fn new(
         root: Value<'a>,
         name: &Arc<str>,
         folder: &'a Path,
         budget: &'a Budget,
-        diagnostics: &'a mut Diagnostics,
-    ) -> Read<Self> {
-        let mut lists: [Vec<Value<'a>>; List::ALL.len()] = Default::default();
+        diagnostics: Diagnostics,
+    ) -> Self {
+        Self {
+            root,
+            name: name.clone(),
+            folder,
+            budget,
+            diagnostics: RefCell::new(diagnostics),
+            lists: Default::default(),
+            buffers: vec![],
+            unpacked: vec![],
+            buffer_bytes: 0,
+        }
+    }
+
+    /// What was said about the file.
+    pub fn into_diagnostics(self) -> Diagnostics {
+        self.diagnostics.into_inner()
+    }
+
+    fn find_lists(&mut self) -> Read<()> {
         for list in List::ALL {
             let (extension, key, _) = list.names();
             let holder = match extension {
-                None => Some(root),
-                Some(extension) => root.extension(extension)?,
+                None => Some(self.root),
+                Some(extension) => self.root.extension(extension)?,
             };
             let Some(holder) = holder else { continue };
             let array = match (holder.get(key)?, extension) {
@@ -124,26 +144,16 @@ impl<'a> File<'a> {
                 (None, None) => continue,
                 (None, Some(_)) => holder.need(key)?,
             };
-            let mut values = crate::budget::BudgetVec::new(budget, "lists of a glTF");
+            let mut values = BudgetVec::new(self.budget, "lists of a glTF");
             for value in array.array()? {
                 values.push(value.object()?)?;
             }
-            lists[list as usize] = values.into_vec();
-            if lists[list as usize].is_empty() {
-                breach(diagnostics, array.wrong("empty list").expected("one element or more, or no list"))?;
+            self.lists[list as usize] = values.into_vec();
+            if self.list(list).is_empty() {
+                self.breach(array.wrong("empty list").expected("one element or more, or no list"))?;
             }
         }
-        Ok(Self {
-            root,
-            name: name.clone(),
-            folder,
-            budget,
-            diagnostics: RefCell::new(diagnostics),
-            lists,
-            buffers: vec![],
-            unpacked: vec![],
-            buffer_bytes: 0,
-        })
+        Ok(())
     }
 
     /// The values of a list.
@@ -160,6 +170,17 @@ impl<'a> File<'a> {
     /// The element of a list that a member of `value` names, where it has that member.
     pub fn named(&self, list: List, value: Value<'_>, member: &str) -> Read<Option<(usize, Value<'a>)>> {
         value.get(member)?.map(|index| self.at(list, index)).transpose()
+    }
+
+    /// Whether the file says that it uses an extension.
+    pub fn uses(&self, extension: &str) -> Read<bool> {
+        let Some(list) = self.root.get("extensionsUsed")? else { return Ok(false) };
+        for name in list.array()? {
+            if name.string()? == extension {
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 
     /// Whether what cannot be used should be dropped with a warning.
@@ -184,11 +205,16 @@ impl<'a> File<'a> {
 
     /// Something that glTF forbids though its meaning is plain: an error, or a warning when lenient.
     pub fn breach(&self, wrong: Diagnostic) -> Read<()> {
-        breach(&mut self.diagnostics.borrow_mut(), wrong)
+        if !self.is_lenient() {
+            return Err(wrong.into());
+        }
+        self.push(Diagnostic { severity: Severity::Warning, ..wrong });
+        Ok(())
     }
 
-    /// Loads every buffer. `binary` is the one inside a GLB.
+    /// Finds the lists and loads every buffer. `binary` is the one inside a GLB.
     pub fn load(&mut self, binary: Option<&'a [u8]>, is_glb: bool) -> Read<()> {
+        self.find_lists()?;
         for (index, &value) in self.lists[List::Buffers as usize].iter().enumerate() {
             let bytes = self.buffer(index, value, binary, is_glb)?;
             self.buffer_bytes += bytes.as_ref().map_or(0, |bytes| bytes.len() as u64);
@@ -222,7 +248,15 @@ impl<'a> File<'a> {
                 }
                 return Ok(None);
             }
-            Some(uri) => Cow::Owned(self.data(uri, &["application/octet-stream", "application/gltf-buffer"])?.1),
+            Some(uri) => {
+                if let Target::Scheme(scheme) = target(&uri.string()?) {
+                    let warning =
+                        Diagnostic::warning("buffer at another place was not loaded").at(uri.place());
+                    self.push(warning.found(quoted(scheme)).expected("the name of a file, or data"));
+                    return Ok(None);
+                }
+                Cow::Owned(self.data(uri, &["application/octet-stream", "application/gltf-buffer"])?.1)
+            }
         };
         let found = bytes.len() as u64;
         if found < length {
@@ -258,7 +292,11 @@ impl<'a> File<'a> {
                 if !is_base64 {
                     return Ok((name, percent_decoded_bytes(data)));
                 }
-                let data = if data.contains('%') { Cow::Owned(super::uri::percent_decoded(data)) } else { Cow::Borrowed(data) };
+                let data = if data.contains('%') {
+                    Cow::Owned(super::uri::percent_decoded(data))
+                } else {
+                    Cow::Borrowed(data)
+                };
                 let decoded = base64_decoded(&data).map_err(|at| {
                     let found = data.get(at..).and_then(|rest| rest.chars().next());
                     let found = found.map_or_else(
@@ -283,6 +321,7 @@ impl<'a> File<'a> {
                 })?;
                 Ok((input.name().clone(), input.into_bytes()))
             }
+            Target::Malformed => Err(uri.unexpected("wrong data URI", "data:MEDIA/TYPE;base64,DATA")),
             Target::Scheme(scheme) => {
                 let wrong = uri.wrong("unsupported scheme of a URI").found(quoted(scheme));
                 Err(wrong.expected("the name of a file, or data").into())
@@ -295,23 +334,14 @@ impl<'a> File<'a> {
         self.buffer_bytes
     }
 
-    /// The bytes of the buffer that a member of `value` names.
-    pub fn buffer_slice(&self, value: Value<'_>) -> Read<(&[u8], u64)> {
+    /// The bytes of a buffer that `value` names as a buffer view does, where they start, and how many there are.
+    pub fn buffer_slice(&self, value: Value<'_>) -> Read<(Option<&[u8]>, u64, u64)> {
         let (index, buffer) = self.at(List::Buffers, value.need("buffer")?)?;
         let offset_value = value.get("byteOffset")?;
         let offset = offset_value.map_or(Ok(0), |v| v.whole(0))?;
         let length_value = value.need("byteLength")?;
         let length = length_value.whole(1)?;
-        // Before the buffers are loaded there is only what they say.
-        let bytes = match self.buffers.get(index) {
-            Some(Some(bytes)) => &bytes[..],
-            _ => {
-                let said = buffer.need("byteLength")?.whole(1)?;
-                let wrong = value.wrong("view of a buffer without data").found(format!("buffer {index} of {said} bytes"));
-                return Err(wrong.into());
-            }
-        };
-        let size = bytes.len() as u64;
+        let size = buffer.need("byteLength")?.whole(1)?;
         let fits = offset.checked_add(length).is_some_and(|end| end <= size);
         if !fits {
             let culprit = if offset < size { length_value } else { offset_value.unwrap_or(length_value) };
@@ -319,7 +349,9 @@ impl<'a> File<'a> {
             let found = format!("{length} bytes from byte {offset}");
             return Err(wrong.found(found).expected(format!("at most {size} bytes in all")).into());
         }
-        Ok((&bytes[offset as usize..(offset + length) as usize], offset))
+        // A buffer that was loaded has as many bytes as it says.
+        let bytes = self.buffers.get(index).and_then(Option::as_ref);
+        Ok((bytes.and_then(|bytes| bytes.get(offset as usize..(offset + length) as usize)), offset, length))
     }
 
     /// The buffer view that `value` names.
@@ -356,29 +388,20 @@ impl<'a> File<'a> {
         }
         if let Some(Some(bytes)) = self.unpacked.get(index) {
             let stride = super::meshopt::stride(value)?;
-            return Ok(View { bytes, stride, offset: 0 });
+            return Ok(View { bytes: Some(bytes), length: bytes.len() as u64, stride, offset: 0 });
         }
-        let (bytes, offset) = self.buffer_slice(value)?;
+        let (bytes, offset, length) = self.buffer_slice(value)?;
         if let (Some(stride), Some(value)) = (stride, value.get("byteStride")?)
-            && stride > bytes.len()
+            && stride as u64 > length
         {
             let wrong = value.wrong("stride longer than the buffer view").found(stride);
-            self.breach(wrong.expected(format!("at most {}", bytes.len())))?;
+            self.breach(wrong.expected(format!("at most {length}")))?;
         }
-        Ok(View { bytes, stride, offset })
+        Ok(View { bytes, length, stride, offset })
     }
 
     /// A place for messages about the file as a whole.
     pub fn whole(&self) -> Place {
         Place::whole(self.name.clone())
     }
-}
-
-fn breach(diagnostics: &mut Diagnostics, wrong: Diagnostic) -> Read<()> {
-    if !diagnostics.is_lenient() {
-        return Err(wrong.into());
-    }
-    let Diagnostic { place, message, found, expected, .. } = wrong;
-    diagnostics.push(Diagnostic { place, found, expected, ..Diagnostic::warning(message) });
-    Ok(())
 }

@@ -27,6 +27,9 @@ pub(super) struct Json<'t> {
     within: Option<u64>,
 }
 
+/// A value inside another one, with its name if it has one.
+pub(super) type Inside<'a> = (Option<Cow<'a, str>>, Value<'a>);
+
 /// A value in a text.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Value<'a> {
@@ -104,7 +107,9 @@ impl Parser<'_> {
             let entry = Entry { start: start as u32, next: place + 1 };
             match self.peek() {
                 Some(bracket @ (b'{' | b'[')) => {
-                    budget.nesting(depth + 1, "JSON").map_err(|e| FormatError::from(e).or_at(|| self.place(start)))?;
+                    budget
+                        .nesting(depth + 1, "JSON")
+                        .map_err(|e| FormatError::from(e).or_at(|| self.place(start)))?;
                     entries.push(entry)?;
                     self.at += 1;
                     self.skip_space();
@@ -212,7 +217,10 @@ impl Parser<'_> {
                             for i in 1..=4 {
                                 if !self.text.get(self.at + i).is_some_and(u8::is_ascii_hexdigit) {
                                     self.at = (self.at + i).min(self.text.len());
-                                    return Err(self.wrong("wrong escape in a JSON string").expected("four hexadecimal digits").into());
+                                    return Err(self
+                                        .wrong("wrong escape in a JSON string")
+                                        .expected("four hexadecimal digits")
+                                        .into());
                                 }
                             }
                             self.at += 5;
@@ -224,7 +232,11 @@ impl Parser<'_> {
                 Some(_) => {
                     let expected = "an escape such as \\n";
                     let found = quoted_bytes(&self.text[self.at..=self.at]);
-                    return Err(self.wrong("control character in a JSON string").found(found).expected(expected).into());
+                    return Err(self
+                        .wrong("control character in a JSON string")
+                        .found(found)
+                        .expected(expected)
+                        .into());
                 }
                 None => return Err(self.wrong("JSON string without end").expected("'\"'").into()),
             }
@@ -237,7 +249,10 @@ impl Parser<'_> {
             while this.peek().is_some_and(|b| b.is_ascii_digit()) {
                 this.at += 1;
             }
-            if this.at == start { Err(this.wrong("wrong JSON number").expected("a digit")) } else { Ok(()) }
+            if this.at == start {
+                return Err(FormatError::from(this.wrong("wrong JSON number").expected("a digit")));
+            }
+            Ok(())
         };
         if self.peek() == Some(b'-') {
             self.at += 1;
@@ -330,7 +345,8 @@ impl<'a> Value<'a> {
                 b'{' => {
                     for (key, value) in here.pairs() {
                         if self.at < value.next() {
-                            let _ = write!(pointer, "/{}", key.unescaped().replace('~', "~0").replace('/', "~1"));
+                            let _ =
+                                write!(pointer, "/{}", key.unescaped().replace('~', "~0").replace('/', "~1"));
                             if self.at == key.at {
                                 break 'down;
                             }
@@ -360,9 +376,8 @@ impl<'a> Value<'a> {
         let json = self.json;
         match json.within {
             Some(start) => Place::binary(json.name.clone(), start + self.start() as u64, self.pointer()),
-            None => {
-                Place::of_offset(json.name.clone(), json.text.as_bytes(), self.start()).with_path(self.pointer())
-            }
+            None => Place::of_offset(json.name.clone(), json.text.as_bytes(), self.start())
+                .with_path(self.pointer()),
         }
     }
 
@@ -403,6 +418,19 @@ impl<'a> Value<'a> {
         if self.first_byte() == b'{' { Ok(self) } else { Err(self.unexpected("wrong type", "an object")) }
     }
 
+    /// The names and values of an object, or the values of an array; nothing for what has none inside.
+    pub fn inside(self) -> impl Iterator<Item = Inside<'a>> {
+        let is_object = self.first_byte() == b'{';
+        let mut values = self.values();
+        std::iter::from_fn(move || {
+            if !is_object {
+                return values.next().map(|value| (None, value));
+            }
+            let key = values.next()?;
+            Some((Some(key.unescaped()), values.next()?))
+        })
+    }
+
     /// The members of an object: names and values.
     pub fn members(self) -> Read<impl Iterator<Item = (Cow<'a, str>, Self)>> {
         self.object()?;
@@ -433,7 +461,11 @@ impl<'a> Value<'a> {
 
     /// The elements of an array.
     pub fn array(self) -> Read<impl Iterator<Item = Self>> {
-        if self.first_byte() == b'[' { Ok(self.values()) } else { Err(self.unexpected("wrong type", "an array")) }
+        if self.first_byte() == b'[' {
+            Ok(self.values())
+        } else {
+            Err(self.unexpected("wrong type", "an array"))
+        }
     }
 
     /// The numbers of an array of so many.
@@ -493,7 +525,11 @@ impl<'a> Value<'a> {
 
     /// A string.
     pub fn string(self) -> Read<Cow<'a, str>> {
-        if self.first_byte() == b'"' { Ok(self.unescaped()) } else { Err(self.unexpected("wrong type", "a string")) }
+        if self.first_byte() == b'"' {
+            Ok(self.unescaped())
+        } else {
+            Err(self.unexpected("wrong type", "a string"))
+        }
     }
 
     /// A number within a range, or `default` where the object has none of this name.
@@ -628,7 +664,8 @@ mod tests {
         assert_eq!(root.need("c").unwrap().string().unwrap(), "x\n😀\u{FFFD}");
         assert_eq!(root.pointer(), "");
         let error = b.index(3, "a mesh").unwrap_err().to_string();
-        let expected = "a.gltf:1:21 /a/1/b~1~0: wrong number (found -2.5e1; expected a whole number, 0 or more)";
+        let expected =
+            "a.gltf:1:21 /a/1/b~1~0: wrong number (found -2.5e1; expected a whole number, 0 or more)";
         assert_eq!(error, expected);
     }
 

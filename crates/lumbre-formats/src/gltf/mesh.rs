@@ -47,9 +47,21 @@ impl Mode {
         match self {
             Self::Points => count,
             Self::Lines => count - count % 2,
-            Self::LineLoop | Self::LineStrip => if count < 2 { 0 } else { count },
+            Self::LineLoop | Self::LineStrip => {
+                if count < 2 {
+                    0
+                } else {
+                    count
+                }
+            }
             Self::Triangles => count - count % 3,
-            Self::TriangleStrip | Self::TriangleFan => if count < 3 { 0 } else { count },
+            Self::TriangleStrip | Self::TriangleFan => {
+                if count < 3 {
+                    0
+                } else {
+                    count
+                }
+            }
         }
     }
 }
@@ -126,8 +138,13 @@ impl<'a> Attributes<'a> {
         for (name, index) in value.members()? {
             let Some(attribute) = Attribute::read(&name) else {
                 let wrong = index.wrong("unknown attribute").found(quoted(&name));
-                let known = ["POSITION", "NORMAL", "TANGENT", "TEXCOORD_0", "COLOR_0", "JOINTS_0", "WEIGHTS_0"];
-                file.breach(wrong.expected("one of glTF's, or a name that starts with an underscore").suggest(&name, known))?;
+                let known =
+                    ["POSITION", "NORMAL", "TANGENT", "TEXCOORD_0", "COLOR_0", "JOINTS_0", "WEIGHTS_0"];
+                file.breach(
+                    wrong
+                        .expected("one of glTF's, or a name that starts with an underscore")
+                        .suggest(&name, known),
+                )?;
                 continue;
             };
             let accessor = Accessor::named(file, index)?;
@@ -161,14 +178,20 @@ impl<'a> Attributes<'a> {
                     file.breach(index.wrong("attributes share a buffer view that says no stride"))?;
                 }
                 views.push(view);
-                if !accessor.start.is_multiple_of(4) || (!accessor.stride.is_multiple_of(4) && accessor.count > 1) {
+                if !accessor.start.is_multiple_of(4)
+                    || (!accessor.stride.is_multiple_of(4) && accessor.count > 1)
+                {
                     let found = format!("byte {}, {} bytes apart", accessor.start, accessor.stride);
-                    file.breach(index.wrong("attribute out of step").found(found).expected("multiples of 4"))?;
+                    file.breach(
+                        index.wrong("attribute out of step").found(found).expected("multiples of 4"),
+                    )?;
                 }
             }
             match &count {
                 Some((count, first)) if *count != accessor.count => {
-                    let wrong = index.wrong("attributes of different lengths").found(format!("{} elements", accessor.count));
+                    let wrong = index
+                        .wrong("attributes of different lengths")
+                        .found(format!("{} elements", accessor.count));
                     return Err(wrong.expected(format!("{count}, as {first} has")).into());
                 }
                 Some(_) => {}
@@ -186,8 +209,10 @@ impl<'a> Attributes<'a> {
             };
             match attribute {
                 Attribute::Position => {
-                    if !accessor.has_bounds && !is_target_only_of_zeros(&accessor) {
-                        file.breach(accessor.value.wrong("accessor of positions without \"min\" and \"max\""))?;
+                    if !accessor.has_bounds {
+                        file.breach(
+                            accessor.value.wrong("accessor of positions without \"min\" and \"max\""),
+                        )?;
                     }
                     attributes.position = Some(accessor);
                 }
@@ -197,7 +222,9 @@ impl<'a> Attributes<'a> {
                 Attribute::Colour(0) => attributes.colour = Some(accessor),
                 Attribute::Colour(_) => file.warn(index, "colours beyond the first set were left out"),
                 Attribute::Joints(_) | Attribute::Weights(_) if is_target => {
-                    file.breach(index.wrong("attribute that a morph target cannot have").found(quoted(&name)))?;
+                    file.breach(
+                        index.wrong("attribute that a morph target cannot have").found(quoted(&name)),
+                    )?;
                 }
                 Attribute::Joints(set) => put(&mut attributes.joints, set),
                 Attribute::Weights(set) => put(&mut attributes.weights, set),
@@ -210,12 +237,18 @@ impl<'a> Attributes<'a> {
             if let Some(missing) = sets.iter().position(Option::is_none)
                 && !is_target
             {
-                file.breach(value.wrong(format!("{name}_{missing} is missing")).expected("sets that count from 0"))?;
+                file.breach(
+                    value.wrong(format!("{name}_{missing} is missing")).expected("sets that count from 0"),
+                )?;
             }
         }
         if attributes.joints.len() != attributes.weights.len() {
             let wrong = value.wrong("as many sets of joints as of weights are needed");
-            file.breach(wrong.found(format!("{} and {}", attributes.joints.len(), attributes.weights.len())))?;
+            file.breach(wrong.found(format!(
+                "{} and {}",
+                attributes.joints.len(),
+                attributes.weights.len()
+            )))?;
         }
         Ok(attributes)
     }
@@ -224,11 +257,6 @@ impl<'a> Attributes<'a> {
     fn count(&self) -> Option<usize> {
         self.position.as_ref().map(|p| p.count)
     }
-}
-
-/// Whether an accessor has no data at all, of which there is nothing to say.
-fn is_target_only_of_zeros(accessor: &Accessor<'_>) -> bool {
-    accessor.view.is_none()
 }
 
 impl<'a> Primitive<'a> {
@@ -244,7 +272,11 @@ impl<'a> Primitive<'a> {
             None => None,
             Some(index) => {
                 let accessor = Accessor::named(file, index)?;
-                accessor.expect(index, &[Element::Scalar], &[Component::U8, Component::U16, Component::U32])?;
+                accessor.expect(
+                    index,
+                    &[Element::Scalar],
+                    &[Component::U8, Component::U16, Component::U32],
+                )?;
                 if accessor.normalized {
                     file.breach(index.wrong("normalized indices"))?;
                 }
@@ -256,7 +288,9 @@ impl<'a> Primitive<'a> {
         };
         let count = indices.as_ref().map(|i| i.count).or(attributes.count());
         if let Some(count) = count.filter(|&count| mode.whole(count) != count) {
-            let warning = value.wrong("vertices that make no whole shape were left out").found(format!("{count} of {mode:?}"));
+            let warning = value
+                .wrong("vertices that make no whole shape were left out")
+                .found(format!("{count} of {mode:?}"));
             file.push(crate::Diagnostic { severity: crate::Severity::Warning, ..warning });
         }
         let mut targets = vec![];
@@ -269,11 +303,18 @@ impl<'a> Primitive<'a> {
                     (&read.tangent, &attributes.tangent, "TANGENT"),
                     (&read.colour, &attributes.colour, "COLOR_0"),
                 ];
-                let sets = read.uvs.iter().enumerate().map(|(set, uv)| (uv, attributes.uvs.get(set).unwrap_or(&None), "TEXCOORD"));
+                let sets = read
+                    .uvs
+                    .iter()
+                    .enumerate()
+                    .map(|(set, uv)| (uv, attributes.uvs.get(set).unwrap_or(&None), "TEXCOORD"));
                 for (added, base, name) in pairs.into_iter().chain(sets) {
                     let Some(added) = added else { continue };
                     let Some(base) = base else {
-                        return Err(target.wrong("morph target of an attribute that is not there").found(name).into());
+                        return Err(target
+                            .wrong("morph target of an attribute that is not there")
+                            .found(name)
+                            .into());
                     };
                     if added.count != base.count {
                         let wrong = target.wrong("morph target of another length than its base");
@@ -289,6 +330,15 @@ impl<'a> Primitive<'a> {
         }
         let material = Self::material(file, value, variant)?;
         Ok(Self { value, mode, attributes, targets, indices, material })
+    }
+
+    /// Everything that it reads, and whether as indices.
+    pub fn accessors(&self) -> impl Iterator<Item = (&Accessor<'a>, bool)> {
+        let vertices = std::iter::once(&self.attributes).chain(&self.targets).flat_map(|a| {
+            let sets = [&a.uvs, &a.joints, &a.weights].into_iter().flatten();
+            [&a.position, &a.normal, &a.tangent, &a.colour].into_iter().chain(sets).flatten()
+        });
+        vertices.map(|accessor| (accessor, false)).chain(self.indices.iter().map(|accessor| (accessor, true)))
     }
 
     fn material(file: &File<'_>, value: Value<'_>, variant: Option<usize>) -> Read<Option<usize>> {
@@ -329,7 +379,12 @@ pub(super) struct Vertices {
 }
 
 /// Reads the vertices of a primitive in a pose. Only the sets of texture coordinates for which `wants` says so are read.
-pub(super) fn vertices(file: &File<'_>, primitive: &Primitive<'_>, pose: Pose<'_>, wants: impl Fn(usize) -> bool) -> Read<Vertices> {
+pub(super) fn vertices(
+    file: &File<'_>,
+    primitive: &Primitive<'_>,
+    pose: Pose<'_>,
+    wants: impl Fn(usize) -> bool,
+) -> Read<Vertices> {
     let attributes = &primitive.attributes;
     let Some(position) = &attributes.position else { return Ok(Vertices::default()) };
     let vec3 = |accessor: &Accessor<'_>| accessor.floats(file, Vec3::from_array);
@@ -417,11 +472,15 @@ fn bend(file: &File<'_>, primitive: &Primitive<'_>, joints: &[DMat4], vertices: 
             let wrong = read.iter().position(|four| four.iter().any(|&j| j as usize >= joints.len()));
             let weights = weights.floats(file, |w: [f32; 4]| w)?;
             // A joint without weight may be any.
-            let used = |i: usize| (0..4).find(|&k| weights[i][k] != 0.0 && read[i][k] as usize >= joints.len());
+            let used =
+                |i: usize| (0..4).find(|&k| weights[i][k] != 0.0 && read[i][k] as usize >= joints.len());
             if let Some((i, k)) = wrong.and_then(|from| (from..count).find_map(|i| Some((i, used(i)?)))) {
                 let wrong = indices.value.wrong("joint that the skin does not have");
                 let found = format!("{} at vertex {i}", read[i][k]);
-                return Err(wrong.found(found).expected(format!("0 to {}", joints.len().saturating_sub(1))).into());
+                return Err(wrong
+                    .found(found)
+                    .expected(format!("0 to {}", joints.len().saturating_sub(1)))
+                    .into());
             }
             sets.push((read, weights));
         }
@@ -494,7 +553,12 @@ pub(super) fn assemble(file: &File<'_>, primitive: &Primitive<'_>, positions: &[
             Some(p) if p.is_finite() => return Ok(true),
             Some(p) => {
                 let culprit = primitive.attributes.position.as_ref().map_or(primitive.value, |a| a.value);
-                ("vertex that is not finite", culprit, format!("{p} as vertex {v}"), "finite numbers".to_owned())
+                (
+                    "vertex that is not finite",
+                    culprit,
+                    format!("{p} as vertex {v}"),
+                    "finite numbers".to_owned(),
+                )
             }
             None => {
                 let culprit = listed.as_ref().map_or(primitive.value, |(accessor, _)| accessor.value);

@@ -11,6 +11,8 @@ pub(super) enum Target<'a> {
     File(PathBuf),
     /// Something with this scheme, which is not read.
     Scheme(&'a str),
+    /// Data that begin wrongly.
+    Malformed,
 }
 
 /// `data:MEDIA TYPE;base64,…`
@@ -27,10 +29,15 @@ pub(super) struct DataUri<'a> {
 /// Looks at a URI. Names of files are percent-decoded once, and never expanded in any other way.
 pub(super) fn target(uri: &str) -> Target<'_> {
     if let Some(rest) = strip_prefix_ignoring_case(uri, "data:") {
-        let (head, data) = rest.split_once(',').unwrap_or((rest, ""));
-        let mut parts = head.split(';');
-        let media_type = parts.next().unwrap_or("");
-        let is_base64 = parts.any(|part| part.eq_ignore_ascii_case("base64"));
+        let Some((head, data)) = rest.split_once(',') else { return Target::Malformed };
+        let (media_type, parameters) = head.split_once(';').map_or((head, None), |(m, p)| (m, Some(p)));
+        let mut is_base64 = false;
+        for parameter in parameters.iter().flat_map(|p| p.split(';')) {
+            if parameter.is_empty() {
+                return Target::Malformed;
+            }
+            is_base64 |= parameter.eq_ignore_ascii_case("base64");
+        }
         return Target::Data(DataUri { media_type, is_base64, data });
     }
     if let Some((scheme, rest)) = uri.split_once(':') {
@@ -123,6 +130,9 @@ mod tests {
         assert_eq!(target("data:image/png;charset=utf-8;base64,AAEC"), Target::Data(data));
         let plain = DataUri { media_type: "", is_base64: false, data: "a%00b" };
         assert_eq!(target("DATA:,a%00b"), Target::Data(plain));
+        for malformed in ["data:", "data:image/png;base64", "data:image/png;;base64,AAEC"] {
+            assert_eq!(target(malformed), Target::Malformed, "{malformed}");
+        }
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! Light from one exact shape.
 
 use lumbre_geometry::{PlacedShape, Ray, Surface};
-use lumbre_math::{DVec2, DVec3, Vec2};
-use lumbre_shading::{FloatTexture, Scatter, Spectrum, TextureContext};
+use lumbre_math::{DVec2, DVec3};
+use lumbre_shading::{FloatTexture, Scatter, Spectrum};
 
 use super::{LightPoint, LightSample};
 use crate::surface::SurfaceEntry;
@@ -50,7 +50,7 @@ pub(super) fn arriving(
             radiance *= (1.0 / pdf) as f32;
             scatter = Scatter::Delta;
         } else {
-            radiance *= alpha.evaluate(&bare_context(&dressed.surface, uv)).clamp(0.0, 1.0);
+            radiance *= alpha.evaluate(&dressed.bare_context()).clamp(0.0, 1.0);
         }
     }
     (pdf > 0.0 && !radiance.is_black()).then(|| LightSample {
@@ -59,19 +59,6 @@ pub(super) fn arriving(
         radiance,
         scatter,
     })
-}
-
-/// The context of a lookup at a point, without a footprint.
-pub(crate) fn bare_context(surface: &Surface, uv: Vec2) -> TextureContext {
-    TextureContext {
-        point: surface.point,
-        normal: surface.normal.as_vec3(),
-        uv,
-        dpdx: lumbre_math::Vec3::ZERO,
-        dpdy: lumbre_math::Vec3::ZERO,
-        duv_dx: Vec2::ZERO,
-        duv_dy: Vec2::ZERO,
-    }
 }
 
 /// The power of a surface of some area that emits this in the mean.

@@ -1,0 +1,239 @@
+//! Animations: where they take nodes at one time.
+
+use std::collections::HashMap;
+
+use lumbre_math::{DQuat, DVec3};
+
+use super::accessor::{Accessor, Component, Element};
+use super::file::{File, List};
+use super::json::{Read, Value};
+use crate::diagnostic::quoted;
+
+/// What animations do to a node at one time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Moved {
+    pub translation: Option<DVec3>,
+    pub rotation: Option<DQuat>,
+    pub scale: Option<DVec3>,
+    pub weights: Option<Vec<f64>>,
+}
+
+impl Moved {
+    /// Whether it moves the node, and not only the weights of its morph targets.
+    pub fn places(&self) -> bool {
+        self.translation.is_some() || self.rotation.is_some() || self.scale.is_some()
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Path {
+    Translation,
+    Rotation,
+    Scale,
+    Weights,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Interpolation {
+    Step,
+    Linear,
+    CubicSpline,
+}
+
+/// A channel with its sampler.
+struct Channel<'a> {
+    value: Value<'a>,
+    node: usize,
+    path: Path,
+    interpolation: Interpolation,
+    input: Accessor<'a>,
+    output: Accessor<'a>,
+    /// Elements of the output that make one value.
+    width: usize,
+}
+
+/// What all animations do at a time in seconds. Of several that do the same thing to the same node the first counts.
+pub(super) fn at(file: &File<'_>, time: f64) -> Read<HashMap<usize, Moved>> {
+    let mut moved: HashMap<usize, Moved> = HashMap::new();
+    for &animation in file.list(List::Animations) {
+        for channel in channels(file, animation)? {
+            let entry = moved.entry(channel.node).or_default();
+            let is_taken = match channel.path {
+                Path::Translation => entry.translation.is_some(),
+                Path::Rotation => entry.rotation.is_some(),
+                Path::Scale => entry.scale.is_some(),
+                Path::Weights => entry.weights.is_some(),
+            };
+            if is_taken {
+                file.warn(channel.value, "animation of what another one animates was left out");
+                continue;
+            }
+            let v = channel.sample(file, time)?;
+            match channel.path {
+                Path::Translation => entry.translation = Some(DVec3::new(v[0], v[1], v[2])),
+                Path::Rotation => entry.rotation = Some(DQuat::from_xyzw(v[0], v[1], v[2], v[3])),
+                Path::Scale => entry.scale = Some(DVec3::new(v[0], v[1], v[2])),
+                Path::Weights => entry.weights = Some(v),
+            }
+        }
+    }
+    Ok(moved)
+}
+
+/// Checks all animations without playing them.
+pub(super) fn check(file: &File<'_>) -> Read<()> {
+    for &animation in file.list(List::Animations) {
+        channels(file, animation)?;
+    }
+    Ok(())
+}
+
+fn channels<'a>(file: &'a File<'_>, animation: Value<'a>) -> Read<Vec<Channel<'a>>> {
+    let samplers: Vec<Value<'a>> = animation.need("samplers")?.array()?.collect();
+    let mut channels = vec![];
+    for value in animation.need("channels")?.array()? {
+        let sampler =
+            samplers[value.need("sampler")?.index(samplers.len(), "a sampler of this animation")?];
+        let target = value.need("target")?;
+        let path_value = target.need("path")?;
+        let path = match &*path_value.string()? {
+            "translation" => Path::Translation,
+            "rotation" => Path::Rotation,
+            "scale" => Path::Scale,
+            "weights" => Path::Weights,
+            "pointer" if target.extension("KHR_animation_pointer")?.is_some() => {
+                file.warn(target, "animation of something other than nodes was left out");
+                continue;
+            }
+            other => {
+                let wrong = path_value.wrong("unknown target of an animation").found(quoted(other));
+                return Err(wrong.suggest(other, ["translation", "rotation", "scale", "weights"]).into());
+            }
+        };
+        let interpolation = match sampler.get("interpolation")? {
+            None => Interpolation::Linear,
+            Some(value) => match &*value.string()? {
+                "LINEAR" => Interpolation::Linear,
+                "STEP" => Interpolation::Step,
+                "CUBICSPLINE" => Interpolation::CubicSpline,
+                other => {
+                    let wrong = value.wrong("unknown interpolation").found(quoted(other));
+                    return Err(wrong.suggest(other, ["LINEAR", "STEP", "CUBICSPLINE"]).into());
+                }
+            },
+        };
+        use Component::{F32, I8, I16, U8, U16};
+        let input_value = sampler.need("input")?;
+        let input = Accessor::named(file, input_value)?;
+        input.expect(input_value, &[Element::Scalar], &[F32])?;
+        let output_value = sampler.need("output")?;
+        let output = Accessor::named(file, output_value)?;
+        let (elements, components): (&[Element], &[Component]) = match path {
+            Path::Translation | Path::Scale => (&[Element::Vec3], &[F32]),
+            Path::Rotation => (&[Element::Vec4], &[F32, I8, U8, I16, U16]),
+            Path::Weights => (&[Element::Scalar], &[F32, I8, U8, I16, U16]),
+        };
+        output.expect(output_value, elements, components)?;
+        // Without a node, it may be for an extension.
+        let Some((node, node_value)) = file.named(List::Nodes, target, "node")? else { continue };
+        let width = if path == Path::Weights { targets(file, node_value)? } else { 1 };
+        if width == 0 {
+            return Err(target.wrong("animation of morph targets that are not there").into());
+        }
+        let each = if interpolation == Interpolation::CubicSpline { 3 } else { 1 };
+        let expected = input.count.checked_mul(width).and_then(|n| n.checked_mul(each));
+        if expected != Some(output.count) {
+            let wrong =
+                output_value.wrong("animation of a wrong length").found(format!("{} elements", output.count));
+            let expected = format!("{} times {} times {each}", input.count, width);
+            return Err(wrong.expected(expected).into());
+        }
+        channels.push(Channel { value, node, path, interpolation, input, output, width });
+    }
+    Ok(channels)
+}
+
+/// How many morph targets the mesh of a node has.
+pub(super) fn targets(file: &File<'_>, node: Value<'_>) -> Read<usize> {
+    let Some((_, mesh)) = file.named(List::Meshes, node, "mesh")? else { return Ok(0) };
+    let Some(primitive) = mesh.need("primitives")?.array()?.next() else { return Ok(0) };
+    primitive.get("targets")?.map_or(Ok(0), |targets| Ok(targets.array()?.count()))
+}
+
+impl Channel<'_> {
+    /// The value at a time: before the first and after the last keyframe, that of the keyframe.
+    fn sample(&self, file: &File<'_>, time: f64) -> Read<Vec<f64>> {
+        let times: Vec<f32> = self.input.floats(file, |[t]: [f32; 1]| t)?;
+        if let Some(i) =
+            (0..times.len()).find(|&i| !times[i].is_finite() || (i > 0 && times[i] <= times[i - 1]))
+        {
+            let wrong =
+                self.input.value.wrong("times out of order").found(format!("{} as element {i}", times[i]));
+            return Err(wrong.expected("finite numbers, each more than the one before").into());
+        }
+        let numbers: usize = match self.path {
+            Path::Translation | Path::Scale => 3,
+            Path::Rotation => 4,
+            Path::Weights => self.width,
+        };
+        let values: Vec<f32> = match self.path {
+            Path::Translation | Path::Scale => {
+                self.output.floats(file, |v: [f32; 3]| v)?.into_iter().flatten().collect()
+            }
+            Path::Rotation => self.output.floats(file, |v: [f32; 4]| v)?.into_iter().flatten().collect(),
+            Path::Weights => self.output.floats(file, |[v]: [f32; 1]| v)?,
+        };
+        file.budget.release(4 * (times.len() + values.len()) as u64);
+        if let Some(i) = values.iter().position(|v| !v.is_finite()) {
+            let wrong = self
+                .output
+                .value
+                .wrong("number that is not finite")
+                .found(format!("{} as number {i}", values[i]));
+            return Err(wrong.into());
+        }
+        let get = |block: usize| -> Vec<f64> {
+            values[block * numbers..(block + 1) * numbers].iter().map(|&v| f64::from(v)).collect()
+        };
+        let is_cubic = self.interpolation == Interpolation::CubicSpline;
+        // A keyframe of a spline has the tangent before it, the value, and the tangent after it.
+        let key = |k: usize| get(if is_cubic { 3 * k + 1 } else { k });
+        let after = times.partition_point(|&t| f64::from(t) <= time);
+        if after == 0 {
+            return Ok(key(0));
+        }
+        let k = after - 1;
+        if after == times.len() || self.interpolation == Interpolation::Step {
+            return Ok(key(k));
+        }
+        let (t0, t1) = (f64::from(times[k]), f64::from(times[after]));
+        let length = t1 - t0;
+        let t = (time - t0) / length;
+        let (from, to) = (key(k), key(after));
+        let blend = |weights: &[(f64, &Vec<f64>)]| -> Vec<f64> {
+            (0..numbers).map(|i| weights.iter().map(|(w, v)| w * v[i]).sum()).collect()
+        };
+        if is_cubic {
+            let (out, into) = (get(3 * k + 2), get(3 * after));
+            let (t2, t3) = (t * t, t * t * t);
+            return Ok(blend(&[
+                (2.0 * t3 - 3.0 * t2 + 1.0, &from),
+                (length * (t3 - 2.0 * t2 + t), &out),
+                (3.0 * t2 - 2.0 * t3, &to),
+                (length * (t3 - t2), &into),
+            ]));
+        }
+        if self.path != Path::Rotation {
+            return Ok(blend(&[(1.0 - t, &from), (t, &to)]));
+        }
+        // Along the shorter way around the sphere (Shoemake, "Animating rotation with quaternion curves", SIGGRAPH 1985).
+        let cosine: f64 = (0..4).map(|i| from[i] * to[i]).sum();
+        let sign = if cosine < 0.0 { -1.0 } else { 1.0 };
+        let angle = cosine.abs().min(1.0).acos();
+        let sine = angle.sin();
+        if sine < 1e-6 {
+            return Ok(blend(&[(1.0 - t, &from), (sign * t, &to)]));
+        }
+        Ok(blend(&[(((1.0 - t) * angle).sin() / sine, &from), (sign * (t * angle).sin() / sine, &to)]))
+    }
+}

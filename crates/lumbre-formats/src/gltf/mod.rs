@@ -1,0 +1,250 @@
+//! glTF 2.0 (Khronos, 2021), as JSON and as GLB, with its extensions.
+//!
+//! Everything in a file is checked, used or not: it is right or wrong as a whole. What glTF forbids though its meaning is
+//! plain is an error, and when lenient a warning. Errors name the place by its JSON pointer.
+//!
+//! Light is photometric all through: radiance in nits, so that `emissiveFactor`, candelas and lux fit together at a
+//! factor of 1. Points and lines, which have no size, become spheres of 0.4 % and cylinders of 0.2 % of the diagonal of
+//! the box around their primitive.
+
+mod accessor;
+mod animation;
+mod container;
+mod file;
+mod graph;
+mod json;
+pub mod material;
+mod mesh;
+mod meshopt;
+mod scene;
+mod shade;
+mod texture;
+mod uri;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use lumbre_scene::SceneDesc;
+
+use self::file::File;
+use self::json::{Inside, Json, Read, Value};
+use crate::budget::Budget;
+use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, nearest_name, quoted};
+use crate::input::{Input, text};
+
+/// What to take out of a glTF.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct GltfOptions {
+    /// The time in seconds at which animations stand; `None` leaves them alone. All animations of the file play at once:
+    /// where two of them move the same thing, the first does.
+    pub frame: Option<f64>,
+    /// The material variant to wear (`KHR_materials_variants`).
+    pub variant: Option<String>,
+}
+
+/// The extensions that are read.
+const SUPPORTED: &[&str] = &[
+    "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
+    "EXT_texture_webp",
+    "KHR_lights_punctual",
+    "KHR_materials_anisotropy",
+    "KHR_materials_clearcoat",
+    "KHR_materials_diffuse_transmission",
+    "KHR_materials_dispersion",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_iridescence",
+    "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_sheen",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_unlit",
+    "KHR_materials_variants",
+    "KHR_materials_volume",
+    "KHR_materials_volume_scatter",
+    "KHR_mesh_quantization",
+    "KHR_texture_transform",
+];
+
+/// Reads the glTF or GLB file `path`; other files that it names are looked for from its folder.
+///
+/// # Errors
+/// As [`Input::open`] and [`read_gltf`].
+pub fn open_gltf(
+    path: &Path,
+    options: &GltfOptions,
+    budget: &Budget,
+    diagnostics: &mut Diagnostics,
+) -> Result<SceneDesc, FormatError> {
+    let input = Input::open(path, budget)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    read_gltf(&input, input.name(), folder, options, budget, diagnostics)
+}
+
+/// Reads a glTF or a GLB from the bytes of its file. Other files that it names are looked for from `folder`.
+///
+/// # Errors
+/// [`FormatError::Input`] with the JSON pointer where the file is wrong or needs an extension that is not known,
+/// [`FormatError::Limit`], and [`FormatError::Io`] for files that it names.
+pub fn read_gltf(
+    bytes: &[u8],
+    name: &Arc<str>,
+    folder: &Path,
+    options: &GltfOptions,
+    budget: &Budget,
+    diagnostics: &mut Diagnostics,
+) -> Result<SceneDesc, FormatError> {
+    read(bytes, name, folder, options, budget, diagnostics)
+        .map_err(|e| e.or_at(|| Place::whole(name.clone())))
+}
+
+fn read(
+    bytes: &[u8],
+    name: &Arc<str>,
+    folder: &Path,
+    options: &GltfOptions,
+    budget: &Budget,
+    diagnostics: &mut Diagnostics,
+) -> Read<SceneDesc> {
+    let is_glb = bytes.starts_with(container::MAGIC);
+    let (text, within, binary) = if is_glb {
+        let glb = container::read(bytes, name, diagnostics)?;
+        let text = std::str::from_utf8(glb.json).map_err(|e| {
+            let at = e.valid_up_to();
+            let wrong = Diagnostic::error("text is not UTF-8").at(Place::binary(
+                name.clone(),
+                glb.json_start + at as u64,
+                "",
+            ));
+            FormatError::from(wrong.found(format!("byte 0x{:02x}", glb.json[at])))
+        })?;
+        (text, Some(glb.json_start), glb.binary)
+    } else {
+        if bytes.is_empty() {
+            return Err(Diagnostic::error("empty file")
+                .at(Place::whole(name.clone()))
+                .expected("a glTF")
+                .into());
+        }
+        (text(bytes, name)?, None, None)
+    };
+    let json = Json::read(text, name, within, budget)?;
+    let root = json.root().object()?;
+    version(root)?;
+    let mut file = File::new(root, name, folder, budget, std::mem::take(diagnostics));
+    let scene = extensions(&file, root)
+        .and_then(|()| file.load(binary, is_glb))
+        .and_then(|()| scene::read(&file, options));
+    *diagnostics = file.into_diagnostics();
+    scene
+}
+
+/// That the file is of a version that is read: 2, whatever comes behind the point, unless it needs more.
+fn version(root: Value<'_>) -> Read<()> {
+    let asset = root.need("asset")?;
+    let needed = asset.get("minVersion")?;
+    for value in [Some(asset.need("version")?), needed].into_iter().flatten() {
+        let text = value.string()?;
+        let (major, minor) = text.split_once('.').unwrap_or((&text, ""));
+        let is_number = |s: &str| !s.is_empty() && s.bytes().all(|b| b.is_ascii_digit());
+        let is_minimum = needed.is_some_and(|n| n.pointer() == value.pointer());
+        if major != "2" || !is_number(minor) || (is_minimum && minor != "0") {
+            return Err(value.unexpected("unsupported version of glTF", "\"2.0\""));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses what needs extensions that are not known, and warns of others.
+fn extensions(file: &File<'_>, root: Value<'_>) -> Read<()> {
+    let mut required = vec![];
+    if let Some(list) = root.get("extensionsRequired")? {
+        for value in list.array()? {
+            let extension = value.string()?;
+            if !SUPPORTED.contains(&&*extension) {
+                let wrong = value
+                    .wrong("the file requires an extension that is not supported")
+                    .found(quoted(&extension));
+                let wrong = Diagnostic {
+                    suggestion: nearest_name(&extension, SUPPORTED.iter().copied()).map(str::to_owned),
+                    ..wrong
+                };
+                return Err(wrong.into());
+            }
+            required.push((value, extension));
+        }
+    }
+    let mut used = vec![];
+    if let Some(list) = root.get("extensionsUsed")? {
+        for value in list.array()? {
+            let extension = value.string()?;
+            if !SUPPORTED.contains(&&*extension) {
+                let warning =
+                    Diagnostic::warning("extension that is not supported was left out").at(value.place());
+                file.push(warning.found(quoted(&extension)));
+            }
+            used.push(extension);
+        }
+    }
+    if let Some((value, extension)) = required.iter().find(|(_, extension)| !used.contains(extension)) {
+        file.breach(
+            value.wrong("required extension that \"extensionsUsed\" does not list").found(quoted(extension)),
+        )?;
+    }
+    places(file, root)
+}
+
+/// Where the objects of extensions may stand: pointers with `*` for positions.
+const PLACES: &[(&str, &[&str])] = &[
+    ("EXT_mesh_gpu_instancing", &["/nodes/*"]),
+    ("EXT_meshopt_compression", &["/bufferViews/*", "/buffers/*"]),
+    ("EXT_texture_webp", &["/textures/*"]),
+    ("KHR_lights_punctual", &["", "/nodes/*"]),
+    ("KHR_materials_variants", &["", "/meshes/*/primitives/*"]),
+    ("KHR_texture_transform", &["/materials/*/…Texture"]),
+    ("KHR_materials_", &["/materials/*"]),
+];
+
+/// Checks that the objects of the extensions that are known stand where they belong: elsewhere they would say nothing.
+fn places(file: &File<'_>, root: Value<'_>) -> Read<()> {
+    let mut path = String::new();
+    // What is being looked through, with the length of its path.
+    let mut open: Vec<(usize, Box<dyn Iterator<Item = Inside<'_>> + '_>)> =
+        vec![(0, Box::new(root.inside()))];
+    while let Some((length, items)) = open.last_mut() {
+        path.truncate(*length);
+        let Some((name, inner)) = items.next() else {
+            open.pop();
+            continue;
+        };
+        let name = name.as_deref().unwrap_or("*");
+        if name == "extras" {
+            continue;
+        }
+        if name == "extensions" {
+            for (extension, object) in inner.members()? {
+                place(file, &path, &extension, object)?;
+            }
+        }
+        path.push('/');
+        path.push_str(name);
+        open.push((path.len(), Box::new(inner.inside())));
+    }
+    Ok(())
+}
+
+fn place(file: &File<'_>, path: &str, extension: &str, object: Value<'_>) -> Read<()> {
+    let is = |known: &str| extension == known || (known.ends_with('_') && extension.starts_with(known));
+    let Some((_, places)) = PLACES.iter().find(|(known, _)| is(known)) else { return Ok(()) };
+    let fits = |place: &str| match place.strip_suffix("/…Texture") {
+        Some(start) => path.starts_with(start) && path.ends_with("Texture"),
+        None => path == place,
+    };
+    if SUPPORTED.contains(&extension) && !places.iter().any(|place| fits(place)) {
+        let wrong = object.wrong("extension where it says nothing").found(quoted(extension));
+        let places: Vec<&str> = places.iter().map(|p| if p.is_empty() { "the top" } else { p }).collect();
+        file.breach(wrong.expected(format!("it at {}", places.join(" or "))))?;
+    }
+    Ok(())
+}

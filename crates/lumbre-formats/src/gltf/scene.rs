@@ -1,0 +1,775 @@
+//! From the nodes of a glTF to a scene: shapes where they stand, meshes of several nodes as objects.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use lumbre_geometry::{Cylinder, Shape, Sphere};
+use lumbre_image::Rgb;
+use lumbre_math::{DAffine3, DMat3, DMat4, DQuat, DVec3, Transform, Vec2, Vec3};
+use lumbre_scene::{
+    Camera, CameraKind, GeometryDesc, InstanceDesc, LightDesc, MeshDesc, ObjectDesc, ObjectId, SceneDesc,
+    ShapeDesc,
+};
+
+use super::accessor::{self, Accessor, Component, Element};
+use super::file::{File, List};
+use super::graph::Graph;
+use super::json::{Read, Value};
+use super::material::GltfMaterial;
+use super::mesh::{self, Assembly, Pose, Primitive, Vertices};
+use super::shade::{Dressing, Materials};
+use super::texture::{Textures, UvSets};
+use super::{GltfOptions, animation};
+use crate::diagnostic::{Diagnostic, quoted};
+
+/// Radius of points, and of lines, as a share of the diagonal of the box around all vertices of the primitive.
+const POINT_RADIUS: f64 = 0.004;
+const LINE_RADIUS: f64 = 0.002;
+
+/// Shapes that shine are not put into objects, unless there are more copies than this: light from inside an object is only
+/// found by chance.
+const MOST_COPIES_OF_LIGHTS: usize = 64;
+
+/// Reads everything that a glTF says.
+pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
+    let variant = variant(file, options)?;
+    let moved = match options.frame {
+        Some(time) => animation::at(file, time)?,
+        None => HashMap::new(),
+    };
+    let graph = Graph::read(file, moved)?;
+    check(file, &graph)?;
+
+    let roots = roots(file, &graph)?;
+    let mut places: Vec<Placement> = vec![];
+    let mut scene = SceneDesc::default();
+    let mut uses: HashMap<Key, usize> = HashMap::new();
+    graph.walk(&roots, |node, world| {
+        let value = file.list(List::Nodes)[node];
+        if let Some((_, camera)) = file.named(List::Cameras, value, "camera")? {
+            scene.cameras.push(self::camera(camera, value, world)?);
+        }
+        if let Some(extension) = value.extension("KHR_lights_punctual")? {
+            let (_, light) = file.at(List::Lights, extension.need("light")?)?;
+            scene.lights.extend(self::light(file, light, world)?);
+        }
+        let Some((mesh, _)) = file.named(List::Meshes, value, "mesh")? else { return Ok(()) };
+        let skin = file.named(List::Skins, value, "skin")?.map(|(skin, _)| skin);
+        let weights = weights(file, &graph, node)?;
+        let key =
+            Key { mesh, weights: weights.iter().map(|w| w.to_bits()).collect(), skinned: skin.map(|_| node) };
+        let worlds = match value.extension("EXT_mesh_gpu_instancing")? {
+            Some(extension) => instances(file, extension, world)?,
+            // A skin says where its vertices are.
+            None if skin.is_some() => vec![DAffine3::IDENTITY],
+            None => vec![*world],
+        };
+        *uses.entry(key.clone()).or_default() += worlds.len();
+        file.budget.elements(worlds.len() as u64, "nodes with meshes")?;
+        file.budget.bytes((worlds.len() * size_of::<DAffine3>()) as u64, "nodes with meshes")?;
+        places.push(Placement { key, node, skin, worlds });
+        Ok(())
+    })?;
+    if let Some(camera) = scene.cameras.first()
+        && let Some(aspect) = aspect(file, camera)?
+    {
+        (scene.film.width, scene.film.height) = size_of_picture(aspect);
+    }
+
+    let mut builder = Builder {
+        file,
+        graph: &graph,
+        variant,
+        materials: Materials::new(file),
+        known: HashMap::new(),
+        objects: HashMap::new(),
+        next_shape: 0,
+    };
+    for place in &places {
+        builder.place(&mut scene, place, uses[&place.key])?;
+    }
+    scene.materials = builder.materials.into_list();
+    Ok(scene)
+}
+
+/// A mesh in a pose: what several nodes may share.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+struct Key {
+    mesh: usize,
+    /// Bits of the weights of its morph targets, none where all are 0.
+    weights: Vec<u64>,
+    /// The node of a skinned mesh, which it shares with no other.
+    skinned: Option<usize>,
+}
+
+struct Placement {
+    key: Key,
+    node: usize,
+    skin: Option<usize>,
+    worlds: Vec<DAffine3>,
+}
+
+/// The variant that is asked for, by its position.
+fn variant(file: &File<'_>, options: &GltfOptions) -> Read<Option<usize>> {
+    let Some(wanted) = &options.variant else { return Ok(None) };
+    let mut names = vec![];
+    for &value in file.list(List::Variants) {
+        names.push(value.need("name")?.string()?.into_owned());
+    }
+    if let Some(index) = names.iter().position(|name| name == wanted) {
+        return Ok(Some(index));
+    }
+    let wrong = Diagnostic::error("no such material variant").at(file.whole()).found(quoted(wanted));
+    let known: Vec<String> = names.iter().take(20).map(|name| quoted(name)).collect();
+    let expected =
+        if known.is_empty() { "no variant: the file has none".to_owned() } else { known.join(", ") };
+    Err(wrong.expected(expected).suggest(wanted, names.iter().map(String::as_str)).into())
+}
+
+/// The nodes at the top of the scene to show.
+fn roots(file: &File<'_>, graph: &Graph<'_>) -> Read<Vec<usize>> {
+    let scenes = file.list(List::Scenes);
+    let scene = match file.named(List::Scenes, file.root, "scene")? {
+        Some((_, scene)) => Some(scene),
+        None => scenes.first().copied(),
+    };
+    let Some(scene) = scene else { return Ok(graph.roots().collect()) };
+    let Some(nodes) = scene.get("nodes")? else { return Ok(vec![]) };
+    nodes.array()?.map(|node| Ok(file.at(List::Nodes, node)?.0)).collect()
+}
+
+/// The weights of a node's morph targets; empty where all are 0.
+fn weights(file: &File<'_>, graph: &Graph<'_>, node: usize) -> Read<Vec<f64>> {
+    let value = file.list(List::Nodes)[node];
+    let weights = match graph.moved(node).and_then(|moved| moved.weights.clone()) {
+        Some(weights) => weights,
+        None => {
+            let own = value.get("weights")?;
+            let of_mesh = match file.named(List::Meshes, value, "mesh")? {
+                Some((_, mesh)) => mesh.get("weights")?,
+                None => None,
+            };
+            match own.or(of_mesh) {
+                None => vec![],
+                Some(list) => list.array()?.map(Value::number).collect::<Read<_>>()?,
+            }
+        }
+    };
+    Ok(if weights.iter().all(|&w| w == 0.0) { vec![] } else { weights })
+}
+
+/// Checks everything that the scene may not come to use, so that a file is right or wrong as a whole.
+fn check(file: &File<'_>, graph: &Graph<'_>) -> Read<()> {
+    for (index, &view) in file.list(List::BufferViews).iter().enumerate() {
+        file.view_at(index, view)?;
+    }
+    for (index, &value) in file.list(List::Accessors).iter().enumerate() {
+        if accessor::is_known(value)? {
+            Accessor::at(file, index)?;
+        } else {
+            file.warn(value, "accessor of an unknown kind was left out");
+        }
+    }
+    for &image in file.list(List::Images) {
+        Textures::check_image(file, image)?;
+    }
+    for &texture in file.list(List::Textures) {
+        Textures::check(file, texture)?;
+    }
+    let mut used_as: HashMap<usize, bool> = HashMap::new();
+    let mut materials = vec![];
+    for &material in file.list(List::Materials) {
+        // As many sets of texture coordinates as its textures need.
+        let read = GltfMaterial::read(file, material)?;
+        materials.push(read.textures().map(|t| t.uv_set + 1).max().unwrap_or(0));
+    }
+    for &mesh in file.list(List::Meshes) {
+        check_mesh(file, mesh, &materials, &mut used_as)?;
+    }
+    for &camera in file.list(List::Cameras) {
+        self::camera(camera, camera, &DAffine3::IDENTITY)?;
+    }
+    for &light in file.list(List::Lights) {
+        self::light(file, light, &DAffine3::IDENTITY)?;
+    }
+    for &skin in file.list(List::Skins) {
+        check_skin(file, skin)?;
+    }
+    for (index, &node) in file.list(List::Nodes).iter().enumerate() {
+        check_node(file, graph, index, node)?;
+    }
+    animation::check(file)?;
+    file.named(List::Scenes, file.root, "scene")?;
+    for &scene in file.list(List::Scenes) {
+        let Some(nodes) = scene.get("nodes")? else { continue };
+        let mut met = std::collections::HashSet::new();
+        for name in nodes.array()? {
+            let (node, _) = file.at(List::Nodes, name)?;
+            if graph.is_child(node) {
+                file.breach(name.wrong("scene with a node that hangs on another").found(node))?;
+            }
+            if !met.insert(node) {
+                return Err(name.wrong("scene with the same node twice").found(node).into());
+            }
+        }
+        if met.is_empty() {
+            file.breach(nodes.wrong("empty list").expected("one node or more, or no list"))?;
+        }
+    }
+    Ok(())
+}
+
+fn check_mesh(
+    file: &File<'_>,
+    mesh: Value<'_>,
+    materials: &[usize],
+    used_as: &mut HashMap<usize, bool>,
+) -> Read<()> {
+    let primitives = mesh.need("primitives")?;
+    let mut targets: Option<usize> = None;
+    let mut count = 0;
+    for value in primitives.array()? {
+        count += 1;
+        let primitive = Primitive::read(file, value, None)?;
+        let wanted = primitive.material.map_or(0, |material| materials[material]);
+        let found = primitive.attributes.uvs.len();
+        if found < wanted {
+            let wrong = value.wrong("texture coordinates that the material needs are missing");
+            file.breach(wrong.found(format!("{found} sets")).expected(format!("{wanted} sets")))?;
+        }
+        if *targets.get_or_insert(primitive.targets.len()) != primitive.targets.len() {
+            let wrong = value.wrong("primitives with different numbers of morph targets");
+            file.breach(wrong.found(primitive.targets.len()).expected(targets.unwrap_or(0)))?;
+        }
+        for (accessor, as_indices) in primitive.accessors() {
+            let Some((view, _)) = accessor.view else { continue };
+            let before = used_as.entry(view).or_insert(as_indices);
+            let said = match file.list(List::BufferViews)[view].get("target")? {
+                Some(target) => Some(target.whole(0)? == 34963),
+                None => None,
+            };
+            if *before != as_indices || said.is_some_and(|said| said != as_indices) {
+                file.breach(
+                    accessor.value.wrong("buffer view for indices and for vertices at once").found(view),
+                )?;
+            }
+        }
+    }
+    if count == 0 {
+        file.breach(primitives.wrong("empty list").expected("one primitive or more"))?;
+    }
+    if let Some(weights) = mesh.get("weights")? {
+        check_weights(file, weights, targets.unwrap_or(0))?;
+    }
+    Ok(())
+}
+
+fn check_weights(file: &File<'_>, weights: Value<'_>, targets: usize) -> Read<()> {
+    let mut count = 0;
+    for weight in weights.array()? {
+        weight.number()?;
+        count += 1;
+    }
+    if count != targets {
+        let wrong = weights.wrong("as many weights as morph targets are needed").found(count);
+        file.breach(wrong.expected(targets))?;
+    }
+    Ok(())
+}
+
+fn check_skin(file: &File<'_>, skin: Value<'_>) -> Read<()> {
+    let list = skin.need("joints")?;
+    let mut joints = 0;
+    for joint in list.array()? {
+        file.at(List::Nodes, joint)?;
+        joints += 1;
+    }
+    if joints == 0 {
+        file.breach(list.wrong("empty list").expected("one joint or more"))?;
+    }
+    file.named(List::Nodes, skin, "skeleton")?;
+    if let Some(name) = skin.get("inverseBindMatrices")? {
+        let matrices = Accessor::named(file, name)?;
+        matrices.expect(name, &[Element::Mat4], &[Component::F32])?;
+        if matrices.count < joints {
+            let wrong = name.wrong("skin with too few matrices").found(matrices.count);
+            return Err(wrong.expected(format!("{joints}, one for each joint")).into());
+        }
+    }
+    Ok(())
+}
+
+fn check_node(file: &File<'_>, graph: &Graph<'_>, index: usize, node: Value<'_>) -> Read<()> {
+    graph.local(index)?;
+    let mesh = file.named(List::Meshes, node, "mesh")?;
+    file.named(List::Cameras, node, "camera")?;
+    let skin = file.named(List::Skins, node, "skin")?;
+    if let Some(extension) = node.extension("KHR_lights_punctual")? {
+        file.at(List::Lights, extension.need("light")?)?;
+    }
+    let Some((_, mesh)) = mesh else {
+        for name in ["skin", "weights"] {
+            if let Some(value) = node.get(name)? {
+                file.breach(value.wrong(format!("node with {} and without a mesh", quoted(name))))?;
+            }
+        }
+        return Ok(());
+    };
+    if let Some(weights) = node.get("weights")? {
+        check_weights(file, weights, animation::targets(file, node)?)?;
+    }
+    let mut skinned = 0;
+    let mut primitives = 0;
+    for primitive in mesh.need("primitives")?.array()? {
+        primitives += 1;
+        skinned += usize::from(primitive.need("attributes")?.get("JOINTS_0")?.is_some());
+    }
+    if skin.is_some() && skinned < primitives {
+        file.breach(node.need("skin")?.wrong("skin on a mesh without joints"))?;
+    }
+    if skin.is_none() && skinned > 0 {
+        file.warn(node, "mesh with joints on a node without a skin stands as it is");
+    }
+    Ok(())
+}
+
+/// Where the copies of a node's mesh stand (`EXT_mesh_gpu_instancing`).
+fn instances(file: &File<'_>, extension: Value<'_>, world: &DAffine3) -> Read<Vec<DAffine3>> {
+    let attributes = extension.need("attributes")?;
+    let mut count: Option<usize> = None;
+    let mut parts: [Option<Accessor<'_>>; 3] = [None; 3];
+    for (name, index) in attributes.members()? {
+        let accessor = Accessor::named(file, index)?;
+        let expected = *count.get_or_insert(accessor.count);
+        if accessor.count != expected {
+            let wrong = index.wrong("attributes of different lengths").found(accessor.count);
+            return Err(wrong.expected(expected).into());
+        }
+        let whole = [Component::F32, Component::I8, Component::I16];
+        match &*name {
+            "TRANSLATION" => {
+                accessor.expect(index, &[Element::Vec3], &[Component::F32])?;
+                parts[0] = Some(accessor);
+            }
+            "ROTATION" => {
+                accessor.expect(index, &[Element::Vec4], &whole)?;
+                parts[1] = Some(accessor);
+            }
+            "SCALE" => {
+                accessor.expect(index, &[Element::Vec3], &[Component::F32])?;
+                parts[2] = Some(accessor);
+            }
+            _ => {}
+        }
+    }
+    let count = count.unwrap_or(0);
+    let vec3 = |part: Option<Accessor<'_>>, default: Vec3| match part {
+        Some(accessor) => accessor.floats(file, Vec3::from_array),
+        None => Ok(vec![default; count]),
+    };
+    let translations = vec3(parts[0], Vec3::ZERO)?;
+    let rotations = match parts[1] {
+        Some(accessor) => accessor.floats(file, |q: [f32; 4]| DQuat::from_array(q.map(f64::from)))?,
+        None => vec![DQuat::IDENTITY; count],
+    };
+    let scales = vec3(parts[2], Vec3::ONE)?;
+    let mut worlds = Vec::with_capacity(count);
+    for i in 0..count {
+        let length = rotations[i].length();
+        let rotation = if length > 0.0 { rotations[i] * (1.0 / length) } else { DQuat::IDENTITY };
+        worlds.push(
+            *world
+                * DAffine3::from_scale_rotation_translation(
+                    scales[i].as_dvec3(),
+                    rotation,
+                    translations[i].as_dvec3(),
+                ),
+        );
+    }
+    Ok(worlds)
+}
+
+/// What grows while meshes are placed.
+struct Builder<'f> {
+    file: &'f File<'f>,
+    graph: &'f Graph<'f>,
+    variant: Option<usize>,
+    materials: Materials<'f>,
+    /// Where joints stand.
+    known: HashMap<usize, DAffine3>,
+    /// Meshes that stand in more than one place: their objects, and the parts that shine.
+    objects: HashMap<Key, (Option<ObjectId>, Vec<ShapeDesc>)>,
+    next_shape: u32,
+}
+
+impl Builder<'_> {
+    fn place(&mut self, scene: &mut SceneDesc, place: &Placement, uses: usize) -> Read<()> {
+        if uses <= 1 {
+            for world in &place.worlds {
+                let shapes = self.shapes(place)?;
+                self.stand(scene, shapes, world, place)?;
+            }
+            return Ok(());
+        }
+        if !self.objects.contains_key(&place.key) {
+            let (shining, plain): (Vec<_>, Vec<_>) = self
+                .shapes(place)?
+                .into_iter()
+                .partition(|shape| shape.area_light.is_some() && uses <= MOST_COPIES_OF_LIGHTS);
+            let object = if plain.is_empty() {
+                None
+            } else {
+                let mesh = self.file.list(List::Meshes)[place.key.mesh];
+                let name =
+                    mesh.string_at("name")?.map_or_else(|| format!("mesh {}", place.key.mesh), Into::into);
+                scene.objects.push(ObjectDesc { name, shapes: plain, instances: vec![] });
+                Some(ObjectId(scene.objects.len() as u32 - 1))
+            };
+            self.objects.insert(place.key.clone(), (object, shining));
+        }
+        let (object, shining) = self.objects[&place.key].clone();
+        let count = place.worlds.len() as u64;
+        self.file.budget.bytes(count * size_of::<InstanceDesc>() as u64, "instances")?;
+        for world in &place.worlds {
+            if let Some(object) = object {
+                match Transform::from_affine(*world) {
+                    Ok(world_from_object) => scene.instances.push(InstanceDesc { object, world_from_object }),
+                    Err(_) => {
+                        let shapes = scene.objects[object.0 as usize].shapes.clone();
+                        self.stand(scene, shapes, world, place)?;
+                    }
+                }
+            }
+            let copies = shining.iter().map(|shape| ShapeDesc { index: self.next_index(), ..shape.clone() });
+            let copies: Vec<ShapeDesc> = copies.collect();
+            self.stand(scene, copies, world, place)?;
+        }
+        Ok(())
+    }
+
+    fn next_index(&mut self) -> u32 {
+        let index = self.next_shape;
+        self.next_shape = self.next_shape.saturating_add(1);
+        index
+    }
+
+    /// Puts shapes into the world.
+    fn stand(
+        &mut self,
+        scene: &mut SceneDesc,
+        shapes: Vec<ShapeDesc>,
+        world: &DAffine3,
+        place: &Placement,
+    ) -> Read<()> {
+        match Transform::from_affine(*world) {
+            Ok(world_from_object) => {
+                scene.shapes.extend(shapes.into_iter().map(|shape| ShapeDesc { world_from_object, ..shape }));
+            }
+            Err(_) => {
+                // Flattened, it may still be seen; squeezed into a line or a point it is nothing.
+                let node = self.file.list(List::Nodes)[place.node];
+                self.file.warn(node, "what a node without an inverse holds is flattened or left out");
+                scene.shapes.extend(shapes.into_iter().filter_map(|shape| flattened(shape, world)));
+            }
+        }
+        Ok(())
+    }
+
+    /// The shapes of a mesh in its own space, or in the world if it has a skin.
+    fn shapes(&mut self, place: &Placement) -> Read<Vec<ShapeDesc>> {
+        let file = self.file;
+        let joints = place.skin.map(|skin| self.joints(skin)).transpose()?;
+        let weights: Vec<f64> = place.key.weights.iter().map(|&bits| f64::from_bits(bits)).collect();
+        let pose = Pose { weights: &weights, joints: joints.as_deref() };
+        let mesh = file.list(List::Meshes)[place.key.mesh];
+        let mut shapes = vec![];
+        for value in mesh.need("primitives")?.array()? {
+            let primitive = Primitive::read(file, value, self.variant)?;
+            if primitive.attributes.position.is_none() {
+                file.warn(value, "primitive without positions was left out");
+                continue;
+            }
+            let has_colours = primitive.attributes.colour.is_some() && primitive.mode.is_surface();
+            let dressing = self.materials.dressing(primitive.material, has_colours)?;
+            let sets = dressing.sets.filter(|_| primitive.mode.is_surface());
+            let wants = |set| sets.is_some_and(|sets| sets.first == set || sets.second == Some(set));
+            let vertices = mesh::vertices(file, &primitive, pose, wants)?;
+            let shape = |geometry, index| ShapeDesc {
+                index,
+                geometry,
+                world_from_object: Transform::IDENTITY,
+                reverse_orientation: false,
+                material: Some(dressing.material),
+                area_light: dressing.area_light.clone(),
+                alpha: dressing.alpha.clone(),
+            };
+            match mesh::assemble(file, &primitive, &vertices.positions)? {
+                Assembly::Triangles(triangles) => {
+                    if let Some(mesh) = mesh_of(vertices, triangles, &dressing) {
+                        shapes.push(shape(GeometryDesc::Mesh(Arc::new(mesh)), self.next_index()));
+                    }
+                }
+                thin => {
+                    if primitive.attributes.colour.is_some() {
+                        file.warn(value, "vertex colours of points and lines were left out");
+                    }
+                    for exact in thin_shapes(&vertices.positions, &thin) {
+                        file.budget.bytes(size_of::<ShapeDesc>() as u64, "points and lines")?;
+                        shapes.push(shape(GeometryDesc::Exact(exact), self.next_index()));
+                    }
+                }
+            }
+        }
+        Ok(shapes)
+    }
+
+    /// Where the joints of a skin take the vertices of a mesh.
+    fn joints(&mut self, skin: usize) -> Read<Vec<DMat4>> {
+        let file = self.file;
+        let value = file.list(List::Skins)[skin];
+        let inverse: Option<Vec<[f32; 16]>> = match value.get("inverseBindMatrices")? {
+            Some(name) => Some(Accessor::named(file, name)?.floats(file, |m| m)?),
+            None => None,
+        };
+        let mut joints = vec![];
+        for (i, name) in value.need("joints")?.array()?.enumerate() {
+            let (node, _) = file.at(List::Nodes, name)?;
+            let world = DMat4::from(self.graph.world(node, &mut self.known)?);
+            let bind = match inverse.as_ref().and_then(|list| list.get(i)) {
+                Some(matrix) => DMat4::from_cols_array(&matrix.map(f64::from)),
+                None => DMat4::IDENTITY,
+            };
+            joints.push(world * bind);
+        }
+        if let Some(inverse) = inverse {
+            file.budget.release((inverse.len() * 64) as u64);
+        }
+        Ok(joints)
+    }
+}
+
+/// A mesh as scenes have it; `None` without triangles.
+fn mesh_of(mut vertices: Vertices, mut triangles: Vec<[u32; 3]>, dressing: &Dressing) -> Option<MeshDesc> {
+    if triangles.is_empty() {
+        return None;
+    }
+    mesh::compact(&mut vertices, &mut triangles);
+    let count = vertices.positions.len();
+    let UvSets { first, second, baked } = dressing.sets.unwrap_or_default();
+    let mut coordinates = |set: usize| -> Vec<Vec2> {
+        let list = vertices.uvs.get_mut(set).and_then(Option::take);
+        let mut list = list.unwrap_or_else(|| vec![Vec2::ZERO; count]);
+        list.iter_mut().for_each(|uv| *uv = Vec2::new(uv.x, 1.0 - uv.y));
+        list
+    };
+    let second_uvs = second.map(&mut coordinates);
+    let uvs = dressing.sets.is_some().then(|| {
+        let mut uvs = coordinates(first);
+        if baked != lumbre_math::glam::Affine2::IDENTITY {
+            uvs.iter_mut().for_each(|uv| *uv = baked.transform_point2(*uv));
+        }
+        uvs
+    });
+    let (colours, coverages) = match vertices.colours {
+        None => (None, None),
+        Some(list) => {
+            let coverages = list.iter().any(|&(_, coverage)| coverage != 1.0);
+            let coverages = coverages.then(|| list.iter().map(|&(_, coverage)| coverage).collect());
+            (Some(list.into_iter().map(|(colour, _)| colour).collect::<Vec<Rgb>>()), coverages)
+        }
+    };
+    // Tangents without normals have nothing to stand on.
+    let tangents = vertices.normals.is_some().then_some(vertices.tangents).flatten();
+    Some(MeshDesc {
+        positions: vertices.positions,
+        triangles,
+        quads: vec![],
+        normals: vertices.normals,
+        uvs,
+        tangents,
+        second_uvs,
+        colours,
+        coverages,
+        face_indices: None,
+    })
+}
+
+/// Points as spheres; lines as capped cylinders, with spheres where one goes on as the next.
+fn thin_shapes(positions: &[Vec3], assembly: &Assembly) -> Vec<Shape> {
+    let at = |i: u32| positions[i as usize].as_dvec3();
+    let size = mesh::diagonal(positions.iter().copied());
+    let size = if size > 0.0 { size } else { 1.0 };
+    match assembly {
+        Assembly::Points(points) => points
+            .iter()
+            .filter_map(|&i| Sphere::new(at(i), POINT_RADIUS * size).ok())
+            .map(Shape::from)
+            .collect(),
+        Assembly::Segments(segments) => {
+            let radius = LINE_RADIUS * size;
+            let mut shapes = vec![];
+            for &([a, b], goes_on) in segments {
+                // A segment without length is no line.
+                shapes.extend(Cylinder::new(at(a), at(b), radius, true).ok().map(Shape::from));
+                if goes_on {
+                    shapes.extend(Sphere::new(at(b), radius).ok().map(Shape::from));
+                }
+            }
+            shapes
+        }
+        Assembly::Triangles(_) => vec![],
+    }
+}
+
+/// A mesh moved by a map without an inverse; `None` where nothing is left to see.
+fn flattened(shape: ShapeDesc, world: &DAffine3) -> Option<ShapeDesc> {
+    let GeometryDesc::Mesh(mesh) = &shape.geometry else { return None };
+    let has_area = mesh::cofactors(&world.matrix3).to_cols_array().iter().any(|&n| n != 0.0);
+    if !world.is_finite() || !has_area {
+        return None;
+    }
+    let mut mesh = MeshDesc::clone(mesh);
+    for p in &mut mesh.positions {
+        *p = world.transform_point3(p.as_dvec3()).as_vec3();
+    }
+    // All normals come to lie across the plane, whichever way they looked.
+    (mesh.normals, mesh.tangents) = (None, None);
+    Some(ShapeDesc {
+        geometry: GeometryDesc::Mesh(Arc::new(mesh)),
+        world_from_object: Transform::IDENTITY,
+        ..shape
+    })
+}
+
+/// The rotation and the place of something whose size does not follow its node's.
+fn rigid(world: &DAffine3) -> DAffine3 {
+    let [x, y, z] = [world.matrix3.x_axis, world.matrix3.y_axis, world.matrix3.z_axis];
+    let z = z.try_normalize().unwrap_or(DVec3::Z);
+    let across = y - z * z.dot(y);
+    let y = across.try_normalize().unwrap_or_else(|| z.any_orthonormal_vector());
+    let right = y.cross(z);
+    // A mirrored node shows a mirrored picture.
+    let right = if right.dot(x) < 0.0 { -right } else { right };
+    DAffine3 { matrix3: DMat3::from_cols(right, y, z), translation: world.translation }
+}
+
+/// A camera. Those of glTF look along -z, with x to the right and y up.
+fn camera(camera: Value<'_>, node: Value<'_>, world: &DAffine3) -> Read<Camera> {
+    let name = match camera.string_at("name")? {
+        Some(name) => Some(name),
+        None => node.string_at("name")?,
+    };
+    let above = f64::MIN_POSITIVE..=f64::INFINITY;
+    let kind_value = camera.need("type")?;
+    let (kind, window) = match &*kind_value.string()? {
+        "perspective" => {
+            let lens = camera.need("perspective")?;
+            lens.need("yfov")?;
+            lens.need("znear")?;
+            lens.number_or("znear", 0.0, above.clone())?;
+            lens.number_or("zfar", 1.0, above.clone())?;
+            let most = std::f64::consts::PI - 1e-6;
+            let fov = lens.number_or("yfov", 1.0, 1e-6..=most)?;
+            let aspect =
+                lens.get("aspectRatio")?.map(|_| lens.number_or("aspectRatio", 1.0, above)).transpose()?;
+            // Ours is along the shorter side.
+            let slope = (0.5 * fov).tan() * aspect.unwrap_or(1.0).min(1.0);
+            let fov = (2.0 * slope.atan()).to_degrees();
+            (CameraKind::Perspective { fov, lens_radius: 0.0, focal_distance: 1.0 }, None)
+        }
+        "orthographic" => {
+            let lens = camera.need("orthographic")?;
+            let [x, y] = ["xmag", "ymag"].map(|name| -> Read<f64> {
+                let magnification = lens.need(name)?;
+                let size = magnification.number()?;
+                if size == 0.0 {
+                    return Err(magnification.unexpected("number out of range", "a number other than 0"));
+                }
+                Ok(size.abs())
+            });
+            let (x, y) = (x?, y?);
+            for name in ["znear", "zfar"] {
+                lens.need(name)?.number()?;
+            }
+            (CameraKind::Orthographic { lens_radius: 0.0, focal_distance: 1.0 }, Some([-x, x, -y, y]))
+        }
+        other => {
+            let wrong = kind_value.wrong("unknown kind of camera").found(quoted(other));
+            return Err(wrong.suggest(other, ["perspective", "orthographic"]).into());
+        }
+    };
+    let forwards = DAffine3::from_scale(DVec3::new(1.0, 1.0, -1.0));
+    let world_from_camera = Transform::from_affine(rigid(world) * forwards)
+        .map_err(|_| crate::FormatError::from(node.wrong("camera at a place that is not finite")))?;
+    Ok(Camera {
+        name: name.map(Into::into),
+        kind,
+        world_from_camera,
+        frame_aspect: None,
+        screen_window: window,
+        shutter_open: 0.0,
+        shutter_close: 1.0,
+    })
+}
+
+/// Width over height of the picture that the first camera asks for.
+fn aspect(file: &File<'_>, camera: &Camera) -> Read<Option<f64>> {
+    if let Some([x0, x1, y0, y1]) = camera.screen_window {
+        return Ok(Some((x1 - x0) / (y1 - y0)));
+    }
+    for &value in file.list(List::Cameras) {
+        let is_this = value.string_at("name")?.as_deref() == camera.name.as_deref();
+        if is_this || file.list(List::Cameras).len() == 1 {
+            let Some(lens) = value.get("perspective")? else { continue };
+            return lens.get("aspectRatio")?.map(Value::number).transpose();
+        }
+    }
+    Ok(None)
+}
+
+/// About as many pixels as 1280 × 720, of this shape.
+fn size_of_picture(aspect: f64) -> (Option<u32>, Option<u32>) {
+    let aspect = aspect.clamp(0.05, 20.0);
+    let height = (1280.0 * 720.0 / aspect).sqrt();
+    (Some((height * aspect).round() as u32), Some(height.round() as u32))
+}
+
+/// A light (`KHR_lights_punctual`): a candela is a unit of radiant intensity, a lux one of irradiance, and so a nit one of
+/// radiance, which is that of `emissiveFactor`. They shine along -z. `None` for a kind that is not known.
+fn light(file: &File<'_>, light: Value<'_>, world: &DAffine3) -> Read<Option<LightDesc>> {
+    let unit = 0.0..=1.0;
+    let positive = 0.0..=f64::INFINITY;
+    let [r, g, b] = light.numbers_or("color", [1.0; 3], unit)?;
+    let intensity = light.number_or("intensity", 1.0, positive.clone())?;
+    let colour = Rgb::new(r as f32, g as f32, b as f32) * intensity as f32;
+    light.number_or("range", 1.0, f64::MIN_POSITIVE..=f64::INFINITY)?;
+    let kind = light.need("type")?;
+    Ok(Some(match &*kind.string()? {
+        "point" => LightDesc::Point { from: world.translation, intensity: colour },
+        "directional" => LightDesc::Distant { towards: rigid(world).matrix3.z_axis, irradiance: colour },
+        "spot" => {
+            let cone = light.need("spot")?;
+            let right = std::f64::consts::FRAC_PI_2;
+            let inner = cone.number_or("innerConeAngle", 0.0, 0.0..=right)?;
+            let outer = cone.number_or("outerConeAngle", 0.5 * right, 0.0..=right)?;
+            if inner >= outer {
+                let wrong = cone.wrong("inner angle of a spot that is not less than the outer one");
+                return Err(wrong.found(format!("{inner} and {outer}")).into());
+            }
+            let backwards = DAffine3::from_scale(DVec3::new(-1.0, 1.0, -1.0));
+            let world_from_light = Transform::from_affine(rigid(world) * backwards)
+                .map_err(|_| crate::FormatError::from(light.wrong("light at a place that is not finite")))?;
+            LightDesc::Spot {
+                world_from_light,
+                intensity: colour,
+                cone_angle: outer.to_degrees() as f32,
+                cone_delta_angle: (outer - inner).to_degrees() as f32,
+            }
+        }
+        other => {
+            let warning = Diagnostic::warning("light of an unknown kind was left out").at(kind.place());
+            file.push(warning.found(quoted(other)));
+            return Ok(None);
+        }
+    }))
+}

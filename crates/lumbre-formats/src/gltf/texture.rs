@@ -1,0 +1,301 @@
+//! Textures: images decoded once, and what materials look up in them.
+
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use lumbre_image::{Bitmap, Channels, Encoding, PixelData, unit_to_u16};
+use lumbre_math::glam::{Affine2, Mat2};
+use lumbre_math::{Vec2, Vec3};
+use lumbre_shading::{
+    AxisWrap, FloatTexture, ImageFilter, ImageTexture, Mapping2d, MipMap, MipMapOptions, SpectrumTexture,
+    Texture, UvSet, Wrap,
+};
+
+use super::file::{File, List};
+use super::json::{Read, Value};
+use super::material::TextureRef;
+use crate::diagnostic::{Diagnostic, quoted};
+use crate::image::read_image;
+
+/// What is looked up in an image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+enum Use {
+    /// Its colours, on the sRGB curve.
+    Colour,
+    /// One channel, as it is stored: 0 to 2 colours, 3 coverage.
+    Channel(usize),
+    /// One channel of a roughness times a factor (its bits), squared; from one minus it if it is a glossiness.
+    Alpha { channel: usize, factor: u32, glossiness: bool },
+    /// Normals whose x and y have a factor (its bits).
+    Normal(u32),
+}
+
+/// A texture and what is looked up in it.
+type MapKey = (usize, Use);
+
+/// The textures of a file, each decoded when it is first asked for.
+pub(super) struct Textures<'f> {
+    file: &'f File<'f>,
+    images: RefCell<HashMap<usize, Option<Arc<Bitmap>>>>,
+    maps: RefCell<HashMap<MapKey, Option<Arc<MipMap>>>>,
+}
+
+/// How a mesh's two sets of texture coordinates come to lie: which sets of the file they are. The v of glTF counts
+/// downwards and ours upwards, so meshes get 1 - v.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub(super) struct UvSets {
+    pub first: usize,
+    pub second: Option<usize>,
+    /// What is done to the first set in the mesh itself: light looks up its image there without any map.
+    pub baked: Affine2,
+}
+
+impl<'f> Textures<'f> {
+    pub fn new(file: &'f File<'f>) -> Self {
+        Self { file, images: RefCell::default(), maps: RefCell::default() }
+    }
+
+    /// Checks the texture and what it names, without decoding anything.
+    pub fn check(file: &File<'_>, value: Value<'_>) -> Read<()> {
+        source(file, value)?;
+        sampler(file, value)?;
+        Ok(())
+    }
+
+    /// Checks an image without decoding it.
+    pub fn check_image(file: &File<'_>, value: Value<'_>) -> Read<()> {
+        let mime = value.string_at("mimeType")?;
+        match (value.get("uri")?, value.get("bufferView")?) {
+            (Some(uri), None) => drop(uri.string()?),
+            (None, Some(view)) => {
+                if mime.is_none() {
+                    file.breach(value.wrong("image in a buffer view without a \"mimeType\""))?;
+                }
+                file.at(List::BufferViews, view)?;
+            }
+            (Some(_), Some(view)) => file.breach(view.wrong("image with a URI and with a buffer view"))?,
+            (None, None) => {
+                file.breach(value.wrong("image without data").expected("\"uri\" or \"bufferView\""))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// A colour by its texture; `None` without an image.
+    pub fn colour(&self, texture: TextureRef, sets: UvSets) -> Read<Option<Arc<SpectrumTexture>>> {
+        Ok(self.look_up(texture, sets, Use::Colour)?.map(|image| Arc::new(Texture::Image(image))))
+    }
+
+    /// One channel of a texture (3 is coverage); `None` where it has no coverage.
+    pub fn channel(
+        &self,
+        texture: TextureRef,
+        channel: usize,
+        sets: UvSets,
+    ) -> Read<Option<Arc<FloatTexture>>> {
+        Ok(self.look_up(texture, sets, Use::Channel(channel))?.map(|image| Arc::new(Texture::Image(image))))
+    }
+
+    /// The α of a roughness (or of a glossiness) in one channel of a texture: (factor · channel)².
+    pub fn alpha(
+        &self,
+        texture: TextureRef,
+        channel: usize,
+        factor: f32,
+        glossiness: bool,
+        sets: UvSets,
+    ) -> Read<Option<Arc<FloatTexture>>> {
+        let how = Use::Alpha { channel, factor: factor.to_bits(), glossiness };
+        Ok(self.look_up(texture, sets, how)?.map(|image| Arc::new(Texture::Image(image))))
+    }
+
+    /// A normal map.
+    pub fn normals(&self, texture: TextureRef, scale: f32, sets: UvSets) -> Read<Option<ImageTexture>> {
+        self.look_up(texture, sets, Use::Normal(scale.to_bits()))
+    }
+
+    /// The colours of a texture, without saying where they lie.
+    pub fn colour_map(&self, texture: usize) -> Read<Option<Arc<MipMap>>> {
+        self.map(texture, Use::Colour)
+    }
+
+    fn look_up(&self, texture: TextureRef, sets: UvSets, how: Use) -> Read<Option<ImageTexture>> {
+        let set = if texture.uv_set == sets.first {
+            UvSet::First
+        } else if Some(texture.uv_set) == sets.second {
+            UvSet::Second
+        } else {
+            return Ok(None);
+        };
+        let image = self.map(texture.texture, how)?;
+        let map = match set {
+            UvSet::First => ours(texture) * sets.baked.inverse(),
+            UvSet::Second => ours(texture),
+        };
+        let axes = [map.matrix2.x_axis, map.matrix2.y_axis];
+        let mapping = Mapping2d::Affine { set, axes, origin: map.translation };
+        Ok(image.map(|image| ImageTexture { mapping, image, scale: 1.0, invert: false }))
+    }
+
+    fn map(&self, texture: usize, how: Use) -> Read<Option<Arc<MipMap>>> {
+        if let Some(map) = self.maps.borrow().get(&(texture, how)) {
+            return Ok(map.clone());
+        }
+        let file = self.file;
+        let value = file.list(List::Textures)[texture];
+        let map = match source(file, value)? {
+            None => {
+                file.warn(value, "texture without an image was left out");
+                None
+            }
+            Some(image) => match self.image(image)? {
+                None => None,
+                Some(bitmap) if how == Use::Channel(3) && bitmap.channels().alpha().is_none() => None,
+                Some(bitmap) => {
+                    let options = sampler(file, value)?;
+                    let pixels = u64::from(bitmap.width()) * u64::from(bitmap.height());
+                    let bitmap = if how == Use::Colour {
+                        bitmap
+                    } else {
+                        let each = if matches!(how, Use::Normal(_)) { 6 } else { 2 };
+                        file.budget.bytes(pixels * each, "texture")?;
+                        Arc::new(derived(&bitmap, how))
+                    };
+                    file.budget.bytes(bitmap.bytes() as u64 / 3 + 16, "texture")?;
+                    Some(Arc::new(MipMap::new(bitmap, options)))
+                }
+            },
+        };
+        self.maps.borrow_mut().insert((texture, how), map.clone());
+        Ok(map)
+    }
+
+    /// An image, decoded; `None` for one that cannot be had, where that was forgiven.
+    fn image(&self, index: usize) -> Read<Option<Arc<Bitmap>>> {
+        if let Some(image) = self.images.borrow().get(&index) {
+            return Ok(image.clone());
+        }
+        let file = self.file;
+        let value = file.list(List::Images)[index];
+        let image = match decoded(file, value) {
+            Ok(image) => Some(Arc::new(image)),
+            Err(error) if file.is_lenient() && matches!(error, crate::FormatError::Input(_)) => {
+                let warning = Diagnostic::warning("image that cannot be read was left out").at(value.place());
+                file.push(warning.found(quoted(&error.to_string())));
+                None
+            }
+            Err(error) => return Err(error),
+        };
+        self.images.borrow_mut().insert(index, image.clone());
+        Ok(image)
+    }
+}
+
+fn decoded(file: &File<'_>, value: Value<'_>) -> Read<Bitmap> {
+    let read = |bytes: &[u8], name: &Arc<str>| {
+        file.with_diagnostics(|diagnostics| read_image(bytes, name, file.budget, diagnostics))
+    };
+    if let Some(uri) = value.get("uri")? {
+        let (name, bytes) = file.data(uri, &[])?;
+        let image = read(&bytes, &name)?;
+        file.budget.release(bytes.len() as u64);
+        return Ok(image.bitmap);
+    }
+    let name: Arc<str> = value.place().to_string().into();
+    let (_, view) = file.view(value.need("bufferView")?)?;
+    let bytes = view.bytes.ok_or_else(|| {
+        crate::FormatError::from(value.wrong("the buffer of what is needed here has no data"))
+    })?;
+    Ok(read(bytes, &name)?.bitmap)
+}
+
+/// The image of a texture: that of an extension first.
+fn source(file: &File<'_>, value: Value<'_>) -> Read<Option<usize>> {
+    let mut chosen = None;
+    for name in ["EXT_texture_webp", "KHR_texture_basisu"] {
+        let Some(extension) = value.extension(name)? else { continue };
+        if let Some((index, _)) = file.named(List::Images, extension, "source")?
+            && super::SUPPORTED.contains(&name)
+        {
+            chosen = chosen.or(Some(index));
+        }
+    }
+    let plain = file.named(List::Images, value, "source")?.map(|(index, _)| index);
+    Ok(chosen.or(plain))
+}
+
+fn sampler(file: &File<'_>, texture: Value<'_>) -> Read<MipMapOptions> {
+    let mut options =
+        MipMapOptions { wrap: Wrap::Axes([AxisWrap::Repeat; 2]), filter: ImageFilter::Trilinear };
+    let Some((_, sampler)) = file.named(List::Samplers, texture, "sampler")? else { return Ok(options) };
+    let wrap = |name: &str| -> Read<AxisWrap> {
+        let Some(value) = sampler.get(name)? else { return Ok(AxisWrap::Repeat) };
+        Ok(match value.whole(0)? {
+            10497 => AxisWrap::Repeat,
+            33071 => AxisWrap::Clamp,
+            33648 => AxisWrap::Mirror,
+            _ => return Err(value.unexpected("unknown way to wrap", "10497, 33071 or 33648")),
+        })
+    };
+    options.wrap = Wrap::Axes([wrap("wrapS")?, wrap("wrapT")?]);
+    let filter = |name: &str, known: &[u64]| -> Read<Option<u64>> {
+        let Some(value) = sampler.get(name)? else { return Ok(None) };
+        let filter = value.whole(0)?;
+        if known.contains(&filter) {
+            return Ok(Some(filter));
+        }
+        let expected: Vec<String> = known.iter().map(u64::to_string).collect();
+        Err(value.unexpected("unknown filter", &expected.join(", ")))
+    };
+    let nearest = 9728;
+    filter("minFilter", &[nearest, 9729, 9984, 9985, 9986, 9987])?;
+    if filter("magFilter", &[nearest, 9729])? == Some(nearest) {
+        options.filter = ImageFilter::Point;
+    }
+    Ok(options)
+}
+
+/// The map of a texture between coordinates whose v counts upwards, as it does in our meshes and images: turned over
+/// before it and after it.
+pub(super) fn ours(texture: TextureRef) -> Affine2 {
+    let ([u, v], offset) = texture.transform.axes();
+    let turn = Affine2 { matrix2: Mat2::from_diagonal(Vec2::new(1.0, -1.0)), translation: Vec2::Y };
+    turn * Affine2 { matrix2: Mat2::from_cols(u, v), translation: offset } * turn
+}
+
+/// The numbers of one use, out of an image.
+fn derived(image: &Bitmap, how: Use) -> Bitmap {
+    let (width, height) = (image.width(), image.height());
+    let places = || (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+    let grey = matches!(image.channels(), Channels::Y | Channels::Ya);
+    let stored = |x, y, c: usize| match image.channels().alpha() {
+        Some(alpha) if c == 3 => image.stored(x, y, alpha),
+        None if c == 3 => 1.0,
+        _ => image.stored(x, y, if grey { 0 } else { c }),
+    };
+    let single = |value: &dyn Fn(u32, u32) -> f32| {
+        let data = places().map(|(x, y)| unit_to_u16(value(x, y))).collect();
+        Bitmap::new(width, height, Channels::Y, PixelData::U16(data), Encoding::Linear)
+    };
+    let bitmap = match how {
+        Use::Colour => None,
+        Use::Channel(c) => single(&|x, y| stored(x, y, c)),
+        Use::Alpha { channel, factor, glossiness } => single(&|x, y| {
+            let value = stored(x, y, channel) * f32::from_bits(factor);
+            let roughness = if glossiness { 1.0 - value } else { value };
+            roughness * roughness
+        }),
+        Use::Normal(scale) => {
+            let scale = f32::from_bits(scale);
+            let normal = |(x, y)| {
+                let n = Vec3::new(stored(x, y, 0), stored(x, y, 1), stored(x, y, 2)) * 2.0 - 1.0;
+                let n = (n * Vec3::new(scale, scale, 1.0)).normalize_or(Vec3::Z);
+                (0.5 * n + 0.5).to_array().map(unit_to_u16)
+            };
+            let data = places().flat_map(normal).collect();
+            Bitmap::new(width, height, Channels::Rgb, PixelData::U16(data), Encoding::Linear)
+        }
+    };
+    bitmap.unwrap_or_else(|| image.clone())
+}
