@@ -61,11 +61,7 @@ impl ReadingArguments {
     /// [`Failure`] by what went wrong.
     pub fn open(&self, paths: &[PathBuf]) -> Result<(Scene, Diagnostics), Failure> {
         let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
-        let options = lumbre::ReadOptions {
-            limits: self.limits(),
-            strictness: self.strictness(),
-            ..Default::default()
-        };
+        let options = lumbre::ReadOptions { limits: self.limits(), strictness: self.strictness() };
         lumbre::open_with(&paths, &options).map_err(Failure::from)
     }
 }

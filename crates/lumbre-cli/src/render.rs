@@ -188,11 +188,7 @@ fn default_output(scene: &Scene, path: &Path) -> PathBuf {
         let stem = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
         let stem = stem.strip_suffix(".gz").unwrap_or(&stem);
         let stem = Path::new(stem).file_stem().map_or_else(|| "picture".into(), |s| s.to_os_string());
-        if stem == "-" {
-            PathBuf::from("picture.png")
-        } else {
-            PathBuf::from(stem).with_added_extension("png")
-        }
+        if stem == "-" { "picture.png".into() } else { format!("{}.png", stem.to_string_lossy()).into() }
     })
 }
 
