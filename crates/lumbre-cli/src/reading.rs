@@ -18,6 +18,12 @@ pub struct ReadingArguments {
     /// Drop what is broken (faces with impossible vertices, say) with a warning instead of an error.
     #[arg(long)]
     lenient: bool,
+    /// The time in seconds at which the animations of a glTF stand.
+    #[arg(long, value_name = "T", value_parser = seconds)]
+    frame: Option<f64>,
+    /// The material variant of a glTF to wear.
+    #[arg(long, value_name = "NAME")]
+    variant: Option<String>,
     /// Bytes that reading may hold at a time.
     #[arg(long, value_name = "SIZE", value_parser = units::bytes)]
     max_memory: Option<u64>,
@@ -33,6 +39,10 @@ pub struct ReadingArguments {
     /// Bytes that a compressed byte may become.
     #[arg(long, value_name = "N", hide_short_help = true)]
     max_expansion: Option<u64>,
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|t: &f64| t.is_finite()).ok_or_else(|| "expected a number of seconds".to_owned())
 }
 
 impl ReadingArguments {
@@ -61,7 +71,12 @@ impl ReadingArguments {
     /// [`Failure`] by what went wrong.
     pub fn open(&self, paths: &[PathBuf]) -> Result<(Scene, Diagnostics), Failure> {
         let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
-        let options = lumbre::ReadOptions { limits: self.limits(), strictness: self.strictness() };
+        let options = lumbre::ReadOptions {
+            limits: self.limits(),
+            strictness: self.strictness(),
+            frame: self.frame,
+            variant: self.variant.clone(),
+        };
         lumbre::open_with(&paths, &options).map_err(Failure::from)
     }
 }

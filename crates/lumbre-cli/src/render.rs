@@ -30,7 +30,7 @@ use crate::units::{self, Crop, spoken};
 
 Ctrl-C stops and saves what is there; a second one stops at once and saves nothing.")]
 pub struct Arguments {
-    /// The scene: .pbrt, .obj, .ply or .stl, also packed by gzip. Several .pbrt files are read one after another.
+    /// The scene: .pbrt, .gltf, .glb, .obj, .ply or .stl, also packed by gzip (but glTF). Several .pbrt files are read one after another.
     #[arg(required = true)]
     scene: Vec<PathBuf>,
     /// The picture: .exr, .png, .hdr, .pfm or .jpg. By default the scene's own film name, else the scene's name with .png.
