@@ -665,7 +665,7 @@ mod tests {
         assert_eq!(root.pointer(), "");
         let error = b.index(3, "a mesh").unwrap_err().to_string();
         let expected =
-            "a.gltf:1:21 /a/1/b~1~0: wrong number (found -2.5e1; expected a whole number, 0 or more)";
+            "a.gltf:1:20 /a/1/b~1~0: wrong number (found -2.5e1; expected a whole number, 0 or more)";
         assert_eq!(error, expected);
     }
 

@@ -1,0 +1,807 @@
+//! glTF: what small models made here become, and what is said of broken ones.
+
+mod common;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use common::Random;
+use lumbre_formats::gltf::{GltfOptions, read_gltf};
+use lumbre_formats::{Budget, Diagnostics, FormatError, Limits, Strictness};
+use lumbre_geometry::Shape;
+use lumbre_image::Rgb;
+use lumbre_math::{DVec3, Vec2, Vec3};
+use lumbre_scene::{CameraKind, GeometryDesc, LightDesc, MeshDesc, Scene, SceneDesc, ShapeDesc};
+use lumbre_shading::MaterialKind;
+
+/// A GLB of a JSON and its first buffer.
+fn glb(json: &str, binary: &[u8]) -> Vec<u8> {
+    let mut json = json.as_bytes().to_vec();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let mut binary = binary.to_vec();
+    binary.resize(binary.len().next_multiple_of(4), 0);
+    let mut file = b"glTF".to_vec();
+    file.extend(2_u32.to_le_bytes());
+    file.extend(
+        (12 + 8 + json.len() as u32 + if binary.is_empty() { 0 } else { 8 + binary.len() as u32 })
+            .to_le_bytes(),
+    );
+    file.extend((json.len() as u32).to_le_bytes());
+    file.extend(b"JSON");
+    file.extend(&json);
+    if !binary.is_empty() {
+        file.extend((binary.len() as u32).to_le_bytes());
+        file.extend(b"BIN\0");
+        file.extend(&binary);
+    }
+    file
+}
+
+fn read_with(
+    bytes: &[u8],
+    options: &GltfOptions,
+    diagnostics: &mut Diagnostics,
+) -> Result<SceneDesc, FormatError> {
+    let name: Arc<str> = "m.gltf".into();
+    read_gltf(bytes, &name, Path::new("."), options, &Budget::default(), diagnostics)
+}
+
+fn read(json: &str, binary: &[u8]) -> SceneDesc {
+    read_with(&glb(json, binary), &GltfOptions::default(), &mut Diagnostics::new()).unwrap()
+}
+
+fn error(json: &str, binary: &[u8]) -> String {
+    let read = read_with(&glb(json, binary), &GltfOptions::default(), &mut Diagnostics::new());
+    read.map(|_| ()).unwrap_err().to_string()
+}
+
+fn mesh(shape: &ShapeDesc) -> &MeshDesc {
+    match &shape.geometry {
+        GeometryDesc::Mesh(mesh) => mesh,
+        other => panic!("a mesh is expected, not {other:?}"),
+    }
+}
+
+fn floats(numbers: &[f32]) -> Vec<u8> {
+    numbers.iter().flat_map(|n| n.to_le_bytes()).collect()
+}
+
+fn shorts(numbers: &[u16]) -> Vec<u8> {
+    numbers.iter().flat_map(|n| n.to_le_bytes()).collect()
+}
+
+/// A buffer in parts, each with its view and its accessor.
+#[derive(Default)]
+struct Parts {
+    binary: Vec<u8>,
+    views: Vec<String>,
+    accessors: Vec<String>,
+}
+
+impl Parts {
+    fn add(&mut self, bytes: &[u8], accessor: &str) -> usize {
+        self.binary.resize(self.binary.len().next_multiple_of(4), 0);
+        let view =
+            format!(r#"{{"buffer":0,"byteOffset":{},"byteLength":{}}}"#, self.binary.len(), bytes.len());
+        self.binary.extend(bytes);
+        self.accessors.push(format!(r#"{{"bufferView":{},{accessor}}}"#, self.views.len()));
+        self.views.push(view);
+        self.accessors.len() - 1
+    }
+
+    fn positions(&mut self, positions: &[[f32; 3]]) -> usize {
+        let kind = format!(
+            r#""componentType":5126,"type":"VEC3","count":{},"min":[0,0,0],"max":[9,9,9]"#,
+            positions.len()
+        );
+        self.add(&floats(positions.as_flattened()), &kind)
+    }
+
+    fn indices(&mut self, indices: &[u16]) -> usize {
+        let kind = format!(r#""componentType":5123,"type":"SCALAR","count":{}"#, indices.len());
+        self.add(&shorts(indices), &kind)
+    }
+
+    /// A file with these buffers and, besides, `rest`.
+    fn json(&self, rest: &str) -> String {
+        format!(
+            r#"{{"asset":{{"version":"2.0"}},"buffers":[{{"byteLength":{}}}],"bufferViews":[{}],"accessors":[{}],{rest}}}"#,
+            self.binary.len(),
+            self.views.join(","),
+            self.accessors.join(",")
+        )
+    }
+
+    fn read(&self, rest: &str) -> SceneDesc {
+        read(&self.json(rest), &self.binary)
+    }
+}
+
+const SQUARE: [[f32; 3]; 4] = [[0.0, 0.0, 2.0], [3.0, 0.0, 2.0], [3.0, 4.0, 2.0], [0.0, 4.0, 2.0]];
+
+/// One node with a mesh of one primitive.
+fn one(primitive: &str) -> String {
+    format!(r#""meshes":[{{"primitives":[{{{primitive}}}]}}],"nodes":[{{"mesh":0}}]"#)
+}
+
+#[test]
+fn every_mode_makes_the_triangles_that_the_specification_says() {
+    let cases: [(u32, &[u16], &[[u32; 3]]); 6] = [
+        (4, &[0, 1, 2, 2, 3, 0], &[[0, 1, 2], [2, 3, 0]]),
+        (4, &[0, 1, 2, 2, 3], &[[0, 1, 2]]),
+        (5, &[0, 1, 3, 2], &[[0, 1, 3], [1, 2, 3]]),
+        (5, &[0, 1, 3, 2, 0], &[[0, 1, 3], [1, 2, 3], [3, 2, 0]]),
+        (6, &[0, 1, 2, 3], &[[1, 2, 0], [2, 3, 0]]),
+        (6, &[0, 1], &[]),
+    ];
+    for (mode, indices, expected) in cases {
+        let mut parts = Parts::default();
+        let (p, i) = (parts.positions(&SQUARE), parts.indices(indices));
+        let scene =
+            parts.read(&one(&format!(r#""mode":{mode},"indices":{i},"attributes":{{"POSITION":{p}}}"#)));
+        let found: Vec<[u32; 3]> = scene.shapes.iter().flat_map(|s| mesh(s).triangles.clone()).collect();
+        assert_eq!(found, expected, "mode {mode}");
+    }
+    // Without indices, in order.
+    let mut parts = Parts::default();
+    let p = parts.positions(&SQUARE);
+    let scene = parts.read(&one(&format!(r#""mode":5,"attributes":{{"POSITION":{p}}}"#)));
+    assert_eq!(mesh(&scene.shapes[0]).triangles, [[0, 1, 2], [1, 3, 2]]);
+}
+
+#[test]
+fn points_and_lines_are_spheres_and_cylinders() {
+    let spheres = |scene: &SceneDesc| {
+        let is = |s: &&ShapeDesc| matches!(s.geometry, GeometryDesc::Exact(Shape::Sphere(_)));
+        scene.shapes.iter().filter(is).count()
+    };
+    // Spheres stand where a line goes on.
+    for (mode, cylinders, balls) in [(0, 0, 4), (1, 2, 0), (2, 4, 4), (3, 3, 2)] {
+        let mut parts = Parts::default();
+        let p = parts.positions(&SQUARE);
+        let scene = parts.read(&one(&format!(r#""mode":{mode},"attributes":{{"POSITION":{p}}}"#)));
+        assert_eq!(spheres(&scene), balls, "mode {mode}");
+        assert_eq!(scene.shapes.len(), cylinders + balls, "mode {mode}");
+        for (i, shape) in scene.shapes.iter().enumerate() {
+            assert_eq!(shape.index as usize, i);
+            let GeometryDesc::Exact(exact) = &shape.geometry else { panic!("an exact shape is expected") };
+            let bounds = exact.bounds(&shape.world_from_object).unwrap();
+            // The square is 5 across.
+            assert!(
+                bounds.size().min_element() > 0.0 && bounds.size().min_element() <= 2.0 * 0.004 * 5.0 + 1e-9
+            );
+        }
+        Scene::build(scene).unwrap();
+    }
+}
+
+#[test]
+fn interleaved_and_strided_vertices_are_told_apart() {
+    let mut binary = vec![];
+    for (i, p) in SQUARE.iter().enumerate() {
+        binary.extend(floats(p));
+        binary.extend(floats(&[0.0, 0.0, 1.0]));
+        binary.extend(shorts(&[i as u16 * 16384, 65535]));
+        // Something else's.
+        binary.extend([0xFF; 8]);
+    }
+    let json = format!(
+        r#"{{"asset":{{"version":"2.0"}},"buffers":[{{"byteLength":{}}}],
+        "bufferViews":[{{"buffer":0,"byteLength":{},"byteStride":36}}],
+        "accessors":[
+            {{"bufferView":0,"componentType":5126,"type":"VEC3","count":4,"min":[0,0,0],"max":[9,9,9]}},
+            {{"bufferView":0,"byteOffset":12,"componentType":5126,"type":"VEC3","count":4}},
+            {{"bufferView":0,"byteOffset":24,"componentType":5123,"normalized":true,"type":"VEC2","count":4}}],
+        "materials":[{{"pbrMetallicRoughness":{{"baseColorTexture":{{"index":0}}}}}}],
+        "textures":[{{}}],
+        "meshes":[{{"primitives":[{{"mode":6,"material":0,
+            "attributes":{{"POSITION":0,"NORMAL":1,"TEXCOORD_0":2}}}}]}}],
+        "nodes":[{{"mesh":0}}]}}"#,
+        binary.len(),
+        binary.len()
+    );
+    let scene = read(&json, &binary);
+    let mesh = mesh(&scene.shapes[0]);
+    assert_eq!(mesh.positions, SQUARE.map(Vec3::from_array));
+    assert_eq!(mesh.normals, Some(vec![Vec3::Z; 4]));
+    let uvs = mesh.uvs.as_ref().unwrap();
+    for (i, uv) in uvs.iter().enumerate() {
+        // v counts upwards in a scene.
+        assert!((*uv - Vec2::new(i as f32 * 16384.0 / 65535.0, 0.0)).length() < 1e-6);
+    }
+}
+
+#[test]
+fn quantized_numbers_of_every_type_are_read() {
+    let cases: [(u32, bool, Vec<u8>, f32); 8] = [
+        (5120, false, vec![2, 0, 0xFD, 0], -3.0),
+        (5120, true, vec![127, 0, 0x80, 0], -1.0),
+        (5121, false, vec![2, 0, 253, 0], 253.0),
+        (5121, true, vec![255, 0, 51, 0], 0.2),
+        (5122, false, shorts(&[2, 0, 0xFF00, 0]), -256.0),
+        (5122, true, shorts(&[0x7FFF, 0, 0x8001, 0]), -1.0),
+        (5123, false, shorts(&[2, 0, 65000, 0]), 65000.0),
+        (5123, true, shorts(&[0xFFFF, 0, 13107, 0]), 0.2),
+    ];
+    for (component, normalized, element, z) in cases {
+        let stride = element.len();
+        let binary: Vec<u8> = element.repeat(3);
+        let json = format!(
+            r#"{{"asset":{{"version":"2.0"}},"extensionsUsed":["KHR_mesh_quantization"],
+            "extensionsRequired":["KHR_mesh_quantization"],"buffers":[{{"byteLength":{}}}],
+            "bufferViews":[{{"buffer":0,"byteLength":{},"byteStride":{stride}}}],
+            "accessors":[{{"bufferView":0,"componentType":{component},"normalized":{normalized},"type":"VEC3","count":3,
+                "min":[0,0,0],"max":[9,9,9]}}],{}}}"#,
+            binary.len(),
+            binary.len(),
+            one(r#""attributes":{"POSITION":0}"#)
+        );
+        let scene = read(&json, &binary);
+        let p = mesh(&scene.shapes[0]).positions[2];
+        assert!((p.z - z).abs() < 1e-6 * z.abs() && p.y == 0.0 && p.x > 0.0, "{component} {normalized}: {p}");
+        // Without the extension these are no positions.
+        let plain = json
+            .replace(r#""extensionsUsed":["KHR_mesh_quantization"],"#, "")
+            .replace(r#""extensionsRequired":["KHR_mesh_quantization"],"#, "");
+        assert!(error(&plain, &binary).contains("/attributes/POSITION: accessor of a wrong type"));
+    }
+}
+
+#[test]
+fn sparse_accessors_replace_some_elements_with_a_base_and_without() {
+    let mut parts = Parts::default();
+    let p = parts.positions(&SQUARE);
+    parts.add(&[1, 3], r#""componentType":5121,"type":"SCALAR","count":2"#);
+    parts.add(&floats(&[7.0, 8.0, 9.0, 1.5, 2.5, 3.5]), r#""componentType":5126,"type":"VEC3","count":2"#);
+    let sparse =
+        r#""sparse":{"count":2,"indices":{"bufferView":1,"componentType":5121},"values":{"bufferView":2}}"#;
+    let kind = r#""componentType":5126,"type":"VEC3","count":4,"min":[0,0,0],"max":[9,9,9]"#;
+    parts.accessors.push(format!(r#"{{"bufferView":0,{kind},{sparse}}}"#));
+    parts.accessors.push(format!(r#"{{{kind},{sparse}}}"#));
+    let read = |a: usize| {
+        let scene = parts.read(&one(&format!(r#""mode":6,"attributes":{{"POSITION":{a}}}"#)));
+        mesh(&scene.shapes[0]).positions.clone()
+    };
+    let (one, three) = (Vec3::new(7.0, 8.0, 9.0), Vec3::new(1.5, 2.5, 3.5));
+    let square = SQUARE.map(Vec3::from_array);
+    assert_eq!(read(p), square);
+    assert_eq!(read(3), [square[0], one, square[2], three]);
+    assert_eq!(read(4), [Vec3::ZERO, one, Vec3::ZERO, three]);
+}
+
+#[test]
+fn nodes_stand_where_their_parents_and_parts_say() {
+    let mut parts = Parts::default();
+    let p = parts.positions(&SQUARE);
+    // A quarter turn about z, then doubled along x, below a parent that moves.
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    let rest = format!(
+        r#""meshes":[{{"primitives":[{{"mode":6,"attributes":{{"POSITION":{p}}}}}]}}],
+        "nodes":[{{"translation":[10,20,30],"children":[1]}},
+            {{"mesh":0,"rotation":[0,0,{half},{half}],"scale":[2,1,-1],"translation":[1,0,0]}},
+            {{"mesh":0,"matrix":[0,2,0,0, -3,0,0,0, 0,0,1,0, 5,6,7,1]}}],
+        "scenes":[{{"nodes":[2]}},{{"nodes":[0,2]}}],"scene":1"#
+    );
+    let scene = parts.read(&rest);
+    assert_eq!((scene.objects.len(), scene.instances.len(), scene.shapes.len()), (1, 2, 0));
+    let at = |i: usize| scene.instances[i].world_from_object.point(DVec3::new(3.0, 4.0, 2.0));
+    assert!((at(0) - DVec3::new(11.0 - 4.0, 20.0 + 6.0, 30.0 - 2.0)).length() < 1e-9, "{}", at(0));
+    assert!(scene.instances[0].world_from_object.is_mirror());
+    assert!((at(1) - DVec3::new(5.0 - 12.0, 6.0 + 6.0, 9.0)).length() < 1e-9, "{}", at(1));
+    Scene::build(scene).unwrap();
+    // The other scene has one place, and so no object.
+    let scene = parts.read(&rest.replace(r#""scene":1"#, r#""scene":0"#));
+    assert_eq!((scene.objects.len(), scene.instances.len(), scene.shapes.len()), (0, 0, 1));
+}
+
+#[test]
+fn flattened_nodes_are_flat_and_vanished_ones_are_gone() {
+    for (scale, shapes) in [("[1,1,0]", 1), ("[0,1,1]", 0), ("[0,0,0]", 0)] {
+        let mut parts = Parts::default();
+        let p = parts.positions(&SQUARE);
+        let rest = one(&format!(r#""mode":6,"attributes":{{"POSITION":{p}}}"#));
+        let scene = parts.read(&rest.replace(r#"{"mesh":0}"#, &format!(r#"{{"mesh":0,"scale":{scale}}}"#)));
+        let seen = scene.shapes.iter().filter(|s| mesh(s).positions.iter().all(|p| p.z == 0.0)).count();
+        let flat = if scale == "[0,1,1]" { 0 } else { seen };
+        assert_eq!(flat, shapes, "{scale}");
+        Scene::build(scene).unwrap();
+    }
+}
+
+#[test]
+fn a_million_nodes_deep_is_no_stack_overflow() {
+    let depth = 200_000;
+    let nodes: Vec<String> =
+        (1..depth).map(|i| format!(r#"{{"children":[{i}],"translation":[0,0,1]}}"#)).collect();
+    let json = format!(
+        r#"{{"asset":{{"version":"2.0"}},"nodes":[{},{{"camera":0}}],"cameras":[{{"type":"perspective",
+        "perspective":{{"yfov":0.7,"znear":0.1}}}}]}}"#,
+        nodes.join(",")
+    );
+    let scene = read_with(json.as_bytes(), &GltfOptions::default(), &mut Diagnostics::new()).unwrap();
+    let depth = f64::from(depth - 1);
+    assert!(
+        (scene.cameras[0].world_from_camera.point(DVec3::ZERO) - DVec3::new(0.0, 0.0, depth)).length() < 1e-6
+    );
+}
+
+#[test]
+fn instancing_places_copies() {
+    let mut parts = Parts::default();
+    let p = parts.positions(&SQUARE);
+    let t = parts.add(
+        &floats(&[1.0, 2.0, 3.0, -4.0, 5.0, 6.0, 7.0, 8.0, 9.0]),
+        r#""componentType":5126,"type":"VEC3","count":3"#,
+    );
+    let s = parts.add(&floats(&[2.0; 9]), r#""componentType":5126,"type":"VEC3","count":3"#);
+    let scene = parts.read(&format!(
+        r#""extensionsUsed":["EXT_mesh_gpu_instancing"],"meshes":[{{"primitives":[{{"attributes":{{"POSITION":{p}}}}}]}}],
+        "nodes":[{{"mesh":0,"translation":[0,0,100],"extensions":{{"EXT_mesh_gpu_instancing":
+            {{"attributes":{{"TRANSLATION":{t},"SCALE":{s}}}}}}}}}]"#
+    ));
+    assert_eq!((scene.objects.len(), scene.instances.len()), (1, 3));
+    let at = scene.instances[1].world_from_object.point(DVec3::new(1.0, 1.0, 1.0));
+    assert!((at - DVec3::new(-2.0, 7.0, 108.0)).length() < 1e-9, "{at}");
+}
+
+/// A square of two joints, which a spline bends and a morph target lifts.
+fn animated() -> (Parts, String) {
+    let mut parts = Parts::default();
+    let p = parts.positions(&SQUARE);
+    let joints = parts.add(&[0, 1, 0, 0].repeat(4), r#""componentType":5121,"type":"VEC4","count":4"#);
+    let weights: Vec<f32> =
+        [[1.0, 0.0, 0.0, 0.0], [0.5, 0.5, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.25, 0.75, 0.0, 0.0]].concat();
+    let weights = parts.add(&floats(&weights), r#""componentType":5126,"type":"VEC4","count":4"#);
+    let lift = parts.positions(&[[0.0, 0.0, 1.0]; 4]);
+    let times = parts.add(&floats(&[1.0, 3.0]), r#""componentType":5126,"type":"SCALAR","count":2"#);
+    let moves = parts
+        .add(&floats(&[0.0, 0.0, 0.0, 8.0, 0.0, 0.0]), r#""componentType":5126,"type":"VEC3","count":2"#);
+    let morphs = parts.add(&floats(&[0.0, 2.0]), r#""componentType":5126,"type":"SCALAR","count":2"#);
+    let half = std::f32::consts::FRAC_1_SQRT_2;
+    let turns = parts.add(
+        &floats(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -half, -half]),
+        r#""componentType":5126,"type":"VEC4","count":2"#,
+    );
+    // Tangent in, value, tangent out.
+    let spline: Vec<f32> = [[0.0; 3], [1.0; 3], [2.0; 3], [-1.0; 3], [3.0; 3], [0.0; 3]].concat();
+    let spline = parts.add(&floats(&spline), r#""componentType":5126,"type":"VEC3","count":6"#);
+    let rest = format!(
+        r#""meshes":[{{"weights":[0.5],"primitives":[{{"mode":6,
+            "attributes":{{"POSITION":{p},"JOINTS_0":{joints},"WEIGHTS_0":{weights}}},"targets":[{{"POSITION":{lift}}}]}}]}}],
+        "skins":[{{"joints":[1,2]}}],
+        "nodes":[{{"mesh":0,"skin":0,"translation":[99,99,99]}},{{"children":[2]}},{{"translation":[0,0,0]}},
+            {{"camera":0}},{{"camera":0}}],
+        "cameras":[{{"type":"perspective","perspective":{{"yfov":0.7,"znear":0.1}}}}],
+        "animations":[{{"samplers":[{{"input":{times},"output":{moves}}},{{"input":{times},"output":{morphs},"interpolation":"STEP"}},
+            {{"input":{times},"output":{turns}}},{{"input":{times},"output":{spline},"interpolation":"CUBICSPLINE"}}],
+            "channels":[{{"sampler":0,"target":{{"node":2,"path":"translation"}}}},
+                {{"sampler":1,"target":{{"node":0,"path":"weights"}}}},
+                {{"sampler":2,"target":{{"node":3,"path":"rotation"}}}},
+                {{"sampler":3,"target":{{"node":4,"path":"translation"}}}}]}}]"#
+    );
+    (parts, rest)
+}
+
+fn at_time(frame: Option<f64>) -> SceneDesc {
+    let (parts, rest) = animated();
+    let options = GltfOptions { frame, variant: None };
+    read_with(&glb(&parts.json(&rest), &parts.binary), &options, &mut Diagnostics::new()).unwrap()
+}
+
+#[test]
+fn skins_and_morph_targets_stand_at_their_time() {
+    let square = SQUARE.map(Vec3::from_array);
+    // Weight of the morph target, and how far the second joint has come.
+    for (frame, weight, far) in [
+        (None, 0.5, 0.0),
+        (Some(0.0), 0.0, 0.0),
+        (Some(1.5), 0.0, 2.0),
+        (Some(2.0), 0.0, 4.0),
+        (Some(3.0), 2.0, 8.0),
+        (Some(9.0), 2.0, 8.0),
+    ] {
+        let scene = at_time(frame);
+        let found = &mesh(&scene.shapes[0]).positions;
+        for (i, share) in [0.0, 0.5, 1.0, 0.75].into_iter().enumerate() {
+            let expected = square[i] + Vec3::new(share * far, 0.0, weight);
+            assert!((found[i] - expected).length() < 1e-5, "{frame:?} {i}: {} {expected}", found[i]);
+        }
+    }
+}
+
+#[test]
+fn rotations_take_the_shorter_way_and_splines_their_curve() {
+    let scene = at_time(Some(2.0));
+    // A half of a quarter turn about z.
+    let forward = scene.cameras[0].world_from_camera.vector(DVec3::X);
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    assert!((forward - DVec3::new(half, half, 0.0)).length() < 1e-6, "{forward}");
+    // Half way: (1 + 3) / 2 + 2 seconds · (2 - -1) / 8.
+    let place = scene.cameras[1].world_from_camera.point(DVec3::ZERO);
+    assert!((place - DVec3::splat(2.75)).length() < 1e-6, "{place}");
+}
+
+#[test]
+fn cameras_look_along_minus_z_and_are_not_mirrored() {
+    let json = r#"{"asset":{"version":"2.0"},"cameras":[
+        {"type":"perspective","name":"wide","perspective":{"yfov":0.8,"znear":0.1,"aspectRatio":2}},
+        {"type":"perspective","perspective":{"yfov":0.8,"znear":0.1,"aspectRatio":0.5}},
+        {"type":"orthographic","orthographic":{"xmag":3,"ymag":2,"znear":0,"zfar":9}}],
+        "nodes":[{"camera":0,"translation":[1,2,3],"scale":[5,5,5]},{"camera":1,"name":"tall"},{"camera":2}]}"#;
+    let scene = read_with(json.as_bytes(), &GltfOptions::default(), &mut Diagnostics::new()).unwrap();
+    let names: Vec<Option<&str>> = scene.cameras.iter().map(|c| c.name.as_deref()).collect();
+    assert_eq!(names, [Some("wide"), Some("tall"), None]);
+    let wide = &scene.cameras[0];
+    assert_eq!(wide.world_from_camera.point(DVec3::new(0.5, 0.25, 2.0)), DVec3::new(1.5, 2.25, 1.0));
+    let fov = |i: usize| match scene.cameras[i].kind {
+        CameraKind::Perspective { fov, .. } => fov.to_radians(),
+        _ => panic!("a perspective camera is expected"),
+    };
+    assert!((fov(0) - 0.8).abs() < 1e-9);
+    assert!(((0.5 * fov(1)).tan() - 0.5 * 0.4_f64.tan()).abs() < 1e-9);
+    assert_eq!(scene.cameras[2].screen_window, Some([-3.0, 3.0, -2.0, 2.0]));
+    let (width, height) = (scene.film.width.unwrap(), scene.film.height.unwrap());
+    assert!((f64::from(width) / f64::from(height) - 2.0).abs() < 0.01);
+}
+
+#[test]
+fn punctual_lights_keep_their_candelas_and_lux() {
+    let json = r#"{"asset":{"version":"2.0"},"extensionsUsed":["KHR_lights_punctual"],"extensions":{"KHR_lights_punctual":{"lights":[
+        {"type":"point","color":[1,0.5,0.25],"intensity":40},{"type":"directional","intensity":3},
+        {"type":"spot","intensity":7,"spot":{"innerConeAngle":0.2,"outerConeAngle":0.5}}]}},
+        "nodes":[{"translation":[1,2,3],"extensions":{"KHR_lights_punctual":{"light":0}}},
+            {"rotation":[0.7071067811865476,0,0,0.7071067811865476],"extensions":{"KHR_lights_punctual":{"light":1}}},
+            {"translation":[4,5,6],"scale":[2,2,2],"extensions":{"KHR_lights_punctual":{"light":2}}}]}"#;
+    let scene = read_with(json.as_bytes(), &GltfOptions::default(), &mut Diagnostics::new()).unwrap();
+    let [
+        LightDesc::Point { from, intensity },
+        LightDesc::Distant { towards, irradiance },
+        LightDesc::Spot { world_from_light, intensity: spot, cone_angle, cone_delta_angle },
+    ] = &scene.lights[..]
+    else {
+        panic!("{:?}", scene.lights)
+    };
+    assert_eq!((*from, *intensity), (DVec3::new(1.0, 2.0, 3.0), Rgb::new(40.0, 20.0, 10.0)));
+    // -z turned about x by a quarter points to +y: light comes from below.
+    assert!(
+        (*towards - DVec3::new(0.0, -1.0, 0.0)).length() < 1e-9 && *irradiance == Rgb::splat(3.0),
+        "{towards}"
+    );
+    assert_eq!(*spot, Rgb::splat(7.0));
+    assert_eq!(world_from_light.vector(DVec3::Z), DVec3::new(0.0, 0.0, -1.0));
+    assert!(
+        (cone_angle - 0.5_f32.to_degrees()).abs() < 1e-4
+            && (cone_delta_angle - 0.3_f32.to_degrees()).abs() < 1e-4
+    );
+    Scene::build(scene).unwrap();
+}
+
+#[test]
+fn materials_become_what_there_is() {
+    let kinds = [
+        (r#"{"pbrMetallicRoughness":{"metallicFactor":0}}"#, "coateddiffuse"),
+        (r#"{"pbrMetallicRoughness":{"metallicFactor":1,"roughnessFactor":0.3}}"#, "conductor"),
+        (r#"{"pbrMetallicRoughness":{"metallicFactor":0.4}}"#, "mix"),
+        (
+            r#"{"pbrMetallicRoughness":{"metallicFactor":0},"extensions":{"KHR_materials_specular":{"specularFactor":0}}}"#,
+            "diffuse",
+        ),
+        (
+            r#"{"pbrMetallicRoughness":{"metallicFactor":0},"extensions":{"KHR_materials_transmission":{"transmissionFactor":1}}}"#,
+            "thindielectric",
+        ),
+        (
+            r#"{"pbrMetallicRoughness":{"metallicFactor":0},"extensions":{"KHR_materials_transmission":{"transmissionFactor":1},
+            "KHR_materials_volume":{"thicknessFactor":2},"KHR_materials_ior":{"ior":1.7}}}"#,
+            "dielectric",
+        ),
+        (
+            r#"{"extensions":{"KHR_materials_diffuse_transmission":{"diffuseTransmissionFactor":0.5}}}"#,
+            "diffusetransmission",
+        ),
+        (r#"{"extensions":{"KHR_materials_unlit":{}}}"#, "diffuse"),
+        (
+            r#"{"extensions":{"KHR_materials_pbrSpecularGlossiness":{"specularFactor":[0.04,0.04,0.04]}}}"#,
+            "coateddiffuse",
+        ),
+    ];
+    for (material, kind) in kinds {
+        let mut parts = Parts::default();
+        let p = parts.positions(&SQUARE);
+        let rest = format!(
+            r#""materials":[{material}],{}"#,
+            one(&format!(r#""material":0,"attributes":{{"POSITION":{p}}}"#))
+        );
+        let scene = parts.read(&rest);
+        assert_eq!(scene.materials[0].material.kind.name(), kind, "{material}");
+        if let MaterialKind::Dielectric { eta, .. } = scene.materials[0].material.kind {
+            assert_eq!(eta, 1.7);
+        }
+        let shines = scene.shapes[0].area_light.is_some();
+        assert_eq!(shines, material.contains("unlit"), "{material}");
+        Scene::build(scene).unwrap();
+    }
+}
+
+#[test]
+fn coverage_is_by_mode_and_light_by_strength() {
+    let with = |material: &str| {
+        let mut parts = Parts::default();
+        let p = parts.positions(&SQUARE);
+        let c = parts.add(
+            &[10, 20, 30, 128].repeat(4),
+            r#""componentType":5121,"normalized":true,"type":"VEC4","count":4"#,
+        );
+        let one = one(&format!(r#""mode":6,"material":0,"attributes":{{"POSITION":{p},"COLOR_0":{c}}}"#));
+        parts.read(&format!(r#""materials":[{material}],{one}"#)).shapes[0].clone()
+    };
+    let at = lumbre_shading::TextureContext {
+        point: DVec3::ONE,
+        normal: Vec3::Z,
+        uv: Vec2::ZERO,
+        dpdx: Vec3::ZERO,
+        dpdy: Vec3::ZERO,
+        duv_dx: Vec2::ZERO,
+        duv_dy: Vec2::ZERO,
+        vertex: lumbre_shading::VertexData { coverage: 128.0 / 255.0, ..lumbre_shading::VertexData::NONE },
+    };
+    let coverage = |material: &str| with(material).alpha.map(|alpha| alpha.evaluate(&at));
+    let colour = r#""pbrMetallicRoughness":{"baseColorFactor":[1,1,1,0.5]}"#;
+    assert_eq!(coverage(&format!(r#"{{{colour}}}"#)), None);
+    assert!((coverage(&format!(r#"{{{colour},"alphaMode":"BLEND"}}"#)).unwrap() - 64.0 / 255.0).abs() < 1e-6);
+    assert_eq!(coverage(&format!(r#"{{{colour},"alphaMode":"MASK"}}"#)), Some(0.0));
+    assert_eq!(coverage(&format!(r#"{{{colour},"alphaMode":"MASK","alphaCutoff":0.25}}"#)), Some(1.0));
+    let light = with(
+        r#"{"emissiveFactor":[1,0.5,0],"doubleSided":true,"extensions":{"KHR_materials_emissive_strength":{"emissiveStrength":6}}}"#,
+    );
+    let light = light.area_light.unwrap();
+    assert!(light.radiance == Rgb::new(6.0, 3.0, 0.0) && light.two_sided);
+    let shape = with("{}");
+    let colours = mesh(&shape).colours.as_ref().unwrap();
+    assert!((colours[2].g - 20.0 / 255.0).abs() < 1e-6 && mesh(&shape).coverages.is_some());
+}
+
+#[test]
+fn variants_are_worn_by_name() {
+    let mut parts = Parts::default();
+    let p = parts.positions(&SQUARE);
+    let rest = format!(
+        r#""extensionsUsed":["KHR_materials_variants"],"extensions":{{"KHR_materials_variants":{{"variants":[{{"name":"red"}},{{"name":"blue"}}]}}}},
+        "materials":[{{"name":"plain"}},{{"name":"r"}},{{"name":"b"}}],
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":{p}}},"material":0,"extensions":{{"KHR_materials_variants":
+            {{"mappings":[{{"material":1,"variants":[0]}},{{"material":2,"variants":[1]}}]}}}}}}]}}],"nodes":[{{"mesh":0}}]"#
+    );
+    let file = glb(&parts.json(&rest), &parts.binary);
+    for (variant, material) in [(None, "plain"), (Some("red"), "r"), (Some("blue"), "b")] {
+        let options = GltfOptions { frame: None, variant: variant.map(str::to_owned) };
+        let scene = read_with(&file, &options, &mut Diagnostics::new()).unwrap();
+        assert_eq!(scene.materials[0].name.as_deref(), Some(material));
+    }
+    let options = GltfOptions { frame: None, variant: Some("bleu".to_owned()) };
+    let error = read_with(&file, &options, &mut Diagnostics::new()).unwrap_err().to_string();
+    assert_eq!(
+        error,
+        "m.gltf: no such material variant (found \"bleu\"; expected \"red\", \"blue\"; did you mean \"blue\"?)"
+    );
+}
+
+#[test]
+fn files_are_found_by_escaped_and_foreign_names() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("a b ü%.bin"), floats(SQUARE.as_flattened())).unwrap();
+    for uri in ["a%20b%20%C3%BC%25.bin", "a b ü%25.bin", "./a b \\u00fc%.bin"] {
+        let json = format!(
+            r#"{{"asset":{{"version":"2.0"}},"buffers":[{{"byteLength":48,"uri":"{uri}"}}],"bufferViews":[{{"buffer":0,"byteLength":48}}],
+            "accessors":[{{"bufferView":0,"componentType":5126,"type":"VEC3","count":4,"min":[0,0,0],"max":[9,9,9]}}],{}}}"#,
+            one(r#""mode":6,"attributes":{"POSITION":0}"#)
+        );
+        let path = dir.path().join("m.gltf");
+        std::fs::write(&path, json).unwrap();
+        let (scene, _) = lumbre_formats::open_scene(&path, &Default::default()).unwrap();
+        assert_eq!(mesh(&scene.shapes[0]).positions.len(), 4, "{uri}");
+    }
+}
+
+#[test]
+fn vertices_that_no_one_uses_are_left_out() {
+    let mut parts = Parts::default();
+    let many: Vec<[f32; 3]> = (0..5000).map(|i| [i as f32, (i % 7) as f32, 0.5]).collect();
+    let (p, i) = (parts.positions(&many), parts.indices(&[4000, 17, 3000]));
+    let scene = parts.read(&one(&format!(r#""indices":{i},"attributes":{{"POSITION":{p}}}"#)));
+    let mesh = mesh(&scene.shapes[0]);
+    assert_eq!(mesh.positions, [4000, 17, 3000].map(|i: usize| Vec3::from_array(many[i])));
+    assert_eq!(mesh.triangles, [[0, 1, 2]]);
+}
+
+/// A file in which much can go wrong.
+fn rich() -> (String, Vec<u8>) {
+    let (mut parts, rest) = animated();
+    parts.accessors.push(
+        r#"{"componentType":5126,"type":"VEC3","count":4,"sparse":{"count":1,"indices":{"bufferView":1,"componentType":5121},"values":{"bufferView":0}}}"#
+            .to_owned(),
+    );
+    let rest = rest.replacen(r#""mode":6,"#, r#""mode":6,"material":0,"#, 1);
+    let json = parts.json(&format!(
+        r#"{rest},"materials":[{{"alphaMode":"MASK","alphaCutoff":0.5,"pbrMetallicRoughness":{{"baseColorFactor":[1,1,1,1],"roughnessFactor":0.5}}}}],
+        "scenes":[{{"nodes":[0,1,3,4]}}],"scene":0,"samplers":[{{"wrapS":10497}}],"textures":[{{"sampler":0}}],
+        "extensionsUsed":["KHR_lights_punctual"],"extensions":{{"KHR_lights_punctual":{{"lights":[{{"type":"point","intensity":2}}]}}}}"#
+    ));
+    (json, parts.binary)
+}
+
+#[test]
+fn broken_files_are_refused_with_a_pointer_and_a_reason() {
+    let (json, binary) = rich();
+    read(&json, &binary);
+    let length = binary.len();
+    let cases: Vec<(String, &str, &str)> = [
+        (r#""version":"2.0""#, r#""version":"1.0""#, r#"/asset/version: unsupported version of glTF (found "1.0"; expected "2.0")"#),
+        (r#""version":"2.0""#, r#""version":2.0"#, "/asset/version: wrong type (found 2.0; expected a string)"),
+        (r#""version":"2.0""#, r#""version":"2.0","minVersion":"2.1""#, "/asset/minVersion: unsupported version"),
+        (r#""asset":{"version":"2.0"},"#, "", r#""asset" is missing"#),
+        (r#""buffer":0,"byteOffset":0"#, r#""buffer":7,"byteOffset":0"#, "/bufferViews/0/buffer: index of something that is not there (found 7; expected a buffer from 0 to 0)"),
+        (r#""buffer":0,"byteOffset":0"#, r#""buffer":-1,"byteOffset":0"#, "/bufferViews/0/buffer: wrong number (found -1; expected a whole number, 0 or more)"),
+        (r#""buffer":0,"byteOffset":0"#, r#""buffer":0,"byteOffset":18446744073709551615"#, "/bufferViews/0/byteOffset: wrong number"),
+        (r#""buffer":0,"byteOffset":0"#, r#""buffer":0,"byteOffset":9007199254740991"#, "/bufferViews/0/byteOffset: buffer view past the end of its buffer"),
+        (r#""byteOffset":0,"byteLength":48"#, r#""byteOffset":0,"byteLength":99999"#, "/bufferViews/0/byteLength: buffer view past the end of its buffer (found 99999 bytes from byte 0"),
+        (r#""byteOffset":0,"byteLength":48"#, r#""byteOffset":0,"byteLength":0"#, "/bufferViews/0/byteLength: wrong number (found 0; expected a whole number, 1 or more)"),
+        (r#""byteOffset":0,"byteLength":48"#, r#""byteOffset":0,"byteLength":48,"byteStride":6"#, "/bufferViews/0/byteStride: wrong stride (found 6"),
+        (r#""byteOffset":0,"byteLength":48"#, r#""byteOffset":0,"byteLength":48,"byteStride":8"#, "/accessors/0: stride shorter than an element (found 8; expected 12 or more)"),
+        (r#""type":"VEC3","count":4,"min""#, r#""type":"VEC3","count":5,"min""#, "/accessors/0/count: accessor past the end of its buffer view (found 5 elements, which need 60 bytes; expected 48 bytes at most)"),
+        (r#""type":"VEC3","count":4,"min""#, r#""type":"VEC3","count":4000000000,"min""#, "/accessors/0/count: accessor past the end"),
+        (r#""type":"VEC3","count":4,"min""#, r#""type":"VEC3","count":9007199254740991,"min""#, "/accessors/0/count: accessor past the end of its buffer view"),
+        (r#""type":"VEC3","count":4,"min""#, r#""type":"VEC3","count":0,"min""#, "/accessors/0/count: wrong number (found 0"),
+        (r#""type":"VEC3","count":4,"min""#, r#""type":"VEC3","count":1.5,"min""#, "/accessors/0/count: wrong number (found 1.5"),
+        (r#""type":"VEC3","count":4,"min""#, r#""type":"VEC3","count":2,"min""#, "attributes of different lengths"),
+        (r#""type":"VEC3","count":4,"min":[0,0,0]"#, r#""type":"VEC3","count":4,"min":[0,0]"#, "/accessors/0/min: bound of a wrong length (expected 3)"),
+        (r#""type":"VEC3","count":4,"min":[0,0,0],"#, r#""type":"VEC3","count":4,"#, r#"/accessors/0: accessor of positions without "min" and "max""#),
+        (r#"{"bufferView":0,"componentType":5126"#, r#"{"bufferView":0,"byteOffset":2,"componentType":5126"#, "/accessors/0/count: accessor past the end"),
+        (r#"{"bufferView":0,"componentType":5126"#, r#"{"bufferView":0,"componentType":5125"#, "/meshes/0/primitives/0/attributes/POSITION: accessor of a wrong type (found VEC3 of unsigned integers; expected VEC3 of floats)"),
+        (r#"{"bufferView":0,"componentType":5126"#, r#"{"bufferView":0,"componentType":5124"#, "/accessors/0/componentType: unknown type of number (found 5124"),
+        (r#"{"componentType":5126,"type":"VEC3","count":4,"sparse":"#, r#"{"componentType":5126,"type":"VEC3","count":4000000000,"sparse":"#, "count: accessor without data has too many elements (found 4000000000"),
+        (r#""sparse":{"count":1"#, r#""sparse":{"count":5"#, "/sparse/count: too many sparse elements (found 5; expected at most 4"),
+        (r#""indices":{"bufferView":1,"componentType":5121}"#, r#""indices":{"bufferView":1,"byteOffset":16,"componentType":5121}"#, "/sparse/indices: accessor past the end"),
+        (r#""indices":{"bufferView":1,"componentType":5121}"#, r#""indices":{"bufferView":1,"componentType":5126}"#, "/sparse/indices/componentType: wrong type of sparse indices"),
+        (r#""POSITION":0"#, r#""POSITION":99"#, "/meshes/0/primitives/0/attributes/POSITION: index of something that is not there"),
+        (r#""POSITION":0"#, r#""POSITON":0"#, r#"/meshes/0/primitives/0/attributes/POSITON: unknown attribute (found "POSITON"; expected one of glTF's, or a name that starts with an underscore; did you mean "POSITION"?)"#),
+        (r#""mode":6"#, r#""mode":7"#, "/meshes/0/primitives/0/mode: unknown mode of a primitive (found 7"),
+        (r#""mode":6"#, r#""indices":0,"mode":6"#, "/meshes/0/primitives/0/indices: accessor of a wrong type"),
+        (r#""weights":[0.5]"#, r#""weights":[0.5,1]"#, "/meshes/0/weights: as many weights as morph targets are needed (found 2; expected 1)"),
+        (r#""WEIGHTS_0":2"#, r#""WEIGHTS_1":2"#, "/meshes/0/primitives/0/attributes: WEIGHTS_0 is missing"),
+        (r#""joints":[1,2]"#, r#""joints":[1,9]"#, "/skins/0/joints/1: index of something that is not there (found 9"),
+        (r#""joints":[1,2]"#, r#""joints":[1]"#, "/accessors/1: joint that the skin does not have (found 1 at vertex 1; expected 0 to 0)"),
+        (r#""joints":[1,2]"#, r#""joints":[1,2],"inverseBindMatrices":0"#, "/skins/0/inverseBindMatrices: accessor of a wrong type"),
+        (r#""children":[2]"#, r#""children":[1]"#, "/nodes/1: node inside itself (found nodes 1 > 1)"),
+        (r#"{"children":[2]},{"#, r#"{"children":[2]},{"children":[1],"#, "node inside itself (found nodes"),
+        (r#"{"children":[2]},{"#, r#"{"children":[2,2]},{"#, "/nodes/1/children/1: node with two parents (found node 2, a child of 1 and of 1)"),
+        (r#""translation":[0,0,0]"#, r#""translation":[0,0]"#, "/nodes/2/translation: wrong type (found an array; expected an array of 3 numbers)"),
+        (r#""translation":[0,0,0]"#, r#""translation":[0,0,1e999]"#, "/nodes/2/translation/2: number too large (found 1e999; expected a finite number)"),
+        (r#""translation":[0,0,0]"#, r#""rotation":[0,0,0,0]"#, "/nodes/2/rotation: rotation that is not a unit quaternion"),
+        (r#""translation":[0,0,0]"#, r#""matrix":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,2]"#, "/nodes/2/matrix: matrix that is not affine"),
+        (r#""translation":[0,0,0]"#, r#""matrix":[1,0,0,0,1,1,0,0,0,0,1,0,0,0,0,1]"#, "/nodes/2/matrix: matrix that shears"),
+        (r#""nodes":[0,1,3,4]"#, r#""nodes":[0,1,2]"#, "/scenes/0/nodes/2: scene with a node that hangs on another (found 2)"),
+        (r#""nodes":[0,1,3,4]"#, r#""nodes":[0,1,0]"#, "/scenes/0/nodes/2: scene with the same node twice (found 0)"),
+        (r#""scene":0"#, r#""scene":3"#, "/scene: index of something that is not there (found 3; expected a scene from 0 to 0)"),
+        (r#""yfov":0.7"#, r#""yfov":4"#, "/cameras/0/perspective/yfov: number out of range (found 4; expected a number from"),
+        (r#""type":"perspective""#, r#""type":"perspektive""#, r#"/cameras/0/type: unknown kind of camera (found "perspektive"; did you mean "perspective"?)"#),
+        (r#""path":"weights""#, r#""path":"wieghts""#, r#"/animations/0/channels/1/target/path: unknown target of an animation (found "wieghts"; did you mean "weights"?)"#),
+        (r#""interpolation":"STEP""#, r#""interpolation":"STEPS""#, r#"/animations/0/samplers/1/interpolation: unknown interpolation (found "STEPS"; did you mean "STEP"?)"#),
+        (r#""interpolation":"CUBICSPLINE""#, r#""interpolation":"LINEAR""#, "/animations/0/samplers/3/output: animation of a wrong length (found 6 elements; expected 2 times 1 times 1)"),
+        (r#""sampler":1,"target""#, r#""sampler":8,"target""#, "/animations/0/channels/1/sampler: index of something that is not there (found 8; expected a sampler of this animation from 0 to 3)"),
+        (r#""alphaMode":"MASK""#, r#""alphaMode":"MASKS""#, r#"/materials/0/alphaMode: unknown alpha mode (found "MASKS"; did you mean "MASK"?)"#),
+        (r#""baseColorFactor":[1,1,1,1]"#, r#""baseColorFactor":[1,1,2,1]"#, "/materials/0/pbrMetallicRoughness/baseColorFactor: number out of range"),
+        (r#""roughnessFactor":0.5"#, r#""roughnessFactor":"0.5""#, r#"/materials/0/pbrMetallicRoughness/roughnessFactor: wrong type (found "0.5"; expected a number)"#),
+        (r#""roughnessFactor":0.5"#, r#""baseColorTexture":{"index":0}"#, "/meshes/0/primitives/0: texture coordinates that the material needs are missing (found 0 sets; expected 1 sets)"),
+        (r#""roughnessFactor":0.5"#, r#""baseColorTexture":{"index":5}"#, "/materials/0/pbrMetallicRoughness/baseColorTexture/index: index of something that is not there"),
+        (r#""wrapS":10497"#, r#""wrapS":10498"#, "/samplers/0/wrapS: unknown way to wrap (found 10498"),
+        (r#""extensionsUsed":["KHR_lights_punctual"]"#, r#""extensionsUsed":["KHR_x"],"extensionsRequired":["KHR_x"]"#, r#"/extensionsRequired/0: the file requires an extension that is not supported (found "KHR_x")"#),
+        (r#""extensionsUsed":["KHR_lights_punctual"]"#, r#""extensionsRequired":["KHR_materials_ior"]"#, r#"required extension that "extensionsUsed" does not list"#),
+        (r#""intensity":2"#, r#""intensity":-2"#, "/extensions/KHR_lights_punctual/lights/0/intensity: number out of range (found -2; expected 0 or more)"),
+        (r#""scene":0"#, r#""scene":0,"scene":0"#, r#"/scene: second member of this name (found "scene")"#),
+        (r#""scene":0"#, r#""scene":0,"images":[{"bufferView":0}]"#, r#"/images/0: image in a buffer view without a "mimeType""#),
+        (r#""scene":0"#, r#""scene":0,"images":[]"#, "/images: empty list (expected one element or more, or no list)"),
+    ]
+    .into_iter()
+    .map(|(from, to, expected)| {
+        assert!(json.contains(from), "{from}");
+        (json.replacen(from, to, 1), expected, to)
+    })
+    .collect();
+    assert!(cases.len() >= 60);
+    for (json, expected, change) in &cases {
+        let found = error(json, &binary);
+        assert!(found.contains(expected), "{change}\n  expected {expected}\n  found    {found}");
+        assert!(found.starts_with("m.gltf:byte "), "{found}");
+    }
+    let said = format!(r#""byteLength":{length}}}],"bufferViews""#);
+    let long = json.replacen(&said, r#""byteLength":100000}],"bufferViews""#, 1);
+    let found = error(&long, &binary);
+    assert!(found.contains("/buffers/0/byteLength: buffer longer than its data (found 100000"), "{found}");
+}
+
+#[test]
+fn indices_beyond_the_vertices_and_numbers_that_are_none_are_found_and_forgiven() {
+    let mut parts = Parts::default();
+    let mut square = SQUARE;
+    square[3][1] = f32::NAN;
+    let (p, i) = (parts.positions(&square), parts.indices(&[0, 1, 2, 2, 3, 0]));
+    let rest = one(&format!(r#""indices":{i},"attributes":{{"POSITION":{p}}}"#));
+    let json = parts.json(&rest);
+    assert!(
+        error(&json, &parts.binary)
+            .contains("/accessors/0: vertex that is not finite (found [0, NaN, 2] as vertex 3")
+    );
+    let mut lenient = Diagnostics::with_strictness(Strictness::Lenient);
+    let scene = read_with(&glb(&json, &parts.binary), &GltfOptions::default(), &mut lenient).unwrap();
+    assert_eq!(mesh(&scene.shapes[0]).triangles, [[0, 1, 2]]);
+    assert_eq!(lenient.warnings(), 1);
+
+    let mut parts = Parts::default();
+    let (p, i) = (parts.positions(&SQUARE), parts.indices(&[0, 1, 2, 2, 65535, 0]));
+    let json = parts.json(&one(&format!(r#""indices":{i},"attributes":{{"POSITION":{p}}}"#)));
+    let found = error(&json, &parts.binary);
+    assert!(
+        found.contains(
+            "/accessors/1: index of a vertex that is not there (found 65535 as index 4; expected 0 to 3)"
+        ),
+        "{found}"
+    );
+}
+
+#[test]
+fn a_file_cut_anywhere_is_an_error() {
+    let (json, binary) = rich();
+    let whole = glb(&json, &binary);
+    for cut in 0..whole.len() {
+        let read = read_with(&whole[..cut], &GltfOptions::default(), &mut Diagnostics::new());
+        assert!(read.is_err(), "{cut} of {} bytes", whole.len());
+        // With a length in the header that fits, the cut is found inside.
+        if cut >= 12 {
+            let mut cut_file = whole[..cut].to_vec();
+            cut_file[8..12].copy_from_slice(&(cut as u32).to_le_bytes());
+            let read = read_with(&cut_file, &GltfOptions::default(), &mut Diagnostics::new());
+            let all_of_json = cut == 20 + json.len().next_multiple_of(4);
+            assert!(read.is_err(), "{cut} {all_of_json}");
+        }
+    }
+}
+
+#[test]
+fn damaged_files_never_panic_and_cost_little() {
+    let (json, binary) = rich();
+    let whole = glb(&json, &binary);
+    let mut random = Random(0x617F);
+    let (mut errors, mut reads) = (0, 0);
+    for round in 0..6000 {
+        let mut file = whole.clone();
+        for _ in 0..1 + random.below(3) {
+            let at = random.below(file.len());
+            match random.below(4) {
+                0 => file[at] = random.next() as u8,
+                1 => file[at] = b"0123456789-e.\"[]{},:"[random.below(20)],
+                2 => file[at] ^= 1 << random.below(8),
+                _ => {
+                    let (from, length) = (random.below(file.len()), 1 + random.below(12));
+                    let piece: Vec<u8> = file[from..(from + length).min(file.len())].to_vec();
+                    let end = (at + piece.len()).min(file.len());
+                    file[at..end].copy_from_slice(&piece[..end - at]);
+                }
+            }
+        }
+        let strictness = [Strictness::Normal, Strictness::Lenient][round % 2];
+        let options = GltfOptions { frame: [None, Some(1.7)][round / 2 % 2], variant: None };
+        let budget = Budget::new(Limits::default());
+        let mut diagnostics = Diagnostics::with_strictness(strictness);
+        let read =
+            read_gltf(&file, &"m.glb".into(), Path::new("/nowhere"), &options, &budget, &mut diagnostics);
+        assert!(budget.memory_peak() < (64 << 20) + 32 * file.len() as u64);
+        match read {
+            Ok(scene) => {
+                reads += 1;
+                let _ = Scene::build(scene);
+            }
+            Err(_) => errors += 1,
+        }
+    }
+    assert!(errors > 500 && reads > 500, "{errors} {reads}");
+}
