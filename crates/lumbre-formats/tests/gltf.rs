@@ -309,7 +309,7 @@ fn flattened_nodes_are_flat_and_vanished_ones_are_gone() {
 }
 
 #[test]
-fn a_million_nodes_deep_is_no_stack_overflow() {
+fn nodes_may_hang_on_each_other_two_hundred_thousand_deep() {
     let depth = 200_000;
     let nodes: Vec<String> =
         (1..depth).map(|i| format!(r#"{{"children":[{i}],"translation":[0,0,1]}}"#)).collect();
@@ -611,6 +611,74 @@ fn vertices_that_no_one_uses_are_left_out() {
     let mesh = mesh(&scene.shapes[0]);
     assert_eq!(mesh.positions, [4000, 17, 3000].map(|i: usize| Vec3::from_array(many[i])));
     assert_eq!(mesh.triangles, [[0, 1, 2]]);
+}
+
+#[test]
+fn compressed_buffer_views_are_unpacked() {
+    // Eight triangles over nine vertices, by meshoptimizer.
+    let packed: Vec<u8> = [
+        0xE1, 0xFE, 0x1E, 0x10, 0x0E, 0x4E, 0x1E, 0x12, 0x0E, 0x0F, 0x06, 0x00, 0x76, 0x87, 0x56, 0x67, 0x78, 0xA9, 0x86,
+        0x65, 0x89, 0x68, 0x98, 0x01, 0x69, 0x00, 0x00,
+    ]
+    .into();
+    let mut parts = Parts::default();
+    let grid: Vec<[f32; 3]> = (0..9).map(|i| [(i % 3) as f32, (i / 3) as f32, 0.25]).collect();
+    let p = parts.positions(&grid);
+    parts.add(&packed, r#""componentType":5123,"type":"SCALAR","count":24"#);
+    let (at, length) = (parts.binary.len() - packed.len(), packed.len());
+    // The buffer that it stands in for has no data.
+    parts.views[1] = format!(
+        r#"{{"buffer":1,"byteLength":48,"extensions":{{"EXT_meshopt_compression":{{"buffer":0,"byteOffset":{at},
+            "byteLength":{length},"byteStride":2,"count":24,"mode":"TRIANGLES"}}}}}}"#
+    );
+    let rest = one(&format!(r#""indices":1,"attributes":{{"POSITION":{p}}}"#));
+    let used = r#""extensionsUsed":["EXT_meshopt_compression"],"extensionsRequired":["EXT_meshopt_compression"]"#;
+    let json = parts.json(&format!("{rest},{used}")).replacen("}],\"bufferViews\"", "},{\"byteLength\":48}],\"bufferViews\"", 1);
+    let scene = read(&json, &parts.binary);
+    let triangles = &mesh(&scene.shapes[0]).triangles;
+    assert_eq!(triangles.len(), 8);
+    assert_eq!(triangles[..3], [[0, 1, 3], [3, 1, 4], [4, 1, 2]]);
+    for (from, to, expected) in [
+        ("\"TRIANGLES\"", "\"TRIANGLE\"", "/EXT_meshopt_compression/mode: unknown mode of compression"),
+        ("\"count\":24,\"mode\"", "\"count\":2400000000,\"mode\"", "/EXT_meshopt_compression/count: wrong count of compressed elements"),
+        ("\"byteStride\":2", "\"byteStride\":3", "/EXT_meshopt_compression/byteStride: wrong stride"),
+        ("\"TRIANGLES\"", "\"INDICES\"", "/EXT_meshopt_compression: damaged compressed data (found a header"),
+    ] {
+        let found = error(&json.replacen(from, to, 1), &parts.binary);
+        assert!(found.contains(expected), "{found}");
+    }
+}
+
+/// A picture of one colour as an image file.
+fn picture(colour: [u8; 3], format: image::ImageFormat) -> Vec<u8> {
+    let mut file = std::io::Cursor::new(vec![]);
+    image::RgbImage::from_pixel(5, 3, image::Rgb(colour)).write_to(&mut file, format).unwrap();
+    file.into_inner()
+}
+
+#[test]
+fn an_image_of_an_extension_goes_before_the_plain_one() {
+    let red = picture([255, 0, 0], image::ImageFormat::Png);
+    let blue = picture([0, 0, 255], image::ImageFormat::WebP);
+    let mut parts = Parts::default();
+    let p = parts.positions(&SQUARE);
+    let uv = parts.add(&floats(&[0.0; 8]), r#""componentType":5126,"type":"VEC2","count":4"#);
+    for image in [&red, &blue] {
+        parts.add(image, r#""componentType":5121,"type":"SCALAR","count":5"#);
+    }
+    let rest = one(&format!(r#""material":0,"mode":6,"attributes":{{"POSITION":{p},"TEXCOORD_0":{uv}}}"#));
+    let rest = format!(
+        r#"{rest},"images":[{{"bufferView":2,"mimeType":"image/png"}},{{"bufferView":3,"mimeType":"image/webp"}}],
+        "textures":[{{"source":0,"extensions":{{"EXT_texture_webp":{{"source":1}}}}}}],"extensionsUsed":["EXT_texture_webp"],
+        "materials":[{{"emissiveFactor":[1,1,1],"emissiveTexture":{{"index":0}}}}]"#
+    );
+    let scene = parts.read(&rest);
+    let light = scene.shapes[0].area_light.as_ref().unwrap();
+    let bitmap = light.image.as_ref().unwrap().bitmap();
+    assert_eq!((bitmap.width(), bitmap.height(), bitmap.rgb(2, 1)), (5, 3, Rgb::new(0.0, 0.0, 1.0)));
+    let plain = parts.read(&rest.replace(r#","extensions":{"EXT_texture_webp":{"source":1}}"#, ""));
+    let light = plain.shapes[0].area_light.as_ref().unwrap();
+    assert_eq!(light.image.as_ref().unwrap().bitmap().rgb(2, 1), Rgb::new(1.0, 0.0, 0.0));
 }
 
 /// A file in which much can go wrong.

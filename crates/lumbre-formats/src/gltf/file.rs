@@ -387,7 +387,6 @@ impl<'a> File<'a> {
             }
         }
         if let Some(Some(bytes)) = self.unpacked.get(index) {
-            let stride = super::meshopt::stride(value)?;
             return Ok(View { bytes: Some(bytes), length: bytes.len() as u64, stride, offset: 0 });
         }
         let (bytes, offset, length) = self.buffer_slice(value)?;

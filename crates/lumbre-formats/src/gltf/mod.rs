@@ -45,6 +45,8 @@ pub struct GltfOptions {
 /// The extensions that are read.
 const SUPPORTED: &[&str] = &[
     "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
+    "EXT_texture_webp",
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",

@@ -1,9 +1,11 @@
-//! PNG, JPEG, TGA, BMP and QOI, by the decoders of the `image` crate behind our checks.
+//! PNG, JPEG, TGA, BMP, QOI and WebP, by the decoders of the `image` crate behind our checks.
 
 use std::io::Cursor;
 use std::sync::Arc;
 
-use image::codecs::{bmp::BmpDecoder, jpeg::JpegDecoder, png::PngDecoder, qoi::QoiDecoder, tga::TgaDecoder};
+use image::codecs::{
+    bmp::BmpDecoder, jpeg::JpegDecoder, png::PngDecoder, qoi::QoiDecoder, tga::TgaDecoder, webp::WebPDecoder,
+};
 use image::{ColorType, ImageDecoder, ImageError, Limits};
 use lumbre_image::{Bitmap, Channels, Encoding, PixelData};
 
@@ -53,6 +55,9 @@ pub(super) fn read(
             }
             ImageFormat::Bmp => {
                 decode(format, BmpDecoder::new(source).map_err(fault)?, bytes, &place, budget)
+            }
+            ImageFormat::WebP => {
+                decode(format, WebPDecoder::new(source).map_err(fault)?, bytes, &place, budget)
             }
             _ => decode(format, QoiDecoder::new(source).map_err(fault)?, bytes, &place, budget),
         }
@@ -110,6 +115,8 @@ fn check_size(
         ImageFormat::Png => 1032 * 8,
         ImageFormat::Jpeg => 1024,
         ImageFormat::Tga | ImageFormat::Bmp => 128,
+        // One colour all over takes next to nothing.
+        ImageFormat::WebP => 1 << 17,
         _ => 62,
     };
     let pixels = u64::from(width) * u64::from(height);

@@ -1,4 +1,4 @@
-//! Image files: PNG, JPEG, EXR, HDR, PFM, TGA, BMP and QOI in; PNG, JPEG, EXR, HDR and PFM out.
+//! Image files: PNG, JPEG, EXR, HDR, PFM, TGA, BMP, QOI and WebP in; PNG, JPEG, EXR, HDR and PFM out.
 
 mod decode;
 mod exr_file;
@@ -39,6 +39,8 @@ pub enum ImageFormat {
     Bmp,
     /// Quite OK Image; read only.
     Qoi,
+    /// WebP, with losses or without; read only.
+    WebP,
 }
 
 impl ImageFormat {
@@ -53,6 +55,7 @@ impl ImageFormat {
             "tga" => Some(Self::Tga),
             "bmp" | "dib" => Some(Self::Bmp),
             "qoi" => Some(Self::Qoi),
+            "webp" => Some(Self::WebP),
             _ => None,
         }
     }
@@ -71,6 +74,9 @@ impl ImageFormat {
             (b"BM", Self::Bmp),
             (b"qoif", Self::Qoi),
         ];
+        if bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(b"WEBP") {
+            return Some(Self::WebP);
+        }
         let marked = marks.into_iter().find(|(mark, _)| bytes.starts_with(mark)).map(|(_, format)| format);
         marked.or_else(|| bytes.ends_with(b"TRUEVISION-XFILE.\0").then_some(Self::Tga))
     }
@@ -86,6 +92,7 @@ impl ImageFormat {
             Self::Tga => "TGA",
             Self::Bmp => "BMP",
             Self::Qoi => "QOI",
+            Self::WebP => "WebP",
         }
     }
 
@@ -228,11 +235,9 @@ fn format_of(bytes: &[u8], name: &Arc<str>) -> Result<ImageFormat, FormatError> 
         (b"\0\0\0\x0CJXL ", "a JPEG XL image"),
         (b"\xFF\x0A", "a JPEG XL image"),
     ];
-    let webp = bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(b"WEBP");
     let avif = matches!(bytes.get(4..12), Some(b"ftypavif" | b"ftypheic" | b"ftypmif1"));
     let found = match others.iter().find(|(mark, _)| bytes.starts_with(mark)) {
         Some((_, kind)) => (*kind).to_owned(),
-        None if webp => "a WebP image".to_owned(),
         None if avif => "an AVIF or HEIF image".to_owned(),
         None if bytes.is_empty() => "an empty file".to_owned(),
         None => format!(
@@ -241,5 +246,5 @@ fn format_of(bytes: &[u8], name: &Arc<str>) -> Result<ImageFormat, FormatError> 
         ),
     };
     let wrong = Diagnostic::error("not an image that can be read").at(Place::whole(name.clone()));
-    Err(wrong.found(found).expected("PNG, JPEG, EXR, HDR, PFM, TGA, BMP or QOI").into())
+    Err(wrong.found(found).expected("PNG, JPEG, EXR, HDR, PFM, TGA, BMP, QOI or WebP").into())
 }

@@ -116,7 +116,7 @@ pub fn encode_image(image: &Image, format: ImageFormat, options: &WriteOptions) 
         ImageFormat::Exr => exr_file::encode(&Layers::from_image(image), options),
         ImageFormat::Hdr => Ok(hdr::encode(image)),
         ImageFormat::Pfm => Ok(pfm::encode(image)),
-        ImageFormat::Tga | ImageFormat::Bmp | ImageFormat::Qoi => {
+        ImageFormat::Tga | ImageFormat::Bmp | ImageFormat::Qoi | ImageFormat::WebP => {
             Err(io::Error::new(io::ErrorKind::Unsupported, format!("{} is not written", format.name())))
         }
     }
