@@ -104,6 +104,7 @@ fn images() -> Vec<(&'static str, Vec<u8>)> {
         ("a.tga", by_image(image::ImageFormat::Tga)),
         ("a.bmp", by_image(image::ImageFormat::Bmp)),
         ("a.qoi", by_image(image::ImageFormat::Qoi)),
+        ("a.webp", by_image(image::ImageFormat::WebP)),
     ]
 }
 

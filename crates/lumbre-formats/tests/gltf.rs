@@ -126,7 +126,8 @@ fn one(primitive: &str) -> String {
 
 #[test]
 fn every_mode_makes_the_triangles_that_the_specification_says() {
-    let cases: [(u32, &[u16], &[[u32; 3]]); 6] = [
+    type Case = (u32, &'static [u16], &'static [[u32; 3]]);
+    let cases: [Case; 6] = [
         (4, &[0, 1, 2, 2, 3, 0], &[[0, 1, 2], [2, 3, 0]]),
         (4, &[0, 1, 2, 2, 3], &[[0, 1, 2]]),
         (5, &[0, 1, 3, 2], &[[0, 1, 3], [1, 2, 3]]),
@@ -617,8 +618,8 @@ fn vertices_that_no_one_uses_are_left_out() {
 fn compressed_buffer_views_are_unpacked() {
     // Eight triangles over nine vertices, by meshoptimizer.
     let packed: Vec<u8> = [
-        0xE1, 0xFE, 0x1E, 0x10, 0x0E, 0x4E, 0x1E, 0x12, 0x0E, 0x0F, 0x06, 0x00, 0x76, 0x87, 0x56, 0x67, 0x78, 0xA9, 0x86,
-        0x65, 0x89, 0x68, 0x98, 0x01, 0x69, 0x00, 0x00,
+        0xE1, 0xFE, 0x1E, 0x10, 0x0E, 0x4E, 0x1E, 0x12, 0x0E, 0x0F, 0x06, 0x00, 0x76, 0x87, 0x56, 0x67, 0x78,
+        0xA9, 0x86, 0x65, 0x89, 0x68, 0x98, 0x01, 0x69, 0x00, 0x00,
     ]
     .into();
     let mut parts = Parts::default();
@@ -632,15 +633,24 @@ fn compressed_buffer_views_are_unpacked() {
             "byteLength":{length},"byteStride":2,"count":24,"mode":"TRIANGLES"}}}}}}"#
     );
     let rest = one(&format!(r#""indices":1,"attributes":{{"POSITION":{p}}}"#));
-    let used = r#""extensionsUsed":["EXT_meshopt_compression"],"extensionsRequired":["EXT_meshopt_compression"]"#;
-    let json = parts.json(&format!("{rest},{used}")).replacen("}],\"bufferViews\"", "},{\"byteLength\":48}],\"bufferViews\"", 1);
+    let used =
+        r#""extensionsUsed":["EXT_meshopt_compression"],"extensionsRequired":["EXT_meshopt_compression"]"#;
+    let json = parts.json(&format!("{rest},{used}")).replacen(
+        "}],\"bufferViews\"",
+        "},{\"byteLength\":48}],\"bufferViews\"",
+        1,
+    );
     let scene = read(&json, &parts.binary);
     let triangles = &mesh(&scene.shapes[0]).triangles;
     assert_eq!(triangles.len(), 8);
     assert_eq!(triangles[..3], [[0, 1, 3], [3, 1, 4], [4, 1, 2]]);
     for (from, to, expected) in [
         ("\"TRIANGLES\"", "\"TRIANGLE\"", "/EXT_meshopt_compression/mode: unknown mode of compression"),
-        ("\"count\":24,\"mode\"", "\"count\":2400000000,\"mode\"", "/EXT_meshopt_compression/count: wrong count of compressed elements"),
+        (
+            "\"count\":24,\"mode\"",
+            "\"count\":2400000000,\"mode\"",
+            "/EXT_meshopt_compression/count: wrong count of compressed elements",
+        ),
         ("\"byteStride\":2", "\"byteStride\":3", "/EXT_meshopt_compression/byteStride: wrong stride"),
         ("\"TRIANGLES\"", "\"INDICES\"", "/EXT_meshopt_compression: damaged compressed data (found a header"),
     ] {
