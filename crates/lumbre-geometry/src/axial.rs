@@ -32,12 +32,12 @@ pub(crate) struct Axial {
     pub(crate) phi_max: f64,
 }
 
-const LATERAL: u32 = 0;
-const CAP1: u32 = 1;
-const CAP2: u32 = 2;
+pub(crate) const LATERAL: u32 = 0;
+pub(crate) const CAP1: u32 = 1;
+pub(crate) const CAP2: u32 = 2;
 
 /// Where a line is in a convex set: from the first to the second `t`, each with the part that bounds it there.
-type Span = [(f64, u32); 2];
+pub(crate) type Span = [(f64, u32); 2];
 
 impl Axial {
     fn is_whole(&self) -> bool {
@@ -61,7 +61,7 @@ impl Axial {
     /// F(t) = |B + tA|² − (e + g t)² with A = D×V, B = W×V. Its discriminant is taken at the point of the line next to p1
     /// and as a difference of two lengths, which keeps its digits where a thin cone is far away.
     #[inline]
-    fn lateral_span(&self, ray: &Ray) -> Option<Span> {
+    pub(crate) fn lateral_span(&self, ray: &Ray) -> Option<Span> {
         let (w, d) = (ray.origin - self.p1, ray.direction);
         let across = d.cross(self.axis);
         let offset = w.cross(self.axis);
@@ -120,7 +120,7 @@ impl Axial {
 
     /// Where the line is between the planes that cut the body.
     #[inline]
-    fn slab_span(&self, ray: &Ray) -> Option<Span> {
+    pub(crate) fn slab_span(&self, ray: &Ray) -> Option<Span> {
         let along = ray.direction.dot(self.axis);
         let z1 = (ray.origin - self.p1).dot(self.axis);
         let z2 = (ray.origin - self.p2).dot(self.axis);
@@ -179,13 +179,13 @@ impl Axial {
         self.phi(arm) <= self.phi_max
     }
 
-    fn phi(&self, arm: DVec3) -> f64 {
+    pub(crate) fn phi(&self, arm: DVec3) -> f64 {
         let (e1, e2) = orthonormal_basis(self.axis);
         azimuth(arm.dot(e2), arm.dot(e1))
     }
 
     /// The height over p1 of the point at `t`, and its arm from the axis.
-    fn arm(&self, ray: &Ray, t: f64, part: u32) -> (f64, DVec3) {
+    pub(crate) fn arm(&self, ray: &Ray, t: f64, part: u32) -> (f64, DVec3) {
         let base = if part == CAP2 { self.p2 } else { self.p1 };
         let w = (ray.origin - base) + t * ray.direction;
         let z = w.dot(self.axis);
@@ -232,7 +232,7 @@ impl Axial {
         }
     }
 
-    fn on_side(&self, z: f64, outward: DVec3, u: f64) -> Surface {
+    pub(crate) fn on_side(&self, z: f64, outward: DVec3, u: f64) -> Surface {
         let rho = (self.r1 + self.k * z).max(0.0);
         let slant = self.k.hypot(1.0);
         let w = z * self.axis + rho * outward;
@@ -437,6 +437,11 @@ macro_rules! axial_shape {
             #[doc = concat!("\"", $name, "\".")]
             pub fn name(&self) -> &'static str {
                 $name
+            }
+
+            /// What a search costs, in visits to a node of a hierarchy.
+            pub fn search_cost(&self) -> f32 {
+                3.0
             }
 
             /// A point uniform by area; `None` when infinite.

@@ -142,8 +142,8 @@ const SHAPE_PARTS: u32 = 8;
 const COINCIDENT: f64 = 256.0 * f64::EPSILON;
 
 impl Csg {
-    /// A single solid: a whole sphere, a box, a torus (even-odd if it is a spindle), a capped cylinder or cone, a closed
-    /// quadric, the half-space below a plane, or a CSG shape, which is taken apart.
+    /// A single solid: a shape of which [`Shape::is_solid`] says so, such as a whole sphere, a torus (even-odd if it is a
+    /// spindle), a capped cylinder, or the half-space below a plane; or a CSG shape, which is taken apart.
     ///
     /// # Errors
     /// [`ShapeError::Degenerate`] for a shape that encloses nothing.
@@ -153,8 +153,8 @@ impl Csg {
         }
         if !shape.shape().is_solid() {
             return Err(ShapeError::Degenerate(
-                "an operand of CSG encloses nothing: it must be a whole sphere, a box, a torus, a capped cylinder or \
-                 cone, a closed quadric, a plane (for the half-space below it), a closed mesh or another csg",
+                "an operand of CSG encloses nothing: it must be a closed shape that is whole, such as a sphere or a \
+                 capped cylinder, a plane (for the half-space below it), a closed mesh or another csg",
             ));
         }
         Ok(Self::single(Leaf::Shape(shape), SHAPE_PARTS))
@@ -536,6 +536,11 @@ impl Csg {
     /// "csg".
     pub fn name(&self) -> &'static str {
         "csg"
+    }
+
+    /// What a search costs, in visits to a node of a hierarchy.
+    pub fn search_cost(&self) -> f32 {
+        16.0
     }
 
     /// `None`: see [`Csg`].

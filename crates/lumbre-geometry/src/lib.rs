@@ -19,43 +19,66 @@
 
 mod aabb;
 mod axial;
+mod density;
+mod hit;
+mod line;
+mod measure;
+mod placed;
+mod ray;
+mod shape;
+mod support;
+
+use lumbre_math::{DVec2, DVec3, Transform};
+
+pub use aabb::Aabb;
+pub use csg::{Crossing, Crossings, Leaf, LeafPart, Solid};
+pub use hit::{DirectionSample, Root, Roots, Surface, SurfaceSample};
+pub use placed::PlacedShape;
+pub use ray::Ray;
+pub use shape::ShapeError;
+pub use triangle::{TriangleHit, WatertightRay, moller_trumbore};
+
+// The shapes: the file of each, and its line in the list.
+
 mod cone;
 mod csg;
 mod cuboid;
 mod cylinder;
-mod density;
 mod disk;
-mod hit;
 mod hyperboloid;
-mod line;
-mod measure;
 mod paraboloid;
 mod patch;
-mod placed;
 mod plane;
 mod quadric;
-mod ray;
-mod shape;
 mod sphere;
-mod support;
 mod torus;
 mod triangle;
 
-pub use aabb::Aabb;
-pub use cone::Cone;
-pub use csg::{Crossing, Crossings, Csg, Leaf, LeafPart, Solid};
-pub use cuboid::Cuboid;
-pub use cylinder::Cylinder;
-pub use disk::Disk;
-pub use hit::{DirectionSample, Root, Roots, Surface, SurfaceSample};
-pub use hyperboloid::Hyperboloid;
-pub use paraboloid::Paraboloid;
-pub use patch::BilinearPatch;
-pub use placed::PlacedShape;
-pub use plane::Plane;
-pub use quadric::Quadric;
-pub use ray::Ray;
-pub use shape::{Shape, ShapeError};
-pub use sphere::Sphere;
-pub use torus::Torus;
-pub use triangle::{Triangle, TriangleHit, WatertightRay, moller_trumbore};
+shape::shapes! {
+    /// A sphere, or the part of one between two heights and two meridians.
+    sphere::Sphere in Sphere,
+    /// An infinite plane.
+    plane::Plane in Plane,
+    /// A disk, an annulus, or a sector of one.
+    disk::Disk in Disk,
+    /// A box along the axes.
+    cuboid::Cuboid in Cuboid,
+    /// A cylinder, open, capped or infinite.
+    cylinder::Cylinder in Cylinder,
+    /// A cone, pointed or cut off, open, capped or infinite.
+    cone::Cone in Cone,
+    /// A bilinear patch.
+    patch::BilinearPatch in BilinearPatch,
+    /// A triangle.
+    triangle::Triangle in Triangle,
+    /// A torus: ring, horn or spindle.
+    torus::Torus in Box<Torus>,
+    /// A paraboloid of revolution.
+    paraboloid::Paraboloid in Paraboloid,
+    /// A hyperboloid of revolution.
+    hyperboloid::Hyperboloid in Box<Hyperboloid>,
+    /// A general quadric, in a box if it is to be bounded.
+    quadric::Quadric in Box<Quadric>,
+    /// Unions, intersections and differences of solids.
+    csg::Csg in Box<Csg>,
+}

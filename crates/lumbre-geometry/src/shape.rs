@@ -1,25 +1,21 @@
-//! The closed set of exact shapes.
+//! What every shape can do, and why a shape cannot be made. The list of shapes itself is in `lib.rs`.
 
-use lumbre_math::{DVec2, DVec3, Transform};
-
-use crate::{
-    Aabb, BilinearPatch, Cone, Csg, Cuboid, Cylinder, DirectionSample, Disk, Hyperboloid, Paraboloid, Plane,
-    Quadric, Ray, Root, Roots, Sphere, Surface, SurfaceSample, Torus, Triangle,
-};
-
-/// Makes the enum and hands every method to the variant's method of the same name. To add a shape, write its file with
-/// these methods and add one line where this is called; `in Box<..>` keeps a large shape out of line.
+/// Makes the enum from a list of `module::Type in Stored`: re-exports each type, makes it a variant of its own name, and
+/// hands every method to the variant's method of the same name. To add a shape, write its file with these methods and add
+/// one line to the list; stored `in Box<Type>` a large shape is kept out of line.
 macro_rules! shapes {
-    ($($(#[$doc:meta])* $variant:ident($shape:ty) in $stored:ty,)+) => {
-        /// An exact shape in its own space. Adding one is a new file, and a line here.
+    ($($(#[$doc:meta])* $module:ident::$shape:ident in $stored:ty,)+) => {
+        $(pub use $module::$shape;)+
+
+        /// An exact shape in its own space.
         #[derive(Clone, Debug)]
         pub enum Shape {
-            $($(#[$doc])* $variant($stored),)+
+            $($(#[$doc])* $shape($stored),)+
         }
 
         $(impl From<$shape> for Shape {
             fn from(shape: $shape) -> Self {
-                Self::$variant(shape.into())
+                Self::$shape(shape.into())
             }
         })+
 
@@ -27,110 +23,86 @@ macro_rules! shapes {
             /// The first crossing in the ray's range.
             #[inline]
             pub fn closest(&self, ray: &Ray) -> Option<Root> {
-                match self { $(Self::$variant(shape) => shape.closest(ray),)+ }
+                match self { $(Self::$shape(shape) => shape.closest(ray),)+ }
+            }
+
+            /// Whether anything is crossed in the ray's range.
+            pub fn any(&self, ray: &Ray) -> bool {
+                self.closest(ray).is_some()
             }
 
             /// Every crossing in the ray's range, appended in ascending order.
             pub fn roots(&self, ray: &Ray, out: &mut Roots) {
-                match self { $(Self::$variant(shape) => shape.roots(ray, out),)+ }
+                match self { $(Self::$shape(shape) => shape.roots(ray, out),)+ }
             }
 
             /// The surface where `root` was found along `ray`.
             pub fn surface(&self, ray: &Ray, root: &Root) -> Surface {
-                match self { $(Self::$variant(shape) => shape.surface(ray, root),)+ }
+                match self { $(Self::$shape(shape) => shape.surface(ray, root),)+ }
             }
 
             /// The surface at `uv` of a part (see [`Root::part`]); `None` for a part that the shape does not have, and for
             /// shapes without a parametrisation that can be run forwards.
             pub fn surface_at(&self, part: u32, uv: DVec2) -> Option<Surface> {
-                match self { $(Self::$variant(shape) => shape.surface_at(part, uv),)+ }
+                match self { $(Self::$shape(shape) => shape.surface_at(part, uv),)+ }
             }
 
             /// The tightest box around the shape under `world_from_object`, rounded outward; `None` for infinite shapes.
             pub fn bounds(&self, world_from_object: &Transform) -> Option<Aabb> {
-                match self { $(Self::$variant(shape) => shape.bounds(world_from_object),)+ }
+                match self { $(Self::$shape(shape) => shape.bounds(world_from_object),)+ }
             }
 
             /// Area before any transform; infinite for infinite shapes.
             pub fn area(&self) -> f64 {
-                match self { $(Self::$variant(shape) => shape.area(),)+ }
+                match self { $(Self::$shape(shape) => shape.area(),)+ }
             }
 
             /// Area after `world_from_object`; infinite for infinite shapes.
             pub fn area_under(&self, world_from_object: &Transform) -> f64 {
-                match self { $(Self::$variant(shape) => shape.area_under(world_from_object),)+ }
+                match self { $(Self::$shape(shape) => shape.area_under(world_from_object),)+ }
             }
 
             /// Whether the surface encloses a solid, so that CSG can use it.
             pub fn is_solid(&self) -> bool {
-                match self { $(Self::$variant(shape) => shape.is_solid(),)+ }
+                match self { $(Self::$shape(shape) => shape.is_solid(),)+ }
             }
 
             /// Whether the closed solid holds `p`; false for shapes that are not solid.
             pub fn contains(&self, p: DVec3) -> bool {
-                match self { $(Self::$variant(shape) => shape.contains(p),)+ }
+                match self { $(Self::$shape(shape) => shape.contains(p),)+ }
             }
 
             /// The name in the scene language.
             pub fn name(&self) -> &'static str {
-                match self { $(Self::$variant(shape) => shape.name(),)+ }
+                match self { $(Self::$shape(shape) => shape.name(),)+ }
+            }
+
+            /// What [`Shape::closest`] costs, in visits to a node of a bounding volume hierarchy: 1 for a disk, 12 for a
+            /// torus. Hierarchies are built by it; no answer depends on it.
+            pub fn search_cost(&self) -> f32 {
+                match self { $(Self::$shape(shape) => shape.search_cost(),)+ }
             }
 
             /// A point uniform by area from two uniform numbers; `None` for infinite shapes.
             pub fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
-                match self { $(Self::$variant(shape) => shape.sample_area(u),)+ }
+                match self { $(Self::$shape(shape) => shape.sample_area(u),)+ }
             }
 
             /// A point as seen from `from`, by solid angle where the shape has a method, else by area; `None` where the
             /// point chosen is seen edge-on, and for infinite shapes.
             pub fn sample_direction(&self, from: DVec3, u: DVec2) -> Option<DirectionSample> {
-                match self { $(Self::$variant(shape) => shape.sample_direction(from, u),)+ }
+                match self { $(Self::$shape(shape) => shape.sample_direction(from, u),)+ }
             }
 
             /// The density, per unit solid angle at `ray.origin`, with which [`Shape::sample_direction`] chooses the point
             /// `surface` on the ray; 0 for points that it never chooses.
             pub fn pdf_direction(&self, ray: &Ray, surface: &Surface) -> f64 {
-                match self { $(Self::$variant(shape) => shape.pdf_direction(ray, surface),)+ }
+                match self { $(Self::$shape(shape) => shape.pdf_direction(ray, surface),)+ }
             }
         }
     };
 }
-
-shapes! {
-    /// A sphere, or the part of one between two heights and two meridians.
-    Sphere(Sphere) in Sphere,
-    /// An infinite plane.
-    Plane(Plane) in Plane,
-    /// A disk, an annulus, or a sector of one.
-    Disk(Disk) in Disk,
-    /// A box along the axes.
-    Cuboid(Cuboid) in Cuboid,
-    /// A cylinder, open, capped or infinite.
-    Cylinder(Cylinder) in Cylinder,
-    /// A cone, pointed or cut off, open, capped or infinite.
-    Cone(Cone) in Cone,
-    /// A bilinear patch.
-    BilinearPatch(BilinearPatch) in BilinearPatch,
-    /// A triangle.
-    Triangle(Triangle) in Triangle,
-    /// A torus: ring, horn or spindle.
-    Torus(Torus) in Box<Torus>,
-    /// A paraboloid of revolution.
-    Paraboloid(Paraboloid) in Paraboloid,
-    /// A hyperboloid of revolution.
-    Hyperboloid(Hyperboloid) in Box<Hyperboloid>,
-    /// A general quadric, in a box if it is to be bounded.
-    Quadric(Quadric) in Box<Quadric>,
-    /// Unions, intersections and differences of solids.
-    Csg(Csg) in Box<Csg>,
-}
-
-impl Shape {
-    /// Whether anything is crossed in the ray's range.
-    pub fn any(&self, ray: &Ray) -> bool {
-        self.closest(ray).is_some()
-    }
-}
+pub(crate) use shapes;
 
 /// Why a shape cannot be made.
 #[derive(Clone, Debug, PartialEq)]
@@ -223,6 +195,6 @@ pub(crate) mod check {
 mod tests {
     #[test]
     fn a_shape_fits_in_two_cache_lines_and_a_word() {
-        assert!(size_of::<super::Shape>() <= 136, "{}", size_of::<super::Shape>());
+        assert!(size_of::<crate::Shape>() <= 136, "{}", size_of::<crate::Shape>());
     }
 }

@@ -80,19 +80,9 @@ impl Sphere {
             && (self.phi_max >= TAU || azimuth(w.y, w.x) <= self.phi_max)
     }
 
-    /// Both crossings of the whole sphere, in order.
-    ///
-    /// The discriminant is that of E. Haines, J. Günther, T. Akenine-Möller, "Precision improvements for ray/sphere
-    /// intersection", Ray Tracing Gems, 2019: the textbook's loses all digits for a small sphere far away.
     #[inline]
     fn crossings(&self, ray: &Ray) -> Option<(f64, f64)> {
-        let w = ray.origin - self.center;
-        let a = ray.direction.length_squared();
-        let h = w.dot(ray.direction);
-        let nearest = w - (h / a) * ray.direction;
-        let delta = a * (self.radius * self.radius - nearest.length_squared());
-        let c = w.length_squared() - self.radius * self.radius;
-        quadratic(a, h, c, delta)
+        crossings(self.center, self.radius, ray)
     }
 
     /// The point of the whole sphere at `t`, relative to the centre.
@@ -232,6 +222,11 @@ impl Sphere {
         "sphere"
     }
 
+    /// What a search costs, in visits to a node of a hierarchy.
+    pub fn search_cost(&self) -> f32 {
+        1.5
+    }
+
     /// A point uniform by area.
     pub fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
         let z = (self.z_min + u.x * (self.z_max - self.z_min)).min(self.z_max);
@@ -303,4 +298,19 @@ impl Sphere {
             0.0
         }
     }
+}
+
+/// Both crossings of a whole sphere, in order.
+///
+/// The discriminant is that of E. Haines, J. Günther, T. Akenine-Möller, "Precision improvements for ray/sphere
+/// intersection", Ray Tracing Gems, 2019: the textbook's loses all digits for a small sphere far away.
+#[inline]
+pub(crate) fn crossings(center: DVec3, radius: f64, ray: &Ray) -> Option<(f64, f64)> {
+    let w = ray.origin - center;
+    let a = ray.direction.length_squared();
+    let h = w.dot(ray.direction);
+    let nearest = w - (h / a) * ray.direction;
+    let delta = a * (radius * radius - nearest.length_squared());
+    let c = w.length_squared() - radius * radius;
+    quadratic(a, h, c, delta)
 }

@@ -272,13 +272,5 @@ fn traits_of(geometry: &Geometry) -> Traits {
 
 fn cost_of(shape: &PlacedShape) -> f32 {
     let moved = if shape.world_from_object().is_identity() { 0.0 } else { 0.5 };
-    moved
-        + match shape.shape().name() {
-            "triangle" | "plane" | "disk" | "bilinear" => 1.0,
-            "sphere" | "box" => 1.5,
-            "cylinder" | "cone" | "frustum" => 3.0,
-            "torus" => 12.0,
-            "csg" => 16.0,
-            _ => 4.0,
-        }
+    moved + shape.shape().search_cost()
 }

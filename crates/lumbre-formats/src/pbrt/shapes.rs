@@ -21,7 +21,7 @@ use crate::diagnostic::quoted;
 use crate::ply::read_ply;
 use crate::{Diagnostic, Diagnostics, Input};
 
-const KNOWN: [&str; 17] = [
+const KNOWN: &[&str] = &[
     "sphere",
     "plane",
     "disk",
@@ -238,7 +238,7 @@ impl Converter<'_, '_> {
                 return Ok(None);
             }
             _ => {
-                self.unknown(params.spot, "shape", ty, &KNOWN, "it is left out");
+                self.unknown(params.spot, "shape", ty, KNOWN, "it is left out");
                 return Ok(None);
             }
         };
@@ -298,7 +298,7 @@ impl Converter<'_, '_> {
                     _ => continue,
                 };
                 let message = format!("object {} has a {not_solid} that is no solid", quoted(name));
-                let expected = "a sphere, box, torus, capped cylinder or cone, closed quadric, plane, closed mesh or csg";
+                let expected = "a closed shape that is whole, such as a sphere or a capped cylinder, a plane, closed mesh or csg";
                 return Err(at.wrong(Diagnostic::error(message).expected(expected)));
             }
             leaves = leaves.saturating_add(slot.leaves);
