@@ -40,6 +40,7 @@ pub use triangle::{TriangleHit, WatertightRay, moller_trumbore};
 
 // The shapes: the file of each, and its line in the list.
 
+mod capsule;
 mod cone;
 mod csg;
 mod cuboid;
@@ -67,6 +68,8 @@ shape::shapes! {
     cylinder::Cylinder in Cylinder,
     /// A cone, pointed or cut off, open, capped or infinite.
     cone::Cone in Cone,
+    /// A capsule: a segment swept by a ball.
+    capsule::Capsule in Capsule,
     /// A bilinear patch.
     patch::BilinearPatch in BilinearPatch,
     /// A triangle.

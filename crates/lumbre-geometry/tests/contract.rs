@@ -3,8 +3,8 @@
 use std::f64::consts::{PI, TAU};
 
 use lumbre_geometry::{
-    Aabb, BilinearPatch, Cone, Csg, Cuboid, Cylinder, Disk, Hyperboloid, Paraboloid, PlacedShape, Plane,
-    Quadric, Ray, Root, Roots, Shape, ShapeError, Sphere, Surface, Torus, Triangle,
+    Aabb, BilinearPatch, Capsule, Cone, Csg, Cuboid, Cylinder, Disk, Hyperboloid, Paraboloid, PlacedShape,
+    Plane, Quadric, Ray, Root, Roots, Shape, ShapeError, Sphere, Surface, Torus, Triangle,
 };
 use lumbre_math::random::{RandomStream, hash_words};
 use lumbre_math::{DVec2, DVec3, Transform};
@@ -108,6 +108,7 @@ fn subjects() -> Vec<Subject> {
     all.add("cylinder along z", Cylinder::along_z(1.3, 2.2, -0.7, false).and_then(|c| c.partial(100.0)));
     all.add("endless cylinder", Cylinder::along_z(0.8, f64::NEG_INFINITY, f64::INFINITY, false));
     all.add("half-endless cylinder", Cylinder::along_z(1.2, f64::NEG_INFINITY, 1.1, true));
+    all.add("capsule", Capsule::new(p, q, 0.8));
     all.add("open frustum", lampshade(false));
     all.add("capped frustum", lampshade(true));
     all.add("wedge of a frustum", lampshade(true).and_then(|c| c.partial(200.0)));

@@ -4,8 +4,8 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use lumbre_geometry::{
-    Aabb, Cone, Cuboid, Cylinder, Disk, Hyperboloid, Paraboloid, Plane, Quadric, Shape, ShapeError, Sphere,
-    Torus, Triangle,
+    Aabb, Capsule, Cone, Cuboid, Cylinder, Disk, Hyperboloid, Paraboloid, Plane, Quadric, Shape, ShapeError,
+    Sphere, Torus, Triangle,
 };
 use lumbre_math::{DVec3, Transform, Vec2, Vec3};
 use lumbre_scene::{CsgDesc, CsgOperation, GeometryDesc, MeshDesc, ShapeDesc};
@@ -28,6 +28,7 @@ const KNOWN: &[&str] = &[
     "triangle",
     "box",
     "cylinder",
+    "capsule",
     "cone",
     "torus",
     "paraboloid",
@@ -178,6 +179,10 @@ impl Converter<'_, '_> {
                 };
                 let phimax = params.float("phimax", 360.0)?;
                 cylinder.and_then(|c| c.partial(phimax)).map(Shape::from)
+            }
+            "capsule" => {
+                let (p0, p1) = (point("p0", DVec3::ZERO)?, point("p1", DVec3::Z)?);
+                Capsule::new(p0, p1, params.float("radius", 0.5)?).map(Shape::from)
             }
             "cone" => {
                 let caps = params.boolean("caps", false)?;
