@@ -51,8 +51,7 @@ impl Interaction<'_> {
     /// The shading frame and how the surface scatters; `None` for an interface.
     pub fn scattering(&self) -> Option<(ShadingFrame, Bsdf)> {
         let material = self.material?.resolve(&self.at, self.towards_origin.as_vec3());
-        let bsdf = material.bsdf(&self.at)?;
-        Some((material.frame(&self.at, &self.shading), bsdf))
+        material.shading(&self.at, &self.shading)
     }
 
     /// The ray that leaves along a unit direction, from beyond the error of the point.

@@ -6,6 +6,7 @@ use crate::coated::{Coat, CoatedConductor, CoatedDiffuse};
 use crate::conductor::Conductor;
 use crate::dielectric::{Dielectric, ThinDielectric};
 use crate::diffuse::{Diffuse, DiffuseTransmission};
+use crate::principled::Principled;
 use crate::{LocalDir, Spectrum};
 
 /// How a direction was chosen.
@@ -36,7 +37,7 @@ pub struct BsdfSample {
 ///
 /// Which conserve energy: [`Diffuse`] of reflectance 1, [`DiffuseTransmission`] whose shares sum to 1, a smooth
 /// [`Dielectric`] (counting η²), [`ThinDielectric`], and a smooth [`Conductor`] of reflectance 1. Rough metal and glass
-/// count single scattering between facets only, and lose some.
+/// count single scattering between facets only, and lose some; [`Principled`] gives it back.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Bsdf {
     /// Lambert.
@@ -53,6 +54,8 @@ pub enum Bsdf {
     CoatedDiffuse(CoatedDiffuse),
     /// Metal under varnish.
     CoatedConductor(CoatedConductor),
+    /// Layers of all these.
+    Principled(Principled),
 }
 
 impl Bsdf {
@@ -66,6 +69,7 @@ impl Bsdf {
             Self::ThinDielectric(_) => Spectrum::BLACK,
             Self::CoatedDiffuse(bsdf) => bsdf.eval(wo, wi),
             Self::CoatedConductor(bsdf) => bsdf.eval(wo, wi),
+            Self::Principled(bsdf) => bsdf.eval(wo, wi),
         }
     }
 
@@ -80,6 +84,7 @@ impl Bsdf {
             Self::ThinDielectric(_) => 0.0,
             Self::CoatedDiffuse(bsdf) => bsdf.pdf(wo, wi),
             Self::CoatedConductor(bsdf) => bsdf.pdf(wo, wi),
+            Self::Principled(bsdf) => bsdf.pdf(wo, wi),
         }
     }
 
@@ -93,6 +98,7 @@ impl Bsdf {
             Self::ThinDielectric(bsdf) => bsdf.sample(wo, lobe),
             Self::CoatedDiffuse(bsdf) => bsdf.sample(wo, lobe, u),
             Self::CoatedConductor(bsdf) => bsdf.sample(wo, lobe, u),
+            Self::Principled(bsdf) => bsdf.sample(wo, lobe, u),
         }
     }
 
@@ -104,6 +110,7 @@ impl Bsdf {
             Self::Dielectric(bsdf) => bsdf.is_delta(),
             Self::ThinDielectric(_) => true,
             Self::CoatedConductor(bsdf) => bsdf.is_delta(),
+            Self::Principled(bsdf) => bsdf.is_delta(),
         }
     }
 
@@ -117,6 +124,7 @@ impl Bsdf {
             Self::Dielectric(_) | Self::ThinDielectric(_) => Spectrum::WHITE,
             Self::CoatedDiffuse(bsdf) => bsdf.albedo_estimate(),
             Self::CoatedConductor(bsdf) => bsdf.albedo_estimate(),
+            Self::Principled(bsdf) => bsdf.albedo_estimate(),
         }
     }
 
@@ -138,6 +146,7 @@ impl Bsdf {
             Self::CoatedConductor(bsdf) => {
                 Self::CoatedConductor(CoatedConductor { base: metal(bsdf.base), coat: coated(bsdf.coat) })
             }
+            Self::Principled(bsdf) => Self::Principled(bsdf.regularized()),
         }
     }
 }

@@ -22,17 +22,17 @@ pub struct Dielectric {
 }
 
 /// A facet that takes `wo` to `wi`.
-struct Facet {
+pub(crate) struct Facet {
     /// Its normal, turned up.
-    normal: Vec3,
+    pub normal: Vec3,
     /// Index of the side of `wi` over that of the side of `wo`.
-    eta: f32,
+    pub eta: f32,
     /// The share it reflects.
-    fresnel: f32,
+    pub fresnel: f32,
     /// |dm/dwi|.
-    jacobian: f32,
+    pub jacobian: f32,
     /// Whether it refracts.
-    transmits: bool,
+    pub transmits: bool,
 }
 
 /// Which of the two ways of a border to consider.
@@ -54,7 +54,8 @@ impl Dielectric {
         if w.cos_theta() > 0.0 { self.eta } else { 1.0 / self.eta }
     }
 
-    fn facet(&self, wo: LocalDir, wi: LocalDir) -> Option<Facet> {
+    /// The facet between two directions; `None` where there is none, as in a delta.
+    pub(crate) fn facet(&self, wo: LocalDir, wi: LocalDir) -> Option<Facet> {
         let (cos_o, cos_i) = (wo.cos_theta(), wi.cos_theta());
         let sides = cos_o * cos_i;
         if self.is_delta() || sides == 0.0 || sides.is_nan() {
@@ -81,12 +82,16 @@ impl Dielectric {
     /// f · |cos θi|.
     pub fn eval(&self, wo: LocalDir, wi: LocalDir) -> f32 {
         let Some(facet) = self.facet(wo, wi) else { return 0.0 };
-        let share =
-            if facet.transmits { (1.0 - facet.fresnel) / (facet.eta * facet.eta) } else { facet.fresnel };
+        let share = if facet.transmits { 1.0 - facet.fresnel } else { facet.fresnel };
+        share * self.eval_facet(&facet, wo, wi)
+    }
+
+    /// f · |cos θi| of a facet that does not share light between its two ways.
+    pub(crate) fn eval_facet(&self, facet: &Facet, wo: LocalDir, wi: LocalDir) -> f32 {
         let facets = self.facets.density(facet.normal)
             * self.facets.both_visible_per_cosines(wo.vec(), wi.vec())
             * wo.vec().dot(facet.normal).abs();
-        share * facets * facet.jacobian * wi.abs_cos_theta()
+        facets * facet.jacobian * wi.abs_cos_theta() / (facet.eta * facet.eta)
     }
 
     /// The density of [`Dielectric::sample`].

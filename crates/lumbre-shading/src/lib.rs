@@ -3,6 +3,7 @@
 //! A [`Material`] is a function of place that yields a [`Bsdf`]; a [`Bsdf`] is a function of two directions. Colour is
 //! carried on the lanes of [`Spectrum`].
 
+mod albedo;
 mod bsdf;
 pub mod coated;
 pub mod conductor;
@@ -13,13 +14,18 @@ pub mod fresnel;
 mod material;
 pub mod microfacet;
 mod mipmap;
+pub mod principled;
+mod principled_params;
+pub mod sheen;
 pub mod spectrum;
 mod texture;
+pub mod thin_film;
 
 pub use bsdf::{Bsdf, BsdfSample, Scatter};
 pub use frame::{LocalDir, ShadingFrame};
 pub use material::{LocalSurface, Material, MaterialKind, Metal, Roughness};
 pub use mipmap::{AxisWrap, ImageFilter, MipMap, MipMapOptions, Wrap};
+pub use principled_params::{Convention, PrincipledParams, VolumeParams};
 pub use spectrum::{NamedSpectrum, SpectrumValue};
 pub use texture::{
     FloatTexture, ImageTexture, Mapping2d, SpectrumTexture, Texture, TextureContext, TexturePoint,

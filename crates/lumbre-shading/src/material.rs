@@ -11,7 +11,8 @@ use crate::dielectric::{Dielectric, ThinDielectric};
 use crate::diffuse::{Diffuse, DiffuseTransmission};
 use crate::microfacet::Microfacets;
 use crate::{
-    Bsdf, FloatTexture, ImageTexture, ShadingFrame, Spectrum, SpectrumTexture, Texture, TextureContext,
+    Bsdf, FloatTexture, ImageTexture, PrincipledParams, ShadingFrame, Spectrum, SpectrumTexture, Texture,
+    TextureContext,
 };
 
 /// The roughness group of parameters.
@@ -145,6 +146,8 @@ pub enum MaterialKind {
         /// A factor on both.
         scale: f32,
     },
+    /// Layers of metal, plastic, glass, cloth and lacquer: all that glTF says.
+    Principled(Box<PrincipledParams>),
     /// One of two, chosen at random by place and direction.
     Mix {
         /// At amount 0 and 1.
@@ -158,7 +161,7 @@ pub enum MaterialKind {
 
 impl MaterialKind {
     /// The names of the kinds in the scene language, in the order of this enum.
-    pub const NAMES: [&str; 9] = [
+    pub const NAMES: [&str; 10] = [
         "diffuse",
         "conductor",
         "dielectric",
@@ -166,6 +169,7 @@ impl MaterialKind {
         "coateddiffuse",
         "coatedconductor",
         "diffusetransmission",
+        "principled",
         "mix",
         "interface",
     ];
@@ -180,6 +184,7 @@ impl MaterialKind {
             Self::CoatedDiffuse { .. } => "coateddiffuse",
             Self::CoatedConductor { .. } => "coatedconductor",
             Self::DiffuseTransmission { .. } => "diffusetransmission",
+            Self::Principled(_) => "principled",
             Self::Mix { .. } => "mix",
             Self::Interface => "interface",
         }
@@ -235,12 +240,7 @@ impl Material {
     pub fn frame(&self, at: &TextureContext, surface: &LocalSurface) -> ShadingFrame {
         let plain = || ShadingFrame::new(surface.normal, surface.dpdu);
         if let Some(map) = &self.normal_map {
-            let texel: Spectrum = map.evaluate(at);
-            let local = Vec3::new(2.0 * texel.r - 1.0, 2.0 * texel.g - 1.0, 2.0 * texel.b - 1.0);
-            let frame = plain();
-            let Some(local) = local.try_normalize() else { return frame };
-            let normal = frame.s * local.x + frame.t * local.y + frame.n * local.z;
-            return turned(normal, surface.dpdu, surface).unwrap_or(frame);
+            return mapped(map, at, surface);
         }
         if let Some(displacement) = &self.displacement {
             if let Texture::Constant(_) = **displacement {
@@ -251,6 +251,37 @@ impl Material {
             return turned(normal, dpdu, surface).unwrap_or_else(plain);
         }
         plain()
+    }
+
+    /// The frame to shade in, and how the surface scatters there: [`Material::frame`] and [`Material::bsdf`], with a clear
+    /// coat in its place. (It follows its own normal map, or the surface below the bumps of the base where it has none.)
+    pub fn shading(&self, at: &TextureContext, surface: &LocalSurface) -> Option<(ShadingFrame, Bsdf)> {
+        let mut bsdf = self.bsdf(at)?;
+        let frame = self.frame(at, surface);
+        if let (Bsdf::Principled(bsdf), MaterialKind::Principled(params)) = (&mut bsdf, &self.kind)
+            && bsdf.coat.weight > 0.0
+        {
+            let normal =
+                params.clearcoat_normal.as_ref().map_or(surface.normal, |map| mapped(map, at, surface).n);
+            let local = frame.to_local(normal).vec();
+            // A coat cannot be met from below.
+            if 0.0 < local.z && frame.n != normal {
+                bsdf.coat.normal = local.normalize();
+            }
+        }
+        Some((frame, bsdf))
+    }
+
+    /// What a solid body of this material takes from light inside it: the coefficient σ of Beer's and Lambert's law, per
+    /// unit of length of the world, so that exp(−σ d) of the light is left after a distance d. `None` where light inside
+    /// loses nothing, or cannot get inside. The normal points out of the body.
+    ///
+    /// This is the data; it is whoever follows a path through the body that knows how long the way inside was.
+    pub fn interior_attenuation(&self) -> Option<Spectrum> {
+        match &self.kind {
+            MaterialKind::Principled(params) => params.interior_attenuation(),
+            _ => None,
+        }
     }
 
     /// How the surface scatters here; `None` for [`MaterialKind::Interface`]. Mixtures must be resolved first: one that is
@@ -324,6 +355,7 @@ impl Material {
                     transmittance: albedo(transmittance.evaluate(at) * *scale),
                 })
             }
+            MaterialKind::Principled(params) => Bsdf::Principled(params.bsdf(at)),
             MaterialKind::Mix { .. } | MaterialKind::Interface => return None,
         };
         Some(bsdf)
@@ -375,8 +407,18 @@ fn by_reflectance(reflectance: &SpectrumTexture, at: &TextureContext, facets: Mi
     Conductor::from_reflectance(albedo(reflectance.evaluate(at)), facets)
 }
 
+/// The frame that a normal map gives.
+fn mapped(map: &ImageTexture, at: &TextureContext, surface: &LocalSurface) -> ShadingFrame {
+    let texel: Spectrum = map.evaluate(at);
+    let local = Vec3::new(2.0 * texel.r - 1.0, 2.0 * texel.g - 1.0, 2.0 * texel.b - 1.0);
+    let frame = ShadingFrame::new(surface.normal, surface.dpdu);
+    let Some(local) = local.try_normalize() else { return frame };
+    let normal = frame.s * local.x + frame.t * local.y + frame.n * local.z;
+    turned(normal, surface.dpdu, surface).unwrap_or(frame)
+}
+
 /// Each lane within [0, 1]; 0 for what is not a number.
-fn albedo(colour: Spectrum) -> Spectrum {
+pub(crate) fn albedo(colour: Spectrum) -> Spectrum {
     colour.map(crate::unit)
 }
 

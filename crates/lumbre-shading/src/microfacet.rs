@@ -32,6 +32,9 @@ impl Microfacets {
     /// A mirror.
     pub const SMOOTH: Self = Self { alpha: Vec2::ZERO };
 
+    /// As rough as it gets: α = 1.
+    pub const ROUGH: Self = Self { alpha: Vec2::ONE };
+
     /// Whether the surface is as good as smooth. The other methods are meant for those that are not.
     pub fn is_smooth(&self) -> bool {
         self.alpha == Vec2::ZERO

@@ -14,6 +14,9 @@ use lumbre_shading::conductor::Conductor;
 use lumbre_shading::dielectric::{Dielectric, ThinDielectric};
 use lumbre_shading::diffuse::{Diffuse, DiffuseTransmission};
 use lumbre_shading::microfacet::Microfacets;
+use lumbre_shading::principled::{Body, Clearcoat, Principled};
+use lumbre_shading::sheen::Sheen;
+use lumbre_shading::thin_film::ThinFilm;
 use lumbre_shading::{Bsdf, LocalDir, Scatter, ShadingFrame, Spectrum, fresnel};
 
 const GLASS: f32 = 1.5;
@@ -70,6 +73,83 @@ fn coated_metal(alpha: (f32, f32), metal: (f32, f32), albedo: f32) -> CoatedCond
     CoatedConductor { base, coat: coat(alpha, albedo, 1) }
 }
 
+/// Surfaces that show every parameter of the principled material, alone and together.
+fn principled() -> Vec<(&'static str, Principled)> {
+    let rough = |x, y| Microfacets::new(x, y);
+    let plastic =
+        Principled { base: Spectrum::new(0.8, 0.5, 0.1), facets: rough(0.2, 0.2), ..Principled::DEFAULT };
+    let metal = Principled { metallic: 1.0, base: Spectrum::new(1.0, 0.7, 0.3), ..plastic };
+    let pane = Principled { transmission: 1.0, transmission_color: Spectrum::new(1.0, 0.9, 0.8), ..plastic };
+    let solid = Principled { body: Body::Solid { spread: 0.0 }, ..pane };
+    let film = ThinFilm { weight: 0.8, eta: 1.4, thickness: 380.0 };
+    let sheen = Sheen::new(Spectrum::new(0.9, 0.3, 0.6), 0.4);
+    let coat = Clearcoat { weight: 0.7, alpha: 0.15, normal: Vec3::Z };
+    let leaf = Principled {
+        diffuse_transmission: 0.6,
+        diffuse_transmission_color: Spectrum::new(0.4, 1.0, 0.2),
+        ..plastic
+    };
+    let everything = Principled {
+        metallic: 0.3,
+        transmission: 0.5,
+        facets: rough(0.4, 0.2),
+        tangent: Vec2::new(0.6, 0.8),
+        f0: Spectrum::new(0.03, 0.02, 0.04),
+        f90: 0.9,
+        film: ThinFilm { weight: 0.5, ..film },
+        sheen,
+        coat,
+        ..leaf
+    };
+    vec![
+        ("plastic", plastic),
+        ("polished plastic", Principled { facets: Microfacets::SMOOTH, ..plastic }),
+        (
+            "chalk",
+            Principled { facets: Microfacets::ROUGH, eta: 1.8, f0: Spectrum::splat(0.0816), ..plastic },
+        ),
+        ("half a reflection", Principled { f0: Spectrum::new(0.01, 0.02, 0.0), f90: 0.5, ..plastic }),
+        ("specular colour", Principled { f0: Spectrum::new(0.9, 0.1, 0.2), ..plastic }),
+        ("metal", metal),
+        ("brushed metal", Principled { facets: rough(0.6, 0.1), tangent: Vec2::new(0.8, -0.6), ..metal }),
+        ("rough metal", Principled { facets: Microfacets::ROUGH, ..metal }),
+        ("mirror", Principled { facets: Microfacets::SMOOTH, ..metal }),
+        ("half metal", Principled { metallic: 0.5, ..metal }),
+        ("pane", pane),
+        ("clear pane", Principled { facets: Microfacets::SMOOTH, ..pane }),
+        ("solid", solid),
+        ("rough solid", Principled { facets: Microfacets::ROUGH, ..solid }),
+        ("light solid", Principled { eta: 0.8, f0: Spectrum::splat(0.012_345_68), ..solid }),
+        ("clear solid", Principled { facets: Microfacets::SMOOTH, ..solid }),
+        ("prism", Principled { body: Body::Solid { spread: 0.05 }, ..solid }),
+        (
+            "clear prism",
+            Principled { body: Body::Solid { spread: 0.05 }, facets: Microfacets::SMOOTH, ..solid },
+        ),
+        ("air", Principled { eta: 1.0, f0: Spectrum::BLACK, ..solid }),
+        ("half glass", Principled { transmission: 0.5, ..solid }),
+        ("leaf", leaf),
+        ("thick leaf", Principled { transmission: 0.5, body: Body::Solid { spread: 0.0 }, ..leaf }),
+        ("soap film", Principled { film, ..pane }),
+        ("filmed solid", Principled { film, ..solid }),
+        ("filmed plastic", Principled { film, ..plastic }),
+        ("filmed metal", Principled { film, ..metal }),
+        ("cloth", Principled { sheen, facets: Microfacets::ROUGH, ..plastic }),
+        ("satin", Principled { sheen: Sheen::new(Spectrum::WHITE, 0.1), ..plastic }),
+        ("coated plastic", Principled { coat, ..plastic }),
+        ("polished coat", Principled { coat: Clearcoat { alpha: 0.0, ..coat }, ..metal }),
+        ("coated solid", Principled { coat, ..solid }),
+        ("everything", everything),
+        ("everything solid", Principled { body: Body::Solid { spread: 0.03 }, ..everything }),
+    ]
+}
+
+/// A coat that leans.
+fn leaning() -> Principled {
+    let coat = Clearcoat { weight: 0.7, alpha: 0.15, normal: Vec3::new(0.3, -0.2, 0.9).normalize() };
+    Principled { coat, facets: Microfacets::new(0.3, 0.3), ..Principled::DEFAULT }
+}
+
 /// A BSDF under its name.
 fn all() -> Vec<(String, Bsdf)> {
     let mut list = vec![
@@ -106,6 +186,9 @@ fn all() -> Vec<(String, Bsdf)> {
                 list.push((format!("coatedconductor {alpha:?} {metal:?} {albedo}"), bsdf));
             }
         }
+    }
+    for (name, bsdf) in principled().into_iter().chain([("leaning coat", leaning())]) {
+        list.push((format!("principled {name}"), Bsdf::Principled(bsdf)));
     }
     list
 }
@@ -351,10 +434,14 @@ fn light_goes_back_the_way_it_came() {
     let mut random = RandomStream::new(17);
     let mut count = 0;
     for (name, bsdf) in all() {
-        if with_walks(bsdf, 1).is_some() {
-            continue;
-        }
-        let eta = if let Bsdf::Dielectric(glass) = bsdf { glass.eta } else { 1.0 };
+        let eta = match bsdf {
+            Bsdf::CoatedDiffuse(_) | Bsdf::CoatedConductor(_) => continue,
+            // A coat with a normal of its own counts cosines about that.
+            Bsdf::Principled(bsdf) if bsdf == leaning() => continue,
+            Bsdf::Dielectric(glass) => glass.eta,
+            Bsdf::Principled(bsdf) if bsdf.transmission > 0.0 && bsdf.body != Body::Thin => bsdf.eta,
+            _ => 1.0,
+        };
         for _ in 0..3_000 {
             let (a, b) = (random_direction(&mut random), random_direction(&mut random));
             if a.abs_cos_theta() < 0.05 || b.abs_cos_theta() < 0.05 {
@@ -488,6 +575,150 @@ fn rough_glass_and_metal_lose_only_what_bounces_twice() {
             assert!((least..1.001).contains(&share), "{bsdf:?}: {share}");
         }
     }
+}
+
+/// The roughnesses to try energy at.
+const ROUGHNESSES: [f32; 7] = [0.0, 0.1, 0.25, 0.4, 0.6, 0.8, 1.0];
+
+#[test]
+fn white_metal_gives_everything_back_at_any_roughness() {
+    let mut count = 0;
+    for roughness in ROUGHNESSES {
+        let facets = Microfacets::new(roughness * roughness, roughness * roughness);
+        let metal = Principled { metallic: 1.0, facets, ..Principled::DEFAULT };
+        for (v, wo) in views().into_iter().enumerate() {
+            let share = furnace(&Bsdf::Principled(metal), wo, 100_000, v as u64);
+            assert!((0.997..1.002).contains(&share), "{roughness} from {:?}: {share}", wo.vec());
+            count += 1;
+        }
+    }
+    assert_eq!(count, 49);
+}
+
+#[test]
+fn white_dielectrics_give_everything_back_at_any_roughness() {
+    let mut count = 0;
+    for roughness in ROUGHNESSES {
+        let alpha = roughness * roughness;
+        for eta in [1.1, 1.5, 2.4] {
+            let f0 = Spectrum::splat(fresnel::dielectric(1.0, eta));
+            let opaque =
+                Principled { facets: Microfacets::new(alpha, alpha), eta, f0, ..Principled::DEFAULT };
+            let leaf = Principled { diffuse_transmission: 0.4, ..opaque };
+            let pane = Principled { transmission: 1.0, ..opaque };
+            let solid = Principled { body: Body::Solid { spread: 0.0 }, ..pane };
+            for (name, bsdf) in [("opaque", opaque), ("leaf", leaf), ("pane", pane), ("solid", solid)] {
+                for (v, wo) in views().into_iter().enumerate() {
+                    let share = furnace(&Bsdf::Principled(bsdf), wo, 100_000, v as u64);
+                    assert!(
+                        (0.995..1.002).contains(&share),
+                        "{name} {roughness} {eta} from {:?}: {share}",
+                        wo.vec()
+                    );
+                    count += 1;
+                }
+            }
+        }
+    }
+    assert_eq!(count, 7 * 3 * 4 * 7);
+}
+
+#[test]
+fn white_layers_make_no_light_and_lose_little() {
+    let mut count = 0;
+    for roughness in ROUGHNESSES {
+        let alpha = roughness * roughness;
+        for metallic in [0.0, 1.0] {
+            let base = Principled { metallic, facets: Microfacets::new(0.09, 0.09), ..Principled::DEFAULT };
+            let coat = Principled { coat: Clearcoat { weight: 1.0, alpha, ..Clearcoat::NONE }, ..base };
+            let cloth = Principled { sheen: Sheen::new(Spectrum::WHITE, roughness), ..base };
+            for (name, bsdf) in [("coat", coat), ("cloth", cloth)] {
+                for (v, wo) in views().into_iter().enumerate() {
+                    let share = furnace(&Bsdf::Principled(bsdf), wo, 100_000, v as u64);
+                    let least = if name == "coat" { 0.8 } else { 0.6 };
+                    assert!(
+                        (least..1.002).contains(&share),
+                        "{name} {roughness} {metallic} from {:?}: {share}",
+                        wo.vec()
+                    );
+                    count += 1;
+                }
+            }
+        }
+    }
+    assert_eq!(count, 7 * 2 * 2 * 7);
+}
+
+#[test]
+fn white_brushed_metal_makes_no_light() {
+    for (x, y) in [(0.3, 0.1), (0.6, 0.1), (1.0, 0.04), (1.0, 0.3)] {
+        let metal = Principled { metallic: 1.0, facets: Microfacets::new(x, y), ..Principled::DEFAULT };
+        for (v, wo) in views().into_iter().enumerate() {
+            let share = furnace(&Bsdf::Principled(metal), wo, 100_000, v as u64);
+            assert!((0.8..1.002).contains(&share), "{x} {y} from {:?}: {share}", wo.vec());
+        }
+    }
+}
+
+#[test]
+fn plain_principled_glass_and_panes_are_the_plain_kinds() {
+    let solid = Principled {
+        facets: Microfacets::SMOOTH,
+        transmission: 1.0,
+        body: Body::Solid { spread: 0.0 },
+        ..Principled::DEFAULT
+    };
+    let pane = Principled { body: Body::Thin, ..solid };
+    let pairs = [
+        (Bsdf::Principled(solid), glass(GLASS, (0.0, 0.0))),
+        (Bsdf::Principled(pane), Bsdf::ThinDielectric(ThinDielectric { eta: GLASS })),
+    ];
+    let (mut random, mut count) = (RandomStream::new(8), 0);
+    for (ours, plain) in pairs {
+        assert!(ours.is_delta());
+        for wo in views() {
+            for _ in 0..200 {
+                let (lobe, u) = numbers(&mut random);
+                let (Some(a), Some(b)) = (ours.sample(wo, lobe, u), plain.sample(wo, lobe, u)) else {
+                    unreachable!()
+                };
+                // Next to the border between the two ways rounding may choose.
+                if a.transmitted != b.transmitted {
+                    continue;
+                }
+                assert!((a.wi.vec() - b.wi.vec()).length() < 1e-5);
+                assert!((a.weight - b.weight).map(f32::abs).max_component() < 1e-4, "{a:?} {b:?}");
+                assert_eq!((a.scatter, a.eta), (b.scatter, b.eta));
+                count += 1;
+            }
+        }
+    }
+    assert!(count > 2_750, "{count}");
+}
+
+#[test]
+fn a_prism_bends_blue_more_than_red() {
+    let prism = Bsdf::Principled(Principled {
+        facets: Microfacets::SMOOTH,
+        transmission: 1.0,
+        body: Body::Solid { spread: 0.1 },
+        ..Principled::DEFAULT
+    });
+    let wo = local(Vec3::new(0.6, 0.0, 0.8));
+    let (mut random, mut seen) = (RandomStream::new(9), [0; 3]);
+    for _ in 0..3_000 {
+        let (lobe, u) = numbers(&mut random);
+        let Some(sample) = prism.sample(wo, lobe, u) else { continue };
+        if !sample.transmitted {
+            continue;
+        }
+        let lane = sample.weight.to_array().iter().position(|&w| w > 0.0).unwrap();
+        assert!(sample.weight.to_array().iter().filter(|&&w| w > 0.0).count() == 1);
+        let eta = [1.4, 1.5, 1.6][lane];
+        assert!((sample.wi.vec().x + 0.6 / eta).abs() < 1e-5, "{lane} {sample:?}");
+        seen[lane] += 1;
+    }
+    assert!(seen.iter().all(|&n| n > 850), "{seen:?}");
 }
 
 #[test]
@@ -686,7 +917,7 @@ fn a_slightly_rough_coated_metal_reflects_as_much_as_a_smooth_one() {
 
 #[test]
 fn a_bsdf_stays_small() {
-    assert!(size_of::<Bsdf>() <= 96, "{}", size_of::<Bsdf>());
+    assert!(size_of::<Bsdf>() <= 176, "{}", size_of::<Bsdf>());
 }
 
 #[test]

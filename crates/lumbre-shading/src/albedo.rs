@@ -1,0 +1,257 @@
+//! Tables of how much rough surfaces reflect of the light from one direction, and in the mean over all.
+
+use std::sync::LazyLock;
+
+/// Nodes of the cosine, at the squares of equal steps from 0 to 1: there is most to resolve at grazing angles.
+const COSINES: usize = 24;
+/// Nodes of the square root of α, in equal steps from 0 to 1.
+const ROUGHNESSES: usize = 24;
+/// Nodes of (η − 1)/(η + 1), in equal steps from 0 to [`MAX_ROOT`].
+const INDICES: usize = 16;
+/// (η − 1)/(η + 1) at the largest index of refraction in the tables, [`MAX_ETA`].
+const MAX_ROOT: f32 = 0.6;
+/// The largest index of refraction in the tables; larger ones count as this.
+pub(crate) const MAX_ETA: f32 = 4.0;
+/// Values are stored as whole numbers up to 65535; sheen reflects up to so much before it is held to 1.
+const MOST_SHEEN: f32 = 8.0;
+
+const PAGE: usize = COSINES * ROUGHNESSES;
+const MIRROR: usize = 0;
+const SHEEN: usize = 1;
+const FACES: usize = 2;
+const OUTSIDE: usize = FACES + INDICES;
+const INSIDE: usize = OUTSIDE + INDICES;
+const PAGES: usize = INSIDE + INDICES;
+
+/// All tables; `albedo.bin` is made by the ignored test of this file, which says how each value is defined.
+pub(crate) static ALBEDO: LazyLock<Albedo> =
+    LazyLock::new(|| Albedo::from_bytes(include_bytes!("albedo.bin")));
+
+/// Directional albedos, linear between nodes, and their means by the cosine law.
+pub(crate) struct Albedo {
+    values: Vec<f32>,
+    /// For each row of cosines.
+    means: Vec<f32>,
+}
+
+/// A place between two nodes.
+#[derive(Clone, Copy)]
+struct Between(usize, f32);
+
+impl Between {
+    /// The place of `x` in [0, 1] between `nodes` in equal steps.
+    fn new(x: f32, nodes: usize) -> Self {
+        let place = crate::unit(x) * (nodes - 1) as f32;
+        let first = (place as usize).min(nodes - 2);
+        Self(first, place - first as f32)
+    }
+
+    fn interpolate(self, mut f: impl FnMut(usize) -> f32) -> f32 {
+        let Self(first, t) = self;
+        f(first) * (1.0 - t) + f(first + 1) * t
+    }
+}
+
+fn by_cosine(cos: f32) -> Between {
+    Between::new(crate::unit(cos).sqrt(), COSINES)
+}
+
+fn by_alpha(alpha: f32) -> Between {
+    Between::new(crate::unit(alpha).sqrt(), ROUGHNESSES)
+}
+
+fn by_index(eta: f32) -> Between {
+    Between::new((eta - 1.0) / (eta + 1.0) / MAX_ROOT, INDICES)
+}
+
+impl Albedo {
+    fn from_bytes(bytes: &[u8]) -> Self {
+        assert_eq!(bytes.len(), 2 * PAGES * PAGE);
+        let pairs =
+            bytes.chunks_exact(2).map(|pair| f32::from(u16::from_le_bytes([pair[0], pair[1]])) / 65535.0);
+        let scale = |i: usize| if i / PAGE == SHEEN { MOST_SHEEN } else { 1.0 };
+        let values: Vec<f32> = pairs.enumerate().map(|(i, v)| v * scale(i)).collect();
+        let weights = mean_weights();
+        let mean = |row: &[f32]| row.iter().zip(weights).map(|(v, w)| v * w).sum();
+        let means = values.chunks_exact(COSINES).map(mean).collect();
+        Self { values, means }
+    }
+
+    fn at(&self, page: usize, alpha: Between, cos: Between) -> f32 {
+        alpha.interpolate(|a| {
+            let row = (page * ROUGHNESSES + a) * COSINES;
+            cos.interpolate(|c| self.values[row + c])
+        })
+    }
+
+    fn mean_at(&self, page: usize, alpha: Between) -> f32 {
+        alpha.interpolate(|a| self.means[page * ROUGHNESSES + a])
+    }
+
+    /// What facets that reflect everything reflect at the first bounce.
+    pub fn mirror(&self, cos: f32, alpha: f32) -> f32 {
+        self.at(MIRROR, by_alpha(alpha), by_cosine(cos))
+    }
+
+    /// The mean of [`Albedo::mirror`].
+    pub fn mirror_mean(&self, alpha: f32) -> f32 {
+        self.mean_at(MIRROR, by_alpha(alpha))
+    }
+
+    /// What the face of a dielectric of index 1 to [`MAX_ETA`] reflects, seen from outside.
+    pub fn face(&self, cos: f32, alpha: f32, eta: f32) -> f32 {
+        let (alpha, cos) = (by_alpha(alpha), by_cosine(cos));
+        by_index(eta).interpolate(|e| self.at(FACES + e, alpha, cos))
+    }
+
+    /// The mean of [`Albedo::face`].
+    pub fn face_mean(&self, alpha: f32, eta: f32) -> f32 {
+        let alpha = by_alpha(alpha);
+        by_index(eta).interpolate(|e| self.mean_at(FACES + e, alpha))
+    }
+
+    /// The page of a border of glass, seen from one side: from the denser side it is the inside.
+    fn glass_pages(eta: f32, inside: bool) -> (usize, f32) {
+        let denser = eta >= 1.0;
+        (if denser == inside { INSIDE } else { OUTSIDE }, if denser { eta } else { 1.0 / eta })
+    }
+
+    /// The power that a border between dielectrics of index `eta` (inside over outside) reflects and lets through.
+    pub fn glass(&self, cos: f32, alpha: f32, eta: f32, inside: bool) -> f32 {
+        let (alpha, cos) = (by_alpha(alpha), by_cosine(cos));
+        let (page, eta) = Self::glass_pages(eta, inside);
+        by_index(eta).interpolate(|e| self.at(page + e, alpha, cos))
+    }
+
+    /// The mean of [`Albedo::glass`].
+    pub fn glass_mean(&self, alpha: f32, eta: f32, inside: bool) -> f32 {
+        let alpha = by_alpha(alpha);
+        let (page, eta) = Self::glass_pages(eta, inside);
+        by_index(eta).interpolate(|e| self.mean_at(page + e, alpha))
+    }
+
+    /// What white fibres reflect, by their roughness (α is its square); may be more than 1.
+    pub fn sheen(&self, cos: f32, roughness: f32) -> f32 {
+        self.at(SHEEN, by_alpha(roughness * roughness), by_cosine(cos))
+    }
+}
+
+/// ∫ 2 μ f(μ) dμ of what is linear between the nodes in t = √μ: ∫ 4 t³ hat(t) dt for each node.
+fn mean_weights() -> [f32; COSINES] {
+    let steps = (COSINES - 1) as f64;
+    // The second integral of 4 t³, whose second differences are the weights; its first integral closes the ends.
+    let twice = |i: usize| (i as f64 / steps).powi(5) / 5.0;
+    let once = |i: usize| (i as f64 / steps).powi(4);
+    std::array::from_fn(|i| {
+        let rising = if i > 0 { once(i) - steps * (twice(i) - twice(i - 1)) } else { 0.0 };
+        let falling = if i + 1 < COSINES { steps * (twice(i + 1) - twice(i)) - once(i) } else { 0.0 };
+        (rising + falling) as f32
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::conductor::Conductor;
+    use crate::dielectric::{Dielectric, Ways};
+    use crate::microfacet::Microfacets;
+    use crate::{LocalDir, Spectrum, sheen};
+    use lumbre_math::random::RandomStream;
+    use lumbre_math::{Vec2, Vec3};
+
+    fn direction(cos: f32) -> LocalDir {
+        LocalDir(Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos))
+    }
+
+    /// The value of a node: means over a grid of random numbers of the weights that the lobes themselves give.
+    fn node(page: usize, roughness: usize, cosine: usize, grid: u32) -> f32 {
+        // In the surface itself there are no directions; nothing is as smooth as nothing.
+        let cos = (cosine as f32 / (COSINES - 1) as f32).powi(2).max(1e-4);
+        let root = roughness as f32 / (ROUGHNESSES - 1) as f32;
+        let facets = Microfacets::new(root * root, root * root);
+        let wo = direction(cos);
+        let mean = |f: &dyn Fn(Vec2) -> f32| {
+            let cell = |i: u32| (i as f32 + 0.5) / grid as f32;
+            let sum: f64 =
+                (0..grid * grid).map(|i| f64::from(f(Vec2::new(cell(i / grid), cell(i % grid))))).sum();
+            (sum / f64::from(grid * grid)) as f32
+        };
+        if page == MIRROR {
+            let mirror = Conductor::from_reflectance(Spectrum::WHITE, facets);
+            return mean(&|u| mirror.sample(wo, u).map_or(0.0, |sample| sample.weight.g));
+        }
+        if page == SHEEN {
+            let roughness = root.max(sheen::Sheen::MIN_ROUGHNESS);
+            // The cosine of wi is the cube of x, φ by y: the lobe crowds at the horizon.
+            let value = mean(&|u| {
+                let z = u.x.powi(3);
+                let (sin, cos) = (std::f32::consts::TAU * u.y).sin_cos();
+                let r = (1.0 - z * z).max(0.0).sqrt();
+                let wi = LocalDir(Vec3::new(r * cos, r * sin, z));
+                sheen::unbounded(roughness, wo, wi) * std::f32::consts::TAU * 3.0 * u.x * u.x
+            });
+            return value / MOST_SHEEN;
+        }
+        let index = (page - FACES) % INDICES;
+        let x = index as f32 / (INDICES - 1) as f32 * MAX_ROOT;
+        // No border at all would be a delta: next to it.
+        let eta = ((1.0 + x) / (1.0 - x)).max(1.001);
+        let glass = Dielectric { eta, facets };
+        let wo = if page >= INSIDE { -wo } else { wo };
+        mean(&|u| {
+            let way = |ways| glass.sample_of(wo, 0.0, u, ways).map_or(0.0, |s| s.weight.g * s.eta * s.eta);
+            way(Ways::Reflection) + if page >= OUTSIDE { way(Ways::Transmission) } else { 0.0 }
+        })
+    }
+
+    /// Writes the tables: `cargo test --release -p lumbre-shading --lib albedo -- --ignored`
+    #[test]
+    #[ignore = "makes src/albedo.bin anew"]
+    fn make_the_tables() {
+        let mut bytes = Vec::with_capacity(2 * PAGES * PAGE);
+        for page in 0..PAGES {
+            let grid = if page == SHEEN { 512 } else { 64 };
+            for i in 0..PAGE {
+                let value = node(page, i / COSINES, i % COSINES, grid);
+                assert!((-1e-3..1.001).contains(&value), "{page} {i} {value}");
+                bytes.extend(((value.clamp(0.0, 1.0) * 65535.0).round() as u16).to_le_bytes());
+            }
+        }
+        std::fs::write(concat!(env!("CARGO_MANIFEST_DIR"), "/src/albedo.bin"), bytes).unwrap();
+    }
+
+    #[test]
+    fn the_tables_are_what_the_lobes_reflect() {
+        let mut random = RandomStream::new(3);
+        let mut count = 0;
+        for page in 0..PAGES {
+            for _ in 0..6 {
+                let (r, c) = ((random.next_f32() * 24.0) as usize, 2 + (random.next_f32() * 22.0) as usize);
+                let grid = if page == SHEEN { 300 } else { 90 };
+                let expected = node(page, r, c, grid) * if page == SHEEN { MOST_SHEEN } else { 1.0 };
+                let ours = ALBEDO.values[(page * ROUGHNESSES + r) * COSINES + c];
+                assert!(
+                    (ours - expected).abs() < 2e-3 * expected.max(1.0),
+                    "{page} {r} {c}: {ours} {expected}"
+                );
+                count += 1;
+            }
+        }
+        assert_eq!(count, 6 * PAGES);
+    }
+
+    #[test]
+    fn means_are_those_of_the_cosine_law() {
+        assert!((mean_weights().iter().sum::<f32>() - 1.0).abs() < 1e-6);
+        let steps = 20_000;
+        for alpha in [0.0, 0.03, 0.4, 1.0] {
+            let sum: f32 = (0..steps)
+                .map(|i| {
+                    let mu = (i as f32 + 0.5) / steps as f32;
+                    2.0 * mu * ALBEDO.face(mu, alpha, 1.7) / steps as f32
+                })
+                .sum();
+            assert!((sum - ALBEDO.face_mean(alpha, 1.7)).abs() < 1e-4, "{alpha}: {sum}");
+        }
+    }
+}

@@ -1,0 +1,277 @@
+//! The parameters of the principled material, as functions of place.
+
+use std::sync::Arc;
+
+use lumbre_math::Vec2;
+
+use crate::material::albedo;
+use crate::microfacet::Microfacets;
+use crate::principled::{Body, Clearcoat, Principled};
+use crate::sheen::Sheen;
+use crate::thin_film::{ThinFilm, index_of};
+use crate::{FloatTexture, ImageTexture, Spectrum, SpectrumTexture, Texture, TextureContext, fresnel};
+
+/// Whose meaning parameters have where the two families differ.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Convention {
+    /// glTF 2.0: anisotropy widens α along the tangent from roughness² up to 1; what is transmitted is multiplied by the
+    /// base colour each time that it crosses the surface.
+    Gltf,
+    /// Burley, "Physically Based Shading at Disney", SIGGRAPH course 2012, and its extension of 2015, as in Mitsuba 3's
+    /// `principled`: anisotropy a makes α = roughness² / s and roughness² · s with s = √(1 − 0.9 a); what is transmitted
+    /// by a solid is multiplied by the root of the base colour, so that the whole colour is seen through both sides.
+    Burley,
+}
+
+/// The inside of a solid body (KHR_materials_volume).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VolumeParams {
+    /// What is left of white light after [`VolumeParams::attenuation_distance`], in [0, 1]. Default white.
+    pub attenuation_color: Spectrum,
+    /// In units of the world, > 0. Default infinite: nothing is lost.
+    pub attenuation_distance: f32,
+}
+
+impl Default for VolumeParams {
+    fn default() -> Self {
+        Self { attenuation_color: Spectrum::WHITE, attenuation_distance: f32::INFINITY }
+    }
+}
+
+/// Parameters of [`Principled`] as functions of place. Names, ranges and defaults are those of the core of glTF 2.0 and of
+/// its extensions (Khronos, 2021 to 2024), given in brackets; values outside a range are held within it. Make one by
+/// `PrincipledParams { …, ..PrincipledParams::default() }`.
+#[derive(Clone, Debug)]
+pub struct PrincipledParams {
+    /// Whose meaning. Default glTF's.
+    pub convention: Convention,
+    /// Colour of the metal, and of the inside of the dielectric. In [0, 1]; default white.
+    pub base_color: Arc<SpectrumTexture>,
+    /// From 0, a dielectric, to 1, a metal. Default 1, as in glTF.
+    pub metallic: Arc<FloatTexture>,
+    /// In [0, 1]; α of the facets is its square. Default 1.
+    pub roughness: Arc<FloatTexture>,
+    /// How much longer than wide reflections are, in [0, 1] (KHR_materials_anisotropy). Default 0.
+    pub anisotropy: Arc<FloatTexture>,
+    /// Turns the direction of that stretch from the tangent towards the bitangent, in radians. Default 0.
+    pub anisotropy_rotation: f32,
+    /// glTF's anisotropy texture: red and green are the direction of the stretch from [-1, 1] mapped to [0, 1], turned by
+    /// the rotation, and blue is a factor on the strength. Default none.
+    pub anisotropy_texture: Option<Arc<SpectrumTexture>>,
+    /// Index of refraction of the dielectric (KHR_materials_ior). Positive; default 1.5. 0 says that normal incidence
+    /// reflects the specular colour itself, whatever the index.
+    pub ior: f32,
+    /// A factor on all that the dielectric's surface reflects, in [0, 1] (KHR_materials_specular). Default 1.
+    pub specular: Arc<FloatTexture>,
+    /// A factor on what it reflects at normal incidence, ≥ 0; the product stays within 1. Default white.
+    pub specular_color: Arc<SpectrumTexture>,
+    /// How much of the base colour's hue that factor takes, in [0, 1] (Burley's). Default 0.
+    pub specular_tint: Arc<FloatTexture>,
+    /// The share of the dielectric that is clear, in [0, 1] (KHR_materials_transmission). Default 0.
+    pub transmission: Arc<FloatTexture>,
+    /// 20 over the Abbe number of the clear solid (KHR_materials_dispersion), ≥ 0. Default 0: no dispersion.
+    pub dispersion: f32,
+    /// What lies behind the clear surface (KHR_materials_volume); `None`, the default, is a pane without thickness, as
+    /// glTF's `thicknessFactor` of 0.
+    pub volume: Option<VolumeParams>,
+    /// The share of the dielectric's inner light that leaves on the other side, in [0, 1]
+    /// (KHR_materials_diffuse_transmission). Default 0.
+    pub diffuse_transmission: Arc<FloatTexture>,
+    /// A factor on that light, in [0, 1]. Default white.
+    pub diffuse_transmission_color: Arc<SpectrumTexture>,
+    /// How much of the surface a clear coat of index 1.5 covers, in [0, 1] (KHR_materials_clearcoat). Default 0.
+    pub clearcoat: Arc<FloatTexture>,
+    /// Its roughness, in [0, 1]; α is the square. Default 0.
+    pub clearcoat_roughness: Arc<FloatTexture>,
+    /// Its normals in tangent space; without, it lies on the surface as it is below the bumps of the base. Default none.
+    pub clearcoat_normal: Option<ImageTexture>,
+    /// Strength and colour of fibres on the base, in [0, 1] (KHR_materials_sheen). Default black: none.
+    pub sheen_color: Arc<SpectrumTexture>,
+    /// How much of the base colour's hue that takes, in [0, 1] (Burley's). Default 0.
+    pub sheen_tint: Arc<FloatTexture>,
+    /// Roughness of the fibres, in [0, 1], held at [`Sheen::MIN_ROUGHNESS`] or more. Default 0.
+    pub sheen_roughness: Arc<FloatTexture>,
+    /// How much of the base a thin film covers, in [0, 1] (KHR_materials_iridescence). Default 0.
+    pub iridescence: Arc<FloatTexture>,
+    /// Index of refraction of the film, ≥ 1. Default 1.3.
+    pub iridescence_ior: f32,
+    /// Thickness of the film in nanometres, ≥ 0. Default 400. (glTF's texture goes between a minimum at 0 and a maximum
+    /// at 1: a [`Texture::Mix`] of the two.)
+    pub iridescence_thickness: Arc<FloatTexture>,
+}
+
+impl Default for PrincipledParams {
+    fn default() -> Self {
+        let (zero, one) = (number(0.0), number(1.0));
+        let white = Arc::new(SpectrumTexture::Constant(Spectrum::WHITE));
+        Self {
+            convention: Convention::Gltf,
+            base_color: white.clone(),
+            metallic: one.clone(),
+            roughness: one.clone(),
+            anisotropy: zero.clone(),
+            anisotropy_rotation: 0.0,
+            anisotropy_texture: None,
+            ior: 1.5,
+            specular: one,
+            specular_color: white.clone(),
+            specular_tint: zero.clone(),
+            transmission: zero.clone(),
+            dispersion: 0.0,
+            volume: None,
+            diffuse_transmission: zero.clone(),
+            diffuse_transmission_color: white,
+            clearcoat: zero.clone(),
+            clearcoat_roughness: zero.clone(),
+            clearcoat_normal: None,
+            sheen_color: Arc::new(SpectrumTexture::Constant(Spectrum::BLACK)),
+            sheen_tint: zero.clone(),
+            sheen_roughness: zero.clone(),
+            iridescence: zero,
+            iridescence_ior: 1.3,
+            iridescence_thickness: number(400.0),
+        }
+    }
+}
+
+impl PrincipledParams {
+    /// From the older way of glTF to say a surface (KHR_materials_pbrSpecularGlossiness): a dielectric with this diffuse
+    /// colour inside, that reflects `specular` at normal incidence and is as rough as 1 − `glossiness`. No guess at a
+    /// metal is needed: a surface that reflects much has little inside.
+    pub fn from_specular_glossiness(
+        diffuse: Arc<SpectrumTexture>,
+        specular: Arc<SpectrumTexture>,
+        glossiness: Arc<FloatTexture>,
+    ) -> Self {
+        let ends = [number(1.0), number(0.0)];
+        Self {
+            base_color: diffuse,
+            metallic: number(0.0),
+            roughness: Arc::new(Texture::Mix { textures: ends, amount: glossiness }),
+            ior: 0.0,
+            specular_color: specular,
+            ..Self::default()
+        }
+    }
+
+    /// The index of refraction whose reflectance at normal incidence is 0.08 times Burley's `specular` in [0, 1].
+    pub fn ior_from_specular(specular: f32) -> f32 {
+        index_of(0.08 * crate::unit(specular))
+    }
+
+    /// The roughness of a coat whose α is that of Burley's `clearcoat_gloss` in [0, 1]: from 0.1 down to 0.001.
+    pub fn roughness_from_gloss(gloss: f32) -> f32 {
+        let gloss = crate::unit(gloss);
+        (0.1 * (1.0 - gloss) + 0.001 * gloss).sqrt()
+    }
+
+    /// σ of Beer's and Lambert's law inside, per unit of length; see [`crate::Material::interior_attenuation`]. A lane
+    /// of which nothing is left counts as a millionth.
+    pub fn interior_attenuation(&self) -> Option<Spectrum> {
+        let volume = self.volume?;
+        let opens = |texture: &FloatTexture| !matches!(texture, Texture::Constant(v) if *v <= 0.0);
+        if !(opens(&self.transmission) || opens(&self.diffuse_transmission)) {
+            return None;
+        }
+        let distance = volume.attenuation_distance.max(f32::MIN_POSITIVE);
+        let sigma = volume.attenuation_color.map(|left| -crate::unit(left).max(1e-6).ln() / distance);
+        (sigma.is_finite() && !sigma.is_black()).then_some(sigma)
+    }
+
+    /// The surface at a place. Its coat follows the shading normal until [`crate::Material::shading`] turns it.
+    pub fn bsdf(&self, at: &TextureContext) -> Principled {
+        let share = |texture: &FloatTexture| crate::unit(texture.evaluate(at));
+        let base = albedo(self.base_color.evaluate(at));
+        let (metallic, transmission) = (share(&self.metallic), share(&self.transmission));
+        let (facets, tangent) = self.facets(at);
+        let f90 = share(&self.specular);
+        let tint = hue(base, share(&self.specular_tint));
+        let specular_color = self.specular_color.evaluate(at).map(|c| c.max(0.0)) * tint;
+        let (eta, bare) = if self.ior > 0.0 && self.ior.is_finite() {
+            (self.ior, fresnel::dielectric(1.0, self.ior))
+        } else if transmission > 0.0 {
+            (1.5, 1.0)
+        } else {
+            (index_of(crate::unit(specular_color.max_component())), 1.0)
+        };
+        let weight = share(&self.clearcoat);
+        let roughness = if weight > 0.0 { share(&self.clearcoat_roughness) } else { 0.0 };
+        let sheen = self.sheen_color.evaluate(at);
+        let sheen = if sheen.is_black() {
+            Sheen::NONE
+        } else {
+            Sheen::new(sheen * hue(base, share(&self.sheen_tint)), self.sheen_roughness.evaluate(at))
+        };
+        let film = share(&self.iridescence);
+        let film = if film == 0.0 {
+            ThinFilm::NONE
+        } else {
+            let thickness = self.iridescence_thickness.evaluate(at).max(0.0);
+            let eta = self.iridescence_ior.max(1.0).min(10.0);
+            ThinFilm { weight: film, eta, thickness: thickness.min(1e6) }
+        };
+        // 20 over the Abbe number V, and V = (η − 1) / (η of blue − η of red): half of that difference.
+        let spread = 0.5 * (eta - 1.0).max(0.0) * self.dispersion.max(0.0) / 20.0;
+        let body = match self.volume {
+            None => Body::Thin,
+            Some(_) => Body::Solid { spread: if spread < 1e-4 { 0.0 } else { spread } },
+        };
+        let rooted = self.convention == Convention::Burley && self.volume.is_some();
+        Principled {
+            base,
+            metallic,
+            facets,
+            tangent,
+            eta,
+            f0: (specular_color * bare).map(crate::unit) * f90,
+            f90,
+            transmission,
+            transmission_color: if rooted { base.map(f32::sqrt) } else { base },
+            body,
+            diffuse_transmission: share(&self.diffuse_transmission),
+            diffuse_transmission_color: albedo(self.diffuse_transmission_color.evaluate(at)),
+            film,
+            sheen,
+            coat: Clearcoat { weight, alpha: roughness * roughness, ..Clearcoat::NONE },
+        }
+    }
+
+    /// The facets of the base, and the direction along which they are stretched.
+    fn facets(&self, at: &TextureContext) -> (Microfacets, Vec2) {
+        let roughness = crate::unit(self.roughness.evaluate(at));
+        let alpha = roughness * roughness;
+        let mut strength = crate::unit(self.anisotropy.evaluate(at));
+        if strength == 0.0 {
+            return (Microfacets::new(alpha, alpha), Vec2::X);
+        }
+        let mut tangent = Vec2::from_angle(self.anisotropy_rotation);
+        if let Some(texture) = &self.anisotropy_texture {
+            let texel = texture.evaluate(at);
+            strength *= crate::unit(texel.b);
+            let direction = Vec2::new(2.0 * texel.r - 1.0, 2.0 * texel.g - 1.0);
+            tangent = tangent.rotate(direction.normalize_or(Vec2::X));
+        }
+        let tangent = tangent.normalize_or(Vec2::X);
+        let facets = match self.convention {
+            Convention::Gltf => Microfacets::new(alpha + (1.0 - alpha) * strength * strength, alpha),
+            Convention::Burley => {
+                let aspect = (1.0 - 0.9 * strength).sqrt();
+                Microfacets::new((alpha / aspect).min(1.0), alpha * aspect)
+            }
+        };
+        (facets, tangent)
+    }
+}
+
+/// White, with so much of the hue of a colour: that colour over its luminance.
+fn hue(color: Spectrum, amount: f32) -> Spectrum {
+    let luminance = color.luminance();
+    if amount == 0.0 || luminance <= 0.0 {
+        return Spectrum::WHITE;
+    }
+    Spectrum::WHITE.lerp(color / luminance, amount)
+}
+
+fn number(v: f32) -> Arc<FloatTexture> {
+    Arc::new(Texture::Constant(v))
+}
