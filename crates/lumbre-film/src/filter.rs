@@ -111,6 +111,10 @@ impl Filter {
 
     /// A place in the filter, from two uniform numbers.
     pub fn sample(&self, u: DVec2) -> FilterSample {
+        if let FilterShape::Box = self.shape {
+            let area = 4.0 * self.radius.x * self.radius.y;
+            return FilterSample { offset: (2.0 * u - 1.0) * self.radius, weight: area };
+        }
         let axis = |table: &PiecewiseConstant1D, u: f64, radius: f64| {
             let (x, density) = table.sample(u);
             let x = (2.0 * x - 1.0) * radius;

@@ -729,7 +729,7 @@ fn samplers_and_integrators_are_read_and_the_last_wins() {
         assert_eq!(scene.sampler, SamplerDesc { kind: SamplerKind::Independent, spp: Some(3), seed: 42 });
     }
     for (name, kind) in [
-        ("whitted", IntegratorKind::Whitted),
+        ("whitted", IntegratorKind::Whitted { light_samples: 1, sky: false }),
         ("normals", IntegratorKind::Normals),
         ("depth", IntegratorKind::Depth),
         ("albedo", IntegratorKind::Albedo),
@@ -737,6 +737,8 @@ fn samplers_and_integrators_are_read_and_the_last_wins() {
     ] {
         assert_eq!(read(&format!("Integrator \"{name}\" WorldBegin")).integrator.kind, kind);
     }
+    let scene = read("Integrator \"whitted\" \"integer lightsamples\" 9 \"bool sky\" true WorldBegin");
+    assert_eq!(scene.integrator.kind, IntegratorKind::Whitted { light_samples: 9, sky: true });
 }
 
 // Files.
@@ -890,7 +892,7 @@ WorldEnd"#,
     );
     let scene = scene.unwrap();
     assert_eq!((scene.film.width, scene.sampler.spp), (Some(40), Some(8)));
-    assert_eq!(scene.integrator.kind, IntegratorKind::Whitted);
+    assert_eq!(scene.integrator.kind, IntegratorKind::Whitted { light_samples: 1, sky: true });
     let MaterialKind::Diffuse { reflectance } = kind(&scene, 0) else { panic!() };
     let Texture::Scale { texture, scale } = &**reflectance else { panic!() };
     assert_eq!((constant(texture), constant(scale)), (Rgb::new(0.2, 0.4, 0.6), 0.5));

@@ -5,18 +5,19 @@ use std::collections::BinaryHeap;
 
 use lumbre_geometry::Ray;
 
-use crate::Hit;
 use crate::traverse::{Ask, Found, Search};
+use crate::{Hit, InstancePath};
 
 impl Found<'_> {
+    #[inline]
     fn to_hit(&self) -> Hit {
         Hit {
             root: self.root,
             id: self.accel.geometries[self.geometry as usize].id,
             primitive: self.primitive,
             geometry: self.geometry,
-            instances: self.place.ids.clone(),
-            route: self.place.route.clone(),
+            instances: copied(&self.place.ids),
+            route: copied(&self.place.route),
         }
     }
 
@@ -26,6 +27,12 @@ impl Found<'_> {
             .then_with(|| self.place.route.cmp(&hit.route))
             .then_with(|| (self.geometry, self.primitive).cmp(&(hit.geometry, hit.primitive)))
     }
+}
+
+/// Most hits are in no instance: for them no list is copied.
+#[inline(always)]
+fn copied(path: &InstancePath) -> InstancePath {
+    if path.is_empty() { InstancePath::new() } else { path.clone() }
 }
 
 // No NaN comes this far, and the two zeros are one place.

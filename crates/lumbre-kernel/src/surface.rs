@@ -33,17 +33,27 @@ pub(crate) fn world_from_object(accel: &Accel, hit: &Hit) -> Transform {
 }
 
 /// The surface at a hit, in the space of `accel`.
+#[inline]
 pub(crate) fn surface(accel: &Accel, ray: &Ray, hit: &Hit) -> Surface {
+    if hit.route.is_empty() {
+        return bare_surface(accel, ray, hit);
+    }
     let (instances, inner) = along(accel, hit);
     // The same steps as the search took, for the same bits.
     let ray = instances.iter().fold(*ray, |ray, instance| ray.into_object(&instance.world_from_object));
-    let surface = match &inner.geometries[hit.geometry as usize].kind {
-        GeometryKind::Shape(shape) => shape.surface(&ray, &hit.root),
-        GeometryKind::Mesh(mesh) => triangle_surface(mesh, hit.primitive, hit.root.local),
-        GeometryKind::Custom(custom) => custom.surface(hit.primitive, &ray, &hit.root),
-        GeometryKind::Instance(_) => panic!("a hit of another tree"),
-    };
+    let surface = bare_surface(inner, &ray, hit);
     instances.iter().rev().fold(surface, |surface, instance| place(&surface, &instance.world_from_object))
+}
+
+/// The surface at a hit in the tree that its geometry stands in.
+#[inline]
+fn bare_surface(accel: &Accel, ray: &Ray, hit: &Hit) -> Surface {
+    match &accel.geometries[hit.geometry as usize].kind {
+        GeometryKind::Shape(shape) => shape.surface(ray, &hit.root),
+        GeometryKind::Mesh(mesh) => triangle_surface(mesh, hit.primitive, hit.root.local),
+        GeometryKind::Custom(custom) => custom.surface(hit.primitive, ray, &hit.root),
+        GeometryKind::Instance(_) => panic!("a hit of another tree"),
+    }
 }
 
 /// A point of a triangle from its barycentrics (b1, b2).

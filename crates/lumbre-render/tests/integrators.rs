@@ -76,7 +76,7 @@ fn whitted_follows_mirrors_to_what_is_lit_and_gives_no_second_bounce() {
     let show = |desc: SceneDesc, depth: u32| {
         let scene = Scene::build(desc).unwrap();
         let options = options(&scene, 4, 4, 16);
-        let whitted = Whitted { max_depth: depth };
+        let whitted = Whitted::new(depth);
         mean(&render_with(&scene, &options, &whitted, &NoProgress, &CancelToken::new()).unwrap().image)[0]
     };
     assert_close(show(desc.clone(), 5), expected, 1e-4, "reflected");

@@ -64,6 +64,7 @@ impl Scene {
         let infinite = (0..builder.lights.len() as u32).map(LightId);
         let infinite = infinite.filter(|id| builder.lights[id.0 as usize].is_infinite()).collect();
         let has_holes = builder.entries.iter().any(SurfaceEntry::has_holes);
+        let looks_up = builder.entries.iter().any(SurfaceEntry::looks_up_anywhere);
         Ok(Self {
             accel,
             light_choice: AliasTable::new(&powers),
@@ -76,6 +77,7 @@ impl Scene {
             bounds,
             has_holes,
             has_instances: !objects.is_empty(),
+            looks_up,
             entries: builder.entries,
             lights: builder.lights,
             warnings: builder.warnings,
@@ -236,7 +238,7 @@ impl Builder {
 
         // The entry of the triangles comes first, if there are any; its light knows the area of all of them.
         let first = self.entries.len() as u32;
-        let light = MeshLight::new(first, mesh.clone());
+        let light = MeshLight::new(first, &mesh);
         let emission = area_light.map(|light_desc| {
             let triangles = light.as_ref().map_or(0.0, |(_, area)| *area);
             emission(light_desc, || triangles + patches.iter().map(PlacedShape::area).sum::<f64>())
@@ -272,6 +274,8 @@ impl Builder {
         };
         Ok(SurfaceEntry {
             shape: desc.index,
+            looks_up: material.as_ref().is_some_and(|material| !material.is_uniform())
+                || desc.alpha.as_ref().is_some_and(|alpha| !alpha.is_constant()),
             material,
             emission: None,
             light: None,

@@ -350,7 +350,12 @@ pub enum IntegratorKind {
         regularize: bool,
     },
     /// Whitted 1980: direct light, perfect reflection and refraction.
-    Whitted,
+    Whitted {
+        /// Points on each light that has a surface, at least 1.
+        light_samples: u32,
+        /// Whether lights at infinity light surfaces, and are not seen as a background alone.
+        sky: bool,
+    },
     /// Ambient occlusion.
     AmbientOcclusion {
         /// By the cosine, or uniformly.
@@ -373,7 +378,7 @@ impl IntegratorKind {
     pub fn from_name(name: &str) -> Option<Self> {
         match name {
             "path" => Some(Self::Path { regularize: false }),
-            "whitted" => Some(Self::Whitted),
+            "whitted" => Some(Self::Whitted { light_samples: 1, sky: false }),
             "ambientocclusion" => Some(Self::AmbientOcclusion { cosine: true, max_distance: f64::INFINITY }),
             "normals" => Some(Self::Normals),
             "depth" => Some(Self::Depth),

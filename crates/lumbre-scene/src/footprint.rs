@@ -41,19 +41,17 @@ pub(crate) struct Spot {
 }
 
 impl Footprint {
-    /// The spot at `point` at a distance along the unit `direction`, on the plane with this normal, in the surface's
-    /// parameters.
-    pub(crate) fn on_plane(
+    /// The sides of the spot, and its width and spread; `None` where nothing is known of it.
+    #[inline]
+    fn sides(
         &self,
         point: DVec3,
         normal: DVec3,
-        dpdu: DVec3,
-        dpdv: DVec3,
         direction: DVec3,
         distance: f64,
-    ) -> Spot {
+    ) -> Option<(DVec3, DVec3, f64, f64)> {
         let (dpdx, dpdy, width, spread) = match *self {
-            Self::Point => return Spot::default(),
+            Self::Point => return None,
             Self::Neighbours { x_origin, x_direction, y_origin, y_direction } => {
                 let meet = |origin: DVec3, towards: DVec3| {
                     origin + towards * (normal.dot(point - origin) / normal.dot(towards)) - point
@@ -72,9 +70,38 @@ impl Footprint {
                 (along * (width / cosine.abs().max(0.02)), normal.cross(along) * width, width, spread)
             }
         };
-        if !(dpdx.is_finite() && dpdy.is_finite() && width.is_finite()) {
-            return Spot::default();
+        (dpdx.is_finite() && dpdy.is_finite() && width.is_finite()).then_some((dpdx, dpdy, width, spread))
+    }
+
+    /// The spot where no texture is looked up: only what the rays that leave need, its width and spread.
+    #[inline]
+    pub(crate) fn across(&self, point: DVec3, normal: DVec3, direction: DVec3, distance: f64) -> Spot {
+        if let Self::Cone { width, spread } = *self {
+            let width = width + spread * distance;
+            return if width.is_finite() {
+                Spot { width, spread, ..Spot::default() }
+            } else {
+                Spot::default()
+            };
         }
+        self.sides(point, normal, direction, distance)
+            .map_or_else(Spot::default, |(_, _, width, spread)| Spot { width, spread, ..Spot::default() })
+    }
+
+    /// The spot at `point` at a distance along the unit `direction`, on the plane with this normal, in the surface's
+    /// parameters.
+    pub(crate) fn on_plane(
+        &self,
+        point: DVec3,
+        normal: DVec3,
+        dpdu: DVec3,
+        dpdv: DVec3,
+        direction: DVec3,
+        distance: f64,
+    ) -> Spot {
+        let Some((dpdx, dpdy, width, spread)) = self.sides(point, normal, direction, distance) else {
+            return Spot::default();
+        };
         // Least squares for the change of (u, v) that moves the point by each.
         let (uu, uv, vv) = (dpdu.dot(dpdu), dpdu.dot(dpdv), dpdv.dot(dpdv));
         let inverse = 1.0 / (uu * vv - uv * uv);

@@ -30,8 +30,10 @@ pub struct Interaction<'s> {
     pub shape: u32,
     /// The triangle or patch of a mesh, else 0.
     pub primitive: u32,
-    /// The bare surface of the tree, which the densities of lights are asked with.
-    pub(crate) bare: Surface,
+    /// The bare surface of the tree, which the densities of lights are asked with; where a light samples it.
+    pub(crate) bare: Option<Box<Surface>>,
+    /// Where rays start that leave on the side that the ray came from.
+    pub(crate) before: DVec3,
     /// Width of the footprint across the ray, and its growth with distance.
     pub(crate) width: f64,
     pub(crate) spread: f64,
@@ -54,6 +56,17 @@ impl Interaction<'_> {
         material.shading(&self.at, &self.shading)
     }
 
+    /// [`Interaction::scattering`] of every material of a mixture, with its share. A mixture whose own share is less than
+    /// `least` is not taken apart (see [`Material::parts`]).
+    pub fn scattering_parts(&self, least: f32) -> impl Iterator<Item = (f32, ShadingFrame, Bsdf)> + '_ {
+        let wo = self.towards_origin.as_vec3();
+        let parts = self.material.map(|material| material.parts(&self.at, wo, least));
+        parts.into_iter().flatten().filter_map(|(share, material)| {
+            let bsdf = material.bsdf(&self.at)?;
+            Some((share, material.frame(&self.at, &self.shading), bsdf))
+        })
+    }
+
     /// The ray that leaves along a unit direction, from beyond the error of the point.
     pub fn leave(&self, direction: DVec3) -> Ray {
         Ray::new(self.start(direction), direction)
@@ -71,7 +84,7 @@ impl Interaction<'_> {
     /// Where lights are sampled from: off the surface, on the side that the ray came from, so that a surface which shines
     /// is not in doubt about which side of itself it is on.
     pub fn lit_from(&self) -> DVec3 {
-        self.start(self.towards_origin)
+        self.before
     }
 
     /// The footprint of a ray that leaves: as wide as that of the ray that came, and spreading as much.
@@ -83,7 +96,12 @@ impl Interaction<'_> {
         }
     }
 
+    #[inline]
     fn start(&self, direction: DVec3) -> DVec3 {
+        let normal = self.surface.normal;
+        if (normal.dot(direction) < 0.0) == (normal.dot(self.towards_origin) < 0.0) {
+            return self.before;
+        }
         offset(self.surface.point, self.surface.point_error, self.surface.normal, direction)
     }
 }
@@ -95,6 +113,7 @@ impl Interaction<'_> {
 /// within its own error; here they do not, and the point goes farther instead: by the error of the coordinate that has
 /// most of it, which is what rounds into `t`. (On a face in the plane z = 0 the point itself has no error along z at all,
 /// and half of all rays from it hit that face again.)
+#[inline]
 pub fn offset(point: DVec3, error: DVec3, normal: DVec3, direction: DVec3) -> DVec3 {
     let distance = normal.abs().dot(error) + 4.0 * error.max_element();
     let along = if normal.dot(direction) < 0.0 { -normal } else { normal };

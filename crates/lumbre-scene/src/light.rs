@@ -116,6 +116,11 @@ impl Light {
         matches!(self, Self::Uniform(_) | Self::Environment(_))
     }
 
+    /// Whether its light comes from one direction alone at each place.
+    pub fn is_delta(&self) -> bool {
+        matches!(self, Self::Point(_) | Self::Spot(_) | Self::Distant(_))
+    }
+
     /// An estimate of the power that it sends into a scene of this radius, by which it is chosen.
     pub fn power(&self, scene_radius: f64) -> f64 {
         use std::f64::consts::PI;

@@ -9,6 +9,8 @@ use lumbre_math::random::{combine, hash_dvec3, uniform_f32};
 use lumbre_math::{DVec2, DVec3, Transform};
 use lumbre_shading::{FloatTexture, Scatter, Spectrum};
 
+use crate::footprint::Spot;
+use crate::interaction::offset;
 use crate::light::{Light, LightId, LightSample};
 use crate::surface::{Dressed, Form, SurfaceEntry};
 use crate::{Camera, FilmDesc, FilterDesc, Footprint, IntegratorDesc, Interaction, SamplerDesc};
@@ -32,6 +34,8 @@ pub struct Scene {
     // Whether rays of light must ask every hit if it counts: something is cut out, or is an interface.
     pub(crate) has_holes: bool,
     pub(crate) has_instances: bool,
+    // Whether any surface looks up a texture, so that rays have to know how wide they are.
+    pub(crate) looks_up: bool,
 }
 
 /// Something in a description that was left out of the scene, or is slower or noisier than it could be.
@@ -149,14 +153,15 @@ impl Scene {
         let direction = ray.direction / length;
         let front = dressed.surface.normal.dot(direction) < 0.0;
         let surface = dressed.surface;
-        let spot = footprint.on_plane(
-            surface.point,
-            surface.normal,
-            surface.dpdu,
-            surface.dpdv,
-            direction,
-            hit.root.t * length,
-        );
+        let spot = if entry.looks_up {
+            let (dpdu, dpdv) = (surface.dpdu, surface.dpdv);
+            footprint.on_plane(surface.point, surface.normal, dpdu, dpdv, direction, hit.root.t * length)
+        } else if self.looks_up {
+            footprint.across(surface.point, surface.normal, direction, hit.root.t * length)
+        } else {
+            Spot::default()
+        };
+        let light = if hit.instances.is_empty() { entry.light } else { None };
         Interaction {
             at: dressed.context(spot.dpdx, spot.dpdy, spot.duv_dx, spot.duv_dy),
             surface,
@@ -165,10 +170,11 @@ impl Scene {
             front,
             material: entry.material.as_deref(),
             emission: entry.emission.as_ref(),
-            light: if hit.instances.is_empty() { entry.light } else { None },
+            light,
             shape: entry.shape,
             primitive,
-            bare,
+            bare: light.map(|_| Box::new(bare)),
+            before: offset(surface.point, surface.point_error, surface.normal, -direction),
             width: spot.width,
             spread: spot.spread,
         }
@@ -186,6 +192,12 @@ impl Scene {
         Some(sample)
     }
 
+    /// A light chosen by its power, with the probability of the choice; `None` where there is no light.
+    pub fn choose_light(&self, choose: f64) -> Option<(LightId, f64)> {
+        let choice = self.light_choice.as_ref()?.sample(choose);
+        Some((LightId(choice.index as u32), choice.probability))
+    }
+
     /// Light that arrives at `from` from one light, in a direction chosen by `u`.
     pub fn sample_one_light(&self, light: LightId, from: DVec3, u: DVec2) -> Option<LightSample> {
         self.lights[light.0 as usize].sample(&self.entries, from, u)
@@ -194,8 +206,8 @@ impl Scene {
     /// The density per unit solid angle with which [`Scene::sample_light`] chooses at `from` what a ray from there hit; 0
     /// where it never does.
     pub fn light_pdf(&self, from: DVec3, hit: &Interaction) -> f32 {
-        let Some(light) = hit.light else { return 0.0 };
-        let surface = Some((&hit.bare, hit.primitive));
+        let (Some(light), Some(bare)) = (hit.light, &hit.bare) else { return 0.0 };
+        let surface = Some((&**bare, hit.primitive));
         let ray = Ray::new(from, -hit.towards_origin);
         (self.light_probability(light) * self.lights[light.0 as usize].pdf(&ray, surface)) as f32
     }
@@ -208,6 +220,11 @@ impl Scene {
             let pdf = self.light_probability(id) * light.pdf(ray, None);
             (light.escaped(ray.direction), pdf as f32)
         })
+    }
+
+    /// What arrives along the unit direction of a ray that leaves the scene, from each light at infinity.
+    pub fn background<'s>(&'s self, ray: &'s Ray) -> impl Iterator<Item = Spectrum> + 's {
+        self.infinite.iter().map(move |&id| self.lights[id.0 as usize].escaped(ray.direction))
     }
 
     fn light_probability(&self, light: LightId) -> f64 {

@@ -23,6 +23,8 @@ pub(crate) struct SurfaceEntry {
     pub light: Option<LightId>,
     pub alpha: Option<Arc<FloatTexture>>,
     pub reverse: bool,
+    /// Whether the material looks up textures, and needs to know how wide a spot a ray covers.
+    pub looks_up: bool,
     pub form: Form,
 }
 
@@ -123,6 +125,27 @@ impl SurfaceEntry {
         match &self.form {
             Form::Csg(csg) => csg.leaves.iter().any(Self::shines),
             _ => self.emission.is_some(),
+        }
+    }
+
+    /// What it gives off, with 1 where it faces as its geometry does and -1 where the other way, if that is the same all
+    /// over it: without textures, without cut-outs, and without normals at vertices that might turn a face.
+    pub fn plain_emission(&self) -> Option<(&Emission, f64)> {
+        let is_plain = match &self.form {
+            Form::Exact => true,
+            Form::Mesh(mesh) => mesh.normals.is_none(),
+            Form::Patch { .. } | Form::Csg(_) => false,
+        };
+        let emission = self.emission.as_ref()?;
+        (is_plain && self.alpha.is_none() && emission.image.is_none())
+            .then_some((emission, if self.reverse { -1.0 } else { 1.0 }))
+    }
+
+    /// Whether any part of it looks up textures.
+    pub fn looks_up_anywhere(&self) -> bool {
+        match &self.form {
+            Form::Csg(csg) => self.looks_up || csg.leaves.iter().any(Self::looks_up_anywhere),
+            _ => self.looks_up,
         }
     }
 

@@ -141,6 +141,11 @@ impl CoatedDiffuse {
         finish(sample.wi, self.pdf(wo, sample.wi), self.eval(wo, sample.wi), below)
     }
 
+    /// The mirror image in a smooth coat.
+    pub(crate) fn specular(&self, wo: LocalDir) -> Option<BsdfSample> {
+        self.coat.mirror_image(wo)
+    }
+
     /// A rough estimate of its albedo: the coat's reflectance at normal incidence, and the base's for the rest.
     pub fn albedo_estimate(&self) -> Spectrum {
         let coat = fresnel::dielectric(1.0, self.coat.face.eta);
@@ -264,6 +269,19 @@ impl CoatedConductor {
         finish(wi, self.pdf(wo, wi), self.eval(wo, wi), below)
     }
 
+    /// The mirror image in the smooth layers.
+    pub(crate) fn specular(&self, wo: LocalDir) -> Option<BsdfSample> {
+        if !self.both_smooth() {
+            return self.coat.mirror_image(wo);
+        }
+        if wo.cos_theta() == 0.0 || wo.cos_theta().is_nan() {
+            return None;
+        }
+        let above = if wo.cos_theta() < 0.0 { -wo } else { wo };
+        let weight = self.mirror(above);
+        Some(BsdfSample { wi: wo.mirrored(), weight, scatter: Scatter::Delta, transmitted: false, eta: 1.0 })
+    }
+
     /// What two smooth layers reflect, all bounces in the one direction summed: those of the coat and of the metal, up to
     /// the depth of a walk.
     fn mirror(&self, wo: LocalDir) -> Spectrum {
@@ -318,6 +336,16 @@ fn finish(wi: LocalDir, pdf: f32, value: Spectrum, below: bool) -> Option<BsdfSa
 impl Coat {
     fn scatters(&self) -> bool {
         self.albedo.max_component() > 0.0
+    }
+
+    /// The mirror image in the face, where it is smooth.
+    fn mirror_image(&self, wo: LocalDir) -> Option<BsdfSample> {
+        if !self.face.is_delta() || self.face.eta == 1.0 {
+            return None;
+        }
+        let below = wo.cos_theta() < 0.0;
+        let above = if below { -wo } else { wo };
+        Some(turn(self.face.sample_of(above, 0.0, Vec2::ZERO, Ways::Reflection)?, below))
     }
 
     /// The share that crosses a height of the medium along `w`.

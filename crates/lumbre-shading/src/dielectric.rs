@@ -4,6 +4,7 @@ use lumbre_math::{Vec2, Vec3};
 
 use crate::conductor::reflect;
 use crate::microfacet::Microfacets;
+use crate::specular::Specular;
 use crate::{BsdfSample, LocalDir, Scatter, Spectrum, fresnel};
 
 /// A border between two dielectrics; the shading normal points to the outside.
@@ -201,6 +202,25 @@ impl ThinDielectric {
     pub fn reflected(&self, cos: f32) -> f32 {
         let once = fresnel::dielectric(cos.abs(), self.eta);
         2.0 * once / (1.0 + once)
+    }
+
+    /// The reflection and the way straight on, with the share of each.
+    pub(crate) fn specular(&self, wo: LocalDir) -> Specular {
+        if wo.cos_theta() == 0.0 || wo.cos_theta().is_nan() {
+            return Specular::new();
+        }
+        let reflected = self.reflected(wo.cos_theta());
+        [(wo.mirrored(), reflected, false), (-wo, 1.0 - reflected, true)]
+            .into_iter()
+            .filter(|&(_, share, _)| share > 0.0)
+            .map(|(wi, share, transmitted)| BsdfSample {
+                wi,
+                weight: Spectrum::splat(share),
+                scatter: Scatter::Delta,
+                transmitted,
+                eta: 1.0,
+            })
+            .collect()
     }
 
     /// A reflection, or the way straight on.

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use lumbre_math::random::{combine, hash_dvec3, hash_vec3, uniform_f32};
 use lumbre_math::{Vec2, Vec3};
+use smallvec::{SmallVec, smallvec};
 
 use crate::coated::{Coat, CoatedConductor, CoatedDiffuse};
 use crate::conductor::Conductor;
@@ -191,6 +192,9 @@ impl MaterialKind {
     }
 }
 
+/// Materials with their shares of a mixture.
+pub type Parts<'m> = SmallVec<[(f32, &'m Material); 2]>;
+
 /// The local shape of the surface that bump and normal maps turn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LocalSurface {
@@ -233,6 +237,66 @@ impl Material {
             material = &materials[usize::from(second)];
         }
         material
+    }
+
+    /// Whether it is known to be the same everywhere, so that it needs no footprint; kinds with many parameters are taken
+    /// for textured.
+    pub fn is_uniform(&self) -> bool {
+        let smooth = |roughness: &Roughness| roughness.u.is_constant() && roughness.v.is_constant();
+        let mut rest: SmallVec<[&Self; 4]> = smallvec![self];
+        // Mixtures may share materials: as many steps as most have, and no more.
+        for _ in 0..64 {
+            let Some(material) = rest.pop() else { return true };
+            let is_uniform = match &material.kind {
+                MaterialKind::Diffuse { reflectance } => reflectance.is_constant(),
+                MaterialKind::Conductor { eta, k, roughness } => {
+                    eta.is_constant() && k.is_constant() && smooth(roughness)
+                }
+                MaterialKind::ConductorReflectance { reflectance, roughness } => {
+                    reflectance.is_constant() && smooth(roughness)
+                }
+                MaterialKind::Dielectric { roughness, .. } => smooth(roughness),
+                MaterialKind::ThinDielectric { .. } | MaterialKind::Interface => true,
+                MaterialKind::CoatedDiffuse { reflectance, roughness, thickness, g, albedo, .. } => {
+                    let base = reflectance.is_constant() && smooth(roughness);
+                    base && thickness.is_constant() && g.is_constant() && albedo.is_constant()
+                }
+                MaterialKind::Mix { materials, amount } => {
+                    rest.extend(materials.iter().map(|material| &**material));
+                    amount.is_constant()
+                }
+                _ => false,
+            };
+            if !is_uniform || material.displacement.is_some() || material.normal_map.is_some() {
+                return false;
+            }
+        }
+        false
+    }
+
+    /// What a mixture is made of at a place, each material with its share; one that is no mixture is all of it. A
+    /// mixture whose own share is less than `least` is not taken apart: the one material stands for it that
+    /// [`Material::resolve`] chooses. Shares sum to 1, and there are at most as many as mixtures and shares above `least`.
+    pub fn parts(&self, at: &TextureContext, wo: Vec3, least: f32) -> Parts<'_> {
+        let mut parts = Parts::new();
+        let mut rest: Parts = smallvec![(1.0, self)];
+        while let Some((share, material)) = rest.pop() {
+            let MaterialKind::Mix { materials: [first, second], amount } = &material.kind else {
+                parts.push((share, material));
+                continue;
+            };
+            let amount = amount.evaluate(at);
+            if amount >= 1.0 {
+                rest.push((share, second));
+            } else if amount > 0.0 && share < least {
+                parts.push((share, material.resolve(at, wo)));
+            } else if amount > 0.0 {
+                rest.extend([(share * amount, &**second), (share * (1.0 - amount), first)]);
+            } else {
+                rest.push((share, first));
+            }
+        }
+        parts
     }
 
     /// The frame to shade in: bump and normal maps applied. A normal map goes before a displacement. The frame stays on

@@ -339,7 +339,13 @@ impl<T: TextureValue> Texture<T> {
     /// How deep a tree of textures may be.
     pub const MAX_DEPTH: usize = 64;
 
+    /// Whether it is the same everywhere by its kind alone.
+    pub fn is_constant(&self) -> bool {
+        matches!(self, Self::Constant(_))
+    }
+
     /// The value at a place. What has no weight is not evaluated.
+    #[inline]
     pub fn evaluate(&self, at: &TextureContext) -> T {
         match self {
             Self::Constant(value) => *value,

@@ -21,6 +21,14 @@ impl<'a, 's> Vertex<'a, 's> {
         Some(Self { met, frame, bsdf, wo })
     }
 
+    /// One vertex for each material of a mixture, with its share: see [`Interaction::scattering_parts`].
+    pub fn parts(met: &'a Interaction<'s>, least: f32) -> impl Iterator<Item = (f32, Self)> {
+        met.scattering_parts(least).map(move |(share, frame, bsdf)| {
+            let wo = frame.to_local(met.towards_origin.as_vec3());
+            (share, Self { met, frame, bsdf, wo })
+        })
+    }
+
     /// What the vertex scatters of a light's sample towards the path, weighed against the other way to find the same
     /// light: the density with which the BSDF would have chosen it.
     pub fn scattered(

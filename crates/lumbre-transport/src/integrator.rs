@@ -63,7 +63,7 @@ pub fn integrator(desc: &IntegratorDesc) -> Box<dyn Integrator> {
     let max_depth = desc.max_depth;
     match desc.kind {
         IntegratorKind::Path { regularize } => Box::new(Path { regularize, ..Path::new(max_depth) }),
-        IntegratorKind::Whitted => Box::new(Whitted { max_depth }),
+        IntegratorKind::Whitted { light_samples, sky } => Box::new(Whitted { max_depth, light_samples, sky }),
         IntegratorKind::AmbientOcclusion { cosine, max_distance } => {
             Box::new(AmbientOcclusion { cosine, max_distance })
         }

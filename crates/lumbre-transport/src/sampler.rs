@@ -2,7 +2,7 @@
 
 use lumbre_math::DVec2;
 use lumbre_math::Vec2;
-use lumbre_math::random::{PixelRandom, SampleRandom};
+use lumbre_math::random::{PixelRandom, SampleRandom, combine, mix, uniform_f64};
 use lumbre_math::sobol::OwenSobol;
 use lumbre_scene::{SamplerDesc, SamplerKind};
 
@@ -36,6 +36,8 @@ const DIRECTION: u32 = 3;
 const SURVIVAL: u32 = 4;
 /// Labels of integrators that ask every light of a vertex for a point.
 const EVERY_LIGHT: u32 = 1 << 24;
+/// Labels of integrators that follow several rays from a vertex.
+const EVERY_BRANCH: u32 = 1 << 28;
 
 impl Sampler {
     /// The sampler that a description asks for.
@@ -97,9 +99,26 @@ impl Draw {
         self.two(label(vertex, LIGHT_POINT))
     }
 
-    /// Where on the light of this number, for integrators that ask all of them.
-    pub fn point_on_each_light(&self, vertex: u32, light: u32) -> DVec2 {
-        self.two(EVERY_LIGHT.wrapping_add(vertex.wrapping_mul(1 << 12)).wrapping_add(light))
+    /// Where on the light of this number, for integrators that ask all of them for some `points` each.
+    pub fn point_on_each_light(&self, vertex: u32, light: u32, point: u32, points: u32) -> DVec2 {
+        let label = EVERY_LIGHT.wrapping_add(vertex.wrapping_mul(1 << 12)).wrapping_add(light);
+        match *self {
+            // The points of all samples of the pixel are one even set.
+            Self::Sobol { points: sobol, pixel, index } => {
+                let index = index.wrapping_mul(points).wrapping_add(point);
+                Self::Sobol { points: sobol, pixel, index }.two(label)
+            }
+            Self::Independent(_) if point == 0 => self.two(label),
+            Self::Independent(random) => {
+                let key = combine(random.bits(label), u64::from(point));
+                DVec2::new(uniform_f64(key), uniform_f64(mix(key)))
+            }
+        }
+    }
+
+    /// Whether a branch of a tree of rays goes on.
+    pub fn branch(&self, vertex: u32, branch: u32) -> f32 {
+        single(self.one(EVERY_BRANCH.wrapping_add(vertex.wrapping_mul(1 << 12)).wrapping_add(branch)))
     }
 
     /// Which part of a BSDF.
@@ -184,6 +203,32 @@ mod tests {
                 assert!(draw.light_point(1).max_element() < 1.0);
             }
         }
+    }
+
+    #[test]
+    fn points_on_a_light_are_even_over_all_samples_of_a_pixel() {
+        let sampler = Sampler::new(&SamplerDesc { kind: SamplerKind::Sobol, spp: None, seed: 9 });
+        let mut cells = [0; 64];
+        for (index, point) in (0..16).flat_map(|index| (0..4).map(move |point| (index, point))) {
+            let u = sampler.draw(13, 2, index).point_on_each_light(3, 5, point, 4);
+            cells[(u.x * 8.0) as usize * 8 + (u.y * 8.0) as usize] += 1;
+        }
+        assert_eq!(cells, [1; 64]);
+    }
+
+    #[test]
+    fn independent_points_on_a_light_are_all_different() {
+        let draw =
+            Sampler::new(&SamplerDesc { kind: SamplerKind::Independent, spp: None, seed: 9 }).draw(13, 2, 4);
+        let mut seen = Vec::new();
+        for (light, point) in (0..3).flat_map(|light| (0..100).map(move |point| (light, point))) {
+            let u = draw.point_on_each_light(2, light, point, 100);
+            assert!(u.min_element() >= 0.0 && u.max_element() < 1.0 && u.x != u.y);
+            seen.extend([u.x.to_bits(), u.y.to_bits()]);
+        }
+        seen.sort_unstable();
+        seen.dedup();
+        assert_eq!(seen.len(), 600);
     }
 
     #[test]

@@ -1,23 +1,132 @@
 //! Direct light, perfect reflection and perfect refraction.
 
-use lumbre_scene::{LightId, Scene, View};
-use lumbre_shading::Spectrum;
+use lumbre_geometry::Ray;
+use lumbre_scene::{Footprint, Interaction, Light, LightId, LightSample, Scene, View};
+use lumbre_shading::{Scatter, Spectrum};
+use smallvec::SmallVec;
 
 use crate::direct::Vertex;
 use crate::{Draw, Integrator, RayCounts, Sight};
 
-/// Follows mirrors and glass until a surface scatters, and gives it direct light from every light.
+/// Follows every mirror image and every refraction, and gives each surface on the way direct light from every light.
 ///
-/// Whitted, "An Improved Illumination Model for Shaded Display", CACM 23(6), 1980. Where he follows both the reflected
-/// and the refracted ray, one of them is chosen, as often as it carries light: the picture is the same in the mean.
+/// Whitted, "An Improved Illumination Model for Shaded Display", CACM 23(6), 1980. A mixture counts with all of its
+/// materials at once. Where a classic ray tracer gives up a branch that carries too little to be seen, it goes on here as
+/// often as it carries light, so that the picture is right in the mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Whitted {
-    /// Reflections and refractions at most, and the direct light of the last surface.
+    /// Reflections and refractions one after the other at most, and the direct light of the last surface.
     pub max_depth: u32,
+    /// Points on each light that has a surface, at least 1: those of all samples of a pixel are even together.
+    pub light_samples: u32,
+    /// Whether lights at infinity light surfaces. Without it they are background: mirrors and escaping rays show them.
+    pub sky: bool,
 }
 
 /// With more lights than these, one is chosen by its power.
 const EVERY_LIGHT_UP_TO: usize = 64;
+/// A branch that carries less than this goes on as often as it carries this.
+const FAINT: f32 = 1.0 / 255.0;
+
+/// A ray that is still to be followed.
+struct Branch {
+    ray: Ray,
+    footprint: Footprint,
+    throughput: Spectrum,
+    depth: u32,
+}
+
+/// The materials at a place that scatter, with their shares.
+type Scatterers<'a, 's> = SmallVec<[(f32, Vertex<'a, 's>); 2]>;
+
+impl Whitted {
+    /// A Whitted tracer that follows so many reflections, with one point on each light.
+    pub fn new(max_depth: u32) -> Self {
+        Self { max_depth, light_samples: 1, sky: false }
+    }
+
+    /// What scatters at a vertex of the tree of rays; its mirrors and its glass go to `pending`.
+    fn split<'a, 's>(
+        &self,
+        here: &'a Interaction<'s>,
+        came: &Arrival,
+        draw: &Draw,
+        pending: &mut SmallVec<[Branch; 4]>,
+    ) -> Scatterers<'a, 's> {
+        let mut scatterers = Scatterers::new();
+        let mut branches = 0;
+        for (share, vertex) in Vertex::parts(here, FAINT / came.throughput.max_component()) {
+            for part in vertex.bsdf.specular(vertex.wo) {
+                let branch = branches;
+                branches += 1;
+                let mut throughput = came.throughput * part.weight * share;
+                let carries = throughput.max_component();
+                if carries < FAINT {
+                    if draw.branch(came.vertex, branch) * FAINT >= carries {
+                        continue;
+                    }
+                    throughput *= FAINT / carries;
+                }
+                pending.push(Branch {
+                    ray: here.leave(vertex.frame.to_world(part.wi).as_dvec3().normalize()),
+                    footprint: here.footprint(),
+                    throughput,
+                    depth: came.depth + 1,
+                });
+            }
+            if !vertex.bsdf.is_delta() {
+                scatterers.push((share, vertex));
+            }
+        }
+        scatterers
+    }
+
+    /// Direct light on all that scatters at a place.
+    fn direct(
+        &self,
+        scene: &Scene,
+        here: &Interaction,
+        scatterers: &Scatterers,
+        vertex: u32,
+        draw: &Draw,
+        rays: &mut RayCounts,
+    ) -> Spectrum {
+        let from = here.lit_from();
+        let lights = scene.lights();
+        let by_light = |rays: &mut RayCounts, id: LightId, light: &Light, label: u32| {
+            if light.is_infinite() && !self.sky {
+                return Spectrum::BLACK;
+            }
+            let points = if light.is_delta() { 1 } else { self.light_samples.max(1) };
+            let mut sum = Spectrum::BLACK;
+            for point in 0..points {
+                let u = draw.point_on_each_light(vertex, label, point, points);
+                if let Some(sample) = scene.sample_one_light(id, from, u) {
+                    sum += scattered(scene, here, scatterers, &sample, rays);
+                }
+            }
+            sum * (1.0 / points as f32)
+        };
+        if lights.len() > EVERY_LIGHT_UP_TO {
+            let choice = scene.choose_light(draw.light_choice(vertex));
+            return choice.map_or(Spectrum::BLACK, |(id, probability)| {
+                by_light(rays, id, &lights[id.0 as usize], 0) * (1.0 / probability) as f32
+            });
+        }
+        let mut sum = Spectrum::BLACK;
+        for (i, light) in (0..).zip(lights) {
+            sum += by_light(rays, LightId(i), light, i);
+        }
+        sum
+    }
+}
+
+/// How a ray came to a vertex: what it carries, and which one in the tree of rays this is.
+struct Arrival {
+    throughput: Spectrum,
+    depth: u32,
+    vertex: u32,
+}
 
 impl Integrator for Whitted {
     fn radiance(
@@ -28,49 +137,56 @@ impl Integrator for Whitted {
         draw: &Draw,
         rays: &mut RayCounts,
     ) -> Spectrum {
-        let mut throughput = Spectrum::WHITE;
-        let (mut ray, mut met) = (sight.ray.ray, sight.met);
         let mut radiance = Spectrum::BLACK;
-        for depth in 0..=self.max_depth {
-            let Some(here) = &met else {
-                let arriving: Spectrum = scene.escaped(&ray).map(|(arriving, _)| arriving).sum();
-                return radiance + throughput * arriving;
-            };
-            radiance += throughput * here.emitted();
-            if depth == self.max_depth {
-                break;
+        let mut pending: SmallVec<[Branch; 4]> = SmallVec::new();
+        let (mut ray, mut met) = (sight.ray.ray, sight.met);
+        let mut came = Arrival { throughput: Spectrum::WHITE, depth: 0, vertex: 0 };
+        loop {
+            if let Some(here) = &met {
+                radiance += came.throughput * here.emitted();
+                if came.depth < self.max_depth {
+                    let scatterers = self.split(here, &came, draw, &mut pending);
+                    if !scatterers.is_empty() {
+                        let direct = self.direct(scene, here, &scatterers, came.vertex, draw, rays);
+                        radiance += came.throughput * direct;
+                    }
+                }
+            } else {
+                let arriving: Spectrum = scene.background(&ray).sum();
+                radiance += came.throughput * arriving;
             }
-            let Some(vertex) = Vertex::new(here) else { break };
-            if !vertex.bsdf.is_delta() {
-                return radiance + throughput * direct(scene, &vertex, depth, draw, rays);
-            }
-            let Some(bounce) = vertex.bsdf.sample(vertex.wo, draw.lobe(depth), draw.direction(depth)) else {
-                break;
-            };
-            throughput *= bounce.weight;
-            ray = here.leave(vertex.frame.to_world(bounce.wi).as_dvec3().normalize());
-            let footprint = here.footprint();
+            let Some(next) = pending.pop() else { return radiance };
+            ray = next.ray;
+            came = Arrival { throughput: next.throughput, depth: next.depth, vertex: came.vertex + 1 };
             rays.bounce += 1;
-            met = scene.closest(&ray).map(|hit| scene.interaction(&ray, &hit, &footprint));
+            met = scene.closest(&ray).map(|hit| scene.interaction(&ray, &hit, &next.footprint));
         }
-        radiance
     }
 }
 
-fn direct(scene: &Scene, vertex: &Vertex, depth: u32, draw: &Draw, rays: &mut RayCounts) -> Spectrum {
-    let from = vertex.met.lit_from();
-    let by_light_alone = |_, _| 1.0;
-    let count = scene.lights().len();
-    if count > EVERY_LIGHT_UP_TO {
-        let sample = scene.sample_light(from, draw.light_choice(depth), draw.light_point(depth));
-        return sample.map_or(Spectrum::BLACK, |s| vertex.scattered(scene, &s, by_light_alone, rays));
-    }
+/// What all materials of a place scatter of a light's sample.
+fn scattered(
+    scene: &Scene,
+    here: &Interaction,
+    scatterers: &Scatterers,
+    sample: &LightSample,
+    rays: &mut RayCounts,
+) -> Spectrum {
     let mut sum = Spectrum::BLACK;
-    for light in 0..count as u32 {
-        let u = draw.point_on_each_light(depth, light);
-        if let Some(sample) = scene.sample_one_light(LightId(light), from, u) {
-            sum += vertex.scattered(scene, &sample, by_light_alone, rays);
-        }
+    for (share, vertex) in scatterers {
+        let wi = vertex.frame.to_local(sample.towards.as_vec3());
+        sum += vertex.bsdf.eval(vertex.wo, wi) * *share;
     }
-    sum
+    let scattered = sum * sample.radiance;
+    if scattered.is_black() {
+        return Spectrum::BLACK;
+    }
+    rays.shadow += 1;
+    if scene.is_occluded(&here.shadow_ray(sample)) {
+        return Spectrum::BLACK;
+    }
+    match sample.scatter {
+        Scatter::Delta => scattered,
+        Scatter::Density(pdf) => scattered / pdf,
+    }
 }

@@ -277,10 +277,13 @@ impl Converter<'_, '_> {
         };
         let kind = match ty {
             "path" | "volpath" | "simplepath" | "simplevolpath" => path(&params)?,
-            "whitted" => IntegratorKind::Whitted,
+            "whitted" => {
+                let light_samples = params.count("lightsamples", 1, 1)?;
+                IntegratorKind::Whitted { light_samples, sky: params.boolean("sky", false)? }
+            }
             "directlighting" => {
                 self.upgraded(spot);
-                IntegratorKind::Whitted
+                IntegratorKind::Whitted { light_samples: 1, sky: true }
             }
             "ambientocclusion" => {
                 let max_distance = params.float_or_infinite("maxdistance", f64::INFINITY)?;

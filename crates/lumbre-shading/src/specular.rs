@@ -1,0 +1,106 @@
+//! What a BSDF does as a mirror or as smooth glass: the few directions that a ray tracer can follow one by one.
+
+use lumbre_math::Vec2;
+use smallvec::SmallVec;
+
+use crate::dielectric::Ways;
+use crate::{Bsdf, BsdfSample, LocalDir};
+
+/// Delta parts: a reflection and a transmission at most.
+pub type Specular = SmallVec<[BsdfSample; 2]>;
+
+impl Bsdf {
+    /// Every delta part, with the weight that it has by itself: together with [`Bsdf::eval`] they are the whole BSDF. The
+    /// mean of [`Bsdf::sample`] over its delta samples is the same.
+    pub fn specular(&self, wo: LocalDir) -> Specular {
+        let nowhere = Vec2::ZERO;
+        match self {
+            Self::Diffuse(_) | Self::DiffuseTransmission(_) => Specular::new(),
+            Self::Conductor(bsdf) if bsdf.facets.is_smooth() => {
+                bsdf.sample(wo, nowhere).into_iter().collect()
+            }
+            Self::Conductor(_) => Specular::new(),
+            Self::Dielectric(bsdf) if bsdf.is_delta() => [Ways::Reflection, Ways::Transmission]
+                .into_iter()
+                .filter_map(|way| bsdf.sample_of(wo, 0.0, nowhere, way))
+                .collect(),
+            Self::Dielectric(_) => Specular::new(),
+            Self::ThinDielectric(bsdf) => bsdf.specular(wo),
+            Self::CoatedDiffuse(bsdf) => bsdf.specular(wo).into_iter().collect(),
+            Self::CoatedConductor(bsdf) => bsdf.specular(wo).into_iter().collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lumbre_math::Vec3;
+
+    use crate::coated::{Coat, CoatedConductor, CoatedDiffuse};
+    use crate::conductor::Conductor;
+    use crate::dielectric::{Dielectric, ThinDielectric};
+    use crate::diffuse::Diffuse;
+    use crate::microfacet::Microfacets;
+    use crate::{Scatter, Spectrum};
+
+    use super::*;
+
+    #[test]
+    fn delta_parts_are_what_sampling_finds_in_the_mean() {
+        let smooth = Microfacets::new(0.0, 0.0);
+        let rough = Microfacets::new(0.3, 0.3);
+        let metal = |facets| Conductor::from_reflectance(Spectrum::new(0.9, 0.6, 0.2), facets);
+        let coat = |facets, albedo: f32| Coat {
+            face: Dielectric { eta: 1.4, facets },
+            thickness: 0.25,
+            g: 0.3,
+            albedo: Spectrum::splat(albedo),
+            max_depth: 10,
+            samples: 1,
+        };
+        let base = Diffuse { reflectance: Spectrum::new(0.7, 0.5, 0.3) };
+        let bsdfs = [
+            (Bsdf::Diffuse(base), 0),
+            (Bsdf::Conductor(metal(smooth)), 1),
+            (Bsdf::Conductor(metal(rough)), 0),
+            (Bsdf::Dielectric(Dielectric { eta: 1.5, facets: smooth }), 2),
+            (Bsdf::Dielectric(Dielectric { eta: 1.5, facets: rough }), 0),
+            (Bsdf::ThinDielectric(ThinDielectric { eta: 1.5 }), 2),
+            (Bsdf::CoatedDiffuse(CoatedDiffuse { base, coat: coat(smooth, 0.0) }), 1),
+            (Bsdf::CoatedDiffuse(CoatedDiffuse { base, coat: coat(rough, 0.0) }), 0),
+            (Bsdf::CoatedConductor(CoatedConductor { base: metal(smooth), coat: coat(smooth, 0.0) }), 1),
+            (Bsdf::CoatedConductor(CoatedConductor { base: metal(smooth), coat: coat(smooth, 0.4) }), 1),
+            (Bsdf::CoatedConductor(CoatedConductor { base: metal(rough), coat: coat(smooth, 0.0) }), 1),
+            (Bsdf::CoatedConductor(CoatedConductor { base: metal(smooth), coat: coat(rough, 0.0) }), 0),
+        ];
+        const LOBES: u32 = 4096;
+        for (bsdf, parts) in bsdfs {
+            for height in [0.4, -0.9] {
+                let wo = LocalDir(Vec3::new(0.6, -0.2, height).normalize());
+                let specular = bsdf.specular(wo);
+                assert_eq!(specular.len(), parts, "{bsdf:?} from {height}");
+                let mut sums = [Spectrum::BLACK; 2];
+                for i in 0..LOBES {
+                    let lobe = (i as f32 + 0.5) / LOBES as f32;
+                    let Some(sample) = bsdf.sample(wo, lobe, Vec2::new(0.3, 0.8)) else { continue };
+                    if sample.scatter == Scatter::Delta {
+                        let part = specular.iter().position(|part| part.wi == sample.wi);
+                        sums[part.expect("no other delta direction")] += sample.weight / LOBES as f32;
+                    }
+                }
+                for (part, sum) in specular.iter().zip(sums) {
+                    let error = (part.weight + sum * -1.0).map(f32::abs).max_component();
+                    assert!(error < 2e-3, "{bsdf:?} from {height}: {part:?}, sampled {sum:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn glass_beyond_the_critical_angle_is_a_mirror_alone() {
+        let glass = Bsdf::Dielectric(Dielectric { eta: 1.5, facets: Microfacets::new(0.0, 0.0) });
+        let parts = glass.specular(LocalDir(Vec3::new(0.9, 0.1, -0.3).normalize()));
+        assert_eq!(parts.len(), 1);
+        assert!(!parts[0].transmitted && (parts[0].weight.max_component() - 1.0).abs() < 1e-6);
+    }
+}
