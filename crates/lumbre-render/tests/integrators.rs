@@ -11,7 +11,8 @@ use lumbre_image::Rgb;
 use lumbre_math::{DVec3, Transform};
 use lumbre_render::{CancelToken, NoProgress, RenderOptions, render_with};
 use lumbre_scene::{IntegratorKind, LightDesc, Scene, SceneDesc};
-use lumbre_shading::{Material, MaterialKind, Roughness, SpectrumTexture};
+use lumbre_shading::dielectric::ThinDielectric;
+use lumbre_shading::{Material, MaterialKind, Roughness, SpectrumTexture, Texture};
 use lumbre_transport::{Path, Whitted};
 
 const PLACE: DVec3 = DVec3::new(3.0, -7.0, 11.0);
@@ -92,6 +93,48 @@ fn whitted_follows_mirrors_to_what_is_lit_and_gives_no_second_bounce() {
         mean(&render_with(&scene, &options, &Path::new(5), &NoProgress, &CancelToken::new()).unwrap().image)
             [0];
     assert!(path > 1.05 * expected, "{path} {expected}");
+}
+
+#[test]
+fn whitted_counts_every_material_of_a_mixture_and_both_ways_of_glass_in_every_sample() {
+    let sky = |radiance: f32| LightDesc::Infinite {
+        world_from_light: Transform::IDENTITY,
+        radiance: Rgb::splat(radiance),
+        image: None,
+    };
+    let show = |desc: SceneDesc, whitted: Whitted| {
+        let scene = Scene::build(desc).unwrap();
+        let options = options(&scene, 8, 8, 1);
+        mean(&render_with(&scene, &options, &whitted, &NoProgress, &CancelToken::new()).unwrap().image)[1]
+    };
+    // A floor of three parts paint and one part mirror, under a point light and a background.
+    let mut desc = floor();
+    let mirror = Arc::new(Material::new(MaterialKind::ConductorReflectance {
+        reflectance: Arc::new(SpectrumTexture::Constant(Rgb::WHITE)),
+        roughness: Roughness::smooth(),
+    }));
+    let paint = Arc::new(diffuse(0.6));
+    let mixture = MaterialKind::Mix { materials: [paint, mirror], amount: Arc::new(Texture::Constant(0.25)) };
+    desc.shapes[0].material = Some(add_material(&mut desc, Material::new(mixture)));
+    desc.lights = vec![
+        LightDesc::Point { from: PLACE + DVec3::new(-3.0, 0.0, 4.0), intensity: Rgb::splat(20.0) },
+        sky(2.0),
+    ];
+    let expected = 0.75 * 0.6 / PI * 20.0 * 4.0 / 125.0 + 0.25 * 2.0;
+    assert_close(show(desc.clone(), Whitted::new(5)), expected, 1e-4, "a mixture under a background");
+    // The sky lights the paint too when it is asked to.
+    let lit = show(desc, Whitted { sky: true, light_samples: 4096, ..Whitted::new(5) });
+    assert_close(lit, expected + 0.75 * 0.6 * 2.0, 2e-2, "a mixture under a sky");
+
+    // A pane over a black floor: what it reflects of the sky is seen alone, what it lets through is black.
+    let mut desc = floor();
+    desc.shapes[0].material = Some(add_material(&mut desc, diffuse(0.0)));
+    let pane = add_material(&mut desc, Material::new(MaterialKind::ThinDielectric { eta: 1.5 }));
+    add(&mut desc, exact(Disk::new(PLACE + 0.01 * DVec3::Z, DVec3::Z, 30.0, 0.0).unwrap()), pane);
+    desc.lights = vec![sky(3.0)];
+    let cos = (DVec3::new(0.2, 0.1, 1.0).length().recip()) as f32;
+    let reflected = f64::from(ThinDielectric { eta: 1.5 }.reflected(cos));
+    assert_close(show(desc, Whitted::new(5)), 3.0 * reflected, 1e-4, "a pane");
 }
 
 #[test]
