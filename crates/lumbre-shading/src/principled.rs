@@ -10,6 +10,7 @@ use crate::dielectric::{Dielectric, Ways, refract};
 use crate::diffuse::cosine_direction;
 use crate::microfacet::Microfacets;
 use crate::sheen::Sheen;
+use crate::specular::Specular;
 use crate::thin_film::ThinFilm;
 use crate::{BsdfSample, LocalDir, Scatter, Spectrum, fresnel};
 
@@ -276,6 +277,27 @@ impl Principled {
         let eta = if transmitted { self.eta_across(wo) } else { 1.0 };
         let weight = self.eval(wo, wi) / pdf;
         Some(BsdfSample { wi, weight, scatter: Scatter::Density(pdf), transmitted, eta })
+    }
+
+    /// Every delta part with the weight that it has by itself: what [`Principled::sample`] gives it times how often it is
+    /// chosen. (Rough facets that bend nothing let light straight through; they count by the facet of u = 0.)
+    pub(crate) fn specular(&self, wo: LocalDir) -> Specular {
+        let lobes = self.lobes(wo);
+        let reflection = self.shares(self.to_facets(wo).cos_theta()).reflection_probability();
+        let (_, lanes) = self.lanes();
+        let through = (1.0 - reflection) / lanes as f32;
+        let facets = |start: f32, share: f32| (lobes.coat + lobes.facets * start, lobes.facets * share);
+        let ways = (0..lanes).map(|lane| facets(reflection + through * lane as f32, through));
+        [(0.0, lobes.coat), facets(0.0, reflection)]
+            .into_iter()
+            .chain(ways)
+            .filter(|(_, probability)| *probability > 0.0)
+            .filter_map(|(start, probability)| {
+                let sample = self.sample(wo, start + 0.5 * probability, Vec2::ZERO)?;
+                let weight = sample.weight * probability;
+                (sample.scatter == Scatter::Delta).then_some(BsdfSample { weight, ..sample })
+            })
+            .collect()
     }
 
     /// Whether it has nothing but delta parts.

@@ -28,6 +28,7 @@ impl Bsdf {
             Self::ThinDielectric(bsdf) => bsdf.specular(wo),
             Self::CoatedDiffuse(bsdf) => bsdf.specular(wo).into_iter().collect(),
             Self::CoatedConductor(bsdf) => bsdf.specular(wo).into_iter().collect(),
+            Self::Principled(bsdf) => bsdf.specular(wo),
         }
     }
 }
@@ -41,6 +42,7 @@ mod tests {
     use crate::dielectric::{Dielectric, ThinDielectric};
     use crate::diffuse::Diffuse;
     use crate::microfacet::Microfacets;
+    use crate::principled::Principled;
     use crate::{Scatter, Spectrum};
 
     use super::*;
@@ -72,6 +74,8 @@ mod tests {
             (Bsdf::CoatedConductor(CoatedConductor { base: metal(smooth), coat: coat(smooth, 0.4) }), 1),
             (Bsdf::CoatedConductor(CoatedConductor { base: metal(rough), coat: coat(smooth, 0.0) }), 1),
             (Bsdf::CoatedConductor(CoatedConductor { base: metal(smooth), coat: coat(rough, 0.0) }), 0),
+            (Bsdf::Principled(Principled { transmission: 0.6, facets: smooth, ..Principled::DEFAULT }), 2),
+            (Bsdf::Principled(Principled { metallic: 0.5, facets: rough, ..Principled::DEFAULT }), 0),
         ];
         const LOBES: u32 = 4096;
         for (bsdf, parts) in bsdfs {
