@@ -7,13 +7,19 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail};
 use clap::Subcommand;
 
-use crate::command::{release_program, root, run, succeeds};
+use crate::command::{release_folder, release_program, root, run, succeeds};
 
 /// What can be measured.
 #[derive(Subcommand)]
 pub enum Bench {
-    /// Rays a second of the kernel on meshes and exact shapes.
-    Kernel,
+    /// Rays a second, build speed and memory of the kernel, beside Embree 4 where EMBREE_LIB names its shared library, and
+    /// beside the crates obvhs and bvh. All options are passed through: `kernel --help`.
+    #[command(disable_help_flag = true)]
+    Kernel {
+        /// --quick, --json FILE, --scene NAME, --work NAME, --peer NAME, --threads 1,2, --mesh FILE, --list …
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        arguments: Vec<String>,
+    },
     /// The field of exact shapes, against POV-Ray where it is on the PATH.
     Field {
         /// A POV-Ray scene of the same field.
@@ -32,12 +38,24 @@ impl Bench {
     /// Measures and prints a table.
     pub fn run(self) -> Result<()> {
         match self {
-            Self::Kernel => {
-                run("cargo", &["run", "--release", "--package", "lumbre-kernel", "--example", "kernel_speed"])
-            }
+            Self::Kernel { arguments } => kernel(&arguments),
             Self::Field { pov, runs, threads } => field(pov.as_deref(), runs, threads),
         }
     }
+}
+
+/// Runs the benchmark where the user stands, so that its paths mean what they say.
+fn kernel(arguments: &[String]) -> Result<()> {
+    run("cargo", &["build", "--release", "--package", "lumbre-bench"])?;
+    let program = release_folder().join(format!("lumbre-bench{}", std::env::consts::EXE_SUFFIX));
+    let status = Command::new(&program)
+        .args(arguments)
+        .status()
+        .with_context(|| format!("cannot start {}", program.display()))?;
+    if !status.success() {
+        bail!("the benchmark failed: {status}");
+    }
+    Ok(())
 }
 
 /// Times whole commands: reading, building, rendering and writing all count.

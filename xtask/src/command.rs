@@ -38,6 +38,11 @@ pub fn succeeds(program: &str, arguments: &[&str]) -> bool {
 /// Builds the program and says where it lies.
 pub fn release_program() -> Result<PathBuf> {
     run("cargo", &["build", "--release", "--package", "lumbre-cli"])?;
+    Ok(release_folder().join(if cfg!(windows) { "lumbre.exe" } else { "lumbre" }))
+}
+
+/// Where cargo puts what it builds for release.
+pub fn release_folder() -> PathBuf {
     let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from);
-    Ok(target.join("release").join(if cfg!(windows) { "lumbre.exe" } else { "lumbre" }))
+    target.join("release")
 }

@@ -12,7 +12,7 @@ const FLOORS: &[(u32, &[&str])] = &[
     (4, &["lumbre-transport", "lumbre-film"]),
     (5, &["lumbre-render", "lumbre-formats"]),
     (6, &["lumbre"]),
-    (7, &["lumbre-cli", "xtask"]),
+    (7, &["lumbre-cli", "lumbre-bench", "xtask"]),
 ];
 
 /// Floors whose crates must not do input or output: no crate here may lean on these.

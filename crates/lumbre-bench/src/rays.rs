@@ -1,0 +1,213 @@
+//! The rays, made once and shared bit for bit.
+
+use lumbre_geometry::Ray;
+use lumbre_kernel::Accel;
+use lumbre_math::random::RandomStream;
+use lumbre_math::warp64::square_to_cosine_hemisphere;
+use lumbre_math::{DVec2, DVec3, Frame};
+
+use crate::scene::Scene;
+
+/// A ray in single precision. Directions are unit but those of shadow rays, which end at `t` = 1 on the lamp.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ray32 {
+    /// Where it starts.
+    pub origin: [f32; 3],
+    /// Where it goes.
+    pub direction: [f32; 3],
+    /// How far, in units of the direction. It starts at 0.
+    pub t_max: f32,
+}
+
+impl Ray32 {
+    /// The same ray in double precision.
+    pub fn to_f64(self) -> Ray {
+        let wide = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
+        Ray::new(wide(self.origin), wide(self.direction)).with_range(0.0, f64::from(self.t_max))
+    }
+
+    fn new(origin: DVec3, direction: DVec3, t_max: f64) -> Self {
+        let narrow = |v: DVec3| v.as_vec3().to_array();
+        Self { origin: narrow(origin), direction: narrow(direction), t_max: t_max as f32 }
+    }
+}
+
+/// Where rays come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Work {
+    /// A pinhole camera, by scanlines.
+    Primary,
+    /// From where primary rays hit, by the cosine.
+    Bounce1,
+    /// From where those of the second bounce hit, by the cosine.
+    Bounce3,
+    /// From where primary rays hit to a lamp.
+    Shadow,
+    /// From where primary rays hit, by the cosine, a twentieth of the scene far.
+    ShortOcclusion,
+    /// From anywhere in the scene's box to any direction.
+    Random,
+}
+
+impl Work {
+    /// All of them.
+    pub const ALL: [Self; 6] =
+        [Self::Primary, Self::Bounce1, Self::Bounce3, Self::Shadow, Self::ShortOcclusion, Self::Random];
+
+    /// Its name in tables and files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Primary => "primary",
+            Self::Bounce1 => "bounce 1",
+            Self::Bounce3 => "bounce 3",
+            Self::Shadow => "shadow",
+            Self::ShortOcclusion => "short ao",
+            Self::Random => "random",
+        }
+    }
+}
+
+/// The size of the picture that primary rays make; both divide by four, for packets are squares of four by four.
+#[derive(Clone, Copy, Debug)]
+pub struct PictureSize {
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+}
+
+impl PictureSize {
+    /// Twice as wide as high, with about `count` pixels.
+    pub fn of_about(count: usize) -> Self {
+        let height = ((count as f64 / 2.0).sqrt() / 4.0).round().max(1.0) as usize * 4;
+        Self { width: 2 * height, height }
+    }
+
+    /// How many pixels.
+    pub fn count(self) -> usize {
+        self.width * self.height
+    }
+}
+
+/// The rays of one kind of work, about as many as the picture has pixels. `accel` is asked where rays hit.
+pub fn make(work: Work, scene: &Scene, accel: &Accel, size: PictureSize) -> Vec<Ray32> {
+    match work {
+        Work::Primary => (0..size.count()).map(|pixel| camera_ray(scene, size, pixel, [0.5; 2])).collect(),
+        Work::Random => {
+            let mut random = RandomStream::new(21);
+            let bounds = accel.bounds();
+            (0..size.count())
+                .map(|_| {
+                    let mut at = || random.next_f64();
+                    let from = bounds.min + bounds.size() * DVec3::new(at(), at(), at());
+                    Ray32::new(from, crate::shaping::direction(&mut random), f64::INFINITY)
+                })
+                .collect()
+        }
+        Work::Bounce1 | Work::Bounce3 | Work::Shadow | Work::ShortOcclusion => {
+            secondary(work, scene, accel, size)
+        }
+    }
+}
+
+/// From the hits of one camera ray a pixel. Pixels that see nothing are made up for by more rays through the others, in
+/// the order of the pixels, at most sixteen times over.
+fn secondary(work: Work, scene: &Scene, accel: &Accel, size: PictureSize) -> Vec<Ray32> {
+    let mut rays = Vec::with_capacity(size.count());
+    for turn in 0..16 {
+        for pixel in 0..size.count() {
+            let mut random =
+                RandomStream::new(lumbre_math::random::hash_words(&[turn, pixel as u64, work as u64]));
+            let jitter = [random.next_f64(), random.next_f64()];
+            let first = camera_ray(scene, size, pixel, jitter);
+            rays.extend(secondary_of(work, scene, accel, first, &mut random));
+            if rays.len() == size.count() {
+                return rays;
+            }
+        }
+    }
+    rays
+}
+
+fn secondary_of(
+    work: Work,
+    scene: &Scene,
+    accel: &Accel,
+    first: Ray32,
+    random: &mut RandomStream,
+) -> Option<Ray32> {
+    let extent = accel.bounds().size().max_element();
+    let start = leave(accel, first, extent)?;
+    let mut cosine = |normal: DVec3| {
+        let u = DVec2::new(random.next_f64(), random.next_f64());
+        Frame::from_z(normal).to_world(square_to_cosine_hemisphere(u))
+    };
+    match work {
+        Work::Bounce1 => Some(Ray32::new(start.0, cosine(start.1), f64::INFINITY)),
+        Work::Bounce3 => {
+            let second = Ray32::new(start.0, cosine(start.1), f64::INFINITY);
+            let start = leave(accel, second, extent)?;
+            let third = Ray32::new(start.0, cosine(start.1), f64::INFINITY);
+            let start = leave(accel, third, extent)?;
+            Some(Ray32::new(start.0, cosine(start.1), f64::INFINITY))
+        }
+        Work::ShortOcclusion => Some(Ray32::new(start.0, cosine(start.1), 0.05 * extent)),
+        Work::Shadow => {
+            let (middle, side) = scene.lamp;
+            let at = DVec3::new(random.next_f64() - 0.5, 0.0, random.next_f64() - 0.5);
+            Some(Ray32::new(start.0, middle + side * at - start.0, 1.0))
+        }
+        Work::Primary | Work::Random => None,
+    }
+}
+
+/// Where a ray hits, moved off the surface, and the normal on the side that it came from. The move is a hundred-thousandth
+/// of the scene: far more than single precision rounds off, so that no program finds the surface that a ray starts on.
+fn leave(accel: &Accel, ray: Ray32, extent: f64) -> Option<(DVec3, DVec3)> {
+    let ray = ray.to_f64();
+    let hit = accel.closest(&ray)?;
+    let surface = accel.surface(&ray, &hit);
+    let normal = if surface.normal.dot(ray.direction) < 0.0 { surface.normal } else { -surface.normal };
+    Some((surface.point + 1e-5 * extent * normal, normal))
+}
+
+fn camera_ray(scene: &Scene, size: PictureSize, pixel: usize, jitter: [f64; 2]) -> Ray32 {
+    let camera = &scene.camera;
+    let forward = (camera.target - camera.eye).normalize();
+    let right = forward.cross(DVec3::Y).normalize();
+    let up = right.cross(forward);
+    let half = (camera.field_of_view / 2.0).to_radians().tan();
+    let (column, row) = ((pixel % size.width) as f64, (pixel / size.width) as f64);
+    let (width, height) = (size.width as f64, size.height as f64);
+    let x = ((column + jitter[0]) / width * 2.0 - 1.0) * half * width / height;
+    let y = (1.0 - (row + jitter[1]) / height * 2.0) * half;
+    Ray32::new(camera.eye, (forward + x * right + y * up).normalize(), f64::INFINITY)
+}
+
+/// For packets of sixteen: the scanlines' pixels in the order of squares of four by four.
+pub fn by_squares(size: PictureSize) -> Vec<usize> {
+    let squares = (0..size.height / 4).flat_map(|y| (0..size.width / 4).map(move |x| (x, y)));
+    squares.flat_map(|(x, y)| (0..16).map(move |i| (4 * y + i / 4) * size.width + 4 * x + i % 4)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn squares_hold_every_pixel_once_and_neighbours_together() {
+        let size = PictureSize { width: 8, height: 12 };
+        let order = by_squares(size);
+        assert_eq!(order[16..24], [4, 5, 6, 7, 12, 13, 14, 15]);
+        let mut sorted = order.clone();
+        sorted.sort_unstable();
+        assert_eq!(sorted, (0..size.count()).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn a_picture_has_about_the_pixels_that_are_asked_for() {
+        let size = PictureSize::of_about(130_000);
+        assert_eq!((size.width % 4, size.height % 4, size.width), (0, 0, 2 * size.height));
+        assert!((120_000..140_000).contains(&size.count()), "{}", size.count());
+    }
+}

@@ -1,0 +1,46 @@
+//! How much a build in Rust allocates.
+
+use std::time::Instant;
+
+use anyhow::Result;
+use peak_alloc::PeakAlloc;
+
+use crate::program::Bytes;
+
+#[global_allocator]
+static HEAP: PeakAlloc = PeakAlloc;
+
+/// Runs a build on a pool of so many threads, with the seconds and the bytes that it took.
+pub fn measure<T: Send>(threads: usize, build: impl FnOnce() -> T + Send) -> Result<(T, f64, Bytes)> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
+    // The threads are there before the clock starts.
+    pool.broadcast(|_| ());
+    let before = HEAP.current_usage();
+    HEAP.reset_peak_usage();
+    let start = Instant::now();
+    let built = pool.install(build);
+    let seconds = start.elapsed().as_secs_f64();
+    let bytes = Bytes {
+        kept: HEAP.current_usage().saturating_sub(before),
+        peak: HEAP.peak_usage().saturating_sub(before),
+    };
+    Ok((built, seconds, bytes))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_kept_and_what_is_dropped_are_told_apart() {
+        let (kept, _, bytes) = measure(2, || {
+            let scratch = vec![1_u8; 6_000_000];
+            vec![scratch[17]; 2_000_000]
+        })
+        .expect("a pool of threads");
+        assert_eq!(kept.len(), 2_000_000);
+        // Other tests allocate at the same time.
+        assert!((1_500_000..4_000_000).contains(&bytes.kept), "{bytes:?}");
+        assert!((7_500_000..10_000_000).contains(&bytes.peak), "{bytes:?}");
+    }
+}
