@@ -146,7 +146,7 @@ fn main() -> Result<()> {
         size: PictureSize::of_about(count.clamp(32, 1 << 26)),
         line,
         oracle_tests: if options.quick { 20_000_000 } else { 400_000_000 },
-        deadline: options.quick.then(|| start + Duration::from_secs(50)),
+        deadline: options.quick.then(|| start + Duration::from_secs(40)),
     };
 
     let mut programs: Vec<Box<dyn Program>> = vec![Box::new(ours::Lumbre)];
@@ -289,12 +289,12 @@ fn measure_builds<'a>(
             trees[i] = Some(built);
             Ok::<_, anyhow::Error>(seconds)
         };
-        if millions <= 2.0 {
+        if millions <= 2.0 && !plan.is_over() {
             for i in 0..taking.len() {
                 build(i)?;
             }
         }
-        let rounds = alternate(taking.len(), least, plan.line, build)?;
+        let rounds = alternate(taking.len(), least, plan.line, plan.deadline, build)?;
         let line = Line { scene, taking, work: "build".to_owned(), unit: "Mprim/s", threads };
         let speed = |i: usize| millions / median(rounds.iter().map(|round| round[i]));
         let ratio = |i: usize| Ratio::of(rounds.iter().map(|round| (round[0], round[i])));
@@ -382,8 +382,9 @@ impl Case<'_> {
         }
 
         for &threads in &plan.threads {
-            let rounds =
-                alternate(jobs.len(), 3, plan.line, |i| Ok::<_, anyhow::Error>(jobs[i].run(threads)))?;
+            let rounds = alternate(jobs.len(), 3, plan.line, plan.deadline, |i| {
+                Ok::<_, anyhow::Error>(jobs[i].run(threads))
+            })?;
             let line = Line {
                 scene: self.scene,
                 taking: self.taking,
