@@ -207,7 +207,7 @@ mod tests {
         assert!(says(Some(t)) && says(Some(t * (1.0 + 1e-6))));
         assert!(!says(None) && !says(Some(1.01 * t)));
         assert!(!truth.agrees(Query::Any, None, 2.0, 2.0));
-        let mut moved = crate::scene::Scene::empty("moved", scene.camera, scene.lamp);
+        let mut moved = Scene::empty("moved", scene.camera, scene.lamp);
         moved.meshes = vec![Arc::new(TriangleMesh::default())];
         assert!(!super::truth(&moved, &ray).agrees(Query::Any, Some(t), 2.0, 2.0));
         assert_eq!(

@@ -85,7 +85,7 @@ impl Shaper {
         });
     }
 
-    /// Another mesh, moved.
+    /// A sphere by parallels and meridians.
     pub fn ball(&mut self, center: DVec3, radius: f64, around: u32) {
         self.lathe(center, around, around / 2, |s| {
             let polar = std::f64::consts::PI * s;
