@@ -413,8 +413,8 @@ struct Group {
     setting: Setting,
     meshes: Vec<SharedMesh>,
     spheres: Vec<Vec<f32>>,
-    // In a box, so that it has an address of its own for the callbacks.
-    shapes: Vec<Box<Arc<Vec<PlacedShape>>>>,
+    // The callbacks have the address of the list inside.
+    shapes: Vec<Arc<Vec<PlacedShape>>>,
     inner: Vec<Self>,
     device: Arc<Device>,
 }
@@ -489,8 +489,7 @@ impl Group {
     }
 
     fn add_shapes(&mut self, shapes: Arc<Vec<PlacedShape>>) {
-        let shapes = Box::new(shapes);
-        let user = (&raw const *shapes).cast_mut().cast();
+        let user = Arc::as_ptr(&shapes).cast_mut().cast();
         self.add(GEOMETRY_USER, |api, geometry| {
             // SAFETY: the callbacks take `user` for what it is; `self.shapes` holds it as long as the scene.
             unsafe {
@@ -537,7 +536,7 @@ impl Drop for Group {
 /// `user` must come from [`Group::add_shapes`], with its group still alive.
 unsafe fn shapes_of<'a>(user: *mut c_void) -> &'a [PlacedShape] {
     // SAFETY: the caller's promise.
-    unsafe { &*user.cast::<Arc<Vec<PlacedShape>>>() }
+    unsafe { &*user.cast::<Vec<PlacedShape>>() }
 }
 
 unsafe extern "C" fn shape_bounds(arguments: *const BoundsArguments) {

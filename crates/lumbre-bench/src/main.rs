@@ -301,7 +301,8 @@ fn measure_builds<'a>(
         line.put(&(0..taking.len()).collect::<Vec<_>>(), speed, ratio, report);
     }
     let trees: Vec<_> = trees.into_iter().flatten().collect();
-    let sizes: [(&str, fn(&Bytes) -> usize); 2] =
+    type Of = fn(&Bytes) -> usize;
+    let sizes: [(&str, Of); 2] =
         [("bytes a primitive", |bytes| bytes.kept), ("peak bytes a primitive", |bytes| bytes.peak)];
     let threads = plan.threads.last().copied().unwrap_or(1);
     for (work, of) in sizes {
