@@ -251,6 +251,8 @@ fn every_exact_shape_is_read() {
         ("box", r#""point3 p0" [-2 -3 -4] "point3 p1" [5 6 7]"#),
         ("cylinder", r#""float radius" 2 "float zmin" -inf "float zmax" 3"#),
         ("cylinder", r#""point3 p0" [1 1 1] "point3 p1" [2 3 4] "float radius" .5 "bool caps" true"#),
+        ("capsule", r#""point3 p0" [1 1 1] "point3 p1" [2 3 4] "float radius" .7"#),
+        ("capsule", r#""float radius" 2.5"#),
         ("cone", r#""float radius" 2 "float height" 3 "float topradius" .5 "bool caps" true"#),
         ("cone", r#""point3 apex" [0 0 4] "vector3 axis" [0 0 -2] "float angle" 30 "float height" inf"#),
         (

@@ -7,8 +7,8 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use lumbre_geometry::{
-    Aabb, BilinearPatch, Cone, Csg, Cuboid, Cylinder, Disk, Hyperboloid, Paraboloid, PlacedShape, Plane,
-    Quadric, Ray, Roots, Shape, ShapeError, Sphere, Torus, Triangle, WatertightRay, moller_trumbore,
+    Aabb, BilinearPatch, Capsule, Cone, Csg, Cuboid, Cylinder, Disk, Hyperboloid, Paraboloid, PlacedShape,
+    Plane, Quadric, Ray, Roots, Shape, ShapeError, Sphere, Torus, Triangle, WatertightRay, moller_trumbore,
 };
 use lumbre_math::random::RandomStream;
 use lumbre_math::{DVec3, Transform};
@@ -36,6 +36,7 @@ fn shapes() -> Result<Vec<Shape>, ShapeError> {
         Disk::new(v(0.1, 0.0, 0.2), v(1.0, 2.0, 3.0), 1.6, 0.0)?.into(),
         Cuboid::new(v(-1.0, -1.1, -0.9), v(1.2, 0.8, 1.0))?.into(),
         Cylinder::new(a, d, 0.8, true)?.into(),
+        Capsule::new(a, d, 0.7)?.into(),
         Cone::new(a, d, 1.1, 0.4, true)?.into(),
         BilinearPatch::new(a, b, c, d)?.into(),
         Triangle::new(a, b, c)?.into(),

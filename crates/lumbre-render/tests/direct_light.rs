@@ -7,8 +7,8 @@ use std::sync::Arc;
 
 use common::*;
 use lumbre_geometry::{
-    BilinearPatch, Cone, Cuboid, Cylinder, Disk, Hyperboloid, Paraboloid, Quadric, Shape, Sphere, Torus,
-    Triangle,
+    BilinearPatch, Capsule, Cone, Cuboid, Cylinder, Disk, Hyperboloid, Paraboloid, Quadric, Shape, Sphere,
+    Torus, Triangle,
 };
 use lumbre_image::{Image, Rgb};
 use lumbre_math::{DAffine3, DMat3, DVec2, DVec3, Transform, Vec3, warp64};
@@ -253,6 +253,7 @@ fn shapes() -> Vec<(&'static str, GeometryDesc)> {
             "open cylinder",
             lift(Cylinder::new(c - 0.9, c + DVec3::new(0.9, 0.3, 0.4), 0.7, false).unwrap().into()),
         ),
+        ("capsule", lift(Capsule::new(c - 0.7, c + DVec3::new(0.7, 0.3, 0.4), 0.6).unwrap().into())),
         ("cone", lift(Cone::new(c - 0.8, c + DVec3::new(0.9, 0.4, 0.6), 1.2, 0.0, true).unwrap().into())),
         ("frustum", lift(Cone::new(c - 0.8, c + DVec3::new(0.9, 0.4, 0.6), 1.2, 0.6, false).unwrap().into())),
         ("patch", lift(patch.unwrap().into())),
