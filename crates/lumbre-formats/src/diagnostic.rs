@@ -503,6 +503,16 @@ pub fn quoted(text: &str) -> String {
     out
 }
 
+/// A number from an input, fit for a message: very large and very small ones by their power of ten.
+pub fn number(value: f64) -> String {
+    let size = value.abs();
+    if size.is_finite() && size != 0.0 && !(1e-5..1e10).contains(&size) {
+        format!("{value:e}")
+    } else {
+        value.to_string()
+    }
+}
+
 /// [`quoted`] for bytes that should have been text.
 pub fn quoted_bytes(bytes: &[u8]) -> String {
     quoted(&String::from_utf8_lossy(&bytes[..bytes.len().min(256)]))
@@ -513,31 +523,43 @@ pub fn quoted_bytes(bytes: &[u8]) -> String {
 /// distance of F. J. Damerau, "A technique for computer detection and correction of spelling errors", CACM 1964).
 /// Upper and lower case are the same. The first one wins a tie.
 pub fn nearest_name<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let letters = |s: &str| s.chars().take(65).flat_map(char::to_lowercase).collect::<Vec<_>>();
+    let letters = |s: &str| s.chars().take(LONGEST + 1).flat_map(char::to_lowercase).collect::<Vec<_>>();
     let wrong = letters(name);
-    if wrong.len() > 64 {
+    if wrong.len() > LONGEST {
         return None;
     }
     let mut best: Option<(usize, &str)> = None;
     for candidate in known {
         let right = letters(candidate);
         let allowed = (wrong.len().max(right.len()) / 3).max(1);
+        // Each letter too many is a mistake: most candidates need no more than their length.
+        let at_least = wrong.len().abs_diff(right.len());
+        let at_most = best.map_or(allowed, |(least, _)| allowed.min(least - 1));
+        if at_least > at_most || right.len() > LONGEST {
+            continue;
+        }
         let distance = edit_distance(&wrong, &right);
-        let nearer = best.is_none_or(|(least, _)| distance < least);
-        if distance <= allowed && distance < right.len() && nearer {
+        if distance <= at_most && distance < right.len() {
             best = Some((distance, candidate));
+            if distance == 0 {
+                break;
+            }
         }
     }
     best.map(|(_, name)| name)
 }
 
+/// Longer names than this are compared with none.
+const LONGEST: usize = 64;
+
+/// Of words of at most [`LONGEST`] letters.
 fn edit_distance(a: &[char], b: &[char]) -> usize {
-    let mut before_last: Vec<usize>;
-    let mut last = vec![0; b.len() + 1];
-    let mut row: Vec<usize> = (0..=b.len()).collect();
+    let mut before_last;
+    let mut last = [0; LONGEST + 1];
+    let mut row: [usize; LONGEST + 1] = std::array::from_fn(|j| j);
     for i in 1..=a.len() {
-        before_last = std::mem::replace(&mut last, row);
-        row = vec![i; b.len() + 1];
+        (before_last, last) = (last, row);
+        row[0] = i;
         for j in 1..=b.len() {
             let change = last[j - 1] + usize::from(a[i - 1] != b[j - 1]);
             row[j] = change.min(last[j] + 1).min(row[j - 1] + 1);

@@ -125,6 +125,22 @@ impl Deref for Input<'_> {
 /// # Errors
 /// When they are UTF-16 or UTF-32 by their byte order mark, and with the place of the first byte that is not UTF-8.
 pub fn text<'a>(bytes: &'a [u8], name: &Arc<str>) -> Result<&'a str, FormatError> {
+    refuse_wide(bytes, name)?;
+    let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
+    std::str::from_utf8(bytes).map_err(|e| {
+        let offset = e.valid_up_to();
+        Diagnostic::error("text is not UTF-8")
+            .at(Place::of_offset(name.clone(), bytes, offset))
+            .found(format!("byte 0x{:02x}", bytes[offset]))
+            .into()
+    })
+}
+
+/// Refuses text whose letters are wider than a byte.
+///
+/// # Errors
+/// When `bytes` are UTF-16 or UTF-32 by their byte order mark.
+pub fn refuse_wide(bytes: &[u8], name: &Arc<str>) -> Result<(), FormatError> {
     let foreign = if bytes.starts_with(&[0xFF, 0xFE, 0, 0]) || bytes.starts_with(&[0, 0, 0xFE, 0xFF]) {
         Some("UTF-32")
     } else if bytes.starts_with(&[0xFF, 0xFE]) || bytes.starts_with(&[0xFE, 0xFF]) {
@@ -136,14 +152,7 @@ pub fn text<'a>(bytes: &'a [u8], name: &Arc<str>) -> Result<&'a str, FormatError
         let wrong = Diagnostic::error("unsupported text encoding").at(Place::text(name.clone(), 1, 1));
         return Err(wrong.found(found).expected("UTF-8").into());
     }
-    let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
-    std::str::from_utf8(bytes).map_err(|e| {
-        let offset = e.valid_up_to();
-        Diagnostic::error("text is not UTF-8")
-            .at(Place::of_offset(name.clone(), bytes, offset))
-            .found(format!("byte 0x{:02x}", bytes[offset]))
-            .into()
-    })
+    Ok(())
 }
 
 /// `bytes` as text whatever they are: bytes that are not UTF-8 become U+FFFD. For formats of a time before UTF-8,

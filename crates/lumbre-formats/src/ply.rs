@@ -10,7 +10,7 @@ use lumbre_shading::Material;
 
 use crate::budget::{Budget, BudgetVec};
 use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, nearest_name, quoted, quoted_bytes};
-use crate::input::Input;
+use crate::input::{Input, refuse_wide};
 use crate::polygon;
 
 /// Reads a mesh from the bytes of a PLY file.
@@ -29,6 +29,7 @@ pub fn read_ply(
     budget: &Budget,
     diagnostics: &mut Diagnostics,
 ) -> Result<MeshDesc, FormatError> {
+    refuse_wide(bytes, name)?;
     let header = Header::read(bytes, name)?;
     let body = header.end;
     let mut mesh = Mesh::new(name, bytes, header.encoding, budget, diagnostics);

@@ -11,7 +11,7 @@ use lumbre_scene::{MeshDesc, SceneDesc, UpAxis};
 
 use crate::budget::{Budget, BudgetVec};
 use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, quoted_bytes};
-use crate::input::Input;
+use crate::input::{Input, refuse_wide};
 use crate::ply::scene_of_meshes;
 
 /// A solid of an STL file.
@@ -52,6 +52,7 @@ pub fn read_stl(
     budget: &Budget,
     diagnostics: &mut Diagnostics,
 ) -> Result<Vec<StlSolid>, FormatError> {
+    refuse_wide(bytes, name)?;
     let whole = || Place::whole(name.clone());
     let count = bytes.get(80..84).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     let is_binary_by_size = count.is_some_and(|n| 84 + 50 * u64::from(n) == bytes.len() as u64);

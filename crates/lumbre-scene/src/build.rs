@@ -16,7 +16,7 @@ use crate::mesh::{self, QuadOrder};
 use crate::surface::{Form, SurfaceEntry};
 use crate::{
     AreaLightDesc, BuildError, BuildWarning, Camera, CameraKind, Emission, GeometryDesc, InstanceDesc,
-    LightDesc, MeshDesc, ObjectDesc, Scene, SceneDesc, ShapeDesc, auto, csg,
+    LightDesc, MeshDesc, ObjectDesc, Scene, SceneDesc, ShapeDesc, WithoutLight, auto, csg,
 };
 
 /// How deep objects may hold objects.
@@ -24,7 +24,7 @@ const MAX_NESTING: usize = 64;
 
 impl Scene {
     /// Resolves a description: one tree over everything, lights ready to be sampled. A description without cameras gets
-    /// one that sees all of it, one without any light gets a studio's.
+    /// one that sees all of it, one without any light what [`SceneDesc::without_light`] says.
     ///
     /// # Errors
     /// [`BuildError`], naming the shape, camera or light at fault.
@@ -40,6 +40,7 @@ impl Scene {
             objects,
             instances,
             lights,
+            without_light,
             up,
         } = desc;
         check_cameras(&cameras)?;
@@ -54,7 +55,13 @@ impl Scene {
 
         let cameras = if cameras.is_empty() { vec![auto::camera(&bounds, up)] } else { cameras };
         let is_dark = lights.is_empty() && !builder.entries.iter().any(SurfaceEntry::shines);
-        let lights = if is_dark { vec![auto::light(up)] } else { lights };
+        let lights = match without_light {
+            WithoutLight::Studio if is_dark => vec![auto::light(up)],
+            WithoutLight::Studio | WithoutLight::Dark => lights,
+        };
+        if is_dark && lights.is_empty() && integrator.kind.needs_light() {
+            builder.warnings.push(BuildWarning::NoLight);
+        }
         for (position, light) in lights.into_iter().enumerate() {
             builder.light(position, light)?;
         }

@@ -30,10 +30,22 @@ pub struct SceneDesc {
     pub objects: Vec<ObjectDesc>,
     /// Objects placed in the world.
     pub instances: Vec<InstanceDesc>,
-    /// Lights that are not shapes. A description without any light at all gets a studio's.
+    /// Lights that are not shapes.
     pub lights: Vec<LightDesc>,
+    /// What to do where there is no light at all, neither here nor on a shape.
+    pub without_light: WithoutLight,
     /// The axis that the automatic camera and the automatic light take for up.
     pub up: UpAxis,
+}
+
+/// What a description without any light at all is lit by.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum WithoutLight {
+    /// A studio's light: a mesh alone is worth a picture.
+    #[default]
+    Studio,
+    /// Nothing: whoever wrote a whole scene meant it, and it is black.
+    Dark,
 }
 
 /// Which axis points up.
@@ -374,6 +386,14 @@ pub enum IntegratorKind {
 }
 
 impl IntegratorKind {
+    /// Whether its picture of a scene without light is black.
+    pub fn needs_light(&self) -> bool {
+        match self {
+            Self::Path { .. } | Self::Whitted => true,
+            Self::AmbientOcclusion { .. } | Self::Normals | Self::Depth | Self::Albedo | Self::Uv => false,
+        }
+    }
+
     /// The integrator of a name in the scene language, with its default parameters.
     pub fn from_name(name: &str) -> Option<Self> {
         match name {

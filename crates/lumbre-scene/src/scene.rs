@@ -62,6 +62,9 @@ pub enum BuildWarning {
         /// Which shape.
         shape: u32,
     },
+    /// There is no light at all: what does not look at light alone is black.
+    #[error("the scene has no light: its picture is black")]
+    NoLight,
     /// An environment that is black or not finite gives no light.
     #[error("light {light}: its picture is black or not finite, it gives no light")]
     DarkEnvironment {

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use lumbre_formats::{Diagnostic, Diagnostics, ReadOptions, open_scenes};
+use lumbre_formats::{Diagnostic, Diagnostics, FormatError, Place, ReadOptions, open_scenes};
 use lumbre_geometry::Ray;
 use lumbre_kernel::Hit;
 use lumbre_render::{CancelToken, NoProgress, Progress, RenderOptions, render};
@@ -34,10 +34,18 @@ pub fn open(path: impl AsRef<Path>) -> Result<Scene, Error> {
 /// As [`open`]; with [`lumbre_formats::Strictness::Strict`], warnings too.
 pub fn open_with(paths: &[&Path], options: &ReadOptions) -> Result<(Scene, Diagnostics), Error> {
     let (desc, mut diagnostics) = open_scenes(paths, options)?;
-    let scene = Scene::from_description(desc)?;
+    // What only the whole shows has no line; it has a file.
+    let file = || Place::whole(paths.first().map_or_else(String::new, |path| path.display().to_string()));
+    let scene = match Scene::from_description(desc) {
+        Err(Error::Build(wrong)) => {
+            return Err(FormatError::from(Diagnostic::error(wrong.to_string()).at(file())).into());
+        }
+        scene => scene?,
+    };
     for warning in scene.resolved.warnings() {
-        diagnostics.push(Diagnostic::warning(warning.to_string()));
+        diagnostics.push(Diagnostic::warning(warning.to_string()).at(file()));
     }
+    diagnostics.check()?;
     Ok((scene, diagnostics))
 }
 

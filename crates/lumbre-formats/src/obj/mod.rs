@@ -15,6 +15,7 @@ use lumbre_scene::MeshDesc;
 
 use crate::budget::{Budget, BudgetVec};
 use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place};
+use crate::input::refuse_wide;
 use crate::polygon;
 use words::{Source, Word, Words};
 
@@ -55,6 +56,7 @@ pub fn read_obj(
     budget: &Budget,
     diagnostics: &mut Diagnostics,
 ) -> Result<ObjFile, FormatError> {
+    refuse_wide(bytes, name)?;
     let source = Source { name, bytes };
     let mut reader = Reader::new(source, budget, diagnostics);
     for line in source.lines() {
@@ -523,6 +525,10 @@ impl<'a> Reader<'a> {
                 let said = Diagnostic::warning(format!("faces name {what}, and the file has none"));
                 self.diagnostics.push(said.at(Place::whole(self.source.name.clone())));
             }
+        }
+        if self.parts.is_empty() && self.positions.is_empty() {
+            let wrong = Diagnostic::error("not an OBJ file, or one without vertices");
+            return Err(wrong.at(Place::whole(self.source.name.clone())).expected("lines such as v 1 2 3").into());
         }
         if self.parts.is_empty() {
             let found = format!("{} vertices", self.positions.len());

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use lumbre_math::Transform;
 use lumbre_scene::{
     FilmDesc, GeometryDesc, InstanceDesc, MaterialId, MeshDesc, NamedMaterial, ObjectDesc, ObjectId,
-    SamplerDesc, SceneDesc, ShapeDesc,
+    SamplerDesc, SceneDesc, ShapeDesc, WithoutLight,
 };
 use lumbre_shading::{FloatTexture, Material, MipMap, Spectrum, SpectrumTexture, Texture, TextureValue};
 
@@ -125,7 +125,7 @@ impl<'b, 'd> Converter<'b, 'd> {
             diagnostics,
             files: Files::default(),
             directory,
-            scene: SceneDesc { film, sampler, ..SceneDesc::default() },
+            scene: SceneDesc { film, sampler, without_light: WithoutLight::Dark, ..SceneDesc::default() },
             shape_count: 0,
             materials: vec![],
             material_names: HashMap::new(),
@@ -160,7 +160,9 @@ impl<'b, 'd> Converter<'b, 'd> {
     /// Says that a type is not known, with the nearest one that is.
     pub fn unknown(&mut self, spot: Spot, noun: &str, ty: &str, known: &[&str], instead: &str) {
         let message = format!("unknown {noun} {}: {instead}", quoted(ty));
-        self.warn(spot, Diagnostic::warning(message).suggest(ty, known.iter().copied()));
+        let files = &self.files;
+        self.diagnostics
+            .warn(&message, |unknown| files.locate(spot, unknown.suggest(ty, known.iter().copied())));
     }
 
     /// Says which parameters were given in vain.

@@ -8,7 +8,7 @@ use lumbre_math::DVec3;
 
 use super::source::{Result, Spot};
 use crate::Diagnostic;
-use crate::diagnostic::quoted;
+use crate::diagnostic::{number, quoted};
 
 /// The types of the scene language.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -112,7 +112,7 @@ impl Values {
     pub fn shown(&self) -> String {
         match self {
             Self::Bools(v) if v.len() == 1 => format!("bool {}", v[0]),
-            Self::Numbers(v) if v.len() == 1 => format!("{}", v[0]),
+            Self::Numbers(v) if v.len() == 1 => number(v[0]),
             Self::Integers(v) if v.len() == 1 => format!("integer {}", v[0]),
             Self::Strings(v) if v.len() == 1 => format!("string {}", quoted(&v[0])),
             Self::Bools(v) => format!("{} bools", v.len()),
@@ -310,7 +310,7 @@ impl Params {
     /// An error about the value of a parameter.
     pub fn out_of_range<T>(&self, name: &str, found: f64, expected: &str) -> Result<T> {
         let message = format!("parameter {} of {} is out of range", quoted(name), self.owner);
-        Err(self.spot_of(name).wrong(Diagnostic::error(message).found(found).expected(expected)))
+        Err(self.spot_of(name).wrong(Diagnostic::error(message).found(number(found)).expected(expected)))
     }
 
     pub fn integer(&self, name: &'static str, default: i32) -> Result<i32> {

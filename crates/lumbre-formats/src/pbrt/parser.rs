@@ -380,8 +380,10 @@ impl<'b, 'd> Parser<'b, 'd> {
     fn directive(&mut self, name: &str, spot: Spot) -> Result<()> {
         let Some((_, place)) = DIRECTIVES.iter().find(|(directive, _)| *directive == name) else {
             let known = DIRECTIVES.iter().map(|(directive, _)| *directive);
-            let unknown = Diagnostic::warning(format!("unknown directive {}", quoted(name)));
-            self.converter.warn(spot, unknown.suggest(name, known));
+            let files = &self.converter.files;
+            self.converter.diagnostics.warn(&format!("unknown directive {}", quoted(name)), |unknown| {
+                files.locate(spot, unknown.suggest(name, known))
+            });
             return self.skip_arguments();
         };
         match place {

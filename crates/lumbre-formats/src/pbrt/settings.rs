@@ -11,7 +11,7 @@ use super::convert::Converter;
 use super::params::{Params, Type};
 use super::source::{Result, Spot};
 use crate::Diagnostic;
-use crate::diagnostic::quoted;
+use crate::diagnostic::{number, quoted};
 
 impl Converter<'_, '_> {
     pub fn camera(&mut self, ty: &str, params: Params, world_from_camera: Transform) -> Result<()> {
@@ -19,9 +19,9 @@ impl Converter<'_, '_> {
         let shutter_open = params.float("shutteropen", 0.0)?;
         let shutter_close = params.float("shutterclose", 1.0)?;
         if shutter_close <= shutter_open {
-            let wrong = Diagnostic::error("the shutter closes before it opens").found(shutter_close);
+            let wrong = Diagnostic::error("the shutter closes before it opens").found(number(shutter_close));
             let at = params.spot_of("shutterclose");
-            return Err(at.wrong(wrong.expected(format!("shutterclose after shutteropen = {shutter_open}"))));
+            return Err(at.wrong(wrong.expected(format!("shutterclose after shutteropen = {}", number(shutter_open)))));
         }
         self.exposure.shutter = shutter_close - shutter_open;
         let frame_aspect = params.float_opt("frameaspectratio")?;

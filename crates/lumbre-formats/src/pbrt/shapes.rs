@@ -17,7 +17,7 @@ use super::source::{AtSpot, Result, Spot};
 use super::state::State;
 use super::subdivision;
 use super::textures::vec3;
-use crate::diagnostic::quoted;
+use crate::diagnostic::{number, quoted};
 use crate::ply::read_ply;
 use crate::{Diagnostic, Diagnostics, Input};
 
@@ -44,6 +44,9 @@ const KNOWN: &[&str] = &[
 
 /// Solids may be combined so deep.
 const MAX_CSG_DEPTH: usize = 64;
+
+/// A solid may be combined of so many; a ray asks each of them.
+const MAX_CSG_LEAVES: u64 = 1 << 16;
 
 /// A form, with what a CSG comes to: its leaves and its depth.
 struct Form {
@@ -76,6 +79,15 @@ impl Converter<'_, '_> {
             self.upgraded(params.spot_of("shadowalpha"));
         }
         self.done(&params);
+        if let GeometryDesc::Mesh(mesh) | GeometryDesc::BilinearMesh(mesh) = &form.geometry {
+            let moved = Aabb::around(mesh.positions.iter().map(|p| state.ctm[0].point(p.as_dvec3())));
+            let farthest = moved.min.abs().max(moved.max.abs()).max_element();
+            if !moved.is_empty() && !(farthest <= f64::from(f32::MAX)) {
+                let wrong = Diagnostic::error("the current transform takes a vertex too far away");
+                let wrong = wrong.found(number(farthest));
+                return Err(spot.wrong(wrong.expected("coordinates of single precision")));
+            }
+        }
         let area_light = self.area_light_of(&form.geometry, spot, state)?;
         let shape = ShapeDesc {
             index,
@@ -308,6 +320,9 @@ impl Converter<'_, '_> {
             }
             leaves = leaves.saturating_add(slot.leaves);
             depth = depth.max(1 + slot.depth);
+            if leaves > MAX_CSG_LEAVES {
+                return Err(at.error(format!("more than {MAX_CSG_LEAVES} solids are combined into one")));
+            }
             // Each operand is written out: objects in objects in a csg may come to very many.
             self.budget.elements(slot.leaves, "operands of a csg").at(at)?;
             let bytes = slot.leaves.saturating_mul(size_of::<ShapeDesc>() as u64);
