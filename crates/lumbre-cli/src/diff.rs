@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use lumbre::image::{Metric, compare};
 
-use crate::failure::Failure;
+use crate::failure::{Failure, print};
 
 /// Compares two pictures of the same size.
 #[derive(Args)]
@@ -55,7 +55,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         )));
     };
     let difference = comparison.value;
-    println!("{difference}");
+    print(&format!("{difference}\n"))?;
     if let Some(path) = &arguments.output {
         let heat = comparison.heat_map(arguments.metric);
         lumbre::write_image(path, &heat, &lumbre::SaveOptions::default()).map_err(Failure::from)?;
@@ -63,7 +63,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     match arguments.fail_above {
         // A difference that is not a number is above every limit.
         Some(limit) if difference.is_nan() || difference > limit => {
-            eprintln!("{difference} is above {limit}");
+            say!("{difference} is above {limit}");
             Err(Failure::Different)
         }
         _ => Ok(()),

@@ -1,6 +1,7 @@
 //! How the program fails: what it says, and the status that it ends with.
 
 use std::fmt;
+use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 
 /// Why a command ended without doing what was asked.
@@ -53,5 +54,17 @@ impl fmt::Display for Failure {
             Self::Interrupted(_) => f.write_str("interrupted"),
             Self::Different => f.write_str("the difference is above its limit"),
         }
+    }
+}
+
+/// Puts text on standard output. Whoever reads it may stop reading: `lumbre info … | head -1`.
+///
+/// # Errors
+/// [`Failure::Io`] when it cannot be written.
+pub fn print(text: &str) -> Result<(), Failure> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(Failure::Io(format!("standard output: {e}"))),
+        _ => Ok(()),
     }
 }

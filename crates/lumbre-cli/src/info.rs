@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 
-use crate::failure::Failure;
+use crate::failure::{Failure, print};
 use crate::reading::{ReadingArguments, print_warnings};
 
 /// Says what is in a scene, and what of it would not be rendered.
@@ -44,32 +44,29 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             "memory_bytes": info.memory_bytes,
             "warnings": diagnostics.lines(),
         });
-        println!("{report:#}");
-        return Ok(());
+        return print(&format!("{report:#}\n"));
     }
+    let line = |title: &str, what: String| format!("{title:<11}{what}\n");
     let count = |title: &str, counts: &BTreeMap<String, u64>| {
         let total: u64 = counts.values().sum();
         let each: Vec<String> = counts.iter().map(|(name, n)| format!("{n} {name}")).collect();
-        println!(
-            "{title:<11}{total}{}",
-            if each.is_empty() { String::new() } else { format!(": {}", each.join(", ")) }
-        );
+        let colon = if each.is_empty() { "" } else { ": " };
+        line(title, format!("{total}{colon}{}", each.join(", ")))
     };
-    count("shapes", &info.shapes);
-    println!("{:<11}{}", "triangles", info.triangles);
-    println!("{:<11}{}", "instances", info.instances);
-    count("materials", &info.materials);
-    count("lights", &info.lights);
-    println!(
-        "{:<11}{}",
-        "cameras",
-        if info.cameras.is_empty() { "none: one is made".into() } else { info.cameras.join(", ") }
-    );
-    match info.bounds {
-        Some(b) => println!("{:<11}{} to {}", "bounds", b.min, b.max),
-        None => println!("{:<11}nothing finite", "bounds"),
-    }
-    println!("{:<11}{:.1} MiB", "memory", info.memory_bytes as f64 / f64::from(1 << 20));
+    let cameras =
+        if info.cameras.is_empty() { "none: one is made".to_owned() } else { info.cameras.join(", ") };
+    let bounds = info.bounds.map_or("nothing finite".to_owned(), |b| format!("{} to {}", b.min, b.max));
+    let report = [
+        count("shapes", &info.shapes),
+        line("triangles", info.triangles.to_string()),
+        line("instances", info.instances.to_string()),
+        count("materials", &info.materials),
+        count("lights", &info.lights),
+        line("cameras", cameras),
+        line("bounds", bounds),
+        line("memory", format!("{:.1} MiB", info.memory_bytes as f64 / f64::from(1 << 20))),
+    ];
+    print(&report.concat())?;
     print_warnings(&diagnostics);
     Ok(())
 }

@@ -95,10 +95,10 @@ impl Progress for Display {
                         "seconds": state.elapsed.as_secs_f64(),
                         "seconds_left": state.left.map(|left| left.as_secs_f64()),
                     });
-                    eprintln!("{line}");
+                    say!("{line}");
                 } else {
                     let percent = 100.0 * state.samples as f64 / state.total.max(1) as f64;
-                    eprintln!("{percent:5.1} %  {}{left}", spoken(state.elapsed));
+                    say!("{percent:5.1} %  {}{left}", spoken(state.elapsed));
                 }
             }
         }

@@ -84,12 +84,12 @@ impl ReadingArguments {
 /// Prints warnings to standard error, and their number where many were left out.
 pub fn print_warnings(diagnostics: &Diagnostics) {
     for line in diagnostics.lines() {
-        eprintln!("{line}");
+        say!("{line}");
     }
     match diagnostics.warnings() {
         0 => {}
-        1 => eprintln!("1 warning"),
-        n => eprintln!("{n} warnings"),
+        1 => say!("1 warning"),
+        n => say!("{n} warnings"),
     }
 }
 

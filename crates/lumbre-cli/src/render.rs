@@ -64,10 +64,10 @@ pub struct Arguments {
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
     /// Threads; all cores by default. The picture does not depend on it.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
     /// Stops brighter, for .png and .jpg.
-    #[arg(long, value_name = "EV", default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "EV", default_value_t = 0.0, allow_negative_numbers = true, value_parser = exposure)]
     exposure: f32,
     /// How light is brought within what a display shows, for .png and .jpg: none, agx, aces or neutral.
     #[arg(long, value_name = "NAME", default_value = "none", value_parser = tone_map)]
@@ -96,6 +96,13 @@ fn noise(text: &str) -> Result<f64, String> {
         .ok()
         .filter(|x: &f64| *x > 0.0 && x.is_finite())
         .ok_or_else(|| "expected a number above 0, such as 0.02".to_owned())
+}
+
+fn exposure(text: &str) -> Result<f32, String> {
+    text.parse()
+        .ok()
+        .filter(|x: &f32| x.abs() <= 100.0)
+        .ok_or_else(|| "expected a number from -100 to 100, such as 1.5".to_owned())
 }
 
 fn integrator(name: &str) -> Result<IntegratorKind, String> {
@@ -146,6 +153,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     picture.save_with(&output, &save, &arguments.aov)?;
     let save_time = save_start.elapsed();
     report_dropped(&picture);
+    if picture.stats().spp == 0 {
+        say!("warning: the time was over before every pixel had a sample");
+    }
     if let Some(path) = &arguments.stats {
         let seconds = json!({
             "load": load_time.as_secs_f64(),
@@ -276,14 +286,11 @@ impl Signals {
 fn report_dropped(picture: &Picture) {
     let stats = picture.stats();
     for sample in &stats.first_dropped {
-        eprintln!(
-            "warning: pixel ({}, {}), sample {}: not finite, dropped",
-            sample.x, sample.y, sample.sample
-        );
+        say!("warning: pixel ({}, {}), sample {}: not finite, dropped", sample.x, sample.y, sample.sample);
     }
     let unsaid = stats.dropped.saturating_sub(stats.first_dropped.len() as u64);
     if unsaid > 0 {
-        eprintln!("warning: {unsaid} more samples were not finite and dropped");
+        say!("warning: {unsaid} more samples were not finite and dropped");
     }
 }
 
@@ -327,7 +334,7 @@ fn peak_memory() -> Option<u64> {
 fn summary(verbose: bool, scene: &Scene, picture: &Picture, output: &Path, render_time: Duration) {
     let stats = picture.stats();
     let image = picture.image();
-    eprintln!(
+    say!(
         "{}: {}x{}, {} samples a pixel, {}",
         output.display(),
         image.width(),
@@ -338,7 +345,7 @@ fn summary(verbose: bool, scene: &Scene, picture: &Picture, output: &Path, rende
     if verbose {
         let rays = stats.rays;
         let total = rays.camera + rays.bounce + rays.shadow;
-        eprintln!(
+        say!(
             "{} threads, {:.2} M paths/s, {:.2} M rays/s ({} camera, {} bounce, {} shadow)",
             stats.threads,
             stats.paths_per_second() / 1e6,
@@ -347,13 +354,13 @@ fn summary(verbose: bool, scene: &Scene, picture: &Picture, output: &Path, rende
             rays.bounce,
             rays.shadow
         );
-        eprintln!(
+        say!(
             "{} primitives, tree built in {}",
             scene.resolved().accel().primitive_count(),
             spoken(scene.build_time())
         );
         if let Some(noise) = stats.noise {
-            eprintln!("noise {noise:.4}");
+            say!("noise {noise:.4}");
         }
     }
 }

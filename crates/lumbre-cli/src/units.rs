@@ -75,11 +75,7 @@ pub fn duration(text: &str) -> Result<Duration, String> {
             };
         rest = &rest[unit_end..];
     }
-    if text.trim().is_empty() {
-        Err(wrong())
-    } else {
-        Duration::try_from_secs_f64(seconds).map_err(|_| wrong())
-    }
+    if seconds <= 0.0 { Err(wrong()) } else { Duration::try_from_secs_f64(seconds).map_err(|_| wrong()) }
 }
 
 /// `8G`, `512M`, `100k`; a bare number is bytes. Powers of 1024.

@@ -528,7 +528,10 @@ impl<'a> Reader<'a> {
         }
         if self.parts.is_empty() && self.positions.is_empty() {
             let wrong = Diagnostic::error("not an OBJ file, or one without vertices");
-            return Err(wrong.at(Place::whole(self.source.name.clone())).expected("lines such as v 1 2 3").into());
+            return Err(wrong
+                .at(Place::whole(self.source.name.clone()))
+                .expected("lines such as v 1 2 3")
+                .into());
         }
         if self.parts.is_empty() {
             let found = format!("{} vertices", self.positions.len());

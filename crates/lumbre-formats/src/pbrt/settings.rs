@@ -21,7 +21,9 @@ impl Converter<'_, '_> {
         if shutter_close <= shutter_open {
             let wrong = Diagnostic::error("the shutter closes before it opens").found(number(shutter_close));
             let at = params.spot_of("shutterclose");
-            return Err(at.wrong(wrong.expected(format!("shutterclose after shutteropen = {}", number(shutter_open)))));
+            return Err(at.wrong(
+                wrong.expected(format!("shutterclose after shutteropen = {}", number(shutter_open))),
+            ));
         }
         self.exposure.shutter = shutter_close - shutter_open;
         let frame_aspect = params.float_opt("frameaspectratio")?;
