@@ -318,17 +318,17 @@ fn every_broken_file_gets_its_message() {
         (
             "a.png",
             b"".to_vec(),
-            "a.png: not an image that can be read (found an empty file; expected PNG, JPEG, EXR, HDR, PFM, TGA, BMP or QOI)",
+            "a.png: not an image that can be read (found an empty file; expected PNG, JPEG, EXR, HDR, PFM, TGA, BMP, QOI or WebP)",
         ),
         (
             "a.png",
             b"GIF89a".to_vec(),
-            "a.png: not an image that can be read (found a GIF image; expected PNG, JPEG, EXR, HDR, PFM, TGA, BMP or QOI)",
+            "a.png: not an image that can be read (found a GIF image; expected PNG, JPEG, EXR, HDR, PFM, TGA, BMP, QOI or WebP)",
         ),
         (
             "a.png",
             b"RIFF\x10\0\0\0WEBPVP8 ".to_vec(),
-            "a.png: not an image that can be read (found a WebP image; expected PNG, JPEG, EXR, HDR, PFM, TGA, BMP or QOI)",
+            "a.png: damaged WebP image (found \"failed to fill whole buffer\")",
         ),
         (
             "a.png",
