@@ -389,7 +389,7 @@ impl IntegratorKind {
     /// Whether its picture of a scene without light is black.
     pub fn needs_light(&self) -> bool {
         match self {
-            Self::Path { .. } | Self::Whitted => true,
+            Self::Path { .. } | Self::Whitted { .. } => true,
             Self::AmbientOcclusion { .. } | Self::Normals | Self::Depth | Self::Albedo | Self::Uv => false,
         }
     }
