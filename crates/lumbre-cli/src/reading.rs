@@ -57,6 +57,11 @@ impl ReadingArguments {
         }
     }
 
+    /// Whether warnings are errors.
+    pub fn is_strict(&self) -> bool {
+        self.strict
+    }
+
     fn strictness(&self) -> Strictness {
         match (self.strict, self.lenient) {
             (true, _) => Strictness::Strict,

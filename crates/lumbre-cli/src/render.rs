@@ -136,6 +136,15 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         probe_writable(path).map_err(|e| Failure::from(lumbre::Error::from(e)))?;
     }
     let options = options(arguments, &scene)?;
+    if scene.is_dark() && options.integrator.kind.needs_light() {
+        let what = format!("{}: the scene has no light, its picture is black", arguments.scene[0].display());
+        if arguments.reading.is_strict() {
+            return Err(Failure::input(what));
+        }
+        if !arguments.quiet {
+            say!("warning: {what}");
+        }
+    }
 
     let cancel = CancelToken::new();
     let signals =

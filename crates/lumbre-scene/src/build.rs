@@ -59,7 +59,7 @@ impl Scene {
             WithoutLight::Studio if is_dark => vec![auto::light(up)],
             WithoutLight::Studio | WithoutLight::Dark => lights,
         };
-        if is_dark && lights.is_empty() && integrator.kind.needs_light() {
+        if is_dark && lights.is_empty() {
             builder.warnings.push(BuildWarning::NoLight);
         }
         for (position, light) in lights.into_iter().enumerate() {

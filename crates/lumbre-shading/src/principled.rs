@@ -557,12 +557,12 @@ impl Principled {
     /// Below this difference of η from 1 there is no border to bend light.
     const NO_BORDER: f32 = 1e-3;
 
-    fn to_facets(&self, w: LocalDir) -> LocalDir {
+    fn to_facets(self, w: LocalDir) -> LocalDir {
         let Vec2 { x: c, y: s } = self.tangent;
         LocalDir(Vec3::new(c * w.0.x + s * w.0.y, c * w.0.y - s * w.0.x, w.0.z))
     }
 
-    fn from_facets(&self, w: LocalDir) -> LocalDir {
+    fn back_from_facets(&self, w: LocalDir) -> LocalDir {
         let Vec2 { x: c, y: s } = self.tangent;
         LocalDir(Vec3::new(c * w.0.x - s * w.0.y, s * w.0.x + c * w.0.y, w.0.z))
     }
@@ -643,7 +643,7 @@ impl Principled {
             let wi = mirrored();
             let delta = smooth.then(|| shares.reflects / reflection);
             return wo.same_hemisphere(wi).then(|| FacetSample {
-                wi: self.from_facets(wi),
+                wi: self.back_from_facets(wi),
                 delta,
                 eta: None,
             });
@@ -665,7 +665,7 @@ impl Principled {
             return None;
         }
         let delta = delta.then(|| share / (eta * eta));
-        Some(FacetSample { wi: self.from_facets(wi), delta, eta: Some(eta) })
+        Some(FacetSample { wi: self.back_from_facets(wi), delta, eta: Some(eta) })
     }
 
     // Sampling.

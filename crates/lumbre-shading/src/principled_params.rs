@@ -207,7 +207,7 @@ impl PrincipledParams {
             ThinFilm::NONE
         } else {
             let thickness = self.iridescence_thickness.evaluate(at).max(0.0);
-            let eta = self.iridescence_ior.max(1.0).min(10.0);
+            let eta = if self.iridescence_ior > 1.0 { self.iridescence_ior.min(10.0) } else { 1.0 };
             ThinFilm { weight: film, eta, thickness: thickness.min(1e6) }
         };
         // 20 over the Abbe number V, and V = (η − 1) / (η of blue − η of red): half of that difference.

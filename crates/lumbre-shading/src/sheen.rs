@@ -26,7 +26,8 @@ impl Sheen {
     /// A layer by its colour and its roughness, which is held within [[`Sheen::MIN_ROUGHNESS`], 1]; the exponent of the
     /// distribution is the reciprocal of the roughness squared.
     pub fn new(color: Spectrum, roughness: f32) -> Self {
-        let roughness = roughness.max(Self::MIN_ROUGHNESS).min(1.0);
+        // What is not a number is as smooth as can be.
+        let roughness = crate::unit(roughness).max(Self::MIN_ROUGHNESS);
         Self { color: color.map(crate::unit), roughness }
     }
 

@@ -8,7 +8,7 @@ use lumbre_formats::{Diagnostic, Diagnostics, FormatError, Place, ReadOptions, o
 use lumbre_geometry::Ray;
 use lumbre_kernel::Hit;
 use lumbre_render::{CancelToken, NoProgress, Progress, RenderOptions, render};
-use lumbre_scene::{Footprint, SceneDesc};
+use lumbre_scene::{BuildWarning, Footprint, SceneDesc};
 
 use crate::{CastHit, Error, Picture, SceneInfo};
 
@@ -42,7 +42,9 @@ pub fn open_with(paths: &[&Path], options: &ReadOptions) -> Result<(Scene, Diagn
         }
         scene => scene?,
     };
-    for warning in scene.resolved.warnings() {
+    // Rays see in the dark: that there is no light concerns pictures alone ([`Scene::is_dark`]).
+    let of_any_use = |warning: &&BuildWarning| **warning != BuildWarning::NoLight;
+    for warning in scene.resolved.warnings().iter().filter(of_any_use) {
         diagnostics.push(Diagnostic::warning(warning.to_string()).at(file()));
     }
     diagnostics.check()?;
@@ -130,6 +132,11 @@ impl Scene {
     /// What is in the scene, in numbers.
     pub fn info(&self) -> &SceneInfo {
         &self.info
+    }
+
+    /// Whether nothing in it gives light, so that pictures by light are black.
+    pub fn is_dark(&self) -> bool {
+        self.resolved.warnings().contains(&BuildWarning::NoLight)
     }
 
     /// How long it took to build the trees and the lights.

@@ -82,7 +82,7 @@ impl Converter<'_, '_> {
         if let GeometryDesc::Mesh(mesh) | GeometryDesc::BilinearMesh(mesh) = &form.geometry {
             let moved = Aabb::around(mesh.positions.iter().map(|p| state.ctm[0].point(p.as_dvec3())));
             let farthest = moved.min.abs().max(moved.max.abs()).max_element();
-            if !moved.is_empty() && !(farthest <= f64::from(f32::MAX)) {
+            if !moved.is_empty() && (farthest.is_nan() || farthest > f64::from(f32::MAX)) {
                 let wrong = Diagnostic::error("the current transform takes a vertex too far away");
                 let wrong = wrong.found(number(farthest));
                 return Err(spot.wrong(wrong.expected("coordinates of single precision")));
