@@ -67,7 +67,7 @@ fn bumpy_ball(n: u32) -> TriangleMesh {
                 let mut p = DVec3::ZERO;
                 p[axis] = side;
                 // Turned so that all six faces look outward.
-                let (u, v) = if side > 0.0 { (column, row) } else { (row, column) };
+                let (u, v) = if side > 0.0 { (row, column) } else { (column, row) };
                 p[(axis + 1) % 3] = even(u);
                 p[(axis + 2) % 3] = even(v);
                 surface(p)
