@@ -620,7 +620,10 @@ fn an_import_closes_what_it_opens_and_nothing_else() {
 #[test]
 fn kinds_of_file_are_told_by_their_ending() {
     let cases = [
-        ("a.xyz", "a.xyz: unknown kind of scene file (found \"xyz\"; expected .pbrt, .pbrt.gz, .gltf, .glb, "),
+        (
+            "a.xyz",
+            "a.xyz: unknown kind of scene file (found \"xyz\"; expected .pbrt, .pbrt.gz, .gltf, .glb, ",
+        ),
         ("noending", "noending: unknown kind of scene file (found no ending; "),
         ("a.glb", "a.glb: cannot open"),
         ("a.PBRT.GZ", "a.PBRT.GZ: cannot open"),

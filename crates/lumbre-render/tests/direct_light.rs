@@ -357,7 +357,8 @@ fn among_many_lights_each_gives_its_share() {
             LightDesc::Distant { towards: normal(), irradiance: Rgb::splat(0.002) },
         ]
     };
-    let (_, geometry) = shapes().into_iter().find(|(name, _)| *name == "mesh").expect("a mesh among the shapes");
+    let (_, geometry) =
+        shapes().into_iter().find(|(name, _)| *name == "mesh").expect("a mesh among the shapes");
     let whole = SceneDesc { lights: lights(), ..with_shape(geometry.clone(), over_floor(), 3.0, false) };
     let (together, _) = irradiance(whole, Strategy::Both, 1024);
     let (mesh_alone, _) = irradiance(with_shape(geometry, over_floor(), 3.0, false), Strategy::Both, 256);

@@ -532,21 +532,91 @@ fn furnace(bsdf: &Bsdf, wo: LocalDir, samples: u32, seed: u64) -> f64 {
     sum.into_iter().fold(0.0, f64::max) / f64::from(samples)
 }
 
-/// The same by a sequence that fills the cube of random numbers evenly: Roberts, "The Unreasonable Effectiveness of
-/// Quasirandom Sequences", 2018.
-fn even_furnace(bsdf: &Principled, wo: LocalDir) -> f64 {
+/// The same with one sample in each cell of a grid of random numbers, which errs less, and four and a half times the
+/// standard error that independent samples would have.
+fn even_furnace(bsdf: &Principled, wo: LocalDir, [lobes, side]: [u32; 2]) -> (f64, f64) {
     let bsdf = Bsdf::Principled(*bsdf);
-    let samples = 1 << 14;
-    let mut sum = [0.0; 3];
-    for i in 0..samples {
-        let number = |step: f64| (0.5 + f64::from(i) * step).fract() as f32;
-        let u = Vec2::new(number(0.671_043_606_703_789_2), number(0.549_700_477_901_970_3));
-        let Some(sample) = bsdf.sample(wo, number(0.819_172_513_396_164_4), u) else { continue };
+    let mut random = RandomStream::new(31);
+    let (mut sum, mut squares) = ([0.0; 3], 0.0);
+    for i in 0..lobes * side * side {
+        let mut within = |cell: u32, cells: u32| {
+            ((cell as f32 + random.next_f32()) / cells as f32).min(1.0 - f32::EPSILON / 2.0)
+        };
+        let lobe = within(i / (side * side), lobes);
+        let u = Vec2::new(within(i / side % side, side), within(i % side, side));
+        let Some(sample) = bsdf.sample(wo, lobe, u) else { continue };
         for (sum, weight) in sum.iter_mut().zip(sample.weight.to_array()) {
             *sum += f64::from(weight) * f64::from(sample.eta * sample.eta);
         }
+        squares += f64::from(sample.weight.max_component() * sample.eta * sample.eta).powi(2);
     }
-    sum.into_iter().fold(0.0, f64::max) / f64::from(samples)
+    let samples = f64::from(lobes * side * side);
+    let share = sum.into_iter().fold(0.0, f64::max) / samples;
+    let error = 4.5 * ((squares / samples - share * share).max(0.0) / samples).sqrt();
+    (share, error)
+}
+
+/// Whether what a furnace found is at least this, and no more than is there, but for its error.
+fn within((share, error): (f64, f64), least: f64) -> bool {
+    least - error <= share && share <= 1.002 + error
+}
+
+#[test]
+#[ignore = "takes minutes: a million samples for each direction"]
+fn white_surfaces_reflect_within_two_thousandths_of_everything() {
+    let facets = Microfacets::new(1.0, 1.0);
+    let low =
+        Principled { eta: 1.1, f0: Spectrum::splat(fresnel::dielectric(1.0, 1.1)), ..Principled::DEFAULT };
+    let list = [
+        ("metal 1", Principled { metallic: 1.0, facets, ..Principled::DEFAULT }),
+        ("pane 1 1.1", Principled { transmission: 1.0, facets, ..low }),
+        ("opaque .01 1.1", Principled { facets: Microfacets::new(0.01, 0.01), ..low }),
+        (
+            "solid .01 2.4",
+            Principled {
+                facets: Microfacets::new(0.01, 0.01),
+                transmission: 1.0,
+                body: Body::Solid { spread: 0.0 },
+                eta: 2.4,
+                f0: Spectrum::splat(fresnel::dielectric(1.0, 2.4)),
+                ..Principled::DEFAULT
+            },
+        ),
+        (
+            "cloth 0.1",
+            Principled {
+                sheen: Sheen::new(Spectrum::WHITE, 0.0),
+                facets: Microfacets::new(0.09, 0.09),
+                ..Principled::DEFAULT
+            },
+        ),
+        (
+            "cloth 0.4",
+            Principled {
+                sheen: Sheen::new(Spectrum::WHITE, 0.4),
+                facets: Microfacets::new(0.09, 0.09),
+                ..Principled::DEFAULT
+            },
+        ),
+        (
+            "coat",
+            Principled {
+                coat: Clearcoat { weight: 1.0, alpha: 0.01, ..Clearcoat::NONE },
+                facets: Microfacets::new(0.09, 0.09),
+                ..Principled::DEFAULT
+            },
+        ),
+        ("brushed", Principled { metallic: 1.0, facets: Microfacets::new(0.6, 0.1), ..Principled::DEFAULT }),
+    ];
+    for (name, bsdf) in list {
+        // Layers and stretched facets lose some; nothing makes any.
+        let loses = name.starts_with("cloth") || name == "coat" || name == "brushed";
+        let least = if loses { 0.5 } else { 0.998 };
+        for wo in views() {
+            let share = even_furnace(&bsdf, wo, [64, 128]);
+            assert!(within(share, least), "{name} from {:?}: {share:?}", wo.vec());
+        }
+    }
 }
 
 #[test]
@@ -554,18 +624,22 @@ fn no_surface_makes_light() {
     let mut count = 0;
     for (name, bsdf) in all() {
         for (v, wo) in views().into_iter().enumerate() {
-            let share = match &bsdf {
-                Bsdf::Principled(bsdf) => even_furnace(bsdf, wo),
-                _ => furnace(&bsdf, wo, 100_000, v as u64),
+            let (share, error) = match &bsdf {
+                // Along the surface a few directions carry most of the light: there it takes more samples to tell.
+                Bsdf::Principled(bsdf) => Some(even_furnace(bsdf, wo, GRID))
+                    .filter(|(_, error)| *error < 0.1)
+                    .unwrap_or_else(|| even_furnace(bsdf, wo, [16, 128])),
+                _ => (furnace(&bsdf, wo, 100_000, v as u64), 0.0),
             };
             // A sample has one index for all lanes.
             let lanes = match bsdf {
                 Bsdf::Principled(bsdf) => f64::from(1.0 + spread(&bsdf)).powi(2),
                 _ => 1.0,
             };
-            let most = if matches!(bsdf, Bsdf::Principled(_)) { BRIGHTEST * lanes } else { 1.002 };
-            assert!(share <= most, "{name} from {:?}: {share}", wo.vec());
-            assert!(share > 0.05, "{name} from {:?}: {share}", wo.vec());
+            assert!(share <= (1.002 + error) * lanes, "{name} from {:?}: {share} ± {error}", wo.vec());
+            // A test with errors as large as its values would find nothing.
+            assert!(error < 0.1, "{name} from {:?}: ± {error}", wo.vec());
+            assert!(share > 0.05, "{name} from {:?}: {share:?}", wo.vec());
             count += 1;
         }
     }
@@ -594,7 +668,7 @@ fn what_promises_to_conserve_energy_does() {
     for (name, bsdf) in &list {
         for (v, wo) in views().into_iter().enumerate() {
             let share = furnace(bsdf, wo, 20_000, v as u64);
-            assert!((share - 1.0).abs() < 2e-3, "{name} from {:?}: {share}", wo.vec());
+            assert!((share - 1.0).abs() < 2e-3, "{name} from {:?}: {share:?}", wo.vec());
             count += 1;
         }
     }
@@ -613,8 +687,8 @@ fn rough_glass_and_metal_lose_only_what_bounces_twice() {
     }
 }
 
-/// 1 and what so few samples err by: with four million of them white metal reflects between 0.9998 and 1.0001.
-const BRIGHTEST: f64 = 1.005;
+/// Cells of the random numbers for a furnace.
+const GRID: [u32; 2] = [16, 32];
 
 /// The roughnesses to try energy at.
 const ROUGHNESSES: [f32; 7] = [0.0, 0.1, 0.25, 0.4, 0.6, 0.8, 1.0];
@@ -626,8 +700,8 @@ fn white_metal_gives_everything_back_at_any_roughness() {
         let facets = Microfacets::new(roughness * roughness, roughness * roughness);
         let metal = Principled { metallic: 1.0, facets, ..Principled::DEFAULT };
         for wo in views() {
-            let share = even_furnace(&metal, wo);
-            assert!((0.997..BRIGHTEST).contains(&share), "{roughness} from {:?}: {share}", wo.vec());
+            let share = even_furnace(&metal, wo, GRID);
+            assert!(within(share, 0.997), "{roughness} from {:?}: {share:?}", wo.vec());
             count += 1;
         }
     }
@@ -639,7 +713,7 @@ fn white_dielectrics_give_everything_back_at_any_roughness() {
     let mut count = 0;
     for roughness in ROUGHNESSES {
         let alpha = roughness * roughness;
-        for eta in [1.1, 1.5, 2.4] {
+        for eta in [1.1, 2.4] {
             let f0 = Spectrum::splat(fresnel::dielectric(1.0, eta));
             let opaque =
                 Principled { facets: Microfacets::new(alpha, alpha), eta, f0, ..Principled::DEFAULT };
@@ -648,18 +722,14 @@ fn white_dielectrics_give_everything_back_at_any_roughness() {
             let solid = Principled { body: Body::Solid { spread: 0.0 }, ..pane };
             for (name, bsdf) in [("opaque", opaque), ("leaf", leaf), ("pane", pane), ("solid", solid)] {
                 for wo in views() {
-                    let share = even_furnace(&bsdf, wo);
-                    assert!(
-                        (0.995..BRIGHTEST).contains(&share),
-                        "{name} {roughness} {eta} from {:?}: {share}",
-                        wo.vec()
-                    );
+                    let share = even_furnace(&bsdf, wo, GRID);
+                    assert!(within(share, 0.995), "{name} {roughness} {eta} from {:?}: {share:?}", wo.vec());
                     count += 1;
                 }
             }
         }
     }
-    assert_eq!(count, 7 * 3 * 4 * 7);
+    assert_eq!(count, 7 * 2 * 4 * 7);
 }
 
 #[test]
@@ -673,12 +743,11 @@ fn white_layers_make_no_light_and_lose_little() {
             let cloth = Principled { sheen: Sheen::new(Spectrum::WHITE, roughness), ..base };
             for (name, bsdf) in [("coat", coat), ("cloth", cloth)] {
                 for wo in views() {
-                    let share = even_furnace(&bsdf, wo);
-                    // Fibres seen along the surface shine in few directions, which few samples find.
-                    let (least, most) = if name == "coat" { (0.8, BRIGHTEST) } else { (0.6, 1.02) };
+                    let share = even_furnace(&bsdf, wo, GRID);
+                    let least = if name == "coat" { 0.8 } else { 0.6 };
                     assert!(
-                        (least..most).contains(&share),
-                        "{name} {roughness} {metallic} from {:?}: {share}",
+                        within(share, least),
+                        "{name} {roughness} {metallic} from {:?}: {share:?}",
                         wo.vec()
                     );
                     count += 1;
@@ -694,8 +763,8 @@ fn white_brushed_metal_makes_no_light() {
     for (x, y) in [(0.3, 0.1), (0.6, 0.1), (1.0, 0.04), (1.0, 0.3)] {
         let metal = Principled { metallic: 1.0, facets: Microfacets::new(x, y), ..Principled::DEFAULT };
         for wo in views() {
-            let share = even_furnace(&metal, wo);
-            assert!((0.55..BRIGHTEST).contains(&share), "{x} {y} from {:?}: {share}", wo.vec());
+            let share = even_furnace(&metal, wo, GRID);
+            assert!(within(share, 0.55), "{x} {y} from {:?}: {share:?}", wo.vec());
         }
     }
 }
