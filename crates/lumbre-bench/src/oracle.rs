@@ -159,10 +159,10 @@ mod tests {
             let extent = accel.bounds().size().max_element();
             let built = program.build(&scene, 2).expect("a sound scene");
             for work in Work::ALL {
-                let list = rays::make(work, &scene, &accel, PictureSize { width: 48, height: 24 });
+                let list = rays::make(work, &scene, &accel, PictureSize { width: 192, height: 128 });
                 let wide: Vec<_> = list.iter().map(|ray| ray.to_f64()).collect();
                 let truths = sample(&scene, &wide, 4_000_000);
-                assert!(truths.len() > 100);
+                assert!(truths.len() > 100, "{}, {}: {} rays", recipe.name, work.name(), truths.len());
                 for query in Query::ALL {
                     let mut pass = built.tree.prepare(query, &list);
                     pass.reset();
