@@ -4,13 +4,14 @@ use std::fmt;
 use std::ops::ControlFlow;
 
 use lumbre_geometry::{Aabb, Ray, Surface};
-use lumbre_math::Transform;
+use lumbre_math::{DVec3, Transform};
 
 use crate::collapse::{Entry, Packed};
+use crate::holds::Holds;
 use crate::lanes::Level;
-use crate::node::Units;
+use crate::node::{Units, tag};
 use crate::query::{All, Any, Batch, Closest, Count, If};
-use crate::{Geometry, Hit, prepare, surface, traverse};
+use crate::{Geometry, GeometryKind, Hit, prepare, surface, traverse};
 
 /// A bounding volume hierarchy over geometries, ready for queries from any number of threads.
 ///
@@ -26,6 +27,7 @@ pub struct Accel {
     pub(crate) bounds: Aabb,
     pub(crate) primitives: usize,
     pub(crate) level: Level,
+    pub(crate) holds: Holds,
 }
 
 /// How a tree is built.
@@ -50,7 +52,8 @@ pub enum BuildError {
         /// The vertex or primitive.
         element: usize,
     },
-    /// More primitives than a tree can name (2^29 - 1).
+    /// More primitives than a tree can name (2^29 - 1), or so many small leaves of triangles that they fill more than 2^26
+    /// blocks of eight.
     TooMany,
 }
 
@@ -63,7 +66,12 @@ impl fmt::Display for BuildError {
             Self::NotFinite { geometry, element } => {
                 write!(f, "element {element} of geometry {geometry} has a coordinate that is not finite")
             }
-            Self::TooMany => write!(f, "more than {} primitives in one tree", prepare::MOST_PRIMITIVES),
+            Self::TooMany => write!(
+                f,
+                "too many primitives for one tree: at most {}, and {} blocks of triangles",
+                prepare::MOST_PRIMITIVES,
+                tag::BLOCK_PLACES
+            ),
         }
     }
 }
@@ -180,8 +188,19 @@ impl Accel {
             + bytes(&self.geometries)
             + bytes(&self.tree.nodes)
             + bytes(&self.tree.blocks)
+            + bytes(&self.tree.names)
             + bytes(&self.tree.entries)
             + bytes(&self.infinite)
+    }
+
+    /// What the corners of a mesh are relative to.
+    #[inline(always)]
+    pub(crate) fn mesh_origin(&self, geometry: u32) -> DVec3 {
+        match (self.holds.origin, &self.geometries[geometry as usize].kind) {
+            (Some(origin), _) => origin,
+            (None, GeometryKind::Mesh(mesh)) => mesh.origin,
+            _ => unreachable!("blocks are of meshes"),
+        }
     }
 
     /// The entry of an instance: those in the tree count first, then those outside it.

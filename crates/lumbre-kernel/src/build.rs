@@ -102,7 +102,7 @@ pub(crate) struct BinaryNode {
 const UNUSED: BinaryNode = BinaryNode { bounds: Bounds::EMPTY, count: 0, place: 0 };
 
 /// The most primitives in a leaf.
-pub(crate) const LEAF: usize = 4;
+pub(crate) const LEAF: usize = 8;
 const BINS: usize = 16;
 /// Levels that may be split by SAH; then come at most 32 more, each halving.
 const SAH_DEPTH: u32 = 64;

@@ -2,8 +2,8 @@
 
 use crate::build::{BinaryNode, Bounds, Kind, Primitive, Traits};
 use crate::node::{Node, WIDTH, tag};
-use crate::triangles::{BLOCK, TriangleBlock};
-use crate::{Geometry, GeometryKind, TriangleMesh};
+use crate::triangles::{BLOCK, BlockNames, TriangleBlock};
+use crate::{BuildError, Geometry, GeometryKind, TriangleMesh};
 
 /// A primitive in a leaf that is no triangle, or outside the tree.
 #[derive(Clone, Copy, Debug)]
@@ -37,25 +37,34 @@ impl Entry {
 pub(crate) struct Packed {
     pub(crate) nodes: Vec<Node>,
     pub(crate) blocks: Vec<TriangleBlock>,
+    /// As many as there are blocks.
+    pub(crate) names: Vec<BlockNames>,
     pub(crate) entries: Vec<Entry>,
     /// The reference to the root; `None` when there is nothing finite.
     pub(crate) root: Option<u32>,
 }
 
 /// Packs a binary tree. The depth of its recursion is that of the tree, which is bounded.
+///
+/// # Errors
+/// [`BuildError::TooMany`] when there are more triangle blocks than references can name.
 pub(crate) fn pack(
     geometries: &[Geometry],
     traits: &[Traits],
     primitives: &[Primitive],
     binary: &[BinaryNode],
-) -> Packed {
+) -> Result<Packed, BuildError> {
     let mut packer = Packer { geometries, traits, primitives, binary, packed: Packed::default() };
     let root = if binary[0].count > 0 { packer.leaf(0) } else { packer.inner(0) };
+    if packer.packed.blocks.len() > tag::BLOCK_PLACES as usize {
+        return Err(BuildError::TooMany);
+    }
     packer.packed.root = Some(root);
     packer.packed.nodes.shrink_to_fit();
     packer.packed.blocks.shrink_to_fit();
+    packer.packed.names.shrink_to_fit();
     packer.packed.entries.shrink_to_fit();
-    packer.packed
+    Ok(packer.packed)
 }
 
 struct Packer<'a> {
@@ -132,9 +141,9 @@ impl<'a> Packer<'a> {
         let mesh = self.mesh(geometry);
         let first = self.packed.blocks.len() as u32;
         for chunk in primitives.chunks(BLOCK) {
-            let mut block = TriangleBlock::empty(geometry, mesh.origin);
+            let (mut block, mut names) = (TriangleBlock::EMPTY, BlockNames::empty(geometry));
             for (lane, primitive) in chunk.iter().enumerate() {
-                block.primitives[lane] = primitive.primitive;
+                names.primitives[lane] = primitive.primitive;
                 for (corner, &vertex) in mesh.indices[primitive.primitive as usize].iter().enumerate() {
                     let position = mesh.positions[vertex as usize];
                     for axis in 0..3 {
@@ -143,9 +152,11 @@ impl<'a> Packer<'a> {
                 }
             }
             self.packed.blocks.push(block);
+            self.packed.names.push(names);
         }
-        self.packed.blocks.last_mut().expect("a leaf has a primitive").is_last = 1;
-        tag::reference(tag::TRIANGLES, first)
+        // Past the last place the tree is given up, so that it does not matter what this names.
+        let first = first.min(tag::BLOCK_PLACES - 1);
+        tag::triangles(first, primitives.len().div_ceil(BLOCK) as u32)
     }
 
     fn mesh(&self, geometry: u32) -> &'a TriangleMesh {

@@ -11,7 +11,7 @@ use crate::node::{BoxRay, Node, WIDTH};
 use crate::stack::{STACK, stack_entry};
 use crate::triangles::{BLOCK, Shear, TriangleBlock};
 
-/// What a search does eight boxes or four triangles at a time.
+/// What a search does eight at a time: boxes, and triangles.
 pub(crate) trait Lanes {
     /// Where the ray enters each of eight boxes, in an order of integers: see [`key`].
     type Keys: Copy;
@@ -278,28 +278,32 @@ impl Lanes for Avx2 {
             let (shear_x, shear_y) = (_mm256_set1_pd(shear.x), _mm256_set1_pd(shear.y));
             let (ox, oy, oz) =
                 (_mm256_set1_pd(origin[0]), _mm256_set1_pd(origin[1]), _mm256_set1_pd(origin[2]));
-            let mut x = [_mm256_setzero_pd(); 3];
-            let mut y = [_mm256_setzero_pd(); 3];
-            for corner in 0..3 {
-                let axes = &block.corners[corner];
-                let z = _mm256_sub_pd(_mm256_cvtps_pd(_mm_loadu_ps(axes[kz].as_ptr())), oz);
-                let across = _mm256_sub_pd(_mm256_cvtps_pd(_mm_loadu_ps(axes[kx].as_ptr())), ox);
-                let up = _mm256_sub_pd(_mm256_cvtps_pd(_mm_loadu_ps(axes[ky].as_ptr())), oy);
-                // No fused multiply-add: the bits are to be those of the scalar test.
-                x[corner] = _mm256_sub_pd(across, _mm256_mul_pd(shear_x, z));
-                y[corner] = _mm256_sub_pd(up, _mm256_mul_pd(shear_y, z));
+            let mut mask = 0;
+            for half in [0, BLOCK / 2] {
+                let mut x = [_mm256_setzero_pd(); 3];
+                let mut y = [_mm256_setzero_pd(); 3];
+                for corner in 0..3 {
+                    let axes = &block.corners[corner];
+                    let z = _mm256_sub_pd(_mm256_cvtps_pd(_mm_loadu_ps(axes[kz][half..].as_ptr())), oz);
+                    let across = _mm256_sub_pd(_mm256_cvtps_pd(_mm_loadu_ps(axes[kx][half..].as_ptr())), ox);
+                    let up = _mm256_sub_pd(_mm256_cvtps_pd(_mm_loadu_ps(axes[ky][half..].as_ptr())), oy);
+                    // No fused multiply-add: the bits are to be those of the scalar test.
+                    x[corner] = _mm256_sub_pd(across, _mm256_mul_pd(shear_x, z));
+                    y[corner] = _mm256_sub_pd(up, _mm256_mul_pd(shear_y, z));
+                }
+                let u = _mm256_sub_pd(_mm256_mul_pd(x[2], y[1]), _mm256_mul_pd(y[2], x[1]));
+                let v = _mm256_sub_pd(_mm256_mul_pd(x[0], y[2]), _mm256_mul_pd(y[0], x[2]));
+                let w = _mm256_sub_pd(_mm256_mul_pd(x[1], y[0]), _mm256_mul_pd(y[1], x[0]));
+                let zero = _mm256_setzero_pd();
+                let least = _mm256_min_pd(_mm256_min_pd(u, v), w);
+                let most = _mm256_max_pd(_mm256_max_pd(u, v), w);
+                let sided = _mm256_or_pd(
+                    _mm256_cmp_pd::<_CMP_GE_OQ>(least, zero),
+                    _mm256_cmp_pd::<_CMP_LE_OQ>(most, zero),
+                );
+                mask |= (_mm256_movemask_pd(sided) as u32) << half;
             }
-            let u = _mm256_sub_pd(_mm256_mul_pd(x[2], y[1]), _mm256_mul_pd(y[2], x[1]));
-            let v = _mm256_sub_pd(_mm256_mul_pd(x[0], y[2]), _mm256_mul_pd(y[0], x[2]));
-            let w = _mm256_sub_pd(_mm256_mul_pd(x[1], y[0]), _mm256_mul_pd(y[1], x[0]));
-            let zero = _mm256_setzero_pd();
-            let least = _mm256_min_pd(_mm256_min_pd(u, v), w);
-            let most = _mm256_max_pd(_mm256_max_pd(u, v), w);
-            let sided = _mm256_or_pd(
-                _mm256_cmp_pd::<_CMP_GE_OQ>(least, zero),
-                _mm256_cmp_pd::<_CMP_LE_OQ>(most, zero),
-            );
-            _mm256_movemask_pd(sided) as u32
+            mask
         }
     }
 }

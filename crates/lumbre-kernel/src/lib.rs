@@ -5,6 +5,7 @@ mod build;
 mod collapse;
 mod geometry;
 mod hit;
+mod holds;
 mod lanes;
 mod node;
 mod prepare;

@@ -32,7 +32,7 @@ pub(crate) mod tag {
     pub(crate) const PLACE: u32 = (1 << SHIFT) - 1;
     /// A node.
     pub(crate) const INNER: u32 = 0;
-    /// The first of some triangle blocks.
+    /// Some triangle blocks in a row: see [`triangles`].
     pub(crate) const TRIANGLES: u32 = 1;
     /// The first of some leaf entries that are shapes.
     pub(crate) const SHAPES: u32 = 2;
@@ -45,6 +45,24 @@ pub(crate) mod tag {
 
     pub(crate) const fn reference(tag: u32, place: u32) -> u32 {
         tag << SHIFT | place
+    }
+
+    /// Blocks that a leaf of triangles may have.
+    pub(crate) const MOST_BLOCKS: u32 = 1 << COUNT_BITS;
+    /// Places that blocks may have.
+    pub(crate) const BLOCK_PLACES: u32 = 1 << (SHIFT - COUNT_BITS);
+    const COUNT_BITS: u32 = 3;
+
+    /// A leaf of triangles: 26 bits for its first block, three for how many there are, 1 to 8.
+    pub(crate) const fn triangles(first: u32, count: u32) -> u32 {
+        reference(TRIANGLES, first << COUNT_BITS | (count - 1))
+    }
+
+    /// The blocks of a leaf of triangles.
+    #[inline(always)]
+    pub(crate) const fn blocks(reference: u32) -> std::ops::Range<usize> {
+        let first = ((reference & PLACE) >> COUNT_BITS) as usize;
+        first..first + (reference & (MOST_BLOCKS - 1)) as usize + 1
     }
 }
 

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use crate::build::{Bounds, Kind, Primitive, Traits, binary_tree};
 use crate::collapse::{Entry, Packed, pack};
+use crate::holds::Holds;
 use crate::lanes::Level;
 use crate::node::{Node, Units, tag};
 use crate::{Accel, BuildError, Geometry, GeometryKind, Instance, TriangleMesh};
@@ -42,10 +43,11 @@ pub(crate) fn build(geometries: Vec<Geometry>) -> Result<Accel, BuildError> {
         Packed::default()
     } else {
         let binary = binary_tree(&mut primitives, &traits);
-        pack(&geometries, &traits, &primitives, &binary)
+        pack(&geometries, &traits, &primitives, &binary)?
     };
     Ok(Accel {
         units,
+        holds: Holds::new(&geometries, &tree.blocks),
         tree,
         infinite: parts.infinite,
         bounds: parts.bounds,

@@ -196,7 +196,7 @@ impl<S: Search> Task for Traversal<'_, '_, S> {
             let first = (reference & tag::PLACE) as usize;
             match reference >> tag::SHIFT {
                 tag::TRIANGLES => {
-                    let is_over = meet_blocks::<L, S>(&mut frame, first, &place, search, touches);
+                    let is_over = meet_blocks::<L, S>(&mut frame, reference, &place, search, touches);
                     if is_over {
                         return true;
                     }
@@ -275,21 +275,24 @@ fn enter<S: Search>(
 #[inline(always)]
 fn meet_blocks<'a, L: Lanes, S: Search>(
     frame: &mut Frame<'a>,
-    first: usize,
+    reference: u32,
     place: &Place,
     search: &mut S,
     touches: &mut Vec<Touch<'a>>,
 ) -> bool {
     let mut found_any = false;
     let accel = frame.accel;
-    for block in &accel.tree.blocks[first..] {
-        let origin = frame.shear.local_origin(frame.ray.origin, &block.origin);
+    let places = tag::blocks(reference);
+    let all_names = &accel.tree.names[places.clone()];
+    for (block, names) in accel.tree.blocks[places].iter().zip(all_names) {
+        let mesh_origin = accel.mesh_origin(names.geometry);
+        let origin = frame.shear.local_origin(frame.ray.origin, &mesh_origin.to_array());
         let mut mask = L::meet_triangles(block, &frame.shear, &origin);
         while mask != 0 {
             let lane = mask.trailing_zeros() as usize % BLOCK;
             mask &= mask - 1;
             let corners = block.triangle(lane);
-            let (geometry, primitive) = (block.geometry, block.primitives[lane]);
+            let (geometry, primitive) = (names.geometry, names.primitives[lane]);
             let root = match triangles::intersect(&frame.ray, &frame.shear, &origin, &corners) {
                 Meeting::Miss => continue,
                 Meeting::Hit(root) => root,
@@ -315,9 +318,6 @@ fn meet_blocks<'a, L: Lanes, S: Search>(
             if search.offer(&Found { root, geometry, primitive, order: 0, accel, place }) {
                 return true;
             }
-        }
-        if block.is_last != 0 {
-            break;
         }
     }
     if found_any {

@@ -1,4 +1,4 @@
-//! Triangles packed by four, and the watertight test.
+//! Triangles packed by eight, and the watertight test.
 //!
 //! After S. Woop, C. Benthin, I. Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013. It differs from theirs in
 //! three ways. Everything after the load is in f64. An edge function whose products are equal is redone exactly, so that
@@ -14,37 +14,37 @@ use lumbre_math::{DVec2, DVec3};
 use crate::touch::Feature;
 
 /// Triangles in a block.
-pub(crate) const BLOCK: usize = 4;
+pub(crate) const BLOCK: usize = 8;
 
-/// Up to four triangles of one mesh. Unused lanes have NaN corners, which no ray hits.
+/// Up to eight triangles of one mesh. Unused lanes have NaN corners, which no ray hits.
 #[derive(Clone, Debug)]
-#[repr(C, align(64))]
+#[repr(C, align(32))]
 pub(crate) struct TriangleBlock {
-    /// `corners[corner][axis][lane]`, relative to `origin`.
+    /// `corners[corner][axis][lane]`, relative to the mesh's origin.
     pub(crate) corners: [[[f32; BLOCK]; 3]; 3],
-    /// The mesh's origin.
-    pub(crate) origin: [f64; 3],
+}
+
+const _: () = assert!(size_of::<TriangleBlock>() == 288);
+
+/// What the triangles of a block are called: apart from their corners, for only the winner of a search is asked.
+#[derive(Clone, Debug)]
+pub(crate) struct BlockNames {
     /// Positions in the mesh's list.
     pub(crate) primitives: [u32; BLOCK],
     /// Position of the mesh in the tree's list.
     pub(crate) geometry: u32,
-    /// 1 in the last block of a leaf, else 0.
-    pub(crate) is_last: u32,
 }
 
-const _: () = assert!(size_of::<TriangleBlock>() == 192);
+impl BlockNames {
+    /// The names in a block without triangles.
+    pub(crate) fn empty(geometry: u32) -> Self {
+        Self { primitives: [u32::MAX; BLOCK], geometry }
+    }
+}
 
 impl TriangleBlock {
     /// A block without triangles.
-    pub(crate) fn empty(geometry: u32, origin: DVec3) -> Self {
-        Self {
-            corners: [[[f32::NAN; BLOCK]; 3]; 3],
-            origin: origin.to_array(),
-            primitives: [u32::MAX; BLOCK],
-            geometry,
-            is_last: 0,
-        }
-    }
+    pub(crate) const EMPTY: Self = Self { corners: [[[f32::NAN; BLOCK]; 3]; 3] };
 
     /// The corners in one lane.
     #[inline(always)]

@@ -160,9 +160,9 @@ fn boxes_hold_their_children_and_every_primitive_has_one_place() {
     let others = accel.tree.entries.len();
     let in_blocks: usize = accel
         .tree
-        .blocks
+        .names
         .iter()
-        .map(|block| block.primitives.iter().filter(|&&primitive| primitive != u32::MAX).count())
+        .map(|names| names.primitives.iter().filter(|&&primitive| primitive != u32::MAX).count())
         .sum();
     assert_eq!(in_blocks, triangles);
     assert_eq!(in_blocks + others, accel.primitive_count());
