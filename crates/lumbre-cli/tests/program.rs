@@ -170,6 +170,29 @@ fn a_crop_has_the_pixels_of_the_whole() {
 }
 
 #[test]
+fn a_scene_file_without_light_is_black_and_that_is_said() {
+    let desk = Desk::new();
+    let dark = "Film \"rgb\" \"integer xresolution\" 9 \"integer yresolution\" 6\nLookAt 3 -9 4 3 0 1 0 0 1\n\
+        Camera \"perspective\"\nWorldBegin\nTranslate 3 0 1\nShape \"sphere\"\n";
+    desk.write("dark.pbrt", dark);
+    let out = desk.lumbre(&["render", "dark.pbrt", "-o", "dark.pfm", "--spp", "2", "--progress", "none"]);
+    assert_eq!(code(&out), 0, "{}", stderr(&out));
+    assert!(
+        stderr(&out).contains("warning: dark.pbrt: the scene has no light, its picture is black"),
+        "{}",
+        stderr(&out)
+    );
+    let picture = lumbre::read_image(&desk.path("dark.pfm")).unwrap();
+    assert!(picture.pixels().iter().all(|p| p.to_array() == [0.0; 3]));
+    let strict = desk.lumbre(&["render", "dark.pbrt", "-o", "strict.pfm", "--strict"]);
+    assert_eq!(code(&strict), 3, "{}", stderr(&strict));
+    assert!(!desk.path("strict.pfm").exists());
+    // What needs no light is seen.
+    let normals = desk.lumbre(&["render", "dark.pbrt", "-o", "n.pfm", "--integrator", "normals", "--strict"]);
+    assert_eq!((code(&normals), stderr(&normals).contains("no light")), (0, false), "{}", stderr(&normals));
+}
+
+#[test]
 fn a_broken_scene_is_refused_with_its_place() {
     let desk = Desk::new();
     desk.write("broken.pbrt", "WorldBegin\n  Shape \"sphere\" \"float radius\" -2\n");
