@@ -12,7 +12,9 @@ use lumbre_geometry::Shape;
 use lumbre_image::Rgb;
 use lumbre_math::{DVec3, Vec2, Vec3};
 use lumbre_scene::{CameraKind, GeometryDesc, LightDesc, MeshDesc, Scene, SceneDesc, ShapeDesc};
-use lumbre_shading::MaterialKind;
+use lumbre_shading::{
+    FloatTexture, MaterialKind, PrincipledParams, SpectrumTexture, TextureContext, VertexData,
+};
 
 /// A GLB of a JSON and its first buffer.
 fn glb(json: &str, binary: &[u8]) -> Vec<u8> {
@@ -477,51 +479,138 @@ fn punctual_lights_keep_their_candelas_and_lux() {
     Scene::build(scene).unwrap();
 }
 
-#[test]
-fn materials_become_what_there_is() {
-    let kinds = [
-        (r#"{"pbrMetallicRoughness":{"metallicFactor":0}}"#, "coateddiffuse"),
-        (r#"{"pbrMetallicRoughness":{"metallicFactor":1,"roughnessFactor":0.3}}"#, "conductor"),
-        (r#"{"pbrMetallicRoughness":{"metallicFactor":0.4}}"#, "mix"),
-        (
-            r#"{"pbrMetallicRoughness":{"metallicFactor":0},"extensions":{"KHR_materials_specular":{"specularFactor":0}}}"#,
-            "diffuse",
-        ),
-        (
-            r#"{"pbrMetallicRoughness":{"metallicFactor":0},"extensions":{"KHR_materials_transmission":{"transmissionFactor":1}}}"#,
-            "thindielectric",
-        ),
-        (
-            r#"{"pbrMetallicRoughness":{"metallicFactor":0},"extensions":{"KHR_materials_transmission":{"transmissionFactor":1},
-            "KHR_materials_volume":{"thicknessFactor":2},"KHR_materials_ior":{"ior":1.7}}}"#,
-            "dielectric",
-        ),
-        (
-            r#"{"extensions":{"KHR_materials_diffuse_transmission":{"diffuseTransmissionFactor":0.5}}}"#,
-            "diffusetransmission",
-        ),
-        (r#"{"extensions":{"KHR_materials_unlit":{}}}"#, "diffuse"),
-        (
-            r#"{"extensions":{"KHR_materials_pbrSpecularGlossiness":{"specularFactor":[0.04,0.04,0.04]}}}"#,
-            "coateddiffuse",
-        ),
-    ];
-    for (material, kind) in kinds {
-        let mut parts = Parts::default();
-        let p = parts.positions(&SQUARE);
-        let rest = format!(
-            r#""materials":[{material}],{}"#,
-            one(&format!(r#""material":0,"attributes":{{"POSITION":{p}}}"#))
-        );
-        let scene = parts.read(&rest);
-        assert_eq!(scene.materials[0].material.kind.name(), kind, "{material}");
-        if let MaterialKind::Dielectric { eta, .. } = scene.materials[0].material.kind {
-            assert_eq!(eta, 1.7);
-        }
-        let shines = scene.shapes[0].area_light.is_some();
-        assert_eq!(shines, material.contains("unlit"), "{material}");
-        Scene::build(scene).unwrap();
+/// A place to look textures up at.
+fn place(colour: Rgb) -> TextureContext {
+    TextureContext {
+        point: DVec3::ONE,
+        normal: Vec3::Z,
+        uv: Vec2::new(0.3, 0.6),
+        dpdx: Vec3::ZERO,
+        dpdy: Vec3::ZERO,
+        duv_dx: Vec2::ZERO,
+        duv_dy: Vec2::ZERO,
+        vertex: VertexData { colour, ..VertexData::NONE },
     }
+}
+
+/// A scene of one square of a material, with an image whose bytes are 51, 102 and 204 at every place.
+fn dressed(material: &str) -> (SceneDesc, Diagnostics) {
+    let mut parts = Parts::default();
+    let p = parts.positions(&SQUARE);
+    let uv = parts.add(&floats(&[0.0; 8]), r#""componentType":5126,"type":"VEC2","count":4"#);
+    let image = picture([51, 102, 204], image::ImageFormat::Png);
+    let start = parts.binary.len();
+    parts.binary.extend_from_slice(&image);
+    parts.views.push(format!(r#"{{"buffer":0,"byteOffset":{start},"byteLength":{}}}"#, image.len()));
+    let view = parts.views.len() - 1;
+    let one = one(&format!(r#""mode":6,"material":0,"attributes":{{"POSITION":{p},"TEXCOORD_0":{uv}}}"#));
+    let rest = format!(
+        r#""images":[{{"bufferView":{view},"mimeType":"image/png"}}],"textures":[{{"source":0}}],"materials":[{material}],{one}"#
+    );
+    let mut diagnostics = Diagnostics::new();
+    let scene = read_with(&glb(&parts.json(&rest), &parts.binary), &GltfOptions::default(), &mut diagnostics);
+    (scene.unwrap(), diagnostics)
+}
+
+fn principled(material: &str) -> PrincipledParams {
+    let (scene, diagnostics) = dressed(material);
+    assert_eq!(diagnostics.warnings(), 0, "{material}: {:?}", diagnostics.lines());
+    let MaterialKind::Principled(params) = scene.materials[0].material.kind.clone() else {
+        panic!("{material}: {:?}", scene.materials[0].material.kind)
+    };
+    Scene::build(scene).unwrap();
+    *params
+}
+
+#[test]
+fn every_parameter_of_a_material_arrives() {
+    let with = |name: &str, rest: &str| {
+        principled(&format!(r#"{{"extensions":{{"KHR_materials_{name}":{{{rest}}}}}}}"#))
+    };
+    let number = |texture: &FloatTexture| texture.evaluate(&place(Rgb::WHITE));
+    let colour = |texture: &SpectrumTexture| texture.evaluate(&place(Rgb::WHITE));
+    let close = |a: f32, b: f32| (a - b).abs() < 1e-5;
+    // The image on the sRGB curve, and as it is.
+    let srgb = Rgb::new(0.033_104_77, 0.132_868_33, 0.603_827_36);
+    let near = |a: Rgb, b: Rgb| (a - b).map(f32::abs).max_component() < 1e-4;
+
+    let plain = principled("{}");
+    assert_eq!((number(&plain.metallic), number(&plain.roughness), plain.ior), (1.0, 1.0, 1.5));
+    assert!(plain.volume.is_none() && number(&plain.transmission) == 0.0);
+    let core = principled(
+        r#"{"pbrMetallicRoughness":{"baseColorFactor":[0.5,1,0.25,1],"baseColorTexture":{"index":0},"metallicFactor":0.5,
+        "roughnessFactor":0.25,"metallicRoughnessTexture":{"index":0}}}"#,
+    );
+    assert!(near(colour(&core.base_color), srgb * Rgb::new(0.5, 1.0, 0.25)));
+    assert!(close(number(&core.metallic), 0.4) && close(number(&core.roughness), 0.1));
+
+    let specular = with(
+        "specular",
+        r#""specularFactor":0.5,"specularColorFactor":[2,1,0.5],"specularColorTexture":{"index":0}"#,
+    );
+    assert!(close(number(&specular.specular), 0.5));
+    assert!(near(colour(&specular.specular_color), srgb * Rgb::new(2.0, 1.0, 0.5)));
+    assert_eq!(with("ior", r#""ior":1.7"#).ior, 1.7);
+    let clear = with("transmission", r#""transmissionFactor":0.5,"transmissionTexture":{"index":0}"#);
+    assert!(close(number(&clear.transmission), 0.1) && clear.volume.is_none());
+    let volume =
+        with("volume", r#""thicknessFactor":2,"attenuationDistance":3,"attenuationColor":[0.5,0.25,1]"#);
+    let inside = volume.volume.unwrap();
+    assert_eq!((inside.attenuation_distance, inside.attenuation_color), (3.0, Rgb::new(0.5, 0.25, 1.0)));
+    assert_eq!(with("dispersion", r#""dispersion":0.4"#).dispersion, 0.4);
+    let through = with(
+        "diffuse_transmission",
+        r#""diffuseTransmissionFactor":0.25,"diffuseTransmissionColorFactor":[0.5,1,1],"diffuseTransmissionColorTexture":{"index":0}"#,
+    );
+    assert_eq!(number(&through.diffuse_transmission), 0.25);
+    assert!(near(colour(&through.diffuse_transmission_color), srgb * Rgb::new(0.5, 1.0, 1.0)));
+    let coat = with(
+        "clearcoat",
+        r#""clearcoatFactor":0.5,"clearcoatTexture":{"index":0},"clearcoatRoughnessFactor":0.5,
+        "clearcoatRoughnessTexture":{"index":0},"clearcoatNormalTexture":{"index":0,"scale":0.5}"#,
+    );
+    assert!(close(number(&coat.clearcoat), 0.1) && close(number(&coat.clearcoat_roughness), 0.2));
+    assert!(coat.clearcoat_normal.is_some());
+    let sheen = with("sheen", r#""sheenColorFactor":[1,0.5,0],"sheenRoughnessFactor":0.5"#);
+    assert_eq!((colour(&sheen.sheen_color), number(&sheen.sheen_roughness)), (Rgb::new(1.0, 0.5, 0.0), 0.5));
+    let film = with(
+        "iridescence",
+        r#""iridescenceFactor":0.5,"iridescenceTexture":{"index":0},"iridescenceIor":1.6,"iridescenceThicknessMinimum":200,
+        "iridescenceThicknessMaximum":700,"iridescenceThicknessTexture":{"index":0}"#,
+    );
+    assert!(close(number(&film.iridescence), 0.1) && film.iridescence_ior == 1.6);
+    assert!((number(&film.iridescence_thickness) - 400.0).abs() < 0.1);
+    assert_eq!(number(&with("iridescence", r#""iridescenceFactor":1"#).iridescence_thickness), 400.0);
+    let brushed = with(
+        "anisotropy",
+        r#""anisotropyStrength":0.6,"anisotropyRotation":1.5,"anisotropyTexture":{"index":0}"#,
+    );
+    assert_eq!((number(&brushed.anisotropy), brushed.anisotropy_rotation), (0.6, 1.5));
+    assert!(near(colour(brushed.anisotropy_texture.as_ref().unwrap()), Rgb::new(0.2, 0.4, 0.8)));
+    let older = with(
+        "pbrSpecularGlossiness",
+        r#""diffuseFactor":[0.5,0.25,1,1],"specularFactor":[0.9,0.5,0.25],"glossinessFactor":0.75"#,
+    );
+    assert_eq!(
+        (colour(&older.base_color), colour(&older.specular_color)),
+        (Rgb::new(0.5, 0.25, 1.0), Rgb::new(0.9, 0.5, 0.25))
+    );
+    assert_eq!((number(&older.roughness), number(&older.metallic), older.ior), (0.25, 0.0, 0.0));
+}
+
+#[test]
+fn unlit_shines_and_what_scatters_inside_is_said_to_be_left_out() {
+    let (scene, _) = dressed(
+        r#"{"extensions":{"KHR_materials_unlit":{}},"pbrMetallicRoughness":{"baseColorFactor":[0.5,0.25,1,1]}}"#,
+    );
+    assert_eq!(scene.materials[0].material.kind.name(), "diffuse");
+    let light = scene.shapes[0].area_light.as_ref().unwrap();
+    assert!(light.radiance == Rgb::new(0.5, 0.25, 1.0) && light.two_sided);
+    let volume = r#"{"extensions":{"KHR_materials_volume":{"thicknessFactor":1},
+        "KHR_materials_volume_scatter":{"multiscatterColor":[0.5,0.5,0.5]}}}"#;
+    let (_, diagnostics) = dressed(volume);
+    let text = diagnostics.lines().join("\n");
+    assert!(text.contains("scattering inside volumes"), "{text}");
 }
 
 #[test]
@@ -536,7 +625,7 @@ fn coverage_is_by_mode_and_light_by_strength() {
         let one = one(&format!(r#""mode":6,"material":0,"attributes":{{"POSITION":{p},"COLOR_0":{c}}}"#));
         parts.read(&format!(r#""materials":[{material}],{one}"#)).shapes[0].clone()
     };
-    let at = lumbre_shading::TextureContext {
+    let at = TextureContext {
         point: DVec3::ONE,
         normal: Vec3::Z,
         uv: Vec2::ZERO,
@@ -544,7 +633,7 @@ fn coverage_is_by_mode_and_light_by_strength() {
         dpdy: Vec3::ZERO,
         duv_dx: Vec2::ZERO,
         duv_dy: Vec2::ZERO,
-        vertex: lumbre_shading::VertexData { coverage: 128.0 / 255.0, ..lumbre_shading::VertexData::NONE },
+        vertex: VertexData { coverage: 128.0 / 255.0, ..VertexData::NONE },
     };
     let coverage = |material: &str| with(material).alpha.map(|alpha| alpha.evaluate(&at));
     let colour = r#""pbrMetallicRoughness":{"baseColorFactor":[1,1,1,0.5]}"#;

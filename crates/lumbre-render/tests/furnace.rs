@@ -8,10 +8,12 @@ use std::sync::Arc;
 use common::*;
 use lumbre_geometry::{Cuboid, Shape, Sphere, Torus};
 use lumbre_image::Rgb;
-use lumbre_math::DVec3;
+use lumbre_math::{DVec3, Vec3};
 use lumbre_render::{CancelToken, NoProgress, render_with};
-use lumbre_scene::{Scene, SceneDesc};
-use lumbre_shading::{Material, MaterialKind, Roughness, SpectrumTexture};
+use lumbre_scene::{GeometryDesc, MeshDesc, Scene, SceneDesc};
+use lumbre_shading::{
+    FloatTexture, Material, MaterialKind, PrincipledParams, Roughness, SpectrumTexture, VolumeParams,
+};
 use lumbre_transport::{Path, Strategy};
 
 const CENTER: DVec3 = DVec3::new(3.0, -7.0, 11.0);
@@ -29,9 +31,14 @@ fn room(shape: Shape, reflectance: f32) -> SceneDesc {
 /// The mean of the picture is 1 however light is found: by paths of 40 bounces without roulette, and with roulette too,
 /// whose noise asks for more samples.
 fn assert_white(desc: SceneDesc, what: &str) {
-    let scene = Scene::build(desc).unwrap();
     // Lights alone are noisy where they are near: the tolerance is that of the noise.
-    for (strategy, share) in [(Strategy::Both, 2e-3), (Strategy::Lights, 1.5e-2), (Strategy::Bsdf, 2e-3)] {
+    let all = [(Strategy::Both, 2e-3), (Strategy::Lights, 1.5e-2), (Strategy::Bsdf, 2e-3)];
+    assert_white_by(desc, &all, what);
+}
+
+fn assert_white_by(desc: SceneDesc, strategies: &[(Strategy, f64)], what: &str) {
+    let scene = Scene::build(desc).unwrap();
+    for &(strategy, share) in strategies {
         let path = Path { strategy, sure_bounces: 1000, ..Path::new(40) };
         let options = options(&scene, 12, 12, 64);
         let rendered = render_with(&scene, &options, &path, &NoProgress, &CancelToken::new()).unwrap();
@@ -101,4 +108,67 @@ fn what_absorbs_nothing_cannot_be_seen_in_a_white_room() {
             assert_white(desc, &what);
         }
     }
+}
+
+/// Layered materials that absorb nothing.
+fn principled() -> Vec<(&'static str, Material)> {
+    let number = |v: f32| Arc::new(FloatTexture::Constant(v));
+    let white = |metallic: f32, roughness: f32, transmission: f32, volume: bool| {
+        Material::new(MaterialKind::Principled(Box::new(PrincipledParams {
+            metallic: number(metallic),
+            roughness: number(roughness),
+            transmission: number(transmission),
+            volume: volume.then(VolumeParams::default),
+            ..PrincipledParams::default()
+        })))
+    };
+    vec![
+        ("polished metal", white(1.0, 0.0, 0.0, false)),
+        ("rough metal", white(1.0, 0.7, 0.0, false)),
+        ("glossy plastic", white(0.0, 0.2, 0.0, false)),
+        ("rough pane", white(0.0, 0.5, 1.0, false)),
+        ("clear solid", white(0.0, 0.0, 1.0, true)),
+        ("rough solid", white(0.0, 0.4, 1.0, true)),
+    ]
+}
+
+/// A coarse sphere whose vertices have the normals of the sphere: shading normals are up to 30 degrees off.
+fn coarse_sphere(center: DVec3, radius: f64) -> GeometryDesc {
+    let corners = [DVec3::X, DVec3::Y, -DVec3::X, -DVec3::Y, DVec3::Z, -DVec3::Z];
+    // An octahedron, each edge halved once.
+    let mut unit: Vec<DVec3> = vec![];
+    let mut triangles = vec![];
+    for pole in [4, 5] {
+        for side in 0..4 {
+            let (a, b) = (corners[side], corners[(side + 1) % 4]);
+            let (a, b) = if pole == 4 { (a, b) } else { (b, a) };
+            let c = corners[pole];
+            let middle = |p: DVec3, q: DVec3| (p + q).normalize();
+            let points = [a, b, c, middle(a, b), middle(b, c), middle(c, a)];
+            let first = unit.len() as u32;
+            unit.extend(points);
+            triangles.extend([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]].map(|t| t.map(|i| first + i)));
+        }
+    }
+    GeometryDesc::Mesh(Arc::new(MeshDesc {
+        positions: unit.iter().map(|n| (center + radius * *n).as_vec3()).collect(),
+        normals: Some(unit.iter().map(|n| n.as_vec3()).collect::<Vec<Vec3>>()),
+        triangles,
+        ..MeshDesc::default()
+    }))
+}
+
+#[test]
+fn shading_normals_take_nothing_from_what_absorbs_nothing() {
+    let mut count = 0;
+    for (name, material) in conserving().into_iter().chain(principled()) {
+        let mut desc = room(Sphere::new(CENTER, 2.5).unwrap().into(), 0.25);
+        let material = add_material(&mut desc, material);
+        add(&mut desc, coarse_sphere(CENTER + DVec3::new(0.5, 0.25, -0.25), 0.75), material);
+        desc.cameras = vec![look(CENTER - DVec3::new(0.3, 2.2, 0.4), CENTER, 60.0)];
+        // By lights alone a narrow lobe is all noise.
+        assert_white_by(desc, &[(Strategy::Both, 3e-3), (Strategy::Bsdf, 3e-3)], name);
+        count += 1;
+    }
+    assert_eq!(count, 11);
 }

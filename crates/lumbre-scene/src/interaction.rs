@@ -2,7 +2,7 @@
 
 use lumbre_geometry::{Ray, Surface};
 use lumbre_math::{DVec3, Vec2};
-use lumbre_shading::{Bsdf, LocalSurface, Material, ShadingFrame, Spectrum, TextureContext};
+use lumbre_shading::{Bsdf, LocalSurface, Material, Parts, ShadingFrame, Spectrum, TextureContext};
 
 use crate::light::{LightId, LightSample};
 use crate::{Emission, Footprint};
@@ -39,7 +39,7 @@ pub struct Interaction<'s> {
     pub(crate) spread: f64,
 }
 
-impl Interaction<'_> {
+impl<'s> Interaction<'s> {
     /// Surface parameters, as textures see them.
     pub fn uv(&self) -> Vec2 {
         self.at.uv
@@ -50,21 +50,21 @@ impl Interaction<'_> {
         self.emission.map_or(Spectrum::BLACK, |emission| emission.at(self.front, self.at.uv))
     }
 
-    /// The shading frame and how the surface scatters; `None` for an interface.
-    pub fn scattering(&self) -> Option<(ShadingFrame, Bsdf)> {
-        let material = self.material?.resolve(&self.at, self.towards_origin.as_vec3());
-        material.shading(&self.at, &self.shading)
+    /// The one material that applies here; `None` for an interface.
+    pub fn resolved(&self) -> Option<&'s Material> {
+        Some(self.material?.resolve(&self.at, self.towards_origin.as_vec3()))
     }
 
-    /// [`Interaction::scattering`] of every material of a mixture, with its share. A mixture whose own share is less than
-    /// `least` is not taken apart (see [`Material::parts`]).
-    pub fn scattering_parts(&self, least: f32) -> impl Iterator<Item = (f32, ShadingFrame, Bsdf)> + '_ {
+    /// Every material of a mixture that applies here, with its share. A mixture whose own share is less than `least` is not
+    /// taken apart (see [`Material::parts`]).
+    pub fn parts(&self, least: f32) -> Parts<'s> {
         let wo = self.towards_origin.as_vec3();
-        let parts = self.material.map(|material| material.parts(&self.at, wo, least));
-        parts.into_iter().flatten().filter_map(|(share, material)| {
-            let bsdf = material.bsdf(&self.at)?;
-            Some((share, material.frame(&self.at, &self.shading), bsdf))
-        })
+        self.material.map_or_else(Parts::new, |material| material.parts(&self.at, wo, least))
+    }
+
+    /// The shading frame and how the surface scatters; `None` for an interface.
+    pub fn scattering(&self) -> Option<(ShadingFrame, Bsdf)> {
+        self.resolved()?.shading(&self.at, &self.shading, self.towards_origin.as_vec3())
     }
 
     /// The ray that leaves along a unit direction, from beyond the error of the point.

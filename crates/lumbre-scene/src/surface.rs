@@ -226,6 +226,7 @@ impl Dressed {
         self.surface.dndu = -self.surface.dndu;
         self.surface.dndv = -self.surface.dndv;
         self.shading.normal = -self.shading.normal;
+        self.shading.geometric = -self.shading.geometric;
         self.shading.dndu = -self.shading.dndu;
         self.shading.dndv = -self.shading.dndv;
     }
@@ -240,6 +241,8 @@ fn plain(surface: &Surface) -> Dressed {
             dpdv: surface.dpdv.as_vec3(),
             dndu: surface.dndu.as_vec3(),
             dndv: surface.dndv.as_vec3(),
+            geometric: surface.normal.as_vec3(),
+            handedness: 1.0,
         },
         vertex: VertexData::NONE,
     }

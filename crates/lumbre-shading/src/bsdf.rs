@@ -128,6 +128,16 @@ impl Bsdf {
         }
     }
 
+    /// The same surface where what lies outside of it is not vacuum but has an index of refraction of its own: a solid
+    /// inside another. Only [`Principled`] solids know their index against vacuum; others stay as they are.
+    #[must_use]
+    pub fn immersed(self, outside: f32) -> Self {
+        match self {
+            Self::Principled(bsdf) => Self::Principled(bsdf.immersed(outside)),
+            other => other,
+        }
+    }
+
     /// The same, with its mirrors and the parts that are nearly so made rough: less noise and fewer sharp details, for
     /// the parts of a path that no one sees directly. Each α below 0.3 becomes twice as large, at least 0.1 and at most
     /// 0.3. A thin pane stays as it is: light goes straight through it.

@@ -208,6 +208,11 @@ pub struct LocalSurface {
     pub dndu: Vec3,
     /// ∂n/∂v.
     pub dndv: Vec3,
+    /// The normal of the surface as it is, unit.
+    pub geometric: Vec3,
+    /// Which side of the tangent the bitangent of normal maps is on: 1 for normal × tangent, -1 where the texture lies
+    /// mirrored.
+    pub handedness: f32,
 }
 
 impl Material {
@@ -261,6 +266,7 @@ impl Material {
                     let base = reflectance.is_constant() && smooth(roughness);
                     base && thickness.is_constant() && g.is_constant() && albedo.is_constant()
                 }
+                MaterialKind::Principled(params) => params.is_uniform(),
                 MaterialKind::Mix { materials, amount } => {
                     rest.extend(materials.iter().map(|material| &**material));
                     amount.is_constant()
@@ -317,20 +323,37 @@ impl Material {
         plain()
     }
 
-    /// The frame to shade in, and how the surface scatters there: [`Material::frame`] and [`Material::bsdf`], with a clear
-    /// coat in its place. (It follows its own normal map, or the surface below the bumps of the base where it has none.)
-    pub fn shading(&self, at: &TextureContext, surface: &LocalSurface) -> Option<(ShadingFrame, Bsdf)> {
+    /// The frame to shade in towards `towards` (unit, world space), and how the surface scatters there: [`Material::frame`]
+    /// and [`Material::bsdf`], with a clear coat in its place. (It follows its own normal map, or the surface below the
+    /// bumps of the base where it has none.)
+    ///
+    /// Where a normal is turned away from the side of the surface that is seen, it comes back as far as it takes to see
+    /// it: the silhouettes of coarse meshes with smooth normals, and steep bumps, would be black otherwise.
+    pub fn shading(
+        &self,
+        at: &TextureContext,
+        surface: &LocalSurface,
+        towards: Vec3,
+    ) -> Option<(ShadingFrame, Bsdf)> {
         let mut bsdf = self.bsdf(at)?;
-        let frame = self.frame(at, surface);
-        if let (Bsdf::Principled(bsdf), MaterialKind::Principled(params)) = (&mut bsdf, &self.kind)
-            && bsdf.coat.weight > 0.0
-        {
-            let normal =
-                params.clearcoat_normal.as_ref().map_or(surface.normal, |map| mapped(map, at, surface).n);
-            let local = frame.to_local(normal).vec();
-            // A coat cannot be met from below.
-            if 0.0 < local.z && frame.n != normal {
-                bsdf.coat.normal = local.normalize();
+        let mut frame = self.frame(at, surface);
+        let seen = |normal: Vec3| facing(normal, surface.geometric, towards);
+        let normal = seen(frame.n);
+        if normal != frame.n {
+            frame = ShadingFrame::new(normal, frame.s);
+        }
+        if let (Bsdf::Principled(bsdf), MaterialKind::Principled(params)) = (&mut bsdf, &self.kind) {
+            if surface.handedness < 0.0 {
+                bsdf.tangent.y = -bsdf.tangent.y;
+            }
+            if bsdf.coat.weight > 0.0 {
+                let map = params.clearcoat_normal.as_ref();
+                let normal = seen(map.map_or(surface.normal, |map| mapped(map, at, surface).n));
+                let local = frame.to_local(normal).vec();
+                // A coat cannot be met from below.
+                if 0.0 < local.z && frame.n != normal {
+                    bsdf.coat.normal = local.normalize();
+                }
             }
         }
         Some((frame, bsdf))
@@ -344,6 +367,21 @@ impl Material {
     pub fn interior_attenuation(&self) -> Option<Spectrum> {
         match &self.kind {
             MaterialKind::Principled(params) => params.interior_attenuation(),
+            _ => None,
+        }
+    }
+
+    /// Whether it encloses a body that light goes through: [`Material::interior_attenuation`] and
+    /// [`Material::interior_index`] are of that.
+    pub fn is_solid(&self) -> bool {
+        self.interior_index().is_some()
+    }
+
+    /// The index of refraction inside a solid body of this material, against vacuum; `None` where light cannot get
+    /// inside, and for the kinds whose index is a ratio that already counts what is outside.
+    pub fn interior_index(&self) -> Option<f32> {
+        match &self.kind {
+            MaterialKind::Principled(params) => params.interior_index(),
             _ => None,
         }
     }
@@ -477,7 +515,7 @@ fn mapped(map: &ImageTexture, at: &TextureContext, surface: &LocalSurface) -> Sh
     let local = Vec3::new(2.0 * texel.r - 1.0, 2.0 * texel.g - 1.0, 2.0 * texel.b - 1.0);
     let frame = ShadingFrame::new(surface.normal, surface.dpdu);
     let Some(local) = local.try_normalize() else { return frame };
-    let normal = frame.s * local.x + frame.t * local.y + frame.n * local.z;
+    let normal = frame.s * local.x + frame.t * (surface.handedness * local.y) + frame.n * local.z;
     turned(normal, surface.dpdu, surface).unwrap_or(frame)
 }
 
@@ -494,6 +532,20 @@ fn asymmetry(g: f32) -> f32 {
 /// An index of refraction that is one.
 fn index(eta: f32) -> f32 {
     if eta > 0.0 && eta.is_finite() { eta } else { 1.0 }
+}
+
+/// The least cosine under which a shading normal is seen.
+const LEAST_SEEN: f32 = 1e-3;
+
+/// A shading normal, turned no farther than it takes to be on the side of `towards` that the geometric normal is on.
+fn facing(normal: Vec3, geometric: Vec3, towards: Vec3) -> Vec3 {
+    let cos = normal.dot(towards);
+    let missing = if geometric.dot(towards) < 0.0 { LEAST_SEEN + cos } else { LEAST_SEEN - cos };
+    if missing <= 0.0 {
+        return normal;
+    }
+    let side = if geometric.dot(towards) < 0.0 { -towards } else { towards };
+    (normal + missing * side).try_normalize().unwrap_or(geometric)
 }
 
 /// The frame about a turned normal of any length.
@@ -565,6 +617,8 @@ mod tests {
             dpdv: Vec3::Y * 3.0,
             dndu: Vec3::ZERO,
             dndv: Vec3::ZERO,
+            geometric: Vec3::new(0.6, 0.0, 0.8),
+            handedness: 1.0,
         }
     }
 

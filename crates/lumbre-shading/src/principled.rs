@@ -127,11 +127,17 @@ impl Clearcoat {
         self.weight * ALBEDO.face(cos, self.alpha, Self::ETA)
     }
 
-    /// Both directions as the coat sees them from above; `None` where it does not lie between them.
-    fn between(&self, wo: LocalDir, wi: LocalDir) -> Option<(LocalDir, LocalDir)> {
-        let (o, i) = (self.local(wo), self.local(wi));
-        let sides = wo.same_hemisphere(wi) && wo.same_hemisphere(o) && wi.same_hemisphere(i);
-        sides.then(|| if wo.cos_theta() < 0.0 { (-o, -i) } else { (o, i) })
+    /// The directions of the coat's own that come to be `wi`, each with `wo`, as it sees them from above: where the coat
+    /// leans, some that it reflects to lie below the surface, and are mirrored back up.
+    fn between(&self, wo: LocalDir, wi: LocalDir) -> impl Iterator<Item = (LocalDir, LocalDir)> {
+        let o = self.local(wo);
+        let is_met = wo.same_hemisphere(wi) && wo.same_hemisphere(o);
+        let folded = (self.normal != Vec3::Z).then(|| flipped(wi));
+        let below = wo.cos_theta() < 0.0;
+        [is_met.then_some(wi), folded.filter(|_| is_met)].into_iter().flatten().filter_map(move |wi| {
+            let i = self.local(wi);
+            o.same_hemisphere(i).then(|| if below { (-o, -i) } else { (o, i) })
+        })
     }
 }
 
@@ -195,11 +201,10 @@ impl Principled {
             sum += self.sheen.eval(wo, wi);
         }
         sum *= self.passes_coat(wo, wi);
-        if covered
-            && self.coat.weight > 0.0
-            && let Some((o, i)) = self.coat.between(wo, wi)
-        {
-            sum += Spectrum::splat(self.coat.weight * self.coat.face().eval(o, i));
+        if covered && self.coat.weight > 0.0 {
+            for (o, i) in self.coat.between(wo, wi) {
+                sum += Spectrum::splat(self.coat.weight * self.coat.face().eval(o, i));
+            }
         }
         sum
     }
@@ -215,10 +220,10 @@ impl Principled {
         if lobes.facets > 0.0 {
             pdf += lobes.facets * self.pdf_facets(wo, wi);
         }
-        if lobes.coat > 0.0
-            && let Some((o, i)) = self.coat.between(wo, wi)
-        {
-            pdf += lobes.coat * self.coat.face().pdf_of(o, i, Ways::Reflection);
+        if lobes.coat > 0.0 {
+            for (o, i) in self.coat.between(wo, wi) {
+                pdf += lobes.coat * self.coat.face().pdf_of(o, i, Ways::Reflection);
+            }
         }
         pdf
     }
@@ -239,6 +244,7 @@ impl Principled {
                 self.coat.face().sample_of(if below { -above } else { above }, 0.0, u, Ways::Reflection)?;
             let wi = LocalDir(self.coat.turned(sample.wi.vec(), true));
             let wi = if below { -wi } else { wi };
+            let wi = if wo.same_hemisphere(wi) { wi } else { flipped(wi) };
             if !wo.same_hemisphere(wi) {
                 return None;
             }
@@ -321,6 +327,20 @@ impl Principled {
         let base = metal.lerp(plastic.lerp(clear, self.transmission), 1.0 - self.metallic);
         let coat = self.coat.share(LocalDir(Vec3::Z));
         base * (1.0 - coat) + Spectrum::splat(coat)
+    }
+
+    /// The same solid inside another of this index; see [`crate::Bsdf::immersed`].
+    #[must_use]
+    pub fn immersed(self, outside: f32) -> Self {
+        let eta = self.eta / outside;
+        let Body::Solid { spread } = self.body else { return self };
+        if !(eta > 0.0 && eta.is_finite()) {
+            return self;
+        }
+        let (in_vacuum, inside) = (fresnel::dielectric(1.0, self.eta), fresnel::dielectric(1.0, eta));
+        let share = if in_vacuum > 0.0 { inside / in_vacuum } else { 1.0 };
+        let body = Body::Solid { spread: spread / outside };
+        Self { eta, f0: (self.f0 * share).map(crate::unit), body, ..self }
     }
 
     /// The same with its sharp parts made rough, as [`crate::Bsdf::regularized`].

@@ -165,14 +165,44 @@ impl PrincipledParams {
         (0.1 * (1.0 - gloss) + 0.001 * gloss).sqrt()
     }
 
+    /// Whether it is the same everywhere.
+    pub(crate) fn is_uniform(&self) -> bool {
+        let colors =
+            [&self.base_color, &self.specular_color, &self.diffuse_transmission_color, &self.sheen_color];
+        let numbers = [
+            &self.metallic,
+            &self.roughness,
+            &self.anisotropy,
+            &self.specular,
+            &self.specular_tint,
+            &self.transmission,
+            &self.diffuse_transmission,
+            &self.clearcoat,
+            &self.clearcoat_roughness,
+            &self.sheen_tint,
+            &self.sheen_roughness,
+            &self.iridescence,
+            &self.iridescence_thickness,
+        ];
+        colors.into_iter().all(|texture| texture.is_constant())
+            && numbers.into_iter().all(|texture| texture.is_constant())
+            && self.anisotropy_texture.is_none()
+            && self.clearcoat_normal.is_none()
+    }
+
+    /// The index of refraction inside; see [`crate::Material::interior_index`].
+    pub(crate) fn interior_index(&self) -> Option<f32> {
+        let opens = |texture: &FloatTexture| !matches!(texture, Texture::Constant(v) if *v <= 0.0);
+        let is_open = opens(&self.transmission) || opens(&self.diffuse_transmission);
+        (self.volume.is_some() && is_open)
+            .then(|| if self.ior > 0.0 && self.ior.is_finite() { self.ior } else { 1.5 })
+    }
+
     /// σ of Beer's and Lambert's law inside, per unit of length; see [`crate::Material::interior_attenuation`]. A lane
     /// of which nothing is left counts as a millionth.
     pub fn interior_attenuation(&self) -> Option<Spectrum> {
+        self.interior_index()?;
         let volume = self.volume?;
-        let opens = |texture: &FloatTexture| !matches!(texture, Texture::Constant(v) if *v <= 0.0);
-        if !(opens(&self.transmission) || opens(&self.diffuse_transmission)) {
-            return None;
-        }
         let distance = volume.attenuation_distance.max(f32::MIN_POSITIVE);
         let sigma = volume.attenuation_color.map(|left| -crate::unit(left).max(1e-6).ln() / distance);
         (sigma.is_finite() && !sigma.is_black()).then_some(sigma)

@@ -4,6 +4,7 @@ mod ambient_occlusion;
 mod direct;
 mod features;
 mod integrator;
+mod interior;
 mod path;
 mod sampler;
 mod whitted;

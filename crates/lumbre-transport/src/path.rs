@@ -1,10 +1,11 @@
 //! Path tracing with next-event estimation and multiple importance sampling.
 
 use lumbre_geometry::Ray;
-use lumbre_scene::{Scene, View};
+use lumbre_scene::{Interaction, Scene, View};
 use lumbre_shading::{Scatter, Spectrum};
 
 use crate::direct::{Vertex, power_heuristic};
+use crate::interior::Interiors;
 use crate::{Draw, Integrator, RayCounts, Sight};
 
 /// Kajiya's path tracing: at each surface one sample of a light and one of the BSDF, combined by the power heuristic,
@@ -93,6 +94,7 @@ impl Integrator for Path {
         // Where the last vertex sampled lights from.
         let mut lit_from = ray.origin;
         let mut depth = 0;
+        let mut interiors = Interiors::default();
         loop {
             let Some(here) = &met else {
                 for (arriving, pdf) in scene.escaped(&ray) {
@@ -100,6 +102,7 @@ impl Integrator for Path {
                 }
                 return radiance;
             };
+            throughput *= interiors.arrive(here, here.resolved(), ray_length(&ray, here));
             let emitted = here.emitted();
             if !emitted.is_black() {
                 let pdf = if chosen == Chosen::Only { 0.0 } else { scene.light_pdf(lit_from, here) };
@@ -108,7 +111,7 @@ impl Integrator for Path {
             if depth == self.max_depth {
                 return radiance;
             }
-            let Some(mut vertex) = Vertex::new(here) else { return radiance };
+            let Some(mut vertex) = Vertex::new(here, &interiors) else { return radiance };
             if self.regularize && has_scattered {
                 vertex.bsdf = vertex.bsdf.regularized();
             }
@@ -118,11 +121,11 @@ impl Integrator for Path {
                 let light = scene.sample_light(lit_from, draw.light_choice(depth), draw.light_point(depth));
                 if let Some(light) = light {
                     let weigh = |light_pdf, bsdf_pdf| self.weight_of_sampled(light_pdf, bsdf_pdf);
-                    radiance += throughput * vertex.scattered(scene, &light, weigh, rays);
+                    radiance += throughput * vertex.scattered(scene, &light, &interiors, weigh, rays);
                 }
             }
 
-            let Some(bounce) = vertex.bsdf.sample(vertex.wo, draw.lobe(depth), draw.direction(depth)) else {
+            let Some(bounce) = vertex.sample(draw.lobe(depth), draw.direction(depth)) else {
                 return radiance;
             };
             throughput *= bounce.weight;
@@ -136,6 +139,7 @@ impl Integrator for Path {
             has_scattered |= bounce.scatter != Scatter::Delta;
             if bounce.transmitted {
                 eta_scale *= bounce.eta * bounce.eta;
+                interiors.cross(vertex.material, here.front);
             }
             depth += 1;
 
@@ -147,11 +151,15 @@ impl Integrator for Path {
                 throughput *= 1.0 / likely;
             }
 
-            let direction = vertex.frame.to_world(bounce.wi).as_dvec3().normalize();
-            ray = here.leave(direction);
+            ray = here.leave(bounce.direction);
             let footprint = here.footprint();
             rays.bounce += 1;
             met = scene.closest(&ray).map(|hit| scene.interaction(&ray, &hit, &footprint));
         }
     }
+}
+
+/// The way from a ray's origin to what it met; its direction is unit.
+pub(crate) fn ray_length(ray: &Ray, here: &Interaction) -> f64 {
+    (here.surface.point - ray.origin).length()
 }

@@ -6,6 +6,8 @@ use lumbre_shading::{Scatter, Spectrum};
 use smallvec::SmallVec;
 
 use crate::direct::Vertex;
+use crate::interior::Interiors;
+use crate::path::ray_length;
 use crate::{Draw, Integrator, RayCounts, Sight};
 
 /// Follows every mirror image and every refraction, and gives each surface on the way direct light from every light.
@@ -29,8 +31,9 @@ const EVERY_LIGHT_UP_TO: usize = 64;
 const FAINT: f32 = 1.0 / 255.0;
 
 /// A ray that is still to be followed.
-struct Branch {
+struct Branch<'s> {
     ray: Ray,
+    interiors: Interiors<'s>,
     footprint: Footprint,
     throughput: Spectrum,
     depth: u32,
@@ -49,14 +52,14 @@ impl Whitted {
     fn split<'a, 's>(
         &self,
         here: &'a Interaction<'s>,
-        came: &Arrival,
+        came: &'a Arrival<'s>,
         draw: &Draw,
-        pending: &mut SmallVec<[Branch; 4]>,
+        pending: &mut SmallVec<[Branch<'s>; 4]>,
     ) -> Scatterers<'a, 's> {
         let mut scatterers = Scatterers::new();
         let mut branches = 0;
-        for (share, vertex) in Vertex::parts(here, FAINT / came.throughput.max_component()) {
-            for part in vertex.bsdf.specular(vertex.wo) {
+        for (share, vertex) in Vertex::parts(here, FAINT / came.throughput.max_component(), &came.interiors) {
+            for part in vertex.specular() {
                 let branch = branches;
                 branches += 1;
                 let mut throughput = came.throughput * part.weight * share;
@@ -67,8 +70,13 @@ impl Whitted {
                     }
                     throughput *= FAINT / carries;
                 }
+                let mut interiors = came.interiors.clone();
+                if part.transmitted {
+                    interiors.cross(vertex.material, here.front);
+                }
                 pending.push(Branch {
-                    ray: here.leave(vertex.frame.to_world(part.wi).as_dvec3().normalize()),
+                    ray: here.leave(part.direction),
+                    interiors,
                     footprint: here.footprint(),
                     throughput,
                     depth: came.depth + 1,
@@ -82,12 +90,12 @@ impl Whitted {
     }
 
     /// Direct light on all that scatters at a place.
-    fn direct(
+    fn direct<'s>(
         &self,
         scene: &Scene,
         here: &Interaction,
-        scatterers: &Scatterers,
-        vertex: u32,
+        scatterers: &Scatterers<'_, 's>,
+        came: &Arrival<'s>,
         draw: &Draw,
         rays: &mut RayCounts,
     ) -> Spectrum {
@@ -100,15 +108,15 @@ impl Whitted {
             let points = if light.is_delta() { 1 } else { self.light_samples.max(1) };
             let mut sum = Spectrum::BLACK;
             for point in 0..points {
-                let u = draw.point_on_each_light(vertex, label, point, points);
+                let u = draw.point_on_each_light(came.vertex, label, point, points);
                 if let Some(sample) = scene.sample_one_light(id, from, u) {
-                    sum += scattered(scene, here, scatterers, &sample, rays);
+                    sum += scattered(scene, here, scatterers, &came.interiors, &sample, rays);
                 }
             }
             sum * (1.0 / points as f32)
         };
         if lights.len() > EVERY_LIGHT_UP_TO {
-            let choice = scene.choose_light(draw.light_choice(vertex));
+            let choice = scene.choose_light(draw.light_choice(came.vertex));
             return choice.map_or(Spectrum::BLACK, |(id, probability)| {
                 by_light(rays, id, &lights[id.0 as usize], 0) * (1.0 / probability) as f32
             });
@@ -122,7 +130,8 @@ impl Whitted {
 }
 
 /// How a ray came to a vertex: what it carries, and which one in the tree of rays this is.
-struct Arrival {
+struct Arrival<'s> {
+    interiors: Interiors<'s>,
     throughput: Spectrum,
     depth: u32,
     vertex: u32,
@@ -140,14 +149,17 @@ impl Integrator for Whitted {
         let mut radiance = Spectrum::BLACK;
         let mut pending: SmallVec<[Branch; 4]> = SmallVec::new();
         let (mut ray, mut met) = (sight.ray.ray, sight.met);
-        let mut came = Arrival { throughput: Spectrum::WHITE, depth: 0, vertex: 0 };
+        let mut came =
+            Arrival { interiors: Interiors::default(), throughput: Spectrum::WHITE, depth: 0, vertex: 0 };
         loop {
             if let Some(here) = &met {
+                // Of a mixture the one material that stands for it says what the way was inside of.
+                came.throughput *= came.interiors.arrive(here, here.resolved(), ray_length(&ray, here));
                 radiance += came.throughput * here.emitted();
                 if came.depth < self.max_depth {
                     let scatterers = self.split(here, &came, draw, &mut pending);
                     if !scatterers.is_empty() {
-                        let direct = self.direct(scene, here, &scatterers, came.vertex, draw, rays);
+                        let direct = self.direct(scene, here, &scatterers, &came, draw, rays);
                         radiance += came.throughput * direct;
                     }
                 }
@@ -157,7 +169,12 @@ impl Integrator for Whitted {
             }
             let Some(next) = pending.pop() else { return radiance };
             ray = next.ray;
-            came = Arrival { throughput: next.throughput, depth: next.depth, vertex: came.vertex + 1 };
+            came = Arrival {
+                interiors: next.interiors,
+                throughput: next.throughput,
+                depth: next.depth,
+                vertex: came.vertex + 1,
+            };
             rays.bounce += 1;
             met = scene.closest(&ray).map(|hit| scene.interaction(&ray, &hit, &next.footprint));
         }
@@ -165,17 +182,20 @@ impl Integrator for Whitted {
 }
 
 /// What all materials of a place scatter of a light's sample.
-fn scattered(
+fn scattered<'s>(
     scene: &Scene,
     here: &Interaction,
-    scatterers: &Scatterers,
+    scatterers: &Scatterers<'_, 's>,
+    interiors: &Interiors<'s>,
     sample: &LightSample,
     rays: &mut RayCounts,
 ) -> Spectrum {
     let mut sum = Spectrum::BLACK;
     for (share, vertex) in scatterers {
-        let wi = vertex.frame.to_local(sample.towards.as_vec3());
-        sum += vertex.bsdf.eval(vertex.wo, wi) * *share;
+        let scattered = vertex.eval(sample.towards) * *share;
+        if !scattered.is_black() {
+            sum += scattered * vertex.passes(sample, interiors);
+        }
     }
     let scattered = sum * sample.radiance;
     if scattered.is_black() {

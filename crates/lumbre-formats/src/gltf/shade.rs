@@ -1,4 +1,4 @@
-//! From the materials of a glTF to ours. What ours cannot say is approximated, and a warning lists it.
+//! From the materials of a glTF to ours. What ours cannot say is left out, and a warning lists it.
 
 use std::cell::RefCell;
 use std::collections::{BTreeSet, HashMap};
@@ -7,7 +7,10 @@ use std::sync::Arc;
 use lumbre_image::Rgb;
 use lumbre_math::glam::Affine2;
 use lumbre_scene::{AreaLightDesc, MaterialId, NamedMaterial};
-use lumbre_shading::{FloatTexture, Material, MaterialKind, Roughness, SpectrumTexture, Texture};
+use lumbre_shading::{
+    FloatTexture, ImageTexture, Material, MaterialKind, PrincipledParams, SpectrumTexture, Texture,
+    VolumeParams,
+};
 
 use super::file::{File, List};
 use super::json::Read;
@@ -37,8 +40,8 @@ pub(super) struct Materials<'f> {
     /// By position in the file and whether vertices have colours.
     made: RefCell<HashMap<MaterialKey, Arc<Dressing>>>,
     list: RefCell<Vec<NamedMaterial>>,
-    /// What was approximated.
-    approximated: RefCell<BTreeSet<&'static str>>,
+    /// What no material of ours can say.
+    left_out: RefCell<BTreeSet<&'static str>>,
 }
 
 impl<'f> Materials<'f> {
@@ -48,7 +51,7 @@ impl<'f> Materials<'f> {
             textures: Textures::new(file),
             made: RefCell::default(),
             list: RefCell::default(),
-            approximated: RefCell::default(),
+            left_out: RefCell::default(),
         }
     }
 
@@ -97,13 +100,12 @@ impl<'f> Materials<'f> {
         Some(UvSets { first, second: others.first().copied(), baked })
     }
 
-    /// All materials that were asked for, after a warning of what was approximated.
+    /// All materials that were asked for, after a warning of what was left out.
     pub fn into_list(self) -> Vec<NamedMaterial> {
-        let approximated = self.approximated.into_inner();
-        if !approximated.is_empty() {
-            let list: Vec<&str> = approximated.into_iter().collect();
-            let warning =
-                Diagnostic::warning("parameters of materials are approximated").at(self.file.whole());
+        let left_out = self.left_out.into_inner();
+        if !left_out.is_empty() {
+            let list: Vec<&str> = left_out.into_iter().collect();
+            let warning = Diagnostic::warning("parameters of materials were left out").at(self.file.whole());
             self.file.push(warning.found(list.join(", ")));
         }
         self.list.into_inner()
@@ -132,8 +134,8 @@ impl<'f> Seam<'_, 'f> {
         &self.materials.textures
     }
 
-    fn approximate(&self, what: &'static str) {
-        self.materials.approximated.borrow_mut().insert(what);
+    fn leave_out(&self, what: &'static str) {
+        self.materials.left_out.borrow_mut().insert(what);
     }
 
     /// A colour with the texture that is a factor on it.
@@ -157,126 +159,82 @@ impl<'f> Seam<'_, 'f> {
         })
     }
 
-    fn roughness(&self) -> Read<Roughness> {
-        let m = self.parameters;
-        let (factor, texture, channel, glossiness) = match m.specular_glossiness {
-            Some(s) => (s.glossiness, s.texture, 3, true),
-            None => (m.roughness, m.metallic_roughness_texture, 1, false),
-        };
-        let image = texture.map(|t| self.textures().alpha(t, channel, factor, glossiness, self.sets));
-        let texture = image.transpose()?.flatten().unwrap_or_else(|| {
-            let roughness = if glossiness { 1.0 - factor } else { factor };
-            Arc::new(Texture::Constant(roughness * roughness))
-        });
-        Ok(Roughness { u: texture.clone(), v: texture, remap: false })
+    /// A normal map.
+    fn normals(&self, texture: Option<TextureRef>, scale: f32) -> Read<Option<ImageTexture>> {
+        Ok(texture.map(|t| self.textures().normals(t, scale, self.sets)).transpose()?.flatten())
     }
 
     fn material(&self) -> Read<Material> {
         let m = self.parameters;
         if m.unlit {
-            if self.has_colours {
-                self.approximate("vertex colours of unlit materials");
-            }
             let reflectance = Arc::new(Texture::Constant(Rgb::BLACK));
             return Ok(Material::new(MaterialKind::Diffuse { reflectance }));
         }
-        let mut kind = self.opaque()?;
-        if m.diffuse_transmission.factor > 0.0 {
-            let d = &m.diffuse_transmission;
-            if d.texture.is_some() || m.metallic > 0.0 {
-                self.approximate("diffuse transmission");
-            }
-            // Both share the light that reaches the inside.
-            let base = self.base_colour()?;
-            kind = MaterialKind::DiffuseTransmission {
-                reflectance: scaled(base, 1.0 - d.factor),
-                transmittance: scaled(self.colour(d.colour, d.colour_texture)?, d.factor),
-                scale: 1.0,
-            };
+        if !m.volume.multiscatter_colour.is_black() {
+            self.leave_out("scattering inside volumes");
         }
-        if m.transmission > 0.0 {
-            let clear = self.clear()?;
-            // Metals let nothing through.
-            let amount = match m.metallic_roughness_texture {
-                None => self.number(m.transmission * (1.0 - m.metallic), m.transmission_texture, 0)?,
-                Some(_) => self.number(m.transmission, m.transmission_texture, 0)?,
-            };
-            kind = mix(kind, clear, amount);
-        }
-        self.list_what_is_left_out();
-        let normals = m.normal_texture.map(|t| self.textures().normals(t, m.normal_scale, self.sets));
-        let normal_map = normals.transpose()?.flatten();
-        Ok(with_normals(kind, normal_map))
+        let kind = MaterialKind::Principled(Box::new(self.principled()?));
+        let normal_map = self.normals(m.normal_texture, m.normal_scale)?;
+        Ok(Material { normal_map, ..Material::new(kind) })
     }
 
-    /// The surface of a dielectric over what is diffuse, and of a metal.
-    fn opaque(&self) -> Read<MaterialKind> {
+    fn principled(&self) -> Read<PrincipledParams> {
         let m = self.parameters;
-        let roughness = self.roughness()?;
-        let reflectance = self.base_colour()?;
-        // Reflectance at normal incidence.
-        let index = if m.ior == 0.0 { 1.5 } else { m.ior };
-        let mut f0 =
-            ((index - 1.0) / (index + 1.0)).powi(2) * m.specular * m.specular_colour.average().min(1.0);
-        if let Some(s) = m.specular_glossiness {
-            let strongest = s.specular.max_component();
-            if strongest > 0.2 {
-                self.approximate("metals by specular and glossiness");
-                let metal = MaterialKind::ConductorReflectance {
-                    reflectance: self.colour(s.specular, s.texture)?,
-                    roughness: roughness.clone(),
-                };
-                let plain = dielectric(reflectance, roughness, 0.04);
-                let amount = Arc::new(Texture::Constant(((strongest - 0.04) / 0.96).clamp(0.0, 1.0)));
-                return Ok(mix(plain, metal, amount));
-            }
-            f0 = s.specular.average();
-        }
-        if m.specular_texture.is_some()
-            || m.specular_colour_texture.is_some()
-            || m.specular_colour != Rgb::WHITE
-        {
-            self.approximate("specular colour");
-        }
-        let plain = dielectric(reflectance.clone(), roughness.clone(), f0);
-        if m.specular_glossiness.is_some() || m.metallic == 0.0 {
-            return Ok(plain);
-        }
-        let metal = MaterialKind::ConductorReflectance { reflectance, roughness };
-        Ok(mix(plain, metal, self.number(m.metallic, m.metallic_roughness_texture, 2)?))
-    }
-
-    /// What lets light through.
-    fn clear(&self) -> Read<MaterialKind> {
-        let m = self.parameters;
-        let eta = if m.ior == 0.0 { 1.5 } else { m.ior };
-        if m.base_colour != Rgb::WHITE || m.base_colour_texture.is_some() || self.has_colours {
-            self.approximate("colour of transmitted light");
-        }
-        if m.volume.thickness > 0.0 {
-            return Ok(MaterialKind::Dielectric { eta, roughness: self.roughness()? });
-        }
-        if m.roughness > 0.0 {
-            self.approximate("roughness of thin transmission");
-        }
-        Ok(MaterialKind::ThinDielectric { eta })
-    }
-
-    fn list_what_is_left_out(&self) {
-        let m = self.parameters;
-        let left_out = [
-            (m.clearcoat.factor > 0.0, "clearcoat"),
-            (!m.sheen.colour.is_black(), "sheen"),
-            (m.iridescence.factor > 0.0, "iridescence"),
-            (m.anisotropy.strength > 0.0, "anisotropy"),
-            (m.transmission > 0.0 && m.dispersion > 0.0, "dispersion"),
-            (
-                m.volume.thickness > 0.0 && m.volume.attenuation_distance.is_finite(),
-                "attenuation inside volumes",
+        let base_color = self.base_colour()?;
+        let core = match m.specular_glossiness {
+            Some(s) => PrincipledParams::from_specular_glossiness(
+                base_color,
+                self.colour(s.specular, s.texture)?,
+                self.number(s.glossiness, s.texture, 3)?,
             ),
-            (!m.volume.multiscatter_colour.is_black(), "scattering inside volumes"),
-        ];
-        left_out.into_iter().filter(|(used, _)| *used).for_each(|(_, what)| self.approximate(what));
+            None => PrincipledParams {
+                base_color,
+                metallic: self.number(m.metallic, m.metallic_roughness_texture, 2)?,
+                roughness: self.number(m.roughness, m.metallic_roughness_texture, 1)?,
+                ior: m.ior,
+                specular: self.number(m.specular, m.specular_texture, 3)?,
+                specular_color: self.colour(m.specular_colour, m.specular_colour_texture)?,
+                ..PrincipledParams::default()
+            },
+        };
+        let directions = m.anisotropy.texture.map(|t| self.textures().directions(t, self.sets));
+        let film = &m.iridescence;
+        let iridescence_thickness = match film.thickness_texture {
+            None => Arc::new(Texture::Constant(film.thickness_maximum)),
+            Some(texture) => {
+                let ends = [film.thickness_minimum, film.thickness_maximum];
+                let textures = ends.map(|thickness| Arc::new(Texture::Constant(thickness)));
+                Arc::new(Texture::Mix { textures, amount: self.number(1.0, Some(texture), 1)? })
+            }
+        };
+        let volume = VolumeParams {
+            attenuation_color: m.volume.attenuation_colour,
+            attenuation_distance: m.volume.attenuation_distance,
+        };
+        Ok(PrincipledParams {
+            anisotropy: self.number(m.anisotropy.strength, None, 0)?,
+            anisotropy_rotation: m.anisotropy.rotation,
+            anisotropy_texture: directions.transpose()?.flatten(),
+            transmission: self.number(m.transmission, m.transmission_texture, 0)?,
+            dispersion: m.dispersion,
+            volume: (m.volume.thickness > 0.0).then_some(volume),
+            diffuse_transmission: self.number(
+                m.diffuse_transmission.factor,
+                m.diffuse_transmission.texture,
+                3,
+            )?,
+            diffuse_transmission_color: self
+                .colour(m.diffuse_transmission.colour, m.diffuse_transmission.colour_texture)?,
+            clearcoat: self.number(m.clearcoat.factor, m.clearcoat.texture, 0)?,
+            clearcoat_roughness: self.number(m.clearcoat.roughness, m.clearcoat.roughness_texture, 1)?,
+            clearcoat_normal: self.normals(m.clearcoat.normal_texture, m.clearcoat.normal_scale)?,
+            sheen_color: self.colour(m.sheen.colour, m.sheen.colour_texture)?,
+            sheen_roughness: self.number(m.sheen.roughness, m.sheen.roughness_texture, 3)?,
+            iridescence: self.number(film.factor, film.texture, 0)?,
+            iridescence_ior: film.ior,
+            iridescence_thickness,
+            ..core
+        })
     }
 
     fn light(&self) -> Read<Option<AreaLightDesc>> {
@@ -321,52 +279,4 @@ fn product<T: lumbre_shading::TextureValue + PartialEq>(
         Some(image) if factor == one => image,
         Some(image) => Arc::new(Texture::Product([image, Arc::new(Texture::Constant(factor))])),
     }
-}
-
-fn scaled(texture: Arc<SpectrumTexture>, scale: f32) -> Arc<SpectrumTexture> {
-    Arc::new(Texture::Scale { texture, scale: Arc::new(Texture::Constant(scale)) })
-}
-
-/// What is diffuse under a surface that reflects `f0` of what falls on it head-on.
-fn dielectric(reflectance: Arc<SpectrumTexture>, roughness: Roughness, f0: f32) -> MaterialKind {
-    if f0 < 1e-4 {
-        return MaterialKind::Diffuse { reflectance };
-    }
-    let root = f0.min(0.9).sqrt();
-    MaterialKind::CoatedDiffuse {
-        reflectance,
-        roughness,
-        thickness: Arc::new(Texture::Constant(0.01)),
-        eta: (1.0 + root) / (1.0 - root),
-        g: Arc::new(Texture::Constant(0.0)),
-        albedo: Arc::new(Texture::Constant(Rgb::BLACK)),
-        max_depth: 10,
-        samples: 1,
-    }
-}
-
-fn mix(first: MaterialKind, second: MaterialKind, amount: Arc<FloatTexture>) -> MaterialKind {
-    match *amount {
-        Texture::Constant(amount) if amount <= 0.0 => first,
-        Texture::Constant(amount) if amount >= 1.0 => second,
-        _ => {
-            MaterialKind::Mix { materials: [first, second].map(|kind| Arc::new(Material::new(kind))), amount }
-        }
-    }
-}
-
-/// The material of a kind with a normal map: on the parts of a mixture, as those are what is shaded.
-fn with_normals(kind: MaterialKind, normal_map: Option<lumbre_shading::ImageTexture>) -> Material {
-    let kind = match kind {
-        MaterialKind::Mix { materials, amount } => {
-            let dressed = |material: Arc<Material>| match &material.kind {
-                // Mixtures are two levels deep at most: metal in opaque in clear.
-                MaterialKind::Mix { .. } => Arc::new(with_normals(material.kind.clone(), normal_map.clone())),
-                kind => Arc::new(Material { normal_map: normal_map.clone(), ..Material::new(kind.clone()) }),
-            };
-            MaterialKind::Mix { materials: materials.map(dressed), amount }
-        }
-        kind => kind,
-    };
-    Material { normal_map, ..Material::new(kind) }
 }

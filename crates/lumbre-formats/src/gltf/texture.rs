@@ -25,8 +25,8 @@ enum Use {
     Colour,
     /// One channel, as it is stored: 0 to 2 colours, 3 coverage.
     Channel(usize),
-    /// One channel of a roughness times a factor (its bits), squared; from one minus it if it is a glossiness.
-    Alpha { channel: usize, factor: u32, glossiness: bool },
+    /// Three numbers, as they are stored.
+    Directions,
     /// Normals whose x and y have a factor (its bits).
     Normal(u32),
 }
@@ -97,17 +97,9 @@ impl<'f> Textures<'f> {
         Ok(self.look_up(texture, sets, Use::Channel(channel))?.map(|image| Arc::new(Texture::Image(image))))
     }
 
-    /// The α of a roughness (or of a glossiness) in one channel of a texture: (factor · channel)².
-    pub fn alpha(
-        &self,
-        texture: TextureRef,
-        channel: usize,
-        factor: f32,
-        glossiness: bool,
-        sets: UvSets,
-    ) -> Read<Option<Arc<FloatTexture>>> {
-        let how = Use::Alpha { channel, factor: factor.to_bits(), glossiness };
-        Ok(self.look_up(texture, sets, how)?.map(|image| Arc::new(Texture::Image(image))))
+    /// Directions in red and green, and what goes with them in blue, as they are stored.
+    pub fn directions(&self, texture: TextureRef, sets: UvSets) -> Read<Option<Arc<SpectrumTexture>>> {
+        Ok(self.look_up(texture, sets, Use::Directions)?.map(|image| Arc::new(Texture::Image(image))))
     }
 
     /// A normal map.
@@ -158,7 +150,11 @@ impl<'f> Textures<'f> {
                     let bitmap = if how == Use::Colour {
                         bitmap
                     } else {
-                        let each = if matches!(how, Use::Normal(_)) { 6 } else { 2 };
+                        let each = match how {
+                            Use::Normal(_) => 6,
+                            Use::Directions => bitmap.bytes() as u64 / pixels.max(1),
+                            _ => 2,
+                        };
                         file.budget.bytes(pixels * each, "texture")?;
                         Arc::new(derived(&bitmap, how))
                     };
@@ -281,11 +277,7 @@ fn derived(image: &Bitmap, how: Use) -> Bitmap {
     let bitmap = match how {
         Use::Colour => None,
         Use::Channel(c) => single(&|x, y| stored(x, y, c)),
-        Use::Alpha { channel, factor, glossiness } => single(&|x, y| {
-            let value = stored(x, y, channel) * f32::from_bits(factor);
-            let roughness = if glossiness { 1.0 - value } else { value };
-            roughness * roughness
-        }),
+        Use::Directions => Some(image.clone().with_encoding(Encoding::Linear)),
         Use::Normal(scale) => {
             let scale = f32::from_bits(scale);
             let normal = |(x, y)| {
