@@ -1,7 +1,14 @@
 //! From the binary tree to eight-wide nodes and packed leaves.
+//!
+//! Which nodes of the binary tree become nodes of the wide one is chosen so that the sum of their areas is least, by
+//! dynamic programming: H. Ylitie, T. Karras, S. Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide
+//! BVHs", High Performance Graphics, 2017. Leaves are those of the binary tree.
 
-use crate::build::{BinaryNode, Bounds, Kind, Primitive, Traits};
+use rayon::prelude::*;
+
+use crate::build::{Binary, BinaryNode, Fork, Name};
 use crate::node::{Node, WIDTH, tag};
+use crate::primitive::{Bounds, Kind, Traits};
 use crate::triangles::{BLOCK, BlockNames, TriangleBlock};
 use crate::{BuildError, Geometry, GeometryKind, TriangleMesh};
 
@@ -35,6 +42,7 @@ impl Entry {
 /// The packed tree.
 #[derive(Debug, Default)]
 pub(crate) struct Packed {
+    /// Each before all that are below it.
     pub(crate) nodes: Vec<Node>,
     pub(crate) blocks: Vec<TriangleBlock>,
     /// As many as there are blocks.
@@ -44,125 +52,413 @@ pub(crate) struct Packed {
     pub(crate) root: Option<u32>,
 }
 
-/// Packs a binary tree. The depth of its recursion is that of the tree, which is bounded.
+/// The least costs of putting a subtree into 1 to 7 children of a node; the first of the eight means nothing.
+pub(crate) type Costs = [f32; WIDTH];
+
+const LEAF_COSTS: Costs = [0.0; WIDTH];
+
+/// How a node of the binary tree shares the children that it is given, 2 to 8, among its own: three bits for each number,
+/// how many go to the left; 0 to take one less.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Choices(pub(crate) u32);
+
+impl Choices {
+    #[inline(always)]
+    fn left(self, children: usize) -> usize {
+        (self.0 >> (3 * (children - 2)) & 7) as usize
+    }
+}
+
+/// Chooses for a node over two children.
+#[inline(always)]
+fn share(area: f32, left: &Costs, right: &Costs) -> (Costs, Choices) {
+    let mut costs = LEAF_COSTS;
+    let mut choices = 0;
+    let best = |children: usize| {
+        let mut best = (f32::INFINITY, 0);
+        for first in children.saturating_sub(WIDTH - 1).max(1)..children.min(WIDTH) {
+            let cost = left[first] + right[children - first];
+            if cost < best.0 {
+                best = (cost, first);
+            }
+        }
+        best
+    };
+    let (cost, first) = best(WIDTH);
+    choices |= (first as u32) << (3 * (WIDTH - 2));
+    costs[1] = area + cost;
+    for children in 2..WIDTH {
+        let (cost, first) = best(children);
+        costs[children] = costs[children - 1];
+        if cost < costs[children] {
+            costs[children] = cost;
+            choices |= (first as u32) << (3 * (children - 2));
+        }
+    }
+    (costs, Choices(choices))
+}
+
+/// Chooses for all nodes of a twig; returns the costs of its root.
+pub(crate) fn choose(nodes: &mut [BinaryNode]) -> Costs {
+    let mut costs = vec![LEAF_COSTS; nodes.len()];
+    // Children stand behind their parents.
+    for place in (0..nodes.len()).rev() {
+        let node = &mut nodes[place];
+        if node.names().is_none() {
+            let (left, right) = (place + 1, place + node.right());
+            let (cost, choices) = share(node.bounds().half_area(), &costs[left], &costs[right]);
+            costs[place] = cost;
+            node.choose(choices);
+        }
+    }
+    costs[0]
+}
+
+impl Binary {
+    fn bounds(&self) -> &Bounds {
+        match self {
+            Self::Fork(fork) => &fork.bounds,
+            Self::Twig(twig) => twig.nodes[0].bounds(),
+        }
+    }
+
+    fn costs(&self) -> &Costs {
+        match self {
+            Self::Fork(fork) => &fork.costs,
+            Self::Twig(twig) => &twig.costs,
+        }
+    }
+}
+
+impl Fork {
+    /// The one over two.
+    pub(crate) fn over(children: [Binary; 2]) -> Self {
+        let mut bounds = *children[0].bounds();
+        bounds.grow(children[1].bounds());
+        let (costs, choices) = share(bounds.half_area(), children[0].costs(), children[1].costs());
+        Self { bounds, costs, choices, children }
+    }
+}
+
+/// A node of the binary tree, wherever it is.
+#[derive(Clone, Copy)]
+enum Cursor<'a> {
+    Fork(&'a Fork),
+    /// From it on.
+    Twig(&'a [BinaryNode]),
+}
+
+impl<'a> Cursor<'a> {
+    fn new(tree: &'a Binary) -> Self {
+        match tree {
+            Binary::Fork(fork) => Self::Fork(fork),
+            Binary::Twig(twig) => Self::Twig(&twig.nodes),
+        }
+    }
+
+    #[inline(always)]
+    fn bounds(&self) -> &'a Bounds {
+        match self {
+            Self::Fork(fork) => &fork.bounds,
+            Self::Twig(nodes) => nodes[0].bounds(),
+        }
+    }
+
+    #[inline(always)]
+    fn names(&self) -> Option<std::ops::Range<usize>> {
+        match self {
+            Self::Fork(_) => None,
+            Self::Twig(nodes) => nodes[0].names(),
+        }
+    }
+
+    #[inline(always)]
+    fn choices(&self) -> Choices {
+        match self {
+            Self::Fork(fork) => fork.choices,
+            Self::Twig(nodes) => nodes[0].choices(),
+        }
+    }
+
+    #[inline(always)]
+    fn children(&self) -> [Self; 2] {
+        match self {
+            Self::Fork(fork) => [Self::new(&fork.children[0]), Self::new(&fork.children[1])],
+            Self::Twig(nodes) => [Self::Twig(&nodes[1..]), Self::Twig(&nodes[nodes[0].right()..])],
+        }
+    }
+
+    /// The children of an inner node in the wide tree, the largest first: where any hit will do, it is the likeliest to
+    /// have one.
+    #[inline(always)]
+    fn gather(self) -> ([Self; WIDTH], usize) {
+        let mut found = [self; WIDTH];
+        let mut areas = [0.0; WIDTH];
+        let mut len = 0;
+        let mut pending = [(self, 0); WIDTH];
+        let first = self.choices().left(WIDTH);
+        let [left, right] = self.children();
+        pending[0] = (right, WIDTH - first);
+        pending[1] = (left, first);
+        let mut waiting = 2;
+        while waiting > 0 {
+            waiting -= 1;
+            let (cursor, mut room) = pending[waiting];
+            let mut first = 0;
+            if cursor.names().is_none() {
+                while room > 1 && first == 0 {
+                    first = cursor.choices().left(room);
+                    room -= usize::from(first == 0);
+                }
+            }
+            if first > 0 {
+                let [left, right] = cursor.children();
+                pending[waiting] = (right, room - first);
+                pending[waiting + 1] = (left, first);
+                waiting += 2;
+                continue;
+            }
+            // In its place by area.
+            let area = cursor.bounds().half_area();
+            let mut at = len;
+            while at > 0 && areas[at - 1] < area {
+                (found[at], areas[at]) = (found[at - 1], areas[at - 1]);
+                at -= 1;
+            }
+            (found[at], areas[at]) = (cursor, area);
+            len += 1;
+        }
+        (found, len)
+    }
+}
+
+/// How much a part of the tree takes.
+#[derive(Clone, Copy, Default)]
+struct Counts {
+    nodes: usize,
+    blocks: usize,
+    entries: usize,
+}
+
+impl std::ops::AddAssign for Counts {
+    fn add_assign(&mut self, other: Self) {
+        self.nodes += other.nodes;
+        self.blocks += other.blocks;
+        self.entries += other.entries;
+    }
+}
+
+/// A wide node over many primitives, with what its children take.
+struct Plan<'a> {
+    children: [Cursor<'a>; WIDTH],
+    len: usize,
+    counts: [Counts; WIDTH],
+    /// Of those children that are over many in turn.
+    plans: [Option<Box<Self>>; WIDTH],
+    total: Counts,
+}
+
+/// Packs a binary tree. The depth of its recursions is that of the tree, which is bounded.
 ///
 /// # Errors
 /// [`BuildError::TooMany`] when there are more triangle blocks than references can name.
 pub(crate) fn pack(
     geometries: &[Geometry],
     traits: &[Traits],
-    primitives: &[Primitive],
-    binary: &[BinaryNode],
+    binary: &Binary,
+    names: &[Name],
 ) -> Result<Packed, BuildError> {
-    let mut packer = Packer { geometries, traits, primitives, binary, packed: Packed::default() };
-    let root = if binary[0].count > 0 { packer.leaf(0) } else { packer.inner(0) };
-    if packer.packed.blocks.len() > tag::BLOCK_PLACES as usize {
+    let packer = Packer { traits, names };
+    let root = Cursor::new(binary);
+    let plan = packer.plan(root);
+    let total = plan.as_ref().map_or_else(|| packer.count(root), |plan| plan.total);
+    if total.blocks > tag::BLOCK_PLACES as usize {
         return Err(BuildError::TooMany);
     }
-    packer.packed.root = Some(root);
-    packer.packed.nodes.shrink_to_fit();
-    packer.packed.blocks.shrink_to_fit();
-    packer.packed.names.shrink_to_fit();
-    packer.packed.entries.shrink_to_fit();
-    Ok(packer.packed)
+    let mut nodes = crate::build::fill(total.nodes, Node::EMPTY);
+    let mut spans = vec![Span { first: 0, count: 0 }; total.blocks];
+    let mut entries = vec![Entry::new(0, 0, true); total.entries];
+    let mut room =
+        Room { nodes: &mut nodes, spans: &mut spans, entries: &mut entries, start: Counts::default() };
+    let root = match &plan {
+        Some(plan) => packer.put_many(plan, room),
+        None => packer.put(root, &mut room),
+    };
+    let block = |span: &Span| {
+        let names = &names[span.first as usize..][..span.count as usize];
+        fill_block(mesh(geometries, names[0][0]), names)
+    };
+    let blocks = spans.par_iter().with_min_len(256).map(block).collect();
+    let name = |span: &Span| {
+        let names = &names[span.first as usize..][..span.count as usize];
+        let mut named = BlockNames::empty(names[0][0]);
+        for (place, name) in named.primitives.iter_mut().zip(names) {
+            *place = name[1];
+        }
+        named
+    };
+    let names = spans.par_iter().with_min_len(256).map(name).collect();
+    Ok(Packed { nodes, blocks, names, entries, root: Some(root) })
+}
+
+fn mesh(geometries: &[Geometry], geometry: u32) -> &TriangleMesh {
+    match &geometries[geometry as usize].kind {
+        GeometryKind::Mesh(mesh) => mesh,
+        _ => unreachable!("triangles come from meshes"),
+    }
+}
+
+#[inline(always)]
+fn fill_block(mesh: &TriangleMesh, names: &[Name]) -> TriangleBlock {
+    let mut block = TriangleBlock::EMPTY;
+    for (lane, name) in names.iter().enumerate().take(BLOCK) {
+        for (corner, &vertex) in mesh.indices[name[1] as usize].iter().enumerate() {
+            let position = mesh.positions[vertex as usize];
+            for axis in 0..3 {
+                block.corners[corner][axis][lane] = position[axis];
+            }
+        }
+    }
+    block
+}
+
+/// The names in a block.
+#[derive(Clone, Copy)]
+struct Span {
+    first: u32,
+    count: u32,
+}
+
+/// Where a part of the tree goes; it takes up what it is given from the front.
+struct Room<'a> {
+    nodes: &'a mut [Node],
+    spans: &'a mut [Span],
+    entries: &'a mut [Entry],
+    /// The places of the first ones in the whole tree.
+    start: Counts,
+}
+
+impl<'a> Room<'a> {
+    /// The first part.
+    fn take(&mut self, counts: Counts) -> Self {
+        let nodes = self.nodes.split_off_mut(..counts.nodes).unwrap_or_default();
+        let spans = self.spans.split_off_mut(..counts.blocks).unwrap_or_default();
+        let entries = self.entries.split_off_mut(..counts.entries).unwrap_or_default();
+        let start = self.start;
+        self.start += counts;
+        Room { nodes, spans, entries, start }
+    }
 }
 
 struct Packer<'a> {
-    geometries: &'a [Geometry],
     traits: &'a [Traits],
-    primitives: &'a [Primitive],
-    binary: &'a [BinaryNode],
-    packed: Packed,
+    names: &'a [Name],
 }
 
-impl<'a> Packer<'a> {
-    fn inner(&mut self, root: usize) -> u32 {
-        // Open the largest child until there are eight.
-        let mut children = [root; WIDTH];
-        let mut len = 1;
-        while len < WIDTH {
-            let mut largest: Option<(usize, f32)> = None;
-            for (lane, &child) in children[..len].iter().enumerate() {
-                let node = &self.binary[child];
-                let area = node.bounds.half_area();
-                if node.count == 0 && largest.is_none_or(|(_, most)| area > most) {
-                    largest = Some((lane, area));
-                }
-            }
-            let Some((lane, _)) = largest else { break };
-            let opened = children[lane];
-            children[lane] = opened + 1;
-            children[len] = opened + self.binary[opened].place as usize;
-            len += 1;
-        }
+impl Packer<'_> {
+    /// `None` for a leaf, or a node over few primitives.
+    fn plan<'a>(&self, root: Cursor<'a>) -> Option<Box<Plan<'a>>> {
+        let Cursor::Fork(_) = root else { return None };
+        let (children, len) = root.gather();
+        let mut plans: [Option<Box<Plan>>; WIDTH] = Default::default();
+        let mut counts = [Counts::default(); WIDTH];
+        plans[..len].par_iter_mut().zip(&mut counts[..len]).zip(&children[..len]).for_each(
+            |((plan, counts), &child)| {
+                *plan = self.plan(child);
+                *counts = plan.as_ref().map_or_else(|| self.count(child), |plan| plan.total);
+            },
+        );
+        let mut total = Counts { nodes: 1, ..Counts::default() };
+        counts.iter().for_each(|&counts| total += counts);
+        Some(Box::new(Plan { children, len, counts, plans, total }))
+    }
 
-        // The largest first: where any hit will do, it is the likeliest to have one.
-        children[..len].sort_by(|&a, &b| {
-            let area = |child: usize| self.binary[child].bounds.half_area();
-            area(b).total_cmp(&area(a))
-        });
+    fn count(&self, root: Cursor) -> Counts {
+        if let Some(names) = root.names() {
+            let kind = self.traits[self.names[names.start][0] as usize].kind;
+            return match kind {
+                Kind::Triangle => Counts { blocks: names.len().div_ceil(BLOCK), ..Counts::default() },
+                _ => Counts { entries: names.len(), ..Counts::default() },
+            };
+        }
+        let (children, len) = root.gather();
+        let mut total = Counts { nodes: 1, ..Counts::default() };
+        children[..len].iter().for_each(|&child| total += self.count(child));
+        total
+    }
 
-        let place = self.packed.nodes.len();
-        let mut node = Node { len: len as u32, ..Node::EMPTY };
-        for (lane, &child) in children[..len].iter().enumerate() {
-            let Bounds { min, max } = self.binary[child].bounds;
-            for axis in 0..3 {
-                node.planes[2 * axis][lane] = min[axis];
-                node.planes[2 * axis + 1][lane] = max[axis];
-            }
-        }
-        self.packed.nodes.push(node);
-        for (lane, &child) in children[..len].iter().enumerate() {
-            let reference = if self.binary[child].count > 0 { self.leaf(child) } else { self.inner(child) };
-            self.packed.nodes[place].children[lane] = reference;
-        }
+    fn put_many(&self, plan: &Plan, mut room: Room) -> u32 {
+        let place = room.start.nodes;
+        let own = room.take(Counts { nodes: 1, ..Counts::default() });
+        let rooms: Vec<Room> = plan.counts[..plan.len].iter().map(|&counts| room.take(counts)).collect();
+        let mut references = [u32::MAX; WIDTH];
+        references[..plan.len]
+            .par_iter_mut()
+            .zip(rooms)
+            .zip(&plan.plans[..plan.len])
+            .zip(&plan.children[..plan.len])
+            .for_each(|(((reference, mut room), plan), &child)| {
+                *reference = match plan {
+                    Some(plan) => self.put_many(plan, room),
+                    None => self.put(child, &mut room),
+                };
+            });
+        own.nodes[0] = node_over(&plan.children[..plan.len], references);
         tag::reference(tag::INNER, place as u32)
     }
 
-    fn leaf(&mut self, leaf: usize) -> u32 {
-        let BinaryNode { place, count, .. } = self.binary[leaf];
-        let primitives = &self.primitives[place as usize..][..count as usize];
-        let tag = match self.traits[primitives[0].geometry as usize].kind {
-            Kind::Triangle => return self.triangles(primitives),
+    fn put(&self, root: Cursor, room: &mut Room) -> u32 {
+        if let Some(names) = root.names() {
+            return self.put_leaf(names, room);
+        }
+        let (children, len) = root.gather();
+        let place = room.start.nodes;
+        let own = room.take(Counts { nodes: 1, ..Counts::default() });
+        let mut references = [u32::MAX; WIDTH];
+        for (reference, &child) in references.iter_mut().zip(&children[..len]) {
+            *reference = self.put(child, room);
+        }
+        own.nodes[0] = node_over(&children[..len], references);
+        tag::reference(tag::INNER, place as u32)
+    }
+
+    fn put_leaf(&self, names: std::ops::Range<usize>, room: &mut Room) -> u32 {
+        let (first, count) = (names.start as u32, names.len() as u32);
+        let names = &self.names[names];
+        let tag = match self.traits[names[0][0] as usize].kind {
+            Kind::Triangle => {
+                let block = room.start.blocks as u32;
+                let blocks = names.len().div_ceil(BLOCK);
+                let own = room.take(Counts { blocks, ..Counts::default() });
+                for (i, span) in own.spans.iter_mut().enumerate() {
+                    let before = (i * BLOCK) as u32;
+                    *span = Span { first: first + before, count: (count - before).min(BLOCK as u32) };
+                }
+                return tag::triangles(block, blocks as u32);
+            }
             Kind::Shape => tag::SHAPES,
             Kind::Instance => tag::INSTANCE,
             Kind::Custom => tag::CUSTOM,
         };
-        let first = self.packed.entries.len() as u32;
-        for (i, primitive) in primitives.iter().enumerate() {
-            let is_last = i + 1 == primitives.len();
-            self.packed.entries.push(Entry::new(primitive.geometry, primitive.primitive, is_last));
+        let place = room.start.entries as u32;
+        let own = room.take(Counts { entries: names.len(), ..Counts::default() });
+        for (i, (entry, name)) in own.entries.iter_mut().zip(names).enumerate() {
+            *entry = Entry::new(name[0], name[1], i + 1 == names.len());
         }
-        tag::reference(tag, first)
+        tag::reference(tag, place)
     }
+}
 
-    fn triangles(&mut self, primitives: &[Primitive]) -> u32 {
-        let geometry = primitives[0].geometry;
-        let mesh = self.mesh(geometry);
-        let first = self.packed.blocks.len() as u32;
-        for chunk in primitives.chunks(BLOCK) {
-            let (mut block, mut names) = (TriangleBlock::EMPTY, BlockNames::empty(geometry));
-            for (lane, primitive) in chunk.iter().enumerate() {
-                names.primitives[lane] = primitive.primitive;
-                for (corner, &vertex) in mesh.indices[primitive.primitive as usize].iter().enumerate() {
-                    let position = mesh.positions[vertex as usize];
-                    for axis in 0..3 {
-                        block.corners[corner][axis][lane] = position[axis];
-                    }
-                }
-            }
-            self.packed.blocks.push(block);
-            self.packed.names.push(names);
-        }
-        // Past the last place the tree is given up, so that it does not matter what this names.
-        let first = first.min(tag::BLOCK_PLACES - 1);
-        tag::triangles(first, primitives.len().div_ceil(BLOCK) as u32)
-    }
-
-    fn mesh(&self, geometry: u32) -> &'a TriangleMesh {
-        match &self.geometries[geometry as usize].kind {
-            GeometryKind::Mesh(mesh) => mesh,
-            _ => unreachable!("triangles come from meshes"),
+/// A node with these children.
+#[inline(always)]
+fn node_over(children: &[Cursor], references: [u32; WIDTH]) -> Node {
+    let mut node = Node { len: children.len() as u32, children: references, ..Node::EMPTY };
+    for (lane, child) in children.iter().enumerate() {
+        let bounds = child.bounds();
+        for axis in 0..3 {
+            node.planes[2 * axis][lane] = bounds.low_plane(axis);
+            node.planes[2 * axis + 1][lane] = bounds.high_plane(axis);
         }
     }
+    node
 }

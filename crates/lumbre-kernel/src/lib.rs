@@ -1,14 +1,17 @@
 #![doc = include_str!("../README.md")]
 
 mod accel;
+mod bins;
 mod build;
 mod collapse;
+mod few;
 mod geometry;
 mod hit;
 mod holds;
 mod lanes;
 mod node;
 mod prepare;
+mod primitive;
 mod query;
 mod stack;
 mod surface;

@@ -1,14 +1,18 @@
 //! What comes before the tree: geometries are checked, bounded and taken apart into primitives.
 
+use std::collections::HashMap;
+use std::sync::Arc;
+
 use lumbre_geometry::{Aabb, PlacedShape};
-use lumbre_math::{DMat3, DVec3, Transform};
+use lumbre_math::{DMat3, DVec3, Transform, Vec3};
 use rayon::prelude::*;
 
-use crate::build::{Bounds, Kind, Primitive, Traits, binary_tree};
+use crate::build::{binary_tree, fill};
 use crate::collapse::{Entry, Packed, pack};
 use crate::holds::Holds;
 use crate::lanes::Level;
 use crate::node::{Node, Units, tag};
+use crate::primitive::{Bounds, Kind, Primitive, Traits};
 use crate::{Accel, BuildError, Geometry, GeometryKind, Instance, TriangleMesh};
 
 /// References have 29 bits of place.
@@ -22,37 +26,35 @@ pub(crate) fn build(geometries: Vec<Geometry>) -> Result<Accel, BuildError> {
     let parts = take_apart(&geometries)?;
     let units = units_of(&geometries, &parts);
     let traits: Vec<Traits> = geometries.iter().map(traits_of).collect();
+    let level = Level::best();
 
-    let mut primitives: Vec<Primitive> = Vec::with_capacity(parts.boxed.len() + parts.triangles);
-    primitives.extend(parts.boxed.iter().map(|part| Primitive {
-        bounds: Bounds::around(&units, &part.bounds),
-        geometry: part.geometry,
-        primitive: part.primitive,
-    }));
-    for (position, geometry) in geometries.iter().enumerate() {
-        if let GeometryKind::Mesh(mesh) = &geometry.kind {
-            primitives.par_extend(triangles_of(mesh).map(|(triangle, bounds)| Primitive {
-                bounds: Bounds::around(&units, &bounds),
-                geometry: position as u32,
-                primitive: triangle,
-            }));
-        }
-    }
-    let count = primitives.len() + parts.infinite.len();
-    let tree = if primitives.is_empty() {
+    let in_tree = parts.boxed.len() + parts.surveys.iter().map(|survey| survey.triangles).sum::<usize>();
+    let count = in_tree + parts.infinite.len();
+    let tree = if in_tree == 0 {
         Packed::default()
     } else {
-        let binary = binary_tree(&mut primitives, &traits);
-        pack(&geometries, &traits, &primitives, &binary)?
+        let mut primitives = fill(in_tree, Bounds::EMPTY);
+        let (boxed, mut rest) = primitives.split_at_mut(parts.boxed.len());
+        for (place, part) in boxed.iter_mut().zip(&parts.boxed) {
+            *place = Bounds::near(&units, &part.bounds, part.geometry, part.primitive);
+        }
+        for survey in &parts.surveys {
+            if let GeometryKind::Mesh(mesh) = &geometries[survey.geometry as usize].kind {
+                let own = rest.split_off_mut(..survey.triangles).expect("they were counted");
+                box_triangles(mesh, survey, &units, own);
+            }
+        }
+        let (binary, names) = binary_tree(level, primitives, &traits);
+        pack(&geometries, &traits, &binary, &names)?
     };
     Ok(Accel {
         units,
-        holds: Holds::new(&geometries, &tree.blocks),
+        holds: Holds::new(&geometries, parts.largest_corner),
         tree,
         infinite: parts.infinite,
         bounds: parts.bounds,
         primitives: count,
-        level: Level::best(),
+        level,
         geometries,
     })
 }
@@ -65,8 +67,21 @@ struct Parts {
     tree_bounds: Aabb,
     boxed: Vec<Boxed>,
     infinite: Vec<Entry>,
-    /// How many that are not of zero area.
+    /// Of every mesh.
+    surveys: Vec<Survey>,
+    /// Of all meshes.
     triangles: usize,
+    /// No corner of a triangle has a larger coordinate, relative to its mesh's origin.
+    largest_corner: f32,
+}
+
+/// What was seen of a mesh.
+struct Survey {
+    geometry: u32,
+    /// Triangles that have an area.
+    triangles: usize,
+    /// The same of every [`CHUNK`] triangles.
+    chunks: Vec<u32>,
 }
 
 struct Boxed {
@@ -81,8 +96,12 @@ fn take_apart(geometries: &[Geometry]) -> Result<Parts, BuildError> {
         tree_bounds: Aabb::EMPTY,
         boxed: Vec::new(),
         infinite: Vec::new(),
+        surveys: Vec::new(),
         triangles: 0,
+        largest_corner: 0.0,
     };
+    // Instances of one tree are many.
+    let mut outlines: HashMap<*const Accel, Vec<Aabb>> = HashMap::new();
     for (position, geometry) in geometries.iter().enumerate() {
         let room = MOST_PRIMITIVES - parts.boxed.len() - parts.infinite.len() - parts.triangles;
         match &geometry.kind {
@@ -90,12 +109,11 @@ fn take_apart(geometries: &[Geometry]) -> Result<Parts, BuildError> {
                 if mesh.indices.len() > room {
                     return Err(BuildError::TooMany);
                 }
-                check_mesh(position, mesh)?;
-                let (bounds, triangles) = triangles_of(mesh)
-                    .map(|(_, bounds)| (bounds, 1))
-                    .reduce(|| (Aabb::EMPTY, 0), |a, b| (a.0.union(b.0), a.1 + b.1));
+                let (survey, bounds, largest) = survey_mesh(position, mesh)?;
+                parts.largest_corner = parts.largest_corner.max(largest);
                 parts.tree_bounds = parts.tree_bounds.union(bounds);
-                parts.triangles += triangles;
+                parts.triangles += survey.triangles;
+                parts.surveys.push(survey);
             }
             GeometryKind::Shape(shape) => parts.add(position, 0, shape.bounds(), room)?,
             GeometryKind::Custom(custom) => {
@@ -105,7 +123,10 @@ fn take_apart(geometries: &[Geometry]) -> Result<Parts, BuildError> {
                 }
             }
             GeometryKind::Instance(instance) => {
-                let (is_infinite, bounds) = (!instance.accel.infinite.is_empty(), instance_bounds(instance));
+                let outline =
+                    outlines.entry(Arc::as_ptr(&instance.accel)).or_insert_with(|| outline(&instance.accel));
+                let (is_infinite, bounds) =
+                    (!instance.accel.infinite.is_empty(), instance_bounds(instance, outline));
                 if is_infinite {
                     parts.bounds = parts.bounds.union(bounds);
                     parts.add(position, 0, None, room)?;
@@ -146,28 +167,157 @@ impl Parts {
     }
 }
 
-fn check_mesh(position: usize, mesh: &TriangleMesh) -> Result<(), BuildError> {
+/// Triangles that a thread looks at together.
+const CHUNK: usize = 1 << 13;
+
+/// Checks a mesh, and finds the box around its triangles that have an area.
+fn survey_mesh(position: usize, mesh: &TriangleMesh) -> Result<(Survey, Aabb, f32), BuildError> {
     if !mesh.origin.is_finite() {
         return Err(BuildError::NotFinite { geometry: position, element: 0 });
     }
-    if let Some(element) = mesh.positions.par_iter().position_first(|position| !position.is_finite()) {
+    let is_broken = |chunk: &&[Vec3]| chunk.iter().any(|p| !p.is_finite());
+    if mesh.positions.par_chunks(CHUNK).find_first(is_broken).is_some() {
+        let element = mesh.positions.iter().position(|p| !p.is_finite()).unwrap_or_default();
         return Err(BuildError::NotFinite { geometry: position, element });
     }
-    let is_outside = |vertex: &u32| *vertex as usize >= mesh.positions.len();
-    match mesh.indices.par_iter().position_first(|triangle| triangle.iter().any(is_outside)) {
-        Some(triangle) => Err(BuildError::VertexOutOfRange { geometry: position, triangle }),
-        None => Ok(()),
+    let survey_chunk = |(chunk, triangles): (usize, &[[u32; 3]])| {
+        let (mut bounds, mut count) = (MeshBox::EMPTY, 0);
+        for (i, triangle) in triangles.iter().enumerate() {
+            let Some(corners) = corners(mesh, triangle) else {
+                let triangle = chunk * CHUNK + i;
+                return Err(BuildError::VertexOutOfRange { geometry: position, triangle });
+            };
+            if has_area(&corners) {
+                count += 1;
+                bounds.grow(&MeshBox::around(&corners));
+            }
+        }
+        Ok((bounds, count))
+    };
+    let chunks: Vec<_> = mesh.indices.par_chunks(CHUNK).enumerate().map(survey_chunk).collect();
+    let mut survey =
+        Survey { geometry: position as u32, triangles: 0, chunks: Vec::with_capacity(chunks.len()) };
+    let mut bounds = MeshBox::EMPTY;
+    for chunk in chunks {
+        let (around, count) = chunk?;
+        bounds.grow(&around);
+        survey.triangles += count as usize;
+        survey.chunks.push(count);
+    }
+    if survey.triangles == 0 {
+        return Ok((survey, Aabb::EMPTY, 0.0));
+    }
+    let corner = |corner: [f32; 3]| mesh.origin + Vec3::from_array(corner).as_dvec3();
+    let largest = bounds.low.iter().chain(&bounds.high).fold(0.0, |most: f32, x| most.max(x.abs()));
+    let bounds = Aabb { min: corner(bounds.low), max: corner(bounds.high) };
+    Ok((survey, bounds, largest))
+}
+
+/// `None` where the mesh lacks a vertex.
+#[inline(always)]
+fn corners(mesh: &TriangleMesh, triangle: &[u32; 3]) -> Option<[Vec3; 3]> {
+    let [a, b, c] = triangle.map(|vertex| mesh.positions.get(vertex as usize).copied());
+    Some([a?, b?, c?])
+}
+
+/// A box in the space of a mesh.
+#[derive(Clone, Copy)]
+struct MeshBox {
+    low: [f32; 3],
+    high: [f32; 3],
+}
+
+impl MeshBox {
+    const EMPTY: Self = Self { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3] };
+
+    #[inline(always)]
+    fn around(&[a, b, c]: &[Vec3; 3]) -> Self {
+        Self {
+            low: std::array::from_fn(|axis| lesser(lesser(a[axis], b[axis]), c[axis])),
+            high: std::array::from_fn(|axis| greater(greater(a[axis], b[axis]), c[axis])),
+        }
+    }
+
+    #[inline(always)]
+    fn grow(&mut self, other: &Self) {
+        for axis in 0..3 {
+            self.low[axis] = lesser(self.low[axis], other.low[axis]);
+            self.high[axis] = greater(self.high[axis], other.high[axis]);
+        }
     }
 }
 
-/// The triangles that have an area, and their boxes in space.
-fn triangles_of(mesh: &TriangleMesh) -> impl ParallelIterator<Item = (u32, Aabb)> {
-    mesh.indices.par_iter().enumerate().filter_map(|(triangle, vertices)| {
-        let [p0, p1, p2] = vertices.map(|vertex| mesh.positions[vertex as usize].as_dvec3());
-        let has_area = (p1 - p0).cross(p2 - p0) != DVec3::ZERO;
-        let bounds = Aabb { min: mesh.origin + p0.min(p1).min(p2), max: mesh.origin + p0.max(p1).max(p2) };
-        has_area.then_some((triangle as u32, bounds))
-    })
+// One instruction each, which f32::min and f32::max are not.
+#[inline(always)]
+fn lesser(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+#[inline(always)]
+fn greater(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+/// Whether a triangle can be hit at all, as double precision sees it.
+#[inline(always)]
+fn has_area(&[a, b, c]: &[Vec3; 3]) -> bool {
+    // Single precision can tell of all but slivers: its errors are below 2^-20 of the products, and 1e-37.
+    let (e, f) = ((b - a).to_array(), (c - a).to_array());
+    let is_clear = |x: usize, y: usize| {
+        let (p, q) = (e[x] * f[y], e[y] * f[x]);
+        let bound = (p.abs() + q.abs()) * (1.0 / (1 << 20) as f32) + 1e-37;
+        (p - q).abs() > bound && bound < f32::INFINITY
+    };
+    is_clear(0, 1) || is_clear(1, 2) || is_clear(2, 0) || has_area_exactly([a, b, c])
+}
+
+#[cold]
+#[inline(never)]
+fn has_area_exactly(corners: [Vec3; 3]) -> bool {
+    let [a, b, c] = corners.map(|corner| corner.as_dvec3());
+    (b - a).cross(c - a) != DVec3::ZERO
+}
+
+/// Writes down the boxes of the triangles that have an area.
+fn box_triangles(mesh: &TriangleMesh, survey: &Survey, units: &Units, mut places: &mut [Primitive]) {
+    let chunks: Vec<(usize, &mut [Primitive])> = survey
+        .chunks
+        .iter()
+        .enumerate()
+        .map(|(chunk, &count)| (chunk, places.split_off_mut(..count as usize).expect("they were counted")))
+        .collect();
+    // Where the mesh is moved by a number that single precision has, one subtraction is rounded once, as in double
+    // precision; and the scale is a power of two.
+    let shift = units.origin - mesh.origin;
+    let (shift_single, scale_single) = (shift.as_vec3(), units.scale as f32);
+    let is_single = shift_single.as_dvec3() == shift
+        && (f32::MIN_POSITIVE..1e38).contains(&scale_single)
+        && shift_single.abs().max_element() < 1e37
+        && units.scale > 1e-37;
+    chunks.into_par_iter().for_each(|(chunk, places)| {
+        let first = chunk * CHUNK;
+        let triangles = mesh.indices[first..].iter().take(CHUNK).enumerate();
+        let boxes = triangles.filter_map(|(i, triangle)| {
+            let corners = corners(mesh, triangle).filter(has_area)?;
+            let bounds = MeshBox::around(&corners);
+            let (low, high): ([f32; 3], [f32; 3]) = if is_single {
+                (
+                    std::array::from_fn(|axis| (bounds.low[axis] - shift_single[axis]) * scale_single),
+                    std::array::from_fn(|axis| (bounds.high[axis] - shift_single[axis]) * scale_single),
+                )
+            } else {
+                let wide = |x: f32, axis: usize| ((f64::from(x) - shift[axis]) * units.scale) as f32;
+                (
+                    std::array::from_fn(|axis| wide(bounds.low[axis], axis)),
+                    std::array::from_fn(|axis| wide(bounds.high[axis], axis)),
+                )
+            };
+            Some(Bounds::new(low, high, survey.geometry, (first + i) as u32))
+        });
+        for (place, bounds) in places.iter_mut().zip(boxes) {
+            *place = bounds;
+        }
+    });
 }
 
 /// The units that make the tree's boxes about 1 in size.
@@ -177,7 +327,7 @@ fn units_of(geometries: &[Geometry], parts: &Parts) -> Units {
     } else {
         parts.tree_bounds
     };
-    let origin = bounds.center();
+    let origin = rounded_center(geometries, &bounds);
     let half = (bounds.max - origin).max(origin - bounds.min);
     let largest = half.max_element();
     // The power of two that brings the largest half edge into (0.5, 1].
@@ -198,6 +348,20 @@ fn units_of(geometries: &[Geometry], parts: &Parts) -> Units {
     Units { origin, scale, radius: (half * scale).length(), condition }
 }
 
+/// About the middle of the box: where that is near enough, what is as far from the first mesh's origin as a single precision
+/// number says, so that boxes of triangles can be made in single precision.
+fn rounded_center(geometries: &[Geometry], bounds: &Aabb) -> DVec3 {
+    let center = bounds.center();
+    let mesh = geometries.iter().find_map(|geometry| match &geometry.kind {
+        GeometryKind::Mesh(mesh) => Some(mesh),
+        _ => None,
+    });
+    let Some(mesh) = mesh else { return center };
+    let rounded = mesh.origin + (center - mesh.origin).as_vec3().as_dvec3();
+    let is_near = (rounded - center).abs().max_element() <= bounds.size().max_element() / 256.0;
+    if is_near { rounded } else { center }
+}
+
 /// By how much a map and its inverse together may enlarge rounding errors: the lesser of two bounds, of which one is 1
 /// for every rotation with a uniform scale, the other for every scale along the axes.
 fn condition_of(map: &Transform) -> f64 {
@@ -209,31 +373,44 @@ fn condition_of(map: &Transform) -> f64 {
     by_norm.min(by_component).max(1.0)
 }
 
-/// A box around an instance of what is finite: of boxes two levels down the inner tree, each taken over by itself, which
-/// is tighter than the image of the whole.
-fn instance_bounds(instance: &Instance) -> Aabb {
-    let inner = &instance.accel;
+/// A box around an instance of what is finite: of many boxes of the inner tree, each taken over by itself, which is tighter
+/// than the image of the whole.
+fn instance_bounds(instance: &Instance, outline: &[Aabb]) -> Aabb {
     let map = &instance.world_from_object;
-    let whole = placed_bounds(&inner.bounds, map);
+    let whole = placed_bounds(&instance.accel.bounds, map);
+    if outline.is_empty() {
+        return whole;
+    }
+    let joined = outline.iter().fold(Aabb::EMPTY, |joined, bounds| joined.union(placed_bounds(bounds, map)));
+    // Each bounds it, so that their common part does.
+    Aabb { min: joined.min.max(whole.min), max: joined.max.min(whole.max) }
+}
+
+/// Boxes of an outline, about.
+const OUTLINE: usize = 128;
+
+/// Boxes of a tree that together hold it, none where something in it is infinite.
+fn outline(inner: &Accel) -> Vec<Aabb> {
     let node = |reference: u32| {
         (reference >> tag::SHIFT == tag::INNER).then(|| &inner.tree.nodes[reference as usize])
     };
     let Some(root) = inner.tree.root.filter(|_| inner.infinite.is_empty()).and_then(node) else {
-        return whole;
+        return Vec::new();
     };
-    let mut joined = Aabb::EMPTY;
-    for lane in 0..root.len as usize {
-        match node(root.children[lane]) {
-            Some(child) => {
-                for lane in 0..child.len as usize {
-                    joined = joined.union(placed_bounds(&box_in_space(&inner.units, child, lane), map));
-                }
-            }
-            None => joined = joined.union(placed_bounds(&box_in_space(&inner.units, root, lane), map)),
-        }
+    let children = |node: &Node| -> Vec<(Aabb, u32)> {
+        (0..node.len as usize)
+            .map(|lane| (box_in_space(&inner.units, node, lane), node.children[lane]))
+            .collect()
+    };
+    let mut boxes = children(root);
+    while boxes.len() < OUTLINE {
+        let area = |i: &usize| boxes[*i].0.half_area();
+        let inner_ones = (0..boxes.len()).filter(|&i| node(boxes[i].1).is_some());
+        let Some(largest) = inner_ones.max_by(|a, b| area(a).total_cmp(&area(b))) else { break };
+        let (_, reference) = boxes.swap_remove(largest);
+        boxes.extend(node(reference).map(children).unwrap_or_default());
     }
-    // Each bounds it, so that their common part does.
-    Aabb { min: joined.min.max(whole.min), max: joined.max.min(whole.max) }
+    boxes.into_iter().map(|(bounds, _)| bounds).collect()
 }
 
 /// A node's box, back from tree units.
@@ -262,17 +439,17 @@ fn placed_bounds(bounds: &Aabb, map: &Transform) -> Aabb {
     Aabb { min: image - reach - rounding, max: image + reach + rounding }
 }
 
-/// What the build must know of a geometry. Costs are relative to a node's.
+/// What the build must know of a geometry.
 fn traits_of(geometry: &Geometry) -> Traits {
     match &geometry.kind {
-        GeometryKind::Mesh(_) => Traits { kind: Kind::Triangle, cost: 0.5 },
+        GeometryKind::Mesh(_) => Traits { kind: Kind::Triangle, cost: 4 },
         GeometryKind::Shape(shape) => Traits { kind: Kind::Shape, cost: cost_of(shape) },
-        GeometryKind::Instance(_) => Traits { kind: Kind::Instance, cost: 6.0 },
-        GeometryKind::Custom(_) => Traits { kind: Kind::Custom, cost: 3.0 },
+        GeometryKind::Instance(_) => Traits { kind: Kind::Instance, cost: 96 },
+        GeometryKind::Custom(_) => Traits { kind: Kind::Custom, cost: 48 },
     }
 }
 
-fn cost_of(shape: &PlacedShape) -> f32 {
+fn cost_of(shape: &PlacedShape) -> u32 {
     let moved = if shape.world_from_object().is_identity() { 0.0 } else { 0.5 };
-    moved + shape.shape().search_cost()
+    (16.0 * (moved + shape.shape().search_cost())) as u32
 }

@@ -6,14 +6,23 @@ use lumbre_geometry::{Aabb, Ray};
 use lumbre_math::DVec3;
 
 use super::scenes::Random;
-use crate::build::Bounds;
 use crate::lanes::{LANE_BITS, Level, key, meet_boxes_at};
 use crate::node::{BoxRay, Node, Units, WIDTH};
+use crate::primitive::Bounds;
 
 fn units(bounds: &Aabb) -> Units {
     let half = 0.5 * bounds.size();
     let scale = half.max_element().log2().ceil().exp2().recip();
     Units { origin: bounds.center(), scale, radius: (half * scale).length(), condition: 1.0 }
+}
+
+/// As the build does.
+fn put_box(node: &mut Node, lane: usize, units: &Units, bounds: &Aabb) {
+    let near = Bounds::near(units, bounds, 2, 3);
+    for axis in 0..3 {
+        node.planes[2 * axis][lane] = near.low_plane(axis);
+        node.planes[2 * axis + 1][lane] = near.high_plane(axis);
+    }
 }
 
 /// A component such as makes trouble.
@@ -49,11 +58,7 @@ fn reached_boxes_are_met(level: Level, seed: u64, rounds: usize) {
                 b[lane % 3] = a[lane % 3];
             }
             let bounds = Aabb::around([a, b]);
-            let Bounds { min, max } = Bounds::around(&units, &bounds);
-            for axis in 0..3 {
-                node.planes[2 * axis][lane] = min[axis];
-                node.planes[2 * axis + 1][lane] = max[axis];
-            }
+            put_box(&mut node, lane, &units, &bounds);
             boxes.push(bounds);
         }
         for (lane, bounds) in boxes.iter().enumerate() {
@@ -107,11 +112,7 @@ fn boxes_far_from_the_ray_are_not_met() {
     let units = units(&whole);
     let mut node = Node { len: 1, ..Node::EMPTY };
     let bounds = Aabb { min: DVec3::new(2.0, 3.0, 4.0), max: DVec3::new(2.5, 3.5, 4.5) };
-    let Bounds { min, max } = Bounds::around(&units, &bounds);
-    for axis in 0..3 {
-        node.planes[2 * axis][0] = min[axis];
-        node.planes[2 * axis + 1][0] = max[axis];
-    }
+    put_box(&mut node, 0, &units, &bounds);
     let mut missed = 0;
     for _ in 0..10_000 {
         let center = bounds.center();

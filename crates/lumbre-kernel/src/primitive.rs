@@ -1,0 +1,136 @@
+//! Primitives on their way into the tree: 32 bytes each.
+
+use lumbre_geometry::Aabb;
+
+use crate::node::{Units, round_up};
+
+/// The kind of a primitive. A leaf holds one kind, and triangles of one mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+pub(crate) enum Kind {
+    Triangle,
+    Shape,
+    Instance,
+    Custom,
+}
+
+/// What the build must know of a geometry: the kind of its primitives, and what a test of one costs.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Traits {
+    pub(crate) kind: Kind,
+    /// In sixteenths of what a node costs: whole numbers, so that sums do not depend on their order.
+    pub(crate) cost: u32,
+}
+
+/// Numbers of the fixed-point coordinates in a tree unit. Twice a centre, less another such, still fits.
+const ONE: f64 = (1 << 28) as f64;
+
+/// A box in tree units with two names: of a primitive, those of its geometry and of itself in it.
+///
+/// Eight whole numbers that grow by one vector operation: the lower corner and the first name, the upper corner negated and
+/// the second name. The corners' resolution of 2^-28 is well below what the test of boxes can tell (see `node`). They are
+/// rounded in any way by up to 2^-24 of themselves; they are widened when they become planes of a node.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(32))]
+pub(crate) struct Bounds {
+    lanes: [i32; 8],
+}
+
+/// A box with the names of what is in it.
+pub(crate) type Primitive = Bounds;
+
+const FIRST: usize = 3;
+const SECOND: usize = 7;
+
+impl Bounds {
+    // Beyond all coordinates, but with a size that does not overflow.
+    pub(crate) const EMPTY: Self = Self { lanes: [1 << 30; 8] };
+
+    /// From corners in tree units.
+    #[inline(always)]
+    pub(crate) fn new(low: [f32; 3], high: [f32; 3], first: u32, second: u32) -> Self {
+        let fixed = |x: f32| (x * ONE as f32) as i32;
+        let (low, high) = (low.map(fixed), high.map(fixed));
+        Self { lanes: [low[0], low[1], low[2], first as i32, -high[0], -high[1], -high[2], second as i32] }
+    }
+
+    /// The nearest one to a box in space.
+    #[inline]
+    pub(crate) fn near(units: &Units, bounds: &Aabb, first: u32, second: u32) -> Self {
+        let low = (bounds.min - units.origin) * units.scale;
+        let high = (bounds.max - units.origin) * units.scale;
+        Self::new(low.as_vec3().to_array(), high.as_vec3().to_array(), first, second)
+    }
+
+    #[inline(always)]
+    pub(crate) fn with_names(mut self, first: u32, second: u32) -> Self {
+        self.lanes[FIRST] = first as i32;
+        self.lanes[SECOND] = second as i32;
+        self
+    }
+
+    /// Of a primitive, its geometry.
+    #[inline(always)]
+    pub(crate) fn first(&self) -> u32 {
+        self.lanes[FIRST] as u32
+    }
+
+    /// Of a primitive, which of its geometry.
+    #[inline(always)]
+    pub(crate) fn second(&self) -> u32 {
+        self.lanes[SECOND] as u32
+    }
+
+    /// The lower plane on an axis, moved outward by what rounding may have moved it inward.
+    #[inline]
+    pub(crate) fn low_plane(&self, axis: usize) -> f32 {
+        -Self::outward(-self.lanes[axis])
+    }
+
+    /// The upper plane on an axis.
+    #[inline]
+    pub(crate) fn high_plane(&self, axis: usize) -> f32 {
+        Self::outward(-self.lanes[axis + 4])
+    }
+
+    fn outward(x: i32) -> f32 {
+        let x = f64::from(x);
+        round_up((x + x.abs() * f64::from(f32::EPSILON) + 2.0) / ONE)
+    }
+
+    /// Twice where it begins and ends on an axis.
+    #[inline(always)]
+    pub(crate) fn range2(&self, axis: usize) -> [i32; 2] {
+        [2 * self.lanes[axis], -2 * self.lanes[axis + 4]]
+    }
+
+    /// Takes another box in; the names are lost.
+    #[inline(always)]
+    pub(crate) fn grow(&mut self, other: &Self) {
+        for lane in 0..8 {
+            self.lanes[lane] = self.lanes[lane].min(other.lanes[lane]);
+        }
+    }
+
+    /// Half the area, in squares of the fixed-point unit; 0 when empty.
+    #[inline(always)]
+    pub(crate) fn half_area(&self) -> f32 {
+        let sizes: [f32; 4] = std::array::from_fn(|lane| {
+            let size = self.lanes[lane].wrapping_neg().wrapping_sub(self.lanes[lane + 4]);
+            size.max(0) as f32
+        });
+        let [x, y, z, _] = sizes;
+        x * y + y * z + z * x
+    }
+
+    /// Twice the middle, on each axis; the last lane means nothing.
+    #[inline(always)]
+    pub(crate) fn center2(&self) -> [i32; 4] {
+        std::array::from_fn(|lane| self.lanes[lane].wrapping_sub(self.lanes[lane + 4]))
+    }
+
+    #[inline(always)]
+    pub(crate) fn center2_on(&self, axis: usize) -> i32 {
+        self.lanes[axis] - self.lanes[axis + 4]
+    }
+}
