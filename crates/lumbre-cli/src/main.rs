@@ -20,6 +20,7 @@ mod info;
 mod progress;
 mod reading;
 mod render;
+mod staging;
 mod units;
 
 /// Renders scenes, casts rays into them, says what is in them, and compares pictures.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use lumbre::formats::{Diagnostics, Limits, Strictness};
-use lumbre::{Error, Scene};
+use lumbre::{Error, Scene, SceneDesc};
 
 use crate::failure::Failure;
 use crate::units;
@@ -62,7 +62,8 @@ impl ReadingArguments {
         self.strict
     }
 
-    fn strictness(&self) -> Strictness {
+    /// What warnings and breaches are.
+    pub fn strictness(&self) -> Strictness {
         match (self.strict, self.lenient) {
             (true, _) => Strictness::Strict,
             (_, true) => Strictness::Lenient,
@@ -76,13 +77,25 @@ impl ReadingArguments {
     /// [`Failure`] by what went wrong.
     pub fn open(&self, paths: &[PathBuf]) -> Result<(Scene, Diagnostics), Failure> {
         let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
-        let options = lumbre::ReadOptions {
+        lumbre::open_with(&paths, &self.options()).map_err(Failure::from)
+    }
+
+    /// Reads one or more files as one description.
+    ///
+    /// # Errors
+    /// As [`ReadingArguments::open`].
+    pub fn describe(&self, paths: &[PathBuf]) -> Result<(SceneDesc, Diagnostics), Failure> {
+        let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
+        lumbre::describe(&paths, &self.options()).map_err(Failure::from)
+    }
+
+    fn options(&self) -> lumbre::ReadOptions {
+        lumbre::ReadOptions {
             limits: self.limits(),
             strictness: self.strictness(),
             frame: self.frame,
             variant: self.variant.clone(),
-        };
-        lumbre::open_with(&paths, &options).map_err(Failure::from)
+        }
     }
 }
 

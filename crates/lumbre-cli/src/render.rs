@@ -9,14 +9,18 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use lumbre::description::{CameraKind, IntegratorKind};
 use lumbre::formats::image::ImageFormat;
-use lumbre::formats::probe_writable;
+use lumbre::formats::{Diagnostics, probe_writable};
 use lumbre::image::ToneMap;
-use lumbre::{CancelToken, Feature, Picture, PixelBounds, RenderOptions, SaveOptions, Scene};
+use lumbre::{
+    CancelToken, DVec3, Feature, Ground, Picture, PixelBounds, RenderOptions, SaveOptions, Scene, SceneDesc,
+    Stage, StageLight,
+};
 use serde_json::json;
 
 use crate::failure::Failure;
 use crate::progress::{Display, Style};
 use crate::reading::{ReadingArguments, print_warnings};
+use crate::staging::{self, Behind, StagingArguments};
 use crate::units::{self, Crop, spoken};
 
 /// Renders a scene to a picture.
@@ -27,6 +31,15 @@ use crate::units::{self, Crop, spoken};
   lumbre render model.obj --size 1920x1080 --tonemap agx --exposure 0.5
   lumbre render scene.pbrt -o part.exr --crop 100,50,300,200
   lumbre render scene.pbrt -o all.exr --aov albedo,normal,depth
+
+A model without camera and light is framed, lit as in a studio, and stands on its shadow:
+  lumbre render chair.glb
+  lumbre render part.stl --background white --ground plane
+  lumbre render chair.glb --env garden.hdr --ground none
+  lumbre render chair.glb -o chair.png --background transparent
+  lumbre render chair.glb --turntable 72 -o frame.####.png
+  lumbre render street.gltf --camera \"Bird's eye\"
+  lumbre render street.gltf --fit --variant winter
 
 Ctrl-C stops and saves what is there; a second one stops at once and saves nothing.")]
 pub struct Arguments {
@@ -69,9 +82,10 @@ pub struct Arguments {
     /// Stops brighter, for .png and .jpg.
     #[arg(long, value_name = "EV", default_value_t = 0.0, allow_negative_numbers = true, value_parser = exposure)]
     exposure: f32,
-    /// How light is brought within what a display shows, for .png and .jpg: none, agx, aces or neutral.
-    #[arg(long, value_name = "NAME", default_value = "none", value_parser = tone_map)]
-    tonemap: ToneMap,
+    /// How light is brought within what a display shows, for .png and .jpg: none, agx, aces or neutral. By default neutral where
+    /// the light is the studio's or --env's, else none.
+    #[arg(long, value_name = "NAME", value_parser = tone_map)]
+    tonemap: Option<ToneMap>,
     /// Feature layers in an .exr: albedo, normal, depth, uv.
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = feature)]
     aov: Vec<Feature>,
@@ -87,6 +101,8 @@ pub struct Arguments {
     /// Say nothing but errors.
     #[arg(short, long, conflicts_with = "verbose")]
     quiet: bool,
+    #[command(flatten)]
+    staging: StagingArguments,
     #[command(flatten)]
     reading: ReadingArguments,
 }
@@ -121,44 +137,103 @@ fn feature(name: &str) -> Result<Feature, String> {
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     // An impossible name is found before the scene is read, an impossible folder before it is rendered.
+    arguments.staging.check(arguments.output.as_deref())?;
     if let Some(output) = &arguments.output {
         check_format(output, !arguments.aov.is_empty())?;
     }
     let start = Instant::now();
-    let (scene, diagnostics) = arguments.reading.open(&arguments.scene)?;
-    let load_time = start.elapsed().saturating_sub(scene.build_time());
-    if !arguments.quiet {
-        print_warnings(&diagnostics);
-    }
-    let output = arguments.output.clone().unwrap_or_else(|| default_output(&scene, &arguments.scene[0]));
-    check_format(&output, !arguments.aov.is_empty())?;
-    for path in std::iter::once(&output).chain(&arguments.stats) {
-        probe_writable(path).map_err(|e| Failure::from(lumbre::Error::from(e)))?;
-    }
-    let options = options(arguments, &scene)?;
-    if scene.is_dark() && options.integrator.kind.needs_light() {
-        let what = format!("{}: the scene has no light, its picture is black", arguments.scene[0].display());
-        if arguments.reading.is_strict() {
-            return Err(Failure::input(what));
-        }
-        if !arguments.quiet {
-            say!("warning: {what}");
-        }
-    }
-
+    let mut stage = arguments.staging.stage(arguments.size)?;
+    let (desc, mut diagnostics) = arguments.reading.describe(&arguments.scene)?;
     let cancel = CancelToken::new();
     let signals =
         Signals::listen(&cancel).map_err(|e| Failure::Io(format!("cannot listen for signals: {e}")))?;
+    match arguments.staging.turntable() {
+        None => picture(arguments, &stage, desc, &mut diagnostics, None, start, &cancel)?,
+        Some(frames) => {
+            for frame in 0..frames {
+                stage.turns = Some(f64::from(frame) / f64::from(frames));
+                let start = Instant::now();
+                picture(arguments, &stage, desc.clone(), &mut diagnostics, Some(frame + 1), start, &cancel)?;
+                if cancel.is_cancelled() {
+                    break;
+                }
+            }
+        }
+    }
+    match signals.received() {
+        Some(status) => Err(Failure::Interrupted(status)),
+        None => Ok(()),
+    }
+}
+
+/// Renders and saves one picture, the only one or a frame of several.
+fn picture(
+    arguments: &Arguments,
+    stage: &Stage,
+    mut desc: SceneDesc,
+    diagnostics: &mut Diagnostics,
+    frame: Option<u32>,
+    start: Instant,
+    cancel: &CancelToken,
+) -> Result<(), Failure> {
+    let is_first = frame.is_none_or(|frame| frame == 1);
+    let is_of_light = arguments.integrator.unwrap_or(desc.integrator.kind).needs_light();
+    let stage = match is_of_light || arguments.staging.wants_ground() {
+        true => stage.clone(),
+        // Pictures of normals and the like are of the model alone.
+        false => Stage { ground: Ground::None, ..stage.clone() },
+    };
+    let staged = stage.set(&mut desc);
+    let behind = arguments.staging.behind(&staged, is_of_light)?;
+    let name = &arguments.scene[0];
+    let mut of_frames = Diagnostics::with_strictness(arguments.reading.strictness());
+    let scene = Scene::of_file(desc, name, if is_first { diagnostics } else { &mut of_frames })?;
+    let load_time = start.elapsed().saturating_sub(scene.build_time());
+    if !arguments.quiet && is_first {
+        print_warnings(diagnostics);
+    }
+    let output = arguments.output.clone().unwrap_or_else(|| default_output(&scene, name, frame.is_some()));
+    check_format(&output, !arguments.aov.is_empty())?;
+    arguments.staging.check(Some(&output))?;
+    let output = frame.map_or(output.clone(), |frame| staging::frame_name(&output, frame));
+    for path in std::iter::once(&output).chain(&arguments.stats) {
+        probe_writable(path).map_err(|e| Failure::from(lumbre::Error::from(e)))?;
+    }
+    let mut options = options(arguments, &scene)?;
+    options.transparent = behind.is_transparent();
+    let warn = |what: String| match arguments.reading.is_strict() {
+        true => Err(Failure::input(what)),
+        false if arguments.quiet || !is_first => Ok(()),
+        false => {
+            say!("warning: {what}");
+            Ok(())
+        }
+    };
+    if scene.is_dark() && is_of_light {
+        warn(format!("{}: the scene has no light, its picture is black", name.display()))?;
+    }
+    let camera = scene.resolved().cameras().get(options.camera);
+    if let (Some(ground), Some(camera)) = (scene.resolved().ground(), camera)
+        && staging::is_below(ground, camera.world_from_camera.point(DVec3::ZERO))
+    {
+        warn(format!("{}: the camera is below the ground, which hides everything", name.display()))?;
+    }
+
     let style = if arguments.quiet { Style::None } else { arguments.progress };
     let display = Display::new(style);
     let render_start = Instant::now();
-    let picture = scene.render_with(&options, &display, &cancel)?;
+    let picture = scene.render_with(&options, &display, cancel)?;
     let render_time = render_start.elapsed();
     display.finish();
 
     let save_start = Instant::now();
-    let save =
-        SaveOptions { tone_map: arguments.tonemap, exposure: arguments.exposure, ..SaveOptions::default() };
+    let is_shown = is_of_light && staged.light != StageLight::Own;
+    let tone_map = arguments.tonemap.unwrap_or(if is_shown { ToneMap::Neutral } else { ToneMap::None });
+    let save = SaveOptions { tone_map, exposure: arguments.exposure, ..SaveOptions::default() };
+    let picture = match behind {
+        Behind::Backdrop(backdrop) => picture.before(backdrop),
+        Behind::Lights | Behind::Nothing => picture,
+    };
     picture.save_with(&output, &save, &arguments.aov)?;
     let save_time = save_start.elapsed();
     report_dropped(&picture);
@@ -179,10 +254,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if !arguments.quiet {
         summary(arguments.verbose, &scene, &picture, &output, render_time);
     }
-    match signals.received() {
-        Some(status) => Err(Failure::Interrupted(status)),
-        None => Ok(()),
-    }
+    Ok(())
 }
 
 /// Whether the program can write what the path's extension names.
@@ -201,13 +273,15 @@ fn check_format(path: &Path, layers: bool) -> Result<(), Failure> {
 }
 
 /// The scene's own name for its picture, else the scene's with .png.
-fn default_output(scene: &Scene, path: &Path) -> PathBuf {
+fn default_output(scene: &Scene, path: &Path, numbered: bool) -> PathBuf {
     let own = scene.resolved().film().filename.as_deref().map(PathBuf::from);
-    own.filter(|name| check_format(name, false).is_ok()).unwrap_or_else(|| {
+    let number = if numbered { ".####" } else { "" };
+    own.filter(|name| check_format(name, false).is_ok() && !numbered).unwrap_or_else(|| {
         let stem = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
         let stem = stem.strip_suffix(".gz").unwrap_or(&stem);
         let stem = Path::new(stem).file_stem().map_or_else(|| "picture".into(), |s| s.to_os_string());
-        if stem == "-" { "picture.png".into() } else { format!("{}.png", stem.to_string_lossy()).into() }
+        let stem = stem.to_string_lossy();
+        format!("{}{number}.png", if stem == "-" { "picture" } else { &*stem }).into()
     })
 }
 

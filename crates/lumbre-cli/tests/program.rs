@@ -412,3 +412,156 @@ fn every_scene_has_the_same_bytes_from_any_number_of_threads() {
         assert!(bytes.iter().all(|b| *b == bytes[0]), "{}", scene.display());
     }
 }
+
+/// A pyramid on the plane z = 0, of 5 by 3 at its foot and 4 high.
+const PYRAMID: &str = "solid p
+facet normal 0 0 0\nouter loop\nvertex 1 1 0\nvertex 6 1 0\nvertex 3 2 4\nendloop\nendfacet
+facet normal 0 0 0\nouter loop\nvertex 6 1 0\nvertex 6 4 0\nvertex 3 2 4\nendloop\nendfacet
+facet normal 0 0 0\nouter loop\nvertex 6 4 0\nvertex 1 4 0\nvertex 3 2 4\nendloop\nendfacet
+facet normal 0 0 0\nouter loop\nvertex 1 4 0\nvertex 1 1 0\nvertex 3 2 4\nendloop\nendfacet
+endsolid p\n";
+
+#[test]
+fn a_model_stands_whole_and_lit_before_its_background() {
+    let desk = Desk::new();
+    desk.write("p.stl", PYRAMID);
+    for size in ["60x40", "24x60"] {
+        let arguments =
+            ["render", "p.stl", "-o", "p.png", "--spp", "4", "--background", "#ff0000", "--size", size, "-q"];
+        let out = desk.lumbre(&arguments);
+        assert_eq!(code(&out), 0, "{}", stderr(&out));
+        let image = lumbre::read_image(&desk.path("p.png")).unwrap();
+        let (w, h) = (image.width(), image.height());
+        let is_model = |x: u32, y: u32| image.pixel(x, y).g > 0.02;
+        let red = |x: u32, y: u32| image.pixel(x, y).r > 0.2 && !is_model(x, y);
+        // The very edge is background, in the colour that was asked for at least at the top.
+        assert!(
+            (0..w).all(|x| red(x, 0) && red(x, h - 1)) && (0..h).all(|y| red(0, y) && red(w - 1, y)),
+            "{size}"
+        );
+        assert_eq!(image.pixel(0, 0).to_array(), [1.0, 0.0, 0.0]);
+        let seen = (0..w * h).filter(|i| is_model(i % w, i / w)).count();
+        assert!(seen > (w * h / 12) as usize, "{size}: {seen}");
+        // Its shadow darkens the ground.
+        let darkest = (0..w * h).filter(|i| !is_model(i % w, i / w)).map(|i| image.pixel(i % w, i / w).r);
+        assert!(darkest.fold(1.0, f32::min) < 0.8);
+    }
+}
+
+#[test]
+fn a_transparent_picture_has_coverage_where_the_model_and_its_shadow_are() {
+    let desk = Desk::new();
+    desk.write("p.stl", PYRAMID);
+    let render = |ground: &str| {
+        let arguments = [
+            "render",
+            "p.stl",
+            "-o",
+            "p.exr",
+            "--spp",
+            "16",
+            "--background",
+            "transparent",
+            "--size",
+            "48x36",
+            "--ground",
+            ground,
+            "-q",
+        ];
+        let out = desk.lumbre(&arguments);
+        assert_eq!(code(&out), 0, "{}", stderr(&out));
+        let alpha = lumbre::read_image(&desk.path("p.exr")).unwrap().alpha().unwrap().to_vec();
+        (
+            alpha.iter().filter(|&&a| a == 0.0).count(),
+            alpha.iter().filter(|&&a| a == 1.0).count(),
+            alpha.len(),
+        )
+    };
+    let (open, solid, all) = render("none");
+    assert!(open > all / 3 && solid > all / 10 && open + solid > all * 8 / 10, "{open} {solid} {all}");
+    let (with_shadow, still_solid, _) = render("shadow");
+    assert!(
+        with_shadow < open - all / 20 && still_solid >= solid,
+        "{with_shadow} {open}, {still_solid} {solid}"
+    );
+    let (behind_plane, _, _) = render("plane");
+    assert!(behind_plane < all / 4, "{behind_plane}");
+}
+
+#[test]
+fn a_turntable_makes_as_many_different_pictures() {
+    let desk = Desk::new();
+    desk.write("p.stl", PYRAMID);
+    let out = desk.lumbre(&[
+        "render",
+        "p.stl",
+        "-o",
+        "p.##.png",
+        "--turntable",
+        "5",
+        "--spp",
+        "1",
+        "--size",
+        "30x20",
+        "-q",
+    ]);
+    assert_eq!(code(&out), 0, "{}", stderr(&out));
+    let mut pictures: Vec<Vec<u8>> =
+        (1..=5).map(|i| fs::read(desk.path(&format!("p.{i:02}.png"))).unwrap()).collect();
+    assert!(!desk.path("p.06.png").exists());
+    pictures.sort();
+    pictures.dedup();
+    assert_eq!(pictures.len(), 5);
+}
+
+#[test]
+fn light_from_a_picture_is_seen_and_lights() {
+    let desk = Desk::new();
+    desk.write("p.stl", PYRAMID);
+    let sky = lumbre::image::Image::filled(16, 8, lumbre::image::Rgb::new(0.1, 0.2, 0.8));
+    lumbre::write_image(&desk.path("sky.exr"), &sky, &lumbre::SaveOptions::default()).unwrap();
+    let out = desk.lumbre(&[
+        "render", "p.stl", "-o", "p.exr", "--env", "sky.exr", "--spp", "16", "--size", "40x30", "-q",
+    ]);
+    assert_eq!(code(&out), 0, "{}", stderr(&out));
+    let image = lumbre::read_image(&desk.path("p.exr")).unwrap();
+    assert!((image.pixel(0, 0).b - 0.8).abs() < 1e-2 && image.alpha().is_none());
+    // Grey reflects the light's own colour.
+    let middle = image.pixel(20, 15);
+    assert!(middle.b > 0.1 && (middle.b / middle.r - 8.0).abs() < 0.5, "{middle:?}");
+    lumbre::write_image(
+        &desk.path("odd.exr"),
+        &lumbre::image::Image::filled(15, 8, lumbre::image::Rgb::WHITE),
+        &lumbre::SaveOptions::default(),
+    )
+    .unwrap();
+    let out = desk.lumbre(&["render", "p.stl", "-o", "p.exr", "--env", "odd.exr"]);
+    assert_eq!(code(&out), 3);
+    assert!(stderr(&out).contains("15 by 8 pixels"), "{}", stderr(&out));
+}
+
+#[test]
+fn words_that_show_nothing_are_refused_before_anything_is_read() {
+    let desk = Desk::new();
+    desk.write("p.stl", PYRAMID);
+    for (arguments, expected) in [
+        (&["--ground", "floor"][..], "shadow"),
+        (&["--background", "wite"], "transparent"),
+        (&["--background", "#12"], "hexadecimal"),
+        (&["--background", "transparent", "-o", "a.jpg"], ".png or .exr"),
+        (&["--turntable", "8", "-o", "a.png"], "frame.####.png"),
+        (&["--turntable", "1"], "2..=100000"),
+        (&["--fit", "--camera", "0"], "cannot be used with"),
+        (&["--turntable", "8", "--camera", "0"], "cannot be used with"),
+    ] {
+        let mut whole = vec!["render", "missing.stl"];
+        whole.extend(arguments);
+        let out = desk.lumbre(&whole);
+        assert_eq!(code(&out), 2, "{arguments:?}: {}", stderr(&out));
+        assert!(stderr(&out).contains(expected), "{arguments:?}: {}", stderr(&out));
+    }
+    let out = desk.lumbre(&["render", "p.stl", "--env", "missing.hdr"]);
+    assert_eq!(code(&out), 4, "{}", stderr(&out));
+    let out = desk.lumbre(&["render", "p.stl", "--background", "missing.png", "-o", "a.png"]);
+    assert_eq!(code(&out), 4, "{}", stderr(&out));
+}

@@ -7,6 +7,8 @@ use lumbre_image::Rgb;
 pub struct Pixel {
     /// Σ weight × colour.
     pub sum: [f64; 3],
+    /// Σ weight × coverage.
+    pub covered: f64,
     /// Σ weight.
     pub weight: f64,
     /// Σ luminance, without weights.
@@ -18,11 +20,12 @@ pub struct Pixel {
 }
 
 impl Pixel {
-    /// Adds a sample.
-    pub fn add(&mut self, colour: Rgb, weight: f64) {
+    /// Adds a sample, whose colour is multiplied by its coverage.
+    pub fn add(&mut self, colour: Rgb, coverage: f32, weight: f64) {
         for (sum, channel) in self.sum.iter_mut().zip(colour.to_array()) {
             *sum += weight * f64::from(channel);
         }
+        self.covered += weight * f64::from(coverage);
         self.weight += weight;
         let luminance = f64::from(colour.luminance());
         self.luminance += luminance;
@@ -33,6 +36,11 @@ impl Pixel {
     /// The mean of the samples; black where there is none.
     pub fn colour(&self) -> Rgb {
         mean(self.sum, self.weight)
+    }
+
+    /// The mean coverage, in [0, 1]; 0 where there is no sample.
+    pub fn coverage(&self) -> f32 {
+        if self.weight == 0.0 { 0.0 } else { (self.covered / self.weight).clamp(0.0, 1.0) as f32 }
     }
 
     /// The mean luminance, and its standard error as if samples were independent (those of a low-discrepancy sampler are
@@ -128,8 +136,10 @@ mod tests {
     fn a_pixel_is_the_weighted_mean_of_its_samples() {
         let mut pixel = Pixel::default();
         assert_eq!(pixel.colour(), Rgb::BLACK);
-        pixel.add(Rgb::new(2.0, 4.0, 8.0), 3.0);
-        pixel.add(Rgb::new(6.0, 0.0, 4.0), 1.0);
+        assert_eq!(pixel.coverage(), 0.0);
+        pixel.add(Rgb::new(2.0, 4.0, 8.0), 0.75, 3.0);
+        pixel.add(Rgb::new(6.0, 0.0, 4.0), -0.25, 1.0);
+        assert_eq!(pixel.coverage(), 0.5);
         assert_eq!(pixel.colour(), Rgb::new(3.0, 3.0, 7.0));
     }
 
@@ -137,7 +147,7 @@ mod tests {
     fn the_standard_error_is_that_of_the_mean() {
         let mut pixel = Pixel::default();
         for value in [1.0, 2.0, 3.0, 6.0] {
-            pixel.add(Rgb::splat(value), 0.5);
+            pixel.add(Rgb::splat(value), 1.0, 0.5);
         }
         let (mean, error) = pixel.luminance_with_error().unwrap();
         assert!((mean - 3.0).abs() < 1e-6);

@@ -33,6 +33,8 @@ impl Exposure {
 pub struct Sample {
     /// Radiance.
     pub radiance: Rgb,
+    /// How much of what is behind it covers; the radiance is multiplied by it.
+    pub coverage: f32,
     /// What it counts: the weight of the filter.
     pub weight: f64,
     /// What it met first, if features are wanted and it met anything.
@@ -82,11 +84,11 @@ impl Tile {
             return false;
         }
         let colour = exposure.colour(sample.radiance);
-        if !colour.is_finite() || !sample.weight.is_finite() {
+        if !colour.is_finite() || !sample.weight.is_finite() || !sample.coverage.is_finite() {
             return false;
         }
         let position = (y - b.y0) as usize * b.width() as usize + (x - b.x0) as usize;
-        self.pixels[position].add(colour, sample.weight);
+        self.pixels[position].add(colour, sample.coverage, sample.weight);
         if let Some(sums) = self.features.get_mut(position) {
             sums.add(sample.features.as_ref(), sample.weight);
         }
@@ -101,7 +103,7 @@ mod tests {
     #[test]
     fn a_sample_goes_to_its_own_pixel_and_one_that_is_not_finite_to_none() {
         let mut tile = Tile::new(PixelBounds { x0: 5, y0: 7, x1: 9, y1: 10 }, true);
-        let sample = |radiance| Sample { radiance, weight: 1.0, features: None };
+        let sample = |radiance| Sample { radiance, coverage: 0.25, weight: 1.0, features: None };
         let exposure = Exposure { factor: 2.0, max_component: 6.0 };
         assert!(tile.add(6, 9, &sample(Rgb::new(1.0, 2.0, 3.0)), &exposure));
         assert!(!tile.add(9, 9, &sample(Rgb::WHITE), &exposure));
@@ -113,6 +115,7 @@ mod tests {
             let expected = if i == 2 * 4 + 1 { Rgb::new(2.0, 4.0, 6.0) } else { Rgb::BLACK };
             assert_eq!(colour, expected, "{i}");
         }
+        assert_eq!(tile.pixels()[2 * 4 + 1].coverage(), 0.25);
     }
 
     #[test]

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use lumbre_film::{FeatureSample, Filter, Sample, Tile};
 use lumbre_math::DVec2;
 use lumbre_scene::{Scene, View};
-use lumbre_transport::{Feature, Features, Integrator, RayCounts, Sampler, Sight, integrator};
+use lumbre_transport::{Feature, Features, Integrator, RayCounts, Sampler, Sight, integrator, see};
 use rayon::prelude::*;
 
 use crate::rendered::{feature_picture, noise, picture};
@@ -96,7 +96,11 @@ pub fn render_with(
         done += pass;
         let tiles = || owners.iter().map(|owner| &owner.tile);
         let reached = noise(tiles());
-        progress.pass(&Snapshot { spp: done, noise: reached, picture: &|| picture(tiles(), bounds) });
+        progress.pass(&Snapshot {
+            spp: done,
+            noise: reached,
+            picture: &|| picture(tiles(), bounds, options.transparent),
+        });
         let is_quiet = matches!((options.stop.noise, reached), (Some(limit), Some(noise)) if noise <= limit);
         // Two or three samples say little about noise.
         if job.must_stop() || (is_quiet && done >= 8) {
@@ -116,7 +120,7 @@ pub fn render_with(
     let wanted: &[Feature] =
         if options.features { &[Feature::Albedo, Feature::Normal, Feature::Depth, Feature::Uv] } else { &[] };
     Ok(Rendered {
-        image: picture(tiles(), bounds),
+        image: picture(tiles(), bounds, options.transparent),
         bounds,
         features: wanted.iter().map(|&f| (f, feature_picture(tiles(), bounds, f))).collect(),
         stats: Stats {
@@ -192,8 +196,11 @@ impl Job<'_> {
         let sight = Sight::new(self.scene, ray, &mut owner.rays);
         let features =
             if self.options.features { Features::of(&self.view, &sight).map(feature_sample) } else { None };
-        let radiance = self.integrator.radiance(self.scene, &self.view, sight, &draw, &mut owner.rays);
-        let sample = Sample { radiance, weight: place.weight, features };
+        let lights_are_seen = !self.options.transparent;
+        let seen =
+            see(self.integrator, self.scene, &self.view, sight, &draw, lights_are_seen, &mut owner.rays);
+        let sample =
+            Sample { radiance: seen.radiance, coverage: seen.coverage, weight: place.weight, features };
         if !owner.tile.add(x, y, &sample, &self.options.exposure) {
             owner.dropped += 1;
             if owner.first_dropped.len() < REMEMBERED {

@@ -27,6 +27,9 @@ pub struct RenderOptions {
     pub filter: FilterDesc,
     /// Factor from radiance to pixel values, and the limit of a sample.
     pub exposure: Exposure,
+    /// Whether what the camera sees where there is nothing is left out: the picture then says how much each pixel covers.
+    /// Lights at infinity still light what there is.
+    pub transparent: bool,
     /// When to stop.
     pub stop: Stop,
     /// Whether to gather albedo, normals, depth and uv too.
@@ -69,6 +72,7 @@ impl RenderOptions {
             sampler: scene.sampler(),
             filter: scene.filter(),
             exposure: Exposure { factor: film.exposure, max_component: film.max_component },
+            transparent: false,
             stop: Stop { spp: scene.sampler().spp.unwrap_or(DEFAULT_SPP), time: None, noise: None },
             features: false,
             threads: 0,

@@ -9,7 +9,8 @@ use lumbre_transport::{Feature, RayCounts};
 /// What [`crate::render`] returns: all that was asked for, or what there was when it was stopped.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rendered {
-    /// The pixels of [`Rendered::bounds`]; black where no sample was taken.
+    /// The pixels of [`Rendered::bounds`]; black where no sample was taken. With coverage, by which its colours are
+    /// multiplied, if the options ask for a transparent picture.
     pub image: Image,
     /// Which pixels of the whole picture.
     pub bounds: PixelBounds,
@@ -61,9 +62,18 @@ pub struct DroppedSample {
     pub sample: u32,
 }
 
-/// The picture of some tiles.
-pub(crate) fn picture<'t>(tiles: impl Iterator<Item = &'t Tile>, bounds: PixelBounds) -> Image {
-    put_together(tiles, bounds, Tile::pixels, Pixel::colour)
+/// The picture of some tiles, with coverage if it is to be transparent.
+pub(crate) fn picture<'t>(
+    tiles: impl Iterator<Item = &'t Tile> + Clone,
+    bounds: PixelBounds,
+    transparent: bool,
+) -> Image {
+    let image = put_together(tiles.clone(), bounds, Tile::pixels, Pixel::colour);
+    if !transparent {
+        return image;
+    }
+    let alpha = put_together(tiles, bounds, Tile::pixels, |pixel: &Pixel| Rgb::splat(pixel.coverage()));
+    image.clone().with_alpha(alpha.channel(0).collect()).unwrap_or(image)
 }
 
 /// The picture of a feature.

@@ -15,8 +15,9 @@ use crate::light::{
 use crate::mesh::{self, QuadOrder};
 use crate::surface::{Form, SurfaceEntry};
 use crate::{
-    AreaLightDesc, BuildError, BuildWarning, Camera, CameraKind, Emission, GeometryDesc, InstanceDesc,
-    LightDesc, MeshDesc, ObjectDesc, Scene, SceneDesc, ShapeDesc, WithoutLight, auto, csg,
+    AreaLightDesc, BuildError, BuildWarning, Camera, CameraKind, Emission, GeometryDesc, GroundPlane,
+    InstanceDesc, LightDesc, MeshDesc, ObjectDesc, Scene, SceneDesc, ShapeDesc, csg, extent, framing, ground,
+    stage, studio,
 };
 
 /// How deep objects may hold objects.
@@ -28,7 +29,11 @@ impl Scene {
     ///
     /// # Errors
     /// [`BuildError`], naming the shape, camera or light at fault.
-    pub fn build(desc: SceneDesc) -> Result<Self, BuildError> {
+    pub fn build(mut desc: SceneDesc) -> Result<Self, BuildError> {
+        if stage::wants_studio(&desc) {
+            desc.lights.push(studio::light(desc.up, 0.0));
+        }
+        let ground = ground::lay(&mut desc)?;
         let SceneDesc {
             cameras,
             film,
@@ -40,8 +45,9 @@ impl Scene {
             objects,
             instances,
             lights,
-            without_light,
+            without_light: _,
             up,
+            ground: _,
         } = desc;
         check_cameras(&cameras)?;
         let mut builder = Builder {
@@ -53,13 +59,18 @@ impl Scene {
         let accel = Arc::new(builder.tree(shapes, &instances, &objects, true)?);
         let bounds = accel.bounds();
 
-        let cameras = if cameras.is_empty() { vec![auto::camera(&bounds, up)] } else { cameras };
-        let is_dark = lights.is_empty() && !builder.entries.iter().any(SurfaceEntry::shines);
-        let lights = match without_light {
-            WithoutLight::Studio if is_dark => vec![auto::light(up)],
-            WithoutLight::Studio | WithoutLight::Dark => lights,
+        let cameras = if cameras.is_empty() {
+            let aspect = film.width.zip(film.height).map_or(1.0, |(w, h)| f64::from(w) / f64::from(h));
+            let corners = |visit: &mut dyn FnMut(DVec3)| {
+                if !bounds.is_empty() {
+                    extent::corners(&bounds).for_each(visit);
+                }
+            };
+            vec![framing::still(&corners, up, aspect)]
+        } else {
+            cameras
         };
-        if is_dark && lights.is_empty() {
+        if lights.is_empty() && !builder.entries.iter().any(SurfaceEntry::shines) {
             builder.warnings.push(BuildWarning::NoLight);
         }
         for (position, light) in lights.into_iter().enumerate() {
@@ -85,6 +96,7 @@ impl Scene {
             has_holes,
             has_instances: !objects.is_empty(),
             looks_up,
+            ground: ground.map(|desc| GroundPlane::new(desc, &builder.lights)),
             entries: builder.entries,
             lights: builder.lights,
             warnings: builder.warnings,
@@ -404,7 +416,7 @@ pub(crate) fn emission(desc: AreaLightDesc, area: impl FnOnce() -> f64) -> Emiss
 }
 
 /// The order in which objects are built so that what is inside another is there before it.
-fn inside_out(objects: &[ObjectDesc]) -> Result<Vec<usize>, BuildError> {
+pub(crate) fn inside_out(objects: &[ObjectDesc]) -> Result<Vec<usize>, BuildError> {
     #[derive(Clone, Copy, PartialEq)]
     enum Mark {
         New,
@@ -498,7 +510,7 @@ fn finite_or_zero(p: DVec3) -> DVec3 {
 }
 
 /// The box around a moved box.
-fn moved(bounds: &Aabb, placement: &Transform) -> Aabb {
+pub(crate) fn moved(bounds: &Aabb, placement: &Transform) -> Aabb {
     if bounds.is_empty() {
         return *bounds;
     }

@@ -36,6 +36,21 @@ pub struct SceneDesc {
     pub without_light: WithoutLight,
     /// The axis that the automatic camera and the automatic light take for up.
     pub up: UpAxis,
+    /// What everything stands on.
+    pub ground: Option<GroundDesc>,
+}
+
+/// An infinite matte plane, which nothing stands below.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GroundDesc {
+    /// A point of it.
+    pub point: DVec3,
+    /// Up from it, of any length but zero.
+    pub normal: DVec3,
+    /// What it reflects of the light that falls on it.
+    pub reflectance: Rgb,
+    /// Whether a camera sees of it only the shadow that falls on it, over what is behind.
+    pub catcher: bool,
 }
 
 /// What a description without any light at all is lit by.
@@ -44,6 +59,9 @@ pub enum WithoutLight {
     /// A studio's light: a mesh alone is worth a picture.
     #[default]
     Studio,
+    /// A studio's light unless there are lights that are no surfaces, and a camera too: what glows in a model is seldom
+    /// meant to light it, and what has no camera is no scene.
+    StudioUnlessStaged,
     /// Nothing: whoever wrote a whole scene meant it, and it is black.
     Dark,
 }
@@ -217,7 +235,7 @@ pub enum LightDesc {
 }
 
 /// An environment map: linear radiance by direction.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct EnvironmentDesc {
     /// Its pixels.
     pub image: Arc<lumbre_image::Image>,

@@ -1,20 +1,24 @@
 //! What is there: first described ([`SceneDesc`], plain data that any reader can make), then resolved for rendering
 //! ([`Scene`]).
 
-mod auto;
 mod build;
 mod camera;
 mod csg;
 mod desc;
 mod emission;
 mod error;
+mod extent;
 mod footprint;
+mod framing;
+mod ground;
 mod id;
 mod interaction;
 pub mod light;
 mod mesh;
 mod scene;
 mod solid;
+mod stage;
+mod studio;
 mod surface;
 
 pub use camera::{Camera, CameraKind, CameraRay, SphericalMapping, View};
@@ -22,7 +26,9 @@ pub use desc::*;
 pub use emission::Emission;
 pub use error::BuildError;
 pub use footprint::Footprint;
+pub use ground::GroundPlane;
 pub use id::{MaterialId, ObjectId};
 pub use interaction::{Interaction, offset};
 pub use light::{Light, LightId, LightSample};
 pub use scene::{BuildWarning, Scene};
+pub use stage::{Ground, Stage, StageLight, Staged, Surroundings};

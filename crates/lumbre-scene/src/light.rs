@@ -111,6 +111,22 @@ impl Light {
         }
     }
 
+    /// The irradiance of a surface at `at` that faces `normal` (unit), if nothing stands in the way; `None` for lights that
+    /// are surfaces.
+    pub fn irradiance(&self, at: DVec3, normal: DVec3) -> Option<Spectrum> {
+        let of = |sample: Option<LightSample>| {
+            sample.map_or(Spectrum::BLACK, |s| s.radiance * normal.dot(s.towards).max(0.0) as f32)
+        };
+        match self {
+            Self::Point(light) => Some(of(light.sample(at))),
+            Self::Spot(light) => Some(of(light.sample(at))),
+            Self::Distant(light) => Some(of(Some(light.sample()))),
+            Self::Uniform(light) => Some(light.radiance * std::f32::consts::PI),
+            Self::Environment(light) => Some(light.irradiance(normal)),
+            Self::Shape(_) | Self::Mesh(_) => None,
+        }
+    }
+
     /// Whether rays that leave the scene meet it.
     pub fn is_infinite(&self) -> bool {
         matches!(self, Self::Uniform(_) | Self::Environment(_))

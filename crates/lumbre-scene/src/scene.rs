@@ -13,7 +13,7 @@ use crate::footprint::Spot;
 use crate::interaction::offset;
 use crate::light::{Light, LightId, LightSample};
 use crate::surface::{Dressed, Form, SurfaceEntry};
-use crate::{Camera, FilmDesc, FilterDesc, Footprint, IntegratorDesc, Interaction, SamplerDesc};
+use crate::{Camera, FilmDesc, FilterDesc, Footprint, GroundPlane, IntegratorDesc, Interaction, SamplerDesc};
 
 /// A scene, ready to be rendered from any number of threads. Nothing changes it.
 #[derive(Debug)]
@@ -30,6 +30,7 @@ pub struct Scene {
     pub(crate) sampler: SamplerDesc,
     pub(crate) integrator: IntegratorDesc,
     pub(crate) bounds: Aabb,
+    pub(crate) ground: Option<GroundPlane>,
     pub(crate) warnings: Vec<BuildWarning>,
     // Whether rays of light must ask every hit if it counts: something is cut out, or is an interface.
     pub(crate) has_holes: bool,
@@ -107,6 +108,11 @@ impl Scene {
     /// A box around everything finite; empty where there is nothing.
     pub fn bounds(&self) -> Aabb {
         self.bounds
+    }
+
+    /// What everything stands on, where there is such a thing.
+    pub fn ground(&self) -> Option<&GroundPlane> {
+        self.ground.as_ref()
     }
 
     /// Every light.

@@ -7,6 +7,7 @@ mod integrator;
 mod interior;
 mod path;
 mod sampler;
+mod seen;
 mod whitted;
 
 pub use ambient_occlusion::AmbientOcclusion;
@@ -14,4 +15,5 @@ pub use features::{Feature, FeatureIntegrator, Features};
 pub use integrator::{Integrator, RayCounts, Sight, integrator};
 pub use path::{Path, Strategy};
 pub use sampler::{Draw, Sampler};
+pub use seen::{Seen, see};
 pub use whitted::Whitted;

@@ -22,9 +22,28 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! A model in a studio of its own, on white paper, from all sides:
+//!
+//! ```no_run
+//! use lumbre::{Backdrop, Ground, ReadOptions, Scene, Stage};
+//!
+//! let (model, _) = lumbre::describe(&["model.glb".as_ref()], &ReadOptions::default())?;
+//! for frame in 0..36 {
+//!     let mut desc = model.clone();
+//!     let turns = Some(f64::from(frame) / 36.0);
+//!     Stage { turns, ground: Ground::Shadow, ..Stage::default() }.set(&mut desc);
+//!     let scene = Scene::from_description(desc)?;
+//!     let options = lumbre::RenderOptions { transparent: true, ..scene.options() };
+//!     let paper = Backdrop::Colour(lumbre::image::Rgb::WHITE);
+//!     scene.render(&options)?.before(paper).save(format!("frame.{frame:04}.png"))?;
+//! }
+//! # Ok::<(), lumbre::Error>(())
+//! ```
+//!
 //! The floors below are here too, under their own names: [`math`], [`image`], [`geometry`], [`kernel`], [`shading`],
 //! [`formats`] and [`description`].
 
+mod backdrop;
 mod builder;
 mod cast;
 mod error;
@@ -41,6 +60,7 @@ pub use lumbre_math as math;
 pub use lumbre_scene as description;
 pub use lumbre_shading as shading;
 
+pub use backdrop::Backdrop;
 pub use builder::{SceneBuilder, ShapeBuilder};
 pub use cast::CastHit;
 pub use error::{Error, ErrorKind};
@@ -53,5 +73,6 @@ pub use lumbre_render::{
     CancelToken, Feature, NoProgress, PixelBounds, Progress, RayCounts, RenderOptions, Snapshot, State,
     Stats, Stop,
 };
+pub use lumbre_scene::{EnvironmentDesc, Ground, SceneDesc, Stage, StageLight, Staged, Surroundings};
 pub use picture::Picture;
-pub use scene::{Scene, open, open_with};
+pub use scene::{Scene, describe, open, open_with};

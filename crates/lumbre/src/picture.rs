@@ -2,23 +2,32 @@
 
 use std::path::Path;
 
-use lumbre_formats::image::{WriteOptions, write_image, write_layers};
-use lumbre_image::{Image, Layer, Layers};
+use lumbre_formats::image::{ImageFormat, WriteOptions, write_image, write_layers};
+use lumbre_image::{Image, Layer, Layers, ToneMap};
 use lumbre_render::{Feature, PixelBounds, Rendered, Stats};
 
-use crate::{Error, SaveOptions};
+use crate::{Backdrop, Error, SaveOptions};
 
 /// A picture that was rendered, with what it took.
 #[derive(Clone, Debug)]
 pub struct Picture {
     pub(crate) rendered: Rendered,
     pub(crate) whole: (u32, u32),
+    pub(crate) backdrop: Option<Backdrop>,
 }
 
 impl Picture {
     /// Its pixels, linear.
     pub fn image(&self) -> &Image {
         &self.rendered.image
+    }
+
+    /// The picture, to be saved before a backdrop. It shows where the picture is transparent
+    /// ([`crate::RenderOptions::transparent`]), in the very colours that it has in formats for displays, and as light in the
+    /// others.
+    #[must_use]
+    pub fn before(self, backdrop: Backdrop) -> Self {
+        Self { backdrop: Some(backdrop), ..self }
     }
 
     /// A feature image, if it was asked for.
@@ -53,14 +62,25 @@ impl Picture {
         let PixelBounds { x0, y0, .. } = self.bounds();
         let part = (self.image().width(), self.image().height()) != self.whole;
         let window = part.then_some((x0 as i32, y0 as i32, self.whole.0, self.whole.1));
-        let options = WriteOptions { exr_window: window, ..*options };
+        let mut options = WriteOptions { exr_window: window, ..*options };
+        let is_for_displays =
+            matches!(ImageFormat::from_path(path), Some(ImageFormat::Png | ImageFormat::Jpeg));
+        let laid_over = self.backdrop.as_ref().map(|backdrop| {
+            if !is_for_displays {
+                return backdrop.under_light(self.image(), self.bounds(), self.whole);
+            }
+            let WriteOptions { tone_map, exposure, .. } = options;
+            (options.tone_map, options.exposure) = (ToneMap::None, 0.0);
+            backdrop.under_shown(self.image(), self.bounds(), self.whole, tone_map, exposure)
+        });
+        let image = laid_over.as_ref().unwrap_or(self.image());
         if layers.is_empty() {
-            return Ok(write_image(path, self.image(), &options)?);
+            return Ok(write_image(path, image, &options)?);
         }
         if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("exr")) {
             return Err(Error::Options(format!("{}: only .exr files hold feature layers", path.display())));
         }
-        let mut all = Layers::from_image(self.image());
+        let mut all = Layers::from_image(image);
         for feature in layers {
             let image = self
                 .feature(*feature)

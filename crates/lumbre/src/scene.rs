@@ -20,7 +20,7 @@ pub struct Scene {
     build_time: Duration,
 }
 
-/// Opens a scene file: .pbrt (also .gz), .obj, .ply or .stl. Warnings are dropped; [`open_with`] returns them.
+/// Opens a scene file: .pbrt (also .gz), .gltf, .glb, .obj, .ply or .stl. Warnings are dropped; [`open_with`] returns them.
 ///
 /// # Errors
 /// [`Error::Format`] with the place of what is wrong, and [`Error::Build`].
@@ -33,22 +33,18 @@ pub fn open(path: impl AsRef<Path>) -> Result<Scene, Error> {
 /// # Errors
 /// As [`open`]; with [`lumbre_formats::Strictness::Strict`], warnings too.
 pub fn open_with(paths: &[&Path], options: &ReadOptions) -> Result<(Scene, Diagnostics), Error> {
-    let (desc, mut diagnostics) = open_scenes(paths, options)?;
-    // What only the whole shows has no line; it has a file.
-    let file = || Place::whole(paths.first().map_or_else(String::new, |path| path.display().to_string()));
-    let scene = match Scene::from_description(desc) {
-        Err(Error::Build(wrong)) => {
-            return Err(FormatError::from(Diagnostic::error(wrong.to_string()).at(file())).into());
-        }
-        scene => scene?,
-    };
-    // Rays see in the dark: that there is no light concerns pictures alone ([`Scene::is_dark`]).
-    let of_any_use = |warning: &&BuildWarning| **warning != BuildWarning::NoLight;
-    for warning in scene.resolved.warnings().iter().filter(of_any_use) {
-        diagnostics.push(Diagnostic::warning(warning.to_string()).at(file()));
-    }
-    diagnostics.check()?;
+    let (desc, mut diagnostics) = describe(paths, options)?;
+    let scene = Scene::of_file(desc, paths.first().copied().unwrap_or(Path::new("")), &mut diagnostics)?;
     Ok((scene, diagnostics))
+}
+
+/// Reads one or more files as one description, which can be changed before it is resolved (as a [`crate::Stage`] does, or by
+/// hand), and returns what there was to say about them.
+///
+/// # Errors
+/// [`Error::Format`] with the place of what is wrong; with [`lumbre_formats::Strictness::Strict`], for warnings too.
+pub fn describe(paths: &[&Path], options: &ReadOptions) -> Result<(SceneDesc, Diagnostics), Error> {
+    Ok(open_scenes(paths, options)?)
 }
 
 impl Scene {
@@ -65,6 +61,28 @@ impl Scene {
         info.bounds = (!bounds.is_empty()).then_some(bounds);
         info.memory_bytes += resolved.accel().memory_bytes() as u64;
         Ok(Self { resolved, info, build_time })
+    }
+
+    /// Resolves what was read from a file; what is wrong with the whole of it is said of the file.
+    ///
+    /// # Errors
+    /// [`Error::Format`]; where diagnostics are strict, for warnings too.
+    pub fn of_file(desc: SceneDesc, path: &Path, diagnostics: &mut Diagnostics) -> Result<Self, Error> {
+        // What only the whole shows has no line; it has a file.
+        let file = || Place::whole(path.display().to_string());
+        let scene = match Self::from_description(desc) {
+            Err(Error::Build(wrong)) => {
+                return Err(FormatError::from(Diagnostic::error(wrong.to_string()).at(file())).into());
+            }
+            scene => scene?,
+        };
+        // Rays see in the dark: that there is no light concerns pictures alone ([`Scene::is_dark`]).
+        let of_any_use = |warning: &&BuildWarning| **warning != BuildWarning::NoLight;
+        for warning in scene.resolved.warnings().iter().filter(of_any_use) {
+            diagnostics.push(Diagnostic::warning(warning.to_string()).at(file()));
+        }
+        diagnostics.check()?;
+        Ok(scene)
     }
 
     /// The nearest hit in the ray's range.
@@ -126,7 +144,7 @@ impl Scene {
     ) -> Result<Picture, Error> {
         let rendered =
             render(&self.resolved, options, progress, cancel).map_err(|e| Error::Options(e.to_string()))?;
-        Ok(Picture { rendered, whole: (options.width, options.height) })
+        Ok(Picture { rendered, whole: (options.width, options.height), backdrop: None })
     }
 
     /// What is in the scene, in numbers.

@@ -8,7 +8,7 @@ use lumbre_image::Rgb;
 use lumbre_math::{DAffine3, DMat3, DMat4, DQuat, DVec3, Transform, Vec2, Vec3};
 use lumbre_scene::{
     Camera, CameraKind, GeometryDesc, InstanceDesc, LightDesc, MeshDesc, ObjectDesc, ObjectId, SceneDesc,
-    ShapeDesc,
+    ShapeDesc, WithoutLight,
 };
 
 use super::accessor::{self, Accessor, Component, Element};
@@ -42,7 +42,7 @@ pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
 
     let roots = roots(file, &graph)?;
     let mut places: Vec<Placement> = vec![];
-    let mut scene = SceneDesc::default();
+    let mut scene = SceneDesc { without_light: WithoutLight::StudioUnlessStaged, ..SceneDesc::default() };
     let mut uses: HashMap<Key, usize> = HashMap::new();
     graph.walk(&roots, |node, world| {
         let value = file.list(List::Nodes)[node];

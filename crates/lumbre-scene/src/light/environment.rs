@@ -96,12 +96,32 @@ impl Environment {
         self.scale * self.lookup(self.square(self.to_light(direction)))
     }
 
+    /// The irradiance of a surface that faces the unit `normal`: a sum over all pixels.
+    pub fn irradiance(&self, normal: DVec3) -> Spectrum {
+        let (width, height) = (self.image.width(), self.image.height());
+        let cell = 1.0 / (f64::from(width) * f64::from(height));
+        let mut sum = [0.0_f64; 3];
+        for y in 0..height {
+            for x in 0..width {
+                let uv = DVec2::new(
+                    (f64::from(x) + 0.5) / f64::from(width),
+                    (f64::from(y) + 0.5) / f64::from(height),
+                );
+                let local = self.direction(uv);
+                let cosine = self.world_from_light.vector(local).normalize().dot(normal);
+                if cosine > 0.0 {
+                    let weight = cosine * cell / self.density_of_map(local);
+                    let texel = texel(&self.image, self.mapping, i64::from(x), i64::from(y));
+                    sum.iter_mut().zip(texel.to_array()).for_each(|(sum, c)| *sum += weight * f64::from(c));
+                }
+            }
+        }
+        self.scale * Spectrum::from(sum.map(|c| c as f32))
+    }
+
     pub(super) fn sample(&self, u: DVec2) -> Option<LightSample> {
         let (uv, density) = self.by_brightness.sample(u);
-        let local = match self.mapping {
-            EnvironmentMapping::EqualArea => warp64::equal_area_square_to_sphere(uv),
-            EnvironmentMapping::LatitudeLongitude => warp64::latlong_to_sphere(uv + DVec2::new(0.5, 0.0)),
-        };
+        let local = self.direction(uv);
         let pdf = density * self.density_of_map(local);
         let radiance = self.scale * self.lookup(uv);
         (pdf > 0.0 && pdf.is_finite() && !radiance.is_black()).then(|| LightSample {
@@ -119,6 +139,14 @@ impl Environment {
 
     fn to_light(&self, direction: DVec3) -> DVec3 {
         self.world_from_light.inverse_vector(direction).normalize()
+    }
+
+    /// The unit direction of the light's space that falls on a point of the unit square.
+    fn direction(&self, uv: DVec2) -> DVec3 {
+        match self.mapping {
+            EnvironmentMapping::EqualArea => warp64::equal_area_square_to_sphere(uv),
+            EnvironmentMapping::LatitudeLongitude => warp64::latlong_to_sphere(uv + DVec2::new(0.5, 0.0)),
+        }
     }
 
     /// Where a unit direction of the light's space falls in the unit square, (0, 0) at the upper left of the picture.

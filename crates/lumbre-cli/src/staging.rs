@@ -1,0 +1,250 @@
+//! What stands around a model: ground, light, background, and the camera that goes around it.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use clap::Args;
+use lumbre::description::{GroundPlane, StageLight};
+use lumbre::image::{Image, Rgb, srgb_to_linear};
+use lumbre::{Backdrop, EnvironmentDesc, Ground, Stage, Staged, Surroundings};
+
+use crate::failure::Failure;
+
+/// How a model is shown.
+#[derive(Args)]
+#[command(next_help_heading = "Showing a model")]
+pub struct StagingArguments {
+    /// What the model stands on: none, shadow (ground of which only the shadow is seen) or plane (matte grey). By default a
+    /// shadow where both camera and light are automatic.
+    #[arg(long, value_name = "WHAT", value_parser = ground)]
+    ground: Option<Ground>,
+    /// Light from all around: a picture twice as wide as high, or square in pbrt's equal-area mapping (.hdr, .exr, …); studio; or
+    /// none besides the file's own. By default studio for what brings no light, and for a glTF without a camera.
+    #[arg(long, value_name = "FILE|studio|none")]
+    env: Option<PathBuf>,
+    /// What is behind everything: env (the light from there), studio (grey paper), transparent, a colour (white, "#e8e0d8") or
+    /// an image file. By default studio where the light is automatic, else env.
+    #[arg(long, value_name = "WHAT", value_parser = background)]
+    background: Option<Background>,
+    /// Frame the whole model though the file has a camera.
+    #[arg(long, conflicts_with = "camera")]
+    fit: bool,
+    /// So many pictures from all around the model, as -o frame.####.png.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000),
+          conflicts_with_all = ["camera", "stats"])]
+    turntable: Option<u32>,
+}
+
+/// What `--background` names.
+#[derive(Clone, Debug, PartialEq)]
+enum Background {
+    Lights,
+    Transparent,
+    Studio,
+    Colour(Rgb),
+    File(PathBuf),
+}
+
+const COLOURS: [(&str, u32); 12] = [
+    ("white", 0xff_ff_ff),
+    ("black", 0x00_00_00),
+    ("grey", 0x80_80_80),
+    ("gray", 0x80_80_80),
+    ("silver", 0xc0_c0_c0),
+    ("red", 0xff_00_00),
+    ("green", 0x00_80_00),
+    ("blue", 0x00_00_ff),
+    ("yellow", 0xff_ff_00),
+    ("cyan", 0x00_ff_ff),
+    ("magenta", 0xff_00_ff),
+    ("navy", 0x00_00_80),
+];
+
+fn ground(name: &str) -> Result<Ground, String> {
+    Ground::from_name(name).ok_or_else(|| "expected none, shadow, plane or auto".to_owned())
+}
+
+fn background(text: &str) -> Result<Background, String> {
+    let lower = text.to_ascii_lowercase();
+    match &*lower {
+        "env" => return Ok(Background::Lights),
+        "transparent" | "none" => return Ok(Background::Transparent),
+        "studio" => return Ok(Background::Studio),
+        _ => {}
+    }
+    if let Some((_, code)) = COLOURS.iter().find(|(name, _)| *name == lower) {
+        return Ok(Background::Colour(colour(*code)));
+    }
+    if let Some(digits) = lower.strip_prefix('#') {
+        let wide = match digits.len() {
+            3 => digits.chars().flat_map(|c| [c, c]).collect(),
+            _ => digits.to_owned(),
+        };
+        let code = u32::from_str_radix(&wide, 16).ok().filter(|_| wide.len() == 6 && !wide.starts_with('+'));
+        return code.map(|code| Background::Colour(colour(code))).ok_or_else(|| {
+            "expected a colour of three or six hexadecimal digits, as #fa0 or #e8e0d8".to_owned()
+        });
+    }
+    if Path::new(text).extension().is_some() || text.contains(std::path::MAIN_SEPARATOR) {
+        return Ok(Background::File(text.into()));
+    }
+    let names: Vec<&str> = COLOURS.iter().map(|(name, _)| *name).collect();
+    Err(format!(
+        "expected env, studio, transparent, a colour ({}, or as #e8e0d8) or an image file",
+        names.join(", ")
+    ))
+}
+
+fn colour(code: u32) -> Rgb {
+    let channel = |shift: u32| srgb_to_linear((code >> shift & 0xff) as f32 / 255.0);
+    Rgb::new(channel(16), channel(8), channel(0))
+}
+
+/// What is behind a picture.
+pub enum Behind {
+    /// The lights at infinity.
+    Lights,
+    /// Nothing: the picture has coverage.
+    Nothing,
+    /// This.
+    Backdrop(Backdrop),
+}
+
+impl Behind {
+    /// Whether the picture is rendered without what is behind it.
+    pub fn is_transparent(&self) -> bool {
+        !matches!(self, Self::Lights)
+    }
+}
+
+impl StagingArguments {
+    /// Refuses what makes no sense for pictures of this name.
+    ///
+    /// # Errors
+    /// [`Failure::Usage`].
+    pub fn check(&self, output: Option<&Path>) -> Result<(), Failure> {
+        let Some(output) = output else { return Ok(()) };
+        let name = output.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
+        let has_number = name.contains('#');
+        if self.turntable.is_some() && !has_number {
+            return Err(Failure::Usage(format!(
+                "{}: --turntable makes many pictures (expected a name with # for their number, as frame.####.png)",
+                output.display()
+            )));
+        }
+        let ending = output.extension().map(|e| e.to_ascii_lowercase()).unwrap_or_default();
+        if self.background == Some(Background::Transparent) && ending != "png" && ending != "exr" {
+            return Err(Failure::Usage(format!(
+                "{}: --background transparent needs a picture that holds coverage (expected .png or .exr)",
+                output.display()
+            )));
+        }
+        Ok(())
+    }
+
+    /// How many pictures there are from around the model.
+    pub fn turntable(&self) -> Option<u32> {
+        self.turntable
+    }
+
+    /// The stage of a picture of this size, if one is asked for, after so many turns.
+    ///
+    /// # Errors
+    /// What cannot be read, and [`Failure::Usage`] for a picture that is no environment.
+    pub fn stage(&self, size: Option<(u32, u32)>) -> Result<Stage, Failure> {
+        let surroundings = match &self.env {
+            None => Surroundings::Automatic,
+            Some(path) if path.as_os_str() == "none" => Surroundings::Own,
+            Some(path) if path.as_os_str() == "studio" => Surroundings::Studio,
+            Some(path) => Surroundings::Map(environment(path)?),
+        };
+        let ground = self.ground.unwrap_or_default();
+        Ok(Stage { fit: self.fit, size, turns: None, surroundings, ground })
+    }
+
+    /// What is behind a picture of a staged description. Pictures that are not of light (normals and the like) have nothing
+    /// behind them unless it is asked for.
+    ///
+    /// # Errors
+    /// What cannot be read.
+    pub fn behind(&self, staged: &Staged, is_of_light: bool) -> Result<Behind, Failure> {
+        Ok(match &self.background {
+            None if is_of_light && staged.light == StageLight::Studio => Behind::Backdrop(Backdrop::studio()),
+            None | Some(Background::Lights) => Behind::Lights,
+            Some(Background::Transparent) => Behind::Nothing,
+            Some(Background::Studio) => Behind::Backdrop(Backdrop::studio()),
+            Some(Background::Colour(colour)) => Behind::Backdrop(Backdrop::Colour(*colour)),
+            Some(Background::File(path)) => {
+                Behind::Backdrop(Backdrop::Picture(opaque(lumbre::read_image(path)?)))
+            }
+        })
+    }
+
+    /// Whether ground is asked for.
+    pub fn wants_ground(&self) -> bool {
+        matches!(self.ground, Some(Ground::Shadow | Ground::Plane))
+    }
+}
+
+fn environment(path: &Path) -> Result<EnvironmentDesc, Failure> {
+    let image = Arc::new(lumbre::read_image(path)?);
+    let found = (image.width(), image.height());
+    EnvironmentDesc::of_image(image).ok_or_else(|| {
+        Failure::Input(format!(
+            "{}: no environment map (found {} by {} pixels; expected twice as wide as high, or square in pbrt's equal-area mapping)",
+            path.display(),
+            found.0,
+            found.1
+        ))
+    })
+}
+
+/// An image without its coverage: over black.
+fn opaque(image: Image) -> Image {
+    Image::from_pixels(image.width(), image.height(), image.pixels().to_vec()).unwrap_or(image)
+}
+
+/// The name of a frame: the number in place of the last run of `#`, with as many digits at least.
+pub fn frame_name(pattern: &Path, number: u32) -> PathBuf {
+    let name = pattern.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let Some(last) = name.rfind('#') else { return pattern.to_owned() };
+    let first = name[..=last]
+        .rfind(|c| c != '#')
+        .map_or(0, |at| at + name[at..].chars().next().map_or(1, char::len_utf8));
+    let digits = last + 1 - first;
+    pattern.with_file_name(format!("{}{number:0digits$}{}", &name[..first], &name[last + 1..]))
+}
+
+/// Whether a camera at this place looks at the ground from below, which hides everything from it.
+pub fn is_below(ground: &GroundPlane, place: lumbre::DVec3) -> bool {
+    (place - ground.point).dot(ground.normal) < 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn backgrounds_are_understood() {
+        assert_eq!(background("env"), Ok(Background::Lights));
+        assert_eq!(background("Transparent"), Ok(Background::Transparent));
+        assert_eq!(background("#fff"), Ok(Background::Colour(Rgb::WHITE)));
+        assert_eq!(background("#FF0000"), Ok(Background::Colour(Rgb::new(1.0, 0.0, 0.0))));
+        assert_eq!(background("sky.png"), Ok(Background::File("sky.png".into())));
+        for text in ["", "#", "#ff", "#12345", "#+12345", "#ggg", "wite"] {
+            assert!(background(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn frames_have_their_number_in_their_name() {
+        for (pattern, expected) in [
+            ("a/frame.####.png", "a/frame.0017.png"),
+            ("#.png", "17.png"),
+            ("a#b##.exr", "a#b17.exr"),
+            ("ä#.png", "ä17.png"),
+        ] {
+            assert_eq!(frame_name(Path::new(pattern), 17), Path::new(expected));
+        }
+    }
+}

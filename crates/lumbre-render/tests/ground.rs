@@ -1,0 +1,159 @@
+//! What a camera sees of the ground, against closed forms.
+
+mod common;
+
+use std::sync::Arc;
+
+use common::{add, add_material, diffuse, empty, exact, options, picture};
+use lumbre_geometry::Disk;
+use lumbre_image::{Image, Rgb};
+use lumbre_math::{DAffine3, DMat3, DVec3, Transform};
+use lumbre_render::RenderOptions;
+use lumbre_scene::{
+    Camera, CameraKind, EnvironmentDesc, GroundDesc, LightDesc, Scene, SceneDesc, WithoutLight,
+};
+
+const RADIUS: f64 = 1.5;
+const HEIGHT: f64 = 2.0;
+
+/// A black disk that hovers over the ground, seen from below the disk, straight down.
+fn hovering(lights: Vec<LightDesc>, catcher: bool) -> SceneDesc {
+    let placement = DAffine3::from_mat3_translation(
+        DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::NEG_Y),
+        DVec3::new(3.0, 4.0 + 0.5 * HEIGHT, -2.0),
+    );
+    let camera = Camera {
+        name: None,
+        // The picture is a spot in the middle.
+        kind: CameraKind::Perspective { fov: 0.5, lens_radius: 0.0, focal_distance: 1.0 },
+        world_from_camera: Transform::from_affine(placement).unwrap(),
+        frame_aspect: None,
+        screen_window: None,
+        shutter_open: 0.0,
+        shutter_close: 1.0,
+    };
+    let mut desc = SceneDesc {
+        cameras: vec![camera],
+        lights,
+        without_light: WithoutLight::Dark,
+        ground: Some(GroundDesc {
+            point: DVec3::new(-9.0, 4.0, 7.0),
+            normal: DVec3::new(0.0, 2.0, 0.0),
+            reflectance: Rgb::splat(0.5),
+            catcher,
+        }),
+        ..empty()
+    };
+    let black = add_material(&mut desc, diffuse(0.0));
+    let disk = Disk::new(DVec3::new(3.0, 4.0 + HEIGHT, -2.0), DVec3::Y, RADIUS, 0.0).unwrap();
+    add(&mut desc, exact(disk), black);
+    desc
+}
+
+fn sky(radiance: Rgb) -> LightDesc {
+    LightDesc::Infinite { world_from_light: Transform::IDENTITY, radiance, image: None }
+}
+
+fn look(desc: SceneDesc, transparent: bool) -> (Rgb, f32) {
+    let scene = Scene::build(desc).unwrap();
+    let rendered = picture(&scene, &RenderOptions { transparent, ..options(&scene, 12, 10, 256) });
+    let alpha = rendered.image.alpha().map_or(1.0, |a| a.iter().sum::<f32>() / a.len() as f32);
+    (rendered.image.mean(), alpha)
+}
+
+/// The share of an even sky that the disk hides: its view factor.
+fn hidden() -> f64 {
+    RADIUS * RADIUS / (RADIUS * RADIUS + HEIGHT * HEIGHT)
+}
+
+#[test]
+fn a_shadow_under_an_even_sky_is_the_view_factor_of_what_hides_it() {
+    let (colour, alpha) = look(hovering(vec![sky(Rgb::new(2.0, 3.0, 4.0))], true), true);
+    assert_eq!(colour, Rgb::BLACK);
+    assert!((f64::from(alpha) / hidden() - 1.0).abs() < 0.01, "{alpha} {}", hidden());
+}
+
+#[test]
+fn a_shadow_darkens_the_sky_behind_it() {
+    // The camera looks down, where the same even sky is.
+    let (colour, alpha) = look(hovering(vec![sky(Rgb::new(2.0, 3.0, 4.0))], true), false);
+    assert_eq!(alpha, 1.0);
+    let left = (1.0 - hidden()) as f32;
+    for (found, sky) in colour.to_array().into_iter().zip([2.0, 3.0, 4.0]) {
+        assert!((found / (sky * left) - 1.0).abs() < 0.01, "{colour:?}");
+    }
+}
+
+#[test]
+fn a_lamp_that_is_hidden_takes_its_share_of_the_light_with_it() {
+    // Straight above, at three times the height of the disk: irradiance I / d².
+    let lamp =
+        LightDesc::Point { from: DVec3::new(3.0, 4.0 + 3.0 * HEIGHT, -2.0), intensity: Rgb::splat(90.0) };
+    let (_, alpha) = look(hovering(vec![sky(Rgb::splat(0.8)), lamp], true), true);
+    let (from_sky, from_lamp) = (0.8 * std::f64::consts::PI, 90.0 / (9.0 * HEIGHT * HEIGHT));
+    let expected = (from_sky * hidden() + from_lamp) / (from_sky + from_lamp);
+    assert!((f64::from(alpha) / expected - 1.0).abs() < 0.02, "{alpha} {expected}");
+}
+
+#[test]
+fn ground_in_the_open_is_not_seen_at_all() {
+    let pixels = (0..64 * 32).map(|i| Rgb::splat(0.1 + (i % 7) as f32 * (i % 11) as f32)).collect();
+    let image = Image::from_pixels(64, 32, pixels).unwrap();
+    let map = EnvironmentDesc::of_image(Arc::new(image)).unwrap();
+    let light = LightDesc::Infinite {
+        world_from_light: Transform::rotate(DVec3::new(1.0, 2.0, 3.0), 40.0).unwrap(),
+        radiance: Rgb::WHITE,
+        image: Some(map),
+    };
+    let mut desc = hovering(vec![light], true);
+    desc.shapes.clear();
+    let scene = Scene::build(desc).unwrap();
+    let rendered = picture(&scene, &RenderOptions { transparent: true, ..options(&scene, 8, 6, 4) });
+    assert!(rendered.image.alpha().unwrap().iter().all(|&a| a == 0.0));
+    assert!(rendered.image.pixels().iter().all(|&c| c == Rgb::BLACK));
+}
+
+#[test]
+fn a_plane_is_seen_as_the_matte_surface_that_it_is() {
+    let (colour, alpha) = look(hovering(vec![sky(Rgb::splat(2.0))], false), true);
+    assert_eq!(alpha, 1.0);
+    let expected = 0.5 * 2.0 * (1.0 - hidden());
+    assert!((f64::from(colour.g) / expected - 1.0).abs() < 0.01, "{colour:?} {expected}");
+}
+
+#[test]
+fn the_irradiance_of_an_environment_agrees_with_its_samples() {
+    let pixels = (0..32 * 16).map(|i| Rgb::new(0.2 + (i % 5) as f32, 1.0, (i % 32) as f32)).collect();
+    let image = Arc::new(Image::from_pixels(32, 16, pixels).unwrap());
+    let square = Arc::new(
+        Image::from_pixels(
+            24,
+            24,
+            image.pixels()[..576.min(512)].iter().copied().chain([Rgb::WHITE; 64]).collect(),
+        )
+        .unwrap(),
+    );
+    for image in [image, square] {
+        let light = LightDesc::Infinite {
+            world_from_light: Transform::rotate(DVec3::new(3.0, -2.0, 1.0), 70.0).unwrap(),
+            radiance: Rgb::new(2.0, 0.5, 1.0),
+            image: EnvironmentDesc::of_image(image),
+        };
+        let desc = SceneDesc { lights: vec![light], without_light: WithoutLight::Dark, ..empty() };
+        let scene = Scene::build(desc).unwrap();
+        let normal = DVec3::new(1.0, -2.0, 2.0) / 3.0;
+        let exact = scene.lights()[0].irradiance(DVec3::ZERO, normal).unwrap();
+        let mut sum = [0.0_f64; 3];
+        const N: u32 = 300;
+        for i in 0..N * N {
+            let u = lumbre_math::DVec2::new(f64::from(i % N) + 0.5, f64::from(i / N) + 0.5) / f64::from(N);
+            let Some(sample) = scene.sample_light(DVec3::ZERO, 0.5, u) else { continue };
+            let lumbre_shading::Scatter::Density(pdf) = sample.scatter else { panic!("no delta light") };
+            let weight = normal.dot(sample.towards).max(0.0) / f64::from(pdf) / f64::from(N * N);
+            sum.iter_mut().zip(sample.radiance.to_array()).for_each(|(sum, c)| *sum += weight * f64::from(c));
+        }
+        for (exact, sampled) in exact.to_array().into_iter().zip(sum) {
+            assert!((f64::from(exact) / sampled - 1.0).abs() < 0.01, "{exact} {sampled}");
+        }
+    }
+}

@@ -1,0 +1,372 @@
+//! What stands around a model that is to be shown: a view of it, light, and the ground under it.
+
+use std::sync::Arc;
+
+use lumbre_image::{Image, Rgb};
+use lumbre_math::{DAffine3, DMat3, Transform};
+
+use crate::extent::Extent;
+use crate::framing::{self, axes};
+use crate::{
+    EnvironmentDesc, EnvironmentMapping, GeometryDesc, GroundDesc, LightDesc, SceneDesc, ShapeDesc, UpAxis,
+    WithoutLight, studio,
+};
+
+/// How a description is made ready to be shown. What it has of its own stays, unless something here says otherwise.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Stage {
+    /// Whether to frame everything though the description has cameras; they are left out then.
+    pub fit: bool,
+    /// Pixels across and down of the picture, whose shape the automatic view fills; by default the description's own, or
+    /// 1200 by 900.
+    pub size: Option<(u32, u32)>,
+    /// How many turns, as a share of one, the automatic camera has made about the model; all turns hold what any of them
+    /// sees. The studio goes with it, as if the model were turning before both. `None` for a view of its own.
+    pub turns: Option<f64>,
+    /// Light from all around.
+    pub surroundings: Surroundings,
+    /// What the model stands on.
+    pub ground: Ground,
+}
+
+/// Light from all around a model.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Surroundings {
+    /// The studio, where the description says so ([`SceneDesc::without_light`]).
+    #[default]
+    Automatic,
+    /// What the description has.
+    Own,
+    /// The studio, besides the description's lights that are not infinitely far away all around.
+    Studio,
+    /// A picture, in place of what the description has. The middle of a latitude–longitude picture lies behind the model as
+    /// the automatic camera sees it before it turns.
+    Map(EnvironmentDesc),
+}
+
+/// What a model stands on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Ground {
+    /// A shadow where the camera and the light from all around are none of the description's own; else nothing.
+    #[default]
+    Automatic,
+    /// Nothing.
+    None,
+    /// Ground of which the camera sees the shadow alone.
+    Shadow,
+    /// A matte grey plane.
+    Plane,
+}
+
+impl Ground {
+    /// Their names, in the order of the enum.
+    pub const NAMES: [&'static str; 4] = ["auto", "none", "shadow", "plane"];
+
+    /// The one of that name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        const ALL: [Ground; 4] = [Ground::Automatic, Ground::None, Ground::Shadow, Ground::Plane];
+        Self::NAMES.iter().position(|known| *known == name).map(|i| ALL[i])
+    }
+}
+
+/// What a [`Stage`] did to a description.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Staged {
+    /// Whether the camera is the automatic one.
+    pub framed: bool,
+    /// Where the light comes from.
+    pub light: StageLight,
+    /// Whether there is ground.
+    pub grounded: bool,
+}
+
+/// Where the light of a staged description comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StageLight {
+    /// The description's own lights, if it has any.
+    Own,
+    /// The studio, with what else the description has.
+    Studio,
+    /// [`Surroundings::Map`], with what else the description has.
+    Map,
+}
+
+/// Reflectance of the ground. As much as a floor of light wood or concrete.
+const GROUND: f32 = 0.5;
+/// How far the ground lies below the lowest point, as a share of the model's size, so that what is flat and lies on it is
+/// seen.
+const GAP: f64 = 1e-4;
+/// Pixels of a picture of which neither the description nor its camera says the size.
+const SIZE: (u32, u32) = (1200, 900);
+
+impl EnvironmentDesc {
+    /// The map that an image is by its shape: square, or twice as wide as high; `None` for others.
+    pub fn of_image(image: Arc<Image>) -> Option<Self> {
+        let (width, height) = (image.width(), image.height());
+        let mapping = if width == height {
+            EnvironmentMapping::EqualArea
+        } else if width == height.saturating_mul(2) {
+            EnvironmentMapping::LatitudeLongitude
+        } else {
+            return None;
+        };
+        Some(Self { image, mapping })
+    }
+}
+
+impl Stage {
+    /// Adds to a description what it lacks to be shown.
+    pub fn set(&self, desc: &mut SceneDesc) -> Staged {
+        let is_model = desc.without_light != WithoutLight::Dark;
+        let framed = desc.cameras.is_empty() || self.fit || self.turns.is_some();
+        let turns = self.turns.unwrap_or(0.0);
+
+        let light = match &self.surroundings {
+            Surroundings::Map(map) => {
+                desc.lights.retain(|light| !matches!(light, LightDesc::Infinite { .. }));
+                desc.lights.push(around(desc.up, map));
+                StageLight::Map
+            }
+            Surroundings::Studio => {
+                desc.lights.retain(|light| !matches!(light, LightDesc::Infinite { .. }));
+                StageLight::Studio
+            }
+            Surroundings::Automatic if wants_studio(desc) => StageLight::Studio,
+            Surroundings::Automatic | Surroundings::Own => StageLight::Own,
+        };
+        if light == StageLight::Studio {
+            desc.lights.push(studio::light(desc.up, turns));
+        }
+        // Nothing is added when it is built.
+        desc.without_light = WithoutLight::Dark;
+
+        let extent = Extent::new(desc);
+        let is_shown_by_default = is_model && framed && light != StageLight::Own;
+        let kind = match self.ground {
+            Ground::Automatic if is_shown_by_default => Ground::Shadow,
+            Ground::Automatic => Ground::None,
+            asked => asked,
+        };
+        let catcher = kind == Ground::Shadow;
+        let ground = (kind != Ground::None).then(|| ground(&extent, desc, catcher)).flatten();
+        let camera = framed.then(|| {
+            let (width, height) = self.size.or(desc.film.width.zip(desc.film.height)).unwrap_or(SIZE);
+            let aspect = f64::from(width) / f64::from(height.max(1));
+            let points = |visit: &mut dyn FnMut(lumbre_math::DVec3)| extent.each_point(visit);
+            match self.turns {
+                None => framing::still(&points, desc.up, aspect),
+                Some(turns) => framing::turned(&points, desc.up, aspect, turns),
+            }
+        });
+        let grounded = ground.is_some();
+        desc.ground = ground.or(desc.ground);
+        if let Some(camera) = camera {
+            desc.cameras = vec![camera];
+            if let ((None, None), None) = ((desc.film.width, desc.film.height), self.size) {
+                (desc.film.width, desc.film.height) = (Some(SIZE.0), Some(SIZE.1));
+            }
+        }
+        Staged { framed, light, grounded }
+    }
+}
+
+/// A picture all around, the middle of a latitude–longitude one to the back.
+fn around(up: UpAxis, map: &EnvironmentDesc) -> LightDesc {
+    let [right, upward, front] = axes(up, 0.0);
+    // x to the back, z up.
+    let space = DAffine3::from_mat3(DMat3::from_cols(-front, -right, upward));
+    LightDesc::Infinite {
+        world_from_light: Transform::from_affine(space).unwrap_or_default(),
+        radiance: Rgb::WHITE,
+        image: Some(map.clone()),
+    }
+}
+
+/// Whether a description has so little light of its own that a studio is to light it.
+pub(crate) fn wants_studio(desc: &SceneDesc) -> bool {
+    match desc.without_light {
+        WithoutLight::Dark => false,
+        WithoutLight::StudioUnlessStaged => desc.lights.is_empty() || desc.cameras.is_empty(),
+        WithoutLight::Studio => desc.lights.is_empty() && !shines(desc),
+    }
+}
+
+/// Whether any shape gives light.
+fn shines(desc: &SceneDesc) -> bool {
+    let in_objects = desc.objects.iter().flat_map(|object| &object.shapes);
+    let mut open: Vec<&ShapeDesc> = desc.shapes.iter().chain(in_objects).collect();
+    while let Some(shape) = open.pop() {
+        if shape.area_light.is_some() {
+            return true;
+        }
+        if let GeometryDesc::Csg(csg) = &shape.geometry {
+            open.extend(csg.operands.iter().flatten());
+        }
+    }
+    false
+}
+
+/// The plane under everything; `None` where there is nothing.
+fn ground(extent: &Extent, desc: &SceneDesc, catcher: bool) -> Option<GroundDesc> {
+    let bounds = extent.bounds();
+    if bounds.is_empty() || !bounds.min.is_finite() || !bounds.max.is_finite() {
+        return None;
+    }
+    let [_, normal, _] = axes(desc.up, 0.0);
+    let center = bounds.center();
+    let half_height = 0.5 * bounds.size().dot(normal);
+    let drop = half_height + GAP * bounds.size().max_element();
+    Some(GroundDesc { point: center - drop * normal, normal, reflectance: Rgb::splat(GROUND), catcher })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{AreaLightDesc, Camera, CameraKind, MaterialId, NamedMaterial, Scene};
+    use lumbre_geometry::{Ray, Sphere};
+    use lumbre_math::DVec3;
+    use lumbre_shading::Material;
+
+    fn ball() -> SceneDesc {
+        let ball = Sphere::new(DVec3::new(3.0, 7.0, -4.0), 2.5).unwrap();
+        SceneDesc {
+            shapes: vec![ShapeDesc {
+                index: 0,
+                geometry: GeometryDesc::Exact(ball.into()),
+                world_from_object: Transform::IDENTITY,
+                reverse_orientation: false,
+                material: Some(MaterialId(0)),
+                area_light: None,
+                alpha: None,
+            }],
+            materials: vec![NamedMaterial { name: None, material: Arc::new(Material::default_diffuse()) }],
+            ..SceneDesc::default()
+        }
+    }
+
+    fn camera() -> Camera {
+        Camera {
+            name: Some("own".into()),
+            kind: CameraKind::Perspective { fov: 50.0, lens_radius: 0.0, focal_distance: 1.0 },
+            world_from_camera: Transform::IDENTITY,
+            frame_aspect: None,
+            screen_window: None,
+            shutter_open: 0.0,
+            shutter_close: 1.0,
+        }
+    }
+
+    fn lamp() -> LightDesc {
+        LightDesc::Point { from: DVec3::new(1.0, 2.0, 3.0), intensity: Rgb::WHITE }
+    }
+
+    #[test]
+    fn a_model_alone_gets_a_camera_a_studio_and_its_shadow() {
+        for up in [UpAxis::Y, UpAxis::Z] {
+            let mut desc = SceneDesc { up, ..ball() };
+            let staged = Stage::default().set(&mut desc);
+            assert_eq!(staged, Staged { framed: true, light: StageLight::Studio, grounded: true });
+            assert_eq!((desc.cameras.len(), desc.lights.len()), (1, 1));
+            assert_eq!((desc.film.width, desc.film.height), (Some(1200), Some(900)));
+            let scene = Scene::build(desc).unwrap();
+            let ground = scene.ground().unwrap();
+            assert!(ground.catcher);
+            // It lies under the ball, just so that it does not touch it.
+            let [_, upward, _] = axes(up, 0.0);
+            let down = Ray::new(DVec3::new(3.0, 7.0, -4.0) + 9.0 * upward, -upward);
+            let hits = scene.accel().count(&down);
+            assert_eq!(hits, 3);
+            let last = (ground.point - down.origin).dot(-upward);
+            assert!(last > 11.5 && last < 11.501, "{last}");
+        }
+    }
+
+    #[test]
+    fn a_scene_of_its_own_is_left_alone() {
+        for without_light in [WithoutLight::Studio, WithoutLight::StudioUnlessStaged, WithoutLight::Dark] {
+            let mut desc =
+                SceneDesc { cameras: vec![camera()], lights: vec![lamp()], without_light, ..ball() };
+            let staged = Stage::default().set(&mut desc);
+            assert_eq!(staged, Staged { framed: false, light: StageLight::Own, grounded: false });
+            assert_eq!((desc.cameras, desc.lights.len(), desc.ground), (vec![camera()], 1, None));
+            assert_eq!(desc.film.width, None);
+        }
+    }
+
+    #[test]
+    fn a_studio_lights_what_the_description_wants_lit() {
+        let glow = AreaLightDesc { radiance: Rgb::WHITE, image: None, two_sided: false, power: None };
+        let light = |without_light, cameras: Vec<Camera>, lights: Vec<LightDesc>, glows: bool| {
+            let mut desc = SceneDesc { cameras, lights, without_light, ..ball() };
+            desc.shapes[0].area_light = glows.then(|| glow.clone());
+            Stage::default().set(&mut desc).light
+        };
+        use {StageLight as L, WithoutLight as W};
+        assert_eq!(light(W::Studio, vec![], vec![], true), L::Own);
+        assert_eq!(light(W::Studio, vec![], vec![lamp()], false), L::Own);
+        assert_eq!(light(W::StudioUnlessStaged, vec![], vec![], true), L::Studio);
+        assert_eq!(light(W::StudioUnlessStaged, vec![camera()], vec![], true), L::Studio);
+        assert_eq!(light(W::StudioUnlessStaged, vec![], vec![lamp()], false), L::Studio);
+        assert_eq!(light(W::Dark, vec![], vec![], false), L::Own);
+    }
+
+    #[test]
+    fn a_map_takes_the_place_of_all_light_from_far_away_and_of_nothing_else() {
+        let image = Image::filled(8, 4, Rgb::new(0.5, 1.0, 2.0));
+        let map = EnvironmentDesc::of_image(Arc::new(image)).unwrap();
+        let sky =
+            LightDesc::Infinite { world_from_light: Transform::IDENTITY, radiance: Rgb::WHITE, image: None };
+        let mut desc = SceneDesc { lights: vec![sky, lamp()], ..ball() };
+        let surroundings = Surroundings::Map(map);
+        let staged = Stage { surroundings, ..Stage::default() }.set(&mut desc);
+        assert_eq!(staged.light, StageLight::Map);
+        assert_eq!(desc.lights.len(), 2);
+        assert!(matches!(desc.lights[0], LightDesc::Point { .. }));
+        assert!(EnvironmentDesc::of_image(Arc::new(Image::filled(9, 4, Rgb::WHITE))).is_none());
+    }
+
+    #[test]
+    fn the_middle_of_a_map_is_behind_the_model() {
+        // Bright in the middle columns alone.
+        let pixels = (0..32 * 16).map(|i| if i % 32 == 15 || i % 32 == 16 { Rgb::WHITE } else { Rgb::BLACK });
+        let image = Image::from_pixels(32, 16, pixels.collect()).unwrap();
+        let map = EnvironmentDesc::of_image(Arc::new(image)).unwrap();
+        for up in [UpAxis::Y, UpAxis::Z] {
+            let mut desc = SceneDesc { up, ..ball() };
+            Stage { surroundings: Surroundings::Map(map.clone()), ..Stage::default() }.set(&mut desc);
+            let scene = Scene::build(desc).unwrap();
+            let [right, _, front] = axes(up, 0.0);
+            let from =
+                |direction| scene.background(&Ray::new(DVec3::ZERO, direction)).map(|c| c.g).sum::<f32>();
+            assert!(from(-front) > 0.99 && from(front) == 0.0 && from(right) == 0.0);
+        }
+    }
+
+    #[test]
+    fn the_studio_turns_with_the_camera() {
+        let seen = |turns: f64| {
+            let mut desc = ball();
+            Stage { turns: Some(turns), ..Stage::default() }.set(&mut desc);
+            let camera = desc.cameras[0].clone();
+            let scene = Scene::build(desc).unwrap();
+            let towards = |x, y, z| camera.world_from_camera.vector(DVec3::new(x, y, z)).normalize();
+            [towards(-1.0, 0.5, 0.2), towards(1.0, 1.0, -0.5)]
+                .map(|d| scene.background(&Ray::new(DVec3::ZERO, d)).map(|c| c.g).sum::<f32>())
+        };
+        let (start, later) = (seen(0.0), seen(0.375));
+        assert!(start[0] != start[1]);
+        for (a, b) in start.into_iter().zip(later) {
+            assert!((a / b - 1.0).abs() < 1e-3, "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn every_ground_has_its_name() {
+        for (name, ground) in
+            Ground::NAMES.into_iter().zip([Ground::Automatic, Ground::None, Ground::Shadow, Ground::Plane])
+        {
+            assert_eq!(Ground::from_name(name), Some(ground));
+        }
+        assert_eq!(Ground::from_name("floor"), None);
+    }
+}
