@@ -10,7 +10,7 @@ use lumbre_formats::gltf::{GltfOptions, read_gltf};
 use lumbre_formats::{Budget, Diagnostics, FormatError, Limits, Strictness};
 use lumbre_geometry::Shape;
 use lumbre_image::Rgb;
-use lumbre_math::{DVec3, Vec2, Vec3};
+use lumbre_math::{DVec3, Vec2, Vec3, Vec4};
 use lumbre_scene::{CameraKind, GeometryDesc, LightDesc, MeshDesc, Scene, SceneDesc, ShapeDesc};
 use lumbre_shading::{
     FloatTexture, MaterialKind, PrincipledParams, SpectrumTexture, TextureContext, VertexData,
@@ -611,6 +611,66 @@ fn unlit_shines_and_what_scatters_inside_is_said_to_be_left_out() {
     let (_, diagnostics) = dressed(volume);
     let text = diagnostics.lines().join("\n");
     assert!(text.contains("scattering inside volumes"), "{text}");
+}
+
+#[test]
+fn tangents_are_made_for_normal_maps_and_those_of_the_file_keep_their_side() {
+    let material = r#""images":[{"uri":"data:image/png;base64,iVBORw0KGgo="}],"textures":[{"source":0}]"#;
+    let square = |attributes: &[&str], material: &str| {
+        let mut parts = Parts::default();
+        let p = parts.positions(&SQUARE);
+        // u runs along x, v (counted downwards) along y: the image is seen mirrored.
+        let uv = parts.add(
+            &floats(&[1.0, 1.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0].map(|c: f32| 1.0 - c)),
+            r#""componentType":5126,"type":"VEC2","count":4"#,
+        );
+        let mirrored = parts.add(
+            &floats(&[0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0]),
+            r#""componentType":5126,"type":"VEC2","count":4"#,
+        );
+        let n =
+            parts.add(&floats(&[0.0, 0.0, 1.0].repeat(4)), r#""componentType":5126,"type":"VEC3","count":4"#);
+        let t = parts.add(
+            &floats(&[0.6, 0.8, 0.0, -1.0].repeat(4)),
+            r#""componentType":5126,"type":"VEC4","count":4"#,
+        );
+        let mut list = format!(r#""POSITION":{p}"#);
+        for name in attributes {
+            let index = match *name {
+                "TEXCOORD_0" => uv,
+                "TEXCOORD_1" => mirrored,
+                "NORMAL" => n,
+                _ => t,
+            };
+            list += &format!(r#","{name}":{index}"#);
+        }
+        let one = one(&format!(r#""mode":6,"material":0,"attributes":{{{list}}}"#));
+        let mut said = Diagnostics::with_strictness(Strictness::Lenient);
+        let json = parts.json(&format!(r#"{material},{one}"#));
+        read_with(&glb(&json, &parts.binary), &GltfOptions::default(), &mut said).unwrap()
+    };
+    let tangents = |scene: &SceneDesc| mesh(&scene.shapes[0]).tangents.clone();
+    let near = |list: Option<Vec<Vec4>>, count: usize, expected: Vec4| {
+        let list = list.unwrap();
+        assert_eq!(list.len(), count);
+        assert!(list.iter().all(|t| (*t - expected).length() < 1e-5), "{list:?} {expected}");
+    };
+    let mapped = |set: usize| {
+        format!(r#"{material},"materials":[{{"normalTexture":{{"index":0,"texCoord":{set}}}}}]"#)
+    };
+    let scene = square(&["TEXCOORD_0", "NORMAL"], &mapped(0));
+    near(tangents(&scene), 4, Vec4::new(1.0, 0.0, 0.0, -1.0));
+    let scene = square(&["TEXCOORD_0", "TEXCOORD_1", "NORMAL"], &mapped(1));
+    near(tangents(&scene), 4, Vec4::new(0.0, 1.0, 0.0, 1.0));
+    // Flat, each triangle with its own vertices.
+    let scene = square(&["TEXCOORD_0"], &mapped(0));
+    near(tangents(&scene), 6, Vec4::new(1.0, 0.0, 0.0, -1.0));
+    let scene = square(&["TEXCOORD_0", "NORMAL", "TANGENT"], &mapped(0));
+    near(tangents(&scene), 4, Vec4::new(0.6, 0.8, 0.0, -1.0));
+    let brushed = r#""materials":[{"extensions":{"KHR_materials_anisotropy":{"anisotropyStrength":0.5}}}]"#;
+    near(tangents(&square(&["TEXCOORD_0", "NORMAL"], brushed)), 4, Vec4::new(1.0, 0.0, 0.0, -1.0));
+    assert_eq!(tangents(&square(&["NORMAL"], brushed)), None);
+    assert_eq!(tangents(&square(&["TEXCOORD_0", "NORMAL"], r#""materials":[{}]"#)), None);
 }
 
 #[test]

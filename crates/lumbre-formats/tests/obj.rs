@@ -202,7 +202,8 @@ fn lenient_drops_what_cannot_be_used_and_counts_it() {
 fn every_key_of_a_material_is_read() {
     let text = "newmtl first one\nKd 0.1 0.2 0.3\nKs 0.5\nKe 1 2 3\nNs 100\nNi 1.33\nd 0.75\nillum 7\nPr 0.4\nPm 1\n\
         map_Kd -s 2 3 -o 0.25 0.5 0 -mm 0 0.5 -clamp on my tex\\a b.png\nmap_bump -bm 0.02 b.png\nnorm n.png\nmap_d d.png\n\
-        map_Pr 2 3.png -bm 1.5 -clamp on\nmap_Ke e.png\nKa 1 1 1\n\nnewmtl second\nTr 0.25\nmap_Kd -s 4 4.png\n";
+        map_Pr 2 3.png -bm 1.5 -clamp on\nmap_Ke e.png\nKa 1 1 1\nPs 0.6\nPc 0.7\nPcr 0.8\naniso 0.9\nanisor 0.25\n\
+        map_Pm m.png\nmap_Ps s.png\n\nnewmtl second\nTr 0.25\nmap_Kd -s 4 4.png\n";
     let mut said = Diagnostics::new();
     let materials = read_mtl(text.as_bytes(), &"m.mtl".into(), &Budget::default(), &mut said).unwrap();
     assert_eq!(said.lines(), Vec::<String>::new());
@@ -215,6 +216,10 @@ fn every_key_of_a_material_is_read() {
     );
     assert_eq!((m.opacity, m.illumination), (Some(0.75), Some(7)));
     assert_eq!((m.roughness, m.metallic), (Some(0.4), Some(1.0)));
+    assert_eq!((m.sheen, m.clearcoat, m.clearcoat_roughness), (Some(0.6), Some(0.7), Some(0.8)));
+    assert_eq!((m.anisotropy, m.anisotropy_rotation), (Some(0.9), Some(0.25)));
+    let files = [&m.metallic_map, &m.sheen_map].map(|map| map.as_ref().unwrap().file.as_str());
+    assert_eq!(files, ["m.png", "s.png"]);
     let map = m.diffuse_map.as_ref().unwrap();
     assert_eq!((map.scale, map.offset), ([2.0, 3.0], [0.25, 0.5]));
     assert_eq!((map.range, map.clamp, map.file.as_str()), ([0.0, 0.5], true, "my tex\\a b.png"));
@@ -233,7 +238,7 @@ fn a_scene_has_its_materials_and_says_what_is_missing() {
     let put = |file: &str, text: &str| std::fs::write(folder.path().join(file), text).unwrap();
     put(
         "my scene.mtl",
-        "newmtl lamp\nKe 5 4 3\nnewmtl glass\nillum 7\nNi 1.7\nnewmtl gold\nPm 1\nPr 0.5\nKd 1 0.8 0.3\nnewmtl matte\n\
+        "newmtl lamp\nKe 5 4 3\nnewmtl glass\nillum 7\nNi 1.7\nnewmtl gold\nPm 1\nPr 0.5\nPc 0.25\nKd 1 0.8 0.3\nnewmtl matte\n\
          Kd 0.2 0.4 0.6\nmap_Kd absent.png\nd 0.5\nnewmtl gloss\nKs 0.5 0.5 0.5\nNs 48\n",
     );
     let faces = ["lamp", "glass", "gold", "matte", "gloss", "mate"]
@@ -248,7 +253,10 @@ fn a_scene_has_its_materials_and_says_what_is_missing() {
         |shape: usize| &scene.materials[scene.shapes[shape].material.unwrap().0 as usize].material.kind;
     assert_eq!(scene.shapes[0].area_light.as_ref().unwrap().radiance, Rgb::new(5.0, 4.0, 3.0));
     assert!(matches!(kind(1), MaterialKind::Dielectric { eta: 1.7, .. }));
-    assert!(matches!(kind(2), MaterialKind::ConductorReflectance { .. }));
+    let MaterialKind::Principled(gold) = kind(2) else { panic!() };
+    let number = |texture: &Texture<f32>| if let Texture::Constant(v) = texture { *v } else { panic!() };
+    assert_eq!((number(&gold.metallic), number(&gold.roughness), number(&gold.clearcoat)), (1.0, 0.5, 0.25));
+    assert!(matches!(*gold.base_color, Texture::Constant(c) if c == Rgb::new(1.0, 0.8, 0.3)));
     assert!(matches!(kind(3), MaterialKind::Diffuse { .. }));
     let MaterialKind::CoatedDiffuse { roughness, .. } = kind(4) else { panic!() };
     assert!(
@@ -259,7 +267,7 @@ fn a_scene_has_its_materials_and_says_what_is_missing() {
     assert!(matches!(scene.shapes[3].alpha.as_deref(), Some(Texture::Constant(0.5))));
     let lines = said.lines();
     assert_eq!(lines.len(), 3, "{lines:#?}");
-    assert!(lines[0].contains("my scene.mtl:12:8: cannot use a texture"), "{}", lines[0]);
+    assert!(lines[0].contains("my scene.mtl:13:8: cannot use a texture"), "{}", lines[0]);
     assert!(lines[1].contains("a.obj:2:8: cannot read a material file"), "{}", lines[1]);
     assert!(
         lines[2].contains(

@@ -9,7 +9,7 @@ use lumbre_geometry::Shape;
 use lumbre_image::Rgb;
 use lumbre_math::{DVec3, Transform, Vec2, Vec3};
 use lumbre_scene::*;
-use lumbre_shading::{Mapping2d, MaterialKind, Spectrum, Texture};
+use lumbre_shading::{Convention, Mapping2d, MaterialKind, PrincipledParams, Spectrum, Texture};
 
 fn try_read(text: &str) -> (Result<SceneDesc, FormatError>, Diagnostics) {
     let mut diagnostics = Diagnostics::new();
@@ -295,7 +295,7 @@ fn triangle_meshes_have_all_their_parts() {
     assert_eq!(m.positions[3], Vec3::new(2.0, 3.0, 1.0));
     assert_eq!(m.uvs.as_ref().unwrap()[2], Vec2::new(0.0, 1.0));
     assert_eq!(m.normals.as_ref().unwrap().len(), 4);
-    assert_eq!(m.tangents.as_ref().unwrap()[1], Vec3::X);
+    assert_eq!(m.tangents.as_ref().unwrap()[1], Vec3::X.extend(0.0));
     assert_eq!(m.face_indices, Some(vec![7, 9]));
     // Three points need no indices.
     let scene = world(r#"Shape "trianglemesh" "point3 P" [0 0 0  2 0 0  0 3 0]"#);
@@ -403,6 +403,73 @@ fn every_material_is_read() {
     assert_eq!(constant(transmittance), Rgb::new(0.1, 0.1, 0.2));
     assert_eq!(*scale, 0.5);
     assert_eq!(scene.shapes[7].material, None);
+}
+
+fn principled(scene: &SceneDesc, shape: usize) -> &PrincipledParams {
+    let MaterialKind::Principled(params) = kind(scene, shape) else { panic!("{:?}", kind(scene, shape)) };
+    params
+}
+
+#[test]
+fn the_principled_material_has_the_words_of_mitsuba_and_more() {
+    let scene = world(
+        r#"Material "principled" Shape "sphere"
+           Material "principled" "rgb base_color" [.1 .2 .3] "float metallic" .25 "float roughness" .75 "float anisotropic" .5
+             "float specular" .25 "float spec_tint" .1 "float sheen" .4 "float sheen_tint" .6 "float clearcoat" .8
+             "float clearcoat_gloss" 1 "float spec_trans" .3 "bool thin" true "float diff_trans" 1
+             "float anisotropic_rotation" 90 Shape "sphere"
+           Material "principled" "float spec_trans" 1 "spectrum eta" "glass-BK7" "rgb attenuation_color" [.9 .5 .25]
+             "float attenuation_distance" 2 "float clearcoat_roughness" .3 "float dispersion" .5 "float sheen_roughness" .2
+             "float iridescence" 1 "float iridescence_ior" 1.8 "float iridescence_thickness" 550 Shape "sphere""#,
+    );
+    let plain = principled(&scene, 0);
+    assert_eq!((constant(&plain.base_color), plain.ior), (Rgb::splat(0.5), 1.5));
+    assert_eq!((constant(&plain.metallic), constant(&plain.roughness)), (0.0, 0.5));
+    assert_eq!((constant(&plain.transmission), constant(&plain.clearcoat)), (0.0, 0.0));
+    let all = principled(&scene, 1);
+    assert_eq!(all.convention, Convention::Burley);
+    assert_eq!((constant(&all.base_color), constant(&all.metallic)), (Rgb::new(0.1, 0.2, 0.3), 0.25));
+    assert_eq!((constant(&all.roughness), constant(&all.anisotropy)), (0.75, 0.5));
+    // 0.08 times 0.25 is reflected head-on.
+    let f0 = ((all.ior - 1.0) / (all.ior + 1.0)).powi(2);
+    assert!((f0 - 0.02).abs() < 1e-6, "{f0}");
+    assert_eq!((constant(&all.specular_tint), constant(&all.sheen_tint)), (0.1, 0.6));
+    assert_eq!((constant(&all.sheen_color), constant(&all.clearcoat)), (Rgb::splat(0.4), 0.2));
+    assert!((constant(&all.clearcoat_roughness).powi(2) - 0.001).abs() < 1e-6);
+    assert!(constant(&all.transmission) == 0.3 && all.volume.is_none());
+    assert_eq!(constant(&all.diffuse_transmission), 0.5);
+    assert!((all.anisotropy_rotation - std::f32::consts::FRAC_PI_2).abs() < 1e-6);
+    let glass = principled(&scene, 2);
+    let volume = glass.volume.unwrap();
+    assert!((glass.ior - 1.5168).abs() < 1e-3);
+    near_rgb(volume.attenuation_color, [0.9, 0.5, 0.25]);
+    assert_eq!((volume.attenuation_distance, constant(&glass.clearcoat_roughness)), (2.0, 0.3));
+    assert_eq!((glass.dispersion, constant(&glass.sheen_roughness)), (0.5, 0.2));
+    assert_eq!((constant(&glass.iridescence), glass.iridescence_ior), (1.0, 1.8));
+    assert_eq!(constant(&glass.iridescence_thickness), 550.0);
+
+    let wrong = |text: &str| try_read(&format!("WorldBegin {text}")).0.unwrap_err().to_string();
+    let both = wrong(r#"Material "principled" "float eta" 1.4 "float specular" .5"#);
+    assert!(both.contains("\"specular\" excludes \"eta\""), "{both}");
+    let endless = wrong(r#"Material "principled" "float attenuation_distance" 0"#);
+    assert!(endless.contains("expected more than 0"), "{endless}");
+    let (_, warnings) = warned(r#"Material "principled" "float flatness" .5 "float metalic" 1"#);
+    assert_eq!(warnings.len(), 2, "{warnings:?}");
+    assert!(warnings[1].contains("metallic"), "{warnings:?}");
+}
+
+#[test]
+fn disney_of_the_last_version_is_the_principled_one() {
+    let (scene, warnings) = warned(
+        r#"Material "disney" "rgb color" [.1 .2 .3] "float metallic" .5 "float roughness" .25 "float eta" 1.6
+           "float speculartint" .1 "float clearcoat" 1 "float clearcoatgloss" 0 "float spectrans" .2 Shape "sphere""#,
+    );
+    assert_eq!(warnings.len(), 1, "{warnings:?}");
+    let disney = principled(&scene, 0);
+    assert_eq!((constant(&disney.base_color), constant(&disney.metallic)), (Rgb::new(0.1, 0.2, 0.3), 0.5));
+    assert_eq!((constant(&disney.roughness), disney.ior), (0.25, 1.6));
+    assert_eq!((constant(&disney.clearcoat), constant(&disney.transmission)), (0.25, 0.2));
+    assert!((constant(&disney.clearcoat_roughness).powi(2) - 0.1).abs() < 1e-6);
 }
 
 #[test]

@@ -65,7 +65,7 @@
 //! | random choice by weight | [`distribution`] |
 
 pub use glam;
-pub use glam::{DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, DVec4, Vec2, Vec3};
+pub use glam::{DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, DVec4, Vec2, Vec3, Vec4};
 
 pub mod distribution;
 pub mod frame;

@@ -82,6 +82,7 @@ impl Scene {
         let infinite = (0..builder.lights.len() as u32).map(LightId);
         let infinite = infinite.filter(|id| builder.lights[id.0 as usize].is_infinite()).collect();
         let has_holes = builder.entries.iter().any(SurfaceEntry::has_holes);
+        let has_one_sided = builder.entries.iter().any(SurfaceEntry::is_one_sided_anywhere);
         let looks_up = builder.entries.iter().any(SurfaceEntry::looks_up_anywhere);
         Ok(Self {
             accel,
@@ -94,6 +95,7 @@ impl Scene {
             integrator,
             bounds,
             has_holes,
+            has_one_sided,
             has_instances: !objects.is_empty(),
             looks_up,
             ground: ground.map(|desc| GroundPlane::new(desc, &builder.lights)),
@@ -403,8 +405,8 @@ impl Builder {
 
 /// An area light's emission, its power turned into radiance.
 pub(crate) fn emission(desc: AreaLightDesc, area: impl FnOnce() -> f64) -> Emission {
-    let AreaLightDesc { radiance, image, two_sided, power } = desc;
-    let mut emission = Emission { radiance, image, two_sided };
+    let AreaLightDesc { radiance, image, by_vertices, two_sided, power } = desc;
+    let mut emission = Emission { radiance, image, by_vertices, two_sided };
     if let Some(power) = power {
         let per_radiance =
             std::f64::consts::PI * area() * f64::from(emission.sides() * emission.mean().luminance());

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use lumbre_geometry::Shape;
 use lumbre_image::Rgb;
-use lumbre_math::{DVec3, Transform, Vec2, Vec3};
+use lumbre_math::{DVec3, Transform, Vec2, Vec3, Vec4};
 use lumbre_shading::{FloatTexture, Material, MipMap};
 
 use crate::{Camera, MaterialId, ObjectId};
@@ -150,8 +150,9 @@ pub struct MeshDesc {
     pub normals: Option<Vec<Vec3>>,
     /// Texture coordinates.
     pub uvs: Option<Vec<Vec2>>,
-    /// Tangents.
-    pub tangents: Option<Vec<Vec3>>,
+    /// Tangents, with the side on which the bitangent of normal maps lies: 1 for that of normal × tangent, -1 for the other,
+    /// as the mesh stands here (a mirror turns it over); 0 for that of normal × tangent come what may.
+    pub tangents: Option<Vec<Vec4>>,
     /// A second set of texture coordinates.
     pub second_uvs: Option<Vec<Vec2>>,
     /// Linear colours.
@@ -189,6 +190,8 @@ pub struct AreaLightDesc {
     pub radiance: Rgb,
     /// A factor on the radiance, over the surface's uv.
     pub image: Option<Arc<MipMap>>,
+    /// Whether the colours of a mesh's vertices are a factor too.
+    pub by_vertices: bool,
     /// Whether the back shines too.
     pub two_sided: bool,
     /// Total power in lumens; when there, `radiance` gives only the colour (luminance 1).

@@ -12,23 +12,26 @@ pub struct Emission {
     pub radiance: Spectrum,
     /// A factor over the surface's uv.
     pub image: Option<Arc<MipMap>>,
+    /// Whether the colours of a mesh's vertices are a factor too.
+    pub by_vertices: bool,
     /// Whether the back shines too.
     pub two_sided: bool,
 }
 
 impl Emission {
-    /// The radiance that leaves the front or the back at `uv`.
-    pub fn at(&self, front: bool, uv: Vec2) -> Spectrum {
+    /// The radiance that leaves the front or the back at `uv`, where the vertices of a mesh have this colour.
+    pub fn at(&self, front: bool, uv: Vec2, vertices: Spectrum) -> Spectrum {
         if !front && !self.two_sided {
             return Spectrum::BLACK;
         }
+        let radiance = if self.by_vertices { self.radiance * vertices } else { self.radiance };
         match &self.image {
-            None => self.radiance,
-            Some(image) => self.radiance * positive(image.lookup(uv, Vec2::ZERO, Vec2::ZERO)),
+            None => radiance,
+            Some(image) => radiance * positive(image.lookup(uv, Vec2::ZERO, Vec2::ZERO)),
         }
     }
 
-    /// The mean radiance over the unit square of uv, from a grid of points.
+    /// The mean radiance over the unit square of uv, from a grid of points; vertices count as white.
     pub fn mean(&self) -> Spectrum {
         const SIDE: u32 = 32;
         if self.image.is_none() {
@@ -36,7 +39,7 @@ impl Emission {
         }
         let grid = |i: u32| (i as f32 + 0.5) / SIDE as f32;
         let points = (0..SIDE * SIDE).map(|i| Vec2::new(grid(i % SIDE), grid(i / SIDE)));
-        points.map(|uv| self.at(true, uv)).sum::<Spectrum>() / (SIDE * SIDE) as f32
+        points.map(|uv| self.at(true, uv, Spectrum::WHITE)).sum::<Spectrum>() / (SIDE * SIDE) as f32
     }
 
     /// How many sides shine.

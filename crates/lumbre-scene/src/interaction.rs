@@ -47,7 +47,8 @@ impl<'s> Interaction<'s> {
 
     /// The radiance that it gives off towards the ray's origin.
     pub fn emitted(&self) -> Spectrum {
-        self.emission.map_or(Spectrum::BLACK, |emission| emission.at(self.front, self.at.uv))
+        let vertices = self.at.vertex.colour;
+        self.emission.map_or(Spectrum::BLACK, |emission| emission.at(self.front, self.at.uv, vertices))
     }
 
     /// The one material that applies here; `None` for an interface.

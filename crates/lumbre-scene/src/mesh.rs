@@ -64,8 +64,9 @@ pub(crate) fn bake(
         for n in normals.iter_mut().flatten() {
             *n = unit(tree_from_object.normal(n.as_dvec3()));
         }
+        let side = if tree_from_object.is_mirror() { -1.0 } else { 1.0 };
         for t in tangents.iter_mut().flatten() {
-            *t = unit(tree_from_object.vector(t.as_dvec3()));
+            *t = unit(tree_from_object.vector(t.truncate().as_dvec3())).extend(side * t.w);
         }
     }
 

@@ -34,6 +34,8 @@ pub struct Scene {
     pub(crate) warnings: Vec<BuildWarning>,
     // Whether rays of light must ask every hit if it counts: something is cut out, or is an interface.
     pub(crate) has_holes: bool,
+    // Whether a camera looks through the back of something.
+    pub(crate) has_one_sided: bool,
     pub(crate) has_instances: bool,
     // Whether any surface looks up a texture, so that rays have to know how wide they are.
     pub(crate) looks_up: bool,
@@ -136,6 +138,16 @@ impl Scene {
             self.accel.closest_filtered(ray, |hit| self.is_solid(ray, hit))
         } else {
             self.accel.closest(ray)
+        }
+    }
+
+    /// The nearest hit that a camera sees: as [`Scene::closest`], but for the backs of what is one-sided.
+    pub fn closest_seen(&self, ray: &Ray) -> Option<Hit> {
+        if self.has_one_sided {
+            self.accel
+                .closest_filtered(ray, |hit| !self.is_back_of_one_sided(ray, hit) && self.is_solid(ray, hit))
+        } else {
+            self.closest(ray)
         }
     }
 
@@ -270,6 +282,15 @@ impl Scene {
         let mut dressed = entry.dress(&outward, primitive, hit.root.local, placement.as_ref());
         dressed.turn();
         dressed
+    }
+
+    fn is_back_of_one_sided(&self, ray: &Ray, hit: &Hit) -> bool {
+        let (entry, _, turned) = self.leaf(hit);
+        entry.is_one_sided() && {
+            // The way its faces run decides, not the normals of vertices.
+            let along = self.accel.surface(ray, hit).normal.dot(ray.direction) > 0.0;
+            along != (turned != entry.reverse)
+        }
     }
 
     /// Whether a hit stops light. Where coverage is partial, a hash of the ray and of the place decides: the same

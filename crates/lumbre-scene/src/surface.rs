@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use lumbre_geometry::Surface;
 use lumbre_kernel::TriangleMesh;
-use lumbre_math::{DVec2, DVec3, Transform, Vec2, Vec3};
+use lumbre_math::{DVec2, DVec3, Transform, Vec2, Vec3, Vec4};
 use lumbre_shading::{FloatTexture, LocalSurface, Material, Spectrum, TextureContext, VertexData};
 
 use crate::Emission;
@@ -51,7 +51,7 @@ pub(crate) struct MeshDress {
     pub first_half: u32,
     pub normals: Option<Vec<Vec3>>,
     pub uvs: Option<Vec<Vec2>>,
-    pub tangents: Option<Vec<Vec3>>,
+    pub tangents: Option<Vec<Vec4>>,
     pub second_uvs: Option<Vec<Vec2>>,
     pub colours: Option<Vec<Spectrum>>,
     pub coverages: Option<Vec<f32>>,
@@ -137,7 +137,7 @@ impl SurfaceEntry {
             Form::Patch { .. } | Form::Csg(_) => false,
         };
         let emission = self.emission.as_ref()?;
-        (is_plain && self.alpha.is_none() && emission.image.is_none())
+        (is_plain && self.alpha.is_none() && emission.image.is_none() && !emission.by_vertices)
             .then_some((emission, if self.reverse { -1.0 } else { 1.0 }))
     }
 
@@ -146,6 +146,19 @@ impl SurfaceEntry {
         match &self.form {
             Form::Csg(csg) => self.looks_up || csg.leaves.iter().any(Self::looks_up_anywhere),
             _ => self.looks_up,
+        }
+    }
+
+    /// Whether a camera looks through its back.
+    pub fn is_one_sided(&self) -> bool {
+        self.material.as_ref().is_some_and(|material| material.one_sided)
+    }
+
+    /// Whether a camera looks through the back of any part of it.
+    pub fn is_one_sided_anywhere(&self) -> bool {
+        match &self.form {
+            Form::Csg(csg) => csg.leaves.iter().any(Self::is_one_sided_anywhere),
+            _ => self.is_one_sided(),
         }
     }
 
@@ -363,7 +376,7 @@ impl MeshDress {
         dressed
     }
 
-    /// Lays ∂p/∂u of the shading surface along the tangents, where the mesh has them.
+    /// Lays ∂p/∂u of the shading surface along the tangents, where the mesh has them, and the bitangent on its side.
     fn align<const N: usize>(
         &self,
         dressed: &mut Dressed,
@@ -372,7 +385,13 @@ impl MeshDress {
         placement: Option<&Transform>,
     ) {
         let Some(tangents) = &self.tangents else { return };
-        let tangent = blend.value(corners.map(|i| tangents[i as usize].as_dvec3()));
+        let tangents = at(tangents, corners);
+        let side: f32 = tangents.iter().map(|t| t.w).sum();
+        let mirrored = placement.is_some_and(Transform::is_mirror);
+        if side != 0.0 && (side < 0.0) != mirrored {
+            dressed.shading.handedness = -1.0;
+        }
+        let tangent = blend.value(std::array::from_fn(|i| tangents[i].truncate().as_dvec3()));
         let tangent = placement.map_or(tangent, |m| m.vector(tangent)).as_vec3();
         let n = dressed.shading.normal;
         if let Some(unit) = (tangent - n * n.dot(tangent)).try_normalize() {

@@ -38,7 +38,13 @@ fn of_shapes(shapes: Vec<ShapeDesc>) -> SceneDesc {
 }
 
 fn glow() -> AreaLightDesc {
-    AreaLightDesc { radiance: Rgb::splat(4.0), image: None, two_sided: false, power: None }
+    AreaLightDesc {
+        radiance: Rgb::splat(4.0),
+        image: None,
+        by_vertices: false,
+        two_sided: false,
+        power: None,
+    }
 }
 
 fn build(shapes: Vec<ShapeDesc>) -> Scene {
@@ -448,4 +454,39 @@ fn a_description_with_a_light_or_a_camera_keeps_its_own() {
     assert_eq!(scene.lights().len(), 1);
     assert!(!scene.lights()[0].is_infinite());
     assert_eq!(build(vec![shape(0, GeometryDesc::Mesh(Arc::new(square())))]).lights().len(), 1);
+}
+
+#[test]
+fn a_camera_looks_through_the_back_of_what_is_one_sided_and_light_does_not() {
+    let mut count = 0;
+    for (mirrored, reverse) in [(false, false), (true, false), (false, true)] {
+        let mut desc = SceneDesc::default();
+        let material = Material { one_sided: true, ..Material::default_diffuse() };
+        desc.materials.push(NamedMaterial { name: None, material: Arc::new(material) });
+        let mesh = MeshDesc {
+            positions: vec![Vec3::new(-4.0, -4.0, 3.0), Vec3::new(4.0, -4.0, 3.0), Vec3::new(0.0, 5.0, 3.0)],
+            triangles: vec![[0, 1, 2]],
+            // Which say nothing about the way the face runs.
+            normals: Some(vec![Vec3::NEG_Z; 3]),
+            ..MeshDesc::default()
+        };
+        let scale = DVec3::new(if mirrored { -1.0 } else { 1.0 }, 1.0, 1.0);
+        desc.shapes.push(ShapeDesc {
+            index: 0,
+            geometry: GeometryDesc::Mesh(Arc::new(mesh)),
+            world_from_object: Transform::scale(scale).unwrap(),
+            reverse_orientation: reverse,
+            material: Some(MaterialId(0)),
+            area_light: None,
+            alpha: None,
+        });
+        let scene = Scene::build(desc).unwrap();
+        for (from, towards, is_front) in [(9.0, DVec3::NEG_Z, !reverse), (-2.0, DVec3::Z, reverse)] {
+            let ray = Ray::new(DVec3::new(0.5, 0.25, from), towards);
+            assert_eq!(scene.closest_seen(&ray).is_some(), is_front, "{mirrored} {reverse} {from}");
+            assert!(scene.closest(&ray).is_some() && scene.is_occluded(&ray));
+            count += 1;
+        }
+    }
+    assert_eq!(count, 6);
 }

@@ -60,6 +60,8 @@ pub struct Material {
     pub displacement: Option<Arc<FloatTexture>>,
     /// A tangent-space normal map.
     pub normal_map: Option<ImageTexture>,
+    /// Whether a camera looks through its back. Light does not: what stands behind it lies in its shadow.
+    pub one_sided: bool,
 }
 
 /// The kinds of material. Parameters and defaults are those of the scene language.
@@ -218,7 +220,7 @@ pub struct LocalSurface {
 impl Material {
     /// A material of a kind, without bumps.
     pub fn new(kind: MaterialKind) -> Self {
-        Self { kind, displacement: None, normal_map: None }
+        Self { kind, displacement: None, normal_map: None, one_sided: false }
     }
 
     /// Follows mixtures to the one material that applies at a place: the choice is a hash of the place and `wo` (unit,

@@ -31,10 +31,10 @@ pub struct Sight<'s> {
 }
 
 impl<'s> Sight<'s> {
-    /// Follows a ray to the first thing that light sees.
+    /// Follows a ray to the first thing that a camera sees.
     pub fn new(scene: &'s Scene, ray: CameraRay, rays: &mut RayCounts) -> Self {
         rays.camera += 1;
-        let met = scene.closest(&ray.ray).map(|hit| scene.interaction(&ray.ray, &hit, &ray.footprint));
+        let met = scene.closest_seen(&ray.ray).map(|hit| scene.interaction(&ray.ray, &hit, &ray.footprint));
         Self { ray, met }
     }
 }

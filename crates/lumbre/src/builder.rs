@@ -60,7 +60,8 @@ impl ShapeBuilder {
     /// Makes its outer side shine with a radiance.
     #[must_use]
     pub fn shining(self, radiance: Rgb) -> Self {
-        let light = AreaLightDesc { radiance, image: None, two_sided: false, power: None };
+        let light =
+            AreaLightDesc { radiance, image: None, by_vertices: false, two_sided: false, power: None };
         Self { light: Some(light), ..self }
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use lumbre_image::Rgb;
-use lumbre_math::{DMat3, DMat4, DVec3, Vec2, Vec3};
+use lumbre_math::{DMat3, DMat4, DVec3, Vec2, Vec3, Vec4};
 
 use super::accessor::{Accessor, Component, Element};
 use super::file::{File, List};
@@ -372,7 +372,8 @@ pub(super) struct Pose<'p> {
 pub(super) struct Vertices {
     pub positions: Vec<Vec3>,
     pub normals: Option<Vec<Vec3>>,
-    pub tangents: Option<Vec<Vec3>>,
+    /// With the side of the bitangent, as [`lumbre_scene::MeshDesc::tangents`].
+    pub tangents: Option<Vec<Vec4>>,
     pub uvs: Vec<Option<Vec<Vec2>>>,
     /// Linear colours and coverages.
     pub colours: Option<Vec<(Rgb, f32)>>,
@@ -391,8 +392,7 @@ pub(super) fn vertices(
     let mut vertices = Vertices {
         positions: vec3(position)?,
         normals: attributes.normal.as_ref().map(vec3).transpose()?,
-        // The last number, which side the bitangent is on, follows from the texture coordinates.
-        tangents: attributes.tangent.as_ref().map(vec3).transpose()?,
+        tangents: attributes.tangent.as_ref().map(|t| t.floats(file, Vec4::from_array)).transpose()?,
         uvs: vec![],
         colours: attributes.colour.as_ref().map(|colour| colours(file, colour)).transpose()?,
     };
@@ -435,7 +435,9 @@ fn morph(file: &File<'_>, primitive: &Primitive<'_>, weights: &[f64], vertices: 
             vec3(accessor, normals)?;
         }
         if let (Some(accessor), Some(tangents)) = (&target.tangent, &mut vertices.tangents) {
-            vec3(accessor, tangents)?;
+            let added = accessor.floats(file, Vec3::from_array)?;
+            tangents.iter_mut().zip(&added).for_each(|(to, added)| *to += (weight * *added).extend(0.0));
+            release(file, added);
         }
         for (accessor, uvs) in target.uvs.iter().zip(&mut vertices.uvs) {
             if let (Some(accessor), Some(uvs)) = (accessor, uvs) {
@@ -456,8 +458,11 @@ fn morph(file: &File<'_>, primitive: &Primitive<'_>, weights: &[f64], vertices: 
             release(file, added);
         }
     }
-    for directions in [&mut vertices.normals, &mut vertices.tangents].into_iter().flatten() {
-        directions.iter_mut().for_each(|d| *d = d.normalize_or_zero());
+    for n in vertices.normals.iter_mut().flatten() {
+        *n = n.normalize_or_zero();
+    }
+    for t in vertices.tangents.iter_mut().flatten() {
+        *t = t.truncate().normalize_or_zero().extend(t.w);
     }
     Ok(())
 }
@@ -507,7 +512,9 @@ fn bend(file: &File<'_>, primitive: &Primitive<'_>, joints: &[DMat4], vertices: 
             normals[i] = (cofactors(&linear) * normals[i].as_dvec3()).normalize_or_zero().as_vec3();
         }
         if let Some(tangents) = &mut vertices.tangents {
-            tangents[i] = (linear * tangents[i].as_dvec3()).normalize_or_zero().as_vec3();
+            let turned = (linear * tangents[i].truncate().as_dvec3()).normalize_or_zero().as_vec3();
+            let side = if linear.determinant() < 0.0 { -1.0 } else { 1.0 };
+            tangents[i] = turned.extend(side * tangents[i].w);
         }
     }
     for (indices, weights) in sets {
@@ -648,18 +655,28 @@ pub(super) fn compact(vertices: &mut Vertices, triangles: &mut [[u32; 3]]) {
             old.len() as u32 - 1
         });
     }
-    fn pick<T: Copy>(old: &[u32], list: &mut Vec<T>) {
-        *list = old.iter().map(|&i| list[i as usize]).collect();
-    }
-    pick(&old, &mut vertices.positions);
-    for list in [&mut vertices.normals, &mut vertices.tangents].into_iter().flatten() {
-        pick(&old, list);
-    }
-    for list in vertices.uvs.iter_mut().flatten() {
-        pick(&old, list);
-    }
-    if let Some(list) = &mut vertices.colours {
-        pick(&old, list);
+    vertices.pick(&old);
+}
+
+impl Vertices {
+    /// Makes these its vertices: each by its present position.
+    pub fn pick(&mut self, old: &[u32]) {
+        fn pick<T: Copy>(old: &[u32], list: &mut Vec<T>) {
+            *list = old.iter().map(|&i| list[i as usize]).collect();
+        }
+        pick(old, &mut self.positions);
+        if let Some(list) = &mut self.normals {
+            pick(old, list);
+        }
+        if let Some(list) = &mut self.tangents {
+            pick(old, list);
+        }
+        for list in self.uvs.iter_mut().flatten() {
+            pick(old, list);
+        }
+        if let Some(list) = &mut self.colours {
+            pick(old, list);
+        }
     }
 }
 

@@ -18,6 +18,7 @@ mod mesh;
 mod meshopt;
 mod scene;
 mod shade;
+mod tangents;
 mod texture;
 mod uri;
 

@@ -19,12 +19,15 @@ use super::material::GltfMaterial;
 use super::mesh::{self, Assembly, Pose, Primitive, Vertices};
 use super::shade::{Dressing, Materials};
 use super::texture::{Textures, UvSets};
-use super::{GltfOptions, animation};
+use super::{GltfOptions, animation, tangents};
 use crate::diagnostic::{Diagnostic, quoted};
 
 /// Radius of points, and of lines, as a share of the diagonal of the box around all vertices of the primitive.
 const POINT_RADIUS: f64 = 0.004;
 const LINE_RADIUS: f64 = 0.002;
+
+/// Bounces at most: a ray goes in and out of every piece of glass that it meets.
+const MAX_DEPTH: u32 = 16;
 
 /// Shapes that shine are not put into objects, unless there are more copies than this: light from inside an object is only
 /// found by chance.
@@ -43,10 +46,13 @@ pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
     let roots = roots(file, &graph)?;
     let mut places: Vec<Placement> = vec![];
     let mut scene = SceneDesc { without_light: WithoutLight::StudioUnlessStaged, ..SceneDesc::default() };
+    scene.integrator.max_depth = MAX_DEPTH;
+    let mut first_camera = None;
     let mut uses: HashMap<Key, usize> = HashMap::new();
     graph.walk(&roots, |node, world| {
         let value = file.list(List::Nodes)[node];
         if let Some((_, camera)) = file.named(List::Cameras, value, "camera")? {
+            first_camera.get_or_insert(camera);
             scene.cameras.push(self::camera(camera, value, world)?);
         }
         if let Some(extension) = value.extension("KHR_lights_punctual")? {
@@ -70,8 +76,8 @@ pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
         places.push(Placement { key, node, skin, worlds });
         Ok(())
     })?;
-    if let Some(camera) = scene.cameras.first()
-        && let Some(aspect) = aspect(file, camera)?
+    if let Some(camera) = first_camera
+        && let Some(aspect) = aspect(camera)?
     {
         (scene.film.width, scene.film.height) = size_of_picture(aspect);
     }
@@ -492,8 +498,13 @@ impl Builder<'_> {
             let has_colours = primitive.attributes.colour.is_some() && primitive.mode.is_surface();
             let dressing = self.materials.dressing(primitive.material, has_colours)?;
             let sets = dressing.sets.filter(|_| primitive.mode.is_surface());
-            let wants = |set| sets.is_some_and(|sets| sets.first == set || sets.second == Some(set));
-            let vertices = mesh::vertices(file, &primitive, pose, wants)?;
+            let has_tangents =
+                primitive.attributes.tangent.is_some() && primitive.attributes.normal.is_some();
+            let by = dressing.tangents.filter(|_| !has_tangents);
+            let wants = |set| {
+                sets.is_some_and(|sets| sets.first == set || sets.second == Some(set)) || by == Some(set)
+            };
+            let mut vertices = mesh::vertices(file, &primitive, pose, wants)?;
             let shape = |geometry, index| ShapeDesc {
                 index,
                 geometry,
@@ -504,7 +515,11 @@ impl Builder<'_> {
                 alpha: dressing.alpha.clone(),
             };
             match mesh::assemble(file, &primitive, &vertices.positions)? {
-                Assembly::Triangles(triangles) => {
+                Assembly::Triangles(mut triangles) => {
+                    mesh::compact(&mut vertices, &mut triangles);
+                    if let Some(set) = by {
+                        tangents::make(file, &mut vertices, &mut triangles, set)?;
+                    }
                     if let Some(mesh) = mesh_of(vertices, triangles, &dressing) {
                         shapes.push(shape(GeometryDesc::Mesh(Arc::new(mesh)), self.next_index()));
                     }
@@ -549,11 +564,10 @@ impl Builder<'_> {
 }
 
 /// A mesh as scenes have it; `None` without triangles.
-fn mesh_of(mut vertices: Vertices, mut triangles: Vec<[u32; 3]>, dressing: &Dressing) -> Option<MeshDesc> {
+fn mesh_of(mut vertices: Vertices, triangles: Vec<[u32; 3]>, dressing: &Dressing) -> Option<MeshDesc> {
     if triangles.is_empty() {
         return None;
     }
-    mesh::compact(&mut vertices, &mut triangles);
     let count = vertices.positions.len();
     let UvSets { first, second, baked } = dressing.sets.unwrap_or_default();
     let mut coordinates = |set: usize| -> Vec<Vec2> {
@@ -712,19 +726,14 @@ fn camera(camera: Value<'_>, node: Value<'_>, world: &DAffine3) -> Read<Camera> 
     })
 }
 
-/// Width over height of the picture that the first camera asks for.
-fn aspect(file: &File<'_>, camera: &Camera) -> Read<Option<f64>> {
-    if let Some([x0, x1, y0, y1]) = camera.screen_window {
-        return Ok(Some((x1 - x0) / (y1 - y0)));
+/// Width over height of the picture that a camera asks for.
+fn aspect(camera: Value<'_>) -> Read<Option<f64>> {
+    if let Some(lens) = camera.get("perspective")? {
+        return lens.get("aspectRatio")?.map(Value::number).transpose();
     }
-    for &value in file.list(List::Cameras) {
-        let is_this = value.string_at("name")?.as_deref() == camera.name.as_deref();
-        if is_this || file.list(List::Cameras).len() == 1 {
-            let Some(lens) = value.get("perspective")? else { continue };
-            return lens.get("aspectRatio")?.map(Value::number).transpose();
-        }
-    }
-    Ok(None)
+    let Some(lens) = camera.get("orthographic")? else { return Ok(None) };
+    let aspect = lens.need("xmag")?.number()? / lens.need("ymag")?.number()?;
+    Ok(Some(aspect.abs()))
 }
 
 /// About as many pixels as 1280 × 720, of this shape.

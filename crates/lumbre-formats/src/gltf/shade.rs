@@ -29,6 +29,8 @@ pub(super) struct Dressing {
     pub area_light: Option<AreaLightDesc>,
     /// The texture coordinates that it wants; `None` when it has no textures.
     pub sets: Option<UvSets>,
+    /// The set by which it wants tangents, if it wants any.
+    pub tangents: Option<usize>,
 }
 
 type MaterialKey = (Option<usize>, bool);
@@ -72,8 +74,10 @@ impl<'f> Materials<'f> {
             alpha: seam.coverage()?,
             area_light: seam.light()?,
             sets,
+            tangents: tangent_set(&parameters),
         });
-        let material = Arc::new(seam.material()?);
+        let one_sided = !parameters.double_sided && !seam.is_clear();
+        let material = Arc::new(Material { one_sided, ..seam.material()? });
         self.list.borrow_mut().push(NamedMaterial { name: parameters.name.clone(), material });
         self.made.borrow_mut().insert((index, has_colours), dressing.clone());
         Ok(dressing)
@@ -112,6 +116,14 @@ impl<'f> Materials<'f> {
     }
 }
 
+/// The set of texture coordinates that tangents go by.
+fn tangent_set(m: &GltfMaterial) -> Option<usize> {
+    let maps = m.normal_texture.or(m.clearcoat.normal_texture);
+    let stretched = m.anisotropy.strength > 0.0;
+    let set = maps.or(m.anisotropy.texture.filter(|_| stretched)).map(|texture| texture.uv_set);
+    set.or(stretched.then_some(0)).filter(|_| !m.unlit)
+}
+
 /// The light that a material gives, and the texture that is a factor on it.
 fn shining(parameters: &GltfMaterial) -> (Rgb, Option<TextureRef>) {
     if parameters.unlit {
@@ -132,6 +144,11 @@ struct Seam<'s, 'f> {
 impl<'f> Seam<'_, 'f> {
     fn textures(&self) -> &Textures<'f> {
         &self.materials.textures
+    }
+
+    /// Whether light gets through it: what is seen through its front is its back.
+    fn is_clear(&self) -> bool {
+        self.parameters.transmission > 0.0 || self.parameters.diffuse_transmission.factor > 0.0
     }
 
     fn leave_out(&self, what: &'static str) {
@@ -245,7 +262,9 @@ impl<'f> Seam<'_, 'f> {
         let image = texture.map(|t| self.textures().colour_map(t.texture)).transpose()?.flatten();
         // Unlit surfaces are drawings, which are to be seen from both sides.
         let two_sided = self.parameters.double_sided || self.parameters.unlit;
-        Ok(Some(AreaLightDesc { radiance, image, two_sided, power: None }))
+        // glTF's vertex colours are a factor on the base colour, which is what an unlit surface shows.
+        let by_vertices = self.has_colours && self.parameters.unlit;
+        Ok(Some(AreaLightDesc { radiance, image, by_vertices, two_sided, power: None }))
     }
 
     fn coverage(&self) -> Read<Option<Arc<FloatTexture>>> {

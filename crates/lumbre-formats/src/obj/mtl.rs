@@ -31,6 +31,16 @@ pub struct MtlMaterial {
     pub roughness: Option<f32>,
     /// `Pm`, in `[0, 1]`.
     pub metallic: Option<f32>,
+    /// `Ps`: sheen, in `[0, 1]`.
+    pub sheen: Option<f32>,
+    /// `Pc`: how much of it is coated, in `[0, 1]`.
+    pub clearcoat: Option<f32>,
+    /// `Pcr`: roughness of the coat, in `[0, 1]`.
+    pub clearcoat_roughness: Option<f32>,
+    /// `aniso`: how stretched reflections are, in `[0, 1]`.
+    pub anisotropy: Option<f32>,
+    /// `anisor`: how far that is turned from the tangent, in turns.
+    pub anisotropy_rotation: Option<f32>,
     /// `map_Kd`.
     pub diffuse_map: Option<MtlTexture>,
     /// `map_Ke`.
@@ -39,6 +49,10 @@ pub struct MtlMaterial {
     pub opacity_map: Option<MtlTexture>,
     /// `map_Pr`.
     pub roughness_map: Option<MtlTexture>,
+    /// `map_Pm`.
+    pub metallic_map: Option<MtlTexture>,
+    /// `map_Ps`.
+    pub sheen_map: Option<MtlTexture>,
     /// `bump`, `map_Bump` or `disp`: heights.
     pub bump_map: Option<MtlTexture>,
     /// `norm`: a normal map.
@@ -66,7 +80,7 @@ pub struct MtlTexture {
 
 /// Reads materials from the bytes of an MTL file.
 ///
-/// Keys without a meaning here (`Ka`, `Ps` and others) are passed over, those that would change the look with a warning.
+/// Keys without a meaning here (`Ka` and others) are passed over, those that would change the look with a warning.
 ///
 /// # Errors
 /// [`FormatError::Input`] with line and column; [`FormatError::Limit`].
@@ -147,6 +161,13 @@ impl<'a> Reader<'a, '_> {
             "tr" => m.opacity = Some(1.0 - self.number(keyword, words)?),
             "pr" => m.roughness = Some(self.number(keyword, words)?),
             "pm" => m.metallic = Some(self.number(keyword, words)?),
+            "ps" => m.sheen = Some(self.number(keyword, words)?),
+            "pc" => m.clearcoat = Some(self.number(keyword, words)?),
+            "pcr" => m.clearcoat_roughness = Some(self.number(keyword, words)?),
+            "aniso" => m.anisotropy = Some(self.number(keyword, words)?),
+            "anisor" => m.anisotropy_rotation = Some(self.number(keyword, words)?),
+            "map_pm" => m.metallic_map = self.texture(keyword, words)?,
+            "map_ps" => m.sheen_map = self.texture(keyword, words)?,
             "map_kd" => m.diffuse_map = self.texture(keyword, words)?,
             "map_ke" => m.emission_map = self.texture(keyword, words)?,
             "map_d" | "map_tr" => m.opacity_map = self.texture(keyword, words)?,
@@ -161,16 +182,16 @@ impl<'a> Reader<'a, '_> {
             }
             // They change nothing in a picture by light alone.
             "ka" | "map_ka" | "sharpness" | "map_aat" => {}
-            "map_ks" | "map_ns" | "map_pm" | "map_ps" | "ps" | "pc" | "pcr" | "aniso" | "anisor" | "km"
-            | "decal" | "refl" | "map_refl" => {
+            "map_ks" | "map_ns" | "km" | "decal" | "refl" | "map_refl" => {
                 let said = format!("{} of a material is not used", String::from_utf8_lossy(keyword.bytes));
                 self.warn(keyword, &said);
             }
             _ => {
                 let source = self.source;
                 let known = [
-                    "newmtl", "Kd", "Ks", "Ke", "Ns", "Ni", "d", "Tr", "illum", "Pr", "Pm", "map_Kd",
-                    "map_Ke", "map_d", "map_Pr", "bump", "norm",
+                    "newmtl", "Kd", "Ks", "Ke", "Ns", "Ni", "d", "Tr", "illum", "Pr", "Pm", "Ps", "Pc",
+                    "Pcr", "aniso", "anisor", "map_Kd", "map_Ke", "map_d", "map_Pr", "map_Pm", "map_Ps",
+                    "bump", "norm",
                 ];
                 let text = String::from_utf8_lossy(&keyword.bytes[..keyword.bytes.len().min(64)]);
                 self.diagnostics.warn("unknown key of a material, passed over", |said| {

@@ -9,7 +9,7 @@ use lumbre_math::{Transform, Vec2};
 use lumbre_scene::{AreaLightDesc, GeometryDesc, MaterialId, NamedMaterial, SceneDesc, ShapeDesc, UpAxis};
 use lumbre_shading::{
     FloatTexture, ImageFilter, ImageTexture, Mapping2d, Material, MaterialKind, MipMap, MipMapOptions,
-    Roughness, Spectrum, SpectrumTexture, Texture, Wrap,
+    PrincipledParams, Roughness, Spectrum, SpectrumTexture, Texture, VolumeParams, Wrap,
 };
 
 use super::{MtlMaterial, MtlTexture, read_mtl, read_obj};
@@ -20,8 +20,9 @@ use crate::input::Input;
 
 /// Reads the OBJ file `path` with its materials and textures, each mesh a shape; y is up.
 ///
-/// A material becomes glass when `illum` is 6 or 7; a metal when `Pm` is at least one half, or when it has only specular
-/// colour; a coated diffuse one when it has `Pr`, or specular colour with `illum` 2 or more; else a diffuse one. `Pr` is
+/// A material with any of the PBR keys (`Pr`, `Pm`, `Ps`, `Pc`, `aniso` and their maps) is the principled one, clear when
+/// `illum` is 6 or 7. Of the others, those with `illum` 6 or 7 become glass, those with nothing but specular colour a
+/// metal, those with specular colour and `illum` 2 or more a coated diffuse one, else a diffuse one. `Pr` is
 /// the square root of the microfacet roughness, for which `Ns` stands otherwise (α² = 2 / (Ns + 2), as B. Walter and
 /// others, "Microfacet models for refraction", EGSR 2007). `Ke` shines to both sides. Files and textures that are not there
 /// are warned about.
@@ -147,18 +148,17 @@ impl Builder<'_> {
             Some(map) => self.colours(folder, map, diffuse)?,
             None => Arc::new(Texture::Constant(diffuse.clamp(0.0, 1.0))),
         };
-        let is_metal = m.metallic.is_some_and(|metallic| metallic >= 0.5);
         let is_mirror = diffuse.is_black() && m.diffuse_map.is_none() && !specular.is_black();
-        let is_glossy =
-            m.roughness.is_some() || m.roughness_map.is_some() || (!specular.is_black() && illumination >= 2);
+        let is_glossy = !specular.is_black() && illumination >= 2;
         let eta = m.refraction.filter(|&eta| 1.0 < eta && eta <= 10.0).unwrap_or(1.5);
-        let roughness = self.roughness(folder, m)?;
-        let kind = if matches!(illumination, 6 | 7) {
-            let perfect = Roughness { u: constant(0.0), v: constant(0.0), remap: false };
-            let is_rough = m.roughness.is_some() || m.roughness_map.is_some();
-            MaterialKind::Dielectric { eta, roughness: if is_rough { roughness } else { perfect } }
-        } else if is_metal {
-            MaterialKind::ConductorReflectance { reflectance, roughness }
+        let roughness = shininess_roughness(m);
+        let is_clear = matches!(illumination, 6 | 7);
+        let kind = if is_principled(m) {
+            let params = self.principled(folder, m, reflectance, eta)?;
+            let transmission = constant(if is_clear { 1.0 } else { 0.0 });
+            MaterialKind::Principled(Box::new(PrincipledParams { transmission, ..params }))
+        } else if is_clear {
+            MaterialKind::Dielectric { eta, roughness: Roughness::smooth() }
         } else if is_mirror && illumination >= 2 {
             let reflectance = Arc::new(Texture::Constant(specular.clamp(0.0, 1.0)));
             MaterialKind::ConductorReflectance { reflectance, roughness }
@@ -200,25 +200,53 @@ impl Builder<'_> {
                 Some(map) => self.image(folder, map, false)?.map(|texture| texture.image),
                 None => None,
             };
-            Some(AreaLightDesc { radiance, image, two_sided: true, power: None })
+            Some(AreaLightDesc { radiance, image, by_vertices: false, two_sided: true, power: None })
         };
         Ok(Finished { name: m.name.clone(), material: Arc::new(material), light, alpha })
     }
 
-    fn roughness(&mut self, folder: &Path, m: &MtlMaterial) -> Result<Roughness, FormatError> {
-        if let Some(map) = &m.roughness_map
-            && let Some(image) = self.image(folder, map, true)?
-        {
-            let image = Arc::new(Texture::Image(image));
-            let squared = Arc::new(Texture::Scale { texture: image.clone(), scale: image });
-            return Ok(Roughness { u: squared.clone(), v: squared, remap: false });
-        }
-        let alpha = match (m.roughness, m.shininess) {
-            (Some(roughness), _) => roughness.clamp(0.0, 1.0).powi(2),
-            (None, Some(shininess)) => (2.0 / (shininess.max(0.0) + 2.0)).sqrt(),
-            (None, None) => 0.0,
+    /// What the PBR keys say. A map takes the place of its number, as is usual for these keys.
+    fn principled(
+        &mut self,
+        folder: &Path,
+        m: &MtlMaterial,
+        base_color: Arc<SpectrumTexture>,
+        ior: f32,
+    ) -> Result<PrincipledParams, FormatError> {
+        let roughness = m.roughness.unwrap_or_else(|| shininess_alpha(m).sqrt());
+        let sheen = self.numbers(folder, &m.sheen_map, m.sheen.unwrap_or(0.0))?;
+        let white = Arc::new(Texture::Constant(Rgb::WHITE));
+        Ok(PrincipledParams {
+            base_color,
+            ior,
+            metallic: self.numbers(folder, &m.metallic_map, m.metallic.unwrap_or(0.0))?,
+            roughness: self.numbers(folder, &m.roughness_map, roughness)?,
+            anisotropy: constant(m.anisotropy.unwrap_or(0.0)),
+            anisotropy_rotation: m.anisotropy_rotation.unwrap_or(0.0) * std::f32::consts::TAU,
+            clearcoat: constant(m.clearcoat.unwrap_or(0.0)),
+            clearcoat_roughness: constant(m.clearcoat_roughness.unwrap_or(0.0)),
+            sheen_color: match *sheen {
+                Texture::Constant(v) => Arc::new(Texture::Constant(Rgb::splat(v))),
+                _ => Arc::new(Texture::Scale { texture: white, scale: sheen }),
+            },
+            sheen_roughness: constant(0.5),
+            volume: Some(VolumeParams::default()),
+            ..PrincipledParams::default()
+        })
+    }
+
+    /// A map of numbers, or a number where there is none that can be read.
+    fn numbers(
+        &mut self,
+        folder: &Path,
+        map: &Option<MtlTexture>,
+        number: f32,
+    ) -> Result<Arc<FloatTexture>, FormatError> {
+        let image = match map {
+            Some(map) => self.image(folder, map, true)?,
+            None => None,
         };
-        Ok(Roughness { u: constant(alpha), v: constant(alpha), remap: false })
+        Ok(image.map_or_else(|| constant(number), |image| Arc::new(Texture::Image(image))))
     }
 
     fn colours(
@@ -230,12 +258,11 @@ impl Builder<'_> {
         let Some(image) = self.image(folder, map, false)? else {
             return Ok(Arc::new(Texture::Constant(factor.clamp(0.0, 1.0))));
         };
-        let scale = factor.max_component();
-        if factor != Rgb::splat(scale) {
-            self.diagnostics
-                .warn("Kd tints its image by its largest channel only", |said| said.at(map.place.clone()));
+        let image = Arc::new(Texture::Image(image));
+        if factor == Rgb::WHITE {
+            return Ok(image);
         }
-        Ok(Arc::new(Texture::Image(ImageTexture { scale: scale * image.scale, ..image })))
+        Ok(Arc::new(Texture::Product([image, Arc::new(Texture::Constant(factor))])))
     }
 
     /// A texture by its image; `None`, with a warning, when that cannot be read.
@@ -288,6 +315,22 @@ impl Builder<'_> {
         let options = MipMapOptions { wrap, filter: ImageFilter::Trilinear };
         Ok(Some(Arc::new(MipMap::new(Arc::new(bitmap), options))))
     }
+}
+
+/// Whether it has any of the PBR keys.
+fn is_principled(m: &MtlMaterial) -> bool {
+    let numbers = [m.roughness, m.metallic, m.sheen, m.clearcoat, m.anisotropy];
+    numbers.iter().any(Option::is_some)
+        || [&m.roughness_map, &m.metallic_map, &m.sheen_map].iter().any(|map| map.is_some())
+}
+
+/// α by the exponent of the highlight.
+fn shininess_alpha(m: &MtlMaterial) -> f32 {
+    m.shininess.map_or(0.0, |shininess| (2.0 / (shininess.max(0.0) + 2.0)).sqrt())
+}
+
+fn shininess_roughness(m: &MtlMaterial) -> Roughness {
+    Roughness::isotropic(shininess_alpha(m), false)
 }
 
 fn constant(value: f32) -> Arc<FloatTexture> {

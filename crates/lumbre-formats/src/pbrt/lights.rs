@@ -213,6 +213,7 @@ impl Converter<'_, '_> {
         let desc = AreaLightDesc {
             radiance: colour * scale,
             image,
+            by_vertices: false,
             two_sided: params.boolean("twosided", false)?,
             power: positive(&params, "power")?.map(|lumens| lumens as f32),
         };

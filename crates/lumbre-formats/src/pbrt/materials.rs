@@ -122,9 +122,10 @@ impl Converter<'_, '_> {
                 self.note(spot, message);
                 MaterialKind::Interface
             }
-            "hair" | "measured" | "subsurface" | "principled" | "openpbr" => {
+            "principled" => self.principled(params)?,
+            "hair" | "measured" | "subsurface" | "openpbr" => {
                 let kind = match ty {
-                    "principled" | "openpbr" => {
+                    "openpbr" => {
                         let reflectance =
                             self.spectrum_texture(params, "base_color", SpectrumUse::Reflectance)?;
                         match reflectance {
@@ -191,7 +192,7 @@ impl Converter<'_, '_> {
     }
 
     /// An index of refraction: a number, or a spectrum's value at the yellow helium line.
-    fn index_of_refraction(&mut self, params: &Params, name: &'static str, default: f32) -> Result<f32> {
+    pub fn index_of_refraction(&mut self, params: &Params, name: &'static str, default: f32) -> Result<f32> {
         let types = [Type::Float, Type::Integer, Type::Rgb, Type::Blackbody, Type::Spectrum];
         let eta = match params.typed(name, &types)? {
             None => default,
@@ -408,35 +409,7 @@ impl Converter<'_, '_> {
                     }
                 }
             }
-            "disney" => {
-                let color = self.reflectance(params, "color", 0.5)?;
-                let metallic = self.float_texture_or(params, "metallic", 0.0)?;
-                let rough = self.float_texture_or(params, "roughness", 0.5)?;
-                // Disney's α is the square of the roughness; of a texture the square has no place here.
-                let alpha = match *rough {
-                    Texture::Constant(r) => number(r * r),
-                    _ => rough,
-                };
-                let roughness = Roughness { u: alpha.clone(), v: alpha, remap: false };
-                let eta = self.index_of_refraction(params, "eta", 1.5)?;
-                params.ignore_all();
-                self.note(spot, "material \"disney\" is approximated by a coated diffuse or a conductor");
-                match *metallic {
-                    Texture::Constant(m) if m >= 0.5 => {
-                        MaterialKind::ConductorReflectance { reflectance: color, roughness }
-                    }
-                    _ => MaterialKind::CoatedDiffuse {
-                        reflectance: color,
-                        roughness,
-                        thickness: number(0.01),
-                        eta,
-                        g: number(0.0),
-                        albedo: constant(Spectrum::BLACK),
-                        max_depth: 10,
-                        samples: 1,
-                    },
-                }
-            }
+            "disney" => self.disney(params)?,
             "fourier" | "kdsubsurface" => {
                 let reflectance = self.reflectance(params, "Kd", 0.5)?;
                 params.ignore_all();

@@ -18,6 +18,7 @@ mod lights;
 mod materials;
 mod params;
 mod parser;
+mod principled;
 mod settings;
 mod shapes;
 mod source;

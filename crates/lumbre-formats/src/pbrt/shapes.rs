@@ -424,7 +424,8 @@ impl Converter<'_, '_> {
         if let Some(normals) = &mesh.normals {
             same("N", normals.len())?;
         }
-        mesh.tangents = triples(params, "S", Type::Vector3)?;
+        let tangents = triples(params, "S", Type::Vector3)?;
+        mesh.tangents = tangents.map(|list| list.into_iter().map(|t| t.extend(0.0)).collect());
         if let Some(tangents) = &mesh.tangents {
             same("S", tangents.len())?;
         }
@@ -456,7 +457,7 @@ impl Converter<'_, '_> {
             mesh.face_indices = Some(kept.iter().map(|&i| indices[i] as u32).collect());
         }
         let numbers =
-            [3 * mesh.normals.as_ref().map_or(0, Vec::len), 3 * mesh.tangents.as_ref().map_or(0, Vec::len)];
+            [3 * mesh.normals.as_ref().map_or(0, Vec::len), 4 * mesh.tangents.as_ref().map_or(0, Vec::len)];
         let bytes = 4 * (numbers[0] + numbers[1] + 2 * mesh.uvs.as_ref().map_or(0, Vec::len)) as u64;
         self.budget.bytes(bytes, "vertices").at(params.spot)
     }

@@ -55,7 +55,13 @@ pub fn mesh(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>, quads: Vec<[u32; 4]>
 }
 
 pub fn glow(radiance: f32) -> AreaLightDesc {
-    AreaLightDesc { radiance: Rgb::splat(radiance), image: None, two_sided: false, power: None }
+    AreaLightDesc {
+        radiance: Rgb::splat(radiance),
+        image: None,
+        by_vertices: false,
+        two_sided: false,
+        power: None,
+    }
 }
 
 /// A camera in a right-handed world.

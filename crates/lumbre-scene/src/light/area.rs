@@ -42,7 +42,7 @@ pub(super) fn arriving(
     let front = dressed.surface.normal.dot(towards) < 0.0;
     let emission = entry.emission.as_ref()?;
     let uv = dressed.surface.uv.as_vec2();
-    let mut radiance = emission.at(front, uv);
+    let mut radiance = emission.at(front, uv, dressed.vertex.colour);
     let mut scatter = Scatter::Density(pdf as f32);
     if let Some(alpha) = &entry.alpha {
         if matches!(**alpha, FloatTexture::Constant(0.0)) {

@@ -4,7 +4,7 @@ use lumbre_geometry::{DirectionSample, Ray, Surface, Triangle};
 use lumbre_kernel::TriangleMesh;
 use lumbre_math::distribution::AliasTable;
 use lumbre_math::{DVec2, DVec3, Vec2};
-use lumbre_shading::Scatter;
+use lumbre_shading::{Scatter, Spectrum};
 
 use super::{LightPoint, LightSample, area};
 use crate::Emission;
@@ -117,7 +117,7 @@ impl Facet {
         let point = self.corner + b1 * self.sides[0] + b2 * self.sides[1];
         let arm = point - from;
         let front = outward * self.normal.dot(arm) < 0.0;
-        let radiance = emission.at(front, Vec2::ZERO);
+        let radiance = emission.at(front, Vec2::ZERO, Spectrum::WHITE);
         if radiance.is_black() {
             return None;
         }
