@@ -295,7 +295,13 @@ mod tests {
 
     #[test]
     fn a_studio_lights_what_the_description_wants_lit() {
-        let glow = AreaLightDesc { radiance: Rgb::WHITE, image: None, two_sided: false, power: None };
+        let glow = AreaLightDesc {
+            radiance: Rgb::WHITE,
+            image: None,
+            by_vertices: false,
+            two_sided: false,
+            power: None,
+        };
         let light = |without_light, cameras: Vec<Camera>, lights: Vec<LightDesc>, glows: bool| {
             let mut desc = SceneDesc { cameras, lights, without_light, ..ball() };
             desc.shapes[0].area_light = glows.then(|| glow.clone());
