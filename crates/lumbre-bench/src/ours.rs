@@ -15,6 +15,11 @@ use crate::scene::Scene;
 /// Lumbre, one ray at a time, as it is built by default.
 pub struct Lumbre;
 
+/// Every way in which it takes part.
+pub fn programs() -> Vec<Box<dyn Program>> {
+    vec![Box::new(Lumbre)]
+}
+
 impl Program for Lumbre {
     fn name(&self) -> String {
         format!("Lumbre {}", env!("CARGO_PKG_VERSION"))

@@ -95,18 +95,15 @@ impl Accel {
         self.closest_at(self.level, ray)
     }
 
+    #[inline(always)]
     pub(crate) fn closest_at(&self, level: Level, ray: &Ray) -> Option<Hit> {
-        let mut search = Closest::new(ray, All);
-        traverse::search(level, self, ray, &mut search);
-        search.best
+        traverse::search(level, self, ray, Closest::new(ray, All)).into_hit()
     }
 
     /// The nearest hit that `accept` takes; it may be asked in any order of `t`, and its answer must depend on the hit
     /// alone.
     pub fn closest_filtered(&self, ray: &Ray, accept: impl FnMut(&Hit) -> bool) -> Option<Hit> {
-        let mut search = Closest::new(ray, If(accept));
-        traverse::search(self.level, self, ray, &mut search);
-        search.best
+        traverse::search(self.level, self, ray, Closest::new(ray, If(accept))).into_hit()
     }
 
     /// Whether anything is hit in the ray's range.
@@ -114,29 +111,29 @@ impl Accel {
         self.any_at(self.level, ray)
     }
 
+    #[inline(always)]
     pub(crate) fn any_at(&self, level: Level, ray: &Ray) -> bool {
-        let mut search = Any::new(ray, All);
-        traverse::search(level, self, ray, &mut search);
-        search.is_hit
+        traverse::search(level, self, ray, Any::new(ray, All)).is_hit
     }
 
     /// Whether anything that `accept` takes is hit in the ray's range.
     pub fn any_filtered(&self, ray: &Ray, accept: impl FnMut(&Hit) -> bool) -> bool {
-        let mut search = Any::new(ray, If(accept));
-        traverse::search(self.level, self, ray, &mut search);
-        search.is_hit
+        traverse::search(self.level, self, ray, Any::new(ray, If(accept))).is_hit
     }
 
     /// Every hit in the ray's range in ascending order of `t` (ties by path, geometry, primitive), until `visit` breaks.
     ///
     /// Hits are sought in batches of 32, 128, 512 and so on, so that an early end costs little and memory is at most
     /// proportional to the hits visited.
-    pub fn all(&self, ray: &Ray, mut visit: impl FnMut(&Hit) -> ControlFlow<()>) {
+    pub fn all(&self, ray: &Ray, visit: impl FnMut(&Hit) -> ControlFlow<()>) {
+        self.all_at(self.level, ray, visit);
+    }
+
+    pub(crate) fn all_at(&self, level: Level, ray: &Ray, mut visit: impl FnMut(&Hit) -> ControlFlow<()>) {
         let mut size = 32;
         let mut last = None;
         loop {
-            let mut search = Batch::new(ray, size, last.as_ref());
-            traverse::search(self.level, self, ray, &mut search);
+            let search = traverse::search(level, self, ray, Batch::new(ray, size, last.as_ref()));
             let (mut hits, may_go_on) = search.into_hits();
             if hits.iter().any(|ranked| visit(&ranked.hit).is_break()) || !may_go_on {
                 return;
@@ -148,9 +145,11 @@ impl Accel {
 
     /// How many hits the ray's range holds.
     pub fn count(&self, ray: &Ray) -> usize {
-        let mut search = Count::new(ray);
-        traverse::search(self.level, self, ray, &mut search);
-        search.hits
+        self.count_at(self.level, ray)
+    }
+
+    pub(crate) fn count_at(&self, level: Level, ray: &Ray) -> usize {
+        traverse::search(level, self, ray, Count::new(ray)).hits
     }
 
     /// The surface at a hit of this tree, in the space of this tree. For triangles `uv` are the barycentrics (b1, b2).
@@ -194,11 +193,9 @@ impl Accel {
     }
 
     /// What the corners of a mesh are relative to.
-    #[inline(always)]
     pub(crate) fn mesh_origin(&self, geometry: u32) -> DVec3 {
-        match (self.holds.origin, &self.geometries[geometry as usize].kind) {
-            (Some(origin), _) => origin,
-            (None, GeometryKind::Mesh(mesh)) => mesh.origin,
+        match &self.geometries[geometry as usize].kind {
+            GeometryKind::Mesh(mesh) => mesh.origin,
             _ => unreachable!("blocks are of meshes"),
         }
     }

@@ -4,14 +4,14 @@ use lumbre_geometry::Ray;
 
 use crate::query::{All, Batch, Closest};
 use crate::touch::{Touch, offer_borders_of_all};
-use crate::traverse::{Found, Place, Search, is_sound, meet_kind};
+use crate::traverse::{Found, Place, Search, What, is_sound, meet_primitive};
 use crate::triangles::{Meeting, Shear, intersect};
 use crate::{Accel, GeometryKind, Hit};
 
 pub(crate) fn closest(accel: &Accel, ray: &Ray) -> Option<Hit> {
     let mut search = Closest::new(ray, All);
     visit(accel, ray, &mut search);
-    search.best
+    search.into_hit()
 }
 
 pub(crate) fn every(accel: &Accel, ray: &Ray) -> Vec<Hit> {
@@ -20,7 +20,7 @@ pub(crate) fn every(accel: &Accel, ray: &Ray) -> Vec<Hit> {
     search.into_hits().0.into_iter().map(|ranked| ranked.hit).collect()
 }
 
-fn visit<S: Search>(accel: &Accel, ray: &Ray, search: &mut S) {
+fn visit<'a, S: Search<'a>>(accel: &'a Accel, ray: &Ray, search: &mut S) {
     let mut touches = Vec::new();
     let mut pending = vec![(accel, *ray, Place::default())];
     while let Some((accel, ray, place)) = pending.pop() {
@@ -31,8 +31,8 @@ fn visit<S: Search>(accel: &Accel, ray: &Ray, search: &mut S) {
             let position = position as u32;
             match &geometry.kind {
                 GeometryKind::Mesh(mesh) => {
-                    let shear = Shear::new(ray.direction);
-                    let origin = shear.local_origin(ray.origin, &mesh.origin.to_array());
+                    let shear = Shear::new(&ray.direction);
+                    let origin = shear.local_origin(&ray.origin, &mesh.origin);
                     for (primitive, triangle) in mesh.indices.iter().enumerate() {
                         let corners = triangle.map(|vertex| mesh.positions[vertex as usize].to_array());
                         let [a, b, c] =
@@ -40,16 +40,21 @@ fn visit<S: Search>(accel: &Accel, ray: &Ray, search: &mut S) {
                         if (b - a).cross(c - a) == lumbre_math::DVec3::ZERO {
                             continue;
                         }
+                        let permuted = corners.map(|corner| {
+                            let corner = lumbre_math::Vec3::from_array(corner).as_dvec3();
+                            shear.axes.permute(&corner).map(|x| x as f32)
+                        });
                         let primitive = primitive as u32;
                         let geometry = position;
-                        let root = match intersect(&ray, &shear, &origin, &corners) {
+                        let (root, is_front) = match intersect(&ray, &shear, &origin, &permuted) {
                             Meeting::Miss => continue,
-                            Meeting::Hit(root) => root,
-                            Meeting::Touch { root, is_owned, feature } => {
+                            Meeting::Hit { root, is_front } => (root, is_front),
+                            Meeting::Touch { root, is_owned, feature, is_front } => {
                                 let place = place.clone();
                                 touches.push(Touch {
                                     root,
                                     is_owned,
+                                    is_front,
                                     feature,
                                     corners,
                                     geometry,
@@ -60,10 +65,11 @@ fn visit<S: Search>(accel: &Accel, ray: &Ray, search: &mut S) {
                                 if !is_owned || !ray.contains(root.t) {
                                     continue;
                                 }
-                                root
+                                (root, is_front)
                             }
                         };
-                        search.offer(&Found { root, geometry, primitive, order: 0, accel, place: &place });
+                        let what = What::Named { geometry, primitive };
+                        search.offer(&Found { root, what, order: 0, is_front, accel, place: &place });
                     }
                 }
                 GeometryKind::Instance(instance) => {
@@ -73,11 +79,11 @@ fn visit<S: Search>(accel: &Accel, ray: &Ray, search: &mut S) {
                     pending.push((&instance.accel, ray.into_object(&instance.world_from_object), inner));
                 }
                 GeometryKind::Shape(_) => {
-                    meet_kind(accel, &geometry.kind, &ray, position, 0, &place, search);
+                    meet_primitive(accel, &ray, position, 0, &place, search);
                 }
                 GeometryKind::Custom(custom) => {
                     for primitive in 0..custom.primitive_count() {
-                        meet_kind(accel, &geometry.kind, &ray, position, primitive, &place, search);
+                        meet_primitive(accel, &ray, position, primitive, &place, search);
                     }
                 }
             }

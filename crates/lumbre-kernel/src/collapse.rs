@@ -188,8 +188,8 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// The children of an inner node in the wide tree, the largest first: where any hit will do, it is the likeliest to
-    /// have one.
+    /// The children of an inner node in the wide tree, the largest last: where any hit will do, it is asked first, for it is
+    /// the likeliest to have one.
     #[inline(always)]
     fn gather(self) -> ([Self; WIDTH], usize) {
         let mut found = [self; WIDTH];
@@ -221,7 +221,7 @@ impl<'a> Cursor<'a> {
             // In its place by area.
             let area = cursor.bounds().half_area();
             let mut at = len;
-            while at > 0 && areas[at - 1] < area {
+            while at > 0 && areas[at - 1] > area {
                 (found[at], areas[at]) = (found[at - 1], areas[at - 1]);
                 at -= 1;
             }

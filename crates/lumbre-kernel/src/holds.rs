@@ -9,8 +9,10 @@ use crate::{Geometry, GeometryKind};
 pub(crate) struct Holds {
     /// Whether it holds nothing but triangles.
     pub(crate) only_triangles: bool,
-    /// What the corners of all triangles are relative to; `None` when meshes differ in it, or there are none.
-    pub(crate) origin: Option<DVec3>,
+    /// Whether the corners of all triangles are relative to one origin.
+    pub(crate) has_one_origin: bool,
+    /// That of the first mesh; a NaN where there is none.
+    pub(crate) first_origin: DVec3,
     /// No corner of a triangle has a larger coordinate, relative to its mesh's origin.
     pub(crate) largest_corner: f32,
 }
@@ -22,9 +24,11 @@ impl Holds {
             GeometryKind::Mesh(mesh) => Some(mesh.origin),
             _ => None,
         });
+        let first_origin = origins.next().unwrap_or(DVec3::NAN);
         Self {
             only_triangles: geometries.iter().all(|geometry| matches!(geometry.kind, GeometryKind::Mesh(_))),
-            origin: origins.next().filter(|first| origins.all(|origin| origin == *first)),
+            has_one_origin: origins.all(|origin| origin == first_origin),
+            first_origin,
             largest_corner,
         }
     }

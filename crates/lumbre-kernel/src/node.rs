@@ -3,28 +3,36 @@
 //! # Why no hit is lost
 //!
 //! Everything here happens in the tree's own units: positions relative to the tree's origin, times a power of two, so
-//! that every plane of a box is an f32 `p` with |p| ≤ 1.01. A ray is moved there in f64: its direction is scaled by a
-//! power of two until its largest component lies in [1, 2), and its start is moved along it to the point `o` nearest
-//! to the origin, so that a ray from far away is as precise as one from nearby. `s` counts along that ray, and
-//! `s = t * t_scale - t_shift`.
+//! that every plane of a box is an f32 `p` with |p| ≤ 1.01. A ray is moved there in f64, as `o + s d`, where
+//! `s = t * s_per_t + s_at_zero` is never negative within its range.
+//!
+//! A ray from near the tree stays as it is: `o` is its start, |o| ≤ 16 on each axis, `d` its direction, whose largest
+//! component is between 2⁻²⁰ and 2²⁰, and `s = t`. Of any other ray, the direction is scaled by a power of two until its
+//! largest component lies in [1, 2), and `o` lies a little before the point of the line nearest to the tree's origin, so
+//! that a ray from far away is as precise as one from nearby.
 //!
 //! A hit's point, as the leaf computed it, lies within `slop` (tree units, on each axis) of its box and of the line
 //! `o + s d`, for the f64 arithmetic of leaves, instances and of this set-up is wrong by a few 2⁻⁵³ of the coordinates
 //! that take part; `slop` allows 2⁻⁴⁷ of them times the condition of the transforms, and at least 2⁻⁴⁰.
 //!
 //! On one axis let `R = 1/d > 0` and `p` be the lower plane; the hit has `s ≥ (p - o - slop) R` exactly. We compute
-//! `near = p r + c` with `r = f32(R)`, `|r - R| ≤ u|R|`, u = 2⁻²⁴, and `c ≤ -o R - e`, rounded down. With a fused
-//! multiply-add, `near ≤ p R - o R - e + u|R|(|p| + |p| + |o|)(1 + 4u)`; with a separate product, one `u|R||p|` more.
-//! So `e = |R| (4u (1.01 + |o|) + slop)` makes `near` no greater than the hit's `s`. The same holds mirrored for the far
-//! planes, and for R < 0 with the planes exchanged.
+//! `near = p r + c` with `r = f32(R)`, `|r - R| ≤ u|R|`, u = 2⁻²⁴, and `c = f32(-o R - e)`, wrong by `u|R||o|` and what is
+//! small beside it. With a fused multiply-add, `near ≤ p R - o R - e + u|R|(2|p| + 2|o|)(1 + 4u)`; with a separate
+//! product, one `u|R||p|` more. So `e = |R| (4u (1.01 + |o|) + slop)` makes `near` no greater than the hit's `s`. The same
+//! holds mirrored for the far planes, and for R < 0 with the planes exchanged.
 //!
-//! A component |d| < 2⁻⁶⁰ (zeros of both signs among them) is replaced by ±2⁻⁶⁰: a hit lies within |s| ≤ 4 + slop, where
-//! that moves the line by less than 2⁻⁵⁷ (1 + slop), which `slop` covers as well. So there is no division by zero, no
-//! 0·∞, and no NaN. Where the scaling itself overflows (coordinates beyond 1e±150 of the tree's size), the ray passes
-//! every box: slow, but right.
+//! A component below 2⁻⁶⁰ of the least that the largest may be (zeros of both signs among them) is replaced by that
+//! bound: a hit lies within |s d| ≤ 20 + 12 slop on the largest axis, where that moves the line by less than
+//! 2⁻⁵⁴ (1 + slop), which `slop` covers as well. So there is no division by zero, no 0·∞, and no NaN. Where the scaling
+//! itself overflows (coordinates beyond 1e±150 of the tree's size), the ray passes every box: slow, but right.
+//!
+//! A child that is not there has planes of ±f32::MAX, inside out. Since |c| is far below f32::MAX |r|, every ray enters it
+//! at more than 2¹⁰⁶ and leaves it before zero: it is never met.
 
 use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
+
+use crate::lanes::Sides;
 
 /// What a reference to a child names: three bits of tag, 29 bits of place.
 pub(crate) mod tag {
@@ -75,7 +83,8 @@ pub(crate) const WIDTH: usize = 8;
 pub(crate) struct Node {
     /// Lower and upper x, y and z planes of the boxes: `planes[2 * axis + side]`.
     pub(crate) planes: [[f32; WIDTH]; 6],
-    /// Tagged references; those from `len` on mean nothing.
+    /// Tagged references; those from `len` on mean nothing. The last are the largest: where any hit will do, they are the
+    /// likeliest to have one.
     pub(crate) children: [u32; WIDTH],
     /// How many children there are, in the first lanes.
     pub(crate) len: u32,
@@ -102,34 +111,102 @@ pub(crate) struct Units {
     pub(crate) radius: f64,
     /// How much the arithmetic of transforms in the leaves may enlarge rounding errors; 1 without any.
     pub(crate) condition: f64,
+    /// How far from zero a ray may start on each axis to be one from nearby; negative where none may.
+    pub(crate) near: f64,
+    /// The origin, and a zero.
+    pub(crate) padded_origin: [f64; 4],
+    /// Of rays from nearby: by how much planes are moved, and by how much more for each unit of the ray's start.
+    pub(crate) near_margin: f64,
+    pub(crate) margin_per_distance: f64,
 }
 
+impl Units {
+    pub(crate) fn new(origin: DVec3, scale: f64, radius: f64, condition: f64) -> Self {
+        let reach = 2.0 * origin.abs().max_element() * scale + NEAR + 1.0;
+        let slop = slop(condition, reach);
+        Self {
+            origin,
+            scale,
+            radius,
+            condition,
+            // None where the slop is no number.
+            near: if slop < 1.0 / 65536.0 { NEAR } else { -1.0 },
+            padded_origin: [origin.x, origin.y, origin.z, 0.0],
+            near_margin: 4.0 * ROUNDOFF * LARGEST_PLANE + slop,
+            margin_per_distance: 4.0 * ROUNDOFF,
+        }
+    }
+}
+
+const NEAR: f64 = 16.0;
+/// Of rays from nearby: the bounds on the largest component of the direction, in tree units.
+pub(crate) const SMALLEST_NEAR: f64 = 1.0 / (1u64 << 20) as f64;
+pub(crate) const LARGEST_NEAR: f64 = (1u64 << 20) as f64;
+/// Of rays from nearby: the bound below which a component is replaced.
+pub(crate) const TINY_NEAR: f64 = TINY_DIRECTION * SMALLEST_NEAR;
 const ROUNDOFF: f64 = 1.0 / (1u64 << 24) as f64;
 const TINY_DIRECTION: f64 = 1.0 / (1u64 << 60) as f64;
 /// The bound on |p| that the proof uses.
 const LARGEST_PLANE: f64 = 1.01;
 
+fn slop(condition: f64, reach: f64) -> f64 {
+    f64::from_bits((1023 - 40) << 52) + f64::from_bits((1023 - 47) << 52) * condition * reach
+}
+
 /// A ray in tree units, ready for the boxes.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct BoxRay {
-    pub(crate) inverse: [f32; 3],
-    pub(crate) near_offset: [f32; 3],
-    pub(crate) far_offset: [f32; 3],
-    /// Index into [`Node::planes`] of the planes met first; the others are at that index with its last bit flipped.
-    pub(crate) near_planes: [usize; 3],
+    // The last of four means nothing.
+    pub(crate) inverse: [f32; 4],
+    pub(crate) near_offset: [f32; 4],
+    pub(crate) far_offset: [f32; 4],
+    /// The planes that are met first.
+    pub(crate) sides: Sides,
+    /// Never negative.
     pub(crate) s_min: f32,
     pub(crate) s_max: f32,
-    t_scale: f64,
-    t_shift: f64,
-    // The scaling overflowed: every box is taken.
-    passes_all: bool,
+    pub(crate) progress: Progress,
+}
+
+/// From the `t` of a ray to the `s` in which it is tested against boxes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Progress {
+    s_per_t: f64,
+    s_at_zero: f64,
 }
 
 impl BoxRay {
-    /// The ray for a tree in these units; `None` where it passes by the tree altogether. The ray is finite, and its
-    /// direction is not zero.
+    /// Makes it the ray from `t_min` to `t_max` for a tree in these units, if that is one from nearby, which it answers; also
+    /// checks that the ray is sound.
     #[inline(always)]
-    pub(crate) fn new(units: &Units, ray: &Ray) -> Option<Self> {
+    pub(crate) fn start_nearby(&mut self, units: &Units, ray: &Ray, t_min: f64, t_max: f64) -> bool {
+        let start = ((ray.origin - units.origin) * units.scale).to_array();
+        let direction = (ray.direction * units.scale).to_array();
+        // Every comparison with a NaN is false.
+        let fits = |axis: usize| start[axis].abs() <= units.near && direction[axis].abs() <= LARGEST_NEAR;
+        let is_long = |axis: usize| direction[axis].abs() >= SMALLEST_NEAR;
+        let is_near = fits(0) && fits(1) && fits(2) && (is_long(0) || is_long(1) || is_long(2));
+        if !(is_near && 0.0 <= t_min && t_min <= t_max) {
+            return false;
+        }
+        self.set_slabs(start, direction, TINY_NEAR, units.margin_per_distance, units.near_margin);
+        self.set_range_nearby(t_min, t_max);
+        true
+    }
+
+    /// The range of a ray from nearby.
+    #[inline(always)]
+    pub(crate) fn set_range_nearby(&mut self, t_min: f64, t_max: f64) {
+        self.progress = Progress { s_per_t: 1.0, s_at_zero: 0.0 };
+        self.s_min = self.progress.down(t_min);
+        self.s_max = self.progress.up(t_max);
+    }
+
+    /// Makes it the ray from `t_min` to `t_max` for a tree in these units, from wherever; false where it passes by the tree
+    /// altogether. The ray is finite, and its direction is not zero.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn start_anywhere(&mut self, units: &Units, ray: &Ray, t_min: f64, t_max: f64) -> bool {
         // Powers of two near the limits of the exponent go in two steps.
         let largest = ray.direction.abs().max_element();
         let step = if largest < f64::from_bits(100 << 52) {
@@ -142,78 +219,95 @@ impl BoxRay {
         let exponent = (largest * step).to_bits() >> 52;
         let normaliser = f64::from_bits((2046 - exponent) << 52);
         let direction = ray.direction * step * normaliser;
-        let t_scale = units.scale / step / normaliser;
+        let s_per_t = units.scale / step / normaliser;
 
         let start = (ray.origin - units.origin) * units.scale;
-        let t_shift = -start.dot(direction) / direction.length_squared();
-        let anchor = start + t_shift * direction;
+        let to_middle = -start.dot(direction) / direction.length_squared();
+        let middle = start + to_middle * direction;
         let reach = (ray.origin.abs() + units.origin.abs()).max_element() * units.scale + 1.0;
-        let slop =
-            f64::from_bits((1023 - 40) << 52) + f64::from_bits((1023 - 47) << 52) * units.condition * reach;
+        let slop = slop(units.condition, reach);
 
-        let distance_squared = anchor.length_squared();
-        let fits = t_scale.is_normal() && slop < 1e6 && distance_squared.is_finite();
+        let distance_squared = middle.length_squared();
+        let fits = s_per_t.is_normal() && slop < 1e6 && distance_squared.is_finite();
         if !fits {
-            return Some(Self::passing_all());
+            *self = Self::passing_all();
+            return true;
         }
         let reach = 1.001 * units.radius + 4.0 * slop;
         if distance_squared > reach * reach {
-            return None;
+            return false;
         }
-
-        let mut boxes = Self { t_scale, t_shift, passes_all: false, ..Self::passing_all() };
-        for axis in 0..3 {
-            let d = direction[axis];
-            let d = if d.abs() < TINY_DIRECTION { TINY_DIRECTION.copysign(d) } else { d };
-            let inverse = 1.0 / d;
-            let o = anchor[axis];
-            let center = -o * inverse;
-            let margin = inverse.abs() * (4.0 * ROUNDOFF * (LARGEST_PLANE + o.abs()) + slop);
-            boxes.inverse[axis] = inverse as f32;
-            boxes.near_offset[axis] = round_down(center - margin);
-            boxes.far_offset[axis] = round_up(center + margin);
-            boxes.near_planes[axis] = 2 * axis + usize::from(d < 0.0);
-        }
-        boxes.s_min = round_down(ray.t_min * t_scale - t_shift);
-        boxes.s_max = round_up(ray.t_max * t_scale - t_shift);
-        Some(boxes)
+        // Hits lie within |p| ≤ 1.75 + 1.75 slop of the origin, and no farther than that from the middle.
+        let back = 2.0 + 4.0 * slop;
+        let start = middle - back * direction;
+        let margin = 4.0 * ROUNDOFF * LARGEST_PLANE + slop;
+        self.set_slabs(start.to_array(), direction.to_array(), TINY_DIRECTION, 4.0 * ROUNDOFF, margin);
+        self.progress = Progress { s_per_t, s_at_zero: back - to_middle };
+        self.s_min = self.progress.down(t_min);
+        self.s_max = self.progress.up(t_max);
+        true
     }
 
+    /// What meets every box, and ends nowhere.
     pub(crate) fn passing_all() -> Self {
+        // Less than f32::MAX times the inverse, so that missing children stay missed.
+        let far = f32::MAX * f32::EPSILON;
         Self {
-            inverse: [0.0; 3],
-            near_offset: [f32::NEG_INFINITY; 3],
-            far_offset: [f32::INFINITY; 3],
-            near_planes: [0, 2, 4],
-            s_min: f32::NEG_INFINITY,
+            inverse: [1.0; 4],
+            near_offset: [-far; 4],
+            far_offset: [far; 4],
+            sides: Sides::new(0),
+            s_min: 0.0,
             s_max: f32::INFINITY,
-            t_scale: 1.0,
-            t_shift: 0.0,
-            passes_all: true,
+            progress: Progress { s_per_t: 1.0, s_at_zero: f64::INFINITY },
         }
     }
 
-    /// Leaves out what lies wholly beyond `t`.
+    /// Inverse direction, offsets and sides: see the proof. `margin` is 4u · 1.01 + slop.
     #[inline(always)]
-    pub(crate) fn end_at(&mut self, t: f64) {
-        if !self.passes_all {
-            self.s_max = round_up(t * self.t_scale - self.t_shift);
+    fn set_slabs(
+        &mut self,
+        start: [f64; 3],
+        direction: [f64; 3],
+        tiny: f64,
+        margin_per_distance: f64,
+        margin: f64,
+    ) {
+        let mut signs = 0;
+        for axis in 0..3 {
+            let (o, d) = (start[axis], direction[axis]);
+            let d = if d.abs() < tiny { tiny.copysign(d) } else { d };
+            let inverse = 1.0 / d;
+            let center = -o * inverse;
+            let margin = inverse.abs() * (margin_per_distance * o.abs() + margin);
+            self.inverse[axis] = inverse as f32;
+            self.near_offset[axis] = (center - margin) as f32;
+            self.far_offset[axis] = (center + margin) as f32;
+            signs |= u32::from(d.is_sign_negative()) << axis;
         }
-    }
-
-    /// Leaves out what lies wholly before `t`.
-    #[inline(always)]
-    pub(crate) fn start_at(&mut self, t: f64) {
-        if !self.passes_all {
-            self.s_min = round_down(t * self.t_scale - self.t_shift);
-        }
+        self.sides = Sides::new(signs);
     }
 }
 
-/// An f32 no greater than `x`.
-#[inline(always)]
-pub(crate) fn round_down(x: f64) -> f32 {
-    (x as f32).next_down()
+/// A little that is neither zero nor subnormal as an f32.
+const LITTLE: f64 = 1.0 / (1u128 << 100) as f64;
+
+impl Progress {
+    /// Where `t` is, or a little more; never negative. What rounding to single precision may take away was added before.
+    #[inline(always)]
+    pub(crate) fn up(&self, t: f64) -> f32 {
+        let s = t * self.s_per_t + self.s_at_zero;
+        let above = s + s * (2.0 * ROUNDOFF) + LITTLE;
+        (if above > 0.0 { above } else { 0.0 }) as f32
+    }
+
+    /// Where `t` is, or a little less; 0 where that is negative.
+    #[inline(always)]
+    pub(crate) fn down(&self, t: f64) -> f32 {
+        let s = t * self.s_per_t + self.s_at_zero;
+        let below = s - s * (2.0 * ROUNDOFF) - LITTLE;
+        (if below > 0.0 { below } else { 0.0 }) as f32
+    }
 }
 
 /// An f32 no smaller than `x`.

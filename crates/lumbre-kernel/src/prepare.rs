@@ -345,7 +345,7 @@ fn units_of(geometries: &[Geometry], parts: &Parts) -> Units {
         }
         _ => worst,
     });
-    Units { origin, scale, radius: (half * scale).length(), condition }
+    Units::new(origin, scale, (half * scale).length(), condition)
 }
 
 /// About the middle of the box: where that is near enough, what is as far from the first mesh's origin as a single precision

@@ -3,29 +3,29 @@
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-use lumbre_geometry::Ray;
+use lumbre_geometry::{Ray, Root};
 
-use crate::traverse::{Ask, Found, Search};
-use crate::{Hit, InstancePath};
+use crate::stack::{AsBuilt, ByDistance};
+use crate::traverse::{Ask, Found, Place, Search, What};
+use crate::{Accel, Hit, InstancePath};
 
-impl Found<'_> {
+impl Found<'_, '_> {
     #[inline]
     fn to_hit(&self) -> Hit {
-        Hit {
-            root: self.root,
-            id: self.accel.geometries[self.geometry as usize].id,
-            primitive: self.primitive,
-            geometry: self.geometry,
-            instances: copied(&self.place.ids),
-            route: copied(&self.place.route),
-        }
+        to_hit(self.root, self.what, self.accel, self.place)
     }
+}
 
-    /// The order of hits: by t, then by where they are in the lists.
-    fn order(&self, hit: &Hit) -> Ordering {
-        by_t(self.root.t, hit.root.t)
-            .then_with(|| self.place.route.cmp(&hit.route))
-            .then_with(|| (self.geometry, self.primitive).cmp(&(hit.geometry, hit.primitive)))
+#[inline(always)]
+fn to_hit(root: Root, what: What, accel: &Accel, place: &Place) -> Hit {
+    let (geometry, primitive) = what.names(accel);
+    Hit {
+        root,
+        id: accel.geometries[geometry as usize].id,
+        primitive,
+        geometry,
+        instances: copied(&place.ids),
+        route: copied(&place.route),
     }
 }
 
@@ -45,7 +45,7 @@ pub(crate) trait Filter {
     /// Whether it takes everything, so that nothing has to be asked.
     const TAKES_ALL: bool;
     /// Whether it takes this.
-    fn takes(&mut self, hit: &Hit) -> bool;
+    fn takes(&mut self, found: &Found) -> bool;
 }
 
 /// Takes everything.
@@ -54,7 +54,7 @@ pub(crate) struct All;
 impl Filter for All {
     const TAKES_ALL: bool = true;
     #[inline(always)]
-    fn takes(&mut self, _: &Hit) -> bool {
+    fn takes(&mut self, _: &Found) -> bool {
         true
     }
 }
@@ -64,29 +64,54 @@ pub(crate) struct If<F>(pub(crate) F);
 
 impl<F: FnMut(&Hit) -> bool> Filter for If<F> {
     const TAKES_ALL: bool = false;
-    fn takes(&mut self, hit: &Hit) -> bool {
-        (self.0)(hit)
+    fn takes(&mut self, found: &Found) -> bool {
+        (self.0)(&found.to_hit())
     }
 }
 
 /// The nearest hit.
-pub(crate) struct Closest<F> {
-    pub(crate) best: Option<Hit>,
+pub(crate) struct Closest<'a, F> {
+    best: Option<Best<'a>>,
+    // Of the best.
+    place: Place,
     limit: f64,
     floor: f64,
     filter: F,
 }
 
-impl<F> Closest<F> {
+/// As little as the winner can be told by.
+struct Best<'a> {
+    root: Root,
+    what: What,
+    accel: &'a Accel,
+}
+
+impl<'a, F> Closest<'a, F> {
     #[inline(always)]
     pub(crate) fn new(ray: &Ray, filter: F) -> Self {
-        Self { best: None, limit: ray.t_max, floor: ray.t_min, filter }
+        Self { best: None, place: Place::default(), limit: ray.t_max, floor: ray.t_min, filter }
+    }
+
+    #[inline(always)]
+    pub(crate) fn into_hit(self) -> Option<Hit> {
+        let Best { root, what, accel } = self.best?;
+        Some(to_hit(root, what, accel, &self.place))
+    }
+
+    /// Whether a crossing at the same `t` comes first in the lists.
+    #[cold]
+    #[inline(never)]
+    fn comes_first(&self, found: &Found, best: &Best) -> bool {
+        let names = |what: What, accel: &Accel| what.names(accel);
+        let order = found.place.route.cmp(&self.place.route);
+        order.then_with(|| names(found.what, found.accel).cmp(&names(best.what, best.accel)))
+            == Ordering::Less
     }
 }
 
-impl<F: Filter> Search for Closest<F> {
+impl<'a, F: Filter> Search<'a> for Closest<'a, F> {
     const ASK: Ask = if F::TAKES_ALL { Ask::First } else { Ask::Every };
-    const ORDERED: bool = true;
+    type Order = ByDistance;
 
     #[inline(always)]
     fn limit(&self) -> f64 {
@@ -99,19 +124,23 @@ impl<F: Filter> Search for Closest<F> {
     }
 
     #[inline(always)]
-    fn offer(&mut self, found: &Found) -> bool {
-        if found.root.t > self.limit {
+    fn offer(&mut self, found: &Found<'a, '_>) -> bool {
+        let t = found.root.t;
+        if t > self.limit {
             return false;
         }
-        if let Some(best) = &self.best
-            && found.order(best) != Ordering::Less
+        if t == self.limit
+            && let Some(best) = &self.best
+            && !self.comes_first(found, best)
         {
             return false;
         }
-        let hit = found.to_hit();
-        if F::TAKES_ALL || self.filter.takes(&hit) {
-            self.limit = hit.root.t;
-            self.best = Some(hit);
+        if F::TAKES_ALL || self.filter.takes(found) {
+            self.limit = t;
+            self.best = Some(Best { root: found.root, what: found.what, accel: found.accel });
+            if !(found.place.route.is_empty() && self.place.route.is_empty()) {
+                self.place.clone_from(found.place);
+            }
         }
         false
     }
@@ -132,9 +161,9 @@ impl<F> Any<F> {
     }
 }
 
-impl<F: Filter> Search for Any<F> {
+impl<'a, F: Filter> Search<'a> for Any<F> {
     const ASK: Ask = if F::TAKES_ALL { Ask::Whether } else { Ask::Every };
-    const ORDERED: bool = false;
+    type Order = AsBuilt;
 
     #[inline(always)]
     fn limit(&self) -> f64 {
@@ -147,8 +176,8 @@ impl<F: Filter> Search for Any<F> {
     }
 
     #[inline(always)]
-    fn offer(&mut self, found: &Found) -> bool {
-        self.is_hit = F::TAKES_ALL || self.filter.takes(&found.to_hit());
+    fn offer(&mut self, found: &Found<'a, '_>) -> bool {
+        self.is_hit = F::TAKES_ALL || self.filter.takes(found);
         self.is_hit
     }
 
@@ -171,9 +200,9 @@ impl Count {
     }
 }
 
-impl Search for Count {
+impl Search<'_> for Count {
     const ASK: Ask = Ask::Every;
-    const ORDERED: bool = false;
+    type Order = AsBuilt;
 
     fn limit(&self) -> f64 {
         self.limit
@@ -183,7 +212,7 @@ impl Search for Count {
         self.floor
     }
 
-    fn offer(&mut self, _: &Found) -> bool {
+    fn offer(&mut self, _: &Found<'_, '_>) -> bool {
         self.hits += 1;
         false
     }
@@ -244,9 +273,9 @@ impl<'a> Batch<'a> {
     }
 }
 
-impl Search for Batch<'_> {
+impl Search<'_> for Batch<'_> {
     const ASK: Ask = Ask::Every;
-    const ORDERED: bool = true;
+    type Order = ByDistance;
 
     fn limit(&self) -> f64 {
         self.limit
@@ -256,7 +285,7 @@ impl Search for Batch<'_> {
         self.floor
     }
 
-    fn offer(&mut self, found: &Found) -> bool {
+    fn offer(&mut self, found: &Found<'_, '_>) -> bool {
         let t = found.root.t;
         if t < self.floor || self.limit < t {
             return false;

@@ -1,6 +1,7 @@
 //! The stack of a search: a short array, and the heap for what no longer fits.
 
-use crate::lanes::Slots;
+use crate::lanes::{Lanes, Slots};
+use crate::node::Node;
 
 /// Entries in the array: a power of two, many more than a search usually has.
 pub(crate) const STACK: usize = 128;
@@ -11,14 +12,82 @@ pub(crate) fn stack_entry(key: i32, reference: u32) -> i64 {
     (i64::from(key) << 32) | i64::from(reference)
 }
 
-/// Last in, first out.
-pub(crate) struct Stack {
-    slots: Slots,
-    // The ones below them.
-    spilled: Vec<i64>,
+/// In which order a search takes the children of a node.
+pub(crate) trait Order {
+    /// What stands on the stack.
+    type Entry: Copy;
+    /// An entry that is never left out.
+    fn entry(reference: u32) -> Self::Entry;
+    /// What it refers to.
+    fn reference(entry: Self::Entry) -> u32;
+    /// Whether it lies wholly beyond the limit.
+    fn is_beyond(entry: Self::Entry, limit_key: i32) -> bool;
+    /// Puts the children in `mask`, two or more, onto the stack but for the first to be taken, which it answers.
+    fn push_children<L: Lanes>(node: &Node, mask: u32, keys: L::Keys, slots: &mut Slots<Self::Entry>) -> u32;
 }
 
-impl Stack {
+/// The nearest first.
+pub(crate) enum ByDistance {}
+
+impl Order for ByDistance {
+    type Entry = i64;
+
+    #[inline(always)]
+    fn entry(reference: u32) -> i64 {
+        stack_entry(i32::MIN, reference)
+    }
+
+    #[inline(always)]
+    fn reference(entry: i64) -> u32 {
+        entry as u32
+    }
+
+    #[inline(always)]
+    fn is_beyond(entry: i64, limit_key: i32) -> bool {
+        (entry >> 32) as i32 > limit_key
+    }
+
+    #[inline(always)]
+    fn push_children<L: Lanes>(node: &Node, mask: u32, keys: L::Keys, slots: &mut Slots<i64>) -> u32 {
+        L::push_by_distance(node, mask, keys, slots)
+    }
+}
+
+/// The largest first, wherever they are.
+pub(crate) enum AsBuilt {}
+
+impl Order for AsBuilt {
+    type Entry = u32;
+
+    #[inline(always)]
+    fn entry(reference: u32) -> u32 {
+        reference
+    }
+
+    #[inline(always)]
+    fn reference(entry: u32) -> u32 {
+        entry
+    }
+
+    #[inline(always)]
+    fn is_beyond(_: u32, _: i32) -> bool {
+        false
+    }
+
+    #[inline(always)]
+    fn push_children<L: Lanes>(node: &Node, mask: u32, _: L::Keys, slots: &mut Slots<u32>) -> u32 {
+        L::push_as_built(node, mask, slots)
+    }
+}
+
+/// Last in, first out.
+pub(crate) struct Stack<E> {
+    slots: Slots<E>,
+    // The ones below them.
+    spilled: Vec<E>,
+}
+
+impl<E: Copy> Stack<E> {
     #[inline(always)]
     pub(crate) fn new() -> Self {
         Self { slots: Slots::new(), spilled: Vec::new() }
@@ -26,7 +95,7 @@ impl Stack {
 
     /// Somewhere for eight more.
     #[inline(always)]
-    pub(crate) fn with_room(&mut self) -> &mut Slots {
+    pub(crate) fn with_room(&mut self) -> &mut Slots<E> {
         if self.slots.len() > STACK - 8 {
             self.spill();
         }
@@ -34,13 +103,17 @@ impl Stack {
     }
 
     #[inline(always)]
-    pub(crate) fn push(&mut self, entry: i64) {
+    pub(crate) fn push(&mut self, entry: E) {
         self.with_room().push(entry);
     }
 
     #[inline(always)]
-    pub(crate) fn pop(&mut self) -> Option<i64> {
-        self.slots.pop().or_else(|| self.pop_spilled())
+    pub(crate) fn pop(&mut self) -> Option<E> {
+        match self.slots.pop() {
+            Some(entry) => Some(entry),
+            None if self.spilled.is_empty() => None,
+            None => self.pop_spilled(),
+        }
     }
 
     #[cold]
@@ -55,7 +128,7 @@ impl Stack {
 
     #[cold]
     #[inline(never)]
-    fn pop_spilled(&mut self) -> Option<i64> {
+    fn pop_spilled(&mut self) -> Option<E> {
         let count = self.spilled.len().min(STACK / 2);
         let rest = self.spilled.len() - count;
         for &entry in &self.spilled[rest..] {

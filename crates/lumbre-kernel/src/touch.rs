@@ -12,7 +12,8 @@ use lumbre_geometry::{Ray, Root};
 
 use crate::Accel;
 use crate::lanes::Level;
-use crate::traverse::{self, Ask, Found, Place, Search};
+use crate::stack::AsBuilt;
+use crate::traverse::{self, Ask, Found, Place, Search, What};
 
 /// Where a ray meets a triangle that it touches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,12 +33,21 @@ pub(crate) struct Touch<'a> {
     pub(crate) root: Root,
     /// Whether the rule for zeros gives the crossing to this triangle, so that it was offered already.
     pub(crate) is_owned: bool,
+    pub(crate) is_front: bool,
     pub(crate) feature: Feature,
     pub(crate) corners: [[f32; 3]; 3],
     pub(crate) geometry: u32,
     pub(crate) primitive: u32,
     pub(crate) accel: &'a Accel,
     pub(crate) place: Place,
+}
+
+impl<'a> Touch<'a> {
+    fn found(&self) -> Found<'a, '_> {
+        let Self { root, is_front, geometry, primitive, accel, ref place, .. } = *self;
+        let what = What::Named { geometry, primitive };
+        Found { root, what, order: 0, is_front, accel, place }
+    }
 }
 
 /// A corner by position; the two zeros are one.
@@ -112,7 +122,13 @@ fn at_borders(touches: &[Touch]) -> Vec<usize> {
 /// Offers what lies at borders, once the search has met `touches`.
 #[cold]
 #[inline(never)]
-pub(crate) fn offer_borders<S: Search>(accel: &Accel, ray: &Ray, touches: &[Touch], search: &mut S) {
+pub(crate) fn offer_borders<'a, S: Search<'a>>(
+    level: Level,
+    accel: &'a Accel,
+    ray: &Ray,
+    touches: &[Touch<'a>],
+    search: &mut S,
+) {
     let matters = |touch: &Touch, search: &S| {
         let t = touch.root.t;
         !touch.is_owned && ray.contains(t) && search.floor() <= t && t <= search.limit()
@@ -122,14 +138,9 @@ pub(crate) fn offer_borders<S: Search>(accel: &Accel, ray: &Ray, touches: &[Touc
         return;
     }
     // A part of the neighbours may lie beyond what was searched.
-    let mut all = AllTouches::default();
-    traverse::search_touches(Level::best(), accel, ray, &mut all);
-    for i in at_borders(&all.touches) {
-        let touch = &all.touches[i];
-        let Touch { root, geometry, primitive, accel, ref place, .. } = *touch;
-        if matters(touch, search)
-            && search.offer(&Found { root, geometry, primitive, order: 0, accel, place })
-        {
+    let all = traverse::all_touches(level, accel, ray);
+    for i in at_borders(&all) {
+        if matters(&all[i], search) && search.offer(&all[i].found()) {
             return;
         }
     }
@@ -137,24 +148,20 @@ pub(crate) fn offer_borders<S: Search>(accel: &Accel, ray: &Ray, touches: &[Touc
 
 /// The same for a loop over everything, which has met all touches.
 #[cfg(test)]
-pub(crate) fn offer_borders_of_all<S: Search>(ray: &Ray, touches: &[Touch], search: &mut S) {
+pub(crate) fn offer_borders_of_all<'a, S: Search<'a>>(ray: &Ray, touches: &[Touch<'a>], search: &mut S) {
     for i in at_borders(touches) {
-        let Touch { root, geometry, primitive, accel, ref place, .. } = touches[i];
-        if ray.contains(root.t) {
-            search.offer(&Found { root, geometry, primitive, order: 0, accel, place });
+        if ray.contains(touches[i].root.t) {
+            search.offer(&touches[i].found());
         }
     }
 }
 
 /// Looks along the whole line for touches alone.
-#[derive(Default)]
-pub(crate) struct AllTouches<'a> {
-    pub(crate) touches: Vec<Touch<'a>>,
-}
+pub(crate) struct AllTouches;
 
-impl Search for AllTouches<'_> {
+impl Search<'_> for AllTouches {
     const ASK: Ask = Ask::Nothing;
-    const ORDERED: bool = false;
+    type Order = AsBuilt;
 
     fn limit(&self) -> f64 {
         f64::INFINITY
@@ -164,7 +171,7 @@ impl Search for AllTouches<'_> {
         f64::NEG_INFINITY
     }
 
-    fn offer(&mut self, _: &Found) -> bool {
+    fn offer(&mut self, _: &Found<'_, '_>) -> bool {
         false
     }
 }

@@ -4,15 +4,19 @@
 //! What a query answers never depends on the order of the visit: the tests in leaves are given the ray's own range and
 //! not the part still of interest, so that a root has the same bits whenever it is found, and ties have an order.
 
+use std::borrow::Borrow;
+use std::marker::PhantomData;
+
 use lumbre_geometry::{Ray, Root, Roots};
+use lumbre_math::DVec3;
 use smallvec::SmallVec;
 
 use crate::collapse::Entry;
-use crate::lanes::{LANE_BITS, Lanes, Level, Task, key};
-use crate::node::{BoxRay, WIDTH, tag};
-use crate::stack::{Stack, stack_entry};
+use crate::lanes::{LANE_BITS, Lanes, Level, Task};
+use crate::node::{BoxRay, tag};
+use crate::stack::{Order, Stack};
 use crate::touch::{self, AllTouches, Touch};
-use crate::triangles::{self, BLOCK, Meeting, Shear};
+use crate::triangles::{self, BLOCK, BlockRay, Meeting, Shear};
 use crate::{Accel, GeometryKind, InstancePath};
 
 /// What a search asks of a primitive that may be crossed more than once.
@@ -29,11 +33,11 @@ pub(crate) enum Ask {
 }
 
 /// A query: what it takes, and when it has enough.
-pub(crate) trait Search {
+pub(crate) trait Search<'a> {
     /// What it needs to know.
     const ASK: Ask;
-    /// Whether nearer boxes are to come first.
-    const ORDERED: bool;
+    /// Which boxes are to come first.
+    type Order: Order;
 
     /// The largest `t` that it still wants; never grows.
     fn limit(&self) -> f64;
@@ -42,22 +46,46 @@ pub(crate) trait Search {
     fn floor(&self) -> f64;
 
     /// Takes a crossing; true ends the search.
-    fn offer(&mut self, found: &Found) -> bool;
+    fn offer(&mut self, found: &Found<'a, '_>) -> bool;
 
-    /// Takes the news that there is a crossing, which ends the search. Only when it asks [`Ask::Whether`].
+    /// Takes the news that there is a crossing, which ends the search. Only where it asks [`Ask::Whether`].
     fn settle(&mut self) {}
 }
 
 /// A crossing on offer.
-pub(crate) struct Found<'a> {
+pub(crate) struct Found<'a, 'p> {
     pub(crate) root: Root,
-    pub(crate) geometry: u32,
-    pub(crate) primitive: u32,
+    pub(crate) what: What,
     /// Which of the primitive's crossings.
     pub(crate) order: u32,
+    /// Whether the front of a triangle is met.
+    pub(crate) is_front: bool,
     /// The tree that the geometry stands in.
     pub(crate) accel: &'a Accel,
-    pub(crate) place: &'a Place,
+    pub(crate) place: &'p Place,
+}
+
+/// What is crossed.
+#[derive(Clone, Copy)]
+pub(crate) enum What {
+    /// The triangle in a lane of a block, whose name is looked up when it is wanted.
+    Lane { block: u32, lane: u32 },
+    /// A primitive by its names.
+    Named { geometry: u32, primitive: u32 },
+}
+
+impl What {
+    /// Geometry and primitive.
+    #[inline(always)]
+    pub(crate) fn names(self, accel: &Accel) -> (u32, u32) {
+        match self {
+            Self::Lane { block, lane } => {
+                let names = &accel.tree.names[block as usize];
+                (names.geometry, names.primitives[lane as usize % BLOCK])
+            }
+            Self::Named { geometry, primitive } => (geometry, primitive),
+        }
+    }
 }
 
 /// The instances that a search is within.
@@ -77,27 +105,133 @@ pub(crate) fn is_sound(ray: &Ray) -> bool {
         && ray.t_min <= ray.t_max
 }
 
-/// Runs `search` along `ray`, whose answers it keeps.
+/// Runs `search` along `ray`, and answers it with what it has found.
 #[inline(always)]
-pub(crate) fn search<S: Search>(level: Level, accel: &Accel, ray: &Ray, search: &mut S) {
-    if is_sound(ray) {
-        let mut touches = Vec::new();
-        let is_over = level.run(Traversal { accel, ray, search, touches: &mut touches });
-        if !is_over && !touches.is_empty() {
-            touch::offer_borders(accel, ray, &touches, search);
+pub(crate) fn search<'a, S: Search<'a>>(level: Level, accel: &'a Accel, ray: &Ray, mut search: S) -> S {
+    let mut touches = Vec::new();
+    let is_over = if accel.holds.only_triangles {
+        level.run(AmongTriangles { accel, ray, search: &mut search, touches: &mut touches })
+    } else {
+        level.run(AmongAll { accel, ray, search: &mut search, touches: &mut touches })
+    };
+    if !is_over && !touches.is_empty() {
+        touch::offer_borders(level, accel, ray, &touches, &mut search);
+    }
+    search
+}
+
+/// Collects what the whole line touches.
+pub(crate) fn all_touches<'a>(level: Level, accel: &'a Accel, ray: &Ray) -> Vec<Touch<'a>> {
+    let line = ray.with_range(f64::NEG_INFINITY, f64::INFINITY);
+    let mut touches = Vec::new();
+    level.run(AmongAll { accel, ray: &line, search: &mut AllTouches, touches: &mut touches });
+    touches
+}
+
+/// A tree in progress, with the ray in its space.
+struct Frame<'a, R, L> {
+    accel: &'a Accel,
+    ray: R,
+    boxes: BoxRay,
+    /// No box ahead of this key is of interest.
+    limit_key: i32,
+    limit: f64,
+    floor: f64,
+    mesh: MeshRay,
+    lanes: PhantomData<L>,
+}
+
+/// The ray for the triangles of one mesh, or of some with one origin.
+struct MeshRay {
+    shear: Shear,
+    /// Relative to the mesh's.
+    origin: [f64; 3],
+    blocks: BlockRay,
+}
+
+impl MeshRay {
+    #[inline(always)]
+    fn new(shear: Shear, ray: &Ray, mesh_origin: &DVec3, largest_corner: f32) -> Self {
+        let origin = shear.local_origin(&ray.origin, mesh_origin);
+        Self { shear, origin, blocks: BlockRay::new(&shear, &origin, largest_corner) }
+    }
+}
+
+/// Makes `boxes` the ray for the boxes of a tree, as far as the search wants it; false where it passes the tree by or is not
+/// sound.
+#[inline(always)]
+fn start<'a, L: Lanes, S: Search<'a>>(accel: &Accel, ray: &Ray, search: &S, boxes: &mut BoxRay) -> bool {
+    let (floor, limit) = (search.floor(), search.limit());
+    L::start_nearby(&accel.units, ray, floor, limit, boxes)
+        || (is_sound(ray) && boxes.start_anywhere(&accel.units, ray, floor, limit))
+}
+
+impl<'a, R: Borrow<Ray>, L: Lanes> Frame<'a, R, L> {
+    #[inline(always)]
+    fn new<S: Search<'a>>(accel: &'a Accel, ray: R, boxes: BoxRay, search: &S) -> Self {
+        let (limit, floor) = (search.limit(), search.floor());
+        let shear = Shear::new(&ray.borrow().direction);
+        let mut mesh =
+            MeshRay::new(shear, ray.borrow(), &accel.holds.first_origin, accel.holds.largest_corner);
+        mesh.blocks.set_range(&mesh.shear, floor, limit);
+        let limit_key = boxes.s_max.to_bits() as i32 | LANE_BITS;
+        Self { accel, ray, boxes, limit_key, limit, floor, mesh, lanes: PhantomData }
+    }
+
+    /// Takes over what the search has found since.
+    #[inline(always)]
+    fn narrow<S: Search<'a>>(&mut self, search: &S) {
+        let limit = search.limit();
+        if limit < self.limit {
+            self.limit = limit;
+            self.boxes.s_max = self.boxes.progress.up(limit);
+            self.limit_key = self.boxes.s_max.to_bits() as i32 | LANE_BITS;
+            self.mesh.blocks.set_range(&self.mesh.shear, self.floor, limit);
+        }
+    }
+
+    /// Turns to the mesh of a block, where meshes have different origins.
+    #[inline(always)]
+    fn turn_to(&mut self, block: usize) {
+        if !self.accel.holds.has_one_origin {
+            let mesh_origin = self.accel.mesh_origin(self.accel.tree.names[block].geometry);
+            let largest = self.accel.holds.largest_corner;
+            self.mesh = MeshRay::new(self.mesh.shear, self.ray.borrow(), &mesh_origin, largest);
+            self.mesh.blocks.set_range(&self.mesh.shear, self.floor, self.limit);
+        }
+    }
+
+    /// Goes down from a node to a leaf; `None` when there is none left.
+    #[inline(always)]
+    fn descend<O: Order>(&self, mut reference: u32, stack: &mut Stack<O::Entry>) -> Option<u32> {
+        while reference >> tag::SHIFT == tag::INNER {
+            let node = &self.accel.tree.nodes[reference as usize];
+            let (mask, keys) = L::meet_boxes(node, &self.boxes);
+            reference = if mask & mask.wrapping_sub(1) != 0 {
+                O::push_children::<L>(node, mask, keys, stack.with_room())
+            } else if mask != 0 {
+                L::only_child(node, mask)
+            } else {
+                self.pop::<O>(stack)?
+            };
+        }
+        Some(reference)
+    }
+
+    /// The next that is not beyond the limit.
+    #[inline(always)]
+    fn pop<O: Order>(&self, stack: &mut Stack<O::Entry>) -> Option<u32> {
+        loop {
+            let entry = stack.pop()?;
+            if !O::is_beyond(entry, self.limit_key) {
+                return Some(O::reference(entry));
+            }
         }
     }
 }
 
-/// Collects what the whole line touches.
-pub(crate) fn search_touches<'a>(level: Level, accel: &'a Accel, ray: &Ray, search: &mut AllTouches<'a>) {
-    let line = ray.with_range(f64::NEG_INFINITY, f64::INFINITY);
-    let mut touches = Vec::new();
-    level.run(Traversal { accel, ray: &line, search, touches: &mut touches });
-    search.touches = touches;
-}
-
-struct Traversal<'a, 's, S> {
+/// A search through a tree of nothing but triangles.
+struct AmongTriangles<'a, 's, S> {
     accel: &'a Accel,
     ray: &'s Ray,
     search: &'s mut S,
@@ -105,99 +239,67 @@ struct Traversal<'a, 's, S> {
     touches: &'s mut Vec<Touch<'a>>,
 }
 
-/// A tree in progress, with the ray in its space.
-struct Frame<'a> {
-    accel: &'a Accel,
-    ray: Ray,
-    shear: Shear,
-    boxes: BoxRay,
-    /// No box ahead of this key is of interest.
-    limit_key: i32,
-    limit: f64,
-}
-
-const ALWAYS: i32 = i32::MIN;
-
-impl<'a> Frame<'a> {
-    #[inline(always)]
-    fn new<S: Search>(accel: &'a Accel, ray: Ray, search: &S) -> (Self, bool) {
-        let boxes = accel.tree.root.and_then(|_| BoxRay::new(&accel.units, &ray));
-        let meets_tree = boxes.is_some();
-        let boxes = boxes.unwrap_or_else(BoxRay::passing_all);
-        let limit_key = key(boxes.s_max) | LANE_BITS;
-        let mut frame =
-            Self { accel, ray, shear: Shear::new(ray.direction), boxes, limit_key, limit: ray.t_max };
-        if search.floor() > ray.t_min {
-            frame.boxes.start_at(search.floor());
-        }
-        frame.narrow(search);
-        (frame, meets_tree)
-    }
-
-    /// Takes over what the search has found since.
-    #[inline(always)]
-    fn narrow<S: Search>(&mut self, search: &S) {
-        let limit = search.limit();
-        if limit < self.limit {
-            self.limit = limit;
-            self.boxes.end_at(limit);
-            self.limit_key = key(self.boxes.s_max) | LANE_BITS;
-        }
-    }
-}
-
-impl<S: Search> Task for Traversal<'_, '_, S> {
+impl<'a, S: Search<'a>> Task for AmongTriangles<'a, '_, S> {
     /// Whether the search ended before it had seen everything.
     type Output = bool;
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> bool {
         let Self { accel, ray, search, touches } = self;
+        let Some(root) = accel.tree.root else { return false };
+        let mut boxes = BoxRay::passing_all();
+        if !start::<L, S>(accel, ray, search, &mut boxes) {
+            return false;
+        }
+        let place = Place::default();
+        let mut frame = Frame::<&Ray, L>::new(accel, ray, boxes, search);
         let mut stack = Stack::new();
-        let mut suspended: SmallVec<[Frame; 2]> = SmallVec::new();
+        let mut next = Some(root);
+        while let Some(reference) = next {
+            let Some(leaf) = frame.descend::<S::Order>(reference, &mut stack) else { break };
+            if meet_blocks(&mut frame, leaf, &place, search, touches) {
+                return true;
+            }
+            next = frame.pop::<S::Order>(&mut stack);
+        }
+        false
+    }
+}
+
+/// A search through a tree of anything.
+struct AmongAll<'a, 's, S> {
+    accel: &'a Accel,
+    ray: &'s Ray,
+    search: &'s mut S,
+    touches: &'s mut Vec<Touch<'a>>,
+}
+
+impl<'a, S: Search<'a>> Task for AmongAll<'a, '_, S> {
+    /// Whether the search ended before it had seen everything.
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> bool {
+        let Self { accel, ray, search, touches } = self;
+        if !is_sound(ray) {
+            return false;
+        }
+        let mut stack: Stack<<S::Order as Order>::Entry> = Stack::new();
+        let mut suspended: SmallVec<[Frame<Ray, L>; 2]> = SmallVec::new();
         let mut place = Place::default();
 
-        let (mut frame, meets_tree) = Frame::new(accel, *ray, search);
+        let mut boxes = BoxRay::passing_all();
+        let meets_tree = start::<L, S>(accel, ray, search, &mut boxes);
+        let mut frame = Frame::<Ray, L>::new(accel, *ray, boxes, search);
         if enter(&mut frame, meets_tree, &place, &mut stack, search) {
             return true;
         }
-        while let Some(entry) = stack.pop() {
-            if (entry >> 32) as i32 > frame.limit_key {
-                continue;
-            }
-            let mut reference = entry as u32;
-            while reference >> tag::SHIFT == tag::INNER {
-                let node = &frame.accel.tree.nodes[reference as usize];
-                let (mask, keys) = L::meet_boxes(node, &frame.boxes);
-                if mask & mask.wrapping_sub(1) == 0 {
-                    if mask == 0 {
-                        break;
-                    }
-                    reference = node.children[mask.trailing_zeros() as usize % WIDTH];
-                    continue;
-                }
-                let slots = stack.with_room();
-                if S::ORDERED {
-                    L::push_by_distance(node, mask, keys, slots);
-                    let Some(nearest) = slots.pop() else { break };
-                    reference = nearest as u32;
-                } else {
-                    // The first children are the largest.
-                    let mut rest = mask & (mask - 1);
-                    while rest != 0 {
-                        let lane = (31 - rest.leading_zeros()) as usize % WIDTH;
-                        rest ^= 1 << lane;
-                        slots.push(stack_entry(ALWAYS, node.children[lane]));
-                    }
-                    reference = node.children[mask.trailing_zeros() as usize % WIDTH];
-                }
-            }
-
-            let first = (reference & tag::PLACE) as usize;
-            match reference >> tag::SHIFT {
+        while let Some(reference) = frame.pop::<S::Order>(&mut stack) {
+            let Some(leaf) = frame.descend::<S::Order>(reference, &mut stack) else { break };
+            let first = (leaf & tag::PLACE) as usize;
+            match leaf >> tag::SHIFT {
                 tag::TRIANGLES => {
-                    let is_over = meet_blocks::<L, S>(&mut frame, reference, &place, search, touches);
-                    if is_over {
+                    if meet_blocks(&mut frame, leaf, &place, search, touches) {
                         return true;
                     }
                 }
@@ -219,16 +321,17 @@ impl<S: Search> Task for Traversal<'_, '_, S> {
                         unreachable!("the tag says so");
                     };
                     let ray = frame.ray.into_object(&instance.world_from_object);
-                    if !is_sound(&ray) {
-                        continue;
-                    }
-                    let (inner, meets_tree) = Frame::new(&instance.accel, ray, search);
-                    if !meets_tree && instance.accel.infinite.is_empty() {
+                    let inner = &*instance.accel;
+                    let mut boxes = BoxRay::passing_all();
+                    let meets_tree =
+                        inner.tree.root.is_some() && start::<L, S>(inner, &ray, search, &mut boxes);
+                    if !meets_tree && (inner.infinite.is_empty() || !is_sound(&ray)) {
                         continue;
                     }
                     place.route.push(geometry);
                     place.ids.push(standing.id);
-                    stack.push(stack_entry(ALWAYS, tag::reference(tag::RETURN, 0)));
+                    stack.push(S::Order::entry(tag::reference(tag::RETURN, 0)));
+                    let inner = Frame::new(inner, ray, boxes, search);
                     suspended.push(std::mem::replace(&mut frame, inner));
                     if enter(&mut frame, meets_tree, &place, &mut stack, search) {
                         return true;
@@ -240,8 +343,7 @@ impl<S: Search> Task for Traversal<'_, '_, S> {
                     place.ids.pop();
                     frame.narrow(search);
                 }
-                // A node that the ray misses.
-                _ => {}
+                _ => unreachable!("no other tags"),
             }
         }
         false
@@ -250,20 +352,20 @@ impl<S: Search> Task for Traversal<'_, '_, S> {
 
 /// Starts on a tree: what is infinite at once, the rest onto the stack. True ends the search.
 #[inline(always)]
-fn enter<S: Search>(
-    frame: &mut Frame,
+fn enter<'a, L: Lanes, S: Search<'a>>(
+    frame: &mut Frame<'a, Ray, L>,
     meets_tree: bool,
     place: &Place,
-    stack: &mut Stack,
+    stack: &mut Stack<<S::Order as Order>::Entry>,
     search: &mut S,
 ) -> bool {
     if let Some(root) = frame.accel.tree.root.filter(|_| meets_tree) {
-        stack.push(stack_entry(ALWAYS, root));
+        stack.push(S::Order::entry(root));
     }
     for (i, entry) in frame.accel.infinite.iter().enumerate() {
         if matches!(frame.accel.geometries[entry.geometry as usize].kind, GeometryKind::Instance(_)) {
             let index = frame.accel.tree.entries.len() + i;
-            stack.push(stack_entry(ALWAYS, tag::reference(tag::INSTANCE, index as u32)));
+            stack.push(S::Order::entry(tag::reference(tag::INSTANCE, index as u32)));
         } else if meet_entry(frame, entry, place, search) {
             return true;
         }
@@ -272,35 +374,45 @@ fn enter<S: Search>(
     false
 }
 
+/// Tests the triangles of a leaf. True ends the search.
 #[inline(always)]
-fn meet_blocks<'a, L: Lanes, S: Search>(
-    frame: &mut Frame<'a>,
-    reference: u32,
+fn meet_blocks<'a, R: Borrow<Ray>, L: Lanes, S: Search<'a>>(
+    frame: &mut Frame<'a, R, L>,
+    leaf: u32,
     place: &Place,
     search: &mut S,
     touches: &mut Vec<Touch<'a>>,
 ) -> bool {
-    let mut found_any = false;
     let accel = frame.accel;
-    let places = tag::blocks(reference);
-    let all_names = &accel.tree.names[places.clone()];
-    for (block, names) in accel.tree.blocks[places].iter().zip(all_names) {
-        let mesh_origin = accel.mesh_origin(names.geometry);
-        let origin = frame.shear.local_origin(frame.ray.origin, &mesh_origin.to_array());
-        let mut mask = L::meet_triangles(block, &frame.shear, &origin);
+    let places = tag::blocks(leaf);
+    frame.turn_to(places.start);
+    let mut number = places.start as u32;
+    for block in &accel.tree.blocks[places] {
+        let (mut mask, sure) = if S::ASK == Ask::Whether {
+            L::meet_triangles::<true>(block, &frame.mesh.blocks)
+        } else {
+            L::meet_triangles::<false>(block, &frame.mesh.blocks)
+        };
+        if S::ASK == Ask::Whether && sure != 0 {
+            search.settle();
+            return true;
+        }
         while mask != 0 {
             let lane = mask.trailing_zeros() as usize % BLOCK;
             mask &= mask - 1;
-            let corners = block.triangle(lane);
-            let (geometry, primitive) = (names.geometry, names.primitives[lane]);
-            let root = match triangles::intersect(&frame.ray, &frame.shear, &origin, &corners) {
+            let MeshRay { shear, origin, .. } = &frame.mesh;
+            let corners = shear.axes.gather(block, lane);
+            let what = What::Lane { block: number, lane: lane as u32 };
+            let (root, is_front) = match triangles::intersect(frame.ray.borrow(), shear, origin, &corners) {
                 Meeting::Miss => continue,
-                Meeting::Hit(root) => root,
-                Meeting::Touch { root, is_owned, feature } => {
-                    let place = place.clone();
+                Meeting::Hit { root, is_front } => (root, is_front),
+                Meeting::Touch { root, is_owned, feature, is_front } => {
+                    let (geometry, primitive) = what.names(accel);
+                    let (place, corners) = (place.clone(), block.triangle(lane));
                     touches.push(Touch {
                         root,
                         is_owned,
+                        is_front,
                         feature,
                         corners,
                         geometry,
@@ -308,47 +420,50 @@ fn meet_blocks<'a, L: Lanes, S: Search>(
                         accel,
                         place,
                     });
-                    if !is_owned || !frame.ray.contains(root.t) {
+                    if !is_owned || !frame.ray.borrow().contains(root.t) {
                         continue;
                     }
-                    root
+                    (root, is_front)
                 }
             };
-            found_any = true;
-            if search.offer(&Found { root, geometry, primitive, order: 0, accel, place }) {
+            if search.offer(&Found { root, what, order: 0, is_front, accel, place }) {
                 return true;
             }
+            frame.narrow(search);
         }
-    }
-    if found_any {
-        frame.narrow(search);
+        number += 1;
     }
     false
 }
 
 /// Tests a shape or a primitive of custom geometry.
 #[inline(always)]
-fn meet_entry<S: Search>(frame: &Frame, entry: &Entry, place: &Place, search: &mut S) -> bool {
+fn meet_entry<'a, L: Lanes, S: Search<'a>>(
+    frame: &Frame<'a, Ray, L>,
+    entry: &Entry,
+    place: &Place,
+    search: &mut S,
+) -> bool {
     let (geometry, primitive) = (entry.geometry, entry.primitive());
-    let kind = &frame.accel.geometries[geometry as usize].kind;
-    meet_kind(frame.accel, kind, &frame.ray, geometry, primitive, place, search)
+    meet_primitive(frame.accel, &frame.ray, geometry, primitive, place, search)
 }
 
 /// Offers the crossings of one primitive that is neither a triangle nor an instance.
 #[inline(always)]
-pub(crate) fn meet_kind<S: Search>(
-    accel: &Accel,
-    kind: &GeometryKind,
+pub(crate) fn meet_primitive<'a, S: Search<'a>>(
+    accel: &'a Accel,
     ray: &Ray,
     geometry: u32,
     primitive: u32,
     place: &Place,
     search: &mut S,
 ) -> bool {
+    let kind = &accel.geometries[geometry as usize].kind;
+    let what = What::Named { geometry, primitive };
     let mut offer = |root: Root, order: usize| {
         let order = order as u32;
         // Also keeps out a NaN.
-        ray.contains(root.t) && search.offer(&Found { root, geometry, primitive, order, accel, place })
+        ray.contains(root.t) && search.offer(&Found { root, what, order, is_front: false, accel, place })
     };
     match S::ASK {
         Ask::Nothing => false,

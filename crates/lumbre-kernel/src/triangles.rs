@@ -11,6 +11,7 @@
 use lumbre_geometry::{Ray, Root};
 use lumbre_math::{DVec2, DVec3};
 
+use crate::lanes::Axes;
 use crate::touch::Feature;
 
 /// Triangles in a block.
@@ -47,7 +48,6 @@ impl TriangleBlock {
     pub(crate) const EMPTY: Self = Self { corners: [[[f32::NAN; BLOCK]; 3]; 3] };
 
     /// The corners in one lane.
-    #[inline(always)]
     pub(crate) fn triangle(&self, lane: usize) -> [[f32; 3]; 3] {
         self.corners.map(|axes| axes.map(|lanes| lanes[lane]))
     }
@@ -57,7 +57,7 @@ impl TriangleBlock {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Shear {
     /// The axes that become x, y and z; z is the direction's largest.
-    pub(crate) axes: [usize; 3],
+    pub(crate) axes: Axes,
     pub(crate) x: f64,
     pub(crate) y: f64,
     /// The direction's largest component.
@@ -66,38 +66,116 @@ pub(crate) struct Shear {
 
 impl Shear {
     #[inline(always)]
-    pub(crate) fn new(direction: DVec3) -> Self {
-        let size = direction.abs();
-        let z = if size.x >= size.y && size.x >= size.z {
-            0
-        } else if size.y >= size.z {
-            1
-        } else {
-            2
-        };
-        let (x, y) = ([1, 2, 0][z], [2, 0, 1][z]);
-        let direction_z = direction[z];
-        // Keeps the winding.
-        let (x, y) = if direction_z < 0.0 { (y, x) } else { (x, y) };
-        Self { axes: [x, y, z], x: direction[x] / direction_z, y: direction[y] / direction_z, direction_z }
+    pub(crate) fn new(direction: &DVec3) -> Self {
+        let axes = Axes::new(direction);
+        let [x, y, z] = axes.permute(direction);
+        Self { axes, x: x / z, y: y / z, direction_z: z }
     }
 
     /// The ray's origin relative to a mesh's, in the order of the axes.
     #[inline(always)]
-    pub(crate) fn local_origin(&self, ray_origin: DVec3, mesh_origin: &[f64; 3]) -> [f64; 3] {
-        self.axes.map(|axis| ray_origin[axis] - mesh_origin[axis])
+    pub(crate) fn local_origin(&self, ray_origin: &DVec3, mesh_origin: &DVec3) -> [f64; 3] {
+        let ([x, y, z], mesh) = (self.axes.permute(ray_origin), self.axes.permute(mesh_origin));
+        [x - mesh[0], y - mesh[1], z - mesh[2]]
     }
 
+    /// `corner` has the order of the axes.
     #[inline(always)]
-    fn corner(&self, origin: &[f64; 3], corner: &[f32; 3]) -> Corner {
-        let [x, y, z] = self.axes;
-        let height = f64::from(corner[z]) - origin[2];
+    fn corner(&self, origin: &[f64; 3], [x, y, z]: [f32; 3]) -> Corner {
+        let height = f64::from(z) - origin[2];
         Corner {
-            x: (f64::from(corner[x]) - origin[0]) - self.x * height,
-            y: (f64::from(corner[y]) - origin[1]) - self.y * height,
+            x: (f64::from(x) - origin[0]) - self.x * height,
+            y: (f64::from(y) - origin[1]) - self.y * height,
             z: height,
         }
     }
+}
+
+/// A ray in single precision, for a first test of eight triangles that is sharp, but never loses one.
+///
+/// # Why none is lost
+///
+/// Let L be the largest coordinate of a corner plus the largest of the ray's origin, both relative to the mesh, u = 2⁻²⁴,
+/// and take a sheared corner (x, y, z) as the test in double precision has it. Here z is wrong by 2uL: the origin is
+/// rounded, and so is the difference. x is wrong by 2uL from its own difference, 2uL from z, uL from the rounded shear (no
+/// more than 1), uL from the product, and 2uL from the last subtraction: 8uL, so that δ = 9uL also covers what is rounded in
+/// double precision. Where |x|, |y| ≤ m for the corners as computed, an edge function xy' - yx' is off by 4δm + 2δ² from
+/// them, and by 4.1um² from its own roundings; m < 2.01L makes the latter less than δm. With `error = 6δm + 3δ²`, which
+/// leaves room for its own roundings, an edge function that is not negative in double precision is not below `-error` here.
+///
+/// A hit in range has its z between those of the corners, up to 2⁻⁴⁰L in double precision and 2uL here; the ends of the
+/// range in z are moved by 6uL, of which their rounding takes 2uL (an end beyond 2L leaves everything in anyway).
+///
+/// Likewise, edge functions beyond `error` here are beyond zero in double precision, and a triangle whose corners all have
+/// their z in the range, by 6uL, is met in range.
+///
+/// All this without overflow or underflow, so for 2⁻⁵⁰ ≤ L ≤ 2⁶⁰; else the test is left out.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BlockRay {
+    pub(crate) axes: Axes,
+    /// In the order of the axes.
+    pub(crate) origin: [f32; 3],
+    pub(crate) shear_x: f32,
+    pub(crate) shear_y: f32,
+    pub(crate) error_slope: f32,
+    pub(crate) error_least: f32,
+    /// Triangles wholly before this, or after the other, are out of range.
+    pub(crate) z_low: f32,
+    pub(crate) z_high: f32,
+    /// Triangles wholly between these are in range.
+    pub(crate) z_surely_in: [f32; 2],
+    /// Whether the test tells anything.
+    pub(crate) is_sharp: bool,
+    // 6uL.
+    z_margin: f64,
+}
+
+impl BlockRay {
+    /// `origin` has the order of the shear's axes.
+    #[inline(always)]
+    pub(crate) fn new(shear: &Shear, origin: &[f64; 3], largest_corner: f32) -> Self {
+        let largest = greater(greater(origin[0].abs(), origin[1].abs()), origin[2].abs());
+        let reach = largest + f64::from(largest_corner);
+        let u = 1.0 / (1u64 << 24) as f64;
+        let delta = 9.0 * u * reach;
+        Self {
+            axes: shear.axes,
+            origin: [origin[0] as f32, origin[1] as f32, origin[2] as f32],
+            shear_x: shear.x as f32,
+            shear_y: shear.y as f32,
+            error_slope: (6.0 * delta) as f32,
+            error_least: (3.0 * delta * delta) as f32,
+            z_low: f32::NEG_INFINITY,
+            z_high: f32::INFINITY,
+            z_surely_in: [f32::INFINITY, f32::NEG_INFINITY],
+            is_sharp: 1.0 / (1u64 << 50) as f64 <= reach && reach <= (1u64 << 60) as f64,
+            z_margin: 6.0 * u * reach,
+        }
+    }
+
+    /// Leaves out what is wholly outside the range of `t`.
+    #[inline(always)]
+    pub(crate) fn set_range(&mut self, shear: &Shear, t_min: f64, t_max: f64) {
+        let (start, end) = (t_min * shear.direction_z, t_max * shear.direction_z);
+        let (low, high) = if shear.direction_z < 0.0 { (end, start) } else { (start, end) };
+        self.z_low = (low - self.z_margin) as f32;
+        self.z_high = (high + self.z_margin) as f32;
+        // Else a place in range may be none, for it is infinite.
+        if shear.direction_z.abs() > 1e-200 {
+            self.z_surely_in = [(low + self.z_margin) as f32, (high - self.z_margin) as f32];
+        }
+    }
+}
+
+// One instruction each, which f64::min and f64::max are not.
+#[inline(always)]
+fn lesser(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+#[inline(always)]
+fn greater(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
 }
 
 /// A sheared corner: the ray is the z axis.
@@ -113,7 +191,12 @@ pub(crate) enum Meeting {
     /// Not at all, or out of the range.
     Miss,
     /// Within the range, away from its edges.
-    Hit(Root),
+    Hit {
+        /// The crossing.
+        root: Root,
+        /// Whether the ray meets the front.
+        is_front: bool,
+    },
     /// Exactly at an edge or a corner, in range or not.
     Touch {
         /// The crossing.
@@ -122,38 +205,42 @@ pub(crate) enum Meeting {
         is_owned: bool,
         /// Where.
         feature: Feature,
+        /// Whether the ray meets the front.
+        is_front: bool,
     },
 }
 
-/// How the ray meets a triangle. `corners` are relative to the mesh, as is `origin`, which has the order of the shear's
-/// axes.
+/// How the ray meets a triangle. Corners and origin are relative to the mesh, and have the order of the shear's axes.
 #[inline(always)]
 pub(crate) fn intersect(ray: &Ray, shear: &Shear, origin: &[f64; 3], corners: &[[f32; 3]; 3]) -> Meeting {
-    let [a, b, c] = [
-        shear.corner(origin, &corners[0]),
-        shear.corner(origin, &corners[1]),
-        shear.corner(origin, &corners[2]),
-    ];
-    let (bc, ca, ab) = (edge(c, b), edge(a, c), edge(b, a));
-    let [u, v, w] = [bc, ca, ab].map(|edge| edge.value);
-    let is_inside = (u > 0.0 && v > 0.0 && w > 0.0) || (u < 0.0 && v < 0.0 && w < 0.0);
-    if !is_inside {
-        return touch(shear, [a, b, c], [bc, ca, ab]);
+    let (a, b, c) = (
+        shear.corner(origin, corners[0]),
+        shear.corner(origin, corners[1]),
+        shear.corner(origin, corners[2]),
+    );
+    // The edge functions px qy - py qx. The two products of each are rounded apart: the opposite edge of the neighbour then
+    // gives exactly the opposite value, and their difference has the right sign unless they are equal.
+    let (bc, ca, ab) = (c.x * b.y, a.x * c.y, b.x * a.y);
+    let (u, v, w) = (bc - c.y * b.x, ca - a.y * c.x, ab - b.y * a.x);
+    let least = lesser(lesser(u, v), w);
+    let most = greater(greater(u, v), w);
+    if !(least > 0.0 || most < 0.0) {
+        return if least >= 0.0 || most <= 0.0 { touch(*shear, [a, b, c]) } else { Meeting::Miss };
     }
     let det = u + v + w;
-    let largest_product = bc.product.max(ca.product).max(ab.product);
+    let largest_product = greater(greater(bc.abs(), ca.abs()), ab.abs());
     // Seen on edge, a triangle's edge functions cancel; left so, t would be anywhere within the triangle.
     let root = if det.abs() < largest_product * (1.0 / 64.0) {
-        root_of(
-            shear,
-            [a, b, c],
-            [difference_of_products(c, b), difference_of_products(a, c), difference_of_products(b, a)],
-        )
+        exact_root_of(*shear, [a, b, c])
     } else {
         root_of(shear, [a, b, c], [u, v, w])
     };
     // A NaN is not in the range; an infinity is no place.
-    if ray.contains(root.t) && root.t.is_finite() { Meeting::Hit(root) } else { Meeting::Miss }
+    if ray.t_min <= root.t && root.t <= ray.t_max && root.t.abs() < f64::INFINITY {
+        Meeting::Hit { root, is_front: det > 0.0 }
+    } else {
+        Meeting::Miss
+    }
 }
 
 #[inline(always)]
@@ -163,18 +250,17 @@ fn root_of(shear: &Shear, [a, b, c]: [Corner; 3], [u, v, w]: [f64; 3]) -> Root {
     Root { t, part: 0, multiplicity: 1, local: DVec2::new(v / det, w / det) }
 }
 
-/// A triangle whose edge functions are not all of one sign.
-#[inline(always)]
-fn touch(shear: &Shear, corners: [Corner; 3], edges: [Edge; 3]) -> Meeting {
-    let values = edges.map(|edge| edge.value);
-    let is_weakly_inside =
-        values.iter().all(|&value| value >= 0.0) || values.iter().all(|&value| value <= 0.0);
-    if is_weakly_inside { touch_at_zero(shear, corners, edges) } else { Meeting::Miss }
-}
-
 #[cold]
 #[inline(never)]
-fn touch_at_zero(shear: &Shear, corners: [Corner; 3], edges: [Edge; 3]) -> Meeting {
+fn exact_root_of(shear: Shear, [a, b, c]: [Corner; 3]) -> Root {
+    let edges = [difference_of_products(c, b), difference_of_products(a, c), difference_of_products(b, a)];
+    root_of(&shear, [a, b, c], edges)
+}
+
+/// A triangle of whose edge functions, as computed, none has another sign than the others but some are zero.
+#[cold]
+#[inline(never)]
+fn touch(shear: Shear, corners: [Corner; 3]) -> Meeting {
     let [a, b, c] = corners;
     let values = [difference_of_products(c, b), difference_of_products(a, c), difference_of_products(b, a)];
     let feature = match values.map(|value| value == 0.0) {
@@ -187,42 +273,26 @@ fn touch_at_zero(shear: &Shear, corners: [Corner; 3], edges: [Edge; 3]) -> Meeti
         [true, true, true] => Feature::EdgeOn,
         [false, false, false] => return Meeting::Miss,
     };
-    let root = root_of(shear, corners, values);
+    let root = root_of(&shear, corners, values);
     if feature != Feature::EdgeOn && !root.t.is_finite() {
         return Meeting::Miss;
     }
-    let is_sided = edges.iter().all(|edge| edge.is_sided);
-    let is_one_sign = edges.iter().all(|edge| edge.is_positive == edges[0].is_positive);
-    Meeting::Touch { root, is_owned: feature != Feature::EdgeOn && is_sided && is_one_sign, feature }
+    let sides = [side(c, b), side(a, c), side(b, a)];
+    let is_owned = feature != Feature::EdgeOn && sides[0].is_some() && sides.iter().all(|s| *s == sides[0]);
+    let is_front = values.iter().any(|&value| value > 0.0);
+    Meeting::Touch { root, is_owned, feature, is_front }
 }
 
-#[derive(Clone, Copy)]
-struct Edge {
-    value: f64,
-    product: f64,
-    // With `is_sided`, the sign for the ray moved by (ε, ε²). Without it the edge is a point: no side.
-    is_positive: bool,
-    is_sided: bool,
-}
-
-/// The edge function px qy - py qx. Its two products are rounded apart: the opposite edge of the neighbour then gives
-/// exactly the opposite value, and their difference has the right sign unless they are equal.
-#[inline(always)]
-fn edge(p: Corner, q: Corner) -> Edge {
+/// Whether the edge function px qy - py qx is positive for the ray moved by (ε, ε²). `None` where the edge is a point.
+fn side(p: Corner, q: Corner) -> Option<bool> {
     let (first, second) = (p.x * q.y, p.y * q.x);
-    let value = first - second;
-    if value != 0.0 {
-        return Edge { value, product: first.abs(), is_positive: value > 0.0, is_sided: true };
+    let difference = first - second;
+    if difference != 0.0 {
+        return Some(difference > 0.0);
     }
-    edge_at_zero(p, q, first)
-}
-
-#[cold]
-fn edge_at_zero(p: Corner, q: Corner, product: f64) -> Edge {
-    let value = p.x.mul_add(q.y, -product) - p.y.mul_add(q.x, -product);
+    let value = p.x.mul_add(q.y, -first) - p.y.mul_add(q.x, -first);
     // (p - m) × (q - m) with m = (ε, ε²) is value + ε (p.y - q.y) + ε² (q.x - p.x).
-    let side = [value, p.y - q.y, q.x - p.x].into_iter().find(|&term| term != 0.0).unwrap_or(0.0);
-    Edge { value, product: product.abs(), is_positive: side > 0.0, is_sided: side != 0.0 }
+    [value, p.y - q.y, q.x - p.x].into_iter().find(|&term| term != 0.0).map(|term| term > 0.0)
 }
 
 /// px qy - py qx within 1.5 ulp (W. Kahan; C.-P. Jeannerod, N. Louvet, J.-M. Muller, Mathematics of Computation 82, 2013).

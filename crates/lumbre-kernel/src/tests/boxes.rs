@@ -6,14 +6,23 @@ use lumbre_geometry::{Aabb, Ray};
 use lumbre_math::DVec3;
 
 use super::scenes::Random;
-use crate::lanes::{LANE_BITS, Level, key, meet_boxes_at};
+use crate::lanes::{LANE_BITS, Level, meet_boxes_at};
 use crate::node::{BoxRay, Node, Units, WIDTH};
 use crate::primitive::Bounds;
 
 fn units(bounds: &Aabb) -> Units {
     let half = 0.5 * bounds.size();
     let scale = half.max_element().log2().ceil().exp2().recip();
-    Units { origin: bounds.center(), scale, radius: (half * scale).length(), condition: 1.0 }
+    Units::new(bounds.center(), scale, (half * scale).length(), 1.0)
+}
+
+/// As a search prepares it.
+fn prepared(units: &Units, ray: &Ray) -> Option<BoxRay> {
+    let mut boxes = BoxRay::passing_all();
+    let (t_min, t_max) = (ray.t_min, ray.t_max);
+    let meets =
+        boxes.start_nearby(units, ray, t_min, t_max) || boxes.start_anywhere(units, ray, t_min, t_max);
+    meets.then_some(boxes)
 }
 
 /// As the build does.
@@ -85,13 +94,12 @@ fn reached_boxes_are_met(level: Level, seed: u64, rounds: usize) {
             let (t_min, t_max) =
                 [(t, t), (0.0, t), (t, f64::INFINITY), (f64::NEG_INFINITY, f64::INFINITY)][random.below(4)];
             let ray = ray.with_range(t_min, t_max);
-            let boxes = BoxRay::new(&units, &ray).unwrap_or_else(|| panic!("{ray:?} misses {units:?}"));
+            let boxes = prepared(&units, &ray).unwrap_or_else(|| panic!("{ray:?} misses {units:?}"));
             let (mask, keys) = meet_boxes_at(level, &node, &boxes);
             assert!(mask & (1 << lane) != 0, "{ray:?} at {t} misses {bounds:?} of {units:?}");
             // A hit at t must not be culled by a limit of t either.
-            let mut ended = boxes.clone();
-            ended.end_at(t);
-            assert!(keys[lane] <= key(ended.s_max) | LANE_BITS, "{ray:?} at {t}");
+            let limit_key = boxes.progress.up(t).to_bits() as i32 | LANE_BITS;
+            assert!(keys[lane] <= limit_key, "{ray:?} at {t}");
             met += 1;
         }
     }
@@ -100,8 +108,9 @@ fn reached_boxes_are_met(level: Level, seed: u64, rounds: usize) {
 
 #[test]
 fn a_box_that_holds_the_point_at_t_is_always_met() {
-    reached_boxes_are_met(Level::PORTABLE, 51, 100_000);
-    reached_boxes_are_met(Level::best(), 52, 100_000);
+    for (i, level) in Level::all().into_iter().enumerate() {
+        reached_boxes_are_met(level, 51 + i as u64, 70_000);
+    }
 }
 
 #[test]
@@ -120,7 +129,7 @@ fn boxes_far_from_the_ray_are_not_met() {
         // Past the box, further than its half diagonal but by little.
         let aside = direction.cross(random.vector()).normalize() * 0.434;
         let ray = Ray::new(center + aside - 20.0 * direction, direction);
-        let mask = BoxRay::new(&units, &ray).map_or(0, |ray| meet_boxes_at(Level::PORTABLE, &node, &ray).0);
+        let mask = prepared(&units, &ray).map_or(0, |ray| meet_boxes_at(Level::best(), &node, &ray).0);
         missed += u32::from(mask == 0);
     }
     assert_eq!(missed, 10_000);

@@ -10,9 +10,9 @@ use super::scenes::{Random, balls, build, cube, icosphere, mixture, ray, soup};
 use crate::lanes::Level;
 use crate::{Accel, GeometryKind, Hit, Instance, brute};
 
-fn every(accel: &Accel, ray: &Ray) -> Vec<Hit> {
+fn every(level: Level, accel: &Accel, ray: &Ray) -> Vec<Hit> {
     let mut hits = Vec::new();
-    accel.all(ray, |hit| {
+    accel.all_at(level, ray, |hit| {
         hits.push(hit.clone());
         ControlFlow::Continue(())
     });
@@ -28,12 +28,13 @@ pub(crate) fn check(accel: &Accel, ray: &Ray) -> usize {
         closest.as_ref().map(|hit| hit.root.t.to_bits()),
         brute::closest(accel, ray).map(|hit| hit.root.t.to_bits()),
     );
-    assert_eq!(closest, accel.closest_at(Level::PORTABLE, ray), "{ray:?}");
     assert_eq!(closest, expected.first().cloned(), "{ray:?}");
-    assert_eq!(accel.any_at(Level::best(), ray), closest.is_some(), "{ray:?}");
-    assert_eq!(accel.any_at(Level::PORTABLE, ray), closest.is_some(), "{ray:?}");
-    assert_eq!(every(accel, ray), expected, "{ray:?}");
-    assert_eq!(accel.count(ray), expected.len(), "{ray:?}");
+    for level in Level::all() {
+        assert_eq!(accel.closest_at(level, ray), closest, "{level:?} {ray:?}");
+        assert_eq!(accel.any_at(level, ray), closest.is_some(), "{level:?} {ray:?}");
+        assert_eq!(every(level, accel, ray), expected, "{level:?} {ray:?}");
+        assert_eq!(accel.count_at(level, ray), expected.len(), "{level:?} {ray:?}");
+    }
 
     let accept = |hit: &Hit| !(hit.id / 7 + hit.primitive + hit.instances.len() as u32).is_multiple_of(3);
     let filtered = expected.iter().find(|hit| accept(hit)).cloned();
@@ -142,7 +143,8 @@ fn ties_go_to_the_first_in_the_lists() {
     ]);
     let ray = Ray::new(DVec3::new(1.25, 0.5, -7.0), DVec3::new(0.01, 0.02, 1.0));
     check(&accel, &ray);
-    let places: Vec<_> = every(&accel, &ray).iter().map(|hit| (hit.route.to_vec(), hit.geometry)).collect();
+    let places: Vec<_> =
+        every(Level::best(), &accel, &ray).iter().map(|hit| (hit.route.to_vec(), hit.geometry)).collect();
     let expected = [(vec![], 1), (vec![], 2), (vec![0], 0), (vec![0], 1), (vec![3], 0), (vec![3], 1)];
     assert_eq!(places[..6], expected);
     assert_eq!(places[6..], expected);
@@ -153,7 +155,7 @@ fn ties_go_to_the_first_in_the_lists() {
 fn both_ends_of_the_range_count() {
     let accel = build(vec![GeometryKind::Mesh(Arc::new(cube()))]);
     let ray = Ray::new(DVec3::new(1.25, 0.5, -7.0), DVec3::new(0.0, 0.0, 2.0));
-    let ts: Vec<f64> = every(&accel, &ray).iter().map(|hit| hit.root.t).collect();
+    let ts: Vec<f64> = every(Level::best(), &accel, &ray).iter().map(|hit| hit.root.t).collect();
     assert_eq!(ts, [5.0, 6.25]);
     assert_eq!(accel.count(&ray.with_range(5.0, 6.25)), 2);
     assert_eq!(accel.count(&ray.with_range(5.0f64.next_up(), 6.25)), 1);
@@ -216,7 +218,7 @@ fn rays_of_absurd_size_are_answered_as_by_the_loop() {
 fn all_stops_where_told() {
     let accel = build(vec![GeometryKind::Mesh(Arc::new(soup(&mut Random(8), 250_000, CENTER, 3.0)))]);
     let ray = Ray::new(CENTER + DVec3::new(0.3, -9.0, 0.2), DVec3::new(0.01, 1.0, -0.02));
-    let hits = every(&accel, &ray);
+    let hits = every(Level::best(), &accel, &ray);
     assert!(hits.len() > 300, "{}", hits.len());
     assert_eq!(hits, brute::every(&accel, &ray));
     for stop in [1, 31, 32, 33, 160, 161, hits.len()] {

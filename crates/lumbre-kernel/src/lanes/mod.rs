@@ -1,0 +1,280 @@
+//! The fence around SIMD, and around the one array that is not cleared: the only module with `unsafe`. Outside it, a search is written once, over [`Lanes`].
+//!
+//! [`Level::run`] chooses the instruction set once a search. The code between is generic and `#[inline(always)]` without a
+//! target feature of its own, so that it takes on the features of the root that it is inlined into.
+
+#![allow(unsafe_code)]
+
+mod portable;
+#[cfg(target_arch = "x86_64")]
+mod x86;
+
+use std::mem::MaybeUninit;
+
+use lumbre_geometry::Ray;
+use lumbre_math::DVec3;
+
+use crate::node::{BoxRay, Node, Units, WIDTH};
+use crate::stack::STACK;
+use crate::triangles::{BLOCK, BlockRay, TriangleBlock};
+
+/// What a search does eight at a time: boxes, and triangles.
+pub(crate) trait Lanes {
+    /// Where the ray enters each of eight boxes, in an order of integers.
+    type Keys: Copy;
+
+    /// Makes `boxes` the ray from `t_min` to `t_max` for a tree in these units, if it is one from nearby, which it answers;
+    /// also checks that it is sound.
+    fn start_nearby(units: &Units, ray: &Ray, t_min: f64, t_max: f64, boxes: &mut BoxRay) -> bool;
+
+    /// One bit for each child whose box the ray meets, and where it enters.
+    fn meet_boxes(node: &Node, ray: &BoxRay) -> (u32, Self::Keys);
+
+    /// The child of which `mask` has the bit: no more than one.
+    fn only_child(node: &Node, mask: u32) -> u32;
+
+    /// Puts the children in `mask`, two or more, onto the stack, the nearest last, but for the nearest, which it answers.
+    /// There must be room for eight.
+    fn push_by_distance(node: &Node, mask: u32, keys: Self::Keys, slots: &mut Slots<i64>) -> u32;
+
+    /// Puts the children in `mask`, one or more, onto the stack in the order in which they stand in the node, but for the
+    /// last, which it answers. There must be room for eight.
+    fn push_as_built(node: &Node, mask: u32, slots: &mut Slots<u32>) -> u32;
+
+    /// One bit for each triangle that the ray may hit within its range, among them all that it does; where `SURE`, also one
+    /// for each that it certainly hits, else none: see [`BlockRay`].
+    fn meet_triangles<const SURE: bool>(block: &TriangleBlock, ray: &BlockRay) -> (u32, u32);
+}
+
+/// In the last bits of a child's key stands its lane, so that no two are equal. To be compared with a limit that has all
+/// these bits set.
+pub(crate) const LANE_BITS: i32 = WIDTH as i32 - 1;
+
+/// The planes of a node that a ray meets first.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sides {
+    // On each axis, where the planes start in the flat array of a node's planes: 16 axis + 8 side. The other planes are at
+    // that place with `WIDTH` flipped.
+    near: [usize; 3],
+}
+
+static SIDES: [Sides; 8] = {
+    let mut sides = [Sides { near: [0; 3] }; 8];
+    let mut signs = 0;
+    while signs < 8 {
+        let mut axis = 0;
+        while axis < 3 {
+            sides[signs].near[axis] = 2 * WIDTH * axis + WIDTH * (signs >> axis & 1);
+            axis += 1;
+        }
+        signs += 1;
+    }
+    sides
+};
+
+impl Sides {
+    /// For a direction that has these signs: a bit for each negative component.
+    #[inline(always)]
+    pub(crate) fn new(signs: u32) -> Self {
+        SIDES[signs as usize % 8]
+    }
+}
+
+/// The axes in another order.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Axes {
+    // Each below three.
+    order: [usize; 3],
+}
+
+static AXES: [Axes; 6] = [
+    Axes { order: [1, 2, 0] },
+    Axes { order: [2, 0, 1] },
+    Axes { order: [0, 1, 2] },
+    Axes { order: [2, 1, 0] },
+    Axes { order: [0, 2, 1] },
+    Axes { order: [1, 0, 2] },
+];
+
+impl Axes {
+    /// The last is the direction's largest; the others are in the order that keeps the winding.
+    #[inline(always)]
+    pub(crate) fn new(direction: &DVec3) -> Self {
+        let [x, y, z] = [direction.x.abs(), direction.y.abs(), direction.z.abs()];
+        // Without branches, for incoherent rays.
+        let x_is_largest = usize::from((x >= y) & (x >= z));
+        let z = (1 - x_is_largest) * (2 - usize::from(y >= z));
+        let is_negative = usize::from(direction.as_ref()[z] < 0.0);
+        AXES[3 * is_negative + z]
+    }
+
+    /// A vector's components in this order.
+    #[inline(always)]
+    pub(crate) fn permute(&self, v: &DVec3) -> [f64; 3] {
+        let v: &[f64; 3] = v.as_ref();
+        // SAFETY: the axes are below three.
+        let at = |axis: usize| unsafe { *v.get_unchecked(axis) };
+        [at(self.order[0]), at(self.order[1]), at(self.order[2])]
+    }
+
+    /// The corners in one lane of a block, each in this order.
+    #[inline(always)]
+    pub(crate) fn gather(&self, block: &TriangleBlock, lane: usize) -> [[f32; 3]; 3] {
+        let lanes = block.corners.as_flattened().as_flattened();
+        let [x, y, z] = self.order;
+        let lane = lane % BLOCK;
+        // SAFETY: the place is at most 24 · 2 + 8 · 2 + 7, in an array of 72.
+        let at = |corner: usize, axis: usize| unsafe { *lanes.get_unchecked(24 * corner + 8 * axis + lane) };
+        [[at(0, x), at(0, y), at(0, z)], [at(1, x), at(1, y), at(1, z)], [at(2, x), at(2, y), at(2, z)]]
+    }
+}
+
+/// The array of a stack, which is not cleared for every ray.
+pub(crate) struct Slots<E> {
+    // The first `len` are initialised, and `len <= STACK`.
+    entries: [MaybeUninit<E>; STACK],
+    len: usize,
+}
+
+impl<E: Copy> Slots<E> {
+    #[inline(always)]
+    pub(crate) fn new() -> Self {
+        Self { entries: [const { MaybeUninit::uninit() }; STACK], len: 0 }
+    }
+
+    #[inline(always)]
+    pub(crate) fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Adds one.
+    ///
+    /// # Panics
+    /// When it is full.
+    #[inline(always)]
+    pub(crate) fn push(&mut self, entry: E) {
+        self.entries[self.len] = MaybeUninit::new(entry);
+        self.len += 1;
+    }
+
+    #[inline(always)]
+    pub(crate) fn pop(&mut self) -> Option<E> {
+        if self.len == 0 {
+            return None;
+        }
+        self.len -= 1;
+        // SAFETY: it was one of the first `len`, which are initialised, and there are no more than `STACK`.
+        Some(unsafe { self.entries.get_unchecked(self.len).assume_init() })
+    }
+
+    /// The next eight, to be written before `len` takes them in.
+    ///
+    /// # Panics
+    /// When there are not as many.
+    #[inline(always)]
+    fn next_eight(&mut self) -> &mut [MaybeUninit<E>; WIDTH] {
+        let window = &mut self.entries[self.len..self.len + WIDTH];
+        window.try_into().expect("eight")
+    }
+}
+
+/// Work to be done with whichever lanes the machine has.
+pub(crate) trait Task {
+    /// What it gives.
+    type Output;
+    /// Does it. To be `#[inline(always)]`, with everything that it calls in its inner loop.
+    fn run<L: Lanes>(self) -> Self::Output;
+}
+
+/// An instruction set that this machine has: there is no other way to one than asking it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Level(Set);
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Set {
+    Portable,
+    #[cfg(target_arch = "x86_64")]
+    Avx2,
+    #[cfg(target_arch = "x86_64")]
+    Avx512,
+}
+
+impl Level {
+    /// The best that this machine has.
+    pub(crate) fn best() -> Self {
+        Self::all().pop().expect("one at least")
+    }
+
+    /// All that this machine has, the best last.
+    pub(crate) fn all() -> Vec<Self> {
+        let mut all = vec![Self(Set::Portable)];
+        #[cfg(target_arch = "x86_64")]
+        {
+            let has_avx2 = std::arch::is_x86_feature_detected!("avx2")
+                && std::arch::is_x86_feature_detected!("fma")
+                && std::arch::is_x86_feature_detected!("bmi1")
+                && std::arch::is_x86_feature_detected!("bmi2")
+                && std::arch::is_x86_feature_detected!("lzcnt")
+                && std::arch::is_x86_feature_detected!("popcnt");
+            if has_avx2 {
+                all.push(Self(Set::Avx2));
+            }
+            if has_avx2
+                && std::arch::is_x86_feature_detected!("avx512f")
+                && std::arch::is_x86_feature_detected!("avx512dq")
+                && std::arch::is_x86_feature_detected!("avx512vl")
+            {
+                all.push(Self(Set::Avx512));
+            }
+        }
+        all
+    }
+
+    /// Runs the task with these lanes.
+    #[inline(always)]
+    pub(crate) fn run<T: Task>(self, task: T) -> T::Output {
+        match self.0 {
+            Set::Portable => task.run::<portable::Portable>(),
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: `all` alone makes this value, after finding on this machine all the features of `run_avx2`.
+            Set::Avx2 => unsafe { x86::run_avx2(task) },
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: as above, of `run_avx512`.
+            Set::Avx512 => unsafe { x86::run_avx512(task) },
+        }
+    }
+}
+
+/// What [`Lanes::meet_boxes`] gives at a level, and where the ray enters each box, for tests.
+#[cfg(test)]
+pub(crate) fn meet_boxes_at(level: Level, node: &Node, ray: &BoxRay) -> (u32, [i32; WIDTH]) {
+    struct Boxes<'a>(&'a Node, &'a BoxRay);
+    impl Task for Boxes<'_> {
+        type Output = (u32, [i32; WIDTH]);
+        #[inline(always)]
+        fn run<L: Lanes>(self) -> Self::Output {
+            // A child's reference is its lane here. The nearest, which never stands on the stack, has no key.
+            let mut node = self.0.clone();
+            node.children = [0, 1, 2, 3, 4, 5, 6, 7];
+            let (mask, keys) = L::meet_boxes(&node, self.1);
+            let mut by_lane = [i32::MAX; WIDTH];
+            if mask.count_ones() > 1 {
+                let mut slots = Slots::new();
+                let nearest = L::push_by_distance(&node, mask, keys, &mut slots);
+                assert_eq!(slots.len() + 1, mask.count_ones() as usize);
+                by_lane[nearest as usize] = i32::MIN;
+                let mut last = i32::MIN;
+                while let Some(entry) = slots.pop() {
+                    let key = (entry >> 32) as i32;
+                    assert!(last < key, "the nearest are on top");
+                    last = key;
+                    by_lane[entry as usize % WIDTH] = key;
+                }
+            } else if mask != 0 {
+                by_lane[L::only_child(&node, mask) as usize] = i32::MIN;
+            }
+            (mask, by_lane)
+        }
+    }
+    level.run(Boxes(node, ray))
+}
