@@ -224,16 +224,31 @@ pub(crate) fn intersect(ray: &Ray, shear: &Shear, origin: &[f64; 3], corners: &[
     let (u, v, w) = (bc - c.y * b.x, ca - a.y * c.x, ab - b.y * a.x);
     let least = lesser(lesser(u, v), w);
     let most = greater(greater(u, v), w);
-    if !(least > 0.0 || most < 0.0) {
-        return if least >= 0.0 || most <= 0.0 { touch(*shear, [a, b, c]) } else { Meeting::Miss };
+    if least > 0.0 || most < 0.0 {
+        return meet_inside(ray, shear, [a, b, c], [u, v, w], [bc, ca, ab]);
     }
-    let det = u + v + w;
-    let largest_product = greater(greater(bc.abs(), ca.abs()), ab.abs());
+    if least >= 0.0 || most <= 0.0 {
+        return meet_near_zero(ray, *shear, [a, b, c], [u, v, w], [bc, ca, ab]);
+    }
+    Meeting::Miss
+}
+
+/// A triangle whose edge functions all have one sign.
+#[inline(always)]
+fn meet_inside(
+    ray: &Ray,
+    shear: &Shear,
+    corners: [Corner; 3],
+    edges: [f64; 3],
+    products: [f64; 3],
+) -> Meeting {
+    let det = edges[0] + edges[1] + edges[2];
+    let largest_product = greater(greater(products[0].abs(), products[1].abs()), products[2].abs());
     // Seen on edge, a triangle's edge functions cancel; left so, t would be anywhere within the triangle.
     let root = if det.abs() < largest_product * (1.0 / 64.0) {
-        exact_root_of(*shear, [a, b, c])
+        exact_root_of(*shear, corners)
     } else {
-        root_of(shear, [a, b, c], [u, v, w])
+        root_of(shear, corners, edges)
     };
     // A NaN is not in the range; an infinity is no place.
     if ray.t_min <= root.t && root.t <= ray.t_max && root.t.abs() < f64::INFINITY {
@@ -241,6 +256,37 @@ pub(crate) fn intersect(ray: &Ray, shear: &Shear, origin: &[f64; 3], corners: &[
     } else {
         Meeting::Miss
     }
+}
+
+/// A triangle some of whose edge functions came out as zero, the others with one sign: now their rounding errors decide.
+#[cold]
+#[inline(never)]
+fn meet_near_zero(
+    ray: &Ray,
+    shear: Shear,
+    corners: [Corner; 3],
+    edges: [f64; 3],
+    products: [f64; 3],
+) -> Meeting {
+    let [a, b, c] = corners;
+    let settled = |value: f64, p: Corner, q: Corner, product: f64| {
+        if value != 0.0 { value } else { residue(p, q, product) }
+    };
+    let [u, v, w] = [
+        settled(edges[0], c, b, products[0]),
+        settled(edges[1], a, c, products[1]),
+        settled(edges[2], b, a, products[2]),
+    ];
+    if (u > 0.0 && v > 0.0 && w > 0.0) || (u < 0.0 && v < 0.0 && w < 0.0) {
+        return meet_inside(ray, &shear, corners, [u, v, w], products);
+    }
+    let is_weakly_inside = (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
+    if is_weakly_inside { touch(&shear, corners) } else { Meeting::Miss }
+}
+
+/// px qy - py qx where both products round to `product`.
+fn residue(p: Corner, q: Corner, product: f64) -> f64 {
+    p.x.mul_add(q.y, -product) - p.y.mul_add(q.x, -product)
 }
 
 #[inline(always)]
@@ -257,10 +303,8 @@ fn exact_root_of(shear: Shear, [a, b, c]: [Corner; 3]) -> Root {
     root_of(&shear, [a, b, c], edges)
 }
 
-/// A triangle of whose edge functions, as computed, none has another sign than the others but some are zero.
-#[cold]
-#[inline(never)]
-fn touch(shear: Shear, corners: [Corner; 3]) -> Meeting {
+/// A triangle whose edge functions have one sign but for those that are zero.
+fn touch(shear: &Shear, corners: [Corner; 3]) -> Meeting {
     let [a, b, c] = corners;
     let values = [difference_of_products(c, b), difference_of_products(a, c), difference_of_products(b, a)];
     let feature = match values.map(|value| value == 0.0) {
@@ -273,7 +317,7 @@ fn touch(shear: Shear, corners: [Corner; 3]) -> Meeting {
         [true, true, true] => Feature::EdgeOn,
         [false, false, false] => return Meeting::Miss,
     };
-    let root = root_of(&shear, corners, values);
+    let root = root_of(shear, corners, values);
     if feature != Feature::EdgeOn && !root.t.is_finite() {
         return Meeting::Miss;
     }
@@ -290,7 +334,7 @@ fn side(p: Corner, q: Corner) -> Option<bool> {
     if difference != 0.0 {
         return Some(difference > 0.0);
     }
-    let value = p.x.mul_add(q.y, -first) - p.y.mul_add(q.x, -first);
+    let value = residue(p, q, first);
     // (p - m) × (q - m) with m = (ε, ε²) is value + ε (p.y - q.y) + ε² (q.x - p.x).
     [value, p.y - q.y, q.x - p.x].into_iter().find(|&term| term != 0.0).map(|term| term > 0.0)
 }
