@@ -26,6 +26,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Result, bail};
 use clap::Parser;
 use lumbre_geometry::Ray;
+use lumbre_kernel::Preset;
 
 use embree::{Embree, Setting};
 use measure::{Job, Ratio, alternate, median};
@@ -51,7 +52,8 @@ struct Options {
     /// Only scenes whose name contains this; may be repeated.
     #[arg(long)]
     scene: Vec<String>,
-    /// Only work whose name contains this: primary, bounce 1, bounce 3, shadow, short ao, random; may be repeated.
+    /// Only work whose name contains this: primary, bounce 1, bounce 3, shadow, short ao, random; or `build`
+    /// for no rays at all; may be repeated.
     #[arg(long)]
     work: Vec<String>,
     /// Only peers whose name contains this; `none` for none; may be repeated.
@@ -69,9 +71,21 @@ struct Options {
     /// Seconds for each line of the table.
     #[arg(long)]
     seconds: Option<f64>,
+    /// How Lumbre builds its trees: fast, balanced or best.
+    #[arg(long, default_value = "balanced", value_parser = preset)]
+    preset: Preset,
     /// Names the scenes and ends.
     #[arg(long)]
     list: bool,
+}
+
+fn preset(name: &str) -> Result<Preset, String> {
+    match name {
+        "fast" => Ok(Preset::Fast),
+        "balanced" => Ok(Preset::Balanced),
+        "best" => Ok(Preset::Best),
+        _ => Err("it is fast, balanced or best".to_owned()),
+    }
 }
 
 /// How much is measured.
@@ -128,7 +142,7 @@ fn main() -> Result<()> {
     let is_wanted =
         |wanted: &[String], name: &str| wanted.is_empty() || wanted.iter().any(|part| name.contains(part));
     let works: Vec<_> = Work::ALL.into_iter().filter(|work| is_wanted(&options.work, work.name())).collect();
-    if works.is_empty() {
+    if works.is_empty() && options.work != ["build"] {
         bail!("no work is called {}", options.work.join(" or "));
     }
     let mut threads: Vec<_> = options.threads.iter().map(|&count| usize::from(count)).collect();
@@ -149,7 +163,7 @@ fn main() -> Result<()> {
         deadline: options.quick.then(|| start + Duration::from_secs(40)),
     };
 
-    let mut programs: Vec<Box<dyn Program>> = vec![Box::new(ours::Lumbre)];
+    let mut programs: Vec<Box<dyn Program>> = vec![Box::new(ours::Lumbre { preset: options.preset })];
     programs.extend(peers()?.into_iter().filter(|peer| is_wanted(&options.peer, &peer.name())));
 
     println!("{}, {}", report::machine(), report::today());
@@ -225,7 +239,7 @@ fn measure_scene(
             Some(why) => println!("{} is left out: {why}", program.name()),
         }
     }
-    let accel = ours::build(scene)?;
+    let accel = ours::build(scene, Preset::Balanced)?;
     let extent = accel.bounds().size().max_element();
     let lists: Vec<_> =
         plan.works.iter().map(|&work| (work, rays::make(work, scene, &accel, plan.size))).collect();

@@ -142,6 +142,8 @@ pub fn differences(
 mod tests {
     use std::sync::Arc;
 
+    use lumbre_kernel::Preset;
+
     use super::*;
     use crate::program::{Program, Tree};
     use crate::rays::{self, PictureSize, Work};
@@ -155,7 +157,7 @@ mod tests {
             if program.refuses(&scene).is_some() {
                 continue;
             }
-            let accel = ours::build(&scene).expect("a sound scene");
+            let accel = ours::build(&scene, Preset::Balanced).expect("a sound scene");
             let extent = accel.bounds().size().max_element();
             let built = program.build(&scene, 2).expect("a sound scene");
             for work in Work::ALL {
@@ -183,7 +185,7 @@ mod tests {
 
     #[test]
     fn our_kernel_agrees_with_the_loop_over_everything() {
-        check(&ours::Lumbre, 1.0);
+        check(&ours::Lumbre { preset: Preset::Best }, 1.0);
     }
 
     #[test]
@@ -219,7 +221,7 @@ mod tests {
     #[test]
     fn a_tree_answers_again_what_it_answered_before() {
         let scene = RECIPES[0].make();
-        let accel = ours::build(&scene).expect("a sound scene");
+        let accel = ours::build(&scene, Preset::Balanced).expect("a sound scene");
         let list = rays::make(Work::Random, &scene, &accel, PictureSize { width: 40, height: 20 });
         let mut pass = accel.prepare(Query::Closest, &list);
         pass.run();

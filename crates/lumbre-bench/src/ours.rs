@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result};
 use lumbre_geometry::{PlacedShape, Ray, Sphere};
-use lumbre_kernel::{Accel, BuildOptions, Geometry, GeometryKind, Instance};
+use lumbre_kernel::{Accel, BuildOptions, Geometry, GeometryKind, Instance, Preset};
 use lumbre_math::{DVec3, Transform};
 
 use crate::program::{Built, Pass, Program, Query, Tree};
@@ -12,8 +12,11 @@ use crate::rays::Ray32;
 use crate::rust_heap;
 use crate::scene::Scene;
 
-/// Lumbre, one ray at a time, as it is built by default.
-pub struct Lumbre;
+/// Lumbre, one ray at a time.
+pub struct Lumbre {
+    /// How its trees are built.
+    pub preset: Preset,
+}
 
 /// Every way in which it takes part.
 pub fn programs() -> Vec<Box<dyn Program>> {
@@ -22,7 +25,12 @@ pub fn programs() -> Vec<Box<dyn Program>> {
 
 impl Program for Lumbre {
     fn name(&self) -> String {
-        format!("Lumbre {}", env!("CARGO_PKG_VERSION"))
+        let version = env!("CARGO_PKG_VERSION");
+        match self.preset {
+            Preset::Fast => format!("Lumbre {version} fast"),
+            Preset::Balanced => format!("Lumbre {version}"),
+            Preset::Best => format!("Lumbre {version} best"),
+        }
     }
 
     fn refuses(&self, _: &Scene) -> Option<&'static str> {
@@ -30,14 +38,14 @@ impl Program for Lumbre {
     }
 
     fn build<'a>(&'a self, scene: &'a Scene, threads: usize) -> Result<Built<'a>> {
-        let (accel, seconds, bytes) = rust_heap::measure(threads, || build(scene))?;
+        let (accel, seconds, bytes) = rust_heap::measure(threads, || build(scene, self.preset))?;
         Ok(Built { tree: Box::new(accel?), seconds, bytes })
     }
 }
 
 /// The kernel's tree of a scene.
-pub fn build(scene: &Scene) -> Result<Accel> {
-    let options = BuildOptions::default();
+pub fn build(scene: &Scene, preset: Preset) -> Result<Accel> {
+    let options = BuildOptions { preset };
     let placed: Result<Vec<_>, _> = scene
         .placed_meshes
         .iter()

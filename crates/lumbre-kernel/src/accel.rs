@@ -30,9 +30,33 @@ pub struct Accel {
     pub(crate) holds: Holds,
 }
 
-/// How a tree is built.
-#[derive(Clone, Debug, Default)]
-pub struct BuildOptions {}
+/// How a tree is built. Answers do not depend on it; how soon they come does.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct BuildOptions {
+    /// How much care is taken.
+    pub preset: Preset,
+}
+
+/// How much care is taken over a tree.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Preset {
+    /// Built soonest, for what changes from picture to picture: primitives are sorted along a curve (C. Lauterbach and
+    /// others, "Fast BVH Construction on GPUs", 2009), and only the ends of the tree are chosen by the surface area
+    /// heuristic.
+    Fast,
+    /// Binned by the surface area heuristic at every level (I. Wald, "On fast Construction of SAH-based Bounding Volume
+    /// Hierarchies", 2007).
+    #[default]
+    Balanced,
+    /// The balanced tree, then made better by putting subtrees elsewhere (D. Meister, J. Bittner, "Parallel Reinsertion for
+    /// Bounding Volume Hierarchy Optimization", 2018): for what is built once and asked often.
+    Best,
+}
+
+impl Preset {
+    /// All of them, from the soonest to the best.
+    pub const ALL: [Self; 3] = [Self::Fast, Self::Balanced, Self::Best];
+}
 
 /// Why a tree cannot be built.
 #[derive(Clone, Debug, PartialEq)]
@@ -85,8 +109,7 @@ impl Accel {
     /// [`BuildError`] when a mesh names vertices that it lacks, a coordinate is not finite, or there are 2^29 primitives
     /// or more.
     pub fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result<Self, BuildError> {
-        let BuildOptions {} = options;
-        prepare::build(geometries)
+        prepare::build(geometries, options)
     }
 
     /// The nearest hit in the ray's range. Of hits at the same `t`, the one whose (path, geometry, primitive) comes

@@ -41,6 +41,14 @@ impl Centers {
         self
     }
 
+    pub(crate) fn start(&self) -> [i32; 3] {
+        [self.low[0], self.low[1], self.low[2]]
+    }
+
+    pub(crate) fn sizes(&self) -> [f32; 3] {
+        std::array::from_fn(|axis| (i64::from(self.high[axis]) - i64::from(self.low[axis])) as f32)
+    }
+
     pub(crate) fn are_one(&self) -> bool {
         (0..3).all(|axis| self.low[axis] == self.high[axis])
     }

@@ -6,11 +6,14 @@
 
 use rayon::prelude::*;
 
+use crate::accel::Preset;
 use crate::bins::{self, BestSplit, Binning, Bins, CountLeft, Fill, Measure, Part, Split};
 use crate::collapse::{Choices, Costs, choose};
 use crate::few::{Decide, FEW, Few, group_of};
 use crate::lanes::Level;
+use crate::morton::{self, Code};
 use crate::primitive::{Bounds, Kind, Primitive, Traits};
+use crate::reinsert::reinsert;
 
 /// Levels that may be split by SAH; then come at most 32 more, each halving.
 const SAH_DEPTH: u32 = 64;
@@ -35,6 +38,19 @@ pub(crate) struct Fork {
     pub(crate) children: [Binary; 2],
 }
 
+impl Binary {
+    /// The node over two.
+    pub(crate) fn over(children: [Self; 2]) -> Self {
+        Self::Fork(Box::new(Fork::over(children)))
+    }
+
+    /// A twig of such nodes.
+    pub(crate) fn twig(mut nodes: Vec<BinaryNode>) -> Self {
+        let costs = choose(&mut nodes);
+        Self::Twig(Twig { nodes, costs })
+    }
+}
+
 /// Nodes in depth-first order, the root first, each left child right after its parent.
 pub(crate) struct Twig {
     pub(crate) nodes: Vec<BinaryNode>,
@@ -49,8 +65,18 @@ pub(crate) struct BinaryNode(Bounds);
 const LEAF: u32 = 1 << 31;
 
 impl BinaryNode {
-    fn leaf(bounds: &Bounds, first: usize, count: usize) -> Self {
+    pub(crate) fn leaf(bounds: &Bounds, first: usize, count: usize) -> Self {
         Self(bounds.with_names(first as u32, LEAF | count as u32))
+    }
+
+    /// A leaf from the box of one.
+    pub(crate) fn again(leaf: &Bounds) -> Self {
+        Self(*leaf)
+    }
+
+    /// An inner node, its right child so far behind it.
+    pub(crate) fn inner(bounds: &Bounds, right: usize) -> Self {
+        Self(bounds.with_names(right as u32, 0))
     }
 
     pub(crate) fn bounds(&self) -> &Bounds {
@@ -88,6 +114,7 @@ pub(crate) type Name = [u32; 2];
 /// The binary tree over primitives (not none), and their names in the order of its leaves.
 pub(crate) fn binary_tree(
     level: Level,
+    preset: Preset,
     mut primitives: Vec<Primitive>,
     traits: &[Traits],
 ) -> (Binary, Vec<Name>) {
@@ -100,8 +127,14 @@ pub(crate) fn binary_tree(
     let builder = Builder { level, traits, shared };
     let range = Range { here: &mut primitives, there: &mut other, names: &mut names, first: 0, depth: 0 };
     let only_triangles = traits.iter().all(|traits| traits.kind == Kind::Triangle);
-    let tree =
-        if only_triangles { builder.grow::<false>(range, None) } else { builder.grow::<true>(range, None) };
+    let tree = match (preset, only_triangles) {
+        (Preset::Fast, true) => builder.grow_fast::<false>(range),
+        (Preset::Fast, false) => builder.grow_fast::<true>(range),
+        (_, true) => builder.grow::<false>(range, None),
+        (_, false) => builder.grow::<true>(range, None),
+    };
+    drop((primitives, other));
+    let tree = if preset == Preset::Best { reinsert(tree) } else { tree };
     (tree, names)
 }
 
@@ -161,18 +194,12 @@ impl Builder<'_> {
     fn grow<const COSTS: bool>(&self, range: Range, split: Option<Split>) -> Binary {
         let count = range.len();
         if count <= PARALLEL {
-            let mut workplace =
-                Workplace { nodes: Vec::with_capacity(count / 2), bins: Box::new(Bins::EMPTY) };
-            self.twig::<COSTS>(range, split, &mut workplace);
-            let Workplace { mut nodes, .. } = workplace;
-            nodes.shrink_to_fit();
-            let costs = choose(&mut nodes);
-            return Binary::Twig(Twig { nodes, costs });
+            return self.grow_twig(count, |work| self.twig::<COSTS>(range, split, work));
         }
         let ([left, right], splits) = self.divide::<COSTS>(range, split);
         let (left, right) =
             rayon::join(|| self.grow::<COSTS>(left, splits[0]), || self.grow::<COSTS>(right, splits[1]));
-        Binary::Fork(Box::new(Fork::over([left, right])))
+        Binary::over([left, right])
     }
 
     /// One level of a node that threads share. Apart, so that its bins are not on the stack of what is below.
@@ -197,6 +224,54 @@ impl Builder<'_> {
             self.best::<COSTS>(&bins, binning)
         });
         (cut, splits)
+    }
+
+    /// Splits by the order along a curve.
+    fn grow_fast<const COSTS: bool>(&self, range: Range) -> Binary {
+        let (_, centers) = self.measure(range.here);
+        let codes = morton::sort(range.here, range.there, &centers);
+        let Range { here, there, names, first, depth } = range;
+        self.grow_sorted::<COSTS>(Range { here: there, there: here, names, first, depth }, &codes)
+    }
+
+    /// The depth of this recursion is at most that of the bits of a code, and then of [`Builder::grow`].
+    fn grow_sorted<const COSTS: bool>(&self, range: Range, codes: &[Code]) -> Binary {
+        let count = range.len();
+        if count <= PARALLEL {
+            return self.grow_twig(count, |work| self.twig_sorted::<COSTS>(range, codes, work));
+        }
+        let Some(middle) = morton::cut(codes) else { return self.grow::<COSTS>(range, None) };
+        let [left, right] = range.cut(middle);
+        let (left_codes, right_codes) = codes.split_at(middle);
+        let (left, right) = rayon::join(
+            || self.grow_sorted::<COSTS>(left, left_codes),
+            || self.grow_sorted::<COSTS>(right, right_codes),
+        );
+        Binary::over([left, right])
+    }
+
+    fn twig_sorted<const COSTS: bool>(&self, range: Range, codes: &[Code], work: &mut Workplace) -> Bounds {
+        let count = range.len();
+        if count <= FEW {
+            return self.few::<COSTS>(range, work);
+        }
+        let Some(middle) = morton::cut(codes) else { return self.twig::<COSTS>(range, None, work) };
+        let place = work.nodes.len();
+        work.nodes.push(BinaryNode(Bounds::EMPTY));
+        let [left, right] = range.cut(middle);
+        let (left_codes, right_codes) = codes.split_at(middle);
+        let mut bounds = self.twig_sorted::<COSTS>(left, left_codes, work);
+        let right_place = work.nodes.len() - place;
+        bounds.grow(&self.twig_sorted::<COSTS>(right, right_codes, work));
+        work.nodes[place] = BinaryNode::inner(&bounds, right_place);
+        bounds
+    }
+
+    fn grow_twig(&self, count: usize, grow: impl FnOnce(&mut Workplace) -> Bounds) -> Binary {
+        let mut work = Workplace { nodes: Vec::with_capacity(count / 2), bins: Box::new(Bins::EMPTY) };
+        grow(&mut work);
+        work.nodes.shrink_to_fit();
+        Binary::twig(work.nodes)
     }
 
     fn best<const COSTS: bool>(&self, bins: &Bins, binning: Binning) -> Option<Split> {
@@ -308,7 +383,7 @@ impl Builder<'_> {
         let mut bounds = self.twig::<COSTS>(left, splits[0], work);
         let right_place = work.nodes.len() - place;
         bounds.grow(&self.twig::<COSTS>(right, splits[1], work));
-        work.nodes[place] = BinaryNode(bounds.with_names(right_place as u32, 0));
+        work.nodes[place] = BinaryNode::inner(&bounds, right_place);
         bounds
     }
 
@@ -331,7 +406,7 @@ impl Builder<'_> {
                 let mut bounds = self.few::<COSTS>(left, work);
                 let right_place = work.nodes.len() - place;
                 bounds.grow(&self.few::<COSTS>(right, work));
-                work.nodes[place] = BinaryNode(bounds.with_names(right_place as u32, 0));
+                work.nodes[place] = BinaryNode::inner(&bounds, right_place);
                 bounds
             }
         }

@@ -9,17 +9,19 @@ mod geometry;
 mod hit;
 mod holds;
 mod lanes;
+mod morton;
 mod node;
 mod prepare;
 mod primitive;
 mod query;
+mod reinsert;
 mod stack;
 mod surface;
 mod touch;
 mod traverse;
 mod triangles;
 
-pub use accel::{Accel, BuildError, BuildOptions};
+pub use accel::{Accel, BuildError, BuildOptions, Preset};
 pub use geometry::{CustomGeometry, Geometry, GeometryKind, Instance, TriangleMesh};
 pub use hit::{Hit, InstancePath};
 

@@ -13,13 +13,13 @@ use crate::holds::Holds;
 use crate::lanes::Level;
 use crate::node::{Node, Units, tag};
 use crate::primitive::{Bounds, Kind, Primitive, Traits};
-use crate::{Accel, BuildError, Geometry, GeometryKind, Instance, TriangleMesh};
+use crate::{Accel, BuildError, BuildOptions, Geometry, GeometryKind, Instance, TriangleMesh};
 
 /// References have 29 bits of place.
 pub(crate) const MOST_PRIMITIVES: usize = (1 << 29) - 1;
 
 /// See [`Accel::build`].
-pub(crate) fn build(geometries: Vec<Geometry>) -> Result<Accel, BuildError> {
+pub(crate) fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result<Accel, BuildError> {
     if geometries.len() > MOST_PRIMITIVES {
         return Err(BuildError::TooMany);
     }
@@ -44,7 +44,7 @@ pub(crate) fn build(geometries: Vec<Geometry>) -> Result<Accel, BuildError> {
                 box_triangles(mesh, survey, &units, own);
             }
         }
-        let (binary, names) = binary_tree(level, primitives, &traits);
+        let (binary, names) = binary_tree(level, options.preset, primitives, &traits);
         pack(&geometries, &traits, &binary, &names)?
     };
     Ok(Accel {

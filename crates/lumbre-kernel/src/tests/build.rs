@@ -5,7 +5,7 @@ use std::sync::Arc;
 use lumbre_geometry::{Aabb, Ray};
 use lumbre_math::{DVec3, Transform, Vec3};
 
-use super::scenes::{Balls, Random, build, cube, icosphere, mixture, soup};
+use super::scenes::{Balls, Random, build, cube, icosphere, mixture, options, soup, with_every_preset};
 use crate::node::tag;
 use crate::{Accel, BuildError, BuildOptions, Geometry, GeometryKind, Instance, TriangleMesh};
 
@@ -75,19 +75,25 @@ fn triangles_without_area_are_left_out() {
 
 #[test]
 fn the_tree_is_the_same_from_any_number_of_threads() {
+    with_every_preset(check_that_threads_make_no_difference);
+}
+
+fn check_that_threads_make_no_difference() {
+    // Threads of a pool do not know this thread's.
+    let options = options();
     let print = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             let mut random = Random(5);
             let soup = soup(&mut random, 150_000, DVec3::new(1.0, 2.0, 3.0), 4.0);
-            let accel = build(vec![
-                GeometryKind::Mesh(Arc::new(soup)),
-                GeometryKind::Mesh(Arc::new(icosphere(4, DVec3::ONE, 2.0))),
-            ]);
+            let kinds = [soup, icosphere(4, DVec3::ONE, 2.0)].map(|mesh| GeometryKind::Mesh(Arc::new(mesh)));
+            let geometries = kinds.map(|kind| Geometry { id: 3, kind }).to_vec();
+            let accel = Accel::build(geometries, &options).unwrap();
             format!("{:?}", accel.tree)
         })
     };
     let one = print(1);
+    assert!(one.len() > 1_000_000);
     assert!(one == print(2), "two threads differ from one");
     assert!(one == print(5), "five threads differ from one");
 }

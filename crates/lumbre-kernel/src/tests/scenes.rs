@@ -1,5 +1,6 @@
 //! Things to build trees of, and rays to send at them.
 
+use std::cell::Cell;
 use std::sync::Arc;
 
 use lumbre_geometry::{
@@ -8,7 +9,7 @@ use lumbre_geometry::{
 };
 use lumbre_math::{DVec2, DVec3, Transform, Vec3};
 
-use crate::{Accel, BuildOptions, CustomGeometry, Geometry, GeometryKind, Instance, TriangleMesh};
+use crate::{Accel, BuildOptions, CustomGeometry, Geometry, GeometryKind, Instance, Preset, TriangleMesh};
 
 /// SplitMix64 (G. Steele, D. Lea, C. Flood, OOPSLA 2014).
 pub(crate) struct Random(pub(crate) u64);
@@ -49,10 +50,27 @@ impl Random {
     }
 }
 
+thread_local! {
+    static PRESET: Cell<Preset> = const { Cell::new(Preset::Balanced) };
+}
+
+/// Runs a test once with every preset for what it builds.
+pub(crate) fn with_every_preset(mut run: impl FnMut()) {
+    for preset in Preset::ALL {
+        PRESET.set(preset);
+        run();
+    }
+    PRESET.set(Preset::default());
+}
+
 pub(crate) fn build(kinds: Vec<GeometryKind>) -> Accel {
     let geometries =
         kinds.into_iter().enumerate().map(|(i, kind)| Geometry { id: 1000 + 7 * i as u32, kind }).collect();
-    Accel::build(geometries, &BuildOptions::default()).unwrap()
+    Accel::build(geometries, &options()).unwrap()
+}
+
+pub(crate) fn options() -> BuildOptions {
+    BuildOptions { preset: PRESET.get() }
 }
 
 pub(crate) fn mesh(positions: Vec<DVec3>, indices: Vec<[u32; 3]>) -> TriangleMesh {

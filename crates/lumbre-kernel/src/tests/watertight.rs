@@ -7,8 +7,8 @@ use std::sync::Arc;
 use lumbre_geometry::Ray;
 use lumbre_math::{DVec3, Transform};
 
-use super::scenes::{Random, build, cube, icosphere, torus, vertex};
-use crate::{Accel, GeometryKind, Instance, TriangleMesh};
+use super::scenes::{Random, build, cube, icosphere, torus, vertex, with_every_preset};
+use crate::{Accel, GeometryKind, Instance, Preset, TriangleMesh};
 
 fn meshes() -> Vec<(&'static str, TriangleMesh)> {
     vec![
@@ -99,11 +99,13 @@ fn inside(name: &str) -> [DVec3; 2] {
 
 fn bombard_all(rays: usize) {
     let mut random = Random(77);
-    for (name, mesh) in meshes() {
-        for inside in inside(name) {
-            bombard(name, &mesh, inside, rays, &mut random);
+    with_every_preset(|| {
+        for (name, mesh) in meshes() {
+            for inside in inside(name) {
+                bombard(name, &mesh, inside, rays / Preset::ALL.len(), &mut random);
+            }
         }
-    }
+    });
 }
 
 #[test]
