@@ -163,7 +163,7 @@ fn main() -> Result<()> {
         deadline: options.quick.then(|| start + Duration::from_secs(40)),
     };
 
-    let mut programs: Vec<Box<dyn Program>> = vec![Box::new(ours::Lumbre { preset: options.preset })];
+    let mut programs = ours::programs(options.preset);
     programs.extend(peers()?.into_iter().filter(|peer| is_wanted(&options.peer, &peer.name())));
 
     println!("{}, {}", report::machine(), report::today());

@@ -19,8 +19,8 @@ pub struct Lumbre {
 }
 
 /// Every way in which it takes part.
-pub fn programs() -> Vec<Box<dyn Program>> {
-    vec![Box::new(Lumbre)]
+pub fn programs(preset: Preset) -> Vec<Box<dyn Program>> {
+    vec![Box::new(Lumbre { preset })]
 }
 
 impl Program for Lumbre {
