@@ -11,7 +11,7 @@ use crate::holds::Holds;
 use crate::lanes::Level;
 use crate::node::{Units, tag};
 use crate::query::{All, Any, Batch, Closest, Count, If};
-use crate::{Geometry, GeometryKind, Hit, prepare, surface, traverse};
+use crate::{Geometry, GeometryKind, Hit, RefitError, prepare, refit, surface, traverse};
 
 /// A bounding volume hierarchy over geometries, ready for queries from any number of threads.
 ///
@@ -28,6 +28,8 @@ pub struct Accel {
     pub(crate) primitives: usize,
     pub(crate) level: Level,
     pub(crate) holds: Holds,
+    /// What a ray cost after the build, once that was asked for.
+    pub(crate) built_cost: Option<f64>,
 }
 
 /// How a tree is built. Answers do not depend on it; how soon they come does.
@@ -110,6 +112,26 @@ impl Accel {
     /// or more.
     pub fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result<Self, BuildError> {
         prepare::build(geometries, options)
+    }
+
+    /// Moves what stands in the tree: `geometries` are those that it was built from, with other vertices, shapes,
+    /// transforms or trees of instances. The tree keeps its structure; its boxes become those of what is now in them.
+    /// Queries answer as after a build.
+    ///
+    /// This takes a fraction of the time of a build, but the boxes of what was near and no longer is grow, and queries
+    /// become slower. The answer says by how much, about: the cost of a ray as a multiple of that after the build, 1 or so
+    /// where everything moved together. As a rule, build again where it passes 1.5: with more than a few rays for every
+    /// primitive, queries then lose more time than a build takes.
+    ///
+    /// Trees that hold this one as an instance are to be refitted after it, from the inside out. It is no part of
+    /// them: they hold it in an [`Arc`](std::sync::Arc), which [`Arc::get_mut`](std::sync::Arc::get_mut) opens only for its
+    /// one owner.
+    ///
+    /// # Errors
+    /// [`RefitError`] when the geometries are not sound, or not of the same kinds and sizes, or something that has no place
+    /// in the tree would now need one. The tree is then as it was.
+    pub fn refit(&mut self, geometries: Vec<Geometry>) -> Result<f64, RefitError> {
+        refit::refit(self, geometries)
     }
 
     /// The nearest hit in the ray's range. Of hits at the same `t`, the one whose (path, geometry, primitive) comes

@@ -14,6 +14,7 @@ mod node;
 mod prepare;
 mod primitive;
 mod query;
+mod refit;
 mod reinsert;
 mod stack;
 mod surface;
@@ -24,6 +25,7 @@ mod triangles;
 pub use accel::{Accel, BuildError, BuildOptions, Preset};
 pub use geometry::{CustomGeometry, Geometry, GeometryKind, Instance, TriangleMesh};
 pub use hit::{Hit, InstancePath};
+pub use refit::RefitError;
 
 #[cfg(test)]
 mod brute;

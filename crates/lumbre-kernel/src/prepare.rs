@@ -55,42 +55,45 @@ pub(crate) fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result
         bounds: parts.bounds,
         primitives: count,
         level,
+        built_cost: None,
         geometries,
     })
 }
 
 /// What geometries consist of, triangles apart.
-struct Parts {
+pub(crate) struct Parts {
     /// Everything finite together, what is finite within infinite instances included.
-    bounds: Aabb,
+    pub(crate) bounds: Aabb,
     /// Everything finite that goes into the tree.
-    tree_bounds: Aabb,
-    boxed: Vec<Boxed>,
-    infinite: Vec<Entry>,
+    pub(crate) tree_bounds: Aabb,
+    pub(crate) boxed: Vec<Boxed>,
+    pub(crate) infinite: Vec<Entry>,
     /// Of every mesh.
-    surveys: Vec<Survey>,
+    pub(crate) surveys: Vec<Survey>,
     /// Of all meshes.
-    triangles: usize,
+    pub(crate) triangles: usize,
     /// No corner of a triangle has a larger coordinate, relative to its mesh's origin.
-    largest_corner: f32,
+    pub(crate) largest_corner: f32,
 }
 
 /// What was seen of a mesh.
-struct Survey {
-    geometry: u32,
+pub(crate) struct Survey {
+    pub(crate) geometry: u32,
     /// Triangles that have an area.
-    triangles: usize,
+    pub(crate) triangles: usize,
     /// The same of every [`CHUNK`] triangles.
-    chunks: Vec<u32>,
+    pub(crate) chunks: Vec<u32>,
 }
 
-struct Boxed {
-    bounds: Aabb,
-    geometry: u32,
-    primitive: u32,
+/// A primitive that is no triangle, with its box. They are in the order of their names.
+pub(crate) struct Boxed {
+    pub(crate) bounds: Aabb,
+    pub(crate) geometry: u32,
+    pub(crate) primitive: u32,
 }
 
-fn take_apart(geometries: &[Geometry]) -> Result<Parts, BuildError> {
+/// Checks geometries, and finds out what they consist of.
+pub(crate) fn take_apart(geometries: &[Geometry]) -> Result<Parts, BuildError> {
     let mut parts = Parts {
         bounds: Aabb::EMPTY,
         tree_bounds: Aabb::EMPTY,
@@ -258,9 +261,51 @@ fn greater(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
+/// What makes boxes of a mesh's triangles, in tree units.
+pub(crate) struct Boxer<'a> {
+    mesh: &'a TriangleMesh,
+    shift: DVec3,
+    scale: f64,
+    shift_single: Vec3,
+    scale_single: f32,
+    is_single: bool,
+}
+
+impl<'a> Boxer<'a> {
+    pub(crate) fn new(mesh: &'a TriangleMesh, units: &Units) -> Self {
+        // Where the mesh is moved by a number that single precision has, one subtraction is rounded once, as in double
+        // precision; and the scale is a power of two.
+        let shift = units.origin - mesh.origin;
+        let (shift_single, scale_single) = (shift.as_vec3(), units.scale as f32);
+        let is_single = shift_single.as_dvec3() == shift
+            && (1e-37..1e38).contains(&units.scale)
+            && shift_single.abs().max_element() < 1e37;
+        Self { mesh, shift, scale: units.scale, shift_single, scale_single, is_single }
+    }
+
+    pub(crate) fn mesh(&self) -> &'a TriangleMesh {
+        self.mesh
+    }
+
+    #[inline(always)]
+    pub(crate) fn around(&self, corners: &[Vec3; 3], first: u32, second: u32) -> Bounds {
+        let around = MeshBox::around(corners);
+        if self.is_single {
+            let (shift, scale) = (self.shift_single, self.scale_single);
+            let moved = |corner: &[f32; 3]| std::array::from_fn(|axis| (corner[axis] - shift[axis]) * scale);
+            Bounds::new(moved(&around.low), moved(&around.high), first, second)
+        } else {
+            let moved = |corner: &[f32; 3]| {
+                std::array::from_fn(|axis| ((f64::from(corner[axis]) - self.shift[axis]) * self.scale) as f32)
+            };
+            Bounds::new(moved(&around.low), moved(&around.high), first, second)
+        }
+    }
+}
+
 /// Whether a triangle can be hit at all, as double precision sees it.
 #[inline(always)]
-fn has_area(&[a, b, c]: &[Vec3; 3]) -> bool {
+pub(crate) fn has_area(&[a, b, c]: &[Vec3; 3]) -> bool {
     // Single precision can tell of all but slivers: its errors are below 2^-20 of the products, and 1e-37.
     let (e, f) = ((b - a).to_array(), (c - a).to_array());
     let is_clear = |x: usize, y: usize| {
@@ -286,33 +331,13 @@ fn box_triangles(mesh: &TriangleMesh, survey: &Survey, units: &Units, mut places
         .enumerate()
         .map(|(chunk, &count)| (chunk, places.split_off_mut(..count as usize).expect("they were counted")))
         .collect();
-    // Where the mesh is moved by a number that single precision has, one subtraction is rounded once, as in double
-    // precision; and the scale is a power of two.
-    let shift = units.origin - mesh.origin;
-    let (shift_single, scale_single) = (shift.as_vec3(), units.scale as f32);
-    let is_single = shift_single.as_dvec3() == shift
-        && (f32::MIN_POSITIVE..1e38).contains(&scale_single)
-        && shift_single.abs().max_element() < 1e37
-        && units.scale > 1e-37;
+    let boxer = Boxer::new(mesh, units);
     chunks.into_par_iter().for_each(|(chunk, places)| {
         let first = chunk * CHUNK;
         let triangles = mesh.indices[first..].iter().take(CHUNK).enumerate();
         let boxes = triangles.filter_map(|(i, triangle)| {
             let corners = corners(mesh, triangle).filter(has_area)?;
-            let bounds = MeshBox::around(&corners);
-            let (low, high): ([f32; 3], [f32; 3]) = if is_single {
-                (
-                    std::array::from_fn(|axis| (bounds.low[axis] - shift_single[axis]) * scale_single),
-                    std::array::from_fn(|axis| (bounds.high[axis] - shift_single[axis]) * scale_single),
-                )
-            } else {
-                let wide = |x: f32, axis: usize| ((f64::from(x) - shift[axis]) * units.scale) as f32;
-                (
-                    std::array::from_fn(|axis| wide(bounds.low[axis], axis)),
-                    std::array::from_fn(|axis| wide(bounds.high[axis], axis)),
-                )
-            };
-            Some(Bounds::new(low, high, survey.geometry, (first + i) as u32))
+            Some(boxer.around(&corners, survey.geometry, (first + i) as u32))
         });
         for (place, bounds) in places.iter_mut().zip(boxes) {
             *place = bounds;
@@ -321,7 +346,7 @@ fn box_triangles(mesh: &TriangleMesh, survey: &Survey, units: &Units, mut places
 }
 
 /// The units that make the tree's boxes about 1 in size.
-fn units_of(geometries: &[Geometry], parts: &Parts) -> Units {
+pub(crate) fn units_of(geometries: &[Geometry], parts: &Parts) -> Units {
     let bounds = if parts.tree_bounds.is_empty() {
         Aabb { min: DVec3::ZERO, max: DVec3::ZERO }
     } else {

@@ -4,6 +4,7 @@ mod borders;
 mod boxes;
 mod build;
 mod oracle;
+mod refit;
 mod scenes;
 mod surfaces;
 mod watertight;

@@ -1,0 +1,285 @@
+//! Moving what stands in a tree without building it again.
+
+use std::fmt;
+
+use lumbre_math::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use crate::holds::Holds;
+use crate::node::{Node, WIDTH, tag};
+use crate::prepare::{Boxer, Parts, has_area, take_apart, units_of};
+use crate::primitive::Bounds;
+use crate::triangles::{BlockNames, TriangleBlock};
+use crate::{Accel, BuildError, Geometry, GeometryKind};
+
+/// Why a tree cannot be refitted. It is as it was before.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum RefitError {
+    /// The geometries themselves are not sound.
+    Unsound(BuildError),
+    /// The list is not of the same length.
+    OtherLength {
+        /// How many geometries the tree has.
+        expected: usize,
+        /// How many were given.
+        found: usize,
+    },
+    /// A geometry is of another kind, or has another number of primitives.
+    OtherTopology {
+        /// Position of the geometry in the list.
+        geometry: usize,
+    },
+    /// Something that was left out of the tree when it was built (a triangle without area, an empty or an infinite
+    /// primitive) would now stand in it, or something in it became infinite: the tree is to be built again.
+    NeedsBuild {
+        /// Position of the geometry in the list.
+        geometry: usize,
+        /// The triangle or primitive.
+        element: usize,
+    },
+}
+
+impl fmt::Display for RefitError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unsound(error) => error.fmt(f),
+            Self::OtherLength { expected, found } => {
+                write!(f, "{found} geometries for a tree that was built of {expected}")
+            }
+            Self::OtherTopology { geometry } => {
+                write!(f, "geometry {geometry} is not of the kind and size that the tree was built of")
+            }
+            Self::NeedsBuild { geometry, element } => {
+                write!(f, "element {element} of geometry {geometry} has no place in the tree: build it again")
+            }
+        }
+    }
+}
+
+impl std::error::Error for RefitError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Self::Unsound(error) => Some(error),
+            _ => None,
+        }
+    }
+}
+
+/// See [`Accel::refit`].
+pub(crate) fn refit(accel: &mut Accel, geometries: Vec<Geometry>) -> Result<f64, RefitError> {
+    if geometries.len() != accel.geometries.len() {
+        return Err(RefitError::OtherLength { expected: accel.geometries.len(), found: geometries.len() });
+    }
+    for (geometry, (old, new)) in accel.geometries.iter().zip(&geometries).enumerate() {
+        if !is_same_topology(&old.kind, &new.kind) {
+            return Err(RefitError::OtherTopology { geometry });
+        }
+    }
+    let parts = take_apart(&geometries).map_err(RefitError::Unsound)?;
+    check_infinite(accel, &parts)?;
+    check_triangles(accel, &geometries, &parts)?;
+    let boxes = entry_boxes(accel, &parts)?;
+
+    // From here on nothing can fail.
+    let units = units_of(&geometries, &parts);
+    let built_cost = *accel.built_cost.get_or_insert_with(|| cost(&accel.tree.nodes));
+    let boxers: Vec<Option<Boxer>> = geometries
+        .iter()
+        .map(|geometry| match &geometry.kind {
+            GeometryKind::Mesh(mesh) => Some(Boxer::new(mesh, &units)),
+            _ => None,
+        })
+        .collect();
+    let tree = &mut accel.tree;
+    let block_boxes: Vec<Bounds> = tree
+        .blocks
+        .par_iter_mut()
+        .zip(&tree.names)
+        .with_min_len(256)
+        .map(|(block, names)| match &boxers[names.geometry as usize] {
+            Some(boxer) => fill_block(block, names, boxer),
+            None => Bounds::EMPTY,
+        })
+        .collect();
+    let entry_boxes: Vec<Bounds> = boxes
+        .iter()
+        .map(|boxed| boxed.map_or(Bounds::EMPTY, |bounds| Bounds::near(&units, &bounds, 0, 0)))
+        .collect();
+
+    // Children stand behind their parents.
+    let mut node_boxes = vec![Bounds::EMPTY; tree.nodes.len()];
+    for place in (0..tree.nodes.len()).rev() {
+        let node = &mut tree.nodes[place];
+        let mut whole = Bounds::EMPTY;
+        for lane in 0..node.len as usize % (WIDTH + 1) {
+            let child = node.children[lane];
+            let first = (child & tag::PLACE) as usize;
+            let mut around = Bounds::EMPTY;
+            match child >> tag::SHIFT {
+                tag::INNER => around = node_boxes[first],
+                tag::TRIANGLES => {
+                    block_boxes[tag::blocks(child)].iter().for_each(|bounds| around.grow(bounds));
+                }
+                _ => {
+                    for (entry, bounds) in tree.entries[first..].iter().zip(&entry_boxes[first..]) {
+                        around.grow(bounds);
+                        if entry.is_last() {
+                            break;
+                        }
+                    }
+                }
+            }
+            for axis in 0..3 {
+                node.planes[2 * axis][lane] = around.low_plane(axis);
+                node.planes[2 * axis + 1][lane] = around.high_plane(axis);
+            }
+            whole.grow(&around);
+        }
+        node_boxes[place] = whole;
+    }
+
+    let cost = cost(&tree.nodes);
+    accel.holds = Holds::new(&geometries, parts.largest_corner);
+    accel.primitives = parts.boxed.len() + parts.triangles + parts.infinite.len();
+    accel.units = units;
+    accel.bounds = parts.bounds;
+    accel.geometries = geometries;
+    Ok(if built_cost > 0.0 { cost / built_cost } else { 1.0 })
+}
+
+fn is_same_topology(old: &GeometryKind, new: &GeometryKind) -> bool {
+    match (old, new) {
+        (GeometryKind::Mesh(old), GeometryKind::Mesh(new)) => old.indices.len() == new.indices.len(),
+        (GeometryKind::Custom(old), GeometryKind::Custom(new)) => {
+            old.primitive_count() == new.primitive_count()
+        }
+        (GeometryKind::Shape(_), GeometryKind::Shape(_))
+        | (GeometryKind::Instance(_), GeometryKind::Instance(_)) => true,
+        _ => false,
+    }
+}
+
+/// What is infinite is to be the same as before.
+fn check_infinite(accel: &Accel, parts: &Parts) -> Result<(), RefitError> {
+    let name = |entry: &crate::collapse::Entry| (entry.geometry, entry.primitive());
+    let (mut old, mut new) = (accel.infinite.iter().map(name), parts.infinite.iter().map(name));
+    loop {
+        match (old.next(), new.next()) {
+            (None, None) => return Ok(()),
+            (old, new) if old == new => {}
+            (old, new) => {
+                let (geometry, element) = old.min(new).or(old).or(new).unwrap_or_default();
+                return Err(RefitError::NeedsBuild {
+                    geometry: geometry as usize,
+                    element: element as usize,
+                });
+            }
+        }
+    }
+}
+
+/// Every triangle that has an area is to have a place in the tree.
+fn check_triangles(accel: &Accel, geometries: &[Geometry], parts: &Parts) -> Result<(), RefitError> {
+    let mut named = vec![0; geometries.len()];
+    for names in &accel.tree.names {
+        let count = names.primitives.iter().filter(|&&primitive| primitive != u32::MAX).count();
+        named[names.geometry as usize] += count;
+    }
+    for (geometry, standing) in geometries.iter().enumerate() {
+        let GeometryKind::Mesh(mesh) = &standing.kind else { continue };
+        if named[geometry] == mesh.indices.len() {
+            continue;
+        }
+        let mut has_place = vec![false; mesh.indices.len()];
+        for names in accel.tree.names.iter().filter(|names| names.geometry as usize == geometry) {
+            for &primitive in names.primitives.iter().filter(|&&primitive| primitive != u32::MAX) {
+                has_place[primitive as usize] = true;
+            }
+        }
+        let missing = (0..mesh.indices.len()).find(|&triangle| {
+            let corners = mesh.indices[triangle].map(|vertex| mesh.positions[vertex as usize]);
+            !has_place[triangle] && has_area(&corners)
+        });
+        if let Some(element) = missing {
+            return Err(RefitError::NeedsBuild { geometry, element });
+        }
+    }
+    debug_assert!(named.iter().sum::<usize>() >= parts.triangles);
+    Ok(())
+}
+
+/// The boxes of the entries in the tree; `None` of what became empty.
+fn entry_boxes(accel: &Accel, parts: &Parts) -> Result<Vec<Option<lumbre_geometry::Aabb>>, RefitError> {
+    // In the order of their names, as they were taken apart.
+    let mut has_place = vec![false; parts.boxed.len()];
+    let boxes = accel
+        .tree
+        .entries
+        .iter()
+        .map(|entry| {
+            let name = (entry.geometry, entry.primitive());
+            let found = parts.boxed.binary_search_by_key(&name, |boxed| (boxed.geometry, boxed.primitive));
+            found.ok().map(|place| {
+                has_place[place] = true;
+                parts.boxed[place].bounds
+            })
+        })
+        .collect();
+    match has_place.iter().position(|&has_place| !has_place) {
+        Some(missing) => {
+            let boxed = &parts.boxed[missing];
+            Err(RefitError::NeedsBuild {
+                geometry: boxed.geometry as usize,
+                element: boxed.primitive as usize,
+            })
+        }
+        None => Ok(boxes),
+    }
+}
+
+/// Takes the corners over; a triangle without area becomes one that is never hit.
+fn fill_block(block: &mut TriangleBlock, names: &BlockNames, boxer: &Boxer) -> Bounds {
+    let mut around = Bounds::EMPTY;
+    for (lane, &primitive) in names.primitives.iter().enumerate() {
+        if primitive == u32::MAX {
+            continue;
+        }
+        let mesh = boxer.mesh();
+        let corners = mesh.indices[primitive as usize].map(|vertex| mesh.positions[vertex as usize]);
+        let is_there = has_area(&corners);
+        if is_there {
+            around.grow(&boxer.around(&corners, 0, 0));
+        }
+        for (corner, position) in corners.iter().enumerate() {
+            let position = if is_there { *position } else { Vec3::NAN };
+            for axis in 0..3 {
+                block.corners[corner][axis][lane] = position[axis];
+            }
+        }
+    }
+    around
+}
+
+/// How many boxes a ray meets, about: the areas of all, as parts of the area of the whole.
+fn cost(nodes: &[Node]) -> f64 {
+    let area = |node: &Node, lane: usize| {
+        let size =
+            |axis: usize| f64::from(node.planes[2 * axis + 1][lane] - node.planes[2 * axis][lane]).max(0.0);
+        size(0) * size(1) + size(1) * size(2) + size(2) * size(0)
+    };
+    let Some(root) = nodes.first() else { return 0.0 };
+    let whole = {
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for lane in 0..root.len as usize % (WIDTH + 1) {
+            let corner =
+                |side: usize| DVec3::from_array([0, 2, 4].map(|axis| root.planes[axis + side][lane].into()));
+            (low, high) = (low.min(corner(0)), high.max(corner(1)));
+        }
+        let size = (high - low).max(DVec3::ZERO);
+        size.x * size.y + size.y * size.z + size.z * size.x
+    };
+    let lanes = |node: &Node| (0..node.len as usize % (WIDTH + 1)).map(|lane| area(node, lane)).sum::<f64>();
+    let all: f64 = nodes.iter().map(lanes).sum();
+    if whole > 0.0 { all / whole } else { 0.0 }
+}
