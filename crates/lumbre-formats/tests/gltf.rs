@@ -1032,3 +1032,228 @@ fn damaged_files_never_panic_and_cost_little() {
     }
     assert!(errors > 500 && reads > 500, "{errors} {reads}");
 }
+
+// What Google's Draco 1.5 made of `grid`: sequential, and by edge breaking.
+const DRACO: [&str; 2] = [
+    "RFJBQ08CAgEAAAAMDAEAAQUABQQBAgYBBgUCAwcCBwYEBQkECQgFBgoFCgkGBwsGCwoBBAICBAEAAwkCAQEBCQMAAgAJAwADAQAAAgABA\
+     QEByQEBLFUBL1UBQ60C//sBDJutAguqcwxrKUJwE5VCigAAAAD/AAAAAAAAAAAAAACrqqo+AAAAAKuqKj8AAAAAAACAPwAAAAAAAAAAAA\
+     AAP6uqqj4AAAA/q6oqPwAAAD8AAIA/AAAAPwAAAAAAAIA/q6qqPgAAgD+rqio/AACAPwAAgD8AAIA/AAAAAAAAAAAAAIA/AAAAAAAAAAA\
+     AAIA/AAAAAAAAAAAAAIA/AAAAAAAAAAAAAIA/AAAAAAAAAAAAAIA/AAAAAAAAAAAAAIA/AAAAAAAAAAAAAIA/AAAAAAAAAAAAAIA/AAAA\
+     AAAAAAAAAIA/AAAAAAAAAAAAAIA/AAAAAAAAAAAAAIA/AAAAAAAAAAAAAIA/AAEBAA8DVQUvrToDECCIUFUBAABAVQUAAABVFQAAAASA/\
+     x8AUFUBAKtKVQUAqCpVFQBIVQUA/x8AUFUBAFVVVQUApipVFQCoqgAAAAAA/z8AAAAAAEAAAEBAAAAAAAAAwD8O",
+    "RFJBQ08CAgEBAAAADAwDDAIABH+69in/ARH/At1A/wLdQP8C3UAEAAAAAQAAAgAA/wABAQICBAEAAQEDCQIBAQABAQkDAAIAAQAJAwADA\
+     gEBAQAJAwEwFwEQBAC8joCgyA4BnwAAAADHAAAAAAAAAAAAAAD/AAAAq6qqPgAAAD8AAAAAAAAAPwAAAAAAAAAAq6qqPgAAAACrqio/AA\
+     AAP6uqKj8AAAAAAACAPwAAAD8AAIA/AAAAAAAAgD8AAIA/q6oqPwAAgD+rqqo+AACAPwAAAAAAAIA/AAAAAAAAAAAAAIA/AAAAAAAAAAA\
+     AAIA/AAAAAAAAAAAAAIA/AAAAAAAAAAAAAIA/AAAAAAAAAAAAAIA/AAAAAAAAAAAAAIA/AAAAAAAAAAAAAIA/AAAAAAAAAAAAAIA/AAAA\
+     AAAAAAAAAIA/AAAAAAAAAAAAAIA/AAAAAAAAAAAAAIA/AAAAAAAAAAAAAIA/AQEBAA8DVQUrrRoBIASYbfm5qur/b1WlqgBAVQUA/P8AA\
+     AAAAFUVAAAAqgoAAMBUBQAAgFQVAAAAkKoCAAAwVQEAAABVBQAAYKoCAAAAAP8/AAAAAABAAABAQAAAAAAAAMA/Dg==",
+];
+
+/// The vertices of four by three: place, uv, colour.
+fn grid() -> Vec<([f32; 3], [f32; 2], [u8; 4])> {
+    let at = |i: u8, j: u8| {
+        let (x, y) = (f32::from(i), f32::from(j));
+        let place = [2.0 + 0.5 * x, 3.0 + 0.75 * y, f32::from((i * j) % 3) * 0.25];
+        (place, [x / 3.0, y / 2.0], [i * 80, j * 100, 7, 255])
+    };
+    (0..3).flat_map(|j| (0..4).map(move |i| at(i, j))).collect()
+}
+
+/// A file with a primitive in compressed data, which say so many indices.
+fn compressed_by_draco(data: &[u8], indices: usize) -> (String, Vec<u8>) {
+    let json = format!(
+        r#"{{"asset":{{"version":"2.0"}},"extensionsUsed":["KHR_draco_mesh_compression"],
+        "extensionsRequired":["KHR_draco_mesh_compression"],"buffers":[{{"byteLength":{0}}}],
+        "bufferViews":[{{"buffer":0,"byteLength":{0}}}],"accessors":[
+        {{"componentType":5126,"type":"VEC3","count":12,"min":[2,3,0],"max":[3.5,4.5,0.5]}},
+        {{"componentType":5126,"type":"VEC2","count":12}},
+        {{"componentType":5126,"type":"VEC3","count":12}},
+        {{"componentType":5121,"normalized":true,"type":"VEC4","count":12}},
+        {{"componentType":5123,"type":"SCALAR","count":{indices}}}],
+        "materials":[{{"pbrMetallicRoughness":{{"baseColorTexture":{{"index":0}}}}}}],
+        "textures":[{{}}],
+        "meshes":[{{"primitives":[{{"material":0,"attributes":{{"POSITION":0,"TEXCOORD_0":1,"NORMAL":2,"COLOR_0":3}},"indices":4,
+        "extensions":{{"KHR_draco_mesh_compression":{{"bufferView":0,
+        "attributes":{{"POSITION":3,"TEXCOORD_0":1,"NORMAL":2,"COLOR_0":0}}}}}}}}]}}],"nodes":[{{"mesh":0}}]}}"#,
+        data.len()
+    );
+    (json, data.to_vec())
+}
+
+fn base64(text: &str) -> Vec<u8> {
+    let value = |c: u8| match c {
+        b'A'..=b'Z' => c - b'A',
+        b'a'..=b'z' => c - b'a' + 26,
+        b'0'..=b'9' => c - b'0' + 52,
+        b'+' => 62,
+        _ => 63,
+    };
+    let text = text.trim_end_matches('=');
+    let bits: Vec<u32> = text.bytes().map(|c| u32::from(value(c))).collect();
+    let mut out = vec![];
+    for four in bits.chunks(4) {
+        let word = four.iter().enumerate().fold(0, |word, (i, b)| word | b << (18 - 6 * i));
+        out.extend(&word.to_be_bytes()[1..four.len()]);
+    }
+    out
+}
+
+#[cfg(feature = "draco")]
+#[test]
+fn primitives_compressed_by_draco_are_the_mesh_that_they_were() {
+    let grid = grid();
+    for packed in DRACO {
+        let (json, data) = compressed_by_draco(&base64(packed), 36);
+        let scene = read(&json, &data);
+        let mesh = mesh(&scene.shapes[0]);
+        assert_eq!((mesh.positions.len(), mesh.triangles.len()), (12, 12));
+        let mut met = vec![];
+        for i in 0..12 {
+            let place = mesh.positions[i];
+            let near = |(p, ..): &([f32; 3], [f32; 2], [u8; 4])| (Vec3::from(*p) - place).length() < 1e-3;
+            let index = grid.iter().position(near).unwrap_or_else(|| panic!("{place} is no vertex"));
+            let (_, uv, colour) = grid[index];
+            // The v of glTF counts downwards.
+            let found = mesh.uvs.as_ref().unwrap()[i];
+            assert!((found - Vec2::new(uv[0], 1.0 - uv[1])).length() < 1e-3, "{found}");
+            assert!((mesh.normals.as_ref().unwrap()[i] - Vec3::Z).length() < 1e-3);
+            let expected = colour.map(|c| f32::from(c) / 255.0);
+            assert_eq!(mesh.colours.as_ref().unwrap()[i].to_array(), expected[..3]);
+            met.push(index);
+        }
+        // Each cell of the grid has two triangles that turn the same way.
+        let mut cells: Vec<(usize, f32)> = mesh
+            .triangles
+            .iter()
+            .map(|corners| {
+                let [a, b, c] = corners.map(|i| mesh.positions[i as usize]);
+                let least = corners.iter().map(|&i| met[i as usize]).min().unwrap();
+                (least, (b - a).cross(c - a).z)
+            })
+            .collect();
+        cells.sort_by_key(|(cell, _)| *cell);
+        let firsts: Vec<usize> = cells.iter().map(|(cell, _)| *cell).collect();
+        assert_eq!(firsts, [0, 0, 1, 1, 2, 2, 4, 4, 5, 5, 6, 6]);
+        assert!(cells.iter().all(|(_, turn)| *turn > 0.0));
+        met.sort_unstable();
+        assert_eq!(met, (0..12).collect::<Vec<_>>());
+    }
+}
+
+#[cfg(feature = "draco")]
+#[test]
+fn damaged_draco_is_an_error_with_a_pointer_and_costs_little() {
+    let whole = base64(DRACO[1]);
+    let (json, data) = compressed_by_draco(&whole, 33);
+    let message = error(&json, &data);
+    assert!(message.contains("/meshes/0/primitives/0"), "{message}");
+    let (json, data) = compressed_by_draco(&whole, 4_000_000_000);
+    let message = error(&json, &data);
+    assert!(message.contains("--max-expansion"), "{message}");
+    let mut survived = 0;
+    for at in 0..whole.len() {
+        for damage in [0x01, 0x80, 0xFF] {
+            let mut data = whole.clone();
+            data[at] ^= damage;
+            let (json, data) = compressed_by_draco(&data, 36);
+            let budget = Budget::default();
+            let name: Arc<str> = "m.gltf".into();
+            let read = read_gltf(
+                &glb(&json, &data),
+                &name,
+                Path::new("."),
+                &GltfOptions::default(),
+                &budget,
+                &mut Diagnostics::new(),
+            );
+            survived += usize::from(read.is_ok());
+            assert!(budget.memory_peak() < 64 << 20, "{at}: {}", budget.memory_peak());
+        }
+    }
+    assert!(survived < whole.len() * 3);
+    for cut in 0..whole.len() {
+        let (json, data) = compressed_by_draco(&whole[..cut.max(1)], 36);
+        assert!(error(&json, &data).contains("/meshes/0/primitives/0"), "{cut}");
+    }
+}
+
+/// A KTX 2.0 texture of 8 by 4 pixels in two blocks of one colour each, in UASTC's mode for these.
+fn ktx(colours: [[u8; 4]; 2]) -> Vec<u8> {
+    let words = |words: &[u32]| -> Vec<u8> { words.iter().flat_map(|w| w.to_le_bytes()).collect() };
+    let mut out = b"\xABKTX 20\xBB\r\n\x1A\n".to_vec();
+    out.extend(words(&[0, 1, 8, 4, 0, 0, 1, 1, 0]));
+    out.extend(words(&[104, 44, 0, 0, 0, 0, 0, 0]));
+    out.extend(words(&[160, 0, 32, 0, 32, 0]));
+    // The descriptor of the data: model 166 is UASTC; sRGB; blocks of four by four in 16 bytes; channel 3 is RGBA.
+    out.extend(words(&[44, 0, 2 | 40 << 16, 166 | 1 << 8 | 2 << 16, 3 | 3 << 8, 16, 0]));
+    out.extend(words(&[127 << 16 | 3 << 24, 0, 0, u32::MAX]));
+    out.resize(160, 0);
+    for colour in colours {
+        // Five bits of mode, then the colour.
+        let bits = u128::from(0x17_u8) | u128::from(u32::from_le_bytes(colour)) << 5;
+        out.extend(bits.to_le_bytes());
+    }
+    out
+}
+
+#[cfg(feature = "basisu")]
+#[test]
+fn textures_in_basis_universal_are_read() {
+    let colours = [[200, 100, 50, 255], [10, 20, 30, 128]];
+    let whole = ktx(colours);
+    let with = |texture: &[u8]| {
+        let mut parts = Parts::default();
+        let p = parts.positions(&[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+        let uv = parts
+            .add(&floats(&[0.0, 0.0, 1.0, 0.0, 0.0, 1.0]), r#""componentType":5126,"type":"VEC2","count":3"#);
+        parts.binary.resize(parts.binary.len().next_multiple_of(4), 0);
+        let view = parts.views.len();
+        parts.views.push(format!(
+            r#"{{"buffer":0,"byteOffset":{},"byteLength":{}}}"#,
+            parts.binary.len(),
+            texture.len()
+        ));
+        parts.binary.extend(texture);
+        let json = parts.json(&format!(
+            r#""extensionsUsed":["KHR_texture_basisu"],"extensionsRequired":["KHR_texture_basisu"],
+            "images":[{{"bufferView":{view},"mimeType":"image/ktx2"}}],
+            "textures":[{{"extensions":{{"KHR_texture_basisu":{{"source":0}}}}}}],
+            "materials":[{{"emissiveFactor":[1,1,1],"emissiveTexture":{{"index":0}}}}],
+            "meshes":[{{"primitives":[{{"material":0,"attributes":{{"POSITION":{p},"TEXCOORD_0":{uv}}}}}]}}],
+            "nodes":[{{"mesh":0}}]"#
+        ));
+        (json, parts.binary)
+    };
+    let (json, binary) = with(&whole);
+    let scene = read(&json, &binary);
+    let light = scene.shapes[0].area_light.clone().unwrap();
+    let map = light.image.unwrap();
+    // The left half has the first colour, the right half the second, on the sRGB curve.
+    let linear = |c: u8| lumbre_image::srgb_to_linear(f32::from(c) / 255.0);
+    let bitmap = map.bitmap();
+    assert_eq!((bitmap.width(), bitmap.height()), (8, 4));
+    for (x, colour) in [(1, colours[0]), (6, colours[1])] {
+        let found: Rgb = bitmap.rgb(x, 2);
+        let expected = Rgb::new(linear(colour[0]), linear(colour[1]), linear(colour[2]));
+        assert!((found - expected).map(f32::abs).max_component() < 0.01, "{found:?} {expected:?}");
+    }
+    for cut in 0..whole.len() {
+        let (json, binary) = with(&whole[..cut.max(1)]);
+        let message = error(&json, &binary);
+        assert!(message.contains("/images/0"), "{cut}: {message}");
+    }
+    for at in 0..whole.len() {
+        for damage in [0x01, 0x10, 0xFF] {
+            let mut texture = whole.clone();
+            texture[at] ^= damage;
+            let (json, binary) = with(&texture);
+            let _ = read_with(&glb(&json, &binary), &GltfOptions::default(), &mut Diagnostics::new());
+        }
+    }
+    // A size that its data cannot have is refused before it is believed.
+    let mut texture = whole;
+    texture[20..28].copy_from_slice(&[0, 0, 1, 0, 0, 0, 1, 0]);
+    let (json, binary) = with(&texture);
+    let message = error(&json, &binary);
+    assert!(message.contains("first level of another size than its blocks"), "{message}");
+}

@@ -16,7 +16,7 @@ pub(super) enum Component {
 }
 
 impl Component {
-    fn read(value: Value<'_>) -> Read<Self> {
+    pub fn read(value: Value<'_>) -> Read<Self> {
         Ok(match value.whole(0)? {
             5120 => Self::I8,
             5121 => Self::U8,
@@ -32,7 +32,7 @@ impl Component {
         })
     }
 
-    fn bytes(self) -> usize {
+    pub fn bytes(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
             Self::I16 | Self::U16 => 2,
@@ -75,7 +75,7 @@ impl Element {
         ("MAT4", Self::Mat4),
     ];
 
-    fn read(value: Value<'_>) -> Read<Self> {
+    pub fn read(value: Value<'_>) -> Read<Self> {
         let text = value.string()?;
         let known = Self::NAMES.iter().find(|(name, _)| *name == text).map(|&(_, element)| element);
         known.ok_or_else(|| {
@@ -101,7 +101,8 @@ impl Element {
         }
     }
 
-    fn numbers(self) -> usize {
+    /// How many numbers there are in all.
+    pub fn numbers(self) -> usize {
         let (columns, rows) = self.columns();
         columns * rows
     }
@@ -241,7 +242,12 @@ impl<'a> Accessor<'a> {
             start: offset,
             stride: size,
         };
-        if let Some(name) = value.get("bufferView")? {
+        if let Some(bytes) = file.filled(index) {
+            at.data = Some(Strided { bytes: Some(bytes), stride: size });
+            at.start = 0;
+            let here = View { bytes: Some(bytes), length: bytes.len() as u64, stride: None, offset: 0 };
+            strided(count_value, &here, 0, count, size, least)?;
+        } else if let Some(name) = value.get("bufferView")? {
             let (index, view) = file.view(name)?;
             let stride = view.stride.unwrap_or(size);
             if stride < least {

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::cell::RefCell;
+use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -87,6 +88,8 @@ pub(super) struct File<'a> {
     buffers: Vec<Option<Cow<'a, [u8]>>>,
     /// Bytes of buffer views that were compressed.
     unpacked: Vec<Option<Vec<u8>>>,
+    /// Elements of accessors that were compressed with their primitives.
+    filled: HashMap<usize, Vec<u8>>,
     /// Bytes of all buffers together.
     buffer_bytes: u64,
 }
@@ -122,6 +125,7 @@ impl<'a> File<'a> {
             lists: Default::default(),
             buffers: vec![],
             unpacked: vec![],
+            filled: HashMap::new(),
             buffer_bytes: 0,
         }
     }
@@ -224,6 +228,11 @@ impl<'a> File<'a> {
             let bytes = super::meshopt::unpacked(self, value)?;
             self.buffer_bytes += bytes.as_ref().map_or(0, |bytes| bytes.len() as u64);
             self.unpacked.push(bytes);
+        }
+        #[cfg(feature = "draco")]
+        {
+            self.filled = super::draco::filled(self)?;
+            self.buffer_bytes += self.filled.values().map(|bytes| bytes.len() as u64).sum::<u64>();
         }
         Ok(())
     }
@@ -358,6 +367,11 @@ impl<'a> File<'a> {
     pub fn view(&self, value: Value<'_>) -> Read<(usize, View<'_>)> {
         let (index, view) = self.at(List::BufferViews, value)?;
         Ok((index, self.view_at(index, view)?))
+    }
+
+    /// The elements of an accessor that was compressed with its primitive, tightly packed.
+    pub fn filled(&self, accessor: usize) -> Option<&[u8]> {
+        self.filled.get(&accessor).map(Vec::as_slice)
     }
 
     /// A buffer view.

@@ -1,4 +1,5 @@
-//! Compressed buffer views (`EXT_meshopt_compression`, Khronos, 2021; the codecs of A. Kapoulkine's meshoptimizer).
+//! Compressed buffer views (`EXT_meshopt_compression`, 2021, and its successor `KHR_meshopt_compression`, a draft of 2025;
+//! Khronos. The codecs are those of A. Kapoulkine's meshoptimizer).
 
 use super::file::File;
 use super::json::{Read, Value};
@@ -9,7 +10,15 @@ type Decoded<T> = Result<T, &'static str>;
 
 /// The bytes of a buffer view, where it is compressed.
 pub(super) fn unpacked(file: &File<'_>, view: Value<'_>) -> Read<Option<Vec<u8>>> {
-    let Some(value) = view.extension("EXT_meshopt_compression")? else { return Ok(None) };
+    let (value, generation) =
+        match (view.extension("EXT_meshopt_compression")?, view.extension("KHR_meshopt_compression")?) {
+            (None, None) => return Ok(None),
+            (Some(value), None) => (value, Generation::Ext),
+            (None, Some(value)) => (value, Generation::Khr),
+            (Some(_), Some(value)) => {
+                return Err(value.wrong("buffer view that is compressed in two ways").into());
+            }
+        };
     let stride_value = value.need("byteStride")?;
     let stride = stride_value.whole(1)?;
     let count_value = value.need("count")?;
@@ -24,7 +33,7 @@ pub(super) fn unpacked(file: &File<'_>, view: Value<'_>) -> Read<Option<Vec<u8>>
         "ATTRIBUTES" => (
             stride.is_multiple_of(4) && stride <= 256,
             "a multiple of 4, 256 at most",
-            length.saturating_mul(64) / stride,
+            length.saturating_mul(generation.most_bytes_of_one()) / stride,
         ),
         "TRIANGLES" => (stride == 2 || stride == 4, "2 or 4", length.saturating_mul(3)),
         "INDICES" => (stride == 2 || stride == 4, "2 or 4", length),
@@ -50,9 +59,10 @@ pub(super) fn unpacked(file: &File<'_>, view: Value<'_>) -> Read<Option<Vec<u8>>
     let Some(packed) = packed else {
         return Err(value.wrong("the buffer of what is needed here has no data").into());
     };
+    super::check_expansion(file, value, length, count as u64 * stride as u64)?;
     let mut bytes = file.budget.vec(count as u64 * stride as u64, "decompressed buffer view")?;
     let decoded = match &*mode {
-        "ATTRIBUTES" => attributes(packed, count, stride, &mut bytes),
+        "ATTRIBUTES" => attributes(packed, count, stride, generation, &mut bytes),
         "TRIANGLES" => triangles(packed, count, |index| put(&mut bytes, index, stride)),
         _ => indices(packed, count, |index| put(&mut bytes, index, stride)),
     };
@@ -72,13 +82,35 @@ pub(super) fn unpacked(file: &File<'_>, view: Value<'_>) -> Read<Option<Vec<u8>>
             exponential(&mut bytes);
             Ok(())
         }
-        "OCTAHEDRAL" | "QUATERNION" => Err("a filter that does not go with the stride"),
+        "COLOR" if generation == Generation::Khr && (stride == 4 || stride == 8) => {
+            colours(&mut bytes, stride);
+            Ok(())
+        }
+        "OCTAHEDRAL" | "QUATERNION" | "COLOR" => Err("a filter that does not go with the stride"),
         _ => Err("an unknown filter"),
     };
     match filtered {
         Ok(()) if filter == "NONE" || mode == "ATTRIBUTES" => Ok(Some(bytes)),
         Ok(()) => Err(damaged("a filter on indices").into()),
         Err(what) => Err(damaged(what).into()),
+    }
+}
+
+/// Which extension.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Generation {
+    Ext,
+    Khr,
+}
+
+impl Generation {
+    /// The most bytes that one compressed byte can become: 256 elements without differences of 4 bytes take 4 bytes, or
+    /// with the control bytes of `Khr` 1.
+    fn most_bytes_of_one(self) -> u64 {
+        match self {
+            Self::Ext => 64,
+            Self::Khr => 1024,
+        }
     }
 }
 
@@ -124,61 +156,133 @@ fn unzigzag(value: u32) -> u32 {
 }
 
 /// Mode 0: for blocks of elements, byte by byte of the element, differences in groups of 16 of so many bits each.
-fn attributes(packed: &[u8], count: usize, stride: usize, out: &mut Vec<u8>) -> Decoded<()> {
-    let tail = stride.max(32);
-    let mut data = Bytes { rest: packed.get(..packed.len().saturating_sub(tail)).ok_or(SHORT)? };
-    if data.byte()? != 0xA0 {
-        return Err("a header that is not that of attributes");
-    }
-    // The element before the first is the last thing in the data.
+fn attributes(
+    packed: &[u8],
+    count: usize,
+    stride: usize,
+    generation: Generation,
+    out: &mut Vec<u8>,
+) -> Decoded<()> {
+    let is_second = match packed.first() {
+        Some(0xA0) => false,
+        Some(0xA1) if generation == Generation::Khr => true,
+        _ => return Err("a header that is not that of attributes"),
+    };
+    // The element before the first, and how each four bytes of it differ from those of the next, are the last thing.
+    let channels = if is_second { stride / 4 } else { 0 };
+    let tail = (stride + channels).max(if is_second { 24 } else { 32 });
+    let mut data = Bytes { rest: packed.get(1..packed.len().saturating_sub(tail)).ok_or(SHORT)? };
+    let last = packed.len() - channels;
     let mut before = [0_u8; 256];
-    before[..stride].copy_from_slice(&packed[packed.len() - stride..]);
+    before[..stride].copy_from_slice(&packed[last - stride..last]);
+    let mut differences = [Difference::Bytes; 64];
+    for (difference, &byte) in differences.iter_mut().zip(&packed[last..]) {
+        *difference = Difference::read(byte)?;
+    }
     let most = ((8192 / stride) & !15).min(256);
-    let mut values = [0_u8; 256];
+    let mut lanes = [[0_u8; 256]; 4];
     let mut first = 0;
     while first < count {
         let block = most.min(count - first);
         out.resize((first + block) * stride, 0);
         let groups = block.div_ceil(16);
-        for lane in 0..stride {
-            let header = data.take(groups.div_ceil(4))?;
-            for group in 0..groups {
-                let bits = header[group / 4] >> (2 * (group % 4)) & 3;
-                let values: &mut [u8; 16] =
-                    (&mut values[16 * group..16 * group + 16]).try_into().map_err(|_| SHORT)?;
-                group_of_16(&mut data, bits, values)?;
+        let controls = data.take(channels)?;
+        for channel in 0..stride / 4 {
+            for (i, values) in lanes.iter_mut().enumerate() {
+                let widths = match controls.get(channel).map(|control| control >> (2 * i) & 3) {
+                    None => [0, 2, 4, 8],
+                    Some(0) => [0, 1, 2, 4],
+                    Some(1) => [1, 2, 4, 8],
+                    Some(2) => {
+                        values[..block].fill(0);
+                        continue;
+                    }
+                    Some(_) => {
+                        values[..block].copy_from_slice(data.take(block)?);
+                        continue;
+                    }
+                };
+                let header = data.take(groups.div_ceil(4))?;
+                for (group, values) in values.as_chunks_mut::<16>().0.iter_mut().take(groups).enumerate() {
+                    let width = widths[usize::from(header[group / 4] >> (2 * (group % 4)) & 3)];
+                    group_of_16(&mut data, width, values)?;
+                }
             }
-            let mut value = before[lane];
-            for (i, &delta) in values[..block].iter().enumerate() {
-                value = value.wrapping_add((delta >> 1) ^ (delta & 1).wrapping_neg());
-                out[(first + i) * stride + lane] = value;
+            let lane = 4 * channel;
+            let mut value: [u8; 4] = [before[lane], before[lane + 1], before[lane + 2], before[lane + 3]];
+            for i in 0..block {
+                let delta = [lanes[0][i], lanes[1][i], lanes[2][i], lanes[3][i]];
+                value = differences[channel].add(value, delta);
+                let at = (first + i) * stride + lane;
+                out[at..at + 4].copy_from_slice(&value);
             }
-            before[lane] = value;
+            before[lane..lane + 4].copy_from_slice(&value);
         }
         first += block;
     }
     if data.rest.is_empty() { Ok(()) } else { Err("too many bytes") }
 }
 
-/// Sixteen numbers of 0, 2, 4 or 8 bits; the largest of 2 and of 4 bits says that a byte behind them has the number.
-fn group_of_16(data: &mut Bytes<'_>, bits: u8, values: &mut [u8; 16]) -> Decoded<()> {
-    let bits = match bits {
-        0 => {
-            *values = [0; 16];
-            return Ok(());
+/// How four bytes of an element differ from those of the one before.
+#[derive(Clone, Copy, Debug)]
+enum Difference {
+    /// Each byte by itself.
+    Bytes,
+    /// Two numbers of two bytes each.
+    Shorts,
+    /// By the bits that are not the same, rotated to the left by so many.
+    Bits(u32),
+}
+
+impl Difference {
+    fn read(byte: u8) -> Decoded<Self> {
+        match (byte & 15, byte >> 4) {
+            (0, 0) => Ok(Self::Bytes),
+            (1, 0) => Ok(Self::Shorts),
+            (2, rotation) => Ok(Self::Bits(u32::from(rotation))),
+            _ => Err("an unknown kind of differences"),
         }
-        3 => {
-            values.copy_from_slice(data.take(16)?);
-            return Ok(());
+    }
+
+    fn add(self, before: [u8; 4], delta: [u8; 4]) -> [u8; 4] {
+        match self {
+            Self::Bytes => std::array::from_fn(|i| {
+                before[i].wrapping_add((delta[i] >> 1) ^ (delta[i] & 1).wrapping_neg())
+            }),
+            Self::Shorts => {
+                let half = |i: usize| {
+                    let short = |b: [u8; 4]| u16::from_le_bytes([b[i], b[i + 1]]);
+                    let delta = short(delta);
+                    short(before).wrapping_add((delta >> 1) ^ (delta & 1).wrapping_neg()).to_le_bytes()
+                };
+                let ([a, b], [c, d]) = (half(0), half(2));
+                [a, b, c, d]
+            }
+            Self::Bits(rotation) => {
+                let bits = u32::from_le_bytes(delta).rotate_right(rotation);
+                (u32::from_le_bytes(before) ^ bits).to_le_bytes()
+            }
         }
-        bits => 2 * usize::from(bits),
-    };
+    }
+}
+
+/// Sixteen numbers of 0, 1, 2, 4 or 8 bits; the largest of 1, 2 and 4 bits says that a byte behind them has the number.
+fn group_of_16(data: &mut Bytes<'_>, bits: usize, values: &mut [u8; 16]) -> Decoded<()> {
+    if bits == 0 {
+        *values = [0; 16];
+        return Ok(());
+    }
     let packed = data.take(2 * bits)?;
+    if bits == 8 {
+        values.copy_from_slice(packed);
+        return Ok(());
+    }
     let sentinel = (1 << bits) - 1;
     for (i, value) in values.iter_mut().enumerate() {
-        // The first is in the highest bits.
         let byte = packed[i * bits / 8];
-        let number = byte >> (8 - bits - i * bits % 8) & sentinel;
+        // The first is in the highest bits, or of single bits in the lowest.
+        let shift = if bits == 1 { i % 8 } else { 8 - bits - i * bits % 8 };
+        let number = byte >> shift & sentinel;
         *value = if number == sentinel { data.byte()? } else { number };
     }
     Ok(())
@@ -352,6 +456,34 @@ fn exponential(bytes: &mut [u8]) {
     }
 }
 
+/// Colours from brightness, orange against blue, and green against purple (H. S. Malvar, G. J. Sullivan, "YCoCg-R: A Color
+/// Space with RGB Reversibility and Low Dynamic Range", 2003), of as many bits as the fourth number says.
+fn colours(bytes: &mut [u8], stride: usize) {
+    for element in bytes.chunks_exact_mut(stride) {
+        let raw = |i: usize| match stride {
+            4 => u16::from(element[i]),
+            _ => u16::from_le_bytes([element[2 * i], element[2 * i + 1]]),
+        };
+        let signed = |i: usize| match stride {
+            4 => i32::from(element[i] as i8),
+            _ => i32::from(raw(i) as i16),
+        };
+        let coverage = i32::from(raw(3));
+        // All bits up to the highest; a fourth number of 0 is not valid and makes black.
+        let scale = if coverage == 0 { 1 } else { (2 << coverage.ilog2()) - 1 };
+        let (y, co, cg) = (i32::from(raw(0)), signed(1), signed(2));
+        let a = coverage & (scale >> 1);
+        let full = if stride == 4 { 255.0 } else { 65535.0 };
+        for (i, v) in [y + co - cg, y + cg, y - co - cg, a << 1 | a & 1].into_iter().enumerate() {
+            let shown = (v as f32 * (full / scale as f32) + 0.5).min(full) as u16;
+            match stride {
+                4 => element[i] = shown as u8,
+                _ => element[2 * i..2 * i + 2].copy_from_slice(&shown.to_le_bytes()),
+            }
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -377,10 +509,84 @@ mod tests {
     const TRIANGLES: &str = "e1fe1e100e4e1e120e0f06007687566778a9866589689801690000";
     const INDICES: &str = "d100040800060c0a040800060c06040800060c0a040800060c00000000";
 
+    // What meshoptimizer 1.0 made of `second_raw`.
+    const SECOND: &str = "a13a9a373900040c141c242c343c2215545c5407747c46b988dba46c8f86899073a7e295c4577fda3d675f0027433f372f22\
+        0f0b07030004080c10213038404428ff60683ed98058c396e151000044010140100101400001aa020ffff888888888881010\
+        1010888888888888888888888444444444444444444444444444444444000000000000666666662066666666206666666620\
+        6666666620666666662066666666206666666620666666662066666666206666666620666666662066666666206666666620\
+        6666666655012aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa0000000faeee2d6cabeb2a69a8e82766a5e52463a2e22160afef2\
+        e6dacec2b6aa9e92867a6e62564a3e32261a0e020915212d3945515d6975818d99a5b1bdc9d5e1edf905111d29350a021555\
+        5555555000001550000055012aabaaae0b0baabaaaea0b0babaaaeaa0b0bbaaaeaab0b0b0baaa00000004a4a4a4a4a4a4a4a\
+        4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a4a\
+        4a4a4a4a4a4a4a4a4a4a4a54010100020100020100020100020000000000008041000060400000409c00c8000001010100";
+
+    /// Seventy elements of two floats, two shorts and four bytes.
+    fn second_raw() -> Vec<u8> {
+        let element = |i: u32| {
+            let mut out = vec![];
+            out.extend((16.0 + (i * i % 97) as f32 * 0.25).to_le_bytes());
+            out.extend((3.5 + i as f32 * 0.125).to_le_bytes());
+            out.extend(((i * 300 + 7 * (i % 5)) as u16).to_le_bytes());
+            out.extend(((40_000 + i * 256 - i * i * 3) as u16).to_le_bytes());
+            out.extend([i % 7, 200, i * 37, i / 16].map(|b| b as u8));
+            out
+        };
+        (0..70).flat_map(element).collect()
+    }
+
+    #[test]
+    fn attributes_of_the_second_version_come_back_to_the_byte() {
+        let mut out = vec![];
+        attributes(&bytes(SECOND), 70, 16, Generation::Khr, &mut out).unwrap();
+        assert_eq!(out, second_raw());
+        // The older extension does not know them.
+        assert!(attributes(&bytes(SECOND), 70, 16, Generation::Ext, &mut vec![]).is_err());
+    }
+
+    #[test]
+    fn differences_by_bits_are_turned_back() {
+        // By hand: three elements of four bytes, each lane literal, differences turned by 4 bits to the left.
+        let (start, deltas) = (0x1234_5678_u32, [0x0000_00F1_u32, 0x8000_0001, 0x1020_3040]);
+        let mut packed = vec![0xA1, 0xFF];
+        for lane in 0..4 {
+            packed.extend(deltas.map(|d| d.to_le_bytes()[lane]));
+        }
+        packed.extend([0; 19]);
+        packed.extend(start.to_le_bytes());
+        packed.push(0x42);
+        let mut out = vec![];
+        attributes(&packed, 3, 4, Generation::Khr, &mut out).unwrap();
+        let first = start ^ 0x1000_000F;
+        let second = first ^ 0x1800_0000;
+        assert_eq!(words(&out), [first, second, second ^ 0x0102_0304]);
+        for wrong in [0x03, 0x10, 0x11, 0x0F] {
+            *packed.last_mut().unwrap() = wrong;
+            assert!(attributes(&packed, 3, 4, Generation::Khr, &mut vec![]).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn colours_come_out_of_brightness_and_differences() {
+        // Red, green and blue of 6 bits: y = (r + 2 g + b) / 4 and so on, worked by hand for (40, 24, 8) and a = 21 of 31.
+        let (y, co, cg) = (24_u8, 16_i8, 0_i8);
+        let mut four = [y, co as u8, cg as u8, 32 | 21];
+        colours(&mut four, 4);
+        let up = |v: f64| (v * 255.0 / 63.0).round() as u8;
+        assert_eq!(four, [up(40.0), up(24.0), up(8.0), up(43.0)]);
+        let mut eight: Vec<u8> =
+            [24_u16, 16, (-4_i16) as u16, 32 | 20].iter().flat_map(|v| v.to_le_bytes()).collect();
+        colours(&mut eight, 8);
+        let up = |v: f64| (v * 65535.0 / 63.0).round() as u16;
+        let found: Vec<u16> = eight.as_chunks::<2>().0.iter().map(|b| u16::from_le_bytes(*b)).collect();
+        assert_eq!(found, [up(44.0), up(20.0), up(12.0), up(40.0)]);
+        // What is not valid makes some colour.
+        colours(&mut [255, 127, 128, 0], 4);
+    }
+
     #[test]
     fn attributes_come_back_to_the_byte() {
         let mut out = vec![];
-        attributes(&bytes(ATTRIBUTES), 20, 8, &mut out).unwrap();
+        attributes(&bytes(ATTRIBUTES), 20, 8, Generation::Ext, &mut out).unwrap();
         assert_eq!(out, bytes(ATTRIBUTES_RAW));
     }
 
@@ -412,10 +618,12 @@ mod tests {
 
     #[test]
     fn damaged_data_are_refused_and_never_panic() {
-        for (packed, count, stride) in [(ATTRIBUTES, 20, 8), (TRIANGLES, 24, 4), (INDICES, 24, 4)] {
+        for (packed, count, stride) in
+            [(ATTRIBUTES, 20, 8), (SECOND, 70, 16), (TRIANGLES, 24, 4), (INDICES, 24, 4)]
+        {
             let whole = bytes(packed);
             let decode = |data: &[u8]| match data.first() {
-                Some(0xA0) => attributes(data, count, stride, &mut vec![]),
+                Some(0xA0 | 0xA1) => attributes(data, count, stride, Generation::Khr, &mut vec![]),
                 Some(0xE1) => triangles(data, count, |_| {}),
                 _ => indices(data, count, |_| {}),
             };

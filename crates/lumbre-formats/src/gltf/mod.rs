@@ -10,9 +10,13 @@
 mod accessor;
 mod animation;
 mod container;
+#[cfg(feature = "draco")]
+mod draco;
 mod file;
 mod graph;
 mod json;
+#[cfg(feature = "basisu")]
+mod ktx;
 pub mod material;
 mod mesh;
 mod meshopt;
@@ -48,6 +52,8 @@ const SUPPORTED: &[&str] = &[
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",
+    #[cfg(feature = "draco")]
+    "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
@@ -65,6 +71,9 @@ const SUPPORTED: &[&str] = &[
     "KHR_materials_volume",
     "KHR_materials_volume_scatter",
     "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
+    #[cfg(feature = "basisu")]
+    "KHR_texture_basisu",
     "KHR_texture_transform",
 ];
 
@@ -200,7 +209,10 @@ fn extensions(file: &File<'_>, root: Value<'_>) -> Read<()> {
 const PLACES: &[(&str, &[&str])] = &[
     ("EXT_mesh_gpu_instancing", &["/nodes/*"]),
     ("EXT_meshopt_compression", &["/bufferViews/*", "/buffers/*"]),
+    ("KHR_meshopt_compression", &["/bufferViews/*", "/buffers/*"]),
     ("EXT_texture_webp", &["/textures/*"]),
+    ("KHR_texture_basisu", &["/textures/*"]),
+    ("KHR_draco_mesh_compression", &["/meshes/*/primitives/*"]),
     ("KHR_lights_punctual", &["", "/nodes/*"]),
     ("KHR_materials_variants", &["", "/meshes/*/primitives/*"]),
     ("KHR_texture_transform", &["/materials/*/…Texture"]),
@@ -248,4 +260,22 @@ fn place(file: &File<'_>, path: &str, extension: &str, object: Value<'_>) -> Rea
         file.breach(wrong.expected(format!("it at {}", places.join(" or "))))?;
     }
     Ok(())
+}
+
+/// What compressed data may become whatever their ratio: a few bytes can stand for millions of vertices.
+const FREE_EXPANSION: u64 = 8 << 20;
+
+/// Refuses compressed data that would become too much.
+fn check_expansion(file: &File<'_>, value: Value<'_>, packed: u64, unpacked: u64) -> Read<()> {
+    let limit = file.budget.limits().expansion;
+    if unpacked <= FREE_EXPANSION.max(packed.saturating_mul(limit)) {
+        return Ok(());
+    }
+    Err(crate::LimitError {
+        what: format!("{}: compressed data", value.place()),
+        kind: crate::LimitKind::Expansion,
+        needed: unpacked.div_ceil(packed.max(1)),
+        limit,
+    }
+    .into())
 }

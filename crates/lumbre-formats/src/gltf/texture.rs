@@ -189,21 +189,26 @@ impl<'f> Textures<'f> {
 }
 
 fn decoded(file: &File<'_>, value: Value<'_>) -> Read<Bitmap> {
-    let read = |bytes: &[u8], name: &Arc<str>| {
-        file.with_diagnostics(|diagnostics| read_image(bytes, name, file.budget, diagnostics))
+    let read = |bytes: &[u8], name: &Arc<str>| -> Read<Bitmap> {
+        #[cfg(feature = "basisu")]
+        if bytes.starts_with(super::ktx::MAGIC) {
+            return super::ktx::read(file, value, bytes, name);
+        }
+        let image = file.with_diagnostics(|diagnostics| read_image(bytes, name, file.budget, diagnostics))?;
+        Ok(image.bitmap)
     };
     if let Some(uri) = value.get("uri")? {
         let (name, bytes) = file.data(uri, &[])?;
         let image = read(&bytes, &name)?;
         file.budget.release(bytes.len() as u64);
-        return Ok(image.bitmap);
+        return Ok(image);
     }
     let name: Arc<str> = value.place().to_string().into();
     let (_, view) = file.view(value.need("bufferView")?)?;
     let bytes = view.bytes.ok_or_else(|| {
         crate::FormatError::from(value.wrong("the buffer of what is needed here has no data"))
     })?;
-    Ok(read(bytes, &name)?.bitmap)
+    read(bytes, &name)
 }
 
 /// The image of a texture: that of an extension first.

@@ -1,0 +1,98 @@
+//! Textures in KTX 2.0 with Basis Universal inside (`KHR_texture_basisu`, Khronos, 2021).
+
+use std::sync::Arc;
+
+use basisu::{DecodeFlags, TargetFormat, Transcoder};
+use lumbre_image::{Bitmap, Channels, Encoding, PixelData};
+
+use super::file::File;
+use super::json::{Read, Value};
+use crate::FormatError;
+use crate::contained::contained;
+use crate::diagnostic::{Diagnostic, Place};
+
+/// How a KTX 2.0 file starts.
+pub(super) const MAGIC: &[u8] = b"\xABKTX 20\xBB\r\n\x1A\n";
+
+/// The bytes of the header, and of what it says of the first level.
+const HEADER: usize = 104;
+const ZSTANDARD: u32 = 2;
+const BASIS_LZ: u32 = 1;
+
+/// What the header says.
+struct Header {
+    width: u32,
+    height: u32,
+    scheme: u32,
+    /// Length of the first level, as it lies in the file and unpacked.
+    packed: u64,
+    unpacked: u64,
+}
+
+/// The first level of a texture. `value` is the image in the glTF, and `name` what messages about its bytes start with.
+pub(super) fn read(file: &File<'_>, value: Value<'_>, bytes: &[u8], name: &Arc<str>) -> Read<Bitmap> {
+    let header = header(bytes, name)?;
+    let blocks = u64::from(header.width.div_ceil(4)) * u64::from(header.height.div_ceil(4));
+    let pixels = 4 * 16 * blocks;
+    // Blocks of 16 bytes each, unless they are coded by codebooks.
+    if header.scheme != BASIS_LZ && header.unpacked != 16 * blocks {
+        let wrong = wrong(name, 96, "first level of another size than its blocks").found(header.unpacked);
+        return Err(wrong.expected(16 * blocks).into());
+    }
+    super::check_expansion(file, value, header.packed, pixels)?;
+    file.budget.bytes(pixels, "texture")?;
+    let hold = file.budget.hold(pixels, "texture")?;
+    let place = Place::whole(name.clone());
+    let (data, has_alpha) = contained("KTX 2.0 texture", &place, || {
+        let failed = |error: basisu::Error| {
+            let wrong = Diagnostic::error("KTX 2.0 texture that cannot be read").at(place.clone());
+            FormatError::from(wrong.found(format!("{error:?}")))
+        };
+        let texture = Transcoder::new(bytes).map_err(failed)?;
+        let data = texture.transcode(0, TargetFormat::Rgba32, DecodeFlags::NONE).map_err(failed)?;
+        Ok((data, texture.has_alpha()))
+    })?;
+    drop(hold);
+    let (channels, data) = if has_alpha {
+        (Channels::Rgba, data)
+    } else {
+        (Channels::Rgb, data.as_chunks::<4>().0.iter().flat_map(|[r, g, b, _]| [*r, *g, *b]).collect())
+    };
+    Bitmap::new(header.width, header.height, channels, PixelData::U8(data), Encoding::Srgb)
+        .ok_or_else(|| wrong(name, 20, "texture with another number of pixels than its size").into())
+}
+
+fn wrong(name: &Arc<str>, at: u64, message: &str) -> Diagnostic {
+    Diagnostic::error(message).at(Place::binary(name.clone(), at, ""))
+}
+
+/// Checks what decoding relies on.
+fn header(bytes: &[u8], name: &Arc<str>) -> Read<Header> {
+    if bytes.len() < HEADER {
+        let wrong = wrong(name, bytes.len() as u64, "KTX 2.0 texture that ends in its header");
+        return Err(wrong.found(format!("{} bytes", bytes.len())).into());
+    }
+    let word = |at: usize| u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
+    let long = |at: usize| u64::from(word(at)) | u64::from(word(at + 4)) << 32;
+    let (width, height) = (word(20), word(24));
+    let checks = [
+        (word(12) == 0, 12, "texture that is not in Basis Universal", "format 0"),
+        (0 < width && width <= 65_536, 20, "wrong width of a texture", "1 to 65536"),
+        (0 < height && height <= 65_536, 24, "wrong height of a texture", "1 to 65536"),
+        (word(28) == 0, 28, "texture that is not flat", "a depth of 0"),
+        (word(32) <= 1, 32, "texture of several layers", "0 or 1"),
+        (word(36) == 1, 36, "texture of several faces", "1"),
+        (word(44) <= ZSTANDARD, 44, "unknown compression of a texture", "0, 1 or 2"),
+    ];
+    for (is_fine, at, message, expected) in checks {
+        if !is_fine {
+            return Err(wrong(name, at as u64, message).found(word(at)).expected(expected).into());
+        }
+    }
+    let (offset, packed, unpacked) = (long(80), long(88), long(96));
+    if offset.checked_add(packed).is_none_or(|end| end > bytes.len() as u64) {
+        let wrong = wrong(name, 80, "first level past the end of its texture");
+        return Err(wrong.found(format!("{packed} bytes from byte {offset}")).into());
+    }
+    Ok(Header { width, height, scheme: word(44), packed, unpacked })
+}
