@@ -28,40 +28,42 @@ fn room(shape: Shape, reflectance: f32) -> SceneDesc {
     desc
 }
 
-/// The mean of the picture is 1 however light is found: by paths of 40 bounces without roulette, and with roulette too,
-/// whose noise asks for more samples.
-fn assert_white(desc: SceneDesc, what: &str) {
-    // Lights alone are noisy where they are near: the tolerance is that of the noise.
-    let all = [(Strategy::Both, 2e-3), (Strategy::Lights, 1.5e-2), (Strategy::Bsdf, 2e-3)];
-    assert_white_by(desc, &all, what);
+/// Closed shapes, each with a place well within.
+fn rooms() -> [(&'static str, Shape, DVec3); 3] {
+    [
+        ("sphere", Sphere::new(CENTER, 2.5).unwrap().into(), CENTER),
+        ("box", Cuboid::new(CENTER - DVec3::new(2.0, 1.5, 3.0), CENTER + 2.5).unwrap().into(), CENTER),
+        ("torus", Torus::new(CENTER, DVec3::Z, 4.0, 1.5).unwrap().into(), CENTER + DVec3::new(4.0, 0.0, 0.0)),
+    ]
 }
 
-fn assert_white_by(desc: SceneDesc, strategies: &[(Strategy, f64)], what: &str) {
+/// The mean of the picture is 1 however light is found, by paths of 40 bounces without roulette. Each way takes as many
+/// samples a pixel as its noise asks for; lights alone are noisy where they are near, and so is the tolerance.
+fn assert_white(desc: SceneDesc, what: &str, ways: &[(Strategy, u32, f64)]) {
     let scene = Scene::build(desc).unwrap();
-    for &(strategy, share) in strategies {
+    for &(strategy, spp, share) in ways {
         let path = Path { strategy, sure_bounces: 1000, ..Path::new(40) };
-        let options = options(&scene, 12, 12, 64);
+        let options = options(&scene, 12, 12, spp);
         let rendered = render_with(&scene, &options, &path, &NoProgress, &CancelToken::new()).unwrap();
         assert_eq!(rendered.stats.dropped, 0);
-        assert!(rendered.stats.rays.bounce > 100_000, "{what}: {:?}", rendered.stats.rays);
+        assert!(rendered.stats.rays.bounce > 1_000, "{what}: {:?}", rendered.stats.rays);
         for channel in mean(&rendered.image) {
             assert_close(channel, 1.0, share, &format!("{what}, {strategy:?}"));
         }
     }
 }
 
+const BOTH: (Strategy, u32, f64) = (Strategy::Both, 320, 2e-3);
+const LIGHTS: (Strategy, u32, f64) = (Strategy::Lights, 48, 2.5e-2);
+const BSDF: (Strategy, u32, f64) = (Strategy::Bsdf, 24, 2e-3);
+
 #[test]
 fn a_sphere_a_box_and_a_torus_are_white_from_inside() {
-    let torus_tube = CENTER + DVec3::new(4.0, 0.0, 0.0);
-    let rooms: [(&str, Shape, DVec3); 3] = [
-        ("sphere", Sphere::new(CENTER, 2.5).unwrap().into(), CENTER + DVec3::new(0.4, -0.3, 0.9)),
-        ("box", Cuboid::new(CENTER - DVec3::new(2.0, 1.5, 3.0), CENTER + 2.5).unwrap().into(), CENTER),
-        ("torus", Torus::new(CENTER, DVec3::Z, 4.0, 1.5).unwrap().into(), torus_tube),
-    ];
-    for (name, shape, from) in rooms {
+    for (name, shape, middle) in rooms() {
+        let from = middle + DVec3::new(0.4, -0.3, 0.7);
         let mut desc = room(shape, 0.5);
         desc.cameras = vec![look(from, from + DVec3::new(0.3, 1.0, -0.2), 70.0)];
-        assert_white(desc, name);
+        assert_white(desc, name, &[BOTH, LIGHTS, BSDF]);
     }
 }
 
@@ -88,26 +90,48 @@ fn conserving() -> Vec<(&'static str, Material)> {
         ("glass", Material::new(MaterialKind::Dielectric { eta: 1.5, roughness: Roughness::smooth() })),
         ("thin glass", Material::new(MaterialKind::ThinDielectric { eta: 1.7 })),
         ("mirror", smooth_conductor()),
+        (
+            "mixture",
+            Material::new(MaterialKind::Mix {
+                materials: [Arc::new(diffuse(1.0)), Arc::new(smooth_conductor())],
+                amount: Arc::new(FloatTexture::Constant(0.375)),
+            }),
+        ),
+        ("interface", Material::new(MaterialKind::Interface)),
     ]
 }
 
 #[test]
 fn what_absorbs_nothing_cannot_be_seen_in_a_white_room() {
-    for (name, material) in conserving() {
-        let shapes: [Shape; 3] = [
-            Sphere::new(CENTER + DVec3::new(0.5, 0.25, -0.25), 0.75).unwrap().into(),
-            Cuboid::new(CENTER - DVec3::new(0.5, 0.75, 0.6), CENTER + 0.4).unwrap().into(),
-            Torus::new(CENTER, DVec3::new(0.2, 1.0, 0.4), 0.8, 0.3).unwrap().into(),
-        ];
-        for shape in shapes {
-            let what = format!("{name} {}", shape.name());
-            let mut desc = room(Sphere::new(CENTER, 2.5).unwrap().into(), 0.25);
-            let material = add_material(&mut desc, material.clone());
-            add(&mut desc, exact(shape), material);
-            desc.cameras = vec![look(CENTER - DVec3::new(0.3, 2.2, 0.4), CENTER, 60.0)];
-            assert_white(desc, &what);
+    let mut seen = 0;
+    let plain = conserving().into_iter().map(|m| (m, false));
+    for ((name, material), is_layered) in plain.chain(principled().into_iter().map(|m| (m, true))) {
+        for (i, (room_name, walls, middle)) in rooms().into_iter().enumerate() {
+            let shapes: [Shape; 3] = [
+                Sphere::new(middle + DVec3::new(0.3, 0.2, -0.25), 0.6).unwrap().into(),
+                Cuboid::new(middle - DVec3::new(0.5, 0.6, 0.55), middle + 0.4).unwrap().into(),
+                Torus::new(middle, DVec3::new(0.2, 1.0, 0.4), 0.6, 0.25).unwrap().into(),
+            ];
+            for (j, shape) in shapes.into_iter().enumerate() {
+                // Every shape in the sphere; one in each of the others, and one everywhere of what takes long.
+                if (i > 0 || is_layered) && i != j {
+                    continue;
+                }
+                let what = format!("{name} {} in a {room_name}", shape.name());
+                let mut desc = room(walls.clone(), 0.25);
+                let material = add_material(&mut desc, material.clone());
+                add(&mut desc, exact(shape), material);
+                desc.cameras = vec![look(middle - DVec3::new(0.2, 1.2, 0.3), middle, 70.0)];
+                assert_white(
+                    desc,
+                    &what,
+                    if i == 0 && !is_layered { &[BOTH, LIGHTS, BSDF] } else { &[BOTH] },
+                );
+                seen += 1;
+            }
         }
     }
+    assert_eq!(seen, 53);
 }
 
 /// Layered materials that absorb nothing.
@@ -167,8 +191,8 @@ fn shading_normals_take_nothing_from_what_absorbs_nothing() {
         add(&mut desc, coarse_sphere(CENTER + DVec3::new(0.5, 0.25, -0.25), 0.75), material);
         desc.cameras = vec![look(CENTER - DVec3::new(0.3, 2.2, 0.4), CENTER, 60.0)];
         // By lights alone a narrow lobe is all noise.
-        assert_white_by(desc, &[(Strategy::Both, 3e-3), (Strategy::Bsdf, 3e-3)], name);
+        assert_white(desc, name, &[(Strategy::Both, 64, 3e-3), (Strategy::Bsdf, 64, 3e-3)]);
         count += 1;
     }
-    assert_eq!(count, 11);
+    assert_eq!(count, 13);
 }
