@@ -3,6 +3,7 @@
 use anyhow::Result;
 use clap::{Parser, Subcommand};
 
+mod agree;
 mod assets;
 mod bench;
 mod command;
@@ -31,6 +32,8 @@ enum Task {
     Assets,
     /// Prints the field of exact shapes of scenes/field as a pbrt scene.
     Field,
+    /// Compares a picture with a reference of the same scene: means, and each pixel by its noise.
+    Agree(agree::Agree),
     /// Measures Lumbre, against peers where they are found.
     #[command(subcommand)]
     Bench(bench::Bench),
@@ -45,6 +48,7 @@ fn main() -> Result<()> {
             print!("{}", field::scene());
             Ok(())
         }
+        Task::Agree(what) => agree::run_comparison(&what),
         Task::Bench(bench) => bench.run(),
     }
 }
