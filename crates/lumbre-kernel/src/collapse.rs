@@ -28,6 +28,15 @@ impl Entry {
         Self { geometry, primitive_and_last: primitive | if is_last { LAST } else { 0 } }
     }
 
+    /// As it is saved.
+    pub(crate) fn to_words(self) -> [u32; 2] {
+        [self.geometry, self.primitive_and_last]
+    }
+
+    pub(crate) fn from_words([geometry, primitive_and_last]: [u32; 2]) -> Self {
+        Self { geometry, primitive_and_last }
+    }
+
     #[inline(always)]
     pub(crate) fn primitive(&self) -> u32 {
         self.primitive_and_last & !LAST

@@ -16,6 +16,7 @@ mod primitive;
 mod query;
 mod refit;
 mod reinsert;
+mod save;
 mod stack;
 mod surface;
 mod touch;
@@ -26,6 +27,7 @@ pub use accel::{Accel, BuildError, BuildOptions, Preset};
 pub use geometry::{CustomGeometry, Geometry, GeometryKind, Instance, TriangleMesh};
 pub use hit::{Hit, InstancePath};
 pub use refit::RefitError;
+pub use save::LoadError;
 
 #[cfg(test)]
 mod brute;

@@ -60,6 +60,21 @@ pub(crate) fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result
     })
 }
 
+/// A tree in which nothing stands yet.
+pub(crate) fn empty_over(geometries: Vec<Geometry>) -> Accel {
+    Accel {
+        units: Units::new(DVec3::ZERO, 1.0, 0.0, 1.0),
+        holds: Holds::new(&geometries, 0.0),
+        tree: Packed::default(),
+        infinite: Vec::new(),
+        bounds: Aabb::EMPTY,
+        primitives: 0,
+        level: Level::best(),
+        built_cost: None,
+        geometries,
+    }
+}
+
 /// What geometries consist of, triangles apart.
 pub(crate) struct Parts {
     /// Everything finite together, what is finite within infinite instances included.

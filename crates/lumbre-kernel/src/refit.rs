@@ -78,12 +78,26 @@ pub(crate) fn refit(accel: &mut Accel, geometries: Vec<Geometry>) -> Result<f64,
     }
     let parts = take_apart(&geometries).map_err(RefitError::Unsound)?;
     check_infinite(accel, &parts)?;
-    check_triangles(accel, &geometries, &parts)?;
+    let built_cost = accel.built_cost.unwrap_or_else(|| cost(&accel.tree.nodes));
+    let old = std::mem::replace(&mut accel.geometries, geometries);
+    if let Err(error) = fit(accel, parts) {
+        accel.geometries = old;
+        return Err(error);
+    }
+    accel.built_cost = Some(built_cost);
+    let cost = cost(&accel.tree.nodes);
+    Ok(if built_cost > 0.0 { cost / built_cost } else { 1.0 })
+}
+
+/// Gives the nodes and blocks of a tree what its geometries, whose parts these are, say. What it refuses leaves the tree as
+/// it was.
+pub(crate) fn fit(accel: &mut Accel, parts: Parts) -> Result<(), RefitError> {
+    check_triangles(accel, &accel.geometries)?;
     let boxes = entry_boxes(accel, &parts)?;
 
     // From here on nothing can fail.
-    let units = units_of(&geometries, &parts);
-    let built_cost = *accel.built_cost.get_or_insert_with(|| cost(&accel.tree.nodes));
+    let geometries = &accel.geometries;
+    let units = units_of(geometries, &parts);
     let boxers: Vec<Option<Boxer>> = geometries
         .iter()
         .map(|geometry| match &geometry.kind {
@@ -139,13 +153,12 @@ pub(crate) fn refit(accel: &mut Accel, geometries: Vec<Geometry>) -> Result<f64,
         node_boxes[place] = whole;
     }
 
-    let cost = cost(&tree.nodes);
-    accel.holds = Holds::new(&geometries, parts.largest_corner);
+    accel.holds = Holds::new(geometries, parts.largest_corner);
     accel.primitives = parts.boxed.len() + parts.triangles + parts.infinite.len();
+    accel.infinite = parts.infinite;
     accel.units = units;
     accel.bounds = parts.bounds;
-    accel.geometries = geometries;
-    Ok(if built_cost > 0.0 { cost / built_cost } else { 1.0 })
+    Ok(())
 }
 
 fn is_same_topology(old: &GeometryKind, new: &GeometryKind) -> bool {
@@ -180,7 +193,7 @@ fn check_infinite(accel: &Accel, parts: &Parts) -> Result<(), RefitError> {
 }
 
 /// Every triangle that has an area is to have a place in the tree.
-fn check_triangles(accel: &Accel, geometries: &[Geometry], parts: &Parts) -> Result<(), RefitError> {
+fn check_triangles(accel: &Accel, geometries: &[Geometry]) -> Result<(), RefitError> {
     let mut named = vec![0; geometries.len()];
     for names in &accel.tree.names {
         let count = names.primitives.iter().filter(|&&primitive| primitive != u32::MAX).count();
@@ -205,7 +218,6 @@ fn check_triangles(accel: &Accel, geometries: &[Geometry], parts: &Parts) -> Res
             return Err(RefitError::NeedsBuild { geometry, element });
         }
     }
-    debug_assert!(named.iter().sum::<usize>() >= parts.triangles);
     Ok(())
 }
 

@@ -5,6 +5,7 @@ mod boxes;
 mod build;
 mod oracle;
 mod refit;
+mod save;
 mod scenes;
 mod surfaces;
 mod watertight;
