@@ -37,18 +37,23 @@ pub(crate) struct Albedo {
 
 /// A place between two nodes.
 #[derive(Clone, Copy)]
-struct Between(usize, f32);
+pub(crate) struct Between(usize, f32);
 
 impl Between {
     /// The place of `x` in [0, 1] between `nodes` in equal steps.
-    fn new(x: f32, nodes: usize) -> Self {
+    pub fn new(x: f32, nodes: usize) -> Self {
         let place = crate::unit(x) * (nodes - 1) as f32;
         let first = (place as usize).min(nodes - 2);
         Self(first, place - first as f32)
     }
 
+    /// The place a share of the way from a node to the next.
+    pub fn at(first: usize, share: f32) -> Self {
+        Self(first, share)
+    }
+
     /// Catmull and Rom's cubic; beyond the ends the table goes straight on. (Linear, white metal reflected up to 1.003.)
-    fn weights(self) -> [f32; 4] {
+    pub fn weights(self) -> [f32; 4] {
         let t = self.1;
         [
             -0.5 * t * (1.0 - t) * (1.0 - t),
@@ -59,7 +64,7 @@ impl Between {
     }
 
     /// The weights of the nodes about the place, and the first of these nodes.
-    fn nodes(self, nodes: usize) -> (usize, [f32; 4]) {
+    pub fn nodes(self, nodes: usize) -> (usize, [f32; 4]) {
         let Self(first, _) = self;
         let [a, b, c, d] = self.weights();
         if first == 0 {
@@ -72,7 +77,7 @@ impl Between {
         (first - 1, [a, b, c, d])
     }
 
-    fn interpolate(self, nodes: usize, mut f: impl FnMut(usize) -> f32) -> f32 {
+    pub fn interpolate(self, nodes: usize, mut f: impl FnMut(usize) -> f32) -> f32 {
         let (first, weights) = self.nodes(nodes);
         weights.into_iter().enumerate().map(|(i, w)| w * f(first + i)).sum()
     }
@@ -97,7 +102,7 @@ impl Albedo {
             bytes.chunks_exact(2).map(|pair| f32::from(u16::from_le_bytes([pair[0], pair[1]])) / 65535.0);
         let scale = |i: usize| if i / PAGE == SHEEN { MOST_SHEEN } else { 1.0 };
         let values: Vec<f32> = pairs.enumerate().map(|(i, v)| v * scale(i)).collect();
-        let weights = mean_weights();
+        let weights = mean_weights::<COSINES>();
         let mean = |row: &[f32]| row.iter().zip(weights).map(|(v, w)| v * w).sum();
         let means = values.chunks_exact(COSINES).map(mean).collect();
         Self { values, means }
@@ -163,12 +168,12 @@ impl Albedo {
 }
 
 /// ∫ 2 μ f(μ) dμ for each node, of what is cubic between them.
-fn mean_weights() -> [f32; COSINES] {
+pub(crate) fn mean_weights<const N: usize>() -> [f32; N] {
     let steps = 4096;
-    let mut sum = [0.0; COSINES];
+    let mut sum = [0.0; N];
     for i in 0..steps {
         let t = (f64::from(i) + 0.5) / f64::from(steps);
-        let (first, weights) = Between::new(t as f32, COSINES).nodes(COSINES);
+        let (first, weights) = Between::new(t as f32, N).nodes(N);
         for (sum, weight) in sum[first..].iter_mut().zip(weights) {
             // μ = t², dμ = 2 t dt
             *sum += 4.0 * t.powi(3) / f64::from(steps) * f64::from(weight);
@@ -278,7 +283,7 @@ mod tests {
 
     #[test]
     fn means_are_those_of_the_cosine_law() {
-        assert!((mean_weights().iter().sum::<f32>() - 1.0).abs() < 1e-5);
+        assert!((mean_weights::<COSINES>().iter().sum::<f32>() - 1.0).abs() < 1e-5);
         let steps = 20_000;
         for alpha in [0.0, 0.03, 0.4, 1.0] {
             let sum: f32 = (0..steps)

@@ -19,6 +19,7 @@ mod principled_params;
 pub mod sheen;
 pub mod spectrum;
 mod specular;
+mod stretched;
 mod texture;
 pub mod thin_film;
 

@@ -11,6 +11,7 @@ use crate::diffuse::cosine_direction;
 use crate::microfacet::Microfacets;
 use crate::sheen::Sheen;
 use crate::specular::Specular;
+use crate::stretched::{STRETCHED, Stretched};
 use crate::thin_film::ThinFilm;
 use crate::{BsdfSample, LocalDir, Scatter, Spectrum, fresnel};
 
@@ -31,7 +32,9 @@ use crate::{BsdfSample, LocalDir, Scatter, Spectrum, fresnel};
 /// It is reciprocal (radiance in a solid body counted by η²) except where the coat has a normal of its own. Opaque and thin
 /// surfaces look the same from both sides; a solid one has its fibres and coat on the outside only.
 ///
-/// The albedos are those of isotropic facets: an anisotropic surface goes by the geometric mean of its two α.
+/// Stretched facets have a table of what they reflect; what a dielectric's reflect and let through is that of isotropic facets
+/// as rough as they are in the plane of each direction. Stretched facets of a clear solid lose what bounces more than once
+/// beyond what those of the smaller roughness do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Principled {
     /// Reflectance of the metal at normal incidence, and of the inside of the opaque dielectric.
@@ -486,6 +489,46 @@ impl Principled {
         (alpha.x * alpha.y).sqrt().min(1.0)
     }
 
+    fn is_stretched(&self) -> bool {
+        let alpha = self.facets.alpha();
+        alpha.x != alpha.y && alpha.max_element() > Stretched::LEAST
+    }
+
+    /// What facets that reflect everything reflect at the first bounce; `alpha` is [`Self::mean_alpha`].
+    fn mirror(&self, w: LocalDir, alpha: f32) -> f32 {
+        if !self.is_stretched() {
+            return ALBEDO.mirror(w.abs_cos_theta(), alpha);
+        }
+        STRETCHED.mirror(self.facets.alpha(), self.to_facets(w).vec())
+    }
+
+    /// The roughness along a direction: that of isotropic facets which look most alike from there.
+    fn alpha_towards(&self, w: LocalDir) -> f32 {
+        let across = self.to_facets(w).vec().truncate();
+        let length = across.length();
+        if !self.is_stretched() || length == 0.0 {
+            return self.mean_alpha();
+        }
+        (self.facets.alpha() * across / length).length().min(1.0)
+    }
+
+    /// The mean of a function of that roughness over all azimuths.
+    fn mean_around(&self, f: impl Fn(f32) -> f32) -> f32 {
+        if !self.is_stretched() {
+            return f(self.mean_alpha());
+        }
+        const STEPS: u8 = 8;
+        let angle = |i: u8| (f32::from(i) + 0.5) / f32::from(STEPS) * std::f32::consts::FRAC_PI_2;
+        let each =
+            (0..STEPS).map(|i| f((self.facets.alpha() * Vec2::from_angle(angle(i))).length().min(1.0)));
+        each.sum::<f32>() / f32::from(STEPS)
+    }
+
+    /// The mean of [`Self::mirror`].
+    fn mirror_mean(&self, alpha: f32) -> f32 {
+        if self.is_stretched() { STRETCHED.mean(self.facets.alpha()) } else { ALBEDO.mirror_mean(alpha) }
+    }
+
     /// f · |cos θi| of all that is sampled by the cosine law, but for the fibres.
     fn cosine_part(&self, wo: LocalDir, wi: LocalDir) -> Spectrum {
         let reflects = wo.same_hemisphere(wi);
@@ -493,12 +536,14 @@ impl Principled {
         let dielectric = 1.0 - self.metallic;
         let opaque = dielectric * (1.0 - self.transmission);
         let rough = !self.facets.is_smooth();
-        let mirror = |w: LocalDir| ALBEDO.mirror(w.abs_cos_theta(), alpha);
+        let mirror = |w: LocalDir| self.mirror(w, alpha);
         let mut sum = Spectrum::BLACK;
         if opaque > 0.0 && (reflects || self.diffuse_transmission > 0.0) {
             let eta = self.opaque_eta();
-            let kept = |w: LocalDir| self.kept(mirror(w), ALBEDO.face(w.abs_cos_theta(), alpha, eta));
-            let mean = self.kept(ALBEDO.mirror_mean(alpha), ALBEDO.face_mean(alpha, eta));
+            let face = |w: LocalDir| ALBEDO.face(w.abs_cos_theta(), self.alpha_towards(w), eta);
+            let kept = |w: LocalDir| self.kept(mirror(w), face(w));
+            let mean =
+                self.kept(self.mirror_mean(alpha), self.mean_around(|alpha| ALBEDO.face_mean(alpha, eta)));
             let white = given_back(kept(wo), kept(wi), mean);
             let color = if reflects {
                 self.base * (1.0 - self.diffuse_transmission)
@@ -508,7 +553,7 @@ impl Principled {
             sum += white * color * opaque;
         }
         if rough && self.metallic > 0.0 && reflects {
-            let mean = ALBEDO.mirror_mean(alpha);
+            let mean = self.mirror_mean(alpha);
             let white =
                 given_back(Spectrum::splat(mirror(wo)), Spectrum::splat(mirror(wi)), Spectrum::splat(mean));
             // Each further bounce takes its share: F² E / (1 − F (1 − E)) of the first one's loss.
@@ -552,8 +597,8 @@ impl Principled {
         let reflects = wo.same_hemisphere(wi);
         let tint = if reflects { Spectrum::WHITE } else { self.transmission_color };
         if self.body == Body::Thin {
-            let loss = |w: LocalDir| 1.0 - ALBEDO.mirror(w.abs_cos_theta(), alpha);
-            let mean = (1.0 - ALBEDO.mirror_mean(alpha)).max(1e-6);
+            let loss = |w: LocalDir| 1.0 - self.mirror(w, alpha);
+            let mean = (1.0 - self.mirror_mean(alpha)).max(1e-6);
             let once = ALBEDO.face_mean(0.0, self.opaque_eta());
             let pane = 2.0 * once / (1.0 + once);
             let share = if reflects { pane } else { 1.0 - pane };
@@ -563,6 +608,8 @@ impl Principled {
         if (eta - 1.0).abs() < Self::NO_BORDER {
             return Spectrum::BLACK;
         }
+        // Stretched ones lose at least what the smoother of their two roughnesses does.
+        let alpha = if self.is_stretched() { self.facets.alpha().min_element() } else { alpha };
         let loss =
             |w: LocalDir| (1.0 - ALBEDO.glass(w.abs_cos_theta(), alpha, eta, w.cos_theta() < 0.0)).max(0.0);
         let mean = |inside| (1.0 - ALBEDO.glass_mean(alpha, eta, inside)).max(0.0);
@@ -704,7 +751,7 @@ impl Principled {
             let face = self.dielectric(cos, self.opaque_eta());
             opaque * (1.0 - face.min_component())
         };
-        let further = if self.facets.is_smooth() { 0.0 } else { 1.0 - ALBEDO.mirror(cos, alpha) };
+        let further = if self.facets.is_smooth() { 0.0 } else { 1.0 - self.mirror(wo, alpha) };
         let fibres =
             if self.covered(wo) { self.sheen.color.max_component() * self.sheen.share(wo) } else { 0.0 };
         let near = inside * self.base.max_component() * (1.0 - self.diffuse_transmission)

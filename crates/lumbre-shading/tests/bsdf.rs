@@ -759,14 +759,33 @@ fn white_layers_make_no_light_and_lose_little() {
 }
 
 #[test]
-fn white_brushed_metal_makes_no_light() {
-    for (x, y) in [(0.3, 0.1), (0.6, 0.1), (1.0, 0.04), (1.0, 0.3)] {
-        let metal = Principled { metallic: 1.0, facets: Microfacets::new(x, y), ..Principled::DEFAULT };
-        for wo in views() {
-            let share = even_furnace(&metal, wo, GRID);
-            assert!(within(share, 0.55), "{x} {y} from {:?}: {share:?}", wo.vec());
+fn white_brushed_surfaces_give_everything_back() {
+    let mut count = 0;
+    for (x, y) in [(0.3, 0.1), (0.1, 0.6), (1.0, 0.04), (0.04, 1.0), (1.0, 0.3)] {
+        let brushed = Principled { facets: Microfacets::new(x, y), ..Principled::DEFAULT };
+        let metal = Principled { metallic: 1.0, tangent: Vec2::new(0.6, 0.8), ..brushed };
+        let mirror_like = Principled { f0: Spectrum::WHITE, ..brushed };
+        let pane = Principled { transmission: 1.0, ..brushed };
+        let solid = Principled { body: Body::Solid { spread: 0.0 }, ..pane };
+        let list = [
+            ("metal", metal, 0.99),
+            ("all specular", mirror_like, 0.99),
+            ("plastic", brushed, 0.975),
+            ("pane", pane, 0.99),
+            // Which gives back only some of it.
+            ("solid", solid, 0.5),
+        ];
+        for (name, bsdf, least) in list {
+            for wo in views() {
+                let (share, error) = even_furnace(&bsdf, wo, GRID);
+                let most = if name == "plastic" { 1.02 } else { 1.004 };
+                let ok = least - error <= share && share <= most + error;
+                assert!(ok, "{name} {x} {y} from {:?}: {share} ± {error}", wo.vec());
+                count += 1;
+            }
         }
     }
+    assert_eq!(count, 5 * 5 * 7);
 }
 
 #[test]

@@ -1,0 +1,245 @@
+//! A table of how much facets that are stretched reflect at the first bounce, by direction, and in the mean.
+
+use std::f32::consts::FRAC_1_PI;
+use std::sync::LazyLock;
+
+use lumbre_math::{Vec2, Vec3};
+
+use crate::albedo::Between;
+
+/// Nodes of the cosine, at the squares of equal steps from 0 to 1.
+const COSINES: usize = 24;
+/// Nodes of the azimuth from the first axis to the second, closest at both: at equal steps of s, where 3 s² − 2 s³ is the share
+/// of the quarter turn.
+const AZIMUTHS: usize = 9;
+/// Nodes of the cube root of each α, in equal steps from 0 to 1.
+const ROUGHNESSES: usize = 16;
+
+const ROW: usize = COSINES;
+const PAGE: usize = AZIMUTHS * ROW;
+/// Pairs of roughnesses, the first at least as large as the second.
+const PAIRS: usize = ROUGHNESSES * (ROUGHNESSES + 1) / 2;
+
+/// The table; `stretched.bin` is made by the ignored test of this file.
+pub(crate) static STRETCHED: LazyLock<Stretched> =
+    LazyLock::new(|| Stretched::from_bytes(include_bytes!("stretched.bin")));
+
+/// What white facets with two α reflect, cubic between nodes.
+pub(crate) struct Stretched {
+    values: Vec<f32>,
+    /// For each pair.
+    means: Vec<f32>,
+}
+
+/// The position of a pair, its larger one first.
+fn pair(x: usize, y: usize) -> usize {
+    x * (x + 1) / 2 + y
+}
+
+fn by_alpha(alpha: f32) -> Between {
+    Between::new(crate::unit(alpha).cbrt(), ROUGHNESSES)
+}
+
+impl Stretched {
+    /// Where neither α is larger the facets are as good as a mirror's, and the steps of this table too wide at grazing angles.
+    pub const LEAST: f32 = 0.004;
+
+    fn from_bytes(bytes: &[u8]) -> Self {
+        assert_eq!(bytes.len(), 2 * PAIRS * PAGE);
+        let values: Vec<f32> = bytes
+            .chunks_exact(2)
+            .map(|pair| f32::from(u16::from_le_bytes([pair[0], pair[1]])) / 65535.0)
+            .collect();
+        let weights = crate::albedo::mean_weights::<COSINES>();
+        let shares = azimuth_weights();
+        let mean = |page: &[f32]| {
+            let rows = page.chunks_exact(ROW).zip(shares);
+            rows.map(|(row, share)| share * row.iter().zip(weights).map(|(v, w)| v * w).sum::<f32>()).sum()
+        };
+        let means = values.chunks_exact(PAGE).map(mean).collect();
+        Self { values, means }
+    }
+
+    /// The share that facets of these α reflect of the light from a direction in their frame (either side).
+    pub fn mirror(&self, alpha: Vec2, w: Vec3) -> f32 {
+        let around = Around::new(w.y.abs().atan2(w.x.abs()) * (2.0 * FRAC_1_PI));
+        let cosines = Between::new(crate::unit(w.z.abs()).sqrt(), COSINES);
+        let (cos_start, cos_weights) = cosines.nodes(COSINES);
+        let row = |row: usize| {
+            let start = row * ROW + cos_start;
+            let values = &self.values[start..(start + 4).min(self.values.len())];
+            values.iter().zip(cos_weights).map(|(v, w)| v * w).sum::<f32>()
+        };
+        let page = |x: usize, y: usize| {
+            let swapped = x < y;
+            let page = if swapped { pair(y, x) } else { pair(x, y) };
+            let node = |node: usize| if swapped { AZIMUTHS - 1 - node } else { node };
+            around
+                .nodes
+                .into_iter()
+                .zip(around.weights)
+                .map(|(i, w)| w * row(page * AZIMUTHS + node(i)))
+                .sum()
+        };
+        interpolated(alpha, page).clamp(0.0, 1.0)
+    }
+
+    /// The mean of [`Stretched::mirror`] by the cosine law.
+    pub fn mean(&self, alpha: Vec2) -> f32 {
+        interpolated(alpha, |x, y| self.means[if x < y { pair(y, x) } else { pair(x, y) }])
+    }
+}
+
+/// Between nodes of the azimuth.
+struct Around {
+    nodes: [usize; 4],
+    weights: [f32; 4],
+}
+
+impl Around {
+    /// By the share of the quarter turn.
+    fn new(share: f32) -> Self {
+        Self::at(0.5 - ((1.0 - 2.0 * crate::unit(share)).asin() / 3.0).sin())
+    }
+
+    /// By its place in equal steps.
+    fn at(s: f32) -> Self {
+        let place = crate::unit(s) * (AZIMUTHS - 1) as f32;
+        let first = (place as usize).min(AZIMUTHS - 2);
+        // Beyond its ends the quarter goes on as its mirror image.
+        let last = 2 * (AZIMUTHS - 1);
+        let nodes = [0, 1, 2, 3].map(|i| {
+            let node = (first + i + last - 1) % last;
+            node.min(last - node)
+        });
+        Self { nodes, weights: Between::at(first, place - first as f32).weights() }
+    }
+}
+
+/// What each node of the azimuth counts for in the mean.
+fn azimuth_weights() -> [f32; AZIMUTHS] {
+    let steps = 4096;
+    let mut sum = [0.0; AZIMUTHS];
+    for i in 0..steps {
+        let s = (i as f32 + 0.5) / steps as f32;
+        let around = Around::at(s);
+        for (node, weight) in around.nodes.into_iter().zip(around.weights) {
+            sum[node] += f64::from(6.0 * s * (1.0 - s) * weight) / f64::from(steps);
+        }
+    }
+    sum.map(|weight| weight as f32)
+}
+
+/// Between nodes of both roughnesses.
+fn interpolated(alpha: Vec2, value: impl Fn(usize, usize) -> f32) -> f32 {
+    by_alpha(alpha.x)
+        .interpolate(ROUGHNESSES, |x| by_alpha(alpha.y).interpolate(ROUGHNESSES, |y| value(x, y)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::conductor::Conductor;
+    use crate::microfacet::Microfacets;
+    use crate::{LocalDir, Spectrum};
+    use lumbre_math::random::RandomStream;
+    use std::f32::consts::FRAC_PI_2;
+
+    /// The direction of a node.
+    fn direction(azimuth: usize, cosine: usize) -> Vec3 {
+        let cos = (cosine as f32 / (COSINES - 1) as f32).powi(2).max(1e-4);
+        let sin = (1.0 - cos * cos).sqrt();
+        let s = azimuth as f32 / (AZIMUTHS - 1) as f32;
+        let phi = s * s * (3.0 - 2.0 * s) * FRAC_PI_2;
+        Vec3::new(sin * phi.cos(), sin * phi.sin(), cos)
+    }
+
+    /// The mean weight of samples at a lattice of random numbers.
+    fn reflected(alpha: Vec2, w: Vec3, [points, step]: [u32; 2]) -> f32 {
+        let mirror = Conductor::from_reflectance(Spectrum::WHITE, Microfacets::new(alpha.x, alpha.y));
+        let sum: f64 = (0..points)
+            .map(|i| {
+                let turns = u64::from(i) * u64::from(step) % u64::from(points);
+                let u = Vec2::new(turns as f32, i as f32 + 0.5) / points as f32;
+                mirror.sample(LocalDir(w), u).map_or(0.0, |sample| f64::from(sample.weight.g))
+            })
+            .sum();
+        (sum / f64::from(points)) as f32
+    }
+
+    fn node(x: usize, y: usize, azimuth: usize, cosine: usize, lattice: [u32; 2]) -> f32 {
+        let root = |i: usize| i as f32 / (ROUGHNESSES - 1) as f32;
+        reflected(Vec2::new(root(x).powi(3), root(y).powi(3)), direction(azimuth, cosine), lattice)
+    }
+
+    /// Writes the table: `cargo test --release -p lumbre-shading --lib stretched -- --ignored`
+    #[test]
+    #[ignore = "makes src/stretched.bin anew"]
+    fn make_the_table() {
+        let mut bytes = Vec::with_capacity(2 * PAIRS * PAGE);
+        for x in 0..ROUGHNESSES {
+            for y in 0..=x {
+                for azimuth in 0..AZIMUTHS {
+                    for cosine in 0..COSINES {
+                        let value = node(x, y, azimuth, cosine, [28657, 17711]);
+                        bytes.extend(((value.clamp(0.0, 1.0) * 65535.0).round() as u16).to_le_bytes());
+                    }
+                }
+            }
+        }
+        std::fs::write(concat!(env!("CARGO_MANIFEST_DIR"), "/src/stretched.bin"), bytes).unwrap();
+    }
+
+    #[test]
+    fn the_table_is_what_facets_reflect_at_nodes_and_between() {
+        let mut random = RandomStream::new(5);
+        let mut worst = 0.0_f32;
+        for _ in 0..400 {
+            let mut number = || random.next_f32();
+            let alpha = Vec2::new(number().powi(2).max(0.02), number().powi(2).max(0.02));
+            let (cos, phi) = (number().powi(2).max(1e-3), number() * std::f32::consts::TAU);
+            let sin = (1.0 - cos * cos).sqrt();
+            let w = Vec3::new(sin * phi.cos(), sin * phi.sin(), cos);
+            let (ours, expected) = (STRETCHED.mirror(alpha, w), reflected(alpha, w, [28657, 17711]));
+            worst = worst.max((ours - expected).abs());
+            // Along the surface, and along the narrow axis most, the steps are too wide.
+            let tolerance = if cos < 0.1 { 3e-2 } else { 3e-3 };
+            assert!((ours - expected).abs() < tolerance, "{alpha} {w}: {ours} {expected}");
+        }
+        assert!(worst > 1e-6);
+    }
+
+    #[test]
+    fn facets_that_are_not_stretched_are_those_of_the_other_table() {
+        for root in [0.0, 0.21, 0.5, 0.83, 1.0_f32] {
+            let alpha = root * root;
+            for cos in [0.02, 0.3, 0.77, 1.0_f32] {
+                let w = Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);
+                let (ours, other) =
+                    (STRETCHED.mirror(Vec2::splat(alpha), w), crate::albedo::ALBEDO.mirror(cos, alpha));
+                assert!((ours - other).abs() < 4e-3, "{alpha} {cos}: {ours} {other}");
+            }
+            let (ours, other) =
+                (STRETCHED.mean(Vec2::splat(alpha)), crate::albedo::ALBEDO.mirror_mean(alpha));
+            assert!((ours - other).abs() < 2e-3, "{alpha}: {ours} {other}");
+        }
+    }
+
+    #[test]
+    fn its_mean_is_that_of_the_cosine_law() {
+        for alpha in [Vec2::new(1.0, 0.04), Vec2::new(0.1, 0.6), Vec2::new(0.3, 0.2)] {
+            let steps = 200;
+            let mut sum = 0.0;
+            for i in 0..steps {
+                for j in 0..steps {
+                    let cos = ((i as f32 + 0.5) / steps as f32).sqrt();
+                    let phi = (j as f32 + 0.5) / steps as f32 * std::f32::consts::TAU;
+                    let sin = (1.0 - cos * cos).sqrt();
+                    sum += STRETCHED.mirror(alpha, Vec3::new(sin * phi.cos(), sin * phi.sin(), cos));
+                }
+            }
+            let mean = sum / (steps * steps) as f32;
+            assert!((mean - STRETCHED.mean(alpha)).abs() < 5e-4, "{alpha}: {mean} {}", STRETCHED.mean(alpha));
+        }
+    }
+}
