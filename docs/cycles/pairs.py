@@ -110,6 +110,9 @@ def staged(name, path, folder):
         for primitive in bare:
             primitive["material"] = len(materials)
         materials.append({"pbrMetallicRoughness": {"metallicFactor": 1.0, "roughnessFactor": 1.0}})
+    # Cycles shows backs whatever the file says.
+    for material in document.get("materials", []):
+        material["doubleSided"] = True
     nodes = document.setdefault("nodes", [])
     scene = document.setdefault("scenes", [{"nodes": [0]}])[document.get("scene", 0)]
     read_into_blender(path)

@@ -1,11 +1,12 @@
 //! Meshes made ready for the tree: in single precision about an origin near them, their quads split where they are flat.
 
+use std::mem::take;
 use std::sync::Arc;
 
 use lumbre_kernel::TriangleMesh;
 use lumbre_math::{DVec3, Transform, Vec3};
 
-use crate::surface::MeshDress;
+use crate::surface::{MeshDress, Turned};
 use crate::{BuildError, MeshDesc};
 
 /// A mesh in the space of a tree.
@@ -36,19 +37,13 @@ pub(crate) fn bake(
     order: QuadOrder,
 ) -> Result<BakedMesh, BuildError> {
     check(shape, &desc)?;
-    let desc = Arc::try_unwrap(desc).unwrap_or_else(|shared| (*shared).clone());
-    let MeshDesc {
-        mut positions,
-        mut triangles,
-        quads,
-        mut normals,
-        uvs,
-        mut tangents,
-        second_uvs,
-        colours,
-        coverages,
-        face_indices: _,
-    } = desc;
+    // A description that others hold too keeps what is its own, and shares what no transform changes; one that no one
+    // else holds gives up its lists.
+    let mut shared = desc;
+    let (mut positions, mut triangles, quads) = match Arc::get_mut(&mut shared) {
+        Some(own) => (take(&mut own.positions), take(&mut own.triangles), take(&mut own.quads)),
+        None => (shared.positions.clone(), shared.triangles.clone(), shared.quads.clone()),
+    };
 
     let stays = tree_from_object.is_identity() && origin == DVec3::ZERO;
     if !stays {
@@ -59,13 +54,18 @@ pub(crate) fn bake(
     if let Some(vertex) = positions.iter().position(|p| !p.is_finite()) {
         return Err(BuildError::NotFinite { shape, vertex });
     }
+    let mut turned = Turned::default();
     if !tree_from_object.is_identity() {
+        (turned.normals, turned.tangents) = match Arc::get_mut(&mut shared) {
+            Some(own) => (own.normals.take(), own.tangents.take()),
+            None => (shared.normals.clone(), shared.tangents.clone()),
+        };
         let unit = |v: DVec3| v.try_normalize().unwrap_or(DVec3::ZERO).as_vec3();
-        for n in normals.iter_mut().flatten() {
+        for n in turned.normals.iter_mut().flatten() {
             *n = unit(tree_from_object.normal(n.as_dvec3()));
         }
         let side = if tree_from_object.is_mirror() { -1.0 } else { 1.0 };
-        for t in tangents.iter_mut().flatten() {
+        for t in turned.tangents.iter_mut().flatten() {
             *t = unit(tree_from_object.vector(t.truncate().as_dvec3())).extend(side * t.w);
         }
     }
@@ -90,17 +90,7 @@ pub(crate) fn bake(
         }
     }
     let mesh = Arc::new(TriangleMesh { origin, positions, indices: triangles });
-    let dress = Arc::new(MeshDress {
-        mesh,
-        swapped,
-        first_half,
-        normals,
-        uvs,
-        tangents,
-        second_uvs,
-        colours,
-        coverages,
-    });
+    let dress = Arc::new(MeshDress { mesh, swapped, first_half, turned, rest: shared });
     Ok(BakedMesh { dress, patches })
 }
 
@@ -215,6 +205,26 @@ mod tests {
         let mirrored = bake(0, desc(), &mirror, DVec3::ZERO, QuadOrder::Around).unwrap();
         let expected = mirror.normal(front(&plain)).normalize();
         assert!((front(&mirrored) - expected).length() < 1e-6);
+    }
+
+    #[test]
+    fn meshes_of_one_description_share_what_does_not_move() {
+        let desc = Arc::new(MeshDesc {
+            uvs: Some(vec![Vec2::new(0.25, 0.75); 4]),
+            normals: Some(vec![Vec3::Z; 4]),
+            ..(*quad(Vec3::new(2.0, 7.0, 4.0))).clone()
+        });
+        let bake_at =
+            |place: &Transform| bake(3, desc.clone(), place, DVec3::ZERO, QuadOrder::Around).unwrap();
+        let turn = Transform::rotate(DVec3::X, 90.0).unwrap();
+        let (here, there) = (bake_at(&Transform::IDENTITY), bake_at(&turn));
+        assert!(Arc::ptr_eq(&here.dress.rest, &there.dress.rest));
+        assert_eq!(here.dress.normals().unwrap()[2], Vec3::Z);
+        assert!((there.dress.normals().unwrap()[2] - Vec3::NEG_Y).length() < 1e-6);
+        assert_eq!(desc.positions.len(), 4);
+        // The last one that holds it needs no copy.
+        let own = bake(3, desc, &turn, DVec3::ZERO, QuadOrder::Around).unwrap();
+        assert!(own.dress.rest.uvs.is_some() && own.dress.mesh.positions.len() == 4);
     }
 
     #[test]

@@ -7,9 +7,9 @@ use lumbre_kernel::TriangleMesh;
 use lumbre_math::{DVec2, DVec3, Transform, Vec2, Vec3, Vec4};
 use lumbre_shading::{FloatTexture, LocalSurface, Material, Spectrum, TextureContext, VertexData};
 
-use crate::Emission;
 use crate::csg::CsgForm;
 use crate::light::LightId;
+use crate::{Emission, MeshDesc};
 
 /// What stands behind one id of the tree.
 #[derive(Clone, Debug)]
@@ -49,12 +49,17 @@ pub(crate) struct MeshDress {
     pub swapped: bool,
     /// From this triangle on, two triangles are halves of a quad.
     pub first_half: u32,
+    /// What a transform turned; else it is in `rest`.
+    pub turned: Turned,
+    /// The description, which others may share, without what has moved into the mesh.
+    pub rest: Arc<MeshDesc>,
+}
+
+/// Directions at vertices, turned into the space of a tree.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Turned {
     pub normals: Option<Vec<Vec3>>,
-    pub uvs: Option<Vec<Vec2>>,
     pub tangents: Option<Vec<Vec4>>,
-    pub second_uvs: Option<Vec<Vec2>>,
-    pub colours: Option<Vec<Spectrum>>,
-    pub coverages: Option<Vec<f32>>,
 }
 
 /// A surface with what its vertices say of it.
@@ -133,7 +138,7 @@ impl SurfaceEntry {
     pub fn plain_emission(&self) -> Option<(&Emission, f64)> {
         let is_plain = match &self.form {
             Form::Exact => true,
-            Form::Mesh(mesh) => mesh.normals.is_none(),
+            Form::Mesh(mesh) => mesh.normals().is_none(),
             Form::Patch { .. } | Form::Csg(_) => false,
         };
         let emission = self.emission.as_ref()?;
@@ -183,14 +188,14 @@ impl SurfaceEntry {
             Form::Exact | Form::Csg(_) => plain(surface),
             Form::Mesh(mesh) => {
                 let corners = mesh.mesh.indices[primitive as usize];
-                let uvs = match &mesh.uvs {
+                let uvs = match &mesh.rest.uvs {
                     Some(uvs) => at(uvs, corners),
                     None => mesh.default_uvs(primitive),
                 };
                 mesh.dress(surface, corners, uvs, &triangle_blend(local), placement)
             }
             Form::Patch { dress, corners, .. } => {
-                let uvs = match &dress.uvs {
+                let uvs = match &dress.rest.uvs {
                     Some(uvs) => at(uvs, *corners),
                     None if dress.swapped => [Vec2::ZERO, Vec2::Y, Vec2::X, Vec2::ONE],
                     None => [Vec2::ZERO, Vec2::X, Vec2::Y, Vec2::ONE],
@@ -262,6 +267,16 @@ fn plain(surface: &Surface) -> Dressed {
 }
 
 impl MeshDress {
+    /// Normals at the vertices.
+    pub fn normals(&self) -> Option<&[Vec3]> {
+        self.turned.normals.as_deref().or(self.rest.normals.as_deref())
+    }
+
+    /// Tangents at the vertices, with the sides of the bitangents.
+    fn tangents(&self) -> Option<&[Vec4]> {
+        self.turned.tangents.as_deref().or(self.rest.tangents.as_deref())
+    }
+
     /// pbrt's parameters for triangles without any: (0, 0), (1, 0), (1, 1), and those of a quad for its halves.
     fn default_uvs(&self, triangle: u32) -> [Vec2; 3] {
         let second_half = triangle >= self.first_half && (triangle - self.first_half) % 2 == 1;
@@ -279,18 +294,18 @@ impl MeshDress {
         placement: Option<&Transform>,
     ) -> Dressed {
         let mut dressed = self.shape(bare, corners, uvs, blend, placement);
-        if let Some(colours) = &self.colours {
+        if let Some(colours) = &self.rest.colours {
             let colour = blend.value(corners.map(|i| {
                 let Spectrum { r, g, b } = colours[i as usize];
                 Vec3::new(r, g, b).as_dvec3()
             }));
             dressed.vertex.colour = Spectrum::new(colour.x as f32, colour.y as f32, colour.z as f32);
         }
-        if let Some(coverages) = &self.coverages {
+        if let Some(coverages) = &self.rest.coverages {
             let coverages = corners.map(|i| DVec3::splat(f64::from(coverages[i as usize])));
             dressed.vertex.coverage = blend.value(coverages).x as f32;
         }
-        if let Some(second) = &self.second_uvs {
+        if let Some(second) = &self.rest.second_uvs {
             let flat = |uv: Vec2| uv.as_dvec2().extend(0.0);
             let second = corners.map(|i| flat(second[i as usize]));
             dressed.vertex.uv = blend.value(second).truncate().as_vec2();
@@ -339,7 +354,7 @@ impl MeshDress {
         (surface.dndu, surface.dndv) =
             if has_parameters { by_uv(bare.dndu, bare.dndv) } else { (DVec3::ZERO, DVec3::ZERO) };
 
-        let Some(normals) = &self.normals else {
+        let Some(normals) = self.normals() else {
             let mut dressed = plain(&surface);
             self.align(&mut dressed, corners, blend, placement);
             return dressed;
@@ -384,7 +399,7 @@ impl MeshDress {
         blend: &Blend<N>,
         placement: Option<&Transform>,
     ) {
-        let Some(tangents) = &self.tangents else { return };
+        let Some(tangents) = self.tangents() else { return };
         let tangents = at(tangents, corners);
         let side: f32 = tangents.iter().map(|t| t.w).sum();
         let mirrored = placement.is_some_and(Transform::is_mirror);
