@@ -425,6 +425,69 @@ fn rotations_take_the_shorter_way_and_splines_their_curve() {
 }
 
 #[test]
+fn animations_by_pointers_change_what_they_name() {
+    let mut parts = Parts::default();
+    let p = parts.positions(&SQUARE);
+    let times = parts.add(&floats(&[1.0, 3.0]), r#""componentType":5126,"type":"SCALAR","count":2"#);
+    let colours = parts.add(
+        &floats(&[0.0, 1.0, 0.5, 1.0, 1.0, 0.0, 0.5, 1.0]),
+        r#""componentType":5126,"type":"VEC4","count":2"#,
+    );
+    let numbers = parts.add(&floats(&[2.0, 6.0]), r#""componentType":5126,"type":"SCALAR","count":2"#);
+    let places = parts
+        .add(&floats(&[0.0, 0.0, 0.0, 8.0, 4.0, 2.0]), r#""componentType":5126,"type":"VEC3","count":2"#);
+    let channel = |sampler: usize, pointer: &str| {
+        format!(
+            r#"{{"sampler":{sampler},"target":{{"path":"pointer","extensions":{{"KHR_animation_pointer":{{"pointer":"{pointer}"}}}}}}}}"#
+        )
+    };
+    let rest = |channels: &[String]| {
+        format!(
+            r#""extensionsUsed":["KHR_animation_pointer","KHR_lights_punctual","KHR_materials_emissive_strength"],
+            "extensions":{{"KHR_lights_punctual":{{"lights":[{{"type":"point","intensity":1}}]}}}},
+            "materials":[{{"emissiveFactor":[1,1,1],"pbrMetallicRoughness":{{"metallicFactor":0}}}}],
+            "meshes":[{{"primitives":[{{"mode":6,"material":0,"attributes":{{"POSITION":{p}}}}}]}}],
+            "nodes":[{{"mesh":0}},{{"extensions":{{"KHR_lights_punctual":{{"light":0}}}},"translation":[1,1,1]}}],
+            "animations":[{{"samplers":[{{"input":{times},"output":{colours}}},{{"input":{times},"output":{numbers}}},
+                {{"input":{times},"output":{places}}}],"channels":[{}]}}]"#,
+            channels.join(",")
+        )
+    };
+    let all = [
+        channel(0, "/materials/0/pbrMetallicRoughness/baseColorFactor"),
+        channel(1, "/extensions/KHR_lights_punctual/lights/0/intensity"),
+        channel(1, "/materials/0/extensions/KHR_materials_emissive_strength/emissiveStrength"),
+        channel(2, "/nodes/1/translation"),
+    ];
+    for (frame, strength, place, green) in
+        [(None, 1.0, DVec3::ONE, 1.0), (Some(1.5), 3.0, DVec3::new(2.0, 1.0, 0.5), 0.75)]
+    {
+        let options = GltfOptions { frame, variant: None };
+        let mut diagnostics = Diagnostics::new();
+        let scene =
+            read_with(&glb(&parts.json(&rest(&all)), &parts.binary), &options, &mut diagnostics).unwrap();
+        assert_eq!(diagnostics.lines(), Vec::<String>::new());
+        let LightDesc::Point { from, intensity } = &scene.lights[0] else { panic!("{:?}", scene.lights) };
+        assert!((*from - place).length() < 1e-6, "{from}");
+        assert_eq!(*intensity, Rgb::splat(strength));
+        let light = scene.shapes[0].area_light.as_ref().unwrap();
+        assert_eq!(light.radiance, Rgb::splat(strength));
+        let material = format!("{:?}", scene.materials[0].material);
+        assert!(frame.is_none() || material.contains(&format!("g: {green:?}")), "{material}");
+    }
+    // What cannot be animated is said, and left out.
+    let odd = [channel(1, "/buffers/0/byteLength")];
+    let options = GltfOptions { frame: Some(1.5), variant: None };
+    let mut diagnostics = Diagnostics::new();
+    read_with(&glb(&parts.json(&rest(&odd)), &parts.binary), &options, &mut diagnostics).unwrap();
+    assert!(
+        diagnostics.lines()[0].contains("/pointer: animation of what cannot be animated"),
+        "{:?}",
+        diagnostics.lines()
+    );
+}
+
+#[test]
 fn cameras_look_along_minus_z_and_are_not_mirrored() {
     let json = r#"{"asset":{"version":"2.0"},"cameras":[
         {"type":"perspective","name":"wide","perspective":{"yfov":0.8,"znear":0.1,"aspectRatio":2}},

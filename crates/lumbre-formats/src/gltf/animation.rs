@@ -1,4 +1,4 @@
-//! Animations: where they take nodes at one time.
+//! Animations: where they take nodes at one time, and what else they change.
 
 use std::collections::HashMap;
 
@@ -7,6 +7,7 @@ use lumbre_math::{DQuat, DVec3};
 use super::accessor::{Accessor, Component, Element};
 use super::file::{File, List};
 use super::json::{Read, Value};
+use super::pointer::{self, Changes};
 use crate::diagnostic::quoted;
 
 /// What animations do to a node at one time.
@@ -31,6 +32,18 @@ enum Path {
     Rotation,
     Scale,
     Weights,
+    /// Anything else: so many numbers, and whether they are a list even if there is one.
+    Numbers {
+        width: usize,
+        is_list: bool,
+    },
+}
+
+/// What a channel moves.
+#[derive(Clone, Debug, PartialEq)]
+enum Target {
+    Node(usize),
+    Pointer(String),
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,7 +56,7 @@ enum Interpolation {
 /// A channel with its sampler.
 struct Channel<'a> {
     value: Value<'a>,
-    node: usize,
+    target: Target,
     path: Path,
     interpolation: Interpolation,
     input: Accessor<'a>,
@@ -57,12 +70,14 @@ pub(super) fn at(file: &File<'_>, time: f64) -> Read<HashMap<usize, Moved>> {
     let mut moved: HashMap<usize, Moved> = HashMap::new();
     for &animation in file.list(List::Animations) {
         for channel in channels(file, animation)? {
-            let entry = moved.entry(channel.node).or_default();
+            let Target::Node(node) = channel.target else { continue };
+            let entry = moved.entry(node).or_default();
             let is_taken = match channel.path {
                 Path::Translation => entry.translation.is_some(),
                 Path::Rotation => entry.rotation.is_some(),
                 Path::Scale => entry.scale.is_some(),
                 Path::Weights => entry.weights.is_some(),
+                Path::Numbers { .. } => continue,
             };
             if is_taken {
                 file.warn(channel.value, "animation of what another one animates was left out");
@@ -74,10 +89,27 @@ pub(super) fn at(file: &File<'_>, time: f64) -> Read<HashMap<usize, Moved>> {
                 Path::Rotation => entry.rotation = Some(DQuat::from_xyzw(v[0], v[1], v[2], v[3])),
                 Path::Scale => entry.scale = Some(DVec3::new(v[0], v[1], v[2])),
                 Path::Weights => entry.weights = Some(v),
+                Path::Numbers { .. } => {}
             }
         }
     }
     Ok(moved)
+}
+
+/// What all animations do at a time to what is not said by a node and a path.
+pub(super) fn changes(file: &File<'_>, time: f64) -> Read<Changes> {
+    let mut changes = Changes::default();
+    for &animation in file.list(List::Animations) {
+        for channel in channels(file, animation)? {
+            let Target::Pointer(pointer) = &channel.target else { continue };
+            let value = channel.sample(file, time)?;
+            let is_list = value.len() > 1 || matches!(channel.path, Path::Numbers { is_list: true, .. });
+            if !changes.set(pointer, &value, is_list) {
+                file.warn(channel.value, "animation of what another one animates was left out");
+            }
+        }
+    }
+    Ok(changes)
 }
 
 /// Checks all animations without playing them.
@@ -102,7 +134,7 @@ fn channels<'a>(file: &'a File<'_>, animation: Value<'a>) -> Read<Vec<Channel<'a
             "scale" => Path::Scale,
             "weights" => Path::Weights,
             "pointer" if target.extension("KHR_animation_pointer")?.is_some() => {
-                file.warn(target, "animation of something other than nodes was left out");
+                channels.extend(by_pointer(file, value, target, sampler)?);
                 continue;
             }
             other => {
@@ -110,18 +142,7 @@ fn channels<'a>(file: &'a File<'_>, animation: Value<'a>) -> Read<Vec<Channel<'a
                 return Err(wrong.suggest(other, ["translation", "rotation", "scale", "weights"]).into());
             }
         };
-        let interpolation = match sampler.get("interpolation")? {
-            None => Interpolation::Linear,
-            Some(value) => match &*value.string()? {
-                "LINEAR" => Interpolation::Linear,
-                "STEP" => Interpolation::Step,
-                "CUBICSPLINE" => Interpolation::CubicSpline,
-                other => {
-                    let wrong = value.wrong("unknown interpolation").found(quoted(other));
-                    return Err(wrong.suggest(other, ["LINEAR", "STEP", "CUBICSPLINE"]).into());
-                }
-            },
-        };
+        let interpolation = interpolation(sampler)?;
         use Component::{F32, I8, I16, U8, U16};
         let input_value = sampler.need("input")?;
         let input = Accessor::named(file, input_value)?;
@@ -131,7 +152,7 @@ fn channels<'a>(file: &'a File<'_>, animation: Value<'a>) -> Read<Vec<Channel<'a
         let (elements, components): (&[Element], &[Component]) = match path {
             Path::Translation | Path::Scale => (&[Element::Vec3], &[F32]),
             Path::Rotation => (&[Element::Vec4], &[F32, I8, U8, I16, U16]),
-            Path::Weights => (&[Element::Scalar], &[F32, I8, U8, I16, U16]),
+            Path::Weights | Path::Numbers { .. } => (&[Element::Scalar], &[F32, I8, U8, I16, U16]),
         };
         output.expect(output_value, elements, components)?;
         // Without a node, it may be for an extension.
@@ -148,9 +169,73 @@ fn channels<'a>(file: &'a File<'_>, animation: Value<'a>) -> Read<Vec<Channel<'a
             let expected = format!("{} times {} times {each}", input.count, width);
             return Err(wrong.expected(expected).into());
         }
-        channels.push(Channel { value, node, path, interpolation, input, output, width });
+        channels.push(Channel {
+            value,
+            target: Target::Node(node),
+            path,
+            interpolation,
+            input,
+            output,
+            width,
+        });
     }
     Ok(channels)
+}
+
+fn interpolation(sampler: Value<'_>) -> Read<Interpolation> {
+    let Some(value) = sampler.get("interpolation")? else { return Ok(Interpolation::Linear) };
+    Ok(match &*value.string()? {
+        "LINEAR" => Interpolation::Linear,
+        "STEP" => Interpolation::Step,
+        "CUBICSPLINE" => Interpolation::CubicSpline,
+        other => {
+            let wrong = value.wrong("unknown interpolation").found(quoted(other));
+            return Err(wrong.suggest(other, ["LINEAR", "STEP", "CUBICSPLINE"]).into());
+        }
+    })
+}
+
+/// A channel that says by a pointer what it moves; none where that is nothing that is played.
+fn by_pointer<'a>(
+    file: &'a File<'_>,
+    value: Value<'a>,
+    target: Value<'a>,
+    sampler: Value<'a>,
+) -> Read<Option<Channel<'a>>> {
+    let Some(extension) = target.extension("KHR_animation_pointer")? else { return Ok(None) };
+    let pointer_value = extension.need("pointer")?;
+    let pointer = pointer_value.string()?.into_owned();
+    if let Some(node) = target.get("node")? {
+        file.breach(node.wrong("animation by a pointer that names a node, too"))?;
+    }
+    let interpolation = interpolation(sampler)?;
+    let input_value = sampler.need("input")?;
+    let input = Accessor::named(file, input_value)?;
+    input.expect(input_value, &[Element::Scalar], &[Component::F32])?;
+    let output_value = sampler.need("output")?;
+    let output = Accessor::named(file, output_value)?;
+    let each = if interpolation == Interpolation::CubicSpline { 3 } else { 1 };
+    let keyframes = input.count.saturating_mul(each);
+    if output.count == 0 || !output.count.is_multiple_of(keyframes) {
+        let wrong = output_value.wrong("animation of a wrong length");
+        let wrong = wrong.found(format!("{} elements", output.count));
+        return Err(wrong.expected(format!("a multiple of {keyframes}")).into());
+    }
+    // Elements of one keyframe: several of one number each are a list.
+    let width = output.count / keyframes;
+    let is_matrix = matches!(output.element, Element::Mat2 | Element::Mat3 | Element::Mat4);
+    let is_list = output.element == Element::Scalar && (width > 1 || pointer.ends_with("/weights"));
+    if !pointer::is_played(&pointer) || is_matrix || (width > 1 && !is_list) {
+        file.warn(pointer_value, "animation of what cannot be animated was left out");
+        return Ok(None);
+    }
+    let is_turn = pointer.starts_with("/nodes/") && pointer.ends_with("/rotation");
+    let path = if is_turn && output.element == Element::Vec4 {
+        Path::Rotation
+    } else {
+        Path::Numbers { width: width * output.element.numbers(), is_list }
+    };
+    Ok(Some(Channel { value, target: Target::Pointer(pointer), path, interpolation, input, output, width }))
 }
 
 /// How many morph targets the mesh of a node has.
@@ -175,6 +260,7 @@ impl Channel<'_> {
             Path::Translation | Path::Scale => 3,
             Path::Rotation => 4,
             Path::Weights => self.width,
+            Path::Numbers { width, .. } => width,
         };
         let values: Vec<f32> = match self.path {
             Path::Translation | Path::Scale => {
@@ -182,6 +268,12 @@ impl Channel<'_> {
             }
             Path::Rotation => self.output.floats(file, |v: [f32; 4]| v)?.into_iter().flatten().collect(),
             Path::Weights => self.output.floats(file, |[v]: [f32; 1]| v)?,
+            Path::Numbers { .. } => match self.output.element {
+                Element::Vec2 => self.output.floats(file, |v: [f32; 2]| v)?.into_iter().flatten().collect(),
+                Element::Vec3 => self.output.floats(file, |v: [f32; 3]| v)?.into_iter().flatten().collect(),
+                Element::Vec4 => self.output.floats(file, |v: [f32; 4]| v)?.into_iter().flatten().collect(),
+                _ => self.output.floats(file, |[v]: [f32; 1]| v)?,
+            },
         };
         file.budget.release(4 * (times.len() + values.len()) as u64);
         if let Some(i) = values.iter().position(|v| !v.is_finite()) {

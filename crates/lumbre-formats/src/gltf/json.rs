@@ -294,6 +294,37 @@ impl<'a> Value<'a> {
         Self { json: self.json, at }
     }
 
+    /// The text that it is a part of.
+    pub fn text(self) -> &'a str {
+        self.json.text
+    }
+
+    /// Where it stands in the text.
+    pub fn range(self) -> std::ops::Range<usize> {
+        let bytes = self.json.text.as_bytes();
+        // Down to the last value that has none inside it, and out again over the brackets.
+        let (mut last, mut depth) = (self, 0);
+        while let b'{' | b'[' = last.first_byte() {
+            depth += 1;
+            match last.values().last() {
+                Some(inner) => last = inner,
+                None => break,
+            }
+        }
+        let mut end = match last.first_byte() {
+            b'{' | b'[' => last.start() + 1,
+            b'"' => last.start() + 2 + last.raw_string().len(),
+            _ => last.start() + last.scalar().len(),
+        };
+        for _ in 0..depth {
+            while !matches!(bytes.get(end), Some(b'}' | b']') | None) {
+                end += 1;
+            }
+            end += 1;
+        }
+        self.start()..end
+    }
+
     /// What it is, for errors.
     fn said(self) -> String {
         const LONGEST: usize = 40;

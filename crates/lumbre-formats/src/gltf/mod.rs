@@ -20,6 +20,7 @@ mod ktx;
 pub mod material;
 mod mesh;
 mod meshopt;
+mod pointer;
 mod scene;
 mod shade;
 mod tangents;
@@ -52,6 +53,7 @@ const SUPPORTED: &[&str] = &[
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",
+    "KHR_animation_pointer",
     #[cfg(feature = "draco")]
     "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
@@ -139,7 +141,15 @@ fn read(
         }
         (text(bytes, name)?, None, None)
     };
-    let json = Json::read(text, name, within, budget)?;
+    let plain = Json::read(text, name, within, budget)?;
+    let animated = match options.frame {
+        Some(time) if text.contains("KHR_animation_pointer") => {
+            animated(&plain, time, name, folder, budget, binary, is_glb)?
+        }
+        _ => None,
+    };
+    let changed = animated.as_ref().map(|text| Json::read(text, name, within, budget)).transpose()?;
+    let json = changed.as_ref().unwrap_or(&plain);
     let root = json.root().object()?;
     version(root)?;
     let mut file = File::new(root, name, folder, budget, std::mem::take(diagnostics));
@@ -148,6 +158,30 @@ fn read(
         .and_then(|()| scene::read(&file, options));
     *diagnostics = file.into_diagnostics();
     scene
+}
+
+/// The text with the numbers that animations by pointers change, as they stand at a time; none where there are none.
+fn animated(
+    json: &Json<'_>,
+    time: f64,
+    name: &Arc<str>,
+    folder: &Path,
+    budget: &Budget,
+    binary: Option<&[u8]>,
+    is_glb: bool,
+) -> Read<Option<String>> {
+    // What is loaded for this is dropped again, and what is wrong is said when the whole is read.
+    let own = Budget::new(*budget.limits());
+    let root = json.root().object()?;
+    let mut file = File::new(root, name, folder, &own, Diagnostics::default());
+    file.load(binary, is_glb)?;
+    let changes = animation::changes(&file, time)?;
+    if changes.is_empty() {
+        return Ok(None);
+    }
+    let text = changes.apply(root)?;
+    budget.bytes(text.len() as u64, "glTF as animations leave it")?;
+    Ok(Some(text))
 }
 
 /// That the file is of a version that is read: 2, whatever comes behind the point, unless it needs more.
@@ -212,6 +246,7 @@ const PLACES: &[(&str, &[&str])] = &[
     ("KHR_meshopt_compression", &["/bufferViews/*", "/buffers/*"]),
     ("EXT_texture_webp", &["/textures/*"]),
     ("KHR_texture_basisu", &["/textures/*"]),
+    ("KHR_animation_pointer", &["/animations/*/channels/*/target"]),
     ("KHR_draco_mesh_compression", &["/meshes/*/primitives/*"]),
     ("KHR_lights_punctual", &["", "/nodes/*"]),
     ("KHR_materials_variants", &["", "/meshes/*/primitives/*"]),
