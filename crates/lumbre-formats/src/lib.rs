@@ -8,6 +8,7 @@ pub mod budget;
 mod contained;
 pub mod diagnostic;
 pub mod gltf;
+pub mod ies;
 pub mod image;
 pub mod input;
 pub mod obj;

@@ -11,7 +11,9 @@ use lumbre_formats::{Budget, Diagnostics, FormatError, Limits, Strictness};
 use lumbre_geometry::Shape;
 use lumbre_image::Rgb;
 use lumbre_math::{DVec3, Vec2, Vec3, Vec4};
-use lumbre_scene::{CameraKind, GeometryDesc, LightDesc, MeshDesc, Scene, SceneDesc, ShapeDesc};
+use lumbre_scene::{
+    CameraKind, GeometryDesc, LightDesc, MeshDesc, Scene, SceneDesc, ShapeDesc, WithoutLight,
+};
 use lumbre_shading::{
     FloatTexture, MaterialKind, PrincipledParams, SpectrumTexture, TextureContext, VertexData,
 };
@@ -422,6 +424,44 @@ fn rotations_take_the_shorter_way_and_splines_their_curve() {
     // Half way: (1 + 3) / 2 + 2 seconds · (2 - -1) / 8.
     let place = scene.cameras[1].world_from_camera.point(DVec3::ZERO);
     assert!((place - DVec3::splat(2.75)).length() < 1e-6, "{place}");
+}
+
+#[test]
+fn measured_lights_shine_as_their_profile_says_along_minus_z() {
+    // 200 candelas straight ahead, none from 90 degrees on.
+    let profile = "IES:LM-63-2019\nTILT=NONE\n1 -1 2 2 1 1 1 0 0 0 1 1 60\n0 90\n0\n100 0\n";
+    let json = |profile: &str| {
+        let data = profile.replace('\n', "%0A").replace(' ', "%20");
+        format!(
+            r#"{{"asset":{{"version":"2.0"}},"extensionsUsed":["EXT_lights_ies"],
+            "extensions":{{"EXT_lights_ies":{{"lights":[{{"uri":"data:application/x-ies-lm-63,{data}"}}]}}}},
+            "nodes":[{{"translation":[1,2,3],"rotation":[0,0.7071067811865476,0,0.7071067811865476],"scale":[5,5,5],
+            "extensions":{{"EXT_lights_ies":{{"light":0,"multiplier":3,"color":[1,0.5,0.25]}}}}}}]}}"#
+        )
+    };
+    let scene = read(&json(profile), &[]);
+    let scene = Scene::build(SceneDesc { without_light: WithoutLight::Dark, ..scene }).unwrap();
+    assert_eq!(scene.lights().len(), 1);
+    // A quarter turn about y takes -z to -x. At distance d the irradiance is I / d².
+    let place = DVec3::new(1.0, 2.0, 3.0);
+    for (towards, share) in [
+        (-DVec3::X, 1.0),
+        (DVec3::X, 0.0),
+        (DVec3::new(-1.0, 1.0, 0.0), 0.5),
+        (DVec3::new(-1.0, 0.0, -1.0), 0.5),
+    ] {
+        let towards = towards.normalize();
+        let found = scene.lights()[0].irradiance(place + 4.0 * towards, -towards).unwrap();
+        let expected = Rgb::new(1.0, 0.5, 0.25) * (3.0 * 200.0 / 16.0 * share) as f32;
+        assert!((found - expected).map(f32::abs).max_component() < 0.5, "{towards}: {found:?} {expected:?}");
+    }
+    let wrong = error(&json(&profile.replace("100 0", "100 x")), &[]);
+    assert!(
+        wrong.contains("/extensions/EXT_lights_ies/lights/0/uri") && wrong.contains("wrong number"),
+        "{wrong}"
+    );
+    let wrong = error(&json(profile).replace(r#""light":0"#, r#""light":1"#), &[]);
+    assert!(wrong.contains("/nodes/0/extensions/EXT_lights_ies/light"), "{wrong}");
 }
 
 #[test]

@@ -9,8 +9,8 @@ use lumbre_math::{DVec3, Transform};
 use lumbre_shading::{Material, MaterialKind};
 
 use crate::light::{
-    DistantLight, Environment, Light, LightId, MeshLight, PointLight, ShapeLight, SpotLight, UniformLight,
-    power,
+    DistantLight, Environment, GoniometricLight, Light, LightId, MeshLight, PointLight, ShapeLight,
+    SpotLight, UniformLight, power,
 };
 use crate::mesh::{self, QuadOrder};
 use crate::surface::{Form, SurfaceEntry};
@@ -376,6 +376,18 @@ impl Builder {
                     ));
                 }
                 Light::Spot(SpotLight::new(&world_from_light, intensity, cone_angle, cone_delta_angle))
+            }
+            LightDesc::Goniometric { world_from_light, intensity, image } => {
+                if !intensity.is_finite() {
+                    return Err(wrong("its intensity is not finite"));
+                }
+                match GoniometricLight::new(&world_from_light, intensity, image) {
+                    Some(light) => Light::Goniometric(light),
+                    None => {
+                        self.warnings.push(BuildWarning::DarkEnvironment { light: position });
+                        return Ok(());
+                    }
+                }
             }
             LightDesc::Distant { towards, irradiance } => {
                 let towards = towards.try_normalize().ok_or(wrong("its direction is zero or not finite"))?;

@@ -219,6 +219,15 @@ pub enum LightDesc {
         /// Degrees inside it over which it fades (smoothstep).
         cone_delta_angle: f32,
     },
+    /// From a point, by direction as a picture says.
+    Goniometric {
+        /// Where; the picture is in this space, z its pole. It is not stretched.
+        world_from_light: Transform,
+        /// A factor on the picture.
+        intensity: Rgb,
+        /// Radiant intensity by direction.
+        image: EnvironmentDesc,
+    },
     /// Parallel light.
     Distant {
         /// Unit vector towards the light.

@@ -36,7 +36,7 @@ impl GroundPlane {
         let mut local = vec![];
         for light in lights {
             match light {
-                Light::Point(_) | Light::Spot(_) => local.push(light.clone()),
+                Light::Point(_) | Light::Spot(_) | Light::Goniometric(_) => local.push(light.clone()),
                 _ => open += light.irradiance(desc.point, normal).unwrap_or(Spectrum::BLACK),
             }
         }

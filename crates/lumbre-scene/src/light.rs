@@ -11,7 +11,7 @@ use lumbre_shading::{Scatter, Spectrum};
 
 pub use area::ShapeLight;
 pub(crate) use area::power;
-pub use delta::{DistantLight, PointLight, SpotLight};
+pub use delta::{DistantLight, GoniometricLight, PointLight, SpotLight};
 pub use environment::{Environment, UniformLight};
 pub use mesh::MeshLight;
 
@@ -28,6 +28,8 @@ pub enum Light {
     Point(PointLight),
     /// A cone from a point.
     Spot(SpotLight),
+    /// From a point, by direction as a picture says.
+    Goniometric(GoniometricLight),
     /// Parallel light.
     Distant(DistantLight),
     /// The same from all around.
@@ -82,6 +84,7 @@ impl Light {
         match self {
             Self::Point(light) => light.sample(from),
             Self::Spot(light) => light.sample(from),
+            Self::Goniometric(light) => light.sample(from),
             Self::Distant(light) => Some(light.sample()),
             Self::Uniform(light) => Some(light.sample(u)),
             Self::Environment(light) => light.sample(u),
@@ -120,6 +123,7 @@ impl Light {
         match self {
             Self::Point(light) => Some(of(light.sample(at))),
             Self::Spot(light) => Some(of(light.sample(at))),
+            Self::Goniometric(light) => Some(of(light.sample(at))),
             Self::Distant(light) => Some(of(Some(light.sample()))),
             Self::Uniform(light) => Some(light.radiance * std::f32::consts::PI),
             Self::Environment(light) => Some(light.irradiance(normal)),
@@ -134,7 +138,7 @@ impl Light {
 
     /// Whether its light comes from one direction alone at each place.
     pub fn is_delta(&self) -> bool {
-        matches!(self, Self::Point(_) | Self::Spot(_) | Self::Distant(_))
+        matches!(self, Self::Point(_) | Self::Spot(_) | Self::Goniometric(_) | Self::Distant(_))
     }
 
     /// An estimate of the power that it sends into a scene of this radius, by which it is chosen.
@@ -144,6 +148,7 @@ impl Light {
         let mean = |colour: Spectrum| f64::from(colour.average());
         match self {
             Self::Point(light) => 4.0 * PI * mean(light.intensity),
+            Self::Goniometric(light) => 4.0 * PI * light.mean(),
             Self::Spot(light) => light.solid_angle() * mean(light.intensity),
             Self::Distant(light) => disk * mean(light.irradiance),
             Self::Uniform(light) => PI * disk * mean(light.radiance),
@@ -158,6 +163,7 @@ impl Light {
         match self {
             Self::Point(_) => "point",
             Self::Spot(_) => "spot",
+            Self::Goniometric(_) => "goniometric",
             Self::Distant(_) => "distant",
             Self::Uniform(_) | Self::Environment(_) => "infinite",
             Self::Shape(_) | Self::Mesh(_) => "diffuse",

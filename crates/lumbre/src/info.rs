@@ -53,6 +53,7 @@ impl SceneInfo {
             let name = match light {
                 LightDesc::Point { .. } => "point",
                 LightDesc::Spot { .. } => "spot",
+                LightDesc::Goniometric { .. } => "goniometric",
                 LightDesc::Distant { .. } => "distant",
                 LightDesc::Infinite { .. } => "infinite",
             };

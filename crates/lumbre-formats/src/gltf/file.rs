@@ -29,11 +29,12 @@ pub(super) enum List {
     Skins,
     Textures,
     Lights,
+    Profiles,
     Variants,
 }
 
 impl List {
-    const ALL: [Self; 15] = [
+    const ALL: [Self; 16] = [
         Self::Accessors,
         Self::Animations,
         Self::Buffers,
@@ -48,6 +49,7 @@ impl List {
         Self::Skins,
         Self::Textures,
         Self::Lights,
+        Self::Profiles,
         Self::Variants,
     ];
 
@@ -68,6 +70,7 @@ impl List {
             Self::Skins => (None, "skins", "a skin"),
             Self::Textures => (None, "textures", "a texture"),
             Self::Lights => (Some("KHR_lights_punctual"), "lights", "a light"),
+            Self::Profiles => (Some("EXT_lights_ies"), "lights", "a light profile"),
             Self::Variants => (Some("KHR_materials_variants"), "variants", "a variant"),
         }
     }

@@ -14,6 +14,7 @@ mod container;
 mod draco;
 mod file;
 mod graph;
+mod ies;
 mod json;
 #[cfg(feature = "basisu")]
 mod ktx;
@@ -50,6 +51,7 @@ pub struct GltfOptions {
 
 /// The extensions that are read.
 const SUPPORTED: &[&str] = &[
+    "EXT_lights_ies",
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",
@@ -241,6 +243,7 @@ fn extensions(file: &File<'_>, root: Value<'_>) -> Read<()> {
 
 /// Where the objects of extensions may stand: pointers with `*` for positions.
 const PLACES: &[(&str, &[&str])] = &[
+    ("EXT_lights_ies", &["", "/nodes/*"]),
     ("EXT_mesh_gpu_instancing", &["/nodes/*"]),
     ("EXT_meshopt_compression", &["/bufferViews/*", "/buffers/*"]),
     ("KHR_meshopt_compression", &["/bufferViews/*", "/buffers/*"]),

@@ -14,6 +14,7 @@ use lumbre_scene::{
 use super::accessor::{self, Accessor, Component, Element};
 use super::file::{File, List};
 use super::graph::Graph;
+use super::ies::Profiles;
 use super::json::{Read, Value};
 use super::material::GltfMaterial;
 use super::mesh::{self, Assembly, Pose, Primitive, Vertices};
@@ -45,6 +46,7 @@ pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
 
     let roots = roots(file, &graph)?;
     let mut places: Vec<Placement> = vec![];
+    let mut profiles = Profiles::new(file);
     let mut scene = SceneDesc { without_light: WithoutLight::StudioUnlessStaged, ..SceneDesc::default() };
     scene.integrator.max_depth = MAX_DEPTH;
     let mut first_camera = None;
@@ -58,6 +60,9 @@ pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
         if let Some(extension) = value.extension("KHR_lights_punctual")? {
             let (_, light) = file.at(List::Lights, extension.need("light")?)?;
             scene.lights.extend(self::light(file, light, world)?);
+        }
+        if let Some(extension) = value.extension("EXT_lights_ies")? {
+            scene.lights.push(profiles.light(extension, &rigid(world))?);
         }
         let Some((mesh, _)) = file.named(List::Meshes, value, "mesh")? else { return Ok(()) };
         let skin = file.named(List::Skins, value, "skin")?.map(|(skin, _)| skin);
@@ -198,6 +203,9 @@ fn check(file: &File<'_>, graph: &Graph<'_>) -> Read<()> {
     for &light in file.list(List::Lights) {
         self::light(file, light, &DAffine3::IDENTITY)?;
     }
+    for &profile in file.list(List::Profiles) {
+        Profiles::check(file, profile)?;
+    }
     for &skin in file.list(List::Skins) {
         check_skin(file, skin)?;
     }
@@ -312,6 +320,9 @@ fn check_node(file: &File<'_>, graph: &Graph<'_>, index: usize, node: Value<'_>)
     let skin = file.named(List::Skins, node, "skin")?;
     if let Some(extension) = node.extension("KHR_lights_punctual")? {
         file.at(List::Lights, extension.need("light")?)?;
+    }
+    if let Some(extension) = node.extension("EXT_lights_ies")? {
+        Profiles::instance(file, extension)?;
     }
     let Some((_, mesh)) = mesh else {
         for name in ["skin", "weights"] {

@@ -1,9 +1,11 @@
 //! Lights that no ray can hit: they shine from a point or from one direction.
 
-use lumbre_math::{DVec3, Transform};
+use lumbre_math::{DAffine3, DMat3, DVec3, Transform};
 use lumbre_shading::{Scatter, Spectrum};
 
+use super::environment::Panorama;
 use super::{LightPoint, LightSample};
+use crate::EnvironmentDesc;
 
 /// The same in all directions from a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -73,6 +75,47 @@ impl SpotLight {
     pub(super) fn solid_angle(&self) -> f64 {
         // The smooth step is ½ in the mean.
         std::f64::consts::TAU * ((1.0 - self.cos_start) + 0.5 * (self.cos_start - self.cos_end))
+    }
+}
+
+/// From a point, by direction as a picture says.
+#[derive(Clone, Debug)]
+pub struct GoniometricLight {
+    /// Where.
+    pub from: DVec3,
+    // Radiant intensity.
+    by_direction: Panorama,
+    // The mean over all directions of the mean of the channels.
+    mean: f64,
+}
+
+impl GoniometricLight {
+    /// `None` for a picture that is black, empty or not finite.
+    pub(crate) fn new(
+        world_from_light: &Transform,
+        intensity: Spectrum,
+        image: EnvironmentDesc,
+    ) -> Option<Self> {
+        // Directions are those of the space without its scale.
+        let axes = world_from_light.linear();
+        let rotation = DMat3::from_cols(
+            axes.x_axis.try_normalize()?,
+            axes.y_axis.try_normalize()?,
+            axes.z_axis.try_normalize()?,
+        );
+        let space = Transform::from_affine(DAffine3::from_mat3(rotation)).ok()?;
+        let by_direction = Panorama::new(image.image, image.mapping, space, intensity)?;
+        let mean = by_direction.mean()?;
+        Some(Self { from: world_from_light.point(DVec3::ZERO), by_direction, mean })
+    }
+
+    pub(super) fn sample(&self, at: DVec3) -> Option<LightSample> {
+        let intensity = self.by_direction.radiance((at - self.from).try_normalize()?);
+        (!intensity.is_black()).then(|| from_point(self.from, at, intensity))?
+    }
+
+    pub(super) fn mean(&self) -> f64 {
+        self.mean
     }
 }
 

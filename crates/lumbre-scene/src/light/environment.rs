@@ -33,71 +33,62 @@ impl UniformLight {
     }
 }
 
-/// A picture of radiance all around, interpolated between its pixels, and chosen by its brightness.
+/// A picture by direction, interpolated between its pixels.
 #[derive(Clone, Debug)]
-pub struct Environment {
+pub(super) struct Panorama {
     image: Arc<Image>,
     mapping: EnvironmentMapping,
     world_from_light: Transform,
     scale: Spectrum,
-    // One cell a pixel: the mean over the pixel of what the interpolation gives there, times its solid angle. It is
-    // nowhere zero where the interpolation is not.
-    by_brightness: PiecewiseConstant2D,
-    // The mean over the sphere of the mean of the channels.
-    mean: f64,
 }
 
-impl Environment {
-    /// `None` for a picture that is black, empty or not finite.
-    pub(crate) fn new(
+impl Panorama {
+    /// `None` for a picture that is empty or not finite.
+    pub(super) fn new(
         image: Arc<Image>,
         mapping: EnvironmentMapping,
         world_from_light: Transform,
         scale: Spectrum,
     ) -> Option<Self> {
-        let (width, height) = (image.width() as usize, image.height() as usize);
-        if width == 0 || height == 0 || !image.pixels().iter().all(|c| c.is_finite()) {
-            return None;
-        }
-        // The mean of a linear interpolation over a pixel: 1/8, 6/8, 1/8 of it and its neighbours, both ways.
-        let brightness = |x: i64, y: i64| f64::from(texel(&image, mapping, x, y).average());
-        let smooth = |x: i64, y: i64| {
-            let row = |y| 0.125 * (brightness(x - 1, y) + brightness(x + 1, y)) + 0.75 * brightness(x, y);
-            0.125 * (row(y - 1) + row(y + 1)) + 0.75 * row(y)
-        };
-        let mut weights = Vec::with_capacity(width * height);
-        let (mut sum, mut whole) = (0.0, 0.0);
-        for y in 0..height {
-            let solid_angle = match mapping {
-                EnvironmentMapping::EqualArea => 1.0,
-                EnvironmentMapping::LatitudeLongitude => {
-                    let edge = |y: usize| (PI * y as f64 / height as f64).cos();
-                    edge(y) - edge(y + 1)
-                }
-            };
-            for x in 0..width {
-                let weight = solid_angle * smooth(x as i64, y as i64);
-                weights.push(weight as f32);
-                sum += weight;
-                whole += solid_angle;
-            }
-        }
-        let by_brightness = PiecewiseConstant2D::new(&weights, width)?;
-        let mean = sum / whole * f64::from(scale.average());
-        Some(Self { image, mapping, world_from_light, scale, by_brightness, mean })
+        let is_usable =
+            image.width() > 0 && image.height() > 0 && image.pixels().iter().all(|c| c.is_finite());
+        is_usable.then_some(Self { image, mapping, world_from_light, scale })
     }
 
-    pub(super) fn mean(&self) -> f64 {
-        self.mean
-    }
-
-    /// The radiance from the unit `direction` of the world.
-    pub fn radiance(&self, direction: DVec3) -> Spectrum {
+    /// The value of the unit `direction` of the world.
+    pub(super) fn radiance(&self, direction: DVec3) -> Spectrum {
         self.scale * self.lookup(self.square(self.to_light(direction)))
     }
 
+    /// The solid angle of a pixel of a row, in any unit.
+    fn solid_angle(&self, row: u32) -> f64 {
+        match self.mapping {
+            EnvironmentMapping::EqualArea => 1.0,
+            EnvironmentMapping::LatitudeLongitude => {
+                let edge = |y: u32| (PI * f64::from(y) / f64::from(self.image.height())).cos();
+                edge(row) - edge(row + 1)
+            }
+        }
+    }
+
+    /// The mean over the sphere of the mean of the channels; `None` where all is black.
+    pub(super) fn mean(&self) -> Option<f64> {
+        let (mut sum, mut whole) = (0.0, 0.0);
+        for (row, pixels) in (0..).zip(self.image.pixels().chunks(self.image.width() as usize)) {
+            let weight = self.solid_angle(row);
+            sum += weight * pixels.iter().map(|p| f64::from(p.map(|c| c.max(0.0)).average())).sum::<f64>();
+            whole += weight * pixels.len() as f64;
+        }
+        let mean = sum / whole * f64::from(self.scale.average());
+        (mean > 0.0 && mean.is_finite()).then_some(mean)
+    }
+
+    fn to_light(&self, direction: DVec3) -> DVec3 {
+        self.world_from_light.inverse_vector(direction).normalize()
+    }
+
     /// The irradiance of a surface that faces the unit `normal`: a sum over all pixels.
-    pub fn irradiance(&self, normal: DVec3) -> Spectrum {
+    fn irradiance(&self, normal: DVec3) -> Spectrum {
         let (width, height) = (self.image.width(), self.image.height());
         let cell = 1.0 / (f64::from(width) * f64::from(height));
         let mut sum = [0.0_f64; 3];
@@ -117,28 +108,6 @@ impl Environment {
             }
         }
         self.scale * Spectrum::from(sum.map(|c| c as f32))
-    }
-
-    pub(super) fn sample(&self, u: DVec2) -> Option<LightSample> {
-        let (uv, density) = self.by_brightness.sample(u);
-        let local = self.direction(uv);
-        let pdf = density * self.density_of_map(local);
-        let radiance = self.scale * self.lookup(uv);
-        (pdf > 0.0 && pdf.is_finite() && !radiance.is_black()).then(|| LightSample {
-            towards: self.world_from_light.vector(local).normalize(),
-            end: None,
-            radiance,
-            scatter: Scatter::Density(pdf as f32),
-        })
-    }
-
-    pub(super) fn pdf(&self, direction: DVec3) -> f64 {
-        let local = self.to_light(direction);
-        self.by_brightness.pdf(self.square(local)) * self.density_of_map(local)
-    }
-
-    fn to_light(&self, direction: DVec3) -> DVec3 {
-        self.world_from_light.inverse_vector(direction).normalize()
     }
 
     /// The unit direction of the light's space that falls on a point of the unit square.
@@ -182,6 +151,83 @@ impl Environment {
         let above = texel(x, y).lerp(texel(x + 1, y), part.x);
         let below = texel(x, y + 1).lerp(texel(x + 1, y + 1), part.x);
         above.lerp(below, part.y)
+    }
+}
+
+/// A picture of radiance all around, interpolated between its pixels, and chosen by its brightness.
+#[derive(Clone, Debug)]
+pub struct Environment {
+    picture: Panorama,
+    // One cell a pixel: the mean over the pixel of what the interpolation gives there, times its solid angle. It is
+    // nowhere zero where the interpolation is not.
+    by_brightness: PiecewiseConstant2D,
+    // The mean over the sphere of the mean of the channels.
+    mean: f64,
+}
+
+impl Environment {
+    /// `None` for a picture that is black, empty or not finite.
+    pub(crate) fn new(
+        image: Arc<Image>,
+        mapping: EnvironmentMapping,
+        world_from_light: Transform,
+        scale: Spectrum,
+    ) -> Option<Self> {
+        let picture = Panorama::new(image, mapping, world_from_light, scale)?;
+        let image = &picture.image;
+        let (width, height) = (image.width() as usize, image.height() as usize);
+        // The mean of a linear interpolation over a pixel: 1/8, 6/8, 1/8 of it and its neighbours, both ways.
+        let brightness = |x: i64, y: i64| f64::from(texel(image, mapping, x, y).average());
+        let smooth = |x: i64, y: i64| {
+            let row = |y| 0.125 * (brightness(x - 1, y) + brightness(x + 1, y)) + 0.75 * brightness(x, y);
+            0.125 * (row(y - 1) + row(y + 1)) + 0.75 * row(y)
+        };
+        let mut weights = Vec::with_capacity(width * height);
+        let (mut sum, mut whole) = (0.0, 0.0);
+        for y in 0..height {
+            let solid_angle = picture.solid_angle(y as u32);
+            for x in 0..width {
+                let weight = solid_angle * smooth(x as i64, y as i64);
+                weights.push(weight as f32);
+                sum += weight;
+                whole += solid_angle;
+            }
+        }
+        let by_brightness = PiecewiseConstant2D::new(&weights, width)?;
+        let mean = sum / whole * f64::from(scale.average());
+        Some(Self { picture, by_brightness, mean })
+    }
+
+    pub(super) fn mean(&self) -> f64 {
+        self.mean
+    }
+
+    /// The radiance from the unit `direction` of the world.
+    pub fn radiance(&self, direction: DVec3) -> Spectrum {
+        self.picture.radiance(direction)
+    }
+
+    /// The irradiance of a surface that faces the unit `normal`: a sum over all pixels.
+    pub fn irradiance(&self, normal: DVec3) -> Spectrum {
+        self.picture.irradiance(normal)
+    }
+
+    pub(super) fn sample(&self, u: DVec2) -> Option<LightSample> {
+        let (uv, density) = self.by_brightness.sample(u);
+        let local = self.picture.direction(uv);
+        let pdf = density * self.picture.density_of_map(local);
+        let radiance = self.picture.scale * self.picture.lookup(uv);
+        (pdf > 0.0 && pdf.is_finite() && !radiance.is_black()).then(|| LightSample {
+            towards: self.picture.world_from_light.vector(local).normalize(),
+            end: None,
+            radiance,
+            scatter: Scatter::Density(pdf as f32),
+        })
+    }
+
+    pub(super) fn pdf(&self, direction: DVec3) -> f64 {
+        let local = self.picture.to_light(direction);
+        self.by_brightness.pdf(self.picture.square(local)) * self.picture.density_of_map(local)
     }
 }
 
