@@ -240,7 +240,7 @@ fn check_structure(tree: &Packed, geometries: &[Geometry]) -> Result<(), LoadErr
     let mut blocks = vec![false; tree.names.len()];
     let mut entries = vec![false; tree.entries.len()];
     let mut take = |reference: u32, parent: Option<usize>| -> Option<()> {
-        let mut once = |taken: &mut [bool], place: usize| {
+        let once = |taken: &mut [bool], place: usize| {
             let taken = taken.get_mut(place)?;
             (!std::mem::replace(taken, true)).then_some(())
         };
