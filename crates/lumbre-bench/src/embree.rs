@@ -9,7 +9,6 @@
 use std::ffi::{CString, OsStr, c_char, c_int, c_uint, c_void};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicIsize, Ordering};
-use std::time::Instant;
 
 use anyhow::{Context, Result, bail, ensure};
 use libloading::Library;
@@ -17,6 +16,7 @@ use lumbre_geometry::{PlacedShape, Ray};
 use lumbre_kernel::TriangleMesh;
 use lumbre_math::DVec3;
 
+use crate::clock::Start;
 use crate::program::{Built, Bytes, Pass, Program, Query, Tree};
 use crate::rays::Ray32;
 use crate::scene::Scene;
@@ -303,7 +303,7 @@ impl Program for Embree {
         let meshes: Vec<_> = scene.meshes.iter().map(padded).collect();
         let placed: Vec<_> = scene.placed_meshes.iter().map(padded).collect();
 
-        let start = Instant::now();
+        let start = Start::of_program();
         let placed: Result<Vec<_>> = placed
             .into_iter()
             .map(|mesh| {
@@ -328,7 +328,7 @@ impl Program for Embree {
         }
         group.inner = placed;
         let group = group.commit()?;
-        let seconds = start.elapsed().as_secs_f64();
+        let seconds = start.program_seconds(threads);
         let bytes = device.memory.bytes();
         Ok(Built {
             tree: Box::new(Committed { group, setting: self.setting, _scene: scene }),

@@ -3,9 +3,11 @@
 //!
 //! Every program gets the same triangles and rays, to the bit, in single precision. Lumbre traces them in double precision
 //! and watertight. Programs run in alternation; a ratio is the median of the ratios of neighbouring runs, and its spread
-//! half their interquartile range. Rays are cut into chunks that threads take in turn. Not timed: the conversion of rays to
-//! the form of a program, and making its answers empty again.
+//! half their interquartile range. Rays are cut into chunks that threads take in turn. What is measured is how long threads
+//! ran (see `clock`). Not timed: the conversion of scenes and rays to the form of a program, and making its answers empty
+//! again.
 
+mod clock;
 mod crates;
 mod embree;
 mod files;

@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Barrier, Mutex};
 use std::time::{Duration, Instant};
 
+use crate::clock::Start;
 use crate::program::{Pass, Query, Tree};
 use crate::rays::Ray32;
 
@@ -23,7 +24,7 @@ impl<'a> Job<'a> {
         Self { passes, rays: rays.len() }
     }
 
-    /// Traces every ray once on so many threads; answers the seconds from the first start to the last end.
+    /// Traces every ray once on so many threads; answers the seconds that a thread ran, in the mean.
     pub fn run(&mut self, threads: usize) -> f64 {
         for pass in &mut self.passes {
             pass.get_mut().expect("no pass panics").reset();
@@ -31,20 +32,19 @@ impl<'a> Job<'a> {
         let (next, barrier) = (AtomicUsize::new(0), Barrier::new(threads));
         let work = || {
             barrier.wait();
-            let start = Instant::now();
+            let start = Start::of_thread();
             while let Some(pass) = self.passes.get(next.fetch_add(1, Ordering::Relaxed)) {
                 pass.lock().expect("no pass panics").run();
             }
-            (start, Instant::now())
+            start.thread_seconds()
         };
-        let times: Vec<_> = std::thread::scope(|scope| {
+        std::thread::scope(|scope| {
             let others: Vec<_> = (1..threads).map(|_| scope.spawn(work)).collect();
             let own = work();
-            others.into_iter().map(|other| other.join().expect("no pass panics")).chain([own]).collect()
-        });
-        let start = times.iter().map(|time| time.0).min().expect("a thread");
-        let end = times.iter().map(|time| time.1).max().expect("a thread");
-        (end - start).as_secs_f64()
+            let all = others.into_iter().map(|other| other.join().expect("no pass panics")).chain([own]);
+            // Where threads had unequal parts of the processors, they took unequal parts of the work.
+            all.sum::<f64>() / threads as f64
+        })
     }
 
     /// What the last run found for each ray.

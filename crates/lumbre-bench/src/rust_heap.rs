@@ -1,10 +1,9 @@
 //! How much a build in Rust allocates.
 
-use std::time::Instant;
-
 use anyhow::Result;
 use peak_alloc::PeakAlloc;
 
+use crate::clock::Start;
 use crate::program::Bytes;
 
 #[global_allocator]
@@ -17,9 +16,9 @@ pub fn measure<T: Send>(threads: usize, build: impl FnOnce() -> T + Send) -> Res
     pool.broadcast(|_| ());
     let before = HEAP.current_usage();
     HEAP.reset_peak_usage();
-    let start = Instant::now();
+    let start = Start::of_program();
     let built = pool.install(build);
-    let seconds = start.elapsed().as_secs_f64();
+    let seconds = start.program_seconds(threads);
     let bytes = Bytes {
         kept: HEAP.current_usage().saturating_sub(before),
         peak: HEAP.peak_usage().saturating_sub(before),

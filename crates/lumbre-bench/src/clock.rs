@@ -1,0 +1,93 @@
+//! How long work took, as little as possible of other programs on the machine in it.
+//!
+//! Linux says how long each thread ran, not counting the time that it waited for a processor; where nobody says that, the
+//! time of the clock on the wall is taken.
+
+use std::path::Path;
+use std::time::Instant;
+
+/// A point in the time of a thread, or of all threads of the program.
+pub struct Start {
+    wall: Instant,
+    ran: Option<f64>,
+}
+
+/// The seconds that a thread ran, from its entry in `/proc`.
+fn ran(task: &Path) -> Option<f64> {
+    let text = std::fs::read_to_string(task.join("schedstat")).ok()?;
+    let nanoseconds: f64 = text.split_ascii_whitespace().next()?.parse().ok()?;
+    Some(1e-9 * nanoseconds)
+}
+
+fn thread_ran() -> Option<f64> {
+    // The count of a running thread is brought up to date when it gives way.
+    std::thread::yield_now();
+    ran(Path::new("/proc/thread-self"))
+}
+
+fn program_ran() -> Option<f64> {
+    std::thread::yield_now();
+    let tasks = std::fs::read_dir("/proc/self/task").ok()?;
+    // A thread that ends meanwhile is none of the work's.
+    let all: f64 = tasks.flatten().filter_map(|task| ran(&task.path())).sum();
+    (all > 0.0).then_some(all)
+}
+
+impl Start {
+    /// Of the calling thread.
+    pub fn of_thread() -> Self {
+        let ran = thread_ran();
+        Self { wall: Instant::now(), ran }
+    }
+
+    /// Of all threads together, none of which may end before it is read.
+    pub fn of_program() -> Self {
+        let ran = program_ran();
+        Self { wall: Instant::now(), ran }
+    }
+
+    /// The seconds that the calling thread ran since [`Start::of_thread`].
+    pub fn thread_seconds(&self) -> f64 {
+        self.seconds(thread_ran)
+    }
+
+    /// The seconds that the work of so many threads took since [`Start::of_program`]: of one thread, what all ran together;
+    /// of more, what the clock says, for one may wait for another.
+    pub fn program_seconds(&self, threads: usize) -> f64 {
+        if threads == 1 { self.seconds(program_ran) } else { self.wall.elapsed().as_secs_f64() }
+    }
+
+    fn seconds(&self, ran: fn() -> Option<f64>) -> f64 {
+        let wall = self.wall.elapsed().as_secs_f64();
+        match (self.ran, ran()) {
+            (Some(start), Some(end)) if end > start => end - start,
+            _ => wall,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    #[test]
+    fn work_counts() {
+        let (wall, start) = (Instant::now(), Start::of_thread());
+        let mut sum = 0_u64;
+        while wall.elapsed() < Duration::from_millis(50) {
+            sum = sum.wrapping_add(std::hint::black_box(7));
+        }
+        let seconds = start.thread_seconds();
+        assert!(sum > 0 && seconds > 0.002 && seconds <= wall.elapsed().as_secs_f64(), "{seconds}");
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn sleep_does_not_count() {
+        let start = Start::of_thread();
+        std::thread::sleep(Duration::from_millis(80));
+        assert!(start.thread_seconds() < 0.04);
+    }
+}
