@@ -45,7 +45,8 @@ pub fn open_stl(
 ///
 /// # Errors
 /// [`FormatError::Input`] with the line and column, or the byte and path such as `/facet/3`; [`FormatError::Limit`]. When
-/// lenient, facets that are not finite are dropped with a warning instead, and a wrong count is only warned about.
+/// lenient, facets that are not finite are dropped with a warning instead, and a wrong count is only warned about; as are,
+/// always, bytes after the last facet that make no other.
 pub fn read_stl(
     bytes: &[u8],
     name: &Arc<str>,
@@ -88,7 +89,8 @@ fn binary(
             .at(place(80, "/count".into()));
         let wrong = wrong.found(format!("{count} facets in {} bytes", bytes.len()));
         let wrong = wrong.expected(format!("{} bytes, or {held} facets", 84 + 50 * u64::from(count)));
-        if !diagnostics.is_lenient() {
+        // Less than a facet at the end is no facet: editors leave a line break there.
+        if held != count as usize && !diagnostics.is_lenient() {
             return Err(wrong.into());
         }
         diagnostics.push(Diagnostic { severity: crate::Severity::Warning, ..wrong });

@@ -98,6 +98,22 @@ fn lenient_reads_what_a_file_of_the_wrong_size_has() {
 }
 
 #[test]
+fn a_line_break_after_the_last_facet_is_only_warned_about() {
+    let mut bytes = binary(b"edited", &[(SQUARE[0], 0), (SQUARE[1], 0)]);
+    bytes.push(b'\n');
+    let mut said = Diagnostics::new();
+    let solids = read_stl(&bytes, &name(), &Budget::default(), &mut said).unwrap();
+    assert_eq!(solids[0].mesh.triangles.len(), 2);
+    assert_eq!(
+        said.lines(),
+        ["warning: m.stl:byte 80 /count: count of facets does not fit the size of the STL file \
+          (found 2 facets in 185 bytes; expected 184 bytes, or 2 facets)"]
+    );
+    bytes.extend([0; 49]);
+    assert!(read(&bytes).is_err(), "room for one more");
+}
+
+#[test]
 fn a_normal_against_its_corners_is_said() {
     let text = "solid\nfacet normal 0 0 -1 outer loop vertex 1 2 3 vertex 4 2 3 vertex 4 5 3 endloop endfacet\nendsolid\n";
     let mut said = Diagnostics::new();
