@@ -3,9 +3,10 @@
 use std::f64::consts::TAU;
 
 use lumbre_math::quadratic::quadratic;
+use lumbre_math::rounding::gamma;
 use lumbre_math::{DVec2, DVec3, Transform, orthonormal_basis};
 
-use crate::support::{arc_support, azimuth, bounds_from_support, cross_size, dot_size, gamma};
+use crate::support::{arc_support, azimuth, bounds_from_support, cross_size, dot_size};
 use crate::{Aabb, DirectionSample, Ray, Root, Roots, Surface, SurfaceSample, density, measure};
 
 /// The points at distance ρ(z) = r1 + k z from an axis, z being the distance along it, between two planes across it.

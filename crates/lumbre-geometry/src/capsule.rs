@@ -2,11 +2,12 @@
 
 use std::f64::consts::{PI, TAU};
 
+use lumbre_math::rounding::gamma;
 use lumbre_math::{DVec2, DVec3, Transform, orthonormal_basis};
 
 use crate::axial::{Axial, CAP1, CAP2, LATERAL, Span};
 use crate::shape::check;
-use crate::support::{bounds_from_support, gamma};
+use crate::support::bounds_from_support;
 use crate::{Aabb, DirectionSample, Ray, Root, Roots, ShapeError, Surface, SurfaceSample};
 use crate::{density, measure, sphere};
 

@@ -1,9 +1,10 @@
 //! Boxes along the axes.
 
+use lumbre_math::rounding::gamma;
 use lumbre_math::{DVec2, DVec3, Transform};
 
 use crate::shape::check;
-use crate::support::{bounds_from_support, gamma};
+use crate::support::bounds_from_support;
 use crate::{Aabb, DirectionSample, Ray, Root, Roots, ShapeError, Surface, SurfaceSample, density, measure};
 
 /// The box between two corners, "box" in the scene language. A solid, closed: a ray that slides in a face enters and

@@ -2,10 +2,11 @@
 
 use std::f64::consts::TAU;
 
+use lumbre_math::rounding::gamma;
 use lumbre_math::{DVec2, DVec3, Transform, orthonormal_basis};
 
 use crate::shape::check;
-use crate::support::{arc_support, azimuth, bounds_from_support, dot_size, gamma};
+use crate::support::{arc_support, azimuth, bounds_from_support, dot_size};
 use crate::{Aabb, DirectionSample, Ray, Root, Roots, ShapeError, Surface, SurfaceSample, density, measure};
 
 /// The points of a plane between two distances from a centre, both included.

@@ -4,11 +4,12 @@ use std::f64::consts::TAU;
 
 use lumbre_math::quadratic::{dop, quadratic};
 use lumbre_math::roots::bracketed_root;
+use lumbre_math::rounding::gamma;
 use lumbre_math::{DVec2, DVec3, Transform};
 
 use crate::line::{Implicit, NearLine};
 use crate::shape::check;
-use crate::support::{arc_support, azimuth, bounds_from_support, gamma};
+use crate::support::{arc_support, azimuth, bounds_from_support};
 use crate::{Aabb, DirectionSample, Ray, Root, Roots, ShapeError, Surface, SurfaceSample, density, measure};
 
 /// What the segment from `p1` to `p2` sweeps when it turns about the z axis.

@@ -1,6 +1,7 @@
 //! Lines moved near the shape that they are tested against, and what surfaces given by an equation share.
 
 use lumbre_math::DVec3;
+use lumbre_math::rounding::gamma;
 
 use crate::{Ray, Root};
 
@@ -73,7 +74,7 @@ impl Implicit {
 
     /// How far off the surface a point can be for which F came out as 0.
     pub(crate) fn uncertainty(&self) -> f64 {
-        let distance = crate::support::gamma(12) * self.terms / self.gradient.length();
+        let distance = gamma(12) * self.terms / self.gradient.length();
         // At a singular point the surface is known to half the digits only, in units of nothing; say nothing then.
         if distance.is_finite() { distance } else { 0.0 }
     }

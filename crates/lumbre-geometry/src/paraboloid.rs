@@ -3,11 +3,12 @@
 use std::f64::consts::TAU;
 
 use lumbre_math::quadratic::{dop, quadratic};
+use lumbre_math::rounding::gamma;
 use lumbre_math::{DVec2, DVec3, Transform};
 
 use crate::line::{Implicit, NearLine};
 use crate::shape::check;
-use crate::support::{arc_support, azimuth, bounds_from_support, gamma};
+use crate::support::{arc_support, azimuth, bounds_from_support};
 use crate::{Aabb, DirectionSample, Ray, Root, Roots, ShapeError, Surface, SurfaceSample, density, measure};
 
 /// The surface `z = zmax (x² + y²)/radius²` between two heights: the bowl, open upwards, whose rim at `zmax` has the given

@@ -3,10 +3,11 @@
 use std::f64::consts::TAU;
 
 use lumbre_math::quadratic::{dop, quadratic};
+use lumbre_math::rounding::gamma;
 use lumbre_math::{DVec2, DVec3, Transform};
 
 use crate::shape::check;
-use crate::support::{bounds_from_support, gamma};
+use crate::support::bounds_from_support;
 use crate::triangle::solid_angle_of;
 use crate::{Aabb, DirectionSample, Ray, Root, Roots, ShapeError, Surface, SurfaceSample, density, measure};
 

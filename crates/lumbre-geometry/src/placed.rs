@@ -1,8 +1,8 @@
 //! A shape and where it stands.
 
+use lumbre_math::rounding::gamma;
 use lumbre_math::{DMat3, DVec2, DVec3, Transform};
 
-use crate::support::gamma;
 use crate::{Aabb, DirectionSample, Ray, Root, Roots, Shape, Surface, SurfaceSample, measure};
 
 /// An exact shape under any invertible affine map. The ray goes to the shape, not the shape to the ray, and `t` stays.

@@ -1,9 +1,10 @@
 //! Infinite planes.
 
+use lumbre_math::rounding::gamma;
 use lumbre_math::{DVec2, DVec3, Transform, orthonormal_basis};
 
 use crate::shape::check;
-use crate::support::{dot_size, gamma};
+use crate::support::dot_size;
 use crate::{Aabb, DirectionSample, Ray, Root, Roots, ShapeError, Surface, SurfaceSample};
 
 /// The plane through a point, facing along its normal; as a solid, the half-space below it.

@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 use std::sync::OnceLock;
 
 use lumbre_math::quadratic::{dop, quadratic};
+use lumbre_math::rounding::gamma;
 use lumbre_math::{DAffine3, DMat3, DVec2, DVec3, Transform};
 
 use smallvec::SmallVec;
@@ -11,7 +12,7 @@ use smallvec::SmallVec;
 use crate::line::{Implicit, NearLine};
 use crate::placed::into_world;
 use crate::shape::check;
-use crate::support::{bounds_from_support, gamma};
+use crate::support::bounds_from_support;
 use crate::{
     Aabb, DirectionSample, PlacedShape, Ray, Root, Roots, Shape, ShapeError, Sphere, Surface, SurfaceSample,
     density, measure,

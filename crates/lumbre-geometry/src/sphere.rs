@@ -3,10 +3,11 @@
 use std::f64::consts::{PI, TAU};
 
 use lumbre_math::quadratic::quadratic;
+use lumbre_math::rounding::gamma;
 use lumbre_math::{DVec2, DVec3, Transform, orthonormal_basis};
 
 use crate::shape::check;
-use crate::support::{arc_support, azimuth, bounds_from_support, gamma};
+use crate::support::{arc_support, azimuth, bounds_from_support};
 use crate::{Aabb, DirectionSample, Ray, Root, Roots, ShapeError, Surface, SurfaceSample, density, measure};
 
 /// The points at distance `radius` from `center`.

@@ -2,18 +2,10 @@
 
 use std::f64::consts::TAU;
 
+use lumbre_math::rounding::gamma;
 use lumbre_math::{DVec3, Transform};
 
 use crate::Aabb;
-
-/// The unit roundoff of binary64.
-const ROUNDOFF: f64 = 0.5 * f64::EPSILON;
-
-/// A bound on the relative error of `n` rounded operations, γₙ = n u / (1 − n u).
-pub(crate) const fn gamma(n: u32) -> f64 {
-    let nu = n as f64 * ROUNDOFF;
-    nu / (1.0 - nu)
-}
 
 /// The box of a body under a transform, from its support function h(d) = max d·x over the body in object space.
 ///

@@ -3,10 +3,11 @@
 use std::f64::consts::{PI, TAU};
 
 use lumbre_math::roots::{DepressedCubic, bracketed_root};
+use lumbre_math::rounding::gamma;
 use lumbre_math::{DVec2, DVec3, Transform, orthonormal_basis};
 
 use crate::shape::check;
-use crate::support::{azimuth, bounds_from_support, gamma};
+use crate::support::{azimuth, bounds_from_support};
 use crate::{Aabb, DirectionSample, Ray, Root, Roots, ShapeError, Surface, SurfaceSample, density, measure};
 
 /// The points at distance `minor` from a circle of radius `major`.

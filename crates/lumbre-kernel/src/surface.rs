@@ -1,16 +1,10 @@
 //! What is computed once, for the hit that was chosen.
 
 use lumbre_geometry::{Ray, Surface};
+use lumbre_math::rounding::{UNIT_ROUNDOFF, gamma};
 use lumbre_math::{DMat3, DVec2, DVec3, Transform};
 
 use crate::{Accel, GeometryKind, Hit, Instance, TriangleMesh};
-
-const U: f64 = 0.5 * f64::EPSILON;
-
-/// Higham's bound on the relative error of n roundings: n u / (1 - n u).
-const fn gamma(n: f64) -> f64 {
-    n * U / (1.0 - n * U)
-}
 
 /// The instances along a hit's route, outermost first, and the tree within the last.
 fn along<'a>(accel: &'a Accel, hit: &Hit) -> (Vec<&'a Instance>, &'a Accel) {
@@ -70,7 +64,7 @@ fn triangle_surface(mesh: &TriangleMesh, triangle: u32, uv: DVec2) -> Surface {
     let sizes = terms[0].abs() + terms[1].abs() + terms[2].abs();
     Surface {
         point,
-        point_error: gamma(7.0) * sizes + U * point.abs(),
+        point_error: gamma(7) * sizes + UNIT_ROUNDOFF * point.abs(),
         normal: unit(dpdu.cross(dpdv)),
         uv,
         dpdu,
@@ -85,8 +79,8 @@ fn place(surface: &Surface, world_from_object: &Transform) -> Surface {
     let affine = world_from_object.affine();
     let linear = affine.matrix3;
     let sizes = DMat3::from_cols(linear.x_axis.abs(), linear.y_axis.abs(), linear.z_axis.abs());
-    let point_error = (1.0 + gamma(3.0)) * (sizes * surface.point_error)
-        + gamma(4.0) * (sizes * surface.point.abs() + affine.translation.abs());
+    let point_error = (1.0 + gamma(3)) * (sizes * surface.point_error)
+        + gamma(4) * (sizes * surface.point.abs() + affine.translation.abs());
     // The normal is N/|N| with N = L⁻ᵀ n, and its change is what N's has across it.
     let scaled = world_from_object.normal(surface.normal);
     let length = scaled.length();
