@@ -46,7 +46,7 @@ fn visit<'a, S: Search<'a>>(accel: &'a Accel, ray: &Ray, search: &mut S) {
                         });
                         let primitive = primitive as u32;
                         let geometry = position;
-                        let (root, is_front) = match intersect(&ray, &shear, &origin, &permuted) {
+                        let (root, is_front) = match intersect(&ray, shear, origin, permuted) {
                             Meeting::Miss => continue,
                             Meeting::Hit { root, is_front } => (root, is_front),
                             Meeting::Touch { root, is_owned, feature, is_front } => {

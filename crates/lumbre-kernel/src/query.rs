@@ -7,6 +7,7 @@ use lumbre_geometry::{Ray, Root};
 
 use crate::stack::{AsBuilt, ByDistance};
 use crate::traverse::{Ask, Found, Place, Search, What};
+use crate::triangles::Inside;
 use crate::{Accel, Hit, InstancePath};
 
 impl Found<'_, '_> {
@@ -81,9 +82,15 @@ pub(crate) struct Closest<'a, F> {
 
 /// As little as the winner can be told by.
 struct Best<'a> {
-    root: Root,
+    crossing: Crossing,
     what: What,
     accel: &'a Accel,
+}
+
+enum Crossing {
+    /// Of a triangle, at the limit.
+    Inside(Inside),
+    Root(Root),
 }
 
 impl<'a, F> Closest<'a, F> {
@@ -94,18 +101,41 @@ impl<'a, F> Closest<'a, F> {
 
     #[inline(always)]
     pub(crate) fn into_hit(self) -> Option<Hit> {
-        let Best { root, what, accel } = self.best?;
+        let Best { crossing, what, accel } = self.best?;
+        let root = match crossing {
+            Crossing::Inside(inside) => inside.root(self.limit),
+            Crossing::Root(root) => root,
+        };
         Some(to_hit(root, what, accel, &self.place))
     }
 
     /// Whether a crossing at the same `t` comes first in the lists.
     #[cold]
     #[inline(never)]
-    fn comes_first(&self, found: &Found, best: &Best) -> bool {
-        let names = |what: What, accel: &Accel| what.names(accel);
-        let order = found.place.route.cmp(&self.place.route);
-        order.then_with(|| names(found.what, found.accel).cmp(&names(best.what, best.accel)))
-            == Ordering::Less
+    fn comes_first(&self, best: &Best, what: What, accel: &Accel, place: &Place) -> bool {
+        let order = place.route.cmp(&self.place.route);
+        order.then_with(|| what.names(accel).cmp(&best.what.names(best.accel))) == Ordering::Less
+    }
+
+    /// Whether a crossing is nearer than the best, or as near and before it.
+    #[inline(always)]
+    fn is_better(&self, t: f64, what: What, accel: &Accel, place: &Place) -> bool {
+        if t > self.limit {
+            return false;
+        }
+        match &self.best {
+            Some(best) if t == self.limit => self.comes_first(best, what, accel, place),
+            _ => true,
+        }
+    }
+
+    #[inline(always)]
+    fn keep(&mut self, t: f64, best: Best<'a>, place: &Place) {
+        self.limit = t;
+        self.best = Some(best);
+        if !(place.route.is_empty() && self.place.route.is_empty()) {
+            self.place.clone_from(place);
+        }
     }
 }
 
@@ -125,23 +155,26 @@ impl<'a, F: Filter> Search<'a> for Closest<'a, F> {
 
     #[inline(always)]
     fn offer(&mut self, found: &Found<'a, '_>) -> bool {
-        let t = found.root.t;
-        if t > self.limit {
+        let Found { root, what, accel, place, .. } = *found;
+        if self.is_better(root.t, what, accel, place) && (F::TAKES_ALL || self.filter.takes(found)) {
+            self.keep(root.t, Best { crossing: Crossing::Root(root), what, accel }, place);
+        }
+        false
+    }
+
+    #[inline(always)]
+    fn offer_inside(&mut self, t: f64, inside: &Inside, what: What, accel: &'a Accel, place: &Place) -> bool {
+        if !self.is_better(t, what, accel, place) {
             return false;
         }
-        if t == self.limit
-            && let Some(best) = &self.best
-            && !self.comes_first(found, best)
-        {
-            return false;
-        }
-        if F::TAKES_ALL || self.filter.takes(found) {
-            self.limit = t;
-            self.best = Some(Best { root: found.root, what: found.what, accel: found.accel });
-            if !(found.place.route.is_empty() && self.place.route.is_empty()) {
-                self.place.clone_from(found.place);
+        if !F::TAKES_ALL {
+            let is_front = inside.det > 0.0;
+            let found = Found { root: inside.root(t), what, order: 0, is_front, accel, place };
+            if !self.filter.takes(&found) {
+                return false;
             }
         }
+        self.keep(t, Best { crossing: Crossing::Inside(*inside), what, accel }, place);
         false
     }
 }
@@ -179,6 +212,16 @@ impl<'a, F: Filter> Search<'a> for Any<F> {
     fn offer(&mut self, found: &Found<'a, '_>) -> bool {
         self.is_hit = F::TAKES_ALL || self.filter.takes(found);
         self.is_hit
+    }
+
+    #[inline(always)]
+    fn offer_inside(&mut self, t: f64, inside: &Inside, what: What, accel: &'a Accel, place: &Place) -> bool {
+        if F::TAKES_ALL {
+            self.is_hit = true;
+            return true;
+        }
+        let is_front = inside.det > 0.0;
+        self.offer(&Found { root: inside.root(t), what, order: 0, is_front, accel, place })
     }
 
     #[inline(always)]

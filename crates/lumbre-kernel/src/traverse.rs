@@ -16,7 +16,7 @@ use crate::lanes::{LANE_BITS, Lanes, Level, Task};
 use crate::node::{BoxRay, tag};
 use crate::stack::{Order, Stack};
 use crate::touch::{self, AllTouches, Touch};
-use crate::triangles::{self, BLOCK, BlockRay, Meeting, Shear};
+use crate::triangles::{self, BLOCK, BlockRay, Inside, Meeting, Passage, Shear};
 use crate::{Accel, GeometryKind, InstancePath};
 
 /// What a search asks of a primitive that may be crossed more than once.
@@ -47,6 +47,13 @@ pub(crate) trait Search<'a> {
 
     /// Takes a crossing; true ends the search.
     fn offer(&mut self, found: &Found<'a, '_>) -> bool;
+
+    /// The same for the inside of a triangle.
+    #[inline(always)]
+    fn offer_inside(&mut self, t: f64, inside: &Inside, what: What, accel: &'a Accel, place: &Place) -> bool {
+        let is_front = inside.det > 0.0;
+        self.offer(&Found { root: inside.root(t), what, order: 0, is_front, accel, place })
+    }
 
     /// Takes the news that there is a crossing, which ends the search. Only where it asks [`Ask::Whether`].
     fn settle(&mut self) {}
@@ -400,40 +407,71 @@ fn meet_blocks<'a, R: Borrow<Ray>, L: Lanes, S: Search<'a>>(
         while mask != 0 {
             let lane = mask.trailing_zeros() as usize % BLOCK;
             mask &= mask - 1;
-            let MeshRay { shear, origin, .. } = &frame.mesh;
-            let corners = shear.axes.gather(block, lane);
             let what = What::Lane { block: number, lane: lane as u32 };
-            let (root, is_front) = match triangles::intersect(frame.ray.borrow(), shear, origin, &corners) {
-                Meeting::Miss => continue,
-                Meeting::Hit { root, is_front } => (root, is_front),
-                Meeting::Touch { root, is_owned, feature, is_front } => {
-                    let (geometry, primitive) = what.names(accel);
-                    let (place, corners) = (place.clone(), block.triangle(lane));
-                    touches.push(Touch {
-                        root,
-                        is_owned,
-                        is_front,
-                        feature,
-                        corners,
-                        geometry,
-                        primitive,
-                        accel,
-                        place,
-                    });
-                    if !is_owned || !frame.ray.borrow().contains(root.t) {
-                        continue;
-                    }
-                    (root, is_front)
+            let MeshRay { shear, origin, .. } = &frame.mesh;
+            let (passage, inside) = L::pass(block, lane, shear, origin);
+            if passage == Passage::Inside {
+                let t = inside.t(shear);
+                if !triangles::is_in_range(frame.ray.borrow(), t) {
+                    continue;
                 }
-            };
-            if search.offer(&Found { root, what, order: 0, is_front, accel, place }) {
-                return true;
+                if search.offer_inside(t, &inside, what, accel, place) {
+                    return true;
+                }
+                frame.narrow(search);
+            } else if passage == Passage::Unclear {
+                let ray = frame.ray.borrow();
+                if meet_unclear(ray, *shear, *origin, accel, what, place, search, touches) {
+                    return true;
+                }
+                frame.narrow(search);
             }
-            frame.narrow(search);
         }
         number += 1;
     }
     false
+}
+
+/// Tests a triangle that may be touched at an edge, or is seen on edge.
+#[cold]
+#[inline(never)]
+#[allow(clippy::too_many_arguments)]
+fn meet_unclear<'a, S: Search<'a>>(
+    ray: &Ray,
+    shear: Shear,
+    origin: [f64; 3],
+    accel: &'a Accel,
+    what: What,
+    place: &Place,
+    search: &mut S,
+    touches: &mut Vec<Touch<'a>>,
+) -> bool {
+    let What::Lane { block, lane } = what else { unreachable!("triangles are in blocks") };
+    let (block, lane) = (&accel.tree.blocks[block as usize], lane as usize);
+    let (root, is_front) = match triangles::intersect(ray, shear, origin, shear.axes.gather(block, lane)) {
+        Meeting::Miss => return false,
+        Meeting::Hit { root, is_front } => (root, is_front),
+        Meeting::Touch { root, is_owned, feature, is_front } => {
+            let (geometry, primitive) = what.names(accel);
+            let (place, corners) = (place.clone(), block.triangle(lane));
+            touches.push(Touch {
+                root,
+                is_owned,
+                is_front,
+                feature,
+                corners,
+                geometry,
+                primitive,
+                accel,
+                place,
+            });
+            if !is_owned || !ray.contains(root.t) {
+                return false;
+            }
+            (root, is_front)
+        }
+    };
+    search.offer(&Found { root, what, order: 0, is_front, accel, place })
 }
 
 /// Tests a shape or a primitive of custom geometry.

@@ -89,6 +89,11 @@ impl Shear {
             z: height,
         }
     }
+
+    #[inline(always)]
+    fn corners(&self, origin: &[f64; 3], corners: &[[f32; 3]; 3]) -> [Corner; 3] {
+        [self.corner(origin, corners[0]), self.corner(origin, corners[1]), self.corner(origin, corners[2])]
+    }
 }
 
 /// A ray in single precision, for a first test of eight triangles that is sharp, but never loses one.
@@ -167,12 +172,7 @@ impl BlockRay {
     }
 }
 
-// One instruction each, which f64::min and f64::max are not.
-#[inline(always)]
-fn lesser(a: f64, b: f64) -> f64 {
-    if a < b { a } else { b }
-}
-
+// One instruction, which f64::max is not.
 #[inline(always)]
 fn greater(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
@@ -210,78 +210,122 @@ pub(crate) enum Meeting {
     },
 }
 
-/// How the ray meets a triangle. Corners and origin are relative to the mesh, and have the order of the shear's axes.
+/// How a ray passes a triangle, its range aside.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Passage {
+    /// Beside it.
+    Outside,
+    /// Through it, away from its edges.
+    Inside,
+    /// So near to an edge, or so flat, that [`intersect`] has to look closer.
+    Unclear,
+}
+
+/// What the crossing of a triangle is made of.
+#[derive(Clone, Copy)]
+pub(crate) struct Inside {
+    /// The heights of the corners, weighted.
+    pub(crate) height: f64,
+    /// The sum of the weights: positive where the front is met.
+    pub(crate) det: f64,
+    /// Two of the weights.
+    pub(crate) v: f64,
+    pub(crate) w: f64,
+}
+
+impl Inside {
+    /// Where there is no crossing.
+    pub(crate) const NONE: Self = Self { height: f64::NAN, det: f64::NAN, v: f64::NAN, w: f64::NAN };
+
+    #[inline(always)]
+    pub(crate) fn t(&self, shear: &Shear) -> f64 {
+        self.height / self.det / shear.direction_z
+    }
+
+    /// The crossing at this `t`, which is its own.
+    #[inline(always)]
+    pub(crate) fn root(&self, t: f64) -> Root {
+        let local = DVec2::new(self.v / self.det, self.w / self.det);
+        Root { t, part: 0, multiplicity: 1, local }
+    }
+
+    fn meeting(&self, ray: &Ray, shear: &Shear) -> Meeting {
+        let t = self.t(shear);
+        if is_in_range(ray, t) {
+            Meeting::Hit { root: self.root(t), is_front: self.det > 0.0 }
+        } else {
+            Meeting::Miss
+        }
+    }
+}
+
+/// Whether a triangle may be met there. A NaN is not in the range; an infinity is no place.
 #[inline(always)]
-pub(crate) fn intersect(ray: &Ray, shear: &Shear, origin: &[f64; 3], corners: &[[f32; 3]; 3]) -> Meeting {
-    let (a, b, c) = (
-        shear.corner(origin, corners[0]),
-        shear.corner(origin, corners[1]),
-        shear.corner(origin, corners[2]),
-    );
+pub(crate) fn is_in_range(ray: &Ray, t: f64) -> bool {
+    ray.t_min <= t && t <= ray.t_max && t.abs() < f64::INFINITY
+}
+
+/// How the ray passes a triangle. Corners and origin are relative to the mesh, and have the order of the shear's axes.
+#[inline(always)]
+pub(crate) fn passage(shear: &Shear, origin: &[f64; 3], corners: &[[f32; 3]; 3]) -> (Passage, Inside) {
+    let [a, b, c] = shear.corners(origin, corners);
     // The edge functions px qy - py qx. The two products of each are rounded apart: the opposite edge of the neighbour then
     // gives exactly the opposite value, and their difference has the right sign unless they are equal.
     let (bc, ca, ab) = (c.x * b.y, a.x * c.y, b.x * a.y);
     let (u, v, w) = (bc - c.y * b.x, ca - a.y * c.x, ab - b.y * a.x);
-    let least = lesser(lesser(u, v), w);
-    let most = greater(greater(u, v), w);
-    if least > 0.0 || most < 0.0 {
-        return meet_inside(ray, shear, [a, b, c], [u, v, w], [bc, ca, ab]);
+    let is_inside = (u > 0.0 && v > 0.0 && w > 0.0) || (u < 0.0 && v < 0.0 && w < 0.0);
+    if !is_inside {
+        let is_weakly_inside = (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
+        return (if is_weakly_inside { Passage::Unclear } else { Passage::Outside }, Inside::NONE);
     }
-    if least >= 0.0 || most <= 0.0 {
-        return meet_near_zero(ray, *shear, [a, b, c], [u, v, w], [bc, ca, ab]);
-    }
-    Meeting::Miss
-}
-
-/// A triangle whose edge functions all have one sign.
-#[inline(always)]
-fn meet_inside(
-    ray: &Ray,
-    shear: &Shear,
-    corners: [Corner; 3],
-    edges: [f64; 3],
-    products: [f64; 3],
-) -> Meeting {
-    let det = edges[0] + edges[1] + edges[2];
-    let largest_product = greater(greater(products[0].abs(), products[1].abs()), products[2].abs());
+    let det = u + v + w;
     // Seen on edge, a triangle's edge functions cancel; left so, t would be anywhere within the triangle.
-    let root = if det.abs() < largest_product * (1.0 / 64.0) {
-        exact_root_of(*shear, corners)
-    } else {
-        root_of(shear, corners, edges)
-    };
-    // A NaN is not in the range; an infinity is no place.
-    if ray.t_min <= root.t && root.t <= ray.t_max && root.t.abs() < f64::INFINITY {
-        Meeting::Hit { root, is_front: det > 0.0 }
-    } else {
-        Meeting::Miss
+    let is_slanted = |product: f64| det.abs() < product.abs() * (1.0 / 64.0);
+    if is_slanted(bc) || is_slanted(ca) || is_slanted(ab) {
+        return (Passage::Unclear, Inside::NONE);
+    }
+    (Passage::Inside, Inside { height: u * a.z + v * b.z + w * c.z, det, v, w })
+}
+
+/// How the ray meets a triangle. Corners and origin are relative to the mesh, and have the order of the shear's axes.
+#[inline(never)]
+pub(crate) fn intersect(ray: &Ray, shear: Shear, origin: [f64; 3], corners: [[f32; 3]; 3]) -> Meeting {
+    match passage(&shear, &origin, &corners) {
+        (Passage::Outside, _) => Meeting::Miss,
+        (Passage::Inside, inside) => inside.meeting(ray, &shear),
+        (Passage::Unclear, _) => meet_unclear(ray, &shear, shear.corners(&origin, &corners)),
     }
 }
 
-/// A triangle some of whose edge functions came out as zero, the others with one sign: now their rounding errors decide.
-#[cold]
-#[inline(never)]
-fn meet_near_zero(
-    ray: &Ray,
-    shear: Shear,
-    corners: [Corner; 3],
-    edges: [f64; 3],
-    products: [f64; 3],
-) -> Meeting {
+/// A triangle some of whose edge functions may have come out as zero, the others with one sign: now their rounding errors
+/// decide. Or one that is seen on edge.
+fn meet_unclear(ray: &Ray, shear: &Shear, corners: [Corner; 3]) -> Meeting {
     let [a, b, c] = corners;
-    let settled = |value: f64, p: Corner, q: Corner, product: f64| {
-        if value != 0.0 { value } else { residue(p, q, product) }
-    };
-    let [u, v, w] = [
-        settled(edges[0], c, b, products[0]),
-        settled(edges[1], a, c, products[1]),
-        settled(edges[2], b, a, products[2]),
-    ];
-    if (u > 0.0 && v > 0.0 && w > 0.0) || (u < 0.0 && v < 0.0 && w < 0.0) {
-        return meet_inside(ray, &shear, corners, [u, v, w], products);
+    let [u, v, w] = [settled_edge(c, b), settled_edge(a, c), settled_edge(b, a)];
+    let is_inside = (u > 0.0 && v > 0.0 && w > 0.0) || (u < 0.0 && v < 0.0 && w < 0.0);
+    if !is_inside {
+        let is_weakly_inside = (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
+        return if is_weakly_inside { touch(shear, corners) } else { Meeting::Miss };
     }
-    let is_weakly_inside = (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
-    if is_weakly_inside { touch(&shear, corners) } else { Meeting::Miss }
+    let det = u + v + w;
+    let largest_product = (c.x * b.y).abs().max((a.x * c.y).abs()).max((b.x * a.y).abs());
+    let [u, v, w] = if det.abs() < largest_product * (1.0 / 64.0) {
+        [difference_of_products(c, b), difference_of_products(a, c), difference_of_products(b, a)]
+    } else {
+        [u, v, w]
+    };
+    let height = u * a.z + v * b.z + w * c.z;
+    let inside = Inside { height, det: u + v + w, v, w };
+    match inside.meeting(ray, shear) {
+        Meeting::Hit { root, .. } => Meeting::Hit { root, is_front: det > 0.0 },
+        miss => miss,
+    }
+}
+
+/// The edge function px qy - py qx; where its rounded products are equal, the difference of their errors.
+fn settled_edge(p: Corner, q: Corner) -> f64 {
+    let (first, second) = (p.x * q.y, p.y * q.x);
+    if first != second { first - second } else { residue(p, q, first) }
 }
 
 /// px qy - py qx where both products round to `product`.
@@ -317,7 +361,10 @@ fn touch(shear: &Shear, corners: [Corner; 3]) -> Meeting {
         [true, true, true] => Feature::EdgeOn,
         [false, false, false] => return Meeting::Miss,
     };
-    let root = root_of(shear, corners, values);
+    let [u, v, w] = values;
+    let det = u + v + w;
+    let t = (u * a.z + v * b.z + w * c.z) / det / shear.direction_z;
+    let root = Root { t, part: 0, multiplicity: 1, local: DVec2::new(v / det, w / det) };
     if feature != Feature::EdgeOn && !root.t.is_finite() {
         return Meeting::Miss;
     }

@@ -16,7 +16,7 @@ use lumbre_math::DVec3;
 
 use crate::node::{BoxRay, Node, Units, WIDTH};
 use crate::stack::STACK;
-use crate::triangles::{BLOCK, BlockRay, TriangleBlock};
+use crate::triangles::{BLOCK, BlockRay, Inside, Passage, Shear, TriangleBlock};
 
 /// What a search does eight at a time: boxes, and triangles.
 pub(crate) trait Lanes {
@@ -44,6 +44,9 @@ pub(crate) trait Lanes {
     /// One bit for each triangle that the ray may hit within its range, among them all that it does; where `SURE`, also one
     /// for each that it certainly hits, else none: see [`BlockRay`].
     fn meet_triangles<const SURE: bool>(block: &TriangleBlock, ray: &BlockRay) -> (u32, u32);
+
+    /// How a ray passes the triangle in a lane, in double precision, and what its crossing inside is made of. `origin` has the order of the shear's axes.
+    fn pass(block: &TriangleBlock, lane: usize, shear: &Shear, origin: &[f64; 3]) -> (Passage, Inside);
 }
 
 /// In the last bits of a child's key stands its lane, so that no two are equal. To be compared with a limit that has all

@@ -7,7 +7,7 @@ use lumbre_geometry::Ray;
 use super::{LANE_BITS, Lanes, Slots};
 use crate::node::{BoxRay, Node, Units, WIDTH};
 use crate::stack::stack_entry;
-use crate::triangles::{BLOCK, BlockRay, TriangleBlock};
+use crate::triangles::{BLOCK, BlockRay, Inside, Passage, Shear, TriangleBlock, passage};
 
 pub(crate) struct Portable;
 
@@ -113,5 +113,10 @@ impl Lanes for Portable {
             }
         }
         (mask, sure)
+    }
+
+    #[inline(always)]
+    fn pass(block: &TriangleBlock, lane: usize, shear: &Shear, origin: &[f64; 3]) -> (Passage, Inside) {
+        passage(shear, origin, &shear.axes.gather(block, lane))
     }
 }

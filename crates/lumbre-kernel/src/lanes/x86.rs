@@ -8,7 +8,7 @@ use lumbre_geometry::Ray;
 use super::{LANE_BITS, Lanes, Sides, Slots, Task};
 use crate::node::{BoxRay, LARGEST_NEAR, Node, SMALLEST_NEAR, TINY_NEAR, Units, WIDTH};
 use crate::stack::stack_entry;
-use crate::triangles::{BLOCK, BlockRay, TriangleBlock};
+use crate::triangles::{BLOCK, BlockRay, Inside, Passage, Shear, TriangleBlock};
 
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
 pub(super) fn run_avx2<T: Task>(task: T) -> T::Output {
@@ -83,6 +83,16 @@ impl<const AVX512: bool> X86<AVX512> {
             let planes = _mm256_loadu_ps(planes);
             _mm256_castps_si256(_mm256_fmadd_ps(planes, _mm256_set1_ps(inverse), _mm256_set1_ps(offset)))
         }
+    }
+
+    /// A component of three corners, the first of which is here.
+    ///
+    /// # Safety
+    /// The others are 24 and 48 further.
+    #[inline(always)]
+    unsafe fn component(first: *const f32) -> __m256d {
+        // SAFETY: see `X86`, and above.
+        unsafe { _mm256_cvtps_pd(_mm_setr_ps(*first, *first.add(24), *first.add(48), 0.0)) }
     }
 
     #[inline(always)]
@@ -332,6 +342,58 @@ impl<const AVX512: bool> Lanes for X86<AVX512> {
                 );
                 (mask, _mm256_movemask_ps(_mm256_and_ps(in_range, sided)) as u32)
             }
+        }
+    }
+
+    #[inline(always)]
+    fn pass(block: &TriangleBlock, lane: usize, shear: &Shear, origin: &[f64; 3]) -> (Passage, Inside) {
+        let corners = block.corners.as_flattened().as_flattened().as_ptr();
+        let [kx, ky, kz] = shear.axes.order;
+        let lane = lane % BLOCK;
+        // The corners in the first three lanes, and the very operations of the portable one.
+        // SAFETY: see `X86`. Each component of the three corners is at 24 corner + 8 axis + lane, in an array of 72.
+        unsafe {
+            let z = _mm256_sub_pd(Self::component(corners.add(8 * kz + lane)), _mm256_set1_pd(origin[2]));
+            let across =
+                _mm256_sub_pd(Self::component(corners.add(8 * kx + lane)), _mm256_set1_pd(origin[0]));
+            let up = _mm256_sub_pd(Self::component(corners.add(8 * ky + lane)), _mm256_set1_pd(origin[1]));
+            // No fused multiply-add here and below.
+            let x = _mm256_sub_pd(across, _mm256_mul_pd(_mm256_set1_pd(shear.x), z));
+            let y = _mm256_sub_pd(up, _mm256_mul_pd(_mm256_set1_pd(shear.y), z));
+            // c, a, b and b, c, a.
+            let (px, py) =
+                (_mm256_permute4x64_pd::<0b11_01_00_10>(x), _mm256_permute4x64_pd::<0b11_01_00_10>(y));
+            let (qx, qy) =
+                (_mm256_permute4x64_pd::<0b11_00_10_01>(x), _mm256_permute4x64_pd::<0b11_00_10_01>(y));
+            let product = _mm256_mul_pd(px, qy);
+            let edges = _mm256_sub_pd(product, _mm256_mul_pd(py, qx));
+            let zero = _mm256_setzero_pd();
+            let is_negative = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(edges, zero)) & 7;
+            let is_positive = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_GT_OQ>(edges, zero)) & 7;
+            if is_positive != 7 && is_negative != 7 {
+                let is_zero = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_EQ_OQ>(edges, zero)) & 7;
+                let is_unclear = is_zero | is_positive == 7 || is_zero | is_negative == 7;
+                return (if is_unclear { Passage::Unclear } else { Passage::Outside }, Inside::NONE);
+            }
+            let (u, w) = (_mm256_castpd256_pd128(edges), _mm256_extractf128_pd::<1>(edges));
+            let v = _mm_unpackhi_pd(u, u);
+            let det = _mm_add_sd(_mm_add_sd(u, v), w);
+            let heights = _mm256_mul_pd(edges, z);
+            let (of_a, of_c) = (_mm256_castpd256_pd128(heights), _mm256_extractf128_pd::<1>(heights));
+            let height = _mm_add_sd(_mm_add_sd(of_a, _mm_unpackhi_pd(of_a, of_a)), of_c);
+            let sign = _mm256_set1_pd(-0.0);
+            let size = _mm256_andnot_pd(sign, _mm256_broadcastsd_pd(det));
+            let least = _mm256_mul_pd(_mm256_andnot_pd(sign, product), _mm256_set1_pd(1.0 / 64.0));
+            if _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(size, least)) & 7 != 0 {
+                return (Passage::Unclear, Inside::NONE);
+            }
+            let inside = Inside {
+                height: _mm_cvtsd_f64(height),
+                det: _mm_cvtsd_f64(det),
+                v: _mm_cvtsd_f64(v),
+                w: _mm_cvtsd_f64(w),
+            };
+            (Passage::Inside, inside)
         }
     }
 }
