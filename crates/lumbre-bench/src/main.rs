@@ -76,6 +76,9 @@ struct Options {
     /// How Lumbre builds its trees: fast, balanced or best.
     #[arg(long, default_value = "balanced", value_parser = preset)]
     preset: Preset,
+    /// Lumbre takes rays by batches, on every thread, and not one at a time.
+    #[arg(long)]
+    batches: bool,
     /// Names the scenes and ends.
     #[arg(long)]
     list: bool,
@@ -165,7 +168,8 @@ fn main() -> Result<()> {
         deadline: options.quick.then(|| start + Duration::from_secs(40)),
     };
 
-    let mut programs = ours::programs(options.preset);
+    let lumbre = ours::Lumbre { preset: options.preset, by_batches: options.batches };
+    let mut programs: Vec<Box<dyn Program>> = vec![Box::new(lumbre)];
     programs.extend(peers()?.into_iter().filter(|peer| is_wanted(&options.peer, &peer.name())));
 
     println!("{}, {}", report::machine(), report::today());

@@ -145,7 +145,7 @@ mod tests {
     use lumbre_kernel::Preset;
 
     use super::*;
-    use crate::program::{Program, Tree};
+    use crate::program::Program;
     use crate::rays::{self, PictureSize, Work};
     use crate::worlds::RECIPES;
     use crate::{crates, ours};
@@ -185,7 +185,8 @@ mod tests {
 
     #[test]
     fn our_kernel_agrees_with_the_loop_over_everything() {
-        check(&ours::Lumbre { preset: Preset::Best }, 1.0);
+        check(&ours::Lumbre { preset: Preset::Best, by_batches: false }, 1.0);
+        check(&ours::Lumbre { preset: Preset::Balanced, by_batches: true }, 1.0);
     }
 
     #[test]
@@ -223,7 +224,9 @@ mod tests {
         let scene = RECIPES[0].make();
         let accel = ours::build(&scene, Preset::Balanced).expect("a sound scene");
         let list = rays::make(Work::Random, &scene, &accel, PictureSize { width: 40, height: 20 });
-        let mut pass = accel.prepare(Query::Closest, &list);
+        let program = ours::Lumbre { preset: Preset::Balanced, by_batches: false };
+        let built = program.build(&scene, 1).expect("a sound scene");
+        let mut pass = built.tree.prepare(Query::Closest, &list);
         pass.run();
         let first = pass.answers();
         pass.reset();

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result};
 use lumbre_geometry::{PlacedShape, Ray, Sphere};
-use lumbre_kernel::{Accel, BuildOptions, Geometry, GeometryKind, Instance, Preset};
+use lumbre_kernel::{Accel, BuildOptions, Geometry, GeometryKind, Hit, Instance, Preset};
 use lumbre_math::{DVec3, Transform};
 
 use crate::program::{Built, Pass, Program, Query, Tree};
@@ -12,25 +12,27 @@ use crate::rays::Ray32;
 use crate::rust_heap;
 use crate::scene::Scene;
 
-/// Lumbre, one ray at a time.
+/// Lumbre.
+#[derive(Clone, Copy, Debug)]
 pub struct Lumbre {
     /// How its trees are built.
     pub preset: Preset,
+    /// Whether rays come by batches of [`BATCH`], not one at a time.
+    pub by_batches: bool,
 }
 
-/// Every way in which it takes part.
-pub fn programs(preset: Preset) -> Vec<Box<dyn Program>> {
-    vec![Box::new(Lumbre { preset })]
-}
+/// Rays that a batch has at most.
+const BATCH: usize = 256;
 
 impl Program for Lumbre {
     fn name(&self) -> String {
         let version = env!("CARGO_PKG_VERSION");
-        match self.preset {
-            Preset::Fast => format!("Lumbre {version} fast"),
-            Preset::Balanced => format!("Lumbre {version}"),
-            Preset::Best => format!("Lumbre {version} best"),
-        }
+        let preset = match self.preset {
+            Preset::Fast => " fast",
+            Preset::Balanced => "",
+            Preset::Best => " best",
+        };
+        format!("Lumbre {version}{preset}{}", if self.by_batches { " batches" } else { "" })
     }
 
     fn refuses(&self, _: &Scene) -> Option<&'static str> {
@@ -46,7 +48,7 @@ impl Program for Lumbre {
         // The tree keeps the list.
         bytes.kept += list_bytes;
         bytes.peak += list_bytes;
-        Ok(Built { tree: Box::new(accel?), seconds, bytes })
+        Ok(Built { tree: Box::new(Queried { accel: accel?, by_batches: self.by_batches }), seconds, bytes })
     }
 }
 
@@ -95,17 +97,24 @@ fn placed_sphere([x, y, z, radius]: [f32; 4]) -> PlacedShape {
     PlacedShape::new(sphere.into(), Transform::IDENTITY)
 }
 
-impl Tree for Accel {
+/// A tree, and how it is asked.
+struct Queried {
+    accel: Accel,
+    by_batches: bool,
+}
+
+impl Tree for Queried {
     fn prepare<'a>(&'a self, query: Query, rays: &[Ray32]) -> Box<dyn Pass + 'a> {
         let rays: Vec<Ray> = rays.iter().map(|ray| ray.to_f64()).collect();
+        let tree = self;
         match query {
             Query::Closest => {
                 let found = vec![Found::MISS; rays.len()];
-                Box::new(Closest { accel: self, rays, found })
+                Box::new(Closest { tree, rays, found, batch: vec![None; BATCH] })
             }
             Query::Any => {
                 let found = vec![false; rays.len()];
-                Box::new(Any { accel: self, rays, found })
+                Box::new(Any { tree, rays, found })
             }
         }
     }
@@ -120,12 +129,20 @@ struct Found {
 
 impl Found {
     const MISS: Self = Self { t_and_barycentrics: [f64::INFINITY; 3], geometry_and_primitive: [u32::MAX; 2] };
+
+    fn put(&mut self, hit: Option<&Hit>) {
+        if let Some(hit) = hit {
+            self.t_and_barycentrics = [hit.root.t, hit.root.local.x, hit.root.local.y];
+            self.geometry_and_primitive = [hit.geometry, hit.primitive];
+        }
+    }
 }
 
 struct Closest<'a> {
-    accel: &'a Accel,
+    tree: &'a Queried,
     rays: Vec<Ray>,
     found: Vec<Found>,
+    batch: Vec<Option<Hit>>,
 }
 
 impl Pass for Closest<'_> {
@@ -134,13 +151,16 @@ impl Pass for Closest<'_> {
     }
 
     fn run(&mut self) {
-        for (ray, found) in self.rays.iter().zip(&mut self.found) {
-            if let Some(hit) = self.accel.closest(ray) {
-                *found = Found {
-                    t_and_barycentrics: [hit.root.t, hit.root.local.x, hit.root.local.y],
-                    geometry_and_primitive: [hit.geometry, hit.primitive],
-                };
+        if self.tree.by_batches {
+            for (rays, found) in self.rays.chunks(BATCH).zip(self.found.chunks_mut(BATCH)) {
+                let hits = &mut self.batch[..rays.len()];
+                self.tree.accel.closest_batch(rays, hits);
+                found.iter_mut().zip(hits).for_each(|(found, hit)| found.put(hit.as_ref()));
             }
+            return;
+        }
+        for (ray, found) in self.rays.iter().zip(&mut self.found) {
+            found.put(self.tree.accel.closest(ray).as_ref());
         }
     }
 
@@ -151,7 +171,7 @@ impl Pass for Closest<'_> {
 }
 
 struct Any<'a> {
-    accel: &'a Accel,
+    tree: &'a Queried,
     rays: Vec<Ray>,
     found: Vec<bool>,
 }
@@ -162,8 +182,14 @@ impl Pass for Any<'_> {
     }
 
     fn run(&mut self) {
+        if self.tree.by_batches {
+            for (rays, found) in self.rays.chunks(BATCH).zip(self.found.chunks_mut(BATCH)) {
+                self.tree.accel.any_batch(rays, found);
+            }
+            return;
+        }
         for (ray, found) in self.rays.iter().zip(&mut self.found) {
-            *found = self.accel.any(ray);
+            *found = self.tree.accel.any(ray);
         }
     }
 

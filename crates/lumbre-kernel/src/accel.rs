@@ -11,7 +11,9 @@ use crate::holds::Holds;
 use crate::lanes::Level;
 use crate::node::{Units, tag};
 use crate::query::{All, Any, Batch, Closest, Count, If};
-use crate::{Geometry, GeometryKind, Hit, LoadError, RefitError, prepare, refit, save, surface, traverse};
+use crate::{
+    Geometry, GeometryKind, Hit, LoadError, RefitError, batch, prepare, refit, save, surface, traverse,
+};
 
 /// A bounding volume hierarchy over geometries, ready for queries from any number of threads.
 ///
@@ -161,6 +163,38 @@ impl Accel {
     #[inline(always)]
     pub(crate) fn closest_at(&self, level: Level, ray: &Ray) -> Option<Hit> {
         traverse::search(level, self, ray, Closest::new(ray, All)).into_hit()
+    }
+
+    /// [`Accel::closest`] for every ray, with the same answers to the bit; `hits` has a place for each.
+    ///
+    /// Several rays are in flight at a time, so that this is faster than one after another, the more the larger the tree and
+    /// the less alike the rays; hundreds at a time suffice. It works on the calling thread: to use more, split `rays` and `hits`.
+    /// In trees of other things than triangles, and through instances, rays are traced one after another.
+    ///
+    /// # Panics
+    /// When `rays` and `hits` differ in length.
+    pub fn closest_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        self.closest_batch_at(self.level, rays, hits);
+    }
+
+    pub(crate) fn closest_batch_at(&self, level: Level, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        assert_eq!(rays.len(), hits.len(), "a place for the hit of every ray");
+        let begin = |ray: &Ray| Closest::new(ray, All);
+        batch::search_all(level, self, rays, begin, |i, search| hits[i] = search.into_hit());
+    }
+
+    /// [`Accel::any`] for every ray: see [`Accel::closest_batch`].
+    ///
+    /// # Panics
+    /// When `rays` and `hits` differ in length.
+    pub fn any_batch(&self, rays: &[Ray], hits: &mut [bool]) {
+        self.any_batch_at(self.level, rays, hits);
+    }
+
+    pub(crate) fn any_batch_at(&self, level: Level, rays: &[Ray], hits: &mut [bool]) {
+        assert_eq!(rays.len(), hits.len(), "a place for the answer of every ray");
+        let begin = |ray: &Ray| Any::new(ray, All);
+        batch::search_all(level, self, rays, begin, |i, search| hits[i] = search.is_hit);
     }
 
     /// The nearest hit that `accept` takes; it may be asked in any order of `t`, and its answer must depend on the hit

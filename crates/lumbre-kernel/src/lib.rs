@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod accel;
+mod batch;
 mod bins;
 mod build;
 mod collapse;

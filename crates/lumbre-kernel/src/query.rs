@@ -8,32 +8,20 @@ use lumbre_geometry::{Ray, Root};
 use crate::stack::{AsBuilt, ByDistance};
 use crate::traverse::{Ask, Found, Place, Search, What};
 use crate::triangles::Inside;
-use crate::{Accel, Hit, InstancePath};
+use crate::{Accel, Hit};
 
 impl Found<'_, '_> {
     #[inline]
     fn to_hit(&self) -> Hit {
-        to_hit(self.root, self.what, self.accel, self.place)
+        to_hit(self.root, self.what, self.accel, self.place.is_within().then(|| self.place.clone()))
     }
 }
 
 #[inline(always)]
-fn to_hit(root: Root, what: What, accel: &Accel, place: &Place) -> Hit {
+fn to_hit(root: Root, what: What, accel: &Accel, place: Option<Place>) -> Hit {
     let (geometry, primitive) = what.names(accel);
-    Hit {
-        root,
-        id: accel.geometries[geometry as usize].id,
-        primitive,
-        geometry,
-        instances: copied(&place.ids),
-        route: copied(&place.route),
-    }
-}
-
-/// Most hits are in no instance: for them no list is copied.
-#[inline(always)]
-fn copied(path: &InstancePath) -> InstancePath {
-    if path.is_empty() { InstancePath::new() } else { path.clone() }
+    let Place { route, ids } = place.unwrap_or_default();
+    Hit { root, id: accel.geometries[geometry as usize].id, primitive, geometry, instances: ids, route }
 }
 
 // No NaN comes this far, and the two zeros are one place.
@@ -73,8 +61,8 @@ impl<F: FnMut(&Hit) -> bool> Filter for If<F> {
 /// The nearest hit.
 pub(crate) struct Closest<'a, F> {
     best: Option<Best<'a>>,
-    // Of the best.
-    place: Place,
+    // Of the best, where that is in an instance.
+    place: Option<Place>,
     limit: f64,
     floor: f64,
     filter: F,
@@ -96,7 +84,7 @@ enum Crossing {
 impl<'a, F> Closest<'a, F> {
     #[inline(always)]
     pub(crate) fn new(ray: &Ray, filter: F) -> Self {
-        Self { best: None, place: Place::default(), limit: ray.t_max, floor: ray.t_min, filter }
+        Self { best: None, place: None, limit: ray.t_max, floor: ray.t_min, filter }
     }
 
     #[inline(always)]
@@ -106,14 +94,15 @@ impl<'a, F> Closest<'a, F> {
             Crossing::Inside(inside) => inside.root(self.limit),
             Crossing::Root(root) => root,
         };
-        Some(to_hit(root, what, accel, &self.place))
+        Some(to_hit(root, what, accel, self.place))
     }
 
     /// Whether a crossing at the same `t` comes first in the lists.
     #[cold]
     #[inline(never)]
     fn comes_first(&self, best: &Best, what: What, accel: &Accel, place: &Place) -> bool {
-        let order = place.route.cmp(&self.place.route);
+        let own: &[u32] = self.place.as_ref().map_or(&[], |place| &place.route);
+        let order = place.route.as_slice().cmp(own);
         order.then_with(|| what.names(accel).cmp(&best.what.names(best.accel))) == Ordering::Less
     }
 
@@ -133,8 +122,8 @@ impl<'a, F> Closest<'a, F> {
     fn keep(&mut self, t: f64, best: Best<'a>, place: &Place) {
         self.limit = t;
         self.best = Some(best);
-        if !(place.route.is_empty() && self.place.route.is_empty()) {
-            self.place.clone_from(place);
+        if place.is_within() || self.place.is_some() {
+            self.place = place.is_within().then(|| place.clone());
         }
     }
 }

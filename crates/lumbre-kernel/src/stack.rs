@@ -93,6 +93,13 @@ impl<E: Copy> Stack<E> {
         Self { slots: Slots::new(), spilled: Vec::new() }
     }
 
+    /// Drops everything.
+    #[inline(always)]
+    pub(crate) fn clear(&mut self) {
+        self.slots.clear();
+        self.spilled.clear();
+    }
+
     /// Somewhere for eight more.
     #[inline(always)]
     pub(crate) fn with_room(&mut self) -> &mut Slots<E> {

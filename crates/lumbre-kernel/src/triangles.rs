@@ -111,8 +111,10 @@ impl Shear {
 /// A hit in range has its z between those of the corners, up to 2⁻⁴⁰L in double precision and 2uL here; the ends of the
 /// range in z are moved by 6uL, of which their rounding takes 2uL (an end beyond 2L leaves everything in anyway).
 ///
-/// Likewise, edge functions beyond `error` here are beyond zero in double precision, and a triangle whose corners all have
-/// their z in the range, by 6uL, is met in range.
+/// Where all edge functions are beyond 2 `error` on one side, those in double precision are beyond zero, so that the line does
+/// meet the triangle. Each of its weights, the shares of the edge functions in their sum D > 6 `error`, is then a little off,
+/// all together by no more than 12 `error` / D: so far does this move z, per unit of the triangle's extent in z. Roundings move
+/// it by 7uL more, those of the corners' z by 2uL, and those of the extent by up to 8uL: `z_error` = 24uL has room for all.
 ///
 /// All this without overflow or underflow, so for 2⁻⁵⁰ ≤ L ≤ 2⁶⁰; else the test is left out.
 #[derive(Clone, Copy, Debug)]
@@ -127,8 +129,11 @@ pub(crate) struct BlockRay {
     /// Triangles wholly before this, or after the other, are out of range.
     pub(crate) z_low: f32,
     pub(crate) z_high: f32,
-    /// Triangles wholly between these are in range.
-    pub(crate) z_surely_in: [f32; 2],
+    /// The direction's z is negative.
+    pub(crate) is_backward: bool,
+    /// A z between these, counted along the direction, is in range.
+    pub(crate) surely_in: [f32; 2],
+    pub(crate) z_error: f32,
     /// Whether the test tells anything.
     pub(crate) is_sharp: bool,
     // 6uL.
@@ -152,7 +157,9 @@ impl BlockRay {
             error_least: (3.0 * delta * delta) as f32,
             z_low: f32::NEG_INFINITY,
             z_high: f32::INFINITY,
-            z_surely_in: [f32::INFINITY, f32::NEG_INFINITY],
+            is_backward: shear.direction_z < 0.0,
+            surely_in: [f32::INFINITY, f32::NEG_INFINITY],
+            z_error: (24.0 * u * reach) as f32,
             is_sharp: 1.0 / (1u64 << 50) as f64 <= reach && reach <= (1u64 << 60) as f64,
             z_margin: 6.0 * u * reach,
         }
@@ -162,12 +169,19 @@ impl BlockRay {
     #[inline(always)]
     pub(crate) fn set_range(&mut self, shear: &Shear, t_min: f64, t_max: f64) {
         let (start, end) = (t_min * shear.direction_z, t_max * shear.direction_z);
-        let (low, high) = if shear.direction_z < 0.0 { (end, start) } else { (start, end) };
+        let (low, high) = if self.is_backward { (end, start) } else { (start, end) };
         self.z_low = (low - self.z_margin) as f32;
         self.z_high = (high + self.z_margin) as f32;
+    }
+
+    /// Where a hit is certain.
+    #[inline(always)]
+    pub(crate) fn set_surely_in(&mut self, shear: &Shear, t_min: f64, t_max: f64) {
+        let size = shear.direction_z.abs();
         // Else a place in range may be none, for it is infinite.
-        if shear.direction_z.abs() > 1e-200 {
-            self.z_surely_in = [(low + self.z_margin) as f32, (high - self.z_margin) as f32];
+        if size > 1e-200 {
+            let (first, last) = (t_min * size + self.z_margin, t_max * size - self.z_margin);
+            self.surely_in = [first as f32, last as f32];
         }
     }
 }
@@ -331,20 +345,6 @@ fn settled_edge(p: Corner, q: Corner) -> f64 {
 /// px qy - py qx where both products round to `product`.
 fn residue(p: Corner, q: Corner, product: f64) -> f64 {
     p.x.mul_add(q.y, -product) - p.y.mul_add(q.x, -product)
-}
-
-#[inline(always)]
-fn root_of(shear: &Shear, [a, b, c]: [Corner; 3], [u, v, w]: [f64; 3]) -> Root {
-    let det = u + v + w;
-    let t = (u * a.z + v * b.z + w * c.z) / det / shear.direction_z;
-    Root { t, part: 0, multiplicity: 1, local: DVec2::new(v / det, w / det) }
-}
-
-#[cold]
-#[inline(never)]
-fn exact_root_of(shear: Shear, [a, b, c]: [Corner; 3]) -> Root {
-    let edges = [difference_of_products(c, b), difference_of_products(a, c), difference_of_products(b, a)];
-    root_of(&shear, [a, b, c], edges)
 }
 
 /// A triangle whose edge functions have one sign but for those that are zero.

@@ -41,8 +41,8 @@ pub(crate) trait Lanes {
     /// last, which it answers. There must be room for eight.
     fn push_as_built(node: &Node, mask: u32, slots: &mut Slots<u32>) -> u32;
 
-    /// One bit for each triangle that the ray may hit within its range, among them all that it does; where `SURE`, also one
-    /// for each that it certainly hits, else none: see [`BlockRay`].
+    /// A bit for each triangle that the ray may hit within its range, among them all that it does; where `SURE`, also one for
+    /// each that it certainly hits, else none: see [`BlockRay`].
     fn meet_triangles<const SURE: bool>(block: &TriangleBlock, ray: &BlockRay) -> (u32, u32);
 
     /// How a ray passes the triangle in a lane, in double precision, and what its crossing inside is made of. `origin` has the order of the shear's axes.
@@ -161,6 +161,11 @@ impl<E: Copy> Slots<E> {
     }
 
     #[inline(always)]
+    pub(crate) fn clear(&mut self) {
+        self.len = 0;
+    }
+
+    #[inline(always)]
     pub(crate) fn pop(&mut self) -> Option<E> {
         if self.len == 0 {
             return None;
@@ -246,6 +251,22 @@ impl Level {
             Set::Avx512 => unsafe { x86::run_avx512(task) },
         }
     }
+}
+
+/// Asks for what stands there to be brought near, where the machine can be asked.
+#[inline(always)]
+pub(crate) fn fetch<T>(value: &T) {
+    #[cfg(target_arch = "x86_64")]
+    for line in 0..size_of::<T>().div_ceil(64) {
+        let start: *const T = value;
+        // SAFETY: SSE is always there, and a prefetch reads nothing that the program could notice.
+        unsafe {
+            use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+            _mm_prefetch::<_MM_HINT_T0>(start.cast::<i8>().wrapping_add(64 * line));
+        }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = value;
 }
 
 /// What [`Lanes::meet_boxes`] gives at a level, and where the ray enters each box, for tests.

@@ -101,15 +101,23 @@ impl Lanes for Portable {
             let size = (0..3).fold(0.0f32, |size, i| size.max(x[i][lane].abs()).max(y[i][lane].abs()));
             let error = size * ray.error_slope + ray.error_least;
             let (least, most) = (u.min(v).min(w), u.max(v).max(w));
-            let (low, high) =
-                (z[0][lane].min(z[1][lane]).min(z[2][lane]), z[0][lane].max(z[1][lane]).max(z[2][lane]));
+            let [a, b, c] = [z[0][lane], z[1][lane], z[2][lane]];
+            let (low, high) = (a.min(b).min(c), a.max(b).max(c));
             // Comparisons with a NaN, which unused lanes have, are false.
             let may_be_inside = least >= -error || most <= error;
-            mask |= u32::from(may_be_inside && high >= ray.z_low && low <= ray.z_high) << lane;
-            if SURE {
-                let is_inside = least > error || most < -error;
-                sure |=
-                    u32::from(is_inside && low >= ray.z_surely_in[0] && high <= ray.z_surely_in[1]) << lane;
+            if !(may_be_inside && high >= ray.z_low && low <= ray.z_high) {
+                continue;
+            }
+            mask |= 1 << lane;
+            if SURE && (least > 2.0 * error || most < -2.0 * error) {
+                let inverse = 1.0 / (u + v + w);
+                let height = (u * a + v * b + w * c) * inverse;
+                let ahead = if ray.is_backward { -height } else { height };
+                let spread = (high - low) * (error * 12.5) * inverse.abs() + ray.z_error;
+                let (from, to) = (ahead - spread, ahead + spread);
+                if ray.surely_in[0] <= from && to <= ray.surely_in[1] {
+                    sure |= 1 << lane;
+                }
             }
         }
         (mask, sure)

@@ -304,21 +304,12 @@ impl<const AVX512: bool> Lanes for X86<AVX512> {
             // Comparisons with a NaN, which unused lanes have, are false. A minimum of a NaN and a number is that number
             // or the NaN: unused lanes have nothing but NaN.
             let minus_error = _mm256_xor_ps(error, _mm256_set1_ps(-0.0));
-            let [sure_low, sure_high] = ray.z_surely_in;
-            let (sure_low, sure_high) = (_mm256_set1_ps(sure_low), _mm256_set1_ps(sure_high));
-            if AVX512 {
+            let mask = if AVX512 {
                 let mask = (_mm256_cmp_ps_mask::<_CMP_GE_OQ>(least, minus_error)
                     | _mm256_cmp_ps_mask::<_CMP_LE_OQ>(most, error))
                     & _mm256_cmp_ps_mask::<_CMP_GE_OQ>(high, z_low)
                     & _mm256_cmp_ps_mask::<_CMP_LE_OQ>(low, z_high);
-                if !SURE {
-                    return (u32::from(mask), 0);
-                }
-                let sure = (_mm256_cmp_ps_mask::<_CMP_GT_OQ>(least, error)
-                    | _mm256_cmp_ps_mask::<_CMP_LT_OQ>(most, minus_error))
-                    & _mm256_cmp_ps_mask::<_CMP_GE_OQ>(low, sure_low)
-                    & _mm256_cmp_ps_mask::<_CMP_LE_OQ>(high, sure_high);
-                (u32::from(mask), u32::from(sure))
+                u32::from(mask)
             } else {
                 let in_range = _mm256_and_ps(
                     _mm256_cmp_ps::<_CMP_GE_OQ>(high, z_low),
@@ -328,20 +319,33 @@ impl<const AVX512: bool> Lanes for X86<AVX512> {
                     _mm256_cmp_ps::<_CMP_GE_OQ>(least, minus_error),
                     _mm256_cmp_ps::<_CMP_LE_OQ>(most, error),
                 );
-                let mask = _mm256_movemask_ps(_mm256_and_ps(in_range, sided)) as u32;
-                if !SURE {
-                    return (mask, 0);
-                }
-                let in_range = _mm256_and_ps(
-                    _mm256_cmp_ps::<_CMP_GE_OQ>(low, sure_low),
-                    _mm256_cmp_ps::<_CMP_LE_OQ>(high, sure_high),
-                );
-                let sided = _mm256_or_ps(
-                    _mm256_cmp_ps::<_CMP_GT_OQ>(least, error),
-                    _mm256_cmp_ps::<_CMP_LT_OQ>(most, minus_error),
-                );
-                (mask, _mm256_movemask_ps(_mm256_and_ps(in_range, sided)) as u32)
+                _mm256_movemask_ps(_mm256_and_ps(in_range, sided)) as u32
+            };
+            if !SURE || mask == 0 {
+                return (mask, 0);
             }
+            let sign = _mm256_set1_ps(-0.0);
+            let inverse = _mm256_div_ps(_mm256_set1_ps(1.0), _mm256_add_ps(_mm256_add_ps(u, v), w));
+            let height = _mm256_fmadd_ps(u, z[0], _mm256_fmadd_ps(v, z[1], _mm256_mul_ps(w, z[2])));
+            let backward = _mm256_set1_ps(if ray.is_backward { -0.0 } else { 0.0 });
+            let ahead = _mm256_xor_ps(_mm256_mul_ps(height, inverse), backward);
+            let spread = _mm256_mul_ps(
+                _mm256_mul_ps(_mm256_sub_ps(high, low), _mm256_mul_ps(error, _mm256_set1_ps(12.5))),
+                _mm256_andnot_ps(sign, inverse),
+            );
+            let spread = _mm256_add_ps(spread, _mm256_set1_ps(ray.z_error));
+            let (from, to) = (_mm256_sub_ps(ahead, spread), _mm256_add_ps(ahead, spread));
+            let twice = _mm256_add_ps(error, error);
+            let inside = _mm256_or_ps(
+                _mm256_cmp_ps::<_CMP_GT_OQ>(least, twice),
+                _mm256_cmp_ps::<_CMP_LT_OQ>(most, _mm256_xor_ps(twice, sign)),
+            );
+            let [first, last] = ray.surely_in;
+            let in_range = _mm256_and_ps(
+                _mm256_cmp_ps::<_CMP_GE_OQ>(from, _mm256_set1_ps(first)),
+                _mm256_cmp_ps::<_CMP_LE_OQ>(to, _mm256_set1_ps(last)),
+            );
+            (mask, _mm256_movemask_ps(_mm256_and_ps(inside, in_range)) as u32 & mask)
         }
     }
 

@@ -8,7 +8,7 @@ use lumbre_math::{DVec3, Transform};
 
 use super::scenes::{Random, balls, build, cube, icosphere, mixture, ray, soup, with_every_preset};
 use crate::lanes::Level;
-use crate::{Accel, GeometryKind, Hit, Instance, brute};
+use crate::{Accel, GeometryKind, Hit, Instance, TriangleMesh, brute};
 
 fn every(level: Level, accel: &Accel, ray: &Ray) -> Vec<Hit> {
     let mut hits = Vec::new();
@@ -46,6 +46,68 @@ pub(crate) fn check(accel: &Accel, ray: &Ray) -> usize {
 fn check_many(accel: &Accel, random: &mut Random, center: DVec3, extent: f64, rays: usize) {
     let hits: usize = (0..rays).map(|_| check(accel, &ray(random, center, extent))).sum();
     assert!(hits > rays / 4, "only {hits} hits of {rays} rays");
+}
+
+/// The same in batches of many sizes, at every level; returns how many were hit.
+fn check_batches(accel: &Accel, rays: &[Ray]) -> usize {
+    let expected: Vec<_> = rays.iter().map(|ray| accel.closest(ray)).collect();
+    for level in Level::all() {
+        for size in [1, 3, 7, 64, rays.len()] {
+            for (rays, expected) in rays.chunks(size).zip(expected.chunks(size)) {
+                // What stood there before does not matter.
+                let mut hits = vec![expected.iter().flatten().next().cloned(); rays.len()];
+                accel.closest_batch_at(level, rays, &mut hits);
+                assert_eq!(hits, expected, "{level:?}");
+                let bits = |hit: &Option<Hit>| hit.as_ref().map(|hit| hit.root.t.to_bits());
+                assert!(hits.iter().map(bits).eq(expected.iter().map(bits)));
+                let mut is_hit = vec![true; rays.len()];
+                accel.any_batch_at(level, rays, &mut is_hit);
+                assert!(is_hit.iter().copied().eq(expected.iter().map(Option::is_some)), "{level:?}");
+            }
+        }
+    }
+    expected.iter().flatten().count()
+}
+
+#[test]
+fn batches_answer_as_single_rays_do() {
+    let mut random = Random(31);
+    // A closed ball far off its own origin, a soup, and an open strip whose edges rays meet exactly.
+    let mut ball = icosphere(3, DVec3::ZERO, 1.2);
+    ball.origin = CENTER;
+    let strip = |ball: &TriangleMesh| TriangleMesh { indices: ball.indices[..37].to_vec(), ..ball.clone() };
+    let soup = soup(&mut random, 900, CENTER, 3.0);
+    let mut meshes = vec![GeometryKind::Mesh(Arc::new(strip(&ball)))];
+    for kind in [ball, soup] {
+        meshes.push(GeometryKind::Mesh(Arc::new(kind)));
+        let accel = build(meshes.clone());
+        let mut rays: Vec<Ray> = (0..1500).map(|_| ray(&mut random, CENTER, 3.0)).collect();
+        // Some miss the tree altogether, some are nothing.
+        rays[3] = Ray::new(CENTER + 50.0 * DVec3::X, DVec3::Y);
+        rays[20].direction = DVec3::ZERO;
+        rays[77].t_max = f64::NAN;
+        for i in (100..1400).step_by(7) {
+            let GeometryKind::Mesh(mesh) = &meshes[random.below(meshes.len())] else { unreachable!() };
+            let corner = mesh.indices[random.below(mesh.indices.len())][random.below(3)];
+            let target = mesh.origin + mesh.positions[corner as usize].as_dvec3();
+            rays[i] = Ray::new(target + DVec3::new(0.0, 0.0, 4.0), -DVec3::Z);
+        }
+        let hits = check_batches(&accel, &rays);
+        assert!(250 < hits && hits < 1450, "{hits}");
+    }
+    let accel = mixture(&mut random, CENTER, 3.0, 1, true);
+    let rays: Vec<Ray> = (0..300).map(|_| ray(&mut random, CENTER, 3.0)).collect();
+    assert!(check_batches(&accel, &rays) > 75);
+}
+
+#[test]
+fn batches_without_rays_or_without_triangles_end() {
+    let accel = build(vec![]);
+    accel.closest_batch(&[], &mut []);
+    let ray = Ray::new(CENTER, DVec3::new(0.3, 0.4, 0.5));
+    let mut hits = [true; 9];
+    accel.any_batch(&[ray; 9], &mut hits);
+    assert_eq!(hits, [false; 9]);
 }
 
 const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
