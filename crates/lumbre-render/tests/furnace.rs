@@ -200,7 +200,9 @@ fn shading_normals_take_nothing_from_what_absorbs_nothing() {
         let material = add_material(&mut desc, material);
         let center = CENTER + DVec3::new(0.5, 0.25, -0.25);
         add(&mut desc, coarse_sphere(center, 0.75), material);
-        let is_clear = ["diffuse transmission", "glass", "pane", "solid", "interface"].iter().any(|kind| name.contains(kind));
+        let is_clear = ["diffuse transmission", "glass", "pane", "solid", "interface"]
+            .iter()
+            .any(|kind| name.contains(kind));
         if !is_clear {
             let black = add_material(&mut desc, diffuse(0.0));
             add(&mut desc, coarse_sphere(center, 0.748), black);
