@@ -56,6 +56,17 @@ impl<const COSTS: bool> Task for Decide<'_, COSTS> {
             return Few::Leaf;
         }
 
+        if could_be_leaf && count == 2 {
+            // There is one way to part them.
+            let cost = |p: &Primitive| traits[p.first() as usize].cost as f32;
+            let [a, b] = [&primitives[0], &primitives[1]];
+            let mut whole = *a;
+            whole.grow(b);
+            let apart = a.half_area() * cost(a) + b.half_area() * cost(b) + NODE_COST * whole.half_area();
+            let is_leaf = (cost(a) + cost(b)) * whole.half_area() <= apart;
+            return if is_leaf { Few::Leaf } else { Few::Split(1) };
+        }
+
         // Without costs, two leaves if at all possible.
         let is_one_mesh = !COSTS && is_one_group(primitives, traits);
         let (least, most) =

@@ -13,7 +13,7 @@ use crate::holds::Holds;
 use crate::lanes::Level;
 use crate::node::{Node, Units, tag};
 use crate::primitive::{Bounds, Kind, Primitive, Traits};
-use crate::{Accel, BuildError, BuildOptions, Geometry, GeometryKind, Instance, TriangleMesh};
+use crate::{Accel, BuildError, BuildOptions, Geometry, GeometryKind, TriangleMesh};
 
 /// References have 29 bits of place.
 pub(crate) const MOST_PRIMITIVES: usize = (1 << 29) - 1;
@@ -118,8 +118,7 @@ pub(crate) fn take_apart(geometries: &[Geometry]) -> Result<Parts, BuildError> {
         triangles: 0,
         largest_corner: 0.0,
     };
-    // Instances of one tree are many.
-    let mut outlines: HashMap<*const Accel, Vec<Aabb>> = HashMap::new();
+    let boxes = boxes_of(geometries);
     for (position, geometry) in geometries.iter().enumerate() {
         let room = MOST_PRIMITIVES - parts.boxed.len() - parts.infinite.len() - parts.triangles;
         match &geometry.kind {
@@ -133,7 +132,7 @@ pub(crate) fn take_apart(geometries: &[Geometry]) -> Result<Parts, BuildError> {
                 parts.triangles += survey.triangles;
                 parts.surveys.push(survey);
             }
-            GeometryKind::Shape(shape) => parts.add(position, 0, shape.bounds(), room)?,
+            GeometryKind::Shape(_) => parts.add(position, 0, boxes[position], room)?,
             GeometryKind::Custom(custom) => {
                 for primitive in 0..custom.primitive_count() {
                     let room = MOST_PRIMITIVES - parts.boxed.len() - parts.infinite.len() - parts.triangles;
@@ -141,10 +140,8 @@ pub(crate) fn take_apart(geometries: &[Geometry]) -> Result<Parts, BuildError> {
                 }
             }
             GeometryKind::Instance(instance) => {
-                let outline =
-                    outlines.entry(Arc::as_ptr(&instance.accel)).or_insert_with(|| outline(&instance.accel));
-                let (is_infinite, bounds) =
-                    (!instance.accel.infinite.is_empty(), instance_bounds(instance, outline));
+                let is_infinite = !instance.accel.infinite.is_empty();
+                let bounds = boxes[position].unwrap_or(Aabb::EMPTY);
                 if is_infinite {
                     parts.bounds = parts.bounds.union(bounds);
                     parts.add(position, 0, None, room)?;
@@ -156,6 +153,32 @@ pub(crate) fn take_apart(geometries: &[Geometry]) -> Result<Parts, BuildError> {
     }
     parts.bounds = parts.bounds.union(parts.tree_bounds);
     Ok(parts)
+}
+
+/// The boxes of all shapes and instances, by position; `None` of what is infinite or of another kind.
+fn boxes_of(geometries: &[Geometry]) -> Vec<Option<Aabb>> {
+    let are_meshes = geometries.iter().all(|geometry| matches!(geometry.kind, GeometryKind::Mesh(_)));
+    if are_meshes {
+        return vec![None; geometries.len()];
+    }
+    // Instances of one tree are many.
+    let mut outlines: HashMap<usize, Outline> = HashMap::new();
+    for geometry in geometries {
+        if let GeometryKind::Instance(instance) = &geometry.kind {
+            outlines
+                .entry(Arc::as_ptr(&instance.accel).addr())
+                .or_insert_with(|| Outline::of(&instance.accel));
+        }
+    }
+    let bounds = |geometry: &Geometry| match &geometry.kind {
+        GeometryKind::Shape(shape) => shape.bounds(),
+        GeometryKind::Instance(instance) => {
+            let outline = &outlines[&Arc::as_ptr(&instance.accel).addr()];
+            Some(outline.placed(&instance.world_from_object))
+        }
+        GeometryKind::Mesh(_) | GeometryKind::Custom(_) => None,
+    };
+    geometries.par_iter().with_min_len(64).map(bounds).collect()
 }
 
 impl Parts {
@@ -413,44 +436,64 @@ fn condition_of(map: &Transform) -> f64 {
     by_norm.min(by_component).max(1.0)
 }
 
-/// A box around an instance of what is finite: of many boxes of the inner tree, each taken over by itself, which is tighter
-/// than the image of the whole.
-fn instance_bounds(instance: &Instance, outline: &[Aabb]) -> Aabb {
-    let map = &instance.world_from_object;
-    let whole = placed_bounds(&instance.accel.bounds, map);
-    if outline.is_empty() {
-        return whole;
-    }
-    let joined = outline.iter().fold(Aabb::EMPTY, |joined, bounds| joined.union(placed_bounds(bounds, map)));
-    // Each bounds it, so that their common part does.
-    Aabb { min: joined.min.max(whole.min), max: joined.max.min(whole.max) }
-}
-
 /// Boxes of an outline, about.
 const OUTLINE: usize = 128;
 
-/// Boxes of a tree that together hold it, none where something in it is infinite.
-fn outline(inner: &Accel) -> Vec<Aabb> {
-    let node = |reference: u32| {
-        (reference >> tag::SHIFT == tag::INNER).then(|| &inner.tree.nodes[reference as usize])
-    };
-    let Some(root) = inner.tree.root.filter(|_| inner.infinite.is_empty()).and_then(node) else {
-        return Vec::new();
-    };
-    let children = |node: &Node| -> Vec<(Aabb, u32)> {
-        (0..node.len as usize)
-            .map(|lane| (box_in_space(&inner.units, node, lane), node.children[lane]))
-            .collect()
-    };
-    let mut boxes = children(root);
-    while boxes.len() < OUTLINE {
-        let area = |i: &usize| boxes[*i].0.half_area();
-        let inner_ones = (0..boxes.len()).filter(|&i| node(boxes[i].1).is_some());
-        let Some(largest) = inner_ones.max_by(|a, b| area(a).total_cmp(&area(b))) else { break };
-        let (_, reference) = boxes.swap_remove(largest);
-        boxes.extend(node(reference).map(children).unwrap_or_default());
+/// Boxes of a tree that together hold what is finite in it. The box around an instance is that of many boxes, each taken over
+/// by itself, which is tighter than the image of the whole.
+struct Outline {
+    whole: Aabb,
+    /// The middle of each, and half its size.
+    boxes: Vec<[DVec3; 2]>,
+    /// No coordinate is larger.
+    reach: DVec3,
+}
+
+impl Outline {
+    fn of(inner: &Accel) -> Self {
+        let whole = inner.bounds;
+        let node = |reference: u32| {
+            (reference >> tag::SHIFT == tag::INNER).then(|| &inner.tree.nodes[reference as usize])
+        };
+        let Some(root) = inner.tree.root.filter(|_| inner.infinite.is_empty()).and_then(node) else {
+            return Self { whole, boxes: Vec::new(), reach: DVec3::ZERO };
+        };
+        let children = |node: &Node| -> Vec<(Aabb, u32)> {
+            (0..node.len as usize)
+                .map(|lane| (box_in_space(&inner.units, node, lane), node.children[lane]))
+                .collect()
+        };
+        let mut open = children(root);
+        while open.len() < OUTLINE {
+            let area = |i: &usize| open[*i].0.half_area();
+            let inner_ones = (0..open.len()).filter(|&i| node(open[i].1).is_some());
+            let Some(largest) = inner_ones.max_by(|a, b| area(a).total_cmp(&area(b))) else { break };
+            let (_, reference) = open.swap_remove(largest);
+            open.extend(node(reference).map(children).unwrap_or_default());
+        }
+        let filled = open.iter().map(|(bounds, _)| bounds).filter(|bounds| !bounds.is_empty());
+        let boxes: Vec<_> = filled.map(center_and_half).collect();
+        let reach = boxes.iter().fold(DVec3::ZERO, |most, [center, half]| most.max(center.abs() + *half));
+        Self { whole, boxes, reach }
     }
-    boxes.into_iter().map(|(bounds, _)| bounds).collect()
+
+    fn placed(&self, map: &Transform) -> Aabb {
+        let whole = placed_bounds(&self.whole, map);
+        if self.boxes.is_empty() {
+            return whole;
+        }
+        let (affine, sizes) = (map.affine(), sizes_of(map));
+        let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for &[center, half] in &self.boxes {
+            let (image, reach) = (affine.matrix3 * center, sizes * half);
+            min = min.min(image - reach);
+            max = max.max(image + reach);
+        }
+        let rounding = rounding_of(map, &sizes, self.reach);
+        let (min, max) = (min + affine.translation - rounding, max + affine.translation + rounding);
+        // Each bounds it, so that their common part does.
+        Aabb { min: min.max(whole.min), max: max.min(whole.max) }
+    }
 }
 
 /// A node's box, back from tree units.
@@ -468,15 +511,28 @@ fn placed_bounds(bounds: &Aabb, map: &Transform) -> Aabb {
     if bounds.is_empty() {
         return Aabb::EMPTY;
     }
-    let affine = map.affine();
-    let linear = affine.matrix3;
-    let sizes = DMat3::from_cols(linear.x_axis.abs(), linear.y_axis.abs(), linear.z_axis.abs());
-    let center = bounds.center();
-    let half = (bounds.max - center).max(center - bounds.min);
+    let (affine, sizes) = (map.affine(), sizes_of(map));
+    let [center, half] = center_and_half(bounds);
     let image = affine.transform_point3(center);
     let reach = sizes * half;
-    let rounding = 8.0 * f64::EPSILON * (sizes * (center.abs() + half) + affine.translation.abs());
+    let rounding = rounding_of(map, &sizes, center.abs() + half);
     Aabb { min: image - reach - rounding, max: image + reach + rounding }
+}
+
+fn center_and_half(bounds: &Aabb) -> [DVec3; 2] {
+    let center = bounds.center();
+    [center, (bounds.max - center).max(center - bounds.min)]
+}
+
+/// The sizes of the numbers of a map's linear part.
+fn sizes_of(map: &Transform) -> DMat3 {
+    let linear = map.linear();
+    DMat3::from_cols(linear.x_axis.abs(), linear.y_axis.abs(), linear.z_axis.abs())
+}
+
+/// By how much the image of a box with no larger coordinates than `reach` may be wrong.
+fn rounding_of(map: &Transform, sizes: &DMat3, reach: DVec3) -> DVec3 {
+    8.0 * f64::EPSILON * (*sizes * reach + map.affine().translation.abs())
 }
 
 /// What the build must know of a geometry.
