@@ -36,6 +36,7 @@ const FORMAT_FLOAT3: c_int = 0x9003;
 const FORMAT_FLOAT4: c_int = 0x9004;
 const FORMAT_FLOAT3X4_COLUMN_MAJOR: c_int = 0x9234;
 
+const SCENE_FLAG_COMPACT: c_int = 1 << 1;
 const SCENE_FLAG_ROBUST: c_int = 1 << 2;
 const QUERY_FLAG_COHERENT: c_int = 1 << 16;
 const FEATURES_ALL: c_uint = c_uint::MAX;
@@ -226,6 +227,8 @@ pub enum Setting {
     High,
     /// Medium quality with its robust flag.
     Robust,
+    /// Medium quality with its compact flag.
+    Compact,
     /// The default, and rays in coherent packets of sixteen.
     Packets,
 }
@@ -234,13 +237,14 @@ impl Setting {
     const fn quality(self) -> c_int {
         match self {
             Self::High => 2,
-            Self::Default | Self::Robust | Self::Packets => 1,
+            Self::Default | Self::Robust | Self::Compact | Self::Packets => 1,
         }
     }
 
     const fn flags(self) -> c_int {
         match self {
             Self::Robust => SCENE_FLAG_ROBUST,
+            Self::Compact => SCENE_FLAG_COMPACT,
             Self::Default | Self::High | Self::Packets => 0,
         }
     }
@@ -279,6 +283,7 @@ impl Program for Embree {
             Setting::Default => format!("Embree {version}"),
             Setting::High => format!("Embree {version} high"),
             Setting::Robust => format!("Embree {version} robust"),
+            Setting::Compact => format!("Embree {version} compact"),
             Setting::Packets => format!("Embree {version} packets of 16"),
         }
     }

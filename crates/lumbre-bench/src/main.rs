@@ -211,7 +211,8 @@ fn peers() -> Result<Vec<Box<dyn Program>>> {
     let mut peers: Vec<Box<dyn Program>> = Vec::new();
     match std::env::var_os("EMBREE_LIB") {
         Some(path) => {
-            let settings = [Setting::Default, Setting::High, Setting::Robust, Setting::Packets];
+            let settings =
+                [Setting::Default, Setting::High, Setting::Robust, Setting::Compact, Setting::Packets];
             for embree in Embree::load(&path, &settings)? {
                 peers.push(Box::new(embree));
             }

@@ -11,7 +11,7 @@ use crate::primitive::Primitive;
 
 /// Bits of a code on each axis.
 const BITS: u32 = 10;
-/// Bits that primitives are first dealt out by.
+/// Bits that primitives are first dealt out by, at most.
 const DEALT: u32 = 12;
 
 /// The place of a centre on the curve, and of its primitive in the list.
@@ -94,8 +94,10 @@ impl Dealt {
 }
 
 fn deal(codes: &[Code]) -> Dealt {
-    let hand_of = |code: &Code| (code[0] >> (3 * BITS - DEALT)) as usize;
-    let mut ends = vec![0; 1 << DEALT];
+    // About as many hands as codes, where these are few.
+    let bits = DEALT.min((codes.len() + 1).ilog2());
+    let hand_of = |code: &Code| (code[0] >> (3 * BITS - bits)) as usize;
+    let mut ends = vec![0; 1 << bits];
     for code in codes {
         ends[hand_of(code)] += 1;
     }
