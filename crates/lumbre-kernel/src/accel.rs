@@ -12,7 +12,8 @@ use crate::lanes::Level;
 use crate::node::{Units, tag};
 use crate::query::{All, Any, Batch, Closest, Count, If};
 use crate::{
-    Geometry, GeometryKind, Hit, LoadError, RefitError, batch, prepare, refit, save, surface, traverse,
+    Geometry, GeometryKind, Hit, LoadError, QueryOptions, RefitError, batch, prepare, refit, save, surface,
+    traverse,
 };
 
 /// A bounding volume hierarchy over geometries, ready for queries from any number of threads.
@@ -32,6 +33,8 @@ pub struct Accel {
     pub(crate) holds: Holds,
     /// What a ray cost after the build, once that was asked for.
     pub(crate) built_cost: Option<f64>,
+    // One for each geometry, or none.
+    pub(crate) masks: Vec<u32>,
 }
 
 /// How a tree is built. Answers do not depend on it; how soon they come does.
@@ -165,6 +168,35 @@ impl Accel {
         traverse::search(level, self, ray, Closest::new(ray, All)).into_hit()
     }
 
+    /// [`Accel::closest`] among what the options leave. Of the crossings of a shape, each is asked by itself.
+    pub fn closest_with(&self, ray: &Ray, options: &QueryOptions) -> Option<Hit> {
+        self.closest_with_at(self.level, ray, options)
+    }
+
+    pub(crate) fn closest_with_at(&self, level: Level, ray: &Ray, options: &QueryOptions) -> Option<Hit> {
+        traverse::search(level, self, ray, Closest::new(ray, *options)).into_hit()
+    }
+
+    /// [`Accel::any`] among what the options leave.
+    pub fn any_with(&self, ray: &Ray, options: &QueryOptions) -> bool {
+        self.any_with_at(self.level, ray, options)
+    }
+
+    pub(crate) fn any_with_at(&self, level: Level, ray: &Ray, options: &QueryOptions) -> bool {
+        traverse::search(level, self, ray, Any::new(ray, *options)).is_hit
+    }
+
+    /// The tree with a mask for each of its geometries, by position, for [`QueryOptions::mask`]; without, all bits are set.
+    /// They are not saved with it, nor kept by a refit.
+    ///
+    /// # Panics
+    /// When there are not as many masks as geometries.
+    #[must_use]
+    pub fn with_masks(self, masks: Vec<u32>) -> Self {
+        assert_eq!(masks.len(), self.geometries.len(), "a mask for each geometry");
+        Self { masks, ..self }
+    }
+
     /// [`Accel::closest`] for every ray, with the same answers to the bit; `hits` has a place for each.
     ///
     /// Several rays are in flight at a time, so that this is faster than one after another, the more the larger the tree and
@@ -287,6 +319,7 @@ impl Accel {
             + bytes(&self.tree.names)
             + bytes(&self.tree.entries)
             + bytes(&self.infinite)
+            + bytes(&self.masks)
     }
 
     /// What the corners of a mesh are relative to.

@@ -12,6 +12,7 @@ mod holds;
 mod lanes;
 mod morton;
 mod node;
+mod options;
 mod prepare;
 mod primitive;
 mod query;
@@ -27,6 +28,7 @@ mod triangles;
 pub use accel::{Accel, BuildError, BuildOptions, Preset};
 pub use geometry::{CustomGeometry, Geometry, GeometryKind, Instance, TriangleMesh};
 pub use hit::{Hit, InstancePath};
+pub use options::{Faces, QueryOptions};
 pub use refit::RefitError;
 pub use save::LoadError;
 

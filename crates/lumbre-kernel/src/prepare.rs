@@ -56,6 +56,7 @@ pub(crate) fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result
         primitives: count,
         level,
         built_cost: None,
+        masks: Vec::new(),
         geometries,
     })
 }
@@ -71,6 +72,7 @@ pub(crate) fn empty_over(geometries: Vec<Geometry>) -> Accel {
         primitives: 0,
         level: Level::best(),
         built_cost: None,
+        masks: Vec::new(),
         geometries,
     }
 }

@@ -33,8 +33,15 @@ fn by_t(a: f64, b: f64) -> Ordering {
 pub(crate) trait Filter {
     /// Whether it takes everything, so that nothing has to be asked.
     const TAKES_ALL: bool;
+    /// Whether it wants to know which side is met.
+    const FACES: bool = false;
     /// Whether it takes this.
     fn takes(&mut self, found: &Found) -> bool;
+    /// Whether it takes anything in an instance.
+    #[inline(always)]
+    fn enters(&self, _accel: &Accel, _geometry: u32) -> bool {
+        true
+    }
 }
 
 /// Takes everything.
@@ -130,7 +137,13 @@ impl<'a, F> Closest<'a, F> {
 
 impl<'a, F: Filter> Search<'a> for Closest<'a, F> {
     const ASK: Ask = if F::TAKES_ALL { Ask::First } else { Ask::Every };
+    const FACES: bool = F::FACES;
     type Order = ByDistance;
+
+    #[inline(always)]
+    fn enters(&self, accel: &Accel, geometry: u32) -> bool {
+        self.filter.enters(accel, geometry)
+    }
 
     #[inline(always)]
     fn limit(&self) -> f64 {
@@ -185,7 +198,13 @@ impl<F> Any<F> {
 
 impl<'a, F: Filter> Search<'a> for Any<F> {
     const ASK: Ask = if F::TAKES_ALL { Ask::Whether } else { Ask::Every };
+    const FACES: bool = F::FACES;
     type Order = AsBuilt;
+
+    #[inline(always)]
+    fn enters(&self, accel: &Accel, geometry: u32) -> bool {
+        self.filter.enters(accel, geometry)
+    }
 
     #[inline(always)]
     fn limit(&self) -> f64 {

@@ -17,7 +17,7 @@ use crate::node::{BoxRay, tag};
 use crate::stack::{Order, Stack};
 use crate::touch::{self, AllTouches, Touch};
 use crate::triangles::{self, BLOCK, BlockRay, Inside, Meeting, Passage, Shear};
-use crate::{Accel, GeometryKind, InstancePath};
+use crate::{Accel, GeometryKind, InstancePath, options};
 
 /// What a search asks of a primitive that may be crossed more than once.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -36,8 +36,16 @@ pub(crate) enum Ask {
 pub(crate) trait Search<'a> {
     /// What it needs to know.
     const ASK: Ask;
+    /// Whether it wants to know which side of what is no triangle is met.
+    const FACES: bool = false;
     /// Which boxes are to come first.
     type Order: Order;
+
+    /// Whether it wants anything in an instance.
+    #[inline(always)]
+    fn enters(&self, _accel: &Accel, _geometry: u32) -> bool {
+        true
+    }
 
     /// The largest `t` that it still wants; never grows.
     fn limit(&self) -> f64;
@@ -65,7 +73,7 @@ pub(crate) struct Found<'a, 'p> {
     pub(crate) what: What,
     /// Which of the primitive's crossings.
     pub(crate) order: u32,
-    /// Whether the front of a triangle is met.
+    /// Whether the front is met; of what is no triangle, only where the search wants to know.
     pub(crate) is_front: bool,
     /// The tree that the geometry stands in.
     pub(crate) accel: &'a Accel,
@@ -404,6 +412,9 @@ impl<'a, S: Search<'a>> Task for AmongAll<'a, '_, S> {
                 }
                 tag::INSTANCE => {
                     let geometry = frame.accel.instance_entry(first).geometry;
+                    if !search.enters(frame.accel, geometry) {
+                        continue;
+                    }
                     let standing = &frame.accel.geometries[geometry as usize];
                     let GeometryKind::Instance(instance) = &standing.kind else {
                         unreachable!("the tag says so");
@@ -582,7 +593,11 @@ pub(crate) fn meet_primitive<'a, S: Search<'a>>(
     let mut offer = |root: Root, order: usize| {
         let order = order as u32;
         // Also keeps out a NaN.
-        ray.contains(root.t) && search.offer(&Found { root, what, order, is_front: false, accel, place })
+        if !ray.contains(root.t) {
+            return false;
+        }
+        let is_front = S::FACES && options::meets_front(accel, ray, what, &root);
+        search.offer(&Found { root, what, order, is_front, accel, place })
     };
     match S::ASK {
         Ask::Nothing => false,

@@ -3,6 +3,7 @@
 mod borders;
 mod boxes;
 mod build;
+mod options;
 mod oracle;
 mod refit;
 mod save;

@@ -1,0 +1,123 @@
+//! Options against a filter over all hits of the loop over everything.
+
+use std::sync::Arc;
+
+use lumbre_geometry::Ray;
+use lumbre_math::{DVec3, Transform};
+
+use super::scenes::{Random, build, cube, icosphere, mixture, ray};
+use crate::lanes::Level;
+use crate::{Accel, Faces, GeometryKind, Hit, Instance, QueryOptions, brute};
+
+const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
+
+/// The masks of what a hit is in, outermost first.
+fn masks(accel: &Accel, hit: &Hit) -> Vec<u32> {
+    let mut masks = Vec::new();
+    let mut accel = accel;
+    for &position in &hit.route {
+        masks.push(accel.masks.get(position as usize).copied().unwrap_or(u32::MAX));
+        let GeometryKind::Instance(instance) = &accel.geometries[position as usize].kind else { panic!() };
+        accel = &instance.accel;
+    }
+    masks.push(accel.masks.get(hit.geometry as usize).copied().unwrap_or(u32::MAX));
+    masks
+}
+
+fn counts(accel: &Accel, ray: &Ray, hit: &Hit, options: &QueryOptions) -> bool {
+    let is_front = accel.surface(ray, hit).normal.dot(ray.direction) < 0.0;
+    let is_face = match options.faces {
+        Faces::Both => true,
+        Faces::Front => is_front,
+        Faces::Back => !is_front,
+    };
+    let place = |hit: &Hit| (hit.route.clone(), hit.geometry, hit.primitive);
+    is_face
+        && options.exclude.is_none_or(|excluded| place(excluded) != place(hit))
+        && masks(accel, hit).iter().all(|mask| mask & options.mask != 0)
+}
+
+fn with_random_masks(accel: Accel, random: &mut Random) -> Accel {
+    let masks = accel.geometries.iter().map(|_| random.bits() as u32 & 0b111_0000).collect();
+    accel.with_masks(masks)
+}
+
+#[test]
+fn options_leave_what_a_filter_leaves() {
+    let mut random = Random(61);
+    let inner = mixture(&mut random, CENTER, 1.5, 0, false);
+    let inner = Arc::new(with_random_masks(inner, &mut random));
+    let outer = mixture(&mut random, CENTER, 3.0, 1, true);
+    let mut kinds: Vec<_> = outer.geometries.iter().map(|geometry| geometry.kind.clone()).collect();
+    for _ in 0..3 {
+        let place =
+            Transform::translate(random.vector()) * Transform::scale(DVec3::new(-1.1, 0.9, 1.2)).unwrap();
+        kinds.push(GeometryKind::Instance(Instance { accel: Arc::clone(&inner), world_from_object: place }));
+    }
+    let accel = with_random_masks(build(kinds), &mut random);
+    let (mut hits, mut fewer) = (0, 0);
+    for i in 0..3000 {
+        let ray = ray(&mut random, CENTER, 3.0);
+        let all = brute::every(&accel, &ray);
+        let options = QueryOptions {
+            mask: [u32::MAX, 0b001_0000, 0b110_0000][i % 3],
+            exclude: if i % 2 == 0 { all.first() } else { None },
+            faces: [Faces::Both, Faces::Front, Faces::Back][random.below(3)],
+        };
+        let expected = all.iter().find(|hit| counts(&accel, &ray, hit, &options)).cloned();
+        for level in Level::all() {
+            assert_eq!(
+                accel.closest_with_at(level, &ray, &options),
+                expected,
+                "{level:?} {ray:?} {options:?}"
+            );
+            assert_eq!(accel.any_with_at(level, &ray, &options), expected.is_some(), "{level:?} {ray:?}");
+        }
+        hits += usize::from(expected.is_some());
+        fewer += usize::from(expected.as_ref() != all.first());
+    }
+    assert!(hits > 600 && fewer > 600, "{hits} {fewer}");
+}
+
+#[test]
+fn a_closed_mesh_has_as_many_fronts_as_backs() {
+    let mut random = Random(62);
+    let ball = icosphere(3, CENTER, 1.2);
+    let accel = build(vec![GeometryKind::Mesh(Arc::new(ball)), GeometryKind::Mesh(Arc::new(cube()))]);
+    let mut hits = 0;
+    for _ in 0..2000 {
+        let outside = CENTER + 9.0 * random.vector().normalize();
+        let target = CENTER + 0.7 * random.vector();
+        let ray = Ray::new(outside, target - outside);
+        let nearest = |faces| accel.closest_with(&ray, &QueryOptions { faces, ..QueryOptions::default() });
+        let (both, front, back) = (nearest(Faces::Both), nearest(Faces::Front), nearest(Faces::Back));
+        // From without, a front comes first, and a back behind it.
+        assert_eq!(both, front);
+        assert!(back.is_some() == front.is_some());
+        if let (Some(front), Some(back)) = (front, back) {
+            assert!(front.root.t < back.root.t);
+            // The other way round, what was a back is a front.
+            let far = ray.at(back.root.t);
+            let return_ray = Ray::new(far, outside - far).with_range(-1e-9, 1.0);
+            let options = QueryOptions { faces: Faces::Front, ..QueryOptions::default() };
+            assert!(accel.any_with(&return_ray, &options));
+            hits += 1;
+        }
+    }
+    assert!(hits > 1000, "{hits}");
+}
+
+#[test]
+fn by_default_nothing_is_left_out() {
+    let mut random = Random(63);
+    let accel = mixture(&mut random, CENTER, 3.0, 1, false);
+    let mut hits = 0;
+    for _ in 0..1500 {
+        let ray = ray(&mut random, CENTER, 3.0);
+        let hit = accel.closest_with(&ray, &QueryOptions::default());
+        assert_eq!(hit, accel.closest(&ray));
+        assert_eq!(accel.any_with(&ray, &QueryOptions::default()), hit.is_some());
+        hits += usize::from(hit.is_some());
+    }
+    assert!(hits > 400, "{hits}");
+}
