@@ -116,7 +116,8 @@ impl Shear {
 /// all together by no more than 12 `error` / D: so far does this move z, per unit of the triangle's extent in z. Roundings move
 /// it by 7uL more, those of the corners' z by 2uL, and those of the extent by up to 8uL: `z_error` = 24uL has room for all.
 ///
-/// All this without overflow or underflow, so for 2⁻⁵⁰ ≤ L ≤ 2⁶⁰; else the test is left out.
+/// All this without overflow or underflow that matters, so for 2⁻⁵⁰ ≤ L ≤ 2⁶⁰; else the test is left out, and below 2⁻⁴⁰
+/// nothing is certain.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BlockRay {
     pub(crate) axes: Axes,
@@ -141,6 +142,9 @@ pub(crate) struct BlockRay {
 }
 
 impl BlockRay {
+    /// For L = 2⁻⁴⁰.
+    const LEAST_SURE_MARGIN: f64 = 6.0 / (1u128 << 64) as f64;
+
     /// `origin` has the order of the shear's axes.
     #[inline(always)]
     pub(crate) fn new(shear: &Shear, origin: &[f64; 3], largest_corner: f32) -> Self {
@@ -178,8 +182,8 @@ impl BlockRay {
     #[inline(always)]
     pub(crate) fn set_surely_in(&mut self, shear: &Shear, t_min: f64, t_max: f64) {
         let size = shear.direction_z.abs();
-        // Else a place in range may be none, for it is infinite.
-        if size > 1e-200 {
+        // Else a place in range may be none, for it is infinite, or the sum of edge functions may have no inverse.
+        if size > 1e-200 && self.z_margin > Self::LEAST_SURE_MARGIN {
             let (first, last) = (t_min * size + self.z_margin, t_max * size - self.z_margin);
             self.surely_in = [first as f32, last as f32];
         }

@@ -302,3 +302,19 @@ pub(crate) fn meet_boxes_at(level: Level, node: &Node, ray: &BoxRay) -> (u32, [i
     }
     level.run(Boxes(node, ray))
 }
+
+/// What [`Lanes::meet_triangles`] gives at a level, for tests.
+#[cfg(test)]
+pub(crate) fn meet_triangles_at(level: Level, block: &TriangleBlock, ray: &BlockRay) -> (u32, u32) {
+    struct Triangles<'a>(&'a TriangleBlock, &'a BlockRay);
+    impl Task for Triangles<'_> {
+        type Output = (u32, u32);
+        #[inline(always)]
+        fn run<L: Lanes>(self) -> Self::Output {
+            let (mask, sure) = L::meet_triangles::<true>(self.0, self.1);
+            assert_eq!(L::meet_triangles::<false>(self.0, self.1), (mask, 0));
+            (mask, sure)
+        }
+    }
+    level.run(Triangles(block, ray))
+}

@@ -111,9 +111,10 @@ impl Lanes for Portable {
             mask |= 1 << lane;
             if SURE && (least > 2.0 * error || most < -2.0 * error) {
                 let inverse = 1.0 / (u + v + w);
-                let height = (u * a + v * b + w * c) * inverse;
+                // Shares first: their products with lengths do not underflow.
+                let height = (u * inverse) * a + (v * inverse) * b + (w * inverse) * c;
                 let ahead = if ray.is_backward { -height } else { height };
-                let spread = (high - low) * (error * 12.5) * inverse.abs() + ray.z_error;
+                let spread = ((error * 12.5) * inverse.abs()) * (high - low) + ray.z_error;
                 let (from, to) = (ahead - spread, ahead + spread);
                 if ray.surely_in[0] <= from && to <= ray.surely_in[1] {
                     sure |= 1 << lane;

@@ -326,13 +326,15 @@ impl<const AVX512: bool> Lanes for X86<AVX512> {
             }
             let sign = _mm256_set1_ps(-0.0);
             let inverse = _mm256_div_ps(_mm256_set1_ps(1.0), _mm256_add_ps(_mm256_add_ps(u, v), w));
-            let height = _mm256_fmadd_ps(u, z[0], _mm256_fmadd_ps(v, z[1], _mm256_mul_ps(w, z[2])));
+            // Shares first: their products with lengths do not underflow.
+            let of_c = _mm256_mul_ps(_mm256_mul_ps(w, inverse), z[2]);
+            let of_b_and_c = _mm256_fmadd_ps(_mm256_mul_ps(v, inverse), z[1], of_c);
+            let height = _mm256_fmadd_ps(_mm256_mul_ps(u, inverse), z[0], of_b_and_c);
             let backward = _mm256_set1_ps(if ray.is_backward { -0.0 } else { 0.0 });
-            let ahead = _mm256_xor_ps(_mm256_mul_ps(height, inverse), backward);
-            let spread = _mm256_mul_ps(
-                _mm256_mul_ps(_mm256_sub_ps(high, low), _mm256_mul_ps(error, _mm256_set1_ps(12.5))),
-                _mm256_andnot_ps(sign, inverse),
-            );
+            let ahead = _mm256_xor_ps(height, backward);
+            let share =
+                _mm256_mul_ps(_mm256_mul_ps(error, _mm256_set1_ps(12.5)), _mm256_andnot_ps(sign, inverse));
+            let spread = _mm256_mul_ps(share, _mm256_sub_ps(high, low));
             let spread = _mm256_add_ps(spread, _mm256_set1_ps(ray.z_error));
             let (from, to) = (_mm256_sub_ps(ahead, spread), _mm256_add_ps(ahead, spread));
             let twice = _mm256_add_ps(error, error);
