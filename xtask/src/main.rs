@@ -1,5 +1,7 @@
 //! What the project runs on itself: `cargo xtask test`, `cargo xtask scenes`, `cargo xtask bench …`.
 
+use std::path::PathBuf;
+
 use anyhow::Result;
 use clap::{Parser, Subcommand};
 
@@ -7,6 +9,7 @@ mod agree;
 mod assets;
 mod bench;
 mod command;
+mod contact;
 mod field;
 mod pictures;
 mod suite;
@@ -30,6 +33,20 @@ enum Task {
     },
     /// Writes the meshes, textures and environments that scenes/ are made of.
     Assets,
+    /// Renders every glTF below a folder, small, and joins the pictures with their names to one PNG.
+    Contact {
+        /// The folder; by default that of the sample models, where it lies beside the workspace.
+        folder: Option<PathBuf>,
+        /// The sheet; by default docs/gltf-models.png.
+        #[arg(short, long)]
+        output: Option<PathBuf>,
+        /// Pictures in a row.
+        #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=100))]
+        columns: u32,
+        /// Samples a pixel.
+        #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
+        spp: u32,
+    },
     /// Prints the field of exact shapes of scenes/field as a pbrt scene.
     Field,
     /// Compares a picture with a reference of the same scene: means, and each pixel by its noise.
@@ -44,6 +61,9 @@ fn main() -> Result<()> {
         Task::Test => suite::run(),
         Task::Scenes { filter } => pictures::render_all(filter.as_deref()),
         Task::Assets => assets::write(),
+        Task::Contact { folder, output, columns, spp } => {
+            contact::sheet(folder.as_deref(), output.as_deref(), columns, spp)
+        }
         Task::Field => {
             print!("{}", field::scene());
             Ok(())

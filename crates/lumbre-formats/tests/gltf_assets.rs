@@ -3,6 +3,7 @@
 mod common;
 
 use std::path::Path;
+use std::time::{Duration, Instant};
 
 use common::{files_below, shared};
 use lumbre_formats::gltf::{GltfOptions, open_gltf};
@@ -38,6 +39,43 @@ fn every_valid_asset_reads_and_builds() {
     }
     assert!(failures.is_empty(), "{} of {count}:\n{}", failures.len(), failures.join("\n"));
     assert!(count > 40, "{count}");
+}
+
+/// What reading may cost: 64 MiB and 32 times the size of the files.
+fn bounded(path: &Path) -> (Result<SceneDesc, String>, Duration, f64) {
+    // Buffers and images lie beside the file.
+    let beside = std::fs::read_dir(path.parent().unwrap()).unwrap();
+    let size: u64 = beside.map(|entry| entry.unwrap().metadata().unwrap().len()).sum();
+    let budget = Budget::default();
+    let start = Instant::now();
+    let scene = open_gltf(path, &GltfOptions::default(), &budget, &mut Diagnostics::new());
+    let share = budget.memory_peak() as f64 / ((64 << 20) + 32 * size) as f64;
+    (scene.map_err(|e| e.to_string()), start.elapsed(), share)
+}
+
+#[test]
+fn malformed_files_are_refused_at_their_place_and_cost_little() {
+    let Some(folder) = shared("gltf/gltf-validator") else { return };
+    let (mut refused, mut longest, mut largest) = (0, Duration::ZERO, 0.0_f64);
+    for path in files_below(&folder, &[".gltf", ".glb"]) {
+        let (read, time, share) = bounded(&path);
+        // A guard against loops, not a measurement: machines that test may be busy.
+        assert!(time < Duration::from_secs(10), "{}: {time:?}", path.display());
+        assert!(share <= 1.0, "{}: {share} of what it may cost", path.display());
+        (longest, largest) = (longest.max(time), largest.max(share));
+        let Err(message) = read else { continue };
+        refused += 1;
+        let said = message.strip_prefix(&*path.display().to_string()).unwrap_or(&message);
+        // Line and column or the byte, and the pointer but for what is wrong with the JSON itself or the whole of it.
+        let has_place = said.starts_with(":byte ")
+            || said.split(':').nth(1).is_some_and(|line| line.bytes().all(|b| b.is_ascii_digit()));
+        let is_of_whole =
+            ["JSON", "GLB", "missing", "empty file", "type (found", "UTF-8"].iter().any(|w| said.contains(w));
+        assert!(has_place || said.contains("empty file") || said.contains("GLB"), "{message}");
+        assert!(said.contains(" /") || is_of_whole, "{message}");
+    }
+    println!("{refused} refused, in {longest:?} and {largest:.3} of the memory at most");
+    assert!(refused > 60, "{refused}");
 }
 
 #[test]
