@@ -259,7 +259,7 @@ impl Builder {
 
         // The entry of the triangles comes first, if there are any; its light knows the area of all of them.
         let first = self.entries.len() as u32;
-        let light = MeshLight::new(first, &mesh);
+        let light = area_light.as_ref().and_then(|_| MeshLight::new(first, &mesh));
         let emission = area_light.map(|light_desc| {
             let triangles = light.as_ref().map_or(0.0, |(_, area)| *area);
             emission(light_desc, || triangles + patches.iter().map(PlacedShape::area).sum::<f64>())

@@ -1,5 +1,8 @@
 //! The points that a description spans, before anything is built of it.
 
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::rc::Rc;
 use std::sync::Arc;
 
 use lumbre_geometry::Aabb;
@@ -18,6 +21,29 @@ pub(crate) struct Extent<'d> {
     desc: &'d SceneDesc,
     /// For each object.
     outlines: Vec<Vec<DVec3>>,
+    used: Used,
+}
+
+/// Which vertices the faces of a mesh use, for meshes of which that is not all: files share one list of vertices among
+/// meshes.
+#[derive(Default)]
+struct Used(RefCell<HashMap<*const MeshDesc, Option<Rc<Vec<bool>>>>>);
+
+impl Used {
+    fn of(&self, mesh: &Arc<MeshDesc>) -> Option<Rc<Vec<bool>>> {
+        let mut known = self.0.borrow_mut();
+        let used = known.entry(Arc::as_ptr(mesh)).or_insert_with(|| {
+            let mut is_used = vec![false; mesh.positions.len()];
+            let triangles = mesh.triangles.iter().flatten();
+            for &corner in triangles.chain(mesh.quads.iter().flatten()) {
+                if let Some(used) = is_used.get_mut(corner as usize) {
+                    *used = true;
+                }
+            }
+            is_used.contains(&false).then(|| Rc::new(is_used))
+        });
+        used.clone()
+    }
 }
 
 impl<'d> Extent<'d> {
@@ -25,14 +51,15 @@ impl<'d> Extent<'d> {
         // Objects that hold each other make no scene; that is said when it is built.
         let order = inside_out(&desc.objects).unwrap_or_default();
         let mut outlines = vec![Vec::new(); desc.objects.len()];
+        let used = Used::default();
         for object in order {
-            outlines[object] = outline(&desc.objects[object], &outlines);
+            outlines[object] = outline(&desc.objects[object], &outlines, &used);
         }
-        Self { desc, outlines }
+        Self { desc, outlines, used }
     }
 
     pub fn each_point(&self, visit: &mut dyn FnMut(DVec3)) {
-        self.desc.shapes.iter().for_each(|shape| each_point_of(shape, visit));
+        self.desc.shapes.iter().for_each(|shape| each_point_of(shape, &self.used, visit));
         for instance in &self.desc.instances {
             let outline = self.outlines.get(instance.object.0 as usize).map_or(&[][..], Vec::as_slice);
             outline.iter().for_each(|&p| visit(instance.world_from_object.point(p)));
@@ -46,9 +73,9 @@ impl<'d> Extent<'d> {
     }
 }
 
-fn outline(object: &ObjectDesc, outlines: &[Vec<DVec3>]) -> Vec<DVec3> {
+fn outline(object: &ObjectDesc, outlines: &[Vec<DVec3>], used: &Used) -> Vec<DVec3> {
     let mut points = Vec::new();
-    object.shapes.iter().for_each(|shape| each_point_of(shape, &mut |p| points.push(p)));
+    object.shapes.iter().for_each(|shape| each_point_of(shape, used, &mut |p| points.push(p)));
     for instance in &object.instances {
         let inner = outlines.get(instance.object.0 as usize).map_or(&[][..], Vec::as_slice);
         points.extend(inner.iter().map(|&p| instance.world_from_object.point(p)));
@@ -71,7 +98,7 @@ fn directions() -> impl Iterator<Item = DVec3> {
     })
 }
 
-fn each_point_of(shape: &ShapeDesc, visit: &mut dyn FnMut(DVec3)) {
+fn each_point_of(shape: &ShapeDesc, used: &Used, visit: &mut dyn FnMut(DVec3)) {
     // Combinations hold shapes, which may be combinations.
     let mut open: Vec<(&ShapeDesc, Transform)> = vec![(shape, Transform::IDENTITY)];
     while let Some((shape, outer)) = open.pop() {
@@ -83,7 +110,7 @@ fn each_point_of(shape: &ShapeDesc, visit: &mut dyn FnMut(DVec3)) {
                 }
             }
             GeometryDesc::Mesh(mesh) | GeometryDesc::BilinearMesh(mesh) => {
-                each_vertex(mesh, &mut |p| visit(placement.point(p)));
+                each_vertex(mesh, used, &mut |p| visit(placement.point(p)));
             }
             GeometryDesc::Csg(csg) => {
                 open.extend(csg.operands.iter().flatten().map(|operand| (operand, placement)));
@@ -92,18 +119,14 @@ fn each_point_of(shape: &ShapeDesc, visit: &mut dyn FnMut(DVec3)) {
     }
 }
 
-/// Every vertex that a face uses: files share one list of vertices among meshes.
-fn each_vertex(mesh: &Arc<MeshDesc>, visit: &mut dyn FnMut(DVec3)) {
-    let mut is_used = vec![false; mesh.positions.len()];
-    let faces =
-        mesh.triangles.iter().map(<[u32; 3]>::as_slice).chain(mesh.quads.iter().map(<[u32; 4]>::as_slice));
-    for &corner in faces.flatten() {
-        if let Some(used) = is_used.get_mut(corner as usize) {
-            *used = true;
+/// Every finite vertex that a face uses.
+fn each_vertex(mesh: &Arc<MeshDesc>, used: &Used, visit: &mut dyn FnMut(DVec3)) {
+    let used = used.of(mesh);
+    for (i, p) in mesh.positions.iter().enumerate() {
+        if p.is_finite() && used.as_ref().is_none_or(|used| used[i]) {
+            visit(p.as_dvec3());
         }
     }
-    let used = mesh.positions.iter().zip(is_used).filter(|(p, used)| *used && p.is_finite());
-    used.for_each(|(p, _)| visit(p.as_dvec3()));
 }
 
 pub(crate) fn corners(bounds: &Aabb) -> impl Iterator<Item = DVec3> + use<> {
