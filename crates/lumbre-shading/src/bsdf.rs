@@ -38,7 +38,7 @@ pub struct BsdfSample {
 /// Which conserve energy: [`Diffuse`] of reflectance 1, [`DiffuseTransmission`] whose shares sum to 1, a smooth
 /// [`Dielectric`] (counting η²), [`ThinDielectric`], and a smooth [`Conductor`] of reflectance 1. Rough metal and glass
 /// count single scattering between facets only, and lose some; [`Principled`] gives it back.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Bsdf {
     /// Lambert.
     Diffuse(Diffuse),
@@ -54,8 +54,8 @@ pub enum Bsdf {
     CoatedDiffuse(CoatedDiffuse),
     /// Metal under varnish.
     CoatedConductor(CoatedConductor),
-    /// Layers of all these.
-    Principled(Principled),
+    /// Layers of all these; boxed, for all others are a quarter of its size, and copied often.
+    Principled(Box<Principled>),
 }
 
 impl Bsdf {
@@ -133,7 +133,7 @@ impl Bsdf {
     #[must_use]
     pub fn immersed(self, outside: f32) -> Self {
         match self {
-            Self::Principled(bsdf) => Self::Principled(bsdf.immersed(outside)),
+            Self::Principled(bsdf) => Self::Principled(Box::new(bsdf.immersed(outside))),
             other => other,
         }
     }
@@ -156,7 +156,7 @@ impl Bsdf {
             Self::CoatedConductor(bsdf) => {
                 Self::CoatedConductor(CoatedConductor { base: metal(bsdf.base), coat: coated(bsdf.coat) })
             }
-            Self::Principled(bsdf) => Self::Principled(bsdf.regularized()),
+            Self::Principled(bsdf) => Self::Principled(Box::new(bsdf.regularized())),
         }
     }
 }

@@ -61,9 +61,9 @@ impl ShadingFrame {
         let across = tangent - n * n.dot(tangent);
         // Below a sine of 2⁻¹⁰ the direction that is left is mostly rounding.
         if across.length_squared() > 1e-6 * tangent.length_squared() && across.is_finite() {
-            // Once more: the first subtraction leaves rounding along n.
+            // Once more: the first subtraction leaves rounding along n, too little to change the length.
             let s = across.normalize();
-            let s = (s - n * n.dot(s)).normalize();
+            let s = s - n * n.dot(s);
             return Self { s, t: n.cross(s), n };
         }
         let (s, t) = orthonormal_basis_f32(n);

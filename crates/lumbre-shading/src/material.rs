@@ -459,7 +459,7 @@ impl Material {
                     transmittance: albedo(transmittance.evaluate(at) * *scale),
                 })
             }
-            MaterialKind::Principled(params) => Bsdf::Principled(params.bsdf(at)),
+            MaterialKind::Principled(params) => Bsdf::Principled(Box::new(params.bsdf(at))),
             MaterialKind::Mix { .. } | MaterialKind::Interface => return None,
         };
         Some(bsdf)

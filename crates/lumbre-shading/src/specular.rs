@@ -61,6 +61,7 @@ mod tests {
             samples: 1,
         };
         let base = Diffuse { reflectance: Spectrum::new(0.7, 0.5, 0.3) };
+        let layered = |bsdf| Bsdf::Principled(Box::new(bsdf));
         let bsdfs = [
             (Bsdf::Diffuse(base), 0),
             (Bsdf::Conductor(metal(smooth)), 1),
@@ -74,8 +75,8 @@ mod tests {
             (Bsdf::CoatedConductor(CoatedConductor { base: metal(smooth), coat: coat(smooth, 0.4) }), 1),
             (Bsdf::CoatedConductor(CoatedConductor { base: metal(rough), coat: coat(smooth, 0.0) }), 1),
             (Bsdf::CoatedConductor(CoatedConductor { base: metal(smooth), coat: coat(rough, 0.0) }), 0),
-            (Bsdf::Principled(Principled { transmission: 0.6, facets: smooth, ..Principled::DEFAULT }), 2),
-            (Bsdf::Principled(Principled { metallic: 0.5, facets: rough, ..Principled::DEFAULT }), 0),
+            (layered(Principled { transmission: 0.6, facets: smooth, ..Principled::DEFAULT }), 2),
+            (layered(Principled { metallic: 0.5, facets: rough, ..Principled::DEFAULT }), 0),
         ];
         const LOBES: u32 = 4096;
         for (bsdf, parts) in bsdfs {

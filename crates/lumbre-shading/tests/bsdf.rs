@@ -196,7 +196,7 @@ fn all() -> Vec<(String, Bsdf)> {
         }
     }
     for (name, bsdf) in principled().into_iter().chain([("leaning coat", leaning())]) {
-        list.push((format!("principled {name}"), Bsdf::Principled(bsdf)));
+        list.push((format!("principled {name}"), Bsdf::Principled(Box::new(bsdf))));
     }
     list
 }
@@ -442,12 +442,12 @@ fn light_goes_back_the_way_it_came() {
     let mut random = RandomStream::new(17);
     let mut count = 0;
     for (name, bsdf) in all() {
-        let eta = match bsdf {
+        let eta = match &bsdf {
             Bsdf::CoatedDiffuse(_) | Bsdf::CoatedConductor(_) => continue,
             // A coat with a normal of its own counts cosines about that.
-            Bsdf::Principled(bsdf) if bsdf == leaning() => continue,
+            Bsdf::Principled(bsdf) if **bsdf == leaning() => continue,
             // Each lane of a prism has an index of its own.
-            Bsdf::Principled(bsdf) if spread(&bsdf) > 0.0 => continue,
+            Bsdf::Principled(bsdf) if spread(bsdf) > 0.0 => continue,
             Bsdf::Dielectric(glass) => glass.eta,
             Bsdf::Principled(bsdf) if bsdf.transmission > 0.0 && bsdf.body != Body::Thin => bsdf.eta,
             _ => 1.0,
@@ -535,7 +535,7 @@ fn furnace(bsdf: &Bsdf, wo: LocalDir, samples: u32, seed: u64) -> f64 {
 /// The same with one sample in each cell of a grid of random numbers, which errs less, and four and a half times the
 /// standard error that independent samples would have.
 fn even_furnace(bsdf: &Principled, wo: LocalDir, [lobes, side]: [u32; 2]) -> (f64, f64) {
-    let bsdf = Bsdf::Principled(*bsdf);
+    let bsdf = Bsdf::Principled(Box::new(*bsdf));
     let mut random = RandomStream::new(31);
     let (mut sum, mut squares) = ([0.0; 3], 0.0);
     for i in 0..lobes * side * side {
@@ -632,8 +632,8 @@ fn no_surface_makes_light() {
                 _ => (furnace(&bsdf, wo, 100_000, v as u64), 0.0),
             };
             // A sample has one index for all lanes.
-            let lanes = match bsdf {
-                Bsdf::Principled(bsdf) => f64::from(1.0 + spread(&bsdf)).powi(2),
+            let lanes = match &bsdf {
+                Bsdf::Principled(bsdf) => f64::from(1.0 + spread(bsdf)).powi(2),
                 _ => 1.0,
             };
             assert!(share <= (1.002 + error) * lanes, "{name} from {:?}: {share} ± {error}", wo.vec());
@@ -798,8 +798,8 @@ fn plain_principled_glass_and_panes_are_the_plain_kinds() {
     };
     let pane = Principled { body: Body::Thin, ..solid };
     let pairs = [
-        (Bsdf::Principled(solid), glass(GLASS, (0.0, 0.0))),
-        (Bsdf::Principled(pane), Bsdf::ThinDielectric(ThinDielectric { eta: GLASS })),
+        (Bsdf::Principled(Box::new(solid)), glass(GLASS, (0.0, 0.0))),
+        (Bsdf::Principled(Box::new(pane)), Bsdf::ThinDielectric(ThinDielectric { eta: GLASS })),
     ];
     let (mut random, mut count) = (RandomStream::new(8), 0);
     for (ours, plain) in pairs {
@@ -826,12 +826,12 @@ fn plain_principled_glass_and_panes_are_the_plain_kinds() {
 
 #[test]
 fn a_prism_bends_blue_more_than_red() {
-    let prism = Bsdf::Principled(Principled {
+    let prism = Bsdf::Principled(Box::new(Principled {
         facets: Microfacets::SMOOTH,
         transmission: 1.0,
         body: Body::Solid { spread: 0.1 },
         ..Principled::DEFAULT
-    });
+    }));
     let wo = local(Vec3::new(0.6, 0.0, 0.8));
     let (mut random, mut seen) = (RandomStream::new(9), [0; 3]);
     for _ in 0..3_000 {
