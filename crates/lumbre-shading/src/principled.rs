@@ -26,10 +26,11 @@ use crate::{BsdfSample, LocalDir, Scatter, Spectrum, fresnel};
 /// - The clear dielectric refracts ([`Body::Solid`]) or lets light straight on ([`Body::Thin`]).
 /// - What bounces more than once between the facets of metal and clear dielectrics is given back in the manner of Kulla,
 ///   Conty, "Revisiting Physically Based Shading at Imageworks", SIGGRAPH course 2017. White metal loses nothing.
-/// - A layer takes from what lies under it the larger of what it reflects along either direction, as glTF's
-///   KHR_materials_sheen does: that is reciprocal, makes no light, and loses the little that the layer throws back down.
+/// - Fibres take from what lies under them the larger of what they reflect along either direction, as glTF's
+///   KHR_materials_sheen does: that is reciprocal, makes no light, and loses the little that they throw back down.
+/// - A coat takes what it reflects towards the viewer, as glTF's KHR_materials_clearcoat does: white under a coat stays white.
 ///
-/// It is reciprocal (radiance in a solid body counted by η²) except where the coat has a normal of its own. Opaque and thin
+/// It is reciprocal (radiance in a solid body counted by η²) except under a coat. Opaque and thin
 /// surfaces look the same from both sides; a solid one has its fibres and coat on the outside only.
 ///
 /// Stretched facets have a table of what they reflect; what a dielectric's reflect and let through is that of isotropic facets
@@ -374,9 +375,17 @@ impl Principled {
         if self.sheen.is_none() { 1.0 } else { one(wo).min(one(wi)) }
     }
 
+    /// By what it reflects towards `wo`, or where that is inside a solid, towards `wi`.
     fn passes_coat(&self, wo: LocalDir, wi: LocalDir) -> f32 {
-        let one = |w| if self.covered(w) { 1.0 - self.coat.share(w) } else { 1.0 };
-        if self.coat.weight == 0.0 { 1.0 } else { one(wo).min(one(wi)) }
+        if self.coat.weight == 0.0 {
+            1.0
+        } else if self.covered(wo) {
+            1.0 - self.coat.share(wo)
+        } else if self.covered(wi) {
+            1.0 - self.coat.share(wi)
+        } else {
+            1.0
+        }
     }
 
     // Fresnel terms.
