@@ -17,6 +17,8 @@ use crate::reinsert::reinsert;
 
 /// Levels that may be split by SAH; then come at most 32 more, each halving.
 const SAH_DEPTH: u32 = 64;
+/// So many a fast build splits by SAH: leaves then are a tenth fuller, and nodes fewer, for a twentieth of its time.
+const FAST_FEW: usize = 48;
 /// From how many primitives on two threads share the work.
 const PARALLEL: usize = 4096;
 /// How many primitives a thread takes at a time in a node that is shared.
@@ -252,8 +254,8 @@ impl Builder<'_> {
 
     fn twig_sorted<const COSTS: bool>(&self, range: Range, codes: &[Code], work: &mut Workplace) -> Bounds {
         let count = range.len();
-        if count <= FEW {
-            return self.few::<COSTS>(range, work);
+        if count <= FAST_FEW {
+            return self.twig::<COSTS>(range, None, work);
         }
         let Some(middle) = morton::cut(codes) else { return self.twig::<COSTS>(range, None, work) };
         let place = work.nodes.len();
