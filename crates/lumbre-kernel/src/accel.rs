@@ -165,7 +165,9 @@ impl Accel {
 
     #[inline(always)]
     pub(crate) fn closest_at(&self, level: Level, ray: &Ray) -> Option<Hit> {
-        traverse::search(level, self, ray, Closest::new(ray, All)).into_hit()
+        let mut search = Closest::new(ray, All);
+        traverse::search(level, self, ray, &mut search);
+        search.take_hit()
     }
 
     /// [`Accel::closest`] among what the options leave. Of the crossings of a shape, each is asked by itself.
@@ -174,7 +176,9 @@ impl Accel {
     }
 
     pub(crate) fn closest_with_at(&self, level: Level, ray: &Ray, options: &QueryOptions) -> Option<Hit> {
-        traverse::search(level, self, ray, Closest::new(ray, *options)).into_hit()
+        let mut search = Closest::new(ray, *options);
+        traverse::search(level, self, ray, &mut search);
+        search.take_hit()
     }
 
     /// [`Accel::any`] among what the options leave.
@@ -183,7 +187,9 @@ impl Accel {
     }
 
     pub(crate) fn any_with_at(&self, level: Level, ray: &Ray, options: &QueryOptions) -> bool {
-        traverse::search(level, self, ray, Any::new(ray, *options)).is_hit
+        let mut search = Any::new(ray, *options);
+        traverse::search(level, self, ray, &mut search);
+        search.is_hit
     }
 
     /// The tree with a mask for each of its geometries, by position, for [`QueryOptions::mask`]; without, all bits are set.
@@ -212,7 +218,7 @@ impl Accel {
     pub(crate) fn closest_batch_at(&self, level: Level, rays: &[Ray], hits: &mut [Option<Hit>]) {
         assert_eq!(rays.len(), hits.len(), "a place for the hit of every ray");
         let begin = |ray: &Ray| Closest::new(ray, All);
-        batch::search_all(level, self, rays, begin, |i, search| hits[i] = search.into_hit());
+        batch::search_all(level, self, rays, begin, |i, search| hits[i] = search.take_hit());
     }
 
     /// [`Accel::any`] for every ray: see [`Accel::closest_batch`].
@@ -232,7 +238,9 @@ impl Accel {
     /// The nearest hit that `accept` takes; it may be asked in any order of `t`, and its answer must depend on the hit
     /// alone.
     pub fn closest_filtered(&self, ray: &Ray, accept: impl FnMut(&Hit) -> bool) -> Option<Hit> {
-        traverse::search(self.level, self, ray, Closest::new(ray, If(accept))).into_hit()
+        let mut search = Closest::new(ray, If(accept));
+        traverse::search(self.level, self, ray, &mut search);
+        search.take_hit()
     }
 
     /// Whether anything is hit in the ray's range.
@@ -242,12 +250,16 @@ impl Accel {
 
     #[inline(always)]
     pub(crate) fn any_at(&self, level: Level, ray: &Ray) -> bool {
-        traverse::search(level, self, ray, Any::new(ray, All)).is_hit
+        let mut search = Any::new(ray, All);
+        traverse::search(level, self, ray, &mut search);
+        search.is_hit
     }
 
     /// Whether anything that `accept` takes is hit in the ray's range.
     pub fn any_filtered(&self, ray: &Ray, accept: impl FnMut(&Hit) -> bool) -> bool {
-        traverse::search(self.level, self, ray, Any::new(ray, If(accept))).is_hit
+        let mut search = Any::new(ray, If(accept));
+        traverse::search(self.level, self, ray, &mut search);
+        search.is_hit
     }
 
     /// Every hit in the ray's range in ascending order of `t` (ties by path, geometry, primitive), until `visit` breaks.
@@ -262,7 +274,8 @@ impl Accel {
         let mut size = 32;
         let mut last = None;
         loop {
-            let search = traverse::search(level, self, ray, Batch::new(ray, size, last.as_ref()));
+            let mut search = Batch::new(ray, size, last.as_ref());
+            traverse::search(level, self, ray, &mut search);
             let (mut hits, may_go_on) = search.into_hits();
             if hits.iter().any(|ranked| visit(&ranked.hit).is_break()) || !may_go_on {
                 return;
@@ -278,7 +291,9 @@ impl Accel {
     }
 
     pub(crate) fn count_at(&self, level: Level, ray: &Ray) -> usize {
-        traverse::search(level, self, ray, Count::new(ray)).hits
+        let mut search = Count::new(ray);
+        traverse::search(level, self, ray, &mut search);
+        search.hits
     }
 
     /// The surface at a hit of this tree, in the space of this tree. For triangles `uv` are the barycentrics (b1, b2).

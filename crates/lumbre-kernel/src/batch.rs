@@ -20,13 +20,15 @@ pub(crate) fn search_all<'a, S: Search<'a>>(
     accel: &'a Accel,
     rays: &[Ray],
     begin: impl Fn(&Ray) -> S,
-    mut end: impl FnMut(usize, S),
+    mut end: impl FnMut(usize, &mut S),
 ) {
     if accel.holds.only_triangles {
         level.run(Flights { level, accel, rays, begin, end });
     } else {
         for (position, ray) in rays.iter().enumerate() {
-            end(position, traverse::search(level, accel, ray, begin(ray)));
+            let mut search = begin(ray);
+            traverse::search(level, accel, ray, &mut search);
+            end(position, &mut search);
         }
     }
 }
@@ -54,7 +56,7 @@ impl<'a, S, B, E> Task for Flights<'a, '_, B, E>
 where
     S: Search<'a>,
     B: Fn(&Ray) -> S,
-    E: FnMut(usize, S),
+    E: FnMut(usize, &mut S),
 {
     type Output = ();
 
@@ -65,20 +67,20 @@ where
         let mut waiting = rays.iter().enumerate();
         let mut flights: Vec<Flight<S, L>> = Vec::with_capacity(IN_FLIGHT);
         let Some(root) = accel.tree.root else {
-            waiting.for_each(|(position, ray)| end(position, begin(ray)));
+            waiting.for_each(|(position, ray)| end(position, &mut begin(ray)));
             return;
         };
         // As many as there is room for; those that pass the tree by end at once.
         while flights.len() < IN_FLIGHT
             && let Some((position, ray)) = waiting.next()
         {
-            let search = begin(ray);
+            let mut search = begin(ray);
             match Frame::start(accel, ray, &search) {
                 Some(frame) => {
                     let (touches, stack) = (Vec::new(), Stack::new());
                     flights.push(Flight { position, reference: root, frame, search, touches, stack });
                 }
-                None => end(position, search),
+                None => end(position, &mut search),
             }
         }
         // Those that are under way stand first.
@@ -105,7 +107,8 @@ where
                 *reference = root;
                 let next = loop {
                     let Some((next, ray)) = waiting.next() else { break None };
-                    end(std::mem::replace(position, next), std::mem::replace(search, begin(ray)));
+                    end(*position, search);
+                    (*position, *search) = (next, begin(ray));
                     if frame.restart(ray, search) {
                         break Some(next);
                     }
@@ -116,6 +119,6 @@ where
                 }
             }
         }
-        flights.into_iter().for_each(|flight| end(flight.position, flight.search));
+        flights.iter_mut().for_each(|flight| end(flight.position, &mut flight.search));
     }
 }

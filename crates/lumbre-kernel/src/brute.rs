@@ -11,7 +11,7 @@ use crate::{Accel, GeometryKind, Hit};
 pub(crate) fn closest(accel: &Accel, ray: &Ray) -> Option<Hit> {
     let mut search = Closest::new(ray, All);
     visit(accel, ray, &mut search);
-    search.into_hit()
+    search.take_hit()
 }
 
 pub(crate) fn every(accel: &Accel, ray: &Ray) -> Vec<Hit> {

@@ -8,20 +8,21 @@ use lumbre_geometry::{Ray, Root};
 use crate::stack::{AsBuilt, ByDistance};
 use crate::traverse::{Ask, Found, Place, Search, What};
 use crate::triangles::Inside;
-use crate::{Accel, Hit};
+use crate::{Accel, Hit, InstancePath};
 
 impl Found<'_, '_> {
     #[inline]
     fn to_hit(&self) -> Hit {
-        to_hit(self.root, self.what, self.accel, self.place.is_within().then(|| self.place.clone()))
+        let (geometry, primitive) = self.what.names(self.accel);
+        Hit {
+            root: self.root,
+            id: self.accel.geometries[geometry as usize].id,
+            primitive,
+            geometry,
+            instances: self.place.ids.clone(),
+            route: self.place.route.clone(),
+        }
     }
-}
-
-#[inline(always)]
-fn to_hit(root: Root, what: What, accel: &Accel, place: Option<Place>) -> Hit {
-    let (geometry, primitive) = what.names(accel);
-    let Place { route, ids } = place.unwrap_or_default();
-    Hit { root, id: accel.geometries[geometry as usize].id, primitive, geometry, instances: ids, route }
 }
 
 // No NaN comes this far, and the two zeros are one place.
@@ -94,14 +95,22 @@ impl<'a, F> Closest<'a, F> {
         Self { best: None, place: None, limit: ray.t_max, floor: ray.t_min, filter }
     }
 
+    // Field by field: a whole that was written in parts is slow to be read at once.
     #[inline(always)]
-    pub(crate) fn into_hit(self) -> Option<Hit> {
-        let Best { crossing, what, accel } = self.best?;
+    pub(crate) fn take_hit(&mut self) -> Option<Hit> {
+        let Best { crossing, what, accel } = self.best.as_ref()?;
         let root = match crossing {
             Crossing::Inside(inside) => inside.root(self.limit),
-            Crossing::Root(root) => root,
+            Crossing::Root(root) => *root,
         };
-        Some(to_hit(root, what, accel, self.place))
+        let (geometry, primitive) = what.names(accel);
+        let id = accel.geometries[geometry as usize].id;
+        let mut hit =
+            Hit { root, id, primitive, geometry, instances: InstancePath::new(), route: InstancePath::new() };
+        if let Some(place) = self.place.take() {
+            (hit.instances, hit.route) = (place.ids, place.route);
+        }
+        Some(hit)
     }
 
     /// Whether a crossing at the same `t` comes first in the lists.

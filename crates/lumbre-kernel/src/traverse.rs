@@ -128,19 +128,18 @@ pub(crate) fn is_sound(ray: &Ray) -> bool {
         && ray.t_min <= ray.t_max
 }
 
-/// Runs `search` along `ray`, and answers it with what it has found.
+/// Runs `search` along `ray`, whose answers it keeps.
 #[inline(always)]
-pub(crate) fn search<'a, S: Search<'a>>(level: Level, accel: &'a Accel, ray: &Ray, mut search: S) -> S {
+pub(crate) fn search<'a, S: Search<'a>>(level: Level, accel: &'a Accel, ray: &Ray, search: &mut S) {
     let mut touches = Vec::new();
     let is_over = if accel.holds.only_triangles {
-        level.run(AmongTriangles { accel, ray, search: &mut search, touches: &mut touches })
+        level.run(AmongTriangles { accel, ray, search: &mut *search, touches: &mut touches })
     } else {
-        level.run(AmongAll { accel, ray, search: &mut search, touches: &mut touches })
+        level.run(AmongAll { accel, ray, search: &mut *search, touches: &mut touches })
     };
     if !is_over && !touches.is_empty() {
-        touch::offer_borders(level, accel, ray, &touches, &mut search);
+        touch::offer_borders(level, accel, ray, &touches, search);
     }
-    search
 }
 
 /// Collects what the whole line touches.
