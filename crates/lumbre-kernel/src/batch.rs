@@ -7,6 +7,7 @@ use lumbre_geometry::Ray;
 
 use crate::Accel;
 use crate::lanes::{Lanes, Level, Task};
+use crate::node::BoxRay;
 use crate::stack::{Order, Stack};
 use crate::touch::{self, Touch};
 use crate::traverse::{self, Frame, Place, Search, Step};
@@ -75,13 +76,14 @@ where
             && let Some((position, ray)) = waiting.next()
         {
             let mut search = begin(ray);
-            match Frame::start(accel, ray, &search) {
-                Some(frame) => {
-                    let (touches, stack) = (Vec::new(), Stack::new());
-                    flights.push(Flight { position, reference: root, frame, search, touches, stack });
-                }
-                None => end(position, &mut search),
+            let mut boxes = BoxRay::passing_all();
+            if !traverse::start::<L, S>(accel, ray, &search, &mut boxes) {
+                end(position, &mut search);
+                continue;
             }
+            let frame = Frame::new(accel, ray, boxes, &search);
+            let (touches, stack) = (Vec::new(), Stack::new());
+            flights.push(Flight { position, reference: root, frame, search, touches, stack });
         }
         // Those that are under way stand first.
         let mut count = flights.len();

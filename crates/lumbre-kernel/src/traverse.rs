@@ -193,7 +193,12 @@ impl MeshRay {
 /// Makes `boxes` the ray for the boxes of a tree, as far as the search wants it; false where it passes the tree by or is not
 /// sound.
 #[inline(always)]
-fn start<'a, L: Lanes, S: Search<'a>>(accel: &Accel, ray: &Ray, search: &S, boxes: &mut BoxRay) -> bool {
+pub(crate) fn start<'a, L: Lanes, S: Search<'a>>(
+    accel: &Accel,
+    ray: &Ray,
+    search: &S,
+    boxes: &mut BoxRay,
+) -> bool {
     let (floor, limit) = (search.floor(), search.limit());
     L::start_nearby(&accel.units, ray, floor, limit, boxes)
         || (is_sound(ray) && boxes.start_anywhere(&accel.units, ray, floor, limit))
@@ -213,18 +218,11 @@ fn mesh_ray<'a, S: Search<'a>>(accel: &Accel, ray: &Ray, search: &S) -> MeshRay 
 
 impl<'a, R: Borrow<Ray>, L: Lanes> Frame<'a, R, L> {
     #[inline(always)]
-    fn new<S: Search<'a>>(accel: &'a Accel, ray: R, boxes: BoxRay, search: &S) -> Self {
+    pub(crate) fn new<S: Search<'a>>(accel: &'a Accel, ray: R, boxes: BoxRay, search: &S) -> Self {
         let (limit, floor) = (search.limit(), search.floor());
         let mesh = mesh_ray(accel, ray.borrow(), search);
         let limit_key = boxes.s_max.to_bits() as i32 | LANE_BITS;
         Self { accel, ray, boxes, limit_key, limit, floor, mesh, lanes: PhantomData }
-    }
-
-    /// `None` where the ray passes the tree by, or is not sound.
-    #[inline(always)]
-    pub(crate) fn start<S: Search<'a>>(accel: &'a Accel, ray: R, search: &S) -> Option<Self> {
-        let mut boxes = BoxRay::passing_all();
-        start::<L, S>(accel, ray.borrow(), search, &mut boxes).then(|| Self::new(accel, ray, boxes, search))
     }
 
     /// Turns to another ray in the same tree; false where that passes the tree by, or is not sound.
@@ -346,7 +344,11 @@ impl<'a, S: Search<'a>> Task for AmongTriangles<'a, '_, S> {
     fn run<L: Lanes>(self) -> bool {
         let Self { accel, ray, search, touches } = self;
         let Some(root) = accel.tree.root else { return false };
-        let Some(mut frame) = Frame::<&Ray, L>::start(accel, ray, search) else { return false };
+        let mut boxes = BoxRay::passing_all();
+        if !start::<L, S>(accel, ray, search, &mut boxes) {
+            return false;
+        }
+        let mut frame = Frame::<&Ray, L>::new(accel, ray, boxes, search);
         let place = Place::default();
         let mut stack = Stack::new();
         let mut next = Some(root);
