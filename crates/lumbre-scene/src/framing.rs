@@ -151,7 +151,11 @@ impl Eye {
         let depth = if depth < 0.0 { depth } else { -1.0 };
         let mut middle = 0.5 * DVec2::new(right - left, top - bottom);
         for _ in 0..4 {
-            middle += self.off_middle(points, center, middle, depth);
+            let off = self.off_middle(points, center, middle, depth);
+            middle += off;
+            if off.length() < 1e-4 * depth.abs() {
+                break;
+            }
         }
         let place = center + middle.x * self.x + middle.y * self.y + depth * self.forward;
         let placement =

@@ -12,7 +12,7 @@ use crate::{EnvironmentDesc, EnvironmentMapping, LightDesc, UpAxis};
 const WIDTH: u32 = 512;
 const HEIGHT: u32 = 256;
 /// The radiance of a white level surface in the open. What faces the key is brighter still, and what faces the camera darker.
-const LEVEL: f64 = 1.25;
+const LEVEL: f64 = 1.0;
 
 /// A soft rectangular lamp.
 struct Softbox {

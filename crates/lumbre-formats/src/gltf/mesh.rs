@@ -553,8 +553,14 @@ pub(super) fn assemble(file: &File<'_>, primitive: &Primitive<'_>, positions: &[
     let count = listed.as_ref().map_or(positions.len(), |(_, indices)| indices.len());
     let count = primitive.mode.whole(count);
     let vertex = |i: usize| listed.as_ref().map_or(i as u32, |(_, indices)| indices[i]);
-    // Whether a vertex is of use.
+    // As a rule every vertex is of use, which is soon seen of all at once.
+    let all_are_there =
+        listed.as_ref().is_none_or(|(_, indices)| indices.iter().all(|&i| (i as usize) < positions.len()));
+    let all_are_fine = all_are_there && positions.iter().all(|p| p.is_finite());
     let check = |i: usize| -> Read<bool> {
+        if all_are_fine {
+            return Ok(true);
+        }
         let v = vertex(i);
         let (message, culprit, found, expected) = match positions.get(v as usize) {
             Some(p) if p.is_finite() => return Ok(true),
