@@ -702,18 +702,19 @@ fn every_parameter_of_a_material_arrives() {
 }
 
 #[test]
-fn unlit_shines_and_what_scatters_inside_is_said_to_be_left_out() {
+fn unlit_shines_and_solids_scatter_inside() {
     let (scene, _) = dressed(
         r#"{"extensions":{"KHR_materials_unlit":{}},"pbrMetallicRoughness":{"baseColorFactor":[0.5,0.25,1,1]}}"#,
     );
     assert_eq!(scene.materials[0].material.kind.name(), "diffuse");
     let light = scene.shapes[0].area_light.as_ref().unwrap();
     assert!(light.radiance == Rgb::new(0.5, 0.25, 1.0) && light.two_sided);
-    let volume = r#"{"extensions":{"KHR_materials_volume":{"thicknessFactor":1},
-        "KHR_materials_volume_scatter":{"multiscatterColor":[0.5,0.5,0.5]}}}"#;
-    let (_, diagnostics) = dressed(volume);
-    let text = diagnostics.lines().join("\n");
-    assert!(text.contains("scattering inside volumes"), "{text}");
+    let volume = r#"{"extensions":{"KHR_materials_transmission":{"transmissionFactor":1},
+        "KHR_materials_volume":{"thicknessFactor":1,"attenuationDistance":2,"attenuationColor":[0.5,0.5,0.5]},
+        "KHR_materials_volume_scatter":{"multiscatterColor":[0.5,0.5,0.5],"scatterAnisotropy":0.25}}}"#;
+    let (scene, _) = dressed(volume);
+    let medium = scene.materials[0].material.interior_medium().unwrap();
+    assert!(medium.albedo.r > 0.7 && medium.asymmetry == 0.25, "{medium:?}");
 }
 
 #[test]

@@ -29,7 +29,11 @@ fn solid(ior: f32, color: Rgb, distance: f32) -> Material {
         roughness: number(0.0),
         transmission: number(1.0),
         ior,
-        volume: Some(VolumeParams { attenuation_color: color, attenuation_distance: distance }),
+        volume: Some(VolumeParams {
+            attenuation_color: color,
+            attenuation_distance: distance,
+            ..VolumeParams::default()
+        }),
         ..PrincipledParams::default()
     })))
 }
@@ -167,4 +171,58 @@ fn glass_in_glass_of_the_same_index_cannot_be_seen() {
         }
     }
     assert!(differs > 0);
+}
+
+/// A solid that scatters, in which light goes a `depth`th of a unit of length before it collides.
+fn cloudy(ior: f32, color: Rgb, depth: f32, g: f32) -> Material {
+    Material::new(MaterialKind::Principled(Box::new(PrincipledParams {
+        metallic: number(0.0),
+        roughness: number(0.0),
+        transmission: number(1.0),
+        ior,
+        volume: Some(VolumeParams {
+            attenuation_color: Rgb::splat((-1.0_f32).exp()),
+            attenuation_distance: 1.0 / depth,
+            scatter_color: color,
+            scatter_anisotropy: g,
+        }),
+        ..PrincipledParams::default()
+    })))
+}
+
+fn by_paths(desc: SceneDesc, camera: Camera, side: u32, spp: u32) -> [f64; 3] {
+    let scene = Scene::build(SceneDesc { cameras: vec![camera], ..desc }).unwrap();
+    let options = options(&scene, side, side, spp);
+    let rendered = render_with(&scene, &options, &Path::new(64), &NoProgress, &CancelToken::new()).unwrap();
+    assert_eq!(rendered.stats.dropped, 0);
+    mean(&rendered.image)
+}
+
+#[test]
+fn a_solid_that_scatters_and_takes_nothing_cannot_be_seen_under_a_white_sky() {
+    for (ior, depth, g) in [(1.0, 2.0, 0.0), (1.5, 3.0, 0.6), (1.3, 9.0, -0.4)] {
+        let mut desc = in_the_open();
+        let cloud = add_material(&mut desc, cloudy(ior, Rgb::WHITE, depth, g));
+        add(&mut desc, exact(Sphere::new(CENTER, 1.3).unwrap()), cloud);
+        for found in by_paths(desc, over(1.2), 24, 64) {
+            assert_close(found, 1.0, 5e-3, &format!("{ior} {depth} {g}"));
+        }
+    }
+}
+
+#[test]
+fn a_deep_body_shows_the_colour_that_many_collisions_leave() {
+    let color = Rgb::new(0.8, 0.5, 0.2);
+    let (radius, side) = (1.3, 3.0);
+    let mut desc = in_the_open();
+    let wax = add_material(&mut desc, cloudy(1.0, color, 60.0, 0.0));
+    add(&mut desc, exact(Sphere::new(CENTER, radius).unwrap()), wax);
+    let disk = std::f64::consts::PI * radius * radius;
+    let area = side * side;
+    let found = by_paths(desc, over(0.5 * side), 48, 64);
+    for (found, expected) in found.into_iter().zip(color.to_array()) {
+        // A sphere shows every angle as often as it counts; beside it is the sky. The formula is a fit.
+        let found = (found * area - (area - disk)) / disk;
+        assert_close(found, f64::from(expected), 0.03, "the colour of wax");
+    }
 }

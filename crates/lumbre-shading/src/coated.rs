@@ -1,13 +1,14 @@
 //! Paint or metal under varnish: layers between which light walks at random.
 
-use std::f32::consts::{FRAC_1_PI, PI};
+use std::f32::consts::FRAC_1_PI;
 
 use lumbre_math::random::{RandomStream, combine, hash_vec3};
-use lumbre_math::{Vec2, Vec3, frame::orthonormal_basis_f32};
+use lumbre_math::{Vec2, Vec3};
 
 use crate::conductor::Conductor;
 use crate::dielectric::{Dielectric, Ways, refract};
 use crate::diffuse::{Diffuse, cosine_direction};
+use crate::medium::{henyey_greenstein, sample_henyey_greenstein};
 use crate::microfacet::Microfacets;
 use crate::{BsdfSample, LocalDir, Scatter, Spectrum, fresnel};
 
@@ -430,6 +431,7 @@ impl Coat {
                     sum += throughput * exit_weight * out;
                     let u = Vec2::new(random.next_f32(), random.next_f32());
                     let (scattered, pdf) = sample_henyey_greenstein(w.vec(), self.g, u);
+                    let scattered = LocalDir(scattered);
                     if scattered.cos_theta() == 0.0 {
                         break;
                     }
@@ -505,27 +507,4 @@ fn balance(own: Option<f32>, other: f32) -> f32 {
     let Some(own) = own else { return 1.0 };
     let ratio = other / own;
     1.0 / (1.0 + ratio * ratio)
-}
-
-/// The density per solid angle of scattering by the angle with this cosine: 1 goes straight on.
-///
-/// Henyey and Greenstein, "Diffuse Radiation in the Galaxy", Astrophysical Journal 93, 1941.
-fn henyey_greenstein(cos: f32, g: f32) -> f32 {
-    let d = (1.0 + g * g - 2.0 * g * cos).max(1e-12);
-    (1.0 - g * g) / (4.0 * PI * d * d.sqrt())
-}
-
-/// A direction about `forward` by [`henyey_greenstein`], with its density.
-fn sample_henyey_greenstein(forward: Vec3, g: f32, u: Vec2) -> (LocalDir, f32) {
-    let cos = if g.abs() < 1e-3 {
-        1.0 - 2.0 * u.x
-    } else {
-        let s = (1.0 - g * g) / (1.0 + g - 2.0 * g * u.x);
-        ((1.0 + g * g - s * s) / (2.0 * g)).clamp(-1.0, 1.0)
-    };
-    let sin = (1.0 - cos * cos).max(0.0).sqrt();
-    let (sin_phi, cos_phi) = (2.0 * PI * u.y).sin_cos();
-    let (x, y) = orthonormal_basis_f32(forward);
-    let w = (x * (sin * cos_phi) + y * (sin * sin_phi) + forward * cos).normalize();
-    (LocalDir(w), henyey_greenstein(cos, g))
 }

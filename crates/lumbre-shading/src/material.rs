@@ -12,8 +12,8 @@ use crate::dielectric::{Dielectric, ThinDielectric};
 use crate::diffuse::{Diffuse, DiffuseTransmission};
 use crate::microfacet::Microfacets;
 use crate::{
-    Bsdf, FloatTexture, ImageTexture, PrincipledParams, ShadingFrame, Spectrum, SpectrumTexture, Texture,
-    TextureContext,
+    Bsdf, FloatTexture, HomogeneousMedium, ImageTexture, PrincipledParams, ShadingFrame, Spectrum,
+    SpectrumTexture, Texture, TextureContext,
 };
 
 /// The roughness group of parameters.
@@ -369,6 +369,15 @@ impl Material {
     pub fn interior_attenuation(&self) -> Option<Spectrum> {
         match &self.kind {
             MaterialKind::Principled(params) => params.interior_attenuation(),
+            _ => None,
+        }
+    }
+
+    /// The inside of a solid body of this material, where it scatters light; `None` where it is clear. Its extinction is
+    /// that of [`Material::interior_attenuation`].
+    pub fn interior_medium(&self) -> Option<HomogeneousMedium> {
+        match &self.kind {
+            MaterialKind::Principled(params) => params.interior_medium(),
             _ => None,
         }
     }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use lumbre_math::Vec2;
 
 use crate::material::albedo;
+use crate::medium::{HomogeneousMedium, albedo_of_many_collisions};
 use crate::microfacet::Microfacets;
 use crate::principled::{Body, Clearcoat, Principled};
 use crate::sheen::Sheen;
@@ -30,11 +31,21 @@ pub struct VolumeParams {
     pub attenuation_color: Spectrum,
     /// In units of the world, > 0. Default infinite: nothing is lost.
     pub attenuation_distance: f32,
+    /// The colour that a deep body shows of the light which it scatters, in [0, 1] (`multiscatterColor`). Default black: what
+    /// is lost is absorbed.
+    pub scatter_color: Spectrum,
+    /// Henyey–Greenstein asymmetry of that scattering, in (−1, 1) (`scatterAnisotropy`). Default 0.
+    pub scatter_anisotropy: f32,
 }
 
 impl Default for VolumeParams {
     fn default() -> Self {
-        Self { attenuation_color: Spectrum::WHITE, attenuation_distance: f32::INFINITY }
+        Self {
+            attenuation_color: Spectrum::WHITE,
+            attenuation_distance: f32::INFINITY,
+            scatter_color: Spectrum::BLACK,
+            scatter_anisotropy: 0.0,
+        }
     }
 }
 
@@ -206,6 +217,16 @@ impl PrincipledParams {
         let distance = volume.attenuation_distance.max(f32::MIN_POSITIVE);
         let sigma = volume.attenuation_color.map(|left| -crate::unit(left).max(1e-6).ln() / distance);
         (sigma.is_finite() && !sigma.is_black()).then_some(sigma)
+    }
+
+    /// The inside, where it scatters light; see [`crate::Material::interior_medium`].
+    pub fn interior_medium(&self) -> Option<HomogeneousMedium> {
+        let extinction = self.interior_attenuation()?;
+        let volume = self.volume.filter(|volume| !volume.scatter_color.is_black())?;
+        let g = volume.scatter_anisotropy;
+        let asymmetry = if g.is_nan() { 0.0 } else { g.clamp(-0.999, 0.999) };
+        let albedo = volume.scatter_color.map(|c| albedo_of_many_collisions(c, asymmetry));
+        Some(HomogeneousMedium { extinction, albedo, asymmetry })
     }
 
     /// The surface at a place. Its coat follows the shading normal until [`crate::Material::shading`] turns it.

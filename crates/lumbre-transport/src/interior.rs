@@ -1,7 +1,7 @@
 //! The solids that a path is inside of.
 
 use lumbre_scene::Interaction;
-use lumbre_shading::{Material, Spectrum};
+use lumbre_shading::{HomogeneousMedium, Material, Spectrum};
 use smallvec::SmallVec;
 
 /// The solids around a point of a path, the innermost last: what was entered and not left yet.
@@ -16,20 +16,19 @@ pub(crate) struct Interiors<'s> {
 }
 
 impl<'s> Interiors<'s> {
-    /// What is left of light along the way to a surface, whose material there is `material`. A solid that is met from
-    /// inside without having been entered is one that the path began in; until then nothing is known of it.
-    pub fn arrive(
-        &mut self,
-        here: &Interaction<'s>,
-        material: Option<&'s Material>,
-        distance: f64,
-    ) -> Spectrum {
+    /// Comes to a surface, whose material there is `material`. A solid that is met from inside without having been entered is
+    /// one that the path began in; until then nothing is known of it.
+    pub fn arrive(&mut self, here: &Interaction<'s>, material: Option<&'s Material>) {
         if let Some(material) = material.filter(|material| !here.front && material.is_solid())
             && !self.around.iter().any(|&solid| std::ptr::eq(solid, material))
         {
             self.around.insert(0, material);
         }
-        self.transmittance(distance)
+    }
+
+    /// What scatters light in the innermost solid.
+    pub fn medium(&self) -> Option<HomogeneousMedium> {
+        self.around.last().and_then(|solid| solid.interior_medium())
     }
 
     /// What is left of light after a distance inside the innermost solid.

@@ -2,6 +2,7 @@
 
 use lumbre_geometry::Ray;
 use lumbre_scene::{Interaction, Scene, View};
+use lumbre_shading::medium::{Flight, sample_henyey_greenstein};
 use lumbre_shading::{Scatter, Spectrum};
 
 use crate::direct::{Vertex, power_heuristic};
@@ -43,6 +44,11 @@ enum Chosen {
     /// With this density.
     Density(f32),
 }
+
+/// Collisions inside media that every path may have before Russian roulette.
+const SURE_COLLISIONS: u32 = 4;
+/// Collisions at most: they are not counted as bounces, and where nothing is absorbed a path might stay for ever.
+const MOST_COLLISIONS: u32 = 1 << 14;
 
 impl Path {
     /// A path tracer of so many bounces.
@@ -95,6 +101,7 @@ impl Integrator for Path {
         let mut lit_from = ray.origin;
         let mut depth = 0;
         let mut interiors = Interiors::default();
+        let (mut flights, mut collisions) = (0, 0);
         loop {
             let Some(here) = &met else {
                 for (arriving, pdf) in scene.escaped(&ray) {
@@ -102,7 +109,43 @@ impl Integrator for Path {
                 }
                 return radiance;
             };
-            throughput *= interiors.arrive(here, here.resolved(), ray_length(&ray, here));
+            interiors.arrive(here, here.resolved());
+            let way = ray_length(&ray, here);
+            match interiors.medium() {
+                None => throughput *= interiors.transmittance(way),
+                Some(medium) => match medium.fly(throughput, way, draw.flight(flights)) {
+                    Flight::Through(weight) => {
+                        throughput *= weight;
+                        flights += 1;
+                    }
+                    Flight::Collision { distance, weight } => {
+                        throughput *= weight;
+                        let likely = (throughput * eta_scale).max_component();
+                        if collisions >= MOST_COLLISIONS || likely <= 0.0 {
+                            return radiance;
+                        }
+                        if likely < 1.0 && collisions >= SURE_COLLISIONS {
+                            if draw.survives_collision(flights) >= likely {
+                                return radiance;
+                            }
+                            throughput *= 1.0 / likely;
+                        }
+                        let u = draw.scattered(flights);
+                        let along = ray.direction.as_vec3();
+                        let (along, _) = sample_henyey_greenstein(along, medium.asymmetry, u);
+                        ray = Ray::new(ray.origin + distance * ray.direction, along.as_dvec3().normalize());
+                        // Lights are behind a surface that bends what comes from them: paths find them.
+                        chosen = Chosen::Only;
+                        has_scattered = true;
+                        flights += 1;
+                        collisions += 1;
+                        rays.bounce += 1;
+                        let footprint = here.footprint();
+                        met = scene.closest(&ray).map(|hit| scene.interaction(&ray, &hit, &footprint));
+                        continue;
+                    }
+                },
+            }
             let emitted = here.emitted();
             if !emitted.is_black() {
                 let pdf = if chosen == Chosen::Only { 0.0 } else { scene.light_pdf(lit_from, here) };

@@ -36,6 +36,8 @@ const DIRECTION: u32 = 3;
 const SURVIVAL: u32 = 4;
 /// Labels of integrators that ask every light of a vertex for a point.
 const EVERY_LIGHT: u32 = 1 << 24;
+/// Labels of flights through media.
+const EVERY_FLIGHT: u32 = 1 << 27;
 /// Labels of integrators that follow several rays from a vertex.
 const EVERY_BRANCH: u32 = 1 << 28;
 
@@ -137,6 +139,22 @@ impl Draw {
         single(self.one(label(vertex, SURVIVAL)))
     }
 
+    /// A flight through a medium: which lane of the spectrum, and how far.
+    pub fn flight(&self, flight: u32) -> [f64; 2] {
+        [self.one(inside(flight, 0)), self.one(inside(flight, 1))]
+    }
+
+    /// Which direction after the collision that a flight ended with.
+    pub fn scattered(&self, flight: u32) -> Vec2 {
+        let u = self.two(inside(flight, 2));
+        Vec2::new(single(u.x), single(u.y))
+    }
+
+    /// Whether the path goes on after that collision.
+    pub fn survives_collision(&self, flight: u32) -> f32 {
+        single(self.one(inside(flight, 3)))
+    }
+
     #[inline]
     fn one(&self, label: u32) -> f64 {
         match self {
@@ -158,6 +176,10 @@ impl Draw {
             }
         }
     }
+}
+
+fn inside(flight: u32, what: u32) -> u32 {
+    EVERY_FLIGHT.wrapping_add(flight.wrapping_mul(4)).wrapping_add(what)
 }
 
 fn label(vertex: u32, what: u32) -> u32 {

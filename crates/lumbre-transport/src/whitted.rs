@@ -154,7 +154,8 @@ impl Integrator for Whitted {
         loop {
             if let Some(here) = &met {
                 // Of a mixture the one material that stands for it says what the way was inside of.
-                came.throughput *= came.interiors.arrive(here, here.resolved(), ray_length(&ray, here));
+                came.interiors.arrive(here, here.resolved());
+                came.throughput *= came.interiors.transmittance(ray_length(&ray, here));
                 radiance += came.throughput * here.emitted();
                 if came.depth < self.max_depth {
                     let scatterers = self.split(here, &came, draw, &mut pending);

@@ -138,7 +138,7 @@ pub struct Volume {
     pub attenuation_distance: f32,
     /// Linear colour in [0, 1].
     pub attenuation_colour: Rgb,
-    /// Linear single-scattering albedo of the inside in [0, 1] after many bounces (`KHR_materials_volume_scatter`).
+    /// Linear colour of what the inside scatters after many bounces, in [0, 1] (`KHR_materials_volume_scatter`).
     pub multiscatter_colour: Rgb,
     /// Henyey–Greenstein asymmetry of that scattering, in (-1, 1).
     pub scatter_anisotropy: f32,

@@ -1,7 +1,7 @@
 //! From the materials of a glTF to ours. What ours cannot say is left out, and a warning lists it.
 
 use std::cell::RefCell;
-use std::collections::{BTreeSet, HashMap};
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use lumbre_image::Rgb;
@@ -16,7 +16,6 @@ use super::file::{File, List};
 use super::json::Read;
 use super::material::{AlphaMode, GltfMaterial, TextureRef};
 use super::texture::{Textures, UvSets, ours};
-use crate::diagnostic::Diagnostic;
 
 /// All that a material gives to a shape.
 #[derive(Clone, Debug)]
@@ -42,19 +41,11 @@ pub(super) struct Materials<'f> {
     /// By position in the file and whether vertices have colours.
     made: RefCell<HashMap<MaterialKey, Arc<Dressing>>>,
     list: RefCell<Vec<NamedMaterial>>,
-    /// What no material of ours can say.
-    left_out: RefCell<BTreeSet<&'static str>>,
 }
 
 impl<'f> Materials<'f> {
     pub fn new(file: &'f File<'f>) -> Self {
-        Self {
-            file,
-            textures: Textures::new(file),
-            made: RefCell::default(),
-            list: RefCell::default(),
-            left_out: RefCell::default(),
-        }
+        Self { file, textures: Textures::new(file), made: RefCell::default(), list: RefCell::default() }
     }
 
     /// The material at a position in the file, or glTF's default, for a mesh with or without colours at its vertices.
@@ -104,14 +95,8 @@ impl<'f> Materials<'f> {
         Some(UvSets { first, second: others.first().copied(), baked })
     }
 
-    /// All materials that were asked for, after a warning of what was left out.
+    /// All materials that were asked for.
     pub fn into_list(self) -> Vec<NamedMaterial> {
-        let left_out = self.left_out.into_inner();
-        if !left_out.is_empty() {
-            let list: Vec<&str> = left_out.into_iter().collect();
-            let warning = Diagnostic::warning("parameters of materials were left out").at(self.file.whole());
-            self.file.push(warning.found(list.join(", ")));
-        }
         self.list.into_inner()
     }
 }
@@ -151,10 +136,6 @@ impl<'f> Seam<'_, 'f> {
         self.parameters.transmission > 0.0 || self.parameters.diffuse_transmission.factor > 0.0
     }
 
-    fn leave_out(&self, what: &'static str) {
-        self.materials.left_out.borrow_mut().insert(what);
-    }
-
     /// A colour with the texture that is a factor on it.
     fn colour(&self, factor: Rgb, texture: Option<TextureRef>) -> Read<Arc<SpectrumTexture>> {
         let image = texture.map(|t| self.textures().colour(t, self.sets)).transpose()?.flatten();
@@ -186,9 +167,6 @@ impl<'f> Seam<'_, 'f> {
         if m.unlit {
             let reflectance = Arc::new(Texture::Constant(Rgb::BLACK));
             return Ok(Material::new(MaterialKind::Diffuse { reflectance }));
-        }
-        if !m.volume.multiscatter_colour.is_black() {
-            self.leave_out("scattering inside volumes");
         }
         let kind = MaterialKind::Principled(Box::new(self.principled()?));
         let normal_map = self.normals(m.normal_texture, m.normal_scale)?;
@@ -227,6 +205,8 @@ impl<'f> Seam<'_, 'f> {
         let volume = VolumeParams {
             attenuation_color: m.volume.attenuation_colour,
             attenuation_distance: m.volume.attenuation_distance,
+            scatter_color: m.volume.multiscatter_colour,
+            scatter_anisotropy: m.volume.scatter_anisotropy,
         };
         Ok(PrincipledParams {
             anisotropy: self.number(m.anisotropy.strength, None, 0)?,

@@ -1,0 +1,192 @@
+//! The inside of solids that scatter light.
+
+use std::f32::consts::PI;
+
+use lumbre_math::frame::orthonormal_basis_f32;
+use lumbre_math::{Vec2, Vec3};
+
+use crate::Spectrum;
+
+/// The same everywhere: what light meets on its way through a solid body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HomogeneousMedium {
+    /// Collisions per unit of length, σ_t; exp(−σ_t d) of light goes a distance d without one.
+    pub extinction: Spectrum,
+    /// The share of light that a collision scatters, in [0, 1]; it takes the rest.
+    pub albedo: Spectrum,
+    /// Henyey–Greenstein asymmetry, in (−1, 1): below 0 light is mostly thrown back, above 0 it mostly goes on.
+    pub asymmetry: f32,
+}
+
+/// How light crosses a part of a medium.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Flight {
+    /// To the end, with this factor on what it carries.
+    Through(Spectrum),
+    /// To a collision that scatters.
+    Collision {
+        /// How far it came.
+        distance: f64,
+        /// The factor on what it carries.
+        weight: Spectrum,
+    },
+}
+
+impl HomogeneousMedium {
+    /// Chooses how light that carries `carried` crosses a `distance`. `u` chooses a lane of the spectrum and the
+    /// collision; the density counts every lane that might have chosen it.
+    ///
+    /// (A. Wilkie and others, "Hero Wavelength Spectral Sampling", EGSR 2014, with lanes for wavelengths.)
+    pub fn fly(&self, carried: Spectrum, distance: f64, u: [f64; 2]) -> Flight {
+        let sigma = self.extinction.to_array().map(f64::from);
+        let carried = carried.to_array().map(|c| f64::from(c.max(0.0)));
+        let sum: f64 = carried.iter().sum();
+        if sum.is_nan() || sum <= 0.0 {
+            return Flight::Through(Spectrum::BLACK);
+        }
+        let shares = carried.map(|c| c / sum);
+        let mut lane = 0;
+        let mut rest = u[0];
+        while lane < 2 && rest >= shares[lane] {
+            rest -= shares[lane];
+            lane += 1;
+        }
+        // 1 - u is in (0, 1]; a lane without collisions flies to infinity.
+        let flight = -(1.0 - u[1]).ln() / sigma[lane];
+        let end = if flight < distance { flight } else { distance };
+        let left = sigma.map(|sigma| (-sigma * end).exp());
+        if flight < distance {
+            let density: f64 = (0..3).map(|i| shares[i] * sigma[i] * left[i]).sum();
+            let albedo = self.albedo.to_array();
+            let [r, g, b] =
+                std::array::from_fn(|i| (f64::from(albedo[i]) * sigma[i] * left[i] / density) as f32);
+            Flight::Collision { distance: flight, weight: Spectrum::new(r, g, b) }
+        } else {
+            let probability: f64 = (0..3).map(|i| shares[i] * left[i]).sum();
+            // So dense that nothing comes this far but by rounding.
+            if probability <= 0.0 {
+                return Flight::Through(Spectrum::BLACK);
+            }
+            let [r, g, b] = left.map(|left| (left / probability) as f32);
+            Flight::Through(Spectrum::new(r, g, b))
+        }
+    }
+}
+
+/// The density per solid angle of scattering by the angle with this cosine: 1 goes straight on.
+///
+/// L. Henyey, J. Greenstein, "Diffuse Radiation in the Galaxy", Astrophysical Journal 93, 1941.
+pub fn henyey_greenstein(cos: f32, g: f32) -> f32 {
+    let d = (1.0 + g * g - 2.0 * g * cos).max(1e-12);
+    (1.0 - g * g) / (4.0 * PI * d * d.sqrt())
+}
+
+/// A unit direction about unit `forward` by [`henyey_greenstein`], with its density.
+pub fn sample_henyey_greenstein(forward: Vec3, g: f32, u: Vec2) -> (Vec3, f32) {
+    let cos = if g.abs() < 1e-3 {
+        1.0 - 2.0 * u.x
+    } else {
+        let s = (1.0 - g * g) / (1.0 + g - 2.0 * g * u.x);
+        ((1.0 + g * g - s * s) / (2.0 * g)).clamp(-1.0, 1.0)
+    };
+    let sin = (1.0 - cos * cos).max(0.0).sqrt();
+    let (sin_phi, cos_phi) = (2.0 * PI * u.y).sin_cos();
+    let (x, y) = orthonormal_basis_f32(forward);
+    let w = (x * (sin * cos_phi) + y * (sin * sin_phi) + forward * cos).normalize();
+    (w, henyey_greenstein(cos, g))
+}
+
+/// The share that one collision scatters, from the colour that a deep body of such a medium shows after many.
+///
+/// C. Kulla, A. Conty, "Revisiting Physically Based Shading at Imageworks", SIGGRAPH course notes, 2017, with the asymmetry
+/// of the medium (similarity theory).
+pub fn albedo_of_many_collisions(color: f32, g: f32) -> f32 {
+    let c = crate::unit(color);
+    let s = 4.097_12 + 4.208_63 * c - (9.592_17 + 41.680_8 * c + 17.712_6 * c * c).sqrt();
+    let squared = crate::unit(s).powi(2);
+    (1.0 - squared) / (1.0 - g * squared)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lumbre_math::random::RandomStream;
+
+    #[test]
+    fn a_flight_collides_as_often_as_beer_and_lambert_say_in_every_lane() {
+        let medium = HomogeneousMedium {
+            extinction: Spectrum::new(0.5, 2.0, 0.0),
+            albedo: Spectrum::new(0.9, 0.5, 0.3),
+            asymmetry: 0.0,
+        };
+        let carried = Spectrum::new(0.25, 0.5, 0.75);
+        let distance = 1.3;
+        let mut random = RandomStream::new(4);
+        let (mut through, mut scattered, mut way) = ([0.0; 3], [0.0; 3], [0.0; 3]);
+        let count = 400_000;
+        for _ in 0..count {
+            match medium.fly(carried, distance, [random.next_f64(), random.next_f64()]) {
+                Flight::Through(weight) => {
+                    (0..3).for_each(|i| through[i] += f64::from(weight.to_array()[i]));
+                }
+                Flight::Collision { distance: flight, weight } => {
+                    assert!(flight < distance);
+                    for i in 0..3 {
+                        scattered[i] += f64::from(weight.to_array()[i]);
+                        way[i] += flight * f64::from(weight.to_array()[i]);
+                    }
+                }
+            }
+        }
+        for (i, (sigma, albedo)) in [(0.5_f64, 0.9), (2.0, 0.5), (0.0, 0.3)].into_iter().enumerate() {
+            let left = (-sigma * distance).exp();
+            let mean = |sum: f64| sum / f64::from(count);
+            assert!((mean(through[i]) - left).abs() < 4e-3, "{i}: {}", mean(through[i]));
+            assert!((mean(scattered[i]) - albedo * (1.0 - left)).abs() < 4e-3, "{i}: {}", mean(scattered[i]));
+            // ∫ t σ exp(−σ t) dt
+            let first = if sigma > 0.0 { (1.0 - left) / sigma - distance * left } else { 0.0 };
+            assert!((mean(way[i]) - albedo * first).abs() < 4e-3, "{i}: {}", mean(way[i]));
+        }
+    }
+
+    #[test]
+    fn light_that_carries_nothing_goes_nowhere_and_dense_media_give_no_nan() {
+        let medium = HomogeneousMedium {
+            extinction: Spectrum::new(1e30, 1e30, 0.0),
+            albedo: Spectrum::WHITE,
+            asymmetry: 0.0,
+        };
+        assert_eq!(medium.fly(Spectrum::BLACK, 2.0, [0.5; 2]), Flight::Through(Spectrum::BLACK));
+        for u in [[0.0, 0.0], [0.3, 0.0], [0.3, 0.999_999], [0.99, 0.999_999]] {
+            match medium.fly(Spectrum::new(0.5, 0.25, 0.25), 2.0, u) {
+                Flight::Through(weight) => assert!(weight.is_finite(), "{u:?}: {weight:?}"),
+                Flight::Collision { weight, .. } => assert!(weight.is_finite(), "{u:?}: {weight:?}"),
+            }
+        }
+    }
+
+    #[test]
+    fn directions_have_the_mean_cosine_of_their_asymmetry() {
+        let forward = Vec3::new(2.0, -3.0, 6.0) / 7.0;
+        let mut random = RandomStream::new(5);
+        for g in [-0.7, 0.0, 0.3, 0.9] {
+            let (mut sum, count) = (0.0, 100_000);
+            for _ in 0..count {
+                let u = Vec2::new(random.next_f32(), random.next_f32());
+                let (w, density) = sample_henyey_greenstein(forward, g, u);
+                assert!((density / henyey_greenstein(w.dot(forward), g) - 1.0).abs() < 1e-2);
+                sum += f64::from(w.dot(forward));
+            }
+            assert!((sum / f64::from(count) - f64::from(g)).abs() < 6e-3, "{g}: {}", sum / f64::from(count));
+        }
+    }
+
+    #[test]
+    fn white_stays_white_and_black_black_through_many_collisions() {
+        for g in [-0.5, 0.0, 0.8] {
+            assert!(albedo_of_many_collisions(0.0, g) < 0.01);
+            assert!((albedo_of_many_collisions(1.0, g) - 1.0).abs() < 1e-3);
+            assert!(albedo_of_many_collisions(0.5, g) > 0.7);
+        }
+    }
+}
