@@ -41,7 +41,7 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    Render(render::Arguments),
+    Render(Box<render::Arguments>),
     Cast(cast::Arguments),
     Info(info::Arguments),
     Diff(diff::Arguments),

@@ -187,7 +187,7 @@ fn attributes(
         out.resize((first + block) * stride, 0);
         let groups = block.div_ceil(16);
         let controls = data.take(channels)?;
-        for channel in 0..stride / 4 {
+        for (channel, difference) in differences.iter().enumerate().take(stride / 4) {
             for (i, values) in lanes.iter_mut().enumerate() {
                 let widths = match controls.get(channel).map(|control| control >> (2 * i) & 3) {
                     None => [0, 2, 4, 8],
@@ -210,11 +210,10 @@ fn attributes(
             }
             let lane = 4 * channel;
             let mut value: [u8; 4] = [before[lane], before[lane + 1], before[lane + 2], before[lane + 3]];
-            for i in 0..block {
-                let delta = [lanes[0][i], lanes[1][i], lanes[2][i], lanes[3][i]];
-                value = differences[channel].add(value, delta);
-                let at = (first + i) * stride + lane;
-                out[at..at + 4].copy_from_slice(&value);
+            let elements = out[first * stride..].chunks_exact_mut(stride);
+            for (i, element) in elements.enumerate().take(block) {
+                value = difference.add(value, lanes.map(|values| values[i]));
+                element[lane..lane + 4].copy_from_slice(&value);
             }
             before[lane..lane + 4].copy_from_slice(&value);
         }
