@@ -3,13 +3,15 @@
 //! Linux says how long each thread ran, not counting the time that it waited for a processor; where nobody says that, the
 //! time of the clock on the wall is taken.
 
-use std::path::Path;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// A point in the time of a thread, or of all threads of the program.
 pub struct Start {
     wall: Instant,
-    ran: Option<f64>,
+    /// Of every thread by its entry in `/proc`; none where nobody says.
+    ran: HashMap<PathBuf, f64>,
 }
 
 /// The seconds that a thread ran, from its entry in `/proc`.
@@ -19,18 +21,17 @@ fn ran(task: &Path) -> Option<f64> {
     Some(1e-9 * nanoseconds)
 }
 
-fn thread_ran() -> Option<f64> {
+fn thread_ran() -> HashMap<PathBuf, f64> {
     // The count of a running thread is brought up to date when it gives way.
     std::thread::yield_now();
-    ran(Path::new("/proc/thread-self"))
+    let task = PathBuf::from("/proc/thread-self");
+    ran(&task).map(|seconds| (task, seconds)).into_iter().collect()
 }
 
-fn program_ran() -> Option<f64> {
+fn program_ran() -> HashMap<PathBuf, f64> {
     std::thread::yield_now();
-    let tasks = std::fs::read_dir("/proc/self/task").ok()?;
-    // A thread that ends meanwhile is none of the work's.
-    let all: f64 = tasks.flatten().filter_map(|task| ran(&task.path())).sum();
-    (all > 0.0).then_some(all)
+    let Ok(tasks) = std::fs::read_dir("/proc/self/task") else { return HashMap::new() };
+    tasks.flatten().filter_map(|task| Some((task.path(), ran(&task.path())?))).collect()
 }
 
 impl Start {
@@ -40,7 +41,7 @@ impl Start {
         Self { wall: Instant::now(), ran }
     }
 
-    /// Of all threads together, none of which may end before it is read.
+    /// Of all threads together. One that ends before it is read is none of the work's.
     pub fn of_program() -> Self {
         let ran = program_ran();
         Self { wall: Instant::now(), ran }
@@ -57,12 +58,11 @@ impl Start {
         if threads == 1 { self.seconds(program_ran) } else { self.wall.elapsed().as_secs_f64() }
     }
 
-    fn seconds(&self, ran: fn() -> Option<f64>) -> f64 {
+    fn seconds(&self, ran: fn() -> HashMap<PathBuf, f64>) -> f64 {
         let wall = self.wall.elapsed().as_secs_f64();
-        match (self.ran, ran()) {
-            (Some(start), Some(end)) if end > start => end - start,
-            _ => wall,
-        }
+        let since = |(task, end): (PathBuf, f64)| end - self.ran.get(&task).copied().unwrap_or(0.0);
+        let all: f64 = ran().into_iter().map(since).sum();
+        if self.ran.is_empty() || all <= 0.0 { wall } else { all }
     }
 }
 
