@@ -6,7 +6,7 @@ use lumbre_geometry::Plane;
 use lumbre_math::{DVec3, Transform};
 use lumbre_shading::{Material, MaterialKind, Spectrum, Texture};
 
-use crate::light::Light;
+use crate::light::{Light, LightId};
 use crate::{
     BuildError, GeometryDesc, GroundDesc, Interaction, MaterialId, NamedMaterial, SceneDesc, ShapeDesc,
 };
@@ -27,6 +27,8 @@ pub struct GroundPlane {
     open: Spectrum,
     /// Lights whose part in that changes from place to place, and are no surfaces.
     local: Vec<Light>,
+    /// All lights that are no surfaces.
+    lights: Vec<LightId>,
 }
 
 impl GroundPlane {
@@ -40,12 +42,19 @@ impl GroundPlane {
                 _ => open += light.irradiance(desc.point, normal).unwrap_or(Spectrum::BLACK),
             }
         }
-        Self { normal, point: desc.point, catcher: desc.catcher, open, local }
+        let is_surface = |light: &Light| matches!(light, Light::Shape(_) | Light::Mesh(_));
+        let ids = (0..).zip(lights).filter(|(_, light)| !is_surface(light)).map(|(id, _)| LightId(id));
+        Self { normal, point: desc.point, catcher: desc.catcher, open, local, lights: ids.collect() }
     }
 
     /// Whether a place is on the ground.
     pub fn holds(&self, met: &Interaction) -> bool {
         met.shape == SHAPE
+    }
+
+    /// The lights that count for [`GroundPlane::open_irradiance`].
+    pub fn lights(&self) -> &[LightId] {
+        &self.lights
     }
 
     /// The irradiance at a point of it if nothing else were there, of all lights that are no surfaces.

@@ -5,8 +5,10 @@ use lumbre_shading::{Scatter, Spectrum};
 
 use crate::{Draw, Integrator, RayCounts, Sight};
 
-/// Samples of light that each sample of a shadow takes: few rays, where a whole path would be many.
+/// Samples of each light that each sample of a shadow takes: few rays, where a whole path would be many.
 const SAMPLES: u32 = 2;
+/// Lights that each such sample asks: of more, as many by chance.
+const MOST_LIGHTS: usize = 4;
 
 /// What is seen along a line of sight.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,14 +61,19 @@ fn blocked(
 ) -> Spectrum {
     let from = at.lit_from();
     let mut lost = Spectrum::BLACK;
-    for i in 0..SAMPLES {
-        let Some(sample) = scene.sample_light(from, draw.light_choice(i), draw.light_point(i)) else {
-            continue;
+    let lights = ground.lights();
+    // Every light, where there are few.
+    let asked = lights.len().min(MOST_LIGHTS);
+    let share = lights.len() as f32 / asked.max(1) as f32;
+    for i in 0..SAMPLES * asked as u32 {
+        let chosen = match lights.len() <= MOST_LIGHTS {
+            true => i as usize % asked,
+            false => (draw.light_choice(i) * lights.len() as f64) as usize,
         };
+        let Some(&light) = lights.get(chosen) else { continue };
+        let Some(sample) = scene.sample_one_light(light, from, draw.light_point(i)) else { continue };
         let density = match sample.scatter {
             Scatter::Delta => 1.0,
-            // A surface that shines: no part of the light in the open.
-            Scatter::Density(_) if sample.end.is_some() => continue,
             Scatter::Density(pdf) => pdf,
         };
         let cosine = ground.normal.dot(sample.towards) as f32;
@@ -75,10 +82,10 @@ fn blocked(
         }
         rays.shadow += 1;
         if scene.is_occluded(&at.shadow_ray(&sample)) {
-            lost += sample.radiance * (cosine / (density * SAMPLES as f32));
+            lost += sample.radiance * (cosine * share / (density * SAMPLES as f32));
         }
     }
     let open = ground.open_irradiance(at.surface.point);
-    let share = |lost: f32, open: f32| if open > 0.0 { lost / open } else { 0.0 };
-    Spectrum::new(share(lost.r, open.r), share(lost.g, open.g), share(lost.b, open.b))
+    let part = |lost: f32, open: f32| if open > 0.0 { lost / open } else { 0.0 };
+    Spectrum::new(part(lost.r, open.r), part(lost.g, open.g), part(lost.b, open.b))
 }
