@@ -286,8 +286,8 @@ fn an_interface_is_no_surface_and_gives_no_light() {
     };
     let scene = build(vec![pane]);
     assert!(!scene.is_occluded(&down(4.0, 4.0)) && scene.closest(&down(4.0, 4.0)).is_none());
-    assert_eq!(scene.warnings(), [BuildWarning::LightOnInterface { shape: 6 }]);
-    assert!(scene.lights().iter().all(Light::is_infinite), "nothing but the automatic light");
+    assert_eq!(scene.warnings(), [BuildWarning::LightOnInterface { shape: 6 }, BuildWarning::NoLight]);
+    assert_eq!(scene.lights().len(), 0);
 }
 
 fn csg(operation: CsgOperation, operands: Vec<ShapeDesc>) -> GeometryDesc {
