@@ -11,8 +11,8 @@ use lumbre_math::random::RandomStream;
 use lumbre_math::{DVec2, DVec3, Transform, Vec2, Vec3, warp64};
 use lumbre_scene::{
     AreaLightDesc, BuildError, BuildWarning, Camera, CameraKind, CsgDesc, CsgOperation, Footprint,
-    GeometryDesc, InstanceDesc, Light, LightDesc, MaterialId, MeshDesc, NamedMaterial, ObjectDesc, ObjectId,
-    Scene, SceneDesc, ShapeDesc,
+    GeometryDesc, InstanceDesc, LightDesc, MaterialId, MeshDesc, NamedMaterial, ObjectDesc, ObjectId, Scene,
+    SceneDesc, ShapeDesc,
 };
 use lumbre_shading::{FloatTexture, Material, Texture};
 
