@@ -6,6 +6,7 @@ mod boxes;
 mod build;
 mod options;
 mod oracle;
+mod proof;
 mod refit;
 mod save;
 mod scenes;

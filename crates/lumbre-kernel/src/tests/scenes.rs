@@ -148,6 +148,16 @@ pub(crate) fn icosphere(levels: u32, center: DVec3, radius: f64) -> TriangleMesh
     mesh(positions.into_iter().map(|p| center + radius * p).collect(), indices)
 }
 
+/// A closed mesh that is no convex body, but seen whole from its centre: an icosphere with its vertices moved in and out.
+pub(crate) fn bumpy(levels: u32, center: DVec3, radius: f64) -> TriangleMesh {
+    let mut random = Random(29);
+    let mut ball = icosphere(levels, DVec3::ZERO, radius);
+    for p in &mut ball.positions {
+        *p = (center + p.as_dvec3() * random.between(0.6, 1.4)).as_vec3();
+    }
+    ball
+}
+
 /// A closed torus of `n` by `m` quads. With a small `minor` and few `m` its triangles are needles.
 pub(crate) fn torus(n: u32, m: u32, major: f64, minor: f64) -> TriangleMesh {
     let turn = std::f64::consts::TAU;
