@@ -6,8 +6,12 @@ use lumbre_math::quadratic::quadratic;
 use lumbre_math::rounding::gamma;
 use lumbre_math::{DVec2, DVec3, Transform, orthonormal_basis};
 
+use crate::nearest::{Meridian, under_similarity};
 use crate::support::{arc_support, azimuth, bounds_from_support, cross_size, dot_size};
-use crate::{Aabb, DirectionSample, Ray, Root, Roots, Surface, SurfaceSample, density, measure};
+use crate::{
+    Aabb, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, Surface, SurfaceSample, density,
+    measure,
+};
 
 /// The points at distance ρ(z) = r1 + k z from an axis, z being the distance along it, between two planes across it.
 ///
@@ -346,6 +350,49 @@ impl Axial {
             && w.cross(self.axis).length() <= radius
     }
 
+    /// The nearest point to `p` under a map that keeps angles.
+    pub(crate) fn closest_point(
+        &self,
+        world_from_object: &Transform,
+        p: DVec3,
+    ) -> Result<NearestPoint, NoNearestPoint> {
+        under_similarity(world_from_object, p, |p| {
+            let (e1, e2) = orthonormal_basis(self.axis);
+            let w = p - self.p1;
+            let local = DVec3::new(w.dot(e1), w.dot(e2), w.dot(self.axis));
+            let meridian = Meridian::new(local, self.phi_max);
+            let outward = meridian.outward.x * e1 + meridian.outward.y * e2;
+            let u = (meridian.phi / self.phi_max).min(1.0);
+            // The side is a segment, or a ray or line: p1 and p2 are then at the one end, if there is any.
+            let has_low_end = self.cut1 || self.k > 0.0 || self.is_bounded();
+            let has_high_end = self.is_bounded() || self.cut2;
+            let low = if has_low_end { 0.0 } else { f64::NEG_INFINITY };
+            let high =
+                if has_high_end { if self.is_bounded() { self.length } else { 0.0 } } else { f64::INFINITY };
+            let foot = (meridian.z + self.k * (meridian.x - self.r1)) / (1.0 + self.k * self.k);
+            let z = foot.clamp(low, high);
+            let rho = (self.r1 + self.k * z).max(0.0);
+            let side = NearestPoint {
+                point: self.p1 + z * self.axis + rho * outward,
+                distance: meridian.distance(rho, z),
+                part: LATERAL,
+                uv: DVec2::new(u, if self.is_bounded() { z / self.length } else { z }),
+            };
+            [CAP1, CAP2].into_iter().filter(|&part| self.has_cap(part)).fold(side, |best, part| {
+                let (center, radius) = self.cap(part);
+                let r = meridian.x.clamp(0.0, radius);
+                let z = if part == CAP2 && self.is_bounded() { self.length } else { 0.0 };
+                let uv = DVec2::new(u, r / radius);
+                best.or_nearer(NearestPoint {
+                    point: center + r * outward,
+                    distance: meridian.distance(r, z),
+                    part,
+                    uv,
+                })
+            })
+        })
+    }
+
     /// A point uniform by area: a part, then a point of it; `None` when infinite.
     pub(crate) fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
         if !self.is_bounded() {
@@ -433,6 +480,18 @@ macro_rules! axial_shape {
             /// Whether the closed solid holds `p`; false when open.
             pub fn contains(&self, p: DVec3) -> bool {
                 self.body.contains(p)
+            }
+
+            /// The nearest point to `p` under a map that keeps angles.
+            ///
+            /// # Errors
+            /// [`NoNearestPoint::Map`] for other maps.
+            pub fn closest_point(
+                &self,
+                world_from_object: &Transform,
+                p: DVec3,
+            ) -> Result<NearestPoint, NoNearestPoint> {
+                self.body.closest_point(world_from_object, p)
             }
 
             #[doc = concat!("\"", $name, "\".")]

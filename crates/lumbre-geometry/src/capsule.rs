@@ -6,9 +6,12 @@ use lumbre_math::rounding::gamma;
 use lumbre_math::{DVec2, DVec3, Transform, orthonormal_basis};
 
 use crate::axial::{Axial, CAP1, CAP2, LATERAL, Span};
+use crate::nearest::under_similarity;
 use crate::shape::check;
 use crate::support::bounds_from_support;
-use crate::{Aabb, DirectionSample, Ray, Root, Roots, ShapeError, Surface, SurfaceSample};
+use crate::{
+    Aabb, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface, SurfaceSample,
+};
 use crate::{density, measure, sphere};
 
 /// The points at distance `radius` from the segment between `p0` and `p1`: half a sphere about each end, and the side of a
@@ -240,6 +243,43 @@ impl Capsule {
             p0 + z * self.tube.axis
         };
         (p - nearest).length() <= self.radius()
+    }
+
+    /// The nearest point to `p` under a map that keeps angles.
+    ///
+    /// # Errors
+    /// [`NoNearestPoint::Map`] for other maps.
+    pub fn closest_point(
+        &self,
+        world_from_object: &Transform,
+        p: DVec3,
+    ) -> Result<NearestPoint, NoNearestPoint> {
+        under_similarity(world_from_object, p, |p| {
+            let (axis, length, radius) = (self.tube.axis, self.tube.length, self.radius());
+            let w = p - self.tube.p1;
+            let z = w.dot(axis);
+            let (part, center) = if z < 0.0 {
+                (CAP1, self.tube.p1)
+            } else if z > length {
+                (CAP2, self.tube.p2)
+            } else {
+                (LATERAL, self.tube.p1 + z * axis)
+            };
+            let mut arm = p - center;
+            if part == LATERAL {
+                arm -= arm.dot(axis) * axis;
+            }
+            let from_segment = arm.length();
+            let outward = if from_segment > 0.0 { arm / from_segment } else { orthonormal_basis(axis).0 };
+            let u = (self.tube.phi(outward) / TAU).min(1.0);
+            let surface = if part == LATERAL {
+                self.on_side(z, outward, u)
+            } else {
+                self.on_cap(part, radius * outward, u)
+            };
+            let distance = (from_segment - radius).abs();
+            NearestPoint { point: surface.point, distance, part, uv: surface.uv }
+        })
     }
 
     /// "capsule".

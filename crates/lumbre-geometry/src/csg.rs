@@ -8,7 +8,8 @@ use smallvec::{SmallVec, smallvec};
 
 use crate::placed::into_world;
 use crate::{
-    Aabb, DirectionSample, PlacedShape, Ray, Root, Roots, Shape, ShapeError, Surface, SurfaceSample,
+    Aabb, DirectionSample, NearestPoint, NoNearestPoint, PlacedShape, Ray, Root, Roots, Shape, ShapeError,
+    Surface, SurfaceSample,
 };
 
 /// A stranger's solid, such as a closed mesh, as an operand of CSG.
@@ -140,6 +141,10 @@ const SHAPE_PARTS: u32 = 8;
 
 /// Crossings as close as this, in terms of the coordinates involved, are one.
 const COINCIDENT: f64 = 256.0 * f64::EPSILON;
+
+/// The least distance from other leaves' surfaces, in terms of the coordinates involved, at which it is clear which side of
+/// them a point is on.
+const CLEAR: f64 = 1e-11;
 
 impl Csg {
     /// A single solid: a shape of which [`Shape::is_solid`] says so, such as a whole sphere, a torus (even-odd if it is a
@@ -531,6 +536,51 @@ impl Csg {
             }
         }
         state.holds(0)
+    }
+
+    /// The nearest point to `p`, where it is the nearest point of all leaves and lies on the result alone.
+    ///
+    /// # Errors
+    /// [`NoNearestPoint`] where it is not, and where a leaf has no answer.
+    pub fn closest_point(
+        &self,
+        world_from_object: &Transform,
+        p: DVec3,
+    ) -> Result<NearestPoint, NoNearestPoint> {
+        let leaf_point = |leaf: &Leaf, p: DVec3| match leaf {
+            Leaf::Shape(shape) => {
+                shape.shape().closest_point(&(*world_from_object * shape.world_from_object()), p)
+            }
+            Leaf::Solid { .. } => Err(NoNearestPoint::Csg),
+        };
+        let mut best: Option<(usize, NearestPoint)> = None;
+        for (i, leaf) in self.leaves.iter().enumerate() {
+            let found = leaf_point(leaf, p)?;
+            if best.is_none_or(|(_, best)| found.distance < best.distance) {
+                best = Some((i, found));
+            }
+        }
+        let (nearest, found) = best.ok_or(NoNearestPoint::Csg)?;
+        // No point of the result is nearer, for it lies on some leaf. It remains to be seen whether this one is on the result.
+        let mut state = State::new(self);
+        let object_point = world_from_object.inverse_point(found.point);
+        for (i, leaf) in self.leaves.iter().enumerate().filter(|(i, _)| *i != nearest) {
+            let size = found.point.abs().max_element().max(p.abs().max_element());
+            let is_clear = leaf_point(leaf, found.point)?.distance > CLEAR * (size + found.distance);
+            if !is_clear {
+                return Err(NoNearestPoint::Csg);
+            }
+            if leaf.contains(object_point) {
+                state.turn(i as u32, true);
+            }
+        }
+        let holds_outside = state.holds(0);
+        state.turn(nearest as u32, true);
+        if state.holds(0) == holds_outside {
+            return Err(NoNearestPoint::Csg);
+        }
+        let part = (self.first_part[nearest] + found.part) << 1 | u32::from(self.places[nearest].1);
+        Ok(NearestPoint { part, ..found })
     }
 
     /// "csg".

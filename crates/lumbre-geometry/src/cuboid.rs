@@ -3,9 +3,13 @@
 use lumbre_math::rounding::gamma;
 use lumbre_math::{DVec2, DVec3, Transform};
 
+use crate::nearest::{on_triangle, similarity_factor, under_similarity};
 use crate::shape::check;
 use crate::support::bounds_from_support;
-use crate::{Aabb, DirectionSample, Ray, Root, Roots, ShapeError, Surface, SurfaceSample, density, measure};
+use crate::{
+    Aabb, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
+    SurfaceSample, density, measure,
+};
 
 /// The box between two corners, "box" in the scene language. A solid, closed: a ray that slides in a face enters and
 /// leaves through the faces at its ends.
@@ -167,6 +171,46 @@ impl Cuboid {
     /// Whether the closed box holds `p`.
     pub fn contains(&self, p: DVec3) -> bool {
         self.low.cmple(p).all() && p.cmple(self.high).all()
+    }
+
+    /// The nearest point to `p` under a map.
+    ///
+    /// # Errors
+    /// [`NoNearestPoint::Map`] never.
+    pub fn closest_point(
+        &self,
+        world_from_object: &Transform,
+        p: DVec3,
+    ) -> Result<NearestPoint, NoNearestPoint> {
+        if similarity_factor(world_from_object).is_none() {
+            let face = |part: u32| {
+                let corner = |u: f64, v: f64| {
+                    let at = self.surface_at(part, DVec2::new(u, v)).map_or(DVec3::NAN, |s| s.point);
+                    world_from_object.point(at)
+                };
+                let [p00, p10, p01, p11] =
+                    [corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0), corner(1.0, 1.0)];
+                let low = on_triangle(p, [p00, p10, p01], part);
+                let high = on_triangle(p, [p11, p01, p10], part);
+                low.or_nearer(NearestPoint { uv: DVec2::ONE - high.uv, ..high })
+            };
+            return Ok((1..6).map(face).fold(face(0), NearestPoint::or_nearer));
+        }
+        under_similarity(world_from_object, p, |p| {
+            let mut point = p.clamp(self.low, self.high);
+            // The face: from within, the nearest; from without, that over which it is farthest.
+            let depths = [p - self.low, self.high - p];
+            let depth = |part: usize| depths[part % 2][part / 2];
+            let part = (1..6).fold(0, |best, part| if depth(part) < depth(best) { part } else { best });
+            point[part / 2] = if part % 2 == 1 { self.high } else { self.low }[part / 2];
+            let (i, j) = ((part / 2 + 1) % 3, (part / 2 + 2) % 3);
+            let size = self.high - self.low;
+            let share = |axis: usize| {
+                if size[axis] > 0.0 { (point[axis] - self.low[axis]) / size[axis] } else { 0.0 }
+            };
+            let uv = DVec2::new(share(i), share(j));
+            NearestPoint { point, distance: (p - point).length(), part: part as u32, uv }
+        })
     }
 
     /// "box".

@@ -5,9 +5,13 @@ use std::f64::consts::TAU;
 use lumbre_math::rounding::gamma;
 use lumbre_math::{DVec2, DVec3, Transform, orthonormal_basis};
 
+use crate::nearest::{Meridian, under_similarity};
 use crate::shape::check;
 use crate::support::{arc_support, azimuth, bounds_from_support, dot_size};
-use crate::{Aabb, DirectionSample, Ray, Root, Roots, ShapeError, Surface, SurfaceSample, density, measure};
+use crate::{
+    Aabb, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
+    SurfaceSample, density, measure,
+};
 
 /// The points of a plane between two distances from a centre, both included.
 ///
@@ -157,6 +161,32 @@ impl Disk {
     /// It holds no volume.
     pub fn contains(&self, _p: DVec3) -> bool {
         false
+    }
+
+    /// The nearest point to `p` under a map that keeps angles.
+    ///
+    /// # Errors
+    /// [`NoNearestPoint::Map`] for other maps.
+    pub fn closest_point(
+        &self,
+        world_from_object: &Transform,
+        p: DVec3,
+    ) -> Result<NearestPoint, NoNearestPoint> {
+        under_similarity(world_from_object, p, |p| {
+            let axis = self.normal();
+            let (e1, e2) = orthonormal_basis(axis);
+            let w = p - self.center;
+            let meridian = Meridian::new(DVec3::new(w.dot(e1), w.dot(e2), w.dot(axis)), self.phi_max);
+            let r = meridian.x.clamp(self.inner_radius, self.radius);
+            let arm = r * (meridian.outward.x * e1 + meridian.outward.y * e2);
+            let v = (self.radius - r) / (self.radius - self.inner_radius);
+            NearestPoint {
+                point: self.center + arm,
+                distance: meridian.distance(r, 0.0),
+                part: 0,
+                uv: DVec2::new((meridian.phi / self.phi_max).min(1.0), v),
+            }
+        })
     }
 
     /// "disk".

@@ -3,14 +3,18 @@
 use std::f64::consts::TAU;
 
 use lumbre_math::quadratic::{dop, quadratic};
-use lumbre_math::roots::bracketed_root;
+use lumbre_math::roots::{bracketed_root, roots_between};
 use lumbre_math::rounding::gamma;
 use lumbre_math::{DVec2, DVec3, Transform};
 
 use crate::line::{Implicit, NearLine};
+use crate::nearest::{Meridian, under_similarity};
 use crate::shape::check;
 use crate::support::{arc_support, azimuth, bounds_from_support};
-use crate::{Aabb, DirectionSample, Ray, Root, Roots, ShapeError, Surface, SurfaceSample, density, measure};
+use crate::{
+    Aabb, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
+    SurfaceSample, density, measure,
+};
 
 /// What the segment from `p1` to `p2` sweeps when it turns about the z axis.
 ///
@@ -128,6 +132,23 @@ impl Hyperboloid {
         self.surface_on(near + self.implicit(near).to_surface())
     }
 
+    /// The nearest point of the circle, or the part of one, that the segment's point at `v` sweeps.
+    fn nearest_at(&self, p: DVec3, v: f64) -> NearestPoint {
+        let q = self.segment(v);
+        let start = azimuth(q.y, q.x);
+        // The frame that has turned to where the sweep begins.
+        let flat = DVec2::from_angle(-start).rotate(p.truncate());
+        let meridian = Meridian::new(flat.extend(p.z), self.phi_max);
+        let r = q.truncate().length();
+        let outward = DVec2::from_angle(start).rotate(meridian.outward);
+        NearestPoint {
+            point: (r * outward).extend(q.z),
+            distance: meridian.distance(r, q.z),
+            part: 0,
+            uv: DVec2::new((meridian.phi / self.phi_max).min(1.0), v),
+        }
+    }
+
     /// The surface at `uv`.
     pub fn surface_at(&self, part: u32, uv: DVec2) -> Option<Surface> {
         (part == 0).then(|| Surface { uv, ..self.surface_on(self.point_at(uv)) })
@@ -238,6 +259,71 @@ impl Hyperboloid {
     /// Nothing.
     pub fn contains(&self, _p: DVec3) -> bool {
         false
+    }
+
+    /// The nearest point to `p` under a map that keeps angles.
+    ///
+    /// # Errors
+    /// [`NoNearestPoint::Map`] for other maps.
+    pub fn closest_point(
+        &self,
+        world_from_object: &Transform,
+        p: DVec3,
+    ) -> Result<NearestPoint, NoNearestPoint> {
+        under_similarity(world_from_object, p, |p| {
+            let mut best = self.nearest_at(p, 0.0);
+            let mut take = |v: f64| best = best.or_nearer(self.nearest_at(p, v));
+            take(1.0);
+            // Where the slope of the squared distance along the segment vanishes when it has turned towards the point: with
+            // r² = start + 2 middle v + end v² and the point at (x, z), (middle + end v)(1 - x/r) + (z of v - z) dz/dv = 0.
+            let x = p.truncate().length();
+            let rise = self.along.z;
+            let line = [self.middle + rise * (self.p1.z - p.z), self.end + rise * rise];
+            let square = [line[0] * line[0], 2.0 * line[0] * line[1], line[1] * line[1]];
+            let radius = [self.start, 2.0 * self.middle, self.end];
+            let spread = [self.middle * self.middle, 2.0 * self.middle * self.end, self.end * self.end];
+            let mut slope = [0.0; 5];
+            for i in 0..3 {
+                slope[i] -= x * x * spread[i];
+                for j in 0..3 {
+                    slope[i + j] += square[i] * radius[j];
+                }
+            }
+            let on_axis = [-line[0] / line[1], -self.middle / self.end];
+            for v in roots_between(&slope, 0.0, 1.0).iter().copied().chain(on_axis) {
+                let mut v = v;
+                // Steps of Newton's method, since the polynomial has few digits next to the axis.
+                for _ in 0..3 {
+                    let r = (radius[0] + v * (radius[1] + v * radius[2])).sqrt();
+                    let half_spread = self.middle + self.end * v;
+                    let first = line[0] + line[1] * v - x * half_spread / r;
+                    let second = line[1] - x * (self.end / r - half_spread * half_spread / (r * r * r));
+                    let next = v - first / second;
+                    let is_step = (next - v).abs() < 1e-3;
+                    if !is_step {
+                        break;
+                    }
+                    v = next;
+                }
+                if v.is_finite() {
+                    take(v.clamp(0.0, 1.0));
+                }
+            }
+            if self.phi_max < TAU {
+                // The segment where it begins and ends to turn.
+                for phi in [0.0, self.phi_max] {
+                    let turn = DVec2::from_angle(phi);
+                    let start = turn.rotate(self.p1.truncate()).extend(self.p1.z);
+                    let along = turn.rotate(self.along.truncate()).extend(self.along.z);
+                    let v = ((p - start).dot(along) / along.length_squared()).clamp(0.0, 1.0);
+                    let point = start + v * along;
+                    let uv = DVec2::new(phi / self.phi_max, v);
+                    best =
+                        best.or_nearer(NearestPoint { point, distance: (p - point).length(), part: 0, uv });
+                }
+            }
+            best
+        })
     }
 
     /// "hyperboloid".

@@ -3,13 +3,18 @@
 use std::f64::consts::TAU;
 
 use lumbre_math::quadratic::{dop, quadratic};
+use lumbre_math::roots::roots_between;
 use lumbre_math::rounding::gamma;
 use lumbre_math::{DVec2, DVec3, Transform};
 
 use crate::line::{Implicit, NearLine};
+use crate::nearest::{Meridian, under_similarity};
 use crate::shape::check;
 use crate::support::{arc_support, azimuth, bounds_from_support};
-use crate::{Aabb, DirectionSample, Ray, Root, Roots, ShapeError, Surface, SurfaceSample, density, measure};
+use crate::{
+    Aabb, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
+    SurfaceSample, density, measure,
+};
 
 /// The surface `z = zmax (x² + y²)/radius²` between two heights: the bowl, open upwards, whose rim at `zmax` has the given
 /// radius.
@@ -188,6 +193,33 @@ impl Paraboloid {
     /// Nothing.
     pub fn contains(&self, _p: DVec3) -> bool {
         false
+    }
+
+    /// The nearest point to `p` under a map that keeps angles.
+    ///
+    /// # Errors
+    /// [`NoNearestPoint::Map`] for other maps.
+    pub fn closest_point(
+        &self,
+        world_from_object: &Transform,
+        p: DVec3,
+    ) -> Result<NearestPoint, NoNearestPoint> {
+        under_similarity(world_from_object, p, |p| {
+            let meridian = Meridian::new(p, self.phi_max);
+            let (inner, rim) = (self.radius_at(self.bottom()), self.radius_at(self.z_max));
+            // Where the slope of the squared distance vanishes along the parabola, in units of the rim's radius.
+            let square = self.bend * rim * self.bend * rim;
+            let slope = [-meridian.x / rim, 1.0 - 2.0 * self.bend * meridian.z, 0.0, 2.0 * square];
+            let inside = roots_between(&slope, inner / rim, 1.0);
+            let places = inside.iter().map(|s| (s * rim).clamp(inner, rim)).chain([rim]);
+            let height = |r: f64| (self.bend * r * r).clamp(self.bottom(), self.z_max);
+            let distance = |r: f64| meridian.distance(r, height(r));
+            let r = places.fold(inner, |best, r| if distance(r) < distance(best) { r } else { best });
+            let point = (r * meridian.outward).extend(height(r));
+            let v = (height(r) - self.z_min) / (self.z_max - self.z_min);
+            let uv = DVec2::new((meridian.phi / self.phi_max).min(1.0), v);
+            NearestPoint { point, distance: distance(r), part: 0, uv }
+        })
     }
 
     /// "paraboloid".

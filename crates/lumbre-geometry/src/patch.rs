@@ -3,13 +3,18 @@
 use std::f64::consts::TAU;
 
 use lumbre_math::quadratic::{dop, quadratic};
+use lumbre_math::roots::{RealRoots, roots_between};
 use lumbre_math::rounding::gamma;
 use lumbre_math::{DVec2, DVec3, Transform};
+use smallvec::SmallVec;
 
 use crate::shape::check;
 use crate::support::bounds_from_support;
 use crate::triangle::solid_angle_of;
-use crate::{Aabb, DirectionSample, Ray, Root, Roots, ShapeError, Surface, SurfaceSample, density, measure};
+use crate::{
+    Aabb, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
+    SurfaceSample, density, measure,
+};
 
 /// The surface (1−u)(1−v) p00 + u(1−v) p10 + (1−u)v p01 + uv p11 with u and v in [0, 1]: doubly ruled, and flat when the
 /// corners are. It faces along ∂p/∂u × ∂p/∂v.
@@ -213,6 +218,55 @@ impl BilinearPatch {
         false
     }
 
+    /// The nearest point to `p` under a map.
+    ///
+    /// # Errors
+    /// [`NoNearestPoint::Map`] never.
+    pub fn closest_point(
+        &self,
+        world_from_object: &Transform,
+        p: DVec3,
+    ) -> Result<NearestPoint, NoNearestPoint> {
+        let [q00, q10, q01, q11] = self.corners().map(|corner| world_from_object.point(corner) - p);
+        let at = |u: f64, v: f64| (1.0 - v) * ((1.0 - u) * q00 + u * q10) + v * ((1.0 - u) * q01 + u * q11);
+        let mut best = (DVec2::ZERO, q00);
+        let mut take = |uv: DVec2| {
+            let uv = uv.clamp(DVec2::ZERO, DVec2::ONE);
+            let point = at(uv.x, uv.y);
+            if point.length_squared() < best.1.length_squared() {
+                best = (uv, point);
+            }
+        };
+        // The sides, and the line of constant u through every place where the slope along both parameters vanishes.
+        let along = |start: DVec3, end: DVec3| {
+            let side = end - start;
+            let t = -start.dot(side) / side.length_squared();
+            if t.is_finite() { t.clamp(0.0, 1.0) } else { 0.0 }
+        };
+        take(DVec2::new(along(q00, q10), 0.0));
+        take(DVec2::new(along(q01, q11), 1.0));
+        let inside = stationary(q00, q10, q01, q11);
+        let columns: SmallVec<[f64; 8]> = inside.iter().copied().chain([0.0, 1.0]).collect();
+        for &u in &columns {
+            let v = along((1.0 - u) * q00 + u * q10, (1.0 - u) * q01 + u * q11);
+            take(DVec2::new(u, v));
+            take(DVec2::new(along((1.0 - v) * q00 + v * q01, (1.0 - v) * q10 + v * q11), v));
+        }
+        // A few steps along each parameter in turn give back the digits that the polynomial lost.
+        for _ in 0..4 {
+            let v = best.0.y;
+            let u = along((1.0 - v) * q00 + v * q01, (1.0 - v) * q10 + v * q11);
+            let v = along((1.0 - u) * q00 + u * q10, (1.0 - u) * q01 + u * q11);
+            let point = at(u, v);
+            if point.length_squared() >= best.1.length_squared() {
+                break;
+            }
+            best = (DVec2::new(u, v), point);
+        }
+        let (uv, offset) = best;
+        Ok(NearestPoint { point: p + offset, distance: offset.length(), part: 0, uv })
+    }
+
     /// "bilinear".
     pub fn name(&self) -> &'static str {
         "bilinear"
@@ -309,4 +363,35 @@ impl BilinearPatch {
 /// A number in [0, 1] with a density that goes linearly from `a` at 0 to `b` at 1, both ≥ 0 and not both 0.
 fn sample_linear(u: f64, a: f64, b: f64) -> f64 {
     (u * (a + b) / (a + ((1.0 - u) * a * a + u * b * b).sqrt())).clamp(0.0, 1.0)
+}
+/// The `u` in [0, 1] of a patch's lines of constant u, whole lines and not just their parts in the patch, on which the point
+/// nearest to the origin is at a standstill: with a(u) + v b(u) on the line and v = -a·b/b·b nearest, the slope along u
+/// vanishes, which times (b·b)² is a quintic.
+fn stationary(q00: DVec3, q10: DVec3, q01: DVec3, q11: DVec3) -> RealRoots<6> {
+    // Each a polynomial in u.
+    let (a, b) = ([q00, q10 - q00], [q01 - q00, (q11 - q10) - (q01 - q00)]);
+    let product = |x: &[f64], y: &[f64]| {
+        let mut sum = [0.0; 6];
+        for (i, x) in x.iter().enumerate() {
+            for (j, y) in y.iter().enumerate() {
+                // Degrees beyond the fifth have coefficients that are not there.
+                if let Some(place) = sum.get_mut(i + j) {
+                    *place += x * y;
+                }
+            }
+        }
+        sum
+    };
+    let dot =
+        |x: [DVec3; 2], y: [DVec3; 2]| [x[0].dot(y[0]), x[0].dot(y[1]) + x[1].dot(y[0]), x[1].dot(y[1])];
+    let along = |x: [DVec3; 2], y: DVec3| [x[0].dot(y), x[1].dot(y)];
+    let (n, d) = (dot(a, b), dot(b, b));
+    let square = product(&d, &d);
+    let both = product(&n, &d);
+    let first = product(&along(a, a[1]), &square[..5]);
+    let second = product(&both[..5], &along(a, b[1]));
+    let third = product(&both[..5], &along(b, a[1]));
+    let fourth = product(&product(&n, &n)[..5], &along(b, b[1]));
+    let slope: [f64; 6] = std::array::from_fn(|i| first[i] - second[i] - third[i] + fourth[i]);
+    roots_between(&slope, 0.0, 1.0)
 }

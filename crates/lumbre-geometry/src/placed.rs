@@ -3,7 +3,10 @@
 use lumbre_math::rounding::gamma;
 use lumbre_math::{DMat3, DVec2, DVec3, Transform};
 
-use crate::{Aabb, DirectionSample, Ray, Root, Roots, Shape, Surface, SurfaceSample, measure};
+use crate::{
+    Aabb, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, Shape, Surface, SurfaceSample,
+    measure,
+};
 
 /// An exact shape under any invertible affine map. The ray goes to the shape, not the shape to the ray, and `t` stays.
 #[derive(Clone, Debug)]
@@ -61,6 +64,25 @@ impl PlacedShape {
         match &self.world_from_object {
             None => self.shape.surface(ray, root),
             Some(m) => into_world(m, &self.shape.surface(&ray.into_object(m), root)),
+        }
+    }
+
+    /// The point of the surface that is nearest to `p`, both in world space: see [`Shape::closest_point`].
+    ///
+    /// # Errors
+    /// [`NoNearestPoint`] where there is no method for the shape, or not under its map.
+    pub fn closest_point(&self, p: DVec3) -> Result<NearestPoint, NoNearestPoint> {
+        self.shape.closest_point(&self.world_from_object(), p)
+    }
+
+    /// The same when the shape is placed under `outer` in turn.
+    ///
+    /// # Errors
+    /// As [`PlacedShape::closest_point`].
+    pub fn closest_point_under(&self, outer: &Transform, p: DVec3) -> Result<NearestPoint, NoNearestPoint> {
+        match &self.world_from_object {
+            None => self.shape.closest_point(outer, p),
+            Some(m) => self.shape.closest_point(&(*outer * **m), p),
         }
     }
 

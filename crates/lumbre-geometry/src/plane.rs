@@ -5,7 +5,9 @@ use lumbre_math::{DVec2, DVec3, Transform, orthonormal_basis};
 
 use crate::shape::check;
 use crate::support::dot_size;
-use crate::{Aabb, DirectionSample, Ray, Root, Roots, ShapeError, Surface, SurfaceSample};
+use crate::{
+    Aabb, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface, SurfaceSample,
+};
 
 /// The plane through a point, facing along its normal; as a solid, the half-space below it.
 ///
@@ -102,6 +104,26 @@ impl Plane {
     /// Whether `p` lies in the plane or below it.
     pub fn contains(&self, p: DVec3) -> bool {
         (p - self.point).dot(self.normal) <= 0.0
+    }
+
+    /// The nearest point to `p` under a map.
+    ///
+    /// # Errors
+    /// [`NoNearestPoint::Map`] never.
+    pub fn closest_point(
+        &self,
+        world_from_object: &Transform,
+        p: DVec3,
+    ) -> Result<NearestPoint, NoNearestPoint> {
+        let point = world_from_object.point(self.point);
+        let normal = world_from_object.normal(self.normal);
+        let normal = normal / normal.abs().max_element();
+        let height = (p - point).dot(normal);
+        let foot = p - (height / normal.length_squared()) * normal;
+        let w = world_from_object.inverse_point(foot) - self.point;
+        let (e1, e2) = orthonormal_basis(self.normal());
+        let uv = DVec2::new(w.dot(e1), w.dot(e2));
+        Ok(NearestPoint { point: foot, distance: height.abs() / normal.length(), part: 0, uv })
     }
 
     /// "plane".

@@ -14,8 +14,8 @@ use crate::placed::into_world;
 use crate::shape::check;
 use crate::support::bounds_from_support;
 use crate::{
-    Aabb, DirectionSample, PlacedShape, Ray, Root, Roots, Shape, ShapeError, Sphere, Surface, SurfaceSample,
-    density, measure,
+    Aabb, DirectionSample, NearestPoint, NoNearestPoint, PlacedShape, Ray, Root, Roots, Shape, ShapeError,
+    Sphere, Surface, SurfaceSample, density, measure,
 };
 
 /// The points where `A x² + B y² + C z² + D xy + E xz + F yz + G x + H y + I z + J` is 0, all of them or those in a box.
@@ -401,6 +401,19 @@ impl Quadric {
     /// Whether a closed quadric holds `p`.
     pub fn contains(&self, p: DVec3) -> bool {
         self.is_solid() && self.implicit(p).value <= 0.0
+    }
+
+    /// The nearest point of a closed quadric to `p`, under any map.
+    ///
+    /// # Errors
+    /// [`NoNearestPoint::OpenQuadric`] for others.
+    pub fn closest_point(
+        &self,
+        world_from_object: &Transform,
+        p: DVec3,
+    ) -> Result<NearestPoint, NoNearestPoint> {
+        let ellipsoid = self.ellipsoid.as_ref().ok_or(NoNearestPoint::OpenQuadric)?;
+        ellipsoid.shape().closest_point(&(*world_from_object * ellipsoid.world_from_object()), p)
     }
 
     /// "quadric".

@@ -72,6 +72,25 @@ macro_rules! shapes {
                 match self { $(Self::$shape(shape) => shape.contains(p),)+ }
             }
 
+            /// The point of the surface, under `world_from_object`, that is nearest to `p`; of several, always the same.
+            ///
+            /// Triangles, boxes, planes, bilinear patches and whole spheres and ellipsoids have a method under every map,
+            /// the other shapes under those that keep angles; general quadrics have none. What is answered is the nearest
+            /// point of all, up to rounding.
+            ///
+            /// # Errors
+            /// [`NoNearestPoint`] where there is no method: never a point that is not the nearest.
+            pub fn closest_point(
+                &self,
+                world_from_object: &Transform,
+                p: DVec3,
+            ) -> Result<NearestPoint, NoNearestPoint> {
+                if !p.is_finite() {
+                    return Err(NoNearestPoint::NotFinite);
+                }
+                match self { $(Self::$shape(shape) => shape.closest_point(world_from_object, p),)+ }
+            }
+
             /// The name in the scene language.
             pub fn name(&self) -> &'static str {
                 match self { $(Self::$shape(shape) => shape.name(),)+ }

@@ -6,9 +6,13 @@ use lumbre_math::quadratic::quadratic;
 use lumbre_math::rounding::gamma;
 use lumbre_math::{DVec2, DVec3, Transform, orthonormal_basis};
 
+use crate::nearest::{Meridian, nearest_on_ellipsoid, similarity_factor, under_similarity};
 use crate::shape::check;
 use crate::support::{arc_support, azimuth, bounds_from_support};
-use crate::{Aabb, DirectionSample, Ray, Root, Roots, ShapeError, Surface, SurfaceSample, density, measure};
+use crate::{
+    Aabb, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
+    SurfaceSample, density, measure,
+};
 
 /// The points at distance `radius` from `center`.
 ///
@@ -89,6 +93,16 @@ impl Sphere {
     /// The point of the whole sphere at `t`, relative to the centre.
     fn arm(&self, ray: &Ray, t: f64) -> DVec3 {
         let w = (ray.origin - self.center) + t * ray.direction;
+        w * (self.radius / w.length())
+    }
+
+    /// The point of the whole sphere below `w`, both relative to the centre.
+    fn radial(&self, w: DVec3) -> DVec3 {
+        let largest = w.abs().max_element();
+        if largest == 0.0 {
+            return DVec3::new(0.0, 0.0, self.radius);
+        }
+        let w = w / largest;
         w * (self.radius / w.length())
     }
 
@@ -216,6 +230,59 @@ impl Sphere {
     /// Whether the ball holds `p`.
     pub fn contains(&self, p: DVec3) -> bool {
         self.is_whole() && (p - self.center).length() <= self.radius
+    }
+
+    /// The nearest point to `p` under a map: of a part of a sphere, one that keeps angles.
+    ///
+    /// # Errors
+    /// [`NoNearestPoint::Map`] for a part of a sphere under another map.
+    pub fn closest_point(
+        &self,
+        world_from_object: &Transform,
+        p: DVec3,
+    ) -> Result<NearestPoint, NoNearestPoint> {
+        if self.is_whole() && !world_from_object.is_identity() {
+            // An ellipsoid, or a sphere again.
+            let center = world_from_object.point(self.center);
+            let w = match similarity_factor(world_from_object) {
+                Some(_) => self.radial(world_from_object.inverse_vector(p - center)),
+                None => nearest_on_ellipsoid(world_from_object.linear(), self.radius, p - center),
+            };
+            let arm = world_from_object.vector(w);
+            let distance = match similarity_factor(world_from_object) {
+                Some(factor) => (factor * self.radius - (p - center).length()).abs(),
+                None => (p - center - arm).length(),
+            };
+            return Ok(NearestPoint { point: center + arm, distance, part: 0, uv: self.surface_on(w).uv });
+        }
+        under_similarity(world_from_object, p, |p| {
+            let from_center = p - self.center;
+            let w = if self.is_whole() {
+                self.radial(from_center)
+            } else {
+                let meridian = Meridian::new(from_center, self.phi_max);
+                let theta = meridian.x.atan2(meridian.z);
+                let at = |theta: f64, z: f64| {
+                    let r = if z.abs() < self.radius { self.radius * theta.sin() } else { 0.0 };
+                    (r, z)
+                };
+                let on_arc = self.theta_max <= theta && theta <= self.theta_min;
+                let (r, z) = if on_arc {
+                    (self.radius * theta.sin(), self.radius * theta.cos())
+                } else {
+                    let (top, bottom) = (at(self.theta_max, self.z_max), at(self.theta_min, self.z_min));
+                    let is_top = meridian.distance(top.0, top.1) <= meridian.distance(bottom.0, bottom.1);
+                    if is_top { top } else { bottom }
+                };
+                (r * meridian.outward).extend(z)
+            };
+            let distance = if self.is_whole() {
+                (from_center.length() - self.radius).abs()
+            } else {
+                (from_center - w).length()
+            };
+            NearestPoint { point: self.center + w, distance, part: 0, uv: self.surface_on(w).uv }
+        })
     }
 
     /// "sphere".

@@ -6,9 +6,13 @@ use lumbre_math::roots::{DepressedCubic, bracketed_root};
 use lumbre_math::rounding::gamma;
 use lumbre_math::{DVec2, DVec3, Transform, orthonormal_basis};
 
+use crate::nearest::under_similarity;
 use crate::shape::check;
 use crate::support::{azimuth, bounds_from_support};
-use crate::{Aabb, DirectionSample, Ray, Root, Roots, ShapeError, Surface, SurfaceSample, density, measure};
+use crate::{
+    Aabb, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
+    SurfaceSample, density, measure,
+};
 
 /// The points at distance `minor` from a circle of radius `major`.
 ///
@@ -496,6 +500,32 @@ impl Torus {
         let p = self.framed(p - self.center);
         let (outer, inner) = self.factors(p.x.hypot(p.y), p.z);
         outer <= 0.0 && (self.is_ring() || inner >= 0.0)
+    }
+
+    /// The nearest point to `p` under a map that keeps angles.
+    ///
+    /// # Errors
+    /// [`NoNearestPoint::Map`] for other maps.
+    pub fn closest_point(
+        &self,
+        world_from_object: &Transform,
+        p: DVec3,
+    ) -> Result<NearestPoint, NoNearestPoint> {
+        under_similarity(world_from_object, p, |p| {
+            let local = self.framed(p - self.center);
+            let rho = local.x.hypot(local.y);
+            let outward = if rho > 0.0 { DVec2::new(local.x, local.y) / rho } else { DVec2::X };
+            // The plane through the axis and the point cuts the torus in two circles.
+            let near = DVec2::new(rho - self.major, local.z);
+            let far = DVec2::new(-rho - self.major, local.z);
+            let distance = |tube: DVec2| (tube.length() - self.minor).abs();
+            let (surface, distance) = if distance(near) <= distance(far) {
+                (self.surface_on(outward, near), distance(near))
+            } else {
+                (self.surface_on(-outward, far), distance(far))
+            };
+            NearestPoint { point: surface.point, distance, part: 0, uv: surface.uv }
+        })
     }
 
     /// "torus".

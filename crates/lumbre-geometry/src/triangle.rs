@@ -6,9 +6,13 @@ use lumbre_math::quadratic::dop;
 use lumbre_math::rounding::gamma;
 use lumbre_math::{DVec2, DVec3, Transform};
 
+use crate::nearest::on_triangle;
 use crate::shape::check;
 use crate::support::bounds_from_support;
-use crate::{Aabb, DirectionSample, Ray, Root, Roots, ShapeError, Surface, SurfaceSample, density, measure};
+use crate::{
+    Aabb, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
+    SurfaceSample, density, measure,
+};
 
 /// Where a line meets a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -257,6 +261,19 @@ impl Triangle {
     /// It holds no volume.
     pub fn contains(&self, _p: DVec3) -> bool {
         false
+    }
+
+    /// The nearest point to `p` under a map.
+    ///
+    /// # Errors
+    /// [`NoNearestPoint::Map`] never.
+    pub fn closest_point(
+        &self,
+        world_from_object: &Transform,
+        p: DVec3,
+    ) -> Result<NearestPoint, NoNearestPoint> {
+        let corners = self.corners().map(|corner| world_from_object.point(corner));
+        Ok(on_triangle(p, corners, 0))
     }
 
     /// "triangle".
