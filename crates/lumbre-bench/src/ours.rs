@@ -65,7 +65,10 @@ fn list(scene: &Scene) -> Vec<Geometry> {
     let shapes = scene.shapes.iter().map(|shape| GeometryKind::Shape(shape.clone()));
     let instances = scene.placements.iter().map(|placement| {
         let world_from_object = placement.transform();
-        GeometryKind::Instance(Instance { accel: Arc::clone(&nothing), world_from_object })
+        GeometryKind::Instance(Instance {
+            accel: Arc::clone(&nothing),
+            world_from_object: world_from_object.into(),
+        })
     });
     let kinds = meshes.chain(spheres).chain(shapes).chain(instances);
     kinds.enumerate().map(|(i, kind)| Geometry { id: i as u32, kind }).collect()

@@ -16,18 +16,26 @@ pub struct Ray {
     pub t_min: f64,
     /// The largest `t` that counts, itself included; may be infinite.
     pub t_max: f64,
+    /// When it looks, in the unit of the keys of what moves; of no consequence to what stands still.
+    pub time: f64,
 }
 
 impl Ray {
-    /// The half-line from `origin` along `direction`.
+    /// The half-line from `origin` along `direction`, at time 0.
     pub fn new(origin: DVec3, direction: DVec3) -> Self {
-        Self { origin, direction, t_min: 0.0, t_max: f64::INFINITY }
+        Self { origin, direction, t_min: 0.0, t_max: f64::INFINITY, time: 0.0 }
     }
 
     /// The same line with another range.
     #[must_use]
     pub fn with_range(self, t_min: f64, t_max: f64) -> Self {
         Self { t_min, t_max, ..self }
+    }
+
+    /// The same ray at another time.
+    #[must_use]
+    pub fn at_time(self, time: f64) -> Self {
+        Self { time, ..self }
     }
 
     /// The point at `t`.

@@ -234,7 +234,10 @@ fn instances(n: usize) -> Vec<GeometryKind> {
             let world_from_object = Transform::translate(center)
                 * Transform::rotate(random.direction(), 360.0 * random.unit()).expect("an axis")
                 * Transform::scale(DVec3::splat(0.07 * step)).expect("not flat");
-            GeometryKind::Instance(Instance { accel: Arc::clone(&accel), world_from_object })
+            GeometryKind::Instance(Instance {
+                accel: Arc::clone(&accel),
+                world_from_object: world_from_object.into(),
+            })
         })
         .collect();
     kinds.push(ground());

@@ -304,12 +304,12 @@ impl Accel {
         surface::surface(self, ray, hit)
     }
 
-    /// The map from the space of the hit's innermost instance to the space of this tree.
+    /// The map from the space of the hit's innermost instance to the space of this tree, at the time of the ray.
     ///
     /// # Panics
     /// When `hit` comes from another tree and names what is not in this one.
-    pub fn world_from_object(&self, hit: &Hit) -> Transform {
-        surface::world_from_object(self, hit)
+    pub fn world_from_object(&self, ray: &Ray, hit: &Hit) -> Transform {
+        surface::world_from_object(self, ray, hit)
     }
 
     /// A box around everything finite in it.

@@ -4,7 +4,7 @@ use std::fmt::Debug;
 use std::sync::Arc;
 
 use lumbre_geometry::{Aabb, PlacedShape, Ray, Root, Roots, Surface};
-use lumbre_math::{DVec3, Transform, Vec3};
+use lumbre_math::{AnimatedTransform, DVec3, Transform, Vec3};
 
 use crate::Accel;
 
@@ -31,13 +31,59 @@ pub enum GeometryKind {
     Custom(Arc<dyn CustomGeometry>),
 }
 
-/// A tree under an invertible affine map; trees may hold instances in turn.
+/// A tree under an invertible affine map, which may change with time; trees may hold instances in turn.
 #[derive(Clone, Debug)]
 pub struct Instance {
     /// What is placed.
     pub accel: Arc<Accel>,
     /// Where.
-    pub world_from_object: Transform,
+    pub world_from_object: Placement,
+}
+
+/// Where an instance stands.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Placement {
+    /// At one place at all times.
+    Still(Transform),
+    /// At the place that the time of a ray says.
+    Moving(Arc<AnimatedTransform>),
+}
+
+impl From<Transform> for Placement {
+    fn from(map: Transform) -> Self {
+        Self::Still(map)
+    }
+}
+
+impl From<AnimatedTransform> for Placement {
+    fn from(map: AnimatedTransform) -> Self {
+        Self::Moving(Arc::new(map))
+    }
+}
+
+impl Placement {
+    /// The map at a time.
+    pub fn at(&self, time: f64) -> Transform {
+        match self {
+            Self::Still(map) => *map,
+            Self::Moving(motion) => motion.at(time),
+        }
+    }
+
+    /// The same ray in the space of what is placed.
+    #[inline(always)]
+    pub(crate) fn into_object(&self, ray: &Ray) -> Ray {
+        match self {
+            Self::Still(map) => ray.into_object(map),
+            Self::Moving(motion) => into_moving(ray, motion),
+        }
+    }
+}
+
+// Out of the way of what stands still.
+#[inline(never)]
+fn into_moving(ray: &Ray, motion: &AnimatedTransform) -> Ray {
+    ray.into_object(&motion.at(ray.time))
 }
 
 /// Triangles by index. Vertex `i` stands at `origin + positions[i]`, so that single precision holds what is small and

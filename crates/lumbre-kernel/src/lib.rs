@@ -26,7 +26,7 @@ mod traverse;
 mod triangles;
 
 pub use accel::{Accel, BuildError, BuildOptions, Preset};
-pub use geometry::{CustomGeometry, Geometry, GeometryKind, Instance, TriangleMesh};
+pub use geometry::{CustomGeometry, Geometry, GeometryKind, Instance, Placement, TriangleMesh};
 pub use hit::{Hit, InstancePath};
 pub use options::{Faces, QueryOptions};
 pub use refit::RefitError;

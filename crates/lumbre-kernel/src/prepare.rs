@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use lumbre_geometry::{Aabb, PlacedShape};
-use lumbre_math::{DMat3, DVec3, Transform, Vec3};
+use lumbre_math::{AnimatedTransform, DMat3, DVec3, Transform, Vec3};
 use rayon::prelude::*;
 
 use crate::build::{binary_tree, fill};
@@ -13,7 +13,7 @@ use crate::holds::Holds;
 use crate::lanes::Level;
 use crate::node::{Node, Units, tag};
 use crate::primitive::{Bounds, Kind, Primitive, Traits};
-use crate::{Accel, BuildError, BuildOptions, Geometry, GeometryKind, TriangleMesh};
+use crate::{Accel, BuildError, BuildOptions, Geometry, GeometryKind, Placement, TriangleMesh};
 
 /// References have 29 bits of place.
 pub(crate) const MOST_PRIMITIVES: usize = (1 << 29) - 1;
@@ -176,7 +176,10 @@ fn boxes_of(geometries: &[Geometry]) -> Vec<Option<Aabb>> {
         GeometryKind::Shape(shape) => shape.bounds(),
         GeometryKind::Instance(instance) => {
             let outline = &outlines[&Arc::as_ptr(&instance.accel).addr()];
-            Some(outline.placed(&instance.world_from_object))
+            Some(match &instance.world_from_object {
+                Placement::Still(map) => outline.placed(map),
+                Placement::Moving(motion) => outline.swept(motion),
+            })
         }
         GeometryKind::Mesh(_) | GeometryKind::Custom(_) => None,
     };
@@ -406,7 +409,11 @@ pub(crate) fn units_of(geometries: &[Geometry], parts: &Parts) -> Units {
         GeometryKind::Shape(shape) => worst.max(condition_of(&shape.world_from_object())),
         GeometryKind::Instance(instance) => {
             let inner = instance.accel.units.condition;
-            worst.max(condition_of(&instance.world_from_object) * inner + 2.0)
+            let outer = match &instance.world_from_object {
+                Placement::Still(map) => condition_of(map),
+                Placement::Moving(motion) => motion.condition(),
+            };
+            worst.max(outer * inner + 2.0)
         }
         _ => worst,
     });
@@ -495,6 +502,37 @@ impl Outline {
         let (min, max) = (min + affine.translation - rounding, max + affine.translation + rounding);
         // Each bounds it, so that their common part does.
         Aabb { min: min.max(whole.min), max: max.min(whole.max) }
+    }
+}
+
+impl Outline {
+    /// A box around it at all times.
+    ///
+    /// Every point of the outline goes, between two neighbours of a list of steps, along a curve that stays within a certain
+    /// distance of its chord. The ends of the chord lie in the boxes at the two steps, so that all of the chord lies in the
+    /// box around both: the curve lies in that box when it is widened by the distance. Before the first key and after the
+    /// last, everything is as at these. What rounds in a map between two keys is a few 2⁻⁵³ of what the maps at the keys make
+    /// of the outline, times their condition.
+    fn swept(&self, motion: &AnimatedTransform) -> Aabb {
+        let mut swept = Aabb::EMPTY;
+        for (_, map) in motion.keys() {
+            swept = swept.union(self.placed(map));
+        }
+        if self.whole.is_empty() {
+            return swept;
+        }
+        let [center, half] = center_and_half(&self.whole);
+        // An instance grows by a fiftieth of its size.
+        let sizes = |map: &Transform| (sizes_of(map) * half).length();
+        let smallest = motion.keys().iter().map(|(_, map)| sizes(map)).fold(f64::INFINITY, f64::min);
+        for (maps, distance) in motion.steps(center, half, 0.02 * smallest) {
+            let along = maps.iter().fold(Aabb::EMPTY, |along, map| along.union(self.placed(map)));
+            let reach = along.min.abs().max(along.max.abs());
+            let rounding = 64.0 * f64::EPSILON * motion.condition() * reach.max_element();
+            let margin = DVec3::splat(distance + rounding);
+            swept = swept.union(Aabb { min: along.min - margin, max: along.max + margin });
+        }
+        swept
     }
 }
 

@@ -21,9 +21,10 @@ fn along<'a>(accel: &'a Accel, hit: &Hit) -> (Vec<&'a Instance>, &'a Accel) {
 }
 
 /// The map from the innermost instance of a hit.
-pub(crate) fn world_from_object(accel: &Accel, hit: &Hit) -> Transform {
+pub(crate) fn world_from_object(accel: &Accel, ray: &Ray, hit: &Hit) -> Transform {
     let (instances, _) = along(accel, hit);
-    instances.iter().fold(Transform::IDENTITY, |outer, instance| outer * instance.world_from_object)
+    let outwards = |outer, instance: &&Instance| outer * instance.world_from_object.at(ray.time);
+    instances.iter().fold(Transform::IDENTITY, outwards)
 }
 
 /// The surface at a hit, in the space of `accel`.
@@ -34,9 +35,10 @@ pub(crate) fn surface(accel: &Accel, ray: &Ray, hit: &Hit) -> Surface {
     }
     let (instances, inner) = along(accel, hit);
     // The same steps as the search took, for the same bits.
-    let ray = instances.iter().fold(*ray, |ray, instance| ray.into_object(&instance.world_from_object));
+    let ray = instances.iter().fold(*ray, |ray, instance| instance.world_from_object.into_object(&ray));
     let surface = bare_surface(inner, &ray, hit);
-    instances.iter().rev().fold(surface, |surface, instance| place(&surface, &instance.world_from_object))
+    let placed = |surface, instance: &&Instance| place(&surface, &instance.world_from_object.at(ray.time));
+    instances.iter().rev().fold(surface, placed)
 }
 
 /// The surface at a hit in the tree that its geometry stands in.

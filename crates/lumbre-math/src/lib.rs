@@ -45,6 +45,7 @@
 //! | rotation about any axis | [`Transform::rotate`], [`matrix::axis_angle`], [`matrix::rotate_vector`] |
 //! | composition, its inverse | `a * b` of [`Transform`], [`Transform::inverse`] |
 //! | scale, rotate about x, y, z, translate | [`matrix::standard_chain`] |
+//! | transforms that change with time | [`AnimatedTransform`] |
 //! | points and directions | [`Transform::point`], [`Transform::vector`] |
 //! | homogeneous coordinates | [`matrix::homogeneous_point`], [`matrix::homogeneous_direction`], [`matrix::point_of_homogeneous`] |
 //! | rows or columns | [`matrix::from_row_convention`], [`matrix::rows4`], [`matrix::row_chain_with_column_rotations`] |
@@ -67,6 +68,7 @@
 pub use glam;
 pub use glam::{DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, DVec4, Vec2, Vec3, Vec4};
 
+pub mod animated;
 pub mod distribution;
 pub mod frame;
 pub mod matrix;
@@ -84,5 +86,6 @@ pub mod view;
 pub mod warp;
 pub mod warp64;
 
+pub use animated::{AnimatedTransform, AnimationError};
 pub use frame::{Frame, orthonormal_basis, orthonormal_basis_f32};
 pub use transform::{SingularTransform, Transform};

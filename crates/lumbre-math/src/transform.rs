@@ -76,6 +76,11 @@ impl Transform {
         if finite { Ok(Self { forward, inverse }) } else { Err(SingularTransform) }
     }
 
+    /// A map with what is known to be its inverse.
+    pub(crate) fn from_parts(forward: DAffine3, inverse: DAffine3) -> Self {
+        Self { forward, inverse }
+    }
+
     /// The map that takes the coordinate axes to the axes of `frame`, and the origin to `origin`: local coordinates to
     /// those of the world.
     pub fn from_frame(origin: DVec3, frame: &Frame) -> Self {
@@ -277,7 +282,7 @@ fn scaled_rows(linear: &DMat3) -> ([DVec3; 3], DVec3) {
 }
 
 /// The inverse by cofactors, each right to a few units in the last place; `None` when |det L| ≤ 16 u Π|row of L|.
-fn inverse_linear(linear: &DMat3) -> Option<DMat3> {
+pub(crate) fn inverse_linear(linear: &DMat3) -> Option<DMat3> {
     if !linear.is_finite() {
         return None;
     }

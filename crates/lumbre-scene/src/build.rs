@@ -164,7 +164,7 @@ impl Builder {
         for ((id, instance), accel) in (0..).zip(instances).zip(accels) {
             let kind = GeometryKind::Instance(Instance {
                 accel: accel.clone(),
-                world_from_object: instance.world_from_object,
+                world_from_object: instance.world_from_object.into(),
             });
             geometries.push(Geometry { id, kind });
         }

@@ -164,7 +164,7 @@ impl Scene {
     pub fn interaction(&self, ray: &Ray, hit: &Hit, footprint: &Footprint) -> Interaction<'_> {
         let (entry, part, turned) = self.leaf(hit);
         let bare = self.accel.surface(ray, hit);
-        let dressed = self.dressed(entry, &bare, hit, part, turned);
+        let dressed = self.dressed(entry, &bare, ray, hit, part, turned);
         let primitive = match entry.form {
             Form::Patch { primitive, .. } => primitive,
             Form::Mesh(_) => part,
@@ -269,12 +269,13 @@ impl Scene {
         &self,
         entry: &SurfaceEntry,
         bare: &Surface,
+        ray: &Ray,
         hit: &Hit,
         primitive: u32,
         turned: bool,
     ) -> Dressed {
         let placement: Option<Transform> =
-            (self.has_instances && !hit.instances.is_empty()).then(|| self.accel.world_from_object(hit));
+            (self.has_instances && !hit.instances.is_empty()).then(|| self.accel.world_from_object(ray, hit));
         if !turned {
             return entry.dress(bare, primitive, hit.root.local, placement.as_ref());
         }
@@ -305,7 +306,7 @@ impl Scene {
             FloatTexture::Constant(coverage) => coverage,
             _ => {
                 let bare = self.accel.surface(ray, hit);
-                let dressed = self.dressed(entry, &bare, hit, part, turned);
+                let dressed = self.dressed(entry, &bare, ray, hit, part, turned);
                 alpha.evaluate(&dressed.bare_context())
             }
         };

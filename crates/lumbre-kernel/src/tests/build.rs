@@ -24,8 +24,10 @@ fn an_empty_tree_is_never_hit() {
     assert!(accel.bounds().is_empty());
     assert_eq!(accel.primitive_count(), 0);
 
-    let instance =
-        Instance { accel: Arc::new(accel), world_from_object: Transform::translate(DVec3::splat(3.0)) };
+    let instance = Instance {
+        accel: Arc::new(accel),
+        world_from_object: Transform::translate(DVec3::splat(3.0)).into(),
+    };
     let outer = build(vec![GeometryKind::Instance(instance), GeometryKind::Mesh(Arc::default())]);
     assert!(!outer.any(&ray));
     assert!(outer.bounds().is_empty());
@@ -201,7 +203,7 @@ fn a_million_million_leaves_fit_by_nesting() {
     for level in 0..40 {
         let step = DVec3::new(4.0 * 2f64.powi(level), 0.0, 0.0);
         let place = |offset| {
-            let world_from_object = Transform::translate(offset);
+            let world_from_object = Transform::translate(offset).into();
             GeometryKind::Instance(Instance { accel: Arc::clone(&tree), world_from_object })
         };
         let next = build(vec![place(DVec3::ZERO), place(step)]);
@@ -218,7 +220,7 @@ fn a_million_million_leaves_fit_by_nesting() {
     let path = hit.route.iter().fold(0u64, |path, &bit| path << 1 | u64::from(bit));
     assert_eq!(path, n);
     assert_eq!(tree.count(&ray), 2);
-    assert_eq!(tree.world_from_object(&hit).point(DVec3::ZERO).x, 4.0 * n as f64);
+    assert_eq!(tree.world_from_object(&ray, &hit).point(DVec3::ZERO).x, 4.0 * n as f64);
     let along = Ray::new(DVec3::new(-3.0, 0.3, 4.4), DVec3::X);
     let first = tree.closest(&along).unwrap();
     assert!((first.root.t - 3.5).abs() < 1e-12);
@@ -230,7 +232,7 @@ fn instances_are_bounded_by_what_is_in_them() {
         Arc::new(build(vec![GeometryKind::Mesh(Arc::new(icosphere(3, DVec3::new(1.0, 2.0, 3.0), 2.0)))]));
     let map = Transform::rotate(DVec3::new(1.0, 1.0, 0.3), 45.0).unwrap();
     let outer =
-        build(vec![GeometryKind::Instance(Instance { accel: inner.clone(), world_from_object: map })]);
+        build(vec![GeometryKind::Instance(Instance { accel: inner.clone(), world_from_object: map.into() })]);
     let center = map.point(DVec3::new(1.0, 2.0, 3.0));
     let exact = Aabb { min: center - 2.0, max: center + 2.0 };
     let ratio = outer.bounds().half_area() / exact.half_area();

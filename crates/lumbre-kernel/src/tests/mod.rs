@@ -4,6 +4,7 @@ mod blocks;
 mod borders;
 mod boxes;
 mod build;
+mod motion;
 mod options;
 mod oracle;
 mod proof;

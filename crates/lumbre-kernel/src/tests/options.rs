@@ -52,7 +52,10 @@ fn options_leave_what_a_filter_leaves() {
     for _ in 0..3 {
         let place =
             Transform::translate(random.vector()) * Transform::scale(DVec3::new(-1.1, 0.9, 1.2)).unwrap();
-        kinds.push(GeometryKind::Instance(Instance { accel: Arc::clone(&inner), world_from_object: place }));
+        kinds.push(GeometryKind::Instance(Instance {
+            accel: Arc::clone(&inner),
+            world_from_object: place.into(),
+        }));
     }
     let accel = with_random_masks(build(kinds), &mut random);
     let (mut hits, mut fewer) = (0, 0);

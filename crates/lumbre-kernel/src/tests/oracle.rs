@@ -197,7 +197,7 @@ fn ill_conditioned_instances_lose_nothing() {
         let center = map.point(CENTER);
         let accel = build(vec![GeometryKind::Instance(Instance {
             accel: Arc::clone(&inner),
-            world_from_object: map,
+            world_from_object: map.into(),
         })]);
         check_many(&accel, &mut random, center, 3.0, 3_000);
     }
@@ -207,8 +207,12 @@ fn ill_conditioned_instances_lose_nothing() {
 fn ties_go_to_the_first_in_the_lists() {
     let cube = Arc::new(cube());
     let inner = Arc::new(build(vec![GeometryKind::Mesh(cube.clone()), GeometryKind::Mesh(cube.clone())]));
-    let instance =
-        || GeometryKind::Instance(Instance { accel: inner.clone(), world_from_object: Transform::IDENTITY });
+    let instance = || {
+        GeometryKind::Instance(Instance {
+            accel: inner.clone(),
+            world_from_object: Transform::IDENTITY.into(),
+        })
+    };
     let accel = build(vec![
         instance(),
         GeometryKind::Mesh(cube.clone()),

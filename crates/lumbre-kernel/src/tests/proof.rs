@@ -35,7 +35,13 @@ fn placements(mesh: &TriangleMesh, preset: Preset) -> [(Accel, Transform); 4] {
     let far = DVec3::new(1.0e6, -3.0e5, 7.0e6);
     let as_it_is = || tree(GeometryKind::Mesh(Arc::new(mesh.clone())), preset);
     let placed = |accel: Accel, world_from_object: Transform| {
-        tree(GeometryKind::Instance(Instance { accel: Arc::new(accel), world_from_object }), preset)
+        tree(
+            GeometryKind::Instance(Instance {
+                accel: Arc::new(accel),
+                world_from_object: world_from_object.into(),
+            }),
+            preset,
+        )
     };
     let squeezed = random.placement(DVec3::new(3.0, -1.0, 2.0), 1.0, 1e-6)
         * Transform::scale(DVec3::new(-1.0, 1.0, 1.0)).unwrap();

@@ -32,6 +32,7 @@ fn moved(accel: &Accel, random: &mut Random, center: DVec3, extent: f64) -> Vec<
         GeometryKind::Instance(instance) => {
             let world_from_object = random.placement(center, extent, 0.2 * extent)
                 * Transform::translate(-instance.accel.bounds().center());
+            let world_from_object = world_from_object.into();
             GeometryKind::Instance(Instance { accel: Arc::clone(&instance.accel), world_from_object })
         }
         GeometryKind::Custom(custom) => {
@@ -154,7 +155,10 @@ fn an_instance_follows_the_tree_in_it() {
     let inner = build(vec![GeometryKind::Mesh(Arc::new(ball.clone()))]);
     let place = Transform::translate(DVec3::new(7.0, 8.0, 9.0));
     let instance = |accel: Arc<Accel>| {
-        vec![Geometry { id: 6, kind: GeometryKind::Instance(Instance { accel, world_from_object: place }) }]
+        vec![Geometry {
+            id: 6,
+            kind: GeometryKind::Instance(Instance { accel, world_from_object: place.into() }),
+        }]
     };
     let mut inner = Arc::new(inner);
     let mut outer = Accel::build(instance(Arc::clone(&inner)), &Default::default()).unwrap();

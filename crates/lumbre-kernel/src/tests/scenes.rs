@@ -319,6 +319,7 @@ pub(crate) fn mixture(random: &mut Random, center: DVec3, extent: f64, depth: u3
         for _ in 0..4 {
             let world_from_object =
                 random.placement(center, extent, 0.2 * extent) * Transform::translate(-inner_center);
+            let world_from_object = world_from_object.into();
             kinds.push(GeometryKind::Instance(Instance { accel: Arc::clone(&inner), world_from_object }));
         }
     }

@@ -46,7 +46,7 @@ fn surfaces_lie_on_the_ray_and_on_the_triangle_through_any_instances() {
         let GeometryKind::Mesh(mesh) = &inner.geometries[hit.geometry as usize].kind else { continue };
         triangles += 1;
         assert!(surface.normal.dot(surface.dpdu).abs() <= 1e-9 * surface.dpdu.length());
-        let map = accel.world_from_object(&hit);
+        let map = accel.world_from_object(&ray, &hit);
         let [a, b, c] = mesh.indices[hit.primitive as usize].map(|i| vertex(mesh, i));
         assert!((map.vector(b - a) - surface.dpdu).length() < 1e-9 * (surface.dpdu.length() + 1.0));
         let normal = map.normal((b - a).cross(c - a).normalize()).normalize();
@@ -71,7 +71,7 @@ fn a_mirror_keeps_the_front() {
     let inner = Arc::new(super::scenes::build(vec![GeometryKind::Mesh(Arc::new(cube))]));
     let outer = super::scenes::build(vec![GeometryKind::Instance(Instance {
         accel: inner,
-        world_from_object: mirror,
+        world_from_object: mirror.into(),
     })]);
     let ray = Ray::new(DVec3::new(-3.0, 0.5, -4.0), DVec3::new(0.02, 0.01, 1.0));
     let mut sides = Vec::new();

@@ -34,10 +34,12 @@ fn placements(mesh: &TriangleMesh, random: &mut Random) -> Vec<(Accel, Transform
         let middle = random.placement(DVec3::new(0.5, 4.0, -2.0), 1.0, 1.0);
         let middle_tree = Arc::new(build(vec![GeometryKind::Instance(Instance {
             accel: inner,
-            world_from_object: middle,
+            world_from_object: middle.into(),
         })]));
-        let tree =
-            build(vec![GeometryKind::Instance(Instance { accel: middle_tree, world_from_object: outer })]);
+        let tree = build(vec![GeometryKind::Instance(Instance {
+            accel: middle_tree,
+            world_from_object: outer.into(),
+        })]);
         placed.push((tree, outer * middle));
     }
     placed
