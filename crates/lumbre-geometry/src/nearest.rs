@@ -30,6 +30,8 @@ pub enum NoNearestPoint {
     Map,
     /// A quadric that is not closed.
     OpenQuadric,
+    /// Geometry of a stranger's that offers no nearest points.
+    NotOffered,
     /// A solid composed of others, of which the nearest leaf's nearest point is not on the result, or not clearly; or one
     /// with strangers' solids.
     Csg,
@@ -41,6 +43,7 @@ impl std::fmt::Display for NoNearestPoint {
             Self::NotFinite => "the point is not finite",
             Self::Map => "the shape is curved, and stands under a map that does not keep angles",
             Self::OpenQuadric => "the shape is a quadric that is not closed",
+            Self::NotOffered => "the geometry offers no nearest points",
             Self::Csg => "the nearest surface that the solid is composed of is not on it where it is nearest",
         })
     }

@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::ops::ControlFlow;
+use std::sync::OnceLock;
 
 use lumbre_geometry::{Aabb, Ray, Surface};
 use lumbre_math::{DVec3, Transform};
@@ -11,9 +12,10 @@ use crate::holds::Holds;
 use crate::lanes::Level;
 use crate::node::{Units, tag};
 use crate::query::{All, Any, Batch, Closest, Count, If};
+use crate::winding::{self, Moments};
 use crate::{
-    Geometry, GeometryKind, Hit, LoadError, QueryOptions, RefitError, batch, prepare, refit, save, surface,
-    traverse,
+    ClosestPoint, Geometry, GeometryKind, Hit, LoadError, NoClosestPoint, NoWindingNumber, QueryOptions,
+    RefitError, batch, inside, nearest, prepare, refit, save, surface, traverse,
 };
 
 /// A bounding volume hierarchy over geometries, ready for queries from any number of threads.
@@ -35,6 +37,8 @@ pub struct Accel {
     pub(crate) built_cost: Option<f64>,
     // One for each geometry, or none.
     pub(crate) masks: Vec<u32>,
+    /// For winding numbers, once one was asked for.
+    pub(crate) moments: OnceLock<Moments>,
 }
 
 /// How a tree is built. Answers do not depend on it; how soon they come does.
@@ -296,6 +300,85 @@ impl Accel {
         search.hits
     }
 
+    /// The nearest point of all surfaces within `max_distance` (itself included; infinite for anywhere), or `None` where there
+    /// is none so near. Of points as near, the one whose (path, geometry, primitive) comes first. Triangles without area do
+    /// not count. Nothing is near a point that is not finite.
+    ///
+    /// Distances to triangles are exact up to rounding under any map; those to shapes wherever
+    /// [`Shape::closest_point`](lumbre_geometry::Shape::closest_point) has a method.
+    ///
+    /// # Errors
+    /// [`NoClosestPoint`] where something may be nearer that has no answer: a shape without a method, or custom geometry
+    /// that offers none. What is farther away than the nearest point does no harm.
+    pub fn closest_point(
+        &self,
+        point: DVec3,
+        max_distance: f64,
+    ) -> Result<Option<ClosestPoint>, NoClosestPoint> {
+        nearest::closest_point(self, point, max_distance, 0.0)
+    }
+
+    /// [`Accel::closest_point`] at a time, in the unit of the keys of what moves; without one, it is 0.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn closest_point_at(
+        &self,
+        point: DVec3,
+        max_distance: f64,
+        time: f64,
+    ) -> Result<Option<ClosestPoint>, NoClosestPoint> {
+        nearest::closest_point(self, point, max_distance, time)
+    }
+
+    /// Whether a point is inside of what stands here, even-odd: inside of two bodies that overlap, or in a body within a
+    /// body, it is outside again. See [`Accel::winding_number`] for another answer.
+    ///
+    /// Solid shapes say it by themselves. Of everything else, crossings are counted along five fixed directions, and most
+    /// of them decide: of closed meshes all say the same. What is open has no inside, and the answer there is some guess,
+    /// always the same one. Nothing is around a point that is not finite.
+    pub fn is_inside(&self, point: DVec3) -> bool {
+        inside::is_inside(self, point, 0.0)
+    }
+
+    /// [`Accel::is_inside`] at a time, in the unit of the keys of what moves; without one, it is 0.
+    pub fn is_inside_at(&self, point: DVec3, time: f64) -> bool {
+        inside::is_inside(self, point, time)
+    }
+
+    /// How often surfaces wind around a point: 1 inside of a closed mesh whose triangles run counter-clockwise as seen from
+    /// without, -1 where they run clockwise, 0 outside, the sum where bodies overlap; a number in between where a mesh is
+    /// open, by how much of the sky it fills. More than 0.5 is a good rule for "inside" where meshes have gaps.
+    ///
+    /// Of solid shapes, it is 1 within and 0 without. Mirrored instances keep the sides of their meshes. Nothing winds around
+    /// a point that is not finite.
+    ///
+    /// Meshes far away are taken together, which may be wrong by a thousandth; [`Accel::winding_number_exact`] is not.
+    /// The first call looks at every triangle and keeps some 350 bytes for every node of the tree. In instances whose maps do
+    /// not keep angles, every triangle is looked at.
+    ///
+    /// # Errors
+    /// [`NoWindingNumber`] where there are open shapes (other than triangles), or custom geometry that offers none.
+    pub fn winding_number(&self, point: DVec3) -> Result<f64, NoWindingNumber> {
+        winding::winding_number(self, point, 0.0, Some(winding::FAR))
+    }
+
+    /// [`Accel::winding_number`] at a time, in the unit of the keys of what moves; without one, it is 0.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn winding_number_at(&self, point: DVec3, time: f64) -> Result<f64, NoWindingNumber> {
+        winding::winding_number(self, point, time, Some(winding::FAR))
+    }
+
+    /// [`Accel::winding_number`] as the sum over every triangle, exact up to rounding.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn winding_number_exact(&self, point: DVec3) -> Result<f64, NoWindingNumber> {
+        winding::winding_number(self, point, 0.0, None)
+    }
+
     /// The surface at a hit of this tree, in the space of this tree. For triangles `uv` are the barycentrics (b1, b2).
     ///
     /// # Panics
@@ -335,6 +418,7 @@ impl Accel {
             + bytes(&self.tree.entries)
             + bytes(&self.infinite)
             + bytes(&self.masks)
+            + self.moments.get().map_or(0, Moments::memory_bytes)
     }
 
     /// What the corners of a mesh are relative to.

@@ -3,7 +3,7 @@
 use std::fmt::Debug;
 use std::sync::Arc;
 
-use lumbre_geometry::{Aabb, PlacedShape, Ray, Root, Roots, Surface};
+use lumbre_geometry::{Aabb, NearestPoint, NoNearestPoint, PlacedShape, Ray, Root, Roots, Surface};
 use lumbre_math::{AnimatedTransform, DVec3, Transform, Vec3};
 
 use crate::Accel;
@@ -110,6 +110,19 @@ pub trait CustomGeometry: Debug + Send + Sync {
     fn roots(&self, primitive: u32, ray: &Ray, out: &mut Roots);
     /// The surface at a crossing.
     fn surface(&self, primitive: u32, ray: &Ray, root: &Root) -> Surface;
+    /// The point of one of them that is nearest to `point`; unless overridden, there is no answer.
+    ///
+    /// # Errors
+    /// [`NoNearestPoint::NotOffered`], or another reason.
+    fn closest_point(&self, primitive: u32, point: DVec3) -> Result<NearestPoint, NoNearestPoint> {
+        let _ = (primitive, point);
+        Err(NoNearestPoint::NotOffered)
+    }
+    /// How often all of them together wind around a point: 1 within a body, 0 without. `None`, unless overridden.
+    fn winding_number(&self, point: DVec3) -> Option<f64> {
+        let _ = point;
+        None
+    }
     /// Whether anything is crossed in the ray's range.
     fn any(&self, primitive: u32, ray: &Ray) -> bool {
         self.closest(primitive, ray).is_some()

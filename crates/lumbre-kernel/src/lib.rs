@@ -9,8 +9,10 @@ mod few;
 mod geometry;
 mod hit;
 mod holds;
+mod inside;
 mod lanes;
 mod morton;
+mod nearest;
 mod node;
 mod options;
 mod prepare;
@@ -24,13 +26,16 @@ mod surface;
 mod touch;
 mod traverse;
 mod triangles;
+mod winding;
 
 pub use accel::{Accel, BuildError, BuildOptions, Preset};
 pub use geometry::{CustomGeometry, Geometry, GeometryKind, Instance, Placement, TriangleMesh};
 pub use hit::{Hit, InstancePath};
+pub use nearest::{ClosestPoint, NoClosestPoint};
 pub use options::{Faces, QueryOptions};
 pub use refit::RefitError;
 pub use save::LoadError;
+pub use winding::NoWindingNumber;
 
 #[cfg(test)]
 mod brute;

@@ -138,6 +138,13 @@ impl Units {
     }
 }
 
+impl Units {
+    /// By how much a box and what is in it may be apart, in tree units, as seen from a point in space.
+    pub(crate) fn slop_of(&self, point: DVec3) -> f64 {
+        slop(self.condition, (point.abs() + self.origin.abs()).max_element() * self.scale + 1.0)
+    }
+}
+
 const NEAR: f64 = 16.0;
 /// Of rays from nearby: the bounds on the largest component of the direction, in tree units.
 pub(crate) const SMALLEST_NEAR: f64 = 1.0 / (1u64 << 20) as f64;

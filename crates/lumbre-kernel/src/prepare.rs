@@ -1,7 +1,7 @@
 //! What comes before the tree: geometries are checked, bounded and taken apart into primitives.
 
 use std::collections::HashMap;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use lumbre_geometry::{Aabb, PlacedShape};
 use lumbre_math::{AnimatedTransform, DMat3, DVec3, Transform, Vec3};
@@ -57,6 +57,7 @@ pub(crate) fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result
         level,
         built_cost: None,
         masks: Vec::new(),
+        moments: OnceLock::new(),
         geometries,
     })
 }
@@ -73,6 +74,7 @@ pub(crate) fn empty_over(geometries: Vec<Geometry>) -> Accel {
         level: Level::best(),
         built_cost: None,
         masks: Vec::new(),
+        moments: OnceLock::new(),
         geometries,
     }
 }

@@ -1,6 +1,7 @@
 //! Moving what stands in a tree without building it again.
 
 use std::fmt;
+use std::sync::OnceLock;
 
 use lumbre_math::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -158,6 +159,7 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts) -> Result<(), RefitError> {
     accel.infinite = parts.infinite;
     accel.units = units;
     accel.bounds = parts.bounds;
+    accel.moments = OnceLock::new();
     Ok(())
 }
 

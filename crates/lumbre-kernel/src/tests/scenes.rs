@@ -4,8 +4,8 @@ use std::cell::Cell;
 use std::sync::Arc;
 
 use lumbre_geometry::{
-    Aabb, BilinearPatch, Cone, Cuboid, Cylinder, Disk, Paraboloid, PlacedShape, Plane, Ray, Root, Roots,
-    Shape, Sphere, Surface, Torus, Triangle,
+    Aabb, BilinearPatch, Cone, Cuboid, Cylinder, Disk, NearestPoint, NoNearestPoint, Paraboloid, PlacedShape,
+    Plane, Ray, Root, Roots, Shape, Sphere, Surface, Torus, Triangle,
 };
 use lumbre_math::{DVec2, DVec3, Transform, Vec3};
 
@@ -215,6 +215,13 @@ impl CustomGeometry for Balls {
         let mut roots = Roots::new();
         self.roots(primitive, ray, &mut roots);
         roots.first().copied()
+    }
+
+    fn closest_point(&self, primitive: u32, point: DVec3) -> Result<NearestPoint, NoNearestPoint> {
+        let &(center, radius) = self.balls.get(primitive as usize).ok_or(NoNearestPoint::NotOffered)?;
+        let arm = (point - center).try_normalize().unwrap_or(DVec3::X);
+        let distance = ((point - center).length() - radius).abs();
+        Ok(NearestPoint { point: center + radius * arm, distance, part: 0, uv: DVec2::ZERO })
     }
 
     fn roots(&self, primitive: u32, ray: &Ray, out: &mut Roots) {

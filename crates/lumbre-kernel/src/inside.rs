@@ -1,0 +1,119 @@
+//! Whether a point is inside: by the parity of crossings, and by the solids that hold it.
+
+use lumbre_geometry::Ray;
+use lumbre_math::DVec3;
+
+use crate::node::tag;
+use crate::stack::AsBuilt;
+use crate::traverse::{self, Ask, Found, Search};
+use crate::{Accel, GeometryKind};
+
+/// Which ways are looked: no axes of symmetry of anything likely, and no two near one line.
+const DIRECTIONS: [DVec3; 5] = [
+    DVec3::new(0.610_372_4, 0.353_853_7, 0.708_106_1),
+    DVec3::new(-0.421_117_3, 0.801_921_9, -0.423_771_1),
+    DVec3::new(0.297_314_8, -0.879_341_7, 0.371_911_3),
+    DVec3::new(-0.718_281_8, -0.314_159_3, 0.620_771_9),
+    DVec3::new(0.143_310_7, -0.271_828_2, -0.951_743_1),
+];
+
+/// See [`Accel::is_inside`].
+pub(crate) fn is_inside(accel: &Accel, point: DVec3, time: f64) -> bool {
+    if !point.is_finite() {
+        return false;
+    }
+    let in_solids = solids_around(accel, point, time) % 2 == 1;
+    let is_odd = |direction: &&DVec3| {
+        let mut crossings = Crossings { odd: false };
+        traverse::search(accel.level, accel, &Ray::new(point, **direction).at_time(time), &mut crossings);
+        crossings.odd
+    };
+    let odd = if has_surfaces(accel) { DIRECTIONS.iter().filter(is_odd).count() } else { 0 };
+    let is_in_surfaces = 2 * odd > DIRECTIONS.len();
+    in_solids != is_in_surfaces
+}
+
+/// Whether it is a shape that says by itself what it holds.
+fn is_solid(kind: &GeometryKind) -> bool {
+    matches!(kind, GeometryKind::Shape(shape) if shape.shape().is_solid())
+}
+
+/// Whether there is anything else than such shapes.
+fn has_surfaces(accel: &Accel) -> bool {
+    !accel.geometries.iter().all(|geometry| is_solid(&geometry.kind))
+}
+
+/// How many solid shapes hold the point, in all instances.
+fn solids_around(accel: &Accel, point: DVec3, time: f64) -> usize {
+    let mut count = 0;
+    let mut trees = vec![(accel, point)];
+    let mut stack = Vec::new();
+    while let Some((accel, point)) = trees.pop() {
+        let mut meet = |geometry: u32| match &accel.geometries[geometry as usize].kind {
+            GeometryKind::Shape(shape) => {
+                let local = shape.world_from_object().inverse_point(point);
+                count += usize::from(shape.shape().contains(local));
+            }
+            GeometryKind::Instance(instance) => {
+                trees.push((&*instance.accel, instance.world_from_object.at(time).inverse_point(point)));
+            }
+            GeometryKind::Mesh(_) | GeometryKind::Custom(_) => {}
+        };
+        accel.infinite.iter().for_each(|entry| meet(entry.geometry));
+        let units = &accel.units;
+        let (local, slop) = ((point - units.origin) * units.scale, 4.0 * units.slop_of(point));
+        stack.extend(accel.tree.root);
+        while let Some(reference) = stack.pop() {
+            match reference >> tag::SHIFT {
+                tag::INNER => {
+                    let node = &accel.tree.nodes[reference as usize];
+                    for lane in 0..node.len as usize {
+                        // In doubt it is within, also where the slop is no number.
+                        let is_beyond = (0..3).any(|axis| {
+                            let (low, high) = (node.planes[2 * axis][lane], node.planes[2 * axis + 1][lane]);
+                            local[axis] < f64::from(low) - slop || f64::from(high) + slop < local[axis]
+                        });
+                        if !is_beyond {
+                            stack.push(node.children[lane]);
+                        }
+                    }
+                }
+                tag::TRIANGLES => {}
+                _ => {
+                    for entry in &accel.tree.entries[(reference & tag::PLACE) as usize..] {
+                        meet(entry.geometry);
+                        if entry.is_last() {
+                            break;
+                        }
+                    }
+                }
+            }
+        }
+    }
+    count
+}
+
+/// The parity of the crossings of what is no solid shape.
+struct Crossings {
+    odd: bool,
+}
+
+impl Search<'_> for Crossings {
+    const ASK: Ask = Ask::Every;
+    type Order = AsBuilt;
+
+    fn limit(&self) -> f64 {
+        f64::INFINITY
+    }
+
+    fn floor(&self) -> f64 {
+        0.0
+    }
+
+    fn offer(&mut self, found: &Found<'_, '_>) -> bool {
+        let (geometry, _) = found.what.names(found.accel);
+        let crosses = found.root.multiplicity % 2 == 1;
+        self.odd ^= crosses && !is_solid(&found.accel.geometries[geometry as usize].kind);
+        false
+    }
+}

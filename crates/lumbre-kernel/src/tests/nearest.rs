@@ -1,0 +1,240 @@
+//! Nearest points against a loop over everything.
+
+use std::sync::Arc;
+
+use lumbre_geometry::{NoNearestPoint, PlacedShape, Plane, Shape, Sphere, Torus};
+use lumbre_math::{DVec3, Transform};
+
+use super::scenes::{Random, balls, build, bumpy, cube, icosphere, mixture, soup, with_every_preset};
+use crate::nearest::{Frame, Search};
+use crate::{Accel, ClosestPoint, Geometry, GeometryKind, Instance, TriangleMesh};
+
+const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
+
+/// The loop: everything that has an answer, whatever has none, and all together.
+fn by_loop(accel: &Accel, point: DVec3, max_distance: f64) -> (Option<ClosestPoint>, bool) {
+    let mut frames = vec![Frame::outermost(accel, point, 0.0)];
+    let mut search = Search::new(point, max_distance);
+    let mut position = 0;
+    while position < frames.len() {
+        let mut inner = Vec::new();
+        let frame = &frames[position];
+        for (geometry, standing) in frame.accel.geometries.iter().enumerate() {
+            let geometry = geometry as u32;
+            match &standing.kind {
+                GeometryKind::Mesh(mesh) => {
+                    for primitive in 0..mesh.indices.len() as u32 {
+                        search.meet_triangle(frame, mesh, geometry, primitive);
+                    }
+                }
+                GeometryKind::Instance(instance) => {
+                    inner.push(frame.within(geometry, instance));
+                }
+                GeometryKind::Shape(_) => search.meet(frame, geometry, 0, 0.0),
+                GeometryKind::Custom(custom) => {
+                    for primitive in 0..custom.primitive_count() {
+                        search.meet(frame, geometry, primitive, 0.0);
+                    }
+                }
+            }
+        }
+        frames.extend(inner);
+        position += 1;
+    }
+    search.into_parts()
+}
+
+/// Asks the tree and the loop; answers whether there was an answer, and whether it was a point.
+fn check(accel: &Accel, point: DVec3, max_distance: f64) -> (bool, bool) {
+    let (expected, all_answered) = by_loop(accel, point, max_distance);
+    match accel.closest_point(point, max_distance) {
+        Ok(found) => {
+            assert_eq!(found, expected, "{point} {max_distance}");
+            if let Some(found) = &found {
+                let rounding = 1e-12 * (point.abs() + found.point.abs()).max_element();
+                assert!(((found.point - point).length() - found.distance).abs() <= rounding);
+                assert!(found.distance <= max_distance);
+            }
+            (true, found.is_some())
+        }
+        Err(no) => {
+            assert!(!all_answered, "{no}");
+            (false, false)
+        }
+    }
+}
+
+fn similar(random: &mut Random, center: DVec3, spread: f64) -> Transform {
+    let size = random.between(0.2, 1.5);
+    let mirror = if random.unit() < 0.3 { -1.0 } else { 1.0 };
+    Transform::translate(center + spread * random.vector())
+        * Transform::rotate(random.vector(), random.between(-180.0, 180.0)).unwrap()
+        * Transform::scale(DVec3::new(mirror * size, size, size)).unwrap()
+}
+
+/// Meshes, shapes where they have a method, balls of a stranger's, instances of all that and of meshes under any map.
+fn answerable(random: &mut Random, center: DVec3, extent: f64, depth: u32) -> Accel {
+    let mut kinds = vec![GeometryKind::Mesh(Arc::new(soup(random, 90, center, extent)))];
+    for _ in 0..12 {
+        let shape: Shape = match random.below(3) {
+            0 => Sphere::new(0.2 * random.vector(), 0.4).unwrap().into(),
+            1 => Torus::new(0.2 * random.vector(), random.vector(), 0.5, 0.2).unwrap().into(),
+            _ => Sphere::new(0.2 * random.vector(), 0.4).unwrap().partial(-0.2, 0.3, 250.0).unwrap().into(),
+        };
+        kinds.push(GeometryKind::Shape(PlacedShape::new(shape, similar(random, center, extent))));
+    }
+    kinds.push(GeometryKind::Custom(Arc::new(balls(random, 9, center, extent, None))));
+    let mut rock = bumpy(1, DVec3::ZERO, 0.3 * extent);
+    rock.origin = center;
+    let meshes = Arc::new(build(vec![GeometryKind::Mesh(Arc::new(rock))]));
+    for _ in 0..3 {
+        let map = random.placement(center, extent, 0.5) * Transform::translate(-center);
+        kinds.push(GeometryKind::Instance(Instance {
+            accel: Arc::clone(&meshes),
+            world_from_object: map.into(),
+        }));
+    }
+    if depth > 0 {
+        let inner_center = DVec3::new(3.0, -2.0, 5.0);
+        let inner = Arc::new(answerable(random, inner_center, 2.0, depth - 1));
+        for _ in 0..3 {
+            let map = similar(random, center, extent) * Transform::translate(-inner_center);
+            kinds.push(GeometryKind::Instance(Instance {
+                accel: Arc::clone(&inner),
+                world_from_object: map.into(),
+            }));
+        }
+    }
+    build(kinds)
+}
+
+fn somewhere(random: &mut Random, center: DVec3, extent: f64) -> DVec3 {
+    let reach = [1.0, 3.0, 100.0][random.below(3)];
+    center + reach * extent * random.vector()
+}
+
+#[test]
+fn a_tree_finds_the_nearest_point_that_a_loop_finds() {
+    with_every_preset(|| {
+        for (seed, center, depth) in [(1, CENTER, 0), (2, CENTER, 2), (3, 1e7 * CENTER, 1)] {
+            let mut random = Random(seed);
+            let accel = answerable(&mut random, center, 3.0, depth);
+            let mut found = 0;
+            for _ in 0..600 {
+                let point = somewhere(&mut random, center, 3.0);
+                let most = [f64::INFINITY, random.between(0.0, 4.0)][random.below(2)];
+                let (is_answer, is_point) = check(&accel, point, most);
+                assert!(is_answer);
+                found += usize::from(is_point);
+            }
+            assert!(found > 300, "{found}");
+        }
+    });
+}
+
+#[test]
+fn without_an_answer_of_everything_there_may_be_one_all_the_same() {
+    let mut random = Random(4);
+    // Shapes under maps that do not keep angles, and a floor of a stranger's.
+    let accel = mixture(&mut random, CENTER, 3.0, 1, true);
+    let (mut answered, mut refused) = (0, 0);
+    for _ in 0..600 {
+        let (is_answer, _) = check(&accel, somewhere(&mut random, CENTER, 3.0), f64::INFINITY);
+        *(if is_answer { &mut answered } else { &mut refused }) += 1;
+    }
+    assert!(refused > 100, "{refused}");
+
+    let mut mesh_and_egg = vec![GeometryKind::Mesh(Arc::new(cube()))];
+    let squeezed = Transform::translate(DVec3::new(9.0, 0.0, 0.0))
+        * Transform::scale(DVec3::new(1.0, 0.5, 0.7)).unwrap();
+    let ring = Torus::new(DVec3::ZERO, DVec3::Z, 1.5, 0.5).unwrap();
+    mesh_and_egg.push(GeometryKind::Shape(PlacedShape::new(ring.into(), squeezed)));
+    let accel = build(mesh_and_egg);
+    let far = accel.closest_point(DVec3::new(-1.0, 0.0, 4.0), f64::INFINITY).unwrap().unwrap();
+    assert_eq!((far.distance, far.geometry), (1.5, 0));
+    let near = accel.closest_point(DVec3::new(9.5, 0.0, 4.0), f64::INFINITY).unwrap_err();
+    assert_eq!((near.why, near.geometry, near.id), (NoNearestPoint::Map, 1, 1007));
+    assert_eq!(accel.closest_point(DVec3::new(9.5, 0.0, 4.0), 1.0), Ok(None));
+}
+
+#[test]
+fn scenes_of_any_scale_have_nearest_points() {
+    for (seed, extent) in [(5, 1e-12), (6, 1e12), (7, 1e-30), (8, 1e30)] {
+        let mut random = Random(seed);
+        let mesh = soup(&mut random, 200, CENTER * extent, extent);
+        let accel = build(vec![GeometryKind::Mesh(Arc::new(mesh))]);
+        for _ in 0..200 {
+            let point = somewhere(&mut random, CENTER * extent, extent);
+            assert!(check(&accel, point, f64::INFINITY).1);
+        }
+    }
+}
+
+#[test]
+fn the_limit_counts_itself_and_nothing_is_near_what_is_no_point() {
+    let accel = build(vec![GeometryKind::Mesh(Arc::new(cube()))]);
+    // Over the face at y = 1.5.
+    let over = DVec3::new(1.25, 4.0, 4.5);
+    let found = accel.closest_point(over, 2.5).unwrap().unwrap();
+    assert_eq!((found.distance, found.point), (2.5, DVec3::new(1.25, 1.5, 4.5)));
+    assert_eq!(accel.closest_point(over, 2.5f64.next_down()), Ok(None));
+    assert_eq!(accel.closest_point(over, -1.0), Ok(None));
+    assert_eq!(accel.closest_point(over, f64::NAN), Ok(None));
+    assert_eq!(accel.closest_point(DVec3::new(1.0, f64::INFINITY, 0.0), f64::INFINITY), Ok(None));
+    assert_eq!(build(vec![]).closest_point(over, f64::INFINITY), Ok(None));
+    // On a corner: the first of its triangles.
+    let corner = DVec3::new(0.5, -1.0, 3.0);
+    let found = accel.closest_point(corner, 0.0).unwrap().unwrap();
+    assert_eq!((found.distance, found.primitive), (0.0, 0));
+}
+
+#[test]
+fn an_infinite_plane_is_near_wherever_it_is() {
+    let plane = Plane::new(DVec3::new(0.0, -3.0, 0.0), DVec3::Y).unwrap();
+    let accel = build(vec![
+        GeometryKind::Mesh(Arc::new(cube())),
+        GeometryKind::Shape(PlacedShape::new(plane.into(), Transform::IDENTITY)),
+    ]);
+    let found = accel.closest_point(DVec3::new(1e6, 2.0, 1e6), f64::INFINITY).unwrap().unwrap();
+    assert_eq!((found.distance, found.geometry), (5.0, 1));
+    assert!(check(&accel, DVec3::new(1.0, 3.0, 4.0), f64::INFINITY).1);
+}
+
+#[test]
+fn two_to_the_fortieth_cubes_have_a_nearest_one() {
+    let mut accel = Arc::new(build(vec![GeometryKind::Mesh(Arc::new(cube()))]));
+    for level in 0..40 {
+        let apart = 4.0 * 2f64.powi(level);
+        let place = |offset: DVec3| {
+            GeometryKind::Instance(Instance {
+                accel: Arc::clone(&accel),
+                world_from_object: Transform::translate(offset).into(),
+            })
+        };
+        let pair = build(vec![place(DVec3::ZERO), place(DVec3::new(apart, 0.0, 0.0))]);
+        accel = Arc::new(pair);
+    }
+    // Cube n stands from 4 n + 0.5 to 4 n + 3.
+    let n = 123_456_789.0;
+    let found = accel.closest_point(DVec3::new(4.0 * n + 3.5, 0.25, 4.0), f64::INFINITY).unwrap().unwrap();
+    assert_eq!((found.distance, found.instances.len()), (0.5, 40));
+}
+
+#[test]
+fn after_a_refit_and_a_reading_the_nearest_point_is_that_of_what_stands_there_now() {
+    let ball = icosphere(3, DVec3::ZERO, 2.5);
+    let at = |origin: DVec3| {
+        let mesh = TriangleMesh { origin, ..ball.clone() };
+        vec![Geometry { id: 4, kind: GeometryKind::Mesh(Arc::new(mesh)) }]
+    };
+    let mut accel = Accel::build(at(CENTER), &Default::default()).unwrap();
+    let bytes = accel.to_bytes();
+    accel.refit(at(-CENTER)).unwrap();
+    let loaded = Accel::from_bytes(&bytes, at(-CENTER)).unwrap();
+    let mut random = Random(9);
+    for _ in 0..200 {
+        let point = -CENTER + 6.0 * random.vector();
+        assert!(check(&accel, point, f64::INFINITY).1);
+        assert_eq!(accel.closest_point(point, 9e9), loaded.closest_point(point, 9e9));
+    }
+}
