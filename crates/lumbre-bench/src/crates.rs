@@ -107,7 +107,7 @@ fn triangles(scene: &Scene) -> Vec<Triangle> {
 
 fn balls(scene: &Scene) -> Vec<Ball> {
     let ball = |&[x, y, z, radius]: &[f32; 4]| Ball { center: Vec3A::new(x, y, z), radius };
-    scene.spheres.iter().map(ball).collect()
+    scene.spheres.spheres.iter().map(ball).collect()
 }
 
 /// A tree of one of the crates with the primitives that it was made of.

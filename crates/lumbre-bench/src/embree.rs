@@ -322,8 +322,8 @@ impl Program for Embree {
         for mesh in meshes {
             group.add_mesh(mesh);
         }
-        if !scene.spheres.is_empty() {
-            group.add_spheres(&scene.spheres);
+        if !scene.spheres.spheres.is_empty() {
+            group.add_spheres(&scene.spheres.spheres);
         }
         if !scene.shapes.is_empty() {
             group.add_shapes(Arc::clone(&scene.shapes));

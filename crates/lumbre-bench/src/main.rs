@@ -79,6 +79,9 @@ struct Options {
     /// Lumbre takes rays by batches, on every thread, and not one at a time.
     #[arg(long)]
     batches: bool,
+    /// Lumbre keeps every sphere as a shape of its own, not in a cloud.
+    #[arg(long)]
+    placed_spheres: bool,
     /// Names the scenes and ends.
     #[arg(long)]
     list: bool,
@@ -168,7 +171,11 @@ fn main() -> Result<()> {
         deadline: options.quick.then(|| start + Duration::from_secs(40)),
     };
 
-    let lumbre = ours::Lumbre { preset: options.preset, by_batches: options.batches };
+    let lumbre = ours::Lumbre {
+        preset: options.preset,
+        by_batches: options.batches,
+        places_spheres: options.placed_spheres,
+    };
     let mut programs: Vec<Box<dyn Program>> = vec![Box::new(lumbre)];
     programs.extend(peers()?.into_iter().filter(|peer| is_wanted(&options.peer, &peer.name())));
 

@@ -32,7 +32,7 @@ pub fn truth(scene: &Scene, ray: &Ray) -> Truth {
     for placement in &scene.placements {
         truth.of_mesh(&scene.placed_meshes[placement.mesh], &ray.into_object(&placement.transform()));
     }
-    for sphere in &scene.spheres {
+    for sphere in &scene.spheres.spheres {
         truth.take(sphere_root(sphere, ray), true);
     }
     for shape in scene.shapes.iter() {

@@ -19,6 +19,8 @@ pub struct Lumbre {
     pub preset: Preset,
     /// Whether rays come by batches of [`BATCH`], not one at a time.
     pub by_batches: bool,
+    /// Whether every sphere is a shape of its own, not one of a cloud.
+    pub places_spheres: bool,
 }
 
 /// Rays that a batch has at most.
@@ -32,7 +34,9 @@ impl Program for Lumbre {
             Preset::Balanced => "",
             Preset::Best => " best",
         };
-        format!("Lumbre {version}{preset}{}", if self.by_batches { " batches" } else { "" })
+        let batches = if self.by_batches { " batches" } else { "" };
+        let placed = if self.places_spheres { " placed" } else { "" };
+        format!("Lumbre {version}{preset}{batches}{placed}")
     }
 
     fn refuses(&self, _: &Scene) -> Option<&'static str> {
@@ -41,7 +45,7 @@ impl Program for Lumbre {
 
     fn build<'a>(&'a self, scene: &'a Scene, threads: usize) -> Result<Built<'a>> {
         // Lists of shapes are what the program takes.
-        let list = list(scene);
+        let list = list(scene, self.places_spheres);
         let list_bytes = list.capacity() * size_of::<Geometry>();
         let (accel, seconds, mut bytes) =
             rust_heap::measure(threads, || build_list(scene, list, self.preset))?;
@@ -54,14 +58,17 @@ impl Program for Lumbre {
 
 /// The kernel's tree of a scene.
 pub fn build(scene: &Scene, preset: Preset) -> Result<Accel> {
-    build_list(scene, list(scene), preset)
+    build_list(scene, list(scene, false), preset)
 }
 
 /// What stands in a scene; instances for now of nothing.
-fn list(scene: &Scene) -> Vec<Geometry> {
+fn list(scene: &Scene, places_spheres: bool) -> Vec<Geometry> {
     let nothing = Arc::new(Accel::build(Vec::new(), &BuildOptions::default()).expect("nothing is sound"));
     let meshes = scene.meshes.iter().map(|mesh| GeometryKind::Mesh(Arc::clone(mesh)));
-    let spheres = scene.spheres.iter().map(|sphere| GeometryKind::Shape(placed_sphere(*sphere)));
+    let has_cloud = !places_spheres && scene.sphere_count() > 0;
+    let cloud = has_cloud.then(|| GeometryKind::Spheres(Arc::clone(&scene.spheres)));
+    let placed = if places_spheres { &scene.spheres.spheres[..] } else { &[] };
+    let spheres = placed.iter().map(|sphere| GeometryKind::Shape(placed_sphere(*sphere))).chain(cloud);
     let shapes = scene.shapes.iter().map(|shape| GeometryKind::Shape(shape.clone()));
     let instances = scene.placements.iter().map(|placement| {
         let world_from_object = placement.transform();

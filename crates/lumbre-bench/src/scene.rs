@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use lumbre_geometry::PlacedShape;
-use lumbre_kernel::TriangleMesh;
+use lumbre_kernel::{SphereCloud, TriangleMesh};
 use lumbre_math::{DAffine3, DMat3, DVec3, Transform};
 
 /// A scene as plain data. Every program makes its own tree of it.
@@ -12,8 +12,8 @@ pub struct Scene {
     pub name: String,
     /// Meshes that stand in the world as they are. Their origins are zero.
     pub meshes: Vec<Arc<TriangleMesh>>,
-    /// Centre and radius of spheres.
-    pub spheres: Vec<[f32; 4]>,
+    /// Centre and radius of spheres. Their origin is zero.
+    pub spheres: Arc<SphereCloud>,
     /// Exact shapes of every kind.
     pub shapes: Arc<Vec<PlacedShape>>,
     /// Meshes that stand in the world only where `placements` say. Their origins are zero.
@@ -64,7 +64,7 @@ impl Scene {
         Self {
             name: name.into(),
             meshes: Vec::new(),
-            spheres: Vec::new(),
+            spheres: Arc::default(),
             shapes: Arc::default(),
             placed_meshes: Vec::new(),
             placements: Vec::new(),
@@ -83,13 +83,18 @@ impl Scene {
         Self { meshes: vec![Arc::new(mesh)], ..Self::empty(name, camera, lamp) }
     }
 
+    /// How many spheres there are.
+    pub fn sphere_count(&self) -> usize {
+        self.spheres.spheres.len()
+    }
+
     /// How many primitives a tree is built of: each mesh counts once, each placement as one.
     pub fn primitive_count(&self) -> usize {
         let triangles = |meshes: &[Arc<TriangleMesh>]| meshes.iter().map(|m| m.indices.len()).sum::<usize>();
         triangles(&self.meshes)
             + triangles(&self.placed_meshes)
             + self.placements.len()
-            + self.spheres.len()
+            + self.sphere_count()
             + self.shapes.len()
     }
 
@@ -99,7 +104,7 @@ impl Scene {
         let placed: usize = self.placed_meshes.iter().map(|mesh| mesh.indices.len()).sum();
         let parts = [
             (triangles, "triangles"),
-            (self.spheres.len(), "spheres"),
+            (self.sphere_count(), "spheres"),
             (self.shapes.len(), "exact shapes"),
             (self.placements.len(), "instances"),
             (placed, "triangles in what is placed"),
@@ -111,7 +116,7 @@ impl Scene {
 
     /// Whether it consists of triangles alone.
     pub fn is_triangles_only(&self) -> bool {
-        self.spheres.is_empty() && self.shapes.is_empty() && self.placements.is_empty()
+        self.spheres.spheres.is_empty() && self.shapes.is_empty() && self.placements.is_empty()
     }
 
     /// Whether it consists of spheres alone.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use lumbre_geometry::{Cone, Cuboid, Cylinder, PlacedShape, Shape, Sphere, Torus, Triangle};
-use lumbre_kernel::TriangleMesh;
+use lumbre_kernel::{SphereCloud, TriangleMesh};
 use lumbre_math::random::RandomStream;
 use lumbre_math::{DVec3, Transform};
 
@@ -300,7 +300,8 @@ fn spheres(name: &str, count: usize) -> Scene {
     }
     let camera = Camera { eye: half * DVec3::new(1.6, 1.2, 2.2), target: DVec3::ZERO, field_of_view: 45.0 };
     let lamp = (half * DVec3::new(0.8, 2.5, 0.9), 0.5 * half);
-    Scene { spheres: list, ..Scene::empty(name, camera, lamp) }
+    let cloud = SphereCloud { spheres: list, ..SphereCloud::default() };
+    Scene { spheres: Arc::new(cloud), ..Scene::empty(name, camera, lamp) }
 }
 
 /// 1,600 exact shapes of six kinds about a scanned ball, on a floor of triangles.

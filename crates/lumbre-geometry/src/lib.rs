@@ -38,6 +38,7 @@ pub use nearest::{NearestPoint, NoNearestPoint, nearest_on_triangle, similarity_
 pub use placed::PlacedShape;
 pub use ray::Ray;
 pub use shape::ShapeError;
+pub use sphere::sphere_crossings;
 pub use triangle::{TriangleHit, WatertightRay, moller_trumbore};
 
 // The shapes: the file of each, and its line in the list.

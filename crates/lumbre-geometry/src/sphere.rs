@@ -368,11 +368,20 @@ impl Sphere {
     }
 }
 
+/// Both crossings of the whole sphere of this centre and radius by a ray's line, in order, whatever the ray's range: the bits
+/// that [`Sphere::closest`] and [`Sphere::roots`] choose from. They are equal where the line touches; `None` where it passes by.
+///
+/// For those who keep many spheres as bare numbers.
+#[inline(always)]
+pub fn sphere_crossings(center: DVec3, radius: f64, ray: &Ray) -> Option<(f64, f64)> {
+    crossings(center, radius, ray)
+}
+
 /// Both crossings of a whole sphere, in order.
 ///
 /// The discriminant is that of E. Haines, J. Günther, T. Akenine-Möller, "Precision improvements for ray/sphere
 /// intersection", Ray Tracing Gems, 2019: the textbook's loses all digits for a small sphere far away.
-#[inline]
+#[inline(always)]
 pub(crate) fn crossings(center: DVec3, radius: f64, ray: &Ray) -> Option<(f64, f64)> {
     let w = ray.origin - center;
     let a = ray.direction.length_squared();

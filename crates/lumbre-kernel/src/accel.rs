@@ -15,7 +15,7 @@ use crate::query::{All, Any, Batch, Closest, Count, If};
 use crate::winding::{self, Moments};
 use crate::{
     ClosestPoint, Geometry, GeometryKind, Hit, LoadError, NoClosestPoint, NoWindingNumber, QueryOptions,
-    RefitError, batch, inside, nearest, prepare, refit, save, surface, traverse,
+    RefitError, SphereCloud, batch, inside, nearest, prepare, refit, save, surface, traverse,
 };
 
 /// A bounding volume hierarchy over geometries, ready for queries from any number of threads.
@@ -80,15 +80,15 @@ pub enum BuildError {
         /// The triangle.
         triangle: usize,
     },
-    /// A coordinate is not finite.
+    /// A coordinate or a radius is not finite.
     NotFinite {
         /// Position of the geometry in the list.
         geometry: usize,
-        /// The vertex or primitive.
+        /// The vertex, sphere or primitive.
         element: usize,
     },
-    /// More primitives than a tree can name (2^29 - 1), or so many small leaves of triangles that they fill more than 2^26
-    /// blocks of eight.
+    /// More primitives than a tree can name (2^29 - 1), or so many small leaves of triangles or of spheres that they fill
+    /// more than 2^26 blocks of eight.
     TooMany,
 }
 
@@ -114,10 +114,10 @@ impl fmt::Display for BuildError {
 impl std::error::Error for BuildError {}
 
 impl Accel {
-    /// Builds a tree over `geometries`. Zero-area triangles are kept out: they are never hit.
+    /// Builds a tree over `geometries`. Zero-area triangles and spheres without a radius are kept out: they are never hit.
     ///
     /// # Errors
-    /// [`BuildError`] when a mesh names vertices that it lacks, a coordinate is not finite, or there are 2^29 primitives
+    /// [`BuildError`] when a mesh names vertices that it lacks, a coordinate or a radius is not finite, or there are 2^29 primitives
     /// or more.
     pub fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result<Self, BuildError> {
         prepare::build(geometries, options)
@@ -416,6 +416,8 @@ impl Accel {
             + bytes(&self.tree.blocks)
             + bytes(&self.tree.names)
             + bytes(&self.tree.entries)
+            + bytes(&self.tree.sphere_blocks)
+            + bytes(&self.tree.sphere_names)
             + bytes(&self.infinite)
             + bytes(&self.masks)
             + self.moments.get().map_or(0, Moments::memory_bytes)
@@ -426,6 +428,15 @@ impl Accel {
         match &self.geometries[geometry as usize].kind {
             GeometryKind::Mesh(mesh) => mesh.origin,
             _ => unreachable!("blocks are of meshes"),
+        }
+    }
+
+    /// A cloud of spheres.
+    #[inline(always)]
+    pub(crate) fn cloud(&self, geometry: u32) -> &SphereCloud {
+        match &self.geometries[geometry as usize].kind {
+            GeometryKind::Spheres(cloud) => cloud,
+            _ => unreachable!("blocks of spheres are of clouds"),
         }
     }
 

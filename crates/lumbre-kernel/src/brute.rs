@@ -3,6 +3,7 @@
 use lumbre_geometry::Ray;
 
 use crate::query::{All, Batch, Closest};
+use crate::spheres::has_radius;
 use crate::touch::{Touch, offer_borders_of_all};
 use crate::traverse::{Found, Place, Search, What, is_sound, meet_primitive};
 use crate::triangles::{Meeting, Shear, intersect};
@@ -80,6 +81,13 @@ fn visit<'a, S: Search<'a>>(accel: &'a Accel, ray: &Ray, search: &mut S) {
                 }
                 GeometryKind::Shape(_) => {
                     meet_primitive(accel, &ray, position, 0, &place, search);
+                }
+                GeometryKind::Spheres(cloud) => {
+                    for primitive in 0..cloud.spheres.len() as u32 {
+                        if has_radius(&cloud.spheres[primitive as usize]) {
+                            meet_primitive(accel, &ray, position, primitive, &place, search);
+                        }
+                    }
                 }
                 GeometryKind::Custom(custom) => {
                     for primitive in 0..custom.primitive_count() {

@@ -12,7 +12,7 @@ use crate::collapse::{Choices, Costs, choose};
 use crate::few::{Decide, FEW, Few, group_of};
 use crate::lanes::Level;
 use crate::morton::{self, Code};
-use crate::primitive::{Bounds, Kind, Primitive, Traits};
+use crate::primitive::{Bounds, Primitive, Traits};
 use crate::reinsert::reinsert;
 
 /// Levels that may be split by SAH; then come at most 32 more, each halving.
@@ -128,8 +128,8 @@ pub(crate) fn binary_tree(
     let shared = if shared > 1 { shared + 1 } else { 0 };
     let builder = Builder { level, traits, shared };
     let range = Range { here: &mut primitives, there: &mut other, names: &mut names, first: 0, depth: 0 };
-    let only_triangles = traits.iter().all(|traits| traits.kind == Kind::Triangle);
-    let tree = match (preset, only_triangles) {
+    let are_packed = traits.iter().all(|traits| traits.kind.is_packed());
+    let tree = match (preset, are_packed) {
         (Preset::Fast, true) => builder.grow_fast::<false>(range),
         (Preset::Fast, false) => builder.grow_fast::<true>(range),
         (_, true) => builder.grow::<false>(range, None),

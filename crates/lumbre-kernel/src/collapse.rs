@@ -9,8 +9,9 @@ use rayon::prelude::*;
 use crate::build::{Binary, BinaryNode, Fork, Name};
 use crate::node::{Node, WIDTH, tag};
 use crate::primitive::{Bounds, Kind, Traits};
+use crate::spheres::SphereBlock;
 use crate::triangles::{BLOCK, BlockNames, TriangleBlock};
-use crate::{BuildError, Geometry, GeometryKind, TriangleMesh};
+use crate::{BuildError, Geometry, GeometryKind, SphereCloud, TriangleMesh};
 
 /// A primitive in a leaf that is no triangle, or outside the tree.
 #[derive(Clone, Copy, Debug)]
@@ -57,6 +58,9 @@ pub(crate) struct Packed {
     /// As many as there are blocks.
     pub(crate) names: Vec<BlockNames>,
     pub(crate) entries: Vec<Entry>,
+    pub(crate) sphere_blocks: Vec<SphereBlock>,
+    /// As many as there are blocks of spheres.
+    pub(crate) sphere_names: Vec<BlockNames>,
     /// The reference to the root; `None` when there is nothing finite.
     pub(crate) root: Option<u32>,
 }
@@ -246,6 +250,7 @@ impl<'a> Cursor<'a> {
 struct Counts {
     nodes: usize,
     blocks: usize,
+    sphere_blocks: usize,
     entries: usize,
 }
 
@@ -253,6 +258,7 @@ impl std::ops::AddAssign for Counts {
     fn add_assign(&mut self, other: Self) {
         self.nodes += other.nodes;
         self.blocks += other.blocks;
+        self.sphere_blocks += other.sphere_blocks;
         self.entries += other.entries;
     }
 }
@@ -270,7 +276,7 @@ struct Plan<'a> {
 /// Packs a binary tree. The depth of its recursions is that of the tree, which is bounded.
 ///
 /// # Errors
-/// [`BuildError::TooMany`] when there are more triangle blocks than references can name.
+/// [`BuildError::TooMany`] when there are more blocks than references can name.
 pub(crate) fn pack(
     geometries: &[Geometry],
     traits: &[Traits],
@@ -281,14 +287,20 @@ pub(crate) fn pack(
     let root = Cursor::new(binary);
     let plan = packer.plan(root);
     let total = plan.as_ref().map_or_else(|| packer.count(root), |plan| plan.total);
-    if total.blocks > tag::BLOCK_PLACES as usize {
+    if total.blocks.max(total.sphere_blocks) > tag::BLOCK_PLACES as usize {
         return Err(BuildError::TooMany);
     }
     let mut nodes = crate::build::fill(total.nodes, Node::EMPTY);
     let mut spans = vec![Span { first: 0, count: 0 }; total.blocks];
+    let mut sphere_spans = vec![Span { first: 0, count: 0 }; total.sphere_blocks];
     let mut entries = vec![Entry::new(0, 0, true); total.entries];
-    let mut room =
-        Room { nodes: &mut nodes, spans: &mut spans, entries: &mut entries, start: Counts::default() };
+    let mut room = Room {
+        nodes: &mut nodes,
+        spans: &mut spans,
+        sphere_spans: &mut sphere_spans,
+        entries: &mut entries,
+        start: Counts::default(),
+    };
     let root = match &plan {
         Some(plan) => packer.put_many(plan, room),
         None => packer.put(root, &mut room),
@@ -297,7 +309,12 @@ pub(crate) fn pack(
         let names = &names[span.first as usize..][..span.count as usize];
         fill_block(mesh(geometries, names[0][0]), names)
     };
+    let sphere_block = |span: &Span| {
+        let names = &names[span.first as usize..][..span.count as usize];
+        fill_sphere_block(cloud(geometries, names[0][0]), names)
+    };
     let blocks = spans.par_iter().with_min_len(256).map(block).collect();
+    let sphere_blocks = sphere_spans.par_iter().with_min_len(256).map(sphere_block).collect();
     let name = |span: &Span| {
         let names = &names[span.first as usize..][..span.count as usize];
         let mut named = BlockNames::empty(names[0][0]);
@@ -306,8 +323,9 @@ pub(crate) fn pack(
         }
         named
     };
+    let sphere_names = sphere_spans.par_iter().with_min_len(256).map(name).collect();
     let names = spans.par_iter().with_min_len(256).map(name).collect();
-    Ok(Packed { nodes, blocks, names, entries, root: Some(root) })
+    Ok(Packed { nodes, blocks, names, entries, sphere_blocks, sphere_names, root: Some(root) })
 }
 
 fn mesh(geometries: &[Geometry], geometry: u32) -> &TriangleMesh {
@@ -315,6 +333,22 @@ fn mesh(geometries: &[Geometry], geometry: u32) -> &TriangleMesh {
         GeometryKind::Mesh(mesh) => mesh,
         _ => unreachable!("triangles come from meshes"),
     }
+}
+
+fn cloud(geometries: &[Geometry], geometry: u32) -> &SphereCloud {
+    match &geometries[geometry as usize].kind {
+        GeometryKind::Spheres(cloud) => cloud,
+        _ => unreachable!("spheres come from clouds"),
+    }
+}
+
+#[inline(always)]
+fn fill_sphere_block(cloud: &SphereCloud, names: &[Name]) -> SphereBlock {
+    let mut block = SphereBlock::EMPTY;
+    for (lane, name) in names.iter().enumerate().take(BLOCK) {
+        block.put(lane, cloud.spheres[name[1] as usize]);
+    }
+    block
 }
 
 #[inline(always)]
@@ -342,6 +376,7 @@ struct Span {
 struct Room<'a> {
     nodes: &'a mut [Node],
     spans: &'a mut [Span],
+    sphere_spans: &'a mut [Span],
     entries: &'a mut [Entry],
     /// The places of the first ones in the whole tree.
     start: Counts,
@@ -352,10 +387,11 @@ impl<'a> Room<'a> {
     fn take(&mut self, counts: Counts) -> Self {
         let nodes = self.nodes.split_off_mut(..counts.nodes).unwrap_or_default();
         let spans = self.spans.split_off_mut(..counts.blocks).unwrap_or_default();
+        let sphere_spans = self.sphere_spans.split_off_mut(..counts.sphere_blocks).unwrap_or_default();
         let entries = self.entries.split_off_mut(..counts.entries).unwrap_or_default();
         let start = self.start;
         self.start += counts;
-        Room { nodes, spans, entries, start }
+        Room { nodes, spans, sphere_spans, entries, start }
     }
 }
 
@@ -387,7 +423,10 @@ impl Packer<'_> {
             let kind = self.traits[self.names[names.start][0] as usize].kind;
             return match kind {
                 Kind::Triangle => Counts { blocks: names.len().div_ceil(BLOCK), ..Counts::default() },
-                _ => Counts { entries: names.len(), ..Counts::default() },
+                Kind::Sphere => Counts { sphere_blocks: names.len().div_ceil(BLOCK), ..Counts::default() },
+                Kind::Shape | Kind::Instance | Kind::Custom => {
+                    Counts { entries: names.len(), ..Counts::default() }
+                }
             };
         }
         let (children, len) = root.gather();
@@ -439,11 +478,15 @@ impl Packer<'_> {
                 let block = room.start.blocks as u32;
                 let blocks = names.len().div_ceil(BLOCK);
                 let own = room.take(Counts { blocks, ..Counts::default() });
-                for (i, span) in own.spans.iter_mut().enumerate() {
-                    let before = (i * BLOCK) as u32;
-                    *span = Span { first: first + before, count: (count - before).min(BLOCK as u32) };
-                }
+                cut(own.spans, first, count);
                 return tag::triangles(block, blocks as u32);
+            }
+            Kind::Sphere => {
+                let block = room.start.sphere_blocks as u32;
+                let sphere_blocks = names.len().div_ceil(BLOCK);
+                let own = room.take(Counts { sphere_blocks, ..Counts::default() });
+                cut(own.sphere_spans, first, count);
+                return tag::spheres(block, sphere_blocks as u32);
             }
             Kind::Shape => tag::SHAPES,
             Kind::Instance => tag::INSTANCE,
@@ -455,6 +498,15 @@ impl Packer<'_> {
             *entry = Entry::new(name[0], name[1], i + 1 == names.len());
         }
         tag::reference(tag, place)
+    }
+}
+
+/// Shares names among blocks.
+#[inline(always)]
+fn cut(spans: &mut [Span], first: u32, count: u32) {
+    for (i, span) in spans.iter_mut().enumerate() {
+        let before = (i * BLOCK) as u32;
+        *span = Span { first: first + before, count: (count - before).min(BLOCK as u32) };
     }
 }
 

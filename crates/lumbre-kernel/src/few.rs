@@ -24,21 +24,21 @@ fn is_uniform(primitives: &[Primitive], traits: &[Traits]) -> bool {
     let group = |p: &Primitive| group_of(p, traits);
     let first = group(&primitives[0]);
     let most = match first.0 {
-        Kind::Triangle => BLOCK,
+        Kind::Triangle | Kind::Sphere => BLOCK,
         Kind::Instance => 1,
         Kind::Shape | Kind::Custom => MOST_OTHERS,
     };
     primitives.len() <= most && primitives[1..].iter().all(|p| group(p) == first)
 }
 
-/// Leaves are of one kind, and their triangles of one mesh.
+/// Leaves are of one kind, and their triangles of one mesh, their spheres of one cloud.
 #[inline(always)]
 pub(crate) fn group_of(primitive: &Primitive, traits: &[Traits]) -> (Kind, u32) {
     let kind = traits[primitive.first() as usize].kind;
-    (kind, if kind == Kind::Triangle { primitive.first() } else { 0 })
+    (kind, if kind.is_packed() { primitive.first() } else { 0 })
 }
 
-/// Decides about few primitives. With `COSTS`, they may be of any kind; without, they are triangles.
+/// Decides about few primitives. With `COSTS`, they may be of any kind; without, they are packed.
 pub(crate) struct Decide<'a, const COSTS: bool> {
     pub(crate) primitives: &'a mut [Primitive],
     pub(crate) traits: &'a [Traits],

@@ -25,6 +25,8 @@ pub enum GeometryKind {
     Shape(PlacedShape),
     /// Triangles, watertight.
     Mesh(Arc<TriangleMesh>),
+    /// Whole spheres in large numbers, tested in double precision: sixteen bytes each, where a shape takes some two hundred.
+    Spheres(Arc<SphereCloud>),
     /// A whole tree, placed.
     Instance(Instance),
     /// A stranger's geometry.
@@ -96,6 +98,17 @@ pub struct TriangleMesh {
     pub positions: Vec<Vec3>,
     /// Three vertices each; the front is where they run counter-clockwise.
     pub indices: Vec<[u32; 3]>,
+}
+
+/// Many spheres. Number `i` stands about `origin + (x, y, z)` of `spheres[i]`, which is its centre and its radius, so that single
+/// precision holds what is small and far away. Each answers as a [`Sphere`](lumbre_geometry::Sphere) of these numbers in
+/// double precision does.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SphereCloud {
+    /// What the centres are relative to.
+    pub origin: DVec3,
+    /// Centre and radius of each. One whose radius is not greater than zero is never hit.
+    pub spheres: Vec<[f32; 4]>,
 }
 
 /// Geometry that the kernel does not know, at one indirect call a test.

@@ -13,7 +13,7 @@ pub struct Hit {
     pub root: Root,
     /// The id of the geometry.
     pub id: u32,
-    /// The triangle of a mesh, the primitive of a custom geometry, else 0.
+    /// The triangle of a mesh, the sphere of a cloud, the primitive of a custom geometry, else 0.
     pub primitive: u32,
     /// The position of the geometry in the list that its tree was built from.
     pub geometry: u32,

@@ -48,6 +48,8 @@ pub(crate) mod tag {
     pub(crate) const INSTANCE: u32 = 3;
     /// The first of some leaf entries that are primitives of custom geometry.
     pub(crate) const CUSTOM: u32 = 4;
+    /// Some blocks of spheres in a row: see [`spheres`].
+    pub(crate) const SPHERES: u32 = 5;
     /// Not a child: the mark on the stack where an instance was entered.
     pub(crate) const RETURN: u32 = 7;
 
@@ -55,7 +57,7 @@ pub(crate) mod tag {
         tag << SHIFT | place
     }
 
-    /// Blocks that a leaf of triangles may have.
+    /// Blocks that a leaf of triangles, or of spheres, may have.
     pub(crate) const MOST_BLOCKS: u32 = 1 << COUNT_BITS;
     /// Places that blocks may have.
     pub(crate) const BLOCK_PLACES: u32 = 1 << (SHIFT - COUNT_BITS);
@@ -66,7 +68,12 @@ pub(crate) mod tag {
         reference(TRIANGLES, first << COUNT_BITS | (count - 1))
     }
 
-    /// The blocks of a leaf of triangles.
+    /// A leaf of spheres, alike.
+    pub(crate) const fn spheres(first: u32, count: u32) -> u32 {
+        reference(SPHERES, first << COUNT_BITS | (count - 1))
+    }
+
+    /// The blocks of a leaf of triangles or of spheres.
     #[inline(always)]
     pub(crate) const fn blocks(reference: u32) -> std::ops::Range<usize> {
         let first = ((reference & PLACE) >> COUNT_BITS) as usize;

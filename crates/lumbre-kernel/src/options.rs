@@ -3,6 +3,7 @@
 use lumbre_geometry::{Ray, Root};
 
 use crate::query::Filter;
+use crate::spheres::ExactSphere;
 use crate::traverse::{Found, What};
 use crate::{Accel, GeometryKind, Hit};
 
@@ -71,6 +72,7 @@ pub(crate) fn meets_front(accel: &Accel, ray: &Ray, what: What, root: &Root) -> 
     let surface = match &accel.geometries[geometry as usize].kind {
         GeometryKind::Shape(shape) => shape.surface(ray, root),
         GeometryKind::Custom(custom) => custom.surface(primitive, ray, root),
+        GeometryKind::Spheres(cloud) => ExactSphere::of(cloud, primitive).surface(ray, root),
         GeometryKind::Mesh(_) | GeometryKind::Instance(_) => unreachable!("it is tested by itself"),
     };
     surface.normal.dot(ray.direction) < 0.0

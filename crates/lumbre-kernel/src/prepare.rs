@@ -8,6 +8,7 @@ use lumbre_math::{AnimatedTransform, DMat3, DVec3, Transform, Vec3};
 use rayon::prelude::*;
 
 use crate::build::{binary_tree, fill};
+use crate::clouds::CloudSurvey;
 use crate::collapse::{Entry, Packed, pack};
 use crate::holds::Holds;
 use crate::lanes::Level;
@@ -28,7 +29,7 @@ pub(crate) fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result
     let traits: Vec<Traits> = geometries.iter().map(traits_of).collect();
     let level = Level::best();
 
-    let in_tree = parts.boxed.len() + parts.surveys.iter().map(|survey| survey.triangles).sum::<usize>();
+    let in_tree = parts.boxed.len() + parts.triangles + parts.spheres;
     let count = in_tree + parts.infinite.len();
     let tree = if in_tree == 0 {
         Packed::default()
@@ -44,12 +45,18 @@ pub(crate) fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result
                 box_triangles(mesh, survey, &units, own);
             }
         }
+        for survey in &parts.clouds {
+            if let GeometryKind::Spheres(cloud) = &geometries[survey.geometry as usize].kind {
+                let own = rest.split_off_mut(..survey.spheres).expect("they were counted");
+                survey.put_boxes(cloud, &units, own);
+            }
+        }
         let (binary, names) = binary_tree(level, options.preset, primitives, &traits);
         pack(&geometries, &traits, &binary, &names)?
     };
     Ok(Accel {
         units,
-        holds: Holds::new(&geometries, parts.largest_corner),
+        holds: Holds::new(&geometries, parts.largest_corner, parts.sphere_reach),
         tree,
         infinite: parts.infinite,
         bounds: parts.bounds,
@@ -66,7 +73,7 @@ pub(crate) fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result
 pub(crate) fn empty_over(geometries: Vec<Geometry>) -> Accel {
     Accel {
         units: Units::new(DVec3::ZERO, 1.0, 0.0, 1.0),
-        holds: Holds::new(&geometries, 0.0),
+        holds: Holds::new(&geometries, 0.0, 0.0),
         tree: Packed::default(),
         infinite: Vec::new(),
         bounds: Aabb::EMPTY,
@@ -93,6 +100,12 @@ pub(crate) struct Parts {
     pub(crate) triangles: usize,
     /// No corner of a triangle has a larger coordinate, relative to its mesh's origin.
     pub(crate) largest_corner: f32,
+    /// Of every cloud of spheres.
+    pub(crate) clouds: Vec<CloudSurvey>,
+    /// Of all clouds.
+    pub(crate) spheres: usize,
+    /// No coordinate of a sphere's centre, relative to its cloud's origin, plus a radius is larger.
+    pub(crate) sphere_reach: f64,
 }
 
 /// What was seen of a mesh.
@@ -121,10 +134,13 @@ pub(crate) fn take_apart(geometries: &[Geometry]) -> Result<Parts, BuildError> {
         surveys: Vec::new(),
         triangles: 0,
         largest_corner: 0.0,
+        clouds: Vec::new(),
+        spheres: 0,
+        sphere_reach: 0.0,
     };
     let boxes = boxes_of(geometries);
     for (position, geometry) in geometries.iter().enumerate() {
-        let room = MOST_PRIMITIVES - parts.boxed.len() - parts.infinite.len() - parts.triangles;
+        let room = parts.room();
         match &geometry.kind {
             GeometryKind::Mesh(mesh) => {
                 if mesh.indices.len() > room {
@@ -136,10 +152,20 @@ pub(crate) fn take_apart(geometries: &[Geometry]) -> Result<Parts, BuildError> {
                 parts.triangles += survey.triangles;
                 parts.surveys.push(survey);
             }
+            GeometryKind::Spheres(cloud) => {
+                if cloud.spheres.len() > room {
+                    return Err(BuildError::TooMany);
+                }
+                let survey = CloudSurvey::of(position, cloud)?;
+                parts.sphere_reach = parts.sphere_reach.max(survey.reach);
+                parts.tree_bounds = parts.tree_bounds.union(survey.bounds);
+                parts.spheres += survey.spheres;
+                parts.clouds.push(survey);
+            }
             GeometryKind::Shape(_) => parts.add(position, 0, boxes[position], room)?,
             GeometryKind::Custom(custom) => {
                 for primitive in 0..custom.primitive_count() {
-                    let room = MOST_PRIMITIVES - parts.boxed.len() - parts.infinite.len() - parts.triangles;
+                    let room = parts.room();
                     parts.add(position, primitive, custom.bounds(primitive), room)?;
                 }
             }
@@ -161,8 +187,8 @@ pub(crate) fn take_apart(geometries: &[Geometry]) -> Result<Parts, BuildError> {
 
 /// The boxes of all shapes and instances, by position; `None` of what is infinite or of another kind.
 fn boxes_of(geometries: &[Geometry]) -> Vec<Option<Aabb>> {
-    let are_meshes = geometries.iter().all(|geometry| matches!(geometry.kind, GeometryKind::Mesh(_)));
-    if are_meshes {
+    let is_packed = |kind: &GeometryKind| matches!(kind, GeometryKind::Mesh(_) | GeometryKind::Spheres(_));
+    if geometries.iter().all(|geometry| is_packed(&geometry.kind)) {
         return vec![None; geometries.len()];
     }
     // Instances of one tree are many.
@@ -183,12 +209,17 @@ fn boxes_of(geometries: &[Geometry]) -> Vec<Option<Aabb>> {
                 Placement::Moving(motion) => outline.swept(motion),
             })
         }
-        GeometryKind::Mesh(_) | GeometryKind::Custom(_) => None,
+        GeometryKind::Mesh(_) | GeometryKind::Spheres(_) | GeometryKind::Custom(_) => None,
     };
     geometries.par_iter().with_min_len(64).map(bounds).collect()
 }
 
 impl Parts {
+    /// How many more primitives a tree takes.
+    fn room(&self) -> usize {
+        MOST_PRIMITIVES - self.boxed.len() - self.infinite.len() - self.triangles - self.spheres
+    }
+
     fn add(
         &mut self,
         position: usize,
@@ -581,6 +612,7 @@ fn rounding_of(map: &Transform, sizes: &DMat3, reach: DVec3) -> DVec3 {
 fn traits_of(geometry: &Geometry) -> Traits {
     match &geometry.kind {
         GeometryKind::Mesh(_) => Traits { kind: Kind::Triangle, cost: 4 },
+        GeometryKind::Spheres(_) => Traits { kind: Kind::Sphere, cost: 4 },
         GeometryKind::Shape(shape) => Traits { kind: Kind::Shape, cost: cost_of(shape) },
         GeometryKind::Instance(_) => Traits { kind: Kind::Instance, cost: 96 },
         GeometryKind::Custom(_) => Traits { kind: Kind::Custom, cost: 48 },

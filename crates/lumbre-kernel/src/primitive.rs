@@ -4,7 +4,7 @@ use lumbre_geometry::Aabb;
 
 use crate::node::{Units, round_up};
 
-/// The kind of a primitive. A leaf holds one kind, and triangles of one mesh.
+/// The kind of a primitive. A leaf holds one kind, triangles of one mesh, and spheres of one cloud.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub(crate) enum Kind {
@@ -12,6 +12,14 @@ pub(crate) enum Kind {
     Shape,
     Instance,
     Custom,
+    Sphere,
+}
+
+impl Kind {
+    /// Whether its primitives are packed into blocks.
+    pub(crate) fn is_packed(self) -> bool {
+        matches!(self, Self::Triangle | Self::Sphere)
+    }
 }
 
 /// What the build must know of a geometry: the kind of its primitives, and what a test of one costs.

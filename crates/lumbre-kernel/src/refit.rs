@@ -6,12 +6,14 @@ use std::sync::OnceLock;
 use lumbre_math::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use crate::clouds::box_of;
 use crate::holds::Holds;
-use crate::node::{Node, WIDTH, tag};
+use crate::node::{Node, Units, WIDTH, tag};
 use crate::prepare::{Boxer, Parts, has_area, take_apart, units_of};
 use crate::primitive::Bounds;
+use crate::spheres::{SphereBlock, has_radius};
 use crate::triangles::{BlockNames, TriangleBlock};
-use crate::{Accel, BuildError, Geometry, GeometryKind};
+use crate::{Accel, BuildError, Geometry, GeometryKind, SphereCloud};
 
 /// Why a tree cannot be refitted. It is as it was before.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,12 +33,12 @@ pub enum RefitError {
         /// Position of the geometry in the list.
         geometry: usize,
     },
-    /// Something that was left out of the tree when it was built (a triangle without area, an empty or an infinite
-    /// primitive) would now stand in it, or something in it became infinite: the tree is to be built again.
+    /// Something that was left out of the tree when it was built (a triangle without area, a sphere without a radius, an empty
+    /// or an infinite primitive) would now stand in it, or something in it became infinite: the tree is to be built again.
     NeedsBuild {
         /// Position of the geometry in the list.
         geometry: usize,
-        /// The triangle or primitive.
+        /// The triangle, sphere or primitive.
         element: usize,
     },
 }
@@ -94,6 +96,7 @@ pub(crate) fn refit(accel: &mut Accel, geometries: Vec<Geometry>) -> Result<f64,
 /// it was.
 pub(crate) fn fit(accel: &mut Accel, parts: Parts) -> Result<(), RefitError> {
     check_triangles(accel, &accel.geometries)?;
+    check_spheres(accel, &accel.geometries)?;
     let boxes = entry_boxes(accel, &parts)?;
 
     // From here on nothing can fail.
@@ -117,6 +120,16 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts) -> Result<(), RefitError> {
             None => Bounds::EMPTY,
         })
         .collect();
+    let cloud_boxes: Vec<Bounds> = tree
+        .sphere_blocks
+        .par_iter_mut()
+        .zip(&tree.sphere_names)
+        .with_min_len(256)
+        .map(|(block, names)| match &geometries[names.geometry as usize].kind {
+            GeometryKind::Spheres(cloud) => fill_sphere_block(block, names, cloud, &units),
+            _ => Bounds::EMPTY,
+        })
+        .collect();
     let entry_boxes: Vec<Bounds> = boxes
         .iter()
         .map(|boxed| boxed.map_or(Bounds::EMPTY, |bounds| Bounds::near(&units, &bounds, 0, 0)))
@@ -136,6 +149,9 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts) -> Result<(), RefitError> {
                 tag::TRIANGLES => {
                     block_boxes[tag::blocks(child)].iter().for_each(|bounds| around.grow(bounds));
                 }
+                tag::SPHERES => {
+                    cloud_boxes[tag::blocks(child)].iter().for_each(|bounds| around.grow(bounds));
+                }
                 _ => {
                     for (entry, bounds) in tree.entries[first..].iter().zip(&entry_boxes[first..]) {
                         around.grow(bounds);
@@ -154,8 +170,8 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts) -> Result<(), RefitError> {
         node_boxes[place] = whole;
     }
 
-    accel.holds = Holds::new(geometries, parts.largest_corner);
-    accel.primitives = parts.boxed.len() + parts.triangles + parts.infinite.len();
+    accel.holds = Holds::new(geometries, parts.largest_corner, parts.sphere_reach);
+    accel.primitives = parts.boxed.len() + parts.triangles + parts.spheres + parts.infinite.len();
     accel.infinite = parts.infinite;
     accel.units = units;
     accel.bounds = parts.bounds;
@@ -166,6 +182,7 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts) -> Result<(), RefitError> {
 fn is_same_topology(old: &GeometryKind, new: &GeometryKind) -> bool {
     match (old, new) {
         (GeometryKind::Mesh(old), GeometryKind::Mesh(new)) => old.indices.len() == new.indices.len(),
+        (GeometryKind::Spheres(old), GeometryKind::Spheres(new)) => old.spheres.len() == new.spheres.len(),
         (GeometryKind::Custom(old), GeometryKind::Custom(new)) => {
             old.primitive_count() == new.primitive_count()
         }
@@ -223,6 +240,34 @@ fn check_triangles(accel: &Accel, geometries: &[Geometry]) -> Result<(), RefitEr
     Ok(())
 }
 
+/// Every sphere that has a radius is to have a place in the tree.
+fn check_spheres(accel: &Accel, geometries: &[Geometry]) -> Result<(), RefitError> {
+    let is_cloud = |geometry: &Geometry| matches!(geometry.kind, GeometryKind::Spheres(_));
+    if !geometries.iter().any(is_cloud) {
+        return Ok(());
+    }
+    let mut has_place: Vec<Vec<bool>> = geometries
+        .iter()
+        .map(|geometry| match &geometry.kind {
+            GeometryKind::Spheres(cloud) => vec![false; cloud.spheres.len()],
+            _ => Vec::new(),
+        })
+        .collect();
+    for names in &accel.tree.sphere_names {
+        for &primitive in names.primitives.iter().filter(|&&primitive| primitive != u32::MAX) {
+            has_place[names.geometry as usize][primitive as usize] = true;
+        }
+    }
+    for (geometry, standing) in geometries.iter().enumerate() {
+        let GeometryKind::Spheres(cloud) = &standing.kind else { continue };
+        let mut places = cloud.spheres.iter().zip(&has_place[geometry]);
+        if let Some(element) = places.position(|(sphere, has_place)| !has_place && has_radius(sphere)) {
+            return Err(RefitError::NeedsBuild { geometry, element });
+        }
+    }
+    Ok(())
+}
+
 /// The boxes of the entries in the tree; `None` of what became empty.
 fn entry_boxes(accel: &Accel, parts: &Parts) -> Result<Vec<Option<lumbre_geometry::Aabb>>, RefitError> {
     // In the order of their names, as they were taken apart.
@@ -270,6 +315,29 @@ fn fill_block(block: &mut TriangleBlock, names: &BlockNames, boxer: &Boxer) -> B
             for axis in 0..3 {
                 block.corners[corner][axis][lane] = position[axis];
             }
+        }
+    }
+    around
+}
+
+/// Takes the spheres over; one without a radius becomes one that is never hit.
+fn fill_sphere_block(
+    block: &mut SphereBlock,
+    names: &BlockNames,
+    cloud: &SphereCloud,
+    units: &Units,
+) -> Bounds {
+    let mut around = Bounds::EMPTY;
+    for (lane, &primitive) in names.primitives.iter().enumerate() {
+        if primitive == u32::MAX {
+            continue;
+        }
+        let sphere = cloud.spheres[primitive as usize];
+        if has_radius(&sphere) {
+            around.grow(&box_of(cloud, primitive, units));
+            block.put(lane, sphere);
+        } else {
+            block.put(lane, [f32::NAN; 4]);
         }
     }
     around

@@ -5,10 +5,10 @@
 //! read, in a fraction of the time of a build. So bytes that come from elsewhere cannot make a tree that answers wrongly: they
 //! are refused, or they say how to arrange what is there. For the same reason nothing is mapped into memory as it is.
 //!
-//! All numbers are u32, the least byte first. The file: eight bytes of magic; the version; how many geometries, nodes, blocks
-//! and entries there are; the reference to the root, or 2³² - 1; for each geometry its kind and how many primitives it has; for
+//! All numbers are u32, the least byte first. The file: eight bytes of magic; the version; how many geometries, nodes, blocks,
+//! blocks of spheres and entries there are; the reference to the root, or 2³² - 1; for each geometry its kind and how many primitives it has; for
 //! each node how many children it has, and references to them; for each block its geometry and eight triangles, 2³² - 1 for
-//! none; for each entry its geometry, and which primitive, with the top bit set in the last of a leaf. Then a checksum of eight
+//! none; for each block of spheres the same; for each entry its geometry, and which primitive, with the top bit set in the last of a leaf. Then a checksum of eight
 //! bytes of everything before it: FNV-1a of 64 bits (G. Fowler, L. Noll, K. Vo, D. Eastlake, "The FNV Non-Cryptographic Hash
 //! Algorithm").
 
@@ -19,12 +19,13 @@ use crate::collapse::{Entry, Packed};
 use crate::node::{Node, WIDTH, tag};
 use crate::prepare::{empty_over, take_apart};
 use crate::refit::{self, RefitError};
+use crate::spheres::SphereBlock;
 use crate::triangles::{BlockNames, TriangleBlock};
 use crate::{BuildError, Geometry, GeometryKind};
 
 const MAGIC: [u8; 8] = *b"LumbTree";
 /// Changes with the format, and with what the numbers mean.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 const NONE: u32 = u32::MAX;
 
 /// Why bytes are no tree over these geometries.
@@ -94,6 +95,7 @@ fn checksum(bytes: &[u8]) -> u64 {
 fn signature(geometry: &Geometry) -> [u32; 2] {
     match &geometry.kind {
         GeometryKind::Mesh(mesh) => [tag::TRIANGLES, mesh.indices.len() as u32],
+        GeometryKind::Spheres(cloud) => [tag::SPHERES, cloud.spheres.len() as u32],
         GeometryKind::Shape(_) => [tag::SHAPES, 1],
         GeometryKind::Instance(_) => [tag::INSTANCE, 1],
         GeometryKind::Custom(custom) => [tag::CUSTOM, custom.primitive_count()],
@@ -109,6 +111,7 @@ pub(crate) fn to_bytes(accel: &Accel) -> Vec<u8> {
     put(accel.geometries.len() as u32);
     put(tree.nodes.len() as u32);
     put(tree.names.len() as u32);
+    put(tree.sphere_names.len() as u32);
     put(tree.entries.len() as u32);
     put(tree.root.unwrap_or(NONE));
     accel.geometries.iter().flat_map(signature).for_each(&mut put);
@@ -116,7 +119,7 @@ pub(crate) fn to_bytes(accel: &Accel) -> Vec<u8> {
         put(node.len);
         node.children[..node.len as usize].iter().copied().for_each(&mut put);
     }
-    for names in &tree.names {
+    for names in tree.names.iter().chain(&tree.sphere_names) {
         put(names.geometry);
         names.primitives.iter().copied().for_each(&mut put);
     }
@@ -148,7 +151,7 @@ impl Words<'_> {
     }
 }
 
-const HEADER: usize = MAGIC.len() + 6 * 4;
+const HEADER: usize = MAGIC.len() + 7 * 4;
 const CHECKSUM: usize = 8;
 
 /// See [`Accel::from_bytes`].
@@ -165,13 +168,15 @@ pub(crate) fn from_bytes(bytes: &[u8], geometries: Vec<Geometry>) -> Result<Acce
     if version != VERSION {
         return Err(LoadError::OtherVersion { found: version, expected: VERSION });
     }
-    let [geometry_count, node_count, block_count, entry_count, root] = words.array().unwrap_or_default();
+    let [geometry_count, node_count, block_count, sphere_block_count, entry_count, root] =
+        words.array().unwrap_or_default();
     let counted = |count: u32, least: u64| u64::from(count) * least;
     // A node has a length and one child at least.
     let least = (HEADER + CHECKSUM) as u64
         + counted(geometry_count, 8)
         + counted(node_count, 8)
         + counted(block_count, 36)
+        + counted(sphere_block_count, 36)
         + counted(entry_count, 8);
     if (found as u64) < least || !found.is_multiple_of(4) {
         let expected = usize::try_from(least).unwrap_or(usize::MAX);
@@ -211,6 +216,11 @@ pub(crate) fn from_bytes(bytes: &[u8], geometries: Vec<Geometry>) -> Result<Acce
         let geometry = words.next().ok_or_else(ends)?;
         tree.names.push(BlockNames { geometry, primitives: words.array().ok_or_else(ends)? });
     }
+    tree.sphere_names.reserve_exact(sphere_block_count as usize);
+    for _ in 0..sphere_block_count {
+        let geometry = words.next().ok_or_else(ends)?;
+        tree.sphere_names.push(BlockNames { geometry, primitives: words.array().ok_or_else(ends)? });
+    }
     tree.entries.reserve_exact(entry_count as usize);
     for _ in 0..entry_count {
         tree.entries.push(Entry::from_words(words.array().ok_or_else(ends)?));
@@ -223,6 +233,7 @@ pub(crate) fn from_bytes(bytes: &[u8], geometries: Vec<Geometry>) -> Result<Acce
     check_structure(&tree, &geometries)?;
     check_names(&tree, &geometries)?;
     tree.blocks = vec![TriangleBlock::EMPTY; tree.names.len()];
+    tree.sphere_blocks = vec![SphereBlock::EMPTY; tree.sphere_names.len()];
 
     let mut accel = empty_over(geometries);
     accel.tree = tree;
@@ -238,6 +249,7 @@ fn inconsistent<T>(what: String) -> Result<T, LoadError> {
 fn check_structure(tree: &Packed, geometries: &[Geometry]) -> Result<(), LoadError> {
     let mut nodes = vec![false; tree.nodes.len()];
     let mut blocks = vec![false; tree.names.len()];
+    let mut sphere_blocks = vec![false; tree.sphere_names.len()];
     let mut entries = vec![false; tree.entries.len()];
     let mut take = |reference: u32, parent: Option<usize>| -> Option<()> {
         let once = |taken: &mut [bool], place: usize| {
@@ -251,6 +263,7 @@ fn check_structure(tree: &Packed, geometries: &[Geometry]) -> Result<(), LoadErr
                 if is_behind { once(&mut nodes, place) } else { None }
             }
             tag::TRIANGLES => tag::blocks(reference).try_for_each(|block| once(&mut blocks, block)),
+            tag::SPHERES => tag::blocks(reference).try_for_each(|block| once(&mut sphere_blocks, block)),
             kind @ (tag::SHAPES | tag::INSTANCE | tag::CUSTOM) => {
                 for (place, entry) in tree.entries.iter().enumerate().skip(place) {
                     once(&mut entries, place)?;
@@ -283,9 +296,10 @@ fn check_structure(tree: &Packed, geometries: &[Geometry]) -> Result<(), LoadErr
             }
         }
     }
-    let unused = [("node", &nodes), ("block", &blocks), ("entry", &entries)]
-        .into_iter()
-        .find_map(|(what, taken)| Some((what, taken.iter().position(|taken| !taken)?)));
+    let unused =
+        [("node", &nodes), ("block", &blocks), ("block of spheres", &sphere_blocks), ("entry", &entries)]
+            .into_iter()
+            .find_map(|(what, taken)| Some((what, taken.iter().position(|taken| !taken)?)));
     match unused {
         Some((what, place)) => inconsistent(format!("{what} {place} is named nowhere")),
         None => Ok(()),
@@ -302,33 +316,33 @@ fn check_names(tree: &Packed, geometries: &[Geometry]) -> Result<(), LoadError> 
         all += signature(geometry)[1] as usize;
     }
     let mut named = vec![false; all];
+    let is_packed = |kind: u32| matches!(kind, tag::TRIANGLES | tag::SPHERES);
     let mut name = |kind: Option<u32>, geometry: u32, primitive: u32| {
         let [found, count] = signature(geometries.get(geometry as usize)?);
-        let is_right = kind.map_or(found != tag::TRIANGLES, |kind| kind == found) && primitive < count;
+        let is_right = kind.map_or(!is_packed(found), |kind| kind == found) && primitive < count;
         if !is_right {
             return None;
         }
         let place = starts[geometry as usize] + primitive as usize;
         (!std::mem::replace(&mut named[place], true)).then_some(())
     };
-    for (block, names) in tree.names.iter().enumerate() {
-        // A block without triangles would have no mesh.
-        let is_mesh =
-            geometries.get(names.geometry as usize).is_some_and(|g| signature(g)[0] == tag::TRIANGLES);
-        let there = names.primitives.iter().filter(|&&primitive| primitive != NONE);
-        for &primitive in there {
-            if name(Some(tag::TRIANGLES), names.geometry, primitive).is_none() {
-                let geometry = names.geometry;
-                return inconsistent(format!(
-                    "block {block} names triangle {primitive} of geometry {geometry}, which is not there or was named"
-                ));
+    let of_triangles = (&tree.names, tag::TRIANGLES, ["block", "triangle", "mesh"]);
+    let of_spheres = (&tree.sphere_names, tag::SPHERES, ["block of spheres", "sphere", "cloud"]);
+    for (list, kind, [what, one, all]) in [of_triangles, of_spheres] {
+        for (block, names) in list.iter().enumerate() {
+            let geometry = names.geometry;
+            // Without anything in it, a block would be of no geometry of its kind.
+            let is_right = geometries.get(geometry as usize).is_some_and(|g| signature(g)[0] == kind);
+            for &primitive in names.primitives.iter().filter(|&&primitive| primitive != NONE) {
+                if name(Some(kind), geometry, primitive).is_none() {
+                    return inconsistent(format!(
+                        "{what} {block} names {one} {primitive} of geometry {geometry}, which is not there or was named"
+                    ));
+                }
             }
-        }
-        if !is_mesh {
-            return inconsistent(format!(
-                "block {block} is of geometry {}, which is no mesh",
-                names.geometry
-            ));
+            if !is_right {
+                return inconsistent(format!("{what} {block} is of geometry {geometry}, which is no {all}"));
+            }
         }
     }
     for (place, entry) in tree.entries.iter().enumerate() {

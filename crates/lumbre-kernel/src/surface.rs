@@ -4,6 +4,7 @@ use lumbre_geometry::{Ray, Surface};
 use lumbre_math::rounding::{UNIT_ROUNDOFF, gamma};
 use lumbre_math::{DMat3, DVec2, DVec3, Transform};
 
+use crate::spheres::ExactSphere;
 use crate::{Accel, GeometryKind, Hit, Instance, TriangleMesh};
 
 /// The instances along a hit's route, outermost first, and the tree within the last.
@@ -48,6 +49,7 @@ fn bare_surface(accel: &Accel, ray: &Ray, hit: &Hit) -> Surface {
         GeometryKind::Shape(shape) => shape.surface(ray, &hit.root),
         GeometryKind::Mesh(mesh) => triangle_surface(mesh, hit.primitive, hit.root.local),
         GeometryKind::Custom(custom) => custom.surface(hit.primitive, ray, &hit.root),
+        GeometryKind::Spheres(cloud) => ExactSphere::of(cloud, hit.primitive).surface(ray, &hit.root),
         GeometryKind::Instance(_) => panic!("a hit of another tree"),
     }
 }

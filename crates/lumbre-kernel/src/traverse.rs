@@ -14,6 +14,8 @@ use smallvec::SmallVec;
 use crate::collapse::Entry;
 use crate::lanes::{self, LANE_BITS, Lanes, Level, Task};
 use crate::node::{BoxRay, tag};
+use crate::sphere_search::{self, AmongSpheres, CloudRay};
+use crate::spheres::ExactSphere;
 use crate::stack::{Order, Stack};
 use crate::touch::{self, AllTouches, Touch};
 use crate::triangles::{self, BLOCK, BlockRay, Inside, Meeting, Passage, Shear};
@@ -85,6 +87,8 @@ pub(crate) struct Found<'a, 'p> {
 pub(crate) enum What {
     /// The triangle in a lane of a block, whose name is looked up when it is wanted.
     Lane { block: u32, lane: u32 },
+    /// The sphere in a lane of a block, alike.
+    Sphere { block: u32, lane: u32 },
     /// A primitive by its names.
     Named { geometry: u32, primitive: u32 },
 }
@@ -96,6 +100,10 @@ impl What {
         match self {
             Self::Lane { block, lane } => {
                 let names = &accel.tree.names[block as usize];
+                (names.geometry, names.primitives[lane as usize % BLOCK])
+            }
+            Self::Sphere { block, lane } => {
+                let names = &accel.tree.sphere_names[block as usize];
                 (names.geometry, names.primitives[lane as usize % BLOCK])
             }
             Self::Named { geometry, primitive } => (geometry, primitive),
@@ -134,6 +142,8 @@ pub(crate) fn search<'a, S: Search<'a>>(level: Level, accel: &'a Accel, ray: &Ra
     let mut touches = Vec::new();
     let is_over = if accel.holds.only_triangles {
         level.run(AmongTriangles { accel, ray, search: &mut *search, touches: &mut touches })
+    } else if accel.holds.only_spheres {
+        level.run(AmongSpheres { accel, ray, search: &mut *search })
     } else {
         level.run(AmongAll { accel, ray, search: &mut *search, touches: &mut touches })
     };
@@ -171,6 +181,8 @@ pub(crate) struct Frame<'a, R, L> {
     limit: f64,
     floor: f64,
     mesh: MeshRay,
+    /// For spheres, once some were met.
+    clouds: Option<CloudRay>,
     lanes: PhantomData<L>,
 }
 
@@ -222,7 +234,7 @@ impl<'a, R: Borrow<Ray>, L: Lanes> Frame<'a, R, L> {
         let (limit, floor) = (search.limit(), search.floor());
         let mesh = mesh_ray(accel, ray.borrow(), search);
         let limit_key = boxes.s_max.to_bits() as i32 | LANE_BITS;
-        Self { accel, ray, boxes, limit_key, limit, floor, mesh, lanes: PhantomData }
+        Self { accel, ray, boxes, limit_key, limit, floor, mesh, clouds: None, lanes: PhantomData }
     }
 
     /// Turns to another ray in the same tree; false where that passes the tree by, or is not sound.
@@ -235,6 +247,7 @@ impl<'a, R: Borrow<Ray>, L: Lanes> Frame<'a, R, L> {
         (self.limit, self.floor) = (search.limit(), search.floor());
         self.limit_key = self.boxes.s_max.to_bits() as i32 | LANE_BITS;
         self.mesh = mesh_ray(accel, ray.borrow(), search);
+        self.clouds = None;
         self.ray = ray;
         true
     }
@@ -277,6 +290,9 @@ impl<'a, R: Borrow<Ray>, L: Lanes> Frame<'a, R, L> {
             self.boxes.s_max = self.boxes.progress.up(limit);
             self.limit_key = self.boxes.s_max.to_bits() as i32 | LANE_BITS;
             self.mesh.blocks.set_range(&self.mesh.shear, self.floor, limit);
+            if let Some(clouds) = &mut self.clouds {
+                clouds.set_range(self.floor, limit);
+            }
         }
     }
 
@@ -399,6 +415,13 @@ impl<'a, S: Search<'a>> Task for AmongAll<'a, '_, S> {
                     if meet_blocks(&mut frame, leaf, &place, search, touches) {
                         return true;
                     }
+                }
+                tag::SPHERES => {
+                    let Frame { accel, ray, clouds, .. } = &mut frame;
+                    if sphere_search::meet_leaf::<L, S>(accel, ray, leaf, clouds, &place, search) {
+                        return true;
+                    }
+                    frame.narrow(search);
                 }
                 tag::SHAPES | tag::CUSTOM => {
                     for entry in &frame.accel.tree.entries[first..] {
@@ -591,6 +614,10 @@ pub(crate) fn meet_primitive<'a, S: Search<'a>>(
 ) -> bool {
     let kind = &accel.geometries[geometry as usize].kind;
     let what = What::Named { geometry, primitive };
+    if let GeometryKind::Spheres(cloud) = kind {
+        let sphere = ExactSphere::of(cloud, primitive);
+        return sphere_search::offer_crossings(accel, ray, &sphere, what, place, search);
+    }
     let mut offer = |root: Root, order: usize| {
         let order = order as u32;
         // Also keeps out a NaN.

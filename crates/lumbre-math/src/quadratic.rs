@@ -50,7 +50,7 @@ fn split(a: f64) -> (f64, f64) {
 ///
 /// The only subtraction of nearly equal numbers is inside `delta`, which each caller knows how to avoid: see W. H. Press
 /// et al., "Numerical Recipes", section 5.6.
-#[inline]
+#[inline(always)]
 pub fn quadratic(a: f64, h: f64, c: f64, delta: f64) -> Option<(f64, f64)> {
     if delta.is_nan() || delta < 0.0 {
         return None;

@@ -6,6 +6,7 @@
 #![allow(unsafe_code)]
 
 mod portable;
+mod spheres;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
@@ -18,8 +19,12 @@ use crate::node::{BoxRay, Node, Units, WIDTH};
 use crate::stack::STACK;
 use crate::triangles::{BLOCK, BlockRay, Inside, Passage, Shear, TriangleBlock};
 
+pub(crate) use spheres::SphereLanes;
+#[cfg(test)]
+pub(crate) use spheres::meet_spheres_at;
+
 /// What a search does eight at a time: boxes, and triangles.
-pub(crate) trait Lanes {
+pub(crate) trait Lanes: SphereLanes {
     /// Where the ray enters each of eight boxes, in an order of integers.
     type Keys: Copy;
 

@@ -153,7 +153,7 @@ fn sizes_that_shrink_without_end_stay_shallow() {
 fn boxes_hold_their_children_and_every_primitive_has_one_place() {
     let mut random = Random(17);
     let accel = mixture(&mut random, DVec3::new(2.0, 3.0, -4.0), 3.0, 1, false);
-    let triangles: usize = accel
+    let packed: usize = accel
         .geometries
         .iter()
         .map(|geometry| match &geometry.kind {
@@ -162,6 +162,7 @@ fn boxes_hold_their_children_and_every_primitive_has_one_place() {
                 let has_area = |&[a, b, c]: &[DVec3; 3]| (b - a).cross(c - a) != DVec3::ZERO;
                 mesh.indices.iter().map(corners).filter(has_area).count()
             }
+            GeometryKind::Spheres(cloud) => cloud.spheres.iter().filter(|sphere| sphere[3] > 0.0).count(),
             _ => 0,
         })
         .sum();
@@ -170,9 +171,10 @@ fn boxes_hold_their_children_and_every_primitive_has_one_place() {
         .tree
         .names
         .iter()
+        .chain(&accel.tree.sphere_names)
         .map(|names| names.primitives.iter().filter(|&&primitive| primitive != u32::MAX).count())
         .sum();
-    assert_eq!(in_blocks, triangles);
+    assert_eq!(in_blocks, packed);
     assert_eq!(in_blocks + others, accel.primitive_count());
     let mut places: Vec<_> = accel.tree.entries.iter().map(|e| (e.geometry, e.primitive())).collect();
     places.sort_unstable();

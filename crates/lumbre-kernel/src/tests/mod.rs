@@ -13,6 +13,7 @@ mod proof;
 mod refit;
 mod save;
 mod scenes;
+mod spheres;
 mod surfaces;
 mod watertight;
 mod winding;

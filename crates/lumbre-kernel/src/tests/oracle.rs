@@ -43,13 +43,13 @@ pub(crate) fn check(accel: &Accel, ray: &Ray) -> usize {
     expected.len()
 }
 
-fn check_many(accel: &Accel, random: &mut Random, center: DVec3, extent: f64, rays: usize) {
+pub(crate) fn check_many(accel: &Accel, random: &mut Random, center: DVec3, extent: f64, rays: usize) {
     let hits: usize = (0..rays).map(|_| check(accel, &ray(random, center, extent))).sum();
     assert!(hits > rays / 4, "only {hits} hits of {rays} rays");
 }
 
 /// The same in batches of many sizes, at every level; returns how many were hit.
-fn check_batches(accel: &Accel, rays: &[Ray]) -> usize {
+pub(crate) fn check_batches(accel: &Accel, rays: &[Ray]) -> usize {
     let expected: Vec<_> = rays.iter().map(|ray| accel.closest(ray)).collect();
     for level in Level::all() {
         for size in [1, 3, 7, 64, rays.len()] {

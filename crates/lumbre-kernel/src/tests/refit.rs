@@ -6,7 +6,7 @@ use lumbre_geometry::Ray;
 use lumbre_math::{DVec3, Transform, Vec3};
 
 use super::oracle::check;
-use super::scenes::{Random, balls, build, cube, icosphere, mixture, ray, shape, with_every_preset};
+use super::scenes::{Random, balls, build, cloud, cube, icosphere, mixture, ray, shape, with_every_preset};
 use crate::{Accel, BuildError, Geometry, GeometryKind, Instance, RefitError, TriangleMesh};
 
 const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
@@ -29,6 +29,14 @@ fn moved(accel: &Accel, random: &mut Random, center: DVec3, extent: f64) -> Vec<
             }))
         }
         GeometryKind::Shape(_) => GeometryKind::Shape(shape(random, center, extent)),
+        GeometryKind::Spheres(old) => {
+            let mut new = cloud(random, old.spheres.len(), center + 0.1 * extent, center, extent);
+            // What has no radius has no place in the tree.
+            for (new, old) in new.spheres.iter_mut().zip(&old.spheres) {
+                new[3] = if old[3] > 0.0 { new[3] } else { 0.0 };
+            }
+            GeometryKind::Spheres(Arc::new(new))
+        }
         GeometryKind::Instance(instance) => {
             let world_from_object = random.placement(center, extent, 0.2 * extent)
                 * Transform::translate(-instance.accel.bounds().center());

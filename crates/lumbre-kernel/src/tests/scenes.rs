@@ -9,7 +9,9 @@ use lumbre_geometry::{
 };
 use lumbre_math::{DVec2, DVec3, Transform, Vec3};
 
-use crate::{Accel, BuildOptions, CustomGeometry, Geometry, GeometryKind, Instance, Preset, TriangleMesh};
+use crate::{
+    Accel, BuildOptions, CustomGeometry, Geometry, GeometryKind, Instance, Preset, SphereCloud, TriangleMesh,
+};
 
 /// SplitMix64 (G. Steele, D. Lea, C. Flood, OOPSLA 2014).
 pub(crate) struct Random(pub(crate) u64);
@@ -282,6 +284,22 @@ pub(crate) fn balls(
     Balls { balls, floor }
 }
 
+/// Spheres in a cloud of their own, a few of them without a radius.
+pub(crate) fn cloud(
+    random: &mut Random,
+    count: usize,
+    origin: DVec3,
+    center: DVec3,
+    extent: f64,
+) -> SphereCloud {
+    let sphere = |random: &mut Random| {
+        let [x, y, z] = (center - origin + extent * random.vector()).as_vec3().to_array();
+        let radius = extent * 0.3 * random.unit().powi(2);
+        [x, y, z, if random.unit() < 0.03 { 0.0 } else { radius as f32 }]
+    };
+    SphereCloud { origin, spheres: (0..count).map(|_| sphere(random)).collect() }
+}
+
 /// An exact shape somewhere.
 pub(crate) fn shape(random: &mut Random, center: DVec3, extent: f64) -> PlacedShape {
     let shape: Shape = match random.below(10) {
@@ -316,6 +334,9 @@ pub(crate) fn mixture(random: &mut Random, center: DVec3, extent: f64, depth: u3
     let mut ball = icosphere(1, DVec3::ZERO, 0.4 * extent);
     ball.origin = center;
     kinds.push(GeometryKind::Mesh(Arc::new(ball)));
+    for origin in [center, center - 0.5 * extent] {
+        kinds.push(GeometryKind::Spheres(Arc::new(cloud(random, 14, origin, center, extent))));
+    }
     if infinite {
         let plane = Plane::new(center - 0.6 * extent, random.vector()).unwrap();
         kinds.push(GeometryKind::Shape(PlacedShape::new(plane.into(), Transform::IDENTITY)));
