@@ -47,8 +47,7 @@ pub(crate) fn meet_leaf<'a, L: Lanes, S: Search<'a>>(
     search: &mut S,
 ) -> bool {
     let places = tag::blocks(leaf);
-    let mut number = places.start as u32;
-    for block in &accel.tree.sphere_blocks[places] {
+    for (number, block) in (places.start as u32..).zip(&accel.tree.sphere_blocks[places]) {
         // Names are elsewhere in memory: where they cannot matter, they are not asked.
         let is_other = |cloud: &CloudRay| {
             !accel.holds.has_one_cloud_origin
@@ -79,7 +78,6 @@ pub(crate) fn meet_leaf<'a, L: Lanes, S: Search<'a>>(
         if search.limit() < limit {
             cloud.spheres.set_range(search.floor(), search.limit());
         }
-        number += 1;
     }
     false
 }

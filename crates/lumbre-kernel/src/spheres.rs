@@ -161,8 +161,7 @@ impl SphereRay {
         let moved = largest(cloud_origin) * (1.0 / (1u64 << 48) as f64);
         let is_sharp = 1.0 / (1u64 << 40) as f64 <= reach
             && reach <= (1u64 << 60) as f64
-            && 1e-50 <= length
-            && length <= 1e50;
+            && (1e-50..=1e50).contains(&length);
         Self {
             origin: [origin.x as f32, origin.y as f32, origin.z as f32],
             direction: [direction.x as f32, direction.y as f32, direction.z as f32],

@@ -40,12 +40,10 @@ impl SphereLanes for Portable {
         let (mut mask, mut sure) = (0, 0);
         for lane in 0..BLOCK {
             // Comparisons with a NaN, which unused lanes have, are false.
-            if !(beside[lane] <= square[lane]) {
-                continue;
-            }
             let half = (square[lane] - beside[lane]).sqrt();
             let (first, second) = (along[lane] - half, along[lane] + half);
-            if !(first <= ray.far && second >= ray.near) {
+            let may_be_hit = beside[lane] <= square[lane] && first <= ray.far && second >= ray.near;
+            if !may_be_hit {
                 continue;
             }
             mask |= 1 << lane;
