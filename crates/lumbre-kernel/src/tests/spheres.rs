@@ -64,7 +64,10 @@ fn a_placed_cloud_is_found_as_by_a_loop() {
     let inner = Arc::new(build(vec![spheres(cloud(&mut random, 60, CENTER, CENTER, 2.0))]));
     let instances = (0..5).map(|_| {
         let world_from_object = random.placement(CENTER, 2.0, 0.6) * Transform::translate(-CENTER);
-        GeometryKind::Instance(Instance { accel: Arc::clone(&inner), world_from_object })
+        GeometryKind::Instance(Instance {
+            accel: Arc::clone(&inner),
+            world_from_object: world_from_object.into(),
+        })
     });
     let accel = build(instances.collect());
     check_many(&accel, &mut random, CENTER, 3.0, 2_000);
