@@ -185,8 +185,8 @@ mod tests {
 
     #[test]
     fn our_kernel_agrees_with_the_loop_over_everything() {
-        check(&ours::Lumbre { preset: Preset::Best, by_batches: false }, 1.0);
-        check(&ours::Lumbre { preset: Preset::Balanced, by_batches: true }, 1.0);
+        check(&ours::Lumbre { preset: Preset::Best, by_batches: false, places_spheres: false }, 1.0);
+        check(&ours::Lumbre { preset: Preset::Balanced, by_batches: true, places_spheres: true }, 1.0);
     }
 
     #[test]
@@ -224,7 +224,7 @@ mod tests {
         let scene = RECIPES[0].make();
         let accel = ours::build(&scene, Preset::Balanced).expect("a sound scene");
         let list = rays::make(Work::Random, &scene, &accel, PictureSize { width: 40, height: 20 });
-        let program = ours::Lumbre { preset: Preset::Balanced, by_batches: false };
+        let program = ours::Lumbre { preset: Preset::Balanced, by_batches: false, places_spheres: false };
         let built = program.build(&scene, 1).expect("a sound scene");
         let mut pass = built.tree.prepare(Query::Closest, &list);
         pass.run();
