@@ -4,6 +4,7 @@ use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
 
 use crate::node::tag;
+use crate::spheres::ExactSphere;
 use crate::stack::AsBuilt;
 use crate::traverse::{self, Ask, Found, Search};
 use crate::{Accel, GeometryKind};
@@ -33,9 +34,13 @@ pub(crate) fn is_inside(accel: &Accel, point: DVec3, time: f64) -> bool {
     in_solids != is_in_surfaces
 }
 
-/// Whether it is a shape that says by itself what it holds.
+/// Whether it is a shape, or a cloud of them, that says by itself what it holds.
 fn is_solid(kind: &GeometryKind) -> bool {
-    matches!(kind, GeometryKind::Shape(shape) if shape.shape().is_solid())
+    match kind {
+        GeometryKind::Shape(shape) => shape.shape().is_solid(),
+        GeometryKind::Spheres(_) => true,
+        GeometryKind::Mesh(_) | GeometryKind::Instance(_) | GeometryKind::Custom(_) => false,
+    }
 }
 
 /// Whether there is anything else than such shapes.
@@ -49,7 +54,7 @@ fn solids_around(accel: &Accel, point: DVec3, time: f64) -> usize {
     let mut trees = vec![(accel, point)];
     let mut stack = Vec::new();
     while let Some((accel, point)) = trees.pop() {
-        let mut meet = |geometry: u32| match &accel.geometries[geometry as usize].kind {
+        let mut meet = |geometry: u32, primitive: u32| match &accel.geometries[geometry as usize].kind {
             GeometryKind::Shape(shape) => {
                 let local = shape.world_from_object().inverse_point(point);
                 count += usize::from(shape.shape().contains(local));
@@ -57,9 +62,12 @@ fn solids_around(accel: &Accel, point: DVec3, time: f64) -> usize {
             GeometryKind::Instance(instance) => {
                 trees.push((&*instance.accel, instance.world_from_object.at(time).inverse_point(point)));
             }
+            GeometryKind::Spheres(cloud) => {
+                count += usize::from(ExactSphere::of(cloud, primitive).contains(point));
+            }
             GeometryKind::Mesh(_) | GeometryKind::Custom(_) => {}
         };
-        accel.infinite.iter().for_each(|entry| meet(entry.geometry));
+        accel.infinite.iter().for_each(|entry| meet(entry.geometry, entry.primitive()));
         let units = &accel.units;
         let (local, slop) = ((point - units.origin) * units.scale, 4.0 * units.slop_of(point));
         stack.extend(accel.tree.root);
@@ -79,9 +87,15 @@ fn solids_around(accel: &Accel, point: DVec3, time: f64) -> usize {
                     }
                 }
                 tag::TRIANGLES => {}
+                tag::SPHERES => {
+                    for names in &accel.tree.sphere_names[tag::blocks(reference)] {
+                        let there = names.primitives.iter().filter(|&&primitive| primitive != u32::MAX);
+                        there.for_each(|&primitive| meet(names.geometry, primitive));
+                    }
+                }
                 _ => {
                     for entry in &accel.tree.entries[(reference & tag::PLACE) as usize..] {
-                        meet(entry.geometry);
+                        meet(entry.geometry, entry.primitive());
                         if entry.is_last() {
                             break;
                         }

@@ -13,6 +13,7 @@ use lumbre_math::{DVec2, DVec3, Transform};
 
 use crate::node::{Node, tag};
 use crate::prepare::has_area;
+use crate::spheres::{ExactSphere, has_radius};
 use crate::traverse::Place;
 use crate::{Accel, GeometryKind, Instance, InstancePath, TriangleMesh};
 
@@ -29,7 +30,7 @@ pub struct ClosestPoint {
     pub uv: DVec2,
     /// The id of the geometry.
     pub id: u32,
-    /// The triangle of a mesh, the primitive of a custom geometry, else 0.
+    /// The triangle of a mesh, the sphere of a cloud, the primitive of a custom geometry, else 0.
     pub primitive: u32,
     /// The position of the geometry in the list that its tree was built from.
     pub geometry: u32,
@@ -105,6 +106,13 @@ pub(crate) fn closest_point(
                         {
                             search.meet_triangle(frame, mesh, names.geometry, primitive);
                         }
+                    }
+                }
+            }
+            Waiting::Reference(reference) if reference >> tag::SHIFT == tag::SPHERES => {
+                for names in &frame.accel.tree.sphere_names[tag::blocks(reference)] {
+                    for &primitive in names.primitives.iter().filter(|&&primitive| primitive != u32::MAX) {
+                        search.meet(frame, names.geometry, primitive, next.distance);
                     }
                 }
             }
@@ -326,12 +334,19 @@ impl Search {
         }
     }
 
-    /// A shape, or a primitive of custom geometry, that is at least `distance` away.
+    /// A shape, a sphere of a cloud, or a primitive of custom geometry, that is at least `distance` away.
     pub(crate) fn meet(&mut self, frame: &Frame, geometry: u32, primitive: u32, distance: f64) {
         let (found, bounds) = match &frame.accel.geometries[geometry as usize].kind {
             GeometryKind::Shape(shape) => {
                 let map = frame.map * shape.world_from_object();
                 (shape.closest_point_under(&frame.map, self.point), shape.shape().bounds(&map))
+            }
+            GeometryKind::Spheres(cloud) => {
+                let sphere = ExactSphere::of(cloud, primitive);
+                if !has_radius(&cloud.spheres[primitive as usize]) {
+                    return;
+                }
+                (sphere.to_shape().closest_point(&frame.map, self.point), None)
             }
             GeometryKind::Custom(custom) => {
                 let found = match similarity_factor(&frame.map) {

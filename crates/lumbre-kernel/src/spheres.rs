@@ -93,12 +93,22 @@ impl ExactSphere {
         }
     }
 
-    /// The surface at a crossing.
+    /// The same as a shape.
     ///
     /// # Panics
-    /// When it has no radius, so that it was never hit.
+    /// When it has no radius, so that it stands in no tree.
+    pub(crate) fn to_shape(self) -> Sphere {
+        Sphere::new(self.center, self.radius).expect("it has a radius")
+    }
+
+    /// The surface at a crossing.
     pub(crate) fn surface(&self, ray: &Ray, root: &Root) -> Surface {
-        Sphere::new(self.center, self.radius).expect("it was hit").surface(ray, root)
+        self.to_shape().surface(ray, root)
+    }
+
+    /// Whether the ball holds `p`.
+    pub(crate) fn contains(&self, p: DVec3) -> bool {
+        self.radius > 0.0 && self.to_shape().contains(p)
     }
 }
 

@@ -16,6 +16,7 @@ use rayon::prelude::*;
 use crate::nearest::Frame;
 use crate::node::{Node, WIDTH, tag};
 use crate::prepare::has_area;
+use crate::spheres::ExactSphere;
 use crate::{Accel, GeometryKind, InstancePath, TriangleMesh};
 
 /// Why there is no winding number: an open shape, or custom geometry that offers none.
@@ -75,6 +76,10 @@ pub(crate) fn winding_number(
                 GeometryKind::Mesh(_) => {}
                 GeometryKind::Instance(instance) => {
                     frames.push(frame.within(geometry, instance));
+                }
+                GeometryKind::Spheres(cloud) => {
+                    let spheres = (0..cloud.spheres.len() as u32).map(|i| ExactSphere::of(cloud, i));
+                    sum += spheres.filter(|sphere| sphere.contains(frame.local)).count() as f64;
                 }
                 GeometryKind::Shape(shape) if shape.shape().is_solid() => {
                     let local = shape.world_from_object().inverse_point(frame.local);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use lumbre_geometry::{NoNearestPoint, PlacedShape, Plane, Shape, Sphere, Torus};
 use lumbre_math::{DVec3, Transform};
 
-use super::scenes::{Random, balls, build, bumpy, cube, icosphere, mixture, soup, with_every_preset};
+use super::scenes::{Random, balls, build, bumpy, cloud, cube, icosphere, mixture, soup, with_every_preset};
 use crate::nearest::{Frame, Search};
 use crate::{Accel, ClosestPoint, Geometry, GeometryKind, Instance, TriangleMesh};
 
@@ -31,6 +31,11 @@ fn by_loop(accel: &Accel, point: DVec3, max_distance: f64) -> (Option<ClosestPoi
                     inner.push(frame.within(geometry, instance));
                 }
                 GeometryKind::Shape(_) => search.meet(frame, geometry, 0, 0.0),
+                GeometryKind::Spheres(cloud) => {
+                    for primitive in 0..cloud.spheres.len() as u32 {
+                        search.meet(frame, geometry, primitive, 0.0);
+                    }
+                }
                 GeometryKind::Custom(custom) => {
                     for primitive in 0..custom.primitive_count() {
                         search.meet(frame, geometry, primitive, 0.0);
@@ -75,6 +80,8 @@ fn similar(random: &mut Random, center: DVec3, spread: f64) -> Transform {
 /// Meshes, shapes where they have a method, balls of a stranger's, instances of all that and of meshes under any map.
 fn answerable(random: &mut Random, center: DVec3, extent: f64, depth: u32) -> Accel {
     let mut kinds = vec![GeometryKind::Mesh(Arc::new(soup(random, 90, center, extent)))];
+    let spheres = cloud(random, 12, center, center, extent);
+    kinds.push(GeometryKind::Spheres(Arc::new(spheres)));
     for _ in 0..12 {
         let shape: Shape = match random.below(3) {
             0 => Sphere::new(0.2 * random.vector(), 0.4).unwrap().into(),

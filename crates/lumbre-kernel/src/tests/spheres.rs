@@ -181,6 +181,31 @@ fn a_cloud_is_refitted_unless_one_without_a_radius_gets_one() {
 }
 
 #[test]
+fn a_cloud_holds_points_as_balls_do() {
+    let mut random = Random(16);
+    let cloud = cloud(&mut random, 80, CENTER, CENTER, 3.0);
+    let map = Transform::translate(DVec3::new(9.0, 8.0, -7.0));
+    let accel = Arc::new(build(vec![spheres(cloud.clone())]));
+    let placed = build(vec![GeometryKind::Instance(Instance {
+        accel: Arc::clone(&accel),
+        world_from_object: map.into(),
+    })]);
+    let mut inside = 0;
+    for _ in 0..1_000 {
+        let p = CENTER + 3.0 * random.vector();
+        let holds = |&[x, y, z, radius]: &[f32; 4]| {
+            (p - CENTER - DVec3::new(x.into(), y.into(), z.into())).length() < radius.into()
+        };
+        let around = cloud.spheres.iter().filter(|sphere| holds(sphere)).count();
+        assert_eq!(accel.is_inside(p), around % 2 == 1, "{p}");
+        assert_eq!(placed.is_inside(map.point(p)), around % 2 == 1, "{p}");
+        assert_eq!(accel.winding_number(p), Ok(around as f64), "{p}");
+        inside += usize::from(around > 0);
+    }
+    assert!(inside > 100, "{inside}");
+}
+
+#[test]
 fn rays_that_touch_are_found_as_by_a_loop() {
     let unit = SphereCloud { origin: CENTER, spheres: vec![[0.0, 0.0, 0.0, 1.0], [4.0, 0.0, 0.0, 1.0]] };
     let accel = build(vec![spheres(unit)]);
