@@ -7,7 +7,7 @@ use crate::spheres::has_radius;
 use crate::touch::{Touch, offer_borders_of_all};
 use crate::traverse::{Found, Place, Search, What, is_sound, meet_primitive};
 use crate::triangles::{Meeting, Shear, intersect};
-use crate::{Accel, GeometryKind, Hit};
+use crate::{Accel, GeometryKind, Hit, precise};
 
 pub(crate) fn closest(accel: &Accel, ray: &Ray) -> Option<Hit> {
     let mut search = Closest::new(ray, All);
@@ -52,6 +52,7 @@ fn visit<'a, S: Search<'a>>(accel: &'a Accel, ray: &Ray, search: &mut S) {
                             Meeting::Hit { root, is_front } => (root, is_front),
                             Meeting::Touch { root, is_owned, feature, is_front } => {
                                 let place = place.clone();
+                                let corners = corners.map(|corner| corner.map(f64::from));
                                 touches.push(Touch {
                                     root,
                                     is_owned,
@@ -71,6 +72,11 @@ fn visit<'a, S: Search<'a>>(accel: &'a Accel, ray: &Ray, search: &mut S) {
                         };
                         let what = What::Named { geometry, primitive };
                         search.offer(&Found { root, what, order: 0, is_front, accel, place: &place });
+                    }
+                }
+                GeometryKind::PreciseMesh(mesh) => {
+                    for primitive in 0..mesh.indices.len() as u32 {
+                        precise::meet(accel, &ray, [position, primitive], &place, search, &mut touches);
                     }
                 }
                 GeometryKind::Instance(instance) => {

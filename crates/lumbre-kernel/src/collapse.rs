@@ -424,7 +424,7 @@ impl Packer<'_> {
             return match kind {
                 Kind::Triangle => Counts { blocks: names.len().div_ceil(BLOCK), ..Counts::default() },
                 Kind::Sphere => Counts { sphere_blocks: names.len().div_ceil(BLOCK), ..Counts::default() },
-                Kind::Shape | Kind::Instance | Kind::Custom => {
+                Kind::Shape | Kind::Instance | Kind::Custom | Kind::Precise => {
                     Counts { entries: names.len(), ..Counts::default() }
                 }
             };
@@ -491,6 +491,7 @@ impl Packer<'_> {
             Kind::Shape => tag::SHAPES,
             Kind::Instance => tag::INSTANCE,
             Kind::Custom => tag::CUSTOM,
+            Kind::Precise => tag::PRECISE,
         };
         let place = room.start.entries as u32;
         let own = room.take(Counts { entries: names.len(), ..Counts::default() });

@@ -26,7 +26,7 @@ fn is_uniform(primitives: &[Primitive], traits: &[Traits]) -> bool {
     let most = match first.0 {
         Kind::Triangle | Kind::Sphere => BLOCK,
         Kind::Instance => 1,
-        Kind::Shape | Kind::Custom => MOST_OTHERS,
+        Kind::Shape | Kind::Custom | Kind::Precise => MOST_OTHERS,
     };
     primitives.len() <= most && primitives[1..].iter().all(|p| group(p) == first)
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use lumbre_geometry::{Aabb, NearestPoint, NoNearestPoint, PlacedShape, Ray, Root, Roots, Surface};
 use lumbre_math::{AnimatedTransform, DVec3, Transform, Vec3};
 
-use crate::Accel;
+use crate::{Accel, PreciseMesh};
 
 /// Something that rays can hit, under a name of the caller's.
 #[derive(Clone, Debug)]
@@ -27,6 +27,8 @@ pub enum GeometryKind {
     Mesh(Arc<TriangleMesh>),
     /// Whole spheres in large numbers, tested in double precision: sixteen bytes each, where a shape takes some two hundred.
     Spheres(Arc<SphereCloud>),
+    /// Triangles with vertices in double precision, watertight as well.
+    PreciseMesh(Arc<PreciseMesh>),
     /// A whole tree, placed.
     Instance(Instance),
     /// A stranger's geometry.

@@ -39,7 +39,10 @@ fn is_solid(kind: &GeometryKind) -> bool {
     match kind {
         GeometryKind::Shape(shape) => shape.shape().is_solid(),
         GeometryKind::Spheres(_) => true,
-        GeometryKind::Mesh(_) | GeometryKind::Instance(_) | GeometryKind::Custom(_) => false,
+        GeometryKind::Mesh(_)
+        | GeometryKind::PreciseMesh(_)
+        | GeometryKind::Instance(_)
+        | GeometryKind::Custom(_) => false,
     }
 }
 
@@ -65,7 +68,7 @@ fn solids_around(accel: &Accel, point: DVec3, time: f64) -> usize {
             GeometryKind::Spheres(cloud) => {
                 count += usize::from(ExactSphere::of(cloud, primitive).contains(point));
             }
-            GeometryKind::Mesh(_) | GeometryKind::Custom(_) => {}
+            GeometryKind::Mesh(_) | GeometryKind::PreciseMesh(_) | GeometryKind::Custom(_) => {}
         };
         accel.infinite.iter().for_each(|entry| meet(entry.geometry, entry.primitive()));
         let units = &accel.units;

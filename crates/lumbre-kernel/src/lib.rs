@@ -16,6 +16,7 @@ mod morton;
 mod nearest;
 mod node;
 mod options;
+mod precise;
 mod prepare;
 mod primitive;
 mod query;
@@ -36,6 +37,7 @@ pub use geometry::{CustomGeometry, Geometry, GeometryKind, Instance, Placement, 
 pub use hit::{Hit, InstancePath};
 pub use nearest::{ClosestPoint, NoClosestPoint};
 pub use options::{Faces, QueryOptions};
+pub use precise::PreciseMesh;
 pub use refit::RefitError;
 pub use save::LoadError;
 pub use winding::NoWindingNumber;

@@ -15,7 +15,7 @@ use crate::node::{Node, tag};
 use crate::prepare::has_area;
 use crate::spheres::{ExactSphere, has_radius};
 use crate::traverse::Place;
-use crate::{Accel, GeometryKind, Instance, InstancePath, TriangleMesh};
+use crate::{Accel, GeometryKind, Instance, InstancePath, TriangleMesh, precise};
 
 /// The point of all surfaces that is nearest to a given one.
 #[derive(Clone, Debug, PartialEq)]
@@ -358,6 +358,13 @@ impl Search {
                     None => Err(NoNearestPoint::Map),
                 };
                 (found, None)
+            }
+            GeometryKind::PreciseMesh(mesh) => {
+                let corners = mesh.corners(primitive);
+                if precise::has_area(&corners) {
+                    self.meet_corners(frame, corners.map(|p| p - frame.local), geometry, primitive);
+                }
+                return;
             }
             GeometryKind::Mesh(_) | GeometryKind::Instance(_) => return,
         };

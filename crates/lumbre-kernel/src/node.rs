@@ -50,6 +50,8 @@ pub(crate) mod tag {
     pub(crate) const CUSTOM: u32 = 4;
     /// Some blocks of spheres in a row: see [`spheres`].
     pub(crate) const SPHERES: u32 = 5;
+    /// The first of some leaf entries that are triangles in double precision.
+    pub(crate) const PRECISE: u32 = 6;
     /// Not a child: the mark on the stack where an instance was entered.
     pub(crate) const RETURN: u32 = 7;
 

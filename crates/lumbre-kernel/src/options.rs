@@ -73,7 +73,9 @@ pub(crate) fn meets_front(accel: &Accel, ray: &Ray, what: What, root: &Root) -> 
         GeometryKind::Shape(shape) => shape.surface(ray, root),
         GeometryKind::Custom(custom) => custom.surface(primitive, ray, root),
         GeometryKind::Spheres(cloud) => ExactSphere::of(cloud, primitive).surface(ray, root),
-        GeometryKind::Mesh(_) | GeometryKind::Instance(_) => unreachable!("it is tested by itself"),
+        GeometryKind::Mesh(_) | GeometryKind::PreciseMesh(_) | GeometryKind::Instance(_) => {
+            unreachable!("it is tested by itself")
+        }
     };
     surface.normal.dot(ray.direction) < 0.0
 }

@@ -14,7 +14,9 @@ use crate::holds::Holds;
 use crate::lanes::Level;
 use crate::node::{Node, Units, tag};
 use crate::primitive::{Bounds, Kind, Primitive, Traits};
-use crate::{Accel, BuildError, BuildOptions, Geometry, GeometryKind, Placement, TriangleMesh};
+use crate::{
+    Accel, BuildError, BuildOptions, Geometry, GeometryKind, Placement, PreciseMesh, TriangleMesh, precise,
+};
 
 /// References have 29 bits of place.
 pub(crate) const MOST_PRIMITIVES: usize = (1 << 29) - 1;
@@ -162,6 +164,7 @@ pub(crate) fn take_apart(geometries: &[Geometry]) -> Result<Parts, BuildError> {
                 parts.spheres += survey.spheres;
                 parts.clouds.push(survey);
             }
+            GeometryKind::PreciseMesh(mesh) => parts.add_precise(position, mesh, room)?,
             GeometryKind::Shape(_) => parts.add(position, 0, boxes[position], room)?,
             GeometryKind::Custom(custom) => {
                 for primitive in 0..custom.primitive_count() {
@@ -209,7 +212,10 @@ fn boxes_of(geometries: &[Geometry]) -> Vec<Option<Aabb>> {
                 Placement::Moving(motion) => outline.swept(motion),
             })
         }
-        GeometryKind::Mesh(_) | GeometryKind::Spheres(_) | GeometryKind::Custom(_) => None,
+        GeometryKind::Mesh(_)
+        | GeometryKind::PreciseMesh(_)
+        | GeometryKind::Spheres(_)
+        | GeometryKind::Custom(_) => None,
     };
     geometries.par_iter().with_min_len(64).map(bounds).collect()
 }
@@ -218,6 +224,29 @@ impl Parts {
     /// How many more primitives a tree takes.
     fn room(&self) -> usize {
         MOST_PRIMITIVES - self.boxed.len() - self.infinite.len() - self.triangles - self.spheres
+    }
+
+    /// The triangles of a mesh in double precision that have an area.
+    fn add_precise(&mut self, position: usize, mesh: &PreciseMesh, room: usize) -> Result<(), BuildError> {
+        if mesh.indices.len() > room {
+            return Err(BuildError::TooMany);
+        }
+        if let Some(element) = mesh.positions.iter().position(|p| !p.is_finite()) {
+            return Err(BuildError::NotFinite { geometry: position, element });
+        }
+        let is_there = |vertex: &u32| (*vertex as usize) < mesh.positions.len();
+        if let Some(triangle) = mesh.indices.iter().position(|triangle| !triangle.iter().all(is_there)) {
+            return Err(BuildError::VertexOutOfRange { geometry: position, triangle });
+        }
+        for primitive in 0..mesh.indices.len() as u32 {
+            let corners = mesh.corners(primitive);
+            if precise::has_area(&corners) {
+                let bounds = Aabb::around(corners);
+                self.tree_bounds = self.tree_bounds.union(bounds);
+                self.boxed.push(Boxed { bounds, geometry: position as u32, primitive });
+            }
+        }
+        Ok(())
     }
 
     fn add(
@@ -616,6 +645,7 @@ fn traits_of(geometry: &Geometry) -> Traits {
         GeometryKind::Shape(shape) => Traits { kind: Kind::Shape, cost: cost_of(shape) },
         GeometryKind::Instance(_) => Traits { kind: Kind::Instance, cost: 96 },
         GeometryKind::Custom(_) => Traits { kind: Kind::Custom, cost: 48 },
+        GeometryKind::PreciseMesh(_) => Traits { kind: Kind::Precise, cost: 16 },
     }
 }
 

@@ -13,6 +13,7 @@ pub(crate) enum Kind {
     Instance,
     Custom,
     Sphere,
+    Precise,
 }
 
 impl Kind {

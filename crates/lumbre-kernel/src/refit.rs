@@ -183,6 +183,9 @@ fn is_same_topology(old: &GeometryKind, new: &GeometryKind) -> bool {
     match (old, new) {
         (GeometryKind::Mesh(old), GeometryKind::Mesh(new)) => old.indices.len() == new.indices.len(),
         (GeometryKind::Spheres(old), GeometryKind::Spheres(new)) => old.spheres.len() == new.spheres.len(),
+        (GeometryKind::PreciseMesh(old), GeometryKind::PreciseMesh(new)) => {
+            old.indices.len() == new.indices.len()
+        }
         (GeometryKind::Custom(old), GeometryKind::Custom(new)) => {
             old.primitive_count() == new.primitive_count()
         }

@@ -96,6 +96,7 @@ fn signature(geometry: &Geometry) -> [u32; 2] {
     match &geometry.kind {
         GeometryKind::Mesh(mesh) => [tag::TRIANGLES, mesh.indices.len() as u32],
         GeometryKind::Spheres(cloud) => [tag::SPHERES, cloud.spheres.len() as u32],
+        GeometryKind::PreciseMesh(mesh) => [tag::PRECISE, mesh.indices.len() as u32],
         GeometryKind::Shape(_) => [tag::SHAPES, 1],
         GeometryKind::Instance(_) => [tag::INSTANCE, 1],
         GeometryKind::Custom(custom) => [tag::CUSTOM, custom.primitive_count()],
@@ -264,7 +265,7 @@ fn check_structure(tree: &Packed, geometries: &[Geometry]) -> Result<(), LoadErr
             }
             tag::TRIANGLES => tag::blocks(reference).try_for_each(|block| once(&mut blocks, block)),
             tag::SPHERES => tag::blocks(reference).try_for_each(|block| once(&mut sphere_blocks, block)),
-            kind @ (tag::SHAPES | tag::INSTANCE | tag::CUSTOM) => {
+            kind @ (tag::SHAPES | tag::INSTANCE | tag::CUSTOM | tag::PRECISE) => {
                 for (place, entry) in tree.entries.iter().enumerate().skip(place) {
                     once(&mut entries, place)?;
                     if signature(geometries.get(entry.geometry as usize)?)[0] != kind {

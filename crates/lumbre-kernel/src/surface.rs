@@ -1,6 +1,7 @@
 //! What is computed once, for the hit that was chosen.
 
 use lumbre_geometry::{Ray, Surface};
+use lumbre_math::quadratic::dop;
 use lumbre_math::rounding::{UNIT_ROUNDOFF, gamma};
 use lumbre_math::{DMat3, DVec2, DVec3, Transform};
 
@@ -48,6 +49,7 @@ fn bare_surface(accel: &Accel, ray: &Ray, hit: &Hit) -> Surface {
     match &accel.geometries[hit.geometry as usize].kind {
         GeometryKind::Shape(shape) => shape.surface(ray, &hit.root),
         GeometryKind::Mesh(mesh) => triangle_surface(mesh, hit.primitive, hit.root.local),
+        GeometryKind::PreciseMesh(mesh) => precise_surface(&mesh.corners(hit.primitive), hit.root.local),
         GeometryKind::Custom(custom) => custom.surface(hit.primitive, ray, &hit.root),
         GeometryKind::Spheres(cloud) => ExactSphere::of(cloud, hit.primitive).surface(ray, &hit.root),
         GeometryKind::Instance(_) => panic!("a hit of another tree"),
@@ -70,6 +72,26 @@ fn triangle_surface(mesh: &TriangleMesh, triangle: u32, uv: DVec2) -> Surface {
         point,
         point_error: gamma(7) * sizes + UNIT_ROUNDOFF * point.abs(),
         normal: unit(dpdu.cross(dpdv)),
+        uv,
+        dpdu,
+        dpdv,
+        dndu: DVec3::ZERO,
+        dndv: DVec3::ZERO,
+    }
+}
+
+/// The same in double precision: from the first corner, so that the error is that of what lies between, and one rounding of
+/// the place.
+fn precise_surface(&[p0, p1, p2]: &[DVec3; 3], uv: DVec2) -> Surface {
+    let (dpdu, dpdv) = (p1 - p0, p2 - p0);
+    let terms = [uv.x * dpdu, uv.y * dpdv];
+    let point = p0 + (terms[0] + terms[1]);
+    // Where the sides are nearly parallel, their products are taken with an error each.
+    let normal = |x: usize, y: usize| dop(dpdu[x], dpdv[y], dpdu[y], dpdv[x]);
+    Surface {
+        point,
+        point_error: gamma(7) * (terms[0].abs() + terms[1].abs()) + gamma(2) * point.abs(),
+        normal: unit(DVec3::new(normal(1, 2), normal(2, 0), normal(0, 1))),
         uv,
         dpdu,
         dpdv,

@@ -35,7 +35,7 @@ pub(crate) struct Touch<'a> {
     pub(crate) is_owned: bool,
     pub(crate) is_front: bool,
     pub(crate) feature: Feature,
-    pub(crate) corners: [[f32; 3]; 3],
+    pub(crate) corners: [[f64; 3]; 3],
     pub(crate) geometry: u32,
     pub(crate) primitive: u32,
     pub(crate) accel: &'a Accel,
@@ -51,9 +51,9 @@ impl<'a> Touch<'a> {
 }
 
 /// A corner by position; the two zeros are one.
-type Position = [u32; 3];
+type Position = [u64; 3];
 
-fn position(corner: [f32; 3]) -> Position {
+fn position(corner: [f64; 3]) -> Position {
     corner.map(|x| (x + 0.0).to_bits())
 }
 

@@ -19,7 +19,7 @@ use crate::spheres::ExactSphere;
 use crate::stack::{Order, Stack};
 use crate::touch::{self, AllTouches, Touch};
 use crate::triangles::{self, BLOCK, BlockRay, Inside, Meeting, Passage, Shear};
-use crate::{Accel, GeometryKind, InstancePath, options};
+use crate::{Accel, GeometryKind, InstancePath, options, precise};
 
 /// What a search asks of a primitive that may be crossed more than once.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -434,6 +434,18 @@ impl<'a, S: Search<'a>> Task for AmongAll<'a, '_, S> {
                     }
                     frame.narrow(search);
                 }
+                tag::PRECISE => {
+                    for entry in &frame.accel.tree.entries[first..] {
+                        let name = [entry.geometry, entry.primitive()];
+                        if precise::meet(frame.accel, &frame.ray, name, &place, search, touches) {
+                            return true;
+                        }
+                        if entry.is_last() {
+                            break;
+                        }
+                    }
+                    frame.narrow(search);
+                }
                 tag::INSTANCE => {
                     let geometry = frame.accel.instance_entry(first).geometry;
                     if !search.enters(frame.accel, geometry) {
@@ -569,7 +581,7 @@ fn meet_unclear<'a, S: Search<'a>>(
         Meeting::Hit { root, is_front } => (root, is_front),
         Meeting::Touch { root, is_owned, feature, is_front } => {
             let (geometry, primitive) = what.names(accel);
-            let (place, corners) = (place.clone(), block.triangle(lane));
+            let (place, corners) = (place.clone(), block.triangle(lane).map(|corner| corner.map(f64::from)));
             touches.push(Touch {
                 root,
                 is_owned,

@@ -286,7 +286,11 @@ pub(crate) fn is_in_range(ray: &Ray, t: f64) -> bool {
 /// How the ray passes a triangle. Corners and origin are relative to the mesh, and have the order of the shear's axes.
 #[inline(always)]
 pub(crate) fn passage(shear: &Shear, origin: &[f64; 3], corners: &[[f32; 3]; 3]) -> (Passage, Inside) {
-    let [a, b, c] = shear.corners(origin, corners);
+    passage_of(shear.corners(origin, corners))
+}
+
+#[inline(always)]
+fn passage_of([a, b, c]: [Corner; 3]) -> (Passage, Inside) {
     // The edge functions px qy - py qx. The two products of each are rounded apart: the opposite edge of the neighbour then
     // gives exactly the opposite value, and their difference has the right sign unless they are equal.
     let (bc, ca, ab) = (c.x * b.y, a.x * c.y, b.x * a.y);
@@ -312,6 +316,21 @@ pub(crate) fn intersect(ray: &Ray, shear: Shear, origin: [f64; 3], corners: [[f3
         (Passage::Outside, _) => Meeting::Miss,
         (Passage::Inside, inside) => inside.meeting(ray, &shear),
         (Passage::Unclear, _) => meet_unclear(ray, &shear, shear.corners(&origin, &corners)),
+    }
+}
+
+/// The same for corners in double precision, in the space of the ray.
+pub(crate) fn intersect_precise(ray: &Ray, shear: Shear, corners: &[DVec3; 3]) -> Meeting {
+    let [x, y, z] = shear.axes.permute(&ray.origin);
+    let corners = corners.map(|corner| {
+        let corner = shear.axes.permute(&corner);
+        let height = corner[2] - z;
+        Corner { x: (corner[0] - x) - shear.x * height, y: (corner[1] - y) - shear.y * height, z: height }
+    });
+    match passage_of(corners) {
+        (Passage::Outside, _) => Meeting::Miss,
+        (Passage::Inside, inside) => inside.meeting(ray, &shear),
+        (Passage::Unclear, _) => meet_unclear(ray, &shear, corners),
     }
 }
 

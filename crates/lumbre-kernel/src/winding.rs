@@ -17,7 +17,7 @@ use crate::nearest::Frame;
 use crate::node::{Node, WIDTH, tag};
 use crate::prepare::has_area;
 use crate::spheres::ExactSphere;
-use crate::{Accel, GeometryKind, InstancePath, TriangleMesh};
+use crate::{Accel, GeometryKind, InstancePath, PreciseMesh, TriangleMesh, precise};
 
 /// Why there is no winding number: an open shape, or custom geometry that offers none.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -73,7 +73,7 @@ pub(crate) fn winding_number(
             let geometry = geometry as u32;
             let no = || NoWindingNumber { id: standing.id, geometry, instances: frame.place.ids.clone() };
             match &standing.kind {
-                GeometryKind::Mesh(_) => {}
+                GeometryKind::Mesh(_) | GeometryKind::PreciseMesh(_) => {}
                 GeometryKind::Instance(instance) => {
                     frames.push(frame.within(geometry, instance));
                 }
@@ -116,18 +116,47 @@ fn corners(mesh: &TriangleMesh, from_point: DVec3, triangle: usize) -> Option<[D
     has_area(&corners).then(|| corners.map(|p| from_point + p.as_dvec3()))
 }
 
+/// The same of a mesh in double precision.
+fn precise_corners(mesh: &PreciseMesh, point: DVec3, triangle: u32) -> Option<[DVec3; 3]> {
+    let corners = mesh.corners(triangle);
+    precise::has_area(&corners).then(|| corners.map(|p| p - point))
+}
+
+/// Calls for every triangle in double precision of a leaf, relative to a point.
+fn for_each_precise(accel: &Accel, reference: u32, point: DVec3, mut f: impl FnMut([DVec3; 3])) {
+    for entry in &accel.tree.entries[(reference & tag::PLACE) as usize..] {
+        if let GeometryKind::PreciseMesh(mesh) = &accel.geometries[entry.geometry as usize].kind
+            && let Some(corners) = precise_corners(mesh, point, entry.primitive())
+        {
+            f(corners);
+        }
+        if entry.is_last() {
+            break;
+        }
+    }
+}
+
 /// The winding number of all meshes of a tree, where needed under a linear map.
 fn meshes_around(accel: &Accel, point: DVec3, linear: Option<DMat3>) -> f64 {
     let side = linear.map_or(1.0, |linear| linear.determinant().signum());
     let mut sum = 0.0;
+    let mut add = |[a, b, c]: [DVec3; 3]| {
+        sum += match linear {
+            None => solid_angle(a, b, c),
+            Some(linear) => side * solid_angle(linear * a, linear * b, linear * c),
+        };
+    };
     for geometry in &accel.geometries {
-        let GeometryKind::Mesh(mesh) = &geometry.kind else { continue };
-        let from_point = mesh.origin - point;
-        for [a, b, c] in (0..mesh.indices.len()).filter_map(|i| corners(mesh, from_point, i)) {
-            sum += match linear {
-                None => solid_angle(a, b, c),
-                Some(linear) => side * solid_angle(linear * a, linear * b, linear * c),
-            };
+        match &geometry.kind {
+            GeometryKind::Mesh(mesh) => {
+                let from_point = mesh.origin - point;
+                (0..mesh.indices.len()).filter_map(|i| corners(mesh, from_point, i)).for_each(&mut add);
+            }
+            GeometryKind::PreciseMesh(mesh) => {
+                let triangles = 0..mesh.indices.len() as u32;
+                triangles.filter_map(|i| precise_corners(mesh, point, i)).for_each(&mut add);
+            }
+            _ => {}
         }
     }
     sum / (4.0 * PI)
@@ -259,6 +288,9 @@ impl Moments {
                 match child >> tag::SHIFT {
                     tag::INNER => parts.push(nodes[(child & tag::PLACE) as usize]),
                     tag::TRIANGLES => parts.extend_from_slice(&blocks[tag::blocks(child)]),
+                    tag::PRECISE => for_each_precise(accel, child, accel.units.origin, |corners| {
+                        parts.push(Moment::of_triangle(corners));
+                    }),
                     _ => {}
                 }
             }
@@ -306,6 +338,9 @@ impl Moments {
                         }
                     }
                 }
+                tag::PRECISE => for_each_precise(accel, reference, point, |[a, b, c]| {
+                    sum += solid_angle(a, b, c);
+                }),
                 _ => {}
             }
         }

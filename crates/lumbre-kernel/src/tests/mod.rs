@@ -9,6 +9,7 @@ mod motion;
 mod nearest;
 mod options;
 mod oracle;
+mod precise;
 mod proof;
 mod refit;
 mod save;

@@ -5,7 +5,9 @@ use std::sync::Arc;
 use lumbre_geometry::{NoNearestPoint, PlacedShape, Plane, Shape, Sphere, Torus};
 use lumbre_math::{DVec3, Transform};
 
-use super::scenes::{Random, balls, build, bumpy, cloud, cube, icosphere, mixture, soup, with_every_preset};
+use super::scenes::{
+    Random, balls, build, bumpy, cloud, cube, icosphere, mixture, precise, soup, with_every_preset,
+};
 use crate::nearest::{Frame, Search};
 use crate::{Accel, ClosestPoint, Geometry, GeometryKind, Instance, TriangleMesh};
 
@@ -29,6 +31,11 @@ fn by_loop(accel: &Accel, point: DVec3, max_distance: f64) -> (Option<ClosestPoi
                 }
                 GeometryKind::Instance(instance) => {
                     inner.push(frame.within(geometry, instance));
+                }
+                GeometryKind::PreciseMesh(mesh) => {
+                    for primitive in 0..mesh.indices.len() as u32 {
+                        search.meet(frame, geometry, primitive, 0.0);
+                    }
                 }
                 GeometryKind::Shape(_) => search.meet(frame, geometry, 0, 0.0),
                 GeometryKind::Spheres(cloud) => {
@@ -90,6 +97,7 @@ fn answerable(random: &mut Random, center: DVec3, extent: f64, depth: u32) -> Ac
         };
         kinds.push(GeometryKind::Shape(PlacedShape::new(shape, similar(random, center, extent))));
     }
+    kinds.push(GeometryKind::PreciseMesh(Arc::new(precise(&soup(random, 40, center, extent)))));
     kinds.push(GeometryKind::Custom(Arc::new(balls(random, 9, center, extent, None))));
     let mut rock = bumpy(1, DVec3::ZERO, 0.3 * extent);
     rock.origin = center;

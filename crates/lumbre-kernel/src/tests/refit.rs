@@ -7,7 +7,7 @@ use lumbre_math::{DVec3, Transform, Vec3};
 
 use super::oracle::check;
 use super::scenes::{Random, balls, build, cloud, cube, icosphere, mixture, ray, shape, with_every_preset};
-use crate::{Accel, BuildError, Geometry, GeometryKind, Instance, RefitError, TriangleMesh};
+use crate::{Accel, BuildError, Geometry, GeometryKind, Instance, PreciseMesh, RefitError, TriangleMesh};
 
 const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
 
@@ -27,6 +27,14 @@ fn moved(accel: &Accel, random: &mut Random, center: DVec3, extent: f64) -> Vec<
                 positions,
                 indices: mesh.indices.clone(),
             }))
+        }
+        GeometryKind::PreciseMesh(mesh) => {
+            let twist = Transform::rotate(random.vector(), 50.0).unwrap();
+            let middle = mesh.positions.iter().sum::<DVec3>() / mesh.positions.len() as f64;
+            let size = mesh.positions.iter().fold(0.0, |most: f64, p| most.max((*p - middle).length()));
+            let bend = |p: &DVec3| center + twist.vector(*p - middle) * (extent / size);
+            let positions = mesh.positions.iter().map(bend).collect();
+            GeometryKind::PreciseMesh(Arc::new(PreciseMesh { positions, indices: mesh.indices.clone() }))
         }
         GeometryKind::Shape(_) => GeometryKind::Shape(shape(random, center, extent)),
         GeometryKind::Spheres(old) => {

@@ -10,7 +10,8 @@ use lumbre_geometry::{
 use lumbre_math::{DVec2, DVec3, Transform, Vec3};
 
 use crate::{
-    Accel, BuildOptions, CustomGeometry, Geometry, GeometryKind, Instance, Preset, SphereCloud, TriangleMesh,
+    Accel, BuildOptions, CustomGeometry, Geometry, GeometryKind, Instance, PreciseMesh, Preset, SphereCloud,
+    TriangleMesh,
 };
 
 /// SplitMix64 (G. Steele, D. Lea, C. Flood, OOPSLA 2014).
@@ -196,6 +197,12 @@ pub(crate) fn soup(random: &mut Random, count: usize, origin: DVec3, extent: f64
     TriangleMesh { origin, positions, indices }
 }
 
+/// The same mesh in double precision.
+pub(crate) fn precise(mesh: &TriangleMesh) -> PreciseMesh {
+    let positions = mesh.positions.iter().map(|p| mesh.origin + p.as_dvec3()).collect();
+    PreciseMesh { positions, indices: mesh.indices.clone() }
+}
+
 /// Spheres as a stranger would bring them; the last primitive is the infinite slab |y - floor| ≤ 0.125 where asked.
 #[derive(Debug)]
 pub(crate) struct Balls {
@@ -329,6 +336,7 @@ pub(crate) fn mixture(random: &mut Random, center: DVec3, extent: f64, depth: u3
     for _ in 0..30 {
         kinds.push(GeometryKind::Shape(shape(random, center, extent)));
     }
+    kinds.push(GeometryKind::PreciseMesh(Arc::new(precise(&soup(random, 40, center, extent)))));
     let floor = infinite.then_some(center.y - 0.7 * extent);
     kinds.push(GeometryKind::Custom(Arc::new(balls(random, 10, center, extent, floor))));
     let mut ball = icosphere(1, DVec3::ZERO, 0.4 * extent);
