@@ -21,6 +21,13 @@ pub struct ReadingArguments {
     /// The time in seconds at which the animations of a glTF stand.
     #[arg(long, value_name = "T", value_parser = seconds)]
     frame: Option<f64>,
+    /// How long the shutter is open about the time of a frame of a glTF, as a share of the time from one frame to the next (see
+    /// --fps): 0 for a moment, 0.5 as in most films. What animations move meanwhile is blurred.
+    #[arg(long, value_name = "S", default_value_t = 0.0, value_parser = shutter)]
+    shutter: f64,
+    /// Frames a second, for --frames and --shutter.
+    #[arg(long, value_name = "N", default_value_t = 24.0, value_parser = rate)]
+    fps: f64,
     /// The material variant of a glTF to wear.
     #[arg(long, value_name = "NAME")]
     variant: Option<String>,
@@ -43,6 +50,35 @@ pub struct ReadingArguments {
 
 fn seconds(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|t: &f64| t.is_finite()).ok_or_else(|| "expected a number of seconds".to_owned())
+}
+
+fn shutter(text: &str) -> Result<f64, String> {
+    let share = text.parse().ok().filter(|share: &f64| (0.0..=100.0).contains(share));
+    share.ok_or_else(|| "expected a share of a frame, such as 0.5".to_owned())
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    let rate = text.parse().ok().filter(|rate: &f64| (1e-3..=1e6).contains(rate));
+    rate.ok_or_else(|| "expected frames a second, such as 24".to_owned())
+}
+
+/// Frames from a first to a last one, both included.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Frames(pub std::ops::RangeInclusive<u32>);
+
+/// The most frames of one run, and the largest number of one.
+const MOST_FRAMES: u32 = 1_000_000;
+
+impl std::str::FromStr for Frames {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("expected the first and the last frame, such as 0..47, up to {MOST_FRAMES}");
+        let (first, last) = text.split_once("..").ok_or_else(wrong)?;
+        let number = |text: &str| text.parse().ok().filter(|&n: &u32| n <= MOST_FRAMES);
+        let (first, last) = (number(first).ok_or_else(wrong)?, number(last).ok_or_else(wrong)?);
+        if last < first { Err(wrong()) } else { Ok(Self(first..=last)) }
+    }
 }
 
 impl ReadingArguments {
@@ -77,7 +113,7 @@ impl ReadingArguments {
     /// [`Failure`] by what went wrong.
     pub fn open(&self, paths: &[PathBuf]) -> Result<(Scene, Diagnostics), Failure> {
         let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
-        lumbre::open_with(&paths, &self.options()).map_err(Failure::from)
+        lumbre::open_with(&paths, &self.options(self.frame)).map_err(Failure::from)
     }
 
     /// Reads one or more files as one description.
@@ -85,15 +121,32 @@ impl ReadingArguments {
     /// # Errors
     /// As [`ReadingArguments::open`].
     pub fn describe(&self, paths: &[PathBuf]) -> Result<(SceneDesc, Diagnostics), Failure> {
-        let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
-        lumbre::describe(&paths, &self.options()).map_err(Failure::from)
+        self.describe_at(paths, self.frame)
     }
 
-    fn options(&self) -> lumbre::ReadOptions {
+    /// The same, as it is in the frame of this number.
+    ///
+    /// # Errors
+    /// As [`ReadingArguments::open`].
+    pub fn describe_frame(
+        &self,
+        paths: &[PathBuf],
+        number: u32,
+    ) -> Result<(SceneDesc, Diagnostics), Failure> {
+        self.describe_at(paths, Some(f64::from(number) / self.fps))
+    }
+
+    fn describe_at(&self, paths: &[PathBuf], time: Option<f64>) -> Result<(SceneDesc, Diagnostics), Failure> {
+        let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
+        lumbre::describe(&paths, &self.options(time)).map_err(Failure::from)
+    }
+
+    fn options(&self, frame: Option<f64>) -> lumbre::ReadOptions {
         lumbre::ReadOptions {
             limits: self.limits(),
             strictness: self.strictness(),
-            frame: self.frame,
+            frame,
+            shutter: self.shutter / self.fps,
             variant: self.variant.clone(),
         }
     }
@@ -119,6 +172,20 @@ impl From<Error> for Failure {
             lumbre::ErrorKind::Io => Self::Io(message),
             lumbre::ErrorKind::Limit => Self::Limit(message),
             lumbre::ErrorKind::Options => Self::Usage(message),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Frames;
+
+    #[test]
+    fn frames_are_counted_with_the_last() {
+        assert_eq!("0..2".parse(), Ok(Frames(0..=2)));
+        assert_eq!("17..17".parse(), Ok(Frames(17..=17)));
+        for text in ["", "3", "..4", "5..4", "1..x", "-1..2", "0..4000000000"] {
+            assert!(text.parse::<Frames>().is_err(), "{text}");
         }
     }
 }

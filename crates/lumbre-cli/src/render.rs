@@ -19,7 +19,7 @@ use serde_json::json;
 
 use crate::failure::Failure;
 use crate::progress::{Display, Style};
-use crate::reading::{ReadingArguments, print_warnings};
+use crate::reading::{Frames, ReadingArguments, print_warnings};
 use crate::staging::{self, Behind, StagingArguments};
 use crate::units::{self, Crop, spoken};
 
@@ -41,6 +41,10 @@ A model without camera and light is framed, lit as in a studio, and stands on it
   lumbre render street.gltf --camera \"Bird's eye\"
   lumbre render street.gltf --fit --variant winter
 
+Animations of a glTF, at a time in seconds, or frame by frame with motion blur:
+  lumbre render dancer.glb --frame 1.5 --shutter 0.5
+  lumbre render dancer.glb --frames 0..47 --fps 24 --shutter 0.5 -o frame.####.png
+
 Ctrl-C stops and saves what is there; a second one stops at once and saves nothing.")]
 pub struct Arguments {
     /// The scene: .pbrt, .gltf, .glb, .obj, .ply or .stl, also packed by gzip (but glTF). Several .pbrt files are read one after another.
@@ -61,6 +65,9 @@ pub struct Arguments {
     /// Pixels across and down.
     #[arg(long, value_name = "WxH", value_parser = units::size)]
     size: Option<(u32, u32)>,
+    /// Frames of an animation from A to B, both included, as -o frame.####.png: frame n is that of the time n / --fps.
+    #[arg(long, value_name = "A..B", conflicts_with_all = ["frame", "turntable"])]
+    frames: Option<Frames>,
     /// Render this part only: pixels, or fractions of the picture.
     #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = units::crop)]
     crop: Option<Crop>,
@@ -138,24 +145,42 @@ fn feature(name: &str) -> Result<Feature, String> {
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     // An impossible name is found before the scene is read, an impossible folder before it is rendered.
     arguments.staging.check(arguments.output.as_deref())?;
+    arguments.check_frames(arguments.output.as_deref())?;
     if let Some(output) = &arguments.output {
         check_format(output, !arguments.aov.is_empty())?;
     }
     let start = Instant::now();
     let mut stage = arguments.staging.stage(arguments.size)?;
-    let (desc, mut diagnostics) = arguments.reading.describe(&arguments.scene)?;
     let cancel = CancelToken::new();
     let signals =
         Signals::listen(&cancel).map_err(|e| Failure::Io(format!("cannot listen for signals: {e}")))?;
-    match arguments.staging.turntable() {
-        None => picture(arguments, &stage, desc, &mut diagnostics, None, start, &cancel)?,
-        Some(frames) => {
-            for frame in 0..frames {
-                stage.turns = Some(f64::from(frame) / f64::from(frames));
-                let start = Instant::now();
-                picture(arguments, &stage, desc.clone(), &mut diagnostics, Some(frame + 1), start, &cancel)?;
-                if cancel.is_cancelled() {
-                    break;
+    if let Some(Frames(frames)) = &arguments.frames {
+        let (first, last) = (*frames.start(), *frames.end());
+        for number in frames.clone() {
+            let start = Instant::now();
+            let (desc, mut diagnostics) = arguments.reading.describe_frame(&arguments.scene, number)?;
+            let frame = Frame { number, is_first: number == first };
+            if !arguments.quiet {
+                say!("frame {number} ({} of {})", number - first + 1, last - first + 1);
+            }
+            picture(arguments, &stage, desc, &mut diagnostics, Some(frame), start, &cancel)?;
+            if cancel.is_cancelled() {
+                break;
+            }
+        }
+    } else {
+        let (desc, mut diagnostics) = arguments.reading.describe(&arguments.scene)?;
+        match arguments.staging.turntable() {
+            None => picture(arguments, &stage, desc, &mut diagnostics, None, start, &cancel)?,
+            Some(frames) => {
+                for turn in 0..frames {
+                    stage.turns = Some(f64::from(turn) / f64::from(frames));
+                    let start = Instant::now();
+                    let frame = Some(Frame { number: turn + 1, is_first: turn == 0 });
+                    picture(arguments, &stage, desc.clone(), &mut diagnostics, frame, start, &cancel)?;
+                    if cancel.is_cancelled() {
+                        break;
+                    }
                 }
             }
         }
@@ -166,17 +191,37 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
+impl Arguments {
+    /// Refuses a name for frames that is the same for all.
+    fn check_frames(&self, output: Option<&Path>) -> Result<(), Failure> {
+        let name = output.and_then(Path::file_name).map(|name| name.to_string_lossy());
+        match name {
+            Some(name) if self.frames.is_some() && !name.contains('#') => Err(Failure::Usage(format!(
+                "{name}: --frames makes many pictures (expected a name with # for their number, as frame.####.png)"
+            ))),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// One of several pictures.
+#[derive(Clone, Copy)]
+struct Frame {
+    number: u32,
+    is_first: bool,
+}
+
 /// Renders and saves one picture, the only one or a frame of several.
 fn picture(
     arguments: &Arguments,
     stage: &Stage,
     mut desc: SceneDesc,
     diagnostics: &mut Diagnostics,
-    frame: Option<u32>,
+    frame: Option<Frame>,
     start: Instant,
     cancel: &CancelToken,
 ) -> Result<(), Failure> {
-    let is_first = frame.is_none_or(|frame| frame == 1);
+    let is_first = frame.is_none_or(|frame| frame.is_first);
     let is_of_light = arguments.integrator.unwrap_or(desc.integrator.kind).needs_light();
     let stage = match is_of_light || arguments.staging.wants_ground() {
         true => stage.clone(),
@@ -195,7 +240,7 @@ fn picture(
     let output = arguments.output.clone().unwrap_or_else(|| default_output(&scene, name, frame.is_some()));
     check_format(&output, !arguments.aov.is_empty())?;
     arguments.staging.check(Some(&output))?;
-    let output = frame.map_or(output.clone(), |frame| staging::frame_name(&output, frame));
+    let output = frame.map_or(output.clone(), |frame| staging::frame_name(&output, frame.number));
     for path in std::iter::once(&output).chain(&arguments.stats) {
         probe_writable(path).map_err(|e| Failure::from(lumbre::Error::from(e)))?;
     }

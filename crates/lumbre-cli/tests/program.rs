@@ -514,6 +514,88 @@ fn a_turntable_makes_as_many_different_pictures() {
     assert_eq!(pictures.len(), 5);
 }
 
+/// A triangle that goes along x from 0 s to 1 s.
+fn write_sliding_triangle(desk: &Desk) {
+    let numbers: [f32; 17] =
+        [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 4.0, 0.0, 0.0];
+    let bytes: Vec<u8> = numbers.iter().flat_map(|n| n.to_le_bytes()).collect();
+    fs::write(desk.path("slide.bin"), bytes).unwrap();
+    desk.write(
+        "slide.gltf",
+        r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0,1]}],
+        "buffers":[{"uri":"slide.bin","byteLength":68}],
+        "bufferViews":[{"buffer":0,"byteLength":36},{"buffer":0,"byteOffset":36,"byteLength":8},
+            {"buffer":0,"byteOffset":44,"byteLength":24}],
+        "accessors":[{"bufferView":0,"componentType":5126,"type":"VEC3","count":3,"min":[0,0,0],"max":[1,1,0]},
+            {"bufferView":1,"componentType":5126,"type":"SCALAR","count":2,"min":[0],"max":[1]},
+            {"bufferView":2,"componentType":5126,"type":"VEC3","count":2}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
+        "cameras":[{"type":"orthographic","orthographic":{"xmag":4,"ymag":3,"znear":0.1,"zfar":99}}],
+        "nodes":[{"mesh":0},{"camera":0,"translation":[2,0.5,9]}],
+        "animations":[{"samplers":[{"input":1,"output":2}],
+            "channels":[{"sampler":0,"target":{"node":0,"path":"translation"}}]}]}"#,
+    );
+}
+
+#[test]
+fn frames_are_pictures_of_their_times_with_motion_blur_where_it_is_asked_for() {
+    let desk = Desk::new();
+    write_sliding_triangle(&desk);
+    let render = |arguments: &[&str]| {
+        let common = ["render", "slide.gltf", "--spp", "64", "--size", "80x60", "--integrator", "albedo"];
+        let out = desk.lumbre(&[&common[..], arguments].concat());
+        assert_eq!(code(&out), 0, "{}", stderr(&out));
+        stderr(&out)
+    };
+    // Four frames a second, of which frames 1 to 3 are a quarter, a half and three quarters of a second.
+    let said = render(&["--frames", "1..3", "--fps", "4", "-o", "f.###.pfm"]);
+    assert!(said.contains("frame 1 (1 of 3)") && said.contains("frame 3 (3 of 3)"), "{said}");
+    assert!(!desk.path("f.000.pfm").exists() && !desk.path("f.004.pfm").exists());
+    let image = |name: &str| lumbre::read_image(&desk.path(name)).unwrap();
+    let frames = [1, 2, 3].map(|i| image(&format!("f.00{i}.pfm")));
+    render(&["--frame", "0.5", "-o", "still.pfm"]);
+    assert_eq!(image("still.pfm"), frames[1]);
+    // Ten pixels a unit: at half a second the square corner stands in column 40 - 40 + 2 · 10 + ... of the middle.
+    let lit = |image: &lumbre::image::Image| {
+        let is_lit = |&x: &u32| (0..60).any(|y| image.pixel(x, y).g > 0.01);
+        let columns: Vec<u32> = (0..80).filter(is_lit).collect();
+        (columns[0], *columns.last().unwrap())
+    };
+    let [first, second, third] = frames.each_ref().map(lit);
+    assert!(
+        first.0.abs_diff(30) <= 1 && second.0.abs_diff(40) <= 1 && third.0.abs_diff(50) <= 1,
+        "{first:?}"
+    );
+    // The filter adds a pixel on each side.
+    assert!((second.1 - second.0).abs_diff(11) <= 1, "{second:?}");
+    // Open for half of a quarter of a second, it sees the triangle go half a unit: five pixels.
+    render(&["--frames", "2..2", "--fps", "4", "--shutter", "0.5", "-o", "b.#.pfm"]);
+    let blurred = image("b.2.pfm");
+    let (from, to) = lit(&blurred);
+    assert!(from.abs_diff(37) <= 1 && (to - from).abs_diff(16) <= 2, "{from} {to}");
+    let sum = |image: &lumbre::image::Image| image.pixels().iter().map(|p| f64::from(p.g)).sum::<f64>();
+    assert!((sum(&blurred) / sum(&frames[1]) - 1.0).abs() < 0.03);
+}
+
+#[test]
+fn frames_that_make_no_sense_are_refused() {
+    let desk = Desk::new();
+    for (arguments, expected) in [
+        (&["--frames", "0..3", "-o", "a.png"][..], "frame.####.png"),
+        (&["--frames", "3..1"], "the first and the last frame"),
+        (&["--frames", "0..3", "--frame", "1"], "cannot be used with"),
+        (&["--shutter", "-1"], "unexpected argument"),
+        (&["--shutter", "half"], "a share of a frame"),
+        (&["--fps", "0"], "frames a second"),
+    ] {
+        let mut whole = vec!["render", "missing.gltf"];
+        whole.extend(arguments);
+        let out = desk.lumbre(&whole);
+        assert_eq!(code(&out), 2, "{arguments:?}: {}", stderr(&out));
+        assert!(stderr(&out).contains(expected), "{arguments:?}: {}", stderr(&out));
+    }
+}
+
 #[test]
 fn light_from_a_picture_is_seen_and_lights() {
     let desk = Desk::new();

@@ -20,6 +20,8 @@ pub struct ReadOptions {
     pub limits: Limits,
     /// The time in seconds at which animations stand; `None` leaves them alone.
     pub frame: Option<f64>,
+    /// How long the shutter is open about `frame`, in seconds: see [`GltfOptions::shutter`].
+    pub shutter: f64,
     /// The material variant of a glTF to wear.
     pub variant: Option<String>,
 }
@@ -120,7 +122,11 @@ fn read_one(
         SceneFormat::Obj => open_obj(path, budget, diagnostics),
         SceneFormat::Stl => open_stl(path, budget, diagnostics),
         SceneFormat::Gltf => {
-            let gltf = GltfOptions { frame: options.frame, variant: options.variant.clone() };
+            let gltf = GltfOptions {
+                frame: options.frame,
+                shutter: options.shutter,
+                variant: options.variant.clone(),
+            };
             open_gltf(path, &gltf, budget, diagnostics)
         }
         SceneFormat::Pbrt => pbrt::read_files(&[path], budget, diagnostics),

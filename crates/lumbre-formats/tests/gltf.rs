@@ -10,9 +10,9 @@ use lumbre_formats::gltf::{GltfOptions, read_gltf};
 use lumbre_formats::{Budget, Diagnostics, FormatError, Limits, Strictness};
 use lumbre_geometry::Shape;
 use lumbre_image::Rgb;
-use lumbre_math::{DVec3, Vec2, Vec3, Vec4};
+use lumbre_math::{DVec3, Transform, Vec2, Vec3, Vec4};
 use lumbre_scene::{
-    CameraKind, GeometryDesc, LightDesc, MeshDesc, Scene, SceneDesc, ShapeDesc, WithoutLight,
+    CameraKind, GeometryDesc, LightDesc, MeshDesc, Placement, Scene, SceneDesc, ShapeDesc, WithoutLight,
 };
 use lumbre_shading::{
     FloatTexture, MaterialKind, PrincipledParams, SpectrumTexture, TextureContext, VertexData,
@@ -289,9 +289,9 @@ fn nodes_stand_where_their_parents_and_parts_say() {
     );
     let scene = parts.read(&rest);
     assert_eq!((scene.objects.len(), scene.instances.len(), scene.shapes.len()), (1, 2, 0));
-    let at = |i: usize| scene.instances[i].world_from_object.point(DVec3::new(3.0, 4.0, 2.0));
+    let at = |i: usize| scene.instances[i].world_from_object.at(0.0).point(DVec3::new(3.0, 4.0, 2.0));
     assert!((at(0) - DVec3::new(11.0 - 4.0, 20.0 + 6.0, 30.0 - 2.0)).length() < 1e-9, "{}", at(0));
-    assert!(scene.instances[0].world_from_object.is_mirror());
+    assert!(scene.instances[0].world_from_object.at(0.0).is_mirror());
     assert!((at(1) - DVec3::new(5.0 - 12.0, 6.0 + 6.0, 9.0)).length() < 1e-9, "{}", at(1));
     Scene::build(scene).unwrap();
     // The other scene has one place, and so no object.
@@ -345,7 +345,7 @@ fn instancing_places_copies() {
             {{"attributes":{{"TRANSLATION":{t},"SCALE":{s}}}}}}}}}]"#
     ));
     assert_eq!((scene.objects.len(), scene.instances.len()), (1, 3));
-    let at = scene.instances[1].world_from_object.point(DVec3::new(1.0, 1.0, 1.0));
+    let at = scene.instances[1].world_from_object.at(0.0).point(DVec3::new(1.0, 1.0, 1.0));
     assert!((at - DVec3::new(-2.0, 7.0, 108.0)).length() < 1e-9, "{at}");
 }
 
@@ -389,7 +389,7 @@ fn animated() -> (Parts, String) {
 
 fn at_time(frame: Option<f64>) -> SceneDesc {
     let (parts, rest) = animated();
-    let options = GltfOptions { frame, variant: None };
+    let options = GltfOptions { frame, ..GltfOptions::default() };
     read_with(&glb(&parts.json(&rest), &parts.binary), &options, &mut Diagnostics::new()).unwrap()
 }
 
@@ -412,6 +412,77 @@ fn skins_and_morph_targets_stand_at_their_time() {
             assert!((found[i] - expected).length() < 1e-5, "{frame:?} {i}: {} {expected}", found[i]);
         }
     }
+}
+
+#[test]
+fn nodes_and_cameras_that_animations_move_are_seen_moving() {
+    // A square that goes 8 along x from 1 s to 3 s, which hangs under one that does a whole turn about z meanwhile.
+    let mut parts = Parts::default();
+    let p = parts.positions(&SQUARE);
+    let times = parts.add(&floats(&[1.0, 3.0]), r#""componentType":5126,"type":"SCALAR","count":2"#);
+    let moves = parts
+        .add(&floats(&[0.0, 0.0, 0.0, 8.0, 0.0, 0.0]), r#""componentType":5126,"type":"VEC3","count":2"#);
+    let quarters =
+        parts.add(&floats(&[1.0, 1.5, 2.0, 2.5, 3.0]), r#""componentType":5126,"type":"SCALAR","count":5"#);
+    let turn = |degrees: f32| {
+        let (sin, cos) = (0.5 * degrees).to_radians().sin_cos();
+        [0.0, 0.0, sin, cos]
+    };
+    let turns: Vec<f32> = [0.0, 90.0, 180.0, 270.0, 360.0].map(turn).concat();
+    let turns = parts.add(&floats(&turns), r#""componentType":5126,"type":"VEC4","count":5"#);
+    let rest = format!(
+        r#""meshes":[{{"primitives":[{{"mode":6,"attributes":{{"POSITION":{p}}}}}]}}],
+        "nodes":[{{"mesh":0}},{{"camera":0}},{{"children":[0,3]}},{{"mesh":0,"translation":[0,5,0]}},{{"mesh":0}}],
+        "cameras":[{{"type":"perspective","perspective":{{"yfov":0.7,"znear":0.1}}}}],
+        "animations":[{{"samplers":[{{"input":{times},"output":{moves}}},{{"input":{quarters},"output":{turns}}}],
+            "channels":[{{"sampler":0,"target":{{"node":0,"path":"translation"}}}},
+                {{"sampler":0,"target":{{"node":1,"path":"translation"}}}},
+                {{"sampler":1,"target":{{"node":2,"path":"rotation"}}}}]}}]"#
+    );
+    let bytes = glb(&parts.json(&rest), &parts.binary);
+    let read = |frame, shutter| {
+        let mut diagnostics = Diagnostics::new();
+        let options = GltfOptions { frame, shutter, ..GltfOptions::default() };
+        let scene = read_with(&bytes, &options, &mut diagnostics).unwrap();
+        assert_eq!(diagnostics.lines(), [""; 0]);
+        scene
+    };
+    for (frame, shutter) in [(None, 1.0), (Some(2.0), 0.0)] {
+        assert!(!Scene::build(read(frame, shutter)).unwrap().moves());
+    }
+    let (middle, shutter) = (2.0, 1.0);
+    let scene = read(Some(middle), shutter);
+    // Where a place of the mesh is at a part of the exposure.
+    let expected = |part: f64, at: DVec3, slides: bool| {
+        let time = middle + shutter * (part - 0.5);
+        let share = (time - 1.0) / 2.0;
+        let turn = Transform::rotate(DVec3::Z, 360.0 * share).unwrap();
+        turn.point(at + if slides { DVec3::new(8.0 * share, 0.0, 0.0) } else { DVec3::new(0.0, 5.0, 0.0) })
+    };
+    let mut moving = 0;
+    for instance in &scene.instances {
+        let Placement::Moving(motion) = &instance.world_from_object else { continue };
+        let slides = (motion.at(0.0).point(DVec3::ZERO) - expected(0.0, DVec3::ZERO, true)).length() < 1e-5;
+        moving += 1 + 10 * usize::from(slides);
+        let at = DVec3::new(0.5, 0.25, 2.0);
+        // At the moments that are looked at it is where it is; between them next to it.
+        for step in 0..=32 {
+            let part = f64::from(step) / 32.0;
+            let apart = (motion.at(part).point(at) - expected(part, at, slides)).length();
+            assert!(apart < if step % 2 == 0 { 1e-5 } else { 0.04 }, "{part}: {apart}");
+        }
+    }
+    // Of the third, which stands still, there is an instance as well.
+    assert_eq!((moving, scene.instances.len()), (12, 3));
+    let camera = &scene.cameras[0];
+    assert_eq!((camera.shutter_open, camera.shutter_close), (0.0, 1.0));
+    let motion = camera.motion.as_ref().unwrap();
+    assert_eq!(motion.keys().len(), 2);
+    for (part, x) in [(0.0, 2.0), (0.5, 4.0), (1.0, 6.0)] {
+        assert!((motion.at(part).point(DVec3::ZERO) - DVec3::new(x, 0.0, 0.0)).length() < 1e-5);
+    }
+    assert!((camera.world_from_camera.point(DVec3::ZERO) - DVec3::new(4.0, 0.0, 0.0)).length() < 1e-5);
+    assert!(Scene::build(scene).unwrap().moves());
 }
 
 #[test]
@@ -502,7 +573,7 @@ fn animations_by_pointers_change_what_they_name() {
     for (frame, strength, place, green) in
         [(None, 1.0, DVec3::ONE, 1.0), (Some(1.5), 3.0, DVec3::new(2.0, 1.0, 0.5), 0.75)]
     {
-        let options = GltfOptions { frame, variant: None };
+        let options = GltfOptions { frame, ..GltfOptions::default() };
         let mut diagnostics = Diagnostics::new();
         let scene =
             read_with(&glb(&parts.json(&rest(&all)), &parts.binary), &options, &mut diagnostics).unwrap();
@@ -517,7 +588,7 @@ fn animations_by_pointers_change_what_they_name() {
     }
     // What cannot be animated is said, and left out.
     let odd = [channel(1, "/buffers/0/byteLength")];
-    let options = GltfOptions { frame: Some(1.5), variant: None };
+    let options = GltfOptions { frame: Some(1.5), ..GltfOptions::default() };
     let mut diagnostics = Diagnostics::new();
     read_with(&glb(&parts.json(&rest(&odd)), &parts.binary), &options, &mut diagnostics).unwrap();
     assert!(
@@ -827,11 +898,11 @@ fn variants_are_worn_by_name() {
     );
     let file = glb(&parts.json(&rest), &parts.binary);
     for (variant, material) in [(None, "plain"), (Some("red"), "r"), (Some("blue"), "b")] {
-        let options = GltfOptions { frame: None, variant: variant.map(str::to_owned) };
+        let options = GltfOptions { variant: variant.map(str::to_owned), ..GltfOptions::default() };
         let scene = read_with(&file, &options, &mut Diagnostics::new()).unwrap();
         assert_eq!(scene.materials[0].name.as_deref(), Some(material));
     }
-    let options = GltfOptions { frame: None, variant: Some("bleu".to_owned()) };
+    let options = GltfOptions { variant: Some("bleu".to_owned()), ..GltfOptions::default() };
     let error = read_with(&file, &options, &mut Diagnostics::new()).unwrap_err().to_string();
     assert_eq!(
         error,
@@ -1120,7 +1191,8 @@ fn damaged_files_never_panic_and_cost_little() {
             }
         }
         let strictness = [Strictness::Normal, Strictness::Lenient][round % 2];
-        let options = GltfOptions { frame: [None, Some(1.7)][round / 2 % 2], variant: None };
+        let (frame, shutter) = ([None, Some(1.7)][round / 2 % 2], [0.0, 0.4][round / 4 % 2]);
+        let options = GltfOptions { frame, shutter, ..GltfOptions::default() };
         let budget = Budget::new(Limits::default());
         let mut diagnostics = Diagnostics::with_strictness(strictness);
         let read =

@@ -131,17 +131,89 @@ fn named_coordinate_systems_come_back() {
 }
 
 #[test]
-fn motion_stays_where_it_starts_and_is_said() {
-    let (scene, warnings) = warned(
-        "ActiveTransform EndTime Translate 5 0 0 ActiveTransform All Translate 0 2 0 Shape \"sphere\"",
-    );
-    assert_eq!(origin(&scene.shapes[0]), DVec3::new(0.0, 2.0, 0.0));
-    assert_eq!(
-        warnings,
-        ["warning: scene.pbrt:1:88: motion is not rendered: this shape stays where it starts"]
-    );
+fn shapes_move_between_the_two_transforms() {
+    let moving =
+        "ActiveTransform EndTime Translate 5 0 0 ActiveTransform All Translate 0 2 0 Shape \"sphere\"";
+    let scene = read(&format!(
+        "TransformTimes 1 3 WorldBegin {moving}
+         ActiveTransform StartTime Identity ActiveTransform EndTime Identity Shape \"disk\""
+    ));
+    // What moves stands in an object of its own, under the number that it has in the file.
+    let [ref instance] = scene.instances[..] else { panic!("{:?}", scene.instances) };
+    let object = &scene.objects[instance.object.0 as usize];
+    assert_eq!((object.shapes[0].index, scene.shapes[0].index), (0, 1));
+    assert_eq!(object.shapes[0].world_from_object, Transform::IDENTITY);
+    for (time, x) in [(0.0, 0.0), (1.0, 0.0), (1.5, 1.25), (3.0, 5.0), (9.0, 5.0)] {
+        near(instance.world_from_object.at(time).point(DVec3::ZERO), DVec3::new(x, 2.0, 0.0));
+    }
     let scene = read("TransformTimes 0 2 WorldBegin ActiveTransform All Translate 1 2 3 Shape \"sphere\"");
     assert_eq!(origin(&scene.shapes[0]), DVec3::new(1.0, 2.0, 3.0));
+    assert!(!Scene::build(scene).unwrap().moves());
+}
+
+#[test]
+fn instances_and_cameras_move_too() {
+    let scene = read(
+        "TransformTimes 0 2
+         LookAt 0 0 -9 0 0 0 0 1 0
+         ActiveTransform EndTime Rotate 90 0 1 0 ActiveTransform All
+         Camera \"perspective\" \"float shutteropen\" 0.5 \"float shutterclose\" 1.5
+         WorldBegin
+         ObjectBegin \"a\" Shape \"sphere\" ActiveTransform EndTime Translate 0 3 0 Shape \"disk\" ObjectEnd
+         ActiveTransform EndTime Translate 0 0 8 ActiveTransform All
+         ObjectInstance \"a\"",
+    );
+    let camera = &scene.cameras[0];
+    assert_eq!((camera.shutter_open, camera.shutter_close), (0.5, 1.5));
+    let place = |time: f64| camera.motion.as_ref().unwrap().at(time).point(DVec3::ZERO);
+    // The camera comes last: the world turns about its own origin before it.
+    near(place(0.0), DVec3::new(0.0, 0.0, -9.0));
+    near(place(2.0), Transform::rotate(DVec3::Y, -90.0).unwrap().point(DVec3::new(0.0, 0.0, -9.0)));
+    assert_eq!(camera.world_from_camera, camera.motion.as_ref().unwrap().at(0.5));
+    near(scene.instances[0].world_from_object.at(1.5).point(DVec3::ZERO), DVec3::new(0.0, 0.0, 6.0));
+    // And what moves in the object.
+    let object = &scene.objects[scene.instances[0].object.0 as usize];
+    near(object.instances[0].world_from_object.at(1.0).point(DVec3::ZERO), DVec3::new(0.0, 1.5, 0.0));
+    assert!(Scene::build(scene).unwrap().moves());
+}
+
+#[test]
+fn lamps_that_move_are_sampled_where_they_are() {
+    let scene = world(
+        "AttributeBegin AreaLightSource \"diffuse\" ActiveTransform EndTime Translate 5 0 0 ActiveTransform All
+         Shape \"sphere\" AttributeEnd Shape \"disk\" \"float radius\" 9",
+    );
+    let scene = Scene::build(scene).unwrap();
+    assert_eq!(scene.warnings(), []);
+    let from = DVec3::new(0.0, 0.0, -20.0);
+    for time in [0.0, 0.5, 1.0] {
+        let sample = scene.sample_light(from, time, 0.5, lumbre_math::DVec2::new(0.3, 0.6)).unwrap();
+        let end = sample.end.unwrap().point;
+        assert!((end - DVec3::new(5.0 * time, 0.0, 0.0)).length() < 1.0 + 1e-9, "{end}");
+    }
+}
+
+#[test]
+fn motion_that_cannot_be_is_said() {
+    let (scene, warnings) =
+        warned("ActiveTransform EndTime Scale 1 1 -1 ActiveTransform All Translate 0 2 0 Shape \"sphere\"");
+    near(origin(&scene.shapes[0]), DVec3::new(0.0, 2.0, 0.0));
+    assert_eq!(
+        warnings,
+        [
+            "warning: scene.pbrt:1:85: this shape stays where it starts: between moment 1 and the one before it lies a mirror"
+        ]
+    );
+    let (_, warnings) = warned("ActiveTransform EndTime Translate 0 2 0 LightSource \"point\"");
+    assert!(warnings[0].contains("the motion of this light is left out"), "{warnings:?}");
+    let error = |text: &str| try_read(text).0.unwrap_err().to_string();
+    let late = error("TransformTimes 2 2 WorldBegin");
+    assert!(late.contains("1:1: the motion ends before it starts (found 2; expected more than 2)"), "{late}");
+    let csg = error(
+        "WorldBegin ObjectBegin \"a\" ActiveTransform EndTime Translate 1 0 0 Shape \"sphere\" ObjectEnd
+         Shape \"csg\" \"string operands\" [ \"a\" \"a\" ]",
+    );
+    assert!(csg.contains("object \"a\" has a shape that moves: it is no operand of a csg"), "{csg}");
 }
 
 #[test]
@@ -227,7 +299,7 @@ fn objects_keep_their_own_transform_and_instances_add_theirs() {
     assert_eq!(scene.objects[0].name, "thing");
     assert_eq!(origin(&scene.objects[0].shapes[0]), DVec3::new(1.0, 2.0, 0.0));
     assert_eq!(scene.instances[0].object, ObjectId(0));
-    let placed = scene.instances[0].world_from_object.point(DVec3::ZERO);
+    let placed = scene.instances[0].world_from_object.at(0.0).point(DVec3::ZERO);
     assert_eq!(placed, DVec3::new(1.0, 0.0, 5.0));
     // The object's scope gave its state back, and its shapes count.
     assert_eq!(origin(&scene.shapes[0]), DVec3::new(1.0, 0.0, 5.0));

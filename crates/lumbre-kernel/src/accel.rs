@@ -387,6 +387,14 @@ impl Accel {
         surface::surface(self, ray, hit)
     }
 
+    /// The surface at a hit of this tree, in the space of the hit's innermost instance.
+    ///
+    /// # Panics
+    /// When `hit` comes from another tree and names what is not in this one.
+    pub fn surface_in_object(&self, ray: &Ray, hit: &Hit) -> Surface {
+        surface::surface_in_object(self, ray, hit)
+    }
+
     /// The map from the space of the hit's innermost instance to the space of this tree, at the time of the ray.
     ///
     /// # Panics

@@ -43,6 +43,13 @@ pub(crate) fn surface(accel: &Accel, ray: &Ray, hit: &Hit) -> Surface {
     instances.iter().rev().fold(surface, placed)
 }
 
+/// The surface at a hit, in the space of its innermost instance.
+pub(crate) fn surface_in_object(accel: &Accel, ray: &Ray, hit: &Hit) -> Surface {
+    let (instances, inner) = along(accel, hit);
+    let ray = instances.iter().fold(*ray, |ray, instance| instance.world_from_object.into_object(&ray));
+    bare_surface(inner, &ray, hit)
+}
+
 /// The surface at a hit in the tree that its geometry stands in.
 #[inline]
 fn bare_surface(accel: &Accel, ray: &Ray, hit: &Hit) -> Surface {

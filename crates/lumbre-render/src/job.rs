@@ -62,10 +62,12 @@ pub fn render_with(
         .build()
         .map_err(|error| RenderError::Threads(error.to_string()))?;
     let spp = options.stop.spp.max(1);
+    let view = View::new(camera, options.width, options.height);
     let job = Job {
         scene,
         options,
-        view: View::new(camera, options.width, options.height),
+        moves: scene.moves() || view.moves(),
+        view,
         integrator,
         sampler: Sampler::new(&options.sampler),
         filter: options.pixel_filter()?,
@@ -142,6 +144,8 @@ struct Job<'a> {
     scene: &'a Scene,
     options: &'a RenderOptions,
     view: View,
+    /// Whether it matters when a ray looks.
+    moves: bool,
     integrator: &'a dyn Integrator,
     sampler: Sampler,
     filter: Filter,
@@ -192,7 +196,8 @@ impl Job<'_> {
         let draw = self.sampler.draw(x, y, index);
         let place = self.filter.sample(draw.filter());
         let film = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5) + place.offset;
-        let ray = self.view.ray(film, draw.lens(), self.spacing);
+        let part = if self.moves { draw.time() } else { 0.0 };
+        let ray = self.view.ray(film, draw.lens(), self.view.time(part), self.spacing);
         let sight = Sight::new(self.scene, ray, &mut owner.rays);
         let features =
             if self.options.features { Features::of(&self.view, &sight).map(feature_sample) } else { None };

@@ -73,7 +73,7 @@ fn still_life(offset: DVec3) -> SceneDesc {
     });
     for x in [-1.5, 0.0, 1.75] {
         let place = at * Transform::translate(DVec3::new(x, 1.75, 0.3));
-        desc.instances.push(InstanceDesc { object: ObjectId(0), world_from_object: place });
+        desc.instances.push(InstanceDesc { object: ObjectId(0), world_from_object: place.into() });
     }
     desc.cameras = vec![look(offset + DVec3::new(-3.0, -5.0, 4.0), offset + DVec3::new(0.2, 0.3, 0.4), 42.0)];
     desc
@@ -241,9 +241,9 @@ fn features_are_what_they_are_called() {
     assert!((normal.b - 1.0).abs() < 1e-5 && normal.r.abs() < 1e-5, "{normal:?}");
     assert!((get(Feature::Albedo).pixel(x, y).g - 0.6).abs() < 1e-6);
     let view = View::new(&scene.cameras()[0], 90, 60);
-    let ray = view.ray(lumbre_math::DVec2::new(45.5, 58.5), lumbre_math::DVec2::splat(0.5), 1.0).ray;
+    let ray = view.ray(lumbre_math::DVec2::new(45.5, 58.5), lumbre_math::DVec2::splat(0.5), 0.0, 1.0).ray;
     let hit = scene.closest(&ray).unwrap();
-    let depth = view.depth(ray.at(hit.root.t));
+    let depth = view.depth(ray.at(hit.root.t), 0.0);
     assert_close(get(Feature::Depth).pixel(x, y).g.into(), depth, 0.03, "depth");
     let uv = get(Feature::Uv).pixel(x, y);
     assert!(uv.r > 0.0 && uv.r < 1.0 && uv.g > 0.0 && uv.g < 1.0 && uv.b == 0.0, "{uv:?}");
@@ -270,7 +270,7 @@ fn options_that_make_no_picture_are_refused() {
 }
 
 #[test]
-fn an_instanced_light_is_found_by_chance_and_as_bright_as_a_plain_one() {
+fn an_instanced_light_is_as_bright_as_a_plain_one_and_found_by_chance_where_it_is_nested() {
     let lamp = || ShapeDesc {
         area_light: Some(glow(3.0)),
         ..{
@@ -280,18 +280,24 @@ fn an_instanced_light_is_found_by_chance_and_as_bright_as_a_plain_one() {
         }
     };
     let place = Transform::translate(DVec3::new(0.0, 1.0, 3.0));
-    let scene = |instanced: bool| {
+    let scene = |depth: u32| {
         let mut desc = empty();
         add_material(&mut desc, diffuse(0.0));
         let grey = add_material(&mut desc, diffuse(0.8));
         let ground: GeometryDesc =
             exact(Cuboid::new(DVec3::new(-9.0, -9.0, -1.0), DVec3::new(9.0, 9.0, 0.0)).unwrap());
         add(&mut desc, ground, grey);
-        if instanced {
-            desc.objects.push(ObjectDesc { name: "lamp".into(), shapes: vec![lamp()], instances: vec![] });
-            desc.instances.push(InstanceDesc { object: ObjectId(0), world_from_object: place });
-        } else {
+        let instance = |object, place: Transform| InstanceDesc {
+            object: ObjectId(object),
+            world_from_object: place.into(),
+        };
+        if depth == 0 {
             desc.shapes.push(ShapeDesc { world_from_object: place, ..lamp() });
+        } else {
+            desc.objects.push(ObjectDesc { name: "lamp".into(), shapes: vec![lamp()], instances: vec![] });
+            let instances = vec![instance(0, Transform::IDENTITY)];
+            desc.objects.extend((depth == 2).then(|| ObjectDesc { instances, ..ObjectDesc::default() }));
+            desc.instances.push(instance(depth - 1, place));
         }
         desc.cameras = vec![look(DVec3::new(-4.0, -6.0, 5.0), DVec3::ZERO, 50.0)];
         Scene::build(desc).unwrap()
@@ -302,8 +308,9 @@ fn an_instanced_light_is_found_by_chance_and_as_bright_as_a_plain_one() {
         let rendered = render_with(scene, &options, &path, &NoProgress, &CancelToken::new()).unwrap();
         mean(&rendered.image)[1]
     };
-    let (plain, instanced) = (scene(false), scene(true));
-    assert!(plain.warnings().is_empty());
-    assert_eq!(instanced.warnings().len(), 1);
-    assert_close(light(&instanced), light(&plain), 0.02, "instanced");
+    let [plain, instanced, nested] = [0, 1, 2].map(scene);
+    assert!(plain.warnings().is_empty() && instanced.warnings().is_empty());
+    assert_eq!(nested.warnings().len(), 1);
+    assert_close(light(&instanced), light(&plain), 0.005, "instanced");
+    assert_close(light(&nested), light(&plain), 0.02, "nested");
 }

@@ -3,14 +3,14 @@
 use std::sync::Arc;
 
 use lumbre_geometry::{Aabb, BilinearPatch, PlacedShape, Shape};
-use lumbre_kernel::{Accel, BuildOptions, Geometry, GeometryKind, Instance};
+use lumbre_kernel::{Accel, BuildOptions, Geometry, GeometryKind, Instance, Placement};
 use lumbre_math::distribution::AliasTable;
 use lumbre_math::{DVec3, Transform};
 use lumbre_shading::{Material, MaterialKind};
 
 use crate::light::{
-    DistantLight, Environment, GoniometricLight, Light, LightId, MeshLight, PointLight, ShapeLight,
-    SpotLight, UniformLight, power,
+    DistantLight, Environment, GoniometricLight, Light, LightId, MeshLight, PlacedLight, PointLight,
+    ShapeLight, SpotLight, UniformLight, power,
 };
 use crate::mesh::{self, QuadOrder};
 use crate::surface::{Form, SurfaceEntry};
@@ -55,8 +55,10 @@ impl Scene {
             ..Builder::default()
         };
 
-        let objects = builder.objects(objects)?;
-        let accel = Arc::new(builder.tree(shapes, &instances, &objects, true)?);
+        let is_moving = |i: &InstanceDesc| matches!(i.world_from_object, Placement::Moving(_));
+        let moves = objects.iter().flat_map(|object| &object.instances).chain(&instances).any(is_moving);
+        let objects = builder.objects(objects, &instances)?;
+        let accel = Arc::new(builder.tree(shapes, &instances, &objects)?);
         let bounds = accel.bounds();
 
         let cameras = if cameras.is_empty() {
@@ -97,12 +99,34 @@ impl Scene {
             has_holes,
             has_one_sided,
             has_instances: !objects.is_empty(),
+            moves,
             looks_up,
             ground: ground.map(|desc| GroundPlane::new(desc, &builder.lights)),
             entries: builder.entries,
             lights: builder.lights,
             warnings: builder.warnings,
         })
+    }
+}
+
+/// Where the shapes of a tree stand, as far as their light is concerned.
+#[derive(Clone, Debug)]
+enum Standing {
+    /// In the world itself.
+    World,
+    /// In an object that stands in the world once, here.
+    Once(Placement),
+    /// In an object that stands anywhere else, or in many places.
+    Anywhere,
+}
+
+impl Standing {
+    /// By how much areas grow from the tree to the world: exactly where it is stretched alike in all directions, else in
+    /// the mean, about; where it moves, at the first key.
+    fn area_factor(&self) -> f64 {
+        let Self::Once(placement) = self else { return 1.0 };
+        let first = extent::places(placement)[0];
+        first.determinant().abs().cbrt().powi(2)
     }
 }
 
@@ -116,16 +140,33 @@ pub(crate) struct Builder {
 }
 
 impl Builder {
-    /// The trees of all objects, those inside others first.
-    fn objects(&mut self, objects: Vec<ObjectDesc>) -> Result<Vec<Arc<Accel>>, BuildError> {
+    /// The trees of all objects, those inside others first. `in_world` are all that stand in the world.
+    fn objects(
+        &mut self,
+        objects: Vec<ObjectDesc>,
+        in_world: &[InstanceDesc],
+    ) -> Result<Vec<Arc<Accel>>, BuildError> {
         let order = inside_out(&objects)?;
+        let mut uses = vec![0_usize; objects.len()];
+        for instance in objects.iter().flat_map(|object| &object.instances).chain(in_world) {
+            if let Some(uses) = uses.get_mut(instance.object.0 as usize) {
+                *uses += 1;
+            }
+        }
+        let mut standing = vec![Standing::Anywhere; objects.len()];
+        for instance in in_world {
+            let object = instance.object.0 as usize;
+            if uses.get(object) == Some(&1) {
+                standing[object] = Standing::Once(instance.world_from_object.clone());
+            }
+        }
         let mut objects: Vec<Option<ObjectDesc>> = objects.into_iter().map(Some).collect();
         let mut trees: Vec<Option<Arc<Accel>>> = vec![None; objects.len()];
         for position in order {
             let Some(object) = objects[position].take() else { continue };
             let inner = |trees: &[Option<Arc<Accel>>], i: &InstanceDesc| trees[i.object.0 as usize].clone();
             let built: Vec<Arc<Accel>> = object.instances.iter().filter_map(|i| inner(&trees, i)).collect();
-            let tree = self.tree_of(object.shapes, &object.instances, &built, false)?;
+            let tree = self.tree_of(object.shapes, &object.instances, &built, &standing[position])?;
             trees[position] = Some(Arc::new(tree));
         }
         Ok(trees.into_iter().flatten().collect())
@@ -137,7 +178,6 @@ impl Builder {
         shapes: Vec<ShapeDesc>,
         instances: &[InstanceDesc],
         objects: &[Arc<Accel>],
-        in_world: bool,
     ) -> Result<Accel, BuildError> {
         let find = |i: &InstanceDesc| {
             objects
@@ -146,7 +186,7 @@ impl Builder {
                 .ok_or(BuildError::NoSuchObject { object: i.object.0, count: objects.len() })
         };
         let accels = instances.iter().map(find).collect::<Result<Vec<_>, _>>()?;
-        self.tree_of(shapes, instances, &accels, in_world)
+        self.tree_of(shapes, instances, &accels, &Standing::World)
     }
 
     fn tree_of(
@@ -154,17 +194,17 @@ impl Builder {
         shapes: Vec<ShapeDesc>,
         instances: &[InstanceDesc],
         accels: &[Arc<Accel>],
-        in_world: bool,
+        standing: &Standing,
     ) -> Result<Accel, BuildError> {
         let origin = origin(&shapes, instances, accels);
         let mut geometries = Vec::new();
         for shape in shapes {
-            self.shape(shape, origin, in_world, &mut geometries)?;
+            self.shape(shape, origin, standing, &mut geometries)?;
         }
         for ((id, instance), accel) in (0..).zip(instances).zip(accels) {
             let kind = GeometryKind::Instance(Instance {
                 accel: accel.clone(),
-                world_from_object: instance.world_from_object.into(),
+                world_from_object: instance.world_from_object.clone(),
             });
             geometries.push(Geometry { id, kind });
         }
@@ -175,7 +215,7 @@ impl Builder {
         &mut self,
         desc: ShapeDesc,
         origin: DVec3,
-        in_world: bool,
+        standing: &Standing,
         geometries: &mut Vec<Geometry>,
     ) -> Result<(), BuildError> {
         let mut entry = self.entry(&desc)?;
@@ -188,9 +228,10 @@ impl Builder {
                     let name = placed.shape().name();
                     return Err(BuildError::InfiniteLight { shape: desc.index, name });
                 }
-                entry.emission = area_light.map(|light| emission(light, || placed.area()));
+                entry.emission =
+                    area_light.map(|light| emission(light, || standing.area_factor() * placed.area()));
                 let id = self.push(entry, geometries, GeometryKind::Shape(placed.clone()))?;
-                self.shape_light(id, placed, in_world);
+                self.shape_light(id, placed, standing);
             }
             GeometryDesc::Mesh(mesh) => {
                 let order = QuadOrder::Around;
@@ -201,7 +242,7 @@ impl Builder {
                     &desc.world_from_object,
                     origin,
                     area_light,
-                    in_world,
+                    standing,
                     geometries,
                 )?;
             }
@@ -214,7 +255,7 @@ impl Builder {
                     &desc.world_from_object,
                     origin,
                     area_light,
-                    in_world,
+                    standing,
                     geometries,
                 )?;
             }
@@ -241,7 +282,7 @@ impl Builder {
         placement: &Transform,
         origin: DVec3,
         area_light: Option<AreaLightDesc>,
-        in_world: bool,
+        standing: &Standing,
         geometries: &mut Vec<Geometry>,
     ) -> Result<(), BuildError> {
         let shape = entry.shape;
@@ -262,20 +303,22 @@ impl Builder {
         let light = area_light.as_ref().and_then(|_| MeshLight::new(first, &mesh));
         let emission = area_light.map(|light_desc| {
             let triangles = light.as_ref().map_or(0.0, |(_, area)| *area);
-            emission(light_desc, || triangles + patches.iter().map(PlacedShape::area).sum::<f64>())
+            emission(light_desc, || {
+                standing.area_factor() * (triangles + patches.iter().map(PlacedShape::area).sum::<f64>())
+            })
         });
         if !mesh.indices.is_empty() {
             let form = Form::Mesh(dress.clone());
             let entry = SurfaceEntry { emission: emission.clone(), form, ..entry.clone() };
             let id = self.push(entry, geometries, GeometryKind::Mesh(mesh.clone()))?;
-            self.mesh_light(id, light, in_world);
+            self.mesh_light(id, light, standing);
         }
         let triangle_count = mesh.indices.len() as u32;
         for ((i, placed), &corners) in (0..).zip(patches).zip(&baked.patches) {
             let form = Form::Patch { dress: dress.clone(), corners, primitive: triangle_count + i };
             let entry = SurfaceEntry { emission: emission.clone(), form, ..entry.clone() };
             let id = self.push(entry, geometries, GeometryKind::Shape(placed.clone()))?;
-            self.shape_light(id, placed, in_world);
+            self.shape_light(id, placed, standing);
         }
         Ok(())
     }
@@ -328,31 +371,35 @@ impl Builder {
         Ok(id)
     }
 
-    fn shape_light(&mut self, id: u32, shape: PlacedShape, in_world: bool) {
+    fn shape_light(&mut self, id: u32, shape: PlacedShape, standing: &Standing) {
         let Some(emission) = &self.entries[id as usize].emission else { return };
-        let power = power(emission.mean(), emission.sides(), shape.area());
-        self.area_light(id, Light::Shape(ShapeLight { entry: id, shape, power }), in_world);
+        let power = power(emission.mean(), emission.sides(), standing.area_factor() * shape.area());
+        self.area_light(id, Light::Shape(ShapeLight { entry: id, shape, power }), standing);
     }
 
-    fn mesh_light(&mut self, id: u32, light: Option<(MeshLight, f64)>, in_world: bool) {
+    fn mesh_light(&mut self, id: u32, light: Option<(MeshLight, f64)>, standing: &Standing) {
         let Some(emission) = &self.entries[id as usize].emission else { return };
         let Some((light, area)) = light else {
             self.warnings.push(BuildWarning::Empty { shape: self.entries[id as usize].shape });
             return;
         };
-        let power = power(emission.mean(), emission.sides(), area);
-        self.area_light(id, Light::Mesh(MeshLight { power, ..light }), in_world);
+        let power = power(emission.mean(), emission.sides(), standing.area_factor() * area);
+        self.area_light(id, Light::Mesh(MeshLight { power, ..light }), standing);
     }
 
-    fn area_light(&mut self, entry: u32, light: Light, in_world: bool) {
+    fn area_light(&mut self, entry: u32, light: Light, standing: &Standing) {
         let entry = &mut self.entries[entry as usize];
-        if !in_world {
-            let warning = BuildWarning::UnsampledLight { shape: entry.shape };
-            if self.warnings.last() != Some(&warning) {
-                self.warnings.push(warning);
+        let light = match standing {
+            Standing::World => light,
+            Standing::Once(placement) => Light::Placed(PlacedLight::new(light, placement.clone())),
+            Standing::Anywhere => {
+                let warning = BuildWarning::UnsampledLight { shape: entry.shape };
+                if self.warnings.last() != Some(&warning) {
+                    self.warnings.push(warning);
+                }
+                return;
             }
-            return;
-        }
+        };
         entry.light = Some(LightId(self.lights.len() as u32));
         self.lights.push(light);
     }
@@ -498,7 +545,9 @@ fn origin(shapes: &[ShapeDesc], instances: &[InstanceDesc], accels: &[Arc<Accel>
         }
     }
     for (instance, accel) in instances.iter().zip(accels) {
-        bounds = bounds.union(moved(&accel.bounds(), &instance.world_from_object));
+        for map in extent::places(&instance.world_from_object) {
+            bounds = bounds.union(moved(&accel.bounds(), &map));
+        }
     }
     near(&bounds)
 }

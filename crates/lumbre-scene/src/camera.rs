@@ -1,8 +1,11 @@
 //! The closed set of cameras.
 
+use std::borrow::Cow;
+use std::sync::Arc;
+
 use lumbre_geometry::Ray;
 use lumbre_math::warp64::{equal_area_square_to_sphere, equal_area_wrap, square_to_disk};
-use lumbre_math::{DVec2, DVec3, Transform};
+use lumbre_math::{AnimatedTransform, DVec2, DVec3, Transform};
 
 use crate::Footprint;
 
@@ -49,15 +52,17 @@ pub struct Camera {
     pub name: Option<String>,
     /// Its kind.
     pub kind: CameraKind,
-    /// Where it stands.
+    /// Where it stands; where it moves, its place when the shutter opens.
     pub world_from_camera: Transform,
+    /// How it moves while the shutter is open, if it does.
+    pub motion: Option<Arc<AnimatedTransform>>,
     /// Width over height of the picture, where it is not that of its pixels.
     pub frame_aspect: Option<f64>,
     /// Window on the screen (x min, x max, y min, y max), where it is not the default: [-1, 1] along the shorter side.
     pub screen_window: Option<[f64; 4]>,
-    /// When the shutter opens.
+    /// When the shutter opens, in the unit in which everything moves.
     pub shutter_open: f64,
-    /// When it closes.
+    /// When it closes; not before it opens.
     pub shutter_close: f64,
 }
 
@@ -77,6 +82,9 @@ pub struct CameraRay {
 pub struct View {
     kind: CameraKind,
     world_from_camera: Transform,
+    motion: Option<Arc<AnimatedTransform>>,
+    shutter_open: f64,
+    shutter_close: f64,
     // Where (0, 0) of the film lies on the screen, and how far a pixel goes there. For a perspective camera the screen
     // stands at z = 1, for a spherical one it is the unit square.
     corner: DVec2,
@@ -101,34 +109,57 @@ impl View {
         Self {
             kind: camera.kind.clone(),
             world_from_camera: camera.world_from_camera,
+            motion: camera.motion.clone(),
+            shutter_open: camera.shutter_open,
+            shutter_close: camera.shutter_close,
             corner,
             step: (opposite - corner) / pixels,
         }
     }
 
-    /// The ray through a point of the film and a point of the lens (two uniform numbers), with the rays through the
-    /// points `spacing` pixels to the right and below as its footprint.
-    pub fn ray(&self, film: DVec2, lens: DVec2, spacing: f64) -> CameraRay {
-        let (origin, direction) = self.line(film, lens);
-        let (x_origin, x_direction) = self.line(film + DVec2::new(spacing, 0.0), lens);
-        let (y_origin, y_direction) = self.line(film + DVec2::new(0.0, spacing), lens);
+    /// The time at which this part of the exposure is over: 0 when the shutter opens, 1 when it closes.
+    pub fn time(&self, part: f64) -> f64 {
+        self.shutter_open + part * (self.shutter_close - self.shutter_open)
+    }
+
+    /// Whether the camera moves.
+    pub fn moves(&self) -> bool {
+        self.motion.is_some()
+    }
+
+    /// The ray through a point of the film and a point of the lens (two uniform numbers) at a time, with the rays through
+    /// the points `spacing` pixels to the right and below as its footprint.
+    pub fn ray(&self, film: DVec2, lens: DVec2, time: f64, spacing: f64) -> CameraRay {
+        let placement = self.placement(time);
+        let line = |film| self.line(&placement, film, lens);
+        let (origin, direction) = line(film);
+        let (x_origin, x_direction) = line(film + DVec2::new(spacing, 0.0));
+        let (y_origin, y_direction) = line(film + DVec2::new(0.0, spacing));
         CameraRay {
-            ray: Ray::new(origin, direction),
+            ray: Ray::new(origin, direction).at_time(time),
             footprint: Footprint::Neighbours { x_origin, x_direction, y_origin, y_direction },
         }
     }
 
-    /// How far a point of the world is along the camera's axis; for a spherical camera, from its place.
-    pub fn depth(&self, point: DVec3) -> f64 {
-        let local = self.world_from_camera.inverse_point(point);
+    /// How far a point of the world is along the camera's axis at a time; for a spherical camera, from its place.
+    pub fn depth(&self, point: DVec3, time: f64) -> f64 {
+        let placement = self.placement(time);
+        let local = placement.inverse_point(point);
         match self.kind {
-            CameraKind::Spherical { .. } => self.world_from_camera.vector(local).length(),
-            _ => self.world_from_camera.vector(DVec3::Z).length() * local.z,
+            CameraKind::Spherical { .. } => placement.vector(local).length(),
+            _ => placement.vector(DVec3::Z).length() * local.z,
+        }
+    }
+
+    fn placement(&self, time: f64) -> Cow<'_, Transform> {
+        match &self.motion {
+            None => Cow::Borrowed(&self.world_from_camera),
+            Some(motion) => Cow::Owned(motion.at(time)),
         }
     }
 
     /// Origin and unit direction in the world.
-    fn line(&self, film: DVec2, lens: DVec2) -> (DVec3, DVec3) {
+    fn line(&self, placement: &Transform, film: DVec2, lens: DVec2) -> (DVec3, DVec3) {
         let on_screen = self.corner + self.step * film;
         let (origin, direction) = match self.kind {
             CameraKind::Perspective { lens_radius, focal_distance, .. } => {
@@ -148,7 +179,7 @@ impl View {
                 (DVec3::ZERO, DVec3::new(d.x, d.z, d.y))
             }
         };
-        (self.world_from_camera.point(origin), self.world_from_camera.vector(direction).normalize())
+        (placement.point(origin), placement.vector(direction).normalize())
     }
 }
 
@@ -177,6 +208,7 @@ mod tests {
             name: None,
             kind,
             world_from_camera: Transform::translate(DVec3::new(7.0, -2.0, 3.0)),
+            motion: None,
             frame_aspect: None,
             screen_window: None,
             shutter_open: 0.0,
@@ -194,7 +226,7 @@ mod tests {
     fn the_field_of_view_spans_the_shorter_side() {
         let direction = |width, height, x, y| {
             let view = View::new(&camera(perspective(60.0, 0.0, 1.0)), width, height);
-            view.ray(DVec2::new(x, y), MIDDLE, 1.0).ray.direction
+            view.ray(DVec2::new(x, y), MIDDLE, 0.0, 1.0).ray.direction
         };
         let slope = 30_f64.to_radians().tan();
         // Wide: the upper edge is at half the angle, the right edge at 1.5 times its slope; y goes up and x right.
@@ -210,12 +242,13 @@ mod tests {
     fn every_point_of_a_lens_looks_at_the_plane_in_focus() {
         let view = View::new(&camera(perspective(40.0, 0.25, 6.0)), 120, 80);
         let film = DVec2::new(31.0, 62.0);
-        let pinhole = View::new(&camera(perspective(40.0, 0.0, 6.0)), 120, 80).ray(film, MIDDLE, 1.0).ray;
+        let pinhole =
+            View::new(&camera(perspective(40.0, 0.0, 6.0)), 120, 80).ray(film, MIDDLE, 0.0, 1.0).ray;
         let target = pinhole.at(6.0 / pinhole.direction.z);
         let mut widest: f64 = 0.0;
         for i in 0..100 {
             let lens = DVec2::new(f64::from(i % 10) + 0.5, f64::from(i / 10) + 0.5) / 10.0;
-            let ray = view.ray(film, lens, 1.0).ray;
+            let ray = view.ray(film, lens, 0.0, 1.0).ray;
             assert!((ray.at(6.0 / ray.direction.z) - target).length() < 1e-12);
             widest = widest.max((ray.origin - pinhole.origin).length());
         }
@@ -226,10 +259,31 @@ mod tests {
     fn orthographic_rays_are_parallel_and_depth_runs_along_them() {
         let kind = CameraKind::Orthographic { lens_radius: 0.0, focal_distance: 1.0 };
         let view = View::new(&Camera { screen_window: Some([-3.0, 5.0, -2.0, 4.0]), ..camera(kind) }, 80, 60);
-        let ray = view.ray(DVec2::new(20.0, 15.0), MIDDLE, 1.0).ray;
+        let ray = view.ray(DVec2::new(20.0, 15.0), MIDDLE, 0.0, 1.0).ray;
         assert_eq!(ray.direction, DVec3::Z);
         assert!((ray.origin - DVec3::new(7.0 - 1.0, -2.0 + 2.5, 3.0)).length() < 1e-12, "{}", ray.origin);
-        assert!((view.depth(ray.at(4.25)) - 4.25).abs() < 1e-12);
+        assert!((view.depth(ray.at(4.25), 0.0) - 4.25).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_camera_that_moves_looks_from_where_it_is() {
+        let kind = CameraKind::Orthographic { lens_radius: 0.0, focal_distance: 1.0 };
+        let still = camera(kind);
+        let turned =
+            Transform::translate(DVec3::new(9.0, -2.0, 3.0)) * Transform::rotate(DVec3::Y, 90.0).unwrap();
+        let keys = vec![(0.5, still.world_from_camera), (2.5, turned)];
+        let motion = Some(Arc::new(AnimatedTransform::new(keys).unwrap()));
+        let view = View::new(&Camera { motion, shutter_open: 1.0, shutter_close: 2.0, ..still }, 80, 60);
+        assert_eq!((view.time(0.0), view.time(0.5), view.time(1.0)), (1.0, 1.5, 2.0));
+        let ray = view.ray(DVec2::new(40.0, 30.0), MIDDLE, view.time(0.5), 1.0).ray;
+        assert_eq!(ray.time, 1.5);
+        assert!((ray.origin - DVec3::new(8.0, -2.0, 3.0)).length() < 1e-14, "{}", ray.origin);
+        assert!(
+            (ray.direction - DVec3::new(1.0, 0.0, 1.0).normalize()).length() < 1e-14,
+            "{}",
+            ray.direction
+        );
+        assert!((view.depth(ray.at(2.75), ray.time) - 2.75).abs() < 1e-14);
     }
 
     #[test]
@@ -241,7 +295,7 @@ mod tests {
             let mut weights = 0.0;
             for i in 0..256 * 256 {
                 let film = DVec2::new(f64::from(i % 256) + 0.5, f64::from(i / 256) + 0.5);
-                let direction = view.ray(film, MIDDLE, 1.0).ray.direction;
+                let direction = view.ray(film, MIDDLE, 0.0, 1.0).ray.direction;
                 assert!((direction.length() - 1.0).abs() < 1e-12);
                 // A row of the equirectangular picture covers less of the sphere towards the poles, which are at y.
                 let weight = match mapping {
@@ -260,7 +314,7 @@ mod tests {
     #[test]
     fn the_footprint_is_as_wide_as_the_pixels_are_apart() {
         let view = View::new(&camera(perspective(60.0, 0.0, 1.0)), 200, 200);
-        let at = view.ray(DVec2::new(100.0, 100.0), MIDDLE, 0.25);
+        let at = view.ray(DVec2::new(100.0, 100.0), MIDDLE, 0.0, 0.25);
         let distance = 8.0;
         let point = at.ray.at(distance);
         let spot = at.footprint.on_plane(

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use lumbre_geometry::Shape;
 use lumbre_image::Rgb;
+use lumbre_kernel::Placement;
 use lumbre_math::{DVec3, Transform, Vec2, Vec3, Vec4};
 use lumbre_shading::{FloatTexture, Material, MipMap};
 
@@ -174,13 +175,13 @@ pub struct ObjectDesc {
     pub instances: Vec<InstanceDesc>,
 }
 
-/// An object, placed.
+/// An object, placed. What moves is an instance: a single shape too stands in an object of its own then.
 #[derive(Clone, Debug)]
 pub struct InstanceDesc {
     /// Which.
     pub object: ObjectId,
-    /// Where.
-    pub world_from_object: Transform,
+    /// Where, at which time.
+    pub world_from_object: Placement,
 }
 
 /// The light that a shape gives off. Photometric units are already resolved but for `power`.

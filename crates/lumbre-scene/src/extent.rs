@@ -6,6 +6,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use lumbre_geometry::Aabb;
+use lumbre_kernel::Placement;
 use lumbre_math::{DVec3, Transform};
 
 use crate::build::inside_out;
@@ -62,7 +63,9 @@ impl<'d> Extent<'d> {
         self.desc.shapes.iter().for_each(|shape| each_point_of(shape, &self.used, visit));
         for instance in &self.desc.instances {
             let outline = self.outlines.get(instance.object.0 as usize).map_or(&[][..], Vec::as_slice);
-            outline.iter().for_each(|&p| visit(instance.world_from_object.point(p)));
+            for map in places(&instance.world_from_object) {
+                outline.iter().for_each(|&p| visit(map.point(p)));
+            }
         }
     }
 
@@ -73,12 +76,22 @@ impl<'d> Extent<'d> {
     }
 }
 
+/// Where an instance stands; of what moves, where it is at each key.
+pub(crate) fn places(placement: &Placement) -> Vec<Transform> {
+    match placement {
+        Placement::Still(map) => vec![*map],
+        Placement::Moving(motion) => motion.keys().iter().map(|&(_, map)| map).collect(),
+    }
+}
+
 fn outline(object: &ObjectDesc, outlines: &[Vec<DVec3>], used: &Used) -> Vec<DVec3> {
     let mut points = Vec::new();
     object.shapes.iter().for_each(|shape| each_point_of(shape, used, &mut |p| points.push(p)));
     for instance in &object.instances {
         let inner = outlines.get(instance.object.0 as usize).map_or(&[][..], Vec::as_slice);
-        points.extend(inner.iter().map(|&p| instance.world_from_object.point(p)));
+        for map in places(&instance.world_from_object) {
+            points.extend(inner.iter().map(|&p| map.point(p)));
+        }
     }
     if points.len() <= DIRECTIONS {
         return points;
@@ -188,7 +201,7 @@ mod tests {
         };
         let place = |object, x| InstanceDesc {
             object: ObjectId(object),
-            world_from_object: Transform::translate(DVec3::new(x, 0.0, 0.0)),
+            world_from_object: Transform::translate(DVec3::new(x, 0.0, 0.0)).into(),
         };
         let outer = ObjectDesc {
             name: "outer".into(),

@@ -164,6 +164,7 @@ impl Eye {
             name: None,
             kind: CameraKind::Perspective { fov: FOV, lens_radius: 0.0, focal_distance: -depth },
             world_from_camera: Transform::from_affine(placement).unwrap_or_default(),
+            motion: None,
             frame_aspect: None,
             screen_window: None,
             shutter_open: 0.0,
@@ -260,7 +261,7 @@ mod tests {
         let bounds = Aabb { min: DVec3::splat(-2.0), max: DVec3::splat(3.0) };
         let points = |visit: &mut dyn FnMut(DVec3)| corners(&bounds).for_each(visit);
         let view = View::new(&still(&points, UpAxis::Y, 1.0), 200, 200);
-        let direction = |x, y| view.ray(DVec2::new(x, y), DVec2::splat(0.5), 1.0).ray.direction;
+        let direction = |x, y| view.ray(DVec2::new(x, y), DVec2::splat(0.5), 0.0, 1.0).ray.direction;
         let (left, right, top) = (direction(10.0, 100.0), direction(190.0, 100.0), direction(100.0, 10.0));
         assert!(left.cross(right).dot(top) < 0.0);
         assert!(top.y > right.y);

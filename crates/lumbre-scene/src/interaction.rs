@@ -28,9 +28,11 @@ pub struct Interaction<'s> {
     pub light: Option<LightId>,
     /// [`crate::ShapeDesc::index`] of the shape.
     pub shape: u32,
+    /// When the ray looked.
+    pub time: f64,
     /// The triangle or patch of a mesh, else 0.
     pub primitive: u32,
-    /// The bare surface of the tree, which the densities of lights are asked with; where a light samples it.
+    /// The bare surface in the space of its tree, which the densities of lights are asked with; where a light samples it.
     pub(crate) bare: Option<Box<Surface>>,
     /// Where rays start that leave on the side that the ray came from.
     pub(crate) before: DVec3,
@@ -70,7 +72,7 @@ impl<'s> Interaction<'s> {
 
     /// The ray that leaves along a unit direction, from beyond the error of the point.
     pub fn leave(&self, direction: DVec3) -> Ray {
-        Ray::new(self.start(direction), direction)
+        Ray::new(self.start(direction), direction).at_time(self.time)
     }
 
     /// The segment to where the light comes from, short of it by its own error.
@@ -79,7 +81,7 @@ impl<'s> Interaction<'s> {
         let start = self.start(sample.towards);
         let stop = offset(end.point, end.error, end.normal, -sample.towards);
         // What rounds in the direction and in t.
-        Ray::new(start, stop - start).with_range(0.0, 1.0 - f64::powi(2.0, -40))
+        Ray::new(start, stop - start).with_range(0.0, 1.0 - f64::powi(2.0, -40)).at_time(self.time)
     }
 
     /// Where lights are sampled from: off the surface, on the side that the ray came from, so that a surface which shines

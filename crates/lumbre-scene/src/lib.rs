@@ -30,5 +30,6 @@ pub use ground::GroundPlane;
 pub use id::{MaterialId, ObjectId};
 pub use interaction::{Interaction, offset};
 pub use light::{Light, LightId, LightSample};
+pub use lumbre_kernel::Placement;
 pub use scene::{BuildWarning, Scene};
 pub use stage::{Ground, Stage, StageLight, Staged, Surroundings};

@@ -4,6 +4,7 @@ mod area;
 mod delta;
 mod environment;
 mod mesh;
+mod placed;
 
 use lumbre_geometry::{Ray, Surface};
 use lumbre_math::{DVec2, DVec3};
@@ -14,6 +15,7 @@ pub(crate) use area::power;
 pub use delta::{DistantLight, GoniometricLight, PointLight, SpotLight};
 pub use environment::{Environment, UniformLight};
 pub use mesh::MeshLight;
+pub use placed::PlacedLight;
 
 use crate::surface::SurfaceEntry;
 
@@ -40,6 +42,8 @@ pub enum Light {
     Shape(ShapeLight),
     /// Triangles.
     Mesh(MeshLight),
+    /// One of the two in an object that stands in the world once, moving or not.
+    Placed(PlacedLight),
 }
 
 /// Light that arrives at a point, from a direction that a light chose.
@@ -78,9 +82,15 @@ impl LightPoint {
 }
 
 impl Light {
-    /// Light that arrives at `from`, by two uniform numbers. `None` where the light chose a direction from which nothing
+    /// Light that arrives at `from` at a time, by two uniform numbers. `None` where the light chose a direction from which nothing
     /// comes.
-    pub(crate) fn sample(&self, entries: &[SurfaceEntry], from: DVec3, u: DVec2) -> Option<LightSample> {
+    pub(crate) fn sample(
+        &self,
+        entries: &[SurfaceEntry],
+        from: DVec3,
+        time: f64,
+        u: DVec2,
+    ) -> Option<LightSample> {
         match self {
             Self::Point(light) => light.sample(from),
             Self::Spot(light) => light.sample(from),
@@ -90,10 +100,12 @@ impl Light {
             Self::Environment(light) => light.sample(u),
             Self::Shape(light) => light.sample(&entries[light.entry as usize], from, u),
             Self::Mesh(light) => light.sample(&entries[light.entry as usize], from, u),
+            Self::Placed(light) => light.sample(entries, from, time, u),
         }
     }
 
-    /// The density per unit solid angle with which the light chooses what `ray` hit: a surface for lights that have one.
+    /// The density per unit solid angle with which the light chooses what `ray` hit: a surface, in the space of its tree,
+    /// for lights that have one.
     /// 0 for lights that no ray can hit.
     pub(crate) fn pdf(&self, ray: &Ray, surface: Option<(&Surface, u32)>) -> f64 {
         match (self, surface) {
@@ -101,6 +113,7 @@ impl Light {
             (Self::Environment(light), None) => light.pdf(ray.direction),
             (Self::Shape(light), Some((surface, _))) => light.pdf(ray, surface),
             (Self::Mesh(light), Some((surface, triangle))) => light.pdf(ray, surface, triangle),
+            (Self::Placed(light), Some(surface)) => light.pdf(ray, surface),
             _ => 0.0,
         }
     }
@@ -127,7 +140,7 @@ impl Light {
             Self::Distant(light) => Some(of(Some(light.sample()))),
             Self::Uniform(light) => Some(light.radiance * std::f32::consts::PI),
             Self::Environment(light) => Some(light.irradiance(normal)),
-            Self::Shape(_) | Self::Mesh(_) => None,
+            Self::Shape(_) | Self::Mesh(_) | Self::Placed(_) => None,
         }
     }
 
@@ -155,6 +168,7 @@ impl Light {
             Self::Environment(light) => PI * disk * light.mean(),
             Self::Shape(light) => light.power,
             Self::Mesh(light) => light.power,
+            Self::Placed(light) => light.power(),
         }
     }
 
@@ -166,7 +180,7 @@ impl Light {
             Self::Goniometric(_) => "goniometric",
             Self::Distant(_) => "distant",
             Self::Uniform(_) | Self::Environment(_) => "infinite",
-            Self::Shape(_) | Self::Mesh(_) => "diffuse",
+            Self::Shape(_) | Self::Mesh(_) | Self::Placed(_) => "diffuse",
         }
     }
 }

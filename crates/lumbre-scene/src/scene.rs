@@ -37,6 +37,7 @@ pub struct Scene {
     // Whether a camera looks through the back of something.
     pub(crate) has_one_sided: bool,
     pub(crate) has_instances: bool,
+    pub(crate) moves: bool,
     // Whether any surface looks up a texture, so that rays have to know how wide they are.
     pub(crate) looks_up: bool,
 }
@@ -51,9 +52,9 @@ pub enum BuildWarning {
         /// Which shape.
         shape: u32,
     },
-    /// Light in an object that is instanced, or on a CSG, is found only by rays that happen to hit it.
+    /// Light in an object that does not stand in the world just once, or on a CSG, is found only by rays that happen to hit it.
     #[error(
-        "shape {shape}: its light is found by chance only, for it is in an instance or a CSG (slow to converge)"
+        "shape {shape}: its light is found by chance only, for it is in one of many instances or a CSG (slow to converge)"
     )]
     UnsampledLight {
         /// Which shape.
@@ -105,6 +106,11 @@ impl Scene {
     /// What the description says of the integrator.
     pub fn integrator(&self) -> IntegratorDesc {
         self.integrator
+    }
+
+    /// Whether anything in it moves, cameras apart.
+    pub fn moves(&self) -> bool {
+        self.moves
     }
 
     /// A box around everything finite; empty where there is nothing.
@@ -182,7 +188,11 @@ impl Scene {
         } else {
             Spot::default()
         };
-        let light = if hit.instances.is_empty() { entry.light } else { None };
+        let light = entry.light;
+        let bare = light.map(|_| {
+            let is_placed = !hit.instances.is_empty();
+            Box::new(if is_placed { self.accel.surface_in_object(ray, hit) } else { bare })
+        });
         Interaction {
             at: dressed.context(spot.dpdx, spot.dpdy, spot.duv_dx, spot.duv_dy),
             surface,
@@ -194,18 +204,19 @@ impl Scene {
             light,
             shape: entry.shape,
             primitive,
-            bare: light.map(|_| Box::new(bare)),
+            bare,
+            time: ray.time,
             before: offset(surface.point, surface.point_error, surface.normal, -direction),
             width: spot.width,
             spread: spot.spread,
         }
     }
 
-    /// Light that arrives at `from` from a light chosen by `choose`, in a direction chosen by `u`. Its density, or its
-    /// radiance where it has none, counts the choice.
-    pub fn sample_light(&self, from: DVec3, choose: f64, u: DVec2) -> Option<LightSample> {
+    /// Light that arrives at `from` at a time, from a light chosen by `choose`, in a direction chosen by `u`. Its density, or
+    /// its radiance where it has none, counts the choice.
+    pub fn sample_light(&self, from: DVec3, time: f64, choose: f64, u: DVec2) -> Option<LightSample> {
         let choice = self.light_choice.as_ref()?.sample(choose);
-        let mut sample = self.lights[choice.index].sample(&self.entries, from, u)?;
+        let mut sample = self.lights[choice.index].sample(&self.entries, from, time, u)?;
         match &mut sample.scatter {
             Scatter::Density(pdf) => *pdf *= choice.probability as f32,
             Scatter::Delta => sample.radiance *= (1.0 / choice.probability) as f32,
@@ -219,9 +230,9 @@ impl Scene {
         Some((LightId(choice.index as u32), choice.probability))
     }
 
-    /// Light that arrives at `from` from one light, in a direction chosen by `u`.
-    pub fn sample_one_light(&self, light: LightId, from: DVec3, u: DVec2) -> Option<LightSample> {
-        self.lights[light.0 as usize].sample(&self.entries, from, u)
+    /// Light that arrives at `from` at a time from one light, in a direction chosen by `u`.
+    pub fn sample_one_light(&self, light: LightId, from: DVec3, time: f64, u: DVec2) -> Option<LightSample> {
+        self.lights[light.0 as usize].sample(&self.entries, from, time, u)
     }
 
     /// The density per unit solid angle with which [`Scene::sample_light`] chooses at `from` what a ray from there hit; 0
@@ -229,7 +240,7 @@ impl Scene {
     pub fn light_pdf(&self, from: DVec3, hit: &Interaction) -> f32 {
         let (Some(light), Some(bare)) = (hit.light, &hit.bare) else { return 0.0 };
         let surface = Some((&**bare, hit.primitive));
-        let ray = Ray::new(from, -hit.towards_origin);
+        let ray = Ray::new(from, -hit.towards_origin).at_time(hit.time);
         (self.light_probability(light) * self.lights[light.0 as usize].pdf(&ray, surface)) as f32
     }
 

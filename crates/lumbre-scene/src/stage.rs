@@ -249,6 +249,7 @@ mod tests {
             name: Some("own".into()),
             kind: CameraKind::Perspective { fov: 50.0, lens_radius: 0.0, focal_distance: 1.0 },
             world_from_camera: Transform::IDENTITY,
+            motion: None,
             frame_aspect: None,
             screen_window: None,
             shutter_open: 0.0,

@@ -237,10 +237,13 @@ fn an_instanced_mesh_carries_its_normals_along() {
         ObjectDesc {
             name: "outer".into(),
             shapes: vec![],
-            instances: vec![InstanceDesc { object: ObjectId(0), world_from_object: Transform::IDENTITY }],
+            instances: vec![InstanceDesc {
+                object: ObjectId(0),
+                world_from_object: Transform::IDENTITY.into(),
+            }],
         },
     ];
-    scene.instances = vec![InstanceDesc { object: ObjectId(1), world_from_object: placement }];
+    scene.instances = vec![InstanceDesc { object: ObjectId(1), world_from_object: placement.into() }];
     let scene = Scene::build(scene).unwrap();
     let target = placement.point(DVec3::new(4.0, 4.5, 1.0));
     let met = meet(&scene, &Ray::new(target + 5.0 * DVec3::Z, -DVec3::Z));
@@ -395,7 +398,8 @@ fn what_cannot_be_built_is_named() {
         BuildError::NoSuchMaterial { shape: 8, material: 5, count: 2 }
     );
 
-    let instance = |object| InstanceDesc { object: ObjectId(object), world_from_object: Transform::IDENTITY };
+    let instance =
+        |object| InstanceDesc { object: ObjectId(object), world_from_object: Transform::IDENTITY.into() };
     let object = |name: &str, inner: Vec<InstanceDesc>| ObjectDesc {
         name: name.into(),
         shapes: vec![],
@@ -425,6 +429,7 @@ fn what_cannot_be_built_is_named() {
         name: None,
         kind: CameraKind::Perspective { fov: 180.0, lens_radius: 0.0, focal_distance: 1.0 },
         world_from_camera: Transform::IDENTITY,
+        motion: None,
         frame_aspect: None,
         screen_window: None,
         shutter_open: 0.0,
@@ -440,7 +445,7 @@ fn a_scene_of_nothing_builds_and_answers() {
     let scene = Scene::build(SceneDesc::default()).unwrap();
     assert!(scene.closest(&down(1.0, 2.0)).is_none());
     assert_eq!((scene.cameras().len(), scene.lights().len()), (1, 1));
-    let sample = scene.sample_light(DVec3::new(1.0, 2.0, 3.0), 0.3, DVec2::new(0.7, 0.6)).unwrap();
+    let sample = scene.sample_light(DVec3::new(1.0, 2.0, 3.0), 0.0, 0.3, DVec2::new(0.7, 0.6)).unwrap();
     assert!(sample.towards.is_normalized() && sample.radiance.is_finite());
 }
 

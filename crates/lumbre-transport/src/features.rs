@@ -65,7 +65,7 @@ impl Features {
         Some(Self {
             albedo: if albedo.is_black() { met.emitted().clamp(0.0, 1.0) } else { albedo },
             normal: if normal.dot(towards) < 0.0 { -normal } else { normal },
-            depth: view.depth(met.surface.point) as f32,
+            depth: view.depth(met.surface.point, met.time) as f32,
             uv: met.uv(),
         })
     }

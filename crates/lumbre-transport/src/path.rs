@@ -133,7 +133,8 @@ impl Integrator for Path {
                         let u = draw.scattered(flights);
                         let along = ray.direction.as_vec3();
                         let (along, _) = sample_henyey_greenstein(along, medium.asymmetry, u);
-                        ray = Ray::new(ray.origin + distance * ray.direction, along.as_dvec3().normalize());
+                        let start = ray.origin + distance * ray.direction;
+                        ray = Ray::new(start, along.as_dvec3().normalize()).at_time(ray.time);
                         // Lights are behind a surface that bends what comes from them: paths find them.
                         chosen = Chosen::Only;
                         has_scattered = true;
@@ -161,7 +162,8 @@ impl Integrator for Path {
 
             lit_from = here.lit_from();
             if !vertex.bsdf.is_delta() {
-                let light = scene.sample_light(lit_from, draw.light_choice(depth), draw.light_point(depth));
+                let light =
+                    scene.sample_light(lit_from, ray.time, draw.light_choice(depth), draw.light_point(depth));
                 if let Some(light) = light {
                     let weigh = |light_pdf, bsdf_pdf| self.weight_of_sampled(light_pdf, bsdf_pdf);
                     radiance += throughput * vertex.scattered(scene, &light, &interiors, weigh, rays);

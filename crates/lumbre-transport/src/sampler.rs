@@ -38,6 +38,8 @@ const SURVIVAL: u32 = 4;
 const EVERY_LIGHT: u32 = 1 << 24;
 /// Labels of flights through media.
 const EVERY_FLIGHT: u32 = 1 << 27;
+/// When a ray looks. Away from the others, so that these are what they are without it.
+const TIME: u32 = 1 << 30;
 /// Labels of integrators that follow several rays from a vertex.
 const EVERY_BRANCH: u32 = 1 << 28;
 
@@ -89,6 +91,11 @@ impl Draw {
     /// Where on the lens.
     pub fn lens(&self) -> DVec2 {
         self.two(LENS)
+    }
+
+    /// Which part of the exposure is over when the ray looks: even over the samples of a pixel.
+    pub fn time(&self) -> f64 {
+        self.one(TIME)
     }
 
     /// Which light, at a vertex.
@@ -251,6 +258,16 @@ mod tests {
         seen.sort_unstable();
         seen.dedup();
         assert_eq!(seen.len(), 600);
+    }
+
+    #[test]
+    fn the_samples_of_a_pixel_are_even_in_time() {
+        let sampler = Sampler::new(&SamplerDesc { kind: SamplerKind::Sobol, spp: None, seed: 9 });
+        let mut cells = [0; 64];
+        for index in 64..128 {
+            cells[(sampler.draw(13, 2, index).time() * 64.0) as usize] += 1;
+        }
+        assert_eq!(cells, [1; 64]);
     }
 
     #[test]

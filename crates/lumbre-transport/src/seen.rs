@@ -71,7 +71,9 @@ fn blocked(
             false => (draw.light_choice(i) * lights.len() as f64) as usize,
         };
         let Some(&light) = lights.get(chosen) else { continue };
-        let Some(sample) = scene.sample_one_light(light, from, draw.light_point(i)) else { continue };
+        let Some(sample) = scene.sample_one_light(light, from, at.time, draw.light_point(i)) else {
+            continue;
+        };
         let density = match sample.scatter {
             Scatter::Delta => 1.0,
             Scatter::Density(pdf) => pdf,

@@ -109,7 +109,7 @@ impl Whitted {
             let mut sum = Spectrum::BLACK;
             for point in 0..points {
                 let u = draw.point_on_each_light(came.vertex, label, point, points);
-                if let Some(sample) = scene.sample_one_light(id, from, u) {
+                if let Some(sample) = scene.sample_one_light(id, from, here.time, u) {
                     sum += scattered(scene, here, scatterers, &came.interiors, &sample, rays);
                 }
             }

@@ -24,6 +24,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         name: None,
         kind: CameraKind::Perspective { fov: 32.0, lens_radius: 0.0, focal_distance: 8.0 },
         world_from_camera: Transform::look_at_left(eye, DVec3::new(0.0, 0.0, 0.6), DVec3::Z)?.inverse(),
+        motion: None,
         frame_aspect: None,
         screen_window: None,
         shutter_open: 0.0,

@@ -12,6 +12,7 @@ mod animation;
 mod container;
 #[cfg(feature = "draco")]
 mod draco;
+mod exposure;
 mod file;
 mod graph;
 mod ies;
@@ -45,6 +46,9 @@ pub struct GltfOptions {
     /// The time in seconds at which animations stand; `None` leaves them alone. All animations of the file play at once:
     /// where two of them move the same thing, the first does.
     pub frame: Option<f64>,
+    /// How long the shutter is open, in seconds, half of it before `frame` and half after; 0 for a moment. What animations
+    /// move by nodes meanwhile is seen moving.
+    pub shutter: f64,
     /// The material variant to wear (`KHR_materials_variants`).
     pub variant: Option<String>,
 }

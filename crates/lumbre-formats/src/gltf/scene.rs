@@ -5,13 +5,14 @@ use std::sync::Arc;
 
 use lumbre_geometry::{Cylinder, Shape, Sphere};
 use lumbre_image::Rgb;
-use lumbre_math::{DAffine3, DMat3, DMat4, DQuat, DVec3, Transform, Vec2, Vec3};
+use lumbre_math::{AnimatedTransform, DAffine3, DMat3, DMat4, DQuat, DVec3, Transform, Vec2, Vec3};
 use lumbre_scene::{
-    Camera, CameraKind, GeometryDesc, InstanceDesc, LightDesc, MeshDesc, ObjectDesc, ObjectId, SceneDesc,
-    ShapeDesc, WithoutLight,
+    Camera, CameraKind, GeometryDesc, InstanceDesc, LightDesc, MeshDesc, ObjectDesc, ObjectId, Placement,
+    SceneDesc, ShapeDesc, WithoutLight,
 };
 
 use super::accessor::{self, Accessor, Component, Element};
+use super::exposure::Exposure;
 use super::file::{File, List};
 use super::graph::Graph;
 use super::ies::Profiles;
@@ -43,9 +44,10 @@ pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
     };
     let graph = Graph::read(file, moved)?;
     check(file, &graph)?;
+    let mut exposure = Exposure::read(file, options)?;
 
     let roots = roots(file, &graph)?;
-    let mut places: Vec<Placement> = vec![];
+    let mut places: Vec<Placed> = vec![];
     let mut profiles = Profiles::new(file);
     let mut scene = SceneDesc { without_light: WithoutLight::StudioUnlessStaged, ..SceneDesc::default() };
     scene.integrator.max_depth = MAX_DEPTH;
@@ -55,11 +57,18 @@ pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
         let value = file.list(List::Nodes)[node];
         if let Some((_, camera)) = file.named(List::Cameras, value, "camera")? {
             first_camera.get_or_insert(camera);
-            scene.cameras.push(self::camera(camera, value, world)?);
+            let mut camera = self::camera(camera, value, world)?;
+            let forwards = Transform::scale(DVec3::new(1.0, 1.0, -1.0)).unwrap_or_default();
+            let place = |world: &DAffine3| Transform::from_affine(rigid(world)).map(|map| map * forwards);
+            camera.motion = exposure.motion(node, place)?;
+            scene.cameras.push(camera);
         }
         if let Some(extension) = value.extension("KHR_lights_punctual")? {
             let (_, light) = file.at(List::Lights, extension.need("light")?)?;
             scene.lights.extend(self::light(file, light, world)?);
+            if exposure.moves(node)? {
+                file.warn(value, "the motion of a light was left out: it stands where it is halfway");
+            }
         }
         if let Some(extension) = value.extension("EXT_lights_ies")? {
             scene.lights.push(profiles.light(extension, &rigid(world))?);
@@ -69,16 +78,30 @@ pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
         let weights = weights(file, &graph, node)?;
         let key =
             Key { mesh, weights: weights.iter().map(|w| w.to_bits()).collect(), skinned: skin.map(|_| node) };
-        let worlds = match value.extension("EXT_mesh_gpu_instancing")? {
-            Some(extension) => instances(file, extension, world)?,
-            // A skin says where its vertices are.
-            None if skin.is_some() => vec![DAffine3::IDENTITY],
-            None => vec![*world],
+        let copies = match value.extension("EXT_mesh_gpu_instancing")? {
+            Some(extension) => instances(file, extension)?,
+            None => vec![DAffine3::IDENTITY],
         };
+        // A skin says where its vertices are.
+        let is_bent = skin.is_some() && value.extension("EXT_mesh_gpu_instancing")?.is_none();
+        let stands = |copy: &DAffine3| if is_bent { DAffine3::IDENTITY } else { *world * *copy };
+        let worlds: Vec<DAffine3> = copies.iter().map(stands).collect();
+        let mut motions = vec![];
+        if !is_bent && exposure.moves(node)? {
+            for copy in &copies {
+                motions.push(exposure.motion(node, |world| Transform::from_affine(*world * *copy))?);
+            }
+        }
+        if exposure.deforms(node, skin)? {
+            file.warn(
+                value,
+                "the motion of a skin or a morph target was left out: it stands as it is halfway",
+            );
+        }
         *uses.entry(key.clone()).or_default() += worlds.len();
         file.budget.elements(worlds.len() as u64, "nodes with meshes")?;
         file.budget.bytes((worlds.len() * size_of::<DAffine3>()) as u64, "nodes with meshes")?;
-        places.push(Placement { key, node, skin, worlds });
+        places.push(Placed { key, node, skin, worlds, motions });
         Ok(())
     })?;
     if let Some(camera) = first_camera
@@ -113,11 +136,19 @@ struct Key {
     skinned: Option<usize>,
 }
 
-struct Placement {
+struct Placed {
     key: Key,
     node: usize,
     skin: Option<usize>,
     worlds: Vec<DAffine3>,
+    /// How each of these moves; none where nothing does.
+    motions: Vec<Option<Arc<AnimatedTransform>>>,
+}
+
+impl Placed {
+    fn motion(&self, copy: usize) -> Option<Arc<AnimatedTransform>> {
+        self.motions.get(copy).cloned().flatten()
+    }
 }
 
 /// The variant that is asked for, by its position.
@@ -350,8 +381,8 @@ fn check_node(file: &File<'_>, graph: &Graph<'_>, index: usize, node: Value<'_>)
     Ok(())
 }
 
-/// Where the copies of a node's mesh stand (`EXT_mesh_gpu_instancing`).
-fn instances(file: &File<'_>, extension: Value<'_>, world: &DAffine3) -> Read<Vec<DAffine3>> {
+/// Where the copies of a node's mesh stand in the space of the node (`EXT_mesh_gpu_instancing`).
+fn instances(file: &File<'_>, extension: Value<'_>) -> Read<Vec<DAffine3>> {
     let attributes = extension.need("attributes")?;
     let mut count: Option<usize> = None;
     let mut parts: [Option<Accessor<'_>>; 3] = [None; 3];
@@ -394,14 +425,11 @@ fn instances(file: &File<'_>, extension: Value<'_>, world: &DAffine3) -> Read<Ve
     for i in 0..count {
         let length = rotations[i].length();
         let rotation = if length > 0.0 { rotations[i] * (1.0 / length) } else { DQuat::IDENTITY };
-        worlds.push(
-            *world
-                * DAffine3::from_scale_rotation_translation(
-                    scales[i].as_dvec3(),
-                    rotation,
-                    translations[i].as_dvec3(),
-                ),
-        );
+        worlds.push(DAffine3::from_scale_rotation_translation(
+            scales[i].as_dvec3(),
+            rotation,
+            translations[i].as_dvec3(),
+        ));
     }
     Ok(worlds)
 }
@@ -420,11 +448,14 @@ struct Builder<'f> {
 }
 
 impl Builder<'_> {
-    fn place(&mut self, scene: &mut SceneDesc, place: &Placement, uses: usize) -> Read<()> {
+    fn place(&mut self, scene: &mut SceneDesc, place: &Placed, uses: usize) -> Read<()> {
         if uses <= 1 {
-            for world in &place.worlds {
+            for (copy, world) in place.worlds.iter().enumerate() {
                 let shapes = self.shapes(place)?;
-                self.stand(scene, shapes, world, place)?;
+                match place.motion(copy) {
+                    Some(motion) => move_about(scene, shapes, motion),
+                    None => self.stand(scene, shapes, world, place)?,
+                }
             }
             return Ok(());
         }
@@ -447,10 +478,16 @@ impl Builder<'_> {
         let (object, shining) = self.objects[&place.key].clone();
         let count = place.worlds.len() as u64;
         self.file.budget.bytes(count * size_of::<InstanceDesc>() as u64, "instances")?;
-        for world in &place.worlds {
-            if let Some(object) = object {
+        for (copy, world) in place.worlds.iter().enumerate() {
+            let motion = place.motion(copy);
+            if let (Some(object), Some(motion)) = (object, &motion) {
+                let world_from_object = Placement::Moving(motion.clone());
+                scene.instances.push(InstanceDesc { object, world_from_object });
+            } else if let Some(object) = object {
                 match Transform::from_affine(*world) {
-                    Ok(world_from_object) => scene.instances.push(InstanceDesc { object, world_from_object }),
+                    Ok(world_from_object) => scene
+                        .instances
+                        .push(InstanceDesc { object, world_from_object: world_from_object.into() }),
                     Err(_) => {
                         let shapes = scene.objects[object.0 as usize].shapes.clone();
                         self.stand(scene, shapes, world, place)?;
@@ -459,7 +496,10 @@ impl Builder<'_> {
             }
             let copies = shining.iter().map(|shape| ShapeDesc { index: self.next_index(), ..shape.clone() });
             let copies: Vec<ShapeDesc> = copies.collect();
-            self.stand(scene, copies, world, place)?;
+            match motion {
+                Some(motion) => move_about(scene, copies, motion),
+                None => self.stand(scene, copies, world, place)?,
+            }
         }
         Ok(())
     }
@@ -476,7 +516,7 @@ impl Builder<'_> {
         scene: &mut SceneDesc,
         shapes: Vec<ShapeDesc>,
         world: &DAffine3,
-        place: &Placement,
+        place: &Placed,
     ) -> Read<()> {
         match Transform::from_affine(*world) {
             Ok(world_from_object) => {
@@ -493,7 +533,7 @@ impl Builder<'_> {
     }
 
     /// The shapes of a mesh in its own space, or in the world if it has a skin.
-    fn shapes(&mut self, place: &Placement) -> Read<Vec<ShapeDesc>> {
+    fn shapes(&mut self, place: &Placed) -> Read<Vec<ShapeDesc>> {
         let file = self.file;
         let joints = place.skin.map(|skin| self.joints(skin)).transpose()?;
         let weights: Vec<f64> = place.key.weights.iter().map(|&bits| f64::from_bits(bits)).collect();
@@ -572,6 +612,16 @@ impl Builder<'_> {
         }
         Ok(joints)
     }
+}
+
+/// Puts shapes that move into the world: in an object of their own.
+fn move_about(scene: &mut SceneDesc, shapes: Vec<ShapeDesc>, motion: Arc<AnimatedTransform>) {
+    if shapes.is_empty() {
+        return;
+    }
+    scene.objects.push(ObjectDesc { shapes, ..ObjectDesc::default() });
+    let object = ObjectId(scene.objects.len() as u32 - 1);
+    scene.instances.push(InstanceDesc { object, world_from_object: Placement::Moving(motion) });
 }
 
 /// A mesh as scenes have it; `None` without triangles.
@@ -730,6 +780,7 @@ fn camera(camera: Value<'_>, node: Value<'_>, world: &DAffine3) -> Read<Camera> 
         name: name.map(Into::into),
         kind,
         world_from_camera,
+        motion: None,
         frame_aspect: None,
         screen_window: window,
         shutter_open: 0.0,

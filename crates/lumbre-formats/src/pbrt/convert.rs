@@ -4,10 +4,10 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use lumbre_math::Transform;
+use lumbre_math::{AnimatedTransform, Transform};
 use lumbre_scene::{
     FilmDesc, GeometryDesc, InstanceDesc, MaterialId, MeshDesc, NamedMaterial, ObjectDesc, ObjectId,
-    SamplerDesc, SceneDesc, ShapeDesc, WithoutLight,
+    Placement, SamplerDesc, SceneDesc, ShapeDesc, WithoutLight,
 };
 use lumbre_shading::{FloatTexture, Material, MipMap, Spectrum, SpectrumTexture, Texture, TextureValue};
 
@@ -46,6 +46,8 @@ pub(super) struct Converter<'b, 'd> {
     /// CSG shapes, whose mesh operands can only be looked at when they are read.
     pub meshes_to_close: Vec<(Arc<MeshDesc>, Spot)>,
     pub sampler_seed: Option<u64>,
+    /// When the two current transforms hold.
+    pub transform_times: [f64; 2],
     pub exposure: Exposure,
     upgraded: Option<Spot>,
 }
@@ -142,6 +144,7 @@ impl<'b, 'd> Converter<'b, 'd> {
             lights_to_check: vec![],
             meshes_to_close: vec![],
             sampler_seed: None,
+            transform_times: [0.0, 1.0],
             exposure: Exposure { shutter: 1.0, iso: 100.0, scale: 1.0 },
             upgraded: None,
         }
@@ -254,14 +257,56 @@ impl<'b, 'd> Converter<'b, 'd> {
         self.open_object = None;
     }
 
-    pub fn instance(&mut self, name: &str, spot: Spot, at: Spot, ctm: Transform) -> Result<()> {
+    pub fn instance(&mut self, name: &str, spot: Spot, at: Spot, ctm: &[Transform; 2]) -> Result<()> {
         if let Some(open) = self.open_object {
             let open = &self.objects[open.0 as usize].name;
             return Err(spot.error(format!("ObjectInstance inside the object {}", quoted(open))));
         }
         let object = self.object_named(name, at);
-        self.scene.instances.push(InstanceDesc { object, world_from_object: ctm });
+        let motion = self.motion(spot, ctm, "instance");
+        let world_from_object = motion.map_or(ctm[0].into(), Placement::Moving);
+        self.scene.instances.push(InstanceDesc { object, world_from_object });
         Ok(())
+    }
+
+    /// The motion between the two current transforms, where they differ.
+    pub fn motion(&mut self, spot: Spot, ctm: &[Transform; 2], what: &str) -> Option<Arc<AnimatedTransform>> {
+        if ctm[0] == ctm[1] {
+            return None;
+        }
+        let [start, end] = self.transform_times;
+        match AnimatedTransform::new(vec![(start, ctm[0]), (end, ctm[1])]) {
+            Ok(motion) => Some(Arc::new(motion)),
+            Err(error) => {
+                let message = format!("this {what} stays where it starts: {error}");
+                self.warn(spot, Diagnostic::warning(message));
+                None
+            }
+        }
+    }
+
+    /// Puts a shape that moves into the object that is open, else into the world: in an object of its own.
+    pub fn push_moving(
+        &mut self,
+        shape: ShapeDesc,
+        leaves: u64,
+        depth: usize,
+        motion: Arc<AnimatedTransform>,
+        spot: Spot,
+    ) {
+        let id = ObjectId(self.objects.len() as u32);
+        let shape = ShapeDesc { world_from_object: Transform::IDENTITY, ..shape };
+        let object = ObjectDesc { shapes: vec![shape], ..ObjectDesc::default() };
+        let name = String::new();
+        self.objects.push(ObjectSlot { object: Some(object), name, first_use: spot, leaves, depth });
+        let instance = InstanceDesc { object: id, world_from_object: Placement::Moving(motion) };
+        match self.open_object {
+            None => self.scene.instances.push(instance),
+            Some(open) => {
+                let slot = &mut self.objects[open.0 as usize];
+                slot.object.as_mut().expect("it is open").instances.push(instance);
+            }
+        }
     }
 
     /// Puts a shape into the object that is open, else into the world. `leaves` and `depth` are those of a CSG.

@@ -16,7 +16,7 @@ use super::lexer::{Lexer, Token, TokenKind, parse_number, says_infinity};
 use super::params::{Param, Params, Type, Values, Wants};
 use super::source::{AtSpot, Fault, Result, Spot};
 use super::state::{EntityKind, Scope, ScopeKind, State};
-use crate::diagnostic::quoted;
+use crate::diagnostic::{number, quoted};
 use crate::{Diagnostic, FormatError, Input};
 
 /// Where a directive may stand.
@@ -465,7 +465,15 @@ impl<'b, 'd> Parser<'b, 'd> {
                 };
                 Ok(())
             }
-            "TransformTimes" => self.numbers::<2>("TransformTimes").map(drop),
+            "TransformTimes" => {
+                let [start, end] = self.numbers::<2>("TransformTimes")?;
+                if start >= end {
+                    let wrong = Diagnostic::error("the motion ends before it starts").found(number(end));
+                    return Err(spot.wrong(wrong.expected(format!("more than {}", number(start)))));
+                }
+                self.converter.transform_times = [start, end];
+                Ok(())
+            }
             "ColorSpace" => {
                 let (name, at) = self.string("ColorSpace", "a name in quotes")?;
                 self.state.space = ColourSpace::from_name(&name).ok_or_else(|| {
@@ -482,11 +490,10 @@ impl<'b, 'd> Parser<'b, 'd> {
             "Option" => self.option(),
             "Camera" => {
                 let (ty, params) = self.entity("Camera", "camera", None, spot)?;
-                self.animated(spot, "camera");
                 let camera_from_world = self.state.ctm;
                 let world_from_camera = camera_from_world.map(|t| t.inverse());
                 self.coordinate_systems.insert("camera".to_owned(), world_from_camera);
-                self.converter.camera(&ty, params, world_from_camera[0])
+                self.converter.camera(&ty, params, &world_from_camera)
             }
             "Film" => {
                 let (ty, params) = self.entity("Film", "film", None, spot)?;
@@ -544,12 +551,10 @@ impl<'b, 'd> Parser<'b, 'd> {
             }
             "ObjectInstance" => {
                 let (name, at) = self.string("ObjectInstance", "a name in quotes")?;
-                self.animated(spot, "instance");
-                self.converter.instance(&name, spot, at, self.state.ctm[0])
+                self.converter.instance(&name, spot, at, &self.state.ctm)
             }
             "Shape" => {
                 let (ty, params) = self.entity("Shape", "shape", Some(EntityKind::Shape), spot)?;
-                self.animated(spot, "shape");
                 self.converter.shape(&ty, params, &self.state)
             }
             "Material" => {
@@ -577,7 +582,7 @@ impl<'b, 'd> Parser<'b, 'd> {
             }
             "LightSource" => {
                 let (ty, params) = self.entity("LightSource", "light", Some(EntityKind::Light), spot)?;
-                self.animated(spot, "light");
+                self.light_stays(spot);
                 self.converter.light(&ty, params, &self.state)
             }
             "AreaLightSource" => {
@@ -669,10 +674,10 @@ impl<'b, 'd> Parser<'b, 'd> {
         self.transform(spot, camera_from_world, "LookAt")
     }
 
-    /// Says that motion is not rendered, where there is some.
-    fn animated(&mut self, spot: Spot, what: &str) {
+    /// Says that a light which is no shape does not move, where it should.
+    fn light_stays(&mut self, spot: Spot) {
         if self.state.ctm[0] != self.state.ctm[1] {
-            let message = format!("motion is not rendered: this {what} stays where it starts");
+            let message = "the motion of this light is left out: it stays where it starts";
             self.converter.warn(spot, Diagnostic::warning(message));
         }
     }

@@ -14,7 +14,7 @@ use crate::Diagnostic;
 use crate::diagnostic::{number, quoted};
 
 impl Converter<'_, '_> {
-    pub fn camera(&mut self, ty: &str, params: Params, world_from_camera: Transform) -> Result<()> {
+    pub fn camera(&mut self, ty: &str, params: Params, world_from_camera: &[Transform; 2]) -> Result<()> {
         let spot = params.spot;
         let shutter_open = params.float("shutteropen", 0.0)?;
         let shutter_close = params.float("shutterclose", 1.0)?;
@@ -85,10 +85,12 @@ impl Converter<'_, '_> {
             }
         };
         self.done(&params);
+        let motion = self.motion(spot, world_from_camera, "camera");
         self.scene.cameras = vec![Camera {
             name: None,
             kind,
-            world_from_camera,
+            world_from_camera: motion.as_ref().map_or(world_from_camera[0], |motion| motion.at(shutter_open)),
+            motion,
             frame_aspect,
             screen_window,
             shutter_open,
@@ -412,6 +414,7 @@ impl Converter<'_, '_> {
                 name: None,
                 kind: CameraKind::Perspective { fov: 90.0, lens_radius: 0.0, focal_distance: 1e6 },
                 world_from_camera: Transform::IDENTITY,
+                motion: None,
                 frame_aspect: None,
                 screen_window: None,
                 shutter_open: 0.0,

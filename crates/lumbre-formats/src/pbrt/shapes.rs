@@ -98,7 +98,10 @@ impl Converter<'_, '_> {
             area_light,
             alpha,
         };
-        self.push_shape(shape, form.leaves, form.depth);
+        match self.motion(spot, &state.ctm, "shape") {
+            None => self.push_shape(shape, form.leaves, form.depth),
+            Some(motion) => self.push_moving(shape, form.leaves, form.depth, motion, spot),
+        }
         Ok(())
     }
 
@@ -298,6 +301,11 @@ impl Converter<'_, '_> {
             };
             if id == self.open_object {
                 return Err(at.error(format!("object {} is an operand of a csg inside it", quoted(name))));
+            }
+            if !object.instances.is_empty() {
+                let message =
+                    format!("object {} has a shape that moves: it is no operand of a csg", quoted(name));
+                return Err(at.error(message));
             }
             if object.shapes.is_empty() {
                 return Err(

@@ -74,6 +74,7 @@ pub fn look(from: DVec3, at: DVec3, fov: f64) -> Camera {
         name: None,
         kind: CameraKind::Perspective { fov, lens_radius: 0.0, focal_distance: 1.0 },
         world_from_camera: Transform::from_affine(DAffine3::from_mat3_translation(matrix, from)).unwrap(),
+        motion: None,
         frame_aspect: None,
         screen_window: None,
         shutter_open: 0.0,

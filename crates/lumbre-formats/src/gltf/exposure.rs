@@ -1,0 +1,112 @@
+//! What nodes do while the shutter is open.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use lumbre_math::{AnimatedTransform, DAffine3, SingularTransform, Transform};
+
+use super::file::{File, List};
+use super::graph::Graph;
+use super::json::Read;
+use super::{GltfOptions, animation};
+
+/// Ways from one moment to the next while the shutter is open: between two, a node turns by less than half a turn, or it is
+/// taken to turn the other way.
+const STEPS: usize = 16;
+
+/// The nodes at some moments, from when the shutter opens, at time 0, to when it closes, at time 1.
+pub(super) struct Exposure<'f> {
+    file: &'f File<'f>,
+    /// None for an exposure of no time.
+    moments: Vec<Moment<'f>>,
+}
+
+struct Moment<'f> {
+    time: f64,
+    graph: Graph<'f>,
+    known: HashMap<usize, DAffine3>,
+}
+
+impl<'f> Exposure<'f> {
+    pub fn read(file: &'f File<'f>, options: &GltfOptions) -> Read<Self> {
+        let mut moments = vec![];
+        if let Some(middle) = options.frame
+            && options.shutter > 0.0
+            && !file.list(List::Animations).is_empty()
+        {
+            for step in 0..=STEPS {
+                let time = step as f64 / STEPS as f64;
+                let moved = animation::at(file, middle + (time - 0.5) * options.shutter)?;
+                moments.push(Moment { time, graph: Graph::read(file, moved)?, known: HashMap::new() });
+            }
+        }
+        Ok(Self { file, moments })
+    }
+
+    /// Where a node stands at each moment.
+    fn worlds(&mut self, node: usize) -> Read<Vec<(f64, DAffine3)>> {
+        let world = |moment: &mut Moment<'_>| Ok((moment.time, moment.graph.world(node, &mut moment.known)?));
+        self.moments.iter_mut().map(world).collect()
+    }
+
+    /// Whether a node moves.
+    pub fn moves(&mut self, node: usize) -> Read<bool> {
+        let worlds = self.worlds(node)?;
+        Ok(worlds.iter().any(|(_, world)| *world != worlds[0].1))
+    }
+
+    /// Whether the mesh of a node changes its form: by its morph targets, or by the joints of its skin.
+    pub fn deforms(&mut self, node: usize, skin: Option<usize>) -> Read<bool> {
+        let weights = |moment: &Moment<'_>| moment.graph.moved(node).and_then(|moved| moved.weights.clone());
+        if self.moments.iter().any(|moment| weights(moment) != weights(&self.moments[0])) {
+            return Ok(true);
+        }
+        let Some(skin) = skin else { return Ok(false) };
+        for name in self.file.list(List::Skins)[skin].need("joints")?.array()? {
+            let (joint, _) = self.file.at(List::Nodes, name)?;
+            if self.moves(joint)? {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// The motion of what stands at `place` when the node stands in the world somewhere; `None` where nothing moves.
+    pub fn motion(
+        &mut self,
+        node: usize,
+        place: impl Fn(&DAffine3) -> Result<Transform, SingularTransform>,
+    ) -> Read<Option<Arc<AnimatedTransform>>> {
+        if !self.moves(node)? {
+            return Ok(None);
+        }
+        let worlds = self.worlds(node)?;
+        let keys: Result<Vec<_>, _> = worlds.iter().map(|(time, world)| Ok((*time, place(world)?))).collect();
+        let motion = keys.map_err(|error: SingularTransform| error.to_string());
+        let motion = motion.and_then(|keys| simplest(keys).map_err(|error| error.to_string()));
+        match motion {
+            Ok(motion) => Ok(Some(Arc::new(motion))),
+            Err(error) => {
+                let value = self.file.list(List::Nodes)[node];
+                self.file.warn(value, &format!("the motion of a node was left out: {error}"));
+                Ok(None)
+            }
+        }
+    }
+}
+
+/// The motion through all keys; through the first and the last alone where that passes the others.
+fn simplest(keys: Vec<(f64, Transform)>) -> Result<AnimatedTransform, lumbre_math::AnimationError> {
+    let largest = |map: DAffine3| map.to_cols_array().into_iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    let size = keys.iter().fold(0.0, |most: f64, (_, map)| most.max(largest(*map.affine())));
+    let ends = AnimatedTransform::new(vec![keys[0], keys[keys.len() - 1]]);
+    let passes = |ends: &AnimatedTransform, time: f64, map: &Transform| {
+        let (a, b) = (*ends.at(time).affine(), *map.affine());
+        let apart = DAffine3 { matrix3: a.matrix3 - b.matrix3, translation: a.translation - b.translation };
+        largest(apart) <= 1e-6 * size
+    };
+    match ends {
+        Ok(ends) if keys.iter().all(|(time, map)| passes(&ends, *time, map)) => Ok(ends),
+        _ => AnimatedTransform::new(keys),
+    }
+}

@@ -1,0 +1,69 @@
+//! Light from a shape in an object that is placed once: sampled where it is at the time of the ray.
+
+use lumbre_geometry::{Ray, Surface};
+use lumbre_kernel::Placement;
+use lumbre_math::{DVec2, DVec3, Transform};
+use lumbre_shading::Scatter;
+
+use super::{Light, LightPoint, LightSample};
+use crate::surface::SurfaceEntry;
+
+/// A light in the space of an object, and where that object is.
+#[derive(Clone, Debug)]
+pub struct PlacedLight {
+    light: Box<Light>,
+    placement: Placement,
+}
+
+impl PlacedLight {
+    pub(crate) fn new(light: Light, placement: Placement) -> Self {
+        Self { light: Box::new(light), placement }
+    }
+
+    pub(crate) fn power(&self) -> f64 {
+        match &*self.light {
+            Light::Shape(light) => light.power,
+            Light::Mesh(light) => light.power,
+            _ => 0.0,
+        }
+    }
+
+    pub(super) fn sample(
+        &self,
+        entries: &[SurfaceEntry],
+        from: DVec3,
+        time: f64,
+        u: DVec2,
+    ) -> Option<LightSample> {
+        let map = self.placement.at(time);
+        let mut sample = self.light.sample(entries, map.inverse_point(from), time, u)?;
+        let end = sample.end?;
+        let point = map.point(end.point);
+        sample.towards = (point - from).try_normalize()?;
+        sample.end = Some(LightPoint {
+            point,
+            error: map.point_error(end.point, end.error),
+            normal: map.normal(end.normal).normalize_or_zero(),
+        });
+        let grown = growth(&map, sample.towards);
+        match &mut sample.scatter {
+            Scatter::Density(pdf) => *pdf *= grown as f32,
+            Scatter::Delta => sample.radiance *= (1.0 / grown) as f32,
+        }
+        Some(sample)
+    }
+
+    /// `surface` is in the space of the object.
+    pub(super) fn pdf(&self, ray: &Ray, surface: (&Surface, u32)) -> f64 {
+        let map = self.placement.at(ray.time);
+        let inner = ray.into_object(&map);
+        let inner = Ray { direction: inner.direction.normalize(), ..inner };
+        self.light.pdf(&inner, Some(surface)) * growth(&map, ray.direction)
+    }
+}
+
+/// By how much a solid angle about a unit direction of the world grows on its way into the object: |det L⁻¹| / |L⁻¹ d|³, for the
+/// cone over a small area |d|² dω at distance |d| keeps its volume up to the determinant.
+fn growth(map: &Transform, direction: DVec3) -> f64 {
+    1.0 / (map.determinant().abs() * map.inverse_vector(direction).length().powi(3))
+}
