@@ -7,6 +7,7 @@ use lumbre_math::{DVec3, Transform};
 /// The direction need not be unit, and `t` is in units of its length; its length may be anything whose square is a number,
 /// from about 1e-150 to 1e150. A NaN anywhere, or a direction of zero, makes every query a miss.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
 pub struct Ray {
     /// Where `t` is 0.
     pub origin: DVec3,

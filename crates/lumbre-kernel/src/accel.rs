@@ -8,10 +8,11 @@ use lumbre_geometry::{Aabb, Ray, Surface};
 use lumbre_math::{DVec3, Transform};
 
 use crate::collapse::{Entry, Packed};
-use crate::holds::Holds;
+use crate::holds::{Holds, SingleStart};
 use crate::lanes::Level;
 use crate::node::{Units, tag};
 use crate::query::{All, Any, Batch, Closest, Count, If};
+use crate::single::{self, Nearest, Outcome, Whether};
 use crate::winding::{self, Moments};
 use crate::{
     ClosestPoint, Geometry, GeometryKind, Hit, LoadError, NoClosestPoint, NoWindingNumber, QueryOptions,
@@ -33,6 +34,8 @@ pub struct Accel {
     pub(crate) primitives: usize,
     pub(crate) level: Level,
     pub(crate) holds: Holds,
+    /// Where single precision can search the tree.
+    pub(crate) single: Option<SingleStart>,
     /// What a ray cost after the build, once that was asked for.
     pub(crate) built_cost: Option<f64>,
     // One for each geometry, or none.
@@ -169,6 +172,16 @@ impl Accel {
 
     #[inline(always)]
     pub(crate) fn closest_at(&self, level: Level, ray: &Ray) -> Option<Hit> {
+        if let Some(start) = &self.single
+            && let Outcome::Settled(hit) = single::search::<Nearest>(level, self, start, ray)
+        {
+            return hit;
+        }
+        self.closest_plainly_at(level, ray)
+    }
+
+    /// The same by the search that knows no other precision than double.
+    pub(crate) fn closest_plainly_at(&self, level: Level, ray: &Ray) -> Option<Hit> {
         let mut search = Closest::new(ray, All);
         traverse::search(level, self, ray, &mut search);
         search.take_hit()
@@ -221,8 +234,8 @@ impl Accel {
 
     pub(crate) fn closest_batch_at(&self, level: Level, rays: &[Ray], hits: &mut [Option<Hit>]) {
         assert_eq!(rays.len(), hits.len(), "a place for the hit of every ray");
-        let begin = |ray: &Ray| Closest::new(ray, All);
-        batch::search_all(level, self, rays, begin, |i, search| hits[i] = search.take_hit());
+        let plainly = |ray: &Ray| self.closest_plainly_at(level, ray);
+        batch::search_all::<Nearest>(level, self, rays, plainly, |i, hit| hits[i] = hit);
     }
 
     /// [`Accel::any`] for every ray: see [`Accel::closest_batch`].
@@ -235,8 +248,8 @@ impl Accel {
 
     pub(crate) fn any_batch_at(&self, level: Level, rays: &[Ray], hits: &mut [bool]) {
         assert_eq!(rays.len(), hits.len(), "a place for the answer of every ray");
-        let begin = |ray: &Ray| Any::new(ray, All);
-        batch::search_all(level, self, rays, begin, |i, search| hits[i] = search.is_hit);
+        let plainly = |ray: &Ray| self.any_plainly_at(level, ray);
+        batch::search_all::<Whether>(level, self, rays, plainly, |i, is_hit| hits[i] = is_hit);
     }
 
     /// The nearest hit that `accept` takes; it may be asked in any order of `t`, and its answer must depend on the hit
@@ -254,6 +267,16 @@ impl Accel {
 
     #[inline(always)]
     pub(crate) fn any_at(&self, level: Level, ray: &Ray) -> bool {
+        if let Some(start) = &self.single
+            && let Outcome::Settled(is_hit) = single::search::<Whether>(level, self, start, ray)
+        {
+            return is_hit;
+        }
+        self.any_plainly_at(level, ray)
+    }
+
+    /// The same by the search that knows no other precision than double.
+    pub(crate) fn any_plainly_at(&self, level: Level, ray: &Ray) -> bool {
         let mut search = Any::new(ray, All);
         traverse::search(level, self, ray, &mut search);
         search.is_hit

@@ -6,122 +6,112 @@
 use lumbre_geometry::Ray;
 
 use crate::Accel;
+use crate::holds::SingleStart;
 use crate::lanes::{Lanes, Level, Task};
-use crate::node::BoxRay;
+use crate::single::{Goal, Outcome, SingleRay, Step};
 use crate::stack::{Order, Stack};
-use crate::touch::{self, Touch};
-use crate::traverse::{self, Frame, Place, Search, Step};
 
-/// Rays in flight on a thread. Of 4, 6, 8 and 12, this is the best for closest hits, by 8 to 13 %, on meshes of 67 thousand to
-/// a million triangles, and within 2 % of the best for any hit (`cargo xtask bench kernel --batches`).
+/// Rays in flight on a thread.
 const IN_FLIGHT: usize = 6;
 
-/// Searches along every ray: `begin` makes a search, `end` takes it with the position of its ray, in any order.
-pub(crate) fn search_all<'a, S: Search<'a>>(
+/// Searches along every ray. `end` takes an answer with the position of its ray, in any order; what `plainly` answers is for
+/// rays that single precision cannot settle.
+pub(crate) fn search_all<G: Goal>(
     level: Level,
-    accel: &'a Accel,
+    accel: &Accel,
     rays: &[Ray],
-    begin: impl Fn(&Ray) -> S,
-    mut end: impl FnMut(usize, &mut S),
+    plainly: impl Fn(&Ray) -> G::Answer,
+    mut end: impl FnMut(usize, G::Answer),
 ) {
-    if accel.holds.only_triangles {
-        level.run(Flights { level, accel, rays, begin, end });
+    if let Some(start) = &accel.single {
+        level.run(Flights::<G, _, _> { accel, start, rays, plainly, end, goal: std::marker::PhantomData });
     } else {
-        for (position, ray) in rays.iter().enumerate() {
-            let mut search = begin(ray);
-            traverse::search(level, accel, ray, &mut search);
-            end(position, &mut search);
-        }
+        rays.iter().enumerate().for_each(|(position, ray)| end(position, plainly(ray)));
     }
 }
 
 /// A ray under way.
-struct Flight<'a, 'r, S: Search<'a>, L> {
+struct Flight<'a, 'r, G: Goal, L> {
     position: usize,
+    ray: &'r Ray,
     reference: u32,
-    frame: Frame<'a, &'r Ray, L>,
-    search: S,
-    touches: Vec<Touch<'a>>,
-    stack: Stack<<S::Order as Order>::Entry>,
+    single: SingleRay<'a, L>,
+    stack: Stack<<G::Order as Order>::Entry>,
 }
 
-/// All the rays, in a tree of nothing but triangles.
-struct Flights<'a, 'r, B, E> {
-    level: Level,
+/// All the rays.
+struct Flights<'a, 'r, G, P, E> {
     accel: &'a Accel,
+    start: &'a SingleStart,
     rays: &'r [Ray],
-    begin: B,
+    plainly: P,
     end: E,
+    goal: std::marker::PhantomData<G>,
 }
 
-impl<'a, S, B, E> Task for Flights<'a, '_, B, E>
+impl<G, P, E> Task for Flights<'_, '_, G, P, E>
 where
-    S: Search<'a>,
-    B: Fn(&Ray) -> S,
-    E: FnMut(usize, &mut S),
+    G: Goal,
+    P: Fn(&Ray) -> G::Answer,
+    E: FnMut(usize, G::Answer),
 {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        let Self { level, accel, rays, begin, mut end } = self;
-        let place = Place::default();
+        let Self { accel, start, rays, plainly, mut end, .. } = self;
         let mut waiting = rays.iter().enumerate();
-        let mut flights: Vec<Flight<S, L>> = Vec::with_capacity(IN_FLIGHT);
-        let Some(root) = accel.tree.root else {
-            waiting.for_each(|(position, ray)| end(position, &mut begin(ray)));
-            return;
-        };
-        // As many as there is room for; those that pass the tree by end at once.
+        let mut flights: Vec<Flight<G, L>> = Vec::with_capacity(IN_FLIGHT);
         while flights.len() < IN_FLIGHT
             && let Some((position, ray)) = waiting.next()
         {
-            let mut search = begin(ray);
-            let mut boxes = BoxRay::passing_all();
-            if !traverse::start::<L, S>(accel, ray, &search, &mut boxes) {
-                end(position, &mut search);
-                continue;
+            match SingleRay::start(accel, start, ray) {
+                Some(single) => {
+                    flights.push(Flight {
+                        position,
+                        ray,
+                        reference: start.root,
+                        single,
+                        stack: Stack::new(),
+                    });
+                }
+                None => end(position, plainly(ray)),
             }
-            let frame = Frame::new(accel, ray, boxes, &search);
-            let (touches, stack) = (Vec::new(), Stack::new());
-            flights.push(Flight { position, reference: root, frame, search, touches, stack });
         }
         // Those that are under way stand first.
         let mut count = flights.len();
         while count > 0 {
             let mut turn = 0;
             while turn < count {
-                let Flight { position, reference, frame, search, touches, stack } = &mut flights[turn];
-                let step = frame.step(*reference, &place, stack, search, touches);
+                let Flight { position, ray, reference, single, stack } = &mut flights[turn];
+                let step = G::step(single, *reference, ray, stack);
                 if let Step::On(next) = step {
                     *reference = next;
-                    frame.fetch(next);
+                    single.fetch(next);
                     turn += 1;
                     continue;
                 }
-                if !touches.is_empty() {
-                    if step == Step::Out {
-                        touch::offer_borders(level, accel, frame.ray, touches, search);
-                    }
-                    touches.clear();
-                }
-                // The next that meets the tree takes its place, where it stands.
-                stack.clear();
-                *reference = root;
-                let next = loop {
+                let answer = match G::answer(single, ray, step) {
+                    Outcome::Settled(answer) => answer,
+                    Outcome::Unsettled => plainly(ray),
+                };
+                end(*position, answer);
+                // The next takes its place, where it stands.
+                let started = loop {
                     let Some((next, ray)) = waiting.next() else { break None };
-                    end(*position, search);
-                    (*position, *search) = (next, begin(ray));
-                    if frame.restart(ray, search) {
-                        break Some(next);
+                    match SingleRay::start(accel, start, ray) {
+                        Some(single) => break Some((next, ray, single)),
+                        None => end(next, plainly(ray)),
                     }
                 };
-                if next.is_none() {
+                if let Some((next, next_ray, next_single)) = started {
+                    (*position, *ray, *reference, *single) = (next, next_ray, start.root, next_single);
+                    stack.clear();
+                } else {
                     count -= 1;
                     flights.swap(turn, count);
                 }
             }
         }
-        flights.iter_mut().for_each(|flight| end(flight.position, &mut flight.search));
     }
 }

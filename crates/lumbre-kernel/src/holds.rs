@@ -2,6 +2,7 @@
 
 use lumbre_math::DVec3;
 
+use crate::node::Units;
 use crate::{Geometry, GeometryKind};
 
 /// What is known of all the geometries of a tree.
@@ -46,5 +47,58 @@ impl Holds {
             first_origin,
             largest_corner,
         }
+    }
+}
+
+/// What a ray from nearby needs to start in single precision, in a tree of nothing but triangles whose corners are relative to
+/// one origin.
+#[derive(Clone, Debug)]
+pub(crate) struct SingleStart {
+    /// Of the tree.
+    pub(crate) root: u32,
+    /// What the tree's boxes are relative to, and a zero.
+    pub(crate) tree_origin: [f64; 4],
+    /// What the corners are relative to, and a zero.
+    pub(crate) mesh_origin: [f64; 4],
+    /// Tree units per unit of space.
+    pub(crate) scale: f64,
+    /// How far from zero a ray may start on each axis, in tree units.
+    pub(crate) farthest: [f32; 4],
+    /// By how much planes are moved, and by how much more for each unit of the ray's start.
+    pub(crate) margin: f32,
+    pub(crate) margin_per_distance: f32,
+    /// The scale, and its inverse.
+    pub(crate) units_per_space: f32,
+    pub(crate) space_per_unit: f32,
+    /// No corner has a larger coordinate.
+    pub(crate) largest_corner: f32,
+}
+
+impl SingleStart {
+    /// `None` where the tree holds anything else, or is so small, so large or so far from its origin that single precision would
+    /// overflow, underflow or tell nothing.
+    pub(crate) fn new(holds: &Holds, units: &Units, root: Option<u32>) -> Option<Self> {
+        let two_to = |exponent: i32| 2.0f64.powi(exponent);
+        let shift = (units.origin - holds.first_origin).abs().max_element();
+        let reach = units.near / units.scale + shift + f64::from(holds.largest_corner);
+        let is_fit = holds.only_triangles
+            && holds.has_one_origin
+            && units.near > 0.0
+            && (two_to(-60)..=two_to(60)).contains(&units.scale)
+            && f64::from(holds.largest_corner) > two_to(-39)
+            && reach < two_to(59);
+        let padded = |v: DVec3, last: f64| [v.x, v.y, v.z, last];
+        root.filter(|_| is_fit).map(|root| Self {
+            root,
+            tree_origin: padded(units.origin, 0.0),
+            mesh_origin: padded(holds.first_origin, 0.0),
+            scale: units.scale,
+            farthest: [units.near as f32; 4],
+            margin: units.single_margin(),
+            margin_per_distance: Units::SINGLE_MARGIN_PER_DISTANCE,
+            units_per_space: units.scale as f32,
+            space_per_unit: (1.0 / units.scale) as f32,
+            largest_corner: holds.largest_corner,
+        })
     }
 }

@@ -23,6 +23,7 @@ mod query;
 mod refit;
 mod reinsert;
 mod save;
+mod single;
 mod sphere_search;
 mod spheres;
 mod stack;

@@ -21,6 +21,10 @@
 //! product, one `u|R||p|` more. So `e = |R| (4u (1.01 + |o|) + slop)` makes `near` no greater than the hit's `s`. The same
 //! holds mirrored for the far planes, and for R < 0 with the planes exchanged.
 //!
+//! A ray may also be rounded before: `o`, `d` and `R` in single precision are off by `u|o|`, `u|d|` and a little more than `2u|R|`.
+//! Then `p r` is off by `2.01u|R||p|`, `o r` by `3.1u|R||o|`, and three roundings (one of a separate product among them, for each of
+//! the two) add `2u|R||p| + 3u|R||o|` and what is small beside it: `e = |R| (8u (1.01 + |o|) + slop)` has room for all of it.
+//!
 //! A component below 2⁻⁶⁰ of the least that the largest may be (zeros of both signs among them) is replaced by that
 //! bound: a hit lies within |s d| ≤ 20 + 12 slop on the largest axis, where that moves the line by less than
 //! 2⁻⁵⁴ (1 + slop), which `slop` covers as well. So there is no division by zero, no 0·∞, and no NaN. Where the scaling
@@ -152,7 +156,19 @@ impl Units {
     pub(crate) fn slop_of(&self, point: DVec3) -> f64 {
         slop(self.condition, (point.abs() + self.origin.abs()).max_element() * self.scale + 1.0)
     }
+
+    /// Of rays that were rounded before: by how much planes are moved, and by how much more for each unit of the ray's start.
+    pub(crate) fn single_margin(&self) -> f32 {
+        let slop = self.near_margin - 4.0 * ROUNDOFF * LARGEST_PLANE;
+        round_up(8.0 * ROUNDOFF * LARGEST_PLANE + slop)
+    }
+
+    pub(crate) const SINGLE_MARGIN_PER_DISTANCE: f32 = (8.0 * ROUNDOFF) as f32;
 }
+
+/// What moves the ends of a rounded range outwards, together with a little at the far one.
+pub(crate) const START_FACTOR: f32 = 1.0 - 4.0 * ROUNDOFF as f32;
+pub(crate) const END_FACTOR: f32 = 1.0 + 4.0 * ROUNDOFF as f32;
 
 const NEAR: f64 = 16.0;
 /// Of rays from nearby: the bounds on the largest component of the direction, in tree units.
@@ -171,16 +187,22 @@ fn slop(condition: f64, reach: f64) -> f64 {
 
 /// A ray in tree units, ready for the boxes.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct BoxRay {
+pub(crate) struct Slabs {
     // The last of four means nothing.
     pub(crate) inverse: [f32; 4],
     pub(crate) near_offset: [f32; 4],
     pub(crate) far_offset: [f32; 4],
     /// The planes that are met first.
-    pub(crate) sides: Sides,
+    pub(crate) sides: &'static Sides,
     /// Never negative.
     pub(crate) s_min: f32,
     pub(crate) s_max: f32,
+}
+
+/// The same, and how to go on with its range.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BoxRay {
+    pub(crate) slabs: Slabs,
     pub(crate) progress: Progress,
 }
 
@@ -214,8 +236,8 @@ impl BoxRay {
     #[inline(always)]
     pub(crate) fn set_range_nearby(&mut self, t_min: f64, t_max: f64) {
         self.progress = Progress { s_per_t: 1.0, s_at_zero: 0.0 };
-        self.s_min = self.progress.down(t_min);
-        self.s_max = self.progress.up(t_max);
+        self.slabs.s_min = self.progress.down(t_min);
+        self.slabs.s_max = self.progress.up(t_max);
     }
 
     /// Makes it the ray from `t_min` to `t_max` for a tree in these units, from wherever; false where it passes by the tree
@@ -259,8 +281,8 @@ impl BoxRay {
         let margin = 4.0 * ROUNDOFF * LARGEST_PLANE + slop;
         self.set_slabs(start.to_array(), direction.to_array(), TINY_DIRECTION, 4.0 * ROUNDOFF, margin);
         self.progress = Progress { s_per_t, s_at_zero: back - to_middle };
-        self.s_min = self.progress.down(t_min);
-        self.s_max = self.progress.up(t_max);
+        self.slabs.s_min = self.progress.down(t_min);
+        self.slabs.s_max = self.progress.up(t_max);
         true
     }
 
@@ -268,15 +290,15 @@ impl BoxRay {
     pub(crate) fn passing_all() -> Self {
         // Less than f32::MAX times the inverse, so that missing children stay missed.
         let far = f32::MAX * f32::EPSILON;
-        Self {
+        let slabs = Slabs {
             inverse: [1.0; 4],
             near_offset: [-far; 4],
             far_offset: [far; 4],
             sides: Sides::new(0),
             s_min: 0.0,
             s_max: f32::INFINITY,
-            progress: Progress { s_per_t: 1.0, s_at_zero: f64::INFINITY },
-        }
+        };
+        Self { slabs, progress: Progress { s_per_t: 1.0, s_at_zero: f64::INFINITY } }
     }
 
     /// Inverse direction, offsets and sides: see the proof. `margin` is 4u · 1.01 + slop.
@@ -296,17 +318,17 @@ impl BoxRay {
             let inverse = 1.0 / d;
             let center = -o * inverse;
             let margin = inverse.abs() * (margin_per_distance * o.abs() + margin);
-            self.inverse[axis] = inverse as f32;
-            self.near_offset[axis] = (center - margin) as f32;
-            self.far_offset[axis] = (center + margin) as f32;
+            self.slabs.inverse[axis] = inverse as f32;
+            self.slabs.near_offset[axis] = (center - margin) as f32;
+            self.slabs.far_offset[axis] = (center + margin) as f32;
             signs |= u32::from(d.is_sign_negative()) << axis;
         }
-        self.sides = Sides::new(signs);
+        self.slabs.sides = Sides::new(signs);
     }
 }
 
 /// A little that is neither zero nor subnormal as an f32.
-const LITTLE: f64 = 1.0 / (1u128 << 100) as f64;
+pub(crate) const LITTLE: f64 = 1.0 / (1u128 << 100) as f64;
 
 impl Progress {
     /// Where `t` is, or a little more; never negative. What rounding to single precision may take away was added before.

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::build::{binary_tree, fill};
 use crate::clouds::CloudSurvey;
 use crate::collapse::{Entry, Packed, pack};
-use crate::holds::Holds;
+use crate::holds::{Holds, SingleStart};
 use crate::lanes::Level;
 use crate::node::{Node, Units, tag};
 use crate::primitive::{Bounds, Kind, Primitive, Traits};
@@ -56,9 +56,11 @@ pub(crate) fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result
         let (binary, names) = binary_tree(level, options.preset, primitives, &traits);
         pack(&geometries, &traits, &binary, &names)?
     };
+    let holds = Holds::new(&geometries, parts.largest_corner, parts.sphere_reach);
     Ok(Accel {
+        single: SingleStart::new(&holds, &units, tree.root),
         units,
-        holds: Holds::new(&geometries, parts.largest_corner, parts.sphere_reach),
+        holds,
         tree,
         infinite: parts.infinite,
         bounds: parts.bounds,
@@ -76,6 +78,7 @@ pub(crate) fn empty_over(geometries: Vec<Geometry>) -> Accel {
     Accel {
         units: Units::new(DVec3::ZERO, 1.0, 0.0, 1.0),
         holds: Holds::new(&geometries, 0.0, 0.0),
+        single: None,
         tree: Packed::default(),
         infinite: Vec::new(),
         bounds: Aabb::EMPTY,

@@ -7,7 +7,7 @@ use lumbre_math::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use crate::clouds::box_of;
-use crate::holds::Holds;
+use crate::holds::{Holds, SingleStart};
 use crate::node::{Node, Units, WIDTH, tag};
 use crate::prepare::{Boxer, Parts, has_area, take_apart, units_of};
 use crate::primitive::Bounds;
@@ -173,6 +173,7 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts) -> Result<(), RefitError> {
     accel.holds = Holds::new(geometries, parts.largest_corner, parts.sphere_reach);
     accel.primitives = parts.boxed.len() + parts.triangles + parts.spheres + parts.infinite.len();
     accel.infinite = parts.infinite;
+    accel.single = SingleStart::new(&accel.holds, &units, accel.tree.root);
     accel.units = units;
     accel.bounds = parts.bounds;
     accel.moments = OnceLock::new();

@@ -146,7 +146,7 @@ impl<L: Lanes> Walk<'_, L> {
     fn descend<O: Order>(&self, mut reference: u32, stack: &mut Stack<O::Entry>) -> Option<u32> {
         while reference >> tag::SHIFT == tag::INNER {
             let node = &self.accel.tree.nodes[reference as usize];
-            let (mask, keys) = L::meet_boxes(node, &self.boxes);
+            let (mask, keys) = L::meet_boxes(node, &self.boxes.slabs);
             reference = if mask & mask.wrapping_sub(1) != 0 {
                 O::push_children::<L>(node, mask, keys, stack.with_room())
             } else if mask != 0 {
@@ -160,8 +160,8 @@ impl<L: Lanes> Walk<'_, L> {
 
     #[inline(always)]
     fn narrow(&mut self, limit: f64) {
-        self.boxes.s_max = self.boxes.progress.up(limit);
-        self.limit_key = self.boxes.s_max.to_bits() as i32 | LANE_BITS;
+        self.boxes.slabs.s_max = self.boxes.progress.up(limit);
+        self.limit_key = self.boxes.slabs.s_max.to_bits() as i32 | LANE_BITS;
     }
 }
 
@@ -177,7 +177,7 @@ impl<'a, S: Search<'a>> Task for AmongSpheres<'a, '_, S> {
         if !traverse::start::<L, S>(accel, ray, search, &mut boxes) {
             return false;
         }
-        let limit_key = boxes.s_max.to_bits() as i32 | LANE_BITS;
+        let limit_key = boxes.slabs.s_max.to_bits() as i32 | LANE_BITS;
         let mut walk = Walk::<L> { accel, boxes, limit_key, lanes: PhantomData };
         let mut turned = None;
         let place = Place::default();

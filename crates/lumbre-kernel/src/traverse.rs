@@ -12,7 +12,7 @@ use lumbre_math::DVec3;
 use smallvec::SmallVec;
 
 use crate::collapse::Entry;
-use crate::lanes::{self, LANE_BITS, Lanes, Level, Task};
+use crate::lanes::{LANE_BITS, Lanes, Level, Task};
 use crate::node::{BoxRay, tag};
 use crate::sphere_search::{self, AmongSpheres, CloudRay};
 use crate::spheres::ExactSphere;
@@ -160,17 +160,6 @@ pub(crate) fn all_touches<'a>(level: Level, accel: &'a Accel, ray: &Ray) -> Vec<
     touches
 }
 
-/// What is left of a search.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Step {
-    /// To go on from here.
-    On(u32),
-    /// Nothing: all was seen.
-    Out,
-    /// Nothing: it has enough.
-    Over,
-}
-
 /// A tree in progress, with the ray in its space.
 pub(crate) struct Frame<'a, R, L> {
     accel: &'a Accel,
@@ -191,14 +180,16 @@ struct MeshRay {
     shear: Shear,
     /// Relative to the mesh's.
     origin: [f64; 3],
-    blocks: BlockRay,
+    /// Where single precision tells anything.
+    blocks: Option<BlockRay>,
 }
 
 impl MeshRay {
     #[inline(always)]
-    fn new(shear: Shear, ray: &Ray, mesh_origin: &DVec3, largest_corner: f32) -> Self {
+    fn new(shear: Shear, ray: &Ray, mesh_origin: &DVec3, largest_corner: f32, range: [f64; 2]) -> Self {
         let origin = shear.local_origin(&ray.origin, mesh_origin);
-        Self { shear, origin, blocks: BlockRay::new(&shear, &origin, largest_corner) }
+        let blocks = BlockRay::new(&shear, &origin, largest_corner, range[0], range[1]);
+        Self { shear, origin, blocks }
     }
 }
 
@@ -220,12 +211,8 @@ pub(crate) fn start<'a, L: Lanes, S: Search<'a>>(
 #[inline(always)]
 fn mesh_ray<'a, S: Search<'a>>(accel: &Accel, ray: &Ray, search: &S) -> MeshRay {
     let shear = Shear::new(&ray.direction);
-    let mut mesh = MeshRay::new(shear, ray, &accel.holds.first_origin, accel.holds.largest_corner);
-    mesh.blocks.set_range(&mesh.shear, search.floor(), search.limit());
-    if S::ASK == Ask::Whether {
-        mesh.blocks.set_surely_in(&mesh.shear, search.floor(), search.limit());
-    }
-    mesh
+    let range = [search.floor(), search.limit()];
+    MeshRay::new(shear, ray, &accel.holds.first_origin, accel.holds.largest_corner, range)
 }
 
 impl<'a, R: Borrow<Ray>, L: Lanes> Frame<'a, R, L> {
@@ -233,52 +220,8 @@ impl<'a, R: Borrow<Ray>, L: Lanes> Frame<'a, R, L> {
     pub(crate) fn new<S: Search<'a>>(accel: &'a Accel, ray: R, boxes: BoxRay, search: &S) -> Self {
         let (limit, floor) = (search.limit(), search.floor());
         let mesh = mesh_ray(accel, ray.borrow(), search);
-        let limit_key = boxes.s_max.to_bits() as i32 | LANE_BITS;
+        let limit_key = boxes.slabs.s_max.to_bits() as i32 | LANE_BITS;
         Self { accel, ray, boxes, limit_key, limit, floor, mesh, clouds: None, lanes: PhantomData }
-    }
-
-    /// Turns to another ray in the same tree; false where that passes the tree by, or is not sound.
-    #[inline(always)]
-    pub(crate) fn restart<S: Search<'a>>(&mut self, ray: R, search: &S) -> bool {
-        let accel = self.accel;
-        if !start::<L, S>(accel, ray.borrow(), search, &mut self.boxes) {
-            return false;
-        }
-        (self.limit, self.floor) = (search.limit(), search.floor());
-        self.limit_key = self.boxes.s_max.to_bits() as i32 | LANE_BITS;
-        self.mesh = mesh_ray(accel, ray.borrow(), search);
-        self.clouds = None;
-        self.ray = ray;
-        true
-    }
-
-    /// Tests a node, or the triangles of a leaf.
-    #[inline(always)]
-    pub(crate) fn step<S: Search<'a>>(
-        &mut self,
-        reference: u32,
-        place: &Place,
-        stack: &mut Stack<<S::Order as Order>::Entry>,
-        search: &mut S,
-        touches: &mut Vec<Touch<'a>>,
-    ) -> Step {
-        if reference >> tag::SHIFT == tag::INNER {
-            return self.meet_node::<S::Order>(reference, stack).map_or(Step::Out, Step::On);
-        }
-        if meet_blocks(self, reference, place, search, touches) {
-            return Step::Over;
-        }
-        self.pop::<S::Order>(stack).map_or(Step::Out, Step::On)
-    }
-
-    /// Asks for what is read next, before it is needed.
-    #[inline(always)]
-    pub(crate) fn fetch(&self, reference: u32) {
-        if reference >> tag::SHIFT == tag::INNER {
-            self.accel.tree.nodes.get(reference as usize).map(lanes::fetch);
-        } else {
-            self.accel.tree.blocks.get(tag::blocks(reference).start).map(lanes::fetch);
-        }
     }
 
     /// Takes over what the search has found since.
@@ -287,9 +230,11 @@ impl<'a, R: Borrow<Ray>, L: Lanes> Frame<'a, R, L> {
         let limit = search.limit();
         if limit < self.limit {
             self.limit = limit;
-            self.boxes.s_max = self.boxes.progress.up(limit);
-            self.limit_key = self.boxes.s_max.to_bits() as i32 | LANE_BITS;
-            self.mesh.blocks.set_range(&self.mesh.shear, self.floor, limit);
+            self.boxes.slabs.s_max = self.boxes.progress.up(limit);
+            self.limit_key = self.boxes.slabs.s_max.to_bits() as i32 | LANE_BITS;
+            if let Some(blocks) = &mut self.mesh.blocks {
+                blocks.end_at(&self.mesh.shear, limit);
+            }
             if let Some(clouds) = &mut self.clouds {
                 clouds.set_range(self.floor, limit);
             }
@@ -302,9 +247,8 @@ impl<'a, R: Borrow<Ray>, L: Lanes> Frame<'a, R, L> {
         if !self.accel.holds.has_one_origin {
             let mesh_origin = self.accel.mesh_origin(self.accel.tree.names[block].geometry);
             let largest = self.accel.holds.largest_corner;
-            self.mesh = MeshRay::new(self.mesh.shear, self.ray.borrow(), &mesh_origin, largest);
-            self.mesh.blocks.set_range(&self.mesh.shear, self.floor, self.limit);
-            self.mesh.blocks.set_surely_in(&self.mesh.shear, self.floor, self.limit);
+            let range = [self.floor, self.limit];
+            self.mesh = MeshRay::new(self.mesh.shear, self.ray.borrow(), &mesh_origin, largest, range);
         }
     }
 
@@ -321,7 +265,7 @@ impl<'a, R: Borrow<Ray>, L: Lanes> Frame<'a, R, L> {
     #[inline(always)]
     fn meet_node<O: Order>(&self, reference: u32, stack: &mut Stack<O::Entry>) -> Option<u32> {
         let node = &self.accel.tree.nodes[reference as usize];
-        let (mask, keys) = L::meet_boxes(node, &self.boxes);
+        let (mask, keys) = L::meet_boxes(node, &self.boxes.slabs);
         if mask & mask.wrapping_sub(1) != 0 {
             Some(O::push_children::<L>(node, mask, keys, stack.with_room()))
         } else if mask != 0 {
@@ -523,15 +467,21 @@ fn meet_blocks<'a, R: Borrow<Ray>, L: Lanes, S: Search<'a>>(
     frame.turn_to(places.start);
     let mut number = places.start as u32;
     for block in &accel.tree.blocks[places] {
-        let (mut mask, sure) = match S::ASK {
-            Ask::Whether => L::meet_triangles::<true>(block, &frame.mesh.blocks),
-            // Here certainty does not pay: an earlier, looser end of the ray costs 5 % more than it saves.
-            Ask::First | Ask::Every | Ask::Nothing => L::meet_triangles::<false>(block, &frame.mesh.blocks),
+        let mut mask = if let Some(blocks) = &frame.mesh.blocks {
+            let (mask, edges) = L::meet_triangles(block, blocks);
+            if mask == 0 {
+                number += 1;
+                continue;
+            }
+            let crossings = L::place_crossings(&edges, blocks);
+            if S::ASK == Ask::Whether && crossings.sure & mask != 0 {
+                search.settle();
+                return true;
+            }
+            crossings.in_range & mask
+        } else {
+            (1 << BLOCK) - 1
         };
-        if S::ASK == Ask::Whether && sure != 0 {
-            search.settle();
-            return true;
-        }
         while mask != 0 {
             let lane = mask.trailing_zeros() as usize % BLOCK;
             mask &= mask - 1;

@@ -57,7 +57,7 @@ impl TriangleBlock {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Shear {
     /// The axes that become x, y and z; z is the direction's largest.
-    pub(crate) axes: Axes,
+    pub(crate) axes: &'static Axes,
     pub(crate) x: f64,
     pub(crate) y: f64,
     /// The direction's largest component.
@@ -102,97 +102,161 @@ impl Shear {
 ///
 /// Let L be the largest coordinate of a corner plus the largest of the ray's origin, both relative to the mesh, u = 2⁻²⁴,
 /// and take a sheared corner (x, y, z) as the test in double precision has it. Here z is wrong by 2uL: the origin is
-/// rounded, and so is the difference. x is wrong by 2uL from its own difference, 2uL from z, uL from the rounded shear (no
-/// more than 1), uL from the product, and 2uL from the last subtraction: 8uL, so that δ = 9uL also covers what is rounded in
-/// double precision. Where |x|, |y| ≤ m for the corners as computed, an edge function xy' - yx' is off by 4δm + 2δ² from
-/// them, and by 4.1um² from its own roundings; m < 2.01L makes the latter less than δm. With `error = 6δm + 3δ²`, which
-/// leaves room for its own roundings, an edge function that is not negative in double precision is not below `-error` here.
+/// rounded, and so is the difference. x is wrong by 2uL from its own difference, 2uL from z, 4.1uL from the shear (no more
+/// than 1, and the quotient of rounded numbers by way of a rounded inverse), uL from the product, and 2uL from the last
+/// subtraction: 11.1uL, so that δ = 12uL also covers what is rounded in double precision. Where |x|, |y| ≤ m for the corners
+/// as computed, an edge function xy' - yx' is off by 4δm + 2δ² from them, and by 4.1um² from its own roundings; m < 2.01L
+/// makes the latter less than δm. With `error = 6δm + 3δ²`, which leaves room for its own roundings, an edge function that
+/// is not negative in double precision is not below `-error` here.
 ///
-/// A hit in range has its z between those of the corners, up to 2⁻⁴⁰L in double precision and 2uL here; the ends of the
-/// range in z are moved by 6uL, of which their rounding takes 2uL (an end beyond 2L leaves everything in anyway).
+/// With edge functions wrong by eᵢ, the height z of a crossing is wrong by Σ eᵢ (zᵢ - z) / D, where D is their sum as
+/// computed: by no more than 3 `error` / |D| of the triangle's extent in z. Roundings add 7uL, those of the corners' z 2uL,
+/// and those of the extent up to 8uL, as long as no edge function is much larger than D; where D is so small that one may
+/// be, `error` / |D| is large. So `spread = 12.5 error / |D| (extent + z_error) + z_error` with `z_error` = 24uL has room for all
+/// of it; no number where D is zero, which counts as being in range.
 ///
 /// Where all edge functions are beyond 2 `error` on one side, those in double precision are beyond zero, so that the line does
-/// meet the triangle. Each of its weights, the shares of the edge functions in their sum D > 6 `error`, is then a little off,
-/// all together by no more than 12 `error` / D: so far does this move z, per unit of the triangle's extent in z. Roundings move
-/// it by 7uL more, those of the corners' z by 2uL, and those of the extent by up to 8uL: `z_error` = 24uL has room for all.
+/// meet the triangle; and where height ± spread lies between `surely_first` and `surely_last`, the hit is in range. The ends
+/// of the range are moved by 6uL, outwards or inwards, and by what their own rounding may be.
 ///
 /// All this without overflow or underflow that matters, so for 2⁻⁵⁰ ≤ L ≤ 2⁶⁰; else the test is left out, and below 2⁻⁴⁰
 /// nothing is certain.
+///
+/// Where two components of the direction are as good as equal, single and double precision may take another one for the last
+/// axis. The edge functions of both are the same but for a factor as good as 1 and double precision's own rounding.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BlockRay {
-    pub(crate) axes: Axes,
-    /// In the order of the axes.
-    pub(crate) origin: [f32; 3],
-    pub(crate) shear_x: f32,
-    pub(crate) shear_y: f32,
-    pub(crate) error_slope: f32,
-    pub(crate) error_least: f32,
-    /// Triangles wholly before this, or after the other, are out of range.
-    pub(crate) z_low: f32,
-    pub(crate) z_high: f32,
-    /// The direction's z is negative.
-    pub(crate) is_backward: bool,
-    /// A z between these, counted along the direction, is in range.
-    pub(crate) surely_in: [f32; 2],
-    pub(crate) z_error: f32,
-    /// Whether the test tells anything.
-    pub(crate) is_sharp: bool,
-    // 6uL.
-    z_margin: f64,
+    pub(crate) axes: &'static Axes,
+    /// Relative to the mesh, in the order of the axes; the last of four means nothing, here and below.
+    pub(crate) origin: [f32; 4],
+    /// The direction by its last component, in the order of the axes.
+    pub(crate) shear: [f32; 4],
+    pub(crate) errors: BlockErrors,
+    pub(crate) range: HeightRange,
+    /// A zero, negative where the last component of the direction is positive: what is behind a corner, with the sign flipped by
+    /// it, grows along the ray.
+    pub(crate) turn: f32,
+}
+
+/// How wrong single precision may be about a block.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub(crate) struct BlockErrors {
+    /// `error` by m, and without.
+    pub(crate) slope: f32,
+    pub(crate) least: f32,
+    /// 24uL.
+    pub(crate) height: f32,
+    /// 6uL.
+    pub(crate) margin: f32,
+}
+
+/// The range of a ray in heights.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub(crate) struct HeightRange {
+    /// Heights along the ray before this, or after the other, are out of range.
+    pub(crate) first: f32,
+    pub(crate) last: f32,
+    /// Those between these are in range.
+    pub(crate) surely_first: f32,
+    pub(crate) surely_last: f32,
+}
+
+/// 72u, 432u², 24u and 6u: the factors of L, L², L and L in [`BlockErrors`].
+pub(crate) const ERROR_FACTORS: [f32; 4] = {
+    let u = 1.0 / (1 << 24) as f32;
+    [72.0 * u, 432.0 * u * u, 24.0 * u, 6.0 * u]
+};
+/// Above all that few roundings may do.
+pub(crate) const ROUNDINGS: f32 = 6.0 / (1 << 24) as f32;
+/// No height that matters is larger, and a range may well end there.
+pub(crate) const FAR: f32 = (1u128 << 100) as f32;
+/// The bounds on L; below the third nothing is certain.
+const SMALLEST_REACH: f32 = 1.0 / (1u64 << 50) as f32;
+const LARGEST_REACH: f32 = (1u64 << 60) as f32;
+const SMALLEST_SURE_REACH: f32 = 1.0 / (1u64 << 40) as f32;
+
+impl BlockErrors {
+    /// Of this L.
+    #[inline(always)]
+    pub(crate) fn new(reach: f32) -> Self {
+        let [slope, least, height, margin] = ERROR_FACTORS;
+        Self {
+            slope: reach * slope,
+            least: reach * least * reach,
+            height: reach * height,
+            margin: reach * margin,
+        }
+    }
+}
+
+impl HeightRange {
+    /// Between heights that are products of few rounded numbers, `margin` apart from those that count.
+    #[inline(always)]
+    pub(crate) fn new(start: f32, end: f32, margin: f32) -> Self {
+        let within = |height: f32| if height < FAR { if height > -FAR { height } else { -FAR } } else { FAR };
+        let (start, end) = (within(start), within(end));
+        let (start_error, end_error) = (start.abs() * ROUNDINGS + margin, end.abs() * ROUNDINGS + margin);
+        Self {
+            first: start - start_error,
+            last: end + end_error,
+            surely_first: start + start_error,
+            surely_last: end - end_error,
+        }
+    }
 }
 
 impl BlockRay {
-    /// For L = 2⁻⁴⁰.
-    const LEAST_SURE_MARGIN: f64 = 6.0 / (1u128 << 64) as f64;
-
-    /// `origin` has the order of the shear's axes.
+    /// For the exact test's ray in a mesh whose largest coordinate is `largest_corner`; `origin` has the order of the axes.
+    /// `None` where it would tell nothing.
     #[inline(always)]
-    pub(crate) fn new(shear: &Shear, origin: &[f64; 3], largest_corner: f32) -> Self {
-        let largest = greater(greater(origin[0].abs(), origin[1].abs()), origin[2].abs());
-        let reach = largest + f64::from(largest_corner);
-        let u = 1.0 / (1u64 << 24) as f64;
-        let delta = 9.0 * u * reach;
-        Self {
+    pub(crate) fn new(
+        shear: &Shear,
+        origin: &[f64; 3],
+        largest_corner: f32,
+        t_min: f64,
+        t_max: f64,
+    ) -> Option<Self> {
+        let origin = [origin[0] as f32, origin[1] as f32, origin[2] as f32, 0.0];
+        let reach = larger(larger(origin[0].abs(), origin[1].abs()), origin[2].abs()) + largest_corner;
+        if !(SMALLEST_REACH..=LARGEST_REACH).contains(&reach) {
+            return None;
+        }
+        let errors = BlockErrors::new(reach);
+        let mut ray = Self {
             axes: shear.axes,
-            origin: [origin[0] as f32, origin[1] as f32, origin[2] as f32],
-            shear_x: shear.x as f32,
-            shear_y: shear.y as f32,
-            error_slope: (6.0 * delta) as f32,
-            error_least: (3.0 * delta * delta) as f32,
-            z_low: f32::NEG_INFINITY,
-            z_high: f32::INFINITY,
-            is_backward: shear.direction_z < 0.0,
-            surely_in: [f32::INFINITY, f32::NEG_INFINITY],
-            z_error: (24.0 * u * reach) as f32,
-            is_sharp: 1.0 / (1u64 << 50) as f64 <= reach && reach <= (1u64 << 60) as f64,
-            z_margin: 6.0 * u * reach,
+            origin,
+            shear: [shear.x as f32, shear.y as f32, 1.0, 0.0],
+            errors,
+            range: HeightRange::new(0.0, 0.0, 0.0),
+            turn: if shear.direction_z < 0.0 { 0.0 } else { -0.0 },
+        };
+        ray.set_range(shear, t_min, t_max);
+        if reach < SMALLEST_SURE_REACH || shear.direction_z.abs() < 1e-200 {
+            // A place in range may be none, for it is infinite.
+            (ray.range.surely_first, ray.range.surely_last) = (f32::INFINITY, f32::NEG_INFINITY);
         }
+        Some(ray)
     }
 
-    /// Leaves out what is wholly outside the range of `t`.
     #[inline(always)]
-    pub(crate) fn set_range(&mut self, shear: &Shear, t_min: f64, t_max: f64) {
-        let (start, end) = (t_min * shear.direction_z, t_max * shear.direction_z);
-        let (low, high) = if self.is_backward { (end, start) } else { (start, end) };
-        self.z_low = (low - self.z_margin) as f32;
-        self.z_high = (high + self.z_margin) as f32;
+    fn set_range(&mut self, shear: &Shear, t_min: f64, t_max: f64) {
+        let length = shear.direction_z.abs();
+        self.range = HeightRange::new((t_min * length) as f32, (t_max * length) as f32, self.errors.margin);
     }
 
-    /// Where a hit is certain.
+    /// Leaves out what lies beyond `t_max`.
     #[inline(always)]
-    pub(crate) fn set_surely_in(&mut self, shear: &Shear, t_min: f64, t_max: f64) {
-        let size = shear.direction_z.abs();
-        // Else a place in range may be none, for it is infinite, or the sum of edge functions may have no inverse.
-        if size > 1e-200 && self.z_margin > Self::LEAST_SURE_MARGIN {
-            let (first, last) = (t_min * size + self.z_margin, t_max * size - self.z_margin);
-            self.surely_in = [first as f32, last as f32];
-        }
+    pub(crate) fn end_at(&mut self, shear: &Shear, t_max: f64) {
+        let end = (t_max * shear.direction_z.abs()) as f32;
+        self.range.last = HeightRange::new(end, end, self.errors.margin).last;
     }
 }
 
-// One instruction, which f64::max is not.
+// One instruction, which f32::max is not.
 #[inline(always)]
-fn greater(a: f64, b: f64) -> f64 {
+fn larger(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 

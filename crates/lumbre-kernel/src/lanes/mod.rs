@@ -15,7 +15,8 @@ use std::mem::MaybeUninit;
 use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
 
-use crate::node::{BoxRay, Node, Units, WIDTH};
+use crate::holds::SingleStart;
+use crate::node::{BoxRay, Node, Slabs, Units, WIDTH};
 use crate::stack::STACK;
 use crate::triangles::{BLOCK, BlockRay, Inside, Passage, Shear, TriangleBlock};
 
@@ -27,13 +28,20 @@ pub(crate) use spheres::meet_spheres_at;
 pub(crate) trait Lanes: SphereLanes {
     /// Where the ray enters each of eight boxes, in an order of integers.
     type Keys: Copy;
+    /// Eight numbers.
+    type Floats: Copy;
+    /// How a line passes the edges of eight triangles.
+    type Edges: Copy;
 
     /// Makes `boxes` the ray from `t_min` to `t_max` for a tree in these units, if it is one from nearby, which it answers;
     /// also checks that it is sound.
     fn start_nearby(units: &Units, ray: &Ray, t_min: f64, t_max: f64, boxes: &mut BoxRay) -> bool;
 
+    /// The ray in single precision; `None` where it does not come from nearby, or is not sound.
+    fn start_single(start: &SingleStart, ray: &Ray) -> Option<Narrow>;
+
     /// One bit for each child whose box the ray meets, and where it enters.
-    fn meet_boxes(node: &Node, ray: &BoxRay) -> (u32, Self::Keys);
+    fn meet_boxes(node: &Node, ray: &Slabs) -> (u32, Self::Keys);
 
     /// The child of which `mask` has the bit: no more than one.
     fn only_child(node: &Node, mask: u32) -> u32;
@@ -46,12 +54,39 @@ pub(crate) trait Lanes: SphereLanes {
     /// last, which it answers. There must be room for eight.
     fn push_as_built(node: &Node, mask: u32, slots: &mut Slots<u32>) -> u32;
 
-    /// A bit for each triangle that the ray may hit within its range, among them all that it does; where `SURE`, also one for
-    /// each that it certainly hits, else none: see [`BlockRay`].
-    fn meet_triangles<const SURE: bool>(block: &TriangleBlock, ray: &BlockRay) -> (u32, u32);
+    /// A bit for each triangle that the line of the ray may meet, among them all that it does, and what [`Lanes::place_crossings`]
+    /// wants to know: see [`BlockRay`].
+    fn meet_triangles(block: &TriangleBlock, ray: &BlockRay) -> (u32, Self::Edges);
+
+    /// Where along the ray that is.
+    fn place_crossings(edges: &Self::Edges, ray: &BlockRay) -> Crossings<Self::Floats>;
+
+    /// The number in a lane.
+    fn lane(floats: Self::Floats, lane: usize) -> f32;
 
     /// How a ray passes the triangle in a lane, in double precision, and what its crossing inside is made of. `origin` has the order of the shear's axes.
     fn pass(block: &TriangleBlock, lane: usize, shear: &Shear, origin: &[f64; 3]) -> (Passage, Inside);
+}
+
+/// A ray in single precision.
+#[derive(Clone, Copy)]
+pub(crate) struct Narrow {
+    pub(crate) slabs: Slabs,
+    pub(crate) blocks: BlockRay,
+    /// From heights to places in the range of boxes.
+    pub(crate) place_per_height: f32,
+}
+
+/// Where a ray may meet the triangles of a block.
+#[derive(Clone, Copy)]
+pub(crate) struct Crossings<F> {
+    /// A bit for each that may be met within the range, if its line meets it: among them all that are.
+    pub(crate) in_range: u32,
+    /// A bit for each that certainly is met there.
+    pub(crate) sure: u32,
+    /// Heights along the ray between which the crossing lies.
+    pub(crate) from: F,
+    pub(crate) to: F,
 }
 
 /// In the last bits of a child's key stands its lane, so that no two are equal. To be compared with a limit that has all
@@ -59,7 +94,7 @@ pub(crate) trait Lanes: SphereLanes {
 pub(crate) const LANE_BITS: i32 = WIDTH as i32 - 1;
 
 /// The planes of a node that a ray meets first.
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 pub(crate) struct Sides {
     // On each axis, where the planes start in the flat array of a node's planes: 16 axis + 8 side. The other planes are at
     // that place with `WIDTH` flipped.
@@ -67,7 +102,7 @@ pub(crate) struct Sides {
 }
 
 static SIDES: [Sides; 8] = {
-    let mut sides = [Sides { near: [0; 3] }; 8];
+    let mut sides = [const { Sides { near: [0; 3] } }; 8];
     let mut signs = 0;
     while signs < 8 {
         let mut axis = 0;
@@ -83,37 +118,80 @@ static SIDES: [Sides; 8] = {
 impl Sides {
     /// For a direction that has these signs: a bit for each negative component.
     #[inline(always)]
-    pub(crate) fn new(signs: u32) -> Self {
-        SIDES[signs as usize % 8]
+    pub(crate) fn new(signs: u32) -> &'static Self {
+        &SIDES[signs as usize % 8]
     }
 }
 
 /// The axes in another order.
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
+#[repr(C)]
 pub(crate) struct Axes {
-    // Each below three.
-    order: [usize; 3],
+    // Each below three; the fourth only fills up.
+    order: [u32; 4],
+    // Where the lanes of each begin among those of a corner: eight times as much.
+    lanes: [usize; 3],
 }
 
-static AXES: [Axes; 6] = [
-    Axes { order: [1, 2, 0] },
-    Axes { order: [2, 0, 1] },
-    Axes { order: [0, 1, 2] },
-    Axes { order: [2, 1, 0] },
-    Axes { order: [0, 2, 1] },
-    Axes { order: [1, 0, 2] },
+impl Axes {
+    const fn of(x: usize, y: usize, z: usize) -> Self {
+        Self { order: [x as u32, y as u32, z as u32, 3], lanes: [x * BLOCK, y * BLOCK, z * BLOCK] }
+    }
+}
+
+// By which is the last and whether it is negative; eight, so that three bits name one.
+static AXES: [Axes; 8] = [
+    Axes::of(1, 2, 0),
+    Axes::of(2, 0, 1),
+    Axes::of(0, 1, 2),
+    Axes::of(0, 1, 2),
+    Axes::of(2, 1, 0),
+    Axes::of(0, 2, 1),
+    Axes::of(1, 0, 2),
+    Axes::of(1, 0, 2),
 ];
 
 impl Axes {
     /// The last is the direction's largest; the others are in the order that keeps the winding.
     #[inline(always)]
-    pub(crate) fn new(direction: &DVec3) -> Self {
+    pub(crate) fn new(direction: &DVec3) -> &'static Self {
         let [x, y, z] = [direction.x.abs(), direction.y.abs(), direction.z.abs()];
         // Without branches, for incoherent rays.
         let x_is_largest = usize::from((x >= y) & (x >= z));
         let z = (1 - x_is_largest) * (2 - usize::from(y >= z));
         let is_negative = usize::from(direction.as_ref()[z] < 0.0);
-        AXES[3 * is_negative + z]
+        &AXES[(4 * is_negative + z) % 8]
+    }
+
+    /// The axes for a direction whose components have these signs, a bit for each negative one, and these sizes: a bit each for
+    /// |x| ≥ |y|, |y| ≥ |z| and |x| ≥ |z|.
+    #[inline(always)]
+    pub(crate) fn by_bits(signs: u32, sizes: u32) -> &'static Self {
+        // By both: which axis is the largest, and whether it is negative.
+        static PLACES: [u8; 64] = {
+            let mut places = [0; 64];
+            let mut bits = 0;
+            while bits < 64 {
+                let (signs, sizes) = (bits % 8, bits / 8);
+                let z = if sizes & 0b101 == 0b101 {
+                    0
+                } else if sizes & 0b10 != 0 {
+                    1
+                } else {
+                    2
+                };
+                places[bits] = (4 * (signs >> z & 1) + z) as u8;
+                bits += 1;
+            }
+            places
+        };
+        &AXES[PLACES[((sizes % 8) << 3 | signs % 8) as usize] as usize % 8]
+    }
+
+    /// A vector's components in this order.
+    #[inline(always)]
+    pub(crate) fn permute_single(&self, v: &[f32; 4]) -> [f32; 4] {
+        [v[self.order[0] as usize % 4], v[self.order[1] as usize % 4], v[self.order[2] as usize % 4], v[3]]
     }
 
     /// A vector's components in this order.
@@ -121,7 +199,7 @@ impl Axes {
     pub(crate) fn permute(&self, v: &DVec3) -> [f64; 3] {
         let v: &[f64; 3] = v.as_ref();
         // SAFETY: the axes are below three.
-        let at = |axis: usize| unsafe { *v.get_unchecked(axis) };
+        let at = |axis: u32| unsafe { *v.get_unchecked(axis as usize) };
         [at(self.order[0]), at(self.order[1]), at(self.order[2])]
     }
 
@@ -129,10 +207,10 @@ impl Axes {
     #[inline(always)]
     pub(crate) fn gather(&self, block: &TriangleBlock, lane: usize) -> [[f32; 3]; 3] {
         let lanes = block.corners.as_flattened().as_flattened();
-        let [x, y, z] = self.order;
+        let [x, y, z] = self.lanes;
         let lane = lane % BLOCK;
         // SAFETY: the place is at most 24 · 2 + 8 · 2 + 7, in an array of 72.
-        let at = |corner: usize, axis: usize| unsafe { *lanes.get_unchecked(24 * corner + 8 * axis + lane) };
+        let at = |corner: usize, axis: usize| unsafe { *lanes.get_unchecked(24 * corner + axis + lane) };
         [[at(0, x), at(0, y), at(0, z)], [at(1, x), at(1, y), at(1, z)], [at(2, x), at(2, y), at(2, z)]]
     }
 }
@@ -247,7 +325,7 @@ impl Level {
     #[inline(always)]
     pub(crate) fn run<T: Task>(self, task: T) -> T::Output {
         match self.0 {
-            Set::Portable => task.run::<portable::Portable>(),
+            Set::Portable => run_portable(task),
             #[cfg(target_arch = "x86_64")]
             // SAFETY: `all` alone makes this value, after finding on this machine all the features of `run_avx2`.
             Set::Avx2 => unsafe { x86::run_avx2(task) },
@@ -256,6 +334,19 @@ impl Level {
             Set::Avx512 => unsafe { x86::run_avx512(task) },
         }
     }
+}
+
+/// The same, of which the compiler knows nothing: else it takes a ray apart ahead of a loop, into more pieces than there are
+/// registers, and writes them down once more.
+#[inline(always)]
+pub(crate) fn opaque<T>(value: &T) -> &T {
+    std::hint::black_box(value)
+}
+
+// Out of the way of the others.
+#[inline(never)]
+fn run_portable<T: Task>(task: T) -> T::Output {
+    task.run::<portable::Portable>()
 }
 
 /// Asks for what stands there to be brought near, where the machine can be asked.
@@ -276,8 +367,8 @@ pub(crate) fn fetch<T>(value: &T) {
 
 /// What [`Lanes::meet_boxes`] gives at a level, and where the ray enters each box, for tests.
 #[cfg(test)]
-pub(crate) fn meet_boxes_at(level: Level, node: &Node, ray: &BoxRay) -> (u32, [i32; WIDTH]) {
-    struct Boxes<'a>(&'a Node, &'a BoxRay);
+pub(crate) fn meet_boxes_at(level: Level, node: &Node, ray: &Slabs) -> (u32, [i32; WIDTH]) {
+    struct Boxes<'a>(&'a Node, &'a Slabs);
     impl Task for Boxes<'_> {
         type Output = (u32, [i32; WIDTH]);
         #[inline(always)]
@@ -308,17 +399,23 @@ pub(crate) fn meet_boxes_at(level: Level, node: &Node, ray: &BoxRay) -> (u32, [i
     level.run(Boxes(node, ray))
 }
 
-/// What [`Lanes::meet_triangles`] gives at a level, for tests.
+/// The triangles of a block that the ray may meet in its range and those that it certainly does, at a level, with the heights
+/// between which each is met, for tests.
 #[cfg(test)]
-pub(crate) fn meet_triangles_at(level: Level, block: &TriangleBlock, ray: &BlockRay) -> (u32, u32) {
+pub(crate) fn meet_triangles_at(
+    level: Level,
+    block: &TriangleBlock,
+    ray: &BlockRay,
+) -> (u32, u32, [[f32; 2]; BLOCK]) {
     struct Triangles<'a>(&'a TriangleBlock, &'a BlockRay);
     impl Task for Triangles<'_> {
-        type Output = (u32, u32);
+        type Output = (u32, u32, [[f32; 2]; BLOCK]);
         #[inline(always)]
         fn run<L: Lanes>(self) -> Self::Output {
-            let (mask, sure) = L::meet_triangles::<true>(self.0, self.1);
-            assert_eq!(L::meet_triangles::<false>(self.0, self.1), (mask, 0));
-            (mask, sure)
+            let (mask, edges) = L::meet_triangles(self.0, self.1);
+            let Crossings { in_range, sure, from, to } = L::place_crossings(&edges, self.1);
+            let between = std::array::from_fn(|lane| [L::lane(from, lane), L::lane(to, lane)]);
+            (mask & in_range, mask & sure, between)
         }
     }
     level.run(Triangles(block, ray))

@@ -4,15 +4,40 @@ use std::mem::MaybeUninit;
 
 use lumbre_geometry::Ray;
 
-use super::{LANE_BITS, Lanes, Slots};
-use crate::node::{BoxRay, Node, Units, WIDTH};
+use super::{Axes, Crossings, LANE_BITS, Lanes, Narrow, Sides, Slots};
+use crate::holds::SingleStart;
+use crate::node::{
+    BoxRay, END_FACTOR, LARGEST_NEAR, LITTLE, Node, SMALLEST_NEAR, START_FACTOR, Slabs, TINY_NEAR, Units,
+    WIDTH,
+};
 use crate::stack::stack_entry;
-use crate::triangles::{BLOCK, BlockRay, Inside, Passage, Shear, TriangleBlock, passage};
+use crate::triangles::{
+    BLOCK, BlockErrors, BlockRay, HeightRange, Inside, Passage, Shear, TriangleBlock, passage,
+};
 
 pub(crate) struct Portable;
 
+/// How a line passes the edges of eight triangles.
+#[derive(Clone, Copy)]
+pub(crate) struct Edges {
+    /// The edge functions.
+    values: [[f32; BLOCK]; 3],
+    /// Of the corners.
+    heights: [[f32; BLOCK]; 3],
+    /// By how much the edge functions may be wrong.
+    error: [f32; BLOCK],
+}
+
+// As the processor's instruction does it, which f32::max does not.
+#[inline(always)]
+fn greater(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
 impl Lanes for Portable {
     type Keys = [i32; WIDTH];
+    type Floats = [f32; BLOCK];
+    type Edges = Edges;
 
     #[inline(always)]
     fn start_nearby(units: &Units, ray: &Ray, t_min: f64, t_max: f64, boxes: &mut BoxRay) -> bool {
@@ -20,7 +45,54 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
-    fn meet_boxes(node: &Node, ray: &BoxRay) -> (u32, [i32; WIDTH]) {
+    fn start_single(start: &SingleStart, ray: &Ray) -> Option<Narrow> {
+        let (origin, toward) = (ray.origin.to_array(), ray.direction.to_array());
+        let (t_min, t_max) = (ray.t_min as f32, ray.t_max as f32);
+        // Every comparison with a NaN is false.
+        let (mut fits, mut is_long) = (0.0 <= t_min && t_min <= t_max, false);
+        let mut signs = 0;
+        let mut slabs = BoxRay::passing_all().slabs;
+        let (mut direction, mut on_mesh) = ([0.0; 4], [0.0; 4]);
+        for axis in 0..3 {
+            let from = ((origin[axis] - start.tree_origin[axis]) * start.scale) as f32;
+            let d = (toward[axis] * start.scale) as f32;
+            fits &= from.abs() <= start.farthest[axis] && d.abs() <= LARGEST_NEAR as f32;
+            is_long |= d.abs() >= SMALLEST_NEAR as f32;
+            direction[axis] = d;
+            on_mesh[axis] = (origin[axis] - start.mesh_origin[axis]) as f32;
+            let inverse = 1.0 / greater(d.abs(), TINY_NEAR as f32);
+            let margin = inverse * (from.abs() * start.margin_per_distance + start.margin);
+            let inverse = inverse.copysign(d);
+            slabs.inverse[axis] = inverse;
+            slabs.near_offset[axis] = -from * inverse - margin;
+            slabs.far_offset[axis] = -from * inverse + margin;
+            signs |= u32::from(d.is_sign_negative()) << axis;
+        }
+        if !(fits && is_long) {
+            return None;
+        }
+        slabs.sides = Sides::new(signs);
+        (slabs.s_min, slabs.s_max) = (t_min * START_FACTOR, t_max * END_FACTOR + LITTLE as f32);
+
+        let [x, y, z, _] = direction.map(f32::abs);
+        let axes = Axes::by_bits(signs, u32::from(x >= y) | u32::from(y >= z) << 1 | u32::from(x >= z) << 2);
+        let inverse = axes.permute_single(&slabs.inverse)[2];
+        let shear = axes.permute_single(&direction).map(|d| d * inverse);
+        let reach =
+            greater(greater(on_mesh[0].abs(), on_mesh[1].abs()), on_mesh[2].abs()) + start.largest_corner;
+        let errors = BlockErrors::new(reach);
+        let length = axes.permute_single(&direction)[2].abs() * start.space_per_unit;
+        let range = HeightRange::new(t_min * length, t_max * length, errors.margin);
+        let turn = 0.0f32.copysign(-inverse);
+        Some(Narrow {
+            slabs,
+            blocks: BlockRay { axes, origin: axes.permute_single(&on_mesh), shear, errors, range, turn },
+            place_per_height: inverse.abs() * start.units_per_space,
+        })
+    }
+
+    #[inline(always)]
+    fn meet_boxes(node: &Node, ray: &Slabs) -> (u32, [i32; WIDTH]) {
         let mut enter = [ray.s_min; WIDTH];
         let mut leave = [ray.s_max; WIDTH];
         let planes = node.planes.as_flattened();
@@ -77,51 +149,68 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
-    fn meet_triangles<const SURE: bool>(block: &TriangleBlock, ray: &BlockRay) -> (u32, u32) {
-        if !ray.is_sharp {
-            return ((1 << BLOCK) - 1, 0);
-        }
+    fn meet_triangles(block: &TriangleBlock, ray: &BlockRay) -> (u32, Edges) {
         let mut x = [[0.0; BLOCK]; 3];
         let mut y = [[0.0; BLOCK]; 3];
         let mut z = [[0.0; BLOCK]; 3];
-        let [kx, ky, kz] = ray.axes.order;
+        let [kx, ky, kz] = ray.axes.lanes;
+        let (origin, shear) = (&ray.origin, &ray.shear);
         for corner in 0..3 {
-            let axes = &block.corners[corner];
+            let lanes = block.corners[corner].as_flattened();
+            let (across, up, along) = (&lanes[kx..][..BLOCK], &lanes[ky..][..BLOCK], &lanes[kz..][..BLOCK]);
             for lane in 0..BLOCK {
-                let height = axes[kz][lane] - ray.origin[2];
-                x[corner][lane] = (axes[kx][lane] - ray.origin[0]) - ray.shear_x * height;
-                y[corner][lane] = (axes[ky][lane] - ray.origin[1]) - ray.shear_y * height;
+                // All three with the sign turned, which their products do not have.
+                let height = origin[2] - along[lane];
+                x[corner][lane] = (origin[0] - across[lane]) - shear[0] * height;
+                y[corner][lane] = (origin[1] - up[lane]) - shear[1] * height;
                 z[corner][lane] = height;
             }
         }
-        let (mut mask, mut sure) = (0, 0);
+        let mut mask = 0;
+        let mut values = [[0.0; BLOCK]; 3];
+        let mut error = [0.0; BLOCK];
         for lane in 0..BLOCK {
             let edge = |p: usize, q: usize| x[p][lane] * y[q][lane] - y[p][lane] * x[q][lane];
             let (u, v, w) = (edge(2, 1), edge(0, 2), edge(1, 0));
             let size = (0..3).fold(0.0f32, |size, i| size.max(x[i][lane].abs()).max(y[i][lane].abs()));
-            let error = size * ray.error_slope + ray.error_least;
+            error[lane] = size * ray.errors.slope + ray.errors.least;
             let (least, most) = (u.min(v).min(w), u.max(v).max(w));
-            let [a, b, c] = [z[0][lane], z[1][lane], z[2][lane]];
-            let (low, high) = (a.min(b).min(c), a.max(b).max(c));
             // Comparisons with a NaN, which unused lanes have, are false.
-            let may_be_inside = least >= -error || most <= error;
-            if !(may_be_inside && high >= ray.z_low && low <= ray.z_high) {
-                continue;
-            }
-            mask |= 1 << lane;
-            if SURE && (least > 2.0 * error || most < -2.0 * error) {
-                let inverse = 1.0 / (u + v + w);
-                // Shares first: their products with lengths do not underflow.
-                let height = (u * inverse) * a + (v * inverse) * b + (w * inverse) * c;
-                let ahead = if ray.is_backward { -height } else { height };
-                let spread = ((error * 12.5) * inverse.abs()) * (high - low) + ray.z_error;
-                let (from, to) = (ahead - spread, ahead + spread);
-                if ray.surely_in[0] <= from && to <= ray.surely_in[1] {
-                    sure |= 1 << lane;
-                }
-            }
+            mask |= u32::from(least >= -error[lane] || most <= error[lane]) << lane;
+            (values[0][lane], values[1][lane], values[2][lane]) = (u, v, w);
         }
-        (mask, sure)
+        (mask, Edges { values, heights: z, error })
+    }
+
+    #[inline(always)]
+    fn place_crossings(edges: &Edges, ray: &BlockRay) -> Crossings<[f32; BLOCK]> {
+        let mut crossings = Crossings { in_range: 0, sure: 0, from: [0.0; BLOCK], to: [0.0; BLOCK] };
+        for lane in 0..BLOCK {
+            let [u, v, w] = [edges.values[0][lane], edges.values[1][lane], edges.values[2][lane]];
+            let [a, b, c] = [edges.heights[0][lane], edges.heights[1][lane], edges.heights[2][lane]];
+            let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+            let error = edges.error[lane];
+            let inverse = 1.0 / (u + v + w);
+            // Shares first: their products with lengths do not underflow.
+            let height = (u * inverse) * a + (v * inverse) * b + (w * inverse) * c;
+            let ahead = if ray.turn.is_sign_negative() { -height } else { height };
+            let share = (error * 12.5) * inverse.abs();
+            let spread = share * ((high - low) + ray.errors.height) + ray.errors.height;
+            let (from, to) = (ahead - spread, ahead + spread);
+            // What is no number may be in range.
+            crossings.in_range |= u32::from(!(to < ray.range.first || from > ray.range.last)) << lane;
+            let (least, most) = (u.min(v).min(w), u.max(v).max(w));
+            let is_inside = least > 2.0 * error || most < -2.0 * error;
+            crossings.sure |=
+                u32::from(is_inside && ray.range.surely_first <= from && to <= ray.range.surely_last) << lane;
+            (crossings.from[lane], crossings.to[lane]) = (from, to);
+        }
+        crossings
+    }
+
+    #[inline(always)]
+    fn lane(floats: [f32; BLOCK], lane: usize) -> f32 {
+        floats[lane % BLOCK]
     }
 
     #[inline(always)]

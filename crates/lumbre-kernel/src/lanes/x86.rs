@@ -1,14 +1,21 @@
 //! AVX2 with FMA, and AVX-512 on vectors of 256 bits.
 
 use std::arch::x86_64::*;
-use std::mem::MaybeUninit;
+use std::mem::{MaybeUninit, offset_of};
 
 use lumbre_geometry::Ray;
 
-use super::{LANE_BITS, Lanes, Sides, Slots, Task};
-use crate::node::{BoxRay, LARGEST_NEAR, Node, SMALLEST_NEAR, TINY_NEAR, Units, WIDTH};
+use super::{Axes, Crossings, LANE_BITS, Lanes, Narrow, Sides, Slots, Task};
+use crate::holds::SingleStart;
+use crate::node::{
+    BoxRay, END_FACTOR, LARGEST_NEAR, LITTLE, Node, SMALLEST_NEAR, START_FACTOR, Slabs, TINY_NEAR, Units,
+    WIDTH,
+};
 use crate::stack::stack_entry;
-use crate::triangles::{BLOCK, BlockRay, Inside, Passage, Shear, TriangleBlock};
+use crate::triangles::{
+    BLOCK, BlockErrors, BlockRay, ERROR_FACTORS, FAR, HeightRange, Inside, Passage, ROUNDINGS, Shear,
+    TriangleBlock,
+};
 
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
 pub(super) fn run_avx2<T: Task>(task: T) -> T::Output {
@@ -23,6 +30,10 @@ pub(super) fn run_avx512<T: Task>(task: T) -> T::Output {
 /// Of the two levels: only `run_avx512` instantiates `X86<true>`, and only `run_avx2` `X86<false>`. That is why the
 /// instructions below are there.
 pub(crate) struct X86<const AVX512: bool>;
+
+// The numbers of a ray stand in a row: origin, direction, range.
+const _: () =
+    assert!(offset_of!(Ray, direction) == 24 && offset_of!(Ray, t_min) == 48 && offset_of!(Ray, t_max) == 56);
 
 /// For each mask, its lanes first.
 static LANES_OF: [[u8; WIDTH]; 256] = {
@@ -72,6 +83,34 @@ impl<const AVX512: bool> X86<AVX512> {
         }
     }
 
+    /// A bit for each lane in which one comparison or the other is true.
+    #[inline(always)]
+    fn either<const A: i32, const B: i32>(a: [__m256; 2], b: [__m256; 2]) -> u32 {
+        // SAFETY: see `X86`.
+        unsafe {
+            if AVX512 {
+                u32::from(_mm256_cmp_ps_mask::<A>(a[0], a[1]) | _mm256_cmp_ps_mask::<B>(b[0], b[1]))
+            } else {
+                let either = _mm256_or_ps(_mm256_cmp_ps::<A>(a[0], a[1]), _mm256_cmp_ps::<B>(b[0], b[1]));
+                _mm256_movemask_ps(either) as u32
+            }
+        }
+    }
+
+    /// A bit for each lane in which both comparisons are true.
+    #[inline(always)]
+    fn both<const A: i32, const B: i32>(a: [__m256; 2], b: [__m256; 2]) -> u32 {
+        // SAFETY: see `X86`.
+        unsafe {
+            if AVX512 {
+                u32::from(_mm256_cmp_ps_mask::<A>(a[0], a[1]) & _mm256_cmp_ps_mask::<B>(b[0], b[1]))
+            } else {
+                let both = _mm256_and_ps(_mm256_cmp_ps::<A>(a[0], a[1]), _mm256_cmp_ps::<B>(b[0], b[1]));
+                _mm256_movemask_ps(both) as u32
+            }
+        }
+    }
+
     /// Where the ray meets the planes from here on, as bits.
     ///
     /// # Safety
@@ -96,14 +135,38 @@ impl<const AVX512: bool> X86<AVX512> {
     }
 
     #[inline(always)]
+    fn array(v: __m128) -> [f32; 4] {
+        let mut array = [0.0; 4];
+        // SAFETY: see `X86`. The store is of four f32 into an array of four.
+        unsafe { _mm_storeu_ps(array.as_mut_ptr(), v) };
+        array
+    }
+
+    #[inline(always)]
     fn children(node: &Node) -> __m256i {
         // SAFETY: see `X86`. The load is of eight u32 in an array of eight.
         unsafe { _mm256_loadu_si256(node.children.as_ptr().cast()) }
     }
 }
 
+/// How a line passes the edges of eight triangles.
+#[derive(Clone, Copy)]
+pub(crate) struct Edges {
+    /// The edge functions.
+    values: [__m256; 3],
+    /// Of the corners.
+    heights: [__m256; 3],
+    /// The least and the most of the edge functions.
+    least: __m256,
+    most: __m256,
+    /// By how much they may be wrong.
+    error: __m256,
+}
+
 impl<const AVX512: bool> Lanes for X86<AVX512> {
     type Keys = __m256i;
+    type Floats = __m256;
+    type Edges = Edges;
 
     #[inline(always)]
     fn start_nearby(units: &Units, ray: &Ray, t_min: f64, t_max: f64, boxes: &mut BoxRay) -> bool {
@@ -142,17 +205,109 @@ impl<const AVX512: bool> Lanes for X86<AVX512> {
             );
             let near = _mm256_fnmsub_pd(start, inverse, margin);
             let far = _mm256_fnmadd_pd(start, inverse, margin);
-            _mm_storeu_ps(boxes.inverse.as_mut_ptr(), _mm256_cvtpd_ps(inverse));
-            _mm_storeu_ps(boxes.near_offset.as_mut_ptr(), _mm256_cvtpd_ps(near));
-            _mm_storeu_ps(boxes.far_offset.as_mut_ptr(), _mm256_cvtpd_ps(far));
-            boxes.sides = Sides::new(_mm256_movemask_pd(direction) as u32);
+            let slabs = &mut boxes.slabs;
+            _mm_storeu_ps(slabs.inverse.as_mut_ptr(), _mm256_cvtpd_ps(inverse));
+            _mm_storeu_ps(slabs.near_offset.as_mut_ptr(), _mm256_cvtpd_ps(near));
+            _mm_storeu_ps(slabs.far_offset.as_mut_ptr(), _mm256_cvtpd_ps(far));
+            slabs.sides = Sides::new(_mm256_movemask_pd(direction) as u32);
         }
         boxes.set_range_nearby(t_min, t_max);
         true
     }
 
     #[inline(always)]
-    fn meet_boxes(node: &Node, ray: &BoxRay) -> (u32, __m256i) {
+    fn start_single(start: &SingleStart, ray: &Ray) -> Option<Narrow> {
+        let numbers: *const Ray = ray;
+        let numbers: *const f64 = numbers.cast();
+        // As the portable one, three axes at a time.
+        // SAFETY: see `X86`. The loads are of the first eight numbers of a ray, see below, and of arrays of four.
+        unsafe {
+            let origin = _mm256_loadu_pd(numbers);
+            let scale = _mm256_set1_pd(start.scale);
+            let from = _mm256_sub_pd(origin, _mm256_loadu_pd(start.tree_origin.as_ptr()));
+            let from = _mm256_cvtpd_ps(_mm256_mul_pd(from, scale));
+            let direction = _mm256_cvtpd_ps(_mm256_mul_pd(_mm256_loadu_pd(numbers.add(3)), scale));
+            let range = _mm_cvtpd_ps(_mm_loadu_pd(numbers.add(6)));
+            let range = _mm_movelh_ps(range, range);
+            let on_mesh = _mm256_cvtpd_ps(_mm256_sub_pd(origin, _mm256_loadu_pd(start.mesh_origin.as_ptr())));
+
+            let sign = _mm_set1_ps(-0.0);
+            let (distance, length) = (_mm_andnot_ps(sign, from), _mm_andnot_ps(sign, direction));
+            // Every comparison with a NaN is false.
+            let fits = _mm_and_ps(
+                _mm_and_ps(
+                    _mm_cmple_ps(distance, _mm_loadu_ps(start.farthest.as_ptr())),
+                    _mm_cmple_ps(length, _mm_set1_ps(LARGEST_NEAR as f32)),
+                ),
+                // 0 <= t_min, t_min <= t_max, and the first again.
+                _mm_cmple_ps(_mm_unpacklo_ps(_mm_setzero_ps(), range), range),
+            );
+            let is_long = _mm_cmpge_ps(length, _mm_set1_ps(SMALLEST_NEAR as f32));
+            if _mm_movemask_ps(fits) & 0b111 != 0b111 || _mm_movemask_ps(is_long) & 0b111 == 0 {
+                return None;
+            }
+
+            let size = _mm_max_ps(length, _mm_set1_ps(TINY_NEAR as f32));
+            let size = _mm_div_ps(_mm_set1_ps(1.0), size);
+            let inverse = _mm_or_ps(size, _mm_and_ps(direction, sign));
+            let per_distance = _mm_set1_ps(start.margin_per_distance);
+            let margin = _mm_mul_ps(size, _mm_fmadd_ps(distance, per_distance, _mm_set1_ps(start.margin)));
+            let signs = _mm_movemask_ps(direction) as u32;
+            let ends = _mm_fmadd_ps(
+                range,
+                _mm_setr_ps(START_FACTOR, END_FACTOR, 0.0, 0.0),
+                _mm_setr_ps(0.0, LITTLE as f32, 0.0, 0.0),
+            );
+            let slabs = Slabs {
+                inverse: Self::array(inverse),
+                near_offset: Self::array(_mm_fnmsub_ps(from, inverse, margin)),
+                far_offset: Self::array(_mm_fnmadd_ps(from, inverse, margin)),
+                sides: Sides::new(signs),
+                s_min: _mm_cvtss_f32(ends),
+                s_max: _mm_cvtss_f32(_mm_movehdup_ps(ends)),
+            };
+
+            // x, y, x and y, z, z.
+            let sizes = _mm_cmpge_ps(
+                _mm_shuffle_ps::<0b00_00_01_00>(length, length),
+                _mm_shuffle_ps::<0b10_10_10_01>(length, length),
+            );
+            let axes = Axes::by_bits(signs, _mm_movemask_ps(sizes) as u32);
+            let order = _mm_loadu_si128(axes.order.as_ptr().cast());
+            let last = _mm_shuffle_epi32::<0b10_10_10_10>(order);
+            let inverse = _mm_permutevar_ps(inverse, last);
+            let first_three = _mm_castsi128_ps(_mm_setr_epi32(i32::MAX, i32::MAX, i32::MAX, 0));
+            let reach = _mm_and_ps(on_mesh, first_three);
+            let reach = _mm_max_ps(reach, _mm_shuffle_ps::<0b01_00_11_10>(reach, reach));
+            let reach = _mm_max_ps(reach, _mm_shuffle_ps::<0b10_11_00_01>(reach, reach));
+            let reach = _mm_add_ps(reach, _mm_set1_ps(start.largest_corner));
+            let errors = _mm_mul_ps(reach, _mm_loadu_ps(ERROR_FACTORS.as_ptr()));
+            let errors = _mm_mul_ps(errors, _mm_blend_ps::<0b0010>(_mm_set1_ps(1.0), reach));
+            let length = _mm_mul_ps(_mm_permutevar_ps(length, last), _mm_set1_ps(start.space_per_unit));
+            // Start, end, start, end; none of them negative.
+            let heights = _mm_min_ps(_mm_mul_ps(range, length), _mm_set1_ps(FAR));
+            let apart = _mm_fmadd_ps(
+                heights,
+                _mm_set1_ps(ROUNDINGS),
+                _mm_shuffle_ps::<0b11_11_11_11>(errors, errors),
+            );
+            let apart = _mm_xor_ps(apart, _mm_setr_ps(-0.0, 0.0, 0.0, -0.0));
+            let place_per_height = _mm_andnot_ps(sign, inverse);
+            let blocks = BlockRay {
+                axes,
+                origin: Self::array(_mm_permutevar_ps(on_mesh, order)),
+                shear: Self::array(_mm_permutevar_ps(_mm_mul_ps(direction, inverse), order)),
+                errors: std::mem::transmute::<[f32; 4], BlockErrors>(Self::array(errors)),
+                range: std::mem::transmute::<[f32; 4], HeightRange>(Self::array(_mm_add_ps(heights, apart))),
+                turn: _mm_cvtss_f32(_mm_andnot_ps(inverse, sign)),
+            };
+            let place_per_height = _mm_cvtss_f32(place_per_height) * start.units_per_space;
+            Some(Narrow { slabs, blocks, place_per_height })
+        }
+    }
+
+    #[inline(always)]
+    fn meet_boxes(node: &Node, ray: &Slabs) -> (u32, __m256i) {
         let planes = node.planes.as_flattened().as_ptr();
         let near = ray.sides.near;
         // SAFETY: see `X86`. The loads are of eight f32 from a multiple of eight below 48 on, in an array of 48.
@@ -185,12 +340,7 @@ impl<const AVX512: bool> Lanes for X86<AVX512> {
 
     #[inline(always)]
     fn only_child(node: &Node, mask: u32) -> u32 {
-        if AVX512 {
-            // SAFETY: see `X86`.
-            unsafe { _mm256_cvtsi256_si32(Self::compress(mask, Self::children(node))) as u32 }
-        } else {
-            node.children[mask.trailing_zeros() as usize % WIDTH]
-        }
+        node.children[mask.trailing_zeros() as usize % WIDTH]
     }
 
     #[inline(always)]
@@ -264,26 +414,24 @@ impl<const AVX512: bool> Lanes for X86<AVX512> {
     }
 
     #[inline(always)]
-    fn meet_triangles<const SURE: bool>(block: &TriangleBlock, ray: &BlockRay) -> (u32, u32) {
-        if !ray.is_sharp {
-            return ((1 << BLOCK) - 1, 0);
-        }
+    fn meet_triangles(block: &TriangleBlock, ray: &BlockRay) -> (u32, Edges) {
         let corners = block.corners.as_flattened().as_flattened().as_ptr();
-        let [kx, ky, kz] = ray.axes.order;
+        let [kx, ky, kz] = ray.axes.lanes;
         // SAFETY: see `X86`. The loads are of eight f32 in an array of 3 · 3 · 8, at 24 corner + 8 axis; the axes are below
         // three.
         unsafe {
             let (ox, oy, oz) =
                 (_mm256_set1_ps(ray.origin[0]), _mm256_set1_ps(ray.origin[1]), _mm256_set1_ps(ray.origin[2]));
-            let (shear_x, shear_y) = (_mm256_set1_ps(ray.shear_x), _mm256_set1_ps(ray.shear_y));
+            let (shear_x, shear_y) = (_mm256_set1_ps(ray.shear[0]), _mm256_set1_ps(ray.shear[1]));
             let mut x = [_mm256_setzero_ps(); 3];
             let mut y = [_mm256_setzero_ps(); 3];
             let mut z = [_mm256_setzero_ps(); 3];
             for corner in 0..3 {
                 let axes = corners.add(24 * corner);
-                z[corner] = _mm256_sub_ps(_mm256_loadu_ps(axes.add(8 * kz)), oz);
-                let across = _mm256_sub_ps(_mm256_loadu_ps(axes.add(8 * kx)), ox);
-                let up = _mm256_sub_ps(_mm256_loadu_ps(axes.add(8 * ky)), oy);
+                // All three with the sign turned, which their products do not have: one operand can come from memory.
+                z[corner] = _mm256_sub_ps(oz, _mm256_loadu_ps(axes.add(kz)));
+                let across = _mm256_sub_ps(ox, _mm256_loadu_ps(axes.add(kx)));
+                let up = _mm256_sub_ps(oy, _mm256_loadu_ps(axes.add(ky)));
                 x[corner] = _mm256_fnmadd_ps(shear_x, z[corner], across);
                 y[corner] = _mm256_fnmadd_ps(shear_y, z[corner], up);
             }
@@ -295,74 +443,74 @@ impl<const AVX512: bool> Lanes for X86<AVX512> {
                 Self::larger(x[2], y[2]),
             );
             let error =
-                _mm256_fmadd_ps(size, _mm256_set1_ps(ray.error_slope), _mm256_set1_ps(ray.error_least));
+                _mm256_fmadd_ps(size, _mm256_set1_ps(ray.errors.slope), _mm256_set1_ps(ray.errors.least));
             let least = _mm256_min_ps(_mm256_min_ps(u, v), w);
             let most = _mm256_max_ps(_mm256_max_ps(u, v), w);
-            let low = _mm256_min_ps(_mm256_min_ps(z[0], z[1]), z[2]);
-            let high = _mm256_max_ps(_mm256_max_ps(z[0], z[1]), z[2]);
-            let (z_low, z_high) = (_mm256_set1_ps(ray.z_low), _mm256_set1_ps(ray.z_high));
             // Comparisons with a NaN, which unused lanes have, are false. A minimum of a NaN and a number is that number
             // or the NaN: unused lanes have nothing but NaN.
             let minus_error = _mm256_xor_ps(error, _mm256_set1_ps(-0.0));
-            let mask = if AVX512 {
-                let mask = (_mm256_cmp_ps_mask::<_CMP_GE_OQ>(least, minus_error)
-                    | _mm256_cmp_ps_mask::<_CMP_LE_OQ>(most, error))
-                    & _mm256_cmp_ps_mask::<_CMP_GE_OQ>(high, z_low)
-                    & _mm256_cmp_ps_mask::<_CMP_LE_OQ>(low, z_high);
-                u32::from(mask)
-            } else {
-                let in_range = _mm256_and_ps(
-                    _mm256_cmp_ps::<_CMP_GE_OQ>(high, z_low),
-                    _mm256_cmp_ps::<_CMP_LE_OQ>(low, z_high),
-                );
-                let sided = _mm256_or_ps(
-                    _mm256_cmp_ps::<_CMP_GE_OQ>(least, minus_error),
-                    _mm256_cmp_ps::<_CMP_LE_OQ>(most, error),
-                );
-                _mm256_movemask_ps(_mm256_and_ps(in_range, sided)) as u32
-            };
-            if !SURE || mask == 0 {
-                return (mask, 0);
-            }
+            let mask = Self::either::<_CMP_GE_OQ, _CMP_LE_OQ>([least, minus_error], [most, error]);
+            (mask, Edges { values: [u, v, w], heights: z, least, most, error })
+        }
+    }
+
+    #[inline(always)]
+    fn place_crossings(edges: &Edges, ray: &BlockRay) -> Crossings<__m256> {
+        // SAFETY: see `X86`.
+        unsafe {
+            let ([u, v, w], z) = (edges.values, edges.heights);
             let sign = _mm256_set1_ps(-0.0);
             let inverse = _mm256_div_ps(_mm256_set1_ps(1.0), _mm256_add_ps(_mm256_add_ps(u, v), w));
             // Shares first: their products with lengths do not underflow.
             let of_c = _mm256_mul_ps(_mm256_mul_ps(w, inverse), z[2]);
             let of_b_and_c = _mm256_fmadd_ps(_mm256_mul_ps(v, inverse), z[1], of_c);
             let height = _mm256_fmadd_ps(_mm256_mul_ps(u, inverse), z[0], of_b_and_c);
-            let backward = _mm256_set1_ps(if ray.is_backward { -0.0 } else { 0.0 });
-            let ahead = _mm256_xor_ps(height, backward);
-            let share =
-                _mm256_mul_ps(_mm256_mul_ps(error, _mm256_set1_ps(12.5)), _mm256_andnot_ps(sign, inverse));
-            let spread = _mm256_mul_ps(share, _mm256_sub_ps(high, low));
-            let spread = _mm256_add_ps(spread, _mm256_set1_ps(ray.z_error));
+            let ahead = _mm256_xor_ps(height, _mm256_set1_ps(ray.turn));
+            let low = _mm256_min_ps(_mm256_min_ps(z[0], z[1]), z[2]);
+            let high = _mm256_max_ps(_mm256_max_ps(z[0], z[1]), z[2]);
+            let z_error = _mm256_set1_ps(ray.errors.height);
+            let share = _mm256_mul_ps(
+                _mm256_mul_ps(edges.error, _mm256_set1_ps(12.5)),
+                _mm256_andnot_ps(sign, inverse),
+            );
+            let extent = _mm256_add_ps(_mm256_sub_ps(high, low), z_error);
+            let spread = _mm256_fmadd_ps(share, extent, z_error);
             let (from, to) = (_mm256_sub_ps(ahead, spread), _mm256_add_ps(ahead, spread));
-            let twice = _mm256_add_ps(error, error);
-            let inside = _mm256_or_ps(
-                _mm256_cmp_ps::<_CMP_GT_OQ>(least, twice),
-                _mm256_cmp_ps::<_CMP_LT_OQ>(most, _mm256_xor_ps(twice, sign)),
+            // What is no number may be in range.
+            let in_range = Self::both::<_CMP_NLT_UQ, _CMP_NGT_UQ>(
+                [to, _mm256_set1_ps(ray.range.first)],
+                [from, _mm256_set1_ps(ray.range.last)],
             );
-            let [first, last] = ray.surely_in;
-            let in_range = _mm256_and_ps(
-                _mm256_cmp_ps::<_CMP_GE_OQ>(from, _mm256_set1_ps(first)),
-                _mm256_cmp_ps::<_CMP_LE_OQ>(to, _mm256_set1_ps(last)),
+            let twice = _mm256_add_ps(edges.error, edges.error);
+            let inside = Self::either::<_CMP_GT_OQ, _CMP_LT_OQ>(
+                [edges.least, twice],
+                [edges.most, _mm256_xor_ps(twice, sign)],
             );
-            (mask, _mm256_movemask_ps(_mm256_and_ps(inside, in_range)) as u32 & mask)
+            let surely_in_range = Self::both::<_CMP_GE_OQ, _CMP_LE_OQ>(
+                [from, _mm256_set1_ps(ray.range.surely_first)],
+                [to, _mm256_set1_ps(ray.range.surely_last)],
+            );
+            Crossings { in_range, sure: inside & surely_in_range, from, to }
         }
+    }
+
+    #[inline(always)]
+    fn lane(floats: __m256, lane: usize) -> f32 {
+        // SAFETY: see `X86`.
+        unsafe { _mm256_cvtss_f32(_mm256_permutevar8x32_ps(floats, _mm256_set1_epi32(lane as i32))) }
     }
 
     #[inline(always)]
     fn pass(block: &TriangleBlock, lane: usize, shear: &Shear, origin: &[f64; 3]) -> (Passage, Inside) {
         let corners = block.corners.as_flattened().as_flattened().as_ptr();
-        let [kx, ky, kz] = shear.axes.order;
+        let [kx, ky, kz] = shear.axes.lanes;
         let lane = lane % BLOCK;
         // The corners in the first three lanes, and the very operations of the portable one.
         // SAFETY: see `X86`. Each component of the three corners is at 24 corner + 8 axis + lane, in an array of 72.
         unsafe {
-            let z = _mm256_sub_pd(Self::component(corners.add(8 * kz + lane)), _mm256_set1_pd(origin[2]));
-            let across =
-                _mm256_sub_pd(Self::component(corners.add(8 * kx + lane)), _mm256_set1_pd(origin[0]));
-            let up = _mm256_sub_pd(Self::component(corners.add(8 * ky + lane)), _mm256_set1_pd(origin[1]));
+            let z = _mm256_sub_pd(Self::component(corners.add(kz + lane)), _mm256_set1_pd(origin[2]));
+            let across = _mm256_sub_pd(Self::component(corners.add(kx + lane)), _mm256_set1_pd(origin[0]));
+            let up = _mm256_sub_pd(Self::component(corners.add(ky + lane)), _mm256_set1_pd(origin[1]));
             // No fused multiply-add here and below.
             let x = _mm256_sub_pd(across, _mm256_mul_pd(_mm256_set1_pd(shear.x), z));
             let y = _mm256_sub_pd(up, _mm256_mul_pd(_mm256_set1_pd(shear.y), z));

@@ -41,17 +41,27 @@ fn check(block: &TriangleBlock, ray: &Ray, mesh_origin: DVec3, tally: &mut Tally
     let origin = shear.local_origin(&ray.origin, &mesh_origin);
     let largest =
         block.corners.as_flattened().as_flattened().iter().fold(0.0f32, |most, x| most.max(x.abs()));
-    let mut blocks = BlockRay::new(&shear, &origin, largest);
-    blocks.set_range(&shear, ray.t_min, ray.t_max);
-    blocks.set_surely_in(&shear, ray.t_min, ray.t_max);
+    let blocks = BlockRay::new(&shear, &origin, largest, ray.t_min, ray.t_max);
     for level in Level::all() {
-        let (mask, sure) = meet_triangles_at(level, block, &blocks);
+        let (mask, sure, between) = blocks
+            .as_ref()
+            .map_or(((1 << BLOCK) - 1, 0, [[f32::NEG_INFINITY, f32::INFINITY]; BLOCK]), |blocks| {
+                meet_triangles_at(level, block, blocks)
+            });
         for lane in 0..BLOCK {
-            let is_hit = match intersect(ray, shear, origin, shear.axes.gather(block, lane)) {
+            let meeting = intersect(ray, shear, origin, shear.axes.gather(block, lane));
+            let is_hit = match meeting {
                 Meeting::Miss => false,
                 Meeting::Hit { .. } => true,
                 Meeting::Touch { root, .. } => ray.contains(root.t),
             };
+            if let Meeting::Hit { root, .. } = meeting {
+                let ([from, to], height) = (between[lane], root.t * shear.direction_z.abs());
+                assert!(
+                    !(height < f64::from(from) || height > f64::from(to)),
+                    "{level:?} places lane {lane} wrongly along {ray:?} of {block:?}: {height} from {from} to {to}"
+                );
+            }
             assert!(
                 !is_hit || mask >> lane & 1 != 0,
                 "{level:?} loses lane {lane} along {ray:?} of {block:?}"

@@ -95,7 +95,7 @@ fn reached_boxes_are_met(level: Level, seed: u64, rounds: usize) {
                 [(t, t), (0.0, t), (t, f64::INFINITY), (f64::NEG_INFINITY, f64::INFINITY)][random.below(4)];
             let ray = ray.with_range(t_min, t_max);
             let boxes = prepared(&units, &ray).unwrap_or_else(|| panic!("{ray:?} misses {units:?}"));
-            let (mask, keys) = meet_boxes_at(level, &node, &boxes);
+            let (mask, keys) = meet_boxes_at(level, &node, &boxes.slabs);
             assert!(mask & (1 << lane) != 0, "{ray:?} at {t} misses {bounds:?} of {units:?}");
             // A hit at t must not be culled by a limit of t either.
             let limit_key = boxes.progress.up(t).to_bits() as i32 | LANE_BITS;
@@ -129,7 +129,7 @@ fn boxes_far_from_the_ray_are_not_met() {
         // Past the box, further than its half diagonal but by little.
         let aside = direction.cross(random.vector()).normalize() * 0.434;
         let ray = Ray::new(center + aside - 20.0 * direction, direction);
-        let mask = prepared(&units, &ray).map_or(0, |ray| meet_boxes_at(Level::best(), &node, &ray).0);
+        let mask = prepared(&units, &ray).map_or(0, |ray| meet_boxes_at(Level::best(), &node, &ray.slabs).0);
         missed += u32::from(mask == 0);
     }
     assert_eq!(missed, 10_000);

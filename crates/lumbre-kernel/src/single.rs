@@ -1,0 +1,381 @@
+//! The nearest hit and any hit among nothing but triangles, in single precision wherever that can decide.
+//!
+//! A hit that single precision is certain of (see [`BlockRay`]) is kept by its place in the tree and the heights between which
+//! it lies. Double precision is asked where it is not: about a triangle whose edge or range the ray ends hardly miss, and which
+//! of two hits is nearer where their heights overlap. And, once a ray, about the winner, so that the answer has the same bits
+//! as that of the plain search in `traverse`, which stands beside this one as its oracle. Where a ray touches an edge or a
+//! corner exactly, or comes from far away, that search answers it altogether.
+
+use std::marker::PhantomData;
+
+use lumbre_geometry::{Ray, Root};
+
+use crate::holds::SingleStart;
+use crate::lanes::{self, LANE_BITS, Lanes, Level, Narrow, Task};
+use crate::node::{Slabs, tag};
+use crate::stack::{AsBuilt, ByDistance, Order, Stack};
+use crate::triangles::{self, BLOCK, BlockRay, Meeting, Passage, Shear};
+use crate::{Accel, Hit, InstancePath};
+
+/// What came of a search.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Outcome<T> {
+    /// The answer.
+    Settled(T),
+    /// The plain search has to answer.
+    Unsettled,
+}
+
+/// What a step of a search leads to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Step {
+    /// To go on from here.
+    On(u32),
+    /// Nothing: all was seen.
+    Out,
+    /// Any hit will do, and there is one.
+    Met,
+    /// Nothing: the plain search has to answer.
+    Unsettled,
+}
+
+/// A triangle by its place in the tree, and the heights along the ray between which it is met.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Candidate {
+    block: u32,
+    lane: u32,
+    from: f32,
+    to: f32,
+}
+
+impl Candidate {
+    const NONE: Self = Self { block: u32::MAX, lane: 0, from: f32::INFINITY, to: f32::INFINITY };
+
+    #[inline(always)]
+    fn is_some(&self) -> bool {
+        self.block != u32::MAX
+    }
+}
+
+/// A ray under way in a tree that [`SingleStart`] was made for.
+pub(crate) struct SingleRay<'a, L> {
+    accel: &'a Accel,
+    slabs: Slabs,
+    blocks: BlockRay,
+    /// No box ahead of this key is of interest.
+    limit_key: i32,
+    /// From heights to places in the range of boxes.
+    place_per_height: f32,
+    /// The nearest so far.
+    best: Candidate,
+    lanes: PhantomData<L>,
+}
+
+impl<'a, L: Lanes> SingleRay<'a, L> {
+    /// Starts with a ray; `None` where that does not come from nearby, or is not sound.
+    #[inline(always)]
+    pub(crate) fn start(accel: &'a Accel, start: &SingleStart, ray: &Ray) -> Option<Self> {
+        let Narrow { slabs, blocks, place_per_height } = L::start_single(start, ray)?;
+        let limit_key = slabs.s_max.to_bits() as i32 | LANE_BITS;
+        let best = Candidate::NONE;
+        Some(Self { accel, slabs, blocks, limit_key, place_per_height, best, lanes: PhantomData })
+    }
+
+    /// Goes on from a node.
+    #[inline(always)]
+    fn meet_node<O: Order>(&self, reference: u32, stack: &mut Stack<O::Entry>) -> Option<u32> {
+        let node = &self.accel.tree.nodes[reference as usize];
+        let (mask, keys) = L::meet_boxes(node, lanes::opaque(&self.slabs));
+        if mask & mask.wrapping_sub(1) != 0 {
+            Some(O::push_children::<L>(node, mask, keys, stack.with_room()))
+        } else if mask != 0 {
+            Some(L::only_child(node, mask))
+        } else {
+            self.pop::<O>(stack)
+        }
+    }
+
+    /// The next that is not beyond the limit.
+    #[inline(always)]
+    fn pop<O: Order>(&self, stack: &mut Stack<O::Entry>) -> Option<u32> {
+        loop {
+            let entry = stack.pop()?;
+            if !O::is_beyond(entry, self.limit_key) {
+                return Some(O::reference(entry));
+            }
+        }
+    }
+
+    /// Tests a leaf for the nearest hit; false where the plain search has to answer.
+    #[inline(always)]
+    fn meet_leaf_closest(&mut self, leaf: u32, ray: &Ray) -> bool {
+        let places = tag::blocks(leaf);
+        let mut number = places.start as u32;
+        for block in &self.accel.tree.blocks[places] {
+            let (mask, edges) = L::meet_triangles(block, lanes::opaque(&self.blocks));
+            if mask != 0 {
+                let crossings = L::place_crossings(&edges, &self.blocks);
+                let mut rest = mask & crossings.in_range;
+                while rest != 0 {
+                    let lane = rest.trailing_zeros();
+                    let is_sure = crossings.sure >> lane & 1 != 0;
+                    rest &= rest - 1;
+                    let from = L::lane(crossings.from, lane as usize);
+                    let to = L::lane(crossings.to, lane as usize);
+                    if is_sure && to < self.best.from {
+                        self.keep(Candidate { block: number, lane, from, to });
+                    } else if !(from > self.best.to) {
+                        match self.contest(ray, number, lane) {
+                            Outcome::Settled(Some(better)) => self.keep(better),
+                            Outcome::Settled(None) => {}
+                            Outcome::Unsettled => return false,
+                        }
+                    }
+                }
+            }
+            number += 1;
+        }
+        true
+    }
+
+    #[inline(always)]
+    fn keep(&mut self, better: Candidate) {
+        self.best = better;
+        self.blocks.range.last = better.to;
+        let place = better.to * self.place_per_height;
+        self.slabs.s_max = place + place.abs() * triangles::ROUNDINGS + f32::MIN_POSITIVE;
+        self.limit_key = self.slabs.s_max.to_bits() as i32 | LANE_BITS;
+    }
+
+    /// Looks closer at a triangle that may be met, and nearer than the best: what is better, if anything.
+    #[cold]
+    #[inline(never)]
+    fn contest(&self, ray: &Ray, block: u32, lane: u32) -> Outcome<Option<Candidate>> {
+        let found = match self.meet_exactly(ray, block, lane) {
+            Meeting::Miss => return Outcome::Settled(None),
+            Meeting::Touch { .. } => return Outcome::Unsettled,
+            Meeting::Hit { root, .. } => root.t,
+        };
+        if self.best.is_some() {
+            let Meeting::Hit { root: best, .. } = self.meet_exactly(ray, self.best.block, self.best.lane)
+            else {
+                return Outcome::Unsettled;
+            };
+            let names = |block: u32, lane: u32| {
+                let names = &self.accel.tree.names[block as usize];
+                (names.geometry, names.primitives[lane as usize % BLOCK])
+            };
+            let is_first = || names(block, lane) < names(self.best.block, self.best.lane);
+            if !(found < best.t || found == best.t && is_first()) {
+                return Outcome::Settled(None);
+            }
+        }
+        let height = (found * ray.direction.abs().max_element()) as f32;
+        let error = self.blocks.errors.height + height.abs() * triangles::ROUNDINGS;
+        Outcome::Settled(Some(Candidate { block, lane, from: height - error, to: height + error }))
+    }
+
+    fn meet_exactly(&self, ray: &Ray, block: u32, lane: u32) -> Meeting {
+        let shear = Shear::new(&ray.direction);
+        let origin = shear.local_origin(&ray.origin, &self.accel.holds.first_origin);
+        let corners = shear.axes.gather(&self.accel.tree.blocks[block as usize], lane as usize);
+        triangles::intersect(ray, shear, origin, corners)
+    }
+
+    /// Tests a leaf for any hit: whether there is one.
+    #[inline(always)]
+    fn meet_leaf_any(&self, leaf: u32, ray: &Ray) -> Outcome<bool> {
+        let places = tag::blocks(leaf);
+        let mut number = places.start as u32;
+        for block in &self.accel.tree.blocks[places] {
+            let (mask, edges) = L::meet_triangles(block, lanes::opaque(&self.blocks));
+            if mask != 0 {
+                let crossings = L::place_crossings(&edges, &self.blocks);
+                if mask & crossings.sure != 0 {
+                    return Outcome::Settled(true);
+                }
+                let rest = mask & crossings.in_range;
+                if rest != 0 {
+                    match self.look_closer(ray, number, rest) {
+                        Outcome::Settled(false) => {}
+                        settled => return settled,
+                    }
+                }
+            }
+            number += 1;
+        }
+        Outcome::Settled(false)
+    }
+
+    /// Whether one of the triangles of a block is met.
+    #[cold]
+    #[inline(never)]
+    fn look_closer(&self, ray: &Ray, block: u32, mut lanes: u32) -> Outcome<bool> {
+        while lanes != 0 {
+            match self.meet_exactly(ray, block, lanes.trailing_zeros()) {
+                Meeting::Miss => {}
+                Meeting::Hit { .. } => return Outcome::Settled(true),
+                Meeting::Touch { .. } => return Outcome::Unsettled,
+            }
+            lanes &= lanes - 1;
+        }
+        Outcome::Settled(false)
+    }
+
+    /// The nearest hit, once all was seen.
+    #[inline(always)]
+    pub(crate) fn winner(&self, ray: &Ray) -> Outcome<Option<Hit>> {
+        if !self.best.is_some() {
+            return Outcome::Settled(None);
+        }
+        let Candidate { block, lane, .. } = self.best;
+        let shear = Shear::new(&ray.direction);
+        let origin = shear.local_origin(&ray.origin, &self.accel.holds.first_origin);
+        let corners = &self.accel.tree.blocks[block as usize];
+        let (passage, inside) = L::pass(corners, lane as usize, &shear, &origin);
+        let root = if passage == Passage::Inside {
+            inside.root(inside.t(&shear))
+        } else {
+            match self.root_of_unclear(ray, block, lane) {
+                Some(root) => root,
+                None => return Outcome::Unsettled,
+            }
+        };
+        let names = &self.accel.tree.names[block as usize];
+        let (geometry, primitive) = (names.geometry, names.primitives[lane as usize % BLOCK]);
+        Outcome::Settled(Some(Hit {
+            root,
+            id: self.accel.geometries[geometry as usize].id,
+            primitive,
+            geometry,
+            instances: InstancePath::new(),
+            route: InstancePath::new(),
+        }))
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn root_of_unclear(&self, ray: &Ray, block: u32, lane: u32) -> Option<Root> {
+        match self.meet_exactly(ray, block, lane) {
+            Meeting::Hit { root, .. } => Some(root),
+            Meeting::Miss | Meeting::Touch { .. } => None,
+        }
+    }
+
+    /// Asks for what is read next, before it is needed.
+    #[inline(always)]
+    pub(crate) fn fetch(&self, reference: u32) {
+        if reference >> tag::SHIFT == tag::INNER {
+            self.accel.tree.nodes.get(reference as usize).map(lanes::fetch);
+        } else {
+            self.accel.tree.blocks.get(tag::blocks(reference).start).map(lanes::fetch);
+        }
+    }
+}
+
+/// What is asked of a ray, step by step.
+pub(crate) trait Goal {
+    /// Which boxes come first.
+    type Order: Order;
+    /// What it is to know.
+    type Answer;
+
+    /// Goes on from a node or a leaf.
+    fn step<L: Lanes>(
+        single: &mut SingleRay<L>,
+        reference: u32,
+        ray: &Ray,
+        stack: &mut Stack<<Self::Order as Order>::Entry>,
+    ) -> Step;
+
+    /// What the last step leads to.
+    fn answer<L: Lanes>(single: &SingleRay<L>, ray: &Ray, last: Step) -> Outcome<Self::Answer>;
+}
+
+/// The nearest hit.
+pub(crate) enum Nearest {}
+
+impl Goal for Nearest {
+    type Order = ByDistance;
+    type Answer = Option<Hit>;
+
+    #[inline(always)]
+    fn step<L: Lanes>(single: &mut SingleRay<L>, reference: u32, ray: &Ray, stack: &mut Stack<i64>) -> Step {
+        if reference >> tag::SHIFT == tag::INNER {
+            return single.meet_node::<ByDistance>(reference, stack).map_or(Step::Out, Step::On);
+        }
+        if !single.meet_leaf_closest(reference, ray) {
+            return Step::Unsettled;
+        }
+        single.pop::<ByDistance>(stack).map_or(Step::Out, Step::On)
+    }
+
+    #[inline(always)]
+    fn answer<L: Lanes>(single: &SingleRay<L>, ray: &Ray, last: Step) -> Outcome<Option<Hit>> {
+        if last == Step::Unsettled { Outcome::Unsettled } else { single.winner(ray) }
+    }
+}
+
+/// Whether there is any hit.
+pub(crate) enum Whether {}
+
+impl Goal for Whether {
+    type Order = AsBuilt;
+    type Answer = bool;
+
+    #[inline(always)]
+    fn step<L: Lanes>(single: &mut SingleRay<L>, reference: u32, ray: &Ray, stack: &mut Stack<u32>) -> Step {
+        if reference >> tag::SHIFT == tag::INNER {
+            return single.meet_node::<AsBuilt>(reference, stack).map_or(Step::Out, Step::On);
+        }
+        match single.meet_leaf_any(reference, ray) {
+            Outcome::Settled(true) => Step::Met,
+            Outcome::Settled(false) => single.pop::<AsBuilt>(stack).map_or(Step::Out, Step::On),
+            Outcome::Unsettled => Step::Unsettled,
+        }
+    }
+
+    #[inline(always)]
+    fn answer<L: Lanes>(_: &SingleRay<L>, _: &Ray, last: Step) -> Outcome<bool> {
+        if last == Step::Unsettled { Outcome::Unsettled } else { Outcome::Settled(last == Step::Met) }
+    }
+}
+
+/// A search with one ray.
+pub(crate) struct Alone<'a, 'r, G> {
+    accel: &'a Accel,
+    start: &'a SingleStart,
+    ray: &'r Ray,
+    goal: PhantomData<G>,
+}
+
+/// Searches along a ray.
+#[inline(always)]
+pub(crate) fn search<G: Goal>(
+    level: Level,
+    accel: &Accel,
+    start: &SingleStart,
+    ray: &Ray,
+) -> Outcome<G::Answer> {
+    level.run(Alone::<G> { accel, start, ray, goal: PhantomData })
+}
+
+impl<G: Goal> Task for Alone<'_, '_, G> {
+    type Output = Outcome<G::Answer>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Self::Output {
+        let Self { accel, start, ray, .. } = self;
+        let Some(mut single) = SingleRay::<L>::start(accel, start, ray) else {
+            return Outcome::Unsettled;
+        };
+        let mut stack = Stack::new();
+        let mut next = start.root;
+        loop {
+            match G::step(&mut single, next, ray, &mut stack) {
+                Step::On(reference) => next = reference,
+                last => return G::answer(&single, ray, last),
+            }
+        }
+    }
+}
