@@ -83,7 +83,7 @@ fn visit<'a, S: Search<'a>>(accel: &'a Accel, ray: &Ray, search: &mut S) {
                     let mut inner = place.clone();
                     inner.route.push(position);
                     inner.ids.push(geometry.id);
-                    pending.push((&instance.accel, instance.world_from_object.into_object(&ray), inner));
+                    pending.push((&instance.accel, instance.world_from_object.object_ray(&ray), inner));
                 }
                 GeometryKind::Shape(_) => {
                     meet_primitive(accel, &ray, position, 0, &place, search);

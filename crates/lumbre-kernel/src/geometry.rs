@@ -76,7 +76,7 @@ impl Placement {
 
     /// The same ray in the space of what is placed.
     #[inline(always)]
-    pub(crate) fn into_object(&self, ray: &Ray) -> Ray {
+    pub(crate) fn object_ray(&self, ray: &Ray) -> Ray {
         match self {
             Self::Still(map) => ray.into_object(map),
             Self::Moving(motion) => into_moving(ray, motion),

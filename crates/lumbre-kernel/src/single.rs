@@ -110,8 +110,7 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
     #[inline(always)]
     fn meet_leaf_closest(&mut self, leaf: u32, ray: &Ray) -> bool {
         let places = tag::blocks(leaf);
-        let mut number = places.start as u32;
-        for block in &self.accel.tree.blocks[places] {
+        for (number, block) in (places.start as u32..).zip(&self.accel.tree.blocks[places]) {
             let (mask, edges) = L::meet_triangles(block, lanes::opaque(&self.blocks));
             if mask != 0 {
                 let crossings = L::place_crossings(&edges, &self.blocks);
@@ -124,7 +123,10 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
                     let to = L::lane(crossings.to, lane as usize);
                     if is_sure && to < self.best.from {
                         self.keep(Candidate { block: number, lane, from, to });
-                    } else if !(from > self.best.to) {
+                    } else if from > self.best.to {
+                        // Farther: what is no number is not.
+                        continue;
+                    } else {
                         match self.contest(ray, number, lane) {
                             Outcome::Settled(Some(better)) => self.keep(better),
                             Outcome::Settled(None) => {}
@@ -133,7 +135,6 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
                     }
                 }
             }
-            number += 1;
         }
         true
     }
@@ -186,8 +187,7 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
     #[inline(always)]
     fn meet_leaf_any(&self, leaf: u32, ray: &Ray) -> Outcome<bool> {
         let places = tag::blocks(leaf);
-        let mut number = places.start as u32;
-        for block in &self.accel.tree.blocks[places] {
+        for (number, block) in (places.start as u32..).zip(&self.accel.tree.blocks[places]) {
             let (mask, edges) = L::meet_triangles(block, lanes::opaque(&self.blocks));
             if mask != 0 {
                 let crossings = L::place_crossings(&edges, &self.blocks);
@@ -202,7 +202,6 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
                     }
                 }
             }
-            number += 1;
         }
         Outcome::Settled(false)
     }

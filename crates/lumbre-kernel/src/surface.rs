@@ -37,7 +37,7 @@ pub(crate) fn surface(accel: &Accel, ray: &Ray, hit: &Hit) -> Surface {
     }
     let (instances, inner) = along(accel, hit);
     // The same steps as the search took, for the same bits.
-    let ray = instances.iter().fold(*ray, |ray, instance| instance.world_from_object.into_object(&ray));
+    let ray = instances.iter().fold(*ray, |ray, instance| instance.world_from_object.object_ray(&ray));
     let surface = bare_surface(inner, &ray, hit);
     let placed = |surface, instance: &&Instance| place(&surface, &instance.world_from_object.at(ray.time));
     instances.iter().rev().fold(surface, placed)

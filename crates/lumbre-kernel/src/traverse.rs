@@ -399,7 +399,7 @@ impl<'a, S: Search<'a>> Task for AmongAll<'a, '_, S> {
                     let GeometryKind::Instance(instance) = &standing.kind else {
                         unreachable!("the tag says so");
                     };
-                    let ray = instance.world_from_object.into_object(&frame.ray);
+                    let ray = instance.world_from_object.object_ray(&frame.ray);
                     let inner = &*instance.accel;
                     let mut boxes = BoxRay::passing_all();
                     let meets_tree =

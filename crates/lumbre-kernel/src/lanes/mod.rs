@@ -185,7 +185,7 @@ impl Axes {
             }
             places
         };
-        &AXES[PLACES[((sizes % 8) << 3 | signs % 8) as usize] as usize % 8]
+        &AXES[PLACES[(((sizes % 8) << 3) | (signs % 8)) as usize] as usize % 8]
     }
 
     /// A vector's components in this order.
@@ -363,6 +363,20 @@ pub(crate) fn fetch<T>(value: &T) {
     }
     #[cfg(not(target_arch = "x86_64"))]
     let _ = value;
+}
+
+/// What [`Lanes::start_single`] gives at a level, for tests.
+#[cfg(test)]
+pub(crate) fn start_single_at(level: Level, start: &SingleStart, ray: &Ray) -> Option<Narrow> {
+    struct Starting<'a>(&'a SingleStart, &'a Ray);
+    impl Task for Starting<'_> {
+        type Output = Option<Narrow>;
+        #[inline(always)]
+        fn run<L: Lanes>(self) -> Self::Output {
+            L::start_single(self.0, self.1)
+        }
+    }
+    level.run(Starting(start, ray))
 }
 
 /// What [`Lanes::meet_boxes`] gives at a level, and where the ray enters each box, for tests.

@@ -48,7 +48,7 @@ fn check(block: &TriangleBlock, ray: &Ray, mesh_origin: DVec3, tally: &mut Tally
             .map_or(((1 << BLOCK) - 1, 0, [[f32::NEG_INFINITY, f32::INFINITY]; BLOCK]), |blocks| {
                 meet_triangles_at(level, block, blocks)
             });
-        for lane in 0..BLOCK {
+        for (lane, [from, to]) in between.into_iter().enumerate() {
             let meeting = intersect(ray, shear, origin, shear.axes.gather(block, lane));
             let is_hit = match meeting {
                 Meeting::Miss => false,
@@ -56,7 +56,7 @@ fn check(block: &TriangleBlock, ray: &Ray, mesh_origin: DVec3, tally: &mut Tally
                 Meeting::Touch { root, .. } => ray.contains(root.t),
             };
             if let Meeting::Hit { root, .. } = meeting {
-                let ([from, to], height) = (between[lane], root.t * shear.direction_z.abs());
+                let height = root.t * shear.direction_z.abs();
                 assert!(
                     !(height < f64::from(from) || height > f64::from(to)),
                     "{level:?} places lane {lane} wrongly along {ray:?} of {block:?}: {height} from {from} to {to}"

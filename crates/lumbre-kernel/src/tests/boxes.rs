@@ -6,7 +6,8 @@ use lumbre_geometry::{Aabb, Ray};
 use lumbre_math::DVec3;
 
 use super::scenes::Random;
-use crate::lanes::{LANE_BITS, Level, meet_boxes_at};
+use crate::holds::{Holds, SingleStart};
+use crate::lanes::{LANE_BITS, Level, meet_boxes_at, start_single_at};
 use crate::node::{BoxRay, Node, Units, WIDTH};
 use crate::primitive::Bounds;
 
@@ -48,7 +49,7 @@ fn component(random: &mut Random) -> f64 {
 
 fn reached_boxes_are_met(level: Level, seed: u64, rounds: usize) {
     let mut random = Random(seed);
-    let mut met = 0;
+    let (mut met, mut met_by_single) = (0, 0);
     for _ in 0..rounds {
         let size = 10f64.powf(random.between(-20.0, 20.0));
         let offset = random.vector() * size * 10f64.powf(random.between(-2.0, 6.0));
@@ -101,9 +102,32 @@ fn reached_boxes_are_met(level: Level, seed: u64, rounds: usize) {
             let limit_key = boxes.progress.up(t).to_bits() as i32 | LANE_BITS;
             assert!(keys[lane] <= limit_key, "{ray:?} at {t}");
             met += 1;
+
+            // The same from nearby, in single precision before anything else.
+            let longest = direction.abs().max_element();
+            let direction = direction / longest * (size * random.between(0.01, 30.0));
+            let distance = size * [0.0, random.unit(), 7.0 * random.unit()][random.below(3)];
+            let t = distance / direction.abs().max_element();
+            let range = [(t, t), (0.0, t), (t, f64::INFINITY), (0.0, f64::INFINITY)][random.below(4)];
+            let ray = Ray::new(target - t * direction, direction).with_range(range.0, range.1);
+            let start = start_of(&units, random.vector() * size);
+            let Some(narrow) = start.and_then(|start| start_single_at(level, &start, &ray)) else { continue };
+            let (mask, _) = meet_boxes_at(level, &node, &narrow.slabs);
+            assert!(
+                mask & (1 << lane) != 0,
+                "{ray:?} at {t} misses {bounds:?} of {units:?} in single precision"
+            );
+            met_by_single += 1;
         }
     }
-    assert!(met > rounds * 5);
+    assert!(met > rounds * 5 && met_by_single > rounds, "{met} {met_by_single}");
+}
+
+/// For a tree of a mesh at this origin.
+fn start_of(units: &Units, first_origin: DVec3) -> Option<SingleStart> {
+    let largest_corner = (1.0 / units.scale) as f32;
+    let holds = Holds { first_origin, largest_corner, ..Holds::new(&[], 0.0, 0.0) };
+    SingleStart::new(&Holds { only_triangles: true, has_one_origin: true, ..holds }, units, Some(0))
 }
 
 #[test]

@@ -14,6 +14,7 @@ mod proof;
 mod refit;
 mod save;
 mod scenes;
+mod single;
 mod spheres;
 mod surfaces;
 mod watertight;

@@ -1,0 +1,117 @@
+//! Single precision decides as double precision does: the search in `single` beside the plain one.
+
+use lumbre_geometry::Ray;
+use lumbre_math::{DVec3, Vec3};
+
+use super::scenes::Random;
+use crate::lanes::Level;
+use crate::single::{self, Nearest, Outcome};
+use crate::{Accel, BuildOptions, Geometry, GeometryKind, Preset, TriangleMesh};
+
+/// A grid of hills, with a sheet twice in the same place, needles and some triangles seen on edge.
+fn mesh(random: &mut Random, origin: DVec3, size: f64) -> TriangleMesh {
+    let mut mesh = TriangleMesh { origin, ..TriangleMesh::default() };
+    let side = 24;
+    for row in 0..=side {
+        for column in 0..=side {
+            let (x, z) = (f64::from(column) / f64::from(side) - 0.5, f64::from(row) / f64::from(side) - 0.5);
+            let y = 0.1 * (9.0 * x).sin() * (7.0 * z).cos();
+            mesh.positions.push((2.0 * size * DVec3::new(x, y, z)).as_vec3());
+        }
+    }
+    for row in 0..side {
+        for column in 0..side {
+            let a = row * (side + 1) + column;
+            let (b, c, d) = (a + 1, a + side + 1, a + side + 2);
+            mesh.indices.extend([[a, c, b], [b, c, d]]);
+            if row == 3 {
+                mesh.indices.push([b, c, d]);
+            }
+        }
+    }
+    for _ in 0..300 {
+        let first = mesh.positions.len() as u32;
+        let (from, along) = (size * random.vector(), size * random.vector());
+        let across = size * random.vector() * [1e-5, 0.1, 0.0][random.below(3)];
+        mesh.positions.extend([from, from + along, from + 0.4 * along + across].map(|p| p.as_vec3()));
+        mesh.indices.push([first, first + 1, first + 2]);
+    }
+    mesh
+}
+
+/// A ray at something of the mesh: often at an edge or a corner, and from a place on another triangle; its range often ends
+/// where it meets something.
+fn ray(random: &mut Random, mesh: &TriangleMesh, size: f64) -> Ray {
+    let place = |random: &mut Random| {
+        let corners = mesh.indices[random.below(mesh.indices.len())].map(|i| mesh.positions[i as usize]);
+        let [a, b, c] = corners.map(Vec3::as_dvec3);
+        match random.below(5) {
+            0 => a,
+            1 => a.lerp(b, [0.5, random.unit()][random.below(2)]),
+            _ => {
+                let (u, v) = (random.unit(), random.unit());
+                let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+                a + u * (b - a) + v * (c - a)
+            }
+        }
+    };
+    let target = place(random);
+    let start = if random.unit() < 0.4 { place(random) } else { 3.0 * size * random.vector() };
+    let mut direction = target - start;
+    if random.unit() < 0.1 {
+        direction = [DVec3::X, -DVec3::Y, DVec3::Z][random.below(3)] * size;
+    }
+    let range = [(0.0, f64::INFINITY), (0.0, 1.0), (1e-6, 1.0 - 1e-6), (0.5, 2.0), (1.0, 1.0), (-1.0, 1.0)];
+    let (t_min, t_max) = range[random.below(range.len())];
+    Ray::new(mesh.origin + start, direction).with_range(t_min, t_max)
+}
+
+#[test]
+fn single_precision_answers_with_the_bits_of_double_precision() {
+    let mut random = Random(91);
+    for (size, offset) in [(1.0, 0.0), (1e-6, 0.0), (3e7, 1.0), (0.02, 1e6), (400.0, 50.0)] {
+        let origin = size * offset * DVec3::new(1.0, -0.7, 0.4);
+        let meshes = [mesh(&mut random, origin, size), mesh(&mut random, origin, 0.7 * size)];
+        for preset in Preset::ALL {
+            let list: Vec<_> = meshes.iter().map(|mesh| GeometryKind::Mesh(mesh.clone().into())).collect();
+            let list = list.into_iter().zip(5..).map(|(kind, id)| Geometry { id, kind }).collect();
+            let accel = Accel::build(list, &BuildOptions { preset }).unwrap();
+            let start = accel.single.as_ref().expect("made for this");
+            for level in Level::all() {
+                let (mut settled, mut hits) = (0, 0);
+                let rays: Vec<_> = (0..6_000).map(|i| ray(&mut random, &meshes[i % 2], size)).collect();
+                let mut in_batch = vec![None; rays.len()];
+                accel.closest_batch_at(level, &rays, &mut in_batch);
+                let mut any_in_batch = vec![false; rays.len()];
+                accel.any_batch_at(level, &rays, &mut any_in_batch);
+                for ((ray, in_batch), any_in_batch) in rays.iter().zip(&in_batch).zip(&any_in_batch) {
+                    let plain = accel.closest_plainly_at(level, ray);
+                    assert_eq!(accel.closest_at(level, ray), plain, "{level:?} {preset:?} {ray:?}");
+                    assert_eq!(*in_batch, plain, "{level:?} {preset:?} {ray:?}");
+                    assert_eq!(accel.any_at(level, ray), plain.is_some(), "{level:?} {preset:?} {ray:?}");
+                    assert_eq!(*any_in_batch, plain.is_some(), "{level:?} {preset:?} {ray:?}");
+                    let outcome = single::search::<Nearest>(level, &accel, start, ray);
+                    settled += u32::from(outcome != Outcome::Unsettled);
+                    hits += u32::from(plain.is_some());
+                }
+                assert!(hits > 1_500 && settled > 1_500, "{hits} hits, {settled} settled");
+            }
+        }
+    }
+}
+
+#[test]
+fn single_precision_settles_nearly_all_rays_that_nobody_aims() {
+    let mut random = Random(92);
+    let mesh = mesh(&mut random, DVec3::ZERO, 1.0);
+    let list = vec![Geometry { id: 1, kind: GeometryKind::Mesh(mesh.into()) }];
+    let accel = Accel::build(list, &BuildOptions::default()).unwrap();
+    let start = accel.single.as_ref().expect("made for this");
+    let mut unsettled = 0;
+    for _ in 0..20_000 {
+        let ray = Ray::new(2.0 * random.vector(), random.vector());
+        let outcome = single::search::<Nearest>(accel.level, &accel, start, &ray);
+        unsettled += u32::from(outcome == Outcome::Unsettled);
+    }
+    assert!(unsettled < 20, "{unsettled}");
+}
