@@ -46,7 +46,7 @@ pub(crate) fn surface(accel: &Accel, ray: &Ray, hit: &Hit) -> Surface {
 /// The surface at a hit, in the space of its innermost instance.
 pub(crate) fn surface_in_object(accel: &Accel, ray: &Ray, hit: &Hit) -> Surface {
     let (instances, inner) = along(accel, hit);
-    let ray = instances.iter().fold(*ray, |ray, instance| instance.world_from_object.into_object(&ray));
+    let ray = instances.iter().fold(*ray, |ray, instance| instance.world_from_object.object_ray(&ray));
     bare_surface(inner, &ray, hit)
 }
 
