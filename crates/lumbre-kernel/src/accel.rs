@@ -1,7 +1,9 @@
 //! The tree and its queries.
 
 use std::fmt;
+use std::io;
 use std::ops::ControlFlow;
+use std::path::Path;
 use std::sync::OnceLock;
 
 use lumbre_geometry::{Aabb, Ray, Surface};
@@ -15,8 +17,9 @@ use crate::query::{All, Any, Batch, Closest, Count, If};
 use crate::single::{self, Nearest, Outcome, Whether};
 use crate::winding::{self, Moments};
 use crate::{
-    ClosestPoint, Geometry, GeometryKind, Hit, LoadError, NoClosestPoint, NoWindingNumber, QueryOptions,
-    RefitError, SphereCloud, batch, inside, nearest, prepare, refit, save, surface, traverse,
+    ClosestPoint, Geometry, GeometryKind, Hit, LoadError, MapError, NoClosestPoint, NoWindingNumber,
+    QueryOptions, RefitError, SphereCloud, batch, file, inside, nearest, prepare, refit, save, surface,
+    traverse,
 };
 
 /// A bounding volume hierarchy over geometries, ready for queries from any number of threads.
@@ -164,6 +167,33 @@ impl Accel {
         save::from_bytes(bytes, geometries)
     }
 
+    /// Writes the tree to a file that [`Accel::map`] uses in place: some fifty bytes a triangle. The geometries are not in it,
+    /// nor the trees that stand in this one as instances. A file that is there already is replaced as a whole once the new one
+    /// is complete; who has it mapped keeps the old one.
+    ///
+    /// # Errors
+    /// When the file cannot be written, or the machine is not little-endian.
+    pub fn save(&self, path: impl AsRef<Path>) -> io::Result<()> {
+        file::save(self, path.as_ref())
+    }
+
+    /// The tree that [`Accel::save`] wrote, over the geometries that it was saved with: its nodes and leaves stay in the file,
+    /// which is mapped into memory, so that little is read before it is needed, and processes share what is.
+    ///
+    /// The file is looked through once, for its checksum and for every reference in it; the boxes in it are believed. Of
+    /// geometries that moved meanwhile, it is refused: [`Accel::from_bytes`] takes them. A later [`Accel::refit`] takes the
+    /// tree over into memory.
+    ///
+    /// **While it is mapped, nobody may write to the file or make it shorter**: reading what another process cut off ends
+    /// this one (by the signal SIGBUS, on Unix), and of what is changed in place nothing is promised. Replacing the file, as
+    /// `save` does, and removing it are fine.
+    ///
+    /// # Errors
+    /// [`MapError`] when the file cannot be mapped, is damaged, of another version or of other geometries.
+    pub fn map(path: impl AsRef<Path>, geometries: Vec<Geometry>) -> Result<Self, MapError> {
+        file::map(path.as_ref(), geometries)
+    }
+
     /// The nearest hit in the ray's range. Of hits at the same `t`, the one whose (path, geometry, primitive) comes
     /// first, by positions in the lists that the trees were built from.
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
@@ -210,7 +240,7 @@ impl Accel {
     }
 
     /// The tree with a mask for each of its geometries, by position, for [`QueryOptions::mask`]; without, all bits are set.
-    /// They are not saved with it, nor kept by a refit.
+    /// They are saved with it, and stay through a refit.
     ///
     /// # Panics
     /// When there are not as many masks as geometries.
@@ -436,19 +466,20 @@ impl Accel {
         self.primitives
     }
 
-    /// Bytes of the tree itself: nodes, leaves and references, not the meshes and not the instances' trees.
+    /// Bytes of the tree itself: nodes, leaves and references, not the meshes, not the instances' trees, and not what lies in a
+    /// mapped file.
     pub fn memory_bytes(&self) -> usize {
         fn bytes<T>(v: &Vec<T>) -> usize {
             v.capacity() * size_of::<T>()
         }
         size_of::<Self>()
             + bytes(&self.geometries)
-            + bytes(&self.tree.nodes)
-            + bytes(&self.tree.blocks)
-            + bytes(&self.tree.names)
-            + bytes(&self.tree.entries)
-            + bytes(&self.tree.sphere_blocks)
-            + bytes(&self.tree.sphere_names)
+            + self.tree.nodes.own_bytes()
+            + self.tree.blocks.own_bytes()
+            + self.tree.names.own_bytes()
+            + self.tree.entries.own_bytes()
+            + self.tree.sphere_blocks.own_bytes()
+            + self.tree.sphere_names.own_bytes()
             + bytes(&self.infinite)
             + bytes(&self.masks)
             + self.moments.get().map_or(0, Moments::memory_bytes)

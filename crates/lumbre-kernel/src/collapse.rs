@@ -4,17 +4,20 @@
 //! dynamic programming: H. Ylitie, T. Karras, S. Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide
 //! BVHs", High Performance Graphics, 2017. Leaves are those of the binary tree.
 
+use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
 use crate::build::{Binary, BinaryNode, Fork, Name};
 use crate::node::{Node, WIDTH, tag};
 use crate::primitive::{Bounds, Kind, Traits};
 use crate::spheres::SphereBlock;
+use crate::store::Store;
 use crate::triangles::{BLOCK, BlockNames, TriangleBlock};
 use crate::{BuildError, Geometry, GeometryKind, SphereCloud, TriangleMesh};
 
 /// A primitive in a leaf that is no triangle, or outside the tree.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
 pub(crate) struct Entry {
     /// Position in the tree's list.
     pub(crate) geometry: u32,
@@ -53,14 +56,14 @@ impl Entry {
 #[derive(Debug, Default)]
 pub(crate) struct Packed {
     /// Each before all that are below it.
-    pub(crate) nodes: Vec<Node>,
-    pub(crate) blocks: Vec<TriangleBlock>,
+    pub(crate) nodes: Store<Node>,
+    pub(crate) blocks: Store<TriangleBlock>,
     /// As many as there are blocks.
-    pub(crate) names: Vec<BlockNames>,
-    pub(crate) entries: Vec<Entry>,
-    pub(crate) sphere_blocks: Vec<SphereBlock>,
+    pub(crate) names: Store<BlockNames>,
+    pub(crate) entries: Store<Entry>,
+    pub(crate) sphere_blocks: Store<SphereBlock>,
     /// As many as there are blocks of spheres.
-    pub(crate) sphere_names: Vec<BlockNames>,
+    pub(crate) sphere_names: Store<BlockNames>,
     /// The reference to the root; `None` when there is nothing finite.
     pub(crate) root: Option<u32>,
 }
@@ -313,8 +316,8 @@ pub(crate) fn pack(
         let names = &names[span.first as usize..][..span.count as usize];
         fill_sphere_block(cloud(geometries, names[0][0]), names)
     };
-    let blocks = spans.par_iter().with_min_len(256).map(block).collect();
-    let sphere_blocks = sphere_spans.par_iter().with_min_len(256).map(sphere_block).collect();
+    let blocks: Vec<_> = spans.par_iter().with_min_len(256).map(block).collect();
+    let sphere_blocks: Vec<_> = sphere_spans.par_iter().with_min_len(256).map(sphere_block).collect();
     let name = |span: &Span| {
         let names = &names[span.first as usize..][..span.count as usize];
         let mut named = BlockNames::empty(names[0][0]);
@@ -323,9 +326,17 @@ pub(crate) fn pack(
         }
         named
     };
-    let sphere_names = sphere_spans.par_iter().with_min_len(256).map(name).collect();
-    let names = spans.par_iter().with_min_len(256).map(name).collect();
-    Ok(Packed { nodes, blocks, names, entries, sphere_blocks, sphere_names, root: Some(root) })
+    let sphere_names: Vec<_> = sphere_spans.par_iter().with_min_len(256).map(name).collect();
+    let names: Vec<_> = spans.par_iter().with_min_len(256).map(name).collect();
+    Ok(Packed {
+        nodes: nodes.into(),
+        blocks: blocks.into(),
+        names: names.into(),
+        entries: entries.into(),
+        sphere_blocks: sphere_blocks.into(),
+        sphere_names: sphere_names.into(),
+        root: Some(root),
+    })
 }
 
 fn mesh(geometries: &[Geometry], geometry: u32) -> &TriangleMesh {

@@ -33,6 +33,7 @@
 //! A child that is not there has planes of ±f32::MAX, inside out. Since |c| is far below f32::MAX |r|, every ray enters it
 //! at more than 2¹⁰⁶ and leaves it before zero: it is never met.
 
+use bytemuck::{Pod, Zeroable};
 use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
 
@@ -91,7 +92,7 @@ pub(crate) mod tag {
 pub(crate) const WIDTH: usize = 8;
 
 /// Up to eight boxes and what they hold.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub(crate) struct Node {
     /// Lower and upper x, y and z planes of the boxes: `planes[2 * axis + side]`.
@@ -101,6 +102,8 @@ pub(crate) struct Node {
     pub(crate) children: [u32; WIDTH],
     /// How many children there are, in the first lanes.
     pub(crate) len: u32,
+    // So that no byte of it is left open.
+    pub(crate) rest: [u32; 7],
 }
 
 const _: () = assert!(size_of::<Node>() == 256);
@@ -109,7 +112,7 @@ impl Node {
     /// A node without children: its boxes are inside out.
     pub(crate) const EMPTY: Self = {
         let (low, high) = ([f32::MAX; WIDTH], [-f32::MAX; WIDTH]);
-        Self { planes: [low, high, low, high, low, high], children: [u32::MAX; WIDTH], len: 0 }
+        Self { planes: [low, high, low, high, low, high], children: [u32::MAX; WIDTH], len: 0, rest: [0; 7] }
     };
 }
 

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::sync::OnceLock;
 
+use lumbre_geometry::Aabb;
 use lumbre_math::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -92,12 +93,18 @@ pub(crate) fn refit(accel: &mut Accel, geometries: Vec<Geometry>) -> Result<f64,
     Ok(if built_cost > 0.0 { cost / built_cost } else { 1.0 })
 }
 
+/// Everything that can be hit is to have a place in the tree. Answers the boxes of the entries there; `None` of what became
+/// empty.
+pub(crate) fn check_places(accel: &Accel, parts: &Parts) -> Result<Vec<Option<Aabb>>, RefitError> {
+    check_triangles(accel, &accel.geometries)?;
+    check_spheres(accel, &accel.geometries)?;
+    entry_boxes(accel, parts)
+}
+
 /// Gives the nodes and blocks of a tree what its geometries, whose parts these are, say. What it refuses leaves the tree as
 /// it was.
 pub(crate) fn fit(accel: &mut Accel, parts: Parts) -> Result<(), RefitError> {
-    check_triangles(accel, &accel.geometries)?;
-    check_spheres(accel, &accel.geometries)?;
-    let boxes = entry_boxes(accel, &parts)?;
+    let boxes = check_places(accel, &parts)?;
 
     // From here on nothing can fail.
     let geometries = &accel.geometries;
@@ -112,8 +119,9 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts) -> Result<(), RefitError> {
     let tree = &mut accel.tree;
     let block_boxes: Vec<Bounds> = tree
         .blocks
+        .to_mut()
         .par_iter_mut()
-        .zip(&tree.names)
+        .zip(tree.names.par_iter())
         .with_min_len(256)
         .map(|(block, names)| match &boxers[names.geometry as usize] {
             Some(boxer) => fill_block(block, names, boxer),
@@ -122,8 +130,9 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts) -> Result<(), RefitError> {
         .collect();
     let cloud_boxes: Vec<Bounds> = tree
         .sphere_blocks
+        .to_mut()
         .par_iter_mut()
-        .zip(&tree.sphere_names)
+        .zip(tree.sphere_names.par_iter())
         .with_min_len(256)
         .map(|(block, names)| match &geometries[names.geometry as usize].kind {
             GeometryKind::Spheres(cloud) => fill_sphere_block(block, names, cloud, &units),
@@ -137,8 +146,9 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts) -> Result<(), RefitError> {
 
     // Children stand behind their parents.
     let mut node_boxes = vec![Bounds::EMPTY; tree.nodes.len()];
-    for place in (0..tree.nodes.len()).rev() {
-        let node = &mut tree.nodes[place];
+    let nodes = tree.nodes.to_mut();
+    for place in (0..nodes.len()).rev() {
+        let node = &mut nodes[place];
         let mut whole = Bounds::EMPTY;
         for lane in 0..node.len as usize % (WIDTH + 1) {
             let child = node.children[lane];
@@ -273,7 +283,7 @@ fn check_spheres(accel: &Accel, geometries: &[Geometry]) -> Result<(), RefitErro
 }
 
 /// The boxes of the entries in the tree; `None` of what became empty.
-fn entry_boxes(accel: &Accel, parts: &Parts) -> Result<Vec<Option<lumbre_geometry::Aabb>>, RefitError> {
+fn entry_boxes(accel: &Accel, parts: &Parts) -> Result<Vec<Option<Aabb>>, RefitError> {
     // In the order of their names, as they were taken apart.
     let mut has_place = vec![false; parts.boxed.len()];
     let boxes = accel

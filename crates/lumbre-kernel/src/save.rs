@@ -3,12 +3,12 @@
 //! What is written down is how the tree is put together: which nodes are in which, and which primitives in which leaf, some
 //! six bytes a triangle. Boxes and packed corners are not; they are computed again from the geometries when the bytes are
 //! read, in a fraction of the time of a build. So bytes that come from elsewhere cannot make a tree that answers wrongly: they
-//! are refused, or they say how to arrange what is there. For the same reason nothing is mapped into memory as it is.
+//! are refused, or they say how to arrange what is there. To map a tree into memory as it is, see `file`.
 //!
 //! All numbers are u32, the least byte first. The file: eight bytes of magic; the version; how many geometries, nodes, blocks,
-//! blocks of spheres and entries there are; the reference to the root, or 2³² - 1; for each geometry its kind and how many primitives it has; for
+//! blocks of spheres, entries and masks there are; the reference to the root, or 2³² - 1; for each geometry its kind and how many primitives it has; for
 //! each node how many children it has, and references to them; for each block its geometry and eight triangles, 2³² - 1 for
-//! none; for each block of spheres the same; for each entry its geometry, and which primitive, with the top bit set in the last of a leaf. Then a checksum of eight
+//! none; for each block of spheres the same; for each entry its geometry, and which primitive, with the top bit set in the last of a leaf; the masks. Then a checksum of eight
 //! bytes of everything before it: FNV-1a of 64 bits (G. Fowler, L. Noll, K. Vo, D. Eastlake, "The FNV Non-Cryptographic Hash
 //! Algorithm").
 
@@ -25,7 +25,7 @@ use crate::{BuildError, Geometry, GeometryKind};
 
 const MAGIC: [u8; 8] = *b"LumbTree";
 /// Changes with the format, and with what the numbers mean.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 const NONE: u32 = u32::MAX;
 
 /// Why bytes are no tree over these geometries.
@@ -55,6 +55,9 @@ pub enum LoadError {
         /// What it is, and where.
         what: String,
     },
+    /// The geometries are of the right kinds and sizes, but not those that a mapped tree was saved with: vertices, shapes
+    /// or transforms moved.
+    Moved,
     /// The tree was built of other geometries, or these changed too much.
     OtherGeometries(RefitError),
 }
@@ -71,6 +74,7 @@ impl fmt::Display for LoadError {
             }
             Self::Damaged => write!(f, "the saved tree is damaged: its checksum is wrong"),
             Self::Inconsistent { what } => write!(f, "the saved tree is inconsistent: {what}"),
+            Self::Moved => write!(f, "the saved tree does not fit: the geometries moved since"),
             Self::OtherGeometries(error) => write!(f, "the saved tree does not fit: {error}"),
         }
     }
@@ -92,7 +96,7 @@ fn checksum(bytes: &[u8]) -> u64 {
 }
 
 /// The kind of a geometry in a file, and how many primitives it has.
-fn signature(geometry: &Geometry) -> [u32; 2] {
+pub(crate) fn signature(geometry: &Geometry) -> [u32; 2] {
     match &geometry.kind {
         GeometryKind::Mesh(mesh) => [tag::TRIANGLES, mesh.indices.len() as u32],
         GeometryKind::Spheres(cloud) => [tag::SPHERES, cloud.spheres.len() as u32],
@@ -114,6 +118,7 @@ pub(crate) fn to_bytes(accel: &Accel) -> Vec<u8> {
     put(tree.names.len() as u32);
     put(tree.sphere_names.len() as u32);
     put(tree.entries.len() as u32);
+    put(accel.masks.len() as u32);
     put(tree.root.unwrap_or(NONE));
     accel.geometries.iter().flat_map(signature).for_each(&mut put);
     for node in &tree.nodes {
@@ -127,6 +132,7 @@ pub(crate) fn to_bytes(accel: &Accel) -> Vec<u8> {
     for entry in &tree.entries {
         entry.to_words().into_iter().for_each(&mut put);
     }
+    accel.masks.iter().copied().for_each(&mut put);
     let checksum = checksum(&bytes);
     bytes.extend_from_slice(&checksum.to_le_bytes());
     bytes
@@ -152,7 +158,7 @@ impl Words<'_> {
     }
 }
 
-const HEADER: usize = MAGIC.len() + 7 * 4;
+const HEADER: usize = MAGIC.len() + 8 * 4;
 const CHECKSUM: usize = 8;
 
 /// See [`Accel::from_bytes`].
@@ -169,7 +175,7 @@ pub(crate) fn from_bytes(bytes: &[u8], geometries: Vec<Geometry>) -> Result<Acce
     if version != VERSION {
         return Err(LoadError::OtherVersion { found: version, expected: VERSION });
     }
-    let [geometry_count, node_count, block_count, sphere_block_count, entry_count, root] =
+    let [geometry_count, node_count, block_count, sphere_block_count, entry_count, mask_count, root] =
         words.array().unwrap_or_default();
     let counted = |count: u32, least: u64| u64::from(count) * least;
     // A node has a length and one child at least.
@@ -178,7 +184,8 @@ pub(crate) fn from_bytes(bytes: &[u8], geometries: Vec<Geometry>) -> Result<Acce
         + counted(node_count, 8)
         + counted(block_count, 36)
         + counted(sphere_block_count, 36)
-        + counted(entry_count, 8);
+        + counted(entry_count, 8)
+        + counted(mask_count, 4);
     if (found as u64) < least || !found.is_multiple_of(4) {
         let expected = usize::try_from(least).unwrap_or(usize::MAX);
         return Err(LoadError::WrongLength { found, expected });
@@ -200,7 +207,7 @@ pub(crate) fn from_bytes(bytes: &[u8], geometries: Vec<Geometry>) -> Result<Acce
         }
     }
     let mut tree = Packed { root: (root != NONE).then_some(root), ..Packed::default() };
-    tree.nodes.reserve_exact(node_count as usize);
+    let mut nodes = Vec::with_capacity(node_count as usize);
     for place in 0..node_count {
         let len = words.next().ok_or_else(ends)?;
         if len == 0 || len as usize > WIDTH {
@@ -210,21 +217,32 @@ pub(crate) fn from_bytes(bytes: &[u8], geometries: Vec<Geometry>) -> Result<Acce
         for child in &mut node.children[..len as usize] {
             *child = words.next().ok_or_else(ends)?;
         }
-        tree.nodes.push(node);
+        nodes.push(node);
     }
-    tree.names.reserve_exact(block_count as usize);
+    tree.nodes = nodes.into();
+    let mut names = Vec::with_capacity(block_count as usize);
     for _ in 0..block_count {
         let geometry = words.next().ok_or_else(ends)?;
-        tree.names.push(BlockNames { geometry, primitives: words.array().ok_or_else(ends)? });
+        names.push(BlockNames { geometry, primitives: words.array().ok_or_else(ends)? });
     }
-    tree.sphere_names.reserve_exact(sphere_block_count as usize);
+    tree.names = names.into();
+    let mut names = Vec::with_capacity(sphere_block_count as usize);
     for _ in 0..sphere_block_count {
         let geometry = words.next().ok_or_else(ends)?;
-        tree.sphere_names.push(BlockNames { geometry, primitives: words.array().ok_or_else(ends)? });
+        names.push(BlockNames { geometry, primitives: words.array().ok_or_else(ends)? });
     }
-    tree.entries.reserve_exact(entry_count as usize);
+    tree.sphere_names = names.into();
+    let mut entries = Vec::with_capacity(entry_count as usize);
     for _ in 0..entry_count {
-        tree.entries.push(Entry::from_words(words.array().ok_or_else(ends)?));
+        entries.push(Entry::from_words(words.array().ok_or_else(ends)?));
+    }
+    tree.entries = entries.into();
+    if mask_count != 0 && mask_count != geometry_count {
+        return inconsistent(format!("{mask_count} masks for {geometry_count} geometries"));
+    }
+    let mut masks = Vec::with_capacity(mask_count as usize);
+    for _ in 0..mask_count {
+        masks.push(words.next().ok_or_else(ends)?);
     }
     if !words.words.is_empty() {
         return Err(LoadError::WrongLength { found, expected: found - 4 * words.words.len() });
@@ -233,11 +251,12 @@ pub(crate) fn from_bytes(bytes: &[u8], geometries: Vec<Geometry>) -> Result<Acce
     let parts = take_apart(&geometries).map_err(unsound)?;
     check_structure(&tree, &geometries)?;
     check_names(&tree, &geometries)?;
-    tree.blocks = vec![TriangleBlock::EMPTY; tree.names.len()];
-    tree.sphere_blocks = vec![SphereBlock::EMPTY; tree.sphere_names.len()];
+    tree.blocks = vec![TriangleBlock::EMPTY; tree.names.len()].into();
+    tree.sphere_blocks = vec![SphereBlock::EMPTY; tree.sphere_names.len()].into();
 
     let mut accel = empty_over(geometries);
     accel.tree = tree;
+    accel.masks = masks;
     refit::fit(&mut accel, parts).map_err(LoadError::OtherGeometries)?;
     Ok(accel)
 }
@@ -247,7 +266,7 @@ fn inconsistent<T>(what: String) -> Result<T, LoadError> {
 }
 
 /// Every node but the first, every block and every entry is to be named by one reference, from a node before it.
-fn check_structure(tree: &Packed, geometries: &[Geometry]) -> Result<(), LoadError> {
+pub(crate) fn check_structure(tree: &Packed, geometries: &[Geometry]) -> Result<(), LoadError> {
     let mut nodes = vec![false; tree.nodes.len()];
     let mut blocks = vec![false; tree.names.len()];
     let mut sphere_blocks = vec![false; tree.sphere_names.len()];
@@ -308,7 +327,7 @@ fn check_structure(tree: &Packed, geometries: &[Geometry]) -> Result<(), LoadErr
 }
 
 /// Every primitive is to be there, and named once.
-fn check_names(tree: &Packed, geometries: &[Geometry]) -> Result<(), LoadError> {
+pub(crate) fn check_names(tree: &Packed, geometries: &[Geometry]) -> Result<(), LoadError> {
     // Where the primitives of each geometry begin, in one list.
     let mut starts = Vec::with_capacity(geometries.len());
     let mut all = 0;

@@ -12,9 +12,9 @@ use lumbre_geometry::{Ray, Root};
 
 use crate::holds::SingleStart;
 use crate::lanes::{self, LANE_BITS, Lanes, Level, Narrow, Task};
-use crate::node::{Slabs, tag};
+use crate::node::{Node, Slabs, tag};
 use crate::stack::{AsBuilt, ByDistance, Order, Stack};
-use crate::triangles::{self, BLOCK, BlockRay, Meeting, Passage, Shear};
+use crate::triangles::{self, BLOCK, BlockRay, Meeting, Passage, Shear, TriangleBlock};
 use crate::{Accel, Hit, InstancePath};
 
 /// What came of a search.
@@ -60,6 +60,9 @@ impl Candidate {
 /// A ray under way in a tree that [`SingleStart`] was made for.
 pub(crate) struct SingleRay<'a, L> {
     accel: &'a Accel,
+    // Those of the tree, which may lie in a file.
+    nodes: &'a [Node],
+    triangles: &'a [TriangleBlock],
     slabs: Slabs,
     blocks: BlockRay,
     /// No box ahead of this key is of interest.
@@ -78,13 +81,24 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
         let Narrow { slabs, blocks, place_per_height } = L::start_single(start, ray)?;
         let limit_key = slabs.s_max.to_bits() as i32 | LANE_BITS;
         let best = Candidate::NONE;
-        Some(Self { accel, slabs, blocks, limit_key, place_per_height, best, lanes: PhantomData })
+        let (nodes, triangles) = (&*accel.tree.nodes, &*accel.tree.blocks);
+        Some(Self {
+            accel,
+            nodes,
+            triangles,
+            slabs,
+            blocks,
+            limit_key,
+            place_per_height,
+            best,
+            lanes: PhantomData,
+        })
     }
 
     /// Goes on from a node.
     #[inline(always)]
     fn meet_node<O: Order>(&self, reference: u32, stack: &mut Stack<O::Entry>) -> Option<u32> {
-        let node = &self.accel.tree.nodes[reference as usize];
+        let node = &self.nodes[reference as usize];
         let (mask, keys) = L::meet_boxes(node, lanes::opaque(&self.slabs));
         if mask & mask.wrapping_sub(1) != 0 {
             Some(O::push_children::<L>(node, mask, keys, stack.with_room()))
@@ -110,7 +124,7 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
     #[inline(always)]
     fn meet_leaf_closest(&mut self, leaf: u32, ray: &Ray) -> bool {
         let places = tag::blocks(leaf);
-        for (number, block) in (places.start as u32..).zip(&self.accel.tree.blocks[places]) {
+        for (number, block) in (places.start as u32..).zip(&self.triangles[places]) {
             let (mask, edges) = L::meet_triangles(block, lanes::opaque(&self.blocks));
             if mask != 0 {
                 let crossings = L::place_crossings(&edges, &self.blocks);
@@ -179,7 +193,7 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
     fn meet_exactly(&self, ray: &Ray, block: u32, lane: u32) -> Meeting {
         let shear = Shear::new(&ray.direction);
         let origin = shear.local_origin(&ray.origin, &self.accel.holds.first_origin);
-        let corners = shear.axes.gather(&self.accel.tree.blocks[block as usize], lane as usize);
+        let corners = shear.axes.gather(&self.triangles[block as usize], lane as usize);
         triangles::intersect(ray, shear, origin, corners)
     }
 
@@ -187,7 +201,7 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
     #[inline(always)]
     fn meet_leaf_any(&self, leaf: u32, ray: &Ray) -> Outcome<bool> {
         let places = tag::blocks(leaf);
-        for (number, block) in (places.start as u32..).zip(&self.accel.tree.blocks[places]) {
+        for (number, block) in (places.start as u32..).zip(&self.triangles[places]) {
             let (mask, edges) = L::meet_triangles(block, lanes::opaque(&self.blocks));
             if mask != 0 {
                 let crossings = L::place_crossings(&edges, &self.blocks);
@@ -230,7 +244,7 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
         let Candidate { block, lane, .. } = self.best;
         let shear = Shear::new(&ray.direction);
         let origin = shear.local_origin(&ray.origin, &self.accel.holds.first_origin);
-        let corners = &self.accel.tree.blocks[block as usize];
+        let corners = &self.triangles[block as usize];
         let (passage, inside) = L::pass(corners, lane as usize, &shear, &origin);
         let root = if passage == Passage::Inside {
             inside.root(inside.t(&shear))
@@ -265,9 +279,9 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
     #[inline(always)]
     pub(crate) fn fetch(&self, reference: u32) {
         if reference >> tag::SHIFT == tag::INNER {
-            self.accel.tree.nodes.get(reference as usize).map(lanes::fetch);
+            self.nodes.get(reference as usize).map(lanes::fetch);
         } else {
-            self.accel.tree.blocks.get(tag::blocks(reference).start).map(lanes::fetch);
+            self.triangles.get(tag::blocks(reference).start).map(lanes::fetch);
         }
     }
 }

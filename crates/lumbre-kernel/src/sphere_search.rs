@@ -6,7 +6,7 @@ use lumbre_geometry::{Ray, Root, Roots};
 use lumbre_math::DVec3;
 
 use crate::lanes::{LANE_BITS, Lanes, Task};
-use crate::node::{BoxRay, tag};
+use crate::node::{BoxRay, Node, tag};
 use crate::spheres::{ExactSphere, SphereRay};
 use crate::stack::{Order, Stack};
 use crate::traverse::{self, Ask, Found, Place, Search, What};
@@ -123,7 +123,7 @@ pub(crate) struct AmongSpheres<'a, 's, S> {
 
 /// Its way through the nodes.
 struct Walk<'a, L> {
-    accel: &'a Accel,
+    nodes: &'a [Node],
     boxes: BoxRay,
     /// No box ahead of this key is of interest.
     limit_key: i32,
@@ -145,7 +145,7 @@ impl<L: Lanes> Walk<'_, L> {
     #[inline(always)]
     fn descend<O: Order>(&self, mut reference: u32, stack: &mut Stack<O::Entry>) -> Option<u32> {
         while reference >> tag::SHIFT == tag::INNER {
-            let node = &self.accel.tree.nodes[reference as usize];
+            let node = &self.nodes[reference as usize];
             let (mask, keys) = L::meet_boxes(node, &self.boxes.slabs);
             reference = if mask & mask.wrapping_sub(1) != 0 {
                 O::push_children::<L>(node, mask, keys, stack.with_room())
@@ -178,7 +178,7 @@ impl<'a, S: Search<'a>> Task for AmongSpheres<'a, '_, S> {
             return false;
         }
         let limit_key = boxes.slabs.s_max.to_bits() as i32 | LANE_BITS;
-        let mut walk = Walk::<L> { accel, boxes, limit_key, lanes: PhantomData };
+        let mut walk = Walk::<L> { nodes: &accel.tree.nodes, boxes, limit_key, lanes: PhantomData };
         let mut turned = None;
         let place = Place::default();
         let mut stack = Stack::new();

@@ -1,5 +1,6 @@
 //! Spheres packed by eight: a first test in single precision, and the exact one for what it leaves.
 
+use bytemuck::{Pod, Zeroable};
 use lumbre_geometry::{Ray, Root, Roots, Sphere, Surface, sphere_crossings};
 use lumbre_math::DVec3;
 
@@ -7,7 +8,7 @@ use crate::SphereCloud;
 use crate::triangles::BLOCK;
 
 /// Up to eight spheres of one cloud. Unused lanes are NaN, which no ray hits.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub(crate) struct SphereBlock {
     /// `centers[axis][lane]`, relative to the cloud's origin.

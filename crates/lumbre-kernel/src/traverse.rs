@@ -13,12 +13,12 @@ use smallvec::SmallVec;
 
 use crate::collapse::Entry;
 use crate::lanes::{LANE_BITS, Lanes, Level, Task};
-use crate::node::{BoxRay, tag};
+use crate::node::{BoxRay, Node, tag};
 use crate::sphere_search::{self, AmongSpheres, CloudRay};
 use crate::spheres::ExactSphere;
 use crate::stack::{Order, Stack};
 use crate::touch::{self, AllTouches, Touch};
-use crate::triangles::{self, BLOCK, BlockRay, Inside, Meeting, Passage, Shear};
+use crate::triangles::{self, BLOCK, BlockRay, Inside, Meeting, Passage, Shear, TriangleBlock};
 use crate::{Accel, GeometryKind, InstancePath, options, precise};
 
 /// What a search asks of a primitive that may be crossed more than once.
@@ -163,6 +163,9 @@ pub(crate) fn all_touches<'a>(level: Level, accel: &'a Accel, ray: &Ray) -> Vec<
 /// A tree in progress, with the ray in its space.
 pub(crate) struct Frame<'a, R, L> {
     accel: &'a Accel,
+    // Those of the tree, which may lie in a file.
+    nodes: &'a [Node],
+    blocks: &'a [TriangleBlock],
     pub(crate) ray: R,
     boxes: BoxRay,
     /// No box ahead of this key is of interest.
@@ -221,7 +224,20 @@ impl<'a, R: Borrow<Ray>, L: Lanes> Frame<'a, R, L> {
         let (limit, floor) = (search.limit(), search.floor());
         let mesh = mesh_ray(accel, ray.borrow(), search);
         let limit_key = boxes.slabs.s_max.to_bits() as i32 | LANE_BITS;
-        Self { accel, ray, boxes, limit_key, limit, floor, mesh, clouds: None, lanes: PhantomData }
+        let (nodes, blocks) = (&*accel.tree.nodes, &*accel.tree.blocks);
+        Self {
+            accel,
+            nodes,
+            blocks,
+            ray,
+            boxes,
+            limit_key,
+            limit,
+            floor,
+            mesh,
+            clouds: None,
+            lanes: PhantomData,
+        }
     }
 
     /// Takes over what the search has found since.
@@ -264,7 +280,7 @@ impl<'a, R: Borrow<Ray>, L: Lanes> Frame<'a, R, L> {
     /// Goes on from a node.
     #[inline(always)]
     fn meet_node<O: Order>(&self, reference: u32, stack: &mut Stack<O::Entry>) -> Option<u32> {
-        let node = &self.accel.tree.nodes[reference as usize];
+        let node = &self.nodes[reference as usize];
         let (mask, keys) = L::meet_boxes(node, &self.boxes.slabs);
         if mask & mask.wrapping_sub(1) != 0 {
             Some(O::push_children::<L>(node, mask, keys, stack.with_room()))
@@ -466,7 +482,7 @@ fn meet_blocks<'a, R: Borrow<Ray>, L: Lanes, S: Search<'a>>(
     let places = tag::blocks(leaf);
     frame.turn_to(places.start);
     let mut number = places.start as u32;
-    for block in &accel.tree.blocks[places] {
+    for block in &frame.blocks[places] {
         let mut mask = if let Some(blocks) = &frame.mesh.blocks {
             let (mask, edges) = L::meet_triangles(block, blocks);
             if mask == 0 {

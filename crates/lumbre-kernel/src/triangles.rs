@@ -8,6 +8,7 @@
 //! triangle: such a ray crosses a closed mesh an even number of times and meets no edge and no vertex, so that each
 //! crossing has exactly one owner.
 
+use bytemuck::{Pod, Zeroable};
 use lumbre_geometry::{Ray, Root};
 use lumbre_math::{DVec2, DVec3};
 
@@ -18,7 +19,7 @@ use crate::touch::Feature;
 pub(crate) const BLOCK: usize = 8;
 
 /// Up to eight triangles of one mesh. Unused lanes have NaN corners, which no ray hits.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(32))]
 pub(crate) struct TriangleBlock {
     /// `corners[corner][axis][lane]`, relative to the mesh's origin.
@@ -28,7 +29,8 @@ pub(crate) struct TriangleBlock {
 const _: () = assert!(size_of::<TriangleBlock>() == 288);
 
 /// What the triangles of a block are called: apart from their corners, for only the winner of a search is asked.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
 pub(crate) struct BlockNames {
     /// Positions in the mesh's list.
     pub(crate) primitives: [u32; BLOCK],

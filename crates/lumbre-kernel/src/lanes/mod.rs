@@ -1,4 +1,4 @@
-//! The fence around SIMD, and around the one array that is not cleared: the only module with `unsafe`. Outside it, a search is written once, over [`Lanes`].
+//! The fence around SIMD, and around the one array that is not cleared: the only module with `unsafe`, but for the call that maps a file. Outside it, a search is written once, over [`Lanes`].
 //!
 //! [`Level::run`] chooses the instruction set once a search. The code between is generic and `#[inline(always)]` without a
 //! target feature of its own, so that it takes on the features of the root that it is inlined into.

@@ -4,6 +4,7 @@ mod blocks;
 mod borders;
 mod boxes;
 mod build;
+mod file;
 mod inside;
 mod motion;
 mod nearest;

@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 
+use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
 
 use super::oracle::check;
 use super::scenes::{Random, build, cube, icosphere, mixture, ray, with_every_preset};
 use crate::node::tag;
-use crate::{Accel, BuildError, Geometry, GeometryKind, LoadError, RefitError, TriangleMesh};
+use crate::{Accel, BuildError, Geometry, GeometryKind, LoadError, QueryOptions, RefitError, TriangleMesh};
 
 const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
 
@@ -81,7 +82,7 @@ fn what_is_wrong_with_bytes_is_said() {
     }
     let mut later = bytes.clone();
     later[8] = 7;
-    assert_eq!(load(&later), LoadError::OtherVersion { found: 7, expected: 2 });
+    assert_eq!(load(&later), LoadError::OtherVersion { found: 7, expected: 3 });
     let mut longer = bytes.clone();
     longer.extend([0; 4]);
     assert_eq!(load(&longer), LoadError::Damaged);
@@ -145,4 +146,31 @@ fn hostile_bytes_are_refused_or_harmless() {
         }
     }
     assert!(refused > 2000 && taken > 20, "{refused} refused, {taken} taken");
+}
+
+#[test]
+fn masks_are_saved_and_stay_through_a_refit() {
+    let accel = two_meshes().with_masks(vec![1, 6]);
+    let bytes = accel.to_bytes();
+    let mut loaded = Accel::from_bytes(&bytes, accel.geometries.clone()).unwrap();
+    assert_eq!(loaded.to_bytes(), bytes);
+    let ray = Ray::new(CENTER - 9.0 * DVec3::Z, DVec3::Z);
+    let both = |accel: &Accel| {
+        [1, 2, 8].map(|mask| {
+            let options = QueryOptions { mask, ..Default::default() };
+            accel.closest_with(&ray, &options).map(|hit| hit.geometry)
+        })
+    };
+    let expected = [Some(0), None, None];
+    assert_eq!(both(&accel), expected);
+    assert_eq!(both(&loaded), expected);
+    loaded.refit(accel.geometries.clone()).unwrap();
+    assert_eq!(both(&loaded), expected);
+    // As many as geometries, or none.
+    let mut fewer = bytes.clone();
+    let place = fewer.len() - 16;
+    fewer.drain(place..place + 4);
+    fewer[32] = 1;
+    let error = Accel::from_bytes(&sealed(fewer), accel.geometries.clone()).unwrap_err();
+    assert!(matches!(error, LoadError::Inconsistent { .. }), "{error}");
 }
