@@ -388,7 +388,7 @@ pub(crate) fn meet_boxes_at(level: Level, node: &Node, ray: &Slabs) -> (u32, [i3
         #[inline(always)]
         fn run<L: Lanes>(self) -> Self::Output {
             // A child's reference is its lane here. The nearest, which never stands on the stack, has no key.
-            let mut node = self.0.clone();
+            let mut node = *self.0;
             node.children = [0, 1, 2, 3, 4, 5, 6, 7];
             let (mask, keys) = L::meet_boxes(&node, self.1);
             let mut by_lane = [i32::MAX; WIDTH];
