@@ -12,6 +12,7 @@ mod command;
 mod contact;
 mod field;
 mod pictures;
+mod proof;
 mod suite;
 
 #[derive(Parser)]
@@ -51,6 +52,21 @@ enum Task {
     Field,
     /// Compares a picture with a reference of the same scene: means, and each pixel by its noise.
     Agree(agree::Agree),
+    /// Proves the kernel by numbers, more of them than the tests have: `leaks` sends rays at edges and vertices of closed
+    /// meshes, `loop` compares trees with a loop over everything.
+    Proof {
+        /// What is to be shown.
+        what: proof::Claim,
+        /// How many rays; by default a billion for leaks, ten million for the loop.
+        #[arg(long)]
+        rays: Option<u64>,
+    },
+    /// Runs a small set of the kernel's tests, on its portable path, in the interpreter Miri. Needs a nightly toolchain with
+    /// the components miri and rust-src.
+    Miri,
+    /// Runs the kernel's tests, with every instruction set that the machine has, under the address sanitizer. Needs a nightly
+    /// toolchain.
+    Asan,
     /// Measures Lumbre, against peers where they are found.
     #[command(subcommand)]
     Bench(bench::Bench),
@@ -69,6 +85,9 @@ fn main() -> Result<()> {
             Ok(())
         }
         Task::Agree(what) => agree::run_comparison(&what),
+        Task::Proof { what, rays } => proof::run_proof(what, rays),
+        Task::Miri => proof::miri(),
+        Task::Asan => proof::asan(),
         Task::Bench(bench) => bench.run(),
     }
 }

@@ -336,29 +336,24 @@ impl Search {
 
     /// A shape, a sphere of a cloud, or a primitive of custom geometry, that is at least `distance` away.
     pub(crate) fn meet(&mut self, frame: &Frame, geometry: u32, primitive: u32, distance: f64) {
-        let (found, bounds) = match &frame.accel.geometries[geometry as usize].kind {
-            GeometryKind::Shape(shape) => {
-                let map = frame.map * shape.world_from_object();
-                (shape.closest_point_under(&frame.map, self.point), shape.shape().bounds(&map))
-            }
+        let standing = &frame.accel.geometries[geometry as usize];
+        let found = match &standing.kind {
+            GeometryKind::Shape(shape) => shape.closest_point_under(&frame.map, self.point),
             GeometryKind::Spheres(cloud) => {
                 let sphere = ExactSphere::of(cloud, primitive);
                 if !has_radius(&cloud.spheres[primitive as usize]) {
                     return;
                 }
-                (sphere.to_shape().closest_point(&frame.map, self.point), None)
+                sphere.to_shape().closest_point(&frame.map, self.point)
             }
-            GeometryKind::Custom(custom) => {
-                let found = match similarity_factor(&frame.map) {
-                    Some(factor) => custom.closest_point(primitive, frame.local).map(|found| NearestPoint {
-                        point: frame.map.point(found.point),
-                        distance: factor * found.distance,
-                        ..found
-                    }),
-                    None => Err(NoNearestPoint::Map),
-                };
-                (found, None)
-            }
+            GeometryKind::Custom(custom) => match similarity_factor(&frame.map) {
+                Some(factor) => custom.closest_point(primitive, frame.local).map(|found| NearestPoint {
+                    point: frame.map.point(found.point),
+                    distance: factor * found.distance,
+                    ..found
+                }),
+                None => Err(NoNearestPoint::Map),
+            },
             GeometryKind::PreciseMesh(mesh) => {
                 let corners = mesh.corners(primitive);
                 if precise::has_area(&corners) {
@@ -371,10 +366,16 @@ impl Search {
         match found {
             Ok(found) => self.offer(frame, geometry, primitive, &found),
             Err(why) => {
+                let bounds = match &standing.kind {
+                    GeometryKind::Shape(shape) => {
+                        shape.shape().bounds(&(frame.map * shape.world_from_object()))
+                    }
+                    _ => None,
+                };
                 let distance =
                     bounds.map_or(distance, |bounds| distance.max(distance_to(&bounds, self.point)));
-                let id = frame.accel.geometries[geometry as usize].id;
-                let no = NoClosestPoint { why, id, geometry, instances: frame.place.ids.clone() };
+                let instances = frame.place.ids.clone();
+                let no = NoClosestPoint { why, id: standing.id, geometry, instances };
                 if distance <= self.limit {
                     self.refused.push((distance, no));
                 }

@@ -16,6 +16,7 @@ mod refit;
 mod save;
 mod scenes;
 mod single;
+mod small;
 mod spheres;
 mod surfaces;
 mod watertight;

@@ -1,0 +1,74 @@
+//! A little of everything, small enough for an interpreter: what `cargo xtask miri` runs.
+//!
+//! All other tests are left out there, but for that of the stack. The instruction sets that it does not know are not found, so that this goes through the
+//! portable path, with the stack that is not cleared and every look-up that is not checked.
+
+use std::sync::Arc;
+
+use lumbre_geometry::Ray;
+use lumbre_math::{DVec3, Transform};
+
+use super::oracle::check;
+use super::scenes::{
+    Random, balls, build, cloud, cube, icosphere, options, precise, ray, shape, soup, with_every_preset,
+};
+use crate::{Accel, GeometryKind, Instance};
+
+const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
+
+fn some_of_each(random: &mut Random) -> Accel {
+    let inner = Arc::new(build(vec![GeometryKind::Mesh(Arc::new(cube()))]));
+    let world_from_object = Transform::scale(DVec3::new(-1.0, 0.5, 0.75)).unwrap();
+    build(vec![
+        GeometryKind::Mesh(Arc::new(soup(random, 20, CENTER, 3.0))),
+        GeometryKind::PreciseMesh(Arc::new(precise(&soup(random, 5, CENTER, 3.0)))),
+        GeometryKind::Spheres(Arc::new(cloud(random, 9, DVec3::ZERO, CENTER, 3.0))),
+        GeometryKind::Shape(shape(random, CENTER, 3.0)),
+        GeometryKind::Custom(Arc::new(balls(random, 3, CENTER, 3.0, None))),
+        GeometryKind::Instance(Instance { accel: inner, world_from_object: world_from_object.into() }),
+    ])
+}
+
+#[test]
+fn a_few_rays_are_answered_as_by_the_loop() {
+    with_every_preset(|| {
+        let mut random = Random(95);
+        let mixed = some_of_each(&mut random);
+        let meshes = build(vec![GeometryKind::Mesh(Arc::new(icosphere(1, CENTER, 2.0)))]);
+        for accel in [mixed, meshes] {
+            let mut rays: Vec<Ray> = (0..6).map(|_| ray(&mut random, CENTER, 3.0)).collect();
+            // Exactly through corners and edges.
+            let corner = CENTER + DVec3::new(0.0, 0.0, 2.0);
+            rays.push(Ray::new(corner + DVec3::new(0.0, 0.0, 3.0), -DVec3::Z));
+            rays.iter().for_each(|ray| {
+                check(&accel, ray);
+            });
+            let mut hits = vec![None; rays.len()];
+            accel.closest_batch(&rays, &mut hits);
+            assert!(rays.iter().zip(&hits).all(|(ray, hit)| accel.closest(ray) == *hit));
+            for (ray, hit) in rays.iter().zip(&hits) {
+                if let Some(hit) = hit {
+                    assert!(accel.surface(ray, hit).point.is_finite());
+                }
+            }
+        }
+    });
+}
+
+#[test]
+fn a_small_tree_is_refitted_saved_and_asked_for_points() {
+    let mut random = Random(96);
+    let mut accel = some_of_each(&mut random);
+    let bytes = accel.to_bytes();
+    let geometries = accel.geometries.clone();
+    accel.refit(geometries.clone()).unwrap();
+    let loaded = Accel::from_bytes(&bytes, geometries).unwrap();
+    for _ in 0..3 {
+        let p = CENTER + 3.0 * random.vector();
+        assert_eq!(accel.is_inside(p), loaded.is_inside(p));
+        assert_eq!(accel.closest_point(p, 9.0), loaded.closest_point(p, 9.0));
+    }
+    let ball = build(vec![GeometryKind::Mesh(Arc::new(icosphere(1, CENTER, 2.0)))]);
+    assert!((ball.winding_number(CENTER).unwrap() - 1.0).abs() < 2e-3);
+    assert_eq!(options().preset, Default::default());
+}
