@@ -6,6 +6,7 @@ mod bins;
 mod build;
 mod clouds;
 mod collapse;
+mod deforming;
 mod few;
 mod file;
 mod geometry;
@@ -37,6 +38,7 @@ mod winding;
 
 pub use accel::{Accel, BuildError, BuildOptions, Preset};
 pub use file::MapError;
+pub use deforming::DeformingMesh;
 pub use geometry::{CustomGeometry, Geometry, GeometryKind, Instance, Placement, SphereCloud, TriangleMesh};
 pub use hit::{Hit, InstancePath};
 pub use nearest::{ClosestPoint, NoClosestPoint};

@@ -3,10 +3,10 @@
 use lumbre_geometry::{Ray, Surface};
 use lumbre_math::quadratic::dop;
 use lumbre_math::rounding::{UNIT_ROUNDOFF, gamma};
-use lumbre_math::{DMat3, DVec2, DVec3, Transform};
+use lumbre_math::{DMat3, DVec2, DVec3, Transform, Vec3};
 
 use crate::spheres::ExactSphere;
-use crate::{Accel, GeometryKind, Hit, Instance, TriangleMesh};
+use crate::{Accel, GeometryKind, Hit, Instance};
 
 /// The instances along a hit's route, outermost first, and the tree within the last.
 fn along<'a>(accel: &'a Accel, hit: &Hit) -> (Vec<&'a Instance>, &'a Accel) {
@@ -55,7 +55,10 @@ pub(crate) fn surface_in_object(accel: &Accel, ray: &Ray, hit: &Hit) -> Surface 
 fn bare_surface(accel: &Accel, ray: &Ray, hit: &Hit) -> Surface {
     match &accel.geometries[hit.geometry as usize].kind {
         GeometryKind::Shape(shape) => shape.surface(ray, &hit.root),
-        GeometryKind::Mesh(mesh) => triangle_surface(mesh, hit.primitive, hit.root.local),
+        GeometryKind::Mesh(mesh) => {
+            let corners = mesh.indices[hit.primitive as usize].map(|vertex| mesh.positions[vertex as usize]);
+            triangle_surface(mesh.origin, corners, hit.root.local)
+        }
         GeometryKind::PreciseMesh(mesh) => precise_surface(&mesh.corners(hit.primitive), hit.root.local),
         GeometryKind::Custom(custom) => custom.surface(hit.primitive, ray, &hit.root),
         GeometryKind::Spheres(cloud) => ExactSphere::of(cloud, hit.primitive).surface(ray, &hit.root),
@@ -67,13 +70,12 @@ fn bare_surface(accel: &Accel, ray: &Ray, hit: &Hit) -> Surface {
 ///
 /// The error is that of the combination, γ₇ Σ|bᵢ pᵢ| (M. Pharr, W. Jakob, G. Humphreys, "Physically Based Rendering",
 /// 3rd edition, 2016, section 3.9), and one rounding for the mesh's origin.
-fn triangle_surface(mesh: &TriangleMesh, triangle: u32, uv: DVec2) -> Surface {
-    let [p0, p1, p2] =
-        mesh.indices[triangle as usize].map(|vertex| mesh.positions[vertex as usize].as_dvec3());
+pub(crate) fn triangle_surface(origin: DVec3, corners: [Vec3; 3], uv: DVec2) -> Surface {
+    let [p0, p1, p2] = corners.map(|corner| corner.as_dvec3());
     let b0 = 1.0 - uv.x - uv.y;
     let (dpdu, dpdv) = (p1 - p0, p2 - p0);
     let terms = [b0 * p0, uv.x * p1, uv.y * p2];
-    let point = mesh.origin + (terms[0] + terms[1] + terms[2]);
+    let point = origin + (terms[0] + terms[1] + terms[2]);
     let sizes = terms[0].abs() + terms[1].abs() + terms[2].abs();
     Surface {
         point,

@@ -5,6 +5,7 @@ mod borders;
 mod boxes;
 mod build;
 mod file;
+mod deforming;
 mod inside;
 mod motion;
 mod nearest;
