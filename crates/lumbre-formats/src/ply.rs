@@ -948,6 +948,7 @@ impl<'a> Mesh<'a> {
             colours: self.colours,
             coverages: None,
             face_indices,
+            motion: None,
         })
     }
 }

@@ -415,6 +415,31 @@ fn skins_and_morph_targets_stand_at_their_time() {
 }
 
 #[test]
+fn skins_and_morph_targets_are_seen_moving() {
+    let (parts, rest) = animated();
+    let options = GltfOptions { frame: Some(2.5), shutter: 2.0, ..GltfOptions::default() };
+    let mut diagnostics = Diagnostics::new();
+    let scene = read_with(&glb(&parts.json(&rest), &parts.binary), &options, &mut diagnostics).unwrap();
+    assert_eq!(diagnostics.lines(), [""; 0]);
+    let found = mesh(&scene.shapes[0]);
+    let motion = found.motion.as_ref().unwrap();
+    assert_eq!((motion.start, motion.end, motion.moments.len()), (0.0, 1.0, 9));
+    for (i, moment) in (0..).zip(&motion.moments) {
+        let still = at_time(Some(1.5 + 2.0 * f64::from(i) / 8.0));
+        assert_eq!(moment.positions, mesh(&still.shapes[0]).positions);
+    }
+    assert_eq!(found.positions, mesh(&at_time(Some(2.5)).shapes[0]).positions);
+    assert!(motion.moments[0] != motion.moments[8]);
+    assert!(Scene::build(scene).unwrap().moves());
+    // Nothing moves before the first keyframe.
+    let options = GltfOptions { frame: Some(0.4), shutter: 1.0, ..GltfOptions::default() };
+    let bytes = glb(&parts.json(&rest), &parts.binary);
+    let still = read_with(&bytes, &options, &mut Diagnostics::new()).unwrap();
+    assert_eq!(mesh(&still.shapes[0]).motion, None);
+    assert!(!Scene::build(still).unwrap().moves());
+}
+
+#[test]
 fn nodes_and_cameras_that_animations_move_are_seen_moving() {
     // A square that goes 8 along x from 1 s to 3 s, which hangs under one that does a whole turn about z meanwhile.
     let mut parts = Parts::default();

@@ -10,8 +10,8 @@ use lumbre_image::{Image, Rgb};
 use lumbre_math::{AnimatedTransform, DAffine3, DMat3, DVec3, Transform, Vec2, Vec3};
 use lumbre_render::{CancelToken, NoProgress, render_with};
 use lumbre_scene::{
-    Camera, CameraKind, GeometryDesc, InstanceDesc, LightDesc, ObjectDesc, ObjectId, Scene, SceneDesc,
-    ShapeDesc,
+    Camera, CameraKind, GeometryDesc, InstanceDesc, LightDesc, MeshMoment, MeshMotion, ObjectDesc, ObjectId,
+    Scene, SceneDesc, ShapeDesc,
 };
 use lumbre_transport::{Path, Strategy};
 
@@ -79,6 +79,65 @@ fn a_pixel_sees_what_passes_for_as_long_as_it_passes() {
             assert!((found - expected).abs() < 0.02, "{x} {y}: {found}, expected {expected}");
         }
     }
+}
+
+#[test]
+fn what_changes_its_form_is_seen_in_all_of_them() {
+    // The same way as above, by the vertices, in a space that is moved and mirrored; its normals turn as well.
+    let mut desc = empty();
+    glowing_quad(&mut desc, [0.0, 2.0, 2.0, 5.0]);
+    let place = shift(3.0, 0.0, 0.0) * Transform::scale(DVec3::new(-1.0, 1.0, 1.0)).unwrap();
+    let GeometryDesc::Mesh(mesh) = &mut desc.shapes[0].geometry else { panic!("a mesh") };
+    let mesh = Arc::make_mut(mesh);
+    let moments = [1.0, 2.0, 3.0, 4.0].map(|x: f32| {
+        let positions = mesh.positions.iter().map(|p| Vec3::new(3.0 - x - p.x, p.y, p.z)).collect();
+        let normals = Some(vec![Vec3::new(0.6 * (x - 1.0) / 3.0, 0.0, -1.0).normalize(); 4]);
+        MeshMoment { positions, normals }
+    });
+    // The mirror turns the faces round, and the coordinates have turned them already.
+    mesh.positions.clone_from(&moments[1].positions);
+    mesh.motion = Some(MeshMotion { start: 2.0, end: 6.0, moments: moments.to_vec() });
+    desc.shapes[0].world_from_object = place;
+    desc.cameras = vec![flat_camera()];
+    let scene = Scene::build(desc).unwrap();
+    assert!(scene.moves());
+    assert_eq!(scene.warnings().len(), 1, "its light is found by chance");
+    let covered = |x: f64| (x.min(4.0) - (x - 2.0).max(1.0)).max(0.0) / 3.0;
+    let mean =
+        |x: usize| (0..1000).map(|i| covered(x as f64 + (f64::from(i) + 0.5) / 1000.0)).sum::<f64>() / 1000.0;
+    let rows = rows_upwards(&picture(&scene, &options(&scene, 8, 8, 1024)).image);
+    for (y, row) in rows.iter().enumerate() {
+        for (x, &found) in row.iter().enumerate() {
+            let expected = if (2..5).contains(&y) { mean(x) } else { 0.0 };
+            assert!((found - expected).abs() < 0.02, "{x} {y}: {found}, expected {expected}");
+        }
+    }
+    // The shading normal half-way, which the mirror turns too.
+    let ray = lumbre_geometry::Ray::new(DVec3::new(3.0, 3.0, -5.0), DVec3::Z).at_time(4.0);
+    let hit = scene.closest(&ray).unwrap();
+    let met = scene.interaction(&ray, &hit, &lumbre_scene::Footprint::Point);
+    let between = Vec3::new(0.2, 0.0, -1.0).normalize() + Vec3::new(0.4, 0.0, -1.0).normalize();
+    let expected = Vec3::new(-between.x, 0.0, between.z).normalize();
+    assert!((met.shading.normal - expected).length() < 1e-6, "{}", met.shading.normal);
+}
+
+#[test]
+fn meshes_whose_moments_do_not_fit_are_refused() {
+    let refused = |change: fn(&mut MeshMotion)| {
+        let mut desc = empty();
+        glowing_quad(&mut desc, [0.0, 2.0, 2.0, 5.0]);
+        let GeometryDesc::Mesh(mesh) = &mut desc.shapes[0].geometry else { panic!("a mesh") };
+        let mesh = Arc::make_mut(mesh);
+        let moment = MeshMoment { positions: mesh.positions.clone(), normals: None };
+        let mut motion = MeshMotion { start: 0.0, end: 1.0, moments: vec![moment.clone(), moment] };
+        change(&mut motion);
+        mesh.motion = Some(motion);
+        Scene::build(desc).map(|_| ()).unwrap_err().to_string()
+    };
+    assert!(refused(|m| m.moments[1].positions.truncate(3)).contains("moving positions"));
+    assert!(refused(|m| m.moments[0].normals = Some(vec![])).contains("moving normals"));
+    assert!(!refused(|m| m.moments[1].positions[2].y = f32::NAN).is_empty());
+    assert!(!refused(|m| m.end = 0.0).is_empty());
 }
 
 #[test]

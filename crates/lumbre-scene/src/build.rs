@@ -56,7 +56,9 @@ impl Scene {
         };
 
         let is_moving = |i: &InstanceDesc| matches!(i.world_from_object, Placement::Moving(_));
-        let moves = objects.iter().flat_map(|object| &object.instances).chain(&instances).any(is_moving);
+        let deforms = |shape: &ShapeDesc| matches!(&shape.geometry, GeometryDesc::Mesh(mesh) | GeometryDesc::BilinearMesh(mesh) if mesh.motion.is_some());
+        let moves = objects.iter().flat_map(|object| &object.instances).chain(&instances).any(is_moving)
+            || objects.iter().flat_map(|object| &object.shapes).chain(&shapes).any(deforms);
         let objects = builder.objects(objects, &instances)?;
         let accel = Arc::new(builder.tree(shapes, &instances, &objects)?);
         let bounds = accel.bounds();
@@ -310,8 +312,16 @@ impl Builder {
         if !mesh.indices.is_empty() {
             let form = Form::Mesh(dress.clone());
             let entry = SurfaceEntry { emission: emission.clone(), form, ..entry.clone() };
-            let id = self.push(entry, geometries, GeometryKind::Mesh(mesh.clone()))?;
-            self.mesh_light(id, light, standing);
+            match &dress.moving {
+                None => {
+                    let id = self.push(entry, geometries, GeometryKind::Mesh(mesh.clone()))?;
+                    self.mesh_light(id, light, standing);
+                }
+                Some(moving) => {
+                    let id = self.push(entry, geometries, GeometryKind::Custom(moving.mesh.clone()))?;
+                    self.mesh_light(id, light, &Standing::Anywhere);
+                }
+            }
         }
         let triangle_count = mesh.indices.len() as u32;
         for ((i, placed), &corners) in (0..).zip(patches).zip(&baked.patches) {

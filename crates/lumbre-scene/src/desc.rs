@@ -162,6 +162,29 @@ pub struct MeshDesc {
     pub coverages: Option<Vec<f32>>,
     /// A number for each face: triangles first, then quads.
     pub face_indices: Option<Vec<u32>>,
+    /// How it changes its form, if it does; what is above is then how it is at some time, for whoever looks at one. Its quads
+    /// are halved, flat or not, and its tangents stay what they are.
+    pub motion: Option<MeshMotion>,
+}
+
+/// The vertices of a mesh while it changes its form: each goes straight from one moment to the next.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeshMotion {
+    /// The time of the first moment; before, the mesh is as then.
+    pub start: f64,
+    /// The time of the last one, more than `start`; the others are evenly spaced between.
+    pub end: f64,
+    /// Two or more.
+    pub moments: Vec<MeshMoment>,
+}
+
+/// The vertices of a mesh at one moment, as many as in the mesh.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeshMoment {
+    /// Where they are.
+    pub positions: Vec<Vec3>,
+    /// Their normals, where the mesh has some; in all moments, or in none.
+    pub normals: Option<Vec<Vec3>>,
 }
 
 /// Shapes to be placed many times.

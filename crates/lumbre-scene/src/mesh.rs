@@ -3,11 +3,11 @@
 use std::mem::take;
 use std::sync::Arc;
 
-use lumbre_kernel::TriangleMesh;
+use lumbre_kernel::{DeformingMesh, TriangleMesh};
 use lumbre_math::{DVec3, Transform, Vec3};
 
-use crate::surface::{MeshDress, Turned};
-use crate::{BuildError, MeshDesc};
+use crate::surface::{Deforming, MeshDress, Turned};
+use crate::{BuildError, MeshDesc, MeshMotion};
 
 /// A mesh in the space of a tree.
 pub(crate) struct BakedMesh {
@@ -45,6 +45,10 @@ pub(crate) fn bake(
         None => (shared.positions.clone(), shared.triangles.clone(), shared.quads.clone()),
     };
 
+    let motion = match Arc::get_mut(&mut shared) {
+        Some(own) => own.motion.take(),
+        None => shared.motion.clone(),
+    };
     let stays = tree_from_object.is_identity() && origin == DVec3::ZERO;
     if !stays {
         for p in &mut positions {
@@ -78,7 +82,7 @@ pub(crate) fn bake(
         let [a, b, c, d] = if order == QuadOrder::Patch { [a, b, d, c] } else { [a, b, c, d] };
         let corners = [a, b, c, d].map(|i| positions[i as usize]);
         let splits = is_parallelogram(corners) || (order == QuadOrder::Around && is_flat_and_convex(corners));
-        if splits {
+        if splits || motion.is_some() {
             triangles.extend([[a, b, c], [a, c, d]]);
         } else {
             patches.push(if swapped { [a, d, b, c] } else { [a, b, d, c] });
@@ -90,8 +94,45 @@ pub(crate) fn bake(
         }
     }
     let mesh = Arc::new(TriangleMesh { origin, positions, indices: triangles });
-    let dress = Arc::new(MeshDress { mesh, swapped, first_half, turned, rest: shared });
+    let moving = motion.map(|motion| deforming(shape, motion, tree_from_object, &mesh)).transpose()?;
+    let dress = Arc::new(MeshDress { mesh, swapped, first_half, turned, moving, rest: shared });
     Ok(BakedMesh { dress, patches })
+}
+
+/// The vertices at all moments, in the space of the tree that `mesh` is baked into.
+fn deforming(
+    shape: u32,
+    motion: MeshMotion,
+    tree_from_object: &Transform,
+    mesh: &TriangleMesh,
+) -> Result<Deforming, BuildError> {
+    let expected = mesh.positions.len();
+    let (mut places, mut normals) = (Vec::new(), Vec::new());
+    for moment in motion.moments {
+        let lists =
+            [("moving positions", Some(&moment.positions)), ("moving normals", moment.normals.as_ref())];
+        for (list, found) in lists {
+            if let Some(found) = found.map(Vec::len).filter(|&found| found != expected) {
+                return Err(BuildError::ListLength { shape, list, found, expected });
+            }
+        }
+        let place = |p: &Vec3| (tree_from_object.point(p.as_dvec3()) - mesh.origin).as_vec3();
+        places.push(moment.positions.iter().map(place).collect());
+        let turned = |n: &Vec3| {
+            let n = tree_from_object.normal(n.as_dvec3());
+            n.try_normalize().unwrap_or(DVec3::ZERO).as_vec3()
+        };
+        normals.extend(moment.normals.map(|list| list.iter().map(turned).collect::<Vec<Vec3>>()));
+    }
+    let normals = (normals.len() == places.len()).then_some(normals);
+    let times = [motion.start, motion.end];
+    match DeformingMesh::new(mesh.origin, times, places, mesh.indices.clone()) {
+        Ok(mesh) => Ok(Deforming { mesh: Arc::new(mesh), normals }),
+        Err(lumbre_kernel::BuildError::NotFinite { element: vertex, .. }) => {
+            Err(BuildError::NotFinite { shape, vertex })
+        }
+        Err(error) => Err(error.into()),
+    }
 }
 
 fn check(shape: u32, desc: &MeshDesc) -> Result<(), BuildError> {

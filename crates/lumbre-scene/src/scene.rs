@@ -52,9 +52,9 @@ pub enum BuildWarning {
         /// Which shape.
         shape: u32,
     },
-    /// Light in an object that does not stand in the world just once, or on a CSG, is found only by rays that happen to hit it.
+    /// Light in an object that does not stand in the world just once, on a CSG, or on a mesh that changes its form, is found only by rays that happen to hit it.
     #[error(
-        "shape {shape}: its light is found by chance only, for it is in one of many instances or a CSG (slow to converge)"
+        "shape {shape}: its light is found by chance only, for it is in one of many instances, a CSG, or a mesh that changes its form (slow to converge)"
     )]
     UnsampledLight {
         /// Which shape.
@@ -288,10 +288,10 @@ impl Scene {
         let placement: Option<Transform> =
             (self.has_instances && !hit.instances.is_empty()).then(|| self.accel.world_from_object(ray, hit));
         if !turned {
-            return entry.dress(bare, primitive, hit.root.local, placement.as_ref());
+            return entry.dress(bare, primitive, hit.root.local, placement.as_ref(), ray.time);
         }
         let outward = Surface { normal: -bare.normal, dndu: -bare.dndu, dndv: -bare.dndv, ..*bare };
-        let mut dressed = entry.dress(&outward, primitive, hit.root.local, placement.as_ref());
+        let mut dressed = entry.dress(&outward, primitive, hit.root.local, placement.as_ref(), ray.time);
         dressed.turn();
         dressed
     }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use lumbre_geometry::Surface;
-use lumbre_kernel::TriangleMesh;
+use lumbre_kernel::{DeformingMesh, TriangleMesh};
 use lumbre_math::{DVec2, DVec3, Transform, Vec2, Vec3, Vec4};
 use lumbre_shading::{FloatTexture, LocalSurface, Material, Spectrum, TextureContext, VertexData};
 
@@ -51,8 +51,18 @@ pub(crate) struct MeshDress {
     pub first_half: u32,
     /// What a transform turned; else it is in `rest`.
     pub turned: Turned,
+    /// Where it changes its form.
+    pub moving: Option<Deforming>,
     /// The description, which others may share, without what has moved into the mesh.
     pub rest: Arc<MeshDesc>,
+}
+
+/// A mesh that changes its form, in the space of its tree.
+#[derive(Clone, Debug)]
+pub(crate) struct Deforming {
+    pub mesh: Arc<DeformingMesh>,
+    /// Normals at the vertices, moment by moment.
+    pub normals: Option<Vec<Vec<Vec3>>>,
 }
 
 /// Directions at vertices, turned into the space of a tree.
@@ -175,7 +185,7 @@ impl SurfaceEntry {
         }
     }
 
-    /// Dresses a bare surface of the tree. `local` are the coordinates of the face that it lies on, `placement` leads
+    /// Dresses a bare surface of the tree at a time. `local` are the coordinates of the face that it lies on, `placement` leads
     /// from the space of the mesh to that of `surface`.
     pub fn dress(
         &self,
@@ -183,6 +193,7 @@ impl SurfaceEntry {
         primitive: u32,
         local: DVec2,
         placement: Option<&Transform>,
+        time: f64,
     ) -> Dressed {
         let mut dressed = match &self.form {
             Form::Exact | Form::Csg(_) => plain(surface),
@@ -192,7 +203,7 @@ impl SurfaceEntry {
                     Some(uvs) => at(uvs, corners),
                     None => mesh.default_uvs(primitive),
                 };
-                mesh.dress(surface, corners, uvs, &triangle_blend(local), placement)
+                mesh.dress(surface, corners, uvs, &triangle_blend(local), placement, time)
             }
             Form::Patch { dress, corners, .. } => {
                 let uvs = match &dress.rest.uvs {
@@ -200,7 +211,7 @@ impl SurfaceEntry {
                     None if dress.swapped => [Vec2::ZERO, Vec2::Y, Vec2::X, Vec2::ONE],
                     None => [Vec2::ZERO, Vec2::X, Vec2::Y, Vec2::ONE],
                 };
-                dress.dress(surface, *corners, uvs, &patch_blend(local), placement)
+                dress.dress(surface, *corners, uvs, &patch_blend(local), placement, time)
             }
         };
         if self.reverse {
@@ -272,6 +283,19 @@ impl MeshDress {
         self.turned.normals.as_deref().or(self.rest.normals.as_deref())
     }
 
+    /// Normals at some vertices at a time.
+    #[inline]
+    fn corner_normals<const N: usize>(&self, corners: [u32; N], time: f64) -> Option<[DVec3; N]> {
+        let Some(moving) = &self.moving else {
+            let normals = at(self.normals()?, corners);
+            return Some(std::array::from_fn(|i| normals[i].as_dvec3()));
+        };
+        let lists = moving.normals.as_ref()?;
+        let (from, part) = moving.mesh.part(time);
+        let [here, next] = [from, (from + 1).min(lists.len() - 1)].map(|moment| at(&lists[moment], corners));
+        Some(std::array::from_fn(|i| here[i].as_dvec3().lerp(next[i].as_dvec3(), part)))
+    }
+
     /// Tangents at the vertices, with the sides of the bitangents.
     fn tangents(&self) -> Option<&[Vec4]> {
         self.turned.tangents.as_deref().or(self.rest.tangents.as_deref())
@@ -292,8 +316,9 @@ impl MeshDress {
         uvs: [Vec2; N],
         blend: &Blend<N>,
         placement: Option<&Transform>,
+        time: f64,
     ) -> Dressed {
-        let mut dressed = self.shape(bare, corners, uvs, blend, placement);
+        let mut dressed = self.shape(bare, corners, uvs, blend, placement, time);
         if let Some(colours) = &self.rest.colours {
             let colour = blend.value(corners.map(|i| {
                 let Spectrum { r, g, b } = colours[i as usize];
@@ -330,6 +355,7 @@ impl MeshDress {
         uvs: [Vec2; N],
         blend: &Blend<N>,
         placement: Option<&Transform>,
+        time: f64,
     ) -> Dressed {
         let mut surface = *bare;
         let uvs = std::array::from_fn(|i| DVec3::new(f64::from(uvs[i].x), f64::from(uvs[i].y), 0.0));
@@ -354,13 +380,11 @@ impl MeshDress {
         (surface.dndu, surface.dndv) =
             if has_parameters { by_uv(bare.dndu, bare.dndv) } else { (DVec3::ZERO, DVec3::ZERO) };
 
-        let Some(normals) = self.normals() else {
+        let Some(normals) = self.corner_normals(corners, time) else {
             let mut dressed = plain(&surface);
             self.align(&mut dressed, corners, blend, placement);
             return dressed;
         };
-        let normals = at(normals, corners);
-        let normals = std::array::from_fn(|i| normals[i].as_dvec3());
         let moved = |n: DVec3| placement.map_or(n, |m| m.normal(n));
         let sum = moved(blend.value(normals));
         let length = sum.length();

@@ -3,22 +3,31 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use lumbre_math::{AnimatedTransform, DAffine3, SingularTransform, Transform};
+use lumbre_math::{AnimatedTransform, DAffine3, DMat4, SingularTransform, Transform};
 
 use super::file::{File, List};
 use super::graph::Graph;
 use super::json::Read;
-use super::{GltfOptions, animation};
+use super::{GltfOptions, animation, scene};
 
 /// Ways from one moment to the next while the shutter is open: between two, a node turns by less than half a turn, or it is
 /// taken to turn the other way.
 const STEPS: usize = 16;
+
+/// The same for vertices, which go straight from one moment to the next.
+const MESH_STEPS: usize = 8;
 
 /// The nodes at some moments, from when the shutter opens, at time 0, to when it closes, at time 1.
 pub(super) struct Exposure<'f> {
     file: &'f File<'f>,
     /// None for an exposure of no time.
     moments: Vec<Moment<'f>>,
+}
+
+/// How a mesh stands at one moment: see [`super::mesh::Pose`].
+pub(super) struct OwnPose {
+    pub weights: Vec<f64>,
+    pub joints: Option<Vec<DMat4>>,
 }
 
 struct Moment<'f> {
@@ -53,6 +62,24 @@ impl<'f> Exposure<'f> {
     pub fn moves(&mut self, node: usize) -> Read<bool> {
         let worlds = self.worlds(node)?;
         Ok(worlds.iter().any(|(_, world)| *world != worlds[0].1))
+    }
+
+    /// How a mesh stands at each moment at which it is looked at while it changes its form; none where it does not.
+    pub fn poses(&mut self, node: usize, skin: Option<usize>) -> Read<Vec<OwnPose>> {
+        if !self.deforms(node, skin)? {
+            return Ok(vec![]);
+        }
+        let file = self.file;
+        let moments = self.moments.iter_mut().step_by(STEPS / MESH_STEPS);
+        let pose = |moment: &mut Moment<'_>| {
+            Ok(OwnPose {
+                weights: scene::weights(file, &moment.graph, node)?,
+                joints: skin
+                    .map(|skin| scene::joints(file, &moment.graph, &mut moment.known, skin))
+                    .transpose()?,
+            })
+        };
+        moments.map(pose).collect()
     }
 
     /// Whether the mesh of a node changes its form: by its morph targets, or by the joints of its skin.

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use lumbre_image::Rgb;
 use lumbre_math::{DMat3, DMat4, DVec3, Vec2, Vec3, Vec4};
+use lumbre_scene::MeshMoment;
 
 use super::accessor::{Accessor, Component, Element};
 use super::file::{File, List};
@@ -377,6 +378,8 @@ pub(super) struct Vertices {
     pub uvs: Vec<Option<Vec<Vec2>>>,
     /// Linear colours and coverages.
     pub colours: Option<Vec<(Rgb, f32)>>,
+    /// Where they are while they move, if they do.
+    pub moments: Vec<MeshMoment>,
 }
 
 /// Reads the vertices of a primitive in a pose. Only the sets of texture coordinates for which `wants` says so are read.
@@ -395,6 +398,7 @@ pub(super) fn vertices(
         tangents: attributes.tangent.as_ref().map(|t| t.floats(file, Vec4::from_array)).transpose()?,
         uvs: vec![],
         colours: attributes.colour.as_ref().map(|colour| colours(file, colour)).transpose()?,
+        moments: vec![],
     };
     for (set, accessor) in attributes.uvs.iter().enumerate() {
         let accessor = accessor.as_ref().filter(|_| wants(set));
@@ -682,6 +686,12 @@ impl Vertices {
         }
         if let Some(list) = &mut self.colours {
             pick(old, list);
+        }
+        for moment in &mut self.moments {
+            pick(old, &mut moment.positions);
+            if let Some(list) = &mut moment.normals {
+                pick(old, list);
+            }
         }
     }
 }

@@ -7,8 +7,8 @@ use lumbre_geometry::{Cylinder, Shape, Sphere};
 use lumbre_image::Rgb;
 use lumbre_math::{AnimatedTransform, DAffine3, DMat3, DMat4, DQuat, DVec3, Transform, Vec2, Vec3};
 use lumbre_scene::{
-    Camera, CameraKind, GeometryDesc, InstanceDesc, LightDesc, MeshDesc, ObjectDesc, ObjectId, Placement,
-    SceneDesc, ShapeDesc, WithoutLight,
+    Camera, CameraKind, GeometryDesc, InstanceDesc, LightDesc, MeshDesc, MeshMoment, MeshMotion, ObjectDesc,
+    ObjectId, Placement, SceneDesc, ShapeDesc, WithoutLight,
 };
 
 use super::accessor::{self, Accessor, Component, Element};
@@ -76,8 +76,8 @@ pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
         let Some((mesh, _)) = file.named(List::Meshes, value, "mesh")? else { return Ok(()) };
         let skin = file.named(List::Skins, value, "skin")?.map(|(skin, _)| skin);
         let weights = weights(file, &graph, node)?;
-        let key =
-            Key { mesh, weights: weights.iter().map(|w| w.to_bits()).collect(), skinned: skin.map(|_| node) };
+        let owner = (skin.is_some() || exposure.deforms(node, skin)?).then_some(node);
+        let key = Key { mesh, weights: weights.iter().map(|w| w.to_bits()).collect(), owner };
         let copies = match value.extension("EXT_mesh_gpu_instancing")? {
             Some(extension) => instances(file, extension)?,
             None => vec![DAffine3::IDENTITY],
@@ -91,12 +91,6 @@ pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
             for copy in &copies {
                 motions.push(exposure.motion(node, |world| Transform::from_affine(*world * *copy))?);
             }
-        }
-        if exposure.deforms(node, skin)? {
-            file.warn(
-                value,
-                "the motion of a skin or a morph target was left out: it stands as it is halfway",
-            );
         }
         *uses.entry(key.clone()).or_default() += worlds.len();
         file.budget.elements(worlds.len() as u64, "nodes with meshes")?;
@@ -116,6 +110,7 @@ pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
         variant,
         materials: Materials::new(file),
         known: HashMap::new(),
+        exposure,
         objects: HashMap::new(),
         next_shape: 0,
     };
@@ -132,8 +127,8 @@ struct Key {
     mesh: usize,
     /// Bits of the weights of its morph targets, none where all are 0.
     weights: Vec<u64>,
-    /// The node of a skinned mesh, which it shares with no other.
-    skinned: Option<usize>,
+    /// The node of a mesh with a skin or a form that changes, which it shares with no other.
+    owner: Option<usize>,
 }
 
 struct Placed {
@@ -181,7 +176,7 @@ fn roots(file: &File<'_>, graph: &Graph<'_>) -> Read<Vec<usize>> {
 }
 
 /// The weights of a node's morph targets; empty where all are 0.
-fn weights(file: &File<'_>, graph: &Graph<'_>, node: usize) -> Read<Vec<f64>> {
+pub(super) fn weights(file: &File<'_>, graph: &Graph<'_>, node: usize) -> Read<Vec<f64>> {
     let value = file.list(List::Nodes)[node];
     let weights = match graph.moved(node).and_then(|moved| moved.weights.clone()) {
         Some(weights) => weights,
@@ -442,6 +437,7 @@ struct Builder<'f> {
     materials: Materials<'f>,
     /// Where joints stand.
     known: HashMap<usize, DAffine3>,
+    exposure: Exposure<'f>,
     /// Meshes that stand in more than one place: their objects, and the parts that shine.
     objects: HashMap<Key, (Option<ObjectId>, Vec<ShapeDesc>)>,
     next_shape: u32,
@@ -535,7 +531,8 @@ impl Builder<'_> {
     /// The shapes of a mesh in its own space, or in the world if it has a skin.
     fn shapes(&mut self, place: &Placed) -> Read<Vec<ShapeDesc>> {
         let file = self.file;
-        let joints = place.skin.map(|skin| self.joints(skin)).transpose()?;
+        let joints = place.skin.map(|skin| joints(file, self.graph, &mut self.known, skin)).transpose()?;
+        let poses = self.exposure.poses(place.node, place.skin)?;
         let weights: Vec<f64> = place.key.weights.iter().map(|&bits| f64::from_bits(bits)).collect();
         let pose = Pose { weights: &weights, joints: joints.as_deref() };
         let mesh = file.list(List::Meshes)[place.key.mesh];
@@ -556,6 +553,19 @@ impl Builder<'_> {
                 sets.is_some_and(|sets| sets.first == set || sets.second == Some(set)) || by == Some(set)
             };
             let mut vertices = mesh::vertices(file, &primitive, pose, wants)?;
+            if primitive.mode.is_surface() {
+                for pose in &poses {
+                    let pose = Pose { weights: &pose.weights, joints: pose.joints.as_deref() };
+                    let Vertices { positions, normals, .. } =
+                        mesh::vertices(file, &primitive, pose, |_| false)?;
+                    vertices.moments.push(MeshMoment { positions, normals });
+                }
+            } else if !poses.is_empty() {
+                file.warn(
+                    value,
+                    "the motion of points and lines was left out: they stand as they are halfway",
+                );
+            }
             let shape = |geometry, index| ShapeDesc {
                 index,
                 geometry,
@@ -588,30 +598,34 @@ impl Builder<'_> {
         }
         Ok(shapes)
     }
+}
 
-    /// Where the joints of a skin take the vertices of a mesh.
-    fn joints(&mut self, skin: usize) -> Read<Vec<DMat4>> {
-        let file = self.file;
-        let value = file.list(List::Skins)[skin];
-        let inverse: Option<Vec<[f32; 16]>> = match value.get("inverseBindMatrices")? {
-            Some(name) => Some(Accessor::named(file, name)?.floats(file, |m| m)?),
-            None => None,
+/// Where the joints of a skin take the vertices of a mesh.
+pub(super) fn joints(
+    file: &File<'_>,
+    graph: &Graph<'_>,
+    known: &mut HashMap<usize, DAffine3>,
+    skin: usize,
+) -> Read<Vec<DMat4>> {
+    let value = file.list(List::Skins)[skin];
+    let inverse: Option<Vec<[f32; 16]>> = match value.get("inverseBindMatrices")? {
+        Some(name) => Some(Accessor::named(file, name)?.floats(file, |m| m)?),
+        None => None,
+    };
+    let mut joints = vec![];
+    for (i, name) in value.need("joints")?.array()?.enumerate() {
+        let (node, _) = file.at(List::Nodes, name)?;
+        let world = DMat4::from(graph.world(node, known)?);
+        let bind = match inverse.as_ref().and_then(|list| list.get(i)) {
+            Some(matrix) => DMat4::from_cols_array(&matrix.map(f64::from)),
+            None => DMat4::IDENTITY,
         };
-        let mut joints = vec![];
-        for (i, name) in value.need("joints")?.array()?.enumerate() {
-            let (node, _) = file.at(List::Nodes, name)?;
-            let world = DMat4::from(self.graph.world(node, &mut self.known)?);
-            let bind = match inverse.as_ref().and_then(|list| list.get(i)) {
-                Some(matrix) => DMat4::from_cols_array(&matrix.map(f64::from)),
-                None => DMat4::IDENTITY,
-            };
-            joints.push(world * bind);
-        }
-        if let Some(inverse) = inverse {
-            file.budget.release((inverse.len() * 64) as u64);
-        }
-        Ok(joints)
+        joints.push(world * bind);
     }
+    if let Some(inverse) = inverse {
+        file.budget.release((inverse.len() * 64) as u64);
+    }
+    Ok(joints)
 }
 
 /// Puts shapes that move into the world: in an object of their own.
@@ -666,6 +680,11 @@ fn mesh_of(mut vertices: Vertices, triangles: Vec<[u32; 3]>, dressing: &Dressing
         colours,
         coverages,
         face_indices: None,
+        motion: (!vertices.moments.is_empty()).then_some(MeshMotion {
+            start: 0.0,
+            end: 1.0,
+            moments: vertices.moments,
+        }),
     })
 }
 

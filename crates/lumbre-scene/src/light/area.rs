@@ -37,7 +37,7 @@ pub(super) fn arriving(
     from: DVec3,
     pdf: f64,
 ) -> Option<LightSample> {
-    let dressed = entry.dress(bare, primitive, local, None);
+    let dressed = entry.dress(bare, primitive, local, None, 0.0);
     let towards = (dressed.surface.point - from).try_normalize()?;
     let front = dressed.surface.normal.dot(towards) < 0.0;
     let emission = entry.emission.as_ref()?;
