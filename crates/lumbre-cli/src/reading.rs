@@ -22,9 +22,9 @@ pub struct ReadingArguments {
     #[arg(long, value_name = "T", value_parser = seconds)]
     frame: Option<f64>,
     /// How long the shutter is open about the time of a frame of a glTF, as a share of the time from one frame to the next (see
-    /// --fps): 0 for a moment, 0.5 as in most films. What animations move meanwhile is blurred.
-    #[arg(long, value_name = "S", default_value_t = 0.0, value_parser = shutter)]
-    shutter: f64,
+    /// --fps): 0 for a moment, as by default, 0.5 as in most films. What animations move meanwhile is blurred.
+    #[arg(long, value_name = "S", value_parser = shutter)]
+    shutter: Option<f64>,
     /// Frames a second, for --frames and --shutter.
     #[arg(long, value_name = "N", default_value_t = 24.0, value_parser = rate)]
     fps: f64,
@@ -113,7 +113,7 @@ impl ReadingArguments {
     /// [`Failure`] by what went wrong.
     pub fn open(&self, paths: &[PathBuf]) -> Result<(Scene, Diagnostics), Failure> {
         let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
-        lumbre::open_with(&paths, &self.options(self.frame)).map_err(Failure::from)
+        lumbre::open_with(&paths, &self.options(self.frame)?).map_err(Failure::from)
     }
 
     /// Reads one or more files as one description.
@@ -138,17 +138,22 @@ impl ReadingArguments {
 
     fn describe_at(&self, paths: &[PathBuf], time: Option<f64>) -> Result<(SceneDesc, Diagnostics), Failure> {
         let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
-        lumbre::describe(&paths, &self.options(time)).map_err(Failure::from)
+        lumbre::describe(&paths, &self.options(time)?).map_err(Failure::from)
     }
 
-    fn options(&self, frame: Option<f64>) -> lumbre::ReadOptions {
-        lumbre::ReadOptions {
+    fn options(&self, frame: Option<f64>) -> Result<lumbre::ReadOptions, Failure> {
+        if self.shutter.is_some() && frame.is_none() {
+            return Err(Failure::Usage(
+                "--shutter needs the time of a picture (expected --frame or --frames, too)".to_owned(),
+            ));
+        }
+        Ok(lumbre::ReadOptions {
             limits: self.limits(),
             strictness: self.strictness(),
             frame,
-            shutter: self.shutter / self.fps,
+            shutter: self.shutter.unwrap_or(0.0) / self.fps,
             variant: self.variant.clone(),
-        }
+        })
     }
 }
 

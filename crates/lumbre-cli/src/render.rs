@@ -7,13 +7,13 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use lumbre::description::{CameraKind, IntegratorKind};
+use lumbre::description::{Camera, CameraKind, GroundDesc, IntegratorKind};
 use lumbre::formats::image::ImageFormat;
 use lumbre::formats::{Diagnostics, probe_writable};
 use lumbre::image::ToneMap;
 use lumbre::{
     CancelToken, DVec3, Feature, Ground, Picture, PixelBounds, RenderOptions, SaveOptions, Scene, SceneDesc,
-    Stage, StageLight,
+    Stage, StageLight, Staged,
 };
 use serde_json::json;
 
@@ -156,6 +156,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         Signals::listen(&cancel).map_err(|e| Failure::Io(format!("cannot listen for signals: {e}")))?;
     if let Some(Frames(frames)) = &arguments.frames {
         let (first, last) = (*frames.start(), *frames.end());
+        let mut held = Held::default();
         for number in frames.clone() {
             let start = Instant::now();
             let (desc, mut diagnostics) = arguments.reading.describe_frame(&arguments.scene, number)?;
@@ -163,7 +164,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             if !arguments.quiet {
                 say!("frame {number} ({} of {})", number - first + 1, last - first + 1);
             }
-            picture(arguments, &stage, desc, &mut diagnostics, Some(frame), start, &cancel)?;
+            picture(arguments, &stage, desc, &mut diagnostics, Some((frame, &mut held)), start, &cancel)?;
             if cancel.is_cancelled() {
                 break;
             }
@@ -176,7 +177,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
                 for turn in 0..frames {
                     stage.turns = Some(f64::from(turn) / f64::from(frames));
                     let start = Instant::now();
-                    let frame = Some(Frame { number: turn + 1, is_first: turn == 0 });
+                    let frame = Frame { number: turn + 1, is_first: turn == 0 };
+                    // Each turn has a camera of its own.
+                    let frame = Some((frame, &mut Held::default()));
                     picture(arguments, &stage, desc.clone(), &mut diagnostics, frame, start, &cancel)?;
                     if cancel.is_cancelled() {
                         break;
@@ -192,14 +195,42 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 impl Arguments {
-    /// Refuses a name for frames that is the same for all.
+    /// Refuses frames of what is no animation, and a name for them that is the same for all.
     fn check_frames(&self, output: Option<&Path>) -> Result<(), Failure> {
+        let is_gltf = |path: &PathBuf| {
+            let ending = path.extension().map(|e| e.to_ascii_lowercase()).unwrap_or_default();
+            ending == "gltf" || ending == "glb"
+        };
+        if self.frames.is_some() && !self.scene.iter().all(is_gltf) {
+            let path = self.scene[0].display();
+            return Err(Failure::Usage(format!(
+                "{path}: --frames needs an animation (expected a .gltf or a .glb)"
+            )));
+        }
         let name = output.and_then(Path::file_name).map(|name| name.to_string_lossy());
         match name {
             Some(name) if self.frames.is_some() && !name.contains('#') => Err(Failure::Usage(format!(
                 "{name}: --frames makes many pictures (expected a name with # for their number, as frame.####.png)"
             ))),
             _ => Ok(()),
+        }
+    }
+}
+
+/// What the stage set in the first frame: camera and ground stay where they are in all others.
+#[derive(Default)]
+struct Held {
+    cameras: Option<Vec<Camera>>,
+    ground: Option<GroundDesc>,
+}
+
+impl Held {
+    fn hold(&mut self, staged: &Staged, desc: &mut SceneDesc) {
+        if staged.framed {
+            desc.cameras.clone_from(self.cameras.get_or_insert_with(|| desc.cameras.clone()));
+        }
+        if let (true, Some(ground)) = (staged.grounded, desc.ground) {
+            desc.ground = Some(*self.ground.get_or_insert(ground));
         }
     }
 }
@@ -217,11 +248,13 @@ fn picture(
     stage: &Stage,
     mut desc: SceneDesc,
     diagnostics: &mut Diagnostics,
-    frame: Option<Frame>,
+    frame: Option<(Frame, &mut Held)>,
     start: Instant,
     cancel: &CancelToken,
 ) -> Result<(), Failure> {
-    let is_first = frame.is_none_or(|frame| frame.is_first);
+    let is_first = frame.as_ref().is_none_or(|(frame, _)| frame.is_first);
+    let is_frame = frame.is_some();
+    let number = frame.as_ref().map(|(frame, _)| frame.number);
     let is_of_light = arguments.integrator.unwrap_or(desc.integrator.kind).needs_light();
     let stage = match is_of_light || arguments.staging.wants_ground() {
         true => stage.clone(),
@@ -229,6 +262,9 @@ fn picture(
         false => Stage { ground: Ground::None, ..stage.clone() },
     };
     let staged = stage.set(&mut desc);
+    if let Some((_, held)) = frame {
+        held.hold(&staged, &mut desc);
+    }
     let behind = arguments.staging.behind(&staged, is_of_light)?;
     let name = &arguments.scene[0];
     let mut of_frames = Diagnostics::with_strictness(arguments.reading.strictness());
@@ -237,10 +273,10 @@ fn picture(
     if !arguments.quiet && is_first {
         print_warnings(diagnostics);
     }
-    let output = arguments.output.clone().unwrap_or_else(|| default_output(&scene, name, frame.is_some()));
+    let output = arguments.output.clone().unwrap_or_else(|| default_output(&scene, name, is_frame));
     check_format(&output, !arguments.aov.is_empty())?;
     arguments.staging.check(Some(&output))?;
-    let output = frame.map_or(output.clone(), |frame| staging::frame_name(&output, frame.number));
+    let output = number.map_or(output.clone(), |number| staging::frame_name(&output, number));
     for path in std::iter::once(&output).chain(&arguments.stats) {
         probe_writable(path).map_err(|e| Failure::from(lumbre::Error::from(e)))?;
     }

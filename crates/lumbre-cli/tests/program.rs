@@ -514,15 +514,13 @@ fn a_turntable_makes_as_many_different_pictures() {
     assert_eq!(pictures.len(), 5);
 }
 
-/// A triangle that goes along x from 0 s to 1 s.
-fn write_sliding_triangle(desk: &Desk) {
+/// A triangle that goes along x from 0 s to 1 s; with a camera among the nodes 0 and 1.
+fn write_sliding_triangle(desk: &Desk, name: &str, nodes: &str) {
     let numbers: [f32; 17] =
         [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 4.0, 0.0, 0.0];
     let bytes: Vec<u8> = numbers.iter().flat_map(|n| n.to_le_bytes()).collect();
     fs::write(desk.path("slide.bin"), bytes).unwrap();
-    desk.write(
-        "slide.gltf",
-        r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0,1]}],
+    let json = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[NODES]}],
         "buffers":[{"uri":"slide.bin","byteLength":68}],
         "bufferViews":[{"buffer":0,"byteLength":36},{"buffer":0,"byteOffset":36,"byteLength":8},
             {"buffer":0,"byteOffset":44,"byteLength":24}],
@@ -533,14 +531,14 @@ fn write_sliding_triangle(desk: &Desk) {
         "cameras":[{"type":"orthographic","orthographic":{"xmag":4,"ymag":3,"znear":0.1,"zfar":99}}],
         "nodes":[{"mesh":0},{"camera":0,"translation":[2,0.5,9]}],
         "animations":[{"samplers":[{"input":1,"output":2}],
-            "channels":[{"sampler":0,"target":{"node":0,"path":"translation"}}]}]}"#,
-    );
+            "channels":[{"sampler":0,"target":{"node":0,"path":"translation"}}]}]}"#;
+    desk.write(name, &json.replace("NODES", nodes));
 }
 
 #[test]
 fn frames_are_pictures_of_their_times_with_motion_blur_where_it_is_asked_for() {
     let desk = Desk::new();
-    write_sliding_triangle(&desk);
+    write_sliding_triangle(&desk, "slide.gltf", "0,1");
     let render = |arguments: &[&str]| {
         let common = ["render", "slide.gltf", "--spp", "64", "--size", "80x60", "--integrator", "albedo"];
         let out = desk.lumbre(&[&common[..], arguments].concat());
@@ -578,6 +576,35 @@ fn frames_are_pictures_of_their_times_with_motion_blur_where_it_is_asked_for() {
 }
 
 #[test]
+fn a_model_moves_on_a_stage_that_stays() {
+    let desk = Desk::new();
+    write_sliding_triangle(&desk, "model.gltf", "0");
+    let out = desk.lumbre(&[
+        "render",
+        "model.gltf",
+        "--frames",
+        "0..2",
+        "--fps",
+        "40",
+        "-o",
+        "m#.pfm",
+        "--spp",
+        "4",
+        "--size",
+        "60x40",
+        "--integrator",
+        "albedo",
+        "-q",
+    ]);
+    assert_eq!(code(&out), 0, "{}", stderr(&out));
+    let left = |i: u32| {
+        let image = lumbre::read_image(&desk.path(&format!("m{i}.pfm"))).unwrap();
+        (0..60).find(|&x| (0..40).any(|y| image.pixel(x, y).g > 0.05)).unwrap()
+    };
+    assert!(left(0) < left(1) && left(1) < left(2), "{} {} {}", left(0), left(1), left(2));
+}
+
+#[test]
 fn frames_that_make_no_sense_are_refused() {
     let desk = Desk::new();
     for (arguments, expected) in [
@@ -587,6 +614,7 @@ fn frames_that_make_no_sense_are_refused() {
         (&["--shutter", "-1"], "unexpected argument"),
         (&["--shutter", "half"], "a share of a frame"),
         (&["--fps", "0"], "frames a second"),
+        (&["--shutter", "0.5"], "--shutter needs the time of a picture"),
     ] {
         let mut whole = vec!["render", "missing.gltf"];
         whole.extend(arguments);
@@ -594,6 +622,9 @@ fn frames_that_make_no_sense_are_refused() {
         assert_eq!(code(&out), 2, "{arguments:?}: {}", stderr(&out));
         assert!(stderr(&out).contains(expected), "{arguments:?}: {}", stderr(&out));
     }
+    let out = desk.lumbre(&["render", "still.pbrt", "--frames", "0..3"]);
+    assert_eq!(code(&out), 2, "{}", stderr(&out));
+    assert!(stderr(&out).contains("--frames needs an animation"), "{}", stderr(&out));
 }
 
 #[test]

@@ -37,8 +37,8 @@ mod triangles;
 mod winding;
 
 pub use accel::{Accel, BuildError, BuildOptions, Preset};
-pub use file::MapError;
 pub use deforming::DeformingMesh;
+pub use file::MapError;
 pub use geometry::{CustomGeometry, Geometry, GeometryKind, Instance, Placement, SphereCloud, TriangleMesh};
 pub use hit::{Hit, InstancePath};
 pub use nearest::{ClosestPoint, NoClosestPoint};
