@@ -98,10 +98,12 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
     /// Goes on from a node.
     #[inline(always)]
     fn meet_node<O: Order>(&self, reference: u32, stack: &mut Stack<O::Entry>) -> Option<u32> {
+        // Before there is anything to be kept in registers meanwhile.
+        let slots = stack.with_room();
         let node = &self.nodes[reference as usize];
         let (mask, keys) = L::meet_boxes(node, lanes::opaque(&self.slabs));
         if mask & mask.wrapping_sub(1) != 0 {
-            Some(O::push_children::<L>(node, mask, keys, stack.with_room()))
+            Some(O::push_children::<L>(node, mask, keys, slots))
         } else if mask != 0 {
             Some(L::only_child(node, mask))
         } else {

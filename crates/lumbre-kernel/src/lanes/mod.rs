@@ -340,7 +340,17 @@ impl Level {
 /// registers, and writes them down once more.
 #[inline(always)]
 pub(crate) fn opaque<T>(value: &T) -> &T {
-    std::hint::black_box(value)
+    #[cfg(all(target_arch = "x86_64", not(miri)))]
+    {
+        let mut place: *const T = value;
+        // SAFETY: nothing is done, so that it still points to `value`.
+        unsafe {
+            std::arch::asm!("/* {0} */", inout(reg) place, options(readonly, nostack, preserves_flags));
+            &*place
+        }
+    }
+    #[cfg(not(all(target_arch = "x86_64", not(miri))))]
+    value
 }
 
 // Out of the way of the others.
