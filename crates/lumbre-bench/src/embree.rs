@@ -7,6 +7,7 @@
 #![allow(unsafe_code)]
 
 use std::ffi::{CString, OsStr, c_char, c_int, c_uint, c_void};
+use std::mem::ManuallyDrop;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicIsize, Ordering};
 
@@ -167,8 +168,8 @@ macro_rules! functions {
     ($($name:ident = $symbol:literal : fn($($argument:ty),*) $(-> $answer:ty)?;)+) => {
         struct Api {
             $($name: unsafe extern "C" fn($($argument),*) $(-> $answer)?,)+
-            // Last, for the functions are in it.
-            _library: Library,
+            // Never let go of: threads that it started may still run when the program ends.
+            _library: ManuallyDrop<Library>,
         }
 
         impl Api {
@@ -179,7 +180,7 @@ macro_rules! functions {
                     let library = Library::new(path).with_context(|| format!("cannot load {}", path.display()))?;
                     Ok(Self {
                         $($name: *library.get($symbol).context(concat!("no function ", stringify!($name)))?,)+
-                        _library: library,
+                        _library: ManuallyDrop::new(library),
                     })
                 }
             }
