@@ -5,7 +5,7 @@ use libfuzzer_sys::fuzz_target;
 use lumbre_formats::image::{read_image, read_layers};
 use lumbre_formats::{Budget, Diagnostics, Limits};
 
-const ENDINGS: [&str; 8] = ["png", "jpg", "exr", "hdr", "pfm", "tga", "bmp", "qoi"];
+const ENDINGS: [&str; 9] = ["png", "jpg", "exr", "hdr", "pfm", "tga", "bmp", "qoi", "webp"];
 
 fuzz_target!(|bytes: &[u8]| {
     let [choice, bytes @ ..] = bytes else { return };

@@ -86,9 +86,10 @@ pub struct Arguments {
     /// Threads; all cores by default. The picture does not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
-    /// Stops brighter, for .png and .jpg.
-    #[arg(long, value_name = "EV", default_value_t = 0.0, allow_negative_numbers = true, value_parser = exposure)]
-    exposure: f32,
+    /// Stops brighter, for .png and .jpg. By default 0, unless a glTF's own lights would make its picture white or black: then
+    /// the light is measured.
+    #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = exposure)]
+    exposure: Option<f32>,
     /// How light is brought within what a display shows, for .png and .jpg: none, agx, aces or neutral. By default neutral where
     /// the light is the studio's or --env's, else none.
     #[arg(long, value_name = "NAME", value_parser = tone_map)]
@@ -154,6 +155,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let cancel = CancelToken::new();
     let signals =
         Signals::listen(&cancel).map_err(|e| Failure::Io(format!("cannot listen for signals: {e}")))?;
+    // That of the first picture is that of all.
+    let mut exposure = arguments.exposure;
     if let Some(Frames(frames)) = &arguments.frames {
         let (first, last) = (*frames.start(), *frames.end());
         let mut held = Held::default();
@@ -164,7 +167,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             if !arguments.quiet {
                 say!("frame {number} ({} of {})", number - first + 1, last - first + 1);
             }
-            picture(arguments, &stage, desc, &mut diagnostics, Some((frame, &mut held)), start, &cancel)?;
+            let frame = Some((frame, &mut held));
+            picture(arguments, &stage, desc, &mut diagnostics, frame, &mut exposure, start, &cancel)?;
             if cancel.is_cancelled() {
                 break;
             }
@@ -172,7 +176,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     } else {
         let (desc, mut diagnostics) = arguments.reading.describe(&arguments.scene)?;
         match arguments.staging.turntable() {
-            None => picture(arguments, &stage, desc, &mut diagnostics, None, start, &cancel)?,
+            None => {
+                picture(arguments, &stage, desc, &mut diagnostics, None, &mut exposure, start, &cancel)?;
+            }
             Some(frames) => {
                 for turn in 0..frames {
                     stage.turns = Some(f64::from(turn) / f64::from(frames));
@@ -180,7 +186,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
                     let frame = Frame { number: turn + 1, is_first: turn == 0 };
                     // Each turn has a camera of its own.
                     let frame = Some((frame, &mut Held::default()));
-                    picture(arguments, &stage, desc.clone(), &mut diagnostics, frame, start, &cancel)?;
+                    let desc = desc.clone();
+                    picture(arguments, &stage, desc, &mut diagnostics, frame, &mut exposure, start, &cancel)?;
                     if cancel.is_cancelled() {
                         break;
                     }
@@ -249,6 +256,7 @@ fn picture(
     mut desc: SceneDesc,
     diagnostics: &mut Diagnostics,
     frame: Option<(Frame, &mut Held)>,
+    exposure: &mut Option<f32>,
     start: Instant,
     cancel: &CancelToken,
 ) -> Result<(), Failure> {
@@ -290,6 +298,9 @@ fn picture(
             Ok(())
         }
     };
+    if staged.framed && scene.resolved().accel().primitive_count() == 0 {
+        warn(format!("{}: there is nothing to see", name.display()))?;
+    }
     if scene.is_dark() && is_of_light {
         warn(format!("{}: the scene has no light, its picture is black", name.display()))?;
     }
@@ -299,6 +310,20 @@ fn picture(
     {
         warn(format!("{}: the camera is below the ground, which hides everything", name.display()))?;
     }
+
+    let exposure = match *exposure {
+        Some(exposure) => exposure,
+        None if staged.photometric && is_of_light && is_for_displays(&output) => {
+            let stops = measured_exposure(scene.white_level(&options)?);
+            if stops != 0.0 && !arguments.quiet {
+                say!(
+                    "exposed by {stops:.1} stops for the file's own lights (--exposure 0 takes them as they are)"
+                );
+            }
+            *exposure.insert(stops)
+        }
+        None => *exposure.insert(0.0),
+    };
 
     let style = if arguments.quiet { Style::None } else { arguments.progress };
     let display = Display::new(style);
@@ -310,7 +335,7 @@ fn picture(
     let save_start = Instant::now();
     let is_shown = is_of_light && staged.light != StageLight::Own;
     let tone_map = arguments.tonemap.unwrap_or(if is_shown { ToneMap::Neutral } else { ToneMap::None });
-    let save = SaveOptions { tone_map, exposure: arguments.exposure, ..SaveOptions::default() };
+    let save = SaveOptions { tone_map, exposure, ..SaveOptions::default() };
     let picture = match behind {
         Behind::Backdrop(backdrop) => picture.before(backdrop),
         Behind::Lights | Behind::Nothing => picture,
@@ -336,6 +361,21 @@ fn picture(
         summary(arguments.verbose, &scene, &picture, &output, render_time);
     }
     Ok(())
+}
+
+/// Whether exposure counts in a picture of this name.
+fn is_for_displays(path: &Path) -> bool {
+    matches!(ImageFormat::from_path(path), Some(ImageFormat::Png | ImageFormat::Jpeg))
+}
+
+/// The stops that bring white to 1, in tenths, where it is more than one stop too bright or three too dark; else none.
+fn measured_exposure(white_level: Option<f32>) -> f32 {
+    match white_level {
+        Some(level) if !(0.125..=2.0).contains(&level) => {
+            (-10.0 * level.log2()).round().clamp(-1000.0, 1000.0) / 10.0
+        }
+        _ => 0.0,
+    }
 }
 
 /// Whether the program can write what the path's extension names.

@@ -653,6 +653,62 @@ fn light_from_a_picture_is_seen_and_lights() {
     assert!(stderr(&out).contains("15 by 8 pixels"), "{}", stderr(&out));
 }
 
+/// A white square of side 2 before a camera, lit by a sun of so many lux, over a black background.
+fn sunlit(lux: f32) -> String {
+    // 4 vertices and 6 indices.
+    let data = "AACAvwAAgL8AAAAAAACAPwAAgL8AAAAAAACAPwAAgD8AAAAAAACAvwAAgD8AAAAAAAABAAIAAAACAAMA";
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},"extensionsUsed":["KHR_lights_punctual"],"extensions":{{"KHR_lights_punctual":{{
+        "lights":[{{"type":"directional","intensity":{lux}}}]}}}},"buffers":[{{"byteLength":60,
+        "uri":"data:application/octet-stream;base64,{data}"}}],"bufferViews":[{{"buffer":0,"byteLength":48}},
+        {{"buffer":0,"byteOffset":48,"byteLength":12}}],"accessors":[{{"bufferView":0,"componentType":5126,"type":"VEC3",
+        "count":4,"min":[-1,-1,0],"max":[1,1,0]}},{{"bufferView":1,"componentType":5123,"type":"SCALAR","count":6}}],
+        "cameras":[{{"type":"perspective","perspective":{{"yfov":0.8,"znear":0.01}}}}],
+        "materials":[{{"pbrMetallicRoughness":{{"metallicFactor":0}}}}],
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1,"material":0}}]}}],
+        "nodes":[{{"mesh":0}},{{"camera":0,"translation":[0,0,4]}},{{"extensions":{{"KHR_lights_punctual":{{"light":0}}}}}}],
+        "scenes":[{{"nodes":[0,1,2]}}]}}"#
+    )
+}
+
+#[test]
+fn light_that_would_be_white_or_black_is_measured_unless_an_exposure_is_asked_for() {
+    let desk = Desk::new();
+    let shown = |lux: f32, more: &[&str]| {
+        desk.write("s.gltf", &sunlit(lux));
+        let mut arguments = vec!["render", "s.gltf", "-o", "s.png", "--spp", "4", "--size", "30x30"];
+        arguments.extend(more);
+        let out = desk.lumbre(&arguments);
+        assert_eq!(code(&out), 0, "{}", stderr(&out));
+        let image = lumbre::read_image(&desk.path("s.png")).unwrap();
+        let middle = image.pixel(image.width() / 2, image.height() / 2);
+        (middle.g, image.pixel(1, 1).g, stderr(&out))
+    };
+    for lux in [100_000.0, 0.02] {
+        let (white, behind, said) = shown(lux, &[]);
+        assert!((0.7..1.01).contains(&white) && behind == 0.0, "{lux}: {white} {behind}");
+        assert!(said.contains("--exposure 0"), "{said}");
+    }
+    // As it is where that is seen, and where it is asked for.
+    let (white, _, said) = shown(1.5, &[]);
+    assert!((0.3..0.6).contains(&white) && !said.contains("exposed"), "{white} {said}");
+    assert_eq!(shown(100_000.0, &["--exposure", "0"]).0, 1.0);
+    let (black, _, said) = shown(0.02, &["--exposure", "0"]);
+    assert!(black < 0.02 && !said.contains("exposed"), "{black} {said}");
+    // A part is as bright as the whole.
+    let (whole, part) = (shown(100_000.0, &[]).0, shown(100_000.0, &["--crop", "10,10,20,20"]).0);
+    assert!((part - whole).abs() < 0.02, "{part} {whole}");
+}
+
+#[test]
+fn a_picture_of_nothing_is_said_to_be_one() {
+    let desk = Desk::new();
+    desk.write("n.gltf", r#"{"asset":{"version":"2.0"},"scenes":[{"name":"nothing"}]}"#);
+    let out = desk.lumbre(&["render", "n.gltf", "-o", "n.png", "--spp", "1", "--size", "8x8"]);
+    assert_eq!(code(&out), 0, "{}", stderr(&out));
+    assert!(stderr(&out).contains("warning: n.gltf: there is nothing to see"), "{}", stderr(&out));
+}
+
 #[test]
 fn words_that_show_nothing_are_refused_before_anything_is_read() {
     let desk = Desk::new();

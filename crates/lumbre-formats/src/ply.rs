@@ -6,7 +6,7 @@ use std::sync::Arc;
 use lumbre_image::{Rgb, srgb_to_linear};
 use lumbre_math::{Transform, Vec2, Vec3};
 use lumbre_scene::{GeometryDesc, MaterialId, MeshDesc, NamedMaterial, SceneDesc, ShapeDesc, UpAxis};
-use lumbre_shading::Material;
+use lumbre_shading::{Material, MaterialKind, SpectrumTexture};
 
 use crate::budget::{Budget, BudgetVec};
 use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, nearest_name, quoted, quoted_bytes};
@@ -56,20 +56,37 @@ pub fn open_ply(
     Ok(scene_of_meshes([mesh], UpAxis::Y))
 }
 
-/// Meshes as shapes of the default material, in their own space.
+/// Meshes as shapes of the default material, or of the colours of their vertices, in their own space.
 pub(crate) fn scene_of_meshes(meshes: impl IntoIterator<Item = MeshDesc>, up: UpAxis) -> SceneDesc {
-    let material = NamedMaterial { name: None, material: Arc::new(Material::default_diffuse()) };
-    let shape = |(index, mesh): (usize, MeshDesc)| ShapeDesc {
-        index: index as u32,
-        geometry: GeometryDesc::Mesh(Arc::new(mesh)),
-        world_from_object: Transform::IDENTITY,
-        reverse_orientation: false,
-        material: Some(MaterialId(0)),
-        area_light: None,
-        alpha: None,
+    let mut scene = SceneDesc { up, ..SceneDesc::default() };
+    // Without and with colours.
+    let mut made: [Option<MaterialId>; 2] = [None; 2];
+    for (index, mesh) in (0..).zip(meshes) {
+        let has_colours = mesh.colours.is_some();
+        let material = *made[usize::from(has_colours)].get_or_insert_with(|| {
+            scene.materials.push(unsaid_material(has_colours));
+            MaterialId(scene.materials.len() as u32 - 1)
+        });
+        scene.shapes.push(ShapeDesc {
+            index,
+            geometry: GeometryDesc::Mesh(Arc::new(mesh)),
+            world_from_object: Transform::IDENTITY,
+            reverse_orientation: false,
+            material: Some(material),
+            area_light: None,
+            alpha: None,
+        });
+    }
+    scene
+}
+
+/// The material of a mesh of which a file does not say it: the colours of its vertices, where it has them, else grey.
+pub(crate) fn unsaid_material(has_colours: bool) -> NamedMaterial {
+    let material = match has_colours {
+        true => Material::new(MaterialKind::Diffuse { reflectance: Arc::new(SpectrumTexture::Vertices) }),
+        false => Material::default_diffuse(),
     };
-    let shapes = meshes.into_iter().enumerate().map(shape).collect();
-    SceneDesc { materials: vec![material], shapes, up, ..SceneDesc::default() }
+    NamedMaterial { name: None, material: Arc::new(material) }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -944,7 +961,7 @@ impl<'a> Mesh<'a> {
             normals: self.normals,
             uvs: self.uvs,
             tangents: None,
-            second_uvs: None,
+            further_uvs: Default::default(),
             colours: self.colours,
             coverages: None,
             face_indices,

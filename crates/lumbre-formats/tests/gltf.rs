@@ -15,7 +15,8 @@ use lumbre_scene::{
     CameraKind, GeometryDesc, LightDesc, MeshDesc, Placement, Scene, SceneDesc, ShapeDesc, WithoutLight,
 };
 use lumbre_shading::{
-    FloatTexture, MaterialKind, PrincipledParams, SpectrumTexture, TextureContext, VertexData,
+    FloatTexture, Mapping2d, MaterialKind, PrincipledParams, SpectrumTexture, Texture, TextureContext, UvSet,
+    VertexData,
 };
 
 /// A GLB of a JSON and its first buffer.
@@ -719,6 +720,91 @@ fn principled(material: &str) -> PrincipledParams {
     };
     Scene::build(scene).unwrap();
     *params
+}
+
+/// A scene of one square with so many sets of texture coordinates, all different, and a material with as many textures.
+fn with_sets(count: usize) -> (SceneDesc, Vec<String>) {
+    let mut parts = Parts::default();
+    let p = parts.positions(&SQUARE);
+    let mut attributes = format!(r#""POSITION":{p}"#);
+    for set in 0..count {
+        let at = |i: u8| 0.1 * set as f32 + 0.25 * f32::from(i);
+        let uvs: Vec<f32> = (0..8).map(at).collect();
+        let accessor = parts.add(&floats(&uvs), r#""componentType":5126,"type":"VEC2","count":4"#);
+        attributes += &format!(r#","TEXCOORD_{set}":{accessor}"#);
+    }
+    let image = picture([51, 102, 204], image::ImageFormat::Png);
+    let start = parts.binary.len();
+    parts.binary.extend_from_slice(&image);
+    parts.views.push(format!(r#"{{"buffer":0,"byteOffset":{start},"byteLength":{}}}"#, image.len()));
+    let view = parts.views.len() - 1;
+    let texture = |set: usize| format!(r#"{{"index":0,"texCoord":{}}}"#, set.min(count - 1));
+    let rest = format!(
+        r#""images":[{{"bufferView":{view},"mimeType":"image/png"}}],"textures":[{{"source":0}}],
+        "materials":[{{"pbrMetallicRoughness":{{"baseColorTexture":{},"metallicRoughnessTexture":{}}},"normalTexture":{},
+        "extensions":{{"KHR_materials_transmission":{{"transmissionFactor":0.5,"transmissionTexture":{}}},
+        "KHR_materials_clearcoat":{{"clearcoatFactor":1,"clearcoatTexture":{}}}}}}}],{}"#,
+        texture(0),
+        texture(1),
+        texture(2),
+        texture(3),
+        texture(4),
+        one(&format!(r#""mode":6,"material":0,"attributes":{{{attributes}}}"#)),
+    );
+    let mut diagnostics = Diagnostics::new();
+    let scene = read_with(&glb(&parts.json(&rest), &parts.binary), &GltfOptions::default(), &mut diagnostics);
+    (scene.unwrap(), diagnostics.lines())
+}
+
+#[test]
+fn four_sets_of_texture_coordinates_serve_one_material() {
+    let (scene, warnings) = with_sets(4);
+    assert_eq!(warnings, [""; 0]);
+    let mesh = mesh(&scene.shapes[0]);
+    let sets = std::iter::once(&mesh.uvs).chain(&mesh.further_uvs);
+    for (set, uvs) in sets.enumerate() {
+        let at = |i: usize| 0.1 * set as f32 + 0.25 * i as f32;
+        // Of the third vertex, wherever the tangents left it; v counts upwards here.
+        let third = mesh.positions.iter().position(|p| p.to_array() == SQUARE[2]).unwrap();
+        let expected = Vec2::new(at(4), 1.0 - at(5));
+        assert!((uvs.as_ref().unwrap()[third] - expected).length() < 1e-6, "{set}");
+    }
+    let MaterialKind::Principled(params) = scene.materials[0].material.kind.clone() else { panic!() };
+    // Where a texture is looked up: in the set that it names, each of which is somewhere else.
+    let set_of = |texture: &FloatTexture| match texture {
+        Texture::Image(image) => image.mapping.clone(),
+        Texture::Product([image, _]) => match &**image {
+            Texture::Image(image) => image.mapping.clone(),
+            other => panic!("{other:?}"),
+        },
+        other => panic!("{other:?}"),
+    };
+    for (texture, expected) in [(&params.roughness, UvSet::Second), (&params.transmission, UvSet::Fourth)] {
+        assert!(matches!(set_of(texture), Mapping2d::Affine { set, .. } if set == expected));
+    }
+    let normal_map = scene.materials[0].material.normal_map.clone().unwrap();
+    assert!(matches!(normal_map.mapping, Mapping2d::Affine { set: UvSet::Third, .. }));
+    Scene::build(scene).unwrap();
+    let (_, warnings) = with_sets(5);
+    assert!(warnings.len() == 1 && warnings[0].contains("on a fifth set"), "{warnings:?}");
+}
+
+#[test]
+fn one_accessor_may_be_two_attributes_but_two_need_a_stride() {
+    let mut parts = Parts::default();
+    let p = parts.positions(&SQUARE);
+    let uv = parts.add(&floats(&[0.0; 16]), r#""componentType":5126,"type":"VEC2","count":4"#);
+    let other =
+        format!(r#"{{"bufferView":{uv},"byteOffset":32,"componentType":5126,"type":"VEC2","count":4}}"#);
+    parts.accessors.push(other);
+    let with = |second: usize| {
+        let attributes = format!(r#""POSITION":{p},"TEXCOORD_0":{uv},"TEXCOORD_1":{second}"#);
+        parts.json(&one(&format!(r#""mode":6,"attributes":{{{attributes}}}"#)))
+    };
+    assert_eq!(read(&with(uv), &parts.binary).shapes.len(), 1);
+    assert!(
+        error(&with(uv + 1), &parts.binary).contains("attributes share a buffer view that says no stride")
+    );
 }
 
 #[test]

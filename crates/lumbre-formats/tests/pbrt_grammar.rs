@@ -762,6 +762,47 @@ fn environments_are_equal_area_or_latitude_longitude() {
 }
 
 #[test]
+fn goniometric_lights_shine_as_their_image_says_y_and_z_exchanged() {
+    let dir = tempfile::tempdir().unwrap();
+    let options = lumbre_formats::image::WriteOptions::default();
+    // The mean of the channels counts. In the square the middle is +z of the image's own space, which is +y of the light's.
+    let square: Vec<Rgb> = (0..8 * 8)
+        .map(|i| if (2..6).contains(&(i % 8)) && (2..6).contains(&(i / 8)) { 4.0 } else { 1.0 })
+        .map(|level| Rgb::new(0.5, 1.0, 1.5) * level)
+        .collect();
+    let square = lumbre_image::Image::from_pixels(8, 8, square).unwrap();
+    lumbre_formats::image::write_image(&dir.path().join("square.pfm"), &square, &options).unwrap();
+    let path = dir.path().join("s.pbrt");
+    fs::write(
+        &path,
+        r#"WorldBegin Translate 1 2 3
+           LightSource "goniometric" "string filename" "square.pfm" "rgb I" [2 4 6]
+           LightSource "goniometric" "string filename" "square.pfm" "float power" 100
+           LightSource "goniometric" "float power" 100"#,
+    )
+    .unwrap();
+    let (scene, diagnostics) = open_scene(&path, &ReadOptions::default()).unwrap();
+    let warnings = diagnostics.lines();
+    assert!(warnings.len() == 1 && warnings[0].contains("without a filename"), "{warnings:?}");
+    let resolved = Scene::build(scene.clone()).unwrap();
+    let found = |light: usize, direction: DVec3| {
+        let at = DVec3::new(1.0, 2.0, 3.0) + 2.0 * direction;
+        resolved.lights()[light].irradiance(at, -direction).unwrap() * 4.0
+    };
+    near_rgb(found(0, DVec3::Y), [8.0, 16.0, 24.0]);
+    for other in [DVec3::NEG_Y, DVec3::new(0.8, -0.6, 0.0), DVec3::new(0.0, -0.6, -0.8)] {
+        near_rgb(found(0, other), [2.0, 4.0, 6.0]);
+    }
+    let LightDesc::Goniometric { intensity, image, .. } = &scene.lights[1] else { panic!() };
+    let mean = image.image.mean().g;
+    assert!((mean - 1.75).abs() < 1e-6);
+    near_rgb(*intensity, [100.0 / (4.0 * std::f32::consts::PI * mean); 3]);
+    let LightDesc::Point { from, intensity } = scene.lights[2] else { panic!() };
+    assert_eq!(from, DVec3::new(1.0, 2.0, 3.0));
+    near_rgb(intensity, [100.0 / (4.0 * std::f32::consts::PI); 3]);
+}
+
+#[test]
 fn interfaces_and_objects_give_no_light_and_say_so() {
     let (scene, warnings) = warned(
         r#"MakeNamedMaterial "i" "string type" "interface" AreaLightSource "diffuse"

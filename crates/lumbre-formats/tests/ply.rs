@@ -6,8 +6,9 @@ use std::sync::Arc;
 
 use common::shared;
 use lumbre_formats::ply::read_ply;
-use lumbre_formats::{Budget, Diagnostics, FormatError, Input, Limits, Strictness};
+use lumbre_formats::{Budget, Diagnostics, FormatError, Input, Limits, ReadOptions, Strictness, open_scene};
 use lumbre_scene::MeshDesc;
+use lumbre_shading::{MaterialKind, Texture};
 
 fn name() -> Arc<str> {
     "m.ply".into()
@@ -124,6 +125,21 @@ fn text_with_everything_in_it_is_read() {
     let colour = mesh.colours.unwrap()[2];
     assert_eq!((colour.r, colour.g), (1.0, 0.0));
     assert!((colour.b - 0.2158605).abs() < 1e-6, "bytes are on the sRGB curve");
+}
+
+#[test]
+fn a_mesh_alone_shows_the_colours_of_its_vertices() {
+    let dir = tempfile::tempdir().unwrap();
+    let plain = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+                 element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n5 0 0\n0 7 0\n3 0 1 2\n";
+    for (name, text, shows) in [("colours.ply", TEXT, true), ("plain.ply", plain, false)] {
+        let path = dir.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        let (scene, _) = open_scene(&path, &ReadOptions::default()).unwrap();
+        let material = &scene.materials[scene.shapes[0].material.unwrap().0 as usize].material;
+        let MaterialKind::Diffuse { reflectance } = &material.kind else { panic!("{:?}", material.kind) };
+        assert_eq!(matches!(**reflectance, Texture::Vertices), shows, "{name}");
+    }
 }
 
 #[test]

@@ -6,7 +6,7 @@ use lumbre_geometry::Shape;
 use lumbre_image::Rgb;
 use lumbre_kernel::Placement;
 use lumbre_math::{DVec3, Transform, Vec2, Vec3, Vec4};
-use lumbre_shading::{FloatTexture, Material, MipMap};
+use lumbre_shading::{FURTHER_SETS, FloatTexture, Material, MipMap};
 
 use crate::{Camera, MaterialId, ObjectId};
 
@@ -154,8 +154,8 @@ pub struct MeshDesc {
     /// Tangents, with the side on which the bitangent of normal maps lies: 1 for that of normal × tangent, -1 for the other,
     /// as the mesh stands here (a mirror turns it over); 0 for that of normal × tangent come what may.
     pub tangents: Option<Vec<Vec4>>,
-    /// A second set of texture coordinates.
-    pub second_uvs: Option<Vec<Vec2>>,
+    /// Further sets of texture coordinates: the second, the third and the fourth.
+    pub further_uvs: [Option<Vec<Vec2>>; FURTHER_SETS],
     /// Linear colours.
     pub colours: Option<Vec<Rgb>>,
     /// Coverages, which go with the colours.

@@ -141,7 +141,9 @@ fn check(shape: u32, desc: &MeshDesc) -> Result<(), BuildError> {
         ("normals", desc.normals.as_ref().map(Vec::len)),
         ("texture coordinates", desc.uvs.as_ref().map(Vec::len)),
         ("tangents", desc.tangents.as_ref().map(Vec::len)),
-        ("second texture coordinates", desc.second_uvs.as_ref().map(Vec::len)),
+        ("second texture coordinates", desc.further_uvs[0].as_ref().map(Vec::len)),
+        ("third texture coordinates", desc.further_uvs[1].as_ref().map(Vec::len)),
+        ("fourth texture coordinates", desc.further_uvs[2].as_ref().map(Vec::len)),
         ("colours", desc.colours.as_ref().map(Vec::len)),
         ("coverages", desc.coverages.as_ref().map(Vec::len)),
     ];

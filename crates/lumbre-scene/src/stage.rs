@@ -78,6 +78,8 @@ pub struct Staged {
     pub light: StageLight,
     /// Whether there is ground.
     pub grounded: bool,
+    /// Whether the description has lights in candelas or lux but does not say how they are to be exposed, as glTF.
+    pub photometric: bool,
 }
 
 /// Where the light of a staged description comes from.
@@ -120,6 +122,8 @@ impl Stage {
         let is_model = desc.without_light != WithoutLight::Dark;
         let framed = desc.cameras.is_empty() || self.fit || self.turns.is_some();
         let turns = self.turns.unwrap_or(0.0);
+        let photometric = desc.without_light == WithoutLight::StudioUnlessStaged
+            && desc.lights.iter().any(|light| !matches!(light, LightDesc::Infinite { .. }));
 
         let light = match &self.surroundings {
             Surroundings::Map(map) => {
@@ -166,7 +170,7 @@ impl Stage {
                 (desc.film.width, desc.film.height) = (Some(SIZE.0), Some(SIZE.1));
             }
         }
-        Staged { framed, light, grounded }
+        Staged { framed, light, grounded, photometric }
     }
 }
 
@@ -266,7 +270,9 @@ mod tests {
         for up in [UpAxis::Y, UpAxis::Z] {
             let mut desc = SceneDesc { up, ..ball() };
             let staged = Stage::default().set(&mut desc);
-            assert_eq!(staged, Staged { framed: true, light: StageLight::Studio, grounded: true });
+            let expected =
+                Staged { framed: true, light: StageLight::Studio, grounded: true, photometric: false };
+            assert_eq!(staged, expected);
             assert_eq!((desc.cameras.len(), desc.lights.len()), (1, 1));
             assert_eq!((desc.film.width, desc.film.height), (Some(1200), Some(900)));
             let scene = Scene::build(desc).unwrap();
@@ -288,7 +294,9 @@ mod tests {
             let mut desc =
                 SceneDesc { cameras: vec![camera()], lights: vec![lamp()], without_light, ..ball() };
             let staged = Stage::default().set(&mut desc);
-            assert_eq!(staged, Staged { framed: false, light: StageLight::Own, grounded: false });
+            let photometric = without_light == WithoutLight::StudioUnlessStaged;
+            let expected = Staged { framed: false, light: StageLight::Own, grounded: false, photometric };
+            assert_eq!(staged, expected);
             assert_eq!((desc.cameras, desc.lights.len(), desc.ground), (vec![camera()], 1, None));
             assert_eq!(desc.film.width, None);
         }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use lumbre_geometry::Surface;
 use lumbre_kernel::{DeformingMesh, TriangleMesh};
 use lumbre_math::{DVec2, DVec3, Transform, Vec2, Vec3, Vec4};
-use lumbre_shading::{FloatTexture, LocalSurface, Material, Spectrum, TextureContext, VertexData};
+use lumbre_shading::{FloatTexture, FurtherUv, LocalSurface, Material, Spectrum, TextureContext, VertexData};
 
 use crate::csg::CsgForm;
 use crate::light::LightId;
@@ -224,7 +224,12 @@ impl SurfaceEntry {
 impl Dressed {
     /// Where textures are looked up, with derivatives of u and v over a pixel.
     pub fn context(&self, dpdx: Vec3, dpdy: Vec3, duv_dx: Vec2, duv_dy: Vec2) -> TextureContext {
-        let (by_u, by_v) = (self.vertex.duv_dx, self.vertex.duv_dy);
+        // From derivatives by u and v to derivatives over a pixel.
+        let further = self.vertex.further.map(|place| FurtherUv {
+            duv_dx: place.duv_dx * duv_dx.x + place.duv_dy * duv_dx.y,
+            duv_dy: place.duv_dx * duv_dy.x + place.duv_dy * duv_dy.y,
+            ..place
+        });
         TextureContext {
             point: self.surface.point,
             normal: self.shading.normal,
@@ -233,11 +238,7 @@ impl Dressed {
             dpdy,
             duv_dx,
             duv_dy,
-            vertex: VertexData {
-                duv_dx: by_u * duv_dx.x + by_v * duv_dx.y,
-                duv_dy: by_u * duv_dy.x + by_v * duv_dy.y,
-                ..self.vertex
-            },
+            vertex: VertexData { further, ..self.vertex },
         }
     }
 
@@ -330,19 +331,19 @@ impl MeshDress {
             let coverages = corners.map(|i| DVec3::splat(f64::from(coverages[i as usize])));
             dressed.vertex.coverage = blend.value(coverages).x as f32;
         }
-        if let Some(second) = &self.rest.second_uvs {
+        for (list, place) in self.rest.further_uvs.iter().zip(&mut dressed.vertex.further) {
+            let Some(list) = list else { continue };
             let flat = |uv: Vec2| uv.as_dvec2().extend(0.0);
-            let second = corners.map(|i| flat(second[i as usize]));
-            dressed.vertex.uv = blend.value(second).truncate().as_vec2();
+            let further = corners.map(|i| flat(list[i as usize]));
+            place.uv = blend.value(further).truncate().as_vec2();
             // From derivatives by the coordinates of the face to derivatives by uv.
             let [by_a, by_b] = blend.slopes(uvs.map(flat));
-            let [second_a, second_b] = blend.slopes(second);
+            let [further_a, further_b] = blend.slopes(further);
             let determinant = by_a.x * by_b.y - by_a.y * by_b.x;
-            let by_u = ((second_a * by_b.y - second_b * by_a.y) / determinant).truncate().as_vec2();
-            let by_v = ((second_b * by_a.x - second_a * by_b.x) / determinant).truncate().as_vec2();
+            let by_u = ((further_a * by_b.y - further_b * by_a.y) / determinant).truncate().as_vec2();
+            let by_v = ((further_b * by_a.x - further_a * by_b.x) / determinant).truncate().as_vec2();
             if by_u.is_finite() && by_v.is_finite() {
-                dressed.vertex.duv_dx = by_u;
-                dressed.vertex.duv_dy = by_v;
+                (place.duv_dx, place.duv_dy) = (by_u, by_v);
             }
         }
         dressed

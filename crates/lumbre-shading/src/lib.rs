@@ -33,8 +33,8 @@ pub use principled_params::{Convention, PrincipledParams, VolumeParams};
 pub use spectrum::{NamedSpectrum, SpectrumValue};
 pub use specular::Specular;
 pub use texture::{
-    FloatTexture, ImageTexture, Mapping2d, SpectrumTexture, Texture, TextureContext, TexturePoint,
-    TextureValue, UvSet, VertexData,
+    FURTHER_SETS, FloatTexture, FurtherUv, ImageTexture, Mapping2d, SpectrumTexture, Texture, TextureContext,
+    TexturePoint, TextureValue, UvSet, VertexData,
 };
 
 /// Values on the lanes that light transport carries: linear Rec. 709 today.

@@ -36,23 +36,33 @@ pub struct VertexData {
     pub colour: Spectrum,
     /// Their coverage, 1 where they have none.
     pub coverage: f32,
-    /// A second set of parameters, zero where they have none.
+    /// Parameters besides the first: the second set, the third and the fourth, zero where they have none.
+    pub further: [FurtherUv; FURTHER_SETS],
+}
+
+/// How many sets of parameters a surface may have besides the first.
+pub const FURTHER_SETS: usize = 3;
+
+/// A place by another set of parameters than the first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FurtherUv {
+    /// The parameters.
     pub uv: Vec2,
-    /// Its derivatives over one pixel to the right.
+    /// Their derivatives over one pixel to the right.
     pub duv_dx: Vec2,
-    /// Its derivatives over one pixel down.
+    /// Their derivatives over one pixel down.
     pub duv_dy: Vec2,
+}
+
+impl FurtherUv {
+    /// Where there are none.
+    pub const ZERO: Self = Self { uv: Vec2::ZERO, duv_dx: Vec2::ZERO, duv_dy: Vec2::ZERO };
 }
 
 impl VertexData {
     /// Of a surface whose vertices say nothing.
-    pub const NONE: Self = Self {
-        colour: Spectrum::WHITE,
-        coverage: 1.0,
-        uv: Vec2::ZERO,
-        duv_dx: Vec2::ZERO,
-        duv_dy: Vec2::ZERO,
-    };
+    pub const NONE: Self =
+        Self { colour: Spectrum::WHITE, coverage: 1.0, further: [FurtherUv::ZERO; FURTHER_SETS] };
 }
 
 /// Which of a mesh's sets of parameters.
@@ -61,8 +71,26 @@ pub enum UvSet {
     /// The first, which every surface has.
     #[default]
     First,
-    /// The second, [`VertexData::uv`].
+    /// The second, first of [`VertexData::further`].
     Second,
+    /// The third.
+    Third,
+    /// The fourth.
+    Fourth,
+}
+
+impl UvSet {
+    /// Those of [`VertexData::further`], in their order.
+    pub const FURTHER: [Self; FURTHER_SETS] = [Self::Second, Self::Third, Self::Fourth];
+
+    fn further(self, vertex: &VertexData) -> Option<&FurtherUv> {
+        match self {
+            Self::First => None,
+            Self::Second => Some(&vertex.further[0]),
+            Self::Third => Some(&vertex.further[1]),
+            Self::Fourth => Some(&vertex.further[2]),
+        }
+    }
 }
 
 /// From a surface to the plane of an image.
@@ -75,7 +103,7 @@ pub enum Mapping2d {
         /// Offsets.
         delta: Vec2,
     },
-    /// (u, v) of either set under an affine map.
+    /// (u, v) of any set under an affine map.
     Affine {
         /// Which parameters.
         set: UvSet,
@@ -123,9 +151,9 @@ impl Mapping2d {
                 dst_dy: *scale * at.duv_dy,
             },
             Self::Affine { set, axes, origin } => {
-                let (uv, duv_dx, duv_dy) = match set {
-                    UvSet::First => (at.uv, at.duv_dx, at.duv_dy),
-                    UvSet::Second => (at.vertex.uv, at.vertex.duv_dx, at.vertex.duv_dy),
+                let (uv, duv_dx, duv_dy) = match set.further(&at.vertex) {
+                    None => (at.uv, at.duv_dx, at.duv_dy),
+                    Some(place) => (place.uv, place.duv_dx, place.duv_dy),
                 };
                 let turned = |v: Vec2| axes[0] * v.x + axes[1] * v.y;
                 TexturePoint { st: turned(uv) + *origin, dst_dx: turned(duv_dx), dst_dy: turned(duv_dy) }
@@ -461,13 +489,18 @@ mod tests {
     }
 
     #[test]
-    fn vertices_tint_and_second_parameters_turn() {
-        let vertex = VertexData {
-            colour: Spectrum::new(0.5, 0.25, 2.0),
-            coverage: 0.75,
+    fn vertices_tint_and_further_parameters_turn() {
+        let second = FurtherUv {
             uv: Vec2::new(0.2, 0.7),
             duv_dx: Vec2::new(0.01, 0.02),
             duv_dy: Vec2::new(-0.03, 0.04),
+        };
+        let third = FurtherUv { uv: Vec2::new(0.4, -0.1), ..second };
+        let fourth = FurtherUv { uv: Vec2::new(0.9, 0.6), ..second };
+        let vertex = VertexData {
+            colour: Spectrum::new(0.5, 0.25, 2.0),
+            coverage: 0.75,
+            further: [second, third, fourth],
         };
         let here = TextureContext { vertex, ..at(DVec3::new(2.0, 3.0, 4.0), Vec2::new(0.3, 0.6)) };
         let tint: Texture<Spectrum> = Texture::Product([
@@ -485,11 +518,15 @@ mod tests {
             axes: [Vec2::new(0.0, 2.0), Vec2::new(-3.0, 0.0)],
             origin: Vec2::new(0.5, 0.25),
         };
-        let second = mapping(UvSet::Second).map(&here);
-        assert!((second.st - Vec2::new(-1.6, 0.65)).length() < 1e-6);
-        assert!((second.dst_dx - Vec2::new(-0.06, 0.02)).length() < 1e-6);
-        assert!((second.dst_dy - Vec2::new(-0.12, -0.06)).length() < 1e-6);
+        let turned = mapping(UvSet::Second).map(&here);
+        assert!((turned.st - Vec2::new(-1.6, 0.65)).length() < 1e-6);
+        assert!((turned.dst_dx - Vec2::new(-0.06, 0.02)).length() < 1e-6);
+        assert!((turned.dst_dy - Vec2::new(-0.12, -0.06)).length() < 1e-6);
         assert!((mapping(UvSet::First).map(&here).st - Vec2::new(-1.3, 0.85)).length() < 1e-6);
+        for (set, uv) in UvSet::FURTHER.into_iter().zip([second.uv, third.uv, fourth.uv]) {
+            let expected = Vec2::new(0.5 - 3.0 * uv.y, 0.25 + 2.0 * uv.x);
+            assert!((mapping(set).map(&here).st - expected).length() < 1e-6, "{set:?}");
+        }
     }
 
     #[test]

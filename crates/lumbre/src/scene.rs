@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use lumbre_formats::{Diagnostic, Diagnostics, FormatError, Place, ReadOptions, open_scenes};
 use lumbre_geometry::Ray;
 use lumbre_kernel::Hit;
-use lumbre_render::{CancelToken, NoProgress, Progress, RenderOptions, render};
+use lumbre_render::{CancelToken, Feature, NoProgress, Progress, RenderOptions, Stop, render};
 use lumbre_scene::{BuildWarning, Footprint, SceneDesc};
 
 use crate::{CastHit, Error, Picture, SceneInfo};
@@ -19,6 +19,9 @@ pub struct Scene {
     info: SceneInfo,
     build_time: Duration,
 }
+
+/// What reflects less says little of the light on it.
+const LEAST_ALBEDO: f32 = 0.02;
 
 /// Opens a scene file: .pbrt (also .gz), .gltf, .glb, .obj, .ply or .stl. Warnings are dropped; [`open_with`] returns them.
 ///
@@ -145,6 +148,45 @@ impl Scene {
         let rendered =
             render(&self.resolved, options, progress, cancel).map_err(|e| Error::Options(e.to_string()))?;
         Ok(Picture { rendered, whole: (options.width, options.height), backdrop: None })
+    }
+
+    /// How bright a picture shows what is white and well lit, as an exposure meter in the light would find it: the luminance
+    /// of what is seen over its reflectance, of which a fifth is brighter. `None` where nothing is seen. It is found from a
+    /// small picture of its own, so that it is the same for every size, part and number of samples.
+    ///
+    /// # Errors
+    /// As [`Scene::render`].
+    pub fn white_level(&self, options: &RenderOptions) -> Result<Option<f32>, Error> {
+        const SIDE: f64 = 64.0;
+        const SPP: u32 = 16;
+        let longer = f64::from(options.width.max(options.height).max(1));
+        let side = |pixels: u32| (f64::from(pixels) * SIDE / longer).ceil().max(1.0) as u32;
+        let small = RenderOptions {
+            width: side(options.width),
+            height: side(options.height),
+            crop: None,
+            transparent: true,
+            stop: Stop { spp: SPP, time: None, noise: None },
+            features: true,
+            ..options.clone()
+        };
+        let picture = self.render(&small)?;
+        let image = picture.image();
+        let (Some(albedo), Some(coverage)) = (picture.feature(Feature::Albedo), image.alpha()) else {
+            return Ok(None);
+        };
+        let mut levels: Vec<f32> = image
+            .pixels()
+            .iter()
+            .zip(albedo.pixels())
+            .zip(coverage)
+            .filter(|((light, albedo), coverage)| {
+                **coverage > 0.99 && light.luminance() > 0.0 && albedo.luminance() > LEAST_ALBEDO
+            })
+            .map(|((light, albedo), _)| light.luminance() / albedo.luminance())
+            .collect();
+        levels.sort_unstable_by(f32::total_cmp);
+        Ok(levels.get(levels.len() * 4 / 5).copied())
     }
 
     /// What is in the scene, in numbers.

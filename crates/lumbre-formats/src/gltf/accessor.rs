@@ -1,8 +1,13 @@
 //! Accessors: numbers out of buffers, whatever their types, strides and gaps.
 
+use rayon::prelude::*;
+
 use super::file::{File, List, View};
 use super::json::{Read, Value};
 use crate::diagnostic::{Diagnostic, FormatError, quoted};
+
+/// From how many elements on it pays that another thread takes some of them.
+pub(super) const SHARE: usize = 1 << 15;
 
 /// The types of numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -113,6 +118,8 @@ impl Element {
 pub(super) struct Accessor<'a> {
     /// The accessor itself, for messages.
     pub value: Value<'a>,
+    /// Its position in the file's list.
+    pub index: usize,
     /// The type of its numbers.
     pub component: Component,
     /// The numbers of one element.
@@ -231,6 +238,7 @@ impl<'a> Accessor<'a> {
 
         let mut at = Self {
             value,
+            index,
             component,
             element,
             normalized,
@@ -304,7 +312,11 @@ impl<'a> Accessor<'a> {
     }
 
     /// All elements as numbers, made into what is wanted. `N` numbers are read of each: an element has at least so many.
-    pub fn floats<const N: usize, T>(&self, file: &File<'_>, make: impl Fn([f32; N]) -> T) -> Read<Vec<T>> {
+    pub fn floats<const N: usize, T: Send>(
+        &self,
+        file: &File<'_>,
+        make: impl Fn([f32; N]) -> T + Sync,
+    ) -> Read<Vec<T>> {
         debug_assert!(N <= self.element.numbers());
         match (self.component, self.normalized) {
             (Component::F32, _) => self.decoded(file, |b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]), make),
@@ -348,11 +360,11 @@ impl<'a> Accessor<'a> {
         }
     }
 
-    fn decoded<N1: Copy + Default, const N: usize, T>(
+    fn decoded<N1: Copy + Default, const N: usize, T: Send>(
         &self,
         file: &File<'_>,
-        decode: impl Fn(&[u8]) -> N1,
-        make: impl Fn([N1; N]) -> T,
+        decode: impl Fn(&[u8]) -> N1 + Sync,
+        make: impl Fn([N1; N]) -> T + Sync,
     ) -> Read<Vec<T>> {
         let size = self.component.bytes();
         let (columns, rows) = self.element.columns();
@@ -371,7 +383,7 @@ impl<'a> Accessor<'a> {
             None => elements.extend((0..self.count).map(|_| make([N1::default(); N]))),
             Some(Strided { bytes, stride }) => {
                 let bytes = bytes.ok_or_else(|| without_data(self.value))?;
-                elements.extend(bytes.chunks(stride).map(element));
+                elements.par_extend(bytes.par_chunks(stride).with_min_len(SHARE).map(element));
             }
         }
         if let Some(sparse) = &self.sparse {

@@ -5,8 +5,9 @@ use std::collections::HashMap;
 use lumbre_image::Rgb;
 use lumbre_math::{DMat3, DMat4, DVec3, Vec2, Vec3, Vec4};
 use lumbre_scene::MeshMoment;
+use rayon::prelude::*;
 
-use super::accessor::{Accessor, Component, Element};
+use super::accessor::{Accessor, Component, Element, SHARE};
 use super::file::{File, List};
 use super::json::{Read, Value};
 use crate::diagnostic::quoted;
@@ -135,7 +136,7 @@ impl<'a> Attributes<'a> {
         let mut attributes = Self::default();
         let mut count: Option<(usize, String)> = None;
         // Views that more than one attribute looks through must say their stride.
-        let mut views: Vec<usize> = vec![];
+        let mut views: Vec<(usize, usize)> = vec![];
         for (name, index) in value.members()? {
             let Some(attribute) = Attribute::read(&name) else {
                 let wrong = index.wrong("unknown attribute").found(quoted(&name));
@@ -175,10 +176,11 @@ impl<'a> Attributes<'a> {
             };
             accessor.expect(index, elements, components)?;
             if let Some((view, has_stride)) = accessor.view {
-                if views.contains(&view) && !has_stride {
+                // Attributes may also be one and the same accessor.
+                if views.iter().any(|&(other, by)| other == view && by != accessor.index) && !has_stride {
                     file.breach(index.wrong("attributes share a buffer view that says no stride"))?;
                 }
-                views.push(view);
+                views.push((view, accessor.index));
                 if !accessor.start.is_multiple_of(4)
                     || (!accessor.stride.is_multiple_of(4) && accessor.count > 1)
                 {
@@ -548,19 +550,17 @@ pub(super) enum Assembly {
 /// error; when lenient they are dropped with a warning.
 pub(super) fn assemble(file: &File<'_>, primitive: &Primitive<'_>, positions: &[Vec3]) -> Read<Assembly> {
     let listed = match &primitive.indices {
-        Some(accessor) => {
-            let indices: Vec<u32> = accessor.wholes::<1>(file)?.into_iter().map(|[i]| i).collect();
-            Some((accessor, indices))
-        }
+        Some(accessor) => Some((accessor, accessor.wholes::<1>(file)?)),
         None => None,
     };
     let count = listed.as_ref().map_or(positions.len(), |(_, indices)| indices.len());
     let count = primitive.mode.whole(count);
-    let vertex = |i: usize| listed.as_ref().map_or(i as u32, |(_, indices)| indices[i]);
+    let vertex = |i: usize| listed.as_ref().map_or(i as u32, |(_, indices)| indices[i][0]);
     // As a rule every vertex is of use, which is soon seen of all at once.
+    let is_there = |&[i]: &[u32; 1]| (i as usize) < positions.len();
     let all_are_there =
-        listed.as_ref().is_none_or(|(_, indices)| indices.iter().all(|&i| (i as usize) < positions.len()));
-    let all_are_fine = all_are_there && positions.iter().all(|p| p.is_finite());
+        listed.as_ref().is_none_or(|(_, indices)| indices.par_iter().with_min_len(SHARE).all(is_there));
+    let all_are_fine = all_are_there && positions.par_iter().with_min_len(SHARE).all(|p| p.is_finite());
     let check = |i: usize| -> Read<bool> {
         if all_are_fine {
             return Ok(true);
@@ -632,14 +632,20 @@ pub(super) fn assemble(file: &File<'_>, primitive: &Primitive<'_>, positions: &[
                 _ => count.saturating_sub(2),
             };
             let mut list = file.budget.vec(triangles as u64, "triangles")?;
-            for k in 0..triangles {
-                let corners = match primitive.mode {
-                    Mode::Triangles => [3 * k, 3 * k + 1, 3 * k + 2],
-                    Mode::TriangleStrip => [k, k + 1 + k % 2, k + 2 - k % 2],
-                    _ => [k + 1, k + 2, 0],
-                };
-                if all(&corners)? {
-                    list.push(corners.map(vertex));
+            let corners = |k: usize| match primitive.mode {
+                Mode::Triangles => [3 * k, 3 * k + 1, 3 * k + 2],
+                Mode::TriangleStrip => [k, k + 1 + k % 2, k + 2 - k % 2],
+                _ => [k + 1, k + 2, 0],
+            };
+            if all_are_fine {
+                list.par_extend(
+                    (0..triangles).into_par_iter().with_min_len(SHARE).map(|k| corners(k).map(vertex)),
+                );
+            } else {
+                for k in 0..triangles {
+                    if all(&corners(k))? {
+                        list.push(corners(k).map(vertex));
+                    }
                 }
             }
             Assembly::Triangles(list)

@@ -514,6 +514,9 @@ impl Builder<'_> {
         world: &DAffine3,
         place: &Placed,
     ) -> Read<()> {
+        if shapes.is_empty() {
+            return Ok(());
+        }
         match Transform::from_affine(*world) {
             Ok(world_from_object) => {
                 scene.shapes.extend(shapes.into_iter().map(|shape| ShapeDesc { world_from_object, ..shape }));
@@ -549,9 +552,7 @@ impl Builder<'_> {
             let has_tangents =
                 primitive.attributes.tangent.is_some() && primitive.attributes.normal.is_some();
             let by = dressing.tangents.filter(|_| !has_tangents);
-            let wants = |set| {
-                sets.is_some_and(|sets| sets.first == set || sets.second == Some(set)) || by == Some(set)
-            };
+            let wants = |set| sets.is_some_and(|sets| sets.find(set).is_some()) || by == Some(set);
             let mut vertices = mesh::vertices(file, &primitive, pose, wants)?;
             if primitive.mode.is_surface() {
                 for pose in &poses {
@@ -644,14 +645,14 @@ fn mesh_of(mut vertices: Vertices, triangles: Vec<[u32; 3]>, dressing: &Dressing
         return None;
     }
     let count = vertices.positions.len();
-    let UvSets { first, second, baked } = dressing.sets.unwrap_or_default();
+    let UvSets { first, further, baked } = dressing.sets.unwrap_or_default();
     let mut coordinates = |set: usize| -> Vec<Vec2> {
         let list = vertices.uvs.get_mut(set).and_then(Option::take);
         let mut list = list.unwrap_or_else(|| vec![Vec2::ZERO; count]);
         list.iter_mut().for_each(|uv| *uv = Vec2::new(uv.x, 1.0 - uv.y));
         list
     };
-    let second_uvs = second.map(&mut coordinates);
+    let further_uvs = further.map(|set| set.map(&mut coordinates));
     let uvs = dressing.sets.is_some().then(|| {
         let mut uvs = coordinates(first);
         if baked != lumbre_math::glam::Affine2::IDENTITY {
@@ -676,7 +677,7 @@ fn mesh_of(mut vertices: Vertices, triangles: Vec<[u32; 3]>, dressing: &Dressing
         normals: vertices.normals,
         uvs,
         tangents,
-        second_uvs,
+        further_uvs,
         colours,
         coverages,
         face_indices: None,

@@ -8,8 +8,8 @@ use lumbre_image::Rgb;
 use lumbre_math::glam::Affine2;
 use lumbre_scene::{AreaLightDesc, MaterialId, NamedMaterial};
 use lumbre_shading::{
-    FloatTexture, ImageTexture, Material, MaterialKind, PrincipledParams, SpectrumTexture, Texture,
-    VolumeParams,
+    FURTHER_SETS, FloatTexture, ImageTexture, Material, MaterialKind, PrincipledParams, SpectrumTexture,
+    Texture, VolumeParams,
 };
 
 use super::file::{File, List};
@@ -83,16 +83,17 @@ impl<'f> Materials<'f> {
             parameters.textures().map(|t| t.uv_set).filter(|&set| set != first).collect();
         others.sort_unstable();
         others.dedup();
-        if others.len() > 1
+        if others.len() > FURTHER_SETS
             && let Some(index) = index
         {
-            let message = "textures on a third set of texture coordinates were left out";
+            let message = "textures on a fifth set of texture coordinates were left out";
             self.file.warn(self.file.list(List::Materials)[index], message);
         }
         let baked = of_light.map_or(Affine2::IDENTITY, ours);
         let is_invertible = baked.matrix2.determinant().abs() > 1e-12;
         let baked = if is_invertible { baked } else { Affine2::IDENTITY };
-        Some(UvSets { first, second: others.first().copied(), baked })
+        let further = std::array::from_fn(|i| others.get(i).copied());
+        Some(UvSets { first, further, baked })
     }
 
     /// All materials that were asked for.

@@ -8,8 +8,8 @@ use lumbre_image::{Bitmap, Channels, Encoding, PixelData, unit_to_u16};
 use lumbre_math::glam::{Affine2, Mat2};
 use lumbre_math::{Vec2, Vec3};
 use lumbre_shading::{
-    AxisWrap, FloatTexture, ImageFilter, ImageTexture, Mapping2d, MipMap, MipMapOptions, SpectrumTexture,
-    Texture, UvSet, Wrap,
+    AxisWrap, FURTHER_SETS, FloatTexture, ImageFilter, ImageTexture, Mapping2d, MipMap, MipMapOptions,
+    SpectrumTexture, Texture, UvSet, Wrap,
 };
 
 use super::file::{File, List};
@@ -41,14 +41,25 @@ pub(super) struct Textures<'f> {
     maps: RefCell<HashMap<MapKey, Option<Arc<MipMap>>>>,
 }
 
-/// How a mesh's two sets of texture coordinates come to lie: which sets of the file they are. The v of glTF counts
-/// downwards and ours upwards, so meshes get 1 - v.
+/// How a mesh's sets of texture coordinates come to lie: which sets of the file they are. The v of glTF counts downwards
+/// and ours upwards, so meshes get 1 - v.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub(super) struct UvSets {
     pub first: usize,
-    pub second: Option<usize>,
+    pub further: [Option<usize>; FURTHER_SETS],
     /// What is done to the first set in the mesh itself: light looks up its image there without any map.
     pub baked: Affine2,
+}
+
+impl UvSets {
+    /// Which of the mesh's sets has the file's; `None` for one that it does not have.
+    pub fn find(&self, set: usize) -> Option<UvSet> {
+        if set == self.first {
+            return Some(UvSet::First);
+        }
+        let found = self.further.iter().position(|further| *further == Some(set))?;
+        Some(UvSet::FURTHER[found])
+    }
 }
 
 impl<'f> Textures<'f> {
@@ -113,17 +124,11 @@ impl<'f> Textures<'f> {
     }
 
     fn look_up(&self, texture: TextureRef, sets: UvSets, how: Use) -> Read<Option<ImageTexture>> {
-        let set = if texture.uv_set == sets.first {
-            UvSet::First
-        } else if Some(texture.uv_set) == sets.second {
-            UvSet::Second
-        } else {
-            return Ok(None);
-        };
+        let Some(set) = sets.find(texture.uv_set) else { return Ok(None) };
         let image = self.map(texture.texture, how)?;
         let map = match set {
             UvSet::First => ours(texture) * sets.baked.inverse(),
-            UvSet::Second => ours(texture),
+            UvSet::Second | UvSet::Third | UvSet::Fourth => ours(texture),
         };
         let axes = [map.matrix2.x_axis, map.matrix2.y_axis];
         let mapping = Mapping2d::Affine { set, axes, origin: map.translation };

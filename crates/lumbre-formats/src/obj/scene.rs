@@ -17,6 +17,7 @@ use crate::budget::Budget;
 use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, nearest_name, quoted};
 use crate::image::open_image;
 use crate::input::Input;
+use crate::ply::unsaid_material;
 
 /// Reads the OBJ file `path` with its materials and textures, each mesh a shape; y is up.
 ///
@@ -56,7 +57,8 @@ pub fn open_obj(
         let material = finished.material.clone();
         scene.materials.push(NamedMaterial { name: Some(finished.name.clone()), material });
     }
-    let mut default = None;
+    // Of meshes without colours at their vertices, and of those with them.
+    let mut unsaid = [None; 2];
     for (index, mesh) in obj.meshes.into_iter().enumerate() {
         let named = mesh.material.as_ref().and_then(|(name, place)| {
             let found = names.get(name).copied();
@@ -70,9 +72,9 @@ pub fn open_obj(
             found
         });
         let id = named.unwrap_or_else(|| {
-            *default.get_or_insert_with(|| {
-                let material = Arc::new(Material::default_diffuse());
-                scene.materials.push(NamedMaterial { name: None, material });
+            let has_colours = mesh.mesh.colours.is_some();
+            *unsaid[usize::from(has_colours)].get_or_insert_with(|| {
+                scene.materials.push(unsaid_material(has_colours));
                 scene.materials.len() - 1
             })
         });

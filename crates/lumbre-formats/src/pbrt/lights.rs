@@ -11,7 +11,7 @@ use lumbre_shading::{ImageFilter, Spectrum, SpectrumValue, Wrap};
 use super::colour;
 use super::convert::{Converter, file_fault};
 use super::params::{Params, Type};
-use super::source::{AtSpot, Result};
+use super::source::{AtSpot, Result, Spot};
 use super::state::{AreaLight, State};
 use super::textures::{SpectrumUse, single};
 use crate::Diagnostic;
@@ -81,7 +81,8 @@ impl Converter<'_, '_> {
                 LightDesc::Distant { towards, irradiance: emission * scale * lux as f32 }
             }
             "infinite" => self.infinite(&params, state)?,
-            "goniometric" | "projection" => {
+            "goniometric" => self.goniometric(&params, state)?,
+            "projection" => {
                 params.ignore_all();
                 self.note(spot, format!("light {} is not rendered yet: it is left out", quoted(ty)));
                 return Ok(());
@@ -150,16 +151,7 @@ impl Converter<'_, '_> {
         let file = self.image_file(&filename, at)?;
         let image = file.to_image(self.budget).map_err(|e| file_fault(at, e))?;
         self.budget.release(file.bitmap.bytes() as u64);
-        let (width, height) = (image.width(), image.height());
-        let mapping = if width == height {
-            EnvironmentMapping::EqualArea
-        } else if width == height.saturating_mul(2) {
-            EnvironmentMapping::LatitudeLongitude
-        } else {
-            let wrong = Diagnostic::error(format!("{} is no environment map", quoted(&filename)));
-            let wrong = wrong.found(format!("{width} by {height} pixels"));
-            return Err(at.wrong(wrong.expected("a square (equal area) or twice as wide as high")));
-        };
+        let mapping = environment_mapping(&image, &filename, at)?;
         if let Some(lux) = lux {
             let found = upper_illuminance(&image, mapping);
             if !(found > 0.0 && found.is_finite()) {
@@ -176,6 +168,52 @@ impl Converter<'_, '_> {
         };
         let image = Some(EnvironmentDesc { image: image.into(), mapping });
         Ok(LightDesc::Infinite { world_from_light, radiance: scale, image })
+    }
+
+    /// From a point, by direction as an image says, of whose channels the mean counts. Its y and z are exchanged.
+    fn goniometric(&mut self, params: &Params, state: &State) -> Result<LightDesc> {
+        let ctm = state.ctm[0];
+        let intensity = self.emission(params, "I", state)? * self.light_scale(params)?;
+        let lumens = positive(params, "power")?;
+        let is_old = params.has("mapname");
+        if is_old {
+            self.upgraded(params.spot_of("mapname"));
+        }
+        let key = if is_old { "mapname" } else { "filename" };
+        let Some(filename) = params.string(key)?.map(str::to_owned) else {
+            self.note(
+                params.spot,
+                "a goniometric light without a filename shines the same in all directions",
+            );
+            let around = lumens.map_or(1.0, |lumens| lumens / (4.0 * PI));
+            return Ok(LightDesc::Point {
+                from: ctm.point(DVec3::ZERO),
+                intensity: intensity * around as f32,
+            });
+        };
+        let at = params.spot_of(key);
+        let file = self.image_file(&filename, at)?;
+        let image = file.to_image(self.budget).map_err(|e| file_fault(at, e))?;
+        self.budget.release(file.bitmap.bytes() as u64);
+        let image = image.map(|c| Spectrum::splat((c.r + c.g + c.b) / 3.0));
+        let mapping = environment_mapping(&image, &filename, at)?;
+        let factor = match lumens {
+            None => 1.0,
+            Some(lumens) => {
+                let found = flux(&image, mapping);
+                if !(found > 0.0 && found.is_finite()) {
+                    let message = "a power is asked of a goniometric light whose image is black";
+                    return Err(params.spot_of("power").error(message));
+                }
+                lumens / found
+            }
+        };
+        let turned = match mapping {
+            EnvironmentMapping::EqualArea => ctm * exchanged(),
+            EnvironmentMapping::LatitudeLongitude => ctm * exchanged() * half_turn(),
+        };
+        let image = EnvironmentDesc { image: image.into(), mapping };
+        Ok(LightDesc::Goniometric { world_from_light: turned, intensity: intensity * factor as f32, image })
     }
 
     /// The light of the next shapes.
@@ -245,9 +283,43 @@ fn frame_along(v: DVec3) -> Option<Transform> {
     axes.is_finite().then(|| Transform::from_affine(DAffine3::from_mat3(axes)).ok()).flatten()
 }
 
+/// y and z exchanged, which is a mirror.
+fn exchanged() -> Transform {
+    let axes = DMat3::from_cols(DVec3::X, DVec3::Z, DVec3::Y);
+    Transform::from_affine(DAffine3::from_mat3(axes)).unwrap_or_default()
+}
+
 /// Half a turn about z.
 fn half_turn() -> Transform {
     Transform::rotate(DVec3::Z, 180.0).unwrap_or_default()
+}
+
+/// How an image covers the sphere, by its shape.
+fn environment_mapping(image: &Image, filename: &str, at: Spot) -> Result<EnvironmentMapping> {
+    let (width, height) = (image.width(), image.height());
+    if width == height {
+        return Ok(EnvironmentMapping::EqualArea);
+    }
+    if width == height.saturating_mul(2) {
+        return Ok(EnvironmentMapping::LatitudeLongitude);
+    }
+    let wrong = Diagnostic::error(format!("{} is no environment map", quoted(filename)));
+    let wrong = wrong.found(format!("{width} by {height} pixels"));
+    Err(at.wrong(wrong.expected("a square (equal area) or twice as wide as high")))
+}
+
+/// The integral of a picture over all directions.
+fn flux(image: &Image, mapping: EnvironmentMapping) -> f64 {
+    let (width, height) = (f64::from(image.width()), f64::from(image.height()));
+    let cosine = |y: u32| (PI * f64::from(y) / height).cos();
+    let row = |y: u32| {
+        let solid_angle = match mapping {
+            EnvironmentMapping::EqualArea => 4.0 * PI / (width * height),
+            EnvironmentMapping::LatitudeLongitude => 2.0 * PI * (cosine(y) - cosine(y + 1)) / width,
+        };
+        (0..image.width()).map(|x| f64::from(image.pixel(x, y).luminance())).sum::<f64>() * solid_angle
+    };
+    (0..image.height()).map(row).sum()
 }
 
 /// Illuminance, in units of the picture, of a horizontal surface under the upper half of an environment.
@@ -288,8 +360,10 @@ mod tests {
         for (mapping, width) in
             [(EnvironmentMapping::EqualArea, 64), (EnvironmentMapping::LatitudeLongitude, 128)]
         {
-            let found = upper_illuminance(&Image::filled(width, 64, Spectrum::WHITE), mapping);
+            let white = Image::filled(width, 64, Spectrum::WHITE);
+            let found = upper_illuminance(&white, mapping);
             assert!((found - PI).abs() < 4e-3, "{mapping:?}: {found}");
+            assert!((flux(&white, mapping) - 4.0 * PI).abs() < 1e-6, "{mapping:?}");
         }
     }
 }
