@@ -30,8 +30,9 @@ pub fn run_proof(claim: Claim, rays: Option<u64>) -> Result<()> {
 pub fn miri() -> Result<()> {
     let arguments =
         ["+nightly", "miri", "test", "--package", "lumbre-kernel", "--lib", "--", "tests::small", "stack::"];
-    // The work-stealing queues below rayon turn integers into pointers.
-    let flags = "-Zmiri-permissive-provenance -Zmiri-ignore-leaks -Zmiri-disable-isolation";
+    // The queues below rayon turn integers into pointers, and keep the rules of tree borrows but not those of stacked ones.
+    let flags =
+        "-Zmiri-tree-borrows -Zmiri-permissive-provenance -Zmiri-ignore-leaks -Zmiri-disable-isolation";
     run_with("cargo", &arguments, &[("MIRIFLAGS", flags), ("RAYON_NUM_THREADS", "1")])
 }
 
