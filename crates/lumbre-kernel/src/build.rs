@@ -12,7 +12,7 @@ use crate::collapse::{Choices, Costs, choose};
 use crate::few::{Decide, FEW, Few, group_of};
 use crate::lanes::Level;
 use crate::morton::{self, Code};
-use crate::primitive::{Bounds, Primitive, Traits};
+use crate::primitive::{Bounds, Kind, Primitive, Traits};
 use crate::reinsert::reinsert;
 
 /// Levels that may be split by SAH; then come at most 32 more, each halving.
@@ -38,6 +38,8 @@ pub(crate) struct Fork {
     pub(crate) costs: Costs,
     pub(crate) choices: Choices,
     pub(crate) children: [Binary; 2],
+    /// Whether the right child is of a higher rank than the left.
+    pub(crate) is_ranked: bool,
 }
 
 impl Binary {
@@ -127,17 +129,55 @@ pub(crate) fn binary_tree(
     let shared = (2 * rayon::current_num_threads()).ilog2();
     let shared = if shared > 1 { shared + 1 } else { 0 };
     let builder = Builder { level, traits, shared };
-    let range = Range { here: &mut primitives, there: &mut other, names: &mut names, first: 0, depth: 0 };
-    let are_packed = traits.iter().all(|traits| traits.kind.is_packed());
-    let tree = match (preset, are_packed) {
-        (Preset::Fast, true) => builder.grow_fast::<false>(range),
-        (Preset::Fast, false) => builder.grow_fast::<true>(range),
-        (_, true) => builder.grow::<false>(range, None),
-        (_, false) => builder.grow::<true>(range, None),
-    };
+    let counts = part_by_rank(&mut primitives, &mut other, traits);
+    let mut rest = Range { here: &mut primitives, there: &mut other, names: &mut names, first: 0, depth: 0 };
+    let mut trees = Vec::with_capacity(Kind::RANKS);
+    for (rank, count) in counts.into_iter().enumerate().filter(|&(_, count)| count > 0) {
+        let [range, behind] = rest.cut(count);
+        rest = behind;
+        let range = Range { depth: 0, ..range };
+        let is_packed = rank + 1 == Kind::RANKS;
+        trees.push(match (preset, is_packed) {
+            (Preset::Fast, true) => builder.grow_fast::<false>(range),
+            (Preset::Fast, false) => builder.grow_fast::<true>(range),
+            (_, true) => builder.grow::<false>(range, None),
+            (_, false) => builder.grow::<true>(range, None),
+        });
+    }
     drop((primitives, other));
-    let tree = if preset == Preset::Best { reinsert(tree) } else { tree };
+    let better = |tree| if preset == Preset::Best { reinsert(tree) } else { tree };
+    let join = |low, high| Binary::Fork(Box::new(Fork { is_ranked: true, ..Fork::over([low, high]) }));
+    let tree = trees.into_iter().map(better).reduce(join).expect("there are primitives");
     (tree, names)
+}
+
+/// Brings primitives into the order of their ranks; how many there are of each.
+///
+/// Apart, because boxes of one kind do not grow around what is of another and everywhere among them, as trees on a ground
+/// are; and so that a search for any hit asks first what is quickly asked.
+fn part_by_rank(
+    primitives: &mut Vec<Primitive>,
+    other: &mut Vec<Primitive>,
+    traits: &[Traits],
+) -> [usize; Kind::RANKS] {
+    let mut counts = [0; Kind::RANKS];
+    let ranks: Vec<usize> = traits.iter().map(|traits| traits.kind.rank()).collect();
+    if let Some(&first) = ranks.first()
+        && ranks.iter().all(|&rank| rank == first)
+    {
+        counts[first] = primitives.len();
+        return counts;
+    }
+    let rank = |primitive: &Primitive| ranks[primitive.first() as usize];
+    primitives.iter().for_each(|primitive| counts[rank(primitive)] += 1);
+    let mut places = [0, counts[0], counts[0] + counts[1]];
+    for primitive in &*primitives {
+        let place = &mut places[rank(primitive)];
+        other[*place] = *primitive;
+        *place += 1;
+    }
+    std::mem::swap(primitives, other);
+    counts
 }
 
 /// Like `vec![value; count]`, by all threads.

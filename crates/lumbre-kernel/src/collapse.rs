@@ -152,7 +152,7 @@ impl Fork {
         let mut bounds = *children[0].bounds();
         bounds.grow(children[1].bounds());
         let (costs, choices) = share(bounds.half_area(), children[0].costs(), children[1].costs());
-        Self { bounds, costs, choices, children }
+        Self { bounds, costs, choices, children, is_ranked: false }
     }
 }
 
@@ -204,22 +204,28 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// The children of an inner node in the wide tree, the largest last: where any hit will do, it is asked first, for it is
-    /// the likeliest to have one.
+    /// Whether the right child is of a higher rank than the left.
+    #[inline(always)]
+    fn is_ranked(&self) -> bool {
+        matches!(self, Self::Fork(fork) if fork.is_ranked)
+    }
+
+    /// The children of an inner node in the wide tree, by rank, and of one rank the largest last: where any hit will do, it
+    /// is asked first, for it is the likeliest to have one.
     #[inline(always)]
     fn gather(self) -> ([Self; WIDTH], usize) {
         let mut found = [self; WIDTH];
-        let mut areas = [0.0; WIDTH];
+        let mut areas = [(0, 0.0); WIDTH];
         let mut len = 0;
-        let mut pending = [(self, 0); WIDTH];
+        let mut pending = [(self, 0, 0); WIDTH];
         let first = self.choices().left(WIDTH);
         let [left, right] = self.children();
-        pending[0] = (right, WIDTH - first);
-        pending[1] = (left, first);
+        pending[0] = (right, WIDTH - first, if self.is_ranked() { 2 } else { 0 });
+        pending[1] = (left, first, 0);
         let mut waiting = 2;
         while waiting > 0 {
             waiting -= 1;
-            let (cursor, mut room) = pending[waiting];
+            let (cursor, mut room, rank) = pending[waiting];
             let mut first = 0;
             if cursor.names().is_none() {
                 while room > 1 && first == 0 {
@@ -229,13 +235,15 @@ impl<'a> Cursor<'a> {
             }
             if first > 0 {
                 let [left, right] = cursor.children();
-                pending[waiting] = (right, room - first);
-                pending[waiting + 1] = (left, first);
+                // Ranks fork at the left, where the lower ones are.
+                let above = if cursor.is_ranked() { 1 } else { rank };
+                pending[waiting] = (right, room - first, above);
+                pending[waiting + 1] = (left, first, rank);
                 waiting += 2;
                 continue;
             }
             // In its place by area.
-            let area = cursor.bounds().half_area();
+            let area = (rank, cursor.bounds().half_area());
             let mut at = len;
             while at > 0 && areas[at - 1] > area {
                 (found[at], areas[at]) = (found[at - 1], areas[at - 1]);

@@ -11,7 +11,7 @@ use crate::build::{binary_tree, fill};
 use crate::clouds::CloudSurvey;
 use crate::collapse::{Entry, Packed, pack};
 use crate::holds::{Holds, SingleStart};
-use crate::lanes::Level;
+use crate::lanes::{Lanes, Level, Task};
 use crate::node::{Node, Units, tag};
 use crate::primitive::{Bounds, Kind, Primitive, Traits};
 use crate::{
@@ -517,8 +517,7 @@ const OUTLINE: usize = 128;
 /// by itself, which is tighter than the image of the whole.
 struct Outline {
     whole: Aabb,
-    /// The middle of each, and half its size.
-    boxes: Vec<[DVec3; 2]>,
+    boxes: Vec<EightBoxes>,
     /// No coordinate is larger.
     reach: DVec3,
 }
@@ -548,6 +547,7 @@ impl Outline {
         let filled = open.iter().map(|(bounds, _)| bounds).filter(|bounds| !bounds.is_empty());
         let boxes: Vec<_> = filled.map(center_and_half).collect();
         let reach = boxes.iter().fold(DVec3::ZERO, |most, [center, half]| most.max(center.abs() + *half));
+        let boxes = boxes.chunks(EIGHT).map(EightBoxes::new).collect();
         Self { whole, boxes, reach }
     }
 
@@ -557,12 +557,8 @@ impl Outline {
             return whole;
         }
         let (affine, sizes) = (map.affine(), sizes_of(map));
-        let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for &[center, half] in &self.boxes {
-            let (image, reach) = (affine.matrix3 * center, sizes * half);
-            min = min.min(image - reach);
-            max = max.max(image + reach);
-        }
+        let [min, max] =
+            Level::best().run(Images { boxes: &self.boxes, linear: &affine.matrix3, sizes: &sizes });
         let rounding = rounding_of(map, &sizes, self.reach);
         let (min, max) = (min + affine.translation - rounding, max + affine.translation + rounding);
         // Each bounds it, so that their common part does.
@@ -598,6 +594,60 @@ impl Outline {
             swept = swept.union(Aabb { min: along.min - margin, max: along.max + margin });
         }
         swept
+    }
+}
+
+/// How many boxes are taken over at a time.
+const EIGHT: usize = 8;
+
+/// The middles of eight boxes and half their sizes, by axes.
+struct EightBoxes {
+    centers: [[f64; EIGHT]; 3],
+    halves: [[f64; EIGHT]; 3],
+}
+
+impl EightBoxes {
+    /// Of some; where there are fewer, the first comes again.
+    fn new(boxes: &[[DVec3; 2]]) -> Self {
+        let component = |part: usize, axis: usize| {
+            std::array::from_fn(|lane| boxes.get(lane).unwrap_or(&boxes[0])[part][axis])
+        };
+        let components = |part: usize| [0, 1, 2].map(|axis| component(part, axis));
+        Self { centers: components(0), halves: components(1) }
+    }
+}
+
+/// The box around the images of boxes, its translation apart.
+struct Images<'a> {
+    boxes: &'a [EightBoxes],
+    linear: &'a DMat3,
+    /// The sizes of its numbers.
+    sizes: &'a DMat3,
+}
+
+impl Task for Images<'_> {
+    type Output = [DVec3; 2];
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> [DVec3; 2] {
+        let mut low = [[f64::INFINITY; EIGHT]; 3];
+        let mut high = [[f64::NEG_INFINITY; EIGHT]; 3];
+        for EightBoxes { centers, halves } in self.boxes {
+            for axis in 0..3 {
+                let row = |m: &DMat3| [m.x_axis[axis], m.y_axis[axis], m.z_axis[axis]];
+                let (m, s) = (row(self.linear), row(self.sizes));
+                for lane in 0..EIGHT {
+                    let image = m[0] * centers[0][lane] + m[1] * centers[1][lane] + m[2] * centers[2][lane];
+                    let reach = s[0] * halves[0][lane] + s[1] * halves[1][lane] + s[2] * halves[2][lane];
+                    let (first, last) = (image - reach, image + reach);
+                    low[axis][lane] = if first < low[axis][lane] { first } else { low[axis][lane] };
+                    high[axis][lane] = if last > high[axis][lane] { last } else { high[axis][lane] };
+                }
+            }
+        }
+        let least = |lanes: [f64; EIGHT]| lanes.into_iter().fold(f64::INFINITY, f64::min);
+        let most = |lanes: [f64; EIGHT]| lanes.into_iter().fold(f64::NEG_INFINITY, f64::max);
+        [DVec3::from_array(low.map(least)), DVec3::from_array(high.map(most))]
     }
 }
 

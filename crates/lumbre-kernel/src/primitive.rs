@@ -21,6 +21,19 @@ impl Kind {
     pub(crate) fn is_packed(self) -> bool {
         matches!(self, Self::Triangle | Self::Sphere)
     }
+
+    /// Kinds of different ranks have trees of their own, joined at the root; those of the last rank, which are the packed ones, are
+    /// the soonest asked.
+    pub(crate) fn rank(self) -> usize {
+        match self {
+            Self::Instance => 0,
+            Self::Shape | Self::Custom | Self::Precise => 1,
+            Self::Triangle | Self::Sphere => 2,
+        }
+    }
+
+    /// How many ranks there are.
+    pub(crate) const RANKS: usize = 3;
 }
 
 /// What the build must know of a geometry: the kind of its primitives, and what a test of one costs.

@@ -375,6 +375,16 @@ pub(crate) fn search<G: Goal>(
     level.run(Alone::<G> { accel, start, ray, goal: PhantomData })
 }
 
+/// The same within a search that goes through other trees.
+#[inline(always)]
+pub(crate) fn search_with<G: Goal, L: Lanes>(
+    accel: &Accel,
+    start: &SingleStart,
+    ray: &Ray,
+) -> Outcome<G::Answer> {
+    Alone::<G> { accel, start, ray, goal: PhantomData }.run::<L>()
+}
+
 impl<G: Goal> Task for Alone<'_, '_, G> {
     type Output = Outcome<G::Answer>;
 

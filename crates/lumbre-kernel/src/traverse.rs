@@ -12,8 +12,10 @@ use lumbre_math::DVec3;
 use smallvec::SmallVec;
 
 use crate::collapse::Entry;
+use crate::holds::SingleStart;
 use crate::lanes::{LANE_BITS, Lanes, Level, Task};
 use crate::node::{BoxRay, Node, tag};
+use crate::single::{self, Nearest, Outcome, Whether};
 use crate::sphere_search::{self, AmongSpheres, CloudRay};
 use crate::spheres::ExactSphere;
 use crate::stack::{Order, Stack};
@@ -325,18 +327,29 @@ impl<'a, S: Search<'a>> Task for AmongTriangles<'a, '_, S> {
             return false;
         }
         let mut frame = Frame::<&Ray, L>::new(accel, ray, boxes, search);
-        let place = Place::default();
-        let mut stack = Stack::new();
-        let mut next = Some(root);
-        while let Some(reference) = next {
-            let Some(leaf) = frame.descend::<S::Order>(reference, &mut stack) else { break };
-            if meet_blocks(&mut frame, leaf, &place, search, touches) {
-                return true;
-            }
-            next = frame.pop::<S::Order>(&mut stack);
-        }
-        false
+        meet_triangles(&mut frame, root, &mut Stack::new(), &Place::default(), search, touches)
     }
+}
+
+/// Searches a tree of nothing but triangles, on a stack that is empty. True ends the search.
+#[inline(always)]
+fn meet_triangles<'a, R: Borrow<Ray>, L: Lanes, S: Search<'a>>(
+    frame: &mut Frame<'a, R, L>,
+    root: u32,
+    stack: &mut Stack<<S::Order as Order>::Entry>,
+    place: &Place,
+    search: &mut S,
+    touches: &mut Vec<Touch<'a>>,
+) -> bool {
+    let mut next = Some(root);
+    while let Some(reference) = next {
+        let Some(leaf) = frame.descend::<S::Order>(reference, stack) else { break };
+        if meet_blocks(frame, leaf, place, search, touches) {
+            return true;
+        }
+        next = frame.pop::<S::Order>(stack);
+    }
+    false
 }
 
 /// A search through a tree of anything.
@@ -358,6 +371,7 @@ impl<'a, S: Search<'a>> Task for AmongAll<'a, '_, S> {
             return false;
         }
         let mut stack: Stack<<S::Order as Order>::Entry> = Stack::new();
+        let mut inner_stack = Stack::new();
         let mut suspended: SmallVec<[Frame<Ray, L>; 2]> = SmallVec::new();
         let mut place = Place::default();
 
@@ -418,6 +432,31 @@ impl<'a, S: Search<'a>> Task for AmongAll<'a, '_, S> {
                     let ray = instance.world_from_object.object_ray(&frame.ray);
                     let inner = &*instance.accel;
                     let mut boxes = BoxRay::passing_all();
+                    if let Some(start) = &inner.single
+                        && let Outcome::Settled(is_over) =
+                            meet_single::<L, S>(inner, start, &ray, geometry, standing.id, &mut place, search)
+                    {
+                        if is_over {
+                            return true;
+                        }
+                        frame.narrow(search);
+                        continue;
+                    }
+                    if inner.holds.only_triangles {
+                        let Some(root) = inner.tree.root else { continue };
+                        if start::<L, S>(inner, &ray, search, &mut boxes) {
+                            place.route.push(geometry);
+                            place.ids.push(standing.id);
+                            let mut inner = Frame::<&Ray, L>::new(inner, &ray, boxes, search);
+                            if meet_triangles(&mut inner, root, &mut inner_stack, &place, search, touches) {
+                                return true;
+                            }
+                            place.route.pop();
+                            place.ids.pop();
+                            frame.narrow(search);
+                        }
+                        continue;
+                    }
                     let meets_tree =
                         inner.tree.root.is_some() && start::<L, S>(inner, &ray, search, &mut boxes);
                     if !meets_tree && (inner.infinite.is_empty() || !is_sound(&ray)) {
@@ -442,6 +481,46 @@ impl<'a, S: Search<'a>> Task for AmongAll<'a, '_, S> {
             }
         }
         false
+    }
+}
+
+/// Searches a placed tree of nothing but triangles in single precision, where the search is one that this can settle. Whether
+/// that ends it.
+#[inline(always)]
+fn meet_single<'a, L: Lanes, S: Search<'a>>(
+    inner: &'a Accel,
+    start: &SingleStart,
+    ray: &Ray,
+    geometry: u32,
+    id: u32,
+    place: &mut Place,
+    search: &mut S,
+) -> Outcome<bool> {
+    // Nothing beyond the limit is wanted; what is met has the same bits whatever the range.
+    let ray = ray.with_range(search.floor(), search.limit());
+    match S::ASK {
+        Ask::First => match single::search_with::<Nearest, L>(inner, start, &ray) {
+            Outcome::Settled(None) => Outcome::Settled(false),
+            Outcome::Settled(Some(hit)) => {
+                place.route.push(geometry);
+                place.ids.push(id);
+                let what = What::Named { geometry: hit.geometry, primitive: hit.primitive };
+                let found = Found { root: hit.root, what, order: 0, is_front: false, accel: inner, place };
+                let is_over = search.offer(&found);
+                place.route.pop();
+                place.ids.pop();
+                Outcome::Settled(is_over)
+            }
+            Outcome::Unsettled => Outcome::Unsettled,
+        },
+        Ask::Whether => {
+            let outcome = single::search_with::<Whether, L>(inner, start, &ray);
+            if outcome == Outcome::Settled(true) {
+                search.settle();
+            }
+            outcome
+        }
+        Ask::Nothing | Ask::Every => Outcome::Unsettled,
     }
 }
 
