@@ -198,6 +198,28 @@ fn boxes_hold_their_children_and_every_primitive_has_one_place() {
 }
 
 #[test]
+fn any_hit_asks_what_is_packed_first_and_instances_last() {
+    let mut random = Random(18);
+    let accel = mixture(&mut random, DVec3::new(2.0, 3.0, -4.0), 3.0, 1, false);
+    // The first tag that is met below a reference, by the way of a search for any hit.
+    let rank = |mut reference: u32| {
+        while reference >> tag::SHIFT == tag::INNER {
+            let node = &accel.tree.nodes[reference as usize];
+            reference = node.children[node.len as usize - 1];
+        }
+        match reference >> tag::SHIFT {
+            tag::INSTANCE => 0,
+            tag::TRIANGLES | tag::SPHERES => 2,
+            _ => 1,
+        }
+    };
+    let root = &accel.tree.nodes[0];
+    let ranks: Vec<u32> = root.children[..root.len as usize].iter().map(|&child| rank(child)).collect();
+    assert!(ranks.is_sorted(), "{ranks:?}");
+    assert_eq!(ranks.last(), Some(&2));
+}
+
+#[test]
 fn a_million_million_leaves_fit_by_nesting() {
     // 40 levels of two: 2^40 cubes in a row along x, in kilobytes.
     let mut tree = Arc::new(build(vec![GeometryKind::Mesh(Arc::new(cube()))]));

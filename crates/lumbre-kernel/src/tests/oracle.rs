@@ -131,6 +131,48 @@ fn nested_instances_are_found_as_by_a_loop() {
 }
 
 #[test]
+fn placed_meshes_are_found_as_by_a_loop() {
+    with_every_preset(|| {
+        let mut random = Random(12);
+        let mut ball = icosphere(2, DVec3::ZERO, 1.5);
+        ball.origin = CENTER;
+        let soups = [CENTER, 3.0 * CENTER].map(|origin| {
+            let mut soup = soup(&mut random, 80, CENTER - origin, 1.5);
+            soup.origin = origin;
+            GeometryKind::Mesh(Arc::new(soup))
+        });
+        // Of one origin, and of two.
+        let trees = [
+            vec![GeometryKind::Mesh(Arc::new(ball.clone())), soups[0].clone()],
+            vec![GeometryKind::Mesh(Arc::new(cube()))],
+            soups.to_vec(),
+        ]
+        .map(|kinds| Arc::new(build(kinds)));
+        assert_eq!(trees.each_ref().map(|tree| tree.single.is_some()), [true, true, false]);
+        let mut kinds = vec![GeometryKind::Mesh(Arc::new(soup(&mut random, 30, CENTER, 3.0)))];
+        for i in 0..24 {
+            let world_from_object =
+                (random.placement(CENTER, 3.0, 0.5) * Transform::translate(-CENTER)).into();
+            kinds.push(GeometryKind::Instance(Instance { accel: trees[i % 3].clone(), world_from_object }));
+        }
+        let accel = build(kinds);
+        check_many(&accel, &mut random, CENTER, 3.0, 3_000);
+        // Exactly at corners of what is placed as it is.
+        let accel = build(vec![GeometryKind::Instance(Instance {
+            accel: trees[0].clone(),
+            world_from_object: Transform::IDENTITY.into(),
+        })]);
+        let mut hits = 0;
+        for position in &ball.positions {
+            let corner = ball.origin + position.as_dvec3();
+            hits += check(&accel, &Ray::new(corner - 4.0 * DVec3::Z, DVec3::Z));
+            hits += check(&accel, &Ray::new(corner + 5.0 * DVec3::X, -DVec3::X));
+        }
+        assert!(hits > 300, "{hits}");
+    });
+}
+
+#[test]
 fn infinite_things_are_found_within_instances_and_without() {
     with_every_preset(|| {
         let mut random = Random(3);
