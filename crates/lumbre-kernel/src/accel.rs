@@ -203,14 +203,15 @@ impl Accel {
     #[inline(always)]
     pub(crate) fn closest_at(&self, level: Level, ray: &Ray) -> Option<Hit> {
         if let Some(start) = &self.single
-            && let Outcome::Settled(hit) = single::search::<Nearest>(level, self, start, ray)
+            && let Outcome::Settled(winner) = single::search::<Nearest>(level, self, start, ray)
         {
-            return hit;
+            return winner.map(|winner| winner.to_hit(self));
         }
         self.closest_plainly_at(level, ray)
     }
 
     /// The same by the search that knows no other precision than double.
+    #[inline(never)]
     pub(crate) fn closest_plainly_at(&self, level: Level, ray: &Ray) -> Option<Hit> {
         let mut search = Closest::new(ray, All);
         traverse::search(level, self, ray, &mut search);
@@ -264,8 +265,12 @@ impl Accel {
 
     pub(crate) fn closest_batch_at(&self, level: Level, rays: &[Ray], hits: &mut [Option<Hit>]) {
         assert_eq!(rays.len(), hits.len(), "a place for the hit of every ray");
-        let plainly = |ray: &Ray| self.closest_plainly_at(level, ray);
-        batch::search_all::<Nearest>(level, self, rays, plainly, |i, hit| hits[i] = hit);
+        batch::search_all::<Nearest>(level, self, rays, |i, outcome| {
+            hits[i] = match outcome {
+                Outcome::Settled(winner) => winner.map(|winner| winner.to_hit(self)),
+                Outcome::Unsettled => self.closest_plainly_at(level, &rays[i]),
+            };
+        });
     }
 
     /// [`Accel::any`] for every ray: see [`Accel::closest_batch`].
@@ -278,8 +283,12 @@ impl Accel {
 
     pub(crate) fn any_batch_at(&self, level: Level, rays: &[Ray], hits: &mut [bool]) {
         assert_eq!(rays.len(), hits.len(), "a place for the answer of every ray");
-        let plainly = |ray: &Ray| self.any_plainly_at(level, ray);
-        batch::search_all::<Whether>(level, self, rays, plainly, |i, is_hit| hits[i] = is_hit);
+        batch::search_all::<Whether>(level, self, rays, |i, outcome| {
+            hits[i] = match outcome {
+                Outcome::Settled(is_hit) => is_hit,
+                Outcome::Unsettled => self.any_plainly_at(level, &rays[i]),
+            };
+        });
     }
 
     /// The nearest hit that `accept` takes; it may be asked in any order of `t`, and its answer must depend on the hit
@@ -306,6 +315,7 @@ impl Accel {
     }
 
     /// The same by the search that knows no other precision than double.
+    #[inline(never)]
     pub(crate) fn any_plainly_at(&self, level: Level, ray: &Ray) -> bool {
         let mut search = Any::new(ray, All);
         traverse::search(level, self, ray, &mut search);

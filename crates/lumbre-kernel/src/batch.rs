@@ -3,6 +3,8 @@
 //! Each ray takes the very steps that it takes alone, a node or a leaf at a time, in turn with the others: its answer has the
 //! same bits. A step ends with a fetch of what the next one of that ray will read.
 
+use std::marker::PhantomData;
+
 use lumbre_geometry::Ray;
 
 use crate::Accel;
@@ -14,19 +16,17 @@ use crate::stack::{Order, Stack};
 /// Rays in flight on a thread.
 const IN_FLIGHT: usize = 6;
 
-/// Searches along every ray. `end` takes an answer with the position of its ray, in any order; what `plainly` answers is for
-/// rays that single precision cannot settle.
+/// Searches along every ray. `end` takes what came of it with the position of the ray, in any order.
 pub(crate) fn search_all<G: Goal>(
     level: Level,
     accel: &Accel,
     rays: &[Ray],
-    plainly: impl Fn(&Ray) -> G::Answer,
-    mut end: impl FnMut(usize, G::Answer),
+    mut end: impl FnMut(usize, Outcome<G::Answer>),
 ) {
     if let Some(start) = &accel.single {
-        level.run(Flights::<G, _, _> { accel, start, rays, plainly, end, goal: std::marker::PhantomData });
+        level.run(Flights::<G, _> { accel, start, rays, end, goal: PhantomData });
     } else {
-        rays.iter().enumerate().for_each(|(position, ray)| end(position, plainly(ray)));
+        (0..rays.len()).for_each(|position| end(position, Outcome::Unsettled));
     }
 }
 
@@ -40,26 +40,20 @@ struct Flight<'a, 'r, G: Goal, L> {
 }
 
 /// All the rays.
-struct Flights<'a, 'r, G, P, E> {
+struct Flights<'a, 'r, G, E> {
     accel: &'a Accel,
     start: &'a SingleStart,
     rays: &'r [Ray],
-    plainly: P,
     end: E,
-    goal: std::marker::PhantomData<G>,
+    goal: PhantomData<G>,
 }
 
-impl<G, P, E> Task for Flights<'_, '_, G, P, E>
-where
-    G: Goal,
-    P: Fn(&Ray) -> G::Answer,
-    E: FnMut(usize, G::Answer),
-{
+impl<G: Goal, E: FnMut(usize, Outcome<G::Answer>)> Task for Flights<'_, '_, G, E> {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        let Self { accel, start, rays, plainly, mut end, .. } = self;
+        let Self { accel, start, rays, mut end, .. } = self;
         let mut waiting = rays.iter().enumerate();
         let mut flights: Vec<Flight<G, L>> = Vec::with_capacity(IN_FLIGHT);
         while flights.len() < IN_FLIGHT
@@ -75,7 +69,7 @@ where
                         stack: Stack::new(),
                     });
                 }
-                None => end(position, plainly(ray)),
+                None => end(position, Outcome::Unsettled),
             }
         }
         // Those that are under way stand first.
@@ -91,17 +85,13 @@ where
                     turn += 1;
                     continue;
                 }
-                let answer = match G::answer(single, ray, step) {
-                    Outcome::Settled(answer) => answer,
-                    Outcome::Unsettled => plainly(ray),
-                };
-                end(*position, answer);
+                end(*position, G::answer(single, ray, step));
                 // The next takes its place, where it stands.
                 let started = loop {
                     let Some((next, ray)) = waiting.next() else { break None };
                     match SingleRay::start(accel, start, ray) {
                         Some(single) => break Some((next, ray, single)),
-                        None => end(next, plainly(ray)),
+                        None => end(next, Outcome::Unsettled),
                     }
                 };
                 if let Some((next, next_ray, next_single)) = started {

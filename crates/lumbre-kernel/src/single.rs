@@ -9,6 +9,7 @@
 use std::marker::PhantomData;
 
 use lumbre_geometry::{Ray, Root};
+use lumbre_math::DVec2;
 
 use crate::holds::SingleStart;
 use crate::lanes::{self, LANE_BITS, Lanes, Level, Narrow, Task};
@@ -24,6 +25,31 @@ pub(crate) enum Outcome<T> {
     Settled(T),
     /// The plain search has to answer.
     Unsettled,
+}
+
+/// The nearest hit, in as few words as it takes: it is handed over faster than a [`Hit`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Winner {
+    t: f64,
+    barycentrics: DVec2,
+    geometry: u32,
+    primitive: u32,
+}
+
+impl Winner {
+    /// As a hit in the tree itself.
+    #[inline(always)]
+    pub(crate) fn to_hit(self, accel: &Accel) -> Hit {
+        let Self { t, barycentrics, geometry, primitive } = self;
+        Hit {
+            root: Root { t, part: 0, multiplicity: 1, local: barycentrics },
+            id: accel.geometries[geometry as usize].id,
+            primitive,
+            geometry,
+            instances: InstancePath::new(),
+            route: InstancePath::new(),
+        }
+    }
 }
 
 /// What a step of a search leads to.
@@ -239,7 +265,7 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
 
     /// The nearest hit, once all was seen.
     #[inline(always)]
-    pub(crate) fn winner(&self, ray: &Ray) -> Outcome<Option<Hit>> {
+    pub(crate) fn winner(&self, ray: &Ray) -> Outcome<Option<Winner>> {
         if !self.best.is_some() {
             return Outcome::Settled(None);
         }
@@ -258,14 +284,7 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
         };
         let names = &self.accel.tree.names[block as usize];
         let (geometry, primitive) = (names.geometry, names.primitives[lane as usize % BLOCK]);
-        Outcome::Settled(Some(Hit {
-            root,
-            id: self.accel.geometries[geometry as usize].id,
-            primitive,
-            geometry,
-            instances: InstancePath::new(),
-            route: InstancePath::new(),
-        }))
+        Outcome::Settled(Some(Winner { t: root.t, barycentrics: root.local, geometry, primitive }))
     }
 
     #[cold]
@@ -312,7 +331,7 @@ pub(crate) enum Nearest {}
 
 impl Goal for Nearest {
     type Order = ByDistance;
-    type Answer = Option<Hit>;
+    type Answer = Option<Winner>;
 
     #[inline(always)]
     fn step<L: Lanes>(single: &mut SingleRay<L>, reference: u32, ray: &Ray, stack: &mut Stack<i64>) -> Step {
@@ -326,7 +345,7 @@ impl Goal for Nearest {
     }
 
     #[inline(always)]
-    fn answer<L: Lanes>(single: &SingleRay<L>, ray: &Ray, last: Step) -> Outcome<Option<Hit>> {
+    fn answer<L: Lanes>(single: &SingleRay<L>, ray: &Ray, last: Step) -> Outcome<Option<Winner>> {
         if last == Step::Unsettled { Outcome::Unsettled } else { single.winner(ray) }
     }
 }
