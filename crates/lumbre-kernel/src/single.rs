@@ -32,17 +32,23 @@ pub(crate) enum Outcome<T> {
 pub(crate) struct Winner {
     t: f64,
     barycentrics: DVec2,
-    geometry: u32,
-    primitive: u32,
+    pub(crate) geometry: u32,
+    pub(crate) primitive: u32,
 }
 
 impl Winner {
+    /// The crossing.
+    #[inline(always)]
+    pub(crate) fn root(&self) -> Root {
+        Root { t: self.t, part: 0, multiplicity: 1, local: self.barycentrics }
+    }
+
     /// As a hit in the tree itself.
     #[inline(always)]
     pub(crate) fn to_hit(self, accel: &Accel) -> Hit {
-        let Self { t, barycentrics, geometry, primitive } = self;
+        let Self { geometry, primitive, .. } = self;
         Hit {
-            root: Root { t, part: 0, multiplicity: 1, local: barycentrics },
+            root: self.root(),
             id: accel.geometries[geometry as usize].id,
             primitive,
             geometry,

@@ -501,11 +501,12 @@ fn meet_single<'a, L: Lanes, S: Search<'a>>(
     match S::ASK {
         Ask::First => match single::search_with::<Nearest, L>(inner, start, &ray) {
             Outcome::Settled(None) => Outcome::Settled(false),
-            Outcome::Settled(Some(hit)) => {
+            Outcome::Settled(Some(winner)) => {
                 place.route.push(geometry);
                 place.ids.push(id);
-                let what = What::Named { geometry: hit.geometry, primitive: hit.primitive };
-                let found = Found { root: hit.root, what, order: 0, is_front: false, accel: inner, place };
+                let what = What::Named { geometry: winner.geometry, primitive: winner.primitive };
+                let found =
+                    Found { root: winner.root(), what, order: 0, is_front: false, accel: inner, place };
                 let is_over = search.offer(&found);
                 place.route.pop();
                 place.ids.pop();
