@@ -68,11 +68,13 @@ impl<const AVX512: bool> SphereLanes for X86<AVX512> {
         }
         // SAFETY: see `X86`. The loads are of eight f32 in arrays of eight.
         unsafe {
-            let [ex, ey, ez] = [0, 1, 2].map(|axis| _mm256_set1_ps(ray.direction[axis]));
-            let [x, y, z] = [0, 1, 2].map(|axis| {
-                let centers = _mm256_load_ps(block.centers[axis].as_ptr());
-                _mm256_sub_ps(centers, _mm256_set1_ps(ray.origin[axis]))
-            });
+            // Axis by axis and without closures: into these, instructions are sometimes not inlined, but called.
+            let ex = _mm256_set1_ps(ray.direction[0]);
+            let ey = _mm256_set1_ps(ray.direction[1]);
+            let ez = _mm256_set1_ps(ray.direction[2]);
+            let x = _mm256_sub_ps(_mm256_load_ps(block.centers[0].as_ptr()), _mm256_set1_ps(ray.origin[0]));
+            let y = _mm256_sub_ps(_mm256_load_ps(block.centers[1].as_ptr()), _mm256_set1_ps(ray.origin[1]));
+            let z = _mm256_sub_ps(_mm256_load_ps(block.centers[2].as_ptr()), _mm256_set1_ps(ray.origin[2]));
             let radii = _mm256_load_ps(block.radii.as_ptr());
             let margin = _mm256_set1_ps(ray.margin);
             let along = _mm256_fmadd_ps(x, ex, _mm256_fmadd_ps(y, ey, _mm256_mul_ps(z, ez)));
@@ -104,7 +106,8 @@ impl<const AVX512: bool> SphereLanes for X86<AVX512> {
                 _mm256_cmp_ps::<_CMP_GT_OQ>(inner, _mm256_setzero_ps()),
                 _mm256_cmp_ps::<_CMP_LE_OQ>(beside, _mm256_mul_ps(inner, inner)),
             );
-            let [from, to] = ray.surely_in.map(|end| _mm256_set1_ps(end));
+            let from = _mm256_set1_ps(ray.surely_in[0]);
+            let to = _mm256_set1_ps(ray.surely_in[1]);
             let surely_in = _mm256_and_ps(
                 _mm256_cmp_ps::<_CMP_GE_OQ>(first, from),
                 _mm256_cmp_ps::<_CMP_LE_OQ>(along, to),
