@@ -18,6 +18,8 @@ const FLOORS: &[(u32, &[&str])] = &[
 /// Floors whose crates must not do input or output: no crate here may lean on these.
 const NO_FILES_BELOW: u32 = 5;
 const FILE_CRATES: &[&str] = &["image", "exr", "tempfile", "flate2", "memmap2", "jpeg-encoder"];
+/// But the kernel maps the trees that it saved, when it is asked to.
+const MAY_MAP: (&str, &str) = ("lumbre-kernel", "memmap2");
 
 fn workspace() -> serde_json::Value {
     let out = Command::new(env!("CARGO"))
@@ -91,7 +93,9 @@ fn the_floors_of_mathematics_and_light_open_no_files() {
     let floors = floors();
     for (from, targets) in &arrows {
         if floors[from.as_str()] < NO_FILES_BELOW {
-            let wrong: Vec<_> = targets.iter().filter(|to| FILE_CRATES.contains(&to.as_str())).collect();
+            let is_wrong =
+                |to: &&String| FILE_CRATES.contains(&to.as_str()) && (from.as_str(), to.as_str()) != MAY_MAP;
+            let wrong: Vec<_> = targets.iter().filter(is_wrong).collect();
             assert!(wrong.is_empty(), "{from} leans on {wrong:?}");
         }
     }
