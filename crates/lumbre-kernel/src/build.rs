@@ -116,6 +116,9 @@ impl BinaryNode {
 pub(crate) type Name = [u32; 2];
 
 /// The binary tree over primitives (not none), and their names in the order of its leaves.
+///
+/// First they are parted, to and fro between two lists, until one thread takes what is left together; the second list is
+/// given back before twigs grow, which need but a little room each.
 pub(crate) fn binary_tree(
     level: Level,
     preset: Preset,
@@ -124,31 +127,52 @@ pub(crate) fn binary_tree(
 ) -> (Binary, Vec<Name>) {
     let count = primitives.len();
     let mut other: Vec<Primitive> = fill(count, Bounds::EMPTY);
-    let mut names: Vec<Name> = fill(count, [0; 2]);
     // Below, there is a node for every thread.
     let shared = (2 * rayon::current_num_threads()).ilog2();
     let shared = if shared > 1 { shared + 1 } else { 0 };
     let builder = Builder { level, traits, shared };
     let counts = part_by_rank(&mut primitives, &mut other, traits);
-    let mut rest = Range { here: &mut primitives, there: &mut other, names: &mut names, first: 0, depth: 0 };
-    let mut trees = Vec::with_capacity(Kind::RANKS);
+    // Sorting moves all of them over, once.
+    let is_sorted = preset == Preset::Fast;
+    let mut rest = Range { here: &mut primitives, there: &mut other, is_home: !is_sorted, depth: 0 };
+    let mut sketches = Vec::with_capacity(Kind::RANKS);
     for (rank, count) in counts.into_iter().enumerate().filter(|&(_, count)| count > 0) {
         let [range, behind] = rest.cut(count);
         rest = behind;
         let range = Range { depth: 0, ..range };
         let is_packed = rank + 1 == Kind::RANKS;
-        trees.push(match (preset, is_packed) {
-            (Preset::Fast, true) => builder.grow_fast::<false>(range),
-            (Preset::Fast, false) => builder.grow_fast::<true>(range),
-            (_, true) => builder.grow::<false>(range, None),
-            (_, false) => builder.grow::<true>(range, None),
+        let (sketch, codes) = match (is_sorted, is_packed) {
+            (true, true) => builder.sort::<false>(range),
+            (true, false) => builder.sort::<true>(range),
+            (false, true) => (builder.sketch::<false>(range, None), Vec::new()),
+            (false, false) => (builder.sketch::<true>(range, None), Vec::new()),
+        };
+        sketches.push((count, is_packed, sketch, codes));
+    }
+    let (mut primitives, there) = if is_sorted { (other, primitives) } else { (primitives, other) };
+    drop(there);
+
+    let mut names: Vec<Name> = fill(count, [0; 2]);
+    let (mut here, mut places, mut first) = (&mut primitives[..], &mut names[..], 0);
+    let mut trees = Vec::with_capacity(Kind::RANKS);
+    for (count, is_packed, sketch, codes) in sketches {
+        let ground = Ground { here: take(&mut here, count), names: take(&mut places, count), first };
+        first += count;
+        trees.push(match is_packed {
+            true => builder.grow::<false>(sketch, &codes, ground),
+            false => builder.grow::<true>(sketch, &codes, ground),
         });
     }
-    drop((primitives, other));
+    drop(primitives);
     let better = |tree| if preset == Preset::Best { reinsert(tree) } else { tree };
     let join = |low, high| Binary::Fork(Box::new(Fork { is_ranked: true, ..Fork::over([low, high]) }));
     let tree = trees.into_iter().map(better).reduce(join).expect("there are primitives");
     (tree, names)
+}
+
+/// The first `count` of some, which then are no longer among them.
+fn take<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
+    rest.split_off_mut(..count).unwrap_or_default()
 }
 
 /// Brings primitives into the order of their ranks; how many there are of each.
@@ -189,32 +213,115 @@ pub(crate) fn fill<T: Clone + Send + Sync>(count: usize, value: T) -> Vec<T> {
 struct Range<'a> {
     here: &'a mut [Primitive],
     there: &'a mut [Primitive],
-    names: &'a mut [Name],
-    /// The place of the first name.
-    first: usize,
+    /// Whether `here` is where they are to be in the end.
+    is_home: bool,
     depth: u32,
 }
 
-impl<'a> Range<'a> {
+impl Range<'_> {
     fn len(&self) -> usize {
         self.here.len()
     }
 
     /// The two sides, where the primitives were moved over.
     fn moved(self, left: usize) -> [Self; 2] {
-        Self { here: self.there, there: self.here, ..self }.cut(left)
+        Self { here: self.there, there: self.here, is_home: !self.is_home, ..self }.cut(left)
     }
 
     /// The two sides, where the primitives are as they were.
     fn cut(self, left: usize) -> [Self; 2] {
         let (here, here_right) = self.here.split_at_mut(left);
         let (there, there_right) = self.there.split_at_mut(left);
-        let (names, names_right) = self.names.split_at_mut(left);
-        let (first, depth) = (self.first, self.depth + 1);
-        [
-            Self { here, there, names, first, depth },
-            Self { here: here_right, there: there_right, names: names_right, first: first + left, depth },
-        ]
+        let (is_home, depth) = (self.is_home, self.depth + 1);
+        [Self { here, there, is_home, depth }, Self { here: here_right, there: there_right, is_home, depth }]
+    }
+}
+
+/// Which twigs there are to be, and what stands over them.
+enum Sketch {
+    Fork(Box<[Sketch; 2]>),
+    Twig(Seed),
+}
+
+/// A twig to be.
+struct Seed {
+    count: usize,
+    depth: u32,
+    /// How it is to be split, where that is known.
+    split: Option<Split>,
+    /// Whether it is to be split by the order along a curve instead.
+    is_sorted: bool,
+}
+
+impl Sketch {
+    /// Of what one thread takes; brings the primitives home.
+    fn twig(range: Range, split: Option<Split>, is_sorted: bool) -> Self {
+        if !range.is_home {
+            range.there.copy_from_slice(range.here);
+        }
+        Self::Twig(Seed { count: range.len(), depth: range.depth, split, is_sorted })
+    }
+
+    /// From the first to the last. The depth of its recursion, and of that of [`Self::over`], is that of the tree.
+    fn seeds<'a>(&'a self, seeds: &mut Vec<&'a Seed>) {
+        match self {
+            Self::Fork(sides) => sides.iter().for_each(|side| side.seeds(seeds)),
+            Self::Twig(seed) => seeds.push(seed),
+        }
+    }
+
+    /// The tree of its twigs, which come in their order.
+    fn over(&self, twigs: &mut impl Iterator<Item = Binary>) -> Binary {
+        match self {
+            Self::Fork(sides) => {
+                let [left, right] = &**sides;
+                let left = left.over(twigs);
+                Binary::over([left, right.over(twigs)])
+            }
+            Self::Twig(_) => twigs.next().expect("there is one for each seed"),
+        }
+    }
+}
+
+/// Where twigs grow: primitives, and room for their names.
+struct Ground<'a> {
+    here: &'a mut [Primitive],
+    names: &'a mut [Name],
+    /// The place of the first name.
+    first: usize,
+}
+
+/// The primitives of a part of a twig, and where their names go.
+struct Plot<'a> {
+    range: Range<'a>,
+    names: &'a mut [Name],
+    /// The place of the first name.
+    first: usize,
+}
+
+impl Plot<'_> {
+    fn len(&self) -> usize {
+        self.range.len()
+    }
+
+    /// As [`Range::moved`].
+    fn moved(self, left: usize) -> [Self; 2] {
+        let Self { range, names, first } = self;
+        Self::of(range.moved(left), names, first)
+    }
+
+    /// As [`Range::cut`].
+    fn cut(self, left: usize) -> [Self; 2] {
+        let Self { range, names, first } = self;
+        Self::of(range.cut(left), names, first)
+    }
+}
+
+impl<'a> Plot<'a> {
+    fn of([left, right]: [Range<'a>; 2], names: &'a mut [Name], first: usize) -> [Self; 2] {
+        let (names, names_right) = names.split_at_mut(left.len());
+        let right_first = first + left.len();
+        [Self { range: left, names, first }, Self { range: right, names: names_right, first: right_first }]
     }
 }
 
@@ -225,23 +332,30 @@ struct Builder<'a> {
     shared: u32,
 }
 
-/// What one thread needs for a twig.
+/// What one thread needs for twigs.
 struct Workplace {
     nodes: Vec<BinaryNode>,
     bins: Box<Bins>,
+    /// Room for the primitives of one.
+    there: Vec<Primitive>,
+}
+
+impl Workplace {
+    fn new() -> Self {
+        Self { nodes: Vec::new(), bins: Box::new(Bins::EMPTY), there: vec![Bounds::EMPTY; PARALLEL] }
+    }
 }
 
 impl Builder<'_> {
     /// `split` is how the primitives are to be split, where that is known.
-    fn grow<const COSTS: bool>(&self, range: Range, split: Option<Split>) -> Binary {
-        let count = range.len();
-        if count <= PARALLEL {
-            return self.grow_twig(count, |work| self.twig::<COSTS>(range, split, work));
+    fn sketch<const COSTS: bool>(&self, range: Range, split: Option<Split>) -> Sketch {
+        if range.len() <= PARALLEL {
+            return Sketch::twig(range, split, false);
         }
         let ([left, right], splits) = self.divide::<COSTS>(range, split);
         let (left, right) =
-            rayon::join(|| self.grow::<COSTS>(left, splits[0]), || self.grow::<COSTS>(right, splits[1]));
-        Binary::over([left, right])
+            rayon::join(|| self.sketch::<COSTS>(left, splits[0]), || self.sketch::<COSTS>(right, splits[1]));
+        Sketch::Fork(Box::new([left, right]))
     }
 
     /// One level of a node that threads share. Apart, so that its bins are not on the stack of what is below.
@@ -268,52 +382,81 @@ impl Builder<'_> {
         (cut, splits)
     }
 
-    /// Splits by the order along a curve.
-    fn grow_fast<const COSTS: bool>(&self, range: Range) -> Binary {
+    /// Splits by the order along a curve; the codes in that order.
+    fn sort<const COSTS: bool>(&self, range: Range) -> (Sketch, Vec<Code>) {
         let (_, centers) = self.measure(range.here);
         let codes = morton::sort(range.here, range.there, &centers);
-        let Range { here, there, names, first, depth } = range;
-        self.grow_sorted::<COSTS>(Range { here: there, there: here, names, first, depth }, &codes)
+        let Range { here, there, is_home, depth } = range;
+        let sorted = Range { here: there, there: here, is_home: !is_home, depth };
+        (self.sketch_sorted::<COSTS>(sorted, &codes), codes)
     }
 
-    /// The depth of this recursion is at most that of the bits of a code, and then of [`Builder::grow`].
-    fn grow_sorted<const COSTS: bool>(&self, range: Range, codes: &[Code]) -> Binary {
-        let count = range.len();
-        if count <= PARALLEL {
-            return self.grow_twig(count, |work| self.twig_sorted::<COSTS>(range, codes, work));
+    /// The depth of this recursion is at most that of the bits of a code, and then of [`Builder::sketch`].
+    fn sketch_sorted<const COSTS: bool>(&self, range: Range, codes: &[Code]) -> Sketch {
+        if range.len() <= PARALLEL {
+            return Sketch::twig(range, None, true);
         }
-        let Some(middle) = morton::cut(codes) else { return self.grow::<COSTS>(range, None) };
+        let Some(middle) = morton::cut(codes) else { return self.sketch::<COSTS>(range, None) };
         let [left, right] = range.cut(middle);
         let (left_codes, right_codes) = codes.split_at(middle);
         let (left, right) = rayon::join(
-            || self.grow_sorted::<COSTS>(left, left_codes),
-            || self.grow_sorted::<COSTS>(right, right_codes),
+            || self.sketch_sorted::<COSTS>(left, left_codes),
+            || self.sketch_sorted::<COSTS>(right, right_codes),
         );
-        Binary::over([left, right])
+        Sketch::Fork(Box::new([left, right]))
     }
 
-    fn twig_sorted<const COSTS: bool>(&self, range: Range, codes: &[Code], work: &mut Workplace) -> Bounds {
-        let count = range.len();
+    /// The tree that was sketched; `codes` are those of its primitives, if they were sorted.
+    fn grow<const COSTS: bool>(&self, sketch: Sketch, codes: &[Code], ground: Ground) -> Binary {
+        let Ground { mut here, mut names, mut first } = ground;
+        let mut seeds = Vec::new();
+        sketch.seeds(&mut seeds);
+        let mut start = 0;
+        let plots: Vec<_> = seeds
+            .into_iter()
+            .map(|seed| {
+                let (here, names) = (take(&mut here, seed.count), take(&mut names, seed.count));
+                let codes = codes.get(start..start + seed.count).unwrap_or_default();
+                let plot = (seed, codes, here, names, first);
+                start += seed.count;
+                first += seed.count;
+                plot
+            })
+            .collect();
+        let twig = |work: &mut Workplace, (seed, codes, here, names, first): (&Seed, _, _, _, _)| {
+            let mut there = std::mem::take(&mut work.there);
+            let range = Range { here, there: &mut there[..seed.count], is_home: true, depth: seed.depth };
+            let plot = Plot { range, names, first };
+            if seed.is_sorted {
+                self.twig_sorted::<COSTS>(plot, codes, work);
+            } else {
+                self.twig::<COSTS>(plot, seed.split, work);
+            }
+            work.there = there;
+            // As long as it is, and no longer.
+            let nodes = work.nodes.to_vec();
+            work.nodes.clear();
+            Binary::twig(nodes)
+        };
+        let twigs: Vec<Binary> = plots.into_par_iter().map_init(Workplace::new, twig).collect();
+        sketch.over(&mut twigs.into_iter())
+    }
+
+    fn twig_sorted<const COSTS: bool>(&self, plot: Plot, codes: &[Code], work: &mut Workplace) -> Bounds {
+        let count = plot.len();
         if count <= FAST_FEW {
-            return self.twig::<COSTS>(range, None, work);
+            return self.twig::<COSTS>(plot, None, work);
         }
-        let Some(middle) = morton::cut(codes) else { return self.twig::<COSTS>(range, None, work) };
+        let Some(middle) = morton::cut(codes) else { return self.twig::<COSTS>(plot, None, work) };
         let place = work.nodes.len();
         work.nodes.push(BinaryNode(Bounds::EMPTY));
-        let [left, right] = range.cut(middle);
+        let [left, right] = plot.cut(middle);
         let (left_codes, right_codes) = codes.split_at(middle);
         let mut bounds = self.twig_sorted::<COSTS>(left, left_codes, work);
         let right_place = work.nodes.len() - place;
         bounds.grow(&self.twig_sorted::<COSTS>(right, right_codes, work));
         work.nodes[place] = BinaryNode::inner(&bounds, right_place);
         bounds
-    }
-
-    fn grow_twig(&self, count: usize, grow: impl FnOnce(&mut Workplace) -> Bounds) -> Binary {
-        let mut work = Workplace { nodes: Vec::with_capacity(count / 2), bins: Box::new(Bins::EMPTY) };
-        grow(&mut work);
-        work.nodes.shrink_to_fit();
-        Binary::twig(work.nodes)
     }
 
     fn best<const COSTS: bool>(&self, bins: &Bins, binning: Binning) -> Option<Split> {
@@ -392,21 +535,21 @@ impl Builder<'_> {
     }
 
     /// Makes a subtree by one thread; returns its box. Its depth is bounded, and so is this recursion.
-    fn twig<const COSTS: bool>(&self, range: Range, split: Option<Split>, work: &mut Workplace) -> Bounds {
-        let count = range.len();
+    fn twig<const COSTS: bool>(&self, plot: Plot, split: Option<Split>, work: &mut Workplace) -> Bounds {
+        let count = plot.len();
         if count <= FEW {
-            return self.few::<COSTS>(range, work);
+            return self.few::<COSTS>(plot, work);
         }
         let place = work.nodes.len();
         work.nodes.push(BinaryNode(Bounds::EMPTY));
-        let split = self.known::<COSTS>(&range, split, &mut work.bins);
+        let split = self.known::<COSTS>(&plot.range, split, &mut work.bins);
         let ([left, right], splits) = match &split {
             Some(split) => {
-                let (left, right) = range.there.split_at_mut(split.left);
-                self.level.run(Part { primitives: &*range.here, split, sides: [left, right] });
-                let cut = range.moved(split.left);
+                let (left, right) = plot.range.there.split_at_mut(split.left);
+                self.level.run(Part { primitives: &*plot.range.here, split, sides: [left, right] });
+                let cut = plot.moved(split.left);
                 let splits = [0, 1].map(|side| {
-                    let primitives = &*cut[side].here;
+                    let primitives = &*cut[side].range.here;
                     if primitives.len() <= FEW {
                         return None;
                     }
@@ -418,8 +561,8 @@ impl Builder<'_> {
                 (cut, splits)
             }
             None => {
-                let middle = self.by_order(range.here);
-                (range.cut(middle), [None; 2])
+                let middle = self.by_order(plot.range.here);
+                (plot.cut(middle), [None; 2])
             }
         };
         let mut bounds = self.twig::<COSTS>(left, splits[0], work);
@@ -429,22 +572,22 @@ impl Builder<'_> {
         bounds
     }
 
-    fn few<const COSTS: bool>(&self, range: Range, work: &mut Workplace) -> Bounds {
+    fn few<const COSTS: bool>(&self, plot: Plot, work: &mut Workplace) -> Bounds {
         let traits = self.traits;
         let place = work.nodes.len();
-        match self.level.run(Decide::<COSTS> { primitives: range.here, traits }) {
+        match self.level.run(Decide::<COSTS> { primitives: plot.range.here, traits }) {
             Few::Leaf => {
                 let mut bounds = Bounds::EMPTY;
-                for (name, primitive) in range.names.iter_mut().zip(&*range.here) {
+                for (name, primitive) in plot.names.iter_mut().zip(&*plot.range.here) {
                     *name = [primitive.first(), primitive.second()];
                     bounds.grow(primitive);
                 }
-                work.nodes.push(BinaryNode::leaf(&bounds, range.first, range.here.len()));
+                work.nodes.push(BinaryNode::leaf(&bounds, plot.first, plot.names.len()));
                 bounds
             }
             Few::Split(left) => {
                 work.nodes.push(BinaryNode(Bounds::EMPTY));
-                let [left, right] = range.cut(left);
+                let [left, right] = plot.cut(left);
                 let mut bounds = self.few::<COSTS>(left, work);
                 let right_place = work.nodes.len() - place;
                 bounds.grow(&self.few::<COSTS>(right, work));

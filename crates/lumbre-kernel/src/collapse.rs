@@ -286,16 +286,19 @@ struct Plan<'a> {
 
 /// Packs a binary tree. The depth of its recursions is that of the tree, which is bounded.
 ///
+/// What is no longer needed is given back as soon as that is so: the blocks, which are most of the tree, come last, when
+/// nothing but the tree is left.
+///
 /// # Errors
 /// [`BuildError::TooMany`] when there are more blocks than references can name.
 pub(crate) fn pack(
     geometries: &[Geometry],
     traits: &[Traits],
-    binary: &Binary,
-    names: &[Name],
+    binary: Binary,
+    names: Vec<Name>,
 ) -> Result<Packed, BuildError> {
-    let packer = Packer { traits, names };
-    let root = Cursor::new(binary);
+    let packer = Packer { traits, names: &names };
+    let root = Cursor::new(&binary);
     let plan = packer.plan(root);
     let total = plan.as_ref().map_or_else(|| packer.count(root), |plan| plan.total);
     if total.blocks.max(total.sphere_blocks) > tag::BLOCK_PLACES as usize {
@@ -316,30 +319,22 @@ pub(crate) fn pack(
         Some(plan) => packer.put_many(plan, room),
         None => packer.put(root, &mut room),
     };
-    let block = |span: &Span| {
-        let names = &names[span.first as usize..][..span.count as usize];
-        fill_block(mesh(geometries, names[0][0]), names)
+    drop(plan);
+    drop(binary);
+    let named = |spans: Vec<Span>| -> Vec<BlockNames> {
+        let name = |span: &Span| BlockNames::of(&names[span.first as usize..][..span.count as usize]);
+        spans.par_iter().with_min_len(256).map(name).collect()
     };
-    let sphere_block = |span: &Span| {
-        let names = &names[span.first as usize..][..span.count as usize];
-        fill_sphere_block(cloud(geometries, names[0][0]), names)
-    };
-    let blocks: Vec<_> = spans.par_iter().with_min_len(256).map(block).collect();
-    let sphere_blocks: Vec<_> = sphere_spans.par_iter().with_min_len(256).map(sphere_block).collect();
-    let name = |span: &Span| {
-        let names = &names[span.first as usize..][..span.count as usize];
-        let mut named = BlockNames::empty(names[0][0]);
-        for (place, name) in named.primitives.iter_mut().zip(names) {
-            *place = name[1];
-        }
-        named
-    };
-    let sphere_names: Vec<_> = sphere_spans.par_iter().with_min_len(256).map(name).collect();
-    let names: Vec<_> = spans.par_iter().with_min_len(256).map(name).collect();
+    let (block_names, sphere_names) = (named(spans), named(sphere_spans));
+    drop(names);
+    let block = |names: &BlockNames| fill_block(mesh(geometries, names.geometry), names);
+    let blocks: Vec<_> = block_names.par_iter().with_min_len(256).map(block).collect();
+    let block = |names: &BlockNames| fill_sphere_block(cloud(geometries, names.geometry), names);
+    let sphere_blocks: Vec<_> = sphere_names.par_iter().with_min_len(256).map(block).collect();
     Ok(Packed {
         nodes: nodes.into(),
         blocks: blocks.into(),
-        names: names.into(),
+        names: block_names.into(),
         entries: entries.into(),
         sphere_blocks: sphere_blocks.into(),
         sphere_names: sphere_names.into(),
@@ -362,19 +357,19 @@ fn cloud(geometries: &[Geometry], geometry: u32) -> &SphereCloud {
 }
 
 #[inline(always)]
-fn fill_sphere_block(cloud: &SphereCloud, names: &[Name]) -> SphereBlock {
+fn fill_sphere_block(cloud: &SphereCloud, names: &BlockNames) -> SphereBlock {
     let mut block = SphereBlock::EMPTY;
-    for (lane, name) in names.iter().enumerate().take(BLOCK) {
-        block.put(lane, cloud.spheres[name[1] as usize]);
+    for (lane, primitive) in names.primitives().enumerate() {
+        block.put(lane, cloud.spheres[primitive as usize]);
     }
     block
 }
 
 #[inline(always)]
-fn fill_block(mesh: &TriangleMesh, names: &[Name]) -> TriangleBlock {
+fn fill_block(mesh: &TriangleMesh, names: &BlockNames) -> TriangleBlock {
     let mut block = TriangleBlock::EMPTY;
-    for (lane, name) in names.iter().enumerate().take(BLOCK) {
-        for (corner, &vertex) in mesh.indices[name[1] as usize].iter().enumerate() {
+    for (lane, primitive) in names.primitives().enumerate() {
+        for (corner, &vertex) in mesh.indices[primitive as usize].iter().enumerate() {
             let position = mesh.positions[vertex as usize];
             for axis in 0..3 {
                 block.corners[corner][axis][lane] = position[axis];
@@ -384,7 +379,7 @@ fn fill_block(mesh: &TriangleMesh, names: &[Name]) -> TriangleBlock {
     block
 }
 
-/// The names in a block.
+/// Those among the names that go into a block.
 #[derive(Clone, Copy)]
 struct Span {
     first: u32,

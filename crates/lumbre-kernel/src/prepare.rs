@@ -54,7 +54,7 @@ pub(crate) fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result
             }
         }
         let (binary, names) = binary_tree(level, options.preset, primitives, &traits);
-        pack(&geometries, &traits, &binary, &names)?
+        pack(&geometries, &traits, binary, names)?
     };
     let holds = Holds::new(&geometries, parts.largest_corner, parts.sphere_reach);
     Ok(Accel {

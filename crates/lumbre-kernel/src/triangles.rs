@@ -12,6 +12,7 @@ use bytemuck::{Pod, Zeroable};
 use lumbre_geometry::{Ray, Root};
 use lumbre_math::{DVec2, DVec3};
 
+use crate::build::Name;
 use crate::lanes::Axes;
 use crate::touch::Feature;
 
@@ -42,6 +43,21 @@ impl BlockNames {
     /// The names in a block without triangles.
     pub(crate) fn empty(geometry: u32) -> Self {
         Self { primitives: [u32::MAX; BLOCK], geometry }
+    }
+
+    /// Of primitives of one geometry: one or more, and no more than fit.
+    pub(crate) fn of(names: &[Name]) -> Self {
+        let mut named = Self::empty(names[0][0]);
+        for (place, name) in named.primitives.iter_mut().zip(names) {
+            *place = name[1];
+        }
+        named
+    }
+
+    /// The positions of those that are there.
+    #[inline(always)]
+    pub(crate) fn primitives(&self) -> impl Iterator<Item = u32> {
+        self.primitives.into_iter().take_while(|&primitive| primitive != u32::MAX)
     }
 }
 
