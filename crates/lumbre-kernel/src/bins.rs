@@ -341,17 +341,30 @@ impl Task for Part<'_> {
     }
 }
 
-/// How many primitives are left of a split.
-pub(crate) struct CountLeft<'a> {
-    pub(crate) primitives: &'a [Primitive],
+/// Brings the primitives left of a split to the front; how many they are. There is room for all of them in `there`.
+pub(crate) struct PartPiece<'a> {
+    pub(crate) primitives: &'a mut [Primitive],
     pub(crate) split: &'a Split,
+    pub(crate) there: &'a mut [Primitive],
 }
 
-impl Task for CountLeft<'_> {
+impl Task for PartPiece<'_> {
     type Output = usize;
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> usize {
-        self.primitives.iter().filter(|primitive| self.split.is_left(primitive)).count()
+        let Self { primitives, split, there } = self;
+        let (mut left, mut right) = (0, 0);
+        for place in 0..primitives.len() {
+            let primitive = primitives[place];
+            let is_left = split.is_left(&primitive);
+            // Without a branch: what does not belong is soon written over.
+            primitives[left] = primitive;
+            there[right] = primitive;
+            left += usize::from(is_left);
+            right += usize::from(!is_left);
+        }
+        primitives[left..].copy_from_slice(&there[..right]);
+        left
     }
 }

@@ -1,17 +1,18 @@
 //! From primitives to a binary tree: the same from any number of threads.
 //!
 //! Subtrees over few thousand primitives are made by one thread each; above them, threads share the work on a node. What is
-//! done does not depend on how it is shared: boxes grow in any order, costs are whole numbers, and sides keep the order of
-//! their primitives. The depth is bounded: past [`SAH_DEPTH`] levels every split is in the middle.
+//! done does not depend on how it is shared: boxes grow in any order, costs are whole numbers, and primitives are parted in
+//! pieces of one length. The depth is bounded: past [`SAH_DEPTH`] levels every split is in the middle.
 
 use rayon::prelude::*;
 
 use crate::accel::Preset;
-use crate::bins::{self, BestSplit, Binning, Bins, CountLeft, Fill, Measure, Part, Split};
+use crate::bins::{self, BestSplit, Binning, Bins, Fill, Measure, Part, Split};
 use crate::collapse::{Choices, Costs, choose};
 use crate::few::{Decide, FEW, Few, group_of};
 use crate::lanes::Level;
 use crate::morton::{self, Code};
+use crate::parting::part;
 use crate::primitive::{Bounds, Kind, Primitive, Traits};
 use crate::reinsert::reinsert;
 
@@ -117,8 +118,8 @@ pub(crate) type Name = [u32; 2];
 
 /// The binary tree over primitives (not none), and their names in the order of its leaves.
 ///
-/// First they are parted, to and fro between two lists, until one thread takes what is left together; the second list is
-/// given back before twigs grow, which need but a little room each.
+/// First they are parted where they stand until one thread takes what is left together; then twigs grow, which need but a
+/// little room each.
 pub(crate) fn binary_tree(
     level: Level,
     preset: Preset,
@@ -126,42 +127,40 @@ pub(crate) fn binary_tree(
     traits: &[Traits],
 ) -> (Binary, Vec<Name>) {
     let count = primitives.len();
-    let mut other: Vec<Primitive> = fill(count, Bounds::EMPTY);
     // Below, there is a node for every thread.
     let shared = (2 * rayon::current_num_threads()).ilog2();
     let shared = if shared > 1 { shared + 1 } else { 0 };
     let builder = Builder { level, traits, shared };
-    let counts = part_by_rank(&mut primitives, &mut other, traits);
-    // Sorting moves all of them over, once.
-    let is_sorted = preset == Preset::Fast;
-    let mut rest = Range { here: &mut primitives, there: &mut other, is_home: !is_sorted, depth: 0 };
-    let mut sketches = Vec::with_capacity(Kind::RANKS);
-    for (rank, count) in counts.into_iter().enumerate().filter(|&(_, count)| count > 0) {
-        let [range, behind] = rest.cut(count);
-        rest = behind;
-        let range = Range { depth: 0, ..range };
-        let is_packed = rank + 1 == Kind::RANKS;
-        let (sketch, codes) = match (is_sorted, is_packed) {
-            (true, true) => builder.sort::<false>(range),
-            (true, false) => builder.sort::<true>(range),
-            (false, true) => (builder.sketch::<false>(range, None), Vec::new()),
-            (false, false) => (builder.sketch::<true>(range, None), Vec::new()),
-        };
-        sketches.push((count, is_packed, sketch, codes));
-    }
-    let (mut primitives, there) = if is_sorted { (other, primitives) } else { (primitives, other) };
-    drop(there);
+    let counts = sort_by_rank(&mut primitives, traits);
+    let codes = if preset == Preset::Fast { builder.sort(&mut primitives, &counts) } else { Vec::new() };
+    let codes_of = |rank: usize| {
+        let start = counts[..rank].iter().sum();
+        codes.get(start..start + counts[rank]).unwrap_or_default()
+    };
+    const PACKED: usize = Kind::RANKS - 1;
+    let mut rest = &mut primitives[..];
+    let sketches: Vec<(usize, Sketch)> = (0..Kind::RANKS)
+        .filter(|&rank| counts[rank] > 0)
+        .map(|rank| {
+            let (own, codes) = (take(&mut rest, counts[rank]), codes_of(rank));
+            let sketch = match rank {
+                PACKED => builder.sketch_sorted::<false>(own, 0, codes),
+                _ => builder.sketch_sorted::<true>(own, 0, codes),
+            };
+            (rank, sketch)
+        })
+        .collect();
 
     let mut names: Vec<Name> = fill(count, [0; 2]);
-    let (mut here, mut places, mut first) = (&mut primitives[..], &mut names[..], 0);
+    let (mut rest, mut places, mut first) = (&mut primitives[..], &mut names[..], 0);
     let mut trees = Vec::with_capacity(Kind::RANKS);
-    for (count, is_packed, sketch, codes) in sketches {
-        let ground = Ground { here: take(&mut here, count), names: take(&mut places, count), first };
-        first += count;
-        trees.push(match is_packed {
-            true => builder.grow::<false>(sketch, &codes, ground),
-            false => builder.grow::<true>(sketch, &codes, ground),
+    for (rank, sketch) in sketches {
+        let (own, names) = (take(&mut rest, counts[rank]), take(&mut places, counts[rank]));
+        trees.push(match rank {
+            PACKED => builder.grow::<false>(&sketch, codes_of(rank), own, names, first),
+            _ => builder.grow::<true>(&sketch, codes_of(rank), own, names, first),
         });
+        first += counts[rank];
     }
     drop(primitives);
     let better = |tree| if preset == Preset::Best { reinsert(tree) } else { tree };
@@ -175,66 +174,27 @@ fn take<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
     rest.split_off_mut(..count).unwrap_or_default()
 }
 
-/// Brings primitives into the order of their ranks; how many there are of each.
+/// Brings primitives, of which the packed ones are the last, into the order of their ranks; how many there are of each.
 ///
 /// Apart, because boxes of one kind do not grow around what is of another and everywhere among them, as trees on a ground
 /// are; and so that a search for any hit asks first what is quickly asked.
-fn part_by_rank(
-    primitives: &mut Vec<Primitive>,
-    other: &mut Vec<Primitive>,
-    traits: &[Traits],
-) -> [usize; Kind::RANKS] {
+fn sort_by_rank(primitives: &mut [Primitive], traits: &[Traits]) -> [usize; Kind::RANKS] {
+    let rank = |primitive: &Primitive| traits[primitive.first() as usize].kind.rank();
+    let others = primitives.partition_point(|primitive| rank(primitive) + 1 < Kind::RANKS);
+    debug_assert!(primitives[others..].iter().all(|primitive| rank(primitive) + 1 == Kind::RANKS));
     let mut counts = [0; Kind::RANKS];
-    let ranks: Vec<usize> = traits.iter().map(|traits| traits.kind.rank()).collect();
-    if let Some(&first) = ranks.first()
-        && ranks.iter().all(|&rank| rank == first)
-    {
-        counts[first] = primitives.len();
-        return counts;
+    counts[Kind::RANKS - 1] = primitives.len() - others;
+    let others = &mut primitives[..others];
+    others.iter().for_each(|primitive| counts[rank(primitive)] += 1);
+    if !counts.contains(&others.len()) {
+        others.sort_by_key(rank);
     }
-    let rank = |primitive: &Primitive| ranks[primitive.first() as usize];
-    primitives.iter().for_each(|primitive| counts[rank(primitive)] += 1);
-    let mut places = [0, counts[0], counts[0] + counts[1]];
-    for primitive in &*primitives {
-        let place = &mut places[rank(primitive)];
-        other[*place] = *primitive;
-        *place += 1;
-    }
-    std::mem::swap(primitives, other);
     counts
 }
 
 /// Like `vec![value; count]`, by all threads.
 pub(crate) fn fill<T: Clone + Send + Sync>(count: usize, value: T) -> Vec<T> {
     (0..count).into_par_iter().with_min_len(CHUNK).map(|_| value.clone()).collect()
-}
-
-/// The primitives of a node, and as much room for those of its children.
-struct Range<'a> {
-    here: &'a mut [Primitive],
-    there: &'a mut [Primitive],
-    /// Whether `here` is where they are to be in the end.
-    is_home: bool,
-    depth: u32,
-}
-
-impl Range<'_> {
-    fn len(&self) -> usize {
-        self.here.len()
-    }
-
-    /// The two sides, where the primitives were moved over.
-    fn moved(self, left: usize) -> [Self; 2] {
-        Self { here: self.there, there: self.here, is_home: !self.is_home, ..self }.cut(left)
-    }
-
-    /// The two sides, where the primitives are as they were.
-    fn cut(self, left: usize) -> [Self; 2] {
-        let (here, here_right) = self.here.split_at_mut(left);
-        let (there, there_right) = self.there.split_at_mut(left);
-        let (is_home, depth) = (self.is_home, self.depth + 1);
-        [Self { here, there, is_home, depth }, Self { here: here_right, there: there_right, is_home, depth }]
-    }
 }
 
 /// Which twigs there are to be, and what stands over them.
@@ -254,14 +214,6 @@ struct Seed {
 }
 
 impl Sketch {
-    /// Of what one thread takes; brings the primitives home.
-    fn twig(range: Range, split: Option<Split>, is_sorted: bool) -> Self {
-        if !range.is_home {
-            range.there.copy_from_slice(range.here);
-        }
-        Self::Twig(Seed { count: range.len(), depth: range.depth, split, is_sorted })
-    }
-
     /// From the first to the last. The depth of its recursion, and of that of [`Self::over`], is that of the tree.
     fn seeds<'a>(&'a self, seeds: &mut Vec<&'a Seed>) {
         match self {
@@ -283,45 +235,36 @@ impl Sketch {
     }
 }
 
-/// Where twigs grow: primitives, and room for their names.
-struct Ground<'a> {
+/// The primitives of a node of a twig, and as much room for those of its children.
+struct Range<'a> {
     here: &'a mut [Primitive],
+    there: &'a mut [Primitive],
     names: &'a mut [Name],
     /// The place of the first name.
     first: usize,
+    depth: u32,
 }
 
-/// The primitives of a part of a twig, and where their names go.
-struct Plot<'a> {
-    range: Range<'a>,
-    names: &'a mut [Name],
-    /// The place of the first name.
-    first: usize,
-}
-
-impl Plot<'_> {
+impl<'a> Range<'a> {
     fn len(&self) -> usize {
-        self.range.len()
+        self.here.len()
     }
 
-    /// As [`Range::moved`].
+    /// The two sides, where the primitives were moved over.
     fn moved(self, left: usize) -> [Self; 2] {
-        let Self { range, names, first } = self;
-        Self::of(range.moved(left), names, first)
+        Self { here: self.there, there: self.here, ..self }.cut(left)
     }
 
-    /// As [`Range::cut`].
+    /// The two sides, where the primitives are as they were.
     fn cut(self, left: usize) -> [Self; 2] {
-        let Self { range, names, first } = self;
-        Self::of(range.cut(left), names, first)
-    }
-}
-
-impl<'a> Plot<'a> {
-    fn of([left, right]: [Range<'a>; 2], names: &'a mut [Name], first: usize) -> [Self; 2] {
-        let (names, names_right) = names.split_at_mut(left.len());
-        let right_first = first + left.len();
-        [Self { range: left, names, first }, Self { range: right, names: names_right, first: right_first }]
+        let (here, here_right) = self.here.split_at_mut(left);
+        let (there, there_right) = self.there.split_at_mut(left);
+        let (names, names_right) = self.names.split_at_mut(left);
+        let (first, depth) = (self.first, self.depth + 1);
+        [
+            Self { here, there, names, first, depth },
+            Self { here: here_right, there: there_right, names: names_right, first: first + left, depth },
+        ]
     }
 }
 
@@ -340,6 +283,12 @@ struct Workplace {
     there: Vec<Primitive>,
 }
 
+/// What a twig needs but for that room.
+struct Tools<'w> {
+    nodes: &'w mut Vec<BinaryNode>,
+    bins: &'w mut Bins,
+}
+
 impl Workplace {
     fn new() -> Self {
         Self { nodes: Vec::new(), bins: Box::new(Bins::EMPTY), there: vec![Bounds::EMPTY; PARALLEL] }
@@ -347,110 +296,141 @@ impl Workplace {
 }
 
 impl Builder<'_> {
-    /// `split` is how the primitives are to be split, where that is known.
-    fn sketch<const COSTS: bool>(&self, range: Range, split: Option<Split>) -> Sketch {
-        if range.len() <= PARALLEL {
-            return Sketch::twig(range, split, false);
+    /// Brings primitives, so many of each rank, into the order along a curve; their codes in that order.
+    fn sort(&self, primitives: &mut Vec<Primitive>, counts: &[usize]) -> Vec<Code> {
+        let mut sorted = fill(primitives.len(), Bounds::EMPTY);
+        let mut codes = Vec::new();
+        let (mut here, mut there) = (&primitives[..], &mut sorted[..]);
+        for &count in counts.iter().filter(|&&count| count > 0) {
+            let own = here.split_off(..count).unwrap_or_default();
+            let (_, centers) = self.measure(own);
+            let found = morton::sort(own, take(&mut there, count), &centers);
+            // As a rule there is one rank.
+            if codes.is_empty() { codes = found } else { codes.extend(found) }
         }
-        let ([left, right], splits) = self.divide::<COSTS>(range, split);
-        let (left, right) =
-            rayon::join(|| self.sketch::<COSTS>(left, splits[0]), || self.sketch::<COSTS>(right, splits[1]));
+        *primitives = sorted;
+        codes
+    }
+
+    /// Splits by the order along a curve as long as there are codes that differ. The depth of this recursion is at most that
+    /// of the bits of a code, and then of [`Builder::sketch`].
+    fn sketch_sorted<const COSTS: bool>(
+        &self,
+        primitives: &mut [Primitive],
+        depth: u32,
+        codes: &[Code],
+    ) -> Sketch {
+        let count = primitives.len();
+        if count <= PARALLEL {
+            return Sketch::Twig(Seed { count, depth, split: None, is_sorted: true });
+        }
+        let Some(middle) = morton::cut(codes) else { return self.sketch::<COSTS>(primitives, depth, None) };
+        let (left, right) = primitives.split_at_mut(middle);
+        let (left_codes, right_codes) = codes.split_at(middle);
+        let (left, right) = rayon::join(
+            || self.sketch_sorted::<COSTS>(left, depth + 1, left_codes),
+            || self.sketch_sorted::<COSTS>(right, depth + 1, right_codes),
+        );
+        Sketch::Fork(Box::new([left, right]))
+    }
+
+    /// `split` is how the primitives are to be split, where that is known.
+    fn sketch<const COSTS: bool>(
+        &self,
+        primitives: &mut [Primitive],
+        depth: u32,
+        split: Option<Split>,
+    ) -> Sketch {
+        let count = primitives.len();
+        if count <= PARALLEL {
+            return Sketch::Twig(Seed { count, depth, split, is_sorted: false });
+        }
+        let ([left, right], [left_split, right_split]) = self.divide::<COSTS>(primitives, depth, split);
+        let (left, right) = rayon::join(
+            || self.sketch::<COSTS>(left, depth + 1, left_split),
+            || self.sketch::<COSTS>(right, depth + 1, right_split),
+        );
         Sketch::Fork(Box::new([left, right]))
     }
 
     /// One level of a node that threads share. Apart, so that its bins are not on the stack of what is below.
     #[inline(never)]
-    fn divide<'r, const COSTS: bool>(
+    fn divide<'p, const COSTS: bool>(
         &self,
-        range: Range<'r>,
+        primitives: &'p mut [Primitive],
+        depth: u32,
         split: Option<Split>,
-    ) -> ([Range<'r>; 2], [Option<Split>; 2]) {
+    ) -> ([&'p mut [Primitive]; 2], [Option<Split>; 2]) {
         let mut bins = Bins::EMPTY;
-        let Some(split) = self.known::<COSTS>(&range, split, &mut bins) else {
-            let middle = self.by_order(range.here);
-            return (range.cut(middle), [None; 2]);
+        let Some(split) = self.known::<COSTS>(primitives, depth, split, &mut bins) else {
+            let middle = self.by_order(primitives);
+            let (left, right) = primitives.split_at_mut(middle);
+            return ([left, right], [None; 2]);
         };
-        let count = range.len();
-        let (left, right) = range.there.split_at_mut(split.left);
-        self.part(range.here, &split, [left, right], range.depth);
-        let cut = range.moved(split.left);
+        part(self.level, primitives, &split, depth < self.shared);
+        let (left, right) = primitives.split_at_mut(split.left);
+        let sides = [left, right];
         let splits = [0, 1].map(|side| {
-            let binning = split.next(side, [split.left, count - split.left][side]);
-            self.fill::<COSTS>(cut[side].here, binning, &mut bins, cut[side].depth);
+            let binning = split.next(side, sides[side].len());
+            self.fill::<COSTS>(sides[side], binning, &mut bins, depth + 1);
             self.best::<COSTS>(&bins, binning)
         });
-        (cut, splits)
+        (sides, splits)
     }
 
-    /// Splits by the order along a curve; the codes in that order.
-    fn sort<const COSTS: bool>(&self, range: Range) -> (Sketch, Vec<Code>) {
-        let (_, centers) = self.measure(range.here);
-        let codes = morton::sort(range.here, range.there, &centers);
-        let Range { here, there, is_home, depth } = range;
-        let sorted = Range { here: there, there: here, is_home: !is_home, depth };
-        (self.sketch_sorted::<COSTS>(sorted, &codes), codes)
-    }
-
-    /// The depth of this recursion is at most that of the bits of a code, and then of [`Builder::sketch`].
-    fn sketch_sorted<const COSTS: bool>(&self, range: Range, codes: &[Code]) -> Sketch {
-        if range.len() <= PARALLEL {
-            return Sketch::twig(range, None, true);
-        }
-        let Some(middle) = morton::cut(codes) else { return self.sketch::<COSTS>(range, None) };
-        let [left, right] = range.cut(middle);
-        let (left_codes, right_codes) = codes.split_at(middle);
-        let (left, right) = rayon::join(
-            || self.sketch_sorted::<COSTS>(left, left_codes),
-            || self.sketch_sorted::<COSTS>(right, right_codes),
-        );
-        Sketch::Fork(Box::new([left, right]))
-    }
-
-    /// The tree that was sketched; `codes` are those of its primitives, if they were sorted.
-    fn grow<const COSTS: bool>(&self, sketch: Sketch, codes: &[Code], ground: Ground) -> Binary {
-        let Ground { mut here, mut names, mut first } = ground;
+    /// The tree that was sketched. `codes` are those of the primitives, if they were sorted, and `first` is the place of the
+    /// first name.
+    fn grow<const COSTS: bool>(
+        &self,
+        sketch: &Sketch,
+        mut codes: &[Code],
+        mut primitives: &mut [Primitive],
+        mut names: &mut [Name],
+        mut first: usize,
+    ) -> Binary {
         let mut seeds = Vec::new();
         sketch.seeds(&mut seeds);
-        let mut start = 0;
         let plots: Vec<_> = seeds
             .into_iter()
             .map(|seed| {
-                let (here, names) = (take(&mut here, seed.count), take(&mut names, seed.count));
-                let codes = codes.get(start..start + seed.count).unwrap_or_default();
-                let plot = (seed, codes, here, names, first);
-                start += seed.count;
+                let codes = codes.split_off(..seed.count).unwrap_or_default();
+                let here = take(&mut primitives, seed.count);
+                let plot = Range {
+                    here,
+                    there: &mut [],
+                    names: take(&mut names, seed.count),
+                    first,
+                    depth: seed.depth,
+                };
                 first += seed.count;
-                plot
+                (seed, codes, plot)
             })
             .collect();
-        let twig = |work: &mut Workplace, (seed, codes, here, names, first): (&Seed, _, _, _, _)| {
-            let mut there = std::mem::take(&mut work.there);
-            let range = Range { here, there: &mut there[..seed.count], is_home: true, depth: seed.depth };
-            let plot = Plot { range, names, first };
+        let twig = |work: &mut Workplace, (seed, codes, plot): (&Seed, &[Code], Range)| {
+            let Workplace { nodes, bins, there } = work;
+            let range = Range { there: &mut there[..seed.count], ..plot };
+            nodes.clear();
             if seed.is_sorted {
-                self.twig_sorted::<COSTS>(plot, codes, work);
+                self.twig_sorted::<COSTS>(range, codes, &mut Tools { nodes, bins });
             } else {
-                self.twig::<COSTS>(plot, seed.split, work);
+                self.twig::<COSTS>(range, seed.split, &mut Tools { nodes, bins });
             }
-            work.there = there;
             // As long as it is, and no longer.
-            let nodes = work.nodes.to_vec();
-            work.nodes.clear();
-            Binary::twig(nodes)
+            Binary::twig(nodes.to_vec())
         };
         let twigs: Vec<Binary> = plots.into_par_iter().map_init(Workplace::new, twig).collect();
         sketch.over(&mut twigs.into_iter())
     }
 
-    fn twig_sorted<const COSTS: bool>(&self, plot: Plot, codes: &[Code], work: &mut Workplace) -> Bounds {
-        let count = plot.len();
+    fn twig_sorted<const COSTS: bool>(&self, range: Range, codes: &[Code], work: &mut Tools) -> Bounds {
+        let count = range.len();
         if count <= FAST_FEW {
-            return self.twig::<COSTS>(plot, None, work);
+            return self.twig::<COSTS>(range, None, work);
         }
-        let Some(middle) = morton::cut(codes) else { return self.twig::<COSTS>(plot, None, work) };
+        let Some(middle) = morton::cut(codes) else { return self.twig::<COSTS>(range, None, work) };
         let place = work.nodes.len();
         work.nodes.push(BinaryNode(Bounds::EMPTY));
-        let [left, right] = plot.cut(middle);
+        let [left, right] = range.cut(middle);
         let (left_codes, right_codes) = codes.split_at(middle);
         let mut bounds = self.twig_sorted::<COSTS>(left, left_codes, work);
         let right_place = work.nodes.len() - place;
@@ -467,23 +447,24 @@ impl Builder<'_> {
     #[inline]
     fn known<const COSTS: bool>(
         &self,
-        range: &Range,
+        primitives: &[Primitive],
+        depth: u32,
         split: Option<Split>,
         bins: &mut Bins,
     ) -> Option<Split> {
-        if range.depth >= SAH_DEPTH {
+        if depth >= SAH_DEPTH {
             return None;
         }
         // Where the range was much too wide, it is measured.
         if split.is_some_and(|split| split.spread > 4) {
             return split;
         }
-        let (_, centers) = self.measure(range.here);
+        let (_, centers) = self.measure(primitives);
         if centers.are_one() {
             return None;
         }
-        let binning = Binning::new(&centers, range.len());
-        self.fill::<COSTS>(range.here, binning, bins, range.depth);
+        let binning = Binning::new(&centers, primitives.len());
+        self.fill::<COSTS>(primitives, binning, bins, depth);
         self.best::<COSTS>(bins, binning)
     }
 
@@ -516,53 +497,35 @@ impl Builder<'_> {
         bins.join(&other);
     }
 
-    /// Moves the primitives of a node that threads share to their sides.
-    fn part(&self, primitives: &[Primitive], split: &Split, sides: [&mut [Primitive]; 2], depth: u32) {
-        if depth >= self.shared || primitives.len() <= 2 * CHUNK {
-            self.level.run(Part { primitives, split, sides });
-            return;
-        }
-        let (first, second) = primitives.split_at(primitives.len() / 2);
-        let count = |primitives: &[Primitive]| self.level.run(CountLeft { primitives, split });
-        let first_left = first.par_chunks(CHUNK).map(count).sum();
-        let [left, right] = sides;
-        let (left, second_left) = left.split_at_mut(first_left);
-        let (right, second_right) = right.split_at_mut(first.len() - first_left);
-        rayon::join(
-            || self.part(first, split, [left, right], depth),
-            || self.part(second, split, [second_left, second_right], depth),
-        );
-    }
-
     /// Makes a subtree by one thread; returns its box. Its depth is bounded, and so is this recursion.
-    fn twig<const COSTS: bool>(&self, plot: Plot, split: Option<Split>, work: &mut Workplace) -> Bounds {
-        let count = plot.len();
+    fn twig<const COSTS: bool>(&self, range: Range, split: Option<Split>, work: &mut Tools) -> Bounds {
+        let count = range.len();
         if count <= FEW {
-            return self.few::<COSTS>(plot, work);
+            return self.few::<COSTS>(range, work);
         }
         let place = work.nodes.len();
         work.nodes.push(BinaryNode(Bounds::EMPTY));
-        let split = self.known::<COSTS>(&plot.range, split, &mut work.bins);
+        let split = self.known::<COSTS>(range.here, range.depth, split, work.bins);
         let ([left, right], splits) = match &split {
             Some(split) => {
-                let (left, right) = plot.range.there.split_at_mut(split.left);
-                self.level.run(Part { primitives: &*plot.range.here, split, sides: [left, right] });
-                let cut = plot.moved(split.left);
+                let (left, right) = range.there.split_at_mut(split.left);
+                self.level.run(Part { primitives: &*range.here, split, sides: [left, right] });
+                let cut = range.moved(split.left);
                 let splits = [0, 1].map(|side| {
-                    let primitives = &*cut[side].range.here;
+                    let primitives = &*cut[side].here;
                     if primitives.len() <= FEW {
                         return None;
                     }
                     let binning = split.next(side, primitives.len());
                     let traits = self.traits;
-                    self.level.run(Fill::<COSTS> { primitives, binning, bins: &mut work.bins, traits });
-                    self.best::<COSTS>(&work.bins, binning)
+                    self.level.run(Fill::<COSTS> { primitives, binning, bins: work.bins, traits });
+                    self.best::<COSTS>(work.bins, binning)
                 });
                 (cut, splits)
             }
             None => {
-                let middle = self.by_order(plot.range.here);
-                (plot.cut(middle), [None; 2])
+                let middle = self.by_order(range.here);
+                (range.cut(middle), [None; 2])
             }
         };
         let mut bounds = self.twig::<COSTS>(left, splits[0], work);
@@ -572,22 +535,22 @@ impl Builder<'_> {
         bounds
     }
 
-    fn few<const COSTS: bool>(&self, plot: Plot, work: &mut Workplace) -> Bounds {
+    fn few<const COSTS: bool>(&self, range: Range, work: &mut Tools) -> Bounds {
         let traits = self.traits;
         let place = work.nodes.len();
-        match self.level.run(Decide::<COSTS> { primitives: plot.range.here, traits }) {
+        match self.level.run(Decide::<COSTS> { primitives: range.here, traits }) {
             Few::Leaf => {
                 let mut bounds = Bounds::EMPTY;
-                for (name, primitive) in plot.names.iter_mut().zip(&*plot.range.here) {
+                for (name, primitive) in range.names.iter_mut().zip(&*range.here) {
                     *name = [primitive.first(), primitive.second()];
                     bounds.grow(primitive);
                 }
-                work.nodes.push(BinaryNode::leaf(&bounds, plot.first, plot.names.len()));
+                work.nodes.push(BinaryNode::leaf(&bounds, range.first, range.names.len()));
                 bounds
             }
             Few::Split(left) => {
                 work.nodes.push(BinaryNode(Bounds::EMPTY));
-                let [left, right] = plot.cut(left);
+                let [left, right] = range.cut(left);
                 let mut bounds = self.few::<COSTS>(left, work);
                 let right_place = work.nodes.len() - place;
                 bounds.grow(&self.few::<COSTS>(right, work));

@@ -18,6 +18,7 @@ mod morton;
 mod nearest;
 mod node;
 mod options;
+mod parting;
 mod precise;
 mod prepare;
 mod primitive;
