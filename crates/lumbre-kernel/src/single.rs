@@ -220,7 +220,7 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
             }
         }
         let height = (found * ray.direction.abs().max_element()) as f32;
-        let error = self.blocks.errors.height + height.abs() * triangles::ROUNDINGS;
+        let error = height.abs() * triangles::ROUNDINGS + f32::MIN_POSITIVE;
         Outcome::Settled(Some(Candidate { block, lane, from: height - error, to: height + error }))
     }
 

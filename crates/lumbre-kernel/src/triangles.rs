@@ -118,55 +118,51 @@ impl Shear {
 ///
 /// # Why none is lost
 ///
-/// Let L be the largest coordinate of a corner plus the largest of the ray's origin, both relative to the mesh, u = 2⁻²⁴,
-/// and take a sheared corner (x, y, z) as the test in double precision has it. Here z is wrong by 2uL: the origin is
-/// rounded, and so is the difference. x is wrong by 2uL from its own difference, 2uL from z, 4.1uL from the shear (no more
-/// than 1, and the quotient of rounded numbers by way of a rounded inverse), uL from the product, and 2uL from the last
-/// subtraction: 11.1uL, so that δ = 12uL also covers what is rounded in double precision. Where |x|, |y| ≤ m for the corners
-/// as computed, an edge function xy' - yx' is off by 4δm + 2δ² from them, and by 4.1um² from its own roundings; m < 2.01L
-/// makes the latter less than δm. With `error = 6δm + 3δ²`, which leaves room for its own roundings, an edge function that
-/// is not negative in double precision is not below `-error` here.
+/// Let u = 2⁻²⁴, L the largest coordinate of a corner of the mesh plus the largest of the ray's origin, both relative to the
+/// mesh, and R the largest coordinate of a triangle's corners relative to the ray's origin. The origin is kept in two parts:
+/// rounded, and the rest, so that together they are wrong by u²L, and differences from it by a share of R. What follows is
+/// the sheared corner (x, y, z), z without the rest, compared with the one that the test in double precision has.
+///
+/// x is wrong by uR from the difference, 12.3u²L from the rest of the origin and its shear, which are added next, uR from
+/// that sum, uR from z, 4.1uR from the shear (no more than 1, and the quotient of rounded numbers by way of a rounded
+/// inverse), and 2uR from the last subtraction: by 9.1uR + 12.3u²L. With |x|, |y| ≤ m and |z| ≤ h as computed, R is no more than
+/// m + h + 2.2uL and few roundings. So δ = 12us with s = m + h + 4uL is more than that, and covers what is rounded in double
+/// precision too.
+///
+/// An edge function xy' - yx' is off by 4δm + 2δ² from the corners, and by 4.1um² from its own roundings, less than δm. With
+/// `error = 6δm + 3δ² = 72us (m + 6us)`, which leaves room for its own roundings, an edge function that is not negative in double
+/// precision is not below `-error` here. [`TINY`] is added for what may underflow.
 ///
 /// With edge functions wrong by eᵢ, the height z of a crossing is wrong by Σ eᵢ (zᵢ - z) / D, where D is their sum as
-/// computed: by no more than 3 `error` / |D| of the triangle's extent in z. Roundings add 7uL, those of the corners' z 2uL,
-/// and those of the extent up to 8uL, as long as no edge function is much larger than D; where D is so small that one may
-/// be, `error` / |D| is large. So `spread = 12.5 error / |D| (extent + z_error) + z_error` with `z_error` = 24uL has room for all
-/// of it; no number where D is zero, which counts as being in range.
+/// computed: by no more than 3 `error` / |D| of the triangle's extent in z. Roundings add 7uh, those of the corners' z uh, that
+/// of adding the rest of the origin uh, those of the extent up to 8uh and those of the ends 2uh, as long as no edge function is
+/// much larger than D; where D is so small that one may be, `error` / |D| is large. So `spread = 12.5 error / |D| (extent + 24us) +
+/// 24us` has room for all of it; no number where D is zero, which counts as being in range.
 ///
 /// Where all edge functions are beyond 2 `error` on one side, those in double precision are beyond zero, so that the line does
 /// meet the triangle; and where height ± spread lies between `surely_first` and `surely_last`, the hit is in range. The ends
-/// of the range are moved by 6uL, outwards or inwards, and by what their own rounding may be.
+/// of the range are moved, outwards or inwards, by what their own rounding may be.
 ///
-/// All this without overflow or underflow that matters, so for 2⁻⁵⁰ ≤ L ≤ 2⁶⁰; else the test is left out, and below 2⁻⁴⁰
-/// nothing is certain.
+/// All this without overflow, and with L ≥ 2⁻⁵⁰, so that 24us is far above what underflows; else the test is left out, and
+/// below 2⁻⁴⁰ nothing is certain.
 ///
 /// Where two components of the direction are as good as equal, single and double precision may take another one for the last
 /// axis. The edge functions of both are the same but for a factor as good as 1 and double precision's own rounding.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BlockRay {
     pub(crate) axes: &'static Axes,
-    /// Relative to the mesh, in the order of the axes; the last of four means nothing, here and below.
+    /// Relative to the mesh, rounded, in the order of the axes; the last of four means nothing, here and below.
     pub(crate) origin: [f32; 4],
+    /// What rounding took from it, sheared as corners are.
+    pub(crate) rest: [f32; 4],
     /// The direction by its last component, in the order of the axes.
     pub(crate) shear: [f32; 4],
-    pub(crate) errors: BlockErrors,
+    /// 4uL.
+    pub(crate) least_size: f32,
     pub(crate) range: HeightRange,
     /// A zero, negative where the last component of the direction is positive: what is behind a corner, with the sign flipped by
     /// it, grows along the ray.
     pub(crate) turn: f32,
-}
-
-/// How wrong single precision may be about a block.
-#[derive(Clone, Copy, Debug)]
-#[repr(C)]
-pub(crate) struct BlockErrors {
-    /// `error` by m, and without.
-    pub(crate) slope: f32,
-    pub(crate) least: f32,
-    /// 24uL.
-    pub(crate) height: f32,
-    /// 6uL.
-    pub(crate) margin: f32,
 }
 
 /// The range of a ray in heights.
@@ -181,13 +177,18 @@ pub(crate) struct HeightRange {
     pub(crate) surely_last: f32,
 }
 
-/// 72u, 432u², 24u and 6u: the factors of L, L², L and L in [`BlockErrors`].
-pub(crate) const ERROR_FACTORS: [f32; 4] = {
-    let u = 1.0 / (1 << 24) as f32;
-    [72.0 * u, 432.0 * u * u, 24.0 * u, 6.0 * u]
-};
+/// u.
+const ROUNDOFF: f32 = 1.0 / (1 << 24) as f32;
+/// The factors of what edge functions and heights may be wrong by.
+pub(crate) const EDGE_ERROR: f32 = 72.0 * ROUNDOFF;
+pub(crate) const SIZE_ERROR: f32 = 6.0 * ROUNDOFF;
+pub(crate) const HEIGHT_ERROR: f32 = 24.0 * ROUNDOFF;
+/// Of L.
+pub(crate) const LEAST_SIZE: f32 = 4.0 * ROUNDOFF;
+/// Above all that underflow may do.
+pub(crate) const TINY: f32 = 1.0 / (1u128 << 120) as f32;
 /// Above all that few roundings may do.
-pub(crate) const ROUNDINGS: f32 = 6.0 / (1 << 24) as f32;
+pub(crate) const ROUNDINGS: f32 = 6.0 * ROUNDOFF;
 /// No height that matters is larger, and a range may well end there.
 pub(crate) const FAR: f32 = (1u128 << 100) as f32;
 /// The bounds on L; below the third nothing is certain.
@@ -195,27 +196,13 @@ const SMALLEST_REACH: f32 = 1.0 / (1u64 << 50) as f32;
 const LARGEST_REACH: f32 = (1u64 << 60) as f32;
 const SMALLEST_SURE_REACH: f32 = 1.0 / (1u64 << 40) as f32;
 
-impl BlockErrors {
-    /// Of this L.
-    #[inline(always)]
-    pub(crate) fn new(reach: f32) -> Self {
-        let [slope, least, height, margin] = ERROR_FACTORS;
-        Self {
-            slope: reach * slope,
-            least: reach * least * reach,
-            height: reach * height,
-            margin: reach * margin,
-        }
-    }
-}
-
 impl HeightRange {
-    /// Between heights that are products of few rounded numbers, `margin` apart from those that count.
+    /// Between heights that are products of few rounded numbers.
     #[inline(always)]
-    pub(crate) fn new(start: f32, end: f32, margin: f32) -> Self {
+    pub(crate) fn new(start: f32, end: f32) -> Self {
         let within = |height: f32| if height < FAR { if height > -FAR { height } else { -FAR } } else { FAR };
         let (start, end) = (within(start), within(end));
-        let (start_error, end_error) = (start.abs() * ROUNDINGS + margin, end.abs() * ROUNDINGS + margin);
+        let (start_error, end_error) = (start.abs() * ROUNDINGS, end.abs() * ROUNDINGS);
         Self {
             first: start - start_error,
             last: end + end_error,
@@ -236,39 +223,35 @@ impl BlockRay {
         t_min: f64,
         t_max: f64,
     ) -> Option<Self> {
-        let origin = [origin[0] as f32, origin[1] as f32, origin[2] as f32, 0.0];
-        let reach = larger(larger(origin[0].abs(), origin[1].abs()), origin[2].abs()) + largest_corner;
+        let rounded = origin.map(|x| x as f32);
+        let rest = [0, 1, 2].map(|axis| (origin[axis] - f64::from(rounded[axis])) as f32);
+        let shear_x_y = [shear.x as f32, shear.y as f32];
+        let reach = larger(larger(rounded[0].abs(), rounded[1].abs()), rounded[2].abs()) + largest_corner;
         if !(SMALLEST_REACH..=LARGEST_REACH).contains(&reach) {
             return None;
         }
-        let errors = BlockErrors::new(reach);
-        let mut ray = Self {
-            axes: shear.axes,
-            origin,
-            shear: [shear.x as f32, shear.y as f32, 1.0, 0.0],
-            errors,
-            range: HeightRange::new(0.0, 0.0, 0.0),
-            turn: if shear.direction_z < 0.0 { 0.0 } else { -0.0 },
-        };
-        ray.set_range(shear, t_min, t_max);
-        if reach < SMALLEST_SURE_REACH || shear.direction_z.abs() < 1e-200 {
-            // A place in range may be none, for it is infinite.
-            (ray.range.surely_first, ray.range.surely_last) = (f32::INFINITY, f32::NEG_INFINITY);
-        }
-        Some(ray)
-    }
-
-    #[inline(always)]
-    fn set_range(&mut self, shear: &Shear, t_min: f64, t_max: f64) {
         let length = shear.direction_z.abs();
-        self.range = HeightRange::new((t_min * length) as f32, (t_max * length) as f32, self.errors.margin);
+        let mut range = HeightRange::new((t_min * length) as f32, (t_max * length) as f32);
+        if reach < SMALLEST_SURE_REACH || length < 1e-200 {
+            // A place in range may be none, for it is infinite.
+            (range.surely_first, range.surely_last) = (f32::INFINITY, f32::NEG_INFINITY);
+        }
+        Some(Self {
+            axes: shear.axes,
+            origin: [rounded[0], rounded[1], rounded[2], 0.0],
+            rest: [rest[0] - shear_x_y[0] * rest[2], rest[1] - shear_x_y[1] * rest[2], rest[2], 0.0],
+            shear: [shear_x_y[0], shear_x_y[1], 1.0, 0.0],
+            least_size: reach * LEAST_SIZE,
+            range,
+            turn: if shear.direction_z < 0.0 { 0.0 } else { -0.0 },
+        })
     }
 
     /// Leaves out what lies beyond `t_max`.
     #[inline(always)]
     pub(crate) fn end_at(&mut self, shear: &Shear, t_max: f64) {
         let end = (t_max * shear.direction_z.abs()) as f32;
-        self.range.last = HeightRange::new(end, end, self.errors.margin).last;
+        self.range.last = HeightRange::new(end, end).last;
     }
 }
 

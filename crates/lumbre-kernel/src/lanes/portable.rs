@@ -12,7 +12,8 @@ use crate::node::{
 };
 use crate::stack::stack_entry;
 use crate::triangles::{
-    BLOCK, BlockErrors, BlockRay, HeightRange, Inside, Passage, Shear, TriangleBlock, passage,
+    BLOCK, BlockRay, EDGE_ERROR, HEIGHT_ERROR, HeightRange, Inside, LEAST_SIZE, Passage, SIZE_ERROR, Shear,
+    TINY, TriangleBlock, passage,
 };
 
 pub(crate) struct Portable;
@@ -24,8 +25,9 @@ pub(crate) struct Edges {
     values: [[f32; BLOCK]; 3],
     /// Of the corners.
     heights: [[f32; BLOCK]; 3],
-    /// By how much the edge functions may be wrong.
+    /// By how much the edge functions and the heights may be wrong.
     error: [f32; BLOCK],
+    height_error: [f32; BLOCK],
 }
 
 // As the processor's instruction does it, which f32::max does not.
@@ -52,14 +54,16 @@ impl Lanes for Portable {
         let (mut fits, mut is_long) = (0.0 <= t_min && t_min <= t_max, false);
         let mut signs = 0;
         let mut slabs = BoxRay::passing_all().slabs;
-        let (mut direction, mut on_mesh) = ([0.0; 4], [0.0; 4]);
+        let (mut direction, mut on_mesh, mut rest) = ([0.0; 4], [0.0; 4], [0.0; 4]);
         for axis in 0..3 {
             let from = ((origin[axis] - start.tree_origin[axis]) * start.scale) as f32;
             let d = (toward[axis] * start.scale) as f32;
             fits &= from.abs() <= start.farthest[axis] && d.abs() <= LARGEST_NEAR as f32;
             is_long |= d.abs() >= SMALLEST_NEAR as f32;
             direction[axis] = d;
-            on_mesh[axis] = (origin[axis] - start.mesh_origin[axis]) as f32;
+            let exact = origin[axis] - start.mesh_origin[axis];
+            on_mesh[axis] = exact as f32;
+            rest[axis] = (exact - f64::from(on_mesh[axis])) as f32;
             let inverse = 1.0 / greater(d.abs(), TINY_NEAR as f32);
             let margin = inverse * (from.abs() * start.margin_per_distance + start.margin);
             let inverse = inverse.copysign(d);
@@ -80,13 +84,21 @@ impl Lanes for Portable {
         let shear = axes.permute_single(&direction).map(|d| d * inverse);
         let reach =
             greater(greater(on_mesh[0].abs(), on_mesh[1].abs()), on_mesh[2].abs()) + start.largest_corner;
-        let errors = BlockErrors::new(reach);
+        let rest = axes.permute_single(&rest);
         let length = axes.permute_single(&direction)[2].abs() * start.space_per_unit;
-        let range = HeightRange::new(t_min * length, t_max * length, errors.margin);
+        let range = HeightRange::new(t_min * length, t_max * length);
         let turn = 0.0f32.copysign(-inverse);
         Some(Narrow {
             slabs,
-            blocks: BlockRay { axes, origin: axes.permute_single(&on_mesh), shear, errors, range, turn },
+            blocks: BlockRay {
+                axes,
+                origin: axes.permute_single(&on_mesh),
+                rest: [rest[0] - shear[0] * rest[2], rest[1] - shear[1] * rest[2], rest[2], 0.0],
+                shear,
+                least_size: reach * LEAST_SIZE,
+                range,
+                turn,
+            },
             place_per_height: inverse.abs() * start.units_per_space,
         })
     }
@@ -154,32 +166,35 @@ impl Lanes for Portable {
         let mut y = [[0.0; BLOCK]; 3];
         let mut z = [[0.0; BLOCK]; 3];
         let [kx, ky, kz] = ray.axes.lanes;
-        let (origin, shear) = (&ray.origin, &ray.shear);
+        let (origin, rest, shear) = (&ray.origin, &ray.rest, &ray.shear);
         for corner in 0..3 {
             let lanes = block.corners[corner].as_flattened();
             let (across, up, along) = (&lanes[kx..][..BLOCK], &lanes[ky..][..BLOCK], &lanes[kz..][..BLOCK]);
             for lane in 0..BLOCK {
                 // All three with the sign turned, which their products do not have.
                 let height = origin[2] - along[lane];
-                x[corner][lane] = (origin[0] - across[lane]) - shear[0] * height;
-                y[corner][lane] = (origin[1] - up[lane]) - shear[1] * height;
+                x[corner][lane] = ((origin[0] - across[lane]) + rest[0]) - shear[0] * height;
+                y[corner][lane] = ((origin[1] - up[lane]) + rest[1]) - shear[1] * height;
                 z[corner][lane] = height;
             }
         }
         let mut mask = 0;
         let mut values = [[0.0; BLOCK]; 3];
-        let mut error = [0.0; BLOCK];
+        let (mut error, mut height_error) = ([0.0; BLOCK], [0.0; BLOCK]);
         for lane in 0..BLOCK {
             let edge = |p: usize, q: usize| x[p][lane] * y[q][lane] - y[p][lane] * x[q][lane];
             let (u, v, w) = (edge(2, 1), edge(0, 2), edge(1, 0));
-            let size = (0..3).fold(0.0f32, |size, i| size.max(x[i][lane].abs()).max(y[i][lane].abs()));
-            error[lane] = size * ray.errors.slope + ray.errors.least;
+            let across = (0..3).fold(0.0f32, |most, i| most.max(x[i][lane].abs()).max(y[i][lane].abs()));
+            let along = (0..3).fold(0.0f32, |most, i| most.max(z[i][lane].abs()));
+            let size = (across + along) + ray.least_size;
+            error[lane] = (size * EDGE_ERROR) * (size * SIZE_ERROR + across) + TINY;
+            height_error[lane] = size * HEIGHT_ERROR;
             let (least, most) = (u.min(v).min(w), u.max(v).max(w));
             // Comparisons with a NaN, which unused lanes have, are false.
             mask |= u32::from(least >= -error[lane] || most <= error[lane]) << lane;
             (values[0][lane], values[1][lane], values[2][lane]) = (u, v, w);
         }
-        (mask, Edges { values, heights: z, error })
+        (mask, Edges { values, heights: z, error, height_error })
     }
 
     #[inline(always)]
@@ -192,10 +207,11 @@ impl Lanes for Portable {
             let error = edges.error[lane];
             let inverse = 1.0 / (u + v + w);
             // Shares first: their products with lengths do not underflow.
-            let height = (u * inverse) * a + (v * inverse) * b + (w * inverse) * c;
+            let height = (u * inverse) * a + (v * inverse) * b + (w * inverse) * c + ray.rest[2];
             let ahead = if ray.turn.is_sign_negative() { -height } else { height };
             let share = (error * 12.5) * inverse.abs();
-            let spread = share * ((high - low) + ray.errors.height) + ray.errors.height;
+            let height_error = edges.height_error[lane];
+            let spread = share * ((high - low) + height_error) + height_error;
             let (from, to) = (ahead - spread, ahead + spread);
             // What is no number may be in range.
             crossings.in_range |= u32::from(!(to < ray.range.first || from > ray.range.last)) << lane;

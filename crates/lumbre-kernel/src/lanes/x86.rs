@@ -13,8 +13,8 @@ use crate::node::{
 };
 use crate::stack::stack_entry;
 use crate::triangles::{
-    BLOCK, BlockErrors, BlockRay, ERROR_FACTORS, FAR, HeightRange, Inside, Passage, ROUNDINGS, Shear,
-    TriangleBlock,
+    BLOCK, BlockRay, EDGE_ERROR, FAR, HEIGHT_ERROR, HeightRange, Inside, LEAST_SIZE, Passage, ROUNDINGS,
+    SIZE_ERROR, Shear, TINY, TriangleBlock,
 };
 
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
@@ -159,8 +159,9 @@ pub(crate) struct Edges {
     /// The least and the most of the edge functions.
     least: __m256,
     most: __m256,
-    /// By how much they may be wrong.
+    /// By how much they may be wrong, and the heights.
     error: __m256,
+    height_error: __m256,
 }
 
 impl<const AVX512: bool> Lanes for X86<AVX512> {
@@ -229,7 +230,9 @@ impl<const AVX512: bool> Lanes for X86<AVX512> {
             let direction = _mm256_cvtpd_ps(_mm256_mul_pd(_mm256_loadu_pd(numbers.add(3)), scale));
             let range = _mm_cvtpd_ps(_mm_loadu_pd(numbers.add(6)));
             let range = _mm_movelh_ps(range, range);
-            let on_mesh = _mm256_cvtpd_ps(_mm256_sub_pd(origin, _mm256_loadu_pd(start.mesh_origin.as_ptr())));
+            let exact = _mm256_sub_pd(origin, _mm256_loadu_pd(start.mesh_origin.as_ptr()));
+            let on_mesh = _mm256_cvtpd_ps(exact);
+            let rest = _mm256_cvtpd_ps(_mm256_sub_pd(exact, _mm256_cvtps_pd(on_mesh)));
 
             let sign = _mm_set1_ps(-0.0);
             let (distance, length) = (_mm_andnot_ps(sign, from), _mm_andnot_ps(sign, direction));
@@ -281,23 +284,22 @@ impl<const AVX512: bool> Lanes for X86<AVX512> {
             let reach = _mm_max_ps(reach, _mm_shuffle_ps::<0b01_00_11_10>(reach, reach));
             let reach = _mm_max_ps(reach, _mm_shuffle_ps::<0b10_11_00_01>(reach, reach));
             let reach = _mm_add_ps(reach, _mm_set1_ps(start.largest_corner));
-            let errors = _mm_mul_ps(reach, _mm_loadu_ps(ERROR_FACTORS.as_ptr()));
-            let errors = _mm_mul_ps(errors, _mm_blend_ps::<0b0010>(_mm_set1_ps(1.0), reach));
             let length = _mm_mul_ps(_mm_permutevar_ps(length, last), _mm_set1_ps(start.space_per_unit));
             // Start, end, start, end; none of them negative.
             let heights = _mm_min_ps(_mm_mul_ps(range, length), _mm_set1_ps(FAR));
-            let apart = _mm_fmadd_ps(
-                heights,
-                _mm_set1_ps(ROUNDINGS),
-                _mm_shuffle_ps::<0b11_11_11_11>(errors, errors),
-            );
+            let apart = _mm_mul_ps(heights, _mm_set1_ps(ROUNDINGS));
             let apart = _mm_xor_ps(apart, _mm_setr_ps(-0.0, 0.0, 0.0, -0.0));
             let place_per_height = _mm_andnot_ps(sign, inverse);
+            let shear = _mm_permutevar_ps(_mm_mul_ps(direction, inverse), order);
+            let rest = _mm_permutevar_ps(rest, order);
+            // Only of the first two: the shear of the last would be one.
+            let sheared = _mm_fnmadd_ps(shear, _mm_shuffle_ps::<0b10_10_10_10>(rest, rest), rest);
             let blocks = BlockRay {
                 axes,
                 origin: Self::array(_mm_permutevar_ps(on_mesh, order)),
-                shear: Self::array(_mm_permutevar_ps(_mm_mul_ps(direction, inverse), order)),
-                errors: std::mem::transmute::<[f32; 4], BlockErrors>(Self::array(errors)),
+                rest: Self::array(_mm_blend_ps::<0b1100>(sheared, rest)),
+                shear: Self::array(shear),
+                least_size: _mm_cvtss_f32(reach) * LEAST_SIZE,
                 range: std::mem::transmute::<[f32; 4], HeightRange>(Self::array(_mm_add_ps(heights, apart))),
                 turn: _mm_cvtss_f32(_mm_andnot_ps(inverse, sign)),
             };
@@ -423,6 +425,7 @@ impl<const AVX512: bool> Lanes for X86<AVX512> {
             let (ox, oy, oz) =
                 (_mm256_set1_ps(ray.origin[0]), _mm256_set1_ps(ray.origin[1]), _mm256_set1_ps(ray.origin[2]));
             let (shear_x, shear_y) = (_mm256_set1_ps(ray.shear[0]), _mm256_set1_ps(ray.shear[1]));
+            let (rest_x, rest_y) = (_mm256_set1_ps(ray.rest[0]), _mm256_set1_ps(ray.rest[1]));
             let mut x = [_mm256_setzero_ps(); 3];
             let mut y = [_mm256_setzero_ps(); 3];
             let mut z = [_mm256_setzero_ps(); 3];
@@ -432,25 +435,31 @@ impl<const AVX512: bool> Lanes for X86<AVX512> {
                 z[corner] = _mm256_sub_ps(oz, _mm256_loadu_ps(axes.add(kz)));
                 let across = _mm256_sub_ps(ox, _mm256_loadu_ps(axes.add(kx)));
                 let up = _mm256_sub_ps(oy, _mm256_loadu_ps(axes.add(ky)));
-                x[corner] = _mm256_fnmadd_ps(shear_x, z[corner], across);
-                y[corner] = _mm256_fnmadd_ps(shear_y, z[corner], up);
+                x[corner] = _mm256_fnmadd_ps(shear_x, z[corner], _mm256_add_ps(across, rest_x));
+                y[corner] = _mm256_fnmadd_ps(shear_y, z[corner], _mm256_add_ps(up, rest_y));
             }
             let u = _mm256_fmsub_ps(x[2], y[1], _mm256_mul_ps(y[2], x[1]));
             let v = _mm256_fmsub_ps(x[0], y[2], _mm256_mul_ps(y[0], x[2]));
             let w = _mm256_fmsub_ps(x[1], y[0], _mm256_mul_ps(y[1], x[0]));
-            let size = Self::larger(
+            let across = Self::larger(
                 Self::larger(Self::larger(x[0], y[0]), Self::larger(x[1], y[1])),
                 Self::larger(x[2], y[2]),
             );
-            let error =
-                _mm256_fmadd_ps(size, _mm256_set1_ps(ray.errors.slope), _mm256_set1_ps(ray.errors.least));
+            let along = Self::larger(Self::larger(z[0], z[1]), z[2]);
+            let size = _mm256_add_ps(_mm256_add_ps(across, along), _mm256_set1_ps(ray.least_size));
+            let error = _mm256_fmadd_ps(
+                _mm256_mul_ps(size, _mm256_set1_ps(EDGE_ERROR)),
+                _mm256_fmadd_ps(size, _mm256_set1_ps(SIZE_ERROR), across),
+                _mm256_set1_ps(TINY),
+            );
+            let height_error = _mm256_mul_ps(size, _mm256_set1_ps(HEIGHT_ERROR));
             let least = _mm256_min_ps(_mm256_min_ps(u, v), w);
             let most = _mm256_max_ps(_mm256_max_ps(u, v), w);
             // Comparisons with a NaN, which unused lanes have, are false. A minimum of a NaN and a number is that number
             // or the NaN: unused lanes have nothing but NaN.
             let minus_error = _mm256_xor_ps(error, _mm256_set1_ps(-0.0));
             let mask = Self::either::<_CMP_GE_OQ, _CMP_LE_OQ>([least, minus_error], [most, error]);
-            (mask, Edges { values: [u, v, w], heights: z, least, most, error })
+            (mask, Edges { values: [u, v, w], heights: z, least, most, error, height_error })
         }
     }
 
@@ -465,16 +474,16 @@ impl<const AVX512: bool> Lanes for X86<AVX512> {
             let of_c = _mm256_mul_ps(_mm256_mul_ps(w, inverse), z[2]);
             let of_b_and_c = _mm256_fmadd_ps(_mm256_mul_ps(v, inverse), z[1], of_c);
             let height = _mm256_fmadd_ps(_mm256_mul_ps(u, inverse), z[0], of_b_and_c);
+            let height = _mm256_add_ps(height, _mm256_set1_ps(ray.rest[2]));
             let ahead = _mm256_xor_ps(height, _mm256_set1_ps(ray.turn));
             let low = _mm256_min_ps(_mm256_min_ps(z[0], z[1]), z[2]);
             let high = _mm256_max_ps(_mm256_max_ps(z[0], z[1]), z[2]);
-            let z_error = _mm256_set1_ps(ray.errors.height);
             let share = _mm256_mul_ps(
                 _mm256_mul_ps(edges.error, _mm256_set1_ps(12.5)),
                 _mm256_andnot_ps(sign, inverse),
             );
-            let extent = _mm256_add_ps(_mm256_sub_ps(high, low), z_error);
-            let spread = _mm256_fmadd_ps(share, extent, z_error);
+            let extent = _mm256_add_ps(_mm256_sub_ps(high, low), edges.height_error);
+            let spread = _mm256_fmadd_ps(share, extent, edges.height_error);
             let (from, to) = (_mm256_sub_ps(ahead, spread), _mm256_add_ps(ahead, spread));
             // What is no number may be in range.
             let in_range = Self::both::<_CMP_NLT_UQ, _CMP_NGT_UQ>(
