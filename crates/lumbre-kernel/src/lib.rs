@@ -35,6 +35,7 @@ mod surface;
 mod touch;
 mod traverse;
 mod triangles;
+mod way;
 mod winding;
 
 pub use accel::{Accel, BuildError, BuildOptions, Preset};

@@ -12,10 +12,11 @@ use lumbre_geometry::{Ray, Root};
 use lumbre_math::DVec2;
 
 use crate::holds::SingleStart;
-use crate::lanes::{self, LANE_BITS, Lanes, Level, Narrow, Task};
-use crate::node::{Node, Slabs, tag};
+use crate::lanes::{self, Lanes, Level, Task};
+use crate::node::tag;
 use crate::stack::{AsBuilt, ByDistance, Order, Stack};
 use crate::triangles::{self, BLOCK, BlockRay, Meeting, Passage, Shear, TriangleBlock};
+use crate::way::Way;
 use crate::{Accel, Hit, InstancePath};
 
 /// What came of a search.
@@ -93,65 +94,28 @@ impl Candidate {
 pub(crate) struct SingleRay<'a, L> {
     accel: &'a Accel,
     // Those of the tree, which may lie in a file.
-    nodes: &'a [Node],
     triangles: &'a [TriangleBlock],
-    slabs: Slabs,
+    way: Way<'a, L>,
     blocks: BlockRay,
-    /// No box ahead of this key is of interest.
-    limit_key: i32,
     /// From heights to places in the range of boxes.
     place_per_height: f32,
     /// The nearest so far.
     best: Candidate,
-    lanes: PhantomData<L>,
 }
 
 impl<'a, L: Lanes> SingleRay<'a, L> {
     /// Starts with a ray; `None` where that does not come from nearby, or is not sound.
     #[inline(always)]
     pub(crate) fn start(accel: &'a Accel, start: &SingleStart, ray: &Ray) -> Option<Self> {
-        let Narrow { slabs, blocks, place_per_height } = L::start_single(start, ray)?;
-        let limit_key = slabs.s_max.to_bits() as i32 | LANE_BITS;
-        let best = Candidate::NONE;
-        let (nodes, triangles) = (&*accel.tree.nodes, &*accel.tree.blocks);
-        Some(Self {
-            accel,
-            nodes,
-            triangles,
-            slabs,
-            blocks,
-            limit_key,
-            place_per_height,
-            best,
-            lanes: PhantomData,
-        })
+        let slabs = L::start_single(start, ray)?;
+        Some(Self::among_triangles(accel, start, ray, Way::new(&accel.tree.nodes, slabs)))
     }
 
-    /// Goes on from a node.
+    /// Goes on with a ray that has come to a first leaf.
     #[inline(always)]
-    fn meet_node<O: Order>(&self, reference: u32, stack: &mut Stack<O::Entry>) -> Option<u32> {
-        // Before there is anything to be kept in registers meanwhile.
-        let slots = stack.with_room();
-        let node = &self.nodes[reference as usize];
-        let (mask, keys) = L::meet_boxes(node, lanes::opaque(&self.slabs));
-        if mask & mask.wrapping_sub(1) != 0 {
-            Some(O::push_children::<L>(node, mask, keys, slots))
-        } else if mask != 0 {
-            Some(L::only_child(node, mask))
-        } else {
-            self.pop::<O>(stack)
-        }
-    }
-
-    /// The next that is not beyond the limit.
-    #[inline(always)]
-    fn pop<O: Order>(&self, stack: &mut Stack<O::Entry>) -> Option<u32> {
-        loop {
-            let entry = stack.pop()?;
-            if !O::is_beyond(entry, self.limit_key) {
-                return Some(O::reference(entry));
-            }
-        }
+    fn among_triangles(accel: &'a Accel, start: &SingleStart, ray: &Ray, way: Way<'a, L>) -> Self {
+        let (blocks, place_per_height) = L::start_blocks(start, ray, way.slabs());
+        Self { accel, triangles: &accel.tree.blocks, way, blocks, place_per_height, best: Candidate::NONE }
     }
 
     /// Tests a leaf for the nearest hit; false where the plain search has to answer.
@@ -171,8 +135,8 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
                     let to = L::lane(crossings.to, lane as usize);
                     if is_sure && to < self.best.from {
                         self.keep(Candidate { block: number, lane, from, to });
-                    } else if from > self.best.to {
-                        // Farther: what is no number is not.
+                    } else if from > self.best.to || self.passes(ray, block, lane) {
+                        // Farther, which what is no number is not; or not met at all.
                         continue;
                     } else {
                         match self.contest(ray, number, lane) {
@@ -192,8 +156,19 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
         self.best = better;
         self.blocks.range.last = better.to;
         let place = better.to * self.place_per_height;
-        self.slabs.s_max = place + place.abs() * triangles::ROUNDINGS + f32::MIN_POSITIVE;
-        self.limit_key = self.slabs.s_max.to_bits() as i32 | LANE_BITS;
+        self.way.end_at(place + place.abs() * triangles::ROUNDINGS + f32::MIN_POSITIVE);
+    }
+
+    /// Whether the ray passes by a triangle, or meets it out of its range, as far as that is seen at a glance.
+    #[inline(always)]
+    fn passes(&self, ray: &Ray, block: &TriangleBlock, lane: u32) -> bool {
+        let shear = Shear::new(&ray.direction);
+        let origin = shear.local_origin(&ray.origin, &self.accel.holds.first_origin);
+        match L::pass(block, lane as usize, &shear, &origin) {
+            (Passage::Outside, _) => true,
+            (Passage::Inside, inside) => !triangles::is_in_range(ray, inside.t(&shear)),
+            (Passage::Unclear, _) => false,
+        }
     }
 
     /// Looks closer at a triangle that may be met, and nearer than the best: what is better, if anything.
@@ -224,6 +199,8 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
         Outcome::Settled(Some(Candidate { block, lane, from: height - error, to: height + error }))
     }
 
+    #[cold]
+    #[inline(never)]
     fn meet_exactly(&self, ray: &Ray, block: u32, lane: u32) -> Meeting {
         let shear = Shear::new(&ray.direction);
         let origin = shear.local_origin(&ray.origin, &self.accel.holds.first_origin);
@@ -242,29 +219,20 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
                 if mask & crossings.sure != 0 {
                     return Outcome::Settled(true);
                 }
-                let rest = mask & crossings.in_range;
-                if rest != 0 {
-                    match self.look_closer(ray, number, rest) {
-                        Outcome::Settled(false) => {}
-                        settled => return settled,
+                let mut rest = mask & crossings.in_range;
+                while rest != 0 {
+                    let lane = rest.trailing_zeros();
+                    rest &= rest - 1;
+                    if self.passes(ray, block, lane) {
+                        continue;
+                    }
+                    match self.meet_exactly(ray, number, lane) {
+                        Meeting::Miss => {}
+                        Meeting::Hit { .. } => return Outcome::Settled(true),
+                        Meeting::Touch { .. } => return Outcome::Unsettled,
                     }
                 }
             }
-        }
-        Outcome::Settled(false)
-    }
-
-    /// Whether one of the triangles of a block is met.
-    #[cold]
-    #[inline(never)]
-    fn look_closer(&self, ray: &Ray, block: u32, mut lanes: u32) -> Outcome<bool> {
-        while lanes != 0 {
-            match self.meet_exactly(ray, block, lanes.trailing_zeros()) {
-                Meeting::Miss => {}
-                Meeting::Hit { .. } => return Outcome::Settled(true),
-                Meeting::Touch { .. } => return Outcome::Unsettled,
-            }
-            lanes &= lanes - 1;
         }
         Outcome::Settled(false)
     }
@@ -306,7 +274,7 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
     #[inline(always)]
     pub(crate) fn fetch(&self, reference: u32) {
         if reference >> tag::SHIFT == tag::INNER {
-            self.nodes.get(reference as usize).map(lanes::fetch);
+            self.way.fetch(reference);
         } else {
             self.triangles.get(tag::blocks(reference).start).map(lanes::fetch);
         }
@@ -319,6 +287,8 @@ pub(crate) trait Goal {
     type Order: Order;
     /// What it is to know.
     type Answer;
+    /// The answer where no triangle comes near.
+    const NOTHING: Self::Answer;
 
     /// Goes on from a node or a leaf.
     fn step<L: Lanes>(
@@ -338,16 +308,17 @@ pub(crate) enum Nearest {}
 impl Goal for Nearest {
     type Order = ByDistance;
     type Answer = Option<Winner>;
+    const NOTHING: Option<Winner> = None;
 
     #[inline(always)]
     fn step<L: Lanes>(single: &mut SingleRay<L>, reference: u32, ray: &Ray, stack: &mut Stack<i64>) -> Step {
         if reference >> tag::SHIFT == tag::INNER {
-            return single.meet_node::<ByDistance>(reference, stack).map_or(Step::Out, Step::On);
+            return single.way.meet_node::<ByDistance>(reference, stack).map_or(Step::Out, Step::On);
         }
         if !single.meet_leaf_closest(reference, ray) {
             return Step::Unsettled;
         }
-        single.pop::<ByDistance>(stack).map_or(Step::Out, Step::On)
+        single.way.pop::<ByDistance>(stack).map_or(Step::Out, Step::On)
     }
 
     #[inline(always)]
@@ -362,15 +333,16 @@ pub(crate) enum Whether {}
 impl Goal for Whether {
     type Order = AsBuilt;
     type Answer = bool;
+    const NOTHING: bool = false;
 
     #[inline(always)]
     fn step<L: Lanes>(single: &mut SingleRay<L>, reference: u32, ray: &Ray, stack: &mut Stack<u32>) -> Step {
         if reference >> tag::SHIFT == tag::INNER {
-            return single.meet_node::<AsBuilt>(reference, stack).map_or(Step::Out, Step::On);
+            return single.way.meet_node::<AsBuilt>(reference, stack).map_or(Step::Out, Step::On);
         }
         match single.meet_leaf_any(reference, ray) {
             Outcome::Settled(true) => Step::Met,
-            Outcome::Settled(false) => single.pop::<AsBuilt>(stack).map_or(Step::Out, Step::On),
+            Outcome::Settled(false) => single.way.pop::<AsBuilt>(stack).map_or(Step::Out, Step::On),
             Outcome::Unsettled => Step::Unsettled,
         }
     }
@@ -416,11 +388,15 @@ impl<G: Goal> Task for Alone<'_, '_, G> {
     #[inline(always)]
     fn run<L: Lanes>(self) -> Self::Output {
         let Self { accel, start, ray, .. } = self;
-        let Some(mut single) = SingleRay::<L>::start(accel, start, ray) else {
-            return Outcome::Unsettled;
-        };
+        let Some(slabs) = L::start_single(start, ray) else { return Outcome::Unsettled };
+        let way = Way::<L>::new(&accel.tree.nodes, slabs);
         let mut stack = Stack::new();
-        let mut next = start.root;
+        // Many rays come to no leaf, and need nothing else.
+        let Some(leaf) = way.descend::<G::Order>(start.root, &mut stack) else {
+            return Outcome::Settled(G::NOTHING);
+        };
+        let mut single = SingleRay::among_triangles(accel, start, ray, way);
+        let mut next = leaf;
         loop {
             match G::step(&mut single, next, ray, &mut stack) {
                 Step::On(reference) => next = reference,

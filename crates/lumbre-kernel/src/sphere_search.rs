@@ -1,16 +1,15 @@
 //! Leaves of spheres in a search, and the search through trees of nothing else.
 
-use std::marker::PhantomData;
-
 use lumbre_geometry::{Ray, Root, Roots};
 use lumbre_math::DVec3;
 
-use crate::lanes::{LANE_BITS, Lanes, Task};
-use crate::node::{BoxRay, Node, tag};
+use crate::lanes::{Lanes, Task};
+use crate::node::{BoxRay, tag};
 use crate::spheres::{ExactSphere, SphereRay};
-use crate::stack::{Order, Stack};
+use crate::stack::Stack;
 use crate::traverse::{self, Ask, Found, Place, Search, What};
 use crate::triangles::BLOCK;
+use crate::way::Way;
 use crate::{Accel, options};
 
 /// The ray for the spheres of one cloud, or of some with one origin.
@@ -121,50 +120,6 @@ pub(crate) struct AmongSpheres<'a, 's, S> {
     pub(crate) search: &'s mut S,
 }
 
-/// Its way through the nodes.
-struct Walk<'a, L> {
-    nodes: &'a [Node],
-    boxes: BoxRay,
-    /// No box ahead of this key is of interest.
-    limit_key: i32,
-    lanes: PhantomData<L>,
-}
-
-impl<L: Lanes> Walk<'_, L> {
-    #[inline(always)]
-    fn pop<O: Order>(&self, stack: &mut Stack<O::Entry>) -> Option<u32> {
-        loop {
-            let entry = stack.pop()?;
-            if !O::is_beyond(entry, self.limit_key) {
-                return Some(O::reference(entry));
-            }
-        }
-    }
-
-    /// Goes down from a node to a leaf; `None` when there is none left.
-    #[inline(always)]
-    fn descend<O: Order>(&self, mut reference: u32, stack: &mut Stack<O::Entry>) -> Option<u32> {
-        while reference >> tag::SHIFT == tag::INNER {
-            let node = &self.nodes[reference as usize];
-            let (mask, keys) = L::meet_boxes(node, &self.boxes.slabs);
-            reference = if mask & mask.wrapping_sub(1) != 0 {
-                O::push_children::<L>(node, mask, keys, stack.with_room())
-            } else if mask != 0 {
-                L::only_child(node, mask)
-            } else {
-                self.pop::<O>(stack)?
-            };
-        }
-        Some(reference)
-    }
-
-    #[inline(always)]
-    fn narrow(&mut self, limit: f64) {
-        self.boxes.slabs.s_max = self.boxes.progress.up(limit);
-        self.limit_key = self.boxes.slabs.s_max.to_bits() as i32 | LANE_BITS;
-    }
-}
-
 impl<'a, S: Search<'a>> Task for AmongSpheres<'a, '_, S> {
     /// Whether the search ended before it had seen everything.
     type Output = bool;
@@ -177,22 +132,21 @@ impl<'a, S: Search<'a>> Task for AmongSpheres<'a, '_, S> {
         if !traverse::start::<L, S>(accel, ray, search, &mut boxes) {
             return false;
         }
-        let limit_key = boxes.slabs.s_max.to_bits() as i32 | LANE_BITS;
-        let mut walk = Walk::<L> { nodes: &accel.tree.nodes, boxes, limit_key, lanes: PhantomData };
+        let mut way = Way::<L>::new(&accel.tree.nodes, boxes.slabs);
         let mut turned = None;
         let place = Place::default();
         let mut stack = Stack::new();
         let mut next = Some(root);
         while let Some(reference) = next {
-            let Some(leaf) = walk.descend::<S::Order>(reference, &mut stack) else { break };
+            let Some(leaf) = way.descend::<S::Order>(reference, &mut stack) else { break };
             let limit = search.limit();
             if meet_leaf::<L, S>(accel, ray, leaf, &mut turned, &place, search) {
                 return true;
             }
             if search.limit() < limit {
-                walk.narrow(search.limit());
+                way.end_at(boxes.progress.up(search.limit()));
             }
-            next = walk.pop::<S::Order>(&mut stack);
+            next = way.pop::<S::Order>(&mut stack);
         }
         false
     }

@@ -20,8 +20,8 @@ pub(crate) trait Order {
     fn entry(reference: u32) -> Self::Entry;
     /// What it refers to.
     fn reference(entry: Self::Entry) -> u32;
-    /// Whether it lies wholly beyond the limit.
-    fn is_beyond(entry: Self::Entry, limit_key: i32) -> bool;
+    /// Whether it lies wholly beyond the limit: the largest entry that does not.
+    fn is_beyond(entry: Self::Entry, limit: i64) -> bool;
     /// Puts the children in `mask`, two or more, onto the stack but for the first to be taken, which it answers.
     fn push_children<L: Lanes>(node: &Node, mask: u32, keys: L::Keys, slots: &mut Slots<Self::Entry>) -> u32;
 }
@@ -43,8 +43,8 @@ impl Order for ByDistance {
     }
 
     #[inline(always)]
-    fn is_beyond(entry: i64, limit_key: i32) -> bool {
-        (entry >> 32) as i32 > limit_key
+    fn is_beyond(entry: i64, limit: i64) -> bool {
+        entry > limit
     }
 
     #[inline(always)]
@@ -70,7 +70,7 @@ impl Order for AsBuilt {
     }
 
     #[inline(always)]
-    fn is_beyond(_: u32, _: i32) -> bool {
+    fn is_beyond(_: u32, _: i64) -> bool {
         false
     }
 

@@ -5,7 +5,6 @@
 //! not the part still of interest, so that a root has the same bits whenever it is found, and ties have an order.
 
 use std::borrow::Borrow;
-use std::marker::PhantomData;
 
 use lumbre_geometry::{Ray, Root, Roots};
 use lumbre_math::DVec3;
@@ -13,14 +12,15 @@ use smallvec::SmallVec;
 
 use crate::collapse::Entry;
 use crate::holds::SingleStart;
-use crate::lanes::{LANE_BITS, Lanes, Level, Task};
-use crate::node::{BoxRay, Node, tag};
+use crate::lanes::{Lanes, Level, Task};
+use crate::node::{BoxRay, Progress, tag};
 use crate::single::{self, Nearest, Outcome, Whether};
 use crate::sphere_search::{self, AmongSpheres, CloudRay};
 use crate::spheres::ExactSphere;
 use crate::stack::{Order, Stack};
 use crate::touch::{self, AllTouches, Touch};
 use crate::triangles::{self, BLOCK, BlockRay, Inside, Meeting, Passage, Shear, TriangleBlock};
+use crate::way::Way;
 use crate::{Accel, GeometryKind, InstancePath, options, precise};
 
 /// What a search asks of a primitive that may be crossed more than once.
@@ -166,18 +166,15 @@ pub(crate) fn all_touches<'a>(level: Level, accel: &'a Accel, ray: &Ray) -> Vec<
 pub(crate) struct Frame<'a, R, L> {
     accel: &'a Accel,
     // Those of the tree, which may lie in a file.
-    nodes: &'a [Node],
+    way: Way<'a, L>,
     blocks: &'a [TriangleBlock],
     pub(crate) ray: R,
-    boxes: BoxRay,
-    /// No box ahead of this key is of interest.
-    limit_key: i32,
+    progress: Progress,
     limit: f64,
     floor: f64,
     mesh: MeshRay,
     /// For spheres, once some were met.
     clouds: Option<CloudRay>,
-    lanes: PhantomData<L>,
 }
 
 /// The ray for the triangles of one mesh, or of some with one origin.
@@ -225,20 +222,17 @@ impl<'a, R: Borrow<Ray>, L: Lanes> Frame<'a, R, L> {
     pub(crate) fn new<S: Search<'a>>(accel: &'a Accel, ray: R, boxes: BoxRay, search: &S) -> Self {
         let (limit, floor) = (search.limit(), search.floor());
         let mesh = mesh_ray(accel, ray.borrow(), search);
-        let limit_key = boxes.slabs.s_max.to_bits() as i32 | LANE_BITS;
-        let (nodes, blocks) = (&*accel.tree.nodes, &*accel.tree.blocks);
+        let way = Way::new(&accel.tree.nodes, boxes.slabs);
         Self {
             accel,
-            nodes,
-            blocks,
+            way,
+            blocks: &accel.tree.blocks,
             ray,
-            boxes,
-            limit_key,
+            progress: boxes.progress,
             limit,
             floor,
             mesh,
             clouds: None,
-            lanes: PhantomData,
         }
     }
 
@@ -248,8 +242,7 @@ impl<'a, R: Borrow<Ray>, L: Lanes> Frame<'a, R, L> {
         let limit = search.limit();
         if limit < self.limit {
             self.limit = limit;
-            self.boxes.slabs.s_max = self.boxes.progress.up(limit);
-            self.limit_key = self.boxes.slabs.s_max.to_bits() as i32 | LANE_BITS;
+            self.way.end_at(self.progress.up(limit));
             if let Some(blocks) = &mut self.mesh.blocks {
                 blocks.end_at(&self.mesh.shear, limit);
             }
@@ -267,40 +260,6 @@ impl<'a, R: Borrow<Ray>, L: Lanes> Frame<'a, R, L> {
             let largest = self.accel.holds.largest_corner;
             let range = [self.floor, self.limit];
             self.mesh = MeshRay::new(self.mesh.shear, self.ray.borrow(), &mesh_origin, largest, range);
-        }
-    }
-
-    /// Goes down from a node to a leaf; `None` when there is none left.
-    #[inline(always)]
-    fn descend<O: Order>(&self, mut reference: u32, stack: &mut Stack<O::Entry>) -> Option<u32> {
-        while reference >> tag::SHIFT == tag::INNER {
-            reference = self.meet_node::<O>(reference, stack)?;
-        }
-        Some(reference)
-    }
-
-    /// Goes on from a node.
-    #[inline(always)]
-    fn meet_node<O: Order>(&self, reference: u32, stack: &mut Stack<O::Entry>) -> Option<u32> {
-        let node = &self.nodes[reference as usize];
-        let (mask, keys) = L::meet_boxes(node, &self.boxes.slabs);
-        if mask & mask.wrapping_sub(1) != 0 {
-            Some(O::push_children::<L>(node, mask, keys, stack.with_room()))
-        } else if mask != 0 {
-            Some(L::only_child(node, mask))
-        } else {
-            self.pop::<O>(stack)
-        }
-    }
-
-    /// The next that is not beyond the limit.
-    #[inline(always)]
-    fn pop<O: Order>(&self, stack: &mut Stack<O::Entry>) -> Option<u32> {
-        loop {
-            let entry = stack.pop()?;
-            if !O::is_beyond(entry, self.limit_key) {
-                return Some(O::reference(entry));
-            }
         }
     }
 }
@@ -343,11 +302,11 @@ fn meet_triangles<'a, R: Borrow<Ray>, L: Lanes, S: Search<'a>>(
 ) -> bool {
     let mut next = Some(root);
     while let Some(reference) = next {
-        let Some(leaf) = frame.descend::<S::Order>(reference, stack) else { break };
+        let Some(leaf) = frame.way.descend::<S::Order>(reference, stack) else { break };
         if meet_blocks(frame, leaf, place, search, touches) {
             return true;
         }
-        next = frame.pop::<S::Order>(stack);
+        next = frame.way.pop::<S::Order>(stack);
     }
     false
 }
@@ -381,8 +340,8 @@ impl<'a, S: Search<'a>> Task for AmongAll<'a, '_, S> {
         if enter(&mut frame, meets_tree, &place, &mut stack, search) {
             return true;
         }
-        while let Some(reference) = frame.pop::<S::Order>(&mut stack) {
-            let Some(leaf) = frame.descend::<S::Order>(reference, &mut stack) else { break };
+        while let Some(reference) = frame.way.pop::<S::Order>(&mut stack) {
+            let Some(leaf) = frame.way.descend::<S::Order>(reference, &mut stack) else { break };
             let first = (leaf & tag::PLACE) as usize;
             match leaf >> tag::SHIFT {
                 tag::TRIANGLES => {

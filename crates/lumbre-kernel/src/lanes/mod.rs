@@ -37,8 +37,11 @@ pub(crate) trait Lanes: SphereLanes {
     /// also checks that it is sound.
     fn start_nearby(units: &Units, ray: &Ray, t_min: f64, t_max: f64, boxes: &mut BoxRay) -> bool;
 
-    /// The ray in single precision; `None` where it does not come from nearby, or is not sound.
-    fn start_single(start: &SingleStart, ray: &Ray) -> Option<Narrow>;
+    /// The ray for boxes in single precision; `None` where it does not come from nearby, or is not sound.
+    fn start_single(start: &SingleStart, ray: &Ray) -> Option<Slabs>;
+
+    /// The same ray for triangles, and from heights along it to places in the range of boxes.
+    fn start_blocks(start: &SingleStart, ray: &Ray, slabs: &Slabs) -> (BlockRay, f32);
 
     /// One bit for each child whose box the ray meets, and where it enters.
     fn meet_boxes(node: &Node, ray: &Slabs) -> (u32, Self::Keys);
@@ -66,15 +69,6 @@ pub(crate) trait Lanes: SphereLanes {
 
     /// How a ray passes the triangle in a lane, in double precision, and what its crossing inside is made of. `origin` has the order of the shear's axes.
     fn pass(block: &TriangleBlock, lane: usize, shear: &Shear, origin: &[f64; 3]) -> (Passage, Inside);
-}
-
-/// A ray in single precision.
-#[derive(Clone, Copy)]
-pub(crate) struct Narrow {
-    pub(crate) slabs: Slabs,
-    pub(crate) blocks: BlockRay,
-    /// From heights to places in the range of boxes.
-    pub(crate) place_per_height: f32,
 }
 
 /// Where a ray may meet the triangles of a block.
@@ -375,15 +369,21 @@ pub(crate) fn fetch<T>(value: &T) {
     let _ = value;
 }
 
-/// What [`Lanes::start_single`] gives at a level, for tests.
+/// What [`Lanes::start_single`] and [`Lanes::start_blocks`] give at a level, for tests.
 #[cfg(test)]
-pub(crate) fn start_single_at(level: Level, start: &SingleStart, ray: &Ray) -> Option<Narrow> {
+pub(crate) fn start_single_at(
+    level: Level,
+    start: &SingleStart,
+    ray: &Ray,
+) -> Option<(Slabs, BlockRay, f32)> {
     struct Starting<'a>(&'a SingleStart, &'a Ray);
     impl Task for Starting<'_> {
-        type Output = Option<Narrow>;
+        type Output = Option<(Slabs, BlockRay, f32)>;
         #[inline(always)]
         fn run<L: Lanes>(self) -> Self::Output {
-            L::start_single(self.0, self.1)
+            let slabs = L::start_single(self.0, self.1)?;
+            let (blocks, place_per_height) = L::start_blocks(self.0, self.1, &slabs);
+            Some((slabs, blocks, place_per_height))
         }
     }
     level.run(Starting(start, ray))

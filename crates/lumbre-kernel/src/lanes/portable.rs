@@ -4,7 +4,7 @@ use std::mem::MaybeUninit;
 
 use lumbre_geometry::Ray;
 
-use super::{Axes, Crossings, LANE_BITS, Lanes, Narrow, Sides, Slots};
+use super::{Axes, Crossings, LANE_BITS, Lanes, Sides, Slots};
 use crate::holds::SingleStart;
 use crate::node::{
     BoxRay, END_FACTOR, LARGEST_NEAR, LITTLE, Node, SMALLEST_NEAR, START_FACTOR, Slabs, TINY_NEAR, Units,
@@ -36,6 +36,13 @@ fn greater(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
+/// In tree units.
+#[inline(always)]
+fn single_direction(start: &SingleStart, ray: &Ray) -> [f32; 4] {
+    let [x, y, z] = (ray.direction * start.scale).to_array().map(|d| d as f32);
+    [x, y, z, 0.0]
+}
+
 impl Lanes for Portable {
     type Keys = [i32; WIDTH];
     type Floats = [f32; BLOCK];
@@ -47,23 +54,18 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
-    fn start_single(start: &SingleStart, ray: &Ray) -> Option<Narrow> {
-        let (origin, toward) = (ray.origin.to_array(), ray.direction.to_array());
+    fn start_single(start: &SingleStart, ray: &Ray) -> Option<Slabs> {
         let (t_min, t_max) = (ray.t_min as f32, ray.t_max as f32);
         // Every comparison with a NaN is false.
         let (mut fits, mut is_long) = (0.0 <= t_min && t_min <= t_max, false);
         let mut signs = 0;
         let mut slabs = BoxRay::passing_all().slabs;
-        let (mut direction, mut on_mesh, mut rest) = ([0.0; 4], [0.0; 4], [0.0; 4]);
+        let direction = single_direction(start, ray);
         for axis in 0..3 {
-            let from = ((origin[axis] - start.tree_origin[axis]) * start.scale) as f32;
-            let d = (toward[axis] * start.scale) as f32;
+            let from = ((ray.origin[axis] - start.tree_origin[axis]) * start.scale) as f32;
+            let d = direction[axis];
             fits &= from.abs() <= start.farthest[axis] && d.abs() <= LARGEST_NEAR as f32;
             is_long |= d.abs() >= SMALLEST_NEAR as f32;
-            direction[axis] = d;
-            let exact = origin[axis] - start.mesh_origin[axis];
-            on_mesh[axis] = exact as f32;
-            rest[axis] = (exact - f64::from(on_mesh[axis])) as f32;
             let inverse = 1.0 / greater(d.abs(), TINY_NEAR as f32);
             let margin = inverse * (from.abs() * start.margin_per_distance + start.margin);
             let inverse = inverse.copysign(d);
@@ -77,30 +79,38 @@ impl Lanes for Portable {
         }
         slabs.sides = Sides::new(signs);
         (slabs.s_min, slabs.s_max) = (t_min * START_FACTOR, t_max * END_FACTOR + LITTLE as f32);
+        Some(slabs)
+    }
 
+    #[inline(always)]
+    fn start_blocks(start: &SingleStart, ray: &Ray, slabs: &Slabs) -> (BlockRay, f32) {
+        let (mut origin, mut rest) = ([0.0; 4], [0.0; 4]);
+        for axis in 0..3 {
+            let exact = ray.origin[axis] - start.mesh_origin[axis];
+            origin[axis] = exact as f32;
+            rest[axis] = (exact - f64::from(origin[axis])) as f32;
+        }
+        let direction = single_direction(start, ray);
+        let signs =
+            (0..3).fold(0, |signs, axis| signs | u32::from(direction[axis].is_sign_negative()) << axis);
         let [x, y, z, _] = direction.map(f32::abs);
         let axes = Axes::by_bits(signs, u32::from(x >= y) | u32::from(y >= z) << 1 | u32::from(x >= z) << 2);
         let inverse = axes.permute_single(&slabs.inverse)[2];
         let shear = axes.permute_single(&direction).map(|d| d * inverse);
         let reach =
-            greater(greater(on_mesh[0].abs(), on_mesh[1].abs()), on_mesh[2].abs()) + start.largest_corner;
+            greater(greater(origin[0].abs(), origin[1].abs()), origin[2].abs()) + start.largest_corner;
         let rest = axes.permute_single(&rest);
         let length = axes.permute_single(&direction)[2].abs() * start.space_per_unit;
-        let range = HeightRange::new(t_min * length, t_max * length);
-        let turn = 0.0f32.copysign(-inverse);
-        Some(Narrow {
-            slabs,
-            blocks: BlockRay {
-                axes,
-                origin: axes.permute_single(&on_mesh),
-                rest: [rest[0] - shear[0] * rest[2], rest[1] - shear[1] * rest[2], rest[2], 0.0],
-                shear,
-                least_size: reach * LEAST_SIZE,
-                range,
-                turn,
-            },
-            place_per_height: inverse.abs() * start.units_per_space,
-        })
+        let blocks = BlockRay {
+            axes,
+            origin: axes.permute_single(&origin),
+            rest: [rest[0] - shear[0] * rest[2], rest[1] - shear[1] * rest[2], rest[2], 0.0],
+            shear,
+            least_size: reach * LEAST_SIZE,
+            range: HeightRange::new(ray.t_min as f32 * length, ray.t_max as f32 * length),
+            turn: 0.0f32.copysign(-inverse),
+        };
+        (blocks, inverse.abs() * start.units_per_space)
     }
 
     #[inline(always)]

@@ -5,7 +5,7 @@ use std::mem::{MaybeUninit, offset_of};
 
 use lumbre_geometry::Ray;
 
-use super::{Axes, Crossings, LANE_BITS, Lanes, Narrow, Sides, Slots, Task};
+use super::{Axes, Crossings, LANE_BITS, Lanes, Sides, Slots, Task};
 use crate::holds::SingleStart;
 use crate::node::{
     BoxRay, END_FACTOR, LARGEST_NEAR, LITTLE, Node, SMALLEST_NEAR, START_FACTOR, Slabs, TINY_NEAR, Units,
@@ -134,6 +134,30 @@ impl<const AVX512: bool> X86<AVX512> {
         unsafe { _mm256_cvtps_pd(_mm_setr_ps(*first, *first.add(24), *first.add(48), 0.0)) }
     }
 
+    /// The numbers of a ray, eight at least: see above.
+    #[inline(always)]
+    fn numbers(ray: &Ray) -> *const f64 {
+        let ray: *const Ray = ray;
+        ray.cast()
+    }
+
+    /// The direction in tree units; the last of four means nothing.
+    #[inline(always)]
+    fn single_direction(start: &SingleStart, ray: &Ray) -> __m128 {
+        // SAFETY: see `X86`. The load is of four of the numbers of a ray.
+        unsafe {
+            let direction = _mm256_loadu_pd(Self::numbers(ray).add(3));
+            _mm256_cvtpd_ps(_mm256_mul_pd(direction, _mm256_set1_pd(start.scale)))
+        }
+    }
+
+    /// The ends of the range in the first two lanes.
+    #[inline(always)]
+    fn single_range(ray: &Ray) -> __m128 {
+        // SAFETY: see `X86`. The load is of two of the numbers of a ray.
+        unsafe { _mm_cvtpd_ps(_mm_loadu_pd(Self::numbers(ray).add(6))) }
+    }
+
     #[inline(always)]
     fn array(v: __m128) -> [f32; 4] {
         let mut array = [0.0; 4];
@@ -217,22 +241,15 @@ impl<const AVX512: bool> Lanes for X86<AVX512> {
     }
 
     #[inline(always)]
-    fn start_single(start: &SingleStart, ray: &Ray) -> Option<Narrow> {
-        let numbers: *const Ray = ray;
-        let numbers: *const f64 = numbers.cast();
+    fn start_single(start: &SingleStart, ray: &Ray) -> Option<Slabs> {
         // As the portable one, three axes at a time.
-        // SAFETY: see `X86`. The loads are of the first eight numbers of a ray, see below, and of arrays of four.
+        // SAFETY: see `X86`. The loads are of the first eight numbers of a ray, see above, and of arrays of four.
         unsafe {
-            let origin = _mm256_loadu_pd(numbers);
-            let scale = _mm256_set1_pd(start.scale);
+            let origin = _mm256_loadu_pd(Self::numbers(ray));
             let from = _mm256_sub_pd(origin, _mm256_loadu_pd(start.tree_origin.as_ptr()));
-            let from = _mm256_cvtpd_ps(_mm256_mul_pd(from, scale));
-            let direction = _mm256_cvtpd_ps(_mm256_mul_pd(_mm256_loadu_pd(numbers.add(3)), scale));
-            let range = _mm_cvtpd_ps(_mm_loadu_pd(numbers.add(6)));
-            let range = _mm_movelh_ps(range, range);
-            let exact = _mm256_sub_pd(origin, _mm256_loadu_pd(start.mesh_origin.as_ptr()));
-            let on_mesh = _mm256_cvtpd_ps(exact);
-            let rest = _mm256_cvtpd_ps(_mm256_sub_pd(exact, _mm256_cvtps_pd(on_mesh)));
+            let from = _mm256_cvtpd_ps(_mm256_mul_pd(from, _mm256_set1_pd(start.scale)));
+            let direction = Self::single_direction(start, ray);
+            let range = Self::single_range(ray);
 
             let sign = _mm_set1_ps(-0.0);
             let (distance, length) = (_mm_andnot_ps(sign, from), _mm_andnot_ps(sign, direction));
@@ -255,56 +272,71 @@ impl<const AVX512: bool> Lanes for X86<AVX512> {
             let inverse = _mm_or_ps(size, _mm_and_ps(direction, sign));
             let per_distance = _mm_set1_ps(start.margin_per_distance);
             let margin = _mm_mul_ps(size, _mm_fmadd_ps(distance, per_distance, _mm_set1_ps(start.margin)));
-            let signs = _mm_movemask_ps(direction) as u32;
             let ends = _mm_fmadd_ps(
                 range,
                 _mm_setr_ps(START_FACTOR, END_FACTOR, 0.0, 0.0),
                 _mm_setr_ps(0.0, LITTLE as f32, 0.0, 0.0),
             );
-            let slabs = Slabs {
+            Some(Slabs {
                 inverse: Self::array(inverse),
                 near_offset: Self::array(_mm_fnmsub_ps(from, inverse, margin)),
                 far_offset: Self::array(_mm_fnmadd_ps(from, inverse, margin)),
-                sides: Sides::new(signs),
+                sides: Sides::new(_mm_movemask_ps(direction) as u32),
                 s_min: _mm_cvtss_f32(ends),
                 s_max: _mm_cvtss_f32(_mm_movehdup_ps(ends)),
-            };
+            })
+        }
+    }
 
+    #[inline(always)]
+    fn start_blocks(start: &SingleStart, ray: &Ray, slabs: &Slabs) -> (BlockRay, f32) {
+        // As the portable one, three axes at a time.
+        // SAFETY: see `X86`. The loads are of the first eight numbers of a ray, see above, and of arrays of four.
+        unsafe {
+            let origin = _mm256_loadu_pd(Self::numbers(ray));
+            let exact = _mm256_sub_pd(origin, _mm256_loadu_pd(start.mesh_origin.as_ptr()));
+            let origin = _mm256_cvtpd_ps(exact);
+            let rest = _mm256_cvtpd_ps(_mm256_sub_pd(exact, _mm256_cvtps_pd(origin)));
+            let direction = Self::single_direction(start, ray);
+            let range = Self::single_range(ray);
+            let range = _mm_movelh_ps(range, range);
+
+            let sign = _mm_set1_ps(-0.0);
+            let length = _mm_andnot_ps(sign, direction);
             // x, y, x and y, z, z.
             let sizes = _mm_cmpge_ps(
                 _mm_shuffle_ps::<0b00_00_01_00>(length, length),
                 _mm_shuffle_ps::<0b10_10_10_01>(length, length),
             );
-            let axes = Axes::by_bits(signs, _mm_movemask_ps(sizes) as u32);
+            let axes = Axes::by_bits(_mm_movemask_ps(direction) as u32, _mm_movemask_ps(sizes) as u32);
             let order = _mm_loadu_si128(axes.order.as_ptr().cast());
             let last = _mm_shuffle_epi32::<0b10_10_10_10>(order);
-            let inverse = _mm_permutevar_ps(inverse, last);
+            let inverse = _mm_permutevar_ps(_mm_loadu_ps(slabs.inverse.as_ptr()), last);
             let first_three = _mm_castsi128_ps(_mm_setr_epi32(i32::MAX, i32::MAX, i32::MAX, 0));
-            let reach = _mm_and_ps(on_mesh, first_three);
+            let reach = _mm_and_ps(origin, first_three);
             let reach = _mm_max_ps(reach, _mm_shuffle_ps::<0b01_00_11_10>(reach, reach));
             let reach = _mm_max_ps(reach, _mm_shuffle_ps::<0b10_11_00_01>(reach, reach));
-            let reach = _mm_add_ps(reach, _mm_set1_ps(start.largest_corner));
+            let reach = _mm_cvtss_f32(reach) + start.largest_corner;
             let length = _mm_mul_ps(_mm_permutevar_ps(length, last), _mm_set1_ps(start.space_per_unit));
             // Start, end, start, end; none of them negative.
             let heights = _mm_min_ps(_mm_mul_ps(range, length), _mm_set1_ps(FAR));
             let apart = _mm_mul_ps(heights, _mm_set1_ps(ROUNDINGS));
             let apart = _mm_xor_ps(apart, _mm_setr_ps(-0.0, 0.0, 0.0, -0.0));
-            let place_per_height = _mm_andnot_ps(sign, inverse);
             let shear = _mm_permutevar_ps(_mm_mul_ps(direction, inverse), order);
             let rest = _mm_permutevar_ps(rest, order);
             // Only of the first two: the shear of the last would be one.
             let sheared = _mm_fnmadd_ps(shear, _mm_shuffle_ps::<0b10_10_10_10>(rest, rest), rest);
             let blocks = BlockRay {
                 axes,
-                origin: Self::array(_mm_permutevar_ps(on_mesh, order)),
+                origin: Self::array(_mm_permutevar_ps(origin, order)),
                 rest: Self::array(_mm_blend_ps::<0b1100>(sheared, rest)),
                 shear: Self::array(shear),
-                least_size: _mm_cvtss_f32(reach) * LEAST_SIZE,
+                least_size: reach * LEAST_SIZE,
                 range: std::mem::transmute::<[f32; 4], HeightRange>(Self::array(_mm_add_ps(heights, apart))),
                 turn: _mm_cvtss_f32(_mm_andnot_ps(inverse, sign)),
             };
-            let place_per_height = _mm_cvtss_f32(place_per_height) * start.units_per_space;
-            Some(Narrow { slabs, blocks, place_per_height })
+            let place_per_height = _mm_cvtss_f32(_mm_andnot_ps(sign, inverse)) * start.units_per_space;
+            (blocks, place_per_height)
         }
     }
 

@@ -111,8 +111,10 @@ fn reached_boxes_are_met(level: Level, seed: u64, rounds: usize) {
             let range = [(t, t), (0.0, t), (t, f64::INFINITY), (0.0, f64::INFINITY)][random.below(4)];
             let ray = Ray::new(target - t * direction, direction).with_range(range.0, range.1);
             let start = start_of(&units, random.vector() * size);
-            let Some(narrow) = start.and_then(|start| start_single_at(level, &start, &ray)) else { continue };
-            let (mask, _) = meet_boxes_at(level, &node, &narrow.slabs);
+            let Some((slabs, ..)) = start.and_then(|start| start_single_at(level, &start, &ray)) else {
+                continue;
+            };
+            let (mask, _) = meet_boxes_at(level, &node, &slabs);
             assert!(
                 mask & (1 << lane) != 0,
                 "{ray:?} at {t} misses {bounds:?} of {units:?} in single precision"

@@ -1,0 +1,82 @@
+//! The way of a ray through the nodes of a tree.
+
+use std::marker::PhantomData;
+
+use crate::lanes::{self, LANE_BITS, Lanes};
+use crate::node::{Node, Slabs, tag};
+use crate::stack::{Order, Stack, stack_entry};
+
+/// A ray among the boxes of a tree.
+pub(crate) struct Way<'a, L> {
+    nodes: &'a [Node],
+    slabs: Slabs,
+    /// No entry of a stack that is larger is of interest.
+    limit: i64,
+    lanes: PhantomData<L>,
+}
+
+impl<'a, L: Lanes> Way<'a, L> {
+    #[inline(always)]
+    pub(crate) fn new(nodes: &'a [Node], slabs: Slabs) -> Self {
+        Self { nodes, limit: limit_of(slabs.s_max), slabs, lanes: PhantomData }
+    }
+
+    /// Leaves out the boxes that the ray enters after this.
+    #[inline(always)]
+    pub(crate) fn end_at(&mut self, s_max: f32) {
+        self.slabs.s_max = s_max;
+        self.limit = limit_of(s_max);
+    }
+
+    #[inline(always)]
+    pub(crate) fn slabs(&self) -> &Slabs {
+        &self.slabs
+    }
+
+    /// Goes on from a node: to a child, to what stands on the stack, or nowhere.
+    #[inline(always)]
+    pub(crate) fn meet_node<O: Order>(&self, reference: u32, stack: &mut Stack<O::Entry>) -> Option<u32> {
+        // Before there is anything to be kept in registers meanwhile.
+        let slots = stack.with_room();
+        let node = &self.nodes[reference as usize];
+        let (mask, keys) = L::meet_boxes(node, lanes::opaque(&self.slabs));
+        if mask & mask.wrapping_sub(1) != 0 {
+            Some(O::push_children::<L>(node, mask, keys, slots))
+        } else if mask != 0 {
+            Some(L::only_child(node, mask))
+        } else {
+            self.pop::<O>(stack)
+        }
+    }
+
+    /// The next on the stack that is not beyond the limit.
+    #[inline(always)]
+    pub(crate) fn pop<O: Order>(&self, stack: &mut Stack<O::Entry>) -> Option<u32> {
+        loop {
+            let entry = stack.pop()?;
+            if !O::is_beyond(entry, self.limit) {
+                return Some(O::reference(entry));
+            }
+        }
+    }
+
+    /// Goes down from a node to a leaf; `None` when there is none left.
+    #[inline(always)]
+    pub(crate) fn descend<O: Order>(&self, mut reference: u32, stack: &mut Stack<O::Entry>) -> Option<u32> {
+        while reference >> tag::SHIFT == tag::INNER {
+            reference = self.meet_node::<O>(reference, stack)?;
+        }
+        Some(reference)
+    }
+
+    /// Asks for a node before it is needed.
+    #[inline(always)]
+    pub(crate) fn fetch(&self, reference: u32) {
+        self.nodes.get(reference as usize).map(lanes::fetch);
+    }
+}
+
+#[inline(always)]
+fn limit_of(s_max: f32) -> i64 {
+    stack_entry(s_max.to_bits() as i32 | LANE_BITS, u32::MAX)
+}
