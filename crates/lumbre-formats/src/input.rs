@@ -191,32 +191,32 @@ fn read_within(
     within: impl Fn(u64) -> Result<(), crate::budget::LimitError>,
 ) -> Result<(), ReadError> {
     const LEAST: usize = 64 << 10;
-    let mut filled = 0;
+    const STEP: usize = 4 << 20;
+    let mut room = 0;
     loop {
-        if filled == bytes.len() {
+        if bytes.len() == room {
             // One more than expected, so that the end shows without growing again. Files of a system folder say 0.
             let first = usize::try_from(expected).unwrap_or(usize::MAX).saturating_add(1).max(LEAST);
-            let more = if filled == 0 { first } else { (filled / 2).max(LEAST) };
+            let more = if room == 0 { first } else { (room / 2).max(LEAST) };
             hold.grow(more as u64, name)?;
             let refused = |_| crate::budget::LimitError {
                 what: name.to_owned(),
                 kind: crate::budget::LimitKind::Memory,
-                needed: (filled + more) as u64,
-                limit: filled as u64,
+                needed: (room + more) as u64,
+                limit: room as u64,
             };
             bytes.try_reserve_exact(more).map_err(refused)?;
-            bytes.resize(filled + more, 0);
+            room += more;
         }
-        match reader.read(&mut bytes[filled..]) {
-            Ok(0) => break,
-            Ok(read) => filled += read,
-            Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
-            Err(e) => return Err(ReadError::Io(e)),
+        // Into room that was not cleared, which is what takes longest of a file that the system has at hand.
+        let step = (room - bytes.len()).min(STEP);
+        let read = (&mut reader).take(step as u64).read_to_end(bytes).map_err(ReadError::Io)?;
+        if read < step {
+            break;
         }
-        within(filled as u64)?;
+        within(bytes.len() as u64)?;
     }
-    bytes.truncate(filled);
-    Ok(())
+    within(bytes.len() as u64).map_err(ReadError::Limit)
 }
 
 #[cfg(test)]

@@ -4,6 +4,9 @@
 //! done does not depend on how it is shared: boxes grow in any order, costs are whole numbers, and primitives are parted in
 //! pieces of one length. The depth is bounded: past [`SAH_DEPTH`] levels every split is in the middle.
 
+use std::borrow::Cow;
+
+use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
 use crate::accel::Preset;
@@ -26,24 +29,24 @@ const PARALLEL: usize = 4096;
 const CHUNK: usize = 1 << 14;
 
 /// The binary tree, or a part of it.
-pub(crate) enum Binary {
+pub(crate) enum Binary<'p> {
     /// Over many primitives.
-    Fork(Box<Fork>),
+    Fork(Box<Fork<'p>>),
     /// Over fewer, with their nodes in a row.
-    Twig(Twig),
+    Twig(Twig<'p>),
 }
 
 /// A node with two children of their own.
-pub(crate) struct Fork {
+pub(crate) struct Fork<'p> {
     pub(crate) bounds: Bounds,
     pub(crate) costs: Costs,
     pub(crate) choices: Choices,
-    pub(crate) children: [Binary; 2],
+    pub(crate) children: [Binary<'p>; 2],
     /// Whether the right child is of a higher rank than the left.
     pub(crate) is_ranked: bool,
 }
 
-impl Binary {
+impl Binary<'_> {
     /// The node over two.
     pub(crate) fn over(children: [Self; 2]) -> Self {
         Self::Fork(Box::new(Fork::over(children)))
@@ -52,19 +55,21 @@ impl Binary {
     /// A twig of such nodes.
     pub(crate) fn twig(mut nodes: Vec<BinaryNode>) -> Self {
         let costs = choose(&mut nodes);
-        Self::Twig(Twig { nodes, costs })
+        Self::Twig(Twig { nodes: Cow::Owned(nodes), costs })
     }
 }
 
 /// Nodes in depth-first order, the root first, each left child right after its parent.
-pub(crate) struct Twig {
-    pub(crate) nodes: Vec<BinaryNode>,
+pub(crate) struct Twig<'p> {
+    /// As a rule where the primitives stood that they are over.
+    pub(crate) nodes: Cow<'p, [BinaryNode]>,
     /// The costs of the root, for those above it.
     pub(crate) costs: Costs,
 }
 
 /// A node of a twig: its box, named by two words.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(transparent)]
 pub(crate) struct BinaryNode(Bounds);
 
 const LEAF: u32 = 1 << 31;
@@ -119,20 +124,20 @@ pub(crate) type Name = [u32; 2];
 /// The binary tree over primitives (not none), and their names in the order of its leaves.
 ///
 /// First they are parted where they stand until one thread takes what is left together; then twigs grow, which need but a
-/// little room each.
-pub(crate) fn binary_tree(
+/// little room each, and take the place of their primitives.
+pub(crate) fn binary_tree<'p>(
     level: Level,
     preset: Preset,
-    mut primitives: Vec<Primitive>,
+    primitives: &'p mut Vec<Primitive>,
     traits: &[Traits],
-) -> (Binary, Vec<Name>) {
+) -> (Binary<'p>, Vec<Name>) {
     let count = primitives.len();
     // Below, there is a node for every thread.
     let shared = (2 * rayon::current_num_threads()).ilog2();
     let shared = if shared > 1 { shared + 1 } else { 0 };
     let builder = Builder { level, traits, shared };
-    let counts = sort_by_rank(&mut primitives, traits);
-    let codes = if preset == Preset::Fast { builder.sort(&mut primitives, &counts) } else { Vec::new() };
+    let counts = sort_by_rank(primitives, traits);
+    let codes = if preset == Preset::Fast { builder.sort(primitives, &counts) } else { Vec::new() };
     let codes_of = |rank: usize| {
         let start = counts[..rank].iter().sum();
         codes.get(start..start + counts[rank]).unwrap_or_default()
@@ -162,7 +167,6 @@ pub(crate) fn binary_tree(
         });
         first += counts[rank];
     }
-    drop(primitives);
     let better = |tree| if preset == Preset::Best { reinsert(tree) } else { tree };
     let join = |low, high| Binary::Fork(Box::new(Fork { is_ranked: true, ..Fork::over([low, high]) }));
     let tree = trees.into_iter().map(better).reduce(join).expect("there are primitives");
@@ -223,7 +227,7 @@ impl Sketch {
     }
 
     /// The tree of its twigs, which come in their order.
-    fn over(&self, twigs: &mut impl Iterator<Item = Binary>) -> Binary {
+    fn over<'p>(&self, twigs: &mut impl Iterator<Item = Binary<'p>>) -> Binary<'p> {
         match self {
             Self::Fork(sides) => {
                 let [left, right] = &**sides;
@@ -380,45 +384,47 @@ impl Builder<'_> {
 
     /// The tree that was sketched. `codes` are those of the primitives, if they were sorted, and `first` is the place of the
     /// first name.
-    fn grow<const COSTS: bool>(
+    fn grow<'p, const COSTS: bool>(
         &self,
         sketch: &Sketch,
         mut codes: &[Code],
-        mut primitives: &mut [Primitive],
+        mut primitives: &'p mut [Primitive],
         mut names: &mut [Name],
         mut first: usize,
-    ) -> Binary {
+    ) -> Binary<'p> {
         let mut seeds = Vec::new();
         sketch.seeds(&mut seeds);
-        let plots: Vec<_> = seeds
-            .into_iter()
-            .map(|seed| {
-                let codes = codes.split_off(..seed.count).unwrap_or_default();
-                let here = take(&mut primitives, seed.count);
-                let plot = Range {
-                    here,
-                    there: &mut [],
-                    names: take(&mut names, seed.count),
-                    first,
-                    depth: seed.depth,
+        let mut plots = Vec::with_capacity(seeds.len());
+        for seed in seeds {
+            let codes = codes.split_off(..seed.count).unwrap_or_default();
+            let own = take(&mut primitives, seed.count);
+            plots.push((seed, codes, own, take(&mut names, seed.count), first));
+            first += seed.count;
+        }
+        let twigs: Vec<Binary> = plots
+            .into_par_iter()
+            .map_init(Workplace::new, |work, (seed, codes, own, names, first)| {
+                let Workplace { nodes, bins, there } = work;
+                nodes.clear();
+                let there = &mut there[..seed.count];
+                let range = Range { here: &mut *own, there, names, first, depth: seed.depth };
+                if seed.is_sorted {
+                    self.twig_sorted::<COSTS>(range, codes, &mut Tools { nodes, bins });
+                } else {
+                    self.twig::<COSTS>(range, seed.split, &mut Tools { nodes, bins });
+                }
+                let costs = choose(nodes);
+                // There are more nodes than primitives only where hardly any share a leaf.
+                let nodes = if nodes.len() <= own.len() {
+                    let (place, _) = own.split_at_mut(nodes.len());
+                    place.copy_from_slice(bytemuck::cast_slice(nodes));
+                    Cow::Borrowed(bytemuck::cast_slice(place))
+                } else {
+                    Cow::Owned(nodes.to_vec())
                 };
-                first += seed.count;
-                (seed, codes, plot)
+                Binary::Twig(Twig { nodes, costs })
             })
             .collect();
-        let twig = |work: &mut Workplace, (seed, codes, plot): (&Seed, &[Code], Range)| {
-            let Workplace { nodes, bins, there } = work;
-            let range = Range { there: &mut there[..seed.count], ..plot };
-            nodes.clear();
-            if seed.is_sorted {
-                self.twig_sorted::<COSTS>(range, codes, &mut Tools { nodes, bins });
-            } else {
-                self.twig::<COSTS>(range, seed.split, &mut Tools { nodes, bins });
-            }
-            // As long as it is, and no longer.
-            Binary::twig(nodes.to_vec())
-        };
-        let twigs: Vec<Binary> = plots.into_par_iter().map_init(Workplace::new, twig).collect();
         sketch.over(&mut twigs.into_iter())
     }
 

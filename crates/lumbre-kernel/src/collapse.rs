@@ -130,7 +130,7 @@ pub(crate) fn choose(nodes: &mut [BinaryNode]) -> Costs {
     costs[0]
 }
 
-impl Binary {
+impl Binary<'_> {
     fn bounds(&self) -> &Bounds {
         match self {
             Self::Fork(fork) => &fork.bounds,
@@ -146,9 +146,9 @@ impl Binary {
     }
 }
 
-impl Fork {
+impl<'p> Fork<'p> {
     /// The one over two.
-    pub(crate) fn over(children: [Binary; 2]) -> Self {
+    pub(crate) fn over(children: [Binary<'p>; 2]) -> Self {
         let mut bounds = *children[0].bounds();
         bounds.grow(children[1].bounds());
         let (costs, choices) = share(bounds.half_area(), children[0].costs(), children[1].costs());
@@ -159,13 +159,13 @@ impl Fork {
 /// A node of the binary tree, wherever it is.
 #[derive(Clone, Copy)]
 enum Cursor<'a> {
-    Fork(&'a Fork),
+    Fork(&'a Fork<'a>),
     /// From it on.
     Twig(&'a [BinaryNode]),
 }
 
 impl<'a> Cursor<'a> {
-    fn new(tree: &'a Binary) -> Self {
+    fn new(tree: &'a Binary<'a>) -> Self {
         match tree {
             Binary::Fork(fork) => Self::Fork(fork),
             Binary::Twig(twig) => Self::Twig(&twig.nodes),
@@ -284,21 +284,23 @@ struct Plan<'a> {
     total: Counts,
 }
 
-/// Packs a binary tree. The depth of its recursions is that of the tree, which is bounded.
-///
-/// What is no longer needed is given back as soon as that is so: the blocks, which are most of the tree, come last, when
-/// nothing but the tree is left.
+/// A tree whose blocks are still to be filled.
+pub(crate) struct Layout {
+    nodes: Vec<Node>,
+    entries: Vec<Entry>,
+    /// What goes into the blocks.
+    spans: Vec<Span>,
+    sphere_spans: Vec<Span>,
+    root: u32,
+}
+
+/// Lays a binary tree out. The depth of its recursions is that of the tree, which is bounded.
 ///
 /// # Errors
 /// [`BuildError::TooMany`] when there are more blocks than references can name.
-pub(crate) fn pack(
-    geometries: &[Geometry],
-    traits: &[Traits],
-    binary: Binary,
-    names: Vec<Name>,
-) -> Result<Packed, BuildError> {
-    let packer = Packer { traits, names: &names };
-    let root = Cursor::new(&binary);
+pub(crate) fn lay_out(traits: &[Traits], binary: &Binary, names: &[Name]) -> Result<Layout, BuildError> {
+    let packer = Packer { traits, names };
+    let root = Cursor::new(binary);
     let plan = packer.plan(root);
     let total = plan.as_ref().map_or_else(|| packer.count(root), |plan| plan.total);
     if total.blocks.max(total.sphere_blocks) > tag::BLOCK_PLACES as usize {
@@ -319,27 +321,34 @@ pub(crate) fn pack(
         Some(plan) => packer.put_many(plan, room),
         None => packer.put(root, &mut room),
     };
-    drop(plan);
-    drop(binary);
-    let named = |spans: Vec<Span>| -> Vec<BlockNames> {
-        let name = |span: &Span| BlockNames::of(&names[span.first as usize..][..span.count as usize]);
-        spans.par_iter().with_min_len(256).map(name).collect()
-    };
-    let (block_names, sphere_names) = (named(spans), named(sphere_spans));
-    drop(names);
-    let block = |names: &BlockNames| fill_block(mesh(geometries, names.geometry), names);
-    let blocks: Vec<_> = block_names.par_iter().with_min_len(256).map(block).collect();
-    let block = |names: &BlockNames| fill_sphere_block(cloud(geometries, names.geometry), names);
-    let sphere_blocks: Vec<_> = sphere_names.par_iter().with_min_len(256).map(block).collect();
-    Ok(Packed {
-        nodes: nodes.into(),
-        blocks: blocks.into(),
-        names: block_names.into(),
-        entries: entries.into(),
-        sphere_blocks: sphere_blocks.into(),
-        sphere_names: sphere_names.into(),
-        root: Some(root),
-    })
+    Ok(Layout { nodes, entries, spans, sphere_spans, root })
+}
+
+impl Layout {
+    /// Fills the blocks. They are most of the tree: nothing of its making but names is to be left by now, and these are given
+    /// back before.
+    pub(crate) fn pack(self, geometries: &[Geometry], names: Vec<Name>) -> Packed {
+        let Self { nodes, entries, spans, sphere_spans, root } = self;
+        let named = |spans: Vec<Span>| -> Vec<BlockNames> {
+            let name = |span: &Span| BlockNames::of(&names[span.first as usize..][..span.count as usize]);
+            spans.par_iter().with_min_len(256).map(name).collect()
+        };
+        let (block_names, sphere_names) = (named(spans), named(sphere_spans));
+        drop(names);
+        let block = |names: &BlockNames| fill_block(mesh(geometries, names.geometry), names);
+        let blocks: Vec<_> = block_names.par_iter().with_min_len(256).map(block).collect();
+        let block = |names: &BlockNames| fill_sphere_block(cloud(geometries, names.geometry), names);
+        let sphere_blocks: Vec<_> = sphere_names.par_iter().with_min_len(256).map(block).collect();
+        Packed {
+            nodes: nodes.into(),
+            blocks: blocks.into(),
+            names: block_names.into(),
+            entries: entries.into(),
+            sphere_blocks: sphere_blocks.into(),
+            sphere_names: sphere_names.into(),
+            root: Some(root),
+        }
+    }
 }
 
 fn mesh(geometries: &[Geometry], geometry: u32) -> &TriangleMesh {

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use crate::build::{binary_tree, fill};
 use crate::clouds::CloudSurvey;
-use crate::collapse::{Entry, Packed, pack};
+use crate::collapse::{Entry, Packed, lay_out};
 use crate::holds::{Holds, SingleStart};
 use crate::lanes::{Lanes, Level, Task};
 use crate::node::{Node, Units, tag};
@@ -53,8 +53,11 @@ pub(crate) fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result
                 survey.put_boxes(cloud, &units, own);
             }
         }
-        let (binary, names) = binary_tree(level, options.preset, primitives, &traits);
-        pack(&geometries, &traits, binary, names)?
+        let (binary, names) = binary_tree(level, options.preset, &mut primitives, &traits);
+        let layout = lay_out(&traits, &binary, &names)?;
+        drop(binary);
+        drop(primitives);
+        layout.pack(&geometries, names)
     };
     let holds = Holds::new(&geometries, parts.largest_corner, parts.sphere_reach);
     Ok(Accel {

@@ -1,5 +1,6 @@
 //! Primitives on their way into the tree: 32 bytes each.
 
+use bytemuck::{Pod, Zeroable};
 use lumbre_geometry::Aabb;
 
 use crate::node::{Units, round_up};
@@ -52,7 +53,7 @@ const ONE: f64 = (1 << 28) as f64;
 /// Eight whole numbers that grow by one vector operation: the lower corner and the first name, the upper corner negated and
 /// the second name. The corners' resolution of 2^-28 is well below what the test of boxes can tell (see `node`). They are
 /// rounded in any way by up to 2^-24 of themselves; they are widened when they become planes of a node.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(32))]
 pub(crate) struct Bounds {
     lanes: [i32; 8],

@@ -44,7 +44,7 @@ struct Move {
 }
 
 /// A better tree over the same leaves, or the same one.
-pub(crate) fn reinsert(tree: Binary) -> Binary {
+pub(crate) fn reinsert(tree: Binary<'_>) -> Binary<'_> {
     let mut linked = Tree::of(&tree);
     if linked.nodes.len() < 8 {
         return tree;
@@ -230,7 +230,7 @@ impl Tree {
     }
 
     /// Back; `None` where it became too deep.
-    fn to_binary(&self) -> Option<Binary> {
+    fn to_binary(&self) -> Option<Binary<'static>> {
         // In the order of a walk, children after parents; then from the end, how many nodes are under each.
         let mut order = Vec::with_capacity(self.nodes.len());
         let mut pending = vec![(0, 0)];
@@ -254,7 +254,7 @@ impl Tree {
     }
 
     /// The depth of its recursion is that of the tree.
-    fn part(&self, root: u32, sizes: &[u32]) -> Binary {
+    fn part(&self, root: u32, sizes: &[u32]) -> Binary<'static> {
         if sizes[root as usize] > 1024 {
             let [left, right] = self.node(root).children;
             let (left, right) = rayon::join(|| self.part(left, sizes), || self.part(right, sizes));

@@ -319,28 +319,20 @@ impl<'a> Accessor<'a> {
     ) -> Read<Vec<T>> {
         debug_assert!(N <= self.element.numbers());
         match (self.component, self.normalized) {
-            (Component::F32, _) => self.decoded(file, |b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]), make),
-            (Component::I8, false) => self.decoded(file, |b| f32::from(b[0] as i8), make),
-            (Component::I8, true) => self.decoded(file, |b| (f32::from(b[0] as i8) / 127.0).max(-1.0), make),
-            (Component::U8, false) => self.decoded(file, |b| f32::from(b[0]), make),
-            (Component::U8, true) => self.decoded(file, |b| f32::from(b[0]) / 255.0, make),
-            (Component::I16, false) => {
-                self.decoded(file, |b| f32::from(i16::from_le_bytes([b[0], b[1]])), make)
+            (Component::F32, _) => self.decoded(file, f32::from_le_bytes, make),
+            (Component::I8, false) => self.decoded(file, |[b]| f32::from(b as i8), make),
+            (Component::I8, true) => self.decoded(file, |[b]| (f32::from(b as i8) / 127.0).max(-1.0), make),
+            (Component::U8, false) => self.decoded(file, |[b]| f32::from(b), make),
+            (Component::U8, true) => self.decoded(file, |[b]| f32::from(b) / 255.0, make),
+            (Component::I16, false) => self.decoded(file, |b| f32::from(i16::from_le_bytes(b)), make),
+            (Component::I16, true) => {
+                self.decoded(file, |b| (f32::from(i16::from_le_bytes(b)) / 32767.0).max(-1.0), make)
             }
-            (Component::I16, true) => self.decoded(
-                file,
-                |b| (f32::from(i16::from_le_bytes([b[0], b[1]])) / 32767.0).max(-1.0),
-                make,
-            ),
-            (Component::U16, false) => {
-                self.decoded(file, |b| f32::from(u16::from_le_bytes([b[0], b[1]])), make)
-            }
+            (Component::U16, false) => self.decoded(file, |b| f32::from(u16::from_le_bytes(b)), make),
             (Component::U16, true) => {
-                self.decoded(file, |b| f32::from(u16::from_le_bytes([b[0], b[1]])) / 65535.0, make)
+                self.decoded(file, |b| f32::from(u16::from_le_bytes(b)) / 65535.0, make)
             }
-            (Component::U32, _) => {
-                self.decoded(file, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as f32, make)
-            }
+            (Component::U32, _) => self.decoded(file, |b| u32::from_le_bytes(b) as f32, make),
         }
     }
 
@@ -348,9 +340,9 @@ impl<'a> Accessor<'a> {
     pub fn wholes<const N: usize>(&self, file: &File<'_>) -> Read<Vec<[u32; N]>> {
         debug_assert!(N <= self.element.numbers());
         match self.component {
-            Component::U8 => self.decoded(file, |b| u32::from(b[0]), |n| n),
-            Component::U16 => self.decoded(file, |b| u32::from(u16::from_le_bytes([b[0], b[1]])), |n| n),
-            Component::U32 => self.decoded(file, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]), |n| n),
+            Component::U8 => self.decoded(file, |[b]| u32::from(b), |n| n),
+            Component::U16 => self.decoded(file, |b| u32::from(u16::from_le_bytes(b)), |n| n),
+            Component::U32 => self.decoded(file, u32::from_le_bytes, |n| n),
             Component::I8 | Component::I16 | Component::F32 => Err(self
                 .value
                 .wrong("accessor of a wrong type")
@@ -360,22 +352,43 @@ impl<'a> Accessor<'a> {
         }
     }
 
-    fn decoded<N1: Copy + Default, const N: usize, T: Send>(
+    /// The same numbers by threes, as long as there are three; `None` where they do not simply stand in a row.
+    pub fn by_threes(&self) -> Option<Self> {
+        let size = self.component.bytes();
+        let count = self.count / 3;
+        let Some(Strided { bytes: Some(bytes), stride }) = self.data else { return None };
+        if self.element != Element::Scalar || stride != size || self.sparse.is_some() || count == 0 {
+            return None;
+        }
+        let bytes = bytes.get(..3 * size * count)?;
+        let data = Some(Strided { bytes: Some(bytes), stride: 3 * size });
+        Some(Self { element: Element::Vec3, count, data, stride: 3 * size, ..*self })
+    }
+
+    /// Numbers of `S` bytes.
+    fn decoded<const S: usize, N1: Copy + Default, const N: usize, T: Send>(
         &self,
         file: &File<'_>,
-        decode: impl Fn(&[u8]) -> N1 + Sync,
+        decode: impl Fn([u8; S]) -> N1 + Sync,
         make: impl Fn([N1; N]) -> T + Sync,
     ) -> Read<Vec<T>> {
-        let size = self.component.bytes();
+        debug_assert_eq!(S, self.component.bytes());
         let (columns, rows) = self.element.columns();
-        let column = if columns > 1 { (rows * size).next_multiple_of(4) } else { rows * size };
-        let element = |bytes: &[u8]| {
-            let mut numbers = [N1::default(); N];
-            for (i, number) in numbers.iter_mut().enumerate() {
-                let at = i / rows * column + i % rows * size;
-                *number = decode(&bytes[at..at + size]);
-            }
-            make(numbers)
+        let column = if columns > 1 { (rows * S).next_multiple_of(4) } else { rows * S };
+        // Of one column, all numbers stand in a row.
+        let in_a_row = |bytes: &[u8]| {
+            let (numbers, _) = bytes.as_chunks::<S>();
+            numbers.first_chunk::<N>().map(|numbers| make(numbers.map(&decode)))
+        };
+        let in_columns = |bytes: &[u8]| {
+            make(std::array::from_fn(|i| {
+                let number = bytes.get(i / rows * column + i % rows * S..).and_then(<[u8]>::first_chunk);
+                number.map_or_else(N1::default, |number| decode(*number))
+            }))
+        };
+        let element = |bytes: &[u8]| match columns {
+            1 => in_a_row(bytes).unwrap_or_else(|| in_columns(bytes)),
+            _ => in_columns(bytes),
         };
         file.budget.elements(self.count as u64, "elements of accessors")?;
         let mut elements = file.budget.vec(self.count as u64, "elements of accessors")?;

@@ -549,6 +549,9 @@ pub(super) enum Assembly {
 /// Puts shapes together from a primitive's vertices. Shapes that are not there, or whose vertices are not finite, are an
 /// error; when lenient they are dropped with a warning.
 pub(super) fn assemble(file: &File<'_>, primitive: &Primitive<'_>, positions: &[Vec3]) -> Read<Assembly> {
+    if let Some(triangles) = listed_triangles(file, primitive, positions)? {
+        return Ok(Assembly::Triangles(triangles));
+    }
     let listed = match &primitive.indices {
         Some(accessor) => Some((accessor, accessor.wholes::<1>(file)?)),
         None => None,
@@ -655,6 +658,26 @@ pub(super) fn assemble(file: &File<'_>, primitive: &Primitive<'_>, positions: &[
         release(file, indices);
     }
     Ok(assembly)
+}
+
+/// The triangles of a primitive whose indices list them one after another, where there is nothing wrong with any of
+/// them.
+fn listed_triangles(
+    file: &File<'_>,
+    primitive: &Primitive<'_>,
+    positions: &[Vec3],
+) -> Read<Option<Vec<[u32; 3]>>> {
+    let listed = primitive.indices.filter(|_| primitive.mode == Mode::Triangles);
+    let Some(listed) = listed.and_then(|indices| indices.by_threes()) else { return Ok(None) };
+    let triangles = listed.wholes::<3>(file)?;
+    let is_there = |triangle: &[u32; 3]| triangle.iter().all(|&i| (i as usize) < positions.len());
+    if triangles.par_iter().with_min_len(SHARE).all(is_there)
+        && positions.par_iter().with_min_len(SHARE).all(|p| p.is_finite())
+    {
+        return Ok(Some(triangles));
+    }
+    release(file, triangles);
+    Ok(None)
 }
 
 /// Leaves out the vertices that no triangle uses, where these are many: exporters let parts of a mesh share one long list.
