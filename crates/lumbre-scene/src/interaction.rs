@@ -5,7 +5,7 @@ use lumbre_math::{DVec3, Vec2};
 use lumbre_shading::{Bsdf, LocalSurface, Material, Parts, ShadingFrame, Spectrum, TextureContext};
 
 use crate::light::{LightId, LightSample};
-use crate::{Emission, Footprint};
+use crate::{Emission, Footprint, Scene};
 
 /// Where a ray meets a surface.
 #[derive(Clone, Debug)]
@@ -36,6 +36,8 @@ pub struct Interaction<'s> {
     pub(crate) bare: Option<Box<Surface>>,
     /// Where rays start that leave on the side that the ray came from.
     pub(crate) before: DVec3,
+    /// From the point to the smooth surface that the normals of vertices tell of, where it stands off the face.
+    pub(crate) rise: Option<DVec3>,
     /// Width of the footprint across the ray, and its growth with distance.
     pub(crate) width: f64,
     pub(crate) spread: f64,
@@ -72,16 +74,42 @@ impl<'s> Interaction<'s> {
 
     /// The ray that leaves along a unit direction, from beyond the error of the point.
     pub fn leave(&self, direction: DVec3) -> Ray {
-        Ray::new(self.start(direction), direction).at_time(self.time)
+        self.leave_from(self.start(direction), direction)
+    }
+
+    /// The ray that leaves along a unit direction from a place of its own, such as [`Interaction::risen`].
+    pub fn leave_from(&self, start: DVec3, direction: DVec3) -> Ray {
+        Ray::new(start, direction).at_time(self.time)
     }
 
     /// The segment to where the light comes from, short of it by its own error.
     pub fn shadow_ray(&self, sample: &LightSample) -> Ray {
-        let Some(end) = sample.end else { return self.leave(sample.towards) };
-        let start = self.start(sample.towards);
+        self.shadow_ray_from(self.start(sample.towards), sample)
+    }
+
+    /// The same from a place of its own.
+    pub fn shadow_ray_from(&self, start: DVec3, sample: &LightSample) -> Ray {
+        let Some(end) = sample.end else { return self.leave_from(start, sample.towards) };
         let stop = offset(end.point, end.error, end.normal, -sample.towards);
         // What rounds in the direction and in t.
         Ray::new(start, stop - start).with_range(0.0, 1.0 - f64::powi(2.0, -40)).at_time(self.time)
+    }
+
+    /// The place that belongs to the point on the smooth surface that the normals of vertices tell of, on the side that the ray
+    /// came from; `None` where the surface is as smooth as it seems, the face bends the other way, or something
+    /// stands between the two.
+    ///
+    /// From there leave rays that go under the plane of the face, though not under the smooth surface: the face, which is but a
+    /// poor picture of it, does not stand in their way.
+    pub fn risen(&self, scene: &Scene) -> Option<DVec3> {
+        let rise = self.rise?;
+        let way = self.leave_from(self.before, rise).with_range(0.0, 1.0);
+        (!scene.is_occluded(&way)).then(|| self.before + rise)
+    }
+
+    /// Whether there may be such a place.
+    pub fn may_rise(&self) -> bool {
+        self.rise.is_some()
     }
 
     /// Where lights are sampled from: off the surface, on the side that the ray came from, so that a surface which shines
@@ -99,8 +127,9 @@ impl<'s> Interaction<'s> {
         }
     }
 
+    /// Where rays start that leave along a direction: from beyond the error of the point.
     #[inline]
-    fn start(&self, direction: DVec3) -> DVec3 {
+    pub fn start(&self, direction: DVec3) -> DVec3 {
         let normal = self.surface.normal;
         if (normal.dot(direction) < 0.0) == (normal.dot(self.towards_origin) < 0.0) {
             return self.before;

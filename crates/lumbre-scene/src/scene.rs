@@ -42,6 +42,9 @@ pub struct Scene {
     pub(crate) looks_up: bool,
 }
 
+/// Where the cosine between shading and geometric normal is less, the surface stands for a smooth one.
+const SMOOTH: f32 = 1.0 - 1e-6;
+
 /// Something in a description that was left out of the scene, or is slower or noisier than it could be.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
@@ -188,6 +191,14 @@ impl Scene {
         } else {
             Spot::default()
         };
+        let before = offset(surface.point, surface.point_error, surface.normal, -direction);
+        let is_smooth = dressed.shading.normal.dot(dressed.shading.geometric) < SMOOTH;
+        let rise = is_smooth.then(|| {
+            let placement = self.placement(ray, hit);
+            let rise = entry.rise(&bare, part, hit.root.local, placement.as_ref(), ray.time, -direction)?;
+            // Else it is lost in the error of the point.
+            (rise.dot(surface.normal).abs() > (before - surface.point).length()).then_some(rise)
+        });
         let light = entry.light;
         let bare = light.map(|_| {
             let is_placed = !hit.instances.is_empty();
@@ -206,7 +217,8 @@ impl Scene {
             primitive,
             bare,
             time: ray.time,
-            before: offset(surface.point, surface.point_error, surface.normal, -direction),
+            before,
+            rise: rise.flatten(),
             width: spot.width,
             spread: spot.spread,
         }
@@ -276,6 +288,11 @@ impl Scene {
         }
     }
 
+    /// The map from the innermost instance of a hit; `None` in the world itself.
+    fn placement(&self, ray: &Ray, hit: &Hit) -> Option<Transform> {
+        (self.has_instances && !hit.instances.is_empty()).then(|| self.accel.world_from_object(ray, hit))
+    }
+
     fn dressed(
         &self,
         entry: &SurfaceEntry,
@@ -285,8 +302,7 @@ impl Scene {
         primitive: u32,
         turned: bool,
     ) -> Dressed {
-        let placement: Option<Transform> =
-            (self.has_instances && !hit.instances.is_empty()).then(|| self.accel.world_from_object(ray, hit));
+        let placement = self.placement(ray, hit);
         if !turned {
             return entry.dress(bare, primitive, hit.root.local, placement.as_ref(), ray.time);
         }

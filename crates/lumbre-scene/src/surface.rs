@@ -221,6 +221,45 @@ impl SurfaceEntry {
     }
 }
 
+impl SurfaceEntry {
+    /// How far the smooth surface that the normals of a triangle's vertices tell of stands off the triangle, on the side that
+    /// `towards` leaves on; `None` where it does not.
+    ///
+    /// J. Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, 2021: the planes through the vertices, across
+    /// their normals, blended as the normals are, as far as they lie above the point. Over a triangle of a sphere that is
+    /// about twice the height of the sphere, so that rays which the sphere would let go clear the triangles beside it.
+    pub fn rise(
+        &self,
+        bare: &Surface,
+        primitive: u32,
+        local: DVec2,
+        placement: Option<&Transform>,
+        time: f64,
+        towards: DVec3,
+    ) -> Option<DVec3> {
+        let Form::Mesh(mesh) = &self.form else { return None };
+        let normals = mesh.corner_normals(mesh.mesh.indices[primitive as usize], time)?;
+        let Blend { weights, .. } = triangle_blend(local);
+        let unit = |n: DVec3| placement.map_or(n, |map| map.normal(n)).normalize_or_zero();
+        let normals = normals.map(unit);
+        let above = if bare.normal.dot(towards) < 0.0 { -bare.normal } else { bare.normal };
+        let side = if weighted(&weights, &normals).dot(above) < 0.0 { -1.0 } else { 1.0 };
+        // From the first corner, and from the others.
+        let from_first = local.x * bare.dpdu + local.y * bare.dpdv;
+        let ways = [from_first, from_first - bare.dpdu, from_first - bare.dpdv];
+        let mut rise = DVec3::ZERO;
+        for ((weight, normal), way) in weights.into_iter().zip(normals).zip(ways) {
+            let normal = side * normal;
+            // A vertex that looks away says nothing of a surface on this side.
+            if normal.dot(above) <= 0.0 {
+                return None;
+            }
+            rise -= weight * way.dot(normal).min(0.0) * normal;
+        }
+        (rise.dot(above) > 0.0 && rise.is_finite()).then_some(rise)
+    }
+}
+
 impl Dressed {
     /// Where textures are looked up, with derivatives of u and v over a pixel.
     pub fn context(&self, dpdx: Vec3, dpdy: Vec3, duv_dx: Vec2, duv_dy: Vec2) -> TextureContext {

@@ -1,5 +1,8 @@
 //! A surface as a path meets it, and light that arrives at it straight from a light.
 
+use std::cell::OnceCell;
+
+use lumbre_geometry::Ray;
 use lumbre_math::{DVec3, Vec2, Vec3};
 use lumbre_scene::{Interaction, LightSample, Scene};
 use lumbre_shading::{Bsdf, LocalDir, Material, Scatter, ShadingFrame, Spectrum};
@@ -15,6 +18,12 @@ use crate::interior::Interiors;
 /// and no light leaks. At grazing angles, where a reflection would point into the surface, it comes to point out of it as
 /// far. Others let it be (and have dark specks at silhouettes of coarse meshes), or turn the normal: A. Keller and others,
 /// "The Iray Light Transport Simulation and Rendering System", 2017, A.3.
+///
+/// Where the faces of a mesh stand for a smooth surface that bulges out over them, directions that go under a face but not under
+/// that surface are no lie: they stay as they are, and their rays start on it ([`Interaction::risen`]). So shadows end where
+/// the smooth surface turns away from the light, not at the edge of a face. J. Hanika ("Hacking the Shadow Terminator",
+/// 2021) starts all rays there; here those that leave a face upwards start on it, for they need no help, and nothing that stands
+/// on it comes to hover.
 pub(crate) struct Vertex<'a, 's> {
     pub met: &'a Interaction<'s>,
     pub bsdf: Bsdf,
@@ -23,6 +32,9 @@ pub(crate) struct Vertex<'a, 's> {
     wo: LocalDir,
     /// The geometric normal, on the side of `wo`; `None` where it is the shading normal.
     geometric: Option<Vec3>,
+    scene: &'s Scene,
+    /// [`Interaction::risen`], once it was asked for.
+    risen: OnceCell<Option<DVec3>>,
 }
 
 /// A direction in which a path goes on.
@@ -41,21 +53,27 @@ pub(crate) struct Bounce {
 
 impl<'a, 's> Vertex<'a, 's> {
     /// `None` where nothing scatters.
-    pub fn new(met: &'a Interaction<'s>, interiors: &Interiors<'s>) -> Option<Self> {
-        Self::of(met, met.resolved()?, interiors)
+    pub fn new(scene: &'s Scene, met: &'a Interaction<'s>, interiors: &Interiors<'s>) -> Option<Self> {
+        Self::of(scene, met, met.resolved()?, interiors)
     }
 
     /// One vertex for each material of a mixture, with its share: see [`Interaction::parts`].
     pub fn parts(
+        scene: &'s Scene,
         met: &'a Interaction<'s>,
         least: f32,
         interiors: &'a Interiors<'s>,
     ) -> impl Iterator<Item = (f32, Self)> {
         let parts = met.parts(least).into_iter();
-        parts.filter_map(move |(share, material)| Some((share, Self::of(met, material, interiors)?)))
+        parts.filter_map(move |(share, material)| Some((share, Self::of(scene, met, material, interiors)?)))
     }
 
-    fn of(met: &'a Interaction<'s>, material: &'s Material, interiors: &Interiors<'s>) -> Option<Self> {
+    fn of(
+        scene: &'s Scene,
+        met: &'a Interaction<'s>,
+        material: &'s Material,
+        interiors: &Interiors<'s>,
+    ) -> Option<Self> {
         let towards = met.towards_origin.as_vec3();
         let (frame, mut bsdf) = material.shading(&met.at, &met.shading, towards)?;
         if material.is_solid() {
@@ -68,25 +86,43 @@ impl<'a, 's> Vertex<'a, 's> {
         let geometric = met.shading.geometric;
         let geometric =
             (frame.n.dot(geometric) < 1.0 - 1e-6).then(|| if met.front { geometric } else { -geometric });
-        Some(Self { met, bsdf, material, frame, wo, geometric })
+        Some(Self { met, bsdf, material, frame, wo, geometric, scene, risen: OnceCell::new() })
     }
 
     /// Whether a direction leaves on the side of `wo`.
     fn reflects(&self, wi: Vec3) -> bool {
         match self.geometric {
-            Some(normal) => normal.dot(wi) > 0.0,
+            Some(normal) => normal.dot(wi) > 0.0 || self.stays(wi),
             None => self.wo.same_hemisphere(self.frame.to_local(wi)),
         }
     }
 
+    /// Whether a direction under the plane of the face is one that the smooth surface over it reflects to.
+    fn stays(&self, wi: Vec3) -> bool {
+        let Some(geometric) = self.geometric.filter(|_| self.met.may_rise()) else { return false };
+        let smooth = self.met.shading.normal;
+        let smooth = if smooth.dot(geometric) < 0.0 { -smooth } else { smooth };
+        geometric.dot(wi) <= 0.0
+            && smooth.dot(wi) > 0.0
+            && self.wo.same_hemisphere(self.frame.to_local(wi))
+            && self.risen().is_some()
+    }
+
+    fn risen(&self) -> Option<DVec3> {
+        *self.risen.get_or_init(|| self.met.risen(self.scene))
+    }
+
     /// The directions of the BSDF that come to be this one: itself, and what is folded onto it.
     fn unfolded(&self, wi: Vec3) -> impl Iterator<Item = LocalDir> {
-        let folded = self.geometric.map(|normal| mirrored(wi, normal));
+        let is_above = self.geometric.is_none_or(|normal| normal.dot(wi) > 0.0);
         let reflects = self.reflects(wi);
-        [Some(wi), folded].into_iter().flatten().filter_map(move |wi| {
-            let wi = self.frame.to_local(wi);
-            (self.wo.same_hemisphere(wi) == reflects).then_some(wi)
-        })
+        let own = self.frame.to_local(wi);
+        let own = (self.wo.same_hemisphere(own) == reflects).then_some(own);
+        let folded = self.geometric.map(|normal| mirrored(wi, normal)).and_then(|wi| {
+            let folded = self.frame.to_local(wi);
+            (self.wo.same_hemisphere(folded) == is_above && !self.stays(wi)).then_some(folded)
+        });
+        own.into_iter().chain(folded)
     }
 
     /// f · |cos θ| towards a unit direction of the world.
@@ -122,6 +158,7 @@ impl<'a, 's> Vertex<'a, 's> {
         let mut direction = self.frame.to_world(sample.wi);
         if let Some(normal) = self.geometric
             && (normal.dot(direction) > 0.0) == sample.transmitted
+            && (sample.transmitted || !self.stays(direction))
         {
             direction = mirrored(direction, normal);
         }
@@ -138,7 +175,6 @@ impl<'a, 's> Vertex<'a, 's> {
     /// light: the density with which the BSDF would have chosen it.
     pub fn scattered(
         &self,
-        scene: &Scene,
         sample: &LightSample,
         interiors: &Interiors<'s>,
         weigh: impl FnOnce(f32, f32) -> f32,
@@ -156,10 +192,29 @@ impl<'a, 's> Vertex<'a, 's> {
             return Spectrum::BLACK;
         }
         rays.shadow += 1;
-        if scene.is_occluded(&self.met.shadow_ray(sample)) {
+        if self.scene.is_occluded(&self.shadow_ray(sample)) {
             return Spectrum::BLACK;
         }
         scattered * weight * self.passes(sample, interiors)
+    }
+
+    /// Where rays along a unit direction start, if that is off the face.
+    pub fn risen_towards(&self, direction: DVec3) -> Option<DVec3> {
+        if self.stays(direction.as_vec3()) { self.risen() } else { None }
+    }
+
+    fn start(&self, direction: DVec3) -> DVec3 {
+        self.risen_towards(direction).unwrap_or_else(|| self.met.start(direction))
+    }
+
+    /// The ray that goes on.
+    pub fn leave(&self, bounce: &Bounce) -> Ray {
+        self.met.leave_from(self.start(bounce.direction), bounce.direction)
+    }
+
+    /// See [`Interaction::shadow_ray`].
+    pub fn shadow_ray(&self, sample: &LightSample) -> Ray {
+        self.met.shadow_ray_from(self.start(sample.towards), sample)
     }
 
     /// What the solids around leave of a light's sample.

@@ -155,7 +155,7 @@ impl Integrator for Path {
             if depth == self.max_depth {
                 return radiance;
             }
-            let Some(mut vertex) = Vertex::new(here, &interiors) else { return radiance };
+            let Some(mut vertex) = Vertex::new(scene, here, &interiors) else { return radiance };
             if self.regularize && has_scattered {
                 vertex.bsdf = vertex.bsdf.regularized();
             }
@@ -166,7 +166,7 @@ impl Integrator for Path {
                     scene.sample_light(lit_from, ray.time, draw.light_choice(depth), draw.light_point(depth));
                 if let Some(light) = light {
                     let weigh = |light_pdf, bsdf_pdf| self.weight_of_sampled(light_pdf, bsdf_pdf);
-                    radiance += throughput * vertex.scattered(scene, &light, &interiors, weigh, rays);
+                    radiance += throughput * vertex.scattered(&light, &interiors, weigh, rays);
                 }
             }
 
@@ -196,7 +196,8 @@ impl Integrator for Path {
                 throughput *= 1.0 / likely;
             }
 
-            ray = here.leave(bounce.direction);
+            ray = vertex.leave(&bounce);
+            lit_from = vertex.risen_towards(bounce.direction).unwrap_or(lit_from);
             let footprint = here.footprint();
             rays.bounce += 1;
             met = scene.closest(&ray).map(|hit| scene.interaction(&ray, &hit, &footprint));

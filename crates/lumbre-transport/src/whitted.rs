@@ -51,6 +51,7 @@ impl Whitted {
     /// What scatters at a vertex of the tree of rays; its mirrors and its glass go to `pending`.
     fn split<'a, 's>(
         &self,
+        scene: &'s Scene,
         here: &'a Interaction<'s>,
         came: &'a Arrival<'s>,
         draw: &Draw,
@@ -58,7 +59,8 @@ impl Whitted {
     ) -> Scatterers<'a, 's> {
         let mut scatterers = Scatterers::new();
         let mut branches = 0;
-        for (share, vertex) in Vertex::parts(here, FAINT / came.throughput.max_component(), &came.interiors) {
+        let least = FAINT / came.throughput.max_component();
+        for (share, vertex) in Vertex::parts(scene, here, least, &came.interiors) {
             for part in vertex.specular() {
                 let branch = branches;
                 branches += 1;
@@ -75,7 +77,7 @@ impl Whitted {
                     interiors.cross(vertex.material, here.front);
                 }
                 pending.push(Branch {
-                    ray: here.leave(part.direction),
+                    ray: vertex.leave(&part),
                     interiors,
                     footprint: here.footprint(),
                     throughput,
@@ -110,7 +112,7 @@ impl Whitted {
             for point in 0..points {
                 let u = draw.point_on_each_light(came.vertex, label, point, points);
                 if let Some(sample) = scene.sample_one_light(id, from, here.time, u) {
-                    sum += scattered(scene, here, scatterers, &came.interiors, &sample, rays);
+                    sum += scattered(scene, scatterers, &came.interiors, &sample, rays);
                 }
             }
             sum * (1.0 / points as f32)
@@ -158,7 +160,7 @@ impl Integrator for Whitted {
                 came.throughput *= came.interiors.transmittance(ray_length(&ray, here));
                 radiance += came.throughput * here.emitted();
                 if came.depth < self.max_depth {
-                    let scatterers = self.split(here, &came, draw, &mut pending);
+                    let scatterers = self.split(scene, here, &came, draw, &mut pending);
                     if !scatterers.is_empty() {
                         let direct = self.direct(scene, here, &scatterers, &came, draw, rays);
                         radiance += came.throughput * direct;
@@ -185,25 +187,24 @@ impl Integrator for Whitted {
 /// What all materials of a place scatter of a light's sample.
 fn scattered<'s>(
     scene: &Scene,
-    here: &Interaction,
     scatterers: &Scatterers<'_, 's>,
     interiors: &Interiors<'s>,
     sample: &LightSample,
     rays: &mut RayCounts,
 ) -> Spectrum {
     let mut sum = Spectrum::BLACK;
+    let mut shadow_ray = None;
     for (share, vertex) in scatterers {
         let scattered = vertex.eval(sample.towards) * *share;
         if !scattered.is_black() {
             sum += scattered * vertex.passes(sample, interiors);
+            shadow_ray.get_or_insert_with(|| vertex.shadow_ray(sample));
         }
     }
     let scattered = sum * sample.radiance;
-    if scattered.is_black() {
-        return Spectrum::BLACK;
-    }
+    let Some(shadow_ray) = shadow_ray.filter(|_| !scattered.is_black()) else { return Spectrum::BLACK };
     rays.shadow += 1;
-    if scene.is_occluded(&here.shadow_ray(sample)) {
+    if scene.is_occluded(&shadow_ray) {
         return Spectrum::BLACK;
     }
     match sample.scatter {
