@@ -2,7 +2,7 @@
 
 use lumbre_math::DVec3;
 
-use crate::node::Units;
+use crate::node::{LARGEST_NEAR, SMALLEST_NEAR, TINY_NEAR, Units};
 use crate::{Geometry, GeometryKind};
 
 /// What is known of all the geometries of a tree.
@@ -72,6 +72,10 @@ pub(crate) struct SingleStart {
     pub(crate) space_per_unit: f32,
     /// No corner has a larger coordinate.
     pub(crate) largest_corner: f32,
+    /// The bounds on the largest component of a direction, and that below which one is replaced.
+    pub(crate) shortest: f32,
+    pub(crate) longest: f32,
+    pub(crate) tiny: f32,
 }
 
 impl SingleStart {
@@ -84,9 +88,9 @@ impl SingleStart {
         let is_fit = holds.only_triangles
             && holds.has_one_origin
             && units.near > 0.0
-            && (two_to(-60)..=two_to(60)).contains(&units.scale)
+            && (two_to(-40)..=two_to(40)).contains(&units.scale)
             && f64::from(holds.largest_corner) > two_to(-39)
-            && reach < two_to(59);
+            && reach < two_to(38);
         let padded = |v: DVec3, last: f64| [v.x, v.y, v.z, last];
         root.filter(|_| is_fit).map(|root| Self {
             root,
@@ -99,6 +103,9 @@ impl SingleStart {
             units_per_space: units.scale as f32,
             space_per_unit: (1.0 / units.scale) as f32,
             largest_corner: holds.largest_corner,
+            shortest: (SMALLEST_NEAR / units.scale) as f32,
+            longest: (LARGEST_NEAR / units.scale) as f32,
+            tiny: (TINY_NEAR / units.scale) as f32,
         })
     }
 }

@@ -131,8 +131,7 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
                     let lane = rest.trailing_zeros();
                     let is_sure = crossings.sure >> lane & 1 != 0;
                     rest &= rest - 1;
-                    let from = L::lane(crossings.from, lane as usize);
-                    let to = L::lane(crossings.to, lane as usize);
+                    let (from, to) = crossings.between::<L>(lane as usize);
                     if is_sure && to < self.best.from {
                         self.keep(Candidate { block: number, lane, from, to });
                     } else if from > self.best.to || self.passes(ray, block, lane) {

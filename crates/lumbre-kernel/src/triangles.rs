@@ -133,18 +133,19 @@ impl Shear {
 /// `error = 6δm + 3δ² = 72us (m + 6us)`, which leaves room for its own roundings, an edge function that is not negative in double
 /// precision is not below `-error` here. [`TINY`] is added for what may underflow.
 ///
-/// With edge functions wrong by eᵢ, the height z of a crossing is wrong by Σ eᵢ (zᵢ - z) / D, where D is their sum as
-/// computed: by no more than 3 `error` / |D| of the triangle's extent in z. Roundings add 7uh, those of the corners' z uh, that
-/// of adding the rest of the origin uh, those of the extent up to 8uh and those of the ends 2uh, as long as no edge function is
-/// much larger than D; where D is so small that one may be, `error` / |D| is large. So `spread = 12.5 error / |D| (extent + 24us) +
-/// 24us` has room for all of it; no number where D is zero, which counts as being in range.
+/// Heights are compared by way of products with |D|, where D is the sum of the edge functions as computed, so that there is
+/// nothing to be divided. A crossing within the triangle is at the z for which Σ eᵢ (zᵢ - z) is zero in double precision. With
+/// edge functions wrong by `error` each, Σ eᵢ zᵢ is off z D by no more than 3 `error` of the triangle's extent in z. Roundings of
+/// the three products and their sums, of the corners' z, and of the rest of the origin that is added, are below 9uh Σ |eᵢ|; those
+/// of the ends of the interval and of the range by |D| below 3uh|D|. As no edge function is beyond `error` on the other side than D,
+/// Σ |eᵢ| ≤ |D| + 6 `error`. So `spread = 12.5 error (extent + 24us) + 24us |D| + TINY` has room for all of it, whatever D.
 ///
 /// Where all edge functions are beyond 2 `error` on one side, those in double precision are beyond zero, so that the line does
 /// meet the triangle; and where height ± spread lies between `surely_first` and `surely_last`, the hit is in range. The ends
 /// of the range are moved, outwards or inwards, by what their own rounding may be.
 ///
-/// All this without overflow, and with L ≥ 2⁻⁵⁰, so that 24us is far above what underflows; else the test is left out, and
-/// below 2⁻⁴⁰ nothing is certain.
+/// All this without overflow, as L ≤ 2³⁸ and so Σ |eᵢ zᵢ| < 2¹²³; else the test is left out. It is also below 2⁻⁵⁰, and below 2⁻⁴⁰
+/// nothing is certain.
 ///
 /// Where two components of the direction are as good as equal, single and double precision may take another one for the last
 /// axis. The edge functions of both are the same but for a factor as good as 1 and double precision's own rounding.
@@ -193,7 +194,7 @@ pub(crate) const ROUNDINGS: f32 = 6.0 * ROUNDOFF;
 pub(crate) const FAR: f32 = (1u128 << 100) as f32;
 /// The bounds on L; below the third nothing is certain.
 const SMALLEST_REACH: f32 = 1.0 / (1u64 << 50) as f32;
-const LARGEST_REACH: f32 = (1u64 << 60) as f32;
+const LARGEST_REACH: f32 = (1u64 << 38) as f32;
 const SMALLEST_SURE_REACH: f32 = 1.0 / (1u64 << 40) as f32;
 
 impl HeightRange {

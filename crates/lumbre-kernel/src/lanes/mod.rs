@@ -18,7 +18,7 @@ use lumbre_math::DVec3;
 use crate::holds::SingleStart;
 use crate::node::{BoxRay, Node, Slabs, Units, WIDTH};
 use crate::stack::STACK;
-use crate::triangles::{BLOCK, BlockRay, Inside, Passage, Shear, TriangleBlock};
+use crate::triangles::{BLOCK, BlockRay, Inside, Passage, ROUNDINGS, Shear, TriangleBlock};
 
 pub(crate) use spheres::SphereLanes;
 #[cfg(test)]
@@ -78,9 +78,20 @@ pub(crate) struct Crossings<F> {
     pub(crate) in_range: u32,
     /// A bit for each that certainly is met there.
     pub(crate) sure: u32,
-    /// Heights along the ray between which the crossing lies.
+    /// Heights along the ray between which the crossing lies, by the weight.
     pub(crate) from: F,
     pub(crate) to: F,
+    pub(crate) weight: F,
+}
+
+impl<F: Copy> Crossings<F> {
+    /// The heights between which the crossing in a lane lies.
+    #[inline(always)]
+    pub(crate) fn between<L: Lanes<Floats = F>>(&self, lane: usize) -> (f32, f32) {
+        let inverse = 1.0 / L::lane(self.weight, lane);
+        let (from, to) = (L::lane(self.from, lane) * inverse, L::lane(self.to, lane) * inverse);
+        (from - from.abs() * ROUNDINGS, to + to.abs() * ROUNDINGS)
+    }
 }
 
 /// In the last bits of a child's key stands its lane, so that no two are equal. To be compared with a limit that has all
@@ -437,9 +448,9 @@ pub(crate) fn meet_triangles_at(
         #[inline(always)]
         fn run<L: Lanes>(self) -> Self::Output {
             let (mask, edges) = L::meet_triangles(self.0, self.1);
-            let Crossings { in_range, sure, from, to } = L::place_crossings(&edges, self.1);
-            let between = std::array::from_fn(|lane| [L::lane(from, lane), L::lane(to, lane)]);
-            (mask & in_range, mask & sure, between)
+            let crossings = L::place_crossings(&edges, self.1);
+            let between = std::array::from_fn(|lane| <[f32; 2]>::from(crossings.between::<L>(lane)));
+            (mask & crossings.in_range, mask & crossings.sure, between)
         }
     }
     level.run(Triangles(block, ray))

@@ -6,10 +6,7 @@ use lumbre_geometry::Ray;
 
 use super::{Axes, Crossings, LANE_BITS, Lanes, Sides, Slots};
 use crate::holds::SingleStart;
-use crate::node::{
-    BoxRay, END_FACTOR, LARGEST_NEAR, LITTLE, Node, SMALLEST_NEAR, START_FACTOR, Slabs, TINY_NEAR, Units,
-    WIDTH,
-};
+use crate::node::{BoxRay, END_FACTOR, LITTLE, Node, START_FACTOR, Slabs, Units, WIDTH};
 use crate::stack::stack_entry;
 use crate::triangles::{
     BLOCK, BlockRay, EDGE_ERROR, HEIGHT_ERROR, HeightRange, Inside, LEAST_SIZE, Passage, SIZE_ERROR, Shear,
@@ -36,10 +33,9 @@ fn greater(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// In tree units.
 #[inline(always)]
-fn single_direction(start: &SingleStart, ray: &Ray) -> [f32; 4] {
-    let [x, y, z] = (ray.direction * start.scale).to_array().map(|d| d as f32);
+fn single_direction(ray: &Ray) -> [f32; 4] {
+    let [x, y, z] = ray.direction.to_array().map(|d| d as f32);
     [x, y, z, 0.0]
 }
 
@@ -60,13 +56,12 @@ impl Lanes for Portable {
         let (mut fits, mut is_long) = (0.0 <= t_min && t_min <= t_max, false);
         let mut signs = 0;
         let mut slabs = BoxRay::passing_all().slabs;
-        let direction = single_direction(start, ray);
-        for axis in 0..3 {
+        let direction = single_direction(ray);
+        for (axis, &d) in direction.iter().enumerate().take(3) {
             let from = ((ray.origin[axis] - start.tree_origin[axis]) * start.scale) as f32;
-            let d = direction[axis];
-            fits &= from.abs() <= start.farthest[axis] && d.abs() <= LARGEST_NEAR as f32;
-            is_long |= d.abs() >= SMALLEST_NEAR as f32;
-            let inverse = 1.0 / greater(d.abs(), TINY_NEAR as f32);
+            fits &= from.abs() <= start.farthest[axis] && d.abs() <= start.longest;
+            is_long |= d.abs() >= start.shortest;
+            let inverse = start.space_per_unit / greater(d.abs(), start.tiny);
             let margin = inverse * (from.abs() * start.margin_per_distance + start.margin);
             let inverse = inverse.copysign(d);
             slabs.inverse[axis] = inverse;
@@ -90,17 +85,17 @@ impl Lanes for Portable {
             origin[axis] = exact as f32;
             rest[axis] = (exact - f64::from(origin[axis])) as f32;
         }
-        let direction = single_direction(start, ray);
+        let direction = single_direction(ray);
         let signs =
             (0..3).fold(0, |signs, axis| signs | u32::from(direction[axis].is_sign_negative()) << axis);
         let [x, y, z, _] = direction.map(f32::abs);
         let axes = Axes::by_bits(signs, u32::from(x >= y) | u32::from(y >= z) << 1 | u32::from(x >= z) << 2);
-        let inverse = axes.permute_single(&slabs.inverse)[2];
+        let inverse = axes.permute_single(&slabs.inverse)[2] * start.units_per_space;
         let shear = axes.permute_single(&direction).map(|d| d * inverse);
         let reach =
             greater(greater(origin[0].abs(), origin[1].abs()), origin[2].abs()) + start.largest_corner;
         let rest = axes.permute_single(&rest);
-        let length = axes.permute_single(&direction)[2].abs() * start.space_per_unit;
+        let length = axes.permute_single(&direction)[2].abs();
         let blocks = BlockRay {
             axes,
             origin: axes.permute_single(&origin),
@@ -110,7 +105,7 @@ impl Lanes for Portable {
             range: HeightRange::new(ray.t_min as f32 * length, ray.t_max as f32 * length),
             turn: 0.0f32.copysign(-inverse),
         };
-        (blocks, inverse.abs() * start.units_per_space)
+        (blocks, inverse.abs())
     }
 
     #[inline(always)]
@@ -209,27 +204,29 @@ impl Lanes for Portable {
 
     #[inline(always)]
     fn place_crossings(edges: &Edges, ray: &BlockRay) -> Crossings<[f32; BLOCK]> {
-        let mut crossings = Crossings { in_range: 0, sure: 0, from: [0.0; BLOCK], to: [0.0; BLOCK] };
+        let none = [0.0; BLOCK];
+        let mut crossings = Crossings { in_range: 0, sure: 0, from: none, to: none, weight: none };
         for lane in 0..BLOCK {
             let [u, v, w] = [edges.values[0][lane], edges.values[1][lane], edges.values[2][lane]];
             let [a, b, c] = [edges.heights[0][lane], edges.heights[1][lane], edges.heights[2][lane]];
             let (low, high) = (a.min(b).min(c), a.max(b).max(c));
             let error = edges.error[lane];
-            let inverse = 1.0 / (u + v + w);
-            // Shares first: their products with lengths do not underflow.
-            let height = (u * inverse) * a + (v * inverse) * b + (w * inverse) * c + ray.rest[2];
-            let ahead = if ray.turn.is_sign_negative() { -height } else { height };
-            let share = (error * 12.5) * inverse.abs();
+            let det = u + v + w;
+            let weight = det.abs();
+            let height = u * a + v * b + w * c + det * ray.rest[2];
+            let is_turned = ray.turn.is_sign_negative() != det.is_sign_negative();
+            let ahead = if is_turned { -height } else { height };
             let height_error = edges.height_error[lane];
-            let spread = share * ((high - low) + height_error) + height_error;
+            let spread = (error * 12.5) * ((high - low) + height_error) + (height_error * weight + TINY);
             let (from, to) = (ahead - spread, ahead + spread);
             // What is no number may be in range.
-            crossings.in_range |= u32::from(!(to < ray.range.first || from > ray.range.last)) << lane;
+            let is_out = to < ray.range.first * weight || from > ray.range.last * weight;
+            crossings.in_range |= u32::from(!is_out) << lane;
             let (least, most) = (u.min(v).min(w), u.max(v).max(w));
             let is_inside = least > 2.0 * error || most < -2.0 * error;
-            crossings.sure |=
-                u32::from(is_inside && ray.range.surely_first <= from && to <= ray.range.surely_last) << lane;
-            (crossings.from[lane], crossings.to[lane]) = (from, to);
+            let is_in_range = ray.range.surely_first * weight <= from && to <= ray.range.surely_last * weight;
+            crossings.sure |= u32::from(is_inside && is_in_range) << lane;
+            (crossings.from[lane], crossings.to[lane], crossings.weight[lane]) = (from, to, weight);
         }
         crossings
     }

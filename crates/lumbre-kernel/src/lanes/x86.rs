@@ -141,14 +141,11 @@ impl<const AVX512: bool> X86<AVX512> {
         ray.cast()
     }
 
-    /// The direction in tree units; the last of four means nothing.
+    /// The direction; the last of four means nothing.
     #[inline(always)]
-    fn single_direction(start: &SingleStart, ray: &Ray) -> __m128 {
+    fn single_direction(ray: &Ray) -> __m128 {
         // SAFETY: see `X86`. The load is of four of the numbers of a ray.
-        unsafe {
-            let direction = _mm256_loadu_pd(Self::numbers(ray).add(3));
-            _mm256_cvtpd_ps(_mm256_mul_pd(direction, _mm256_set1_pd(start.scale)))
-        }
+        unsafe { _mm256_cvtpd_ps(_mm256_loadu_pd(Self::numbers(ray).add(3))) }
     }
 
     /// The ends of the range in the first two lanes.
@@ -248,7 +245,7 @@ impl<const AVX512: bool> Lanes for X86<AVX512> {
             let origin = _mm256_loadu_pd(Self::numbers(ray));
             let from = _mm256_sub_pd(origin, _mm256_loadu_pd(start.tree_origin.as_ptr()));
             let from = _mm256_cvtpd_ps(_mm256_mul_pd(from, _mm256_set1_pd(start.scale)));
-            let direction = Self::single_direction(start, ray);
+            let direction = Self::single_direction(ray);
             let range = Self::single_range(ray);
 
             let sign = _mm_set1_ps(-0.0);
@@ -257,18 +254,18 @@ impl<const AVX512: bool> Lanes for X86<AVX512> {
             let fits = _mm_and_ps(
                 _mm_and_ps(
                     _mm_cmple_ps(distance, _mm_loadu_ps(start.farthest.as_ptr())),
-                    _mm_cmple_ps(length, _mm_set1_ps(LARGEST_NEAR as f32)),
+                    _mm_cmple_ps(length, _mm_set1_ps(start.longest)),
                 ),
                 // 0 <= t_min, t_min <= t_max, and the first again.
                 _mm_cmple_ps(_mm_unpacklo_ps(_mm_setzero_ps(), range), range),
             );
-            let is_long = _mm_cmpge_ps(length, _mm_set1_ps(SMALLEST_NEAR as f32));
+            let is_long = _mm_cmpge_ps(length, _mm_set1_ps(start.shortest));
             if _mm_movemask_ps(fits) & 0b111 != 0b111 || _mm_movemask_ps(is_long) & 0b111 == 0 {
                 return None;
             }
 
-            let size = _mm_max_ps(length, _mm_set1_ps(TINY_NEAR as f32));
-            let size = _mm_div_ps(_mm_set1_ps(1.0), size);
+            let size = _mm_max_ps(length, _mm_set1_ps(start.tiny));
+            let size = _mm_div_ps(_mm_set1_ps(start.space_per_unit), size);
             let inverse = _mm_or_ps(size, _mm_and_ps(direction, sign));
             let per_distance = _mm_set1_ps(start.margin_per_distance);
             let margin = _mm_mul_ps(size, _mm_fmadd_ps(distance, per_distance, _mm_set1_ps(start.margin)));
@@ -297,7 +294,7 @@ impl<const AVX512: bool> Lanes for X86<AVX512> {
             let exact = _mm256_sub_pd(origin, _mm256_loadu_pd(start.mesh_origin.as_ptr()));
             let origin = _mm256_cvtpd_ps(exact);
             let rest = _mm256_cvtpd_ps(_mm256_sub_pd(exact, _mm256_cvtps_pd(origin)));
-            let direction = Self::single_direction(start, ray);
+            let direction = Self::single_direction(ray);
             let range = Self::single_range(ray);
             let range = _mm_movelh_ps(range, range);
 
@@ -312,12 +309,13 @@ impl<const AVX512: bool> Lanes for X86<AVX512> {
             let order = _mm_loadu_si128(axes.order.as_ptr().cast());
             let last = _mm_shuffle_epi32::<0b10_10_10_10>(order);
             let inverse = _mm_permutevar_ps(_mm_loadu_ps(slabs.inverse.as_ptr()), last);
+            let inverse = _mm_mul_ps(inverse, _mm_set1_ps(start.units_per_space));
             let first_three = _mm_castsi128_ps(_mm_setr_epi32(i32::MAX, i32::MAX, i32::MAX, 0));
             let reach = _mm_and_ps(origin, first_three);
             let reach = _mm_max_ps(reach, _mm_shuffle_ps::<0b01_00_11_10>(reach, reach));
             let reach = _mm_max_ps(reach, _mm_shuffle_ps::<0b10_11_00_01>(reach, reach));
             let reach = _mm_cvtss_f32(reach) + start.largest_corner;
-            let length = _mm_mul_ps(_mm_permutevar_ps(length, last), _mm_set1_ps(start.space_per_unit));
+            let length = _mm_permutevar_ps(length, last);
             // Start, end, start, end; none of them negative.
             let heights = _mm_min_ps(_mm_mul_ps(range, length), _mm_set1_ps(FAR));
             let apart = _mm_mul_ps(heights, _mm_set1_ps(ROUNDINGS));
@@ -335,8 +333,7 @@ impl<const AVX512: bool> Lanes for X86<AVX512> {
                 range: std::mem::transmute::<[f32; 4], HeightRange>(Self::array(_mm_add_ps(heights, apart))),
                 turn: _mm_cvtss_f32(_mm_andnot_ps(inverse, sign)),
             };
-            let place_per_height = _mm_cvtss_f32(_mm_andnot_ps(sign, inverse)) * start.units_per_space;
-            (blocks, place_per_height)
+            (blocks, _mm_cvtss_f32(_mm_andnot_ps(sign, inverse)))
         }
     }
 
@@ -501,26 +498,26 @@ impl<const AVX512: bool> Lanes for X86<AVX512> {
         unsafe {
             let ([u, v, w], z) = (edges.values, edges.heights);
             let sign = _mm256_set1_ps(-0.0);
-            let inverse = _mm256_div_ps(_mm256_set1_ps(1.0), _mm256_add_ps(_mm256_add_ps(u, v), w));
-            // Shares first: their products with lengths do not underflow.
-            let of_c = _mm256_mul_ps(_mm256_mul_ps(w, inverse), z[2]);
-            let of_b_and_c = _mm256_fmadd_ps(_mm256_mul_ps(v, inverse), z[1], of_c);
-            let height = _mm256_fmadd_ps(_mm256_mul_ps(u, inverse), z[0], of_b_and_c);
-            let height = _mm256_add_ps(height, _mm256_set1_ps(ray.rest[2]));
-            let ahead = _mm256_xor_ps(height, _mm256_set1_ps(ray.turn));
+            let det = _mm256_add_ps(_mm256_add_ps(u, v), w);
+            let weight = _mm256_andnot_ps(sign, det);
+            let of_a_and_b = _mm256_fmadd_ps(v, z[1], _mm256_mul_ps(u, z[0]));
+            let of_c = _mm256_fmadd_ps(det, _mm256_set1_ps(ray.rest[2]), _mm256_mul_ps(w, z[2]));
+            let height = _mm256_add_ps(of_a_and_b, of_c);
+            let turn = _mm256_xor_ps(_mm256_set1_ps(ray.turn), _mm256_and_ps(det, sign));
+            let ahead = _mm256_xor_ps(height, turn);
             let low = _mm256_min_ps(_mm256_min_ps(z[0], z[1]), z[2]);
             let high = _mm256_max_ps(_mm256_max_ps(z[0], z[1]), z[2]);
-            let share = _mm256_mul_ps(
-                _mm256_mul_ps(edges.error, _mm256_set1_ps(12.5)),
-                _mm256_andnot_ps(sign, inverse),
-            );
             let extent = _mm256_add_ps(_mm256_sub_ps(high, low), edges.height_error);
-            let spread = _mm256_fmadd_ps(share, extent, edges.height_error);
+            let spread = _mm256_fmadd_ps(
+                _mm256_mul_ps(edges.error, _mm256_set1_ps(12.5)),
+                extent,
+                _mm256_fmadd_ps(edges.height_error, weight, _mm256_set1_ps(TINY)),
+            );
             let (from, to) = (_mm256_sub_ps(ahead, spread), _mm256_add_ps(ahead, spread));
             // What is no number may be in range.
             let in_range = Self::both::<_CMP_NLT_UQ, _CMP_NGT_UQ>(
-                [to, _mm256_set1_ps(ray.range.first)],
-                [from, _mm256_set1_ps(ray.range.last)],
+                [to, _mm256_mul_ps(weight, _mm256_set1_ps(ray.range.first))],
+                [from, _mm256_mul_ps(weight, _mm256_set1_ps(ray.range.last))],
             );
             let twice = _mm256_add_ps(edges.error, edges.error);
             let inside = Self::either::<_CMP_GT_OQ, _CMP_LT_OQ>(
@@ -528,10 +525,10 @@ impl<const AVX512: bool> Lanes for X86<AVX512> {
                 [edges.most, _mm256_xor_ps(twice, sign)],
             );
             let surely_in_range = Self::both::<_CMP_GE_OQ, _CMP_LE_OQ>(
-                [from, _mm256_set1_ps(ray.range.surely_first)],
-                [to, _mm256_set1_ps(ray.range.surely_last)],
+                [from, _mm256_mul_ps(weight, _mm256_set1_ps(ray.range.surely_first))],
+                [to, _mm256_mul_ps(weight, _mm256_set1_ps(ray.range.surely_last))],
             );
-            Crossings { in_range, sure: inside & surely_in_range, from, to }
+            Crossings { in_range, sure: inside & surely_in_range, from, to, weight }
         }
     }
 
