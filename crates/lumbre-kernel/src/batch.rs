@@ -10,11 +10,15 @@ use lumbre_geometry::Ray;
 use crate::Accel;
 use crate::holds::SingleStart;
 use crate::lanes::{Lanes, Level, Task};
-use crate::single::{Goal, Outcome, SingleRay, Step};
+use crate::node::Node;
+use crate::single::{self, Goal, Outcome, SingleRay, Step};
 use crate::stack::{Order, Stack};
+use crate::triangles::TriangleBlock;
 
 /// Rays in flight on a thread.
 const IN_FLIGHT: usize = 6;
+/// Bytes of nodes and triangles from which on waiting for memory outweighs what it costs to turn from ray to ray.
+const WORTH_FLYING: usize = 1 << 24;
 
 /// Searches along every ray. `end` takes what came of it with the position of the ray, in any order.
 pub(crate) fn search_all<G: Goal>(
@@ -23,10 +27,37 @@ pub(crate) fn search_all<G: Goal>(
     rays: &[Ray],
     mut end: impl FnMut(usize, Outcome<G::Answer>),
 ) {
+    let tree = &accel.tree;
+    let bytes = size_of_val::<[Node]>(&tree.nodes) + size_of_val::<[TriangleBlock]>(&tree.blocks);
     if let Some(start) = &accel.single {
-        level.run(Flights::<G, _> { accel, start, rays, end, goal: PhantomData });
+        if bytes < WORTH_FLYING {
+            level.run(OneByOne::<G, _> { accel, start, rays, end, goal: PhantomData });
+        } else {
+            level.run(Flights::<G, _> { accel, start, rays, end, goal: PhantomData });
+        }
     } else {
         (0..rays.len()).for_each(|position| end(position, Outcome::Unsettled));
+    }
+}
+
+/// Rays through a tree of which the caches hold much: they go one after another.
+struct OneByOne<'a, 'r, G, E> {
+    accel: &'a Accel,
+    start: &'a SingleStart,
+    rays: &'r [Ray],
+    end: E,
+    goal: PhantomData<G>,
+}
+
+impl<G: Goal, E: FnMut(usize, Outcome<G::Answer>)> Task for OneByOne<'_, '_, G, E> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let Self { accel, start, rays, mut end, .. } = self;
+        for (position, ray) in rays.iter().enumerate() {
+            end(position, single::search_with::<G, L>(accel, start, ray));
+        }
     }
 }
 

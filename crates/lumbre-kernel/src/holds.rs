@@ -2,7 +2,8 @@
 
 use lumbre_math::DVec3;
 
-use crate::node::{LARGEST_NEAR, SMALLEST_NEAR, TINY_NEAR, Units};
+use crate::node::{LARGEST_NEAR, SMALLEST_NEAR, TINY_NEAR, Units, round_up};
+use crate::triangles::LEAST_SIZE;
 use crate::{Geometry, GeometryKind};
 
 /// What is known of all the geometries of a tree.
@@ -70,8 +71,8 @@ pub(crate) struct SingleStart {
     /// The scale, and its inverse.
     pub(crate) units_per_space: f32,
     pub(crate) space_per_unit: f32,
-    /// No corner has a larger coordinate.
-    pub(crate) largest_corner: f32,
+    /// That of [`BlockRay`](crate::triangles::BlockRay) for every ray from nearby.
+    pub(crate) least_size: f32,
     /// The bounds on the largest component of a direction, and that below which one is replaced.
     pub(crate) shortest: f32,
     pub(crate) longest: f32,
@@ -102,7 +103,7 @@ impl SingleStart {
             margin_per_distance: Units::SINGLE_MARGIN_PER_DISTANCE,
             units_per_space: units.scale as f32,
             space_per_unit: (1.0 / units.scale) as f32,
-            largest_corner: holds.largest_corner,
+            least_size: round_up(reach * f64::from(LEAST_SIZE)),
             shortest: (SMALLEST_NEAR / units.scale) as f32,
             longest: (LARGEST_NEAR / units.scale) as f32,
             tiny: (TINY_NEAR / units.scale) as f32,

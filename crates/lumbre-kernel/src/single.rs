@@ -93,6 +93,7 @@ impl Candidate {
 /// A ray under way in a tree that [`SingleStart`] was made for.
 pub(crate) struct SingleRay<'a, L> {
     accel: &'a Accel,
+    start: &'a SingleStart,
     // Those of the tree, which may lie in a file.
     triangles: &'a [TriangleBlock],
     way: Way<'a, L>,
@@ -106,16 +107,17 @@ pub(crate) struct SingleRay<'a, L> {
 impl<'a, L: Lanes> SingleRay<'a, L> {
     /// Starts with a ray; `None` where that does not come from nearby, or is not sound.
     #[inline(always)]
-    pub(crate) fn start(accel: &'a Accel, start: &SingleStart, ray: &Ray) -> Option<Self> {
+    pub(crate) fn start(accel: &'a Accel, start: &'a SingleStart, ray: &Ray) -> Option<Self> {
         let slabs = L::start_single(start, ray)?;
         Some(Self::among_triangles(accel, start, ray, Way::new(&accel.tree.nodes, slabs)))
     }
 
     /// Goes on with a ray that has come to a first leaf.
     #[inline(always)]
-    fn among_triangles(accel: &'a Accel, start: &SingleStart, ray: &Ray, way: Way<'a, L>) -> Self {
+    fn among_triangles(accel: &'a Accel, start: &'a SingleStart, ray: &Ray, way: Way<'a, L>) -> Self {
         let (blocks, place_per_height) = L::start_blocks(start, ray, way.slabs());
-        Self { accel, triangles: &accel.tree.blocks, way, blocks, place_per_height, best: Candidate::NONE }
+        let triangles = &accel.tree.blocks;
+        Self { accel, start, triangles, way, blocks, place_per_height, best: Candidate::NONE }
     }
 
     /// Tests a leaf for the nearest hit; false where the plain search has to answer.
@@ -161,8 +163,7 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
     /// Whether the ray passes by a triangle, or meets it out of its range, as far as that is seen at a glance.
     #[inline(always)]
     fn passes(&self, ray: &Ray, block: &TriangleBlock, lane: u32) -> bool {
-        let shear = Shear::new(&ray.direction);
-        let origin = shear.local_origin(&ray.origin, &self.accel.holds.first_origin);
+        let (shear, origin) = L::shear(ray, &self.start.mesh_origin);
         match L::pass(block, lane as usize, &shear, &origin) {
             (Passage::Outside, _) => true,
             (Passage::Inside, inside) => !triangles::is_in_range(ray, inside.t(&shear)),
@@ -243,8 +244,7 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
             return Outcome::Settled(None);
         }
         let Candidate { block, lane, .. } = self.best;
-        let shear = Shear::new(&ray.direction);
-        let origin = shear.local_origin(&ray.origin, &self.accel.holds.first_origin);
+        let (shear, origin) = L::shear(ray, &self.start.mesh_origin);
         let corners = &self.triangles[block as usize];
         let (passage, inside) = L::pass(corners, lane as usize, &shear, &origin);
         let root = if passage == Passage::Inside {

@@ -83,21 +83,25 @@ impl Order for AsBuilt {
 /// Last in, first out.
 pub(crate) struct Stack<E> {
     slots: Slots<E>,
-    // The ones below them.
-    spilled: Vec<E>,
+    // The ones below them: apart, for there seldom are any.
+    spilled: Option<Box<Spilled<E>>>,
+}
+
+struct Spilled<E> {
+    entries: Vec<E>,
 }
 
 impl<E: Copy> Stack<E> {
     #[inline(always)]
     pub(crate) fn new() -> Self {
-        Self { slots: Slots::new(), spilled: Vec::new() }
+        Self { slots: Slots::new(), spilled: None }
     }
 
     /// Drops everything.
     #[inline(always)]
     pub(crate) fn clear(&mut self) {
         self.slots.clear();
-        self.spilled.clear();
+        self.spilled = None;
     }
 
     /// Somewhere for eight more.
@@ -118,7 +122,7 @@ impl<E: Copy> Stack<E> {
     pub(crate) fn pop(&mut self) -> Option<E> {
         match self.slots.pop() {
             Some(entry) => Some(entry),
-            None if self.spilled.is_empty() => None,
+            None if self.spilled.is_none() => None,
             None => self.pop_spilled(),
         }
     }
@@ -126,22 +130,28 @@ impl<E: Copy> Stack<E> {
     #[cold]
     #[inline(never)]
     fn spill(&mut self) {
-        let bottom = self.spilled.len();
+        let Spilled { entries } =
+            &mut **self.spilled.get_or_insert_with(|| Box::new(Spilled { entries: Vec::new() }));
+        let bottom = entries.len();
         while let Some(entry) = self.slots.pop() {
-            self.spilled.push(entry);
+            entries.push(entry);
         }
-        self.spilled[bottom..].reverse();
+        entries[bottom..].reverse();
     }
 
     #[cold]
     #[inline(never)]
     fn pop_spilled(&mut self) -> Option<E> {
-        let count = self.spilled.len().min(STACK / 2);
-        let rest = self.spilled.len() - count;
-        for &entry in &self.spilled[rest..] {
+        let Spilled { entries } = &mut **self.spilled.as_mut()?;
+        let count = entries.len().min(STACK / 2);
+        let rest = entries.len() - count;
+        for &entry in &entries[rest..] {
             self.slots.push(entry);
         }
-        self.spilled.truncate(rest);
+        entries.truncate(rest);
+        if rest == 0 {
+            self.spilled = None;
+        }
         self.slots.pop()
     }
 }

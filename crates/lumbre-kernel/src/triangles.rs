@@ -158,7 +158,7 @@ pub(crate) struct BlockRay {
     pub(crate) rest: [f32; 4],
     /// The direction by its last component, in the order of the axes.
     pub(crate) shear: [f32; 4],
-    /// 4uL.
+    /// 4uL, of the largest L there may be.
     pub(crate) least_size: f32,
     pub(crate) range: HeightRange,
     /// A zero, negative where the last component of the direction is positive: what is behind a corner, with the sign flipped by

@@ -67,6 +67,9 @@ pub(crate) trait Lanes: SphereLanes {
     /// The number in a lane.
     fn lane(floats: Self::Floats, lane: usize) -> f32;
 
+    /// [`Shear::new`] and [`Shear::local_origin`] of a ray for a mesh.
+    fn shear(ray: &Ray, mesh_origin: &[f64; 4]) -> (Shear, [f64; 3]);
+
     /// How a ray passes the triangle in a lane, in double precision, and what its crossing inside is made of. `origin` has the order of the shear's axes.
     fn pass(block: &TriangleBlock, lane: usize, shear: &Shear, origin: &[f64; 3]) -> (Passage, Inside);
 }
@@ -129,23 +132,32 @@ impl Sides {
 }
 
 /// The axes in another order.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub(crate) struct Axes {
     // Each below three; the fourth only fills up.
     order: [u32; 4],
+    // The halves of each.
+    halves: [u32; 8],
     // Where the lanes of each begin among those of a corner: eight times as much.
     lanes: [usize; 3],
 }
 
 impl Axes {
     const fn of(x: usize, y: usize, z: usize) -> Self {
-        Self { order: [x as u32, y as u32, z as u32, 3], lanes: [x * BLOCK, y * BLOCK, z * BLOCK] }
+        let order = [x as u32, y as u32, z as u32, 3];
+        let mut halves = [0; 8];
+        let mut half = 0;
+        while half < 8 {
+            halves[half] = 2 * order[half / 2] + half as u32 % 2;
+            half += 1;
+        }
+        Self { order, halves, lanes: [x * BLOCK, y * BLOCK, z * BLOCK] }
     }
 }
 
 // By which is the last and whether it is negative; eight, so that three bits name one.
-static AXES: [Axes; 8] = [
+const AXES: [Axes; 8] = [
     Axes::of(1, 2, 0),
     Axes::of(2, 0, 1),
     Axes::of(0, 1, 2),
@@ -165,16 +177,16 @@ impl Axes {
         let x_is_largest = usize::from((x >= y) & (x >= z));
         let z = (1 - x_is_largest) * (2 - usize::from(y >= z));
         let is_negative = usize::from(direction.as_ref()[z] < 0.0);
-        &AXES[(4 * is_negative + z) % 8]
+        static ALL: [Axes; 8] = AXES;
+        &ALL[(4 * is_negative + z) % 8]
     }
 
     /// The axes for a direction whose components have these signs, a bit for each negative one, and these sizes: a bit each for
     /// |x| ≥ |y|, |y| ≥ |z| and |x| ≥ |z|.
     #[inline(always)]
     pub(crate) fn by_bits(signs: u32, sizes: u32) -> &'static Self {
-        // By both: which axis is the largest, and whether it is negative.
-        static PLACES: [u8; 64] = {
-            let mut places = [0; 64];
+        static ALL: [Axes; 64] = {
+            let mut all = [AXES[0]; 64];
             let mut bits = 0;
             while bits < 64 {
                 let (signs, sizes) = (bits % 8, bits / 8);
@@ -185,12 +197,12 @@ impl Axes {
                 } else {
                     2
                 };
-                places[bits] = (4 * (signs >> z & 1) + z) as u8;
+                all[bits] = AXES[4 * (signs >> z & 1) + z];
                 bits += 1;
             }
-            places
+            all
         };
-        &AXES[PLACES[(((sizes % 8) << 3) | (signs % 8)) as usize] as usize % 8]
+        &ALL[(((sizes % 8) << 3) | (signs % 8)) as usize]
     }
 
     /// A vector's components in this order.

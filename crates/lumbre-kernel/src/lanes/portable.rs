@@ -3,14 +3,15 @@
 use std::mem::MaybeUninit;
 
 use lumbre_geometry::Ray;
+use lumbre_math::DVec3;
 
 use super::{Axes, Crossings, LANE_BITS, Lanes, Sides, Slots};
 use crate::holds::SingleStart;
 use crate::node::{BoxRay, END_FACTOR, LITTLE, Node, START_FACTOR, Slabs, Units, WIDTH};
 use crate::stack::stack_entry;
 use crate::triangles::{
-    BLOCK, BlockRay, EDGE_ERROR, HEIGHT_ERROR, HeightRange, Inside, LEAST_SIZE, Passage, SIZE_ERROR, Shear,
-    TINY, TriangleBlock, passage,
+    BLOCK, BlockRay, EDGE_ERROR, HEIGHT_ERROR, HeightRange, Inside, Passage, SIZE_ERROR, Shear, TINY,
+    TriangleBlock, passage,
 };
 
 pub(crate) struct Portable;
@@ -92,8 +93,6 @@ impl Lanes for Portable {
         let axes = Axes::by_bits(signs, u32::from(x >= y) | u32::from(y >= z) << 1 | u32::from(x >= z) << 2);
         let inverse = axes.permute_single(&slabs.inverse)[2] * start.units_per_space;
         let shear = axes.permute_single(&direction).map(|d| d * inverse);
-        let reach =
-            greater(greater(origin[0].abs(), origin[1].abs()), origin[2].abs()) + start.largest_corner;
         let rest = axes.permute_single(&rest);
         let length = axes.permute_single(&direction)[2].abs();
         let blocks = BlockRay {
@@ -101,7 +100,7 @@ impl Lanes for Portable {
             origin: axes.permute_single(&origin),
             rest: [rest[0] - shear[0] * rest[2], rest[1] - shear[1] * rest[2], rest[2], 0.0],
             shear,
-            least_size: reach * LEAST_SIZE,
+            least_size: start.least_size,
             range: HeightRange::new(ray.t_min as f32 * length, ray.t_max as f32 * length),
             turn: 0.0f32.copysign(-inverse),
         };
@@ -234,6 +233,12 @@ impl Lanes for Portable {
     #[inline(always)]
     fn lane(floats: [f32; BLOCK], lane: usize) -> f32 {
         floats[lane % BLOCK]
+    }
+
+    #[inline(always)]
+    fn shear(ray: &Ray, &[x, y, z, _]: &[f64; 4]) -> (Shear, [f64; 3]) {
+        let shear = Shear::new(&ray.direction);
+        (shear, shear.local_origin(&ray.origin, &DVec3::new(x, y, z)))
     }
 
     #[inline(always)]

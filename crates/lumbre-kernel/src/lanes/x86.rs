@@ -13,8 +13,8 @@ use crate::node::{
 };
 use crate::stack::stack_entry;
 use crate::triangles::{
-    BLOCK, BlockRay, EDGE_ERROR, FAR, HEIGHT_ERROR, HeightRange, Inside, LEAST_SIZE, Passage, ROUNDINGS,
-    SIZE_ERROR, Shear, TINY, TriangleBlock,
+    BLOCK, BlockRay, EDGE_ERROR, FAR, HEIGHT_ERROR, HeightRange, Inside, Passage, ROUNDINGS, SIZE_ERROR,
+    Shear, TINY, TriangleBlock,
 };
 
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
@@ -310,11 +310,6 @@ impl<const AVX512: bool> Lanes for X86<AVX512> {
             let last = _mm_shuffle_epi32::<0b10_10_10_10>(order);
             let inverse = _mm_permutevar_ps(_mm_loadu_ps(slabs.inverse.as_ptr()), last);
             let inverse = _mm_mul_ps(inverse, _mm_set1_ps(start.units_per_space));
-            let first_three = _mm_castsi128_ps(_mm_setr_epi32(i32::MAX, i32::MAX, i32::MAX, 0));
-            let reach = _mm_and_ps(origin, first_three);
-            let reach = _mm_max_ps(reach, _mm_shuffle_ps::<0b01_00_11_10>(reach, reach));
-            let reach = _mm_max_ps(reach, _mm_shuffle_ps::<0b10_11_00_01>(reach, reach));
-            let reach = _mm_cvtss_f32(reach) + start.largest_corner;
             let length = _mm_permutevar_ps(length, last);
             // Start, end, start, end; none of them negative.
             let heights = _mm_min_ps(_mm_mul_ps(range, length), _mm_set1_ps(FAR));
@@ -329,7 +324,7 @@ impl<const AVX512: bool> Lanes for X86<AVX512> {
                 origin: Self::array(_mm_permutevar_ps(origin, order)),
                 rest: Self::array(_mm_blend_ps::<0b1100>(sheared, rest)),
                 shear: Self::array(shear),
-                least_size: reach * LEAST_SIZE,
+                least_size: start.least_size,
                 range: std::mem::transmute::<[f32; 4], HeightRange>(Self::array(_mm_add_ps(heights, apart))),
                 turn: _mm_cvtss_f32(_mm_andnot_ps(inverse, sign)),
             };
@@ -536,6 +531,39 @@ impl<const AVX512: bool> Lanes for X86<AVX512> {
     fn lane(floats: __m256, lane: usize) -> f32 {
         // SAFETY: see `X86`.
         unsafe { _mm256_cvtss_f32(_mm256_permutevar8x32_ps(floats, _mm256_set1_epi32(lane as i32))) }
+    }
+
+    #[inline(always)]
+    fn shear(ray: &Ray, mesh_origin: &[f64; 4]) -> (Shear, [f64; 3]) {
+        // SAFETY: see `X86`. The loads are of the first eight numbers of a ray, see above, and of arrays of four and eight.
+        unsafe {
+            let direction = _mm256_loadu_pd(Self::numbers(ray).add(3));
+            let size = _mm256_andnot_pd(_mm256_set1_pd(-0.0), direction);
+            // x, y, x and y, z, z.
+            let sizes = _mm256_cmp_pd::<_CMP_GE_OQ>(
+                _mm256_permute4x64_pd::<0b00_00_01_00>(size),
+                _mm256_permute4x64_pd::<0b10_10_10_01>(size),
+            );
+            let signs = _mm256_movemask_pd(direction) as u32;
+            let axes = Axes::by_bits(signs, _mm256_movemask_pd(sizes) as u32);
+            let halves = _mm256_loadu_si256(axes.halves.as_ptr().cast());
+            let origin = _mm256_loadu_pd(Self::numbers(ray));
+            let origin = _mm256_sub_pd(origin, _mm256_loadu_pd(mesh_origin.as_ptr()));
+            let origin = _mm256_permutevar8x32_ps(_mm256_castpd_ps(origin), halves);
+            let direction = _mm256_permutevar8x32_ps(_mm256_castpd_ps(direction), halves);
+            let direction = _mm256_castps_pd(direction);
+            let last = _mm256_permute4x64_pd::<0b10_10_10_10>(direction);
+            let shear = _mm_div_pd(_mm256_castpd256_pd128(direction), _mm256_castpd256_pd128(last));
+            let mut local = [0.0; 4];
+            _mm256_storeu_pd(local.as_mut_ptr(), _mm256_castps_pd(origin));
+            let shear = Shear {
+                axes,
+                x: _mm_cvtsd_f64(shear),
+                y: _mm_cvtsd_f64(_mm_unpackhi_pd(shear, shear)),
+                direction_z: _mm256_cvtsd_f64(last),
+            };
+            (shear, [local[0], local[1], local[2]])
+        }
     }
 
     #[inline(always)]
