@@ -95,10 +95,12 @@ impl Parts {
     }
 
     fn positions(&mut self, positions: &[[f32; 3]]) -> usize {
-        let kind = format!(
-            r#""componentType":5126,"type":"VEC3","count":{},"min":[0,0,0],"max":[9,9,9]"#,
-            positions.len()
-        );
+        let end = |better: fn(f32, f32) -> f32| {
+            [0, 1, 2].map(|axis| positions.iter().map(|p| p[axis]).reduce(better).unwrap_or_default())
+        };
+        let ([x0, y0, z0], [x1, y1, z1]) = (end(f32::min), end(f32::max));
+        let bounds = format!(r#""min":[{x0},{y0},{z0}],"max":[{x1},{y1},{z1}]"#);
+        let kind = format!(r#""componentType":5126,"type":"VEC3","count":{},{bounds}"#, positions.len());
         self.add(&floats(positions.as_flattened()), &kind)
     }
 
@@ -179,6 +181,102 @@ fn points_and_lines_are_spheres_and_cylinders() {
         }
         Scene::build(scene).unwrap();
     }
+}
+
+/// Radius and base colour of the first shape, a sphere or a cylinder.
+fn thin(scene: &SceneDesc) -> (f64, Rgb) {
+    let GeometryDesc::Exact(exact) = &scene.shapes[0].geometry else { panic!("an exact shape is expected") };
+    let size = exact.bounds(&scene.shapes[0].world_from_object).unwrap().size();
+    let MaterialKind::Principled(params) = &scene.materials[0].material.kind else {
+        panic!("principled is expected")
+    };
+    let colour = match *params.base_color {
+        Texture::Constant(colour) => colour,
+        ref other => panic!("{other:?}"),
+    };
+    (0.5 * size.min_element(), colour)
+}
+
+#[test]
+fn points_and_lines_are_as_wide_as_the_model_asks_and_of_a_colour_that_is_seen() {
+    // A square of 5 by its diagonal, at twice its size, and another far to its right: 50 across, and 8 high.
+    let scene = |mode: u32, material: &str| {
+        let mut parts = Parts::default();
+        let p = parts.positions(&SQUARE);
+        parts.read(&format!(
+            r#""materials":[{{"pbrMetallicRoughness":{{"baseColorFactor":[1,1,1,1]}}}}],
+            "meshes":[{{"primitives":[{{"mode":{mode},{material}"attributes":{{"POSITION":{p}}}}}]}},
+                {{"primitives":[{{"attributes":{{"POSITION":{p}}}}}]}}],
+            "nodes":[{{"mesh":0,"scale":[2,2,2]}},{{"mesh":1,"translation":[40,0,0]}}]"#
+        ))
+    };
+    let (low, high) = SQUARE.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), &p| {
+        (low.min(Vec3::from_array(p)), high.max(Vec3::from_array(p)))
+    });
+    let whole = (high + Vec3::X * 40.0).max(2.0 * high) - (2.0 * low).min(low);
+    let whole = f64::from(whole.length());
+    for (mode, share) in [(0, 0.004), (1, 0.002), (3, 0.002)] {
+        let (radius, ink) = thin(&scene(mode, ""));
+        assert!((radius / (share * whole) - 1.0).abs() < 1e-5, "mode {mode}: {radius} of {whole}");
+        assert!(ink.luminance() < 0.2 && ink.b > 3.0 * ink.g, "{ink:?}");
+        let (_, own) = thin(&scene(mode, r#""material":0,"#));
+        assert_eq!(own, Rgb::WHITE);
+    }
+    // What is a surface keeps glTF's own default.
+    assert_eq!(colour_of_default_surface(), Rgb::WHITE);
+    // Of a hundred thousand points, each is less than a five hundredth across.
+    let mut parts = Parts::default();
+    let cloud: Vec<[f32; 3]> =
+        (0..100_000).map(|i| [i as f32 * 1e-5, (i % 317) as f32 / 316.0, 0.0]).collect();
+    let p = parts.positions(&cloud);
+    let (radius, _) = thin(&parts.read(&one(&format!(r#""mode":0,"attributes":{{"POSITION":{p}}}"#))));
+    assert!((radius / (0.5 / 100_000_f64.sqrt() * 2_f64.sqrt()) - 1.0).abs() < 1e-3, "{radius}");
+}
+
+fn colour_of_default_surface() -> Rgb {
+    let mut parts = Parts::default();
+    let p = parts.positions(&SQUARE);
+    let scene = parts.read(&one(&format!(r#""mode":6,"attributes":{{"POSITION":{p}}}"#)));
+    match &scene.materials[0].material.kind {
+        MaterialKind::Principled(params) => match *params.base_color {
+            Texture::Constant(colour) => colour,
+            ref other => panic!("{other:?}"),
+        },
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn images_of_another_kind_than_they_are_said_to_be_are_read_and_named() {
+    let image = picture([51, 102, 204], image::ImageFormat::Png);
+    let escaped: String = image.iter().map(|byte| format!("%{byte:02x}")).collect();
+    let said = |image: &str| {
+        let mut parts = Parts::default();
+        let p = parts.positions(&SQUARE);
+        let uv = parts.add(&floats(&[0.0; 8]), r#""componentType":5126,"type":"VEC2","count":4"#);
+        let one = one(&format!(r#""mode":6,"material":0,"attributes":{{"POSITION":{p},"TEXCOORD_0":{uv}}}"#));
+        let json = parts.json(&format!(
+            r#""images":[{image}],"textures":[{{"source":0}}],
+            "materials":[{{"pbrMetallicRoughness":{{"baseColorTexture":{{"index":0}}}}}}],{one}"#
+        ));
+        let mut diagnostics = Diagnostics::new();
+        let scene = read_with(&glb(&json, &parts.binary), &GltfOptions::default(), &mut diagnostics).unwrap();
+        let MaterialKind::Principled(params) = &scene.materials[0].material.kind else {
+            panic!("principled")
+        };
+        assert!(matches!(*params.base_color, Texture::Image(_)), "{:?}", params.base_color);
+        diagnostics.lines()
+    };
+    assert_eq!(said(&format!(r#"{{"uri":"data:image/png,{escaped}"}}"#)), [""; 0]);
+    assert_eq!(said(&format!(r#"{{"uri":"data:image/PNG,{escaped}"}}"#)), [""; 0]);
+    for (wrong, kind) in [("image/jpeg", "jpeg"), ("", "none"), ("application/octet-stream", "other")] {
+        let lines = said(&format!(r#"{{"uri":"data:{wrong},{escaped}"}}"#));
+        assert_eq!(lines.len(), 1, "{kind}: {lines:?}");
+        assert!(lines[0].contains("/images/0/uri: wrong media type of an image"), "{kind}: {lines:?}");
+        assert!(lines[0].contains(r#"expected "image/png""#), "{kind}: {lines:?}");
+    }
+    let lines = said(&format!(r#"{{"mimeType":"image/jpeg","uri":"data:image/png,{escaped}"}}"#));
+    assert!(lines.len() == 1 && lines[0].contains("/images/0/mimeType: wrong media type"), "{lines:?}");
 }
 
 #[test]
@@ -1166,8 +1264,8 @@ fn broken_files_are_refused_with_a_pointer_and_a_reason() {
         (r#""type":"VEC3","count":4,"min""#, r#""type":"VEC3","count":0,"min""#, "/accessors/0/count: wrong number (found 0"),
         (r#""type":"VEC3","count":4,"min""#, r#""type":"VEC3","count":1.5,"min""#, "/accessors/0/count: wrong number (found 1.5"),
         (r#""type":"VEC3","count":4,"min""#, r#""type":"VEC3","count":2,"min""#, "attributes of different lengths"),
-        (r#""type":"VEC3","count":4,"min":[0,0,0]"#, r#""type":"VEC3","count":4,"min":[0,0]"#, "/accessors/0/min: bound of a wrong length (expected 3)"),
-        (r#""type":"VEC3","count":4,"min":[0,0,0],"#, r#""type":"VEC3","count":4,"#, r#"/accessors/0: accessor of positions without "min" and "max""#),
+        (r#""type":"VEC3","count":4,"min":[0,0,2]"#, r#""type":"VEC3","count":4,"min":[0,0]"#, "/accessors/0/min: bound of a wrong length (expected 3)"),
+        (r#""type":"VEC3","count":4,"min":[0,0,2],"#, r#""type":"VEC3","count":4,"#, r#"/accessors/0: accessor of positions without "min" and "max""#),
         (r#"{"bufferView":0,"componentType":5126"#, r#"{"bufferView":0,"byteOffset":2,"componentType":5126"#, "/accessors/0/count: accessor past the end"),
         (r#"{"bufferView":0,"componentType":5126"#, r#"{"bufferView":0,"componentType":5125"#, "/meshes/0/primitives/0/attributes/POSITION: accessor of a wrong type (found VEC3 of unsigned integers; expected VEC3 of floats)"),
         (r#"{"bufferView":0,"componentType":5126"#, r#"{"bufferView":0,"componentType":5124"#, "/accessors/0/componentType: unknown type of number (found 5124"),

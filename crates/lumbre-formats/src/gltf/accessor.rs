@@ -352,6 +352,24 @@ impl<'a> Accessor<'a> {
         }
     }
 
+    /// The least and the largest of its numbers, as it says them itself; `None` where it does not, or not as many as there are.
+    pub fn bounds<const N: usize>(&self) -> Read<Option<[[f64; N]; 2]>> {
+        let [Some(low), Some(high)] = [self.value.get("min")?, self.value.get("max")?] else {
+            return Ok(None);
+        };
+        if low.array()?.count() != N || high.array()?.count() != N {
+            return Ok(None);
+        }
+        let unit = match (self.component, self.normalized) {
+            (Component::I8, true) => 127.0,
+            (Component::U8, true) => 255.0,
+            (Component::I16, true) => 32767.0,
+            (Component::U16, true) => 65535.0,
+            _ => 1.0,
+        };
+        Ok(Some([low.numbers::<N>()?.map(|x| x / unit), high.numbers::<N>()?.map(|x| x / unit)]))
+    }
+
     /// The same numbers by threes, as long as there are three; `None` where they do not simply stand in a row.
     pub fn by_threes(&self) -> Option<Self> {
         let size = self.component.bytes();

@@ -1,6 +1,7 @@
 //! From the nodes of a glTF to a scene: shapes where they stand, meshes of several nodes as objects.
 
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::sync::Arc;
 
 use lumbre_geometry::{Cylinder, Shape, Sphere};
@@ -24,9 +25,11 @@ use super::texture::{Textures, UvSets};
 use super::{GltfOptions, animation, tangents};
 use crate::diagnostic::{Diagnostic, quoted};
 
-/// Radius of points, and of lines, as a share of the diagonal of the box around all vertices of the primitive.
+/// Radius of points, and of lines, as a share of the diagonal of the box around the whole model; and no more than this share
+/// of it over the root of how many there are, so that clouds stay clouds.
 const POINT_RADIUS: f64 = 0.004;
 const LINE_RADIUS: f64 = 0.002;
+const MOST_RADIUS_OF_MANY: f64 = 0.5;
 
 /// Bounces at most: a ray goes in and out of every piece of glass that it meets.
 const MAX_DEPTH: u32 = 16;
@@ -113,6 +116,7 @@ pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
         exposure,
         objects: HashMap::new(),
         next_shape: 0,
+        size: size(file, &places)?,
     };
     for place in &places {
         builder.place(&mut scene, place, uses[&place.key])?;
@@ -144,6 +148,45 @@ impl Placed {
     fn motion(&self, copy: usize) -> Option<Arc<AnimatedTransform>> {
         self.motions.get(copy).cloned().flatten()
     }
+}
+
+/// The length of the diagonal of the box around all that is placed, as accessors say where their vertices are, before skins and
+/// morph targets; 0 where they say nothing.
+fn size(file: &File<'_>, places: &[Placed]) -> Read<f64> {
+    let mut of_meshes: HashMap<usize, Vec<[DVec3; 2]>> = HashMap::new();
+    let mut corners = vec![];
+    for place in places {
+        if let Entry::Vacant(entry) = of_meshes.entry(place.key.mesh) {
+            let mesh = file.list(List::Meshes)[place.key.mesh];
+            let mut boxes = vec![];
+            for value in mesh.need("primitives")?.array()? {
+                let Some(position) = value.need("attributes")?.get("POSITION")? else { continue };
+                let bounds = Accessor::named(file, position)?.bounds::<3>()?;
+                boxes.extend(bounds.map(|bounds| bounds.map(DVec3::from_array)));
+            }
+            entry.insert(boxes);
+        }
+        for world in &place.worlds {
+            let ends = of_meshes[&place.key.mesh].iter().map(|[low, high]| {
+                let (center, half) = (0.5 * (*low + *high), 0.5 * (*high - *low));
+                let axes = [world.matrix3.x_axis, world.matrix3.y_axis, world.matrix3.z_axis];
+                let reach = axes[0].abs() * half.x + axes[1].abs() * half.y + axes[2].abs() * half.z;
+                let center = world.transform_point3(center);
+                [center - reach, center + reach]
+            });
+            corners.extend(ends.flatten());
+            // Two say as much as many.
+            if corners.len() > 2 {
+                let start = corners.iter().copied().fold(DVec3::INFINITY, DVec3::min);
+                let end = corners.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+                corners = vec![start, end];
+            }
+        }
+    }
+    Ok(match corners[..] {
+        [start, end] if (end - start).is_finite() => (end - start).length(),
+        _ => 0.0,
+    })
 }
 
 /// The variant that is asked for, by its position.
@@ -441,6 +484,8 @@ struct Builder<'f> {
     /// Meshes that stand in more than one place: their objects, and the parts that shine.
     objects: HashMap<Key, (Option<ObjectId>, Vec<ShapeDesc>)>,
     next_shape: u32,
+    /// That of the whole model: see [`size`].
+    size: f64,
 }
 
 impl Builder<'_> {
@@ -547,7 +592,8 @@ impl Builder<'_> {
                 continue;
             }
             let has_colours = primitive.attributes.colour.is_some() && primitive.mode.is_surface();
-            let dressing = self.materials.dressing(primitive.material, has_colours)?;
+            let dressing =
+                self.materials.dressing(primitive.material, has_colours, primitive.mode.is_surface())?;
             let sets = dressing.sets.filter(|_| primitive.mode.is_surface());
             let has_tangents =
                 primitive.attributes.tangent.is_some() && primitive.attributes.normal.is_some();
@@ -590,7 +636,10 @@ impl Builder<'_> {
                     if primitive.attributes.colour.is_some() {
                         file.warn(value, "vertex colours of points and lines were left out");
                     }
-                    for exact in thin_shapes(&vertices.positions, &thin) {
+                    // In the space of the mesh, as large as in the world.
+                    let scale =
+                        place.worlds.first().map_or(1.0, |world| world.matrix3.determinant().abs().cbrt());
+                    for exact in thin_shapes(&vertices.positions, &thin, self.size / scale) {
                         file.budget.bytes(size_of::<ShapeDesc>() as u64, "points and lines")?;
                         shapes.push(shape(GeometryDesc::Exact(exact), self.next_index()));
                     }
@@ -689,19 +738,21 @@ fn mesh_of(mut vertices: Vertices, triangles: Vec<[u32; 3]>, dressing: &Dressing
     })
 }
 
-/// Points as spheres; lines as capped cylinders, with spheres where one goes on as the next.
-fn thin_shapes(positions: &[Vec3], assembly: &Assembly) -> Vec<Shape> {
+/// Points as spheres; lines as capped cylinders, with spheres where one goes on as the next. `size` is that of the whole
+/// model, which the primitive itself stands for where there is none.
+fn thin_shapes(positions: &[Vec3], assembly: &Assembly, size: f64) -> Vec<Shape> {
     let at = |i: u32| positions[i as usize].as_dvec3();
-    let size = mesh::diagonal(positions.iter().copied());
-    let size = if size > 0.0 { size } else { 1.0 };
+    let is_size = |size: &f64| *size > 0.0 && size.is_finite();
+    let own = || mesh::diagonal(positions.iter().copied());
+    let size = Some(size).filter(is_size).or_else(|| Some(own()).filter(is_size)).unwrap_or(1.0);
+    let radius = |share: f64, count: usize| share.min(MOST_RADIUS_OF_MANY / (count as f64).sqrt()) * size;
     match assembly {
-        Assembly::Points(points) => points
-            .iter()
-            .filter_map(|&i| Sphere::new(at(i), POINT_RADIUS * size).ok())
-            .map(Shape::from)
-            .collect(),
+        Assembly::Points(points) => {
+            let radius = radius(POINT_RADIUS, points.len());
+            points.iter().filter_map(|&i| Sphere::new(at(i), radius).ok()).map(Shape::from).collect()
+        }
         Assembly::Segments(segments) => {
-            let radius = LINE_RADIUS * size;
+            let radius = radius(LINE_RADIUS, segments.len());
             let mut shapes = vec![];
             for &([a, b], goes_on) in segments {
                 // A segment without length is no line.

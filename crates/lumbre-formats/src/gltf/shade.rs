@@ -32,13 +32,16 @@ pub(super) struct Dressing {
     pub tangents: Option<usize>,
 }
 
-type MaterialKey = (Option<usize>, bool);
+/// Its position in the file, whether vertices have colours, and whether they make a surface.
+type MaterialKey = (Option<usize>, bool, bool);
+
+/// The colour of points and lines that have no material: glTF's white would not be seen on paper, nor black in the dark.
+const INK: Rgb = Rgb::new(0.02, 0.08, 0.3);
 
 /// The materials of a file, each made when it is first asked for.
 pub(super) struct Materials<'f> {
     file: &'f File<'f>,
     textures: Textures<'f>,
-    /// By position in the file and whether vertices have colours.
     made: RefCell<HashMap<MaterialKey, Arc<Dressing>>>,
     list: RefCell<Vec<NamedMaterial>>,
 }
@@ -48,12 +51,17 @@ impl<'f> Materials<'f> {
         Self { file, textures: Textures::new(file), made: RefCell::default(), list: RefCell::default() }
     }
 
-    /// The material at a position in the file, or glTF's default, for a mesh with or without colours at its vertices.
-    pub fn dressing(&self, index: Option<usize>, has_colours: bool) -> Read<Arc<Dressing>> {
-        if let Some(made) = self.made.borrow().get(&(index, has_colours)) {
+    /// The material at a position in the file, or glTF's default, for a mesh with or without colours at its vertices. Points and
+    /// lines, which are no surface, have a default of their own: [`INK`].
+    pub fn dressing(&self, index: Option<usize>, has_colours: bool, is_surface: bool) -> Read<Arc<Dressing>> {
+        let key = (index, has_colours, is_surface || index.is_some());
+        if let Some(made) = self.made.borrow().get(&key) {
             return Ok(made.clone());
         }
         let parameters = match index {
+            None if !is_surface => {
+                GltfMaterial { base_colour: INK, metallic: 0.0, ..GltfMaterial::default() }
+            }
             None => GltfMaterial::default(),
             Some(index) => GltfMaterial::read(self.file, self.file.list(List::Materials)[index])?,
         };
@@ -70,7 +78,7 @@ impl<'f> Materials<'f> {
         let one_sided = !parameters.double_sided && !seam.is_clear();
         let material = Arc::new(Material { one_sided, ..seam.material()? });
         self.list.borrow_mut().push(NamedMaterial { name: parameters.name.clone(), material });
-        self.made.borrow_mut().insert((index, has_colours), dressing.clone());
+        self.made.borrow_mut().insert(key, dressing.clone());
         Ok(dressing)
     }
 

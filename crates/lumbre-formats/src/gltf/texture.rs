@@ -15,6 +15,7 @@ use lumbre_shading::{
 use super::file::{File, List};
 use super::json::{Read, Value};
 use super::material::TextureRef;
+use super::uri::{Target, target};
 use crate::diagnostic::{Diagnostic, quoted};
 use crate::image::read_image;
 
@@ -195,6 +196,7 @@ impl<'f> Textures<'f> {
 
 fn decoded(file: &File<'_>, value: Value<'_>) -> Read<Bitmap> {
     let read = |bytes: &[u8], name: &Arc<str>| -> Read<Bitmap> {
+        check_media_type(file, value, bytes)?;
         #[cfg(feature = "basisu")]
         if bytes.starts_with(super::ktx::MAGIC) {
             return super::ktx::read(file, value, bytes, name);
@@ -214,6 +216,33 @@ fn decoded(file: &File<'_>, value: Value<'_>) -> Read<Bitmap> {
         crate::FormatError::from(value.wrong("the buffer of what is needed here has no data"))
     })?;
     read(bytes, &name)
+}
+
+/// Warns of an image that is of another kind than it is said to be, by its media type or by that of its data URI. What its first
+/// bytes say counts, as the specification asks.
+fn check_media_type(file: &File<'_>, image: Value<'_>, bytes: &[u8]) -> Read<()> {
+    let kinds: [(&str, bool); 4] = [
+        ("image/png", bytes.starts_with(b"\x89PNG")),
+        ("image/jpeg", bytes.starts_with(b"\xFF\xD8\xFF")),
+        ("image/webp", bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(b"WEBP")),
+        ("image/ktx2", bytes.starts_with(b"\xABKTX 20\xBB")),
+    ];
+    let Some((expected, _)) = kinds.into_iter().find(|(_, is)| *is) else { return Ok(()) };
+    let warn = |culprit: Value<'_>, said: &str| {
+        if !said.eq_ignore_ascii_case(expected) {
+            let warning = Diagnostic::warning("wrong media type of an image").at(culprit.place());
+            file.push(warning.found(quoted(said)).expected(quoted(expected)));
+        }
+    };
+    if let Some(said) = image.get("mimeType")? {
+        warn(said, &said.string()?);
+    }
+    if let Some(uri) = image.get("uri")?
+        && let Target::Data(data) = target(&uri.string()?)
+    {
+        warn(uri, data.media_type);
+    }
+    Ok(())
 }
 
 /// The image of a texture: that of an extension first.
