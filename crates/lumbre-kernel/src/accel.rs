@@ -66,7 +66,9 @@ pub enum Preset {
     #[default]
     Balanced,
     /// The balanced tree, then made better by putting subtrees elsewhere (D. Meister, J. Bittner, "Parallel Reinsertion for
-    /// Bounding Volume Hierarchy Optimization", 2018): for what is built once and asked often.
+    /// Bounding Volume Hierarchy Optimization", 2018): for what is built once and asked often. Where most of a tree is empty
+    /// space in the boxes of long and slanted triangles, these stand in several leaves, each for a part of it (M. Stich and
+    /// others, "Spatial Splits in Bounding Volume Hierarchies", 2009): no more than 1.3 times as many places as triangles.
     Best,
 }
 
@@ -294,7 +296,7 @@ impl Accel {
     /// The nearest hit that `accept` takes; it may be asked in any order of `t`, and its answer must depend on the hit
     /// alone.
     pub fn closest_filtered(&self, ray: &Ray, accept: impl FnMut(&Hit) -> bool) -> Option<Hit> {
-        let mut search = Closest::new(ray, If(accept));
+        let mut search = Closest::new(ray, If::new(accept));
         traverse::search(self.level, self, ray, &mut search);
         search.take_hit()
     }
@@ -324,7 +326,7 @@ impl Accel {
 
     /// Whether anything that `accept` takes is hit in the ray's range.
     pub fn any_filtered(&self, ray: &Ray, accept: impl FnMut(&Hit) -> bool) -> bool {
-        let mut search = Any::new(ray, If(accept));
+        let mut search = Any::new(ray, If::new(accept));
         traverse::search(self.level, self, ray, &mut search);
         search.is_hit
     }
@@ -488,6 +490,7 @@ impl Accel {
             + self.tree.blocks.own_bytes()
             + self.tree.names.own_bytes()
             + self.tree.entries.own_bytes()
+            + self.tree.cells.own_bytes()
             + self.tree.sphere_blocks.own_bytes()
             + self.tree.sphere_names.own_bytes()
             + bytes(&self.infinite)

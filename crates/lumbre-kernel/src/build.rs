@@ -4,17 +4,22 @@
 //! done does not depend on how it is shared: boxes grow in any order, costs are whole numbers, and primitives are parted in
 //! pieces of one length. The depth is bounded: past [`SAH_DEPTH`] levels every split is in the middle.
 
+pub(crate) mod spatial;
+
 use std::borrow::Cow;
 
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
+use crate::Geometry;
 use crate::accel::Preset;
 use crate::bins::{self, BestSplit, Binning, Bins, Fill, Measure, Part, Split};
+use crate::carve::Cell;
 use crate::collapse::{Choices, Costs, choose};
 use crate::few::{Decide, FEW, Few, group_of};
 use crate::lanes::Level;
 use crate::morton::{self, Code};
+use crate::node::Units;
 use crate::parting::part;
 use crate::primitive::{Bounds, Kind, Primitive, Traits};
 use crate::reinsert::reinsert;
@@ -50,6 +55,20 @@ impl Binary<'_> {
     /// The node over two.
     pub(crate) fn over(children: [Self; 2]) -> Self {
         Self::Fork(Box::new(Fork::over(children)))
+    }
+
+    /// The same, of which nothing stands elsewhere. The depth of its recursion is that of the tree.
+    fn into_owned(self) -> Binary<'static> {
+        match self {
+            Self::Fork(fork) => {
+                let Fork { bounds, costs, choices, children, is_ranked } = *fork;
+                let children = children.map(Binary::into_owned);
+                Binary::Fork(Box::new(Fork { bounds, costs, choices, children, is_ranked }))
+            }
+            Self::Twig(Twig { nodes, costs }) => {
+                Binary::Twig(Twig { nodes: Cow::Owned(nodes.into_owned()), costs })
+            }
+        }
     }
 
     /// A twig of such nodes.
@@ -121,7 +140,16 @@ impl BinaryNode {
 /// A primitive by its geometry, and which of it.
 pub(crate) type Name = [u32; 2];
 
-/// The binary tree over primitives (not none), and their names in the order of its leaves.
+/// A binary tree, and what is in its leaves.
+pub(crate) struct Grown<'p> {
+    pub(crate) tree: Binary<'p>,
+    /// In the order of leaves.
+    pub(crate) names: Vec<Name>,
+    /// Of each name, which part of it; without any, all is whole.
+    pub(crate) cells: Vec<Cell>,
+}
+
+/// The binary tree over primitives (not none) of geometries.
 ///
 /// First they are parted where they stand until one thread takes what is left together; then twigs grow, which need but a
 /// little room each, and take the place of their primitives.
@@ -130,7 +158,9 @@ pub(crate) fn binary_tree<'p>(
     preset: Preset,
     primitives: &'p mut Vec<Primitive>,
     traits: &[Traits],
-) -> (Binary<'p>, Vec<Name>) {
+    geometries: &[Geometry],
+    units: &Units,
+) -> Grown<'p> {
     let count = primitives.len();
     // Below, there is a node for every thread.
     let shared = (2 * rayon::current_num_threads()).ilog2();
@@ -167,10 +197,25 @@ pub(crate) fn binary_tree<'p>(
         });
         first += counts[rank];
     }
+    let mut cells = Vec::new();
+    if let Some(tree) = trees.last_mut()
+        && preset == Preset::Best
+        && counts[PACKED] > 0
+    {
+        let first = count - counts[PACKED];
+        let found = spatial::in_parts(&builder, geometries, units, tree, &names[first..], first);
+        if let Some(found) = found {
+            *tree = found.tree;
+            names.truncate(first);
+            names.extend(found.names);
+            cells = fill(first, Cell::WHOLE);
+            cells.extend(found.cells);
+        }
+    }
     let better = |tree| if preset == Preset::Best { reinsert(tree) } else { tree };
     let join = |low, high| Binary::Fork(Box::new(Fork { is_ranked: true, ..Fork::over([low, high]) }));
     let tree = trees.into_iter().map(better).reduce(join).expect("there are primitives");
-    (tree, names)
+    Grown { tree, names, cells }
 }
 
 /// The first `count` of some, which then are no longer among them.

@@ -8,6 +8,7 @@ use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
 use crate::build::{Binary, BinaryNode, Fork, Name};
+use crate::carve::{self, Cell, LaneCell};
 use crate::node::{Node, WIDTH, tag};
 use crate::primitive::{Bounds, Kind, Traits};
 use crate::spheres::SphereBlock;
@@ -64,8 +65,32 @@ pub(crate) struct Packed {
     pub(crate) sphere_blocks: Store<SphereBlock>,
     /// As many as there are blocks of spheres.
     pub(crate) sphere_names: Store<BlockNames>,
+    /// The triangles of which but a part stands in a lane of a block, in the order of lanes; others are whole.
+    pub(crate) cells: Store<LaneCell>,
     /// The reference to the root; `None` when there is nothing finite.
     pub(crate) root: Option<u32>,
+}
+
+impl Packed {
+    /// Whether a triangle may stand in more than one lane.
+    pub(crate) fn has_parts(&self) -> bool {
+        !self.cells.is_empty()
+    }
+
+    /// Whether but a part of a triangle stands in a lane.
+    #[inline]
+    pub(crate) fn is_part(&self, block: u32, lane: u32) -> bool {
+        self.has_parts() && carve::is_part(&self.cells, block, lane)
+    }
+
+    /// The parts that stand in lanes, each with the name of its triangle; of a lane that is not there, there is no name.
+    pub(crate) fn parts(&self) -> impl Iterator<Item = (Option<Name>, Cell)> {
+        self.cells.iter().map(|at| {
+            let (block, lane) = (at.lane as usize / BLOCK, at.lane as usize % BLOCK);
+            let name = self.names.get(block).map(|names| [names.geometry, names.primitives[lane]]);
+            (name.filter(|name| name[1] != u32::MAX), at.cell)
+        })
+    }
 }
 
 /// The least costs of putting a subtree into 1 to 7 children of a node; the first of the eight means nothing.
@@ -138,7 +163,7 @@ impl Binary<'_> {
         }
     }
 
-    fn costs(&self) -> &Costs {
+    pub(crate) fn costs(&self) -> &Costs {
         match self {
             Self::Fork(fork) => &fork.costs,
             Self::Twig(twig) => &twig.costs,
@@ -327,12 +352,14 @@ pub(crate) fn lay_out(traits: &[Traits], binary: &Binary, names: &[Name]) -> Res
 impl Layout {
     /// Fills the blocks. They are most of the tree: nothing of its making but names is to be left by now, and these are given
     /// back before.
-    pub(crate) fn pack(self, geometries: &[Geometry], names: Vec<Name>) -> Packed {
+    pub(crate) fn pack(self, geometries: &[Geometry], names: Vec<Name>, cells: Vec<Cell>) -> Packed {
         let Self { nodes, entries, spans, sphere_spans, root } = self;
         let named = |spans: Vec<Span>| -> Vec<BlockNames> {
             let name = |span: &Span| BlockNames::of(&names[span.first as usize..][..span.count as usize]);
             spans.par_iter().with_min_len(256).map(name).collect()
         };
+        let lane_cells = if cells.is_empty() { Vec::new() } else { lane_cells(&spans, &cells) };
+        drop(cells);
         let (block_names, sphere_names) = (named(spans), named(sphere_spans));
         drop(names);
         let block = |names: &BlockNames| fill_block(mesh(geometries, names.geometry), names);
@@ -346,9 +373,22 @@ impl Layout {
             entries: entries.into(),
             sphere_blocks: sphere_blocks.into(),
             sphere_names: sphere_names.into(),
+            cells: lane_cells.into(),
             root: Some(root),
         }
     }
+}
+
+/// The cells of triangles that are in parts, lane by lane.
+fn lane_cells(spans: &[Span], cells: &[Cell]) -> Vec<LaneCell> {
+    let of_block = |(block, span): (usize, &Span)| {
+        let own = &cells[span.first as usize..][..span.count as usize];
+        let lanes = (block * BLOCK) as u32..;
+        lanes.zip(own).filter(|&(_, cell)| *cell != Cell::WHOLE).map(|(lane, &cell)| LaneCell { lane, cell })
+    };
+    let mut found: Vec<LaneCell> = spans.iter().enumerate().flat_map(of_block).collect();
+    found.shrink_to_fit();
+    found
 }
 
 fn mesh(geometries: &[Geometry], geometry: u32) -> &TriangleMesh {

@@ -7,7 +7,7 @@
 //! A header of 256 bytes: eight bytes of magic; as u32 the version, a mark of the byte order, how many geometries and masks
 //! there are, the reference to the root, and a zero; as u64 how many elements each array has; a fingerprint of the
 //! geometries; a checksum of everything behind the header; and one of the header before itself. Then come the arrays, each at
-//! a multiple of 64 bytes: nodes, blocks and names of triangles, those of spheres, entries, masks.
+//! a multiple of 64 bytes: nodes, blocks and names of triangles, those of spheres, entries, parts of triangles, masks.
 //!
 //! What a file says is checked when it is mapped: checksums, the length, every reference and every name, that all that has
 //! no place in an array is marked as such, and that the geometries are those that it was saved with. A file that somebody
@@ -24,6 +24,7 @@ use std::sync::{Arc, OnceLock};
 use bytemuck::Pod;
 use memmap2::Mmap;
 
+use crate::carve::LaneCell;
 use crate::collapse::{Entry, Packed};
 use crate::holds::{Holds, SingleStart};
 use crate::lanes::Level;
@@ -38,13 +39,13 @@ use crate::{Accel, Geometry, GeometryKind, LoadError, RefitError};
 
 const MAGIC: [u8; 8] = *b"LumbMap\0";
 /// Changes with the format, and with the layout of what is in it.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 const BYTE_ORDER: u32 = 0x0102_0304;
 const NONE: u32 = u32::MAX;
 const HEADER: usize = 256;
 /// Where the header's own checksum stands, behind all that it is of.
 const SEAL: usize = 128;
-const ARRAYS: usize = 7;
+const ARRAYS: usize = 8;
 const ALIGNMENT: usize = 64;
 
 /// Why a file is not mapped.
@@ -167,6 +168,7 @@ fn arrays(accel: &Accel) -> [&[u8]; ARRAYS] {
         bytemuck::cast_slice(&tree.sphere_blocks),
         bytemuck::cast_slice(&tree.sphere_names),
         bytemuck::cast_slice(&tree.entries),
+        bytemuck::cast_slice(&tree.cells),
         bytemuck::cast_slice(&accel.masks),
     ]
 }
@@ -178,6 +180,7 @@ const SIZES: [usize; ARRAYS] = [
     size_of::<SphereBlock>(),
     size_of::<BlockNames>(),
     size_of::<Entry>(),
+    size_of::<LaneCell>(),
     size_of::<u32>(),
 ];
 
@@ -356,12 +359,13 @@ fn over_mapped(file: Arc<Mmap>, geometries: Vec<Geometry>) -> Result<Accel, Load
         sphere_blocks: array(&file, &header, 3)?,
         sphere_names: array(&file, &header, 4)?,
         entries: array(&file, &header, 5)?,
+        cells: array(&file, &header, 6)?,
         root: (header.root != NONE).then_some(header.root),
     };
     check_lanes(&tree)?;
     check_structure(&tree, &geometries)?;
     check_names(&tree, &geometries)?;
-    let masks: Store<u32> = array(&file, &header, 6)?;
+    let masks: Store<u32> = array(&file, &header, 7)?;
     let units = units_of(&geometries, &parts);
     let holds = Holds::new(&geometries, parts.largest_corner, parts.sphere_reach);
     let accel = Accel {

@@ -4,6 +4,7 @@ use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
 
 use crate::node::tag;
+use crate::query::MetInParts;
 use crate::spheres::ExactSphere;
 use crate::stack::AsBuilt;
 use crate::traverse::{self, Ask, Found, Search};
@@ -25,7 +26,7 @@ pub(crate) fn is_inside(accel: &Accel, point: DVec3, time: f64) -> bool {
     }
     let in_solids = solids_around(accel, point, time) % 2 == 1;
     let is_odd = |direction: &&DVec3| {
-        let mut crossings = Crossings { odd: false };
+        let mut crossings = Crossings { odd: false, met: MetInParts::default() };
         traverse::search(accel.level, accel, &Ray::new(point, **direction).at_time(time), &mut crossings);
         crossings.odd
     };
@@ -113,6 +114,7 @@ fn solids_around(accel: &Accel, point: DVec3, time: f64) -> usize {
 /// The parity of the crossings of what is no solid shape.
 struct Crossings {
     odd: bool,
+    met: MetInParts,
 }
 
 impl Search<'_> for Crossings {
@@ -130,7 +132,8 @@ impl Search<'_> for Crossings {
     fn offer(&mut self, found: &Found<'_, '_>) -> bool {
         let (geometry, _) = found.what.names(found.accel);
         let crosses = found.root.multiplicity % 2 == 1;
-        self.odd ^= crosses && !is_solid(&found.accel.geometries[geometry as usize].kind);
+        let counts = crosses && !is_solid(&found.accel.geometries[geometry as usize].kind);
+        self.odd ^= counts && self.met.is_first(found);
         false
     }
 }

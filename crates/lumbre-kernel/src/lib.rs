@@ -4,6 +4,7 @@ mod accel;
 mod batch;
 mod bins;
 mod build;
+mod carve;
 mod clouds;
 mod collapse;
 mod deforming;

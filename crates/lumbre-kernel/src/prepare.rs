@@ -7,7 +7,7 @@ use lumbre_geometry::{Aabb, PlacedShape};
 use lumbre_math::{AnimatedTransform, DMat3, DVec3, Transform, Vec3};
 use rayon::prelude::*;
 
-use crate::build::{binary_tree, fill};
+use crate::build::{Grown, binary_tree, fill};
 use crate::clouds::CloudSurvey;
 use crate::collapse::{Entry, Packed, lay_out};
 use crate::holds::{Holds, SingleStart};
@@ -53,11 +53,12 @@ pub(crate) fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result
                 survey.put_boxes(cloud, &units, own);
             }
         }
-        let (binary, names) = binary_tree(level, options.preset, &mut primitives, &traits);
-        let layout = lay_out(&traits, &binary, &names)?;
-        drop(binary);
+        let grown = binary_tree(level, options.preset, &mut primitives, &traits, &geometries, &units);
+        let Grown { tree, names, cells } = grown;
+        let layout = lay_out(&traits, &tree, &names)?;
+        drop(tree);
         drop(primitives);
-        layout.pack(&geometries, names)
+        layout.pack(&geometries, names, cells)
     };
     let holds = Holds::new(&geometries, parts.largest_corner, parts.sphere_reach);
     Ok(Accel {
@@ -373,8 +374,7 @@ fn greater(a: f32, b: f32) -> f32 {
 }
 
 /// What makes boxes of a mesh's triangles, in tree units.
-pub(crate) struct Boxer<'a> {
-    mesh: &'a TriangleMesh,
+pub(crate) struct Boxer {
     shift: DVec3,
     scale: f64,
     shift_single: Vec3,
@@ -382,8 +382,8 @@ pub(crate) struct Boxer<'a> {
     is_single: bool,
 }
 
-impl<'a> Boxer<'a> {
-    pub(crate) fn new(mesh: &'a TriangleMesh, units: &Units) -> Self {
+impl Boxer {
+    pub(crate) fn new(mesh: &TriangleMesh, units: &Units) -> Self {
         // Where the mesh is moved by a number that single precision has, one subtraction is rounded once, as in double
         // precision; and the scale is a power of two.
         let shift = units.origin - mesh.origin;
@@ -391,11 +391,7 @@ impl<'a> Boxer<'a> {
         let is_single = shift_single.as_dvec3() == shift
             && (1e-37..1e38).contains(&units.scale)
             && shift_single.abs().max_element() < 1e37;
-        Self { mesh, shift, scale: units.scale, shift_single, scale_single, is_single }
-    }
-
-    pub(crate) fn mesh(&self) -> &'a TriangleMesh {
-        self.mesh
+        Self { shift, scale: units.scale, shift_single, scale_single, is_single }
     }
 
     #[inline(always)]

@@ -46,7 +46,7 @@ pub(crate) struct Traits {
 }
 
 /// Numbers of the fixed-point coordinates in a tree unit. Twice a centre, less another such, still fits.
-const ONE: f64 = (1 << 28) as f64;
+pub(crate) const ONE: f64 = (1 << 28) as f64;
 
 /// A box in tree units with two names: of a primitive, those of its geometry and of itself in it.
 ///
@@ -75,6 +75,22 @@ impl Bounds {
         let fixed = |x: f32| (x * ONE as f32) as i32;
         let (low, high) = (low.map(fixed), high.map(fixed));
         Self { lanes: [low[0], low[1], low[2], first as i32, -high[0], -high[1], -high[2], second as i32] }
+    }
+
+    /// From corners in fixed-point numbers.
+    pub(crate) fn of_fixed(low: [i32; 3], high: [i32; 3]) -> Self {
+        Self { lanes: [low[0], low[1], low[2], 0, -high[0], -high[1], -high[2], 0] }
+    }
+
+    /// What is in both; without a size where that is nothing.
+    pub(crate) fn common(&self, other: &Self) -> Self {
+        Self { lanes: std::array::from_fn(|lane| self.lanes[lane].max(other.lanes[lane])) }
+    }
+
+    /// Where it begins and ends on an axis.
+    #[inline(always)]
+    pub(crate) fn range(&self, axis: usize) -> [i32; 2] {
+        [self.lanes[axis], -self.lanes[axis + 4]]
     }
 
     /// The nearest one to a box in space.

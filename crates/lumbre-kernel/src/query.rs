@@ -1,7 +1,7 @@
 //! The queries as searches: closest, any, every and how many.
 
 use std::cmp::Ordering;
-use std::collections::BinaryHeap;
+use std::collections::{BTreeSet, BinaryHeap};
 
 use lumbre_geometry::{Ray, Root};
 
@@ -56,13 +56,46 @@ impl Filter for All {
     }
 }
 
-/// Takes what the closure takes.
-pub(crate) struct If<F>(pub(crate) F);
+/// Takes what the closure takes, which is asked once about each crossing.
+pub(crate) struct If<F> {
+    accept: F,
+    asked: MetInParts,
+}
+
+impl<F> If<F> {
+    pub(crate) fn new(accept: F) -> Self {
+        Self { accept, asked: MetInParts::default() }
+    }
+}
 
 impl<F: FnMut(&Hit) -> bool> Filter for If<F> {
     const TAKES_ALL: bool = false;
     fn takes(&mut self, found: &Found) -> bool {
-        (self.0)(&found.to_hit())
+        // What was taken is the best so far, or ended the search: it does not come again.
+        self.asked.is_first(found) && (self.accept)(&found.to_hit())
+    }
+}
+
+/// The triangles in parts that a search has met: it may meet more than one part of each, at the same crossing.
+#[derive(Default)]
+pub(crate) struct MetInParts {
+    met: BTreeSet<(InstancePath, u32, u32)>,
+}
+
+impl MetInParts {
+    /// Whether a crossing was not yet met.
+    #[inline]
+    pub(crate) fn is_first(&mut self, found: &Found) -> bool {
+        match found.what {
+            What::Lane { block, lane } if found.accel.tree.is_part(block, lane) => self.add(found),
+            _ => true,
+        }
+    }
+
+    #[cold]
+    fn add(&mut self, found: &Found) -> bool {
+        let (geometry, primitive) = found.what.names(found.accel);
+        self.met.insert((found.place.route.clone(), geometry, primitive))
     }
 }
 
@@ -250,13 +283,14 @@ impl<'a, F: Filter> Search<'a> for Any<F> {
 /// How many hits.
 pub(crate) struct Count {
     pub(crate) hits: usize,
+    met: MetInParts,
     limit: f64,
     floor: f64,
 }
 
 impl Count {
     pub(crate) fn new(ray: &Ray) -> Self {
-        Self { hits: 0, limit: ray.t_max, floor: ray.t_min }
+        Self { hits: 0, met: MetInParts::default(), limit: ray.t_max, floor: ray.t_min }
     }
 }
 
@@ -272,8 +306,8 @@ impl Search<'_> for Count {
         self.floor
     }
 
-    fn offer(&mut self, _: &Found<'_, '_>) -> bool {
-        self.hits += 1;
+    fn offer(&mut self, found: &Found<'_, '_>) -> bool {
+        self.hits += usize::from(self.met.is_first(found));
         false
     }
 }
@@ -329,7 +363,10 @@ impl<'a> Batch<'a> {
     /// The hits in order, and whether there may be more.
     pub(crate) fn into_hits(self) -> (Vec<Ranked>, bool) {
         let is_full = self.nearest.len() == self.size;
-        (self.nearest.into_sorted_vec(), is_full)
+        let mut hits = self.nearest.into_sorted_vec();
+        // Triangles in parts; they took the places of others, but of none that is nearer than the last.
+        hits.dedup();
+        (hits, is_full)
     }
 }
 

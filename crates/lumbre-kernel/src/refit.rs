@@ -7,13 +7,14 @@ use lumbre_geometry::Aabb;
 use lumbre_math::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use crate::carve::{Carver, LaneCell, cells_in, part_of};
 use crate::clouds::box_of;
 use crate::holds::{Holds, SingleStart};
 use crate::node::{Node, Units, WIDTH, tag};
-use crate::prepare::{Boxer, Parts, has_area, take_apart, units_of};
+use crate::prepare::{Parts, has_area, take_apart, units_of};
 use crate::primitive::Bounds;
 use crate::spheres::{SphereBlock, has_radius};
-use crate::triangles::{BlockNames, TriangleBlock};
+use crate::triangles::{BLOCK, BlockNames, TriangleBlock};
 use crate::{Accel, BuildError, Geometry, GeometryKind, SphereCloud};
 
 /// Why a tree cannot be refitted. It is as it was before.
@@ -109,22 +110,18 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts) -> Result<(), RefitError> {
     // From here on nothing can fail.
     let geometries = &accel.geometries;
     let units = units_of(geometries, &parts);
-    let boxers: Vec<Option<Boxer>> = geometries
-        .iter()
-        .map(|geometry| match &geometry.kind {
-            GeometryKind::Mesh(mesh) => Some(Boxer::new(mesh, &units)),
-            _ => None,
-        })
-        .collect();
+    let carvers = Carver::of_all(geometries, &units);
     let tree = &mut accel.tree;
+    let cells = &*tree.cells;
     let block_boxes: Vec<Bounds> = tree
         .blocks
         .to_mut()
         .par_iter_mut()
         .zip(tree.names.par_iter())
+        .enumerate()
         .with_min_len(256)
-        .map(|(block, names)| match &boxers[names.geometry as usize] {
-            Some(boxer) => fill_block(block, names, boxer),
+        .map(|(place, (block, names))| match &carvers[names.geometry as usize] {
+            Some(carver) => fill_block(block, names, cells_in(cells, place), carver),
             None => Bounds::EMPTY,
         })
         .collect();
@@ -234,7 +231,8 @@ fn check_triangles(accel: &Accel, geometries: &[Geometry]) -> Result<(), RefitEr
     }
     for (geometry, standing) in geometries.iter().enumerate() {
         let GeometryKind::Mesh(mesh) = &standing.kind else { continue };
-        if named[geometry] == mesh.indices.len() {
+        // Those in parts are named more than once.
+        if named[geometry] == mesh.indices.len() && !accel.tree.has_parts() {
             continue;
         }
         let mut has_place = vec![false; mesh.indices.len()];
@@ -311,18 +309,25 @@ fn entry_boxes(accel: &Accel, parts: &Parts) -> Result<Vec<Option<Aabb>>, RefitE
     }
 }
 
-/// Takes the corners over; a triangle without area becomes one that is never hit.
-fn fill_block(block: &mut TriangleBlock, names: &BlockNames, boxer: &Boxer) -> Bounds {
+/// Takes the corners over; a triangle without area becomes one that is never hit. Of those that are in parts, these are `cells`.
+fn fill_block(block: &mut TriangleBlock, names: &BlockNames, cells: &[LaneCell], carver: &Carver) -> Bounds {
     let mut around = Bounds::EMPTY;
     for (lane, &primitive) in names.primitives.iter().enumerate() {
         if primitive == u32::MAX {
             continue;
         }
-        let mesh = boxer.mesh();
+        let mesh = carver.mesh();
         let corners = mesh.indices[primitive as usize].map(|vertex| mesh.positions[vertex as usize]);
         let is_there = has_area(&corners);
         if is_there {
-            around.grow(&boxer.around(&corners, 0, 0));
+            match cells.iter().find(|at| at.lane as usize % BLOCK == lane) {
+                None => around.grow(&carver.whole(names.geometry, primitive)),
+                // What has moved may have left a cell.
+                Some(at) => {
+                    let part = part_of(&carver.corners(primitive), &at.cell);
+                    part.iter().for_each(|part| around.grow(part));
+                }
+            }
         }
         for (corner, position) in corners.iter().enumerate() {
             let position = if is_there { *position } else { Vec3::NAN };

@@ -6,6 +6,7 @@
 //! as in G. Barill, N. Dickson, R. Schmidt, D. Levin, A. Jacobson, "Fast Winding Numbers for Soups and Clouds", ACM
 //! Transactions on Graphics 37(4), 2018: a node's triangles become a dipole with its first and second moments.
 
+use std::collections::BTreeSet;
 use std::f64::consts::PI;
 use std::fmt;
 
@@ -17,6 +18,7 @@ use crate::nearest::Frame;
 use crate::node::{Node, WIDTH, tag};
 use crate::prepare::has_area;
 use crate::spheres::ExactSphere;
+use crate::triangles::{BLOCK, BlockNames};
 use crate::{Accel, GeometryKind, InstancePath, PreciseMesh, TriangleMesh, precise};
 
 /// Why there is no winding number: an open shape, or custom geometry that offers none.
@@ -166,6 +168,8 @@ fn meshes_around(accel: &Accel, point: DVec3, linear: Option<DMat3>) -> f64 {
 #[derive(Debug)]
 pub(crate) struct Moments {
     nodes: Vec<Moment>,
+    /// Lanes of triangles that are in parts and stand in a lane before, in their order: a triangle counts once.
+    repeated: Vec<u32>,
 }
 
 /// Of some triangles with normals n of the length of their areas, at δ from the center.
@@ -263,14 +267,19 @@ impl Moment {
 impl Moments {
     pub(crate) fn of(accel: &Accel) -> Self {
         let tree = &accel.tree;
+        let mut named = BTreeSet::new();
+        let is_new = |name: Option<[u32; 2]>| name.is_some_and(|name| named.insert(name));
+        let news: Vec<bool> = tree.parts().map(|(name, _)| name).map(is_new).collect();
+        let repeated: Vec<u32> =
+            tree.cells.iter().zip(news).filter(|(_, is_new)| !is_new).map(|(at, _)| at.lane).collect();
         // Of every block, then of the nodes from below: children stand behind their parents.
-        let block = |names: &crate::triangles::BlockNames| {
+        let block = |(place, names): (usize, &BlockNames)| {
             let GeometryKind::Mesh(mesh) = &accel.geometries[names.geometry as usize].kind else {
                 return Moment::NOTHING;
             };
             let from_origin = mesh.origin - accel.units.origin;
-            let there = names.primitives.iter().filter(|&&primitive| primitive != u32::MAX);
-            let triangles = there.filter_map(|&primitive| corners(mesh, from_origin, primitive as usize));
+            let there = once(&repeated, place, names);
+            let triangles = there.filter_map(|primitive| corners(mesh, from_origin, primitive as usize));
             let mut parts = [Moment::NOTHING; WIDTH];
             let mut count = 0;
             for (part, corners) in parts.iter_mut().zip(triangles) {
@@ -279,7 +288,7 @@ impl Moments {
             }
             Moment::of_all(&parts[..count])
         };
-        let blocks: Vec<Moment> = tree.names.par_iter().with_min_len(256).map(block).collect();
+        let blocks: Vec<Moment> = tree.names.par_iter().enumerate().with_min_len(256).map(block).collect();
         let mut nodes = vec![Moment::NOTHING; tree.nodes.len()];
         let mut parts = Vec::new();
         for (place, node) in tree.nodes.iter().enumerate().rev() {
@@ -295,14 +304,17 @@ impl Moments {
                 }
             }
             nodes[place] = Moment::of_all(&parts);
-            nodes[place].radius = nodes[place].radius.min(reach(node, accel, nodes[place].center));
+            // Boxes do not hold all of triangles that are in parts.
+            if repeated.is_empty() {
+                nodes[place].radius = nodes[place].radius.min(reach(node, accel, nodes[place].center));
+            }
         }
-        Self { nodes }
+        Self { nodes, repeated }
     }
 
     /// Bytes that they take.
     pub(crate) fn memory_bytes(&self) -> usize {
-        self.nodes.capacity() * size_of::<Moment>()
+        self.nodes.capacity() * size_of::<Moment>() + self.repeated.capacity() * size_of::<u32>()
     }
 
     /// The winding number of all meshes of a tree.
@@ -326,12 +338,12 @@ impl Moments {
                     stack.extend_from_slice(&node.children[..node.len as usize]);
                 }
                 tag::TRIANGLES => {
-                    for names in &accel.tree.names[tag::blocks(reference)] {
+                    let places = tag::blocks(reference);
+                    for (place, names) in places.clone().zip(&accel.tree.names[places]) {
                         let GeometryKind::Mesh(mesh) = &accel.geometries[names.geometry as usize].kind else {
                             continue;
                         };
-                        for &primitive in names.primitives.iter().filter(|&&primitive| primitive != u32::MAX)
-                        {
+                        for primitive in once(&self.repeated, place, names) {
                             if let Some([a, b, c]) = corners(mesh, mesh.origin - point, primitive as usize) {
                                 sum += solid_angle(a, b, c);
                             }
@@ -346,6 +358,17 @@ impl Moments {
         }
         sum / (4.0 * PI)
     }
+}
+
+/// The triangles of a block that count there.
+fn once(repeated: &[u32], block: usize, names: &BlockNames) -> impl Iterator<Item = u32> {
+    let lanes = (block * BLOCK) as u32..;
+    lanes
+        .zip(&names.primitives)
+        .filter(|&(lane, &primitive)| {
+            primitive != u32::MAX && (repeated.is_empty() || repeated.binary_search(&lane).is_err())
+        })
+        .map(|(_, &primitive)| primitive)
 }
 
 /// How far the boxes of a node reach from a place that is relative to the tree's origin.

@@ -6,6 +6,7 @@ use lumbre_geometry::{Aabb, Ray};
 use lumbre_math::{DVec3, Transform, Vec3};
 
 use super::scenes::{Balls, Random, build, cube, icosphere, mixture, options, soup, with_every_preset};
+use crate::build::spatial::tests::IS_FORCED;
 use crate::node::tag;
 use crate::{Accel, BuildError, BuildOptions, Geometry, GeometryKind, Instance, TriangleMesh};
 
@@ -82,15 +83,17 @@ fn the_tree_is_the_same_from_any_number_of_threads() {
 
 fn check_that_threads_make_no_difference() {
     // Threads of a pool do not know this thread's.
-    let options = options();
+    let (options, is_forced) = (options(), IS_FORCED.get());
     let print = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
+            IS_FORCED.set(is_forced);
             let mut random = Random(5);
             let soup = soup(&mut random, 150_000, DVec3::new(1.0, 2.0, 3.0), 4.0);
             let kinds = [soup, icosphere(4, DVec3::ONE, 2.0)].map(|mesh| GeometryKind::Mesh(Arc::new(mesh)));
             let geometries = kinds.map(|kind| Geometry { id: 3, kind }).to_vec();
             let accel = Accel::build(geometries, &options).unwrap();
+            assert_eq!(accel.tree.has_parts(), is_forced);
             format!("{:?}", accel.tree)
         })
     };

@@ -11,6 +11,7 @@ mod motion;
 mod nearest;
 mod options;
 mod oracle;
+mod parts;
 mod precise;
 mod proof;
 mod refit;

@@ -9,7 +9,10 @@ use lumbre_geometry::Ray;
 use lumbre_math::{DVec3, Transform};
 use rayon::prelude::*;
 
-use super::scenes::{Random, bumpy, cube, icosphere, mixture, ray, soup, torus, vertex, with_every_preset};
+use super::scenes::{
+    Random, bumpy, cube, icosphere, mixture, ray, soup, torus, vertex, with_every_preset,
+    with_parts_everywhere,
+};
 use crate::{Accel, BuildOptions, Geometry, GeometryKind, Instance, Preset, TriangleMesh, brute};
 
 /// Closed meshes, each with a point inside.
@@ -65,13 +68,18 @@ const CHUNK: u64 = 1 << 14;
 /// asked for all its crossings as well, which must be odd in number. Answers how many rays there were.
 fn bombard(rays: u64, seed: u64) -> u64 {
     let meshes = closed_meshes();
-    let presets = Preset::ALL.len() as u64;
-    let places = meshes.len() as u64 * presets * 4;
+    let ways = || Preset::ALL.map(|preset| (preset, false)).into_iter().chain([(Preset::Best, true)]);
+    let places = (meshes.len() * ways().count() * 4) as u64;
     let chunks_each = rays.div_ceil(places * CHUNK);
     let shot = AtomicU64::new(0);
     for (name, mesh, inside) in &meshes {
-        for preset in Preset::ALL {
-            for (place, (accel, map)) in placements(mesh, preset).iter().enumerate() {
+        for (preset, is_in_parts) in ways() {
+            let trees = || placements(mesh, preset);
+            let trees = if is_in_parts { with_parts_everywhere(trees) } else { trees() };
+            for (place, (accel, map)) in trees.iter().enumerate() {
+                // A cube is but two leaves.
+                let is_large = mesh.indices.len() > 12;
+                assert!(accel.tree.has_parts() || !is_in_parts || !is_large || place > 1, "{name}");
                 let from = map.point(*inside);
                 (0..chunks_each).into_par_iter().for_each(|chunk| {
                     let mut random = Random(seed ^ (chunk << 20) ^ (place as u64) << 8);
@@ -130,8 +138,11 @@ fn compare(rays: u64, seed: u64) -> u64 {
             mixture(&mut random, center, 3.0, (chunk % 8 == 0).into(), chunk % 16 == 0)
         } else {
             let mesh = soup(&mut random, 100, center, 3.0);
-            let preset = Preset::ALL[chunk as usize % 3];
-            tree(GeometryKind::Mesh(Arc::new(mesh)), preset)
+            let mesh = GeometryKind::Mesh(Arc::new(mesh));
+            match chunk as usize % 5 {
+                preset @ 0..3 => tree(mesh, Preset::ALL[preset]),
+                _ => with_parts_everywhere(|| tree(mesh, Preset::Best)),
+            }
         };
         let mut found = 0;
         for _ in 0..CHUNK {
