@@ -11,7 +11,7 @@ use crate::Accel;
 use crate::holds::SingleStart;
 use crate::lanes::{Lanes, Level, Task};
 use crate::node::Node;
-use crate::single::{self, Goal, Outcome, SingleRay, Step};
+use crate::single::{Alone, Goal, Outcome, SingleRay, Step};
 use crate::stack::{Order, Stack};
 use crate::triangles::TriangleBlock;
 
@@ -30,18 +30,31 @@ pub(crate) fn search_all<G: Goal>(
     let tree = &accel.tree;
     let bytes = size_of_val::<[Node]>(&tree.nodes) + size_of_val::<[TriangleBlock]>(&tree.blocks);
     if let Some(start) = &accel.single {
-        if bytes < WORTH_FLYING {
-            level.run(OneByOne::<G, _> { accel, start, rays, end, goal: PhantomData });
+        if start.is_mixed {
+            level.run(OneByOne::<G, _, true> { accel, start, rays, end, goal: PhantomData });
+        } else if bytes < WORTH_FLYING {
+            level.run(OneByOne::<G, _, false> { accel, start, rays, end, goal: PhantomData });
         } else {
-            level.run(Flights::<G, _> { accel, start, rays, end, goal: PhantomData });
+            fly::<G>(level, accel, start, rays, end);
         }
     } else {
         (0..rays.len()).for_each(|position| end(position, Outcome::Unsettled));
     }
 }
 
-/// Rays through a tree of which the caches hold much: they go one after another.
-struct OneByOne<'a, 'r, G, E> {
+/// Searches a tree of triangles along every ray, some at a time.
+pub(crate) fn fly<G: Goal>(
+    level: Level,
+    accel: &Accel,
+    start: &SingleStart,
+    rays: &[Ray],
+    end: impl FnMut(usize, Outcome<G::Answer>),
+) {
+    level.run(Flights::<G, _> { accel, start, rays, end, goal: PhantomData });
+}
+
+/// Rays through a tree of which the caches hold much, or where shapes take most of the time: they go one after another.
+struct OneByOne<'a, 'r, G, E, const MIXED: bool> {
     accel: &'a Accel,
     start: &'a SingleStart,
     rays: &'r [Ray],
@@ -49,14 +62,14 @@ struct OneByOne<'a, 'r, G, E> {
     goal: PhantomData<G>,
 }
 
-impl<G: Goal, E: FnMut(usize, Outcome<G::Answer>)> Task for OneByOne<'_, '_, G, E> {
+impl<G: Goal, E: FnMut(usize, Outcome<G::Answer>), const MIXED: bool> Task for OneByOne<'_, '_, G, E, MIXED> {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Lanes>(self) {
         let Self { accel, start, rays, mut end, .. } = self;
         for (position, ray) in rays.iter().enumerate() {
-            end(position, single::search_with::<G, L>(accel, start, ray));
+            end(position, Alone::<G, MIXED>::new(accel, start, ray).run::<L>());
         }
     }
 }
@@ -109,7 +122,7 @@ impl<G: Goal, E: FnMut(usize, Outcome<G::Answer>)> Task for Flights<'_, '_, G, E
             let mut turn = 0;
             while turn < count {
                 let Flight { position, ray, reference, single, stack } = &mut flights[turn];
-                let step = G::step(single, *reference, ray, stack);
+                let step = single.step::<G, false>(*reference, ray, stack);
                 if let Step::On(next) = step {
                     *reference = next;
                     single.fetch(next);

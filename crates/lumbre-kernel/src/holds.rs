@@ -11,6 +11,8 @@ use crate::{Geometry, GeometryKind};
 pub(crate) struct Holds {
     /// Whether it holds nothing but triangles.
     pub(crate) only_triangles: bool,
+    /// Whether it holds nothing but triangles, shapes and custom geometry.
+    pub(crate) only_triangles_and_entries: bool,
     /// Whether the corners of all triangles are relative to one origin.
     pub(crate) has_one_origin: bool,
     /// That of the first mesh; a NaN where there is none.
@@ -44,6 +46,12 @@ impl Holds {
             has_one_cloud_origin: cloud_origins.all(|origin| Some(origin) == first_cloud_origin),
             sphere_reach,
             only_triangles: geometries.iter().all(|geometry| matches!(geometry.kind, GeometryKind::Mesh(_))),
+            only_triangles_and_entries: geometries.iter().all(|geometry| {
+                matches!(
+                    geometry.kind,
+                    GeometryKind::Mesh(_) | GeometryKind::Shape(_) | GeometryKind::Custom(_)
+                )
+            }),
             has_one_origin: origins.all(|origin| origin == first_origin),
             first_origin,
             largest_corner,
@@ -51,12 +59,14 @@ impl Holds {
     }
 }
 
-/// What a ray from nearby needs to start in single precision, in a tree of nothing but triangles whose corners are relative to
-/// one origin.
+/// What a ray from nearby needs to start in single precision, in a tree of triangles whose corners are relative to one origin,
+/// of shapes and of custom geometry.
 #[derive(Clone, Debug)]
 pub(crate) struct SingleStart {
     /// Of the tree.
     pub(crate) root: u32,
+    /// Whether there is anything but triangles.
+    pub(crate) is_mixed: bool,
     /// What the tree's boxes are relative to, and a zero.
     pub(crate) tree_origin: [f64; 4],
     /// What the corners are relative to, and a zero.
@@ -84,19 +94,27 @@ impl SingleStart {
     /// overflow, underflow or tell nothing.
     pub(crate) fn new(holds: &Holds, units: &Units, root: Option<u32>) -> Option<Self> {
         let two_to = |exponent: i32| 2.0f64.powi(exponent);
-        let shift = (units.origin - holds.first_origin).abs().max_element();
-        let reach = units.near / units.scale + shift + f64::from(holds.largest_corner);
-        let is_fit = holds.only_triangles
+        // Without a triangle, any place will do.
+        let has_triangles = holds.first_origin.is_finite() && holds.largest_corner > 0.0;
+        let (mesh_origin, largest_corner) = if has_triangles {
+            (holds.first_origin, f64::from(holds.largest_corner))
+        } else {
+            (units.origin, 1.0 / units.scale)
+        };
+        let shift = (units.origin - mesh_origin).abs().max_element();
+        let reach = units.near / units.scale + shift + largest_corner;
+        let is_fit = holds.only_triangles_and_entries
             && holds.has_one_origin
             && units.near > 0.0
             && (two_to(-40)..=two_to(40)).contains(&units.scale)
-            && f64::from(holds.largest_corner) > two_to(-39)
+            && largest_corner > two_to(-39)
             && reach < two_to(38);
         let padded = |v: DVec3, last: f64| [v.x, v.y, v.z, last];
         root.filter(|_| is_fit).map(|root| Self {
             root,
+            is_mixed: !holds.only_triangles,
             tree_origin: padded(units.origin, 0.0),
-            mesh_origin: padded(holds.first_origin, 0.0),
+            mesh_origin: padded(mesh_origin, 0.0),
             scale: units.scale,
             farthest: [units.near as f32; 4],
             margin: units.single_margin(),

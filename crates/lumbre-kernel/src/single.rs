@@ -1,23 +1,26 @@
-//! The nearest hit and any hit among nothing but triangles, in single precision wherever that can decide.
+//! The nearest hit and any hit, in single precision wherever that can decide: in trees of triangles, and of shapes and custom
+//! geometry beside them.
 //!
 //! A hit that single precision is certain of (see [`BlockRay`]) is kept by its place in the tree and the heights between which
 //! it lies. Double precision is asked where it is not: about a triangle whose edge or range the ray ends hardly miss, and which
 //! of two hits is nearer where their heights overlap. And, once a ray, about the winner, so that the answer has the same bits
 //! as that of the plain search in `traverse`, which stands beside this one as its oracle. Where a ray touches an edge or a
-//! corner exactly, or comes from far away, that search answers it altogether.
+//! corner exactly, or comes from far away, that search answers it altogether. Shapes and custom geometry always answer in double
+//! precision.
 
 use std::marker::PhantomData;
 
 use lumbre_geometry::{Ray, Root};
-use lumbre_math::DVec2;
+use lumbre_math::DVec3;
 
+use crate::collapse::Entry;
 use crate::holds::SingleStart;
 use crate::lanes::{self, Lanes, Level, Task};
 use crate::node::tag;
 use crate::stack::{AsBuilt, ByDistance, Order, Stack};
 use crate::triangles::{self, BLOCK, BlockRay, Meeting, Passage, Shear, TriangleBlock};
 use crate::way::Way;
-use crate::{Accel, Hit, InstancePath};
+use crate::{Accel, Hit, InstancePath, traverse};
 
 /// What came of a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,25 +34,18 @@ pub(crate) enum Outcome<T> {
 /// The nearest hit, in as few words as it takes: it is handed over faster than a [`Hit`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Winner {
-    t: f64,
-    barycentrics: DVec2,
+    pub(crate) root: Root,
     pub(crate) geometry: u32,
     pub(crate) primitive: u32,
 }
 
 impl Winner {
-    /// The crossing.
-    #[inline(always)]
-    pub(crate) fn root(&self) -> Root {
-        Root { t: self.t, part: 0, multiplicity: 1, local: self.barycentrics }
-    }
-
     /// As a hit in the tree itself.
     #[inline(always)]
     pub(crate) fn to_hit(self, accel: &Accel) -> Hit {
-        let Self { geometry, primitive, .. } = self;
+        let Self { root, geometry, primitive } = self;
         Hit {
-            root: self.root(),
+            root,
             id: accel.geometries[geometry as usize].id,
             primitive,
             geometry,
@@ -72,9 +68,9 @@ pub(crate) enum Step {
     Unsettled,
 }
 
-/// A triangle by its place in the tree, and the heights along the ray between which it is met.
+/// A triangle by its place in the tree, or the crossing of something else, and the heights along the ray between which it is met.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Candidate {
+struct Candidate {
     block: u32,
     lane: u32,
     from: f32,
@@ -83,10 +79,17 @@ pub(crate) struct Candidate {
 
 impl Candidate {
     const NONE: Self = Self { block: u32::MAX, lane: 0, from: f32::INFINITY, to: f32::INFINITY };
+    /// Of what is no triangle.
+    const CROSSED: u32 = u32::MAX - 1;
 
     #[inline(always)]
     fn is_some(&self) -> bool {
         self.block != u32::MAX
+    }
+
+    #[inline(always)]
+    fn is_triangle(&self) -> bool {
+        self.block < Self::CROSSED
     }
 }
 
@@ -100,8 +103,12 @@ pub(crate) struct SingleRay<'a, L> {
     blocks: BlockRay,
     /// From heights to places in the range of boxes.
     place_per_height: f32,
+    /// From t to heights.
+    length: f64,
     /// The nearest so far.
     best: Candidate,
+    /// That, where it is no triangle.
+    crossed: Winner,
 }
 
 impl<'a, L: Lanes> SingleRay<'a, L> {
@@ -109,18 +116,55 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
     #[inline(always)]
     pub(crate) fn start(accel: &'a Accel, start: &'a SingleStart, ray: &Ray) -> Option<Self> {
         let slabs = L::start_single(start, ray)?;
-        Some(Self::among_triangles(accel, start, ray, Way::new(&accel.tree.nodes, slabs)))
+        Some(Self::among_leaves(accel, start, ray, Way::new(&accel.tree.nodes, slabs)))
     }
 
     /// Goes on with a ray that has come to a first leaf.
     #[inline(always)]
-    fn among_triangles(accel: &'a Accel, start: &'a SingleStart, ray: &Ray, way: Way<'a, L>) -> Self {
+    fn among_leaves(accel: &'a Accel, start: &'a SingleStart, ray: &Ray, way: Way<'a, L>) -> Self {
         let (blocks, place_per_height) = L::start_blocks(start, ray, way.slabs());
         let triangles = &accel.tree.blocks;
-        Self { accel, start, triangles, way, blocks, place_per_height, best: Candidate::NONE }
+        let crossed = Winner { root: Root::at(f64::INFINITY), geometry: 0, primitive: 0 };
+        let best = Candidate::NONE;
+        let length = ray.direction.abs().max_element();
+        Self { accel, start, triangles, way, blocks, place_per_height, length, best, crossed }
     }
 
-    /// Tests a leaf for the nearest hit; false where the plain search has to answer.
+    /// Goes on from a node or a leaf.
+    #[inline(always)]
+    pub(crate) fn step<G: Goal, const MIXED: bool>(
+        &mut self,
+        reference: u32,
+        ray: &Ray,
+        stack: &mut Stack<<G::Order as Order>::Entry>,
+    ) -> Step {
+        if reference >> tag::SHIFT == tag::INNER {
+            return self.way.meet_node::<G::Order>(reference, stack).map_or(Step::Out, Step::On);
+        }
+        let end = if MIXED && reference >> tag::SHIFT != tag::TRIANGLES {
+            self.meet_entries::<G>(reference, ray)
+        } else {
+            G::meet_triangles(self, reference, ray)
+        };
+        match end {
+            Some(last) => last,
+            None => self.way.pop::<G::Order>(stack).map_or(Step::Out, Step::On),
+        }
+    }
+
+    /// Tests a leaf of what is no triangle.
+    #[inline(always)]
+    fn meet_entries<G: Goal>(&mut self, leaf: u32, ray: &Ray) -> Option<Step> {
+        for entry in &self.accel.tree.entries[(leaf & tag::PLACE) as usize..] {
+            let end = G::meet_entry(self, entry, ray);
+            if end.is_some() || entry.is_last() {
+                return end;
+            }
+        }
+        None
+    }
+
+    /// Tests a leaf of triangles for the nearest hit; false where the plain search has to answer.
     #[inline(always)]
     fn meet_leaf_closest(&mut self, leaf: u32, ray: &Ray) -> bool {
         let places = tag::blocks(leaf);
@@ -180,30 +224,79 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
             Meeting::Touch { .. } => return Outcome::Unsettled,
             Meeting::Hit { root, .. } => root.t,
         };
-        if self.best.is_some() {
-            let Meeting::Hit { root: best, .. } = self.meet_exactly(ray, self.best.block, self.best.lane)
-            else {
+        let names = self.names(block, lane);
+        match self.is_better(ray, found, names) {
+            Outcome::Settled(false) => return Outcome::Settled(None),
+            Outcome::Settled(true) => {}
+            Outcome::Unsettled => return Outcome::Unsettled,
+        }
+        let (from, to) = self.heights(found);
+        Outcome::Settled(Some(Candidate { block, lane, from, to }))
+    }
+
+    /// The heights between which a crossing in double precision lies.
+    #[inline(always)]
+    fn heights(&self, t: f64) -> (f32, f32) {
+        let height = (t * self.length) as f32;
+        let error = height.abs() * triangles::ROUNDINGS + f32::MIN_POSITIVE;
+        (height - error, height + error)
+    }
+
+    /// Geometry and primitive of a triangle.
+    #[inline(always)]
+    fn names(&self, block: u32, lane: u32) -> (u32, u32) {
+        let names = &self.accel.tree.names[block as usize];
+        (names.geometry, names.primitives[lane as usize % BLOCK])
+    }
+
+    /// Whether a crossing is nearer than the best, or as near and before it.
+    fn is_better(&self, ray: &Ray, t: f64, names: (u32, u32)) -> Outcome<bool> {
+        if !self.best.is_some() {
+            return Outcome::Settled(true);
+        }
+        let Candidate { block, lane, .. } = self.best;
+        let (best, best_names) = if self.best.is_triangle() {
+            let Meeting::Hit { root, .. } = self.meet_exactly(ray, block, lane) else {
                 return Outcome::Unsettled;
             };
-            let names = |block: u32, lane: u32| {
-                let names = &self.accel.tree.names[block as usize];
-                (names.geometry, names.primitives[lane as usize % BLOCK])
-            };
-            let is_first = || names(block, lane) < names(self.best.block, self.best.lane);
-            if !(found < best.t || found == best.t && is_first()) {
-                return Outcome::Settled(None);
-            }
+            (root.t, self.names(block, lane))
+        } else {
+            (self.crossed.root.t, (self.crossed.geometry, self.crossed.primitive))
+        };
+        Outcome::Settled(t < best || t == best && names < best_names)
+    }
+
+    /// Tests what is no triangle for the nearest hit; false where the plain search has to answer.
+    #[inline(always)]
+    fn meet_entry_closest(&mut self, entry: &Entry, ray: &Ray) -> bool {
+        let (geometry, primitive) = (entry.geometry, entry.primitive());
+        let kind = &self.accel.geometries[geometry as usize].kind;
+        let Some(root) = traverse::first_crossing(kind, primitive, ray) else { return true };
+        let (from, to) = self.heights(root.t);
+        // Also keeps out a NaN.
+        if !ray.contains(root.t) || from > self.best.to {
+            return true;
         }
-        let height = (found * ray.direction.abs().max_element()) as f32;
-        let error = height.abs() * triangles::ROUNDINGS + f32::MIN_POSITIVE;
-        Outcome::Settled(Some(Candidate { block, lane, from: height - error, to: height + error }))
+        let is_nearer = if to < self.best.from {
+            true
+        } else {
+            match self.is_better(ray, root.t, (geometry, primitive)) {
+                Outcome::Settled(is_better) => is_better,
+                Outcome::Unsettled => return false,
+            }
+        };
+        if is_nearer {
+            self.crossed = Winner { root, geometry, primitive };
+            self.keep(Candidate { block: Candidate::CROSSED, lane: 0, from, to });
+        }
+        true
     }
 
     #[cold]
     #[inline(never)]
     fn meet_exactly(&self, ray: &Ray, block: u32, lane: u32) -> Meeting {
         let shear = Shear::new(&ray.direction);
-        let origin = shear.local_origin(&ray.origin, &self.accel.holds.first_origin);
+        let origin = shear.local_origin(&ray.origin, &DVec3::from_slice(&self.start.mesh_origin));
         let corners = shear.axes.gather(&self.triangles[block as usize], lane as usize);
         triangles::intersect(ray, shear, origin, corners)
     }
@@ -243,6 +336,9 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
         if !self.best.is_some() {
             return Outcome::Settled(None);
         }
+        if !self.best.is_triangle() {
+            return Outcome::Settled(Some(self.crossed));
+        }
         let Candidate { block, lane, .. } = self.best;
         let (shear, origin) = L::shear(ray, &self.start.mesh_origin);
         let corners = &self.triangles[block as usize];
@@ -255,9 +351,8 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
                 None => return Outcome::Unsettled,
             }
         };
-        let names = &self.accel.tree.names[block as usize];
-        let (geometry, primitive) = (names.geometry, names.primitives[lane as usize % BLOCK]);
-        Outcome::Settled(Some(Winner { t: root.t, barycentrics: root.local, geometry, primitive }))
+        let (geometry, primitive) = self.names(block, lane);
+        Outcome::Settled(Some(Winner { root, geometry, primitive }))
     }
 
     #[cold]
@@ -280,22 +375,20 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
     }
 }
 
-/// What is asked of a ray, step by step.
+/// What is asked of a ray.
 pub(crate) trait Goal {
     /// Which boxes come first.
     type Order: Order;
     /// What it is to know.
     type Answer;
-    /// The answer where no triangle comes near.
+    /// The answer where nothing comes near.
     const NOTHING: Self::Answer;
 
-    /// Goes on from a node or a leaf.
-    fn step<L: Lanes>(
-        single: &mut SingleRay<L>,
-        reference: u32,
-        ray: &Ray,
-        stack: &mut Stack<<Self::Order as Order>::Entry>,
-    ) -> Step;
+    /// Tests a leaf of triangles; how the search ends, if it does.
+    fn meet_triangles<L: Lanes>(single: &mut SingleRay<L>, leaf: u32, ray: &Ray) -> Option<Step>;
+
+    /// Tests what is no triangle.
+    fn meet_entry<L: Lanes>(single: &mut SingleRay<L>, entry: &Entry, ray: &Ray) -> Option<Step>;
 
     /// What the last step leads to.
     fn answer<L: Lanes>(single: &SingleRay<L>, ray: &Ray, last: Step) -> Outcome<Self::Answer>;
@@ -310,14 +403,13 @@ impl Goal for Nearest {
     const NOTHING: Option<Winner> = None;
 
     #[inline(always)]
-    fn step<L: Lanes>(single: &mut SingleRay<L>, reference: u32, ray: &Ray, stack: &mut Stack<i64>) -> Step {
-        if reference >> tag::SHIFT == tag::INNER {
-            return single.way.meet_node::<ByDistance>(reference, stack).map_or(Step::Out, Step::On);
-        }
-        if !single.meet_leaf_closest(reference, ray) {
-            return Step::Unsettled;
-        }
-        single.way.pop::<ByDistance>(stack).map_or(Step::Out, Step::On)
+    fn meet_triangles<L: Lanes>(single: &mut SingleRay<L>, leaf: u32, ray: &Ray) -> Option<Step> {
+        (!single.meet_leaf_closest(leaf, ray)).then_some(Step::Unsettled)
+    }
+
+    #[inline(always)]
+    fn meet_entry<L: Lanes>(single: &mut SingleRay<L>, entry: &Entry, ray: &Ray) -> Option<Step> {
+        (!single.meet_entry_closest(entry, ray)).then_some(Step::Unsettled)
     }
 
     #[inline(always)]
@@ -335,15 +427,18 @@ impl Goal for Whether {
     const NOTHING: bool = false;
 
     #[inline(always)]
-    fn step<L: Lanes>(single: &mut SingleRay<L>, reference: u32, ray: &Ray, stack: &mut Stack<u32>) -> Step {
-        if reference >> tag::SHIFT == tag::INNER {
-            return single.way.meet_node::<AsBuilt>(reference, stack).map_or(Step::Out, Step::On);
+    fn meet_triangles<L: Lanes>(single: &mut SingleRay<L>, leaf: u32, ray: &Ray) -> Option<Step> {
+        match single.meet_leaf_any(leaf, ray) {
+            Outcome::Settled(true) => Some(Step::Met),
+            Outcome::Settled(false) => None,
+            Outcome::Unsettled => Some(Step::Unsettled),
         }
-        match single.meet_leaf_any(reference, ray) {
-            Outcome::Settled(true) => Step::Met,
-            Outcome::Settled(false) => single.way.pop::<AsBuilt>(stack).map_or(Step::Out, Step::On),
-            Outcome::Unsettled => Step::Unsettled,
-        }
+    }
+
+    #[inline(always)]
+    fn meet_entry<L: Lanes>(single: &mut SingleRay<L>, entry: &Entry, ray: &Ray) -> Option<Step> {
+        let kind = &single.accel.geometries[entry.geometry as usize].kind;
+        traverse::is_crossed(kind, entry.primitive(), ray).then_some(Step::Met)
     }
 
     #[inline(always)]
@@ -352,8 +447,8 @@ impl Goal for Whether {
     }
 }
 
-/// A search with one ray.
-pub(crate) struct Alone<'a, 'r, G> {
+/// A search with one ray. `MIXED` where there is anything but triangles.
+pub(crate) struct Alone<'a, 'r, G, const MIXED: bool> {
     accel: &'a Accel,
     start: &'a SingleStart,
     ray: &'r Ray,
@@ -368,20 +463,34 @@ pub(crate) fn search<G: Goal>(
     start: &SingleStart,
     ray: &Ray,
 ) -> Outcome<G::Answer> {
-    level.run(Alone::<G> { accel, start, ray, goal: PhantomData })
+    if start.is_mixed {
+        level.run(Alone::<G, true>::new(accel, start, ray))
+    } else {
+        level.run(Alone::<G, false>::new(accel, start, ray))
+    }
 }
 
-/// The same within a search that goes through other trees.
+/// The same among nothing but triangles, within a search that goes through other trees.
 #[inline(always)]
 pub(crate) fn search_with<G: Goal, L: Lanes>(
     accel: &Accel,
     start: &SingleStart,
     ray: &Ray,
 ) -> Outcome<G::Answer> {
-    Alone::<G> { accel, start, ray, goal: PhantomData }.run::<L>()
+    if start.is_mixed {
+        return Outcome::Unsettled;
+    }
+    Alone::<G, false>::new(accel, start, ray).run::<L>()
 }
 
-impl<G: Goal> Task for Alone<'_, '_, G> {
+impl<'a, 'r, G, const MIXED: bool> Alone<'a, 'r, G, MIXED> {
+    #[inline(always)]
+    pub(crate) fn new(accel: &'a Accel, start: &'a SingleStart, ray: &'r Ray) -> Self {
+        Self { accel, start, ray, goal: PhantomData }
+    }
+}
+
+impl<G: Goal, const MIXED: bool> Task for Alone<'_, '_, G, MIXED> {
     type Output = Outcome<G::Answer>;
 
     #[inline(always)]
@@ -390,14 +499,23 @@ impl<G: Goal> Task for Alone<'_, '_, G> {
         let Some(slabs) = L::start_single(start, ray) else { return Outcome::Unsettled };
         let way = Way::<L>::new(&accel.tree.nodes, slabs);
         let mut stack = Stack::new();
-        // Many rays come to no leaf, and need nothing else.
-        let Some(leaf) = way.descend::<G::Order>(start.root, &mut stack) else {
-            return Outcome::Settled(G::NOTHING);
-        };
-        let mut single = SingleRay::among_triangles(accel, start, ray, way);
-        let mut next = leaf;
+        let mut next = start.root;
+        let infinite = if MIXED { &*accel.infinite } else { &[] };
+        if infinite.is_empty() {
+            // Many rays come to no leaf, and need nothing else.
+            match way.descend::<G::Order>(next, &mut stack) {
+                Some(leaf) => next = leaf,
+                None => return Outcome::Settled(G::NOTHING),
+            }
+        }
+        let mut single = SingleRay::among_leaves(accel, start, ray, way);
+        for entry in infinite {
+            if let Some(last) = G::meet_entry(&mut single, entry, ray) {
+                return G::answer(&single, ray, last);
+            }
+        }
         loop {
-            match G::step(&mut single, next, ray, &mut stack) {
+            match single.step::<G, MIXED>(next, ray, &mut stack) {
                 Step::On(reference) => next = reference,
                 last => return G::answer(&single, ray, last),
             }

@@ -464,8 +464,7 @@ fn meet_single<'a, L: Lanes, S: Search<'a>>(
                 place.route.push(geometry);
                 place.ids.push(id);
                 let what = What::Named { geometry: winner.geometry, primitive: winner.primitive };
-                let found =
-                    Found { root: winner.root(), what, order: 0, is_front: false, accel: inner, place };
+                let found = Found { root: winner.root, what, order: 0, is_front: false, accel: inner, place };
                 let is_over = search.offer(&found);
                 place.route.pop();
                 place.ids.pop();
@@ -619,6 +618,26 @@ fn meet_entry<'a, L: Lanes, S: Search<'a>>(
     meet_primitive(frame.accel, &frame.ray, geometry, primitive, place, search)
 }
 
+/// Whether a shape, or a primitive of custom geometry, is crossed within the ray's range.
+#[inline(always)]
+pub(crate) fn is_crossed(kind: &GeometryKind, primitive: u32, ray: &Ray) -> bool {
+    match kind {
+        GeometryKind::Shape(shape) => shape.any(ray),
+        GeometryKind::Custom(custom) => custom.any(primitive, ray),
+        _ => false,
+    }
+}
+
+/// The first of its crossings. What custom geometry answers may lie out of the range.
+#[inline(always)]
+pub(crate) fn first_crossing(kind: &GeometryKind, primitive: u32, ray: &Ray) -> Option<Root> {
+    match kind {
+        GeometryKind::Shape(shape) => shape.closest(ray),
+        GeometryKind::Custom(custom) => custom.closest(primitive, ray),
+        _ => None,
+    }
+}
+
 /// Offers the crossings of one primitive that is neither a triangle nor an instance.
 #[inline(always)]
 pub(crate) fn meet_primitive<'a, S: Search<'a>>(
@@ -647,24 +666,13 @@ pub(crate) fn meet_primitive<'a, S: Search<'a>>(
     match S::ASK {
         Ask::Nothing => false,
         Ask::Whether => {
-            let is_hit = match kind {
-                GeometryKind::Shape(shape) => shape.any(ray),
-                GeometryKind::Custom(custom) => custom.any(primitive, ray),
-                _ => false,
-            };
+            let is_hit = is_crossed(kind, primitive, ray);
             if is_hit {
                 search.settle();
             }
             is_hit
         }
-        Ask::First => {
-            let root = match kind {
-                GeometryKind::Shape(shape) => shape.closest(ray),
-                GeometryKind::Custom(custom) => custom.closest(primitive, ray),
-                _ => None,
-            };
-            root.is_some_and(|root| offer(root, 0))
-        }
+        Ask::First => first_crossing(kind, primitive, ray).is_some_and(|root| offer(root, 0)),
         Ask::Every => {
             let mut roots = Roots::new();
             match kind {

@@ -1,12 +1,14 @@
 //! Single precision decides as double precision does: the search in `single` beside the plain one.
 
-use lumbre_geometry::Ray;
-use lumbre_math::{DVec3, Vec3};
+use std::sync::Arc;
 
-use super::scenes::Random;
+use lumbre_geometry::{PlacedShape, Plane, Ray};
+use lumbre_math::{DVec3, Transform, Vec3};
+
+use super::scenes::{self, Random};
 use crate::lanes::Level;
-use crate::single::{self, Nearest, Outcome};
-use crate::{Accel, BuildOptions, Geometry, GeometryKind, Preset, TriangleMesh};
+use crate::single::{self, Nearest, Outcome, Whether};
+use crate::{Accel, BuildOptions, Geometry, GeometryKind, Preset, TriangleMesh, batch};
 
 /// A grid of hills, with a sheet twice in the same place, needles and some triangles seen on edge.
 fn mesh(random: &mut Random, origin: DVec3, size: f64) -> TriangleMesh {
@@ -66,36 +68,77 @@ fn ray(random: &mut Random, mesh: &TriangleMesh, size: f64) -> Ray {
     Ray::new(mesh.origin + start, direction).with_range(t_min, t_max)
 }
 
+/// Every search of a tree beside the plain one, which answers with the same bits.
+fn check(accel: &Accel, rays: &[Ray], least: u32) {
+    let start = accel.single.as_ref().expect("made for this");
+    for level in Level::all() {
+        let (mut settled, mut hits) = (0, 0);
+        let mut in_batch = vec![None; rays.len()];
+        accel.closest_batch_at(level, rays, &mut in_batch);
+        let mut any_in_batch = vec![false; rays.len()];
+        accel.any_batch_at(level, rays, &mut any_in_batch);
+        for ((ray, in_batch), any_in_batch) in rays.iter().zip(&in_batch).zip(&any_in_batch) {
+            let plain = accel.closest_plainly_at(level, ray);
+            assert_eq!(accel.closest_at(level, ray), plain, "{level:?} {ray:?}");
+            assert_eq!(*in_batch, plain, "{level:?} {ray:?}");
+            assert_eq!(accel.any_at(level, ray), plain.is_some(), "{level:?} {ray:?}");
+            assert_eq!(*any_in_batch, plain.is_some(), "{level:?} {ray:?}");
+            let outcome = single::search::<Nearest>(level, accel, start, ray);
+            settled += u32::from(outcome != Outcome::Unsettled);
+            hits += u32::from(plain.is_some());
+        }
+        assert!(hits > least && settled > least, "{hits} hits, {settled} settled");
+        if !start.is_mixed {
+            // Few trees of tests are large enough to be searched like this.
+            batch::fly::<Nearest>(level, accel, start, rays, |i, outcome| {
+                assert_eq!(outcome, single::search::<Nearest>(level, accel, start, &rays[i]), "{level:?}");
+            });
+            batch::fly::<Whether>(level, accel, start, rays, |i, outcome| {
+                assert_eq!(outcome, single::search::<Whether>(level, accel, start, &rays[i]), "{level:?}");
+            });
+        }
+    }
+}
+
+const SIZES_AND_OFFSETS: [(f64, f64); 5] = [(1.0, 0.0), (1e-6, 0.0), (3e7, 1.0), (0.02, 1e6), (400.0, 50.0)];
+
 #[test]
 fn single_precision_answers_with_the_bits_of_double_precision() {
     let mut random = Random(91);
-    for (size, offset) in [(1.0, 0.0), (1e-6, 0.0), (3e7, 1.0), (0.02, 1e6), (400.0, 50.0)] {
+    for (size, offset) in SIZES_AND_OFFSETS {
         let origin = size * offset * DVec3::new(1.0, -0.7, 0.4);
         let meshes = [mesh(&mut random, origin, size), mesh(&mut random, origin, 0.7 * size)];
         for preset in Preset::ALL {
-            let list: Vec<_> = meshes.iter().map(|mesh| GeometryKind::Mesh(mesh.clone().into())).collect();
-            let list = list.into_iter().zip(5..).map(|(kind, id)| Geometry { id, kind }).collect();
+            let kinds = meshes.iter().map(|mesh| GeometryKind::Mesh(mesh.clone().into()));
+            let list = kinds.zip(5..).map(|(kind, id)| Geometry { id, kind }).collect();
             let accel = Accel::build(list, &BuildOptions { preset }).unwrap();
-            let start = accel.single.as_ref().expect("made for this");
-            for level in Level::all() {
-                let (mut settled, mut hits) = (0, 0);
-                let rays: Vec<_> = (0..6_000).map(|i| ray(&mut random, &meshes[i % 2], size)).collect();
-                let mut in_batch = vec![None; rays.len()];
-                accel.closest_batch_at(level, &rays, &mut in_batch);
-                let mut any_in_batch = vec![false; rays.len()];
-                accel.any_batch_at(level, &rays, &mut any_in_batch);
-                for ((ray, in_batch), any_in_batch) in rays.iter().zip(&in_batch).zip(&any_in_batch) {
-                    let plain = accel.closest_plainly_at(level, ray);
-                    assert_eq!(accel.closest_at(level, ray), plain, "{level:?} {preset:?} {ray:?}");
-                    assert_eq!(*in_batch, plain, "{level:?} {preset:?} {ray:?}");
-                    assert_eq!(accel.any_at(level, ray), plain.is_some(), "{level:?} {preset:?} {ray:?}");
-                    assert_eq!(*any_in_batch, plain.is_some(), "{level:?} {preset:?} {ray:?}");
-                    let outcome = single::search::<Nearest>(level, &accel, start, ray);
-                    settled += u32::from(outcome != Outcome::Unsettled);
-                    hits += u32::from(plain.is_some());
-                }
-                assert!(hits > 1_500 && settled > 1_500, "{hits} hits, {settled} settled");
+            let rays: Vec<_> = (0..6_000).map(|i| ray(&mut random, &meshes[i % 2], size)).collect();
+            check(&accel, &rays, 1_500);
+        }
+    }
+}
+
+#[test]
+fn it_does_so_beside_shapes_and_custom_geometry() {
+    let mut random = Random(93);
+    for (size, offset) in SIZES_AND_OFFSETS {
+        let origin = size * offset * DVec3::new(1.0, -0.7, 0.4);
+        let mesh = mesh(&mut random, origin, size);
+        for (has_mesh, has_plane) in [(true, false), (true, true), (false, false), (false, true)] {
+            let mut kinds: Vec<_> =
+                (0..60).map(|_| GeometryKind::Shape(scenes::shape(&mut random, origin, size))).collect();
+            // The same twice: the first in the list is hit.
+            kinds.push(kinds[7].clone());
+            kinds.push(GeometryKind::Custom(Arc::new(scenes::balls(&mut random, 20, origin, size, None))));
+            if has_plane {
+                let plane = Plane::new(origin, DVec3::new(0.1, 1.0, 0.2)).unwrap();
+                kinds.push(GeometryKind::Shape(PlacedShape::new(plane.into(), Transform::IDENTITY)));
             }
+            if has_mesh {
+                kinds.push(GeometryKind::Mesh(mesh.clone().into()));
+            }
+            let rays: Vec<_> = (0..3_000).map(|_| ray(&mut random, &mesh, size)).collect();
+            check(&scenes::build(kinds), &rays, 500);
         }
     }
 }
