@@ -10,7 +10,7 @@ use lumbre_formats::gltf::{GltfOptions, read_gltf};
 use lumbre_formats::{Budget, Diagnostics, FormatError, Limits, Strictness};
 use lumbre_geometry::Shape;
 use lumbre_image::Rgb;
-use lumbre_math::{DVec3, Transform, Vec2, Vec3, Vec4};
+use lumbre_math::{DVec2, DVec3, Transform, Vec2, Vec3, Vec4};
 use lumbre_scene::{
     CameraKind, GeometryDesc, LightDesc, MeshDesc, Placement, Scene, SceneDesc, ShapeDesc, WithoutLight,
 };
@@ -646,7 +646,7 @@ fn measured_lights_shine_as_their_profile_says_along_minus_z() {
         (DVec3::new(-1.0, 0.0, -1.0), 0.5),
     ] {
         let towards = towards.normalize();
-        let found = scene.lights()[0].irradiance(place + 4.0 * towards, -towards).unwrap();
+        let found = scene.lights()[0].irradiance(place + 4.0 * towards, 0.0, -towards).unwrap();
         let expected = Rgb::new(1.0, 0.5, 0.25) * (3.0 * 200.0 / 16.0 * share) as f32;
         assert!((found - expected).map(f32::abs).max_component() < 0.5, "{towards}: {found:?} {expected:?}");
     }
@@ -743,6 +743,67 @@ fn cameras_look_along_minus_z_and_are_not_mirrored() {
     assert_eq!(scene.cameras[2].screen_window, Some([-3.0, 3.0, -2.0, 2.0]));
     let (width, height) = (scene.film.width.unwrap(), scene.film.height.unwrap());
     assert!((f64::from(width) / f64::from(height) - 2.0).abs() < 0.01);
+}
+
+#[test]
+fn lights_that_animations_move_are_seen_moving() {
+    // A lamp that goes 8 along x from 1 s to 3 s, and a sun that turns by a quarter about z meanwhile, from +x to +y.
+    let mut parts = Parts::default();
+    let times = parts.add(&floats(&[1.0, 3.0]), r#""componentType":5126,"type":"SCALAR","count":2"#);
+    let moves = parts
+        .add(&floats(&[2.0, 3.0, 4.0, 10.0, 3.0, 4.0]), r#""componentType":5126,"type":"VEC3","count":2"#);
+    // -z turned to -x, and that about z.
+    let half = std::f32::consts::FRAC_1_SQRT_2;
+    let turns = parts.add(
+        &floats(&[0.0, half, 0.0, half, -0.5, 0.5, 0.5, 0.5]),
+        r#""componentType":5126,"type":"VEC4","count":2"#,
+    );
+    let rest = format!(
+        r#""extensionsUsed":["KHR_lights_punctual"],"extensions":{{"KHR_lights_punctual":{{"lights":[
+            {{"type":"point","intensity":8}},{{"type":"directional","intensity":3}}]}}}},
+        "nodes":[{{"extensions":{{"KHR_lights_punctual":{{"light":0}}}}}},
+            {{"extensions":{{"KHR_lights_punctual":{{"light":1}}}}}}],
+        "animations":[{{"samplers":[{{"input":{times},"output":{moves}}},{{"input":{times},"output":{turns}}}],
+            "channels":[{{"sampler":0,"target":{{"node":0,"path":"translation"}}}},
+                {{"sampler":1,"target":{{"node":1,"path":"rotation"}}}}]}}]"#
+    );
+    let bytes = glb(&parts.json(&rest), &parts.binary);
+    let read = |shutter| {
+        let mut diagnostics = Diagnostics::new();
+        let options = GltfOptions { frame: Some(2.0), shutter, ..GltfOptions::default() };
+        let scene = read_with(&bytes, &options, &mut diagnostics).unwrap();
+        assert_eq!(diagnostics.lines(), [""; 0]);
+        Scene::build(scene).unwrap()
+    };
+    assert!(!read(0.0).moves());
+    let scene = read(1.0);
+    assert!(scene.moves());
+    // Besides, there is the light of the studio.
+    let [lamp, sun, ..] = scene.lights() else { panic!("two lights are expected") };
+    for part in [0.0, 0.25, 0.5, 1.0] {
+        let share = 0.25 + 0.5 * part;
+        // 2 above the floor, 1 beside the lamp.
+        let floor = DVec3::new(2.0 + 8.0 * share, 4.0, 2.0);
+        let found = lamp.irradiance(floor, part, DVec3::Z).unwrap().g;
+        let expected = 8.0 * 2.0 / 5.0_f64.powf(1.5);
+        assert!((f64::from(found) / expected - 1.0).abs() < 1e-5, "{part}: {found}, {expected}");
+        let angle = 0.5 * std::f64::consts::PI * share;
+        let found = sun.irradiance(floor, part, DVec3::new(angle.cos(), angle.sin(), 0.0)).unwrap().g;
+        // Between the moments that are looked at it turns as evenly.
+        assert!((found / 3.0 - 1.0).abs() < 1e-4, "{part}: {found}");
+        assert_eq!((lamp.name(), sun.name()), ("point", "distant"));
+        assert!(lamp.is_delta() && sun.is_delta());
+        // Chosen and asked at the time, a sample comes from where the lamp is then.
+        let samples =
+            [0.1, 0.4, 0.7, 0.95].map(|choose| scene.sample_light(floor, part, choose, DVec2::splat(0.5)));
+        let ends: Vec<DVec3> =
+            samples.into_iter().flatten().filter_map(|sample| Some(sample.end?.point)).collect();
+        assert!(!ends.is_empty());
+        assert!(
+            ends.iter().all(|end| (*end - floor - DVec3::new(0.0, -1.0, 2.0)).length() < 1e-5),
+            "{ends:?}"
+        );
+    }
 }
 
 #[test]

@@ -787,7 +787,7 @@ fn goniometric_lights_shine_as_their_image_says_y_and_z_exchanged() {
     let resolved = Scene::build(scene.clone()).unwrap();
     let found = |light: usize, direction: DVec3| {
         let at = DVec3::new(1.0, 2.0, 3.0) + 2.0 * direction;
-        resolved.lights()[light].irradiance(at, -direction).unwrap() * 4.0
+        resolved.lights()[light].irradiance(at, 0.0, -direction).unwrap() * 4.0
     };
     near_rgb(found(0, DVec3::Y), [8.0, 16.0, 24.0]);
     for other in [DVec3::NEG_Y, DVec3::new(0.8, -0.6, 0.0), DVec3::new(0.0, -0.6, -0.8)] {

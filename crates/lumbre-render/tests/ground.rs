@@ -139,7 +139,7 @@ fn the_irradiance_of_an_environment_agrees_with_its_samples() {
         let desc = SceneDesc { lights: vec![light], without_light: WithoutLight::Dark, ..empty() };
         let scene = Scene::build(desc).unwrap();
         let normal = DVec3::new(1.0, -2.0, 2.0) / 3.0;
-        let exact = scene.lights()[0].irradiance(DVec3::ZERO, normal).unwrap();
+        let exact = scene.lights()[0].irradiance(DVec3::ZERO, 0.0, normal).unwrap();
         let mut sum = [0.0_f64; 3];
         const N: u32 = 300;
         for i in 0..N * N {

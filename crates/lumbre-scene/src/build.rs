@@ -9,8 +9,8 @@ use lumbre_math::{DVec3, Transform};
 use lumbre_shading::{Material, MaterialKind};
 
 use crate::light::{
-    DistantLight, Environment, GoniometricLight, Light, LightId, MeshLight, PlacedLight, PointLight,
-    ShapeLight, SpotLight, UniformLight, power,
+    DistantLight, Environment, GoniometricLight, Light, LightId, MeshLight, MovingLight, PlacedLight,
+    PointLight, ShapeLight, SpotLight, UniformLight, power,
 };
 use crate::mesh::{self, QuadOrder};
 use crate::surface::{Form, SurfaceEntry};
@@ -58,7 +58,8 @@ impl Scene {
         let is_moving = |i: &InstanceDesc| matches!(i.world_from_object, Placement::Moving(_));
         let deforms = |shape: &ShapeDesc| matches!(&shape.geometry, GeometryDesc::Mesh(mesh) | GeometryDesc::BilinearMesh(mesh) if mesh.motion.is_some());
         let moves = objects.iter().flat_map(|object| &object.instances).chain(&instances).any(is_moving)
-            || objects.iter().flat_map(|object| &object.shapes).chain(&shapes).any(deforms);
+            || objects.iter().flat_map(|object| &object.shapes).chain(&shapes).any(deforms)
+            || lights.iter().any(|light| matches!(light, LightDesc::Moving { .. }));
         let objects = builder.objects(objects, &instances)?;
         let accel = Arc::new(builder.tree(shapes, &instances, &objects)?);
         let bounds = accel.bounds();
@@ -417,6 +418,14 @@ impl Builder {
     fn light(&mut self, position: usize, desc: LightDesc) -> Result<(), BuildError> {
         let wrong = |reason| BuildError::Light { light: position, reason };
         let light = match desc {
+            LightDesc::Moving { light, world_from_light } => {
+                let before = self.lights.len();
+                self.light(position, *light)?;
+                // One that gives no light was left out.
+                let Some(light) = self.lights.drain(before..).next() else { return Ok(()) };
+                let moving = MovingLight::new(light, world_from_light);
+                Light::Moving(moving.ok_or(wrong("it is infinite and moves, or its motion stretches it"))?)
+            }
             LightDesc::Point { from, intensity } => {
                 if !from.is_finite() || !intensity.is_finite() {
                     return Err(wrong("its place or intensity is not finite"));

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use lumbre_geometry::Shape;
 use lumbre_image::Rgb;
 use lumbre_kernel::Placement;
-use lumbre_math::{DVec3, Transform, Vec2, Vec3, Vec4};
+use lumbre_math::{AnimatedTransform, DVec3, Transform, Vec2, Vec3, Vec4};
 use lumbre_shading::{FURTHER_SETS, FloatTexture, Material, MipMap};
 
 use crate::{Camera, MaterialId, ObjectId};
@@ -267,6 +267,13 @@ pub enum LightDesc {
         radiance: Rgb,
         /// Radiance by direction, where it varies.
         image: Option<EnvironmentDesc>,
+    },
+    /// One of the above, though not an infinite one, that moves.
+    Moving {
+        /// The light, in a space of its own.
+        light: Box<LightDesc>,
+        /// Where that space is: by rotations, mirrors and translations alone, as a light cannot be stretched.
+        world_from_light: Arc<AnimatedTransform>,
     },
 }
 

@@ -25,7 +25,7 @@ pub struct GroundPlane {
     pub catcher: bool,
     /// Its irradiance in the open by lights at infinity, the same everywhere.
     open: Spectrum,
-    /// Lights whose part in that changes from place to place, and are no surfaces.
+    /// Lights whose part in that changes from place to place or with time, and are no surfaces.
     local: Vec<Light>,
     /// All lights that are no surfaces.
     lights: Vec<LightId>,
@@ -38,11 +38,14 @@ impl GroundPlane {
         let mut local = vec![];
         for light in lights {
             match light {
-                Light::Point(_) | Light::Spot(_) | Light::Goniometric(_) => local.push(light.clone()),
-                _ => open += light.irradiance(desc.point, normal).unwrap_or(Spectrum::BLACK),
+                Light::Point(_) | Light::Spot(_) | Light::Goniometric(_) | Light::Moving(_) => {
+                    local.push(light.clone());
+                }
+                // The others are the same at all times.
+                _ => open += light.irradiance(desc.point, 0.0, normal).unwrap_or(Spectrum::BLACK),
             }
         }
-        let is_surface = |light: &Light| matches!(light, Light::Shape(_) | Light::Mesh(_));
+        let is_surface = |light: &Light| matches!(light, Light::Shape(_) | Light::Mesh(_) | Light::Placed(_));
         let ids = (0..).zip(lights).filter(|(_, light)| !is_surface(light)).map(|(id, _)| LightId(id));
         Self { normal, point: desc.point, catcher: desc.catcher, open, local, lights: ids.collect() }
     }
@@ -57,9 +60,9 @@ impl GroundPlane {
         &self.lights
     }
 
-    /// The irradiance at a point of it if nothing else were there, of all lights that are no surfaces.
-    pub fn open_irradiance(&self, at: DVec3) -> Spectrum {
-        let local = self.local.iter().filter_map(|light| light.irradiance(at, self.normal));
+    /// The irradiance at a point of it and at a time if nothing else were there, of all lights that are no surfaces.
+    pub fn open_irradiance(&self, at: DVec3, time: f64) -> Spectrum {
+        let local = self.local.iter().filter_map(|light| light.irradiance(at, time, self.normal));
         local.fold(self.open, |sum, irradiance| sum + irradiance)
     }
 }

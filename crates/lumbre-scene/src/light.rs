@@ -4,6 +4,7 @@ mod area;
 mod delta;
 mod environment;
 mod mesh;
+mod moving;
 mod placed;
 
 use lumbre_geometry::{Ray, Surface};
@@ -15,6 +16,7 @@ pub(crate) use area::power;
 pub use delta::{DistantLight, GoniometricLight, PointLight, SpotLight};
 pub use environment::{Environment, UniformLight};
 pub use mesh::MeshLight;
+pub use moving::MovingLight;
 pub use placed::PlacedLight;
 
 use crate::surface::SurfaceEntry;
@@ -44,6 +46,8 @@ pub enum Light {
     Mesh(MeshLight),
     /// One of the two in an object that stands in the world once, moving or not.
     Placed(PlacedLight),
+    /// A light from a point or in one direction that moves.
+    Moving(MovingLight),
 }
 
 /// Light that arrives at a point, from a direction that a light chose.
@@ -101,6 +105,7 @@ impl Light {
             Self::Shape(light) => light.sample(&entries[light.entry as usize], from, u),
             Self::Mesh(light) => light.sample(&entries[light.entry as usize], from, u),
             Self::Placed(light) => light.sample(entries, from, time, u),
+            Self::Moving(light) => light.sample(entries, from, time, u),
         }
     }
 
@@ -127,9 +132,9 @@ impl Light {
         }
     }
 
-    /// The irradiance of a surface at `at` that faces `normal` (unit), if nothing stands in the way; `None` for lights that
-    /// are surfaces.
-    pub fn irradiance(&self, at: DVec3, normal: DVec3) -> Option<Spectrum> {
+    /// The irradiance at a time of a surface at `at` that faces `normal` (unit), if nothing stands in the way; `None` for lights
+    /// that are surfaces.
+    pub fn irradiance(&self, at: DVec3, time: f64, normal: DVec3) -> Option<Spectrum> {
         let of = |sample: Option<LightSample>| {
             sample.map_or(Spectrum::BLACK, |s| s.radiance * normal.dot(s.towards).max(0.0) as f32)
         };
@@ -140,6 +145,7 @@ impl Light {
             Self::Distant(light) => Some(of(Some(light.sample()))),
             Self::Uniform(light) => Some(light.radiance * std::f32::consts::PI),
             Self::Environment(light) => Some(light.irradiance(normal)),
+            Self::Moving(light) => light.irradiance(at, time, normal),
             Self::Shape(_) | Self::Mesh(_) | Self::Placed(_) => None,
         }
     }
@@ -151,7 +157,10 @@ impl Light {
 
     /// Whether its light comes from one direction alone at each place.
     pub fn is_delta(&self) -> bool {
-        matches!(self, Self::Point(_) | Self::Spot(_) | Self::Goniometric(_) | Self::Distant(_))
+        matches!(
+            self,
+            Self::Point(_) | Self::Spot(_) | Self::Goniometric(_) | Self::Distant(_) | Self::Moving(_)
+        )
     }
 
     /// An estimate of the power that it sends into a scene of this radius, by which it is chosen.
@@ -169,6 +178,7 @@ impl Light {
             Self::Shape(light) => light.power,
             Self::Mesh(light) => light.power,
             Self::Placed(light) => light.power(),
+            Self::Moving(light) => light.light.power(scene_radius),
         }
     }
 
@@ -181,6 +191,7 @@ impl Light {
             Self::Distant(_) => "distant",
             Self::Uniform(_) | Self::Environment(_) => "infinite",
             Self::Shape(_) | Self::Mesh(_) | Self::Placed(_) => "diffuse",
+            Self::Moving(light) => light.light.name(),
         }
     }
 }

@@ -87,7 +87,7 @@ fn blocked(
             lost += sample.radiance * (cosine * share / (density * SAMPLES as f32));
         }
     }
-    let open = ground.open_irradiance(at.surface.point);
+    let open = ground.open_irradiance(at.surface.point, at.time);
     let part = |lost: f32, open: f32| if open > 0.0 { lost / open } else { 0.0 };
     Spectrum::new(part(lost.r, open.r), part(lost.g, open.g), part(lost.b, open.b))
 }

@@ -50,14 +50,7 @@ impl SceneInfo {
             *info.materials.entry(material.material.kind.name().to_owned()).or_default() += 1;
         }
         for light in &desc.lights {
-            let name = match light {
-                LightDesc::Point { .. } => "point",
-                LightDesc::Spot { .. } => "spot",
-                LightDesc::Goniometric { .. } => "goniometric",
-                LightDesc::Distant { .. } => "distant",
-                LightDesc::Infinite { .. } => "infinite",
-            };
-            *info.lights.entry(name.to_owned()).or_default() += 1;
+            *info.lights.entry(light_name(light).to_owned()).or_default() += 1;
         }
         info.cameras = desc
             .cameras
@@ -108,4 +101,16 @@ fn mesh_bytes(mesh: &MeshDesc) -> u64 {
         + list(&mesh.colours)
         + list(&mesh.face_indices);
     bytes as u64
+}
+
+/// The name of a light in the scene language; of one that moves, that of what it is.
+fn light_name(light: &LightDesc) -> &'static str {
+    match light {
+        LightDesc::Point { .. } => "point",
+        LightDesc::Spot { .. } => "spot",
+        LightDesc::Goniometric { .. } => "goniometric",
+        LightDesc::Distant { .. } => "distant",
+        LightDesc::Infinite { .. } => "infinite",
+        LightDesc::Moving { light, .. } => light_name(light),
+    }
 }

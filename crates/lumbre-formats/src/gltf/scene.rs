@@ -68,13 +68,14 @@ pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
         }
         if let Some(extension) = value.extension("KHR_lights_punctual")? {
             let (_, light) = file.at(List::Lights, extension.need("light")?)?;
-            scene.lights.extend(self::light(file, light, world)?);
-            if exposure.moves(node)? {
-                file.warn(value, "the motion of a light was left out: it stands where it is halfway");
-            }
+            let motion = exposure.motion(node, |world| Transform::from_affine(rigid(world)))?;
+            let at = if motion.is_some() { DAffine3::IDENTITY } else { *world };
+            scene.lights.extend(self::light(file, light, &at)?.map(|light| carried(light, motion)));
         }
         if let Some(extension) = value.extension("EXT_lights_ies")? {
-            scene.lights.push(profiles.light(extension, &rigid(world))?);
+            let motion = exposure.motion(node, |world| Transform::from_affine(rigid(world)))?;
+            let at = if motion.is_some() { DAffine3::IDENTITY } else { rigid(world) };
+            scene.lights.push(carried(profiles.light(extension, &at)?, motion));
         }
         let Some((mesh, _)) = file.named(List::Meshes, value, "mesh")? else { return Ok(()) };
         let skin = file.named(List::Skins, value, "skin")?.map(|(skin, _)| skin);
@@ -123,6 +124,14 @@ pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
     }
     scene.materials = builder.materials.into_list();
     Ok(scene)
+}
+
+/// A light, with the motion of its space if there is one.
+fn carried(light: LightDesc, motion: Option<Arc<AnimatedTransform>>) -> LightDesc {
+    match motion {
+        Some(world_from_light) => LightDesc::Moving { light: Box::new(light), world_from_light },
+        None => light,
+    }
 }
 
 /// A mesh in a pose: what several nodes may share.

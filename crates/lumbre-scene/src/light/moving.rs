@@ -1,0 +1,54 @@
+//! A light without a surface that something carries about: sampled where it is at the time of the ray.
+
+use std::sync::Arc;
+
+use lumbre_math::{AnimatedTransform, DMat3, DVec2, DVec3};
+use lumbre_shading::Spectrum;
+
+use super::{Light, LightSample};
+use crate::surface::SurfaceEntry;
+
+/// A light in a space of its own, and the rigid motion of that space.
+#[derive(Clone, Debug)]
+pub struct MovingLight {
+    /// From a point or in one direction.
+    pub(super) light: Box<Light>,
+    // Of rotations, mirrors and translations.
+    motion: Arc<AnimatedTransform>,
+}
+
+/// How far columns of a rigid motion may be from unit length and from right angles.
+const RIGID: f64 = 1e-6;
+
+impl MovingLight {
+    /// `None` for a light that is a surface or infinite, and for a motion that stretches.
+    pub(crate) fn new(light: Light, motion: Arc<AnimatedTransform>) -> Option<Self> {
+        let is_rigid = |m: DMat3| (m.transpose() * m).abs_diff_eq(DMat3::IDENTITY, RIGID);
+        let is_sound = light.is_delta() && motion.keys().iter().all(|(_, map)| is_rigid(map.linear()));
+        is_sound.then(|| Self { light: Box::new(light), motion })
+    }
+
+    pub(super) fn sample(
+        &self,
+        entries: &[SurfaceEntry],
+        from: DVec3,
+        time: f64,
+        u: DVec2,
+    ) -> Option<LightSample> {
+        let map = self.motion.at(time);
+        let mut sample = self.light.sample(entries, map.inverse_point(from), time, u)?;
+        sample.towards = map.vector(sample.towards).try_normalize()?;
+        if let Some(end) = &mut sample.end {
+            end.point = map.point(end.point);
+            // Seen from the place itself, which the way there and back may have moved by its rounding.
+            sample.towards = (end.point - from).try_normalize()?;
+        }
+        Some(sample)
+    }
+
+    pub(super) fn irradiance(&self, at: DVec3, time: f64, normal: DVec3) -> Option<Spectrum> {
+        let map = self.motion.at(time);
+        let normal = map.inverse_vector(normal).try_normalize()?;
+        self.light.irradiance(map.inverse_point(at), time, normal)
+    }
+}
