@@ -4,9 +4,9 @@ use lumbre_geometry::Ray;
 
 use crate::query::{All, Batch, Closest};
 use crate::spheres::has_radius;
-use crate::touch::{Touch, offer_borders_of_all};
-use crate::traverse::{Found, Place, Search, What, is_sound, meet_primitive};
-use crate::triangles::{Meeting, Shear, intersect};
+use crate::touch::{offer_borders_of_all, offer_meeting};
+use crate::traverse::{Place, Search, What, is_sound, meet_primitive};
+use crate::triangles::{Shear, intersect};
 use crate::{Accel, GeometryKind, Hit, precise};
 
 pub(crate) fn closest(accel: &Accel, ray: &Ray) -> Option<Hit> {
@@ -47,31 +47,10 @@ fn visit<'a, S: Search<'a>>(accel: &'a Accel, ray: &Ray, search: &mut S) {
                         });
                         let primitive = primitive as u32;
                         let geometry = position;
-                        let (root, is_front) = match intersect(&ray, shear, origin, permuted) {
-                            Meeting::Miss => continue,
-                            Meeting::Hit { root, is_front } => (root, is_front),
-                            Meeting::Touch { root, is_owned, feature, is_front } => {
-                                let place = place.clone();
-                                let corners = corners.map(|corner| corner.map(f64::from));
-                                touches.push(Touch {
-                                    root,
-                                    is_owned,
-                                    is_front,
-                                    feature,
-                                    corners,
-                                    geometry,
-                                    primitive,
-                                    accel,
-                                    place,
-                                });
-                                if !is_owned || !ray.contains(root.t) {
-                                    continue;
-                                }
-                                (root, is_front)
-                            }
-                        };
+                        let meeting = intersect(&ray, shear, origin, permuted);
+                        let corners = corners.map(|corner| corner.map(f64::from));
                         let what = What::Named { geometry, primitive };
-                        search.offer(&Found { root, what, order: 0, is_front, accel, place: &place });
+                        offer_meeting(meeting, &ray, corners, what, accel, &place, search, &mut touches);
                     }
                 }
                 GeometryKind::PreciseMesh(mesh) => {

@@ -8,8 +8,8 @@ use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
 use lumbre_math::quadratic::dop;
 
-use crate::touch::Touch;
-use crate::traverse::{Found, Place, Search, What};
+use crate::touch::{self, Touch};
+use crate::traverse::{Place, Search, What};
 use crate::triangles::{Meeting, Shear, intersect_precise};
 use crate::{Accel, GeometryKind};
 
@@ -57,29 +57,7 @@ pub(crate) fn meet<'a, S: Search<'a>>(
     if matches!(meeting, Meeting::Miss) || !has_area(&corners) {
         return false;
     }
-    let (root, is_front) = match meeting {
-        Meeting::Miss => return false,
-        Meeting::Hit { root, is_front } => (root, is_front),
-        Meeting::Touch { root, is_owned, feature, is_front } => {
-            let corners = corners.map(|corner| corner.to_array());
-            let place = place.clone();
-            touches.push(Touch {
-                root,
-                is_owned,
-                is_front,
-                feature,
-                corners,
-                geometry,
-                primitive,
-                accel,
-                place,
-            });
-            if !is_owned || !ray.contains(root.t) {
-                return false;
-            }
-            (root, is_front)
-        }
-    };
     let what = What::Named { geometry, primitive };
-    search.offer(&Found { root, what, order: 0, is_front, accel, place })
+    let corners = corners.map(|corner| corner.to_array());
+    touch::offer_meeting(meeting, ray, corners, what, accel, place, search, touches)
 }

@@ -14,6 +14,7 @@ use crate::Accel;
 use crate::lanes::Level;
 use crate::stack::AsBuilt;
 use crate::traverse::{self, Ask, Found, Place, Search, What};
+use crate::triangles::Meeting;
 
 /// Where a ray meets a triangle that it touches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,6 +49,45 @@ impl<'a> Touch<'a> {
         let what = What::Named { geometry, primitive };
         Found { root, what, order: 0, is_front, accel, place }
     }
+}
+
+/// Offers what a ray meets of a triangle that has these corners. One that it touches joins the touches. True ends the search.
+#[inline(always)]
+#[allow(clippy::too_many_arguments)]
+pub(crate) fn offer_meeting<'a, S: Search<'a>>(
+    meeting: Meeting,
+    ray: &Ray,
+    corners: [[f64; 3]; 3],
+    what: What,
+    accel: &'a Accel,
+    place: &Place,
+    search: &mut S,
+    touches: &mut Vec<Touch<'a>>,
+) -> bool {
+    let (root, is_front) = match meeting {
+        Meeting::Miss => return false,
+        Meeting::Hit { root, is_front } => (root, is_front),
+        Meeting::Touch { root, is_owned, feature, is_front } => {
+            let (geometry, primitive) = what.names(accel);
+            let place = place.clone();
+            touches.push(Touch {
+                root,
+                is_owned,
+                is_front,
+                feature,
+                corners,
+                geometry,
+                primitive,
+                accel,
+                place,
+            });
+            if !is_owned || !ray.contains(root.t) {
+                return false;
+            }
+            (root, is_front)
+        }
+    };
+    search.offer(&Found { root, what, order: 0, is_front, accel, place })
 }
 
 /// A corner by position; the two zeros are one.

@@ -19,7 +19,7 @@ use crate::sphere_search::{self, AmongSpheres, CloudRay};
 use crate::spheres::ExactSphere;
 use crate::stack::{Order, Stack};
 use crate::touch::{self, AllTouches, Touch};
-use crate::triangles::{self, BLOCK, BlockRay, Inside, Meeting, Passage, Shear, TriangleBlock};
+use crate::triangles::{self, BLOCK, BlockRay, Inside, Passage, Shear, TriangleBlock};
 use crate::way::Way;
 use crate::{Accel, GeometryKind, InstancePath, options, precise};
 
@@ -580,30 +580,9 @@ fn meet_unclear<'a, S: Search<'a>>(
 ) -> bool {
     let What::Lane { block, lane } = what else { unreachable!("triangles are in blocks") };
     let (block, lane) = (&accel.tree.blocks[block as usize], lane as usize);
-    let (root, is_front) = match triangles::intersect(ray, shear, origin, shear.axes.gather(block, lane)) {
-        Meeting::Miss => return false,
-        Meeting::Hit { root, is_front } => (root, is_front),
-        Meeting::Touch { root, is_owned, feature, is_front } => {
-            let (geometry, primitive) = what.names(accel);
-            let (place, corners) = (place.clone(), block.triangle(lane).map(|corner| corner.map(f64::from)));
-            touches.push(Touch {
-                root,
-                is_owned,
-                is_front,
-                feature,
-                corners,
-                geometry,
-                primitive,
-                accel,
-                place,
-            });
-            if !is_owned || !ray.contains(root.t) {
-                return false;
-            }
-            (root, is_front)
-        }
-    };
-    search.offer(&Found { root, what, order: 0, is_front, accel, place })
+    let meeting = triangles::intersect(ray, shear, origin, shear.axes.gather(block, lane));
+    let corners = block.triangle(lane).map(|corner| corner.map(f64::from));
+    touch::offer_meeting(meeting, ray, corners, what, accel, place, search, touches)
 }
 
 /// Tests a shape or a primitive of custom geometry.
