@@ -327,8 +327,14 @@ pub(crate) fn check_structure(tree: &Packed, geometries: &[Geometry]) -> Result<
                 let is_behind = parent.map_or(place == 0, |parent| place > parent);
                 if is_behind { once(&mut nodes, place) } else { None }
             }
-            tag::TRIANGLES => tag::blocks(reference).try_for_each(|block| once(&mut blocks, block)),
-            tag::SPHERES => tag::blocks(reference).try_for_each(|block| once(&mut sphere_blocks, block)),
+            tag::TRIANGLES => {
+                are_of_one(&tree.names, reference)?;
+                tag::blocks(reference).try_for_each(|block| once(&mut blocks, block))
+            }
+            tag::SPHERES => {
+                are_of_one(&tree.sphere_names, reference)?;
+                tag::blocks(reference).try_for_each(|block| once(&mut sphere_blocks, block))
+            }
             kind @ (tag::SHAPES | tag::INSTANCE | tag::CUSTOM | tag::PRECISE) => {
                 for (place, entry) in tree.entries.iter().enumerate().skip(place) {
                     once(&mut entries, place)?;
@@ -369,6 +375,12 @@ pub(crate) fn check_structure(tree: &Packed, geometries: &[Geometry]) -> Result<
         Some((what, place)) => inconsistent(format!("{what} {place} is named nowhere")),
         None => Ok(()),
     }
+}
+
+/// The blocks of a leaf are to be there, and of one geometry: it has one origin.
+fn are_of_one(names: &[BlockNames], leaf: u32) -> Option<()> {
+    let names = names.get(tag::blocks(leaf))?;
+    names.iter().all(|block| block.geometry == names[0].geometry).then_some(())
 }
 
 /// Every primitive is to be there, and named once, or in parts that together are all of it.

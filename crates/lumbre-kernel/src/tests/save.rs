@@ -7,7 +7,10 @@ use lumbre_math::DVec3;
 
 use super::oracle::check;
 use super::scenes::{Random, build, cube, icosphere, mixture, ray, with_every_preset};
-use crate::node::tag;
+use crate::collapse::Packed;
+use crate::node::{Node, tag};
+use crate::save::check_structure;
+use crate::triangles::{BlockNames, TriangleBlock};
 use crate::{Accel, BuildError, Geometry, GeometryKind, LoadError, QueryOptions, RefitError, TriangleMesh};
 
 const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
@@ -173,4 +176,20 @@ fn masks_are_saved_and_stay_through_a_refit() {
     fewer[32] = 1;
     let error = Accel::from_bytes(&sealed(fewer), accel.geometries.clone()).unwrap_err();
     assert!(matches!(error, LoadError::Inconsistent { .. }), "{error}");
+}
+
+#[test]
+fn a_leaf_with_blocks_of_two_meshes_is_refused() {
+    let accel = two_meshes();
+    let mut tree = Packed { root: Some(0), ..Packed::default() };
+    tree.names = vec![BlockNames::empty(0), BlockNames::empty(1)].into();
+    let mut apart = Node::EMPTY;
+    (apart.len, apart.children[0], apart.children[1]) = (2, tag::triangles(0, 1), tag::triangles(1, 1));
+    let mut together = Node::EMPTY;
+    (together.len, together.children[0]) = (1, tag::triangles(0, 2));
+    for (node, is_sound) in [(apart, true), (together, false)] {
+        tree.nodes = vec![node].into();
+        tree.blocks = vec![TriangleBlock::EMPTY; 2].into();
+        assert_eq!(check_structure(&tree, &accel.geometries).is_ok(), is_sound);
+    }
 }
