@@ -255,9 +255,9 @@ impl Accel {
 
     /// [`Accel::closest`] for every ray, with the same answers to the bit; `hits` has a place for each.
     ///
-    /// Several rays are in flight at a time, which hides the wait for memory: this is faster than one after another where the
-    /// tree is large (a million triangles) and the rays are unlike, and a little slower where not. Hundreds at a time suffice. It works on the calling thread: to use more, split `rays` and `hits`.
-    /// In trees of other things than triangles, and through instances, rays are traced one after another.
+    /// In a large tree of triangles (some hundred thousand of them), several rays are in flight at a time, which hides the wait
+    /// for memory: hundreds at a time suffice. In others they are traced one after another. It works on the calling thread: to
+    /// use more, split `rays` and `hits`.
     ///
     /// # Panics
     /// When `rays` and `hits` differ in length.
