@@ -60,6 +60,9 @@ enum Task {
         /// How many rays; by default a billion for leaks, ten million for the loop.
         #[arg(long)]
         rays: Option<u64>,
+        /// Other rays for every seed, so that a long proof can be had in parts.
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
     },
     /// Runs a small set of the kernel's tests, on its portable path, in the interpreter Miri. Needs a nightly toolchain with
     /// the components miri and rust-src.
@@ -85,7 +88,7 @@ fn main() -> Result<()> {
             Ok(())
         }
         Task::Agree(what) => agree::run_comparison(&what),
-        Task::Proof { what, rays } => proof::run_proof(what, rays),
+        Task::Proof { what, rays, seed } => proof::run_proof(what, rays, seed),
         Task::Miri => proof::miri(),
         Task::Asan => proof::asan(),
         Task::Bench(bench) => bench.run(),

@@ -15,15 +15,15 @@ pub enum Claim {
 }
 
 /// Runs the ignored test of a claim, optimised.
-pub fn run_proof(claim: Claim, rays: Option<u64>) -> Result<()> {
+pub fn run_proof(claim: Claim, rays: Option<u64>, seed: u64) -> Result<()> {
     let (test, usual) = match claim {
         Claim::Leaks => ("proof_that_no_aimed_ray_leaks", 1_000_000_000),
         Claim::Loop => ("proof_that_trees_answer_as_a_loop", 10_000_000),
     };
-    let rays = rays.unwrap_or(usual).to_string();
+    let (rays, seed) = (rays.unwrap_or(usual).to_string(), seed.to_string());
     let arguments =
         ["test", "--release", "--package", "lumbre-kernel", "--lib", "--", "--ignored", "--nocapture", test];
-    run_with("cargo", &arguments, &[("LUMBRE_PROOF_RAYS", &rays)])
+    run_with("cargo", &arguments, &[("LUMBRE_PROOF_RAYS", &rays), ("LUMBRE_PROOF_SEED", &seed)])
 }
 
 /// A little of everything in an interpreter that sees undefined behaviour.

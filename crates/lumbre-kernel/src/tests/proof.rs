@@ -1,6 +1,6 @@
 //! Proof by numbers: rays aimed at edges and vertices that must not leak, and trees that must answer as loops do.
 //!
-//! The counts of the ignored tests are set by `LUMBRE_PROOF_RAYS`; `cargo xtask proof` runs them.
+//! The counts of the ignored tests are set by `LUMBRE_PROOF_RAYS`, which rays they are by `LUMBRE_PROOF_SEED`; `cargo xtask proof` runs them.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -64,8 +64,9 @@ fn placements(mesh: &TriangleMesh, preset: Preset) -> [(Accel, Transform); 4] {
 /// Rays of a chunk; each has its own random numbers.
 const CHUNK: u64 = 1 << 14;
 
-/// Half as many rays at vertices as `rays`, half at edges, from within: every one has a closest hit, and every fourth is
-/// asked for all its crossings as well, which must be odd in number. Answers how many rays there were.
+/// Half as many rays at vertices as `rays`, half at edges, from within: every one has a closest hit, every fourth is
+/// asked for all its crossings as well, which must be odd in number, and every other fourth whether it hits at all. Answers
+/// how many rays there were.
 fn bombard(rays: u64, seed: u64) -> u64 {
     let meshes = closed_meshes();
     let ways = || Preset::ALL.map(|preset| (preset, false)).into_iter().chain([(Preset::Best, true)]);
@@ -96,6 +97,8 @@ fn bombard(rays: u64, seed: u64) -> u64 {
                         if i % 8 < 2 {
                             let count = accel.count(&ray);
                             assert_eq!(count % 2, 1, "{name}, {preset:?}, place {place}: {ray:?}");
+                        } else if i % 8 < 4 {
+                            assert!(accel.any(&ray), "{name}, {preset:?}, place {place}: {ray:?}");
                         }
                     }
                     shot.fetch_add(CHUNK, Ordering::Relaxed);
@@ -115,19 +118,25 @@ fn no_ray_leaks_in_twenty_million_aimed_at_edges_and_vertices() {
     assert!(bombard(20_000_000, 5) >= 20_000_000);
 }
 
-fn rays_asked_for() -> u64 {
-    let asked = std::env::var("LUMBRE_PROOF_RAYS").ok();
-    asked.map_or(1_000_000_000, |asked| asked.parse().expect("LUMBRE_PROOF_RAYS is a whole number"))
+fn asked_for(name: &str, otherwise: u64) -> u64 {
+    let asked = std::env::var(name).ok();
+    asked.map_or(otherwise, |asked| asked.parse().unwrap_or_else(|_| panic!("{name} is a whole number")))
+}
+
+/// What the random numbers start from: far apart even where the seeds asked for are neighbours.
+fn seed_asked_for() -> u64 {
+    Random(asked_for("LUMBRE_PROOF_SEED", 1)).bits()
 }
 
 #[test]
 #[ignore = "an hour; `cargo xtask proof leaks` before a release"]
 fn proof_that_no_aimed_ray_leaks() {
-    let shot = bombard(rays_asked_for(), 6);
+    let shot = bombard(asked_for("LUMBRE_PROOF_RAYS", 1_000_000_000), seed_asked_for());
     eprintln!("{shot} rays aimed at edges and vertices, 0 leaks");
 }
 
-/// Trees against the loop: the same hit, with the same bits of t. Answers how many of the rays hit something.
+/// Trees against the loop: the same hit, with the same bits of t, and any hit where there is one. Answers how many of the
+/// rays hit something.
 fn compare(rays: u64, seed: u64) -> u64 {
     let chunks = rays.div_ceil(CHUNK);
     let center = DVec3::new(1.5, -2.25, 4.0);
@@ -151,6 +160,7 @@ fn compare(rays: u64, seed: u64) -> u64 {
             let bits = |hit: &Option<crate::Hit>| hit.as_ref().map(|hit| hit.root.t.to_bits());
             assert_eq!(hit, expected, "{ray:?}");
             assert_eq!(bits(&hit), bits(&expected), "{ray:?}");
+            assert_eq!(accel.any(&ray), expected.is_some(), "{ray:?}");
             found += u64::from(hit.is_some());
         }
         hits.fetch_add(found, Ordering::Relaxed);
@@ -166,8 +176,8 @@ fn half_a_million_rays_are_answered_as_by_a_loop() {
 #[test]
 #[ignore = "minutes; `cargo xtask proof loop` before a release"]
 fn proof_that_trees_answer_as_a_loop() {
-    let rays = rays_asked_for().div_ceil(CHUNK) * CHUNK;
-    let hits = compare(rays, 8);
+    let rays = asked_for("LUMBRE_PROOF_RAYS", 10_000_000).div_ceil(CHUNK) * CHUNK;
+    let hits = compare(rays, seed_asked_for());
     eprintln!("{rays} rays, {hits} hits, 0 other than a loop's");
     assert!(hits > rays / 8);
 }
