@@ -16,7 +16,7 @@ pub enum Bench {
     /// beside the crates obvhs and bvh. All options are passed through: `kernel --help`.
     #[command(disable_help_flag = true)]
     Kernel {
-        /// --quick, --json FILE, --scene NAME, --work NAME, --peer NAME, --threads 1,2, --mesh FILE, --list …
+        /// --quick, --costs, --json FILE, --scene NAME, --work NAME, --peer NAME, --threads 1,2, --mesh FILE, --list …
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         arguments: Vec<String>,
     },

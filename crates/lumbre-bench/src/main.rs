@@ -33,6 +33,7 @@ use lumbre_kernel::Preset;
 use embree::{Embree, Setting};
 use measure::{Job, Ratio, alternate, median};
 use oracle::Sample;
+use ours::Asked;
 use program::{Built, Bytes, Program, Query};
 use rays::{PictureSize, Ray32, Work};
 use report::{Mismatches, Report, Row};
@@ -79,6 +80,10 @@ struct Options {
     /// Lumbre takes rays by batches, on every thread, and not one at a time.
     #[arg(long)]
     batches: bool,
+    /// Peers are Lumbre itself, asked otherwise: by batches, in double precision alone, with options, with masks, and with
+    /// vertices in double precision. The ratios are what that costs.
+    #[arg(long, conflicts_with = "batches")]
+    costs: bool,
     /// Lumbre keeps every sphere as a shape of its own, not in a cloud.
     #[arg(long)]
     placed_spheres: bool,
@@ -173,11 +178,17 @@ fn main() -> Result<()> {
 
     let lumbre = ours::Lumbre {
         preset: options.preset,
-        by_batches: options.batches,
+        asked: if options.batches { Asked::ByBatches } else { Asked::Each },
         places_spheres: options.placed_spheres,
     };
     let mut programs: Vec<Box<dyn Program>> = vec![Box::new(lumbre)];
-    programs.extend(peers()?.into_iter().filter(|peer| is_wanted(&options.peer, &peer.name())));
+    let peers = if options.costs {
+        let other = |asked| Box::new(ours::Lumbre { asked, ..lumbre }) as Box<dyn Program>;
+        Asked::OTHERS.into_iter().map(other).collect()
+    } else {
+        peers()?
+    };
+    programs.extend(peers.into_iter().filter(|peer| is_wanted(&options.peer, &peer.name())));
 
     println!("{}, {}", report::machine(), report::today());
     println!("Mray/s; in brackets the ratio, more than 1 where Lumbre is faster or smaller, and its spread");

@@ -145,6 +145,7 @@ mod tests {
     use lumbre_kernel::Preset;
 
     use super::*;
+    use crate::ours::Asked;
     use crate::program::Program;
     use crate::rays::{self, PictureSize, Work};
     use crate::worlds::RECIPES;
@@ -185,8 +186,11 @@ mod tests {
 
     #[test]
     fn our_kernel_agrees_with_the_loop_over_everything() {
-        check(&ours::Lumbre { preset: Preset::Best, by_batches: false, places_spheres: false }, 1.0);
-        check(&ours::Lumbre { preset: Preset::Balanced, by_batches: true, places_spheres: true }, 1.0);
+        check(&ours::Lumbre { preset: Preset::Best, asked: Asked::Each, places_spheres: false }, 1.0);
+        check(&ours::Lumbre { preset: Preset::Balanced, asked: Asked::ByBatches, places_spheres: true }, 1.0);
+        for asked in Asked::OTHERS {
+            check(&ours::Lumbre { preset: Preset::Balanced, asked, places_spheres: false }, 1.0);
+        }
     }
 
     #[test]
@@ -224,7 +228,7 @@ mod tests {
         let scene = RECIPES[0].make();
         let accel = ours::build(&scene, Preset::Balanced).expect("a sound scene");
         let list = rays::make(Work::Random, &scene, &accel, PictureSize { width: 40, height: 20 });
-        let program = ours::Lumbre { preset: Preset::Balanced, by_batches: false, places_spheres: false };
+        let program = ours::Lumbre { preset: Preset::Balanced, asked: Asked::Each, places_spheres: false };
         let built = program.build(&scene, 1).expect("a sound scene");
         let mut pass = built.tree.prepare(Query::Closest, &list);
         pass.run();

@@ -4,7 +4,10 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result};
 use lumbre_geometry::{PlacedShape, Ray, Sphere};
-use lumbre_kernel::{Accel, BuildOptions, Geometry, GeometryKind, Hit, Instance, Preset};
+use lumbre_kernel::{
+    Accel, BuildOptions, Geometry, GeometryKind, Hit, Instance, PreciseMesh, Preset, QueryOptions,
+    TriangleMesh,
+};
 use lumbre_math::{DVec3, Transform};
 
 use crate::program::{Built, Pass, Program, Query, Tree};
@@ -17,11 +20,50 @@ use crate::scene::Scene;
 pub struct Lumbre {
     /// How its trees are built.
     pub preset: Preset,
-    /// Whether rays come by batches of [`BATCH`], not one at a time.
-    pub by_batches: bool,
+    /// How it is asked.
+    pub asked: Asked,
     /// Whether every sphere is a shape of its own, not one of a cloud.
     pub places_spheres: bool,
 }
+
+/// How a tree is asked: the same answers in every way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Asked {
+    /// One ray at a time.
+    Each,
+    /// By batches of [`BATCH`] rays. Of a tree below 16 MiB, that is one after another again, but the instruction set is
+    /// chosen once a batch.
+    ByBatches,
+    /// One ray at a time, in double precision from the start.
+    Plainly,
+    /// One ray at a time, with options that leave nothing out.
+    WithOptions,
+    /// The same, of geometries that have masks, all of which let rays through.
+    WithMasks,
+    /// One ray at a time, of meshes whose vertices are in double precision, too.
+    OfPreciseMeshes,
+}
+
+impl Asked {
+    /// All but the first: what else costs what.
+    pub const OTHERS: [Self; 5] =
+        [Self::ByBatches, Self::Plainly, Self::WithOptions, Self::WithMasks, Self::OfPreciseMeshes];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Each => "",
+            Self::ByBatches => " batches",
+            Self::Plainly => " double alone",
+            Self::WithOptions => " options",
+            Self::WithMasks => " masks",
+            Self::OfPreciseMeshes => " f64 meshes",
+        }
+    }
+}
+
+/// Masks that share a bit with what is asked.
+const MASK_OF_ALL: u32 = 0b0110;
+const MASK_ASKED: u32 = 0b1010;
 
 /// Rays that a batch has at most.
 const BATCH: usize = 256;
@@ -34,37 +76,44 @@ impl Program for Lumbre {
             Preset::Balanced => "",
             Preset::Best => " best",
         };
-        let batches = if self.by_batches { " batches" } else { "" };
+        let asked = self.asked.name();
         let placed = if self.places_spheres { " placed" } else { "" };
-        format!("Lumbre {version}{preset}{batches}{placed}")
+        format!("Lumbre {version}{preset}{asked}{placed}")
     }
 
-    fn refuses(&self, _: &Scene) -> Option<&'static str> {
-        None
+    fn refuses(&self, scene: &Scene) -> Option<&'static str> {
+        let has_meshes = !scene.meshes.is_empty() || !scene.placed_meshes.is_empty();
+        (self.asked == Asked::OfPreciseMeshes && !has_meshes).then_some("there is no mesh")
     }
 
     fn build<'a>(&'a self, scene: &'a Scene, threads: usize) -> Result<Built<'a>> {
         // Lists of shapes are what the program takes.
-        let list = list(scene, self.places_spheres);
+        let is_precise = self.asked == Asked::OfPreciseMeshes;
+        let list = list(scene, self.places_spheres, is_precise);
+        let count = list.len();
         let list_bytes = list.capacity() * size_of::<Geometry>();
         let (accel, seconds, mut bytes) =
-            rust_heap::measure(threads, || build_list(scene, list, self.preset))?;
+            rust_heap::measure(threads, || build_list(scene, list, self.preset, is_precise))?;
         // The tree keeps the list.
         bytes.kept += list_bytes;
         bytes.peak += list_bytes;
-        Ok(Built { tree: Box::new(Queried { accel: accel?, by_batches: self.by_batches }), seconds, bytes })
+        let mut accel = accel?;
+        if self.asked == Asked::WithMasks {
+            accel = accel.with_masks(vec![MASK_OF_ALL; count]);
+        }
+        Ok(Built { tree: Box::new(Queried { accel, asked: self.asked }), seconds, bytes })
     }
 }
 
 /// The kernel's tree of a scene.
 pub fn build(scene: &Scene, preset: Preset) -> Result<Accel> {
-    build_list(scene, list(scene, false), preset)
+    build_list(scene, list(scene, false, false), preset, false)
 }
 
 /// What stands in a scene; instances for now of nothing.
-fn list(scene: &Scene, places_spheres: bool) -> Vec<Geometry> {
+fn list(scene: &Scene, places_spheres: bool, is_precise: bool) -> Vec<Geometry> {
     let nothing = Arc::new(Accel::build(Vec::new(), &BuildOptions::default()).expect("nothing is sound"));
-    let meshes = scene.meshes.iter().map(|mesh| GeometryKind::Mesh(Arc::clone(mesh)));
+    let meshes = scene.meshes.iter().map(|mesh| mesh_kind(mesh, is_precise));
     let has_cloud = !places_spheres && scene.sphere_count() > 0;
     let cloud = has_cloud.then(|| GeometryKind::Spheres(Arc::clone(&scene.spheres)));
     let placed = if places_spheres { &scene.spheres.spheres[..] } else { &[] };
@@ -81,13 +130,21 @@ fn list(scene: &Scene, places_spheres: bool) -> Vec<Geometry> {
     kinds.enumerate().map(|(i, kind)| Geometry { id: i as u32, kind }).collect()
 }
 
-fn build_list(scene: &Scene, mut list: Vec<Geometry>, preset: Preset) -> Result<Accel> {
+fn mesh_kind(mesh: &Arc<TriangleMesh>, is_precise: bool) -> GeometryKind {
+    if !is_precise {
+        return GeometryKind::Mesh(Arc::clone(mesh));
+    }
+    let positions = mesh.positions.iter().map(|p| mesh.origin + p.as_dvec3()).collect();
+    GeometryKind::PreciseMesh(Arc::new(PreciseMesh { positions, indices: mesh.indices.clone() }))
+}
+
+fn build_list(scene: &Scene, mut list: Vec<Geometry>, preset: Preset, is_precise: bool) -> Result<Accel> {
     let options = BuildOptions { preset };
     let placed: Result<Vec<_>, _> = scene
         .placed_meshes
         .iter()
         .map(|mesh| {
-            let kind = GeometryKind::Mesh(Arc::clone(mesh));
+            let kind = mesh_kind(mesh, is_precise);
             Accel::build(vec![Geometry { id: 0, kind }], &options).map(Arc::new)
         })
         .collect();
@@ -110,7 +167,7 @@ fn placed_sphere([x, y, z, radius]: [f32; 4]) -> PlacedShape {
 /// A tree, and how it is asked.
 struct Queried {
     accel: Accel,
-    by_batches: bool,
+    asked: Asked,
 }
 
 impl Tree for Queried {
@@ -128,6 +185,10 @@ impl Tree for Queried {
             }
         }
     }
+}
+
+fn masked() -> QueryOptions<'static> {
+    QueryOptions { mask: MASK_ASKED, ..QueryOptions::default() }
 }
 
 /// What is written down of a hit: about what Embree writes.
@@ -155,22 +216,36 @@ struct Closest<'a> {
     batch: Vec<Option<Hit>>,
 }
 
+impl Closest<'_> {
+    // A loop of its own for every way of asking.
+    #[inline(always)]
+    fn each(&mut self, ask: impl Fn(&Ray) -> Option<Hit>) {
+        for (ray, found) in self.rays.iter().zip(&mut self.found) {
+            found.put(ask(ray).as_ref());
+        }
+    }
+}
+
 impl Pass for Closest<'_> {
     fn reset(&mut self) {
         self.found.fill(Found::MISS);
     }
 
     fn run(&mut self) {
-        if self.tree.by_batches {
+        let Queried { accel, asked } = self.tree;
+        if *asked == Asked::ByBatches {
             for (rays, found) in self.rays.chunks(BATCH).zip(self.found.chunks_mut(BATCH)) {
                 let hits = &mut self.batch[..rays.len()];
-                self.tree.accel.closest_batch(rays, hits);
+                accel.closest_batch(rays, hits);
                 found.iter_mut().zip(hits).for_each(|(found, hit)| found.put(hit.as_ref()));
             }
             return;
         }
-        for (ray, found) in self.rays.iter().zip(&mut self.found) {
-            found.put(self.tree.accel.closest(ray).as_ref());
+        match asked {
+            Asked::Plainly => self.each(|ray| accel.closest_plainly(ray)),
+            Asked::WithOptions => self.each(|ray| accel.closest_with(ray, &QueryOptions::default())),
+            Asked::WithMasks => self.each(|ray| accel.closest_with(ray, &masked())),
+            _ => self.each(|ray| accel.closest(ray)),
         }
     }
 
@@ -186,20 +261,33 @@ struct Any<'a> {
     found: Vec<bool>,
 }
 
+impl Any<'_> {
+    #[inline(always)]
+    fn each(&mut self, ask: impl Fn(&Ray) -> bool) {
+        for (ray, found) in self.rays.iter().zip(&mut self.found) {
+            *found = ask(ray);
+        }
+    }
+}
+
 impl Pass for Any<'_> {
     fn reset(&mut self) {
         self.found.fill(false);
     }
 
     fn run(&mut self) {
-        if self.tree.by_batches {
+        let Queried { accel, asked } = self.tree;
+        if *asked == Asked::ByBatches {
             for (rays, found) in self.rays.chunks(BATCH).zip(self.found.chunks_mut(BATCH)) {
-                self.tree.accel.any_batch(rays, found);
+                accel.any_batch(rays, found);
             }
             return;
         }
-        for (ray, found) in self.rays.iter().zip(&mut self.found) {
-            *found = self.tree.accel.any(ray);
+        match asked {
+            Asked::Plainly => self.each(|ray| accel.any_plainly(ray)),
+            Asked::WithOptions => self.each(|ray| accel.any_with(ray, &QueryOptions::default())),
+            Asked::WithMasks => self.each(|ray| accel.any_with(ray, &masked())),
+            _ => self.each(|ray| accel.any(ray)),
         }
     }
 

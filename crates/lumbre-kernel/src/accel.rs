@@ -220,6 +220,13 @@ impl Accel {
         search.take_hit()
     }
 
+    /// [`Accel::closest`] by the search that knows no other precision than double: the same answer to the bit. To be
+    /// measured beside it.
+    #[doc(hidden)]
+    pub fn closest_plainly(&self, ray: &Ray) -> Option<Hit> {
+        self.closest_plainly_at(self.level, ray)
+    }
+
     /// [`Accel::closest`] among what the options leave. Of the crossings of a shape, each is asked by itself.
     pub fn closest_with(&self, ray: &Ray, options: &QueryOptions) -> Option<Hit> {
         self.closest_with_at(self.level, ray, options)
@@ -322,6 +329,12 @@ impl Accel {
         let mut search = Any::new(ray, All);
         traverse::search(level, self, ray, &mut search);
         search.is_hit
+    }
+
+    /// [`Accel::any`] by the search that knows no other precision than double. To be measured beside it.
+    #[doc(hidden)]
+    pub fn any_plainly(&self, ray: &Ray) -> bool {
+        self.any_plainly_at(self.level, ray)
     }
 
     /// Whether anything that `accept` takes is hit in the ray's range.
