@@ -710,16 +710,127 @@ fn animations_by_pointers_change_what_they_name() {
         let material = format!("{:?}", scene.materials[0].material);
         assert!(frame.is_none() || material.contains(&format!("g: {green:?}")), "{material}");
     }
-    // What cannot be animated is said, and left out.
-    let odd = [channel(1, "/buffers/0/byteLength")];
-    let options = GltfOptions { frame: Some(1.5), ..GltfOptions::default() };
-    let mut diagnostics = Diagnostics::new();
-    read_with(&glb(&parts.json(&rest(&odd)), &parts.binary), &options, &mut diagnostics).unwrap();
-    assert!(
-        diagnostics.lines()[0].contains("/pointer: animation of what cannot be animated"),
-        "{:?}",
-        diagnostics.lines()
-    );
+    // While the shutter is open nodes move; what else changes is said to stand, if it really does.
+    for (middle, shutter, still) in [(2.0, 0.5, 3), (0.4, 0.5, 0)] {
+        let options = GltfOptions { frame: Some(middle), shutter, ..GltfOptions::default() };
+        let mut diagnostics = Diagnostics::new();
+        let scene =
+            read_with(&glb(&parts.json(&rest(&all)), &parts.binary), &options, &mut diagnostics).unwrap();
+        let lines = diagnostics.lines();
+        assert_eq!(lines.len(), still, "{lines:?}");
+        assert_eq!(still > 0, matches!(scene.lights[0], LightDesc::Moving { .. }));
+        let is_said = |(i, pointer): (usize, &str)| {
+            let start =
+                format!("/animations/0/channels/{i}: what an animation changes while the shutter is open");
+            lines[i].contains(&start) && lines[i].contains(pointer)
+        };
+        let places = ["/baseColorFactor\"", "/lights/0/intensity\"", "/KHR_materials_emissive_strength/"];
+        assert!(places.into_iter().enumerate().take(still).all(is_said), "{lines:?}");
+    }
+    // What cannot be animated, or is not there, is said and left out.
+    for (pointer, said) in [
+        ("/buffers/0/byteLength", "/pointer: animation of what cannot be animated was left out"),
+        ("/materials/1/alphaCutoff", "/pointer: animation of what is not there was left out"),
+        ("/nodes/2/scale/0", "/pointer: animation of what is not there was left out"),
+    ] {
+        let options = GltfOptions { frame: Some(1.5), ..GltfOptions::default() };
+        let mut diagnostics = Diagnostics::new();
+        let odd = glb(&parts.json(&rest(&[channel(1, pointer)])), &parts.binary);
+        read_with(&odd, &options, &mut diagnostics).unwrap();
+        assert!(diagnostics.lines()[0].contains(said), "{pointer}: {:?}", diagnostics.lines());
+    }
+}
+
+/// The same animations, but by pointers.
+fn by_pointers(rest: &str) -> String {
+    let mut out = String::from(r#""extensionsUsed":["KHR_animation_pointer"],"#);
+    let mut parts = rest.split(r#""target":{"node":"#);
+    out += parts.next().unwrap();
+    for part in parts {
+        let (node, part) = part.split_once(r#","path":""#).unwrap();
+        let (path, part) = part.split_once(r#""}"#).unwrap();
+        let extension = format!(r#"{{"KHR_animation_pointer":{{"pointer":"/nodes/{node}/{path}"}}}}"#);
+        out += &format!(r#""target":{{"path":"pointer","extensions":{extension}}}{part}"#);
+    }
+    out
+}
+
+#[test]
+fn nodes_move_by_pointers_as_they_do_by_names() {
+    let (parts, rest) = animated();
+    let mut moving = 0;
+    for (frame, shutter) in [(None, 0.0), (Some(1.5), 0.0), (Some(2.5), 2.0), (Some(2.0), 0.5)] {
+        let options = GltfOptions { frame, shutter, ..GltfOptions::default() };
+        let [named, pointed] = [rest.clone(), by_pointers(&rest)].map(|rest| {
+            let mut diagnostics = Diagnostics::new();
+            let scene =
+                read_with(&glb(&parts.json(&rest), &parts.binary), &options, &mut diagnostics).unwrap();
+            assert_eq!(diagnostics.lines(), [""; 0]);
+            scene
+        });
+        assert_eq!(format!("{named:?}"), format!("{pointed:?}"), "{frame:?} {shutter}");
+        moving +=
+            usize::from(mesh(&pointed.shapes[0]).motion.is_some() && pointed.cameras[0].motion.is_some());
+    }
+    assert_eq!(moving, 2);
+}
+
+#[test]
+fn single_weights_and_those_of_meshes_are_animated_by_pointers() {
+    let mut parts = Parts::default();
+    let p = parts.positions(&SQUARE);
+    let aside = parts.positions(&[[1.0, 0.0, 0.0]; 4]);
+    let lift = parts.positions(&[[0.0, 0.0, 1.0]; 4]);
+    let times = parts.add(&floats(&[1.0, 3.0]), r#""componentType":5126,"type":"SCALAR","count":2"#);
+    let one = parts.add(&floats(&[2.0, 6.0]), r#""componentType":5126,"type":"SCALAR","count":2"#);
+    let both = parts.add(&floats(&[0.0, 3.0, 4.0, 5.0]), r#""componentType":5126,"type":"SCALAR","count":4"#);
+    let rest = |pointers: &[(usize, &str)]| {
+        let channel = |(sampler, pointer): &(usize, &str)| {
+            let extension = format!(r#"{{"KHR_animation_pointer":{{"pointer":"{pointer}"}}}}"#);
+            format!(r#"{{"sampler":{sampler},"target":{{"path":"pointer","extensions":{extension}}}}}"#)
+        };
+        let channels: Vec<String> = pointers.iter().map(channel).collect();
+        format!(
+            r#""extensionsUsed":["KHR_animation_pointer"],
+            "meshes":[{{"weights":[7,9],"primitives":[{{"mode":6,"attributes":{{"POSITION":{p}}},
+                "targets":[{{"POSITION":{aside}}},{{"POSITION":{lift}}}]}}]}}],
+            "nodes":[{{"mesh":0}},{{"mesh":0,"weights":[-1,-2]}}],
+            "animations":[{{"samplers":[{{"input":{times},"output":{one}}},{{"input":{times},"output":{both}}}],
+                "channels":[{}]}}]"#,
+            channels.join(",")
+        )
+    };
+    // Where the first vertex of a mesh is at 1.5 s, 2 s and 2.5 s.
+    let seen = |pointers: &[(usize, &str)], node: usize, shutter: f64| {
+        let bytes = glb(&parts.json(&rest(pointers)), &parts.binary);
+        let options = GltfOptions { frame: Some(2.0), shutter, ..GltfOptions::default() };
+        let mut diagnostics = Diagnostics::new();
+        let scene = read_with(&bytes, &options, &mut diagnostics).unwrap();
+        let mesh = mesh(&scene.shapes[node]);
+        let moved = mesh.motion.as_ref().map_or_else(
+            || vec![mesh.positions[0]],
+            |motion| [0, 4, 8].map(|i| motion.moments[i].positions[0]).to_vec(),
+        );
+        let added = moved.iter().map(|p| (*p - Vec3::from_array(SQUARE[0])).to_array());
+        (added.collect::<Vec<_>>(), diagnostics.lines())
+    };
+    let none: Vec<String> = vec![];
+    let of_mesh = [(1, "/meshes/0/weights")];
+    assert_eq!(seen(&of_mesh, 0, 0.0), (vec![[2.0, 0.0, 4.0]], none.clone()));
+    let moved = vec![[1.0, 0.0, 3.5], [2.0, 0.0, 4.0], [3.0, 0.0, 4.5]];
+    assert_eq!(seen(&of_mesh, 0, 1.0), (moved, none.clone()));
+    // What a node says of its own stays.
+    assert_eq!(seen(&of_mesh, 1, 1.0), (vec![[-1.0, 0.0, -2.0]], none.clone()));
+    let of_node = [(0, "/nodes/1/weights/1")];
+    let moved = vec![[-1.0, 0.0, 3.0], [-1.0, 0.0, 4.0], [-1.0, 0.0, 5.0]];
+    assert_eq!(seen(&of_node, 1, 1.0), (moved, none.clone()));
+    assert_eq!(seen(&[(0, "/nodes/0/weights/0")], 0, 0.0), (vec![[4.0, 0.0, 9.0]], none));
+    // One and all of them at once: the first counts.
+    let (found, warnings) = seen(&[(0, "/nodes/1/weights/1"), (1, "/nodes/1/weights")], 1, 0.0);
+    assert_eq!(found, [[-1.0, 0.0, 4.0]]);
+    assert!(warnings[0].contains("/animations/0/channels/1: animation of what another one"), "{warnings:?}");
+    let wrong = error(&parts.json(&rest(&[(0, "/nodes/0/weights/2")])), &parts.binary);
+    assert!(wrong.contains("morph targets that are not there"), "{wrong}");
 }
 
 #[test]

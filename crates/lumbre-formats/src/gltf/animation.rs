@@ -1,6 +1,6 @@
 //! Animations: where they take nodes at one time, and what else they change.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use lumbre_math::{DQuat, DVec3};
 
@@ -8,7 +8,14 @@ use super::accessor::{Accessor, Component, Element};
 use super::file::{File, List};
 use super::json::{Read, Value};
 use super::pointer::{self, Changes};
-use crate::diagnostic::quoted;
+use crate::diagnostic::{Diagnostic, quoted};
+
+/// What animations do at one time to nodes, and to the meshes of nodes without weights of their own.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Played {
+    pub nodes: HashMap<usize, Moved>,
+    pub meshes: HashMap<usize, Weights>,
+}
 
 /// What animations do to a node at one time.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -16,7 +23,43 @@ pub(super) struct Moved {
     pub translation: Option<DVec3>,
     pub rotation: Option<DQuat>,
     pub scale: Option<DVec3>,
-    pub weights: Option<Vec<f64>>,
+    pub weights: Weights,
+}
+
+/// What animations do to the weights of morph targets at one time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Weights {
+    /// All of them.
+    pub all: Option<Vec<f64>>,
+    /// Single ones.
+    pub single: BTreeMap<usize, f64>,
+}
+
+impl Weights {
+    /// Sets a value as [`Path::Weights`] and [`Path::Weight`] name it; false where one is set already.
+    fn set(&mut self, path: Path, value: Vec<f64>) -> bool {
+        let is_free = self.all.is_none()
+            && match path {
+                Path::Weight(target) => !self.single.contains_key(&target),
+                _ => self.single.is_empty(),
+            };
+        match path {
+            _ if !is_free => {}
+            Path::Weight(target) => drop(self.single.insert(target, value[0])),
+            _ => self.all = Some(value),
+        }
+        is_free
+    }
+
+    /// The weights, where `still` are those without animations.
+    pub fn over(&self, still: Option<Vec<f64>>) -> Option<Vec<f64>> {
+        let weights = self.all.clone().or(still);
+        let Some((&last, _)) = self.single.last_key_value() else { return weights };
+        let mut weights = weights.unwrap_or_default();
+        weights.resize(weights.len().max(last + 1), 0.0);
+        self.single.iter().for_each(|(&target, &weight)| weights[target] = weight);
+        Some(weights)
+    }
 }
 
 impl Moved {
@@ -31,7 +74,10 @@ enum Path {
     Translation,
     Rotation,
     Scale,
+    /// All weights of morph targets.
     Weights,
+    /// That of one.
+    Weight(usize),
     /// Anything else: so many numbers, and whether they are a list even if there is one.
     Numbers {
         width: usize,
@@ -43,6 +89,9 @@ enum Path {
 #[derive(Clone, Debug, PartialEq)]
 enum Target {
     Node(usize),
+    /// The weights that it gives to nodes without any.
+    Mesh(usize),
+    /// What only the text of the file has.
     Pointer(String),
 }
 
@@ -66,37 +115,66 @@ struct Channel<'a> {
 }
 
 /// What all animations do at a time in seconds. Of several that do the same thing to the same node the first counts.
-pub(super) fn at(file: &File<'_>, time: f64) -> Read<HashMap<usize, Moved>> {
-    let mut moved: HashMap<usize, Moved> = HashMap::new();
+pub(super) fn at(file: &File<'_>, time: f64) -> Read<Played> {
+    let mut played = Played::default();
     for &animation in file.list(List::Animations) {
         for channel in channels(file, animation)? {
-            let Target::Node(node) = channel.target else { continue };
-            let entry = moved.entry(node).or_default();
-            let is_taken = match channel.path {
-                Path::Translation => entry.translation.is_some(),
-                Path::Rotation => entry.rotation.is_some(),
-                Path::Scale => entry.scale.is_some(),
-                Path::Weights => entry.weights.is_some(),
-                Path::Numbers { .. } => continue,
+            let path = channel.path;
+            let is_free = match channel.target {
+                Target::Pointer(_) => continue,
+                Target::Mesh(mesh) => {
+                    played.meshes.entry(mesh).or_default().set(path, channel.sample(file, time)?)
+                }
+                Target::Node(node) => {
+                    let entry = played.nodes.entry(node).or_default();
+                    let v = channel.sample(file, time)?;
+                    let vec3 = |v: &[f64]| DVec3::new(v[0], v[1], v[2]);
+                    match path {
+                        Path::Translation => set(&mut entry.translation, vec3(&v)),
+                        Path::Rotation => set(&mut entry.rotation, DQuat::from_xyzw(v[0], v[1], v[2], v[3])),
+                        Path::Scale => set(&mut entry.scale, vec3(&v)),
+                        Path::Weights | Path::Weight(_) => entry.weights.set(path, v),
+                        Path::Numbers { .. } => continue,
+                    }
+                }
             };
-            if is_taken {
-                file.warn(channel.value, "animation of what another one animates was left out");
-                continue;
-            }
-            let v = channel.sample(file, time)?;
-            match channel.path {
-                Path::Translation => entry.translation = Some(DVec3::new(v[0], v[1], v[2])),
-                Path::Rotation => entry.rotation = Some(DQuat::from_xyzw(v[0], v[1], v[2], v[3])),
-                Path::Scale => entry.scale = Some(DVec3::new(v[0], v[1], v[2])),
-                Path::Weights => entry.weights = Some(v),
-                Path::Numbers { .. } => {}
+            if !is_free {
+                file.warn(channel.value, TAKEN);
             }
         }
     }
-    Ok(moved)
+    Ok(played)
 }
 
-/// What all animations do at a time to what is not said by a node and a path.
+/// Fills what is empty; false where it is full.
+fn set<T>(place: &mut Option<T>, value: T) -> bool {
+    let is_free = place.is_none();
+    place.get_or_insert(value);
+    is_free
+}
+
+const TAKEN: &str = "animation of what another one animates was left out";
+
+/// Warns of what animations change by pointers between these times, if it does not move with nodes and meshes: it is as it is
+/// halfway.
+pub(super) fn warn_of_changes(file: &File<'_>, times: &[f64]) -> Read<()> {
+    for &animation in file.list(List::Animations) {
+        for channel in channels(file, animation)? {
+            let Target::Pointer(pointer) = &channel.target else { continue };
+            let values: Vec<Vec<f64>> =
+                times.iter().map(|&time| channel.sample(file, time)).collect::<Read<_>>()?;
+            if values.iter().any(|value| *value != values[0]) {
+                let warning = Diagnostic::warning(
+                    "what an animation changes while the shutter is open was left as it is halfway",
+                );
+                file.push(warning.at(channel.value.place()).found(quoted(pointer)));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// What all animations do at a time to anything else, by pointers.
 pub(super) fn changes(file: &File<'_>, time: f64) -> Read<Changes> {
     let mut changes = Changes::default();
     for &animation in file.list(List::Animations) {
@@ -105,7 +183,7 @@ pub(super) fn changes(file: &File<'_>, time: f64) -> Read<Changes> {
             let value = channel.sample(file, time)?;
             let is_list = value.len() > 1 || matches!(channel.path, Path::Numbers { is_list: true, .. });
             if !changes.set(pointer, &value, is_list) {
-                file.warn(channel.value, "animation of what another one animates was left out");
+                file.warn(channel.value, TAKEN);
             }
         }
     }
@@ -128,16 +206,25 @@ fn channels<'a>(file: &'a File<'_>, animation: Value<'a>) -> Read<Vec<Channel<'a
             samplers[value.need("sampler")?.index(samplers.len(), "a sampler of this animation")?];
         let target = value.need("target")?;
         let path_value = target.need("path")?;
-        let path = match &*path_value.string()? {
-            "translation" => Path::Translation,
-            "rotation" => Path::Rotation,
-            "scale" => Path::Scale,
-            "weights" => Path::Weights,
-            "pointer" if target.extension("KHR_animation_pointer")?.is_some() => {
-                channels.extend(by_pointer(file, value, target, sampler)?);
-                continue;
+        let extension = target.extension("KHR_animation_pointer")?;
+        let (pointed, path) = match (&*path_value.string()?, extension) {
+            ("translation", _) => (None, Path::Translation),
+            ("rotation", _) => (None, Path::Rotation),
+            ("scale", _) => (None, Path::Scale),
+            ("weights", _) => (None, Path::Weights),
+            ("pointer", Some(extension)) => {
+                if let Some(node) = target.get("node")? {
+                    file.breach(node.wrong("animation by a pointer that names a node, too"))?;
+                }
+                match pointed(file, &extension.need("pointer")?.string()?) {
+                    Some((target, path)) => (Some(target), path),
+                    None => {
+                        channels.extend(by_pointer(file, value, extension, sampler)?);
+                        continue;
+                    }
+                }
             }
-            other => {
+            (other, _) => {
                 let wrong = path_value.wrong("unknown target of an animation").found(quoted(other));
                 return Err(wrong.suggest(other, ["translation", "rotation", "scale", "weights"]).into());
             }
@@ -152,13 +239,30 @@ fn channels<'a>(file: &'a File<'_>, animation: Value<'a>) -> Read<Vec<Channel<'a
         let (elements, components): (&[Element], &[Component]) = match path {
             Path::Translation | Path::Scale => (&[Element::Vec3], &[F32]),
             Path::Rotation => (&[Element::Vec4], &[F32, I8, U8, I16, U16]),
-            Path::Weights | Path::Numbers { .. } => (&[Element::Scalar], &[F32, I8, U8, I16, U16]),
+            Path::Weights | Path::Weight(_) | Path::Numbers { .. } => {
+                (&[Element::Scalar], &[F32, I8, U8, I16, U16])
+            }
         };
         output.expect(output_value, elements, components)?;
-        // Without a node, it may be for an extension.
-        let Some((node, node_value)) = file.named(List::Nodes, target, "node")? else { continue };
-        let width = if path == Path::Weights { targets(file, node_value)? } else { 1 };
-        if width == 0 {
+        let aim = match pointed {
+            Some(aim) => aim,
+            // Without a node, it may be for an extension.
+            None => match file.named(List::Nodes, target, "node")? {
+                Some((node, _)) => Target::Node(node),
+                None => continue,
+            },
+        };
+        let targets = match aim {
+            Target::Node(node) => targets(file, file.list(List::Nodes)[node])?,
+            Target::Mesh(mesh) => targets_of(file.list(List::Meshes)[mesh])?,
+            Target::Pointer(_) => 0,
+        };
+        let (width, is_there) = match path {
+            Path::Weights => (targets, targets > 0),
+            Path::Weight(position) => (1, position < targets),
+            _ => (1, true),
+        };
+        if !is_there {
             return Err(target.wrong("animation of morph targets that are not there").into());
         }
         let each = if interpolation == Interpolation::CubicSpline { 3 } else { 1 };
@@ -169,15 +273,7 @@ fn channels<'a>(file: &'a File<'_>, animation: Value<'a>) -> Read<Vec<Channel<'a
             let expected = format!("{} times {} times {each}", input.count, width);
             return Err(wrong.expected(expected).into());
         }
-        channels.push(Channel {
-            value,
-            target: Target::Node(node),
-            path,
-            interpolation,
-            input,
-            output,
-            width,
-        });
+        channels.push(Channel { value, target: aim, path, interpolation, input, output, width });
     }
     Ok(channels)
 }
@@ -195,19 +291,35 @@ fn interpolation(sampler: Value<'_>) -> Read<Interpolation> {
     })
 }
 
-/// A channel that says by a pointer what it moves; none where that is nothing that is played.
+/// The part of a node or of a mesh that a pointer names, where that is what other animations move too.
+fn pointed(file: &File<'_>, pointer: &str) -> Option<(Target, Path)> {
+    let steps: Vec<&str> = pointer.strip_prefix('/')?.split('/').collect();
+    let position = |list: List, step: &str| step.parse().ok().filter(|&i: &usize| i < file.list(list).len());
+    let target = match steps[..] {
+        ["nodes", node, ..] => Target::Node(position(List::Nodes, node)?),
+        ["meshes", mesh, "weights", ..] => Target::Mesh(position(List::Meshes, mesh)?),
+        _ => return None,
+    };
+    let path = match steps[2..] {
+        ["translation"] => Path::Translation,
+        ["rotation"] => Path::Rotation,
+        ["scale"] => Path::Scale,
+        ["weights"] => Path::Weights,
+        ["weights", target] => Path::Weight(target.parse().ok()?),
+        _ => return None,
+    };
+    Some((target, path))
+}
+
+/// A channel that says by a pointer what it changes; none where that is nothing that is played.
 fn by_pointer<'a>(
     file: &'a File<'_>,
     value: Value<'a>,
-    target: Value<'a>,
+    extension: Value<'a>,
     sampler: Value<'a>,
 ) -> Read<Option<Channel<'a>>> {
-    let Some(extension) = target.extension("KHR_animation_pointer")? else { return Ok(None) };
     let pointer_value = extension.need("pointer")?;
     let pointer = pointer_value.string()?.into_owned();
-    if let Some(node) = target.get("node")? {
-        file.breach(node.wrong("animation by a pointer that names a node, too"))?;
-    }
     let interpolation = interpolation(sampler)?;
     let input_value = sampler.need("input")?;
     let input = Accessor::named(file, input_value)?;
@@ -229,18 +341,21 @@ fn by_pointer<'a>(
         file.warn(pointer_value, "animation of what cannot be animated was left out");
         return Ok(None);
     }
-    let is_turn = pointer.starts_with("/nodes/") && pointer.ends_with("/rotation");
-    let path = if is_turn && output.element == Element::Vec4 {
-        Path::Rotation
-    } else {
-        Path::Numbers { width: width * output.element.numbers(), is_list }
-    };
+    if !pointer::has_place(file.root, &pointer)? {
+        file.warn(pointer_value, "animation of what is not there was left out");
+        return Ok(None);
+    }
+    let path = Path::Numbers { width: width * output.element.numbers(), is_list };
     Ok(Some(Channel { value, target: Target::Pointer(pointer), path, interpolation, input, output, width }))
 }
 
 /// How many morph targets the mesh of a node has.
 pub(super) fn targets(file: &File<'_>, node: Value<'_>) -> Read<usize> {
-    let Some((_, mesh)) = file.named(List::Meshes, node, "mesh")? else { return Ok(0) };
+    file.named(List::Meshes, node, "mesh")?.map_or(Ok(0), |(_, mesh)| targets_of(mesh))
+}
+
+/// How many morph targets a mesh has.
+fn targets_of(mesh: Value<'_>) -> Read<usize> {
     let Some(primitive) = mesh.need("primitives")?.array()?.next() else { return Ok(0) };
     primitive.get("targets")?.map_or(Ok(0), |targets| Ok(targets.array()?.count()))
 }
@@ -259,7 +374,7 @@ impl Channel<'_> {
         let numbers: usize = match self.path {
             Path::Translation | Path::Scale => 3,
             Path::Rotation => 4,
-            Path::Weights => self.width,
+            Path::Weights | Path::Weight(_) => self.width,
             Path::Numbers { width, .. } => width,
         };
         let values: Vec<f32> = match self.path {
@@ -267,7 +382,7 @@ impl Channel<'_> {
                 self.output.floats(file, |v: [f32; 3]| v)?.into_iter().flatten().collect()
             }
             Path::Rotation => self.output.floats(file, |v: [f32; 4]| v)?.into_iter().flatten().collect(),
-            Path::Weights => self.output.floats(file, |[v]: [f32; 1]| v)?,
+            Path::Weights | Path::Weight(_) => self.output.floats(file, |[v]: [f32; 1]| v)?,
             Path::Numbers { .. } => match self.output.element {
                 Element::Vec2 => self.output.floats(file, |v: [f32; 2]| v)?.into_iter().flatten().collect(),
                 Element::Vec3 => self.output.floats(file, |v: [f32; 3]| v)?.into_iter().flatten().collect(),

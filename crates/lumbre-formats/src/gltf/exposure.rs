@@ -43,11 +43,14 @@ impl<'f> Exposure<'f> {
             && options.shutter > 0.0
             && !file.list(List::Animations).is_empty()
         {
-            for step in 0..=STEPS {
-                let time = step as f64 / STEPS as f64;
-                let moved = animation::at(file, middle + (time - 0.5) * options.shutter)?;
-                moments.push(Moment { time, graph: Graph::read(file, moved)?, known: HashMap::new() });
+            let times: Vec<f64> = (0..=STEPS).map(|step| step as f64 / STEPS as f64).collect();
+            let of_file = |time: f64| middle + (time - 0.5) * options.shutter;
+            for &time in &times {
+                let graph = Graph::read(file, animation::at(file, of_file(time))?)?;
+                moments.push(Moment { time, graph, known: HashMap::new() });
             }
+            let times: Vec<f64> = times.into_iter().map(of_file).collect();
+            animation::warn_of_changes(file, &times)?;
         }
         Ok(Self { file, moments })
     }
@@ -73,7 +76,7 @@ impl<'f> Exposure<'f> {
         let moments = self.moments.iter_mut().step_by(STEPS / MESH_STEPS);
         let pose = |moment: &mut Moment<'_>| {
             Ok(OwnPose {
-                weights: scene::weights(file, &moment.graph, node)?,
+                weights: scene::weights(&moment.graph, node)?,
                 joints: skin
                     .map(|skin| scene::joints(file, &moment.graph, &mut moment.known, skin))
                     .transpose()?,
@@ -84,9 +87,13 @@ impl<'f> Exposure<'f> {
 
     /// Whether the mesh of a node changes its form: by its morph targets, or by the joints of its skin.
     pub fn deforms(&mut self, node: usize, skin: Option<usize>) -> Read<bool> {
-        let weights = |moment: &Moment<'_>| moment.graph.moved(node).and_then(|moved| moved.weights.clone());
-        if self.moments.iter().any(|moment| weights(moment) != weights(&self.moments[0])) {
-            return Ok(true);
+        if let Some((first, others)) = self.moments.split_first() {
+            let first = first.graph.weights(node)?;
+            for moment in others {
+                if moment.graph.weights(node)? != first {
+                    return Ok(true);
+                }
+            }
         }
         let Some(skin) = skin else { return Ok(false) };
         for name in self.file.list(List::Skins)[skin].need("joints")?.array()? {

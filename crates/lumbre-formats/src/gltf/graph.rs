@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use lumbre_math::{DAffine3, DMat3, DMat4, DQuat, DVec3};
 
-use super::animation::Moved;
+use super::animation::{Moved, Played, Weights};
 use super::file::{File, List};
 use super::json::{Read, Value};
 
@@ -12,12 +12,12 @@ use super::json::{Read, Value};
 pub(super) struct Graph<'a> {
     file: &'a File<'a>,
     parents: Vec<Option<u32>>,
-    moved: HashMap<usize, Moved>,
+    played: Played,
 }
 
 impl<'a> Graph<'a> {
-    /// Looks at every node. `moved` is what animations do to some of them.
-    pub fn read(file: &'a File<'a>, moved: HashMap<usize, Moved>) -> Read<Self> {
+    /// Looks at every node. `played` is what animations do to some of them.
+    pub fn read(file: &'a File<'a>, played: Played) -> Read<Self> {
         let nodes = file.list(List::Nodes);
         let mut parents: Vec<Option<u32>> = file.budget.vec(nodes.len() as u64, "nodes")?;
         parents.resize(nodes.len(), None);
@@ -39,7 +39,7 @@ impl<'a> Graph<'a> {
                 file.breach(children.wrong("empty list").expected("one child or more, or no list"))?;
             }
         }
-        let graph = Self { file, parents, moved };
+        let graph = Self { file, parents, played };
         graph.refuse_cycles()?;
         Ok(graph)
     }
@@ -97,12 +97,29 @@ impl<'a> Graph<'a> {
 
     /// What an animation does to a node.
     pub fn moved(&self, node: usize) -> Option<&Moved> {
-        self.moved.get(&node)
+        self.played.nodes.get(&node)
+    }
+
+    /// The weights of morph targets that a node's mesh has, as animations leave them; none where nothing says them.
+    pub fn weights(&self, node: usize) -> Read<Option<Vec<f64>>> {
+        let value = self.file.list(List::Nodes)[node];
+        let still = |value: Value<'_>| -> Read<Option<Vec<f64>>> {
+            value.get("weights")?.map(|list| list.array()?.map(Value::number).collect()).transpose()
+        };
+        let over = |moved: Option<&Weights>, still: Option<Vec<f64>>| match moved {
+            Some(moved) => moved.over(still),
+            None => still,
+        };
+        let of_mesh = match self.file.named(List::Meshes, value, "mesh")? {
+            Some((index, mesh)) => over(self.played.meshes.get(&index), still(mesh)?),
+            None => None,
+        };
+        Ok(over(self.moved(node).map(|moved| &moved.weights), still(value)?.or(of_mesh)))
     }
 
     /// From a node's own space to its parent's.
     pub fn local(&self, node: usize) -> Read<DAffine3> {
-        local(self.file, self.file.list(List::Nodes)[node], self.moved.get(&node))
+        local(self.file, self.file.list(List::Nodes)[node], self.moved(node))
     }
 
     /// From the spaces of nodes to the world. What is found on the way is kept in `known`.

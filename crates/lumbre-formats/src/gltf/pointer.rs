@@ -17,6 +17,34 @@ pub(super) fn is_played(pointer: &str) -> bool {
     steps.len() >= 3 && steps.len() <= DEEPEST && ROOTS.contains(&steps[0]) && !steps.contains(&"")
 }
 
+/// Whether there is a place for the numbers that a pointer names: they are there, or an object to which they can be added.
+pub(super) fn has_place(root: Value<'_>, pointer: &str) -> Read<bool> {
+    let mut here = root;
+    for step in pointer.split('/').skip(1) {
+        match inside(here, &unescaped(step))? {
+            Some(found) => here = found,
+            None => return Ok(here.object().is_ok()),
+        }
+    }
+    Ok(true)
+}
+
+/// What a step leads to: a member of an object, or an element of a list.
+fn inside<'a>(value: Value<'a>, step: &str) -> Read<Option<Value<'a>>> {
+    if value.object().is_ok() {
+        return value.get(step);
+    }
+    Ok(match (value.array(), step.parse::<usize>()) {
+        (Ok(mut list), Ok(position)) => list.nth(position),
+        _ => None,
+    })
+}
+
+/// A step as it is meant.
+fn unescaped(step: &str) -> String {
+    step.replace("~1", "/").replace("~0", "~")
+}
+
 /// Numbers by the pointers that they are to stand at, which have passed [`is_played`].
 #[derive(Debug, Default)]
 pub(super) struct Changes {
@@ -40,7 +68,7 @@ impl Changes {
             if here.text.is_some() {
                 return false;
             }
-            here = here.inside.entry(step.replace("~1", "/").replace("~0", "~")).or_default();
+            here = here.inside.entry(unescaped(step)).or_default();
         }
         if here.text.is_some() || !here.inside.is_empty() {
             return false;
@@ -70,12 +98,7 @@ impl Changes {
             let is_object = value.object().is_ok();
             let mut added = String::new();
             for (step, inner) in &change.inside {
-                let found = match step.parse::<usize>() {
-                    _ if is_object => value.get(step)?,
-                    Ok(position) => value.array()?.nth(position),
-                    Err(_) => None,
-                };
-                match found {
+                match inside(value, step)? {
                     Some(found) => open.push((inner, found)),
                     // A list does not grow.
                     None if is_object => added += &format!("{}:{},", quoted(step), inner.written()),

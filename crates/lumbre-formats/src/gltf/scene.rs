@@ -13,6 +13,7 @@ use lumbre_scene::{
 };
 
 use super::accessor::{self, Accessor, Component, Element};
+use super::animation::Played;
 use super::exposure::Exposure;
 use super::file::{File, List};
 use super::graph::Graph;
@@ -41,11 +42,11 @@ const MOST_COPIES_OF_LIGHTS: usize = 64;
 /// Reads everything that a glTF says.
 pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
     let variant = variant(file, options)?;
-    let moved = match options.frame {
+    let played = match options.frame {
         Some(time) => animation::at(file, time)?,
-        None => HashMap::new(),
+        None => Played::default(),
     };
-    let graph = Graph::read(file, moved)?;
+    let graph = Graph::read(file, played)?;
     check(file, &graph)?;
     let mut exposure = Exposure::read(file, options)?;
 
@@ -79,7 +80,7 @@ pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
         }
         let Some((mesh, _)) = file.named(List::Meshes, value, "mesh")? else { return Ok(()) };
         let skin = file.named(List::Skins, value, "skin")?.map(|(skin, _)| skin);
-        let weights = weights(file, &graph, node)?;
+        let weights = weights(&graph, node)?;
         let owner = (skin.is_some() || exposure.deforms(node, skin)?).then_some(node);
         let key = Key { mesh, weights: weights.iter().map(|w| w.to_bits()).collect(), owner };
         let copies = match value.extension("EXT_mesh_gpu_instancing")? {
@@ -228,23 +229,8 @@ fn roots(file: &File<'_>, graph: &Graph<'_>) -> Read<Vec<usize>> {
 }
 
 /// The weights of a node's morph targets; empty where all are 0.
-pub(super) fn weights(file: &File<'_>, graph: &Graph<'_>, node: usize) -> Read<Vec<f64>> {
-    let value = file.list(List::Nodes)[node];
-    let weights = match graph.moved(node).and_then(|moved| moved.weights.clone()) {
-        Some(weights) => weights,
-        None => {
-            let own = value.get("weights")?;
-            let of_mesh = match file.named(List::Meshes, value, "mesh")? {
-                Some((_, mesh)) => mesh.get("weights")?,
-                None => None,
-            };
-            match own.or(of_mesh) {
-                None => vec![],
-                Some(list) => list.array()?.map(Value::number).collect::<Read<_>>()?,
-            }
-        }
-    };
-    Ok(if weights.iter().all(|&w| w == 0.0) { vec![] } else { weights })
+pub(super) fn weights(graph: &Graph<'_>, node: usize) -> Read<Vec<f64>> {
+    Ok(graph.weights(node)?.filter(|weights| weights.iter().any(|&w| w != 0.0)).unwrap_or_default())
 }
 
 /// Checks everything that the scene may not come to use, so that a file is right or wrong as a whole.
