@@ -183,6 +183,50 @@ fn points_and_lines_are_spheres_and_cylinders() {
     }
 }
 
+#[test]
+fn points_and_lines_have_the_colours_of_their_vertices() {
+    let mut parts = Parts::default();
+    let p = parts.positions(&SQUARE);
+    let list: Vec<f32> = (0..16).map(|i| i as f32 / 16.0).collect();
+    let c = parts.add(&floats(&list), r#""componentType":5126,"type":"VEC4","count":4"#);
+    let colour = |i: usize| Rgb::new(list[4 * i], list[4 * i + 1], list[4 * i + 2]);
+    let at = |i: usize| Vec3::from_array(SQUARE[i]).as_dvec3();
+    // The vertices that each shape lies between: of points, and of a strip, whose spheres stand where it goes on.
+    let expected: [(u32, &[[usize; 2]]); 2] =
+        [(0, &[[0, 0], [1, 1], [2, 2], [3, 3]]), (3, &[[0, 1], [1, 1], [1, 2], [2, 2], [2, 3]])];
+    for (mode, ends) in expected {
+        for material in ["", r#""material":0,"#] {
+            let mut diagnostics = Diagnostics::new();
+            let rest = format!(
+                r#""extensionsUsed":["KHR_materials_unlit"],
+                "materials":[{{"alphaMode":"BLEND","extensions":{{"KHR_materials_unlit":{{}}}}}}],
+                "meshes":[{{"primitives":[{{"mode":{mode},{material}"attributes":{{"POSITION":{p},"COLOR_0":{c}}}}}]}}],
+                "nodes":[{{"mesh":0}}]"#
+            );
+            let bytes = glb(&parts.json(&rest), &parts.binary);
+            let scene = read_with(&bytes, &GltfOptions::default(), &mut diagnostics).unwrap();
+            assert_eq!(diagnostics.lines(), [""; 0]);
+            assert_eq!(scene.shapes.len(), ends.len());
+            for (shape, &[a, b]) in scene.shapes.iter().zip(ends) {
+                let GeometryDesc::Coloured(found) = &shape.geometry else { panic!("colours are expected") };
+                assert_eq!(matches!(found.shape, Shape::Sphere(_)), a == b);
+                assert_eq!((found.ends, found.colours), ([at(a), at(b)], [colour(a), colour(b)]));
+                assert_eq!(found.coverages, [list[4 * a + 3], list[4 * b + 3]]);
+                let light = shape.area_light.as_ref();
+                assert_eq!(light.map(|light| light.by_vertices), (!material.is_empty()).then_some(true));
+                assert_eq!(shape.alpha.is_some(), !material.is_empty());
+            }
+            let base = match &scene.materials[0].material.kind {
+                MaterialKind::Principled(params) => format!("{:?}", params.base_color),
+                other => format!("{other:?}"),
+            };
+            // White, and not the ink of what has no colour of its own.
+            assert!(!material.is_empty() || base.contains("Vertices") && base.contains("r: 1.0"), "{base}");
+            Scene::build(scene).unwrap();
+        }
+    }
+}
+
 /// Radius and base colour of the first shape, a sphere or a cylinder.
 fn thin(scene: &SceneDesc) -> (f64, Rgb) {
     let GeometryDesc::Exact(exact) = &scene.shapes[0].geometry else { panic!("an exact shape is expected") };

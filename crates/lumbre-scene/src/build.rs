@@ -13,7 +13,7 @@ use crate::light::{
     PointLight, ShapeLight, SpotLight, UniformLight, power,
 };
 use crate::mesh::{self, QuadOrder};
-use crate::surface::{Form, SurfaceEntry};
+use crate::surface::{ColourRamp, Form, SurfaceEntry};
 use crate::{
     AreaLightDesc, BuildError, BuildWarning, Camera, CameraKind, Emission, GeometryDesc, GroundPlane,
     InstanceDesc, LightDesc, MeshDesc, ObjectDesc, Scene, SceneDesc, ShapeDesc, csg, extent, framing, ground,
@@ -227,14 +227,12 @@ impl Builder {
         match desc.geometry {
             GeometryDesc::Exact(shape) => {
                 let placed = PlacedShape::new(shape, desc.world_from_object);
-                if area_light.is_some() && placed.bounds().is_none() {
-                    let name = placed.shape().name();
-                    return Err(BuildError::InfiniteLight { shape: desc.index, name });
-                }
-                entry.emission =
-                    area_light.map(|light| emission(light, || standing.area_factor() * placed.area()));
-                let id = self.push(entry, geometries, GeometryKind::Shape(placed.clone()))?;
-                self.shape_light(id, placed, standing);
+                self.exact(entry, placed, area_light, standing, geometries)?;
+            }
+            GeometryDesc::Coloured(coloured) => {
+                entry.form = Form::Coloured(Box::new(ColourRamp::new(&coloured, &desc.world_from_object)));
+                let placed = PlacedShape::new(coloured.shape, desc.world_from_object);
+                self.exact(entry, placed, area_light, standing, geometries)?;
             }
             GeometryDesc::Mesh(mesh) => {
                 let order = QuadOrder::Around;
@@ -273,6 +271,23 @@ impl Builder {
                 self.push(entry, geometries, GeometryKind::Shape(placed))?;
             }
         }
+        Ok(())
+    }
+
+    fn exact(
+        &mut self,
+        mut entry: SurfaceEntry,
+        placed: PlacedShape,
+        area_light: Option<AreaLightDesc>,
+        standing: &Standing,
+        geometries: &mut Vec<Geometry>,
+    ) -> Result<(), BuildError> {
+        if area_light.is_some() && placed.bounds().is_none() {
+            return Err(BuildError::InfiniteLight { shape: entry.shape, name: placed.shape().name() });
+        }
+        entry.emission = area_light.map(|light| emission(light, || standing.area_factor() * placed.area()));
+        let id = self.push(entry, geometries, GeometryKind::Shape(placed.clone()))?;
+        self.shape_light(id, placed, standing);
         Ok(())
     }
 
@@ -553,15 +568,15 @@ pub(crate) fn inside_out(objects: &[ObjectDesc]) -> Result<Vec<usize>, BuildErro
 fn origin(shapes: &[ShapeDesc], instances: &[InstanceDesc], accels: &[Arc<Accel>]) -> DVec3 {
     let mut bounds = Aabb::EMPTY;
     for shape in shapes {
-        match &shape.geometry {
-            GeometryDesc::Exact(exact) => {
-                bounds = exact.bounds(&shape.world_from_object).map_or(bounds, |b| bounds.union(b));
-            }
+        let own = match &shape.geometry {
+            GeometryDesc::Exact(exact) => exact.bounds(&shape.world_from_object),
+            GeometryDesc::Coloured(coloured) => coloured.shape.bounds(&shape.world_from_object),
             GeometryDesc::Mesh(mesh) | GeometryDesc::BilinearMesh(mesh) => {
-                bounds = bounds.union(mesh_bounds(mesh, &shape.world_from_object));
+                Some(mesh_bounds(mesh, &shape.world_from_object))
             }
-            GeometryDesc::Csg(_) => {}
-        }
+            GeometryDesc::Csg(_) => None,
+        };
+        bounds = own.map_or(bounds, |own| bounds.union(own));
     }
     for (instance, accel) in instances.iter().zip(accels) {
         for map in extent::places(&instance.world_from_object) {

@@ -8,7 +8,7 @@ use lumbre_math::Transform;
 use crate::build::{Builder, emission};
 use crate::mesh::QuadOrder;
 use crate::solid::MeshSolid;
-use crate::surface::{Form, SurfaceEntry};
+use crate::surface::{ColourRamp, Form, SurfaceEntry};
 use crate::{BuildError, CsgDesc, CsgOperation, GeometryDesc, ShapeDesc, mesh};
 
 /// How deep combinations may hold combinations: as deep as geometry nests them.
@@ -104,11 +104,16 @@ fn solid(
         entry.emission = Some(emission(light, || 0.0));
     }
     let placement = *tree_from_csg * desc.world_from_object;
+    let mut leaf = |entry: SurfaceEntry, exact: Shape| {
+        let leaf = Csg::leaf(PlacedShape::new(exact, placement)).map_err(|e| wrong(e.to_string()))?;
+        leaves.extend(std::iter::repeat_n(entry, leaf.leaves().len()));
+        Ok(leaf)
+    };
     match desc.geometry {
-        GeometryDesc::Exact(exact) => {
-            let leaf = Csg::leaf(PlacedShape::new(exact, placement)).map_err(|e| wrong(e.to_string()))?;
-            leaves.extend(std::iter::repeat_n(entry, leaf.leaves().len()));
-            Ok(leaf)
+        GeometryDesc::Exact(exact) => leaf(entry, exact),
+        GeometryDesc::Coloured(coloured) => {
+            entry.form = Form::Coloured(Box::new(ColourRamp::new(&coloured, &placement)));
+            leaf(entry, coloured.shape)
         }
         GeometryDesc::Mesh(mesh) => {
             let origin = crate::build::near(&crate::build::mesh_bounds(&mesh, &placement));

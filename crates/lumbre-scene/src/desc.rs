@@ -110,12 +110,28 @@ pub struct ShapeDesc {
 pub enum GeometryDesc {
     /// One exact shape.
     Exact(Shape),
+    /// One exact shape with colours.
+    Coloured(Box<ColouredShape>),
     /// Triangles and quads.
     Mesh(Arc<MeshDesc>),
     /// Bilinear patches (p00, p10, p01, p11 each) with shared vertices.
     BilinearMesh(Arc<MeshDesc>),
     /// A combination of solids, each surface keeping its own material.
     Csg(CsgDesc),
+}
+
+/// An exact shape with colours like those of a mesh's vertices, which run evenly from one place to another: a line between
+/// two vertices with some thickness.
+#[derive(Clone, Debug)]
+pub struct ColouredShape {
+    /// Its form.
+    pub shape: Shape,
+    /// The two places, in the space of the shape. Where they are the same, the first colour is that of the whole shape.
+    pub ends: [DVec3; 2],
+    /// Linear colours there, and beyond.
+    pub colours: [Rgb; 2],
+    /// Coverages, which go with the colours.
+    pub coverages: [f32; 2],
 }
 
 /// A combination of solids.

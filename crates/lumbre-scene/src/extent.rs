@@ -118,9 +118,12 @@ fn each_point_of(shape: &ShapeDesc, used: &Used, visit: &mut dyn FnMut(DVec3)) {
         let placement = outer * shape.world_from_object;
         match &shape.geometry {
             GeometryDesc::Exact(exact) => {
-                if let Some(bounds) = exact.bounds(&placement).filter(|bounds| !bounds.is_empty()) {
-                    corners(&bounds).for_each(&mut *visit);
-                }
+                let bounds = exact.bounds(&placement).filter(|bounds| !bounds.is_empty());
+                bounds.iter().flat_map(corners).for_each(&mut *visit);
+            }
+            GeometryDesc::Coloured(coloured) => {
+                let bounds = coloured.shape.bounds(&placement).filter(|bounds| !bounds.is_empty());
+                bounds.iter().flat_map(corners).for_each(&mut *visit);
             }
             GeometryDesc::Mesh(mesh) | GeometryDesc::BilinearMesh(mesh) => {
                 each_vertex(mesh, used, &mut |p| visit(placement.point(p)));

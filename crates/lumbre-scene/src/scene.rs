@@ -177,7 +177,7 @@ impl Scene {
         let primitive = match entry.form {
             Form::Patch { primitive, .. } => primitive,
             Form::Mesh(_) => part,
-            Form::Exact | Form::Csg(_) => 0,
+            Form::Exact | Form::Coloured(_) | Form::Csg(_) => 0,
         };
         let length = ray.direction.length();
         let direction = ray.direction / length;

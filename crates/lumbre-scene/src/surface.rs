@@ -9,7 +9,7 @@ use lumbre_shading::{FloatTexture, FurtherUv, LocalSurface, Material, Spectrum, 
 
 use crate::csg::CsgForm;
 use crate::light::LightId;
-use crate::{Emission, MeshDesc};
+use crate::{ColouredShape, Emission, MeshDesc};
 
 /// What stands behind one id of the tree.
 #[derive(Clone, Debug)]
@@ -33,12 +33,24 @@ pub(crate) struct SurfaceEntry {
 pub(crate) enum Form {
     /// Nothing: the surface is as geometry has it.
     Exact,
+    /// Colours alone.
+    Coloured(Box<ColourRamp>),
     /// A triangle mesh.
     Mesh(Arc<MeshDress>),
     /// The patch of a mesh that is a quad which is not flat.
     Patch { dress: Arc<MeshDress>, corners: [u32; 4], primitive: u32 },
     /// A CSG: the surface of each leaf.
     Csg(Arc<CsgForm>),
+}
+
+/// A colour that runs from one place to another, in the space of a tree.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ColourRamp {
+    start: DVec3,
+    /// By how much more of the way is done a step farther.
+    slope: DVec3,
+    colours: [Spectrum; 2],
+    coverages: [f32; 2],
 }
 
 /// What a mesh has at its vertices, in the space of the tree that it stands in.
@@ -147,7 +159,7 @@ impl SurfaceEntry {
     /// over it: without textures, without cut-outs, and without normals at vertices that might turn a face.
     pub fn plain_emission(&self) -> Option<(&Emission, f64)> {
         let is_plain = match &self.form {
-            Form::Exact => true,
+            Form::Exact | Form::Coloured(_) => true,
             Form::Mesh(mesh) => mesh.normals().is_none(),
             Form::Patch { .. } | Form::Csg(_) => false,
         };
@@ -197,6 +209,7 @@ impl SurfaceEntry {
     ) -> Dressed {
         let mut dressed = match &self.form {
             Form::Exact | Form::Csg(_) => plain(surface),
+            Form::Coloured(ramp) => Dressed { vertex: ramp.at(surface.point, placement), ..plain(surface) },
             Form::Mesh(mesh) => {
                 let corners = mesh.mesh.indices[primitive as usize];
                 let uvs = match &mesh.rest.uvs {
@@ -314,6 +327,33 @@ fn plain(surface: &Surface) -> Dressed {
             handedness: 1.0,
         },
         vertex: VertexData::NONE,
+    }
+}
+
+impl ColourRamp {
+    pub fn new(coloured: &ColouredShape, tree_from_object: &Transform) -> Self {
+        let [from, to] = coloured.ends;
+        let way = to - from;
+        let slope = way / way.length_squared();
+        Self {
+            start: tree_from_object.point(from),
+            // What is even in one space is so in another.
+            slope: if slope.is_finite() { tree_from_object.normal(slope) } else { DVec3::ZERO },
+            colours: coloured.colours,
+            coverages: coloured.coverages,
+        }
+    }
+
+    /// The colour at a place, which `placement` leads to from the space of the tree.
+    fn at(&self, place: DVec3, placement: Option<&Transform>) -> VertexData {
+        let place = placement.map_or(place, |map| map.inverse_point(place));
+        let part = self.slope.dot(place - self.start).clamp(0.0, 1.0) as f32;
+        let [from, to] = self.coverages;
+        VertexData {
+            colour: self.colours[0].lerp(self.colours[1], part),
+            coverage: from + part * (to - from),
+            ..VertexData::NONE
+        }
     }
 }
 

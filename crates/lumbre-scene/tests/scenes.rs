@@ -10,9 +10,9 @@ use lumbre_image::Rgb;
 use lumbre_math::random::RandomStream;
 use lumbre_math::{DVec2, DVec3, Transform, Vec2, Vec3, warp64};
 use lumbre_scene::{
-    AreaLightDesc, BuildError, BuildWarning, Camera, CameraKind, CsgDesc, CsgOperation, Footprint,
-    GeometryDesc, InstanceDesc, LightDesc, MaterialId, MeshDesc, NamedMaterial, ObjectDesc, ObjectId, Scene,
-    SceneDesc, ShapeDesc,
+    AreaLightDesc, BuildError, BuildWarning, Camera, CameraKind, ColouredShape, CsgDesc, CsgOperation,
+    Footprint, GeometryDesc, InstanceDesc, LightDesc, MaterialId, MeshDesc, NamedMaterial, ObjectDesc,
+    ObjectId, Scene, SceneDesc, ShapeDesc,
 };
 use lumbre_shading::{FloatTexture, Material, Texture};
 
@@ -139,6 +139,55 @@ fn check_leaving(geometry: &GeometryDesc, outside_alone: bool) {
             }
             assert!(left > 300, "{geometry:?}: {left}");
         }
+    }
+}
+
+#[test]
+fn the_colour_of_a_line_runs_from_end_to_end() {
+    let (from, to) = (DVec3::new(2.0, 3.0, 4.0), DVec3::new(5.0, 1.0, 4.5));
+    let colours = [Rgb::new(1.0, 0.25, 0.0), Rgb::new(0.0, 0.75, 0.5)];
+    let line = || {
+        GeometryDesc::Coloured(Box::new(ColouredShape {
+            shape: Cylinder::new(from, to, 0.3, true).unwrap().into(),
+            ends: [from, to],
+            colours,
+            coverages: [1.0, 0.5],
+        }))
+    };
+    let stretch = Transform::translate(DVec3::new(-7.0, 20.0, 3.0))
+        * Transform::rotate(DVec3::new(1.0, 2.0, -0.5), 40.0).unwrap()
+        * Transform::scale(DVec3::new(-2.0, 0.5, 3.0)).unwrap();
+    let turn = Transform::rotate(DVec3::Y, 70.0).unwrap() * Transform::translate(DVec3::new(1.0, -9.0, 2.0));
+    let alone = of_shapes(vec![ShapeDesc { world_from_object: stretch, ..shape(0, line()) }]);
+    let mut inside = of_shapes(vec![]);
+    inside.objects.push(ObjectDesc { shapes: alone.shapes.clone(), ..ObjectDesc::default() });
+    inside.instances.push(InstanceDesc { object: ObjectId(0), world_from_object: turn.into() });
+    for (scene, place) in [(alone, stretch), (inside, turn * stretch)] {
+        let scene = Scene::build(scene).unwrap();
+        let mut met_ends = [0; 3];
+        for towards in directions(2000) {
+            let at = from.lerp(to, towards.x.abs());
+            let ray = Ray::new(place.point(at - 0.9 * towards), place.vector(towards).normalize());
+            let Some(hit) = scene.closest(&ray) else { continue };
+            let met = scene.interaction(&ray, &hit, &Footprint::Point);
+            let here = place.inverse_point(met.surface.point) - from;
+            let part = (here.dot(to - from) / (to - from).length_squared()) as f32;
+            let end = if part < 1e-6 {
+                0
+            } else if part > 1.0 - 1e-6 {
+                2
+            } else {
+                1
+            };
+            met_ends[end] += 1;
+            let vertex = met.at.vertex;
+            let expected = colours[0].lerp(colours[1], part);
+            let off =
+                [vertex.colour.r - expected.r, vertex.colour.g - expected.g, vertex.colour.b - expected.b];
+            assert!(off.iter().all(|off| off.abs() < 1e-5), "{part}: {:?}", vertex.colour);
+            assert!((vertex.coverage - (1.0 - 0.5 * part)).abs() < 1e-5, "{part}: {}", vertex.coverage);
+        }
+        assert!(met_ends.iter().all(|&met| met > 20), "{met_ends:?}");
     }
 }
 

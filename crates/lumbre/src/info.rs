@@ -70,6 +70,7 @@ impl SceneInfo {
     fn add_shape(&mut self, shape: &ShapeDesc) {
         let name = match &shape.geometry {
             GeometryDesc::Exact(exact) => exact.name(),
+            GeometryDesc::Coloured(coloured) => coloured.shape.name(),
             GeometryDesc::Mesh(mesh) => {
                 self.triangles += mesh.triangles.len() as u64 + 2 * mesh.quads.len() as u64;
                 self.memory_bytes += mesh_bytes(mesh);

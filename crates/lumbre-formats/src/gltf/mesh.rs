@@ -2,9 +2,10 @@
 
 use std::collections::HashMap;
 
+use lumbre_geometry::Shape;
 use lumbre_image::Rgb;
 use lumbre_math::{DMat3, DMat4, DVec3, Vec2, Vec3, Vec4};
-use lumbre_scene::MeshMoment;
+use lumbre_scene::{ColouredShape, GeometryDesc, MeshMoment};
 use rayon::prelude::*;
 
 use super::accessor::{Accessor, Component, Element, SHARE};
@@ -698,6 +699,18 @@ pub(super) fn compact(vertices: &mut Vertices, triangles: &mut [[u32; 3]]) {
 }
 
 impl Vertices {
+    /// A shape between two vertices, with their colours if they have any.
+    pub fn coloured(&self, shape: Shape, ends: [u32; 2]) -> GeometryDesc {
+        let Some(colours) = &self.colours else { return GeometryDesc::Exact(shape) };
+        let ends = ends.map(|i| i as usize);
+        GeometryDesc::Coloured(Box::new(ColouredShape {
+            shape,
+            ends: ends.map(|i| self.positions[i].as_dvec3()),
+            colours: ends.map(|i| colours[i].0),
+            coverages: ends.map(|i| colours[i].1),
+        }))
+    }
+
     /// Makes these its vertices: each by its present position.
     pub fn pick(&mut self, old: &[u32]) {
         fn pick<T: Copy>(old: &[u32], list: &mut Vec<T>) {

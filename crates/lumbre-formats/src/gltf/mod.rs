@@ -5,7 +5,8 @@
 //!
 //! Light is photometric all through: radiance in nits, so that `emissiveFactor`, candelas and lux fit together at a
 //! factor of 1. Points and lines, which have no size, become spheres and cylinders whose radius is 0.4 % and 0.2 % of the
-//! diagonal of the box around the whole model, and less where there are very many; without a material they are blue.
+//! diagonal of the box around the whole model, and less where there are very many; without a material and colours
+//! they are blue.
 
 mod accessor;
 mod animation;

@@ -8,8 +8,8 @@ use lumbre_geometry::{Cylinder, Shape, Sphere};
 use lumbre_image::Rgb;
 use lumbre_math::{AnimatedTransform, DAffine3, DMat3, DMat4, DQuat, DVec3, Transform, Vec2, Vec3};
 use lumbre_scene::{
-    Camera, CameraKind, GeometryDesc, InstanceDesc, LightDesc, MeshDesc, MeshMoment, MeshMotion, ObjectDesc,
-    ObjectId, Placement, SceneDesc, ShapeDesc, WithoutLight,
+    Camera, CameraKind, ColouredShape, GeometryDesc, InstanceDesc, LightDesc, MeshDesc, MeshMoment,
+    MeshMotion, ObjectDesc, ObjectId, Placement, SceneDesc, ShapeDesc, WithoutLight,
 };
 
 use super::accessor::{self, Accessor, Component, Element};
@@ -586,7 +586,7 @@ impl Builder<'_> {
                 file.warn(value, "primitive without positions was left out");
                 continue;
             }
-            let has_colours = primitive.attributes.colour.is_some() && primitive.mode.is_surface();
+            let has_colours = primitive.attributes.colour.is_some();
             let dressing =
                 self.materials.dressing(primitive.material, has_colours, primitive.mode.is_surface())?;
             let sets = dressing.sets.filter(|_| primitive.mode.is_surface());
@@ -628,15 +628,14 @@ impl Builder<'_> {
                     }
                 }
                 thin => {
-                    if primitive.attributes.colour.is_some() {
-                        file.warn(value, "vertex colours of points and lines were left out");
-                    }
                     // In the space of the mesh, as large as in the world.
                     let scale =
                         place.worlds.first().map_or(1.0, |world| world.matrix3.determinant().abs().cbrt());
-                    for exact in thin_shapes(&vertices.positions, &thin, self.size / scale) {
-                        file.budget.bytes(size_of::<ShapeDesc>() as u64, "points and lines")?;
-                        shapes.push(shape(GeometryDesc::Exact(exact), self.next_index()));
+                    let each =
+                        size_of::<ShapeDesc>() + if has_colours { size_of::<ColouredShape>() } else { 0 };
+                    for (exact, ends) in thin_shapes(&vertices.positions, &thin, self.size / scale) {
+                        file.budget.bytes(each as u64, "points and lines")?;
+                        shapes.push(shape(vertices.coloured(exact, ends), self.next_index()));
                     }
                 }
             }
@@ -733,9 +732,9 @@ fn mesh_of(mut vertices: Vertices, triangles: Vec<[u32; 3]>, dressing: &Dressing
     })
 }
 
-/// Points as spheres; lines as capped cylinders, with spheres where one goes on as the next. `size` is that of the whole
-/// model, which the primitive itself stands for where there is none.
-fn thin_shapes(positions: &[Vec3], assembly: &Assembly, size: f64) -> Vec<Shape> {
+/// Points as spheres; lines as capped cylinders, with spheres where one goes on as the next; each with the two vertices that it
+/// lies between. `size` is that of the whole model, which the primitive itself stands for where there is none.
+fn thin_shapes(positions: &[Vec3], assembly: &Assembly, size: f64) -> Vec<(Shape, [u32; 2])> {
     let at = |i: u32| positions[i as usize].as_dvec3();
     let is_size = |size: &f64| *size > 0.0 && size.is_finite();
     let own = || mesh::diagonal(positions.iter().copied());
@@ -744,16 +743,17 @@ fn thin_shapes(positions: &[Vec3], assembly: &Assembly, size: f64) -> Vec<Shape>
     match assembly {
         Assembly::Points(points) => {
             let radius = radius(POINT_RADIUS, points.len());
-            points.iter().filter_map(|&i| Sphere::new(at(i), radius).ok()).map(Shape::from).collect()
+            let sphere = |&i: &u32| Some((Sphere::new(at(i), radius).ok()?.into(), [i, i]));
+            points.iter().filter_map(sphere).collect()
         }
         Assembly::Segments(segments) => {
             let radius = radius(LINE_RADIUS, segments.len());
             let mut shapes = vec![];
             for &([a, b], goes_on) in segments {
                 // A segment without length is no line.
-                shapes.extend(Cylinder::new(at(a), at(b), radius, true).ok().map(Shape::from));
+                shapes.extend(Cylinder::new(at(a), at(b), radius, true).ok().map(|s| (s.into(), [a, b])));
                 if goes_on {
-                    shapes.extend(Sphere::new(at(b), radius).ok().map(Shape::from));
+                    shapes.extend(Sphere::new(at(b), radius).ok().map(|s| (s.into(), [b, b])));
                 }
             }
             shapes

@@ -32,10 +32,10 @@ pub(super) struct Dressing {
     pub tangents: Option<usize>,
 }
 
-/// Its position in the file, whether vertices have colours, and whether they make a surface.
+/// Its position in the file, whether vertices have colours, and whether it is [`INK`].
 type MaterialKey = (Option<usize>, bool, bool);
 
-/// The colour of points and lines that have no material: glTF's white would not be seen on paper, nor black in the dark.
+/// The colour of points and lines that have no material and no colours: glTF's white would not be seen on paper, nor black in the dark.
 const INK: Rgb = Rgb::new(0.02, 0.08, 0.3);
 
 /// The materials of a file, each made when it is first asked for.
@@ -52,16 +52,15 @@ impl<'f> Materials<'f> {
     }
 
     /// The material at a position in the file, or glTF's default, for a mesh with or without colours at its vertices. Points and
-    /// lines, which are no surface, have a default of their own: [`INK`].
+    /// lines without colours, which are no surface, have a default of their own: [`INK`].
     pub fn dressing(&self, index: Option<usize>, has_colours: bool, is_surface: bool) -> Read<Arc<Dressing>> {
-        let key = (index, has_colours, is_surface || index.is_some());
+        let is_inked = index.is_none() && !is_surface && !has_colours;
+        let key = (index, has_colours, is_inked);
         if let Some(made) = self.made.borrow().get(&key) {
             return Ok(made.clone());
         }
         let parameters = match index {
-            None if !is_surface => {
-                GltfMaterial { base_colour: INK, metallic: 0.0, ..GltfMaterial::default() }
-            }
+            None if is_inked => GltfMaterial { base_colour: INK, metallic: 0.0, ..GltfMaterial::default() },
             None => GltfMaterial::default(),
             Some(index) => GltfMaterial::read(self.file, self.file.list(List::Materials)[index])?,
         };
