@@ -233,6 +233,26 @@ impl Accel {
     }
 
     pub(crate) fn closest_with_at(&self, level: Level, ray: &Ray, options: &QueryOptions) -> Option<Hit> {
+        if options.take_all(self) {
+            return self.closest_at(level, ray);
+        }
+        if let Some(start) = &self.single
+            && let Outcome::Settled(winner) =
+                single::search_among::<Nearest, _>(level, self, start, ray, options.of_tree(self))
+        {
+            return winner.map(|winner| winner.to_hit(self));
+        }
+        self.closest_with_plainly_at(level, ray, options)
+    }
+
+    /// The same by the search that knows no other precision than double.
+    #[inline(never)]
+    pub(crate) fn closest_with_plainly_at(
+        &self,
+        level: Level,
+        ray: &Ray,
+        options: &QueryOptions,
+    ) -> Option<Hit> {
         let mut search = Closest::new(ray, *options);
         traverse::search(level, self, ray, &mut search);
         search.take_hit()
@@ -244,6 +264,21 @@ impl Accel {
     }
 
     pub(crate) fn any_with_at(&self, level: Level, ray: &Ray, options: &QueryOptions) -> bool {
+        if options.take_all(self) {
+            return self.any_at(level, ray);
+        }
+        if let Some(start) = &self.single
+            && let Outcome::Settled(is_hit) =
+                single::search_among::<Whether, _>(level, self, start, ray, options.of_tree(self))
+        {
+            return is_hit;
+        }
+        self.any_with_plainly_at(level, ray, options)
+    }
+
+    /// The same by the search that knows no other precision than double.
+    #[inline(never)]
+    pub(crate) fn any_with_plainly_at(&self, level: Level, ray: &Ray, options: &QueryOptions) -> bool {
         let mut search = Any::new(ray, *options);
         traverse::search(level, self, ray, &mut search);
         search.is_hit

@@ -2,9 +2,10 @@
 
 use lumbre_geometry::{Ray, Root};
 
-use crate::query::Filter;
+use crate::query::{All, Filter};
 use crate::spheres::ExactSphere;
 use crate::traverse::{Found, What};
+use crate::triangles::BlockNames;
 use crate::{Accel, GeometryKind, Hit};
 
 /// What a query leaves out; by default nothing. Queries that do not take this pay nothing for it.
@@ -38,9 +39,45 @@ pub enum Faces {
     Back,
 }
 
+impl Faces {
+    /// Whether a side is among them.
+    #[inline(always)]
+    pub(crate) fn have(self, is_front: bool) -> bool {
+        match self {
+            Self::Both => true,
+            Self::Front => is_front,
+            Self::Back => !is_front,
+        }
+    }
+}
+
 impl QueryOptions<'_> {
+    /// Whether they leave everything of a tree.
+    #[inline(always)]
+    pub(crate) fn take_all(&self, accel: &Accel) -> bool {
+        accel.masks.is_empty() && self.exclude.is_none() && self.faces == Faces::Both
+    }
+
+    /// What they leave of a tree.
+    #[inline(always)]
+    pub(crate) fn of_tree<'a>(&self, accel: &'a Accel) -> Selected<'a> {
+        let excluded = match self.exclude {
+            Some(hit) if hit.route.is_empty() => Some((hit.geometry, hit.primitive)),
+            _ => None,
+        };
+        Selected { masks: &accel.masks, mask: self.mask, excluded, faces: self.faces }
+    }
+
     fn has_mask(&self, accel: &Accel, geometry: u32) -> bool {
-        accel.masks.get(geometry as usize).is_none_or(|mask| mask & self.mask != 0)
+        has_mask(&accel.masks, self.mask, geometry)
+    }
+}
+
+#[inline(always)]
+fn has_mask(masks: &[u32], mask: u32, geometry: u32) -> bool {
+    match masks.get(geometry as usize) {
+        Some(own) => own & mask != 0,
+        None => true,
     }
 }
 
@@ -50,19 +87,82 @@ impl Filter for QueryOptions<'_> {
 
     fn takes(&mut self, found: &Found) -> bool {
         let (geometry, primitive) = found.what.names(found.accel);
-        let is_face = match self.faces {
-            Faces::Both => true,
-            Faces::Front => found.is_front,
-            Faces::Back => !found.is_front,
-        };
         let is_excluded = self.exclude.is_some_and(|hit| {
             (hit.geometry, hit.primitive) == (geometry, primitive) && hit.route == found.place.route
         });
-        is_face && !is_excluded && self.has_mask(found.accel, geometry)
+        self.faces.have(found.is_front) && !is_excluded && self.has_mask(found.accel, geometry)
     }
 
     fn enters(&self, accel: &Accel, geometry: u32) -> bool {
         self.has_mask(accel, geometry)
+    }
+}
+
+/// What a search in one tree takes of what stands in that itself: told by names and faces, before anything is known of where it is
+/// met.
+pub(crate) trait Selection: Copy {
+    /// Whether it takes everything, so that nothing has to be asked.
+    const TAKES_ALL: bool;
+    /// The faces that it takes.
+    fn faces(&self) -> Faces;
+    /// Whether it takes a primitive, its faces aside.
+    fn takes(&self, geometry: u32, primitive: u32) -> bool;
+    /// Of the lanes of a block, those whose triangles it takes, their faces aside.
+    fn lanes(&self, names: &BlockNames) -> u32;
+}
+
+impl Selection for All {
+    const TAKES_ALL: bool = true;
+
+    #[inline(always)]
+    fn faces(&self) -> Faces {
+        Faces::Both
+    }
+
+    #[inline(always)]
+    fn takes(&self, _: u32, _: u32) -> bool {
+        true
+    }
+
+    #[inline(always)]
+    fn lanes(&self, _: &BlockNames) -> u32 {
+        u32::MAX
+    }
+}
+
+/// What [`QueryOptions`] leave of one tree.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Selected<'a> {
+    masks: &'a [u32],
+    mask: u32,
+    /// Geometry and primitive.
+    excluded: Option<(u32, u32)>,
+    faces: Faces,
+}
+
+// Without closures, which would not have the instruction set of the search around them.
+impl Selection for Selected<'_> {
+    const TAKES_ALL: bool = false;
+
+    #[inline(always)]
+    fn faces(&self) -> Faces {
+        self.faces
+    }
+
+    #[inline(always)]
+    fn takes(&self, geometry: u32, primitive: u32) -> bool {
+        self.excluded != Some((geometry, primitive)) && has_mask(self.masks, self.mask, geometry)
+    }
+
+    #[inline(always)]
+    fn lanes(&self, names: &BlockNames) -> u32 {
+        if !has_mask(self.masks, self.mask, names.geometry) {
+            return 0;
+        }
+        match self.excluded {
+            Some((geometry, primitive)) if geometry == names.geometry => !names.lanes_of(primitive),
+            _ => u32::MAX,
+        }
     }
 }
 

@@ -46,6 +46,7 @@ pub(crate) trait Filter {
 }
 
 /// Takes everything.
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct All;
 
 impl Filter for All {

@@ -7,20 +7,26 @@
 //! as that of the plain search in `traverse`, which stands beside this one as its oracle. Where a ray touches an edge or a
 //! corner exactly, or comes from far away, that search answers it altogether. Shapes and custom geometry always answer in double
 //! precision.
+//!
+//! What options leave out is left out by name before anything closer is known of it, and by its face wherever single precision is
+//! certain of a hit, for then it is certain of the face.
 
 use std::marker::PhantomData;
 
-use lumbre_geometry::{Ray, Root};
+use lumbre_geometry::{Ray, Root, Roots};
 use lumbre_math::DVec3;
 
 use crate::collapse::Entry;
 use crate::holds::SingleStart;
-use crate::lanes::{self, Lanes, Level, Task};
+use crate::lanes::{self, Crossings, Lanes, Level, Task};
 use crate::node::tag;
+use crate::options::{self, Selection};
+use crate::query::All;
 use crate::stack::{AsBuilt, ByDistance, Order, Stack};
+use crate::traverse::What;
 use crate::triangles::{self, BLOCK, BlockRay, Meeting, Passage, Shear, TriangleBlock};
 use crate::way::Way;
-use crate::{Accel, Hit, InstancePath, traverse};
+use crate::{Accel, Faces, Hit, InstancePath, traverse};
 
 /// What came of a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -93,8 +99,8 @@ impl Candidate {
     }
 }
 
-/// A ray under way in a tree that [`SingleStart`] was made for.
-pub(crate) struct SingleRay<'a, L> {
+/// A ray under way in a tree that [`SingleStart`] was made for, among what a selection takes.
+pub(crate) struct SingleRay<'a, L, S = All> {
     accel: &'a Accel,
     start: &'a SingleStart,
     // Those of the tree, which may lie in a file.
@@ -109,6 +115,7 @@ pub(crate) struct SingleRay<'a, L> {
     best: Candidate,
     /// That, where it is no triangle.
     crossed: Winner,
+    selection: S,
 }
 
 impl<'a, L: Lanes> SingleRay<'a, L> {
@@ -116,18 +123,26 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
     #[inline(always)]
     pub(crate) fn start(accel: &'a Accel, start: &'a SingleStart, ray: &Ray) -> Option<Self> {
         let slabs = L::start_single(start, ray)?;
-        Some(Self::among_leaves(accel, start, ray, Way::new(&accel.tree.nodes, slabs)))
+        Some(Self::among_leaves(accel, start, ray, Way::new(&accel.tree.nodes, slabs), All))
     }
+}
 
+impl<'a, L: Lanes, S: Selection> SingleRay<'a, L, S> {
     /// Goes on with a ray that has come to a first leaf.
     #[inline(always)]
-    fn among_leaves(accel: &'a Accel, start: &'a SingleStart, ray: &Ray, way: Way<'a, L>) -> Self {
+    fn among_leaves(
+        accel: &'a Accel,
+        start: &'a SingleStart,
+        ray: &Ray,
+        way: Way<'a, L>,
+        selection: S,
+    ) -> Self {
         let (blocks, place_per_height) = L::start_blocks(start, ray, way.slabs());
         let triangles = &accel.tree.blocks;
         let crossed = Winner { root: Root::at(f64::INFINITY), geometry: 0, primitive: 0 };
         let best = Candidate::NONE;
         let length = ray.direction.abs().max_element();
-        Self { accel, start, triangles, way, blocks, place_per_height, length, best, crossed }
+        Self { accel, start, triangles, way, blocks, place_per_height, length, best, crossed, selection }
     }
 
     /// Goes on from a node or a leaf.
@@ -164,6 +179,22 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
         None
     }
 
+    /// Of the triangles of a block that may be met, those that are taken, as far as that is seen at a glance.
+    #[inline(always)]
+    fn select(&self, block: u32, mask: u32, edges: &L::Edges, crossings: &Crossings<L::Floats>) -> u32 {
+        if S::TAKES_ALL {
+            return mask;
+        }
+        let mask = mask & crossings.in_range;
+        let mask = match self.selection.faces() {
+            Faces::Both => mask,
+            Faces::Front => mask & (!crossings.sure | L::fronts(edges)),
+            Faces::Back => mask & !(crossings.sure & L::fronts(edges)),
+        };
+        // Names stand elsewhere, and most blocks have nothing left to be asked about.
+        if mask == 0 { 0 } else { mask & self.selection.lanes(&self.accel.tree.names[block as usize]) }
+    }
+
     /// Tests a leaf of triangles for the nearest hit; false where the plain search has to answer.
     #[inline(always)]
     fn meet_leaf_closest(&mut self, leaf: u32, ray: &Ray) -> bool {
@@ -172,6 +203,7 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
             let (mask, edges) = L::meet_triangles(block, lanes::opaque(&self.blocks));
             if mask != 0 {
                 let crossings = L::place_crossings(&edges, &self.blocks);
+                let mask = self.select(number, mask, &edges, &crossings);
                 let mut rest = mask & crossings.in_range;
                 while rest != 0 {
                     let lane = rest.trailing_zeros();
@@ -222,6 +254,9 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
         let found = match self.meet_exactly(ray, block, lane) {
             Meeting::Miss => return Outcome::Settled(None),
             Meeting::Touch { .. } => return Outcome::Unsettled,
+            Meeting::Hit { is_front, .. } if !self.selection.faces().have(is_front) => {
+                return Outcome::Settled(None);
+            }
             Meeting::Hit { root, .. } => root.t,
         };
         let names = self.names(block, lane);
@@ -270,8 +305,39 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
     #[inline(always)]
     fn meet_entry_closest(&mut self, entry: &Entry, ray: &Ray) -> bool {
         let (geometry, primitive) = (entry.geometry, entry.primitive());
+        if !self.selection.takes(geometry, primitive) {
+            return true;
+        }
+        if self.selection.faces() != Faces::Both {
+            for root in self.crossings_of_faces(geometry, primitive, ray) {
+                if !self.meet_root(root, geometry, primitive, ray) {
+                    return false;
+                }
+            }
+            return true;
+        }
         let kind = &self.accel.geometries[geometry as usize].kind;
-        let Some(root) = traverse::first_crossing(kind, primitive, ray) else { return true };
+        match traverse::first_crossing(kind, primitive, ray) {
+            Some(root) => self.meet_root(root, geometry, primitive, ray),
+            None => true,
+        }
+    }
+
+    /// The crossings of what is no triangle at the faces that are taken.
+    #[inline(never)]
+    fn crossings_of_faces(&self, geometry: u32, primitive: u32, ray: &Ray) -> Roots {
+        let (what, faces) = (What::Named { geometry, primitive }, self.selection.faces());
+        let kind = &self.accel.geometries[geometry as usize].kind;
+        let mut roots = traverse::all_crossings(kind, primitive, ray);
+        roots.retain(|root| {
+            ray.contains(root.t) && faces.have(options::meets_front(self.accel, ray, what, root))
+        });
+        roots
+    }
+
+    /// Takes a crossing of what is no triangle, if it is the nearest; false where the plain search has to answer.
+    #[inline(always)]
+    fn meet_root(&mut self, root: Root, geometry: u32, primitive: u32, ray: &Ray) -> bool {
         let (from, to) = self.heights(root.t);
         // Also keeps out a NaN.
         if !ray.contains(root.t) || from > self.best.to {
@@ -292,6 +358,19 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
         true
     }
 
+    /// Tests what is no triangle for any hit.
+    #[inline(always)]
+    fn meet_entry_any(&self, entry: &Entry, ray: &Ray) -> bool {
+        let (geometry, primitive) = (entry.geometry, entry.primitive());
+        if !self.selection.takes(geometry, primitive) {
+            return false;
+        }
+        if self.selection.faces() != Faces::Both {
+            return !self.crossings_of_faces(geometry, primitive, ray).is_empty();
+        }
+        traverse::is_crossed(&self.accel.geometries[geometry as usize].kind, primitive, ray)
+    }
+
     #[cold]
     #[inline(never)]
     fn meet_exactly(&self, ray: &Ray, block: u32, lane: u32) -> Meeting {
@@ -309,6 +388,7 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
             let (mask, edges) = L::meet_triangles(block, lanes::opaque(&self.blocks));
             if mask != 0 {
                 let crossings = L::place_crossings(&edges, &self.blocks);
+                let mask = self.select(number, mask, &edges, &crossings);
                 if mask & crossings.sure != 0 {
                     return Outcome::Settled(true);
                 }
@@ -321,7 +401,11 @@ impl<'a, L: Lanes> SingleRay<'a, L> {
                     }
                     match self.meet_exactly(ray, number, lane) {
                         Meeting::Miss => {}
-                        Meeting::Hit { .. } => return Outcome::Settled(true),
+                        Meeting::Hit { is_front, .. } => {
+                            if self.selection.faces().have(is_front) {
+                                return Outcome::Settled(true);
+                            }
+                        }
                         Meeting::Touch { .. } => return Outcome::Unsettled,
                     }
                 }
@@ -385,13 +469,25 @@ pub(crate) trait Goal {
     const NOTHING: Self::Answer;
 
     /// Tests a leaf of triangles; how the search ends, if it does.
-    fn meet_triangles<L: Lanes>(single: &mut SingleRay<L>, leaf: u32, ray: &Ray) -> Option<Step>;
+    fn meet_triangles<L: Lanes, S: Selection>(
+        single: &mut SingleRay<L, S>,
+        leaf: u32,
+        ray: &Ray,
+    ) -> Option<Step>;
 
     /// Tests what is no triangle.
-    fn meet_entry<L: Lanes>(single: &mut SingleRay<L>, entry: &Entry, ray: &Ray) -> Option<Step>;
+    fn meet_entry<L: Lanes, S: Selection>(
+        single: &mut SingleRay<L, S>,
+        entry: &Entry,
+        ray: &Ray,
+    ) -> Option<Step>;
 
     /// What the last step leads to.
-    fn answer<L: Lanes>(single: &SingleRay<L>, ray: &Ray, last: Step) -> Outcome<Self::Answer>;
+    fn answer<L: Lanes, S: Selection>(
+        single: &SingleRay<L, S>,
+        ray: &Ray,
+        last: Step,
+    ) -> Outcome<Self::Answer>;
 }
 
 /// The nearest hit.
@@ -403,17 +499,29 @@ impl Goal for Nearest {
     const NOTHING: Option<Winner> = None;
 
     #[inline(always)]
-    fn meet_triangles<L: Lanes>(single: &mut SingleRay<L>, leaf: u32, ray: &Ray) -> Option<Step> {
+    fn meet_triangles<L: Lanes, S: Selection>(
+        single: &mut SingleRay<L, S>,
+        leaf: u32,
+        ray: &Ray,
+    ) -> Option<Step> {
         (!single.meet_leaf_closest(leaf, ray)).then_some(Step::Unsettled)
     }
 
     #[inline(always)]
-    fn meet_entry<L: Lanes>(single: &mut SingleRay<L>, entry: &Entry, ray: &Ray) -> Option<Step> {
+    fn meet_entry<L: Lanes, S: Selection>(
+        single: &mut SingleRay<L, S>,
+        entry: &Entry,
+        ray: &Ray,
+    ) -> Option<Step> {
         (!single.meet_entry_closest(entry, ray)).then_some(Step::Unsettled)
     }
 
     #[inline(always)]
-    fn answer<L: Lanes>(single: &SingleRay<L>, ray: &Ray, last: Step) -> Outcome<Option<Winner>> {
+    fn answer<L: Lanes, S: Selection>(
+        single: &SingleRay<L, S>,
+        ray: &Ray,
+        last: Step,
+    ) -> Outcome<Option<Winner>> {
         if last == Step::Unsettled { Outcome::Unsettled } else { single.winner(ray) }
     }
 }
@@ -427,7 +535,11 @@ impl Goal for Whether {
     const NOTHING: bool = false;
 
     #[inline(always)]
-    fn meet_triangles<L: Lanes>(single: &mut SingleRay<L>, leaf: u32, ray: &Ray) -> Option<Step> {
+    fn meet_triangles<L: Lanes, S: Selection>(
+        single: &mut SingleRay<L, S>,
+        leaf: u32,
+        ray: &Ray,
+    ) -> Option<Step> {
         match single.meet_leaf_any(leaf, ray) {
             Outcome::Settled(true) => Some(Step::Met),
             Outcome::Settled(false) => None,
@@ -436,22 +548,26 @@ impl Goal for Whether {
     }
 
     #[inline(always)]
-    fn meet_entry<L: Lanes>(single: &mut SingleRay<L>, entry: &Entry, ray: &Ray) -> Option<Step> {
-        let kind = &single.accel.geometries[entry.geometry as usize].kind;
-        traverse::is_crossed(kind, entry.primitive(), ray).then_some(Step::Met)
+    fn meet_entry<L: Lanes, S: Selection>(
+        single: &mut SingleRay<L, S>,
+        entry: &Entry,
+        ray: &Ray,
+    ) -> Option<Step> {
+        single.meet_entry_any(entry, ray).then_some(Step::Met)
     }
 
     #[inline(always)]
-    fn answer<L: Lanes>(_: &SingleRay<L>, _: &Ray, last: Step) -> Outcome<bool> {
+    fn answer<L: Lanes, S: Selection>(_: &SingleRay<L, S>, _: &Ray, last: Step) -> Outcome<bool> {
         if last == Step::Unsettled { Outcome::Unsettled } else { Outcome::Settled(last == Step::Met) }
     }
 }
 
 /// A search with one ray. `MIXED` where there is anything but triangles.
-pub(crate) struct Alone<'a, 'r, G, const MIXED: bool> {
+pub(crate) struct Alone<'a, 'r, G, const MIXED: bool, S = All> {
     accel: &'a Accel,
     start: &'a SingleStart,
     ray: &'r Ray,
+    selection: S,
     goal: PhantomData<G>,
 }
 
@@ -463,10 +579,22 @@ pub(crate) fn search<G: Goal>(
     start: &SingleStart,
     ray: &Ray,
 ) -> Outcome<G::Answer> {
+    search_among::<G, All>(level, accel, start, ray, All)
+}
+
+/// The same among what a selection takes.
+#[inline(always)]
+pub(crate) fn search_among<G: Goal, S: Selection>(
+    level: Level,
+    accel: &Accel,
+    start: &SingleStart,
+    ray: &Ray,
+    selection: S,
+) -> Outcome<G::Answer> {
     if start.is_mixed {
-        level.run(Alone::<G, true>::new(accel, start, ray))
+        level.run(Alone::<G, true, S> { accel, start, ray, selection, goal: PhantomData })
     } else {
-        level.run(Alone::<G, false>::new(accel, start, ray))
+        level.run(Alone::<G, false, S> { accel, start, ray, selection, goal: PhantomData })
     }
 }
 
@@ -486,16 +614,16 @@ pub(crate) fn search_with<G: Goal, L: Lanes>(
 impl<'a, 'r, G, const MIXED: bool> Alone<'a, 'r, G, MIXED> {
     #[inline(always)]
     pub(crate) fn new(accel: &'a Accel, start: &'a SingleStart, ray: &'r Ray) -> Self {
-        Self { accel, start, ray, goal: PhantomData }
+        Self { accel, start, ray, selection: All, goal: PhantomData }
     }
 }
 
-impl<G: Goal, const MIXED: bool> Task for Alone<'_, '_, G, MIXED> {
+impl<G: Goal, const MIXED: bool, S: Selection> Task for Alone<'_, '_, G, MIXED, S> {
     type Output = Outcome<G::Answer>;
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Self::Output {
-        let Self { accel, start, ray, .. } = self;
+        let Self { accel, start, ray, selection, .. } = self;
         let Some(slabs) = L::start_single(start, ray) else { return Outcome::Unsettled };
         let way = Way::<L>::new(&accel.tree.nodes, slabs);
         let mut stack = Stack::new();
@@ -508,7 +636,7 @@ impl<G: Goal, const MIXED: bool> Task for Alone<'_, '_, G, MIXED> {
                 None => return Outcome::Settled(G::NOTHING),
             }
         }
-        let mut single = SingleRay::among_leaves(accel, start, ray, way);
+        let mut single = SingleRay::among_leaves(accel, start, ray, way, selection);
         for entry in infinite {
             if let Some(last) = G::meet_entry(&mut single, entry, ray) {
                 return G::answer(&single, ray, last);

@@ -617,6 +617,17 @@ pub(crate) fn first_crossing(kind: &GeometryKind, primitive: u32, ray: &Ray) -> 
     }
 }
 
+/// All of its crossings. What custom geometry answers may lie out of the range.
+pub(crate) fn all_crossings(kind: &GeometryKind, primitive: u32, ray: &Ray) -> Roots {
+    let mut roots = Roots::new();
+    match kind {
+        GeometryKind::Shape(shape) => shape.roots(ray, &mut roots),
+        GeometryKind::Custom(custom) => custom.roots(primitive, ray, &mut roots),
+        _ => {}
+    }
+    roots
+}
+
 /// Offers the crossings of one primitive that is neither a triangle nor an instance.
 #[inline(always)]
 pub(crate) fn meet_primitive<'a, S: Search<'a>>(
@@ -653,12 +664,7 @@ pub(crate) fn meet_primitive<'a, S: Search<'a>>(
         }
         Ask::First => first_crossing(kind, primitive, ray).is_some_and(|root| offer(root, 0)),
         Ask::Every => {
-            let mut roots = Roots::new();
-            match kind {
-                GeometryKind::Shape(shape) => shape.roots(ray, &mut roots),
-                GeometryKind::Custom(custom) => custom.roots(primitive, ray, &mut roots),
-                _ => {}
-            }
+            let roots = all_crossings(kind, primitive, ray);
             roots.into_iter().enumerate().any(|(order, root)| offer(root, order))
         }
     }

@@ -40,6 +40,16 @@ pub(crate) struct BlockNames {
 }
 
 impl BlockNames {
+    /// A bit for each lane that has this primitive of the geometry.
+    #[inline(always)]
+    pub(crate) fn lanes_of(&self, primitive: u32) -> u32 {
+        let mut lanes = 0;
+        for (lane, &own) in self.primitives.iter().enumerate() {
+            lanes |= u32::from(own == primitive) << lane;
+        }
+        lanes
+    }
+
     /// The names in a block without triangles.
     pub(crate) fn empty(geometry: u32) -> Self {
         Self { primitives: [u32::MAX; BLOCK], geometry }
@@ -140,8 +150,8 @@ impl Shear {
 /// of the ends of the interval and of the range by |D| below 3uh|D|. As no edge function is beyond `error` on the other side than D,
 /// Σ |eᵢ| ≤ |D| + 6 `error`. So `spread = 12.5 error (extent + 24us) + 24us |D| + TINY` has room for all of it, whatever D.
 ///
-/// Where all edge functions are beyond 2 `error` on one side, those in double precision are beyond zero, so that the line does
-/// meet the triangle; and where height ± spread lies between `surely_first` and `surely_last`, the hit is in range. The ends
+/// Where all edge functions are beyond 2 `error` on one side, those in double precision are beyond zero on the same, so that the
+/// line does meet the triangle, and at which face is certain, too; and where height ± spread lies between `surely_first` and `surely_last`, the hit is in range. The ends
 /// of the range are moved, outwards or inwards, by what their own rounding may be.
 ///
 /// All this without overflow, as L ≤ 2³⁸ and so Σ |eᵢ zᵢ| < 2¹²³; else the test is left out. It is also below 2⁻⁵⁰, and below 2⁻⁴⁰

@@ -64,6 +64,9 @@ pub(crate) trait Lanes: SphereLanes {
     /// Where along the ray that is.
     fn place_crossings(edges: &Self::Edges, ray: &BlockRay) -> Crossings<Self::Floats>;
 
+    /// Of those that certainly are met ([`Crossings::sure`]), a bit for each whose front it is; other bits mean nothing.
+    fn fronts(edges: &Self::Edges) -> u32;
+
     /// The number in a lane.
     fn lane(floats: Self::Floats, lane: usize) -> f32;
 

@@ -231,6 +231,16 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
+    fn fronts(edges: &Edges) -> u32 {
+        let [u, v, w] = &edges.values;
+        let mut fronts = 0;
+        for lane in 0..BLOCK {
+            fronts |= u32::from(u[lane].min(v[lane]).min(w[lane]) > 0.0) << lane;
+        }
+        fronts
+    }
+
+    #[inline(always)]
     fn lane(floats: [f32; BLOCK], lane: usize) -> f32 {
         floats[lane % BLOCK]
     }

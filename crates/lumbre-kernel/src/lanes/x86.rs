@@ -528,6 +528,13 @@ impl<const AVX512: bool> Lanes for X86<AVX512> {
     }
 
     #[inline(always)]
+    fn fronts(edges: &Edges) -> u32 {
+        // SAFETY: see `X86`.
+        let backs = unsafe { _mm256_movemask_ps(edges.least) };
+        !backs as u32
+    }
+
+    #[inline(always)]
     fn lane(floats: __m256, lane: usize) -> f32 {
         // SAFETY: see `X86`.
         unsafe { _mm256_cvtss_f32(_mm256_permutevar8x32_ps(floats, _mm256_set1_epi32(lane as i32))) }

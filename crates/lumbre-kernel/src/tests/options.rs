@@ -5,9 +5,11 @@ use std::sync::Arc;
 use lumbre_geometry::Ray;
 use lumbre_math::{DVec3, Transform};
 
-use super::scenes::{Random, build, cube, icosphere, mixture, ray};
+use super::scenes::{
+    Random, balls, build, cube, icosphere, mixture, ray, shape, soup, with_parts_everywhere,
+};
 use crate::lanes::Level;
-use crate::{Accel, Faces, GeometryKind, Hit, Instance, QueryOptions, brute};
+use crate::{Accel, Faces, GeometryKind, Hit, Instance, QueryOptions, TriangleMesh, brute};
 
 const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
 
@@ -58,16 +60,40 @@ fn options_leave_what_a_filter_leaves() {
         }));
     }
     let accel = with_random_masks(build(kinds), &mut random);
+    assert!(accel.single.is_none());
+    check(&accel, &mut random);
+}
+
+#[test]
+fn they_do_so_in_trees_that_single_precision_searches() {
+    let mut random = Random(64);
+    let zero = DVec3::ZERO;
+    let meshes = [icosphere(2, zero, 1.5), soup(&mut random, 100, zero, 3.0), icosphere(1, zero, 2.2)];
+    let meshes = meshes.map(|mesh| GeometryKind::Mesh(Arc::new(TriangleMesh { origin: CENTER, ..mesh })));
+    let meshes = meshes.to_vec();
+    let mut mixed = meshes.clone();
+    mixed.extend((0..30).map(|_| GeometryKind::Shape(shape(&mut random, CENTER, 3.0))));
+    mixed.push(GeometryKind::Custom(Arc::new(balls(&mut random, 10, CENTER, 3.0, Some(CENTER.y - 2.0)))));
+    for kinds in [meshes, mixed] {
+        for accel in [build(kinds.clone()), with_parts_everywhere(|| build(kinds.clone()))] {
+            let accel = with_random_masks(accel, &mut random);
+            assert!(accel.single.is_some());
+            check(&accel, &mut random);
+        }
+    }
+}
+
+fn check(accel: &Accel, random: &mut Random) {
     let (mut hits, mut fewer) = (0, 0);
     for i in 0..3000 {
-        let ray = ray(&mut random, CENTER, 3.0);
-        let all = brute::every(&accel, &ray);
+        let ray = ray(random, CENTER, 3.0);
+        let all = brute::every(accel, &ray);
         let options = QueryOptions {
             mask: [u32::MAX, 0b001_0000, 0b110_0000][i % 3],
             exclude: if i % 2 == 0 { all.first() } else { None },
             faces: [Faces::Both, Faces::Front, Faces::Back][random.below(3)],
         };
-        let expected = all.iter().find(|hit| counts(&accel, &ray, hit, &options)).cloned();
+        let expected = all.iter().find(|hit| counts(accel, &ray, hit, &options)).cloned();
         for level in Level::all() {
             assert_eq!(
                 accel.closest_with_at(level, &ray, &options),

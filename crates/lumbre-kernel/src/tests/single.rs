@@ -8,7 +8,9 @@ use lumbre_math::{DVec3, Transform, Vec3};
 use super::scenes::{self, Random};
 use crate::lanes::Level;
 use crate::single::{self, Nearest, Outcome, Whether};
-use crate::{Accel, BuildOptions, Geometry, GeometryKind, Preset, TriangleMesh, batch};
+use crate::{
+    Accel, BuildOptions, Faces, Geometry, GeometryKind, Hit, Preset, QueryOptions, TriangleMesh, batch,
+};
 
 /// A grid of hills, with a sheet twice in the same place, needles and some triangles seen on edge.
 fn mesh(random: &mut Random, origin: DVec3, size: f64) -> TriangleMesh {
@@ -157,4 +159,169 @@ fn single_precision_settles_nearly_all_rays_that_nobody_aims() {
         unsettled += u32::from(outcome == Outcome::Unsettled);
     }
     assert!(unsettled < 20, "{unsettled}");
+}
+
+fn bits(hit: &Option<Hit>) -> Option<[u64; 3]> {
+    hit.as_ref().map(|hit| [hit.root.t, hit.root.local.x, hit.root.local.y].map(f64::to_bits))
+}
+
+/// Both searches with options beside the plain ones, which answer with the same bits; the nearest hit, and whether the first
+/// search was settled.
+fn check_with(level: Level, accel: &Accel, ray: &Ray, options: &QueryOptions) -> (Option<Hit>, bool) {
+    let plain = accel.closest_with_plainly_at(level, ray, options);
+    let found = accel.closest_with_at(level, ray, options);
+    assert_eq!(found, plain, "{level:?} {ray:?} {options:?}");
+    assert_eq!(bits(&found), bits(&plain), "{level:?} {ray:?} {options:?}");
+    assert_eq!(accel.any_with_plainly_at(level, ray, options), plain.is_some());
+    assert_eq!(accel.any_with_at(level, ray, options), plain.is_some(), "{level:?} {ray:?} {options:?}");
+    let start = accel.single.as_ref().expect("made for this");
+    let selected = options.of_tree(accel);
+    let outcome = single::search_among::<Nearest, _>(level, accel, start, ray, selected);
+    (plain, outcome != Outcome::Unsettled)
+}
+
+/// Options of every sort along every ray, in a tree whose geometries get masks.
+fn check_options(accel: Accel, random: &mut Random, rays: &[Ray], least: u32) {
+    let masks = accel.geometries.iter().map(|_| random.bits() as u32 & 0b111).collect();
+    let accel = accel.with_masks(masks);
+    for level in Level::all() {
+        let (mut settled, mut hits, mut others) = (0, 0, 0);
+        for ray in rays {
+            let nearest = accel.closest_plainly_at(level, ray);
+            let options = QueryOptions {
+                mask: [u32::MAX, 0b001, 0b110][random.below(3)],
+                exclude: if random.unit() < 0.5 { nearest.as_ref() } else { None },
+                faces: [Faces::Both, Faces::Front, Faces::Back][random.below(3)],
+            };
+            let (hit, is_settled) = check_with(level, &accel, ray, &options);
+            settled += u32::from(is_settled);
+            hits += u32::from(hit.is_some());
+            others += u32::from(hit.is_some() && hit != nearest);
+        }
+        assert!(settled > least && hits > least && others > least / 3, "{settled} {hits} {others}");
+    }
+}
+
+#[test]
+fn options_leave_the_same_bits_in_single_precision() {
+    let mut random = Random(94);
+    for (size, offset) in SIZES_AND_OFFSETS {
+        let origin = size * offset * DVec3::new(1.0, -0.7, 0.4);
+        let mut meshes = vec![mesh(&mut random, origin, size), mesh(&mut random, origin, 0.7 * size)];
+        // The same places twice, and the other way round: at every height two names and two faces.
+        meshes.push(meshes[0].clone());
+        meshes.push(meshes[1].clone());
+        meshes[3].indices.iter_mut().for_each(|[a, _, c]| std::mem::swap(a, c));
+        scenes::with_every_preset(|| {
+            let accel =
+                scenes::build(meshes.iter().map(|mesh| GeometryKind::Mesh(mesh.clone().into())).collect());
+            let rays: Vec<_> = (0..4_000).map(|i| ray(&mut random, &meshes[i % 2], size)).collect();
+            check_options(accel, &mut random, &rays, 600);
+        });
+    }
+}
+
+#[test]
+fn they_do_so_beside_shapes_and_custom_geometry() {
+    let mut random = Random(95);
+    for (size, offset) in SIZES_AND_OFFSETS {
+        let origin = size * offset * DVec3::new(1.0, -0.7, 0.4);
+        let mesh = mesh(&mut random, origin, size);
+        for (has_mesh, has_plane) in [(true, false), (true, true), (false, false)] {
+            let mut kinds: Vec<_> =
+                (0..60).map(|_| GeometryKind::Shape(scenes::shape(&mut random, origin, size))).collect();
+            kinds.push(kinds[7].clone());
+            kinds.push(GeometryKind::Custom(Arc::new(scenes::balls(&mut random, 20, origin, size, None))));
+            if has_plane {
+                let plane = Plane::new(origin, DVec3::new(0.1, 1.0, 0.2)).unwrap();
+                kinds.push(GeometryKind::Shape(PlacedShape::new(plane.into(), Transform::IDENTITY)));
+            }
+            if has_mesh {
+                kinds.push(GeometryKind::Mesh(mesh.clone().into()));
+            }
+            let rays: Vec<_> = (0..3_000).map(|_| ray(&mut random, &mesh, size)).collect();
+            check_options(scenes::build(kinds), &mut random, &rays, 300);
+        }
+    }
+}
+
+#[test]
+fn a_ray_that_leaves_out_where_it_starts_goes_on_with_the_same_bits() {
+    let mut random = Random(96);
+    let center = DVec3::new(1.5, -2.25, 4.0);
+    scenes::with_every_preset(|| {
+        // A hilly ball around a smooth one, and loose triangles between.
+        let mut meshes = [
+            scenes::bumpy(4, DVec3::ZERO, 4.0),
+            scenes::icosphere(3, DVec3::ZERO, 1.2),
+            scenes::soup(&mut random, 200, DVec3::ZERO, 3.0),
+        ];
+        meshes.iter_mut().for_each(|mesh| mesh.origin = center);
+        let accel = scenes::build(meshes.map(|mesh| GeometryKind::Mesh(mesh.into())).to_vec());
+        let (mut bounces, mut settled, mut blocked) = (0, 0, 0);
+        for _ in 0..250 {
+            let mut ray = Ray::new(center + 2.2 * random.vector(), random.vector());
+            let mut last = None;
+            for bounce in 0..12 {
+                let faces = [Faces::Both, Faces::Front, Faces::Back][bounce % 3];
+                let options = QueryOptions { exclude: last.as_ref(), ..QueryOptions::default() };
+                for level in Level::all() {
+                    check_with(level, &accel, &ray, &QueryOptions { faces, ..options });
+                    // Back to where it came from, and no further.
+                    check_with(level, &accel, &ray.with_range(0.0, 1.0), &options);
+                }
+                let (hit, is_settled) = check_with(Level::best(), &accel, &ray, &options);
+                settled += u32::from(is_settled);
+                blocked += u32::from(accel.any_with(&ray.with_range(0.0, 1.0), &options));
+                let Some(hit) = hit else { break };
+                bounces += 1;
+                let surface = accel.surface(&ray, &hit);
+                let side = -surface.normal.dot(ray.direction).signum();
+                let direction = side * surface.normal + 0.99 * random.vector().normalize();
+                ray = Ray::new(surface.point, direction);
+                last = Some(hit);
+            }
+        }
+        assert!(bounces > 2_000 && settled > 1_900, "{bounces} {settled}");
+        assert!(blocked > 300, "{blocked}");
+    });
+}
+
+#[test]
+fn culling_at_edges_and_corners_keeps_its_bits() {
+    let mut random = Random(97);
+    let center = DVec3::new(1.5, -2.25, 4.0);
+    let ball = scenes::icosphere(2, center, 1.2);
+    let open = TriangleMesh {
+        indices: scenes::bumpy(2, center, 2.0).indices[..200].to_vec(),
+        ..scenes::bumpy(2, center, 2.0)
+    };
+    for meshes in [vec![scenes::cube()], vec![ball.clone()], vec![ball, open]] {
+        let accel =
+            scenes::build(meshes.iter().map(|mesh| GeometryKind::Mesh(mesh.clone().into())).collect());
+        let (mut fronts, mut backs, mut unsettled) = (0, 0, 0);
+        for mesh in &meshes {
+            for triangle in &mesh.indices {
+                let [a, b, _] = triangle.map(|index| scenes::vertex(mesh, index));
+                let axis = [DVec3::X, -DVec3::Y, DVec3::Z][random.below(3)];
+                for target in [a, 0.5 * (a + b)] {
+                    for direction in [axis, -axis, random.vector()] {
+                        let ray = Ray::new(target - 4.0 * direction, direction);
+                        let exclude = accel.closest(&ray);
+                        for level in Level::all() {
+                            for (faces, count) in [(Faces::Front, &mut fronts), (Faces::Back, &mut backs)] {
+                                let options = QueryOptions { faces, ..QueryOptions::default() };
+                                let (hit, is_settled) = check_with(level, &accel, &ray, &options);
+                                *count += u32::from(hit.is_some());
+                                unsettled += u32::from(!is_settled);
+                                let options = QueryOptions { exclude: exclude.as_ref(), ..options };
+                                check_with(level, &accel, &ray, &options);
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        assert!(fronts > 50 && backs > 50 && unsettled > 50, "{fronts} {backs} {unsettled}");
+    }
 }
