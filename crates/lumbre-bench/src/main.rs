@@ -80,8 +80,8 @@ struct Options {
     /// Lumbre takes rays by batches, on every thread, and not one at a time.
     #[arg(long)]
     batches: bool,
-    /// Peers are Lumbre itself, asked otherwise: by batches, in double precision alone, with options, with masks, and with
-    /// vertices in double precision. The ratios are what that costs.
+    /// Peers are Lumbre itself, asked otherwise: by batches, in double precision alone, with options, with masks, but for a
+    /// primitive, and with vertices in double precision. The ratios are what that costs.
     #[arg(long, conflicts_with = "batches")]
     costs: bool,
     /// Lumbre keeps every sphere as a shape of its own, not in a cloud.

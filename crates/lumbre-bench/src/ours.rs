@@ -40,14 +40,22 @@ pub enum Asked {
     WithOptions,
     /// The same, of geometries that have masks, all of which let rays through.
     WithMasks,
+    /// One ray at a time, but for a primitive that is nowhere.
+    Excluding,
     /// One ray at a time, of meshes whose vertices are in double precision, too.
     OfPreciseMeshes,
 }
 
 impl Asked {
     /// All but the first: what else costs what.
-    pub const OTHERS: [Self; 5] =
-        [Self::ByBatches, Self::Plainly, Self::WithOptions, Self::WithMasks, Self::OfPreciseMeshes];
+    pub const OTHERS: [Self; 6] = [
+        Self::ByBatches,
+        Self::Plainly,
+        Self::WithOptions,
+        Self::WithMasks,
+        Self::Excluding,
+        Self::OfPreciseMeshes,
+    ];
 
     fn name(self) -> &'static str {
         match self {
@@ -56,6 +64,7 @@ impl Asked {
             Self::Plainly => " double alone",
             Self::WithOptions => " options",
             Self::WithMasks => " masks",
+            Self::Excluding => " excluding",
             Self::OfPreciseMeshes => " f64 meshes",
         }
     }
@@ -101,7 +110,8 @@ impl Program for Lumbre {
         if self.asked == Asked::WithMasks {
             accel = accel.with_masks(vec![MASK_OF_ALL; count]);
         }
-        Ok(Built { tree: Box::new(Queried { accel, asked: self.asked }), seconds, bytes })
+        let tree = Queried { accel, asked: self.asked, nowhere: nowhere()? };
+        Ok(Built { tree: Box::new(tree), seconds, bytes })
     }
 }
 
@@ -168,6 +178,16 @@ fn placed_sphere([x, y, z, radius]: [f32; 4]) -> PlacedShape {
 struct Queried {
     accel: Accel,
     asked: Asked,
+    /// Of the first geometry, but no primitive of that.
+    nowhere: Hit,
+}
+
+fn nowhere() -> Result<Hit> {
+    let kind = GeometryKind::Shape(placed_sphere([0.0, 0.0, 0.0, 1.0]));
+    let ball = Accel::build(vec![Geometry { id: 0, kind }], &BuildOptions::default())?;
+    let mut hit = ball.closest(&Ray::new(DVec3::ZERO, DVec3::X)).context("a ball from within")?;
+    hit.primitive = u32::MAX - 1;
+    Ok(hit)
 }
 
 impl Tree for Queried {
@@ -189,6 +209,10 @@ impl Tree for Queried {
 
 fn masked() -> QueryOptions<'static> {
     QueryOptions { mask: MASK_ASKED, ..QueryOptions::default() }
+}
+
+fn excluding(hit: &Hit) -> QueryOptions<'_> {
+    QueryOptions { exclude: Some(hit), ..QueryOptions::default() }
 }
 
 /// What is written down of a hit: about what Embree writes.
@@ -232,7 +256,7 @@ impl Pass for Closest<'_> {
     }
 
     fn run(&mut self) {
-        let Queried { accel, asked } = self.tree;
+        let Queried { accel, asked, nowhere } = self.tree;
         if *asked == Asked::ByBatches {
             for (rays, found) in self.rays.chunks(BATCH).zip(self.found.chunks_mut(BATCH)) {
                 let hits = &mut self.batch[..rays.len()];
@@ -245,6 +269,7 @@ impl Pass for Closest<'_> {
             Asked::Plainly => self.each(|ray| accel.closest_plainly(ray)),
             Asked::WithOptions => self.each(|ray| accel.closest_with(ray, &QueryOptions::default())),
             Asked::WithMasks => self.each(|ray| accel.closest_with(ray, &masked())),
+            Asked::Excluding => self.each(|ray| accel.closest_with(ray, &excluding(nowhere))),
             _ => self.each(|ray| accel.closest(ray)),
         }
     }
@@ -276,7 +301,7 @@ impl Pass for Any<'_> {
     }
 
     fn run(&mut self) {
-        let Queried { accel, asked } = self.tree;
+        let Queried { accel, asked, nowhere } = self.tree;
         if *asked == Asked::ByBatches {
             for (rays, found) in self.rays.chunks(BATCH).zip(self.found.chunks_mut(BATCH)) {
                 accel.any_batch(rays, found);
@@ -287,6 +312,7 @@ impl Pass for Any<'_> {
             Asked::Plainly => self.each(|ray| accel.any_plainly(ray)),
             Asked::WithOptions => self.each(|ray| accel.any_with(ray, &QueryOptions::default())),
             Asked::WithMasks => self.each(|ray| accel.any_with(ray, &masked())),
+            Asked::Excluding => self.each(|ray| accel.any_with(ray, &excluding(nowhere))),
             _ => self.each(|ray| accel.any(ray)),
         }
     }

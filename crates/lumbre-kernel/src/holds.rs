@@ -4,7 +4,7 @@ use lumbre_math::DVec3;
 
 use crate::node::{LARGEST_NEAR, SMALLEST_NEAR, TINY_NEAR, Units, round_up};
 use crate::triangles::LEAST_SIZE;
-use crate::{Geometry, GeometryKind};
+use crate::{Geometry, GeometryKind, Instance};
 
 /// What is known of all the geometries of a tree.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,6 +25,8 @@ pub(crate) struct Holds {
     pub(crate) has_one_cloud_origin: bool,
     /// No coordinate of a sphere's centre, relative to its cloud's origin, plus a radius is larger.
     pub(crate) sphere_reach: f64,
+    /// Whether geometries in instances have masks.
+    pub(crate) masks_within: bool,
 }
 
 impl Holds {
@@ -55,6 +57,12 @@ impl Holds {
             has_one_origin: origins.all(|origin| origin == first_origin),
             first_origin,
             largest_corner,
+            masks_within: geometries.iter().any(|geometry| match &geometry.kind {
+                GeometryKind::Instance(Instance { accel, .. }) => {
+                    !accel.masks.is_empty() || accel.holds.masks_within
+                }
+                _ => false,
+            }),
         }
     }
 }

@@ -52,10 +52,11 @@ impl Faces {
 }
 
 impl QueryOptions<'_> {
-    /// Whether they leave everything of a tree.
+    /// Whether they leave everything of a tree and of those placed in it, as far as that is seen at a glance.
     #[inline(always)]
     pub(crate) fn take_all(&self, accel: &Accel) -> bool {
-        accel.masks.is_empty() && self.exclude.is_none() && self.faces == Faces::Both
+        let has_masks = !accel.masks.is_empty() || accel.holds.masks_within;
+        !has_masks && self.exclude.is_none() && self.faces == Faces::Both
     }
 
     /// What they leave of a tree.

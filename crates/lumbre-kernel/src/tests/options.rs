@@ -59,16 +59,21 @@ fn options_leave_what_a_filter_leaves() {
             world_from_object: place.into(),
         }));
     }
-    let accel = with_random_masks(build(kinds), &mut random);
+    let accel = build(kinds);
     assert!(accel.single.is_none());
+    // At first there are masks in instances alone, and then everywhere.
     check(&accel, &mut random);
+    let placed = Instance { accel: Arc::new(accel), world_from_object: Transform::IDENTITY.into() };
+    check(&build(vec![GeometryKind::Instance(placed.clone())]), &mut random);
+    let accel = Arc::into_inner(placed.accel).expect("its one owner");
+    check(&with_random_masks(accel, &mut random), &mut random);
 }
 
 #[test]
 fn they_do_so_in_trees_that_single_precision_searches() {
     let mut random = Random(64);
     let zero = DVec3::ZERO;
-    let meshes = [icosphere(2, zero, 1.5), soup(&mut random, 100, zero, 3.0), icosphere(1, zero, 2.2)];
+    let meshes = [icosphere(2, zero, 1.5), soup(&mut random, 150, zero, 3.0), icosphere(1, zero, 2.2)];
     let meshes = meshes.map(|mesh| GeometryKind::Mesh(Arc::new(TriangleMesh { origin: CENTER, ..mesh })));
     let meshes = meshes.to_vec();
     let mut mixed = meshes.clone();
@@ -76,8 +81,10 @@ fn they_do_so_in_trees_that_single_precision_searches() {
     mixed.push(GeometryKind::Custom(Arc::new(balls(&mut random, 10, CENTER, 3.0, Some(CENTER.y - 2.0)))));
     for kinds in [meshes, mixed] {
         for accel in [build(kinds.clone()), with_parts_everywhere(|| build(kinds.clone()))] {
-            let accel = with_random_masks(accel, &mut random);
             assert!(accel.single.is_some());
+            let masks = [0b011_0000, 0b101_0000, 0b010_0000].into_iter().cycle();
+            let masks = masks.take(accel.geometries.len()).collect();
+            let accel = accel.with_masks(masks);
             check(&accel, &mut random);
         }
     }
@@ -105,7 +112,7 @@ fn check(accel: &Accel, random: &mut Random) {
         hits += usize::from(expected.is_some());
         fewer += usize::from(expected.as_ref() != all.first());
     }
-    assert!(hits > 600 && fewer > 600, "{hits} {fewer}");
+    assert!(hits > 500 && fewer > 500, "{hits} {fewer}");
 }
 
 #[test]
