@@ -5,13 +5,14 @@ mod common;
 use std::sync::Arc;
 
 use common::{add, add_material, diffuse, empty, exact, options, picture};
-use lumbre_geometry::Disk;
+use lumbre_geometry::{Disk, Sphere};
 use lumbre_image::{Image, Rgb};
 use lumbre_math::{DAffine3, DMat3, DVec3, Transform};
 use lumbre_render::RenderOptions;
 use lumbre_scene::{
-    Camera, CameraKind, EnvironmentDesc, GroundDesc, LightDesc, Scene, SceneDesc, WithoutLight,
+    Camera, CameraKind, EnvironmentDesc, GeometryDesc, GroundDesc, LightDesc, Scene, SceneDesc, WithoutLight,
 };
+use lumbre_shading::{Material, MaterialKind, Roughness};
 
 const RADIUS: f64 = 1.5;
 const HEIGHT: f64 = 2.0;
@@ -94,6 +95,77 @@ fn a_lamp_that_is_hidden_takes_its_share_of_the_light_with_it() {
     let (from_sky, from_lamp) = (0.8 * std::f64::consts::PI, 90.0 / (9.0 * HEIGHT * HEIGHT));
     let expected = (from_sky * hidden() + from_lamp) / (from_sky + from_lamp);
     assert!((f64::from(alpha) / expected - 1.0).abs() < 0.02, "{alpha} {expected}");
+}
+
+/// The same place below something clear, in place of the disk.
+fn below(lights: Vec<LightDesc>, kind: MaterialKind, geometry: GeometryDesc) -> SceneDesc {
+    let mut desc = hovering(lights, true);
+    desc.shapes.clear();
+    let clear = add_material(&mut desc, Material::new(kind));
+    add(&mut desc, geometry, clear);
+    desc
+}
+
+/// What glass of index 1.5 reflects of light that comes at an angle, and the angle inside it.
+fn fresnel(angle: f64) -> (f64, f64) {
+    let inside = (angle.sin() / 1.5).asin();
+    let (outer, inner) = (angle.cos(), inside.cos());
+    let across = ((outer - 1.5 * inner) / (outer + 1.5 * inner)).powi(2);
+    let along = ((1.5 * outer - inner) / (1.5 * outer + inner)).powi(2);
+    (0.5 * (across + along), inside)
+}
+
+/// The share of an even sky that comes to the ground from angles up to `most` from straight above, of what `left` says.
+fn share(most: f64, left: impl Fn(f64) -> f64) -> f64 {
+    const STEPS: u32 = 20_000;
+    let angles = (0..STEPS).map(|i| most * (f64::from(i) + 0.5) / f64::from(STEPS));
+    angles.map(|a| left(a) * 2.0 * a.sin() * a.cos()).sum::<f64>() * most / f64::from(STEPS)
+}
+
+#[test]
+fn a_pane_takes_from_the_light_what_it_reflects() {
+    let pane = || exact(Disk::new(DVec3::new(3.0, 4.0 + HEIGHT, -2.0), DVec3::Y, RADIUS, 0.0).unwrap());
+    let kind = || MaterialKind::ThinDielectric { eta: 1.5 };
+    // With all that goes to and fro inside.
+    let reflected = |angle: f64| 2.0 * fresnel(angle).0 / (1.0 + fresnel(angle).0);
+    let from_sky = share((RADIUS / HEIGHT).atan(), reflected);
+    let (_, alpha) = look(below(vec![sky(Rgb::splat(0.8))], kind(), pane()), true);
+    assert!((f64::from(alpha) / from_sky - 1.0).abs() < 0.02, "{alpha} {from_sky}");
+    let lamp =
+        LightDesc::Point { from: DVec3::new(3.0, 4.0 + 3.0 * HEIGHT, -2.0), intensity: Rgb::splat(90.0) };
+    let (_, alpha) = look(below(vec![lamp], kind(), pane()), true);
+    assert!((f64::from(alpha) / reflected(0.0) - 1.0).abs() < 0.02, "{alpha} {}", reflected(0.0));
+}
+
+#[test]
+fn glass_that_bends_light_takes_as_much_as_geometric_optics_says() {
+    let middle = HEIGHT + RADIUS;
+    let ball = exact(Sphere::new(DVec3::new(3.0, 4.0 + middle, -2.0), RADIUS).unwrap());
+    let kind = MaterialKind::Dielectric { eta: 1.5, roughness: Roughness::smooth() };
+    let most = (RADIUS / middle).asin();
+    // Looked at from the ground, after so many reflections inside; what comes from below the horizon is dark.
+    let passed = share(most, |angle| {
+        let outside = (angle.sin() * middle / RADIUS).min(1.0).asin();
+        let (reflected, inside) = fresnel(outside);
+        let after = |bounces: i32| {
+            let turned =
+                2.0 * (outside - inside) + f64::from(bounces) * (std::f64::consts::PI - 2.0 * inside);
+            let is_up = (angle - turned).cos() > 0.0;
+            if is_up { (1.0 - reflected).powi(2) * reflected.powi(bounces) } else { 0.0 }
+        };
+        (0..12).map(after).sum()
+    });
+    let hidden = most.sin().powi(2);
+    assert!(passed > 0.7 * hidden, "{passed} {hidden}");
+    let (_, alpha) = look(below(vec![sky(Rgb::splat(0.8))], kind, ball.clone()), true);
+    let expected = hidden - passed;
+    assert!((f64::from(alpha) / expected - 1.0).abs() < 0.03, "{alpha} {expected}");
+    // Light in one direction alone would have to be found by chance: it is taken to be hidden.
+    let lamp =
+        LightDesc::Point { from: DVec3::new(3.0, 4.0 + 6.0 * HEIGHT, -2.0), intensity: Rgb::splat(90.0) };
+    let kind = MaterialKind::Dielectric { eta: 1.5, roughness: Roughness::smooth() };
+    let (_, alpha) = look(below(vec![lamp], kind, ball), true);
+    assert_eq!(alpha, 1.0);
 }
 
 #[test]

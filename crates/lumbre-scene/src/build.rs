@@ -87,6 +87,7 @@ impl Scene {
         let infinite = (0..builder.lights.len() as u32).map(LightId);
         let infinite = infinite.filter(|id| builder.lights[id.0 as usize].is_infinite()).collect();
         let has_holes = builder.entries.iter().any(SurfaceEntry::has_holes);
+        let lets_light_through = builder.entries.iter().any(SurfaceEntry::lets_light_through);
         let has_one_sided = builder.entries.iter().any(SurfaceEntry::is_one_sided_anywhere);
         let looks_up = builder.entries.iter().any(SurfaceEntry::looks_up_anywhere);
         Ok(Self {
@@ -100,6 +101,7 @@ impl Scene {
             integrator,
             bounds,
             has_holes,
+            lets_light_through,
             has_one_sided,
             has_instances: !objects.is_empty(),
             moves,

@@ -34,6 +34,8 @@ pub struct Scene {
     pub(crate) warnings: Vec<BuildWarning>,
     // Whether rays of light must ask every hit if it counts: something is cut out, or is an interface.
     pub(crate) has_holes: bool,
+    /// Whether anything is made of glass, or of what else light goes through.
+    pub(crate) lets_light_through: bool,
     // Whether a camera looks through the back of something.
     pub(crate) has_one_sided: bool,
     pub(crate) has_instances: bool,
@@ -139,6 +141,11 @@ impl Scene {
     /// The position in its file of the shape that was hit.
     pub fn shape_index(&self, hit: &Hit) -> u32 {
         self.leaf(hit).0.shape
+    }
+
+    /// Whether anything is made of what light goes through: glass, panes, leaves. Cut-outs do not count.
+    pub fn lets_light_through(&self) -> bool {
+        self.lets_light_through
     }
 
     /// The nearest hit that light sees: cut-outs and interfaces let it pass.

@@ -189,6 +189,14 @@ impl SurfaceEntry {
         }
     }
 
+    /// Whether light may go through the material of any part of it.
+    pub fn lets_light_through(&self) -> bool {
+        match &self.form {
+            Form::Csg(csg) => csg.leaves.iter().any(Self::lets_light_through),
+            _ => self.material.as_ref().is_some_and(|material| material.lets_light_through()),
+        }
+    }
+
     /// Whether light may pass through some of it.
     pub fn has_holes(&self) -> bool {
         match &self.form {

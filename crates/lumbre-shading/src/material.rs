@@ -282,6 +282,30 @@ impl Material {
         false
     }
 
+    /// Whether light gets through it to the other side, or may: of a mixture, through any part of it.
+    pub fn lets_light_through(&self) -> bool {
+        let mut rest: SmallVec<[&Self; 4]> = smallvec![self];
+        // Mixtures may share materials: as many steps as most have, and no more.
+        for _ in 0..64 {
+            let Some(material) = rest.pop() else { return false };
+            let lets_through = match &material.kind {
+                MaterialKind::Dielectric { .. }
+                | MaterialKind::ThinDielectric { .. }
+                | MaterialKind::DiffuseTransmission { .. } => true,
+                MaterialKind::Principled(params) => params.lets_light_through(),
+                MaterialKind::Mix { materials, .. } => {
+                    rest.extend(materials.iter().map(|material| &**material));
+                    false
+                }
+                _ => false,
+            };
+            if lets_through {
+                return true;
+            }
+        }
+        true
+    }
+
     /// What a mixture is made of at a place, each material with its share; one that is no mixture is all of it. A
     /// mixture whose own share is less than `least` is not taken apart: the one material stands for it that
     /// [`Material::resolve`] chooses. Shares sum to 1, and there are at most as many as mixtures and shares above `least`.

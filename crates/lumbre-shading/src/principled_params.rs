@@ -203,10 +203,14 @@ impl PrincipledParams {
 
     /// The index of refraction inside; see [`crate::Material::interior_index`].
     pub(crate) fn interior_index(&self) -> Option<f32> {
-        let opens = |texture: &FloatTexture| !matches!(texture, Texture::Constant(v) if *v <= 0.0);
-        let is_open = opens(&self.transmission) || opens(&self.diffuse_transmission);
-        (self.volume.is_some() && is_open)
+        (self.volume.is_some() && self.lets_light_through())
             .then(|| if self.ior > 0.0 && self.ior.is_finite() { self.ior } else { 1.5 })
+    }
+
+    /// Whether light gets through anywhere.
+    pub fn lets_light_through(&self) -> bool {
+        let opens = |texture: &FloatTexture| !matches!(texture, Texture::Constant(v) if *v <= 0.0);
+        opens(&self.transmission) || opens(&self.diffuse_transmission)
     }
 
     /// σ of Beer's and Lambert's law inside, per unit of length; see [`crate::Material::interior_attenuation`]. A lane

@@ -8,6 +8,7 @@ mod interior;
 mod path;
 mod sampler;
 mod seen;
+mod through;
 mod whitted;
 
 pub use ambient_occlusion::AmbientOcclusion;

@@ -1,14 +1,21 @@
 //! What a camera sees along a line of sight: light, and how much of what is behind it covers.
 
+use std::f64::consts::FRAC_1_PI;
+
+use lumbre_math::{DVec3, Frame, warp64};
 use lumbre_scene::{GroundPlane, Interaction, Scene, View};
 use lumbre_shading::{Scatter, Spectrum};
 
+use crate::through::{light_through, share_through_panes};
 use crate::{Draw, Integrator, RayCounts, Sight};
 
 /// Samples of each light that each sample of a shadow takes: few rays, where a whole path would be many.
 const SAMPLES: u32 = 2;
 /// Lights that each such sample asks: of more, as many by chance.
 const MOST_LIGHTS: usize = 4;
+
+/// Each way of light through clear things has as many vertices of a draw as two to the power of this.
+const WAY_BITS: u32 = 6;
 
 /// What is seen along a line of sight.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,9 +31,10 @@ pub struct Seen {
 ///
 /// Where the camera meets nothing it sees the lights at infinity, or, if these are not to be seen, nothing at all. On ground
 /// that catches shadows ([`GroundPlane::catcher`]) it sees what it would see without the ground, darkened by the share of
-/// the light which something keeps from the ground: of light at infinity, from points and from spots. (P. Debevec,
-/// "Rendering Synthetic Objects into Real Scenes", SIGGRAPH 1998, takes the difference of two renderings; here only what
-/// is blocked is estimated, so that ground in the open has no noise.)
+/// the light which something keeps from the ground: of light at infinity, from points and from spots. What comes through clear
+/// things is not kept from it: light at infinity through whatever bends or spreads it, the other light through smooth panes
+/// without thickness. (P. Debevec, "Rendering Synthetic Objects into Real Scenes", SIGGRAPH 1998, takes the difference of
+/// two renderings; here only what is blocked is estimated, so that ground in the open has no noise.)
 pub fn see(
     integrator: &dyn Integrator,
     scene: &Scene,
@@ -87,7 +95,56 @@ fn blocked(
             lost += sample.radiance * (cosine * share / (density * SAMPLES as f32));
         }
     }
+    if scene.lets_light_through() {
+        lost = lost - passed(scene, ground, at, draw, rays);
+    }
     let open = ground.open_irradiance(at.surface.point, at.time);
     let part = |lost: f32, open: f32| if open > 0.0 { lost / open } else { 0.0 };
     Spectrum::new(part(lost.r, open.r), part(lost.g, open.g), part(lost.b, open.b))
+}
+
+/// An estimate of the irradiance by light that comes through clear things.
+///
+/// Light is looked for where lights are, and over the whole sky, for what is clear may bend it: both ways are
+/// combined by the balance heuristic (E. Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997).
+fn passed(
+    scene: &Scene,
+    ground: &GroundPlane,
+    at: &Interaction<'_>,
+    draw: &Draw,
+    rays: &mut RayCounts,
+) -> Spectrum {
+    let frame = Frame::from_z(ground.normal);
+    let mut irradiance = Spectrum::BLACK;
+    // The vertices whose numbers choose the way of the light begin at a place of their own for each direction.
+    let along = |direction: DVec3, way: u32, rays: &mut RayCounts| {
+        let cosine = ground.normal.dot(direction);
+        if cosine <= 0.0 {
+            return Spectrum::BLACK;
+        }
+        let ray = at.leave(direction);
+        let light = light_through(scene, ray, draw, way << WAY_BITS, rays);
+        if light.is_black() {
+            return Spectrum::BLACK;
+        }
+        let by_lights: f64 = scene.escaped(&ray).map(|(_, pdf)| f64::from(pdf)).sum();
+        let by_cosine = cosine * FRAC_1_PI;
+        light * (cosine / (by_lights + by_cosine)) as f32
+    };
+    for i in 0..SAMPLES {
+        let sample = scene.sample_light(at.lit_from(), at.time, draw.light_choice(i), draw.light_point(i));
+        if let Some(sample) = sample {
+            match (sample.scatter, sample.end) {
+                (Scatter::Density(_), None) => irradiance += along(sample.towards, 1 + 2 * i, rays),
+                (Scatter::Density(_), Some(_)) => {}
+                (Scatter::Delta, _) => {
+                    let cosine = ground.normal.dot(sample.towards).max(0.0) as f32;
+                    irradiance += sample.radiance * cosine * share_through_panes(scene, at, &sample, rays);
+                }
+            }
+        }
+        let local = warp64::square_to_cosine_hemisphere(draw.direction(i).as_dvec2());
+        irradiance += along(frame.to_world(local), 2 + 2 * i, rays);
+    }
+    irradiance / SAMPLES as f32
 }
