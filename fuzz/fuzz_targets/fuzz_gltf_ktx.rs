@@ -5,7 +5,7 @@ use std::path::Path;
 
 use libfuzzer_sys::fuzz_target;
 use lumbre_formats::gltf::{GltfOptions, read_gltf};
-use lumbre_formats::{Budget, Diagnostics, Limits};
+use lumbre_formats::{Budget, Diagnostics, FormatError, Limits};
 
 fuzz_target!(|data: &[u8]| {
     // A file that does not start as one is not even looked at.
@@ -13,9 +13,10 @@ fuzz_target!(|data: &[u8]| {
     texture.extend(data);
     let json = format!(
         r#"{{"asset":{{"version":"2.0"}},"extensionsUsed":["KHR_texture_basisu"],"buffers":[{{"byteLength":{0}}}],
-        "bufferViews":[{{"buffer":0,"byteLength":36}},{{"buffer":0,"byteOffset":36,"byteLength":{1}}}],
+        "bufferViews":[{{"buffer":0,"byteLength":36}},{{"buffer":0,"byteOffset":36,"byteLength":{1}}},
+        {{"buffer":0,"byteLength":24}}],
         "accessors":[{{"bufferView":0,"componentType":5126,"type":"VEC3","count":3,"min":[0,0,0],"max":[1,1,0]}},
-        {{"bufferView":0,"componentType":5126,"type":"VEC2","count":3}}],
+        {{"bufferView":2,"componentType":5126,"type":"VEC2","count":3}}],
         "images":[{{"bufferView":1,"mimeType":"image/ktx2"}}],
         "textures":[{{"extensions":{{"KHR_texture_basisu":{{"source":0}}}}}}],
         "materials":[{{"pbrMetallicRoughness":{{"baseColorTexture":{{"index":0}}}}}}],
@@ -44,12 +45,11 @@ fn read(json: &str, binary: &[u8]) {
     glb.extend(&[0; 3][..padding]);
     let budget = Budget::new(Limits { memory: (64 << 20) + 32 * glb.len() as u64, ..Limits::default() });
     let name = "fuzz.glb".into();
-    let _ = read_gltf(
-        &glb,
-        &name,
-        Path::new("/nowhere"),
-        &GltfOptions::default(),
-        &budget,
-        &mut Diagnostics::new(),
-    );
+    let (nowhere, options) = (Path::new("/nowhere"), GltfOptions::default());
+    if let Err(error) = read_gltf(&glb, &name, nowhere, &options, &budget, &mut Diagnostics::new()) {
+        // What is around the texture is right: otherwise none would ever be looked at.
+        let message = error.to_diagnostic().to_string();
+        let is_of_texture = message.contains("/images/0") || matches!(error, FormatError::Limit { .. });
+        assert!(is_of_texture, "{message}");
+    }
 }
