@@ -377,11 +377,12 @@ impl Case<'_> {
             .filter(|&i| self.work == Work::Primary || !self.taking[i].takes_packets())
             .collect();
         let squares = rays::by_squares(plan.size);
+        let in_squares = |i: usize| self.work == Work::Primary && self.taking[i].takes_squares();
         let mut jobs: Vec<Job> = programs
             .iter()
             .map(|&i| {
                 let tree = &*self.trees[i].tree;
-                if self.taking[i].takes_packets() {
+                if in_squares(i) {
                     let list: Vec<_> = squares.iter().map(|&pixel| self.list[pixel]).collect();
                     Job::new(tree, query, &list)
                 } else {
@@ -397,7 +398,7 @@ impl Case<'_> {
             .map(|(&i, job)| {
                 job.run(1);
                 let found = job.answers();
-                if !self.taking[i].takes_packets() {
+                if !in_squares(i) {
                     return found;
                 }
                 let mut ordered = vec![None; found.len()];

@@ -31,8 +31,7 @@ pub struct Lumbre {
 pub enum Asked {
     /// One ray at a time.
     Each,
-    /// By batches of [`BATCH`] rays. Of a tree below 16 MiB, that is one after another again, but the instruction set is
-    /// chosen once a batch.
+    /// By batches of [`BATCH`] rays. In a tree below 16 MiB, those that are alike go together, and the others one after another.
     ByBatches,
     /// One ray at a time, in double precision from the start.
     Plainly,
@@ -93,6 +92,10 @@ impl Program for Lumbre {
     fn refuses(&self, scene: &Scene) -> Option<&'static str> {
         let has_meshes = !scene.meshes.is_empty() || !scene.placed_meshes.is_empty();
         (self.asked == Asked::OfPreciseMeshes && !has_meshes).then_some("there is no mesh")
+    }
+
+    fn takes_squares(&self) -> bool {
+        self.asked == Asked::ByBatches
     }
 
     fn build<'a>(&'a self, scene: &'a Scene, threads: usize) -> Result<Built<'a>> {

@@ -57,9 +57,14 @@ pub trait Program {
     /// Why it cannot take part in a scene or in some of its work; `None` when it can.
     fn refuses(&self, scene: &crate::scene::Scene) -> Option<&'static str>;
 
-    /// Whether it takes primary rays alone, in squares of four by four pixels.
+    /// Whether it takes primary rays alone.
     fn takes_packets(&self) -> bool {
         false
+    }
+
+    /// Whether it takes primary rays in squares of four by four pixels.
+    fn takes_squares(&self) -> bool {
+        self.takes_packets()
     }
 
     /// Builds on so many threads. The scene's own arrays are shared where the program can read them, and copied beforehand

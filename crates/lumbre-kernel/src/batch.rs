@@ -1,7 +1,8 @@
-//! Many rays at once: some in flight on one thread, so that one's arithmetic fills the waits of another.
+//! Many rays at once.
 //!
-//! Each ray takes the very steps that it takes alone, a node or a leaf at a time, in turn with the others: its answer has the
-//! same bits. A step ends with a fetch of what the next one of that ray will read.
+//! Those that are alike go together: see [`packet`]. In large trees, some are in flight on one thread, so that one's arithmetic
+//! fills the waits of another. Each ray takes the very steps that it takes alone, a node or a leaf at a time, in turn with the
+//! others: its answer has the same bits. A step ends with a fetch of what the next one of that ray will read.
 
 use std::marker::PhantomData;
 
@@ -11,6 +12,7 @@ use crate::Accel;
 use crate::holds::SingleStart;
 use crate::lanes::{Lanes, Level, Task};
 use crate::node::Node;
+use crate::packet::{self, PACKET};
 use crate::single::{Alone, Goal, Outcome, SingleRay, Step};
 use crate::stack::{Order, Stack};
 use crate::triangles::TriangleBlock;
@@ -20,25 +22,36 @@ const IN_FLIGHT: usize = 6;
 /// Bytes of nodes and triangles from which on waiting for memory outweighs what it costs to turn from ray to ray.
 const WORTH_FLYING: usize = 1 << 24;
 
-/// Searches along every ray. `end` takes what came of it with the position of the ray, in any order.
-pub(crate) fn search_all<G: Goal>(
-    level: Level,
-    accel: &Accel,
-    rays: &[Ray],
-    mut end: impl FnMut(usize, Outcome<G::Answer>),
-) {
+/// Packets in a row that may go without a try.
+const LEAST_OFTEN: usize = 8;
+
+/// Takes what came of every ray, in any order.
+pub(crate) trait Ends<A> {
+    /// To be `#[inline(always)]`: an answer that goes through memory is waited for.
+    fn put(&mut self, position: usize, outcome: Outcome<A>);
+}
+
+impl<A, F: FnMut(usize, Outcome<A>)> Ends<A> for F {
+    #[inline(always)]
+    fn put(&mut self, position: usize, outcome: Outcome<A>) {
+        self(position, outcome);
+    }
+}
+
+/// Searches along every ray.
+pub(crate) fn search_all<G: Goal>(level: Level, accel: &Accel, rays: &[Ray], mut ends: impl Ends<G::Answer>) {
     let tree = &accel.tree;
     let bytes = size_of_val::<[Node]>(&tree.nodes) + size_of_val::<[TriangleBlock]>(&tree.blocks);
     if let Some(start) = &accel.single {
         if start.is_mixed {
-            level.run(OneByOne::<G, _, true> { accel, start, rays, end, goal: PhantomData });
+            level.run(OneByOne::<G, _, true> { accel, start, rays, ends, goal: PhantomData });
         } else if bytes < WORTH_FLYING {
-            level.run(OneByOne::<G, _, false> { accel, start, rays, end, goal: PhantomData });
+            level.run(OneByOne::<G, _, false> { accel, start, rays, ends, goal: PhantomData });
         } else {
-            fly::<G>(level, accel, start, rays, end);
+            fly::<G>(level, accel, start, rays, ends);
         }
     } else {
-        (0..rays.len()).for_each(|position| end(position, Outcome::Unsettled));
+        (0..rays.len()).for_each(|position| ends.put(position, Outcome::Unsettled));
     }
 }
 
@@ -48,28 +61,43 @@ pub(crate) fn fly<G: Goal>(
     accel: &Accel,
     start: &SingleStart,
     rays: &[Ray],
-    end: impl FnMut(usize, Outcome<G::Answer>),
+    ends: impl Ends<G::Answer>,
 ) {
-    level.run(Flights::<G, _> { accel, start, rays, end, goal: PhantomData });
+    level.run(Flights::<G, _> { accel, start, rays, ends, goal: PhantomData });
 }
 
-/// Rays through a tree of which the caches hold much, or where shapes take most of the time: they go one after another.
+/// Rays through a tree of which the caches hold much, or where shapes take most of the time: in the former, those that are alike
+/// go together, and all others one after another.
 struct OneByOne<'a, 'r, G, E, const MIXED: bool> {
     accel: &'a Accel,
     start: &'a SingleStart,
     rays: &'r [Ray],
-    end: E,
+    ends: E,
     goal: PhantomData<G>,
 }
 
-impl<G: Goal, E: FnMut(usize, Outcome<G::Answer>), const MIXED: bool> Task for OneByOne<'_, '_, G, E, MIXED> {
+impl<G: Goal, E: Ends<G::Answer>, const MIXED: bool> Task for OneByOne<'_, '_, G, E, MIXED> {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        let Self { accel, start, rays, mut end, .. } = self;
-        for (position, ray) in rays.iter().enumerate() {
-            end(position, Alone::<G, MIXED>::new(accel, start, ray).run::<L>());
+        let Self { accel, start, rays, mut ends, .. } = self;
+        // After a packet that did not pay, some rays go alone before the next is tried, and ever more while none does.
+        let (mut alone, mut patience) = (0, 1);
+        for (number, chunk) in rays.chunks(PACKET).enumerate() {
+            let first = number * PACKET;
+            if alone > 0 {
+                alone -= 1;
+            } else if !MIXED && let Ok(packet) = <&[Ray; PACKET]>::try_from(chunk) {
+                if packet::search::<G, L>(accel, start, packet, first, &mut ends) {
+                    patience = 1;
+                    continue;
+                }
+                (alone, patience) = (patience, (2 * patience).min(LEAST_OFTEN));
+            }
+            for (i, ray) in chunk.iter().enumerate() {
+                ends.put(first + i, Alone::<G, MIXED>::new(accel, start, ray).run::<L>());
+            }
         }
     }
 }
@@ -88,16 +116,16 @@ struct Flights<'a, 'r, G, E> {
     accel: &'a Accel,
     start: &'a SingleStart,
     rays: &'r [Ray],
-    end: E,
+    ends: E,
     goal: PhantomData<G>,
 }
 
-impl<G: Goal, E: FnMut(usize, Outcome<G::Answer>)> Task for Flights<'_, '_, G, E> {
+impl<G: Goal, E: Ends<G::Answer>> Task for Flights<'_, '_, G, E> {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        let Self { accel, start, rays, mut end, .. } = self;
+        let Self { accel, start, rays, mut ends, .. } = self;
         let mut waiting = rays.iter().enumerate();
         let mut flights: Vec<Flight<G, L>> = Vec::with_capacity(IN_FLIGHT);
         while flights.len() < IN_FLIGHT
@@ -113,7 +141,7 @@ impl<G: Goal, E: FnMut(usize, Outcome<G::Answer>)> Task for Flights<'_, '_, G, E
                         stack: Stack::new(),
                     });
                 }
-                None => end(position, Outcome::Unsettled),
+                None => ends.put(position, Outcome::Unsettled),
             }
         }
         // Those that are under way stand first.
@@ -129,13 +157,13 @@ impl<G: Goal, E: FnMut(usize, Outcome<G::Answer>)> Task for Flights<'_, '_, G, E
                     turn += 1;
                     continue;
                 }
-                end(*position, G::answer(single, ray, step));
+                ends.put(*position, G::answer(single, ray, step));
                 // The next takes its place, where it stands.
                 let started = loop {
                     let Some((next, ray)) = waiting.next() else { break None };
                     match SingleRay::start(accel, start, ray) {
                         Some(single) => break Some((next, ray, single)),
-                        None => end(next, Outcome::Unsettled),
+                        None => ends.put(next, Outcome::Unsettled),
                     }
                 };
                 if let Some((next, next_ray, next_single)) = started {

@@ -19,6 +19,7 @@ mod morton;
 mod nearest;
 mod node;
 mod options;
+mod packet;
 mod parting;
 mod precise;
 mod prepare;

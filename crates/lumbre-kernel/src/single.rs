@@ -76,20 +76,20 @@ pub(crate) enum Step {
 
 /// A triangle by its place in the tree, or the crossing of something else, and the heights along the ray between which it is met.
 #[derive(Clone, Copy, Debug)]
-struct Candidate {
-    block: u32,
-    lane: u32,
-    from: f32,
-    to: f32,
+pub(crate) struct Candidate {
+    pub(crate) block: u32,
+    pub(crate) lane: u32,
+    pub(crate) from: f32,
+    pub(crate) to: f32,
 }
 
 impl Candidate {
-    const NONE: Self = Self { block: u32::MAX, lane: 0, from: f32::INFINITY, to: f32::INFINITY };
+    pub(crate) const NONE: Self = Self { block: u32::MAX, lane: 0, from: f32::INFINITY, to: f32::INFINITY };
     /// Of what is no triangle.
     const CROSSED: u32 = u32::MAX - 1;
 
     #[inline(always)]
-    fn is_some(&self) -> bool {
+    pub(crate) fn is_some(&self) -> bool {
         self.block != u32::MAX
     }
 
@@ -99,12 +99,96 @@ impl Candidate {
     }
 }
 
-/// A ray under way in a tree that [`SingleStart`] was made for, among what a selection takes.
-pub(crate) struct SingleRay<'a, L, S = All> {
+/// What is asked of a tree where single precision cannot decide.
+#[derive(Clone, Copy)]
+pub(crate) struct Exact<'a> {
     accel: &'a Accel,
     start: &'a SingleStart,
     // Those of the tree, which may lie in a file.
     triangles: &'a [TriangleBlock],
+}
+
+impl<'a> Exact<'a> {
+    #[inline(always)]
+    pub(crate) fn new(accel: &'a Accel, start: &'a SingleStart) -> Self {
+        Self { accel, start, triangles: &accel.tree.blocks }
+    }
+
+    /// Whether the ray passes by a triangle, or meets it out of its range, as far as that is seen at a glance.
+    #[inline(always)]
+    pub(crate) fn passes<L: Lanes>(&self, ray: &Ray, block: &TriangleBlock, lane: u32) -> bool {
+        let (shear, origin) = L::shear(ray, &self.start.mesh_origin);
+        match L::pass(block, lane as usize, &shear, &origin) {
+            (Passage::Outside, _) => true,
+            (Passage::Inside, inside) => !triangles::is_in_range(ray, inside.t(&shear)),
+            (Passage::Unclear, _) => false,
+        }
+    }
+
+    /// How the ray meets a triangle.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn meet(&self, ray: &Ray, block: u32, lane: u32) -> Meeting {
+        let shear = Shear::new(&ray.direction);
+        let origin = shear.local_origin(&ray.origin, &DVec3::from_slice(&self.start.mesh_origin));
+        let corners = shear.axes.gather(&self.triangles[block as usize], lane as usize);
+        triangles::intersect(ray, shear, origin, corners)
+    }
+
+    /// Geometry and primitive of a triangle.
+    #[inline(always)]
+    pub(crate) fn names(&self, block: u32, lane: u32) -> (u32, u32) {
+        let names = &self.accel.tree.names[block as usize];
+        (names.geometry, names.primitives[lane as usize % BLOCK])
+    }
+
+    /// Where the ray meets a triangle that it does meet, and geometry and primitive; `None` where the plain search has to answer.
+    #[inline(always)]
+    pub(crate) fn t_and_names(
+        &self,
+        ray: &Ray,
+        &Candidate { block, lane, .. }: &Candidate,
+    ) -> Option<(f64, (u32, u32))> {
+        match self.meet(ray, block, lane) {
+            Meeting::Hit { root, .. } => Some((root.t, self.names(block, lane))),
+            Meeting::Miss | Meeting::Touch { .. } => None,
+        }
+    }
+
+    /// A triangle that the ray does meet as the nearest hit; `None` where the plain search has to answer.
+    #[inline(always)]
+    pub(crate) fn winner<L: Lanes>(
+        &self,
+        ray: &Ray,
+        &Candidate { block, lane, .. }: &Candidate,
+    ) -> Option<Winner> {
+        let (shear, origin) = L::shear(ray, &self.start.mesh_origin);
+        let corners = &self.triangles[block as usize];
+        let (passage, inside) = L::pass(corners, lane as usize, &shear, &origin);
+        let root = if passage == Passage::Inside {
+            inside.root(inside.t(&shear))
+        } else {
+            match self.meet(ray, block, lane) {
+                Meeting::Hit { root, .. } => root,
+                Meeting::Miss | Meeting::Touch { .. } => return None,
+            }
+        };
+        let (geometry, primitive) = self.names(block, lane);
+        Some(Winner { root, geometry, primitive })
+    }
+}
+
+/// The heights between which a crossing in double precision lies, for a direction whose largest component has this length.
+#[inline(always)]
+pub(crate) fn heights(t: f64, length: f64) -> (f32, f32) {
+    let height = (t * length) as f32;
+    let error = height.abs() * triangles::ROUNDINGS + f32::MIN_POSITIVE;
+    (height - error, height + error)
+}
+
+/// A ray under way in a tree that [`SingleStart`] was made for, among what a selection takes.
+pub(crate) struct SingleRay<'a, L, S = All> {
+    exact: Exact<'a>,
     way: Way<'a, L>,
     blocks: BlockRay,
     /// From heights to places in the range of boxes.
@@ -138,11 +222,11 @@ impl<'a, L: Lanes, S: Selection> SingleRay<'a, L, S> {
         selection: S,
     ) -> Self {
         let (blocks, place_per_height) = L::start_blocks(start, ray, way.slabs());
-        let triangles = &accel.tree.blocks;
+        let exact = Exact::new(accel, start);
         let crossed = Winner { root: Root::at(f64::INFINITY), geometry: 0, primitive: 0 };
         let best = Candidate::NONE;
         let length = ray.direction.abs().max_element();
-        Self { accel, start, triangles, way, blocks, place_per_height, length, best, crossed, selection }
+        Self { exact, way, blocks, place_per_height, length, best, crossed, selection }
     }
 
     /// Goes on from a node or a leaf.
@@ -170,7 +254,7 @@ impl<'a, L: Lanes, S: Selection> SingleRay<'a, L, S> {
     /// Tests a leaf of what is no triangle.
     #[inline(always)]
     fn meet_entries<G: Goal>(&mut self, leaf: u32, ray: &Ray) -> Option<Step> {
-        for entry in &self.accel.tree.entries[(leaf & tag::PLACE) as usize..] {
+        for entry in &self.exact.accel.tree.entries[(leaf & tag::PLACE) as usize..] {
             let end = G::meet_entry(self, entry, ray);
             if end.is_some() || entry.is_last() {
                 return end;
@@ -192,14 +276,14 @@ impl<'a, L: Lanes, S: Selection> SingleRay<'a, L, S> {
             Faces::Back => mask & !(crossings.sure & L::fronts(edges)),
         };
         // Names stand elsewhere, and most blocks have nothing left to be asked about.
-        if mask == 0 { 0 } else { mask & self.selection.lanes(&self.accel.tree.names[block as usize]) }
+        if mask == 0 { 0 } else { mask & self.selection.lanes(&self.exact.accel.tree.names[block as usize]) }
     }
 
     /// Tests a leaf of triangles for the nearest hit; false where the plain search has to answer.
     #[inline(always)]
     fn meet_leaf_closest(&mut self, leaf: u32, ray: &Ray) -> bool {
         let places = tag::blocks(leaf);
-        for (number, block) in (places.start as u32..).zip(&self.triangles[places]) {
+        for (number, block) in (places.start as u32..).zip(&self.exact.triangles[places]) {
             let (mask, edges) = L::meet_triangles(block, lanes::opaque(&self.blocks));
             if mask != 0 {
                 let crossings = L::place_crossings(&edges, &self.blocks);
@@ -212,7 +296,7 @@ impl<'a, L: Lanes, S: Selection> SingleRay<'a, L, S> {
                     let (from, to) = crossings.between::<L>(lane as usize);
                     if is_sure && to < self.best.from {
                         self.keep(Candidate { block: number, lane, from, to });
-                    } else if from > self.best.to || self.passes(ray, block, lane) {
+                    } else if from > self.best.to || self.exact.passes::<L>(ray, block, lane) {
                         // Farther, which what is no number is not; or not met at all.
                         continue;
                     } else {
@@ -236,22 +320,11 @@ impl<'a, L: Lanes, S: Selection> SingleRay<'a, L, S> {
         self.way.end_at(place + place.abs() * triangles::ROUNDINGS + f32::MIN_POSITIVE);
     }
 
-    /// Whether the ray passes by a triangle, or meets it out of its range, as far as that is seen at a glance.
-    #[inline(always)]
-    fn passes(&self, ray: &Ray, block: &TriangleBlock, lane: u32) -> bool {
-        let (shear, origin) = L::shear(ray, &self.start.mesh_origin);
-        match L::pass(block, lane as usize, &shear, &origin) {
-            (Passage::Outside, _) => true,
-            (Passage::Inside, inside) => !triangles::is_in_range(ray, inside.t(&shear)),
-            (Passage::Unclear, _) => false,
-        }
-    }
-
     /// Looks closer at a triangle that may be met, and nearer than the best: what is better, if anything.
     #[cold]
     #[inline(never)]
     fn contest(&self, ray: &Ray, block: u32, lane: u32) -> Outcome<Option<Candidate>> {
-        let found = match self.meet_exactly(ray, block, lane) {
+        let found = match self.exact.meet(ray, block, lane) {
             Meeting::Miss => return Outcome::Settled(None),
             Meeting::Touch { .. } => return Outcome::Unsettled,
             Meeting::Hit { is_front, .. } if !self.selection.faces().have(is_front) => {
@@ -259,29 +332,14 @@ impl<'a, L: Lanes, S: Selection> SingleRay<'a, L, S> {
             }
             Meeting::Hit { root, .. } => root.t,
         };
-        let names = self.names(block, lane);
+        let names = self.exact.names(block, lane);
         match self.is_better(ray, found, names) {
             Outcome::Settled(false) => return Outcome::Settled(None),
             Outcome::Settled(true) => {}
             Outcome::Unsettled => return Outcome::Unsettled,
         }
-        let (from, to) = self.heights(found);
+        let (from, to) = heights(found, self.length);
         Outcome::Settled(Some(Candidate { block, lane, from, to }))
-    }
-
-    /// The heights between which a crossing in double precision lies.
-    #[inline(always)]
-    fn heights(&self, t: f64) -> (f32, f32) {
-        let height = (t * self.length) as f32;
-        let error = height.abs() * triangles::ROUNDINGS + f32::MIN_POSITIVE;
-        (height - error, height + error)
-    }
-
-    /// Geometry and primitive of a triangle.
-    #[inline(always)]
-    fn names(&self, block: u32, lane: u32) -> (u32, u32) {
-        let names = &self.accel.tree.names[block as usize];
-        (names.geometry, names.primitives[lane as usize % BLOCK])
     }
 
     /// Whether a crossing is nearer than the best, or as near and before it.
@@ -289,12 +347,11 @@ impl<'a, L: Lanes, S: Selection> SingleRay<'a, L, S> {
         if !self.best.is_some() {
             return Outcome::Settled(true);
         }
-        let Candidate { block, lane, .. } = self.best;
         let (best, best_names) = if self.best.is_triangle() {
-            let Meeting::Hit { root, .. } = self.meet_exactly(ray, block, lane) else {
-                return Outcome::Unsettled;
-            };
-            (root.t, self.names(block, lane))
+            match self.exact.t_and_names(ray, &self.best) {
+                Some(best) => best,
+                None => return Outcome::Unsettled,
+            }
         } else {
             (self.crossed.root.t, (self.crossed.geometry, self.crossed.primitive))
         };
@@ -316,7 +373,7 @@ impl<'a, L: Lanes, S: Selection> SingleRay<'a, L, S> {
             }
             return true;
         }
-        let kind = &self.accel.geometries[geometry as usize].kind;
+        let kind = &self.exact.accel.geometries[geometry as usize].kind;
         match traverse::first_crossing(kind, primitive, ray) {
             Some(root) => self.meet_root(root, geometry, primitive, ray),
             None => true,
@@ -327,10 +384,10 @@ impl<'a, L: Lanes, S: Selection> SingleRay<'a, L, S> {
     #[inline(never)]
     fn crossings_of_faces(&self, geometry: u32, primitive: u32, ray: &Ray) -> Roots {
         let (what, faces) = (What::Named { geometry, primitive }, self.selection.faces());
-        let kind = &self.accel.geometries[geometry as usize].kind;
+        let kind = &self.exact.accel.geometries[geometry as usize].kind;
         let mut roots = traverse::all_crossings(kind, primitive, ray);
         roots.retain(|root| {
-            ray.contains(root.t) && faces.have(options::meets_front(self.accel, ray, what, root))
+            ray.contains(root.t) && faces.have(options::meets_front(self.exact.accel, ray, what, root))
         });
         roots
     }
@@ -338,7 +395,7 @@ impl<'a, L: Lanes, S: Selection> SingleRay<'a, L, S> {
     /// Takes a crossing of what is no triangle, if it is the nearest; false where the plain search has to answer.
     #[inline(always)]
     fn meet_root(&mut self, root: Root, geometry: u32, primitive: u32, ray: &Ray) -> bool {
-        let (from, to) = self.heights(root.t);
+        let (from, to) = heights(root.t, self.length);
         // Also keeps out a NaN.
         if !ray.contains(root.t) || from > self.best.to {
             return true;
@@ -368,23 +425,14 @@ impl<'a, L: Lanes, S: Selection> SingleRay<'a, L, S> {
         if self.selection.faces() != Faces::Both {
             return !self.crossings_of_faces(geometry, primitive, ray).is_empty();
         }
-        traverse::is_crossed(&self.accel.geometries[geometry as usize].kind, primitive, ray)
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn meet_exactly(&self, ray: &Ray, block: u32, lane: u32) -> Meeting {
-        let shear = Shear::new(&ray.direction);
-        let origin = shear.local_origin(&ray.origin, &DVec3::from_slice(&self.start.mesh_origin));
-        let corners = shear.axes.gather(&self.triangles[block as usize], lane as usize);
-        triangles::intersect(ray, shear, origin, corners)
+        traverse::is_crossed(&self.exact.accel.geometries[geometry as usize].kind, primitive, ray)
     }
 
     /// Tests a leaf for any hit: whether there is one.
     #[inline(always)]
     fn meet_leaf_any(&self, leaf: u32, ray: &Ray) -> Outcome<bool> {
         let places = tag::blocks(leaf);
-        for (number, block) in (places.start as u32..).zip(&self.triangles[places]) {
+        for (number, block) in (places.start as u32..).zip(&self.exact.triangles[places]) {
             let (mask, edges) = L::meet_triangles(block, lanes::opaque(&self.blocks));
             if mask != 0 {
                 let crossings = L::place_crossings(&edges, &self.blocks);
@@ -396,10 +444,10 @@ impl<'a, L: Lanes, S: Selection> SingleRay<'a, L, S> {
                 while rest != 0 {
                     let lane = rest.trailing_zeros();
                     rest &= rest - 1;
-                    if self.passes(ray, block, lane) {
+                    if self.exact.passes::<L>(ray, block, lane) {
                         continue;
                     }
-                    match self.meet_exactly(ray, number, lane) {
+                    match self.exact.meet(ray, number, lane) {
                         Meeting::Miss => {}
                         Meeting::Hit { is_front, .. } => {
                             if self.selection.faces().have(is_front) {
@@ -423,28 +471,9 @@ impl<'a, L: Lanes, S: Selection> SingleRay<'a, L, S> {
         if !self.best.is_triangle() {
             return Outcome::Settled(Some(self.crossed));
         }
-        let Candidate { block, lane, .. } = self.best;
-        let (shear, origin) = L::shear(ray, &self.start.mesh_origin);
-        let corners = &self.triangles[block as usize];
-        let (passage, inside) = L::pass(corners, lane as usize, &shear, &origin);
-        let root = if passage == Passage::Inside {
-            inside.root(inside.t(&shear))
-        } else {
-            match self.root_of_unclear(ray, block, lane) {
-                Some(root) => root,
-                None => return Outcome::Unsettled,
-            }
-        };
-        let (geometry, primitive) = self.names(block, lane);
-        Outcome::Settled(Some(Winner { root, geometry, primitive }))
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn root_of_unclear(&self, ray: &Ray, block: u32, lane: u32) -> Option<Root> {
-        match self.meet_exactly(ray, block, lane) {
-            Meeting::Hit { root, .. } => Some(root),
-            Meeting::Miss | Meeting::Touch { .. } => None,
+        match self.exact.winner::<L>(ray, &self.best) {
+            Some(winner) => Outcome::Settled(Some(winner)),
+            None => Outcome::Unsettled,
         }
     }
 
@@ -454,7 +483,7 @@ impl<'a, L: Lanes, S: Selection> SingleRay<'a, L, S> {
         if reference >> tag::SHIFT == tag::INNER {
             self.way.fetch(reference);
         } else {
-            self.triangles.get(tag::blocks(reference).start).map(lanes::fetch);
+            self.exact.triangles.get(tag::blocks(reference).start).map(lanes::fetch);
         }
     }
 }
@@ -467,6 +496,8 @@ pub(crate) trait Goal {
     type Answer;
     /// The answer where nothing comes near.
     const NOTHING: Self::Answer;
+    /// Whether any hit will do.
+    const IS_ANY: bool;
 
     /// Tests a leaf of triangles; how the search ends, if it does.
     fn meet_triangles<L: Lanes, S: Selection>(
@@ -488,6 +519,14 @@ pub(crate) trait Goal {
         ray: &Ray,
         last: Step,
     ) -> Outcome<Self::Answer>;
+
+    /// What came of a ray that went with others: the nearest triangle, or whether one was met.
+    fn answer_together<L: Lanes>(
+        exact: &Exact,
+        ray: &Ray,
+        best: &Candidate,
+        is_met: bool,
+    ) -> Outcome<Self::Answer>;
 }
 
 /// The nearest hit.
@@ -497,6 +536,7 @@ impl Goal for Nearest {
     type Order = ByDistance;
     type Answer = Option<Winner>;
     const NOTHING: Option<Winner> = None;
+    const IS_ANY: bool = false;
 
     #[inline(always)]
     fn meet_triangles<L: Lanes, S: Selection>(
@@ -524,6 +564,22 @@ impl Goal for Nearest {
     ) -> Outcome<Option<Winner>> {
         if last == Step::Unsettled { Outcome::Unsettled } else { single.winner(ray) }
     }
+
+    #[inline(always)]
+    fn answer_together<L: Lanes>(
+        exact: &Exact,
+        ray: &Ray,
+        best: &Candidate,
+        _: bool,
+    ) -> Outcome<Option<Winner>> {
+        if !best.is_some() {
+            return Outcome::Settled(None);
+        }
+        match exact.winner::<L>(ray, best) {
+            Some(winner) => Outcome::Settled(Some(winner)),
+            None => Outcome::Unsettled,
+        }
+    }
 }
 
 /// Whether there is any hit.
@@ -533,6 +589,7 @@ impl Goal for Whether {
     type Order = AsBuilt;
     type Answer = bool;
     const NOTHING: bool = false;
+    const IS_ANY: bool = true;
 
     #[inline(always)]
     fn meet_triangles<L: Lanes, S: Selection>(
@@ -559,6 +616,11 @@ impl Goal for Whether {
     #[inline(always)]
     fn answer<L: Lanes, S: Selection>(_: &SingleRay<L, S>, _: &Ray, last: Step) -> Outcome<bool> {
         if last == Step::Unsettled { Outcome::Unsettled } else { Outcome::Settled(last == Step::Met) }
+    }
+
+    #[inline(always)]
+    fn answer_together<L: Lanes>(_: &Exact, _: &Ray, _: &Candidate, is_met: bool) -> Outcome<bool> {
+        Outcome::Settled(is_met)
     }
 }
 

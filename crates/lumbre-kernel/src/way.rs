@@ -76,7 +76,8 @@ impl<'a, L: Lanes> Way<'a, L> {
     }
 }
 
+/// No entry of a stack that is larger is of interest to what ends here.
 #[inline(always)]
-fn limit_of(s_max: f32) -> i64 {
+pub(crate) fn limit_of(s_max: f32) -> i64 {
     stack_entry(s_max.to_bits() as i32 | LANE_BITS, u32::MAX)
 }

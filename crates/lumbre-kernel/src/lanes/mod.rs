@@ -7,6 +7,7 @@
 
 mod portable;
 mod spheres;
+mod wide;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
@@ -17,12 +18,14 @@ use lumbre_math::DVec3;
 
 use crate::holds::SingleStart;
 use crate::node::{BoxRay, Node, Slabs, Units, WIDTH};
+use crate::packet::Frustum;
 use crate::stack::STACK;
 use crate::triangles::{BLOCK, BlockRay, Inside, Passage, ROUNDINGS, Shear, TriangleBlock};
 
 pub(crate) use spheres::SphereLanes;
 #[cfg(test)]
 pub(crate) use spheres::meet_spheres_at;
+pub(crate) use wide::{Row, WIDE, Wide};
 
 /// What a search does eight at a time: boxes, and triangles.
 pub(crate) trait Lanes: SphereLanes {
@@ -32,6 +35,8 @@ pub(crate) trait Lanes: SphereLanes {
     type Floats: Copy;
     /// How a line passes the edges of eight triangles.
     type Edges: Copy;
+    /// Sixteen numbers.
+    type Wide: Wide;
 
     /// Makes `boxes` the ray from `t_min` to `t_max` for a tree in these units, if it is one from nearby, which it answers;
     /// also checks that it is sound.
@@ -43,8 +48,14 @@ pub(crate) trait Lanes: SphereLanes {
     /// The same ray for triangles, and from heights along it to places in the range of boxes.
     fn start_blocks(start: &SingleStart, ray: &Ray, slabs: &Slabs) -> (BlockRay, f32);
 
+    /// The numbers of rays, side by side: origin, direction and range.
+    fn columns(rays: &[Ray; WIDE]) -> [Row<f64>; 8];
+
     /// One bit for each child whose box the ray meets, and where it enters.
     fn meet_boxes(node: &Node, ray: &Slabs) -> (u32, Self::Keys);
+
+    /// The same of rays together: among them all that one of them meets, and no later than it enters.
+    fn meet_frustum(node: &Node, frustum: &Frustum) -> (u32, Self::Keys);
 
     /// The child of which `mask` has the bit: no more than one.
     fn only_child(node: &Node, mask: u32) -> u32;
@@ -206,6 +217,12 @@ impl Axes {
             all
         };
         &ALL[(((sizes % 8) << 3) | (signs % 8)) as usize]
+    }
+
+    /// What they are in it.
+    #[inline(always)]
+    pub(crate) fn order(&self) -> [usize; 3] {
+        [self.order[0] as usize % 3, self.order[1] as usize % 3, self.order[2] as usize % 3]
     }
 
     /// A vector's components in this order.

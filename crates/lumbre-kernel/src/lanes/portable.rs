@@ -5,9 +5,10 @@ use std::mem::MaybeUninit;
 use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
 
-use super::{Axes, Crossings, LANE_BITS, Lanes, Sides, Slots};
+use super::{Axes, Crossings, LANE_BITS, Lanes, Row, Sides, Slots, WIDE};
 use crate::holds::SingleStart;
 use crate::node::{BoxRay, END_FACTOR, LITTLE, Node, START_FACTOR, Slabs, Units, WIDTH};
+use crate::packet::Frustum;
 use crate::stack::stack_entry;
 use crate::triangles::{
     BLOCK, BlockRay, EDGE_ERROR, HEIGHT_ERROR, HeightRange, Inside, Passage, SIZE_ERROR, Shear, TINY,
@@ -40,10 +41,24 @@ fn single_direction(ray: &Ray) -> [f32; 4] {
     [x, y, z, 0.0]
 }
 
+/// Which boxes are met, and the keys of where they are entered.
+#[inline(always)]
+fn met(enter: &[f32; WIDTH], leave: &[f32; WIDTH]) -> (u32, [i32; WIDTH]) {
+    let mut mask = 0;
+    let mut keys = [0; WIDTH];
+    for lane in 0..WIDTH {
+        mask |= u32::from(enter[lane] <= leave[lane]) << lane;
+        // Never negative, so that the bits have the order of the numbers.
+        keys[lane] = enter[lane].to_bits() as i32 & !LANE_BITS | lane as i32;
+    }
+    (mask, keys)
+}
+
 impl Lanes for Portable {
     type Keys = [i32; WIDTH];
     type Floats = [f32; BLOCK];
     type Edges = Edges;
+    type Wide = super::wide::Portable16;
 
     #[inline(always)]
     fn start_nearby(units: &Units, ray: &Ray, t_min: f64, t_max: f64, boxes: &mut BoxRay) -> bool {
@@ -108,6 +123,19 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
+    fn columns(rays: &[Ray; WIDE]) -> [Row<f64>; 8] {
+        let mut columns = [Row::of(0.0); 8];
+        for (i, ray) in rays.iter().enumerate() {
+            for axis in 0..3 {
+                columns[axis].0[i] = ray.origin[axis];
+                columns[3 + axis].0[i] = ray.direction[axis];
+            }
+            (columns[6].0[i], columns[7].0[i]) = (ray.t_min, ray.t_max);
+        }
+        columns
+    }
+
+    #[inline(always)]
     fn meet_boxes(node: &Node, ray: &Slabs) -> (u32, [i32; WIDTH]) {
         let mut enter = [ray.s_min; WIDTH];
         let mut leave = [ray.s_max; WIDTH];
@@ -122,14 +150,28 @@ impl Lanes for Portable {
                 leave[lane] = if last < leave[lane] { last } else { leave[lane] };
             }
         }
-        let mut mask = 0;
-        let mut keys = [0; WIDTH];
-        for lane in 0..WIDTH {
-            mask |= u32::from(enter[lane] <= leave[lane]) << lane;
-            // Never negative, so that the bits have the order of the numbers.
-            keys[lane] = enter[lane].to_bits() as i32 & !LANE_BITS | lane as i32;
+        met(&enter, &leave)
+    }
+
+    #[inline(always)]
+    fn meet_frustum(node: &Node, frustum: &Frustum) -> (u32, [i32; WIDTH]) {
+        let mut enter = [frustum.s_min; WIDTH];
+        let mut leave = [frustum.s_max; WIDTH];
+        let planes = node.planes.as_flattened();
+        for axis in 0..3 {
+            let near = frustum.sides.near[axis];
+            let (near_planes, far_planes) = (&planes[near..][..WIDTH], &planes[near ^ WIDTH..][..WIDTH]);
+            let (least, most) = (frustum.least_inverse[axis], frustum.most_inverse[axis]);
+            for lane in 0..WIDTH {
+                let (near, far) =
+                    (near_planes[lane] - frustum.center[axis], far_planes[lane] - frustum.center[axis]);
+                let first = (near * least).min(near * most) + frustum.near_offset[axis];
+                let last = (far * least).max(far * most) + frustum.far_offset[axis];
+                enter[lane] = if first > enter[lane] { first } else { enter[lane] };
+                leave[lane] = if last < leave[lane] { last } else { leave[lane] };
+            }
         }
-        (mask, keys)
+        met(&enter, &leave)
     }
 
     #[inline(always)]

@@ -5,12 +5,13 @@ use std::mem::{MaybeUninit, offset_of};
 
 use lumbre_geometry::Ray;
 
-use super::{Axes, Crossings, LANE_BITS, Lanes, Sides, Slots, Task};
+use super::{Axes, Crossings, LANE_BITS, Lanes, Row, Sides, Slots, Task, WIDE, Wide, wide};
 use crate::holds::SingleStart;
 use crate::node::{
     BoxRay, END_FACTOR, LARGEST_NEAR, LITTLE, Node, SMALLEST_NEAR, START_FACTOR, Slabs, TINY_NEAR, Units,
     WIDTH,
 };
+use crate::packet::Frustum;
 use crate::stack::stack_entry;
 use crate::triangles::{
     BLOCK, BlockRay, EDGE_ERROR, FAR, HEIGHT_ERROR, HeightRange, Inside, Passage, ROUNDINGS, SIZE_ERROR,
@@ -93,6 +94,20 @@ impl<const AVX512: bool> X86<AVX512> {
             } else {
                 let either = _mm256_or_ps(_mm256_cmp_ps::<A>(a[0], a[1]), _mm256_cmp_ps::<B>(b[0], b[1]));
                 _mm256_movemask_ps(either) as u32
+            }
+        }
+    }
+
+    /// A bit for each lane in which the first is no larger than the second.
+    #[inline(always)]
+    fn no_later(a: __m256i, b: __m256i) -> u32 {
+        // SAFETY: see `X86`.
+        unsafe {
+            if AVX512 {
+                u32::from(_mm256_cmple_epi32_mask(a, b))
+            } else {
+                let later = _mm256_cmpgt_epi32(a, b);
+                _mm256_movemask_ps(_mm256_castsi256_ps(later)) as u32 ^ 0xff
             }
         }
     }
@@ -185,10 +200,27 @@ pub(crate) struct Edges {
     height_error: __m256,
 }
 
-impl<const AVX512: bool> Lanes for X86<AVX512> {
+/// Which sixteen numbers go with which level.
+pub(crate) trait HasWide {
+    type Wide: Wide;
+}
+
+impl HasWide for X86<true> {
+    type Wide = wide::Avx512;
+}
+
+impl HasWide for X86<false> {
+    type Wide = wide::Avx2;
+}
+
+impl<const AVX512: bool> Lanes for X86<AVX512>
+where
+    Self: HasWide,
+{
     type Keys = __m256i;
     type Floats = __m256;
     type Edges = Edges;
+    type Wide = <Self as HasWide>::Wide;
 
     #[inline(always)]
     fn start_nearby(units: &Units, ray: &Ray, t_min: f64, t_max: f64, boxes: &mut BoxRay) -> bool {
@@ -333,6 +365,36 @@ impl<const AVX512: bool> Lanes for X86<AVX512> {
     }
 
     #[inline(always)]
+    fn columns(rays: &[Ray; WIDE]) -> [Row<f64>; 8] {
+        let mut columns = [Row::of(0.0); 8];
+        for four in 0..WIDE / 4 {
+            for half in 0..2 {
+                let at = |i: usize| Self::numbers(&rays[4 * four + i]).wrapping_add(4 * half);
+                let (a, b, c, d) = (at(0), at(1), at(2), at(3));
+                let columns = &mut columns[4 * half..][..4];
+                // SAFETY: see `X86`. The loads are of the first or the last four of the eight numbers of a ray, see above; the
+                // stores of four f64 from a multiple of four below sixteen on, into arrays of sixteen.
+                unsafe {
+                    let (a, b) = (_mm256_loadu_pd(a), _mm256_loadu_pd(b));
+                    let (c, d) = (_mm256_loadu_pd(c), _mm256_loadu_pd(d));
+                    let (even, odd) = (_mm256_unpacklo_pd(a, b), _mm256_unpackhi_pd(a, b));
+                    let (more_even, more_odd) = (_mm256_unpacklo_pd(c, d), _mm256_unpackhi_pd(c, d));
+                    let of_four = [
+                        _mm256_permute2f128_pd::<0x20>(even, more_even),
+                        _mm256_permute2f128_pd::<0x20>(odd, more_odd),
+                        _mm256_permute2f128_pd::<0x31>(even, more_even),
+                        _mm256_permute2f128_pd::<0x31>(odd, more_odd),
+                    ];
+                    for (column, of_four) in columns.iter_mut().zip(of_four) {
+                        _mm256_storeu_pd(column.0.as_mut_ptr().add(4 * four), of_four);
+                    }
+                }
+            }
+        }
+        columns
+    }
+
+    #[inline(always)]
     fn meet_boxes(node: &Node, ray: &Slabs) -> (u32, __m256i) {
         let planes = node.planes.as_flattened().as_ptr();
         let near = ray.sides.near;
@@ -354,13 +416,32 @@ impl<const AVX512: bool> Lanes for X86<AVX512> {
                 _mm256_min_epi32(far_x, far_y),
                 _mm256_min_epi32(far_z, _mm256_set1_epi32(ray.s_max.to_bits() as i32)),
             );
-            let mask = if AVX512 {
-                u32::from(_mm256_cmple_epi32_mask(enter, leave))
-            } else {
-                let missed = _mm256_cmpgt_epi32(enter, leave);
-                _mm256_movemask_ps(_mm256_castsi256_ps(missed)) as u32 ^ 0xff
-            };
-            (mask, enter)
+            (Self::no_later(enter, leave), enter)
+        }
+    }
+
+    #[inline(always)]
+    fn meet_frustum(node: &Node, frustum: &Frustum) -> (u32, __m256i) {
+        let planes = node.planes.as_flattened().as_ptr();
+        // SAFETY: see `X86`. The loads are of eight f32 from a multiple of eight below 48 on, in an array of 48.
+        unsafe {
+            let mut enter = _mm256_set1_epi32(frustum.s_min.to_bits() as i32);
+            let mut leave = _mm256_set1_epi32(frustum.s_max.to_bits() as i32);
+            for (axis, near) in frustum.sides.near.into_iter().enumerate() {
+                let center = _mm256_set1_ps(frustum.center[axis]);
+                let (least, most) =
+                    (_mm256_set1_ps(frustum.least_inverse[axis]), _mm256_set1_ps(frustum.most_inverse[axis]));
+                let first = _mm256_sub_ps(_mm256_loadu_ps(planes.add(near)), center);
+                let last = _mm256_sub_ps(_mm256_loadu_ps(planes.add(near ^ WIDTH)), center);
+                let first = _mm256_min_ps(_mm256_mul_ps(first, least), _mm256_mul_ps(first, most));
+                let last = _mm256_max_ps(_mm256_mul_ps(last, least), _mm256_mul_ps(last, most));
+                let first = _mm256_add_ps(first, _mm256_set1_ps(frustum.near_offset[axis]));
+                let last = _mm256_add_ps(last, _mm256_set1_ps(frustum.far_offset[axis]));
+                // By the bits: see above.
+                enter = _mm256_max_epi32(enter, _mm256_castps_si256(first));
+                leave = _mm256_min_epi32(leave, _mm256_castps_si256(last));
+            }
+            (Self::no_later(enter, leave), enter)
         }
     }
 

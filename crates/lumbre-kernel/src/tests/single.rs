@@ -3,10 +3,11 @@
 use std::sync::Arc;
 
 use lumbre_geometry::{PlacedShape, Plane, Ray};
-use lumbre_math::{DVec3, Transform, Vec3};
+use lumbre_math::{DVec3, Transform};
 
 use super::scenes::{self, Random};
 use crate::lanes::Level;
+use crate::packet::{self, PACKET};
 use crate::single::{self, Nearest, Outcome, Whether};
 use crate::{
     Accel, BuildOptions, Faces, Geometry, GeometryKind, Hit, Preset, QueryOptions, TriangleMesh, batch,
@@ -43,21 +44,31 @@ fn mesh(random: &mut Random, origin: DVec3, size: f64) -> TriangleMesh {
     mesh
 }
 
-/// A ray at something of the mesh: often at an edge or a corner, and from a place on another triangle; its range often ends
-/// where it meets something.
+/// A place on a triangle, often on an edge or a corner.
+fn place(random: &mut Random, mesh: &TriangleMesh, triangle: usize) -> DVec3 {
+    let [a, b, c] = mesh.indices[triangle].map(|i| mesh.positions[i as usize].as_dvec3());
+    match random.below(5) {
+        0 => a,
+        1 => a.lerp(b, [0.5, random.unit()][random.below(2)]),
+        _ => {
+            let (u, v) = (random.unit(), random.unit());
+            let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+            a + u * (b - a) + v * (c - a)
+        }
+    }
+}
+
+/// Ranges that often end where a ray meets something.
+fn range(random: &mut Random) -> (f64, f64) {
+    let range = [(0.0, f64::INFINITY), (0.0, 1.0), (1e-6, 1.0 - 1e-6), (0.5, 2.0), (1.0, 1.0), (-1.0, 1.0)];
+    range[random.below(range.len())]
+}
+
+/// A ray at something of the mesh, and from a place on another triangle.
 fn ray(random: &mut Random, mesh: &TriangleMesh, size: f64) -> Ray {
     let place = |random: &mut Random| {
-        let corners = mesh.indices[random.below(mesh.indices.len())].map(|i| mesh.positions[i as usize]);
-        let [a, b, c] = corners.map(Vec3::as_dvec3);
-        match random.below(5) {
-            0 => a,
-            1 => a.lerp(b, [0.5, random.unit()][random.below(2)]),
-            _ => {
-                let (u, v) = (random.unit(), random.unit());
-                let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
-                a + u * (b - a) + v * (c - a)
-            }
-        }
+        let triangle = random.below(mesh.indices.len());
+        place(random, mesh, triangle)
     };
     let target = place(random);
     let start = if random.unit() < 0.4 { place(random) } else { 3.0 * size * random.vector() };
@@ -65,9 +76,24 @@ fn ray(random: &mut Random, mesh: &TriangleMesh, size: f64) -> Ray {
     if random.unit() < 0.1 {
         direction = [DVec3::X, -DVec3::Y, DVec3::Z][random.below(3)] * size;
     }
-    let range = [(0.0, f64::INFINITY), (0.0, 1.0), (1e-6, 1.0 - 1e-6), (0.5, 2.0), (1.0, 1.0), (-1.0, 1.0)];
-    let (t_min, t_max) = range[random.below(range.len())];
+    let (t_min, t_max) = range(random);
     Ray::new(mesh.origin + start, direction).with_range(t_min, t_max)
+}
+
+/// Rays at neighbours, from one place or some that are near to each other, or from the very triangles.
+fn alike(random: &mut Random, mesh: &TriangleMesh, size: f64) -> [Ray; PACKET] {
+    let first = random.below(mesh.indices.len() - PACKET);
+    let eye = 3.0 * size * random.vector();
+    let (apart, kind) = ([0.0, 1e-6, 0.1][random.below(3)] * size, random.below(4));
+    let spread = [1.0, 0.1][random.below(2)];
+    std::array::from_fn(|i| {
+        let near = place(random, mesh, first + i);
+        let target = eye + spread * (near - eye);
+        let from = eye + apart * random.vector();
+        let (t_min, t_max) = if kind == 0 { (0.0, f64::INFINITY) } else { range(random) };
+        let (from, target) = if kind == 1 { (target, from) } else { (from, target) };
+        Ray::new(mesh.origin + from, target - from).with_range(t_min.max(0.0), t_max)
+    })
 }
 
 /// Every search of a tree beside the plain one, which answers with the same bits.
@@ -116,6 +142,61 @@ fn single_precision_answers_with_the_bits_of_double_precision() {
             let accel = Accel::build(list, &BuildOptions { preset }).unwrap();
             let rays: Vec<_> = (0..6_000).map(|i| ray(&mut random, &meshes[i % 2], size)).collect();
             check(&accel, &rays, 1_500);
+        }
+    }
+}
+
+#[test]
+fn rays_that_go_together_are_answered_as_each_alone() {
+    let mut random = Random(94);
+    for (size, offset) in SIZES_AND_OFFSETS {
+        let origin = size * offset * DVec3::new(1.0, -0.7, 0.4);
+        let meshes = [mesh(&mut random, origin, size), mesh(&mut random, origin, 0.7 * size)];
+        for preset in Preset::ALL {
+            let kinds = meshes.iter().map(|mesh| GeometryKind::Mesh(mesh.clone().into()));
+            let list = kinds.zip(5..).map(|(kind, id)| Geometry { id, kind }).collect();
+            let accel = Accel::build(list, &BuildOptions { preset }).unwrap();
+            let packets: Vec<_> = (0..500).map(|i| alike(&mut random, &meshes[i % 2], size)).collect();
+            let start = accel.single.as_ref().expect("made for this");
+            let together =
+                packets.iter().filter(|packet| packet::are_alike(accel.level, start, packet)).count();
+            assert!(together > 60, "{together}");
+            check(&accel, packets.as_flattened(), 1_500);
+        }
+    }
+}
+
+#[test]
+fn rays_that_are_not_sound_do_not_go_together() {
+    let mut random = Random(96);
+    let mesh = mesh(&mut random, DVec3::ZERO, 1.0);
+    let list = vec![Geometry { id: 1, kind: GeometryKind::Mesh(mesh.into()) }];
+    let accel = Accel::build(list, &BuildOptions::default()).unwrap();
+    let start = accel.single.as_ref().expect("made for this");
+    let sound = Ray::new(DVec3::new(0.1, 3.0, 0.2), DVec3::new(0.01, -1.0, 0.02));
+    let packet = [sound; PACKET];
+    let (nan, infinity) = (f64::NAN, f64::INFINITY);
+    let others = [
+        Ray { origin: DVec3::new(0.1, nan, 0.2), ..sound },
+        Ray { origin: DVec3::new(0.1, infinity, 0.2), ..sound },
+        Ray { direction: DVec3::new(nan, -1.0, 0.02), ..sound },
+        Ray { direction: DVec3::new(0.01, -infinity, 0.02), ..sound },
+        Ray { direction: DVec3::new(0.0, -0.0, 0.0), ..sound },
+        Ray { direction: DVec3::new(0.01, 1.0, 0.02), ..sound },
+        Ray { t_min: nan, ..sound },
+        Ray { t_min: -1.0, ..sound },
+        Ray { t_max: nan, ..sound },
+        Ray { t_min: 2.0, t_max: 1.0, ..sound },
+        Ray { origin: DVec3::new(0.1, 3e9, 0.2), ..sound },
+    ];
+    for level in Level::all() {
+        assert!(packet::are_alike(level, start, &packet));
+        for (number, other) in others.iter().enumerate() {
+            for place in 0..PACKET {
+                let mut packet = packet;
+                packet[place] = *other;
+                assert!(!packet::are_alike(level, start, &packet), "{level:?} {number} {place}");
+            }
         }
     }
 }

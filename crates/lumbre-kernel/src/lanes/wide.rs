@@ -1,0 +1,558 @@
+//! Sixteen numbers at once: those of as many rays.
+
+use std::ops::{Add, Mul, Sub};
+
+/// How many they are.
+pub(crate) const WIDE: usize = 16;
+
+/// An array that can be loaded at once.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C, align(64))]
+pub(crate) struct Row<T>(pub(crate) [T; WIDE]);
+
+impl<T: Copy> Row<T> {
+    #[inline(always)]
+    pub(crate) const fn of(value: T) -> Self {
+        Self([value; WIDE])
+    }
+}
+
+/// Sixteen numbers. A mask has a bit for each; comparisons with a NaN are false.
+pub(crate) trait Wide: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
+    /// All the same.
+    fn splat(value: f32) -> Self;
+    fn load(row: &Row<f32>) -> Self;
+    /// Eight, and the same again.
+    fn load_twice(row: &[f32; 8]) -> Self;
+    fn store(self, row: &mut Row<f32>);
+    /// Rounded.
+    fn rounded(row: &Row<f64>) -> Self;
+    /// `self * factor + summand`, rounded once or twice.
+    fn times_plus(self, factor: Self, summand: Self) -> Self;
+    /// `summand - self * factor`, alike.
+    fn times_from(self, factor: Self, summand: Self) -> Self;
+    /// `self * factor - other`, alike.
+    fn times_minus(self, factor: Self, other: Self) -> Self;
+    fn over(self, divisor: Self) -> Self;
+    /// Either where one of the two is a NaN.
+    fn min(self, other: Self) -> Self;
+    fn max(self, other: Self) -> Self;
+    fn abs(self) -> Self;
+    /// With the sign changed wherever the other has one.
+    fn turned_by(self, other: Self) -> Self;
+    fn at_most(self, other: Self) -> u32;
+    fn below(self, other: Self) -> u32;
+    /// The least of all; any of them where one is a NaN.
+    fn least(self) -> f32;
+    fn most(self) -> f32;
+    /// The first where the mask has a bit, else the second; bit by bit.
+    fn select(mask: u32, first: Self, second: Self) -> Self;
+}
+
+#[derive(Clone, Copy)]
+pub(crate) struct Portable16([f32; WIDE]);
+
+macro_rules! by_lane {
+    ($name:ident, $trait:ident, $operator:tt) => {
+        impl $trait for Portable16 {
+            type Output = Self;
+            #[inline(always)]
+            fn $name(mut self, other: Self) -> Self {
+                for lane in 0..WIDE {
+                    self.0[lane] $operator other.0[lane];
+                }
+                self
+            }
+        }
+    };
+}
+by_lane!(add, Add, +=);
+by_lane!(sub, Sub, -=);
+by_lane!(mul, Mul, *=);
+
+impl Wide for Portable16 {
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        Self([value; WIDE])
+    }
+
+    #[inline(always)]
+    fn load(row: &Row<f32>) -> Self {
+        Self(row.0)
+    }
+
+    #[inline(always)]
+    fn load_twice(row: &[f32; 8]) -> Self {
+        let mut all = [0.0; WIDE];
+        for (lane, one) in all.iter_mut().enumerate() {
+            *one = row[lane % 8];
+        }
+        Self(all)
+    }
+
+    #[inline(always)]
+    fn store(self, row: &mut Row<f32>) {
+        row.0 = self.0;
+    }
+
+    #[inline(always)]
+    fn rounded(row: &Row<f64>) -> Self {
+        let mut all = [0.0; WIDE];
+        for (one, exact) in all.iter_mut().zip(row.0) {
+            *one = exact as f32;
+        }
+        Self(all)
+    }
+
+    #[inline(always)]
+    fn times_plus(self, factor: Self, summand: Self) -> Self {
+        self * factor + summand
+    }
+
+    #[inline(always)]
+    fn times_from(self, factor: Self, summand: Self) -> Self {
+        summand - self * factor
+    }
+
+    #[inline(always)]
+    fn times_minus(self, factor: Self, other: Self) -> Self {
+        self * factor - other
+    }
+
+    #[inline(always)]
+    fn over(mut self, divisor: Self) -> Self {
+        for lane in 0..WIDE {
+            self.0[lane] /= divisor.0[lane];
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn min(mut self, other: Self) -> Self {
+        for lane in 0..WIDE {
+            self.0[lane] = if self.0[lane] < other.0[lane] { self.0[lane] } else { other.0[lane] };
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn max(mut self, other: Self) -> Self {
+        for lane in 0..WIDE {
+            self.0[lane] = if self.0[lane] > other.0[lane] { self.0[lane] } else { other.0[lane] };
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn abs(mut self) -> Self {
+        for lane in 0..WIDE {
+            self.0[lane] = self.0[lane].abs();
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn turned_by(mut self, other: Self) -> Self {
+        for lane in 0..WIDE {
+            self.0[lane] = f32::from_bits(self.0[lane].to_bits() ^ other.0[lane].to_bits() & (1 << 31));
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn at_most(self, other: Self) -> u32 {
+        let mut mask = 0;
+        for lane in 0..WIDE {
+            mask |= u32::from(self.0[lane] <= other.0[lane]) << lane;
+        }
+        mask
+    }
+
+    #[inline(always)]
+    fn below(self, other: Self) -> u32 {
+        let mut mask = 0;
+        for lane in 0..WIDE {
+            mask |= u32::from(self.0[lane] < other.0[lane]) << lane;
+        }
+        mask
+    }
+
+    #[inline(always)]
+    fn least(self) -> f32 {
+        let mut least = self.0[0];
+        for lane in 1..WIDE {
+            least = if self.0[lane] < least { self.0[lane] } else { least };
+        }
+        least
+    }
+
+    #[inline(always)]
+    fn most(self) -> f32 {
+        let mut most = self.0[0];
+        for lane in 1..WIDE {
+            most = if self.0[lane] > most { self.0[lane] } else { most };
+        }
+        most
+    }
+
+    #[inline(always)]
+    fn select(mask: u32, mut first: Self, second: Self) -> Self {
+        for lane in 0..WIDE {
+            first.0[lane] = if mask >> lane & 1 != 0 { first.0[lane] } else { second.0[lane] };
+        }
+        first
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+pub(crate) use x86::{Avx2, Avx512};
+
+#[cfg(target_arch = "x86_64")]
+mod x86 {
+    use std::arch::x86_64::*;
+    use std::ops::{Add, Mul, Sub};
+
+    use super::{Row, WIDE, Wide};
+
+    /// Only where `lanes::x86::X86<true>` is: the instructions are there.
+    #[derive(Clone, Copy)]
+    pub(crate) struct Avx512(__m512);
+
+    /// Only where `lanes::x86::X86<false>` is, alike.
+    #[derive(Clone, Copy)]
+    pub(crate) struct Avx2([__m256; 2]);
+
+    const SIGN: i32 = i32::MIN;
+
+    macro_rules! operator {
+        ($name:ident, $trait:ident, $wide:ident, $half:ident) => {
+            impl $trait for Avx512 {
+                type Output = Self;
+                #[inline(always)]
+                fn $name(self, other: Self) -> Self {
+                    // SAFETY: see the type.
+                    unsafe { Self($wide(self.0, other.0)) }
+                }
+            }
+            impl $trait for Avx2 {
+                type Output = Self;
+                #[inline(always)]
+                fn $name(self, other: Self) -> Self {
+                    // SAFETY: see the type.
+                    unsafe { Self([$half(self.0[0], other.0[0]), $half(self.0[1], other.0[1])]) }
+                }
+            }
+        };
+    }
+    operator!(add, Add, _mm512_add_ps, _mm256_add_ps);
+    operator!(sub, Sub, _mm512_sub_ps, _mm256_sub_ps);
+    operator!(mul, Mul, _mm512_mul_ps, _mm256_mul_ps);
+
+    impl Wide for Avx512 {
+        #[inline(always)]
+        fn splat(value: f32) -> Self {
+            // SAFETY: see the type.
+            unsafe { Self(_mm512_set1_ps(value)) }
+        }
+
+        #[inline(always)]
+        fn load(row: &Row<f32>) -> Self {
+            // SAFETY: see the type. The load is of sixteen f32.
+            unsafe { Self(_mm512_loadu_ps(row.0.as_ptr())) }
+        }
+
+        #[inline(always)]
+        fn load_twice(row: &[f32; 8]) -> Self {
+            // SAFETY: see the type. The load is of eight f32.
+            unsafe {
+                let once = _mm256_castps_pd(_mm256_loadu_ps(row.as_ptr()));
+                Self(_mm512_castpd_ps(_mm512_broadcast_f64x4(once)))
+            }
+        }
+
+        #[inline(always)]
+        fn store(self, row: &mut Row<f32>) {
+            // SAFETY: see the type. The store is of sixteen f32.
+            unsafe { _mm512_storeu_ps(row.0.as_mut_ptr(), self.0) }
+        }
+
+        #[inline(always)]
+        fn rounded(row: &Row<f64>) -> Self {
+            // SAFETY: see the type. The loads are of eight f64 each, of sixteen.
+            unsafe {
+                let low = _mm512_cvtpd_ps(_mm512_loadu_pd(row.0.as_ptr()));
+                let high = _mm512_cvtpd_ps(_mm512_loadu_pd(row.0.as_ptr().add(WIDE / 2)));
+                Self(_mm512_insertf32x8::<1>(_mm512_castps256_ps512(low), high))
+            }
+        }
+
+        #[inline(always)]
+        fn times_plus(self, factor: Self, summand: Self) -> Self {
+            // SAFETY: see the type.
+            unsafe { Self(_mm512_fmadd_ps(self.0, factor.0, summand.0)) }
+        }
+
+        #[inline(always)]
+        fn times_from(self, factor: Self, summand: Self) -> Self {
+            // SAFETY: see the type.
+            unsafe { Self(_mm512_fnmadd_ps(self.0, factor.0, summand.0)) }
+        }
+
+        #[inline(always)]
+        fn times_minus(self, factor: Self, other: Self) -> Self {
+            // SAFETY: see the type.
+            unsafe { Self(_mm512_fmsub_ps(self.0, factor.0, other.0)) }
+        }
+
+        #[inline(always)]
+        fn over(self, divisor: Self) -> Self {
+            // SAFETY: see the type.
+            unsafe { Self(_mm512_div_ps(self.0, divisor.0)) }
+        }
+
+        #[inline(always)]
+        fn min(self, other: Self) -> Self {
+            // SAFETY: see the type.
+            unsafe { Self(_mm512_min_ps(self.0, other.0)) }
+        }
+
+        #[inline(always)]
+        fn max(self, other: Self) -> Self {
+            // SAFETY: see the type.
+            unsafe { Self(_mm512_max_ps(self.0, other.0)) }
+        }
+
+        #[inline(always)]
+        fn abs(self) -> Self {
+            // SAFETY: see the type.
+            unsafe { Self(_mm512_abs_ps(self.0)) }
+        }
+
+        #[inline(always)]
+        fn turned_by(self, other: Self) -> Self {
+            // SAFETY: see the type.
+            unsafe {
+                let sign = _mm512_and_ps(other.0, _mm512_castsi512_ps(_mm512_set1_epi32(SIGN)));
+                Self(_mm512_xor_ps(self.0, sign))
+            }
+        }
+
+        #[inline(always)]
+        fn at_most(self, other: Self) -> u32 {
+            // SAFETY: see the type.
+            unsafe { u32::from(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(self.0, other.0)) }
+        }
+
+        #[inline(always)]
+        fn below(self, other: Self) -> u32 {
+            // SAFETY: see the type.
+            unsafe { u32::from(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(self.0, other.0)) }
+        }
+
+        #[inline(always)]
+        fn least(self) -> f32 {
+            // SAFETY: see the type.
+            unsafe {
+                let low = _mm512_castps512_ps256(self.0);
+                least_of_eight(_mm256_min_ps(low, _mm512_extractf32x8_ps::<1>(self.0)))
+            }
+        }
+
+        #[inline(always)]
+        fn most(self) -> f32 {
+            // SAFETY: see the type.
+            unsafe {
+                let low = _mm512_castps512_ps256(self.0);
+                most_of_eight(_mm256_max_ps(low, _mm512_extractf32x8_ps::<1>(self.0)))
+            }
+        }
+
+        #[inline(always)]
+        fn select(mask: u32, first: Self, second: Self) -> Self {
+            // SAFETY: see the type.
+            unsafe { Self(_mm512_mask_mov_ps(second.0, mask as u16, first.0)) }
+        }
+    }
+
+    /// # Safety
+    /// There must be AVX2.
+    #[inline(always)]
+    unsafe fn least_of_eight(v: __m256) -> f32 {
+        // SAFETY: see above.
+        unsafe {
+            let v = _mm_min_ps(_mm256_castps256_ps128(v), _mm256_extractf128_ps::<1>(v));
+            let v = _mm_min_ps(v, _mm_movehl_ps(v, v));
+            _mm_cvtss_f32(_mm_min_ss(v, _mm_movehdup_ps(v)))
+        }
+    }
+
+    /// # Safety
+    /// There must be AVX2.
+    #[inline(always)]
+    unsafe fn most_of_eight(v: __m256) -> f32 {
+        // SAFETY: see above.
+        unsafe {
+            let v = _mm_max_ps(_mm256_castps256_ps128(v), _mm256_extractf128_ps::<1>(v));
+            let v = _mm_max_ps(v, _mm_movehl_ps(v, v));
+            _mm_cvtss_f32(_mm_max_ss(v, _mm_movehdup_ps(v)))
+        }
+    }
+
+    impl Avx2 {
+        #[inline(always)]
+        fn masks([low, high]: [__m256; 2]) -> u32 {
+            // SAFETY: see the type.
+            unsafe { _mm256_movemask_ps(low) as u32 | (_mm256_movemask_ps(high) as u32) << 8 }
+        }
+    }
+
+    impl Wide for Avx2 {
+        #[inline(always)]
+        fn splat(value: f32) -> Self {
+            // SAFETY: see the type.
+            unsafe { Self([_mm256_set1_ps(value); 2]) }
+        }
+
+        #[inline(always)]
+        fn load(row: &Row<f32>) -> Self {
+            // SAFETY: see the type. The loads are of eight f32 each, of sixteen.
+            unsafe { Self([_mm256_loadu_ps(row.0.as_ptr()), _mm256_loadu_ps(row.0.as_ptr().add(8))]) }
+        }
+
+        #[inline(always)]
+        fn load_twice(row: &[f32; 8]) -> Self {
+            // SAFETY: see the type. The load is of eight f32.
+            unsafe { Self([_mm256_loadu_ps(row.as_ptr()); 2]) }
+        }
+
+        #[inline(always)]
+        fn store(self, row: &mut Row<f32>) {
+            let [low, high] = self.0;
+            // SAFETY: see the type. The stores are of eight f32 each, of sixteen.
+            unsafe {
+                _mm256_storeu_ps(row.0.as_mut_ptr(), low);
+                _mm256_storeu_ps(row.0.as_mut_ptr().add(8), high);
+            }
+        }
+
+        #[inline(always)]
+        fn rounded(row: &Row<f64>) -> Self {
+            // SAFETY: see the type. The loads are of four f64 each, of sixteen.
+            unsafe {
+                let start = row.0.as_ptr();
+                let low = _mm256_setr_m128(
+                    _mm256_cvtpd_ps(_mm256_loadu_pd(start)),
+                    _mm256_cvtpd_ps(_mm256_loadu_pd(start.add(4))),
+                );
+                let high = _mm256_setr_m128(
+                    _mm256_cvtpd_ps(_mm256_loadu_pd(start.add(8))),
+                    _mm256_cvtpd_ps(_mm256_loadu_pd(start.add(12))),
+                );
+                Self([low, high])
+            }
+        }
+
+        #[inline(always)]
+        fn times_plus(self, factor: Self, summand: Self) -> Self {
+            let ([a, b], [c, d], [e, f]) = (self.0, factor.0, summand.0);
+            // SAFETY: see the type.
+            unsafe { Self([_mm256_fmadd_ps(a, c, e), _mm256_fmadd_ps(b, d, f)]) }
+        }
+
+        #[inline(always)]
+        fn times_from(self, factor: Self, summand: Self) -> Self {
+            let ([a, b], [c, d], [e, f]) = (self.0, factor.0, summand.0);
+            // SAFETY: see the type.
+            unsafe { Self([_mm256_fnmadd_ps(a, c, e), _mm256_fnmadd_ps(b, d, f)]) }
+        }
+
+        #[inline(always)]
+        fn times_minus(self, factor: Self, other: Self) -> Self {
+            let ([a, b], [c, d], [e, f]) = (self.0, factor.0, other.0);
+            // SAFETY: see the type.
+            unsafe { Self([_mm256_fmsub_ps(a, c, e), _mm256_fmsub_ps(b, d, f)]) }
+        }
+
+        #[inline(always)]
+        fn over(self, divisor: Self) -> Self {
+            let ([a, b], [c, d]) = (self.0, divisor.0);
+            // SAFETY: see the type.
+            unsafe { Self([_mm256_div_ps(a, c), _mm256_div_ps(b, d)]) }
+        }
+
+        #[inline(always)]
+        fn min(self, other: Self) -> Self {
+            let ([a, b], [c, d]) = (self.0, other.0);
+            // SAFETY: see the type.
+            unsafe { Self([_mm256_min_ps(a, c), _mm256_min_ps(b, d)]) }
+        }
+
+        #[inline(always)]
+        fn max(self, other: Self) -> Self {
+            let ([a, b], [c, d]) = (self.0, other.0);
+            // SAFETY: see the type.
+            unsafe { Self([_mm256_max_ps(a, c), _mm256_max_ps(b, d)]) }
+        }
+
+        #[inline(always)]
+        fn abs(self) -> Self {
+            let [a, b] = self.0;
+            // SAFETY: see the type.
+            unsafe {
+                let sign = _mm256_castsi256_ps(_mm256_set1_epi32(SIGN));
+                Self([_mm256_andnot_ps(sign, a), _mm256_andnot_ps(sign, b)])
+            }
+        }
+
+        #[inline(always)]
+        fn turned_by(self, other: Self) -> Self {
+            let ([a, b], [c, d]) = (self.0, other.0);
+            // SAFETY: see the type.
+            unsafe {
+                let sign = _mm256_castsi256_ps(_mm256_set1_epi32(SIGN));
+                let (c, d) = (_mm256_and_ps(c, sign), _mm256_and_ps(d, sign));
+                Self([_mm256_xor_ps(a, c), _mm256_xor_ps(b, d)])
+            }
+        }
+
+        #[inline(always)]
+        fn at_most(self, other: Self) -> u32 {
+            let ([a, b], [c, d]) = (self.0, other.0);
+            // SAFETY: see the type.
+            unsafe { Self::masks([_mm256_cmp_ps::<_CMP_LE_OQ>(a, c), _mm256_cmp_ps::<_CMP_LE_OQ>(b, d)]) }
+        }
+
+        #[inline(always)]
+        fn below(self, other: Self) -> u32 {
+            let ([a, b], [c, d]) = (self.0, other.0);
+            // SAFETY: see the type.
+            unsafe { Self::masks([_mm256_cmp_ps::<_CMP_LT_OQ>(a, c), _mm256_cmp_ps::<_CMP_LT_OQ>(b, d)]) }
+        }
+
+        #[inline(always)]
+        fn least(self) -> f32 {
+            // SAFETY: see the type.
+            unsafe { least_of_eight(_mm256_min_ps(self.0[0], self.0[1])) }
+        }
+
+        #[inline(always)]
+        fn most(self) -> f32 {
+            // SAFETY: see the type.
+            unsafe { most_of_eight(_mm256_max_ps(self.0[0], self.0[1])) }
+        }
+
+        #[inline(always)]
+        fn select(mask: u32, first: Self, second: Self) -> Self {
+            let ([a, b], [c, d]) = (first.0, second.0);
+            // SAFETY: see the type.
+            unsafe {
+                let bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+                let low = _mm256_and_si256(_mm256_set1_epi32(mask as i32), bits);
+                let high = _mm256_and_si256(_mm256_set1_epi32((mask >> 8) as i32), bits);
+                let low = _mm256_castsi256_ps(_mm256_cmpeq_epi32(low, bits));
+                let high = _mm256_castsi256_ps(_mm256_cmpeq_epi32(high, bits));
+                Self([_mm256_blendv_ps(c, a, low), _mm256_blendv_ps(d, b, high)])
+            }
+        }
+    }
+}

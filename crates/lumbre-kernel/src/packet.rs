@@ -1,0 +1,616 @@
+//! Sixteen rays together, where they are much alike: rays of a camera, or shadow rays of neighbours.
+//!
+//! They go from box to box as one frustum, of which a node costs little more than of one ray. At a leaf, triangles that none of
+//! them can meet are left out eight at a time; each of the others is tested against all sixteen, by the operations and with the
+//! bounds of [`BlockRay`](crate::triangles::BlockRay), so that an answer has the bits that it has alone.
+//!
+//! # Why the frustum loses no box
+//!
+//! On each axis the directions have one sign. A single ray meets a plane p at `p r + c`, with a margin in c; see `node`. Here it
+//! is `(p - q) r + (q r + c)`, where q is a place among the starts, which are all within a quarter of it. That is another order
+//! of the same operations, with one more subtraction and one more sum: together wrong by less than 4u|r| (1.3 + |q|), where a
+//! ray's margin is at least 8u|r| (1.01 + |o|). Twice that margin is added. The frustum takes the least of `(p - q) r` and of
+//! the offsets over all rays, as they are computed; rounding keeps their order, so that it is no later than any ray with its
+//! margin, and likewise no earlier where it leaves.
+//!
+//! # Why none of its rays loses a triangle
+//!
+//! Let (X, Y, Z) be a corner as seen from the middle of the rays' starts, sheared by the middle of their shears. For a ray whose
+//! start and shear are off by a and b, the corner is at X + (a_x - s_x a_z) - b_x Z, and within |a_z| of Z. So |x| is below
+//! |X| + `apart` + `spread` |Z|, the largest of these over all rays; the roundings of both are below 32us with s as there, taken of
+//! these larger bounds. A triangle all of whose corners are beyond that on one side is met by no ray; and with the larger m, h
+//! and s the errors are no smaller than those of every ray.
+
+use lumbre_geometry::Ray;
+
+use crate::Accel;
+use crate::batch::Ends;
+use crate::holds::SingleStart;
+use crate::lanes::{self, Axes, Lanes, Row, Sides, WIDE, Wide};
+use crate::node::{END_FACTOR, LITTLE, Node, START_FACTOR, tag};
+use crate::single::{Candidate, Exact, Goal, Outcome, heights};
+use crate::stack::{Order, Stack};
+use crate::triangles::{
+    BLOCK, EDGE_ERROR, FAR, HEIGHT_ERROR, Meeting, ROUNDINGS, SIZE_ERROR, TINY, TriangleBlock,
+};
+use crate::way::limit_of;
+
+/// Rays in a packet.
+pub(crate) const PACKET: usize = WIDE;
+
+/// How far apart on an axis rays may start, in tree units.
+const MOST_DISTANCE: f32 = 0.25;
+/// How far apart their directions may be, by the largest component.
+const MOST_SPREAD: f32 = 0.25;
+/// How many triangles they may be tested against before they go alone: where triangles are small beside the distances between
+/// the rays, that is faster.
+const MOST_TESTS: u32 = 96;
+/// What the corners of triangles may be wrong by, by their size: 32u, see above.
+const CULL_ERROR: f32 = 32.0 / (1 << 24) as f32;
+
+/// What holds all the rays among boxes: see above.
+pub(crate) struct Frustum {
+    pub(crate) center: [f32; 3],
+    pub(crate) least_inverse: [f32; 3],
+    pub(crate) most_inverse: [f32; 3],
+    pub(crate) near_offset: [f32; 3],
+    pub(crate) far_offset: [f32; 3],
+    pub(crate) s_min: f32,
+    pub(crate) s_max: f32,
+    pub(crate) sides: &'static Sides,
+}
+
+#[inline(always)]
+fn greater(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+/// From a place, in other units.
+#[inline(always)]
+fn from_place(origins: &Row<f64>, place: f64, scale: f64) -> Row<f64> {
+    let mut from = Row::of(0.0);
+    for i in 0..PACKET {
+        from.0[i] = (origins.0[i] - place) * scale;
+    }
+    from
+}
+
+/// The rays among triangles: each as a [`BlockRay`](crate::triangles::BlockRay), and what holds them all.
+struct Bundle {
+    axes: &'static Axes,
+    origin: [Row<f32>; 3],
+    rest: [Row<f32>; 3],
+    shear: [Row<f32>; 2],
+    first: Row<f32>,
+    last: Row<f32>,
+    surely_first: Row<f32>,
+    surely_last: Row<f32>,
+    place_per_height: Row<f32>,
+    /// A zero, negative where the last components of the directions are positive.
+    turn: f32,
+    least_size: f32,
+    middle: [f32; 3],
+    middle_shear: [f32; 2],
+    apart: [f32; 3],
+    spread: [f32; 2],
+}
+
+/// A mask of all the rays.
+const ALL: u32 = (1 << PACKET) - 1;
+
+/// Starts with rays; `None` where one is not from nearby or not sound, or where they are not alike.
+#[inline(always)]
+fn start<W: Wide>(start: &SingleStart, columns: &[Row<f64>; 8]) -> Option<(Frustum, Bundle, Row<f32>)> {
+    let zero = W::splat(0.0);
+    let (mut direction, mut length) = ([zero; 3], [zero; 3]);
+    let mut signs = 0;
+    let mut fits = ALL;
+    let mut is_long = 0;
+    for axis in 0..3 {
+        direction[axis] = W::rounded(&columns[3 + axis]);
+        length[axis] = direction[axis].abs();
+        let negative = W::splat(1.0).turned_by(direction[axis]).below(zero);
+        if negative != 0 && negative != ALL {
+            return None;
+        }
+        signs |= (negative & 1) << axis;
+        fits &= length[axis].at_most(W::splat(start.longest));
+        is_long |= W::splat(start.shortest).at_most(length[axis]);
+    }
+    let sizes = [length[1].at_most(length[0]), length[2].at_most(length[1]), length[2].at_most(length[0])];
+    let mut bits = 0;
+    for (place, &size) in sizes.iter().enumerate() {
+        if size != 0 && size != ALL {
+            return None;
+        }
+        bits |= (size & 1) << place;
+    }
+    let axes = Axes::by_bits(signs, bits);
+    let (t_min, t_max) = (W::rounded(&columns[6]), W::rounded(&columns[7]));
+    fits &= zero.at_most(t_min) & t_min.at_most(t_max);
+
+    let sides = Sides::new(signs);
+    let none = [0.0; 3];
+    let mut frustum = Frustum {
+        center: none,
+        least_inverse: none,
+        most_inverse: none,
+        near_offset: none,
+        far_offset: none,
+        s_min: (t_min * W::splat(START_FACTOR)).least(),
+        s_max: 0.0,
+        sides,
+    };
+    let mut inverses = [zero; 3];
+    for axis in 0..3 {
+        let from = W::rounded(&from_place(&columns[axis], start.tree_origin[axis], start.scale));
+        let distance = from.abs();
+        fits &= distance.at_most(W::splat(start.farthest[axis]));
+        let size = W::splat(start.space_per_unit).over(length[axis].max(W::splat(start.tiny)));
+        let margin = size * distance.times_plus(W::splat(start.margin_per_distance), W::splat(start.margin));
+        let inverse = size.turned_by(direction[axis]);
+        inverses[axis] = inverse;
+        let (low, high) = (from.least(), from.most());
+        // A NaN is not.
+        let are_near = high - low <= MOST_DISTANCE;
+        if !are_near {
+            return None;
+        }
+        let center = 0.5 * (low + high);
+        let shift = W::splat(center) * inverse;
+        let twice = margin + margin;
+        let near = shift + from.times_from(inverse, zero - margin) - twice;
+        let far = shift + from.times_from(inverse, margin) + twice;
+        frustum.center[axis] = center;
+        frustum.least_inverse[axis] = inverse.least();
+        frustum.most_inverse[axis] = inverse.most();
+        frustum.near_offset[axis] = near.least();
+        frustum.far_offset[axis] = far.most();
+    }
+    if fits != ALL || is_long != ALL {
+        return None;
+    }
+
+    let order = axes.order();
+    let inverse = inverses[order[2]] * W::splat(start.units_per_space);
+    let mut bundle = Bundle {
+        axes,
+        origin: [Row::of(0.0); 3],
+        rest: [Row::of(0.0); 3],
+        shear: [Row::of(0.0); 2],
+        first: Row::of(0.0),
+        last: Row::of(0.0),
+        surely_first: Row::of(0.0),
+        surely_last: Row::of(0.0),
+        place_per_height: Row::of(0.0),
+        turn: if signs >> order[2] & 1 != 0 { 0.0 } else { -0.0 },
+        least_size: start.least_size,
+        middle: none,
+        middle_shear: [0.0; 2],
+        apart: none,
+        spread: [0.0; 2],
+    };
+    inverse.abs().store(&mut bundle.place_per_height);
+    let mut rests = [zero; 3];
+    for (place, &axis) in order.iter().enumerate() {
+        let mut exact = from_place(&columns[axis], start.mesh_origin[axis], 1.0);
+        let origin = W::rounded(&exact);
+        origin.store(&mut bundle.origin[place]);
+        for i in 0..PACKET {
+            exact.0[i] -= f64::from(bundle.origin[place].0[i]);
+        }
+        rests[place] = W::rounded(&exact);
+        bundle.middle[place] = 0.5 * (origin.least() + origin.most());
+    }
+    rests[2].store(&mut bundle.rest[2]);
+    let off_z = W::load(&bundle.origin[2]) - W::splat(bundle.middle[2]);
+    bundle.apart[2] = off_z.abs().most();
+    for place in 0..2 {
+        let shear = direction[order[place]] * inverse;
+        let rest = rests[2].times_from(shear, rests[place]);
+        let (low, high) = (shear.least(), shear.most());
+        let are_alike = high - low <= MOST_SPREAD;
+        if !are_alike {
+            return None;
+        }
+        let middle = 0.5 * (low + high);
+        bundle.middle_shear[place] = middle;
+        bundle.spread[place] = ((shear - W::splat(middle)).abs()).most();
+        let off = W::load(&bundle.origin[place]) - W::splat(bundle.middle[place]) + rest;
+        bundle.apart[place] = (off_z.times_from(shear, off).abs()).most();
+        shear.store(&mut bundle.shear[place]);
+        rest.store(&mut bundle.rest[place]);
+    }
+    let (far, roundings) = (W::splat(FAR), W::splat(ROUNDINGS));
+    let heights = [(t_min * length[order[2]]).min(far), (t_max * length[order[2]]).min(far)];
+    let errors = [heights[0] * roundings, heights[1] * roundings];
+    (heights[0] - errors[0]).store(&mut bundle.first);
+    (heights[0] + errors[0]).store(&mut bundle.surely_first);
+    (heights[1] - errors[1]).store(&mut bundle.surely_last);
+    (heights[1] + errors[1]).store(&mut bundle.last);
+    let s_max = t_max.times_plus(W::splat(END_FACTOR), W::splat(LITTLE as f32));
+    frustum.s_max = s_max.most();
+    let mut row = Row::of(0.0);
+    s_max.store(&mut row);
+    Some((frustum, bundle, row))
+}
+
+/// What is known of the triangles of a block for all the rays: which may be met, and the errors to reckon with.
+struct Bounds {
+    mask: u32,
+    error: Row<f32>,
+    height_error: Row<f32>,
+    extent: Row<f32>,
+}
+
+/// Rays under way together.
+struct Packet<'a, 'r> {
+    exact: Exact<'a>,
+    triangles: &'a [TriangleBlock],
+    rays: &'r [Ray; PACKET],
+    frustum: Frustum,
+    bundle: Bundle,
+    /// Where each need no longer meet boxes.
+    s_max: Row<f32>,
+    /// The nearest so far, by heights; its triangle is one of eight times the block, and the lane.
+    from: Row<f32>,
+    to: Row<f32>,
+    triangle: Row<f32>,
+    /// Those that go on, those for which any hit will do and that have one, and those that the plain search has to answer.
+    alive: u32,
+    met: u32,
+    unsettled: u32,
+    /// How many triangles it was tested against.
+    tests: u32,
+}
+
+impl Packet<'_, '_> {
+    /// Which triangles of a block are left.
+    #[inline(always)]
+    fn bounds<W: Wide>(&self, block: &TriangleBlock) -> Bounds {
+        let bundle = lanes::opaque(&self.bundle);
+        let [kx, ky, kz] = bundle.axes.order();
+        let [ox, oy, oz] = bundle.middle;
+        let (ox, oy, oz) = (W::splat(ox), W::splat(oy), W::splat(oz));
+        let (sx, sy) = (W::splat(bundle.middle_shear[0]), W::splat(bundle.middle_shear[1]));
+        let (az, bz, cz) = (
+            oz - W::load_twice(&block.corners[0][kz]),
+            oz - W::load_twice(&block.corners[1][kz]),
+            oz - W::load_twice(&block.corners[2][kz]),
+        );
+        let (ax, bx, cx) = (
+            sx.times_from(az, ox - W::load_twice(&block.corners[0][kx])),
+            sx.times_from(bz, ox - W::load_twice(&block.corners[1][kx])),
+            sx.times_from(cz, ox - W::load_twice(&block.corners[2][kx])),
+        );
+        let (ay, by, cy) = (
+            sy.times_from(az, oy - W::load_twice(&block.corners[0][ky])),
+            sy.times_from(bz, oy - W::load_twice(&block.corners[1][ky])),
+            sy.times_from(cz, oy - W::load_twice(&block.corners[2][ky])),
+        );
+        let (low_x, high_x) = (ax.min(bx).min(cx), ax.max(bx).max(cx));
+        let (low_y, high_y) = (ay.min(by).min(cy), ay.max(by).max(cy));
+        let (low_z, high_z) = (az.min(bz).min(cz), az.max(bz).max(cz));
+        let zero = W::splat(0.0);
+        let along = (zero - low_z).max(high_z);
+        let wide_x = along.times_plus(W::splat(bundle.spread[0]), W::splat(bundle.apart[0]));
+        let wide_y = along.times_plus(W::splat(bundle.spread[1]), W::splat(bundle.apart[1]));
+        let (across_x, across_y) = ((zero - low_x).max(high_x), (zero - low_y).max(high_y));
+        let across = (across_x + wide_x).max(across_y + wide_y);
+        let size = across + along + W::splat(bundle.apart[2] + bundle.least_size);
+        let slack = size * W::splat(CULL_ERROR);
+        let (wide_x, wide_y) = (wide_x + slack, wide_y + slack);
+        // The edge functions seen from the middle, and by how much those of the rays may differ.
+        let u = cx.times_minus(by, cy * bx);
+        let v = ax.times_minus(cy, ay * cx);
+        let w = bx.times_minus(ay, by * ax);
+        let off = across_y.times_plus(wide_x, wide_y.times_plus(wide_x, across_x * wide_y));
+        let off = off * W::splat(2.0 + 8.0 * CULL_ERROR) + W::splat(TINY);
+        // False for unused lanes, which are NaN.
+        let mask = low_x.at_most(wide_x)
+            & (zero - wide_x).at_most(high_x)
+            & low_y.at_most(wide_y)
+            & (zero - wide_y).at_most(high_y)
+            & ((zero - off).at_most(u.min(v).min(w)) | u.max(v).max(w).at_most(off))
+            & 0xff;
+        let mut bounds =
+            Bounds { mask, error: Row::of(0.0), height_error: Row::of(0.0), extent: Row::of(0.0) };
+        if mask != 0 {
+            let across = across + slack;
+            let size = size + slack + slack;
+            let error = (size * W::splat(EDGE_ERROR))
+                .times_plus(size.times_plus(W::splat(SIZE_ERROR), across), W::splat(TINY));
+            error.store(&mut bounds.error);
+            let height_error = size * W::splat(HEIGHT_ERROR);
+            height_error.store(&mut bounds.height_error);
+            (high_z - low_z + height_error + height_error).store(&mut bounds.extent);
+        }
+        bounds
+    }
+
+    /// Tests all the rays against a triangle.
+    #[inline(always)]
+    fn meet_triangle<G: Goal, L: Lanes>(
+        &mut self,
+        block: &TriangleBlock,
+        number: u32,
+        lane: usize,
+        bounds: &Bounds,
+    ) {
+        let bundle = lanes::opaque(&self.bundle);
+        let [kx, ky, kz] = bundle.axes.order();
+        let (ox, oy, oz) = (
+            L::Wide::load(&bundle.origin[0]),
+            L::Wide::load(&bundle.origin[1]),
+            L::Wide::load(&bundle.origin[2]),
+        );
+        let (rx, ry) = (L::Wide::load(&bundle.rest[0]), L::Wide::load(&bundle.rest[1]));
+        let (sx, sy) = (L::Wide::load(&bundle.shear[0]), L::Wide::load(&bundle.shear[1]));
+        let lane = lane % BLOCK;
+        let at = |corner: usize, axis: usize| block.corners[corner][axis][lane];
+        // As `Lanes::meet_triangles`, with the signs turned.
+        let az = oz - L::Wide::splat(at(0, kz));
+        let bz = oz - L::Wide::splat(at(1, kz));
+        let cz = oz - L::Wide::splat(at(2, kz));
+        let ax = sx.times_from(az, ox - L::Wide::splat(at(0, kx)) + rx);
+        let bx = sx.times_from(bz, ox - L::Wide::splat(at(1, kx)) + rx);
+        let cx = sx.times_from(cz, ox - L::Wide::splat(at(2, kx)) + rx);
+        let ay = sy.times_from(az, oy - L::Wide::splat(at(0, ky)) + ry);
+        let by = sy.times_from(bz, oy - L::Wide::splat(at(1, ky)) + ry);
+        let cy = sy.times_from(cz, oy - L::Wide::splat(at(2, ky)) + ry);
+        let u = cx.times_minus(by, cy * bx);
+        let v = ax.times_minus(cy, ay * cx);
+        let w = bx.times_minus(ay, by * ax);
+        let error = bounds.error.0[lane];
+        let (low, high) = (u.min(v).min(w), u.max(v).max(w));
+        let mask = (L::Wide::splat(-error).at_most(low) | high.at_most(L::Wide::splat(error))) & self.alive;
+        if mask == 0 {
+            return;
+        }
+        let det = u + v + w;
+        let weight = det.abs();
+        let height =
+            det.times_plus(L::Wide::load(&bundle.rest[2]), w.times_plus(cz, v.times_plus(bz, u * az)));
+        let ahead = height.turned_by(det).turned_by(L::Wide::splat(bundle.turn));
+        let height_error = bounds.height_error.0[lane];
+        let spread = weight.times_plus(
+            L::Wide::splat(height_error),
+            L::Wide::splat(error * 12.5 * bounds.extent.0[lane] + TINY),
+        );
+        let (from, to) = (ahead - spread, ahead + spread);
+        // What is no number may be in range.
+        let is_out = to.below(weight * L::Wide::load(&bundle.first))
+            | (weight * L::Wide::load(&bundle.last)).below(from);
+        let in_range = mask & !is_out;
+        if in_range == 0 {
+            return;
+        }
+        let twice = error + error;
+        let inside = L::Wide::splat(twice).below(low) | high.below(L::Wide::splat(-twice));
+        let sure = in_range
+            & inside
+            & (weight * L::Wide::load(&bundle.surely_first)).at_most(from)
+            & to.at_most(weight * L::Wide::load(&bundle.surely_last));
+        if G::IS_ANY {
+            self.met |= sure;
+            self.alive &= !sure;
+            let unsure = in_range & !sure;
+            if unsure != 0 {
+                self.settle_any(unsure, number, lane as u32);
+            }
+            return;
+        }
+        let roundings = L::Wide::splat(ROUNDINGS);
+        let inverse = L::Wide::splat(1.0).over(weight);
+        let (from, to) = (from * inverse, to * inverse);
+        let from = from.abs().times_from(roundings, from);
+        let to = to.abs().times_plus(roundings, to);
+        let (best_from, best_to) = (L::Wide::load(&self.from), L::Wide::load(&self.to));
+        let better = sure & to.below(best_from);
+        if better != 0 {
+            let triangle = L::Wide::splat(f32::from_bits(number << 3 | lane as u32));
+            L::Wide::select(better, from, best_from).store(&mut self.from);
+            let to = L::Wide::select(better, to, best_to);
+            to.store(&mut self.to);
+            L::Wide::select(better, triangle, L::Wide::load(&self.triangle)).store(&mut self.triangle);
+            L::Wide::select(better, to, L::Wide::load(&self.bundle.last)).store(&mut self.bundle.last);
+            let place = to * L::Wide::load(&self.bundle.place_per_height);
+            let end = place.abs().times_plus(roundings, place + L::Wide::splat(f32::MIN_POSITIVE));
+            let s_max = L::Wide::select(better, end, L::Wide::load(&self.s_max));
+            s_max.store(&mut self.s_max);
+            self.frustum.s_max = s_max.most();
+        }
+        let doubtful = in_range & !better & !best_to.below(from);
+        if doubtful != 0 {
+            self.settle_closest(doubtful, number, lane as u32);
+        }
+    }
+
+    /// Looks closer at a triangle that these rays may meet.
+    #[cold]
+    #[inline(never)]
+    fn settle_any(&mut self, mut those: u32, number: u32, lane: u32) {
+        while those != 0 {
+            let i = those.trailing_zeros() as usize % PACKET;
+            those &= those - 1;
+            let ray = &self.rays[i];
+            match self.exact.meet(ray, number, lane) {
+                Meeting::Miss => continue,
+                Meeting::Hit { .. } => self.met |= 1 << i,
+                Meeting::Touch { .. } => self.unsettled |= 1 << i,
+            }
+            self.alive &= !(1 << i);
+        }
+    }
+
+    /// The same, where a hit may be nearer than the best.
+    #[cold]
+    #[inline(never)]
+    fn settle_closest(&mut self, mut those: u32, number: u32, lane: u32) {
+        while those != 0 {
+            let i = those.trailing_zeros() as usize % PACKET;
+            those &= those - 1;
+            let ray = &self.rays[i];
+            let found = match self.exact.meet(ray, number, lane) {
+                Meeting::Miss => continue,
+                Meeting::Hit { root, .. } => Some(root.t),
+                Meeting::Touch { .. } => None,
+            };
+            let best = self.best(i);
+            let is_better = match found {
+                None => None,
+                Some(_) if !best.is_some() => Some(true),
+                Some(t) => match self.exact.t_and_names(ray, &best) {
+                    Some((best, best_names)) => {
+                        Some(t < best || t == best && self.exact.names(number, lane) < best_names)
+                    }
+                    None => None,
+                },
+            };
+            match (found, is_better) {
+                (Some(_), Some(false)) => {}
+                (Some(t), Some(true)) => {
+                    let (from, to) = heights(t, ray.direction.abs().max_element());
+                    (self.from.0[i], self.to.0[i]) = (from, to);
+                    self.triangle.0[i] = f32::from_bits(number << 3 | lane);
+                    self.bundle.last.0[i] = to;
+                    let place = to * self.bundle.place_per_height.0[i];
+                    self.s_max.0[i] = place + place.abs() * ROUNDINGS + f32::MIN_POSITIVE;
+                }
+                _ => {
+                    self.unsettled |= 1 << i;
+                    self.alive &= !(1 << i);
+                    self.s_max.0[i] = -1.0;
+                }
+            }
+        }
+        self.frustum.s_max = self.s_max.0.iter().fold(-1.0, |most, &s_max| greater(most, s_max));
+    }
+
+    /// The nearest hit of one so far.
+    #[inline(always)]
+    fn best(&self, i: usize) -> Candidate {
+        let triangle = self.triangle.0[i].to_bits();
+        if triangle == u32::MAX {
+            return Candidate::NONE;
+        }
+        Candidate { block: triangle >> 3, lane: triangle & 7, from: self.from.0[i], to: self.to.0[i] }
+    }
+
+    /// Tests a leaf.
+    #[inline(always)]
+    fn meet_leaf<G: Goal, L: Lanes>(&mut self, leaf: u32) {
+        let places = tag::blocks(leaf);
+        let triangles = self.triangles;
+        for (number, block) in (places.start as u32..).zip(&triangles[places]) {
+            let bounds = self.bounds::<L::Wide>(block);
+            let mut rest = bounds.mask;
+            self.tests += rest.count_ones();
+            while rest != 0 {
+                let lane = rest.trailing_zeros() as usize;
+                rest &= rest - 1;
+                self.meet_triangle::<G, L>(block, number, lane, &bounds);
+            }
+        }
+    }
+
+    /// Goes through the tree from a node or a leaf; false where it gave up.
+    #[inline(always)]
+    fn run<G: Goal, L: Lanes>(&mut self, nodes: &[Node], root: u32) -> bool {
+        let mut stack: Stack<<G::Order as Order>::Entry> = Stack::new();
+        let mut reference = root;
+        loop {
+            while reference >> tag::SHIFT == tag::INNER {
+                let slots = stack.with_room();
+                let node = &nodes[reference as usize];
+                let (mask, keys) = L::meet_frustum(node, lanes::opaque(&self.frustum));
+                if mask & mask.wrapping_sub(1) != 0 {
+                    reference = G::Order::push_children::<L>(node, mask, keys, slots);
+                } else if mask != 0 {
+                    reference = L::only_child(node, mask);
+                } else {
+                    match self.pop::<G>(&mut stack) {
+                        Some(next) => reference = next,
+                        None => return true,
+                    }
+                }
+            }
+            self.meet_leaf::<G, L>(reference);
+            if self.alive == 0 {
+                return true;
+            }
+            if self.tests > MOST_TESTS {
+                return false;
+            }
+            match self.pop::<G>(&mut stack) {
+                Some(next) => reference = next,
+                None => return true,
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn pop<G: Goal>(&self, stack: &mut Stack<<G::Order as Order>::Entry>) -> Option<u32> {
+        let limit = limit_of(self.frustum.s_max);
+        loop {
+            let entry = stack.pop()?;
+            if !G::Order::is_beyond(entry, limit) {
+                return Some(G::Order::reference(entry));
+            }
+        }
+    }
+}
+
+/// Searches a tree of triangles along rays together, the first of which has this position; false where that does not
+/// pay, and `ends` got nothing.
+#[inline(always)]
+pub(crate) fn search<G: Goal, L: Lanes>(
+    accel: &Accel,
+    single: &SingleStart,
+    rays: &[Ray; PACKET],
+    first: usize,
+    ends: &mut impl Ends<G::Answer>,
+) -> bool {
+    let Some((frustum, bundle, s_max)) = start::<L::Wide>(single, &L::columns(rays)) else { return false };
+    let mut packet = Packet {
+        exact: Exact::new(accel, single),
+        triangles: &accel.tree.blocks,
+        rays,
+        frustum,
+        bundle,
+        s_max,
+        from: Row::of(f32::INFINITY),
+        to: Row::of(f32::INFINITY),
+        triangle: Row::of(f32::from_bits(u32::MAX)),
+        alive: ALL,
+        met: 0,
+        unsettled: 0,
+        tests: 0,
+    };
+    if !packet.run::<G, L>(&accel.tree.nodes, single.root) {
+        return false;
+    }
+    for (i, ray) in rays.iter().enumerate() {
+        let answer = if packet.unsettled >> i & 1 != 0 {
+            Outcome::Unsettled
+        } else {
+            G::answer_together::<L>(&packet.exact, ray, &packet.best(i), packet.met >> i & 1 != 0)
+        };
+        ends.put(first + i, answer);
+    }
+    true
+}
+
+/// Whether rays go together, at a level, for tests.
+#[cfg(test)]
+pub(crate) fn are_alike(level: lanes::Level, single: &SingleStart, rays: &[Ray; PACKET]) -> bool {
+    struct Starting<'a>(&'a SingleStart, &'a [Ray; PACKET]);
+    impl lanes::Task for Starting<'_> {
+        type Output = bool;
+        #[inline(always)]
+        fn run<L: Lanes>(self) -> bool {
+            start::<L::Wide>(self.0, &L::columns(self.1)).is_some()
+        }
+    }
+    level.run(Starting(single, rays))
+}
