@@ -11,7 +11,7 @@ fuzz_target!(|bytes: &[u8]| {
     let limits = Limits { memory: 64 << 20, elements: 1_000_000, ..Limits::default() };
     for (strictness, frame) in [(Strictness::Normal, None), (Strictness::Lenient, Some(0.7))] {
         let mut diagnostics = Diagnostics::with_strictness(strictness);
-        let options = GltfOptions { frame, shutter: 0.1, variant: None };
+        let options = GltfOptions { frame, shutter: 0.1, ..GltfOptions::default() };
         let budget = Budget::new(limits);
         // A folder that is not there: nothing outside the bytes is to be read.
         let nowhere = Path::new("/nonexistent");

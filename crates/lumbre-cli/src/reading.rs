@@ -28,6 +28,10 @@ pub struct ReadingArguments {
     /// Frames a second, for --frames and --shutter.
     #[arg(long, value_name = "N", default_value_t = 24.0, value_parser = rate)]
     fps: f64,
+    /// The one animation of a glTF to play, by its name or its position from 0. Without, all play at once but for those that
+    /// move something which one before them moves.
+    #[arg(long, value_name = "NAME|INDEX")]
+    animation: Option<String>,
     /// The material variant of a glTF to wear.
     #[arg(long, value_name = "NAME")]
     variant: Option<String>,
@@ -147,11 +151,17 @@ impl ReadingArguments {
                 "--shutter needs the time of a picture (expected --frame or --frames, too)".to_owned(),
             ));
         }
+        if self.animation.is_some() && frame.is_none() {
+            return Err(Failure::Usage(
+                "--animation needs the time of a picture (expected --frame or --frames, too)".to_owned(),
+            ));
+        }
         Ok(lumbre::ReadOptions {
             limits: self.limits(),
             strictness: self.strictness(),
             frame,
             shutter: self.shutter.unwrap_or(0.0) / self.fps,
+            animation: self.animation.clone(),
             variant: self.variant.clone(),
         })
     }

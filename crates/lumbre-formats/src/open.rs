@@ -22,6 +22,8 @@ pub struct ReadOptions {
     pub frame: Option<f64>,
     /// How long the shutter is open about `frame`, in seconds: see [`GltfOptions::shutter`].
     pub shutter: f64,
+    /// The one animation of a glTF to play: see [`GltfOptions::animation`].
+    pub animation: Option<String>,
     /// The material variant of a glTF to wear.
     pub variant: Option<String>,
 }
@@ -125,6 +127,7 @@ fn read_one(
             let gltf = GltfOptions {
                 frame: options.frame,
                 shutter: options.shutter,
+                animation: options.animation.clone(),
                 variant: options.variant.clone(),
             };
             open_gltf(path, &gltf, budget, diagnostics)

@@ -785,6 +785,71 @@ fn animations_by_pointers_change_what_they_name() {
     }
 }
 
+#[test]
+fn one_of_several_animations_is_chosen_and_those_that_disagree_do_not_mix() {
+    let mut parts = Parts::default();
+    let times = parts.add(&floats(&[1.0, 3.0]), r#""componentType":5126,"type":"SCALAR","count":2"#);
+    let moves = [8.0, 16.0].map(|far| {
+        parts.add(&floats(&[0.0, 0.0, 0.0, far, 0.0, 0.0]), r#""componentType":5126,"type":"VEC3","count":2"#)
+    });
+    let clip = |start: &str, output: usize, nodes: &[u32]| {
+        let channels: Vec<String> = nodes
+            .iter()
+            .map(|node| format!(r#"{{"sampler":0,"target":{{"node":{node},"path":"translation"}}}}"#))
+            .collect();
+        let channels = channels.join(",");
+        format!(r#"{{{start}"samplers":[{{"input":{times},"output":{output}}}],"channels":[{channels}]}}"#)
+    };
+    // The second moves what the first moves, and something else; the third has no name.
+    let clips = [
+        clip(r#""name":"Walk","#, moves[0], &[0]),
+        clip(r#""name":"Run","#, moves[1], &[1, 0]),
+        clip("", moves[0], &[2]),
+    ];
+    let rest = format!(
+        r#""extensionsUsed":["KHR_lights_punctual"],
+        "extensions":{{"KHR_lights_punctual":{{"lights":[{{"type":"point"}}]}}}},
+        "nodes":[{{"extensions":{{"KHR_lights_punctual":{{"light":0}}}}}},{{"extensions":{{"KHR_lights_punctual":{{"light":0}}}}}},
+            {{"extensions":{{"KHR_lights_punctual":{{"light":0}}}}}}],
+        "animations":[{}]"#,
+        clips.join(",")
+    );
+    let bytes = glb(&parts.json(&rest), &parts.binary);
+    let at = |animation: Option<&str>, shutter: f64, diagnostics: &mut Diagnostics| {
+        let animation = animation.map(Into::into);
+        let options = GltfOptions { frame: Some(2.0), shutter, animation, ..GltfOptions::default() };
+        let scene = read_with(&bytes, &options, diagnostics)?;
+        let place = |light: &LightDesc| match light {
+            LightDesc::Point { from, .. } => from.x,
+            LightDesc::Moving { world_from_light, .. } => world_from_light.at(0.5).point(DVec3::ZERO).x,
+            other => panic!("{other:?}"),
+        };
+        Ok::<_, FormatError>(scene.lights.iter().map(place).collect::<Vec<f64>>())
+    };
+    for shutter in [0.0, 1.0] {
+        let mut diagnostics = Diagnostics::new();
+        assert_eq!(at(None, shutter, &mut diagnostics).unwrap(), [4.0, 0.0, 4.0]);
+        let lines = diagnostics.lines();
+        assert_eq!(lines.len(), 1, "{lines:?}");
+        assert!(lines[0].contains("/animations/1: ") && lines[0].contains("\"Run\""), "{lines:?}");
+        for (name, expected) in [
+            ("Run", [8.0, 8.0, 0.0]),
+            ("0", [4.0, 0.0, 0.0]),
+            ("2", [0.0, 0.0, 4.0]),
+            ("Walk", [4.0, 0.0, 0.0]),
+        ] {
+            let mut diagnostics = Diagnostics::new();
+            assert_eq!(at(Some(name), shutter, &mut diagnostics).unwrap(), expected, "{name}");
+            assert_eq!(diagnostics.lines(), [""; 0]);
+        }
+    }
+    for wrong in ["3", "run", ""] {
+        let error = at(Some(wrong), 0.0, &mut Diagnostics::new()).unwrap_err().to_string();
+        let is_said = error.contains("no such animation") && error.contains(r#""Walk", "Run", "2""#);
+        assert!(is_said && (wrong != "run" || error.contains("Run")), "{error}");
+    }
+}
+
 /// The same animations, but by pointers.
 fn by_pointers(rest: &str) -> String {
     let mut out = String::from(r#""extensionsUsed":["KHR_animation_pointer"],"#);

@@ -1,9 +1,10 @@
 //! Animations: where they take nodes at one time, and what else they change.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use lumbre_math::{DQuat, DVec3};
 
+use super::GltfOptions;
 use super::accessor::{Accessor, Component, Element};
 use super::file::{File, List};
 use super::json::{Read, Value};
@@ -69,7 +70,7 @@ impl Moved {
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum Path {
     Translation,
     Rotation,
@@ -86,7 +87,7 @@ enum Path {
 }
 
 /// What a channel moves.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 enum Target {
     Node(usize),
     /// The weights that it gives to nodes without any.
@@ -114,36 +115,115 @@ struct Channel<'a> {
     width: usize,
 }
 
-/// What all animations do at a time in seconds. Of several that do the same thing to the same node the first counts.
-pub(super) fn at(file: &File<'_>, time: f64) -> Read<Played> {
-    let mut played = Played::default();
-    for &animation in file.list(List::Animations) {
-        for channel in channels(file, animation)? {
-            let path = channel.path;
-            let is_free = match channel.target {
-                Target::Pointer(_) => continue,
-                Target::Mesh(mesh) => {
-                    played.meshes.entry(mesh).or_default().set(path, channel.sample(file, time)?)
+/// The animations that play, all at once.
+pub(super) struct Playing<'a> {
+    file: &'a File<'a>,
+    channels: Vec<Channel<'a>>,
+}
+
+impl<'a> Playing<'a> {
+    /// Checks all animations, and chooses those that play: the one that is asked for, or else every one that moves nothing of
+    /// what one before it moves. Without a time none does, and nothing is looked at.
+    pub fn read(file: &'a File<'a>, options: &GltfOptions) -> Read<Self> {
+        let mut playing = Self { file, channels: vec![] };
+        if options.frame.is_none() {
+            return Ok(playing);
+        }
+        let chosen = options.animation.as_deref().map(|name| position(file, name)).transpose()?;
+        let mut moved: HashSet<(Target, Path)> = HashSet::new();
+        let (mut played, mut changes) = (Played::default(), Changes::default());
+        for (position, &animation) in file.list(List::Animations).iter().enumerate() {
+            let channels = channels(file, animation)?;
+            if chosen.is_some_and(|chosen| chosen != position) {
+                continue;
+            }
+            let key = |channel: &Channel<'_>| (channel.target.clone(), channel.path);
+            if channels.iter().any(|channel| moved.contains(&key(channel))) {
+                let warning = Diagnostic::warning(
+                    "animation that moves what one before it moves was left out: choose one by its name or number",
+                );
+                let name = animation.string_at("name")?.map_or_else(|| position.to_string(), Into::into);
+                file.push(warning.at(animation.place()).found(quoted(&name)));
+                continue;
+            }
+            moved.extend(channels.iter().map(key));
+            for channel in channels {
+                let nothing = vec![0.0; channel.numbers()];
+                let is_free = match &channel.target {
+                    Target::Pointer(pointer) => changes.set(pointer, &nothing, channel.is_list()),
+                    target => played.set(target, channel.path, nothing),
+                };
+                if is_free {
+                    playing.channels.push(channel);
+                } else {
+                    file.warn(channel.value, "animation of what another one animates was left out");
                 }
-                Target::Node(node) => {
-                    let entry = played.nodes.entry(node).or_default();
-                    let v = channel.sample(file, time)?;
-                    let vec3 = |v: &[f64]| DVec3::new(v[0], v[1], v[2]);
-                    match path {
-                        Path::Translation => set(&mut entry.translation, vec3(&v)),
-                        Path::Rotation => set(&mut entry.rotation, DQuat::from_xyzw(v[0], v[1], v[2], v[3])),
-                        Path::Scale => set(&mut entry.scale, vec3(&v)),
-                        Path::Weights | Path::Weight(_) => entry.weights.set(path, v),
-                        Path::Numbers { .. } => continue,
-                    }
-                }
-            };
-            if !is_free {
-                file.warn(channel.value, TAKEN);
             }
         }
+        Ok(playing)
     }
-    Ok(played)
+
+    /// What they do at a time in seconds to nodes and meshes.
+    pub fn at(&self, time: f64) -> Read<Played> {
+        let mut played = Played::default();
+        for channel in &self.channels {
+            if !matches!(channel.target, Target::Pointer(_)) {
+                played.set(&channel.target, channel.path, channel.sample(self.file, time)?);
+            }
+        }
+        Ok(played)
+    }
+
+    /// What they do at a time to anything else, by pointers.
+    pub fn changes(&self, time: f64) -> Read<Changes> {
+        let mut changes = Changes::default();
+        for channel in &self.channels {
+            if let Target::Pointer(pointer) = &channel.target {
+                changes.set(pointer, &channel.sample(self.file, time)?, channel.is_list());
+            }
+        }
+        Ok(changes)
+    }
+
+    /// Warns of what they change by pointers between these times: it is as it is halfway.
+    pub fn warn_of_changes(&self, times: &[f64]) -> Read<()> {
+        for channel in &self.channels {
+            let Target::Pointer(pointer) = &channel.target else { continue };
+            let values: Vec<Vec<f64>> =
+                times.iter().map(|&time| channel.sample(self.file, time)).collect::<Read<_>>()?;
+            if values.iter().any(|value| *value != values[0]) {
+                let warning = Diagnostic::warning(
+                    "what an animation changes while the shutter is open was left as it is halfway",
+                );
+                self.file.push(warning.at(channel.value.place()).found(quoted(pointer)));
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether nothing plays.
+    pub fn is_empty(&self) -> bool {
+        self.channels.is_empty()
+    }
+}
+
+impl Played {
+    /// Sets a value; false where it is set already.
+    fn set(&mut self, target: &Target, path: Path, v: Vec<f64>) -> bool {
+        let node = match *target {
+            Target::Mesh(mesh) => return self.meshes.entry(mesh).or_default().set(path, v),
+            Target::Node(node) => self.nodes.entry(node).or_default(),
+            Target::Pointer(_) => return false,
+        };
+        let vec3 = |v: &[f64]| DVec3::new(v[0], v[1], v[2]);
+        match path {
+            Path::Translation => set(&mut node.translation, vec3(&v)),
+            Path::Rotation => set(&mut node.rotation, DQuat::from_xyzw(v[0], v[1], v[2], v[3])),
+            Path::Scale => set(&mut node.scale, vec3(&v)),
+            Path::Weights | Path::Weight(_) => node.weights.set(path, v),
+            Path::Numbers { .. } => false,
+        }
+    }
 }
 
 /// Fills what is empty; false where it is full.
@@ -153,41 +233,21 @@ fn set<T>(place: &mut Option<T>, value: T) -> bool {
     is_free
 }
 
-const TAKEN: &str = "animation of what another one animates was left out";
-
-/// Warns of what animations change by pointers between these times, if it does not move with nodes and meshes: it is as it is
-/// halfway.
-pub(super) fn warn_of_changes(file: &File<'_>, times: &[f64]) -> Read<()> {
-    for &animation in file.list(List::Animations) {
-        for channel in channels(file, animation)? {
-            let Target::Pointer(pointer) = &channel.target else { continue };
-            let values: Vec<Vec<f64>> =
-                times.iter().map(|&time| channel.sample(file, time)).collect::<Read<_>>()?;
-            if values.iter().any(|value| *value != values[0]) {
-                let warning = Diagnostic::warning(
-                    "what an animation changes while the shutter is open was left as it is halfway",
-                );
-                file.push(warning.at(channel.value.place()).found(quoted(pointer)));
-            }
-        }
+/// The animation of a name, or else of a number.
+fn position(file: &File<'_>, wanted: &str) -> Read<usize> {
+    let mut names = vec![];
+    for (position, value) in file.list(List::Animations).iter().enumerate() {
+        names.push(value.string_at("name")?.map_or_else(|| position.to_string(), Into::into));
     }
-    Ok(())
-}
-
-/// What all animations do at a time to anything else, by pointers.
-pub(super) fn changes(file: &File<'_>, time: f64) -> Read<Changes> {
-    let mut changes = Changes::default();
-    for &animation in file.list(List::Animations) {
-        for channel in channels(file, animation)? {
-            let Target::Pointer(pointer) = &channel.target else { continue };
-            let value = channel.sample(file, time)?;
-            let is_list = value.len() > 1 || matches!(channel.path, Path::Numbers { is_list: true, .. });
-            if !changes.set(pointer, &value, is_list) {
-                file.warn(channel.value, TAKEN);
-            }
-        }
+    let by_number = || wanted.parse().ok().filter(|&position: &usize| position < names.len());
+    if let Some(position) = names.iter().position(|name| name == wanted).or_else(by_number) {
+        return Ok(position);
     }
-    Ok(changes)
+    let wrong = Diagnostic::error("no such animation").at(file.whole()).found(quoted(wanted));
+    let known: Vec<String> = names.iter().take(20).map(|name| quoted(name)).collect();
+    let expected =
+        if known.is_empty() { "no choice: the file has none".to_owned() } else { known.join(", ") };
+    Err(wrong.expected(expected).suggest(wanted, names.iter().map(String::as_str)).into())
 }
 
 /// Checks all animations without playing them.
@@ -361,6 +421,21 @@ fn targets_of(mesh: Value<'_>) -> Read<usize> {
 }
 
 impl Channel<'_> {
+    /// How many numbers make one value.
+    fn numbers(&self) -> usize {
+        match self.path {
+            Path::Translation | Path::Scale => 3,
+            Path::Rotation => 4,
+            Path::Weights | Path::Weight(_) => self.width,
+            Path::Numbers { width, .. } => width,
+        }
+    }
+
+    /// Whether they are written as a list.
+    fn is_list(&self) -> bool {
+        self.numbers() > 1 || matches!(self.path, Path::Numbers { is_list: true, .. })
+    }
+
     /// The value at a time: before the first and after the last keyframe, that of the keyframe.
     fn sample(&self, file: &File<'_>, time: f64) -> Read<Vec<f64>> {
         let times: Vec<f32> = self.input.floats(file, |[t]: [f32; 1]| t)?;
@@ -371,12 +446,7 @@ impl Channel<'_> {
                 self.input.value.wrong("times out of order").found(format!("{} as element {i}", times[i]));
             return Err(wrong.expected("finite numbers, each more than the one before").into());
         }
-        let numbers: usize = match self.path {
-            Path::Translation | Path::Scale => 3,
-            Path::Rotation => 4,
-            Path::Weights | Path::Weight(_) => self.width,
-            Path::Numbers { width, .. } => width,
-        };
+        let numbers = self.numbers();
         let values: Vec<f32> = match self.path {
             Path::Translation | Path::Scale => {
                 self.output.floats(file, |v: [f32; 3]| v)?.into_iter().flatten().collect()

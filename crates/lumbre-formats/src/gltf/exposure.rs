@@ -5,10 +5,11 @@ use std::sync::Arc;
 
 use lumbre_math::{AnimatedTransform, DAffine3, DMat4, SingularTransform, Transform};
 
+use super::animation::Playing;
 use super::file::{File, List};
 use super::graph::Graph;
 use super::json::Read;
-use super::{GltfOptions, animation, scene};
+use super::{GltfOptions, scene};
 
 /// Ways from one moment to the next while the shutter is open: between two, a node turns by less than half a turn, or it is
 /// taken to turn the other way.
@@ -37,20 +38,20 @@ struct Moment<'f> {
 }
 
 impl<'f> Exposure<'f> {
-    pub fn read(file: &'f File<'f>, options: &GltfOptions) -> Read<Self> {
+    pub fn read(file: &'f File<'f>, playing: &Playing<'_>, options: &GltfOptions) -> Read<Self> {
         let mut moments = vec![];
         if let Some(middle) = options.frame
             && options.shutter > 0.0
-            && !file.list(List::Animations).is_empty()
+            && !playing.is_empty()
         {
             let times: Vec<f64> = (0..=STEPS).map(|step| step as f64 / STEPS as f64).collect();
             let of_file = |time: f64| middle + (time - 0.5) * options.shutter;
             for &time in &times {
-                let graph = Graph::read(file, animation::at(file, of_file(time))?)?;
+                let graph = Graph::read(file, playing.at(of_file(time))?)?;
                 moments.push(Moment { time, graph, known: HashMap::new() });
             }
             let times: Vec<f64> = times.into_iter().map(of_file).collect();
-            animation::warn_of_changes(file, &times)?;
+            playing.warn_of_changes(&times)?;
         }
         Ok(Self { file, moments })
     }

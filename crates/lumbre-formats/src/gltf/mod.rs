@@ -35,6 +35,7 @@ use std::sync::Arc;
 
 use lumbre_scene::SceneDesc;
 
+use self::animation::Playing;
 use self::file::File;
 use self::json::{Inside, Json, Read, Value};
 use crate::budget::Budget;
@@ -44,9 +45,11 @@ use crate::input::{Input, text};
 /// What to take out of a glTF.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct GltfOptions {
-    /// The time in seconds at which animations stand; `None` leaves them alone. All animations of the file play at once:
-    /// where two of them move the same thing, the first does.
+    /// The time in seconds at which animations stand; `None` leaves them alone.
     pub frame: Option<f64>,
+    /// The one animation to play, by its name or its position in the file. `None` plays all at once but for those that move
+    /// something which one before them moves.
+    pub animation: Option<String>,
     /// How long the shutter is open, in seconds, half of it before `frame` and half after; 0 for a moment. What animations
     /// move by nodes meanwhile is seen moving.
     pub shutter: f64,
@@ -151,7 +154,7 @@ fn read(
     let plain = Json::read(text, name, within, budget)?;
     let animated = match options.frame {
         Some(time) if text.contains("KHR_animation_pointer") => {
-            animated(&plain, time, name, folder, budget, binary, is_glb)?
+            animated(&plain, options, time, name, folder, budget, binary, is_glb)?
         }
         _ => None,
     };
@@ -168,8 +171,10 @@ fn read(
 }
 
 /// The text with the numbers that animations by pointers change, as they stand at a time; none where there are none.
+#[expect(clippy::too_many_arguments, reason = "what the file is, and what is asked of it")]
 fn animated(
     json: &Json<'_>,
+    options: &GltfOptions,
     time: f64,
     name: &Arc<str>,
     folder: &Path,
@@ -182,7 +187,7 @@ fn animated(
     let root = json.root().object()?;
     let mut file = File::new(root, name, folder, &own, Diagnostics::default());
     file.load(binary, is_glb)?;
-    let changes = animation::changes(&file, time)?;
+    let changes = Playing::read(&file, options)?.changes(time)?;
     if changes.is_empty() {
         return Ok(None);
     }

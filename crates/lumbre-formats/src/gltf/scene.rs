@@ -13,7 +13,7 @@ use lumbre_scene::{
 };
 
 use super::accessor::{self, Accessor, Component, Element};
-use super::animation::Played;
+use super::animation::Playing;
 use super::exposure::Exposure;
 use super::file::{File, List};
 use super::graph::Graph;
@@ -42,13 +42,14 @@ const MOST_COPIES_OF_LIGHTS: usize = 64;
 /// Reads everything that a glTF says.
 pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
     let variant = variant(file, options)?;
-    let played = match options.frame {
-        Some(time) => animation::at(file, time)?,
-        None => Played::default(),
-    };
+    let playing = Playing::read(file, options)?;
+    let played = options.frame.map(|time| playing.at(time)).transpose()?.unwrap_or_default();
     let graph = Graph::read(file, played)?;
     check(file, &graph)?;
-    let mut exposure = Exposure::read(file, options)?;
+    if options.frame.is_none() {
+        animation::check(file)?;
+    }
+    let mut exposure = Exposure::read(file, &playing, options)?;
 
     let roots = roots(file, &graph)?;
     let mut places: Vec<Placed> = vec![];
@@ -276,7 +277,6 @@ fn check(file: &File<'_>, graph: &Graph<'_>) -> Read<()> {
     for (index, &node) in file.list(List::Nodes).iter().enumerate() {
         check_node(file, graph, index, node)?;
     }
-    animation::check(file)?;
     file.named(List::Scenes, file.root, "scene")?;
     for &scene in file.list(List::Scenes) {
         let Some(nodes) = scene.get("nodes")? else { continue };
