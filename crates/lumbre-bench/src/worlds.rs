@@ -5,7 +5,7 @@ use std::sync::Arc;
 use lumbre_geometry::{Cone, Cuboid, Cylinder, PlacedShape, Shape, Sphere, Torus, Triangle};
 use lumbre_kernel::{SphereCloud, TriangleMesh};
 use lumbre_math::random::RandomStream;
-use lumbre_math::{DVec3, Transform};
+use lumbre_math::{DAffine3, DVec3, Transform};
 
 use crate::scene::{Camera, Placement, Scene};
 use crate::shaping::{Shaper, between, direction};
@@ -37,6 +37,8 @@ pub const RECIPES: &[Recipe] = &[
     Recipe { name: "needles", is_quick: false, make: needles },
     Recipe { name: "stadium", is_quick: false, make: stadium },
     Recipe { name: "forest", is_quick: false, make: forest },
+    Recipe { name: "pipes", is_quick: false, make: pipes },
+    Recipe { name: "boulders", is_quick: false, make: boulders },
     Recipe { name: "spheres-20k", is_quick: true, make: |name| spheres(name, 20_000) },
     Recipe { name: "spheres-1m", is_quick: false, make: |name| spheres(name, 1_000_000) },
     Recipe { name: "mixed", is_quick: true, make: mixed },
@@ -273,6 +275,41 @@ fn forest(name: &str) -> Scene {
         placements,
         ..Scene::empty(name, camera, lamp)
     }
+}
+
+/// A thousand long bent pipes, every which way and through one another: the boxes of all overlap.
+fn pipes(name: &str) -> Scene {
+    let mut random = RandomStream::new(21);
+    let mut shaper = Shaper::default();
+    shaper.tube(24, 200, |s| {
+        let bend = 0.3 * (9.0 * s).sin();
+        (DVec3::new(10.0 * s - 5.0, bend, 0.2 * (14.0 * s).cos()), 0.08)
+    });
+    scattered(name, &mut random, shaper.finish(), 1_000, 5.0)
+}
+
+/// Two hundred scanned balls in a heap, each through many others.
+fn boulders(name: &str) -> Scene {
+    let mut random = RandomStream::new(22);
+    scattered(name, &mut random, bumpy_ball(40), 200, 2.5)
+}
+
+/// Copies of a mesh in a cube, turned and stretched at random.
+fn scattered(name: &str, random: &mut RandomStream, mesh: TriangleMesh, count: usize, half: f64) -> Scene {
+    let placements = (0..count).map(|_| {
+        let at = DVec3::from_array([(); 3].map(|()| between(random, -half, half)));
+        let stretch = DVec3::from_array([(); 3].map(|()| between(random, 0.7, 1.2)));
+        let place = Transform::translate(at)
+            * Transform::rotate(direction(random), 360.0 * random.next_f64()).expect("an axis")
+            * Transform::scale(stretch).expect("not flat");
+        let DAffine3 { matrix3: m, translation } = *place.affine();
+        let columns = [m.x_axis, m.y_axis, m.z_axis, translation];
+        Placement { mesh: 0, world_from_object: columns.map(|column| column.as_vec3().to_array()) }
+    });
+    let placements = placements.collect();
+    let camera = Camera { eye: half * DVec3::new(1.7, 1.3, 2.6), target: DVec3::ZERO, field_of_view: 45.0 };
+    let lamp = (half * DVec3::new(0.8, 2.5, 0.9), 0.5 * half);
+    Scene { placed_meshes: vec![Arc::new(mesh)], placements, ..Scene::empty(name, camera, lamp) }
 }
 
 /// A trunk and two and a half thousand leaves.

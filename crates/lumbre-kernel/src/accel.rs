@@ -63,7 +63,8 @@ pub enum Preset {
     /// heuristic.
     Fast,
     /// Binned by the surface area heuristic at every level (I. Wald, "On fast Construction of SAH-based Bounding Volume
-    /// Hierarchies", 2007).
+    /// Hierarchies", 2007). Instances whose parts have much smaller boxes than the whole are entered part by part (after C. Benthin
+    /// and others, "Improved Two-Level BVHs using Partial Re-Braiding", 2017): at most eight parts for each on average, and 64.
     #[default]
     Balanced,
     /// The balanced tree, then made better by putting subtrees elsewhere (D. Meister, J. Bittner, "Parallel Reinsertion for
@@ -140,6 +141,9 @@ impl Accel {
     /// become slower. The answer says by how much, about: the cost of a ray as a multiple of that after the build, 1 or so
     /// where everything moved together. As a rule, build again where it passes 1.5: with more than a few rays for every
     /// primitive, queries then lose more time than a build takes.
+    ///
+    /// Where an instance was opened (see [`Preset::Balanced`]) and its new tree has other nodes, it is whole again, until a tree
+    /// comes that has these nodes.
     ///
     /// Trees that hold this one as an instance are to be refitted after it, from the inside out. It is no part of
     /// them: they hold it in an [`Arc`](std::sync::Arc), which [`Arc::get_mut`](std::sync::Arc::get_mut) opens only for its

@@ -22,7 +22,7 @@ use crate::{BuildError, Geometry, GeometryKind, SphereCloud, TriangleMesh};
 pub(crate) struct Entry {
     /// Position in the tree's list.
     pub(crate) geometry: u32,
-    /// Which primitive of a custom geometry; else 0, except that the top bit marks the last of its leaf.
+    /// Which primitive of its geometry, or where an instance is entered; the top bit marks the last of its leaf.
     primitive_and_last: u32,
 }
 

@@ -6,7 +6,8 @@
 //!
 //! A header of 256 bytes: eight bytes of magic; as u32 the version, a mark of the byte order, how many geometries and masks
 //! there are, the reference to the root, and a zero; as u64 how many elements each array has; a fingerprint of the
-//! geometries; a checksum of everything behind the header; and one of the header before itself. Then come the arrays, each at
+//! geometries; a checksum of everything behind the header; a fingerprint of the parts of instances that were opened; and a
+//! checksum of the header before itself. Then come the arrays, each at
 //! a multiple of 64 bytes: nodes, blocks and names of triangles, those of spheres, entries, parts of triangles, masks.
 //!
 //! What a file says is checked when it is mapped: checksums, the length, every reference and every name, that all that has
@@ -29,8 +30,9 @@ use crate::collapse::{Entry, Packed};
 use crate::holds::{Holds, SingleStart};
 use crate::lanes::Level;
 use crate::node::{Node, WIDTH};
+use crate::opening::Start;
 use crate::prepare::{Parts, take_apart, units_of};
-use crate::refit::check_places;
+use crate::refit::{Places, check_places};
 use crate::save::{check_names, check_structure, signature};
 use crate::spheres::SphereBlock;
 use crate::store::Store;
@@ -39,7 +41,7 @@ use crate::{Accel, Geometry, GeometryKind, LoadError, RefitError};
 
 const MAGIC: [u8; 8] = *b"LumbMap\0";
 /// Changes with the format, and with the layout of what is in it.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 const BYTE_ORDER: u32 = 0x0102_0304;
 const NONE: u32 = u32::MAX;
 const HEADER: usize = 256;
@@ -158,6 +160,19 @@ fn fingerprint(geometries: &[Geometry], parts: &Parts) -> u64 {
     sum.finish()
 }
 
+/// What the boxes of instances that were opened depend on, beside that.
+fn fingerprint_of_parts(tree: &Packed, places: &Places) -> u64 {
+    let mut sum = Sum::new();
+    for (place, start) in &places.starts {
+        sum.add(bytemuck::cast_slice(&[tree.entries[*place].geometry, start.word()]));
+        if let Some(bounds) = &places.boxes[*place] {
+            sum.add(bytemuck::cast_slice(&bounds.min.to_array()));
+            sum.add(bytemuck::cast_slice(&bounds.max.to_array()));
+        }
+    }
+    sum.finish()
+}
+
 /// The arrays of a tree as bytes, in the order of the file.
 fn arrays(accel: &Accel) -> [&[u8]; ARRAYS] {
     let tree = &accel.tree;
@@ -193,8 +208,9 @@ pub(crate) fn save(accel: &Accel, path: &Path) -> io::Result<()> {
     if cfg!(target_endian = "big") {
         return Err(io::Error::new(io::ErrorKind::Unsupported, MapError::ByteOrder));
     }
-    let parts =
-        take_apart(&accel.geometries).map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error))?;
+    let invalid = |error| io::Error::new(io::ErrorKind::InvalidData, error);
+    let parts = take_apart(&accel.geometries).map_err(|error| invalid(RefitError::Unsound(error)))?;
+    let places = check_places(accel, &parts).map_err(invalid)?;
     let arrays = arrays(accel);
     let mut content = Sum::new();
     for array in arrays {
@@ -215,6 +231,7 @@ pub(crate) fn save(accel: &Accel, path: &Path) -> io::Result<()> {
     }
     header.extend_from_slice(&fingerprint(&accel.geometries, &parts).to_le_bytes());
     header.extend_from_slice(&content.finish().to_le_bytes());
+    header.extend_from_slice(&fingerprint_of_parts(&accel.tree, &places).to_le_bytes());
     header.resize(SEAL, 0);
     let mut seal = Sum::new();
     seal.add(&header);
@@ -247,6 +264,7 @@ struct Header {
     root: u32,
     arrays: [Range<usize>; ARRAYS],
     fingerprint: u64,
+    fingerprint_of_parts: u64,
 }
 
 fn read_header(bytes: &[u8]) -> Result<Header, LoadError> {
@@ -295,7 +313,13 @@ fn read_header(bytes: &[u8]) -> Result<Header, LoadError> {
     if masks != u64::from(word(20)) || masks != 0 && masks != u64::from(word(16)) {
         return Err(LoadError::Inconsistent { what: format!("{masks} masks for {} geometries", word(16)) });
     }
-    Ok(Header { geometries: word(16), root: word(24), arrays, fingerprint: long(32 + 8 * ARRAYS) })
+    Ok(Header {
+        geometries: word(16),
+        root: word(24),
+        arrays,
+        fingerprint: long(32 + 8 * ARRAYS),
+        fingerprint_of_parts: long(32 + 8 * ARRAYS + 16),
+    })
 }
 
 /// Puts the right checksums into a file whose header says where its arrays are.
@@ -374,7 +398,7 @@ fn over_mapped(file: Arc<Mmap>, geometries: Vec<Geometry>) -> Result<Accel, Load
         holds,
         tree,
         bounds: parts.bounds,
-        primitives: parts.boxed.len() + parts.triangles + parts.spheres + parts.infinite.len(),
+        primitives: parts.count(),
         level: Level::best(),
         built_cost: None,
         masks: masks.to_vec(),
@@ -382,7 +406,13 @@ fn over_mapped(file: Arc<Mmap>, geometries: Vec<Geometry>) -> Result<Accel, Load
         infinite: Vec::new(),
         geometries,
     };
-    check_places(&accel, &parts).map_err(LoadError::OtherGeometries)?;
+    let places = check_places(&accel, &parts).map_err(LoadError::OtherGeometries)?;
+    let is_as_saved =
+        |&(place, start): &(usize, Start)| accel.tree.entries[place].primitive() == start.word();
+    let print = fingerprint_of_parts(&accel.tree, &places);
+    if !places.starts.iter().all(is_as_saved) || print != header.fingerprint_of_parts {
+        return Err(LoadError::Moved);
+    }
     Ok(Accel { infinite: parts.infinite, ..accel })
 }
 

@@ -4,6 +4,7 @@ use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
 
 use crate::node::tag;
+use crate::opening::Start;
 use crate::query::MetInParts;
 use crate::spheres::ExactSphere;
 use crate::stack::AsBuilt;
@@ -55,16 +56,18 @@ fn has_surfaces(accel: &Accel) -> bool {
 /// How many solid shapes hold the point, in all instances.
 fn solids_around(accel: &Accel, point: DVec3, time: f64) -> usize {
     let mut count = 0;
-    let mut trees = vec![(accel, point)];
+    let mut trees = vec![(accel, point, Start::WHOLE)];
     let mut stack = Vec::new();
-    while let Some((accel, point)) = trees.pop() {
+    while let Some((accel, point, start)) = trees.pop() {
         let mut meet = |geometry: u32, primitive: u32| match &accel.geometries[geometry as usize].kind {
             GeometryKind::Shape(shape) => {
                 let local = shape.world_from_object().inverse_point(point);
                 count += usize::from(shape.shape().contains(local));
             }
             GeometryKind::Instance(instance) => {
-                trees.push((&*instance.accel, instance.world_from_object.at(time).inverse_point(point)));
+                let local = instance.world_from_object.at(time).inverse_point(point);
+                let start = Start::of(primitive);
+                trees.extend((!start.is_nothing()).then_some((&*instance.accel, local, start)));
             }
             GeometryKind::Spheres(cloud) => {
                 count += usize::from(ExactSphere::of(cloud, primitive).contains(point));
@@ -74,7 +77,7 @@ fn solids_around(accel: &Accel, point: DVec3, time: f64) -> usize {
         accel.infinite.iter().for_each(|entry| meet(entry.geometry, entry.primitive()));
         let units = &accel.units;
         let (local, slop) = ((point - units.origin) * units.scale, 4.0 * units.slop_of(point));
-        stack.extend(accel.tree.root);
+        stack.extend(accel.tree.root.map(|root| start.below(root)));
         while let Some(reference) = stack.pop() {
             match reference >> tag::SHIFT {
                 tag::INNER => {

@@ -12,6 +12,7 @@ use lumbre_geometry::{Aabb, NearestPoint, NoNearestPoint, nearest_on_triangle, s
 use lumbre_math::{DVec2, DVec3, Transform};
 
 use crate::node::{Node, tag};
+use crate::opening::Start;
 use crate::prepare::has_area;
 use crate::spheres::{ExactSphere, has_radius};
 use crate::traverse::Place;
@@ -82,7 +83,7 @@ pub(crate) fn closest_point(
     }
     let mut frames = vec![Frame::outermost(accel, point, time)];
     let mut pending = BinaryHeap::new();
-    enter(&frames, 0, 0.0, &mut pending);
+    enter(&frames, Start::WHOLE, 0.0, &mut pending);
     while let Some(next) = pending.pop() {
         if next.distance > search.limit {
             break;
@@ -128,9 +129,13 @@ pub(crate) fn closest_point(
             }
             Waiting::Primitive(geometry, primitive) => {
                 if let GeometryKind::Instance(instance) = &frame.accel.geometries[geometry as usize].kind {
+                    let start = Start::of(primitive);
+                    if start.is_nothing() {
+                        continue;
+                    }
                     let inner = frame.within(geometry, instance);
                     frames.push(inner);
-                    enter(&frames, frames.len() - 1, next.distance, &mut pending);
+                    enter(&frames, start, next.distance, &mut pending);
                 } else {
                     search.meet(frame, geometry, primitive, next.distance);
                 }
@@ -140,11 +145,12 @@ pub(crate) fn closest_point(
     search.into_answer()
 }
 
-/// Puts a whole tree onto the list.
-fn enter(frames: &[Frame], position: usize, distance: f64, pending: &mut BinaryHeap<Pending>) {
+/// Puts the tree of the last frame onto the list, or a part of it.
+fn enter(frames: &[Frame], start: Start, distance: f64, pending: &mut BinaryHeap<Pending>) {
+    let position = frames.len() - 1;
     let frame = position as u32;
     let accel = frames[position].accel;
-    let root = accel.tree.root.map(Waiting::Reference);
+    let root = accel.tree.root.map(|root| Waiting::Reference(start.below(root)));
     let infinite = accel.infinite.iter().map(|entry| Waiting::Primitive(entry.geometry, entry.primitive()));
     pending.extend(root.into_iter().chain(infinite).map(|what| Pending { distance, frame, what }));
 }
@@ -160,7 +166,7 @@ struct Pending {
 enum Waiting {
     /// A node or a leaf.
     Reference(u32),
-    /// Geometry and primitive of what is no triangle of a mesh.
+    /// Geometry and primitive of what is no triangle of a mesh; of an instance, where it is entered.
     Primitive(u32, u32),
 }
 

@@ -4,18 +4,20 @@ use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
 
 use lumbre_geometry::{Aabb, PlacedShape};
-use lumbre_math::{AnimatedTransform, DMat3, DVec3, Transform, Vec3};
+use lumbre_math::{DMat3, DVec3, Transform, Vec3};
 use rayon::prelude::*;
 
 use crate::build::{Grown, binary_tree, fill};
 use crate::clouds::CloudSurvey;
 use crate::collapse::{Entry, Packed, lay_out};
 use crate::holds::{Holds, SingleStart};
-use crate::lanes::{Lanes, Level, Task};
-use crate::node::{Node, Units, tag};
+use crate::lanes::Level;
+use crate::node::Units;
+use crate::outline::Outline;
 use crate::primitive::{Bounds, Kind, Primitive, Traits};
 use crate::{
-    Accel, BuildError, BuildOptions, Geometry, GeometryKind, Placement, PreciseMesh, TriangleMesh, precise,
+    Accel, BuildError, BuildOptions, Geometry, GeometryKind, Placement, PreciseMesh, Preset, TriangleMesh,
+    opening, precise,
 };
 
 /// References have 29 bits of place.
@@ -26,13 +28,17 @@ pub(crate) fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result
     if geometries.len() > MOST_PRIMITIVES {
         return Err(BuildError::TooMany);
     }
-    let parts = take_apart(&geometries)?;
+    let mut parts = take_apart(&geometries)?;
     let units = units_of(&geometries, &parts);
     let traits: Vec<Traits> = geometries.iter().map(traits_of).collect();
     let level = Level::best();
 
+    let count = parts.count();
+    if options.preset != Preset::Fast {
+        let room = parts.room();
+        parts.boxed = opening::open(parts.boxed, &geometries, room);
+    }
     let in_tree = parts.boxed.len() + parts.triangles + parts.spheres;
-    let count = in_tree + parts.infinite.len();
     let tree = if in_tree == 0 {
         Packed::default()
     } else {
@@ -126,7 +132,8 @@ pub(crate) struct Survey {
     pub(crate) chunks: Vec<u32>,
 }
 
-/// A primitive that is no triangle, with its box. They are in the order of their names.
+/// A primitive that is no triangle, with its box. They are in the order of their names. Of an instance that was opened, the
+/// second name is the node where a part begins.
 pub(crate) struct Boxed {
     pub(crate) bounds: Aabb,
     pub(crate) geometry: u32,
@@ -214,10 +221,7 @@ fn boxes_of(geometries: &[Geometry]) -> Vec<Option<Aabb>> {
         GeometryKind::Shape(shape) => shape.bounds(),
         GeometryKind::Instance(instance) => {
             let outline = &outlines[&Arc::as_ptr(&instance.accel).addr()];
-            Some(match &instance.world_from_object {
-                Placement::Still(map) => outline.placed(map),
-                Placement::Moving(motion) => outline.swept(motion),
-            })
+            Some(outline.at(&instance.world_from_object))
         }
         GeometryKind::Mesh(_)
         | GeometryKind::PreciseMesh(_)
@@ -228,9 +232,14 @@ fn boxes_of(geometries: &[Geometry]) -> Vec<Option<Aabb>> {
 }
 
 impl Parts {
+    /// How many primitives there are.
+    pub(crate) fn count(&self) -> usize {
+        self.boxed.len() + self.infinite.len() + self.triangles + self.spheres
+    }
+
     /// How many more primitives a tree takes.
     fn room(&self) -> usize {
-        MOST_PRIMITIVES - self.boxed.len() - self.infinite.len() - self.triangles - self.spheres
+        MOST_PRIMITIVES - self.count()
     }
 
     /// The triangles of a mesh in double precision that have an area.
@@ -507,186 +516,6 @@ fn condition_of(map: &Transform) -> f64 {
     let by_norm = size(there) * size(back) / 3.0;
     let by_component = (sizes(there) * sizes(back) * DVec3::ONE).max_element();
     by_norm.min(by_component).max(1.0)
-}
-
-/// Boxes of an outline, about.
-const OUTLINE: usize = 128;
-
-/// Boxes of a tree that together hold what is finite in it. The box around an instance is that of many boxes, each taken over
-/// by itself, which is tighter than the image of the whole.
-struct Outline {
-    whole: Aabb,
-    boxes: Vec<EightBoxes>,
-    /// No coordinate is larger.
-    reach: DVec3,
-}
-
-impl Outline {
-    fn of(inner: &Accel) -> Self {
-        let whole = inner.bounds;
-        let node = |reference: u32| {
-            (reference >> tag::SHIFT == tag::INNER).then(|| &inner.tree.nodes[reference as usize])
-        };
-        let Some(root) = inner.tree.root.filter(|_| inner.infinite.is_empty()).and_then(node) else {
-            return Self { whole, boxes: Vec::new(), reach: DVec3::ZERO };
-        };
-        let children = |node: &Node| -> Vec<(Aabb, u32)> {
-            (0..node.len as usize)
-                .map(|lane| (box_in_space(&inner.units, node, lane), node.children[lane]))
-                .collect()
-        };
-        let mut open = children(root);
-        while open.len() < OUTLINE {
-            let area = |i: &usize| open[*i].0.half_area();
-            let inner_ones = (0..open.len()).filter(|&i| node(open[i].1).is_some());
-            let Some(largest) = inner_ones.max_by(|a, b| area(a).total_cmp(&area(b))) else { break };
-            let (_, reference) = open.swap_remove(largest);
-            open.extend(node(reference).map(children).unwrap_or_default());
-        }
-        let filled = open.iter().map(|(bounds, _)| bounds).filter(|bounds| !bounds.is_empty());
-        let boxes: Vec<_> = filled.map(center_and_half).collect();
-        let reach = boxes.iter().fold(DVec3::ZERO, |most, [center, half]| most.max(center.abs() + *half));
-        let boxes = boxes.chunks(EIGHT).map(EightBoxes::new).collect();
-        Self { whole, boxes, reach }
-    }
-
-    fn placed(&self, map: &Transform) -> Aabb {
-        let whole = placed_bounds(&self.whole, map);
-        if self.boxes.is_empty() {
-            return whole;
-        }
-        let (affine, sizes) = (map.affine(), sizes_of(map));
-        let [min, max] =
-            Level::best().run(Images { boxes: &self.boxes, linear: &affine.matrix3, sizes: &sizes });
-        let rounding = rounding_of(map, &sizes, self.reach);
-        let (min, max) = (min + affine.translation - rounding, max + affine.translation + rounding);
-        // Each bounds it, so that their common part does.
-        Aabb { min: min.max(whole.min), max: max.min(whole.max) }
-    }
-}
-
-impl Outline {
-    /// A box around it at all times.
-    ///
-    /// Every point of the outline goes, between two neighbours of a list of steps, along a curve that stays within a certain
-    /// distance of its chord. The ends of the chord lie in the boxes at the two steps, so that all of the chord lies in the
-    /// box around both: the curve lies in that box when it is widened by the distance. Before the first key and after the
-    /// last, everything is as at these. What rounds in a map between two keys is a few 2⁻⁵³ of what the maps at the keys make
-    /// of the outline, times their condition.
-    fn swept(&self, motion: &AnimatedTransform) -> Aabb {
-        let mut swept = Aabb::EMPTY;
-        for (_, map) in motion.keys() {
-            swept = swept.union(self.placed(map));
-        }
-        if self.whole.is_empty() {
-            return swept;
-        }
-        let [center, half] = center_and_half(&self.whole);
-        // An instance grows by a fiftieth of its size.
-        let sizes = |map: &Transform| (sizes_of(map) * half).length();
-        let smallest = motion.keys().iter().map(|(_, map)| sizes(map)).fold(f64::INFINITY, f64::min);
-        for (maps, distance) in motion.steps(center, half, 0.02 * smallest) {
-            let along = maps.iter().fold(Aabb::EMPTY, |along, map| along.union(self.placed(map)));
-            let reach = along.min.abs().max(along.max.abs());
-            let rounding = 64.0 * f64::EPSILON * motion.condition() * reach.max_element();
-            let margin = DVec3::splat(distance + rounding);
-            swept = swept.union(Aabb { min: along.min - margin, max: along.max + margin });
-        }
-        swept
-    }
-}
-
-/// How many boxes are taken over at a time.
-const EIGHT: usize = 8;
-
-/// The middles of eight boxes and half their sizes, by axes.
-struct EightBoxes {
-    centers: [[f64; EIGHT]; 3],
-    halves: [[f64; EIGHT]; 3],
-}
-
-impl EightBoxes {
-    /// Of some; where there are fewer, the first comes again.
-    fn new(boxes: &[[DVec3; 2]]) -> Self {
-        let component = |part: usize, axis: usize| {
-            std::array::from_fn(|lane| boxes.get(lane).unwrap_or(&boxes[0])[part][axis])
-        };
-        let components = |part: usize| [0, 1, 2].map(|axis| component(part, axis));
-        Self { centers: components(0), halves: components(1) }
-    }
-}
-
-/// The box around the images of boxes, its translation apart.
-struct Images<'a> {
-    boxes: &'a [EightBoxes],
-    linear: &'a DMat3,
-    /// The sizes of its numbers.
-    sizes: &'a DMat3,
-}
-
-impl Task for Images<'_> {
-    type Output = [DVec3; 2];
-
-    #[inline(always)]
-    fn run<L: Lanes>(self) -> [DVec3; 2] {
-        let mut low = [[f64::INFINITY; EIGHT]; 3];
-        let mut high = [[f64::NEG_INFINITY; EIGHT]; 3];
-        for EightBoxes { centers, halves } in self.boxes {
-            for axis in 0..3 {
-                let row = |m: &DMat3| [m.x_axis[axis], m.y_axis[axis], m.z_axis[axis]];
-                let (m, s) = (row(self.linear), row(self.sizes));
-                for lane in 0..EIGHT {
-                    let image = m[0] * centers[0][lane] + m[1] * centers[1][lane] + m[2] * centers[2][lane];
-                    let reach = s[0] * halves[0][lane] + s[1] * halves[1][lane] + s[2] * halves[2][lane];
-                    let (first, last) = (image - reach, image + reach);
-                    low[axis][lane] = if first < low[axis][lane] { first } else { low[axis][lane] };
-                    high[axis][lane] = if last > high[axis][lane] { last } else { high[axis][lane] };
-                }
-            }
-        }
-        let least = |lanes: [f64; EIGHT]| lanes.into_iter().fold(f64::INFINITY, f64::min);
-        let most = |lanes: [f64; EIGHT]| lanes.into_iter().fold(f64::NEG_INFINITY, f64::max);
-        [DVec3::from_array(low.map(least)), DVec3::from_array(high.map(most))]
-    }
-}
-
-/// A node's box, back from tree units.
-fn box_in_space(units: &Units, node: &Node, lane: usize) -> Aabb {
-    let plane = |side: usize| {
-        let planes = [0, 2, 4].map(|axis| f64::from(node.planes[axis + side][lane]));
-        DVec3::from_array(planes) / units.scale + units.origin
-    };
-    // Rounded once more than the planes were.
-    Aabb { min: plane(0), max: plane(1) }.outward(2)
-}
-
-/// A box around the image of a box (J. Arvo, "Transforming axis-aligned bounding boxes", Graphics Gems, 1990).
-fn placed_bounds(bounds: &Aabb, map: &Transform) -> Aabb {
-    if bounds.is_empty() {
-        return Aabb::EMPTY;
-    }
-    let (affine, sizes) = (map.affine(), sizes_of(map));
-    let [center, half] = center_and_half(bounds);
-    let image = affine.transform_point3(center);
-    let reach = sizes * half;
-    let rounding = rounding_of(map, &sizes, center.abs() + half);
-    Aabb { min: image - reach - rounding, max: image + reach + rounding }
-}
-
-fn center_and_half(bounds: &Aabb) -> [DVec3; 2] {
-    let center = bounds.center();
-    [center, (bounds.max - center).max(center - bounds.min)]
-}
-
-/// The sizes of the numbers of a map's linear part.
-fn sizes_of(map: &Transform) -> DMat3 {
-    let linear = map.linear();
-    DMat3::from_cols(linear.x_axis.abs(), linear.y_axis.abs(), linear.z_axis.abs())
-}
-
-/// By how much the image of a box with no larger coordinates than `reach` may be wrong.
-fn rounding_of(map: &Transform, sizes: &DMat3, reach: DVec3) -> DVec3 {
-    8.0 * f64::EPSILON * (*sizes * reach + map.affine().translation.abs())
 }
 
 /// What the build must know of a geometry.

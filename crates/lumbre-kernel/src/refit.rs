@@ -9,8 +9,10 @@ use rayon::prelude::*;
 
 use crate::carve::{Carver, LaneCell, cells_in, part_of};
 use crate::clouds::box_of;
+use crate::collapse::Entry;
 use crate::holds::{Holds, SingleStart};
 use crate::node::{Node, Units, WIDTH, tag};
+use crate::opening::{self, Families, Start};
 use crate::prepare::{Parts, has_area, take_apart, units_of};
 use crate::primitive::Bounds;
 use crate::spheres::{SphereBlock, has_radius};
@@ -94,9 +96,16 @@ pub(crate) fn refit(accel: &mut Accel, geometries: Vec<Geometry>) -> Result<f64,
     Ok(if built_cost > 0.0 { cost / built_cost } else { 1.0 })
 }
 
-/// Everything that can be hit is to have a place in the tree. Answers the boxes of the entries there; `None` of what became
-/// empty.
-pub(crate) fn check_places(accel: &Accel, parts: &Parts) -> Result<Vec<Option<Aabb>>, RefitError> {
+/// What the entries of a tree are now.
+pub(crate) struct Places {
+    /// The box of each; `None` of what became empty.
+    pub(crate) boxes: Vec<Option<Aabb>>,
+    /// The entries of instances that were opened, and where these are entered.
+    pub(crate) starts: Vec<(usize, Start)>,
+}
+
+/// Everything that can be hit is to have a place in the tree. Answers what the entries there are.
+pub(crate) fn check_places(accel: &Accel, parts: &Parts) -> Result<Places, RefitError> {
     check_triangles(accel, &accel.geometries)?;
     check_spheres(accel, &accel.geometries)?;
     entry_boxes(accel, parts)
@@ -105,13 +114,19 @@ pub(crate) fn check_places(accel: &Accel, parts: &Parts) -> Result<Vec<Option<Aa
 /// Gives the nodes and blocks of a tree what its geometries, whose parts these are, say. What it refuses leaves the tree as
 /// it was.
 pub(crate) fn fit(accel: &mut Accel, parts: Parts) -> Result<(), RefitError> {
-    let boxes = check_places(accel, &parts)?;
+    let Places { boxes, starts } = check_places(accel, &parts)?;
 
     // From here on nothing can fail.
     let geometries = &accel.geometries;
     let units = units_of(geometries, &parts);
     let carvers = Carver::of_all(geometries, &units);
     let tree = &mut accel.tree;
+    for (place, start) in starts {
+        let old = tree.entries[place];
+        if old.primitive() != start.word() {
+            tree.entries.to_mut()[place] = Entry::new(old.geometry, start.word(), old.is_last());
+        }
+    }
     let cells = &*tree.cells;
     let block_boxes: Vec<Bounds> = tree
         .blocks
@@ -178,7 +193,7 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts) -> Result<(), RefitError> {
     }
 
     accel.holds = Holds::new(geometries, parts.largest_corner, parts.sphere_reach);
-    accel.primitives = parts.boxed.len() + parts.triangles + parts.spheres + parts.infinite.len();
+    accel.primitives = parts.count();
     accel.infinite = parts.infinite;
     accel.single = SingleStart::new(&accel.holds, &units, accel.tree.root);
     accel.units = units;
@@ -205,7 +220,7 @@ fn is_same_topology(old: &GeometryKind, new: &GeometryKind) -> bool {
 
 /// What is infinite is to be the same as before.
 fn check_infinite(accel: &Accel, parts: &Parts) -> Result<(), RefitError> {
-    let name = |entry: &crate::collapse::Entry| (entry.geometry, entry.primitive());
+    let name = |entry: &Entry| (entry.geometry, entry.primitive());
     let (mut old, mut new) = (accel.infinite.iter().map(name), parts.infinite.iter().map(name));
     loop {
         match (old.next(), new.next()) {
@@ -280,16 +295,16 @@ fn check_spheres(accel: &Accel, geometries: &[Geometry]) -> Result<(), RefitErro
     Ok(())
 }
 
-/// The boxes of the entries in the tree; `None` of what became empty.
-fn entry_boxes(accel: &Accel, parts: &Parts) -> Result<Vec<Option<Aabb>>, RefitError> {
+/// What the entries in the tree are now.
+fn entry_boxes(accel: &Accel, parts: &Parts) -> Result<Places, RefitError> {
+    let (entries, geometries) = (&*accel.tree.entries, &accel.geometries);
     // In the order of their names, as they were taken apart.
     let mut has_place = vec![false; parts.boxed.len()];
-    let boxes = accel
-        .tree
-        .entries
+    let mut boxes: Vec<Option<Aabb>> = entries
         .iter()
         .map(|entry| {
-            let name = (entry.geometry, entry.primitive());
+            let primitive = if opening::is_part(entry, geometries) { 0 } else { entry.primitive() };
+            let name = (entry.geometry, primitive);
             let found = parts.boxed.binary_search_by_key(&name, |boxed| (boxed.geometry, boxed.primitive));
             found.ok().map(|place| {
                 has_place[place] = true;
@@ -297,16 +312,25 @@ fn entry_boxes(accel: &Accel, parts: &Parts) -> Result<Vec<Option<Aabb>>, RefitE
             })
         })
         .collect();
-    match has_place.iter().position(|&has_place| !has_place) {
-        Some(missing) => {
-            let boxed = &parts.boxed[missing];
-            Err(RefitError::NeedsBuild {
-                geometry: boxed.geometry as usize,
-                element: boxed.primitive as usize,
-            })
-        }
-        None => Ok(boxes),
+    if let Some(missing) = has_place.iter().position(|&has_place| !has_place) {
+        let boxed = &parts.boxed[missing];
+        return Err(RefitError::NeedsBuild {
+            geometry: boxed.geometry as usize,
+            element: boxed.primitive as usize,
+        });
     }
+    let mut families = Families::default();
+    let mut starts = Vec::new();
+    for (geometry, places) in opening::opened(entries, geometries) {
+        let GeometryKind::Instance(instance) = &geometries[geometry as usize].kind else { continue };
+        let old: Vec<Start> = places.iter().map(|&place| Start::of(entries[place].primitive())).collect();
+        let now = opening::starts_of(&mut families, instance, boxes[places[0]], &old);
+        for (place, (start, bounds)) in places.into_iter().zip(now) {
+            boxes[place] = bounds;
+            starts.push((place, start));
+        }
+    }
+    Ok(Places { boxes, starts })
 }
 
 /// Takes the corners over; a triangle without area becomes one that is never hit. Of those that are in parts, these are `cells`.

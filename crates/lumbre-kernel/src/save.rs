@@ -9,7 +9,8 @@
 //! blocks of spheres, entries, masks and parts of triangles there are; the reference to the root, or 2³² - 1; for each geometry
 //! its kind and how many primitives it has; for each node how many children it has, and references to them; for each block its
 //! geometry and eight triangles, 2³² - 1 for none; for each block of spheres the same; for each entry its geometry, and which
-//! primitive, with the top bit set in the last of a leaf; the masks; for each part of a triangle (see `carve`) eight times the block
+//! primitive (of an instance that was opened, the node of its tree where that is entered: see `opening`), with the top bit set in
+//! the last of a leaf; the masks; for each part of a triangle (see `carve`) eight times the block
 //! plus the lane that it stands in, and where its cell begins and ends on each axis, the end in the upper half. Then a checksum of
 //! eight bytes of everything before it: FNV-1a of 64 bits (G. Fowler, L. Noll, K. Vo, D. Eastlake, "The FNV Non-Cryptographic Hash
 //! Algorithm").
@@ -21,6 +22,7 @@ use crate::accel::Accel;
 use crate::carve::{Cell, LaneCell, find_incomplete};
 use crate::collapse::{Entry, Packed};
 use crate::node::{Node, WIDTH, tag};
+use crate::opening::is_part;
 use crate::prepare::{empty_over, take_apart};
 use crate::refit::{self, RefitError};
 use crate::spheres::SphereBlock;
@@ -29,7 +31,7 @@ use crate::{BuildError, Geometry, GeometryKind};
 
 const MAGIC: [u8; 8] = *b"LumbTree";
 /// Changes with the format, and with what the numbers mean.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 const NONE: u32 = u32::MAX;
 
 /// Why bytes are no tree over these geometries.
@@ -430,7 +432,12 @@ pub(crate) fn check_names(tree: &Packed, geometries: &[Geometry]) -> Result<(), 
         }
     }
     for (place, entry) in tree.entries.iter().enumerate() {
-        if name(None, entry.geometry, entry.primitive()).is_none() {
+        // Whether the parts of an instance are all of it is seen later, where their boxes are made.
+        let is_part = is_part(entry, geometries);
+        if is_part && !named_in_parts.insert([entry.geometry, 0]) {
+            continue;
+        }
+        if name(None, entry.geometry, if is_part { 0 } else { entry.primitive() }).is_none() {
             return inconsistent(format!("entry {place} names a primitive that is not there or was named"));
         }
     }

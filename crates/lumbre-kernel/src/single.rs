@@ -628,6 +628,8 @@ impl Goal for Whether {
 pub(crate) struct Alone<'a, 'r, G, const MIXED: bool, S = All> {
     accel: &'a Accel,
     start: &'a SingleStart,
+    /// The node that it starts at.
+    root: u32,
     ray: &'r Ray,
     selection: S,
     goal: PhantomData<G>,
@@ -654,29 +656,30 @@ pub(crate) fn search_among<G: Goal, S: Selection>(
     selection: S,
 ) -> Outcome<G::Answer> {
     if start.is_mixed {
-        level.run(Alone::<G, true, S> { accel, start, ray, selection, goal: PhantomData })
+        level.run(Alone::<G, true, S> { accel, start, root: start.root, ray, selection, goal: PhantomData })
     } else {
-        level.run(Alone::<G, false, S> { accel, start, ray, selection, goal: PhantomData })
+        level.run(Alone::<G, false, S> { accel, start, root: start.root, ray, selection, goal: PhantomData })
     }
 }
 
-/// The same among nothing but triangles, within a search that goes through other trees.
+/// The same among nothing but triangles, from a node on, within a search that goes through other trees.
 #[inline(always)]
 pub(crate) fn search_with<G: Goal, L: Lanes>(
     accel: &Accel,
     start: &SingleStart,
+    root: u32,
     ray: &Ray,
 ) -> Outcome<G::Answer> {
     if start.is_mixed {
         return Outcome::Unsettled;
     }
-    Alone::<G, false>::new(accel, start, ray).run::<L>()
+    Alone::<G, false> { root, ..Alone::new(accel, start, ray) }.run::<L>()
 }
 
 impl<'a, 'r, G, const MIXED: bool> Alone<'a, 'r, G, MIXED> {
     #[inline(always)]
     pub(crate) fn new(accel: &'a Accel, start: &'a SingleStart, ray: &'r Ray) -> Self {
-        Self { accel, start, ray, selection: All, goal: PhantomData }
+        Self { accel, start, root: start.root, ray, selection: All, goal: PhantomData }
     }
 }
 
@@ -685,11 +688,11 @@ impl<G: Goal, const MIXED: bool, S: Selection> Task for Alone<'_, '_, G, MIXED, 
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Self::Output {
-        let Self { accel, start, ray, selection, .. } = self;
+        let Self { accel, start, root, ray, selection, .. } = self;
         let Some(slabs) = L::start_single(start, ray) else { return Outcome::Unsettled };
         let way = Way::<L>::new(&accel.tree.nodes, slabs);
         let mut stack = Stack::new();
-        let mut next = start.root;
+        let mut next = root;
         let infinite = if MIXED { &*accel.infinite } else { &[] };
         if infinite.is_empty() {
             // Many rays come to no leaf, and need nothing else.

@@ -14,6 +14,7 @@ use crate::collapse::Entry;
 use crate::holds::SingleStart;
 use crate::lanes::{Lanes, Level, Task};
 use crate::node::{BoxRay, Progress, tag};
+use crate::opening::Start;
 use crate::single::{self, Nearest, Outcome, Whether};
 use crate::sphere_search::{self, AmongSpheres, CloudRay};
 use crate::spheres::ExactSphere;
@@ -337,7 +338,7 @@ impl<'a, S: Search<'a>> Task for AmongAll<'a, '_, S> {
         let mut boxes = BoxRay::passing_all();
         let meets_tree = start::<L, S>(accel, ray, search, &mut boxes);
         let mut frame = Frame::<Ray, L>::new(accel, *ray, boxes, search);
-        if enter(&mut frame, meets_tree, &place, &mut stack, search) {
+        if enter(&mut frame, Start::WHOLE, meets_tree, &place, &mut stack, search) {
             return true;
         }
         while let Some(reference) = frame.way.pop::<S::Order>(&mut stack) {
@@ -380,8 +381,9 @@ impl<'a, S: Search<'a>> Task for AmongAll<'a, '_, S> {
                     frame.narrow(search);
                 }
                 tag::INSTANCE => {
-                    let geometry = frame.accel.instance_entry(first).geometry;
-                    if !search.enters(frame.accel, geometry) {
+                    let entry = frame.accel.instance_entry(first);
+                    let (geometry, from) = (entry.geometry, Start::of(entry.primitive()));
+                    if from.is_nothing() || !search.enters(frame.accel, geometry) {
                         continue;
                     }
                     let standing = &frame.accel.geometries[geometry as usize];
@@ -392,8 +394,16 @@ impl<'a, S: Search<'a>> Task for AmongAll<'a, '_, S> {
                     let inner = &*instance.accel;
                     let mut boxes = BoxRay::passing_all();
                     if let Some(start) = &inner.single
-                        && let Outcome::Settled(is_over) =
-                            meet_single::<L, S>(inner, start, &ray, geometry, standing.id, &mut place, search)
+                        && let Outcome::Settled(is_over) = meet_single::<L, S>(
+                            inner,
+                            start,
+                            from,
+                            &ray,
+                            geometry,
+                            standing.id,
+                            &mut place,
+                            search,
+                        )
                     {
                         if is_over {
                             return true;
@@ -403,6 +413,7 @@ impl<'a, S: Search<'a>> Task for AmongAll<'a, '_, S> {
                     }
                     if inner.holds.only_triangles {
                         let Some(root) = inner.tree.root else { continue };
+                        let root = from.below(root);
                         if start::<L, S>(inner, &ray, search, &mut boxes) {
                             place.route.push(geometry);
                             place.ids.push(standing.id);
@@ -426,7 +437,7 @@ impl<'a, S: Search<'a>> Task for AmongAll<'a, '_, S> {
                     stack.push(S::Order::entry(tag::reference(tag::RETURN, 0)));
                     let inner = Frame::new(inner, ray, boxes, search);
                     suspended.push(std::mem::replace(&mut frame, inner));
-                    if enter(&mut frame, meets_tree, &place, &mut stack, search) {
+                    if enter(&mut frame, from, meets_tree, &place, &mut stack, search) {
                         return true;
                     }
                 }
@@ -446,9 +457,11 @@ impl<'a, S: Search<'a>> Task for AmongAll<'a, '_, S> {
 /// Searches a placed tree of nothing but triangles in single precision, where the search is one that this can settle. Whether
 /// that ends it.
 #[inline(always)]
+#[allow(clippy::too_many_arguments)]
 fn meet_single<'a, L: Lanes, S: Search<'a>>(
     inner: &'a Accel,
     start: &SingleStart,
+    from: Start,
     ray: &Ray,
     geometry: u32,
     id: u32,
@@ -457,8 +470,9 @@ fn meet_single<'a, L: Lanes, S: Search<'a>>(
 ) -> Outcome<bool> {
     // Nothing beyond the limit is wanted; what is met has the same bits whatever the range.
     let ray = ray.with_range(search.floor(), search.limit());
+    let root = from.below(start.root);
     match S::ASK {
-        Ask::First => match single::search_with::<Nearest, L>(inner, start, &ray) {
+        Ask::First => match single::search_with::<Nearest, L>(inner, start, root, &ray) {
             Outcome::Settled(None) => Outcome::Settled(false),
             Outcome::Settled(Some(winner)) => {
                 place.route.push(geometry);
@@ -473,7 +487,7 @@ fn meet_single<'a, L: Lanes, S: Search<'a>>(
             Outcome::Unsettled => Outcome::Unsettled,
         },
         Ask::Whether => {
-            let outcome = single::search_with::<Whether, L>(inner, start, &ray);
+            let outcome = single::search_with::<Whether, L>(inner, start, root, &ray);
             if outcome == Outcome::Settled(true) {
                 search.settle();
             }
@@ -483,17 +497,18 @@ fn meet_single<'a, L: Lanes, S: Search<'a>>(
     }
 }
 
-/// Starts on a tree: what is infinite at once, the rest onto the stack. True ends the search.
+/// Starts on a tree, or on a part of one: what is infinite at once, the rest onto the stack. True ends the search.
 #[inline(always)]
 fn enter<'a, L: Lanes, S: Search<'a>>(
     frame: &mut Frame<'a, Ray, L>,
+    from: Start,
     meets_tree: bool,
     place: &Place,
     stack: &mut Stack<<S::Order as Order>::Entry>,
     search: &mut S,
 ) -> bool {
     if let Some(root) = frame.accel.tree.root.filter(|_| meets_tree) {
-        stack.push(S::Order::entry(root));
+        stack.push(S::Order::entry(from.below(root)));
     }
     for (i, entry) in frame.accel.infinite.iter().enumerate() {
         if matches!(frame.accel.geometries[entry.geometry as usize].kind, GeometryKind::Instance(_)) {

@@ -9,6 +9,7 @@ mod file;
 mod inside;
 mod motion;
 mod nearest;
+mod opening;
 mod options;
 mod oracle;
 mod parts;

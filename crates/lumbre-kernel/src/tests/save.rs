@@ -85,7 +85,7 @@ fn what_is_wrong_with_bytes_is_said() {
     }
     let mut later = bytes.clone();
     later[8] = 7;
-    assert_eq!(load(&later), LoadError::OtherVersion { found: 7, expected: 4 });
+    assert_eq!(load(&later), LoadError::OtherVersion { found: 7, expected: 5 });
     let mut longer = bytes.clone();
     longer.extend([0; 4]);
     assert_eq!(load(&longer), LoadError::Damaged);

@@ -1,0 +1,237 @@
+//! Boxes that together hold what is in a tree, and the box around them where the tree is placed.
+
+use lumbre_geometry::Aabb;
+use lumbre_math::{AnimatedTransform, DMat3, DVec3, Transform};
+
+use crate::lanes::{Lanes, Level, Task};
+use crate::node::{Node, Units, tag};
+use crate::{Accel, Placement};
+
+/// Boxes of an outline, about.
+const OUTLINE: usize = 128;
+
+/// Boxes of a tree that together hold what is finite in it. The box around an instance is that of many boxes, each taken over
+/// by itself, which is tighter than the image of the whole.
+pub(crate) struct Outline {
+    whole: Aabb,
+    boxes: Vec<EightBoxes>,
+    /// No coordinate is larger.
+    reach: DVec3,
+}
+
+impl Outline {
+    /// Of a whole tree.
+    pub(crate) fn of(inner: &Accel) -> Self {
+        let whole = inner.bounds;
+        match inner.tree.root.filter(|_| inner.infinite.is_empty()) {
+            Some(root) => Self::below(inner, root, whole, OUTLINE),
+            None => Self::of_box(whole),
+        }
+    }
+
+    fn of_box(whole: Aabb) -> Self {
+        Self { whole, boxes: Vec::new(), reach: DVec3::ZERO }
+    }
+
+    /// Of what is below a reference, within a box, by some such number of boxes.
+    pub(crate) fn below(inner: &Accel, reference: u32, whole: Aabb, count: usize) -> Self {
+        let node = |reference: u32| {
+            (reference >> tag::SHIFT == tag::INNER).then(|| &inner.tree.nodes[reference as usize])
+        };
+        let Some(root) = node(reference) else { return Self::of_box(whole) };
+        let children = |node: &Node| -> Vec<(Aabb, u32)> {
+            (0..node.len as usize)
+                .map(|lane| (box_in_space(&inner.units, node, lane), node.children[lane]))
+                .collect()
+        };
+        let mut open = children(root);
+        while open.len() < count {
+            let area = |i: &usize| open[*i].0.half_area();
+            let inner_ones = (0..open.len()).filter(|&i| node(open[i].1).is_some());
+            let Some(largest) = inner_ones.max_by(|a, b| area(a).total_cmp(&area(b))) else { break };
+            let (_, reference) = open.swap_remove(largest);
+            open.extend(node(reference).map(children).unwrap_or_default());
+        }
+        let filled = open.iter().map(|(bounds, _)| bounds).filter(|bounds| !bounds.is_empty());
+        let boxes: Vec<_> = filled.map(center_and_half).collect();
+        let reach = boxes.iter().fold(DVec3::ZERO, |most, [center, half]| most.max(center.abs() + *half));
+        let boxes = boxes.chunks(EIGHT).map(EightBoxes::new).collect();
+        Self { whole, boxes, reach }
+    }
+
+    /// A box around it at all times.
+    pub(crate) fn at(&self, placement: &Placement) -> Aabb {
+        match placement {
+            Placement::Still(map) => self.placed(map),
+            Placement::Moving(motion) => self.swept(motion),
+        }
+    }
+
+    fn placed(&self, map: &Transform) -> Aabb {
+        let whole = placed_bounds(&self.whole, map);
+        if self.boxes.is_empty() {
+            return whole;
+        }
+        let (affine, sizes) = (map.affine(), sizes_of(map));
+        let [min, max] =
+            Level::best().run(Images { boxes: &self.boxes, linear: &affine.matrix3, sizes: &sizes });
+        let rounding = rounding_of(map, &sizes, self.reach);
+        let (min, max) = (min + affine.translation - rounding, max + affine.translation + rounding);
+        // Each bounds it, so that their common part does.
+        Aabb { min: min.max(whole.min), max: max.min(whole.max) }
+    }
+}
+
+impl Outline {
+    /// The same of what moves.
+    ///
+    /// Every point of the outline goes, between two neighbours of a list of steps, along a curve that stays within a certain
+    /// distance of its chord. The ends of the chord lie in the boxes at the two steps, so that all of the chord lies in the
+    /// box around both: the curve lies in that box when it is widened by the distance. Before the first key and after the
+    /// last, everything is as at these. What rounds in a map between two keys is a few 2⁻⁵³ of what the maps at the keys make
+    /// of the outline, times their condition.
+    fn swept(&self, motion: &AnimatedTransform) -> Aabb {
+        let mut swept = Aabb::EMPTY;
+        for (_, map) in motion.keys() {
+            swept = swept.union(self.placed(map));
+        }
+        if self.whole.is_empty() {
+            return swept;
+        }
+        let [center, half] = center_and_half(&self.whole);
+        // An instance grows by a fiftieth of its size.
+        let sizes = |map: &Transform| (sizes_of(map) * half).length();
+        let smallest = motion.keys().iter().map(|(_, map)| sizes(map)).fold(f64::INFINITY, f64::min);
+        for (maps, distance) in motion.steps(center, half, 0.02 * smallest) {
+            let along = maps.iter().fold(Aabb::EMPTY, |along, map| along.union(self.placed(map)));
+            let reach = along.min.abs().max(along.max.abs());
+            let rounding = 64.0 * f64::EPSILON * motion.condition() * reach.max_element();
+            let margin = DVec3::splat(distance + rounding);
+            swept = swept.union(Aabb { min: along.min - margin, max: along.max + margin });
+        }
+        swept
+    }
+}
+
+/// How many boxes are taken over at a time.
+const EIGHT: usize = 8;
+
+/// The middles of eight boxes and half their sizes, by axes.
+pub(crate) struct EightBoxes {
+    centers: [[f64; EIGHT]; 3],
+    halves: [[f64; EIGHT]; 3],
+}
+
+impl EightBoxes {
+    /// Of some; where there are fewer, the first comes again.
+    pub(crate) fn new(boxes: &[[DVec3; 2]]) -> Self {
+        let component = |part: usize, axis: usize| {
+            std::array::from_fn(|lane| boxes.get(lane).unwrap_or(&boxes[0])[part][axis])
+        };
+        let components = |part: usize| [0, 1, 2].map(|axis| component(part, axis));
+        Self { centers: components(0), halves: components(1) }
+    }
+}
+
+impl EightBoxes {
+    /// Half the areas of the boxes around the images of the first `count`, together.
+    pub(crate) fn placed_area(&self, count: usize, map: &Transform) -> f64 {
+        let areas = Level::best().run(Areas { boxes: self, sizes: &sizes_of(map) });
+        areas[..count.min(EIGHT)].iter().sum()
+    }
+}
+
+/// Half the area of the box around the image of each of eight boxes.
+struct Areas<'a> {
+    boxes: &'a EightBoxes,
+    /// The sizes of the numbers of the linear part.
+    sizes: &'a DMat3,
+}
+
+impl Task for Areas<'_> {
+    type Output = [f64; EIGHT];
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> [f64; EIGHT] {
+        let (halves, s) = (&self.boxes.halves, self.sizes);
+        std::array::from_fn(|lane| {
+            let [x, y, z] = [0, 1, 2].map(|axis| halves[axis][lane]);
+            let size = |axis: usize| 2.0 * (s.x_axis[axis] * x + s.y_axis[axis] * y + s.z_axis[axis] * z);
+            size(0) * size(1) + size(1) * size(2) + size(2) * size(0)
+        })
+    }
+}
+
+/// The box around the images of boxes, its translation apart.
+struct Images<'a> {
+    boxes: &'a [EightBoxes],
+    linear: &'a DMat3,
+    /// The sizes of its numbers.
+    sizes: &'a DMat3,
+}
+
+impl Task for Images<'_> {
+    type Output = [DVec3; 2];
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> [DVec3; 2] {
+        let mut low = [[f64::INFINITY; EIGHT]; 3];
+        let mut high = [[f64::NEG_INFINITY; EIGHT]; 3];
+        for EightBoxes { centers, halves } in self.boxes {
+            for axis in 0..3 {
+                let row = |m: &DMat3| [m.x_axis[axis], m.y_axis[axis], m.z_axis[axis]];
+                let (m, s) = (row(self.linear), row(self.sizes));
+                for lane in 0..EIGHT {
+                    let image = m[0] * centers[0][lane] + m[1] * centers[1][lane] + m[2] * centers[2][lane];
+                    let reach = s[0] * halves[0][lane] + s[1] * halves[1][lane] + s[2] * halves[2][lane];
+                    let (first, last) = (image - reach, image + reach);
+                    low[axis][lane] = if first < low[axis][lane] { first } else { low[axis][lane] };
+                    high[axis][lane] = if last > high[axis][lane] { last } else { high[axis][lane] };
+                }
+            }
+        }
+        let least = |lanes: [f64; EIGHT]| lanes.into_iter().fold(f64::INFINITY, f64::min);
+        let most = |lanes: [f64; EIGHT]| lanes.into_iter().fold(f64::NEG_INFINITY, f64::max);
+        [DVec3::from_array(low.map(least)), DVec3::from_array(high.map(most))]
+    }
+}
+
+/// A node's box, back from tree units.
+pub(crate) fn box_in_space(units: &Units, node: &Node, lane: usize) -> Aabb {
+    let plane = |side: usize| {
+        let planes = [0, 2, 4].map(|axis| f64::from(node.planes[axis + side][lane]));
+        DVec3::from_array(planes) / units.scale + units.origin
+    };
+    // Rounded once more than the planes were.
+    Aabb { min: plane(0), max: plane(1) }.outward(2)
+}
+
+/// A box around the image of a box (J. Arvo, "Transforming axis-aligned bounding boxes", Graphics Gems, 1990).
+fn placed_bounds(bounds: &Aabb, map: &Transform) -> Aabb {
+    if bounds.is_empty() {
+        return Aabb::EMPTY;
+    }
+    let (affine, sizes) = (map.affine(), sizes_of(map));
+    let [center, half] = center_and_half(bounds);
+    let image = affine.transform_point3(center);
+    let reach = sizes * half;
+    let rounding = rounding_of(map, &sizes, center.abs() + half);
+    Aabb { min: image - reach - rounding, max: image + reach + rounding }
+}
+
+/// The middle of a box, and half its size.
+pub(crate) fn center_and_half(bounds: &Aabb) -> [DVec3; 2] {
+    let center = bounds.center();
+    [center, (bounds.max - center).max(center - bounds.min)]
+}
+
+/// The sizes of the numbers of a map's linear part.
+fn sizes_of(map: &Transform) -> DMat3 {
+    let linear = map.linear();
+    DMat3::from_cols(linear.x_axis.abs(), linear.y_axis.abs(), linear.z_axis.abs())
+}
+
+/// By how much the image of a box with no larger coordinates than `reach` may be wrong.
+fn rounding_of(map: &Transform, sizes: &DMat3, reach: DVec3) -> DVec3 {
+    8.0 * f64::EPSILON * (*sizes * reach + map.affine().translation.abs())
+}
