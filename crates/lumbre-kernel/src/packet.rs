@@ -42,9 +42,9 @@ pub(crate) const PACKET: usize = WIDE;
 const MOST_DISTANCE: f32 = 0.25;
 /// How far apart their directions may be, by the largest component.
 const MOST_SPREAD: f32 = 0.25;
-/// How many triangles they may be tested against before they go alone: where triangles are small beside the distances between
-/// the rays, that is faster.
-const MOST_TESTS: u32 = 96;
+/// How much they may do before they go alone: where boxes and triangles are small beside the distances between the rays, that is
+/// faster. In nodes met; a block of triangles is as much as two, and so is a triangle.
+const MOST_WORK: u32 = 128;
 /// What the corners of triangles may be wrong by, by their size: 32u, see above.
 const CULL_ERROR: f32 = 32.0 / (1 << 24) as f32;
 
@@ -260,8 +260,8 @@ struct Packet<'a, 'r> {
     alive: u32,
     met: u32,
     unsettled: u32,
-    /// How many triangles it was tested against.
-    tests: u32,
+    /// What it has done, in nodes met.
+    work: u32,
 }
 
 impl Packet<'_, '_> {
@@ -505,7 +505,7 @@ impl Packet<'_, '_> {
         for (number, block) in (places.start as u32..).zip(&triangles[places]) {
             let bounds = self.bounds::<L::Wide>(block);
             let mut rest = bounds.mask;
-            self.tests += rest.count_ones();
+            self.work += 2 + 2 * rest.count_ones();
             while rest != 0 {
                 let lane = rest.trailing_zeros() as usize;
                 rest &= rest - 1;
@@ -521,6 +521,7 @@ impl Packet<'_, '_> {
         let mut reference = root;
         loop {
             while reference >> tag::SHIFT == tag::INNER {
+                self.work += 1;
                 let slots = stack.with_room();
                 let node = &nodes[reference as usize];
                 let (mask, keys) = L::meet_frustum(node, lanes::opaque(&self.frustum));
@@ -539,7 +540,7 @@ impl Packet<'_, '_> {
             if self.alive == 0 {
                 return true;
             }
-            if self.tests > MOST_TESTS {
+            if self.work > MOST_WORK {
                 return false;
             }
             match self.pop::<G>(&mut stack) {
@@ -585,7 +586,7 @@ pub(crate) fn search<G: Goal, L: Lanes>(
         alive: ALL,
         met: 0,
         unsettled: 0,
-        tests: 0,
+        work: 0,
     };
     if !packet.run::<G, L>(&accel.tree.nodes, single.root) {
         return false;
