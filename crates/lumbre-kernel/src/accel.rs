@@ -302,8 +302,8 @@ impl Accel {
 
     /// [`Accel::closest`] for every ray, with the same answers to the bit; `hits` has a place for each.
     ///
-    /// In a tree of triangles, sixteen rays in a row that are much alike (those of a square of four by four pixels, say, but not of
-    /// sixteen pixels in a line) are traced together, which takes about half the time. In a large tree (some hundred thousand
+    /// In a tree of triangles, sixteen rays in a row that are much alike (those of a square of four by four pixels, say, rather than
+    /// of sixteen pixels in a line) are traced together, which takes down to half the time. In a large tree (some hundred thousand
     /// triangles), several rays are in flight at a time instead, which hides the wait for memory. All others are traced one after
     /// another. Hundreds of rays at a time suffice. It works on the calling thread: to use more, split `rays` and `hits`.
     ///

@@ -2,7 +2,8 @@
 //!
 //! They go from box to box as one frustum, of which a node costs little more than of one ray. At a leaf, triangles that none of
 //! them can meet are left out eight at a time; each of the others is tested against all sixteen, by the operations and with the
-//! bounds of [`BlockRay`](crate::triangles::BlockRay), so that an answer has the bits that it has alone.
+//! bounds of [`BlockRay`](crate::triangles::BlockRay), so that an answer has the bits that it has alone. Where
+//! that turns out to be more work than it is worth, they go alone after all.
 //!
 //! # Why the frustum loses no box
 //!
