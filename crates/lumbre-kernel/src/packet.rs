@@ -119,13 +119,18 @@ fn start<W: Wide>(start: &SingleStart, columns: &[Row<f64>; 8]) -> Option<(Frust
         is_long |= W::splat(start.shortest).at_most(length[axis]);
     }
     let sizes = [length[1].at_most(length[0]), length[2].at_most(length[1]), length[2].at_most(length[0])];
-    let mut bits = 0;
-    for (place, &size) in sizes.iter().enumerate() {
-        if size != 0 && size != ALL {
-            return None;
-        }
-        bits |= (size & 1) << place;
-    }
+    // Which axis is the last: of the others, either may be larger.
+    let x_is_last = sizes[0] & sizes[2];
+    let y_is_last = sizes[1] & !x_is_last;
+    let bits = if x_is_last == ALL {
+        0b101
+    } else if y_is_last == ALL {
+        0b010
+    } else if x_is_last | y_is_last == 0 {
+        0
+    } else {
+        return None;
+    };
     let axes = Axes::by_bits(signs, bits);
     let (t_min, t_max) = (W::rounded(&columns[6]), W::rounded(&columns[7]));
     fits &= zero.at_most(t_min) & t_min.at_most(t_max);

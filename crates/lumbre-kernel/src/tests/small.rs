@@ -12,6 +12,7 @@ use super::oracle::check;
 use super::scenes::{
     Random, balls, build, cloud, cube, icosphere, options, precise, ray, shape, soup, with_every_preset,
 };
+use crate::packet::{self, PACKET};
 use crate::{Accel, GeometryKind, Instance};
 
 /// How many random rays a tree is asked with: in the interpreter, every one takes seconds.
@@ -56,6 +57,26 @@ fn a_few_rays_are_answered_as_by_the_loop() {
             }
         }
     });
+}
+
+#[test]
+fn sixteen_rays_that_go_together_are_answered_as_each_alone() {
+    let mut random = Random(97);
+    let accel = build(vec![GeometryKind::Mesh(Arc::new(icosphere(1, CENTER, 2.0)))]);
+    let eye = CENTER + DVec3::new(1.5, 1.25, 9.0);
+    // One of them exactly through a corner.
+    let rays: [Ray; PACKET] = std::array::from_fn(|i| {
+        let beside = if i == 5 { DVec3::ZERO } else { 0.3 * random.vector() };
+        Ray::new(eye, CENTER + DVec3::new(0.0, 0.0, 2.0) + beside - eye)
+    });
+    assert!(packet::are_alike(accel.level, accel.single.as_ref().expect("a mesh alone"), &rays));
+    let (mut hits, mut any) = (vec![None; rays.len()], vec![false; rays.len()]);
+    accel.closest_batch(&rays, &mut hits);
+    accel.any_batch(&rays, &mut any);
+    for ((ray, hit), any) in rays.iter().zip(&hits).zip(any) {
+        assert_eq!(accel.closest_plainly_at(accel.level, ray), *hit);
+        assert_eq!(any, hit.is_some());
+    }
 }
 
 #[test]
