@@ -6,8 +6,6 @@ use crate::triangles::BLOCK;
 
 /// How many are few.
 pub(crate) const FEW: usize = 2 * BLOCK;
-/// The most primitives that are no triangles in a leaf; of instances, one.
-const MOST_OTHERS: usize = 4;
 /// What a node costs, in the units of costs.
 const NODE_COST: f32 = 16.0;
 
@@ -23,11 +21,7 @@ pub(crate) enum Few {
 fn is_uniform(primitives: &[Primitive], traits: &[Traits]) -> bool {
     let group = |p: &Primitive| group_of(p, traits);
     let first = group(&primitives[0]);
-    let most = match first.0 {
-        Kind::Triangle | Kind::Sphere => BLOCK,
-        Kind::Instance => 1,
-        Kind::Shape | Kind::Custom | Kind::Precise => MOST_OTHERS,
-    };
+    let most = traits[primitives[0].first() as usize].most;
     primitives.len() <= most && primitives[1..].iter().all(|p| group(p) == first)
 }
 
