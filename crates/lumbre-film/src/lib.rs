@@ -11,5 +11,5 @@ mod tile;
 
 pub use bounds::PixelBounds;
 pub use filter::{Filter, FilterSample, FilterShape};
-pub use pixel::{FeatureSample, FeatureSums, Pixel};
-pub use tile::{Exposure, Sample, Tile};
+pub use pixel::{FeatureSample, FeatureSums, Pixel, Tint};
+pub use tile::{Exposure, Extras, Sample, Tile};

@@ -56,6 +56,34 @@ impl Pixel {
     }
 }
 
+/// By how much the coverage of red and that of blue are more than that of green: weighted sums of the samples of one pixel.
+///
+/// As a rule they are exactly zero, and else as noisy as shadows are: single precision is enough.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Tint {
+    red: f32,
+    blue: f32,
+}
+
+impl Tint {
+    /// Adds the coverage of a sample.
+    pub fn add(&mut self, coverage: Rgb, weight: f64) {
+        self.red += (weight * f64::from(coverage.r - coverage.g)) as f32;
+        self.blue += (weight * f64::from(coverage.b - coverage.g)) as f32;
+    }
+
+    /// The mean coverage of each colour in the pixel that the same samples were added to, in [0, 1]; 0 where there is none.
+    pub fn coverage(&self, of: &Pixel) -> Rgb {
+        if of.weight == 0.0 {
+            return Rgb::BLACK;
+        }
+        let [red, blue] = [self.red, self.blue].map(f64::from);
+        let green = of.covered - (red + blue) / 3.0;
+        let share = |covered: f64| (covered / of.weight).clamp(0.0, 1.0) as f32;
+        Rgb::new(share(green + red), share(green), share(green + blue))
+    }
+}
+
 /// What a sample met first.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FeatureSample {

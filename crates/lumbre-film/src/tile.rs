@@ -2,7 +2,7 @@
 
 use lumbre_image::Rgb;
 
-use crate::{FeatureSample, FeatureSums, Pixel, PixelBounds};
+use crate::{FeatureSample, FeatureSums, Pixel, PixelBounds, Tint};
 
 /// How radiance becomes the colour of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,8 +33,8 @@ impl Exposure {
 pub struct Sample {
     /// Radiance.
     pub radiance: Rgb,
-    /// How much of what is behind it covers; the radiance is multiplied by it.
-    pub coverage: f32,
+    /// How much of what is behind it covers, of each colour; the radiance is multiplied by it.
+    pub coverage: Rgb,
     /// What it counts: the weight of the filter.
     pub weight: f64,
     /// What it met first, if features are wanted and it met anything.
@@ -48,16 +48,28 @@ pub struct Tile {
     pixels: Vec<Pixel>,
     // Empty unless features are wanted; else as many as pixels.
     features: Vec<FeatureSums>,
+    // Empty unless coverage is wanted by colour; else as many as pixels.
+    tints: Vec<Tint>,
+}
+
+/// What is wanted of samples besides the colour of pixels and their coverage.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Extras {
+    /// What the samples met first.
+    pub features: bool,
+    /// By how much the coverage of each colour is another.
+    pub tints: bool,
 }
 
 impl Tile {
     /// No samples yet.
-    pub fn new(bounds: PixelBounds, with_features: bool) -> Self {
+    pub fn new(bounds: PixelBounds, extras: Extras) -> Self {
         let count = bounds.area() as usize;
         Self {
             bounds,
             pixels: vec![Pixel::default(); count],
-            features: vec![FeatureSums::default(); if with_features { count } else { 0 }],
+            features: vec![FeatureSums::default(); if extras.features { count } else { 0 }],
+            tints: vec![Tint::default(); if extras.tints { count } else { 0 }],
         }
     }
 
@@ -76,6 +88,17 @@ impl Tile {
         &self.features
     }
 
+    /// The coverage of every pixel by colour, row by row; where that is not wanted, of all colours alike.
+    pub fn coverages(&self) -> impl Iterator<Item = Rgb> + '_ {
+        let tints = self.tints.iter().copied().chain(std::iter::repeat(Tint::default()));
+        self.pixels.iter().zip(tints).map(|(pixel, tint)| tint.coverage(pixel))
+    }
+
+    /// Whether the coverage of any pixel is not that of all colours alike.
+    pub fn is_tinted(&self) -> bool {
+        self.tints.iter().any(|tint| *tint != Tint::default())
+    }
+
     /// Adds a sample to the pixel in column `x` and row `y` of the picture. False, and nothing is added, when the sample
     /// is not finite or the pixel is elsewhere.
     pub fn add(&mut self, x: u32, y: u32, sample: &Sample, exposure: &Exposure) -> bool {
@@ -88,7 +111,10 @@ impl Tile {
             return false;
         }
         let position = (y - b.y0) as usize * b.width() as usize + (x - b.x0) as usize;
-        self.pixels[position].add(colour, sample.coverage, sample.weight);
+        self.pixels[position].add(colour, sample.coverage.average(), sample.weight);
+        if let Some(tint) = self.tints.get_mut(position) {
+            tint.add(sample.coverage, sample.weight);
+        }
         if let Some(sums) = self.features.get_mut(position) {
             sums.add(sample.features.as_ref(), sample.weight);
         }
@@ -102,8 +128,10 @@ mod tests {
 
     #[test]
     fn a_sample_goes_to_its_own_pixel_and_one_that_is_not_finite_to_none() {
-        let mut tile = Tile::new(PixelBounds { x0: 5, y0: 7, x1: 9, y1: 10 }, true);
-        let sample = |radiance| Sample { radiance, coverage: 0.25, weight: 1.0, features: None };
+        let extras = Extras { features: true, tints: true };
+        let mut tile = Tile::new(PixelBounds { x0: 5, y0: 7, x1: 9, y1: 10 }, extras);
+        let coverage = Rgb::splat(0.25);
+        let sample = |radiance| Sample { radiance, coverage, weight: 1.0, features: None };
         let exposure = Exposure { factor: 2.0, max_component: 6.0 };
         assert!(tile.add(6, 9, &sample(Rgb::new(1.0, 2.0, 3.0)), &exposure));
         assert!(!tile.add(9, 9, &sample(Rgb::WHITE), &exposure));
@@ -116,6 +144,25 @@ mod tests {
             assert_eq!(colour, expected, "{i}");
         }
         assert_eq!(tile.pixels()[2 * 4 + 1].coverage(), 0.25);
+        assert!(!tile.is_tinted());
+    }
+
+    #[test]
+    fn coverage_is_kept_by_colour_where_it_is_wanted() {
+        let bounds = PixelBounds { x0: 5, y0: 7, x1: 9, y1: 10 };
+        let covered = [Rgb::new(0.75, 0.5, 0.125), Rgb::new(0.25, 1.0, 0.5)];
+        let mut tiles = [true, false].map(|tints| Tile::new(bounds, Extras { features: false, tints }));
+        for tile in &mut tiles {
+            for (coverage, weight) in covered.into_iter().zip([1.0, 3.0]) {
+                let sample = Sample { radiance: Rgb::BLACK, coverage, weight, features: None };
+                assert!(tile.add(7, 8, &sample, &Exposure::default()));
+            }
+        }
+        let [by_colour, alike] = tiles.each_ref().map(|tile| tile.coverages().collect::<Vec<_>>());
+        let mean = (covered[0] + covered[1] * 3.0) / 4.0;
+        assert!((by_colour[6] - mean).map(f32::abs).max_component() < 1e-6, "{:?} {mean:?}", by_colour[6]);
+        assert!((alike[6] - Rgb::splat(mean.average())).map(f32::abs).max_component() < 1e-6);
+        assert_eq!((by_colour[5], tiles[0].is_tinted(), tiles[1].is_tinted()), (Rgb::BLACK, true, false));
     }
 
     #[test]

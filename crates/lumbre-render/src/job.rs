@@ -4,13 +4,13 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-use lumbre_film::{FeatureSample, Filter, Sample, Tile};
+use lumbre_film::{Extras, FeatureSample, Filter, Sample, Tile};
 use lumbre_math::DVec2;
 use lumbre_scene::{Scene, View};
 use lumbre_transport::{Feature, Features, Integrator, RayCounts, Sampler, Sight, integrator, see};
 use rayon::prelude::*;
 
-use crate::rendered::{feature_picture, noise, picture};
+use crate::rendered::{coverage_picture, feature_picture, noise, picture};
 use crate::{
     CancelToken, DroppedSample, Progress, RenderError, RenderOptions, Rendered, Snapshot, State, Stats,
 };
@@ -83,8 +83,10 @@ pub fn render_with(
             progress,
         },
     };
+    let catches_shadows = scene.ground().is_some_and(|ground| ground.catcher);
+    let extras = Extras { features: options.features, tints: options.transparent && catches_shadows };
     let mut owners: Vec<Owner> =
-        bounds.tiles(TILE).into_iter().map(|tile| Owner::new(Tile::new(tile, options.features))).collect();
+        bounds.tiles(TILE).into_iter().map(|tile| Owner::new(Tile::new(tile, extras))).collect();
 
     let mut done = 0;
     while done < spp {
@@ -123,6 +125,7 @@ pub fn render_with(
         if options.features { &[Feature::Albedo, Feature::Normal, Feature::Depth, Feature::Uv] } else { &[] };
     Ok(Rendered {
         image: picture(tiles(), bounds, options.transparent),
+        coverage: coverage_picture(tiles(), bounds),
         bounds,
         features: wanted.iter().map(|&f| (f, feature_picture(tiles(), bounds, f))).collect(),
         stats: Stats {

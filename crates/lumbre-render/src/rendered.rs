@@ -12,6 +12,9 @@ pub struct Rendered {
     /// The pixels of [`Rendered::bounds`]; black where no sample was taken. With coverage, by which its colours are
     /// multiplied, if the options ask for a transparent picture.
     pub image: Image,
+    /// Coverage by colour, of which that of the image is the mean: where a transparent picture has coloured shadows on its
+    /// ground. `None` where it is that of all colours alike.
+    pub coverage: Option<Image>,
     /// Which pixels of the whole picture.
     pub bounds: PixelBounds,
     /// Feature images, if they were asked for: albedo, normal (with signs), depth, uv (in red and green).
@@ -68,12 +71,23 @@ pub(crate) fn picture<'t>(
     bounds: PixelBounds,
     transparent: bool,
 ) -> Image {
-    let image = put_together(tiles.clone(), bounds, Tile::pixels, Pixel::colour);
+    let pixels = |tile: &'t Tile| tile.pixels().iter();
+    let colours = put_together(tiles.clone(), bounds, Rgb::BLACK, |tile| pixels(tile).map(Pixel::colour));
+    let image = image_of(bounds, colours);
     if !transparent {
         return image;
     }
-    let alpha = put_together(tiles, bounds, Tile::pixels, |pixel: &Pixel| Rgb::splat(pixel.coverage()));
-    image.clone().with_alpha(alpha.channel(0).collect()).unwrap_or(image)
+    let alpha = put_together(tiles, bounds, 0.0, |tile| pixels(tile).map(Pixel::coverage));
+    image.with_alpha(alpha).expect("a value for each pixel")
+}
+
+/// The coverage of some tiles by colour; `None` where it is that of all colours alike.
+pub(crate) fn coverage_picture<'t>(
+    tiles: impl Iterator<Item = &'t Tile> + Clone,
+    bounds: PixelBounds,
+) -> Option<Image> {
+    let is_tinted = tiles.clone().any(Tile::is_tinted);
+    is_tinted.then(|| image_of(bounds, put_together(tiles, bounds, Rgb::BLACK, Tile::coverages)))
 }
 
 /// The picture of a feature.
@@ -82,7 +96,7 @@ pub(crate) fn feature_picture<'t>(
     bounds: PixelBounds,
     feature: Feature,
 ) -> Image {
-    put_together(tiles, bounds, Tile::features, |sums: &FeatureSums| match feature {
+    let colour = |sums: &FeatureSums| match feature {
         Feature::Albedo => sums.albedo(),
         Feature::Normal => sums.normal(),
         Feature::Depth => Rgb::splat(sums.depth()),
@@ -90,25 +104,29 @@ pub(crate) fn feature_picture<'t>(
             let [u, v] = sums.uv();
             Rgb::new(u, v, 0.0)
         }
-    })
+    };
+    image_of(bounds, put_together(tiles, bounds, Rgb::BLACK, |tile| tile.features().iter().map(colour)))
 }
 
-fn put_together<'t, T: 't>(
+/// The values of all pixels, row by row, from those of tiles; `none` where there is no tile.
+fn put_together<'t, T: Copy, I: Iterator<Item = T>>(
     tiles: impl Iterator<Item = &'t Tile>,
     bounds: PixelBounds,
-    values: impl Fn(&'t Tile) -> &'t [T],
-    colour: impl Fn(&T) -> Rgb,
-) -> Image {
-    let mut image = Image::filled(bounds.width(), bounds.height(), Rgb::BLACK);
+    none: T,
+    values: impl Fn(&'t Tile) -> I,
+) -> Vec<T> {
     let width = bounds.width() as usize;
+    let mut all = vec![none; bounds.area() as usize];
     for tile in tiles {
-        let own = tile.bounds();
-        for ((x, y), value) in own.pixels().zip(values(tile)) {
-            let position = (y - bounds.y0) as usize * width + (x - bounds.x0) as usize;
-            image.pixels_mut()[position] = colour(value);
+        for ((x, y), value) in tile.bounds().pixels().zip(values(tile)) {
+            all[(y - bounds.y0) as usize * width + (x - bounds.x0) as usize] = value;
         }
     }
-    image
+    all
+}
+
+fn image_of(bounds: PixelBounds, pixels: Vec<Rgb>) -> Image {
+    Image::from_pixels(bounds.width(), bounds.height(), pixels).expect("a value for each pixel")
 }
 
 /// The noise of some tiles, as [`crate::Stop::noise`] defines it.

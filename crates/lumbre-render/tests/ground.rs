@@ -12,7 +12,7 @@ use lumbre_render::RenderOptions;
 use lumbre_scene::{
     Camera, CameraKind, EnvironmentDesc, GeometryDesc, GroundDesc, LightDesc, Scene, SceneDesc, WithoutLight,
 };
-use lumbre_shading::{Material, MaterialKind, Roughness};
+use lumbre_shading::{Material, MaterialKind, PrincipledParams, Roughness, Texture};
 
 const RADIUS: f64 = 1.5;
 const HEIGHT: f64 = 2.0;
@@ -166,6 +166,53 @@ fn glass_that_bends_light_takes_as_much_as_geometric_optics_says() {
     let kind = MaterialKind::Dielectric { eta: 1.5, roughness: Roughness::smooth() };
     let (_, alpha) = look(below(vec![lamp], kind, ball), true);
     assert_eq!(alpha, 1.0);
+}
+
+/// The coverage of each colour, and that of the picture.
+fn coverage_by_colour(desc: SceneDesc) -> (Option<Rgb>, f32) {
+    let scene = Scene::build(desc).unwrap();
+    let rendered = picture(&scene, &RenderOptions { transparent: true, ..options(&scene, 12, 10, 256) });
+    let alpha = rendered.image.alpha().unwrap();
+    (rendered.coverage.map(|coverage| coverage.mean()), alpha.iter().sum::<f32>() / alpha.len() as f32)
+}
+
+#[test]
+fn shadows_have_the_colours_of_the_light_that_is_missing() {
+    let from = DVec3::new(3.0, 4.0 + 3.0 * HEIGHT, -2.0);
+    let intensity = Rgb::new(180.0, 90.0, 20.0);
+    let lights = vec![sky(Rgb::new(0.4, 0.8, 1.2)), LightDesc::Point { from, intensity }];
+    let (coverage, alpha) = coverage_by_colour(hovering(lights, true));
+    let coverage = coverage.unwrap().to_array();
+    for (found, (sky, lamp)) in coverage.into_iter().zip([(0.4, 180.0), (0.8, 90.0), (1.2, 20.0)]) {
+        let (from_sky, from_lamp) = (sky * std::f64::consts::PI, lamp / (9.0 * HEIGHT * HEIGHT));
+        let expected = (from_sky * hidden() + from_lamp) / (from_sky + from_lamp);
+        assert!((f64::from(found) / expected - 1.0).abs() < 0.02, "{found} {expected}");
+    }
+    assert!((coverage.iter().sum::<f32>() / 3.0 - alpha).abs() < 1e-4, "{coverage:?} {alpha}");
+}
+
+#[test]
+fn a_stained_pane_throws_a_shadow_of_its_colour() {
+    let from = DVec3::new(3.0, 4.0 + 3.0 * HEIGHT, -2.0);
+    let lamp = || LightDesc::Point { from, intensity: Rgb::splat(90.0) };
+    let pane = || exact(Disk::new(DVec3::new(3.0, 4.0 + HEIGHT, -2.0), DVec3::Y, RADIUS, 0.0).unwrap());
+    let stain = Rgb::new(0.9, 0.5, 0.125);
+    let clear = |base_color: Rgb| {
+        MaterialKind::Principled(Box::new(PrincipledParams {
+            base_color: Arc::new(Texture::Constant(base_color)),
+            metallic: Arc::new(Texture::Constant(0.0)),
+            roughness: Arc::new(Texture::Constant(0.0)),
+            transmission: Arc::new(Texture::Constant(1.0)),
+            ior: 1.0,
+            ..PrincipledParams::default()
+        }))
+    };
+    let (coverage, _) = coverage_by_colour(below(vec![lamp()], clear(stain), pane()));
+    let expected = Rgb::WHITE - stain;
+    assert!((coverage.unwrap() - expected).map(f32::abs).max_component() < 1e-4, "{coverage:?}");
+    // Where nothing has a colour, the coverage of the picture says all.
+    let (coverage, alpha) = coverage_by_colour(below(vec![lamp()], clear(Rgb::splat(0.5)), pane()));
+    assert!(coverage.is_none() && (alpha - 0.5).abs() < 1e-4, "{coverage:?} {alpha}");
 }
 
 #[test]

@@ -22,9 +22,9 @@ const WAY_BITS: u32 = 6;
 pub struct Seen {
     /// Radiance, multiplied by the coverage.
     pub radiance: Spectrum,
-    /// How much of what is behind is covered. Its mean over the samples of a pixel is in [0, 1]; that of one sample need
-    /// not be.
-    pub coverage: f32,
+    /// How much of what is behind is covered, of each colour: shadows are coloured where lights are, or what they shine through.
+    /// Its mean over the samples of a pixel is in [0, 1]; that of one sample need not be.
+    pub coverage: Spectrum,
 }
 
 /// Looks along a line of sight.
@@ -45,17 +45,20 @@ pub fn see(
     rays: &mut RayCounts,
 ) -> Seen {
     let behind = |ray| if lights_are_seen { scene.background(ray).sum() } else { Spectrum::BLACK };
-    let covered = if lights_are_seen { 1.0 } else { 0.0 };
+    let covered = if lights_are_seen { Spectrum::WHITE } else { Spectrum::BLACK };
     let catcher = scene.ground().filter(|ground| ground.catcher);
     match (&sight.met, catcher) {
         (Some(met), Some(ground)) if ground.holds(met) => {
             let blocked = blocked(scene, ground, met, draw, rays);
             let left = Spectrum::WHITE - blocked;
-            let coverage = if lights_are_seen { 1.0 } else { blocked.average() };
+            let coverage = if lights_are_seen { Spectrum::WHITE } else { blocked };
             Seen { radiance: behind(&sight.ray.ray) * left, coverage }
         }
         (None, _) if !lights_are_seen => Seen { radiance: Spectrum::BLACK, coverage: covered },
-        _ => Seen { radiance: integrator.radiance(scene, view, sight, draw, rays), coverage: 1.0 },
+        _ => {
+            let radiance = integrator.radiance(scene, view, sight, draw, rays);
+            Seen { radiance, coverage: Spectrum::WHITE }
+        }
     }
 }
 

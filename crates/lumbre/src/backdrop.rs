@@ -42,40 +42,51 @@ impl Backdrop {
         })
     }
 
-    /// A picture laid over the backdrop as a display shows it: its light tone-mapped, the backdrop's colours as they are.
+    /// A picture laid over the backdrop as a display shows it: its light tone-mapped, the backdrop's colours as they are. Of
+    /// these is left what `coverage`, or without it the image's own, does not cover.
     pub(crate) fn under_shown(
         &self,
         image: &Image,
+        coverage: Option<&Image>,
         bounds: PixelBounds,
         whole: (u32, u32),
         tone_map: ToneMap,
         exposure: f32,
     ) -> Image {
-        self.under(image, bounds, whole, |light, alpha| {
+        self.under(image, coverage, bounds, whole, |light, alpha| {
             let pure = if alpha > 0.0 { light / alpha } else { light };
             tone_map.apply(pure * exposure.exp2()) * if alpha > 0.0 { alpha } else { 1.0 }
         })
     }
 
     /// A picture laid over the backdrop, all of it taken for light.
-    pub(crate) fn under_light(&self, image: &Image, bounds: PixelBounds, whole: (u32, u32)) -> Image {
-        self.under(image, bounds, whole, |light, _| light)
+    pub(crate) fn under_light(
+        &self,
+        image: &Image,
+        coverage: Option<&Image>,
+        bounds: PixelBounds,
+        whole: (u32, u32),
+    ) -> Image {
+        self.under(image, coverage, bounds, whole, |light, _| light)
     }
 
     fn under(
         &self,
         image: &Image,
+        coverage: Option<&Image>,
         bounds: PixelBounds,
         whole: (u32, u32),
         front: impl Fn(Rgb, f32) -> Rgb,
     ) -> Image {
-        let alpha = image.alpha().map_or_else(|| vec![1.0; image.pixels().len()], <[f32]>::to_vec);
+        let alpha = |i: usize| image.alpha().map_or(1.0, |alpha| alpha[i]);
         let mut out = Image::filled(image.width(), image.height(), Rgb::BLACK);
-        let behind = self.pixels(bounds, whole);
-        for (((out, &light), &alpha), behind) in
-            out.pixels_mut().iter_mut().zip(image.pixels()).zip(&alpha).zip(behind)
+        let light = image.pixels().iter().enumerate();
+        for ((out, (i, &light)), behind) in
+            out.pixels_mut().iter_mut().zip(light).zip(self.pixels(bounds, whole))
         {
-            *out = front(light, alpha) + behind * (1.0 - alpha);
+            let alpha = alpha(i);
+            let covered = coverage.map_or(Rgb::splat(alpha), |coverage| coverage.pixels()[i]);
+            *out = front(light, alpha) + behind * (Rgb::WHITE - covered);
         }
         out
     }
@@ -108,15 +119,30 @@ mod tests {
     #[test]
     fn colours_are_shown_as_asked_and_light_is_tone_mapped() {
         let colour = Rgb::new(0.9, 0.8, 0.7);
-        let shown = Backdrop::Colour(colour).under_shown(&picture(), WHOLE, (6, 4), ToneMap::Neutral, -1.0);
+        let shown =
+            Backdrop::Colour(colour).under_shown(&picture(), None, WHOLE, (6, 4), ToneMap::Neutral, -1.0);
         let front = ToneMap::Neutral.apply(Rgb::new(1.0, 0.25, 0.125));
         for (i, expected) in [colour, (front + colour) * 0.5, front].into_iter().enumerate() {
             let found = shown.pixels()[6 + i];
             assert!((found - expected).map(f32::abs).max_component() < 1e-6, "{i}: {found:?} {expected:?}");
         }
-        let light = Backdrop::Colour(colour).under_light(&picture(), WHOLE, (6, 4));
+        let light = Backdrop::Colour(colour).under_light(&picture(), None, WHOLE, (6, 4));
         assert_eq!(light.pixels()[2], Rgb::new(2.0, 0.5, 0.25));
         assert!(light.alpha().is_none());
+    }
+
+    #[test]
+    fn what_is_covered_of_each_colour_is_missing_of_it() {
+        let behind = Rgb::new(0.9, 0.8, 0.7);
+        let image = Image::filled(6, 4, Rgb::BLACK).with_alpha(vec![0.5; 24]).unwrap();
+        let coverage = Image::filled(6, 4, Rgb::new(0.25, 0.5, 0.75));
+        let expected = Rgb::new(0.75 * 0.9, 0.5 * 0.8, 0.25 * 0.7);
+        let backdrop = Backdrop::Colour(behind);
+        let light = backdrop.under_light(&image, Some(&coverage), WHOLE, (6, 4));
+        let shown = backdrop.under_shown(&image, Some(&coverage), WHOLE, (6, 4), ToneMap::Neutral, 1.0);
+        for found in [light.pixels()[7], shown.pixels()[7]] {
+            assert!((found - expected).map(f32::abs).max_component() < 1e-6, "{found:?} {expected:?}");
+        }
     }
 
     #[test]

@@ -65,13 +65,14 @@ impl Picture {
         let mut options = WriteOptions { exr_window: window, ..*options };
         let is_for_displays =
             matches!(ImageFormat::from_path(path), Some(ImageFormat::Png | ImageFormat::Jpeg));
+        let coverage = self.rendered.coverage.as_ref();
         let laid_over = self.backdrop.as_ref().map(|backdrop| {
             if !is_for_displays {
-                return backdrop.under_light(self.image(), self.bounds(), self.whole);
+                return backdrop.under_light(self.image(), coverage, self.bounds(), self.whole);
             }
             let WriteOptions { tone_map, exposure, .. } = options;
             (options.tone_map, options.exposure) = (ToneMap::None, 0.0);
-            backdrop.under_shown(self.image(), self.bounds(), self.whole, tone_map, exposure)
+            backdrop.under_shown(self.image(), coverage, self.bounds(), self.whole, tone_map, exposure)
         });
         let image = laid_over.as_ref().unwrap_or(self.image());
         if layers.is_empty() {
