@@ -1,31 +1,70 @@
-//! glTF: the bytes of a primitive compressed by Draco, under accessors that fit what they start with.
+//! glTF: the bytes of a primitive compressed by Draco, under accessors that fit what they start with. What is taken is a mesh
+//! of as many vertices and triangles as the accessors say, and scenes can be built of it; what is refused is the primitive.
 #![no_main]
 
+use std::collections::HashSet;
 use std::path::Path;
 
 use libfuzzer_sys::fuzz_target;
 use lumbre_formats::gltf::{GltfOptions, read_gltf};
-use lumbre_formats::{Budget, Diagnostics, Limits};
+use lumbre_formats::{Budget, Diagnostics, FormatError, Limits};
+use lumbre_scene::{BuildError, GeometryDesc, Scene, SceneDesc};
 
 fuzz_target!(|data: &[u8]| {
     // How many vertices and corners, then the stream.
     let Some((&[points, corners], stream)) = data.split_first_chunk::<2>() else { return };
-    let (points, corners) = (u32::from(points).max(1), 3 * u32::from(corners).max(1));
+    if stream.is_empty() {
+        return;
+    }
+    let (points, corners) = (usize::from(points).max(1), 3 * usize::from(corners).max(1));
+    // Texture coordinates are read because there is a texture, even one without an image.
     let json = format!(
         r#"{{"asset":{{"version":"2.0"}},"extensionsUsed":["KHR_draco_mesh_compression"],
         "buffers":[{{"byteLength":{0}}}],"bufferViews":[{{"buffer":0,"byteLength":{0}}}],"accessors":[
         {{"componentType":5126,"type":"VEC3","count":{points},"min":[0,0,0],"max":[1,1,1]}},
         {{"componentType":5126,"type":"VEC2","count":{points}}},
         {{"componentType":5123,"type":"SCALAR","count":{corners}}}],
-        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0,"TEXCOORD_0":1}},"indices":2,"extensions":{{
+        "textures":[{{}}],"materials":[{{"pbrMetallicRoughness":{{"baseColorTexture":{{"index":0}}}}}}],
+        "meshes":[{{"primitives":[{{"material":0,"attributes":{{"POSITION":0,"TEXCOORD_0":1}},"indices":2,"extensions":{{
         "KHR_draco_mesh_compression":{{"bufferView":0,"attributes":{{"POSITION":0,"TEXCOORD_0":1}}}}}}}}]}}],
         "nodes":[{{"mesh":0}}]}}"#,
         stream.len()
     );
-    read(&json, stream);
+    match read(&json, stream) {
+        Ok(scene) => check(scene, points, corners / 3),
+        Err(FormatError::Limit { .. }) => {}
+        Err(error) => {
+            // What is around the primitive is right: otherwise none would ever be looked at.
+            let message = error.to_diagnostic().to_string();
+            let is_of_primitive = ["/meshes/0/primitives/0", "/accessors/"];
+            assert!(is_of_primitive.iter().any(|place| message.contains(place)), "{message}");
+        }
+    }
 });
 
-fn read(json: &str, binary: &[u8]) {
+fn check(scene: SceneDesc, points: usize, triangles: usize) {
+    let [shape] = &scene.shapes[..] else { panic!("{} shapes", scene.shapes.len()) };
+    let GeometryDesc::Mesh(mesh) = &shape.geometry else { panic!("no mesh") };
+    // Where but few vertices are used, the others are left out.
+    let corners = mesh.triangles.as_flattened();
+    let used = corners.iter().collect::<HashSet<_>>().len();
+    let points = if corners.len() < points / 2 { used } else { points };
+    assert_eq!((mesh.positions.len(), mesh.triangles.len()), (points, triangles));
+    assert_eq!(mesh.uvs.as_ref().map(Vec::len), Some(points));
+    for &vertex in corners {
+        let position = mesh.positions.get(vertex as usize);
+        assert!(position.is_some_and(|p| p.is_finite()), "{vertex}: {position:?}");
+    }
+    let unused_may_be_wrong = mesh.positions.iter().any(|p| !p.is_finite());
+    match Scene::build(scene) {
+        Ok(_) => assert!(!unused_may_be_wrong),
+        Err(error) => {
+            assert!(unused_may_be_wrong && matches!(error, BuildError::NotFinite { .. }), "{error}")
+        }
+    }
+}
+
+fn read(json: &str, binary: &[u8]) -> Result<SceneDesc, FormatError> {
     let mut json = json.as_bytes().to_vec();
     json.resize(json.len().next_multiple_of(4), b' ');
     let padding = binary.len().next_multiple_of(4) - binary.len();
@@ -38,14 +77,10 @@ fn read(json: &str, binary: &[u8]) {
     glb.extend(b"BIN\0");
     glb.extend(binary);
     glb.extend(&[0; 3][..padding]);
-    let budget = Budget::new(Limits { memory: (64 << 20) + 32 * glb.len() as u64, ..Limits::default() });
-    let name = "fuzz.glb".into();
-    let _ = read_gltf(
-        &glb,
-        &name,
-        Path::new("/nowhere"),
-        &GltfOptions::default(),
-        &budget,
-        &mut Diagnostics::new(),
-    );
+    let limits = Limits { memory: (64 << 20) + 32 * glb.len() as u64, ..Limits::default() };
+    let budget = Budget::new(limits);
+    let (name, nowhere, options) = ("fuzz.glb".into(), Path::new("/nowhere"), GltfOptions::default());
+    let scene = read_gltf(&glb, &name, nowhere, &options, &budget, &mut Diagnostics::new());
+    assert!(budget.memory_peak() <= limits.memory);
+    scene
 }

@@ -1,31 +1,132 @@
-//! glTF: the bytes of a compressed buffer view, of any mode, filter, stride and count.
+//! glTF: the bytes of a compressed buffer view, of any mode, filter, stride and count. What is taken is all there: vertices as
+//! many as there should be, colours that are shares, corners of triangles that are vertices; and what the older extension takes the
+//! newer one takes for the same. What is refused is the buffer view, or what it has.
 #![no_main]
 
+use std::collections::HashSet;
 use std::path::Path;
 
 use libfuzzer_sys::fuzz_target;
 use lumbre_formats::gltf::{GltfOptions, read_gltf};
-use lumbre_formats::{Budget, Diagnostics, Limits};
+use lumbre_formats::{Budget, Diagnostics, FormatError, Limits};
+use lumbre_scene::{GeometryDesc, MeshDesc, SceneDesc};
+
+/// Vertices where the buffer view has indices.
+const VERTICES: usize = 300;
 
 fuzz_target!(|data: &[u8]| {
     // What the extension says, then the stream.
     let Some((&[kind, stride, low, high], stream)) = data.split_first_chunk::<4>() else { return };
+    if stream.is_empty() {
+        return;
+    }
     let mode = ["ATTRIBUTES", "TRIANGLES", "INDICES"][usize::from(kind % 3)];
     let filter = ["NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "COLOR"][usize::from(kind / 3 % 5)];
-    let extension = ["EXT_meshopt_compression", "KHR_meshopt_compression"][usize::from(kind / 15 % 2)];
-    let stride = if mode == "ATTRIBUTES" { 4 * (u32::from(stride) % 64 + 1) } else { 2 + 2 * u32::from(stride % 2) };
-    let count = u32::from(u16::from_le_bytes([low, high])).max(1);
-    let json = format!(
-        r#"{{"asset":{{"version":"2.0"}},"extensionsUsed":["{extension}"],
-        "buffers":[{{"byteLength":{0}}},{{"byteLength":{1}}}],"bufferViews":[{{"buffer":1,"byteLength":{1},"extensions":{{
-        "{extension}":{{"buffer":0,"byteLength":{0},"byteStride":{stride},"count":{count},"mode":"{mode}","filter":"{filter}"}}}}}}]}}"#,
-        stream.len(),
-        stride * count
-    );
-    read(&json, stream);
+    let extensions = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
+    let count = usize::from(u16::from_le_bytes([low, high])).max(1);
+    let has_vertices = mode == "ATTRIBUTES";
+    let stride =
+        if has_vertices { 4 * (usize::from(stride) % 64 + 1) } else { 2 + 2 * usize::from(stride % 2) };
+
+    // What looks at the numbers: as indices, as places where there is room for them, or else as colours.
+    let with_stride =
+        if has_vertices && stride <= 252 { format!(r#""byteStride":{stride},"#) } else { String::new() };
+    let read_as = match (has_vertices, stride) {
+        (false, 2) => Some((r#""componentType":5123,"type":"SCALAR""#, "indices")),
+        (false, _) => Some((r#""componentType":5125,"type":"SCALAR""#, "indices")),
+        (true, 4) => Some((r#""componentType":5121,"normalized":true,"type":"VEC4""#, "COLOR_0")),
+        (true, 8) => Some((r#""componentType":5123,"normalized":true,"type":"VEC4""#, "COLOR_0")),
+        (true, 12..=252) => {
+            Some((r#""componentType":5126,"type":"VEC3","min":[0,0,0],"max":[1,1,1]"#, "POSITION"))
+        }
+        _ => None,
+    };
+    let vertices = if has_vertices { count } else { VERTICES };
+    let zeros =
+        format!(r#"{{"componentType":5126,"type":"VEC3","count":{vertices},"min":[0,0,0],"max":[0,0,0]}}"#);
+    let (accessor, primitive) = match read_as {
+        None => (zeros.clone(), r#"{"attributes":{"POSITION":1}}"#.to_owned()),
+        Some((numbers, attribute)) => (
+            format!(r#"{{"bufferView":0,"count":{count},{numbers}}}"#),
+            match attribute {
+                "POSITION" => r#"{"attributes":{"POSITION":0}}"#.to_owned(),
+                "indices" => r#"{"attributes":{"POSITION":1},"indices":0}"#.to_owned(),
+                colours => format!(r#"{{"attributes":{{"POSITION":1,"{colours}":0}}}}"#),
+            },
+        ),
+    };
+    let json = |extension: &str| {
+        format!(
+            r#"{{"asset":{{"version":"2.0"}},"extensionsUsed":["{extension}"],
+            "buffers":[{{"byteLength":{0}}},{{"byteLength":{1}}}],"bufferViews":[{{"buffer":1,"byteLength":{1},{with_stride}"extensions":{{
+            "{extension}":{{"buffer":0,"byteLength":{0},"byteStride":{stride},"count":{count},"mode":"{mode}","filter":"{filter}"}}}}}}],
+            "accessors":[{accessor},{zeros}],"meshes":[{{"primitives":[{primitive}]}}],"nodes":[{{"mesh":0}}]}}"#,
+            stream.len(),
+            stride * count
+        )
+    };
+    let found = read(&json(extensions[usize::from(kind / 15 % 2)]), stream);
+    match &found {
+        Ok(scene) => {
+            let mesh = mesh(scene);
+            let triangles = count / 3;
+            assert_eq!(mesh.map_or(0, |mesh| mesh.triangles.len()), triangles);
+            if let Some(mesh) = mesh {
+                check(mesh, vertices);
+            }
+        }
+        Err(FormatError::Limit { .. }) => {}
+        Err(error) => {
+            // What is around the buffer view is right: otherwise none would ever be looked at.
+            let message = error.to_diagnostic().to_string();
+            let is_of_view = ["/bufferViews/0", "/accessors/0"].iter().any(|place| message.contains(place));
+            assert!(is_of_view, "{message}");
+        }
+    }
+    if let (Ok(scene), 0) = (found, kind / 15 % 2) {
+        let newer = read(&json(extensions[1]), stream).unwrap_or_else(|error| panic!("{error}"));
+        let bits = |mesh: &MeshDesc| {
+            mesh.positions.iter().map(|p| p.to_array().map(f32::to_bits)).collect::<Vec<_>>()
+        };
+        let parts =
+            |scene: &SceneDesc| mesh(scene).map(|m| (bits(m), m.triangles.clone(), m.colours.clone()));
+        assert_eq!(parts(&scene), parts(&newer));
+    }
 });
 
-fn read(json: &str, binary: &[u8]) {
+fn mesh(scene: &SceneDesc) -> Option<&MeshDesc> {
+    match &scene.shapes[..] {
+        [] => None,
+        [shape] => match &shape.geometry {
+            GeometryDesc::Mesh(mesh) => Some(mesh),
+            _ => panic!("no mesh"),
+        },
+        shapes => panic!("{} shapes", shapes.len()),
+    }
+}
+
+fn check(mesh: &MeshDesc, vertices: usize) {
+    // Where but few are used, the others are left out.
+    let corners = mesh.triangles.as_flattened();
+    let used = corners.iter().collect::<HashSet<_>>().len();
+    let vertices = if corners.len() < vertices / 2 { used } else { vertices };
+    assert_eq!(mesh.positions.len(), vertices);
+    for &vertex in corners {
+        let position = mesh.positions.get(vertex as usize);
+        assert!(position.is_some_and(|p| p.is_finite()), "{vertex}: {position:?}");
+    }
+    let is_share = |n: &f32| (0.0..=1.0).contains(n);
+    if let Some(colours) = &mesh.colours {
+        assert!(
+            colours.len() == vertices && colours.iter().all(|colour| colour.to_array().iter().all(is_share))
+        );
+    }
+    if let Some(coverages) = &mesh.coverages {
+        assert!(coverages.len() == vertices && coverages.iter().all(is_share));
+    }
+}
+
+fn read(json: &str, binary: &[u8]) -> Result<SceneDesc, FormatError> {
     let mut json = json.as_bytes().to_vec();
     json.resize(json.len().next_multiple_of(4), b' ');
     let padding = binary.len().next_multiple_of(4) - binary.len();
@@ -38,14 +139,10 @@ fn read(json: &str, binary: &[u8]) {
     glb.extend(b"BIN\0");
     glb.extend(binary);
     glb.extend(&[0; 3][..padding]);
-    let budget = Budget::new(Limits { memory: (64 << 20) + 32 * glb.len() as u64, ..Limits::default() });
-    let name = "fuzz.glb".into();
-    let _ = read_gltf(
-        &glb,
-        &name,
-        Path::new("/nowhere"),
-        &GltfOptions::default(),
-        &budget,
-        &mut Diagnostics::new(),
-    );
+    let limits = Limits { memory: (64 << 20) + 32 * glb.len() as u64, ..Limits::default() };
+    let budget = Budget::new(limits);
+    let (name, nowhere, options) = ("fuzz.glb".into(), Path::new("/nowhere"), GltfOptions::default());
+    let scene = read_gltf(&glb, &name, nowhere, &options, &budget, &mut Diagnostics::new());
+    assert!(budget.memory_peak() <= limits.memory);
+    scene
 }
