@@ -73,7 +73,7 @@ impl Binary<'_> {
 
     /// A twig of such nodes.
     pub(crate) fn twig(mut nodes: Vec<BinaryNode>) -> Self {
-        let costs = choose(&mut nodes);
+        let costs = choose(&mut nodes, false);
         Self::Twig(Twig { nodes: Cow::Owned(nodes), costs })
     }
 }
@@ -145,77 +145,81 @@ pub(crate) struct Grown<'p> {
     pub(crate) tree: Binary<'p>,
     /// In the order of leaves.
     pub(crate) names: Vec<Name>,
+    /// Instances with their boxes; their names are the first.
+    pub(crate) instances: Vec<Primitive>,
     /// Of each name, which part of it; without any, all is whole.
     pub(crate) cells: Vec<Cell>,
 }
 
-/// The binary tree over primitives (not none) of geometries.
+/// The binary tree over primitives (not none) of geometries: packed ones, and all others.
 ///
 /// First they are parted where they stand until one thread takes what is left together; then twigs grow, which need but a
-/// little room each, and take the place of their primitives.
+/// little room each, and take the place of their primitives, as long as those are packed. Of others, there are more nodes than
+/// primitives as a rule: these are given back here, before the tree is laid out, but for instances.
 pub(crate) fn binary_tree<'p>(
     level: Level,
     preset: Preset,
-    primitives: &'p mut Vec<Primitive>,
+    mut others: Vec<Primitive>,
+    packed: &'p mut Vec<Primitive>,
     traits: &[Traits],
     geometries: &[Geometry],
     units: &Units,
 ) -> Grown<'p> {
-    let count = primitives.len();
     // Below, there is a node for every thread.
     let shared = (2 * rayon::current_num_threads()).ilog2();
     let shared = if shared > 1 { shared + 1 } else { 0 };
     let builder = Builder { level, traits, shared };
-    let counts = sort_by_rank(primitives, traits);
-    let codes = if preset == Preset::Fast { builder.sort(primitives, &counts) } else { Vec::new() };
-    let codes_of = |rank: usize| {
-        let start = counts[..rank].iter().sum();
-        codes.get(start..start + counts[rank]).unwrap_or_default()
-    };
-    const PACKED: usize = Kind::RANKS - 1;
-    let mut rest = &mut primitives[..];
-    let sketches: Vec<(usize, Sketch)> = (0..Kind::RANKS)
-        .filter(|&rank| counts[rank] > 0)
-        .map(|rank| {
-            let (own, codes) = (take(&mut rest, counts[rank]), codes_of(rank));
-            let sketch = match rank {
-                PACKED => builder.sketch_sorted::<false>(own, 0, codes),
-                _ => builder.sketch_sorted::<true>(own, 0, codes),
-            };
-            (rank, sketch)
-        })
-        .collect();
-
-    let mut names: Vec<Name> = fill(count, [0; 2]);
-    let (mut rest, mut places, mut first) = (&mut primitives[..], &mut names[..], 0);
+    let is_sorted = preset == Preset::Fast;
+    let counts = sort_by_rank(&mut others, traits);
+    let mut names: Vec<Name> = fill(others.len() + packed.len(), [0; 2]);
+    let (mut rest, mut places, mut first) = (&mut others[..], &mut names[..], 0);
     let mut trees = Vec::with_capacity(Kind::RANKS);
-    for (rank, sketch) in sketches {
-        let (own, names) = (take(&mut rest, counts[rank]), take(&mut places, counts[rank]));
-        trees.push(match rank {
-            PACKED => builder.grow::<false>(&sketch, codes_of(rank), own, names, first),
-            _ => builder.grow::<true>(&sketch, codes_of(rank), own, names, first),
+    for (rank, &count) in counts.iter().enumerate().filter(|&(_, &count)| count > 0) {
+        let (primitives, names) = (take(&mut rest, count), take(&mut places, count));
+        let mut codes = Vec::new();
+        if is_sorted {
+            let sorted;
+            (sorted, codes) = builder.sort(primitives);
+            primitives.copy_from_slice(&sorted);
+        }
+        let keeps = rank == Kind::Instance.rank();
+        // Subtrees that are put elsewhere later are those of single instances.
+        trees.push(if keeps && preset != Preset::Best {
+            let sketch = builder.sketch_sorted::<false>(primitives, 0, &codes);
+            builder.grow::<false>(&sketch, &codes, Plot { primitives, names, first, keeps }).into_owned()
+        } else {
+            let sketch = builder.sketch_sorted::<true>(primitives, 0, &codes);
+            builder.grow::<true>(&sketch, &codes, Plot { primitives, names, first, keeps }).into_owned()
         });
-        first += counts[rank];
+        first += count;
     }
+    others.truncate(counts[Kind::Instance.rank()]);
+    others.shrink_to_fit();
     let mut cells = Vec::new();
-    if let Some(tree) = trees.last_mut()
-        && preset == Preset::Best
-        && counts[PACKED] > 0
-    {
-        let first = count - counts[PACKED];
-        let found = spatial::in_parts(&builder, geometries, units, tree, &names[first..], first);
-        if let Some(found) = found {
-            *tree = found.tree;
+    if !packed.is_empty() {
+        let mut codes = Vec::new();
+        if is_sorted {
+            (*packed, codes) = builder.sort(packed);
+        }
+        let sketch = builder.sketch_sorted::<false>(packed, 0, &codes);
+        let plot = Plot { primitives: packed, names: places, first, keeps: false };
+        let mut tree = builder.grow::<false>(&sketch, &codes, plot);
+        drop(codes);
+        if preset == Preset::Best
+            && let Some(found) = spatial::in_parts(&builder, geometries, units, &tree, &names[first..], first)
+        {
+            tree = found.tree;
             names.truncate(first);
             names.extend(found.names);
             cells = fill(first, Cell::WHOLE);
             cells.extend(found.cells);
         }
+        trees.push(tree);
     }
     let better = |tree| if preset == Preset::Best { reinsert(tree) } else { tree };
     let join = |low, high| Binary::Fork(Box::new(Fork { is_ranked: true, ..Fork::over([low, high]) }));
     let tree = trees.into_iter().map(better).reduce(join).expect("there are primitives");
-    Grown { tree, names, cells }
+    Grown { tree, names, instances: others, cells }
 }
 
 /// The first `count` of some, which then are no longer among them.
@@ -223,20 +227,16 @@ fn take<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
     rest.split_off_mut(..count).unwrap_or_default()
 }
 
-/// Brings primitives, of which the packed ones are the last, into the order of their ranks; how many there are of each.
+/// Brings primitives, none of which is packed, into the order of their ranks; how many there are of each.
 ///
 /// Apart, because boxes of one kind do not grow around what is of another and everywhere among them, as trees on a ground
 /// are; and so that a search for any hit asks first what is quickly asked.
 fn sort_by_rank(primitives: &mut [Primitive], traits: &[Traits]) -> [usize; Kind::RANKS] {
     let rank = |primitive: &Primitive| traits[primitive.first() as usize].kind.rank();
-    let others = primitives.partition_point(|primitive| rank(primitive) + 1 < Kind::RANKS);
-    debug_assert!(primitives[others..].iter().all(|primitive| rank(primitive) + 1 == Kind::RANKS));
     let mut counts = [0; Kind::RANKS];
-    counts[Kind::RANKS - 1] = primitives.len() - others;
-    let others = &mut primitives[..others];
-    others.iter().for_each(|primitive| counts[rank(primitive)] += 1);
-    if !counts.contains(&others.len()) {
-        others.sort_by_key(rank);
+    primitives.iter().for_each(|primitive| counts[rank(primitive)] += 1);
+    if !counts.contains(&primitives.len()) {
+        primitives.sort_by_key(rank);
     }
     counts
 }
@@ -284,6 +284,16 @@ impl Sketch {
     }
 }
 
+/// Primitives of which a tree is to grow, and places for what is in its leaves.
+struct Plot<'p, 'a> {
+    primitives: &'p mut [Primitive],
+    names: &'a mut [Name],
+    /// The place of the first name.
+    first: usize,
+    /// Whether the primitives are to stay, in the order of names; or else nodes may take their place.
+    keeps: bool,
+}
+
 /// The primitives of a node of a twig, and as much room for those of its children.
 struct Range<'a> {
     here: &'a mut [Primitive],
@@ -292,6 +302,8 @@ struct Range<'a> {
     /// The place of the first name.
     first: usize,
     depth: u32,
+    /// Whether `there` is where they stood in the beginning.
+    is_away: bool,
 }
 
 impl<'a> Range<'a> {
@@ -301,7 +313,7 @@ impl<'a> Range<'a> {
 
     /// The two sides, where the primitives were moved over.
     fn moved(self, left: usize) -> [Self; 2] {
-        Self { here: self.there, there: self.here, ..self }.cut(left)
+        Self { here: self.there, there: self.here, is_away: !self.is_away, ..self }.cut(left)
     }
 
     /// The two sides, where the primitives are as they were.
@@ -309,10 +321,11 @@ impl<'a> Range<'a> {
         let (here, here_right) = self.here.split_at_mut(left);
         let (there, there_right) = self.there.split_at_mut(left);
         let (names, names_right) = self.names.split_at_mut(left);
-        let (first, depth) = (self.first, self.depth + 1);
+        let (first, depth, is_away) = (self.first, self.depth + 1, self.is_away);
+        let (right, place) = (here_right, first + left);
         [
-            Self { here, there, names, first, depth },
-            Self { here: here_right, there: there_right, names: names_right, first: first + left, depth },
+            Self { here, there, names, first, depth, is_away },
+            Self { here: right, there: there_right, names: names_right, first: place, depth, is_away },
         ]
     }
 }
@@ -339,26 +352,19 @@ struct Tools<'w> {
 }
 
 impl Workplace {
-    fn new() -> Self {
-        Self { nodes: Vec::new(), bins: Box::new(Bins::EMPTY), there: vec![Bounds::EMPTY; PARALLEL] }
+    /// For twigs of no more than so many primitives.
+    fn new(most: usize) -> Self {
+        Self { nodes: Vec::new(), bins: Box::new(Bins::EMPTY), there: vec![Bounds::EMPTY; most] }
     }
 }
 
 impl Builder<'_> {
-    /// Brings primitives, so many of each rank, into the order along a curve; their codes in that order.
-    fn sort(&self, primitives: &mut Vec<Primitive>, counts: &[usize]) -> Vec<Code> {
+    /// Primitives in the order along a curve, and their codes.
+    fn sort(&self, primitives: &[Primitive]) -> (Vec<Primitive>, Vec<Code>) {
         let mut sorted = fill(primitives.len(), Bounds::EMPTY);
-        let mut codes = Vec::new();
-        let (mut here, mut there) = (&primitives[..], &mut sorted[..]);
-        for &count in counts.iter().filter(|&&count| count > 0) {
-            let own = here.split_off(..count).unwrap_or_default();
-            let (_, centers) = self.measure(own);
-            let found = morton::sort(own, take(&mut there, count), &centers);
-            // As a rule there is one rank.
-            if codes.is_empty() { codes = found } else { codes.extend(found) }
-        }
-        *primitives = sorted;
-        codes
+        let (_, centers) = self.measure(primitives);
+        let codes = morton::sort(primitives, &mut sorted, &centers);
+        (sorted, codes)
     }
 
     /// Splits by the order along a curve as long as there are codes that differ. The depth of this recursion is at most that
@@ -427,48 +433,53 @@ impl Builder<'_> {
         (sides, splits)
     }
 
-    /// The tree that was sketched. `codes` are those of the primitives, if they were sorted, and `first` is the place of the
-    /// first name.
+    /// The tree that was sketched. `codes` are those of the primitives, if they were sorted.
     fn grow<'p, const COSTS: bool>(
         &self,
         sketch: &Sketch,
         mut codes: &[Code],
-        mut primitives: &'p mut [Primitive],
-        mut names: &mut [Name],
-        mut first: usize,
+        plot: Plot<'p, '_>,
     ) -> Binary<'p> {
+        let Plot { mut primitives, mut names, mut first, keeps } = plot;
         let mut seeds = Vec::new();
         sketch.seeds(&mut seeds);
+        let most = seeds.iter().map(|seed| seed.count).max().unwrap_or_default();
         let mut plots = Vec::with_capacity(seeds.len());
         for seed in seeds {
             let codes = codes.split_off(..seed.count).unwrap_or_default();
             let own = take(&mut primitives, seed.count);
-            plots.push((seed, codes, own, take(&mut names, seed.count), first));
+            let names = take(&mut names, seed.count);
+            plots.push((seed, codes, Plot { primitives: own, names, first, keeps }));
             first += seed.count;
         }
         let twigs: Vec<Binary> = plots
             .into_par_iter()
-            .map_init(Workplace::new, |work, (seed, codes, own, names, first)| {
-                let Workplace { nodes, bins, there } = work;
-                nodes.clear();
-                let there = &mut there[..seed.count];
-                let range = Range { here: &mut *own, there, names, first, depth: seed.depth };
-                if seed.is_sorted {
-                    self.twig_sorted::<COSTS>(range, codes, &mut Tools { nodes, bins });
-                } else {
-                    self.twig::<COSTS>(range, seed.split, &mut Tools { nodes, bins });
-                }
-                let costs = choose(nodes);
-                // There are more nodes than primitives only where hardly any share a leaf.
-                let nodes = if nodes.len() <= own.len() {
-                    let (place, _) = own.split_at_mut(nodes.len());
-                    place.copy_from_slice(bytemuck::cast_slice(nodes));
-                    Cow::Borrowed(bytemuck::cast_slice(place))
-                } else {
-                    Cow::Owned(nodes.to_vec())
-                };
-                Binary::Twig(Twig { nodes, costs })
-            })
+            .map_init(
+                || Workplace::new(most),
+                |work, (seed, codes, plot)| {
+                    let Workplace { nodes, bins, there } = work;
+                    nodes.clear();
+                    let there = &mut there[..seed.count];
+                    let Plot { primitives: own, names, first, keeps } = plot;
+                    let range =
+                        Range { here: &mut *own, there, names, first, depth: seed.depth, is_away: false };
+                    if seed.is_sorted {
+                        self.twig_sorted::<COSTS>(range, codes, &mut Tools { nodes, bins });
+                    } else {
+                        self.twig::<COSTS>(range, seed.split, &mut Tools { nodes, bins });
+                    }
+                    let costs = choose(nodes, keeps);
+                    // There are more nodes than primitives only where hardly any share a leaf.
+                    let nodes = if !keeps && nodes.len() <= own.len() {
+                        let (place, _) = own.split_at_mut(nodes.len());
+                        place.copy_from_slice(bytemuck::cast_slice(nodes));
+                        Cow::Borrowed(bytemuck::cast_slice(place))
+                    } else {
+                        Cow::Owned(nodes.to_vec())
+                    };
+                    Binary::Twig(Twig { nodes, costs })
+                },
+            )
             .collect();
         sketch.over(&mut twigs.into_iter())
     }
@@ -595,6 +606,9 @@ impl Builder<'_> {
                 for (name, primitive) in range.names.iter_mut().zip(&*range.here) {
                     *name = [primitive.first(), primitive.second()];
                     bounds.grow(primitive);
+                }
+                if range.is_away {
+                    range.there.copy_from_slice(range.here);
                 }
                 work.nodes.push(BinaryNode::leaf(&bounds, range.first, range.names.len()));
                 bounds

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::build::{Binary, BinaryNode, Fork, Name};
 use crate::carve::{self, Cell, LaneCell};
 use crate::node::{Node, WIDTH, tag};
-use crate::primitive::{Bounds, Kind, Traits};
+use crate::primitive::{Bounds, Kind, Primitive, Traits};
 use crate::spheres::SphereBlock;
 use crate::store::Store;
 use crate::triangles::{BLOCK, BlockNames, TriangleBlock};
@@ -139,20 +139,29 @@ fn share(area: f32, left: &Costs, right: &Costs) -> (Costs, Choices) {
     (costs, Choices(choices))
 }
 
+/// The costs of putting leaves of so many instances: beside others where there is room for all, or else into a node of their own.
+fn costs_of_instances(count: usize, area: f32) -> Costs {
+    std::array::from_fn(|children| if children < count { area } else { 0.0 })
+}
+
 /// Chooses for all nodes of a twig; returns the costs of its root.
-pub(crate) fn choose(nodes: &mut [BinaryNode]) -> Costs {
-    let mut costs = vec![LEAF_COSTS; nodes.len()];
-    // Children stand behind their parents.
-    for place in (0..nodes.len()).rev() {
-        let node = &mut nodes[place];
-        if node.names().is_none() {
-            let (left, right) = (place + 1, place + node.right());
-            let (cost, choices) = share(node.bounds().half_area(), &costs[left], &costs[right]);
-            costs[place] = cost;
+pub(crate) fn choose(nodes: &mut [BinaryNode], are_instances: bool) -> Costs {
+    // Of the subtrees behind a node that have no parent there, from the last to the first: its children's are the last two.
+    let mut behind = Vec::new();
+    for node in nodes.iter_mut().rev() {
+        let mut costs = LEAF_COSTS;
+        if let Some(names) = node.names() {
+            if are_instances {
+                costs = costs_of_instances(names.len(), node.bounds().half_area());
+            }
+        } else if let (Some(left), Some(right)) = (behind.pop(), behind.pop()) {
+            let choices;
+            (costs, choices) = share(node.bounds().half_area(), &left, &right);
             node.choose(choices);
         }
+        behind.push(costs);
     }
-    costs[0]
+    behind.pop().unwrap_or(LEAF_COSTS)
 }
 
 impl Binary<'_> {
@@ -187,6 +196,8 @@ enum Cursor<'a> {
     Fork(&'a Fork<'a>),
     /// From it on.
     Twig(&'a [BinaryNode]),
+    /// One of the instances of a leaf, and the place of its name.
+    Instance(&'a Primitive, usize),
 }
 
 impl<'a> Cursor<'a> {
@@ -202,6 +213,7 @@ impl<'a> Cursor<'a> {
         match self {
             Self::Fork(fork) => &fork.bounds,
             Self::Twig(nodes) => nodes[0].bounds(),
+            Self::Instance(bounds, _) => bounds,
         }
     }
 
@@ -210,6 +222,7 @@ impl<'a> Cursor<'a> {
         match self {
             Self::Fork(_) => None,
             Self::Twig(nodes) => nodes[0].names(),
+            Self::Instance(_, name) => Some(*name..*name + 1),
         }
     }
 
@@ -218,6 +231,7 @@ impl<'a> Cursor<'a> {
         match self {
             Self::Fork(fork) => fork.choices,
             Self::Twig(nodes) => nodes[0].choices(),
+            Self::Instance(..) => Choices::default(),
         }
     }
 
@@ -226,6 +240,7 @@ impl<'a> Cursor<'a> {
         match self {
             Self::Fork(fork) => [Self::new(&fork.children[0]), Self::new(&fork.children[1])],
             Self::Twig(nodes) => [Self::Twig(&nodes[1..]), Self::Twig(&nodes[nodes[0].right()..])],
+            Self::Instance(..) => unreachable!("a leaf"),
         }
     }
 
@@ -234,50 +249,27 @@ impl<'a> Cursor<'a> {
     fn is_ranked(&self) -> bool {
         matches!(self, Self::Fork(fork) if fork.is_ranked)
     }
+}
 
-    /// The children of an inner node in the wide tree, by rank, and of one rank the largest last: where any hit will do, it
-    /// is asked first, for it is the likeliest to have one.
+/// Children of a wide node by rank, and of one rank the largest last: where any hit will do, it is asked first, for it is the
+/// likeliest to have one.
+struct Gathered<'a> {
+    children: [Cursor<'a>; WIDTH],
+    keys: [(u8, f32); WIDTH],
+    len: usize,
+}
+
+impl<'a> Gathered<'a> {
     #[inline(always)]
-    fn gather(self) -> ([Self; WIDTH], usize) {
-        let mut found = [self; WIDTH];
-        let mut areas = [(0, 0.0); WIDTH];
-        let mut len = 0;
-        let mut pending = [(self, 0, 0); WIDTH];
-        let first = self.choices().left(WIDTH);
-        let [left, right] = self.children();
-        pending[0] = (right, WIDTH - first, if self.is_ranked() { 2 } else { 0 });
-        pending[1] = (left, first, 0);
-        let mut waiting = 2;
-        while waiting > 0 {
-            waiting -= 1;
-            let (cursor, mut room, rank) = pending[waiting];
-            let mut first = 0;
-            if cursor.names().is_none() {
-                while room > 1 && first == 0 {
-                    first = cursor.choices().left(room);
-                    room -= usize::from(first == 0);
-                }
-            }
-            if first > 0 {
-                let [left, right] = cursor.children();
-                // Ranks fork at the left, where the lower ones are.
-                let above = if cursor.is_ranked() { 1 } else { rank };
-                pending[waiting] = (right, room - first, above);
-                pending[waiting + 1] = (left, first, rank);
-                waiting += 2;
-                continue;
-            }
-            // In its place by area.
-            let area = (rank, cursor.bounds().half_area());
-            let mut at = len;
-            while at > 0 && areas[at - 1] > area {
-                (found[at], areas[at]) = (found[at - 1], areas[at - 1]);
-                at -= 1;
-            }
-            (found[at], areas[at]) = (cursor, area);
-            len += 1;
+    fn put(&mut self, rank: u8, child: Cursor<'a>) {
+        let key = (rank, child.bounds().half_area());
+        let mut at = self.len;
+        while at > 0 && self.keys[at - 1] > key {
+            (self.children[at], self.keys[at]) = (self.children[at - 1], self.keys[at - 1]);
+            at -= 1;
         }
-        (found, len)
+        (self.children[at], self.keys[at]) = (child, key);
+        self.len += 1;
     }
 }
 
@@ -319,12 +311,18 @@ pub(crate) struct Layout {
     root: u32,
 }
 
-/// Lays a binary tree out. The depth of its recursions is that of the tree, which is bounded.
+/// Lays a binary tree out, with the names in its leaves, the first of which are those of the instances. The depth of its recursions
+/// is that of the tree, which is bounded.
 ///
 /// # Errors
 /// [`BuildError::TooMany`] when there are more blocks than references can name.
-pub(crate) fn lay_out(traits: &[Traits], binary: &Binary, names: &[Name]) -> Result<Layout, BuildError> {
-    let packer = Packer { traits, names };
+pub(crate) fn lay_out(
+    traits: &[Traits],
+    binary: &Binary,
+    names: &[Name],
+    instances: &[Primitive],
+) -> Result<Layout, BuildError> {
+    let packer = Packer { traits, names, instances };
     let root = Cursor::new(binary);
     let plan = packer.plan(root);
     let total = plan.as_ref().map_or_else(|| packer.count(root), |plan| plan.total);
@@ -461,13 +459,70 @@ impl<'a> Room<'a> {
 struct Packer<'a> {
     traits: &'a [Traits],
     names: &'a [Name],
+    instances: &'a [Primitive],
 }
 
-impl Packer<'_> {
+impl<'a> Packer<'a> {
+    /// The instances of a leaf that holds several: each will have a leaf of its own.
+    #[inline(always)]
+    fn instances_of(&self, leaf: Cursor<'a>) -> Option<(usize, &'a [Primitive])> {
+        let names = leaf.names().filter(|names| names.len() > 1)?;
+        Some((names.start, self.instances.get(names)?))
+    }
+
+    /// What becomes a leaf of the wide tree.
+    #[inline(always)]
+    fn leaf(&self, cursor: Cursor<'a>) -> Option<std::ops::Range<usize>> {
+        if self.instances_of(cursor).is_some() { None } else { cursor.names() }
+    }
+
+    /// The children in the wide tree of what is no leaf there.
+    #[inline(always)]
+    fn gather(&self, root: Cursor<'a>) -> ([Cursor<'a>; WIDTH], usize) {
+        let mut found = Gathered { children: [root; WIDTH], keys: [(0, 0.0); WIDTH], len: 0 };
+        let mut pending = [(root, WIDTH, 0); WIDTH];
+        let mut waiting = 1;
+        while waiting > 0 {
+            waiting -= 1;
+            let (cursor, mut room, rank) = pending[waiting];
+            if cursor.names().is_some() {
+                match self.instances_of(cursor) {
+                    Some((first, instances)) if instances.len() <= room => {
+                        for (name, instance) in (first..).zip(instances) {
+                            found.put(rank, Cursor::Instance(instance, name));
+                        }
+                    }
+                    _ => found.put(rank, cursor),
+                }
+                continue;
+            }
+            let mut first = 0;
+            while room > 1 && first == 0 {
+                first = cursor.choices().left(room);
+                room -= usize::from(first == 0);
+            }
+            if first == 0 {
+                found.put(rank, cursor);
+                continue;
+            }
+            let [left, right] = cursor.children();
+            // Ranks fork at the left, where the lower ones are, and first at the root, which has the most room.
+            let above = match cursor.is_ranked() {
+                true if room == WIDTH => 2,
+                true => 1,
+                false => rank,
+            };
+            pending[waiting] = (right, room - first, above);
+            pending[waiting + 1] = (left, first, rank);
+            waiting += 2;
+        }
+        (found.children, found.len)
+    }
+
     /// `None` for a leaf, or a node over few primitives.
-    fn plan<'a>(&self, root: Cursor<'a>) -> Option<Box<Plan<'a>>> {
+    fn plan(&self, root: Cursor<'a>) -> Option<Box<Plan<'a>>> {
         let Cursor::Fork(_) = root else { return None };
-        let (children, len) = root.gather();
+        let (children, len) = self.gather(root);
         let mut plans: [Option<Box<Plan>>; WIDTH] = Default::default();
         let mut counts = [Counts::default(); WIDTH];
         plans[..len].par_iter_mut().zip(&mut counts[..len]).zip(&children[..len]).for_each(
@@ -481,8 +536,8 @@ impl Packer<'_> {
         Some(Box::new(Plan { children, len, counts, plans, total }))
     }
 
-    fn count(&self, root: Cursor) -> Counts {
-        if let Some(names) = root.names() {
+    fn count(&self, root: Cursor<'a>) -> Counts {
+        if let Some(names) = self.leaf(root) {
             let kind = self.traits[self.names[names.start][0] as usize].kind;
             return match kind {
                 Kind::Triangle => Counts { blocks: names.len().div_ceil(BLOCK), ..Counts::default() },
@@ -492,13 +547,13 @@ impl Packer<'_> {
                 }
             };
         }
-        let (children, len) = root.gather();
+        let (children, len) = self.gather(root);
         let mut total = Counts { nodes: 1, ..Counts::default() };
         children[..len].iter().for_each(|&child| total += self.count(child));
         total
     }
 
-    fn put_many(&self, plan: &Plan, mut room: Room) -> u32 {
+    fn put_many(&self, plan: &Plan<'a>, mut room: Room) -> u32 {
         let place = room.start.nodes;
         let own = room.take(Counts { nodes: 1, ..Counts::default() });
         let rooms: Vec<Room> = plan.counts[..plan.len].iter().map(|&counts| room.take(counts)).collect();
@@ -518,11 +573,11 @@ impl Packer<'_> {
         tag::reference(tag::INNER, place as u32)
     }
 
-    fn put(&self, root: Cursor, room: &mut Room) -> u32 {
-        if let Some(names) = root.names() {
+    fn put(&self, root: Cursor<'a>, room: &mut Room) -> u32 {
+        if let Some(names) = self.leaf(root) {
             return self.put_leaf(names, room);
         }
-        let (children, len) = root.gather();
+        let (children, len) = self.gather(root);
         let place = room.start.nodes;
         let own = room.take(Counts { nodes: 1, ..Counts::default() });
         let mut references = [u32::MAX; WIDTH];

@@ -1,11 +1,15 @@
 //! The last splits: of sixteen primitives or fewer, every split along every axis is tried.
 
 use crate::lanes::{Lanes, Task};
+use crate::node::WIDTH;
 use crate::primitive::{Bounds, Kind, Primitive, Traits};
 use crate::triangles::BLOCK;
 
 /// How many are few.
 pub(crate) const FEW: usize = 2 * BLOCK;
+/// The most primitives in a leaf that are neither packed nor instances. Of these, it is one with costs; without, as many as a node
+/// has children: what looks like a leaf then becomes a node over leaves of one each.
+const MOST_OTHERS: usize = 4;
 /// What a node costs, in the units of costs.
 const NODE_COST: f32 = 16.0;
 
@@ -18,10 +22,20 @@ pub(crate) enum Few {
 
 /// Whether they can stand in one leaf.
 #[inline(always)]
-fn is_uniform(primitives: &[Primitive], traits: &[Traits]) -> bool {
+fn is_uniform<const COSTS: bool>(primitives: &[Primitive], traits: &[Traits]) -> bool {
     let group = |p: &Primitive| group_of(p, traits);
     let first = group(&primitives[0]);
-    let most = traits[primitives[0].first() as usize].most;
+    let most = match first.0 {
+        Kind::Triangle | Kind::Sphere => BLOCK,
+        Kind::Instance => {
+            if COSTS {
+                1
+            } else {
+                WIDTH
+            }
+        }
+        Kind::Shape | Kind::Custom | Kind::Precise => MOST_OTHERS,
+    };
     primitives.len() <= most && primitives[1..].iter().all(|p| group(p) == first)
 }
 
@@ -32,7 +46,7 @@ pub(crate) fn group_of(primitive: &Primitive, traits: &[Traits]) -> (Kind, u32) 
     (kind, if kind.is_packed() { primitive.first() } else { 0 })
 }
 
-/// Decides about few primitives. With `COSTS`, they may be of any kind; without, they are packed.
+/// Decides about few primitives. With `COSTS`, they may be of any kind; without, a test of each costs the same.
 pub(crate) struct Decide<'a, const COSTS: bool> {
     pub(crate) primitives: &'a mut [Primitive],
     pub(crate) traits: &'a [Traits],
@@ -45,7 +59,7 @@ impl<const COSTS: bool> Task for Decide<'_, COSTS> {
     fn run<L: Lanes>(self) -> Few {
         let Self { primitives, traits } = self;
         let count = primitives.len();
-        let could_be_leaf = is_uniform(primitives, traits);
+        let could_be_leaf = is_uniform::<COSTS>(primitives, traits);
         if could_be_leaf && (count == 1 || !COSTS) {
             return Few::Leaf;
         }

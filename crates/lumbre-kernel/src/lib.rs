@@ -13,7 +13,6 @@ mod file;
 mod geometry;
 mod hit;
 mod holds;
-mod hulls;
 mod inside;
 mod lanes;
 mod morton;

@@ -11,16 +11,17 @@
 //! The scenes are `boulders`, `forest` and `pipes` of `cargo xtask bench kernel`.
 
 use std::collections::{BTreeMap, HashMap};
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use lumbre_geometry::Aabb;
 use lumbre_math::Transform;
 use rayon::prelude::*;
 
 use crate::collapse::Entry;
-use crate::node::tag;
-use crate::outline::{EightBoxes, Outline, box_in_space, center_and_half};
-use crate::prepare::Boxed;
+use crate::lanes::{Lanes, Level, Task};
+use crate::node::{Units, tag};
+use crate::outline::{EightBoxes, Outline, Placing, box_in_space, center_and_half};
+use crate::primitive::{Bounds, ONE, Primitive};
 use crate::{Accel, Geometry, GeometryKind, Instance, Placement};
 
 /// How many leaves there may be more for each instance that stands still, and how many more for all.
@@ -28,7 +29,7 @@ const MORE: usize = 7;
 const MORE_FOR_ALL: usize = 64;
 /// Parts are to have no more of the area of the whole than this. The test of an entered root would allow for 7/6; more nodes
 /// of the outer tree take from that.
-const LARGEST_SHARE: f64 = 0.8;
+const LARGEST_SHARE: f32 = 0.8;
 /// Boxes of a part's outline, about.
 const OUTLINE: usize = 8;
 
@@ -76,18 +77,20 @@ impl Start {
     }
 }
 
-/// A node of an instance's tree that is to be entered, or the root, with what is below it. Nothing where there is a leaf, for
-/// leaves are not entered.
+/// A node of an instance's tree that is to be entered, or the root, with what is below it.
 struct Family {
+    /// None where one of them is a leaf, for leaves are not entered.
     children: Vec<u32>,
-    boxes: Vec<Aabb>,
-    packed: Option<EightBoxes>,
-    outlines: OnceLock<Vec<Outline>>,
+    /// Around the children.
+    boxes: Option<EightBoxes>,
+    outline: Outline,
+    /// The children in turn, once they are known.
+    families: Vec<u32>,
 }
 
 impl Family {
-    fn of(inner: &Accel, node: u32) -> Self {
-        let node = &inner.tree.nodes[node as usize];
+    fn of(inner: &Accel, reference: u32) -> Self {
+        let node = &inner.tree.nodes[reference as usize];
         let lanes = 0..node.len as usize;
         let children = lanes.map(|lane| (node.children[lane], box_in_space(&inner.units, node, lane)));
         // What became empty by a refit is met by no ray.
@@ -96,74 +99,68 @@ impl Family {
         if children.iter().any(|child| child >> tag::SHIFT != tag::INNER) {
             (children, boxes) = Default::default();
         }
-        let packed: Vec<_> = boxes.iter().map(center_and_half).collect();
-        let packed = (!packed.is_empty()).then(|| EightBoxes::new(&packed));
-        Self { children, boxes, packed, outlines: OnceLock::new() }
-    }
-
-    /// By how much the areas of the boxes around the children are less than that of the box around all, if that is enough.
-    fn gain(&self, map: &Transform, whole: &Aabb) -> f64 {
-        let Some(boxes) = &self.packed else { return 0.0 };
-        let (area, areas) = (whole.half_area(), boxes.placed_area(self.children.len(), map));
-        if areas <= LARGEST_SHARE * area { area - areas } else { 0.0 }
-    }
-
-    /// The children, each with a box in the space around the instance.
-    fn placed<'a>(
-        &'a self,
-        inner: &'a Accel,
-        placement: &'a Placement,
-        whole: &'a Aabb,
-    ) -> impl Iterator<Item = (u32, Aabb)> + 'a {
-        let outlines = self.outlines.get_or_init(|| {
-            let own = self.children.iter().zip(&self.boxes);
-            own.map(|(&child, &around)| Outline::below(inner, child, around, OUTLINE)).collect()
-        });
-        self.children.iter().zip(outlines).map(move |(&child, outline)| {
-            let bounds = outline.at(placement);
-            // Each bounds it, so that their common part does.
-            (child, Aabb { min: bounds.min.max(whole.min), max: bounds.max.min(whole.max) })
-        })
+        let boxes: Vec<_> = boxes.iter().map(center_and_half).collect();
+        let boxes = (!boxes.is_empty()).then(|| EightBoxes::new(&boxes));
+        let outline = Outline::below(inner, reference, OUTLINE);
+        Self { children, boxes, outline, families: Vec::new() }
     }
 }
 
 /// What is known of trees that instances place: many are of one.
 #[derive(Default)]
 pub(crate) struct Families {
-    known: HashMap<(usize, u32), Family>,
+    known: Vec<Family>,
+    /// Of a tree and a node, the place among those that are known.
+    places: HashMap<(usize, u32), u32>,
 }
 
 impl Families {
-    fn key(instance: &Instance, node: u32) -> (usize, u32) {
-        (Arc::as_ptr(&instance.accel).addr(), node)
+    /// The place of a node.
+    fn learn(&mut self, accel: &Arc<Accel>, node: u32) -> u32 {
+        *self.places.entry((Arc::as_ptr(accel).addr(), node)).or_insert_with(|| {
+            self.known.push(Family::of(accel, node));
+            self.known.len() as u32 - 1
+        })
     }
 
-    fn get(&self, instance: &Instance, node: u32) -> &Family {
-        &self.known[&Self::key(instance, node)]
+    fn get(&self, place: u32) -> &Family {
+        &self.known[place as usize]
     }
 
-    fn learn(&mut self, instance: &Instance, node: u32) -> &Family {
-        self.known.entry(Self::key(instance, node)).or_insert_with(|| Family::of(&instance.accel, node))
+    /// Gets to know the children of one.
+    fn learn_children(&mut self, accel: &Arc<Accel>, place: u32) {
+        let family = self.get(place);
+        if family.families.len() < family.children.len() {
+            let children = family.children.clone();
+            self.known[place as usize].families =
+                children.into_iter().map(|child| self.learn(accel, child)).collect();
+        }
     }
 
     /// The boxes around those parts of a tree, whose nodes these are, in the space around the instance; `None` unless they
     /// together are all of the tree.
     fn boxes_of(&mut self, instance: &Instance, whole: &Aabb, nodes: &[u32]) -> Option<Vec<Aabb>> {
-        let inner = &*instance.accel;
-        inner.tree.root.filter(|root| root >> tag::SHIFT == tag::INNER)?;
+        let Instance { accel, world_from_object } = instance;
+        accel.tree.root.filter(|root| root >> tag::SHIFT == tag::INNER)?;
         let mut places: Vec<(u32, usize)> = nodes.iter().copied().zip(0..).collect();
         places.sort_unstable();
         let mut boxes = vec![None; nodes.len()];
-        let mut pending = vec![(0, *whole)];
-        while let Some((node, around)) = pending.pop() {
-            let family = self.learn(instance, node);
+        let mut pending = vec![(self.learn(accel, 0), *whole)];
+        while let Some((place, around)) = pending.pop() {
+            self.learn_children(accel, place);
+            let family = self.get(place);
             if family.children.is_empty() {
                 return None;
             }
-            for (child, bounds) in family.placed(inner, &instance.world_from_object, &around) {
-                match places.binary_search_by_key(&child, |place| place.0) {
+            for (node, &place) in family.children.iter().zip(&family.families) {
+                let mut bounds = around;
+                if let Some(own) = self.get(place).outline.part_at(world_from_object) {
+                    // Each bounds it, so that their common part does.
+                    bounds = Aabb { min: own.min.max(around.min), max: own.max.min(around.max) };
+                }
+                match places.binary_search_by_key(node, |place| place.0) {
                     Ok(found) => boxes[places[found].1] = Some(bounds),
-                    Err(_) => pending.push((child, bounds)),
+                    Err(_) => pending.push((place, bounds)),
                 }
             }
         }
@@ -182,57 +179,112 @@ fn still(geometry: &Geometry) -> Option<(&Instance, &Transform)> {
     }
 }
 
-/// Opens the instances among some primitives where that pays, into no more than `room` parts more than there are primitives.
-/// They come back in the order of their names.
-pub(crate) fn open(boxed: Vec<Boxed>, geometries: &[Geometry], room: usize) -> Vec<Boxed> {
-    let of = |boxed: &Boxed| still(&geometries[boxed.geometry as usize]);
-    let can_be_opened = |boxed: &Boxed| {
-        let root = of(boxed).and_then(|(instance, _)| instance.accel.tree.root);
-        root.is_some_and(|root| root >> tag::SHIFT == tag::INNER)
+/// Of what is no instance that can be opened.
+const NO_FAMILY: u32 = u32::MAX;
+/// The second name of what was opened.
+const OPENED: u32 = u32::MAX;
+/// Parts that a thread looks at together.
+const CHUNK: usize = 256;
+
+/// Opens the instances among some primitives where that pays, into no more than `room` parts more than there are primitives. The
+/// second name of a part is the node where it begins.
+pub(crate) fn open(primitives: &mut Vec<Primitive>, geometries: &[Geometry], units: &Units, room: usize) {
+    let mut known = Families::default();
+    let of = |primitive: &Primitive| still(&geometries[primitive.first() as usize]);
+    let family = |primitive: &Primitive| match of(primitive) {
+        Some((Instance { accel, .. }, _))
+            if accel.tree.root.is_some_and(|root| root >> tag::SHIFT == tag::INNER) =>
+        {
+            known.learn(accel, 0)
+        }
+        _ => NO_FAMILY,
     };
-    if !boxed.iter().any(can_be_opened) {
-        return boxed;
+    let mut families: Vec<u32> = primitives.iter().map(family).collect();
+    let instances = families.iter().filter(|&&family| family != NO_FAMILY).count();
+    if instances == 0 {
+        return;
     }
-    let (mut parts, mut done): (Vec<_>, Vec<_>) = boxed.into_iter().partition(can_be_opened);
-    let mut more = (MORE * parts.len() + MORE_FOR_ALL).min(room);
-    let mut families = Families::default();
+    let mut more = (MORE * instances + MORE_FOR_ALL).min(room);
+    let mut first = 0;
     // Level by level, so that threads share the work on one.
-    while !parts.is_empty() {
-        for part in &parts {
-            if let Some((instance, _)) = of(part) {
-                families.learn(instance, part.primitive);
+    while first < primitives.len() {
+        let mut gains = vec![0.0; families.len()];
+        let parts = primitives[first..].par_chunks_mut(CHUNK).zip(families.par_chunks(CHUNK));
+        parts.zip(gains.par_chunks_mut(CHUNK)).for_each(|((parts, families), gains)| {
+            let are_whole = first == 0;
+            Level::best().run(Weigh { parts, families, gains, known: &known, geometries, units, are_whole });
+        });
+        let positive = gains.iter().enumerate().filter(|(_, gain)| **gain > 0.0);
+        // The largest first, and of equals the first.
+        let mut order: Vec<u64> =
+            positive.map(|(place, gain)| u64::from(!gain.to_bits()) << 32 | place as u64).collect();
+        drop(gains);
+        order.par_sort_unstable();
+        let mut opened = Vec::new();
+        let mut count = 0;
+        for place in order.into_iter().map(|key| key as u32 as usize) {
+            let children = known.get(families[place]).children.len();
+            let Some(rest) = (more + 1).checked_sub(children) else { break };
+            more = rest;
+            count += children;
+            opened.push(place);
+        }
+        opened.sort_unstable();
+        let mut next = Vec::with_capacity(count);
+        let end = primitives.len();
+        primitives.reserve_exact(count);
+        for place in opened {
+            let part = primitives[first + place];
+            let Some((instance, _)) = of(&part) else { continue };
+            known.learn_children(&instance.accel, families[place]);
+            let family = known.get(families[place]);
+            next.extend(&family.families);
+            primitives.extend(family.children.iter().map(|&child| part.with_names(part.first(), child)));
+            primitives[first + place] = part.with_names(part.first(), OPENED);
+        }
+        (first, families) = (end, next);
+    }
+    primitives.retain(|primitive| primitive.second() != OPENED);
+}
+
+/// Finds the boxes around parts, which have those of what they are parts of, and what would be gained if they were opened.
+struct Weigh<'a> {
+    parts: &'a mut [Primitive],
+    families: &'a [u32],
+    gains: &'a mut [f32],
+    known: &'a Families,
+    geometries: &'a [Geometry],
+    units: &'a Units,
+    /// Whether they are no parts but whole, with boxes of their own.
+    are_whole: bool,
+}
+
+impl Task for Weigh<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let Self { parts, families, gains, known, geometries, units, are_whole } = self;
+        // From areas in space to those of primitives.
+        let scale = (units.scale * ONE).powi(2);
+        for ((part, &family), gain) in parts.iter_mut().zip(families).zip(gains) {
+            if family == NO_FAMILY {
+                continue;
+            }
+            let Some((_, map)) = still(&geometries[part.first() as usize]) else { continue };
+            let (family, placing) = (known.get(family), Placing::of(map));
+            if !are_whole && let Some(around) = family.outline.around(&placing) {
+                *part = part.common(&Bounds::near(units, &around, part.first(), part.second()));
+            }
+            if let Some(boxes) = &family.boxes {
+                let areas = (scale * boxes.placed_area(family.children.len(), &placing)) as f32;
+                let area = part.half_area();
+                if areas <= LARGEST_SHARE * area {
+                    *gain = area - areas;
+                }
             }
         }
-        let gain = |part: &Boxed| {
-            of(part)
-                .map_or(0.0, |(instance, map)| families.get(instance, part.primitive).gain(map, &part.bounds))
-        };
-        let gains: Vec<f64> = parts.par_iter().with_min_len(256).map(gain).collect();
-        let mut order: Vec<usize> = (0..parts.len()).filter(|&i| gains[i] > 0.0).collect();
-        order.par_sort_unstable_by(|&a, &b| gains[b].total_cmp(&gains[a]).then(a.cmp(&b)));
-        let mut is_opened = vec![false; parts.len()];
-        for i in order {
-            let Some((instance, _)) = of(&parts[i]) else { continue };
-            let children = families.get(instance, parts[i].primitive).children.len();
-            let Some(rest) = (more + 1).checked_sub(children) else { break };
-            (more, is_opened[i]) = (rest, true);
-        }
-        let children = |part: &Boxed| -> Vec<Boxed> {
-            let Some((instance, _)) = of(part) else { return Vec::new() };
-            let family = families.get(instance, part.primitive);
-            let placed = family.placed(&instance.accel, &instance.world_from_object, &part.bounds);
-            let geometry = part.geometry;
-            placed.map(|(primitive, bounds)| Boxed { bounds, geometry, primitive }).collect()
-        };
-        let opened = parts.par_iter().zip(&is_opened).with_min_len(256).filter(|(_, is_opened)| **is_opened);
-        let next: Vec<Boxed> = opened.flat_map_iter(|(part, _)| children(part)).collect();
-        let mut is_opened = is_opened.into_iter();
-        parts.retain(|_| !is_opened.next().unwrap_or_default());
-        done.append(&mut parts);
-        parts = next;
     }
-    done.sort_unstable_by_key(|boxed| (boxed.geometry, boxed.primitive));
-    done
 }
 
 /// Where the entries of instances that were opened stand among all of a tree, by geometry.

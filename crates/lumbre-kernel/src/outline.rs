@@ -24,7 +24,7 @@ impl Outline {
     pub(crate) fn of(inner: &Accel) -> Self {
         let whole = inner.bounds;
         match inner.tree.root.filter(|_| inner.infinite.is_empty()) {
-            Some(root) => Self::below(inner, root, whole, OUTLINE),
+            Some(root) => Self { whole, ..Self::below(inner, root, OUTLINE) },
             None => Self::of_box(whole),
         }
     }
@@ -33,12 +33,12 @@ impl Outline {
         Self { whole, boxes: Vec::new(), reach: DVec3::ZERO }
     }
 
-    /// Of what is below a reference, within a box, by some such number of boxes.
-    pub(crate) fn below(inner: &Accel, reference: u32, whole: Aabb, count: usize) -> Self {
+    /// Of what is below a node, by no more than so many boxes, of which it has room for eight; of a leaf, by none.
+    pub(crate) fn below(inner: &Accel, reference: u32, count: usize) -> Self {
         let node = |reference: u32| {
             (reference >> tag::SHIFT == tag::INNER).then(|| &inner.tree.nodes[reference as usize])
         };
-        let Some(root) = node(reference) else { return Self::of_box(whole) };
+        let Some(root) = node(reference) else { return Self::of_box(Aabb::EMPTY) };
         let children = |node: &Node| -> Vec<(Aabb, u32)> {
             (0..node.len as usize)
                 .map(|lane| (box_in_space(&inner.units, node, lane), node.children[lane]))
@@ -49,14 +49,27 @@ impl Outline {
             let area = |i: &usize| open[*i].0.half_area();
             let inner_ones = (0..open.len()).filter(|&i| node(open[i].1).is_some());
             let Some(largest) = inner_ones.max_by(|a, b| area(a).total_cmp(&area(b))) else { break };
-            let (_, reference) = open.swap_remove(largest);
-            open.extend(node(reference).map(children).unwrap_or_default());
+            let below = node(open[largest].1).map(children).unwrap_or_default();
+            if open.len() + below.len() > count + 1 {
+                break;
+            }
+            open.swap_remove(largest);
+            open.extend(below);
         }
-        let filled = open.iter().map(|(bounds, _)| bounds).filter(|bounds| !bounds.is_empty());
-        let boxes: Vec<_> = filled.map(center_and_half).collect();
+        open.retain(|(bounds, _)| !bounds.is_empty());
+        let whole = open.iter().fold(Aabb::EMPTY, |whole, (bounds, _)| whole.union(*bounds));
+        let boxes: Vec<_> = open.iter().map(|(bounds, _)| center_and_half(bounds)).collect();
         let reach = boxes.iter().fold(DVec3::ZERO, |most, [center, half]| most.max(center.abs() + *half));
         let boxes = boxes.chunks(EIGHT).map(EightBoxes::new).collect();
         Self { whole, boxes, reach }
+    }
+
+    /// A box around it at all times, whatever is the box around the whole tree; `None` where nothing is known but that.
+    pub(crate) fn part_at(&self, placement: &Placement) -> Option<Aabb> {
+        match placement {
+            Placement::Still(map) => Level::best().run(Around { outline: self, placing: &Placing::of(map) }),
+            Placement::Moving(motion) => (!self.boxes.is_empty()).then(|| self.swept(motion)),
+        }
     }
 
     /// A box around it at all times.
@@ -68,17 +81,45 @@ impl Outline {
     }
 
     fn placed(&self, map: &Transform) -> Aabb {
-        let whole = placed_bounds(&self.whole, map);
-        if self.boxes.is_empty() {
-            return whole;
+        let (whole, placing) = (placed_bounds(&self.whole, map), Placing::of(map));
+        match Level::best().run(Around { outline: self, placing: &placing }) {
+            // Each bounds it, so that their common part does.
+            Some(parts) => Aabb { min: parts.min.max(whole.min), max: parts.max.min(whole.max) },
+            None => whole,
         }
-        let (affine, sizes) = (map.affine(), sizes_of(map));
-        let [min, max] =
-            Level::best().run(Images { boxes: &self.boxes, linear: &affine.matrix3, sizes: &sizes });
-        let rounding = rounding_of(map, &sizes, self.reach);
-        let (min, max) = (min + affine.translation - rounding, max + affine.translation + rounding);
-        // Each bounds it, so that their common part does.
-        Aabb { min: min.max(whole.min), max: max.min(whole.max) }
+    }
+
+    /// The box around the images of its boxes; `None` where there are none.
+    #[inline(always)]
+    pub(crate) fn around(&self, placing: &Placing) -> Option<Aabb> {
+        if self.boxes.is_empty() {
+            return None;
+        }
+        let [min, max] = images(&self.boxes, placing);
+        let rounding = placing.rounding(self.reach);
+        let (min, max) = (min + placing.translation, max + placing.translation);
+        Some(Aabb { min: min - rounding, max: max + rounding })
+    }
+}
+
+/// A map, and what else the images of boxes need of it.
+pub(crate) struct Placing {
+    linear: DMat3,
+    /// The sizes of its numbers.
+    sizes: DMat3,
+    translation: DVec3,
+}
+
+impl Placing {
+    #[inline(always)]
+    pub(crate) fn of(map: &Transform) -> Self {
+        Self { linear: map.linear(), sizes: sizes_of(map), translation: map.affine().translation }
+    }
+
+    /// By how much the image of a box with no larger coordinates than `reach` may be wrong.
+    #[inline(always)]
+    fn rounding(&self, reach: DVec3) -> DVec3 {
+        8.0 * f64::EPSILON * (self.sizes * reach + self.translation.abs())
     }
 }
 
@@ -135,65 +176,56 @@ impl EightBoxes {
 
 impl EightBoxes {
     /// Half the areas of the boxes around the images of the first `count`, together.
-    pub(crate) fn placed_area(&self, count: usize, map: &Transform) -> f64 {
-        let areas = Level::best().run(Areas { boxes: self, sizes: &sizes_of(map) });
+    #[inline(always)]
+    pub(crate) fn placed_area(&self, count: usize, placing: &Placing) -> f64 {
+        let (halves, s) = (&self.halves, &placing.sizes);
+        let mut areas = [0.0; EIGHT];
+        for (lane, area) in areas.iter_mut().enumerate() {
+            let [x, y, z] = [0, 1, 2].map(|axis| halves[axis][lane]);
+            let size = |axis: usize| 2.0 * (s.x_axis[axis] * x + s.y_axis[axis] * y + s.z_axis[axis] * z);
+            *area = size(0) * size(1) + size(1) * size(2) + size(2) * size(0);
+        }
         areas[..count.min(EIGHT)].iter().sum()
     }
 }
 
-/// Half the area of the box around the image of each of eight boxes.
-struct Areas<'a> {
-    boxes: &'a EightBoxes,
-    /// The sizes of the numbers of the linear part.
-    sizes: &'a DMat3,
+/// The box around the images of an outline's boxes.
+struct Around<'a> {
+    outline: &'a Outline,
+    placing: &'a Placing,
 }
 
-impl Task for Areas<'_> {
-    type Output = [f64; EIGHT];
+impl Task for Around<'_> {
+    type Output = Option<Aabb>;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> [f64; EIGHT] {
-        let (halves, s) = (&self.boxes.halves, self.sizes);
-        std::array::from_fn(|lane| {
-            let [x, y, z] = [0, 1, 2].map(|axis| halves[axis][lane]);
-            let size = |axis: usize| 2.0 * (s.x_axis[axis] * x + s.y_axis[axis] * y + s.z_axis[axis] * z);
-            size(0) * size(1) + size(1) * size(2) + size(2) * size(0)
-        })
+    fn run<L: Lanes>(self) -> Option<Aabb> {
+        self.outline.around(self.placing)
     }
 }
 
-/// The box around the images of boxes, its translation apart.
-struct Images<'a> {
-    boxes: &'a [EightBoxes],
-    linear: &'a DMat3,
-    /// The sizes of its numbers.
-    sizes: &'a DMat3,
-}
-
-impl Task for Images<'_> {
-    type Output = [DVec3; 2];
-
-    #[inline(always)]
-    fn run<L: Lanes>(self) -> [DVec3; 2] {
-        let mut low = [[f64::INFINITY; EIGHT]; 3];
-        let mut high = [[f64::NEG_INFINITY; EIGHT]; 3];
-        for EightBoxes { centers, halves } in self.boxes {
-            for axis in 0..3 {
-                let row = |m: &DMat3| [m.x_axis[axis], m.y_axis[axis], m.z_axis[axis]];
-                let (m, s) = (row(self.linear), row(self.sizes));
-                for lane in 0..EIGHT {
-                    let image = m[0] * centers[0][lane] + m[1] * centers[1][lane] + m[2] * centers[2][lane];
-                    let reach = s[0] * halves[0][lane] + s[1] * halves[1][lane] + s[2] * halves[2][lane];
-                    let (first, last) = (image - reach, image + reach);
-                    low[axis][lane] = if first < low[axis][lane] { first } else { low[axis][lane] };
-                    high[axis][lane] = if last > high[axis][lane] { last } else { high[axis][lane] };
-                }
+/// The corners of the box around the images of boxes, the translation apart.
+#[inline(always)]
+fn images(boxes: &[EightBoxes], placing: &Placing) -> [DVec3; 2] {
+    let mut low = [[f64::INFINITY; EIGHT]; 3];
+    let mut high = [[f64::NEG_INFINITY; EIGHT]; 3];
+    for EightBoxes { centers, halves } in boxes {
+        for axis in 0..3 {
+            let row = |m: &DMat3| [m.x_axis[axis], m.y_axis[axis], m.z_axis[axis]];
+            let (m, s) = (row(&placing.linear), row(&placing.sizes));
+            for lane in 0..EIGHT {
+                let image = m[0] * centers[0][lane] + m[1] * centers[1][lane] + m[2] * centers[2][lane];
+                let reach = s[0] * halves[0][lane] + s[1] * halves[1][lane] + s[2] * halves[2][lane];
+                let (first, last) = (image - reach, image + reach);
+                low[axis][lane] = if first < low[axis][lane] { first } else { low[axis][lane] };
+                high[axis][lane] = if last > high[axis][lane] { last } else { high[axis][lane] };
             }
         }
-        let least = |lanes: [f64; EIGHT]| lanes.into_iter().fold(f64::INFINITY, f64::min);
-        let most = |lanes: [f64; EIGHT]| lanes.into_iter().fold(f64::NEG_INFINITY, f64::max);
-        [DVec3::from_array(low.map(least)), DVec3::from_array(high.map(most))]
     }
+    let least = |lanes: [f64; EIGHT]| lanes.into_iter().fold(f64::INFINITY, |a, b| if b < a { b } else { a });
+    let most =
+        |lanes: [f64; EIGHT]| lanes.into_iter().fold(f64::NEG_INFINITY, |a, b| if b > a { b } else { a });
+    [DVec3::from_array(low.map(least)), DVec3::from_array(high.map(most))]
 }
 
 /// A node's box, back from tree units.
@@ -211,11 +243,11 @@ fn placed_bounds(bounds: &Aabb, map: &Transform) -> Aabb {
     if bounds.is_empty() {
         return Aabb::EMPTY;
     }
-    let (affine, sizes) = (map.affine(), sizes_of(map));
+    let placing = Placing::of(map);
     let [center, half] = center_and_half(bounds);
-    let image = affine.transform_point3(center);
-    let reach = sizes * half;
-    let rounding = rounding_of(map, &sizes, center.abs() + half);
+    let image = map.affine().transform_point3(center);
+    let reach = placing.sizes * half;
+    let rounding = placing.rounding(center.abs() + half);
     Aabb { min: image - reach - rounding, max: image + reach + rounding }
 }
 
@@ -226,12 +258,8 @@ pub(crate) fn center_and_half(bounds: &Aabb) -> [DVec3; 2] {
 }
 
 /// The sizes of the numbers of a map's linear part.
+#[inline(always)]
 fn sizes_of(map: &Transform) -> DMat3 {
     let linear = map.linear();
     DMat3::from_cols(linear.x_axis.abs(), linear.y_axis.abs(), linear.z_axis.abs())
-}
-
-/// By how much the image of a box with no larger coordinates than `reach` may be wrong.
-fn rounding_of(map: &Transform, sizes: &DMat3, reach: DVec3) -> DVec3 {
-    8.0 * f64::EPSILON * (*sizes * reach + map.affine().translation.abs())
 }

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
 
-use lumbre_geometry::Aabb;
+use lumbre_geometry::{Aabb, PlacedShape};
 use lumbre_math::{DMat3, DVec3, Transform, Vec3};
 use rayon::prelude::*;
 
@@ -11,12 +11,10 @@ use crate::build::{Grown, binary_tree, fill};
 use crate::clouds::CloudSurvey;
 use crate::collapse::{Entry, Packed, lay_out};
 use crate::holds::{Holds, SingleStart};
-use crate::hulls::Hulls;
 use crate::lanes::Level;
 use crate::node::Units;
 use crate::outline::Outline;
 use crate::primitive::{Bounds, Kind, Primitive, Traits};
-use crate::triangles::BLOCK;
 use crate::{
     Accel, BuildError, BuildOptions, Geometry, GeometryKind, Placement, PreciseMesh, Preset, TriangleMesh,
     opening, precise,
@@ -36,19 +34,19 @@ pub(crate) fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result
     let level = Level::best();
 
     let count = parts.count();
+    let room = parts.room();
+    let near = |part: &Boxed| Bounds::near(&units, &part.bounds, part.geometry, part.primitive);
+    let mut others: Vec<Primitive> =
+        std::mem::take(&mut parts.boxed).par_iter().with_min_len(1024).map(near).collect();
     if options.preset != Preset::Fast {
-        let room = parts.room();
-        parts.boxed = opening::open(parts.boxed, &geometries, room);
+        opening::open(&mut others, &geometries, &units, room);
     }
-    let in_tree = parts.boxed.len() + parts.triangles + parts.spheres;
-    let tree = if in_tree == 0 {
+    let packed = parts.triangles + parts.spheres;
+    let tree = if others.len() + packed == 0 {
         Packed::default()
     } else {
-        let mut primitives = fill(in_tree, Bounds::EMPTY);
-        let (boxed, mut rest) = primitives.split_at_mut(parts.boxed.len());
-        for (place, part) in boxed.iter_mut().zip(&parts.boxed) {
-            *place = Bounds::near(&units, &part.bounds, part.geometry, part.primitive);
-        }
+        let mut primitives = fill(packed, Bounds::EMPTY);
+        let mut rest = &mut primitives[..];
         for survey in &parts.surveys {
             if let GeometryKind::Mesh(mesh) = &geometries[survey.geometry as usize].kind {
                 let own = rest.split_off_mut(..survey.triangles).expect("they were counted");
@@ -61,16 +59,15 @@ pub(crate) fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result
                 survey.put_boxes(cloud, &units, own);
             }
         }
-        let grown = binary_tree(level, options.preset, &mut primitives, &traits, &geometries, &units);
-        let Grown { tree, names, cells } = grown;
-        let layout = lay_out(&traits, &tree, &names)?;
-        drop(tree);
+        let grown = binary_tree(level, options.preset, others, &mut primitives, &traits, &geometries, &units);
+        let Grown { tree, names, instances, cells } = grown;
+        let layout = lay_out(&traits, &tree, &names, &instances)?;
+        drop((tree, instances));
         drop(primitives);
         layout.pack(&geometries, names, cells)
     };
     let holds = Holds::new(&geometries, parts.largest_corner, parts.sphere_reach);
     Ok(Accel {
-        hulls: Hulls::new(&geometries, &tree.entries, &units),
         single: SingleStart::new(&holds, &units, tree.root),
         units,
         holds,
@@ -92,7 +89,6 @@ pub(crate) fn empty_over(geometries: Vec<Geometry>) -> Accel {
         units: Units::new(DVec3::ZERO, 1.0, 0.0, 1.0),
         holds: Holds::new(&geometries, 0.0, 0.0),
         single: None,
-        hulls: Hulls::default(),
         tree: Packed::default(),
         infinite: Vec::new(),
         bounds: Aabb::EMPTY,
@@ -136,8 +132,7 @@ pub(crate) struct Survey {
     pub(crate) chunks: Vec<u32>,
 }
 
-/// A primitive that is no triangle, with its box. They are in the order of their names. Of an instance that was opened, the
-/// second name is the node where a part begins.
+/// A primitive that is no triangle, with its box. They are in the order of their names.
 pub(crate) struct Boxed {
     pub(crate) bounds: Aabb,
     pub(crate) geometry: u32,
@@ -524,14 +519,17 @@ fn condition_of(map: &Transform) -> f64 {
 
 /// What the build must know of a geometry.
 fn traits_of(geometry: &Geometry) -> Traits {
-    let (kind, cost, most) = match &geometry.kind {
-        GeometryKind::Mesh(_) => (Kind::Triangle, 4, BLOCK),
-        GeometryKind::Spheres(_) => (Kind::Sphere, 4, BLOCK),
-        // Its share in the first test of eight, which nearly always spares the others: its own cost is the same in any leaf.
-        GeometryKind::Shape(_) => (Kind::Shape, 3, BLOCK),
-        GeometryKind::Instance(_) => (Kind::Instance, 96, 1),
-        GeometryKind::Custom(_) => (Kind::Custom, 48, 4),
-        GeometryKind::PreciseMesh(_) => (Kind::Precise, 16, 4),
-    };
-    Traits { kind, cost, most }
+    match &geometry.kind {
+        GeometryKind::Mesh(_) => Traits { kind: Kind::Triangle, cost: 4 },
+        GeometryKind::Spheres(_) => Traits { kind: Kind::Sphere, cost: 4 },
+        GeometryKind::Shape(shape) => Traits { kind: Kind::Shape, cost: cost_of(shape) },
+        GeometryKind::Instance(_) => Traits { kind: Kind::Instance, cost: 96 },
+        GeometryKind::Custom(_) => Traits { kind: Kind::Custom, cost: 48 },
+        GeometryKind::PreciseMesh(_) => Traits { kind: Kind::Precise, cost: 16 },
+    }
+}
+
+fn cost_of(shape: &PlacedShape) -> u32 {
+    let moved = if shape.world_from_object().is_identity() { 0.0 } else { 0.5 };
+    (16.0 * (moved + shape.shape().search_cost())) as u32
 }

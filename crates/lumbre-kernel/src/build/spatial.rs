@@ -9,7 +9,7 @@
 
 use rayon::prelude::*;
 
-use super::{Binary, Builder, CHUNK, Name, PARALLEL, Range, SAH_DEPTH, Tools, fill};
+use super::{Binary, Builder, CHUNK, Name, PARALLEL, Plot, Range, SAH_DEPTH, Tools, fill};
 use crate::bins::{Binning, Bins};
 use crate::carve::{Carver, Cell, part_of, plane_at, reach};
 use crate::clouds::box_of;
@@ -245,12 +245,14 @@ impl Spatial<'_, '_> {
             let mut there = vec![Bounds::EMPTY; count];
             let mut nodes = Vec::new();
             let mut bins = Box::new(Bins::EMPTY);
-            let range = Range { here: &mut boxes, there: &mut there, names, first: room.first, depth };
+            let (here, there) = (&mut boxes[..], &mut there[..]);
+            let range = Range { here, there, names, first: room.first, depth, is_away: false };
             self.builder.twig::<false>(range, None, &mut Tools { nodes: &mut nodes, bins: &mut bins });
             Binary::twig(nodes)
         } else {
             let sketch = self.builder.sketch::<false>(&mut boxes, depth, None);
-            self.builder.grow::<false>(&sketch, &[], &mut boxes, names, room.first).into_owned()
+            let plot = Plot { primitives: &mut boxes, names, first: room.first, keeps: false };
+            self.builder.grow::<false>(&sketch, &[], plot).into_owned()
         };
         for (name, cell) in room.names[..count].iter_mut().zip(room.cells) {
             let place = name[1] as usize;

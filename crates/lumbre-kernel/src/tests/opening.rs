@@ -283,6 +283,21 @@ fn only_what_gains_is_opened_and_only_so_far() {
 }
 
 #[test]
+fn instances_fill_their_nodes() {
+    let mut random = Random(311);
+    let bars = [Arc::new(build(vec![GeometryKind::Mesh(Arc::new(bar(60)))]))];
+    for count in [1, 3, 8, 9, 700] {
+        let accel = scattered(&mut random, &bars, count);
+        let (nodes, entries) = (accel.tree.nodes.len(), accel.tree.entries.len());
+        // A root, and nodes of six children in the mean.
+        assert!(nodes - 1 <= entries / 5, "{nodes} nodes over {entries} entries");
+        if count == 700 {
+            check_rays(&accel, &mut random, 40);
+        }
+    }
+}
+
+#[test]
 fn opened_trees_are_the_same_from_any_number_of_threads() {
     with_every_preset(|| {
         // Threads of a pool do not know this thread's.
