@@ -1101,8 +1101,9 @@ fn principled(material: &str) -> PrincipledParams {
     *params
 }
 
-/// A scene of one square with so many sets of texture coordinates, all different, and a material with as many textures.
-fn with_sets(count: usize) -> (SceneDesc, Vec<String>) {
+/// A scene of one square with so many sets of texture coordinates, all different, and a material whose textures go by some:
+/// base colour, roughness, normals, transmission and clearcoat.
+fn with_sets(count: usize, named: [usize; 5]) -> (SceneDesc, Vec<String>) {
     let mut parts = Parts::default();
     let p = parts.positions(&SQUARE);
     let mut attributes = format!(r#""POSITION":{p}"#);
@@ -1117,17 +1118,13 @@ fn with_sets(count: usize) -> (SceneDesc, Vec<String>) {
     parts.binary.extend_from_slice(&image);
     parts.views.push(format!(r#"{{"buffer":0,"byteOffset":{start},"byteLength":{}}}"#, image.len()));
     let view = parts.views.len() - 1;
-    let texture = |set: usize| format!(r#"{{"index":0,"texCoord":{}}}"#, set.min(count - 1));
+    let [base, rough, normals, clear, coat] = named.map(|set| format!(r#"{{"index":0,"texCoord":{set}}}"#));
     let rest = format!(
         r#""images":[{{"bufferView":{view},"mimeType":"image/png"}}],"textures":[{{"source":0}}],
-        "materials":[{{"pbrMetallicRoughness":{{"baseColorTexture":{},"metallicRoughnessTexture":{}}},"normalTexture":{},
-        "extensions":{{"KHR_materials_transmission":{{"transmissionFactor":0.5,"transmissionTexture":{}}},
-        "KHR_materials_clearcoat":{{"clearcoatFactor":1,"clearcoatTexture":{}}}}}}}],{}"#,
-        texture(0),
-        texture(1),
-        texture(2),
-        texture(3),
-        texture(4),
+        "materials":[{{"pbrMetallicRoughness":{{"baseColorTexture":{base},"metallicRoughnessTexture":{rough}}},
+        "normalTexture":{normals},
+        "extensions":{{"KHR_materials_transmission":{{"transmissionFactor":0.5,"transmissionTexture":{clear}}},
+        "KHR_materials_clearcoat":{{"clearcoatFactor":1,"clearcoatTexture":{coat}}}}}}}],{}"#,
         one(&format!(r#""mode":6,"material":0,"attributes":{{{attributes}}}"#)),
     );
     let mut diagnostics = Diagnostics::new();
@@ -1135,37 +1132,68 @@ fn with_sets(count: usize) -> (SceneDesc, Vec<String>) {
     (scene.unwrap(), diagnostics.lines())
 }
 
-#[test]
-fn four_sets_of_texture_coordinates_serve_one_material() {
-    let (scene, warnings) = with_sets(4);
-    assert_eq!(warnings, [""; 0]);
-    let mesh = mesh(&scene.shapes[0]);
-    let sets = std::iter::once(&mesh.uvs).chain(&mesh.further_uvs);
-    for (set, uvs) in sets.enumerate() {
-        let at = |i: usize| 0.1 * set as f32 + 0.25 * i as f32;
-        // Of the third vertex, wherever the tangents left it; v counts upwards here.
-        let third = mesh.positions.iter().position(|p| p.to_array() == SQUARE[2]).unwrap();
-        let expected = Vec2::new(at(4), 1.0 - at(5));
-        assert!((uvs.as_ref().unwrap()[third] - expected).length() < 1e-6, "{set}");
-    }
-    let MaterialKind::Principled(params) = scene.materials[0].material.kind.clone() else { panic!() };
-    // Where a texture is looked up: in the set that it names, each of which is somewhere else.
-    let set_of = |texture: &FloatTexture| match texture {
-        Texture::Image(image) => image.mapping.clone(),
+/// Of the third vertex of [`with_sets`], wherever the tangents left it: its coordinates in a set of the mesh.
+fn of_third_vertex(mesh: &MeshDesc, uvs: &[Vec2]) -> Vec2 {
+    uvs[mesh.positions.iter().position(|p| p.to_array() == SQUARE[2]).unwrap()]
+}
+
+/// The same, as the file has them in one of its sets; v counts upwards here.
+fn in_the_file(set: usize) -> Vec2 {
+    let at = |i: usize| 0.1 * set as f32 + 0.25 * i as f32;
+    Vec2::new(at(4), 1.0 - at(5))
+}
+
+/// Which set of its mesh a texture is looked up in.
+fn set_of(texture: &FloatTexture) -> UvSet {
+    let image = match texture {
+        Texture::Image(image) => image,
         Texture::Product([image, _]) => match &**image {
-            Texture::Image(image) => image.mapping.clone(),
+            Texture::Image(image) => image,
             other => panic!("{other:?}"),
         },
         other => panic!("{other:?}"),
     };
-    for (texture, expected) in [(&params.roughness, UvSet::Second), (&params.transmission, UvSet::Fourth)] {
-        assert!(matches!(set_of(texture), Mapping2d::Affine { set, .. } if set == expected));
+    let Mapping2d::Affine { set, .. } = image.mapping else { panic!("{:?}", image.mapping) };
+    set
+}
+
+#[test]
+fn four_sets_of_texture_coordinates_serve_one_material() {
+    let (scene, warnings) = with_sets(4, [0, 1, 2, 3, 3]);
+    assert_eq!(warnings, [""; 0]);
+    let mesh = mesh(&scene.shapes[0]);
+    for (set, uvs) in std::iter::once(&mesh.uvs).chain(&mesh.further_uvs).enumerate() {
+        let found = of_third_vertex(mesh, uvs.as_ref().unwrap());
+        assert!((found - in_the_file(set)).length() < 1e-6, "{set}");
     }
+    let MaterialKind::Principled(params) = scene.materials[0].material.kind.clone() else { panic!() };
+    assert_eq!((set_of(&params.roughness), set_of(&params.transmission)), (UvSet::Second, UvSet::Fourth));
     let normal_map = scene.materials[0].material.normal_map.clone().unwrap();
     assert!(matches!(normal_map.mapping, Mapping2d::Affine { set: UvSet::Third, .. }));
     Scene::build(scene).unwrap();
-    let (_, warnings) = with_sets(5);
+    let (_, warnings) = with_sets(5, [0, 1, 2, 3, 4]);
     assert!(warnings.len() == 1 && warnings[0].contains("on a fifth set"), "{warnings:?}");
+}
+
+#[test]
+fn of_many_sets_of_texture_coordinates_those_are_kept_that_the_material_names() {
+    // Two of eight, one of them the last, take the room of two.
+    let (scene, warnings) = with_sets(8, [7, 3, 7, 3, 7]);
+    assert_eq!(warnings, [""; 0]);
+    let mesh = mesh(&scene.shapes[0]);
+    let [Some(second), None, None] = &mesh.further_uvs else { panic!("{:?}", mesh.further_uvs) };
+    for (uvs, set) in [(mesh.uvs.as_ref().unwrap(), 7), (second, 3)] {
+        assert!((of_third_vertex(mesh, uvs) - in_the_file(set)).length() < 1e-6, "{set}");
+    }
+    let MaterialKind::Principled(params) = scene.materials[0].material.kind.clone() else { panic!() };
+    assert_eq!((set_of(&params.roughness), set_of(&params.clearcoat)), (UvSet::Second, UvSet::First));
+    Scene::build(scene).unwrap();
+    // Four, in any order.
+    let (scene, warnings) = with_sets(8, [6, 1, 4, 0, 4]);
+    assert_eq!(warnings, [""; 0]);
+    let MaterialKind::Principled(params) = scene.materials[0].material.kind.clone() else { panic!() };
+    let found = [&params.transmission, &params.roughness, &params.clearcoat].map(|texture| set_of(texture));
+    assert_eq!(found, [UvSet::Second, UvSet::Third, UvSet::Fourth]);
 }
 
 #[test]
