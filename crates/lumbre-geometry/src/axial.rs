@@ -4,13 +4,13 @@ use std::f64::consts::TAU;
 
 use lumbre_math::quadratic::quadratic;
 use lumbre_math::rounding::gamma;
-use lumbre_math::{DVec2, DVec3, Transform, orthonormal_basis};
+use lumbre_math::{DMat3, DVec2, DVec3, Transform, orthonormal_basis};
 
 use crate::nearest::{Meridian, under_similarity};
 use crate::support::{arc_support, azimuth, bounds_from_support, cross_size, dot_size};
 use crate::{
-    Aabb, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, Surface, SurfaceSample, density,
-    measure,
+    Aabb, DirectionSample, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, Surface, SurfaceSample,
+    density, measure,
 };
 
 /// The points at distance ρ(z) = r1 + k z from an axis, z being the distance along it, between two planes across it.
@@ -305,6 +305,20 @@ impl Axial {
         Some(bounds_from_support(world_from_object, magnitude, support))
     }
 
+    /// The whole body, with caps.
+    pub(crate) fn hull(&self) -> Option<Hull> {
+        if !self.is_bounded() {
+            return None;
+        }
+        let (e1, e2) = orthonormal_basis(self.axis);
+        let radius = self.r1.max(self.r2);
+        let axes = DMat3::from_cols(radius * e1, radius * e2, 0.5 * self.length * self.axis);
+        // The radius is middle + half z.
+        let (middle, half) = (0.5 * (self.r1 + self.r2) / radius, 0.5 * (self.r2 - self.r1) / radius);
+        let profile = [-half * half, -2.0 * middle * half, -middle * middle];
+        Some(Hull::new(0.5 * (self.p1 + self.p2), axes, profile, self.is_solid()))
+    }
+
     /// The areas of the lateral surface and the two caps, 0 for a cap that is not there.
     fn part_areas(&self) -> [f64; 3] {
         let cap = |part| {
@@ -460,6 +474,11 @@ macro_rules! axial_shape {
             /// The box under a transform, tight for every sweep; `None` when infinite.
             pub fn bounds(&self, world_from_object: &Transform) -> Option<Aabb> {
                 self.body.bounds(world_from_object)
+            }
+
+            /// The whole body, with caps; `None` when infinite.
+            pub fn hull(&self) -> Option<Hull> {
+                self.body.hull()
             }
 
             /// The area, caps included; infinite when it is.

@@ -3,14 +3,15 @@
 use std::f64::consts::{PI, TAU};
 
 use lumbre_math::rounding::gamma;
-use lumbre_math::{DVec2, DVec3, Transform, orthonormal_basis};
+use lumbre_math::{DMat3, DVec2, DVec3, Transform, orthonormal_basis};
 
 use crate::axial::{Axial, CAP1, CAP2, LATERAL, Span};
 use crate::nearest::under_similarity;
 use crate::shape::check;
 use crate::support::bounds_from_support;
 use crate::{
-    Aabb, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface, SurfaceSample,
+    Aabb, DirectionSample, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
+    SurfaceSample,
 };
 use crate::{density, measure, sphere};
 
@@ -206,6 +207,15 @@ impl Capsule {
         let support = |d: DVec3| d.dot(p0).max(d.dot(p1)) + self.radius() * d.length();
         let magnitude = p0.abs().max(p1.abs()) + DVec3::splat(self.radius());
         Some(bounds_from_support(world_from_object, magnitude, support))
+    }
+
+    /// The cylinder around it.
+    pub fn hull(&self) -> Option<Hull> {
+        let [p0, p1] = self.ends();
+        let (e1, e2) = orthonormal_basis(self.tube.axis);
+        let half = 0.5 * self.tube.length + self.radius();
+        let axes = DMat3::from_cols(self.radius() * e1, self.radius() * e2, half * self.tube.axis);
+        Some(Hull::new(0.5 * (p0 + p1), axes, Hull::CYLINDER, false))
     }
 
     /// The area, 2πr (L + 2r): by Archimedes, that of the cylinder around it.

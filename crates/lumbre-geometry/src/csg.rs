@@ -8,8 +8,8 @@ use smallvec::{SmallVec, smallvec};
 
 use crate::placed::into_world;
 use crate::{
-    Aabb, DirectionSample, NearestPoint, NoNearestPoint, PlacedShape, Ray, Root, Roots, Shape, ShapeError,
-    Surface, SurfaceSample,
+    Aabb, DirectionSample, Hull, NearestPoint, NoNearestPoint, PlacedShape, Ray, Root, Roots, Shape,
+    ShapeError, Surface, SurfaceSample,
 };
 
 /// A stranger's solid, such as a closed mesh, as an operand of CSG.
@@ -510,6 +510,11 @@ impl Csg {
         // Operands that have nothing in common: a point is box enough for what is never hit.
         let center = bounds.center();
         Some(Aabb { min: center, max: center })
+    }
+
+    /// A box around it.
+    pub fn hull(&self) -> Option<Hull> {
+        Hull::of_box(&self.bounds(&Transform::IDENTITY)?)
     }
 
     /// Infinite, for want of a closed form: see [`Csg`].

@@ -7,7 +7,7 @@ use crate::nearest::{on_triangle, similarity_factor, under_similarity};
 use crate::shape::check;
 use crate::support::bounds_from_support;
 use crate::{
-    Aabb, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
+    Aabb, DirectionSample, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
     SurfaceSample, density, measure,
 };
 
@@ -144,6 +144,12 @@ impl Cuboid {
         let magnitude = self.low.abs().max(self.high.abs());
         let support = |d: DVec3| (d * self.low).max(d * self.high).element_sum();
         Some(bounds_from_support(world_from_object, magnitude, support))
+    }
+
+    /// Itself.
+    pub fn hull(&self) -> Option<Hull> {
+        let hull = Hull::of_box(&Aabb { min: self.low, max: self.high })?;
+        Some(Hull { is_solid: !hull.is_flat, ..hull })
     }
 
     /// The areas of the faces across x, y and z, with their normals stretched by `stretch`; one face of each pair.

@@ -9,7 +9,7 @@ use crate::nearest::{Meridian, under_similarity};
 use crate::shape::check;
 use crate::support::{arc_support, azimuth, bounds_from_support, dot_size};
 use crate::{
-    Aabb, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
+    Aabb, DirectionSample, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
     SurfaceSample, density, measure,
 };
 
@@ -141,6 +141,12 @@ impl Disk {
         };
         let magnitude = self.center.abs() + DVec3::splat(self.radius);
         Some(bounds_from_support(world_from_object, magnitude, support))
+    }
+
+    /// The whole disk, without its hole.
+    pub fn hull(&self) -> Option<Hull> {
+        let (e1, e2) = orthonormal_basis(self.normal());
+        Hull::flat(self.center, self.radius * e1, self.radius * e2, Hull::BALL)
     }
 
     /// The area, of one side.

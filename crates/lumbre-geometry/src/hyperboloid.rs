@@ -5,14 +5,14 @@ use std::f64::consts::TAU;
 use lumbre_math::quadratic::{dop, quadratic};
 use lumbre_math::roots::{bracketed_root, roots_between};
 use lumbre_math::rounding::gamma;
-use lumbre_math::{DVec2, DVec3, Transform};
+use lumbre_math::{DMat3, DVec2, DVec3, Transform};
 
 use crate::line::{Implicit, NearLine};
 use crate::nearest::{Meridian, under_similarity};
 use crate::shape::check;
 use crate::support::{arc_support, azimuth, bounds_from_support};
 use crate::{
-    Aabb, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
+    Aabb, DirectionSample, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
     SurfaceSample, density, measure,
 };
 
@@ -194,6 +194,22 @@ impl Hyperboloid {
         let radius = ends[0].truncate().length().max(ends[1].truncate().length());
         let height = ends[0].z.abs().max(ends[1].z.abs());
         Some(bounds_from_support(world_from_object, DVec3::new(radius, radius, height), support))
+    }
+
+    /// What it surrounds, between its rims.
+    pub fn hull(&self) -> Option<Hull> {
+        let p2 = self.p1 + self.along;
+        let radius = self.p1.truncate().length().max(p2.truncate().length());
+        let axes = DMat3::from_diagonal(DVec3::new(radius, radius, 0.5 * self.along.z));
+        let center = DVec3::new(0.0, 0.0, 0.5 * (self.p1.z + p2.z));
+        // v = (1 + z) / 2.
+        let square = radius * radius;
+        let profile = [
+            -0.25 * self.end / square,
+            -(self.middle + 0.5 * self.end) / square,
+            -(self.start + self.middle + 0.25 * self.end) / square,
+        ];
+        Some(Hull::new(center, axes, profile, false))
     }
 
     /// The area element is √(square v² + 2 linear v + constant) dφ dv: the three coefficients.

@@ -5,14 +5,14 @@ use std::f64::consts::TAU;
 use lumbre_math::quadratic::{dop, quadratic};
 use lumbre_math::roots::roots_between;
 use lumbre_math::rounding::gamma;
-use lumbre_math::{DVec2, DVec3, Transform};
+use lumbre_math::{DMat3, DVec2, DVec3, Transform};
 
 use crate::line::{Implicit, NearLine};
 use crate::nearest::{Meridian, under_similarity};
 use crate::shape::check;
 use crate::support::{arc_support, azimuth, bounds_from_support};
 use crate::{
-    Aabb, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
+    Aabb, DirectionSample, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
     SurfaceSample, density, measure,
 };
 
@@ -160,6 +160,16 @@ impl Paraboloid {
             if inner < turn && turn < outer { ends.max(at(turn)) } else { ends }
         };
         Some(bounds_from_support(world_from_object, DVec3::new(outer, outer, self.z_max), support))
+    }
+
+    /// The bowl, filled.
+    pub fn hull(&self) -> Option<Hull> {
+        let (low, high) = (self.bottom(), self.z_max);
+        let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+        let radius = self.radius_at(high);
+        let axes = DMat3::from_diagonal(DVec3::new(radius, radius, half));
+        let profile = [0.0, -half / high, -middle / high];
+        Some(Hull::new(DVec3::new(0.0, 0.0, middle), axes, profile, false))
     }
 
     /// The slopes of the surface's normal cone at the two ends, √(1 + 4 bend z): what areas are made of.

@@ -12,7 +12,7 @@ use crate::shape::check;
 use crate::support::bounds_from_support;
 use crate::triangle::solid_angle_of;
 use crate::{
-    Aabb, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
+    Aabb, DirectionSample, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
     SurfaceSample, density, measure,
 };
 
@@ -196,6 +196,11 @@ impl BilinearPatch {
         let magnitude = corners.map(DVec3::abs).into_iter().fold(DVec3::ZERO, DVec3::max);
         let support = |d: DVec3| corners.iter().map(|&p| d.dot(p)).fold(f64::NEG_INFINITY, f64::max);
         Some(bounds_from_support(world_from_object, magnitude, support))
+    }
+
+    /// A box around it.
+    pub fn hull(&self) -> Option<Hull> {
+        Hull::of_box(&self.bounds(&Transform::IDENTITY)?)
     }
 
     /// The area, of one side, by quadrature.

@@ -4,8 +4,8 @@ use lumbre_math::rounding::gamma;
 use lumbre_math::{DMat3, DVec2, DVec3, Transform};
 
 use crate::{
-    Aabb, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, Shape, Surface, SurfaceSample,
-    measure,
+    Aabb, DirectionSample, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, Shape, Surface,
+    SurfaceSample, measure,
 };
 
 /// An exact shape under any invertible affine map. The ray goes to the shape, not the shape to the ray, and `t` stays.
@@ -89,6 +89,12 @@ impl PlacedShape {
     /// The tightest box around it, rounded outward; `None` when it is infinite.
     pub fn bounds(&self) -> Option<Aabb> {
         self.shape.bounds(&self.world_from_object())
+    }
+
+    /// A body around it, in world space: see [`Shape::hull`].
+    pub fn hull(&self) -> Option<Hull> {
+        let hull = self.shape.hull()?;
+        Some(self.world_from_object.as_deref().map_or(hull, |map| hull.under(map)))
     }
 
     /// Area in world space; infinite for infinite shapes.

@@ -6,7 +6,8 @@ use lumbre_math::{DVec2, DVec3, Transform, orthonormal_basis};
 use crate::shape::check;
 use crate::support::dot_size;
 use crate::{
-    Aabb, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface, SurfaceSample,
+    Aabb, DirectionSample, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
+    SurfaceSample,
 };
 
 /// The plane through a point, facing along its normal; as a solid, the half-space below it.
@@ -83,6 +84,11 @@ impl Plane {
 
     /// It has none.
     pub fn bounds(&self, _world_from_object: &Transform) -> Option<Aabb> {
+        None
+    }
+
+    /// None: it is infinite.
+    pub fn hull(&self) -> Option<Hull> {
         None
     }
 

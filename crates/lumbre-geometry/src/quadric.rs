@@ -14,8 +14,8 @@ use crate::placed::into_world;
 use crate::shape::check;
 use crate::support::bounds_from_support;
 use crate::{
-    Aabb, DirectionSample, NearestPoint, NoNearestPoint, PlacedShape, Ray, Root, Roots, Shape, ShapeError,
-    Sphere, Surface, SurfaceSample, density, measure,
+    Aabb, DirectionSample, Hull, NearestPoint, NoNearestPoint, PlacedShape, Ray, Root, Roots, Shape,
+    ShapeError, Sphere, Surface, SurfaceSample, density, measure,
 };
 
 /// The points where `A x² + B y² + C z² + D xy + E xz + F yz + G x + H y + I z + J` is 0, all of them or those in a box.
@@ -256,6 +256,14 @@ impl Quadric {
         let clip = self.clip?;
         let support = |d: DVec3| (d * clip.min).max(d * clip.max).element_sum();
         Some(bounds_from_support(world_from_object, clip.min.abs().max(clip.max.abs()), support))
+    }
+
+    /// An ellipsoid, or the box that cuts it off.
+    pub fn hull(&self) -> Option<Hull> {
+        match &self.ellipsoid {
+            Some(ellipsoid) => ellipsoid.hull().map(|hull| Hull { is_solid: false, ..hull }),
+            None => Hull::of_box(&self.clip?),
+        }
     }
 
     /// The area of a closed or clipped quadric; infinite for others. A clipped one's is known to about five digits.

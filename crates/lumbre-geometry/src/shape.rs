@@ -52,6 +52,12 @@ macro_rules! shapes {
                 match self { $(Self::$shape(shape) => shape.bounds(world_from_object),)+ }
             }
 
+            /// A body around the shape that a line is soon tried against; `None` for infinite shapes, and for those so small
+            /// or so thin that numbers fail.
+            pub fn hull(&self) -> Option<Hull> {
+                match self { $(Self::$shape(shape) => shape.hull(),)+ }
+            }
+
             /// Area before any transform; infinite for infinite shapes.
             pub fn area(&self) -> f64 {
                 match self { $(Self::$shape(shape) => shape.area(),)+ }
@@ -97,7 +103,7 @@ macro_rules! shapes {
             }
 
             /// What [`Shape::closest`] costs, in visits to a node of a bounding volume hierarchy: 1 for a disk, 12 for a
-            /// torus. Hierarchies are built by it; no answer depends on it.
+            /// torus. Hierarchies may be built by it; no answer depends on it.
             pub fn search_cost(&self) -> f32 {
                 match self { $(Self::$shape(shape) => shape.search_cost(),)+ }
             }

@@ -4,13 +4,13 @@ use std::f64::consts::{PI, TAU};
 
 use lumbre_math::quadratic::quadratic;
 use lumbre_math::rounding::gamma;
-use lumbre_math::{DVec2, DVec3, Transform, orthonormal_basis};
+use lumbre_math::{DMat3, DVec2, DVec3, Transform, orthonormal_basis};
 
 use crate::nearest::{Meridian, nearest_on_ellipsoid, similarity_factor, under_similarity};
 use crate::shape::check;
 use crate::support::{arc_support, azimuth, bounds_from_support};
 use crate::{
-    Aabb, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
+    Aabb, DirectionSample, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
     SurfaceSample, density, measure,
 };
 
@@ -202,6 +202,21 @@ impl Sphere {
         };
         let magnitude = self.center.abs() + DVec3::splat(self.radius);
         Some(bounds_from_support(world_from_object, magnitude, support))
+    }
+
+    /// A ball, or the layer of one between two heights.
+    pub fn hull(&self) -> Option<Hull> {
+        if self.is_whole() {
+            let axes = DMat3::from_diagonal(DVec3::splat(self.radius));
+            return Some(Hull::new(self.center, axes, Hull::BALL, true));
+        }
+        // By the radius, z = middle + half * (z of the hull).
+        let (middle, half) =
+            (0.5 * (self.z_min + self.z_max) / self.radius, 0.5 * (self.z_max - self.z_min) / self.radius);
+        let center = self.center + self.radius * middle * DVec3::Z;
+        let axes = DMat3::from_diagonal(self.radius * DVec3::new(1.0, 1.0, half));
+        let profile = [half * half, 2.0 * middle * half, middle * middle - 1.0];
+        Some(Hull::new(center, axes, profile, false))
     }
 
     /// The area: by Archimedes, that of the cylinder around it.

@@ -4,13 +4,13 @@ use std::f64::consts::{PI, TAU};
 
 use lumbre_math::roots::{DepressedCubic, bracketed_root};
 use lumbre_math::rounding::gamma;
-use lumbre_math::{DVec2, DVec3, Transform, orthonormal_basis};
+use lumbre_math::{DMat3, DVec2, DVec3, Transform, orthonormal_basis};
 
 use crate::nearest::under_similarity;
 use crate::shape::check;
 use crate::support::{azimuth, bounds_from_support};
 use crate::{
-    Aabb, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
+    Aabb, DirectionSample, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
     SurfaceSample, density, measure,
 };
 
@@ -451,6 +451,22 @@ impl Torus {
         };
         let magnitude = self.center.abs() + DVec3::splat(self.major + self.minor);
         Some(bounds_from_support(world_from_object, magnitude, support))
+    }
+
+    /// The body of revolution whose outline touches the tube where it turns from out to up, without the hole.
+    pub fn hull(&self) -> Option<Hull> {
+        let (major, minor) = (self.major, self.minor);
+        let reach = major + minor;
+        let axes = DMat3::from_cols(reach * self.e1, reach * self.e2, minor * self.axis);
+        // At a height of `minor` z, ρ² is at most (R + r s)² with s = √(1 - z²), and s at most that of the tangent to it as a
+        // function of z², here at z² = 1/2: s ≤ (1/√2) + (1/2 - z²) / √2.
+        let (big, small) = (major / reach, minor / reach);
+        let s = std::f64::consts::FRAC_1_SQRT_2;
+        let constant = big * big + small * small + 3.0 * s * big * small;
+        let slope = small * small + 2.0 * s * big * small;
+        let hull = Hull::new(self.center, axes, [slope, 0.0, -constant], false);
+        let hole = if self.is_ring() { (big - small) * (big - small) } else { 0.0 };
+        Some(Hull { hole, ..hull })
     }
 
     /// Where the tube meets the axis: ϑ beyond it, up to π, belongs to the inner sheet; π for a ring.

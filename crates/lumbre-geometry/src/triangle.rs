@@ -10,7 +10,7 @@ use crate::nearest::on_triangle;
 use crate::shape::check;
 use crate::support::bounds_from_support;
 use crate::{
-    Aabb, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
+    Aabb, DirectionSample, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
     SurfaceSample, density, measure,
 };
 
@@ -241,6 +241,14 @@ impl Triangle {
         let magnitude = self.p0.abs().max(self.p1.abs()).max(self.p2.abs());
         let support = |d: DVec3| d.dot(self.p0).max(d.dot(self.p1)).max(d.dot(self.p2));
         Some(bounds_from_support(world_from_object, magnitude, support))
+    }
+
+    /// Itself: where a plane cuts a cone along its axis.
+    pub fn hull(&self) -> Option<Hull> {
+        let [p0, p1, p2] = self.corners();
+        let (base, foot) = (0.5 * (p1 - p0), 0.5 * (p0 + p1));
+        // As wide as high, the radius of the cone is (1 - z) / 2.
+        Hull::flat(0.5 * (foot + p2), base, 0.5 * (p2 - foot), [-0.25, 0.5, -0.25])
     }
 
     /// Half the length of the cross product.

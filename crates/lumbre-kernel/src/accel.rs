@@ -12,6 +12,7 @@ use lumbre_math::{DVec3, Transform};
 use crate::batch::Ends;
 use crate::collapse::{Entry, Packed};
 use crate::holds::{Holds, SingleStart};
+use crate::hulls::Hulls;
 use crate::lanes::Level;
 use crate::node::{Units, tag};
 use crate::query::{All, Any, Batch, Closest, Count, If};
@@ -40,6 +41,8 @@ pub struct Accel {
     pub(crate) holds: Holds,
     /// Where single precision can search the tree.
     pub(crate) single: Option<SingleStart>,
+    /// What is asked of shapes first.
+    pub(crate) hulls: Hulls,
     /// What a ray cost after the build, once that was asked for.
     pub(crate) built_cost: Option<f64>,
     // One for each geometry, or none.
@@ -537,6 +540,7 @@ impl Accel {
             + self.tree.cells.own_bytes()
             + self.tree.sphere_blocks.own_bytes()
             + self.tree.sphere_names.own_bytes()
+            + self.hulls.memory_bytes()
             + bytes(&self.infinite)
             + bytes(&self.masks)
             + self.moments.get().map_or(0, Moments::memory_bytes)

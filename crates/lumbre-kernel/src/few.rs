@@ -7,9 +7,6 @@ use crate::triangles::BLOCK;
 
 /// How many are few.
 pub(crate) const FEW: usize = 2 * BLOCK;
-/// The most primitives in a leaf that are neither packed nor instances. Of these, it is one with costs; without, as many as a node
-/// has children: what looks like a leaf then becomes a node over leaves of one each.
-const MOST_OTHERS: usize = 4;
 /// What a node costs, in the units of costs.
 const NODE_COST: f32 = 16.0;
 
@@ -26,15 +23,9 @@ fn is_uniform<const COSTS: bool>(primitives: &[Primitive], traits: &[Traits]) ->
     let group = |p: &Primitive| group_of(p, traits);
     let first = group(&primitives[0]);
     let most = match first.0 {
-        Kind::Triangle | Kind::Sphere => BLOCK,
-        Kind::Instance => {
-            if COSTS {
-                1
-            } else {
-                WIDTH
-            }
-        }
-        Kind::Shape | Kind::Custom | Kind::Precise => MOST_OTHERS,
+        // What looks like a leaf then becomes a node over leaves of one each.
+        Kind::Instance if !COSTS => WIDTH,
+        _ => traits[primitives[0].first() as usize].most,
     };
     primitives.len() <= most && primitives[1..].iter().all(|p| group(p) == first)
 }

@@ -28,6 +28,7 @@ use memmap2::Mmap;
 use crate::carve::LaneCell;
 use crate::collapse::{Entry, Packed};
 use crate::holds::{Holds, SingleStart};
+use crate::hulls::Hulls;
 use crate::lanes::Level;
 use crate::node::{Node, WIDTH};
 use crate::opening::Start;
@@ -393,6 +394,7 @@ fn over_mapped(file: Arc<Mmap>, geometries: Vec<Geometry>) -> Result<Accel, Load
     let units = units_of(&geometries, &parts);
     let holds = Holds::new(&geometries, parts.largest_corner, parts.sphere_reach);
     let accel = Accel {
+        hulls: Hulls::new(&geometries, &tree.entries, &units),
         single: SingleStart::new(&holds, &units, tree.root),
         units,
         holds,

@@ -13,6 +13,7 @@ mod file;
 mod geometry;
 mod hit;
 mod holds;
+mod hulls;
 mod inside;
 mod lanes;
 mod morton;

@@ -161,10 +161,14 @@ impl Units {
         slop(self.condition, (point.abs() + self.origin.abs()).max_element() * self.scale + 1.0)
     }
 
+    /// The same as seen from where a ray from nearby may start.
+    pub(crate) fn nearby_slop(&self) -> f64 {
+        self.near_margin - 4.0 * ROUNDOFF * LARGEST_PLANE
+    }
+
     /// Of rays that were rounded before: by how much planes are moved, and by how much more for each unit of the ray's start.
     pub(crate) fn single_margin(&self) -> f32 {
-        let slop = self.near_margin - 4.0 * ROUNDOFF * LARGEST_PLANE;
-        round_up(8.0 * ROUNDOFF * LARGEST_PLANE + slop)
+        round_up(8.0 * ROUNDOFF * LARGEST_PLANE + self.nearby_slop())
     }
 
     pub(crate) const SINGLE_MARGIN_PER_DISTANCE: f32 = (8.0 * ROUNDOFF) as f32;
@@ -215,6 +219,14 @@ pub(crate) struct BoxRay {
 pub(crate) struct Progress {
     s_per_t: f64,
     s_at_zero: f64,
+}
+
+impl Progress {
+    /// Whether the ray is tested as it is, because it comes from nearby.
+    #[inline(always)]
+    pub(crate) fn is_nearby(&self) -> bool {
+        self.s_per_t == 1.0 && self.s_at_zero == 0.0
+    }
 }
 
 impl BoxRay {

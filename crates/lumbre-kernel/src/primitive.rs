@@ -43,6 +43,8 @@ pub(crate) struct Traits {
     pub(crate) kind: Kind,
     /// In sixteenths of what a node costs: whole numbers, so that sums do not depend on their order.
     pub(crate) cost: u32,
+    /// How many of its kind a leaf may hold.
+    pub(crate) most: usize,
 }
 
 /// Numbers of the fixed-point coordinates in a tree unit. Twice a centre, less another such, still fits.

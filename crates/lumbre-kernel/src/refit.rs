@@ -11,6 +11,7 @@ use crate::carve::{Carver, LaneCell, cells_in, part_of};
 use crate::clouds::box_of;
 use crate::collapse::Entry;
 use crate::holds::{Holds, SingleStart};
+use crate::hulls::Hulls;
 use crate::node::{Node, Units, WIDTH, tag};
 use crate::opening::{self, Families, Start};
 use crate::prepare::{Parts, has_area, take_apart, units_of};
@@ -196,6 +197,7 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts) -> Result<(), RefitError> {
     accel.primitives = parts.count();
     accel.infinite = parts.infinite;
     accel.single = SingleStart::new(&accel.holds, &units, accel.tree.root);
+    accel.hulls = Hulls::new(&accel.geometries, &accel.tree.entries, &units);
     accel.units = units;
     accel.bounds = parts.bounds;
     accel.moments = OnceLock::new();

@@ -6,7 +6,7 @@
 //! of two hits is nearer where their heights overlap. And, once a ray, about the winner, so that the answer has the same bits
 //! as that of the plain search in `traverse`, which stands beside this one as its oracle. Where a ray touches an edge or a
 //! corner exactly, or comes from far away, that search answers it altogether. Shapes and custom geometry always answer in double
-//! precision.
+//! precision; shapes are asked only where single precision does not see that the ray passes them by (see [`HullRay`]).
 //!
 //! What options leave out is left out by name before anything closer is known of it, and by its face wherever single precision is
 //! certain of a hit, for then it is certain of the face.
@@ -18,7 +18,8 @@ use lumbre_math::DVec3;
 
 use crate::collapse::Entry;
 use crate::holds::SingleStart;
-use crate::lanes::{self, Crossings, Lanes, Level, Task};
+use crate::hulls::HullRay;
+use crate::lanes::{self, Crossings, Lanes, Level, MetHulls, Task};
 use crate::node::tag;
 use crate::options::{self, Selection};
 use crate::query::All;
@@ -191,6 +192,8 @@ pub(crate) struct SingleRay<'a, L, S = All> {
     exact: Exact<'a>,
     way: Way<'a, L>,
     blocks: BlockRay,
+    /// For shapes.
+    hulls: HullRay,
     /// From heights to places in the range of boxes.
     place_per_height: f32,
     /// From t to heights.
@@ -226,7 +229,8 @@ impl<'a, L: Lanes, S: Selection> SingleRay<'a, L, S> {
         let crossed = Winner { root: Root::at(f64::INFINITY), geometry: 0, primitive: 0 };
         let best = Candidate::NONE;
         let length = ray.direction.abs().max_element();
-        Self { exact, way, blocks, place_per_height, length, best, crossed, selection }
+        let hulls = if start.is_mixed { HullRay::new(&accel.units, ray, length) } else { HullRay::NONE };
+        Self { exact, way, blocks, hulls, place_per_height, length, best, crossed, selection }
     }
 
     /// Goes on from a node or a leaf.
@@ -240,7 +244,9 @@ impl<'a, L: Lanes, S: Selection> SingleRay<'a, L, S> {
         if reference >> tag::SHIFT == tag::INNER {
             return self.way.meet_node::<G::Order>(reference, stack).map_or(Step::Out, Step::On);
         }
-        let end = if MIXED && reference >> tag::SHIFT != tag::TRIANGLES {
+        let end = if MIXED && reference >> tag::SHIFT == tag::SHAPES {
+            self.meet_shapes::<G>(reference, ray)
+        } else if MIXED && reference >> tag::SHIFT != tag::TRIANGLES {
             self.meet_entries::<G>(reference, ray)
         } else {
             G::meet_triangles(self, reference, ray)
@@ -251,7 +257,52 @@ impl<'a, L: Lanes, S: Selection> SingleRay<'a, L, S> {
         }
     }
 
-    /// Tests a leaf of what is no triangle.
+    /// Tests a leaf of shapes: in double precision those alone whose hulls are met, the nearest first.
+    #[inline(always)]
+    fn meet_shapes<G: Goal>(&mut self, leaf: u32, ray: &Ray) -> Option<Step> {
+        let accel = self.exact.accel;
+        let mut first = (leaf & tag::PLACE) as usize;
+        loop {
+            let Some((block, goes_on)) = accel.hulls.block(first) else {
+                return self.meet_entries::<G>(leaf, ray);
+            };
+            let entries = &accel.tree.entries[first..];
+            let range = &self.blocks.range;
+            let MetHulls { mut mask, sure, near } = if G::IS_ANY && S::TAKES_ALL {
+                L::meet_hulls::<true>(block, lanes::opaque(&self.hulls), range)
+            } else {
+                L::meet_hulls::<false>(block, lanes::opaque(&self.hulls), range)
+            };
+            if G::IS_ANY && S::TAKES_ALL && sure != 0 {
+                return Some(Step::Met);
+            }
+            while mask != 0 {
+                let mut lane = mask.trailing_zeros() as usize % BLOCK;
+                if !G::IS_ANY && mask & (mask - 1) != 0 {
+                    let mut others = mask & (mask - 1);
+                    while others != 0 {
+                        let other = others.trailing_zeros() as usize % BLOCK;
+                        others &= others - 1;
+                        lane = if near[other] < near[lane] { other } else { lane };
+                    }
+                }
+                mask &= !(1 << lane);
+                if !G::IS_ANY && near[lane] > self.blocks.range.last {
+                    continue;
+                }
+                let end = G::meet_entry(self, &entries[lane], ray);
+                if end.is_some() {
+                    return end;
+                }
+            }
+            if !goes_on {
+                return None;
+            }
+            first += BLOCK;
+        }
+    }
+
+    /// Tests a leaf of custom geometry, or of anything that is no triangle.
     #[inline(always)]
     fn meet_entries<G: Goal>(&mut self, leaf: u32, ray: &Ray) -> Option<Step> {
         for entry in &self.exact.accel.tree.entries[(leaf & tag::PLACE) as usize..] {

@@ -12,7 +12,8 @@ use smallvec::SmallVec;
 
 use crate::collapse::Entry;
 use crate::holds::SingleStart;
-use crate::lanes::{Lanes, Level, Task};
+use crate::hulls::HullRay;
+use crate::lanes::{Lanes, Level, MetHulls, Task};
 use crate::node::{BoxRay, Progress, tag};
 use crate::opening::Start;
 use crate::single::{self, Nearest, Outcome, Whether};
@@ -20,7 +21,7 @@ use crate::sphere_search::{self, AmongSpheres, CloudRay};
 use crate::spheres::ExactSphere;
 use crate::stack::{Order, Stack};
 use crate::touch::{self, AllTouches, Touch};
-use crate::triangles::{self, BLOCK, BlockRay, Inside, Passage, Shear, TriangleBlock};
+use crate::triangles::{self, BLOCK, BlockRay, HeightRange, Inside, Passage, Shear, TriangleBlock};
 use crate::way::Way;
 use crate::{Accel, GeometryKind, InstancePath, options, precise};
 
@@ -176,6 +177,8 @@ pub(crate) struct Frame<'a, R, L> {
     mesh: MeshRay,
     /// For spheres, once some were met.
     clouds: Option<CloudRay>,
+    /// For shapes, alike.
+    hulls: Option<HullRay>,
 }
 
 /// The ray for the triangles of one mesh, or of some with one origin.
@@ -234,6 +237,7 @@ impl<'a, R: Borrow<Ray>, L: Lanes> Frame<'a, R, L> {
             floor,
             mesh,
             clouds: None,
+            hulls: None,
         }
     }
 
@@ -353,6 +357,12 @@ impl<'a, S: Search<'a>> Task for AmongAll<'a, '_, S> {
                 tag::SPHERES => {
                     let Frame { accel, ray, clouds, .. } = &mut frame;
                     if sphere_search::meet_leaf::<L, S>(accel, ray, leaf, clouds, &place, search) {
+                        return true;
+                    }
+                    frame.narrow(search);
+                }
+                tag::SHAPES if frame.progress.is_nearby() && frame.accel.hulls.block(first).is_some() => {
+                    if meet_shapes(&mut frame, first, &place, search) {
                         return true;
                     }
                     frame.narrow(search);
@@ -598,6 +608,42 @@ fn meet_unclear<'a, S: Search<'a>>(
     let meeting = triangles::intersect(ray, shear, origin, shear.axes.gather(block, lane));
     let corners = block.triangle(lane).map(|corner| corner.map(f64::from));
     touch::offer_meeting(meeting, ray, corners, what, accel, place, search, touches)
+}
+
+/// Tests a leaf of shapes, whose hulls there are: in double precision those alone whose hulls are met.
+#[inline(always)]
+fn meet_shapes<'a, L: Lanes, S: Search<'a>>(
+    frame: &mut Frame<'a, Ray, L>,
+    mut first: usize,
+    place: &Place,
+    search: &mut S,
+) -> bool {
+    let accel = frame.accel;
+    let length = frame.ray.direction.abs().max_element();
+    let hulls = *frame.hulls.get_or_insert_with(|| HullRay::new(&accel.units, &frame.ray, length));
+    let range = HeightRange::new((search.floor() * length) as f32, (search.limit() * length) as f32);
+    while let Some((block, goes_on)) = accel.hulls.block(first) {
+        let MetHulls { mut mask, sure, .. } = match S::ASK {
+            Ask::Whether => L::meet_hulls::<true>(block, &hulls, &range),
+            Ask::First | Ask::Every | Ask::Nothing => L::meet_hulls::<false>(block, &hulls, &range),
+        };
+        if S::ASK == Ask::Whether && sure != 0 {
+            search.settle();
+            return true;
+        }
+        while mask != 0 {
+            let entry = &accel.tree.entries[first + mask.trailing_zeros() as usize];
+            mask &= mask - 1;
+            if meet_entry(frame, entry, place, search) {
+                return true;
+            }
+        }
+        if !goes_on {
+            break;
+        }
+        first += BLOCK;
+    }
+    false
 }
 
 /// Tests a shape or a primitive of custom geometry.

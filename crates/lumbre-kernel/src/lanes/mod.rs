@@ -5,6 +5,7 @@
 
 #![allow(unsafe_code)]
 
+mod hulls;
 mod portable;
 mod spheres;
 mod wide;
@@ -22,13 +23,16 @@ use crate::packet::Frustum;
 use crate::stack::STACK;
 use crate::triangles::{BLOCK, BlockRay, Inside, Passage, ROUNDINGS, Shear, TriangleBlock};
 
+#[cfg(test)]
+pub(crate) use hulls::meet_hulls_at;
+pub(crate) use hulls::{HullLanes, MetHulls};
 pub(crate) use spheres::SphereLanes;
 #[cfg(test)]
 pub(crate) use spheres::meet_spheres_at;
 pub(crate) use wide::{Row, WIDE, Wide};
 
 /// What a search does eight at a time: boxes, and triangles.
-pub(crate) trait Lanes: SphereLanes {
+pub(crate) trait Lanes: SphereLanes + HullLanes {
     /// Where the ray enters each of eight boxes, in an order of integers.
     type Keys: Copy;
     /// Eight numbers.

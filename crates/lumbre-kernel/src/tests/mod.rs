@@ -6,6 +6,7 @@ mod boxes;
 mod build;
 mod deforming;
 mod file;
+mod hulls;
 mod inside;
 mod motion;
 mod nearest;
