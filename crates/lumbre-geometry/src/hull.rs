@@ -7,8 +7,8 @@ use crate::Aabb;
 /// A body that holds a shape: where a line misses it, it misses the shape.
 ///
 /// Its points are `center + axes * q`, for the `q` in the cube from -1 to 1 on each axis with x² + y² + c z² + d z + e ≤ 0 for
-/// `profile` = [c, d, e]: with the right numbers a ball, a cylinder, a cone, a paraboloid, or the whole cube. `hole` is a squared
-/// distance from the z axis within which the shape has no point.
+/// `profile` = [c, d, e]: with the right numbers a ball, a cylinder, a cone, a paraboloid, or the whole cube; and of a ring, they
+/// also are those of its tube.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hull {
     /// Where `q` is 0.
@@ -19,10 +19,11 @@ pub struct Hull {
     pub is_flat: bool,
     /// c, d and e: none beyond 2 in size, but for an `e` of -8 where all of the cube is in the body.
     pub profile: [f64; 3],
-    /// Squared, below 1; 0 where there is no hole.
-    pub hole: f64,
+    /// Of a ring, the radius r of its tube by its largest radius, less than a half; else 0. Of its points, whose ρ is √(x² + y²),
+    /// (ρ - (1 - r))² + r² z² is r², and what encloses them is less.
+    pub tube: f64,
     /// Whether the shape is the border of all of the body, and this is not flat: then every line that passes through its inside
-    /// crosses the shape where it enters it and where it leaves it.
+    /// crosses the shape where it enters it and where it leaves it. A ring is solid.
     pub is_solid: bool,
 }
 
@@ -31,9 +32,9 @@ impl Hull {
     pub(crate) const BALL: [f64; 3] = [1.0, 0.0, -1.0];
     pub(crate) const CYLINDER: [f64; 3] = [0.0, 0.0, -1.0];
 
-    /// A body that is not flat, and has no hole.
+    /// A body that is not flat, and no ring.
     pub(crate) fn new(center: DVec3, axes: DMat3, profile: [f64; 3], is_solid: bool) -> Self {
-        Self { center, axes, is_flat: false, profile, hole: 0.0, is_solid }
+        Self { center, axes, is_flat: false, profile, tube: 0.0, is_solid }
     }
 
     /// A flat body in the plane through `center` along `x` and `z`, which are neither 0 nor parallel. `None` where these are too
@@ -41,7 +42,7 @@ impl Hull {
     pub(crate) fn flat(center: DVec3, x: DVec3, z: DVec3, profile: [f64; 3]) -> Option<Self> {
         let normal = z.cross(x).try_normalize()?;
         let axes = DMat3::from_cols(x, normal * x.length().max(z.length()), z);
-        Some(Self { center, axes, is_flat: true, profile, hole: 0.0, is_solid: false })
+        Some(Self { center, axes, is_flat: true, profile, tube: 0.0, is_solid: false })
     }
 
     /// A box. `None` where it is less than a rectangle.
@@ -68,7 +69,10 @@ impl Hull {
         let height = if self.is_flat { 0.0 } else { 1.0 };
         let beside = q.x * q.x + q.y * q.y;
         let is_in_cube = q.abs().cmple(DVec3::new(1.0, height, 1.0) + margin).all();
-        is_in_cube && beside + (c * q.z + d) * q.z + e <= 12.0 * margin && beside >= self.hole - 4.0 * margin
+        let from_circle = beside.sqrt() - (1.0 - self.tube);
+        let square = from_circle * from_circle + (self.tube * q.z) * (self.tube * q.z);
+        let is_in_tube = self.tube == 0.0 || square <= self.tube * self.tube + 4.0 * margin;
+        is_in_cube && beside + (c * q.z + d) * q.z + e <= 12.0 * margin && is_in_tube
     }
 }
 

@@ -453,7 +453,7 @@ impl Torus {
         Some(bounds_from_support(world_from_object, magnitude, support))
     }
 
-    /// The body of revolution whose outline touches the tube where it turns from out to up, without the hole.
+    /// The body of revolution whose outline touches the tube where it turns from out to up, and of a ring its tube.
     pub fn hull(&self) -> Option<Hull> {
         let (major, minor) = (self.major, self.minor);
         let reach = major + minor;
@@ -464,9 +464,8 @@ impl Torus {
         let s = std::f64::consts::FRAC_1_SQRT_2;
         let constant = big * big + small * small + 3.0 * s * big * small;
         let slope = small * small + 2.0 * s * big * small;
-        let hull = Hull::new(self.center, axes, [slope, 0.0, -constant], false);
-        let hole = if self.is_ring() { (big - small) * (big - small) } else { 0.0 };
-        Some(Hull { hole, ..hull })
+        let hull = Hull::new(self.center, axes, [slope, 0.0, -constant], self.is_ring());
+        Some(Hull { tube: if self.is_ring() { small } else { 0.0 }, ..hull })
     }
 
     /// Where the tube meets the axis: ϑ beyond it, up to π, belongs to the inner sheet; π for a ring.

@@ -23,8 +23,8 @@ pub(crate) struct HullBlock {
     pub(crate) heights: [f32; BLOCK],
     /// c, d and e.
     pub(crate) profiles: [[f32; BLOCK]; 3],
-    /// Squared radii; -1 of solids, which have no hole.
-    pub(crate) holes: [f32; BLOCK],
+    /// Of rings, the radius of the tube; of other solids -1, else 0.
+    pub(crate) tubes: [f32; BLOCK],
     /// By how much cube coordinates may be wrong for each unit of distance from the centre, 64uN, and apart from that: see
     /// [`HullRay`].
     pub(crate) margins: [f32; BLOCK],
@@ -76,7 +76,7 @@ impl HullBlock {
         rows: [[[0.0; BLOCK]; 3]; 3],
         heights: [f32::NEG_INFINITY; BLOCK],
         profiles: [[0.0; BLOCK]; 3],
-        holes: [0.0; BLOCK],
+        tubes: [0.0; BLOCK],
         margins: [1.0; BLOCK],
         least_margins: [1.0; BLOCK],
     };
@@ -85,7 +85,7 @@ impl HullBlock {
     pub(crate) fn put(&mut self, lane: usize, hull: Option<Hull>, units: &Units) {
         let Some(mapped) = hull.and_then(|hull| Mapped::new(hull, units)) else {
             self.rows.iter_mut().flatten().for_each(|lanes| lanes[lane] = f32::NAN);
-            (self.heights[lane], self.holes[lane]) = (f32::NAN, 0.0);
+            (self.heights[lane], self.tubes[lane]) = (f32::NAN, 0.0);
             return;
         };
         let Mapped { hull, center, rows, norm, size } = mapped;
@@ -99,7 +99,7 @@ impl HullBlock {
         for (lanes, number) in self.profiles.iter_mut().zip(hull.profile) {
             lanes[lane] = number as f32;
         }
-        self.holes[lane] = if hull.is_solid { -1.0 } else { hull.hole as f32 };
+        self.tubes[lane] = if hull.is_solid && hull.tube == 0.0 { -1.0 } else { hull.tube as f32 };
         let per_distance = 64.0 * ROUNDOFF * norm;
         // The centre was rounded.
         let moved = ROUNDOFF * center.abs().max_element() + units.nearby_slop() / units.scale;
@@ -204,8 +204,10 @@ fn leaves(entries: &[Entry]) -> impl Iterator<Item = (&[Entry], usize)> {
 /// than `tolerance` = 12 m (1 + m) + 2⁻¹⁵ there, by 2⁻¹⁶ at least, and so is its least value, which is at an end, or C - B² / A
 /// where |B| < A; that this is greater is seen from (C - tolerance) A > B², with roundings below 4u B² < 4u A².
 ///
-/// *Hole.* The distance from the axis is convex along the line. Where both ends lie within the hole, by the tolerance, so does
-/// all between.
+/// *Tube.* In the space of x, y and r z, how far a point is outside of a ring's tube is √((ρ - (1 - r))² + r² z²) - r, and changes by
+/// no more than the way that the point goes. So there is no hit on a piece of the line whose middle is farther outside than half
+/// its length: sixteen pieces are looked at. A point is wrong by m on each axis, with its roundings, and in its distance
+/// by less than 2m + 2⁻¹⁶; half the length of a piece by 2⁻²⁰ of itself.
 ///
 /// # What is certain
 ///
@@ -228,6 +230,9 @@ pub(crate) struct HullRay {
 /// Of the tolerance, by m (1 + m), and its last summand.
 pub(crate) const TOLERANCE_PER_MARGIN: f32 = 12.0;
 pub(crate) const LEAST_TOLERANCE: f32 = 1.0 / (1 << 15) as f32;
+/// What a distance from a tube may be wrong by, by m, and apart from that.
+pub(crate) const TUBE_ERROR_PER_MARGIN: f32 = 2.0;
+pub(crate) const LEAST_TUBE_ERROR: f32 = 1.0 / (1 << 16) as f32;
 /// No component of a direction in the cube is taken to be less, by 64uN.
 pub(crate) const LEAST_COMPONENT: f32 = 1.0 / (1u64 << 22) as f32;
 

@@ -6,7 +6,10 @@ use std::arch::x86_64::*;
 use super::portable::Portable;
 #[cfg(target_arch = "x86_64")]
 use super::x86::X86;
-use crate::hulls::{HullBlock, HullRay, LEAST_COMPONENT, LEAST_TOLERANCE, TOLERANCE_PER_MARGIN};
+use crate::hulls::{
+    HullBlock, HullRay, LEAST_COMPONENT, LEAST_TOLERANCE, LEAST_TUBE_ERROR, TOLERANCE_PER_MARGIN,
+    TUBE_ERROR_PER_MARGIN,
+};
 use crate::triangles::{BLOCK, HeightRange};
 
 /// What came of eight hulls.
@@ -28,6 +31,65 @@ impl MetHulls {
 pub(crate) trait HullLanes {
     /// Tries a ray against eight; with `SURE`, also what is certain: see [`HullRay`].
     fn meet_hulls<const SURE: bool>(block: &HullBlock, ray: &HullRay, range: &HeightRange) -> MetHulls;
+}
+
+/// What a line has in a hull: `p + k d` for k from -1 to 1, at the height `middle + k reach`.
+struct Chord {
+    p: [f32; 3],
+    d: [f32; 3],
+    middle: f32,
+    reach: f32,
+}
+
+/// What is seen of a tube from sixteen places on a chord.
+struct SeenTube {
+    /// Whether none of it is met in between, either.
+    misses: bool,
+    /// Whether a place that is surely in range is surely inside.
+    is_inside: bool,
+    /// The same for outside.
+    is_outside: bool,
+}
+
+/// Places on a chord.
+const PLACES: usize = 2 * BLOCK;
+
+/// k of each: the middles of pieces of equal lengths.
+static MIDDLES: [f32; PLACES] = {
+    let mut middles = [0.0; PLACES];
+    let mut i = 0;
+    while i < PLACES {
+        middles[i] = (2 * i + 1) as f32 / PLACES as f32 - 1.0;
+        i += 1;
+    }
+    middles
+};
+
+impl Chord {
+    /// Half the length of a piece, in the space of x, y and r z.
+    #[inline(always)]
+    fn half_piece(&self, tube: f32) -> f32 {
+        let [x, y, z] = [self.d[0], self.d[1], self.d[2] * tube];
+        (x * x + y * y + z * z).sqrt() * ((1.0 + 1e-6) / PLACES as f32)
+    }
+
+    #[inline(always)]
+    fn meet_tube(&self, tube: f32, margin: f32, range: &HeightRange) -> SeenTube {
+        let error = TUBE_ERROR_PER_MARGIN * margin + LEAST_TUBE_ERROR;
+        let near_by = self.half_piece(tube) + error;
+        let mut seen = SeenTube { misses: true, is_inside: false, is_outside: false };
+        for k in MIDDLES {
+            let [x, y, z] = std::array::from_fn(|axis| self.p[axis] + k * self.d[axis]);
+            let (from_circle, rise) = ((x * x + y * y).sqrt() - (1.0 - tube), tube * z);
+            let outside = (from_circle * from_circle + rise * rise).sqrt() - tube;
+            let height = self.middle + k * self.reach;
+            let is_in_range = range.surely_first <= height && height <= range.surely_last;
+            seen.misses &= outside > near_by;
+            seen.is_inside |= outside < -error && is_in_range;
+            seen.is_outside |= outside > error && is_in_range;
+        }
+        seen
+    }
 }
 
 impl HullLanes for Portable {
@@ -74,17 +136,18 @@ impl HullLanes for Portable {
             if first > tolerance && last > tolerance && is_beside_between {
                 continue;
             }
-            let beside = |sign: f32| {
-                let (x, y) = (px + sign * dx, py + sign * dy);
-                x * x + y * y
-            };
-            let hole = block.holes[lane] - tolerance;
-            if beside(-1.0) < hole && beside(1.0) < hole {
-                continue;
-            }
-            met.mask |= 1 << lane;
-            met.near[lane] = from;
-            if SURE && block.holes[lane] < 0.0 {
+            let tube = block.tubes[lane];
+            let comes = enters > range.surely_first || first > tolerance;
+            let goes = leaves < range.surely_last || last > tolerance;
+            let mut is_sure = false;
+            if tube > 0.0 {
+                let chord = Chord { p: [px, py, pz], d: [dx, dy, dz], middle, reach };
+                let seen = chord.meet_tube(tube, margin, range);
+                if seen.misses {
+                    continue;
+                }
+                is_sure = seen.is_inside && (seen.is_outside || comes || goes);
+            } else if SURE && tube < 0.0 {
                 let deep = 1.0 - margin;
                 let least_at = (-b / a).clamp(-1.0, 1.0);
                 let least = k + least_at * (2.0 * b + least_at * a);
@@ -96,11 +159,12 @@ impl HullLanes for Portable {
                     && least < -tolerance
                     && height >= range.surely_first
                     && height <= range.surely_last;
-                let comes = enters > range.surely_first || first > tolerance;
-                let goes = leaves < range.surely_last || last > tolerance;
-                if is_inside && (comes || goes) {
-                    met.sure |= 1 << lane;
-                }
+                is_sure = is_inside && (comes || goes);
+            }
+            met.mask |= 1 << lane;
+            met.near[lane] = from;
+            if SURE && is_sure {
+                met.sure |= 1 << lane;
             }
         }
         met
@@ -156,7 +220,7 @@ impl<const AVX512: bool> HullLanes for X86<AVX512> {
             let c = _mm256_load_ps(block.profiles[0].as_ptr());
             let linear = _mm256_load_ps(block.profiles[1].as_ptr());
             let e = _mm256_load_ps(block.profiles[2].as_ptr());
-            let holes = _mm256_load_ps(block.holes.as_ptr());
+            let tubes = _mm256_load_ps(block.tubes.as_ptr());
             let tolerance = _mm256_fmadd_ps(
                 _mm256_mul_ps(_mm256_set1_ps(TOLERANCE_PER_MARGIN), margin),
                 wide,
@@ -185,21 +249,13 @@ impl<const AVX512: bool> HullLanes for X86<AVX512> {
                     _mm256_cmp_ps::<_CMP_GT_OQ>(last, tolerance),
                 ),
             );
-            let hole = _mm256_sub_ps(holes, tolerance);
-            let (x, y) = (_mm256_sub_ps(px, dx), _mm256_sub_ps(py, dy));
-            let at_first = _mm256_fmadd_ps(x, x, _mm256_mul_ps(y, y));
-            let (x, y) = (_mm256_add_ps(px, dx), _mm256_add_ps(py, dy));
-            let at_last = _mm256_fmadd_ps(x, x, _mm256_mul_ps(y, y));
-            let is_in_hole = _mm256_and_ps(
-                _mm256_cmp_ps::<_CMP_LT_OQ>(at_first, hole),
-                _mm256_cmp_ps::<_CMP_LT_OQ>(at_last, hole),
-            );
-            let mask = !(missed | _mm256_movemask_ps(_mm256_or_ps(is_beside, is_in_hole)) as u32) & 0xff;
+            let mask = !(missed | _mm256_movemask_ps(is_beside) as u32) & 0xff;
             let mut met = MetHulls { mask, sure: 0, near: [0.0; BLOCK] };
             if mask == 0 {
                 return met;
             }
             _mm256_storeu_ps(met.near.as_mut_ptr(), from);
+            let mut outside_once = 0;
             if SURE {
                 let deep = _mm256_sub_ps(one, margin);
                 // Some place between the ends, near to where the parabola is least.
@@ -223,7 +279,7 @@ impl<const AVX512: bool> HullLanes for X86<AVX512> {
                     _mm256_and_ps(is_in_cube, is_in_range),
                     _mm256_and_ps(
                         _mm256_cmp_ps::<_CMP_LT_OQ>(least, _mm256_xor_ps(tolerance, sign)),
-                        _mm256_cmp_ps::<_CMP_LT_OQ>(holes, _mm256_setzero_ps()),
+                        _mm256_cmp_ps::<_CMP_LT_OQ>(tubes, _mm256_setzero_ps()),
                     ),
                 );
                 let comes = _mm256_or_ps(
@@ -234,11 +290,69 @@ impl<const AVX512: bool> HullLanes for X86<AVX512> {
                     _mm256_cmp_ps::<_CMP_LT_OQ>(leaves, end),
                     _mm256_cmp_ps::<_CMP_GT_OQ>(last, tolerance),
                 );
-                let sure = _mm256_and_ps(is_inside, _mm256_or_ps(comes, goes));
-                met.sure = _mm256_movemask_ps(sure) as u32 & mask;
+                outside_once = _mm256_movemask_ps(_mm256_or_ps(comes, goes)) as u32;
+                met.sure = _mm256_movemask_ps(is_inside) as u32 & outside_once & mask;
+            }
+            let mut rings =
+                _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GT_OQ>(tubes, _mm256_setzero_ps())) as u32 & mask;
+            if rings != 0 {
+                let mut numbers = [[0.0; BLOCK]; 9];
+                for (place, v) in numbers.iter_mut().zip([px, py, pz, dx, dy, dz, middle, reach, margin]) {
+                    _mm256_storeu_ps(place.as_mut_ptr(), v);
+                }
+                while rings != 0 {
+                    let lane = rings.trailing_zeros() as usize % BLOCK;
+                    rings &= rings - 1;
+                    let [px, py, pz, dx, dy, dz, middle, reach, margin] = numbers.map(|lanes| lanes[lane]);
+                    let chord = Chord { p: [px, py, pz], d: [dx, dy, dz], middle, reach };
+                    let seen = Self::meet_tube(&chord, block.tubes[lane], margin, range);
+                    met.mask &= !(u32::from(seen.misses) << lane);
+                    let is_outside = seen.is_outside || outside_once >> lane & 1 == 1;
+                    if SURE && seen.is_inside && is_outside {
+                        met.sure |= 1 << lane;
+                    }
+                }
             }
             met
         }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+impl<const AVX512: bool> X86<AVX512> {
+    /// As [`Chord::meet_tube`], eight places at a time.
+    #[inline(always)]
+    fn meet_tube(chord: &Chord, tube: f32, margin: f32, range: &HeightRange) -> SeenTube {
+        let error = TUBE_ERROR_PER_MARGIN * margin + LEAST_TUBE_ERROR;
+        let near_by = chord.half_piece(tube) + error;
+        let (mut missed, mut inside, mut outside) = (true, 0, 0);
+        // SAFETY: see `X86`. The loads are of eight f32 in an array of sixteen, from its start and its middle.
+        unsafe {
+            let [px, py, pz] = [chord.p[0], chord.p[1], chord.p[2]];
+            let [dx, dy, dz] = [chord.d[0], chord.d[1], chord.d[2]];
+            for half in 0..2 {
+                let k = _mm256_loadu_ps(MIDDLES.as_ptr().add(BLOCK * half));
+                let x = _mm256_fmadd_ps(k, _mm256_set1_ps(dx), _mm256_set1_ps(px));
+                let y = _mm256_fmadd_ps(k, _mm256_set1_ps(dy), _mm256_set1_ps(py));
+                let z = _mm256_fmadd_ps(k, _mm256_set1_ps(tube * dz), _mm256_set1_ps(tube * pz));
+                let beside = _mm256_sqrt_ps(_mm256_fmadd_ps(x, x, _mm256_mul_ps(y, y)));
+                let from_circle = _mm256_sub_ps(beside, _mm256_set1_ps(1.0 - tube));
+                let square = _mm256_fmadd_ps(from_circle, from_circle, _mm256_mul_ps(z, z));
+                let out = _mm256_sub_ps(_mm256_sqrt_ps(square), _mm256_set1_ps(tube));
+                let height = _mm256_fmadd_ps(k, _mm256_set1_ps(chord.reach), _mm256_set1_ps(chord.middle));
+                let is_in_range = _mm256_and_ps(
+                    _mm256_cmp_ps::<_CMP_GE_OQ>(height, _mm256_set1_ps(range.surely_first)),
+                    _mm256_cmp_ps::<_CMP_LE_OQ>(height, _mm256_set1_ps(range.surely_last)),
+                );
+                let is_far = _mm256_cmp_ps::<_CMP_GT_OQ>(out, _mm256_set1_ps(near_by));
+                let is_inside = _mm256_cmp_ps::<_CMP_LT_OQ>(out, _mm256_set1_ps(-error));
+                let is_outside = _mm256_cmp_ps::<_CMP_GT_OQ>(out, _mm256_set1_ps(error));
+                missed &= _mm256_movemask_ps(is_far) == 0xff;
+                inside |= _mm256_movemask_ps(_mm256_and_ps(is_inside, is_in_range));
+                outside |= _mm256_movemask_ps(_mm256_and_ps(is_outside, is_in_range));
+            }
+        }
+        SeenTube { misses: missed, is_inside: inside != 0, is_outside: outside != 0 }
     }
 }
 

@@ -1,4 +1,6 @@
 //! The first test of shapes: against every shape's own in double precision, and in trees against the loop.
+//!
+//! Tried by hand: half of all margins, a tenth of the tolerance, and no error for tubes each make a test fail.
 
 use lumbre_geometry::{
     Aabb, Capsule, Csg, Cuboid, Cylinder, Hyperboloid, PlacedShape, Quadric, Ray, Shape, Sphere, Torus,
