@@ -4,7 +4,7 @@ use lumbre_geometry::{Ray, Root};
 
 use crate::query::{All, Filter};
 use crate::spheres::ExactSphere;
-use crate::traverse::{Found, What};
+use crate::traverse::{Found, PlacedTree, What};
 use crate::triangles::BlockNames;
 use crate::{Accel, GeometryKind, Hit};
 
@@ -62,8 +62,14 @@ impl QueryOptions<'_> {
     /// What they leave of a tree.
     #[inline(always)]
     pub(crate) fn of_tree<'a>(&self, accel: &'a Accel) -> Selected<'a> {
+        self.among(accel, |route| route.is_empty())
+    }
+
+    /// The same of one that stands where a route says.
+    #[inline(always)]
+    fn among<'a>(&self, accel: &'a Accel, is_there: impl FnOnce(&[u32]) -> bool) -> Selected<'a> {
         let excluded = match self.exclude {
-            Some(hit) if hit.route.is_empty() => Some((hit.geometry, hit.primitive)),
+            Some(hit) if is_there(&hit.route) => Some((hit.geometry, hit.primitive)),
             _ => None,
         };
         Selected { masks: &accel.masks, mask: self.mask, excluded, faces: self.faces }
@@ -96,6 +102,12 @@ impl Filter for QueryOptions<'_> {
 
     fn enters(&self, accel: &Accel, geometry: u32) -> bool {
         self.has_mask(accel, geometry)
+    }
+
+    type Selection<'a> = Selected<'a>;
+    #[inline(always)]
+    fn select<'a>(&self, placed: &PlacedTree<'a, '_>) -> Option<Selected<'a>> {
+        Some(self.among(placed.accel, |route| placed.has_route(route)))
     }
 }
 

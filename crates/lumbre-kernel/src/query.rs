@@ -5,8 +5,11 @@ use std::collections::{BTreeSet, BinaryHeap};
 
 use lumbre_geometry::{Ray, Root};
 
+use crate::lanes::Lanes;
+use crate::options::Selection;
+use crate::single::{self, Nearest, Outcome, Whether, Winner};
 use crate::stack::{AsBuilt, ByDistance};
-use crate::traverse::{Ask, Found, Place, Search, What};
+use crate::traverse::{Ask, Found, Place, PlacedTree, Search, What};
 use crate::triangles::Inside;
 use crate::{Accel, Hit, InstancePath};
 
@@ -43,6 +46,10 @@ pub(crate) trait Filter {
     fn enters(&self, _accel: &Accel, _geometry: u32) -> bool {
         true
     }
+    /// What it takes in one tree.
+    type Selection<'a>: Selection;
+    /// That of a placed tree; `None` where names and faces do not tell it.
+    fn select<'a>(&self, placed: &PlacedTree<'a, '_>) -> Option<Self::Selection<'a>>;
 }
 
 /// Takes everything.
@@ -54,6 +61,12 @@ impl Filter for All {
     #[inline(always)]
     fn takes(&mut self, _: &Found) -> bool {
         true
+    }
+
+    type Selection<'a> = All;
+    #[inline(always)]
+    fn select<'a>(&self, _: &PlacedTree<'a, '_>) -> Option<All> {
+        Some(All)
     }
 }
 
@@ -74,6 +87,11 @@ impl<F: FnMut(&Hit) -> bool> Filter for If<F> {
     fn takes(&mut self, found: &Found) -> bool {
         // What was taken is the best so far, or ended the search: it does not come again.
         self.asked.is_first(found) && (self.accept)(&found.to_hit())
+    }
+
+    type Selection<'a> = All;
+    fn select<'a>(&self, _: &PlacedTree<'a, '_>) -> Option<All> {
+        None
     }
 }
 
@@ -222,6 +240,23 @@ impl<'a, F: Filter> Search<'a> for Closest<'a, F> {
         self.keep(t, Best { crossing: Crossing::Inside(*inside), what, accel }, place);
         false
     }
+
+    #[inline(always)]
+    fn meet_single<L: Lanes>(&mut self, placed: &PlacedTree<'a, '_>, ray: &Ray) -> Outcome<bool> {
+        let Some(selection) = self.filter.select(placed) else { return Outcome::Unsettled };
+        match single::search_placed::<Nearest, L, _>(placed, ray, selection) {
+            Outcome::Unsettled => return Outcome::Unsettled,
+            Outcome::Settled(None) => {}
+            Outcome::Settled(Some(Winner { root, geometry, primitive })) => {
+                let (place, accel) = (placed.place(), placed.accel);
+                let what = What::Named { geometry, primitive };
+                if self.is_better(root.t, what, accel, &place) {
+                    self.keep(root.t, Best { crossing: Crossing::Root(root), what, accel }, &place);
+                }
+            }
+        }
+        Outcome::Settled(false)
+    }
 }
 
 /// Whether there is a hit.
@@ -278,6 +313,14 @@ impl<'a, F: Filter> Search<'a> for Any<F> {
     #[inline(always)]
     fn settle(&mut self) {
         self.is_hit = true;
+    }
+
+    #[inline(always)]
+    fn meet_single<L: Lanes>(&mut self, placed: &PlacedTree<'a, '_>, ray: &Ray) -> Outcome<bool> {
+        let Some(selection) = self.filter.select(placed) else { return Outcome::Unsettled };
+        let outcome = single::search_placed::<Whether, L, _>(placed, ray, selection);
+        self.is_hit |= outcome == Outcome::Settled(true);
+        outcome
     }
 }
 

@@ -24,7 +24,7 @@ use crate::node::tag;
 use crate::options::{self, Selection};
 use crate::query::All;
 use crate::stack::{AsBuilt, ByDistance, Order, Stack};
-use crate::traverse::What;
+use crate::traverse::{PlacedTree, What};
 use crate::triangles::{self, BLOCK, BlockRay, Meeting, Passage, Shear, TriangleBlock};
 use crate::way::Way;
 use crate::{Accel, Faces, Hit, InstancePath, traverse};
@@ -713,18 +713,15 @@ pub(crate) fn search_among<G: Goal, S: Selection>(
     }
 }
 
-/// The same among nothing but triangles, from a node on, within a search that goes through other trees.
+/// The same in a placed tree of nothing but triangles, within a search that goes through other trees.
 #[inline(always)]
-pub(crate) fn search_with<G: Goal, L: Lanes>(
-    accel: &Accel,
-    start: &SingleStart,
-    root: u32,
+pub(crate) fn search_placed<G: Goal, L: Lanes, S: Selection>(
+    placed: &PlacedTree,
     ray: &Ray,
+    selection: S,
 ) -> Outcome<G::Answer> {
-    if start.is_mixed {
-        return Outcome::Unsettled;
-    }
-    Alone::<G, false> { root, ..Alone::new(accel, start, ray) }.run::<L>()
+    let &PlacedTree { accel, start, root, .. } = placed;
+    Alone::<G, false, S> { accel, start, root, ray, selection, goal: PhantomData }.run::<L>()
 }
 
 impl<'a, 'r, G, const MIXED: bool> Alone<'a, 'r, G, MIXED> {

@@ -16,7 +16,7 @@ use crate::hulls::HullRay;
 use crate::lanes::{Lanes, Level, MetHulls, Task};
 use crate::node::{BoxRay, Progress, tag};
 use crate::opening::Start;
-use crate::single::{self, Nearest, Outcome, Whether};
+use crate::single::Outcome;
 use crate::sphere_search::{self, AmongSpheres, CloudRay};
 use crate::spheres::ExactSphere;
 use crate::stack::{Order, Stack};
@@ -71,6 +71,42 @@ pub(crate) trait Search<'a> {
 
     /// Takes the news that there is a crossing, which ends the search. Only where it asks [`Ask::Whether`].
     fn settle(&mut self) {}
+
+    /// Searches a placed tree of nothing but triangles in single precision, if that can settle what it wants; true ends the search.
+    #[inline(always)]
+    fn meet_single<L: Lanes>(&mut self, _placed: &PlacedTree<'a, '_>, _ray: &Ray) -> Outcome<bool> {
+        Outcome::Unsettled
+    }
+}
+
+/// A tree in an instance, for single precision.
+pub(crate) struct PlacedTree<'a, 'p> {
+    pub(crate) accel: &'a Accel,
+    pub(crate) start: &'a SingleStart,
+    /// Where it is entered.
+    pub(crate) root: u32,
+    /// Where the instance stands.
+    pub(crate) around: &'p Place,
+    /// The instance there: its position and its id.
+    pub(crate) geometry: u32,
+    pub(crate) id: u32,
+}
+
+impl PlacedTree<'_, '_> {
+    /// The place of what is in the tree.
+    #[inline(always)]
+    pub(crate) fn place(&self) -> Place {
+        let mut place = self.around.clone();
+        place.route.push(self.geometry);
+        place.ids.push(self.id);
+        place
+    }
+
+    /// Whether it has this route.
+    #[inline(always)]
+    pub(crate) fn has_route(&self, route: &[u32]) -> bool {
+        route.split_last() == Some((&self.geometry, &self.around.route[..]))
+    }
 }
 
 /// A crossing on offer.
@@ -403,23 +439,18 @@ impl<'a, S: Search<'a>> Task for AmongAll<'a, '_, S> {
                     let ray = instance.world_from_object.object_ray(&frame.ray);
                     let inner = &*instance.accel;
                     let mut boxes = BoxRay::passing_all();
-                    if let Some(start) = &inner.single
-                        && let Outcome::Settled(is_over) = meet_single::<L, S>(
-                            inner,
-                            start,
-                            from,
-                            &ray,
-                            geometry,
-                            standing.id,
-                            &mut place,
-                            search,
-                        )
-                    {
-                        if is_over {
-                            return true;
+                    if let Some(start) = inner.single.as_ref().filter(|start| !start.is_mixed) {
+                        let (root, id) = (from.below(start.root), standing.id);
+                        let placed = PlacedTree { accel: inner, start, root, around: &place, geometry, id };
+                        // Nothing beyond the limit is wanted; what is met has the same bits whatever the range.
+                        let ray = ray.with_range(search.floor(), search.limit());
+                        if let Outcome::Settled(is_over) = search.meet_single::<L>(&placed, &ray) {
+                            if is_over {
+                                return true;
+                            }
+                            frame.narrow(search);
+                            continue;
                         }
-                        frame.narrow(search);
-                        continue;
                     }
                     if inner.holds.only_triangles {
                         let Some(root) = inner.tree.root else { continue };
@@ -461,49 +492,6 @@ impl<'a, S: Search<'a>> Task for AmongAll<'a, '_, S> {
             }
         }
         false
-    }
-}
-
-/// Searches a placed tree of nothing but triangles in single precision, where the search is one that this can settle. Whether
-/// that ends it.
-#[inline(always)]
-#[allow(clippy::too_many_arguments)]
-fn meet_single<'a, L: Lanes, S: Search<'a>>(
-    inner: &'a Accel,
-    start: &SingleStart,
-    from: Start,
-    ray: &Ray,
-    geometry: u32,
-    id: u32,
-    place: &mut Place,
-    search: &mut S,
-) -> Outcome<bool> {
-    // Nothing beyond the limit is wanted; what is met has the same bits whatever the range.
-    let ray = ray.with_range(search.floor(), search.limit());
-    let root = from.below(start.root);
-    match S::ASK {
-        Ask::First => match single::search_with::<Nearest, L>(inner, start, root, &ray) {
-            Outcome::Settled(None) => Outcome::Settled(false),
-            Outcome::Settled(Some(winner)) => {
-                place.route.push(geometry);
-                place.ids.push(id);
-                let what = What::Named { geometry: winner.geometry, primitive: winner.primitive };
-                let found = Found { root: winner.root, what, order: 0, is_front: false, accel: inner, place };
-                let is_over = search.offer(&found);
-                place.route.pop();
-                place.ids.pop();
-                Outcome::Settled(is_over)
-            }
-            Outcome::Unsettled => Outcome::Unsettled,
-        },
-        Ask::Whether => {
-            let outcome = single::search_with::<Whether, L>(inner, start, root, &ray);
-            if outcome == Outcome::Settled(true) {
-                search.settle();
-            }
-            outcome
-        }
-        Ask::Nothing | Ask::Every => Outcome::Unsettled,
     }
 }
 

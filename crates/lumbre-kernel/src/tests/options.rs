@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use lumbre_geometry::Ray;
-use lumbre_math::{DVec3, Transform};
+use lumbre_math::{DVec3, Transform, Vec3};
 
 use super::scenes::{
     Random, balls, build, cube, icosphere, mixture, ray, shape, soup, with_parts_everywhere,
@@ -88,6 +88,36 @@ fn they_do_so_in_trees_that_single_precision_searches() {
             check(&accel, &mut random);
         }
     }
+}
+
+#[test]
+fn they_do_so_in_placed_trees_that_single_precision_searches() {
+    let mut random = Random(65);
+    let zero = DVec3::ZERO;
+    // A long one is opened.
+    let mut needle = icosphere(3, zero, 1.0);
+    needle.positions.iter_mut().for_each(|p| *p *= Vec3::new(3.0, 0.2, 0.3));
+    let meshes = [(icosphere(2, zero, 1.1), 0.8), (soup(&mut random, 120, zero, 1.5), 1.2), (needle, 0.1)];
+    let trees = meshes.map(|(mesh, radius)| {
+        let other = icosphere(1, zero, radius);
+        let kinds = [mesh, other].map(|mesh| GeometryKind::Mesh(Arc::new(mesh)));
+        let tree = with_parts_everywhere(|| build(kinds.to_vec()));
+        assert!(tree.single.as_ref().is_some_and(|start| !start.is_mixed));
+        Arc::new(tree.with_masks(vec![0b011_0000, 0b101_0000]))
+    });
+    let placed = |random: &mut Random, accel: &Arc<Accel>, at: DVec3| {
+        GeometryKind::Instance(Instance {
+            accel: Arc::clone(accel),
+            world_from_object: random.placement(at, 2.0, 0.8).into(),
+        })
+    };
+    let pair = build(trees[..2].iter().map(|tree| placed(&mut random, tree, zero)).collect());
+    let pair = Arc::new(pair.with_masks(vec![0b001_0000, 0b111_0000]));
+    let kinds = (0..12).map(|i| placed(&mut random, [&trees[2], &pair, &trees[i % 2]][i % 3], CENTER));
+    let accel = build(kinds.collect());
+    assert!(accel.tree.entries.len() > 12);
+    check(&accel, &mut random);
+    check(&with_random_masks(accel, &mut random), &mut random);
 }
 
 fn check(accel: &Accel, random: &mut Random) {
