@@ -16,7 +16,7 @@ use crate::hulls::Hulls;
 use crate::lanes::Level;
 use crate::node::{Units, tag};
 use crate::query::{All, Any, Batch, Closest, Count, If};
-use crate::single::{self, Nearest, Outcome, Whether, Winner};
+use crate::single::{self, AnyHit, ClosestHit, Nearest, Outcome, Whether, Winner};
 use crate::winding::{self, Moments};
 use crate::{
     ClosestPoint, Geometry, GeometryKind, Hit, LoadError, MapError, NoClosestPoint, NoWindingNumber,
@@ -212,12 +212,11 @@ impl Accel {
 
     #[inline(always)]
     pub(crate) fn closest_at(&self, level: Level, ray: &Ray) -> Option<Hit> {
-        if let Some(start) = &self.single
-            && let Outcome::Settled(winner) = single::search::<Nearest>(level, self, start, ray)
-        {
-            return winner.map(|winner| winner.to_hit(self));
+        match &self.single {
+            Some(start) if start.is_mixed => level.run(ClosestHit::<true> { accel: self, ray }),
+            Some(_) => level.run(ClosestHit::<false> { accel: self, ray }),
+            None => self.closest_plainly_at(level, ray),
         }
-        self.closest_plainly_at(level, ray)
     }
 
     /// The same by the search that knows no other precision than double.
@@ -349,12 +348,11 @@ impl Accel {
 
     #[inline(always)]
     pub(crate) fn any_at(&self, level: Level, ray: &Ray) -> bool {
-        if let Some(start) = &self.single
-            && let Outcome::Settled(is_hit) = single::search::<Whether>(level, self, start, ray)
-        {
-            return is_hit;
+        match &self.single {
+            Some(start) if start.is_mixed => level.run(AnyHit::<true> { accel: self, ray }),
+            Some(_) => level.run(AnyHit::<false> { accel: self, ray }),
+            None => self.any_plainly_at(level, ray),
         }
-        self.any_plainly_at(level, ray)
     }
 
     /// The same by the search that knows no other precision than double.

@@ -1,8 +1,8 @@
 //! Many rays at once.
 //!
-//! Those that are alike go together: see [`packet`]. In large trees, some are in flight on one thread, so that one's arithmetic
-//! fills the waits of another. Each ray takes the very steps that it takes alone, a node or a leaf at a time, in turn with the
-//! others: its answer has the same bits. A step ends with a fetch of what the next one of that ray will read.
+//! Those that are alike go together: see [`packet`]. The others are in flight, some on a thread, so that one's arithmetic fills the
+//! waits of another: which boxes each of them meets is told for all before any of them turns by it. Each ray takes the very
+//! steps that it takes alone, in turn with the others: its answer has the same bits.
 
 use std::marker::PhantomData;
 
@@ -10,20 +10,25 @@ use lumbre_geometry::Ray;
 
 use crate::Accel;
 use crate::holds::SingleStart;
-use crate::lanes::{Lanes, Level, Task};
-use crate::node::Node;
+use crate::lanes::{self, Lanes, Level, Task};
+use crate::node::{Node, tag};
 use crate::packet::{self, PACKET};
+use crate::query::All;
 use crate::single::{Alone, Goal, Outcome, SingleRay, Step};
 use crate::stack::{Order, Stack};
 use crate::triangles::TriangleBlock;
+use crate::way::{Met, Way};
 
-/// Rays in flight on a thread.
-const IN_FLIGHT: usize = 6;
-/// Bytes of nodes and triangles from which on waiting for memory outweighs what it costs to turn from ray to ray.
-const WORTH_FLYING: usize = 1 << 24;
+/// Rays in flight on a thread, where the caches hold much of the tree and where they do not.
+const FEW: usize = 4;
+const MANY: usize = 32;
+/// Bytes of nodes and triangles from which on they do not.
+const FAR: usize = 1 << 24;
 
 /// Packets in a row that may go without a try.
 const LEAST_OFTEN: usize = 8;
+/// Rays among which those that are alike are sought before the others set out.
+const AT_ONCE: usize = 4096;
 
 /// Takes what came of every ray, in any order.
 pub(crate) trait Ends<A> {
@@ -42,33 +47,34 @@ impl<A, F: FnMut(usize, Outcome<A>)> Ends<A> for F {
 pub(crate) fn search_all<G: Goal>(level: Level, accel: &Accel, rays: &[Ray], mut ends: impl Ends<G::Answer>) {
     let tree = &accel.tree;
     let bytes = size_of_val::<[Node]>(&tree.nodes) + size_of_val::<[TriangleBlock]>(&tree.blocks);
-    if let Some(start) = &accel.single {
-        if start.is_mixed {
-            level.run(OneByOne::<G, _, true> { accel, start, rays, ends, goal: PhantomData });
-        } else if bytes < WORTH_FLYING {
-            level.run(OneByOne::<G, _, false> { accel, start, rays, ends, goal: PhantomData });
-        } else {
-            fly::<G>(level, accel, start, rays, ends);
+    match &accel.single {
+        Some(start) if start.is_mixed => {
+            level.run(OneByOne::<G, _> { accel, start, rays, ends, goal: PhantomData });
         }
-    } else {
-        (0..rays.len()).for_each(|position| ends.put(position, Outcome::Unsettled));
+        Some(start) => search_triangles::<G>(level, accel, start, rays, ends, bytes >= FAR, true),
+        None => (0..rays.len()).for_each(|position| ends.put(position, Outcome::Unsettled)),
     }
 }
 
-/// Searches a tree of triangles along every ray, some at a time.
-pub(crate) fn fly<G: Goal>(
+/// Searches a tree of triangles along every ray, as where the caches hold little of it or much, and with or without packets.
+pub(crate) fn search_triangles<G: Goal>(
     level: Level,
     accel: &Accel,
     start: &SingleStart,
     rays: &[Ray],
     ends: impl Ends<G::Answer>,
+    is_far: bool,
+    has_packets: bool,
 ) {
-    level.run(Flights::<G, _> { accel, start, rays, ends, goal: PhantomData });
+    if is_far {
+        level.run(AllAtOnce::<G, _, MANY, true> { accel, start, rays, ends, has_packets, goal: PhantomData });
+    } else {
+        level.run(AllAtOnce::<G, _, FEW, false> { accel, start, rays, ends, has_packets, goal: PhantomData });
+    }
 }
 
-/// Rays through a tree of which the caches hold much, or where shapes take most of the time: in the former, those that are alike
-/// go together, and all others one after another.
-struct OneByOne<'a, 'r, G, E, const MIXED: bool> {
+/// Rays through a tree where shapes take most of the time: one after another.
+struct OneByOne<'a, 'r, G, E> {
     accel: &'a Accel,
     start: &'a SingleStart,
     rays: &'r [Ray],
@@ -76,28 +82,76 @@ struct OneByOne<'a, 'r, G, E, const MIXED: bool> {
     goal: PhantomData<G>,
 }
 
-impl<G: Goal, E: Ends<G::Answer>, const MIXED: bool> Task for OneByOne<'_, '_, G, E, MIXED> {
+impl<G: Goal, E: Ends<G::Answer>> Task for OneByOne<'_, '_, G, E> {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Lanes>(self) {
         let Self { accel, start, rays, mut ends, .. } = self;
-        // After a packet that did not pay, some rays go alone before the next is tried, and ever more while none does.
-        let (mut alone, mut patience) = (0, 1);
-        for (number, chunk) in rays.chunks(PACKET).enumerate() {
-            let first = number * PACKET;
-            if alone > 0 {
-                alone -= 1;
-            } else if !MIXED && let Ok(packet) = <&[Ray; PACKET]>::try_from(chunk) {
-                if packet::search::<G, L>(accel, start, packet, first, &mut ends) {
-                    patience = 1;
-                    continue;
+        for (position, ray) in rays.iter().enumerate() {
+            ends.put(position, Alone::<G, true>::new(accel, start, ray).run::<L>());
+        }
+    }
+}
+
+/// Rays through a tree of triangles: those that are alike together, and `N` of the others in flight. Where the tree `IS_FAR`, what
+/// a ray will read next is asked for before it is its turn.
+struct AllAtOnce<'a, 'r, G, E, const N: usize, const IS_FAR: bool> {
+    accel: &'a Accel,
+    start: &'a SingleStart,
+    rays: &'r [Ray],
+    ends: E,
+    has_packets: bool,
+    goal: PhantomData<G>,
+}
+
+impl<G: Goal, E: Ends<G::Answer>, const N: usize, const IS_FAR: bool> Task
+    for AllAtOnce<'_, '_, G, E, N, IS_FAR>
+{
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let Self { accel, start, rays, mut ends, has_packets, .. } = self;
+        let mut flights: Vec<Flight<G, L>> = Vec::with_capacity(N);
+        let mut others = Vec::with_capacity(rays.len().min(AT_ONCE));
+        // After a packet that did not pay, some rays go otherwise before the next is tried, and ever more while none does.
+        let (mut without, mut patience) = (0, 1);
+        for (number, rays) in rays.chunks(AT_ONCE).enumerate() {
+            for (place, chunk) in rays.chunks(PACKET).enumerate() {
+                let first = number * AT_ONCE + place * PACKET;
+                if without > 0 {
+                    without -= 1;
+                } else if has_packets && let Ok(packet) = <&[Ray; PACKET]>::try_from(chunk) {
+                    if packet::search::<G, L>(accel, start, packet, first, &mut ends) {
+                        patience = 1;
+                        continue;
+                    }
+                    (without, patience) = (patience, (2 * patience).min(LEAST_OFTEN));
                 }
-                (alone, patience) = (patience, (2 * patience).min(LEAST_OFTEN));
+                others.extend((first..).zip(chunk));
             }
-            for (i, ray) in chunk.iter().enumerate() {
-                ends.put(first + i, Alone::<G, MIXED>::new(accel, start, ray).run::<L>());
+            let mut waiting = others.iter().copied();
+            while flights.len() < N
+                && let Some(next) = Start::next::<G>(accel, start, &mut waiting, &mut ends)
+            {
+                flights.push(Flight::new(next, start.root));
             }
+            if !is_node(start.root) {
+                // A single leaf.
+                for flight in &mut flights {
+                    while {
+                        let last = flight.meet_leaf();
+                        flight.end(accel, start, last, &mut waiting, &mut ends)
+                    } {}
+                }
+            } else if IS_FAR {
+                fly_far::<G, L, N>(accel, start, &mut flights, &mut waiting, &mut ends);
+            } else {
+                fly_near::<G, L, N>(accel, start, &mut flights, &mut waiting, &mut ends);
+            }
+            others.clear();
+            flights.clear();
         }
     }
 }
@@ -107,73 +161,211 @@ struct Flight<'a, 'r, G: Goal, L> {
     position: usize,
     ray: &'r Ray,
     reference: u32,
-    single: SingleRay<'a, L>,
+    way: Way<'a, L>,
+    single: SingleRay<'a, false>,
     stack: Stack<<G::Order as Order>::Entry>,
 }
 
-/// All the rays.
-struct Flights<'a, 'r, G, E> {
-    accel: &'a Accel,
-    start: &'a SingleStart,
-    rays: &'r [Ray],
-    ends: E,
-    goal: PhantomData<G>,
+/// A ray that sets out.
+struct Start<'a, 'r, L> {
+    position: usize,
+    ray: &'r Ray,
+    way: Way<'a, L>,
+    single: SingleRay<'a, false>,
 }
 
-impl<G: Goal, E: Ends<G::Answer>> Task for Flights<'_, '_, G, E> {
-    type Output = ();
+impl<'a, 'r, L: Lanes> Start<'a, 'r, L> {
+    /// That of the next ray, if there is one. What does not come from nearby, or is not sound, is passed over.
+    #[inline(always)]
+    fn next<G: Goal>(
+        accel: &'a Accel,
+        start: &'a SingleStart,
+        waiting: &mut impl Iterator<Item = (usize, &'r Ray)>,
+        ends: &mut impl Ends<G::Answer>,
+    ) -> Option<Self> {
+        for (position, ray) in waiting {
+            if let Some(slabs) = L::start_single(start, ray) {
+                let way = Way::new(&accel.tree.nodes, slabs);
+                let single = SingleRay::new::<L>(accel, start, ray, way.slabs(), All);
+                return Some(Self { position, ray, way, single });
+            }
+            ends.put(position, Outcome::Unsettled);
+        }
+        None
+    }
+}
+
+impl<'a, 'r, G: Goal, L: Lanes> Flight<'a, 'r, G, L> {
+    fn new(Start { position, ray, way, single }: Start<'a, 'r, L>, root: u32) -> Self {
+        Self { position, ray, reference: root, way, single, stack: Stack::new() }
+    }
+
+    /// Puts what came of it, and sets out with the next ray in its place; whether there is one.
+    #[inline(always)]
+    fn end(
+        &mut self,
+        accel: &'a Accel,
+        start: &'a SingleStart,
+        last: Step,
+        waiting: &mut impl Iterator<Item = (usize, &'r Ray)>,
+        ends: &mut impl Ends<G::Answer>,
+    ) -> bool {
+        ends.put(self.position, G::answer::<L, _, false>(&self.single, self.ray, last));
+        let Some(next) = Start::next::<G>(accel, start, waiting, ends) else { return false };
+        let Start { position, ray, way, single } = next;
+        (self.position, self.ray, self.reference) = (position, ray, start.root);
+        (self.way, self.single) = (way, single);
+        self.stack.clear();
+        true
+    }
+
+    /// Tests the leaf that it is at, and goes on to what stands on the stack.
+    #[inline(always)]
+    fn meet_leaf(&mut self) -> Step {
+        match self.single.meet_leaf::<G, L>(self.reference, self.ray, &mut self.way) {
+            Some(last) => last,
+            None => self.way.pop::<G::Order>(&mut self.stack).map_or(Step::Out, Step::On),
+        }
+    }
+
+    /// Asks for what is read next, before it is needed.
+    #[inline(always)]
+    fn fetch(&self, accel: &Accel) {
+        if is_node(self.reference) {
+            accel.tree.nodes.get(self.reference as usize).map(lanes::fetch);
+        } else {
+            accel.tree.blocks.get(tag::blocks(self.reference).start).map(lanes::fetch);
+        }
+    }
+}
+
+#[inline(always)]
+fn is_node(reference: u32) -> bool {
+    reference >> tag::SHIFT == tag::INNER
+}
+
+/// Whose turn comes next. The places of a turn are read one by one, as they were written: a wide read would wait for them.
+struct Queue<const N: usize> {
+    // Those whose turn it is, and those who come after, by turns.
+    flights: [[u8; N]; 2],
+    next: usize,
+    len: usize,
+}
+
+impl<const N: usize> Queue<N> {
+    const EMPTY: Self = Self { flights: [[0; N]; 2], next: 0, len: 0 };
 
     #[inline(always)]
-    fn run<L: Lanes>(self) {
-        let Self { accel, start, rays, mut ends, .. } = self;
-        let mut waiting = rays.iter().enumerate();
-        let mut flights: Vec<Flight<G, L>> = Vec::with_capacity(IN_FLIGHT);
-        while flights.len() < IN_FLIGHT
-            && let Some((position, ray)) = waiting.next()
-        {
-            match SingleRay::start(accel, start, ray) {
-                Some(single) => {
-                    flights.push(Flight {
-                        position,
-                        ray,
-                        reference: start.root,
-                        single,
-                        stack: Stack::new(),
-                    });
-                }
-                None => ends.put(position, Outcome::Unsettled),
+    fn put(&mut self, flight: usize) {
+        self.flights[self.next][self.len % N] = flight as u8;
+        self.len += 1;
+    }
+
+    /// Begins a turn of all that were put: how many they are.
+    #[inline(always)]
+    fn begin(&mut self) -> usize {
+        self.next ^= 1;
+        std::mem::take(&mut self.len)
+    }
+
+    /// One of those whose turn it is.
+    #[inline(always)]
+    fn at(&self, place: usize) -> usize {
+        self.flights[self.next ^ 1][place % N] as usize
+    }
+}
+
+/// Flies through a tree of which the caches hold little until no ray is left: at nodes together, and then at leaves, each of which
+/// was asked for a turn before.
+#[inline(always)]
+fn fly_far<'a, 'r, G: Goal, L: Lanes, const N: usize>(
+    accel: &'a Accel,
+    start: &'a SingleStart,
+    flights: &mut [Flight<'a, 'r, G, L>],
+    waiting: &mut impl Iterator<Item = (usize, &'r Ray)>,
+    ends: &mut impl Ends<G::Answer>,
+) {
+    let Some(first) = flights.first() else { return };
+    let mut met: [Met<L>; N] = [first.way.look_at(start.root); N];
+    let (mut at_nodes, mut at_leaves) = (Queue::<N>::EMPTY, Queue::<N>::EMPTY);
+    for i in 0..flights.len() {
+        at_nodes.put(i);
+    }
+    while at_nodes.len + at_leaves.len > 0 {
+        let count = at_nodes.begin();
+        for (place, met) in met[..count].iter_mut().enumerate() {
+            let flight = &flights[at_nodes.at(place)];
+            *met = flight.way.look_at(flight.reference);
+        }
+        for (place, met) in met[..count].iter().enumerate() {
+            let i = at_nodes.at(place);
+            let flight = &mut flights[i];
+            if let Some(next) = flight.way.go_on::<G::Order>(met, &mut flight.stack) {
+                flight.reference = next;
+                flight.fetch(accel);
+                if is_node(next) { at_nodes.put(i) } else { at_leaves.put(i) }
+            } else if flight.end(accel, start, Step::Out, waiting, ends) {
+                at_nodes.put(i);
             }
         }
-        // Those that are under way stand first.
-        let mut count = flights.len();
-        while count > 0 {
-            let mut turn = 0;
-            while turn < count {
-                let Flight { position, ray, reference, single, stack } = &mut flights[turn];
-                let step = single.step::<G, false>(*reference, ray, stack);
-                if let Step::On(next) = step {
-                    *reference = next;
-                    single.fetch(next);
-                    turn += 1;
-                    continue;
-                }
-                ends.put(*position, G::answer(single, ray, step));
-                // The next takes its place, where it stands.
-                let started = loop {
-                    let Some((next, ray)) = waiting.next() else { break None };
-                    match SingleRay::start(accel, start, ray) {
-                        Some(single) => break Some((next, ray, single)),
-                        None => ends.put(next, Outcome::Unsettled),
-                    }
-                };
-                if let Some((next, next_ray, next_single)) = started {
-                    (*position, *ray, *reference, *single) = (next, next_ray, start.root, next_single);
-                    stack.clear();
-                } else {
-                    count -= 1;
-                    flights.swap(turn, count);
-                }
+        if at_nodes.len > N / 2 {
+            continue;
+        }
+        for place in 0..at_leaves.begin() {
+            let i = at_leaves.at(place);
+            let flight = &mut flights[i];
+            let step = flight.meet_leaf();
+            if let Step::On(next) = step {
+                flight.reference = next;
+                flight.fetch(accel);
+                if is_node(next) { at_nodes.put(i) } else { at_leaves.put(i) }
+            } else if flight.end(accel, start, step, waiting, ends) {
+                at_nodes.put(i);
             }
         }
     }
 }
+
+/// Flies through a tree of which the caches hold much until no ray is left: all at nodes together, but for what each finds at leaves
+/// between.
+#[inline(always)]
+fn fly_near<'a, 'r, G: Goal, L: Lanes, const N: usize>(
+    accel: &'a Accel,
+    start: &'a SingleStart,
+    flights: &mut Vec<Flight<'a, 'r, G, L>>,
+    waiting: &mut impl Iterator<Item = (usize, &'r Ray)>,
+    ends: &mut impl Ends<G::Answer>,
+) {
+    let Some(first) = flights.first() else { return };
+    let mut met: [Met<L>; N] = [first.way.look_at(start.root); N];
+    while !flights.is_empty() {
+        for (flight, met) in flights.iter().zip(&mut met) {
+            *met = flight.way.look_at(flight.reference);
+        }
+        let mut are_all_on = true;
+        for (flight, met) in flights.iter_mut().zip(&met) {
+            let mut next = flight.way.go_on::<G::Order>(met, &mut flight.stack);
+            let last = loop {
+                let Some(reference) = next else { break Step::Out };
+                flight.reference = reference;
+                if is_node(reference) {
+                    break Step::On(reference);
+                }
+                match flight.single.meet_leaf::<G, L>(reference, flight.ray, &mut flight.way) {
+                    Some(last) => break last,
+                    None => next = flight.way.pop::<G::Order>(&mut flight.stack),
+                }
+            };
+            if !matches!(last, Step::On(_)) && !flight.end(accel, start, last, waiting, ends) {
+                flight.reference = NOWHERE;
+                are_all_on = false;
+            }
+        }
+        if !are_all_on {
+            flights.retain(|flight| flight.reference != NOWHERE);
+        }
+    }
+}
+
+/// No reference.
+const NOWHERE: u32 = u32::MAX;

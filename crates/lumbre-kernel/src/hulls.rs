@@ -237,9 +237,6 @@ pub(crate) const LEAST_TUBE_ERROR: f32 = 1.0 / (1 << 16) as f32;
 pub(crate) const LEAST_COMPONENT: f32 = 1.0 / (1u64 << 22) as f32;
 
 impl HullRay {
-    /// What stands where there are no hulls.
-    pub(crate) const NONE: Self = Self { origin: [0.0; 3], rest: [0.0; 3], direction: [0.0; 3] };
-
     /// For a ray from nearby, whose direction's largest component has the size `length`.
     #[inline(always)]
     pub(crate) fn new(units: &Units, ray: &Ray, length: f64) -> Self {

@@ -528,11 +528,13 @@ impl Packet<'_, '_> {
         loop {
             while reference >> tag::SHIFT == tag::INNER {
                 self.work += 1;
-                let slots = stack.with_room();
                 let node = &nodes[reference as usize];
                 let (mask, keys) = L::meet_frustum(node, lanes::opaque(&self.frustum));
                 if mask & mask.wrapping_sub(1) != 0 {
-                    reference = G::Order::push_children::<L>(node, mask, keys, slots);
+                    reference = stack.put(
+                        #[inline(always)]
+                        |room| G::Order::push_children::<L>(node, mask, keys, room),
+                    );
                 } else if mask != 0 {
                     reference = L::only_child(node, mask);
                 } else {

@@ -19,14 +19,14 @@ use lumbre_math::DVec3;
 use crate::collapse::Entry;
 use crate::holds::SingleStart;
 use crate::hulls::HullRay;
-use crate::lanes::{self, Crossings, Lanes, Level, MetHulls, Task};
-use crate::node::tag;
+use crate::lanes::{self, Axes, Crossings, Lanes, Level, MetHulls, Task};
+use crate::node::{Slabs, tag};
 use crate::options::{self, Selection};
 use crate::query::All;
 use crate::stack::{AsBuilt, ByDistance, Order, Stack};
 use crate::traverse::{PlacedTree, What};
 use crate::triangles::{self, BLOCK, BlockRay, Meeting, Passage, Shear, TriangleBlock};
-use crate::way::Way;
+use crate::way::{Way, out_of_tree};
 use crate::{Accel, Faces, Hit, InstancePath, traverse};
 
 /// What came of a search.
@@ -117,8 +117,14 @@ impl<'a> Exact<'a> {
 
     /// Whether the ray passes by a triangle, or meets it out of its range, as far as that is seen at a glance.
     #[inline(always)]
-    pub(crate) fn passes<L: Lanes>(&self, ray: &Ray, block: &TriangleBlock, lane: u32) -> bool {
-        let (shear, origin) = L::shear(ray, &self.start.mesh_origin);
+    pub(crate) fn passes<L: Lanes>(
+        &self,
+        ray: &Ray,
+        axes: &'static Axes,
+        block: &TriangleBlock,
+        lane: u32,
+    ) -> bool {
+        let (shear, origin) = L::shear(ray, axes, &self.start.mesh_origin);
         match L::pass(block, lane as usize, &shear, &origin) {
             (Passage::Outside, _) => true,
             (Passage::Inside, inside) => !triangles::is_in_range(ray, inside.t(&shear)),
@@ -161,9 +167,10 @@ impl<'a> Exact<'a> {
     pub(crate) fn winner<L: Lanes>(
         &self,
         ray: &Ray,
+        axes: &'static Axes,
         &Candidate { block, lane, .. }: &Candidate,
     ) -> Option<Winner> {
-        let (shear, origin) = L::shear(ray, &self.start.mesh_origin);
+        let (shear, origin) = L::shear(ray, axes, &self.start.mesh_origin);
         let corners = &self.triangles[block as usize];
         let (passage, inside) = L::pass(corners, lane as usize, &shear, &origin);
         let root = if passage == Passage::Inside {
@@ -187,91 +194,76 @@ pub(crate) fn heights(t: f64, length: f64) -> (f32, f32) {
     (height - error, height + error)
 }
 
-/// A ray under way in a tree that [`SingleStart`] was made for, among what a selection takes.
-pub(crate) struct SingleRay<'a, L, S = All> {
+/// What takes t to heights.
+#[inline(always)]
+fn largest_component(ray: &Ray) -> f64 {
+    ray.direction.abs().max_element()
+}
+
+/// A ray in the leaves of a tree that [`SingleStart`] was made for, among what a selection takes. Its [`Way`] leads it to them.
+pub(crate) struct SingleRay<'a, const MIXED: bool, S = All> {
     exact: Exact<'a>,
-    way: Way<'a, L>,
     blocks: BlockRay,
-    /// For shapes.
-    hulls: HullRay,
+    /// For shapes, where there are any.
+    hulls: Option<HullRay>,
     /// From heights to places in the range of boxes.
     place_per_height: f32,
-    /// From t to heights.
-    length: f64,
     /// The nearest so far.
     best: Candidate,
-    /// That, where it is no triangle.
-    crossed: Winner,
+    /// The last of the best that was no triangle.
+    crossed: Option<Winner>,
     selection: S,
 }
 
-impl<'a, L: Lanes> SingleRay<'a, L> {
-    /// Starts with a ray; `None` where that does not come from nearby, or is not sound.
+impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
+    /// Starts with a ray that is on its way.
     #[inline(always)]
-    pub(crate) fn start(accel: &'a Accel, start: &'a SingleStart, ray: &Ray) -> Option<Self> {
-        let slabs = L::start_single(start, ray)?;
-        Some(Self::among_leaves(accel, start, ray, Way::new(&accel.tree.nodes, slabs), All))
-    }
-}
-
-impl<'a, L: Lanes, S: Selection> SingleRay<'a, L, S> {
-    /// Goes on with a ray that has come to a first leaf.
-    #[inline(always)]
-    fn among_leaves(
+    pub(crate) fn new<L: Lanes>(
         accel: &'a Accel,
         start: &'a SingleStart,
         ray: &Ray,
-        way: Way<'a, L>,
+        slabs: &Slabs,
         selection: S,
     ) -> Self {
-        let (blocks, place_per_height) = L::start_blocks(start, ray, way.slabs());
+        let (blocks, place_per_height) = L::start_blocks(start, ray, slabs);
         let exact = Exact::new(accel, start);
-        let crossed = Winner { root: Root::at(f64::INFINITY), geometry: 0, primitive: 0 };
+        let hulls = MIXED.then(|| HullRay::new(&accel.units, ray, largest_component(ray)));
         let best = Candidate::NONE;
-        let length = ray.direction.abs().max_element();
-        let hulls = if start.is_mixed { HullRay::new(&accel.units, ray, length) } else { HullRay::NONE };
-        Self { exact, way, blocks, hulls, place_per_height, length, best, crossed, selection }
+        Self { exact, blocks, hulls, place_per_height, best, crossed: None, selection }
     }
 
-    /// Goes on from a node or a leaf.
+    /// Tests a leaf; how the search ends, if it does.
     #[inline(always)]
-    pub(crate) fn step<G: Goal, const MIXED: bool>(
+    pub(crate) fn meet_leaf<G: Goal, L: Lanes>(
         &mut self,
-        reference: u32,
+        leaf: u32,
         ray: &Ray,
-        stack: &mut Stack<<G::Order as Order>::Entry>,
-    ) -> Step {
-        if reference >> tag::SHIFT == tag::INNER {
-            return self.way.meet_node::<G::Order>(reference, stack).map_or(Step::Out, Step::On);
-        }
-        let end = if MIXED && reference >> tag::SHIFT == tag::SHAPES {
-            self.meet_shapes::<G>(reference, ray)
-        } else if MIXED && reference >> tag::SHIFT != tag::TRIANGLES {
-            self.meet_entries::<G>(reference, ray)
+        way: &mut Way<L>,
+    ) -> Option<Step> {
+        if MIXED && leaf >> tag::SHIFT == tag::SHAPES {
+            self.meet_shapes::<G, L>(leaf, ray, way)
+        } else if MIXED && leaf >> tag::SHIFT != tag::TRIANGLES {
+            self.meet_entries::<G, L>(leaf, ray, way)
         } else {
-            G::meet_triangles(self, reference, ray)
-        };
-        match end {
-            Some(last) => last,
-            None => self.way.pop::<G::Order>(stack).map_or(Step::Out, Step::On),
+            G::meet_triangles(self, leaf, ray, way)
         }
     }
 
     /// Tests a leaf of shapes: in double precision those alone whose hulls are met, the nearest first.
     #[inline(always)]
-    fn meet_shapes<G: Goal>(&mut self, leaf: u32, ray: &Ray) -> Option<Step> {
+    fn meet_shapes<G: Goal, L: Lanes>(&mut self, leaf: u32, ray: &Ray, way: &mut Way<L>) -> Option<Step> {
         let accel = self.exact.accel;
         let mut first = (leaf & tag::PLACE) as usize;
         loop {
-            let Some((block, goes_on)) = accel.hulls.block(first) else {
-                return self.meet_entries::<G>(leaf, ray);
+            let (Some(hulls), Some((block, goes_on))) = (&self.hulls, accel.hulls.block(first)) else {
+                return self.meet_entries::<G, L>(leaf, ray, way);
             };
             let entries = &accel.tree.entries[first..];
             let range = &self.blocks.range;
             let MetHulls { mut mask, sure, near } = if G::IS_ANY && S::TAKES_ALL {
-                L::meet_hulls::<true>(block, lanes::opaque(&self.hulls), range)
+                L::meet_hulls::<true>(block, lanes::opaque(hulls), range)
             } else {
-                L::meet_hulls::<false>(block, lanes::opaque(&self.hulls), range)
+                L::meet_hulls::<false>(block, lanes::opaque(hulls), range)
             };
             if G::IS_ANY && S::TAKES_ALL && sure != 0 {
                 return Some(Step::Met);
@@ -290,7 +282,7 @@ impl<'a, L: Lanes, S: Selection> SingleRay<'a, L, S> {
                 if !G::IS_ANY && near[lane] > self.blocks.range.last {
                     continue;
                 }
-                let end = G::meet_entry(self, &entries[lane], ray);
+                let end = G::meet_entry(self, &entries[lane], ray, way);
                 if end.is_some() {
                     return end;
                 }
@@ -304,9 +296,9 @@ impl<'a, L: Lanes, S: Selection> SingleRay<'a, L, S> {
 
     /// Tests a leaf of custom geometry, or of anything that is no triangle.
     #[inline(always)]
-    fn meet_entries<G: Goal>(&mut self, leaf: u32, ray: &Ray) -> Option<Step> {
+    fn meet_entries<G: Goal, L: Lanes>(&mut self, leaf: u32, ray: &Ray, way: &mut Way<L>) -> Option<Step> {
         for entry in &self.exact.accel.tree.entries[(leaf & tag::PLACE) as usize..] {
-            let end = G::meet_entry(self, entry, ray);
+            let end = G::meet_entry(self, entry, ray, way);
             if end.is_some() || entry.is_last() {
                 return end;
             }
@@ -316,7 +308,13 @@ impl<'a, L: Lanes, S: Selection> SingleRay<'a, L, S> {
 
     /// Of the triangles of a block that may be met, those that are taken, as far as that is seen at a glance.
     #[inline(always)]
-    fn select(&self, block: u32, mask: u32, edges: &L::Edges, crossings: &Crossings<L::Floats>) -> u32 {
+    fn select<L: Lanes>(
+        &self,
+        block: u32,
+        mask: u32,
+        edges: &L::Edges,
+        crossings: &Crossings<L::Floats>,
+    ) -> u32 {
         if S::TAKES_ALL {
             return mask;
         }
@@ -332,13 +330,17 @@ impl<'a, L: Lanes, S: Selection> SingleRay<'a, L, S> {
 
     /// Tests a leaf of triangles for the nearest hit; false where the plain search has to answer.
     #[inline(always)]
-    fn meet_leaf_closest(&mut self, leaf: u32, ray: &Ray) -> bool {
+    fn meet_leaf_closest<L: Lanes>(&mut self, leaf: u32, ray: &Ray, way: &mut Way<L>) -> bool {
+        // One at least, and mostly no more.
         let places = tag::blocks(leaf);
-        for (number, block) in (places.start as u32..).zip(&self.exact.triangles[places]) {
+        let mut place = places.start;
+        loop {
+            let Some(block) = self.exact.triangles.get(place) else { out_of_tree() };
             let (mask, edges) = L::meet_triangles(block, lanes::opaque(&self.blocks));
             if mask != 0 {
+                let number = place as u32;
                 let crossings = L::place_crossings(&edges, &self.blocks);
-                let mask = self.select(number, mask, &edges, &crossings);
+                let mask = self.select::<L>(number, mask, &edges, &crossings);
                 let mut rest = mask & crossings.in_range;
                 while rest != 0 {
                     let lane = rest.trailing_zeros();
@@ -346,29 +348,34 @@ impl<'a, L: Lanes, S: Selection> SingleRay<'a, L, S> {
                     rest &= rest - 1;
                     let (from, to) = crossings.between::<L>(lane as usize);
                     if is_sure && to < self.best.from {
-                        self.keep(Candidate { block: number, lane, from, to });
-                    } else if from > self.best.to || self.exact.passes::<L>(ray, block, lane) {
+                        self.keep(Candidate { block: number, lane, from, to }, way);
+                    } else if from > self.best.to
+                        || self.exact.passes::<L>(ray, self.blocks.axes, block, lane)
+                    {
                         // Farther, which what is no number is not; or not met at all.
                         continue;
                     } else {
                         match self.contest(ray, number, lane) {
-                            Outcome::Settled(Some(better)) => self.keep(better),
+                            Outcome::Settled(Some(better)) => self.keep(better, way),
                             Outcome::Settled(None) => {}
                             Outcome::Unsettled => return false,
                         }
                     }
                 }
             }
+            place += 1;
+            if place == places.end {
+                return true;
+            }
         }
-        true
     }
 
     #[inline(always)]
-    fn keep(&mut self, better: Candidate) {
+    fn keep<L: Lanes>(&mut self, better: Candidate, way: &mut Way<L>) {
         self.best = better;
         self.blocks.range.last = better.to;
         let place = better.to * self.place_per_height;
-        self.way.end_at(place + place.abs() * triangles::ROUNDINGS + f32::MIN_POSITIVE);
+        way.end_at(place + place.abs() * triangles::ROUNDINGS + f32::MIN_POSITIVE);
     }
 
     /// Looks closer at a triangle that may be met, and nearer than the best: what is better, if anything.
@@ -389,8 +396,14 @@ impl<'a, L: Lanes, S: Selection> SingleRay<'a, L, S> {
             Outcome::Settled(true) => {}
             Outcome::Unsettled => return Outcome::Unsettled,
         }
-        let (from, to) = heights(found, self.length);
+        let (from, to) = heights(found, largest_component(ray));
         Outcome::Settled(Some(Candidate { block, lane, from, to }))
+    }
+
+    /// The best, where it is no triangle.
+    #[inline(always)]
+    fn crossed(&self) -> Option<Winner> {
+        if MIXED && !self.best.is_triangle() { self.crossed } else { None }
     }
 
     /// Whether a crossing is nearer than the best, or as near and before it.
@@ -398,27 +411,26 @@ impl<'a, L: Lanes, S: Selection> SingleRay<'a, L, S> {
         if !self.best.is_some() {
             return Outcome::Settled(true);
         }
-        let (best, best_names) = if self.best.is_triangle() {
-            match self.exact.t_and_names(ray, &self.best) {
+        let (best, best_names) = match self.crossed() {
+            Some(best) => (best.root.t, (best.geometry, best.primitive)),
+            None => match self.exact.t_and_names(ray, &self.best) {
                 Some(best) => best,
                 None => return Outcome::Unsettled,
-            }
-        } else {
-            (self.crossed.root.t, (self.crossed.geometry, self.crossed.primitive))
+            },
         };
         Outcome::Settled(t < best || t == best && names < best_names)
     }
 
     /// Tests what is no triangle for the nearest hit; false where the plain search has to answer.
     #[inline(always)]
-    fn meet_entry_closest(&mut self, entry: &Entry, ray: &Ray) -> bool {
+    fn meet_entry_closest<L: Lanes>(&mut self, entry: &Entry, ray: &Ray, way: &mut Way<L>) -> bool {
         let (geometry, primitive) = (entry.geometry, entry.primitive());
         if !self.selection.takes(geometry, primitive) {
             return true;
         }
         if self.selection.faces() != Faces::Both {
             for root in self.crossings_of_faces(geometry, primitive, ray) {
-                if !self.meet_root(root, geometry, primitive, ray) {
+                if !self.meet_root(root, geometry, primitive, ray, way) {
                     return false;
                 }
             }
@@ -426,7 +438,7 @@ impl<'a, L: Lanes, S: Selection> SingleRay<'a, L, S> {
         }
         let kind = &self.exact.accel.geometries[geometry as usize].kind;
         match traverse::first_crossing(kind, primitive, ray) {
-            Some(root) => self.meet_root(root, geometry, primitive, ray),
+            Some(root) => self.meet_root(root, geometry, primitive, ray, way),
             None => true,
         }
     }
@@ -445,8 +457,15 @@ impl<'a, L: Lanes, S: Selection> SingleRay<'a, L, S> {
 
     /// Takes a crossing of what is no triangle, if it is the nearest; false where the plain search has to answer.
     #[inline(always)]
-    fn meet_root(&mut self, root: Root, geometry: u32, primitive: u32, ray: &Ray) -> bool {
-        let (from, to) = heights(root.t, self.length);
+    fn meet_root<L: Lanes>(
+        &mut self,
+        root: Root,
+        geometry: u32,
+        primitive: u32,
+        ray: &Ray,
+        way: &mut Way<L>,
+    ) -> bool {
+        let (from, to) = heights(root.t, largest_component(ray));
         // Also keeps out a NaN.
         if !ray.contains(root.t) || from > self.best.to {
             return true;
@@ -460,8 +479,8 @@ impl<'a, L: Lanes, S: Selection> SingleRay<'a, L, S> {
             }
         };
         if is_nearer {
-            self.crossed = Winner { root, geometry, primitive };
-            self.keep(Candidate { block: Candidate::CROSSED, lane: 0, from, to });
+            self.crossed = Some(Winner { root, geometry, primitive });
+            self.keep(Candidate { block: Candidate::CROSSED, lane: 0, from, to }, way);
         }
         true
     }
@@ -481,13 +500,17 @@ impl<'a, L: Lanes, S: Selection> SingleRay<'a, L, S> {
 
     /// Tests a leaf for any hit: whether there is one.
     #[inline(always)]
-    fn meet_leaf_any(&self, leaf: u32, ray: &Ray) -> Outcome<bool> {
+    fn meet_leaf_any<L: Lanes>(&self, leaf: u32, ray: &Ray) -> Outcome<bool> {
+        // One at least, and mostly no more.
         let places = tag::blocks(leaf);
-        for (number, block) in (places.start as u32..).zip(&self.exact.triangles[places]) {
+        let mut place = places.start;
+        loop {
+            let Some(block) = self.exact.triangles.get(place) else { out_of_tree() };
             let (mask, edges) = L::meet_triangles(block, lanes::opaque(&self.blocks));
             if mask != 0 {
+                let number = place as u32;
                 let crossings = L::place_crossings(&edges, &self.blocks);
-                let mask = self.select(number, mask, &edges, &crossings);
+                let mask = self.select::<L>(number, mask, &edges, &crossings);
                 if mask & crossings.sure != 0 {
                     return Outcome::Settled(true);
                 }
@@ -495,7 +518,7 @@ impl<'a, L: Lanes, S: Selection> SingleRay<'a, L, S> {
                 while rest != 0 {
                     let lane = rest.trailing_zeros();
                     rest &= rest - 1;
-                    if self.exact.passes::<L>(ray, block, lane) {
+                    if self.exact.passes::<L>(ray, self.blocks.axes, block, lane) {
                         continue;
                     }
                     match self.exact.meet(ray, number, lane) {
@@ -509,32 +532,25 @@ impl<'a, L: Lanes, S: Selection> SingleRay<'a, L, S> {
                     }
                 }
             }
+            place += 1;
+            if place == places.end {
+                return Outcome::Settled(false);
+            }
         }
-        Outcome::Settled(false)
     }
 
     /// The nearest hit, once all was seen.
     #[inline(always)]
-    pub(crate) fn winner(&self, ray: &Ray) -> Outcome<Option<Winner>> {
+    pub(crate) fn winner<L: Lanes>(&self, ray: &Ray) -> Outcome<Option<Winner>> {
         if !self.best.is_some() {
             return Outcome::Settled(None);
         }
-        if !self.best.is_triangle() {
-            return Outcome::Settled(Some(self.crossed));
+        if let Some(crossed) = self.crossed() {
+            return Outcome::Settled(Some(crossed));
         }
-        match self.exact.winner::<L>(ray, &self.best) {
+        match self.exact.winner::<L>(ray, self.blocks.axes, &self.best) {
             Some(winner) => Outcome::Settled(Some(winner)),
             None => Outcome::Unsettled,
-        }
-    }
-
-    /// Asks for what is read next, before it is needed.
-    #[inline(always)]
-    pub(crate) fn fetch(&self, reference: u32) {
-        if reference >> tag::SHIFT == tag::INNER {
-            self.way.fetch(reference);
-        } else {
-            self.exact.triangles.get(tag::blocks(reference).start).map(lanes::fetch);
         }
     }
 }
@@ -551,22 +567,24 @@ pub(crate) trait Goal {
     const IS_ANY: bool;
 
     /// Tests a leaf of triangles; how the search ends, if it does.
-    fn meet_triangles<L: Lanes, S: Selection>(
-        single: &mut SingleRay<L, S>,
+    fn meet_triangles<L: Lanes, S: Selection, const MIXED: bool>(
+        single: &mut SingleRay<MIXED, S>,
         leaf: u32,
         ray: &Ray,
+        way: &mut Way<L>,
     ) -> Option<Step>;
 
     /// Tests what is no triangle.
-    fn meet_entry<L: Lanes, S: Selection>(
-        single: &mut SingleRay<L, S>,
+    fn meet_entry<L: Lanes, S: Selection, const MIXED: bool>(
+        single: &mut SingleRay<MIXED, S>,
         entry: &Entry,
         ray: &Ray,
+        way: &mut Way<L>,
     ) -> Option<Step>;
 
     /// What the last step leads to.
-    fn answer<L: Lanes, S: Selection>(
-        single: &SingleRay<L, S>,
+    fn answer<L: Lanes, S: Selection, const MIXED: bool>(
+        single: &SingleRay<MIXED, S>,
         ray: &Ray,
         last: Step,
     ) -> Outcome<Self::Answer>;
@@ -590,30 +608,32 @@ impl Goal for Nearest {
     const IS_ANY: bool = false;
 
     #[inline(always)]
-    fn meet_triangles<L: Lanes, S: Selection>(
-        single: &mut SingleRay<L, S>,
+    fn meet_triangles<L: Lanes, S: Selection, const MIXED: bool>(
+        single: &mut SingleRay<MIXED, S>,
         leaf: u32,
         ray: &Ray,
+        way: &mut Way<L>,
     ) -> Option<Step> {
-        (!single.meet_leaf_closest(leaf, ray)).then_some(Step::Unsettled)
+        (!single.meet_leaf_closest(leaf, ray, way)).then_some(Step::Unsettled)
     }
 
     #[inline(always)]
-    fn meet_entry<L: Lanes, S: Selection>(
-        single: &mut SingleRay<L, S>,
+    fn meet_entry<L: Lanes, S: Selection, const MIXED: bool>(
+        single: &mut SingleRay<MIXED, S>,
         entry: &Entry,
         ray: &Ray,
+        way: &mut Way<L>,
     ) -> Option<Step> {
-        (!single.meet_entry_closest(entry, ray)).then_some(Step::Unsettled)
+        (!single.meet_entry_closest(entry, ray, way)).then_some(Step::Unsettled)
     }
 
     #[inline(always)]
-    fn answer<L: Lanes, S: Selection>(
-        single: &SingleRay<L, S>,
+    fn answer<L: Lanes, S: Selection, const MIXED: bool>(
+        single: &SingleRay<MIXED, S>,
         ray: &Ray,
         last: Step,
     ) -> Outcome<Option<Winner>> {
-        if last == Step::Unsettled { Outcome::Unsettled } else { single.winner(ray) }
+        if last == Step::Unsettled { Outcome::Unsettled } else { single.winner::<L>(ray) }
     }
 
     #[inline(always)]
@@ -626,7 +646,7 @@ impl Goal for Nearest {
         if !best.is_some() {
             return Outcome::Settled(None);
         }
-        match exact.winner::<L>(ray, best) {
+        match exact.winner::<L>(ray, L::axes(ray), best) {
             Some(winner) => Outcome::Settled(Some(winner)),
             None => Outcome::Unsettled,
         }
@@ -643,12 +663,13 @@ impl Goal for Whether {
     const IS_ANY: bool = true;
 
     #[inline(always)]
-    fn meet_triangles<L: Lanes, S: Selection>(
-        single: &mut SingleRay<L, S>,
+    fn meet_triangles<L: Lanes, S: Selection, const MIXED: bool>(
+        single: &mut SingleRay<MIXED, S>,
         leaf: u32,
         ray: &Ray,
+        _: &mut Way<L>,
     ) -> Option<Step> {
-        match single.meet_leaf_any(leaf, ray) {
+        match single.meet_leaf_any::<L>(leaf, ray) {
             Outcome::Settled(true) => Some(Step::Met),
             Outcome::Settled(false) => None,
             Outcome::Unsettled => Some(Step::Unsettled),
@@ -656,22 +677,69 @@ impl Goal for Whether {
     }
 
     #[inline(always)]
-    fn meet_entry<L: Lanes, S: Selection>(
-        single: &mut SingleRay<L, S>,
+    fn meet_entry<L: Lanes, S: Selection, const MIXED: bool>(
+        single: &mut SingleRay<MIXED, S>,
         entry: &Entry,
         ray: &Ray,
+        _: &mut Way<L>,
     ) -> Option<Step> {
         single.meet_entry_any(entry, ray).then_some(Step::Met)
     }
 
     #[inline(always)]
-    fn answer<L: Lanes, S: Selection>(_: &SingleRay<L, S>, _: &Ray, last: Step) -> Outcome<bool> {
+    fn answer<L: Lanes, S: Selection, const MIXED: bool>(
+        _: &SingleRay<MIXED, S>,
+        _: &Ray,
+        last: Step,
+    ) -> Outcome<bool> {
         if last == Step::Unsettled { Outcome::Unsettled } else { Outcome::Settled(last == Step::Met) }
     }
 
     #[inline(always)]
     fn answer_together<L: Lanes>(_: &Exact, _: &Ray, _: &Candidate, is_met: bool) -> Outcome<bool> {
         Outcome::Settled(is_met)
+    }
+}
+
+/// The nearest hit of a ray by whichever search can tell. `MIXED` as below.
+pub(crate) struct ClosestHit<'a, 'r, const MIXED: bool> {
+    pub(crate) accel: &'a Accel,
+    pub(crate) ray: &'r Ray,
+}
+
+impl<const MIXED: bool> Task for ClosestHit<'_, '_, MIXED> {
+    type Output = Option<Hit>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Option<Hit> {
+        let Self { accel, ray } = self;
+        if let Some(start) = &accel.single
+            && let Outcome::Settled(winner) = Alone::<Nearest, MIXED>::new(accel, start, ray).run::<L>()
+        {
+            return winner.map(|winner| winner.to_hit(accel));
+        }
+        accel.closest_plainly_at(L::level(), ray)
+    }
+}
+
+/// Whether a ray hits anything, alike.
+pub(crate) struct AnyHit<'a, 'r, const MIXED: bool> {
+    pub(crate) accel: &'a Accel,
+    pub(crate) ray: &'r Ray,
+}
+
+impl<const MIXED: bool> Task for AnyHit<'_, '_, MIXED> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> bool {
+        let Self { accel, ray } = self;
+        if let Some(start) = &accel.single
+            && let Outcome::Settled(is_hit) = Alone::<Whether, MIXED>::new(accel, start, ray).run::<L>()
+        {
+            return is_hit;
+        }
+        accel.any_plainly_at(L::level(), ray)
     }
 }
 
@@ -688,6 +756,7 @@ pub(crate) struct Alone<'a, 'r, G, const MIXED: bool, S = All> {
 
 /// Searches along a ray.
 #[inline(always)]
+#[cfg(test)]
 pub(crate) fn search<G: Goal>(
     level: Level,
     accel: &Accel,
@@ -738,28 +807,37 @@ impl<G: Goal, const MIXED: bool, S: Selection> Task for Alone<'_, '_, G, MIXED, 
     fn run<L: Lanes>(self) -> Self::Output {
         let Self { accel, start, root, ray, selection, .. } = self;
         let Some(slabs) = L::start_single(start, ray) else { return Outcome::Unsettled };
-        let way = Way::<L>::new(&accel.tree.nodes, slabs);
+        let mut way = Way::<L>::new(&accel.tree.nodes, slabs);
         let mut stack = Stack::new();
-        let mut next = root;
         let infinite = if MIXED { &*accel.infinite } else { &[] };
+        let mut leaf = root;
         if infinite.is_empty() {
             // Many rays come to no leaf, and need nothing else.
-            match way.descend::<G::Order>(next, &mut stack) {
-                Some(leaf) => next = leaf,
+            match way.descend::<G::Order>(root, &mut stack) {
+                Some(first) => leaf = first,
                 None => return Outcome::Settled(G::NOTHING),
             }
         }
-        let mut single = SingleRay::among_leaves(accel, start, ray, way, selection);
-        for entry in infinite {
-            if let Some(last) = G::meet_entry(&mut single, entry, ray) {
-                return G::answer(&single, ray, last);
+        let mut single = SingleRay::<MIXED, S>::new::<L>(accel, start, ray, way.slabs(), selection);
+        if !infinite.is_empty() {
+            for entry in infinite {
+                if let Some(last) = G::meet_entry(&mut single, entry, ray, &mut way) {
+                    return G::answer::<L, S, MIXED>(&single, ray, last);
+                }
+            }
+            match way.descend::<G::Order>(root, &mut stack) {
+                Some(first) => leaf = first,
+                None => return G::answer::<L, S, MIXED>(&single, ray, Step::Out),
             }
         }
         loop {
-            match single.step::<G, MIXED>(next, ray, &mut stack) {
-                Step::On(reference) => next = reference,
-                last => return G::answer(&single, ray, last),
+            if let Some(last) = single.meet_leaf::<G, L>(leaf, ray, &mut way) {
+                return G::answer::<L, S, MIXED>(&single, ray, last);
             }
+            let Some(next) = way.pop::<G::Order>(&mut stack) else { break };
+            let Some(next) = way.descend::<G::Order>(next, &mut stack) else { break };
+            leaf = next;
         }
+        G::answer::<L, S, MIXED>(&single, ray, Step::Out)
     }
 }

@@ -1,7 +1,7 @@
 //! The stack of a search: a short array, and the heap for what no longer fits.
 
-use crate::lanes::{Lanes, Slots};
-use crate::node::Node;
+use crate::lanes::{Lanes, Room, Slots};
+use crate::node::{Node, WIDTH};
 
 /// Entries in the array: a power of two, many more than a search usually has.
 pub(crate) const STACK: usize = 128;
@@ -23,7 +23,7 @@ pub(crate) trait Order {
     /// Whether it lies wholly beyond the limit: the largest entry that does not.
     fn is_beyond(entry: Self::Entry, limit: i64) -> bool;
     /// Puts the children in `mask`, two or more, onto the stack but for the first to be taken, which it answers.
-    fn push_children<L: Lanes>(node: &Node, mask: u32, keys: L::Keys, slots: &mut Slots<Self::Entry>) -> u32;
+    fn push_children<L: Lanes>(node: &Node, mask: u32, keys: L::Keys, room: Room<Self::Entry>) -> u32;
 }
 
 /// The nearest first.
@@ -48,8 +48,8 @@ impl Order for ByDistance {
     }
 
     #[inline(always)]
-    fn push_children<L: Lanes>(node: &Node, mask: u32, keys: L::Keys, slots: &mut Slots<i64>) -> u32 {
-        L::push_by_distance(node, mask, keys, slots)
+    fn push_children<L: Lanes>(node: &Node, mask: u32, keys: L::Keys, room: Room<i64>) -> u32 {
+        L::push_by_distance(node, mask, keys, room)
     }
 }
 
@@ -75,13 +75,14 @@ impl Order for AsBuilt {
     }
 
     #[inline(always)]
-    fn push_children<L: Lanes>(node: &Node, mask: u32, _: L::Keys, slots: &mut Slots<u32>) -> u32 {
-        L::push_as_built(node, mask, slots)
+    fn push_children<L: Lanes>(node: &Node, mask: u32, _: L::Keys, room: Room<u32>) -> u32 {
+        L::push_as_built(node, mask, room)
     }
 }
 
 /// Last in, first out.
 pub(crate) struct Stack<E> {
+    // With room for eight.
     slots: Slots<E>,
     // The ones below them: apart, for there seldom are any.
     spilled: Option<Box<Spilled<E>>>,
@@ -104,18 +105,23 @@ impl<E: Copy> Stack<E> {
         self.spilled = None;
     }
 
-    /// Somewhere for eight more.
+    /// Has an entry or more put into the room for eight that there always is. Only afterwards, when nothing else has to be kept in
+    /// registers meanwhile, it is made anew.
     #[inline(always)]
-    pub(crate) fn with_room(&mut self) -> &mut Slots<E> {
-        if self.slots.len() > STACK - 8 {
+    pub(crate) fn put<T>(&mut self, put: impl FnOnce(Room<'_, E>) -> T) -> T {
+        let result = put(self.slots.room());
+        if self.slots.len() > STACK - WIDTH {
             self.spill();
         }
-        &mut self.slots
+        result
     }
 
     #[inline(always)]
     pub(crate) fn push(&mut self, entry: E) {
-        self.with_room().push(entry);
+        self.slots.push(entry);
+        if self.slots.len() > STACK - WIDTH {
+            self.spill();
+        }
     }
 
     #[inline(always)]

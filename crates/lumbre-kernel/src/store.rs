@@ -54,7 +54,7 @@ impl<T: Pod> Store<T> {
 impl<T: Pod> Deref for Store<T> {
     type Target = [T];
 
-    #[inline]
+    #[inline(always)]
     fn deref(&self) -> &[T] {
         match self {
             Self::Owned(elements) => elements,

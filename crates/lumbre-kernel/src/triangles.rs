@@ -95,7 +95,12 @@ pub(crate) struct Shear {
 impl Shear {
     #[inline(always)]
     pub(crate) fn new(direction: &DVec3) -> Self {
-        let axes = Axes::new(direction);
+        Self::along(Axes::new(direction), direction)
+    }
+
+    /// For a direction that has these axes.
+    #[inline(always)]
+    pub(crate) fn along(axes: &'static Axes, direction: &DVec3) -> Self {
         let [x, y, z] = axes.permute(direction);
         Self { axes, x: x / z, y: y / z, direction_z: z }
     }
@@ -157,8 +162,7 @@ impl Shear {
 /// All this without overflow, as L ≤ 2³⁸ and so Σ |eᵢ zᵢ| < 2¹²³; else the test is left out. It is also below 2⁻⁵⁰, and below 2⁻⁴⁰
 /// nothing is certain.
 ///
-/// Where two components of the direction are as good as equal, single and double precision may take another one for the last
-/// axis. The edge functions of both are the same but for a factor as good as 1 and double precision's own rounding.
+/// The last axis is the one that double precision takes, along which the rounded direction is no shorter than along the others.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BlockRay {
     pub(crate) axes: &'static Axes,

@@ -15,6 +15,21 @@ pub(crate) struct Way<'a, L> {
     lanes: PhantomData<L>,
 }
 
+/// The children of a node that a ray meets.
+pub(crate) struct Met<'a, L: Lanes> {
+    node: &'a Node,
+    mask: u32,
+    keys: L::Keys,
+}
+
+impl<L: Lanes> Clone for Met<'_, L> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<L: Lanes> Copy for Met<'_, L> {}
+
 impl<'a, L: Lanes> Way<'a, L> {
     #[inline(always)]
     pub(crate) fn new(nodes: &'a [Node], slabs: Slabs) -> Self {
@@ -36,12 +51,30 @@ impl<'a, L: Lanes> Way<'a, L> {
     /// Goes on from a node: to a child, to what stands on the stack, or nowhere.
     #[inline(always)]
     pub(crate) fn meet_node<O: Order>(&self, reference: u32, stack: &mut Stack<O::Entry>) -> Option<u32> {
-        // Before there is anything to be kept in registers meanwhile.
-        let slots = stack.with_room();
-        let node = &self.nodes[reference as usize];
+        let met = self.look_at(reference);
+        self.go_on::<O>(&met, stack)
+    }
+
+    /// Which children of a node are met.
+    #[inline(always)]
+    pub(crate) fn look_at(&self, reference: u32) -> Met<'a, L> {
+        let Some(node) = self.nodes.get(reference as usize) else { out_of_tree() };
         let (mask, keys) = L::meet_boxes(node, lanes::opaque(&self.slabs));
+        Met { node, mask, keys }
+    }
+
+    /// Goes on from what was met.
+    #[inline(always)]
+    pub(crate) fn go_on<O: Order>(
+        &self,
+        &Met { node, mask, keys }: &Met<'a, L>,
+        stack: &mut Stack<O::Entry>,
+    ) -> Option<u32> {
         if mask & mask.wrapping_sub(1) != 0 {
-            Some(O::push_children::<L>(node, mask, keys, slots))
+            Some(stack.put(
+                #[inline(always)]
+                |room| O::push_children::<L>(node, mask, keys, room),
+            ))
         } else if mask != 0 {
             Some(L::only_child(node, mask))
         } else {
@@ -68,12 +101,13 @@ impl<'a, L: Lanes> Way<'a, L> {
         }
         Some(reference)
     }
+}
 
-    /// Asks for a node before it is needed.
-    #[inline(always)]
-    pub(crate) fn fetch(&self, reference: u32) {
-        self.nodes.get(reference as usize).map(lanes::fetch);
-    }
+/// What no reference in a tree leads to. The place is not told: it would have to be kept at hand for every step.
+#[cold]
+#[inline(never)]
+pub(crate) fn out_of_tree() -> ! {
+    panic!("a reference leads out of its tree")
 }
 
 /// No entry of a stack that is larger is of interest to what ends here.

@@ -42,6 +42,9 @@ pub(crate) trait Lanes: SphereLanes + HullLanes {
     /// Sixteen numbers.
     type Wide: Wide;
 
+    /// The instruction set that these are of.
+    fn level() -> Level;
+
     /// Makes `boxes` the ray from `t_min` to `t_max` for a tree in these units, if it is one from nearby, which it answers;
     /// also checks that it is sound.
     fn start_nearby(units: &Units, ray: &Ray, t_min: f64, t_max: f64, boxes: &mut BoxRay) -> bool;
@@ -66,11 +69,11 @@ pub(crate) trait Lanes: SphereLanes + HullLanes {
 
     /// Puts the children in `mask`, two or more, onto the stack, the nearest last, but for the nearest, which it answers.
     /// There must be room for eight.
-    fn push_by_distance(node: &Node, mask: u32, keys: Self::Keys, slots: &mut Slots<i64>) -> u32;
+    fn push_by_distance(node: &Node, mask: u32, keys: Self::Keys, room: Room<i64>) -> u32;
 
     /// Puts the children in `mask`, one or more, onto the stack in the order in which they stand in the node, but for the
     /// last, which it answers. There must be room for eight.
-    fn push_as_built(node: &Node, mask: u32, slots: &mut Slots<u32>) -> u32;
+    fn push_as_built(node: &Node, mask: u32, room: Room<u32>) -> u32;
 
     /// A bit for each triangle that the line of the ray may meet, among them all that it does, and what [`Lanes::place_crossings`]
     /// wants to know: see [`BlockRay`].
@@ -85,8 +88,11 @@ pub(crate) trait Lanes: SphereLanes + HullLanes {
     /// The number in a lane.
     fn lane(floats: Self::Floats, lane: usize) -> f32;
 
-    /// [`Shear::new`] and [`Shear::local_origin`] of a ray for a mesh.
-    fn shear(ray: &Ray, mesh_origin: &[f64; 4]) -> (Shear, [f64; 3]);
+    /// [`Axes::new`] of a ray's direction.
+    fn axes(ray: &Ray) -> &'static Axes;
+
+    /// [`Shear::new`] and [`Shear::local_origin`] of a ray that has these axes, for a mesh.
+    fn shear(ray: &Ray, axes: &'static Axes, mesh_origin: &[f64; 4]) -> (Shear, [f64; 3]);
 
     /// How a ray passes the triangle in a lane, in double precision, and what its crossing inside is made of. `origin` has the order of the shear's axes.
     fn pass(block: &TriangleBlock, lane: usize, shear: &Shear, origin: &[f64; 3]) -> (Passage, Inside);
@@ -115,7 +121,7 @@ impl<F: Copy> Crossings<F> {
     }
 }
 
-/// In the last bits of a child's key stands its lane, so that no two are equal. To be compared with a limit that has all
+/// In the last bits of a child's key its lane may stand, where no two may be equal. To be compared with a limit that has all
 /// these bits set.
 pub(crate) const LANE_BITS: i32 = WIDTH as i32 - 1;
 
@@ -284,6 +290,17 @@ impl<E: Copy> Slots<E> {
         self.len += 1;
     }
 
+    /// Somewhere for eight more.
+    ///
+    /// # Panics
+    /// When there is not.
+    #[inline(always)]
+    pub(crate) fn room(&mut self) -> Room<'_, E> {
+        let len = self.len;
+        let window = (&mut self.entries[len..len + WIDTH]).try_into().expect("eight");
+        Room { window, end: &mut self.len, len }
+    }
+
     #[inline(always)]
     pub(crate) fn clear(&mut self) {
         self.len = 0;
@@ -298,15 +315,24 @@ impl<E: Copy> Slots<E> {
         // SAFETY: it was one of the first `len`, which are initialised, and there are no more than `STACK`.
         Some(unsafe { self.entries.get_unchecked(self.len).assume_init() })
     }
+}
 
-    /// The next eight, to be written before `len` takes them in.
+/// The next eight of an array that entries are added to.
+pub(crate) struct Room<'s, E> {
+    window: &'s mut [MaybeUninit<E>; WIDTH],
+    end: &'s mut usize,
+    // Where that stood.
+    len: usize,
+}
+
+impl<E> Room<'_, E> {
+    /// Adds the first of them.
     ///
-    /// # Panics
-    /// When there are not as many.
+    /// # Safety
+    /// They have been written.
     #[inline(always)]
-    fn next_eight(&mut self) -> &mut [MaybeUninit<E>; WIDTH] {
-        let window = &mut self.entries[self.len..self.len + WIDTH];
-        window.try_into().expect("eight")
+    unsafe fn add(self, count: usize) {
+        *self.end = self.len + count;
     }
 }
 
@@ -451,15 +477,14 @@ pub(crate) fn meet_boxes_at(level: Level, node: &Node, ray: &Slabs) -> (u32, [i3
             let mut by_lane = [i32::MAX; WIDTH];
             if mask.count_ones() > 1 {
                 let mut slots = Slots::new();
-                let nearest = L::push_by_distance(&node, mask, keys, &mut slots);
+                let nearest = L::push_by_distance(&node, mask, keys, slots.room());
                 assert_eq!(slots.len() + 1, mask.count_ones() as usize);
                 by_lane[nearest as usize] = i32::MIN;
-                let mut last = i32::MIN;
+                let mut last = i64::MIN;
                 while let Some(entry) = slots.pop() {
-                    let key = (entry >> 32) as i32;
-                    assert!(last < key, "the nearest are on top");
-                    last = key;
-                    by_lane[entry as usize % WIDTH] = key;
+                    assert!(last < entry, "the nearest are on top");
+                    last = entry;
+                    by_lane[entry as usize % WIDTH] = (entry >> 32) as i32;
                 }
             } else if mask != 0 {
                 by_lane[L::only_child(&node, mask) as usize] = i32::MIN;

@@ -5,7 +5,7 @@ use std::mem::MaybeUninit;
 use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
 
-use super::{Axes, Crossings, LANE_BITS, Lanes, Row, Sides, Slots, WIDE};
+use super::{Axes, Crossings, LANE_BITS, Lanes, Level, Room, Row, Set, Sides, WIDE};
 use crate::holds::SingleStart;
 use crate::node::{BoxRay, END_FACTOR, LITTLE, Node, START_FACTOR, Slabs, Units, WIDTH};
 use crate::packet::Frustum;
@@ -61,6 +61,11 @@ impl Lanes for Portable {
     type Wide = super::wide::Portable16;
 
     #[inline(always)]
+    fn level() -> Level {
+        Level(Set::Portable)
+    }
+
+    #[inline(always)]
     fn start_nearby(units: &Units, ray: &Ray, t_min: f64, t_max: f64, boxes: &mut BoxRay) -> bool {
         boxes.start_nearby(units, ray, t_min, t_max)
     }
@@ -102,10 +107,7 @@ impl Lanes for Portable {
             rest[axis] = (exact - f64::from(origin[axis])) as f32;
         }
         let direction = single_direction(ray);
-        let signs =
-            (0..3).fold(0, |signs, axis| signs | u32::from(direction[axis].is_sign_negative()) << axis);
-        let [x, y, z, _] = direction.map(f32::abs);
-        let axes = Axes::by_bits(signs, u32::from(x >= y) | u32::from(y >= z) << 1 | u32::from(x >= z) << 2);
+        let axes = Self::axes(ray);
         let inverse = axes.permute_single(&slabs.inverse)[2] * start.units_per_space;
         let shear = axes.permute_single(&direction).map(|d| d * inverse);
         let rest = axes.permute_single(&rest);
@@ -180,29 +182,34 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
-    fn push_by_distance(node: &Node, mask: u32, keys: [i32; WIDTH], slots: &mut Slots<i64>) -> u32 {
-        let window = slots.next_eight();
+    fn push_by_distance(node: &Node, mask: u32, keys: [i32; WIDTH], room: Room<i64>) -> u32 {
         let mut nearest = 0;
         // Where each goes is how many are farther: no two have one key, so that the first places are all written.
         for lane in (0..WIDTH).filter(|lane| mask >> lane & 1 != 0) {
             let is_farther = |other: &usize| mask >> other & 1 != 0 && keys[*other] > keys[lane];
             let place = (0..WIDTH).filter(is_farther).count();
-            window[place % WIDTH] = MaybeUninit::new(stack_entry(keys[lane], node.children[lane]));
+            room.window[place % WIDTH] = MaybeUninit::new(stack_entry(keys[lane], node.children[lane]));
             if place + 1 == mask.count_ones() as usize {
                 nearest = node.children[lane];
             }
         }
-        slots.len += (mask & 0xff).count_ones() as usize - 1;
+        // SAFETY: see above; the nearest stays without.
+        unsafe { room.add((mask & 0xff).count_ones() as usize - 1) };
         nearest
     }
 
     #[inline(always)]
-    fn push_as_built(node: &Node, mask: u32, slots: &mut Slots<u32>) -> u32 {
-        let mut rest = mask;
+    fn push_as_built(node: &Node, mask: u32, room: Room<u32>) -> u32 {
+        let mut rest = mask & 0xff;
+        let mut count = 0;
         while rest & (rest - 1) != 0 {
-            slots.push(node.children[rest.trailing_zeros() as usize % WIDTH]);
+            room.window[count % WIDTH] =
+                MaybeUninit::new(node.children[rest.trailing_zeros() as usize % WIDTH]);
+            count += 1;
             rest &= rest - 1;
         }
+        // SAFETY: as many were written.
+        unsafe { room.add(count) };
         node.children[rest.trailing_zeros() as usize % WIDTH]
     }
 
@@ -288,8 +295,13 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
-    fn shear(ray: &Ray, &[x, y, z, _]: &[f64; 4]) -> (Shear, [f64; 3]) {
-        let shear = Shear::new(&ray.direction);
+    fn axes(ray: &Ray) -> &'static Axes {
+        Axes::new(&ray.direction)
+    }
+
+    #[inline(always)]
+    fn shear(ray: &Ray, axes: &'static Axes, &[x, y, z, _]: &[f64; 4]) -> (Shear, [f64; 3]) {
+        let shear = Shear::along(axes, &ray.direction);
         (shear, shear.local_origin(&ray.origin, &DVec3::new(x, y, z)))
     }
 

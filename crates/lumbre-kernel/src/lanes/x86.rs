@@ -5,7 +5,7 @@ use std::mem::{MaybeUninit, offset_of};
 
 use lumbre_geometry::Ray;
 
-use super::{Axes, Crossings, LANE_BITS, Lanes, Row, Sides, Slots, Task, WIDE, Wide, wide};
+use super::{Axes, Crossings, LANE_BITS, Lanes, Level, Room, Row, Set, Sides, Task, WIDE, Wide, wide};
 use crate::holds::SingleStart;
 use crate::node::{
     BoxRay, END_FACTOR, LARGEST_NEAR, LITTLE, Node, SMALLEST_NEAR, START_FACTOR, Slabs, TINY_NEAR, Units,
@@ -178,6 +178,33 @@ impl<const AVX512: bool> X86<AVX512> {
         array
     }
 
+    /// Pushes five children or more.
+    #[inline(always)]
+    fn push_many(node: &Node, mask: u32, enter: __m256i, room: Room<i64>) -> u32 {
+        // SAFETY: see `X86`. The store is of eight i32 into an array of eight; the entries up to the last are written, see below.
+        unsafe {
+            let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+            let keys = _mm256_or_si256(_mm256_andnot_si256(_mm256_set1_epi32(LANE_BITS), enter), lanes);
+            let mut scalar_keys = [0; WIDTH];
+            _mm256_storeu_si256(scalar_keys.as_mut_ptr().cast(), keys);
+            // Where each goes is how many are farther: no two have one key, so that the first places are all written.
+            let mut rest = mask & 0xff;
+            while rest != 0 {
+                let lane = rest.trailing_zeros() as usize % WIDTH;
+                rest &= rest - 1;
+                let this = scalar_keys[lane];
+                let farther = _mm256_cmpgt_epi32(keys, _mm256_set1_epi32(this));
+                let farther = _mm256_movemask_ps(_mm256_castsi256_ps(farther)) as u32 & mask;
+                let place = farther.count_ones() as usize % WIDTH;
+                room.window[place] = MaybeUninit::new(stack_entry(this, node.children[lane]));
+            }
+            let count = mask.count_ones() as usize - 1;
+            let nearest = room.window[count % WIDTH].assume_init() as u32;
+            room.add(count);
+            nearest
+        }
+    }
+
     #[inline(always)]
     fn children(node: &Node) -> __m256i {
         // SAFETY: see `X86`. The load is of eight u32 in an array of eight.
@@ -221,6 +248,11 @@ where
     type Floats = __m256;
     type Edges = Edges;
     type Wide = <Self as HasWide>::Wide;
+
+    #[inline(always)]
+    fn level() -> Level {
+        Level(if AVX512 { Set::Avx512 } else { Set::Avx2 })
+    }
 
     #[inline(always)]
     fn start_nearby(units: &Units, ray: &Ray, t_min: f64, t_max: f64, boxes: &mut BoxRay) -> bool {
@@ -332,12 +364,7 @@ where
 
             let sign = _mm_set1_ps(-0.0);
             let length = _mm_andnot_ps(sign, direction);
-            // x, y, x and y, z, z.
-            let sizes = _mm_cmpge_ps(
-                _mm_shuffle_ps::<0b00_00_01_00>(length, length),
-                _mm_shuffle_ps::<0b10_10_10_01>(length, length),
-            );
-            let axes = Axes::by_bits(_mm_movemask_ps(direction) as u32, _mm_movemask_ps(sizes) as u32);
+            let axes = Self::axes(ray);
             let order = _mm_loadu_si128(axes.order.as_ptr().cast());
             let last = _mm_shuffle_epi32::<0b10_10_10_10>(order);
             let inverse = _mm_permutevar_ps(_mm_loadu_ps(slabs.inverse.as_ptr()), last);
@@ -451,72 +478,55 @@ where
     }
 
     #[inline(always)]
-    fn push_by_distance(node: &Node, mask: u32, enter: __m256i, slots: &mut Slots<i64>) -> u32 {
-        let count = mask.count_ones() as usize;
-        // SAFETY: see `X86`. The store is of eight i32 into an array of eight.
+    fn push_by_distance(node: &Node, mask: u32, enter: __m256i, room: Room<i64>) -> u32 {
+        let but_one = mask & mask.wrapping_sub(1);
+        let but_two = but_one & but_one.wrapping_sub(1);
+        let but_three = but_two & but_two.wrapping_sub(1);
+        // SAFETY: see `X86`. The store is of eight i32 into an array of eight; as many entries are added as are written.
         unsafe {
-            let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
-            let keys = _mm256_or_si256(_mm256_andnot_si256(_mm256_set1_epi32(LANE_BITS), enter), lanes);
-            if count <= 4 {
-                let (first_keys, first) =
-                    (Self::compress(mask, keys), Self::compress(mask, Self::children(node)));
-                let (first_keys, first) = (_mm256_castsi256_si128(first_keys), _mm256_castsi256_si128(first));
-                let entries = _mm_unpacklo_epi32(first, first_keys);
-                let (a, b) = (_mm_cvtsi128_si64(entries), _mm_extract_epi64::<1>(entries));
-                let (a, b) = (a.min(b), a.max(b));
-                if count == 2 {
-                    slots.push(b);
-                    return a as u32;
-                }
-                let entries = _mm_unpackhi_epi32(first, first_keys);
-                let c = _mm_cvtsi128_si64(entries);
-                if count == 3 {
-                    let (nearest, rest) = (a.min(c), a.max(c));
-                    let window = slots.next_eight();
-                    window[0] = MaybeUninit::new(b.max(rest));
-                    window[1] = MaybeUninit::new(b.min(rest));
-                    slots.len += 2;
-                    return nearest as u32;
-                }
-                let d = _mm_extract_epi64::<1>(entries);
-                let (c, d) = (c.min(d), c.max(d));
-                let (nearest, low) = (a.min(c), a.max(c));
-                let (high, farthest) = (b.min(d), b.max(d));
-                let window = slots.next_eight();
-                window[0] = MaybeUninit::new(farthest);
-                window[1] = MaybeUninit::new(low.max(high));
-                window[2] = MaybeUninit::new(low.min(high));
-                slots.len += 3;
+            if but_three & but_three.wrapping_sub(1) != 0 {
+                return Self::push_many(node, mask, enter, room);
+            }
+            let (keys, first) = (Self::compress(mask, enter), Self::compress(mask, Self::children(node)));
+            let (keys, first) = (_mm256_castsi256_si128(keys), _mm256_castsi256_si128(first));
+            let entries = _mm_unpacklo_epi32(first, keys);
+            let (a, b) = (_mm_cvtsi128_si64(entries), _mm_extract_epi64::<1>(entries));
+            let (a, b) = (a.min(b), a.max(b));
+            let window = &mut *room.window;
+            if but_two == 0 {
+                window[0] = MaybeUninit::new(b);
+                room.add(1);
+                return a as u32;
+            }
+            let entries = _mm_unpackhi_epi32(first, keys);
+            let c = _mm_cvtsi128_si64(entries);
+            if but_three == 0 {
+                let (nearest, rest) = (a.min(c), a.max(c));
+                window[0] = MaybeUninit::new(b.max(rest));
+                window[1] = MaybeUninit::new(b.min(rest));
+                room.add(2);
                 return nearest as u32;
             }
-            let window = slots.next_eight();
-            let mut scalar_keys = [0; WIDTH];
-            _mm256_storeu_si256(scalar_keys.as_mut_ptr().cast(), keys);
-            // Where each goes is how many are farther: no two have one key, so that the first places are all written.
-            let mut rest = mask & 0xff;
-            while rest != 0 {
-                let lane = rest.trailing_zeros() as usize % WIDTH;
-                rest &= rest - 1;
-                let this = scalar_keys[lane];
-                let farther = _mm256_cmpgt_epi32(keys, _mm256_set1_epi32(this));
-                let farther = _mm256_movemask_ps(_mm256_castsi256_ps(farther)) as u32 & mask;
-                let place = farther.count_ones() as usize % WIDTH;
-                window[place] = MaybeUninit::new(stack_entry(this, node.children[lane]));
-            }
-            slots.len += count - 1;
-            slots.entries[slots.len].assume_init() as u32
+            let d = _mm_extract_epi64::<1>(entries);
+            let (c, d) = (c.min(d), c.max(d));
+            let (nearest, low) = (a.min(c), a.max(c));
+            let (high, farthest) = (b.min(d), b.max(d));
+            window[0] = MaybeUninit::new(farthest);
+            window[1] = MaybeUninit::new(low.max(high));
+            window[2] = MaybeUninit::new(low.min(high));
+            room.add(3);
+            nearest as u32
         }
     }
 
     #[inline(always)]
-    fn push_as_built(node: &Node, mask: u32, slots: &mut Slots<u32>) -> u32 {
-        let window = slots.next_eight();
+    fn push_as_built(node: &Node, mask: u32, room: Room<u32>) -> u32 {
         // SAFETY: see `X86`. The store is of eight u32 into an array of eight.
         unsafe {
             let first = Self::compress(mask, Self::children(node));
-            _mm256_storeu_si256(window.as_mut_ptr().cast(), first);
+            _mm256_storeu_si256(room.window.as_mut_ptr().cast(), first);
+            room.add(mask.count_ones() as usize - 1);
         }
-        slots.len += mask.count_ones() as usize - 1;
         node.children[(31 - mask.leading_zeros()) as usize % WIDTH]
     }
 
@@ -622,8 +632,8 @@ where
     }
 
     #[inline(always)]
-    fn shear(ray: &Ray, mesh_origin: &[f64; 4]) -> (Shear, [f64; 3]) {
-        // SAFETY: see `X86`. The loads are of the first eight numbers of a ray, see above, and of arrays of four and eight.
+    fn axes(ray: &Ray) -> &'static Axes {
+        // SAFETY: see `X86`. The load is of four of the first eight numbers of a ray, see above.
         unsafe {
             let direction = _mm256_loadu_pd(Self::numbers(ray).add(3));
             let size = _mm256_andnot_pd(_mm256_set1_pd(-0.0), direction);
@@ -632,8 +642,15 @@ where
                 _mm256_permute4x64_pd::<0b00_00_01_00>(size),
                 _mm256_permute4x64_pd::<0b10_10_10_01>(size),
             );
-            let signs = _mm256_movemask_pd(direction) as u32;
-            let axes = Axes::by_bits(signs, _mm256_movemask_pd(sizes) as u32);
+            Axes::by_bits(_mm256_movemask_pd(direction) as u32, _mm256_movemask_pd(sizes) as u32)
+        }
+    }
+
+    #[inline(always)]
+    fn shear(ray: &Ray, axes: &'static Axes, mesh_origin: &[f64; 4]) -> (Shear, [f64; 3]) {
+        // SAFETY: see `X86`. The loads are of the first eight numbers of a ray, see above, and of arrays of four and eight.
+        unsafe {
+            let direction = _mm256_loadu_pd(Self::numbers(ray).add(3));
             let halves = _mm256_loadu_si256(axes.halves.as_ptr().cast());
             let origin = _mm256_loadu_pd(Self::numbers(ray));
             let origin = _mm256_sub_pd(origin, _mm256_loadu_pd(mesh_origin.as_ptr()));

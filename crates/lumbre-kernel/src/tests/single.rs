@@ -117,13 +117,20 @@ fn check(accel: &Accel, rays: &[Ray], least: u32) {
         }
         assert!(hits > least && settled > least, "{hits} hits, {settled} settled");
         if !start.is_mixed {
-            // Few trees of tests are large enough to be searched like this.
-            batch::fly::<Nearest>(level, accel, start, rays, |i, outcome| {
-                assert_eq!(outcome, single::search::<Nearest>(level, accel, start, &rays[i]), "{level:?}");
-            });
-            batch::fly::<Whether>(level, accel, start, rays, |i, outcome| {
-                assert_eq!(outcome, single::search::<Whether>(level, accel, start, &rays[i]), "{level:?}");
-            });
+            // No tree of the tests is as large as those that are searched as far ones, and alike rays would go together.
+            for is_far in [false, true] {
+                let expected = |i: usize| single::search::<Nearest>(level, accel, start, &rays[i]);
+                let mut count = 0;
+                let put = |i, outcome| {
+                    count += 1;
+                    assert_eq!(outcome, expected(i), "{level:?} {is_far}");
+                };
+                batch::search_triangles::<Nearest>(level, accel, start, rays, put, is_far, false);
+                assert_eq!(count, rays.len());
+                let expected = |i: usize| single::search::<Whether>(level, accel, start, &rays[i]);
+                let put = |i, outcome| assert_eq!(outcome, expected(i), "{level:?} {is_far}");
+                batch::search_triangles::<Whether>(level, accel, start, rays, put, is_far, false);
+            }
         }
     }
 }
