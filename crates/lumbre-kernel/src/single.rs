@@ -204,7 +204,7 @@ fn largest_component(ray: &Ray) -> f64 {
 pub(crate) struct SingleRay<'a, const MIXED: bool, S = All> {
     exact: Exact<'a>,
     blocks: BlockRay,
-    /// For shapes, where there are any.
+    /// For shapes, once the ray has come to some.
     hulls: Option<HullRay>,
     /// From heights to places in the range of boxes.
     place_per_height: f32,
@@ -227,9 +227,8 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
     ) -> Self {
         let (blocks, place_per_height) = L::start_blocks(start, ray, slabs);
         let exact = Exact::new(accel, start);
-        let hulls = MIXED.then(|| HullRay::new(&accel.units, ray, largest_component(ray)));
         let best = Candidate::NONE;
-        Self { exact, blocks, hulls, place_per_height, best, crossed: None, selection }
+        Self { exact, blocks, hulls: None, place_per_height, best, crossed: None, selection }
     }
 
     /// Tests a leaf; how the search ends, if it does.
@@ -253,17 +252,19 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
     #[inline(always)]
     fn meet_shapes<G: Goal, L: Lanes>(&mut self, leaf: u32, ray: &Ray, way: &mut Way<L>) -> Option<Step> {
         let accel = self.exact.accel;
+        let make = || HullRay::new(&accel.units, ray, largest_component(ray));
+        let hulls = *self.hulls.get_or_insert_with(make);
         let mut first = (leaf & tag::PLACE) as usize;
         loop {
-            let (Some(hulls), Some((block, goes_on))) = (&self.hulls, accel.hulls.block(first)) else {
+            let Some((block, goes_on)) = accel.hulls.block(first) else {
                 return self.meet_entries::<G, L>(leaf, ray, way);
             };
             let entries = &accel.tree.entries[first..];
             let range = &self.blocks.range;
             let MetHulls { mut mask, sure, near } = if G::IS_ANY && S::TAKES_ALL {
-                L::meet_hulls::<true>(block, lanes::opaque(hulls), range)
+                L::meet_hulls::<true>(block, lanes::opaque(&hulls), range)
             } else {
-                L::meet_hulls::<false>(block, lanes::opaque(hulls), range)
+                L::meet_hulls::<false>(block, lanes::opaque(&hulls), range)
             };
             if G::IS_ANY && S::TAKES_ALL && sure != 0 {
                 return Some(Step::Met);
