@@ -457,25 +457,17 @@ impl Packet<'_, '_> {
             let i = those.trailing_zeros() as usize % PACKET;
             those &= those - 1;
             let ray = &self.rays[i];
-            let found = match self.exact.meet(ray, number, lane) {
+            let judged = match self.exact.meet(ray, number, lane) {
                 Meeting::Miss => continue,
-                Meeting::Hit { root, .. } => Some(root.t),
-                Meeting::Touch { .. } => None,
+                Meeting::Hit { root, .. } => {
+                    let names = self.exact.names(number, lane);
+                    (root.t, self.exact.is_better(ray, root.t, names, &self.best(i)))
+                }
+                Meeting::Touch { .. } => (f64::NAN, Outcome::Unsettled),
             };
-            let best = self.best(i);
-            let is_better = match found {
-                None => None,
-                Some(_) if !best.is_some() => Some(true),
-                Some(t) => match self.exact.t_and_names(ray, &best) {
-                    Some((best, best_names)) => {
-                        Some(t < best || t == best && self.exact.names(number, lane) < best_names)
-                    }
-                    None => None,
-                },
-            };
-            match (found, is_better) {
-                (Some(_), Some(false)) => {}
-                (Some(t), Some(true)) => {
+            match judged {
+                (_, Outcome::Settled(false)) => {}
+                (t, Outcome::Settled(true)) => {
                     let (from, to) = heights(t, ray.direction.abs().max_element());
                     (self.from.0[i], self.to.0[i]) = (from, to);
                     self.triangle.0[i] = f32::from_bits(number << 3 | lane);
@@ -483,7 +475,7 @@ impl Packet<'_, '_> {
                     let place = to * self.bundle.place_per_height.0[i];
                     self.s_max.0[i] = place + place.abs() * ROUNDINGS + f32::MIN_POSITIVE;
                 }
-                _ => {
+                (_, Outcome::Unsettled) => {
                     self.unsettled |= 1 << i;
                     self.alive &= !(1 << i);
                     self.s_max.0[i] = -1.0;

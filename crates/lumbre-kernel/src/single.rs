@@ -149,16 +149,18 @@ impl<'a> Exact<'a> {
         (names.geometry, names.primitives[lane as usize % BLOCK])
     }
 
-    /// Where the ray meets a triangle that it does meet, and geometry and primitive; `None` where the plain search has to answer.
-    #[inline(always)]
-    pub(crate) fn t_and_names(
-        &self,
-        ray: &Ray,
-        &Candidate { block, lane, .. }: &Candidate,
-    ) -> Option<(f64, (u32, u32))> {
+    /// Whether a crossing, of what has these names, is nearer than that of a triangle that the ray does meet, if there is one, or as
+    /// near and before it.
+    pub(crate) fn is_better(&self, ray: &Ray, t: f64, names: (u32, u32), best: &Candidate) -> Outcome<bool> {
+        let &Candidate { block, lane, .. } = best;
+        if !best.is_some() {
+            return Outcome::Settled(true);
+        }
         match self.meet(ray, block, lane) {
-            Meeting::Hit { root, .. } => Some((root.t, self.names(block, lane))),
-            Meeting::Miss | Meeting::Touch { .. } => None,
+            Meeting::Hit { root, .. } => {
+                Outcome::Settled(t < root.t || t == root.t && names < self.names(block, lane))
+            }
+            Meeting::Miss | Meeting::Touch { .. } => Outcome::Unsettled,
         }
     }
 
@@ -409,17 +411,12 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
 
     /// Whether a crossing is nearer than the best, or as near and before it.
     fn is_better(&self, ray: &Ray, t: f64, names: (u32, u32)) -> Outcome<bool> {
-        if !self.best.is_some() {
-            return Outcome::Settled(true);
+        match self.crossed() {
+            Some(Winner { root, geometry, primitive }) => {
+                Outcome::Settled(t < root.t || t == root.t && names < (geometry, primitive))
+            }
+            None => self.exact.is_better(ray, t, names, &self.best),
         }
-        let (best, best_names) = match self.crossed() {
-            Some(best) => (best.root.t, (best.geometry, best.primitive)),
-            None => match self.exact.t_and_names(ray, &self.best) {
-                Some(best) => best,
-                None => return Outcome::Unsettled,
-            },
-        };
-        Outcome::Settled(t < best || t == best && names < best_names)
     }
 
     /// Tests what is no triangle for the nearest hit; false where the plain search has to answer.

@@ -54,6 +54,30 @@ fn met(enter: &[f32; WIDTH], leave: &[f32; WIDTH]) -> (u32, [i32; WIDTH]) {
     (mask, keys)
 }
 
+/// Which boxes are met within a range, and where they are entered. `places` says where that of a near and of a far plane of an axis
+/// is.
+#[inline(always)]
+fn meet_planes(
+    node: &Node,
+    sides: &Sides,
+    [s_min, s_max]: [f32; 2],
+    places: impl Fn(usize, f32, f32) -> (f32, f32),
+) -> (u32, [i32; WIDTH]) {
+    let mut enter = [s_min; WIDTH];
+    let mut leave = [s_max; WIDTH];
+    let planes = node.planes.as_flattened();
+    for axis in 0..3 {
+        let near = sides.near[axis];
+        let (near_planes, far_planes) = (&planes[near..][..WIDTH], &planes[near ^ WIDTH..][..WIDTH]);
+        for lane in 0..WIDTH {
+            let (first, last) = places(axis, near_planes[lane], far_planes[lane]);
+            enter[lane] = if first > enter[lane] { first } else { enter[lane] };
+            leave[lane] = if last < leave[lane] { last } else { leave[lane] };
+        }
+    }
+    met(&enter, &leave)
+}
+
 impl Lanes for Portable {
     type Keys = [i32; WIDTH];
     type Floats = [f32; BLOCK];
@@ -139,41 +163,22 @@ impl Lanes for Portable {
 
     #[inline(always)]
     fn meet_boxes(node: &Node, ray: &Slabs) -> (u32, [i32; WIDTH]) {
-        let mut enter = [ray.s_min; WIDTH];
-        let mut leave = [ray.s_max; WIDTH];
-        let planes = node.planes.as_flattened();
-        for axis in 0..3 {
-            let near = ray.sides.near[axis];
-            let (near_planes, far_planes) = (&planes[near..][..WIDTH], &planes[near ^ WIDTH..][..WIDTH]);
-            for lane in 0..WIDTH {
-                let first = near_planes[lane] * ray.inverse[axis] + ray.near_offset[axis];
-                let last = far_planes[lane] * ray.inverse[axis] + ray.far_offset[axis];
-                enter[lane] = if first > enter[lane] { first } else { enter[lane] };
-                leave[lane] = if last < leave[lane] { last } else { leave[lane] };
-            }
-        }
-        met(&enter, &leave)
+        meet_planes(node, ray.sides, [ray.s_min, ray.s_max], |axis, near, far| {
+            let inverse = ray.inverse[axis];
+            (near * inverse + ray.near_offset[axis], far * inverse + ray.far_offset[axis])
+        })
     }
 
     #[inline(always)]
     fn meet_frustum(node: &Node, frustum: &Frustum) -> (u32, [i32; WIDTH]) {
-        let mut enter = [frustum.s_min; WIDTH];
-        let mut leave = [frustum.s_max; WIDTH];
-        let planes = node.planes.as_flattened();
-        for axis in 0..3 {
-            let near = frustum.sides.near[axis];
-            let (near_planes, far_planes) = (&planes[near..][..WIDTH], &planes[near ^ WIDTH..][..WIDTH]);
+        meet_planes(node, frustum.sides, [frustum.s_min, frustum.s_max], |axis, near, far| {
             let (least, most) = (frustum.least_inverse[axis], frustum.most_inverse[axis]);
-            for lane in 0..WIDTH {
-                let (near, far) =
-                    (near_planes[lane] - frustum.center[axis], far_planes[lane] - frustum.center[axis]);
-                let first = (near * least).min(near * most) + frustum.near_offset[axis];
-                let last = (far * least).max(far * most) + frustum.far_offset[axis];
-                enter[lane] = if first > enter[lane] { first } else { enter[lane] };
-                leave[lane] = if last < leave[lane] { last } else { leave[lane] };
-            }
-        }
-        met(&enter, &leave)
+            let (near, far) = (near - frustum.center[axis], far - frustum.center[axis]);
+            (
+                (near * least).min(near * most) + frustum.near_offset[axis],
+                (far * least).max(far * most) + frustum.far_offset[axis],
+            )
+        })
     }
 
     #[inline(always)]

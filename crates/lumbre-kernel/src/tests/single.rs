@@ -208,6 +208,20 @@ fn rays_that_are_not_sound_do_not_go_together() {
     }
 }
 
+/// Shapes and custom geometry, and perhaps a plane without end.
+fn beside_meshes(random: &mut Random, origin: DVec3, size: f64, has_plane: bool) -> Vec<GeometryKind> {
+    let mut kinds: Vec<_> =
+        (0..60).map(|_| GeometryKind::Shape(scenes::shape(random, origin, size))).collect();
+    // The same twice: the first in the list is hit.
+    kinds.push(kinds[7].clone());
+    kinds.push(GeometryKind::Custom(Arc::new(scenes::balls(random, 20, origin, size, None))));
+    if has_plane {
+        let plane = Plane::new(origin, DVec3::new(0.1, 1.0, 0.2)).unwrap();
+        kinds.push(GeometryKind::Shape(PlacedShape::new(plane.into(), Transform::IDENTITY)));
+    }
+    kinds
+}
+
 #[test]
 fn it_does_so_beside_shapes_and_custom_geometry() {
     let mut random = Random(93);
@@ -215,15 +229,7 @@ fn it_does_so_beside_shapes_and_custom_geometry() {
         let origin = size * offset * DVec3::new(1.0, -0.7, 0.4);
         let mesh = mesh(&mut random, origin, size);
         for (has_mesh, has_plane) in [(true, false), (true, true), (false, false), (false, true)] {
-            let mut kinds: Vec<_> =
-                (0..60).map(|_| GeometryKind::Shape(scenes::shape(&mut random, origin, size))).collect();
-            // The same twice: the first in the list is hit.
-            kinds.push(kinds[7].clone());
-            kinds.push(GeometryKind::Custom(Arc::new(scenes::balls(&mut random, 20, origin, size, None))));
-            if has_plane {
-                let plane = Plane::new(origin, DVec3::new(0.1, 1.0, 0.2)).unwrap();
-                kinds.push(GeometryKind::Shape(PlacedShape::new(plane.into(), Transform::IDENTITY)));
-            }
+            let mut kinds = beside_meshes(&mut random, origin, size, has_plane);
             if has_mesh {
                 kinds.push(GeometryKind::Mesh(mesh.clone().into()));
             }
@@ -316,14 +322,7 @@ fn they_do_so_beside_shapes_and_custom_geometry() {
         let origin = size * offset * DVec3::new(1.0, -0.7, 0.4);
         let mesh = mesh(&mut random, origin, size);
         for (has_mesh, has_plane) in [(true, false), (true, true), (false, false)] {
-            let mut kinds: Vec<_> =
-                (0..60).map(|_| GeometryKind::Shape(scenes::shape(&mut random, origin, size))).collect();
-            kinds.push(kinds[7].clone());
-            kinds.push(GeometryKind::Custom(Arc::new(scenes::balls(&mut random, 20, origin, size, None))));
-            if has_plane {
-                let plane = Plane::new(origin, DVec3::new(0.1, 1.0, 0.2)).unwrap();
-                kinds.push(GeometryKind::Shape(PlacedShape::new(plane.into(), Transform::IDENTITY)));
-            }
+            let mut kinds = beside_meshes(&mut random, origin, size, has_plane);
             if has_mesh {
                 kinds.push(GeometryKind::Mesh(mesh.clone().into()));
             }
