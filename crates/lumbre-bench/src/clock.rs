@@ -52,10 +52,12 @@ impl Start {
         self.seconds(thread_ran)
     }
 
-    /// The seconds that the work of so many threads took since [`Start::of_program`]: of one thread, what all ran together;
-    /// of more, what the clock says, for one may wait for another.
+    /// The seconds that the work of so many threads took since [`Start::of_program`]: of one thread, what all ran together, but no
+    /// more than the clock says, for threads that are done may wait busily for a while; of more, what the clock says, for one
+    /// may wait for another.
     pub fn program_seconds(&self, threads: usize) -> f64 {
-        if threads == 1 { self.seconds(program_ran) } else { self.wall.elapsed().as_secs_f64() }
+        let wall = self.wall.elapsed().as_secs_f64();
+        if threads == 1 { self.seconds(program_ran).min(wall) } else { wall }
     }
 
     fn seconds(&self, ran: fn() -> HashMap<PathBuf, f64>) -> f64 {

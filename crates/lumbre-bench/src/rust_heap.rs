@@ -16,19 +16,9 @@ pub fn measure<T: Send>(threads: usize, build: impl FnOnce() -> T + Send) -> Res
     pool.broadcast(|_| ());
     let before = HEAP.current_usage();
     HEAP.reset_peak_usage();
-    let timed = || {
-        // Threads of other programs may still wait busily for work. Here, a single thread is all that does any.
-        if threads == 1 {
-            let start = Start::of_thread();
-            let built = build();
-            (built, start.thread_seconds())
-        } else {
-            let start = Start::of_program();
-            let built = build();
-            (built, start.program_seconds(threads))
-        }
-    };
-    let (built, seconds) = pool.install(timed);
+    let start = Start::of_program();
+    let built = pool.install(build);
+    let seconds = start.program_seconds(threads);
     let bytes = Bytes {
         kept: HEAP.current_usage().saturating_sub(before),
         peak: HEAP.peak_usage().saturating_sub(before),
