@@ -9,21 +9,30 @@ use crate::program::Bytes;
 #[global_allocator]
 static HEAP: PeakAlloc = PeakAlloc;
 
-/// Runs a build on a pool of so many threads, with the seconds and the bytes that it took.
+/// Runs a build on so many threads, with the seconds and the bytes that it took. One thread alone is that which asks for it, as it
+/// is with Embree, so that none has to wake another before the work begins.
 pub fn measure<T: Send>(threads: usize, build: impl FnOnce() -> T + Send) -> Result<(T, f64, Bytes)> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
-    // The threads are there before the clock starts.
-    pool.broadcast(|_| ());
-    let before = HEAP.current_usage();
-    HEAP.reset_peak_usage();
-    let start = Start::of_program();
-    let built = pool.install(build);
-    let seconds = start.program_seconds(threads);
-    let bytes = Bytes {
-        kept: HEAP.current_usage().saturating_sub(before),
-        peak: HEAP.peak_usage().saturating_sub(before),
-    };
-    Ok((built, seconds, bytes))
+    // A thread that has joined a pool never leaves it.
+    std::thread::scope(|scope| {
+        let asking = scope.spawn(|| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+            // Of more, those that are asked do not take work from the one that asks.
+            let pool = if threads == 1 { pool.use_current_thread() } else { pool }.build()?;
+            // The threads are there before the clock starts.
+            pool.broadcast(|_| ());
+            let before = HEAP.current_usage();
+            HEAP.reset_peak_usage();
+            let start = Start::of_program();
+            let built = pool.install(build);
+            let seconds = start.program_seconds(threads);
+            let bytes = Bytes {
+                kept: HEAP.current_usage().saturating_sub(before),
+                peak: HEAP.peak_usage().saturating_sub(before),
+            };
+            Ok((built, seconds, bytes))
+        });
+        asking.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+    })
 }
 
 #[cfg(test)]

@@ -168,50 +168,28 @@ pub(crate) fn binary_tree<'p>(
     // Below, there is a node for every thread.
     let shared = (2 * rayon::current_num_threads()).ilog2();
     let shared = if shared > 1 { shared + 1 } else { 0 };
-    let builder = Builder { level, traits, shared };
-    let is_sorted = preset == Preset::Fast;
+    let builder = &Builder { level, traits, shared };
     let counts = sort_by_rank(&mut others, traits);
     let mut names: Vec<Name> = fill(others.len() + packed.len(), [0; 2]);
-    let (mut rest, mut places, mut first) = (&mut others[..], &mut names[..], 0);
-    let mut trees = Vec::with_capacity(Kind::RANKS);
-    for (rank, &count) in counts.iter().enumerate().filter(|&(_, &count)| count > 0) {
-        let (primitives, names) = (take(&mut rest, count), take(&mut places, count));
-        let mut codes = Vec::new();
-        if is_sorted {
-            let sorted;
-            (sorted, codes) = builder.sort(primitives);
-            primitives.copy_from_slice(&sorted);
-        }
-        let keeps = rank == Kind::Instance.rank();
-        // Subtrees that are put elsewhere later are those of single instances.
-        trees.push(if keeps && preset != Preset::Best {
-            let sketch = builder.sketch_sorted::<false>(primitives, 0, &codes);
-            builder.grow::<false>(&sketch, &codes, Plot { primitives, names, first, keeps }).into_owned()
-        } else {
-            let sketch = builder.sketch_sorted::<true>(primitives, 0, &codes);
-            builder.grow::<true>(&sketch, &codes, Plot { primitives, names, first, keeps }).into_owned()
-        });
-        first += count;
-    }
+    let first_packed = others.len();
+    let (other_names, packed_names) = names.split_at_mut(first_packed);
+    let has_packed = !packed.is_empty();
+    let (mut trees, packed_tree) = rayon::join(
+        || builder.trees_by_rank(preset, &mut others, &counts, other_names),
+        move || has_packed.then(|| builder.tree_of_packed(preset, packed, packed_names, first_packed)),
+    );
     others.truncate(counts[Kind::Instance.rank()]);
     others.shrink_to_fit();
     let mut cells = Vec::new();
-    if !packed.is_empty() {
-        let mut codes = Vec::new();
-        if is_sorted {
-            (*packed, codes) = builder.sort(packed);
-        }
-        let sketch = builder.sketch_sorted::<false>(packed, 0, &codes);
-        let plot = Plot { primitives: packed, names: places, first, keeps: false };
-        let mut tree = builder.grow::<false>(&sketch, &codes, plot);
-        drop(codes);
+    if let Some(mut tree) = packed_tree {
         if preset == Preset::Best
-            && let Some(found) = spatial::in_parts(&builder, geometries, units, &tree, &names[first..], first)
+            && let Some(found) =
+                spatial::in_parts(builder, geometries, units, &tree, &names[first_packed..], first_packed)
         {
             tree = found.tree;
-            names.truncate(first);
+            names.truncate(first_packed);
             names.extend(found.names);
-            cells = fill(first, Cell::WHOLE);
+            cells = fill(first_packed, Cell::WHOLE);
             cells.extend(found.cells);
         }
         trees.push(tree);
@@ -359,6 +337,55 @@ impl Workplace {
 }
 
 impl Builder<'_> {
+    /// A tree of each rank of which there are primitives, none of which is packed: they come in the order of their ranks, so many of
+    /// each.
+    fn trees_by_rank(
+        &self,
+        preset: Preset,
+        mut primitives: &mut [Primitive],
+        counts: &[usize],
+        mut names: &mut [Name],
+    ) -> Vec<Binary<'static>> {
+        let mut trees = Vec::with_capacity(Kind::RANKS);
+        let mut first = 0;
+        for (rank, &count) in counts.iter().enumerate().filter(|&(_, &count)| count > 0) {
+            let (primitives, names) = (take(&mut primitives, count), take(&mut names, count));
+            let mut codes = Vec::new();
+            if preset == Preset::Fast {
+                let sorted;
+                (sorted, codes) = self.sort(primitives);
+                primitives.copy_from_slice(&sorted);
+            }
+            let keeps = rank == Kind::Instance.rank();
+            // Subtrees that are put elsewhere later are those of single instances.
+            trees.push(if keeps && preset != Preset::Best {
+                let sketch = self.sketch_sorted::<false>(primitives, 0, &codes);
+                self.grow::<false>(&sketch, &codes, Plot { primitives, names, first, keeps }).into_owned()
+            } else {
+                let sketch = self.sketch_sorted::<true>(primitives, 0, &codes);
+                self.grow::<true>(&sketch, &codes, Plot { primitives, names, first, keeps }).into_owned()
+            });
+            first += count;
+        }
+        trees
+    }
+
+    /// A tree of packed primitives, whose first name has this place.
+    fn tree_of_packed<'p>(
+        &self,
+        preset: Preset,
+        primitives: &'p mut Vec<Primitive>,
+        names: &mut [Name],
+        first: usize,
+    ) -> Binary<'p> {
+        let mut codes = Vec::new();
+        if preset == Preset::Fast {
+            (*primitives, codes) = self.sort(primitives);
+        }
+        let sketch = self.sketch_sorted::<false>(primitives, 0, &codes);
+        self.grow::<false>(&sketch, &codes, Plot { primitives, names, first, keeps: false })
+    }
+
     /// Primitives in the order along a curve, and their codes.
     fn sort(&self, primitives: &[Primitive]) -> (Vec<Primitive>, Vec<Code>) {
         let mut sorted = fill(primitives.len(), Bounds::EMPTY);
