@@ -36,6 +36,8 @@ pub struct Scene {
     pub(crate) has_holes: bool,
     /// Whether anything is made of glass, or of what else light goes through.
     pub(crate) lets_light_through: bool,
+    /// Whether light may go straight on through anything.
+    pub(crate) lets_light_straight_on: bool,
     // Whether a camera looks through the back of something.
     pub(crate) has_one_sided: bool,
     pub(crate) has_instances: bool,
@@ -146,6 +148,17 @@ impl Scene {
     /// Whether anything is made of what light goes through: glass, panes, leaves. Cut-outs do not count.
     pub fn lets_light_through(&self) -> bool {
         self.lets_light_through
+    }
+
+    /// Whether light may go straight on through anything ([`lumbre_shading::Bsdf::straight_on`]): smooth panes without
+    /// thickness, mostly.
+    pub fn lets_light_straight_on(&self) -> bool {
+        self.lets_light_straight_on
+    }
+
+    /// Whether light may go straight on through what was hit.
+    pub fn is_pane(&self, hit: &Hit) -> bool {
+        self.leaf(hit).0.lets_light_straight_on()
     }
 
     /// The nearest hit that light sees: cut-outs and interfaces let it pass.

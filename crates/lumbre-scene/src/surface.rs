@@ -197,6 +197,14 @@ impl SurfaceEntry {
         }
     }
 
+    /// Whether light may go straight on through the material of any part of it.
+    pub fn lets_light_straight_on(&self) -> bool {
+        match &self.form {
+            Form::Csg(csg) => csg.leaves.iter().any(Self::lets_light_straight_on),
+            _ => self.material.as_ref().is_some_and(|material| material.lets_light_straight_on()),
+        }
+    }
+
     /// Whether light may pass through some of it.
     pub fn has_holes(&self) -> bool {
         match &self.form {

@@ -284,23 +284,37 @@ impl Material {
 
     /// Whether light gets through it to the other side, or may: of a mixture, through any part of it.
     pub fn lets_light_through(&self) -> bool {
+        self.has_part(|kind| match kind {
+            MaterialKind::Dielectric { .. }
+            | MaterialKind::ThinDielectric { .. }
+            | MaterialKind::DiffuseTransmission { .. } => true,
+            MaterialKind::Principled(params) => params.lets_light_through(),
+            _ => false,
+        })
+    }
+
+    /// Whether [`Bsdf::straight_on`] may be anything but black anywhere on it: of a mixture, on any part of it.
+    pub fn lets_light_straight_on(&self) -> bool {
+        self.has_part(|kind| match kind {
+            MaterialKind::ThinDielectric { .. } => true,
+            MaterialKind::Dielectric { eta, .. } => index(*eta) == 1.0,
+            MaterialKind::Principled(params) => params.lets_light_straight_on(),
+            _ => false,
+        })
+    }
+
+    /// Whether it, or a part of the mixture that it is, is of some kind; perhaps so where a mixture has very many parts.
+    fn has_part(&self, is: impl Fn(&MaterialKind) -> bool) -> bool {
         let mut rest: SmallVec<[&Self; 4]> = smallvec![self];
         // Mixtures may share materials: as many steps as most have, and no more.
         for _ in 0..64 {
             let Some(material) = rest.pop() else { return false };
-            let lets_through = match &material.kind {
-                MaterialKind::Dielectric { .. }
-                | MaterialKind::ThinDielectric { .. }
-                | MaterialKind::DiffuseTransmission { .. } => true,
-                MaterialKind::Principled(params) => params.lets_light_through(),
+            match &material.kind {
                 MaterialKind::Mix { materials, .. } => {
                     rest.extend(materials.iter().map(|material| &**material));
-                    false
                 }
-                _ => false,
-            };
-            if lets_through {
-                return true;
+                kind if is(kind) => return true,
+                _ => {}
             }
         }
         true
@@ -759,6 +773,46 @@ mod tests {
         assert_eq!((glass.eta, glass.facets.alpha()), (1.0, Vec2::splat(0.5)));
         assert!(Material::new(MaterialKind::Interface).bsdf(&here).is_none());
         assert!(mix(&diffuse(0.1), &diffuse(0.2), 0.5).bsdf(&here).is_none());
+    }
+
+    #[test]
+    fn materials_tell_whether_their_light_goes_straight_on() {
+        let here = at(DVec3::ONE, Vec2::ZERO);
+        let number = |v: f32| Arc::new(Texture::Constant(v));
+        let clear = |ior: f32, roughness: f32, metallic: f32| PrincipledParams {
+            metallic: number(metallic),
+            roughness: number(roughness),
+            transmission: number(1.0),
+            ior,
+            ..PrincipledParams::default()
+        };
+        let solid = |ior: f32| PrincipledParams {
+            volume: Some(crate::VolumeParams::default()),
+            ..clear(ior, 0.0, 0.0)
+        };
+        let principled = |params| Material::new(MaterialKind::Principled(Box::new(params)));
+        let glass = |eta| Material::new(MaterialKind::Dielectric { eta, roughness: Roughness::smooth() });
+        let cases = [
+            (Material::new(MaterialKind::ThinDielectric { eta: 1.5 }), true),
+            (principled(clear(1.5, 0.0, 0.0)), true),
+            (principled(clear(1.5, 0.03, 0.5)), true),
+            (principled(clear(1.5, 0.04, 0.0)), false),
+            (principled(clear(1.5, 0.0, 1.0)), false),
+            (principled(solid(1.5)), false),
+            (principled(solid(1.0)), true),
+            (principled(PrincipledParams::default()), false),
+            (glass(1.5), false),
+            (glass(1.0), true),
+            ((*diffuse(0.5)).clone(), false),
+        ];
+        let wo = crate::LocalDir(Vec3::new(0.6, -0.2, 0.4).normalize());
+        for (material, expected) in cases {
+            assert_eq!(material.lets_light_straight_on(), expected, "{material:?}");
+            let left = material.bsdf(&here).unwrap().straight_on(wo);
+            assert_eq!(!left.is_black(), expected, "{material:?}");
+            let mixture = mix(&Arc::new(material), &diffuse(0.5), 0.5);
+            assert_eq!(mixture.lets_light_straight_on(), expected);
+        }
     }
 
     #[test]

@@ -631,7 +631,7 @@ impl Principled {
     // Facets.
 
     /// Below this difference of η from 1 there is no border to bend light.
-    const NO_BORDER: f32 = 1e-3;
+    pub(crate) const NO_BORDER: f32 = 1e-3;
 
     fn to_facets(self, w: LocalDir) -> LocalDir {
         let Vec2 { x: c, y: s } = self.tangent;

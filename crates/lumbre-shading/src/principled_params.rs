@@ -213,6 +213,20 @@ impl PrincipledParams {
         opens(&self.transmission) || opens(&self.diffuse_transmission)
     }
 
+    /// Whether any light may go straight on; see [`crate::Material::lets_light_straight_on`].
+    pub(crate) fn lets_light_straight_on(&self) -> bool {
+        let is_constantly =
+            |texture: &FloatTexture, is: fn(f32) -> bool| matches!(texture, Texture::Constant(v) if is(*v));
+        if is_constantly(&self.transmission, |v| v <= 0.0) || is_constantly(&self.metallic, |v| v >= 1.0) {
+            return false;
+        }
+        match self.interior_index() {
+            Some(index) => (index - 1.0).abs() < Principled::NO_BORDER,
+            // Anisotropy makes it only rougher.
+            None => !is_constantly(&self.roughness, |v| !Microfacets::new(v * v, v * v).is_smooth()),
+        }
+    }
+
     /// σ of Beer's and Lambert's law inside, per unit of length; see [`crate::Material::interior_attenuation`]. A lane
     /// of which nothing is left counts as a millionth.
     pub fn interior_attenuation(&self) -> Option<Spectrum> {

@@ -4,7 +4,7 @@ use lumbre_math::Vec2;
 use smallvec::SmallVec;
 
 use crate::dielectric::Ways;
-use crate::{Bsdf, BsdfSample, LocalDir};
+use crate::{Bsdf, BsdfSample, LocalDir, Spectrum};
 
 /// Delta parts: a reflection and a transmission at most.
 pub type Specular = SmallVec<[BsdfSample; 2]>;
@@ -31,6 +31,18 @@ impl Bsdf {
             Self::Principled(bsdf) => bsdf.specular(wo),
         }
     }
+
+    /// What of the light that comes from straight behind goes straight on, along `wo`: the weight of those delta parts that
+    /// cross the surface without bending. They are what is clear of a smooth pane without thickness, and what a border lets
+    /// through that has the same index on both sides. Black for all else, rough panes and glass that refracts among it.
+    ///
+    /// Since the direction stays, the way to a light beyond is known without a search, and its light arrives by this factor,
+    /// exactly. That matters for lights from a point or in one direction, which no ray hits by chance. The light of surfaces
+    /// and of the sky is found by following [`Bsdf::sample`], which chooses these parts too: by this factor, it would count twice.
+    pub fn straight_on(&self, wo: LocalDir) -> Spectrum {
+        let straight = |part: &BsdfSample| part.transmitted && part.eta == 1.0;
+        self.specular(wo).into_iter().filter(straight).map(|part| part.weight).sum()
+    }
 }
 
 #[cfg(test)]
@@ -42,7 +54,7 @@ mod tests {
     use crate::dielectric::{Dielectric, ThinDielectric};
     use crate::diffuse::Diffuse;
     use crate::microfacet::Microfacets;
-    use crate::principled::Principled;
+    use crate::principled::{Body, Principled};
     use crate::{Scatter, Spectrum};
 
     use super::*;
@@ -97,6 +109,42 @@ mod tests {
                     let error = (part.weight + sum * -1.0).map(f32::abs).max_component();
                     assert!(error < 2e-3, "{bsdf:?} from {height}: {part:?}, sampled {sum:?}");
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn straight_on_goes_what_is_clear_smooth_and_thin() {
+        let smooth = Microfacets::SMOOTH;
+        let stain = Spectrum::new(0.9, 0.5, 0.125);
+        let pane = Principled {
+            facets: smooth,
+            transmission: 0.5,
+            metallic: 0.25,
+            transmission_color: stain,
+            ..Principled::DEFAULT
+        };
+        let solid = Body::Solid { spread: 0.0 };
+        let layered = |bsdf| Bsdf::Principled(Box::new(bsdf));
+        let glass = |eta, facets| Bsdf::Dielectric(Dielectric { eta, facets });
+        for height in [0.4, -0.9] {
+            let wo = LocalDir(Vec3::new(0.6, -0.2, height).normalize());
+            let left = 1.0 - ThinDielectric { eta: 1.5 }.reflected(wo.cos_theta());
+            let rough = Microfacets::new(0.1, 0.1);
+            let cases = [
+                (Bsdf::ThinDielectric(ThinDielectric { eta: 1.5 }), Spectrum::splat(left)),
+                (layered(pane), stain * (0.375 * left)),
+                (layered(pane.regularized()), Spectrum::BLACK),
+                (layered(Principled { facets: rough, ..pane }), Spectrum::BLACK),
+                (layered(Principled { body: solid, ..pane }), Spectrum::BLACK),
+                (glass(1.5, smooth), Spectrum::BLACK),
+                (glass(1.5, rough), Spectrum::BLACK),
+                (glass(1.0, smooth), Spectrum::WHITE),
+                (Bsdf::Diffuse(Diffuse { reflectance: stain }), Spectrum::BLACK),
+            ];
+            for (bsdf, expected) in cases {
+                let error = (bsdf.straight_on(wo) - expected).map(f32::abs).max_component();
+                assert!(error < 1e-6, "{bsdf:?} from {height}: {:?}", bsdf.straight_on(wo));
             }
         }
     }

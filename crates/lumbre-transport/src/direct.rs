@@ -9,6 +9,7 @@ use lumbre_shading::{Bsdf, LocalDir, Material, Scatter, ShadingFrame, Spectrum};
 
 use crate::RayCounts;
 use crate::interior::Interiors;
+use crate::through::straight_on;
 
 /// A surface as seen along a path, ready to scatter.
 ///
@@ -177,6 +178,7 @@ impl<'a, 's> Vertex<'a, 's> {
         &self,
         sample: &LightSample,
         interiors: &Interiors<'s>,
+        regularize: bool,
         weigh: impl FnOnce(f32, f32) -> f32,
         rays: &mut RayCounts,
     ) -> Spectrum {
@@ -191,11 +193,19 @@ impl<'a, 's> Vertex<'a, 's> {
         if weight <= 0.0 {
             return Spectrum::BLACK;
         }
+        if sample.scatter == Scatter::Delta && self.scene.lets_light_straight_on() {
+            return scattered * weight * self.passes_straight_on(sample, interiors, regularize, rays);
+        }
         rays.shadow += 1;
         if self.scene.is_occluded(&self.shadow_ray(sample)) {
             return Spectrum::BLACK;
         }
         scattered * weight * self.passes(sample, interiors)
+    }
+
+    /// What of the light that comes from straight behind goes straight on: see [`Bsdf::straight_on`].
+    pub fn straight_on(&self) -> Spectrum {
+        self.bsdf.straight_on(self.wo)
     }
 
     /// Where rays along a unit direction start, if that is off the face.
@@ -217,19 +227,42 @@ impl<'a, 's> Vertex<'a, 's> {
         self.met.shadow_ray_from(self.start(sample.towards), sample)
     }
 
-    /// What the solids around leave of a light's sample.
+    /// What the solids around leave of a light's sample that nothing stands in the way of.
     pub fn passes(&self, sample: &LightSample, interiors: &Interiors<'s>) -> Spectrum {
         // Light from infinitely far away was not inside anything.
         let Some(end) = sample.end else { return Spectrum::WHITE };
-        let crosses = self.material.is_solid() && !self.reflects(sample.towards.as_vec3());
+        let crosses = self.crosses(sample);
         if !crosses && !interiors.attenuates() {
             return Spectrum::WHITE;
         }
+        let around = self.around(crosses, interiors);
+        around.transmittance((end.point - self.met.surface.point).length())
+    }
+
+    /// What all that stands in the way of a light's sample leaves of it: see [`straight_on`].
+    pub fn passes_straight_on(
+        &self,
+        sample: &LightSample,
+        interiors: &Interiors<'s>,
+        regularize: bool,
+        rays: &mut RayCounts,
+    ) -> Spectrum {
+        let around = self.around(self.crosses(sample), interiors);
+        straight_on(self.scene, self.shadow_ray(sample), sample, around, regularize, rays)
+    }
+
+    /// Whether a light's sample comes through the solid whose surface this is.
+    fn crosses(&self, sample: &LightSample) -> bool {
+        self.material.is_solid() && !self.reflects(sample.towards.as_vec3())
+    }
+
+    /// The solids around the place, on one side of its surface or the other.
+    fn around(&self, crosses: bool, interiors: &Interiors<'s>) -> Interiors<'s> {
         let mut interiors = interiors.clone();
         if crosses {
             interiors.cross(self.material, self.met.front);
         }
-        interiors.transmittance((end.point - self.met.surface.point).length())
+        interiors
     }
 }
 

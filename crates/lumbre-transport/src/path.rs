@@ -11,6 +11,10 @@ use crate::{Draw, Integrator, RayCounts, Sight};
 
 /// Kajiya's path tracing: at each surface one sample of a light and one of the BSDF, combined by the power heuristic,
 /// and Russian roulette by throughput from the second bounce on.
+///
+/// Light from points and in one direction, which no path finds by chance, is sampled straight through what does not change
+/// its direction ([`lumbre_shading::Bsdf::straight_on`]): smooth panes without thickness. That is no bounce. What is rough or refracts throws
+/// a shadow of such light. The light of surfaces and of the sky is found by paths, through panes as through anything else.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Path {
     /// Bounces at most: 0 shows lights alone, 1 direct light.
@@ -166,7 +170,8 @@ impl Integrator for Path {
                     scene.sample_light(lit_from, ray.time, draw.light_choice(depth), draw.light_point(depth));
                 if let Some(light) = light {
                     let weigh = |light_pdf, bsdf_pdf| self.weight_of_sampled(light_pdf, bsdf_pdf);
-                    radiance += throughput * vertex.scattered(&light, &interiors, weigh, rays);
+                    radiance +=
+                        throughput * vertex.scattered(&light, &interiors, self.regularize, weigh, rays);
                 }
             }
 

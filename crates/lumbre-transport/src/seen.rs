@@ -3,10 +3,11 @@
 use std::f64::consts::FRAC_1_PI;
 
 use lumbre_math::{DVec3, Frame, warp64};
-use lumbre_scene::{GroundPlane, Interaction, Scene, View};
+use lumbre_scene::{GroundPlane, Interaction, LightSample, Scene, View};
 use lumbre_shading::{Scatter, Spectrum};
 
-use crate::through::{light_through, share_through_panes};
+use crate::interior::Interiors;
+use crate::through::{light_through, straight_on};
 use crate::{Draw, Integrator, RayCounts, Sight};
 
 /// Samples of each light that each sample of a shadow takes: few rays, where a whole path would be many.
@@ -93,10 +94,17 @@ fn blocked(
         if cosine <= 0.0 || density <= 0.0 {
             continue;
         }
-        rays.shadow += 1;
-        if scene.is_occluded(&at.shadow_ray(&sample)) {
-            lost += sample.radiance * (cosine * share / (density * SAMPLES as f32));
+        let shadow_ray = at.shadow_ray(&sample);
+        let left = if sample.scatter == Scatter::Delta && scene.lets_light_straight_on() {
+            straight_on(scene, shadow_ray, &sample, Interiors::default(), false, rays)
+        } else {
+            rays.shadow += 1;
+            if scene.is_occluded(&shadow_ray) { Spectrum::BLACK } else { Spectrum::WHITE }
+        };
+        if left == Spectrum::WHITE {
+            continue;
         }
+        lost += sample.radiance * (Spectrum::WHITE - left) * (cosine * share / (density * SAMPLES as f32));
     }
     if scene.lets_light_through() {
         lost = lost - passed(scene, ground, at, draw, rays);
@@ -106,7 +114,7 @@ fn blocked(
     Spectrum::new(part(lost.r, open.r), part(lost.g, open.g), part(lost.b, open.b))
 }
 
-/// An estimate of the irradiance by light that comes through clear things.
+/// An estimate of the irradiance by light at infinity that comes through clear things.
 ///
 /// Light is looked for where lights are, and over the whole sky, for what is clear may bend it: both ways are
 /// combined by the balance heuristic (E. Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997).
@@ -136,15 +144,8 @@ fn passed(
     };
     for i in 0..SAMPLES {
         let sample = scene.sample_light(at.lit_from(), at.time, draw.light_choice(i), draw.light_point(i));
-        if let Some(sample) = sample {
-            match (sample.scatter, sample.end) {
-                (Scatter::Density(_), None) => irradiance += along(sample.towards, 1 + 2 * i, rays),
-                (Scatter::Density(_), Some(_)) => {}
-                (Scatter::Delta, _) => {
-                    let cosine = ground.normal.dot(sample.towards).max(0.0) as f32;
-                    irradiance += sample.radiance * cosine * share_through_panes(scene, at, &sample, rays);
-                }
-            }
+        if let Some(LightSample { scatter: Scatter::Density(_), end: None, towards, .. }) = sample {
+            irradiance += along(towards, 1 + 2 * i, rays);
         }
         let local = warp64::square_to_cosine_hemisphere(draw.direction(i).as_dvec2());
         irradiance += along(frame.to_world(local), 2 + 2 * i, rays);

@@ -1,7 +1,7 @@
 //! Light that reaches a place through what is clear.
 
 use lumbre_geometry::Ray;
-use lumbre_scene::{Footprint, Interaction, LightSample, Scene};
+use lumbre_scene::{Footprint, LightSample, Scene};
 use lumbre_shading::Spectrum;
 
 use crate::direct::Vertex;
@@ -11,6 +11,10 @@ use crate::{Draw, RayCounts};
 
 /// Surfaces at most that light goes through or is reflected by inside a solid.
 const MOST_SURFACES: u32 = 16;
+/// Surfaces at most that light goes straight on through.
+const MOST_PANES: u32 = 256;
+/// A part of a pane's mixture that has less of it than this is not taken apart.
+const LEAST_PART: f32 = 1.0 / 256.0;
 /// How far the product of the indices along a path may be from 1 by rounding.
 const INDEX_ERROR: f32 = 1e-4;
 
@@ -66,31 +70,49 @@ pub(crate) fn light_through(
     Spectrum::BLACK
 }
 
-/// What is left of the light of a sample after all the panes between a place and the light; black where there is anything else,
-/// and where there is nothing at all.
+/// What is left of a light's sample where `shadow_ray` starts, inside of `interiors`: the product of what all that it goes
+/// straight on through leaves of it ([`lumbre_shading::Bsdf::straight_on`], that of regularized BSDFs where the path's are), and
+/// of what solids on the way take. Black behind anything else, and behind more than [`MOST_PANES`] surfaces.
 ///
-/// Panes without thickness that are smooth are what light goes straight through. What bends it would have to be found by
-/// chance, and light from a point or from one direction never is.
-pub(crate) fn share_through_panes(
-    scene: &Scene,
-    from: &Interaction<'_>,
+/// Only for light that is not also found by rays which go through the pane themselves, or it would count twice: of paths, that from
+/// points and in one direction. What bends or spreads such light would have to be found by chance, and stands in its way.
+pub(crate) fn straight_on<'s>(
+    scene: &'s Scene,
+    shadow_ray: Ray,
     sample: &LightSample,
+    mut interiors: Interiors<'s>,
+    regularize: bool,
     rays: &mut RayCounts,
 ) -> Spectrum {
-    let mut share = Spectrum::WHITE;
-    let mut ray = from.shadow_ray(sample);
-    for surface in 0..MOST_SURFACES {
+    let mut left = Spectrum::WHITE;
+    let mut ray = shadow_ray;
+    for _ in 0..MOST_PANES {
         rays.shadow += 1;
         let Some(hit) = scene.closest(&ray) else {
-            let is_open = surface == 0;
-            return if is_open { Spectrum::BLACK } else { share };
+            // Light from infinitely far away was not inside anything.
+            let last = sample.end.map(|end| interiors.transmittance((end.point - ray.origin).length()));
+            return left * last.unwrap_or(Spectrum::WHITE);
         };
-        let pane = scene.interaction(&ray, &hit, &Footprint::Point);
-        let Some(vertex) = Vertex::new(scene, &pane, &Interiors::default()) else { return Spectrum::BLACK };
-        let straight = vertex.specular().filter(|bounce| bounce.transmitted && bounce.eta == 1.0);
-        share *= straight.map(|bounce| bounce.weight).sum::<Spectrum>();
-        if share.is_black() {
+        if !scene.is_pane(&hit) {
             return Spectrum::BLACK;
+        }
+        let pane = scene.interaction(&ray, &hit, &Footprint::Point);
+        let material = pane.resolved();
+        interiors.arrive(&pane, material);
+        left *= interiors.transmittance(ray_length(&ray, &pane));
+        left *= Vertex::parts(scene, &pane, LEAST_PART, &interiors)
+            .map(|(share, mut vertex)| {
+                if regularize {
+                    vertex.bsdf = vertex.bsdf.regularized();
+                }
+                vertex.straight_on() * share
+            })
+            .sum::<Spectrum>();
+        if left.is_black() {
+            return Spectrum::BLACK;
+        }
+        if let Some(material) = material {
+            interiors.cross(material, pane.front);
         }
         ray = pane.shadow_ray(sample);
     }

@@ -14,7 +14,8 @@ use crate::{Draw, Integrator, RayCounts, Sight};
 ///
 /// Whitted, "An Improved Illumination Model for Shaded Display", CACM 23(6), 1980. A mixture counts with all of its
 /// materials at once. Where a classic ray tracer gives up a branch that carries too little to be seen, it goes on here as
-/// often as it carries light, so that the picture is right in the mean.
+/// often as it carries light, so that the picture is right in the mean. Direct light goes straight on through smooth panes
+/// without thickness; what is rough, or bends it, throws a shadow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Whitted {
     /// Reflections and refractions one after the other at most, and the direct light of the last surface.
@@ -194,18 +195,29 @@ fn scattered<'s>(
 ) -> Spectrum {
     let mut sum = Spectrum::BLACK;
     let mut shadow_ray = None;
+    // Light of any kind, for nothing else brings it from behind a pane to what scatters.
+    let goes_straight_on = scene.lets_light_straight_on();
     for (share, vertex) in scatterers {
         let scattered = vertex.eval(sample.towards) * *share;
-        if !scattered.is_black() {
+        if scattered.is_black() {
+            continue;
+        }
+        if goes_straight_on {
+            sum += scattered * vertex.passes_straight_on(sample, interiors, false, rays);
+        } else {
             sum += scattered * vertex.passes(sample, interiors);
             shadow_ray.get_or_insert_with(|| vertex.shadow_ray(sample));
         }
     }
     let scattered = sum * sample.radiance;
-    let Some(shadow_ray) = shadow_ray.filter(|_| !scattered.is_black()) else { return Spectrum::BLACK };
-    rays.shadow += 1;
-    if scene.is_occluded(&shadow_ray) {
+    if scattered.is_black() {
         return Spectrum::BLACK;
+    }
+    if let Some(shadow_ray) = shadow_ray {
+        rays.shadow += 1;
+        if scene.is_occluded(&shadow_ray) {
+            return Spectrum::BLACK;
+        }
     }
     match sample.scatter {
         Scatter::Delta => scattered,
