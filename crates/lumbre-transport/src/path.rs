@@ -13,8 +13,9 @@ use crate::{Draw, Integrator, RayCounts, Sight};
 /// and Russian roulette by throughput from the second bounce on.
 ///
 /// Light from points and in one direction, which no path finds by chance, is sampled straight through what does not change
-/// its direction ([`lumbre_shading::Bsdf::straight_on`]): smooth panes without thickness. That is no bounce. What is rough or refracts throws
-/// a shadow of such light. The light of surfaces and of the sky is found by paths, through panes as through anything else.
+/// its direction ([`lumbre_shading::Bsdf::straight_on`]): smooth panes without thickness. That is no bounce. What is smooth and refracts
+/// throws a shadow of such light; what is rough is lit by it, and passes it on. The light of surfaces and of the sky is found
+/// by paths, through panes as through anything else.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Path {
     /// Bounces at most: 0 shows lights alone, 1 direct light.

@@ -75,7 +75,8 @@ pub(crate) fn light_through(
 /// of what solids on the way take. Black behind anything else, and behind more than [`MOST_PANES`] surfaces.
 ///
 /// Only for light that is not also found by rays which go through the pane themselves, or it would count twice: of paths, that from
-/// points and in one direction. What bends or spreads such light would have to be found by chance, and stands in its way.
+/// points and in one direction. What bends or spreads light stands in its way here: what is rough is lit itself, and paths find it; what
+/// is smooth and bends light would have to send a path to such a light by chance, and never does.
 pub(crate) fn straight_on<'s>(
     scene: &'s Scene,
     shadow_ray: Ray,
