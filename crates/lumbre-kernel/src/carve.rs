@@ -30,6 +30,7 @@ use std::collections::BTreeMap;
 use bytemuck::{Pod, Zeroable};
 use lumbre_math::DVec3;
 
+use crate::lanes;
 use crate::node::Units;
 use crate::prepare::Boxer;
 use crate::primitive::Bounds;
@@ -126,6 +127,17 @@ impl<'a> Carver<'a> {
             let position = self.mesh.positions[vertex as usize].as_dvec3();
             ((position - self.shift) * self.scale).to_array()
         })
+    }
+
+    /// Asks for the vertices of a triangle to be brought near, and for what names them of another, whose vertices come next.
+    #[inline(always)]
+    pub(crate) fn fetch(&self, triangle: u32, next: u32) {
+        if let Some(vertices) = self.mesh.indices.get(triangle as usize) {
+            for vertex in vertices {
+                self.mesh.positions.get(*vertex as usize).map(lanes::fetch);
+            }
+        }
+        self.mesh.indices.get(next as usize).map(lanes::fetch);
     }
 
     /// The box around a triangle, under the names of its geometry and of itself.

@@ -79,12 +79,14 @@ impl Bounds {
         Self { lanes: [low[0], low[1], low[2], first as i32, -high[0], -high[1], -high[2], second as i32] }
     }
 
-    /// From corners in fixed-point numbers.
-    pub(crate) fn of_fixed(low: [i32; 3], high: [i32; 3]) -> Self {
-        Self { lanes: [low[0], low[1], low[2], 0, -high[0], -high[1], -high[2], 0] }
+    /// Around a point in fixed-point numbers; the last of four means nothing.
+    #[inline(always)]
+    pub(crate) fn at([x, y, z, w]: [i32; 4]) -> Self {
+        Self { lanes: [x, y, z, w, -x, -y, -z, -w] }
     }
 
     /// What is in both; without a size where that is nothing.
+    #[inline(always)]
     pub(crate) fn common(&self, other: &Self) -> Self {
         Self { lanes: std::array::from_fn(|lane| self.lanes[lane].max(other.lanes[lane])) }
     }
