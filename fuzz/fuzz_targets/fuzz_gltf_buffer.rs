@@ -1,6 +1,8 @@
 //! Any bytes are the buffer of a glTF: vertices, indices, sparse elements and joints, and the data of each decompressor.
 #![no_main]
 
+mod glb;
+
 use std::path::Path;
 
 use libfuzzer_sys::fuzz_target;
@@ -36,19 +38,7 @@ fuzz_target!(|bytes: &[u8]| {
         "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1}},{{"attributes":{{"POSITION":2}}}}]}}],
         "nodes":[{{"mesh":0}}]}}"#
     );
-    let pad = |bytes: &[u8], with: u8| {
-        let mut padded = bytes.to_vec();
-        padded.resize(bytes.len().next_multiple_of(4), with);
-        padded
-    };
-    let (json, data) = (pad(json.as_bytes(), b' '), pad(data, 0));
-    let mut glb = b"glTF\x02\0\0\0".to_vec();
-    glb.extend((28 + json.len() as u32 + data.len() as u32).to_le_bytes());
-    for (kind, chunk) in [(b"JSON", &json), (b"BIN\0", &data)] {
-        glb.extend((chunk.len() as u32).to_le_bytes());
-        glb.extend(kind);
-        glb.extend(chunk);
-    }
+    let glb = glb::of_chunks(&json, data);
     let limits = Limits { memory: 64 << 20, elements: 1_000_000, ..Limits::default() };
     let mut diagnostics = Diagnostics::with_strictness(Strictness::Lenient);
     let (budget, options) = (Budget::new(limits), GltfOptions::default());

@@ -2,12 +2,12 @@
 //! of as many vertices and triangles as the accessors say, and scenes can be built of it; what is refused is the primitive.
 #![no_main]
 
+mod glb;
+
 use std::collections::HashSet;
-use std::path::Path;
 
 use libfuzzer_sys::fuzz_target;
-use lumbre_formats::gltf::{GltfOptions, read_gltf};
-use lumbre_formats::{Budget, Diagnostics, FormatError, Limits};
+use lumbre_formats::FormatError;
 use lumbre_scene::{BuildError, GeometryDesc, Scene, SceneDesc};
 
 fuzz_target!(|data: &[u8]| {
@@ -30,7 +30,7 @@ fuzz_target!(|data: &[u8]| {
         "nodes":[{{"mesh":0}}]}}"#,
         stream.len()
     );
-    match read(&json, stream) {
+    match glb::read(&json, stream) {
         Ok(scene) => check(scene, points, corners / 3),
         Err(FormatError::Limit { .. }) => {}
         Err(error) => {
@@ -62,25 +62,4 @@ fn check(scene: SceneDesc, points: usize, triangles: usize) {
             assert!(unused_may_be_wrong && matches!(error, BuildError::NotFinite { .. }), "{error}")
         }
     }
-}
-
-fn read(json: &str, binary: &[u8]) -> Result<SceneDesc, FormatError> {
-    let mut json = json.as_bytes().to_vec();
-    json.resize(json.len().next_multiple_of(4), b' ');
-    let padding = binary.len().next_multiple_of(4) - binary.len();
-    let mut glb = b"glTF\x02\0\0\0".to_vec();
-    glb.extend(((28 + json.len() + binary.len() + padding) as u32).to_le_bytes());
-    glb.extend((json.len() as u32).to_le_bytes());
-    glb.extend(b"JSON");
-    glb.extend(&json);
-    glb.extend(((binary.len() + padding) as u32).to_le_bytes());
-    glb.extend(b"BIN\0");
-    glb.extend(binary);
-    glb.extend(&[0; 3][..padding]);
-    let limits = Limits { memory: (64 << 20) + 32 * glb.len() as u64, ..Limits::default() };
-    let budget = Budget::new(limits);
-    let (name, nowhere, options) = ("fuzz.glb".into(), Path::new("/nowhere"), GltfOptions::default());
-    let scene = read_gltf(&glb, &name, nowhere, &options, &budget, &mut Diagnostics::new());
-    assert!(budget.memory_peak() <= limits.memory);
-    scene
 }

@@ -3,12 +3,12 @@
 //! newer one takes for the same. What is refused is the buffer view, or what it has.
 #![no_main]
 
+mod glb;
+
 use std::collections::HashSet;
-use std::path::Path;
 
 use libfuzzer_sys::fuzz_target;
-use lumbre_formats::gltf::{GltfOptions, read_gltf};
-use lumbre_formats::{Budget, Diagnostics, FormatError, Limits};
+use lumbre_formats::FormatError;
 use lumbre_scene::{GeometryDesc, MeshDesc, SceneDesc};
 
 /// Vertices where the buffer view has indices.
@@ -65,7 +65,7 @@ fuzz_target!(|data: &[u8]| {
             stride * count
         )
     };
-    let found = read(&json(extensions[usize::from(kind / 15 % 2)]), stream);
+    let found = glb::read(&json(extensions[usize::from(kind / 15 % 2)]), stream);
     match &found {
         Ok(scene) => {
             let mesh = mesh(scene);
@@ -84,7 +84,7 @@ fuzz_target!(|data: &[u8]| {
         }
     }
     if let (Ok(scene), 0) = (found, kind / 15 % 2) {
-        let newer = read(&json(extensions[1]), stream).unwrap_or_else(|error| panic!("{error}"));
+        let newer = glb::read(&json(extensions[1]), stream).unwrap_or_else(|error| panic!("{error}"));
         let bits = |mesh: &MeshDesc| {
             mesh.positions.iter().map(|p| p.to_array().map(f32::to_bits)).collect::<Vec<_>>()
         };
@@ -124,25 +124,4 @@ fn check(mesh: &MeshDesc, vertices: usize) {
     if let Some(coverages) = &mesh.coverages {
         assert!(coverages.len() == vertices && coverages.iter().all(is_share));
     }
-}
-
-fn read(json: &str, binary: &[u8]) -> Result<SceneDesc, FormatError> {
-    let mut json = json.as_bytes().to_vec();
-    json.resize(json.len().next_multiple_of(4), b' ');
-    let padding = binary.len().next_multiple_of(4) - binary.len();
-    let mut glb = b"glTF\x02\0\0\0".to_vec();
-    glb.extend(((28 + json.len() + binary.len() + padding) as u32).to_le_bytes());
-    glb.extend((json.len() as u32).to_le_bytes());
-    glb.extend(b"JSON");
-    glb.extend(&json);
-    glb.extend(((binary.len() + padding) as u32).to_le_bytes());
-    glb.extend(b"BIN\0");
-    glb.extend(binary);
-    glb.extend(&[0; 3][..padding]);
-    let limits = Limits { memory: (64 << 20) + 32 * glb.len() as u64, ..Limits::default() };
-    let budget = Budget::new(limits);
-    let (name, nowhere, options) = ("fuzz.glb".into(), Path::new("/nowhere"), GltfOptions::default());
-    let scene = read_gltf(&glb, &name, nowhere, &options, &budget, &mut Diagnostics::new());
-    assert!(budget.memory_peak() <= limits.memory);
-    scene
 }

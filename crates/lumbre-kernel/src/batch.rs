@@ -228,6 +228,26 @@ impl<'a, 'r, G: Goal, L: Lanes> Flight<'a, 'r, G, L> {
         }
     }
 
+    /// Follows a step, or sets out with the next ray where that was the last, and asks for what it reads then; whether there is
+    /// anything.
+    #[inline(always)]
+    fn follow(
+        &mut self,
+        accel: &'a Accel,
+        start: &'a SingleStart,
+        step: Step,
+        waiting: &mut impl Iterator<Item = (usize, &'r Ray)>,
+        ends: &mut impl Ends<G::Answer>,
+    ) -> bool {
+        if let Step::On(next) = step {
+            self.reference = next;
+            self.fetch(accel);
+            true
+        } else {
+            self.end(accel, start, step, waiting, ends)
+        }
+    }
+
     /// Asks for what is read next, before it is needed.
     #[inline(always)]
     fn fetch(&self, accel: &Accel) {
@@ -300,12 +320,9 @@ fn fly_far<'a, 'r, G: Goal, L: Lanes, const N: usize>(
         for (place, met) in met[..count].iter().enumerate() {
             let i = at_nodes.at(place);
             let flight = &mut flights[i];
-            if let Some(next) = flight.way.go_on::<G::Order>(met, &mut flight.stack) {
-                flight.reference = next;
-                flight.fetch(accel);
-                if is_node(next) { at_nodes.put(i) } else { at_leaves.put(i) }
-            } else if flight.end(accel, start, Step::Out, waiting, ends) {
-                at_nodes.put(i);
+            let step = flight.way.go_on::<G::Order>(met, &mut flight.stack).map_or(Step::Out, Step::On);
+            if flight.follow(accel, start, step, waiting, ends) {
+                if is_node(flight.reference) { at_nodes.put(i) } else { at_leaves.put(i) }
             }
         }
         if at_nodes.len > N / 2 {
@@ -315,12 +332,8 @@ fn fly_far<'a, 'r, G: Goal, L: Lanes, const N: usize>(
             let i = at_leaves.at(place);
             let flight = &mut flights[i];
             let step = flight.meet_leaf();
-            if let Step::On(next) = step {
-                flight.reference = next;
-                flight.fetch(accel);
-                if is_node(next) { at_nodes.put(i) } else { at_leaves.put(i) }
-            } else if flight.end(accel, start, step, waiting, ends) {
-                at_nodes.put(i);
+            if flight.follow(accel, start, step, waiting, ends) {
+                if is_node(flight.reference) { at_nodes.put(i) } else { at_leaves.put(i) }
             }
         }
     }
