@@ -518,11 +518,6 @@ macro_rules! axial_shape {
                 $name
             }
 
-            /// What a search costs, in visits to a node of a hierarchy.
-            pub fn search_cost(&self) -> f32 {
-                3.0
-            }
-
             /// A point uniform by area; `None` when infinite.
             pub fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
                 self.body.sample_area(u)

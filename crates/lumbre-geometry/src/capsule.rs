@@ -297,11 +297,6 @@ impl Capsule {
         "capsule"
     }
 
-    /// What a search costs, in visits to a node of a hierarchy.
-    pub fn search_cost(&self) -> f32 {
-        4.0
-    }
-
     /// A point uniform by area: by Archimedes' theorem uniform in height over all parts, and in azimuth.
     pub fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
         let (radius, length) = (self.radius(), self.tube.length);

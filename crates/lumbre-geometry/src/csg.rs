@@ -593,11 +593,6 @@ impl Csg {
         "csg"
     }
 
-    /// What a search costs, in visits to a node of a hierarchy.
-    pub fn search_cost(&self) -> f32 {
-        16.0
-    }
-
     /// `None`: see [`Csg`].
     pub fn sample_area(&self, _u: DVec2) -> Option<SurfaceSample> {
         None

@@ -224,11 +224,6 @@ impl Cuboid {
         "box"
     }
 
-    /// What a search costs, in visits to a node of a hierarchy.
-    pub fn search_cost(&self) -> f32 {
-        1.5
-    }
-
     /// A point uniform by area: a face, then a point of it.
     pub fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
         let areas = self.face_areas(|_| 1.0);

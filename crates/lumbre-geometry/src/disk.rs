@@ -200,11 +200,6 @@ impl Disk {
         "disk"
     }
 
-    /// What a search costs, in visits to a node of a hierarchy.
-    pub fn search_cost(&self) -> f32 {
-        1.0
-    }
-
     /// A point uniform by area.
     pub fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
         let (inner, outer) = (self.inner_radius * self.inner_radius, self.radius * self.radius);

@@ -347,11 +347,6 @@ impl Hyperboloid {
         "hyperboloid"
     }
 
-    /// What a search costs, in visits to a node of a hierarchy.
-    pub fn search_cost(&self) -> f32 {
-        4.0
-    }
-
     /// A point uniform by area: the swept area is inverted numerically.
     pub fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
         let total = self.swept(1.0).0;

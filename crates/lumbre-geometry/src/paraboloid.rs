@@ -237,11 +237,6 @@ impl Paraboloid {
         "paraboloid"
     }
 
-    /// What a search costs, in visits to a node of a hierarchy.
-    pub fn search_cost(&self) -> f32 {
-        4.0
-    }
-
     /// A point uniform by area: the cube of the slant is uniform.
     pub fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
         let (a, b) = self.slants();

@@ -277,11 +277,6 @@ impl BilinearPatch {
         "bilinear"
     }
 
-    /// What a search costs, in visits to a node of a hierarchy.
-    pub fn search_cost(&self) -> f32 {
-        1.0
-    }
-
     /// A point with a density that is uniform by area when the corners lie in a plane and follow each other around a convex
     /// quadrilateral, and nearly so otherwise; `pdf` is exact.
     ///

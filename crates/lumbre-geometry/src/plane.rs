@@ -137,11 +137,6 @@ impl Plane {
         "plane"
     }
 
-    /// What a search costs, in visits to a node of a hierarchy.
-    pub fn search_cost(&self) -> f32 {
-        1.0
-    }
-
     /// None: there is no uniform choice from an infinite area.
     pub fn sample_area(&self, _u: DVec2) -> Option<SurfaceSample> {
         None

@@ -429,11 +429,6 @@ impl Quadric {
         "quadric"
     }
 
-    /// What a search costs, in visits to a node of a hierarchy.
-    pub fn search_cost(&self) -> f32 {
-        4.0
-    }
-
     /// A point on a closed or clipped quadric, with its exact density; `None` for others.
     ///
     /// A closed one is sampled as the sphere that it is the image of. A clipped one is looked at along a random axis, from a

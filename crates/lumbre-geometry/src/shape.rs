@@ -102,12 +102,6 @@ macro_rules! shapes {
                 match self { $(Self::$shape(shape) => shape.name(),)+ }
             }
 
-            /// What [`Shape::closest`] costs, in visits to a node of a bounding volume hierarchy: 1 for a disk, 12 for a
-            /// torus. Hierarchies may be built by it; no answer depends on it.
-            pub fn search_cost(&self) -> f32 {
-                match self { $(Self::$shape(shape) => shape.search_cost(),)+ }
-            }
-
             /// A point uniform by area from two uniform numbers; `None` for infinite shapes.
             pub fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
                 match self { $(Self::$shape(shape) => shape.sample_area(u),)+ }

@@ -305,11 +305,6 @@ impl Sphere {
         "sphere"
     }
 
-    /// What a search costs, in visits to a node of a hierarchy.
-    pub fn search_cost(&self) -> f32 {
-        1.5
-    }
-
     /// A point uniform by area.
     pub fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
         let z = (self.z_min + u.x * (self.z_max - self.z_min)).min(self.z_max);

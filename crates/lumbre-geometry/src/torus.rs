@@ -548,11 +548,6 @@ impl Torus {
         "torus"
     }
 
-    /// What a search costs, in visits to a node of a hierarchy.
-    pub fn search_cost(&self) -> f32 {
-        12.0
-    }
-
     /// A point uniform by area.
     pub fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
         // The upper half of the tube for one half of the numbers, the lower for the other.

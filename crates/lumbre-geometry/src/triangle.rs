@@ -289,11 +289,6 @@ impl Triangle {
         "triangle"
     }
 
-    /// What a search costs, in visits to a node of a hierarchy.
-    pub fn search_cost(&self) -> f32 {
-        1.0
-    }
-
     /// A point uniform by area; `None` for a triangle of no area.
     ///
     /// E. Heitz, "A low-distortion map between triangle and square", 2019.
