@@ -429,7 +429,7 @@ fn run_portable<T: Task>(task: T) -> T::Output {
 /// Asks for what stands there to be brought near, where the machine can be asked.
 #[inline(always)]
 pub(crate) fn fetch<T>(value: &T) {
-    #[cfg(target_arch = "x86_64")]
+    #[cfg(all(target_arch = "x86_64", not(miri)))]
     for line in 0..size_of::<T>().div_ceil(64) {
         let start: *const T = value;
         // SAFETY: SSE is always there, and a prefetch reads nothing that the program could notice.
@@ -438,7 +438,7 @@ pub(crate) fn fetch<T>(value: &T) {
             _mm_prefetch::<_MM_HINT_T0>(start.cast::<i8>().wrapping_add(64 * line));
         }
     }
-    #[cfg(not(target_arch = "x86_64"))]
+    #[cfg(not(all(target_arch = "x86_64", not(miri))))]
     let _ = value;
 }
 
