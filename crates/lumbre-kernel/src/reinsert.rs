@@ -54,7 +54,8 @@ pub(crate) fn reinsert(tree: Binary<'_>) -> Binary<'_> {
     }
     let all = linked.inner_area();
     for _ in 0..ROUNDS {
-        if linked.round() <= LEAST_GAIN * all {
+        let gained: f64 = linked.round().into_iter().map(f64::from).sum();
+        if gained <= LEAST_GAIN * all {
             break;
         }
     }
@@ -126,8 +127,8 @@ impl Tree {
         self.nodes.iter().filter(|node| node.children[0] != NONE).map(|node| f64::from(node.area)).sum()
     }
 
-    /// Seeks places and moves; returns how much area that gained.
-    fn round(&mut self) -> f64 {
+    /// Seeks places and moves; returns how much area each move gained.
+    fn round(&mut self) -> Vec<f32> {
         // The largest ones, of those that have a grandparent.
         let mut candidates: Vec<u32> =
             (1..self.nodes.len() as u32).filter(|&place| self.node(place).parent != 0).collect();
@@ -143,7 +144,7 @@ impl Tree {
         moves.par_sort_unstable_by(|a, b| b.gain.total_cmp(&a.gain).then(a.from.cmp(&b.from)));
 
         let mut touched = vec![false; self.nodes.len()];
-        let mut gained = 0.0;
+        let mut gains = Vec::new();
         for Move { from, to, gain } in moves {
             let parent = self.node(from).parent;
             let all = [from, to, parent, self.sibling(from), self.node(parent).parent, self.node(to).parent];
@@ -152,9 +153,9 @@ impl Tree {
             }
             all.iter().for_each(|&place| touched[place as usize] = true);
             self.reinsert(from, to);
-            gained += f64::from(gain);
+            gains.push(gain);
         }
-        gained
+        gains
     }
 
     /// Where a subtree is best put: beside which node. Nodes are looked at from the near to the far, and not below where
@@ -321,7 +322,9 @@ mod tests {
         let sum = before.inner_area();
         let leaves: f32 =
             before.nodes.iter().filter(|node| node.children[0] == NONE).map(|node| node.area).sum();
-        let gained: f64 = (0..ROUNDS).map(|_| before.round()).sum();
+        let gains: Vec<f32> = (0..ROUNDS).flat_map(|_| before.round()).collect();
+        assert!(gains.len() > 4, "{}", gains.len());
+        let gained: f64 = gains.into_iter().map(f64::from).sum();
         let rest = before.inner_area();
         assert!(rest < 0.6 * sum, "{rest} of {sum}");
         // Gains are reckoned as if nothing else moved meanwhile.

@@ -9,7 +9,7 @@ use lumbre_shading::{Bsdf, LocalDir, Material, Scatter, ShadingFrame, Spectrum};
 
 use crate::RayCounts;
 use crate::interior::Interiors;
-use crate::through::straight_on;
+use crate::through::{goes_straight_on, straight_on};
 
 /// A surface as seen along a path, ready to scatter.
 ///
@@ -193,7 +193,7 @@ impl<'a, 's> Vertex<'a, 's> {
         if weight <= 0.0 {
             return Spectrum::BLACK;
         }
-        if sample.scatter == Scatter::Delta && self.scene.lets_light_straight_on() {
+        if goes_straight_on(self.scene, sample) {
             return scattered * weight * self.passes_straight_on(sample, interiors, regularize, rays);
         }
         rays.shadow += 1;

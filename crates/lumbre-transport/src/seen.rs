@@ -7,7 +7,7 @@ use lumbre_scene::{GroundPlane, Interaction, LightSample, Scene, View};
 use lumbre_shading::{Scatter, Spectrum};
 
 use crate::interior::Interiors;
-use crate::through::{light_through, straight_on};
+use crate::through::{goes_straight_on, light_through, straight_on};
 use crate::{Draw, Integrator, RayCounts, Sight};
 
 /// Samples of each light that each sample of a shadow takes: few rays, where a whole path would be many.
@@ -95,7 +95,7 @@ fn blocked(
             continue;
         }
         let shadow_ray = at.shadow_ray(&sample);
-        let left = if sample.scatter == Scatter::Delta && scene.lets_light_straight_on() {
+        let left = if goes_straight_on(scene, &sample) {
             straight_on(scene, shadow_ray, &sample, Interiors::default(), false, rays)
         } else {
             rays.shadow += 1;

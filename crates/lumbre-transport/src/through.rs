@@ -2,7 +2,7 @@
 
 use lumbre_geometry::Ray;
 use lumbre_scene::{Footprint, LightSample, Scene};
-use lumbre_shading::Spectrum;
+use lumbre_shading::{Scatter, Spectrum};
 
 use crate::direct::Vertex;
 use crate::interior::Interiors;
@@ -70,12 +70,18 @@ pub(crate) fn light_through(
     Spectrum::BLACK
 }
 
+/// Whether a light's sample is to be followed through panes by [`straight_on`], where paths find all other light behind them: that of
+/// points and in one direction, which no path finds by chance, so that nothing counts twice.
+pub(crate) fn goes_straight_on(scene: &Scene, sample: &LightSample) -> bool {
+    sample.scatter == Scatter::Delta && scene.lets_light_straight_on()
+}
+
 /// What is left of a light's sample where `shadow_ray` starts, inside of `interiors`: the product of what all that it goes
 /// straight on through leaves of it ([`lumbre_shading::Bsdf::straight_on`], that of regularized BSDFs where the path's are), and
 /// of what solids on the way take. Black behind anything else, and behind more than [`MOST_PANES`] surfaces.
 ///
-/// Only for light that is not also found by rays which go through the pane themselves, or it would count twice: of paths, that from
-/// points and in one direction. What bends or spreads light stands in its way here: what is rough is lit itself, and paths find it; what
+/// Only for light that is not also found by rays which go through the pane themselves, or it would count twice: of paths, see
+/// [`goes_straight_on`]. What bends or spreads light stands in its way here: what is rough is lit itself, and paths find it; what
 /// is smooth and bends light would have to send a path to such a light by chance, and never does.
 pub(crate) fn straight_on<'s>(
     scene: &'s Scene,
