@@ -101,7 +101,7 @@ pub enum BuildError {
         element: usize,
     },
     /// More primitives than a tree can name (2^29 - 1), or so many small leaves of triangles or of spheres that they fill
-    /// more than 2^26 blocks of eight.
+    /// more than 2^26 blocks of eight, or 8 GiB.
     TooMany,
 }
 
@@ -116,7 +116,7 @@ impl fmt::Display for BuildError {
             }
             Self::TooMany => write!(
                 f,
-                "too many primitives for one tree: at most {}, and {} blocks of triangles",
+                "too many primitives for one tree: at most {}, and {} blocks or 8 GiB of triangles",
                 prepare::MOST_PRIMITIVES,
                 tag::BLOCK_PLACES
             ),

@@ -9,6 +9,7 @@ use std::marker::PhantomData;
 use lumbre_geometry::Ray;
 
 use crate::Accel;
+use crate::blocks::{TriangleBlock, Unit};
 use crate::holds::SingleStart;
 use crate::lanes::{self, Lanes, Level, Task};
 use crate::node::{Node, tag};
@@ -16,7 +17,6 @@ use crate::packet::{self, PACKET};
 use crate::query::All;
 use crate::single::{Alone, Goal, Outcome, SingleRay, Step};
 use crate::stack::{Order, Stack};
-use crate::triangles::TriangleBlock;
 use crate::way::{Met, Way};
 
 /// Rays in flight on a thread, where the caches hold much of the tree and where they do not.
@@ -46,7 +46,7 @@ impl<A, F: FnMut(usize, Outcome<A>)> Ends<A> for F {
 /// Searches along every ray.
 pub(crate) fn search_all<G: Goal>(level: Level, accel: &Accel, rays: &[Ray], mut ends: impl Ends<G::Answer>) {
     let tree = &accel.tree;
-    let bytes = size_of_val::<[Node]>(&tree.nodes) + size_of_val::<[TriangleBlock]>(&tree.blocks);
+    let bytes = size_of_val::<[Node]>(&tree.nodes) + size_of_val::<[Unit]>(&tree.blocks);
     match &accel.single {
         Some(start) if start.is_mixed => {
             level.run(OneByOne::<G, _> { accel, start, rays, ends, goal: PhantomData });
@@ -254,7 +254,7 @@ impl<'a, 'r, G: Goal, L: Lanes> Flight<'a, 'r, G, L> {
         if is_node(self.reference) {
             accel.tree.nodes.get(self.reference as usize).map(lanes::fetch);
         } else {
-            accel.tree.blocks.get(tag::blocks(self.reference).start).map(lanes::fetch);
+            accel.tree.blocks().at(self.reference & tag::PLACE).map(TriangleBlock::fetch);
         }
     }
 }

@@ -14,6 +14,7 @@ use rayon::prelude::*;
 use crate::Geometry;
 use crate::accel::Preset;
 use crate::bins::{self, BestSplit, Binning, Bins, Fill, Measure, Part, Split};
+use crate::boxes::Boxes;
 use crate::carve::Cell;
 use crate::collapse::{Choices, Costs, choose};
 use crate::few::{Decide, FEW, Few, group_of};
@@ -55,20 +56,6 @@ impl Binary<'_> {
     /// The node over two.
     pub(crate) fn over(children: [Self; 2]) -> Self {
         Self::Fork(Box::new(Fork::over(children)))
-    }
-
-    /// The same, of which nothing stands elsewhere. The depth of its recursion is that of the tree.
-    fn into_owned(self) -> Binary<'static> {
-        match self {
-            Self::Fork(fork) => {
-                let Fork { bounds, costs, choices, children, is_ranked } = *fork;
-                let children = children.map(Binary::into_owned);
-                Binary::Fork(Box::new(Fork { bounds, costs, choices, children, is_ranked }))
-            }
-            Self::Twig(Twig { nodes, costs }) => {
-                Binary::Twig(Twig { nodes: Cow::Owned(nodes.into_owned()), costs })
-            }
-        }
     }
 
     /// A twig of such nodes.
@@ -154,13 +141,14 @@ pub(crate) struct Grown<'p> {
 /// The binary tree over primitives (not none) of geometries: packed ones, and all others.
 ///
 /// First they are parted where they stand until one thread takes what is left together; then twigs grow, which need but a
-/// little room each, and take the place of their primitives, as long as those are packed. Of others, there are more nodes than
-/// primitives as a rule: these are given back here, before the tree is laid out, but for instances.
+/// little room each. They take the place of their primitives with their names, as long as those are packed: half of the room, and
+/// where there are many of them the other half is given back. Of others, there are more nodes than primitives as a rule: these
+/// are given back here, before the tree is laid out, but for instances.
 pub(crate) fn binary_tree<'p>(
     level: Level,
     preset: Preset,
     mut others: Vec<Primitive>,
-    packed: &'p mut Vec<Primitive>,
+    packed: &'p mut Boxes,
     traits: &[Traits],
     geometries: &[Geometry],
     units: &Units,
@@ -170,18 +158,18 @@ pub(crate) fn binary_tree<'p>(
     let shared = if shared > 1 { shared + 1 } else { 0 };
     let builder = &Builder { level, traits, shared };
     let counts = sort_by_rank(&mut others, traits);
-    let mut names: Vec<Name> = fill(others.len() + packed.len(), [0; 2]);
     let first_packed = others.len();
-    let (other_names, packed_names) = names.split_at_mut(first_packed);
+    let mut names: Vec<Name> = vec![[0; 2]; first_packed];
     let has_packed = !packed.is_empty();
     let (mut trees, packed_tree) = rayon::join(
-        || builder.trees_by_rank(preset, &mut others, &counts, other_names),
-        move || has_packed.then(|| builder.tree_of_packed(preset, packed, packed_names, first_packed)),
+        || builder.trees_by_rank(preset, &mut others, &counts, &mut names),
+        move || has_packed.then(|| builder.tree_of_packed(preset, packed, first_packed)),
     );
     others.truncate(counts[Kind::Instance.rank()]);
     others.shrink_to_fit();
     let mut cells = Vec::new();
-    if let Some(mut tree) = packed_tree {
+    if let Some(PackedTree { mut tree, names: packed_names }) = packed_tree {
+        names = with_all(names, &packed_names);
         if preset == Preset::Best
             && let Some(found) =
                 spatial::in_parts(builder, geometries, units, &tree, &names[first_packed..], first_packed)
@@ -198,6 +186,16 @@ pub(crate) fn binary_tree<'p>(
     let join = |low, high| Binary::Fork(Box::new(Fork { is_ranked: true, ..Fork::over([low, high]) }));
     let tree = trees.into_iter().map(better).reduce(join).expect("there are primitives");
     Grown { tree, names, instances: others, cells }
+}
+
+/// Names, and others behind them.
+fn with_all(first: Vec<Name>, others: &[&[Name]]) -> Vec<Name> {
+    let mut names = fill(first.len() + others.iter().map(|others| others.len()).sum::<usize>(), [0; 2]);
+    let (place, mut rest) = names.split_at_mut(first.len());
+    place.copy_from_slice(&first);
+    let places: Vec<&mut [Name]> = others.iter().map(|others| take(&mut rest, others.len())).collect();
+    places.into_par_iter().zip(others).for_each(|(place, others)| place.copy_from_slice(others));
+    names
 }
 
 /// The first `count` of some, which then are no longer among them.
@@ -263,14 +261,49 @@ impl Sketch {
 }
 
 /// Primitives of which a tree is to grow, and places for what is in its leaves.
-struct Plot<'p, 'a> {
-    primitives: &'p mut [Primitive],
-    names: &'a mut [Name],
+struct Plot<'a> {
+    primitives: &'a mut [Primitive],
+    /// Without, names and nodes take the place of the primitives.
+    names: Option<&'a mut [Name]>,
     /// The place of the first name.
     first: usize,
-    /// Whether the primitives are to stay, in the order of names; or else nodes may take their place.
+    /// Whether the primitives are to stay, in the order of names.
     keeps: bool,
 }
+
+/// A twig that has grown where its primitives stood, or apart.
+struct GrownTwig {
+    /// Of how many primitives.
+    count: usize,
+    /// `None` where they stand in the place of the primitives, before their names, so many of them.
+    nodes: Result<usize, Vec<BinaryNode>>,
+    costs: Costs,
+}
+
+impl GrownTwig {
+    /// How much of the place of the primitives its nodes and names take: never more than there is.
+    fn len(&self) -> usize {
+        self.nodes_there() + units_of_names(self.count)
+    }
+
+    fn nodes_there(&self) -> usize {
+        self.nodes.as_ref().map_or(0, |&count| count)
+    }
+}
+
+/// The primitives in whose place so many names have room.
+fn units_of_names(count: usize) -> usize {
+    (count * size_of::<Name>()).div_ceil(size_of::<Primitive>())
+}
+
+/// The tree over packed primitives, and what is in its leaves, piece by piece.
+struct PackedTree<'p> {
+    tree: Binary<'p>,
+    names: Vec<&'p [Name]>,
+}
+
+/// From how many packed primitives on the room that they leave is given back before more is asked for.
+const MANY: usize = 1 << 20;
 
 /// The primitives of a node of a twig, and as much room for those of its children.
 struct Range<'a> {
@@ -321,6 +354,8 @@ struct Workplace {
     bins: Box<Bins>,
     /// Room for the primitives of one.
     there: Vec<Primitive>,
+    /// And for their names.
+    names: Vec<Name>,
 }
 
 /// What a twig needs but for that room.
@@ -332,7 +367,8 @@ struct Tools<'w> {
 impl Workplace {
     /// For twigs of no more than so many primitives.
     fn new(most: usize) -> Self {
-        Self { nodes: Vec::new(), bins: Box::new(Bins::EMPTY), there: vec![Bounds::EMPTY; most] }
+        let names = vec![[0; 2]; most];
+        Self { nodes: Vec::new(), bins: Box::new(Bins::EMPTY), there: vec![Bounds::EMPTY; most], names }
     }
 }
 
@@ -352,18 +388,19 @@ impl Builder<'_> {
             let (primitives, names) = (take(&mut primitives, count), take(&mut names, count));
             let mut codes = Vec::new();
             if preset == Preset::Fast {
-                let sorted;
-                (sorted, codes) = self.sort(primitives);
+                let mut sorted = vec![Bounds::EMPTY; primitives.len()];
+                codes = self.sort(primitives, &mut sorted);
                 primitives.copy_from_slice(&sorted);
             }
             let keeps = rank == Kind::Instance.rank();
+            let names = Some(names);
             // Subtrees that are put elsewhere later are those of single instances.
             trees.push(if keeps && preset != Preset::Best {
                 let sketch = self.sketch_sorted::<false>(primitives, 0, &codes);
-                self.grow::<false>(&sketch, &codes, Plot { primitives, names, first, keeps }).into_owned()
+                self.grow::<false>(&sketch, &codes, Plot { primitives, names, first, keeps })
             } else {
                 let sketch = self.sketch_sorted::<true>(primitives, 0, &codes);
-                self.grow::<true>(&sketch, &codes, Plot { primitives, names, first, keeps }).into_owned()
+                self.grow::<true>(&sketch, &codes, Plot { primitives, names, first, keeps })
             });
             first += count;
         }
@@ -371,27 +408,46 @@ impl Builder<'_> {
     }
 
     /// A tree of packed primitives, whose first name has this place.
-    fn tree_of_packed<'p>(
-        &self,
-        preset: Preset,
-        primitives: &'p mut Vec<Primitive>,
-        names: &mut [Name],
-        first: usize,
-    ) -> Binary<'p> {
+    fn tree_of_packed<'p>(&self, preset: Preset, primitives: &'p mut Boxes, first: usize) -> PackedTree<'p> {
         let mut codes = Vec::new();
         if preset == Preset::Fast {
-            (*primitives, codes) = self.sort(primitives);
+            let mut sorted = Boxes::empty(primitives.len());
+            codes = self.sort(primitives, &mut sorted);
+            *primitives = sorted;
         }
         let sketch = self.sketch_sorted::<false>(primitives, 0, &codes);
-        self.grow::<false>(&sketch, &codes, Plot { primitives, names, first, keeps: false })
+        let twigs =
+            self.twigs::<false>(&sketch, &codes, Plot { primitives, names: None, first, keeps: false });
+        drop(codes);
+        let is_compact = primitives.len() >= MANY;
+        if is_compact {
+            let (mut from, mut to) = (0, 0);
+            for twig in &twigs {
+                primitives.copy_within(from..from + twig.len(), to);
+                (from, to) = (from + twig.count, to + twig.len());
+            }
+            primitives.shorten(to);
+        }
+        let mut rest = &primitives[..];
+        let mut names = Vec::with_capacity(twigs.len());
+        let mut binaries = Vec::with_capacity(twigs.len());
+        for twig in twigs {
+            let own = rest.split_off(..if is_compact { twig.len() } else { twig.count }).unwrap_or_default();
+            let (nodes, behind) = own.split_at(twig.nodes_there());
+            names.push(&bytemuck::cast_slice(behind)[..twig.count]);
+            let nodes = match twig.nodes {
+                Ok(_) => Cow::Borrowed(bytemuck::cast_slice(nodes)),
+                Err(nodes) => Cow::Owned(nodes),
+            };
+            binaries.push(Binary::Twig(Twig { nodes, costs: twig.costs }));
+        }
+        PackedTree { tree: sketch.over(&mut binaries.into_iter()), names }
     }
 
-    /// Primitives in the order along a curve, and their codes.
-    fn sort(&self, primitives: &[Primitive]) -> (Vec<Primitive>, Vec<Code>) {
-        let mut sorted = fill(primitives.len(), Bounds::EMPTY);
+    /// Puts as many primitives in the order along a curve there; their codes.
+    fn sort(&self, primitives: &[Primitive], sorted: &mut [Primitive]) -> Vec<Code> {
         let (_, centers) = self.measure(primitives);
-        let codes = morton::sort(primitives, &mut sorted, &centers);
-        (sorted, codes)
+        morton::sort(primitives, sorted, &centers)
     }
 
     /// Splits by the order along a curve as long as there are codes that differ. The depth of this recursion is at most that
@@ -460,13 +516,18 @@ impl Builder<'_> {
         (sides, splits)
     }
 
-    /// The tree that was sketched. `codes` are those of the primitives, if they were sorted.
-    fn grow<'p, const COSTS: bool>(
-        &self,
-        sketch: &Sketch,
-        mut codes: &[Code],
-        plot: Plot<'p, '_>,
-    ) -> Binary<'p> {
+    /// The tree that was sketched. `codes` are those of the primitives, if they were sorted, and there are places for names.
+    fn grow<const COSTS: bool>(&self, sketch: &Sketch, codes: &[Code], plot: Plot) -> Binary<'static> {
+        let twigs = self.twigs::<COSTS>(sketch, codes, plot);
+        let mut apart = twigs.into_iter().map(|GrownTwig { nodes, costs, .. }| {
+            let nodes = Cow::Owned(nodes.expect_err("names have places of their own"));
+            Binary::Twig(Twig { nodes, costs })
+        });
+        sketch.over(&mut apart)
+    }
+
+    /// The twigs that were sketched.
+    fn twigs<const COSTS: bool>(&self, sketch: &Sketch, mut codes: &[Code], plot: Plot) -> Vec<GrownTwig> {
         let Plot { mut primitives, mut names, mut first, keeps } = plot;
         let mut seeds = Vec::new();
         sketch.seeds(&mut seeds);
@@ -475,40 +536,49 @@ impl Builder<'_> {
         for seed in seeds {
             let codes = codes.split_off(..seed.count).unwrap_or_default();
             let own = take(&mut primitives, seed.count);
-            let names = take(&mut names, seed.count);
+            let names = names.as_mut().map(|names| take(names, seed.count));
             plots.push((seed, codes, Plot { primitives: own, names, first, keeps }));
             first += seed.count;
         }
-        let twigs: Vec<Binary> = plots
+        plots
             .into_par_iter()
             .map_init(
                 || Workplace::new(most),
                 |work, (seed, codes, plot)| {
-                    let Workplace { nodes, bins, there } = work;
+                    let Workplace { nodes, bins, there, names: own_names } = work;
                     nodes.clear();
                     let there = &mut there[..seed.count];
                     let Plot { primitives: own, names, first, keeps } = plot;
-                    let range =
-                        Range { here: &mut *own, there, names, first, depth: seed.depth, is_away: false };
+                    let is_there = names.is_none();
+                    let names = names.unwrap_or(&mut own_names[..seed.count]);
+                    let range = Range {
+                        here: &mut *own,
+                        there,
+                        names: &mut *names,
+                        first,
+                        depth: seed.depth,
+                        is_away: false,
+                    };
                     if seed.is_sorted {
                         self.twig_sorted::<COSTS>(range, codes, &mut Tools { nodes, bins });
                     } else {
                         self.twig::<COSTS>(range, seed.split, &mut Tools { nodes, bins });
                     }
                     let costs = choose(nodes, keeps);
-                    // There are more nodes than primitives only where hardly any share a leaf.
-                    let nodes = if !keeps && nodes.len() <= own.len() {
-                        let (place, _) = own.split_at_mut(nodes.len());
-                        place.copy_from_slice(bytemuck::cast_slice(nodes));
-                        Cow::Borrowed(bytemuck::cast_slice(place))
-                    } else {
-                        Cow::Owned(nodes.to_vec())
-                    };
-                    Binary::Twig(Twig { nodes, costs })
+                    let mut twig = GrownTwig { count: seed.count, nodes: Ok(nodes.len()), costs };
+                    // There is no room for both only where hardly any share a leaf.
+                    if !is_there || twig.len() > own.len() {
+                        twig.nodes = Err(nodes.to_vec());
+                    }
+                    if is_there {
+                        let (nodes_there, behind) = own.split_at_mut(twig.nodes_there());
+                        nodes_there.copy_from_slice(bytemuck::cast_slice(&nodes[..nodes_there.len()]));
+                        bytemuck::cast_slice_mut(behind)[..names.len()].copy_from_slice(names);
+                    }
+                    twig
                 },
             )
-            .collect();
-        sketch.over(&mut twigs.into_iter())
+            .collect()
     }
 
     fn twig_sorted<const COSTS: bool>(&self, range: Range, codes: &[Code], work: &mut Tools) -> Bounds {

@@ -7,14 +7,17 @@
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
+use crate::blocks::{self, BlockNames, Blocks, Filled, TriangleBlock, Unit};
 use crate::build::{Binary, BinaryNode, Fork, Name};
 use crate::carve::{self, Cell, LaneCell};
+use crate::lanes::Level;
 use crate::node::{Node, WIDTH, tag};
 use crate::primitive::{Bounds, Kind, Primitive, Traits};
 use crate::spheres::SphereBlock;
 use crate::store::Store;
-use crate::triangles::{BLOCK, BlockNames, TriangleBlock};
-use crate::{BuildError, Geometry, GeometryKind, SphereCloud, TriangleMesh};
+use crate::triangles::BLOCK;
+use crate::way::out_of_tree;
+use crate::{BuildError, Geometry, GeometryKind, SphereCloud};
 
 /// A primitive in a leaf that is no triangle, or outside the tree.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -58,7 +61,8 @@ impl Entry {
 pub(crate) struct Packed {
     /// Each before all that are below it.
     pub(crate) nodes: Store<Node>,
-    pub(crate) blocks: Store<TriangleBlock>,
+    /// The blocks of triangles: see [`blocks`].
+    pub(crate) blocks: Store<Unit>,
     /// As many as there are blocks.
     pub(crate) names: Store<BlockNames>,
     pub(crate) entries: Store<Entry>,
@@ -72,6 +76,61 @@ pub(crate) struct Packed {
 }
 
 impl Packed {
+    /// The blocks of triangles.
+    #[inline(always)]
+    pub(crate) fn blocks(&self) -> Blocks<'_> {
+        Blocks::new(&self.blocks)
+    }
+
+    /// The block of triangles that begins there.
+    #[inline(always)]
+    pub(crate) fn block(&self, place: u32) -> &TriangleBlock {
+        match self.blocks().at(place) {
+            Some(block) => block,
+            None => out_of_tree(),
+        }
+    }
+
+    /// The numbers of the blocks of a leaf of triangles, by which their names stand.
+    pub(crate) fn numbers(&self, leaf: u32) -> std::ops::Range<usize> {
+        self.blocks().numbers(leaf).expect("references lead to blocks")
+    }
+
+    /// Packs the triangles of a packed tree again, as the geometries are now. What fails leaves everything as it was.
+    ///
+    /// # Errors
+    /// [`BuildError::TooMany`] when there is more than references can name.
+    pub(crate) fn pack_again(&mut self, level: Level, geometries: &[Geometry]) -> Result<(), BuildError> {
+        let followers = self.blocks().followers(self.names.len());
+        let Filled { units, places } = blocks::pack(level, geometries, &self.names, &followers, true)?;
+        let Self { nodes, root, blocks, .. } = self;
+        let before = Blocks::new(blocks);
+        blocks::refer(nodes.to_mut(), root, &places, |leaf| {
+            before.numbers(leaf).map_or(0, |numbers| numbers.start)
+        });
+        self.blocks = units.into();
+        Ok(())
+    }
+
+    /// Packs the triangles, as the names and the nodes say, whose references number blocks. Without an area they are left out;
+    /// where there may be none, it is not asked.
+    ///
+    /// # Errors
+    /// [`BuildError::TooMany`] when there is more than references can name.
+    pub(crate) fn pack_triangles(
+        &mut self,
+        level: Level,
+        geometries: &[Geometry],
+        may_lack_area: bool,
+    ) -> Result<(), BuildError> {
+        let followers = blocks::followers_of(&self.nodes, self.root, self.names.len());
+        let Filled { units, places } =
+            blocks::pack(level, geometries, &self.names, &followers, may_lack_area)?;
+        self.blocks = units.into();
+        blocks::refer(self.nodes.to_mut(), &mut self.root, &places, |leaf| tag::blocks(leaf).start);
+        Ok(())
+    }
+
     /// Whether a triangle may stand in more than one lane.
     pub(crate) fn has_parts(&self) -> bool {
         !self.cells.is_empty()
@@ -350,7 +409,16 @@ pub(crate) fn lay_out(
 impl Layout {
     /// Fills the blocks. They are most of the tree: nothing of its making but names is to be left by now, and these are given
     /// back before.
-    pub(crate) fn pack(self, geometries: &[Geometry], names: Vec<Name>, cells: Vec<Cell>) -> Packed {
+    ///
+    /// # Errors
+    /// [`BuildError::TooMany`] when there is more than references can name.
+    pub(crate) fn pack(
+        self,
+        level: Level,
+        geometries: &[Geometry],
+        names: Vec<Name>,
+        cells: Vec<Cell>,
+    ) -> Result<Packed, BuildError> {
         let Self { nodes, entries, spans, sphere_spans, root } = self;
         let named = |spans: Vec<Span>| -> Vec<BlockNames> {
             let name = |span: &Span| BlockNames::of(&names[span.first as usize..][..span.count as usize]);
@@ -360,20 +428,20 @@ impl Layout {
         drop(cells);
         let (block_names, sphere_names) = (named(spans), named(sphere_spans));
         drop(names);
-        let block = |names: &BlockNames| fill_block(mesh(geometries, names.geometry), names);
-        let blocks: Vec<_> = block_names.par_iter().with_min_len(256).map(block).collect();
         let block = |names: &BlockNames| fill_sphere_block(cloud(geometries, names.geometry), names);
         let sphere_blocks: Vec<_> = sphere_names.par_iter().with_min_len(256).map(block).collect();
-        Packed {
+        let mut packed = Packed {
             nodes: nodes.into(),
-            blocks: blocks.into(),
+            blocks: Store::default(),
             names: block_names.into(),
             entries: entries.into(),
             sphere_blocks: sphere_blocks.into(),
             sphere_names: sphere_names.into(),
             cells: lane_cells.into(),
             root: Some(root),
-        }
+        };
+        packed.pack_triangles(level, geometries, false)?;
+        Ok(packed)
     }
 }
 
@@ -389,13 +457,6 @@ fn lane_cells(spans: &[Span], cells: &[Cell]) -> Vec<LaneCell> {
     found
 }
 
-fn mesh(geometries: &[Geometry], geometry: u32) -> &TriangleMesh {
-    match &geometries[geometry as usize].kind {
-        GeometryKind::Mesh(mesh) => mesh,
-        _ => unreachable!("triangles come from meshes"),
-    }
-}
-
 fn cloud(geometries: &[Geometry], geometry: u32) -> &SphereCloud {
     match &geometries[geometry as usize].kind {
         GeometryKind::Spheres(cloud) => cloud,
@@ -408,20 +469,6 @@ fn fill_sphere_block(cloud: &SphereCloud, names: &BlockNames) -> SphereBlock {
     let mut block = SphereBlock::EMPTY;
     for (lane, primitive) in names.primitives().enumerate() {
         block.put(lane, cloud.spheres[primitive as usize]);
-    }
-    block
-}
-
-#[inline(always)]
-fn fill_block(mesh: &TriangleMesh, names: &BlockNames) -> TriangleBlock {
-    let mut block = TriangleBlock::EMPTY;
-    for (lane, primitive) in names.primitives().enumerate() {
-        for (corner, &vertex) in mesh.indices[primitive as usize].iter().enumerate() {
-            let position = mesh.positions[vertex as usize];
-            for axis in 0..3 {
-                block.corners[corner][axis][lane] = position[axis];
-            }
-        }
     }
     block
 }

@@ -8,7 +8,7 @@
 //! there are, the reference to the root, and a zero; as u64 how many elements each array has; a fingerprint of the
 //! geometries; a checksum of everything behind the header; a fingerprint of the parts of instances that were opened; and a
 //! checksum of the header before itself. Then come the arrays, each at
-//! a multiple of 64 bytes: nodes, blocks and names of triangles, those of spheres, entries, parts of triangles, masks.
+//! a multiple of 64 bytes: nodes, units of blocks (see `blocks`) and names of triangles, those of spheres, entries, parts of triangles, masks.
 //!
 //! What a file says is checked when it is mapped: checksums, the length, every reference and every name, that all that has
 //! no place in an array is marked as such, and that the geometries are those that it was saved with. A file that somebody
@@ -25,24 +25,24 @@ use std::sync::{Arc, OnceLock};
 use bytemuck::Pod;
 use memmap2::Mmap;
 
+use crate::blocks::{BlockNames, Unit};
 use crate::carve::LaneCell;
 use crate::collapse::{Entry, Packed};
 use crate::holds::{Holds, SingleStart};
 use crate::hulls::Hulls;
 use crate::lanes::Level;
-use crate::node::{Node, WIDTH};
+use crate::node::{Node, WIDTH, tag};
 use crate::opening::Start;
 use crate::prepare::{Parts, take_apart, units_of};
 use crate::refit::{Places, check_places};
 use crate::save::{check_names, check_structure, signature};
 use crate::spheres::SphereBlock;
 use crate::store::Store;
-use crate::triangles::{BlockNames, TriangleBlock};
 use crate::{Accel, Geometry, GeometryKind, LoadError, RefitError};
 
 const MAGIC: [u8; 8] = *b"LumbMap\0";
 /// Changes with the format, and with the layout of what is in it.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 const BYTE_ORDER: u32 = 0x0102_0304;
 const NONE: u32 = u32::MAX;
 const HEADER: usize = 256;
@@ -191,7 +191,7 @@ fn arrays(accel: &Accel) -> [&[u8]; ARRAYS] {
 
 const SIZES: [usize; ARRAYS] = [
     size_of::<Node>(),
-    size_of::<TriangleBlock>(),
+    size_of::<Unit>(),
     size_of::<BlockNames>(),
     size_of::<SphereBlock>(),
     size_of::<BlockNames>(),
@@ -388,7 +388,13 @@ fn over_mapped(file: Arc<Mmap>, geometries: Vec<Geometry>) -> Result<Accel, Load
         root: (header.root != NONE).then_some(header.root),
     };
     check_lanes(&tree)?;
-    check_structure(&tree, &geometries)?;
+    let places = tree.blocks().places(&tree.names).ok_or_else(|| LoadError::Inconsistent {
+        what: "the blocks of triangles are not such as their names say".to_owned(),
+    })?;
+    check_structure(&tree, &geometries, |leaf| {
+        let numbers = tree.blocks().numbers(leaf)?;
+        (places.get(numbers.start) == Some(&(leaf & tag::PLACE))).then_some(numbers)
+    })?;
     check_names(&tree, &geometries)?;
     let masks: Store<u32> = array(&file, &header, 7)?;
     let units = units_of(&geometries, &parts);
@@ -420,8 +426,10 @@ fn over_mapped(file: Arc<Mmap>, geometries: Vec<Geometry>) -> Result<Accel, Load
 
 /// Lanes that hold nothing are to be such that no ray meets them, so that nobody follows what stands there.
 fn check_lanes(tree: &Packed) -> Result<(), LoadError> {
-    if tree.blocks.len() != tree.names.len() || tree.sphere_blocks.len() != tree.sphere_names.len() {
-        return Err(LoadError::Inconsistent { what: "there are not as many names as blocks".to_owned() });
+    if tree.sphere_blocks.len() != tree.sphere_names.len() {
+        return Err(LoadError::Inconsistent {
+            what: "there are not as many names as blocks of spheres".to_owned(),
+        });
     }
     for (place, node) in tree.nodes.iter().enumerate() {
         let len = node.len as usize;
@@ -437,20 +445,12 @@ fn check_lanes(tree: &Packed) -> Result<(), LoadError> {
         }
     }
     let unnamed = |names: &BlockNames| names.primitives.map(|primitive| primitive == NONE);
-    let loose = |what: &str, place: usize| LoadError::Inconsistent {
-        what: format!("{what} {place} has something without a name"),
-    };
-    for (place, (block, names)) in tree.blocks.iter().zip(&tree.names).enumerate() {
-        let is_nothing = |lane: usize| block.triangle(lane).as_flattened().iter().all(|x| x.is_nan());
-        if unnamed(names).into_iter().enumerate().any(|(lane, is_unnamed)| is_unnamed && !is_nothing(lane)) {
-            return Err(loose("block", place));
-        }
-    }
     for (place, (block, names)) in tree.sphere_blocks.iter().zip(&tree.sphere_names).enumerate() {
         let is_nothing =
             |lane: usize| block.radii[lane].is_nan() && block.centers.iter().all(|axis| axis[lane].is_nan());
         if unnamed(names).into_iter().enumerate().any(|(lane, is_unnamed)| is_unnamed && !is_nothing(lane)) {
-            return Err(loose("block of spheres", place));
+            let what = format!("block of spheres {place} has something without a name");
+            return Err(LoadError::Inconsistent { what });
         }
     }
     Ok(())

@@ -3,6 +3,8 @@
 mod accel;
 mod batch;
 mod bins;
+mod blocks;
+mod boxes;
 mod build;
 mod carve;
 mod clouds;

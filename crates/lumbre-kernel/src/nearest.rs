@@ -101,7 +101,7 @@ pub(crate) fn closest_point(
                 }
             }
             Waiting::Reference(reference) if reference >> tag::SHIFT == tag::TRIANGLES => {
-                for names in &frame.accel.tree.names[tag::blocks(reference)] {
+                for names in &frame.accel.tree.names[frame.accel.tree.numbers(reference)] {
                     if let GeometryKind::Mesh(mesh) = &frame.accel.geometries[names.geometry as usize].kind {
                         for &primitive in names.primitives.iter().filter(|&&primitive| primitive != u32::MAX)
                         {

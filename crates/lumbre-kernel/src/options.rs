@@ -2,10 +2,10 @@
 
 use lumbre_geometry::{Ray, Root};
 
+use crate::blocks::BlockNames;
 use crate::query::{All, Filter};
 use crate::spheres::ExactSphere;
 use crate::traverse::{Found, PlacedTree, What};
-use crate::triangles::BlockNames;
 use crate::{Accel, GeometryKind, Hit};
 
 /// What a query leaves out; by default nothing. Queries that do not take this pay nothing for it.

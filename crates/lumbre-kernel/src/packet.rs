@@ -26,15 +26,14 @@ use lumbre_geometry::Ray;
 
 use crate::Accel;
 use crate::batch::Ends;
+use crate::blocks::Blocks;
 use crate::holds::SingleStart;
-use crate::lanes::{self, Axes, Lanes, Row, Sides, WIDE, Wide};
+use crate::lanes::{self, Axes, Corners, Lanes, Row, Sides, WIDE, Wide};
 use crate::node::{END_FACTOR, LITTLE, Node, START_FACTOR, tag};
 use crate::single::{Candidate, Exact, Goal, Outcome, heights};
 use crate::stack::{Order, Stack};
-use crate::triangles::{
-    BLOCK, EDGE_ERROR, FAR, HEIGHT_ERROR, Meeting, ROUNDINGS, SIZE_ERROR, TINY, TriangleBlock,
-};
-use crate::way::limit_of;
+use crate::triangles::{BLOCK, EDGE_ERROR, FAR, HEIGHT_ERROR, Meeting, ROUNDINGS, SIZE_ERROR, TINY};
+use crate::way::{limit_of, out_of_tree};
 
 /// Rays in a packet.
 pub(crate) const PACKET: usize = WIDE;
@@ -252,13 +251,13 @@ struct Bounds {
 /// Rays under way together.
 struct Packet<'a, 'r> {
     exact: Exact<'a>,
-    triangles: &'a [TriangleBlock],
+    triangles: Blocks<'a>,
     rays: &'r [Ray; PACKET],
     frustum: Frustum,
     bundle: Bundle,
     /// Where each need no longer meet boxes.
     s_max: Row<f32>,
-    /// The nearest so far, by heights; its triangle is one of eight times the block, and the lane.
+    /// The nearest so far, by heights; its triangle is one of eight times the place of the block, and the lane.
     from: Row<f32>,
     to: Row<f32>,
     triangle: Row<f32>,
@@ -273,26 +272,26 @@ struct Packet<'a, 'r> {
 impl Packet<'_, '_> {
     /// Which triangles of a block are left.
     #[inline(always)]
-    fn bounds<W: Wide>(&self, block: &TriangleBlock) -> Bounds {
+    fn bounds<W: Wide>(&self, Corners(corners): &Corners, taken: u32) -> Bounds {
         let bundle = lanes::opaque(&self.bundle);
         let [kx, ky, kz] = bundle.axes.order();
         let [ox, oy, oz] = bundle.middle;
         let (ox, oy, oz) = (W::splat(ox), W::splat(oy), W::splat(oz));
         let (sx, sy) = (W::splat(bundle.middle_shear[0]), W::splat(bundle.middle_shear[1]));
         let (az, bz, cz) = (
-            oz - W::load_twice(&block.corners[0][kz]),
-            oz - W::load_twice(&block.corners[1][kz]),
-            oz - W::load_twice(&block.corners[2][kz]),
+            oz - W::load_twice(&corners[0][kz]),
+            oz - W::load_twice(&corners[1][kz]),
+            oz - W::load_twice(&corners[2][kz]),
         );
         let (ax, bx, cx) = (
-            sx.times_from(az, ox - W::load_twice(&block.corners[0][kx])),
-            sx.times_from(bz, ox - W::load_twice(&block.corners[1][kx])),
-            sx.times_from(cz, ox - W::load_twice(&block.corners[2][kx])),
+            sx.times_from(az, ox - W::load_twice(&corners[0][kx])),
+            sx.times_from(bz, ox - W::load_twice(&corners[1][kx])),
+            sx.times_from(cz, ox - W::load_twice(&corners[2][kx])),
         );
         let (ay, by, cy) = (
-            sy.times_from(az, oy - W::load_twice(&block.corners[0][ky])),
-            sy.times_from(bz, oy - W::load_twice(&block.corners[1][ky])),
-            sy.times_from(cz, oy - W::load_twice(&block.corners[2][ky])),
+            sy.times_from(az, oy - W::load_twice(&corners[0][ky])),
+            sy.times_from(bz, oy - W::load_twice(&corners[1][ky])),
+            sy.times_from(cz, oy - W::load_twice(&corners[2][ky])),
         );
         let (low_x, high_x) = (ax.min(bx).min(cx), ax.max(bx).max(cx));
         let (low_y, high_y) = (ay.min(by).min(cy), ay.max(by).max(cy));
@@ -312,13 +311,12 @@ impl Packet<'_, '_> {
         let w = bx.times_minus(ay, by * ax);
         let off = across_y.times_plus(wide_x, wide_y.times_plus(wide_x, across_x * wide_y));
         let off = off * W::splat(2.0 + 8.0 * CULL_ERROR) + W::splat(TINY);
-        // False for unused lanes, which are NaN.
         let mask = low_x.at_most(wide_x)
             & (zero - wide_x).at_most(high_x)
             & low_y.at_most(wide_y)
             & (zero - wide_y).at_most(high_y)
             & ((zero - off).at_most(u.min(v).min(w)) | u.max(v).max(w).at_most(off))
-            & 0xff;
+            & taken;
         let mut bounds =
             Bounds { mask, error: Row::of(0.0), height_error: Row::of(0.0), extent: Row::of(0.0) };
         if mask != 0 {
@@ -338,7 +336,7 @@ impl Packet<'_, '_> {
     #[inline(always)]
     fn meet_triangle<G: Goal, L: Lanes>(
         &mut self,
-        block: &TriangleBlock,
+        Corners(corners): &Corners,
         number: u32,
         lane: usize,
         bounds: &Bounds,
@@ -353,7 +351,7 @@ impl Packet<'_, '_> {
         let (rx, ry) = (L::Wide::load(&bundle.rest[0]), L::Wide::load(&bundle.rest[1]));
         let (sx, sy) = (L::Wide::load(&bundle.shear[0]), L::Wide::load(&bundle.shear[1]));
         let lane = lane % BLOCK;
-        let at = |corner: usize, axis: usize| block.corners[corner][axis][lane];
+        let at = |corner: usize, axis: usize| corners[corner][axis][lane];
         // As `Lanes::meet_triangles`, with the signs turned.
         let az = oz - L::Wide::splat(at(0, kz));
         let bz = oz - L::Wide::splat(at(1, kz));
@@ -498,16 +496,18 @@ impl Packet<'_, '_> {
     /// Tests a leaf.
     #[inline(always)]
     fn meet_leaf<G: Goal, L: Lanes>(&mut self, leaf: u32) {
-        let places = tag::blocks(leaf);
-        let triangles = self.triangles;
-        for (number, block) in (places.start as u32..).zip(&triangles[places]) {
-            let bounds = self.bounds::<L::Wide>(block);
+        let mut following = Some(leaf & tag::PLACE);
+        while let Some(place) = following {
+            let Some(block) = self.triangles.at(place) else { out_of_tree() };
+            following = block.next(place);
+            let corners = L::corners(block);
+            let bounds = self.bounds::<L::Wide>(&corners, block.taken());
             let mut rest = bounds.mask;
             self.work += 2 + 2 * rest.count_ones();
             while rest != 0 {
                 let lane = rest.trailing_zeros() as usize;
                 rest &= rest - 1;
-                self.meet_triangle::<G, L>(block, number, lane, &bounds);
+                self.meet_triangle::<G, L>(&corners, place, lane, &bounds);
             }
         }
     }
@@ -575,7 +575,7 @@ pub(crate) fn search<G: Goal, L: Lanes>(
     let Some((frustum, bundle, s_max)) = start::<L::Wide>(single, &L::columns(rays)) else { return false };
     let mut packet = Packet {
         exact: Exact::new(accel, single),
-        triangles: &accel.tree.blocks,
+        triangles: accel.tree.blocks(),
         rays,
         frustum,
         bundle,

@@ -7,7 +7,8 @@ use lumbre_geometry::Aabb;
 use lumbre_math::{DMat3, DVec3, Transform, Vec3};
 use rayon::prelude::*;
 
-use crate::build::{Grown, binary_tree, fill};
+use crate::boxes::Boxes;
+use crate::build::{Grown, binary_tree};
 use crate::clouds::CloudSurvey;
 use crate::collapse::{Entry, Packed, lay_out};
 use crate::holds::{Holds, SingleStart};
@@ -47,7 +48,7 @@ pub(crate) fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result
     let tree = if others.len() + packed == 0 {
         Packed::default()
     } else {
-        let mut primitives = fill(packed, Bounds::EMPTY);
+        let mut primitives = Boxes::empty(packed);
         let mut rest = &mut primitives[..];
         for survey in &parts.surveys {
             if let GeometryKind::Mesh(mesh) = &geometries[survey.geometry as usize].kind {
@@ -66,7 +67,7 @@ pub(crate) fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result
         let layout = lay_out(&traits, &tree, &names, &instances)?;
         drop((tree, instances));
         drop(primitives);
-        layout.pack(&geometries, names, cells)
+        layout.pack(level, &geometries, names, cells)?
     };
     let holds = Holds::new(&geometries, parts.largest_corner, parts.sphere_reach);
     Ok(Accel {

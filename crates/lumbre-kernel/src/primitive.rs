@@ -69,7 +69,8 @@ const SECOND: usize = 7;
 
 impl Bounds {
     // Beyond all coordinates, but with a size that does not overflow.
-    pub(crate) const EMPTY: Self = Self { lanes: [1 << 30; 8] };
+    pub(crate) const EMPTY: Self = Self { lanes: [Self::EMPTY_LANE; 8] };
+    pub(crate) const EMPTY_LANE: i32 = 1 << 30;
 
     /// From corners in tree units.
     #[inline(always)]

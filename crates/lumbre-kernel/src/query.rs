@@ -106,7 +106,11 @@ impl MetInParts {
     #[inline]
     pub(crate) fn is_first(&mut self, found: &Found) -> bool {
         match found.what {
-            What::Lane { block, lane } if found.accel.tree.is_part(block, lane) => self.add(found),
+            What::Lane { block, lane }
+                if found.accel.tree.is_part(found.accel.tree.block(block).number(), lane) =>
+            {
+                self.add(found)
+            }
             _ => true,
         }
     }

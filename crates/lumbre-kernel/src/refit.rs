@@ -4,9 +4,10 @@ use std::fmt;
 use std::sync::OnceLock;
 
 use lumbre_geometry::Aabb;
-use lumbre_math::{DVec3, Vec3};
+use lumbre_math::DVec3;
 use rayon::prelude::*;
 
+use crate::blocks::{BlockNames, Blocks};
 use crate::carve::{Carver, LaneCell, cells_in, part_of};
 use crate::clouds::box_of;
 use crate::collapse::Entry;
@@ -17,7 +18,7 @@ use crate::opening::{self, Families, Start};
 use crate::prepare::{Parts, has_area, take_apart, units_of};
 use crate::primitive::Bounds;
 use crate::spheres::{SphereBlock, has_radius};
-use crate::triangles::{BLOCK, BlockNames, TriangleBlock};
+use crate::triangles::BLOCK;
 use crate::{Accel, BuildError, Geometry, GeometryKind, SphereCloud};
 
 /// Why a tree cannot be refitted. It is as it was before.
@@ -88,9 +89,17 @@ pub(crate) fn refit(accel: &mut Accel, geometries: Vec<Geometry>) -> Result<f64,
     check_infinite(accel, &parts)?;
     let built_cost = accel.built_cost.unwrap_or_else(|| cost(&accel.tree.nodes));
     let old = std::mem::replace(&mut accel.geometries, geometries);
-    if let Err(error) = fit(accel, parts) {
-        accel.geometries = old;
-        return Err(error);
+    let places = check_places(accel, &parts).and_then(|places| {
+        // Triangles may share other vertices than before.
+        accel.tree.pack_again(accel.level, &accel.geometries).map_err(RefitError::Unsound)?;
+        Ok(places)
+    });
+    match places {
+        Ok(places) => fit(accel, parts, places),
+        Err(error) => {
+            accel.geometries = old;
+            return Err(error);
+        }
     }
     accel.built_cost = Some(built_cost);
     let cost = cost(&accel.tree.nodes);
@@ -112,12 +121,10 @@ pub(crate) fn check_places(accel: &Accel, parts: &Parts) -> Result<Places, Refit
     entry_boxes(accel, parts)
 }
 
-/// Gives the nodes and blocks of a tree what its geometries, whose parts these are, say. What it refuses leaves the tree as
-/// it was.
-pub(crate) fn fit(accel: &mut Accel, parts: Parts) -> Result<(), RefitError> {
-    let Places { boxes, starts } = check_places(accel, &parts)?;
-
-    // From here on nothing can fail.
+/// Gives the nodes, spheres and entries of a tree what its geometries say, whose parts and places these are. Triangles are packed
+/// already.
+pub(crate) fn fit(accel: &mut Accel, parts: Parts, places: Places) {
+    let Places { boxes, starts } = places;
     let geometries = &accel.geometries;
     let units = units_of(geometries, &parts);
     let carvers = Carver::of_all(geometries, &units);
@@ -130,14 +137,12 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts) -> Result<(), RefitError> {
     }
     let cells = &*tree.cells;
     let block_boxes: Vec<Bounds> = tree
-        .blocks
-        .to_mut()
-        .par_iter_mut()
-        .zip(tree.names.par_iter())
+        .names
+        .par_iter()
         .enumerate()
         .with_min_len(256)
-        .map(|(place, (block, names))| match &carvers[names.geometry as usize] {
-            Some(carver) => fill_block(block, names, cells_in(cells, place), carver),
+        .map(|(number, names)| match &carvers[names.geometry as usize] {
+            Some(carver) => block_box(names, cells_in(cells, number), carver),
             None => Bounds::EMPTY,
         })
         .collect();
@@ -159,7 +164,7 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts) -> Result<(), RefitError> {
 
     // Children stand behind their parents.
     let mut node_boxes = vec![Bounds::EMPTY; tree.nodes.len()];
-    let nodes = tree.nodes.to_mut();
+    let (nodes, blocks) = (tree.nodes.to_mut(), Blocks::new(&tree.blocks));
     for place in (0..nodes.len()).rev() {
         let node = &mut nodes[place];
         let mut whole = Bounds::EMPTY;
@@ -170,7 +175,8 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts) -> Result<(), RefitError> {
             match child >> tag::SHIFT {
                 tag::INNER => around = node_boxes[first],
                 tag::TRIANGLES => {
-                    block_boxes[tag::blocks(child)].iter().for_each(|bounds| around.grow(bounds));
+                    let numbers = blocks.numbers(child).unwrap_or_default();
+                    block_boxes[numbers].iter().for_each(|bounds| around.grow(bounds));
                 }
                 tag::SPHERES => {
                     cloud_boxes[tag::blocks(child)].iter().for_each(|bounds| around.grow(bounds));
@@ -201,7 +207,6 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts) -> Result<(), RefitError> {
     accel.units = units;
     accel.bounds = parts.bounds;
     accel.moments = OnceLock::new();
-    Ok(())
 }
 
 fn is_same_topology(old: &GeometryKind, new: &GeometryKind) -> bool {
@@ -335,30 +340,21 @@ fn entry_boxes(accel: &Accel, parts: &Parts) -> Result<Places, RefitError> {
     Ok(Places { boxes, starts })
 }
 
-/// Takes the corners over; a triangle without area becomes one that is never hit. Of those that are in parts, these are `cells`.
-fn fill_block(block: &mut TriangleBlock, names: &BlockNames, cells: &[LaneCell], carver: &Carver) -> Bounds {
+/// The box around the triangles of a block; those without area have none. Of those that are in parts, these are `cells`.
+fn block_box(names: &BlockNames, cells: &[LaneCell], carver: &Carver) -> Bounds {
     let mut around = Bounds::EMPTY;
-    for (lane, &primitive) in names.primitives.iter().enumerate() {
-        if primitive == u32::MAX {
-            continue;
-        }
+    for (lane, primitive) in names.primitives().enumerate() {
         let mesh = carver.mesh();
         let corners = mesh.indices[primitive as usize].map(|vertex| mesh.positions[vertex as usize]);
-        let is_there = has_area(&corners);
-        if is_there {
-            match cells.iter().find(|at| at.lane as usize % BLOCK == lane) {
-                None => around.grow(&carver.whole(names.geometry, primitive)),
-                // What has moved may have left a cell.
-                Some(at) => {
-                    let part = part_of(&carver.corners(primitive), &at.cell);
-                    part.iter().for_each(|part| around.grow(part));
-                }
-            }
+        if !has_area(&corners) {
+            continue;
         }
-        for (corner, position) in corners.iter().enumerate() {
-            let position = if is_there { *position } else { Vec3::NAN };
-            for axis in 0..3 {
-                block.corners[corner][axis][lane] = position[axis];
+        match cells.iter().find(|at| at.lane as usize % BLOCK == lane) {
+            None => around.grow(&carver.whole(names.geometry, primitive)),
+            // What has moved may have left a cell.
+            Some(at) => {
+                let part = part_of(&carver.corners(primitive), &at.cell);
+                part.iter().for_each(|part| around.grow(part));
             }
         }
     }

@@ -17,16 +17,18 @@
 
 use std::collections::BTreeSet;
 use std::fmt;
+use std::ops::Range;
 
 use crate::accel::Accel;
+use crate::blocks::BlockNames;
 use crate::carve::{Cell, LaneCell, find_incomplete};
 use crate::collapse::{Entry, Packed};
+use crate::lanes::Level;
 use crate::node::{Node, WIDTH, tag};
 use crate::opening::is_part;
 use crate::prepare::{empty_over, take_apart};
 use crate::refit::{self, RefitError};
 use crate::spheres::SphereBlock;
-use crate::triangles::{BlockNames, TriangleBlock};
 use crate::{BuildError, Geometry, GeometryKind};
 
 const MAGIC: [u8; 8] = *b"LumbTree";
@@ -126,11 +128,20 @@ pub(crate) fn to_bytes(accel: &Accel) -> Vec<u8> {
     put(tree.entries.len() as u32);
     put(accel.masks.len() as u32);
     put(tree.cells.len() as u32);
-    put(tree.root.unwrap_or(NONE));
+    // References to triangles number blocks: where these begin is found again.
+    let numbered = |reference: u32| {
+        if reference >> tag::SHIFT == tag::TRIANGLES {
+            let numbers = tree.numbers(reference);
+            tag::triangles(numbers.start as u32, numbers.len() as u32)
+        } else {
+            reference
+        }
+    };
+    put(tree.root.map_or(NONE, numbered));
     accel.geometries.iter().flat_map(signature).for_each(&mut put);
     for node in &tree.nodes {
         put(node.len);
-        node.children[..node.len as usize].iter().copied().for_each(&mut put);
+        node.children[..node.len as usize].iter().map(|&child| numbered(child)).for_each(&mut put);
     }
     for names in tree.names.iter().chain(&tree.sphere_names) {
         put(names.geometry);
@@ -279,15 +290,16 @@ pub(crate) fn from_bytes(bytes: &[u8], geometries: Vec<Geometry>) -> Result<Acce
     }
     let unsound = |error: BuildError| LoadError::OtherGeometries(RefitError::Unsound(error));
     let parts = take_apart(&geometries).map_err(unsound)?;
-    check_structure(&tree, &geometries)?;
+    check_structure(&tree, &geometries, |leaf| Some(tag::blocks(leaf)))?;
     check_names(&tree, &geometries)?;
-    tree.blocks = vec![TriangleBlock::EMPTY; tree.names.len()].into();
+    tree.pack_triangles(Level::best(), &geometries, true).map_err(unsound)?;
     tree.sphere_blocks = vec![SphereBlock::EMPTY; tree.sphere_names.len()].into();
 
     let mut accel = empty_over(geometries);
     accel.tree = tree;
     accel.masks = masks;
-    refit::fit(&mut accel, parts).map_err(LoadError::OtherGeometries)?;
+    let places = refit::check_places(&accel, &parts).map_err(LoadError::OtherGeometries)?;
+    refit::fit(&mut accel, parts, places);
     Ok(accel)
 }
 
@@ -312,8 +324,13 @@ fn inconsistent<T>(what: String) -> Result<T, LoadError> {
     Err(LoadError::Inconsistent { what })
 }
 
-/// Every node but the first, every block and every entry is to be named by one reference, from a node before it.
-pub(crate) fn check_structure(tree: &Packed, geometries: &[Geometry]) -> Result<(), LoadError> {
+/// Every node but the first, every block and every entry is to be named by one reference, from a node before it. `numbers` tells
+/// those of the blocks of a leaf of triangles.
+pub(crate) fn check_structure(
+    tree: &Packed,
+    geometries: &[Geometry],
+    numbers: impl Fn(u32) -> Option<Range<usize>>,
+) -> Result<(), LoadError> {
     let mut nodes = vec![false; tree.nodes.len()];
     let mut blocks = vec![false; tree.names.len()];
     let mut sphere_blocks = vec![false; tree.sphere_names.len()];
@@ -330,11 +347,12 @@ pub(crate) fn check_structure(tree: &Packed, geometries: &[Geometry]) -> Result<
                 if is_behind { once(&mut nodes, place) } else { None }
             }
             tag::TRIANGLES => {
-                are_of_one(&tree.names, reference)?;
-                tag::blocks(reference).try_for_each(|block| once(&mut blocks, block))
+                let numbers = numbers(reference)?;
+                are_of_one(tree.names.get(numbers.clone())?)?;
+                numbers.into_iter().try_for_each(|block| once(&mut blocks, block))
             }
             tag::SPHERES => {
-                are_of_one(&tree.sphere_names, reference)?;
+                are_of_one(tree.sphere_names.get(tag::blocks(reference))?)?;
                 tag::blocks(reference).try_for_each(|block| once(&mut sphere_blocks, block))
             }
             kind @ (tag::SHAPES | tag::INSTANCE | tag::CUSTOM | tag::PRECISE) => {
@@ -379,9 +397,8 @@ pub(crate) fn check_structure(tree: &Packed, geometries: &[Geometry]) -> Result<
     }
 }
 
-/// The blocks of a leaf are to be there, and of one geometry: it has one origin.
-fn are_of_one(names: &[BlockNames], leaf: u32) -> Option<()> {
-    let names = names.get(tag::blocks(leaf))?;
+/// The blocks of a leaf are to be of one geometry: it has one origin.
+fn are_of_one(names: &[BlockNames]) -> Option<()> {
     names.iter().all(|block| block.geometry == names[0].geometry).then_some(())
 }
 

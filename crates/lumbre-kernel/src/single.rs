@@ -16,6 +16,7 @@ use std::marker::PhantomData;
 use lumbre_geometry::{Ray, Root, Roots};
 use lumbre_math::DVec3;
 
+use crate::blocks::{Blocks, TriangleBlock};
 use crate::collapse::Entry;
 use crate::holds::SingleStart;
 use crate::hulls::HullRay;
@@ -25,7 +26,7 @@ use crate::options::{self, Selection};
 use crate::query::All;
 use crate::stack::{AsBuilt, ByDistance, Order, Stack};
 use crate::traverse::{PlacedTree, What};
-use crate::triangles::{self, BLOCK, BlockRay, Meeting, Passage, Shear, TriangleBlock};
+use crate::triangles::{self, BLOCK, BlockRay, Meeting, Passage, Shear};
 use crate::way::{Way, out_of_tree};
 use crate::{Accel, Faces, Hit, InstancePath, traverse};
 
@@ -106,13 +107,13 @@ pub(crate) struct Exact<'a> {
     accel: &'a Accel,
     start: &'a SingleStart,
     // Those of the tree, which may lie in a file.
-    triangles: &'a [TriangleBlock],
+    triangles: Blocks<'a>,
 }
 
 impl<'a> Exact<'a> {
     #[inline(always)]
     pub(crate) fn new(accel: &'a Accel, start: &'a SingleStart) -> Self {
-        Self { accel, start, triangles: &accel.tree.blocks }
+        Self { accel, start, triangles: accel.tree.blocks() }
     }
 
     /// Whether the ray passes by a triangle, or meets it out of its range, as far as that is seen at a glance.
@@ -138,14 +139,16 @@ impl<'a> Exact<'a> {
     pub(crate) fn meet(&self, ray: &Ray, block: u32, lane: u32) -> Meeting {
         let shear = Shear::new(&ray.direction);
         let origin = shear.local_origin(&ray.origin, &DVec3::from_slice(&self.start.mesh_origin));
-        let corners = shear.axes.gather(&self.triangles[block as usize], lane as usize);
+        let Some(block) = self.triangles.at(block) else { out_of_tree() };
+        let corners = shear.axes.gather(block, lane as usize);
         triangles::intersect(ray, shear, origin, corners)
     }
 
     /// Geometry and primitive of a triangle.
     #[inline(always)]
     pub(crate) fn names(&self, block: u32, lane: u32) -> (u32, u32) {
-        let names = &self.accel.tree.names[block as usize];
+        let Some(block) = self.triangles.at(block) else { out_of_tree() };
+        let names = &self.accel.tree.names[block.number() as usize];
         (names.geometry, names.primitives[lane as usize % BLOCK])
     }
 
@@ -173,7 +176,7 @@ impl<'a> Exact<'a> {
         &Candidate { block, lane, .. }: &Candidate,
     ) -> Option<Winner> {
         let (shear, origin) = L::shear(ray, axes, &self.start.mesh_origin);
-        let corners = &self.triangles[block as usize];
+        let Some(corners) = self.triangles.at(block) else { out_of_tree() };
         let (passage, inside) = L::pass(corners, lane as usize, &shear, &origin);
         let root = if passage == Passage::Inside {
             inside.root(inside.t(&shear))
@@ -313,7 +316,7 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
     #[inline(always)]
     fn select<L: Lanes>(
         &self,
-        block: u32,
+        block: &TriangleBlock,
         mask: u32,
         edges: &L::Edges,
         crossings: &Crossings<L::Floats>,
@@ -328,22 +331,24 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
             Faces::Back => mask & !(crossings.sure & L::fronts(edges)),
         };
         // Names stand elsewhere, and most blocks have nothing left to be asked about.
-        if mask == 0 { 0 } else { mask & self.selection.lanes(&self.exact.accel.tree.names[block as usize]) }
+        if mask == 0 {
+            0
+        } else {
+            mask & self.selection.lanes(&self.exact.accel.tree.names[block.number() as usize])
+        }
     }
 
     /// Tests a leaf of triangles for the nearest hit; false where the plain search has to answer.
     #[inline(always)]
     fn meet_leaf_closest<L: Lanes>(&mut self, leaf: u32, ray: &Ray, way: &mut Way<L>) -> bool {
         // One at least, and mostly no more.
-        let places = tag::blocks(leaf);
-        let mut place = places.start;
+        let mut place = leaf & tag::PLACE;
         loop {
-            let Some(block) = self.exact.triangles.get(place) else { out_of_tree() };
+            let Some(block) = self.exact.triangles.at(place) else { out_of_tree() };
             let (mask, edges) = L::meet_triangles(block, lanes::opaque(&self.blocks));
             if mask != 0 {
-                let number = place as u32;
                 let crossings = L::place_crossings(&edges, &self.blocks);
-                let mask = self.select::<L>(number, mask, &edges, &crossings);
+                let mask = self.select::<L>(block, mask, &edges, &crossings);
                 let mut rest = mask & crossings.in_range;
                 while rest != 0 {
                     let lane = rest.trailing_zeros();
@@ -351,14 +356,14 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
                     rest &= rest - 1;
                     let (from, to) = crossings.between::<L>(lane as usize);
                     if is_sure && to < self.best.from {
-                        self.keep(Candidate { block: number, lane, from, to }, way);
+                        self.keep(Candidate { block: place, lane, from, to }, way);
                     } else if from > self.best.to
                         || self.exact.passes::<L>(ray, self.blocks.axes, block, lane)
                     {
                         // Farther, which what is no number is not; or not met at all.
                         continue;
                     } else {
-                        match self.contest(ray, number, lane) {
+                        match self.contest(ray, place, lane) {
                             Outcome::Settled(Some(better)) => self.keep(better, way),
                             Outcome::Settled(None) => {}
                             Outcome::Unsettled => return false,
@@ -366,9 +371,9 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
                     }
                 }
             }
-            place += 1;
-            if place == places.end {
-                return true;
+            match block.next(place) {
+                Some(next) => place = next,
+                None => return true,
             }
         }
     }
@@ -500,15 +505,13 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
     #[inline(always)]
     fn meet_leaf_any<L: Lanes>(&self, leaf: u32, ray: &Ray) -> Outcome<bool> {
         // One at least, and mostly no more.
-        let places = tag::blocks(leaf);
-        let mut place = places.start;
+        let mut place = leaf & tag::PLACE;
         loop {
-            let Some(block) = self.exact.triangles.get(place) else { out_of_tree() };
+            let Some(block) = self.exact.triangles.at(place) else { out_of_tree() };
             let (mask, edges) = L::meet_triangles(block, lanes::opaque(&self.blocks));
             if mask != 0 {
-                let number = place as u32;
                 let crossings = L::place_crossings(&edges, &self.blocks);
-                let mask = self.select::<L>(number, mask, &edges, &crossings);
+                let mask = self.select::<L>(block, mask, &edges, &crossings);
                 if mask & crossings.sure != 0 {
                     return Outcome::Settled(true);
                 }
@@ -519,7 +522,7 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
                     if self.exact.passes::<L>(ray, self.blocks.axes, block, lane) {
                         continue;
                     }
-                    match self.exact.meet(ray, number, lane) {
+                    match self.exact.meet(ray, place, lane) {
                         Meeting::Miss => {}
                         Meeting::Hit { is_front, .. } => {
                             if self.selection.faces().have(is_front) {
@@ -530,9 +533,9 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
                     }
                 }
             }
-            place += 1;
-            if place == places.end {
-                return Outcome::Settled(false);
+            match block.next(place) {
+                Some(next) => place = next,
+                None => return Outcome::Settled(false),
             }
         }
     }

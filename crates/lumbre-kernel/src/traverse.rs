@@ -10,6 +10,7 @@ use lumbre_geometry::{Ray, Root, Roots};
 use lumbre_math::DVec3;
 use smallvec::SmallVec;
 
+use crate::blocks::{Blocks, TriangleBlock};
 use crate::collapse::Entry;
 use crate::holds::SingleStart;
 use crate::hulls::HullRay;
@@ -21,8 +22,8 @@ use crate::sphere_search::{self, AmongSpheres, CloudRay};
 use crate::spheres::ExactSphere;
 use crate::stack::{Order, Stack};
 use crate::touch::{self, AllTouches, Touch};
-use crate::triangles::{self, BLOCK, BlockRay, HeightRange, Inside, Passage, Shear, TriangleBlock};
-use crate::way::Way;
+use crate::triangles::{self, BLOCK, BlockRay, HeightRange, Inside, Passage, Shear};
+use crate::way::{Way, out_of_tree};
 use crate::{Accel, GeometryKind, InstancePath, options, precise};
 
 /// What a search asks of a primitive that may be crossed more than once.
@@ -125,7 +126,7 @@ pub(crate) struct Found<'a, 'p> {
 /// What is crossed.
 #[derive(Clone, Copy)]
 pub(crate) enum What {
-    /// The triangle in a lane of a block, whose name is looked up when it is wanted.
+    /// The triangle in a lane of the block that begins there, whose name is looked up when it is wanted.
     Lane { block: u32, lane: u32 },
     /// The sphere in a lane of a block, alike.
     Sphere { block: u32, lane: u32 },
@@ -139,7 +140,7 @@ impl What {
     pub(crate) fn names(self, accel: &Accel) -> (u32, u32) {
         match self {
             Self::Lane { block, lane } => {
-                let names = &accel.tree.names[block as usize];
+                let names = &accel.tree.names[accel.tree.block(block).number() as usize];
                 (names.geometry, names.primitives[lane as usize % BLOCK])
             }
             Self::Sphere { block, lane } => {
@@ -205,7 +206,7 @@ pub(crate) struct Frame<'a, R, L> {
     accel: &'a Accel,
     // Those of the tree, which may lie in a file.
     way: Way<'a, L>,
-    blocks: &'a [TriangleBlock],
+    blocks: Blocks<'a>,
     pub(crate) ray: R,
     progress: Progress,
     limit: f64,
@@ -266,7 +267,7 @@ impl<'a, R: Borrow<Ray>, L: Lanes> Frame<'a, R, L> {
         Self {
             accel,
             way,
-            blocks: &accel.tree.blocks,
+            blocks: accel.tree.blocks(),
             ray,
             progress: boxes.progress,
             limit,
@@ -295,9 +296,9 @@ impl<'a, R: Borrow<Ray>, L: Lanes> Frame<'a, R, L> {
 
     /// Turns to the mesh of a block, where meshes have different origins.
     #[inline(always)]
-    fn turn_to(&mut self, block: usize) {
+    fn turn_to(&mut self, block: &TriangleBlock) {
         if !self.accel.holds.has_one_origin {
-            let mesh_origin = self.accel.mesh_origin(self.accel.tree.names[block].geometry);
+            let mesh_origin = self.accel.mesh_origin(self.accel.tree.names[block.number() as usize].geometry);
             let largest = self.accel.holds.largest_corner;
             let range = [self.floor, self.limit];
             self.mesh = MeshRay::new(self.mesh.shear, self.ray.borrow(), &mesh_origin, largest, range);
@@ -530,14 +531,19 @@ fn meet_blocks<'a, R: Borrow<Ray>, L: Lanes, S: Search<'a>>(
     touches: &mut Vec<Touch<'a>>,
 ) -> bool {
     let accel = frame.accel;
-    let places = tag::blocks(leaf);
-    frame.turn_to(places.start);
-    let mut number = places.start as u32;
-    for block in &frame.blocks[places] {
+    let mut following = Some(leaf & tag::PLACE);
+    let mut is_first = true;
+    while let Some(number) = following {
+        let Some(block) = frame.blocks.at(number) else { out_of_tree() };
+        following = block.next(number);
+        if is_first {
+            // All of a leaf are of one mesh.
+            frame.turn_to(block);
+            is_first = false;
+        }
         let mut mask = if let Some(blocks) = &frame.mesh.blocks {
             let (mask, edges) = L::meet_triangles(block, blocks);
             if mask == 0 {
-                number += 1;
                 continue;
             }
             let crossings = L::place_crossings(&edges, blocks);
@@ -547,7 +553,7 @@ fn meet_blocks<'a, R: Borrow<Ray>, L: Lanes, S: Search<'a>>(
             }
             crossings.in_range & mask
         } else {
-            (1 << BLOCK) - 1
+            block.taken()
         };
         while mask != 0 {
             let lane = mask.trailing_zeros() as usize % BLOCK;
@@ -572,7 +578,6 @@ fn meet_blocks<'a, R: Borrow<Ray>, L: Lanes, S: Search<'a>>(
                 frame.narrow(search);
             }
         }
-        number += 1;
     }
     false
 }
@@ -592,7 +597,7 @@ fn meet_unclear<'a, S: Search<'a>>(
     touches: &mut Vec<Touch<'a>>,
 ) -> bool {
     let What::Lane { block, lane } = what else { unreachable!("triangles are in blocks") };
-    let (block, lane) = (&accel.tree.blocks[block as usize], lane as usize);
+    let (block, lane) = (accel.tree.block(block), lane as usize);
     let meeting = triangles::intersect(ray, shear, origin, shear.axes.gather(block, lane));
     let corners = block.triangle(lane).map(|corner| corner.map(f64::from));
     touch::offer_meeting(meeting, ray, corners, what, accel, place, search, touches)

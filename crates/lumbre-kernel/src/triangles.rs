@@ -1,4 +1,4 @@
-//! Triangles packed by eight, and the watertight test.
+//! The watertight test of triangles, alone and by eight.
 //!
 //! After S. Woop, C. Benthin, I. Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013. It differs from theirs in
 //! three ways. Everything after the load is in f64. An edge function whose products are equal is redone exactly, so that
@@ -8,78 +8,14 @@
 //! triangle: such a ray crosses a closed mesh an even number of times and meets no edge and no vertex, so that each
 //! crossing has exactly one owner.
 
-use bytemuck::{Pod, Zeroable};
 use lumbre_geometry::{Ray, Root};
 use lumbre_math::{DVec2, DVec3};
 
-use crate::build::Name;
 use crate::lanes::Axes;
 use crate::touch::Feature;
 
 /// Triangles in a block.
 pub(crate) const BLOCK: usize = 8;
-
-/// Up to eight triangles of one mesh. Unused lanes have NaN corners, which no ray hits.
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-#[repr(C, align(32))]
-pub(crate) struct TriangleBlock {
-    /// `corners[corner][axis][lane]`, relative to the mesh's origin.
-    pub(crate) corners: [[[f32; BLOCK]; 3]; 3],
-}
-
-const _: () = assert!(size_of::<TriangleBlock>() == 288);
-
-/// What the triangles of a block are called: apart from their corners, for only the winner of a search is asked.
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-#[repr(C)]
-pub(crate) struct BlockNames {
-    /// Positions in the mesh's list.
-    pub(crate) primitives: [u32; BLOCK],
-    /// Position of the mesh in the tree's list.
-    pub(crate) geometry: u32,
-}
-
-impl BlockNames {
-    /// A bit for each lane that has this primitive of the geometry.
-    #[inline(always)]
-    pub(crate) fn lanes_of(&self, primitive: u32) -> u32 {
-        let mut lanes = 0;
-        for (lane, &own) in self.primitives.iter().enumerate() {
-            lanes |= u32::from(own == primitive) << lane;
-        }
-        lanes
-    }
-
-    /// The names in a block without triangles.
-    pub(crate) fn empty(geometry: u32) -> Self {
-        Self { primitives: [u32::MAX; BLOCK], geometry }
-    }
-
-    /// Of primitives of one geometry: one or more, and no more than fit.
-    pub(crate) fn of(names: &[Name]) -> Self {
-        let mut named = Self::empty(names[0][0]);
-        for (place, name) in named.primitives.iter_mut().zip(names) {
-            *place = name[1];
-        }
-        named
-    }
-
-    /// The positions of those that are there.
-    #[inline(always)]
-    pub(crate) fn primitives(&self) -> impl Iterator<Item = u32> {
-        self.primitives.into_iter().take_while(|&primitive| primitive != u32::MAX)
-    }
-}
-
-impl TriangleBlock {
-    /// A block without triangles.
-    pub(crate) const EMPTY: Self = Self { corners: [[[f32::NAN; BLOCK]; 3]; 3] };
-
-    /// The corners in one lane.
-    pub(crate) fn triangle(&self, lane: usize) -> [[f32; 3]; 3] {
-        self.corners.map(|axes| axes.map(|lanes| lanes[lane]))
-    }
-}
 
 /// The shear that turns a ray's direction into the last axis: once a ray.
 #[derive(Clone, Copy, Debug)]

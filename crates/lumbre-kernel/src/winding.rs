@@ -14,11 +14,12 @@ use lumbre_geometry::{Shape, similarity_factor};
 use lumbre_math::{DMat3, DVec3};
 use rayon::prelude::*;
 
+use crate::blocks::BlockNames;
 use crate::nearest::Frame;
 use crate::node::{Node, WIDTH, tag};
 use crate::prepare::has_area;
 use crate::spheres::ExactSphere;
-use crate::triangles::{BLOCK, BlockNames};
+use crate::triangles::BLOCK;
 use crate::{Accel, GeometryKind, InstancePath, PreciseMesh, TriangleMesh, precise};
 
 /// Why there is no winding number: an open shape, or custom geometry that offers none.
@@ -296,7 +297,7 @@ impl Moments {
             for &child in &node.children[..node.len as usize] {
                 match child >> tag::SHIFT {
                     tag::INNER => parts.push(nodes[(child & tag::PLACE) as usize]),
-                    tag::TRIANGLES => parts.extend_from_slice(&blocks[tag::blocks(child)]),
+                    tag::TRIANGLES => parts.extend_from_slice(&blocks[tree.numbers(child)]),
                     tag::PRECISE => for_each_precise(accel, child, accel.units.origin, |corners| {
                         parts.push(Moment::of_triangle(corners));
                     }),
@@ -338,7 +339,7 @@ impl Moments {
                     stack.extend_from_slice(&node.children[..node.len as usize]);
                 }
                 tag::TRIANGLES => {
-                    let places = tag::blocks(reference);
+                    let places = accel.tree.numbers(reference);
                     for (place, names) in places.clone().zip(&accel.tree.names[places]) {
                         let GeometryKind::Mesh(mesh) = &accel.geometries[names.geometry as usize].kind else {
                             continue;

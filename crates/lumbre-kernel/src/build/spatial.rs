@@ -254,8 +254,8 @@ impl Spatial<'_, '_> {
             Binary::twig(nodes)
         } else {
             let sketch = self.builder.sketch::<false>(&mut boxes, depth, None);
-            let plot = Plot { primitives: &mut boxes, names, first: room.first, keeps: false };
-            self.builder.grow::<false>(&sketch, &[], plot).into_owned()
+            let plot = Plot { primitives: &mut boxes, names: Some(names), first: room.first, keeps: false };
+            self.builder.grow::<false>(&sketch, &[], plot)
         };
         for (name, cell) in room.names[..count].iter_mut().zip(room.cells) {
             let place = name[1] as usize;

@@ -17,11 +17,12 @@ use std::mem::MaybeUninit;
 use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
 
+use crate::blocks::{ROOMS, TriangleBlock};
 use crate::holds::SingleStart;
 use crate::node::{BoxRay, Node, Slabs, Units, WIDTH};
 use crate::packet::Frustum;
 use crate::stack::STACK;
-use crate::triangles::{BLOCK, BlockRay, Inside, Passage, ROUNDINGS, Shear, TriangleBlock};
+use crate::triangles::{BLOCK, BlockRay, Inside, Passage, ROUNDINGS, Shear};
 
 #[cfg(test)]
 pub(crate) use hulls::meet_hulls_at;
@@ -79,6 +80,12 @@ pub(crate) trait Lanes: SphereLanes + HullLanes {
     /// wants to know: see [`BlockRay`].
     fn meet_triangles(block: &TriangleBlock, ray: &BlockRay) -> (u32, Self::Edges);
 
+    /// A bit for each place in a list that has this number.
+    fn places_of(list: &[u32; 3 * BLOCK], number: u32) -> u32;
+
+    /// The corners of the triangles of a block.
+    fn corners(block: &TriangleBlock) -> Corners;
+
     /// Where along the ray that is.
     fn place_crossings(edges: &Self::Edges, ray: &BlockRay) -> Crossings<Self::Floats>;
 
@@ -97,6 +104,10 @@ pub(crate) trait Lanes: SphereLanes + HullLanes {
     /// How a ray passes the triangle in a lane, in double precision, and what its crossing inside is made of. `origin` has the order of the shear's axes.
     fn pass(block: &TriangleBlock, lane: usize, shear: &Shear, origin: &[f64; 3]) -> (Passage, Inside);
 }
+
+/// Corners of triangles side by side, `[corner][axis][lane]`; those of lanes without a triangle mean nothing.
+#[repr(align(32))]
+pub(crate) struct Corners(pub(crate) [[[f32; BLOCK]; 3]; 3]);
 
 /// Where a ray may meet the triangles of a block.
 #[derive(Clone, Copy)]
@@ -161,10 +172,10 @@ impl Sides {
 pub(crate) struct Axes {
     // Each below three; the fourth only fills up.
     order: [u32; 4],
+    // Where the coordinates along each begin in blocks of each room.
+    rows_by_room: [[usize; 3]; ROOMS.len()],
     // The halves of each.
     halves: [u32; 8],
-    // Where the lanes of each begin among those of a corner: eight times as much.
-    lanes: [usize; 3],
 }
 
 impl Axes {
@@ -176,7 +187,13 @@ impl Axes {
             halves[half] = 2 * order[half / 2] + half as u32 % 2;
             half += 1;
         }
-        Self { order, halves, lanes: [x * BLOCK, y * BLOCK, z * BLOCK] }
+        let mut rows_by_room = [[0; 3]; ROOMS.len()];
+        let mut i = 0;
+        while i < ROOMS.len() {
+            rows_by_room[i] = [x * ROOMS[i], y * ROOMS[i], z * ROOMS[i]];
+            i += 1;
+        }
+        Self { order, halves, rows_by_room }
     }
 }
 
@@ -250,15 +267,24 @@ impl Axes {
         [at(self.order[0]), at(self.order[1]), at(self.order[2])]
     }
 
+    /// Where the coordinates of a block's vertices along each begin: no further than at twice 31, of 96.
+    #[inline(always)]
+    fn rows(&self, block: &TriangleBlock) -> [usize; 3] {
+        let room = block.room();
+        [self.order[0], self.order[1], self.order[2]].map(|axis| axis as usize * room)
+    }
+
     /// The corners in one lane of a block, each in this order.
     #[inline(always)]
     pub(crate) fn gather(&self, block: &TriangleBlock, lane: usize) -> [[f32; 3]; 3] {
-        let lanes = block.corners.as_flattened().as_flattened();
-        let [x, y, z] = self.lanes;
-        let lane = lane % BLOCK;
-        // SAFETY: the place is at most 24 · 2 + 8 · 2 + 7, in an array of 72.
-        let at = |corner: usize, axis: usize| unsafe { *lanes.get_unchecked(24 * corner + axis + lane) };
-        [[at(0, x), at(0, y), at(0, z)], [at(1, x), at(1, y), at(1, z)], [at(2, x), at(2, y), at(2, z)]]
+        let coordinates = block.coordinates();
+        let [x, y, z] = self.rows(block);
+        [0, 1, 2].map(|corner| {
+            let vertex = block.vertex_at(corner, lane);
+            // SAFETY: see `rows`; a vertex is below 32.
+            let at = |row: usize| unsafe { *coordinates.get_unchecked(row + vertex) };
+            [at(x), at(y), at(z)]
+        })
     }
 }
 
@@ -515,4 +541,18 @@ pub(crate) fn meet_triangles_at(
         }
     }
     level.run(Triangles(block, ray))
+}
+
+/// [`Lanes::corners`] at a level, for tests.
+#[cfg(test)]
+pub(crate) fn corners_at(level: Level, block: &TriangleBlock) -> [[[f32; BLOCK]; 3]; 3] {
+    struct Taking<'a>(&'a TriangleBlock);
+    impl Task for Taking<'_> {
+        type Output = [[[f32; BLOCK]; 3]; 3];
+        #[inline(always)]
+        fn run<L: Lanes>(self) -> Self::Output {
+            L::corners(self.0).0
+        }
+    }
+    level.run(Taking(block))
 }

@@ -5,14 +5,14 @@ use std::mem::MaybeUninit;
 use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
 
-use super::{Axes, Crossings, LANE_BITS, Lanes, Level, Room, Row, Set, Sides, WIDE};
+use super::{Axes, Corners, Crossings, LANE_BITS, Lanes, Level, Room, Row, Set, Sides, WIDE};
+use crate::blocks::TriangleBlock;
 use crate::holds::SingleStart;
 use crate::node::{BoxRay, END_FACTOR, LITTLE, Node, START_FACTOR, Slabs, Units, WIDTH};
 use crate::packet::Frustum;
 use crate::stack::stack_entry;
 use crate::triangles::{
-    BLOCK, BlockRay, EDGE_ERROR, HEIGHT_ERROR, HeightRange, Inside, Passage, SIZE_ERROR, Shear, TINY,
-    TriangleBlock, passage,
+    BLOCK, BlockRay, EDGE_ERROR, HEIGHT_ERROR, HeightRange, Inside, Passage, SIZE_ERROR, Shear, TINY, passage,
 };
 
 pub(crate) struct Portable;
@@ -223,11 +223,11 @@ impl Lanes for Portable {
         let mut x = [[0.0; BLOCK]; 3];
         let mut y = [[0.0; BLOCK]; 3];
         let mut z = [[0.0; BLOCK]; 3];
-        let [kx, ky, kz] = ray.axes.lanes;
+        let [kx, ky, kz] = ray.axes.order();
         let (origin, rest, shear) = (&ray.origin, &ray.rest, &ray.shear);
+        let Corners(corners) = Self::corners(block);
         for corner in 0..3 {
-            let lanes = block.corners[corner].as_flattened();
-            let (across, up, along) = (&lanes[kx..][..BLOCK], &lanes[ky..][..BLOCK], &lanes[kz..][..BLOCK]);
+            let [across, up, along] = [kx, ky, kz].map(|axis| &corners[corner][axis]);
             for lane in 0..BLOCK {
                 // All three with the sign turned, which their products do not have.
                 let height = origin[2] - along[lane];
@@ -248,11 +248,24 @@ impl Lanes for Portable {
             error[lane] = (size * EDGE_ERROR) * (size * SIZE_ERROR + across) + TINY;
             height_error[lane] = size * HEIGHT_ERROR;
             let (least, most) = (u.min(v).min(w), u.max(v).max(w));
-            // Comparisons with a NaN, which unused lanes have, are false.
             mask |= u32::from(least >= -error[lane] || most <= error[lane]) << lane;
             (values[0][lane], values[1][lane], values[2][lane]) = (u, v, w);
         }
-        (mask, Edges { values, heights: z, error, height_error })
+        (mask & block.taken(), Edges { values, heights: z, error, height_error })
+    }
+
+    #[inline(always)]
+    fn places_of(list: &[u32; 3 * BLOCK], number: u32) -> u32 {
+        list.iter().enumerate().fold(0, |places, (at, &other)| places | u32::from(other == number) << at)
+    }
+
+    #[inline(always)]
+    fn corners(block: &TriangleBlock) -> Corners {
+        let (rows, room) = (block.coordinates(), block.room());
+        Corners([0, 1, 2].map(|corner| {
+            let vertices: [usize; BLOCK] = std::array::from_fn(|lane| block.vertex_at(corner, lane));
+            [0, 1, 2].map(|axis| vertices.map(|vertex| rows[axis * room + vertex]))
+        }))
     }
 
     #[inline(always)]

@@ -5,7 +5,10 @@ use std::mem::{MaybeUninit, offset_of};
 
 use lumbre_geometry::Ray;
 
-use super::{Axes, Crossings, LANE_BITS, Lanes, Level, Room, Row, Set, Sides, Task, WIDE, Wide, wide};
+use super::{
+    Axes, Corners, Crossings, LANE_BITS, Lanes, Level, Room, Row, Set, Sides, Task, WIDE, Wide, wide,
+};
+use crate::blocks::{MOST_SHARED, TriangleBlock, USUAL};
 use crate::holds::SingleStart;
 use crate::node::{
     BoxRay, END_FACTOR, LARGEST_NEAR, LITTLE, Node, SMALLEST_NEAR, START_FACTOR, Slabs, TINY_NEAR, Units,
@@ -15,7 +18,7 @@ use crate::packet::Frustum;
 use crate::stack::stack_entry;
 use crate::triangles::{
     BLOCK, BlockRay, EDGE_ERROR, FAR, HEIGHT_ERROR, HeightRange, Inside, Passage, ROUNDINGS, SIZE_ERROR,
-    Shear, TINY, TriangleBlock,
+    Shear, TINY,
 };
 
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
@@ -142,11 +145,119 @@ impl<const AVX512: bool> X86<AVX512> {
     /// A component of three corners, the first of which is here.
     ///
     /// # Safety
-    /// The others are 24 and 48 further.
+    /// They are so far behind `row`.
     #[inline(always)]
-    unsafe fn component(first: *const f32) -> __m256d {
+    unsafe fn component(row: *const f32, [a, b, c]: [usize; 3]) -> __m256d {
         // SAFETY: see `X86`, and above.
-        unsafe { _mm256_cvtps_pd(_mm_setr_ps(*first, *first.add(24), *first.add(48), 0.0)) }
+        unsafe { _mm256_cvtps_pd(_mm_setr_ps(*row.add(a), *row.add(b), *row.add(c), 0.0)) }
+    }
+
+    /// Eight numbers of sixteen, `low` and `high`, each by its place.
+    #[inline(always)]
+    fn of_two(low: __m256, high: __m256, places: __m256i) -> __m256 {
+        // SAFETY: see `X86`.
+        unsafe {
+            let is_high = _mm256_castsi256_ps(_mm256_slli_epi32::<28>(places));
+            let (low, high) = (_mm256_permutevar8x32_ps(low, places), _mm256_permutevar8x32_ps(high, places));
+            _mm256_blendv_ps(low, high, is_high)
+        }
+    }
+
+    /// The places of eight vertices, of four bits each: of more bits, what is above means nothing.
+    #[inline(always)]
+    fn places(vertices: u32) -> __m256i {
+        // SAFETY: see `X86`.
+        unsafe {
+            let shifts = _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28);
+            _mm256_srlv_epi32(_mm256_set1_epi32(vertices as i32), shifts)
+        }
+    }
+
+    /// The corners of the triangles of a block in the ray's sheared space, `[x, y or z][corner]`, all with the sign turned, which
+    /// their products do not have: so one operand can come from memory. What lanes without a triangle have means nothing.
+    #[inline(always)]
+    fn sheared_corners(block: &TriangleBlock, ray: &BlockRay) -> [[__m256; 3]; 3] {
+        // Nothing waits for a block to say where its rows are, as long as that is foreseen: hence the branches, which the
+        // compiler must not take out.
+        let room = block.room();
+        let rows = if room == USUAL[0] {
+            super::opaque(&ray.axes.rows_by_room[0])
+        } else if room == USUAL[1] {
+            super::opaque(&ray.axes.rows_by_room[1])
+        } else if room <= MOST_SHARED {
+            super::opaque(&ray.axes.rows_by_room[2])
+        } else {
+            super::opaque(&ray.axes.rows_by_room[3])
+        };
+        if room > MOST_SHARED {
+            let eight = |corner: usize| rows.map(|row| row + BLOCK * corner);
+            let a = Self::sheared_eight(block, ray, eight(0));
+            let b = Self::sheared_eight(block, ray, eight(1));
+            let c = Self::sheared_eight(block, ray, eight(2));
+            return [[a[0], b[0], c[0]], [a[1], b[1], c[1]], [a[2], b[2], c[2]]];
+        }
+        // SAFETY: see `X86`.
+        let mut corners = [[unsafe { _mm256_setzero_ps() }; 3]; 3];
+        if AVX512 {
+            let vertices = Self::sheared_sixteen(block, super::opaque(ray), *rows);
+            for (corner, &places) in block.corners().iter().enumerate() {
+                let places = Self::places(places);
+                for axis in 0..3 {
+                    corners[axis][corner] = Self::of_sixteen(vertices[axis], places);
+                }
+            }
+        } else {
+            let low = Self::sheared_eight(block, ray, *rows);
+            let high = Self::sheared_eight(block, ray, rows.map(|row| row + BLOCK));
+            for (corner, &places) in block.corners().iter().enumerate() {
+                let places = Self::places(places);
+                for axis in 0..3 {
+                    corners[axis][corner] = Self::of_two(low[axis], high[axis], places);
+                }
+            }
+        }
+        corners
+    }
+
+    /// Eight vertices from these places on.
+    #[inline(always)]
+    fn sheared_eight(block: &TriangleBlock, ray: &BlockRay, [kx, ky, kz]: [usize; 3]) -> [__m256; 3] {
+        let rows = block.coordinates();
+        // SAFETY: see `X86`. Rows begin at 48 at most, and no more of them than 24 are looked at, in an array of 96.
+        unsafe {
+            let load = |at: usize| _mm256_loadu_ps(rows.as_ptr().add(at));
+            let (shear_x, shear_y) = (_mm256_set1_ps(ray.shear[0]), _mm256_set1_ps(ray.shear[1]));
+            let z = _mm256_sub_ps(_mm256_set1_ps(ray.origin[2]), load(kz));
+            let across = _mm256_sub_ps(_mm256_set1_ps(ray.origin[0]), load(kx));
+            let up = _mm256_sub_ps(_mm256_set1_ps(ray.origin[1]), load(ky));
+            let x = _mm256_fnmadd_ps(shear_x, z, _mm256_add_ps(across, _mm256_set1_ps(ray.rest[0])));
+            let y = _mm256_fnmadd_ps(shear_y, z, _mm256_add_ps(up, _mm256_set1_ps(ray.rest[1])));
+            [x, y, z]
+        }
+    }
+
+    /// Sixteen vertices. For AVX-512 alone.
+    #[inline(always)]
+    fn sheared_sixteen(block: &TriangleBlock, ray: &BlockRay, [kx, ky, kz]: [usize; 3]) -> [__m512; 3] {
+        let rows = block.coordinates();
+        // SAFETY: as there.
+        unsafe {
+            let load = |at: usize| _mm512_loadu_ps(rows.as_ptr().add(at));
+            let (shear_x, shear_y) = (_mm512_set1_ps(ray.shear[0]), _mm512_set1_ps(ray.shear[1]));
+            let z = _mm512_sub_ps(_mm512_set1_ps(ray.origin[2]), load(kz));
+            let across = _mm512_sub_ps(_mm512_set1_ps(ray.origin[0]), load(kx));
+            let up = _mm512_sub_ps(_mm512_set1_ps(ray.origin[1]), load(ky));
+            let x = _mm512_fnmadd_ps(shear_x, z, _mm512_add_ps(across, _mm512_set1_ps(ray.rest[0])));
+            let y = _mm512_fnmadd_ps(shear_y, z, _mm512_add_ps(up, _mm512_set1_ps(ray.rest[1])));
+            [x, y, z]
+        }
+    }
+
+    /// Eight of sixteen numbers, each by its place. For AVX-512 alone.
+    #[inline(always)]
+    fn of_sixteen(numbers: __m512, places: __m256i) -> __m256 {
+        // SAFETY: see `X86`.
+        unsafe { _mm512_castps512_ps256(_mm512_permutexvar_ps(_mm512_castsi256_si512(places), numbers)) }
     }
 
     /// The numbers of a ray, eight at least: see above.
@@ -532,27 +643,9 @@ where
 
     #[inline(always)]
     fn meet_triangles(block: &TriangleBlock, ray: &BlockRay) -> (u32, Edges) {
-        let corners = block.corners.as_flattened().as_flattened().as_ptr();
-        let [kx, ky, kz] = ray.axes.lanes;
-        // SAFETY: see `X86`. The loads are of eight f32 in an array of 3 · 3 · 8, at 24 corner + 8 axis; the axes are below
-        // three.
+        let [x, y, z] = Self::sheared_corners(block, ray);
+        // SAFETY: see `X86`.
         unsafe {
-            let (ox, oy, oz) =
-                (_mm256_set1_ps(ray.origin[0]), _mm256_set1_ps(ray.origin[1]), _mm256_set1_ps(ray.origin[2]));
-            let (shear_x, shear_y) = (_mm256_set1_ps(ray.shear[0]), _mm256_set1_ps(ray.shear[1]));
-            let (rest_x, rest_y) = (_mm256_set1_ps(ray.rest[0]), _mm256_set1_ps(ray.rest[1]));
-            let mut x = [_mm256_setzero_ps(); 3];
-            let mut y = [_mm256_setzero_ps(); 3];
-            let mut z = [_mm256_setzero_ps(); 3];
-            for corner in 0..3 {
-                let axes = corners.add(24 * corner);
-                // All three with the sign turned, which their products do not have: one operand can come from memory.
-                z[corner] = _mm256_sub_ps(oz, _mm256_loadu_ps(axes.add(kz)));
-                let across = _mm256_sub_ps(ox, _mm256_loadu_ps(axes.add(kx)));
-                let up = _mm256_sub_ps(oy, _mm256_loadu_ps(axes.add(ky)));
-                x[corner] = _mm256_fnmadd_ps(shear_x, z[corner], _mm256_add_ps(across, rest_x));
-                y[corner] = _mm256_fnmadd_ps(shear_y, z[corner], _mm256_add_ps(up, rest_y));
-            }
             let u = _mm256_fmsub_ps(x[2], y[1], _mm256_mul_ps(y[2], x[1]));
             let v = _mm256_fmsub_ps(x[0], y[2], _mm256_mul_ps(y[0], x[2]));
             let w = _mm256_fmsub_ps(x[1], y[0], _mm256_mul_ps(y[1], x[0]));
@@ -570,12 +663,51 @@ where
             let height_error = _mm256_mul_ps(size, _mm256_set1_ps(HEIGHT_ERROR));
             let least = _mm256_min_ps(_mm256_min_ps(u, v), w);
             let most = _mm256_max_ps(_mm256_max_ps(u, v), w);
-            // Comparisons with a NaN, which unused lanes have, are false. A minimum of a NaN and a number is that number
-            // or the NaN: unused lanes have nothing but NaN.
             let minus_error = _mm256_xor_ps(error, _mm256_set1_ps(-0.0));
             let mask = Self::either::<_CMP_GE_OQ, _CMP_LE_OQ>([least, minus_error], [most, error]);
+            let mask = mask & block.taken();
             (mask, Edges { values: [u, v, w], heights: z, least, most, error, height_error })
         }
+    }
+
+    #[inline(always)]
+    fn places_of(list: &[u32; 3 * BLOCK], number: u32) -> u32 {
+        let (eights, _) = list.as_chunks::<BLOCK>();
+        let mut places = 0;
+        // SAFETY: see `X86`. The loads are of arrays of eight.
+        unsafe {
+            let number = _mm256_set1_epi32(number as i32);
+            for (i, eight) in eights.iter().enumerate() {
+                let is_equal = _mm256_cmpeq_epi32(_mm256_loadu_si256(eight.as_ptr().cast()), number);
+                places |= (_mm256_movemask_ps(_mm256_castsi256_ps(is_equal)) as u32) << (BLOCK * i);
+            }
+        }
+        places
+    }
+
+    #[inline(always)]
+    fn corners(block: &TriangleBlock) -> Corners {
+        let coordinates = block.coordinates().as_ptr();
+        let room = block.room();
+        let places = block.corners().map(Self::places);
+        let mut corners = Corners([[[0.0; BLOCK]; 3]; 3]);
+        // SAFETY: see `X86`. A row begins at 62 at most, in an array of 96: behind that are 32 more, and no more are looked at.
+        unsafe {
+            for axis in 0..3 {
+                let row = coordinates.add(axis * room);
+                for (corner, &places) in places.iter().enumerate() {
+                    let found = if block.is_unshared() {
+                        _mm256_loadu_ps(row.add(BLOCK * corner))
+                    } else if AVX512 {
+                        Self::of_sixteen(_mm512_loadu_ps(row), places)
+                    } else {
+                        Self::of_two(_mm256_loadu_ps(row), _mm256_loadu_ps(row.add(8)), places)
+                    };
+                    _mm256_store_ps(corners.0[corner][axis].as_mut_ptr(), found);
+                }
+            }
+        }
+        corners
     }
 
     #[inline(always)]
@@ -673,15 +805,16 @@ where
 
     #[inline(always)]
     fn pass(block: &TriangleBlock, lane: usize, shear: &Shear, origin: &[f64; 3]) -> (Passage, Inside) {
-        let corners = block.corners.as_flattened().as_flattened().as_ptr();
-        let [kx, ky, kz] = shear.axes.lanes;
-        let lane = lane % BLOCK;
+        let coordinates = block.coordinates().as_ptr();
+        let [kx, ky, kz] = shear.axes.rows(block);
+        let vertices = [0, 1, 2].map(|corner| block.vertex_at(corner, lane));
         // The corners in the first three lanes, and the very operations of the portable one.
-        // SAFETY: see `X86`. Each component of the three corners is at 24 corner + 8 axis + lane, in an array of 72.
+        // SAFETY: see `X86`. A row begins at 62 at most, and vertices are below 32: in an array of 96.
         unsafe {
-            let z = _mm256_sub_pd(Self::component(corners.add(kz + lane)), _mm256_set1_pd(origin[2]));
-            let across = _mm256_sub_pd(Self::component(corners.add(kx + lane)), _mm256_set1_pd(origin[0]));
-            let up = _mm256_sub_pd(Self::component(corners.add(ky + lane)), _mm256_set1_pd(origin[1]));
+            let z = _mm256_sub_pd(Self::component(coordinates.add(kz), vertices), _mm256_set1_pd(origin[2]));
+            let across =
+                _mm256_sub_pd(Self::component(coordinates.add(kx), vertices), _mm256_set1_pd(origin[0]));
+            let up = _mm256_sub_pd(Self::component(coordinates.add(ky), vertices), _mm256_set1_pd(origin[1]));
             // No fused multiply-add here and below.
             let x = _mm256_sub_pd(across, _mm256_mul_pd(_mm256_set1_pd(shear.x), z));
             let y = _mm256_sub_pd(up, _mm256_mul_pd(_mm256_set1_pd(shear.y), z));

@@ -1,0 +1,529 @@
+//! Triangles packed by eight, each block with the vertices that its triangles share.
+//!
+//! Eight neighbours have some nine or ten vertices among them, where corners of their own would be twenty-four. A block has room
+//! for ten or twelve of them, for sixteen, or for all, and is as long as that. Blocks stand one behind another in a list of units of sixteen bytes, and references in nodes name the unit where
+//! the first block of a leaf begins. What a block's triangles are called stands elsewhere, for only the winner of a search is
+//! asked.
+
+use bytemuck::{Pod, Zeroable};
+use rayon::prelude::*;
+
+use crate::build::Name;
+use crate::lanes::{self, Lanes, Level, Task};
+use crate::node::{Node, tag};
+use crate::prepare::has_area;
+use crate::triangles::BLOCK;
+use crate::{BuildError, Geometry, GeometryKind, TriangleMesh};
+
+/// What the triangles of a block are called.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct BlockNames {
+    /// Positions in the mesh's list.
+    pub(crate) primitives: [u32; BLOCK],
+    /// Position of the mesh in the tree's list.
+    pub(crate) geometry: u32,
+}
+
+impl BlockNames {
+    /// A bit for each lane that has this primitive of the geometry.
+    #[inline(always)]
+    pub(crate) fn lanes_of(&self, primitive: u32) -> u32 {
+        let mut lanes = 0;
+        for (lane, &own) in self.primitives.iter().enumerate() {
+            lanes |= u32::from(own == primitive) << lane;
+        }
+        lanes
+    }
+
+    /// The names in a block without triangles.
+    pub(crate) fn empty(geometry: u32) -> Self {
+        Self { primitives: [u32::MAX; BLOCK], geometry }
+    }
+
+    /// Of primitives of one geometry: one or more, and no more than fit.
+    pub(crate) fn of(names: &[Name]) -> Self {
+        let mut named = Self::empty(names[0][0]);
+        for (place, name) in named.primitives.iter_mut().zip(names) {
+            *place = name[1];
+        }
+        named
+    }
+
+    /// The positions of those that are there.
+    #[inline(always)]
+    pub(crate) fn primitives(&self) -> impl Iterator<Item = u32> {
+        self.primitives.into_iter().take_while(|&primitive| primitive != u32::MAX)
+    }
+}
+
+/// Sixteen bytes of a list of blocks.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C, align(16))]
+pub(crate) struct Unit([u32; 4]);
+
+/// What stands before the vertices of a block.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+struct Head {
+    /// How many blocks there are before this one: the place of its names.
+    number: u32,
+    /// A bit for each lane that has a triangle.
+    taken: u8,
+    /// How many vertices it has room for.
+    room: u8,
+    /// How many blocks of the same leaf come behind it.
+    followers: u8,
+    // So that no byte of it is left open.
+    rest: u8,
+    /// Which vertex each corner is, four bits for each lane; lanes without a triangle have those of the first. Means nothing where
+    /// each corner has a vertex of its own.
+    corners: [u32; 3],
+}
+
+const _: () = assert!(size_of::<Head>() == 20);
+
+/// The rooms for vertices that almost all blocks of a tree do with, the one or the other: nine of ten trees of scans with the first.
+/// So it is foreseen where coordinates stand, before a block's head has come.
+pub(crate) const USUAL: [usize; 2] = [10, 12];
+/// As many as 512 bits hold.
+pub(crate) const MOST_SHARED: usize = 16;
+/// Where triangles share less: each corner has a vertex of its own, corner by corner and lane by lane.
+const UNSHARED: usize = 3 * BLOCK;
+pub(crate) const ROOMS: [usize; 4] = [USUAL[0], USUAL[1], MOST_SHARED, UNSHARED];
+/// Rooms and vertices are taken modulo this, so that they lead nowhere whatever they are.
+const VERTEX_NUMBERS: usize = 32;
+/// Coordinates that may be looked at from where those of a block begin.
+const COORDINATES: usize = 3 * VERTEX_NUMBERS;
+
+/// Up to eight triangles of one mesh, and what follows them in the list.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C, align(16))]
+pub(crate) struct TriangleBlock {
+    head: Head,
+    /// The x of the vertices, relative to the mesh's origin, then y, then z; then what is of other blocks.
+    coordinates: [f32; COORDINATES],
+    // Up to whole units.
+    rest: [u32; 3],
+}
+
+/// A block and what may be looked at behind it.
+const WINDOW: usize = size_of::<TriangleBlock>() / size_of::<Unit>();
+
+/// Units that a block with room for so many vertices takes.
+const fn units_of(room: usize) -> usize {
+    (size_of::<Head>() + room * size_of::<[f32; 3]>()).div_ceil(size_of::<Unit>())
+}
+
+impl TriangleBlock {
+    /// The place of its names.
+    #[inline(always)]
+    pub(crate) fn number(&self) -> u32 {
+        self.head.number
+    }
+
+    /// A bit for each lane that has a triangle.
+    #[inline(always)]
+    pub(crate) fn taken(&self) -> u32 {
+        self.head.taken.into()
+    }
+
+    /// How many vertices it has room for: 10, 12, 16 or 24, and below 32 at any rate.
+    #[inline(always)]
+    pub(crate) fn room(&self) -> usize {
+        usize::from(self.head.room) % VERTEX_NUMBERS
+    }
+
+    /// Whether each corner has a vertex of its own: lane by lane, eight for each corner.
+    #[inline(always)]
+    pub(crate) fn is_unshared(&self) -> bool {
+        self.room() > MOST_SHARED
+    }
+
+    /// Which vertex each corner is, four bits for each lane, where they share any.
+    #[inline(always)]
+    pub(crate) fn corners(&self) -> &[u32; 3] {
+        &self.head.corners
+    }
+
+    /// The coordinates from the first vertex on: the x of as many as there is room for, then y, then z, and then what means nothing.
+    #[inline(always)]
+    pub(crate) fn coordinates(&self) -> &[f32; COORDINATES] {
+        &self.coordinates
+    }
+
+    /// Which vertex a corner in a lane is, below 32: its x stands there, y and z each a room behind.
+    #[inline(always)]
+    pub(crate) fn vertex_at(&self, corner: usize, lane: usize) -> usize {
+        if self.is_unshared() {
+            return BLOCK * corner + lane % BLOCK;
+        }
+        (self.head.corners[corner] >> (4 * (lane % BLOCK))) as usize % MOST_SHARED
+    }
+
+    /// The corners of the triangle in a lane.
+    #[inline(always)]
+    pub(crate) fn triangle(&self, lane: usize) -> [[f32; 3]; 3] {
+        let at =
+            |corner: usize, axis: usize| self.coordinates[axis * self.room() + self.vertex_at(corner, lane)];
+        [0, 1, 2].map(|corner| [at(corner, 0), at(corner, 1), at(corner, 2)])
+    }
+
+    /// Asks for it to be brought near, before it is needed.
+    #[inline(always)]
+    pub(crate) fn fetch(&self) {
+        // Most have no more.
+        let units: &[Unit; WINDOW] = bytemuck::cast_ref(self);
+        units.first_chunk::<{ units_of(USUAL[1]) }>().map(lanes::fetch);
+    }
+
+    /// The place of the next block of its leaf, where this one stands at `place`.
+    #[inline(always)]
+    pub(crate) fn next(&self, place: u32) -> Option<u32> {
+        (self.head.followers != 0).then(|| place + units_of(self.room()) as u32)
+    }
+}
+
+/// The blocks of a tree.
+#[derive(Clone, Copy)]
+pub(crate) struct Blocks<'a>(&'a [Unit]);
+
+impl<'a> Blocks<'a> {
+    pub(crate) fn new(units: &'a [Unit]) -> Self {
+        Self(units)
+    }
+
+    /// The block at a unit, which a reference names.
+    #[inline(always)]
+    pub(crate) fn at(self, place: u32) -> Option<&'a TriangleBlock> {
+        let window = self.0.get(place as usize..place as usize + WINDOW)?;
+        Some(bytemuck::cast_ref::<[Unit; WINDOW], TriangleBlock>(window.try_into().ok()?))
+    }
+
+    /// The numbers of the blocks of a leaf.
+    pub(crate) fn numbers(self, leaf: u32) -> Option<std::ops::Range<usize>> {
+        let head = self.at(leaf & tag::PLACE)?.head;
+        let first = head.number as usize;
+        Some(first..first + usize::from(head.followers) + 1)
+    }
+
+    /// How many blocks of its leaf stand behind each of so many.
+    pub(crate) fn followers(self, count: usize) -> Vec<u8> {
+        let mut followers = Vec::with_capacity(count);
+        let mut place = 0;
+        while followers.len() < count
+            && let Some(block) = self.at(place)
+        {
+            followers.push(block.head.followers);
+            place += units_of(block.room()) as u32;
+        }
+        followers
+    }
+
+    /// Where every block begins, if they are such as [`pack`] makes them of so many names.
+    pub(crate) fn places(self, names: &[BlockNames]) -> Option<Vec<u32>> {
+        let mut places = Vec::with_capacity(names.len());
+        let (mut place, mut followers) = (0, 0);
+        for (number, names) in names.iter().enumerate() {
+            let block = self.at(place)?;
+            let head = &block.head;
+            let named = names.primitives.iter().enumerate();
+            let named = named.fold(0, |lanes, (lane, &name)| lanes | u8::from(name != u32::MAX) << lane);
+            let mut corners = (0..3).flat_map(|corner| (0..BLOCK).map(move |lane| (corner, lane)));
+            let are_there = corners.all(|(corner, lane)| block.vertex_at(corner, lane) < block.room());
+            let is_sound = head.number as usize == number
+                && head.taken & !named == 0
+                && ROOMS.contains(&head.room.into())
+                && are_there
+                && usize::from(head.followers) < tag::MOST_BLOCKS as usize
+                && (followers == 0 || head.followers == followers - 1);
+            if !is_sound {
+                return None;
+            }
+            followers = head.followers;
+            places.push(place);
+            place += units_of(block.room()) as u32;
+        }
+        let is_all =
+            followers == 0 && self.0.len() == if names.is_empty() { 0 } else { place as usize + MARGIN };
+        is_all.then_some(places)
+    }
+}
+
+/// Behind the last block, so that the window of each is there.
+const MARGIN: usize = WINDOW - 1;
+
+/// Blocks, and where each begins.
+pub(crate) struct Filled {
+    pub(crate) units: Vec<Unit>,
+    pub(crate) places: Vec<u32>,
+}
+
+/// Blocks that are packed at once, one lot after another, and by one task.
+const WAVE: usize = 1 << 14;
+const SHARE: usize = 256;
+
+/// What the blocks of a tree will be like.
+struct Survey {
+    /// The usual room.
+    usual: usize,
+    /// About how many units they take together: rather more.
+    units: usize,
+}
+
+/// Looks at some of the blocks with these names.
+struct Look<'a> {
+    geometries: &'a [Geometry],
+    names: &'a [BlockNames],
+}
+
+impl Task for Look<'_> {
+    type Output = Survey;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Survey {
+        const SOME: usize = 256;
+        let some = self.names.iter().step_by((self.names.len() / SOME).max(4));
+        let (count, mut usual, mut units) = (some.len().max(1), [0; 2], [0; 2]);
+        for names in some {
+            let shared = Shared::of::<L>(mesh(self.geometries, names.geometry), names);
+            for i in 0..2 {
+                let room = shared.with_room(USUAL[i]).room();
+                usual[i] += usize::from(room == USUAL[i]);
+                units[i] += units_of(room);
+            }
+        }
+        let i = usize::from(10 * usual[0] < 9 * count);
+        let all = units[i] * self.names.len() / count;
+        Survey { usual: USUAL[i], units: all + all / 32 }
+    }
+}
+
+/// Packs triangles with these names. Behind each block stand so many more of its leaf. Those without an area are left out; where
+/// there may be none, it is not asked.
+///
+/// # Errors
+/// [`BuildError::TooMany`] when there are more units than references can name.
+pub(crate) fn pack(
+    level: Level,
+    geometries: &[Geometry],
+    names: &[BlockNames],
+    followers: &[u8],
+    may_lack_area: bool,
+) -> Result<Filled, BuildError> {
+    let Survey { usual, units: expected } = level.run(Look { geometries, names });
+    let mut filled = Filled {
+        units: vec![Unit::default(); if names.is_empty() { 0 } else { expected + MARGIN }],
+        places: Vec::with_capacity(names.len()),
+    };
+    let mut shared = Vec::new();
+    let mut end = 0;
+    for (wave, (names, followers)) in names.chunks(WAVE).zip(followers.chunks(WAVE)).enumerate() {
+        shared.resize(names.len(), Shared::NOTHING);
+        shared.par_chunks_mut(SHARE).zip(names.par_chunks(SHARE)).for_each(|(shared, names)| {
+            level.run(FindShared { geometries, names, usual, shared });
+        });
+        let start = end;
+        for shared in &shared {
+            filled.places.push(end as u32);
+            end += units_of(shared.room());
+        }
+        if end > tag::PLACE as usize {
+            return Err(BuildError::TooMany);
+        }
+        if filled.units.len() < end + MARGIN {
+            filled.units.resize(end + end / 8 + MARGIN, Unit::default());
+        }
+        let mut rest = &mut filled.units[start..end];
+        let mut shares = Vec::with_capacity(names.len().div_ceil(SHARE));
+        let mut first = wave * WAVE;
+        for ((names, followers), shared) in
+            names.chunks(SHARE).zip(followers.chunks(SHARE)).zip(shared.chunks(SHARE))
+        {
+            let len = shared.iter().map(|shared| units_of(shared.room())).sum();
+            let units = rest.split_off_mut(..len).expect("there is room for all");
+            shares.push(PackShare {
+                geometries,
+                names,
+                followers,
+                shared,
+                first: first as u32,
+                may_lack_area,
+                units,
+            });
+            first += names.len();
+        }
+        shares.into_par_iter().for_each(PackShare::run);
+    }
+    if !names.is_empty() {
+        filled.units.truncate(end + MARGIN);
+        filled.units.shrink_to_fit();
+    }
+    Ok(filled)
+}
+
+/// Finds which vertices the triangles of each block share.
+struct FindShared<'a> {
+    geometries: &'a [Geometry],
+    names: &'a [BlockNames],
+    usual: usize,
+    shared: &'a mut [Shared],
+}
+
+impl Task for FindShared<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        for (shared, names) in self.shared.iter_mut().zip(self.names) {
+            *shared = Shared::of::<L>(mesh(self.geometries, names.geometry), names).with_room(self.usual);
+        }
+    }
+}
+
+/// Some of the triangles to be packed, as [`pack`] does.
+struct PackShare<'a> {
+    geometries: &'a [Geometry],
+    names: &'a [BlockNames],
+    followers: &'a [u8],
+    shared: &'a [Shared],
+    /// The number of the first block.
+    first: u32,
+    may_lack_area: bool,
+    /// As many as they take.
+    units: &'a mut [Unit],
+}
+
+impl PackShare<'_> {
+    fn run(self) {
+        let Self { geometries, names, followers, shared, first, may_lack_area, mut units } = self;
+        for (((number, names), &followers), shared) in (first..).zip(names).zip(followers).zip(shared) {
+            let mesh = mesh(geometries, names.geometry);
+            let room = shared.room();
+            let own = units.split_off_mut(..units_of(room)).expect("there is room for all");
+            let (head, coordinates) =
+                bytemuck::cast_slice_mut::<Unit, u8>(own).split_at_mut(size_of::<Head>());
+            let coordinates: &mut [f32] = bytemuck::cast_slice_mut(coordinates);
+            let mut taken = 0;
+            for (lane, primitive) in names.primitives().enumerate() {
+                let triangle = mesh.indices[primitive as usize];
+                let corners = triangle.map(|vertex| mesh.positions[vertex as usize]);
+                taken |= u8::from(!may_lack_area || has_area(&corners)) << lane;
+                for (corner, position) in corners.iter().enumerate() {
+                    let place = shared.vertex_at(corner, lane);
+                    for axis in 0..3 {
+                        coordinates[axis * room + place] = position[axis];
+                    }
+                }
+            }
+            let own_head =
+                Head { number, taken, room: shared.room, followers, rest: 0, corners: shared.corners };
+            head.copy_from_slice(bytemuck::bytes_of(&own_head));
+        }
+    }
+}
+
+fn mesh(geometries: &[Geometry], geometry: u32) -> &TriangleMesh {
+    match &geometries[geometry as usize].kind {
+        GeometryKind::Mesh(mesh) => mesh,
+        _ => unreachable!("triangles come from meshes"),
+    }
+}
+
+/// Which vertices the triangles of a block share.
+#[derive(Clone, Copy)]
+struct Shared {
+    /// As in the head of a block.
+    corners: [u32; 3],
+    room: u8,
+}
+
+impl Shared {
+    const NOTHING: Self = Self { corners: [0; 3], room: 0 };
+
+    fn room(&self) -> usize {
+        self.room.into()
+    }
+
+    /// See [`TriangleBlock::vertex_at`].
+    #[inline(always)]
+    fn vertex_at(&self, corner: usize, lane: usize) -> usize {
+        if self.room() == UNSHARED {
+            return BLOCK * corner + lane;
+        }
+        (self.corners[corner] >> (4 * lane)) as usize % MOST_SHARED
+    }
+
+    /// With one of the rooms that there are.
+    #[inline(always)]
+    fn with_room(self, usual: usize) -> Self {
+        let room = match self.room() {
+            room if room <= usual => usual,
+            room if room <= MOST_SHARED => MOST_SHARED,
+            _ => UNSHARED,
+        };
+        Self { room: room as u8, ..self }
+    }
+
+    /// With room for no more than they have. Without branches that could not be foreseen: every corner is compared with all.
+    #[inline(always)]
+    fn of<L: Lanes>(mesh: &TriangleMesh, names: &BlockNames) -> Self {
+        let mut all = [0; UNSHARED];
+        let (triangles, _) = all.as_chunks_mut::<3>();
+        let mut len = 0;
+        for (triangle, primitive) in triangles.iter_mut().zip(names.primitives()) {
+            *triangle = mesh.indices[primitive as usize];
+            len += 1;
+        }
+        let first = triangles[0];
+        triangles[len..].fill(first);
+        // The first corner that each has its vertex in common with, and a bit for each that is that itself.
+        let mut firsts = [0; UNSHARED];
+        let mut are_first = 0u32;
+        for (at, first) in firsts.iter_mut().enumerate() {
+            *first = L::places_of(&all, all[at]).trailing_zeros() % 32;
+            are_first |= u32::from(*first as usize == at) << at;
+        }
+        let count = are_first.count_ones() as usize;
+        if count > MOST_SHARED {
+            return Self { corners: [0; 3], room: UNSHARED as u8 };
+        }
+        let mut corners = [0u32; 3];
+        for (at, first) in firsts.into_iter().enumerate() {
+            corners[at % 3] |= (are_first & ((1 << first) - 1)).count_ones() << (4 * (at / 3));
+        }
+        Self { corners, room: count as u8 }
+    }
+}
+
+/// Turns references to leaves of triangles, of which `number_of` tells the number of the first block, into ones to where this
+/// begins.
+pub(crate) fn refer(
+    nodes: &mut [Node],
+    root: &mut Option<u32>,
+    places: &[u32],
+    number_of: impl Fn(u32) -> usize + Sync,
+) {
+    let refer = |reference: &mut u32| {
+        if *reference >> tag::SHIFT == tag::TRIANGLES {
+            *reference = tag::reference(tag::TRIANGLES, places[number_of(*reference)]);
+        }
+    };
+    root.iter_mut().for_each(refer);
+    nodes.par_iter_mut().with_min_len(256).for_each(|node| {
+        let len = node.len as usize;
+        node.children[..len].iter_mut().for_each(refer);
+    });
+}
+
+/// How many blocks of its leaf stand behind each, where the references in nodes number them.
+pub(crate) fn followers_of(nodes: &[Node], root: Option<u32>, blocks: usize) -> Vec<u8> {
+    let mut followers = vec![0; blocks];
+    let children = nodes.iter().flat_map(|node| &node.children[..node.len as usize]);
+    for &reference in children.chain(&root).filter(|&&reference| reference >> tag::SHIFT == tag::TRIANGLES) {
+        for (behind, followers) in followers[tag::blocks(reference)].iter_mut().rev().enumerate() {
+            *followers = behind as u8;
+        }
+    }
+    followers
+}
