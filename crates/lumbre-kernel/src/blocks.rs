@@ -477,12 +477,21 @@ impl Shared {
         }
         let first = triangles[0];
         triangles[len..].fill(first);
-        // The first corner that each has its vertex in common with, and a bit for each that is that itself.
-        let mut firsts = [0; UNSHARED];
-        let mut are_first = 0u32;
-        for (at, first) in firsts.iter_mut().enumerate() {
-            *first = L::places_of(&all, all[at]).trailing_zeros() % 32;
-            are_first |= u32::from(*first as usize == at) << at;
+        let mut equal = [0; UNSHARED];
+        for (at, equal) in equal.iter_mut().enumerate() {
+            *equal = L::places_of(&all, all[at]);
+        }
+        let (mut firsts, mut are_first) = firsts_of(&equal);
+        if are_first.count_ones() as usize > MOST_SHARED {
+            // Vertices of different names may stand in one place.
+            equal = [u32::MAX; UNSHARED];
+            for axis in 0..3 {
+                let coordinates = all.map(|vertex| mesh.positions[vertex as usize][axis].to_bits());
+                for (at, equal) in equal.iter_mut().enumerate() {
+                    *equal &= L::places_of(&coordinates, coordinates[at]);
+                }
+            }
+            (firsts, are_first) = firsts_of(&equal);
         }
         let count = are_first.count_ones() as usize;
         if count > MOST_SHARED {
@@ -494,6 +503,18 @@ impl Shared {
         }
         Self { corners, room: count as u8 }
     }
+}
+
+/// The first corner that each is equal to, and a bit for each that is that itself.
+#[inline(always)]
+fn firsts_of(equal: &[u32; UNSHARED]) -> ([u32; UNSHARED], u32) {
+    let mut are_first = 0;
+    let mut firsts = [0; UNSHARED];
+    for (at, (first, equal)) in firsts.iter_mut().zip(equal).enumerate() {
+        *first = equal.trailing_zeros() % 32;
+        are_first |= u32::from(*first as usize == at) << at;
+    }
+    (firsts, are_first)
 }
 
 /// Turns references to leaves of triangles, of which `number_of` tells the number of the first block, into ones to where this

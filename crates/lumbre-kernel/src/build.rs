@@ -275,7 +275,7 @@ struct Plot<'a> {
 struct GrownTwig {
     /// Of how many primitives.
     count: usize,
-    /// `None` where they stand in the place of the primitives, before their names, so many of them.
+    /// How many there are in the place of the primitives, before their names; or the nodes themselves, which stand apart.
     nodes: Result<usize, Vec<BinaryNode>>,
     costs: Costs,
 }
@@ -302,8 +302,9 @@ struct PackedTree<'p> {
     names: Vec<&'p [Name]>,
 }
 
-/// From how many packed primitives on the room that they leave is given back before more is asked for.
-const MANY: usize = 1 << 20;
+/// From how many packed primitives on the room that they leave is given back before more is asked for. In tests there are many
+/// sooner.
+const MANY: usize = if cfg!(test) { 1 << 13 } else { 1 << 20 };
 
 /// The primitives of a node of a twig, and as much room for those of its children.
 struct Range<'a> {
