@@ -312,10 +312,8 @@ pub(crate) fn pack(
     may_lack_area: bool,
 ) -> Result<Filled, BuildError> {
     let Survey { usual, units: expected } = level.run(Look { geometries, names });
-    let mut filled = Filled {
-        units: vec![Unit::default(); if names.is_empty() { 0 } else { expected + MARGIN }],
-        places: Vec::with_capacity(names.len()),
-    };
+    let mut filled = Filled { units: Vec::new(), places: Vec::with_capacity(names.len()) };
+    let is_all_at_once = names.len() <= WAVE;
     let mut shared = Vec::new();
     let mut end = 0;
     for (wave, (names, followers)) in names.chunks(WAVE).zip(followers.chunks(WAVE)).enumerate() {
@@ -331,7 +329,10 @@ pub(crate) fn pack(
         if end > tag::PLACE as usize {
             return Err(BuildError::TooMany);
         }
-        if filled.units.len() < end + MARGIN {
+        if wave == 0 {
+            let len = if is_all_at_once { end } else { end.max(expected) };
+            filled.units = vec![Unit::default(); len + MARGIN];
+        } else if filled.units.len() < end + MARGIN {
             filled.units.resize(end + end / 8 + MARGIN, Unit::default());
         }
         let mut rest = &mut filled.units[start..end];
@@ -355,7 +356,7 @@ pub(crate) fn pack(
         }
         shares.into_par_iter().for_each(PackShare::run);
     }
-    if !names.is_empty() {
+    if !is_all_at_once {
         filled.units.truncate(end + MARGIN);
         filled.units.shrink_to_fit();
     }
