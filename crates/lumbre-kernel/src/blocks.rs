@@ -83,13 +83,14 @@ struct Head {
 
 const _: () = assert!(size_of::<Head>() == 20);
 
-/// The rooms for vertices that almost all blocks of a tree do with, the one or the other: nine of ten trees of scans with the first.
-/// So it is foreseen where coordinates stand, before a block's head has come.
+/// The rooms for vertices of which a tree has one as its usual: the first where nine of ten blocks do with it, as of scans, else the
+/// second. So it is foreseen where coordinates stand, before a block's head has come.
 pub(crate) const USUAL: [usize; 2] = [10, 12];
 /// As many as 512 bits hold.
 pub(crate) const MOST_SHARED: usize = 16;
 /// Where triangles share less: each corner has a vertex of its own, corner by corner and lane by lane.
 const UNSHARED: usize = 3 * BLOCK;
+/// All rooms that there are.
 pub(crate) const ROOMS: [usize; 4] = [USUAL[0], USUAL[1], MOST_SHARED, UNSHARED];
 /// Rooms and vertices are taken modulo this, so that they lead nowhere whatever they are.
 const VERTEX_NUMBERS: usize = 32;
