@@ -162,12 +162,17 @@ impl TriangleBlock {
         (self.head.corners[corner] >> (4 * (lane % BLOCK))) as usize % MOST_SHARED
     }
 
-    /// The corners of the triangle in a lane.
+    /// The same of all corners in a lane.
     #[inline(always)]
+    pub(crate) fn vertices_at(&self, lane: usize) -> [usize; 3] {
+        // No closure: those do not take on the instruction set of who calls them.
+        [self.vertex_at(0, lane), self.vertex_at(1, lane), self.vertex_at(2, lane)]
+    }
+
+    /// The corners of the triangle in a lane.
     pub(crate) fn triangle(&self, lane: usize) -> [[f32; 3]; 3] {
-        let at =
-            |corner: usize, axis: usize| self.coordinates[axis * self.room() + self.vertex_at(corner, lane)];
-        [0, 1, 2].map(|corner| [at(corner, 0), at(corner, 1), at(corner, 2)])
+        self.vertices_at(lane)
+            .map(|vertex| [0, 1, 2].map(|axis| self.coordinates[axis * self.room() + vertex]))
     }
 
     /// Asks for it to be brought near, before it is needed.

@@ -270,8 +270,8 @@ impl Axes {
     /// Where the coordinates of a block's vertices along each begin: no further than at twice 31, of 96.
     #[inline(always)]
     fn rows(&self, block: &TriangleBlock) -> [usize; 3] {
-        let room = block.room();
-        [self.order[0], self.order[1], self.order[2]].map(|axis| axis as usize * room)
+        let (room, order) = (block.room(), &self.order);
+        [order[0] as usize * room, order[1] as usize * room, order[2] as usize * room]
     }
 
     /// The corners in one lane of a block, each in this order.
@@ -279,8 +279,7 @@ impl Axes {
     pub(crate) fn gather(&self, block: &TriangleBlock, lane: usize) -> [[f32; 3]; 3] {
         let coordinates = block.coordinates();
         let [x, y, z] = self.rows(block);
-        [0, 1, 2].map(|corner| {
-            let vertex = block.vertex_at(corner, lane);
+        block.vertices_at(lane).map(|vertex| {
             // SAFETY: see `rows`; a vertex is below 32.
             let at = |row: usize| unsafe { *coordinates.get_unchecked(row + vertex) };
             [at(x), at(y), at(z)]

@@ -87,16 +87,15 @@ impl<const AVX512: bool> X86<AVX512> {
         }
     }
 
-    /// A bit for each lane in which one comparison or the other is true.
+    /// A bit for each lane in which the comparison is true.
     #[inline(always)]
-    fn either<const A: i32, const B: i32>(a: [__m256; 2], b: [__m256; 2]) -> u32 {
+    fn compare<const HOW: i32>(a: __m256, b: __m256) -> u32 {
         // SAFETY: see `X86`.
         unsafe {
             if AVX512 {
-                u32::from(_mm256_cmp_ps_mask::<A>(a[0], a[1]) | _mm256_cmp_ps_mask::<B>(b[0], b[1]))
+                u32::from(_mm256_cmp_ps_mask::<HOW>(a, b))
             } else {
-                let either = _mm256_or_ps(_mm256_cmp_ps::<A>(a[0], a[1]), _mm256_cmp_ps::<B>(b[0], b[1]));
-                _mm256_movemask_ps(either) as u32
+                _mm256_movemask_ps(_mm256_cmp_ps::<HOW>(a, b)) as u32
             }
         }
     }
@@ -121,7 +120,7 @@ impl<const AVX512: bool> X86<AVX512> {
         // SAFETY: see `X86`.
         unsafe {
             if AVX512 {
-                u32::from(_mm256_cmp_ps_mask::<A>(a[0], a[1]) & _mm256_cmp_ps_mask::<B>(b[0], b[1]))
+                u32::from(_mm256_mask_cmp_ps_mask::<B>(_mm256_cmp_ps_mask::<A>(a[0], a[1]), b[0], b[1]))
             } else {
                 let both = _mm256_and_ps(_mm256_cmp_ps::<A>(a[0], a[1]), _mm256_cmp_ps::<B>(b[0], b[1]));
                 _mm256_movemask_ps(both) as u32
@@ -190,10 +189,9 @@ impl<const AVX512: bool> X86<AVX512> {
             super::opaque(&ray.axes.rows_by_room[3])
         };
         if room > MOST_SHARED {
-            let eight = |corner: usize| rows.map(|row| row + BLOCK * corner);
-            let a = Self::sheared_eight(block, ray, eight(0));
-            let b = Self::sheared_eight(block, ray, eight(1));
-            let c = Self::sheared_eight(block, ray, eight(2));
+            let a = Self::sheared_eight(block, ray, rows, 0);
+            let b = Self::sheared_eight(block, ray, rows, BLOCK);
+            let c = Self::sheared_eight(block, ray, rows, 2 * BLOCK);
             return [[a[0], b[0], c[0]], [a[1], b[1], c[1]], [a[2], b[2], c[2]]];
         }
         // SAFETY: see `X86`.
@@ -207,8 +205,8 @@ impl<const AVX512: bool> X86<AVX512> {
                 }
             }
         } else {
-            let low = Self::sheared_eight(block, ray, *rows);
-            let high = Self::sheared_eight(block, ray, rows.map(|row| row + BLOCK));
+            let low = Self::sheared_eight(block, ray, rows, 0);
+            let high = Self::sheared_eight(block, ray, rows, BLOCK);
             for (corner, &places) in block.corners().iter().enumerate() {
                 let places = Self::places(places);
                 for axis in 0..3 {
@@ -219,13 +217,18 @@ impl<const AVX512: bool> X86<AVX512> {
         corners
     }
 
-    /// Eight vertices from these places on.
+    /// Eight vertices from the `first` of these rows on.
     #[inline(always)]
-    fn sheared_eight(block: &TriangleBlock, ray: &BlockRay, [kx, ky, kz]: [usize; 3]) -> [__m256; 3] {
+    fn sheared_eight(
+        block: &TriangleBlock,
+        ray: &BlockRay,
+        &[kx, ky, kz]: &[usize; 3],
+        first: usize,
+    ) -> [__m256; 3] {
         let rows = block.coordinates();
         // SAFETY: see `X86`. Rows begin at 48 at most, and no more of them than 24 are looked at, in an array of 96.
         unsafe {
-            let load = |at: usize| _mm256_loadu_ps(rows.as_ptr().add(at));
+            let load = |row: usize| _mm256_loadu_ps(rows.as_ptr().add(row + first));
             let (shear_x, shear_y) = (_mm256_set1_ps(ray.shear[0]), _mm256_set1_ps(ray.shear[1]));
             let z = _mm256_sub_ps(_mm256_set1_ps(ray.origin[2]), load(kz));
             let across = _mm256_sub_ps(_mm256_set1_ps(ray.origin[0]), load(kx));
@@ -330,11 +333,10 @@ pub(crate) struct Edges {
     values: [__m256; 3],
     /// Of the corners.
     heights: [__m256; 3],
-    /// The least and the most of the edge functions.
-    least: __m256,
-    most: __m256,
-    /// By how much they may be wrong, and the heights.
-    error: __m256,
+    /// The least of them or of their opposites, whichever is more: how far within the triangle the line is.
+    within: __m256,
+    /// By how much they may be wrong, below zero, and the heights.
+    minus_error: __m256,
     height_error: __m256,
 }
 
@@ -655,7 +657,7 @@ where
             );
             let along = Self::larger(Self::larger(z[0], z[1]), z[2]);
             let size = _mm256_add_ps(_mm256_add_ps(across, along), _mm256_set1_ps(ray.least_size));
-            let error = _mm256_fmadd_ps(
+            let minus_error = _mm256_fnmsub_ps(
                 _mm256_mul_ps(size, _mm256_set1_ps(EDGE_ERROR)),
                 _mm256_fmadd_ps(size, _mm256_set1_ps(SIZE_ERROR), across),
                 _mm256_set1_ps(TINY),
@@ -663,10 +665,9 @@ where
             let height_error = _mm256_mul_ps(size, _mm256_set1_ps(HEIGHT_ERROR));
             let least = _mm256_min_ps(_mm256_min_ps(u, v), w);
             let most = _mm256_max_ps(_mm256_max_ps(u, v), w);
-            let minus_error = _mm256_xor_ps(error, _mm256_set1_ps(-0.0));
-            let mask = Self::either::<_CMP_GE_OQ, _CMP_LE_OQ>([least, minus_error], [most, error]);
-            let mask = mask & block.taken();
-            (mask, Edges { values: [u, v, w], heights: z, least, most, error, height_error })
+            let within = _mm256_max_ps(least, _mm256_xor_ps(most, _mm256_set1_ps(-0.0)));
+            let mask = Self::compare::<_CMP_GE_OQ>(within, minus_error) & block.taken();
+            (mask, Edges { values: [u, v, w], heights: z, within, minus_error, height_error })
         }
     }
 
@@ -727,7 +728,7 @@ where
             let high = _mm256_max_ps(_mm256_max_ps(z[0], z[1]), z[2]);
             let extent = _mm256_add_ps(_mm256_sub_ps(high, low), edges.height_error);
             let spread = _mm256_fmadd_ps(
-                _mm256_mul_ps(edges.error, _mm256_set1_ps(12.5)),
+                _mm256_mul_ps(edges.minus_error, _mm256_set1_ps(-12.5)),
                 extent,
                 _mm256_fmadd_ps(edges.height_error, weight, _mm256_set1_ps(TINY)),
             );
@@ -737,11 +738,8 @@ where
                 [to, _mm256_mul_ps(weight, _mm256_set1_ps(ray.range.first))],
                 [from, _mm256_mul_ps(weight, _mm256_set1_ps(ray.range.last))],
             );
-            let twice = _mm256_add_ps(edges.error, edges.error);
-            let inside = Self::either::<_CMP_GT_OQ, _CMP_LT_OQ>(
-                [edges.least, twice],
-                [edges.most, _mm256_xor_ps(twice, sign)],
-            );
+            let twice = _mm256_mul_ps(edges.minus_error, _mm256_set1_ps(-2.0));
+            let inside = Self::compare::<_CMP_GT_OQ>(edges.within, twice);
             let surely_in_range = Self::both::<_CMP_GE_OQ, _CMP_LE_OQ>(
                 [from, _mm256_mul_ps(weight, _mm256_set1_ps(ray.range.surely_first))],
                 [to, _mm256_mul_ps(weight, _mm256_set1_ps(ray.range.surely_last))],
@@ -753,7 +751,7 @@ where
     #[inline(always)]
     fn fronts(edges: &Edges) -> u32 {
         // SAFETY: see `X86`.
-        let backs = unsafe { _mm256_movemask_ps(edges.least) };
+        let backs = unsafe { _mm256_movemask_ps(edges.values[0]) };
         !backs as u32
     }
 
@@ -807,7 +805,7 @@ where
     fn pass(block: &TriangleBlock, lane: usize, shear: &Shear, origin: &[f64; 3]) -> (Passage, Inside) {
         let coordinates = block.coordinates().as_ptr();
         let [kx, ky, kz] = shear.axes.rows(block);
-        let vertices = [0, 1, 2].map(|corner| block.vertex_at(corner, lane));
+        let vertices = block.vertices_at(lane);
         // The corners in the first three lanes, and the very operations of the portable one.
         // SAFETY: see `X86`. A row begins at 62 at most, and vertices are below 32: in an array of 96.
         unsafe {
