@@ -160,11 +160,12 @@ pub(crate) fn binary_tree<'p>(
     let counts = sort_by_rank(&mut others, traits);
     let first_packed = others.len();
     let mut names: Vec<Name> = vec![[0; 2]; first_packed];
-    let has_packed = !packed.is_empty();
-    let (mut trees, packed_tree) = rayon::join(
-        || builder.trees_by_rank(preset, &mut others, &counts, &mut names),
-        move || has_packed.then(|| builder.tree_of_packed(preset, packed, first_packed)),
-    );
+    let packed = (!packed.is_empty()).then_some(packed);
+    let of_others = || builder.trees_by_rank(preset, &mut others, &counts, &mut names);
+    let of_packed = || packed.map(|packed| builder.tree_of_packed(preset, packed, first_packed));
+    // Work for one is not handed over.
+    let (mut trees, packed_tree) =
+        if first_packed > 0 { rayon::join(of_others, of_packed) } else { (Vec::new(), of_packed()) };
     others.truncate(counts[Kind::Instance.rank()]);
     others.shrink_to_fit();
     let mut cells = Vec::new();
