@@ -10,8 +10,13 @@ use crate::program::Bytes;
 static HEAP: PeakAlloc = PeakAlloc;
 
 /// Runs a build on so many threads, with the seconds and the bytes that it took. One thread alone is that which asks for it, as it
-/// is with Embree, so that none has to wake another before the work begins.
+/// is with Embree, so that none has to wake another before the work begins. As many as the machine has are those that every
+/// program has: it is for the build to hand its work to them, if there is enough of it.
 pub fn measure<T: Send>(threads: usize, build: impl FnOnce() -> T + Send) -> Result<(T, f64, Bytes)> {
+    if threads > 1 && threads == rayon::current_num_threads() {
+        rayon::broadcast(|_| ());
+        return Ok(measure_here(threads, build));
+    }
     // A thread that has joined a pool never leaves it.
     std::thread::scope(|scope| {
         let asking = scope.spawn(|| {
@@ -20,19 +25,23 @@ pub fn measure<T: Send>(threads: usize, build: impl FnOnce() -> T + Send) -> Res
             let pool = if threads == 1 { pool.use_current_thread() } else { pool }.build()?;
             // The threads are there before the clock starts.
             pool.broadcast(|_| ());
-            let before = HEAP.current_usage();
-            HEAP.reset_peak_usage();
-            let start = Start::of_program();
-            let built = pool.install(build);
-            let seconds = start.program_seconds(threads);
-            let bytes = Bytes {
-                kept: HEAP.current_usage().saturating_sub(before),
-                peak: HEAP.peak_usage().saturating_sub(before),
-            };
-            Ok((built, seconds, bytes))
+            Ok(measure_here(threads, || pool.install(build)))
         });
         asking.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     })
+}
+
+fn measure_here<T>(threads: usize, build: impl FnOnce() -> T) -> (T, f64, Bytes) {
+    let before = HEAP.current_usage();
+    HEAP.reset_peak_usage();
+    let start = Start::of_program();
+    let built = build();
+    let seconds = start.program_seconds(threads);
+    let bytes = Bytes {
+        kept: HEAP.current_usage().saturating_sub(before),
+        peak: HEAP.peak_usage().saturating_sub(before),
+    };
+    (built, seconds, bytes)
 }
 
 #[cfg(test)]

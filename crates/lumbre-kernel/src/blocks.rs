@@ -472,7 +472,8 @@ impl Shared {
         Self { room: room as u8, ..self }
     }
 
-    /// With room for no more than they have. Without branches that could not be foreseen: every corner is compared with all.
+    /// With room for no more than they have. Without branches that could not be foreseen: every corner is compared with all before
+    /// it.
     #[inline(always)]
     fn of<L: Lanes>(mesh: &TriangleMesh, names: &BlockNames) -> Self {
         let mut all = [0; UNSHARED];
@@ -484,44 +485,43 @@ impl Shared {
         }
         let first = triangles[0];
         triangles[len..].fill(first);
-        let mut equal = [0; UNSHARED];
-        for (at, equal) in equal.iter_mut().enumerate() {
-            *equal = L::places_of(&all, all[at]);
-        }
-        let (mut firsts, mut are_first) = firsts_of(&equal);
+        let mut equals = L::equals_before(&all);
+        let mut are_first = firsts_of(&equals);
         if are_first.count_ones() as usize > MOST_SHARED {
             // Vertices of different names may stand in one place.
-            equal = [u32::MAX; UNSHARED];
+            equals = [u32::MAX; UNSHARED];
             for axis in 0..3 {
-                let coordinates = all.map(|vertex| mesh.positions[vertex as usize][axis].to_bits());
-                for (at, equal) in equal.iter_mut().enumerate() {
-                    *equal &= L::places_of(&coordinates, coordinates[at]);
+                let mut coordinates = all;
+                for vertex in &mut coordinates {
+                    *vertex = mesh.positions[*vertex as usize][axis].to_bits();
+                }
+                for (equals, own) in equals.iter_mut().zip(L::equals_before(&coordinates)) {
+                    *equals &= own;
                 }
             }
-            (firsts, are_first) = firsts_of(&equal);
+            are_first = firsts_of(&equals);
         }
         let count = are_first.count_ones() as usize;
         if count > MOST_SHARED {
             return Self { corners: [0; 3], room: UNSHARED as u8 };
         }
         let mut corners = [0u32; 3];
-        for (at, first) in firsts.into_iter().enumerate() {
+        for (at, before) in equals.into_iter().enumerate() {
+            let first = (before | 1 << at).trailing_zeros();
             corners[at % 3] |= (are_first & ((1 << first) - 1)).count_ones() << (4 * (at / 3));
         }
         Self { corners, room: count as u8 }
     }
 }
 
-/// The first corner that each is equal to, and a bit for each that is that itself.
+/// A bit for each corner that is equal to none before it.
 #[inline(always)]
-fn firsts_of(equal: &[u32; UNSHARED]) -> ([u32; UNSHARED], u32) {
+fn firsts_of(equals: &[u32; UNSHARED]) -> u32 {
     let mut are_first = 0;
-    let mut firsts = [0; UNSHARED];
-    for (at, (first, equal)) in firsts.iter_mut().zip(equal).enumerate() {
-        *first = equal.trailing_zeros() % 32;
-        are_first |= u32::from(*first as usize == at) << at;
+    for (at, &before) in equals.iter().enumerate() {
+        are_first |= u32::from(before == 0) << at;
     }
-    (firsts, are_first)
+    are_first
 }
 
 /// Turns references to leaves of triangles, of which `number_of` tells the number of the first block, into ones to where this

@@ -15,6 +15,7 @@ use crate::Geometry;
 use crate::accel::Preset;
 use crate::bins::{self, BestSplit, Binning, Bins, Fill, Measure, Part, Split};
 use crate::boxes::Boxes;
+use crate::build::spatial::Eagerness;
 use crate::carve::Cell;
 use crate::collapse::{Choices, Costs, choose};
 use crate::few::{Decide, FEW, Few, group_of};
@@ -30,7 +31,7 @@ const SAH_DEPTH: u32 = 64;
 /// So many a fast build splits by SAH: leaves then are a tenth fuller, and nodes fewer, for a twentieth of its time.
 const FAST_FEW: usize = 48;
 /// From how many primitives on two threads share the work.
-const PARALLEL: usize = 4096;
+pub(crate) const PARALLEL: usize = 4096;
 /// How many primitives a thread takes at a time in a node that is shared.
 const CHUNK: usize = 1 << 14;
 
@@ -138,6 +139,20 @@ pub(crate) struct Grown<'p> {
     pub(crate) cells: Vec<Cell>,
 }
 
+/// How much care a tree is given.
+#[derive(Clone, Copy)]
+pub(crate) struct Effort {
+    pub(crate) preset: Preset,
+    eagerness: Eagerness,
+}
+
+impl Effort {
+    /// Of a preset, on the thread that asks for a tree.
+    pub(crate) fn of(preset: Preset) -> Self {
+        Self { preset, eagerness: Eagerness::now() }
+    }
+}
+
 /// The binary tree over primitives (not none) of geometries: packed ones, and all others.
 ///
 /// First they are parted where they stand until one thread takes what is left together; then twigs grow, which need but a
@@ -146,7 +161,7 @@ pub(crate) struct Grown<'p> {
 /// are given back here, before the tree is laid out, but for instances.
 pub(crate) fn binary_tree<'p>(
     level: Level,
-    preset: Preset,
+    Effort { preset, eagerness }: Effort,
     mut others: Vec<Primitive>,
     packed: &'p mut Boxes,
     traits: &[Traits],
@@ -172,8 +187,15 @@ pub(crate) fn binary_tree<'p>(
     if let Some(PackedTree { mut tree, names: packed_names }) = packed_tree {
         names = with_all(names, &packed_names);
         if preset == Preset::Best
-            && let Some(found) =
-                spatial::in_parts(builder, geometries, units, &tree, &names[first_packed..], first_packed)
+            && let Some(found) = spatial::in_parts(
+                builder,
+                eagerness,
+                geometries,
+                units,
+                &tree,
+                &names[first_packed..],
+                first_packed,
+            )
         {
             tree = found.tree;
             names.truncate(first_packed);

@@ -8,7 +8,7 @@ use lumbre_math::{DMat3, DVec3, Transform, Vec3};
 use rayon::prelude::*;
 
 use crate::boxes::Boxes;
-use crate::build::{Grown, binary_tree};
+use crate::build::{Effort, Grown, PARALLEL, binary_tree};
 use crate::clouds::CloudSurvey;
 use crate::collapse::{Entry, Packed, lay_out};
 use crate::holds::{Holds, SingleStart};
@@ -31,6 +31,31 @@ pub(crate) fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result
     if geometries.len() > MOST_PRIMITIVES {
         return Err(BuildError::TooMany);
     }
+    // Handed to a pool of threads once, not with every piece of work; what one thread does alone is not handed over at all.
+    let effort = Effort::of(options.preset);
+    let work: usize = geometries.iter().map(size_of_geometry).sum();
+    if work > PARALLEL {
+        rayon::scope(|_| build_here(geometries, effort))
+    } else {
+        build_here(geometries, effort)
+    }
+}
+
+/// About how many primitives it has.
+fn size_of_geometry(geometry: &Geometry) -> usize {
+    match &geometry.kind {
+        GeometryKind::Mesh(mesh) => mesh.indices.len(),
+        GeometryKind::PreciseMesh(mesh) => mesh.indices.len(),
+        GeometryKind::Spheres(cloud) => cloud.spheres.len(),
+        GeometryKind::Custom(custom) => custom.primitive_count() as usize,
+        GeometryKind::Shape(_) => 1,
+        // It may be opened.
+        GeometryKind::Instance(_) => 8,
+    }
+}
+
+/// The same on the calling thread and those of its pool.
+fn build_here(geometries: Vec<Geometry>, effort: Effort) -> Result<Accel, BuildError> {
     let mut parts = take_apart(&geometries)?;
     let units = units_of(&geometries, &parts);
     let traits: Vec<Traits> = geometries.iter().map(traits_of).collect();
@@ -41,7 +66,7 @@ pub(crate) fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result
     let near = |part: &Boxed| Bounds::near(&units, &part.bounds, part.geometry, part.primitive);
     let mut others: Vec<Primitive> =
         std::mem::take(&mut parts.boxed).par_iter().with_min_len(1024).map(near).collect();
-    if options.preset != Preset::Fast {
+    if effort.preset != Preset::Fast {
         opening::open(&mut others, &geometries, &units, room);
     }
     let packed = parts.triangles + parts.spheres;
@@ -62,7 +87,7 @@ pub(crate) fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result
                 survey.put_boxes(cloud, &units, own);
             }
         }
-        let grown = binary_tree(level, options.preset, others, &mut primitives, &traits, &geometries, &units);
+        let grown = binary_tree(level, effort, others, &mut primitives, &traits, &geometries, &units);
         let Grown { tree, names, instances, cells } = grown;
         let layout = lay_out(&traits, &tree, &names, &instances)?;
         drop((tree, instances));
@@ -455,8 +480,10 @@ fn box_triangles(mesh: &TriangleMesh, survey: &Survey, units: &Units, mut places
     chunks.into_par_iter().for_each(|(chunk, places)| {
         let first = chunk * CHUNK;
         let triangles = mesh.indices[first..].iter().take(CHUNK).enumerate();
+        // Where all have an area, none has to be asked again.
+        let all_have_area = places.len() == mesh.indices[first..].len().min(CHUNK);
         let boxes = triangles.filter_map(|(i, triangle)| {
-            let corners = corners(mesh, triangle).filter(has_area)?;
+            let corners = corners(mesh, triangle).filter(|corners| all_have_area || has_area(corners))?;
             Some(boxer.around(&corners, survey.geometry, (first + i) as u32))
         });
         for (place, bounds) in places.iter_mut().zip(boxes) {

@@ -43,7 +43,7 @@ const SOON: usize = 8;
 
 /// How little is enough.
 #[derive(Clone, Copy)]
-struct Eagerness {
+pub(crate) struct Eagerness {
     least_waste: f64,
     most_cost: f64,
     least_overlap: f32,
@@ -52,7 +52,8 @@ struct Eagerness {
 }
 
 impl Eagerness {
-    fn now() -> Self {
+    /// The usual one; in tests, that which the calling thread was told.
+    pub(super) fn now() -> Self {
         #[cfg(test)]
         if tests::IS_FORCED.get() {
             let (least_waste, most_cost) = (0.0, f64::INFINITY);
@@ -85,6 +86,7 @@ pub(super) struct InParts {
 /// the first of which has the place `first`.
 pub(super) fn in_parts(
     builder: &Builder,
+    eagerness: Eagerness,
     geometries: &[Geometry],
     units: &Units,
     tree: &Binary,
@@ -92,7 +94,6 @@ pub(super) fn in_parts(
     first: usize,
 ) -> Option<InParts> {
     let carvers = &*Carver::of_all(geometries, units);
-    let eagerness = Eagerness::now();
     let old_cost = cost_of(tree);
     // Whatever is no number counts as too much.
     let is_promising = waste(carvers, names) > eagerness.least_waste * old_cost || eagerness.is_blind;

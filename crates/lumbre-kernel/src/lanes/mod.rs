@@ -80,8 +80,8 @@ pub(crate) trait Lanes: SphereLanes + HullLanes {
     /// wants to know: see [`BlockRay`].
     fn meet_triangles(block: &TriangleBlock, ray: &BlockRay) -> (u32, Self::Edges);
 
-    /// A bit for each place in a list that has this number.
-    fn places_of(list: &[u32; 3 * BLOCK], number: u32) -> u32;
+    /// For each number of a list, a bit for each place before it that has the same.
+    fn equals_before(list: &[u32; 3 * BLOCK]) -> [u32; 3 * BLOCK];
 
     /// The corners of the triangles of a block.
     fn corners(block: &TriangleBlock) -> Corners;
@@ -404,6 +404,7 @@ impl Level {
             }
             if has_avx2
                 && std::arch::is_x86_feature_detected!("avx512f")
+                && std::arch::is_x86_feature_detected!("avx512cd")
                 && std::arch::is_x86_feature_detected!("avx512dq")
                 && std::arch::is_x86_feature_detected!("avx512vl")
             {

@@ -255,8 +255,11 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
-    fn places_of(list: &[u32; 3 * BLOCK], number: u32) -> u32 {
-        list.iter().enumerate().fold(0, |places, (at, &other)| places | u32::from(other == number) << at)
+    fn equals_before(list: &[u32; 3 * BLOCK]) -> [u32; 3 * BLOCK] {
+        std::array::from_fn(|at| {
+            let before = list[..at].iter().enumerate();
+            before.fold(0, |places, (place, &other)| places | u32::from(other == list[at]) << place)
+        })
     }
 
     #[inline(always)]

@@ -26,7 +26,7 @@ pub(super) fn run_avx2<T: Task>(task: T) -> T::Output {
     task.run::<X86<false>>()
 }
 
-#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512dq,avx512vl")]
+#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512cd,avx512dq,avx512vl")]
 pub(super) fn run_avx512<T: Task>(task: T) -> T::Output {
     task.run::<X86<true>>()
 }
@@ -672,18 +672,34 @@ where
     }
 
     #[inline(always)]
-    fn places_of(list: &[u32; 3 * BLOCK], number: u32) -> u32 {
-        let (eights, _) = list.as_chunks::<BLOCK>();
-        let mut places = 0;
-        // SAFETY: see `X86`. The loads are of arrays of eight.
+    fn equals_before(list: &[u32; 3 * BLOCK]) -> [u32; 3 * BLOCK] {
+        let mut equals = [0; 3 * BLOCK];
+        // SAFETY: see `X86`. The loads and stores are of eight or sixteen numbers of arrays of twenty-four.
         unsafe {
-            let number = _mm256_set1_epi32(number as i32);
-            for (i, eight) in eights.iter().enumerate() {
-                let is_equal = _mm256_cmpeq_epi32(_mm256_loadu_si256(eight.as_ptr().cast()), number);
-                places |= (_mm256_movemask_ps(_mm256_castsi256_ps(is_equal)) as u32) << (BLOCK * i);
+            if AVX512 {
+                let (first, last) = list.split_at(2 * BLOCK);
+                let sixteen = _mm512_loadu_si512(first.as_ptr().cast());
+                _mm512_storeu_si512(equals.as_mut_ptr().cast(), _mm512_conflict_epi32(sixteen));
+                let eight = _mm256_loadu_si256(last.as_ptr().cast());
+                let before = _mm256_slli_epi32::<16>(_mm256_conflict_epi32(eight));
+                _mm256_storeu_si256(equals.as_mut_ptr().add(2 * BLOCK).cast(), before);
+                for (equals, &number) in equals[2 * BLOCK..].iter_mut().zip(last) {
+                    let number = _mm512_set1_epi32(number as i32);
+                    *equals |= u32::from(_mm512_cmpeq_epi32_mask(sixteen, number));
+                }
+                return equals;
+            }
+            let (eights, _) = list.as_chunks::<BLOCK>();
+            for (at, (equals, &number)) in equals.iter_mut().zip(list).enumerate() {
+                let number = _mm256_set1_epi32(number as i32);
+                for (i, eight) in eights.iter().enumerate() {
+                    let is_equal = _mm256_cmpeq_epi32(_mm256_loadu_si256(eight.as_ptr().cast()), number);
+                    *equals |= (_mm256_movemask_ps(_mm256_castsi256_ps(is_equal)) as u32) << (BLOCK * i);
+                }
+                *equals &= (1 << at) - 1;
             }
         }
-        places
+        equals
     }
 
     #[inline(always)]
