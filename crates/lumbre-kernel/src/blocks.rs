@@ -13,6 +13,7 @@ use crate::lanes::{self, Lanes, Level, Task};
 use crate::node::{Node, tag};
 use crate::prepare::has_area;
 use crate::triangles::BLOCK;
+use crate::way::out_of_tree;
 use crate::{BuildError, Geometry, GeometryKind, TriangleMesh};
 
 /// What the triangles of a block are called.
@@ -116,6 +117,15 @@ const fn units_of(room: usize) -> usize {
     (size_of::<Head>() + room * size_of::<[f32; 3]>()).div_ceil(size_of::<Unit>())
 }
 
+/// Which vertex a corner in a lane, below eight, is: see [`Head::corners`].
+#[inline(always)]
+fn vertex_at(corners: &[u32; 3], is_unshared: bool, corner: usize, lane: usize) -> usize {
+    if is_unshared {
+        return BLOCK * corner + lane;
+    }
+    (corners[corner] >> (4 * lane)) as usize % MOST_SHARED
+}
+
 impl TriangleBlock {
     /// The place of its names.
     #[inline(always)]
@@ -156,10 +166,7 @@ impl TriangleBlock {
     /// Which vertex a corner in a lane is, below 32: its x stands there, y and z each a room behind.
     #[inline(always)]
     pub(crate) fn vertex_at(&self, corner: usize, lane: usize) -> usize {
-        if self.is_unshared() {
-            return BLOCK * corner + lane % BLOCK;
-        }
-        (self.head.corners[corner] >> (4 * (lane % BLOCK))) as usize % MOST_SHARED
+        vertex_at(&self.head.corners, self.is_unshared(), corner, lane % BLOCK)
     }
 
     /// The same of all corners in a lane.
@@ -204,6 +211,18 @@ impl<'a> Blocks<'a> {
     pub(crate) fn at(self, place: u32) -> Option<&'a TriangleBlock> {
         let window = self.0.get(place as usize..place as usize + WINDOW)?;
         Some(bytemuck::cast_ref::<[Unit; WINDOW], TriangleBlock>(window.try_into().ok()?))
+    }
+
+    /// The same of a reference that stands in the tree.
+    ///
+    /// # Panics
+    /// When there is none.
+    #[inline(always)]
+    pub(crate) fn block(self, place: u32) -> &'a TriangleBlock {
+        match self.at(place) {
+            Some(block) => block,
+            None => out_of_tree(),
+        }
     }
 
     /// The numbers of the blocks of a leaf.
@@ -455,10 +474,7 @@ impl Shared {
     /// See [`TriangleBlock::vertex_at`].
     #[inline(always)]
     fn vertex_at(&self, corner: usize, lane: usize) -> usize {
-        if self.room() == UNSHARED {
-            return BLOCK * corner + lane;
-        }
-        (self.corners[corner] >> (4 * lane)) as usize % MOST_SHARED
+        vertex_at(&self.corners, self.room() > MOST_SHARED, corner, lane)
     }
 
     /// With one of the rooms that there are.

@@ -16,7 +16,6 @@ use crate::primitive::{Bounds, Kind, Primitive, Traits};
 use crate::spheres::SphereBlock;
 use crate::store::Store;
 use crate::triangles::BLOCK;
-use crate::way::out_of_tree;
 use crate::{BuildError, Geometry, GeometryKind, SphereCloud};
 
 /// A primitive in a leaf that is no triangle, or outside the tree.
@@ -85,10 +84,7 @@ impl Packed {
     /// The block of triangles that begins there.
     #[inline(always)]
     pub(crate) fn block(&self, place: u32) -> &TriangleBlock {
-        match self.blocks().at(place) {
-            Some(block) => block,
-            None => out_of_tree(),
-        }
+        self.blocks().block(place)
     }
 
     /// The numbers of the blocks of a leaf of triangles, by which their names stand.
@@ -102,14 +98,13 @@ impl Packed {
     /// [`BuildError::TooMany`] when there is more than references can name.
     pub(crate) fn pack_again(&mut self, level: Level, geometries: &[Geometry]) -> Result<(), BuildError> {
         let followers = self.blocks().followers(self.names.len());
-        let Filled { units, places } = blocks::pack(level, geometries, &self.names, &followers, true)?;
-        let Self { nodes, root, blocks, .. } = self;
-        let before = Blocks::new(blocks);
-        blocks::refer(nodes.to_mut(), root, &places, |leaf| {
-            before.numbers(leaf).map_or(0, |numbers| numbers.start)
-        });
-        self.blocks = units.into();
-        Ok(())
+        let before = std::mem::take(&mut self.blocks);
+        let number_of = |leaf| Blocks::new(&before).numbers(leaf).map_or(0, |numbers| numbers.start);
+        let packed = self.pack(level, geometries, &followers, true, number_of);
+        if packed.is_err() {
+            self.blocks = before;
+        }
+        packed
     }
 
     /// Packs the triangles, as the names and the nodes say, whose references number blocks. Without an area they are left out;
@@ -124,10 +119,23 @@ impl Packed {
         may_lack_area: bool,
     ) -> Result<(), BuildError> {
         let followers = blocks::followers_of(&self.nodes, self.root, self.names.len());
+        self.pack(level, geometries, &followers, may_lack_area, |leaf| tag::blocks(leaf).start)
+    }
+
+    /// Packs triangles behind each block of which so many follow, and turns the references in nodes to them. `number_of` tells the
+    /// number of a leaf's first block.
+    fn pack(
+        &mut self,
+        level: Level,
+        geometries: &[Geometry],
+        followers: &[u8],
+        may_lack_area: bool,
+        number_of: impl Fn(u32) -> usize + Sync,
+    ) -> Result<(), BuildError> {
         let Filled { units, places } =
-            blocks::pack(level, geometries, &self.names, &followers, may_lack_area)?;
+            blocks::pack(level, geometries, &self.names, followers, may_lack_area)?;
+        blocks::refer(self.nodes.to_mut(), &mut self.root, &places, number_of);
         self.blocks = units.into();
-        blocks::refer(self.nodes.to_mut(), &mut self.root, &places, |leaf| tag::blocks(leaf).start);
         Ok(())
     }
 

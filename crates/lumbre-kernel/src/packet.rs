@@ -33,7 +33,7 @@ use crate::node::{END_FACTOR, LITTLE, Node, START_FACTOR, tag};
 use crate::single::{Candidate, Exact, Goal, Outcome, heights};
 use crate::stack::{Order, Stack};
 use crate::triangles::{BLOCK, EDGE_ERROR, FAR, HEIGHT_ERROR, Meeting, ROUNDINGS, SIZE_ERROR, TINY};
-use crate::way::{limit_of, out_of_tree};
+use crate::way::limit_of;
 
 /// Rays in a packet.
 pub(crate) const PACKET: usize = WIDE;
@@ -498,7 +498,7 @@ impl Packet<'_, '_> {
     fn meet_leaf<G: Goal, L: Lanes>(&mut self, leaf: u32) {
         let mut following = Some(leaf & tag::PLACE);
         while let Some(place) = following {
-            let Some(block) = self.triangles.at(place) else { out_of_tree() };
+            let block = self.triangles.block(place);
             following = block.next(place);
             let corners = L::corners(block);
             let bounds = self.bounds::<L::Wide>(&corners, block.taken());

@@ -27,7 +27,7 @@ use crate::query::All;
 use crate::stack::{AsBuilt, ByDistance, Order, Stack};
 use crate::traverse::{PlacedTree, What};
 use crate::triangles::{self, BLOCK, BlockRay, Meeting, Passage, Shear};
-use crate::way::{Way, out_of_tree};
+use crate::way::Way;
 use crate::{Accel, Faces, Hit, InstancePath, traverse};
 
 /// What came of a search.
@@ -139,7 +139,7 @@ impl<'a> Exact<'a> {
     pub(crate) fn meet(&self, ray: &Ray, block: u32, lane: u32) -> Meeting {
         let shear = Shear::new(&ray.direction);
         let origin = shear.local_origin(&ray.origin, &DVec3::from_slice(&self.start.mesh_origin));
-        let Some(block) = self.triangles.at(block) else { out_of_tree() };
+        let block = self.triangles.block(block);
         let corners = shear.axes.gather(block, lane as usize);
         triangles::intersect(ray, shear, origin, corners)
     }
@@ -147,7 +147,7 @@ impl<'a> Exact<'a> {
     /// Geometry and primitive of a triangle.
     #[inline(always)]
     pub(crate) fn names(&self, block: u32, lane: u32) -> (u32, u32) {
-        let Some(block) = self.triangles.at(block) else { out_of_tree() };
+        let block = self.triangles.block(block);
         let names = &self.accel.tree.names[block.number() as usize];
         (names.geometry, names.primitives[lane as usize % BLOCK])
     }
@@ -176,7 +176,7 @@ impl<'a> Exact<'a> {
         &Candidate { block, lane, .. }: &Candidate,
     ) -> Option<Winner> {
         let (shear, origin) = L::shear(ray, axes, &self.start.mesh_origin);
-        let Some(corners) = self.triangles.at(block) else { out_of_tree() };
+        let corners = self.triangles.block(block);
         let (passage, inside) = L::pass(corners, lane as usize, &shear, &origin);
         let root = if passage == Passage::Inside {
             inside.root(inside.t(&shear))
@@ -344,7 +344,7 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
         // One at least, and mostly no more.
         let mut place = leaf & tag::PLACE;
         loop {
-            let Some(block) = self.exact.triangles.at(place) else { out_of_tree() };
+            let block = self.exact.triangles.block(place);
             let (mask, edges) = L::meet_triangles(block, lanes::opaque(&self.blocks));
             if mask != 0 {
                 let crossings = L::place_crossings(&edges, &self.blocks);
@@ -507,7 +507,7 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
         // One at least, and mostly no more.
         let mut place = leaf & tag::PLACE;
         loop {
-            let Some(block) = self.exact.triangles.at(place) else { out_of_tree() };
+            let block = self.exact.triangles.block(place);
             let (mask, edges) = L::meet_triangles(block, lanes::opaque(&self.blocks));
             if mask != 0 {
                 let crossings = L::place_crossings(&edges, &self.blocks);

@@ -23,7 +23,7 @@ use crate::spheres::ExactSphere;
 use crate::stack::{Order, Stack};
 use crate::touch::{self, AllTouches, Touch};
 use crate::triangles::{self, BLOCK, BlockRay, HeightRange, Inside, Passage, Shear};
-use crate::way::{Way, out_of_tree};
+use crate::way::Way;
 use crate::{Accel, GeometryKind, InstancePath, options, precise};
 
 /// What a search asks of a primitive that may be crossed more than once.
@@ -532,15 +532,11 @@ fn meet_blocks<'a, R: Borrow<Ray>, L: Lanes, S: Search<'a>>(
 ) -> bool {
     let accel = frame.accel;
     let mut following = Some(leaf & tag::PLACE);
-    let mut is_first = true;
+    // All of a leaf are of one mesh.
+    frame.turn_to(frame.blocks.block(leaf & tag::PLACE));
     while let Some(number) = following {
-        let Some(block) = frame.blocks.at(number) else { out_of_tree() };
+        let block = frame.blocks.block(number);
         following = block.next(number);
-        if is_first {
-            // All of a leaf are of one mesh.
-            frame.turn_to(block);
-            is_first = false;
-        }
         let mut mask = if let Some(blocks) = &frame.mesh.blocks {
             let (mask, edges) = L::meet_triangles(block, blocks);
             if mask == 0 {
