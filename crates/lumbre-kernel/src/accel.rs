@@ -213,8 +213,8 @@ impl Accel {
     #[inline(always)]
     pub(crate) fn closest_at(&self, level: Level, ray: &Ray) -> Option<Hit> {
         match &self.single {
-            Some(start) if start.is_mixed => level.run(ClosestHit::<true> { accel: self, ray }),
-            Some(_) => level.run(ClosestHit::<false> { accel: self, ray }),
+            Some(start) if start.is_mixed => level.run(ClosestHit::<true> { accel: self, start, ray }),
+            Some(start) => level.run(ClosestHit::<false> { accel: self, start, ray }),
             None => self.closest_plainly_at(level, ray),
         }
     }
@@ -349,8 +349,8 @@ impl Accel {
     #[inline(always)]
     pub(crate) fn any_at(&self, level: Level, ray: &Ray) -> bool {
         match &self.single {
-            Some(start) if start.is_mixed => level.run(AnyHit::<true> { accel: self, ray }),
-            Some(_) => level.run(AnyHit::<false> { accel: self, ray }),
+            Some(start) if start.is_mixed => level.run(AnyHit::<true> { accel: self, start, ray }),
+            Some(start) => level.run(AnyHit::<false> { accel: self, start, ray }),
             None => self.any_plainly_at(level, ray),
         }
     }

@@ -5,6 +5,8 @@
 //! the first block of a leaf begins. What a block's triangles are called stands elsewhere, for only the winner of a search is
 //! asked.
 
+use std::mem::offset_of;
+
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
@@ -155,6 +157,14 @@ impl TriangleBlock {
     #[inline(always)]
     pub(crate) fn corners(&self) -> &[u32; 3] {
         &self.head.corners
+    }
+
+    /// The same, and what stands behind them.
+    #[inline(always)]
+    pub(crate) fn corners_and_more(&self) -> &[u32; 4] {
+        const FIRST: usize = offset_of!(TriangleBlock, head) / 4 + offset_of!(Head, corners) / 4;
+        let words: &[u32] = bytemuck::cast_slice(std::slice::from_ref(self));
+        (&words[FIRST..FIRST + 4]).try_into().expect("four")
     }
 
     /// The coordinates from the first vertex on: the x of as many as there is room for, then y, then z, and then what means nothing.

@@ -32,7 +32,9 @@ use crate::lanes::{self, Axes, Corners, Lanes, Row, Sides, WIDE, Wide};
 use crate::node::{END_FACTOR, LITTLE, Node, START_FACTOR, tag};
 use crate::single::{Candidate, Exact, Goal, Outcome, heights};
 use crate::stack::{Order, Stack};
-use crate::triangles::{BLOCK, EDGE_ERROR, FAR, HEIGHT_ERROR, Meeting, ROUNDINGS, SIZE_ERROR, TINY};
+use crate::triangles::{
+    BEYOND, BLOCK, EDGE_ERROR, FAR, HEIGHT_ERROR, Meeting, ROUNDINGS, SIZE_ERROR, TINY, beyond,
+};
 use crate::way::limit_of;
 
 /// Rays in a packet.
@@ -419,7 +421,7 @@ impl Packet<'_, '_> {
             L::Wide::select(better, triangle, L::Wide::load(&self.triangle)).store(&mut self.triangle);
             L::Wide::select(better, to, L::Wide::load(&self.bundle.last)).store(&mut self.bundle.last);
             let place = to * L::Wide::load(&self.bundle.place_per_height);
-            let end = place.abs().times_plus(roundings, place + L::Wide::splat(f32::MIN_POSITIVE));
+            let end = place.times_plus(L::Wide::splat(BEYOND), L::Wide::splat(f32::MIN_POSITIVE));
             let s_max = L::Wide::select(better, end, L::Wide::load(&self.s_max));
             s_max.store(&mut self.s_max);
             self.frustum.s_max = s_max.most();
@@ -470,8 +472,7 @@ impl Packet<'_, '_> {
                     (self.from.0[i], self.to.0[i]) = (from, to);
                     self.triangle.0[i] = f32::from_bits(number << 3 | lane);
                     self.bundle.last.0[i] = to;
-                    let place = to * self.bundle.place_per_height.0[i];
-                    self.s_max.0[i] = place + place.abs() * ROUNDINGS + f32::MIN_POSITIVE;
+                    self.s_max.0[i] = beyond(to * self.bundle.place_per_height.0[i]);
                 }
                 (_, Outcome::Unsettled) => {
                     self.unsettled |= 1 << i;

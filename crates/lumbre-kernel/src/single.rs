@@ -147,7 +147,11 @@ impl<'a> Exact<'a> {
     /// Geometry and primitive of a triangle.
     #[inline(always)]
     pub(crate) fn names(&self, block: u32, lane: u32) -> (u32, u32) {
-        let block = self.triangles.block(block);
+        self.names_in(self.triangles.block(block), lane)
+    }
+
+    #[inline(always)]
+    fn names_in(&self, block: &TriangleBlock, lane: u32) -> (u32, u32) {
         let names = &self.accel.tree.names[block.number() as usize];
         (names.geometry, names.primitives[lane as usize % BLOCK])
     }
@@ -178,16 +182,16 @@ impl<'a> Exact<'a> {
         let (shear, origin) = L::shear(ray, axes, &self.start.mesh_origin);
         let corners = self.triangles.block(block);
         let (passage, inside) = L::pass(corners, lane as usize, &shear, &origin);
-        let root = if passage == Passage::Inside {
-            inside.root(inside.t(&shear))
+        let (t, local) = if passage == Passage::Inside {
+            (inside.t(&shear), inside.local())
         } else {
             match self.meet(ray, block, lane) {
-                Meeting::Hit { root, .. } => root,
+                Meeting::Hit { root, .. } => (root.t, root.local),
                 Meeting::Miss | Meeting::Touch { .. } => return None,
             }
         };
-        let (geometry, primitive) = self.names(block, lane);
-        Some(Winner { root, geometry, primitive })
+        let (geometry, primitive) = self.names_in(corners, lane);
+        Some(Winner { root: triangles::root(t, local), geometry, primitive })
     }
 }
 
@@ -382,8 +386,7 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
     fn keep<L: Lanes>(&mut self, better: Candidate, way: &mut Way<L>) {
         self.best = better;
         self.blocks.range.last = better.to;
-        let place = better.to * self.place_per_height;
-        way.end_at(place + place.abs() * triangles::ROUNDINGS + f32::MIN_POSITIVE);
+        way.end_at(triangles::beyond(better.to * self.place_per_height));
     }
 
     /// Looks closer at a triangle that may be met, and nearer than the best: what is better, if anything.
@@ -705,6 +708,8 @@ impl Goal for Whether {
 /// The nearest hit of a ray by whichever search can tell. `MIXED` as below.
 pub(crate) struct ClosestHit<'a, 'r, const MIXED: bool> {
     pub(crate) accel: &'a Accel,
+    /// That of the tree.
+    pub(crate) start: &'a SingleStart,
     pub(crate) ray: &'r Ray,
 }
 
@@ -713,10 +718,8 @@ impl<const MIXED: bool> Task for ClosestHit<'_, '_, MIXED> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Option<Hit> {
-        let Self { accel, ray } = self;
-        if let Some(start) = &accel.single
-            && let Outcome::Settled(winner) = Alone::<Nearest, MIXED>::new(accel, start, ray).run::<L>()
-        {
+        let Self { accel, start, ray } = self;
+        if let Outcome::Settled(winner) = Alone::<Nearest, MIXED>::new(accel, start, ray).run::<L>() {
             return winner.map(|winner| winner.to_hit(accel));
         }
         accel.closest_plainly_at(L::level(), ray)
@@ -726,6 +729,8 @@ impl<const MIXED: bool> Task for ClosestHit<'_, '_, MIXED> {
 /// Whether a ray hits anything, alike.
 pub(crate) struct AnyHit<'a, 'r, const MIXED: bool> {
     pub(crate) accel: &'a Accel,
+    /// That of the tree.
+    pub(crate) start: &'a SingleStart,
     pub(crate) ray: &'r Ray,
 }
 
@@ -734,10 +739,8 @@ impl<const MIXED: bool> Task for AnyHit<'_, '_, MIXED> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> bool {
-        let Self { accel, ray } = self;
-        if let Some(start) = &accel.single
-            && let Outcome::Settled(is_hit) = Alone::<Whether, MIXED>::new(accel, start, ray).run::<L>()
-        {
+        let Self { accel, start, ray } = self;
+        if let Outcome::Settled(is_hit) = Alone::<Whether, MIXED>::new(accel, start, ray).run::<L>() {
             return is_hit;
         }
         accel.any_plainly_at(L::level(), ray)

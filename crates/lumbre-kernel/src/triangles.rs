@@ -140,6 +140,9 @@ pub(crate) const LEAST_SIZE: f32 = 4.0 * ROUNDOFF;
 pub(crate) const TINY: f32 = 1.0 / (1u128 << 120) as f32;
 /// Above all that few roundings may do.
 pub(crate) const ROUNDINGS: f32 = 6.0 * ROUNDOFF;
+/// What takes a place in the range of boxes, a product of few rounded numbers that is not below zero, to beyond what it may be
+/// wrong by.
+pub(crate) const BEYOND: f32 = 1.0 + 2.0 * ROUNDINGS;
 /// No height that matters is larger, and a range may well end there.
 pub(crate) const FAR: f32 = (1u128 << 100) as f32;
 /// The bounds on L; below the third nothing is certain.
@@ -212,6 +215,12 @@ fn larger(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
+/// See [`BEYOND`]. Rays from nearby start at zero or later, and so no hit has a height below zero.
+#[inline(always)]
+pub(crate) fn beyond(place: f32) -> f32 {
+    place * BEYOND + f32::MIN_POSITIVE
+}
+
 /// A sheared corner: the ray is the z axis.
 #[derive(Clone, Copy)]
 struct Corner {
@@ -276,11 +285,16 @@ impl Inside {
         self.height / self.det / shear.direction_z
     }
 
+    /// The barycentrics of the crossing: those of the second and third corner.
+    #[inline(always)]
+    pub(crate) fn local(&self) -> DVec2 {
+        DVec2::new(self.v / self.det, self.w / self.det)
+    }
+
     /// The crossing at this `t`, which is its own.
     #[inline(always)]
     pub(crate) fn root(&self, t: f64) -> Root {
-        let local = DVec2::new(self.v / self.det, self.w / self.det);
-        Root { t, part: 0, multiplicity: 1, local }
+        root(t, self.local())
     }
 
     fn meeting(&self, ray: &Ray, shear: &Shear) -> Meeting {
@@ -291,6 +305,12 @@ impl Inside {
             Meeting::Miss
         }
     }
+}
+
+/// The crossing of a triangle at this `t`, with these barycentrics.
+#[inline(always)]
+pub(crate) fn root(t: f64, local: DVec2) -> Root {
+    Root { t, part: 0, multiplicity: 1, local }
 }
 
 /// Whether a triangle may be met there. A NaN is not in the range; an infinity is no place.
@@ -403,7 +423,7 @@ fn touch(shear: &Shear, corners: [Corner; 3]) -> Meeting {
     let [u, v, w] = values;
     let det = u + v + w;
     let t = (u * a.z + v * b.z + w * c.z) / det / shear.direction_z;
-    let root = Root { t, part: 0, multiplicity: 1, local: DVec2::new(v / det, w / det) };
+    let root = root(t, DVec2::new(v / det, w / det));
     if feature != Feature::EdgeOn && !root.t.is_finite() {
         return Meeting::Miss;
     }

@@ -151,6 +151,46 @@ impl<const AVX512: bool> X86<AVX512> {
         unsafe { _mm256_cvtps_pd(_mm_setr_ps(*row.add(a), *row.add(b), *row.add(c), 0.0)) }
     }
 
+    /// The numbers of a row in three places below sixteen, of more bits than which what is above means nothing; nor does the last.
+    /// For AVX-512 alone.
+    ///
+    /// # Safety
+    /// There are sixteen to be read.
+    #[inline(always)]
+    unsafe fn three_of(row: *const f32, places: __m128i) -> __m256d {
+        // SAFETY: see `X86`, and above.
+        unsafe {
+            let three = _mm512_permutexvar_ps(_mm512_castsi128_si512(places), _mm512_loadu_ps(row));
+            _mm256_cvtps_pd(_mm512_castps512_ps128(three))
+        }
+    }
+
+    /// The corners of the triangle in a lane, `[axis][corner]` by the order of the axes; the last of four means nothing.
+    #[inline(always)]
+    fn corners_in(block: &TriangleBlock, lane: usize, axes: &Axes) -> [__m256d; 3] {
+        let coordinates = block.coordinates().as_ptr();
+        let [x, y, z] = axes.rows(block);
+        // SAFETY: see `X86`. A row begins at 62 at most, and no more of it than 32 are looked at: in an array of 96. The load is of
+        // four u32.
+        unsafe {
+            if AVX512 && !block.is_unshared() {
+                let corners = _mm_loadu_si128(block.corners_and_more().as_ptr().cast());
+                let vertices = _mm_srl_epi32(corners, _mm_cvtsi32_si128(4 * (lane % BLOCK) as i32));
+                return [
+                    Self::three_of(coordinates.add(x), vertices),
+                    Self::three_of(coordinates.add(y), vertices),
+                    Self::three_of(coordinates.add(z), vertices),
+                ];
+            }
+            let vertices = block.vertices_at(lane);
+            [
+                Self::component(coordinates.add(x), vertices),
+                Self::component(coordinates.add(y), vertices),
+                Self::component(coordinates.add(z), vertices),
+            ]
+        }
+    }
+
     /// Eight numbers of sixteen, `low` and `high`, each by its place.
     #[inline(always)]
     fn of_two(low: __m256, high: __m256, places: __m256i) -> __m256 {
@@ -819,16 +859,13 @@ where
 
     #[inline(always)]
     fn pass(block: &TriangleBlock, lane: usize, shear: &Shear, origin: &[f64; 3]) -> (Passage, Inside) {
-        let coordinates = block.coordinates().as_ptr();
-        let [kx, ky, kz] = shear.axes.rows(block);
-        let vertices = block.vertices_at(lane);
         // The corners in the first three lanes, and the very operations of the portable one.
-        // SAFETY: see `X86`. A row begins at 62 at most, and vertices are below 32: in an array of 96.
+        let [across, up, z] = Self::corners_in(block, lane, shear.axes);
+        // SAFETY: see `X86`.
         unsafe {
-            let z = _mm256_sub_pd(Self::component(coordinates.add(kz), vertices), _mm256_set1_pd(origin[2]));
-            let across =
-                _mm256_sub_pd(Self::component(coordinates.add(kx), vertices), _mm256_set1_pd(origin[0]));
-            let up = _mm256_sub_pd(Self::component(coordinates.add(ky), vertices), _mm256_set1_pd(origin[1]));
+            let z = _mm256_sub_pd(z, _mm256_set1_pd(origin[2]));
+            let across = _mm256_sub_pd(across, _mm256_set1_pd(origin[0]));
+            let up = _mm256_sub_pd(up, _mm256_set1_pd(origin[1]));
             // No fused multiply-add here and below.
             let x = _mm256_sub_pd(across, _mm256_mul_pd(_mm256_set1_pd(shear.x), z));
             let y = _mm256_sub_pd(up, _mm256_mul_pd(_mm256_set1_pd(shear.y), z));
