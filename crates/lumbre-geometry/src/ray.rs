@@ -29,6 +29,7 @@ impl Ray {
 
     /// The same line with another range.
     #[must_use]
+    #[inline]
     pub fn with_range(self, t_min: f64, t_max: f64) -> Self {
         Self { t_min, t_max, ..self }
     }
@@ -51,6 +52,7 @@ impl Ray {
 
     /// The same ray in the object's space. Every `t` keeps its meaning, because the direction is not renormalised.
     #[must_use]
+    #[inline]
     pub fn into_object(&self, world_from_object: &Transform) -> Self {
         Self {
             origin: world_from_object.inverse_point(self.origin),

@@ -153,12 +153,20 @@ impl What {
 }
 
 /// The instances that a search is within.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub(crate) struct Place {
     /// Their positions in the lists of their trees.
     pub(crate) route: InstancePath,
     /// Their ids.
     pub(crate) ids: InstancePath,
+}
+
+impl Clone for Place {
+    // Every better hit takes a copy, and that of a slice is no loop.
+    #[inline]
+    fn clone(&self) -> Self {
+        Self { route: InstancePath::from_slice(&self.route), ids: InstancePath::from_slice(&self.ids) }
+    }
 }
 
 impl Place {

@@ -227,11 +227,13 @@ impl Transform {
     }
 
     /// The point whose image is `p`.
+    #[inline]
     pub fn inverse_point(&self, p: DVec3) -> DVec3 {
         self.inverse.transform_point3(p)
     }
 
     /// The direction whose image is `v`.
+    #[inline]
     pub fn inverse_vector(&self, v: DVec3) -> DVec3 {
         self.inverse.transform_vector3(v)
     }
