@@ -556,3 +556,17 @@ pub(crate) fn corners_at(level: Level, block: &TriangleBlock) -> [[[f32; BLOCK];
     }
     level.run(Taking(block))
 }
+
+/// [`Lanes::equals_before`] at a level, for tests.
+#[cfg(test)]
+pub(crate) fn equals_before_at(level: Level, list: &[u32; 3 * BLOCK]) -> [u32; 3 * BLOCK] {
+    struct Comparing<'a>(&'a [u32; 3 * BLOCK]);
+    impl Task for Comparing<'_> {
+        type Output = [u32; 3 * BLOCK];
+        #[inline(always)]
+        fn run<L: Lanes>(self) -> Self::Output {
+            L::equals_before(self.0)
+        }
+    }
+    level.run(Comparing(list))
+}

@@ -13,7 +13,7 @@ use lumbre_math::{DVec3, Vec3};
 
 use super::scenes::Random;
 use crate::blocks::{self, BlockNames, Blocks, TriangleBlock, Unit};
-use crate::lanes::{Level, corners_at, meet_triangles_at};
+use crate::lanes::{Level, corners_at, equals_before_at, meet_triangles_at};
 use crate::triangles::{BLOCK, BlockRay, Meeting, Shear, intersect};
 use crate::{Accel, BuildOptions, Geometry, GeometryKind, TriangleMesh};
 
@@ -188,6 +188,27 @@ fn grid(random: &mut Random, own: f64) -> Geometry {
         }
     }
     Geometry { id: 0, kind: GeometryKind::Mesh(Arc::new(mesh)) }
+}
+
+#[test]
+fn corners_are_compared_with_all_before_them_at_every_level() {
+    let mut random = Random(83);
+    for kinds in [1, 2, 5, 12, 24, 1000] {
+        for _ in 0..200 {
+            // Near the ends of the range as well, where a sign might be taken for one.
+            let list: [u32; 3 * BLOCK] =
+                std::array::from_fn(|_| (random.below(kinds) as u32).wrapping_sub(kinds as u32 / 2));
+            let mut expected = [0; 3 * BLOCK];
+            for at in 0..list.len() {
+                for before in 0..at {
+                    expected[at] |= u32::from(list[before] == list[at]) << before;
+                }
+            }
+            for level in Level::all() {
+                assert_eq!(equals_before_at(level, &list), expected, "{level:?}: {list:?}");
+            }
+        }
+    }
 }
 
 #[test]

@@ -1,14 +1,57 @@
 //! Building: what is refused, what is left out, and that the tree is always the same.
 
-use std::sync::Arc;
+use std::collections::BTreeSet;
+use std::sync::{Arc, Mutex};
 
-use lumbre_geometry::{Aabb, Ray};
+use lumbre_geometry::{Aabb, Ray, Root, Roots, Surface};
 use lumbre_math::{DVec3, Transform, Vec3};
 
 use super::scenes::{Balls, Random, build, cube, icosphere, mixture, options, soup, with_every_preset};
 use crate::build::spatial::tests::IS_FORCED;
 use crate::node::tag;
-use crate::{Accel, BuildError, BuildOptions, Geometry, GeometryKind, Instance, TriangleMesh};
+use crate::{
+    Accel, BuildError, BuildOptions, CustomGeometry, Geometry, GeometryKind, Instance, TriangleMesh,
+};
+
+/// Custom geometry of which nothing is ever met, and that writes down which threads ask for its boxes.
+#[derive(Debug)]
+struct Asked {
+    count: u32,
+    by: Mutex<BTreeSet<String>>,
+}
+
+impl CustomGeometry for Asked {
+    fn primitive_count(&self) -> u32 {
+        self.count
+    }
+
+    fn bounds(&self, primitive: u32) -> Option<Aabb> {
+        self.by.lock().unwrap().insert(format!("{:?}", std::thread::current().id()));
+        let low = DVec3::splat(primitive.into());
+        Some(Aabb { min: low, max: low + DVec3::ONE })
+    }
+
+    fn closest(&self, _: u32, _: &Ray) -> Option<Root> {
+        None
+    }
+
+    fn roots(&self, _: u32, _: &Ray, _: &mut Roots) {}
+
+    fn surface(&self, _: u32, _: &Ray, _: &Root) -> Surface {
+        unreachable!("nothing is met")
+    }
+}
+
+#[test]
+fn what_is_little_is_built_by_the_thread_that_asks_and_more_by_the_pool() {
+    let own = BTreeSet::from([format!("{:?}", std::thread::current().id())]);
+    for (count, is_own) in [(100, true), (4096, true), (4097, false)] {
+        let asked = Arc::new(Asked { count, by: Mutex::default() });
+        let accel = try_build(vec![GeometryKind::Custom(asked.clone())]).unwrap();
+        assert_eq!(accel.primitive_count(), count as usize);
+        assert_eq!(*asked.by.lock().unwrap() == own, is_own, "{count}");
+    }
+}
 
 fn try_build(kinds: Vec<GeometryKind>) -> Result<Accel, BuildError> {
     let geometries = kinds.into_iter().map(|kind| Geometry { id: 5, kind }).collect();
