@@ -565,7 +565,7 @@ pub(crate) fn refer(
     };
     root.iter_mut().for_each(refer);
     nodes.par_iter_mut().with_min_len(256).for_each(|node| {
-        let len = node.len as usize;
+        let len = node.len();
         node.children[..len].iter_mut().for_each(refer);
     });
 }
@@ -573,7 +573,7 @@ pub(crate) fn refer(
 /// How many blocks of its leaf stand behind each, where the references in nodes number them.
 pub(crate) fn followers_of(nodes: &[Node], root: Option<u32>, blocks: usize) -> Vec<u8> {
     let mut followers = vec![0; blocks];
-    let children = nodes.iter().flat_map(|node| &node.children[..node.len as usize]);
+    let children = nodes.iter().flat_map(|node| &node.children[..node.len()]);
     for &reference in children.chain(&root).filter(|&&reference| reference >> tag::SHIFT == tag::TRIANGLES) {
         for (behind, followers) in followers[tag::blocks(reference)].iter_mut().rev().enumerate() {
             *followers = behind as u8;

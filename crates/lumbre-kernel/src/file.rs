@@ -42,7 +42,7 @@ use crate::{Accel, Geometry, GeometryKind, LoadError, RefitError};
 
 const MAGIC: [u8; 8] = *b"LumbMap\0";
 /// Changes with the format, and with the layout of what is in it.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 const BYTE_ORDER: u32 = 0x0102_0304;
 const NONE: u32 = u32::MAX;
 const HEADER: usize = 256;
@@ -432,12 +432,14 @@ fn check_lanes(tree: &Packed) -> Result<(), LoadError> {
         });
     }
     for (place, node) in tree.nodes.iter().enumerate() {
-        let len = node.len as usize;
-        if len == 0 || len > WIDTH {
-            return Err(LoadError::Inconsistent { what: format!("node {place} has {len} children") });
+        let len = node.len();
+        if len == 0 {
+            return Err(LoadError::Inconsistent { what: format!("node {place} has no child") });
         }
         let is_empty = |lane: usize| {
-            (0..6).all(|side| node.planes[side][lane].to_bits() == Node::EMPTY.planes[side][lane].to_bits())
+            node.children[lane] == Node::ABSENT
+                && (0..6)
+                    .all(|side| node.planes[side][lane].to_bits() == Node::EMPTY.planes[side][lane].to_bits())
         };
         if !(len..WIDTH).all(is_empty) {
             let what = format!("node {place} has a box without a child");

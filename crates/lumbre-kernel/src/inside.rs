@@ -82,7 +82,7 @@ fn solids_around(accel: &Accel, point: DVec3, time: f64) -> usize {
             match reference >> tag::SHIFT {
                 tag::INNER => {
                     let node = &accel.tree.nodes[reference as usize];
-                    for lane in 0..node.len as usize {
+                    for lane in 0..node.len() {
                         // In doubt it is within, also where the slop is no number.
                         let is_beyond = (0..3).any(|axis| {
                             let (low, high) = (node.planes[2 * axis][lane], node.planes[2 * axis + 1][lane]);

@@ -92,7 +92,7 @@ pub(crate) fn closest_point(
         match next.what {
             Waiting::Reference(reference) if reference >> tag::SHIFT == tag::INNER => {
                 let node = &frame.accel.tree.nodes[reference as usize];
-                for lane in 0..node.len as usize {
+                for lane in 0..node.len() {
                     let distance = frame.distance_to_box(node, lane).max(next.distance);
                     if distance <= search.limit {
                         let what = Waiting::Reference(node.children[lane]);

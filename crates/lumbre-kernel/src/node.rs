@@ -1,4 +1,4 @@
-//! Eight-wide nodes, and the single-precision ray that is tested against their boxes without ever losing a hit.
+//! Sixteen-wide nodes, and the single-precision ray that is tested against their boxes without ever losing a hit.
 //!
 //! # Why no hit is lost
 //!
@@ -90,31 +90,36 @@ pub(crate) mod tag {
 }
 
 /// Children of a node.
-pub(crate) const WIDTH: usize = 8;
+pub(crate) const WIDTH: usize = 16;
 
-/// Up to eight boxes and what they hold.
+/// Up to sixteen boxes and what they hold.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub(crate) struct Node {
     /// Lower and upper x, y and z planes of the boxes: `planes[2 * axis + side]`.
     pub(crate) planes: [[f32; WIDTH]; 6],
-    /// Tagged references; those from `len` on mean nothing. The last are the largest: where any hit will do, they are the
-    /// likeliest to have one.
+    /// Tagged references, in the first lanes; [`Node::ABSENT`] in the others. The last are the largest: where any hit will do, they
+    /// are the likeliest to have one.
     pub(crate) children: [u32; WIDTH],
-    /// How many children there are, in the first lanes.
-    pub(crate) len: u32,
-    // So that no byte of it is left open.
-    pub(crate) rest: [u32; 7],
 }
 
-const _: () = assert!(size_of::<Node>() == 256);
+const _: () = assert!(size_of::<Node>() == 7 * 64);
 
 impl Node {
     /// A node without children: its boxes are inside out.
     pub(crate) const EMPTY: Self = {
         let (low, high) = ([f32::MAX; WIDTH], [-f32::MAX; WIDTH]);
-        Self { planes: [low, high, low, high, low, high], children: [u32::MAX; WIDTH], len: 0, rest: [0; 7] }
+        Self { planes: [low, high, low, high, low, high], children: [Self::ABSENT; WIDTH] }
     };
+
+    /// What stands for a child that is not there.
+    pub(crate) const ABSENT: u32 = u32::MAX;
+
+    /// How many children there are.
+    #[inline]
+    pub(crate) fn len(&self) -> usize {
+        self.children.iter().position(|&child| child == Self::ABSENT).unwrap_or(WIDTH)
+    }
 }
 
 /// The units in which a tree's boxes are kept.

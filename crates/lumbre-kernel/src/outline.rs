@@ -8,7 +8,7 @@ use crate::node::{Node, Units, tag};
 use crate::{Accel, Placement};
 
 /// Boxes of an outline, about.
-const OUTLINE: usize = 128;
+const OUTLINE: usize = 256;
 
 /// Boxes of a tree that together hold what is finite in it. The box around an instance is that of many boxes, each taken over
 /// by itself, which is tighter than the image of the whole.
@@ -40,7 +40,7 @@ impl Outline {
         };
         let Some(root) = node(reference) else { return Self::of_box(Aabb::EMPTY) };
         let children = |node: &Node| -> Vec<(Aabb, u32)> {
-            (0..node.len as usize)
+            (0..node.len())
                 .map(|lane| (box_in_space(&inner.units, node, lane), node.children[lane]))
                 .collect()
         };
@@ -60,8 +60,7 @@ impl Outline {
         let whole = open.iter().fold(Aabb::EMPTY, |whole, (bounds, _)| whole.union(*bounds));
         let boxes: Vec<_> = open.iter().map(|(bounds, _)| center_and_half(bounds)).collect();
         let reach = boxes.iter().fold(DVec3::ZERO, |most, [center, half]| most.max(center.abs() + *half));
-        let boxes = boxes.chunks(EIGHT).map(EightBoxes::new).collect();
-        Self { whole, boxes, reach }
+        Self { whole, boxes: EightBoxes::of(&boxes), reach }
     }
 
     /// A box around it at all times, whatever is the box around the whole tree; `None` where nothing is known but that.
@@ -164,8 +163,13 @@ pub(crate) struct EightBoxes {
 }
 
 impl EightBoxes {
+    /// Of any number.
+    pub(crate) fn of(boxes: &[[DVec3; 2]]) -> Vec<Self> {
+        boxes.chunks(EIGHT).map(Self::new).collect()
+    }
+
     /// Of some; where there are fewer, the first comes again.
-    pub(crate) fn new(boxes: &[[DVec3; 2]]) -> Self {
+    fn new(boxes: &[[DVec3; 2]]) -> Self {
         let component = |part: usize, axis: usize| {
             std::array::from_fn(|lane| boxes.get(lane).unwrap_or(&boxes[0])[part][axis])
         };
@@ -175,9 +179,18 @@ impl EightBoxes {
 }
 
 impl EightBoxes {
-    /// Half the areas of the boxes around the images of the first `count`, together.
+    /// Half the areas of the boxes around the images of `count` boxes, together.
     #[inline(always)]
-    pub(crate) fn placed_area(&self, count: usize, placing: &Placing) -> f64 {
+    pub(crate) fn placed_area(boxes: &[Self], count: usize, placing: &Placing) -> f64 {
+        let mut area = 0.0;
+        for (i, eight) in boxes.iter().enumerate() {
+            area += eight.area_of_first(count - EIGHT * i, placing);
+        }
+        area
+    }
+
+    #[inline(always)]
+    fn area_of_first(&self, count: usize, placing: &Placing) -> f64 {
         let (halves, s) = (&self.halves, &placing.sizes);
         let mut areas = [0.0; EIGHT];
         for (lane, area) in areas.iter_mut().enumerate() {

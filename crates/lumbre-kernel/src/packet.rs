@@ -210,7 +210,7 @@ fn start<W: Wide>(start: &SingleStart, columns: &[Row<f64>; 8]) -> Option<(Frust
         bundle.middle[place] = 0.5 * (origin.least() + origin.most());
     }
     rests[2].store(&mut bundle.rest[2]);
-    let off_z = W::load(&bundle.origin[2]) - W::splat(bundle.middle[2]);
+    let off_z = W::load(&bundle.origin[2].0) - W::splat(bundle.middle[2]);
     bundle.apart[2] = off_z.abs().most();
     for place in 0..2 {
         let shear = direction[order[place]] * inverse;
@@ -223,7 +223,7 @@ fn start<W: Wide>(start: &SingleStart, columns: &[Row<f64>; 8]) -> Option<(Frust
         let middle = 0.5 * (low + high);
         bundle.middle_shear[place] = middle;
         bundle.spread[place] = ((shear - W::splat(middle)).abs()).most();
-        let off = W::load(&bundle.origin[place]) - W::splat(bundle.middle[place]) + rest;
+        let off = W::load(&bundle.origin[place].0) - W::splat(bundle.middle[place]) + rest;
         bundle.apart[place] = (off_z.times_from(shear, off).abs()).most();
         shear.store(&mut bundle.shear[place]);
         rest.store(&mut bundle.rest[place]);
@@ -346,12 +346,12 @@ impl Packet<'_, '_> {
         let bundle = lanes::opaque(&self.bundle);
         let [kx, ky, kz] = bundle.axes.order();
         let (ox, oy, oz) = (
-            L::Wide::load(&bundle.origin[0]),
-            L::Wide::load(&bundle.origin[1]),
-            L::Wide::load(&bundle.origin[2]),
+            L::Wide::load(&bundle.origin[0].0),
+            L::Wide::load(&bundle.origin[1].0),
+            L::Wide::load(&bundle.origin[2].0),
         );
-        let (rx, ry) = (L::Wide::load(&bundle.rest[0]), L::Wide::load(&bundle.rest[1]));
-        let (sx, sy) = (L::Wide::load(&bundle.shear[0]), L::Wide::load(&bundle.shear[1]));
+        let (rx, ry) = (L::Wide::load(&bundle.rest[0].0), L::Wide::load(&bundle.rest[1].0));
+        let (sx, sy) = (L::Wide::load(&bundle.shear[0].0), L::Wide::load(&bundle.shear[1].0));
         let lane = lane % BLOCK;
         let at = |corner: usize, axis: usize| corners[corner][axis][lane];
         // As `Lanes::meet_triangles`, with the signs turned.
@@ -376,7 +376,7 @@ impl Packet<'_, '_> {
         let det = u + v + w;
         let weight = det.abs();
         let height =
-            det.times_plus(L::Wide::load(&bundle.rest[2]), w.times_plus(cz, v.times_plus(bz, u * az)));
+            det.times_plus(L::Wide::load(&bundle.rest[2].0), w.times_plus(cz, v.times_plus(bz, u * az)));
         let ahead = height.turned_by(det).turned_by(L::Wide::splat(bundle.turn));
         let height_error = bounds.height_error.0[lane];
         let spread = weight.times_plus(
@@ -385,8 +385,8 @@ impl Packet<'_, '_> {
         );
         let (from, to) = (ahead - spread, ahead + spread);
         // What is no number may be in range.
-        let is_out = to.below(weight * L::Wide::load(&bundle.first))
-            | (weight * L::Wide::load(&bundle.last)).below(from);
+        let is_out = to.below(weight * L::Wide::load(&bundle.first.0))
+            | (weight * L::Wide::load(&bundle.last.0)).below(from);
         let in_range = mask & !is_out;
         if in_range == 0 {
             return;
@@ -395,8 +395,8 @@ impl Packet<'_, '_> {
         let inside = L::Wide::splat(twice).below(low) | high.below(L::Wide::splat(-twice));
         let sure = in_range
             & inside
-            & (weight * L::Wide::load(&bundle.surely_first)).at_most(from)
-            & to.at_most(weight * L::Wide::load(&bundle.surely_last));
+            & (weight * L::Wide::load(&bundle.surely_first.0)).at_most(from)
+            & to.at_most(weight * L::Wide::load(&bundle.surely_last.0));
         if G::IS_ANY {
             self.met |= sure;
             self.alive &= !sure;
@@ -411,18 +411,18 @@ impl Packet<'_, '_> {
         let (from, to) = (from * inverse, to * inverse);
         let from = from.abs().times_from(roundings, from);
         let to = to.abs().times_plus(roundings, to);
-        let (best_from, best_to) = (L::Wide::load(&self.from), L::Wide::load(&self.to));
+        let (best_from, best_to) = (L::Wide::load(&self.from.0), L::Wide::load(&self.to.0));
         let better = sure & to.below(best_from);
         if better != 0 {
             let triangle = L::Wide::splat(f32::from_bits(number << 3 | lane as u32));
             L::Wide::select(better, from, best_from).store(&mut self.from);
             let to = L::Wide::select(better, to, best_to);
             to.store(&mut self.to);
-            L::Wide::select(better, triangle, L::Wide::load(&self.triangle)).store(&mut self.triangle);
-            L::Wide::select(better, to, L::Wide::load(&self.bundle.last)).store(&mut self.bundle.last);
-            let place = to * L::Wide::load(&self.bundle.place_per_height);
+            L::Wide::select(better, triangle, L::Wide::load(&self.triangle.0)).store(&mut self.triangle);
+            L::Wide::select(better, to, L::Wide::load(&self.bundle.last.0)).store(&mut self.bundle.last);
+            let place = to * L::Wide::load(&self.bundle.place_per_height.0);
             let end = place.times_plus(L::Wide::splat(BEYOND), L::Wide::splat(f32::MIN_POSITIVE));
-            let s_max = L::Wide::select(better, end, L::Wide::load(&self.s_max));
+            let s_max = L::Wide::select(better, end, L::Wide::load(&self.s_max.0));
             s_max.store(&mut self.s_max);
             self.frustum.s_max = s_max.most();
         }
@@ -522,14 +522,14 @@ impl Packet<'_, '_> {
             while reference >> tag::SHIFT == tag::INNER {
                 self.work += 1;
                 let node = &nodes[reference as usize];
-                let (mask, keys) = L::meet_frustum(node, lanes::opaque(&self.frustum));
+                let (mask, keys) = lanes::meet_frustum::<L::Wide>(node, lanes::opaque(&self.frustum));
                 if mask & mask.wrapping_sub(1) != 0 {
                     reference = stack.put(
                         #[inline(always)]
                         |room| G::Order::push_children::<L>(node, mask, keys, room),
                     );
                 } else if mask != 0 {
-                    reference = L::only_child(node, mask);
+                    reference = lanes::only_child(node, mask);
                 } else {
                     match self.pop::<G>(&mut stack) {
                         Some(next) => reference = next,

@@ -13,7 +13,7 @@ use crate::clouds::box_of;
 use crate::collapse::Entry;
 use crate::holds::{Holds, SingleStart};
 use crate::hulls::Hulls;
-use crate::node::{Node, Units, WIDTH, tag};
+use crate::node::{Node, Units, tag};
 use crate::opening::{self, Families, Start};
 use crate::prepare::{Parts, has_area, take_apart, units_of};
 use crate::primitive::Bounds;
@@ -168,7 +168,7 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts, places: Places) {
     for place in (0..nodes.len()).rev() {
         let node = &mut nodes[place];
         let mut whole = Bounds::EMPTY;
-        for lane in 0..node.len as usize % (WIDTH + 1) {
+        for lane in 0..node.len() {
             let child = node.children[lane];
             let first = (child & tag::PLACE) as usize;
             let mut around = Bounds::EMPTY;
@@ -394,7 +394,7 @@ fn cost(nodes: &[Node]) -> f64 {
     let Some(root) = nodes.first() else { return 0.0 };
     let whole = {
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for lane in 0..root.len as usize % (WIDTH + 1) {
+        for lane in 0..root.len() {
             let corner =
                 |side: usize| DVec3::from_array([0, 2, 4].map(|axis| root.planes[axis + side][lane].into()));
             (low, high) = (low.min(corner(0)), high.max(corner(1)));
@@ -402,7 +402,7 @@ fn cost(nodes: &[Node]) -> f64 {
         let size = (high - low).max(DVec3::ZERO);
         size.x * size.y + size.y * size.z + size.z * size.x
     };
-    let lanes = |node: &Node| (0..node.len as usize % (WIDTH + 1)).map(|lane| area(node, lane)).sum::<f64>();
+    let lanes = |node: &Node| (0..node.len()).map(|lane| area(node, lane)).sum::<f64>();
     let all: f64 = nodes.iter().map(lanes).sum();
     if whole > 0.0 { all / whole } else { 0.0 }
 }

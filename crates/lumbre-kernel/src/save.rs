@@ -33,7 +33,7 @@ use crate::{BuildError, Geometry, GeometryKind};
 
 const MAGIC: [u8; 8] = *b"LumbTree";
 /// Changes with the format, and with what the numbers mean.
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 const NONE: u32 = u32::MAX;
 
 /// Why bytes are no tree over these geometries.
@@ -140,8 +140,8 @@ pub(crate) fn to_bytes(accel: &Accel) -> Vec<u8> {
     put(tree.root.map_or(NONE, numbered));
     accel.geometries.iter().flat_map(signature).for_each(&mut put);
     for node in &tree.nodes {
-        put(node.len);
-        node.children[..node.len as usize].iter().map(|&child| numbered(child)).for_each(&mut put);
+        put(node.len() as u32);
+        node.children[..node.len()].iter().map(|&child| numbered(child)).for_each(&mut put);
     }
     for names in tree.names.iter().chain(&tree.sphere_names) {
         put(names.geometry);
@@ -246,9 +246,12 @@ pub(crate) fn from_bytes(bytes: &[u8], geometries: Vec<Geometry>) -> Result<Acce
         if len == 0 || len as usize > WIDTH {
             return inconsistent(format!("node {place} has {len} children"));
         }
-        let mut node = Node { len, ..Node::EMPTY };
+        let mut node = Node::EMPTY;
         for child in &mut node.children[..len as usize] {
             *child = words.next().ok_or_else(ends)?;
+        }
+        if node.len() != len as usize {
+            return inconsistent(format!("node {place} lacks a child"));
         }
         nodes.push(node);
     }
@@ -379,7 +382,7 @@ pub(crate) fn check_structure(
         return inconsistent(format!("the root's reference {root:#010x} is out of range"));
     }
     for (place, node) in tree.nodes.iter().enumerate() {
-        for &child in &node.children[..node.len as usize] {
+        for &child in &node.children[..node.len()] {
             if take(child, Some(place)).is_none() {
                 return inconsistent(format!(
                     "reference {child:#010x} of node {place} is out of range or used twice"

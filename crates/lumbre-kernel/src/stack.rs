@@ -1,10 +1,10 @@
 //! The stack of a search: a short array, and the heap for what no longer fits.
 
-use crate::lanes::{Lanes, Room, Slots};
+use crate::lanes::{self, Lanes, Room, Slots};
 use crate::node::{Node, WIDTH};
 
 /// Entries in the array: a power of two, many more than a search usually has.
-pub(crate) const STACK: usize = 128;
+pub(crate) const STACK: usize = 256;
 
 /// The key of a distance above, a reference below: entries have the order of their distances.
 #[inline(always)]
@@ -16,14 +16,16 @@ pub(crate) fn stack_entry(key: i32, reference: u32) -> i64 {
 pub(crate) trait Order {
     /// What stands on the stack.
     type Entry: Copy;
+    /// Whether a child alone is put as many are, without a branch that would often be foreseen wrongly.
+    const PUTS_ONE: bool;
     /// An entry that is never left out.
     fn entry(reference: u32) -> Self::Entry;
     /// What it refers to.
     fn reference(entry: Self::Entry) -> u32;
     /// Whether it lies wholly beyond the limit: the largest entry that does not.
     fn is_beyond(entry: Self::Entry, limit: i64) -> bool;
-    /// Puts the children in `mask`, two or more, onto the stack but for the first to be taken, which it answers.
-    fn push_children<L: Lanes>(node: &Node, mask: u32, keys: L::Keys, room: Room<Self::Entry>) -> u32;
+    /// Puts the children in `mask`, two or more, or one or more, onto the stack but for the first to be taken, which it answers.
+    fn push_children<L: Lanes>(node: &Node, mask: u32, enter: L::Wide, room: Room<Self::Entry>) -> u32;
 }
 
 /// The nearest first.
@@ -31,6 +33,7 @@ pub(crate) enum ByDistance {}
 
 impl Order for ByDistance {
     type Entry = i64;
+    const PUTS_ONE: bool = false;
 
     #[inline(always)]
     fn entry(reference: u32) -> i64 {
@@ -48,8 +51,8 @@ impl Order for ByDistance {
     }
 
     #[inline(always)]
-    fn push_children<L: Lanes>(node: &Node, mask: u32, keys: L::Keys, room: Room<i64>) -> u32 {
-        L::push_by_distance(node, mask, keys, room)
+    fn push_children<L: Lanes>(node: &Node, mask: u32, enter: L::Wide, room: Room<i64>) -> u32 {
+        lanes::push_by_distance(node, mask, enter, room)
     }
 }
 
@@ -58,6 +61,7 @@ pub(crate) enum AsBuilt {}
 
 impl Order for AsBuilt {
     type Entry = u32;
+    const PUTS_ONE: bool = true;
 
     #[inline(always)]
     fn entry(reference: u32) -> u32 {
@@ -75,14 +79,14 @@ impl Order for AsBuilt {
     }
 
     #[inline(always)]
-    fn push_children<L: Lanes>(node: &Node, mask: u32, _: L::Keys, room: Room<u32>) -> u32 {
-        L::push_as_built(node, mask, room)
+    fn push_children<L: Lanes>(node: &Node, mask: u32, _: L::Wide, room: Room<u32>) -> u32 {
+        lanes::push_as_built::<L::Wide>(node, mask, room)
     }
 }
 
 /// Last in, first out.
 pub(crate) struct Stack<E> {
-    // With room for eight.
+    // With room for all children of a node.
     slots: Slots<E>,
     // The ones below them: apart, for there seldom are any.
     spilled: Option<Box<Spilled<E>>>,
@@ -105,8 +109,8 @@ impl<E: Copy> Stack<E> {
         self.spilled = None;
     }
 
-    /// Has an entry or more put into the room for eight that there always is. Only afterwards, when nothing else has to be kept in
-    /// registers meanwhile, it is made anew.
+    /// Has entries put into the room for all children of a node that there always is. Only afterwards, when nothing else has to be
+    /// kept in registers meanwhile, it is made anew.
     #[inline(always)]
     pub(crate) fn put<T>(&mut self, put: impl FnOnce(Room<'_, E>) -> T) -> T {
         let result = put(self.slots.room());

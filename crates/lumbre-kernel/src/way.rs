@@ -19,7 +19,7 @@ pub(crate) struct Way<'a, L> {
 pub(crate) struct Met<'a, L: Lanes> {
     node: &'a Node,
     mask: u32,
-    keys: L::Keys,
+    enter: L::Wide,
 }
 
 impl<L: Lanes> Clone for Met<'_, L> {
@@ -59,24 +59,24 @@ impl<'a, L: Lanes> Way<'a, L> {
     #[inline(always)]
     pub(crate) fn look_at(&self, reference: u32) -> Met<'a, L> {
         let Some(node) = self.nodes.get(reference as usize) else { out_of_tree() };
-        let (mask, keys) = L::meet_boxes(node, lanes::opaque(&self.slabs));
-        Met { node, mask, keys }
+        let (mask, enter) = lanes::meet_boxes::<L::Wide>(node, lanes::opaque(&self.slabs));
+        Met { node, mask, enter }
     }
 
     /// Goes on from what was met.
     #[inline(always)]
     pub(crate) fn go_on<O: Order>(
         &self,
-        &Met { node, mask, keys }: &Met<'a, L>,
+        &Met { node, mask, enter }: &Met<'a, L>,
         stack: &mut Stack<O::Entry>,
     ) -> Option<u32> {
-        if mask & mask.wrapping_sub(1) != 0 {
+        if mask & mask.wrapping_sub(1) != 0 || O::PUTS_ONE && mask != 0 {
             Some(stack.put(
                 #[inline(always)]
-                |room| O::push_children::<L>(node, mask, keys, room),
+                |room| O::push_children::<L>(node, mask, enter, room),
             ))
         } else if mask != 0 {
-            Some(L::only_child(node, mask))
+            Some(lanes::only_child(node, mask))
         } else {
             self.pop::<O>(stack)
         }

@@ -294,7 +294,7 @@ impl Moments {
         let mut parts = Vec::new();
         for (place, node) in tree.nodes.iter().enumerate().rev() {
             parts.clear();
-            for &child in &node.children[..node.len as usize] {
+            for &child in &node.children[..node.len()] {
                 match child >> tag::SHIFT {
                     tag::INNER => parts.push(nodes[(child & tag::PLACE) as usize]),
                     tag::TRIANGLES => parts.extend_from_slice(&blocks[tree.numbers(child)]),
@@ -336,7 +336,7 @@ impl Moments {
                         continue;
                     }
                     let node = &accel.tree.nodes[reference as usize];
-                    stack.extend_from_slice(&node.children[..node.len as usize]);
+                    stack.extend_from_slice(&node.children[..node.len()]);
                 }
                 tag::TRIANGLES => {
                     let places = accel.tree.numbers(reference);
@@ -375,7 +375,7 @@ fn once(repeated: &[u32], block: usize, names: &BlockNames) -> impl Iterator<Ite
 /// How far the boxes of a node reach from a place that is relative to the tree's origin.
 fn reach(node: &Node, accel: &Accel, center: DVec3) -> f64 {
     let mut farthest: f64 = 0.0;
-    for lane in 0..node.len as usize {
+    for lane in 0..node.len() {
         let arm = |axis: usize| {
             let plane = |side: usize| f64::from(node.planes[2 * axis + side][lane]) / accel.units.scale;
             (plane(0) - center[axis]).abs().max((plane(1) - center[axis]).abs())

@@ -5,6 +5,7 @@
 
 #![allow(unsafe_code)]
 
+mod boxes;
 mod hulls;
 mod portable;
 mod spheres;
@@ -19,23 +20,23 @@ use lumbre_math::DVec3;
 
 use crate::blocks::{ROOMS, TriangleBlock};
 use crate::holds::SingleStart;
-use crate::node::{BoxRay, Node, Slabs, Units, WIDTH};
-use crate::packet::Frustum;
+#[cfg(test)]
+use crate::node::Node;
+use crate::node::{BoxRay, Slabs, Units, WIDTH};
 use crate::stack::STACK;
 use crate::triangles::{BLOCK, BlockRay, Inside, Passage, ROUNDINGS, Shear};
 
+pub(crate) use boxes::{meet_boxes, meet_frustum, only_child, push_as_built, push_by_distance};
 #[cfg(test)]
 pub(crate) use hulls::meet_hulls_at;
 pub(crate) use hulls::{HullLanes, MetHulls};
 pub(crate) use spheres::SphereLanes;
 #[cfg(test)]
 pub(crate) use spheres::meet_spheres_at;
-pub(crate) use wide::{Row, WIDE, Wide};
+pub(crate) use wide::{LANE_BITS, Row, WIDE, Wide};
 
-/// What a search does eight at a time: boxes, and triangles.
+/// What a search does many at a time: boxes by sixteen, and triangles by eight.
 pub(crate) trait Lanes: SphereLanes + HullLanes {
-    /// Where the ray enters each of eight boxes, in an order of integers.
-    type Keys: Copy;
     /// Eight numbers.
     type Floats: Copy;
     /// How a line passes the edges of eight triangles.
@@ -58,23 +59,6 @@ pub(crate) trait Lanes: SphereLanes + HullLanes {
 
     /// The numbers of rays, side by side: origin, direction and range.
     fn columns(rays: &[Ray; WIDE]) -> [Row<f64>; 8];
-
-    /// One bit for each child whose box the ray meets, and where it enters.
-    fn meet_boxes(node: &Node, ray: &Slabs) -> (u32, Self::Keys);
-
-    /// The same of rays together: among them all that one of them meets, and no later than it enters.
-    fn meet_frustum(node: &Node, frustum: &Frustum) -> (u32, Self::Keys);
-
-    /// The child of which `mask` has the bit: no more than one.
-    fn only_child(node: &Node, mask: u32) -> u32;
-
-    /// Puts the children in `mask`, two or more, onto the stack, the nearest last, but for the nearest, which it answers.
-    /// There must be room for eight.
-    fn push_by_distance(node: &Node, mask: u32, keys: Self::Keys, room: Room<i64>) -> u32;
-
-    /// Puts the children in `mask`, one or more, onto the stack in the order in which they stand in the node, but for the
-    /// last, which it answers. There must be room for eight.
-    fn push_as_built(node: &Node, mask: u32, room: Room<u32>) -> u32;
 
     /// A bit for each triangle that the line of the ray may meet, among them all that it does, and what [`Lanes::place_crossings`]
     /// wants to know: see [`BlockRay`].
@@ -132,15 +116,11 @@ impl<F: Copy> Crossings<F> {
     }
 }
 
-/// In the last bits of a child's key its lane may stand, where no two may be equal. To be compared with a limit that has all
-/// these bits set.
-pub(crate) const LANE_BITS: i32 = WIDTH as i32 - 1;
-
 /// The planes of a node that a ray meets first.
 #[derive(Debug)]
 pub(crate) struct Sides {
-    // On each axis, where the planes start in the flat array of a node's planes: 16 axis + 8 side. The other planes are at
-    // that place with `WIDTH` flipped.
+    // On each axis, where the planes start in the flat array of a node's planes: `WIDTH` times 2 axis + side. The other planes are
+    // at that place with `WIDTH` flipped.
     near: [usize; 3],
 }
 
@@ -315,14 +295,14 @@ impl<E: Copy> Slots<E> {
         self.len += 1;
     }
 
-    /// Somewhere for eight more.
+    /// Somewhere for all children of a node.
     ///
     /// # Panics
     /// When there is not.
     #[inline(always)]
     pub(crate) fn room(&mut self) -> Room<'_, E> {
         let len = self.len;
-        let window = (&mut self.entries[len..len + WIDTH]).try_into().expect("eight");
+        let window = (&mut self.entries[len..len + WIDTH]).try_into().expect("as many");
         Room { window, end: &mut self.len, len }
     }
 
@@ -342,7 +322,7 @@ impl<E: Copy> Slots<E> {
     }
 }
 
-/// The next eight of an array that entries are added to.
+/// The next ones of an array that entries are added to.
 pub(crate) struct Room<'s, E> {
     window: &'s mut [MaybeUninit<E>; WIDTH],
     end: &'s mut usize,
@@ -498,12 +478,12 @@ pub(crate) fn meet_boxes_at(level: Level, node: &Node, ray: &Slabs) -> (u32, [i3
         fn run<L: Lanes>(self) -> Self::Output {
             // A child's reference is its lane here. The nearest, which never stands on the stack, has no key.
             let mut node = *self.0;
-            node.children = [0, 1, 2, 3, 4, 5, 6, 7];
-            let (mask, keys) = L::meet_boxes(&node, self.1);
+            node.children = std::array::from_fn(|lane| lane as u32);
+            let (mask, enter) = meet_boxes::<L::Wide>(&node, self.1);
             let mut by_lane = [i32::MAX; WIDTH];
             if mask.count_ones() > 1 {
                 let mut slots = Slots::new();
-                let nearest = L::push_by_distance(&node, mask, keys, slots.room());
+                let nearest = push_by_distance(&node, mask, enter, slots.room());
                 assert_eq!(slots.len() + 1, mask.count_ones() as usize);
                 by_lane[nearest as usize] = i32::MIN;
                 let mut last = i64::MIN;
@@ -513,7 +493,7 @@ pub(crate) fn meet_boxes_at(level: Level, node: &Node, ray: &Slabs) -> (u32, [i3
                     by_lane[entry as usize % WIDTH] = (entry >> 32) as i32;
                 }
             } else if mask != 0 {
-                by_lane[L::only_child(&node, mask) as usize] = i32::MIN;
+                by_lane[only_child(&node, mask) as usize] = i32::MIN;
             }
             (mask, by_lane)
         }

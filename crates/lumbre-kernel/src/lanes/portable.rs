@@ -1,16 +1,12 @@
 //! Plain loops over arrays, for any machine.
 
-use std::mem::MaybeUninit;
-
 use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
 
-use super::{Axes, Corners, Crossings, LANE_BITS, Lanes, Level, Room, Row, Set, Sides, WIDE};
+use super::{Axes, Corners, Crossings, Lanes, Level, Row, Set, Sides, WIDE};
 use crate::blocks::TriangleBlock;
 use crate::holds::SingleStart;
-use crate::node::{BoxRay, END_FACTOR, LITTLE, Node, START_FACTOR, Slabs, Units, WIDTH};
-use crate::packet::Frustum;
-use crate::stack::stack_entry;
+use crate::node::{BoxRay, END_FACTOR, LITTLE, START_FACTOR, Slabs, Units};
 use crate::triangles::{
     BLOCK, BlockRay, EDGE_ERROR, HEIGHT_ERROR, HeightRange, Inside, Passage, SIZE_ERROR, Shear, TINY, passage,
 };
@@ -41,45 +37,7 @@ fn single_direction(ray: &Ray) -> [f32; 4] {
     [x, y, z, 0.0]
 }
 
-/// Which boxes are met, and the keys of where they are entered.
-#[inline(always)]
-fn met(enter: &[f32; WIDTH], leave: &[f32; WIDTH]) -> (u32, [i32; WIDTH]) {
-    let mut mask = 0;
-    let mut keys = [0; WIDTH];
-    for lane in 0..WIDTH {
-        mask |= u32::from(enter[lane] <= leave[lane]) << lane;
-        // Never negative, so that the bits have the order of the numbers.
-        keys[lane] = enter[lane].to_bits() as i32 & !LANE_BITS | lane as i32;
-    }
-    (mask, keys)
-}
-
-/// Which boxes are met within a range, and where they are entered. `places` says where that of a near and of a far plane of an axis
-/// is.
-#[inline(always)]
-fn meet_planes(
-    node: &Node,
-    sides: &Sides,
-    [s_min, s_max]: [f32; 2],
-    places: impl Fn(usize, f32, f32) -> (f32, f32),
-) -> (u32, [i32; WIDTH]) {
-    let mut enter = [s_min; WIDTH];
-    let mut leave = [s_max; WIDTH];
-    let planes = node.planes.as_flattened();
-    for axis in 0..3 {
-        let near = sides.near[axis];
-        let (near_planes, far_planes) = (&planes[near..][..WIDTH], &planes[near ^ WIDTH..][..WIDTH]);
-        for lane in 0..WIDTH {
-            let (first, last) = places(axis, near_planes[lane], far_planes[lane]);
-            enter[lane] = if first > enter[lane] { first } else { enter[lane] };
-            leave[lane] = if last < leave[lane] { last } else { leave[lane] };
-        }
-    }
-    met(&enter, &leave)
-}
-
 impl Lanes for Portable {
-    type Keys = [i32; WIDTH];
     type Floats = [f32; BLOCK];
     type Edges = Edges;
     type Wide = super::wide::Portable16;
@@ -159,63 +117,6 @@ impl Lanes for Portable {
             (columns[6].0[i], columns[7].0[i]) = (ray.t_min, ray.t_max);
         }
         columns
-    }
-
-    #[inline(always)]
-    fn meet_boxes(node: &Node, ray: &Slabs) -> (u32, [i32; WIDTH]) {
-        meet_planes(node, ray.sides, [ray.s_min, ray.s_max], |axis, near, far| {
-            let inverse = ray.inverse[axis];
-            (near * inverse + ray.near_offset[axis], far * inverse + ray.far_offset[axis])
-        })
-    }
-
-    #[inline(always)]
-    fn meet_frustum(node: &Node, frustum: &Frustum) -> (u32, [i32; WIDTH]) {
-        meet_planes(node, frustum.sides, [frustum.s_min, frustum.s_max], |axis, near, far| {
-            let (least, most) = (frustum.least_inverse[axis], frustum.most_inverse[axis]);
-            let (near, far) = (near - frustum.center[axis], far - frustum.center[axis]);
-            (
-                (near * least).min(near * most) + frustum.near_offset[axis],
-                (far * least).max(far * most) + frustum.far_offset[axis],
-            )
-        })
-    }
-
-    #[inline(always)]
-    fn only_child(node: &Node, mask: u32) -> u32 {
-        node.children[mask.trailing_zeros() as usize % WIDTH]
-    }
-
-    #[inline(always)]
-    fn push_by_distance(node: &Node, mask: u32, keys: [i32; WIDTH], room: Room<i64>) -> u32 {
-        let mut nearest = 0;
-        // Where each goes is how many are farther: no two have one key, so that the first places are all written.
-        for lane in (0..WIDTH).filter(|lane| mask >> lane & 1 != 0) {
-            let is_farther = |other: &usize| mask >> other & 1 != 0 && keys[*other] > keys[lane];
-            let place = (0..WIDTH).filter(is_farther).count();
-            room.window[place % WIDTH] = MaybeUninit::new(stack_entry(keys[lane], node.children[lane]));
-            if place + 1 == mask.count_ones() as usize {
-                nearest = node.children[lane];
-            }
-        }
-        // SAFETY: see above; the nearest stays without.
-        unsafe { room.add((mask & 0xff).count_ones() as usize - 1) };
-        nearest
-    }
-
-    #[inline(always)]
-    fn push_as_built(node: &Node, mask: u32, room: Room<u32>) -> u32 {
-        let mut rest = mask & 0xff;
-        let mut count = 0;
-        while rest & (rest - 1) != 0 {
-            room.window[count % WIDTH] =
-                MaybeUninit::new(node.children[rest.trailing_zeros() as usize % WIDTH]);
-            count += 1;
-            rest &= rest - 1;
-        }
-        // SAFETY: as many were written.
-        unsafe { room.add(count) };
-        node.children[rest.trailing_zeros() as usize % WIDTH]
     }
 
     #[inline(always)]

@@ -1,6 +1,9 @@
 //! Sixteen numbers at once: those of as many rays.
 
+use std::mem::MaybeUninit;
 use std::ops::{Add, Mul, Sub};
+
+use crate::stack::stack_entry;
 
 /// How many they are.
 pub(crate) const WIDE: usize = 16;
@@ -21,7 +24,7 @@ impl<T: Copy> Row<T> {
 pub(crate) trait Wide: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
     /// All the same.
     fn splat(value: f32) -> Self;
-    fn load(row: &Row<f32>) -> Self;
+    fn load(row: &[f32; WIDE]) -> Self;
     /// Eight, and the same again.
     fn load_twice(row: &[f32; 8]) -> Self;
     fn store(self, row: &mut Row<f32>);
@@ -47,6 +50,53 @@ pub(crate) trait Wide: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Outp
     fn most(self) -> f32;
     /// The first where the mask has a bit, else the second; bit by bit.
     fn select(mask: u32, first: Self, second: Self) -> Self;
+    /// The larger as far as that is not negative, else anything that is. Integers, which have the same order there, are compared
+    /// faster where there are instructions for it.
+    #[inline(always)]
+    fn later(self, other: Self) -> Self {
+        self.max(other)
+    }
+    /// The smaller, or anything negative where one is.
+    #[inline(always)]
+    fn earlier(self, other: Self) -> Self {
+        self.min(other)
+    }
+    /// Where this, which is not negative, is no larger than the other.
+    #[inline(always)]
+    fn no_later(self, other: Self) -> u32 {
+        self.at_most(other)
+    }
+    /// Where the bits are more, as an integer.
+    fn bits_above(self, other: i32) -> u32;
+    /// With each one's place in its last four bits.
+    fn lanes_in_bits(self) -> Self;
+    fn bits(self) -> [i32; WIDE];
+
+    /// Of the first four that the mask chooses, if there are as many, the bits above and the word in the same place below.
+    #[inline(always)]
+    fn first_four(self, mask: u32, words: &[u32; WIDE]) -> [i64; 4] {
+        let bits = self.bits();
+        let mut rest = mask;
+        let mut four = [0; 4];
+        for one in &mut four {
+            let lane = rest.trailing_zeros() as usize % WIDE;
+            rest &= rest.wrapping_sub(1);
+            *one = stack_entry(bits[lane], words[lane]);
+        }
+        four
+    }
+
+    /// Puts the words that the mask chooses there, in their order.
+    #[inline(always)]
+    fn put_chosen(mask: u32, words: &[u32; WIDE], place: &mut [MaybeUninit<u32>; WIDE]) {
+        let mut rest = mask % (1 << WIDE);
+        let mut count = 0;
+        while rest != 0 {
+            place[count % WIDE] = MaybeUninit::new(words[rest.trailing_zeros() as usize % WIDE]);
+            count += 1;
+            rest &= rest - 1;
+        }
+    }
 }
 
 #[derive(Clone, Copy)]
@@ -77,8 +127,8 @@ impl Wide for Portable16 {
     }
 
     #[inline(always)]
-    fn load(row: &Row<f32>) -> Self {
-        Self(row.0)
+    fn load(row: &[f32; WIDE]) -> Self {
+        Self(*row)
     }
 
     #[inline(always)]
@@ -202,7 +252,41 @@ impl Wide for Portable16 {
         }
         first
     }
+
+    #[inline(always)]
+    fn bits_above(self, other: i32) -> u32 {
+        let mut mask = 0;
+        for lane in 0..WIDE {
+            mask |= u32::from(bits_of(self.0[lane]) > other) << lane;
+        }
+        mask
+    }
+
+    #[inline(always)]
+    fn lanes_in_bits(mut self) -> Self {
+        for lane in 0..WIDE {
+            self.0[lane] = f32::from_bits((bits_of(self.0[lane]) & !LANE_BITS | lane as i32) as u32);
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn bits(self) -> [i32; WIDE] {
+        let mut bits = [0; WIDE];
+        for (bits, number) in bits.iter_mut().zip(self.0) {
+            *bits = bits_of(number);
+        }
+        bits
+    }
 }
+
+#[inline(always)]
+fn bits_of(number: f32) -> i32 {
+    number.to_bits() as i32
+}
+
+/// The last bits of a number, in which its place among sixteen may stand.
+pub(crate) const LANE_BITS: i32 = WIDE as i32 - 1;
 
 #[cfg(target_arch = "x86_64")]
 pub(crate) use x86::{Avx2, Avx512};
@@ -210,9 +294,10 @@ pub(crate) use x86::{Avx2, Avx512};
 #[cfg(target_arch = "x86_64")]
 mod x86 {
     use std::arch::x86_64::*;
+    use std::mem::MaybeUninit;
     use std::ops::{Add, Mul, Sub};
 
-    use super::{Row, WIDE, Wide};
+    use super::{LANE_BITS, Row, WIDE, Wide};
 
     /// Only where `lanes::x86::X86<true>` is: the instructions are there.
     #[derive(Clone, Copy)]
@@ -256,9 +341,9 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn load(row: &Row<f32>) -> Self {
+        fn load(row: &[f32; WIDE]) -> Self {
             // SAFETY: see the type. The load is of sixteen f32.
-            unsafe { Self(_mm512_loadu_ps(row.0.as_ptr())) }
+            unsafe { Self(_mm512_loadu_ps(row.as_ptr())) }
         }
 
         #[inline(always)]
@@ -372,6 +457,81 @@ mod x86 {
             // SAFETY: see the type.
             unsafe { Self(_mm512_mask_mov_ps(second.0, mask as u16, first.0)) }
         }
+
+        #[inline(always)]
+        fn later(self, other: Self) -> Self {
+            let (a, b) = (self.integers(), other.integers());
+            // SAFETY: see the type.
+            unsafe { Self(_mm512_castsi512_ps(_mm512_max_epi32(a, b))) }
+        }
+
+        #[inline(always)]
+        fn earlier(self, other: Self) -> Self {
+            let (a, b) = (self.integers(), other.integers());
+            // SAFETY: see the type.
+            unsafe { Self(_mm512_castsi512_ps(_mm512_min_epi32(a, b))) }
+        }
+
+        #[inline(always)]
+        fn no_later(self, other: Self) -> u32 {
+            // SAFETY: see the type.
+            unsafe { u32::from(_mm512_cmple_epi32_mask(self.integers(), other.integers())) }
+        }
+
+        #[inline(always)]
+        fn bits_above(self, other: i32) -> u32 {
+            // SAFETY: see the type.
+            unsafe { u32::from(_mm512_cmpgt_epi32_mask(self.integers(), _mm512_set1_epi32(other))) }
+        }
+
+        #[inline(always)]
+        fn lanes_in_bits(self) -> Self {
+            // SAFETY: see the type.
+            unsafe {
+                let lanes = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+                let kept = _mm512_andnot_si512(_mm512_set1_epi32(LANE_BITS), self.integers());
+                Self(_mm512_castsi512_ps(_mm512_or_si512(kept, lanes)))
+            }
+        }
+
+        #[inline(always)]
+        fn bits(self) -> [i32; WIDE] {
+            let mut bits = [0; WIDE];
+            // SAFETY: see the type. The store is of sixteen i32.
+            unsafe { _mm512_storeu_si512(bits.as_mut_ptr().cast(), self.integers()) };
+            bits
+        }
+
+        #[inline(always)]
+        fn first_four(self, mask: u32, words: &[u32; WIDE]) -> [i64; 4] {
+            // SAFETY: see the type. The load is of sixteen u32.
+            unsafe {
+                let words = _mm512_loadu_si512(words.as_ptr().cast());
+                let bits = _mm512_castsi512_si128(_mm512_maskz_compress_epi32(mask as u16, self.integers()));
+                let words = _mm512_castsi512_si128(_mm512_maskz_compress_epi32(mask as u16, words));
+                let (two, more) = (_mm_unpacklo_epi32(words, bits), _mm_unpackhi_epi32(words, bits));
+                let (a, b) = (_mm_cvtsi128_si64(two), _mm_extract_epi64::<1>(two));
+                [a, b, _mm_cvtsi128_si64(more), _mm_extract_epi64::<1>(more)]
+            }
+        }
+
+        #[inline(always)]
+        fn put_chosen(mask: u32, words: &[u32; WIDE], place: &mut [MaybeUninit<u32>; WIDE]) {
+            // SAFETY: see the type. The load and the store are of sixteen u32.
+            unsafe {
+                let words = _mm512_loadu_si512(words.as_ptr().cast());
+                let chosen = _mm512_maskz_compress_epi32(mask as u16, words);
+                _mm512_storeu_si512(place.as_mut_ptr().cast(), chosen);
+            }
+        }
+    }
+
+    impl Avx512 {
+        #[inline(always)]
+        pub(crate) fn integers(self) -> __m512i {
+            // SAFETY: see the type.
+            unsafe { _mm512_castps_si512(self.0) }
+        }
     }
 
     /// # Safety
@@ -398,7 +558,51 @@ mod x86 {
         }
     }
 
+    /// For each mask of eight, its lanes first.
+    static LANES_OF: [[u8; 8]; 256] = {
+        let mut lanes = [[0; 8]; 256];
+        let mut mask = 0;
+        while mask < 256 {
+            let (mut lane, mut place) = (0, 0);
+            while lane < 8 {
+                if mask >> lane & 1 != 0 {
+                    lanes[mask][place] = lane as u8;
+                    place += 1;
+                }
+                lane += 1;
+            }
+            mask += 1;
+        }
+        lanes
+    };
+
     impl Avx2 {
+        /// Of eight words from here on, those that the mask chooses first; the others mean nothing.
+        ///
+        /// # Safety
+        /// There are as many.
+        #[inline(always)]
+        unsafe fn chosen(mask: u32, words: *const u32) -> __m256i {
+            // SAFETY: see the type, and above. The other load is of one of the table's rows of eight bytes.
+            unsafe {
+                let lanes = _mm_loadl_epi64(LANES_OF[mask as usize % 256].as_ptr().cast());
+                _mm256_permutevar8x32_epi32(_mm256_loadu_si256(words.cast()), _mm256_cvtepu8_epi32(lanes))
+            }
+        }
+
+        #[inline(always)]
+        fn integers(self) -> [__m256i; 2] {
+            let [low, high] = self.0;
+            // SAFETY: see the type.
+            unsafe { [_mm256_castps_si256(low), _mm256_castps_si256(high)] }
+        }
+
+        #[inline(always)]
+        fn of([low, high]: [__m256i; 2]) -> Self {
+            // SAFETY: see the type.
+            unsafe { Self([_mm256_castsi256_ps(low), _mm256_castsi256_ps(high)]) }
+        }
+
         #[inline(always)]
         fn masks([low, high]: [__m256; 2]) -> u32 {
             // SAFETY: see the type.
@@ -414,9 +618,9 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn load(row: &Row<f32>) -> Self {
+        fn load(row: &[f32; WIDE]) -> Self {
             // SAFETY: see the type. The loads are of eight f32 each, of sixteen.
-            unsafe { Self([_mm256_loadu_ps(row.0.as_ptr()), _mm256_loadu_ps(row.0.as_ptr().add(8))]) }
+            unsafe { Self([_mm256_loadu_ps(row.as_ptr()), _mm256_loadu_ps(row.as_ptr().add(8))]) }
         }
 
         #[inline(always)]
@@ -552,6 +756,75 @@ mod x86 {
                 let low = _mm256_castsi256_ps(_mm256_cmpeq_epi32(low, bits));
                 let high = _mm256_castsi256_ps(_mm256_cmpeq_epi32(high, bits));
                 Self([_mm256_blendv_ps(c, a, low), _mm256_blendv_ps(d, b, high)])
+            }
+        }
+
+        #[inline(always)]
+        fn later(self, other: Self) -> Self {
+            let ([a, b], [c, d]) = (self.integers(), other.integers());
+            // SAFETY: see the type.
+            unsafe { Self::of([_mm256_max_epi32(a, c), _mm256_max_epi32(b, d)]) }
+        }
+
+        #[inline(always)]
+        fn earlier(self, other: Self) -> Self {
+            let ([a, b], [c, d]) = (self.integers(), other.integers());
+            // SAFETY: see the type.
+            unsafe { Self::of([_mm256_min_epi32(a, c), _mm256_min_epi32(b, d)]) }
+        }
+
+        #[inline(always)]
+        fn no_later(self, other: Self) -> u32 {
+            let ([a, b], [c, d]) = (self.integers(), other.integers());
+            // SAFETY: see the type.
+            let above = unsafe { Self::of([_mm256_cmpgt_epi32(a, c), _mm256_cmpgt_epi32(b, d)]) };
+            Self::masks(above.0) ^ 0xffff
+        }
+
+        #[inline(always)]
+        fn bits_above(self, other: i32) -> u32 {
+            let [a, b] = self.integers();
+            // SAFETY: see the type.
+            unsafe {
+                let other = _mm256_set1_epi32(other);
+                let above = Self::of([_mm256_cmpgt_epi32(a, other), _mm256_cmpgt_epi32(b, other)]);
+                Self::masks(above.0)
+            }
+        }
+
+        #[inline(always)]
+        fn lanes_in_bits(self) -> Self {
+            let [a, b] = self.integers();
+            // SAFETY: see the type.
+            unsafe {
+                let low = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+                let high = _mm256_setr_epi32(8, 9, 10, 11, 12, 13, 14, 15);
+                let own = _mm256_set1_epi32(LANE_BITS);
+                let (a, b) = (_mm256_andnot_si256(own, a), _mm256_andnot_si256(own, b));
+                Self::of([_mm256_or_si256(a, low), _mm256_or_si256(b, high)])
+            }
+        }
+
+        #[inline(always)]
+        fn bits(self) -> [i32; WIDE] {
+            let [low, high] = self.integers();
+            let mut bits = [0; WIDE];
+            // SAFETY: see the type. The stores are of eight i32 each, of sixteen.
+            unsafe {
+                _mm256_storeu_si256(bits.as_mut_ptr().cast(), low);
+                _mm256_storeu_si256(bits.as_mut_ptr().add(8).cast(), high);
+            }
+            bits
+        }
+
+        #[inline(always)]
+        fn put_chosen(mask: u32, words: &[u32; WIDE], place: &mut [MaybeUninit<u32>; WIDE]) {
+            // SAFETY: see the type. The loads are of eight u32 each, of sixteen; so are the stores, the second no farther than eight on.
+            unsafe {
+                let (words, place) = (words.as_ptr(), place.as_mut_ptr());
+                let of_low = (mask & 0xff).count_ones() as usize;
+                _mm256_storeu_si256(place.cast(), Self::chosen(mask, words));
+                _mm256_storeu_si256(place.add(of_low).cast(), Self::chosen(mask >> 8, words.add(8)));
             }
         }
     }

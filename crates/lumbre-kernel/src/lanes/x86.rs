@@ -1,21 +1,16 @@
 //! AVX2 with FMA, and AVX-512 on vectors of 256 bits.
 
 use std::arch::x86_64::*;
-use std::mem::{MaybeUninit, offset_of};
+use std::mem::offset_of;
 
 use lumbre_geometry::Ray;
 
-use super::{
-    Axes, Corners, Crossings, LANE_BITS, Lanes, Level, Room, Row, Set, Sides, Task, WIDE, Wide, wide,
-};
+use super::{Axes, Corners, Crossings, Lanes, Level, Row, Set, Sides, Task, WIDE, Wide, wide};
 use crate::blocks::{MOST_SHARED, TriangleBlock, USUAL};
 use crate::holds::SingleStart;
 use crate::node::{
-    BoxRay, END_FACTOR, LARGEST_NEAR, LITTLE, Node, SMALLEST_NEAR, START_FACTOR, Slabs, TINY_NEAR, Units,
-    WIDTH,
+    BoxRay, END_FACTOR, LARGEST_NEAR, LITTLE, SMALLEST_NEAR, START_FACTOR, Slabs, TINY_NEAR, Units,
 };
-use crate::packet::Frustum;
-use crate::stack::stack_entry;
 use crate::triangles::{
     BLOCK, BlockRay, EDGE_ERROR, FAR, HEIGHT_ERROR, HeightRange, Inside, Passage, ROUNDINGS, SIZE_ERROR,
     Shear, TINY,
@@ -39,39 +34,7 @@ pub(crate) struct X86<const AVX512: bool>;
 const _: () =
     assert!(offset_of!(Ray, direction) == 24 && offset_of!(Ray, t_min) == 48 && offset_of!(Ray, t_max) == 56);
 
-/// For each mask, its lanes first.
-static LANES_OF: [[u8; WIDTH]; 256] = {
-    let mut lanes = [[0; WIDTH]; 256];
-    let mut mask = 0;
-    while mask < 256 {
-        let (mut lane, mut place) = (0, 0);
-        while lane < WIDTH {
-            if mask >> lane & 1 != 0 {
-                lanes[mask][place] = lane as u8;
-                place += 1;
-            }
-            lane += 1;
-        }
-        mask += 1;
-    }
-    lanes
-};
-
 impl<const AVX512: bool> X86<AVX512> {
-    /// The lanes in `mask` first; the others mean nothing.
-    #[inline(always)]
-    fn compress(mask: u32, v: __m256i) -> __m256i {
-        // SAFETY: see `X86`. The load is of one of the table's rows of eight bytes.
-        unsafe {
-            if AVX512 {
-                _mm256_maskz_compress_epi32(mask as u8, v)
-            } else {
-                let lanes = _mm_loadl_epi64(LANES_OF[mask as usize % 256].as_ptr().cast());
-                _mm256_permutevar8x32_epi32(v, _mm256_cvtepu8_epi32(lanes))
-            }
-        }
-    }
-
     /// The larger of the absolute values.
     #[inline(always)]
     fn larger(a: __m256, b: __m256) -> __m256 {
@@ -100,20 +63,6 @@ impl<const AVX512: bool> X86<AVX512> {
         }
     }
 
-    /// A bit for each lane in which the first is no larger than the second.
-    #[inline(always)]
-    fn no_later(a: __m256i, b: __m256i) -> u32 {
-        // SAFETY: see `X86`.
-        unsafe {
-            if AVX512 {
-                u32::from(_mm256_cmple_epi32_mask(a, b))
-            } else {
-                let later = _mm256_cmpgt_epi32(a, b);
-                _mm256_movemask_ps(_mm256_castsi256_ps(later)) as u32 ^ 0xff
-            }
-        }
-    }
-
     /// A bit for each lane in which both comparisons are true.
     #[inline(always)]
     fn both<const A: i32, const B: i32>(a: [__m256; 2], b: [__m256; 2]) -> u32 {
@@ -125,19 +74,6 @@ impl<const AVX512: bool> X86<AVX512> {
                 let both = _mm256_and_ps(_mm256_cmp_ps::<A>(a[0], a[1]), _mm256_cmp_ps::<B>(b[0], b[1]));
                 _mm256_movemask_ps(both) as u32
             }
-        }
-    }
-
-    /// Where the ray meets the planes from here on, as bits.
-    ///
-    /// # Safety
-    /// There are eight to be read.
-    #[inline(always)]
-    unsafe fn slab(planes: *const f32, inverse: f32, offset: f32) -> __m256i {
-        // SAFETY: see `X86`, and above.
-        unsafe {
-            let planes = _mm256_loadu_ps(planes);
-            _mm256_castps_si256(_mm256_fmadd_ps(planes, _mm256_set1_ps(inverse), _mm256_set1_ps(offset)))
         }
     }
 
@@ -331,39 +267,6 @@ impl<const AVX512: bool> X86<AVX512> {
         unsafe { _mm_storeu_ps(array.as_mut_ptr(), v) };
         array
     }
-
-    /// Pushes five children or more.
-    #[inline(always)]
-    fn push_many(node: &Node, mask: u32, enter: __m256i, room: Room<i64>) -> u32 {
-        // SAFETY: see `X86`. The store is of eight i32 into an array of eight; the entries up to the last are written, see below.
-        unsafe {
-            let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
-            let keys = _mm256_or_si256(_mm256_andnot_si256(_mm256_set1_epi32(LANE_BITS), enter), lanes);
-            let mut scalar_keys = [0; WIDTH];
-            _mm256_storeu_si256(scalar_keys.as_mut_ptr().cast(), keys);
-            // Where each goes is how many are farther: no two have one key, so that the first places are all written.
-            let mut rest = mask & 0xff;
-            while rest != 0 {
-                let lane = rest.trailing_zeros() as usize % WIDTH;
-                rest &= rest - 1;
-                let this = scalar_keys[lane];
-                let farther = _mm256_cmpgt_epi32(keys, _mm256_set1_epi32(this));
-                let farther = _mm256_movemask_ps(_mm256_castsi256_ps(farther)) as u32 & mask;
-                let place = farther.count_ones() as usize % WIDTH;
-                room.window[place] = MaybeUninit::new(stack_entry(this, node.children[lane]));
-            }
-            let count = mask.count_ones() as usize - 1;
-            let nearest = room.window[count % WIDTH].assume_init() as u32;
-            room.add(count);
-            nearest
-        }
-    }
-
-    #[inline(always)]
-    fn children(node: &Node) -> __m256i {
-        // SAFETY: see `X86`. The load is of eight u32 in an array of eight.
-        unsafe { _mm256_loadu_si256(node.children.as_ptr().cast()) }
-    }
 }
 
 /// How a line passes the edges of eight triangles.
@@ -397,7 +300,6 @@ impl<const AVX512: bool> Lanes for X86<AVX512>
 where
     Self: HasWide,
 {
-    type Keys = __m256i;
     type Floats = __m256;
     type Edges = Edges;
     type Wide = <Self as HasWide>::Wide;
@@ -572,115 +474,6 @@ where
             }
         }
         columns
-    }
-
-    #[inline(always)]
-    fn meet_boxes(node: &Node, ray: &Slabs) -> (u32, __m256i) {
-        let planes = node.planes.as_flattened().as_ptr();
-        let near = ray.sides.near;
-        // SAFETY: see `X86`. The loads are of eight f32 from a multiple of eight below 48 on, in an array of 48.
-        unsafe {
-            let near_x = Self::slab(planes.add(near[0]), ray.inverse[0], ray.near_offset[0]);
-            let near_y = Self::slab(planes.add(near[1]), ray.inverse[1], ray.near_offset[1]);
-            let near_z = Self::slab(planes.add(near[2]), ray.inverse[2], ray.near_offset[2]);
-            let far_x = Self::slab(planes.add(near[0] ^ WIDTH), ray.inverse[0], ray.far_offset[0]);
-            let far_y = Self::slab(planes.add(near[1] ^ WIDTH), ray.inverse[1], ray.far_offset[1]);
-            let far_z = Self::slab(planes.add(near[2] ^ WIDTH), ray.inverse[2], ray.far_offset[2]);
-            // By the bits: floats that are not negative have the order of integers, and 0 <= s_min. A negative one gives
-            // way to s_min where the box is entered, and is a miss where it is left.
-            let enter = _mm256_max_epi32(
-                _mm256_max_epi32(near_x, near_y),
-                _mm256_max_epi32(near_z, _mm256_set1_epi32(ray.s_min.to_bits() as i32)),
-            );
-            let leave = _mm256_min_epi32(
-                _mm256_min_epi32(far_x, far_y),
-                _mm256_min_epi32(far_z, _mm256_set1_epi32(ray.s_max.to_bits() as i32)),
-            );
-            (Self::no_later(enter, leave), enter)
-        }
-    }
-
-    #[inline(always)]
-    fn meet_frustum(node: &Node, frustum: &Frustum) -> (u32, __m256i) {
-        let planes = node.planes.as_flattened().as_ptr();
-        // SAFETY: see `X86`. The loads are of eight f32 from a multiple of eight below 48 on, in an array of 48.
-        unsafe {
-            let mut enter = _mm256_set1_epi32(frustum.s_min.to_bits() as i32);
-            let mut leave = _mm256_set1_epi32(frustum.s_max.to_bits() as i32);
-            for (axis, near) in frustum.sides.near.into_iter().enumerate() {
-                let center = _mm256_set1_ps(frustum.center[axis]);
-                let (least, most) =
-                    (_mm256_set1_ps(frustum.least_inverse[axis]), _mm256_set1_ps(frustum.most_inverse[axis]));
-                let first = _mm256_sub_ps(_mm256_loadu_ps(planes.add(near)), center);
-                let last = _mm256_sub_ps(_mm256_loadu_ps(planes.add(near ^ WIDTH)), center);
-                let first = _mm256_min_ps(_mm256_mul_ps(first, least), _mm256_mul_ps(first, most));
-                let last = _mm256_max_ps(_mm256_mul_ps(last, least), _mm256_mul_ps(last, most));
-                let first = _mm256_add_ps(first, _mm256_set1_ps(frustum.near_offset[axis]));
-                let last = _mm256_add_ps(last, _mm256_set1_ps(frustum.far_offset[axis]));
-                // By the bits: see above.
-                enter = _mm256_max_epi32(enter, _mm256_castps_si256(first));
-                leave = _mm256_min_epi32(leave, _mm256_castps_si256(last));
-            }
-            (Self::no_later(enter, leave), enter)
-        }
-    }
-
-    #[inline(always)]
-    fn only_child(node: &Node, mask: u32) -> u32 {
-        node.children[mask.trailing_zeros() as usize % WIDTH]
-    }
-
-    #[inline(always)]
-    fn push_by_distance(node: &Node, mask: u32, enter: __m256i, room: Room<i64>) -> u32 {
-        let but_one = mask & mask.wrapping_sub(1);
-        let but_two = but_one & but_one.wrapping_sub(1);
-        let but_three = but_two & but_two.wrapping_sub(1);
-        // SAFETY: see `X86`. The store is of eight i32 into an array of eight; as many entries are added as are written.
-        unsafe {
-            if but_three & but_three.wrapping_sub(1) != 0 {
-                return Self::push_many(node, mask, enter, room);
-            }
-            let (keys, first) = (Self::compress(mask, enter), Self::compress(mask, Self::children(node)));
-            let (keys, first) = (_mm256_castsi256_si128(keys), _mm256_castsi256_si128(first));
-            let entries = _mm_unpacklo_epi32(first, keys);
-            let (a, b) = (_mm_cvtsi128_si64(entries), _mm_extract_epi64::<1>(entries));
-            let (a, b) = (a.min(b), a.max(b));
-            let window = &mut *room.window;
-            if but_two == 0 {
-                window[0] = MaybeUninit::new(b);
-                room.add(1);
-                return a as u32;
-            }
-            let entries = _mm_unpackhi_epi32(first, keys);
-            let c = _mm_cvtsi128_si64(entries);
-            if but_three == 0 {
-                let (nearest, rest) = (a.min(c), a.max(c));
-                window[0] = MaybeUninit::new(b.max(rest));
-                window[1] = MaybeUninit::new(b.min(rest));
-                room.add(2);
-                return nearest as u32;
-            }
-            let d = _mm_extract_epi64::<1>(entries);
-            let (c, d) = (c.min(d), c.max(d));
-            let (nearest, low) = (a.min(c), a.max(c));
-            let (high, farthest) = (b.min(d), b.max(d));
-            window[0] = MaybeUninit::new(farthest);
-            window[1] = MaybeUninit::new(low.max(high));
-            window[2] = MaybeUninit::new(low.min(high));
-            room.add(3);
-            nearest as u32
-        }
-    }
-
-    #[inline(always)]
-    fn push_as_built(node: &Node, mask: u32, room: Room<u32>) -> u32 {
-        // SAFETY: see `X86`. The store is of eight u32 into an array of eight.
-        unsafe {
-            let first = Self::compress(mask, Self::children(node));
-            _mm256_storeu_si256(room.window.as_mut_ptr().cast(), first);
-            room.add(mask.count_ones() as usize - 1);
-        }
-        node.children[(31 - mask.leading_zeros()) as usize % WIDTH]
     }
 
     #[inline(always)]

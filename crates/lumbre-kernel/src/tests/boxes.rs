@@ -55,7 +55,7 @@ fn reached_boxes_are_met(level: Level, seed: u64, rounds: usize) {
         let offset = random.vector() * size * 10f64.powf(random.between(-2.0, 6.0));
         let whole = Aabb { min: offset - size * random.between(0.1, 1.0), max: offset + size };
         let units = units(&whole);
-        let mut node = Node { len: WIDTH as u32, ..Node::EMPTY };
+        let mut node = Node::EMPTY;
         let mut boxes = Vec::new();
         for lane in 0..WIDTH {
             // Small, flat, or the whole.
@@ -145,7 +145,7 @@ fn boxes_far_from_the_ray_are_not_met() {
     let mut random = Random(53);
     let whole = Aabb { min: DVec3::new(1.0, 2.0, 3.0), max: DVec3::new(5.0, 6.0, 7.0) };
     let units = units(&whole);
-    let mut node = Node { len: 1, ..Node::EMPTY };
+    let mut node = Node::EMPTY;
     let bounds = Aabb { min: DVec3::new(2.0, 3.0, 4.0), max: DVec3::new(2.5, 3.5, 4.5) };
     put_box(&mut node, 0, &units, &bounds);
     let mut missed = 0;

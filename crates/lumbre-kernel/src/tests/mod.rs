@@ -18,7 +18,7 @@ mod precise;
 mod proof;
 mod refit;
 mod save;
-mod scenes;
+pub(crate) mod scenes;
 mod single;
 mod small;
 mod spheres;
