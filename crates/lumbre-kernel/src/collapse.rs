@@ -168,7 +168,7 @@ const LEAF_COSTS: Costs = [0.0; WIDTH];
 /// How a node of the binary tree shares the children that it is given, 2 to 16, among its own two, and how many are still too few for
 /// that. How many go to the left is chosen freely for up to eight and for sixteen; from the ninth to the fifteenth, one more goes to
 /// the side that it serves better. So all of it takes 29 bits, and trees are hardly worse for it.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Choices(pub(crate) u32);
 
 /// The most children that are shared freely but for all.
@@ -179,6 +179,9 @@ const LEFT_AT: [u32; FREELY + 2] = [0, 0, 0, 0, 1, 3, 5, 8, 11, 14];
 const NEXT_AT: u32 = LEFT_AT[FREELY + 1];
 const LEFT_OF_ALL_AT: u32 = NEXT_AT + (WIDTH - FREELY - 1) as u32;
 const MOST_AS_ONE_AT: u32 = LEFT_OF_ALL_AT + 4;
+
+// The last bit of the word says that a node is a leaf; four bits hold what is below sixteen.
+const _: () = assert!(MOST_AS_ONE_AT + 4 < u32::BITS && WIDTH == 16);
 
 /// The choices where there is a leaf at the left, or at the right.
 const ALL_BUT_ONE_RIGHT: u32 = 0;
@@ -365,7 +368,7 @@ impl<'a> Cursor<'a> {
         match self {
             Self::Fork(fork) => fork.choices,
             Self::Twig(nodes) => nodes[0].choices(),
-            Self::Instance(..) => Choices::default(),
+            Self::Instance(..) => unreachable!("a leaf"),
         }
     }
 

@@ -25,12 +25,12 @@ use crate::outline::{EightBoxes, Outline, Placing, box_in_space, center_and_half
 use crate::primitive::{Bounds, ONE, Primitive};
 use crate::{Accel, Geometry, GeometryKind, Instance, Placement};
 
-/// How many leaves there may be more for each instance that stands still, and how many more for all: the mean may be opened once.
+/// How many leaves there may be more for each instance that stands still, and how many more for all: so many that a mean one may be opened once.
 const MORE: usize = 15;
 const MORE_FOR_ALL: usize = 64;
 /// Parts are to have no more of the area of the whole than this. Sixteen of a ball have some 0.8 of it.
 const LARGEST_SHARE: f32 = 0.65;
-/// Boxes of a part's outline, about.
+/// Boxes of a part's outline, about; those of its children, where they are more.
 const OUTLINE: usize = 8;
 
 /// Where an entry of an instance enters the instance's tree: at the root, or at another node. The parts of an instance

@@ -33,7 +33,7 @@ impl Outline {
         Self { whole, boxes: Vec::new(), reach: DVec3::ZERO }
     }
 
-    /// Of what is below a node, by no more than so many boxes, of which it has room for eight; of a leaf, by none.
+    /// Of what is below a node, by one box more than this at most, or by those of its children where they are more; of a leaf, by none.
     pub(crate) fn below(inner: &Accel, reference: u32, count: usize) -> Self {
         let node = |reference: u32| {
             (reference >> tag::SHIFT == tag::INNER).then(|| &inner.tree.nodes[reference as usize])

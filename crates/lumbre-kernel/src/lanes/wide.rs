@@ -528,7 +528,7 @@ mod x86 {
 
     impl Avx512 {
         #[inline(always)]
-        pub(crate) fn integers(self) -> __m512i {
+        fn integers(self) -> __m512i {
             // SAFETY: see the type.
             unsafe { _mm512_castps_si512(self.0) }
         }
