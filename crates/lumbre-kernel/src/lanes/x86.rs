@@ -539,7 +539,9 @@ where
     fn corners(block: &TriangleBlock) -> Corners {
         let coordinates = block.coordinates().as_ptr();
         let room = block.room();
-        let places = block.corners().map(Self::places);
+        // No `map`: it does not take on the instruction set of who calls it.
+        let [a, b, c] = *block.corners();
+        let places = [Self::places(a), Self::places(b), Self::places(c)];
         let mut corners = Corners([[[0.0; BLOCK]; 3]; 3]);
         // SAFETY: see `X86`. A row begins at 62 at most, in an array of 96: behind that are 32 more, and no more are looked at.
         unsafe {
