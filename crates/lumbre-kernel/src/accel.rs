@@ -580,11 +580,12 @@ struct Answers<'a, T> {
 impl Ends<Option<Winner>> for Answers<'_, Option<Hit>> {
     #[inline(always)]
     fn put(&mut self, position: usize, outcome: Outcome<Option<Winner>>) {
-        self.places[position] = match outcome {
-            Outcome::Settled(Some(winner)) => Some(winner.to_hit(self.accel)),
-            Outcome::Settled(None) => None,
-            Outcome::Unsettled => self.accel.closest_plainly_at(self.level, &self.rays[position]),
-        };
+        let place = &mut self.places[position];
+        match outcome {
+            Outcome::Settled(Some(winner)) => winner.put(self.accel, place),
+            Outcome::Settled(None) => *place = None,
+            Outcome::Unsettled => *place = self.accel.closest_plainly_at(self.level, &self.rays[position]),
+        }
     }
 }
 

@@ -13,7 +13,7 @@ use crate::blocks::{TriangleBlock, Unit};
 use crate::holds::SingleStart;
 use crate::lanes::{self, Lanes, Level, Task};
 use crate::node::{Node, tag};
-use crate::packet::{self, PACKET};
+use crate::packet::{self, PACKET, Together};
 use crate::query::All;
 use crate::single::{Alone, Goal, Outcome, SingleRay, Step};
 use crate::stack::{Order, Stack};
@@ -26,7 +26,7 @@ const MANY: usize = 32;
 const FAR: usize = 1 << 24;
 
 /// Packets in a row that may go without a try.
-const LEAST_OFTEN: usize = 8;
+const LEAST_OFTEN: usize = 16;
 /// Rays among which those that are alike are sought before the others set out.
 const AT_ONCE: usize = 4096;
 
@@ -123,11 +123,15 @@ impl<G: Goal, E: Ends<G::Answer>, const N: usize, const IS_FAR: bool> Task
                 if without > 0 {
                     without -= 1;
                 } else if has_packets && let Ok(packet) = <&[Ray; PACKET]>::try_from(chunk) {
-                    if packet::search::<G, L>(accel, start, packet, first, &mut ends) {
+                    let together = packet::search::<G, L>(accel, start, packet, first, &mut ends);
+                    if together == Together::Well {
                         patience = 1;
+                    } else {
+                        (without, patience) = (patience, (2 * patience).min(LEAST_OFTEN));
+                    }
+                    if together != Together::NotAtAll {
                         continue;
                     }
-                    (without, patience) = (patience, (2 * patience).min(LEAST_OFTEN));
                 }
                 others.extend((first..).zip(chunk));
             }

@@ -23,6 +23,7 @@
 //! and s the errors are no smaller than those of every ray.
 
 use lumbre_geometry::Ray;
+use lumbre_math::DVec2;
 
 use crate::Accel;
 use crate::batch::Ends;
@@ -30,10 +31,10 @@ use crate::blocks::Blocks;
 use crate::holds::SingleStart;
 use crate::lanes::{self, Axes, Corners, Lanes, Row, Sides, WIDE, Wide};
 use crate::node::{END_FACTOR, LITTLE, Node, START_FACTOR, tag};
-use crate::single::{Candidate, Exact, Goal, Outcome, heights};
+use crate::single::{Candidate, Exact, Goal, Outcome, Winner, heights};
 use crate::stack::{Order, Stack};
 use crate::triangles::{
-    BEYOND, BLOCK, EDGE_ERROR, FAR, HEIGHT_ERROR, Meeting, ROUNDINGS, SIZE_ERROR, TINY, beyond,
+    self, BEYOND, BLOCK, EDGE_ERROR, FAR, HEIGHT_ERROR, Meeting, Pairs, ROUNDINGS, SIZE_ERROR, TINY, beyond,
 };
 use crate::way::limit_of;
 
@@ -46,7 +47,9 @@ const MOST_DISTANCE: f32 = 0.25;
 const MOST_SPREAD: f32 = 0.25;
 /// How much they may do before they go alone: where boxes and triangles are small beside the distances between the rays, that is
 /// faster. In nodes met; a block of triangles is as much as two, and so is a triangle.
-const MOST_WORK: u32 = 128;
+const MOST_WORK: u32 = 80;
+/// What they may do and have it pay.
+const WORK_THAT_PAYS: u32 = 48;
 /// What the corners of triangles may be wrong by, by their size: 32u, see above.
 const CULL_ERROR: f32 = 32.0 / (1 << 24) as f32;
 
@@ -251,10 +254,12 @@ struct Bounds {
 }
 
 /// Rays under way together.
-struct Packet<'a, 'r> {
+pub(crate) struct Packet<'a, 'r> {
     exact: Exact<'a>,
     triangles: Blocks<'a>,
     rays: &'r [Ray; PACKET],
+    /// The same, number by number.
+    columns: &'r [Row<f64>; 8],
     frustum: Frustum,
     bundle: Bundle,
     /// Where each need no longer meet boxes.
@@ -494,6 +499,65 @@ impl Packet<'_, '_> {
         Candidate { block: triangle >> 3, lane: triangle & 7, from: self.from.0[i], to: self.to.0[i] }
     }
 
+    /// The nearest hits.
+    #[inline(always)]
+    pub(crate) fn put_nearest(&self, first: usize, ends: &mut impl Ends<Option<Winner>>) {
+        let (axes, columns) = (self.bundle.axes, self.columns);
+        let order = axes.order();
+        let mut pairs = Pairs {
+            origin: [columns[order[0]], columns[order[1]], columns[order[2]]],
+            direction: [columns[3 + order[0]], columns[3 + order[1]], columns[3 + order[2]]],
+            corners: [[Row::of(0.0); 3]; 3],
+        };
+        for (place, &axis) in order.iter().enumerate() {
+            for i in 0..PACKET {
+                pairs.origin[place].0[i] -= self.exact.start.mesh_origin[axis];
+            }
+        }
+        for i in 0..PACKET {
+            let best = self.best(i);
+            if best.is_some() {
+                let corners = axes.gather(self.triangles.block(best.block), best.lane as usize);
+                for (rows, corner) in pairs.corners.iter_mut().zip(corners) {
+                    for (row, coordinate) in rows.iter_mut().zip(corner) {
+                        row.0[i] = coordinate;
+                    }
+                }
+            }
+        }
+        let met = pairs.meet();
+        for i in 0..PACKET {
+            let best = self.best(i);
+            let t = met.t.0[i];
+            // An answer that goes through memory is waited for: hence each by itself.
+            if self.unsettled >> i & 1 != 0 {
+                ends.put(first + i, Outcome::Unsettled);
+            } else if !best.is_some() {
+                ends.put(first + i, Outcome::Settled(None));
+            } else if t.is_nan() {
+                ends.put(first + i, self.exact.unclear_winner(&self.rays[i], &best));
+            } else {
+                let (geometry, primitive) = self.exact.names(best.block, best.lane);
+                let local = DVec2::new(met.local[0].0[i], met.local[1].0[i]);
+                let root = triangles::root(t, local);
+                ends.put(first + i, Outcome::Settled(Some(Winner { root, geometry, primitive })));
+            }
+        }
+    }
+
+    /// Whether each met anything.
+    #[inline(always)]
+    pub(crate) fn put_met(&self, first: usize, ends: &mut impl Ends<bool>) {
+        for i in 0..PACKET {
+            let answer = if self.unsettled >> i & 1 != 0 {
+                Outcome::Unsettled
+            } else {
+                Outcome::Settled(self.met >> i & 1 != 0)
+            };
+            ends.put(first + i, answer);
+        }
+    }
+
     /// Tests a leaf.
     #[inline(always)]
     fn meet_leaf<G: Goal, L: Lanes>(&mut self, leaf: u32) {
@@ -563,8 +627,18 @@ impl Packet<'_, '_> {
     }
 }
 
-/// Searches a tree of triangles along rays together, the first of which has this position; false where that does not
-/// pay, and `ends` got nothing.
+/// How rays went together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Together {
+    /// Faster than each alone.
+    Well,
+    /// To the end, but it hardly paid.
+    Slowly,
+    /// Not to the end, and `ends` got nothing.
+    NotAtAll,
+}
+
+/// Searches a tree of triangles along rays together, the first of which has this position.
 #[inline(always)]
 pub(crate) fn search<G: Goal, L: Lanes>(
     accel: &Accel,
@@ -572,12 +646,16 @@ pub(crate) fn search<G: Goal, L: Lanes>(
     rays: &[Ray; PACKET],
     first: usize,
     ends: &mut impl Ends<G::Answer>,
-) -> bool {
-    let Some((frustum, bundle, s_max)) = start::<L::Wide>(single, &L::columns(rays)) else { return false };
+) -> Together {
+    let columns = L::columns(rays);
+    let Some((frustum, bundle, s_max)) = start::<L::Wide>(single, &columns) else {
+        return Together::NotAtAll;
+    };
     let mut packet = Packet {
         exact: Exact::new(accel, single),
         triangles: accel.tree.blocks(),
         rays,
+        columns: &columns,
         frustum,
         bundle,
         s_max,
@@ -590,17 +668,10 @@ pub(crate) fn search<G: Goal, L: Lanes>(
         work: 0,
     };
     if !packet.run::<G, L>(&accel.tree.nodes, single.root) {
-        return false;
+        return Together::NotAtAll;
     }
-    for (i, ray) in rays.iter().enumerate() {
-        let answer = if packet.unsettled >> i & 1 != 0 {
-            Outcome::Unsettled
-        } else {
-            G::answer_together::<L>(&packet.exact, ray, &packet.best(i), packet.met >> i & 1 != 0)
-        };
-        ends.put(first + i, answer);
-    }
-    true
+    G::answer_together(&packet, first, ends);
+    if packet.work <= WORK_THAT_PAYS { Together::Well } else { Together::Slowly }
 }
 
 /// Whether rays go together, at a level, for tests.

@@ -16,6 +16,7 @@ use std::marker::PhantomData;
 use lumbre_geometry::{Ray, Root, Roots};
 use lumbre_math::DVec3;
 
+use crate::batch::Ends;
 use crate::blocks::{Blocks, TriangleBlock};
 use crate::collapse::Entry;
 use crate::holds::SingleStart;
@@ -23,6 +24,7 @@ use crate::hulls::HullRay;
 use crate::lanes::{self, Axes, Crossings, Lanes, Level, MetHulls, Task};
 use crate::node::{Slabs, tag};
 use crate::options::{self, Selection};
+use crate::packet::Packet;
 use crate::query::All;
 use crate::stack::{AsBuilt, ByDistance, Order, Stack};
 use crate::traverse::{PlacedTree, What};
@@ -60,6 +62,22 @@ impl Winner {
             instances: InstancePath::new(),
             route: InstancePath::new(),
         }
+    }
+
+    /// Makes a place hold that, field by field: a hit that is put together elsewhere would be waited for.
+    #[inline(always)]
+    pub(crate) fn put(self, accel: &Accel, place: &mut Option<Hit>) {
+        let Some(hit) = place else {
+            *place = Some(self.to_hit(accel));
+            return;
+        };
+        let Self { root, geometry, primitive } = self;
+        hit.root = root;
+        hit.id = accel.geometries[geometry as usize].id;
+        hit.primitive = primitive;
+        hit.geometry = geometry;
+        hit.instances.clear();
+        hit.route.clear();
     }
 }
 
@@ -105,7 +123,7 @@ impl Candidate {
 #[derive(Clone, Copy)]
 pub(crate) struct Exact<'a> {
     accel: &'a Accel,
-    start: &'a SingleStart,
+    pub(crate) start: &'a SingleStart,
     // Those of the tree, which may lie in a file.
     triangles: Blocks<'a>,
 }
@@ -166,6 +184,23 @@ impl<'a> Exact<'a> {
         match self.meet(ray, block, lane) {
             Meeting::Hit { root, .. } => {
                 Outcome::Settled(t < root.t || t == root.t && names < self.names(block, lane))
+            }
+            Meeting::Miss | Meeting::Touch { .. } => Outcome::Unsettled,
+        }
+    }
+
+    /// The same for one whose crossing is not clear at a glance.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn unclear_winner(
+        &self,
+        ray: &Ray,
+        &Candidate { block, lane, .. }: &Candidate,
+    ) -> Outcome<Option<Winner>> {
+        match self.meet(ray, block, lane) {
+            Meeting::Hit { root, .. } => {
+                let (geometry, primitive) = self.names(block, lane);
+                Outcome::Settled(Some(Winner { root, geometry, primitive }))
             }
             Meeting::Miss | Meeting::Touch { .. } => Outcome::Unsettled,
         }
@@ -593,13 +628,8 @@ pub(crate) trait Goal {
         last: Step,
     ) -> Outcome<Self::Answer>;
 
-    /// What came of a ray that went with others: the nearest triangle, or whether one was met.
-    fn answer_together<L: Lanes>(
-        exact: &Exact,
-        ray: &Ray,
-        best: &Candidate,
-        is_met: bool,
-    ) -> Outcome<Self::Answer>;
+    /// What came of rays that went together, the first of which has this position.
+    fn answer_together(packet: &Packet, first: usize, ends: &mut impl Ends<Self::Answer>);
 }
 
 /// The nearest hit.
@@ -641,19 +671,8 @@ impl Goal for Nearest {
     }
 
     #[inline(always)]
-    fn answer_together<L: Lanes>(
-        exact: &Exact,
-        ray: &Ray,
-        best: &Candidate,
-        _: bool,
-    ) -> Outcome<Option<Winner>> {
-        if !best.is_some() {
-            return Outcome::Settled(None);
-        }
-        match exact.winner::<L>(ray, L::axes(ray), best) {
-            Some(winner) => Outcome::Settled(Some(winner)),
-            None => Outcome::Unsettled,
-        }
+    fn answer_together(packet: &Packet, first: usize, ends: &mut impl Ends<Self::Answer>) {
+        packet.put_nearest(first, ends);
     }
 }
 
@@ -700,8 +719,8 @@ impl Goal for Whether {
     }
 
     #[inline(always)]
-    fn answer_together<L: Lanes>(_: &Exact, _: &Ray, _: &Candidate, is_met: bool) -> Outcome<bool> {
-        Outcome::Settled(is_met)
+    fn answer_together(packet: &Packet, first: usize, ends: &mut impl Ends<bool>) {
+        packet.put_met(first, ends);
     }
 }
 

@@ -1,4 +1,4 @@
-//! The watertight test of triangles, alone and by eight.
+//! The watertight test of triangles: alone, by eight, and by sixteen with a ray each.
 //!
 //! After S. Woop, C. Benthin, I. Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013. It differs from theirs in
 //! three ways. Everything after the load is in f64. An edge function whose products are equal is redone exactly, so that
@@ -11,7 +11,7 @@
 use lumbre_geometry::{Ray, Root};
 use lumbre_math::{DVec2, DVec3};
 
-use crate::lanes::Axes;
+use crate::lanes::{Axes, Row, WIDE};
 use crate::touch::Feature;
 
 /// Triangles in a block.
@@ -48,20 +48,21 @@ impl Shear {
         [x - mesh[0], y - mesh[1], z - mesh[2]]
     }
 
-    /// `corner` has the order of the axes.
     #[inline(always)]
-    fn corner(&self, origin: &[f64; 3], [x, y, z]: [f32; 3]) -> Corner {
-        let height = f64::from(z) - origin[2];
-        Corner {
-            x: (f64::from(x) - origin[0]) - self.x * height,
-            y: (f64::from(y) - origin[1]) - self.y * height,
-            z: height,
-        }
+    fn corners(&self, origin: &[f64; 3], &[a, b, c]: &[[f32; 3]; 3]) -> [Corner; 3] {
+        let shear = [self.x, self.y];
+        [sheared(shear, origin, a), sheared(shear, origin, b), sheared(shear, origin, c)]
     }
+}
 
-    #[inline(always)]
-    fn corners(&self, origin: &[f64; 3], corners: &[[f32; 3]; 3]) -> [Corner; 3] {
-        [self.corner(origin, corners[0]), self.corner(origin, corners[1]), self.corner(origin, corners[2])]
+/// A corner, sheared by the first two components of a direction by the last. All have the order of the axes.
+#[inline(always)]
+fn sheared(shear: [f64; 2], origin: &[f64; 3], [x, y, z]: [f32; 3]) -> Corner {
+    let height = f64::from(z) - origin[2];
+    Corner {
+        x: (f64::from(x) - origin[0]) - shear[0] * height,
+        y: (f64::from(y) - origin[1]) - shear[1] * height,
+        z: height,
     }
 }
 
@@ -282,7 +283,13 @@ impl Inside {
 
     #[inline(always)]
     pub(crate) fn t(&self, shear: &Shear) -> f64 {
-        self.height / self.det / shear.direction_z
+        self.t_along(shear.direction_z)
+    }
+
+    /// For a direction whose largest component this is.
+    #[inline(always)]
+    fn t_along(&self, direction_z: f64) -> f64 {
+        self.height / self.det / direction_z
     }
 
     /// The barycentrics of the crossing: those of the second and third corner.
@@ -326,23 +333,98 @@ pub(crate) fn passage(shear: &Shear, origin: &[f64; 3], corners: &[[f32; 3]; 3])
 }
 
 #[inline(always)]
-fn passage_of([a, b, c]: [Corner; 3]) -> (Passage, Inside) {
+fn passage_of(corners: [Corner; 3]) -> (Passage, Inside) {
+    let weights = weigh(corners);
+    if !weights.are_of_inside() {
+        let [u, v, w] = weights.edges;
+        let is_weakly_inside = (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
+        return (if is_weakly_inside { Passage::Unclear } else { Passage::Outside }, Inside::NONE);
+    }
+    if weights.cancel() {
+        return (Passage::Unclear, Inside::NONE);
+    }
+    (Passage::Inside, weights.inside)
+}
+
+/// How a line passes the edges of a triangle.
+#[derive(Clone, Copy)]
+struct Weights {
+    edges: [f64; 3],
+    /// The first product of each edge function.
+    products: [f64; 3],
+    inside: Inside,
+}
+
+/// In terms of its sheared corners, without a branch.
+#[inline(always)]
+fn weigh([a, b, c]: [Corner; 3]) -> Weights {
     // The edge functions px qy - py qx. The two products of each are rounded apart: the opposite edge of the neighbour then
     // gives exactly the opposite value, and their difference has the right sign unless they are equal.
     let (bc, ca, ab) = (c.x * b.y, a.x * c.y, b.x * a.y);
     let (u, v, w) = (bc - c.y * b.x, ca - a.y * c.x, ab - b.y * a.x);
-    let is_inside = (u > 0.0 && v > 0.0 && w > 0.0) || (u < 0.0 && v < 0.0 && w < 0.0);
-    if !is_inside {
-        let is_weakly_inside = (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
-        return (if is_weakly_inside { Passage::Unclear } else { Passage::Outside }, Inside::NONE);
+    let inside = Inside { height: u * a.z + v * b.z + w * c.z, det: u + v + w, v, w };
+    Weights { edges: [u, v, w], products: [bc, ca, ab], inside }
+}
+
+impl Weights {
+    /// Whether the line passes within the triangle, away from its edges.
+    #[inline(always)]
+    fn are_of_inside(&self) -> bool {
+        let [u, v, w] = self.edges;
+        ((u > 0.0) & (v > 0.0) & (w > 0.0)) | ((u < 0.0) & (v < 0.0) & (w < 0.0))
     }
-    let det = u + v + w;
-    // Seen on edge, a triangle's edge functions cancel; left so, t would be anywhere within the triangle.
-    let is_slanted = |product: f64| det.abs() < product.abs() * (1.0 / 64.0);
-    if is_slanted(bc) || is_slanted(ca) || is_slanted(ab) {
-        return (Passage::Unclear, Inside::NONE);
+
+    /// Whether the triangle is seen on edge, so that its edge functions cancel: left so, t would be anywhere within it.
+    #[inline(always)]
+    fn cancel(&self) -> bool {
+        let det = self.inside.det.abs();
+        let [bc, ca, ab] = self.products;
+        let least = 1.0 / 64.0;
+        (det < bc.abs() * least) | (det < ca.abs() * least) | (det < ab.abs() * least)
     }
-    (Passage::Inside, Inside { height: u * a.z + v * b.z + w * c.z, det, v, w })
+}
+
+/// Sixteen triangles, each with a ray of its own, all of which have these axes.
+pub(crate) struct Pairs {
+    /// By the order of the axes, relative to the mesh.
+    pub(crate) origin: [Row<f64>; 3],
+    pub(crate) direction: [Row<f64>; 3],
+    /// `[corner][axis]`, alike.
+    pub(crate) corners: [[Row<f32>; 3]; 3],
+}
+
+/// Where sixteen rays meet triangles.
+pub(crate) struct Met {
+    /// No number where [`Passage::Inside`] is not how the ray passes.
+    pub(crate) t: Row<f64>,
+    pub(crate) local: [Row<f64>; 2],
+}
+
+impl Pairs {
+    /// Where each ray meets its triangle: [`passage`] of every pair, by the same operations side by side.
+    #[inline(always)]
+    pub(crate) fn meet(&self) -> Met {
+        let mut met = Met { t: Row::of(0.0), local: [Row::of(0.0); 2] };
+        for i in 0..WIDE {
+            let [x, y, z] = [self.direction[0].0[i], self.direction[1].0[i], self.direction[2].0[i]];
+            let origin = [self.origin[0].0[i], self.origin[1].0[i], self.origin[2].0[i]];
+            let shear = [x / z, y / z];
+            let [a, b, c] = &self.corners;
+            let weights = weigh([
+                sheared(shear, &origin, [a[0].0[i], a[1].0[i], a[2].0[i]]),
+                sheared(shear, &origin, [b[0].0[i], b[1].0[i], b[2].0[i]]),
+                sheared(shear, &origin, [c[0].0[i], c[1].0[i], c[2].0[i]]),
+            ]);
+            let inside = &weights.inside;
+            let is_clear = weights.are_of_inside() & !weights.cancel();
+            let t = inside.t_along(z);
+            met.t.0[i] = if is_clear { t } else { f64::NAN };
+            let local = inside.local();
+            met.local[0].0[i] = local.x;
+            met.local[1].0[i] = local.y;
+        }
+        met
+    }
 }
 
 /// How the ray meets a triangle. Corners and origin are relative to the mesh, and have the order of the shear's axes.

@@ -13,6 +13,7 @@ mod nearest;
 mod opening;
 mod options;
 mod oracle;
+mod pairs;
 mod parts;
 mod precise;
 mod proof;

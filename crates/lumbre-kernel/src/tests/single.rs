@@ -169,6 +169,19 @@ fn rays_that_go_together_are_answered_as_each_alone() {
                 packets.iter().filter(|packet| packet::are_alike(accel.level, start, packet)).count();
             assert!(together > 60, "{together}");
             check(&accel, packets.as_flattened(), 1_500);
+            // In a long batch, those that do not gain by it are seldom tried.
+            for level in Level::all() {
+                let mut hits = [const { None }; PACKET];
+                for packet in &packets {
+                    accel.closest_batch_at(level, packet, &mut hits);
+                    let mut met = [false; PACKET];
+                    accel.any_batch_at(level, packet, &mut met);
+                    for ((ray, hit), met) in packet.iter().zip(&hits).zip(met) {
+                        assert_eq!(*hit, accel.closest_at(level, ray), "{level:?} {ray:?}");
+                        assert_eq!(met, hit.is_some(), "{level:?} {ray:?}");
+                    }
+                }
+            }
         }
     }
 }

@@ -1,0 +1,96 @@
+//! Sixteen triangles with a ray each, beside each alone.
+
+use lumbre_math::DVec3;
+
+use super::scenes::Random;
+use crate::lanes::{Lanes, Level, Row, Task, WIDE};
+use crate::triangles::{self, Met, Pairs, Passage, Shear};
+
+struct Meeting<'a>(&'a Pairs);
+
+impl Task for Meeting<'_> {
+    type Output = Met;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Met {
+        self.0.meet()
+    }
+}
+
+/// What a lane is made of: a direction, an origin and corners, by the order of the axes.
+fn lane(random: &mut Random) -> (DVec3, [f64; 3], [[f32; 3]; 3]) {
+    let scale = [1.0, 1e-12, 3e7][random.below(3)];
+    let kind = random.below(6);
+    let (direction, origin) = if kind < 2 {
+        (DVec3::Z, (scale * random.vector()).as_vec3().as_dvec3())
+    } else {
+        (random.vector().with_z(1.0 + random.unit()), scale * random.vector())
+    };
+    let middle = origin + scale * 2.0 * direction;
+    let place = |random: &mut Random| (middle + 0.8 * scale * random.vector()).as_vec3().to_array();
+    let mut corners = [place(random), place(random), place(random)];
+    match kind {
+        // The ray goes exactly through a corner, or the triangle lies along it.
+        0 => (corners[1][0], corners[1][1]) = (origin.x as f32, origin.y as f32),
+        1 => {
+            for corner in &mut corners {
+                corner[0] = origin.x as f32;
+            }
+        }
+        // A point, and a needle.
+        2 => corners[1] = corners[0],
+        3 => corners[2] = [0, 1, 2].map(|axis| 0.5 * (corners[0][axis] + corners[1][axis])),
+        _ => {}
+    }
+    (direction, origin.to_array(), corners)
+}
+
+#[test]
+fn sixteen_pairs_meet_as_each_alone() {
+    let mut random = Random(171);
+    let (mut inside, mut outside, mut unclear) = (0, 0, 0);
+    for _ in 0..if cfg!(miri) { 20 } else { 3_000 } {
+        let none = Row::of(0.0);
+        let mut pairs = Pairs { origin: [none; 3], direction: [none; 3], corners: [[Row::of(0.0); 3]; 3] };
+        let lanes: Vec<_> = (0..WIDE).map(|_| lane(&mut random)).collect();
+        for (i, (direction, origin, corners)) in lanes.iter().enumerate() {
+            for axis in 0..3 {
+                pairs.origin[axis].0[i] = origin[axis];
+                pairs.direction[axis].0[i] = direction.to_array()[axis];
+                for (rows, corner) in pairs.corners.iter_mut().zip(corners) {
+                    rows[axis].0[i] = corner[axis];
+                }
+            }
+        }
+        for level in Level::all() {
+            let met = level.run(Meeting(&pairs));
+            for (i, (direction, origin, corners)) in lanes.iter().enumerate() {
+                // Its third axis is the largest and not negative, so that the order stays.
+                let shear = Shear::new(direction);
+                let (passage, crossing) = triangles::passage(&shear, origin, corners);
+                let met = (met.t.0[i], met.local[0].0[i], met.local[1].0[i]);
+                match passage {
+                    Passage::Inside => {
+                        let (t, local) = (crossing.t(&shear), crossing.local());
+                        let expected = (t, local.x, local.y);
+                        assert_eq!(bits(met), bits(expected), "{level:?}");
+                        inside += 1;
+                    }
+                    Passage::Outside => {
+                        assert!(met.0.is_nan(), "{level:?}");
+                        outside += 1;
+                    }
+                    Passage::Unclear => {
+                        assert!(met.0.is_nan(), "{level:?}");
+                        unclear += 1;
+                    }
+                }
+            }
+        }
+    }
+    assert!(cfg!(miri) || inside > 5_000 && outside > 5_000 && unclear > 500, "{inside} {outside} {unclear}");
+}
+
+fn bits((t, u, v): (f64, f64, f64)) -> [u64; 3] {
+    [t.to_bits(), u.to_bits(), v.to_bits()]
+}
