@@ -501,7 +501,7 @@ impl Packet<'_, '_> {
 
     /// The nearest hits.
     #[inline(always)]
-    pub(crate) fn put_nearest(&self, first: usize, ends: &mut impl Ends<Option<Winner>>) {
+    pub(crate) fn put_nearest<L: Lanes>(&self, first: usize, ends: &mut impl Ends<Option<Winner>>) {
         let (axes, columns) = (self.bundle.axes, self.columns);
         let order = axes.order();
         let mut pairs = Pairs {
@@ -535,7 +535,12 @@ impl Packet<'_, '_> {
             } else if !best.is_some() {
                 ends.put(first + i, Outcome::Settled(None));
             } else if t.is_nan() {
-                ends.put(first + i, self.exact.unclear_winner(&self.rays[i], &best));
+                // Unclear: by itself, and closer.
+                let winner = self.exact.winner::<L>(&self.rays[i], axes, &best);
+                ends.put(
+                    first + i,
+                    winner.map_or(Outcome::Unsettled, |winner| Outcome::Settled(Some(winner))),
+                );
             } else {
                 let (geometry, primitive) = self.exact.names(best.block, best.lane);
                 let local = DVec2::new(met.local[0].0[i], met.local[1].0[i]);
@@ -670,7 +675,7 @@ pub(crate) fn search<G: Goal, L: Lanes>(
     if !packet.run::<G, L>(&accel.tree.nodes, single.root) {
         return Together::NotAtAll;
     }
-    G::answer_together(&packet, first, ends);
+    G::answer_together::<L>(&packet, first, ends);
     if packet.work <= WORK_THAT_PAYS { Together::Well } else { Together::Slowly }
 }
 

@@ -189,23 +189,6 @@ impl<'a> Exact<'a> {
         }
     }
 
-    /// The same for one whose crossing is not clear at a glance.
-    #[cold]
-    #[inline(never)]
-    pub(crate) fn unclear_winner(
-        &self,
-        ray: &Ray,
-        &Candidate { block, lane, .. }: &Candidate,
-    ) -> Outcome<Option<Winner>> {
-        match self.meet(ray, block, lane) {
-            Meeting::Hit { root, .. } => {
-                let (geometry, primitive) = self.names(block, lane);
-                Outcome::Settled(Some(Winner { root, geometry, primitive }))
-            }
-            Meeting::Miss | Meeting::Touch { .. } => Outcome::Unsettled,
-        }
-    }
-
     /// A triangle that the ray does meet as the nearest hit; `None` where the plain search has to answer.
     #[inline(always)]
     pub(crate) fn winner<L: Lanes>(
@@ -629,7 +612,7 @@ pub(crate) trait Goal {
     ) -> Outcome<Self::Answer>;
 
     /// What came of rays that went together, the first of which has this position.
-    fn answer_together(packet: &Packet, first: usize, ends: &mut impl Ends<Self::Answer>);
+    fn answer_together<L: Lanes>(packet: &Packet, first: usize, ends: &mut impl Ends<Self::Answer>);
 }
 
 /// The nearest hit.
@@ -671,8 +654,8 @@ impl Goal for Nearest {
     }
 
     #[inline(always)]
-    fn answer_together(packet: &Packet, first: usize, ends: &mut impl Ends<Self::Answer>) {
-        packet.put_nearest(first, ends);
+    fn answer_together<L: Lanes>(packet: &Packet, first: usize, ends: &mut impl Ends<Self::Answer>) {
+        packet.put_nearest::<L>(first, ends);
     }
 }
 
@@ -719,7 +702,7 @@ impl Goal for Whether {
     }
 
     #[inline(always)]
-    fn answer_together(packet: &Packet, first: usize, ends: &mut impl Ends<bool>) {
+    fn answer_together<L: Lanes>(packet: &Packet, first: usize, ends: &mut impl Ends<bool>) {
         packet.put_met(first, ends);
     }
 }
