@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use lumbre_geometry::{PlacedShape, Ray, Sphere};
 use lumbre_kernel::{
     Accel, BuildOptions, Geometry, GeometryKind, Hit, Instance, PreciseMesh, Preset, QueryOptions,
@@ -43,17 +43,20 @@ pub enum Asked {
     Excluding,
     /// One ray at a time, of meshes whose vertices are in double precision, too.
     OfPreciseMeshes,
+    /// One ray at a time, in single precision alone, which leaks at edges. These answers may differ.
+    Leaking,
 }
 
 impl Asked {
     /// All but the first: what else costs what.
-    pub const OTHERS: [Self; 6] = [
+    pub const OTHERS: [Self; 7] = [
         Self::ByBatches,
         Self::Plainly,
         Self::WithOptions,
         Self::WithMasks,
         Self::Excluding,
         Self::OfPreciseMeshes,
+        Self::Leaking,
     ];
 
     fn name(self) -> &'static str {
@@ -65,6 +68,7 @@ impl Asked {
             Self::WithMasks => " masks",
             Self::Excluding => " excluding",
             Self::OfPreciseMeshes => " f64 meshes",
+            Self::Leaking => " leaking",
         }
     }
 }
@@ -91,7 +95,13 @@ impl Program for Lumbre {
 
     fn refuses(&self, scene: &Scene) -> Option<&'static str> {
         let has_meshes = !scene.meshes.is_empty() || !scene.placed_meshes.is_empty();
-        (self.asked == Asked::OfPreciseMeshes && !has_meshes).then_some("there is no mesh")
+        let holds_others =
+            !(scene.shapes.is_empty() && scene.placements.is_empty() && scene.sphere_count() == 0);
+        match self.asked {
+            Asked::OfPreciseMeshes if !has_meshes => Some("there is no mesh"),
+            Asked::Leaking if holds_others => Some("there is more than meshes"),
+            _ => None,
+        }
     }
 
     fn takes_squares(&self) -> bool {
@@ -112,6 +122,9 @@ impl Program for Lumbre {
         let mut accel = accel?;
         if self.asked == Asked::WithMasks {
             accel = accel.with_masks(vec![MASK_OF_ALL; count]);
+        }
+        if self.asked == Asked::Leaking {
+            ensure!(accel.leak(), "there is no leaking search of this tree on this machine");
         }
         let tree = Queried { accel, asked: self.asked, nowhere: nowhere()? };
         Ok(Built { tree: Box::new(tree), seconds, bytes })

@@ -16,7 +16,7 @@ use crate::hulls::Hulls;
 use crate::lanes::Level;
 use crate::node::{Units, tag};
 use crate::query::{All, Any, Batch, Closest, Count, If};
-use crate::single::{self, AnyHit, ClosestHit, Nearest, Outcome, Whether, Winner};
+use crate::single::{self, Nearest, Outcome, Questions, Whether, Winner};
 use crate::winding::{self, Moments};
 use crate::{
     ClosestPoint, Geometry, GeometryKind, Hit, LoadError, MapError, NoClosestPoint, NoWindingNumber,
@@ -41,6 +41,8 @@ pub struct Accel {
     pub(crate) holds: Holds,
     /// Where single precision can search the tree.
     pub(crate) single: Option<SingleStart>,
+    /// What is asked of it at the best level.
+    pub(crate) questions: Questions,
     /// What is asked of shapes first.
     pub(crate) hulls: Hulls,
     /// What a ray cost after the build, once that was asked for.
@@ -206,17 +208,14 @@ impl Accel {
 
     /// The nearest hit in the ray's range. Of hits at the same `t`, the one whose (path, geometry, primitive) comes
     /// first, by positions in the lists that the trees were built from.
+    #[inline]
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
-        self.closest_at(self.level, ray)
+        self.questions.closest.ask(self, ray)
     }
 
-    #[inline(always)]
+    #[cfg(test)]
     pub(crate) fn closest_at(&self, level: Level, ray: &Ray) -> Option<Hit> {
-        match &self.single {
-            Some(start) if start.is_mixed => level.run(ClosestHit::<true> { accel: self, start, ray }),
-            Some(start) => level.run(ClosestHit::<false> { accel: self, start, ray }),
-            None => self.closest_plainly_at(level, ray),
-        }
+        Questions::new(level, self.single.as_ref()).closest.ask(self, ray)
     }
 
     /// The same by the search that knows no other precision than double.
@@ -234,15 +233,29 @@ impl Accel {
         self.closest_plainly_at(self.level, ray)
     }
 
+    /// [`Accel::closest`] and [`Accel::any`] as they would be if triangles were met in single precision alone and boxes had no margin:
+    /// rays may then pass between two triangles, and answers are rounded. To be measured beside them; whether there is such a thing
+    /// for this tree and on this machine.
+    #[cfg(feature = "measure")]
+    #[doc(hidden)]
+    pub fn leak(&mut self) -> bool {
+        let leaking = Questions::leaking(self.level, self.single.as_ref());
+        if let Some(leaking) = leaking {
+            self.questions = leaking;
+        }
+        leaking.is_some()
+    }
+
     /// [`Accel::closest`] among what the options leave. Of the crossings of a shape, each is asked by itself.
     pub fn closest_with(&self, ray: &Ray, options: &QueryOptions) -> Option<Hit> {
-        self.closest_with_at(self.level, ray, options)
+        if options.take_all(self) {
+            self.closest(ray)
+        } else {
+            self.closest_with_at(self.level, ray, options)
+        }
     }
 
     pub(crate) fn closest_with_at(&self, level: Level, ray: &Ray, options: &QueryOptions) -> Option<Hit> {
-        if options.take_all(self) {
-            return self.closest_at(level, ray);
-        }
         if let Some(start) = &self.single
             && let Outcome::Settled(winner) =
                 single::search_among::<Nearest, _>(level, self, start, ray, options.of_tree(self))
@@ -267,13 +280,10 @@ impl Accel {
 
     /// [`Accel::any`] among what the options leave.
     pub fn any_with(&self, ray: &Ray, options: &QueryOptions) -> bool {
-        self.any_with_at(self.level, ray, options)
+        if options.take_all(self) { self.any(ray) } else { self.any_with_at(self.level, ray, options) }
     }
 
     pub(crate) fn any_with_at(&self, level: Level, ray: &Ray, options: &QueryOptions) -> bool {
-        if options.take_all(self) {
-            return self.any_at(level, ray);
-        }
         if let Some(start) = &self.single
             && let Outcome::Settled(is_hit) =
                 single::search_among::<Whether, _>(level, self, start, ray, options.of_tree(self))
@@ -342,17 +352,14 @@ impl Accel {
     }
 
     /// Whether anything is hit in the ray's range.
+    #[inline]
     pub fn any(&self, ray: &Ray) -> bool {
-        self.any_at(self.level, ray)
+        self.questions.any.ask(self, ray)
     }
 
-    #[inline(always)]
+    #[cfg(test)]
     pub(crate) fn any_at(&self, level: Level, ray: &Ray) -> bool {
-        match &self.single {
-            Some(start) if start.is_mixed => level.run(AnyHit::<true> { accel: self, start, ray }),
-            Some(start) => level.run(AnyHit::<false> { accel: self, start, ray }),
-            None => self.any_plainly_at(level, ray),
-        }
+        Questions::new(level, self.single.as_ref()).any.ask(self, ray)
     }
 
     /// The same by the search that knows no other precision than double.

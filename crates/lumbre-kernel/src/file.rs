@@ -36,6 +36,7 @@ use crate::opening::Start;
 use crate::prepare::{Parts, take_apart, units_of};
 use crate::refit::{Places, check_places};
 use crate::save::{check_names, check_structure, signature};
+use crate::single::Questions;
 use crate::spheres::SphereBlock;
 use crate::store::Store;
 use crate::{Accel, Geometry, GeometryKind, LoadError, RefitError};
@@ -399,15 +400,18 @@ fn over_mapped(file: Arc<Mmap>, geometries: Vec<Geometry>) -> Result<Accel, Load
     let masks: Store<u32> = array(&file, &header, 7)?;
     let units = units_of(&geometries, &parts);
     let holds = Holds::new(&geometries, parts.largest_corner, parts.sphere_reach);
+    let level = Level::best();
+    let single = SingleStart::new(&holds, &units, tree.root);
     let accel = Accel {
         hulls: Hulls::new(&geometries, &tree.entries, &units),
-        single: SingleStart::new(&holds, &units, tree.root),
+        questions: Questions::new(level, single.as_ref()),
+        single,
         units,
         holds,
         tree,
         bounds: parts.bounds,
         primitives: parts.count(),
-        level: Level::best(),
+        level,
         built_cost: None,
         masks: masks.to_vec(),
         moments: OnceLock::new(),

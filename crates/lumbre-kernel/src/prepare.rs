@@ -17,6 +17,7 @@ use crate::lanes::Level;
 use crate::node::Units;
 use crate::outline::Outline;
 use crate::primitive::{Bounds, Kind, Primitive, Traits};
+use crate::single::Questions;
 use crate::triangles::BLOCK;
 use crate::{
     Accel, BuildError, BuildOptions, Geometry, GeometryKind, Placement, PreciseMesh, Preset, TriangleMesh,
@@ -95,9 +96,11 @@ fn build_here(geometries: Vec<Geometry>, effort: Effort) -> Result<Accel, BuildE
         layout.pack(level, &geometries, names, cells)?
     };
     let holds = Holds::new(&geometries, parts.largest_corner, parts.sphere_reach);
+    let single = SingleStart::new(&holds, &units, tree.root);
     Ok(Accel {
         hulls: Hulls::new(&geometries, &tree.entries, &units),
-        single: SingleStart::new(&holds, &units, tree.root),
+        questions: Questions::new(level, single.as_ref()),
+        single,
         units,
         holds,
         tree,
@@ -114,16 +117,18 @@ fn build_here(geometries: Vec<Geometry>, effort: Effort) -> Result<Accel, BuildE
 
 /// A tree in which nothing stands yet.
 pub(crate) fn empty_over(geometries: Vec<Geometry>) -> Accel {
+    let level = Level::best();
     Accel {
         units: Units::new(DVec3::ZERO, 1.0, 0.0, 1.0),
         holds: Holds::new(&geometries, 0.0, 0.0),
         single: None,
+        questions: Questions::new(level, None),
         hulls: Hulls::default(),
         tree: Packed::default(),
         infinite: Vec::new(),
         bounds: Aabb::EMPTY,
         primitives: 0,
-        level: Level::best(),
+        level,
         built_cost: None,
         masks: Vec::new(),
         moments: OnceLock::new(),

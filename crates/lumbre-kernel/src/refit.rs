@@ -17,6 +17,7 @@ use crate::node::{Node, Units, tag};
 use crate::opening::{self, Families, Start};
 use crate::prepare::{Parts, has_area, take_apart, units_of};
 use crate::primitive::Bounds;
+use crate::single::Questions;
 use crate::spheres::{SphereBlock, has_radius};
 use crate::triangles::BLOCK;
 use crate::{Accel, BuildError, Geometry, GeometryKind, SphereCloud};
@@ -203,6 +204,7 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts, places: Places) {
     accel.primitives = parts.count();
     accel.infinite = parts.infinite;
     accel.single = SingleStart::new(&accel.holds, &units, accel.tree.root);
+    accel.questions = Questions::new(accel.level, accel.single.as_ref());
     accel.hulls = Hulls::new(&accel.geometries, &accel.tree.entries, &units);
     accel.units = units;
     accel.bounds = parts.bounds;

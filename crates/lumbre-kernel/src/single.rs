@@ -21,7 +21,7 @@ use crate::blocks::{Blocks, TriangleBlock};
 use crate::collapse::Entry;
 use crate::holds::SingleStart;
 use crate::hulls::HullRay;
-use crate::lanes::{self, Axes, Crossings, Lanes, Level, MetHulls, Task};
+use crate::lanes::{self, Asked, Axes, Crossings, Lanes, Level, MetHulls, Question, Task};
 use crate::node::{Slabs, tag};
 use crate::options::{self, Selection};
 use crate::packet::Packet;
@@ -143,6 +143,7 @@ impl<'a> Exact<'a> {
         block: &TriangleBlock,
         lane: u32,
     ) -> bool {
+        let ray = lanes::opaque(ray);
         let (shear, origin) = L::shear(ray, axes, &self.start.mesh_origin);
         match L::pass(block, lane as usize, &shear, &origin) {
             (Passage::Outside, _) => true,
@@ -197,7 +198,7 @@ impl<'a> Exact<'a> {
         axes: &'static Axes,
         &Candidate { block, lane, .. }: &Candidate,
     ) -> Option<Winner> {
-        let (shear, origin) = L::shear(ray, axes, &self.start.mesh_origin);
+        let (shear, origin) = L::shear(lanes::opaque(ray), axes, &self.start.mesh_origin);
         let corners = self.triangles.block(block);
         let (passage, inside) = L::pass(corners, lane as usize, &shear, &origin);
         let (t, local) = if passage == Passage::Inside {
@@ -252,7 +253,7 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
         slabs: &Slabs,
         selection: S,
     ) -> Self {
-        let (blocks, place_per_height) = L::start_blocks(start, ray, slabs);
+        let (blocks, place_per_height) = L::start_blocks(start, lanes::opaque(ray), slabs);
         let exact = Exact::new(accel, start);
         let best = Candidate::NONE;
         Self { exact, blocks, hulls: None, place_per_height, best, crossed: None, selection }
@@ -707,44 +708,98 @@ impl Goal for Whether {
     }
 }
 
-/// The nearest hit of a ray by whichever search can tell. `MIXED` as below.
-pub(crate) struct ClosestHit<'a, 'r, const MIXED: bool> {
-    pub(crate) accel: &'a Accel,
-    /// That of the tree.
-    pub(crate) start: &'a SingleStart,
-    pub(crate) ray: &'r Ray,
+/// What is asked most, by whichever searches can tell.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Questions {
+    /// [`Accel::closest`].
+    pub(crate) closest: Asked<Option<Hit>>,
+    /// [`Accel::any`].
+    pub(crate) any: Asked<bool>,
 }
 
-impl<const MIXED: bool> Task for ClosestHit<'_, '_, MIXED> {
-    type Output = Option<Hit>;
+impl Questions {
+    /// Of a tree that has this start.
+    pub(crate) fn new(level: Level, start: Option<&SingleStart>) -> Self {
+        match start {
+            Some(start) if start.is_mixed => Self::of::<Singly<true>>(level),
+            Some(_) => Self::of::<Singly<false>>(level),
+            None => Self::of::<Plainly>(level),
+        }
+    }
+
+    /// The same as they may leak at edges, to be measured beside; `None` but of trees of triangles, and without AVX2.
+    #[cfg(feature = "measure")]
+    pub(crate) fn leaking(level: Level, start: Option<&SingleStart>) -> Option<Self> {
+        start.filter(|start| !start.is_mixed)?;
+        Some(Self {
+            closest: level.asked_leaking::<ClosestHit<Singly<false>>>()?,
+            any: level.asked_leaking::<AnyHit<Singly<false>>>()?,
+        })
+    }
+
+    fn of<W>(level: Level) -> Self
+    where
+        ClosestHit<W>: Question<Answer = Option<Hit>>,
+        AnyHit<W>: Question<Answer = bool>,
+    {
+        Self { closest: level.asked::<ClosestHit<W>>(), any: level.asked::<AnyHit<W>>() }
+    }
+}
+
+/// The nearest hit of a ray.
+struct ClosestHit<W>(PhantomData<W>);
+
+/// Whether a ray hits anything.
+struct AnyHit<W>(PhantomData<W>);
+
+/// In single precision first. `MIXED` as below.
+struct Singly<const MIXED: bool>;
+
+/// In double precision alone.
+struct Plainly;
+
+impl<const MIXED: bool> Question for ClosestHit<Singly<MIXED>> {
+    type Answer = Option<Hit>;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> Option<Hit> {
-        let Self { accel, start, ray } = self;
-        if let Outcome::Settled(winner) = Alone::<Nearest, MIXED>::new(accel, start, ray).run::<L>() {
+    fn ask<L: Lanes>(accel: &Accel, ray: &Ray) -> Option<Hit> {
+        if let Some(start) = &accel.single
+            && let Outcome::Settled(winner) = Alone::<Nearest, MIXED>::new(accel, start, ray).run::<L>()
+        {
             return winner.map(|winner| winner.to_hit(accel));
         }
         accel.closest_plainly_at(L::level(), ray)
     }
 }
 
-/// Whether a ray hits anything, alike.
-pub(crate) struct AnyHit<'a, 'r, const MIXED: bool> {
-    pub(crate) accel: &'a Accel,
-    /// That of the tree.
-    pub(crate) start: &'a SingleStart,
-    pub(crate) ray: &'r Ray,
-}
-
-impl<const MIXED: bool> Task for AnyHit<'_, '_, MIXED> {
-    type Output = bool;
+impl<const MIXED: bool> Question for AnyHit<Singly<MIXED>> {
+    type Answer = bool;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> bool {
-        let Self { accel, start, ray } = self;
-        if let Outcome::Settled(is_hit) = Alone::<Whether, MIXED>::new(accel, start, ray).run::<L>() {
+    fn ask<L: Lanes>(accel: &Accel, ray: &Ray) -> bool {
+        if let Some(start) = &accel.single
+            && let Outcome::Settled(is_hit) = Alone::<Whether, MIXED>::new(accel, start, ray).run::<L>()
+        {
             return is_hit;
         }
+        accel.any_plainly_at(L::level(), ray)
+    }
+}
+
+impl Question for ClosestHit<Plainly> {
+    type Answer = Option<Hit>;
+
+    #[inline(always)]
+    fn ask<L: Lanes>(accel: &Accel, ray: &Ray) -> Option<Hit> {
+        accel.closest_plainly_at(L::level(), ray)
+    }
+}
+
+impl Question for AnyHit<Plainly> {
+    type Answer = bool;
+
+    #[inline(always)]
+    fn ask<L: Lanes>(accel: &Accel, ray: &Ray) -> bool {
         accel.any_plainly_at(L::level(), ray)
     }
 }
@@ -812,7 +867,8 @@ impl<G: Goal, const MIXED: bool, S: Selection> Task for Alone<'_, '_, G, MIXED, 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Self::Output {
         let Self { accel, start, root, ray, selection, .. } = self;
-        let Some(slabs) = L::start_single(start, ray) else { return Outcome::Unsettled };
+        // Opaque here and where the ray is read again: what was read would else be written down, to be kept until then.
+        let Some(slabs) = L::start_single(start, lanes::opaque(ray)) else { return Outcome::Unsettled };
         let mut way = Way::<L>::new(&accel.tree.nodes, slabs);
         let mut stack = Stack::new();
         let infinite = if MIXED { &*accel.infinite } else { &[] };

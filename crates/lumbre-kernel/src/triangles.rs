@@ -165,6 +165,19 @@ impl HeightRange {
             surely_last: end - end_error,
         }
     }
+
+    /// The same where none is below zero.
+    #[inline(always)]
+    pub(crate) fn ahead(start: f32, end: f32) -> Self {
+        let within = |height: f32| if height < FAR { height } else { FAR };
+        let (start, end) = (within(start), within(end));
+        Self {
+            first: start * (1.0 - ROUNDINGS),
+            last: end * (1.0 + ROUNDINGS),
+            surely_first: start * (1.0 + ROUNDINGS),
+            surely_last: end * (1.0 - ROUNDINGS),
+        }
+    }
 }
 
 impl BlockRay {

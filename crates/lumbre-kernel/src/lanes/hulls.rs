@@ -172,7 +172,7 @@ impl HullLanes for Portable {
 }
 
 #[cfg(target_arch = "x86_64")]
-impl<const AVX512: bool> HullLanes for X86<AVX512> {
+impl<const AVX512: bool, const LEAKS: bool> HullLanes for X86<AVX512, LEAKS> {
     #[inline(always)]
     fn meet_hulls<const SURE: bool>(block: &HullBlock, ray: &HullRay, range: &HeightRange) -> MetHulls {
         // As the portable one, eight at a time. Of a maximum or a minimum with a NaN, the second number comes.
@@ -319,7 +319,7 @@ impl<const AVX512: bool> HullLanes for X86<AVX512> {
 }
 
 #[cfg(target_arch = "x86_64")]
-impl<const AVX512: bool> X86<AVX512> {
+impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
     /// As [`Chord::meet_tube`], eight places at a time.
     #[inline(always)]
     fn meet_tube(chord: &Chord, tube: f32, margin: f32, range: &HeightRange) -> SeenTube {

@@ -1,10 +1,11 @@
 //! The fence around SIMD, and around the one array that is not cleared: the only module with `unsafe`, but for the call that maps a file. Outside it, a search is written once, over [`Lanes`].
 //!
-//! [`Level::run`] chooses the instruction set once a search. The code between is generic and `#[inline(always)]` without a
+//! [`Level::run`] chooses the instruction set once a search, and [`Level::asked`] for all searches. The code between is generic and `#[inline(always)]` without a
 //! target feature of its own, so that it takes on the features of the root that it is inlined into.
 
 #![allow(unsafe_code)]
 
+mod asked;
 mod boxes;
 mod hulls;
 mod portable;
@@ -26,6 +27,7 @@ use crate::node::{BoxRay, Slabs, Units, WIDTH};
 use crate::stack::STACK;
 use crate::triangles::{BLOCK, BlockRay, Inside, Passage, ROUNDINGS, Shear};
 
+pub(crate) use asked::{Asked, Question};
 pub(crate) use boxes::{meet_boxes, meet_frustum, only_child, push_as_built, push_by_distance};
 #[cfg(test)]
 pub(crate) use hulls::meet_hulls_at;
@@ -147,13 +149,14 @@ impl Sides {
 }
 
 /// The axes in another order.
+// By lines: what every ray reads stands in the first, and one of a table is found by a shift.
 #[derive(Clone, Copy, Debug)]
-#[repr(C)]
+#[repr(C, align(64))]
 pub(crate) struct Axes {
     // Each below three; the fourth only fills up.
     order: [u32; 4],
     // Where the coordinates along each begin in blocks of each room.
-    rows_by_room: [[usize; 3]; ROOMS.len()],
+    rows_by_room: [[u32; 3]; ROOMS.len()],
     // The halves of each.
     halves: [u32; 8],
 }
@@ -170,7 +173,8 @@ impl Axes {
         let mut rows_by_room = [[0; 3]; ROOMS.len()];
         let mut i = 0;
         while i < ROOMS.len() {
-            rows_by_room[i] = [x * ROOMS[i], y * ROOMS[i], z * ROOMS[i]];
+            let room = ROOMS[i] as u32;
+            rows_by_room[i] = [order[0] * room, order[1] * room, order[2] * room];
             i += 1;
         }
         Self { order, halves, rows_by_room }

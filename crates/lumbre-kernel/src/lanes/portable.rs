@@ -100,7 +100,7 @@ impl Lanes for Portable {
             rest: [rest[0] - shear[0] * rest[2], rest[1] - shear[1] * rest[2], rest[2], 0.0],
             shear,
             least_size: start.least_size,
-            range: HeightRange::new(ray.t_min as f32 * length, ray.t_max as f32 * length),
+            range: HeightRange::ahead(ray.t_min as f32 * length, ray.t_max as f32 * length),
             turn: 0.0f32.copysign(-inverse),
         };
         (blocks, inverse.abs())

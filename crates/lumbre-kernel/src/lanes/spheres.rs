@@ -60,7 +60,7 @@ impl SphereLanes for Portable {
 }
 
 #[cfg(target_arch = "x86_64")]
-impl<const AVX512: bool> SphereLanes for X86<AVX512> {
+impl<const AVX512: bool, const LEAKS: bool> SphereLanes for X86<AVX512, LEAKS> {
     #[inline(always)]
     fn meet_spheres<const SURE: bool>(block: &SphereBlock, ray: &SphereRay) -> (u32, u32) {
         if !ray.is_sharp {

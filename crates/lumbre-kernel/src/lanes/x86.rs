@@ -5,7 +5,8 @@ use std::mem::offset_of;
 
 use lumbre_geometry::Ray;
 
-use super::{Axes, Corners, Crossings, Lanes, Level, Row, Set, Sides, Task, WIDE, Wide, wide};
+use super::{Axes, Corners, Crossings, Lanes, Level, Question, Row, Set, Sides, Task, WIDE, Wide, wide};
+use crate::Accel;
 use crate::blocks::{MOST_SHARED, TriangleBlock, USUAL};
 use crate::holds::SingleStart;
 use crate::node::{
@@ -26,15 +27,41 @@ pub(super) fn run_avx512<T: Task>(task: T) -> T::Output {
     task.run::<X86<true>>()
 }
 
-/// Of the two levels: only `run_avx512` instantiates `X86<true>`, and only `run_avx2` `X86<false>`. That is why the
-/// instructions below are there.
-pub(crate) struct X86<const AVX512: bool>;
+#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+pub(super) fn ask_avx2<Q: Question>(accel: &Accel, ray: &Ray) -> Q::Answer {
+    Q::ask::<X86<false>>(accel, ray)
+}
+
+#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512cd,avx512dq,avx512vl")]
+pub(super) fn ask_avx512<Q: Question>(accel: &Accel, ray: &Ray) -> Q::Answer {
+    Q::ask::<X86<true>>(accel, ray)
+}
+
+/// The same as it may leak: see `X86`.
+#[cfg(feature = "measure")]
+#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+pub(super) fn ask_leaking_avx2<Q: Question>(accel: &Accel, ray: &Ray) -> Q::Answer {
+    Q::ask::<X86<false, true>>(accel, ray)
+}
+
+#[cfg(feature = "measure")]
+#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512cd,avx512dq,avx512vl")]
+pub(super) fn ask_leaking_avx512<Q: Question>(accel: &Accel, ray: &Ray) -> Q::Answer {
+    Q::ask::<X86<true, true>>(accel, ray)
+}
+
+/// Of the two levels: only what is named after AVX-512 above instantiates `X86<true>`, and only what is named after AVX2 `X86<false>`.
+/// That is why the instructions below are there.
+///
+/// `LEAKS` is there to be measured beside: triangles are met as single precision has it, and boxes without a margin, so that hits may
+/// be lost at edges and the answers are rounded.
+pub(crate) struct X86<const AVX512: bool, const LEAKS: bool = false>;
 
 // The numbers of a ray stand in a row: origin, direction, range.
 const _: () =
     assert!(offset_of!(Ray, direction) == 24 && offset_of!(Ray, t_min) == 48 && offset_of!(Ray, t_max) == 56);
 
-impl<const AVX512: bool> X86<AVX512> {
+impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
     /// The larger of the absolute values.
     #[inline(always)]
     fn larger(a: __m256, b: __m256) -> __m256 {
@@ -82,9 +109,9 @@ impl<const AVX512: bool> X86<AVX512> {
     /// # Safety
     /// They are so far behind `row`.
     #[inline(always)]
-    unsafe fn component(row: *const f32, [a, b, c]: [usize; 3]) -> __m256d {
+    unsafe fn component(row: *const f32, [a, b, c]: [usize; 3]) -> __m128 {
         // SAFETY: see `X86`, and above.
-        unsafe { _mm256_cvtps_pd(_mm_setr_ps(*row.add(a), *row.add(b), *row.add(c), 0.0)) }
+        unsafe { _mm_setr_ps(*row.add(a), *row.add(b), *row.add(c), 0.0) }
     }
 
     /// The numbers of a row in three places below sixteen, of more bits than which what is above means nothing; nor does the last.
@@ -93,17 +120,17 @@ impl<const AVX512: bool> X86<AVX512> {
     /// # Safety
     /// There are sixteen to be read.
     #[inline(always)]
-    unsafe fn three_of(row: *const f32, places: __m128i) -> __m256d {
+    unsafe fn three_of(row: *const f32, places: __m128i) -> __m128 {
         // SAFETY: see `X86`, and above.
         unsafe {
             let three = _mm512_permutexvar_ps(_mm512_castsi128_si512(places), _mm512_loadu_ps(row));
-            _mm256_cvtps_pd(_mm512_castps512_ps128(three))
+            _mm512_castps512_ps128(three)
         }
     }
 
     /// The corners of the triangle in a lane, `[axis][corner]` by the order of the axes; the last of four means nothing.
     #[inline(always)]
-    fn corners_in(block: &TriangleBlock, lane: usize, axes: &Axes) -> [__m256d; 3] {
+    fn corners_in(block: &TriangleBlock, lane: usize, axes: &Axes) -> [__m128; 3] {
         let coordinates = block.coordinates().as_ptr();
         let [x, y, z] = axes.rows(block);
         // SAFETY: see `X86`. A row begins at 62 at most, and no more of it than 32 are looked at: in an array of 96. The load is of
@@ -198,17 +225,20 @@ impl<const AVX512: bool> X86<AVX512> {
     fn sheared_eight(
         block: &TriangleBlock,
         ray: &BlockRay,
-        &[kx, ky, kz]: &[usize; 3],
+        &[kx, ky, kz]: &[u32; 3],
         first: usize,
     ) -> [__m256; 3] {
         let rows = block.coordinates();
         // SAFETY: see `X86`. Rows begin at 48 at most, and no more of them than 24 are looked at, in an array of 96.
         unsafe {
-            let load = |row: usize| _mm256_loadu_ps(rows.as_ptr().add(row + first));
+            let load = |row: u32| _mm256_loadu_ps(rows.as_ptr().add(row as usize + first));
             let (shear_x, shear_y) = (_mm256_set1_ps(ray.shear[0]), _mm256_set1_ps(ray.shear[1]));
             let z = _mm256_sub_ps(_mm256_set1_ps(ray.origin[2]), load(kz));
             let across = _mm256_sub_ps(_mm256_set1_ps(ray.origin[0]), load(kx));
             let up = _mm256_sub_ps(_mm256_set1_ps(ray.origin[1]), load(ky));
+            if LEAKS {
+                return [_mm256_fnmadd_ps(shear_x, z, across), _mm256_fnmadd_ps(shear_y, z, up), z];
+            }
             let x = _mm256_fnmadd_ps(shear_x, z, _mm256_add_ps(across, _mm256_set1_ps(ray.rest[0])));
             let y = _mm256_fnmadd_ps(shear_y, z, _mm256_add_ps(up, _mm256_set1_ps(ray.rest[1])));
             [x, y, z]
@@ -217,18 +247,64 @@ impl<const AVX512: bool> X86<AVX512> {
 
     /// Sixteen vertices. For AVX-512 alone.
     #[inline(always)]
-    fn sheared_sixteen(block: &TriangleBlock, ray: &BlockRay, [kx, ky, kz]: [usize; 3]) -> [__m512; 3] {
+    fn sheared_sixteen(block: &TriangleBlock, ray: &BlockRay, [kx, ky, kz]: [u32; 3]) -> [__m512; 3] {
         let rows = block.coordinates();
         // SAFETY: as there.
         unsafe {
-            let load = |at: usize| _mm512_loadu_ps(rows.as_ptr().add(at));
+            let load = |at: u32| _mm512_loadu_ps(rows.as_ptr().add(at as usize));
             let (shear_x, shear_y) = (_mm512_set1_ps(ray.shear[0]), _mm512_set1_ps(ray.shear[1]));
             let z = _mm512_sub_ps(_mm512_set1_ps(ray.origin[2]), load(kz));
             let across = _mm512_sub_ps(_mm512_set1_ps(ray.origin[0]), load(kx));
             let up = _mm512_sub_ps(_mm512_set1_ps(ray.origin[1]), load(ky));
+            if LEAKS {
+                return [_mm512_fnmadd_ps(shear_x, z, across), _mm512_fnmadd_ps(shear_y, z, up), z];
+            }
             let x = _mm512_fnmadd_ps(shear_x, z, _mm512_add_ps(across, _mm512_set1_ps(ray.rest[0])));
             let y = _mm512_fnmadd_ps(shear_y, z, _mm512_add_ps(up, _mm512_set1_ps(ray.rest[1])));
             [x, y, z]
+        }
+    }
+
+    /// [`Lanes::shear`] in single precision.
+    #[inline(always)]
+    fn rounded_shear(ray: &Ray, axes: &'static Axes, mesh_origin: &[f64; 4]) -> (Shear, [f64; 3]) {
+        // SAFETY: see `X86`. The loads are of the first eight numbers of a ray, see below, and of arrays of four.
+        unsafe {
+            let order = _mm_loadu_si128(axes.order.as_ptr().cast());
+            let origin = _mm256_loadu_pd(Self::numbers(ray));
+            let origin = _mm256_cvtpd_ps(_mm256_sub_pd(origin, _mm256_loadu_pd(mesh_origin.as_ptr())));
+            let origin = Self::array(_mm_permutevar_ps(origin, order));
+            let direction = _mm_permutevar_ps(Self::single_direction(ray), order);
+            let last = _mm_shuffle_ps::<0b10_10_10_10>(direction, direction);
+            let shear = Self::array(_mm_div_ps(direction, last));
+            let shear = Shear {
+                axes,
+                x: shear[0].into(),
+                y: shear[1].into(),
+                direction_z: _mm_cvtss_f32(last).into(),
+            };
+            (shear, [origin[0].into(), origin[1].into(), origin[2].into()])
+        }
+    }
+
+    /// The inside of [`Lanes::pass`] in single precision.
+    #[inline(always)]
+    fn rounded_inside(block: &TriangleBlock, lane: usize, shear: &Shear, origin: &[f64; 3]) -> Inside {
+        let [across, up, z] = Self::corners_in(block, lane, shear.axes);
+        // SAFETY: see `X86`.
+        unsafe {
+            let z = _mm_sub_ps(z, _mm_set1_ps(origin[2] as f32));
+            let across = _mm_sub_ps(across, _mm_set1_ps(origin[0] as f32));
+            let up = _mm_sub_ps(up, _mm_set1_ps(origin[1] as f32));
+            let x = _mm_fnmadd_ps(_mm_set1_ps(shear.x as f32), z, across);
+            let y = _mm_fnmadd_ps(_mm_set1_ps(shear.y as f32), z, up);
+            // c, a, b and b, c, a.
+            let (px, py) = (_mm_permute_ps::<0b11_01_00_10>(x), _mm_permute_ps::<0b11_01_00_10>(y));
+            let (qx, qy) = (_mm_permute_ps::<0b11_00_10_01>(x), _mm_permute_ps::<0b11_00_10_01>(y));
+            let edges = _mm_fmsub_ps(px, qy, _mm_mul_ps(py, qx));
+            let [u, v, w, _] = Self::array(edges);
+            let [a, b, c, _] = Self::array(_mm_mul_ps(edges, z));
+            Inside { height: (a + b + c).into(), det: (u + v + w).into(), v: v.into(), w: w.into() }
         }
     }
 
@@ -288,15 +364,15 @@ pub(crate) trait HasWide {
     type Wide: Wide;
 }
 
-impl HasWide for X86<true> {
+impl<const LEAKS: bool> HasWide for X86<true, LEAKS> {
     type Wide = wide::Avx512;
 }
 
-impl HasWide for X86<false> {
+impl<const LEAKS: bool> HasWide for X86<false, LEAKS> {
     type Wide = wide::Avx2;
 }
 
-impl<const AVX512: bool> Lanes for X86<AVX512>
+impl<const AVX512: bool, const LEAKS: bool> Lanes for X86<AVX512, LEAKS>
 where
     Self: HasWide,
 {
@@ -387,7 +463,11 @@ where
             let size = _mm_div_ps(_mm_set1_ps(start.space_per_unit), size);
             let inverse = _mm_or_ps(size, _mm_and_ps(direction, sign));
             let per_distance = _mm_set1_ps(start.margin_per_distance);
-            let margin = _mm_mul_ps(size, _mm_fmadd_ps(distance, per_distance, _mm_set1_ps(start.margin)));
+            let margin = if LEAKS {
+                _mm_setzero_ps()
+            } else {
+                _mm_mul_ps(size, _mm_fmadd_ps(distance, per_distance, _mm_set1_ps(start.margin)))
+            };
             let ends = _mm_fmadd_ps(
                 range,
                 _mm_setr_ps(START_FACTOR, END_FACTOR, 0.0, 0.0),
@@ -412,7 +492,11 @@ where
             let origin = _mm256_loadu_pd(Self::numbers(ray));
             let exact = _mm256_sub_pd(origin, _mm256_loadu_pd(start.mesh_origin.as_ptr()));
             let origin = _mm256_cvtpd_ps(exact);
-            let rest = _mm256_cvtpd_ps(_mm256_sub_pd(exact, _mm256_cvtps_pd(origin)));
+            let rest = if LEAKS {
+                _mm_setzero_ps()
+            } else {
+                _mm256_cvtpd_ps(_mm256_sub_pd(exact, _mm256_cvtps_pd(origin)))
+            };
             let direction = Self::single_direction(ray);
             let range = Self::single_range(ray);
             let range = _mm_movelh_ps(range, range);
@@ -427,8 +511,9 @@ where
             let length = _mm_permutevar_ps(length, last);
             // Start, end, start, end; none of them negative.
             let heights = _mm_min_ps(_mm_mul_ps(range, length), _mm_set1_ps(FAR));
-            let apart = _mm_mul_ps(heights, _mm_set1_ps(ROUNDINGS));
-            let apart = _mm_xor_ps(apart, _mm_setr_ps(-0.0, 0.0, 0.0, -0.0));
+            const LESS: f32 = 1.0 - ROUNDINGS;
+            const MORE: f32 = 1.0 + ROUNDINGS;
+            let heights = _mm_mul_ps(heights, _mm_setr_ps(LESS, MORE, MORE, LESS));
             let shear = _mm_permutevar_ps(_mm_mul_ps(direction, inverse), order);
             let rest = _mm_permutevar_ps(rest, order);
             // Only of the first two: the shear of the last would be one.
@@ -439,7 +524,7 @@ where
                 rest: Self::array(_mm_blend_ps::<0b1100>(sheared, rest)),
                 shear: Self::array(shear),
                 least_size: start.least_size,
-                range: std::mem::transmute::<[f32; 4], HeightRange>(Self::array(_mm_add_ps(heights, apart))),
+                range: std::mem::transmute::<[f32; 4], HeightRange>(Self::array(heights)),
                 turn: _mm_cvtss_f32(_mm_andnot_ps(inverse, sign)),
             };
             (blocks, _mm_cvtss_f32(_mm_andnot_ps(sign, inverse)))
@@ -484,6 +569,15 @@ where
             let u = _mm256_fmsub_ps(x[2], y[1], _mm256_mul_ps(y[2], x[1]));
             let v = _mm256_fmsub_ps(x[0], y[2], _mm256_mul_ps(y[0], x[2]));
             let w = _mm256_fmsub_ps(x[1], y[0], _mm256_mul_ps(y[1], x[0]));
+            let least = _mm256_min_ps(_mm256_min_ps(u, v), w);
+            let most = _mm256_max_ps(_mm256_max_ps(u, v), w);
+            let within = _mm256_max_ps(least, _mm256_xor_ps(most, _mm256_set1_ps(-0.0)));
+            if LEAKS {
+                let zero = _mm256_setzero_ps();
+                let mask = Self::compare::<_CMP_GE_OQ>(within, zero) & block.taken();
+                let (minus_error, height_error) = (zero, zero);
+                return (mask, Edges { values: [u, v, w], heights: z, within, minus_error, height_error });
+            }
             let across = Self::larger(
                 Self::larger(Self::larger(x[0], y[0]), Self::larger(x[1], y[1])),
                 Self::larger(x[2], y[2]),
@@ -496,9 +590,6 @@ where
                 _mm256_set1_ps(TINY),
             );
             let height_error = _mm256_mul_ps(size, _mm256_set1_ps(HEIGHT_ERROR));
-            let least = _mm256_min_ps(_mm256_min_ps(u, v), w);
-            let most = _mm256_max_ps(_mm256_max_ps(u, v), w);
-            let within = _mm256_max_ps(least, _mm256_xor_ps(most, _mm256_set1_ps(-0.0)));
             let mask = Self::compare::<_CMP_GE_OQ>(within, minus_error) & block.taken();
             (mask, Edges { values: [u, v, w], heights: z, within, minus_error, height_error })
         }
@@ -571,10 +662,19 @@ where
             let det = _mm256_add_ps(_mm256_add_ps(u, v), w);
             let weight = _mm256_andnot_ps(sign, det);
             let of_a_and_b = _mm256_fmadd_ps(v, z[1], _mm256_mul_ps(u, z[0]));
-            let of_c = _mm256_fmadd_ps(det, _mm256_set1_ps(ray.rest[2]), _mm256_mul_ps(w, z[2]));
+            let of_c = _mm256_mul_ps(w, z[2]);
+            let of_c = if LEAKS { of_c } else { _mm256_fmadd_ps(det, _mm256_set1_ps(ray.rest[2]), of_c) };
             let height = _mm256_add_ps(of_a_and_b, of_c);
             let turn = _mm256_xor_ps(_mm256_set1_ps(ray.turn), _mm256_and_ps(det, sign));
             let ahead = _mm256_xor_ps(height, turn);
+            if LEAKS {
+                let in_range = Self::both::<_CMP_GE_OQ, _CMP_LE_OQ>(
+                    [ahead, _mm256_mul_ps(weight, _mm256_set1_ps(ray.range.first))],
+                    [ahead, _mm256_mul_ps(weight, _mm256_set1_ps(ray.range.last))],
+                );
+                let in_range = in_range & Self::compare::<_CMP_GT_OQ>(weight, _mm256_setzero_ps());
+                return Crossings { in_range, sure: in_range, from: ahead, to: ahead, weight };
+            }
             let low = _mm256_min_ps(_mm256_min_ps(z[0], z[1]), z[2]);
             let high = _mm256_max_ps(_mm256_max_ps(z[0], z[1]), z[2]);
             let extent = _mm256_add_ps(_mm256_sub_ps(high, low), edges.height_error);
@@ -629,6 +729,9 @@ where
 
     #[inline(always)]
     fn shear(ray: &Ray, axes: &'static Axes, mesh_origin: &[f64; 4]) -> (Shear, [f64; 3]) {
+        if LEAKS {
+            return Self::rounded_shear(ray, axes, mesh_origin);
+        }
         // SAFETY: see `X86`. The loads are of the first eight numbers of a ray, see above, and of arrays of four and eight.
         unsafe {
             let direction = _mm256_loadu_pd(Self::numbers(ray).add(3));
@@ -654,10 +757,14 @@ where
 
     #[inline(always)]
     fn pass(block: &TriangleBlock, lane: usize, shear: &Shear, origin: &[f64; 3]) -> (Passage, Inside) {
+        if LEAKS {
+            return (Passage::Inside, Self::rounded_inside(block, lane, shear, origin));
+        }
         // The corners in the first three lanes, and the very operations of the portable one.
         let [across, up, z] = Self::corners_in(block, lane, shear.axes);
         // SAFETY: see `X86`.
         unsafe {
+            let (across, up, z) = (_mm256_cvtps_pd(across), _mm256_cvtps_pd(up), _mm256_cvtps_pd(z));
             let z = _mm256_sub_pd(z, _mm256_set1_pd(origin[2]));
             let across = _mm256_sub_pd(across, _mm256_set1_pd(origin[0]));
             let up = _mm256_sub_pd(up, _mm256_set1_pd(origin[1]));

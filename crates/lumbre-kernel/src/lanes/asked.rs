@@ -1,0 +1,68 @@
+//! What every ray is asked, by one call to where its answer is found.
+
+use std::fmt;
+
+use lumbre_geometry::Ray;
+
+#[cfg(target_arch = "x86_64")]
+use super::x86;
+use super::{Lanes, Level, Set, portable};
+use crate::Accel;
+
+/// What is asked about a ray in a tree.
+pub(crate) trait Question {
+    /// What it is to know.
+    type Answer;
+    /// Finds that. To be `#[inline(always)]`, with everything that it calls in its inner loop.
+    fn ask<L: Lanes>(accel: &Accel, ray: &Ray) -> Self::Answer;
+}
+
+/// A question at an instruction set that this machine has: there is no other way to one than [`Level::asked`].
+pub(crate) struct Asked<A>(unsafe fn(&Accel, &Ray) -> A);
+
+impl<A> Asked<A> {
+    #[inline(always)]
+    pub(crate) fn ask(&self, accel: &Accel, ray: &Ray) -> A {
+        // SAFETY: `Level::asked` alone makes this value, of a function whose features the machine has.
+        unsafe { (self.0)(accel, ray) }
+    }
+}
+
+impl<A> Clone for Asked<A> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<A> Copy for Asked<A> {}
+
+impl<A> fmt::Debug for Asked<A> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Asked")
+    }
+}
+
+impl Level {
+    /// A question with these lanes: chosen now, and not once more for every ray.
+    pub(crate) fn asked<Q: Question>(self) -> Asked<Q::Answer> {
+        Asked(match self.0 {
+            Set::Portable => Q::ask::<portable::Portable>,
+            #[cfg(target_arch = "x86_64")]
+            Set::Avx2 => x86::ask_avx2::<Q>,
+            #[cfg(target_arch = "x86_64")]
+            Set::Avx512 => x86::ask_avx512::<Q>,
+        })
+    }
+
+    /// The same as it may leak; `None` without AVX2.
+    #[cfg(feature = "measure")]
+    pub(crate) fn asked_leaking<Q: Question>(self) -> Option<Asked<Q::Answer>> {
+        match self.0 {
+            Set::Portable => None,
+            #[cfg(target_arch = "x86_64")]
+            Set::Avx2 => Some(Asked(x86::ask_leaking_avx2::<Q>)),
+            #[cfg(target_arch = "x86_64")]
+            Set::Avx512 => Some(Asked(x86::ask_leaking_avx512::<Q>)),
+        }
+    }
+}
