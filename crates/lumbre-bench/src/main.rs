@@ -81,7 +81,7 @@ struct Options {
     #[arg(long)]
     batches: bool,
     /// Peers are Lumbre itself, asked otherwise: by batches, in double precision alone, with options, with masks, but for a
-    /// primitive, with vertices in double precision, and in single precision alone, which leaks. The ratios are what that costs.
+    /// primitive, with a closure, with vertices in double precision, and in single precision alone, which leaks. The ratios are what that costs.
     #[arg(long, conflicts_with = "batches")]
     costs: bool,
     /// Lumbre keeps every sphere as a shape of its own, not in a cloud.

@@ -41,6 +41,8 @@ pub enum Asked {
     WithMasks,
     /// One ray at a time, but for a primitive that is nowhere.
     Excluding,
+    /// One ray at a time, with a closure that takes every hit.
+    Filtered,
     /// One ray at a time, of meshes whose vertices are in double precision, too.
     OfPreciseMeshes,
     /// One ray at a time, in single precision alone, which leaks at edges. These answers may differ.
@@ -49,12 +51,13 @@ pub enum Asked {
 
 impl Asked {
     /// All but the first: what else costs what.
-    pub const OTHERS: [Self; 7] = [
+    pub const OTHERS: [Self; 8] = [
         Self::ByBatches,
         Self::Plainly,
         Self::WithOptions,
         Self::WithMasks,
         Self::Excluding,
+        Self::Filtered,
         Self::OfPreciseMeshes,
         Self::Leaking,
     ];
@@ -67,6 +70,7 @@ impl Asked {
             Self::WithOptions => " options",
             Self::WithMasks => " masks",
             Self::Excluding => " excluding",
+            Self::Filtered => " filtered",
             Self::OfPreciseMeshes => " f64 meshes",
             Self::Leaking => " leaking",
         }
@@ -286,6 +290,9 @@ impl Pass for Closest<'_> {
             Asked::WithOptions => self.each(|ray| accel.closest_with(ray, &QueryOptions::default())),
             Asked::WithMasks => self.each(|ray| accel.closest_with(ray, &masked())),
             Asked::Excluding => self.each(|ray| accel.closest_with(ray, &excluding(nowhere))),
+            Asked::Filtered => {
+                self.each(|ray| accel.closest_filtered(ray, |hit| hit.primitive != nowhere.primitive))
+            }
             _ => self.each(|ray| accel.closest(ray)),
         }
     }
@@ -329,6 +336,9 @@ impl Pass for Any<'_> {
             Asked::WithOptions => self.each(|ray| accel.any_with(ray, &QueryOptions::default())),
             Asked::WithMasks => self.each(|ray| accel.any_with(ray, &masked())),
             Asked::Excluding => self.each(|ray| accel.any_with(ray, &excluding(nowhere))),
+            Asked::Filtered => {
+                self.each(|ray| accel.any_filtered(ray, |hit| hit.primitive != nowhere.primitive))
+            }
             _ => self.each(|ray| accel.any(ray)),
         }
     }

@@ -15,7 +15,7 @@ use crate::holds::{Holds, SingleStart};
 use crate::hulls::Hulls;
 use crate::lanes::Level;
 use crate::node::{Units, tag};
-use crate::query::{All, Any, Batch, Closest, Count, If};
+use crate::query::{All, Any, Batch, Closest, Count, Filter, If};
 use crate::single::{self, Nearest, Outcome, Questions, Whether, Winner};
 use crate::winding::{self, Moments};
 use crate::{
@@ -345,9 +345,26 @@ impl Accel {
 
     /// The nearest hit that `accept` takes; it may be asked in any order of `t`, and its answer must depend on the hit
     /// alone.
-    pub fn closest_filtered(&self, ray: &Ray, accept: impl FnMut(&Hit) -> bool) -> Option<Hit> {
-        let mut search = Closest::new(ray, If::new(accept));
-        traverse::search(self.level, self, ray, &mut search);
+    pub fn closest_filtered(&self, ray: &Ray, mut accept: impl FnMut(&Hit) -> bool) -> Option<Hit> {
+        self.closest_filtered_at(self.level, ray, &mut accept)
+    }
+
+    pub(crate) fn closest_filtered_at(
+        &self,
+        level: Level,
+        ray: &Ray,
+        accept: &mut dyn FnMut(&Hit) -> bool,
+    ) -> Option<Hit> {
+        let mut filter = If::new(accept);
+        if let Some(start) = &self.single {
+            let asking = filter.of_tree(self);
+            match single::search_among::<Nearest, _>(level, self, start, ray, asking) {
+                Outcome::Settled(winner) => return winner.map(|winner| winner.to_hit(self)),
+                Outcome::Unsettled => filter.end_of_single(false),
+            }
+        }
+        let mut search = Closest::new(ray, filter);
+        traverse::search(level, self, ray, &mut search);
         search.take_hit()
     }
 
@@ -377,9 +394,21 @@ impl Accel {
     }
 
     /// Whether anything that `accept` takes is hit in the ray's range.
-    pub fn any_filtered(&self, ray: &Ray, accept: impl FnMut(&Hit) -> bool) -> bool {
-        let mut search = Any::new(ray, If::new(accept));
-        traverse::search(self.level, self, ray, &mut search);
+    pub fn any_filtered(&self, ray: &Ray, mut accept: impl FnMut(&Hit) -> bool) -> bool {
+        self.any_filtered_at(self.level, ray, &mut accept)
+    }
+
+    pub(crate) fn any_filtered_at(&self, level: Level, ray: &Ray, accept: impl FnMut(&Hit) -> bool) -> bool {
+        let mut filter = If::new(accept);
+        if let Some(start) = &self.single {
+            let asking = filter.of_tree(self);
+            match single::search_among::<Whether, _>(level, self, start, ray, asking) {
+                Outcome::Settled(is_hit) => return is_hit,
+                Outcome::Unsettled => filter.end_of_single(false),
+            }
+        }
+        let mut search = Any::new(ray, filter);
+        traverse::search(level, self, ray, &mut search);
         search.is_hit
     }
 

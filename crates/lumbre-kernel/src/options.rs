@@ -4,6 +4,7 @@ use lumbre_geometry::{Ray, Root};
 
 use crate::blocks::BlockNames;
 use crate::query::{All, Filter};
+use crate::single::Winner;
 use crate::spheres::ExactSphere;
 use crate::traverse::{Found, PlacedTree, What};
 use crate::{Accel, GeometryKind, Hit};
@@ -104,24 +105,35 @@ impl Filter for QueryOptions<'_> {
         self.has_mask(accel, geometry)
     }
 
-    type Selection<'a> = Selected<'a>;
+    type Selection<'s>
+        = Selected<'s>
+    where
+        Self: 's;
     #[inline(always)]
-    fn select<'a>(&self, placed: &PlacedTree<'a, '_>) -> Option<Selected<'a>> {
-        Some(self.among(placed.accel, |route| placed.has_route(route)))
+    fn select<'s>(&'s self, placed: &'s PlacedTree<'s, 's>) -> Selected<'s> {
+        self.among(placed.accel, |route| placed.has_route(route))
     }
 }
 
 /// What a search in one tree takes of what stands in that itself: told by names and faces, before anything is known of where it is
-/// met.
+/// met; or by the hit itself.
 pub(crate) trait Selection: Copy {
     /// Whether it takes everything, so that nothing has to be asked.
     const TAKES_ALL: bool;
+    /// Whether it has to be asked about every hit that would be an answer: see [`Selection::accepts`].
+    const ASKS: bool = false;
     /// The faces that it takes.
     fn faces(&self) -> Faces;
     /// Whether it takes a primitive, its faces aside.
     fn takes(&self, geometry: u32, primitive: u32) -> bool;
     /// Of the lanes of a block, those whose triangles it takes, their faces aside.
     fn lanes(&self, names: &BlockNames) -> u32;
+    /// Whether it takes a hit, which is the crossing of this order of its primitive; where it `may_come_again`, the answer is known
+    /// the second time.
+    #[inline(always)]
+    fn accepts(&self, _winner: &Winner, _order: u32, _may_come_again: bool) -> bool {
+        true
+    }
 }
 
 impl Selection for All {

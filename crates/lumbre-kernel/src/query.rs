@@ -1,12 +1,15 @@
 //! The queries as searches: closest, any, every and how many.
 
+use std::cell::RefCell;
 use std::cmp::Ordering;
-use std::collections::{BTreeSet, BinaryHeap};
+use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 
 use lumbre_geometry::{Ray, Root};
+use smallvec::SmallVec;
 
+use crate::blocks::BlockNames;
 use crate::lanes::Lanes;
-use crate::options::Selection;
+use crate::options::{Faces, Selection};
 use crate::single::{self, Nearest, Outcome, Whether, Winner};
 use crate::stack::{AsBuilt, ByDistance};
 use crate::traverse::{Ask, Found, Place, PlacedTree, Search, What};
@@ -47,9 +50,14 @@ pub(crate) trait Filter {
         true
     }
     /// What it takes in one tree.
-    type Selection<'a>: Selection;
-    /// That of a placed tree; `None` where names and faces do not tell it.
-    fn select<'a>(&self, placed: &PlacedTree<'a, '_>) -> Option<Self::Selection<'a>>;
+    type Selection<'s>: Selection
+    where
+        Self: 's;
+    /// That of a placed tree.
+    fn select<'s>(&'s self, placed: &'s PlacedTree<'s, 's>) -> Self::Selection<'s>;
+    /// Learns that a search by such a selection is over, and whether it could tell.
+    #[inline(always)]
+    fn end_of_single(&mut self, _is_settled: bool) {}
 }
 
 /// Takes everything.
@@ -63,35 +71,128 @@ impl Filter for All {
         true
     }
 
-    type Selection<'a> = All;
+    type Selection<'s> = All;
     #[inline(always)]
-    fn select<'a>(&self, _: &PlacedTree<'a, '_>) -> Option<All> {
-        Some(All)
+    fn select<'s>(&'s self, _: &'s PlacedTree<'s, 's>) -> All {
+        All
     }
 }
 
 /// Takes what the closure takes, which is asked once about each crossing.
 pub(crate) struct If<F> {
-    accept: F,
-    asked: MetInParts,
+    // Asked by searches within a search, too, one at a time.
+    asked: RefCell<Answered<F>>,
 }
 
-impl<F> If<F> {
+/// A crossing by route, geometry, primitive, and which of the primitive's crossings it is.
+type CrossingName = (InstancePath, u32, u32, u32);
+
+/// A closure, and what it has answered.
+struct Answered<F> {
+    accept: F,
+    /// Of crossings that may be met again.
+    answers: BTreeMap<CrossingName, bool>,
+    /// Of those that a search in single precision met: where it has to give up, the plain one meets them again.
+    latest: SmallVec<[(CrossingName, bool); 4]>,
+}
+
+impl<F: FnMut(&Hit) -> bool> If<F> {
     pub(crate) fn new(accept: F) -> Self {
-        Self { accept, asked: MetInParts::default() }
+        let answered = Answered { accept, answers: BTreeMap::new(), latest: SmallVec::new() };
+        Self { asked: RefCell::new(answered) }
+    }
+
+    /// What a search of a tree itself takes, in single precision.
+    pub(crate) fn of_tree<'s>(&'s self, accel: &'s Accel) -> Asking<'s, F> {
+        Asking { filter: self, accel, placed: None }
     }
 }
 
 impl<F: FnMut(&Hit) -> bool> Filter for If<F> {
     const TAKES_ALL: bool = false;
     fn takes(&mut self, found: &Found) -> bool {
-        // What was taken is the best so far, or ended the search: it does not come again.
-        self.asked.is_first(found) && (self.accept)(&found.to_hit())
+        let Answered { accept, answers, .. } = self.asked.get_mut();
+        let is_part = match found.what {
+            What::Lane { block, lane } => {
+                found.accel.tree.is_part(found.accel.tree.block(block).number(), lane)
+            }
+            _ => false,
+        };
+        if !is_part && answers.is_empty() {
+            return accept(&found.to_hit());
+        }
+        let (geometry, primitive) = found.what.names(found.accel);
+        let crossing = (found.place.route.clone(), geometry, primitive, found.order);
+        *answers.entry(crossing).or_insert_with(|| accept(&found.to_hit()))
     }
 
-    type Selection<'a> = All;
-    fn select<'a>(&self, _: &PlacedTree<'a, '_>) -> Option<All> {
-        None
+    type Selection<'s>
+        = Asking<'s, F>
+    where
+        F: 's;
+    fn select<'s>(&'s self, placed: &'s PlacedTree<'s, 's>) -> Asking<'s, F> {
+        Asking { filter: self, accel: placed.accel, placed: Some(placed) }
+    }
+
+    fn end_of_single(&mut self, is_settled: bool) {
+        let Answered { answers, latest, .. } = self.asked.get_mut();
+        if is_settled {
+            latest.clear();
+        } else {
+            answers.extend(latest.drain(..));
+        }
+    }
+}
+
+/// What a closure takes of one tree.
+pub(crate) struct Asking<'s, F> {
+    filter: &'s If<F>,
+    accel: &'s Accel,
+    placed: Option<&'s PlacedTree<'s, 's>>,
+}
+
+impl<F> Clone for Asking<'_, F> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<F> Copy for Asking<'_, F> {}
+
+impl<F: FnMut(&Hit) -> bool> Selection for Asking<'_, F> {
+    const TAKES_ALL: bool = false;
+    const ASKS: bool = true;
+
+    #[inline(always)]
+    fn faces(&self) -> Faces {
+        Faces::Both
+    }
+
+    #[inline(always)]
+    fn takes(&self, _: u32, _: u32) -> bool {
+        true
+    }
+
+    #[inline(always)]
+    fn lanes(&self, _: &BlockNames) -> u32 {
+        u32::MAX
+    }
+
+    #[inline(never)]
+    fn accepts(&self, winner: &Winner, order: u32, may_come_again: bool) -> bool {
+        let mut hit = winner.to_hit(self.accel);
+        if let Some(placed) = self.placed {
+            let place = placed.place();
+            (hit.instances, hit.route) = (place.ids, place.route);
+        }
+        let Answered { accept, answers, latest } = &mut *self.filter.asked.borrow_mut();
+        let name = (hit.route.clone(), hit.geometry, hit.primitive, order);
+        if may_come_again {
+            return *answers.entry(name).or_insert_with(|| accept(&hit));
+        }
+        let is_taken = accept(&hit);
+        latest.push((name, is_taken));
+        is_taken
     }
 }
 
@@ -247,8 +348,9 @@ impl<'a, F: Filter> Search<'a> for Closest<'a, F> {
 
     #[inline(always)]
     fn meet_single<L: Lanes>(&mut self, placed: &PlacedTree<'a, '_>, ray: &Ray) -> Outcome<bool> {
-        let Some(selection) = self.filter.select(placed) else { return Outcome::Unsettled };
-        match single::search_placed::<Nearest, L, _>(placed, ray, selection) {
+        let outcome = single::search_placed::<Nearest, L, _>(placed, ray, self.filter.select(placed));
+        self.filter.end_of_single(outcome != Outcome::Unsettled);
+        match outcome {
             Outcome::Unsettled => return Outcome::Unsettled,
             Outcome::Settled(None) => {}
             Outcome::Settled(Some(Winner { root, geometry, primitive })) => {
@@ -321,8 +423,8 @@ impl<'a, F: Filter> Search<'a> for Any<F> {
 
     #[inline(always)]
     fn meet_single<L: Lanes>(&mut self, placed: &PlacedTree<'a, '_>, ray: &Ray) -> Outcome<bool> {
-        let Some(selection) = self.filter.select(placed) else { return Outcome::Unsettled };
-        let outcome = single::search_placed::<Whether, L, _>(placed, ray, selection);
+        let outcome = single::search_placed::<Whether, L, _>(placed, ray, self.filter.select(placed));
+        self.filter.end_of_single(outcome != Outcome::Unsettled);
         self.is_hit |= outcome == Outcome::Settled(true);
         outcome
     }

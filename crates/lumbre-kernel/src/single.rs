@@ -163,6 +163,38 @@ impl<'a> Exact<'a> {
         triangles::intersect(ray, shear, origin, corners)
     }
 
+    /// The crossing of a triangle in the ray's range, if there is one.
+    fn crossing<L: Lanes>(
+        &self,
+        ray: &Ray,
+        axes: &'static Axes,
+        block: u32,
+        lane: u32,
+    ) -> Outcome<Option<Winner>> {
+        let (shear, origin) = L::shear(ray, axes, &self.start.mesh_origin);
+        let corners = self.triangles.block(block);
+        let root = match L::pass(corners, lane as usize, &shear, &origin) {
+            (Passage::Outside, _) => None,
+            (Passage::Inside, inside) => {
+                let t = inside.t(&shear);
+                triangles::is_in_range(ray, t).then(|| inside.root(t))
+            }
+            (Passage::Unclear, _) => match self.meet(ray, block, lane) {
+                Meeting::Miss => None,
+                Meeting::Hit { root, .. } => Some(root),
+                Meeting::Touch { .. } => return Outcome::Unsettled,
+            },
+        };
+        let (geometry, primitive) = self.names_in(corners, lane);
+        Outcome::Settled(root.map(|root| Winner { root, geometry, primitive }))
+    }
+
+    /// Whether a triangle stands in the tree in parts, of which a ray may meet more than one.
+    #[inline(always)]
+    fn is_in_parts(&self, block: u32, lane: u32) -> bool {
+        self.accel.tree.is_part(self.triangles.block(block).number(), lane)
+    }
+
     /// Geometry and primitive of a triangle.
     #[inline(always)]
     pub(crate) fn names(&self, block: u32, lane: u32) -> (u32, u32) {
@@ -378,7 +410,16 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
                     let is_sure = crossings.sure >> lane & 1 != 0;
                     rest &= rest - 1;
                     let (from, to) = crossings.between::<L>(lane as usize);
-                    if is_sure && to < self.best.from {
+                    if S::ASKS {
+                        if from > self.best.to {
+                            continue;
+                        }
+                        match self.ask::<L>(ray, place, lane) {
+                            Outcome::Settled(Some(better)) => self.keep(better, way),
+                            Outcome::Settled(None) => {}
+                            Outcome::Unsettled => return false,
+                        }
+                    } else if is_sure && to < self.best.from {
                         self.keep(Candidate { block: place, lane, from, to }, way);
                     } else if from > self.best.to
                         || self.exact.passes::<L>(ray, self.blocks.axes, block, lane)
@@ -408,6 +449,34 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
         way.end_at(triangles::beyond(better.to * self.place_per_height));
     }
 
+    /// Looks at a triangle that may be met, and asks about it if that is nearer than the best: what is better, if anything.
+    #[inline(always)]
+    fn ask<L: Lanes>(&mut self, ray: &Ray, block: u32, lane: u32) -> Outcome<Option<Candidate>> {
+        let found = match self.exact.crossing::<L>(ray, self.blocks.axes, block, lane) {
+            Outcome::Settled(Some(found)) => found,
+            Outcome::Settled(None) => return Outcome::Settled(None),
+            Outcome::Unsettled => return Outcome::Unsettled,
+        };
+        Outcome::Settled(self.ask_about(ray, found, 0, self.exact.is_in_parts(block, lane)))
+    }
+
+    /// Asks about a crossing in range, if it is nearer than the best, or as near and before it: the new best, if it is.
+    fn ask_about(&mut self, ray: &Ray, found: Winner, order: u32, may_come_again: bool) -> Option<Candidate> {
+        if let Some(best) = self.crossed() {
+            let names = |winner: &Winner| (winner.geometry, winner.primitive);
+            let (t, best_t) = (found.root.t, best.root.t);
+            if !(t < best_t || t == best_t && names(&found) < names(&best)) {
+                return None;
+            }
+        }
+        if !self.selection.accepts(&found, order, may_come_again) {
+            return None;
+        }
+        self.crossed = Some(found);
+        let (from, to) = heights(found.root.t, largest_component(ray));
+        Some(Candidate { block: Candidate::CROSSED, lane: 0, from, to })
+    }
+
     /// Looks closer at a triangle that may be met, and nearer than the best: what is better, if anything.
     #[cold]
     #[inline(never)]
@@ -433,7 +502,7 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
     /// The best, where it is no triangle.
     #[inline(always)]
     fn crossed(&self) -> Option<Winner> {
-        if MIXED && !self.best.is_triangle() { self.crossed } else { None }
+        if (MIXED || S::ASKS) && !self.best.is_triangle() { self.crossed } else { None }
     }
 
     /// Whether a crossing is nearer than the best, or as near and before it.
@@ -451,6 +520,18 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
     fn meet_entry_closest<L: Lanes>(&mut self, entry: &Entry, ray: &Ray, way: &mut Way<L>) -> bool {
         let (geometry, primitive) = (entry.geometry, entry.primitive());
         if !self.selection.takes(geometry, primitive) {
+            return true;
+        }
+        if S::ASKS {
+            let kind = &self.exact.accel.geometries[geometry as usize].kind;
+            for (order, root) in traverse::all_crossings(kind, primitive, ray).into_iter().enumerate() {
+                let found = Winner { root, geometry, primitive };
+                if ray.contains(root.t)
+                    && let Some(better) = self.ask_about(ray, found, order as u32, false)
+                {
+                    self.keep(better, way);
+                }
+            }
             return true;
         }
         if self.selection.faces() != Faces::Both {
@@ -475,7 +556,10 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
         let kind = &self.exact.accel.geometries[geometry as usize].kind;
         let mut roots = traverse::all_crossings(kind, primitive, ray);
         roots.retain(|root| {
-            ray.contains(root.t) && faces.have(options::meets_front(self.exact.accel, ray, what, root))
+            let is_there = ray.contains(root.t);
+            is_there
+                && (faces == Faces::Both
+                    || faces.have(options::meets_front(self.exact.accel, ray, what, root)))
         });
         roots
     }
@@ -517,6 +601,14 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
         if !self.selection.takes(geometry, primitive) {
             return false;
         }
+        if S::ASKS {
+            let kind = &self.exact.accel.geometries[geometry as usize].kind;
+            let roots = traverse::all_crossings(kind, primitive, ray);
+            return roots.into_iter().enumerate().any(|(order, root)| {
+                ray.contains(root.t)
+                    && self.selection.accepts(&Winner { root, geometry, primitive }, order as u32, false)
+            });
+        }
         if self.selection.faces() != Faces::Both {
             return !self.crossings_of_faces(geometry, primitive, ray).is_empty();
         }
@@ -534,13 +626,25 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
             if mask != 0 {
                 let crossings = L::place_crossings(&edges, &self.blocks);
                 let mask = self.select::<L>(block, mask, &edges, &crossings);
-                if mask & crossings.sure != 0 {
+                if !S::ASKS && mask & crossings.sure != 0 {
                     return Outcome::Settled(true);
                 }
                 let mut rest = mask & crossings.in_range;
                 while rest != 0 {
                     let lane = rest.trailing_zeros();
                     rest &= rest - 1;
+                    if S::ASKS {
+                        match self.exact.crossing::<L>(ray, self.blocks.axes, place, lane) {
+                            Outcome::Settled(Some(found)) => {
+                                if self.selection.accepts(&found, 0, self.exact.is_in_parts(place, lane)) {
+                                    return Outcome::Settled(true);
+                                }
+                            }
+                            Outcome::Settled(None) => {}
+                            Outcome::Unsettled => return Outcome::Unsettled,
+                        }
+                        continue;
+                    }
                     if self.exact.passes::<L>(ray, self.blocks.axes, block, lane) {
                         continue;
                     }

@@ -38,9 +38,37 @@ pub(crate) fn check(accel: &Accel, ray: &Ray) -> usize {
 
     let accept = |hit: &Hit| !(hit.id / 7 + hit.primitive + hit.instances.len() as u32).is_multiple_of(3);
     let filtered = expected.iter().find(|hit| accept(hit)).cloned();
-    assert_eq!(accel.closest_filtered(ray, accept), filtered, "{ray:?}");
-    assert_eq!(accel.any_filtered(ray, accept), filtered.is_some(), "{ray:?}");
+    for level in Level::all() {
+        let mut asked = Vec::new();
+        let mut ask = |hit: &Hit| {
+            asked.push(hit.clone());
+            accept(hit)
+        };
+        let found = accel.closest_filtered_at(level, ray, &mut ask);
+        assert_eq!(found, filtered, "{level:?} {ray:?}");
+        assert_eq!(t_bits(&found), t_bits(&filtered), "{level:?} {ray:?}");
+        assert_asked_once(&asked, &expected);
+        asked.clear();
+        let mut ask = |hit: &Hit| {
+            asked.push(hit.clone());
+            accept(hit)
+        };
+        assert_eq!(accel.any_filtered_at(level, ray, &mut ask), filtered.is_some(), "{level:?} {ray:?}");
+        assert_asked_once(&asked, &expected);
+    }
     expected.len()
+}
+
+fn t_bits(hit: &Option<Hit>) -> Option<u64> {
+    hit.as_ref().map(|hit| hit.root.t.to_bits())
+}
+
+/// A filter is asked about hits alone, and about each no more than once.
+fn assert_asked_once(asked: &[Hit], every: &[Hit]) {
+    for hit in asked.iter().take(50) {
+        let times = |hits: &[Hit]| hits.iter().filter(|other| *other == hit).count();
+        assert!((1..=times(every)).contains(&times(asked)), "{hit:?}");
+    }
 }
 
 pub(crate) fn check_many(accel: &Accel, random: &mut Random, center: DVec3, extent: f64, rays: usize) {

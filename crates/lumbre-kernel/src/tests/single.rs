@@ -3,14 +3,16 @@
 use std::sync::Arc;
 
 use lumbre_geometry::{PlacedShape, Plane, Ray};
-use lumbre_math::{DVec3, Transform};
+use lumbre_math::{DVec3, Transform, Vec3};
 
 use super::scenes::{self, Random};
 use crate::lanes::Level;
 use crate::packet::{self, PACKET};
+use crate::query::If;
 use crate::single::{self, Nearest, Outcome, Whether};
 use crate::{
-    Accel, BuildOptions, Faces, Geometry, GeometryKind, Hit, Preset, QueryOptions, TriangleMesh, batch,
+    Accel, BuildOptions, Faces, Geometry, GeometryKind, Hit, Instance, Preset, QueryOptions, TriangleMesh,
+    batch, brute,
 };
 
 /// A grid of hills, with a sheet twice in the same place, needles and some triangles seen on edge.
@@ -424,4 +426,87 @@ fn culling_at_edges_and_corners_keeps_its_bits() {
         }
         assert!(fronts > 50 && backs > 50 && unsettled > 50, "{fronts} {backs} {unsettled}");
     }
+}
+
+#[test]
+fn a_filter_is_asked_once_where_single_precision_gives_up() {
+    // Two squares that the ray meets within, and behind them one whose diagonal it meets exactly.
+    let square = |x: f32, z: f32| {
+        let corner = |dx: f32, dy: f32| Vec3::new(x + dx, dy, z);
+        let positions = vec![corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0)];
+        let mesh = TriangleMesh { origin: DVec3::ZERO, positions, indices: vec![[0, 1, 2], [0, 2, 3]] };
+        GeometryKind::Mesh(Arc::new(mesh))
+    };
+    let kinds = vec![square(0.0, 3.0), square(0.0, 2.0), square(0.25, 1.0)];
+    let ray = Ray::new(DVec3::new(0.75, 0.5, 8.0), -DVec3::Z);
+    let single = scenes::build(kinds.clone());
+    let start = single.single.as_ref().expect("nothing but triangles");
+    let inside = Arc::new(scenes::build(kinds));
+    let placed = scenes::build(vec![GeometryKind::Instance(Instance {
+        accel: inside,
+        world_from_object: Transform::IDENTITY.into(),
+    })]);
+    for level in Level::all() {
+        let mut deny = |_: &Hit| false;
+        let filter = If::new(&mut deny);
+        let outcome =
+            single::search_among::<Nearest, _>(level, &single, start, &ray, filter.of_tree(&single));
+        assert_eq!(outcome, Outcome::Unsettled, "{level:?}: else this tests nothing");
+        for accel in [&single, &placed] {
+            for wanted in 1..=4 {
+                let expected = brute::every(accel, &ray);
+                assert_eq!(expected.len(), 3);
+                let mut asked = Vec::new();
+                let mut accept = |hit: &Hit| {
+                    asked.push(hit.root.t);
+                    hit.root.t == 4.0 + f64::from(wanted)
+                };
+                let found = accel.closest_filtered_at(level, &ray, &mut accept);
+                assert_eq!(found, expected.get(wanted as usize - 1).cloned(), "{level:?}");
+                asked.clear();
+                let mut accept = |hit: &Hit| {
+                    asked.push(hit.root.t);
+                    hit.root.t == 4.0 + f64::from(wanted)
+                };
+                assert_eq!(accel.any_filtered_at(level, &ray, &mut accept), wanted <= 3);
+                asked.sort_by(f64::total_cmp);
+                let times = asked.len();
+                asked.dedup();
+                assert_eq!(asked.len(), times, "{level:?}: asked twice");
+            }
+        }
+    }
+}
+
+/// What is measured beside the rest is what it says: it meets the same triangles away from their edges, at rounded places.
+#[cfg(feature = "measure")]
+#[test]
+fn what_leaks_meets_nearly_the_same() {
+    let mut random = Random(93);
+    let mesh = Arc::new(mesh(&mut random, DVec3::ZERO, 1.0));
+    let list = || vec![Geometry { id: 1, kind: GeometryKind::Mesh(Arc::clone(&mesh)) }];
+    let exact = Accel::build(list(), &BuildOptions::default()).unwrap();
+    let mut leaking = Accel::build(list(), &BuildOptions::default()).unwrap();
+    if !leaking.leak() {
+        assert_eq!(Level::all().len(), 1, "wherever there are vectors");
+        return;
+    }
+    let (mut hits, mut rounded, mut others) = (0, 0, 0);
+    for _ in 0..20_000 {
+        let ray = Ray::new(2.0 * random.vector(), random.vector());
+        match (exact.closest(&ray), leaking.closest(&ray)) {
+            (Some(hit), Some(other)) if hit.primitive == other.primitive => {
+                assert!((hit.root.t - other.root.t).abs() <= 1e-4 * (1.0 + hit.root.t), "{ray:?}");
+                hits += 1;
+                rounded += u32::from(hit.root.t != other.root.t);
+            }
+            (None, None) => {}
+            _ => others += 1,
+        }
+        others += u32::from(exact.any(&ray) != leaking.any(&ray));
+    }
+    assert!(
+        hits > 2000 && rounded > hits / 2 && others < 40,
+        "{hits} hits, {rounded} rounded, {others} others"
+    );
 }
