@@ -398,7 +398,12 @@ impl Accel {
         self.any_filtered_at(self.level, ray, &mut accept)
     }
 
-    pub(crate) fn any_filtered_at(&self, level: Level, ray: &Ray, accept: impl FnMut(&Hit) -> bool) -> bool {
+    pub(crate) fn any_filtered_at(
+        &self,
+        level: Level,
+        ray: &Ray,
+        accept: &mut dyn FnMut(&Hit) -> bool,
+    ) -> bool {
         let mut filter = If::new(accept);
         if let Some(start) = &self.single {
             let asking = filter.of_tree(self);

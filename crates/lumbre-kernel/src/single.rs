@@ -164,6 +164,7 @@ impl<'a> Exact<'a> {
     }
 
     /// The crossing of a triangle in the ray's range, if there is one.
+    #[inline(always)]
     fn crossing<L: Lanes>(
         &self,
         ray: &Ray,
@@ -177,7 +178,7 @@ impl<'a> Exact<'a> {
             (Passage::Outside, _) => None,
             (Passage::Inside, inside) => {
                 let t = inside.t(&shear);
-                triangles::is_in_range(ray, t).then(|| inside.root(t))
+                if triangles::is_in_range(ray, t) { Some(inside.root(t)) } else { None }
             }
             (Passage::Unclear, _) => match self.meet(ray, block, lane) {
                 Meeting::Miss => None,
