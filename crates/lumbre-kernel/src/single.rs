@@ -557,10 +557,7 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
         let kind = &self.exact.accel.geometries[geometry as usize].kind;
         let mut roots = traverse::all_crossings(kind, primitive, ray);
         roots.retain(|root| {
-            let is_there = ray.contains(root.t);
-            is_there
-                && (faces == Faces::Both
-                    || faces.have(options::meets_front(self.exact.accel, ray, what, root)))
+            ray.contains(root.t) && faces.have(options::meets_front(self.exact.accel, ray, what, root))
         });
         roots
     }
