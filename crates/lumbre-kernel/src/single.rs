@@ -286,7 +286,7 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
         slabs: &Slabs,
         selection: S,
     ) -> Self {
-        let (blocks, place_per_height) = L::start_blocks(start, lanes::opaque(ray), slabs);
+        let (blocks, place_per_height) = L::start_blocks(start, ray, slabs);
         let exact = Exact::new(accel, start);
         let best = Candidate::NONE;
         Self { exact, blocks, hulls: None, place_per_height, best, crossed: None, selection }
