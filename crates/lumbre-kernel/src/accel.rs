@@ -247,6 +247,7 @@ impl Accel {
     }
 
     /// [`Accel::closest`] among what the options leave. Of the crossings of a shape, each is asked by itself.
+    #[inline]
     pub fn closest_with(&self, ray: &Ray, options: &QueryOptions) -> Option<Hit> {
         if options.take_all(self) {
             self.closest(ray)
@@ -279,6 +280,7 @@ impl Accel {
     }
 
     /// [`Accel::any`] among what the options leave.
+    #[inline]
     pub fn any_with(&self, ray: &Ray, options: &QueryOptions) -> bool {
         if options.take_all(self) { self.any(ray) } else { self.any_with_at(self.level, ray, options) }
     }

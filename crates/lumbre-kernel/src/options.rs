@@ -115,7 +115,7 @@ impl Filter for QueryOptions<'_> {
     }
 }
 
-/// What a search in one tree takes of what stands in that itself: told by names and faces, before anything is known of where it is
+/// What a search in one tree takes of what stands in that itself, by default everything: told by names and faces, before anything is known of where it is
 /// met; or by the hit itself.
 pub(crate) trait Selection: Copy {
     /// Whether it takes everything, so that nothing has to be asked.
@@ -123,11 +123,20 @@ pub(crate) trait Selection: Copy {
     /// Whether it has to be asked about every hit that would be an answer: see [`Selection::accepts`].
     const ASKS: bool = false;
     /// The faces that it takes.
-    fn faces(&self) -> Faces;
+    #[inline(always)]
+    fn faces(&self) -> Faces {
+        Faces::Both
+    }
     /// Whether it takes a primitive, its faces aside.
-    fn takes(&self, geometry: u32, primitive: u32) -> bool;
+    #[inline(always)]
+    fn takes(&self, _geometry: u32, _primitive: u32) -> bool {
+        true
+    }
     /// Of the lanes of a block, those whose triangles it takes, their faces aside.
-    fn lanes(&self, names: &BlockNames) -> u32;
+    #[inline(always)]
+    fn lanes(&self, _names: &BlockNames) -> u32 {
+        u32::MAX
+    }
     /// Whether it takes a hit, which is the crossing of this order of its primitive; where it `may_come_again`, the answer is known
     /// the second time.
     #[inline(always)]
@@ -138,21 +147,6 @@ pub(crate) trait Selection: Copy {
 
 impl Selection for All {
     const TAKES_ALL: bool = true;
-
-    #[inline(always)]
-    fn faces(&self) -> Faces {
-        Faces::Both
-    }
-
-    #[inline(always)]
-    fn takes(&self, _: u32, _: u32) -> bool {
-        true
-    }
-
-    #[inline(always)]
-    fn lanes(&self, _: &BlockNames) -> u32 {
-        u32::MAX
-    }
 }
 
 /// What [`QueryOptions`] leave of one tree.

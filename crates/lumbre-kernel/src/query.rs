@@ -7,9 +7,8 @@ use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 use lumbre_geometry::{Ray, Root};
 use smallvec::SmallVec;
 
-use crate::blocks::BlockNames;
 use crate::lanes::Lanes;
-use crate::options::{Faces, Selection};
+use crate::options::Selection;
 use crate::single::{self, Nearest, Outcome, Whether, Winner};
 use crate::stack::{AsBuilt, ByDistance};
 use crate::traverse::{Ask, Found, Place, PlacedTree, Search, What};
@@ -162,21 +161,6 @@ impl<F> Copy for Asking<'_, F> {}
 impl<F: FnMut(&Hit) -> bool> Selection for Asking<'_, F> {
     const TAKES_ALL: bool = false;
     const ASKS: bool = true;
-
-    #[inline(always)]
-    fn faces(&self) -> Faces {
-        Faces::Both
-    }
-
-    #[inline(always)]
-    fn takes(&self, _: u32, _: u32) -> bool {
-        true
-    }
-
-    #[inline(always)]
-    fn lanes(&self, _: &BlockNames) -> u32 {
-        u32::MAX
-    }
 
     #[inline(never)]
     fn accepts(&self, winner: &Winner, order: u32, may_come_again: bool) -> bool {
