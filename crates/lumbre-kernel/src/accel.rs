@@ -345,8 +345,8 @@ impl Accel {
         batch::search_all::<Whether>(level, self, rays, Answers { accel: self, level, rays, places: hits });
     }
 
-    /// The nearest hit that `accept` takes; it may be asked in any order of `t`, and its answer must depend on the hit
-    /// alone.
+    /// The nearest hit that `accept` takes; it may be asked in any order of `t`, but about no crossing twice, and its answer must
+    /// depend on the hit alone.
     pub fn closest_filtered(&self, ray: &Ray, mut accept: impl FnMut(&Hit) -> bool) -> Option<Hit> {
         self.closest_filtered_at(self.level, ray, &mut accept)
     }
@@ -395,7 +395,7 @@ impl Accel {
         self.any_plainly_at(self.level, ray)
     }
 
-    /// Whether anything that `accept` takes is hit in the ray's range.
+    /// Whether anything that `accept` takes, asked as by [`Accel::closest_filtered`], is hit in the ray's range.
     pub fn any_filtered(&self, ray: &Ray, mut accept: impl FnMut(&Hit) -> bool) -> bool {
         self.any_filtered_at(self.level, ray, &mut accept)
     }

@@ -17,13 +17,13 @@ pub(crate) trait Question {
     fn ask<L: Lanes>(accel: &Accel, ray: &Ray) -> Self::Answer;
 }
 
-/// A question at an instruction set that this machine has: there is no other way to one than [`Level::asked`].
+/// A question at an instruction set that this machine has: there is no other way to one than by a [`Level`].
 pub(crate) struct Asked<A>(unsafe fn(&Accel, &Ray) -> A);
 
 impl<A> Asked<A> {
     #[inline(always)]
     pub(crate) fn ask(&self, accel: &Accel, ray: &Ray) -> A {
-        // SAFETY: `Level::asked` alone makes this value, of a function whose features the machine has.
+        // SAFETY: only a `Level` makes this value, of a function whose features the machine has.
         unsafe { (self.0)(accel, ray) }
     }
 }
