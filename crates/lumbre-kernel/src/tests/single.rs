@@ -463,19 +463,24 @@ fn a_filter_is_asked_once_where_single_precision_gives_up() {
                 };
                 let found = accel.closest_filtered_at(level, &ray, &mut accept);
                 assert_eq!(found, expected.get(wanted as usize - 1).cloned(), "{level:?}");
+                assert_no_two_alike(&mut asked);
                 asked.clear();
                 let mut accept = |hit: &Hit| {
                     asked.push(hit.root.t);
                     hit.root.t == 4.0 + f64::from(wanted)
                 };
                 assert_eq!(accel.any_filtered_at(level, &ray, &mut accept), wanted <= 3);
-                asked.sort_by(f64::total_cmp);
-                let times = asked.len();
-                asked.dedup();
-                assert_eq!(asked.len(), times, "{level:?}: asked twice");
+                assert_no_two_alike(&mut asked);
             }
         }
     }
+}
+
+fn assert_no_two_alike(asked: &mut Vec<f64>) {
+    asked.sort_by(f64::total_cmp);
+    let times = asked.len();
+    asked.dedup();
+    assert_eq!(asked.len(), times, "asked twice: {asked:?}");
 }
 
 /// What is measured beside the rest is what it says: it meets the same triangles away from their edges, at rounded places.
