@@ -1,6 +1,6 @@
 //! Many rays at once.
 //!
-//! Those that are alike go together: see [`packet`]. The others are in flight, some on a thread, so that one's arithmetic fills the
+//! Those that are alike go together: see [`packet`](crate::packet). The others are in flight, some on a thread, so that one's arithmetic fills the
 //! waits of another: which boxes each of them meets is told for all before any of them turns by it. Each ray takes the very
 //! steps that it takes alone, in turn with the others: its answer has the same bits.
 
@@ -13,7 +13,7 @@ use crate::blocks::{TriangleBlock, Unit};
 use crate::holds::SingleStart;
 use crate::lanes::{self, Lanes, Level, Task};
 use crate::node::{Node, tag};
-use crate::packet::{self, PACKET, Together};
+use crate::packet::{PACKET, Packet, Together};
 use crate::query::All;
 use crate::single::{Alone, Goal, Outcome, SingleRay, Step};
 use crate::stack::{Order, Stack};
@@ -115,6 +115,7 @@ impl<G: Goal, E: Ends<G::Answer>, const N: usize, const IS_FAR: bool> Task
         let Self { accel, start, rays, mut ends, has_packets, .. } = self;
         let mut flights: Vec<Flight<G, L>> = Vec::with_capacity(N);
         let mut others = Vec::with_capacity(rays.len().min(AT_ONCE));
+        let mut packet = Packet::new(accel, start);
         // After a packet that did not pay, some rays go otherwise before the next is tried, and ever more while none does.
         let (mut without, mut patience) = (0, 1);
         for (number, rays) in rays.chunks(AT_ONCE).enumerate() {
@@ -122,8 +123,8 @@ impl<G: Goal, E: Ends<G::Answer>, const N: usize, const IS_FAR: bool> Task
                 let first = number * AT_ONCE + place * PACKET;
                 if without > 0 {
                     without -= 1;
-                } else if has_packets && let Ok(packet) = <&[Ray; PACKET]>::try_from(chunk) {
-                    let together = packet::search::<G, L>(accel, start, packet, first, &mut ends);
+                } else if has_packets && let Ok(alike) = <&[Ray; PACKET]>::try_from(chunk) {
+                    let together = packet.search::<G, L>(alike, first, &mut ends);
                     if together == Together::Well {
                         patience = 1;
                     } else {

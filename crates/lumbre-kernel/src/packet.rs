@@ -8,11 +8,12 @@
 //! # Why the frustum loses no box
 //!
 //! On each axis the directions have one sign. A single ray meets a plane p at `p r + c`, with a margin in c; see `node`. Here it
-//! is `(p - q) r + (q r + c)`, where q is a place among the starts, which are all within a quarter of it. That is another order
+//! is `(p - q) r + (q - o) r`, where q is a place among the starts o, which are all within an eighth of it. That is another order
 //! of the same operations, with one more subtraction and one more sum: together wrong by less than 4u|r| (1.3 + |q|), where a
-//! ray's margin is at least 8u|r| (1.01 + |o|). Twice that margin is added. The frustum takes the least of `(p - q) r` and of
-//! the offsets over all rays, as they are computed; rounding keeps their order, so that it is no later than any ray with its
-//! margin, and likewise no earlier where it leaves.
+//! ray's margin is at least 8u|r| (1.01 + |o|). Twice that margin is added. The frustum takes the least of `(p - q) r` over all
+//! rays, as it is computed, and from it the largest |r| times the largest |q - o| and thrice the largest margin by |r|: with three
+//! roundings of something below |r|/2, which that sum of margins has room for. So it is no later than any ray with its margin, and likewise no
+//! earlier where it leaves.
 //!
 //! # Why none of its rays loses a triangle
 //!
@@ -41,10 +42,10 @@ use crate::way::limit_of;
 /// Rays in a packet.
 pub(crate) const PACKET: usize = WIDE;
 
-/// How far apart on an axis rays may start, in tree units.
-const MOST_DISTANCE: f32 = 0.25;
-/// How far apart their directions may be, by the largest component.
-const MOST_SPREAD: f32 = 0.25;
+/// How far from their middle rays may start on an axis, in tree units.
+const MOST_DISTANCE: f32 = 0.125;
+/// How far from their middle directions may be, by the largest component.
+const MOST_SPREAD: f32 = 0.125;
 /// How much they may do before they go alone: where boxes and triangles are small beside the distances between the rays, that is
 /// faster. In nodes met; a block of triangles is as much as two, and so is a triangle.
 const MOST_WORK: u32 = 80;
@@ -58,8 +59,8 @@ pub(crate) struct Frustum {
     pub(crate) center: [f32; 3],
     pub(crate) least_inverse: [f32; 3],
     pub(crate) most_inverse: [f32; 3],
-    pub(crate) near_offset: [f32; 3],
-    pub(crate) far_offset: [f32; 3],
+    /// What is taken from where they enter, and added to where they leave.
+    pub(crate) width: [f32; 3],
     pub(crate) s_min: f32,
     pub(crate) s_max: f32,
     pub(crate) sides: &'static Sides,
@@ -68,16 +69,6 @@ pub(crate) struct Frustum {
 #[inline(always)]
 fn greater(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
-}
-
-/// From a place, in other units.
-#[inline(always)]
-fn from_place(origins: &Row<f64>, place: f64, scale: f64) -> Row<f64> {
-    let mut from = Row::of(0.0);
-    for i in 0..PACKET {
-        from.0[i] = (origins.0[i] - place) * scale;
-    }
-    from
 }
 
 /// The rays among triangles: each as a [`BlockRay`](crate::triangles::BlockRay), and what holds them all.
@@ -103,148 +94,6 @@ struct Bundle {
 /// A mask of all the rays.
 const ALL: u32 = (1 << PACKET) - 1;
 
-/// Starts with rays; `None` where one is not from nearby or not sound, or where they are not alike.
-#[inline(always)]
-fn start<W: Wide>(start: &SingleStart, columns: &[Row<f64>; 8]) -> Option<(Frustum, Bundle, Row<f32>)> {
-    let zero = W::splat(0.0);
-    let (mut direction, mut length) = ([zero; 3], [zero; 3]);
-    let mut signs = 0;
-    let mut fits = ALL;
-    let mut is_long = 0;
-    for axis in 0..3 {
-        direction[axis] = W::rounded(&columns[3 + axis]);
-        length[axis] = direction[axis].abs();
-        let negative = W::splat(1.0).turned_by(direction[axis]).below(zero);
-        if negative != 0 && negative != ALL {
-            return None;
-        }
-        signs |= (negative & 1) << axis;
-        fits &= length[axis].at_most(W::splat(start.longest));
-        is_long |= W::splat(start.shortest).at_most(length[axis]);
-    }
-    let sizes = [length[1].at_most(length[0]), length[2].at_most(length[1]), length[2].at_most(length[0])];
-    // Which axis is the last: of the others, either may be larger.
-    let x_is_last = sizes[0] & sizes[2];
-    let y_is_last = sizes[1] & !x_is_last;
-    let bits = if x_is_last == ALL {
-        0b101
-    } else if y_is_last == ALL {
-        0b010
-    } else if x_is_last | y_is_last == 0 {
-        0
-    } else {
-        return None;
-    };
-    let axes = Axes::by_bits(signs, bits);
-    let (t_min, t_max) = (W::rounded(&columns[6]), W::rounded(&columns[7]));
-    fits &= zero.at_most(t_min) & t_min.at_most(t_max);
-
-    let sides = Sides::new(signs);
-    let none = [0.0; 3];
-    let mut frustum = Frustum {
-        center: none,
-        least_inverse: none,
-        most_inverse: none,
-        near_offset: none,
-        far_offset: none,
-        s_min: (t_min * W::splat(START_FACTOR)).least(),
-        s_max: 0.0,
-        sides,
-    };
-    let mut inverses = [zero; 3];
-    for axis in 0..3 {
-        let from = W::rounded(&from_place(&columns[axis], start.tree_origin[axis], start.scale));
-        let distance = from.abs();
-        fits &= distance.at_most(W::splat(start.farthest[axis]));
-        let size = W::splat(start.space_per_unit).over(length[axis].max(W::splat(start.tiny)));
-        let margin = size * distance.times_plus(W::splat(start.margin_per_distance), W::splat(start.margin));
-        let inverse = size.turned_by(direction[axis]);
-        inverses[axis] = inverse;
-        let (low, high) = (from.least(), from.most());
-        // A NaN is not.
-        let are_near = high - low <= MOST_DISTANCE;
-        if !are_near {
-            return None;
-        }
-        let center = 0.5 * (low + high);
-        let shift = W::splat(center) * inverse;
-        let twice = margin + margin;
-        let near = shift + from.times_from(inverse, zero - margin) - twice;
-        let far = shift + from.times_from(inverse, margin) + twice;
-        frustum.center[axis] = center;
-        frustum.least_inverse[axis] = inverse.least();
-        frustum.most_inverse[axis] = inverse.most();
-        frustum.near_offset[axis] = near.least();
-        frustum.far_offset[axis] = far.most();
-    }
-    if fits != ALL || is_long != ALL {
-        return None;
-    }
-
-    let order = axes.order();
-    let inverse = inverses[order[2]] * W::splat(start.units_per_space);
-    let mut bundle = Bundle {
-        axes,
-        origin: [Row::of(0.0); 3],
-        rest: [Row::of(0.0); 3],
-        shear: [Row::of(0.0); 2],
-        first: Row::of(0.0),
-        last: Row::of(0.0),
-        surely_first: Row::of(0.0),
-        surely_last: Row::of(0.0),
-        place_per_height: Row::of(0.0),
-        turn: if signs >> order[2] & 1 != 0 { 0.0 } else { -0.0 },
-        least_size: start.least_size,
-        middle: none,
-        middle_shear: [0.0; 2],
-        apart: none,
-        spread: [0.0; 2],
-    };
-    inverse.abs().store(&mut bundle.place_per_height);
-    let mut rests = [zero; 3];
-    for (place, &axis) in order.iter().enumerate() {
-        let mut exact = from_place(&columns[axis], start.mesh_origin[axis], 1.0);
-        let origin = W::rounded(&exact);
-        origin.store(&mut bundle.origin[place]);
-        for i in 0..PACKET {
-            exact.0[i] -= f64::from(bundle.origin[place].0[i]);
-        }
-        rests[place] = W::rounded(&exact);
-        bundle.middle[place] = 0.5 * (origin.least() + origin.most());
-    }
-    rests[2].store(&mut bundle.rest[2]);
-    let off_z = W::load(&bundle.origin[2].0) - W::splat(bundle.middle[2]);
-    bundle.apart[2] = off_z.abs().most();
-    for place in 0..2 {
-        let shear = direction[order[place]] * inverse;
-        let rest = rests[2].times_from(shear, rests[place]);
-        let (low, high) = (shear.least(), shear.most());
-        let are_alike = high - low <= MOST_SPREAD;
-        if !are_alike {
-            return None;
-        }
-        let middle = 0.5 * (low + high);
-        bundle.middle_shear[place] = middle;
-        bundle.spread[place] = ((shear - W::splat(middle)).abs()).most();
-        let off = W::load(&bundle.origin[place].0) - W::splat(bundle.middle[place]) + rest;
-        bundle.apart[place] = (off_z.times_from(shear, off).abs()).most();
-        shear.store(&mut bundle.shear[place]);
-        rest.store(&mut bundle.rest[place]);
-    }
-    let (far, roundings) = (W::splat(FAR), W::splat(ROUNDINGS));
-    let heights = [(t_min * length[order[2]]).min(far), (t_max * length[order[2]]).min(far)];
-    let errors = [heights[0] * roundings, heights[1] * roundings];
-    (heights[0] - errors[0]).store(&mut bundle.first);
-    (heights[0] + errors[0]).store(&mut bundle.surely_first);
-    (heights[1] - errors[1]).store(&mut bundle.surely_last);
-    (heights[1] + errors[1]).store(&mut bundle.last);
-    let s_max = t_max.times_plus(W::splat(END_FACTOR), W::splat(LITTLE as f32));
-    frustum.s_max = s_max.most();
-    let mut row = Row::of(0.0);
-    s_max.store(&mut row);
-    Some((frustum, bundle, row))
-}
-
 /// What is known of the triangles of a block for all the rays: which may be met, and the errors to reckon with.
 struct Bounds {
     mask: u32,
@@ -253,13 +102,12 @@ struct Bounds {
     extent: Row<f32>,
 }
 
-/// Rays under way together.
-pub(crate) struct Packet<'a, 'r> {
+/// Rays under way together, and then others.
+pub(crate) struct Packet<'a> {
     exact: Exact<'a>,
     triangles: Blocks<'a>,
-    rays: &'r [Ray; PACKET],
-    /// The same, number by number.
-    columns: &'r [Row<f64>; 8],
+    /// The rays, number by number.
+    columns: [Row<f64>; 8],
     frustum: Frustum,
     bundle: Bundle,
     /// Where each need no longer meet boxes.
@@ -276,7 +124,190 @@ pub(crate) struct Packet<'a, 'r> {
     work: u32,
 }
 
-impl Packet<'_, '_> {
+/// No triangle.
+const NONE: u32 = u32::MAX;
+
+impl<'a> Packet<'a> {
+    /// Through a tree of triangles, without rays yet.
+    #[inline(always)]
+    pub(crate) fn new(accel: &'a Accel, single: &'a SingleStart) -> Self {
+        let (none, row) = ([0.0; 3], Row::of(0.0));
+        let frustum = Frustum {
+            center: none,
+            least_inverse: none,
+            most_inverse: none,
+            width: none,
+            s_min: 0.0,
+            s_max: 0.0,
+            sides: Sides::new(0),
+        };
+        let bundle = Bundle {
+            axes: Axes::by_bits(0, 0),
+            origin: [row; 3],
+            rest: [row; 3],
+            shear: [row; 2],
+            first: row,
+            last: row,
+            surely_first: row,
+            surely_last: row,
+            place_per_height: row,
+            turn: 0.0,
+            least_size: single.least_size,
+            middle: none,
+            middle_shear: [0.0; 2],
+            apart: none,
+            spread: [0.0; 2],
+        };
+        Self {
+            exact: Exact::new(accel, single),
+            triangles: accel.tree.blocks(),
+            columns: [Row::of(0.0); 8],
+            frustum,
+            bundle,
+            s_max: row,
+            from: row,
+            to: row,
+            triangle: row,
+            alive: 0,
+            met: 0,
+            unsettled: 0,
+            work: 0,
+        }
+    }
+
+    /// Searches along rays together, the first of which has this position.
+    #[inline(always)]
+    pub(crate) fn search<G: Goal, L: Lanes>(
+        &mut self,
+        rays: &[Ray; PACKET],
+        first: usize,
+        ends: &mut impl Ends<G::Answer>,
+    ) -> Together {
+        if !self.start::<L>(rays) || !self.run::<G, L>(rays) {
+            return Together::NotAtAll;
+        }
+        G::answer_together::<L>(self, rays, first, ends);
+        if self.work <= WORK_THAT_PAYS { Together::Well } else { Together::Slowly }
+    }
+
+    /// Sets out with rays; false where one is not from nearby or not sound, or where they are not alike.
+    #[inline(always)]
+    fn start<L: Lanes>(&mut self, rays: &[Ray; PACKET]) -> bool {
+        L::columns(rays, &mut self.columns);
+        let Self { columns, frustum, bundle, exact: Exact { start, .. }, .. } = self;
+        let splat = L::Wide::splat;
+        let zero = splat(0.0);
+        let (mut direction, mut length) = ([zero; 3], [zero; 3]);
+        let mut signs = 0;
+        let mut fits = ALL;
+        let mut is_long = 0;
+        for axis in 0..3 {
+            direction[axis] = L::Wide::rounded(&columns[3 + axis]);
+            length[axis] = direction[axis].abs();
+            let negative = splat(1.0).turned_by(direction[axis]).below(zero);
+            if negative != 0 && negative != ALL {
+                return false;
+            }
+            signs |= (negative & 1) << axis;
+            fits &= length[axis].at_most(splat(start.longest));
+            is_long |= splat(start.shortest).at_most(length[axis]);
+        }
+        let sizes = [length[1].at_most(length[0]), length[2].at_most(length[1]), length[2].at_most(length[0])];
+        // Which axis is the last: of the others, either may be larger.
+        let x_is_last = sizes[0] & sizes[2];
+        let y_is_last = sizes[1] & !x_is_last;
+        let bits = if x_is_last == ALL {
+            0b101
+        } else if y_is_last == ALL {
+            0b010
+        } else if x_is_last | y_is_last == 0 {
+            0
+        } else {
+            return false;
+        };
+        let axes = Axes::by_bits(signs, bits);
+        let (t_min, t_max) = (L::Wide::rounded(&columns[6]), L::Wide::rounded(&columns[7]));
+        fits &= zero.at_most(t_min) & t_min.at_most(t_max);
+
+        // Among boxes.
+        let (mut inverse, mut off) = ([zero; 3], [zero; 3]);
+        for axis in 0..3 {
+            let from = L::Wide::rounded_from(&columns[axis], start.tree_origin[axis], start.scale);
+            fits &= from.abs().at_most(splat(start.farthest[axis]));
+            let size = splat(start.space_per_unit).over(length[axis].max(splat(start.tiny)));
+            inverse[axis] = size.turned_by(direction[axis]);
+            let center = from.middle();
+            off[axis] = (from - center).abs();
+            frustum.center[axis] = center.first();
+        }
+        if fits != ALL || is_long != ALL {
+            return false;
+        }
+        let s_max = t_max.times_plus(splat(END_FACTOR), splat(LITTLE as f32));
+        s_max.store(&mut self.s_max);
+
+        // Among triangles.
+        let order = axes.order();
+        let unit_inverse = inverse[order[2]] * splat(start.units_per_space);
+        unit_inverse.abs().store(&mut bundle.place_per_height);
+        let (mut rest, mut apart) = ([zero; 3], [zero; 3]);
+        for (place, &axis) in order.iter().enumerate() {
+            let (origin, more) = L::Wide::parted_from(&columns[axis], start.mesh_origin[axis]);
+            let middle = origin.middle();
+            origin.store(&mut bundle.origin[place]);
+            (rest[place], apart[place]) = (more, origin - middle);
+            bundle.middle[place] = middle.first();
+        }
+        rest[2].store(&mut bundle.rest[2]);
+        let mut spread = [zero; 2];
+        for place in 0..2 {
+            let shear = direction[order[place]] * unit_inverse;
+            let sheared = rest[2].times_from(shear, rest[place]);
+            let middle = shear.middle();
+            shear.store(&mut bundle.shear[place]);
+            sheared.store(&mut bundle.rest[place]);
+            bundle.middle_shear[place] = middle.first();
+            spread[place] = (shear - middle).abs();
+            apart[place] = apart[2].times_from(shear, apart[place] + sheared);
+        }
+        let (far, roundings) = (splat(FAR), splat(ROUNDINGS));
+        let heights = [(t_min * length[order[2]]).min(far), (t_max * length[order[2]]).min(far)];
+        let errors = [heights[0] * roundings, heights[1] * roundings];
+        (heights[0] - errors[0]).store(&mut bundle.first);
+        (heights[0] + errors[0]).store(&mut bundle.surely_first);
+        (heights[1] - errors[1]).store(&mut bundle.surely_last);
+        (heights[1] + errors[1]).store(&mut bundle.last);
+        bundle.turn = if signs >> order[2] & 1 != 0 { 0.0 } else { -0.0 };
+        bundle.axes = axes;
+
+        // What holds them all.
+        let [x, y, z] = inverse;
+        let [minus_x, minus_y, minus_z] = [zero - x, zero - y, zero - z];
+        let minus_s_min = t_min * splat(-START_FACTOR);
+        let [apart_x, apart_y, apart_z] = [apart[0].abs(), apart[1].abs(), apart[2].abs()];
+        #[rustfmt::skip]
+        let Row(most) = L::Wide::most_of_each([
+            x, y, z, s_max,
+            minus_x, minus_y, minus_z, minus_s_min,
+            off[0], off[1], off[2], apart_z,
+            apart_x, apart_y, spread[0], spread[1],
+        ]);
+        let mut are_alike = true;
+        for axis in 0..3 {
+            let (most_inverse, minus_least, off) = (most[axis], most[4 + axis], most[8 + axis]);
+            let distance = frustum.center[axis].abs() + off;
+            let margin = distance * start.margin_per_distance + start.margin;
+            frustum.most_inverse[axis] = most_inverse;
+            frustum.least_inverse[axis] = -minus_least;
+            frustum.width[axis] = greater(most_inverse, minus_least) * (off + 3.0 * margin);
+            are_alike &= off <= MOST_DISTANCE;
+        }
+        (frustum.s_max, frustum.s_min, frustum.sides) = (most[3], -most[7], Sides::new(signs));
+        bundle.apart = [most[12], most[13], most[11]];
+        bundle.spread = [most[14], most[15]];
+        are_alike & (most[14] <= MOST_SPREAD) & (most[15] <= MOST_SPREAD)
+    }
+
     /// Which triangles of a block are left.
     #[inline(always)]
     fn bounds<W: Wide>(&self, Corners(corners): &Corners, taken: u32) -> Bounds {
@@ -347,6 +378,7 @@ impl Packet<'_, '_> {
         number: u32,
         lane: usize,
         bounds: &Bounds,
+        rays: &[Ray; PACKET],
     ) {
         let bundle = lanes::opaque(&self.bundle);
         let [kx, ky, kz] = bundle.axes.order();
@@ -407,7 +439,7 @@ impl Packet<'_, '_> {
             self.alive &= !sure;
             let unsure = in_range & !sure;
             if unsure != 0 {
-                self.settle_any(unsure, number, lane as u32);
+                self.settle_any(unsure, number, lane as u32, rays);
             }
             return;
         }
@@ -433,18 +465,18 @@ impl Packet<'_, '_> {
         }
         let doubtful = in_range & !better & !best_to.below(from);
         if doubtful != 0 {
-            self.settle_closest(doubtful, number, lane as u32);
+            self.settle_closest(doubtful, number, lane as u32, rays);
         }
     }
 
     /// Looks closer at a triangle that these rays may meet.
     #[cold]
     #[inline(never)]
-    fn settle_any(&mut self, mut those: u32, number: u32, lane: u32) {
+    fn settle_any(&mut self, mut those: u32, number: u32, lane: u32, rays: &[Ray; PACKET]) {
         while those != 0 {
             let i = those.trailing_zeros() as usize % PACKET;
             those &= those - 1;
-            let ray = &self.rays[i];
+            let ray = &rays[i];
             match self.exact.meet(ray, number, lane) {
                 Meeting::Miss => continue,
                 Meeting::Hit { .. } => self.met |= 1 << i,
@@ -457,11 +489,11 @@ impl Packet<'_, '_> {
     /// The same, where a hit may be nearer than the best.
     #[cold]
     #[inline(never)]
-    fn settle_closest(&mut self, mut those: u32, number: u32, lane: u32) {
+    fn settle_closest(&mut self, mut those: u32, number: u32, lane: u32, rays: &[Ray; PACKET]) {
         while those != 0 {
             let i = those.trailing_zeros() as usize % PACKET;
             those &= those - 1;
-            let ray = &self.rays[i];
+            let ray = &rays[i];
             let judged = match self.exact.meet(ray, number, lane) {
                 Meeting::Miss => continue,
                 Meeting::Hit { root, .. } => {
@@ -493,7 +525,7 @@ impl Packet<'_, '_> {
     #[inline(always)]
     fn best(&self, i: usize) -> Candidate {
         let triangle = self.triangle.0[i].to_bits();
-        if triangle == u32::MAX {
+        if triangle == NONE {
             return Candidate::NONE;
         }
         Candidate { block: triangle >> 3, lane: triangle & 7, from: self.from.0[i], to: self.to.0[i] }
@@ -501,42 +533,59 @@ impl Packet<'_, '_> {
 
     /// The nearest hits.
     #[inline(always)]
-    pub(crate) fn put_nearest<L: Lanes>(&self, first: usize, ends: &mut impl Ends<Option<Winner>>) {
-        let (axes, columns) = (self.bundle.axes, self.columns);
-        let order = axes.order();
-        let mut pairs = Pairs {
-            origin: [columns[order[0]], columns[order[1]], columns[order[2]]],
-            direction: [columns[3 + order[0]], columns[3 + order[1]], columns[3 + order[2]]],
-            corners: [[Row::of(0.0); 3]; 3],
-        };
-        for (place, &axis) in order.iter().enumerate() {
-            for i in 0..PACKET {
-                pairs.origin[place].0[i] -= self.exact.start.mesh_origin[axis];
-            }
+    pub(crate) fn put_nearest<L: Lanes>(
+        &self,
+        rays: &[Ray; PACKET],
+        first: usize,
+        ends: &mut impl Ends<Option<Winner>>,
+    ) {
+        let axes = self.bundle.axes;
+        let triangle = L::Wide::load(&self.triangle.0);
+        let hits = !triangle.with_bits(NONE) & !self.unsettled & ALL;
+        let mut others = !hits & ALL;
+        while others != 0 {
+            let i = others.trailing_zeros() as usize % PACKET;
+            others &= others - 1;
+            let is_settled = self.unsettled >> i & 1 == 0;
+            ends.put(first + i, if is_settled { Outcome::Settled(None) } else { Outcome::Unsettled });
         }
-        for i in 0..PACKET {
-            let best = self.best(i);
-            if best.is_some() {
-                let corners = axes.gather(self.triangles.block(best.block), best.lane as usize);
-                for (rows, corner) in pairs.corners.iter_mut().zip(corners) {
-                    for (row, coordinate) in rows.iter_mut().zip(corner) {
-                        row.0[i] = coordinate;
-                    }
+        if hits == 0 {
+            return;
+        }
+        // Many may have met the same.
+        let mut corners = [[Row::of(0.0); 3]; 3];
+        let mut rest = hits;
+        while rest != 0 {
+            let one = self.triangle.0[rest.trailing_zeros() as usize % PACKET].to_bits();
+            let with_this = triangle.with_bits(one);
+            rest &= !with_this;
+            let these = axes.gather(self.triangles.block(one >> 3), (one & 7) as usize);
+            for (rows, corner) in corners.iter_mut().zip(these) {
+                for (row, coordinate) in rows.iter_mut().zip(corner) {
+                    L::Wide::select(with_this, L::Wide::splat(coordinate), L::Wide::load(&row.0)).store(row);
                 }
             }
         }
+        let [x, y, z] = axes.order();
+        let columns = &self.columns;
+        let mesh_origin = &self.exact.start.mesh_origin;
+        let pairs = Pairs {
+            origin: [&columns[x], &columns[y], &columns[z]],
+            mesh_origin: [mesh_origin[x], mesh_origin[y], mesh_origin[z]],
+            direction: [&columns[3 + x], &columns[3 + y], &columns[3 + z]],
+            corners: &corners,
+        };
         let met = pairs.meet();
-        for i in 0..PACKET {
+        let mut rest = hits;
+        while rest != 0 {
+            let i = rest.trailing_zeros() as usize % PACKET;
+            rest &= rest - 1;
             let best = self.best(i);
             let t = met.t.0[i];
             // An answer that goes through memory is waited for: hence each by itself.
-            if self.unsettled >> i & 1 != 0 {
-                ends.put(first + i, Outcome::Unsettled);
-            } else if !best.is_some() {
-                ends.put(first + i, Outcome::Settled(None));
-            } else if t.is_nan() {
+            if t.is_nan() {
                 // Unclear: by itself, and closer.
-                let winner = self.exact.winner::<L>(&self.rays[i], axes, &best);
+                let winner = self.exact.winner::<L>(&rays[i], axes, &best);
                 ends.put(
                     first + i,
                     winner.map_or(Outcome::Unsettled, |winner| Outcome::Settled(Some(winner))),
@@ -565,7 +614,7 @@ impl Packet<'_, '_> {
 
     /// Tests a leaf.
     #[inline(always)]
-    fn meet_leaf<G: Goal, L: Lanes>(&mut self, leaf: u32) {
+    fn meet_leaf<G: Goal, L: Lanes>(&mut self, leaf: u32, rays: &[Ray; PACKET]) {
         let mut following = Some(leaf & tag::PLACE);
         while let Some(place) = following {
             let block = self.triangles.block(place);
@@ -577,16 +626,22 @@ impl Packet<'_, '_> {
             while rest != 0 {
                 let lane = rest.trailing_zeros() as usize;
                 rest &= rest - 1;
-                self.meet_triangle::<G, L>(&corners, place, lane, &bounds);
+                self.meet_triangle::<G, L>(&corners, place, lane, &bounds, rays);
             }
         }
     }
 
-    /// Goes through the tree from a node or a leaf; false where it gave up.
+    /// Goes through the tree; false where it gave up.
     #[inline(always)]
-    fn run<G: Goal, L: Lanes>(&mut self, nodes: &[Node], root: u32) -> bool {
+    fn run<G: Goal, L: Lanes>(&mut self, rays: &[Ray; PACKET]) -> bool {
+        let infinity = L::Wide::splat(f32::INFINITY);
+        infinity.store(&mut self.from);
+        infinity.store(&mut self.to);
+        L::Wide::splat(f32::from_bits(NONE)).store(&mut self.triangle);
+        (self.alive, self.met, self.unsettled, self.work) = (ALL, 0, 0, 0);
+        let nodes: &[Node] = self.exact.nodes();
         let mut stack: Stack<<G::Order as Order>::Entry> = Stack::new();
-        let mut reference = root;
+        let mut reference = self.exact.start.root;
         loop {
             while reference >> tag::SHIFT == tag::INNER {
                 self.work += 1;
@@ -606,7 +661,7 @@ impl Packet<'_, '_> {
                     }
                 }
             }
-            self.meet_leaf::<G, L>(reference);
+            self.meet_leaf::<G, L>(reference, rays);
             if self.alive == 0 {
                 return true;
             }
@@ -643,52 +698,17 @@ pub(crate) enum Together {
     NotAtAll,
 }
 
-/// Searches a tree of triangles along rays together, the first of which has this position.
-#[inline(always)]
-pub(crate) fn search<G: Goal, L: Lanes>(
-    accel: &Accel,
-    single: &SingleStart,
-    rays: &[Ray; PACKET],
-    first: usize,
-    ends: &mut impl Ends<G::Answer>,
-) -> Together {
-    let columns = L::columns(rays);
-    let Some((frustum, bundle, s_max)) = start::<L::Wide>(single, &columns) else {
-        return Together::NotAtAll;
-    };
-    let mut packet = Packet {
-        exact: Exact::new(accel, single),
-        triangles: accel.tree.blocks(),
-        rays,
-        columns: &columns,
-        frustum,
-        bundle,
-        s_max,
-        from: Row::of(f32::INFINITY),
-        to: Row::of(f32::INFINITY),
-        triangle: Row::of(f32::from_bits(u32::MAX)),
-        alive: ALL,
-        met: 0,
-        unsettled: 0,
-        work: 0,
-    };
-    if !packet.run::<G, L>(&accel.tree.nodes, single.root) {
-        return Together::NotAtAll;
-    }
-    G::answer_together::<L>(&packet, first, ends);
-    if packet.work <= WORK_THAT_PAYS { Together::Well } else { Together::Slowly }
-}
-
 /// Whether rays go together, at a level, for tests.
 #[cfg(test)]
-pub(crate) fn are_alike(level: lanes::Level, single: &SingleStart, rays: &[Ray; PACKET]) -> bool {
-    struct Starting<'a>(&'a SingleStart, &'a [Ray; PACKET]);
+pub(crate) fn are_alike(level: lanes::Level, accel: &Accel, rays: &[Ray; PACKET]) -> bool {
+    struct Starting<'a>(Packet<'a>, &'a [Ray; PACKET]);
     impl lanes::Task for Starting<'_> {
         type Output = bool;
         #[inline(always)]
-        fn run<L: Lanes>(self) -> bool {
-            start::<L::Wide>(self.0, &L::columns(self.1)).is_some()
+        fn run<L: Lanes>(mut self) -> bool {
+            self.0.start::<L>(self.1)
         }
     }
-    level.run(Starting(single, rays))
+    let single = accel.single.as_ref().expect("nothing but triangles");
+    level.run(Starting(Packet::new(accel, single), rays))
 }

@@ -22,9 +22,9 @@ use crate::collapse::Entry;
 use crate::holds::SingleStart;
 use crate::hulls::HullRay;
 use crate::lanes::{self, Asked, Axes, Crossings, Lanes, Level, MetHulls, Question, Task};
-use crate::node::{Slabs, tag};
+use crate::node::{Node, Slabs, tag};
 use crate::options::{self, Selection};
-use crate::packet::Packet;
+use crate::packet::{PACKET, Packet};
 use crate::query::All;
 use crate::stack::{AsBuilt, ByDistance, Order, Stack};
 use crate::traverse::{PlacedTree, What};
@@ -132,6 +132,12 @@ impl<'a> Exact<'a> {
     #[inline(always)]
     pub(crate) fn new(accel: &'a Accel, start: &'a SingleStart) -> Self {
         Self { accel, start, triangles: accel.tree.blocks() }
+    }
+
+    /// The nodes of the tree.
+    #[inline(always)]
+    pub(crate) fn nodes(&self) -> &'a [Node] {
+        &self.accel.tree.nodes
     }
 
     /// Whether the ray passes by a triangle, or meets it out of its range, as far as that is seen at a glance.
@@ -715,7 +721,12 @@ pub(crate) trait Goal {
     ) -> Outcome<Self::Answer>;
 
     /// What came of rays that went together, the first of which has this position.
-    fn answer_together<L: Lanes>(packet: &Packet, first: usize, ends: &mut impl Ends<Self::Answer>);
+    fn answer_together<L: Lanes>(
+        packet: &Packet,
+        rays: &[Ray; PACKET],
+        first: usize,
+        ends: &mut impl Ends<Self::Answer>,
+    );
 }
 
 /// The nearest hit.
@@ -757,8 +768,13 @@ impl Goal for Nearest {
     }
 
     #[inline(always)]
-    fn answer_together<L: Lanes>(packet: &Packet, first: usize, ends: &mut impl Ends<Self::Answer>) {
-        packet.put_nearest::<L>(first, ends);
+    fn answer_together<L: Lanes>(
+        packet: &Packet,
+        rays: &[Ray; PACKET],
+        first: usize,
+        ends: &mut impl Ends<Self::Answer>,
+    ) {
+        packet.put_nearest::<L>(rays, first, ends);
     }
 }
 
@@ -805,7 +821,12 @@ impl Goal for Whether {
     }
 
     #[inline(always)]
-    fn answer_together<L: Lanes>(packet: &Packet, first: usize, ends: &mut impl Ends<bool>) {
+    fn answer_together<L: Lanes>(
+        packet: &Packet,
+        _: &[Ray; PACKET],
+        first: usize,
+        ends: &mut impl Ends<bool>,
+    ) {
         packet.put_met(first, ends);
     }
 }

@@ -398,12 +398,13 @@ impl Weights {
 }
 
 /// Sixteen triangles, each with a ray of its own, all of which have these axes.
-pub(crate) struct Pairs {
-    /// By the order of the axes, relative to the mesh.
-    pub(crate) origin: [Row<f64>; 3],
-    pub(crate) direction: [Row<f64>; 3],
-    /// `[corner][axis]`, alike.
-    pub(crate) corners: [[Row<f32>; 3]; 3],
+pub(crate) struct Pairs<'a> {
+    /// By the order of the axes.
+    pub(crate) origin: [&'a Row<f64>; 3],
+    pub(crate) mesh_origin: [f64; 3],
+    pub(crate) direction: [&'a Row<f64>; 3],
+    /// `[corner][axis]`, alike, relative to the mesh.
+    pub(crate) corners: &'a [[Row<f32>; 3]; 3],
 }
 
 /// Where sixteen rays meet triangles.
@@ -413,16 +414,20 @@ pub(crate) struct Met {
     pub(crate) local: [Row<f64>; 2],
 }
 
-impl Pairs {
+impl Pairs<'_> {
     /// Where each ray meets its triangle: [`passage`] of every pair, by the same operations side by side.
     #[inline(always)]
     pub(crate) fn meet(&self) -> Met {
         let mut met = Met { t: Row::of(0.0), local: [Row::of(0.0); 2] };
         for i in 0..WIDE {
             let [x, y, z] = [self.direction[0].0[i], self.direction[1].0[i], self.direction[2].0[i]];
-            let origin = [self.origin[0].0[i], self.origin[1].0[i], self.origin[2].0[i]];
+            let origin = [
+                self.origin[0].0[i] - self.mesh_origin[0],
+                self.origin[1].0[i] - self.mesh_origin[1],
+                self.origin[2].0[i] - self.mesh_origin[2],
+            ];
             let shear = [x / z, y / z];
-            let [a, b, c] = &self.corners;
+            let [a, b, c] = self.corners;
             let weights = weigh([
                 sheared(shear, &origin, [a[0].0[i], a[1].0[i], a[2].0[i]]),
                 sheared(shear, &origin, [b[0].0[i], b[1].0[i], b[2].0[i]]),

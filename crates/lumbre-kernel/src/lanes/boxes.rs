@@ -48,8 +48,9 @@ pub(crate) fn meet_frustum<W: Wide>(node: &Node, frustum: &Frustum) -> (u32, W) 
         let center = W::splat(frustum.center[axis]);
         let (least, most) = (W::splat(frustum.least_inverse[axis]), W::splat(frustum.most_inverse[axis]));
         let (near, far) = (W::load(near) - center, W::load(far) - center);
-        let first = (near * least).min(near * most) + W::splat(frustum.near_offset[axis]);
-        let last = (far * least).max(far * most) + W::splat(frustum.far_offset[axis]);
+        let width = W::splat(frustum.width[axis]);
+        let first = (near * least).min(near * most) - width;
+        let last = (far * least).max(far * most) + width;
         enter = enter.later(first);
         leave = leave.earlier(last);
     }

@@ -60,7 +60,7 @@ pub(crate) trait Lanes: SphereLanes + HullLanes {
     fn start_blocks(start: &SingleStart, ray: &Ray, slabs: &Slabs) -> (BlockRay, f32);
 
     /// The numbers of rays, side by side: origin, direction and range.
-    fn columns(rays: &[Ray; WIDE]) -> [Row<f64>; 8];
+    fn columns(rays: &[Ray; WIDE], columns: &mut [Row<f64>; 8]);
 
     /// A bit for each triangle that the line of the ray may meet, among them all that it does, and what [`Lanes::place_crossings`]
     /// wants to know: see [`BlockRay`].

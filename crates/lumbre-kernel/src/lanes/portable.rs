@@ -107,8 +107,7 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
-    fn columns(rays: &[Ray; WIDE]) -> [Row<f64>; 8] {
-        let mut columns = [Row::of(0.0); 8];
+    fn columns(rays: &[Ray; WIDE], columns: &mut [Row<f64>; 8]) {
         for (i, ray) in rays.iter().enumerate() {
             for axis in 0..3 {
                 columns[axis].0[i] = ray.origin[axis];
@@ -116,7 +115,6 @@ impl Lanes for Portable {
             }
             (columns[6].0[i], columns[7].0[i]) = (ray.t_min, ray.t_max);
         }
-        columns
     }
 
     #[inline(always)]

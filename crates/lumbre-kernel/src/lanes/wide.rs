@@ -30,6 +30,10 @@ pub(crate) trait Wide: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Outp
     fn store(self, row: &mut Row<f32>);
     /// Rounded.
     fn rounded(row: &Row<f64>) -> Self;
+    /// From a place, in other units; rounded, after it was computed in double precision.
+    fn rounded_from(row: &Row<f64>, place: f64, scale: f64) -> Self;
+    /// From a place, rounded, and what rounding took.
+    fn parted_from(row: &Row<f64>, place: f64) -> (Self, Self);
     /// `self * factor + summand`, rounded once or twice.
     fn times_plus(self, factor: Self, summand: Self) -> Self;
     /// `summand - self * factor`, alike.
@@ -45,9 +49,14 @@ pub(crate) trait Wide: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Outp
     fn turned_by(self, other: Self) -> Self;
     fn at_most(self, other: Self) -> u32;
     fn below(self, other: Self) -> u32;
-    /// The least of all; any of them where one is a NaN.
-    fn least(self) -> f32;
+    /// The largest of all; any of them where one is a NaN.
     fn most(self) -> f32;
+    /// The largest of each of sixteen; any of them where one is a NaN.
+    fn most_of_each(them: [Self; WIDE]) -> Row<f32>;
+    /// Everywhere the place half way between two: those inside a square of four by four that are across from one another.
+    fn middle(self) -> Self;
+    /// The first of them.
+    fn first(self) -> f32;
     /// The first where the mask has a bit, else the second; bit by bit.
     fn select(mask: u32, first: Self, second: Self) -> Self;
     /// The larger as far as that is not negative, else anything that is. Integers, which have the same order there, are compared
@@ -68,6 +77,8 @@ pub(crate) trait Wide: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Outp
     }
     /// Where the bits are more, as an integer.
     fn bits_above(self, other: i32) -> u32;
+    /// Where these are the bits.
+    fn with_bits(self, bits: u32) -> u32;
     /// With each one's place in its last four bits.
     fn lanes_in_bits(self) -> Self;
     fn bits(self) -> [i32; WIDE];
@@ -155,6 +166,26 @@ impl Wide for Portable16 {
     }
 
     #[inline(always)]
+    fn rounded_from(row: &Row<f64>, place: f64, scale: f64) -> Self {
+        let mut all = [0.0; WIDE];
+        for (one, exact) in all.iter_mut().zip(row.0) {
+            *one = ((exact - place) * scale) as f32;
+        }
+        Self(all)
+    }
+
+    #[inline(always)]
+    fn parted_from(row: &Row<f64>, place: f64) -> (Self, Self) {
+        let (mut rounded, mut rest) = ([0.0; WIDE], [0.0; WIDE]);
+        for lane in 0..WIDE {
+            let exact = row.0[lane] - place;
+            rounded[lane] = exact as f32;
+            rest[lane] = (exact - f64::from(rounded[lane])) as f32;
+        }
+        (Self(rounded), Self(rest))
+    }
+
+    #[inline(always)]
     fn times_plus(self, factor: Self, summand: Self) -> Self {
         self * factor + summand
     }
@@ -228,21 +259,31 @@ impl Wide for Portable16 {
     }
 
     #[inline(always)]
-    fn least(self) -> f32 {
-        let mut least = self.0[0];
-        for lane in 1..WIDE {
-            least = if self.0[lane] < least { self.0[lane] } else { least };
-        }
-        least
-    }
-
-    #[inline(always)]
     fn most(self) -> f32 {
         let mut most = self.0[0];
         for lane in 1..WIDE {
             most = if self.0[lane] > most { self.0[lane] } else { most };
         }
         most
+    }
+
+    #[inline(always)]
+    fn most_of_each(them: [Self; WIDE]) -> Row<f32> {
+        let mut most = Row::of(0.0);
+        for lane in 0..WIDE {
+            most.0[lane] = them[lane].most();
+        }
+        most
+    }
+
+    #[inline(always)]
+    fn middle(self) -> Self {
+        Self::splat(0.5 * (self.0[BEFORE_MIDDLE] + self.0[AFTER_MIDDLE]))
+    }
+
+    #[inline(always)]
+    fn first(self) -> f32 {
+        self.0[0]
     }
 
     #[inline(always)]
@@ -258,6 +299,15 @@ impl Wide for Portable16 {
         let mut mask = 0;
         for lane in 0..WIDE {
             mask |= u32::from(bits_of(self.0[lane]) > other) << lane;
+        }
+        mask
+    }
+
+    #[inline(always)]
+    fn with_bits(self, bits: u32) -> u32 {
+        let mut mask = 0;
+        for lane in 0..WIDE {
+            mask |= u32::from(self.0[lane].to_bits() == bits) << lane;
         }
         mask
     }
@@ -285,6 +335,10 @@ fn bits_of(number: f32) -> i32 {
     number.to_bits() as i32
 }
 
+/// Of sixteen in rows of four, two that are across from one another beside the middle.
+const BEFORE_MIDDLE: usize = 5;
+const AFTER_MIDDLE: usize = 10;
+
 /// The last bits of a number, in which its place among sixteen may stand.
 pub(crate) const LANE_BITS: i32 = WIDE as i32 - 1;
 
@@ -297,7 +351,7 @@ mod x86 {
     use std::mem::MaybeUninit;
     use std::ops::{Add, Mul, Sub};
 
-    use super::{LANE_BITS, Row, WIDE, Wide};
+    use super::{AFTER_MIDDLE, BEFORE_MIDDLE, LANE_BITS, Row, WIDE, Wide};
 
     /// Only where `lanes::x86::X86<true>` is: the instructions are there.
     #[derive(Clone, Copy)]
@@ -365,9 +419,34 @@ mod x86 {
         fn rounded(row: &Row<f64>) -> Self {
             // SAFETY: see the type. The loads are of eight f64 each, of sixteen.
             unsafe {
-                let low = _mm512_cvtpd_ps(_mm512_loadu_pd(row.0.as_ptr()));
-                let high = _mm512_cvtpd_ps(_mm512_loadu_pd(row.0.as_ptr().add(WIDE / 2)));
-                Self(_mm512_insertf32x8::<1>(_mm512_castps256_ps512(low), high))
+                let low = _mm512_loadu_pd(row.0.as_ptr());
+                Self::of_halves(low, _mm512_loadu_pd(row.0.as_ptr().add(WIDE / 2)))
+            }
+        }
+
+        #[inline(always)]
+        fn rounded_from(row: &Row<f64>, place: f64, scale: f64) -> Self {
+            // SAFETY: see the type. The loads are of eight f64 each, of sixteen.
+            unsafe {
+                let (place, scale) = (_mm512_set1_pd(place), _mm512_set1_pd(scale));
+                let low = _mm512_sub_pd(_mm512_loadu_pd(row.0.as_ptr()), place);
+                let high = _mm512_sub_pd(_mm512_loadu_pd(row.0.as_ptr().add(WIDE / 2)), place);
+                Self::of_halves(_mm512_mul_pd(low, scale), _mm512_mul_pd(high, scale))
+            }
+        }
+
+        #[inline(always)]
+        fn parted_from(row: &Row<f64>, place: f64) -> (Self, Self) {
+            // SAFETY: see the type. The loads are of eight f64 each, of sixteen.
+            unsafe {
+                let place = _mm512_set1_pd(place);
+                let low = _mm512_sub_pd(_mm512_loadu_pd(row.0.as_ptr()), place);
+                let high = _mm512_sub_pd(_mm512_loadu_pd(row.0.as_ptr().add(WIDE / 2)), place);
+                let rounded = Self::of_halves(low, high);
+                let low_rest = _mm512_sub_pd(low, _mm512_cvtps_pd(_mm512_castps512_ps256(rounded.0)));
+                let high_rest =
+                    _mm512_sub_pd(high, _mm512_cvtps_pd(_mm512_extractf32x8_ps::<1>(rounded.0)));
+                (rounded, Self::of_halves(low_rest, high_rest))
             }
         }
 
@@ -435,21 +514,54 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn least(self) -> f32 {
-            // SAFETY: see the type.
-            unsafe {
-                let low = _mm512_castps512_ps256(self.0);
-                least_of_eight(_mm256_min_ps(low, _mm512_extractf32x8_ps::<1>(self.0)))
-            }
-        }
-
-        #[inline(always)]
         fn most(self) -> f32 {
             // SAFETY: see the type.
             unsafe {
                 let low = _mm512_castps512_ps256(self.0);
                 most_of_eight(_mm256_max_ps(low, _mm512_extractf32x8_ps::<1>(self.0)))
             }
+        }
+
+        #[inline(always)]
+        fn most_of_each(them: [Self; WIDE]) -> Row<f32> {
+            let mut most = Row::of(0.0);
+            let [abcd, efgh, ijkl, mnop] = [
+                Self::most_of_four(them[0], them[1], them[2], them[3]),
+                Self::most_of_four(them[4], them[5], them[6], them[7]),
+                Self::most_of_four(them[8], them[9], them[10], them[11]),
+                Self::most_of_four(them[12], them[13], them[14], them[15]),
+            ];
+            // SAFETY: see the type.
+            unsafe {
+                let first = _mm512_max_ps(
+                    _mm512_shuffle_f32x4::<0b01_00_01_00>(abcd, efgh),
+                    _mm512_shuffle_f32x4::<0b11_10_11_10>(abcd, efgh),
+                );
+                let second = _mm512_max_ps(
+                    _mm512_shuffle_f32x4::<0b01_00_01_00>(ijkl, mnop),
+                    _mm512_shuffle_f32x4::<0b11_10_11_10>(ijkl, mnop),
+                );
+                let even = _mm512_shuffle_f32x4::<0b10_00_10_00>(first, second);
+                Self(_mm512_max_ps(even, _mm512_shuffle_f32x4::<0b11_01_11_01>(first, second)))
+                    .store(&mut most);
+            }
+            most
+        }
+
+        #[inline(always)]
+        fn middle(self) -> Self {
+            // SAFETY: see the type.
+            unsafe {
+                let before = _mm512_permutexvar_ps(_mm512_set1_epi32(BEFORE_MIDDLE as i32), self.0);
+                let after = _mm512_permutexvar_ps(_mm512_set1_epi32(AFTER_MIDDLE as i32), self.0);
+                Self(_mm512_mul_ps(_mm512_add_ps(before, after), _mm512_set1_ps(0.5)))
+            }
+        }
+
+        #[inline(always)]
+        fn first(self) -> f32 {
+            // SAFETY: see the type.
+            unsafe { _mm512_cvtss_f32(self.0) }
         }
 
         #[inline(always)]
@@ -482,6 +594,14 @@ mod x86 {
         fn bits_above(self, other: i32) -> u32 {
             // SAFETY: see the type.
             unsafe { u32::from(_mm512_cmpgt_epi32_mask(self.integers(), _mm512_set1_epi32(other))) }
+        }
+
+        #[inline(always)]
+        fn with_bits(self, bits: u32) -> u32 {
+            // SAFETY: see the type.
+            unsafe {
+                u32::from(_mm512_cmpeq_epi32_mask(self.integers(), _mm512_set1_epi32(bits as i32)))
+            }
         }
 
         #[inline(always)]
@@ -527,22 +647,33 @@ mod x86 {
     }
 
     impl Avx512 {
+        /// Rounded.
+        #[inline(always)]
+        fn of_halves(low: __m512d, high: __m512d) -> Self {
+            // SAFETY: see the type.
+            unsafe {
+                let low = _mm512_castps256_ps512(_mm512_cvtpd_ps(low));
+                Self(_mm512_insertf32x8::<1>(low, _mm512_cvtpd_ps(high)))
+            }
+        }
+
+        /// In every four lanes, the largest that four have in those.
+        #[inline(always)]
+        fn most_of_four(Self(a): Self, Self(b): Self, Self(c): Self, Self(d): Self) -> __m512 {
+            // SAFETY: see the type.
+            unsafe {
+                let ab = _mm512_max_ps(_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b));
+                let cd = _mm512_max_ps(_mm512_unpacklo_ps(c, d), _mm512_unpackhi_ps(c, d));
+                let (ab, cd) = (_mm512_castps_pd(ab), _mm512_castps_pd(cd));
+                let low = _mm512_castpd_ps(_mm512_unpacklo_pd(ab, cd));
+                _mm512_max_ps(low, _mm512_castpd_ps(_mm512_unpackhi_pd(ab, cd)))
+            }
+        }
+
         #[inline(always)]
         fn integers(self) -> __m512i {
             // SAFETY: see the type.
             unsafe { _mm512_castps_si512(self.0) }
-        }
-    }
-
-    /// # Safety
-    /// There must be AVX2.
-    #[inline(always)]
-    unsafe fn least_of_eight(v: __m256) -> f32 {
-        // SAFETY: see above.
-        unsafe {
-            let v = _mm_min_ps(_mm256_castps256_ps128(v), _mm256_extractf128_ps::<1>(v));
-            let v = _mm_min_ps(v, _mm_movehl_ps(v, v));
-            _mm_cvtss_f32(_mm_min_ss(v, _mm_movehdup_ps(v)))
         }
     }
 
@@ -577,6 +708,47 @@ mod x86 {
     };
 
     impl Avx2 {
+        #[inline(always)]
+        fn quarters(row: &Row<f64>) -> [__m256d; 4] {
+            let start = row.0.as_ptr();
+            // SAFETY: see the type. The loads are of four f64 each, of sixteen.
+            unsafe {
+                [
+                    _mm256_loadu_pd(start),
+                    _mm256_loadu_pd(start.add(4)),
+                    _mm256_loadu_pd(start.add(8)),
+                    _mm256_loadu_pd(start.add(12)),
+                ]
+            }
+        }
+
+        /// Rounded.
+        #[inline(always)]
+        fn of_quarters([a, b, c, d]: [__m256d; 4]) -> Self {
+            // SAFETY: see the type.
+            unsafe {
+                let low = _mm256_setr_m128(_mm256_cvtpd_ps(a), _mm256_cvtpd_ps(b));
+                Self([low, _mm256_setr_m128(_mm256_cvtpd_ps(c), _mm256_cvtpd_ps(d))])
+            }
+        }
+
+        /// In every four lanes of eight, the largest that four have in those or eight behind.
+        #[inline(always)]
+        fn most_of_four(a: Self, b: Self, c: Self, d: Self) -> __m256 {
+            // SAFETY: see the type.
+            unsafe {
+                let a = _mm256_max_ps(a.0[0], a.0[1]);
+                let b = _mm256_max_ps(b.0[0], b.0[1]);
+                let c = _mm256_max_ps(c.0[0], c.0[1]);
+                let d = _mm256_max_ps(d.0[0], d.0[1]);
+                let ab = _mm256_max_ps(_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
+                let cd = _mm256_max_ps(_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
+                let (ab, cd) = (_mm256_castps_pd(ab), _mm256_castps_pd(cd));
+                let low = _mm256_castpd_ps(_mm256_unpacklo_pd(ab, cd));
+                _mm256_max_ps(low, _mm256_castpd_ps(_mm256_unpackhi_pd(ab, cd)))
+            }
+        }
+
         /// Of eight words from here on, those that the mask chooses first; the others mean nothing.
         ///
         /// # Safety
@@ -641,19 +813,44 @@ mod x86 {
 
         #[inline(always)]
         fn rounded(row: &Row<f64>) -> Self {
-            // SAFETY: see the type. The loads are of four f64 each, of sixteen.
-            unsafe {
-                let start = row.0.as_ptr();
-                let low = _mm256_setr_m128(
-                    _mm256_cvtpd_ps(_mm256_loadu_pd(start)),
-                    _mm256_cvtpd_ps(_mm256_loadu_pd(start.add(4))),
-                );
-                let high = _mm256_setr_m128(
-                    _mm256_cvtpd_ps(_mm256_loadu_pd(start.add(8))),
-                    _mm256_cvtpd_ps(_mm256_loadu_pd(start.add(12))),
-                );
-                Self([low, high])
+            Self::of_quarters(Self::quarters(row))
+        }
+
+        #[inline(always)]
+        fn rounded_from(row: &Row<f64>, place: f64, scale: f64) -> Self {
+            let mut quarters = Self::quarters(row);
+            for quarter in &mut quarters {
+                // SAFETY: see the type.
+                unsafe {
+                    let from = _mm256_sub_pd(*quarter, _mm256_set1_pd(place));
+                    *quarter = _mm256_mul_pd(from, _mm256_set1_pd(scale));
+                }
             }
+            Self::of_quarters(quarters)
+        }
+
+        #[inline(always)]
+        fn parted_from(row: &Row<f64>, place: f64) -> (Self, Self) {
+            let mut quarters = Self::quarters(row);
+            for quarter in &mut quarters {
+                // SAFETY: see the type.
+                *quarter = unsafe { _mm256_sub_pd(*quarter, _mm256_set1_pd(place)) };
+            }
+            let rounded = Self::of_quarters(quarters);
+            // SAFETY: see the type.
+            unsafe {
+                let [low, high] = rounded.0;
+                let parts = [
+                    _mm256_castps256_ps128(low),
+                    _mm256_extractf128_ps::<1>(low),
+                    _mm256_castps256_ps128(high),
+                    _mm256_extractf128_ps::<1>(high),
+                ];
+                for (quarter, part) in quarters.iter_mut().zip(parts) {
+                    *quarter = _mm256_sub_pd(*quarter, _mm256_cvtps_pd(part));
+                }
+            }
+            (rounded, Self::of_quarters(quarters))
         }
 
         #[inline(always)]
@@ -734,15 +931,42 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn least(self) -> f32 {
-            // SAFETY: see the type.
-            unsafe { least_of_eight(_mm256_min_ps(self.0[0], self.0[1])) }
-        }
-
-        #[inline(always)]
         fn most(self) -> f32 {
             // SAFETY: see the type.
             unsafe { most_of_eight(_mm256_max_ps(self.0[0], self.0[1])) }
+        }
+
+        #[inline(always)]
+        fn most_of_each(them: [Self; WIDE]) -> Row<f32> {
+            let mut most = Row::of(0.0);
+            for (half, of_half) in most.0.chunks_exact_mut(8).zip(them.chunks_exact(8)) {
+                let abcd = Self::most_of_four(of_half[0], of_half[1], of_half[2], of_half[3]);
+                let efgh = Self::most_of_four(of_half[4], of_half[5], of_half[6], of_half[7]);
+                // SAFETY: see the type. The store is of eight f32.
+                unsafe {
+                    let low = _mm256_permute2f128_ps::<0x20>(abcd, efgh);
+                    let all = _mm256_max_ps(low, _mm256_permute2f128_ps::<0x31>(abcd, efgh));
+                    _mm256_storeu_ps(half.as_mut_ptr(), all);
+                }
+            }
+            most
+        }
+
+        #[inline(always)]
+        fn middle(self) -> Self {
+            let [low, high] = self.0;
+            // SAFETY: see the type.
+            unsafe {
+                let before = _mm256_permutevar8x32_ps(low, _mm256_set1_epi32(BEFORE_MIDDLE as i32));
+                let after = _mm256_permutevar8x32_ps(high, _mm256_set1_epi32(AFTER_MIDDLE as i32 - 8));
+                Self([_mm256_mul_ps(_mm256_add_ps(before, after), _mm256_set1_ps(0.5)); 2])
+            }
+        }
+
+        #[inline(always)]
+        fn first(self) -> f32 {
+            // SAFETY: see the type.
+            unsafe { _mm256_cvtss_f32(self.0[0]) }
         }
 
         #[inline(always)]
@@ -789,6 +1013,16 @@ mod x86 {
                 let other = _mm256_set1_epi32(other);
                 let above = Self::of([_mm256_cmpgt_epi32(a, other), _mm256_cmpgt_epi32(b, other)]);
                 Self::masks(above.0)
+            }
+        }
+
+        #[inline(always)]
+        fn with_bits(self, bits: u32) -> u32 {
+            let [a, b] = self.integers();
+            // SAFETY: see the type.
+            unsafe {
+                let bits = _mm256_set1_epi32(bits as i32);
+                Self::masks(Self::of([_mm256_cmpeq_epi32(a, bits), _mm256_cmpeq_epi32(b, bits)]).0)
             }
         }
 

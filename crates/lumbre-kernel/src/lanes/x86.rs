@@ -532,8 +532,7 @@ where
     }
 
     #[inline(always)]
-    fn columns(rays: &[Ray; WIDE]) -> [Row<f64>; 8] {
-        let mut columns = [Row::of(0.0); 8];
+    fn columns(rays: &[Ray; WIDE], columns: &mut [Row<f64>; 8]) {
         for four in 0..WIDE / 4 {
             for half in 0..2 {
                 let at = |i: usize| Self::numbers(&rays[4 * four + i]).wrapping_add(4 * half);
@@ -558,7 +557,6 @@ where
                 }
             }
         }
-        columns
     }
 
     #[inline(always)]

@@ -6,7 +6,7 @@ use super::scenes::Random;
 use crate::lanes::{Lanes, Level, Row, Task, WIDE};
 use crate::triangles::{self, Met, Pairs, Passage, Shear};
 
-struct Meeting<'a>(&'a Pairs);
+struct Meeting<'a>(&'a Pairs<'a>);
 
 impl Task for Meeting<'_> {
     type Output = Met;
@@ -50,18 +50,24 @@ fn sixteen_pairs_meet_as_each_alone() {
     let mut random = Random(171);
     let (mut inside, mut outside, mut unclear) = (0, 0, 0);
     for _ in 0..if cfg!(miri) { 20 } else { 3_000 } {
-        let none = Row::of(0.0);
-        let mut pairs = Pairs { origin: [none; 3], direction: [none; 3], corners: [[Row::of(0.0); 3]; 3] };
+        let (mut from, mut along) = ([Row::of(0.0); 3], [Row::of(0.0); 3]);
+        let mut rows_of_corners = [[Row::of(0.0); 3]; 3];
         let lanes: Vec<_> = (0..WIDE).map(|_| lane(&mut random)).collect();
         for (i, (direction, origin, corners)) in lanes.iter().enumerate() {
             for axis in 0..3 {
-                pairs.origin[axis].0[i] = origin[axis];
-                pairs.direction[axis].0[i] = direction.to_array()[axis];
-                for (rows, corner) in pairs.corners.iter_mut().zip(corners) {
+                from[axis].0[i] = origin[axis];
+                along[axis].0[i] = direction.to_array()[axis];
+                for (rows, corner) in rows_of_corners.iter_mut().zip(corners) {
                     rows[axis].0[i] = corner[axis];
                 }
             }
         }
+        let pairs = Pairs {
+            origin: from.each_ref(),
+            mesh_origin: [0.0; 3],
+            direction: along.each_ref(),
+            corners: &rows_of_corners,
+        };
         for level in Level::all() {
             let met = level.run(Meeting(&pairs));
             for (i, (direction, origin, corners)) in lanes.iter().enumerate() {

@@ -166,9 +166,8 @@ fn rays_that_go_together_are_answered_as_each_alone() {
             let list = kinds.zip(5..).map(|(kind, id)| Geometry { id, kind }).collect();
             let accel = Accel::build(list, &BuildOptions { preset }).unwrap();
             let packets: Vec<_> = (0..500).map(|i| alike(&mut random, &meshes[i % 2], size)).collect();
-            let start = accel.single.as_ref().expect("made for this");
             let together =
-                packets.iter().filter(|packet| packet::are_alike(accel.level, start, packet)).count();
+                packets.iter().filter(|packet| packet::are_alike(accel.level, &accel, packet)).count();
             assert!(together > 60, "{together}");
             check(&accel, packets.as_flattened(), 1_500);
             // In a long batch, those that do not gain by it are seldom tried.
@@ -194,7 +193,6 @@ fn rays_that_are_not_sound_do_not_go_together() {
     let mesh = mesh(&mut random, DVec3::ZERO, 1.0);
     let list = vec![Geometry { id: 1, kind: GeometryKind::Mesh(mesh.into()) }];
     let accel = Accel::build(list, &BuildOptions::default()).unwrap();
-    let start = accel.single.as_ref().expect("made for this");
     let sound = Ray::new(DVec3::new(0.1, 3.0, 0.2), DVec3::new(0.01, -1.0, 0.02));
     let packet = [sound; PACKET];
     let (nan, infinity) = (f64::NAN, f64::INFINITY);
@@ -212,12 +210,12 @@ fn rays_that_are_not_sound_do_not_go_together() {
         Ray { origin: DVec3::new(0.1, 3e9, 0.2), ..sound },
     ];
     for level in Level::all() {
-        assert!(packet::are_alike(level, start, &packet));
+        assert!(packet::are_alike(level, &accel, &packet));
         for (number, other) in others.iter().enumerate() {
             for place in 0..PACKET {
                 let mut packet = packet;
                 packet[place] = *other;
-                assert!(!packet::are_alike(level, start, &packet), "{level:?} {number} {place}");
+                assert!(!packet::are_alike(level, &accel, &packet), "{level:?} {number} {place}");
             }
         }
     }
