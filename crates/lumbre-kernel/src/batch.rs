@@ -13,7 +13,7 @@ use crate::blocks::{TriangleBlock, Unit};
 use crate::holds::SingleStart;
 use crate::lanes::{self, Lanes, Level, Task};
 use crate::node::{Node, tag};
-use crate::packet::{PACKET, Packet, Together};
+use crate::packet::{self, PACKET, Packet};
 use crate::query::All;
 use crate::single::{Alone, Goal, Outcome, SingleRay, Step};
 use crate::stack::{Order, Stack};
@@ -117,24 +117,26 @@ impl<G: Goal, E: Ends<G::Answer>, const N: usize, const IS_FAR: bool> Task
         let mut others = Vec::with_capacity(rays.len().min(AT_ONCE));
         let mut packet = Packet::new(accel, start);
         // After a packet that did not pay, some rays go otherwise before the next is tried, and ever more while none does.
-        let (mut without, mut patience) = (0, 1);
+        let (mut without, mut patience) = (0, 0);
         for (number, rays) in rays.chunks(AT_ONCE).enumerate() {
             for (place, chunk) in rays.chunks(PACKET).enumerate() {
                 let first = number * AT_ONCE + place * PACKET;
+                let mut answered = 0;
                 if without > 0 {
                     without -= 1;
                 } else if has_packets && let Ok(alike) = <&[Ray; PACKET]>::try_from(chunk) {
                     let together = packet.search::<G, L>(alike, first, &mut ends);
-                    if together == Together::Well {
-                        patience = 1;
+                    answered = together.answered;
+                    (without, patience) = if together.pays {
+                        (0, 0)
                     } else {
-                        (without, patience) = (patience, (2 * patience).min(LEAST_OFTEN));
-                    }
-                    if together != Together::NotAtAll {
-                        continue;
-                    }
+                        (patience, (2 * patience).clamp(1, LEAST_OFTEN))
+                    };
                 }
-                others.extend((first..).zip(chunk));
+                if answered != packet::ALL {
+                    let is_left = |(position, _): &(usize, &Ray)| answered >> (position - first) & 1 == 0;
+                    others.extend((first..).zip(chunk).filter(is_left));
+                }
             }
             let mut waiting = others.iter().copied();
             while flights.len() < N

@@ -49,6 +49,8 @@ const MOST_SPREAD: f32 = 0.125;
 /// How much they may do before they go alone: where boxes and triangles are small beside the distances between the rays, that is
 /// faster. In nodes met; a block of triangles is as much as two, and so is a triangle.
 const MOST_WORK: u32 = 80;
+/// How many there have to be.
+const LEAST: u32 = 4;
 /// What they may do and have it pay.
 const WORK_THAT_PAYS: u32 = 48;
 /// What the corners of triangles may be wrong by, by their size: 32u, see above.
@@ -91,8 +93,21 @@ struct Bundle {
     spread: [f32; 2],
 }
 
+/// The signs of directions, a bit for each negative component, and their axes.
+struct Direction {
+    signs: u32,
+    axes: &'static Axes,
+}
+
+/// What a direction is to planes, as for a ray alone.
+#[inline(always)]
+fn inverse_of<W: Wide>(start: &SingleStart, direction: W) -> W {
+    let size = W::splat(start.space_per_unit).over(direction.abs().max(W::splat(start.tiny)));
+    size.turned_by(direction)
+}
+
 /// A mask of all the rays.
-const ALL: u32 = (1 << PACKET) - 1;
+pub(crate) const ALL: u32 = (1 << PACKET) - 1;
 
 /// What is known of the triangles of a block for all the rays: which may be met, and the errors to reckon with.
 struct Bounds {
@@ -109,7 +124,11 @@ pub(crate) struct Packet<'a> {
     /// The rays, number by number.
     columns: [Row<f64>; 8],
     frustum: Frustum,
+    /// Once they have come to some triangles.
     bundle: Bundle,
+    is_among_triangles: bool,
+    /// Those that are asked for; the others go along with one of them.
+    chosen: u32,
     /// Where each need no longer meet boxes.
     s_max: Row<f32>,
     /// The nearest so far, by heights; its triangle is one of eight times the place of the block, and the lane.
@@ -164,6 +183,8 @@ impl<'a> Packet<'a> {
             columns: [Row::of(0.0); 8],
             frustum,
             bundle,
+            is_among_triangles: false,
+            chosen: 0,
             s_max: row,
             from: row,
             to: row,
@@ -175,7 +196,7 @@ impl<'a> Packet<'a> {
         }
     }
 
-    /// Searches along rays together, the first of which has this position.
+    /// Searches along rays together, the first of which has this position. Those that go another way than others do so together, too.
     #[inline(always)]
     pub(crate) fn search<G: Goal, L: Lanes>(
         &mut self,
@@ -183,59 +204,93 @@ impl<'a> Packet<'a> {
         first: usize,
         ends: &mut impl Ends<G::Answer>,
     ) -> Together {
-        if !self.start::<L>(rays) || !self.run::<G, L>(rays) {
-            return Together::NotAtAll;
+        let mut together = Together { answered: 0, pays: true };
+        let mut rest = ALL;
+        while rest != 0 {
+            L::columns(rays, &mut self.columns);
+            let (chosen, way) = self.ways::<L>(rest.trailing_zeros());
+            self.chosen = chosen & rest;
+            if self.chosen != ALL {
+                if self.chosen.count_ones() < LEAST {
+                    together.pays = false;
+                    break;
+                }
+                self.fill_up();
+            }
+            if !self.start::<L>(way) || !self.run::<G, L>(rays) {
+                together.pays = false;
+                break;
+            }
+            G::answer_together::<L>(self, rays, first, ends);
+            together.pays &= self.work <= WORK_THAT_PAYS;
+            together.answered |= self.chosen;
+            rest &= !self.chosen;
         }
-        G::answer_together::<L>(self, rays, first, ends);
-        if self.work <= WORK_THAT_PAYS { Together::Well } else { Together::Slowly }
+        together
     }
 
-    /// Sets out with rays; false where one is not from nearby or not sound, or where they are not alike.
+    /// Which rays go the way of one: with its signs and its last axis.
     #[inline(always)]
-    fn start<L: Lanes>(&mut self, rays: &[Ray; PACKET]) -> bool {
-        L::columns(rays, &mut self.columns);
-        let Self { columns, frustum, bundle, exact: Exact { start, .. }, .. } = self;
-        let splat = L::Wide::splat;
-        let zero = splat(0.0);
-        let (mut direction, mut length) = ([zero; 3], [zero; 3]);
-        let mut signs = 0;
-        let mut fits = ALL;
-        let mut is_long = 0;
+    fn ways<L: Lanes>(&self, one: u32) -> (u32, Direction) {
+        let zero = L::Wide::splat(0.0);
+        let (mut length, mut negative) = ([zero; 3], [0; 3]);
         for axis in 0..3 {
-            direction[axis] = L::Wide::rounded(&columns[3 + axis]);
-            length[axis] = direction[axis].abs();
-            let negative = splat(1.0).turned_by(direction[axis]).below(zero);
-            if negative != 0 && negative != ALL {
-                return false;
-            }
-            signs |= (negative & 1) << axis;
-            fits &= length[axis].at_most(splat(start.longest));
-            is_long |= splat(start.shortest).at_most(length[axis]);
+            let direction = L::Wide::rounded(&self.columns[3 + axis]);
+            length[axis] = direction.abs();
+            negative[axis] = L::Wide::splat(1.0).turned_by(direction).below(zero);
         }
         let sizes = [length[1].at_most(length[0]), length[2].at_most(length[1]), length[2].at_most(length[0])];
         // Which axis is the last: of the others, either may be larger.
         let x_is_last = sizes[0] & sizes[2];
         let y_is_last = sizes[1] & !x_is_last;
-        let bits = if x_is_last == ALL {
+        let (mut alike, mut signs) = (ALL, 0);
+        for (axis, &negative) in negative.iter().enumerate() {
+            let is_negative = negative >> one & 1;
+            signs |= is_negative << axis;
+            alike &= if is_negative != 0 { negative } else { !negative };
+        }
+        let bits = if x_is_last >> one & 1 != 0 {
+            alike &= x_is_last;
             0b101
-        } else if y_is_last == ALL {
+        } else if y_is_last >> one & 1 != 0 {
+            alike &= y_is_last;
             0b010
-        } else if x_is_last | y_is_last == 0 {
-            0
         } else {
-            return false;
+            alike &= !(x_is_last | y_is_last);
+            0
         };
-        let axes = Axes::by_bits(signs, bits);
-        let (t_min, t_max) = (L::Wide::rounded(&columns[6]), L::Wide::rounded(&columns[7]));
-        fits &= zero.at_most(t_min) & t_min.at_most(t_max);
+        (alike, Direction { signs, axes: Axes::by_bits(signs, bits) })
+    }
 
-        // Among boxes.
+    /// Makes those that are not chosen like one that is.
+    #[cold]
+    #[inline(never)]
+    fn fill_up(&mut self) {
+        let one = self.chosen.trailing_zeros() as usize % PACKET;
+        for Row(column) in &mut self.columns {
+            for i in 0..PACKET {
+                column[i] = if self.chosen >> i & 1 != 0 { column[i] } else { column[one] };
+            }
+        }
+    }
+
+    /// Sets out among boxes; false where one is not from nearby or not sound, or where they are too far apart.
+    #[inline(always)]
+    fn start<L: Lanes>(&mut self, Direction { signs, axes }: Direction) -> bool {
+        let Self { columns, frustum, exact: Exact { start, .. }, .. } = self;
+        let splat = L::Wide::splat;
+        let zero = splat(0.0);
+        let (t_min, t_max) = (L::Wide::rounded(&columns[6]), L::Wide::rounded(&columns[7]));
+        let mut fits = zero.at_most(t_min) & t_min.at_most(t_max);
+        let mut is_long = 0;
         let (mut inverse, mut off) = ([zero; 3], [zero; 3]);
         for axis in 0..3 {
+            let direction = L::Wide::rounded(&columns[3 + axis]);
             let from = L::Wide::rounded_from(&columns[axis], start.tree_origin[axis], start.scale);
             fits &= from.abs().at_most(splat(start.farthest[axis]));
-            let size = splat(start.space_per_unit).over(length[axis].max(splat(start.tiny)));
-            inverse[axis] = size.turned_by(direction[axis]);
+            fits &= direction.abs().at_most(splat(start.longest));
+            is_long |= splat(start.shortest).at_most(direction.abs());
+            inverse[axis] = inverse_of(start, direction);
             let center = from.middle();
             off[axis] = (from - center).abs();
             frustum.center[axis] = center.first();
@@ -244,12 +299,44 @@ impl<'a> Packet<'a> {
             return false;
         }
         let s_max = t_max.times_plus(splat(END_FACTOR), splat(LITTLE as f32));
-        s_max.store(&mut self.s_max);
+        L::Wide::select(self.chosen, s_max, splat(-1.0)).store(&mut self.s_max);
 
-        // Among triangles.
-        let order = axes.order();
-        let unit_inverse = inverse[order[2]] * splat(start.units_per_space);
-        unit_inverse.abs().store(&mut bundle.place_per_height);
+        let [x, y, z] = inverse;
+        let [minus_x, minus_y, minus_z] = [zero - x, zero - y, zero - z];
+        let minus_s_min = t_min * splat(-START_FACTOR);
+        #[rustfmt::skip]
+        let Row(most) = L::Wide::most_of_each([
+            x, y, z, s_max,
+            minus_x, minus_y, minus_z, minus_s_min,
+            off[0], off[1], off[2], zero,
+            zero, zero, zero, zero,
+        ]);
+        let mut are_near = true;
+        for axis in 0..3 {
+            let (most_inverse, minus_least, off) = (most[axis], most[4 + axis], most[8 + axis]);
+            let distance = frustum.center[axis].abs() + off;
+            let margin = distance * start.margin_per_distance + start.margin;
+            frustum.most_inverse[axis] = most_inverse;
+            frustum.least_inverse[axis] = -minus_least;
+            frustum.width[axis] = greater(most_inverse, minus_least) * (off + 3.0 * margin);
+            are_near &= off <= MOST_DISTANCE;
+        }
+        (frustum.s_max, frustum.s_min, frustum.sides) = (most[3], -most[7], Sides::new(signs));
+        (self.bundle.axes, self.is_among_triangles) = (axes, false);
+        are_near
+    }
+
+    /// Sets out among triangles; false where directions are too far apart.
+    #[inline(always)]
+    fn start_triangles<L: Lanes>(&mut self) -> bool {
+        let Self { columns, bundle, exact: Exact { start, .. }, .. } = self;
+        let splat = L::Wide::splat;
+        let zero = splat(0.0);
+        let order = bundle.axes.order();
+        let last = L::Wide::rounded(&columns[3 + order[2]]);
+        let inverse = inverse_of(start, last) * splat(start.units_per_space);
+        inverse.abs().store(&mut bundle.place_per_height);
+        bundle.turn = if columns[3 + order[2]].0[0].is_sign_negative() { 0.0 } else { -0.0 };
         let (mut rest, mut apart) = ([zero; 3], [zero; 3]);
         for (place, &axis) in order.iter().enumerate() {
             let (origin, more) = L::Wide::parted_from(&columns[axis], start.mesh_origin[axis]);
@@ -259,53 +346,33 @@ impl<'a> Packet<'a> {
             bundle.middle[place] = middle.first();
         }
         rest[2].store(&mut bundle.rest[2]);
-        let mut spread = [zero; 2];
+        bundle.apart[2] = apart[2].abs().most();
+        let mut are_alike = true;
         for place in 0..2 {
-            let shear = direction[order[place]] * unit_inverse;
+            let shear = L::Wide::rounded(&columns[3 + order[place]]) * inverse;
             let sheared = rest[2].times_from(shear, rest[place]);
             let middle = shear.middle();
             shear.store(&mut bundle.shear[place]);
             sheared.store(&mut bundle.rest[place]);
             bundle.middle_shear[place] = middle.first();
-            spread[place] = (shear - middle).abs();
-            apart[place] = apart[2].times_from(shear, apart[place] + sheared);
+            bundle.spread[place] = (shear - middle).abs().most();
+            bundle.apart[place] = apart[2].times_from(shear, apart[place] + sheared).abs().most();
+            are_alike &= bundle.spread[place] <= MOST_SPREAD;
         }
+        let (t_min, t_max) = (L::Wide::rounded(&columns[6]), L::Wide::rounded(&columns[7]));
         let (far, roundings) = (splat(FAR), splat(ROUNDINGS));
-        let heights = [(t_min * length[order[2]]).min(far), (t_max * length[order[2]]).min(far)];
+        let heights = [(t_min * last.abs()).min(far), (t_max * last.abs()).min(far)];
         let errors = [heights[0] * roundings, heights[1] * roundings];
         (heights[0] - errors[0]).store(&mut bundle.first);
         (heights[0] + errors[0]).store(&mut bundle.surely_first);
         (heights[1] - errors[1]).store(&mut bundle.surely_last);
         (heights[1] + errors[1]).store(&mut bundle.last);
-        bundle.turn = if signs >> order[2] & 1 != 0 { 0.0 } else { -0.0 };
-        bundle.axes = axes;
-
-        // What holds them all.
-        let [x, y, z] = inverse;
-        let [minus_x, minus_y, minus_z] = [zero - x, zero - y, zero - z];
-        let minus_s_min = t_min * splat(-START_FACTOR);
-        let [apart_x, apart_y, apart_z] = [apart[0].abs(), apart[1].abs(), apart[2].abs()];
-        #[rustfmt::skip]
-        let Row(most) = L::Wide::most_of_each([
-            x, y, z, s_max,
-            minus_x, minus_y, minus_z, minus_s_min,
-            off[0], off[1], off[2], apart_z,
-            apart_x, apart_y, spread[0], spread[1],
-        ]);
-        let mut are_alike = true;
-        for axis in 0..3 {
-            let (most_inverse, minus_least, off) = (most[axis], most[4 + axis], most[8 + axis]);
-            let distance = frustum.center[axis].abs() + off;
-            let margin = distance * start.margin_per_distance + start.margin;
-            frustum.most_inverse[axis] = most_inverse;
-            frustum.least_inverse[axis] = -minus_least;
-            frustum.width[axis] = greater(most_inverse, minus_least) * (off + 3.0 * margin);
-            are_alike &= off <= MOST_DISTANCE;
-        }
-        (frustum.s_max, frustum.s_min, frustum.sides) = (most[3], -most[7], Sides::new(signs));
-        bundle.apart = [most[12], most[13], most[11]];
-        bundle.spread = [most[14], most[15]];
-        are_alike & (most[14] <= MOST_SPREAD) & (most[15] <= MOST_SPREAD)
+        let infinity = splat(f32::INFINITY);
+        infinity.store(&mut self.from);
+        infinity.store(&mut self.to);
+        splat(f32::from_bits(NONE)).store(&mut self.triangle);
+        self.is_among_triangles = true;
+        are_alike
     }
 
     /// Which triangles of a block are left.
@@ -541,8 +608,11 @@ impl<'a> Packet<'a> {
     ) {
         let axes = self.bundle.axes;
         let triangle = L::Wide::load(&self.triangle.0);
-        let hits = !triangle.with_bits(NONE) & !self.unsettled & ALL;
-        let mut others = !hits & ALL;
+        let mut hits = 0;
+        if self.is_among_triangles {
+            hits = !triangle.with_bits(NONE) & !self.unsettled & self.chosen;
+        }
+        let mut others = !hits & self.chosen;
         while others != 0 {
             let i = others.trailing_zeros() as usize % PACKET;
             others &= others - 1;
@@ -602,7 +672,10 @@ impl<'a> Packet<'a> {
     /// Whether each met anything.
     #[inline(always)]
     pub(crate) fn put_met(&self, first: usize, ends: &mut impl Ends<bool>) {
-        for i in 0..PACKET {
+        let mut rest = self.chosen;
+        while rest != 0 {
+            let i = rest.trailing_zeros() as usize % PACKET;
+            rest &= rest - 1;
             let answer = if self.unsettled >> i & 1 != 0 {
                 Outcome::Unsettled
             } else {
@@ -634,11 +707,7 @@ impl<'a> Packet<'a> {
     /// Goes through the tree; false where it gave up.
     #[inline(always)]
     fn run<G: Goal, L: Lanes>(&mut self, rays: &[Ray; PACKET]) -> bool {
-        let infinity = L::Wide::splat(f32::INFINITY);
-        infinity.store(&mut self.from);
-        infinity.store(&mut self.to);
-        L::Wide::splat(f32::from_bits(NONE)).store(&mut self.triangle);
-        (self.alive, self.met, self.unsettled, self.work) = (ALL, 0, 0, 0);
+        (self.alive, self.met, self.unsettled, self.work) = (self.chosen, 0, 0, 0);
         let nodes: &[Node] = self.exact.nodes();
         let mut stack: Stack<<G::Order as Order>::Entry> = Stack::new();
         let mut reference = self.exact.start.root;
@@ -660,6 +729,9 @@ impl<'a> Packet<'a> {
                         None => return true,
                     }
                 }
+            }
+            if !self.is_among_triangles && !self.start_triangles::<L>() {
+                return false;
             }
             self.meet_leaf::<G, L>(reference, rays);
             if self.alive == 0 {
@@ -688,14 +760,11 @@ impl<'a> Packet<'a> {
 }
 
 /// How rays went together.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Together {
-    /// Faster than each alone.
-    Well,
-    /// To the end, but it hardly paid.
-    Slowly,
-    /// Not to the end, and `ends` got nothing.
-    NotAtAll,
+pub(crate) struct Together {
+    /// A bit for each that was answered.
+    pub(crate) answered: u32,
+    /// Whether that is faster than each alone.
+    pub(crate) pays: bool,
 }
 
 /// Whether rays go together, at a level, for tests.
@@ -706,7 +775,11 @@ pub(crate) fn are_alike(level: lanes::Level, accel: &Accel, rays: &[Ray; PACKET]
         type Output = bool;
         #[inline(always)]
         fn run<L: Lanes>(mut self) -> bool {
-            self.0.start::<L>(self.1)
+            let Self(packet, rays) = &mut self;
+            L::columns(rays, &mut packet.columns);
+            let (chosen, way) = packet.ways::<L>(0);
+            packet.chosen = ALL;
+            chosen == ALL && packet.start::<L>(way) && packet.start_triangles::<L>()
         }
     }
     let single = accel.single.as_ref().expect("nothing but triangles");
