@@ -46,13 +46,20 @@ pub(crate) const PACKET: usize = WIDE;
 const MOST_DISTANCE: f32 = 0.125;
 /// How far from their middle directions may be, by the largest component.
 const MOST_SPREAD: f32 = 0.125;
-/// How much they may do before they go alone: where boxes and triangles are small beside the distances between the rays, that is
-/// faster. In nodes met; a block of triangles is as much as two, and so is a triangle.
-const MOST_WORK: u32 = 80;
 /// How many there have to be.
 const LEAST: u32 = 4;
+
+/// How much they may do before they go alone: where boxes and triangles are small beside the distances between the rays, that is
+/// faster. In nodes met; a block of triangles is as much as two, and so is a triangle. Less for any hit, which a ray alone has sooner.
+const fn most_work(is_any: bool) -> u32 {
+    if is_any { 160 } else { 300 }
+}
+
 /// What they may do and have it pay.
-const WORK_THAT_PAYS: u32 = 48;
+const fn work_that_pays(is_any: bool) -> u32 {
+    if is_any { 100 } else { 120 }
+}
+
 /// What the corners of triangles may be wrong by, by their size: 32u, see above.
 const CULL_ERROR: f32 = 32.0 / (1 << 24) as f32;
 
@@ -217,14 +224,22 @@ impl<'a> Packet<'a> {
                 }
                 self.fill_up();
             }
-            if !self.start::<L>(way) || !self.run::<G, L>(rays) {
+            if !self.start::<L>(way) {
                 together.pays = false;
                 break;
             }
+            let is_done = self.run::<G, L>(rays);
+            if !is_done {
+                // Any hit will do for those that have one.
+                self.chosen &= if G::IS_ANY { !self.alive } else { 0 };
+            }
             G::answer_together::<L>(self, rays, first, ends);
-            together.pays &= self.work <= WORK_THAT_PAYS;
+            together.pays &= is_done && self.work <= work_that_pays(G::IS_ANY);
             together.answered |= self.chosen;
             rest &= !self.chosen;
+            if !is_done {
+                break;
+            }
         }
         together
     }
@@ -737,7 +752,7 @@ impl<'a> Packet<'a> {
             if self.alive == 0 {
                 return true;
             }
-            if self.work > MOST_WORK {
+            if self.work > most_work(G::IS_ANY) {
                 return false;
             }
             match self.pop::<G>(&mut stack) {
