@@ -25,7 +25,7 @@ const MANY: usize = 32;
 /// Bytes of nodes and triangles from which on they do not.
 const FAR: usize = 1 << 24;
 
-/// Packets in a row that may go without a try.
+/// Packets in a row that may go alone without a try.
 const LEAST_OFTEN: usize = 16;
 /// Rays among which those that are alike are sought before the others set out.
 const AT_ONCE: usize = 4096;
@@ -116,8 +116,9 @@ impl<G: Goal, E: Ends<G::Answer>, const N: usize, const IS_FAR: bool> Task
         let mut flights: Vec<Flight<G, L>> = Vec::with_capacity(N);
         let mut others = Vec::with_capacity(rays.len().min(AT_ONCE));
         let mut packet = Packet::new(accel, start);
-        // After a packet that did not pay, some rays go otherwise before the next is tried, and ever more while none does.
-        let (mut without, mut patience) = (0, 0);
+        // After a packet that did not pay, others go alone before the next is tried: ever more while none does, and at once many where
+        // none has.
+        let (mut without, mut patience) = (0, LEAST_OFTEN);
         for (number, rays) in rays.chunks(AT_ONCE).enumerate() {
             for (place, chunk) in rays.chunks(PACKET).enumerate() {
                 let first = number * AT_ONCE + place * PACKET;
@@ -127,11 +128,8 @@ impl<G: Goal, E: Ends<G::Answer>, const N: usize, const IS_FAR: bool> Task
                 } else if has_packets && let Ok(alike) = <&[Ray; PACKET]>::try_from(chunk) {
                     let together = packet.search::<G, L>(alike, first, &mut ends);
                     answered = together.answered;
-                    (without, patience) = if together.pays {
-                        (0, 0)
-                    } else {
-                        (patience, (2 * patience).clamp(1, LEAST_OFTEN))
-                    };
+                    (without, patience) =
+                        if together.pays { (0, 0) } else { (patience, (2 * patience).clamp(1, LEAST_OFTEN)) };
                 }
                 if answered != packet::ALL {
                     let is_left = |(position, _): &(usize, &Ray)| answered >> (position - first) & 1 == 0;

@@ -254,7 +254,8 @@ impl<'a> Packet<'a> {
             length[axis] = direction.abs();
             negative[axis] = L::Wide::splat(1.0).turned_by(direction).below(zero);
         }
-        let sizes = [length[1].at_most(length[0]), length[2].at_most(length[1]), length[2].at_most(length[0])];
+        let sizes =
+            [length[1].at_most(length[0]), length[2].at_most(length[1]), length[2].at_most(length[0])];
         // Which axis is the last: of the others, either may be larger.
         let x_is_last = sizes[0] & sizes[2];
         let y_is_last = sizes[1] & !x_is_last;

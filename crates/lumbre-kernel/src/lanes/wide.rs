@@ -270,8 +270,8 @@ impl Wide for Portable16 {
     #[inline(always)]
     fn most_of_each(them: [Self; WIDE]) -> Row<f32> {
         let mut most = Row::of(0.0);
-        for lane in 0..WIDE {
-            most.0[lane] = them[lane].most();
+        for (most, one) in most.0.iter_mut().zip(them) {
+            *most = one.most();
         }
         most
     }
@@ -444,8 +444,7 @@ mod x86 {
                 let high = _mm512_sub_pd(_mm512_loadu_pd(row.0.as_ptr().add(WIDE / 2)), place);
                 let rounded = Self::of_halves(low, high);
                 let low_rest = _mm512_sub_pd(low, _mm512_cvtps_pd(_mm512_castps512_ps256(rounded.0)));
-                let high_rest =
-                    _mm512_sub_pd(high, _mm512_cvtps_pd(_mm512_extractf32x8_ps::<1>(rounded.0)));
+                let high_rest = _mm512_sub_pd(high, _mm512_cvtps_pd(_mm512_extractf32x8_ps::<1>(rounded.0)));
                 (rounded, Self::of_halves(low_rest, high_rest))
             }
         }
@@ -599,9 +598,7 @@ mod x86 {
         #[inline(always)]
         fn with_bits(self, bits: u32) -> u32 {
             // SAFETY: see the type.
-            unsafe {
-                u32::from(_mm512_cmpeq_epi32_mask(self.integers(), _mm512_set1_epi32(bits as i32)))
-            }
+            unsafe { u32::from(_mm512_cmpeq_epi32_mask(self.integers(), _mm512_set1_epi32(bits as i32))) }
         }
 
         #[inline(always)]
