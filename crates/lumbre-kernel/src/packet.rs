@@ -131,6 +131,8 @@ pub(crate) struct Packet<'a> {
     /// The rays, number by number.
     columns: [Row<f64>; 8],
     frustum: Frustum,
+    /// Whether they start where the first does.
+    has_one_origin: bool,
     /// Once they have come to some triangles.
     bundle: Bundle,
     is_among_triangles: bool,
@@ -190,6 +192,7 @@ impl<'a> Packet<'a> {
             columns: [Row::of(0.0); 8],
             frustum,
             bundle,
+            has_one_origin: false,
             is_among_triangles: false,
             chosen: 0,
             s_max: row,
@@ -293,25 +296,35 @@ impl<'a> Packet<'a> {
     /// Sets out among boxes; false where one is not from nearby or not sound, or where they are too far apart.
     #[inline(always)]
     fn start<L: Lanes>(&mut self, Direction { signs, axes }: Direction) -> bool {
+        self.has_one_origin = L::Wide::are_same(&self.columns[0])
+            && L::Wide::are_same(&self.columns[1])
+            && L::Wide::are_same(&self.columns[2]);
         let Self { columns, frustum, exact: Exact { start, .. }, .. } = self;
         let splat = L::Wide::splat;
         let zero = splat(0.0);
         let (t_min, t_max) = (L::Wide::rounded(&columns[6]), L::Wide::rounded(&columns[7]));
         let mut fits = zero.at_most(t_min) & t_min.at_most(t_max);
-        let mut is_long = 0;
+        let (mut is_long, mut is_near) = (0, true);
         let (mut inverse, mut off) = ([zero; 3], [zero; 3]);
+        let has_one_origin = self.has_one_origin;
         for axis in 0..3 {
             let direction = L::Wide::rounded(&columns[3 + axis]);
-            let from = L::Wide::rounded_from(&columns[axis], start.tree_origin[axis], start.scale);
-            fits &= from.abs().at_most(splat(start.farthest[axis]));
             fits &= direction.abs().at_most(splat(start.longest));
             is_long |= splat(start.shortest).at_most(direction.abs());
             inverse[axis] = inverse_of(start, direction);
-            let center = from.middle();
-            off[axis] = (from - center).abs();
-            frustum.center[axis] = center.first();
+            let (origin, scale) = (start.tree_origin[axis], start.scale);
+            if has_one_origin {
+                frustum.center[axis] = ((columns[axis].0[0] - origin) * scale) as f32;
+                is_near &= frustum.center[axis].abs() <= start.farthest[axis];
+            } else {
+                let from = L::Wide::rounded_from(&columns[axis], origin, scale);
+                let center = from.middle();
+                fits &= from.abs().at_most(splat(start.farthest[axis]));
+                off[axis] = (from - center).abs();
+                frustum.center[axis] = center.first();
+            }
         }
-        if fits != ALL || is_long != ALL {
+        if fits != ALL || is_long != ALL || !is_near {
             return false;
         }
         let s_max = t_max.times_plus(splat(END_FACTOR), splat(LITTLE as f32));
@@ -327,7 +340,6 @@ impl<'a> Packet<'a> {
             off[0], off[1], off[2], zero,
             zero, zero, zero, zero,
         ]);
-        let mut are_near = true;
         for axis in 0..3 {
             let (most_inverse, minus_least, off) = (most[axis], most[4 + axis], most[8 + axis]);
             let distance = frustum.center[axis].abs() + off;
@@ -335,11 +347,11 @@ impl<'a> Packet<'a> {
             frustum.most_inverse[axis] = most_inverse;
             frustum.least_inverse[axis] = -minus_least;
             frustum.width[axis] = greater(most_inverse, minus_least) * (off + 3.0 * margin);
-            are_near &= off <= MOST_DISTANCE;
+            is_near &= off <= MOST_DISTANCE;
         }
         (frustum.s_max, frustum.s_min, frustum.sides) = (most[3], -most[7], Sides::new(signs));
         (self.bundle.axes, self.is_among_triangles) = (axes, false);
-        are_near
+        is_near
     }
 
     /// Sets out among triangles; false where directions are too far apart.
@@ -353,16 +365,25 @@ impl<'a> Packet<'a> {
         let inverse = inverse_of(start, last) * splat(start.units_per_space);
         inverse.abs().store(&mut bundle.place_per_height);
         bundle.turn = if columns[3 + order[2]].0[0].is_sign_negative() { 0.0 } else { -0.0 };
-        let (mut rest, mut apart) = ([zero; 3], [zero; 3]);
+        let (mut rest, mut off) = ([zero; 3], [zero; 3]);
         for (place, &axis) in order.iter().enumerate() {
-            let (origin, more) = L::Wide::parted_from(&columns[axis], start.mesh_origin[axis]);
-            let middle = origin.middle();
-            origin.store(&mut bundle.origin[place]);
-            (rest[place], apart[place]) = (more, origin - middle);
-            bundle.middle[place] = middle.first();
+            let mesh_origin = start.mesh_origin[axis];
+            if self.has_one_origin {
+                let exact = columns[axis].0[0] - mesh_origin;
+                let origin = exact as f32;
+                let more = (exact - f64::from(origin)) as f32;
+                rest[place] = splat(more);
+                splat(origin).store(&mut bundle.origin[place]);
+                (bundle.middle[place], bundle.apart[place]) = (origin, more.abs());
+            } else {
+                let (origin, more) = L::Wide::parted_from(&columns[axis], mesh_origin);
+                let middle = origin.middle();
+                (rest[place], off[place]) = (more, origin - middle);
+                origin.store(&mut bundle.origin[place]);
+                bundle.middle[place] = middle.first();
+            }
         }
         rest[2].store(&mut bundle.rest[2]);
-        bundle.apart[2] = apart[2].abs().most();
         let mut are_alike = true;
         for place in 0..2 {
             let shear = L::Wide::rounded(&columns[3 + order[place]]) * inverse;
@@ -372,9 +393,15 @@ impl<'a> Packet<'a> {
             sheared.store(&mut bundle.rest[place]);
             bundle.middle_shear[place] = middle.first();
             bundle.spread[place] = (shear - middle).abs().most();
-            bundle.apart[place] = apart[2].times_from(shear, apart[place] + sheared).abs().most();
             are_alike &= bundle.spread[place] <= MOST_SPREAD;
+            if self.has_one_origin {
+                // Of the rest alone, with a shear of no more than one and few roundings.
+                bundle.apart[place] = 1.5 * (bundle.apart[place] + bundle.apart[2]);
+            } else {
+                bundle.apart[place] = off[2].times_from(shear, off[place] + sheared).abs().most();
+            }
         }
+        bundle.apart[2] = if self.has_one_origin { 0.0 } else { off[2].abs().most() };
         let (t_min, t_max) = (L::Wide::rounded(&columns[6]), L::Wide::rounded(&columns[7]));
         let (far, roundings) = (splat(FAR), splat(ROUNDINGS));
         let heights = [(t_min * last.abs()).min(far), (t_max * last.abs()).min(far)];

@@ -30,6 +30,8 @@ pub(crate) trait Wide: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Outp
     fn store(self, row: &mut Row<f32>);
     /// Rounded.
     fn rounded(row: &Row<f64>) -> Self;
+    /// Whether all are as the first; a NaN is not.
+    fn are_same(row: &Row<f64>) -> bool;
     /// From a place, in other units; rounded, after it was computed in double precision.
     fn rounded_from(row: &Row<f64>, place: f64, scale: f64) -> Self;
     /// From a place, rounded, and what rounding took.
@@ -163,6 +165,15 @@ impl Wide for Portable16 {
             *one = exact as f32;
         }
         Self(all)
+    }
+
+    #[inline(always)]
+    fn are_same(row: &Row<f64>) -> bool {
+        let mut are_same = true;
+        for one in row.0 {
+            are_same &= one == row.0[0];
+        }
+        are_same
     }
 
     #[inline(always)]
@@ -421,6 +432,18 @@ mod x86 {
             unsafe {
                 let low = _mm512_loadu_pd(row.0.as_ptr());
                 Self::of_halves(low, _mm512_loadu_pd(row.0.as_ptr().add(WIDE / 2)))
+            }
+        }
+
+        #[inline(always)]
+        fn are_same(row: &Row<f64>) -> bool {
+            // SAFETY: see the type. The loads are of eight f64 each, of sixteen.
+            unsafe {
+                let first = _mm512_set1_pd(row.0[0]);
+                let low = _mm512_loadu_pd(row.0.as_ptr());
+                let high = _mm512_loadu_pd(row.0.as_ptr().add(WIDE / 2));
+                _mm512_cmp_pd_mask::<_CMP_NEQ_UQ>(low, first) | _mm512_cmp_pd_mask::<_CMP_NEQ_UQ>(high, first)
+                    == 0
             }
         }
 
@@ -811,6 +834,24 @@ mod x86 {
         #[inline(always)]
         fn rounded(row: &Row<f64>) -> Self {
             Self::of_quarters(Self::quarters(row))
+        }
+
+        #[inline(always)]
+        fn are_same(row: &Row<f64>) -> bool {
+            let [a, b, c, d] = Self::quarters(row);
+            // SAFETY: see the type.
+            unsafe {
+                let first = _mm256_set1_pd(row.0[0]);
+                let low = _mm256_and_pd(
+                    _mm256_cmp_pd::<_CMP_EQ_OQ>(a, first),
+                    _mm256_cmp_pd::<_CMP_EQ_OQ>(b, first),
+                );
+                let high = _mm256_and_pd(
+                    _mm256_cmp_pd::<_CMP_EQ_OQ>(c, first),
+                    _mm256_cmp_pd::<_CMP_EQ_OQ>(d, first),
+                );
+                _mm256_movemask_pd(_mm256_and_pd(low, high)) == 0b1111
+            }
         }
 
         #[inline(always)]
