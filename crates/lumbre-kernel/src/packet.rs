@@ -715,16 +715,19 @@ impl<'a> Packet<'a> {
     /// Whether each met anything.
     #[inline(always)]
     pub(crate) fn put_met(&self, first: usize, ends: &mut impl Ends<bool>) {
+        if self.chosen & !self.unsettled == ALL {
+            for i in 0..PACKET {
+                ends.put(first + i, Outcome::Settled(self.met >> i & 1 != 0));
+            }
+            return;
+        }
         let mut rest = self.chosen;
         while rest != 0 {
             let i = rest.trailing_zeros() as usize % PACKET;
             rest &= rest - 1;
-            let answer = if self.unsettled >> i & 1 != 0 {
-                Outcome::Unsettled
-            } else {
-                Outcome::Settled(self.met >> i & 1 != 0)
-            };
-            ends.put(first + i, answer);
+            let is_settled = self.unsettled >> i & 1 == 0;
+            let is_met = self.met >> i & 1 != 0;
+            ends.put(first + i, if is_settled { Outcome::Settled(is_met) } else { Outcome::Unsettled });
         }
     }
 

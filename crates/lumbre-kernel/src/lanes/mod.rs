@@ -230,10 +230,11 @@ impl Axes {
         &ALL[(((sizes % 8) << 3) | (signs % 8)) as usize]
     }
 
-    /// What they are in it.
+    /// What they are in it: each below three, as the compiler then knows.
     #[inline(always)]
     pub(crate) fn order(&self) -> [usize; 3] {
-        [self.order[0] as usize % 3, self.order[1] as usize % 3, self.order[2] as usize % 3]
+        let [x, y, z, _] = self.order;
+        [x.min(2) as usize, y.min(2) as usize, z.min(2) as usize]
     }
 
     /// A vector's components in this order.
