@@ -16,7 +16,7 @@ use crate::hulls::Hulls;
 use crate::lanes::Level;
 use crate::node::{Units, tag};
 use crate::query::{All, Any, Batch, Closest, Count, Filter, If};
-use crate::single::{self, Nearest, Outcome, Questions, Whether, Winner};
+use crate::single::{self, Goal, Nearest, Outcome, Questions, Whether, Winner};
 use crate::winding::{self, Moments};
 use crate::{
     ClosestPoint, Geometry, GeometryKind, Hit, LoadError, MapError, NoClosestPoint, NoWindingNumber,
@@ -358,12 +358,8 @@ impl Accel {
         accept: &mut dyn FnMut(&Hit) -> bool,
     ) -> Option<Hit> {
         let mut filter = If::new(accept);
-        if let Some(start) = &self.single {
-            let asking = filter.of_tree(self);
-            match single::search_among::<Nearest, _>(level, self, start, ray, asking) {
-                Outcome::Settled(winner) => return winner.map(|winner| winner.to_hit(self)),
-                Outcome::Unsettled => filter.end_of_single(false),
-            }
+        if let Outcome::Settled(found) = self.ask_singly::<Nearest, _>(level, ray, &mut filter) {
+            return found;
         }
         let mut search = Closest::new(ray, filter);
         traverse::search(level, self, ray, &mut search);
@@ -400,6 +396,23 @@ impl Accel {
         self.any_filtered_at(self.level, ray, &mut accept)
     }
 
+    /// What a closure takes, in single precision; where that cannot tell, the filter knows what the closure has answered.
+    fn ask_singly<G: Goal, F: FnMut(&Hit) -> bool>(
+        &self,
+        level: Level,
+        ray: &Ray,
+        filter: &mut If<F>,
+    ) -> Outcome<G::Found> {
+        let Some(start) = &self.single else { return Outcome::Unsettled };
+        match single::search_among::<G, _>(level, self, start, ray, filter.of_tree(self)) {
+            Outcome::Settled(answer) => Outcome::Settled(G::found(self, answer)),
+            Outcome::Unsettled => {
+                filter.end_of_single(false);
+                Outcome::Unsettled
+            }
+        }
+    }
+
     pub(crate) fn any_filtered_at(
         &self,
         level: Level,
@@ -407,12 +420,8 @@ impl Accel {
         accept: &mut dyn FnMut(&Hit) -> bool,
     ) -> bool {
         let mut filter = If::new(accept);
-        if let Some(start) = &self.single {
-            let asking = filter.of_tree(self);
-            match single::search_among::<Whether, _>(level, self, start, ray, asking) {
-                Outcome::Settled(is_hit) => return is_hit,
-                Outcome::Unsettled => filter.end_of_single(false),
-            }
+        if let Outcome::Settled(is_hit) = self.ask_singly::<Whether, _>(level, ray, &mut filter) {
+            return is_hit;
         }
         let mut search = Any::new(ray, filter);
         traverse::search(level, self, ray, &mut search);

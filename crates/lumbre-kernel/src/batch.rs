@@ -1,6 +1,6 @@
 //! Many rays at once.
 //!
-//! Those that are alike go together: see [`packet`](crate::packet). The others are in flight, some on a thread, so that one's arithmetic fills the
+//! Those that are alike go together: see [`packet`]. The others are in flight, some on a thread, so that one's arithmetic fills the
 //! waits of another: which boxes each of them meets is told for all before any of them turns by it. Each ray takes the very
 //! steps that it takes alone, in turn with the others: its answer has the same bits.
 

@@ -115,8 +115,8 @@ impl Filter for QueryOptions<'_> {
     }
 }
 
-/// What a search in one tree takes of what stands in that itself, by default everything: told by names and faces, before anything is known of where it is
-/// met; or by the hit itself.
+/// What a search in one tree takes of what stands in that itself, by default everything: told by names and faces, before anything
+/// is known of where it is met; or by the hit itself.
 pub(crate) trait Selection: Copy {
     /// Whether it takes everything, so that nothing has to be asked.
     const TAKES_ALL: bool;

@@ -11,9 +11,9 @@
 //! is `(p - q) r + (q - o) r`, where q is a place among the starts o, which are all within an eighth of it. That is another order
 //! of the same operations, with one more subtraction and one more sum: together wrong by less than 4u|r| (1.3 + |q|), where a
 //! ray's margin is at least 8u|r| (1.01 + |o|). Twice that margin is added. The frustum takes the least of `(p - q) r` over all
-//! rays, as it is computed, and from it the largest |r| times the largest |q - o| and thrice the largest margin by |r|: with three
-//! roundings of something below |r|/2, which that sum of margins has room for. So it is no later than any ray with its margin, and likewise no
-//! earlier where it leaves.
+//! rays, as it is computed, and from it the largest |r| times the sum of the largest |q - o| and thrice the largest margin by |r|:
+//! with three roundings of something below |r|/2, for which those margins have room. So it is no later than any ray with its
+//! margin, and likewise no earlier where it leaves.
 //!
 //! # Why none of its rays loses a triangle
 //!

@@ -95,6 +95,13 @@ struct Answered<F> {
     latest: SmallVec<[(CrossingName, bool); 4]>,
 }
 
+impl<F: FnMut(&Hit) -> bool> Answered<F> {
+    /// What the closure takes of a crossing that may be met again: it is asked once.
+    fn take_once(&mut self, name: CrossingName, hit: impl FnOnce() -> Hit) -> bool {
+        *self.answers.entry(name).or_insert_with(|| (self.accept)(&hit()))
+    }
+}
+
 impl<F: FnMut(&Hit) -> bool> If<F> {
     pub(crate) fn new(accept: F) -> Self {
         let answered = Answered { accept, answers: BTreeMap::new(), latest: SmallVec::new() };
@@ -110,19 +117,19 @@ impl<F: FnMut(&Hit) -> bool> If<F> {
 impl<F: FnMut(&Hit) -> bool> Filter for If<F> {
     const TAKES_ALL: bool = false;
     fn takes(&mut self, found: &Found) -> bool {
-        let Answered { accept, answers, .. } = self.asked.get_mut();
+        let asked = self.asked.get_mut();
         let is_part = match found.what {
             What::Lane { block, lane } => {
                 found.accel.tree.is_part(found.accel.tree.block(block).number(), lane)
             }
             _ => false,
         };
-        if !is_part && answers.is_empty() {
-            return accept(&found.to_hit());
+        if !is_part && asked.answers.is_empty() {
+            return (asked.accept)(&found.to_hit());
         }
         let (geometry, primitive) = found.what.names(found.accel);
-        let crossing = (found.place.route.clone(), geometry, primitive, found.order);
-        *answers.entry(crossing).or_insert_with(|| accept(&found.to_hit()))
+        let name = (found.place.route.clone(), geometry, primitive, found.order);
+        asked.take_once(name, || found.to_hit())
     }
 
     type Selection<'s>
@@ -169,13 +176,13 @@ impl<F: FnMut(&Hit) -> bool> Selection for Asking<'_, F> {
             let place = placed.place();
             (hit.instances, hit.route) = (place.ids, place.route);
         }
-        let Answered { accept, answers, latest } = &mut *self.filter.asked.borrow_mut();
+        let asked = &mut *self.filter.asked.borrow_mut();
         let name = (hit.route.clone(), hit.geometry, hit.primitive, order);
         if may_come_again {
-            return *answers.entry(name).or_insert_with(|| accept(&hit));
+            return asked.take_once(name, || hit);
         }
-        let is_taken = accept(&hit);
-        latest.push((name, is_taken));
+        let is_taken = (asked.accept)(&hit);
+        asked.latest.push((name, is_taken));
         is_taken
     }
 }

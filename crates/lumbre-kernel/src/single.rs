@@ -692,10 +692,18 @@ pub(crate) trait Goal {
     type Order: Order;
     /// What it is to know.
     type Answer;
+    /// The same as it is handed out.
+    type Found;
     /// The answer where nothing comes near.
     const NOTHING: Self::Answer;
     /// Whether any hit will do.
     const IS_ANY: bool;
+
+    /// Hands out an answer of a tree.
+    fn found(accel: &Accel, answer: Self::Answer) -> Self::Found;
+
+    /// What the plain search finds.
+    fn find_plainly(accel: &Accel, level: Level, ray: &Ray) -> Self::Found;
 
     /// Tests a leaf of triangles; how the search ends, if it does.
     fn meet_triangles<L: Lanes, S: Selection, const MIXED: bool>(
@@ -735,8 +743,19 @@ pub(crate) enum Nearest {}
 impl Goal for Nearest {
     type Order = ByDistance;
     type Answer = Option<Winner>;
+    type Found = Option<Hit>;
     const NOTHING: Option<Winner> = None;
     const IS_ANY: bool = false;
+
+    #[inline(always)]
+    fn found(accel: &Accel, answer: Option<Winner>) -> Option<Hit> {
+        answer.map(|winner| winner.to_hit(accel))
+    }
+
+    #[inline(always)]
+    fn find_plainly(accel: &Accel, level: Level, ray: &Ray) -> Option<Hit> {
+        accel.closest_plainly_at(level, ray)
+    }
 
     #[inline(always)]
     fn meet_triangles<L: Lanes, S: Selection, const MIXED: bool>(
@@ -784,8 +803,19 @@ pub(crate) enum Whether {}
 impl Goal for Whether {
     type Order = AsBuilt;
     type Answer = bool;
+    type Found = bool;
     const NOTHING: bool = false;
     const IS_ANY: bool = true;
+
+    #[inline(always)]
+    fn found(_: &Accel, answer: bool) -> bool {
+        answer
+    }
+
+    #[inline(always)]
+    fn find_plainly(accel: &Accel, level: Level, ray: &Ray) -> bool {
+        accel.any_plainly_at(level, ray)
+    }
 
     #[inline(always)]
     fn meet_triangles<L: Lanes, S: Selection, const MIXED: bool>(
@@ -844,9 +874,17 @@ impl Questions {
     /// Of a tree that has this start.
     pub(crate) fn new(level: Level, start: Option<&SingleStart>) -> Self {
         match start {
-            Some(start) if start.is_mixed => Self::of::<Singly<true>>(level),
-            Some(_) => Self::of::<Singly<false>>(level),
-            None => Self::of::<Plainly>(level),
+            Some(start) if start.is_mixed => Self {
+                closest: level.asked::<Singly<Nearest, true>>(),
+                any: level.asked::<Singly<Whether, true>>(),
+            },
+            Some(_) => Self {
+                closest: level.asked::<Singly<Nearest, false>>(),
+                any: level.asked::<Singly<Whether, false>>(),
+            },
+            None => {
+                Self { closest: level.asked::<Plainly<Nearest>>(), any: level.asked::<Plainly<Whether>>() }
+            }
         }
     }
 
@@ -855,75 +893,38 @@ impl Questions {
     pub(crate) fn leaking(level: Level, start: Option<&SingleStart>) -> Option<Self> {
         start.filter(|start| !start.is_mixed)?;
         Some(Self {
-            closest: level.asked_leaking::<ClosestHit<Singly<false>>>()?,
-            any: level.asked_leaking::<AnyHit<Singly<false>>>()?,
+            closest: level.asked_leaking::<Singly<Nearest, false>>()?,
+            any: level.asked_leaking::<Singly<Whether, false>>()?,
         })
     }
-
-    fn of<W>(level: Level) -> Self
-    where
-        ClosestHit<W>: Question<Answer = Option<Hit>>,
-        AnyHit<W>: Question<Answer = bool>,
-    {
-        Self { closest: level.asked::<ClosestHit<W>>(), any: level.asked::<AnyHit<W>>() }
-    }
 }
-
-/// The nearest hit of a ray.
-struct ClosestHit<W>(PhantomData<W>);
-
-/// Whether a ray hits anything.
-struct AnyHit<W>(PhantomData<W>);
 
 /// In single precision first. `MIXED` as below.
-struct Singly<const MIXED: bool>;
+struct Singly<G, const MIXED: bool>(PhantomData<G>);
 
 /// In double precision alone.
-struct Plainly;
+struct Plainly<G>(PhantomData<G>);
 
-impl<const MIXED: bool> Question for ClosestHit<Singly<MIXED>> {
-    type Answer = Option<Hit>;
+impl<G: Goal, const MIXED: bool> Question for Singly<G, MIXED> {
+    type Answer = G::Found;
 
     #[inline(always)]
-    fn ask<L: Lanes>(accel: &Accel, ray: &Ray) -> Option<Hit> {
+    fn ask<L: Lanes>(accel: &Accel, ray: &Ray) -> G::Found {
         if let Some(start) = &accel.single
-            && let Outcome::Settled(winner) = Alone::<Nearest, MIXED>::new(accel, start, ray).run::<L>()
+            && let Outcome::Settled(answer) = Alone::<G, MIXED>::new(accel, start, ray).run::<L>()
         {
-            return winner.map(|winner| winner.to_hit(accel));
+            return G::found(accel, answer);
         }
-        accel.closest_plainly_at(L::level(), ray)
+        G::find_plainly(accel, L::level(), ray)
     }
 }
 
-impl<const MIXED: bool> Question for AnyHit<Singly<MIXED>> {
-    type Answer = bool;
+impl<G: Goal> Question for Plainly<G> {
+    type Answer = G::Found;
 
     #[inline(always)]
-    fn ask<L: Lanes>(accel: &Accel, ray: &Ray) -> bool {
-        if let Some(start) = &accel.single
-            && let Outcome::Settled(is_hit) = Alone::<Whether, MIXED>::new(accel, start, ray).run::<L>()
-        {
-            return is_hit;
-        }
-        accel.any_plainly_at(L::level(), ray)
-    }
-}
-
-impl Question for ClosestHit<Plainly> {
-    type Answer = Option<Hit>;
-
-    #[inline(always)]
-    fn ask<L: Lanes>(accel: &Accel, ray: &Ray) -> Option<Hit> {
-        accel.closest_plainly_at(L::level(), ray)
-    }
-}
-
-impl Question for AnyHit<Plainly> {
-    type Answer = bool;
-
-    #[inline(always)]
-    fn ask<L: Lanes>(accel: &Accel, ray: &Ray) -> bool {
-        accel.any_plainly_at(L::level(), ray)
+    fn ask<L: Lanes>(accel: &Accel, ray: &Ray) -> G::Found {
+        G::find_plainly(accel, L::level(), ray)
     }
 }
 

@@ -1,7 +1,8 @@
-//! The fence around SIMD, and around the one array that is not cleared: the only module with `unsafe`, but for the call that maps a file. Outside it, a search is written once, over [`Lanes`].
+//! The fence around SIMD, and around the one array that is not cleared: the only module with `unsafe`, but for the call that maps
+//! a file. Outside it, a search is written once, over [`Lanes`].
 //!
-//! [`Level::run`] chooses the instruction set once a search, and [`Level::asked`] for all searches. The code between is generic and `#[inline(always)]` without a
-//! target feature of its own, so that it takes on the features of the root that it is inlined into.
+//! [`Level::run`] chooses the instruction set once a search, and [`Level::asked`] for all searches. The code between is generic and
+//! `#[inline(always)]` without a target feature of its own, so that it takes on the features of the root that it is inlined into.
 
 #![allow(unsafe_code)]
 
@@ -87,7 +88,8 @@ pub(crate) trait Lanes: SphereLanes + HullLanes {
     /// [`Shear::new`] and [`Shear::local_origin`] of a ray that has these axes, for a mesh.
     fn shear(ray: &Ray, axes: &'static Axes, mesh_origin: &[f64; 4]) -> (Shear, [f64; 3]);
 
-    /// How a ray passes the triangle in a lane, in double precision, and what its crossing inside is made of. `origin` has the order of the shear's axes.
+    /// How a ray passes the triangle in a lane, in double precision, and what its crossing inside is made of. `origin` has the order
+    /// of the shear's axes.
     fn pass(block: &TriangleBlock, lane: usize, shear: &Shear, origin: &[f64; 3]) -> (Passage, Inside);
 }
 
