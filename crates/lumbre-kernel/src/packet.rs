@@ -32,6 +32,8 @@ use crate::blocks::Blocks;
 use crate::holds::SingleStart;
 use crate::lanes::{self, Axes, Corners, Lanes, Row, Sides, WIDE, Wide};
 use crate::node::{END_FACTOR, LITTLE, Node, START_FACTOR, tag};
+#[cfg(test)]
+use crate::single::Nearest;
 use crate::single::{Candidate, Exact, Goal, Outcome, Winner, heights};
 use crate::stack::{Order, Stack};
 use crate::triangles::{
@@ -257,11 +259,16 @@ impl<'a> Packet<'a> {
             length[axis] = direction.abs();
             negative[axis] = L::Wide::splat(1.0).turned_by(direction).below(zero);
         }
-        let sizes =
-            [length[1].at_most(length[0]), length[2].at_most(length[1]), length[2].at_most(length[0])];
+        // For each pair, where the first is longer and where the second is: rounding keeps their order, or makes them equal.
+        let [x, y, z] = length;
+        let mut longer = [y.below(x), z.below(y), z.below(x)];
+        let shorter = [x.below(y), y.below(z), x.below(z)];
+        if (longer[0] | shorter[0]) & (longer[1] | shorter[1]) & (longer[2] | shorter[2]) != ALL {
+            longer = self.no_shorter();
+        }
         // Which axis is the last: of the others, either may be larger.
-        let x_is_last = sizes[0] & sizes[2];
-        let y_is_last = sizes[1] & !x_is_last;
+        let x_is_last = longer[0] & longer[2];
+        let y_is_last = longer[1] & !x_is_last;
         let (mut alike, mut signs) = (ALL, 0);
         for (axis, &negative) in negative.iter().enumerate() {
             let is_negative = negative >> one & 1;
@@ -279,6 +286,21 @@ impl<'a> Packet<'a> {
             0
         };
         (alike, Direction { signs, axes: Axes::by_bits(signs, bits) })
+    }
+
+    /// Where x is no shorter than y, y than z, and x than z, in double precision.
+    #[cold]
+    #[inline(never)]
+    fn no_shorter(&self) -> [u32; 3] {
+        let [_, _, _, Row(x), Row(y), Row(z), ..] = &self.columns;
+        let mut no_shorter = [0; 3];
+        for i in 0..PACKET {
+            let [x, y, z] = [x[i].abs(), y[i].abs(), z[i].abs()];
+            no_shorter[0] |= u32::from(x >= y) << i;
+            no_shorter[1] |= u32::from(y >= z) << i;
+            no_shorter[2] |= u32::from(x >= z) << i;
+        }
+        no_shorter
     }
 
     /// Makes those that are not chosen like one that is.
@@ -813,21 +835,17 @@ pub(crate) struct Together {
     pub(crate) pays: bool,
 }
 
-/// Whether rays go together, at a level, for tests.
+/// Those of some rays that a packet answers, at a level, for tests.
 #[cfg(test)]
-pub(crate) fn are_alike(level: lanes::Level, accel: &Accel, rays: &[Ray; PACKET]) -> bool {
-    struct Starting<'a>(Packet<'a>, &'a [Ray; PACKET]);
-    impl lanes::Task for Starting<'_> {
-        type Output = bool;
+pub(crate) fn answered_together(level: lanes::Level, accel: &Accel, rays: &[Ray; PACKET]) -> u32 {
+    struct Searching<'a>(Packet<'a>, &'a [Ray; PACKET]);
+    impl lanes::Task for Searching<'_> {
+        type Output = u32;
         #[inline(always)]
-        fn run<L: Lanes>(mut self) -> bool {
-            let Self(packet, rays) = &mut self;
-            L::columns(rays, &mut packet.columns);
-            let (chosen, way) = packet.ways::<L>(0);
-            packet.chosen = ALL;
-            chosen == ALL && packet.start::<L>(way) && packet.start_triangles::<L>()
+        fn run<L: Lanes>(mut self) -> u32 {
+            self.0.search::<Nearest, L>(self.1, 0, &mut |_, _| {}).answered
         }
     }
     let single = accel.single.as_ref().expect("nothing but triangles");
-    level.run(Starting(Packet::new(accel, single), rays))
+    level.run(Searching(Packet::new(accel, single), rays))
 }

@@ -25,4 +25,5 @@ mod small;
 mod spheres;
 mod surfaces;
 mod watertight;
+mod wide;
 mod winding;

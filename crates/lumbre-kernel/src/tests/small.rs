@@ -69,7 +69,7 @@ fn sixteen_rays_that_go_together_are_answered_as_each_alone() {
         let beside = if i == 5 { DVec3::ZERO } else { 0.3 * random.vector() };
         Ray::new(eye, CENTER + DVec3::new(0.0, 0.0, 2.0) + beside - eye)
     });
-    assert!(packet::are_alike(accel.level, &accel, &rays));
+    assert_eq!(packet::answered_together(accel.level, &accel, &rays), packet::ALL);
     let (mut hits, mut any) = (vec![None; rays.len()], vec![false; rays.len()]);
     accel.closest_batch(&rays, &mut hits);
     accel.any_batch(&rays, &mut any);
