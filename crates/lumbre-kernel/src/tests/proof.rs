@@ -13,6 +13,7 @@ use super::scenes::{
     Random, bumpy, cube, icosphere, mixture, ray, soup, torus, vertex, with_every_preset,
     with_parts_everywhere,
 };
+use crate::packet::PACKET;
 use crate::{Accel, BuildOptions, Geometry, GeometryKind, Instance, Preset, TriangleMesh, brute};
 
 /// Closed meshes, each with a point inside.
@@ -65,8 +66,8 @@ fn placements(mesh: &TriangleMesh, preset: Preset) -> [(Accel, Transform); 4] {
 const CHUNK: u64 = 1 << 14;
 
 /// Half as many rays at vertices as `rays`, half at edges, from within: every one has a closest hit, every fourth is
-/// asked for all its crossings as well, which must be odd in number, and every other fourth whether it hits at all. Answers
-/// how many rays there were.
+/// asked for all its crossings as well, which must be odd in number, and every other fourth whether it hits at all. Half of them
+/// are aimed at triangles that follow one another, and are asked by batches of sixteen, too. Answers how many rays there were.
 fn bombard(rays: u64, seed: u64) -> u64 {
     let meshes = closed_meshes();
     let ways = || Preset::ALL.map(|preset| (preset, false)).into_iter().chain([(Preset::Best, true)]);
@@ -84,8 +85,16 @@ fn bombard(rays: u64, seed: u64) -> u64 {
                 let from = map.point(*inside);
                 (0..chunks_each).into_par_iter().for_each(|chunk| {
                     let mut random = Random(seed ^ (chunk << 20) ^ (place as u64) << 8);
+                    let mut alike = Vec::with_capacity(PACKET);
+                    let mut number = 0;
                     for i in 0..CHUNK {
-                        let triangle = mesh.indices[random.below(mesh.indices.len())];
+                        let are_alike = i as usize / PACKET % 2 == 0;
+                        if are_alike && i as usize % PACKET != 0 {
+                            number = (number + 1) % mesh.indices.len();
+                        } else {
+                            number = random.below(mesh.indices.len());
+                        }
+                        let triangle = mesh.indices[number];
                         let corners = triangle.map(|index| vertex(mesh, index));
                         let along = [0.5, 0.25, random.unit()][random.below(3)];
                         let local = if i % 2 == 0 { corners[0] } else { corners[0].lerp(corners[1], along) };
@@ -99,6 +108,17 @@ fn bombard(rays: u64, seed: u64) -> u64 {
                             assert_eq!(count % 2, 1, "{name}, {preset:?}, place {place}: {ray:?}");
                         } else if i % 8 < 4 {
                             assert!(accel.any(&ray), "{name}, {preset:?}, place {place}: {ray:?}");
+                        }
+                        if are_alike {
+                            alike.push(ray);
+                        }
+                        if alike.len() == PACKET {
+                            let (mut hits, mut any) = ([const { None }; PACKET], [false; PACKET]);
+                            accel.closest_batch(&alike, &mut hits);
+                            accel.any_batch(&alike, &mut any);
+                            let none = hits.iter().zip(any).position(|(hit, any)| hit.is_none() || !any);
+                            assert_eq!(none, None, "{name}, {preset:?}, place {place}: {alike:?}");
+                            alike.clear();
                         }
                     }
                     shot.fetch_add(CHUNK, Ordering::Relaxed);
@@ -135,8 +155,8 @@ fn proof_that_no_aimed_ray_leaks() {
     eprintln!("{shot} rays aimed at edges and vertices, 0 leaks");
 }
 
-/// Trees against the loop: the same hit, with the same bits of t, and any hit where there is one. Answers how many of the
-/// rays hit something.
+/// Trees against the loop: the same hit, with the same bits of t, and any hit where there is one. Half of the rays follow one
+/// another closely, and are asked by batches of sixteen. Answers how many of the rays hit something.
 fn compare(rays: u64, seed: u64) -> u64 {
     let chunks = rays.div_ceil(CHUNK);
     let center = DVec3::new(1.5, -2.25, 4.0);
@@ -154,14 +174,32 @@ fn compare(rays: u64, seed: u64) -> u64 {
             }
         };
         let mut found = 0;
-        for _ in 0..CHUNK {
-            let ray = ray(&mut random, center, 3.0);
-            let (hit, expected) = (accel.closest(&ray), brute::closest(&accel, &ray));
-            let bits = |hit: &Option<crate::Hit>| hit.as_ref().map(|hit| hit.root.t.to_bits());
-            assert_eq!(hit, expected, "{ray:?}");
-            assert_eq!(bits(&hit), bits(&expected), "{ray:?}");
-            assert_eq!(accel.any(&ray), expected.is_some(), "{ray:?}");
-            found += u64::from(hit.is_some());
+        for group in 0..CHUNK as usize / PACKET {
+            let mut rays = [ray(&mut random, center, 3.0); PACKET];
+            let (mut hits, mut any) = ([const { None }; PACKET], [false; PACKET]);
+            if group % 2 == 0 {
+                // From one place, or from places that are near to each other.
+                let apart = [0.0, 0.01][group / 2 % 2];
+                for ray in &mut rays {
+                    ray.origin += apart * random.vector();
+                    ray.direction += 0.02 * ray.direction.length() * random.vector();
+                }
+                accel.closest_batch(&rays, &mut hits);
+                accel.any_batch(&rays, &mut any);
+            } else {
+                for ((one, hit), any) in rays.iter_mut().zip(&mut hits).zip(&mut any) {
+                    *one = ray(&mut random, center, 3.0);
+                    (*hit, *any) = (accel.closest(one), accel.any(one));
+                }
+            }
+            for ((ray, hit), any) in rays.iter().zip(hits).zip(any) {
+                let expected = brute::closest(&accel, ray);
+                let bits = |hit: &Option<crate::Hit>| hit.as_ref().map(|hit| hit.root.t.to_bits());
+                assert_eq!(hit, expected, "{ray:?}");
+                assert_eq!(bits(&hit), bits(&expected), "{ray:?}");
+                assert_eq!(any, expected.is_some(), "{ray:?}");
+                found += u64::from(hit.is_some());
+            }
         }
         hits.fetch_add(found, Ordering::Relaxed);
     });
