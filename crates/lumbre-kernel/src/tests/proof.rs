@@ -88,8 +88,8 @@ fn bombard(rays: u64, seed: u64) -> u64 {
                     let mut alike = Vec::with_capacity(PACKET);
                     let mut number = 0;
                     for i in 0..CHUNK {
-                        let are_alike = i as usize / PACKET % 2 == 0;
-                        if are_alike && i as usize % PACKET != 0 {
+                        let are_alike = (i as usize / PACKET).is_multiple_of(2);
+                        if are_alike && !(i as usize).is_multiple_of(PACKET) {
                             number = (number + 1) % mesh.indices.len();
                         } else {
                             number = random.below(mesh.indices.len());
@@ -177,7 +177,7 @@ fn compare(rays: u64, seed: u64) -> u64 {
         for group in 0..CHUNK as usize / PACKET {
             let mut rays = [ray(&mut random, center, 3.0); PACKET];
             let (mut hits, mut any) = ([const { None }; PACKET], [false; PACKET]);
-            if group % 2 == 0 {
+            if group.is_multiple_of(2) {
                 // From one place, or from places that are near to each other.
                 let apart = [0.0, 0.01][group / 2 % 2];
                 for ray in &mut rays {
