@@ -217,18 +217,10 @@ impl<'a> Packet<'a> {
         ends: &mut impl Ends<G::Answer>,
     ) -> Together {
         let mut together = Together { answered: 0, pays: true };
-        let mut rest = ALL;
-        while rest != 0 {
+        while together.answered != ALL {
             L::columns(rays, &mut self.columns);
-            let (chosen, way) = self.ways::<L>(rest.trailing_zeros());
-            self.chosen = chosen & rest;
-            if self.chosen != ALL {
-                if self.chosen.count_ones() < LEAST {
-                    together.pays = false;
-                    break;
-                }
-                self.fill_up();
-            }
+            let (alike, way) = self.ways::<L>((!together.answered).trailing_zeros());
+            self.chosen = alike & !together.answered;
             if !self.start::<L>(way) {
                 together.pays = false;
                 break;
@@ -239,9 +231,8 @@ impl<'a> Packet<'a> {
                 self.chosen &= if G::IS_ANY { !self.alive } else { 0 };
             }
             G::answer_together::<L>(self, rays, first, ends);
-            together.pays &= is_done && self.work <= work_that_pays(G::IS_ANY);
             together.answered |= self.chosen;
-            rest &= !self.chosen;
+            together.pays &= is_done && self.work <= work_that_pays(G::IS_ANY);
             if !is_done {
                 break;
             }
@@ -315,9 +306,16 @@ impl<'a> Packet<'a> {
         }
     }
 
-    /// Sets out among boxes; false where one is not from nearby or not sound, or where they are too far apart.
+    /// Sets out among boxes with those that are chosen; false where they are few, where one is not from nearby or not sound, or where
+    /// they are too far apart.
     #[inline(always)]
     fn start<L: Lanes>(&mut self, Direction { signs, axes }: Direction) -> bool {
+        if self.chosen.count_ones() < LEAST {
+            return false;
+        }
+        if self.chosen != ALL {
+            self.fill_up();
+        }
         self.has_one_origin = L::Wide::are_same(&self.columns[0])
             && L::Wide::are_same(&self.columns[1])
             && L::Wide::are_same(&self.columns[2]);
