@@ -107,16 +107,27 @@ impl Binning {
     }
 }
 
+/// From how many primitives on they are tallied in two rows.
+const TWO_ROWS_FROM: usize = 32;
+
 /// What the bins of a node hold.
 #[derive(Clone)]
 pub(crate) struct Bins {
+    /// The first has all once they are filled. Where there are two, primitives go to them by turns: neighbours mostly share bins, and
+    /// what grew just now would be waited for.
+    tallies: [Tally; 2],
+}
+
+/// What some of the primitives of a node put into its bins.
+#[derive(Clone)]
+struct Tally {
     bounds: [[Bounds; MOST_BINS]; 3],
     counts: [[u32; MOST_BINS]; 3],
     costs: [[u32; MOST_BINS]; 3],
 }
 
-impl Bins {
-    pub(crate) const EMPTY: Self = Self {
+impl Tally {
+    const EMPTY: Self = Self {
         bounds: [[Bounds::EMPTY; MOST_BINS]; 3],
         counts: [[0; MOST_BINS]; 3],
         costs: [[0; MOST_BINS]; 3],
@@ -144,13 +155,52 @@ impl Bins {
         }
     }
 
-    pub(crate) fn join(&mut self, other: &Self) {
+    #[inline(always)]
+    fn join(&mut self, other: &Self, bins: usize) {
         for axis in 0..3 {
-            for bin in 0..MOST_BINS {
+            for bin in 0..bins {
                 self.bounds[axis][bin].grow(&other.bounds[axis][bin]);
                 self.counts[axis][bin] += other.counts[axis][bin];
                 self.costs[axis][bin] += other.costs[axis][bin];
             }
+        }
+    }
+}
+
+impl Bins {
+    pub(crate) const EMPTY: Self = Self { tallies: [Tally::EMPTY, Tally::EMPTY] };
+
+    pub(crate) fn join(&mut self, other: &Self) {
+        self.tallies[0].join(&other.tallies[0], MOST_BINS);
+    }
+
+    #[inline(always)]
+    fn fill<const ROWS: usize, const COSTS: bool>(
+        &mut self,
+        primitives: &[Primitive],
+        binning: Binning,
+        traits: &[Traits],
+    ) {
+        let tallies = &mut self.tallies[..ROWS];
+        for tally in tallies.iter_mut() {
+            tally.clear(binning.bins);
+        }
+        // By eight, so that where they go is found by vectors.
+        let (eights, rest) = primitives.as_chunks::<8>();
+        for eight in eights {
+            let mut places = [[0; 4]; 8];
+            for (place, primitive) in places.iter_mut().zip(eight) {
+                *place = binning.bins(primitive);
+            }
+            for (i, (place, primitive)) in places.iter().zip(eight).enumerate() {
+                tallies[i % ROWS].add::<COSTS>(place, primitive, traits);
+            }
+        }
+        for primitive in rest {
+            tallies[0].add::<COSTS>(&binning.bins(primitive), primitive, traits);
+        }
+        if let [all, others] = tallies {
+            all.join(others, binning.bins);
         }
     }
 }
@@ -199,7 +249,7 @@ impl<const COSTS: bool> Task for BestSplit<'_, COSTS> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Option<Split> {
-        let Self { bins, binning } = self;
+        let Self { bins: Bins { tallies: [bins, ..] }, binning } = self;
         let last = binning.bins;
         let mut best = (f32::INFINITY, 0, 0);
         let mut occupied = [(0, 0); 3];
@@ -297,20 +347,10 @@ impl<const COSTS: bool> Task for Fill<'_, COSTS> {
     #[inline(always)]
     fn run<L: Lanes>(self) {
         let Self { primitives, binning, bins, traits } = self;
-        bins.clear(binning.bins);
-        // By eight, so that where they go is found by vectors.
-        let (eights, rest) = primitives.as_chunks::<8>();
-        for eight in eights {
-            let mut places = [[0; 4]; 8];
-            for (place, primitive) in places.iter_mut().zip(eight) {
-                *place = binning.bins(primitive);
-            }
-            for (place, primitive) in places.iter().zip(eight) {
-                bins.add::<COSTS>(place, primitive, traits);
-            }
-        }
-        for primitive in rest {
-            bins.add::<COSTS>(&binning.bins(primitive), primitive, traits);
+        if primitives.len() >= TWO_ROWS_FROM {
+            bins.fill::<2, COSTS>(primitives, binning, traits);
+        } else {
+            bins.fill::<1, COSTS>(primitives, binning, traits);
         }
     }
 }
