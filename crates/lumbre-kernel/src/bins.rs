@@ -95,6 +95,16 @@ impl Binning {
         std::array::from_fn(|lane| Self::bin_of(center2[lane], self.start[lane], self.factor[lane]) as u32)
     }
 
+    /// The same of eight, found by vectors.
+    #[inline(always)]
+    fn bins_of_eight(&self, eight: &[Primitive; 8]) -> [[u32; 4]; 8] {
+        let mut places = [[0; 4]; 8];
+        for (place, primitive) in places.iter_mut().zip(eight) {
+            *place = self.bins(primitive);
+        }
+        places
+    }
+
     #[inline(always)]
     fn is_left(&self, primitive: &Primitive, axis: usize, bin: usize) -> bool {
         Self::bin_of(primitive.center2_on(axis), self.start[axis], self.factor[axis]) < bin
@@ -185,13 +195,9 @@ impl Bins {
         for tally in tallies.iter_mut() {
             tally.clear(binning.bins);
         }
-        // By eight, so that where they go is found by vectors.
         let (eights, rest) = primitives.as_chunks::<8>();
         for eight in eights {
-            let mut places = [[0; 4]; 8];
-            for (place, primitive) in places.iter_mut().zip(eight) {
-                *place = binning.bins(primitive);
-            }
+            let places = binning.bins_of_eight(eight);
             for (i, (place, primitive)) in places.iter().zip(eight).enumerate() {
                 tallies[i % ROWS].add::<COSTS>(place, primitive, traits);
             }
@@ -369,15 +375,35 @@ impl Task for Part<'_> {
     fn run<L: Lanes>(self) {
         let Self { primitives, split, sides: [left, right] } = self;
         let (axis, bin, binning) = (split.axis, split.bin, split.binning);
-        let (mut left_place, mut right_place) = (0, 0);
-        for primitive in primitives {
-            let is_left = binning.is_left(primitive, axis, bin);
-            // Without a branch, which would often be foretold wrong.
-            let place = if is_left { &mut left[left_place] } else { &mut right[right_place] };
-            *place = *primitive;
-            left_place += usize::from(is_left);
-            right_place += usize::from(!is_left);
+        let mut sides = Sides { left, right, places: [0; 2] };
+        let (eights, rest) = primitives.as_chunks::<8>();
+        for eight in eights {
+            let places = binning.bins_of_eight(eight);
+            for (place, primitive) in places.iter().zip(eight) {
+                sides.put(primitive, (place[axis] as usize) < bin);
+            }
         }
+        for primitive in rest {
+            sides.put(primitive, binning.is_left(primitive, axis, bin));
+        }
+    }
+}
+
+struct Sides<'a> {
+    left: &'a mut [Primitive],
+    right: &'a mut [Primitive],
+    places: [usize; 2],
+}
+
+impl Sides<'_> {
+    #[inline(always)]
+    fn put(&mut self, primitive: &Primitive, is_left: bool) {
+        let [left, right] = &mut self.places;
+        // Without a branch, which would often be foretold wrong.
+        let place = if is_left { &mut self.left[*left] } else { &mut self.right[*right] };
+        *place = *primitive;
+        *left += usize::from(is_left);
+        *right += usize::from(!is_left);
     }
 }
 
@@ -395,10 +421,23 @@ impl Task for PartPiece<'_> {
     fn run<L: Lanes>(self) -> usize {
         let Self { primitives, split, there } = self;
         let (mut left, mut right) = (0, 0);
-        for place in 0..primitives.len() {
+        let mut place = 0;
+        while let Some(eight) = primitives[place..].first_chunk::<8>() {
+            let eight = *eight;
+            let places = split.binning.bins_of_eight(&eight);
+            for (bins, primitive) in places.iter().zip(eight) {
+            let is_left = (bins[split.axis] as usize) < split.bin;
+            // Without a branch: what does not belong is soon written over.
+            primitives[left] = primitive;
+            there[right] = primitive;
+            left += usize::from(is_left);
+            right += usize::from(!is_left);
+            }
+            place += 8;
+        }
+        for place in place..primitives.len() {
             let primitive = primitives[place];
             let is_left = split.is_left(&primitive);
-            // Without a branch: what does not belong is soon written over.
             primitives[left] = primitive;
             there[right] = primitive;
             left += usize::from(is_left);

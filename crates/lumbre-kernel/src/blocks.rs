@@ -296,7 +296,7 @@ pub(crate) struct Filled {
 
 /// Blocks that are packed at once, one lot after another, and by one task.
 const WAVE: usize = 1 << 14;
-const SHARE: usize = 256;
+const SHARE: usize = 64;
 
 /// What the blocks of a tree will be like.
 struct Survey {
@@ -564,7 +564,7 @@ pub(crate) fn refer(
         }
     };
     root.iter_mut().for_each(refer);
-    nodes.par_iter_mut().with_min_len(256).for_each(|node| {
+    nodes.par_iter_mut().with_min_len(64).for_each(|node| {
         let len = node.len();
         node.children[..len].iter_mut().for_each(refer);
     });

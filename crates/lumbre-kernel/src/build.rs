@@ -30,10 +30,12 @@ use crate::reinsert::reinsert;
 const SAH_DEPTH: u32 = 64;
 /// So many a fast build splits by SAH: leaves then are a tenth fuller, and nodes fewer, for a twentieth of its time.
 const FAST_FEW: usize = 48;
-/// From how many primitives on two threads share the work.
+/// From how many primitives on threads share the work.
 pub(crate) const PARALLEL: usize = 4096;
+/// How few they leave to one of them, where there are not many more.
+const LEAST_ALONE: usize = 1024;
 /// How many primitives a thread takes at a time in a node that is shared.
-const CHUNK: usize = 1 << 14;
+const CHUNK: usize = 1 << 12;
 
 /// The binary tree, or a part of it.
 pub(crate) enum Binary<'p> {
@@ -171,7 +173,9 @@ pub(crate) fn binary_tree<'p>(
     // Below, there is a node for every thread.
     let shared = (2 * rayon::current_num_threads()).ilog2();
     let shared = if shared > 1 { shared + 1 } else { 0 };
-    let builder = &Builder { level, traits, shared };
+    let all = others.len() + packed.len();
+    let alone = if all <= PARALLEL { PARALLEL } else { (all / 8).clamp(LEAST_ALONE, PARALLEL) };
+    let builder = &Builder { level, traits, shared, alone };
     let counts = sort_by_rank(&mut others, traits);
     let first_packed = others.len();
     let mut names: Vec<Name> = vec![[0; 2]; first_packed];
@@ -255,8 +259,8 @@ enum Sketch {
 struct Seed {
     count: usize,
     depth: u32,
-    /// How it is to be split, where that is known.
-    split: Option<Split>,
+    /// How it is to be binned, where that is known.
+    binning: Option<Binning>,
     /// Whether it is to be split by the order along a curve instead.
     is_sorted: bool,
 }
@@ -370,6 +374,8 @@ struct Builder<'a> {
     traits: &'a [Traits],
     /// Levels of the tree whose nodes threads share. What comes out does not depend on it.
     shared: u32,
+    /// So many primitives, and fewer, are left to one thread.
+    alone: usize,
 }
 
 /// What one thread needs for twigs.
@@ -483,8 +489,8 @@ impl Builder<'_> {
         codes: &[Code],
     ) -> Sketch {
         let count = primitives.len();
-        if count <= PARALLEL {
-            return Sketch::Twig(Seed { count, depth, split: None, is_sorted: true });
+        if count <= self.alone {
+            return Sketch::Twig(Seed { count, depth, binning: None, is_sorted: true });
         }
         let Some(middle) = morton::cut(codes) else { return self.sketch::<COSTS>(primitives, depth, None) };
         let (left, right) = primitives.split_at_mut(middle);
@@ -496,21 +502,21 @@ impl Builder<'_> {
         Sketch::Fork(Box::new([left, right]))
     }
 
-    /// `split` is how the primitives are to be split, where that is known.
+    /// `binning` is how the primitives are to be binned, where that is known.
     fn sketch<const COSTS: bool>(
         &self,
         primitives: &mut [Primitive],
         depth: u32,
-        split: Option<Split>,
+        binning: Option<Binning>,
     ) -> Sketch {
         let count = primitives.len();
-        if count <= PARALLEL {
-            return Sketch::Twig(Seed { count, depth, split, is_sorted: false });
+        if count <= self.alone {
+            return Sketch::Twig(Seed { count, depth, binning, is_sorted: false });
         }
-        let ([left, right], [left_split, right_split]) = self.divide::<COSTS>(primitives, depth, split);
+        let ([left, right], [left_binning, right_binning]) = self.divide::<COSTS>(primitives, depth, binning);
         let (left, right) = rayon::join(
-            || self.sketch::<COSTS>(left, depth + 1, left_split),
-            || self.sketch::<COSTS>(right, depth + 1, right_split),
+            || self.sketch::<COSTS>(left, depth + 1, left_binning),
+            || self.sketch::<COSTS>(right, depth + 1, right_binning),
         );
         Sketch::Fork(Box::new([left, right]))
     }
@@ -521,23 +527,18 @@ impl Builder<'_> {
         &self,
         primitives: &'p mut [Primitive],
         depth: u32,
-        split: Option<Split>,
-    ) -> ([&'p mut [Primitive]; 2], [Option<Split>; 2]) {
+        binning: Option<Binning>,
+    ) -> ([&'p mut [Primitive]; 2], [Option<Binning>; 2]) {
         let mut bins = Bins::EMPTY;
-        let Some(split) = self.known::<COSTS>(primitives, depth, split, &mut bins) else {
+        let Some(split) = self.split::<COSTS>(primitives, depth, binning, &mut bins) else {
             let middle = self.by_order(primitives);
             let (left, right) = primitives.split_at_mut(middle);
             return ([left, right], [None; 2]);
         };
         part(self.level, primitives, &split, depth < self.shared);
         let (left, right) = primitives.split_at_mut(split.left);
-        let sides = [left, right];
-        let splits = [0, 1].map(|side| {
-            let binning = split.next(side, sides[side].len());
-            self.fill::<COSTS>(sides[side], binning, &mut bins, depth + 1);
-            self.best::<COSTS>(&bins, binning)
-        });
-        (sides, splits)
+        let binnings = [split.next(0, left.len()), split.next(1, right.len())];
+        ([left, right], binnings.map(Some))
     }
 
     /// The tree that was sketched. `codes` are those of the primitives, if they were sorted, and there are places for names.
@@ -586,7 +587,10 @@ impl Builder<'_> {
                     if seed.is_sorted {
                         self.twig_sorted::<COSTS>(range, codes, &mut Tools { nodes, bins });
                     } else {
-                        self.twig::<COSTS>(range, seed.split, &mut Tools { nodes, bins });
+                        let tools = &mut Tools { nodes, bins };
+                        let split =
+                            seed.binning.and_then(|binning| self.binned::<COSTS>(range.here, binning, tools.bins, range.depth));
+                        self.twig::<COSTS>(range, split, tools);
                     }
                     let costs = choose(nodes, keeps);
                     let mut twig = GrownTwig { count: seed.count, nodes: Ok(nodes.len()), costs };
@@ -622,11 +626,31 @@ impl Builder<'_> {
         bounds
     }
 
-    fn best<const COSTS: bool>(&self, bins: &Bins, binning: Binning) -> Option<Split> {
+    /// The cheapest split by these bins.
+    fn binned<const COSTS: bool>(
+        &self,
+        primitives: &[Primitive],
+        binning: Binning,
+        bins: &mut Bins,
+        depth: u32,
+    ) -> Option<Split> {
+        self.fill::<COSTS>(primitives, binning, bins, depth);
         self.level.run(BestSplit::<COSTS> { bins, binning })
     }
 
     /// The split of a node; `None` where it is to be split by order.
+    fn split<const COSTS: bool>(
+        &self,
+        primitives: &[Primitive],
+        depth: u32,
+        binning: Option<Binning>,
+        bins: &mut Bins,
+    ) -> Option<Split> {
+        let split = binning.and_then(|binning| self.binned::<COSTS>(primitives, binning, bins, depth));
+        self.known::<COSTS>(primitives, depth, split, bins)
+    }
+
+    /// The same where a split has been found, if any was.
     #[inline]
     fn known<const COSTS: bool>(
         &self,
@@ -646,9 +670,7 @@ impl Builder<'_> {
         if centers.are_one() {
             return None;
         }
-        let binning = Binning::new(&centers, primitives.len());
-        self.fill::<COSTS>(primitives, binning, bins, depth);
-        self.best::<COSTS>(bins, binning)
+        self.binned::<COSTS>(primitives, Binning::new(&centers, primitives.len()), bins, depth)
     }
 
     fn measure(&self, primitives: &[Primitive]) -> (Bounds, bins::Centers) {
@@ -700,9 +722,7 @@ impl Builder<'_> {
                         return None;
                     }
                     let binning = split.next(side, primitives.len());
-                    let traits = self.traits;
-                    self.level.run(Fill::<COSTS> { primitives, binning, bins: work.bins, traits });
-                    self.best::<COSTS>(work.bins, binning)
+                    self.binned::<COSTS>(primitives, binning, work.bins, cut[side].depth)
                 });
                 (cut, splits)
             }

@@ -326,7 +326,7 @@ impl Parts {
 }
 
 /// Triangles that a thread looks at together.
-const CHUNK: usize = 1 << 13;
+const CHUNK: usize = 1 << 11;
 
 /// Checks a mesh, and finds the box around its triangles that have an area.
 fn survey_mesh(position: usize, mesh: &TriangleMesh) -> Result<(Survey, Aabb, f32), BuildError> {

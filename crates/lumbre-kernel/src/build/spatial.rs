@@ -275,8 +275,7 @@ impl Spatial<'_, '_> {
         }
         let binning = Binning::new(&centers, count);
         let mut bins = Bins::EMPTY;
-        self.builder.fill::<false>(&parts.boxes, binning, &mut bins, depth);
-        let split = self.builder.best::<false>(&bins, binning)?;
+        let split = self.builder.binned::<false>(&parts.boxes, binning, &mut bins, depth)?;
         let mut around = [Bounds::EMPTY; 2];
         for bounds in &parts.boxes {
             around[usize::from(!split.is_left(bounds))].grow(bounds);
