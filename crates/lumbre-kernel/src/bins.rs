@@ -426,12 +426,12 @@ impl Task for PartPiece<'_> {
             let eight = *eight;
             let places = split.binning.bins_of_eight(&eight);
             for (bins, primitive) in places.iter().zip(eight) {
-            let is_left = (bins[split.axis] as usize) < split.bin;
-            // Without a branch: what does not belong is soon written over.
-            primitives[left] = primitive;
-            there[right] = primitive;
-            left += usize::from(is_left);
-            right += usize::from(!is_left);
+                let is_left = (bins[split.axis] as usize) < split.bin;
+                // Without a branch: what does not belong is soon written over.
+                primitives[left] = primitive;
+                there[right] = primitive;
+                left += usize::from(is_left);
+                right += usize::from(!is_left);
             }
             place += 8;
         }

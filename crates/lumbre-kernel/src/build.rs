@@ -588,8 +588,9 @@ impl Builder<'_> {
                         self.twig_sorted::<COSTS>(range, codes, &mut Tools { nodes, bins });
                     } else {
                         let tools = &mut Tools { nodes, bins };
-                        let split =
-                            seed.binning.and_then(|binning| self.binned::<COSTS>(range.here, binning, tools.bins, range.depth));
+                        let split = seed.binning.and_then(|binning| {
+                            self.binned::<COSTS>(range.here, binning, tools.bins, range.depth)
+                        });
                         self.twig::<COSTS>(range, split, tools);
                     }
                     let costs = choose(nodes, keeps);

@@ -30,7 +30,7 @@ use std::collections::BTreeMap;
 use bytemuck::{Pod, Zeroable};
 use lumbre_math::DVec3;
 
-use crate::lanes;
+use crate::lanes::{self, Portable};
 use crate::node::Units;
 use crate::prepare::Boxer;
 use crate::primitive::Bounds;
@@ -143,7 +143,7 @@ impl<'a> Carver<'a> {
     /// The box around a triangle, under the names of its geometry and of itself.
     pub(crate) fn whole(&self, geometry: u32, triangle: u32) -> Bounds {
         let corners = self.mesh.indices[triangle as usize].map(|vertex| self.mesh.positions[vertex as usize]);
-        self.boxer.around(&corners, geometry, triangle)
+        self.boxer.around::<Portable>(&corners, geometry, triangle)
     }
 }
 

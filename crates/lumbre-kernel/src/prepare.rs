@@ -13,7 +13,7 @@ use crate::clouds::CloudSurvey;
 use crate::collapse::{Entry, Packed, lay_out};
 use crate::holds::{Holds, SingleStart};
 use crate::hulls::Hulls;
-use crate::lanes::Level;
+use crate::lanes::{Lanes, Level, Task};
 use crate::node::Units;
 use crate::outline::Outline;
 use crate::primitive::{Bounds, Kind, Primitive, Traits};
@@ -338,19 +338,12 @@ fn survey_mesh(position: usize, mesh: &TriangleMesh) -> Result<(Survey, Aabb, f3
         let element = mesh.positions.iter().position(|p| !p.is_finite()).unwrap_or_default();
         return Err(BuildError::NotFinite { geometry: position, element });
     }
+    let level = Level::best();
     let survey_chunk = |(chunk, triangles): (usize, &[[u32; 3]])| {
-        let (mut bounds, mut count) = (MeshBox::EMPTY, 0);
-        for (i, triangle) in triangles.iter().enumerate() {
-            let Some(corners) = corners(mesh, triangle) else {
-                let triangle = chunk * CHUNK + i;
-                return Err(BuildError::VertexOutOfRange { geometry: position, triangle });
-            };
-            if has_area(&corners) {
-                count += 1;
-                bounds.grow(&MeshBox::around(&corners));
-            }
-        }
-        Ok((bounds, count))
+        level.run(SurveyChunk { mesh, triangles }).map_err(|place| {
+            let triangle = chunk * CHUNK + place;
+            BuildError::VertexOutOfRange { geometry: position, triangle }
+        })
     };
     let chunks: Vec<_> = mesh.indices.par_chunks(CHUNK).enumerate().map(survey_chunk).collect();
     let mut survey =
@@ -365,10 +358,34 @@ fn survey_mesh(position: usize, mesh: &TriangleMesh) -> Result<(Survey, Aabb, f3
     if survey.triangles == 0 {
         return Ok((survey, Aabb::EMPTY, 0.0));
     }
-    let corner = |corner: [f32; 3]| mesh.origin + Vec3::from_array(corner).as_dvec3();
-    let largest = bounds.low.iter().chain(&bounds.high).fold(0.0, |most: f32, x| most.max(x.abs()));
-    let bounds = Aabb { min: corner(bounds.low), max: corner(bounds.high) };
+    let [low, high] = bounds.corners();
+    let largest = low.abs().max(high.abs()).max_element();
+    let bounds = Aabb { min: mesh.origin + low.as_dvec3(), max: mesh.origin + high.as_dvec3() };
     Ok((survey, bounds, largest))
+}
+
+/// Looks at some triangles: the box around those that have an area, and how many have; or the place of one that lacks a vertex.
+struct SurveyChunk<'a> {
+    mesh: &'a TriangleMesh,
+    triangles: &'a [[u32; 3]],
+}
+
+impl Task for SurveyChunk<'_> {
+    type Output = Result<(MeshBox, u32), usize>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Self::Output {
+        let Self { mesh, triangles } = self;
+        let (mut bounds, mut count) = (MeshBox::EMPTY, 0);
+        for (place, triangle) in triangles.iter().enumerate() {
+            let Some(corners) = corners(mesh, triangle) else { return Err(place) };
+            if has_area(&corners) {
+                count += 1;
+                bounds.grow(&MeshBox::around(&corners));
+            }
+        }
+        Ok((bounds, count))
+    }
 }
 
 /// `None` where the mesh lacks a vertex.
@@ -378,50 +395,47 @@ fn corners(mesh: &TriangleMesh, triangle: &[u32; 3]) -> Option<[Vec3; 3]> {
     Some([a?, b?, c?])
 }
 
-/// A box in the space of a mesh.
+/// A box in the space of a mesh: the lower corner, and the upper one negated, each with a lane behind it that means nothing.
 #[derive(Clone, Copy)]
-struct MeshBox {
-    low: [f32; 3],
-    high: [f32; 3],
-}
+struct MeshBox([f32; 8]);
 
 impl MeshBox {
-    const EMPTY: Self = Self { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3] };
+    const EMPTY: Self = Self([f32::INFINITY; 8]);
+
+    #[inline(always)]
+    fn at(p: Vec3) -> Self {
+        Self([p.x, p.y, p.z, 0.0, -p.x, -p.y, -p.z, 0.0])
+    }
 
     #[inline(always)]
     fn around(&[a, b, c]: &[Vec3; 3]) -> Self {
-        Self {
-            low: std::array::from_fn(|axis| lesser(lesser(a[axis], b[axis]), c[axis])),
-            high: std::array::from_fn(|axis| greater(greater(a[axis], b[axis]), c[axis])),
-        }
+        let mut around = Self::at(a);
+        around.grow(&Self::at(b));
+        around.grow(&Self::at(c));
+        around
     }
 
     #[inline(always)]
     fn grow(&mut self, other: &Self) {
-        for axis in 0..3 {
-            self.low[axis] = lesser(self.low[axis], other.low[axis]);
-            self.high[axis] = greater(self.high[axis], other.high[axis]);
+        for (own, &other) in self.0.iter_mut().zip(&other.0) {
+            // One instruction, which f32::min is not.
+            *own = if *own < other { *own } else { other };
         }
     }
-}
 
-// One instruction each, which f32::min and f32::max are not.
-#[inline(always)]
-fn lesser(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
-}
-
-#[inline(always)]
-fn greater(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
+    /// The lower and the upper one.
+    fn corners(&self) -> [Vec3; 2] {
+        let [x, y, z, _, minus_x, minus_y, minus_z, _] = self.0;
+        [Vec3::new(x, y, z), -Vec3::new(minus_x, minus_y, minus_z)]
+    }
 }
 
 /// What makes boxes of a mesh's triangles, in tree units.
 pub(crate) struct Boxer {
-    shift: DVec3,
+    /// As in a [`MeshBox`].
+    shift: [f64; 8],
     scale: f64,
-    shift_single: Vec3,
-    scale_single: f32,
+    shift_single: [f32; 8],
     is_single: bool,
 }
 
@@ -430,26 +444,33 @@ impl Boxer {
         // Where the mesh is moved by a number that single precision has, one subtraction is rounded once, as in double
         // precision; and the scale is a power of two.
         let shift = units.origin - mesh.origin;
-        let (shift_single, scale_single) = (shift.as_vec3(), units.scale as f32);
+        let shift_single = shift.as_vec3();
         let is_single = shift_single.as_dvec3() == shift
             && (1e-37..1e38).contains(&units.scale)
             && shift_single.abs().max_element() < 1e37;
-        Self { shift, scale: units.scale, shift_single, scale_single, is_single }
+        Self {
+            shift: [shift.x, shift.y, shift.z, 0.0, -shift.x, -shift.y, -shift.z, 0.0],
+            scale: units.scale,
+            shift_single: MeshBox::at(shift_single).0,
+            is_single,
+        }
     }
 
     #[inline(always)]
-    pub(crate) fn around(&self, corners: &[Vec3; 3], first: u32, second: u32) -> Bounds {
-        let around = MeshBox::around(corners);
+    pub(crate) fn around<L: Lanes>(&self, corners: &[Vec3; 3], first: u32, second: u32) -> Bounds {
+        let MeshBox(around) = MeshBox::around(corners);
+        let mut numbers = [0.0; 8];
         if self.is_single {
-            let (shift, scale) = (self.shift_single, self.scale_single);
-            let moved = |corner: &[f32; 3]| std::array::from_fn(|axis| (corner[axis] - shift[axis]) * scale);
-            Bounds::new(moved(&around.low), moved(&around.high), first, second)
+            let scale = self.scale as f32;
+            for lane in 0..8 {
+                numbers[lane] = (around[lane] - self.shift_single[lane]) * scale;
+            }
         } else {
-            let moved = |corner: &[f32; 3]| {
-                std::array::from_fn(|axis| ((f64::from(corner[axis]) - self.shift[axis]) * self.scale) as f32)
-            };
-            Bounds::new(moved(&around.low), moved(&around.high), first, second)
+            for lane in 0..8 {
+                numbers[lane] = ((f64::from(around[lane]) - self.shift[lane]) * self.scale) as f32;
+            }
         }
+        Bounds::of_lanes::<L>(numbers).with_names(first, second)
     }
 }
 
@@ -481,20 +502,41 @@ fn box_triangles(mesh: &TriangleMesh, survey: &Survey, units: &Units, mut places
         .enumerate()
         .map(|(chunk, &count)| (chunk, places.split_off_mut(..count as usize).expect("they were counted")))
         .collect();
-    let boxer = Boxer::new(mesh, units);
+    let (boxer, level) = (&Boxer::new(mesh, units), Level::best());
     chunks.into_par_iter().for_each(|(chunk, places)| {
-        let first = chunk * CHUNK;
-        let triangles = mesh.indices[first..].iter().take(CHUNK).enumerate();
-        // Where all have an area, none has to be asked again.
-        let all_have_area = places.len() == mesh.indices[first..].len().min(CHUNK);
-        let boxes = triangles.filter_map(|(i, triangle)| {
-            let corners = corners(mesh, triangle).filter(|corners| all_have_area || has_area(corners))?;
-            Some(boxer.around(&corners, survey.geometry, (first + i) as u32))
-        });
-        for (place, bounds) in places.iter_mut().zip(boxes) {
-            *place = bounds;
-        }
+        level.run(BoxChunk { mesh, boxer, geometry: survey.geometry, first: chunk * CHUNK, places });
     });
+}
+
+/// The same of some triangles, from the first on.
+struct BoxChunk<'a> {
+    mesh: &'a TriangleMesh,
+    boxer: &'a Boxer,
+    geometry: u32,
+    first: usize,
+    places: &'a mut [Primitive],
+}
+
+impl Task for BoxChunk<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let Self { mesh, boxer, geometry, first, places } = self;
+        let rest = &mesh.indices[first..];
+        let triangles = &rest[..rest.len().min(CHUNK)];
+        // Where all have an area, none has to be asked again.
+        let all_have_area = places.len() == triangles.len();
+        let mut places = places.iter_mut();
+        for (primitive, triangle) in (first as u32..).zip(triangles) {
+            let Some(corners) = corners(mesh, triangle) else { continue };
+            if (all_have_area || has_area(&corners))
+                && let Some(place) = places.next()
+            {
+                *place = boxer.around::<L>(&corners, geometry, primitive);
+            }
+        }
+    }
 }
 
 /// The units that make the tree's boxes about 1 in size.

@@ -3,6 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use lumbre_geometry::Aabb;
 
+use crate::lanes::Lanes;
 use crate::node::{Units, round_up};
 
 /// The kind of a primitive. A leaf holds one kind, triangles of one mesh, and spheres of one cloud.
@@ -78,6 +79,15 @@ impl Bounds {
         let fixed = |x: f32| (x * ONE as f32) as i32;
         let (low, high) = (low.map(fixed), high.map(fixed));
         Self { lanes: [low[0], low[1], low[2], first as i32, -high[0], -high[1], -high[2], second as i32] }
+    }
+
+    /// From the lower corner and the upper one negated, in tree units; there are no names behind them yet.
+    #[inline(always)]
+    pub(crate) fn of_lanes<L: Lanes>(mut numbers: [f32; 8]) -> Self {
+        for number in &mut numbers {
+            *number *= ONE as f32;
+        }
+        Self { lanes: L::truncated(&numbers) }
     }
 
     /// Around a point in fixed-point numbers; the last of four means nothing.

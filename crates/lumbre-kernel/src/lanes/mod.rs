@@ -33,6 +33,7 @@ pub(crate) use boxes::{meet_boxes, meet_frustum, only_child, push_as_built, push
 #[cfg(test)]
 pub(crate) use hulls::meet_hulls_at;
 pub(crate) use hulls::{HullLanes, MetHulls};
+pub(crate) use portable::Portable;
 pub(crate) use spheres::SphereLanes;
 #[cfg(test)]
 pub(crate) use spheres::meet_spheres_at;
@@ -69,6 +70,9 @@ pub(crate) trait Lanes: SphereLanes + HullLanes {
 
     /// For each number of a list, a bit for each place before it that has the same.
     fn equals_before(list: &[u32; 3 * BLOCK]) -> [u32; 3 * BLOCK];
+
+    /// Whole numbers without what stands behind the point. None is to be 2^31 or more, or to be no number.
+    fn truncated(numbers: &[f32; BLOCK]) -> [i32; BLOCK];
 
     /// The corners of the triangles of a block.
     fn corners(block: &TriangleBlock) -> Corners;
@@ -436,7 +440,7 @@ pub(crate) fn opaque<T>(value: &T) -> &T {
 // Out of the way of the others.
 #[inline(never)]
 fn run_portable<T: Task>(task: T) -> T::Output {
-    task.run::<portable::Portable>()
+    task.run::<Portable>()
 }
 
 /// Asks for what stands there to be brought near, where the machine can be asked.

@@ -162,6 +162,11 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
+    fn truncated(numbers: &[f32; BLOCK]) -> [i32; BLOCK] {
+        numbers.map(|number| number as i32)
+    }
+
+    #[inline(always)]
     fn corners(block: &TriangleBlock) -> Corners {
         let (rows, room) = (block.coordinates(), block.room());
         Corners([0, 1, 2].map(|corner| {

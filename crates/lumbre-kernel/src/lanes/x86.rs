@@ -594,6 +594,17 @@ where
     }
 
     #[inline(always)]
+    fn truncated(numbers: &[f32; BLOCK]) -> [i32; BLOCK] {
+        let mut whole = [0; BLOCK];
+        // SAFETY: see `X86`. The load and the store are of eight numbers in arrays of eight.
+        unsafe {
+            let truncated = _mm256_cvttps_epi32(_mm256_loadu_ps(numbers.as_ptr()));
+            _mm256_storeu_si256(whole.as_mut_ptr().cast(), truncated);
+        }
+        whole
+    }
+
+    #[inline(always)]
     fn equals_before(list: &[u32; 3 * BLOCK]) -> [u32; 3 * BLOCK] {
         let mut equals = [0; 3 * BLOCK];
         // SAFETY: see `X86`. The loads and stores are of eight or sixteen numbers of arrays of twenty-four.
