@@ -294,9 +294,17 @@ pub(crate) struct Filled {
     pub(crate) places: Vec<u32>,
 }
 
-/// Blocks that are packed at once, one lot after another, and by one task.
+/// Blocks that are packed at once, one lot after another.
 const WAVE: usize = 1 << 14;
+/// Of how many blocks threads share the work, and how many are left to one of them: those of as many triangles as one thread takes
+/// alone fill some six hundred.
+const SHARED: usize = 640;
 const SHARE: usize = 64;
+
+/// Of so many blocks, how many are left to one thread.
+pub(crate) fn share_of(blocks: usize) -> usize {
+    if blocks > SHARED { SHARE } else { SHARED }
+}
 
 /// What the blocks of a tree will be like.
 struct Survey {
@@ -351,9 +359,10 @@ pub(crate) fn pack(
     let is_all_at_once = names.len() <= WAVE;
     let mut shared = Vec::new();
     let mut end = 0;
+    let share = share_of(names.len());
     for (wave, (names, followers)) in names.chunks(WAVE).zip(followers.chunks(WAVE)).enumerate() {
         shared.resize(names.len(), Shared::NOTHING);
-        shared.par_chunks_mut(SHARE).zip(names.par_chunks(SHARE)).for_each(|(shared, names)| {
+        shared.par_chunks_mut(share).zip(names.par_chunks(share)).for_each(|(shared, names)| {
             level.run(FindShared { geometries, names, usual, shared });
         });
         let start = end;
@@ -371,10 +380,10 @@ pub(crate) fn pack(
             filled.units.resize(end + end / 8 + MARGIN, Unit::default());
         }
         let mut rest = &mut filled.units[start..end];
-        let mut shares = Vec::with_capacity(names.len().div_ceil(SHARE));
+        let mut shares = Vec::with_capacity(names.len().div_ceil(share));
         let mut first = wave * WAVE;
         for ((names, followers), shared) in
-            names.chunks(SHARE).zip(followers.chunks(SHARE)).zip(shared.chunks(SHARE))
+            names.chunks(share).zip(followers.chunks(share)).zip(shared.chunks(share))
         {
             let len = shared.iter().map(|shared| units_of(shared.room())).sum();
             let units = rest.split_off_mut(..len).expect("there is room for all");

@@ -500,7 +500,7 @@ impl Layout {
         let Self { nodes, entries, spans, sphere_spans, root } = self;
         let named = |spans: Vec<Span>| -> Vec<BlockNames> {
             let name = |span: &Span| BlockNames::of(&names[span.first as usize..][..span.count as usize]);
-            spans.par_iter().with_min_len(64).map(name).collect()
+            spans.par_iter().with_min_len(blocks::share_of(spans.len())).map(name).collect()
         };
         let lane_cells = if cells.is_empty() { Vec::new() } else { lane_cells(&spans, &cells) };
         drop(cells);

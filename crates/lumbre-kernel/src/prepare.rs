@@ -328,13 +328,19 @@ impl Parts {
 /// Triangles that a thread looks at together.
 const CHUNK: usize = 1 << 11;
 
+/// How many such chunks of a mesh are left to one thread, at least.
+fn least_chunks(mesh: &TriangleMesh) -> usize {
+    if mesh.indices.len() > PARALLEL { 1 } else { usize::MAX }
+}
+
 /// Checks a mesh, and finds the box around its triangles that have an area.
 fn survey_mesh(position: usize, mesh: &TriangleMesh) -> Result<(Survey, Aabb, f32), BuildError> {
     if !mesh.origin.is_finite() {
         return Err(BuildError::NotFinite { geometry: position, element: 0 });
     }
     let is_broken = |chunk: &&[Vec3]| chunk.iter().any(|p| !p.is_finite());
-    if mesh.positions.par_chunks(CHUNK).find_first(is_broken).is_some() {
+    let least = least_chunks(mesh);
+    if mesh.positions.par_chunks(CHUNK).with_min_len(least).find_first(is_broken).is_some() {
         let element = mesh.positions.iter().position(|p| !p.is_finite()).unwrap_or_default();
         return Err(BuildError::NotFinite { geometry: position, element });
     }
@@ -345,7 +351,8 @@ fn survey_mesh(position: usize, mesh: &TriangleMesh) -> Result<(Survey, Aabb, f3
             BuildError::VertexOutOfRange { geometry: position, triangle }
         })
     };
-    let chunks: Vec<_> = mesh.indices.par_chunks(CHUNK).enumerate().map(survey_chunk).collect();
+    let chunks: Vec<_> =
+        mesh.indices.par_chunks(CHUNK).with_min_len(least).enumerate().map(survey_chunk).collect();
     let mut survey =
         Survey { geometry: position as u32, triangles: 0, chunks: Vec::with_capacity(chunks.len()) };
     let mut bounds = MeshBox::EMPTY;
@@ -503,7 +510,7 @@ fn box_triangles(mesh: &TriangleMesh, survey: &Survey, units: &Units, mut places
         .map(|(chunk, &count)| (chunk, places.split_off_mut(..count as usize).expect("they were counted")))
         .collect();
     let (boxer, level) = (&Boxer::new(mesh, units), Level::best());
-    chunks.into_par_iter().for_each(|(chunk, places)| {
+    chunks.into_par_iter().with_min_len(least_chunks(mesh)).for_each(|(chunk, places)| {
         level.run(BoxChunk { mesh, boxer, geometry: survey.geometry, first: chunk * CHUNK, places });
     });
 }
