@@ -87,13 +87,13 @@ impl Bounds {
         for number in &mut numbers {
             *number *= ONE as f32;
         }
-        Self { lanes: L::truncated(&numbers) }
+        Self::truncated::<L>(&numbers)
     }
 
-    /// Around a point in fixed-point numbers; the last of four means nothing.
+    /// The same in fixed-point numbers.
     #[inline(always)]
-    pub(crate) fn at([x, y, z, w]: [i32; 4]) -> Self {
-        Self { lanes: [x, y, z, w, -x, -y, -z, -w] }
+    pub(crate) fn truncated<L: Lanes>(numbers: &[f32; 8]) -> Self {
+        Self { lanes: L::truncated(numbers) }
     }
 
     /// What is in both; without a size where that is nothing.

@@ -7,6 +7,7 @@
 use rayon::prelude::*;
 
 use crate::build::{Binary, BinaryNode};
+use crate::lanes::{self, Lanes, Level, Task};
 use crate::primitive::Bounds;
 
 /// How often places are sought at most.
@@ -62,6 +63,22 @@ pub(crate) fn reinsert(tree: Binary<'_>) -> Binary<'_> {
     linked.to_binary().unwrap_or(tree)
 }
 
+/// Seeks where a subtree is best put.
+struct Seek<'a> {
+    tree: &'a Tree,
+    from: u32,
+    stack: &'a mut Vec<(f32, u32)>,
+}
+
+impl Task for Seek<'_> {
+    type Output = Option<Move>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Option<Move> {
+        self.tree.best_move(self.from, self.stack)
+    }
+}
+
 impl Tree {
     fn of(tree: &Binary) -> Self {
         let mut nodes = Vec::new();
@@ -109,6 +126,7 @@ impl Tree {
         }
     }
 
+    #[inline(always)]
     fn node(&self, place: u32) -> &Node {
         &self.nodes[place as usize]
     }
@@ -117,6 +135,7 @@ impl Tree {
         self.node(place).children[0] == NONE
     }
 
+    #[inline(always)]
     fn sibling(&self, place: u32) -> u32 {
         let [left, right] = self.node(self.node(place).parent).children;
         if left == place { right } else { left }
@@ -138,7 +157,8 @@ impl Tree {
             candidates.select_nth_unstable_by(count, by_area);
             candidates.truncate(count);
         }
-        let seek = |stack: &mut Vec<(f32, u32)>, &place: &u32| self.best_move(place, stack);
+        let level = Level::best();
+        let seek = |stack: &mut Vec<(f32, u32)>, &from: &u32| level.run(Seek { tree: self, from, stack });
         let mut moves: Vec<Move> =
             candidates.par_iter().with_min_len(64).map_init(Vec::new, seek).flatten().collect();
         moves.par_sort_unstable_by(|a, b| b.gain.total_cmp(&a.gain).then(a.from.cmp(&b.from)));
@@ -160,6 +180,7 @@ impl Tree {
 
     /// Where a subtree is best put: beside which node. Nodes are looked at from the near to the far, and not below where
     /// even a place without cost would gain less than the best one so far.
+    #[inline(always)]
     fn best_move(&self, from: u32, stack: &mut Vec<(f32, u32)>) -> Option<Move> {
         let own = *self.node(from);
         let parent = own.parent;
@@ -187,6 +208,7 @@ impl Tree {
                 }
                 if there.children[0] != NONE {
                     let below = gain_here + there.area;
+                    lanes::fetch(self.node(there.children[1]));
                     stack.push((below, there.children[1]));
                     stack.push((below, there.children[0]));
                 }

@@ -489,12 +489,12 @@ impl Task for FillSlabs<'_> {
                     let Some([a, b]) = between(ends, axis, low, high) else { continue };
                     let from = slab_of(a[axis]).clamp(first, last);
                     let to = slab_of(b[axis]).clamp(first, last);
-                    parts[from].grow(&at_point(&a));
-                    parts[to].grow(&at_point(&b));
+                    parts[from].grow(&at_point::<L>(&a));
+                    parts[to].grow(&at_point::<L>(&b));
                     let step = 1.0 / (b[axis] - a[axis]);
                     for slab in from + 1..=to {
                         let along = (start + slab as f32 * width - a[axis]) * step;
-                        let point = at_point(&towards(&a, &b, along.clamp(0.0, 1.0)));
+                        let point = at_point::<L>(&towards(&a, &b, along.clamp(0.0, 1.0)));
                         parts[slab - 1].grow(&point);
                         parts[slab].grow(&point);
                     }
@@ -515,14 +515,9 @@ fn points_of(corners: &Corners) -> [Point; 3] {
     corners.map(|[x, y, z]| [(x * ONE) as f32, (y * ONE) as f32, (z * ONE) as f32, 0.0])
 }
 
-// All four alike, for vector operations.
 #[inline(always)]
-fn at_point(point: &Point) -> Bounds {
-    let mut fixed = [0; 4];
-    for (fixed, x) in fixed.iter_mut().zip(point) {
-        *fixed = *x as i32;
-    }
-    Bounds::at(fixed)
+fn at_point<L: Lanes>(&[x, y, z, w]: &Point) -> Bounds {
+    Bounds::truncated::<L>(&[x, y, z, w, -x, -y, -z, -w])
 }
 
 #[inline(always)]
