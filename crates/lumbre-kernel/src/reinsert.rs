@@ -16,7 +16,7 @@ const ROUNDS: usize = 8;
 /// those of rooms, of which the first gains a tenth, and of needles in six to eight.
 const LEAST_GAIN: f64 = 1e-3;
 /// Of how many nodes one is considered in a round, by area.
-const SHARE: usize = 2;
+const SHARE: usize = 8;
 /// Trees that become deeper are given up: recursions below rely on it.
 const DEEPEST: u32 = 200;
 /// How many places are looked at for one subtree at most.
