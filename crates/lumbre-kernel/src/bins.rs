@@ -421,23 +421,10 @@ impl Task for PartPiece<'_> {
     fn run<L: Lanes>(self) -> usize {
         let Self { primitives, split, there } = self;
         let (mut left, mut right) = (0, 0);
-        let mut place = 0;
-        while let Some(eight) = primitives[place..].first_chunk::<8>() {
-            let eight = *eight;
-            let places = split.binning.bins_of_eight(&eight);
-            for (bins, primitive) in places.iter().zip(eight) {
-                let is_left = (bins[split.axis] as usize) < split.bin;
-                // Without a branch: what does not belong is soon written over.
-                primitives[left] = primitive;
-                there[right] = primitive;
-                left += usize::from(is_left);
-                right += usize::from(!is_left);
-            }
-            place += 8;
-        }
-        for place in place..primitives.len() {
+        for place in 0..primitives.len() {
             let primitive = primitives[place];
             let is_left = split.is_left(&primitive);
+            // Without a branch: what does not belong is soon written over.
             primitives[left] = primitive;
             there[right] = primitive;
             left += usize::from(is_left);

@@ -561,3 +561,17 @@ pub(crate) fn equals_before_at(level: Level, list: &[u32; 3 * BLOCK]) -> [u32; 3
     }
     level.run(Comparing(list))
 }
+
+/// [`Lanes::truncated`] at a level, for tests.
+#[cfg(test)]
+pub(crate) fn truncated_at(level: Level, numbers: &[f32; BLOCK]) -> [i32; BLOCK] {
+    struct Truncating<'a>(&'a [f32; BLOCK]);
+    impl Task for Truncating<'_> {
+        type Output = [i32; BLOCK];
+        #[inline(always)]
+        fn run<L: Lanes>(self) -> Self::Output {
+            L::truncated(self.0)
+        }
+    }
+    level.run(Truncating(numbers))
+}

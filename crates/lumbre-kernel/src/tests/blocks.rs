@@ -13,7 +13,7 @@ use lumbre_math::{DVec3, Vec3};
 
 use super::scenes::Random;
 use crate::blocks::{self, BlockNames, Blocks, TriangleBlock, Unit};
-use crate::lanes::{Level, corners_at, equals_before_at, meet_triangles_at};
+use crate::lanes::{Level, corners_at, equals_before_at, meet_triangles_at, truncated_at};
 use crate::triangles::{BLOCK, BlockRay, Meeting, Shear, intersect};
 use crate::{Accel, BuildOptions, Geometry, GeometryKind, TriangleMesh};
 
@@ -207,6 +207,22 @@ fn corners_are_compared_with_all_before_them_at_every_level() {
             for level in Level::all() {
                 assert_eq!(equals_before_at(level, &list), expected, "{level:?}: {list:?}");
             }
+        }
+    }
+}
+
+#[test]
+fn numbers_lose_what_stands_behind_the_point_at_every_level() {
+    let mut random = Random(84);
+    let below_the_end = 2.0f32.powi(31).next_down();
+    let mut lists = vec![[0.0, -0.0, 0.99, -0.99, 1e-40, 8_388_608.5, below_the_end, -below_the_end]];
+    lists.extend(
+        (0..200).map(|i| std::array::from_fn(|_| ((2.0 * random.unit() - 1.0) * 2.0f64.powi(i % 31)) as f32)),
+    );
+    for numbers in lists {
+        let expected = numbers.map(|number| f64::from(number).trunc() as i32);
+        for level in Level::all() {
+            assert_eq!(truncated_at(level, &numbers), expected, "{level:?}: {numbers:?}");
         }
     }
 }
