@@ -398,7 +398,9 @@ impl Workplace {
     /// For twigs of no more than so many primitives.
     fn new(most: usize) -> Self {
         let names = vec![[0; 2]; most];
-        Self { nodes: Vec::new(), bins: Box::new(Bins::EMPTY), there: vec![Bounds::EMPTY; most], names }
+        // Packed primitives have somewhat fewer nodes as a rule; what grows takes twice its room for a moment.
+        let nodes = Vec::with_capacity(most / 3);
+        Self { nodes, bins: Box::new(Bins::EMPTY), there: vec![Bounds::EMPTY; most], names }
     }
 }
 
