@@ -184,6 +184,7 @@ impl Bins {
         self.tallies[0].join(&other.tallies[0], MOST_BINS);
     }
 
+    /// Tallies primitives in so many rows.
     #[inline(always)]
     fn fill<const ROWS: usize, const COSTS: bool>(
         &mut self,
@@ -389,6 +390,7 @@ impl Task for Part<'_> {
     }
 }
 
+/// The sides of a split, and how many primitives each has by now.
 struct Sides<'a> {
     left: &'a mut [Primitive],
     right: &'a mut [Primitive],
