@@ -244,9 +244,10 @@ fn sort_by_rank(primitives: &mut [Primitive], traits: &[Traits]) -> [usize; Kind
     counts
 }
 
-/// Like `vec![value; count]`, by all threads.
+/// Like `vec![value; count]`, by all threads where that is much: so many for each at least.
 pub(crate) fn fill<T: Clone + Send + Sync>(count: usize, value: T) -> Vec<T> {
-    (0..count).into_par_iter().with_min_len(CHUNK).map(|_| value.clone()).collect()
+    const LEAST: usize = 1 << 14;
+    (0..count).into_par_iter().with_min_len(LEAST).map(|_| value.clone()).collect()
 }
 
 /// Which twigs there are to be, and what stands over them.
