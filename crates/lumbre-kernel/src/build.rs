@@ -17,7 +17,7 @@ use crate::bins::{self, BestSplit, Binning, Bins, Fill, Measure, Part, Split};
 use crate::boxes::Boxes;
 use crate::build::spatial::Eagerness;
 use crate::carve::Cell;
-use crate::collapse::{Choices, Costs, choose};
+use crate::collapse::{Choices, Costs, Known, choose};
 use crate::few::{Decide, FEW, Few, group_of};
 use crate::lanes::Level;
 use crate::morton::{self, Code};
@@ -25,6 +25,7 @@ use crate::node::Units;
 use crate::parting::part;
 use crate::primitive::{Bounds, Kind, Primitive, Traits};
 use crate::reinsert::reinsert;
+use crate::treelet;
 
 /// Levels that may be split by SAH; then come at most 32 more, each halving.
 const SAH_DEPTH: u32 = 64;
@@ -51,6 +52,8 @@ pub(crate) struct Fork<'p> {
     pub(crate) costs: Costs,
     pub(crate) choices: Choices,
     pub(crate) children: [Binary<'p>; 2],
+    /// How many there are, with this one.
+    pub(crate) nodes: usize,
     /// Whether the right child is of a higher rank than the left.
     pub(crate) is_ranked: bool,
 }
@@ -64,7 +67,7 @@ impl Binary<'_> {
     /// A twig of such nodes.
     pub(crate) fn twig(mut nodes: Vec<BinaryNode>) -> Self {
         let costs = choose(&mut nodes, false);
-        Self::Twig(Twig { nodes: Cow::Owned(nodes), costs })
+        Self::Twig(Twig { nodes: Cow::Owned(nodes), costs, known: Known::default() })
     }
 }
 
@@ -74,6 +77,20 @@ pub(crate) struct Twig<'p> {
     pub(crate) nodes: Cow<'p, [BinaryNode]>,
     /// The costs of the root, for those above it.
     pub(crate) costs: Costs,
+    /// Those of others, where they may come to stand elsewhere.
+    known: Known,
+}
+
+impl<'p> Twig<'p> {
+    /// The subtree of these nodes. Unless they stand where the primitives stood, they are copied.
+    pub(crate) fn part(&self, nodes: std::ops::Range<usize>) -> Self {
+        let costs = self.known.costs(nodes.start, &self.nodes[nodes.clone()]);
+        let nodes = match &self.nodes {
+            Cow::Borrowed(all) => Cow::Borrowed(&all[nodes]),
+            Cow::Owned(all) => Cow::Owned(all[nodes].to_vec()),
+        };
+        Self { nodes, costs, known: Known::default() }
+    }
 }
 
 /// A node of a twig: its box, named by two words.
@@ -297,6 +314,8 @@ struct Plot<'a> {
     first: usize,
     /// Whether the primitives are to stay, in the order of names.
     keeps: bool,
+    /// Whether subtrees of twigs may be put elsewhere.
+    moves: bool,
 }
 
 /// A twig that has grown where its primitives stood, or apart.
@@ -306,6 +325,7 @@ struct GrownTwig {
     /// How many there are in the place of the primitives, before their names; or the nodes themselves, which stand apart.
     nodes: Result<usize, Vec<BinaryNode>>,
     costs: Costs,
+    known: Known,
 }
 
 impl GrownTwig {
@@ -430,10 +450,10 @@ impl Builder<'_> {
             // Subtrees that are put elsewhere later are those of single instances.
             trees.push(if keeps && preset != Preset::Best {
                 let sketch = self.sketch_sorted::<false>(primitives, 0, &codes);
-                self.grow::<false>(&sketch, &codes, Plot { primitives, names, first, keeps })
+                self.grow::<false>(&sketch, &codes, Plot { primitives, names, first, keeps, moves: false })
             } else {
                 let sketch = self.sketch_sorted::<true>(primitives, 0, &codes);
-                self.grow::<true>(&sketch, &codes, Plot { primitives, names, first, keeps })
+                self.grow::<true>(&sketch, &codes, Plot { primitives, names, first, keeps, moves: false })
             });
             first += count;
         }
@@ -449,10 +469,12 @@ impl Builder<'_> {
             *primitives = sorted;
         }
         let sketch = self.sketch_sorted::<false>(primitives, 0, &codes);
-        let twigs =
-            self.twigs::<false>(&sketch, &codes, Plot { primitives, names: None, first, keeps: false });
+        let moves = preset == Preset::Balanced && treelet::is_tried(primitives.len());
+        let plot = Plot { primitives, names: None, first, keeps: false, moves };
+        let twigs = self.twigs::<false>(&sketch, &codes, plot);
         drop(codes);
-        let is_compact = primitives.len() >= MANY;
+        let count = primitives.len();
+        let is_compact = count >= MANY;
         if is_compact {
             let (mut from, mut to) = (0, 0);
             for twig in &twigs {
@@ -472,9 +494,10 @@ impl Builder<'_> {
                 Ok(_) => Cow::Borrowed(bytemuck::cast_slice(nodes)),
                 Err(nodes) => Cow::Owned(nodes),
             };
-            binaries.push(Binary::Twig(Twig { nodes, costs: twig.costs }));
+            binaries.push(Binary::Twig(Twig { nodes, costs: twig.costs, known: twig.known }));
         }
-        PackedTree { tree: sketch.over(&mut binaries.into_iter()), names }
+        let tree = sketch.over(&mut binaries.into_iter());
+        PackedTree { tree: if moves { treelet::reinsert_upper(tree, count) } else { tree }, names }
     }
 
     /// Puts as many primitives in the order along a curve there; their codes.
@@ -547,16 +570,16 @@ impl Builder<'_> {
     /// The tree that was sketched. `codes` are those of the primitives, if they were sorted, and there are places for names.
     fn grow<const COSTS: bool>(&self, sketch: &Sketch, codes: &[Code], plot: Plot) -> Binary<'static> {
         let twigs = self.twigs::<COSTS>(sketch, codes, plot);
-        let mut apart = twigs.into_iter().map(|GrownTwig { nodes, costs, .. }| {
+        let mut apart = twigs.into_iter().map(|GrownTwig { nodes, costs, known, .. }| {
             let nodes = Cow::Owned(nodes.expect_err("names have places of their own"));
-            Binary::Twig(Twig { nodes, costs })
+            Binary::Twig(Twig { nodes, costs, known })
         });
         sketch.over(&mut apart)
     }
 
     /// The twigs that were sketched.
     fn twigs<const COSTS: bool>(&self, sketch: &Sketch, mut codes: &[Code], plot: Plot) -> Vec<GrownTwig> {
-        let Plot { mut primitives, mut names, mut first, keeps } = plot;
+        let Plot { mut primitives, mut names, mut first, keeps, moves } = plot;
         let mut seeds = Vec::new();
         sketch.seeds(&mut seeds);
         let most = seeds.iter().map(|seed| seed.count).max().unwrap_or_default();
@@ -565,7 +588,7 @@ impl Builder<'_> {
             let codes = codes.split_off(..seed.count).unwrap_or_default();
             let own = take(&mut primitives, seed.count);
             let names = names.as_mut().map(|names| take(names, seed.count));
-            plots.push((seed, codes, Plot { primitives: own, names, first, keeps }));
+            plots.push((seed, codes, Plot { primitives: own, names, first, keeps, moves }));
             first += seed.count;
         }
         plots
@@ -576,7 +599,7 @@ impl Builder<'_> {
                     let Workplace { nodes, bins, there, names: own_names } = work;
                     nodes.clear();
                     let there = &mut there[..seed.count];
-                    let Plot { primitives: own, names, first, keeps } = plot;
+                    let Plot { primitives: own, names, first, keeps, moves } = plot;
                     let is_there = names.is_none();
                     let names = names.unwrap_or(&mut own_names[..seed.count]);
                     let range = Range {
@@ -596,8 +619,9 @@ impl Builder<'_> {
                         });
                         self.twig::<COSTS>(range, split, tools);
                     }
-                    let costs = choose(nodes, keeps);
-                    let mut twig = GrownTwig { count: seed.count, nodes: Ok(nodes.len()), costs };
+                    let (costs, known) =
+                        if moves { Known::choose(nodes) } else { (choose(nodes, keeps), Known::default()) };
+                    let mut twig = GrownTwig { count: seed.count, nodes: Ok(nodes.len()), costs, known };
                     // There is no room for both only where hardly any share a leaf.
                     if !is_there || twig.len() > own.len() {
                         twig.nodes = Err(nodes.to_vec());

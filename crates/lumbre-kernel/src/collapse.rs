@@ -4,6 +4,8 @@
 //! dynamic programming: H. Ylitie, T. Karras, S. Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide
 //! BVHs", High Performance Graphics, 2017. Leaves are those of the binary tree.
 
+use std::cmp::Reverse;
+
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
@@ -29,6 +31,9 @@ pub(crate) struct Entry {
 }
 
 const LAST: u32 = 1 << 31;
+
+/// From how many nodes of the binary tree on a part of it is shared among threads.
+const MANY: usize = 1024;
 
 impl Entry {
     pub(crate) fn new(geometry: u32, primitive: u32, is_last: bool) -> Self {
@@ -281,12 +286,63 @@ fn costs_of_instances(count: usize, area: f32) -> Costs {
     std::array::from_fn(|children| if children < count { area } else { 0.0 })
 }
 
+/// The costs of the larger subtrees of a twig.
+#[derive(Default)]
+pub(crate) struct Known {
+    /// With their places, from the last to the first.
+    costs: Vec<(u32, Costs)>,
+}
+
+impl Known {
+    /// From how many nodes on a subtree is a larger one.
+    const LEAST: usize = 32;
+
+    /// Chooses for all nodes of a twig; returns the costs of its root, too.
+    pub(crate) fn choose(nodes: &mut [BinaryNode]) -> (Costs, Self) {
+        let mut known = Self { costs: Vec::with_capacity(nodes.len() / 16) };
+        let costs = choose_and(
+            nodes,
+            false,
+            #[inline(always)]
+            |place, count, costs| {
+                if count >= Self::LEAST {
+                    known.costs.push((place as u32, *costs));
+                }
+            },
+        );
+        (costs, known)
+    }
+
+    /// The costs of the subtree of these nodes, the first of which has that place in the twig.
+    pub(crate) fn costs(&self, place: usize, nodes: &[BinaryNode]) -> Costs {
+        let found = self.costs.binary_search_by_key(&Reverse(place as u32), |&(place, _)| Reverse(place));
+        found.map_or_else(|_| choose(&mut nodes.to_vec(), false), |found| self.costs[found].1)
+    }
+}
+
 /// Chooses for all nodes of a twig; returns the costs of its root.
 pub(crate) fn choose(nodes: &mut [BinaryNode], are_instances: bool) -> Costs {
+    choose_and(
+        nodes,
+        are_instances,
+        #[inline(always)]
+        |_, _, _| {},
+    )
+}
+
+/// The same; tells the place of each inner node, how many nodes its subtree has, and the costs of that.
+#[inline(always)]
+fn choose_and(
+    nodes: &mut [BinaryNode],
+    are_instances: bool,
+    mut tell: impl FnMut(usize, usize, &Costs),
+) -> Costs {
     // Of the subtrees behind a node that have no parent there, from the last to the first: its children's are the last two.
     let mut behind = Vec::new();
-    for node in nodes.iter_mut().rev() {
+    let mut ends = Vec::new();
+    for (place, node) in nodes.iter_mut().enumerate().rev() {
         let mut costs = LEAF_COSTS;
+        let mut end = place + 1;
         if let Some(names) = node.names() {
             if are_instances {
                 costs = costs_of_instances(names.len(), node.bounds().half_area());
@@ -295,14 +351,17 @@ pub(crate) fn choose(nodes: &mut [BinaryNode], are_instances: bool) -> Costs {
             let choices;
             (costs, choices) = share(node.bounds().half_area(), &left, &right);
             node.choose(choices);
+            end = ends.pop().and_then(|_| ends.pop()).unwrap_or(end);
+            tell(place, end - place, &costs);
         }
         behind.push(costs);
+        ends.push(end);
     }
     behind.pop().unwrap_or(LEAF_COSTS)
 }
 
 impl Binary<'_> {
-    fn bounds(&self) -> &Bounds {
+    pub(crate) fn bounds(&self) -> &Bounds {
         match self {
             Self::Fork(fork) => &fork.bounds,
             Self::Twig(twig) => twig.nodes[0].bounds(),
@@ -315,6 +374,14 @@ impl Binary<'_> {
             Self::Twig(twig) => &twig.costs,
         }
     }
+
+    /// How many nodes there are.
+    fn nodes(&self) -> usize {
+        match self {
+            Self::Fork(fork) => fork.nodes,
+            Self::Twig(twig) => twig.nodes.len(),
+        }
+    }
 }
 
 impl<'p> Fork<'p> {
@@ -323,7 +390,8 @@ impl<'p> Fork<'p> {
         let mut bounds = *children[0].bounds();
         bounds.grow(children[1].bounds());
         let (costs, choices) = share(bounds.half_area(), children[0].costs(), children[1].costs());
-        Self { bounds, costs, choices, children, is_ranked: false }
+        let nodes = 1 + children[0].nodes() + children[1].nodes();
+        Self { bounds, costs, choices, children, nodes, is_ranked: false }
     }
 }
 
@@ -642,7 +710,7 @@ impl<'a> Packer<'a> {
 
     /// `None` for a leaf, or a node over few primitives.
     fn plan(&self, root: Cursor<'a>) -> Option<Box<Plan<'a>>> {
-        let Cursor::Fork(_) = root else { return None };
+        let Cursor::Fork(Fork { nodes: MANY.., .. }) = root else { return None };
         let (children, len) = self.gather(root);
         let mut plans: [Option<Box<Plan>>; WIDTH] = Default::default();
         let mut counts = [Counts::default(); WIDTH];

@@ -41,6 +41,7 @@ mod store;
 mod surface;
 mod touch;
 mod traverse;
+mod treelet;
 mod triangles;
 mod way;
 mod winding;

@@ -23,21 +23,28 @@ const DEEPEST: u32 = 200;
 /// How many places are looked at for one subtree at most.
 const MOST_PLACES: usize = 4096;
 
-const NONE: u32 = u32::MAX;
+pub(crate) const NONE: u32 = u32::MAX;
 
 /// A node with links both ways.
 #[derive(Clone, Copy)]
-struct Node {
+pub(crate) struct Node {
     bounds: Bounds,
-    area: f32,
+    pub(crate) area: f32,
     parent: u32,
     /// `NONE` for leaves.
-    children: [u32; 2],
+    pub(crate) children: [u32; 2],
+}
+
+impl Node {
+    /// Without children.
+    pub(crate) fn closed(bounds: &Bounds, parent: u32) -> Self {
+        Self { bounds: *bounds, area: bounds.half_area(), parent, children: [NONE; 2] }
+    }
 }
 
 /// The tree as a list; the root comes first.
-struct Tree {
-    nodes: Vec<Node>,
+pub(crate) struct Tree {
+    pub(crate) nodes: Vec<Node>,
 }
 
 /// A subtree that would be better elsewhere.
@@ -56,8 +63,7 @@ pub(crate) fn reinsert(tree: Binary<'_>) -> Binary<'_> {
     }
     let all = linked.inner_area();
     for _ in 0..ROUNDS {
-        let gained: f64 = linked.round().into_iter().map(f64::from).sum();
-        if gained <= LEAST_GAIN * all {
+        if linked.round(SHARE) <= LEAST_GAIN * all {
             break;
         }
     }
@@ -88,19 +94,13 @@ impl Tree {
             match tree {
                 Binary::Fork(fork) => {
                     let place = nodes.len() as u32;
-                    let area = fork.bounds.half_area();
-                    nodes.push(Node { bounds: fork.bounds, area, parent, children: [NONE; 2] });
+                    nodes.push(Node::closed(&fork.bounds, parent));
                     Self::link(&mut nodes, parent, place);
                     pending.extend(fork.children.iter().rev().map(|child| (child, place)));
                 }
                 Binary::Twig(twig) => {
                     let start = nodes.len() as u32;
-                    nodes.extend(twig.nodes.iter().map(|node| Node {
-                        bounds: *node.bounds(),
-                        area: node.bounds().half_area(),
-                        parent: NONE,
-                        children: [NONE; 2],
-                    }));
+                    nodes.extend(twig.nodes.iter().map(|node| Node::closed(node.bounds(), NONE)));
                     nodes[start as usize].parent = parent;
                     Self::link(&mut nodes, parent, start);
                     for (i, node) in twig.nodes.iter().enumerate() {
@@ -142,17 +142,27 @@ impl Tree {
         if left == place { right } else { left }
     }
 
+    /// Those of an inner node.
+    pub(crate) fn children(&self, place: u32) -> Option<[u32; 2]> {
+        (!self.is_leaf(place)).then(|| self.node(place).children)
+    }
+
     /// The areas of all inner nodes together.
-    fn inner_area(&self) -> f64 {
+    pub(crate) fn inner_area(&self) -> f64 {
         self.nodes.iter().filter(|node| node.children[0] != NONE).map(|node| f64::from(node.area)).sum()
     }
 
-    /// Seeks places and moves; returns how much area each move gained.
-    fn round(&mut self) -> Vec<f32> {
+    /// Seeks places for one of so many nodes and moves; returns how much area was gained.
+    pub(crate) fn round(&mut self, share: usize) -> f64 {
+        self.moves(share).into_iter().map(f64::from).sum()
+    }
+
+    /// The same; returns how much each move gained.
+    fn moves(&mut self, share: usize) -> Vec<f32> {
         // The largest ones, of those that have a grandparent.
         let mut candidates: Vec<u32> =
             (1..self.nodes.len() as u32).filter(|&place| self.node(place).parent != 0).collect();
-        let count = (candidates.len() / SHARE).max(candidates.len().min(64));
+        let count = (candidates.len() / share).max(candidates.len().min(64));
         let by_area = |a: &u32, b: &u32| self.node(*b).area.total_cmp(&self.node(*a).area).then(a.cmp(b));
         if count < candidates.len() {
             candidates.select_nth_unstable_by(count, by_area);
@@ -262,13 +272,12 @@ impl Tree {
         }
     }
 
-    /// Back; `None` where it became too deep.
-    fn to_binary(&self) -> Option<Binary<'static>> {
-        // In the order of a walk, children after parents; then from the end, how many nodes are under each.
+    /// The nodes in the order of a walk, children after parents; `None` where it is deeper than that.
+    pub(crate) fn order(&self, deepest: u32) -> Option<Vec<u32>> {
         let mut order = Vec::with_capacity(self.nodes.len());
         let mut pending = vec![(0, 0)];
         while let Some((place, depth)) = pending.pop() {
-            if depth > DEEPEST {
+            if depth > deepest {
                 return None;
             }
             order.push(place);
@@ -276,6 +285,13 @@ impl Tree {
                 pending.extend(self.node(place).children.map(|child| (child, depth + 1)));
             }
         }
+        Some(order)
+    }
+
+    /// Back; `None` where it became too deep.
+    fn to_binary(&self) -> Option<Binary<'static>> {
+        // From the end, how many nodes are under each.
+        let order = self.order(DEEPEST)?;
         let mut sizes = vec![1_u32; self.nodes.len()];
         for &place in order.iter().rev() {
             if !self.is_leaf(place) {
@@ -345,7 +361,7 @@ mod tests {
         let sum = before.inner_area();
         let leaves: f32 =
             before.nodes.iter().filter(|node| node.children[0] == NONE).map(|node| node.area).sum();
-        let gains: Vec<f32> = (0..ROUNDS).flat_map(|_| before.round()).collect();
+        let gains: Vec<f32> = (0..ROUNDS).flat_map(|_| before.moves(SHARE)).collect();
         assert!(gains.len() > 4, "{}", gains.len());
         let gained: f64 = gains.into_iter().map(f64::from).sum();
         let rest = before.inner_area();

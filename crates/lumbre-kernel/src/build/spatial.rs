@@ -255,7 +255,13 @@ impl Spatial<'_, '_> {
             Binary::twig(nodes)
         } else {
             let sketch = self.builder.sketch::<false>(&mut boxes, depth, None);
-            let plot = Plot { primitives: &mut boxes, names: Some(names), first: room.first, keeps: false };
+            let plot = Plot {
+                primitives: &mut boxes,
+                names: Some(names),
+                first: room.first,
+                keeps: false,
+                moves: false,
+            };
             self.builder.grow::<false>(&sketch, &[], plot)
         };
         for (name, cell) in room.names[..count].iter_mut().zip(room.cells) {

@@ -6,7 +6,9 @@ use std::sync::{Arc, Mutex};
 use lumbre_geometry::{Aabb, Ray, Root, Roots, Surface};
 use lumbre_math::{DVec3, Transform, Vec3};
 
-use super::scenes::{Balls, Random, build, cube, icosphere, mixture, options, soup, with_every_preset};
+use super::scenes::{
+    Balls, Random, build, cube, icosphere, mixture, options, ray, room, soup, with_every_preset,
+};
 use crate::build::spatial::tests::IS_FORCED;
 use crate::node::tag;
 use crate::{
@@ -125,6 +127,7 @@ fn the_tree_is_the_same_from_any_number_of_threads() {
 }
 
 fn check_that_threads_make_no_difference() {
+    const ROOM: usize = 20_000;
     // Threads of a pool do not know this thread's.
     let (options, is_forced) = (options(), IS_FORCED.get());
     let print = |threads: usize, triangles: usize| {
@@ -132,8 +135,13 @@ fn check_that_threads_make_no_difference() {
         pool.install(|| {
             IS_FORCED.set(is_forced);
             let mut random = Random(5);
-            let soup = soup(&mut random, triangles, DVec3::new(1.0, 2.0, 3.0), 4.0);
-            let kinds = [soup, icosphere(4, DVec3::ONE, 2.0)].map(|mesh| GeometryKind::Mesh(Arc::new(mesh)));
+            let kinds = if triangles == ROOM {
+                [room(&mut random, ROOM / 200), cube()]
+            } else {
+                let soup = soup(&mut random, triangles, DVec3::new(1.0, 2.0, 3.0), 4.0);
+                [soup, icosphere(4, DVec3::ONE, 2.0)]
+            };
+            let kinds = kinds.map(|mesh| GeometryKind::Mesh(Arc::new(mesh)));
             let geometries = kinds.map(|kind| Geometry { id: 3, kind }).to_vec();
             let accel = Accel::build(geometries, &options).unwrap();
             if triangles > 100_000 {
@@ -142,14 +150,34 @@ fn check_that_threads_make_no_difference() {
             format!("{:?}", accel.tree)
         })
     };
-    // Of few, threads leave less to one.
-    for triangles in [4_000, 150_000] {
+    // Of few, threads leave less to one; and of a room, upper nodes are put elsewhere.
+    for triangles in [4_000, ROOM, 150_000] {
         let one = print(1, triangles);
         assert!(one.len() > 10 * triangles);
         for threads in [2, 5] {
             assert!(one == print(threads, triangles), "{threads} threads differ from one at {triangles}");
         }
     }
+}
+
+#[test]
+fn a_room_whose_upper_nodes_were_moved_answers_as_one_whose_were_not() {
+    let room = Arc::new(room(&mut Random(6), 60));
+    let tree = |preset| {
+        let geometries = vec![Geometry { id: 3, kind: GeometryKind::Mesh(Arc::clone(&room)) }];
+        Accel::build(geometries, &BuildOptions { preset }).unwrap()
+    };
+    let (moved, plain) = (tree(Preset::Balanced), tree(Preset::Fast));
+    let mut random = Random(7);
+    let mut hits = 0;
+    for _ in 0..4_000 {
+        let ray = ray(&mut random, DVec3::ZERO, 1.0);
+        assert_eq!(moved.closest(&ray), plain.closest(&ray), "{ray:?}");
+        assert_eq!(moved.any(&ray), plain.any(&ray), "{ray:?}");
+        assert_eq!(moved.count(&ray), plain.count(&ray), "{ray:?}");
+        hits += usize::from(moved.any(&ray));
+    }
+    assert!((500..3_900).contains(&hits), "{hits}");
 }
 
 #[test]

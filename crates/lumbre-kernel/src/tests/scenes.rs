@@ -208,6 +208,28 @@ pub(crate) fn soup(random: &mut Random, count: usize, origin: DVec3, extent: f64
     TriangleMesh { origin, positions, indices }
 }
 
+/// Walls and boards of two triangles each every which way, and among them a hundred times as many small triangles, in heaps.
+pub(crate) fn room(random: &mut Random, walls: usize) -> TriangleMesh {
+    let mut positions = Vec::new();
+    let mut indices = Vec::new();
+    for wall in 0..walls {
+        let center = random.vector();
+        let [u, v] = [1, 2].map(|turn| DVec3::AXES[(wall + turn) % 3] * random.between(0.1, 0.5));
+        let corners = [center - u - v, center + u - v, center + u + v, center - u + v];
+        let base = positions.len() as u32;
+        positions.extend(corners);
+        indices.extend([[base, base + 1, base + 2], [base, base + 2, base + 3]]);
+        let heap = random.vector();
+        for _ in 0..200 {
+            let at = heap + 0.1 * random.vector();
+            let base = positions.len() as u32;
+            positions.extend([(); 3].map(|()| at + 0.01 * random.vector()));
+            indices.push([base, base + 1, base + 2]);
+        }
+    }
+    mesh(positions, indices)
+}
+
 /// The same mesh in double precision.
 pub(crate) fn precise(mesh: &TriangleMesh) -> PreciseMesh {
     let positions = mesh.positions.iter().map(|p| mesh.origin + p.as_dvec3()).collect();
