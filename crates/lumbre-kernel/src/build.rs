@@ -469,7 +469,7 @@ impl Builder<'_> {
             *primitives = sorted;
         }
         let sketch = self.sketch_sorted::<false>(primitives, 0, &codes);
-        let moves = preset == Preset::Balanced && treelet::is_tried(primitives.len());
+        let moves = preset != Preset::Fast && treelet::is_tried(primitives.len());
         let plot = Plot { primitives, names: None, first, keeps: false, moves };
         let twigs = self.twigs::<false>(&sketch, &codes, plot);
         drop(codes);

@@ -14,7 +14,7 @@ use crate::primitive::Bounds;
 const ROUNDS: usize = 8;
 /// No more where a round gains less than this share of all areas. Trees of statues and landscapes come to that in one round or two;
 /// those of rooms, of which the first gains a tenth, and of needles in six to eight.
-const LEAST_GAIN: f64 = 1e-3;
+const LEAST_GAIN: f64 = 0.015;
 /// Of how many nodes one is considered in a round, by area. With one of two, whole builds took up to 1.7 times as long, and rays
 /// gained nothing that could be measured.
 const SHARE: usize = 8;
