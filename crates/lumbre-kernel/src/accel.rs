@@ -68,11 +68,12 @@ pub enum Preset {
     /// heuristic.
     Fast,
     /// Binned by the surface area heuristic at every level (I. Wald, "On fast Construction of SAH-based Bounding Volume
-    /// Hierarchies", 2007). Instances whose parts have much smaller boxes than the whole are entered part by part (after C. Benthin
+    /// Hierarchies", 2007). Among the upper nodes of meshes, subtrees are put elsewhere where that makes the tree much better, as in
+    /// `Best`. Instances whose parts have much smaller boxes than the whole are entered part by part (after C. Benthin
     /// and others, "Improved Two-Level BVHs using Partial Re-Braiding", 2017): at most eight parts for each on average, and 64.
     #[default]
     Balanced,
-    /// The balanced tree, then made better by putting subtrees elsewhere (D. Meister, J. Bittner, "Parallel Reinsertion for
+    /// The balanced tree, then made better by putting subtrees elsewhere everywhere (D. Meister, J. Bittner, "Parallel Reinsertion for
     /// Bounding Volume Hierarchy Optimization", 2018): for what is built once and asked often. Where most of a tree is empty
     /// space in the boxes of long and slanted triangles, these stand in several leaves, each for a part of it (M. Stich and
     /// others, "Spatial Splits in Bounding Volume Hierarchies", 2009): no more than 1.3 times as many places as triangles.

@@ -29,6 +29,8 @@ use crate::treelet;
 
 /// Levels that may be split by SAH; then come at most 32 more, each halving.
 const SAH_DEPTH: u32 = 64;
+/// No tree that has grown so is deeper: the last few are split in any way.
+pub(crate) const DEEPEST: u32 = SAH_DEPTH + 32 + FEW as u32;
 /// So many a fast build splits by SAH: leaves then are a tenth fuller, and nodes fewer, for a twentieth of its time.
 const FAST_FEW: usize = 48;
 /// From how many primitives on threads share the work.
@@ -52,7 +54,7 @@ pub(crate) struct Fork<'p> {
     pub(crate) costs: Costs,
     pub(crate) choices: Choices,
     pub(crate) children: [Binary<'p>; 2],
-    /// How many there are, with this one.
+    /// How many there are below it, with itself.
     pub(crate) nodes: usize,
     /// Whether the right child is of a higher rank than the left.
     pub(crate) is_ranked: bool,

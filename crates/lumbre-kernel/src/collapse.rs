@@ -32,9 +32,6 @@ pub(crate) struct Entry {
 
 const LAST: u32 = 1 << 31;
 
-/// From how many nodes of the binary tree on a part of it is shared among threads.
-const MANY: usize = 1024;
-
 impl Entry {
     pub(crate) fn new(geometry: u32, primitive: u32, is_last: bool) -> Self {
         Self { geometry, primitive_and_last: primitive | if is_last { LAST } else { 0 } }
@@ -286,7 +283,7 @@ fn costs_of_instances(count: usize, area: f32) -> Costs {
     std::array::from_fn(|children| if children < count { area } else { 0.0 })
 }
 
-/// The costs of the larger subtrees of a twig.
+/// The costs of the larger subtrees of a twig, so that these can be put elsewhere without choosing again.
 #[derive(Default)]
 pub(crate) struct Known {
     /// With their places, from the last to the first.
@@ -375,7 +372,7 @@ impl Binary<'_> {
         }
     }
 
-    /// How many nodes there are.
+    /// How many nodes it has.
     fn nodes(&self) -> usize {
         match self {
             Self::Fork(fork) => fork.nodes,
@@ -495,6 +492,9 @@ impl std::ops::AddAssign for Counts {
         self.entries += other.entries;
     }
 }
+
+/// From how many nodes of the binary tree on a part of it is shared among threads.
+const MANY: usize = 1024;
 
 /// A wide node over many primitives, with what its children take.
 struct Plan<'a> {

@@ -9,9 +9,9 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::ops::Range;
 
-use crate::build::{Binary, BinaryNode, Twig};
+use crate::build::{self, Binary, BinaryNode, Twig};
 use crate::primitive::Bounds;
-use crate::reinsert::{NONE, Node, Tree};
+use crate::reinsert::{self, NONE, Node, Tree};
 
 /// How many are opened. With a thousand, rays gain no more, and seeking takes four times as long.
 const OPENED: usize = 128;
@@ -24,8 +24,8 @@ const ROUNDS: usize = 10;
 /// in statues and landscapes, and 5 to 10 in rooms.
 const FIRST_GAIN: f64 = 0.03;
 const LEAST_GAIN: f64 = 0.005;
-/// Treelets that become deeper are given up.
-const DEEPEST: u32 = 96;
+/// Treelets that become deeper are given up: with what is below they are no deeper than other trees that were changed.
+const DEEPEST: u32 = reinsert::DEEPEST - build::DEEPEST;
 
 /// What stands at a node of a treelet.
 #[derive(Clone, Copy)]
