@@ -196,7 +196,7 @@ mod tests {
         binary_tree(Level::best(), Effort::of(preset), Vec::new(), boxes, &traits, &[], &units)
     }
 
-    /// Calls for every node below, with its box; returns its costs as they are chosen for all of them together.
+    /// Lists the nodes of a tree, left before right, and tells of every leaf; sees that boxes hold those below them.
     fn walk(tree: Piece, leaf: &mut impl FnMut(&BinaryNode), nodes: &mut Vec<BinaryNode>) {
         let place = nodes.len();
         match tree.children() {
