@@ -73,7 +73,7 @@ pub enum Preset {
     /// and others, "Improved Two-Level BVHs using Partial Re-Braiding", 2017): at most eight parts for each on average, and 64.
     #[default]
     Balanced,
-    /// The balanced tree, then made better by putting subtrees elsewhere everywhere (D. Meister, J. Bittner, "Parallel Reinsertion for
+    /// The balanced tree, then made better by putting subtrees of any size elsewhere (D. Meister, J. Bittner, "Parallel Reinsertion for
     /// Bounding Volume Hierarchy Optimization", 2018): for what is built once and asked often. Where most of a tree is empty
     /// space in the boxes of long and slanted triangles, these stand in several leaves, each for a part of it (M. Stich and
     /// others, "Spatial Splits in Bounding Volume Hierarchies", 2009): no more than 1.3 times as many places as triangles.

@@ -63,11 +63,7 @@ pub(crate) fn reinsert(tree: Binary<'_>) -> Binary<'_> {
         return tree;
     }
     let all = linked.inner_area();
-    for _ in 0..ROUNDS {
-        if linked.round(SHARE) <= LEAST_GAIN * all {
-            break;
-        }
-    }
+    linked.rounds(ROUNDS, SHARE, LEAST_GAIN * all);
     linked.to_binary().unwrap_or(tree)
 }
 
@@ -151,6 +147,15 @@ impl Tree {
     /// The areas of all inner nodes together.
     pub(crate) fn inner_area(&self) -> f64 {
         self.nodes.iter().filter(|node| node.children[0] != NONE).map(|node| f64::from(node.area)).sum()
+    }
+
+    /// So many rounds at most, up to the first that gains no more than `least`.
+    pub(crate) fn rounds(&mut self, most: usize, share: usize, least: f64) {
+        for _ in 0..most {
+            if self.round(share) <= least {
+                break;
+            }
+        }
     }
 
     /// Seeks places for one of so many nodes and moves; returns how much area was gained.

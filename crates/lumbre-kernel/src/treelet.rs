@@ -75,12 +75,11 @@ pub(crate) fn reinsert_upper(tree: Binary<'_>, primitives: usize) -> Binary<'_> 
 
 /// The nodes of a tree of which so many are opened, if there are, the largest first and the earlier of equals.
 fn open(tree: &Binary, count: usize) -> Tree {
-    let root = Piece::Tree(tree);
-    let mut pieces = vec![root];
-    let mut upper = Tree { nodes: vec![Node::closed(root.bounds(), NONE)] };
+    let mut pieces = vec![Piece::Tree(tree)];
+    let mut upper = Tree { nodes: vec![Node::closed(tree.bounds(), NONE)] };
     // No area is less than nothing, so that their bits are in the same order.
-    let key = |piece: Piece, place: u32| (piece.bounds().half_area().to_bits(), Reverse(place));
-    let mut closed = BinaryHeap::from([key(root, 0)]);
+    let key = |node: &Node, place: u32| (node.area.to_bits(), Reverse(place));
+    let mut closed = BinaryHeap::from([key(&upper.nodes[0], 0)]);
     let mut opened = 0;
     while opened < count
         && let Some((_, Reverse(parent))) = closed.pop()
@@ -88,9 +87,10 @@ fn open(tree: &Binary, count: usize) -> Tree {
         let Some(children) = pieces[parent as usize].children() else { continue };
         let first = pieces.len() as u32;
         for (place, child) in (first..).zip(children) {
+            let node = Node::closed(child.bounds(), parent);
+            closed.push(key(&node, place));
+            upper.nodes.push(node);
             pieces.push(child);
-            upper.nodes.push(Node::closed(child.bounds(), parent));
-            closed.push(key(child, place));
         }
         upper.nodes[parent as usize].children = [first, first + 1];
         opened += 1;
@@ -104,11 +104,7 @@ fn improve(upper: &mut Tree) -> bool {
     if upper.round(1) <= FIRST_GAIN * all {
         return false;
     }
-    for _ in 1..ROUNDS {
-        if upper.round(1) <= LEAST_GAIN * all {
-            break;
-        }
-    }
+    upper.rounds(ROUNDS - 1, 1, LEAST_GAIN * all);
     upper.order(DEEPEST).is_some()
 }
 
@@ -238,7 +234,7 @@ mod tests {
 
     #[test]
     fn what_is_large_among_small_things_is_put_where_it_belongs() {
-        // So many that nodes are given back or not, and are in one twig or many.
+        // In few twigs and in many.
         for count in [9_000, 15_000, 120_000] {
             let mut boxes = boxes(count, true);
             let grown = grow(Preset::Balanced, &mut boxes);
