@@ -30,7 +30,7 @@ use crate::Accel;
 use crate::batch::Ends;
 use crate::blocks::Blocks;
 use crate::holds::SingleStart;
-use crate::lanes::{self, Axes, Corners, Lanes, Row, Sides, WIDE, Wide};
+use crate::lanes::{self, Axes, Corners, Lanes, Row, Sides, Vector, WIDE, Wide};
 use crate::node::{END_FACTOR, LITTLE, Node, START_FACTOR, tag};
 #[cfg(test)]
 use crate::single::Nearest;

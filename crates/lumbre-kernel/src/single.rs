@@ -329,9 +329,9 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
             let entries = &accel.tree.entries[first..];
             let range = &self.blocks.range;
             let MetHulls { mut mask, sure, near } = if G::IS_ANY && S::TAKES_ALL {
-                L::meet_hulls::<true>(block, lanes::opaque(&hulls), range)
+                lanes::meet_hulls::<L, true>(block, lanes::opaque(&hulls), range)
             } else {
-                L::meet_hulls::<false>(block, lanes::opaque(&hulls), range)
+                lanes::meet_hulls::<L, false>(block, lanes::opaque(&hulls), range)
             };
             if G::IS_ANY && S::TAKES_ALL && sure != 0 {
                 return Some(Step::Met);

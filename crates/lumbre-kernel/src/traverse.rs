@@ -14,7 +14,7 @@ use crate::blocks::{Blocks, TriangleBlock};
 use crate::collapse::Entry;
 use crate::holds::SingleStart;
 use crate::hulls::HullRay;
-use crate::lanes::{Lanes, Level, MetHulls, Task};
+use crate::lanes::{self, Lanes, Level, MetHulls, Task};
 use crate::node::{BoxRay, Progress, tag};
 use crate::opening::Start;
 use crate::single::Outcome;
@@ -621,8 +621,8 @@ fn meet_shapes<'a, L: Lanes, S: Search<'a>>(
     let range = HeightRange::new((search.floor() * length) as f32, (search.limit() * length) as f32);
     while let Some((block, goes_on)) = accel.hulls.block(first) {
         let MetHulls { mut mask, sure, .. } = match S::ASK {
-            Ask::Whether => L::meet_hulls::<true>(block, &hulls, &range),
-            Ask::First | Ask::Every | Ask::Nothing => L::meet_hulls::<false>(block, &hulls, &range),
+            Ask::Whether => lanes::meet_hulls::<L, true>(block, &hulls, &range),
+            Ask::First | Ask::Every | Ask::Nothing => lanes::meet_hulls::<L, false>(block, &hulls, &range),
         };
         if S::ASK == Ask::Whether && sure != 0 {
             search.settle();

@@ -32,20 +32,22 @@ pub(crate) use asked::{Asked, Question};
 pub(crate) use boxes::{meet_boxes, meet_frustum, only_child, push_as_built, push_by_distance};
 #[cfg(test)]
 pub(crate) use hulls::meet_hulls_at;
-pub(crate) use hulls::{HullLanes, MetHulls};
+pub(crate) use hulls::{MetHulls, meet_hulls};
 pub(crate) use portable::Portable;
 pub(crate) use spheres::SphereLanes;
 #[cfg(test)]
 pub(crate) use spheres::meet_spheres_at;
-pub(crate) use wide::{LANE_BITS, Row, WIDE, Wide};
+pub(crate) use wide::{Eight, LANE_BITS, Row, Vector, WIDE, Wide};
 
 /// What a search does many at a time: boxes by sixteen, and triangles by eight.
-pub(crate) trait Lanes: SphereLanes + HullLanes {
+pub(crate) trait Lanes: SphereLanes {
     /// Eight numbers.
     type Floats: Copy;
     /// How a line passes the edges of eight triangles.
     type Edges: Copy;
-    /// Sixteen numbers.
+    /// The same, for arithmetic.
+    type Eight: Eight;
+    /// Sixteen numbers, alike.
     type Wide: Wide;
 
     /// The instruction set that these are of.

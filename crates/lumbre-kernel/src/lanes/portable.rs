@@ -40,6 +40,7 @@ fn single_direction(ray: &Ray) -> [f32; 4] {
 impl Lanes for Portable {
     type Floats = [f32; BLOCK];
     type Edges = Edges;
+    type Eight = super::wide::Portable8;
     type Wide = super::wide::Portable16;
 
     #[inline(always)]

@@ -1,11 +1,11 @@
-//! Sixteen numbers at once: those of as many rays.
+//! Eight or sixteen numbers at once: those of as many boxes, rays, triangles or hulls.
 
 use std::mem::MaybeUninit;
-use std::ops::{Add, Mul, Sub};
+use std::ops::{Add, Index, Mul, Sub};
 
 use crate::stack::stack_entry;
 
-/// How many they are.
+/// Those that are sixteen.
 pub(crate) const WIDE: usize = 16;
 
 /// An array that can be loaded at once.
@@ -20,10 +20,41 @@ impl<T: Copy> Row<T> {
     }
 }
 
-/// Sixteen numbers. A mask has a bit for each; comparisons with a NaN are false.
-pub(crate) trait Wide: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
+/// Numbers side by side, for arithmetic. A mask has a bit for each; comparisons with a NaN are false.
+pub(crate) trait Vector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
+    /// How many there are.
+    const COUNT: usize;
+    /// The mask of all.
+    const ALL: u32 = (1 << Self::COUNT) - 1;
+    type Array: Index<usize, Output = f32>;
+    fn to_array(self) -> Self::Array;
     /// All the same.
     fn splat(value: f32) -> Self;
+    /// `self * factor + summand`, rounded once or twice.
+    fn times_plus(self, factor: Self, summand: Self) -> Self;
+    /// `summand - self * factor`, alike.
+    fn times_from(self, factor: Self, summand: Self) -> Self;
+    /// `self * factor - other`, alike.
+    fn times_minus(self, factor: Self, other: Self) -> Self;
+    fn over(self, divisor: Self) -> Self;
+    fn sqrt(self) -> Self;
+    /// Either where one of the two is a NaN.
+    fn min(self, other: Self) -> Self;
+    fn max(self, other: Self) -> Self;
+    fn abs(self) -> Self;
+    /// With the sign changed wherever the other has one.
+    fn turned_by(self, other: Self) -> Self;
+    fn at_most(self, other: Self) -> u32;
+    fn below(self, other: Self) -> u32;
+}
+
+/// Eight.
+pub(crate) trait Eight: Vector<Array = [f32; 8]> {
+    fn load(eight: &[f32; 8]) -> Self;
+}
+
+/// Sixteen.
+pub(crate) trait Wide: Vector<Array = [f32; WIDE]> {
     fn load(row: &[f32; WIDE]) -> Self;
     /// Eight, and the same again.
     fn load_twice(row: &[f32; 8]) -> Self;
@@ -36,21 +67,6 @@ pub(crate) trait Wide: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Outp
     fn rounded_from(row: &Row<f64>, place: f64, scale: f64) -> Self;
     /// From a place, rounded, and what rounding took.
     fn parted_from(row: &Row<f64>, place: f64) -> (Self, Self);
-    /// `self * factor + summand`, rounded once or twice.
-    fn times_plus(self, factor: Self, summand: Self) -> Self;
-    /// `summand - self * factor`, alike.
-    fn times_from(self, factor: Self, summand: Self) -> Self;
-    /// `self * factor - other`, alike.
-    fn times_minus(self, factor: Self, other: Self) -> Self;
-    fn over(self, divisor: Self) -> Self;
-    /// Either where one of the two is a NaN.
-    fn min(self, other: Self) -> Self;
-    fn max(self, other: Self) -> Self;
-    fn abs(self) -> Self;
-    /// With the sign changed wherever the other has one.
-    fn turned_by(self, other: Self) -> Self;
-    fn at_most(self, other: Self) -> u32;
-    fn below(self, other: Self) -> u32;
     /// The largest of all; any of them where one is a NaN.
     fn most(self) -> f32;
     /// The largest of each of sixteen; any of them where one is a NaN.
@@ -113,15 +129,17 @@ pub(crate) trait Wide: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Outp
 }
 
 #[derive(Clone, Copy)]
-pub(crate) struct Portable16([f32; WIDE]);
+pub(crate) struct PortableVector<const N: usize>([f32; N]);
+pub(crate) type Portable8 = PortableVector<8>;
+pub(crate) type Portable16 = PortableVector<WIDE>;
 
 macro_rules! by_lane {
     ($name:ident, $trait:ident, $operator:tt) => {
-        impl $trait for Portable16 {
+        impl<const N: usize> $trait for PortableVector<N> {
             type Output = Self;
             #[inline(always)]
             fn $name(mut self, other: Self) -> Self {
-                for lane in 0..WIDE {
+                for lane in 0..N {
                     self.0[lane] $operator other.0[lane];
                 }
                 self
@@ -133,12 +151,110 @@ by_lane!(add, Add, +=);
 by_lane!(sub, Sub, -=);
 by_lane!(mul, Mul, *=);
 
-impl Wide for Portable16 {
+impl<const N: usize> Vector for PortableVector<N> {
+    const COUNT: usize = N;
+    type Array = [f32; N];
+
     #[inline(always)]
-    fn splat(value: f32) -> Self {
-        Self([value; WIDE])
+    fn to_array(self) -> [f32; N] {
+        self.0
     }
 
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        Self([value; N])
+    }
+
+    #[inline(always)]
+    fn times_plus(self, factor: Self, summand: Self) -> Self {
+        self * factor + summand
+    }
+
+    #[inline(always)]
+    fn times_from(self, factor: Self, summand: Self) -> Self {
+        summand - self * factor
+    }
+
+    #[inline(always)]
+    fn times_minus(self, factor: Self, other: Self) -> Self {
+        self * factor - other
+    }
+
+    #[inline(always)]
+    fn over(mut self, divisor: Self) -> Self {
+        for lane in 0..N {
+            self.0[lane] /= divisor.0[lane];
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn sqrt(mut self) -> Self {
+        for lane in 0..N {
+            self.0[lane] = self.0[lane].sqrt();
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn min(mut self, other: Self) -> Self {
+        for lane in 0..N {
+            self.0[lane] = if self.0[lane] < other.0[lane] { self.0[lane] } else { other.0[lane] };
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn max(mut self, other: Self) -> Self {
+        for lane in 0..N {
+            self.0[lane] = if self.0[lane] > other.0[lane] { self.0[lane] } else { other.0[lane] };
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn abs(mut self) -> Self {
+        for lane in 0..N {
+            self.0[lane] = self.0[lane].abs();
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn turned_by(mut self, other: Self) -> Self {
+        for lane in 0..N {
+            self.0[lane] = f32::from_bits(self.0[lane].to_bits() ^ other.0[lane].to_bits() & (1 << 31));
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn at_most(self, other: Self) -> u32 {
+        let mut mask = 0;
+        for lane in 0..N {
+            mask |= u32::from(self.0[lane] <= other.0[lane]) << lane;
+        }
+        mask
+    }
+
+    #[inline(always)]
+    fn below(self, other: Self) -> u32 {
+        let mut mask = 0;
+        for lane in 0..N {
+            mask |= u32::from(self.0[lane] < other.0[lane]) << lane;
+        }
+        mask
+    }
+}
+
+impl Eight for Portable8 {
+    #[inline(always)]
+    fn load(eight: &[f32; 8]) -> Self {
+        Self(*eight)
+    }
+}
+
+impl Wide for Portable16 {
     #[inline(always)]
     fn load(row: &[f32; WIDE]) -> Self {
         Self(*row)
@@ -194,79 +310,6 @@ impl Wide for Portable16 {
             rest[lane] = (exact - f64::from(rounded[lane])) as f32;
         }
         (Self(rounded), Self(rest))
-    }
-
-    #[inline(always)]
-    fn times_plus(self, factor: Self, summand: Self) -> Self {
-        self * factor + summand
-    }
-
-    #[inline(always)]
-    fn times_from(self, factor: Self, summand: Self) -> Self {
-        summand - self * factor
-    }
-
-    #[inline(always)]
-    fn times_minus(self, factor: Self, other: Self) -> Self {
-        self * factor - other
-    }
-
-    #[inline(always)]
-    fn over(mut self, divisor: Self) -> Self {
-        for lane in 0..WIDE {
-            self.0[lane] /= divisor.0[lane];
-        }
-        self
-    }
-
-    #[inline(always)]
-    fn min(mut self, other: Self) -> Self {
-        for lane in 0..WIDE {
-            self.0[lane] = if self.0[lane] < other.0[lane] { self.0[lane] } else { other.0[lane] };
-        }
-        self
-    }
-
-    #[inline(always)]
-    fn max(mut self, other: Self) -> Self {
-        for lane in 0..WIDE {
-            self.0[lane] = if self.0[lane] > other.0[lane] { self.0[lane] } else { other.0[lane] };
-        }
-        self
-    }
-
-    #[inline(always)]
-    fn abs(mut self) -> Self {
-        for lane in 0..WIDE {
-            self.0[lane] = self.0[lane].abs();
-        }
-        self
-    }
-
-    #[inline(always)]
-    fn turned_by(mut self, other: Self) -> Self {
-        for lane in 0..WIDE {
-            self.0[lane] = f32::from_bits(self.0[lane].to_bits() ^ other.0[lane].to_bits() & (1 << 31));
-        }
-        self
-    }
-
-    #[inline(always)]
-    fn at_most(self, other: Self) -> u32 {
-        let mut mask = 0;
-        for lane in 0..WIDE {
-            mask |= u32::from(self.0[lane] <= other.0[lane]) << lane;
-        }
-        mask
-    }
-
-    #[inline(always)]
-    fn below(self, other: Self) -> u32 {
-        let mut mask = 0;
-        for lane in 0..WIDE {
-            mask |= u32::from(self.0[lane] < other.0[lane]) << lane;
-        }
-        mask
     }
 
     #[inline(always)]
@@ -354,7 +397,7 @@ const AFTER_MIDDLE: usize = 10;
 pub(crate) const LANE_BITS: i32 = WIDE as i32 - 1;
 
 #[cfg(target_arch = "x86_64")]
-pub(crate) use x86::{Avx2, Avx512};
+pub(crate) use x86::{Avx2, Avx512, Eight256};
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
@@ -362,7 +405,7 @@ mod x86 {
     use std::mem::MaybeUninit;
     use std::ops::{Add, Mul, Sub};
 
-    use super::{AFTER_MIDDLE, BEFORE_MIDDLE, LANE_BITS, Row, WIDE, Wide};
+    use super::{AFTER_MIDDLE, BEFORE_MIDDLE, Eight, Vector, LANE_BITS, Row, WIDE, Wide};
 
     /// Only where `lanes::x86::X86<true>` is: the instructions are there.
     #[derive(Clone, Copy)]
@@ -371,6 +414,10 @@ mod x86 {
     /// Only where `lanes::x86::X86<false>` is, alike.
     #[derive(Clone, Copy)]
     pub(crate) struct Avx2([__m256; 2]);
+
+    /// Only where either is.
+    #[derive(Clone, Copy)]
+    pub(crate) struct Eight256(__m256);
 
     const SIGN: i32 = i32::MIN;
 
@@ -382,6 +429,14 @@ mod x86 {
                 fn $name(self, other: Self) -> Self {
                     // SAFETY: see the type.
                     unsafe { Self($wide(self.0, other.0)) }
+                }
+            }
+            impl $trait for Eight256 {
+                type Output = Self;
+                #[inline(always)]
+                fn $name(self, other: Self) -> Self {
+                    // SAFETY: see the type.
+                    unsafe { Self($half(self.0, other.0)) }
                 }
             }
             impl $trait for Avx2 {
@@ -398,13 +453,94 @@ mod x86 {
     operator!(sub, Sub, _mm512_sub_ps, _mm256_sub_ps);
     operator!(mul, Mul, _mm512_mul_ps, _mm256_mul_ps);
 
-    impl Wide for Avx512 {
+    impl Vector for Avx512 {
+        const COUNT: usize = WIDE;
+        type Array = [f32; WIDE];
+
+        #[inline(always)]
+        fn to_array(self) -> [f32; WIDE] {
+            let mut row = Row::of(0.0);
+            self.store(&mut row);
+            row.0
+        }
+
         #[inline(always)]
         fn splat(value: f32) -> Self {
             // SAFETY: see the type.
             unsafe { Self(_mm512_set1_ps(value)) }
         }
 
+        #[inline(always)]
+        fn times_plus(self, factor: Self, summand: Self) -> Self {
+            // SAFETY: see the type.
+            unsafe { Self(_mm512_fmadd_ps(self.0, factor.0, summand.0)) }
+        }
+
+        #[inline(always)]
+        fn times_from(self, factor: Self, summand: Self) -> Self {
+            // SAFETY: see the type.
+            unsafe { Self(_mm512_fnmadd_ps(self.0, factor.0, summand.0)) }
+        }
+
+        #[inline(always)]
+        fn times_minus(self, factor: Self, other: Self) -> Self {
+            // SAFETY: see the type.
+            unsafe { Self(_mm512_fmsub_ps(self.0, factor.0, other.0)) }
+        }
+
+        #[inline(always)]
+        fn over(self, divisor: Self) -> Self {
+            // SAFETY: see the type.
+            unsafe { Self(_mm512_div_ps(self.0, divisor.0)) }
+        }
+
+        #[inline(always)]
+        fn sqrt(self) -> Self {
+            // SAFETY: see the type.
+            unsafe { Self(_mm512_sqrt_ps(self.0)) }
+        }
+
+        #[inline(always)]
+        fn min(self, other: Self) -> Self {
+            // SAFETY: see the type.
+            unsafe { Self(_mm512_min_ps(self.0, other.0)) }
+        }
+
+        #[inline(always)]
+        fn max(self, other: Self) -> Self {
+            // SAFETY: see the type.
+            unsafe { Self(_mm512_max_ps(self.0, other.0)) }
+        }
+
+        #[inline(always)]
+        fn abs(self) -> Self {
+            // SAFETY: see the type.
+            unsafe { Self(_mm512_abs_ps(self.0)) }
+        }
+
+        #[inline(always)]
+        fn turned_by(self, other: Self) -> Self {
+            // SAFETY: see the type.
+            unsafe {
+                let sign = _mm512_and_ps(other.0, _mm512_castsi512_ps(_mm512_set1_epi32(SIGN)));
+                Self(_mm512_xor_ps(self.0, sign))
+            }
+        }
+
+        #[inline(always)]
+        fn at_most(self, other: Self) -> u32 {
+            // SAFETY: see the type.
+            unsafe { u32::from(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(self.0, other.0)) }
+        }
+
+        #[inline(always)]
+        fn below(self, other: Self) -> u32 {
+            // SAFETY: see the type.
+            unsafe { u32::from(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(self.0, other.0)) }
+        }
+    }
+
+    impl Wide for Avx512 {
         #[inline(always)]
         fn load(row: &[f32; WIDE]) -> Self {
             // SAFETY: see the type. The load is of sixteen f32.
@@ -470,69 +606,6 @@ mod x86 {
                 let high_rest = _mm512_sub_pd(high, _mm512_cvtps_pd(_mm512_extractf32x8_ps::<1>(rounded.0)));
                 (rounded, Self::of_halves(low_rest, high_rest))
             }
-        }
-
-        #[inline(always)]
-        fn times_plus(self, factor: Self, summand: Self) -> Self {
-            // SAFETY: see the type.
-            unsafe { Self(_mm512_fmadd_ps(self.0, factor.0, summand.0)) }
-        }
-
-        #[inline(always)]
-        fn times_from(self, factor: Self, summand: Self) -> Self {
-            // SAFETY: see the type.
-            unsafe { Self(_mm512_fnmadd_ps(self.0, factor.0, summand.0)) }
-        }
-
-        #[inline(always)]
-        fn times_minus(self, factor: Self, other: Self) -> Self {
-            // SAFETY: see the type.
-            unsafe { Self(_mm512_fmsub_ps(self.0, factor.0, other.0)) }
-        }
-
-        #[inline(always)]
-        fn over(self, divisor: Self) -> Self {
-            // SAFETY: see the type.
-            unsafe { Self(_mm512_div_ps(self.0, divisor.0)) }
-        }
-
-        #[inline(always)]
-        fn min(self, other: Self) -> Self {
-            // SAFETY: see the type.
-            unsafe { Self(_mm512_min_ps(self.0, other.0)) }
-        }
-
-        #[inline(always)]
-        fn max(self, other: Self) -> Self {
-            // SAFETY: see the type.
-            unsafe { Self(_mm512_max_ps(self.0, other.0)) }
-        }
-
-        #[inline(always)]
-        fn abs(self) -> Self {
-            // SAFETY: see the type.
-            unsafe { Self(_mm512_abs_ps(self.0)) }
-        }
-
-        #[inline(always)]
-        fn turned_by(self, other: Self) -> Self {
-            // SAFETY: see the type.
-            unsafe {
-                let sign = _mm512_and_ps(other.0, _mm512_castsi512_ps(_mm512_set1_epi32(SIGN)));
-                Self(_mm512_xor_ps(self.0, sign))
-            }
-        }
-
-        #[inline(always)]
-        fn at_most(self, other: Self) -> u32 {
-            // SAFETY: see the type.
-            unsafe { u32::from(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(self.0, other.0)) }
-        }
-
-        #[inline(always)]
-        fn below(self, other: Self) -> u32 {
-            // SAFETY: see the type.
-            unsafe { u32::from(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(self.0, other.0)) }
         }
 
         #[inline(always)]
@@ -802,13 +875,156 @@ mod x86 {
         }
     }
 
-    impl Wide for Avx2 {
+    impl Vector for Eight256 {
+        const COUNT: usize = 8;
+        type Array = [f32; 8];
+
+        #[inline(always)]
+        fn to_array(self) -> [f32; 8] {
+            let mut eight = [0.0; 8];
+            // SAFETY: see the type. The store is of eight f32.
+            unsafe { _mm256_storeu_ps(eight.as_mut_ptr(), self.0) }
+            eight
+        }
+
         #[inline(always)]
         fn splat(value: f32) -> Self {
             // SAFETY: see the type.
-            unsafe { Self([_mm256_set1_ps(value); 2]) }
+            unsafe { Self(_mm256_set1_ps(value)) }
         }
 
+        #[inline(always)]
+        fn times_plus(self, factor: Self, summand: Self) -> Self {
+            // SAFETY: see the type.
+            unsafe { Self(_mm256_fmadd_ps(self.0, factor.0, summand.0)) }
+        }
+
+        #[inline(always)]
+        fn times_from(self, factor: Self, summand: Self) -> Self {
+            // SAFETY: see the type.
+            unsafe { Self(_mm256_fnmadd_ps(self.0, factor.0, summand.0)) }
+        }
+
+        #[inline(always)]
+        fn times_minus(self, factor: Self, other: Self) -> Self {
+            // SAFETY: see the type.
+            unsafe { Self(_mm256_fmsub_ps(self.0, factor.0, other.0)) }
+        }
+
+        #[inline(always)]
+        fn over(self, divisor: Self) -> Self {
+            // SAFETY: see the type.
+            unsafe { Self(_mm256_div_ps(self.0, divisor.0)) }
+        }
+
+        #[inline(always)]
+        fn sqrt(self) -> Self {
+            // SAFETY: see the type.
+            unsafe { Self(_mm256_sqrt_ps(self.0)) }
+        }
+
+        #[inline(always)]
+        fn min(self, other: Self) -> Self {
+            // SAFETY: see the type.
+            unsafe { Self(_mm256_min_ps(self.0, other.0)) }
+        }
+
+        #[inline(always)]
+        fn max(self, other: Self) -> Self {
+            // SAFETY: see the type.
+            unsafe { Self(_mm256_max_ps(self.0, other.0)) }
+        }
+
+        #[inline(always)]
+        fn abs(self) -> Self {
+            // SAFETY: see the type.
+            unsafe { Self(_mm256_andnot_ps(_mm256_castsi256_ps(_mm256_set1_epi32(SIGN)), self.0)) }
+        }
+
+        #[inline(always)]
+        fn turned_by(self, other: Self) -> Self {
+            // SAFETY: see the type.
+            unsafe {
+                let sign = _mm256_and_ps(other.0, _mm256_castsi256_ps(_mm256_set1_epi32(SIGN)));
+                Self(_mm256_xor_ps(self.0, sign))
+            }
+        }
+
+        #[inline(always)]
+        fn at_most(self, other: Self) -> u32 {
+            // SAFETY: see the type.
+            unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, other.0)) as u32 }
+        }
+
+        #[inline(always)]
+        fn below(self, other: Self) -> u32 {
+            // SAFETY: see the type.
+            unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(self.0, other.0)) as u32 }
+        }
+    }
+
+    impl Eight for Eight256 {
+        #[inline(always)]
+        fn load(eight: &[f32; 8]) -> Self {
+            // SAFETY: see the type. The load is of eight f32.
+            unsafe { Self(_mm256_loadu_ps(eight.as_ptr())) }
+        }
+    }
+
+    macro_rules! by_halves {
+        ($name:ident($($other:ident),*)) => {
+            #[inline(always)]
+            fn $name(self $(, $other: Self)*) -> Self {
+                Self([
+                    Eight256(self.0[0]).$name($(Eight256($other.0[0])),*).0,
+                    Eight256(self.0[1]).$name($(Eight256($other.0[1])),*).0,
+                ])
+            }
+        };
+    }
+
+    impl Vector for Avx2 {
+        const COUNT: usize = WIDE;
+        type Array = [f32; WIDE];
+
+        #[inline(always)]
+        fn to_array(self) -> [f32; WIDE] {
+            let mut row = Row::of(0.0);
+            self.store(&mut row);
+            row.0
+        }
+
+        by_halves!(times_plus(factor, summand));
+        by_halves!(times_from(factor, summand));
+        by_halves!(times_minus(factor, other));
+        by_halves!(over(divisor));
+        by_halves!(sqrt());
+        by_halves!(min(other));
+        by_halves!(max(other));
+        by_halves!(abs());
+        by_halves!(turned_by(other));
+
+        #[inline(always)]
+        fn splat(value: f32) -> Self {
+            Self([Eight256::splat(value).0; 2])
+        }
+
+        #[inline(always)]
+        fn at_most(self, other: Self) -> u32 {
+            let ([a, b], [c, d]) = (self.0, other.0);
+            // SAFETY: see the type.
+            unsafe { Self::masks([_mm256_cmp_ps::<_CMP_LE_OQ>(a, c), _mm256_cmp_ps::<_CMP_LE_OQ>(b, d)]) }
+        }
+
+        #[inline(always)]
+        fn below(self, other: Self) -> u32 {
+            let ([a, b], [c, d]) = (self.0, other.0);
+            // SAFETY: see the type.
+            unsafe { Self::masks([_mm256_cmp_ps::<_CMP_LT_OQ>(a, c), _mm256_cmp_ps::<_CMP_LT_OQ>(b, d)]) }
+        }
+    }
+
+    impl Wide for Avx2 {
         #[inline(always)]
         fn load(row: &[f32; WIDE]) -> Self {
             // SAFETY: see the type. The loads are of eight f32 each, of sixteen.
@@ -889,83 +1105,6 @@ mod x86 {
                 }
             }
             (rounded, Self::of_quarters(quarters))
-        }
-
-        #[inline(always)]
-        fn times_plus(self, factor: Self, summand: Self) -> Self {
-            let ([a, b], [c, d], [e, f]) = (self.0, factor.0, summand.0);
-            // SAFETY: see the type.
-            unsafe { Self([_mm256_fmadd_ps(a, c, e), _mm256_fmadd_ps(b, d, f)]) }
-        }
-
-        #[inline(always)]
-        fn times_from(self, factor: Self, summand: Self) -> Self {
-            let ([a, b], [c, d], [e, f]) = (self.0, factor.0, summand.0);
-            // SAFETY: see the type.
-            unsafe { Self([_mm256_fnmadd_ps(a, c, e), _mm256_fnmadd_ps(b, d, f)]) }
-        }
-
-        #[inline(always)]
-        fn times_minus(self, factor: Self, other: Self) -> Self {
-            let ([a, b], [c, d], [e, f]) = (self.0, factor.0, other.0);
-            // SAFETY: see the type.
-            unsafe { Self([_mm256_fmsub_ps(a, c, e), _mm256_fmsub_ps(b, d, f)]) }
-        }
-
-        #[inline(always)]
-        fn over(self, divisor: Self) -> Self {
-            let ([a, b], [c, d]) = (self.0, divisor.0);
-            // SAFETY: see the type.
-            unsafe { Self([_mm256_div_ps(a, c), _mm256_div_ps(b, d)]) }
-        }
-
-        #[inline(always)]
-        fn min(self, other: Self) -> Self {
-            let ([a, b], [c, d]) = (self.0, other.0);
-            // SAFETY: see the type.
-            unsafe { Self([_mm256_min_ps(a, c), _mm256_min_ps(b, d)]) }
-        }
-
-        #[inline(always)]
-        fn max(self, other: Self) -> Self {
-            let ([a, b], [c, d]) = (self.0, other.0);
-            // SAFETY: see the type.
-            unsafe { Self([_mm256_max_ps(a, c), _mm256_max_ps(b, d)]) }
-        }
-
-        #[inline(always)]
-        fn abs(self) -> Self {
-            let [a, b] = self.0;
-            // SAFETY: see the type.
-            unsafe {
-                let sign = _mm256_castsi256_ps(_mm256_set1_epi32(SIGN));
-                Self([_mm256_andnot_ps(sign, a), _mm256_andnot_ps(sign, b)])
-            }
-        }
-
-        #[inline(always)]
-        fn turned_by(self, other: Self) -> Self {
-            let ([a, b], [c, d]) = (self.0, other.0);
-            // SAFETY: see the type.
-            unsafe {
-                let sign = _mm256_castsi256_ps(_mm256_set1_epi32(SIGN));
-                let (c, d) = (_mm256_and_ps(c, sign), _mm256_and_ps(d, sign));
-                Self([_mm256_xor_ps(a, c), _mm256_xor_ps(b, d)])
-            }
-        }
-
-        #[inline(always)]
-        fn at_most(self, other: Self) -> u32 {
-            let ([a, b], [c, d]) = (self.0, other.0);
-            // SAFETY: see the type.
-            unsafe { Self::masks([_mm256_cmp_ps::<_CMP_LE_OQ>(a, c), _mm256_cmp_ps::<_CMP_LE_OQ>(b, d)]) }
-        }
-
-        #[inline(always)]
-        fn below(self, other: Self) -> u32 {
-            let ([a, b], [c, d]) = (self.0, other.0);
-            // SAFETY: see the type.
-            unsafe { Self::masks([_mm256_cmp_ps::<_CMP_LT_OQ>(a, c), _mm256_cmp_ps::<_CMP_LT_OQ>(b, d)]) }
         }
 
         #[inline(always)]

@@ -378,6 +378,7 @@ where
 {
     type Floats = __m256;
     type Edges = Edges;
+    type Eight = wide::Eight256;
     type Wide = <Self as HasWide>::Wide;
 
     #[inline(always)]
