@@ -317,11 +317,11 @@ impl Accel {
 
     /// [`Accel::closest`] for every ray, with the same answers to the bit; `hits` has a place for each.
     ///
-    /// In a tree of triangles, sixteen rays in a row that are much alike (those of a square of four by four pixels, say, rather than
-    /// of sixteen pixels in a line) are traced together, which takes down to two fifths of the time. Of the others several are in
-    /// flight at a time, which hides waits, for memory above all: many in a large tree (some hundred thousand triangles). In trees
-    /// of anything else, rays are traced one after another. Hundreds of rays at a time suffice. It works on the calling thread: to
-    /// use more, split `rays` and `hits`.
+    /// In a tree of triangles, or of shapes too, sixteen rays in a row that are much alike (those of a square of four by four pixels,
+    /// say, rather than of sixteen pixels in a line) are traced together, which takes down to two fifths of the time. Of the others
+    /// several are in flight at a time in a tree of triangles, which hides waits, for memory above all: many in a large one (some
+    /// hundred thousand triangles). In trees of anything else, rays are traced one after another. Hundreds of rays at a time suffice.
+    /// It works on the calling thread: to use more, split `rays` and `hits`.
     ///
     /// # Panics
     /// When `rays` and `hits` differ in length.

@@ -13,7 +13,7 @@ use crate::blocks::{TriangleBlock, Unit};
 use crate::holds::SingleStart;
 use crate::lanes::{self, Lanes, Level, Task};
 use crate::node::{Node, tag};
-use crate::packet::{self, PACKET, Packet};
+use crate::packet::{self, PACKET, Packet, Together};
 use crate::query::All;
 use crate::single::{Alone, Goal, Outcome, SingleRay, Step};
 use crate::stack::{Order, Stack};
@@ -73,7 +73,42 @@ pub(crate) fn search_triangles<G: Goal>(
     }
 }
 
-/// Rays through a tree where shapes take most of the time: one after another.
+/// Tries to have rays go together.
+struct Trials<'a, const MIXED: bool> {
+    packet: Packet<'a, MIXED>,
+    // After a packet that did not pay, others go alone before the next is tried: ever more while none does, and at once many where
+    // none has.
+    without: usize,
+    patience: usize,
+}
+
+impl<'a, const MIXED: bool> Trials<'a, MIXED> {
+    #[inline(always)]
+    fn new(accel: &'a Accel, start: &'a SingleStart) -> Self {
+        Self { packet: Packet::new(accel, start), without: 0, patience: LEAST_OFTEN }
+    }
+
+    /// A bit for each of up to sixteen rays, the first of which has this position, that was answered.
+    #[inline(always)]
+    fn search<G: Goal, L: Lanes>(
+        &mut self,
+        rays: &[Ray],
+        first: usize,
+        ends: &mut impl Ends<G::Answer>,
+    ) -> u32 {
+        if self.without > 0 {
+            self.without -= 1;
+            return 0;
+        }
+        let Ok(rays) = <&[Ray; PACKET]>::try_from(rays) else { return 0 };
+        let Together { answered, pays } = self.packet.search::<G, L>(rays, first, ends);
+        (self.without, self.patience) =
+            if pays { (0, 0) } else { (self.patience, (2 * self.patience).clamp(1, LEAST_OFTEN)) };
+        answered
+    }
+}
+
+/// Rays through a tree where shapes take most of the time: those that are alike together, and the others one after another.
 struct OneByOne<'a, 'r, G, E> {
     accel: &'a Accel,
     start: &'a SingleStart,
@@ -88,8 +123,15 @@ impl<G: Goal, E: Ends<G::Answer>> Task for OneByOne<'_, '_, G, E> {
     #[inline(always)]
     fn run<L: Lanes>(self) {
         let Self { accel, start, rays, mut ends, .. } = self;
-        for (position, ray) in rays.iter().enumerate() {
-            ends.put(position, Alone::<G, true>::new(accel, start, ray).run::<L>());
+        let mut trials = Trials::<true>::new(accel, start);
+        for (number, rays) in rays.chunks(PACKET).enumerate() {
+            let first = number * PACKET;
+            let answered = trials.search::<G, L>(rays, first, &mut ends);
+            for (place, ray) in rays.iter().enumerate() {
+                if answered >> place & 1 == 0 {
+                    ends.put(first + place, Alone::<G, true>::new(accel, start, ray).run::<L>());
+                }
+            }
         }
     }
 }
@@ -115,22 +157,12 @@ impl<G: Goal, E: Ends<G::Answer>, const N: usize, const IS_FAR: bool> Task
         let Self { accel, start, rays, mut ends, has_packets, .. } = self;
         let mut flights: Vec<Flight<G, L>> = Vec::with_capacity(N);
         let mut others = Vec::with_capacity(rays.len().min(AT_ONCE));
-        let mut packet = Packet::new(accel, start);
-        // After a packet that did not pay, others go alone before the next is tried: ever more while none does, and at once many where
-        // none has.
-        let (mut without, mut patience) = (0, LEAST_OFTEN);
+        let mut trials = Trials::<false>::new(accel, start);
         for (number, rays) in rays.chunks(AT_ONCE).enumerate() {
             for (place, chunk) in rays.chunks(PACKET).enumerate() {
                 let first = number * AT_ONCE + place * PACKET;
-                let mut answered = 0;
-                if without > 0 {
-                    without -= 1;
-                } else if has_packets && let Ok(alike) = <&[Ray; PACKET]>::try_from(chunk) {
-                    let together = packet.search::<G, L>(alike, first, &mut ends);
-                    answered = together.answered;
-                    (without, patience) =
-                        if together.pays { (0, 0) } else { (patience, (2 * patience).clamp(1, LEAST_OFTEN)) };
-                }
+                let answered =
+                    if has_packets { trials.search::<G, L>(chunk, first, &mut ends) } else { 0 };
                 if answered != packet::ALL {
                     let is_left = |(position, _): &(usize, &Ray)| answered >> (position - first) & 1 == 0;
                     others.extend((first..).zip(chunk).filter(is_left));

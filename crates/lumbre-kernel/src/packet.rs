@@ -23,9 +23,12 @@
 //! these larger bounds. A triangle all of whose corners are beyond that on one side is met by no ray; and with the larger m, h
 //! and s the errors are no smaller than those of every ray.
 
+mod shapes;
+
 use lumbre_geometry::Ray;
 use lumbre_math::DVec2;
 
+use self::shapes::AmongShapes;
 use crate::Accel;
 use crate::batch::Ends;
 use crate::blocks::Blocks;
@@ -126,8 +129,8 @@ struct Bounds {
     extent: Row<f32>,
 }
 
-/// Rays under way together, and then others.
-pub(crate) struct Packet<'a> {
+/// Rays under way together, and then others. `MIXED` where there is anything but triangles.
+pub(crate) struct Packet<'a, const MIXED: bool> {
     exact: Exact<'a>,
     triangles: Blocks<'a>,
     /// The rays, number by number.
@@ -142,10 +145,12 @@ pub(crate) struct Packet<'a> {
     chosen: u32,
     /// Where each need no longer meet boxes.
     s_max: Row<f32>,
-    /// The nearest so far, by heights; its triangle is one of eight times the place of the block, and the lane.
+    /// The nearest so far, by heights; its triangle is one of eight times the place of the block, and the lane. Where it is none,
+    /// what it is stands among the shapes.
     from: Row<f32>,
     to: Row<f32>,
     triangle: Row<f32>,
+    shapes: AmongShapes,
     /// Those that go on, those for which any hit will do and that have one, and those that the plain search has to answer.
     alive: u32,
     met: u32,
@@ -154,11 +159,12 @@ pub(crate) struct Packet<'a> {
     work: u32,
 }
 
-/// No triangle.
+/// No triangle, and no hit or one of something else.
 const NONE: u32 = u32::MAX;
+const CROSSED: u32 = u32::MAX - 1;
 
-impl<'a> Packet<'a> {
-    /// Through a tree of triangles, without rays yet.
+impl<'a, const MIXED: bool> Packet<'a, MIXED> {
+    /// Without rays yet.
     #[inline(always)]
     pub(crate) fn new(accel: &'a Accel, single: &'a SingleStart) -> Self {
         let (none, row) = ([0.0; 3], Row::of(0.0));
@@ -201,6 +207,7 @@ impl<'a> Packet<'a> {
             from: row,
             to: row,
             triangle: row,
+            shapes: AmongShapes::new(),
             alive: 0,
             met: 0,
             unsettled: 0,
@@ -230,7 +237,7 @@ impl<'a> Packet<'a> {
                 // Any hit will do for those that have one.
                 self.chosen &= if G::IS_ANY { !self.alive } else { 0 };
             }
-            G::answer_together::<L>(self, rays, first, ends);
+            G::answer_together::<L, MIXED>(self, rays, first, ends);
             together.answered |= self.chosen;
             together.pays &= is_done && self.work <= work_that_pays(G::IS_ANY);
             if !is_done {
@@ -371,6 +378,7 @@ impl<'a> Packet<'a> {
         }
         (frustum.s_max, frustum.s_min, frustum.sides) = (most[3], -most[7], Sides::new(signs));
         (self.bundle.axes, self.is_among_triangles) = (axes, false);
+        self.shapes.is_started = false;
         is_near
     }
 
@@ -628,27 +636,57 @@ impl<'a> Packet<'a> {
                 Meeting::Miss => continue,
                 Meeting::Hit { root, .. } => {
                     let names = self.exact.names(number, lane);
-                    (root.t, self.exact.is_better(ray, root.t, names, &self.best(i)))
+                    (root.t, self.is_better(ray, i, root.t, names))
                 }
                 Meeting::Touch { .. } => (f64::NAN, Outcome::Unsettled),
             };
             match judged {
                 (_, Outcome::Settled(false)) => {}
                 (t, Outcome::Settled(true)) => {
-                    let (from, to) = heights(t, ray.direction.abs().max_element());
-                    (self.from.0[i], self.to.0[i]) = (from, to);
-                    self.triangle.0[i] = f32::from_bits(number << 3 | lane);
-                    self.bundle.last.0[i] = to;
-                    self.s_max.0[i] = beyond(to * self.bundle.place_per_height.0[i]);
+                    let heights = heights(t, ray.direction.abs().max_element());
+                    self.keep(i, heights, number << 3 | lane);
                 }
-                (_, Outcome::Unsettled) => {
-                    self.unsettled |= 1 << i;
-                    self.alive &= !(1 << i);
-                    self.s_max.0[i] = -1.0;
-                }
+                (_, Outcome::Unsettled) => self.give_up(i),
             }
         }
+        self.end_frustum();
+    }
+
+    /// Makes this the nearest hit of one.
+    #[inline(always)]
+    fn keep(&mut self, i: usize, (from, to): (f32, f32), triangle: u32) {
+        (self.from.0[i], self.to.0[i]) = (from, to);
+        self.triangle.0[i] = f32::from_bits(triangle);
+        self.bundle.last.0[i] = to;
+        self.s_max.0[i] = beyond(to * self.bundle.place_per_height.0[i]);
+    }
+
+    /// Leaves one to the plain search.
+    #[inline(always)]
+    fn give_up(&mut self, i: usize) {
+        self.unsettled |= 1 << i;
+        self.alive &= !(1 << i);
+        self.s_max.0[i] = -1.0;
+    }
+
+    /// Lets the frustum end where none of the rays goes on.
+    #[inline(always)]
+    fn end_frustum(&mut self) {
         self.frustum.s_max = self.s_max.0.iter().fold(-1.0, |most, &s_max| greater(most, s_max));
+    }
+
+    /// Whether a crossing, of what has these names, is nearer than the nearest of one so far, or as near and before it.
+    fn is_better(&self, ray: &Ray, i: usize, t: f64, names: (u32, u32)) -> Outcome<bool> {
+        match self.crossed(i) {
+            Some(crossed) => Outcome::Settled(crossed.comes_after(t, names)),
+            None => self.exact.is_better(ray, t, names, &self.best(i)),
+        }
+    }
+
+    /// The nearest hit of one so far, where that is of no triangle.
+    #[inline(always)]
+    fn crossed(&self, i: usize) -> Option<Winner> {
+        if MIXED && self.triangle.0[i].to_bits() == CROSSED { self.shapes.crossed[i] } else { None }
     }
 
     /// The nearest hit of one so far.
@@ -675,12 +713,19 @@ impl<'a> Packet<'a> {
         if self.is_among_triangles {
             hits = !triangle.with_bits(NONE) & !self.unsettled & self.chosen;
         }
+        let mut crossed = if MIXED { triangle.with_bits(CROSSED) & hits } else { 0 };
         let mut others = !hits & self.chosen;
         while others != 0 {
             let i = others.trailing_zeros() as usize % PACKET;
             others &= others - 1;
             let is_settled = self.unsettled >> i & 1 == 0;
             ends.put(first + i, if is_settled { Outcome::Settled(None) } else { Outcome::Unsettled });
+        }
+        hits &= !crossed;
+        while crossed != 0 {
+            let i = crossed.trailing_zeros() as usize % PACKET;
+            crossed &= crossed - 1;
+            ends.put(first + i, Outcome::Settled(self.shapes.crossed[i]));
         }
         if hits == 0 {
             return;
@@ -751,9 +796,9 @@ impl<'a> Packet<'a> {
         }
     }
 
-    /// Tests a leaf.
+    /// Tests a leaf of triangles.
     #[inline(always)]
-    fn meet_leaf<G: Goal, L: Lanes>(&mut self, leaf: u32, rays: &[Ray; PACKET]) {
+    fn meet_triangles<G: Goal, L: Lanes>(&mut self, leaf: u32, rays: &[Ray; PACKET]) {
         let mut following = Some(leaf & tag::PLACE);
         while let Some(place) = following {
             let block = self.triangles.block(place);
@@ -777,6 +822,14 @@ impl<'a> Packet<'a> {
         let nodes: &[Node] = self.exact.nodes();
         let mut stack: Stack<<G::Order as Order>::Entry> = Stack::new();
         let mut reference = self.exact.start.root;
+        if MIXED {
+            if !self.meet_infinite::<G, L>(rays) {
+                return false;
+            }
+            if self.alive == 0 {
+                return true;
+            }
+        }
         loop {
             while reference >> tag::SHIFT == tag::INNER {
                 self.work += 1;
@@ -799,7 +852,11 @@ impl<'a> Packet<'a> {
             if !self.is_among_triangles && !self.start_triangles::<L>() {
                 return false;
             }
-            self.meet_leaf::<G, L>(reference, rays);
+            if !MIXED || reference >> tag::SHIFT == tag::TRIANGLES {
+                self.meet_triangles::<G, L>(reference, rays);
+            } else if !self.meet_shapes::<G, L>(reference, rays) {
+                return false;
+            }
             if self.alive == 0 {
                 return true;
             }
@@ -836,14 +893,18 @@ pub(crate) struct Together {
 /// Those of some rays that a packet answers, at a level, for tests.
 #[cfg(test)]
 pub(crate) fn answered_together(level: lanes::Level, accel: &Accel, rays: &[Ray; PACKET]) -> u32 {
-    struct Searching<'a>(Packet<'a>, &'a [Ray; PACKET]);
-    impl lanes::Task for Searching<'_> {
+    struct Searching<'a, const MIXED: bool>(Packet<'a, MIXED>, &'a [Ray; PACKET]);
+    impl<const MIXED: bool> lanes::Task for Searching<'_, MIXED> {
         type Output = u32;
         #[inline(always)]
         fn run<L: Lanes>(mut self) -> u32 {
             self.0.search::<Nearest, L>(self.1, 0, &mut |_, _| {}).answered
         }
     }
-    let single = accel.single.as_ref().expect("nothing but triangles");
-    level.run(Searching(Packet::new(accel, single), rays))
+    let single = accel.single.as_ref().expect("what single precision searches");
+    if single.is_mixed {
+        level.run(Searching(Packet::<true>::new(accel, single), rays))
+    } else {
+        level.run(Searching(Packet::<false>::new(accel, single), rays))
+    }
 }

@@ -50,6 +50,12 @@ pub(crate) struct Winner {
 }
 
 impl Winner {
+    /// Whether another crossing, of what has these names, is nearer, or as near and before it.
+    #[inline(always)]
+    pub(crate) fn comes_after(&self, t: f64, names: (u32, u32)) -> bool {
+        t < self.root.t || t == self.root.t && names < (self.geometry, self.primitive)
+    }
+
     /// As a hit in the tree itself.
     #[inline(always)]
     pub(crate) fn to_hit(self, accel: &Accel) -> Hit {
@@ -132,6 +138,12 @@ impl<'a> Exact<'a> {
     #[inline(always)]
     pub(crate) fn new(accel: &'a Accel, start: &'a SingleStart) -> Self {
         Self { accel, start, triangles: accel.tree.blocks() }
+    }
+
+    /// The tree.
+    #[inline(always)]
+    pub(crate) fn accel(&self) -> &'a Accel {
+        self.accel
     }
 
     /// The nodes of the tree.
@@ -337,15 +349,8 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
                 return Some(Step::Met);
             }
             while mask != 0 {
-                let mut lane = mask.trailing_zeros() as usize % BLOCK;
-                if !G::IS_ANY && mask & (mask - 1) != 0 {
-                    let mut others = mask & (mask - 1);
-                    while others != 0 {
-                        let other = others.trailing_zeros() as usize % BLOCK;
-                        others &= others - 1;
-                        lane = if near[other] < near[lane] { other } else { lane };
-                    }
-                }
+                let lane =
+                    if G::IS_ANY { mask.trailing_zeros() as usize % BLOCK } else { nearest_of(mask, &near) };
                 mask &= !(1 << lane);
                 if !G::IS_ANY && near[lane] > self.blocks.range.last {
                     continue;
@@ -470,9 +475,7 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
     /// Asks about a crossing in range, if it is nearer than the best, or as near and before it: the new best, if it is.
     fn ask_about(&mut self, ray: &Ray, found: Winner, order: u32, may_come_again: bool) -> Option<Candidate> {
         if let Some(best) = self.crossed() {
-            let names = |winner: &Winner| (winner.geometry, winner.primitive);
-            let (t, best_t) = (found.root.t, best.root.t);
-            if !(t < best_t || t == best_t && names(&found) < names(&best)) {
+            if !best.comes_after(found.root.t, (found.geometry, found.primitive)) {
                 return None;
             }
         }
@@ -515,9 +518,7 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
     /// Whether a crossing is nearer than the best, or as near and before it.
     fn is_better(&self, ray: &Ray, t: f64, names: (u32, u32)) -> Outcome<bool> {
         match self.crossed() {
-            Some(Winner { root, geometry, primitive }) => {
-                Outcome::Settled(t < root.t || t == root.t && names < (geometry, primitive))
-            }
+            Some(crossed) => Outcome::Settled(crossed.comes_after(t, names)),
             None => self.exact.is_better(ray, t, names, &self.best),
         }
     }
@@ -729,8 +730,8 @@ pub(crate) trait Goal {
     ) -> Outcome<Self::Answer>;
 
     /// What came of rays that went together, the first of which has this position.
-    fn answer_together<L: Lanes>(
-        packet: &Packet,
+    fn answer_together<L: Lanes, const MIXED: bool>(
+        packet: &Packet<MIXED>,
         rays: &[Ray; PACKET],
         first: usize,
         ends: &mut impl Ends<Self::Answer>,
@@ -787,8 +788,8 @@ impl Goal for Nearest {
     }
 
     #[inline(always)]
-    fn answer_together<L: Lanes>(
-        packet: &Packet,
+    fn answer_together<L: Lanes, const MIXED: bool>(
+        packet: &Packet<MIXED>,
         rays: &[Ray; PACKET],
         first: usize,
         ends: &mut impl Ends<Self::Answer>,
@@ -851,8 +852,8 @@ impl Goal for Whether {
     }
 
     #[inline(always)]
-    fn answer_together<L: Lanes>(
-        packet: &Packet,
+    fn answer_together<L: Lanes, const MIXED: bool>(
+        packet: &Packet<MIXED>,
         _: &[Ray; PACKET],
         first: usize,
         ends: &mut impl Ends<bool>,
@@ -1026,4 +1027,17 @@ impl<G: Goal, const MIXED: bool, S: Selection> Task for Alone<'_, '_, G, MIXED, 
         }
         G::answer::<L, S, MIXED>(&single, ray, Step::Out)
     }
+}
+
+/// Which of those in the mask, one at least, is the nearest.
+#[inline(always)]
+pub(crate) fn nearest_of(mask: u32, near: &[f32; BLOCK]) -> usize {
+    let mut nearest = mask.trailing_zeros() as usize % BLOCK;
+    let mut others = mask & (mask - 1);
+    while others != 0 {
+        let other = others.trailing_zeros() as usize % BLOCK;
+        others &= others - 1;
+        nearest = if near[other] < near[nearest] { other } else { nearest };
+    }
+    nearest
 }

@@ -19,7 +19,7 @@ pub(crate) struct MetHulls {
 }
 
 /// Hulls, side by side: see [`HullBlock`].
-pub(crate) trait Bodies<V> {
+trait Bodies<V> {
     fn center(&self, axis: usize) -> V;
     fn row(&self, axis: usize) -> [V; 3];
     fn height(&self) -> V;
@@ -82,7 +82,7 @@ impl<V: Eight> Bodies<V> for AllHulls<'_> {
 }
 
 /// A hull, in a lane of a block below eight.
-pub(crate) struct OneHull<'a>(pub(crate) &'a HullBlock, pub(crate) usize);
+struct OneHull<'a>(&'a HullBlock, usize);
 
 impl<V: Vector> Bodies<V> for OneHull<'_> {
     #[inline(always)]
@@ -149,7 +149,7 @@ impl<V: Vector> Lines<V> for OneLine<'_> {
 }
 
 /// What lines have between the planes of cubes.
-pub(crate) struct Passages<V> {
+struct Passages<V> {
     /// Where they start in the cubes, and whither they go.
     p: [V; 3],
     d: [V; 3],
@@ -157,15 +157,15 @@ pub(crate) struct Passages<V> {
     enters: V,
     leaves: V,
     /// The same within their ranges.
-    pub(crate) from: V,
+    from: V,
     to: V,
     /// A bit for each that is not there.
-    pub(crate) missed: u32,
+    missed: u32,
 }
 
 /// Lines between the planes of cubes.
 #[inline(always)]
-pub(crate) fn pass<V: Vector>(bodies: &impl Bodies<V>, lines: &impl Lines<V>) -> Passages<V> {
+fn pass<V: Vector>(bodies: &impl Bodies<V>, lines: &impl Lines<V>) -> Passages<V> {
     let (zero, one) = (V::splat(0.0), V::splat(1.0));
     let mut w = [zero; 3];
     for axis in 0..3 {
@@ -200,7 +200,7 @@ pub(crate) fn pass<V: Vector>(bodies: &impl Bodies<V>, lines: &impl Lines<V>) ->
 }
 
 /// What lines have in hulls: `p + k d` for k from -1 to 1, at the heights `middle + k reach`.
-pub(crate) struct Chords<V> {
+struct Chords<V> {
     p: [V; 3],
     d: [V; 3],
     middle: V,
@@ -217,7 +217,7 @@ pub(crate) struct Chords<V> {
 
 /// Lines in hulls, between the planes of whose cubes they pass; with `SURE`, also what is certain: see [`HullRay`].
 #[inline(always)]
-pub(crate) fn look_into<V: Vector, const SURE: bool>(
+fn look_into<V: Vector, const SURE: bool>(
     bodies: &impl Bodies<V>,
     lines: &impl Lines<V>,
     passages: &Passages<V>,
@@ -325,7 +325,7 @@ impl<V: Vector> Chords<V> {
     /// Looks closer at those that pass tubes: a bit for each that may be met, among them all that are, and for each that certainly is.
     /// `bodies` and `lines` are what these are of.
     #[inline(always)]
-    pub(crate) fn meet_tubes<W: Wide, const SURE: bool>(
+    fn meet_tubes<W: Wide, const SURE: bool>(
         &self,
         bodies: &impl Bodies<V>,
         lines: &impl Lines<V>,
@@ -381,6 +381,29 @@ pub(crate) fn meet_hulls<L: Lanes, const SURE: bool>(
     }
     let (mask, sure) = chords.meet_tubes::<L::Wide, SURE>(&hulls, &line);
     MetHulls { mask, sure, near: chords.from.to_array() }
+}
+
+/// Which of the cubes of a block lines may pass, a bit for each, and no sooner than where; by `lines` that stand for more.
+#[inline(always)]
+pub(crate) fn pass_hulls<L: Lanes>(block: &HullBlock, lines: &impl Lines<L::Eight>) -> (u32, [f32; BLOCK]) {
+    let passages = pass(&AllHulls(block), lines);
+    (!passages.missed & L::Eight::ALL, passages.from.to_array())
+}
+
+/// Tries sixteen rays against the hull in a lane: a bit for each that may meet it within its range, among them all that do, and for
+/// each that certainly does, where that is asked.
+#[inline(always)]
+pub(crate) fn meet_one_hull<W: Wide, const SURE: bool>(
+    block: &HullBlock,
+    lane: usize,
+    lines: &impl Lines<W>,
+) -> (u32, u32) {
+    let hull = OneHull(block, lane % BLOCK);
+    let passages = pass::<W>(&hull, lines);
+    if passages.missed == W::ALL {
+        return (0, 0);
+    }
+    look_into::<W, SURE>(&hull, lines, &passages).meet_tubes::<W, SURE>(&hull, lines)
 }
 
 /// What [`meet_hulls`] gives at a level, for tests.

@@ -16,6 +16,7 @@ mod wide;
 mod x86;
 
 use std::mem::MaybeUninit;
+use std::sync::OnceLock;
 
 use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
@@ -32,7 +33,7 @@ pub(crate) use asked::{Asked, Question};
 pub(crate) use boxes::{meet_boxes, meet_frustum, only_child, push_as_built, push_by_distance};
 #[cfg(test)]
 pub(crate) use hulls::meet_hulls_at;
-pub(crate) use hulls::{MetHulls, meet_hulls};
+pub(crate) use hulls::{Lines, MetHulls, meet_hulls, meet_one_hull, pass_hulls};
 pub(crate) use portable::Portable;
 pub(crate) use spheres::SphereLanes;
 #[cfg(test)]
@@ -378,7 +379,8 @@ enum Set {
 impl Level {
     /// The best that this machine has.
     pub(crate) fn best() -> Self {
-        Self::all().pop().expect("one at least")
+        static BEST: OnceLock<Level> = OnceLock::new();
+        *BEST.get_or_init(|| Self::all().pop().expect("one at least"))
     }
 
     /// All that this machine has, the best last.

@@ -2,18 +2,22 @@
 //!
 //! Tried by hand: half of all margins, a tenth of the tolerance, and no error for tubes each make a test fail.
 
+use std::sync::Arc;
+
 use lumbre_geometry::{
-    Aabb, Capsule, Csg, Cuboid, Cylinder, Hyperboloid, PlacedShape, Quadric, Ray, Shape, Sphere, Torus,
-    Triangle,
+    Aabb, Capsule, Csg, Cuboid, Cylinder, Hyperboloid, PlacedShape, Plane, Quadric, Ray, Shape, Sphere,
+    Torus, Triangle,
 };
 use lumbre_math::{DVec2, DVec3, Transform};
 
 use super::oracle::check_many;
 use super::scenes::{self, Random, build, with_every_preset};
+use super::single::check_packet;
 use crate::collapse::Entry;
 use crate::hulls::{HullBlock, HullRay, Hulls};
 use crate::lanes::{Level, meet_hulls_at};
 use crate::node::Units;
+use crate::packet::{self, PACKET};
 use crate::single;
 use crate::triangles::{BLOCK, HeightRange};
 use crate::{Geometry, GeometryKind};
@@ -234,5 +238,57 @@ fn a_tree_of_many_shapes_finds_what_a_loop_finds() {
             let accel = build(kinds);
             check_many(&accel, &mut random, center, 2.0 * size, 600);
         });
+    }
+}
+
+/// Rays that are near to each other, at a shape.
+fn alike(random: &mut Random, shape: &PlacedShape, center: DVec3, size: f64) -> [Ray; PACKET] {
+    let first = ray(random, shape, center, size);
+    let apart = size * [0.0, 1e-9, 1e-3, 0.1][random.below(4)];
+    let spread = first.direction.abs().max_element() * [0.0, 1e-9, 1e-3, 0.1][random.below(4)];
+    std::array::from_fn(|_| {
+        let origin = first.origin + apart * random.vector();
+        Ray { origin, direction: first.direction + spread * random.vector(), ..first }
+    })
+}
+
+#[test]
+fn rays_that_go_together_among_shapes_are_answered_as_each_alone() {
+    let mut random = Random(64);
+    for (size, offset) in [(1.0, 0.0), (1e3, 50.0), (1e-6, 0.0), (0.4, 1e7)] {
+        let center = size * offset * DVec3::new(1.0, 0.6, -0.8);
+        let (mut together, mut apart) = (0, 0);
+        for with in 0..4 {
+            let shapes: Vec<_> = (0..60)
+                .map(|_| {
+                    let place = center + size * random.vector();
+                    shape(&mut random, place, size)
+                })
+                .collect();
+            let mut kinds: Vec<_> = shapes.iter().cloned().map(GeometryKind::Shape).collect();
+            // The same twice: the first in the list is hit.
+            kinds.push(kinds[7].clone());
+            match with {
+                0 => kinds.push(GeometryKind::Mesh(scenes::soup(&mut random, 40, center, size).into())),
+                1 => {
+                    let plane = Plane::new(center, DVec3::new(0.1, 1.0, 0.2)).unwrap();
+                    kinds.push(GeometryKind::Shape(PlacedShape::new(plane.into(), Transform::IDENTITY)));
+                }
+                2 => {
+                    let balls = scenes::balls(&mut random, 3, center, size, None);
+                    kinds.push(GeometryKind::Custom(Arc::new(balls)));
+                }
+                _ => {}
+            }
+            let accel = build(kinds);
+            for i in 0..if cfg!(miri) { 2 } else { 400 } {
+                let rays = alike(&mut random, &shapes[i % shapes.len()], center, size);
+                check_packet(&accel, &rays);
+                let answered = packet::answered_together(accel.level, &accel, &rays);
+                together += answered.count_ones();
+                apart += answered.count_zeros() - (32 - PACKET as u32);
+            }
+        }
+        assert!(cfg!(miri) || together > 4_000 && apart > 100, "{together} together, {apart} apart");
     }
 }

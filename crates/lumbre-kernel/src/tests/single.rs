@@ -177,7 +177,7 @@ fn rays_that_go_together_are_answered_as_each_alone() {
 }
 
 /// Each level's batch of these rays beside each ray alone.
-fn check_packet(accel: &Accel, rays: &[Ray; PACKET]) {
+pub(super) fn check_packet(accel: &Accel, rays: &[Ray; PACKET]) {
     let mut others = *rays;
     others.reverse();
     for level in Level::all() {
