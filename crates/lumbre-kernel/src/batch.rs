@@ -161,8 +161,7 @@ impl<G: Goal, E: Ends<G::Answer>, const N: usize, const IS_FAR: bool> Task
         for (number, rays) in rays.chunks(AT_ONCE).enumerate() {
             for (place, chunk) in rays.chunks(PACKET).enumerate() {
                 let first = number * AT_ONCE + place * PACKET;
-                let answered =
-                    if has_packets { trials.search::<G, L>(chunk, first, &mut ends) } else { 0 };
+                let answered = if has_packets { trials.search::<G, L>(chunk, first, &mut ends) } else { 0 };
                 if answered != packet::ALL {
                     let is_left = |(position, _): &(usize, &Ray)| answered >> (position - first) & 1 == 0;
                     others.extend((first..).zip(chunk).filter(is_left));

@@ -21,7 +21,7 @@ use rayon::prelude::*;
 use crate::collapse::Entry;
 use crate::lanes::{Lanes, Level, Task};
 use crate::node::{Units, tag};
-use crate::outline::{EightBoxes, Outline, Placing, box_in_space, center_and_half};
+use crate::outline::{EightSizes, Outline, Placing, box_in_space};
 use crate::primitive::{Bounds, ONE, Primitive};
 use crate::{Accel, Geometry, GeometryKind, Instance, Placement};
 
@@ -82,7 +82,7 @@ struct Family {
     /// None where one of them is a leaf, for leaves are not entered.
     children: Vec<u32>,
     /// Around the children.
-    boxes: Vec<EightBoxes>,
+    boxes: Vec<EightSizes>,
     outline: Outline,
     /// The children in turn, once they are known.
     families: Vec<u32>,
@@ -99,8 +99,7 @@ impl Family {
         if children.iter().any(|child| child >> tag::SHIFT != tag::INNER) {
             (children, boxes) = Default::default();
         }
-        let boxes: Vec<_> = boxes.iter().map(center_and_half).collect();
-        let boxes = EightBoxes::of(&boxes);
+        let boxes = EightSizes::of(&boxes);
         let outline = Outline::below(inner, reference, OUTLINE);
         Self { children, boxes, outline, families: Vec::new() }
     }
@@ -273,12 +272,12 @@ impl Task for Weigh<'_> {
             }
             let Some((_, map)) = still(&geometries[part.first() as usize]) else { continue };
             let (family, placing) = (known.get(family), Placing::of(map));
-            if !are_whole && let Some(around) = family.outline.around(&placing) {
+            if !are_whole && let Some(around) = family.outline.around::<L>(&placing) {
                 *part = part.common(&Bounds::near(units, &around, part.first(), part.second()));
             }
             if !family.boxes.is_empty() {
                 let count = family.children.len();
-                let areas = (scale * EightBoxes::placed_area(&family.boxes, count, &placing)) as f32;
+                let areas = (scale * EightSizes::placed_area(&family.boxes, count, &placing)) as f32;
                 let area = part.half_area();
                 if areas <= LARGEST_SHARE * area {
                     *gain = area - areas;

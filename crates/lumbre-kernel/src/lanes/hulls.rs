@@ -182,10 +182,7 @@ fn pass<V: Vector>(bodies: &impl Bodies<V>, lines: &impl Lines<V>) -> Passages<V
     for axis in 0..3 {
         let [x, y, z] = bodies.row(axis);
         p[axis] = x.times_plus(w[0], y.times_plus(w[1], z * w[2]));
-        d[axis] = x.times_plus(
-            lines.direction(0),
-            y.times_plus(lines.direction(1), z * lines.direction(2)),
-        );
+        d[axis] = x.times_plus(lines.direction(0), y.times_plus(lines.direction(1), z * lines.direction(2)));
         let inverse = one.over(least.max(d[axis].abs()));
         let at = p[axis].turned_by(d[axis]);
         near[axis] = (zero - (at + half[axis])) * inverse;
@@ -229,8 +226,8 @@ fn look_into<V: Vector, const SURE: bool>(
         [middle.times_plus(d[0], p[0]), middle.times_plus(d[1], p[1]), middle.times_plus(d[2], p[2])];
     let [dx, dy, dz] = [reach * d[0], reach * d[1], reach * d[2]];
     let [c, linear, e] = bodies.profile();
-    let tolerance = (V::splat(TOLERANCE_PER_MARGIN) * margin)
-        .times_plus(one + margin, V::splat(LEAST_TOLERANCE));
+    let tolerance =
+        (V::splat(TOLERANCE_PER_MARGIN) * margin).times_plus(one + margin, V::splat(LEAST_TOLERANCE));
     let a = dx.times_plus(dx, dy.times_plus(dy, c * dz * dz));
     let slope = c.times_plus(pz, half * linear);
     let b = px.times_plus(dx, py.times_plus(dy, slope * dz));

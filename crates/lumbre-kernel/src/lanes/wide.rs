@@ -405,7 +405,7 @@ mod x86 {
     use std::mem::MaybeUninit;
     use std::ops::{Add, Mul, Sub};
 
-    use super::{AFTER_MIDDLE, BEFORE_MIDDLE, Eight, Vector, LANE_BITS, Row, WIDE, Wide};
+    use super::{AFTER_MIDDLE, BEFORE_MIDDLE, Eight, LANE_BITS, Row, Vector, WIDE, Wide};
 
     /// Only where `lanes::x86::X86<true>` is: the instructions are there.
     #[derive(Clone, Copy)]

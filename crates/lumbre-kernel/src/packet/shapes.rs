@@ -61,8 +61,14 @@ const PER_DISTANCE: f32 = (1 << 18) as f32 * 1.2;
 impl AmongShapes {
     pub(super) fn new() -> Self {
         let (none, rows) = ([0.0; 3], [Row::of(0.0); 3]);
-        let middle =
-            Middle { origin: none, direction: none, first: 0.0, last: 0.0, per_margin: 0.0, per_distance: 0.0 };
+        let middle = Middle {
+            origin: none,
+            direction: none,
+            first: 0.0,
+            last: 0.0,
+            per_margin: 0.0,
+            per_distance: 0.0,
+        };
         let lines = Lined { origin: rows, rest: rows, direction: rows };
         Self { is_started: false, lines, middle, crossed: [None; PACKET] }
     }
@@ -248,11 +254,8 @@ impl<const MIXED: bool> Packet<'_, MIXED> {
         if !ray.contains(root.t) || from > self.to.0[i] {
             return;
         }
-        let is_nearer = if to < self.from.0[i] {
-            Outcome::Settled(true)
-        } else {
-            self.is_better(ray, i, root.t, names)
-        };
+        let is_nearer =
+            if to < self.from.0[i] { Outcome::Settled(true) } else { self.is_better(ray, i, root.t, names) };
         match is_nearer {
             Outcome::Settled(false) => {}
             Outcome::Settled(true) => {
