@@ -310,6 +310,8 @@ pub(crate) fn share_of(blocks: usize) -> usize {
 struct Survey {
     /// The usual room.
     usual: usize,
+    /// Whether any share more when vertices of different names in one place are taken for one.
+    by_place: bool,
     /// About how many units they take together: rather more.
     units: usize,
 }
@@ -328,8 +330,12 @@ impl Task for Look<'_> {
         const SOME: usize = 256;
         let some = self.names.iter().step_by((self.names.len() / SOME).max(4));
         let (count, mut usual, mut units) = (some.len().max(1), [0; 2], [0; 2]);
+        let mut by_place = false;
         for names in some {
-            let shared = Shared::of::<L>(mesh(self.geometries, names.geometry), names);
+            let mesh = mesh(self.geometries, names.geometry);
+            let shared = Shared::of::<L, true>(mesh, names);
+            by_place |=
+                shared.room() <= MOST_SHARED && Shared::of::<L, false>(mesh, names).room() > MOST_SHARED;
             for i in 0..2 {
                 let room = shared.with_room(USUAL[i]).room();
                 usual[i] += usize::from(room == USUAL[i]);
@@ -338,7 +344,7 @@ impl Task for Look<'_> {
         }
         let i = usize::from(10 * usual[0] < 9 * count);
         let all = units[i] * self.names.len() / count;
-        Survey { usual: USUAL[i], units: all + all / 32 }
+        Survey { usual: USUAL[i], by_place, units: all + all / 32 }
     }
 }
 
@@ -354,7 +360,7 @@ pub(crate) fn pack(
     followers: &[u8],
     may_lack_area: bool,
 ) -> Result<Filled, BuildError> {
-    let Survey { usual, units: expected } = level.run(Look { geometries, names });
+    let Survey { usual, by_place, units: expected } = level.run(Look { geometries, names });
     let mut filled = Filled { units: Vec::new(), places: Vec::with_capacity(names.len()) };
     let is_all_at_once = names.len() <= WAVE;
     let mut shared = Vec::new();
@@ -363,7 +369,7 @@ pub(crate) fn pack(
     for (wave, (names, followers)) in names.chunks(WAVE).zip(followers.chunks(WAVE)).enumerate() {
         shared.resize(names.len(), Shared::NOTHING);
         shared.par_chunks_mut(share).zip(names.par_chunks(share)).for_each(|(shared, names)| {
-            level.run(FindShared { geometries, names, usual, shared });
+            level.run(FindShared { geometries, names, usual, by_place, shared });
         });
         let start = end;
         for shared in &shared {
@@ -412,6 +418,7 @@ struct FindShared<'a> {
     geometries: &'a [Geometry],
     names: &'a [BlockNames],
     usual: usize,
+    by_place: bool,
     shared: &'a mut [Shared],
 }
 
@@ -420,8 +427,16 @@ impl Task for FindShared<'_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) {
+        if self.by_place { self.find::<L, true>() } else { self.find::<L, false>() }
+    }
+}
+
+impl FindShared<'_> {
+    #[inline(always)]
+    fn find<L: Lanes, const BY_PLACE: bool>(self) {
         for (shared, names) in self.shared.iter_mut().zip(self.names) {
-            *shared = Shared::of::<L>(mesh(self.geometries, names.geometry), names).with_room(self.usual);
+            let mesh = mesh(self.geometries, names.geometry);
+            *shared = Shared::of::<L, BY_PLACE>(mesh, names).with_room(self.usual);
         }
     }
 }
@@ -508,9 +523,9 @@ impl Shared {
     }
 
     /// With room for no more than they have. Without branches that could not be foreseen: every corner is compared with all before
-    /// it.
+    /// it; and where that is not enough and `BY_PLACE`, so is where they stand.
     #[inline(always)]
-    fn of<L: Lanes>(mesh: &TriangleMesh, names: &BlockNames) -> Self {
+    fn of<L: Lanes, const BY_PLACE: bool>(mesh: &TriangleMesh, names: &BlockNames) -> Self {
         let mut all = [0; UNSHARED];
         let (triangles, _) = all.as_chunks_mut::<3>();
         let mut len = 0;
@@ -522,7 +537,7 @@ impl Shared {
         triangles[len..].fill(first);
         let mut equals = L::equals_before(&all);
         let mut are_first = firsts_of(&equals);
-        if are_first.count_ones() as usize > MOST_SHARED {
+        if BY_PLACE && are_first.count_ones() as usize > MOST_SHARED {
             // Vertices of different names may stand in one place.
             equals = [u32::MAX; UNSHARED];
             for axis in 0..3 {

@@ -11,12 +11,13 @@
 //! the children of their roots; half of them opened, to 1.9 and 1.6. The scenes are `boulders`, `forest` and `pipes` of
 //! `cargo xtask bench kernel`.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use lumbre_geometry::Aabb;
 use lumbre_math::Transform;
 use rayon::prelude::*;
+use rustc_hash::FxHashMap;
 
 use crate::collapse::Entry;
 use crate::lanes::{Lanes, Level, Task};
@@ -110,7 +111,7 @@ impl Family {
 pub(crate) struct Families {
     known: Vec<Family>,
     /// Of a tree and a node, the place among those that are known.
-    places: HashMap<(usize, u32), u32>,
+    places: FxHashMap<(usize, u32), u32>,
 }
 
 impl Families {

@@ -1,11 +1,11 @@
 //! What comes before the tree: geometries are checked, bounded and taken apart into primitives.
 
-use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
 
 use lumbre_geometry::Aabb;
 use lumbre_math::{DMat3, DVec3, Transform, Vec3};
 use rayon::prelude::*;
+use rustc_hash::FxHashMap;
 
 use crate::boxes::Boxes;
 use crate::build::{Effort, Grown, PARALLEL, binary_tree};
@@ -34,12 +34,12 @@ pub(crate) fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result
     }
     // Handed to a pool of threads once, not with every piece of work; what one thread does alone is not handed over at all.
     let effort = Effort::of(options.preset);
-    let work: usize = geometries.iter().map(size_of_geometry).sum();
-    if work > PARALLEL {
-        rayon::scope(|_| build_here(geometries, effort))
-    } else {
-        build_here(geometries, effort)
-    }
+    let mut work = 0;
+    let is_much = geometries.iter().any(|geometry| {
+        work += size_of_geometry(geometry);
+        work > PARALLEL
+    });
+    if is_much { rayon::scope(|_| build_here(geometries, effort)) } else { build_here(geometries, effort) }
 }
 
 /// About how many primitives it has.
@@ -243,7 +243,7 @@ fn boxes_of(geometries: &[Geometry]) -> Vec<Option<Aabb>> {
         return vec![None; geometries.len()];
     }
     // Instances of one tree are many.
-    let mut outlines: HashMap<usize, Outline> = HashMap::new();
+    let mut outlines: FxHashMap<usize, Outline> = FxHashMap::default();
     for geometry in geometries {
         if let GeometryKind::Instance(instance) = &geometry.kind {
             outlines
@@ -563,18 +563,19 @@ pub(crate) fn units_of(geometries: &[Geometry], parts: &Parts) -> Units {
     } else {
         1.0
     };
-    let condition = geometries.iter().fold(1.0, |worst: f64, geometry| match &geometry.kind {
-        GeometryKind::Shape(shape) => worst.max(condition_of(&shape.world_from_object())),
+    let condition = |geometry: &Geometry| match &geometry.kind {
+        GeometryKind::Shape(shape) => condition_of(&shape.world_from_object()),
         GeometryKind::Instance(instance) => {
             let inner = instance.accel.units.condition;
             let outer = match &instance.world_from_object {
                 Placement::Still(map) => condition_of(map),
                 Placement::Moving(motion) => motion.condition(),
             };
-            worst.max(outer * inner + 2.0)
+            outer * inner + 2.0
         }
-        _ => worst,
-    });
+        _ => 1.0,
+    };
+    let condition = geometries.par_iter().with_min_len(1024).map(condition).reduce(|| 1.0, f64::max);
     Units::new(origin, scale, (half * scale).length(), condition)
 }
 
