@@ -47,8 +47,12 @@ use crate::way::limit_of;
 /// Rays in a packet.
 pub(crate) const PACKET: usize = WIDE;
 
-/// How far from their middle rays may start on an axis, in tree units.
-const MOST_DISTANCE: f32 = 0.125;
+/// How far from their middle rays may start on an axis, in tree units: an eighth, see above; where there are shapes, no farther than
+/// pays.
+const fn most_distance(is_mixed: bool) -> f32 {
+    if is_mixed { 0.015625 } else { 0.125 }
+}
+
 /// How far from their middle directions may be, by the largest component.
 const MOST_SPREAD: f32 = 0.125;
 /// How many there have to be.
@@ -374,7 +378,7 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
             frustum.most_inverse[axis] = most_inverse;
             frustum.least_inverse[axis] = -minus_least;
             frustum.width[axis] = greater(most_inverse, minus_least) * (off + 3.0 * margin);
-            is_near &= off <= MOST_DISTANCE;
+            is_near &= off <= most_distance(MIXED);
         }
         (frustum.s_max, frustum.s_min, frustum.sides) = (most[3], -most[7], Sides::new(signs));
         (self.bundle.axes, self.is_among_triangles) = (axes, false);
