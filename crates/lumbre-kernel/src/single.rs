@@ -474,10 +474,10 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
 
     /// Asks about a crossing in range, if it is nearer than the best, or as near and before it: the new best, if it is.
     fn ask_about(&mut self, ray: &Ray, found: Winner, order: u32, may_come_again: bool) -> Option<Candidate> {
-        if let Some(best) = self.crossed() {
-            if !best.comes_after(found.root.t, (found.geometry, found.primitive)) {
-                return None;
-            }
+        if let Some(best) = self.crossed()
+            && !best.comes_after(found.root.t, (found.geometry, found.primitive))
+        {
+            return None;
         }
         if !self.selection.accepts(&found, order, may_come_again) {
             return None;

@@ -163,14 +163,17 @@ struct Passages<V> {
     missed: u32,
 }
 
+/// From centres to where lines start, on an axis.
+#[inline(always)]
+fn offset<V: Vector>(bodies: &impl Bodies<V>, lines: &impl Lines<V>, axis: usize) -> V {
+    (lines.origin(axis) - bodies.center(axis)) + lines.rest(axis)
+}
+
 /// Lines between the planes of cubes.
 #[inline(always)]
 fn pass<V: Vector>(bodies: &impl Bodies<V>, lines: &impl Lines<V>) -> Passages<V> {
     let (zero, one) = (V::splat(0.0), V::splat(1.0));
-    let mut w = [zero; 3];
-    for axis in 0..3 {
-        w[axis] = (lines.origin(axis) - bodies.center(axis)) + lines.rest(axis);
-    }
+    let w = [offset(bodies, lines, 0), offset(bodies, lines, 1), offset(bodies, lines, 2)];
     let distance = w[0].abs().max(w[1].abs().max(w[2].abs()));
     let [per_distance, least_margin] = bodies.margins();
     let margin = per_distance.times_plus(distance, least_margin);

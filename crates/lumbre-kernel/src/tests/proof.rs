@@ -10,7 +10,7 @@ use lumbre_math::{DVec3, Transform};
 use rayon::prelude::*;
 
 use super::scenes::{
-    Random, bumpy, cube, icosphere, mixture, ray, soup, torus, vertex, with_every_preset,
+    Random, build, bumpy, cube, icosphere, mixture, ray, shape, soup, torus, vertex, with_every_preset,
     with_parts_everywhere,
 };
 use crate::packet::PACKET;
@@ -165,6 +165,10 @@ fn compare(rays: u64, seed: u64) -> u64 {
         let mut random = Random(seed ^ chunk << 24);
         let accel = if chunk % 4 == 0 {
             mixture(&mut random, center, 3.0, (chunk % 8 == 0).into(), chunk % 16 == 0)
+        } else if chunk % 4 == 1 {
+            let shapes = (0..60).map(|_| GeometryKind::Shape(shape(&mut random, center, 3.0))).collect();
+            let mesh = GeometryKind::Mesh(Arc::new(soup(&mut random, 60, center, 3.0)));
+            build([shapes, vec![mesh]].concat())
         } else {
             let mesh = soup(&mut random, 100, center, 3.0);
             let mesh = GeometryKind::Mesh(Arc::new(mesh));
