@@ -35,13 +35,17 @@ pub(crate) trait Lines<V> {
     fn direction(&self, axis: usize) -> V;
     /// Where they begin and end at the farthest.
     fn range(&self) -> [V; 2];
-    /// Where they have surely begun, and not yet ended.
-    fn sure_range(&self) -> [V; 2];
-    /// By how much the planes of a cube are moved outwards, of a hull with this margin and that margin for each unit of distance.
+    /// By how much planes are moved outwards, of hulls with this margin, of which so much is for each unit of distance.
     #[inline(always)]
     fn widened(&self, margin: V, _per_distance: V) -> V {
         margin
     }
+}
+
+/// Lines of which more is known.
+pub(crate) trait SureLines<V>: Lines<V> {
+    /// Where they have surely begun, and not yet ended.
+    fn sure_range(&self) -> [V; 2];
 }
 
 /// The hulls of a block.
@@ -141,7 +145,9 @@ impl<V: Vector> Lines<V> for OneLine<'_> {
     fn range(&self) -> [V; 2] {
         [V::splat(self.1.first), V::splat(self.1.last)]
     }
+}
 
+impl<V: Vector> SureLines<V> for OneLine<'_> {
     #[inline(always)]
     fn sure_range(&self) -> [V; 2] {
         [V::splat(self.1.surely_first), V::splat(self.1.surely_last)]
@@ -209,9 +215,9 @@ struct Chords<V> {
     from: V,
     /// A bit for each that may be met, as far as is seen without a look at tubes: among them all that are.
     mask: u32,
-    /// A bit for each that certainly is met, tubes left aside, and for each line that certainly is outside somewhere, where that was
-    /// asked.
+    /// A bit for each that certainly is met, tubes left aside, where that was asked.
     sure: u32,
+    /// A bit for each whose line certainly is outside somewhere, alike.
     outside: u32,
 }
 
@@ -219,7 +225,7 @@ struct Chords<V> {
 #[inline(always)]
 fn look_into<V: Vector, const SURE: bool>(
     bodies: &impl Bodies<V>,
-    lines: &impl Lines<V>,
+    lines: &impl SureLines<V>,
     passages: &Passages<V>,
 ) -> Chords<V> {
     let &Passages { p, d, margin, enters, leaves, from, to, missed } = passages;
@@ -328,7 +334,7 @@ impl<V: Vector> Chords<V> {
     fn meet_tubes<W: Wide, const SURE: bool>(
         &self,
         bodies: &impl Bodies<V>,
-        lines: &impl Lines<V>,
+        lines: &impl SureLines<V>,
     ) -> (u32, u32) {
         let (mut mask, mut sure) = (self.mask, self.sure);
         let tubes = bodies.tube();
@@ -396,7 +402,7 @@ pub(crate) fn pass_hulls<L: Lanes>(block: &HullBlock, lines: &impl Lines<L::Eigh
 pub(crate) fn meet_one_hull<W: Wide, const SURE: bool>(
     block: &HullBlock,
     lane: usize,
-    lines: &impl Lines<W>,
+    lines: &impl SureLines<W>,
 ) -> (u32, u32) {
     let hull = OneHull(block, lane % BLOCK);
     let passages = pass::<W>(&hull, lines);

@@ -33,7 +33,7 @@ pub(crate) use asked::{Asked, Question};
 pub(crate) use boxes::{meet_boxes, meet_frustum, only_child, push_as_built, push_by_distance};
 #[cfg(test)]
 pub(crate) use hulls::meet_hulls_at;
-pub(crate) use hulls::{Lines, MetHulls, meet_hulls, meet_one_hull, pass_hulls};
+pub(crate) use hulls::{Lines, MetHulls, SureLines, meet_hulls, meet_one_hull, pass_hulls};
 pub(crate) use portable::Portable;
 pub(crate) use spheres::SphereLanes;
 #[cfg(test)]

@@ -453,6 +453,16 @@ mod x86 {
     operator!(sub, Sub, _mm512_sub_ps, _mm256_sub_ps);
     operator!(mul, Mul, _mm512_mul_ps, _mm256_mul_ps);
 
+    macro_rules! by_one {
+        ($name:ident($($other:ident),*) $instruction:ident) => {
+            #[inline(always)]
+            fn $name(self $(, $other: Self)*) -> Self {
+                // SAFETY: see the type.
+                unsafe { Self($instruction(self.0 $(, $other.0)*)) }
+            }
+        };
+    }
+
     impl Vector for Avx512 {
         const COUNT: usize = WIDE;
         type Array = [f32; WIDE];
@@ -464,52 +474,18 @@ mod x86 {
             row.0
         }
 
+        by_one!(times_plus(factor, summand) _mm512_fmadd_ps);
+        by_one!(times_from(factor, summand) _mm512_fnmadd_ps);
+        by_one!(times_minus(factor, other) _mm512_fmsub_ps);
+        by_one!(over(divisor) _mm512_div_ps);
+        by_one!(sqrt() _mm512_sqrt_ps);
+        by_one!(min(other) _mm512_min_ps);
+        by_one!(max(other) _mm512_max_ps);
+
         #[inline(always)]
         fn splat(value: f32) -> Self {
             // SAFETY: see the type.
             unsafe { Self(_mm512_set1_ps(value)) }
-        }
-
-        #[inline(always)]
-        fn times_plus(self, factor: Self, summand: Self) -> Self {
-            // SAFETY: see the type.
-            unsafe { Self(_mm512_fmadd_ps(self.0, factor.0, summand.0)) }
-        }
-
-        #[inline(always)]
-        fn times_from(self, factor: Self, summand: Self) -> Self {
-            // SAFETY: see the type.
-            unsafe { Self(_mm512_fnmadd_ps(self.0, factor.0, summand.0)) }
-        }
-
-        #[inline(always)]
-        fn times_minus(self, factor: Self, other: Self) -> Self {
-            // SAFETY: see the type.
-            unsafe { Self(_mm512_fmsub_ps(self.0, factor.0, other.0)) }
-        }
-
-        #[inline(always)]
-        fn over(self, divisor: Self) -> Self {
-            // SAFETY: see the type.
-            unsafe { Self(_mm512_div_ps(self.0, divisor.0)) }
-        }
-
-        #[inline(always)]
-        fn sqrt(self) -> Self {
-            // SAFETY: see the type.
-            unsafe { Self(_mm512_sqrt_ps(self.0)) }
-        }
-
-        #[inline(always)]
-        fn min(self, other: Self) -> Self {
-            // SAFETY: see the type.
-            unsafe { Self(_mm512_min_ps(self.0, other.0)) }
-        }
-
-        #[inline(always)]
-        fn max(self, other: Self) -> Self {
-            // SAFETY: see the type.
-            unsafe { Self(_mm512_max_ps(self.0, other.0)) }
         }
 
         #[inline(always)]
@@ -887,52 +863,18 @@ mod x86 {
             eight
         }
 
+        by_one!(times_plus(factor, summand) _mm256_fmadd_ps);
+        by_one!(times_from(factor, summand) _mm256_fnmadd_ps);
+        by_one!(times_minus(factor, other) _mm256_fmsub_ps);
+        by_one!(over(divisor) _mm256_div_ps);
+        by_one!(sqrt() _mm256_sqrt_ps);
+        by_one!(min(other) _mm256_min_ps);
+        by_one!(max(other) _mm256_max_ps);
+
         #[inline(always)]
         fn splat(value: f32) -> Self {
             // SAFETY: see the type.
             unsafe { Self(_mm256_set1_ps(value)) }
-        }
-
-        #[inline(always)]
-        fn times_plus(self, factor: Self, summand: Self) -> Self {
-            // SAFETY: see the type.
-            unsafe { Self(_mm256_fmadd_ps(self.0, factor.0, summand.0)) }
-        }
-
-        #[inline(always)]
-        fn times_from(self, factor: Self, summand: Self) -> Self {
-            // SAFETY: see the type.
-            unsafe { Self(_mm256_fnmadd_ps(self.0, factor.0, summand.0)) }
-        }
-
-        #[inline(always)]
-        fn times_minus(self, factor: Self, other: Self) -> Self {
-            // SAFETY: see the type.
-            unsafe { Self(_mm256_fmsub_ps(self.0, factor.0, other.0)) }
-        }
-
-        #[inline(always)]
-        fn over(self, divisor: Self) -> Self {
-            // SAFETY: see the type.
-            unsafe { Self(_mm256_div_ps(self.0, divisor.0)) }
-        }
-
-        #[inline(always)]
-        fn sqrt(self) -> Self {
-            // SAFETY: see the type.
-            unsafe { Self(_mm256_sqrt_ps(self.0)) }
-        }
-
-        #[inline(always)]
-        fn min(self, other: Self) -> Self {
-            // SAFETY: see the type.
-            unsafe { Self(_mm256_min_ps(self.0, other.0)) }
-        }
-
-        #[inline(always)]
-        fn max(self, other: Self) -> Self {
-            // SAFETY: see the type.
-            unsafe { Self(_mm256_max_ps(self.0, other.0)) }
         }
 
         #[inline(always)]

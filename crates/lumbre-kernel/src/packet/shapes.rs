@@ -17,7 +17,7 @@ use lumbre_geometry::{Ray, Root};
 
 use super::{Bundle, CROSSED, Packet, greater};
 use crate::collapse::Entry;
-use crate::lanes::{self, Lanes, Lines, Row, Vector, Wide};
+use crate::lanes::{self, Lanes, Lines, Row, SureLines, Vector, Wide};
 use crate::node::tag;
 use crate::packet::PACKET;
 use crate::single::{Goal, Outcome, Winner, heights, nearest_of};
@@ -97,14 +97,15 @@ impl<W: Wide> Lines<W> for InRange<'_> {
     fn range(&self) -> [W; 2] {
         [W::load(&self.1.first.0), W::load(&self.1.last.0)]
     }
+}
 
+impl<W: Wide> SureLines<W> for InRange<'_> {
     #[inline(always)]
     fn sure_range(&self) -> [W; 2] {
         [W::load(&self.1.surely_first.0), W::load(&self.1.surely_last.0)]
     }
 }
 
-/// Among the planes of cubes alone.
 impl<V: Vector> Lines<V> for Middle {
     #[inline(always)]
     fn origin(&self, axis: usize) -> V {
@@ -124,11 +125,6 @@ impl<V: Vector> Lines<V> for Middle {
     #[inline(always)]
     fn range(&self) -> [V; 2] {
         [V::splat(self.first), V::splat(self.last)]
-    }
-
-    #[inline(always)]
-    fn sure_range(&self) -> [V; 2] {
-        <Self as Lines<V>>::range(self)
     }
 
     #[inline(always)]

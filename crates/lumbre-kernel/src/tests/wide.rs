@@ -1,7 +1,7 @@
-//! What sixteen numbers give together, beside each alone.
+//! What eight and sixteen numbers give together, beside each alone.
 
 use super::scenes::Random;
-use crate::lanes::{Lanes, Level, Row, Task, WIDE, Wide};
+use crate::lanes::{Eight, Lanes, Level, Row, Task, Vector, WIDE, Wide};
 
 /// What is looked at of sixteen rows, and of numbers in double precision.
 struct Together<'a> {
@@ -95,6 +95,77 @@ fn sixteen_numbers_give_together_what_each_gives_alone() {
             assert_eq!(bits(given.rounded.0), bits(scaled), "{level:?}");
             assert_eq!(bits(given.parted[0].0), bits(rounded), "{level:?}");
             assert_eq!(bits(given.parted[1].0), bits(rest), "{level:?}");
+        }
+    }
+}
+
+/// Numbers of each result, and masks, of arithmetic with three.
+type Results = (Vec<Vec<f32>>, [u32; 2]);
+
+#[inline(always)]
+fn arithmetic<V: Vector>(a: V, b: V, c: V) -> Results {
+    let results = [
+        a + b,
+        a - b,
+        a * b,
+        a.times_plus(b, c),
+        a.times_from(b, c),
+        a.times_minus(b, c),
+        a.over(V::splat(4.0)),
+        (a * a).sqrt(),
+        a.min(b),
+        a.max(b),
+        a.abs(),
+        a.turned_by(b),
+    ];
+    let numbers = |v: V| {
+        let array = v.to_array();
+        (0..V::COUNT).map(|i| array[i]).collect()
+    };
+    (results.into_iter().map(numbers).collect(), [a.at_most(b), a.below(b)])
+}
+
+/// The same of eight and of sixteen.
+struct Arithmetic([[f32; WIDE]; 3]);
+
+impl Task for Arithmetic {
+    type Output = [Results; 2];
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> [Results; 2] {
+        let [a, b, c] = &self.0;
+        let eight = |row: &[f32; WIDE]| L::Eight::load(row.first_chunk().expect("sixteen"));
+        let wide = |row: &[f32; WIDE]| L::Wide::load(row);
+        [arithmetic(eight(a), eight(b), eight(c)), arithmetic(wide(a), wide(b), wide(c))]
+    }
+}
+
+#[test]
+fn arithmetic_gives_in_every_lane_what_it_gives_alone() {
+    let mut random = Random(173);
+    for _ in 0..100 {
+        // Whole numbers, of which nothing is rounded.
+        let mut row = || std::array::from_fn(|_| random.below(9) as f32 - 4.0);
+        let [a, b, c]: [[f32; WIDE]; 3] = [row(), row(), row()];
+        let alone = |i: usize| {
+            let (a, b, c) = (a[i], b[i], c[i]);
+            let turned = if b.is_sign_negative() { -a } else { a };
+            let products = [a * b + c, c - a * b, a * b - c];
+            [[a + b, a - b, a * b], products, [a / 4.0, a.abs(), a.min(b)], [a.max(b), a.abs(), turned]]
+                .concat()
+        };
+        for level in Level::all() {
+            for (results, masks) in level.run(Arithmetic([a, b, c])) {
+                let count = results[0].len();
+                assert!(count == 8 || count == WIDE);
+                for i in 0..count {
+                    let given: Vec<f32> = results.iter().map(|result| result[i]).collect();
+                    assert_eq!(given, alone(i), "{level:?}");
+                    assert_eq!(masks[0] >> i & 1 == 1, a[i] <= b[i], "{level:?}");
+                    assert_eq!(masks[1] >> i & 1 == 1, a[i] < b[i], "{level:?}");
+                }
+                assert_eq!((masks[0] | masks[1]) >> count, 0, "{level:?}");
+            }
         }
     }
 }
