@@ -37,7 +37,7 @@ use crate::lanes::{self, Axes, Corners, Lanes, Row, Sides, Vector, WIDE, Wide};
 use crate::node::{END_FACTOR, LITTLE, Node, START_FACTOR, tag};
 #[cfg(test)]
 use crate::single::Nearest;
-use crate::single::{Candidate, Exact, Goal, Outcome, Winner, heights};
+use crate::single::{Candidate, Exact, Goal, Outcome, Winner, heights, largest_component};
 use crate::stack::{Order, Stack};
 use crate::triangles::{
     self, BEYOND, BLOCK, EDGE_ERROR, FAR, HEIGHT_ERROR, Meeting, Pairs, ROUNDINGS, SIZE_ERROR, TINY, beyond,
@@ -647,7 +647,7 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
             match judged {
                 (_, Outcome::Settled(false)) => {}
                 (t, Outcome::Settled(true)) => {
-                    let heights = heights(t, ray.direction.abs().max_element());
+                    let heights = heights(t, largest_component(ray));
                     self.keep(i, heights, number << 3 | lane);
                 }
                 (_, Outcome::Unsettled) => self.give_up(i),

@@ -275,7 +275,7 @@ pub(crate) fn heights(t: f64, length: f64) -> (f32, f32) {
 
 /// What takes t to heights.
 #[inline(always)]
-fn largest_component(ray: &Ray) -> f64 {
+pub(crate) fn largest_component(ray: &Ray) -> f64 {
     ray.direction.abs().max_element()
 }
 

@@ -20,7 +20,7 @@ use crate::collapse::Entry;
 use crate::lanes::{self, Lanes, Lines, Row, SureLines, Vector, Wide};
 use crate::node::tag;
 use crate::packet::PACKET;
-use crate::single::{Goal, Outcome, Winner, heights, nearest_of};
+use crate::single::{Goal, Outcome, Winner, heights, largest_component, nearest_of};
 use crate::traverse;
 use crate::triangles::BLOCK;
 
@@ -245,7 +245,7 @@ impl<const MIXED: bool> Packet<'_, MIXED> {
     /// Takes a crossing of what is no triangle, if it is the nearest of that ray.
     #[inline(always)]
     fn meet_root(&mut self, root: Root, names: (u32, u32), i: usize, ray: &Ray) {
-        let heights @ (from, to) = heights(root.t, ray.direction.abs().max_element());
+        let heights @ (from, to) = heights(root.t, largest_component(ray));
         // Also keeps out a NaN.
         if !ray.contains(root.t) || from > self.to.0[i] {
             return;
