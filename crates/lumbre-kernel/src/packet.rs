@@ -40,7 +40,8 @@ use crate::single::Nearest;
 use crate::single::{Candidate, Exact, Goal, Outcome, Winner, heights, largest_component};
 use crate::stack::{Order, Stack};
 use crate::triangles::{
-    self, BEYOND, BLOCK, EDGE_ERROR, FAR, HEIGHT_ERROR, Meeting, Pairs, ROUNDINGS, SIZE_ERROR, TINY, beyond,
+    self, BEYOND, BLOCK, EDGE_ERROR, ERRORS_OF_EDGES, ERRORS_OF_EXTENT, FAR, HEIGHT_ERROR, Meeting, Pairs,
+    ROUNDINGS, SIZE_ERROR, TINY, beyond,
 };
 use crate::way::limit_of;
 
@@ -507,7 +508,7 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
             error.store(&mut bounds.error);
             let height_error = size * W::splat(HEIGHT_ERROR);
             height_error.store(&mut bounds.height_error);
-            (high_z - low_z + height_error + height_error).store(&mut bounds.extent);
+            (high_z - low_z + height_error).store(&mut bounds.extent);
         }
         bounds
     }
@@ -558,10 +559,9 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
             det.times_plus(L::Wide::load(&bundle.rest[2].0), w.times_plus(cz, v.times_plus(bz, u * az)));
         let ahead = height.turned_by(det).turned_by(L::Wide::splat(bundle.turn));
         let height_error = bounds.height_error.0[lane];
-        let spread = weight.times_plus(
-            L::Wide::splat(height_error),
-            L::Wide::splat(error * 12.5 * bounds.extent.0[lane] + TINY),
-        );
+        let least_spread =
+            error * (ERRORS_OF_EXTENT * bounds.extent.0[lane] + ERRORS_OF_EDGES * height_error) + TINY;
+        let spread = weight.times_plus(L::Wide::splat(height_error), L::Wide::splat(least_spread));
         let (from, to) = (ahead - spread, ahead + spread);
         // What is no number may be in range.
         let is_out = to.below(weight * L::Wide::load(&bundle.first.0))
@@ -570,8 +570,7 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
         if in_range == 0 {
             return;
         }
-        let twice = error + error;
-        let inside = L::Wide::splat(twice).below(low) | high.below(L::Wide::splat(-twice));
+        let inside = L::Wide::splat(error).below(low) | high.below(L::Wide::splat(-error));
         let sure = in_range
             & inside
             & (weight * L::Wide::load(&bundle.surely_first.0)).at_most(from)

@@ -75,26 +75,28 @@ fn sheared(shear: [f64; 2], origin: &[f64; 3], [x, y, z]: [f32; 3]) -> Corner {
 /// rounded, and the rest, so that together they are wrong by u²L, and differences from it by a share of R. What follows is
 /// the sheared corner (x, y, z), z without the rest, compared with the one that the test in double precision has.
 ///
-/// x is wrong by uR from the difference, 12.3u²L from the rest of the origin and its shear, which are added next, uR from
-/// that sum, uR from z, 4.1uR from the shear (no more than 1, and the quotient of rounded numbers by way of a rounded
-/// inverse), and 2uR from the last subtraction: by 9.1uR + 12.3u²L. With |x|, |y| ≤ m and |z| ≤ h as computed, R is no more than
-/// m + h + 2.2uL and few roundings. So δ = 12us with s = m + h + 4uL is more than that, and covers what is rounded in double
-/// precision too.
+/// Let |x|, |y| ≤ m and |z| ≤ h be as computed, and s = m + h + 4uL. x is wrong by u(m + h) from the difference and as much from
+/// the sum with the rest, by uh from z, uh from the product where that is rounded apart, 4.1uh from the shear (no more than 1, and
+/// the quotient of rounded numbers by way of a rounded inverse), by um from the last subtraction, and by 12.3u²L from the rest of
+/// the origin and its shear, which with what the rest adds to the first two is 16.3u²L: by u(3m + 8.1h) + 16.3u²L. So δ = 8.5us is
+/// more than that, and covers what is rounded in double precision too.
 ///
-/// An edge function xy' - yx' is off by 4δm + 2δ² from the corners, and by 4.1um² from its own roundings, less than δm. With
-/// `error = 6δm + 3δ² = 72us (m + 6us)`, which leaves room for its own roundings, an edge function that is not negative in double
-/// precision is not below `-error` here. [`TINY`] is added for what may underflow.
+/// An edge function xy' - yx' is off by 4δm + 2δ² from the corners, and by 4.1um² from its own roundings: by no more than
+/// 38.1usm + 145u²s². With `error = 40us (m + 4us)`, which leaves room for its own roundings, an edge function that is not negative
+/// in double precision is not below `-error` here. [`TINY`] is added for what may underflow.
 ///
 /// Heights are compared by way of products with |D|, where D is the sum of the edge functions as computed, so that there is
-/// nothing to be divided. A crossing within the triangle is at the z for which Σ eᵢ (zᵢ - z) is zero in double precision. With
-/// edge functions wrong by `error` each, Σ eᵢ zᵢ is off z D by no more than 3 `error` of the triangle's extent in z. Roundings of
-/// the three products and their sums, of the corners' z, and of the rest of the origin that is added, are below 9uh Σ |eᵢ|; those
-/// of the ends of the interval and of the range by |D| below 3uh|D|. As no edge function is beyond `error` on the other side than D,
-/// Σ |eᵢ| ≤ |D| + 6 `error`. So `spread = 12.5 error (extent + 24us) + 24us |D| + TINY` has room for all of it, whatever D.
+/// nothing to be divided. A crossing within the triangle is at the z for which Σ eᵢ (zᵢ - z) is zero in double precision, and between
+/// the least and the largest zᵢ. With edge functions wrong by `error` each, Σ eᵢ zᵢ is off z D by no more than 3 `error` of the
+/// triangle's extent in z, of which there is a twentieth less. Roundings of the three products and their sums are below
+/// 4uh Σ |eᵢ|, those of the corners' z below uh Σ |eᵢ|, those of D below 2uh Σ |eᵢ|, and what comes of the rest of the origin, of
+/// which D takes a part, below us Σ |eᵢ|; those of the ends of the interval and of the range by |D| below 2uh Σ |eᵢ|. As no edge
+/// function is beyond `error` on the other side than D, Σ |eᵢ| ≤ |D| + 6 `error`. So
+/// `spread = 3 error extent + 12us (|D| + 6 error) + TINY` has room for all of it, whatever D.
 ///
-/// Where all edge functions are beyond 2 `error` on one side, those in double precision are beyond zero on the same, so that the
-/// line does meet the triangle, and at which face is certain, too; and where height ± spread lies between `surely_first` and `surely_last`, the hit is in range. The ends
-/// of the range are moved, outwards or inwards, by what their own rounding may be.
+/// Where all edge functions are beyond `error` on one side, those in double precision are beyond zero on the same, so that the
+/// line does meet the triangle, and at which face is certain, too; and where height ± spread lies between `surely_first` and
+/// `surely_last`, the hit is in range. The ends of the range are moved, outwards or inwards, by what their own rounding may be.
 ///
 /// All this without overflow, as L ≤ 2³⁸ and so Σ |eᵢ zᵢ| < 2¹²³; else the test is left out. It is also below 2⁻⁵⁰, and below 2⁻⁴⁰
 /// nothing is certain.
@@ -132,9 +134,12 @@ pub(crate) struct HeightRange {
 /// u.
 const ROUNDOFF: f32 = 1.0 / (1 << 24) as f32;
 /// The factors of what edge functions and heights may be wrong by.
-pub(crate) const EDGE_ERROR: f32 = 72.0 * ROUNDOFF;
-pub(crate) const SIZE_ERROR: f32 = 6.0 * ROUNDOFF;
-pub(crate) const HEIGHT_ERROR: f32 = 24.0 * ROUNDOFF;
+pub(crate) const EDGE_ERROR: f32 = 40.0 * ROUNDOFF;
+pub(crate) const SIZE_ERROR: f32 = 4.0 * ROUNDOFF;
+pub(crate) const HEIGHT_ERROR: f32 = 12.0 * ROUNDOFF;
+/// How often the error of an edge function stands in that of a height by the extent in z, and in the bound on all edge functions.
+pub(crate) const ERRORS_OF_EXTENT: f32 = 3.0;
+pub(crate) const ERRORS_OF_EDGES: f32 = 6.0;
 /// Of L.
 pub(crate) const LEAST_SIZE: f32 = 4.0 * ROUNDOFF;
 /// Above all that underflow may do.

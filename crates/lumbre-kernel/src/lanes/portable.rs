@@ -8,7 +8,8 @@ use crate::blocks::TriangleBlock;
 use crate::holds::SingleStart;
 use crate::node::{BoxRay, END_FACTOR, LITTLE, START_FACTOR, Slabs, Units};
 use crate::triangles::{
-    BLOCK, BlockRay, EDGE_ERROR, HEIGHT_ERROR, HeightRange, Inside, Passage, SIZE_ERROR, Shear, TINY, passage,
+    BLOCK, BlockRay, EDGE_ERROR, ERRORS_OF_EDGES, ERRORS_OF_EXTENT, HEIGHT_ERROR, HeightRange, Inside,
+    Passage, SIZE_ERROR, Shear, TINY, passage,
 };
 
 pub(crate) struct Portable;
@@ -191,13 +192,14 @@ impl Lanes for Portable {
             let is_turned = ray.turn.is_sign_negative() != det.is_sign_negative();
             let ahead = if is_turned { -height } else { height };
             let height_error = edges.height_error[lane];
-            let spread = (error * 12.5) * ((high - low) + height_error) + (height_error * weight + TINY);
+            let along_edges = height_error * (error * ERRORS_OF_EDGES + weight) + TINY;
+            let spread = (error * ERRORS_OF_EXTENT) * (high - low) + along_edges;
             let (from, to) = (ahead - spread, ahead + spread);
             // What is no number may be in range.
             let is_out = to < ray.range.first * weight || from > ray.range.last * weight;
             crossings.in_range |= u32::from(!is_out) << lane;
             let (least, most) = (u.min(v).min(w), u.max(v).max(w));
-            let is_inside = least > 2.0 * error || most < -2.0 * error;
+            let is_inside = least > error || most < -error;
             let is_in_range = ray.range.surely_first * weight <= from && to <= ray.range.surely_last * weight;
             crossings.sure |= u32::from(is_inside && is_in_range) << lane;
             (crossings.from[lane], crossings.to[lane], crossings.weight[lane]) = (from, to, weight);

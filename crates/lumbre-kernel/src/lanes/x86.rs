@@ -13,8 +13,8 @@ use crate::node::{
     BoxRay, END_FACTOR, LARGEST_NEAR, LITTLE, SMALLEST_NEAR, START_FACTOR, Slabs, TINY_NEAR, Units,
 };
 use crate::triangles::{
-    BLOCK, BlockRay, EDGE_ERROR, FAR, HEIGHT_ERROR, HeightRange, Inside, Passage, ROUNDINGS, SIZE_ERROR,
-    Shear, TINY,
+    BLOCK, BlockRay, EDGE_ERROR, ERRORS_OF_EDGES, ERRORS_OF_EXTENT, FAR, HEIGHT_ERROR, HeightRange, Inside,
+    Passage, ROUNDINGS, SIZE_ERROR, Shear, TINY,
 };
 
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
@@ -687,11 +687,15 @@ where
             }
             let low = _mm256_min_ps(_mm256_min_ps(z[0], z[1]), z[2]);
             let high = _mm256_max_ps(_mm256_max_ps(z[0], z[1]), z[2]);
-            let extent = _mm256_add_ps(_mm256_sub_ps(high, low), edges.height_error);
+            let along_edges = _mm256_fmadd_ps(
+                edges.height_error,
+                _mm256_fmadd_ps(edges.minus_error, _mm256_set1_ps(-ERRORS_OF_EDGES), weight),
+                _mm256_set1_ps(TINY),
+            );
             let spread = _mm256_fmadd_ps(
-                _mm256_mul_ps(edges.minus_error, _mm256_set1_ps(-12.5)),
-                extent,
-                _mm256_fmadd_ps(edges.height_error, weight, _mm256_set1_ps(TINY)),
+                _mm256_mul_ps(edges.minus_error, _mm256_set1_ps(-ERRORS_OF_EXTENT)),
+                _mm256_sub_ps(high, low),
+                along_edges,
             );
             let (from, to) = (_mm256_sub_ps(ahead, spread), _mm256_add_ps(ahead, spread));
             // What is no number may be in range.
@@ -699,8 +703,8 @@ where
                 [to, _mm256_mul_ps(weight, _mm256_set1_ps(ray.range.first))],
                 [from, _mm256_mul_ps(weight, _mm256_set1_ps(ray.range.last))],
             );
-            let twice = _mm256_mul_ps(edges.minus_error, _mm256_set1_ps(-2.0));
-            let inside = Self::compare::<_CMP_GT_OQ>(edges.within, twice);
+            let error = _mm256_xor_ps(edges.minus_error, sign);
+            let inside = Self::compare::<_CMP_GT_OQ>(edges.within, error);
             let surely_in_range = Self::both::<_CMP_GE_OQ, _CMP_LE_OQ>(
                 [from, _mm256_mul_ps(weight, _mm256_set1_ps(ray.range.surely_first))],
                 [to, _mm256_mul_ps(weight, _mm256_set1_ps(ray.range.surely_last))],
