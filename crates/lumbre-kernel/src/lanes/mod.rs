@@ -27,7 +27,7 @@ use crate::holds::SingleStart;
 use crate::node::Node;
 use crate::node::{BoxRay, Slabs, Units, WIDTH};
 use crate::stack::STACK;
-use crate::triangles::{BLOCK, BlockRay, Inside, Passage, ROUNDINGS, Shear};
+use crate::triangles::{BLOCK, BlockRay, Inside, Passage, Shear};
 
 pub(crate) use asked::{Asked, Question};
 pub(crate) use boxes::{meet_boxes, meet_frustum, only_child, push_as_built, push_by_distance};
@@ -111,19 +111,16 @@ pub(crate) struct Crossings<F> {
     pub(crate) in_range: u32,
     /// A bit for each that certainly is met there.
     pub(crate) sure: u32,
-    /// Heights along the ray between which the crossing lies, by the weight.
+    /// Heights along the ray between which the crossing lies.
     pub(crate) from: F,
     pub(crate) to: F,
-    pub(crate) weight: F,
 }
 
 impl<F: Copy> Crossings<F> {
     /// The heights between which the crossing in a lane lies.
     #[inline(always)]
     pub(crate) fn between<L: Lanes<Floats = F>>(&self, lane: usize) -> (f32, f32) {
-        let inverse = 1.0 / L::lane(self.weight, lane);
-        let (from, to) = (L::lane(self.from, lane) * inverse, L::lane(self.to, lane) * inverse);
-        (from - from.abs() * ROUNDINGS, to + to.abs() * ROUNDINGS)
+        (L::lane(self.from, lane), L::lane(self.to, lane))
     }
 }
 

@@ -180,7 +180,7 @@ impl Lanes for Portable {
     #[inline(always)]
     fn place_crossings(edges: &Edges, ray: &BlockRay) -> Crossings<[f32; BLOCK]> {
         let none = [0.0; BLOCK];
-        let mut crossings = Crossings { in_range: 0, sure: 0, from: none, to: none, weight: none };
+        let mut crossings = Crossings { in_range: 0, sure: 0, from: none, to: none };
         for lane in 0..BLOCK {
             let [u, v, w] = [edges.values[0][lane], edges.values[1][lane], edges.values[2][lane]];
             let [a, b, c] = [edges.heights[0][lane], edges.heights[1][lane], edges.heights[2][lane]];
@@ -202,7 +202,8 @@ impl Lanes for Portable {
             let is_inside = least > error || most < -error;
             let is_in_range = ray.range.surely_first * weight <= from && to <= ray.range.surely_last * weight;
             crossings.sure |= u32::from(is_inside && is_in_range) << lane;
-            (crossings.from[lane], crossings.to[lane], crossings.weight[lane]) = (from, to, weight);
+            let inverse = 1.0 / weight;
+            (crossings.from[lane], crossings.to[lane]) = (from * inverse, to * inverse);
         }
         crossings
     }

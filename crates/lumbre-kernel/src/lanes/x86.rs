@@ -677,13 +677,16 @@ where
             let height = _mm256_add_ps(of_a_and_b, of_c);
             let turn = _mm256_xor_ps(_mm256_set1_ps(ray.turn), _mm256_and_ps(det, sign));
             let ahead = _mm256_xor_ps(height, turn);
+            let inverse = _mm256_div_ps(_mm256_set1_ps(1.0), weight);
+            let range = &ray.range;
             if LEAKS {
+                let at = _mm256_mul_ps(ahead, inverse);
                 let in_range = Self::both::<_CMP_GE_OQ, _CMP_LE_OQ>(
-                    [ahead, _mm256_mul_ps(weight, _mm256_set1_ps(ray.range.first))],
-                    [ahead, _mm256_mul_ps(weight, _mm256_set1_ps(ray.range.last))],
+                    [at, _mm256_set1_ps(range.first)],
+                    [at, _mm256_set1_ps(range.last)],
                 );
                 let in_range = in_range & Self::compare::<_CMP_GT_OQ>(weight, _mm256_setzero_ps());
-                return Crossings { in_range, sure: in_range, from: ahead, to: ahead, weight };
+                return Crossings { in_range, sure: in_range, from: at, to: at };
             }
             let low = _mm256_min_ps(_mm256_min_ps(z[0], z[1]), z[2]);
             let high = _mm256_max_ps(_mm256_max_ps(z[0], z[1]), z[2]);
@@ -700,16 +703,17 @@ where
             let (from, to) = (_mm256_sub_ps(ahead, spread), _mm256_add_ps(ahead, spread));
             // What is no number may be in range.
             let in_range = Self::both::<_CMP_NLT_UQ, _CMP_NGT_UQ>(
-                [to, _mm256_mul_ps(weight, _mm256_set1_ps(ray.range.first))],
-                [from, _mm256_mul_ps(weight, _mm256_set1_ps(ray.range.last))],
+                [to, _mm256_mul_ps(weight, _mm256_set1_ps(range.first))],
+                [from, _mm256_mul_ps(weight, _mm256_set1_ps(range.last))],
             );
             let error = _mm256_xor_ps(edges.minus_error, sign);
             let inside = Self::compare::<_CMP_GT_OQ>(edges.within, error);
             let surely_in_range = Self::both::<_CMP_GE_OQ, _CMP_LE_OQ>(
-                [from, _mm256_mul_ps(weight, _mm256_set1_ps(ray.range.surely_first))],
-                [to, _mm256_mul_ps(weight, _mm256_set1_ps(ray.range.surely_last))],
+                [from, _mm256_mul_ps(weight, _mm256_set1_ps(range.surely_first))],
+                [to, _mm256_mul_ps(weight, _mm256_set1_ps(range.surely_last))],
             );
-            Crossings { in_range, sure: inside & surely_in_range, from, to, weight }
+            let (from, to) = (_mm256_mul_ps(from, inverse), _mm256_mul_ps(to, inverse));
+            Crossings { in_range, sure: inside & surely_in_range, from, to }
         }
     }
 
