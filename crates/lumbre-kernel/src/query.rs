@@ -8,6 +8,7 @@ use lumbre_geometry::{Ray, Root};
 use smallvec::SmallVec;
 
 use crate::lanes::Lanes;
+use crate::node::Slabs;
 use crate::options::Selection;
 use crate::single::{self, Nearest, Outcome, Whether, Winner};
 use crate::stack::{AsBuilt, ByDistance};
@@ -338,8 +339,13 @@ impl<'a, F: Filter> Search<'a> for Closest<'a, F> {
     }
 
     #[inline(always)]
-    fn meet_single<L: Lanes>(&mut self, placed: &PlacedTree<'a, '_>, ray: &Ray) -> Outcome<bool> {
-        let outcome = single::search_placed::<Nearest, L, _>(placed, ray, self.filter.select(placed));
+    fn meet_single<L: Lanes>(
+        &mut self,
+        placed: &PlacedTree<'a, '_>,
+        ray: &Ray,
+        slabs: Slabs,
+    ) -> Outcome<bool> {
+        let outcome = single::search_placed::<Nearest, L, _>(placed, ray, slabs, self.filter.select(placed));
         self.filter.end_of_single(outcome != Outcome::Unsettled);
         match outcome {
             Outcome::Unsettled => return Outcome::Unsettled,
@@ -413,8 +419,13 @@ impl<'a, F: Filter> Search<'a> for Any<F> {
     }
 
     #[inline(always)]
-    fn meet_single<L: Lanes>(&mut self, placed: &PlacedTree<'a, '_>, ray: &Ray) -> Outcome<bool> {
-        let outcome = single::search_placed::<Whether, L, _>(placed, ray, self.filter.select(placed));
+    fn meet_single<L: Lanes>(
+        &mut self,
+        placed: &PlacedTree<'a, '_>,
+        ray: &Ray,
+        slabs: Slabs,
+    ) -> Outcome<bool> {
+        let outcome = single::search_placed::<Whether, L, _>(placed, ray, slabs, self.filter.select(placed));
         self.filter.end_of_single(outcome != Outcome::Unsettled);
         self.is_hit |= outcome == Outcome::Settled(true);
         outcome

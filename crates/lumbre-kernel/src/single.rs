@@ -968,15 +968,16 @@ pub(crate) fn search_among<G: Goal, S: Selection>(
     }
 }
 
-/// The same in a placed tree of nothing but triangles, within a search that goes through other trees.
+/// The same in a placed tree of nothing but triangles, within a search that goes through other trees, with a ray that has started.
 #[inline(always)]
 pub(crate) fn search_placed<G: Goal, L: Lanes, S: Selection>(
     placed: &PlacedTree,
     ray: &Ray,
+    slabs: Slabs,
     selection: S,
 ) -> Outcome<G::Answer> {
     let &PlacedTree { accel, start, root, .. } = placed;
-    Alone::<G, false, S> { accel, start, root, ray, selection, goal: PhantomData }.run::<L>()
+    Alone::<G, false, S> { accel, start, root, ray, selection, goal: PhantomData }.go::<L>(slabs)
 }
 
 impl<'a, 'r, G, const MIXED: bool> Alone<'a, 'r, G, MIXED> {
@@ -991,9 +992,19 @@ impl<G: Goal, const MIXED: bool, S: Selection> Task for Alone<'_, '_, G, MIXED, 
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Self::Output {
-        let Self { accel, start, root, ray, selection, .. } = self;
         // Opaque here and where the ray is read again: what was read would else be written down, to be kept until then.
-        let Some(slabs) = L::start_single(start, lanes::opaque(ray)) else { return Outcome::Unsettled };
+        match L::start_single(self.start, lanes::opaque(self.ray)) {
+            Some(slabs) => self.go::<L>(slabs),
+            None => Outcome::Unsettled,
+        }
+    }
+}
+
+impl<G: Goal, const MIXED: bool, S: Selection> Alone<'_, '_, G, MIXED, S> {
+    /// Goes through the tree with a ray that has started.
+    #[inline(always)]
+    fn go<L: Lanes>(self, slabs: Slabs) -> Outcome<G::Answer> {
+        let Self { accel, start, root, ray, selection, .. } = self;
         let mut way = Way::<L>::new(&accel.tree.nodes, slabs);
         let mut stack = Stack::new();
         let infinite = if MIXED { &*accel.infinite } else { &[] };

@@ -15,7 +15,7 @@ use crate::collapse::Entry;
 use crate::holds::SingleStart;
 use crate::hulls::HullRay;
 use crate::lanes::{self, Lanes, Level, MetHulls, Task};
-use crate::node::{BoxRay, Progress, tag};
+use crate::node::{BoxRay, Progress, Slabs, tag};
 use crate::opening::Start;
 use crate::single::Outcome;
 use crate::sphere_search::{self, AmongSpheres, CloudRay};
@@ -24,7 +24,7 @@ use crate::stack::{Order, Stack};
 use crate::touch::{self, AllTouches, Touch};
 use crate::triangles::{self, BLOCK, BlockRay, HeightRange, Inside, Passage, Shear};
 use crate::way::Way;
-use crate::{Accel, GeometryKind, InstancePath, options, precise};
+use crate::{Accel, GeometryKind, InstancePath, Placement, options, precise};
 
 /// What a search asks of a primitive that may be crossed more than once.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -74,8 +74,14 @@ pub(crate) trait Search<'a> {
     fn settle(&mut self) {}
 
     /// Searches a placed tree of nothing but triangles in single precision, if that can settle what it wants; true ends the search.
+    /// The ray is that in the tree's space, and has started among its boxes.
     #[inline(always)]
-    fn meet_single<L: Lanes>(&mut self, _placed: &PlacedTree<'a, '_>, _ray: &Ray) -> Outcome<bool> {
+    fn meet_single<L: Lanes>(
+        &mut self,
+        _placed: &PlacedTree<'a, '_>,
+        _ray: &Ray,
+        _slabs: Slabs,
+    ) -> Outcome<bool> {
         Outcome::Unsettled
     }
 }
@@ -445,15 +451,24 @@ impl<'a, S: Search<'a>> Task for AmongAll<'a, '_, S> {
                     let GeometryKind::Instance(instance) = &standing.kind else {
                         unreachable!("the tag says so");
                     };
-                    let ray = instance.world_from_object.object_ray(&frame.ray);
                     let inner = &*instance.accel;
-                    let mut boxes = BoxRay::passing_all();
                     if let Some(start) = inner.single.as_ref().filter(|start| !start.is_mixed) {
                         let (root, id) = (from.below(start.root), standing.id);
                         let placed = PlacedTree { accel: inner, start, root, around: &place, geometry, id };
                         // Nothing beyond the limit is wanted; what is met has the same bits whatever the range.
-                        let ray = ray.with_range(search.floor(), search.limit());
-                        if let Outcome::Settled(is_over) = search.meet_single::<L>(&placed, &ray) {
+                        let range = [search.floor(), search.limit()];
+                        let moving;
+                        let map = match &instance.world_from_object {
+                            Placement::Still(map) => map,
+                            Placement::Moving(motion) => {
+                                moving = motion.at(frame.ray.time);
+                                &moving
+                            }
+                        };
+                        let (ray, slabs) = L::start_placed(start, map, &frame.ray, range);
+                        if let Some(slabs) = slabs
+                            && let Outcome::Settled(is_over) = search.meet_single::<L>(&placed, &ray, slabs)
+                        {
                             if is_over {
                                 return true;
                             }
@@ -461,6 +476,8 @@ impl<'a, S: Search<'a>> Task for AmongAll<'a, '_, S> {
                             continue;
                         }
                     }
+                    let ray = instance.world_from_object.object_ray(&frame.ray);
+                    let mut boxes = BoxRay::passing_all();
                     if inner.holds.only_triangles {
                         let Some(root) = inner.tree.root else { continue };
                         let root = from.below(root);

@@ -19,7 +19,7 @@ use std::mem::MaybeUninit;
 use std::sync::OnceLock;
 
 use lumbre_geometry::Ray;
-use lumbre_math::DVec3;
+use lumbre_math::{DVec3, Transform};
 
 use crate::blocks::{ROOMS, TriangleBlock};
 use crate::holds::SingleStart;
@@ -60,6 +60,18 @@ pub(crate) trait Lanes: SphereLanes {
 
     /// The ray for boxes in single precision; `None` where it does not come from nearby, or is not sound.
     fn start_single(start: &SingleStart, ray: &Ray) -> Option<Slabs>;
+
+    /// The ray in the space of what a map places, with another range, and for boxes there: see [`Ray::into_object`].
+    #[inline(always)]
+    fn start_placed(
+        start: &SingleStart,
+        map: &Transform,
+        ray: &Ray,
+        [t_min, t_max]: [f64; 2],
+    ) -> (Ray, Option<Slabs>) {
+        let ray = ray.into_object(map).with_range(t_min, t_max);
+        (ray, Self::start_single(start, &ray))
+    }
 
     /// The same ray for triangles, and from heights along it to places in the range of boxes.
     fn start_blocks(start: &SingleStart, ray: &Ray, slabs: &Slabs) -> (BlockRay, f32);
@@ -478,6 +490,26 @@ pub(crate) fn start_single_at(
         }
     }
     level.run(Starting(start, ray))
+}
+
+/// What [`Lanes::start_placed`] gives at a level, for tests.
+#[cfg(test)]
+pub(crate) fn start_placed_at(
+    level: Level,
+    start: &SingleStart,
+    map: &Transform,
+    ray: &Ray,
+    range: [f64; 2],
+) -> (Ray, Option<Slabs>) {
+    struct Starting<'a>(&'a SingleStart, &'a Transform, &'a Ray, [f64; 2]);
+    impl Task for Starting<'_> {
+        type Output = (Ray, Option<Slabs>);
+        #[inline(always)]
+        fn run<L: Lanes>(self) -> Self::Output {
+            L::start_placed(self.0, self.1, self.2, self.3)
+        }
+    }
+    level.run(Starting(start, map, ray, range))
 }
 
 /// What [`Lanes::meet_boxes`] gives at a level, and where the ray enters each box, for tests.

@@ -4,6 +4,7 @@ use std::arch::x86_64::*;
 use std::mem::offset_of;
 
 use lumbre_geometry::Ray;
+use lumbre_math::{DAffine3, DVec3, Transform};
 
 use super::{Axes, Corners, Crossings, Lanes, Level, Question, Row, Set, Sides, Task, WIDE, Wide, wide};
 use crate::Accel;
@@ -336,6 +337,72 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
         unsafe { _mm_cvtpd_ps(_mm_loadu_pd(Self::numbers(ray).add(6))) }
     }
 
+    /// [`Lanes::start_single`] of a ray by its numbers: the ends of the range are the first two; the last of the others mean nothing.
+    #[inline(always)]
+    fn slabs(start: &SingleStart, origin: __m256d, direction: __m128, range: __m128) -> Option<Slabs> {
+        // As the portable one, three axes at a time.
+        // SAFETY: see `X86`. The loads are of arrays of four.
+        unsafe {
+            let from = _mm256_sub_pd(origin, _mm256_loadu_pd(start.tree_origin.as_ptr()));
+            let from = _mm256_cvtpd_ps(_mm256_mul_pd(from, _mm256_set1_pd(start.scale)));
+
+            let sign = _mm_set1_ps(-0.0);
+            let (distance, length) = (_mm_andnot_ps(sign, from), _mm_andnot_ps(sign, direction));
+            // Every comparison with a NaN is false.
+            let fits = _mm_and_ps(
+                _mm_and_ps(
+                    _mm_cmple_ps(distance, _mm_loadu_ps(start.farthest.as_ptr())),
+                    _mm_cmple_ps(length, _mm_set1_ps(start.longest)),
+                ),
+                // 0 <= t_min, t_min <= t_max, and the first again.
+                _mm_cmple_ps(_mm_unpacklo_ps(_mm_setzero_ps(), range), range),
+            );
+            let is_long = _mm_cmpge_ps(length, _mm_set1_ps(start.shortest));
+            if _mm_movemask_ps(fits) & 0b111 != 0b111 || _mm_movemask_ps(is_long) & 0b111 == 0 {
+                return None;
+            }
+
+            let size = _mm_max_ps(length, _mm_set1_ps(start.tiny));
+            let size = _mm_div_ps(_mm_set1_ps(start.space_per_unit), size);
+            let inverse = _mm_or_ps(size, _mm_and_ps(direction, sign));
+            let per_distance = _mm_set1_ps(start.margin_per_distance);
+            let margin = if LEAKS {
+                _mm_setzero_ps()
+            } else {
+                _mm_mul_ps(size, _mm_fmadd_ps(distance, per_distance, _mm_set1_ps(start.margin)))
+            };
+            let ends = _mm_fmadd_ps(
+                range,
+                _mm_setr_ps(START_FACTOR, END_FACTOR, 0.0, 0.0),
+                _mm_setr_ps(0.0, LITTLE as f32, 0.0, 0.0),
+            );
+            Some(Slabs {
+                inverse: Self::array(inverse),
+                near_offset: Self::array(_mm_fnmsub_ps(from, inverse, margin)),
+                far_offset: Self::array(_mm_fnmadd_ps(from, inverse, margin)),
+                sides: Sides::new(_mm_movemask_ps(direction) as u32),
+                s_min: _mm_cvtss_f32(ends),
+                s_max: _mm_cvtss_f32(_mm_movehdup_ps(ends)),
+            })
+        }
+    }
+
+    /// Three numbers, and a zero.
+    #[inline(always)]
+    fn three(v: &DVec3) -> __m256d {
+        // SAFETY: see `X86`. Only the first three are loaded.
+        unsafe { _mm256_maskload_pd(v.as_ref().as_ptr(), _mm256_setr_epi64x(-1, -1, -1, 0)) }
+    }
+
+    /// The first three of four numbers.
+    #[inline(always)]
+    fn vector(v: __m256d) -> DVec3 {
+        let mut array = [0.0; 4];
+        // SAFETY: see `X86`. The store is of four f64 into an array of four.
+        unsafe { _mm256_storeu_pd(array.as_mut_ptr(), v) };
+        DVec3::new(array[0], array[1], array[2])
+    }
+
     #[inline(always)]
     fn array(v: __m128) -> [f32; 4] {
         let mut array = [0.0; 4];
@@ -392,9 +459,8 @@ where
         // SAFETY: see `X86`. The loads are of three f64 in arrays of three, and of four in arrays of four; the stores of
         // four f32 into arrays of four.
         unsafe {
-            let first_three = _mm256_setr_epi64x(-1, -1, -1, 0);
-            let origin = _mm256_maskload_pd(ray.origin.as_ref().as_ptr(), first_three);
-            let direction = _mm256_maskload_pd(ray.direction.as_ref().as_ptr(), first_three);
+            let origin = Self::three(&ray.origin);
+            let direction = Self::three(&ray.direction);
             let scale = _mm256_set1_pd(units.scale);
             let tree_origin = _mm256_loadu_pd(units.padded_origin.as_ptr());
             let start = _mm256_mul_pd(_mm256_sub_pd(origin, tree_origin), scale);
@@ -435,53 +501,43 @@ where
 
     #[inline(always)]
     fn start_single(start: &SingleStart, ray: &Ray) -> Option<Slabs> {
-        // As the portable one, three axes at a time.
-        // SAFETY: see `X86`. The loads are of the first eight numbers of a ray, see above, and of arrays of four.
+        // SAFETY: see `X86`. The load is of four of the first eight numbers of a ray, see above.
+        let origin = unsafe { _mm256_loadu_pd(Self::numbers(ray)) };
+        Self::slabs(start, origin, Self::single_direction(ray), Self::single_range(ray))
+    }
+
+    #[inline(always)]
+    fn start_placed(
+        start: &SingleStart,
+        map: &Transform,
+        ray: &Ray,
+        [t_min, t_max]: [f64; 2],
+    ) -> (Ray, Option<Slabs>) {
+        let DAffine3 { matrix3: linear, translation } = map.inverse_affine();
+        // The very operations of `Ray::into_object`, three axes at a time. The slabs are made of what is in registers still: to read
+        // the ray again, which was just written by parts, would have to wait.
+        // SAFETY: see `X86`.
         unsafe {
-            let origin = _mm256_loadu_pd(Self::numbers(ray));
-            let from = _mm256_sub_pd(origin, _mm256_loadu_pd(start.tree_origin.as_ptr()));
-            let from = _mm256_cvtpd_ps(_mm256_mul_pd(from, _mm256_set1_pd(start.scale)));
-            let direction = Self::single_direction(ray);
-            let range = Self::single_range(ray);
-
-            let sign = _mm_set1_ps(-0.0);
-            let (distance, length) = (_mm_andnot_ps(sign, from), _mm_andnot_ps(sign, direction));
-            // Every comparison with a NaN is false.
-            let fits = _mm_and_ps(
-                _mm_and_ps(
-                    _mm_cmple_ps(distance, _mm_loadu_ps(start.farthest.as_ptr())),
-                    _mm_cmple_ps(length, _mm_set1_ps(start.longest)),
-                ),
-                // 0 <= t_min, t_min <= t_max, and the first again.
-                _mm_cmple_ps(_mm_unpacklo_ps(_mm_setzero_ps(), range), range),
-            );
-            let is_long = _mm_cmpge_ps(length, _mm_set1_ps(start.shortest));
-            if _mm_movemask_ps(fits) & 0b111 != 0b111 || _mm_movemask_ps(is_long) & 0b111 == 0 {
-                return None;
-            }
-
-            let size = _mm_max_ps(length, _mm_set1_ps(start.tiny));
-            let size = _mm_div_ps(_mm_set1_ps(start.space_per_unit), size);
-            let inverse = _mm_or_ps(size, _mm_and_ps(direction, sign));
-            let per_distance = _mm_set1_ps(start.margin_per_distance);
-            let margin = if LEAKS {
-                _mm_setzero_ps()
-            } else {
-                _mm_mul_ps(size, _mm_fmadd_ps(distance, per_distance, _mm_set1_ps(start.margin)))
+            let (x, y, z) =
+                (Self::three(&linear.x_axis), Self::three(&linear.y_axis), Self::three(&linear.z_axis));
+            let (from, along) = (&ray.origin, &ray.direction);
+            let origin = _mm256_mul_pd(x, _mm256_set1_pd(from.x));
+            let origin = _mm256_add_pd(origin, _mm256_mul_pd(y, _mm256_set1_pd(from.y)));
+            let origin = _mm256_add_pd(origin, _mm256_mul_pd(z, _mm256_set1_pd(from.z)));
+            let origin = _mm256_add_pd(origin, Self::three(translation));
+            let direction = _mm256_mul_pd(x, _mm256_set1_pd(along.x));
+            let direction = _mm256_add_pd(direction, _mm256_mul_pd(y, _mm256_set1_pd(along.y)));
+            let direction = _mm256_add_pd(direction, _mm256_mul_pd(z, _mm256_set1_pd(along.z)));
+            let range = _mm_cvtpd_ps(_mm_setr_pd(t_min, t_max));
+            let slabs = Self::slabs(start, origin, _mm256_cvtpd_ps(direction), range);
+            let ray = Ray {
+                origin: Self::vector(origin),
+                direction: Self::vector(direction),
+                t_min,
+                t_max,
+                ..*ray
             };
-            let ends = _mm_fmadd_ps(
-                range,
-                _mm_setr_ps(START_FACTOR, END_FACTOR, 0.0, 0.0),
-                _mm_setr_ps(0.0, LITTLE as f32, 0.0, 0.0),
-            );
-            Some(Slabs {
-                inverse: Self::array(inverse),
-                near_offset: Self::array(_mm_fnmsub_ps(from, inverse, margin)),
-                far_offset: Self::array(_mm_fnmadd_ps(from, inverse, margin)),
-                sides: Sides::new(_mm_movemask_ps(direction) as u32),
-                s_min: _mm_cvtss_f32(ends),
-                s_max: _mm_cvtss_f32(_mm_movehdup_ps(ends)),
-            })
+            (ray, slabs)
         }
     }
 
