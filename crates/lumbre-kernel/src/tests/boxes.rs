@@ -3,12 +3,12 @@
 //! Tried by hand: without the margin for single precision, this fails.
 
 use lumbre_geometry::{Aabb, Ray};
-use lumbre_math::DVec3;
+use lumbre_math::{DVec3, Transform};
 
 use super::scenes::Random;
 use crate::holds::{Holds, SingleStart};
-use crate::lanes::{LANE_BITS, Level, meet_boxes_at, start_single_at};
-use crate::node::{BoxRay, Node, Units, WIDTH};
+use crate::lanes::{LANE_BITS, Level, meet_boxes_at, start_placed_at, start_single_at};
+use crate::node::{BoxRay, Node, Slabs, Units, WIDTH};
 use crate::primitive::Bounds;
 
 fn units(bounds: &Aabb) -> Units {
@@ -130,6 +130,48 @@ fn start_of(units: &Units, first_origin: DVec3) -> Option<SingleStart> {
     let largest_corner = (1.0 / units.scale) as f32;
     let holds = Holds { first_origin, largest_corner, ..Holds::new(&[], 0.0, 0.0) };
     SingleStart::new(&Holds { has_one_origin: true, ..holds }, units, Some(0))
+}
+
+#[test]
+fn rays_start_in_placed_trees_as_they_would_there() {
+    let mut random = Random(54);
+    let (mut started, rounds) = (0, 20_000);
+    for _ in 0..rounds {
+        let center = random.vector() * 10f64.powf(random.between(-2.0, 6.0));
+        let half = DVec3::splat(10f64.powf(random.between(-3.0, 3.0)));
+        let units = units(&Aabb { min: center - half, max: center + half });
+        let Some(start) = start_of(&units, center + random.vector() * half) else { continue };
+        let factors = DVec3::new(random.between(0.2, 4.0), -random.between(0.2, 4.0), 1.0);
+        let map = Transform::translate(random.vector() * 10f64.powf(random.between(-2.0, 6.0)))
+            * Transform::rotate(random.vector(), random.between(-180.0, 180.0)).unwrap()
+            * Transform::scale(factors).unwrap();
+        // From within the tree's surroundings or from far away; some along an axis there.
+        let distance = 10f64.powf(random.between(-2.0, 2.0));
+        let from = center + random.vector() * half * distance;
+        let direction = random.vector() * half;
+        let direction = if random.below(4) == 0 { DVec3::new(direction.x, 0.0, -0.0) } else { direction };
+        let ray = Ray::new(map.point(from), map.vector(direction)).at_time(random.unit());
+        let range = [[0.0, f64::INFINITY], [0.0, 2.0], [1.5, 1.0], [-1.0, 1.0]][random.below(4)];
+        let there = ray.into_object(&map).with_range(range[0], range[1]);
+        for level in Level::all() {
+            let (placed, slabs) = start_placed_at(level, &start, &map, &ray, range);
+            assert_eq!(format!("{placed:?}"), format!("{there:?}"), "{level:?}");
+            let expected = start_single_at(level, &start, &there).map(|(slabs, ..)| slabs);
+            assert_eq!(slabs.is_some(), expected.is_some(), "{level:?}");
+            let (Some(slabs), Some(expected)) = (slabs, expected) else { continue };
+            assert_eq!(bits_of(&slabs), bits_of(&expected), "{level:?} of {there:?}");
+            assert!(std::ptr::eq(slabs.sides, expected.sides), "{level:?} of {there:?}");
+            started += 1;
+        }
+    }
+    assert!(started > rounds / 2 && started < 3 * rounds, "{started}");
+}
+
+/// All numbers that mean anything.
+fn bits_of(slabs: &Slabs) -> Vec<u32> {
+    let rows = [&slabs.inverse, &slabs.near_offset, &slabs.far_offset];
+    let ends = [slabs.s_min, slabs.s_max];
+    rows.into_iter().flat_map(|row| &row[..3]).chain(&ends).map(|x| x.to_bits()).collect()
 }
 
 #[test]
