@@ -12,7 +12,7 @@ use smallvec::SmallVec;
 
 use crate::blocks::{Blocks, TriangleBlock};
 use crate::collapse::Entry;
-use crate::holds::SingleStart;
+use crate::holds::{Holds, SingleStart};
 use crate::hulls::HullRay;
 use crate::lanes::{self, Lanes, Level, MetHulls, Task};
 use crate::node::{BoxRay, Progress, Slabs, tag};
@@ -225,7 +225,8 @@ pub(crate) struct Frame<'a, R, L> {
     progress: Progress,
     limit: f64,
     floor: f64,
-    mesh: MeshRay,
+    /// For triangles, once the ray has come to some.
+    mesh: Option<MeshRay>,
     /// For spheres, once some were met.
     clouds: Option<CloudRay>,
     /// For shapes, alike.
@@ -264,19 +265,10 @@ pub(crate) fn start<'a, L: Lanes, S: Search<'a>>(
         || (is_sound(ray) && boxes.start_anywhere(&accel.units, ray, floor, limit))
 }
 
-/// The ray for the first mesh of a tree.
-#[inline(always)]
-fn mesh_ray<'a, S: Search<'a>>(accel: &Accel, ray: &Ray, search: &S) -> MeshRay {
-    let shear = Shear::new(&ray.direction);
-    let range = [search.floor(), search.limit()];
-    MeshRay::new(shear, ray, &accel.holds.first_origin, accel.holds.largest_corner, range)
-}
-
 impl<'a, R: Borrow<Ray>, L: Lanes> Frame<'a, R, L> {
     #[inline(always)]
     pub(crate) fn new<S: Search<'a>>(accel: &'a Accel, ray: R, boxes: BoxRay, search: &S) -> Self {
         let (limit, floor) = (search.limit(), search.floor());
-        let mesh = mesh_ray(accel, ray.borrow(), search);
         let way = Way::new(&accel.tree.nodes, boxes.slabs);
         Self {
             accel,
@@ -286,7 +278,7 @@ impl<'a, R: Borrow<Ray>, L: Lanes> Frame<'a, R, L> {
             progress: boxes.progress,
             limit,
             floor,
-            mesh,
+            mesh: None,
             clouds: None,
             hulls: None,
         }
@@ -299,8 +291,8 @@ impl<'a, R: Borrow<Ray>, L: Lanes> Frame<'a, R, L> {
         if limit < self.limit {
             self.limit = limit;
             self.way.end_at(self.progress.up(limit));
-            if let Some(blocks) = &mut self.mesh.blocks {
-                blocks.end_at(&self.mesh.shear, limit);
+            if let Some(MeshRay { shear, blocks: Some(blocks), .. }) = &mut self.mesh {
+                blocks.end_at(shear, limit);
             }
             if let Some(clouds) = &mut self.clouds {
                 clouds.set_range(self.floor, limit);
@@ -308,15 +300,23 @@ impl<'a, R: Borrow<Ray>, L: Lanes> Frame<'a, R, L> {
         }
     }
 
-    /// Turns to the mesh of a block, where meshes have different origins.
+    /// Turns to the mesh of a block: to the first that the ray comes to, and where meshes have different origins to each.
     #[inline(always)]
     fn turn_to(&mut self, block: &TriangleBlock) {
-        if !self.accel.holds.has_one_origin {
-            let mesh_origin = self.accel.mesh_origin(self.accel.tree.names[block.number() as usize].geometry);
-            let largest = self.accel.holds.largest_corner;
-            let range = [self.floor, self.limit];
-            self.mesh = MeshRay::new(self.mesh.shear, self.ray.borrow(), &mesh_origin, largest, range);
+        let Holds { has_one_origin, first_origin, largest_corner, .. } = self.accel.holds;
+        if has_one_origin && self.mesh.is_some() {
+            return;
         }
+        let ray = self.ray.borrow();
+        let shear = self.mesh.as_ref().map_or_else(|| Shear::new(&ray.direction), |mesh| mesh.shear);
+        let names = &self.accel.tree.names;
+        let mesh_origin = if has_one_origin {
+            first_origin
+        } else {
+            self.accel.mesh_origin(names[block.number() as usize].geometry)
+        };
+        let range = [self.floor, self.limit];
+        self.mesh = Some(MeshRay::new(shear, ray, &mesh_origin, largest_corner, range));
     }
 }
 
@@ -562,7 +562,8 @@ fn meet_blocks<'a, R: Borrow<Ray>, L: Lanes, S: Search<'a>>(
     while let Some(number) = following {
         let block = frame.blocks.block(number);
         following = block.next(number);
-        let mut mask = if let Some(blocks) = &frame.mesh.blocks {
+        let Some(mesh) = &frame.mesh else { unreachable!("the ray was turned to it") };
+        let mut mask = if let Some(blocks) = &mesh.blocks {
             let (mask, edges) = L::meet_triangles(block, blocks);
             if mask == 0 {
                 continue;
@@ -576,14 +577,14 @@ fn meet_blocks<'a, R: Borrow<Ray>, L: Lanes, S: Search<'a>>(
         } else {
             block.taken()
         };
+        let MeshRay { shear, origin, .. } = *mesh;
         while mask != 0 {
             let lane = mask.trailing_zeros() as usize % BLOCK;
             mask &= mask - 1;
             let what = What::Lane { block: number, lane: lane as u32 };
-            let MeshRay { shear, origin, .. } = &frame.mesh;
-            let (passage, inside) = L::pass(block, lane, shear, origin);
+            let (passage, inside) = L::pass(block, lane, &shear, &origin);
             if passage == Passage::Inside {
-                let t = inside.t(shear);
+                let t = inside.t(&shear);
                 if !triangles::is_in_range(frame.ray.borrow(), t) {
                     continue;
                 }
@@ -593,7 +594,7 @@ fn meet_blocks<'a, R: Borrow<Ray>, L: Lanes, S: Search<'a>>(
                 frame.narrow(search);
             } else if passage == Passage::Unclear {
                 let ray = frame.ray.borrow();
-                if meet_unclear(ray, *shear, *origin, accel, what, place, search, touches) {
+                if meet_unclear(ray, shear, origin, accel, what, place, search, touches) {
                     return true;
                 }
                 frame.narrow(search);
