@@ -87,10 +87,11 @@ fn sheared(shear: [f64; 2], origin: &[f64; 3], [x, y, z]: [f32; 3]) -> Corner {
 ///
 /// Let D be the sum of the edge functions as computed. A crossing within the triangle is at the z for which Σ eᵢ (zᵢ - z) is zero in
 /// double precision, and between the least and the largest zᵢ. With edge functions wrong by `error` each, Σ eᵢ zᵢ is off z D by no
-/// more than 3 `error` of the triangle's extent in z, of which there is a twentieth less. Roundings of the three products and their
+/// more than 3 `error` of the triangle's extent in z: they are wrong by a twentieth less. Roundings of the three products and their
 /// sums are below 4uh Σ |eᵢ|, those of the corners' z below uh Σ |eᵢ|, those of D below 2uh Σ |eᵢ|, and what comes of the rest of
 /// the origin, of which D takes a part, below us Σ |eᵢ|; those of the ends of the interval, which are compared with products of the
-/// range's ends with |D|, or multiplied by its inverse, below 3uh Σ |eᵢ|. As no edge function is beyond `error` on the other side than D, Σ |eᵢ| ≤ |D| + 6 `error`. So
+/// range's ends with |D|, or multiplied by its inverse, below 3uh Σ |eᵢ|. As no edge function is beyond `error` on the other side
+/// than D, Σ |eᵢ| ≤ |D| + 6 `error`. So
 /// `spread = 3 error extent + 12us (|D| + 6 error) + TINY` has room for all of it, whatever D.
 ///
 /// Where all edge functions are beyond `error` on one side, those in double precision are beyond zero on the same, so that the
