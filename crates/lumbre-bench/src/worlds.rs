@@ -42,6 +42,7 @@ pub const RECIPES: &[Recipe] = &[
     Recipe { name: "spheres-20k", is_quick: true, make: |name| spheres(name, 20_000) },
     Recipe { name: "spheres-1m", is_quick: false, make: |name| spheres(name, 1_000_000) },
     Recipe { name: "mixed", is_quick: true, make: mixed },
+    Recipe { name: "park", is_quick: false, make: park },
 ];
 
 /// A closed ball with bumps and grooves as a scanner sees them: 12 n² triangles.
@@ -277,6 +278,51 @@ fn forest(name: &str) -> Scene {
     }
 }
 
+/// Everything in one tree: hills of a hundred thousand triangles, five hundred trees and twenty thousand stones by instancing, most
+/// of which are seen from hundreds of times their size, and three hundred exact shapes.
+fn park(name: &str) -> Scene {
+    let mut random = RandomStream::new(31);
+    let mut stone = bumpy_ball(8);
+    for p in &mut stone.positions {
+        *p *= lumbre_math::Vec3::new(1.0, 0.6, 0.8);
+    }
+    let placed = vec![Arc::new(tree(&mut random, 3.5)), Arc::new(stone)];
+    let foot = |random: &mut RandomStream| {
+        let (x, z) = (between(random, -48.0, 48.0), between(random, -48.0, 48.0));
+        DVec3::new(x, height_of_hills(x, z), z)
+    };
+    let mut placements = Vec::new();
+    for i in 0..20_500 {
+        let mesh = usize::from(i >= 500);
+        let size = if mesh == 0 { between(&mut random, 0.6, 1.3) } else { between(&mut random, 0.03, 0.12) };
+        let place = Transform::translate(foot(&mut random))
+            * Transform::rotate(DVec3::Y, 360.0 * random.next_f64()).expect("an axis")
+            * Transform::scale(DVec3::splat(size)).expect("not flat");
+        placements.push(Placement { mesh, world_from_object: columns_of(&place) });
+    }
+    let shapes = (0..300).map(|i| {
+        let kind: Shape = match i % 3 {
+            0 => Sphere::new(0.4 * DVec3::Y, 0.5).expect("a radius").into(),
+            1 => Cylinder::new(DVec3::ZERO, 1.2 * DVec3::Y, 0.2, true).expect("a radius").into(),
+            _ => Cuboid::new(DVec3::new(-0.6, 0.0, -0.2), DVec3::new(0.6, 0.5, 0.2)).expect("a size").into(),
+        };
+        let place = Transform::translate(foot(&mut random))
+            * Transform::rotate(DVec3::Y, 360.0 * random.next_f64()).expect("an axis");
+        PlacedShape::new(kind, place)
+    });
+    let shapes = Arc::new(shapes.collect());
+    let camera =
+        Camera { eye: DVec3::new(10.0, 22.0, 45.0), target: DVec3::new(0.0, 2.0, 0.0), field_of_view: 50.0 };
+    let lamp = (DVec3::new(60.0, 70.0, -40.0), 8.0);
+    Scene {
+        meshes: vec![Arc::new(hills(224, 100.0))],
+        shapes,
+        placed_meshes: placed,
+        placements,
+        ..Scene::empty(name, camera, lamp)
+    }
+}
+
 /// A thousand long bent pipes, every which way and through one another: the boxes of all overlap.
 fn pipes(name: &str) -> Scene {
     let mut random = RandomStream::new(21);
@@ -294,6 +340,12 @@ fn boulders(name: &str) -> Scene {
     scattered(name, &mut random, bumpy_ball(40), 200, 2.5)
 }
 
+/// A map as all programs can take it.
+fn columns_of(place: &Transform) -> [[f32; 3]; 4] {
+    let DAffine3 { matrix3: m, translation } = *place.affine();
+    [m.x_axis, m.y_axis, m.z_axis, translation].map(|column| column.as_vec3().to_array())
+}
+
 /// Copies of a mesh in a cube, turned and stretched at random.
 fn scattered(name: &str, random: &mut RandomStream, mesh: TriangleMesh, count: usize, half: f64) -> Scene {
     let placements = (0..count).map(|_| {
@@ -302,9 +354,7 @@ fn scattered(name: &str, random: &mut RandomStream, mesh: TriangleMesh, count: u
         let place = Transform::translate(at)
             * Transform::rotate(direction(random), 360.0 * random.next_f64()).expect("an axis")
             * Transform::scale(stretch).expect("not flat");
-        let DAffine3 { matrix3: m, translation } = *place.affine();
-        let columns = [m.x_axis, m.y_axis, m.z_axis, translation];
-        Placement { mesh: 0, world_from_object: columns.map(|column| column.as_vec3().to_array()) }
+        Placement { mesh: 0, world_from_object: columns_of(&place) }
     });
     let placements = placements.collect();
     let camera = Camera { eye: half * DVec3::new(1.7, 1.3, 2.6), target: DVec3::ZERO, field_of_view: 45.0 };

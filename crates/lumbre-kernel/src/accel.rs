@@ -9,14 +9,16 @@ use std::sync::OnceLock;
 use lumbre_geometry::{Aabb, Ray, Surface};
 use lumbre_math::{DVec3, Transform};
 
+use crate::anything::{self, Sought};
 use crate::batch::Ends;
 use crate::collapse::{Entry, Packed};
-use crate::holds::{Holds, SingleStart};
+use crate::holds::{Contents, Holds, SingleStart};
 use crate::hulls::Hulls;
 use crate::lanes::Level;
 use crate::node::{Units, tag};
 use crate::query::{All, Any, Batch, Closest, Count, Filter, If};
-use crate::single::{self, Goal, Nearest, Outcome, Questions, Whether, Winner};
+use crate::single::{self, Nearest, Outcome, Questions, Whether, Winner};
+use crate::traverse::{Place, Standing};
 use crate::winding::{self, Moments};
 use crate::{
     ClosestPoint, Geometry, GeometryKind, Hit, LoadError, MapError, NoClosestPoint, NoWindingNumber,
@@ -216,7 +218,7 @@ impl Accel {
 
     #[cfg(test)]
     pub(crate) fn closest_at(&self, level: Level, ray: &Ray) -> Option<Hit> {
-        Questions::new(level, self.single.as_ref()).closest.ask(self, ray)
+        self.questions_at(level).closest.ask(self, ray)
     }
 
     /// The same by the search that knows no other precision than double.
@@ -258,11 +260,8 @@ impl Accel {
     }
 
     pub(crate) fn closest_with_at(&self, level: Level, ray: &Ray, options: &QueryOptions) -> Option<Hit> {
-        if let Some(start) = &self.single
-            && let Outcome::Settled(winner) =
-                single::search_among::<Nearest, _>(level, self, start, ray, options.of_tree(self))
-        {
-            return winner.map(|winner| winner.to_hit(self));
+        if let Outcome::Settled(found) = self.ask_singly::<Nearest, _>(level, ray, options) {
+            return found;
         }
         self.closest_with_plainly_at(level, ray, options)
     }
@@ -287,10 +286,7 @@ impl Accel {
     }
 
     pub(crate) fn any_with_at(&self, level: Level, ray: &Ray, options: &QueryOptions) -> bool {
-        if let Some(start) = &self.single
-            && let Outcome::Settled(is_hit) =
-                single::search_among::<Whether, _>(level, self, start, ray, options.of_tree(self))
-        {
+        if let Outcome::Settled(is_hit) = self.ask_singly::<Whether, _>(level, ray, options) {
             return is_hit;
         }
         self.any_with_plainly_at(level, ray, options)
@@ -331,7 +327,13 @@ impl Accel {
 
     pub(crate) fn closest_batch_at(&self, level: Level, rays: &[Ray], hits: &mut [Option<Hit>]) {
         assert_eq!(rays.len(), hits.len(), "a place for the hit of every ray");
-        batch::search_all::<Nearest>(level, self, rays, Answers { accel: self, level, rays, places: hits });
+        let Some(start) = self.batch_start() else {
+            let asked = self.questions_at(level).closest;
+            hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = asked.ask(self, ray));
+            return;
+        };
+        let ends = Answers { accel: self, level, rays, places: hits };
+        batch::search_all::<Nearest>(level, self, start, rays, ends);
     }
 
     /// [`Accel::any`] for every ray: see [`Accel::closest_batch`].
@@ -344,7 +346,22 @@ impl Accel {
 
     pub(crate) fn any_batch_at(&self, level: Level, rays: &[Ray], hits: &mut [bool]) {
         assert_eq!(rays.len(), hits.len(), "a place for the answer of every ray");
-        batch::search_all::<Whether>(level, self, rays, Answers { accel: self, level, rays, places: hits });
+        let Some(start) = self.batch_start() else {
+            let asked = self.questions_at(level).any;
+            hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = asked.ask(self, ray));
+            return;
+        };
+        let ends = Answers { accel: self, level, rays, places: hits };
+        batch::search_all::<Whether>(level, self, start, rays, ends);
+    }
+
+    /// Where batches have a search of their own.
+    fn batch_start(&self) -> Option<&SingleStart> {
+        self.single.as_ref().filter(|start| start.contents != Contents::Anything)
+    }
+
+    fn questions_at(&self, level: Level) -> Questions {
+        if level == self.level { self.questions } else { Questions::new(level, self.single.as_ref()) }
     }
 
     /// The nearest hit that `accept` takes; it may be asked in any order of `t`, but about no crossing twice, and its answer must
@@ -359,8 +376,8 @@ impl Accel {
         ray: &Ray,
         accept: &mut dyn FnMut(&Hit) -> bool,
     ) -> Option<Hit> {
-        let mut filter = If::new(accept);
-        if let Outcome::Settled(found) = self.ask_singly::<Nearest, _>(level, ray, &mut filter) {
+        let filter = If::new(accept);
+        if let Outcome::Settled(found) = self.ask_singly::<Nearest, _>(level, ray, &filter) {
             return found;
         }
         let mut search = Closest::new(ray, filter);
@@ -376,7 +393,7 @@ impl Accel {
 
     #[cfg(test)]
     pub(crate) fn any_at(&self, level: Level, ray: &Ray) -> bool {
-        Questions::new(level, self.single.as_ref()).any.ask(self, ray)
+        self.questions_at(level).any.ask(self, ray)
     }
 
     /// The same by the search that knows no other precision than double.
@@ -398,21 +415,23 @@ impl Accel {
         self.any_filtered_at(self.level, ray, &mut accept)
     }
 
-    /// What a closure takes, in single precision; where that cannot tell, the filter knows what the closure has answered.
-    fn ask_singly<G: Goal, F: FnMut(&Hit) -> bool>(
-        &self,
-        level: Level,
-        ray: &Ray,
-        filter: &mut If<F>,
-    ) -> Outcome<G::Found> {
+    /// Among what a filter takes, in single precision; where that cannot tell, a filter that asks keeps what was answered.
+    fn ask_singly<G: Sought, F: Filter>(&self, level: Level, ray: &Ray, filter: &F) -> Outcome<G::Found> {
         let Some(start) = &self.single else { return Outcome::Unsettled };
-        match single::search_among::<G, _>(level, self, start, ray, filter.of_tree(self)) {
-            Outcome::Settled(answer) => Outcome::Settled(G::found(self, answer)),
-            Outcome::Unsettled => {
-                filter.end_of_single(false);
-                Outcome::Unsettled
+        let found = if start.contents == Contents::Anything {
+            anything::search::<G, F>(level, self, start, ray, filter)
+        } else {
+            let place = Place::default();
+            let selection = filter.select(self, Standing::at(&place));
+            match single::search_among::<G, _>(level, self, start, ray, selection) {
+                Outcome::Settled(answer) => Outcome::Settled(G::found(self, answer)),
+                Outcome::Unsettled => Outcome::Unsettled,
             }
+        };
+        if matches!(found, Outcome::Unsettled) {
+            filter.keep_answers();
         }
+        found
     }
 
     pub(crate) fn any_filtered_at(
@@ -421,8 +440,8 @@ impl Accel {
         ray: &Ray,
         accept: &mut dyn FnMut(&Hit) -> bool,
     ) -> bool {
-        let mut filter = If::new(accept);
-        if let Outcome::Settled(is_hit) = self.ask_singly::<Whether, _>(level, ray, &mut filter) {
+        let filter = If::new(accept);
+        if let Outcome::Settled(is_hit) = self.ask_singly::<Whether, _>(level, ray, &filter) {
             return is_hit;
         }
         let mut search = Any::new(ray, filter);

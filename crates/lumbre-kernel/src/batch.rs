@@ -10,7 +10,7 @@ use lumbre_geometry::Ray;
 
 use crate::Accel;
 use crate::blocks::{TriangleBlock, Unit};
-use crate::holds::SingleStart;
+use crate::holds::{Contents, SingleStart};
 use crate::lanes::{self, Lanes, Level, Task};
 use crate::node::{Node, tag};
 use crate::packet::{self, PACKET, Packet, Together};
@@ -43,16 +43,20 @@ impl<A, F: FnMut(usize, Outcome<A>)> Ends<A> for F {
     }
 }
 
-/// Searches along every ray.
-pub(crate) fn search_all<G: Goal>(level: Level, accel: &Accel, rays: &[Ray], mut ends: impl Ends<G::Answer>) {
+/// Searches along every ray, in a tree of triangles, or of shapes and custom geometry too.
+pub(crate) fn search_all<G: Goal>(
+    level: Level,
+    accel: &Accel,
+    start: &SingleStart,
+    rays: &[Ray],
+    ends: impl Ends<G::Answer>,
+) {
     let tree = &accel.tree;
     let bytes = size_of_val::<[Node]>(&tree.nodes) + size_of_val::<[Unit]>(&tree.blocks);
-    match &accel.single {
-        Some(start) if start.is_mixed => {
-            level.run(OneByOne::<G, _> { accel, start, rays, ends, goal: PhantomData });
-        }
-        Some(start) => search_triangles::<G>(level, accel, start, rays, ends, bytes >= FAR, true),
-        None => (0..rays.len()).for_each(|position| ends.put(position, Outcome::Unsettled)),
+    if start.contents == Contents::Triangles {
+        search_triangles::<G>(level, accel, start, rays, ends, bytes >= FAR, true);
+    } else {
+        level.run(OneByOne::<G, _> { accel, start, rays, ends, goal: PhantomData });
     }
 }
 

@@ -74,20 +74,20 @@ impl Placement {
         }
     }
 
+    /// The map at a time, which is made in `moving` where it changes.
+    #[inline(always)]
+    pub(crate) fn map_at<'m>(&'m self, time: f64, moving: &'m mut Option<Transform>) -> &'m Transform {
+        match self {
+            Self::Still(map) => map,
+            Self::Moving(motion) => moving.insert(motion.at(time)),
+        }
+    }
+
     /// The same ray in the space of what is placed.
     #[inline(always)]
     pub(crate) fn object_ray(&self, ray: &Ray) -> Ray {
-        match self {
-            Self::Still(map) => ray.into_object(map),
-            Self::Moving(motion) => into_moving(ray, motion),
-        }
+        ray.into_object(self.map_at(ray.time, &mut None))
     }
-}
-
-// Out of the way of what stands still.
-#[inline(never)]
-fn into_moving(ray: &Ray, motion: &AnimatedTransform) -> Ray {
-    ray.into_object(&motion.at(ray.time))
 }
 
 /// Triangles by index. Vertex `i` stands at `origin + positions[i]`, so that single precision holds what is small and

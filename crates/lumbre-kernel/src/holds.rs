@@ -13,6 +13,10 @@ pub(crate) struct Holds {
     pub(crate) only_triangles: bool,
     /// Whether it holds nothing but triangles, shapes and custom geometry.
     pub(crate) only_triangles_and_entries: bool,
+    /// Whether it holds any of those, or instances.
+    pub(crate) has_more_than_precise: bool,
+    /// How many instances are around what is innermost.
+    pub(crate) nesting: u32,
     /// Whether the corners of all triangles are relative to one origin.
     pub(crate) has_one_origin: bool,
     /// That of the first mesh; a NaN where there is none.
@@ -43,6 +47,11 @@ impl Holds {
         });
         let first_cloud_origin = cloud_origins.next();
         let is_cloud = |geometry: &Geometry| matches!(geometry.kind, GeometryKind::Spheres(_));
+        let is_precise = |geometry: &Geometry| matches!(geometry.kind, GeometryKind::PreciseMesh(_));
+        let nesting_of = |geometry: &Geometry| match &geometry.kind {
+            GeometryKind::Instance(Instance { accel, .. }) => accel.holds.nesting.saturating_add(1),
+            _ => 0,
+        };
         Self {
             only_spheres: first_cloud_origin.is_some() && geometries.iter().all(is_cloud),
             has_one_cloud_origin: cloud_origins.all(|origin| Some(origin) == first_cloud_origin),
@@ -54,6 +63,8 @@ impl Holds {
                     GeometryKind::Mesh(_) | GeometryKind::Shape(_) | GeometryKind::Custom(_)
                 )
             }),
+            has_more_than_precise: !geometries.iter().all(|one| is_cloud(one) || is_precise(one)),
+            nesting: geometries.iter().map(nesting_of).max().unwrap_or(0),
             has_one_origin: origins.all(|origin| origin == first_origin),
             first_origin,
             largest_corner,
@@ -67,14 +78,28 @@ impl Holds {
     }
 }
 
-/// What a ray from nearby needs to start in single precision, in a tree of triangles whose corners are relative to one origin,
-/// of shapes and of custom geometry.
+/// Which search in single precision goes through a tree.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Contents {
+    /// That among nothing but triangles.
+    Triangles,
+    /// Among shapes and custom geometry, too.
+    Shapes,
+    /// Among instances, clouds of spheres and meshes in double precision, too.
+    Anything,
+}
+
+/// Instances within one another are searched in single precision no deeper: there, each takes a few kilobytes of the thread's stack.
+const DEEPEST: u32 = 8;
+
+/// What a ray from nearby needs to start in single precision, in a tree where the corners of all triangles in single precision are
+/// relative to one origin.
 #[derive(Clone, Debug)]
 pub(crate) struct SingleStart {
     /// Of the tree.
     pub(crate) root: u32,
-    /// Whether there is anything but triangles.
-    pub(crate) is_mixed: bool,
+    /// What it holds.
+    pub(crate) contents: Contents,
     /// What the tree's boxes are relative to, and a zero.
     pub(crate) tree_origin: [f64; 4],
     /// What the corners are relative to, and a zero.
@@ -98,7 +123,8 @@ pub(crate) struct SingleStart {
 }
 
 impl SingleStart {
-    /// `None` where the tree holds anything else, or is so small, so large or so far from its origin that single precision would
+    /// `None` where the tree holds nothing but clouds and meshes in double precision, instances too deep within one another, or meshes
+    /// with different origins, or is so small, so large or so far from its origin that single precision would
     /// overflow, underflow or tell nothing.
     pub(crate) fn new(holds: &Holds, units: &Units, root: Option<u32>) -> Option<Self> {
         let two_to = |exponent: i32| 2.0f64.powi(exponent);
@@ -111,7 +137,8 @@ impl SingleStart {
         };
         let shift = (units.origin - mesh_origin).abs().max_element();
         let reach = units.near / units.scale + shift + largest_corner;
-        let is_fit = holds.only_triangles_and_entries
+        let is_fit = holds.has_more_than_precise
+            && holds.nesting <= DEEPEST
             && holds.has_one_origin
             && units.near > 0.0
             && (two_to(-40)..=two_to(40)).contains(&units.scale)
@@ -120,7 +147,11 @@ impl SingleStart {
         let padded = |v: DVec3, last: f64| [v.x, v.y, v.z, last];
         root.filter(|_| is_fit).map(|root| Self {
             root,
-            is_mixed: !holds.only_triangles,
+            contents: match holds {
+                Holds { only_triangles: true, .. } => Contents::Triangles,
+                Holds { only_triangles_and_entries: true, .. } => Contents::Shapes,
+                _ => Contents::Anything,
+            },
             tree_origin: padded(units.origin, 0.0),
             mesh_origin: padded(mesh_origin, 0.0),
             scale: units.scale,

@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod accel;
+mod anything;
 mod batch;
 mod bins;
 mod blocks;

@@ -6,7 +6,7 @@ use crate::blocks::BlockNames;
 use crate::query::{All, Filter};
 use crate::single::Winner;
 use crate::spheres::ExactSphere;
-use crate::traverse::{Found, PlacedTree, What};
+use crate::traverse::{Found, Standing, What};
 use crate::{Accel, GeometryKind, Hit};
 
 /// What a query leaves out; by default nothing. Queries that do not take this pay nothing for it.
@@ -60,22 +60,6 @@ impl QueryOptions<'_> {
         !has_masks && self.exclude.is_none() && self.faces == Faces::Both
     }
 
-    /// What they leave of a tree.
-    #[inline(always)]
-    pub(crate) fn of_tree<'a>(&self, accel: &'a Accel) -> Selected<'a> {
-        self.among(accel, |route| route.is_empty())
-    }
-
-    /// The same of one that stands where a route says.
-    #[inline(always)]
-    fn among<'a>(&self, accel: &'a Accel, is_there: impl FnOnce(&[u32]) -> bool) -> Selected<'a> {
-        let excluded = match self.exclude {
-            Some(hit) if is_there(&hit.route) => Some((hit.geometry, hit.primitive)),
-            _ => None,
-        };
-        Selected { masks: &accel.masks, mask: self.mask, excluded, faces: self.faces }
-    }
-
     fn has_mask(&self, accel: &Accel, geometry: u32) -> bool {
         has_mask(&accel.masks, self.mask, geometry)
     }
@@ -93,7 +77,7 @@ impl Filter for QueryOptions<'_> {
     const TAKES_ALL: bool = false;
     const FACES: bool = true;
 
-    fn takes(&mut self, found: &Found) -> bool {
+    fn takes(&self, found: &Found) -> bool {
         let (geometry, primitive) = found.what.names(found.accel);
         let is_excluded = self.exclude.is_some_and(|hit| {
             (hit.geometry, hit.primitive) == (geometry, primitive) && hit.route == found.place.route
@@ -110,8 +94,12 @@ impl Filter for QueryOptions<'_> {
     where
         Self: 's;
     #[inline(always)]
-    fn select<'s>(&'s self, placed: &'s PlacedTree<'s, 's>) -> Selected<'s> {
-        self.among(placed.accel, |route| placed.has_route(route))
+    fn select<'s>(&'s self, accel: &'s Accel, standing: Standing<'s>) -> Selected<'s> {
+        let excluded = match self.exclude {
+            Some(hit) if standing.has_route(&hit.route) => Some((hit.geometry, hit.primitive)),
+            _ => None,
+        };
+        Selected { masks: &accel.masks, mask: self.mask, excluded, faces: self.faces }
     }
 }
 

@@ -896,6 +896,8 @@ pub(crate) struct Together {
 /// Those of some rays that a packet answers, at a level, for tests.
 #[cfg(test)]
 pub(crate) fn answered_together(level: lanes::Level, accel: &Accel, rays: &[Ray; PACKET]) -> u32 {
+    use crate::holds::Contents;
+
     struct Searching<'a, const MIXED: bool>(Packet<'a, MIXED>, &'a [Ray; PACKET]);
     impl<const MIXED: bool> lanes::Task for Searching<'_, MIXED> {
         type Output = u32;
@@ -905,9 +907,9 @@ pub(crate) fn answered_together(level: lanes::Level, accel: &Accel, rays: &[Ray;
         }
     }
     let single = accel.single.as_ref().expect("what single precision searches");
-    if single.is_mixed {
-        level.run(Searching(Packet::<true>::new(accel, single), rays))
-    } else {
-        level.run(Searching(Packet::<false>::new(accel, single), rays))
+    match single.contents {
+        Contents::Triangles => level.run(Searching(Packet::<false>::new(accel, single), rays)),
+        Contents::Shapes => level.run(Searching(Packet::<true>::new(accel, single), rays)),
+        Contents::Anything => 0,
     }
 }

@@ -12,7 +12,7 @@ use crate::node::Slabs;
 use crate::options::Selection;
 use crate::single::{self, Nearest, Outcome, Whether, Winner};
 use crate::stack::{AsBuilt, ByDistance};
-use crate::traverse::{Ask, Found, Place, PlacedTree, Search, What};
+use crate::traverse::{Ask, Found, Place, PlacedTree, Search, Standing, What};
 use crate::triangles::Inside;
 use crate::{Accel, Hit, InstancePath};
 
@@ -43,7 +43,7 @@ pub(crate) trait Filter {
     /// Whether it wants to know which side is met.
     const FACES: bool = false;
     /// Whether it takes this.
-    fn takes(&mut self, found: &Found) -> bool;
+    fn takes(&self, found: &Found) -> bool;
     /// Whether it takes anything in an instance.
     #[inline(always)]
     fn enters(&self, _accel: &Accel, _geometry: u32) -> bool {
@@ -53,11 +53,50 @@ pub(crate) trait Filter {
     type Selection<'s>: Selection
     where
         Self: 's;
-    /// That of a placed tree.
-    fn select<'s>(&'s self, placed: &'s PlacedTree<'s, 's>) -> Self::Selection<'s>;
-    /// Learns that a search by such a selection is over, and whether it could tell.
+    /// That of a tree which stands there.
+    fn select<'s>(&'s self, accel: &'s Accel, standing: Standing<'s>) -> Self::Selection<'s>;
+    /// Learns that searches of such selections are over: none of what it was asked about will be met again.
     #[inline(always)]
-    fn end_of_single(&mut self, _is_settled: bool) {}
+    fn forget(&self) {}
+    /// Learns that a search by such a selection could not tell, so that what it was asked about may be met again, and that what
+    /// is met from now on may, too.
+    #[inline(always)]
+    fn keep_answers(&self) {}
+}
+
+/// The same, lent to a search within a search.
+impl<F: Filter> Filter for &F {
+    const TAKES_ALL: bool = F::TAKES_ALL;
+    const FACES: bool = F::FACES;
+
+    #[inline(always)]
+    fn takes(&self, found: &Found) -> bool {
+        (**self).takes(found)
+    }
+
+    #[inline(always)]
+    fn enters(&self, accel: &Accel, geometry: u32) -> bool {
+        (**self).enters(accel, geometry)
+    }
+
+    type Selection<'s>
+        = F::Selection<'s>
+    where
+        Self: 's;
+    #[inline(always)]
+    fn select<'s>(&'s self, accel: &'s Accel, standing: Standing<'s>) -> F::Selection<'s> {
+        (**self).select(accel, standing)
+    }
+
+    #[inline(always)]
+    fn forget(&self) {
+        (**self).forget();
+    }
+
+    #[inline(always)]
+    fn keep_answers(&self) {
+        (**self).keep_answers();
+    }
 }
 
 /// Takes everything.
@@ -67,13 +106,13 @@ pub(crate) struct All;
 impl Filter for All {
     const TAKES_ALL: bool = true;
     #[inline(always)]
-    fn takes(&mut self, _: &Found) -> bool {
+    fn takes(&self, _: &Found) -> bool {
         true
     }
 
     type Selection<'s> = All;
     #[inline(always)]
-    fn select<'s>(&'s self, _: &'s PlacedTree<'s, 's>) -> All {
+    fn select<'s>(&'s self, _: &'s Accel, _: Standing<'s>) -> All {
         All
     }
 }
@@ -94,6 +133,8 @@ struct Answered<F> {
     answers: BTreeMap<CrossingName, bool>,
     /// Of those that a search in single precision met: where it has to give up, the plain one meets them again.
     latest: SmallVec<[(CrossingName, bool); 4]>,
+    /// Whether that has happened: then every answer is kept.
+    keeps_all: bool,
 }
 
 impl<F: FnMut(&Hit) -> bool> Answered<F> {
@@ -105,27 +146,23 @@ impl<F: FnMut(&Hit) -> bool> Answered<F> {
 
 impl<F: FnMut(&Hit) -> bool> If<F> {
     pub(crate) fn new(accept: F) -> Self {
-        let answered = Answered { accept, answers: BTreeMap::new(), latest: SmallVec::new() };
+        let answered =
+            Answered { accept, answers: BTreeMap::new(), latest: SmallVec::new(), keeps_all: false };
         Self { asked: RefCell::new(answered) }
-    }
-
-    /// What a search of a tree itself takes, in single precision.
-    pub(crate) fn of_tree<'s>(&'s self, accel: &'s Accel) -> Asking<'s, F> {
-        Asking { filter: self, accel, placed: None }
     }
 }
 
 impl<F: FnMut(&Hit) -> bool> Filter for If<F> {
     const TAKES_ALL: bool = false;
-    fn takes(&mut self, found: &Found) -> bool {
-        let asked = self.asked.get_mut();
+    fn takes(&self, found: &Found) -> bool {
+        let asked = &mut *self.asked.borrow_mut();
         let is_part = match found.what {
             What::Lane { block, lane } => {
                 found.accel.tree.is_part(found.accel.tree.block(block).number(), lane)
             }
             _ => false,
         };
-        if !is_part && asked.answers.is_empty() {
+        if !is_part && !asked.keeps_all {
             return (asked.accept)(&found.to_hit());
         }
         let (geometry, primitive) = found.what.names(found.accel);
@@ -137,17 +174,19 @@ impl<F: FnMut(&Hit) -> bool> Filter for If<F> {
         = Asking<'s, F>
     where
         F: 's;
-    fn select<'s>(&'s self, placed: &'s PlacedTree<'s, 's>) -> Asking<'s, F> {
-        Asking { filter: self, accel: placed.accel, placed: Some(placed) }
+    #[inline(always)]
+    fn select<'s>(&'s self, accel: &'s Accel, standing: Standing<'s>) -> Asking<'s, F> {
+        Asking { filter: self, accel, standing }
     }
 
-    fn end_of_single(&mut self, is_settled: bool) {
-        let Answered { answers, latest, .. } = self.asked.get_mut();
-        if is_settled {
-            latest.clear();
-        } else {
-            answers.extend(latest.drain(..));
-        }
+    fn forget(&self) {
+        self.asked.borrow_mut().latest.clear();
+    }
+
+    fn keep_answers(&self) {
+        let Answered { answers, latest, keeps_all, .. } = &mut *self.asked.borrow_mut();
+        answers.extend(latest.drain(..));
+        *keeps_all = true;
     }
 }
 
@@ -155,7 +194,7 @@ impl<F: FnMut(&Hit) -> bool> Filter for If<F> {
 pub(crate) struct Asking<'s, F> {
     filter: &'s If<F>,
     accel: &'s Accel,
-    placed: Option<&'s PlacedTree<'s, 's>>,
+    standing: Standing<'s>,
 }
 
 impl<F> Clone for Asking<'_, F> {
@@ -173,13 +212,11 @@ impl<F: FnMut(&Hit) -> bool> Selection for Asking<'_, F> {
     #[inline(never)]
     fn accepts(&self, winner: &Winner, order: u32, may_come_again: bool) -> bool {
         let mut hit = winner.to_hit(self.accel);
-        if let Some(placed) = self.placed {
-            let place = placed.place();
-            (hit.instances, hit.route) = (place.ids, place.route);
-        }
+        let place = self.standing.place();
+        (hit.instances, hit.route) = (place.ids, place.route);
         let asked = &mut *self.filter.asked.borrow_mut();
         let name = (hit.route.clone(), hit.geometry, hit.primitive, order);
-        if may_come_again {
+        if may_come_again || asked.keeps_all {
             return asked.take_once(name, || hit);
         }
         let is_taken = (asked.accept)(&hit);
@@ -247,11 +284,8 @@ impl<'a, F> Closest<'a, F> {
     // Field by field: a whole that was written in parts is slow to be read at once.
     #[inline(always)]
     pub(crate) fn take_hit(&mut self) -> Option<Hit> {
-        let Best { crossing, what, accel } = self.best.as_ref()?;
-        let root = match crossing {
-            Crossing::Inside(inside) => inside.root(self.limit),
-            Crossing::Root(root) => *root,
-        };
+        let (root, what) = self.crossing()?;
+        let Best { accel, .. } = self.best.as_ref()?;
         let (geometry, primitive) = what.names(accel);
         let id = accel.geometries[geometry as usize].id;
         let mut hit =
@@ -260,6 +294,17 @@ impl<'a, F> Closest<'a, F> {
             (hit.instances, hit.route) = (place.ids, place.route);
         }
         Some(hit)
+    }
+
+    /// The nearest crossing so far, of something that stands in the tree itself.
+    #[inline(always)]
+    pub(crate) fn crossing(&self) -> Option<(Root, What)> {
+        let Best { crossing, what, .. } = self.best.as_ref()?;
+        let root = match crossing {
+            Crossing::Inside(inside) => inside.root(self.limit),
+            Crossing::Root(root) => *root,
+        };
+        Some((root, *what))
     }
 
     /// Whether a crossing at the same `t` comes first in the lists.
@@ -345,19 +390,22 @@ impl<'a, F: Filter> Search<'a> for Closest<'a, F> {
         ray: &Ray,
         slabs: Slabs,
     ) -> Outcome<bool> {
-        let outcome = single::search_placed::<Nearest, L, _>(placed, ray, slabs, self.filter.select(placed));
-        self.filter.end_of_single(outcome != Outcome::Unsettled);
-        match outcome {
-            Outcome::Unsettled => return Outcome::Unsettled,
+        let selection = self.filter.select(placed.accel, placed.standing);
+        match single::search_placed::<Nearest, L, _>(placed, ray, slabs, selection) {
+            Outcome::Unsettled => {
+                self.filter.keep_answers();
+                return Outcome::Unsettled;
+            }
             Outcome::Settled(None) => {}
             Outcome::Settled(Some(Winner { root, geometry, primitive })) => {
-                let (place, accel) = (placed.place(), placed.accel);
+                let (place, accel) = (placed.standing.place(), placed.accel);
                 let what = What::Named { geometry, primitive };
                 if self.is_better(root.t, what, accel, &place) {
                     self.keep(root.t, Best { crossing: Crossing::Root(root), what, accel }, &place);
                 }
             }
         }
+        self.filter.forget();
         Outcome::Settled(false)
     }
 }
@@ -425,9 +473,15 @@ impl<'a, F: Filter> Search<'a> for Any<F> {
         ray: &Ray,
         slabs: Slabs,
     ) -> Outcome<bool> {
-        let outcome = single::search_placed::<Whether, L, _>(placed, ray, slabs, self.filter.select(placed));
-        self.filter.end_of_single(outcome != Outcome::Unsettled);
-        self.is_hit |= outcome == Outcome::Settled(true);
+        let selection = self.filter.select(placed.accel, placed.standing);
+        let outcome = single::search_placed::<Whether, L, _>(placed, ray, slabs, selection);
+        match outcome {
+            Outcome::Settled(is_hit) => {
+                self.is_hit |= is_hit;
+                self.filter.forget();
+            }
+            Outcome::Unsettled => self.filter.keep_answers(),
+        }
         outcome
     }
 }

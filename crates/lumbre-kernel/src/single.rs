@@ -16,10 +16,11 @@ use std::marker::PhantomData;
 use lumbre_geometry::{Ray, Root, Roots};
 use lumbre_math::DVec3;
 
+use crate::anything::Amidst;
 use crate::batch::Ends;
 use crate::blocks::{Blocks, TriangleBlock};
 use crate::collapse::Entry;
-use crate::holds::SingleStart;
+use crate::holds::{Contents, SingleStart};
 use crate::hulls::HullRay;
 use crate::lanes::{self, Asked, Axes, Crossings, Lanes, Level, MetHulls, Question, Task};
 use crate::node::{Node, Slabs, tag};
@@ -288,7 +289,7 @@ pub(crate) struct SingleRay<'a, const MIXED: bool, S = All> {
     /// From heights to places in the range of boxes.
     place_per_height: f32,
     /// The nearest so far.
-    best: Candidate,
+    pub(crate) best: Candidate,
     /// The last of the best that was no triangle.
     crossed: Option<Winner>,
     selection: S,
@@ -511,12 +512,12 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
 
     /// The best, where it is no triangle.
     #[inline(always)]
-    fn crossed(&self) -> Option<Winner> {
+    pub(crate) fn crossed(&self) -> Option<Winner> {
         if (MIXED || S::ASKS) && !self.best.is_triangle() { self.crossed } else { None }
     }
 
     /// Whether a crossing is nearer than the best, or as near and before it.
-    fn is_better(&self, ray: &Ray, t: f64, names: (u32, u32)) -> Outcome<bool> {
+    pub(crate) fn is_better(&self, ray: &Ray, t: f64, names: (u32, u32)) -> Outcome<bool> {
         match self.crossed() {
             Some(crossed) => Outcome::Settled(crossed.comes_after(t, names)),
             None => self.exact.is_better(ray, t, names, &self.best),
@@ -569,9 +570,21 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
         roots
     }
 
+    /// How far along the ray a hit may be that is nearer than the best, or as near.
+    #[inline(always)]
+    pub(crate) fn limit(&self, ray: &Ray) -> f64 {
+        if !self.best.is_some() {
+            return ray.t_max;
+        }
+        // What the best lies before, and rounded upwards as a whole.
+        const UP: f64 = 1.0 + 4.0 * f64::EPSILON;
+        let limit = f64::from(self.best.to) / largest_component(ray) * UP;
+        if limit < ray.t_max { limit } else { ray.t_max }
+    }
+
     /// Takes a crossing of what is no triangle, if it is the nearest; false where the plain search has to answer.
     #[inline(always)]
-    fn meet_root<L: Lanes>(
+    pub(crate) fn meet_root<L: Lanes>(
         &mut self,
         root: Root,
         geometry: u32,
@@ -593,10 +606,21 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
             }
         };
         if is_nearer {
-            self.crossed = Some(Winner { root, geometry, primitive });
-            self.keep(Candidate { block: Candidate::CROSSED, lane: 0, from, to }, way);
+            self.keep_crossed(Winner { root, geometry, primitive }, (from, to), way);
         }
         true
+    }
+
+    /// Takes a crossing of what is no triangle, which lies between these heights.
+    #[inline(always)]
+    pub(crate) fn keep_crossed<L: Lanes>(
+        &mut self,
+        crossed: Winner,
+        (from, to): (f32, f32),
+        way: &mut Way<L>,
+    ) {
+        self.crossed = Some(crossed);
+        self.keep(Candidate { block: Candidate::CROSSED, lane: 0, from, to }, way);
     }
 
     /// Tests what is no triangle for any hit.
@@ -874,15 +898,18 @@ pub(crate) struct Questions {
 impl Questions {
     /// Of a tree that has this start.
     pub(crate) fn new(level: Level, start: Option<&SingleStart>) -> Self {
-        match start {
-            Some(start) if start.is_mixed => Self {
-                closest: level.asked::<Singly<Nearest, true>>(),
-                any: level.asked::<Singly<Whether, true>>(),
-            },
-            Some(_) => Self {
+        match start.map(|start| start.contents) {
+            Some(Contents::Triangles) => Self {
                 closest: level.asked::<Singly<Nearest, false>>(),
                 any: level.asked::<Singly<Whether, false>>(),
             },
+            Some(Contents::Shapes) => Self {
+                closest: level.asked::<Singly<Nearest, true>>(),
+                any: level.asked::<Singly<Whether, true>>(),
+            },
+            Some(Contents::Anything) => {
+                Self { closest: level.asked::<Amidst<Nearest>>(), any: level.asked::<Amidst<Whether>>() }
+            }
             None => {
                 Self { closest: level.asked::<Plainly<Nearest>>(), any: level.asked::<Plainly<Whether>>() }
             }
@@ -892,7 +919,7 @@ impl Questions {
     /// The same as they may leak at edges, to be measured beside; `None` but of trees of triangles, and without AVX2.
     #[cfg(feature = "measure")]
     pub(crate) fn leaking(level: Level, start: Option<&SingleStart>) -> Option<Self> {
-        start.filter(|start| !start.is_mixed)?;
+        start.filter(|start| start.contents == Contents::Triangles)?;
         Some(Self {
             closest: level.asked_leaking::<Singly<Nearest, false>>()?,
             any: level.asked_leaking::<Singly<Whether, false>>()?,
@@ -961,10 +988,11 @@ pub(crate) fn search_among<G: Goal, S: Selection>(
     ray: &Ray,
     selection: S,
 ) -> Outcome<G::Answer> {
-    if start.is_mixed {
-        level.run(Alone::<G, true, S> { accel, start, root: start.root, ray, selection, goal: PhantomData })
-    } else {
-        level.run(Alone::<G, false, S> { accel, start, root: start.root, ray, selection, goal: PhantomData })
+    let root = start.root;
+    match start.contents {
+        Contents::Triangles => level.run(Alone::<G, false, S>::among(accel, start, root, ray, selection)),
+        Contents::Shapes => level.run(Alone::<G, true, S>::among(accel, start, root, ray, selection)),
+        Contents::Anything => unreachable!("what it finds is no winner, but a hit"),
     }
 }
 
@@ -977,13 +1005,13 @@ pub(crate) fn search_placed<G: Goal, L: Lanes, S: Selection>(
     selection: S,
 ) -> Outcome<G::Answer> {
     let &PlacedTree { accel, start, root, .. } = placed;
-    Alone::<G, false, S> { accel, start, root, ray, selection, goal: PhantomData }.go::<L>(slabs)
+    Alone::<G, false, S>::among(accel, start, root, ray, selection).go::<L>(slabs)
 }
 
-impl<'a, 'r, G, const MIXED: bool> Alone<'a, 'r, G, MIXED> {
+impl<'a, 'r, G: Goal, const MIXED: bool> Alone<'a, 'r, G, MIXED> {
     #[inline(always)]
     pub(crate) fn new(accel: &'a Accel, start: &'a SingleStart, ray: &'r Ray) -> Self {
-        Self { accel, start, root: start.root, ray, selection: All, goal: PhantomData }
+        Self::among(accel, start, start.root, ray, All)
     }
 }
 
@@ -1000,10 +1028,22 @@ impl<G: Goal, const MIXED: bool, S: Selection> Task for Alone<'_, '_, G, MIXED, 
     }
 }
 
-impl<G: Goal, const MIXED: bool, S: Selection> Alone<'_, '_, G, MIXED, S> {
+impl<'a, 'r, G: Goal, const MIXED: bool, S: Selection> Alone<'a, 'r, G, MIXED, S> {
+    /// Below a node, among what a selection takes.
+    #[inline(always)]
+    pub(crate) fn among(
+        accel: &'a Accel,
+        start: &'a SingleStart,
+        root: u32,
+        ray: &'r Ray,
+        selection: S,
+    ) -> Self {
+        Self { accel, start, root, ray, selection, goal: PhantomData }
+    }
+
     /// Goes through the tree with a ray that has started.
     #[inline(always)]
-    fn go<L: Lanes>(self, slabs: Slabs) -> Outcome<G::Answer> {
+    pub(crate) fn go<L: Lanes>(self, slabs: Slabs) -> Outcome<G::Answer> {
         let Self { accel, start, root, ray, selection, .. } = self;
         let mut way = Way::<L>::new(&accel.tree.nodes, slabs);
         let mut stack = Stack::new();

@@ -5,6 +5,7 @@ use lumbre_math::DVec3;
 
 use crate::lanes::{Lanes, Task};
 use crate::node::{BoxRay, tag};
+use crate::opening::Start;
 use crate::spheres::{ExactSphere, SphereRay};
 use crate::stack::Stack;
 use crate::traverse::{self, Ask, Found, Place, Search, What};
@@ -116,6 +117,8 @@ pub(crate) fn offer_crossings<'a, S: Search<'a>>(
 /// A search through a tree of nothing but spheres.
 pub(crate) struct AmongSpheres<'a, 's, S> {
     pub(crate) accel: &'a Accel,
+    pub(crate) from: Start,
+    pub(crate) place: &'s Place,
     pub(crate) ray: &'s Ray,
     pub(crate) search: &'s mut S,
 }
@@ -126,7 +129,7 @@ impl<'a, S: Search<'a>> Task for AmongSpheres<'a, '_, S> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> bool {
-        let Self { accel, ray, search } = self;
+        let Self { accel, from, place, ray, search } = self;
         let Some(root) = accel.tree.root else { return false };
         let mut boxes = BoxRay::passing_all();
         if !traverse::start::<L, S>(accel, ray, search, &mut boxes) {
@@ -134,13 +137,12 @@ impl<'a, S: Search<'a>> Task for AmongSpheres<'a, '_, S> {
         }
         let mut way = Way::<L>::new(&accel.tree.nodes, boxes.slabs);
         let mut turned = None;
-        let place = Place::default();
         let mut stack = Stack::new();
-        let mut next = Some(root);
+        let mut next = Some(from.below(root));
         while let Some(reference) = next {
             let Some(leaf) = way.descend::<S::Order>(reference, &mut stack) else { break };
             let limit = search.limit();
-            if meet_leaf::<L, S>(accel, ray, leaf, &mut turned, &place, search) {
+            if meet_leaf::<L, S>(accel, ray, leaf, &mut turned, place, search) {
                 return true;
             }
             if search.limit() < limit {

@@ -167,6 +167,7 @@ fn at_borders(touches: &[Touch]) -> Vec<usize> {
 pub(crate) fn offer_borders<'a, S: Search<'a>>(
     level: Level,
     accel: &'a Accel,
+    place: &mut Place,
     ray: &Ray,
     touches: &[Touch<'a>],
     search: &mut S,
@@ -180,7 +181,7 @@ pub(crate) fn offer_borders<'a, S: Search<'a>>(
         return;
     }
     // A part of the neighbours may lie beyond what was searched.
-    let all = traverse::all_touches(level, accel, ray);
+    let all = traverse::all_touches(level, accel, place, ray);
     for i in at_borders(&all) {
         if matters(&all[i], search) && search.offer(&all[i].found()) {
             return;

@@ -12,7 +12,7 @@ use smallvec::SmallVec;
 
 use crate::blocks::{Blocks, TriangleBlock};
 use crate::collapse::Entry;
-use crate::holds::{Holds, SingleStart};
+use crate::holds::{Contents, Holds, SingleStart};
 use crate::hulls::HullRay;
 use crate::lanes::{self, Lanes, Level, MetHulls, Task};
 use crate::node::{BoxRay, Progress, Slabs, tag};
@@ -24,7 +24,7 @@ use crate::stack::{Order, Stack};
 use crate::touch::{self, AllTouches, Touch};
 use crate::triangles::{self, BLOCK, BlockRay, HeightRange, Inside, Passage, Shear};
 use crate::way::Way;
-use crate::{Accel, GeometryKind, InstancePath, Placement, options, precise};
+use crate::{Accel, GeometryKind, InstancePath, options, precise};
 
 /// What a search asks of a primitive that may be crossed more than once.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -92,27 +92,49 @@ pub(crate) struct PlacedTree<'a, 'p> {
     pub(crate) start: &'a SingleStart,
     /// Where it is entered.
     pub(crate) root: u32,
-    /// Where the instance stands.
-    pub(crate) around: &'p Place,
-    /// The instance there: its position and its id.
-    pub(crate) geometry: u32,
-    pub(crate) id: u32,
+    pub(crate) standing: Standing<'p>,
 }
 
-impl PlacedTree<'_, '_> {
+/// Where a tree stands, which is only written down once something is met there.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Standing<'p> {
+    /// Instances around it, but for the innermost one where that is given.
+    pub(crate) around: &'p Place,
+    /// The position of that, and its id.
+    pub(crate) innermost: Option<(u32, u32)>,
+}
+
+impl<'p> Standing<'p> {
+    /// At a place.
+    #[inline(always)]
+    pub(crate) fn at(around: &'p Place) -> Self {
+        Self { around, innermost: None }
+    }
+
+    /// In one more instance.
+    #[inline(always)]
+    pub(crate) fn within(around: &'p Place, geometry: u32, id: u32) -> Self {
+        Self { around, innermost: Some((geometry, id)) }
+    }
+
     /// The place of what is in the tree.
     #[inline(always)]
     pub(crate) fn place(&self) -> Place {
         let mut place = self.around.clone();
-        place.route.push(self.geometry);
-        place.ids.push(self.id);
+        if let Some((geometry, id)) = self.innermost {
+            place.route.push(geometry);
+            place.ids.push(id);
+        }
         place
     }
 
     /// Whether it has this route.
     #[inline(always)]
     pub(crate) fn has_route(&self, route: &[u32]) -> bool {
-        route.split_last() == Some((&self.geometry, &self.around.route[..]))
+        match self.innermost {
+            Some((geometry, _)) => route.split_last() == Some((&geometry, &self.around.route[..])),
+            None => *route == self.around.route[..],
+        }
     }
 }
 
@@ -194,24 +216,44 @@ pub(crate) fn is_sound(ray: &Ray) -> bool {
 /// Runs `search` along `ray`, whose answers it keeps.
 #[inline(always)]
 pub(crate) fn search<'a, S: Search<'a>>(level: Level, accel: &'a Accel, ray: &Ray, search: &mut S) {
+    search_from(level, accel, Start::WHOLE, Place::default(), ray, search);
+}
+
+/// The same in a part of a tree that stands at a place; crossings exactly at an edge may be ones of the whole.
+#[inline(always)]
+pub(crate) fn search_from<'a, S: Search<'a>>(
+    level: Level,
+    accel: &'a Accel,
+    from: Start,
+    mut place: Place,
+    ray: &Ray,
+    search: &mut S,
+) {
     let mut touches = Vec::new();
+    let (place, touched) = (&mut place, &mut touches);
     let is_over = if accel.holds.only_triangles {
-        level.run(AmongTriangles { accel, ray, search: &mut *search, touches: &mut touches })
+        level.run(AmongTriangles { accel, from, place, ray, search: &mut *search, touches: touched })
     } else if accel.holds.only_spheres {
-        level.run(AmongSpheres { accel, ray, search: &mut *search })
+        level.run(AmongSpheres { accel, from, place, ray, search: &mut *search })
     } else {
-        level.run(AmongAll { accel, ray, search: &mut *search, touches: &mut touches })
+        level.run(AmongAll { accel, from, place, ray, search: &mut *search, touches: touched })
     };
     if !is_over && !touches.is_empty() {
-        touch::offer_borders(level, accel, ray, &touches, search);
+        touch::offer_borders(level, accel, place, ray, &touches, search);
     }
 }
 
 /// Collects what the whole line touches.
-pub(crate) fn all_touches<'a>(level: Level, accel: &'a Accel, ray: &Ray) -> Vec<Touch<'a>> {
+pub(crate) fn all_touches<'a>(
+    level: Level,
+    accel: &'a Accel,
+    place: &mut Place,
+    ray: &Ray,
+) -> Vec<Touch<'a>> {
     let line = ray.with_range(f64::NEG_INFINITY, f64::INFINITY);
     let mut touches = Vec::new();
-    level.run(AmongAll { accel, ray: &line, search: &mut AllTouches, touches: &mut touches });
+    let from = Start::WHOLE;
+    level.run(AmongAll { accel, from, place, ray: &line, search: &mut AllTouches, touches: &mut touches });
     touches
 }
 
@@ -323,6 +365,8 @@ impl<'a, R: Borrow<Ray>, L: Lanes> Frame<'a, R, L> {
 /// A search through a tree of nothing but triangles.
 struct AmongTriangles<'a, 's, S> {
     accel: &'a Accel,
+    from: Start,
+    place: &'s Place,
     ray: &'s Ray,
     search: &'s mut S,
     /// The triangles met at an edge or a corner.
@@ -335,14 +379,14 @@ impl<'a, S: Search<'a>> Task for AmongTriangles<'a, '_, S> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> bool {
-        let Self { accel, ray, search, touches } = self;
+        let Self { accel, from, place, ray, search, touches } = self;
         let Some(root) = accel.tree.root else { return false };
         let mut boxes = BoxRay::passing_all();
         if !start::<L, S>(accel, ray, search, &mut boxes) {
             return false;
         }
         let mut frame = Frame::<&Ray, L>::new(accel, ray, boxes, search);
-        meet_triangles(&mut frame, root, &mut Stack::new(), &Place::default(), search, touches)
+        meet_triangles(&mut frame, from.below(root), &mut Stack::new(), place, search, touches)
     }
 }
 
@@ -370,6 +414,9 @@ fn meet_triangles<'a, R: Borrow<Ray>, L: Lanes, S: Search<'a>>(
 /// A search through a tree of anything.
 struct AmongAll<'a, 's, S> {
     accel: &'a Accel,
+    from: Start,
+    /// As it was again, unless the search ends before it has seen everything.
+    place: &'s mut Place,
     ray: &'s Ray,
     search: &'s mut S,
     touches: &'s mut Vec<Touch<'a>>,
@@ -381,19 +428,18 @@ impl<'a, S: Search<'a>> Task for AmongAll<'a, '_, S> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> bool {
-        let Self { accel, ray, search, touches } = self;
+        let Self { accel, from, place, ray, search, touches } = self;
         if !is_sound(ray) {
             return false;
         }
         let mut stack: Stack<<S::Order as Order>::Entry> = Stack::new();
         let mut inner_stack = Stack::new();
         let mut suspended: SmallVec<[Frame<Ray, L>; 2]> = SmallVec::new();
-        let mut place = Place::default();
 
         let mut boxes = BoxRay::passing_all();
         let meets_tree = start::<L, S>(accel, ray, search, &mut boxes);
         let mut frame = Frame::<Ray, L>::new(accel, *ray, boxes, search);
-        if enter(&mut frame, Start::WHOLE, meets_tree, &place, &mut stack, search) {
+        if enter(&mut frame, from, meets_tree, place, &mut stack, search) {
             return true;
         }
         while let Some(reference) = frame.way.pop::<S::Order>(&mut stack) {
@@ -401,26 +447,26 @@ impl<'a, S: Search<'a>> Task for AmongAll<'a, '_, S> {
             let first = (leaf & tag::PLACE) as usize;
             match leaf >> tag::SHIFT {
                 tag::TRIANGLES => {
-                    if meet_blocks(&mut frame, leaf, &place, search, touches) {
+                    if meet_blocks(&mut frame, leaf, place, search, touches) {
                         return true;
                     }
                 }
                 tag::SPHERES => {
                     let Frame { accel, ray, clouds, .. } = &mut frame;
-                    if sphere_search::meet_leaf::<L, S>(accel, ray, leaf, clouds, &place, search) {
+                    if sphere_search::meet_leaf::<L, S>(accel, ray, leaf, clouds, place, search) {
                         return true;
                     }
                     frame.narrow(search);
                 }
                 tag::SHAPES if frame.progress.is_nearby() && frame.accel.hulls.block(first).is_some() => {
-                    if meet_shapes(&mut frame, first, &place, search) {
+                    if meet_shapes(&mut frame, first, place, search) {
                         return true;
                     }
                     frame.narrow(search);
                 }
                 tag::SHAPES | tag::CUSTOM => {
                     for entry in &frame.accel.tree.entries[first..] {
-                        if meet_entry(&frame, entry, &place, search) {
+                        if meet_entry(&frame, entry, place, search) {
                             return true;
                         }
                         if entry.is_last() {
@@ -432,7 +478,7 @@ impl<'a, S: Search<'a>> Task for AmongAll<'a, '_, S> {
                 tag::PRECISE => {
                     for entry in &frame.accel.tree.entries[first..] {
                         let name = [entry.geometry, entry.primitive()];
-                        if precise::meet(frame.accel, &frame.ray, name, &place, search, touches) {
+                        if precise::meet(frame.accel, &frame.ray, name, place, search, touches) {
                             return true;
                         }
                         if entry.is_last() {
@@ -452,19 +498,16 @@ impl<'a, S: Search<'a>> Task for AmongAll<'a, '_, S> {
                         unreachable!("the tag says so");
                     };
                     let inner = &*instance.accel;
-                    if let Some(start) = inner.single.as_ref().filter(|start| !start.is_mixed) {
+                    if let Some(start) =
+                        inner.single.as_ref().filter(|start| start.contents == Contents::Triangles)
+                    {
                         let (root, id) = (from.below(start.root), standing.id);
-                        let placed = PlacedTree { accel: inner, start, root, around: &place, geometry, id };
+                        let standing = Standing::within(place, geometry, id);
+                        let placed = PlacedTree { accel: inner, start, root, standing };
                         // Nothing beyond the limit is wanted; what is met has the same bits whatever the range.
                         let range = [search.floor(), search.limit()];
-                        let moving;
-                        let map = match &instance.world_from_object {
-                            Placement::Still(map) => map,
-                            Placement::Moving(motion) => {
-                                moving = motion.at(frame.ray.time);
-                                &moving
-                            }
-                        };
+                        let mut moving = None;
+                        let map = instance.world_from_object.map_at(frame.ray.time, &mut moving);
                         let (ray, slabs) = L::start_placed(start, map, &frame.ray, range);
                         if let Some(slabs) = slabs
                             && let Outcome::Settled(is_over) = search.meet_single::<L>(&placed, &ray, slabs)
@@ -485,7 +528,7 @@ impl<'a, S: Search<'a>> Task for AmongAll<'a, '_, S> {
                             place.route.push(geometry);
                             place.ids.push(standing.id);
                             let mut inner = Frame::<&Ray, L>::new(inner, &ray, boxes, search);
-                            if meet_triangles(&mut inner, root, &mut inner_stack, &place, search, touches) {
+                            if meet_triangles(&mut inner, root, &mut inner_stack, place, search, touches) {
                                 return true;
                             }
                             place.route.pop();
@@ -504,7 +547,7 @@ impl<'a, S: Search<'a>> Task for AmongAll<'a, '_, S> {
                     stack.push(S::Order::entry(tag::reference(tag::RETURN, 0)));
                     let inner = Frame::new(inner, ray, boxes, search);
                     suspended.push(std::mem::replace(&mut frame, inner));
-                    if enter(&mut frame, from, meets_tree, &place, &mut stack, search) {
+                    if enter(&mut frame, from, meets_tree, place, &mut stack, search) {
                         return true;
                     }
                 }

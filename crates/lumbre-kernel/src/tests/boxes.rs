@@ -129,7 +129,7 @@ fn reached_boxes_are_met(level: Level, seed: u64, rounds: usize) {
 fn start_of(units: &Units, first_origin: DVec3) -> Option<SingleStart> {
     let largest_corner = (1.0 / units.scale) as f32;
     let holds = Holds { first_origin, largest_corner, ..Holds::new(&[], 0.0, 0.0) };
-    SingleStart::new(&Holds { has_one_origin: true, ..holds }, units, Some(0))
+    SingleStart::new(&Holds { has_more_than_precise: true, has_one_origin: true, ..holds }, units, Some(0))
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! What the kernel promises, against a loop over everything.
 
+mod anything;
 mod blocks;
 mod borders;
 mod boxes;

@@ -6,10 +6,12 @@ use lumbre_geometry::{PlacedShape, Plane, Ray};
 use lumbre_math::{DVec3, Transform, Vec3};
 
 use super::scenes::{self, Random};
+use crate::holds::Contents;
 use crate::lanes::Level;
 use crate::packet::{self, PACKET};
-use crate::query::If;
+use crate::query::{Filter, If};
 use crate::single::{self, Nearest, Outcome, Whether};
+use crate::traverse::{Place, Standing};
 use crate::{
     Accel, BuildOptions, Faces, Geometry, GeometryKind, Hit, Instance, Preset, QueryOptions, TriangleMesh,
     batch, brute,
@@ -118,7 +120,7 @@ fn check(accel: &Accel, rays: &[Ray], least: u32) {
             hits += u32::from(plain.is_some());
         }
         assert!(hits > least && settled > least, "{hits} hits, {settled} settled");
-        if !start.is_mixed {
+        if start.contents == Contents::Triangles {
             // No tree of the tests is as large as those that are searched as far ones, and alike rays would go together.
             for is_far in [false, true] {
                 let expected = |i: usize| single::search::<Nearest>(level, accel, start, &rays[i]);
@@ -330,7 +332,8 @@ fn check_with(level: Level, accel: &Accel, ray: &Ray, options: &QueryOptions) ->
     assert_eq!(accel.any_with_plainly_at(level, ray, options), plain.is_some());
     assert_eq!(accel.any_with_at(level, ray, options), plain.is_some(), "{level:?} {ray:?} {options:?}");
     let start = accel.single.as_ref().expect("made for this");
-    let selected = options.of_tree(accel);
+    let place = Place::default();
+    let selected = options.select(accel, Standing::at(&place));
     let outcome = single::search_among::<Nearest, _>(level, accel, start, ray, selected);
     (plain, outcome != Outcome::Unsettled)
 }
@@ -495,8 +498,10 @@ fn a_filter_is_asked_once_where_single_precision_gives_up() {
     for level in Level::all() {
         let mut deny = |_: &Hit| false;
         let filter = If::new(&mut deny);
+        let place = Place::default();
+        let top = Standing::at(&place);
         let outcome =
-            single::search_among::<Nearest, _>(level, &single, start, &ray, filter.of_tree(&single));
+            single::search_among::<Nearest, _>(level, &single, start, &ray, filter.select(&single, top));
         assert_eq!(outcome, Outcome::Unsettled, "{level:?}: else this tests nothing");
         for accel in [&single, &placed] {
             for wanted in 1..=4 {
