@@ -22,8 +22,8 @@ use crate::traverse::{Place, Standing};
 use crate::winding::{self, Moments};
 use crate::{
     ClosestPoint, Geometry, GeometryKind, Hit, LoadError, MapError, NoClosestPoint, NoWindingNumber,
-    QueryOptions, RefitError, SphereCloud, batch, file, inside, nearest, prepare, refit, save, surface,
-    traverse,
+    QueryOptions, RefitError, SphereCloud, batch, file, inside, nearest, prepare, rebuild, refit, save,
+    surface, traverse,
 };
 
 /// A bounding volume hierarchy over geometries, ready for queries from any number of threads.
@@ -162,6 +162,19 @@ impl Accel {
     /// in the tree would now need one. The tree is then as it was.
     pub fn refit(&mut self, geometries: Vec<Geometry>) -> Result<f64, RefitError> {
         refit::refit(self, geometries)
+    }
+
+    /// Puts together anew what refits have moved: a partial rebuild. Queries answer as before, to the bit.
+    ///
+    /// Leaves of triangles and of spheres stay as they are, up to eight in each, and are put together as a build would put
+    /// triangles; shapes, instances and custom geometry are all put together anew. That takes about a tenth of the time of a build, and
+    /// is as good where what shares a leaf has moved together, as the surfaces of bodies do that bend, turn or go their ways.
+    /// Where it has not, as in a cloud of dust, only a build helps. A tree that would be worse than what there is is not taken.
+    ///
+    /// The answer is as that of [`refit`](Self::refit): the cost of a ray as a multiple of that after the build. What
+    /// is said there of trees that hold this one holds here, too.
+    pub fn rebuild_partially(&mut self, options: &BuildOptions) -> f64 {
+        rebuild::rebuild_partially(self, options)
     }
 
     /// How the tree is put together, as bytes for a file: some six a triangle, whatever the machine. The geometries are not

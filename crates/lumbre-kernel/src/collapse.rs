@@ -591,6 +591,29 @@ impl Layout {
     }
 }
 
+/// A tree of leaves that there were before.
+pub(crate) struct Relaid {
+    pub(crate) nodes: Vec<Node>,
+    pub(crate) entries: Vec<Entry>,
+    pub(crate) root: u32,
+}
+
+impl Layout {
+    /// The tree where each sphere stands for a leaf of another, which is found by the sphere's geometry.
+    pub(crate) fn over_leaves(self, names: &[Name], leaf_of: impl Fn(u32) -> u32) -> Relaid {
+        let Self { mut nodes, entries, sphere_spans, mut root, .. } = self;
+        let stands_for = |reference: &mut u32| {
+            if *reference != Node::ABSENT && *reference >> tag::SHIFT == tag::SPHERES {
+                let span = sphere_spans[tag::blocks(*reference).start];
+                *reference = leaf_of(names[span.first as usize][0]);
+            }
+        };
+        nodes.iter_mut().flat_map(|node| &mut node.children).for_each(stands_for);
+        stands_for(&mut root);
+        Relaid { nodes, entries, root }
+    }
+}
+
 /// The cells of triangles that are in parts, lane by lane.
 fn lane_cells(spans: &[Span], cells: &[Cell]) -> Vec<LaneCell> {
     let of_block = |(block, span): (usize, &Span)| {

@@ -31,6 +31,7 @@ mod precise;
 mod prepare;
 mod primitive;
 mod query;
+mod rebuild;
 mod refit;
 mod reinsert;
 mod save;

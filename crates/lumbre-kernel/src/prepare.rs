@@ -605,10 +605,10 @@ fn condition_of(map: &Transform) -> f64 {
 }
 
 /// What the build must know of a geometry.
-fn traits_of(geometry: &Geometry) -> Traits {
+pub(crate) fn traits_of(geometry: &Geometry) -> Traits {
     let (kind, cost, most) = match &geometry.kind {
-        GeometryKind::Mesh(_) => (Kind::Triangle, 4, BLOCK),
-        GeometryKind::Spheres(_) => (Kind::Sphere, 4, BLOCK),
+        GeometryKind::Mesh(_) => (Kind::Triangle, Traits::COST_OF_PACKED, BLOCK),
+        GeometryKind::Spheres(_) => (Kind::Sphere, Traits::COST_OF_PACKED, BLOCK),
         // Its share in the first test of eight, which nearly always spares the others: its own cost is the same in any leaf.
         GeometryKind::Shape(_) => (Kind::Shape, 3, BLOCK),
         GeometryKind::Instance(_) => (Kind::Instance, 96, 1),

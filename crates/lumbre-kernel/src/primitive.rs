@@ -48,6 +48,11 @@ pub(crate) struct Traits {
     pub(crate) most: usize,
 }
 
+impl Traits {
+    /// What a test of a triangle or a sphere costs.
+    pub(crate) const COST_OF_PACKED: u32 = 4;
+}
+
 /// Numbers of the fixed-point coordinates in a tree unit. Twice a centre, less another such, still fits.
 pub(crate) const ONE: f64 = (1 << 28) as f64;
 

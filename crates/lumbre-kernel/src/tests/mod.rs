@@ -18,6 +18,7 @@ mod pairs;
 mod parts;
 mod precise;
 mod proof;
+mod rebuild;
 mod refit;
 mod save;
 pub(crate) mod scenes;

@@ -12,7 +12,7 @@ use crate::{Accel, BuildError, Geometry, GeometryKind, Instance, PreciseMesh, Re
 const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
 
 /// The same geometries elsewhere.
-fn moved(accel: &Accel, random: &mut Random, center: DVec3, extent: f64) -> Vec<Geometry> {
+pub(crate) fn moved(accel: &Accel, random: &mut Random, center: DVec3, extent: f64) -> Vec<Geometry> {
     let mut move_kind = |kind: &GeometryKind| match kind {
         GeometryKind::Mesh(mesh) => {
             let twist = Transform::rotate(random.vector(), 50.0).unwrap();
