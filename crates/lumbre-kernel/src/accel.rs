@@ -147,8 +147,8 @@ impl Accel {
     ///
     /// This takes a fraction of the time of a build, but the boxes of what was near and no longer is grow, and queries
     /// become slower. The answer says by how much, about: the cost of a ray as a multiple of that after the build, 1 or so
-    /// where everything moved together. As a rule, build again where it passes 1.5: with more than a few rays for every
-    /// primitive, queries then lose more time than a build takes.
+    /// where everything moved together. As a rule, [rebuild in part](Self::rebuild_partially) where it passes 1.1, and build again
+    /// where it is still more than 1.5 then: with more than a few rays for every primitive, queries lose more time than that takes.
     ///
     /// Where an instance was opened (see [`Preset::Balanced`]) and its new tree has other nodes, it is whole again, until a tree
     /// comes that has these nodes.
@@ -167,7 +167,7 @@ impl Accel {
     /// Puts together anew what refits have moved: a partial rebuild. Queries answer as before, to the bit.
     ///
     /// Leaves of triangles and of spheres stay as they are, up to eight in each, and are put together as a build would put
-    /// triangles; shapes, instances and custom geometry are all put together anew. That takes about a tenth of the time of a build, and
+    /// triangles; shapes, instances and custom geometry are all put together anew. That takes about a third of the time of a build, and
     /// is as good where what shares a leaf has moved together, as the surfaces of bodies do that bend, turn or go their ways.
     /// Where it has not, as in a cloud of dust, only a build helps. A tree that would be worse than what there is is not taken.
     ///

@@ -152,9 +152,33 @@ impl Bounds {
         Self::outward(-self.lanes[axis + 4])
     }
 
+    /// One that has these planes, which are those of another; empty where they are inside out, or beyond all coordinates, as no box
+    /// has them.
+    pub(crate) fn of_planes(low: [f32; 3], high: [f32; 3]) -> Self {
+        const BEYOND: f32 = (Bounds::EMPTY_LANE as f64 / ONE) as f32;
+        if !(0..3).all(|axis| -BEYOND < low[axis] && low[axis] <= high[axis] && high[axis] < BEYOND) {
+            return Self::EMPTY;
+        }
+        let [low, high] = [low.map(|plane| Self::inward(-plane)), high.map(Self::inward)];
+        Self { lanes: [-low[0], -low[1], -low[2], 0, -high[0], -high[1], -high[2], 0] }
+    }
+
     fn outward(x: i32) -> f32 {
         let x = f64::from(x);
         round_up((x + x.abs() * f64::from(f32::EPSILON) + 2.0) / ONE)
+    }
+
+    /// One that comes to lie there.
+    fn inward(plane: f32) -> i32 {
+        let near = f64::from(plane.next_down()) * ONE;
+        let mut x = (near - near.abs() * f64::from(f32::EPSILON) - 2.0).round() as i32;
+        while Self::outward(x) > plane {
+            x -= 1;
+        }
+        while Self::outward(x) < plane {
+            x += 1;
+        }
+        x
     }
 
     /// Twice where it begins and ends on an axis.
@@ -191,5 +215,38 @@ impl Bounds {
     #[inline(always)]
     pub(crate) fn center2_on(&self, axis: usize) -> i32 {
         self.lanes[axis] - self.lanes[axis + 4]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::scenes::Random;
+
+    #[test]
+    fn boxes_by_planes_have_these_planes() {
+        let mut random = Random(461);
+        for round in 0..200_000 {
+            let size = 2f64.powf(random.between(-28.0, 0.0));
+            let mut corner = || [0; 3].map(|_| (size * random.between(-1.0, 1.0)) as f32);
+            let (a, b) = (corner(), if round % 5 == 0 { [0.0, 1.0, -1.0] } else { corner() });
+            let bounds = Bounds::new(
+                std::array::from_fn(|axis| a[axis].min(b[axis])),
+                std::array::from_fn(|axis| a[axis].max(b[axis])),
+                7,
+                8,
+            );
+            let planes = |bounds: &Bounds| {
+                let low: [f32; 3] = std::array::from_fn(|axis| bounds.low_plane(axis));
+                (low, std::array::from_fn(|axis| bounds.high_plane(axis)))
+            };
+            let (low, high) = planes(&bounds);
+            assert_eq!(planes(&Bounds::of_planes(low, high)), (low, high), "{bounds:?}");
+        }
+        let (low, high) = ([0, 1, 2].map(|axis| Bounds::EMPTY.low_plane(axis)), [0.0; 3]);
+        assert_eq!(Bounds::of_planes(low, high).half_area(), 0.0);
+        for hostile in [f32::NAN, f32::INFINITY, -f32::INFINITY, f32::MAX, -1e9] {
+            assert_eq!(Bounds::of_planes([hostile; 3], [hostile.max(0.5); 3]).half_area(), 0.0);
+        }
     }
 }

@@ -15,7 +15,7 @@ use crate::hulls::Hulls;
 use crate::node::tag;
 use crate::prepare::{self, take_apart};
 use crate::primitive::{Bounds, Kind, Primitive, Traits};
-use crate::refit::{LeafBoxes, check_places, cost};
+use crate::refit::{Places, check_places, cost};
 use crate::single::Questions;
 use crate::triangles::BLOCK;
 use crate::{Accel, BuildOptions};
@@ -47,23 +47,24 @@ pub(crate) fn rebuild_partially(accel: &mut Accel, options: &BuildOptions) -> f6
 fn over_leaves(accel: &Accel, effort: Effort) -> Option<Relaid> {
     let Accel { geometries, tree, units, .. } = accel;
     tree.root.filter(|root| root >> tag::SHIFT == tag::INNER)?;
-    let boxes = LeafBoxes::of(accel, units, &boxes_of_entries(accel)?);
-    let named = |(entry, bounds): (&Entry, &Bounds)| bounds.with_names(entry.geometry, entry.primitive());
-    let mut primitives: Vec<Primitive> = tree.entries.iter().zip(&boxes.entries).map(named).collect();
+    let mut primitives = entries_of(accel)?;
     // Every leaf is as a geometry of its own, behind the others, with one sphere in it.
     let mut traits: Vec<Traits> = geometries.iter().map(prepare::traits_of).collect();
     let first = traits.len();
     let mut leaves = Vec::new();
-    for &child in tree.nodes.iter().flat_map(|node| &node.children[..node.len()]) {
-        let blocks = match child >> tag::SHIFT {
-            tag::TRIANGLES => &boxes.blocks[tree.numbers(child)],
-            tag::SPHERES => &boxes.sphere_blocks[tag::blocks(child)],
-            _ => continue,
-        };
-        primitives.push(LeafBoxes::around(blocks).with_names(traits.len() as u32, 0));
-        let cost = Traits::COST_OF_PACKED * (blocks.len() * BLOCK) as u32;
-        traits.push(Traits { kind: Kind::Sphere, cost, most: 1 });
-        leaves.push(child);
+    for node in &*tree.nodes {
+        for (lane, &child) in node.children[..node.len()].iter().enumerate() {
+            let blocks = match child >> tag::SHIFT {
+                tag::TRIANGLES => tree.numbers(child).len(),
+                tag::SPHERES => tag::blocks(child).len(),
+                _ => continue,
+            };
+            let plane = |side: usize| [0, 2, 4].map(|axis| node.planes[axis + side][lane]);
+            primitives.push(Bounds::of_planes(plane(0), plane(1)).with_names(traits.len() as u32, 0));
+            let cost = Traits::COST_OF_PACKED * (blocks * BLOCK) as u32;
+            traits.push(Traits { kind: Kind::Sphere, cost, most: 1 });
+            leaves.push(child);
+        }
     }
     let nothing = &mut Boxes::empty(0);
     let grown = binary_tree(accel.level, effort, primitives, nothing, &traits, geometries, units);
@@ -72,11 +73,17 @@ fn over_leaves(accel: &Accel, effort: Effort) -> Option<Relaid> {
     Some(layout.over_leaves(&names, |geometry| leaves[geometry as usize - first]))
 }
 
-/// The boxes of what stands in leaves of no packed kind; `None` where it does not fit the geometries.
-fn boxes_of_entries(accel: &Accel) -> Option<Vec<Option<Aabb>>> {
-    if accel.tree.entries.is_empty() {
+/// What stands in leaves of no packed kind, one by one; `None` where it does not fit the geometries.
+fn entries_of(accel: &Accel) -> Option<Vec<Primitive>> {
+    let entries = &accel.tree.entries;
+    if entries.is_empty() {
         return Some(Vec::new());
     }
     let parts = take_apart(&accel.geometries).ok()?;
-    Some(check_places(accel, &parts).ok()?.boxes)
+    let Places { boxes, .. } = check_places(accel, &parts).ok()?;
+    let around = |(entry, bounds): (&Entry, Option<Aabb>)| {
+        let bounds = bounds.map_or(Bounds::EMPTY, |bounds| Bounds::near(&accel.units, &bounds, 0, 0));
+        bounds.with_names(entry.geometry, entry.primitive())
+    };
+    Some(entries.iter().zip(boxes).map(around).collect())
 }

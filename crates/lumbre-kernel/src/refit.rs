@@ -122,54 +122,13 @@ pub(crate) fn check_places(accel: &Accel, parts: &Parts) -> Result<Places, Refit
     entry_boxes(accel, parts)
 }
 
-/// The boxes of what stands in the leaves of a tree.
-pub(crate) struct LeafBoxes {
-    /// Of each block of triangles.
-    pub(crate) blocks: Vec<Bounds>,
-    /// Of each block of spheres.
-    pub(crate) sphere_blocks: Vec<Bounds>,
-    /// Of each entry.
-    pub(crate) entries: Vec<Bounds>,
-}
-
-impl LeafBoxes {
-    /// By the geometries; those of entries are given.
-    pub(crate) fn of(accel: &Accel, units: &Units, entries: &[Option<Aabb>]) -> Self {
-        let Accel { geometries, tree, .. } = accel;
-        let carvers = Carver::of_all(geometries, units);
-        let cells = &*tree.cells;
-        let block_box = |(number, names): (usize, &BlockNames)| match &carvers[names.geometry as usize] {
-            Some(carver) => block_box(names, cells_in(cells, number), carver),
-            None => Bounds::EMPTY,
-        };
-        let sphere_block_box = |names: &BlockNames| match &geometries[names.geometry as usize].kind {
-            GeometryKind::Spheres(cloud) => sphere_block_box(names, cloud, units),
-            _ => Bounds::EMPTY,
-        };
-        let near =
-            |bounds: &Option<Aabb>| bounds.map_or(Bounds::EMPTY, |bounds| Bounds::near(units, &bounds, 0, 0));
-        Self {
-            blocks: tree.names.par_iter().enumerate().with_min_len(256).map(block_box).collect(),
-            sphere_blocks: tree.sphere_names.par_iter().with_min_len(256).map(sphere_block_box).collect(),
-            entries: entries.iter().map(near).collect(),
-        }
-    }
-
-    /// Around a leaf of these blocks.
-    pub(crate) fn around(blocks: &[Bounds]) -> Bounds {
-        let mut around = Bounds::EMPTY;
-        blocks.iter().for_each(|bounds| around.grow(bounds));
-        around
-    }
-}
-
 /// Gives the nodes, spheres and entries of a tree what its geometries say, whose parts and places these are. Triangles are packed
 /// already.
 pub(crate) fn fit(accel: &mut Accel, parts: Parts, places: Places) {
     let Places { boxes, starts } = places;
-    let units = units_of(&accel.geometries, &parts);
-    let boxes = LeafBoxes::of(accel, &units, &boxes);
     let geometries = &accel.geometries;
+    let units = units_of(geometries, &parts);
+    let carvers = Carver::of_all(geometries, &units);
     let tree = &mut accel.tree;
     for (place, start) in starts {
         let old = tree.entries[place];
@@ -177,13 +136,32 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts, places: Places) {
             tree.entries.to_mut()[place] = Entry::new(old.geometry, start.word(), old.is_last());
         }
     }
-    tree.sphere_blocks.to_mut().par_iter_mut().zip(tree.sphere_names.par_iter()).with_min_len(256).for_each(
-        |(block, names)| {
-            if let GeometryKind::Spheres(cloud) = &geometries[names.geometry as usize].kind {
-                fill_sphere_block(block, names, cloud);
-            }
-        },
-    );
+    let cells = &*tree.cells;
+    let block_boxes: Vec<Bounds> = tree
+        .names
+        .par_iter()
+        .enumerate()
+        .with_min_len(256)
+        .map(|(number, names)| match &carvers[names.geometry as usize] {
+            Some(carver) => block_box(names, cells_in(cells, number), carver),
+            None => Bounds::EMPTY,
+        })
+        .collect();
+    let cloud_boxes: Vec<Bounds> = tree
+        .sphere_blocks
+        .to_mut()
+        .par_iter_mut()
+        .zip(tree.sphere_names.par_iter())
+        .with_min_len(256)
+        .map(|(block, names)| match &geometries[names.geometry as usize].kind {
+            GeometryKind::Spheres(cloud) => fill_sphere_block(block, names, cloud, &units),
+            _ => Bounds::EMPTY,
+        })
+        .collect();
+    let entry_boxes: Vec<Bounds> = boxes
+        .iter()
+        .map(|boxed| boxed.map_or(Bounds::EMPTY, |bounds| Bounds::near(&units, &bounds, 0, 0)))
+        .collect();
 
     // Children stand behind their parents.
     let mut node_boxes = vec![Bounds::EMPTY; tree.nodes.len()];
@@ -199,11 +177,13 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts, places: Places) {
                 tag::INNER => around = node_boxes[first],
                 tag::TRIANGLES => {
                     let numbers = blocks.numbers(child).unwrap_or_default();
-                    around = LeafBoxes::around(&boxes.blocks[numbers]);
+                    block_boxes[numbers].iter().for_each(|bounds| around.grow(bounds));
                 }
-                tag::SPHERES => around = LeafBoxes::around(&boxes.sphere_blocks[tag::blocks(child)]),
+                tag::SPHERES => {
+                    cloud_boxes[tag::blocks(child)].iter().for_each(|bounds| around.grow(bounds));
+                }
                 _ => {
-                    for (entry, bounds) in tree.entries[first..].iter().zip(&boxes.entries[first..]) {
+                    for (entry, bounds) in tree.entries[first..].iter().zip(&entry_boxes[first..]) {
                         around.grow(bounds);
                         if entry.is_last() {
                             break;
@@ -383,23 +363,27 @@ fn block_box(names: &BlockNames, cells: &[LaneCell], carver: &Carver) -> Bounds 
     around
 }
 
-/// The box around the spheres of a block; those without a radius have none.
-fn sphere_block_box(names: &BlockNames, cloud: &SphereCloud, units: &Units) -> Bounds {
+/// Takes the spheres over; one without a radius becomes one that is never hit.
+fn fill_sphere_block(
+    block: &mut SphereBlock,
+    names: &BlockNames,
+    cloud: &SphereCloud,
+    units: &Units,
+) -> Bounds {
     let mut around = Bounds::EMPTY;
-    for primitive in names.primitives() {
-        if has_radius(&cloud.spheres[primitive as usize]) {
+    for (lane, &primitive) in names.primitives.iter().enumerate() {
+        if primitive == u32::MAX {
+            continue;
+        }
+        let sphere = cloud.spheres[primitive as usize];
+        if has_radius(&sphere) {
             around.grow(&box_of(cloud, primitive, units));
+            block.put(lane, sphere);
+        } else {
+            block.put(lane, [f32::NAN; 4]);
         }
     }
     around
-}
-
-/// Takes the spheres over; one without a radius becomes one that is never hit.
-fn fill_sphere_block(block: &mut SphereBlock, names: &BlockNames, cloud: &SphereCloud) {
-    for (lane, primitive) in names.primitives().enumerate() {
-        let sphere = cloud.spheres[primitive as usize];
-        block.put(lane, if has_radius(&sphere) { sphere } else { [f32::NAN; 4] });
-    }
 }
 
 /// How many boxes a ray meets, about: the areas of all, as parts of the area of the whole.
