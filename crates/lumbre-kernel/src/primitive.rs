@@ -181,10 +181,10 @@ impl Bounds {
         x
     }
 
-    /// Twice where it begins and ends on an axis.
+    /// Twice where it begins and ends on an axis; of an empty one, anywhere.
     #[inline(always)]
     pub(crate) fn range2(&self, axis: usize) -> [i32; 2] {
-        [2 * self.lanes[axis], -2 * self.lanes[axis + 4]]
+        [self.lanes[axis].wrapping_mul(2), self.lanes[axis + 4].wrapping_mul(-2)]
     }
 
     /// Takes another box in; the names are lost.
