@@ -177,6 +177,14 @@ impl Accel {
         rebuild::rebuild_partially(self, options)
     }
 
+    /// Makes anew what searches keep of the tree, which has changed.
+    pub(crate) fn follow_tree(&mut self) {
+        self.single = SingleStart::new(&self.holds, &self.units, self.tree.root);
+        self.questions = Questions::new(self.level, self.single.as_ref());
+        self.hulls = Hulls::new(&self.geometries, &self.tree.entries, &self.units);
+        self.moments = OnceLock::new();
+    }
+
     /// How the tree is put together, as bytes for a file: some six a triangle, whatever the machine. The geometries are not
     /// in them. Trees that stand in this one as instances are saved by themselves.
     pub fn to_bytes(&self) -> Vec<u8> {

@@ -10,13 +10,10 @@ use lumbre_geometry::Aabb;
 use crate::boxes::Boxes;
 use crate::build::{Effort, Grown, PARALLEL, binary_tree};
 use crate::collapse::{Entry, Relaid, lay_out};
-use crate::holds::SingleStart;
-use crate::hulls::Hulls;
 use crate::node::tag;
 use crate::prepare::{self, take_apart};
 use crate::primitive::{Bounds, Kind, Primitive, Traits};
 use crate::refit::{Places, check_places, cost};
-use crate::single::Questions;
 use crate::triangles::BLOCK;
 use crate::{Accel, BuildOptions};
 
@@ -35,10 +32,7 @@ pub(crate) fn rebuild_partially(accel: &mut Accel, options: &BuildOptions) -> f6
         best = new_cost;
         let tree = &mut accel.tree;
         (tree.nodes, tree.entries, tree.root) = (nodes.into(), entries.into(), Some(root));
-        accel.single = SingleStart::new(&accel.holds, &accel.units, accel.tree.root);
-        accel.questions = Questions::new(accel.level, accel.single.as_ref());
-        accel.hulls = Hulls::new(&accel.geometries, &accel.tree.entries, &accel.units);
-        accel.moments = Default::default();
+        accel.follow_tree();
     }
     if built_cost > 0.0 { best / built_cost } else { 1.0 }
 }

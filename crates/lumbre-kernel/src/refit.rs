@@ -1,7 +1,6 @@
 //! Moving what stands in a tree without building it again.
 
 use std::fmt;
-use std::sync::OnceLock;
 
 use lumbre_geometry::Aabb;
 use lumbre_math::DVec3;
@@ -11,13 +10,11 @@ use crate::blocks::{BlockNames, Blocks};
 use crate::carve::{Carver, LaneCell, cells_in, part_of};
 use crate::clouds::box_of;
 use crate::collapse::Entry;
-use crate::holds::{Holds, SingleStart};
-use crate::hulls::Hulls;
+use crate::holds::Holds;
 use crate::node::{Node, Units, tag};
 use crate::opening::{self, Families, Start};
 use crate::prepare::{Parts, has_area, take_apart, units_of};
 use crate::primitive::Bounds;
-use crate::single::Questions;
 use crate::spheres::{SphereBlock, has_radius};
 use crate::triangles::BLOCK;
 use crate::{Accel, BuildError, Geometry, GeometryKind, SphereCloud};
@@ -203,12 +200,9 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts, places: Places) {
     accel.holds = Holds::new(geometries, parts.largest_corner, parts.sphere_reach);
     accel.primitives = parts.count();
     accel.infinite = parts.infinite;
-    accel.single = SingleStart::new(&accel.holds, &units, accel.tree.root);
-    accel.questions = Questions::new(accel.level, accel.single.as_ref());
-    accel.hulls = Hulls::new(&accel.geometries, &accel.tree.entries, &units);
     accel.units = units;
     accel.bounds = parts.bounds;
-    accel.moments = OnceLock::new();
+    accel.follow_tree();
 }
 
 fn is_same_topology(old: &GeometryKind, new: &GeometryKind) -> bool {
