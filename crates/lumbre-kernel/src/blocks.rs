@@ -8,6 +8,7 @@
 use std::mem::offset_of;
 
 use bytemuck::{Pod, Zeroable};
+use lumbre_math::Vec3;
 use rayon::prelude::*;
 
 use crate::build::Name;
@@ -242,6 +243,16 @@ impl<'a> Blocks<'a> {
         Some(first..first + usize::from(head.followers) + 1)
     }
 
+    /// The blocks of a leaf.
+    pub(crate) fn leaf(self, leaf: u32) -> impl Iterator<Item = &'a TriangleBlock> {
+        let mut place = Some(leaf & tag::PLACE);
+        std::iter::from_fn(move || {
+            let block = self.at(place?)?;
+            place = block.next(place?);
+            Some(block)
+        })
+    }
+
     /// How many blocks of its leaf stand behind each of so many.
     pub(crate) fn followers(self, count: usize) -> Vec<u8> {
         let mut followers = Vec::with_capacity(count);
@@ -461,9 +472,7 @@ impl PackShare<'_> {
             let mesh = mesh(geometries, names.geometry);
             let room = shared.room();
             let own = units.split_off_mut(..units_of(room)).expect("there is room for all");
-            let (head, coordinates) =
-                bytemuck::cast_slice_mut::<Unit, u8>(own).split_at_mut(size_of::<Head>());
-            let coordinates: &mut [f32] = bytemuck::cast_slice_mut(coordinates);
+            let (head, coordinates) = parts_of_first(own);
             let mut taken = 0;
             for (lane, primitive) in names.primitives().enumerate() {
                 let triangle = mesh.indices[primitive as usize];
@@ -476,11 +485,105 @@ impl PackShare<'_> {
                     }
                 }
             }
-            let own_head =
-                Head { number, taken, room: shared.room, followers, rest: 0, corners: shared.corners };
-            head.copy_from_slice(bytemuck::bytes_of(&own_head));
+            *head = Head { number, taken, room: shared.room, followers, rest: 0, corners: shared.corners };
         }
     }
+}
+
+/// Puts the triangles of blocks that [`pack`] made, with these names, where their vertices are now. False where triangles lie apart
+/// that shared a vertex: the blocks, some of which are changed then, are to be packed again. Those without an area are left out, as
+/// there.
+pub(crate) fn move_triangles(
+    level: Level,
+    geometries: &[Geometry],
+    names: &[BlockNames],
+    may_lack_area: bool,
+    mut units: &mut [Unit],
+) -> bool {
+    let share = share_of(names.len());
+    let mut shares = Vec::with_capacity(names.len().div_ceil(share));
+    for names in names.chunks(share) {
+        let mut len = 0;
+        for _ in names {
+            len += units_of(Blocks(units).block(len as u32).room());
+        }
+        let units = units.split_off_mut(..len).expect("their heads are there");
+        shares.push(MoveShare { geometries, names, may_lack_area, units });
+    }
+    shares.into_par_iter().all(|share| level.run(share))
+}
+
+/// Some of the triangles to be moved, as [`move_triangles`] does.
+struct MoveShare<'a> {
+    geometries: &'a [Geometry],
+    names: &'a [BlockNames],
+    may_lack_area: bool,
+    units: &'a mut [Unit],
+}
+
+impl Task for MoveShare<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> bool {
+        let Self { geometries, names: all, may_lack_area, mut units } = self;
+        let mut do_fit = true;
+        for (place, names) in all.iter().enumerate() {
+            // Where the vertices of the next are, and where that stands of the one behind it.
+            if let Some(next) = all.get(place + 1) {
+                let mesh = mesh(geometries, next.geometry);
+                for primitive in next.primitives() {
+                    for vertex in mesh.indices[primitive as usize] {
+                        lanes::fetch(&mesh.positions[vertex as usize]);
+                    }
+                }
+            }
+            if let Some(later) = all.get(place + 2) {
+                let mesh = mesh(geometries, later.geometry);
+                for primitive in later.primitives() {
+                    lanes::fetch(&mesh.indices[primitive as usize]);
+                }
+            }
+            let mesh = mesh(geometries, names.geometry);
+            let (head, coordinates) = parts_of_first(units);
+            let room = usize::from(head.room);
+            let vertices =
+                |corner: usize, lane: usize| vertex_at(&head.corners, room > MOST_SHARED, corner, lane);
+            let mut corners = [[Vec3::ZERO; 3]; BLOCK];
+            let (mut taken, mut len) = (0, 0);
+            for (lane, primitive) in names.primitives().enumerate() {
+                let triangle = mesh.indices[primitive as usize];
+                corners[lane] = triangle.map(|vertex| mesh.positions[vertex as usize]);
+                taken |= u8::from(!may_lack_area || has_area(&corners[lane])) << lane;
+                for corner in 0..3 {
+                    let place = vertices(corner, lane);
+                    for axis in 0..3 {
+                        coordinates[axis * room + place] = corners[lane][corner][axis];
+                    }
+                }
+                len += 1;
+            }
+            for (lane, corners) in corners[..len].iter().enumerate() {
+                for corner in 0..3 {
+                    let place = vertices(corner, lane);
+                    for axis in 0..3 {
+                        do_fit &=
+                            coordinates[axis * room + place].to_bits() == corners[corner][axis].to_bits();
+                    }
+                }
+            }
+            head.taken = taken;
+            units = &mut units[units_of(room)..];
+        }
+        do_fit
+    }
+}
+
+/// The head of the first of these blocks, and the coordinates in it, with what is behind them.
+#[inline(always)]
+fn parts_of_first(units: &mut [Unit]) -> (&mut Head, &mut [f32]) {
+    let (head, coordinates) = bytemuck::cast_slice_mut::<Unit, u8>(units).split_at_mut(size_of::<Head>());
+    (bytemuck::from_bytes_mut(head), bytemuck::cast_slice_mut(coordinates))
 }
 
 fn mesh(geometries: &[Geometry], geometry: u32) -> &TriangleMesh {

@@ -117,11 +117,6 @@ impl<'a> Carver<'a> {
     }
 
     #[inline(always)]
-    pub(crate) fn mesh(&self) -> &'a TriangleMesh {
-        self.mesh
-    }
-
-    #[inline(always)]
     pub(crate) fn corners(&self, triangle: u32) -> Corners {
         self.mesh.indices[triangle as usize].map(|vertex| {
             let position = self.mesh.positions[vertex as usize].as_dvec3();
@@ -144,6 +139,11 @@ impl<'a> Carver<'a> {
     pub(crate) fn whole(&self, geometry: u32, triangle: u32) -> Bounds {
         let corners = self.mesh.indices[triangle as usize].map(|vertex| self.mesh.positions[vertex as usize]);
         self.boxer.around::<Portable>(&corners, geometry, triangle)
+    }
+
+    /// The box around triangles that stand in the mesh's space.
+    pub(crate) fn around(&self, triangles: impl Iterator<Item = [[f32; 3]; 3]>) -> Bounds {
+        self.boxer.around_all::<Portable>(triangles)
     }
 }
 

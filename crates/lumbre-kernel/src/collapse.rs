@@ -15,6 +15,7 @@ use crate::carve::{self, Cell, LaneCell};
 use crate::lanes::Level;
 use crate::node::{Node, WIDTH, tag};
 use crate::primitive::{Bounds, Kind, Primitive, Traits};
+use crate::refit::has_same_indices;
 use crate::spheres::SphereBlock;
 use crate::store::Store;
 use crate::triangles::BLOCK;
@@ -94,19 +95,40 @@ impl Packed {
         self.blocks().numbers(leaf).expect("references lead to blocks")
     }
 
-    /// Packs the triangles of a packed tree again, as the geometries are now. What fails leaves everything as it was.
+    /// Puts the triangles of a packed tree where its geometries, which stood elsewhere before, have them now. Where there may be none
+    /// without an area, it is not asked. What fails leaves everything as it was.
     ///
     /// # Errors
     /// [`BuildError::TooMany`] when there is more than references can name.
-    pub(crate) fn pack_again(&mut self, level: Level, geometries: &[Geometry]) -> Result<(), BuildError> {
+    pub(crate) fn move_triangles(
+        &mut self,
+        level: Level,
+        geometries: &[Geometry],
+        before: &[Geometry],
+        may_lack_area: bool,
+    ) -> Result<(), BuildError> {
+        // Those that have other vertices may share more of them than before.
+        let are_same = before.iter().zip(geometries).all(|(old, new)| has_same_indices(&old.kind, &new.kind));
+        if are_same && self.put_triangles(level, geometries, may_lack_area) {
+            return Ok(());
+        }
         let followers = self.blocks().followers(self.names.len());
-        let before = std::mem::take(&mut self.blocks);
-        let number_of = |leaf| Blocks::new(&before).numbers(leaf).map_or(0, |numbers| numbers.start);
-        let packed = self.pack(level, geometries, &followers, true, number_of);
+        let old = std::mem::take(&mut self.blocks);
+        let number_of = |leaf| Blocks::new(&old).numbers(leaf).map_or(0, |numbers| numbers.start);
+        let packed = self.pack(level, geometries, &followers, may_lack_area, number_of);
         if packed.is_err() {
-            self.blocks = before;
+            self.blocks = old;
+            if are_same {
+                // Some may have moved.
+                self.put_triangles(level, before, true);
+            }
         }
         packed
+    }
+
+    /// See [`blocks::move_triangles`].
+    fn put_triangles(&mut self, level: Level, geometries: &[Geometry], may_lack_area: bool) -> bool {
+        blocks::move_triangles(level, geometries, &self.names, may_lack_area, self.blocks.to_mut())
     }
 
     /// Packs the triangles, as the names and the nodes say, whose references number blocks. Without an area they are left out;
@@ -846,11 +868,7 @@ fn cut(spans: &mut [Span], first: u32, count: u32) {
 fn node_over(children: &[Cursor], references: [u32; WIDTH]) -> Node {
     let mut node = Node { children: references, ..Node::EMPTY };
     for (lane, child) in children.iter().enumerate() {
-        let bounds = child.bounds();
-        for axis in 0..3 {
-            node.planes[2 * axis][lane] = bounds.low_plane(axis);
-            node.planes[2 * axis + 1][lane] = bounds.high_plane(axis);
-        }
+        child.bounds().put(&mut node, lane);
     }
     node
 }

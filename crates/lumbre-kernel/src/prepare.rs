@@ -148,6 +148,8 @@ pub(crate) struct Parts {
     pub(crate) surveys: Vec<Survey>,
     /// Of all meshes.
     pub(crate) triangles: usize,
+    /// Whether there are others, which have no area.
+    pub(crate) has_flat: bool,
     /// No corner of a triangle has a larger coordinate, relative to its mesh's origin.
     pub(crate) largest_corner: f32,
     /// Of every cloud of spheres.
@@ -183,6 +185,7 @@ pub(crate) fn take_apart(geometries: &[Geometry]) -> Result<Parts, BuildError> {
         infinite: Vec::new(),
         surveys: Vec::new(),
         triangles: 0,
+        has_flat: false,
         largest_corner: 0.0,
         clouds: Vec::new(),
         spheres: 0,
@@ -200,6 +203,7 @@ pub(crate) fn take_apart(geometries: &[Geometry]) -> Result<Parts, BuildError> {
                 parts.largest_corner = parts.largest_corner.max(largest);
                 parts.tree_bounds = parts.tree_bounds.union(bounds);
                 parts.triangles += survey.triangles;
+                parts.has_flat |= survey.triangles < mesh.indices.len();
                 parts.surveys.push(survey);
             }
             GeometryKind::Spheres(cloud) => {
@@ -465,7 +469,22 @@ impl Boxer {
 
     #[inline(always)]
     pub(crate) fn around<L: Lanes>(&self, corners: &[Vec3; 3], first: u32, second: u32) -> Bounds {
-        let MeshBox(around) = MeshBox::around(corners);
+        self.of_box::<L>(&MeshBox::around(corners)).with_names(first, second)
+    }
+
+    /// The box around all of these: the same as around their boxes.
+    #[inline(always)]
+    pub(crate) fn around_all<L: Lanes>(&self, triangles: impl Iterator<Item = [[f32; 3]; 3]>) -> Bounds {
+        let (mut around, mut is_any) = (MeshBox::EMPTY, false);
+        for corners in triangles {
+            around.grow(&MeshBox::around(&corners.map(Vec3::from_array)));
+            is_any = true;
+        }
+        if is_any { self.of_box::<L>(&around) } else { Bounds::EMPTY }
+    }
+
+    #[inline(always)]
+    fn of_box<L: Lanes>(&self, MeshBox(around): &MeshBox) -> Bounds {
         let mut numbers = [0.0; 8];
         if self.is_single {
             let scale = self.scale as f32;
@@ -477,7 +496,7 @@ impl Boxer {
                 numbers[lane] = ((f64::from(around[lane]) - self.shift[lane]) * self.scale) as f32;
             }
         }
-        Bounds::of_lanes::<L>(numbers).with_names(first, second)
+        Bounds::of_lanes::<L>(numbers)
     }
 }
 

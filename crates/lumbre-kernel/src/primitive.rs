@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use lumbre_geometry::Aabb;
 
 use crate::lanes::Lanes;
-use crate::node::{Units, round_up};
+use crate::node::{Node, Units, round_up};
 
 /// The kind of a primitive. A leaf holds one kind, triangles of one mesh, and spheres of one cloud.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -150,6 +150,15 @@ impl Bounds {
     #[inline]
     pub(crate) fn high_plane(&self, axis: usize) -> f32 {
         Self::outward(-self.lanes[axis + 4])
+    }
+
+    /// Makes it the box of a node's child.
+    #[inline]
+    pub(crate) fn put(&self, node: &mut Node, lane: usize) {
+        for axis in 0..3 {
+            node.planes[2 * axis][lane] = self.low_plane(axis);
+            node.planes[2 * axis + 1][lane] = self.high_plane(axis);
+        }
     }
 
     /// One that has these planes, which are those of another; empty where they are inside out, or beyond all coordinates, as no box

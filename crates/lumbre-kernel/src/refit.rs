@@ -6,7 +6,7 @@ use lumbre_geometry::Aabb;
 use lumbre_math::DVec3;
 use rayon::prelude::*;
 
-use crate::blocks::{BlockNames, Blocks};
+use crate::blocks::{BlockNames, Blocks, TriangleBlock};
 use crate::carve::{Carver, LaneCell, cells_in, part_of};
 use crate::clouds::box_of;
 use crate::collapse::Entry;
@@ -88,8 +88,8 @@ pub(crate) fn refit(accel: &mut Accel, geometries: Vec<Geometry>) -> Result<f64,
     let built_cost = accel.built_cost.unwrap_or_else(|| cost(&accel.tree.nodes));
     let old = std::mem::replace(&mut accel.geometries, geometries);
     let places = check_places(accel, &parts).and_then(|places| {
-        // Triangles may share other vertices than before.
-        accel.tree.pack_again(accel.level, &accel.geometries).map_err(RefitError::Unsound)?;
+        let (level, geometries) = (accel.level, &accel.geometries);
+        accel.tree.move_triangles(level, geometries, &old, parts.has_flat).map_err(RefitError::Unsound)?;
         Ok(places)
     });
     match places {
@@ -133,17 +133,6 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts, places: Places) {
             tree.entries.to_mut()[place] = Entry::new(old.geometry, start.word(), old.is_last());
         }
     }
-    let cells = &*tree.cells;
-    let block_boxes: Vec<Bounds> = tree
-        .names
-        .par_iter()
-        .enumerate()
-        .with_min_len(256)
-        .map(|(number, names)| match &carvers[names.geometry as usize] {
-            Some(carver) => block_box(names, cells_in(cells, number), carver),
-            None => Bounds::EMPTY,
-        })
-        .collect();
     let cloud_boxes: Vec<Bounds> = tree
         .sphere_blocks
         .to_mut()
@@ -160,27 +149,31 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts, places: Places) {
         .map(|boxed| boxed.map_or(Bounds::EMPTY, |bounds| Bounds::near(&units, &bounds, 0, 0)))
         .collect();
 
-    // Children stand behind their parents.
+    // What is in leaves, then what is above: children stand behind their parents.
     let mut node_boxes = vec![Bounds::EMPTY; tree.nodes.len()];
     let (nodes, blocks) = (tree.nodes.to_mut(), Blocks::new(&tree.blocks));
-    for place in (0..nodes.len()).rev() {
-        let node = &mut nodes[place];
-        let mut whole = Bounds::EMPTY;
+    let (names, entries, cells) = (&*tree.names, &*tree.entries, &*tree.cells);
+    nodes.par_iter_mut().zip(&mut node_boxes).with_min_len(64).for_each(|(node, whole)| {
         for lane in 0..node.len() {
             let child = node.children[lane];
             let first = (child & tag::PLACE) as usize;
             let mut around = Bounds::EMPTY;
             match child >> tag::SHIFT {
-                tag::INNER => around = node_boxes[first],
+                tag::INNER => continue,
                 tag::TRIANGLES => {
-                    let numbers = blocks.numbers(child).unwrap_or_default();
-                    block_boxes[numbers].iter().for_each(|bounds| around.grow(bounds));
+                    for block in blocks.leaf(child) {
+                        let number = block.number() as usize;
+                        let names = &names[number];
+                        if let Some(carver) = &carvers[names.geometry as usize] {
+                            around.grow(&block_box(block, names, cells_in(cells, number), carver));
+                        }
+                    }
                 }
                 tag::SPHERES => {
                     cloud_boxes[tag::blocks(child)].iter().for_each(|bounds| around.grow(bounds));
                 }
                 _ => {
-                    for (entry, bounds) in tree.entries[first..].iter().zip(&entry_boxes[first..]) {
+                    for (entry, bounds) in entries[first..].iter().zip(&entry_boxes[first..]) {
                         around.grow(bounds);
                         if entry.is_last() {
                             break;
@@ -188,13 +181,20 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts, places: Places) {
                     }
                 }
             }
-            for axis in 0..3 {
-                node.planes[2 * axis][lane] = around.low_plane(axis);
-                node.planes[2 * axis + 1][lane] = around.high_plane(axis);
-            }
+            around.put(node, lane);
             whole.grow(&around);
         }
-        node_boxes[place] = whole;
+    });
+    for place in (0..nodes.len()).rev() {
+        let node = &mut nodes[place];
+        for lane in 0..node.len() {
+            let child = node.children[lane];
+            if child >> tag::SHIFT == tag::INNER {
+                let around = node_boxes[(child & tag::PLACE) as usize];
+                around.put(node, lane);
+                node_boxes[place].grow(&around);
+            }
+        }
     }
 
     accel.holds = Holds::new(geometries, parts.largest_corner, parts.sphere_reach);
@@ -336,23 +336,29 @@ fn entry_boxes(accel: &Accel, parts: &Parts) -> Result<Places, RefitError> {
     Ok(Places { boxes, starts })
 }
 
-/// The box around the triangles of a block; those without area have none. Of those that are in parts, these are `cells`.
-fn block_box(names: &BlockNames, cells: &[LaneCell], carver: &Carver) -> Bounds {
-    let mut around = Bounds::EMPTY;
-    for (lane, primitive) in names.primitives().enumerate() {
-        let mesh = carver.mesh();
-        let corners = mesh.indices[primitive as usize].map(|vertex| mesh.positions[vertex as usize]);
-        if !has_area(&corners) {
-            continue;
+/// Whether the triangles of meshes name the same vertices.
+pub(crate) fn has_same_indices(old: &GeometryKind, new: &GeometryKind) -> bool {
+    const CHUNK: usize = 1 << 14;
+    match (old, new) {
+        (GeometryKind::Mesh(old), GeometryKind::Mesh(new)) => {
+            let (old, new) = (&old.indices, &new.indices);
+            let chunks = old.par_chunks(CHUNK).zip(new.par_chunks(CHUNK));
+            old.len() == new.len() && chunks.all(|(old, new)| old.as_flattened() == new.as_flattened())
         }
-        match cells.iter().find(|at| at.lane as usize % BLOCK == lane) {
-            None => around.grow(&carver.whole(names.geometry, primitive)),
-            // What has moved may have left a cell.
-            Some(at) => {
-                let part = part_of(&carver.corners(primitive), &at.cell);
-                part.iter().for_each(|part| around.grow(part));
-            }
-        }
+        _ => true,
+    }
+}
+
+/// The box around the triangles of a block with these names, of which those in parts are `cells`.
+fn block_box(block: &TriangleBlock, names: &BlockNames, cells: &[LaneCell], carver: &Carver) -> Bounds {
+    let lane_of = |at: &LaneCell| at.lane as usize % BLOCK;
+    let is_there = |lane: usize| block.taken() >> lane & 1 != 0;
+    let is_whole = |lane: &usize| is_there(*lane) && cells.iter().all(|at| lane_of(at) != *lane);
+    let mut around = carver.around((0..BLOCK).filter(is_whole).map(|lane| block.triangle(lane)));
+    for at in cells.iter().filter(|at| is_there(lane_of(at))) {
+        // What has moved may have left a cell.
+        let part = part_of(&carver.corners(names.primitives[lane_of(at)]), &at.cell);
+        part.iter().for_each(|part| around.grow(part));
     }
     around
 }

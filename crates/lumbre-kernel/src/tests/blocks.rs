@@ -15,7 +15,7 @@ use super::scenes::Random;
 use crate::blocks::{self, BlockNames, Blocks, TriangleBlock, Unit};
 use crate::lanes::{Level, corners_at, equals_before_at, meet_triangles_at, truncated_at};
 use crate::triangles::{BLOCK, BlockRay, Meeting, Shear, intersect};
-use crate::{Accel, BuildOptions, Geometry, GeometryKind, TriangleMesh};
+use crate::{Accel, BuildOptions, Geometry, GeometryKind, Preset, TriangleMesh};
 
 struct Tally {
     hits: u32,
@@ -302,6 +302,76 @@ fn vertices_in_one_place_are_one_to_a_block() {
     let shared = Accel::build(vec![geometry], &BuildOptions::default()).unwrap();
     let apart = Accel::build(vec![apart], &BuildOptions::default()).unwrap();
     assert_eq!(*shared.tree.blocks, *apart.tree.blocks);
+}
+
+/// The same mesh with its vertices elsewhere.
+fn with_positions(geometry: &Geometry, mut place: impl FnMut(usize, Vec3) -> Vec3) -> Geometry {
+    let GeometryKind::Mesh(mesh) = &geometry.kind else { unreachable!() };
+    let positions = mesh.positions.iter().enumerate().map(|(i, &p)| place(i, p)).collect();
+    let mesh = TriangleMesh { origin: mesh.origin, positions, indices: mesh.indices.clone() };
+    Geometry { id: geometry.id, kind: GeometryKind::Mesh(Arc::new(mesh)) }
+}
+
+#[test]
+fn triangles_that_move_stand_where_packing_puts_them() {
+    let mut random = Random(85);
+    for own in [0.0, 0.15, 1.0] {
+        let two = [grid(&mut random, own), grid(&mut random, 0.5 * own)];
+        let [second, third] = [0, 1].map(|step| {
+            // The second time, some are without an area.
+            let bent = |i: usize, p: Vec3| {
+                let is_flat = step == 0 && i % 7 == 0;
+                if is_flat { Vec3::new(3.0, 4.0, 5.0) } else { p + 2.0 * (p + i as f32).map(f32::sin) }
+            };
+            two.each_ref().map(|geometry| with_positions(geometry, bent)).to_vec()
+        });
+        for preset in [Preset::Fast, Preset::Balanced, Preset::Best] {
+            let mut accel = Accel::build(two.to_vec(), &BuildOptions { preset }).unwrap();
+            let first = accel.tree.blocks.to_vec();
+            for geometries in [&second, &third, &two.to_vec()] {
+                accel.refit(geometries.clone()).unwrap();
+                let again = Accel::from_bytes(&accel.to_bytes(), geometries.clone()).unwrap();
+                assert_eq!(accel.tree.names.len(), again.tree.names.len());
+                assert_eq!(
+                    bytemuck::cast_slice::<_, u8>(&accel.tree.nodes),
+                    bytemuck::cast_slice::<_, u8>(&again.tree.nodes)
+                );
+                assert_eq!(*accel.tree.blocks, *again.tree.blocks, "{preset:?}");
+            }
+            assert_eq!(*accel.tree.blocks, first);
+        }
+    }
+}
+
+#[test]
+fn triangles_that_come_apart_are_packed_again() {
+    let mut random = Random(86);
+    let shared = grid(&mut random, 0.0);
+    let GeometryKind::Mesh(mesh) = &shared.kind else { unreachable!() };
+    // Vertices of other names in the same places: no two triangles share one by name.
+    let positions: Vec<Vec3> = mesh.indices.iter().flatten().map(|&v| mesh.positions[v as usize]).collect();
+    let indices = (0..mesh.indices.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let together = TriangleMesh { origin: DVec3::ZERO, positions, indices };
+    let together = Geometry { id: 0, kind: GeometryKind::Mesh(Arc::new(together)) };
+    // One in the middle, by the least that there is; and all of them.
+    let one = with_positions(&together, |i, p| if i == 901 { p.map(f32::next_up) } else { p });
+    let all = with_positions(&together, |_, p| p + 0.1 * random.vector().as_vec3());
+    for apart in [one, all] {
+        let mut accel = Accel::build(vec![together.clone()], &BuildOptions::default()).unwrap();
+        let first = accel.tree.blocks.to_vec();
+        let mut units = first.clone();
+        let mut put = |geometry: &Geometry| {
+            let geometries = std::slice::from_ref(geometry);
+            blocks::move_triangles(accel.level, geometries, &accel.tree.names, true, &mut units)
+        };
+        assert!(!put(&apart));
+        assert!(put(&together));
+        assert_eq!(units, first);
+
+        accel.refit(vec![apart.clone()]).unwrap();
+        let again = Accel::from_bytes(&accel.to_bytes(), vec![apart.clone()]).unwrap();
+        assert_eq!(*accel.tree.blocks, *again.tree.blocks);
+    }
 }
 
 #[test]

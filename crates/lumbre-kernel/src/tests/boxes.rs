@@ -28,11 +28,7 @@ fn prepared(units: &Units, ray: &Ray) -> Option<BoxRay> {
 
 /// As the build does.
 fn put_box(node: &mut Node, lane: usize, units: &Units, bounds: &Aabb) {
-    let near = Bounds::near(units, bounds, 2, 3);
-    for axis in 0..3 {
-        node.planes[2 * axis][lane] = near.low_plane(axis);
-        node.planes[2 * axis + 1][lane] = near.high_plane(axis);
-    }
+    Bounds::near(units, bounds, 2, 3).put(node, lane);
 }
 
 /// A component such as makes trouble.
