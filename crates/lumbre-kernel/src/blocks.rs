@@ -549,26 +549,27 @@ impl Task for MoveShare<'_> {
             let room = usize::from(head.room);
             let vertices =
                 |corner: usize, lane: usize| vertex_at(&head.corners, room > MOST_SHARED, corner, lane);
-            let mut corners = [[Vec3::ZERO; 3]; BLOCK];
+            let mut triangles = [[Vec3::ZERO; 3]; BLOCK];
             let (mut taken, mut len) = (0, 0);
             for (lane, primitive) in names.primitives().enumerate() {
                 let triangle = mesh.indices[primitive as usize];
-                corners[lane] = triangle.map(|vertex| mesh.positions[vertex as usize]);
-                taken |= u8::from(!may_lack_area || has_area(&corners[lane])) << lane;
-                for corner in 0..3 {
+                let corners = triangle.map(|vertex| mesh.positions[vertex as usize]);
+                taken |= u8::from(!may_lack_area || has_area(&corners)) << lane;
+                for (corner, position) in corners.iter().enumerate() {
                     let place = vertices(corner, lane);
                     for axis in 0..3 {
-                        coordinates[axis * room + place] = corners[lane][corner][axis];
+                        coordinates[axis * room + place] = position[axis];
                     }
                 }
+                triangles[lane] = corners;
                 len += 1;
             }
-            for (lane, corners) in corners[..len].iter().enumerate() {
-                for corner in 0..3 {
+            for (lane, corners) in triangles[..len].iter().enumerate() {
+                for (corner, position) in corners.iter().enumerate() {
                     let place = vertices(corner, lane);
                     for axis in 0..3 {
-                        do_fit &=
-                            coordinates[axis * room + place].to_bits() == corners[corner][axis].to_bits();
+                        let stands = coordinates[axis * room + place];
+                        do_fit &= stands.to_bits() == position[axis].to_bits();
                     }
                 }
             }

@@ -320,7 +320,7 @@ fn triangles_that_move_stand_where_packing_puts_them() {
         let [second, third] = [0, 1].map(|step| {
             // The second time, some are without an area.
             let bent = |i: usize, p: Vec3| {
-                let is_flat = step == 0 && i % 7 == 0;
+                let is_flat = step == 0 && i.is_multiple_of(7);
                 if is_flat { Vec3::new(3.0, 4.0, 5.0) } else { p + 2.0 * (p + i as f32).map(f32::sin) }
             };
             two.each_ref().map(|geometry| with_positions(geometry, bent)).to_vec()
