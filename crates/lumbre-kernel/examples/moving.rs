@@ -44,7 +44,7 @@ type Result<T> = std::result::Result<T, Box<dyn std::error::Error + Send + Sync>
 
 fn main() -> Result<()> {
     let threads = match std::env::args().nth(1) {
-        Some(argument) => argument.parse().map_err(|_| format!("\"{argument}\" is no number of threads"))?,
+        Some(argument) => argument.parse().map_err(|_| format!("{argument} is no number of threads"))?,
         None => 1,
     };
     rayon::ThreadPoolBuilder::new().num_threads(threads).build()?.install(measure)

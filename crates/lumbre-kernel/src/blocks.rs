@@ -478,12 +478,7 @@ impl PackShare<'_> {
                 let triangle = mesh.indices[primitive as usize];
                 let corners = triangle.map(|vertex| mesh.positions[vertex as usize]);
                 taken |= u8::from(!may_lack_area || has_area(&corners)) << lane;
-                for (corner, position) in corners.iter().enumerate() {
-                    let place = shared.vertex_at(corner, lane);
-                    for axis in 0..3 {
-                        coordinates[axis * room + place] = position[axis];
-                    }
-                }
+                put_corners(coordinates, room, &corners, |corner| shared.vertex_at(corner, lane));
             }
             *head = Head { number, taken, room: shared.room, followers, rest: 0, corners: shared.corners };
         }
@@ -555,12 +550,7 @@ impl Task for MoveShare<'_> {
                 let triangle = mesh.indices[primitive as usize];
                 let corners = triangle.map(|vertex| mesh.positions[vertex as usize]);
                 taken |= u8::from(!may_lack_area || has_area(&corners)) << lane;
-                for (corner, position) in corners.iter().enumerate() {
-                    let place = vertices(corner, lane);
-                    for axis in 0..3 {
-                        coordinates[axis * room + place] = position[axis];
-                    }
-                }
+                put_corners(coordinates, room, &corners, |corner| vertices(corner, lane));
                 triangles[lane] = corners;
                 len += 1;
             }
@@ -585,6 +575,35 @@ impl Task for MoveShare<'_> {
 fn parts_of_first(units: &mut [Unit]) -> (&mut Head, &mut [f32]) {
     let (head, coordinates) = bytemuck::cast_slice_mut::<Unit, u8>(units).split_at_mut(size_of::<Head>());
     (bytemuck::from_bytes_mut(head), bytemuck::cast_slice_mut(coordinates))
+}
+
+/// Writes down the corners of a triangle, each as the vertex that it is, in a block with such a room.
+#[inline(always)]
+fn put_corners(
+    coordinates: &mut [f32],
+    room: usize,
+    corners: &[Vec3; 3],
+    vertex_of: impl Fn(usize) -> usize,
+) {
+    for (corner, position) in corners.iter().enumerate() {
+        let vertex = vertex_of(corner);
+        for axis in 0..3 {
+            coordinates[axis * room + vertex] = position[axis];
+        }
+    }
+}
+
+/// Whether the triangles of meshes name the same vertices as those of the same geometries before. Else they may share more of them.
+pub(crate) fn name_same_vertices(before: &[Geometry], geometries: &[Geometry]) -> bool {
+    const CHUNK: usize = 1 << 14;
+    before.iter().zip(geometries).all(|(old, new)| match (&old.kind, &new.kind) {
+        (GeometryKind::Mesh(old), GeometryKind::Mesh(new)) => {
+            let (old, new) = (&old.indices, &new.indices);
+            let chunks = old.par_chunks(CHUNK).zip(new.par_chunks(CHUNK));
+            old.len() == new.len() && chunks.all(|(old, new)| old.as_flattened() == new.as_flattened())
+        }
+        _ => true,
+    })
 }
 
 fn mesh(geometries: &[Geometry], geometry: u32) -> &TriangleMesh {

@@ -15,7 +15,6 @@ use crate::carve::{self, Cell, LaneCell};
 use crate::lanes::Level;
 use crate::node::{Node, WIDTH, tag};
 use crate::primitive::{Bounds, Kind, Primitive, Traits};
-use crate::refit::has_same_indices;
 use crate::spheres::SphereBlock;
 use crate::store::Store;
 use crate::triangles::BLOCK;
@@ -107,8 +106,7 @@ impl Packed {
         before: &[Geometry],
         may_lack_area: bool,
     ) -> Result<(), BuildError> {
-        // Those that have other vertices may share more of them than before.
-        let are_same = before.iter().zip(geometries).all(|(old, new)| has_same_indices(&old.kind, &new.kind));
+        let are_same = blocks::name_same_vertices(before, geometries);
         if are_same && self.put_triangles(level, geometries, may_lack_area) {
             return Ok(());
         }

@@ -336,19 +336,6 @@ fn entry_boxes(accel: &Accel, parts: &Parts) -> Result<Places, RefitError> {
     Ok(Places { boxes, starts })
 }
 
-/// Whether the triangles of meshes name the same vertices.
-pub(crate) fn has_same_indices(old: &GeometryKind, new: &GeometryKind) -> bool {
-    const CHUNK: usize = 1 << 14;
-    match (old, new) {
-        (GeometryKind::Mesh(old), GeometryKind::Mesh(new)) => {
-            let (old, new) = (&old.indices, &new.indices);
-            let chunks = old.par_chunks(CHUNK).zip(new.par_chunks(CHUNK));
-            old.len() == new.len() && chunks.all(|(old, new)| old.as_flattened() == new.as_flattened())
-        }
-        _ => true,
-    }
-}
-
 /// The box around the triangles of a block with these names, of which those in parts are `cells`.
 fn block_box(block: &TriangleBlock, names: &BlockNames, cells: &[LaneCell], carver: &Carver) -> Bounds {
     let lane_of = |at: &LaneCell| at.lane as usize % BLOCK;

@@ -290,15 +290,19 @@ fn a_block_has_the_corners_of_its_triangles_however_many_they_share() {
     assert_eq!(rooms.into_iter().collect::<Vec<_>>(), [10, 12, 16, 24]);
 }
 
+/// The same mesh where every triangle has vertices of its own: no two share one by name.
+fn with_own_vertices(geometry: &Geometry) -> Geometry {
+    let GeometryKind::Mesh(mesh) = &geometry.kind else { unreachable!() };
+    let positions = mesh.indices.iter().flatten().map(|&v| mesh.positions[v as usize]).collect();
+    let indices = (0..mesh.indices.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let mesh = TriangleMesh { origin: mesh.origin, positions, indices };
+    Geometry { id: geometry.id, kind: GeometryKind::Mesh(Arc::new(mesh)) }
+}
+
 #[test]
 fn vertices_in_one_place_are_one_to_a_block() {
     let geometry = grid(&mut Random(84), 0.0);
-    let GeometryKind::Mesh(mesh) = &geometry.kind else { unreachable!() };
-    // Every triangle with vertices of its own.
-    let positions: Vec<Vec3> = mesh.indices.iter().flatten().map(|&v| mesh.positions[v as usize]).collect();
-    let indices = (0..mesh.indices.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-    let apart = TriangleMesh { origin: DVec3::ZERO, positions, indices };
-    let apart = Geometry { id: 0, kind: GeometryKind::Mesh(Arc::new(apart)) };
+    let apart = with_own_vertices(&geometry);
     let shared = Accel::build(vec![geometry], &BuildOptions::default()).unwrap();
     let apart = Accel::build(vec![apart], &BuildOptions::default()).unwrap();
     assert_eq!(*shared.tree.blocks, *apart.tree.blocks);
@@ -346,13 +350,8 @@ fn triangles_that_move_stand_where_packing_puts_them() {
 #[test]
 fn triangles_that_come_apart_are_packed_again() {
     let mut random = Random(86);
-    let shared = grid(&mut random, 0.0);
-    let GeometryKind::Mesh(mesh) = &shared.kind else { unreachable!() };
-    // Vertices of other names in the same places: no two triangles share one by name.
-    let positions: Vec<Vec3> = mesh.indices.iter().flatten().map(|&v| mesh.positions[v as usize]).collect();
-    let indices = (0..mesh.indices.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-    let together = TriangleMesh { origin: DVec3::ZERO, positions, indices };
-    let together = Geometry { id: 0, kind: GeometryKind::Mesh(Arc::new(together)) };
+    // Vertices of other names in the same places.
+    let together = with_own_vertices(&grid(&mut random, 0.0));
     // One in the middle, by the least that there is; and all of them.
     let one = with_positions(&together, |i, p| if i == 901 { p.map(f32::next_up) } else { p });
     let all = with_positions(&together, |_, p| p + 0.1 * random.vector().as_vec3());
