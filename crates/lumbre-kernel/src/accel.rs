@@ -145,7 +145,7 @@ impl Accel {
     /// transforms or trees of instances. The tree keeps its structure; its boxes become those of what is now in them.
     /// Queries answer as after a build.
     ///
-    /// This takes a fifth of the time of a build, or half of it where meshes have other indices than before; but the boxes of what was
+    /// This takes a sixth of the time of a build, or half of it where meshes have other indices than before; but the boxes of what was
     /// near and no longer is grow, and queries become slower. The answer says by how much, about: the cost of a ray as a multiple of
     /// that after the build, 1 or so where everything moved together. As a rule, [rebuild in part](Self::rebuild_partially) where it
     /// passes 1.1, and build again where it is still more than 1.5 then: with more than a few rays for every primitive, queries lose
