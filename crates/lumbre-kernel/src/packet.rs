@@ -584,11 +584,8 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
             }
             return;
         }
-        let roundings = L::Wide::splat(ROUNDINGS);
         let inverse = L::Wide::splat(1.0).over(weight);
         let (from, to) = (from * inverse, to * inverse);
-        let from = from.abs().times_from(roundings, from);
-        let to = to.abs().times_plus(roundings, to);
         let (best_from, best_to) = (L::Wide::load(&self.from.0), L::Wide::load(&self.to.0));
         let better = sure & to.below(best_from);
         if better != 0 {

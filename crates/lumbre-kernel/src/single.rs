@@ -83,8 +83,9 @@ impl Winner {
         hit.id = accel.geometries[geometry as usize].id;
         hit.primitive = primitive;
         hit.geometry = geometry;
-        hit.instances.clear();
-        hit.route.clear();
+        // To clear a path, one has to look where it stands.
+        hit.instances = InstancePath::new();
+        hit.route = InstancePath::new();
     }
 }
 

@@ -323,6 +323,38 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
         ray.cast()
     }
 
+    /// Rays by eight, whose columns are then written as wide as they are read: what is put together of two writes is waited for.
+    #[inline(always)]
+    fn columns_by_eight(rays: &[Ray; WIDE], columns: &mut [Row<f64>; 8]) {
+        const EVEN: i32 = 0b10_00_10_00;
+        const ODD: i32 = 0b11_01_11_01;
+        for half in 0..2 {
+            let at = |i: usize| Self::numbers(&rays[8 * half + i]);
+            // SAFETY: see `X86`; only called where `AVX512` is. The loads are of the eight numbers of a ray, see above; the stores of
+            // eight f64 from the first or the ninth on, into arrays of sixteen.
+            unsafe {
+                let pairs = [0, 2, 4, 6].map(|i| (_mm512_loadu_pd(at(i)), _mm512_loadu_pd(at(i + 1))));
+                let even = pairs.map(|(first, second)| _mm512_unpacklo_pd(first, second));
+                let odd = pairs.map(|(first, second)| _mm512_unpackhi_pd(first, second));
+                for (first, [a, b, c, d]) in [even, odd].into_iter().enumerate() {
+                    let (low, more_low) =
+                        (_mm512_shuffle_f64x2::<EVEN>(a, b), _mm512_shuffle_f64x2::<EVEN>(c, d));
+                    let (high, more_high) =
+                        (_mm512_shuffle_f64x2::<ODD>(a, b), _mm512_shuffle_f64x2::<ODD>(c, d));
+                    let of_eight = [
+                        _mm512_shuffle_f64x2::<EVEN>(low, more_low),
+                        _mm512_shuffle_f64x2::<EVEN>(high, more_high),
+                        _mm512_shuffle_f64x2::<ODD>(low, more_low),
+                        _mm512_shuffle_f64x2::<ODD>(high, more_high),
+                    ];
+                    for (place, of_eight) in of_eight.into_iter().enumerate() {
+                        _mm512_storeu_pd(columns[first + 2 * place].0.as_mut_ptr().add(8 * half), of_eight);
+                    }
+                }
+            }
+        }
+    }
+
     /// The direction; the last of four means nothing.
     #[inline(always)]
     fn single_direction(ray: &Ray) -> __m128 {
@@ -590,6 +622,10 @@ where
 
     #[inline(always)]
     fn columns(rays: &[Ray; WIDE], columns: &mut [Row<f64>; 8]) {
+        if AVX512 {
+            Self::columns_by_eight(rays, columns);
+            return;
+        }
         for four in 0..WIDE / 4 {
             for half in 0..2 {
                 let at = |i: usize| Self::numbers(&rays[4 * four + i]).wrapping_add(4 * half);

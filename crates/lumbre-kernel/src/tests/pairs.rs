@@ -1,5 +1,6 @@
-//! Sixteen triangles with a ray each, beside each alone.
+//! Sixteen triangles with a ray each, beside each alone, and the numbers of sixteen rays.
 
+use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
 
 use super::scenes::Random;
@@ -99,4 +100,31 @@ fn sixteen_pairs_meet_as_each_alone() {
 
 fn bits((t, u, v): (f64, f64, f64)) -> [u64; 3] {
     [t.to_bits(), u.to_bits(), v.to_bits()]
+}
+
+struct Columns<'a>(&'a [Ray; WIDE]);
+
+impl Task for Columns<'_> {
+    type Output = [Row<f64>; 8];
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> [Row<f64>; 8] {
+        let mut columns = [Row::of(f64::NAN); 8];
+        L::columns(self.0, &mut columns);
+        columns
+    }
+}
+
+#[test]
+fn the_numbers_of_rays_stand_side_by_side_at_every_level() {
+    let number = |ray: usize, column: usize| (100 * column + ray) as f64;
+    let rays = std::array::from_fn(|i| {
+        let three = |first: usize| DVec3::from_array([0, 1, 2].map(|axis| number(i, first + axis)));
+        Ray::new(three(0), three(3)).with_range(number(i, 6), number(i, 7)).at_time(-1.0)
+    });
+    let expected: [Row<f64>; 8] =
+        std::array::from_fn(|column| Row(std::array::from_fn(|i| number(i, column))));
+    for level in Level::all() {
+        assert_eq!(level.run(Columns(&rays)), expected, "{level:?}");
+    }
 }
