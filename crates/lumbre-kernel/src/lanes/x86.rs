@@ -333,9 +333,31 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
             // SAFETY: see `X86`; only called where `AVX512` is. The loads are of the eight numbers of a ray, see above; the stores of
             // eight f64 from the first or the ninth on, into arrays of sixteen.
             unsafe {
-                let pairs = [0, 2, 4, 6].map(|i| (_mm512_loadu_pd(at(i)), _mm512_loadu_pd(at(i + 1))));
-                let even = pairs.map(|(first, second)| _mm512_unpacklo_pd(first, second));
-                let odd = pairs.map(|(first, second)| _mm512_unpackhi_pd(first, second));
+                // One by one: what is handed to a closure may become a call.
+                let (a, b, c, d) = (
+                    _mm512_loadu_pd(at(0)),
+                    _mm512_loadu_pd(at(1)),
+                    _mm512_loadu_pd(at(2)),
+                    _mm512_loadu_pd(at(3)),
+                );
+                let (e, f, g, h) = (
+                    _mm512_loadu_pd(at(4)),
+                    _mm512_loadu_pd(at(5)),
+                    _mm512_loadu_pd(at(6)),
+                    _mm512_loadu_pd(at(7)),
+                );
+                let even = [
+                    _mm512_unpacklo_pd(a, b),
+                    _mm512_unpacklo_pd(c, d),
+                    _mm512_unpacklo_pd(e, f),
+                    _mm512_unpacklo_pd(g, h),
+                ];
+                let odd = [
+                    _mm512_unpackhi_pd(a, b),
+                    _mm512_unpackhi_pd(c, d),
+                    _mm512_unpackhi_pd(e, f),
+                    _mm512_unpackhi_pd(g, h),
+                ];
                 for (first, [a, b, c, d]) in [even, odd].into_iter().enumerate() {
                     let (low, more_low) =
                         (_mm512_shuffle_f64x2::<EVEN>(a, b), _mm512_shuffle_f64x2::<EVEN>(c, d));
