@@ -29,7 +29,7 @@ use crate::packet::{PACKET, Packet};
 use crate::query::All;
 use crate::stack::{AsBuilt, ByDistance, Order, Stack};
 use crate::traverse::{PlacedTree, What};
-use crate::triangles::{self, BLOCK, BlockRay, Meeting, Passage, Shear};
+use crate::triangles::{self, BLOCK, BlockRay, Inside, Meeting, Passage, Shear};
 use crate::way::Way;
 use crate::{Accel, Faces, Hit, InstancePath, traverse};
 
@@ -169,6 +169,15 @@ impl<'a> Exact<'a> {
             (Passage::Outside, _) => true,
             (Passage::Inside, inside) => !triangles::is_in_range(ray, inside.t(&shear)),
             (Passage::Unclear, _) => false,
+        }
+    }
+
+    /// What the crossing of a triangle is made of, where it is seen at a glance that there is one.
+    #[inline(always)]
+    fn inside<L: Lanes>(&self, shear: &Shear, origin: &[f64; 3], block: u32, lane: u32) -> Option<Inside> {
+        match L::pass(self.triangles.block(block), lane as usize, shear, origin) {
+            (Passage::Inside, inside) => Some(inside),
+            (Passage::Outside | Passage::Unclear, _) => None,
         }
     }
 
@@ -419,6 +428,10 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
                 let crossings = L::place_crossings(&edges, &self.blocks);
                 let mask = self.select::<L>(block, mask, &edges, &crossings);
                 let mut rest = mask & crossings.in_range;
+                if rest != 0 && mask & (mask - 1) == 0 {
+                    // One alone, known before its range is: the winner need not wait for that.
+                    rest = lanes::foreseen(mask);
+                }
                 while rest != 0 {
                     let lane = rest.trailing_zeros();
                     let is_sure = crossings.sure >> lane & 1 != 0;
@@ -441,7 +454,7 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
                         // Farther, which what is no number is not; or not met at all.
                         continue;
                     } else {
-                        match self.contest(ray, place, lane) {
+                        match self.contest(L::level(), ray, place, lane) {
                             Outcome::Settled(Some(better)) => self.keep(better, way),
                             Outcome::Settled(None) => {}
                             Outcome::Unsettled => return false,
@@ -490,9 +503,16 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
     }
 
     /// Looks closer at a triangle that may be met, and nearer than the best: what is better, if anything.
+    // Apart, for there it is in nobody's way.
     #[cold]
     #[inline(never)]
-    fn contest(&self, ray: &Ray, block: u32, lane: u32) -> Outcome<Option<Candidate>> {
+    fn contest(&self, level: Level, ray: &Ray, block: u32, lane: u32) -> Outcome<Option<Candidate>> {
+        level.run(Contest { single: self, ray, block, lane })
+    }
+
+    /// The same where it is not seen at a glance how the ray passes the two.
+    #[inline(never)]
+    fn contest_closely(&self, ray: &Ray, block: u32, lane: u32) -> Outcome<Option<Candidate>> {
         let found = match self.exact.meet(ray, block, lane) {
             Meeting::Miss => return Outcome::Settled(None),
             Meeting::Touch { .. } => return Outcome::Unsettled,
@@ -709,6 +729,46 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
             Some(winner) => Outcome::Settled(Some(winner)),
             None => Outcome::Unsettled,
         }
+    }
+}
+
+/// A triangle that may be met, and nearer than the best: see [`SingleRay::contest`].
+struct Contest<'s, 'a, const MIXED: bool, S> {
+    single: &'s SingleRay<'a, MIXED, S>,
+    ray: &'s Ray,
+    block: u32,
+    lane: u32,
+}
+
+impl<const MIXED: bool, S: Selection> Task for Contest<'_, '_, MIXED, S> {
+    type Output = Outcome<Option<Candidate>>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Self::Output {
+        let Self { single, ray, block, lane } = self;
+        let SingleRay { exact, best, selection, .. } = single;
+        let (shear, origin) = L::shear(ray, single.blocks.axes, &exact.start.mesh_origin);
+        let Some(inside) = exact.inside::<L>(&shear, &origin, block, lane) else {
+            return single.contest_closely(ray, block, lane);
+        };
+        let t = inside.t(&shear);
+        if !triangles::is_in_range(ray, t) || !selection.faces().have(inside.det > 0.0) {
+            return Outcome::Settled(None);
+        }
+        if best.is_triangle() {
+            let Some(inside) = exact.inside::<L>(&shear, &origin, best.block, best.lane) else {
+                return single.contest_closely(ray, block, lane);
+            };
+            let nearest = inside.t(&shear);
+            let comes_after = || exact.names(block, lane) > exact.names(best.block, best.lane);
+            if t > nearest || t == nearest && comes_after() {
+                return Outcome::Settled(None);
+            }
+        } else if best.is_some() {
+            return single.contest_closely(ray, block, lane);
+        }
+        let (from, to) = heights(t, largest_component(ray));
+        Outcome::Settled(Some(Candidate { block, lane, from, to }))
     }
 }
 

@@ -450,6 +450,22 @@ pub(crate) fn opaque<T>(value: &T) -> &T {
     value
 }
 
+/// The same number, where it is chosen by a branch that is to stay one: foreseen, nothing waits for what it was asked by.
+#[inline(always)]
+pub(crate) fn foreseen(number: u32) -> u32 {
+    #[cfg(all(target_arch = "x86_64", not(miri)))]
+    {
+        let mut same = number;
+        // SAFETY: nothing is done.
+        unsafe {
+            std::arch::asm!("/* {0:e} */", inout(reg) same, options(nomem, nostack, preserves_flags));
+        }
+        same
+    }
+    #[cfg(not(all(target_arch = "x86_64", not(miri))))]
+    number
+}
+
 // Out of the way of the others.
 #[inline(never)]
 fn run_portable<T: Task>(task: T) -> T::Output {

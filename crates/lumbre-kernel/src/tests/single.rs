@@ -303,6 +303,30 @@ fn it_does_so_beside_shapes_and_custom_geometry() {
 }
 
 #[test]
+fn of_sheets_that_lie_close_on_one_another_the_nearest_is_met() {
+    let mut random = Random(98);
+    for apart in [0.0, 1e-7, 1e-6, 1e-4] {
+        let mut mesh = TriangleMesh::default();
+        for _ in 0..200 {
+            let first = mesh.positions.len() as u32;
+            let corners =
+                [DVec3::new(-1.0, -1.0, 1.0), DVec3::new(1.0, -1.0, 0.8), DVec3::new(0.0, 1.0, 1.2)];
+            let sheet = corners.map(|corner| corner + apart * random.vector());
+            mesh.positions.extend(sheet.map(|corner| corner.as_vec3()));
+            mesh.indices
+                .push([[first, first + 1, first + 2], [first + 1, first, first + 2]][random.below(2)]);
+        }
+        let list = vec![Geometry { id: 3, kind: GeometryKind::Mesh(mesh.clone().into()) }];
+        let accel = Accel::build(list, &BuildOptions::default()).unwrap();
+        let rays: Vec<_> = (0..800).map(|_| Ray::new(0.3 * random.vector(), DVec3::Z)).collect();
+        check(&accel, &rays, 300);
+        if apart == 0.0 {
+            assert!(rays.iter().filter_map(|ray| accel.closest(ray)).all(|hit| hit.primitive == 0));
+        }
+    }
+}
+
+#[test]
 fn single_precision_settles_nearly_all_rays_that_nobody_aims() {
     let mut random = Random(92);
     let mesh = mesh(&mut random, DVec3::ZERO, 1.0);
