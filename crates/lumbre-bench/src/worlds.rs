@@ -34,6 +34,8 @@ pub const RECIPES: &[Recipe] = &[
     Recipe { name: "scan-10m", is_quick: false, make: |name| scan(name, 913) },
     Recipe { name: "indoor", is_quick: true, make: indoor },
     Recipe { name: "terrain", is_quick: false, make: terrain },
+    Recipe { name: "bars", is_quick: false, make: bars },
+    Recipe { name: "sponge", is_quick: false, make: sponge },
     Recipe { name: "needles", is_quick: false, make: needles },
     Recipe { name: "stadium", is_quick: false, make: stadium },
     Recipe { name: "forest", is_quick: false, make: forest },
@@ -154,6 +156,40 @@ fn table(shaper: &mut Shaper, random: &mut RandomStream, foot: DVec3, yaw: f64) 
             shaper.ball(turn(spot + DVec3::new(0.0, 0.05, 0.0)), 0.05, 20);
         }
     }
+}
+
+/// Six gratings of bars that cross: wherever two do, their faces lie in one plane, and a ray meets both at once.
+fn bars(name: &str) -> Scene {
+    let mut shaper = Shaper::default();
+    let (count, step, half) = (120, 0.1, 0.01);
+    let end = 0.5 * f64::from(count) * step;
+    for grating in 0..6 {
+        let z = f64::from(grating);
+        for bar in 0..count {
+            let at = f64::from(bar) * step - end;
+            shaper.cuboid(DVec3::new(at, 0.0, z), DVec3::new(half, end, half), 0.0);
+            shaper.cuboid(DVec3::new(0.0, at, z), DVec3::new(end, half, half), 0.0);
+        }
+    }
+    Scene::of_mesh(name, shaper.finish())
+}
+
+/// A sponge after K. Menger, of eight thousand cubes side by side: the faces between two are there twice.
+fn sponge(name: &str) -> Scene {
+    let mut cubes = vec![DVec3::ZERO];
+    let mut size = 1.0;
+    for _ in 0..3 {
+        size /= 3.0;
+        let steps = (0..27).map(|i: i32| [i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1]);
+        let kept = steps.filter(|step| step.iter().filter(|&&s| s == 0).count() < 2);
+        let offsets: Vec<_> = kept.map(|step| DVec3::from_array(step.map(f64::from)) * 2.0 * size).collect();
+        cubes = cubes.iter().flat_map(|&cube| offsets.iter().map(move |&offset| cube + offset)).collect();
+    }
+    let mut shaper = Shaper::default();
+    for cube in cubes {
+        shaper.cuboid(cube, DVec3::splat(size), 0.0);
+    }
+    Scene::of_mesh(name, shaper.finish())
 }
 
 /// Hills of half a million triangles, seen from among them.
@@ -447,6 +483,8 @@ mod tests {
         assert_eq!(count("mixed"), 1_600 + 2 + 12 * 40 * 40);
         assert!((40_000..80_000).contains(&count("indoor")), "{}", count("indoor"));
         assert!((190_000..210_000).contains(&count("stadium")), "{}", count("stadium"));
+        assert_eq!(count("bars"), 6 * 2 * 120 * 12);
+        assert_eq!(count("sponge"), 20 * 20 * 20 * 12);
         assert_eq!(count("needles"), 100_000);
         assert_eq!(count("forest"), 10_000 + 2 * 100 * 100 + 3 * (2 * 60 + 2 * 2_400));
     }
