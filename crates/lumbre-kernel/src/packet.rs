@@ -29,11 +29,10 @@ use lumbre_geometry::Ray;
 use lumbre_math::DVec2;
 
 use self::shapes::AmongShapes;
-use crate::Accel;
 use crate::batch::Ends;
 use crate::blocks::Blocks;
 use crate::holds::SingleStart;
-use crate::lanes::{self, Axes, Corners, Lanes, Row, Sides, Vector, WIDE, Wide};
+use crate::lanes::{self, Axes, Corners, Lanes, Level, Row, Sides, Task, Vector, WIDE, Wide};
 use crate::node::{END_FACTOR, LITTLE, Node, START_FACTOR, tag};
 #[cfg(test)]
 use crate::single::Nearest;
@@ -44,6 +43,7 @@ use crate::triangles::{
     ROUNDINGS, SIZE_ERROR, TINY, beyond,
 };
 use crate::way::limit_of;
+use crate::{Accel, Faces};
 
 /// Rays in a packet.
 pub(crate) const PACKET: usize = WIDE;
@@ -603,7 +603,7 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
         }
         let doubtful = in_range & !better & !best_to.below(from);
         if doubtful != 0 {
-            self.settle_closest(doubtful, number, lane as u32, rays);
+            self.settle_closest(L::level(), doubtful, number, lane as u32, rays);
         }
     }
 
@@ -627,29 +627,45 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
     /// The same, where a hit may be nearer than the best.
     #[cold]
     #[inline(never)]
-    fn settle_closest(&mut self, mut those: u32, number: u32, lane: u32, rays: &[Ray; PACKET]) {
-        while those != 0 {
-            let i = those.trailing_zeros() as usize % PACKET;
-            those &= those - 1;
-            let ray = &rays[i];
-            let judged = match self.exact.meet(ray, number, lane) {
-                Meeting::Miss => continue,
-                Meeting::Hit { root, .. } => {
-                    let names = self.exact.names(number, lane);
-                    (root.t, self.is_better(ray, i, root.t, names))
+    fn settle_closest(&mut self, level: Level, those: u32, number: u32, lane: u32, rays: &[Ray; PACKET]) {
+        level.run(Settle { packet: self, those, number, lane, rays });
+        self.end_frustum();
+    }
+
+    /// One ray at a triangle that may be nearer than its best.
+    #[inline(always)]
+    fn settle<L: Lanes>(&mut self, i: usize, number: u32, lane: u32, ray: &Ray) {
+        let best = self.best(i);
+        let at_a_glance = match self.crossed(i) {
+            Some(_) => Outcome::Unsettled,
+            None => self.exact.contest::<L>(ray, self.bundle.axes, (number, lane), &best, Faces::Both),
+        };
+        let judged = match at_a_glance {
+            Outcome::Unsettled => self.judge_closely(i, number, lane, ray),
+            judged => judged,
+        };
+        match judged {
+            Outcome::Settled(None) => {}
+            Outcome::Settled(Some(t)) => {
+                self.keep(i, heights(t, largest_component(ray)), number << 3 | lane);
+            }
+            Outcome::Unsettled => self.give_up(i),
+        }
+    }
+
+    /// Where one meets a triangle, if that is better than its best.
+    #[inline(never)]
+    fn judge_closely(&self, i: usize, number: u32, lane: u32, ray: &Ray) -> Outcome<Option<f64>> {
+        match self.exact.meet(ray, number, lane) {
+            Meeting::Miss => Outcome::Settled(None),
+            Meeting::Touch { .. } => Outcome::Unsettled,
+            Meeting::Hit { root, .. } => {
+                match self.is_better(ray, i, root.t, self.exact.names(number, lane)) {
+                    Outcome::Settled(is_better) => Outcome::Settled(is_better.then_some(root.t)),
+                    Outcome::Unsettled => Outcome::Unsettled,
                 }
-                Meeting::Touch { .. } => (f64::NAN, Outcome::Unsettled),
-            };
-            match judged {
-                (_, Outcome::Settled(false)) => {}
-                (t, Outcome::Settled(true)) => {
-                    let heights = heights(t, largest_component(ray));
-                    self.keep(i, heights, number << 3 | lane);
-                }
-                (_, Outcome::Unsettled) => self.give_up(i),
             }
         }
-        self.end_frustum();
     }
 
     /// Makes this the nearest hit of one.
@@ -882,6 +898,29 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
     }
 }
 
+/// Rays that may meet a triangle, and nearer than anything so far: see [`Packet::settle_closest`].
+struct Settle<'p, 'a, const MIXED: bool> {
+    packet: &'p mut Packet<'a, MIXED>,
+    those: u32,
+    number: u32,
+    lane: u32,
+    rays: &'p [Ray; PACKET],
+}
+
+impl<const MIXED: bool> Task for Settle<'_, '_, MIXED> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let Self { packet, mut those, number, lane, rays } = self;
+        while those != 0 {
+            let i = those.trailing_zeros() as usize % PACKET;
+            those &= those - 1;
+            packet.settle::<L>(i, number, lane, &rays[i]);
+        }
+    }
+}
+
 /// How rays went together.
 pub(crate) struct Together {
     /// A bit for each that was answered.
@@ -892,11 +931,11 @@ pub(crate) struct Together {
 
 /// Those of some rays that a packet answers, at a level, for tests.
 #[cfg(test)]
-pub(crate) fn answered_together(level: lanes::Level, accel: &Accel, rays: &[Ray; PACKET]) -> u32 {
+pub(crate) fn answered_together(level: Level, accel: &Accel, rays: &[Ray; PACKET]) -> u32 {
     use crate::holds::Contents;
 
     struct Searching<'a, const MIXED: bool>(Packet<'a, MIXED>, &'a [Ray; PACKET]);
-    impl<const MIXED: bool> lanes::Task for Searching<'_, MIXED> {
+    impl<const MIXED: bool> Task for Searching<'_, MIXED> {
         type Output = u32;
         #[inline(always)]
         fn run<L: Lanes>(mut self) -> u32 {

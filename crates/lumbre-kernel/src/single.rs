@@ -172,13 +172,44 @@ impl<'a> Exact<'a> {
         }
     }
 
-    /// What the crossing of a triangle is made of, where it is seen at a glance that there is one.
+    /// Looks closer at a triangle that may be met, and nearer than the best, which is another triangle if it is anything: where it is
+    /// met, if it is better and has such a face. Unsettled where it is not seen at a glance how the ray passes the two.
     #[inline(always)]
-    fn inside<L: Lanes>(&self, shear: &Shear, origin: &[f64; 3], block: u32, lane: u32) -> Option<Inside> {
-        match L::pass(self.triangles.block(block), lane as usize, shear, origin) {
-            (Passage::Inside, inside) => Some(inside),
-            (Passage::Outside | Passage::Unclear, _) => None,
+    pub(crate) fn contest<L: Lanes>(
+        &self,
+        ray: &Ray,
+        axes: &'static Axes,
+        (block, lane): (u32, u32),
+        best: &Candidate,
+        faces: Faces,
+    ) -> Outcome<Option<f64>> {
+        let (shear, origin) = L::shear(ray, axes, &self.start.mesh_origin);
+        let inside = match self.pass::<L>(&shear, &origin, block, lane) {
+            (Passage::Inside, inside) => inside,
+            (Passage::Outside, _) => return Outcome::Settled(None),
+            (Passage::Unclear, _) => return Outcome::Unsettled,
+        };
+        let t = inside.t(&shear);
+        if !triangles::is_in_range(ray, t) || !faces.have(inside.det > 0.0) {
+            return Outcome::Settled(None);
         }
+        if best.is_some() {
+            let (Passage::Inside, inside) = self.pass::<L>(&shear, &origin, best.block, best.lane) else {
+                return Outcome::Unsettled;
+            };
+            let nearest = inside.t(&shear);
+            let comes_after = || self.names(block, lane) > self.names(best.block, best.lane);
+            if t > nearest || t == nearest && comes_after() {
+                return Outcome::Settled(None);
+            }
+        }
+        Outcome::Settled(Some(t))
+    }
+
+    /// [`Lanes::pass`] of a triangle by its place.
+    #[inline(always)]
+    fn pass<L: Lanes>(&self, shear: &Shear, origin: &[f64; 3], block: u32, lane: u32) -> (Passage, Inside) {
+        L::pass(self.triangles.block(block), lane as usize, shear, origin)
     }
 
     /// How the ray meets a triangle.
@@ -747,28 +778,17 @@ impl<const MIXED: bool, S: Selection> Task for Contest<'_, '_, MIXED, S> {
     fn run<L: Lanes>(self) -> Self::Output {
         let Self { single, ray, block, lane } = self;
         let SingleRay { exact, best, selection, .. } = single;
-        let (shear, origin) = L::shear(ray, single.blocks.axes, &exact.start.mesh_origin);
-        let Some(inside) = exact.inside::<L>(&shear, &origin, block, lane) else {
+        if best.is_some() && !best.is_triangle() {
             return single.contest_closely(ray, block, lane);
-        };
-        let t = inside.t(&shear);
-        if !triangles::is_in_range(ray, t) || !selection.faces().have(inside.det > 0.0) {
-            return Outcome::Settled(None);
         }
-        if best.is_triangle() {
-            let Some(inside) = exact.inside::<L>(&shear, &origin, best.block, best.lane) else {
-                return single.contest_closely(ray, block, lane);
-            };
-            let nearest = inside.t(&shear);
-            let comes_after = || exact.names(block, lane) > exact.names(best.block, best.lane);
-            if t > nearest || t == nearest && comes_after() {
-                return Outcome::Settled(None);
+        match exact.contest::<L>(ray, single.blocks.axes, (block, lane), best, selection.faces()) {
+            Outcome::Unsettled => single.contest_closely(ray, block, lane),
+            Outcome::Settled(None) => Outcome::Settled(None),
+            Outcome::Settled(Some(t)) => {
+                let (from, to) = heights(t, largest_component(ray));
+                Outcome::Settled(Some(Candidate { block, lane, from, to }))
             }
-        } else if best.is_some() {
-            return single.contest_closely(ray, block, lane);
         }
-        let (from, to) = heights(t, largest_component(ray));
-        Outcome::Settled(Some(Candidate { block, lane, from, to }))
     }
 }
 
