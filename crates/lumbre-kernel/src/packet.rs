@@ -635,36 +635,13 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
     /// One ray at a triangle that may be nearer than its best.
     #[inline(always)]
     fn settle<L: Lanes>(&mut self, i: usize, number: u32, lane: u32, ray: &Ray) {
-        let best = self.best(i);
-        let at_a_glance = match self.crossed(i) {
-            Some(_) => Outcome::Unsettled,
-            None => self.exact.contest::<L>(ray, self.bundle.axes, (number, lane), &best, Faces::Both),
-        };
-        let judged = match at_a_glance {
-            Outcome::Unsettled => self.judge_closely(i, number, lane, ray),
-            judged => judged,
-        };
-        match judged {
+        let (axes, best) = (self.bundle.axes, self.best(i));
+        match self.exact.contest::<L>(ray, axes, (number, lane), (&best, self.crossed(i)), Faces::Both) {
             Outcome::Settled(None) => {}
             Outcome::Settled(Some(t)) => {
                 self.keep(i, heights(t, largest_component(ray)), number << 3 | lane);
             }
             Outcome::Unsettled => self.give_up(i),
-        }
-    }
-
-    /// Where one meets a triangle, if that is better than its best.
-    #[inline(never)]
-    fn judge_closely(&self, i: usize, number: u32, lane: u32, ray: &Ray) -> Outcome<Option<f64>> {
-        match self.exact.meet(ray, number, lane) {
-            Meeting::Miss => Outcome::Settled(None),
-            Meeting::Touch { .. } => Outcome::Unsettled,
-            Meeting::Hit { root, .. } => {
-                match self.is_better(ray, i, root.t, self.exact.names(number, lane)) {
-                    Outcome::Settled(is_better) => Outcome::Settled(is_better.then_some(root.t)),
-                    Outcome::Unsettled => Outcome::Unsettled,
-                }
-            }
         }
     }
 
@@ -693,10 +670,7 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
 
     /// Whether a crossing, of what has these names, is nearer than the nearest of one so far, or as near and before it.
     fn is_better(&self, ray: &Ray, i: usize, t: f64, names: (u32, u32)) -> Outcome<bool> {
-        match self.crossed(i) {
-            Some(crossed) => Outcome::Settled(crossed.comes_after(t, names)),
-            None => self.exact.is_better(ray, t, names, &self.best(i)),
-        }
+        self.exact.is_better(ray, t, names, &self.best(i), self.crossed(i))
     }
 
     /// The nearest hit of one so far, where that is of no triangle.

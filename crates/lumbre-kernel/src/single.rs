@@ -172,38 +172,61 @@ impl<'a> Exact<'a> {
         }
     }
 
-    /// Looks closer at a triangle that may be met, and nearer than the best, which is another triangle if it is anything: where it is
-    /// met, if it is better and has such a face. Unsettled where it is not seen at a glance how the ray passes the two.
+    /// Looks closer at a triangle that may be met, and nearer than the best, which is the crossing if there is that: where it is met,
+    /// if it is better and has such a face.
     #[inline(always)]
     pub(crate) fn contest<L: Lanes>(
         &self,
         ray: &Ray,
         axes: &'static Axes,
         (block, lane): (u32, u32),
-        best: &Candidate,
+        (best, crossed): (&Candidate, Option<Winner>),
         faces: Faces,
     ) -> Outcome<Option<f64>> {
+        let closely = || self.contest_closely(ray, (block, lane), (best, crossed), faces);
         let (shear, origin) = L::shear(ray, axes, &self.start.mesh_origin);
         let inside = match self.pass::<L>(&shear, &origin, block, lane) {
             (Passage::Inside, inside) => inside,
             (Passage::Outside, _) => return Outcome::Settled(None),
-            (Passage::Unclear, _) => return Outcome::Unsettled,
+            (Passage::Unclear, _) => return closely(),
         };
         let t = inside.t(&shear);
         if !triangles::is_in_range(ray, t) || !faces.have(inside.det > 0.0) {
             return Outcome::Settled(None);
         }
-        if best.is_some() {
+        let comes_after = if let Some(crossed) = crossed {
+            !crossed.comes_after(t, self.names(block, lane))
+        } else if best.is_some() {
             let (Passage::Inside, inside) = self.pass::<L>(&shear, &origin, best.block, best.lane) else {
-                return Outcome::Unsettled;
+                return closely();
             };
             let nearest = inside.t(&shear);
-            let comes_after = || self.names(block, lane) > self.names(best.block, best.lane);
-            if t > nearest || t == nearest && comes_after() {
-                return Outcome::Settled(None);
-            }
+            t > nearest || t == nearest && self.names(block, lane) > self.names(best.block, best.lane)
+        } else {
+            false
+        };
+        Outcome::Settled((!comes_after).then_some(t))
+    }
+
+    /// The same where it is not seen at a glance how the ray passes the two.
+    #[inline(never)]
+    fn contest_closely(
+        &self,
+        ray: &Ray,
+        (block, lane): (u32, u32),
+        (best, crossed): (&Candidate, Option<Winner>),
+        faces: Faces,
+    ) -> Outcome<Option<f64>> {
+        let t = match self.meet(ray, block, lane) {
+            Meeting::Miss => return Outcome::Settled(None),
+            Meeting::Touch { .. } => return Outcome::Unsettled,
+            Meeting::Hit { is_front, .. } if !faces.have(is_front) => return Outcome::Settled(None),
+            Meeting::Hit { root, .. } => root.t,
+        };
+        match self.is_better(ray, t, self.names(block, lane), best, crossed) {
+            Outcome::Settled(is_better) => Outcome::Settled(is_better.then_some(t)),
+            Outcome::Unsettled => Outcome::Unsettled,
         }
-        Outcome::Settled(Some(t))
     }
 
     /// [`Lanes::pass`] of a triangle by its place.
@@ -270,7 +293,17 @@ impl<'a> Exact<'a> {
 
     /// Whether a crossing, of what has these names, is nearer than that of a triangle that the ray does meet, if there is one, or as
     /// near and before it.
-    pub(crate) fn is_better(&self, ray: &Ray, t: f64, names: (u32, u32), best: &Candidate) -> Outcome<bool> {
+    pub(crate) fn is_better(
+        &self,
+        ray: &Ray,
+        t: f64,
+        names: (u32, u32),
+        best: &Candidate,
+        crossed: Option<Winner>,
+    ) -> Outcome<bool> {
+        if let Some(crossed) = crossed {
+            return Outcome::Settled(crossed.comes_after(t, names));
+        }
         let &Candidate { block, lane, .. } = best;
         if !best.is_some() {
             return Outcome::Settled(true);
@@ -541,27 +574,6 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
         level.run(Contest { single: self, ray, block, lane })
     }
 
-    /// The same where it is not seen at a glance how the ray passes the two.
-    #[inline(never)]
-    fn contest_closely(&self, ray: &Ray, block: u32, lane: u32) -> Outcome<Option<Candidate>> {
-        let found = match self.exact.meet(ray, block, lane) {
-            Meeting::Miss => return Outcome::Settled(None),
-            Meeting::Touch { .. } => return Outcome::Unsettled,
-            Meeting::Hit { is_front, .. } if !self.selection.faces().have(is_front) => {
-                return Outcome::Settled(None);
-            }
-            Meeting::Hit { root, .. } => root.t,
-        };
-        let names = self.exact.names(block, lane);
-        match self.is_better(ray, found, names) {
-            Outcome::Settled(false) => return Outcome::Settled(None),
-            Outcome::Settled(true) => {}
-            Outcome::Unsettled => return Outcome::Unsettled,
-        }
-        let (from, to) = heights(found, largest_component(ray));
-        Outcome::Settled(Some(Candidate { block, lane, from, to }))
-    }
-
     /// The best, where it is no triangle.
     #[inline(always)]
     pub(crate) fn crossed(&self) -> Option<Winner> {
@@ -570,10 +582,7 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
 
     /// Whether a crossing is nearer than the best, or as near and before it.
     pub(crate) fn is_better(&self, ray: &Ray, t: f64, names: (u32, u32)) -> Outcome<bool> {
-        match self.crossed() {
-            Some(crossed) => Outcome::Settled(crossed.comes_after(t, names)),
-            None => self.exact.is_better(ray, t, names, &self.best),
-        }
+        self.exact.is_better(ray, t, names, &self.best, self.crossed())
     }
 
     /// Tests what is no triangle for the nearest hit; false where the plain search has to answer.
@@ -777,12 +786,9 @@ impl<const MIXED: bool, S: Selection> Task for Contest<'_, '_, MIXED, S> {
     #[inline(always)]
     fn run<L: Lanes>(self) -> Self::Output {
         let Self { single, ray, block, lane } = self;
-        let SingleRay { exact, best, selection, .. } = single;
-        if best.is_some() && !best.is_triangle() {
-            return single.contest_closely(ray, block, lane);
-        }
-        match exact.contest::<L>(ray, single.blocks.axes, (block, lane), best, selection.faces()) {
-            Outcome::Unsettled => single.contest_closely(ray, block, lane),
+        let (axes, best) = (single.blocks.axes, (&single.best, single.crossed()));
+        match single.exact.contest::<L>(ray, axes, (block, lane), best, single.selection.faces()) {
+            Outcome::Unsettled => Outcome::Unsettled,
             Outcome::Settled(None) => Outcome::Settled(None),
             Outcome::Settled(Some(t)) => {
                 let (from, to) = heights(t, largest_component(ray));
