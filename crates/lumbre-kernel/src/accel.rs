@@ -349,13 +349,17 @@ impl Accel {
 
     pub(crate) fn closest_batch_at(&self, level: Level, rays: &[Ray], hits: &mut [Option<Hit>]) {
         assert_eq!(rays.len(), hits.len(), "a place for the hit of every ray");
-        let Some(start) = self.batch_start() else {
+        let Some(start) = &self.single else {
             let asked = self.questions_at(level).closest;
             hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = asked.ask(self, ray));
             return;
         };
         let ends = Answers { accel: self, level, rays, places: hits };
-        batch::search_all::<Nearest>(level, self, start, rays, ends);
+        if start.contents == Contents::Anything {
+            batch::search_anything::<Nearest>(level, self, start, rays, ends);
+        } else {
+            batch::search_all::<Nearest>(level, self, start, rays, ends);
+        }
     }
 
     /// [`Accel::any`] for every ray: see [`Accel::closest_batch`].
@@ -368,18 +372,17 @@ impl Accel {
 
     pub(crate) fn any_batch_at(&self, level: Level, rays: &[Ray], hits: &mut [bool]) {
         assert_eq!(rays.len(), hits.len(), "a place for the answer of every ray");
-        let Some(start) = self.batch_start() else {
+        let Some(start) = &self.single else {
             let asked = self.questions_at(level).any;
             hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = asked.ask(self, ray));
             return;
         };
         let ends = Answers { accel: self, level, rays, places: hits };
-        batch::search_all::<Whether>(level, self, start, rays, ends);
-    }
-
-    /// Where batches have a search of their own.
-    fn batch_start(&self) -> Option<&SingleStart> {
-        self.single.as_ref().filter(|start| start.contents != Contents::Anything)
+        if start.contents == Contents::Anything {
+            batch::search_anything::<Whether>(level, self, start, rays, ends);
+        } else {
+            batch::search_all::<Whether>(level, self, start, rays, ends);
+        }
     }
 
     fn questions_at(&self, level: Level) -> Questions {
@@ -681,6 +684,16 @@ impl Ends<Option<Winner>> for Answers<'_, Option<Hit>> {
             Outcome::Settled(None) => *place = None,
             Outcome::Unsettled => *place = self.accel.closest_plainly_at(self.level, &self.rays[position]),
         }
+    }
+}
+
+impl Ends<Option<Hit>> for Answers<'_, Option<Hit>> {
+    #[inline(always)]
+    fn put(&mut self, position: usize, outcome: Outcome<Option<Hit>>) {
+        self.places[position] = match outcome {
+            Outcome::Settled(hit) => hit,
+            Outcome::Unsettled => self.accel.closest_plainly_at(self.level, &self.rays[position]),
+        };
     }
 }
 

@@ -34,9 +34,8 @@ impl<G: Sought> Question for Amidst<G> {
     #[inline(always)]
     fn ask<L: Lanes>(accel: &Accel, ray: &Ray) -> G::Found {
         if let Some(start) = &accel.single {
-            let (root, around) = (start.root, &Place::default());
-            let search = Whole::<G, All> { accel, start, root, around, ray, filter: &All, goal: PhantomData };
-            if let Outcome::Settled(found) = search.run::<L>() {
+            let around = &Place::default();
+            if let Outcome::Settled(found) = Whole::<G, All>::new(accel, start, around, ray).run::<L>() {
                 return found;
             }
         }
@@ -57,7 +56,7 @@ pub(crate) fn search<G: Sought, F: Filter>(
 }
 
 /// A search with one ray, from a node on.
-struct Whole<'a, 'r, G, F> {
+pub(crate) struct Whole<'a, 'r, G, F> {
     accel: &'a Accel,
     start: &'a SingleStart,
     root: u32,
@@ -66,6 +65,14 @@ struct Whole<'a, 'r, G, F> {
     ray: &'r Ray,
     filter: &'r F,
     goal: PhantomData<G>,
+}
+
+impl<'a, 'r, G> Whole<'a, 'r, G, All> {
+    /// In a tree that stands nowhere else, among all there is.
+    #[inline(always)]
+    pub(crate) fn new(accel: &'a Accel, start: &'a SingleStart, around: &'r Place, ray: &'r Ray) -> Self {
+        Self { accel, start, root: start.root, around, ray, filter: &All, goal: PhantomData }
+    }
 }
 
 impl<G: Sought, F: Filter> Task for Whole<'_, '_, G, F> {
@@ -115,7 +122,7 @@ pub(crate) struct AmongOthers<'a, F: Filter + 'a> {
 }
 
 /// No geometry of the tree, and behind all of them: of two hits at the same `t`, one outside of instances comes first.
-const WITHIN: u32 = u32::MAX;
+pub(crate) const WITHIN: u32 = u32::MAX;
 
 impl<'a, F: Filter> AmongOthers<'a, F> {
     /// Tests a leaf; how the search ends, if it does.
@@ -217,7 +224,7 @@ impl<'a, F: Filter> AmongOthers<'a, F> {
 }
 
 /// A hit in an instance.
-trait InInstance {
+pub(crate) trait InInstance {
     fn t(&self) -> f64;
     /// Whether it is nearer than another, or as near and before it.
     fn comes_before(&self, other: &Hit) -> bool;
@@ -242,10 +249,10 @@ impl InInstance for Hit {
 }
 
 /// What is nearest in a placed tree of triangles.
-struct Direct<'d> {
-    accel: &'d Accel,
-    standing: Standing<'d>,
-    winner: Winner,
+pub(crate) struct Direct<'d> {
+    pub(crate) accel: &'d Accel,
+    pub(crate) standing: Standing<'d>,
+    pub(crate) winner: Winner,
 }
 
 impl InInstance for Direct<'_> {
@@ -280,18 +287,18 @@ fn comes_before(t: f64, names: (&[u32], u32, u32), other: &Hit) -> bool {
 }
 
 /// An instance, or a part of one.
-struct Placed<'a> {
-    instance: &'a Instance,
-    from: Start,
+pub(crate) struct Placed<'a> {
+    pub(crate) instance: &'a Instance,
+    pub(crate) from: Start,
     /// Its position and its id.
-    geometry: u32,
-    id: u32,
+    pub(crate) geometry: u32,
+    pub(crate) id: u32,
 }
 
 impl<'a> Placed<'a> {
     /// `None` where an entry stands for nothing.
     #[inline(always)]
-    fn of(accel: &'a Accel, entry: &Entry) -> Option<Self> {
+    pub(crate) fn of(accel: &'a Accel, entry: &Entry) -> Option<Self> {
         let (geometry, from) = (entry.geometry, Start::of(entry.primitive()));
         let standing = &accel.geometries[geometry as usize];
         let GeometryKind::Instance(instance) = &standing.kind else { unreachable!("the tag says so") };
@@ -300,7 +307,7 @@ impl<'a> Placed<'a> {
 
     /// What is met in it in a range, if it is a tree of triangles and single precision can tell.
     #[inline(always)]
-    fn search_triangles<G: Goal, L: Lanes, F: Filter>(
+    pub(crate) fn search_triangles<G: Goal, L: Lanes, F: Filter>(
         &self,
         ray: &Ray,
         range: [f64; 2],
@@ -322,7 +329,7 @@ impl<'a> Placed<'a> {
 
     /// What is met in it in a range, whatever it is.
     #[inline(never)]
-    fn search<G: Sought, F: Filter>(
+    pub(crate) fn search<G: Sought, F: Filter>(
         &self,
         level: Level,
         ray: &Ray,

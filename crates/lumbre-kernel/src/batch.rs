@@ -13,9 +13,9 @@ use crate::blocks::{TriangleBlock, Unit};
 use crate::holds::{Contents, SingleStart};
 use crate::lanes::{self, Lanes, Level, Task};
 use crate::node::{Node, tag};
-use crate::packet::{self, PACKET, Packet, Together};
+use crate::packet::{self, AmongInstances, Companion, NoOthers, Others, PACKET, Packet, Together};
 use crate::query::All;
-use crate::single::{Alone, Goal, Outcome, SingleRay, Step};
+use crate::single::{Goal, Outcome, SingleRay, Step};
 use crate::stack::{Order, Stack};
 use crate::way::{Met, Way};
 
@@ -55,6 +55,12 @@ impl<A, F: FnMut(usize, Outcome<A>)> Ends<A> for F {
     }
 }
 
+/// What takes the ends, as it is given: to have a closure inlined, it has to stand in a call.
+#[inline(always)]
+pub(crate) fn ends<A, F: FnMut(usize, Outcome<A>)>(ends: F) -> F {
+    ends
+}
+
 /// Searches along every ray, in a tree of triangles, or of shapes and custom geometry too.
 pub(crate) fn search_all<G: Goal>(
     level: Level,
@@ -68,8 +74,21 @@ pub(crate) fn search_all<G: Goal>(
     if start.contents == Contents::Triangles {
         search_triangles::<G>(level, accel, start, rays, ends, bytes >= FAR, true);
     } else {
-        level.run(OneByOne::<G, _> { accel, start, rays, ends, goal: PhantomData });
+        let others = NoOthers::<true> { accel, start };
+        level.run(OneByOne::<G, _, _> { accel, start, rays, others, ends, goal: PhantomData });
     }
+}
+
+/// Searches along every ray in a tree of anything.
+pub(crate) fn search_anything<G: Companion>(
+    level: Level,
+    accel: &Accel,
+    start: &SingleStart,
+    rays: &[Ray],
+    ends: impl Ends<G::Found>,
+) {
+    let others = AmongInstances::new(accel, start);
+    level.run(OneByOne::<G, _, _> { accel, start, rays, others, ends, goal: PhantomData });
 }
 
 /// Searches a tree of triangles along every ray, as where the caches hold little of it or much, and with or without packets.
@@ -106,18 +125,24 @@ impl<'a, const MIXED: bool> Trials<'a, MIXED> {
 
     /// A bit for each of up to sixteen rays, the first of which has this position, that was answered.
     #[inline(always)]
-    fn search<G: Goal, L: Lanes>(
+    fn search<G: Goal, L: Lanes, O: Others<'a, G>>(
         &mut self,
         rays: &[Ray],
         first: usize,
-        ends: &mut impl Ends<G::Answer>,
+        others: &mut O,
+        ends: &mut impl Ends<O::Found>,
     ) -> u32 {
         if self.without > 0 {
             self.without -= 1;
             return 0;
         }
         let Ok(rays) = <&[Ray; PACKET]>::try_from(rays) else { return 0 };
-        let Together { answered, pays } = self.packet.search::<G, L>(rays, first, ends);
+        let whole = self.packet.whole::<G>();
+        let mut ends = self::ends(
+            #[inline(always)]
+            |place, outcome| ends.put(first + place, outcome),
+        );
+        let Together { answered, pays, .. } = self.packet.search::<G, L, O>(rays, whole, others, &mut ends);
         (self.without, self.patience) =
             if pays { (0, 0) } else { (self.patience, (2 * self.patience).clamp(1, LEAST_OFTEN)) };
         answered
@@ -125,30 +150,31 @@ impl<'a, const MIXED: bool> Trials<'a, MIXED> {
 }
 
 /// Rays through a tree where shapes take most of the time: those that are alike together, and the others one after another.
-struct OneByOne<'a, 'r, G, E> {
+struct OneByOne<'a, 'r, G, O, E> {
     accel: &'a Accel,
     start: &'a SingleStart,
     rays: &'r [Ray],
+    others: O,
     ends: E,
     goal: PhantomData<G>,
 }
 
-impl<G: Goal, E: Ends<G::Answer>> Task for OneByOne<'_, '_, G, E> {
+impl<'a, G: Goal, O: Others<'a, G>, E: Ends<O::Found>> Task for OneByOne<'a, '_, G, O, E> {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        let Self { accel, start, rays, mut ends, .. } = self;
+        let Self { accel, start, rays, mut others, mut ends, .. } = self;
         let mut trials = Trials::<true>::new(accel, start);
         let mut coming = rays.chunks(PACKET);
         coming.by_ref().take(AHEAD).for_each(fetch_rays::<G>);
         for (number, rays) in rays.chunks(PACKET).enumerate() {
             let first = number * PACKET;
             coming.next().map(fetch_rays::<G>);
-            let answered = trials.search::<G, L>(rays, first, &mut ends);
+            let answered = trials.search::<G, L, O>(rays, first, &mut others, &mut ends);
             for (place, ray) in rays.iter().enumerate() {
                 if answered >> place & 1 == 0 {
-                    ends.put(first + place, Alone::<G, true>::new(accel, start, ray).run::<L>());
+                    ends.put(first + place, others.search_alone::<L>(ray));
                 }
             }
         }
@@ -177,13 +203,15 @@ impl<G: Goal, E: Ends<G::Answer>, const N: usize, const IS_FAR: bool> Task
         let mut flights: Vec<Flight<G, L>> = Vec::with_capacity(N);
         let mut others = Vec::with_capacity(rays.len().min(AT_ONCE));
         let mut trials = Trials::<false>::new(accel, start);
+        let nothing = &mut NoOthers::<false> { accel, start };
         for (number, rays) in rays.chunks(AT_ONCE).enumerate() {
             let mut coming = rays.chunks(PACKET);
             coming.by_ref().take(AHEAD).for_each(fetch_rays::<G>);
             for (place, chunk) in rays.chunks(PACKET).enumerate() {
                 let first = number * AT_ONCE + place * PACKET;
                 coming.next().map(fetch_rays::<G>);
-                let answered = if has_packets { trials.search::<G, L>(chunk, first, &mut ends) } else { 0 };
+                let answered =
+                    if has_packets { trials.search::<G, L, _>(chunk, first, nothing, &mut ends) } else { 0 };
                 if answered != packet::ALL {
                     let is_left = |(position, _): &(usize, &Ray)| answered >> (position - first) & 1 == 0;
                     others.extend((first..).zip(chunk).filter(is_left));

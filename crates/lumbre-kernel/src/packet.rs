@@ -23,20 +23,23 @@
 //! these larger bounds. A triangle all of whose corners are beyond that on one side is met by no ray; and with the larger m, h
 //! and s the errors are no smaller than those of every ray.
 
+mod instances;
 mod shapes;
 
 use lumbre_geometry::Ray;
 use lumbre_math::DVec2;
 
+pub(crate) use self::instances::{AmongInstances, Companion};
 use self::shapes::AmongShapes;
-use crate::batch::Ends;
+use crate::batch::{self, Ends};
 use crate::blocks::Blocks;
+use crate::collapse::Entry;
 use crate::holds::SingleStart;
 use crate::lanes::{self, Axes, Corners, Lanes, Level, Row, Sides, Task, Vector, WIDE, Wide};
 use crate::node::{END_FACTOR, LITTLE, Node, START_FACTOR, tag};
 #[cfg(test)]
 use crate::single::Nearest;
-use crate::single::{Candidate, Exact, Goal, Outcome, Winner, heights, largest_component};
+use crate::single::{Alone, Candidate, Exact, Goal, Outcome, Winner, heights, largest_component};
 use crate::stack::{Order, Stack};
 use crate::triangles::{
     self, BEYOND, BLOCK, EDGE_ERROR, ERRORS_OF_EDGES, ERRORS_OF_EXTENT, FAR, HEIGHT_ERROR, Meeting, Pairs,
@@ -59,15 +62,25 @@ const MOST_SPREAD: f32 = 0.125;
 /// How many there have to be.
 const LEAST: u32 = 4;
 
-/// How much they may do before they go alone: where boxes and triangles are small beside the distances between the rays, that is
-/// faster. In nodes met; a block of triangles is as much as two, and so is a triangle. Less for any hit, which a ray alone has sooner.
-const fn most_work(is_any: bool) -> u32 {
-    if is_any { 160 } else { 300 }
+/// How much rays may do together, in nodes met; a block of triangles is as much as two, and so is a triangle.
+#[derive(Clone, Copy)]
+struct Effort {
+    /// Before they go alone: where boxes and triangles are small beside the distances between the rays, that is faster.
+    most: u32,
+    /// And have it pay.
+    paying: u32,
 }
 
-/// What they may do and have it pay.
-const fn work_that_pays(is_any: bool) -> u32 {
-    if is_any { 100 } else { 120 }
+impl Effort {
+    /// Less for any hit, which a ray alone has sooner; more where there is anything but triangles, of which one alone has more to do.
+    const fn new(is_any: bool, is_mixed: bool) -> Self {
+        match (is_any, is_mixed) {
+            (true, false) => Self { most: 160, paying: 100 },
+            (false, false) => Self { most: 300, paying: 120 },
+            (true, true) => Self { most: 600, paying: 400 },
+            (false, true) => Self { most: 800, paying: 400 },
+        }
+    }
 }
 
 /// What the corners of triangles may be wrong by, by their size: 32u, see above.
@@ -220,15 +233,23 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
         }
     }
 
-    /// Searches along rays together, the first of which has this position. Those that go another way than others do so together, too.
+    /// All there is, from the root on.
     #[inline(always)]
-    pub(crate) fn search<G: Goal, L: Lanes>(
+    pub(crate) fn whole<G: Goal>(&self) -> Asked {
+        let most_work = Effort::new(G::IS_ANY, MIXED).most;
+        Asked { those: ALL, root: self.exact.start.root, most_work }
+    }
+
+    /// Searches along some of these rays together, from a node on. Those that go another way than others do so together, too.
+    #[inline(always)]
+    pub(crate) fn search<G: Goal, L: Lanes, O: Others<'a, G>>(
         &mut self,
         rays: &[Ray; PACKET],
-        first: usize,
-        ends: &mut impl Ends<G::Answer>,
+        Asked { those, root, most_work }: Asked,
+        others: &mut O,
+        ends: &mut impl Ends<O::Found>,
     ) -> Together {
-        let mut together = Together { answered: 0, pays: true };
+        let mut together = Together { answered: ALL & !those, pays: true, is_done: true };
         while together.answered != ALL {
             L::columns(rays, &mut self.columns);
             let (alike, way) = self.ways::<L>((!together.answered).trailing_zeros());
@@ -237,18 +258,24 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
                 together.pays = false;
                 break;
             }
-            let is_done = self.run::<G, L>(rays);
+            let is_done = self.run::<G, L, O>(root, most_work, rays, others);
             if !is_done {
                 // Any hit will do for those that have one.
                 self.chosen &= if G::IS_ANY { !self.alive } else { 0 };
             }
-            G::answer_together::<L, MIXED>(self, rays, first, ends);
+            let mut answers = batch::ends(
+                #[inline(always)]
+                |place, outcome| others.put(place, outcome, ends),
+            );
+            G::answer_together::<L, MIXED>(self, rays, &mut answers);
             together.answered |= self.chosen;
-            together.pays &= is_done && self.work <= work_that_pays(G::IS_ANY);
+            together.pays &= is_done && self.work <= Effort::new(G::IS_ANY, MIXED).paying;
             if !is_done {
+                together.is_done = false;
                 break;
             }
         }
+        together.answered &= those;
         together
     }
 
@@ -691,12 +718,7 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
 
     /// The nearest hits.
     #[inline(always)]
-    pub(crate) fn put_nearest<L: Lanes>(
-        &self,
-        rays: &[Ray; PACKET],
-        first: usize,
-        ends: &mut impl Ends<Option<Winner>>,
-    ) {
+    pub(crate) fn put_nearest<L: Lanes>(&self, rays: &[Ray; PACKET], ends: &mut impl Ends<Option<Winner>>) {
         let axes = self.bundle.axes;
         let triangle = L::Wide::load(&self.triangle.0);
         let mut hits = 0;
@@ -709,13 +731,13 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
             let i = others.trailing_zeros() as usize % PACKET;
             others &= others - 1;
             let is_settled = self.unsettled >> i & 1 == 0;
-            ends.put(first + i, if is_settled { Outcome::Settled(None) } else { Outcome::Unsettled });
+            ends.put(i, if is_settled { Outcome::Settled(None) } else { Outcome::Unsettled });
         }
         hits &= !crossed;
         while crossed != 0 {
             let i = crossed.trailing_zeros() as usize % PACKET;
             crossed &= crossed - 1;
-            ends.put(first + i, Outcome::Settled(self.shapes.crossed[i]));
+            ends.put(i, Outcome::Settled(self.shapes.crossed[i]));
         }
         if hits == 0 {
             return;
@@ -754,25 +776,22 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
             if t.is_nan() {
                 // Unclear: by itself, and closer.
                 let winner = self.exact.winner::<L>(&rays[i], axes, &best);
-                ends.put(
-                    first + i,
-                    winner.map_or(Outcome::Unsettled, |winner| Outcome::Settled(Some(winner))),
-                );
+                ends.put(i, winner.map_or(Outcome::Unsettled, |winner| Outcome::Settled(Some(winner))));
             } else {
                 let (geometry, primitive) = self.exact.names(best.block, best.lane);
                 let local = DVec2::new(met.local[0].0[i], met.local[1].0[i]);
                 let root = triangles::root(t, local);
-                ends.put(first + i, Outcome::Settled(Some(Winner { root, geometry, primitive })));
+                ends.put(i, Outcome::Settled(Some(Winner { root, geometry, primitive })));
             }
         }
     }
 
     /// Whether each met anything.
     #[inline(always)]
-    pub(crate) fn put_met(&self, first: usize, ends: &mut impl Ends<bool>) {
+    pub(crate) fn put_met(&self, ends: &mut impl Ends<bool>) {
         if self.chosen & !self.unsettled == ALL {
             for i in 0..PACKET {
-                ends.put(first + i, Outcome::Settled(self.met >> i & 1 != 0));
+                ends.put(i, Outcome::Settled(self.met >> i & 1 != 0));
             }
             return;
         }
@@ -782,7 +801,7 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
             rest &= rest - 1;
             let is_settled = self.unsettled >> i & 1 == 0;
             let is_met = self.met >> i & 1 != 0;
-            ends.put(first + i, if is_settled { Outcome::Settled(is_met) } else { Outcome::Unsettled });
+            ends.put(i, if is_settled { Outcome::Settled(is_met) } else { Outcome::Unsettled });
         }
     }
 
@@ -807,13 +826,19 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
 
     /// Goes through the tree; false where it gave up.
     #[inline(always)]
-    fn run<G: Goal, L: Lanes>(&mut self, rays: &[Ray; PACKET]) -> bool {
+    fn run<G: Goal, L: Lanes, O: Others<'a, G>>(
+        &mut self,
+        root: u32,
+        most_work: u32,
+        rays: &[Ray; PACKET],
+        others: &mut O,
+    ) -> bool {
         (self.alive, self.met, self.unsettled, self.work) = (self.chosen, 0, 0, 0);
         let nodes: &[Node] = self.exact.nodes();
         let mut stack: Stack<<G::Order as Order>::Entry> = Stack::new();
-        let mut reference = self.exact.start.root;
+        let mut reference = root;
         if MIXED {
-            if !self.meet_infinite::<G, L>(rays) {
+            if !self.meet_infinite::<G, L, O>(most_work, rays, others) {
                 return false;
             }
             if self.alive == 0 {
@@ -844,13 +869,19 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
             }
             if !MIXED || reference >> tag::SHIFT == tag::TRIANGLES {
                 self.meet_triangles::<G, L>(reference, rays);
+            } else if reference >> tag::SHIFT == tag::INSTANCE {
+                let entry = &self.exact.accel().tree.entries[(reference & tag::PLACE) as usize];
+                let left = most_work.saturating_sub(self.work);
+                if !others.meet_instance::<L, MIXED>(self, entry, left, rays) {
+                    return false;
+                }
             } else if !self.meet_shapes::<G, L>(reference, rays) {
                 return false;
             }
             if self.alive == 0 {
                 return true;
             }
-            if self.work > most_work(G::IS_ANY) {
+            if self.work > most_work {
                 return false;
             }
             match self.pop::<G>(&mut stack) {
@@ -869,6 +900,58 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
                 return Some(G::Order::reference(entry));
             }
         }
+    }
+}
+
+/// What takes part in a search by packets in a tree: instances, and rays that go alone.
+pub(crate) trait Others<'a, G: Goal> {
+    /// What is handed out.
+    type Found;
+
+    /// Has those that go on meet an instance, or a part of one; false where that is more work than they may do.
+    fn meet_instance<L: Lanes, const MIXED: bool>(
+        &mut self,
+        packet: &mut Packet<'a, MIXED>,
+        entry: &Entry,
+        most_work: u32,
+        rays: &[Ray; PACKET],
+    ) -> bool;
+
+    /// Hands out what came of a ray.
+    fn put(&mut self, place: usize, outcome: Outcome<G::Answer>, ends: &mut impl Ends<Self::Found>);
+
+    /// Searches along a ray alone.
+    fn search_alone<L: Lanes>(&self, ray: &Ray) -> Outcome<Self::Found>;
+}
+
+/// Nothing: triangles and shapes are all there is. `MIXED` where there are shapes.
+pub(crate) struct NoOthers<'a, const MIXED: bool> {
+    pub(crate) accel: &'a Accel,
+    pub(crate) start: &'a SingleStart,
+}
+
+impl<'a, G: Goal, const ARE_MIXED: bool> Others<'a, G> for NoOthers<'a, ARE_MIXED> {
+    type Found = G::Answer;
+
+    #[inline(always)]
+    fn meet_instance<L: Lanes, const MIXED: bool>(
+        &mut self,
+        _: &mut Packet<'a, MIXED>,
+        _: &Entry,
+        _: u32,
+        _: &[Ray; PACKET],
+    ) -> bool {
+        unreachable!("there are no instances");
+    }
+
+    #[inline(always)]
+    fn put(&mut self, place: usize, outcome: Outcome<G::Answer>, ends: &mut impl Ends<G::Answer>) {
+        ends.put(place, outcome);
+    }
+
+    #[inline(always)]
+    fn search_alone<L: Lanes>(&self, ray: &Ray) -> Outcome<G::Answer> {
+        Alone::<G, ARE_MIXED>::new(self.accel, self.start, ray).run::<L>()
     }
 }
 
@@ -901,6 +984,19 @@ pub(crate) struct Together {
     pub(crate) answered: u32,
     /// Whether that is faster than each alone.
     pub(crate) pays: bool,
+    /// Whether none was given up under way.
+    pub(crate) is_done: bool,
+}
+
+/// What is asked of a packet.
+#[derive(Clone, Copy)]
+pub(crate) struct Asked {
+    /// A bit for each ray that is asked for.
+    pub(crate) those: u32,
+    /// The node that they start at.
+    pub(crate) root: u32,
+    /// What they may do before they go alone.
+    pub(crate) most_work: u32,
 }
 
 /// Those of some rays that a packet answers, at a level, for tests.
@@ -913,13 +1009,16 @@ pub(crate) fn answered_together(level: Level, accel: &Accel, rays: &[Ray; PACKET
         type Output = u32;
         #[inline(always)]
         fn run<L: Lanes>(mut self) -> u32 {
-            self.0.search::<Nearest, L>(self.1, 0, &mut |_, _| {}).answered
+            let (accel, start) = (self.0.exact.accel(), self.0.exact.start);
+            let others = &mut NoOthers::<MIXED> { accel, start };
+            let whole = self.0.whole::<Nearest>();
+            self.0.search::<Nearest, L, _>(self.1, whole, others, &mut |_, _| {}).answered
         }
     }
     let single = accel.single.as_ref().expect("what single precision searches");
     match single.contents {
         Contents::Triangles => level.run(Searching(Packet::<false>::new(accel, single), rays)),
         Contents::Shapes => level.run(Searching(Packet::<true>::new(accel, single), rays)),
-        Contents::Anything => 0,
+        Contents::Anything => level.run(instances::Searching(accel, single, rays)),
     }
 }

@@ -125,6 +125,18 @@ impl Candidate {
     fn is_triangle(&self) -> bool {
         self.block < Self::CROSSED
     }
+
+    /// How far along the ray a hit may be that is nearer than this, or as near.
+    #[inline(always)]
+    pub(crate) fn limit(&self, ray: &Ray) -> f64 {
+        if !self.is_some() {
+            return ray.t_max;
+        }
+        // What this lies before, and rounded upwards as a whole.
+        const UP: f64 = 1.0 + 4.0 * f64::EPSILON;
+        let limit = f64::from(self.to) / largest_component(ray) * UP;
+        if limit < ray.t_max { limit } else { ray.t_max }
+    }
 }
 
 /// What is asked of a tree where single precision cannot decide.
@@ -634,13 +646,7 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
     /// How far along the ray a hit may be that is nearer than the best, or as near.
     #[inline(always)]
     pub(crate) fn limit(&self, ray: &Ray) -> f64 {
-        if !self.best.is_some() {
-            return ray.t_max;
-        }
-        // What the best lies before, and rounded upwards as a whole.
-        const UP: f64 = 1.0 + 4.0 * f64::EPSILON;
-        let limit = f64::from(self.best.to) / largest_component(ray) * UP;
-        if limit < ray.t_max { limit } else { ray.t_max }
+        self.best.limit(ray)
     }
 
     /// Takes a crossing of what is no triangle, if it is the nearest; false where the plain search has to answer.
@@ -840,11 +846,10 @@ pub(crate) trait Goal {
         last: Step,
     ) -> Outcome<Self::Answer>;
 
-    /// What came of rays that went together, the first of which has this position.
+    /// What came of rays that went together, by their places in the packet.
     fn answer_together<L: Lanes, const MIXED: bool>(
         packet: &Packet<MIXED>,
         rays: &[Ray; PACKET],
-        first: usize,
         ends: &mut impl Ends<Self::Answer>,
     );
 }
@@ -902,10 +907,9 @@ impl Goal for Nearest {
     fn answer_together<L: Lanes, const MIXED: bool>(
         packet: &Packet<MIXED>,
         rays: &[Ray; PACKET],
-        first: usize,
         ends: &mut impl Ends<Self::Answer>,
     ) {
-        packet.put_nearest::<L>(rays, first, ends);
+        packet.put_nearest::<L>(rays, ends);
     }
 }
 
@@ -966,10 +970,9 @@ impl Goal for Whether {
     fn answer_together<L: Lanes, const MIXED: bool>(
         packet: &Packet<MIXED>,
         _: &[Ray; PACKET],
-        first: usize,
         ends: &mut impl Ends<bool>,
     ) {
-        packet.put_met(first, ends);
+        packet.put_met(ends);
     }
 }
 

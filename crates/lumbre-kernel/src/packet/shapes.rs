@@ -15,7 +15,8 @@
 
 use lumbre_geometry::{Ray, Root};
 
-use super::{Bundle, CROSSED, Packet, greater};
+use super::{Bundle, CROSSED, Others, Packet, greater};
+use crate::GeometryKind;
 use crate::collapse::Entry;
 use crate::lanes::{self, Lanes, Lines, Row, SureLines, Vector, Wide};
 use crate::node::tag;
@@ -133,11 +134,18 @@ impl<V: Vector> Lines<V> for Middle {
     }
 }
 
-impl<const MIXED: bool> Packet<'_, MIXED> {
-    /// Tests what has no bounds, which stands before the tree; false where the rays are too far apart for that.
+impl<'a, const MIXED: bool> Packet<'a, MIXED> {
+    /// Tests what has no bounds, which stands before the tree; false where the rays are too far apart for that, or it is more work
+    /// than they may do.
     #[inline(always)]
-    pub(super) fn meet_infinite<G: Goal, L: Lanes>(&mut self, rays: &[Ray; PACKET]) -> bool {
-        let infinite = &self.exact.accel().infinite;
+    pub(super) fn meet_infinite<G: Goal, L: Lanes, O: Others<'a, G>>(
+        &mut self,
+        most_work: u32,
+        rays: &[Ray; PACKET],
+        others: &mut O,
+    ) -> bool {
+        let accel = self.exact.accel();
+        let infinite = &accel.infinite;
         if infinite.is_empty() {
             return true;
         }
@@ -145,7 +153,14 @@ impl<const MIXED: bool> Packet<'_, MIXED> {
             return false;
         }
         for entry in infinite {
-            self.meet_entry::<G>(entry, self.alive, rays);
+            if matches!(accel.geometries[entry.geometry as usize].kind, GeometryKind::Instance(_)) {
+                let left = most_work.saturating_sub(self.work);
+                if !others.meet_instance::<L, MIXED>(self, entry, left, rays) {
+                    return false;
+                }
+            } else {
+                self.meet_entry::<G>(entry, self.alive, rays);
+            }
         }
         true
     }
