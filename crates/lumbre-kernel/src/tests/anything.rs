@@ -7,9 +7,11 @@ use lumbre_math::{AnimatedTransform, DVec3, Transform, Vec3};
 
 use super::oracle;
 use super::scenes::{Random, build, cloud, icosphere, mixture, precise, ray, shape, soup, vertex};
+use super::single::check_packet;
 use crate::anything::search_at;
 use crate::holds::Contents;
 use crate::lanes::Level;
+use crate::packet::{self, PACKET};
 use crate::query::All;
 use crate::single::{Nearest, Outcome};
 use crate::{Accel, Faces, GeometryKind, Hit, Instance, QueryOptions, TriangleMesh, brute};
@@ -194,6 +196,70 @@ fn it_tells_of_nearly_all_rays_that_nobody_aims() {
     let rays: Vec<_> = (0..3_000).map(|_| free_ray(&mut random)).collect();
     let told = check(&accel, &rays);
     assert!(told > 2_950, "{told}");
+}
+
+/// A tree in which rays can go together everywhere, of instances that overlap, move, stand twice in one place and hold one another.
+fn company(random: &mut Random, is_endless: bool) -> Accel {
+    let zero = DVec3::ZERO;
+    let ball = Arc::new(build(vec![GeometryKind::Mesh(Arc::new(icosphere(2, zero, 0.7)))]));
+    let long = Arc::new(build(vec![GeometryKind::Mesh(Arc::new(needle()))]));
+    let shapes = (0..9).map(|_| GeometryKind::Shape(shape(random, zero, 1.0))).collect();
+    let mut within = vec![GeometryKind::Mesh(Arc::new(icosphere(1, zero, 0.5)))];
+    within.extend((0..5).map(|_| placed(&ball, random.placement(zero, 1.0, 0.5))));
+    let mut trees = vec![ball, long, Arc::new(build(shapes)), Arc::new(build(within))];
+    if is_endless {
+        let plane = Plane::new(-0.9 * DVec3::Y, random.vector()).unwrap();
+        let plane = PlacedShape::new(plane.into(), Transform::IDENTITY);
+        trees.push(Arc::new(build(vec![GeometryKind::Shape(plane)])));
+    }
+    let mesh = TriangleMesh { origin: CENTER, ..icosphere(2, zero, 1.2) };
+    // What stands in the tree itself is placed in the same place, too.
+    let again = Arc::new(build(vec![GeometryKind::Mesh(Arc::new(mesh.clone()))]));
+    let mut kinds = vec![placed(&again, Transform::IDENTITY), GeometryKind::Mesh(Arc::new(mesh))];
+    kinds.extend((0..6).map(|_| GeometryKind::Shape(shape(random, CENTER, 3.0))));
+    for tree in &trees {
+        for size in [0.2, 0.5, 1.0] {
+            let map = random.placement(CENTER, 3.0, size);
+            kinds.extend([placed(tree, map), placed(tree, map)]);
+        }
+        let first = random.placement(CENTER, 3.0, 0.5);
+        let moved = Transform::translate(random.vector()) * first;
+        let motion = AnimatedTransform::new(vec![(0.0, first), (1.0, moved)]);
+        let instance = Instance { accel: Arc::clone(tree), world_from_object: motion.unwrap().into() };
+        kinds.push(GeometryKind::Instance(instance));
+    }
+    build(kinds)
+}
+
+#[test]
+fn rays_that_go_together_through_instances_are_answered_as_each_alone() {
+    super::scenes::with_every_preset(|| {
+        let mut random = Random(408);
+        for is_endless in [false, true] {
+            let accel = company(&mut random, is_endless);
+            assert_eq!(contents(&accel), Some(Contents::Anything));
+            let (mut together, mut within) = (0, 0);
+            for i in 0..240 {
+                let spread = [1e-4, 3e-3, 0.03, 0.1][i % 4];
+                let (eye, target) = (CENTER + 7.0 * random.vector(), CENTER + 2.0 * random.vector());
+                let (along, away) = (target - eye, [0.0, 1e-3, 0.05][i % 3]);
+                let t_max = [f64::INFINITY, random.between(0.5, 1.5)][i / 2 % 2];
+                let rays: [Ray; PACKET] = std::array::from_fn(|_| {
+                    let direction = along + spread * along.length() * random.vector();
+                    let from = eye + away * random.vector();
+                    Ray::new(from, direction).with_range(1e-3, t_max).at_time(random.unit())
+                });
+                check_packet(&accel, &rays);
+                let answered = packet::answered_together(accel.level, &accel, &rays);
+                together += answered.count_ones();
+                let is_within = |ray: &&Ray| accel.closest(ray).is_some_and(|hit| !hit.route.is_empty());
+                if answered == packet::ALL {
+                    within += rays.iter().filter(is_within).count();
+                }
+            }
+            assert!(together > 1_200 && within > 400, "{together} together, {within} of them in instances");
+        }
+    });
 }
 
 #[test]
