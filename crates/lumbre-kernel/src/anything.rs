@@ -18,7 +18,7 @@ use crate::lanes::{self, Lanes, Level, Question, Task};
 use crate::node::tag;
 use crate::opening::Start;
 use crate::query::{All, Any, Closest, Filter};
-use crate::single::{self, Alone, Goal, Nearest, Outcome, SingleRay, Step, Whether, Winner};
+use crate::single::{self, Alone, Candidate, Goal, Nearest, Outcome, SingleRay, Step, Whether, Winner};
 use crate::sphere_search::{self, CloudRay};
 use crate::stack::Stack;
 use crate::traverse::{self, Place, Search, Standing};
@@ -173,26 +173,17 @@ impl<'a, F: Filter> AmongOthers<'a, F> {
     /// Takes a hit in an instance, if it is the nearest; false where the plain search has to answer.
     #[inline(always)]
     fn meet_hit<L: Lanes>(&mut self, hit: &impl InInstance, ray: &Ray, way: &mut Way<L>) -> bool {
-        let t = hit.t();
-        let (from, to) = single::heights(t, single::largest_component(ray));
-        if from > self.single.best.to {
-            return true;
-        }
-        let is_nearer = if to < self.single.best.from {
-            true
-        } else {
-            match (self.single.crossed(), &self.within) {
-                (Some(Winner { geometry: WITHIN, .. }), Some(best)) => hit.comes_before(best),
-                _ => match self.single.is_better(ray, t, (WITHIN, 0)) {
-                    Outcome::Settled(is_better) => is_better,
-                    Outcome::Unsettled => return false,
-                },
-            }
+        let heights = single::heights(hit.t(), single::largest_component(ray));
+        let (best, crossed) = (&self.single.best, || self.single.crossed());
+        let is_better = |t| self.single.is_better(ray, t, (WITHIN, 0));
+        let is_nearer = match is_nearest(hit, heights, (best, crossed, &self.within), is_better) {
+            Outcome::Settled(is_nearer) => is_nearer,
+            Outcome::Unsettled => return false,
         };
         if is_nearer {
             let within = hit.put(&mut self.within);
             let crossed = Winner { root: within.root, geometry: WITHIN, primitive: 0 };
-            self.single.keep_crossed(crossed, (from, to), way);
+            self.single.keep_crossed(crossed, heights, way);
         }
         true
     }
@@ -275,6 +266,27 @@ impl InInstance for Direct<'_> {
         let Place { route, ids } = standing.place();
         (hit.route, hit.instances) = (route, ids);
         hit
+    }
+}
+
+/// Whether a hit in an instance, between these heights, is the nearest of its ray: where heights do not tell, beside the best that is
+/// no triangle, and what that is where it is in an instance.
+#[inline(always)]
+pub(crate) fn is_nearest(
+    hit: &impl InInstance,
+    (from, to): (f32, f32),
+    (best, crossed, within): (&Candidate, impl FnOnce() -> Option<Winner>, &Option<Hit>),
+    is_better: impl FnOnce(f64) -> Outcome<bool>,
+) -> Outcome<bool> {
+    if from > best.to {
+        return Outcome::Settled(false);
+    }
+    if to < best.from {
+        return Outcome::Settled(true);
+    }
+    match (crossed(), within) {
+        (Some(Winner { geometry: WITHIN, .. }), Some(within)) => Outcome::Settled(hit.comes_before(within)),
+        _ => is_better(hit.t()),
     }
 }
 

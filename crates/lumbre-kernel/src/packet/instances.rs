@@ -9,7 +9,7 @@ use std::marker::PhantomData;
 use lumbre_geometry::Ray;
 
 use super::{Asked, CROSSED, NoOthers, Others, Packet, Together};
-use crate::anything::{Direct, InInstance, Placed, Sought, WITHIN, Whole};
+use crate::anything::{Direct, InInstance, Placed, Sought, WITHIN, Whole, is_nearest};
 use crate::batch::{self, Ends};
 use crate::collapse::Entry;
 use crate::holds::{Contents, SingleStart};
@@ -228,26 +228,17 @@ impl<const MIXED: bool> Visit<'_, '_, MIXED> {
     fn meet_hit(&mut self, hit: &impl InInstance, i: usize) {
         let Self { packet, within, rays, .. } = self;
         let ray = &rays[i];
-        let t = hit.t();
-        let (from, to) = heights(t, largest_component(ray));
-        if from > packet.to.0[i] {
-            return;
-        }
-        let is_nearer = if to < packet.from.0[i] {
-            true
-        } else {
-            match (packet.crossed(i), &within[i]) {
-                (Some(Winner { geometry: WITHIN, .. }), Some(best)) => hit.comes_before(best),
-                _ => match packet.is_better(ray, i, t, (WITHIN, 0)) {
-                    Outcome::Settled(is_better) => is_better,
-                    Outcome::Unsettled => return packet.give_up(i),
-                },
-            }
+        let heights = heights(hit.t(), largest_component(ray));
+        let (best, crossed) = (packet.best(i), || packet.crossed(i));
+        let is_better = |t| packet.is_better(ray, i, t, (WITHIN, 0));
+        let is_nearer = match is_nearest(hit, heights, (&best, crossed, &within[i]), is_better) {
+            Outcome::Settled(is_nearer) => is_nearer,
+            Outcome::Unsettled => return packet.give_up(i),
         };
         if is_nearer {
             let within = hit.put(&mut within[i]);
             packet.shapes.crossed[i] = Some(Winner { root: within.root, geometry: WITHIN, primitive: 0 });
-            packet.keep(i, (from, to), CROSSED);
+            packet.keep(i, heights, CROSSED);
         }
     }
 }

@@ -198,10 +198,17 @@ fn it_tells_of_nearly_all_rays_that_nobody_aims() {
     assert!(told > 2_950, "{told}");
 }
 
+/// Where a ball stands of which rays can meet a corner exactly, and its mesh.
+const ASIDE: DVec3 = DVec3::new(5.5, -2.25, 4.0);
+
+fn ball() -> TriangleMesh {
+    icosphere(2, DVec3::ZERO, 0.7)
+}
+
 /// A tree in which rays can go together everywhere, of instances that overlap, move, stand twice in one place and hold one another.
 fn company(random: &mut Random, is_endless: bool) -> Accel {
     let zero = DVec3::ZERO;
-    let ball = Arc::new(build(vec![GeometryKind::Mesh(Arc::new(icosphere(2, zero, 0.7)))]));
+    let ball = Arc::new(build(vec![GeometryKind::Mesh(Arc::new(ball()))]));
     let long = Arc::new(build(vec![GeometryKind::Mesh(Arc::new(needle()))]));
     let shapes = (0..9).map(|_| GeometryKind::Shape(shape(random, zero, 1.0))).collect();
     let mut within = vec![GeometryKind::Mesh(Arc::new(icosphere(1, zero, 0.5)))];
@@ -216,6 +223,7 @@ fn company(random: &mut Random, is_endless: bool) -> Accel {
     // What stands in the tree itself is placed in the same place, too.
     let again = Arc::new(build(vec![GeometryKind::Mesh(Arc::new(mesh.clone()))]));
     let mut kinds = vec![placed(&again, Transform::IDENTITY), GeometryKind::Mesh(Arc::new(mesh))];
+    kinds.push(placed(&trees[0], Transform::translate(ASIDE)));
     kinds.extend((0..6).map(|_| GeometryKind::Shape(shape(random, CENTER, 3.0))));
     for tree in &trees {
         for size in [0.2, 0.5, 1.0] {
@@ -241,12 +249,18 @@ fn rays_that_go_together_through_instances_are_answered_as_each_alone() {
             let (mut together, mut within) = (0, 0);
             for i in 0..240 {
                 let spread = [1e-4, 3e-3, 0.03, 0.1][i % 4];
-                let (eye, target) = (CENTER + 7.0 * random.vector(), CENTER + 2.0 * random.vector());
+                let (mut eye, mut target) = (CENTER + 7.0 * random.vector(), CENTER + 2.0 * random.vector());
+                let is_aimed = i % 5 == 0;
+                if is_aimed {
+                    target = ASIDE + vertex(&ball(), random.below(40) as u32);
+                    eye = target - 3.0 * [DVec3::X, -DVec3::Y, DVec3::Z][random.below(3)];
+                }
                 let (along, away) = (target - eye, [0.0, 1e-3, 0.05][i % 3]);
                 let t_max = [f64::INFINITY, random.between(0.5, 1.5)][i / 2 % 2];
-                let rays: [Ray; PACKET] = std::array::from_fn(|_| {
-                    let direction = along + spread * along.length() * random.vector();
-                    let from = eye + away * random.vector();
+                let rays: [Ray; PACKET] = std::array::from_fn(|place| {
+                    let apart = if is_aimed && place % 4 == 0 { 0.0 } else { 1.0 };
+                    let direction = along + apart * spread * along.length() * random.vector();
+                    let from = eye + apart * away * random.vector();
                     Ray::new(from, direction).with_range(1e-3, t_max).at_time(random.unit())
                 });
                 check_packet(&accel, &rays);
