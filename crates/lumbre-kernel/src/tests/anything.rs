@@ -247,7 +247,7 @@ fn rays_that_go_together_through_instances_are_answered_as_each_alone() {
             let accel = company(&mut random, is_endless);
             assert_eq!(contents(&accel), Some(Contents::Anything));
             let (mut together, mut within) = (0, 0);
-            for i in 0..240 {
+            for i in 0..600 {
                 let spread = [1e-4, 3e-3, 0.03, 0.1][i % 4];
                 let (mut eye, mut target) = (CENTER + 7.0 * random.vector(), CENTER + 2.0 * random.vector());
                 let is_aimed = i % 5 == 0;
