@@ -15,15 +15,16 @@ use crate::collapse::{Entry, Packed};
 use crate::holds::{Contents, Holds, SingleStart};
 use crate::hulls::Hulls;
 use crate::lanes::Level;
+use crate::narrow::{self, NarrowQuestions};
 use crate::node::{Units, tag};
 use crate::query::{All, Any, Batch, Closest, Count, Filter, If};
 use crate::single::{self, Nearest, Outcome, Questions, Whether, Winner};
 use crate::traverse::{Place, Standing};
 use crate::winding::{self, Moments};
 use crate::{
-    ClosestPoint, Geometry, GeometryKind, Hit, LoadError, MapError, NoClosestPoint, NoWindingNumber,
-    QueryOptions, RefitError, SphereCloud, batch, file, inside, nearest, prepare, rebuild, refit, save,
-    surface, traverse,
+    ClosestPoint, Geometry, GeometryKind, Hit, Hit32, LoadError, MapError, NoClosestPoint, NoWindingNumber,
+    QueryOptions, Ray32, RefitError, SphereCloud, batch, file, inside, nearest, prepare, rebuild, refit,
+    save, surface, traverse,
 };
 
 /// A bounding volume hierarchy over geometries, ready for queries from any number of threads.
@@ -45,6 +46,8 @@ pub struct Accel {
     pub(crate) single: Option<SingleStart>,
     /// What is asked of it at the best level.
     pub(crate) questions: Questions,
+    /// The same of rays in single precision.
+    pub(crate) narrow_questions: NarrowQuestions,
     /// What is asked of shapes first.
     pub(crate) hulls: Hulls,
     /// What a ray cost after the build, once that was asked for.
@@ -182,6 +185,7 @@ impl Accel {
     pub(crate) fn follow_tree(&mut self) {
         self.single = SingleStart::new(&self.holds, &self.units, self.tree.root);
         self.questions = Questions::new(self.level, self.single.as_ref());
+        self.narrow_questions = NarrowQuestions::new(self.level, self.single.as_ref());
         self.hulls = Hulls::new(&self.geometries, &self.tree.entries, &self.units);
         self.moments = OnceLock::new();
     }
@@ -236,6 +240,66 @@ impl Accel {
     #[inline]
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
         self.questions.closest.ask(self, ray)
+    }
+
+    /// The nearest hit of a ray in single precision: faster than [`Accel::closest`], and as watertight.
+    ///
+    /// A tree of nothing but meshes answers in single precision. It meets the triangles as they are seen from the ray, with their
+    /// corners rounded: a ray that passes through a closed mesh meets it, at edges and corners, too, which belong to all triangles that
+    /// have them. The point at `t` lies within some 2⁻²⁰ of its distance and of the tree's size from the triangle; so near to an edge,
+    /// another triangle may be met than in double precision, and where a triangle is seen nearly on edge, `t` may differ by more. Of hits
+    /// at the same `t`, the one whose geometry and primitive come first is the answer. It is the same on any machine, and however the
+    /// tree was built.
+    ///
+    /// Other trees, and rays that come from afar (sixteen sizes of the tree), answer in double precision; the answer is rounded.
+    #[inline]
+    pub fn closest_f32(&self, ray: &Ray32) -> Option<Hit32> {
+        self.narrow_questions.closest.ask(self, ray)
+    }
+
+    /// Whether a ray in single precision hits anything in its range: whether there is an answer of [`Accel::closest_f32`].
+    #[inline]
+    pub fn any_f32(&self, ray: &Ray32) -> bool {
+        self.narrow_questions.any.ask(self, ray)
+    }
+
+    #[cfg(test)]
+    pub(crate) fn closest_f32_at(&self, level: Level, ray: &Ray32) -> Option<Hit32> {
+        NarrowQuestions::new(level, self.single.as_ref()).closest.ask(self, ray)
+    }
+
+    #[cfg(test)]
+    pub(crate) fn any_f32_at(&self, level: Level, ray: &Ray32) -> bool {
+        NarrowQuestions::new(level, self.single.as_ref()).any.ask(self, ray)
+    }
+
+    /// [`Accel::closest_f32`] for every ray, with the same answers to the bit; `hits` has a place for each.
+    ///
+    /// What is said of [`Accel::closest_batch`] holds here, too: sixteen rays in a row that are much alike go together, and in a large
+    /// tree of meshes others are in flight at the same time.
+    ///
+    /// # Panics
+    /// When `rays` and `hits` differ in length.
+    pub fn closest_batch_f32(&self, rays: &[Ray32], hits: &mut [Option<Hit32>]) {
+        self.closest_batch_f32_at(self.level, rays, hits);
+    }
+
+    pub(crate) fn closest_batch_f32_at(&self, level: Level, rays: &[Ray32], hits: &mut [Option<Hit32>]) {
+        assert_eq!(rays.len(), hits.len(), "a place for the hit of every ray");
+        narrow::search_all::<narrow::Closest>(level, self, rays, hits);
+    }
+
+    /// [`Accel::any_f32`] for every ray: see [`Accel::closest_batch_f32`].
+    ///
+    /// # Panics
+    /// When `rays` and `hits` differ in length.
+    pub fn any_batch_f32(&self, rays: &[Ray32], hits: &mut [bool]) {
+        self.any_batch_f32_at(self.level, rays, hits);
+    }
+
+    pub(crate) fn any_batch_f32_at(&self, level: Level, rays: &[Ray32], hits: &mut [bool]) {
+        assert_eq!(rays.len(), hits.len(), "a place for the answer of every ray");
+        narrow::search_all::<narrow::Any>(level, self, rays, hits);
     }
 
     #[cfg(test)]

@@ -29,6 +29,7 @@ use crate::{Accel, GeometryKind, Hit, Instance, precise};
 pub(crate) struct Amidst<G>(PhantomData<G>);
 
 impl<G: Sought> Question for Amidst<G> {
+    type Ray = Ray;
     type Answer = G::Found;
 
     #[inline(always)]

@@ -31,6 +31,7 @@ use crate::collapse::{Entry, Packed};
 use crate::holds::{Holds, SingleStart};
 use crate::hulls::Hulls;
 use crate::lanes::Level;
+use crate::narrow::NarrowQuestions;
 use crate::node::{Node, WIDTH, tag};
 use crate::opening::Start;
 use crate::prepare::{Parts, take_apart, units_of};
@@ -405,6 +406,7 @@ fn over_mapped(file: Arc<Mmap>, geometries: Vec<Geometry>) -> Result<Accel, Load
     let accel = Accel {
         hulls: Hulls::new(&geometries, &tree.entries, &units),
         questions: Questions::new(level, single.as_ref()),
+        narrow_questions: NarrowQuestions::new(level, single.as_ref()),
         single,
         units,
         holds,

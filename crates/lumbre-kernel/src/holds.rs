@@ -111,6 +111,10 @@ pub(crate) struct SingleStart {
     /// By how much planes are moved, and by how much more for each unit of the ray's start.
     pub(crate) margin: f32,
     pub(crate) margin_per_distance: f32,
+    /// What the tree's boxes are relative to as seen from where the corners are, and a zero.
+    pub(crate) shift: [f32; 4],
+    /// By how much planes are moved for rays in single precision: see `narrow`.
+    pub(crate) narrow_margin: f32,
     /// The scale, and its inverse.
     pub(crate) units_per_space: f32,
     pub(crate) space_per_unit: f32,
@@ -155,9 +159,11 @@ impl SingleStart {
             tree_origin: padded(units.origin, 0.0),
             mesh_origin: padded(mesh_origin, 0.0),
             scale: units.scale,
-            farthest: [units.near as f32; 4],
+            farthest: [units.near as f32, units.near as f32, units.near as f32, f32::INFINITY],
             margin: units.single_margin(),
             margin_per_distance: Units::SINGLE_MARGIN_PER_DISTANCE,
+            shift: (units.origin - mesh_origin).extend(0.0).as_vec4().to_array(),
+            narrow_margin: units.narrow_margin(shift * units.scale),
             units_per_space: units.scale as f32,
             space_per_unit: (1.0 / units.scale) as f32,
             least_size: round_up(reach * f64::from(LEAST_SIZE)),

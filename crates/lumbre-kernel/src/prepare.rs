@@ -14,6 +14,7 @@ use crate::collapse::{Entry, Packed, lay_out};
 use crate::holds::{Holds, SingleStart};
 use crate::hulls::Hulls;
 use crate::lanes::{Lanes, Level, Task};
+use crate::narrow::NarrowQuestions;
 use crate::node::Units;
 use crate::outline::Outline;
 use crate::primitive::{Bounds, Kind, Primitive, Traits};
@@ -100,6 +101,7 @@ fn build_here(geometries: Vec<Geometry>, effort: Effort) -> Result<Accel, BuildE
     Ok(Accel {
         hulls: Hulls::new(&geometries, &tree.entries, &units),
         questions: Questions::new(level, single.as_ref()),
+        narrow_questions: NarrowQuestions::new(level, single.as_ref()),
         single,
         units,
         holds,
@@ -123,6 +125,7 @@ pub(crate) fn empty_over(geometries: Vec<Geometry>) -> Accel {
         holds: Holds::new(&geometries, 0.0, 0.0),
         single: None,
         questions: Questions::new(level, None),
+        narrow_questions: NarrowQuestions::new(level, None),
         hulls: Hulls::default(),
         tree: Packed::default(),
         infinite: Vec::new(),

@@ -160,6 +160,12 @@ impl<'a> Exact<'a> {
         self.accel
     }
 
+    /// A block of triangles.
+    #[inline(always)]
+    pub(crate) fn block(&self, place: u32) -> &'a TriangleBlock {
+        self.triangles.block(place)
+    }
+
     /// The nodes of the tree.
     #[inline(always)]
     pub(crate) fn nodes(&self) -> &'a [Node] {
@@ -1024,6 +1030,7 @@ struct Singly<G, const MIXED: bool>(PhantomData<G>);
 struct Plainly<G>(PhantomData<G>);
 
 impl<G: Goal, const MIXED: bool> Question for Singly<G, MIXED> {
+    type Ray = Ray;
     type Answer = G::Found;
 
     #[inline(always)]
@@ -1038,6 +1045,7 @@ impl<G: Goal, const MIXED: bool> Question for Singly<G, MIXED> {
 }
 
 impl<G: Goal> Question for Plainly<G> {
+    type Ray = Ray;
     type Answer = G::Found;
 
     #[inline(always)]

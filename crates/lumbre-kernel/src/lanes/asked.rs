@@ -11,32 +11,34 @@ use crate::Accel;
 
 /// What is asked about a ray in a tree.
 pub(crate) trait Question {
+    /// The ray.
+    type Ray;
     /// What it is to know.
     type Answer;
     /// Finds that. To be `#[inline(always)]`, with everything that it calls in its inner loop.
-    fn ask<L: Lanes>(accel: &Accel, ray: &Ray) -> Self::Answer;
+    fn ask<L: Lanes>(accel: &Accel, ray: &Self::Ray) -> Self::Answer;
 }
 
 /// A question at an instruction set that this machine has: there is no other way to one than by a [`Level`].
-pub(crate) struct Asked<A>(unsafe fn(&Accel, &Ray) -> A);
+pub(crate) struct Asked<A, R = Ray>(unsafe fn(&Accel, &R) -> A);
 
-impl<A> Asked<A> {
+impl<A, R> Asked<A, R> {
     #[inline(always)]
-    pub(crate) fn ask(&self, accel: &Accel, ray: &Ray) -> A {
+    pub(crate) fn ask(&self, accel: &Accel, ray: &R) -> A {
         // SAFETY: only a `Level` makes this value, of a function whose features the machine has.
         unsafe { (self.0)(accel, ray) }
     }
 }
 
-impl<A> Clone for Asked<A> {
+impl<A, R> Clone for Asked<A, R> {
     fn clone(&self) -> Self {
         *self
     }
 }
 
-impl<A> Copy for Asked<A> {}
+impl<A, R> Copy for Asked<A, R> {}
 
-impl<A> fmt::Debug for Asked<A> {
+impl<A, R> fmt::Debug for Asked<A, R> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("Asked")
     }
@@ -44,7 +46,7 @@ impl<A> fmt::Debug for Asked<A> {
 
 impl Level {
     /// A question with these lanes: chosen now, and not once more for every ray.
-    pub(crate) fn asked<Q: Question>(self) -> Asked<Q::Answer> {
+    pub(crate) fn asked<Q: Question>(self) -> Asked<Q::Answer, Q::Ray> {
         Asked(match self.0 {
             Set::Portable => Q::ask::<portable::Portable>,
             #[cfg(target_arch = "x86_64")]
@@ -56,7 +58,7 @@ impl Level {
 
     /// The same as it may leak; `None` without AVX2.
     #[cfg(feature = "measure")]
-    pub(crate) fn asked_leaking<Q: Question>(self) -> Option<Asked<Q::Answer>> {
+    pub(crate) fn asked_leaking<Q: Question>(self) -> Option<Asked<Q::Answer, Q::Ray>> {
         match self.0 {
             Set::Portable => None,
             #[cfg(target_arch = "x86_64")]

@@ -21,8 +21,10 @@ use std::sync::OnceLock;
 use lumbre_geometry::Ray;
 use lumbre_math::{DVec3, Transform};
 
+use crate::Ray32;
 use crate::blocks::{ROOMS, TriangleBlock};
 use crate::holds::SingleStart;
+use crate::narrow::NarrowRay;
 #[cfg(test)]
 use crate::node::Node;
 use crate::node::{BoxRay, Slabs, Units, WIDTH};
@@ -75,6 +77,19 @@ pub(crate) trait Lanes: SphereLanes {
 
     /// The same ray for triangles, and from heights along it to places in the range of boxes.
     fn start_blocks(start: &SingleStart, ray: &Ray, slabs: &Slabs) -> (BlockRay, f32);
+
+    /// The ray in single precision for boxes; `None` where it does not come from nearby, or is not sound.
+    fn start_narrow(start: &SingleStart, ray: &Ray32) -> Option<Slabs>;
+
+    /// The same ray for triangles.
+    fn start_narrow_blocks(start: &SingleStart, ray: &Ray32, slabs: &Slabs) -> NarrowRay;
+
+    /// The corners of the triangles of a block in the ray's sheared space, `[x, y or z][corner]`, all with the sign turned; what lanes
+    /// without a triangle have means nothing. No product is fused with a sum: it is the same on every machine.
+    fn narrow_corners(block: &TriangleBlock, ray: &NarrowRay) -> [[Self::Eight; 3]; 3];
+
+    /// The numbers of rays in single precision, side by side: origin, start, direction, end.
+    fn narrow_rows(rays: &[Ray32; WIDE], rows: &mut [Row<f32>; 8]);
 
     /// The numbers of rays, side by side: origin, direction and range.
     fn columns(rays: &[Ray; WIDE], columns: &mut [Row<f64>; 8]);

@@ -3,9 +3,11 @@
 use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
 
-use super::{Axes, Corners, Crossings, Lanes, Level, Row, Set, Sides, WIDE};
+use super::{Axes, Corners, Crossings, Eight, Lanes, Level, Row, Set, Sides, Vector, WIDE};
+use crate::Ray32;
 use crate::blocks::TriangleBlock;
 use crate::holds::SingleStart;
+use crate::narrow::{NarrowRay, Precise};
 use crate::node::{BoxRay, END_FACTOR, LITTLE, START_FACTOR, Slabs, Units};
 use crate::triangles::{
     BLOCK, BlockRay, EDGE_ERROR, ERRORS_OF_EDGES, ERRORS_OF_EXTENT, HEIGHT_ERROR, HeightRange, Inside,
@@ -35,6 +37,13 @@ fn greater(a: f32, b: f32) -> f32 {
 #[inline(always)]
 fn single_direction(ray: &Ray) -> [f32; 4] {
     let [x, y, z] = ray.direction.to_array().map(|d| d as f32);
+    [x, y, z, 0.0]
+}
+
+/// Where a ray starts relative to the mesh, rounded once.
+#[inline(always)]
+fn local(start: &SingleStart, ray: &Ray32) -> [f32; 4] {
+    let [x, y, z] = [0, 1, 2].map(|axis| (f64::from(ray.origin[axis]) - start.mesh_origin[axis]) as f32);
     [x, y, z, 0.0]
 }
 
@@ -106,6 +115,79 @@ impl Lanes for Portable {
             turn: 0.0f32.copysign(-inverse),
         };
         (blocks, inverse.abs())
+    }
+
+    #[inline(always)]
+    fn start_narrow(start: &SingleStart, ray: &Ray32) -> Option<Slabs> {
+        let (t_min, t_max) = (ray.t_min, ray.t_max);
+        // Every comparison with a NaN is false.
+        let (mut fits, mut is_long) = (0.0 <= t_min && t_min <= t_max && t_min.is_sign_positive(), false);
+        let mut signs = 0;
+        let mut slabs = BoxRay::passing_all().slabs;
+        for (axis, &local) in local(start, ray).iter().enumerate().take(3) {
+            let d = ray.direction[axis];
+            let from = (local - start.shift[axis]) * start.units_per_space;
+            fits &= from.abs() <= start.farthest[axis] && d.abs() <= start.longest;
+            is_long |= d.abs() >= start.shortest;
+            let inverse = start.space_per_unit / greater(d.abs(), start.tiny);
+            let margin = inverse * (from.abs() * Units::NARROW_MARGIN_PER_DISTANCE + start.narrow_margin);
+            let inverse = inverse.copysign(d);
+            slabs.inverse[axis] = inverse;
+            slabs.near_offset[axis] = -from * inverse - margin;
+            slabs.far_offset[axis] = -from * inverse + margin;
+            signs |= u32::from(d.is_sign_negative()) << axis;
+        }
+        if !(fits && is_long) {
+            return None;
+        }
+        slabs.sides = Sides::new(signs);
+        (slabs.s_min, slabs.s_max) = (t_min * START_FACTOR, t_max * END_FACTOR + LITTLE as f32);
+        Some(slabs)
+    }
+
+    #[inline(always)]
+    fn start_narrow_blocks(start: &SingleStart, ray: &Ray32, slabs: &Slabs) -> NarrowRay {
+        let axes = Axes::new(&ray.direction.as_dvec3());
+        let inverse = axes.permute_single(&slabs.inverse)[2] * start.units_per_space;
+        let [x, y, z] = ray.direction.to_array();
+        NarrowRay {
+            axes,
+            origin: axes.permute_single(&local(start, ray)),
+            shear: axes.permute_single(&[x, y, z, 0.0]).map(|d| d * inverse),
+            minus_inverse: -inverse,
+            t_min: ray.t_min,
+            t_max: ray.t_max,
+            precise: Precise::new(start),
+        }
+    }
+
+    #[inline(always)]
+    fn narrow_corners(block: &TriangleBlock, ray: &NarrowRay) -> [[Self::Eight; 3]; 3] {
+        let splat = Self::Eight::splat;
+        let [kx, ky, kz] = ray.axes.order();
+        let Corners(corners) = Self::corners(block);
+        let mut sheared = [[splat(0.0); 3]; 3];
+        for (corner, axes) in corners.iter().enumerate() {
+            // All three with the sign turned, which their products do not have.
+            let z = splat(ray.origin[2]) - Self::Eight::load(&axes[kz]);
+            let across = splat(ray.origin[0]) - Self::Eight::load(&axes[kx]);
+            let up = splat(ray.origin[1]) - Self::Eight::load(&axes[ky]);
+            sheared[0][corner] = across - splat(ray.shear[0]) * z;
+            sheared[1][corner] = up - splat(ray.shear[1]) * z;
+            sheared[2][corner] = z;
+        }
+        sheared
+    }
+
+    #[inline(always)]
+    fn narrow_rows(rays: &[Ray32; WIDE], rows: &mut [Row<f32>; 8]) {
+        for (i, ray) in rays.iter().enumerate() {
+            for axis in 0..3 {
+                rows[axis].0[i] = ray.origin[axis];
+                rows[4 + axis].0[i] = ray.direction[axis];
+            }
+            (rows[3].0[i], rows[7].0[i]) = (ray.t_min, ray.t_max);
+        }
     }
 
     #[inline(always)]

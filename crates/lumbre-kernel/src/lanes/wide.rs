@@ -65,12 +65,18 @@ pub(crate) trait Wide: Vector<Array = [f32; WIDE]> {
     fn are_same(row: &Row<f64>) -> bool;
     /// From a place, in other units; rounded, after it was computed in double precision.
     fn rounded_from(row: &Row<f64>, place: f64, scale: f64) -> Self;
+    /// The difference to a number in double precision, rounded once.
+    fn rounded_less(self, place: f64) -> Self;
     /// From a place, rounded, and what rounding took.
     fn parted_from(row: &Row<f64>, place: f64) -> (Self, Self);
     /// The largest of all; any of them where one is a NaN.
     fn most(self) -> f32;
     /// The largest of each of sixteen; any of them where one is a NaN.
     fn most_of_each(them: [Self; WIDE]) -> Row<f32>;
+    /// The same of each of eight.
+    fn most_of_eight(them: [Self; 8]) -> [f32; 8];
+    /// Whether all are the same number.
+    fn are_equal(self) -> bool;
     /// Everywhere the place half way between two: those inside a square of four by four that are across from one another.
     fn middle(self) -> Self;
     /// The first of them.
@@ -302,6 +308,14 @@ impl Wide for Portable16 {
     }
 
     #[inline(always)]
+    fn rounded_less(mut self, place: f64) -> Self {
+        for one in &mut self.0 {
+            *one = (f64::from(*one) - place) as f32;
+        }
+        self
+    }
+
+    #[inline(always)]
     fn parted_from(row: &Row<f64>, place: f64) -> (Self, Self) {
         let (mut rounded, mut rest) = ([0.0; WIDE], [0.0; WIDE]);
         for lane in 0..WIDE {
@@ -328,6 +342,24 @@ impl Wide for Portable16 {
             *most = one.most();
         }
         most
+    }
+
+    #[inline(always)]
+    fn most_of_eight(them: [Self; 8]) -> [f32; 8] {
+        let mut most = [0.0; 8];
+        for (most, one) in most.iter_mut().zip(them) {
+            *most = one.most();
+        }
+        most
+    }
+
+    #[inline(always)]
+    fn are_equal(self) -> bool {
+        let mut are_equal = true;
+        for one in self.0 {
+            are_equal &= one == self.0[0];
+        }
+        are_equal
     }
 
     #[inline(always)]
@@ -571,6 +603,17 @@ mod x86 {
         }
 
         #[inline(always)]
+        fn rounded_less(self, place: f64) -> Self {
+            // SAFETY: see the type.
+            unsafe {
+                let place = _mm512_set1_pd(place);
+                let low = _mm512_cvtps_pd(_mm512_castps512_ps256(self.0));
+                let high = _mm512_cvtps_pd(_mm512_extractf32x8_ps::<1>(self.0));
+                Self::of_halves(_mm512_sub_pd(low, place), _mm512_sub_pd(high, place))
+            }
+        }
+
+        #[inline(always)]
         fn parted_from(row: &Row<f64>, place: f64) -> (Self, Self) {
             // SAFETY: see the type. The loads are of eight f64 each, of sixteen.
             unsafe {
@@ -617,6 +660,31 @@ mod x86 {
                     .store(&mut most);
             }
             most
+        }
+
+        #[inline(always)]
+        fn most_of_eight(them: [Self; 8]) -> [f32; 8] {
+            let abcd = Self::most_of_four(them[0], them[1], them[2], them[3]);
+            let efgh = Self::most_of_four(them[4], them[5], them[6], them[7]);
+            let mut most = [0.0; 8];
+            // SAFETY: see the type. The store is of eight f32.
+            unsafe {
+                let low = _mm512_shuffle_f32x4::<0b01_00_01_00>(abcd, efgh);
+                let halves = _mm512_max_ps(low, _mm512_shuffle_f32x4::<0b11_10_11_10>(abcd, efgh));
+                let even = _mm512_shuffle_f32x4::<0b10_00_10_00>(halves, halves);
+                let all = _mm512_max_ps(even, _mm512_shuffle_f32x4::<0b11_01_11_01>(halves, halves));
+                _mm256_storeu_ps(most.as_mut_ptr(), _mm512_castps512_ps256(all));
+            }
+            most
+        }
+
+        #[inline(always)]
+        fn are_equal(self) -> bool {
+            // SAFETY: see the type.
+            unsafe {
+                let first = _mm512_broadcastss_ps(_mm512_castps512_ps128(self.0));
+                _mm512_cmp_ps_mask::<_CMP_NEQ_UQ>(self.0, first) == 0
+            }
         }
 
         #[inline(always)]
@@ -905,6 +973,15 @@ mod x86 {
         }
     }
 
+    impl Eight256 {
+        /// # Safety
+        /// There must be AVX2.
+        #[inline(always)]
+        pub(in crate::lanes) unsafe fn new(eight: __m256) -> Self {
+            Self(eight)
+        }
+    }
+
     impl Eight for Eight256 {
         #[inline(always)]
         fn load(eight: &[f32; 8]) -> Self {
@@ -1026,6 +1103,21 @@ mod x86 {
         }
 
         #[inline(always)]
+        fn rounded_less(self, place: f64) -> Self {
+            let [low, high] = self.0;
+            // SAFETY: see the type.
+            unsafe {
+                let place = _mm256_set1_pd(place);
+                Self::of_quarters([
+                    _mm256_sub_pd(_mm256_cvtps_pd(_mm256_castps256_ps128(low)), place),
+                    _mm256_sub_pd(_mm256_cvtps_pd(_mm256_extractf128_ps::<1>(low)), place),
+                    _mm256_sub_pd(_mm256_cvtps_pd(_mm256_castps256_ps128(high)), place),
+                    _mm256_sub_pd(_mm256_cvtps_pd(_mm256_extractf128_ps::<1>(high)), place),
+                ])
+            }
+        }
+
+        #[inline(always)]
         fn parted_from(row: &Row<f64>, place: f64) -> (Self, Self) {
             let mut quarters = Self::quarters(row);
             for quarter in &mut quarters {
@@ -1069,6 +1161,32 @@ mod x86 {
                 }
             }
             most
+        }
+
+        #[inline(always)]
+        fn most_of_eight(them: [Self; 8]) -> [f32; 8] {
+            let abcd = Self::most_of_four(them[0], them[1], them[2], them[3]);
+            let efgh = Self::most_of_four(them[4], them[5], them[6], them[7]);
+            let mut most = [0.0; 8];
+            // SAFETY: see the type. The store is of eight f32.
+            unsafe {
+                let low = _mm256_permute2f128_ps::<0x20>(abcd, efgh);
+                let all = _mm256_max_ps(low, _mm256_permute2f128_ps::<0x31>(abcd, efgh));
+                _mm256_storeu_ps(most.as_mut_ptr(), all);
+            }
+            most
+        }
+
+        #[inline(always)]
+        fn are_equal(self) -> bool {
+            let [low, high] = self.0;
+            // SAFETY: see the type.
+            unsafe {
+                let first = _mm256_broadcastss_ps(_mm256_castps256_ps128(low));
+                let low = _mm256_cmp_ps::<_CMP_EQ_OQ>(low, first);
+                let both = _mm256_and_ps(low, _mm256_cmp_ps::<_CMP_EQ_OQ>(high, first));
+                _mm256_movemask_ps(both) == 0xff
+            }
         }
 
         #[inline(always)]

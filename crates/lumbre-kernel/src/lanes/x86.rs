@@ -7,9 +7,9 @@ use lumbre_geometry::Ray;
 use lumbre_math::{DAffine3, DVec3, Transform};
 
 use super::{Axes, Corners, Crossings, Lanes, Level, Question, Row, Set, Sides, Task, WIDE, Wide, wide};
-use crate::Accel;
 use crate::blocks::{MOST_SHARED, TriangleBlock, USUAL};
 use crate::holds::SingleStart;
+use crate::narrow::{NarrowRay, Precise};
 use crate::node::{
     BoxRay, END_FACTOR, LARGEST_NEAR, LITTLE, SMALLEST_NEAR, START_FACTOR, Slabs, TINY_NEAR, Units,
 };
@@ -17,6 +17,7 @@ use crate::triangles::{
     BLOCK, BlockRay, EDGE_ERROR, ERRORS_OF_EDGES, ERRORS_OF_EXTENT, FAR, HEIGHT_ERROR, HeightRange, Inside,
     Passage, ROUNDINGS, SIZE_ERROR, Shear, TINY,
 };
+use crate::{Accel, Ray32};
 
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
 pub(super) fn run_avx2<T: Task>(task: T) -> T::Output {
@@ -29,25 +30,25 @@ pub(super) fn run_avx512<T: Task>(task: T) -> T::Output {
 }
 
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
-pub(super) fn ask_avx2<Q: Question>(accel: &Accel, ray: &Ray) -> Q::Answer {
+pub(super) fn ask_avx2<Q: Question>(accel: &Accel, ray: &Q::Ray) -> Q::Answer {
     Q::ask::<X86<false>>(accel, ray)
 }
 
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512cd,avx512dq,avx512vl")]
-pub(super) fn ask_avx512<Q: Question>(accel: &Accel, ray: &Ray) -> Q::Answer {
+pub(super) fn ask_avx512<Q: Question>(accel: &Accel, ray: &Q::Ray) -> Q::Answer {
     Q::ask::<X86<true>>(accel, ray)
 }
 
 /// The same as it may leak: see `X86`.
 #[cfg(feature = "measure")]
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
-pub(super) fn ask_leaking_avx2<Q: Question>(accel: &Accel, ray: &Ray) -> Q::Answer {
+pub(super) fn ask_leaking_avx2<Q: Question>(accel: &Accel, ray: &Q::Ray) -> Q::Answer {
     Q::ask::<X86<false, true>>(accel, ray)
 }
 
 #[cfg(feature = "measure")]
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512cd,avx512dq,avx512vl")]
-pub(super) fn ask_leaking_avx512<Q: Question>(accel: &Accel, ray: &Ray) -> Q::Answer {
+pub(super) fn ask_leaking_avx512<Q: Question>(accel: &Accel, ray: &Q::Ray) -> Q::Answer {
     Q::ask::<X86<true, true>>(accel, ray)
 }
 
@@ -59,6 +60,7 @@ pub(super) fn ask_leaking_avx512<Q: Question>(accel: &Accel, ray: &Ray) -> Q::An
 pub(crate) struct X86<const AVX512: bool, const LEAKS: bool = false>;
 
 // The numbers of a ray stand in a row: origin, direction, range.
+const _: () = assert!(size_of::<Ray32>() == 32 && offset_of!(Ray32, direction) == 16);
 const _: () =
     assert!(offset_of!(Ray, direction) == 24 && offset_of!(Ray, t_min) == 48 && offset_of!(Ray, t_max) == 56);
 
@@ -179,18 +181,19 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
     /// The corners of the triangles of a block in the ray's sheared space, `[x, y or z][corner]`, all with the sign turned, which
     /// their products do not have: so one operand can come from memory. What lanes without a triangle have means nothing.
     #[inline(always)]
-    fn sheared_corners(block: &TriangleBlock, ray: &BlockRay) -> [[__m256; 3]; 3] {
+    fn sheared_corners<S: Shears>(block: &TriangleBlock, ray: &S) -> [[__m256; 3]; 3] {
         // Nothing waits for a block to say where its rows are, as long as that is foreseen: hence the branches, which the
         // compiler must not take out.
         let room = block.room();
+        let rows_by_room = &ray.axes().rows_by_room;
         let rows = if room == USUAL[0] {
-            super::opaque(&ray.axes.rows_by_room[0])
+            super::opaque(&rows_by_room[0])
         } else if room == USUAL[1] {
-            super::opaque(&ray.axes.rows_by_room[1])
+            super::opaque(&rows_by_room[1])
         } else if room <= MOST_SHARED {
-            super::opaque(&ray.axes.rows_by_room[2])
+            super::opaque(&rows_by_room[2])
         } else {
-            super::opaque(&ray.axes.rows_by_room[3])
+            super::opaque(&rows_by_room[3])
         };
         if room > MOST_SHARED {
             let a = Self::sheared_eight(block, ray, rows, 0);
@@ -223,9 +226,9 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
 
     /// Eight vertices from the `first` of these rows on.
     #[inline(always)]
-    fn sheared_eight(
+    fn sheared_eight<S: Shears>(
         block: &TriangleBlock,
-        ray: &BlockRay,
+        ray: &S,
         &[kx, ky, kz]: &[u32; 3],
         first: usize,
     ) -> [__m256; 3] {
@@ -233,35 +236,47 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
         // SAFETY: see `X86`. Rows begin at 48 at most, and no more of them than 24 are looked at, in an array of 96.
         unsafe {
             let load = |row: u32| _mm256_loadu_ps(rows.as_ptr().add(row as usize + first));
-            let (shear_x, shear_y) = (_mm256_set1_ps(ray.shear[0]), _mm256_set1_ps(ray.shear[1]));
-            let z = _mm256_sub_ps(_mm256_set1_ps(ray.origin[2]), load(kz));
-            let across = _mm256_sub_ps(_mm256_set1_ps(ray.origin[0]), load(kx));
-            let up = _mm256_sub_ps(_mm256_set1_ps(ray.origin[1]), load(ky));
+            let (origin, shear) = (ray.origin(), ray.shear());
+            let (shear_x, shear_y) = (_mm256_set1_ps(shear[0]), _mm256_set1_ps(shear[1]));
+            let z = _mm256_sub_ps(_mm256_set1_ps(origin[2]), load(kz));
+            let across = _mm256_sub_ps(_mm256_set1_ps(origin[0]), load(kx));
+            let up = _mm256_sub_ps(_mm256_set1_ps(origin[1]), load(ky));
             if LEAKS {
                 return [_mm256_fnmadd_ps(shear_x, z, across), _mm256_fnmadd_ps(shear_y, z, up), z];
             }
-            let x = _mm256_fnmadd_ps(shear_x, z, _mm256_add_ps(across, _mm256_set1_ps(ray.rest[0])));
-            let y = _mm256_fnmadd_ps(shear_y, z, _mm256_add_ps(up, _mm256_set1_ps(ray.rest[1])));
+            let Some(rest) = ray.rest() else {
+                // No fused multiply-add: the same on every machine.
+                let x = _mm256_sub_ps(across, _mm256_mul_ps(shear_x, z));
+                return [x, _mm256_sub_ps(up, _mm256_mul_ps(shear_y, z)), z];
+            };
+            let x = _mm256_fnmadd_ps(shear_x, z, _mm256_add_ps(across, _mm256_set1_ps(rest[0])));
+            let y = _mm256_fnmadd_ps(shear_y, z, _mm256_add_ps(up, _mm256_set1_ps(rest[1])));
             [x, y, z]
         }
     }
 
     /// Sixteen vertices. For AVX-512 alone.
     #[inline(always)]
-    fn sheared_sixteen(block: &TriangleBlock, ray: &BlockRay, [kx, ky, kz]: [u32; 3]) -> [__m512; 3] {
+    fn sheared_sixteen<S: Shears>(block: &TriangleBlock, ray: &S, [kx, ky, kz]: [u32; 3]) -> [__m512; 3] {
         let rows = block.coordinates();
         // SAFETY: as there.
         unsafe {
             let load = |at: u32| _mm512_loadu_ps(rows.as_ptr().add(at as usize));
-            let (shear_x, shear_y) = (_mm512_set1_ps(ray.shear[0]), _mm512_set1_ps(ray.shear[1]));
-            let z = _mm512_sub_ps(_mm512_set1_ps(ray.origin[2]), load(kz));
-            let across = _mm512_sub_ps(_mm512_set1_ps(ray.origin[0]), load(kx));
-            let up = _mm512_sub_ps(_mm512_set1_ps(ray.origin[1]), load(ky));
+            let (origin, shear) = (ray.origin(), ray.shear());
+            let (shear_x, shear_y) = (_mm512_set1_ps(shear[0]), _mm512_set1_ps(shear[1]));
+            let z = _mm512_sub_ps(_mm512_set1_ps(origin[2]), load(kz));
+            let across = _mm512_sub_ps(_mm512_set1_ps(origin[0]), load(kx));
+            let up = _mm512_sub_ps(_mm512_set1_ps(origin[1]), load(ky));
             if LEAKS {
                 return [_mm512_fnmadd_ps(shear_x, z, across), _mm512_fnmadd_ps(shear_y, z, up), z];
             }
-            let x = _mm512_fnmadd_ps(shear_x, z, _mm512_add_ps(across, _mm512_set1_ps(ray.rest[0])));
-            let y = _mm512_fnmadd_ps(shear_y, z, _mm512_add_ps(up, _mm512_set1_ps(ray.rest[1])));
+            let Some(rest) = ray.rest() else {
+                // No fused multiply-add: the same on every machine.
+                let x = _mm512_sub_ps(across, _mm512_mul_ps(shear_x, z));
+                return [x, _mm512_sub_ps(up, _mm512_mul_ps(shear_y, z)), z];
+            };
+            let x = _mm512_fnmadd_ps(shear_x, z, _mm512_add_ps(across, _mm512_set1_ps(rest[0])));
+            let y = _mm512_fnmadd_ps(shear_y, z, _mm512_add_ps(up, _mm512_set1_ps(rest[1])));
             [x, y, z]
         }
     }
@@ -441,6 +456,24 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
         }
     }
 
+    /// Origin and start, direction and end.
+    #[inline(always)]
+    fn narrow_numbers(ray: &Ray32) -> (__m128, __m128) {
+        let ray: *const Ray32 = ray;
+        // SAFETY: see `X86`. A ray is eight f32 in this order.
+        unsafe { (_mm_loadu_ps(ray.cast()), _mm_loadu_ps(ray.cast::<f32>().add(4))) }
+    }
+
+    /// Three coordinates relative to the mesh, rounded once.
+    #[inline(always)]
+    fn local(start: &SingleStart, origin: __m128) -> __m128 {
+        // SAFETY: see `X86`. The load is of an array of four.
+        unsafe {
+            let origin = _mm256_sub_pd(_mm256_cvtps_pd(origin), _mm256_loadu_pd(start.mesh_origin.as_ptr()));
+            _mm256_cvtpd_ps(origin)
+        }
+    }
+
     /// Three numbers, and a zero.
     #[inline(always)]
     fn three(v: &DVec3) -> __m256d {
@@ -463,6 +496,60 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
         // SAFETY: see `X86`. The store is of four f32 into an array of four.
         unsafe { _mm_storeu_ps(array.as_mut_ptr(), v) };
         array
+    }
+}
+
+/// What shears the corners of triangles.
+trait Shears {
+    fn axes(&self) -> &'static Axes;
+    /// In the order of the axes, here and below.
+    fn origin(&self) -> &[f32; 4];
+    fn shear(&self) -> &[f32; 4];
+    /// What rounding took from the origin, where that counts.
+    fn rest(&self) -> Option<&[f32; 4]>;
+}
+
+impl Shears for BlockRay {
+    #[inline(always)]
+    fn axes(&self) -> &'static Axes {
+        self.axes
+    }
+
+    #[inline(always)]
+    fn origin(&self) -> &[f32; 4] {
+        &self.origin
+    }
+
+    #[inline(always)]
+    fn shear(&self) -> &[f32; 4] {
+        &self.shear
+    }
+
+    #[inline(always)]
+    fn rest(&self) -> Option<&[f32; 4]> {
+        Some(&self.rest)
+    }
+}
+
+impl Shears for NarrowRay {
+    #[inline(always)]
+    fn axes(&self) -> &'static Axes {
+        self.axes
+    }
+
+    #[inline(always)]
+    fn origin(&self) -> &[f32; 4] {
+        &self.origin
+    }
+
+    #[inline(always)]
+    fn shear(&self) -> &[f32; 4] {
+        &self.shear
+    }
+
+    #[inline(always)]
+    fn rest(&self) -> Option<&[f32; 4]> {
+        None
     }
 }
 
@@ -561,6 +648,84 @@ where
     }
 
     #[inline(always)]
+    fn start_narrow(start: &SingleStart, ray: &Ray32) -> Option<Slabs> {
+        // As the portable one, three axes at a time.
+        // SAFETY: see `X86`. The loads are of arrays of four.
+        unsafe {
+            let (origin, direction) = Self::narrow_numbers(ray);
+            let from = _mm_sub_ps(Self::local(start, origin), _mm_loadu_ps(start.shift.as_ptr()));
+            let from = _mm_mul_ps(from, _mm_set1_ps(start.units_per_space));
+            let sign = _mm_set1_ps(-0.0);
+            let (distance, length) = (_mm_andnot_ps(sign, from), _mm_andnot_ps(sign, direction));
+            // Every comparison with a NaN is false. The last of four: t_min is not below zero, and t_min <= t_max.
+            let fits = _mm_and_ps(
+                _mm_cmple_ps(distance, _mm_loadu_ps(start.farthest.as_ptr())),
+                _mm_cmple_ps(
+                    _mm_blend_ps::<0b1000>(length, origin),
+                    _mm_blend_ps::<0b1000>(_mm_set1_ps(start.longest), direction),
+                ),
+            );
+            let is_long = _mm_cmpge_ps(length, _mm_set1_ps(start.shortest));
+            let is_before = _mm_movemask_ps(origin) & 0b1000;
+            if _mm_movemask_ps(fits) != 0b1111 || _mm_movemask_ps(is_long) & 0b111 == 0 || is_before != 0 {
+                return None;
+            }
+            let size = _mm_max_ps(length, _mm_set1_ps(start.tiny));
+            let size = _mm_div_ps(_mm_set1_ps(start.space_per_unit), size);
+            let inverse = _mm_or_ps(size, _mm_and_ps(direction, sign));
+            let per_distance = _mm_set1_ps(Units::NARROW_MARGIN_PER_DISTANCE);
+            let margin =
+                _mm_mul_ps(size, _mm_fmadd_ps(distance, per_distance, _mm_set1_ps(start.narrow_margin)));
+            Some(Slabs {
+                inverse: Self::array(inverse),
+                near_offset: Self::array(_mm_fnmsub_ps(from, inverse, margin)),
+                far_offset: Self::array(_mm_fnmadd_ps(from, inverse, margin)),
+                sides: Sides::new(_mm_movemask_ps(direction) as u32),
+                s_min: ray.t_min * START_FACTOR,
+                s_max: ray.t_max * END_FACTOR + LITTLE as f32,
+            })
+        }
+    }
+
+    #[inline(always)]
+    fn start_narrow_blocks(start: &SingleStart, ray: &Ray32, slabs: &Slabs) -> NarrowRay {
+        // SAFETY: see `X86`. The loads are of arrays of four.
+        unsafe {
+            let (origin, direction) = Self::narrow_numbers(ray);
+            let local = Self::local(start, origin);
+            let size = _mm_andnot_ps(_mm_set1_ps(-0.0), direction);
+            // x, y, x and y, z, z.
+            let sizes = _mm_cmpge_ps(
+                _mm_shuffle_ps::<0b00_00_01_00>(size, size),
+                _mm_shuffle_ps::<0b10_10_10_01>(size, size),
+            );
+            let axes = Axes::by_bits(_mm_movemask_ps(direction) as u32, _mm_movemask_ps(sizes) as u32);
+            let order = _mm_loadu_si128(axes.order.as_ptr().cast());
+            let last = _mm_shuffle_epi32::<0b10_10_10_10>(order);
+            let inverse = _mm_permutevar_ps(_mm_loadu_ps(slabs.inverse.as_ptr()), last);
+            let inverse = _mm_mul_ps(inverse, _mm_set1_ps(start.units_per_space));
+            let shear = _mm_permutevar_ps(_mm_mul_ps(direction, inverse), order);
+            NarrowRay {
+                axes,
+                origin: Self::array(_mm_permutevar_ps(local, order)),
+                shear: Self::array(shear),
+                minus_inverse: -_mm_cvtss_f32(inverse),
+                t_min: ray.t_min,
+                t_max: ray.t_max,
+                precise: Precise::new(start),
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn narrow_corners(block: &TriangleBlock, ray: &NarrowRay) -> [[wide::Eight256; 3]; 3] {
+        let [[a, b, c], [d, e, f], [g, h, i]] = Self::sheared_corners(block, ray);
+        let of = wide::Eight256::new;
+        // SAFETY: see `X86`.
+        unsafe { [[of(a), of(b), of(c)], [of(d), of(e), of(f)], [of(g), of(h), of(i)]] }
+    }
+
+    #[inline(always)]
     fn start_placed(
         start: &SingleStart,
         map: &Transform,
@@ -639,6 +804,48 @@ where
                 turn: _mm_cvtss_f32(_mm_andnot_ps(inverse, sign)),
             };
             (blocks, _mm_cvtss_f32(_mm_andnot_ps(sign, inverse)))
+        }
+    }
+
+    #[inline(always)]
+    fn narrow_rows(rays: &[Ray32; WIDE], rows: &mut [Row<f32>; 8]) {
+        // Eight rays of eight numbers each, twice.
+        for half in 0..2 {
+            // SAFETY: see `X86`. The loads are of the eight numbers of a ray; the stores of eight f32 from the first or the ninth on, into
+            // arrays of sixteen.
+            unsafe {
+                let at = rays.as_ptr().add(8 * half).cast::<f32>();
+                let (a, b) = (_mm256_loadu_ps(at), _mm256_loadu_ps(at.add(8)));
+                let (c, d) = (_mm256_loadu_ps(at.add(16)), _mm256_loadu_ps(at.add(24)));
+                let (e, f) = (_mm256_loadu_ps(at.add(32)), _mm256_loadu_ps(at.add(40)));
+                let (g, h) = (_mm256_loadu_ps(at.add(48)), _mm256_loadu_ps(at.add(56)));
+                // One by one: what is handed to a closure may become a call.
+                let (ab, ab2) = (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
+                let (cd, cd2) = (_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
+                let (ef, ef2) = (_mm256_unpacklo_ps(e, f), _mm256_unpackhi_ps(e, f));
+                let (gh, gh2) = (_mm256_unpacklo_ps(g, h), _mm256_unpackhi_ps(g, h));
+                const LOW: i32 = 0b01_00_01_00;
+                const HIGH: i32 = 0b11_10_11_10;
+                // Numbers 0 and 4, 1 and 5, 2 and 6, 3 and 7, of the first four rays and of the others.
+                let first = [
+                    _mm256_shuffle_ps::<LOW>(ab, cd),
+                    _mm256_shuffle_ps::<HIGH>(ab, cd),
+                    _mm256_shuffle_ps::<LOW>(ab2, cd2),
+                    _mm256_shuffle_ps::<HIGH>(ab2, cd2),
+                ];
+                let others = [
+                    _mm256_shuffle_ps::<LOW>(ef, gh),
+                    _mm256_shuffle_ps::<HIGH>(ef, gh),
+                    _mm256_shuffle_ps::<LOW>(ef2, gh2),
+                    _mm256_shuffle_ps::<HIGH>(ef2, gh2),
+                ];
+                for number in 0..4 {
+                    let low = _mm256_permute2f128_ps::<0x20>(first[number], others[number]);
+                    let high = _mm256_permute2f128_ps::<0x31>(first[number], others[number]);
+                    _mm256_storeu_ps(rows[number].0.as_mut_ptr().add(8 * half), low);
+                    _mm256_storeu_ps(rows[4 + number].0.as_mut_ptr().add(8 * half), high);
+                }
+            }
         }
     }
 

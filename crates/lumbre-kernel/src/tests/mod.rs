@@ -10,6 +10,7 @@ mod file;
 mod hulls;
 mod inside;
 mod motion;
+mod narrow;
 mod nearest;
 mod opening;
 mod options;

@@ -1,0 +1,441 @@
+//! Rays in single precision, in trees of nothing but meshes: what is asked where speed counts more than the last digits.
+//!
+//! The test is that of S. Woop, C. Benthin, I. Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013, and simpler than the one
+//! in double precision (see [`triangles`](crate::triangles)): triangles are closed, so that a ray through an edge meets all that have it,
+//! which makes no difference to the nearest hit and to whether there is one. Where that would be imprecise, products are computed exactly.
+//! Nothing depends on the instruction set: no product is fused with a sum.
+//!
+//! The ray is that from its start relative to the mesh, rounded once. All that follows is meant of it.
+//!
+//! # Why nothing leaks
+//!
+//! Where a corner comes to lie in the ray's sheared space is computed of the ray and the corner alone, so that it is the same for all
+//! triangles that share it. The line of the ray passes through a closed mesh of those corners: not through the rim of one of them only,
+//! but, if it is moved by ever so little into general position, through the inside of one that is not seen on edge; and as triangles are
+//! closed and finitely many, there is one that it passes through, and is not seen on edge, without being moved. Its edge functions have
+//! one sign, or are zero. An edge function is the difference of two rounded products. Rounding keeps their order or makes them equal, and
+//! so it has the exact sign or is zero: that triangle is not left out. Where one came out as zero it is computed again by exact products,
+//! which those of two numbers of single precision are in double precision, and so has the exact sign.
+//!
+//! # Why boxes lose nothing
+//!
+//! Let u = 2⁻²⁴, h the largest distance of the mesh from the ray's start along the last axis, and lengths be in tree units. The sheared
+//! corners are off by u(2m + 6.1h) from exact ones, where m ≤ 4.1 for a triangle around the ray: by two roundings of what they are, and
+//! of the height, the shear (which is off by 3u, and no more than 1), and their product. Where all edge functions e are strictly of one
+//! sign, their exact ones are too, and the ray does pass through the computed triangle, at the height Σ e z / Σ e of exact ones.
+//! Each is off by 2u(p + |e|), where p is the largest product, so that the height as computed is off by 6u(p / |Σ e| + 1) times the extent
+//! of the triangle along the ray, and by 7uh for the roundings of sums, products and heights. That is why p times the extent has to be
+//! below 2 |Σ e|, which leaves 24.2u; else, and where one is zero, weights come from exact products, and their height is off by 2uh.
+//!
+//! So the hit lies within u(8.2 + 6.1h) + 24.2u + 7uh of the triangle on each axis, where h ≤ 1.01 + |o|: below
+//! u(47 + 14|o|). And as planes are relative to the tree's origin, which the ray knows rounded, by a little more than u times its
+//! distance from the mesh's: `Units::narrow_margin` has room for all of it beside what is said in [`node`](crate::node). `t` itself is
+//! off by three roundings, which the ends of the range among boxes have room for, too.
+//!
+//! So no box is passed by with a hit in it that is as near as the nearest: the answer is that of a loop over all triangles, whatever
+//! the tree.
+
+mod alone;
+mod batch;
+mod packet;
+mod stream;
+
+use std::marker::PhantomData;
+
+use lumbre_geometry::Ray;
+
+use crate::blocks::TriangleBlock;
+use crate::holds::{Contents, SingleStart};
+use crate::lanes::{self, Asked, Axes, Lanes, Level, Question, Vector};
+use crate::packet::PACKET;
+use crate::single::{Exact, Outcome};
+use crate::stack::{AsBuilt, ByDistance, Order};
+use crate::triangles::BLOCK;
+use crate::{Accel, Hit, Hit32, Ray32};
+
+pub(crate) use self::batch::search_all;
+use self::packet::Packet;
+
+/// A ray in single precision among triangles.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct NarrowRay {
+    /// The axes that become x, y and z; z is the direction's largest.
+    pub(crate) axes: &'static Axes,
+    /// Relative to the mesh, in the order of the axes; the last of four means nothing, here and below.
+    pub(crate) origin: [f32; 4],
+    /// The direction by its last component.
+    pub(crate) shear: [f32; 4],
+    /// From what is behind a corner, with the sign turned, to `t`.
+    pub(crate) minus_inverse: f32,
+    pub(crate) t_min: f32,
+    pub(crate) t_max: f32,
+    /// See [`Precise`].
+    pub(crate) precise: Precise,
+}
+
+/// Where weights are precise enough: the largest product times the extent of the triangle, or a little if that is less, is no more
+/// than their sum times so much. See above.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Precise {
+    most: f32,
+    little: f32,
+}
+
+impl Precise {
+    #[inline(always)]
+    pub(crate) fn new(start: &SingleStart) -> Self {
+        let most = 2.0 * start.space_per_unit;
+        Self { most, little: most * (1.0 / 1024.0) }
+    }
+
+    /// A bit for each that is: by products, edge functions, their sum and heights of corners.
+    #[inline(always)]
+    fn of<V: Vector>(&self, products: [V; 3], [u, v, w]: [V; 3], sum: V, z: [V; 3]) -> u32 {
+        let zero = V::splat(0.0);
+        let is_strict = zero.below(u.min(v).min(w)) | u.max(v).max(w).below(zero);
+        let largest = products[0].abs().max(products[1].abs()).max(products[2].abs()) + V::splat(TINY);
+        let extent = z[0].max(z[1]).max(z[2]) - z[0].min(z[1]).min(z[2]);
+        let least = largest * (extent + V::splat(self.little));
+        is_strict & least.at_most(sum.abs() * V::splat(self.most))
+    }
+}
+
+/// What products may lose by underflow is nothing beside this.
+const TINY: f32 = 1.0 / (1u128 << 80) as f32;
+
+/// The triangles of a block that a line may pass through.
+struct Passed<E> {
+    /// A bit for each whose crossing is precise, and in range.
+    met: u32,
+    /// A bit for each that has to be looked at closer.
+    unclear: u32,
+    t: E,
+    /// The weights of the second and third corner, and the sum of all.
+    weights: [E; 3],
+}
+
+/// The nearest crossing so far.
+#[derive(Clone, Copy)]
+pub(crate) struct Nearest {
+    /// Its place; [`u32::MAX`] for none.
+    block: u32,
+    lane: u32,
+    /// The weights of the second and third corner in that lane, and the sum of all.
+    weights: [[f32; BLOCK]; 3],
+}
+
+impl Nearest {
+    const NONE: Self = Self { block: u32::MAX, lane: 0, weights: [[0.0; BLOCK]; 3] };
+
+    #[inline(always)]
+    fn is_some(&self) -> bool {
+        self.block != u32::MAX
+    }
+
+    /// As a hit at this `t`, if there is one.
+    #[inline(always)]
+    fn hit(&self, exact: &Exact, t: f32) -> Option<Hit32> {
+        if !self.is_some() {
+            return None;
+        }
+        let (geometry, primitive) = exact.names(self.block, self.lane);
+        let lane = self.lane as usize % BLOCK;
+        let [v, w, det] = &self.weights;
+        Some(Hit32 {
+            t,
+            local: [v[lane] / det[lane], w[lane] / det[lane]],
+            id: exact.accel().geometries[geometry as usize].id,
+            primitive,
+            geometry,
+            instance: Hit32::NO_INSTANCE,
+        })
+    }
+}
+
+impl NarrowRay {
+    /// Which triangles of a block the ray meets; `None` where its line passes through none.
+    #[inline(always)]
+    fn pass<L: Lanes>(&self, block: &TriangleBlock) -> Option<Passed<L::Eight>> {
+        let [x, y, z] = L::narrow_corners(block, lanes::opaque(self));
+        let (bc, ca, ab) = (x[2] * y[1], x[0] * y[2], x[1] * y[0]);
+        let (u, v, w) = (bc - y[2] * x[1], ca - y[0] * x[2], ab - y[1] * x[0]);
+        let zero = L::Eight::splat(0.0);
+        let mask = (zero.at_most(u.min(v).min(w)) | u.max(v).max(w).at_most(zero)) & block.taken();
+        if mask == 0 {
+            return None;
+        }
+        // Read again: most lines pass through few blocks.
+        let ray = lanes::opaque(self);
+        let det = u + v + w;
+        let height = u * z[0] + v * z[1] + w * z[2];
+        let precise = ray.precise.of([bc, ca, ab], [u, v, w], det, z);
+        let t = height.over(det) * L::Eight::splat(ray.minus_inverse);
+        let in_range = L::Eight::splat(ray.t_min).at_most(t) & t.at_most(L::Eight::splat(ray.t_max));
+        Some(Passed { met: mask & precise & in_range, unclear: mask & !precise, t, weights: [v, w, det] })
+    }
+
+    /// Where the ray meets a triangle, by exact products; the weights of the second and third corner, and the sum of all.
+    #[cold]
+    #[inline(never)]
+    fn cross_exactly(&self, block: &TriangleBlock, lane: u32) -> Option<(f32, [f32; 3])> {
+        let corners = self.axes.gather(block, lane as usize).map(|[x, y, z]| {
+            let height = self.origin[2] - z;
+            let x = (self.origin[0] - x) - self.shear[0] * height;
+            let y = (self.origin[1] - y) - self.shear[1] * height;
+            [f64::from(x), f64::from(y), f64::from(height)]
+        });
+        let [a, b, c] = corners;
+        let edge = |p: [f64; 3], q: [f64; 3]| p[0] * q[1] - p[1] * q[0];
+        let (u, v, w) = (edge(c, b), edge(a, c), edge(b, a));
+        let is_inside = u.min(v).min(w) >= 0.0 || u.max(v).max(w) <= 0.0;
+        let det = u + v + w;
+        if !is_inside || det == 0.0 {
+            return None;
+        }
+        let t = ((u * a[2] + v * b[2] + w * c[2]) / det * f64::from(self.minus_inverse)) as f32;
+        (self.t_min <= t && t <= self.t_max).then(|| (t, [(v / det) as f32, (w / det) as f32, 1.0]))
+    }
+
+    /// Whether the ray meets any triangle of a block.
+    #[inline(always)]
+    fn meets_any<L: Lanes>(&self, block: &TriangleBlock) -> bool {
+        match self.pass::<L>(block) {
+            Some(Passed { met, unclear, .. }) => {
+                met != 0 || unclear != 0 && self.meets_exactly(block, unclear)
+            }
+            None => false,
+        }
+    }
+
+    /// Whether the ray meets one of these.
+    #[cold]
+    #[inline(never)]
+    fn meets_exactly(&self, block: &TriangleBlock, mut mask: u32) -> bool {
+        while mask != 0 {
+            let lane = mask.trailing_zeros();
+            mask &= mask - 1;
+            if self.cross_exactly(block, lane).is_some() {
+                return true;
+            }
+        }
+        false
+    }
+}
+
+/// A ray in single precision, and the nearest that it has met.
+struct Seeker<'a, 's> {
+    exact: Exact<'a>,
+    /// Ends at the nearest.
+    ray: &'s mut NarrowRay,
+    nearest: &'s mut Nearest,
+}
+
+impl Seeker<'_, '_> {
+    /// Tests a block for what is nearer; whether there was anything.
+    #[inline(always)]
+    fn meet_block<L: Lanes>(&mut self, block: &TriangleBlock, place: u32) -> bool {
+        let Some(passed) = self.ray.pass::<L>(block) else { return false };
+        let mut is_nearer = false;
+        if passed.met != 0 {
+            let t = passed.t.to_array();
+            let mut rest = passed.met;
+            while rest != 0 {
+                let lane = rest.trailing_zeros();
+                rest &= rest - 1;
+                let t = t[lane as usize % BLOCK];
+                if t < self.ray.t_max || t == self.ray.t_max && self.comes_first(place, lane) {
+                    let [v, w, det] = passed.weights;
+                    self.nearest.block = place;
+                    self.nearest.lane = lane;
+                    self.nearest.weights = [v.to_array(), w.to_array(), det.to_array()];
+                    self.ray.t_max = t;
+                    is_nearer = true;
+                }
+            }
+        }
+        if passed.unclear != 0 {
+            is_nearer |= self.meet_exactly(block, place, passed.unclear);
+        }
+        is_nearer
+    }
+
+    /// Whether a triangle that is met where the nearest is comes before it.
+    #[cold]
+    #[inline(never)]
+    fn comes_first(&self, block: u32, lane: u32) -> bool {
+        let nearest = &self.nearest;
+        !nearest.is_some() || self.exact.names(block, lane) < self.exact.names(nearest.block, nearest.lane)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn meet_exactly(&mut self, block: &TriangleBlock, place: u32, mut mask: u32) -> bool {
+        let mut is_nearer = false;
+        while mask != 0 {
+            let lane = mask.trailing_zeros();
+            mask &= mask - 1;
+            let Some((t, weights)) = self.ray.cross_exactly(block, lane) else { continue };
+            if t < self.ray.t_max || self.comes_first(place, lane) {
+                *self.nearest =
+                    Nearest { block: place, lane, weights: weights.map(|weight| [weight; BLOCK]) };
+                self.ray.t_max = t;
+                is_nearer = true;
+            }
+        }
+        is_nearer
+    }
+}
+
+/// What is asked of a ray.
+pub(crate) trait Goal: Sized {
+    /// Which boxes come first.
+    type Order: Order;
+    /// What is handed out.
+    type Answer: Copy;
+    /// Whether any hit will do.
+    const IS_ANY: bool;
+    /// The question of a ray alone, at a level.
+    fn alone_at(level: Level) -> Asked<Self::Answer, Ray32> {
+        level.asked::<Narrowly<Self>>()
+    }
+    /// Searches along a ray alone; not where it does not come from nearby.
+    fn alone<L: Lanes>(exact: &Exact, ray: &Ray32) -> Outcome<Self::Answer>;
+    /// What double precision says.
+    fn widely(accel: &Accel, ray: &Ray32) -> Self::Answer;
+    /// The same for every ray.
+    fn all_widely(level: Level, accel: &Accel, rays: &[Ray], answers: &mut [Self::Answer]);
+    /// The answer where that is the nearest, at this `t`.
+    fn answer(exact: &Exact, nearest: &Nearest, t: f32) -> Self::Answer;
+    /// Puts the answers of rays that went together.
+    fn answer_together<L: Lanes>(packet: &Packet, answers: &mut [Self::Answer; PACKET]);
+}
+
+/// The nearest hit.
+pub(crate) enum Closest {}
+
+/// Whether there is a hit.
+pub(crate) enum Any {}
+
+impl Goal for Closest {
+    type Order = ByDistance;
+    type Answer = Option<Hit32>;
+    const IS_ANY: bool = false;
+
+    #[inline(always)]
+    fn alone<L: Lanes>(exact: &Exact, ray: &Ray32) -> Outcome<Self::Answer> {
+        alone::closest::<L>(exact, ray)
+    }
+
+    #[inline(never)]
+    fn widely(accel: &Accel, ray: &Ray32) -> Option<Hit32> {
+        accel.closest(&ray.to_f64()).map(|hit| narrowed(&hit))
+    }
+
+    fn all_widely(level: Level, accel: &Accel, rays: &[Ray], answers: &mut [Option<Hit32>]) {
+        let mut hits = vec![None; rays.len()];
+        accel.closest_batch_at(level, rays, &mut hits);
+        for (answer, hit) in answers.iter_mut().zip(&hits) {
+            *answer = hit.as_ref().map(narrowed);
+        }
+    }
+
+    #[inline(always)]
+    fn answer(exact: &Exact, nearest: &Nearest, t: f32) -> Option<Hit32> {
+        nearest.hit(exact, t)
+    }
+
+    #[inline(always)]
+    fn answer_together<L: Lanes>(packet: &Packet, answers: &mut [Option<Hit32>; PACKET]) {
+        packet.put_nearest::<L>(answers);
+    }
+}
+
+impl Goal for Any {
+    type Order = AsBuilt;
+    type Answer = bool;
+    const IS_ANY: bool = true;
+
+    #[inline(always)]
+    fn alone<L: Lanes>(exact: &Exact, ray: &Ray32) -> Outcome<bool> {
+        alone::any::<L>(exact, ray)
+    }
+
+    #[inline(never)]
+    fn widely(accel: &Accel, ray: &Ray32) -> bool {
+        accel.any(&ray.to_f64())
+    }
+
+    fn all_widely(level: Level, accel: &Accel, rays: &[Ray], answers: &mut [bool]) {
+        accel.any_batch_at(level, rays, answers);
+    }
+
+    #[inline(always)]
+    fn answer(_: &Exact, nearest: &Nearest, _: f32) -> bool {
+        nearest.is_some()
+    }
+
+    #[inline(always)]
+    fn answer_together<L: Lanes>(packet: &Packet, answers: &mut [bool; PACKET]) {
+        packet.put_met(answers);
+    }
+}
+
+/// An answer in double precision, rounded.
+fn narrowed(hit: &Hit) -> Hit32 {
+    Hit32 {
+        t: hit.root.t as f32,
+        local: [hit.root.local.x as f32, hit.root.local.y as f32],
+        id: hit.id,
+        primitive: hit.primitive,
+        geometry: hit.geometry,
+        instance: hit.instances.first().copied().unwrap_or(Hit32::NO_INSTANCE),
+    }
+}
+
+/// What is asked of rays in single precision, one after another.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct NarrowQuestions {
+    /// [`Accel::closest_f32`].
+    pub(crate) closest: Asked<Option<Hit32>, Ray32>,
+    /// [`Accel::any_f32`].
+    pub(crate) any: Asked<bool, Ray32>,
+}
+
+impl NarrowQuestions {
+    pub(crate) fn new(level: Level, start: Option<&SingleStart>) -> Self {
+        match start.map(|start| start.contents) {
+            Some(Contents::Triangles) => {
+                Self { closest: level.asked::<Narrowly<Closest>>(), any: level.asked::<Narrowly<Any>>() }
+            }
+            _ => Self { closest: level.asked::<Widely<Closest>>(), any: level.asked::<Widely<Any>>() },
+        }
+    }
+}
+
+/// In single precision.
+struct Narrowly<G>(PhantomData<G>);
+/// In double precision, rounded.
+struct Widely<G>(PhantomData<G>);
+
+impl<G: Goal> Question for Narrowly<G> {
+    type Ray = Ray32;
+    type Answer = G::Answer;
+
+    #[inline(always)]
+    fn ask<L: Lanes>(accel: &Accel, ray: &Ray32) -> G::Answer {
+        match &accel.single {
+            Some(start) => alone::search::<G, L>(&Exact::new(accel, start), ray),
+            None => G::widely(accel, ray),
+        }
+    }
+}
+
+impl<G: Goal> Question for Widely<G> {
+    type Ray = Ray32;
+    type Answer = G::Answer;
+
+    #[inline(always)]
+    fn ask<L: Lanes>(accel: &Accel, ray: &Ray32) -> G::Answer {
+        G::widely(accel, ray)
+    }
+}
