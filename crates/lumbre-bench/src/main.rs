@@ -1,8 +1,8 @@
 //! How fast the kernel is beside Embree 4 and the crates `obvhs` and `bvh`, on the same scenes and the same rays:
 //! `cargo xtask bench kernel`.
 //!
-//! Every program gets the same triangles and rays, to the bit, in single precision. Lumbre traces them in double precision
-//! and watertight. Programs run in alternation; a ratio is the median of the ratios of neighbouring runs, and its spread
+//! Every program gets the same triangles and rays, to the bit, in single precision. Lumbre takes them as they are, by its queries in
+//! single precision, and as a peer of itself in double precision; watertight both. Programs run in alternation; a ratio is the median of the ratios of neighbouring runs, and its spread
 //! half their interquartile range. Rays are cut into chunks that threads take in turn. What is measured is how long threads
 //! ran (see `clock`). Not timed: the conversion of scenes and rays to the form of a program, and making its answers empty
 //! again.
@@ -33,9 +33,9 @@ use lumbre_kernel::Preset;
 use embree::{Embree, Setting};
 use measure::{Job, Ratio, alternate, median};
 use oracle::Sample;
-use ours::Asked;
+use ours::{Asked, Precision};
 use program::{Built, Bytes, Program, Query};
-use rays::{PictureSize, Ray32, Work};
+use rays::{PictureSize, Rays, Work};
 use report::{Mismatches, Report, Row};
 use scene::Scene;
 use worlds::RECIPES;
@@ -77,11 +77,15 @@ struct Options {
     /// How Lumbre builds its trees: fast, balanced or best.
     #[arg(long, default_value = "balanced", value_parser = preset)]
     preset: Preset,
-    /// Lumbre takes rays by batches, on every thread, and not one at a time.
+    /// Lumbre takes rays by batches, on every thread, and not one at a time; those of pixels by squares of four by four.
     #[arg(long)]
     batches: bool,
-    /// Peers are Lumbre itself, asked otherwise: by batches, in double precision alone, with options, with masks, but for a
-    /// primitive, with a closure, with vertices in double precision, and in single precision alone, which leaks. The ratios are what that costs.
+    /// Lumbre takes rays in double precision.
+    #[arg(long)]
+    double: bool,
+    /// Peers are Lumbre itself, asked otherwise; all take rays in double precision, but for one: by batches, in double precision alone,
+    /// with options, with masks, but for a primitive, with a closure, with vertices in double precision, in single precision alone, which
+    /// leaks, and with rays in single precision. The ratios are what that costs.
     #[arg(long, conflicts_with = "batches")]
     costs: bool,
     /// Lumbre keeps every sphere as a shape of its own, not in a cloud.
@@ -179,14 +183,20 @@ fn main() -> Result<()> {
     let lumbre = ours::Lumbre {
         preset: options.preset,
         asked: if options.batches { Asked::ByBatches } else { Asked::Each },
+        precision: if options.double || options.costs { Precision::Double } else { Precision::Single },
         places_spheres: options.placed_spheres,
     };
     let mut programs: Vec<Box<dyn Program>> = vec![Box::new(lumbre)];
     let peers = if options.costs {
-        let other = |asked| Box::new(ours::Lumbre { asked, ..lumbre }) as Box<dyn Program>;
-        Asked::OTHERS.into_iter().map(other).collect()
+        let others = Asked::OTHERS.into_iter().map(|asked| ours::Lumbre { asked, ..lumbre });
+        let single = ours::Lumbre { precision: Precision::Single, ..lumbre };
+        others.chain([single]).map(|other| Box::new(other) as Box<dyn Program>).collect()
     } else {
-        peers()?
+        let mut peers = peers()?;
+        if !options.double {
+            peers.push(Box::new(ours::Lumbre { precision: Precision::Double, ..lumbre }));
+        }
+        peers
     };
     programs.extend(peers.into_iter().filter(|peer| is_wanted(&options.peer, &peer.name())));
 
@@ -274,14 +284,15 @@ fn measure_scene(
     let trees = measure_builds(scene, &taking, plan, report)?;
     let mut tallies: Vec<_> =
         taking.iter().map(|_| Tally { sampled: 0, wrong: 0, compared: 0, differing: 0 }).collect();
-    for (work, list) in &lists {
+    for (work, rays) in &lists {
+        let list = &rays.list;
         if list.is_empty() {
             println!("{}: no ray hits anything to start from", work.name());
             continue;
         }
         let wide: Vec<Ray> = list.iter().map(|ray| ray.to_f64()).collect();
         let truths = oracle::sample(scene, &wide, plan.oracle_tests / (lists.len() * 2));
-        let case = Case { scene, taking: &taking, trees: &trees, work: *work, list, wide: &wide, extent };
+        let case = Case { scene, taking: &taking, trees: &trees, work: *work, rays, wide: &wide, extent };
         for query in Query::ALL {
             if plan.is_over() {
                 println!("{} {}: left out, the time is up", work.name(), query.name());
@@ -359,7 +370,7 @@ struct Case<'a> {
     taking: &'a [&'a dyn Program],
     trees: &'a [Built<'a>],
     work: Work,
-    list: &'a [Ray32],
+    rays: &'a Rays,
     wide: &'a [Ray],
     extent: f64,
 }
@@ -376,17 +387,17 @@ impl Case<'_> {
         let programs: Vec<usize> = (0..self.taking.len())
             .filter(|&i| self.work == Work::Primary || !self.taking[i].takes_packets())
             .collect();
-        let squares = rays::by_squares(plan.size);
-        let in_squares = |i: usize| self.work == Work::Primary && self.taking[i].takes_squares();
+        let Rays { list, by_squares } = self.rays;
+        let in_squares = |i: usize| self.taking[i].takes_squares();
         let mut jobs: Vec<Job> = programs
             .iter()
             .map(|&i| {
                 let tree = &*self.trees[i].tree;
                 if in_squares(i) {
-                    let list: Vec<_> = squares.iter().map(|&pixel| self.list[pixel]).collect();
+                    let list: Vec<_> = by_squares.iter().map(|&place| list[place]).collect();
                     Job::new(tree, query, &list)
                 } else {
-                    Job::new(tree, query, self.list)
+                    Job::new(tree, query, list)
                 }
             })
             .collect();
@@ -402,8 +413,8 @@ impl Case<'_> {
                     return found;
                 }
                 let mut ordered = vec![None; found.len()];
-                for (answer, &pixel) in found.into_iter().zip(&squares) {
-                    ordered[pixel] = answer;
+                for (answer, &place) in found.into_iter().zip(by_squares) {
+                    ordered[place] = answer;
                 }
                 ordered
             })

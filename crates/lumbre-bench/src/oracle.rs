@@ -145,9 +145,9 @@ mod tests {
     use lumbre_kernel::Preset;
 
     use super::*;
-    use crate::ours::Asked;
+    use crate::ours::{Asked, Precision};
     use crate::program::Program;
-    use crate::rays::{self, PictureSize, Work};
+    use crate::rays::{self, PictureSize, Rays, Work};
     use crate::worlds::RECIPES;
     use crate::{crates, ours};
 
@@ -162,7 +162,11 @@ mod tests {
             let extent = accel.bounds().size().max_element();
             let built = program.build(&scene, 2).expect("a sound scene");
             for work in Work::ALL {
-                let list = rays::make(work, &scene, &accel, PictureSize { width: 192, height: 128 });
+                let size = PictureSize { width: 192, height: 128 };
+                let Rays { list, by_squares } = rays::make(work, &scene, &accel, size);
+                let mut places = by_squares;
+                places.sort_unstable();
+                assert_eq!(places, (0..list.len()).collect::<Vec<_>>());
                 let wide: Vec<_> = list.iter().map(|ray| ray.to_f64()).collect();
                 let truths = sample(&scene, &wide, 4_000_000);
                 assert!(truths.len() > 100, "{}, {}: {} rays", recipe.name, work.name(), truths.len());
@@ -186,10 +190,24 @@ mod tests {
 
     #[test]
     fn our_kernel_agrees_with_the_loop_over_everything() {
-        check(&ours::Lumbre { preset: Preset::Best, asked: Asked::Each, places_spheres: false }, 1.0);
-        check(&ours::Lumbre { preset: Preset::Balanced, asked: Asked::ByBatches, places_spheres: true }, 1.0);
+        let usual = ours::Lumbre {
+            preset: Preset::Balanced,
+            asked: Asked::Each,
+            precision: Precision::Double,
+            places_spheres: false,
+        };
+        check(&ours::Lumbre { preset: Preset::Best, ..usual }, 1.0);
+        check(&ours::Lumbre { asked: Asked::ByBatches, places_spheres: true, ..usual }, 1.0);
         for asked in Asked::OTHERS {
-            check(&ours::Lumbre { preset: Preset::Balanced, asked, places_spheres: false }, 1.0);
+            check(&ours::Lumbre { asked, ..usual }, 1.0);
+        }
+    }
+
+    #[test]
+    fn our_kernel_agrees_with_the_loop_in_single_precision_too() {
+        for asked in [Asked::Each, Asked::ByBatches] {
+            let (preset, precision) = (Preset::Balanced, Precision::Single);
+            check(&ours::Lumbre { preset, asked, precision, places_spheres: false }, 0.999);
         }
     }
 
@@ -227,8 +245,9 @@ mod tests {
     fn a_tree_answers_again_what_it_answered_before() {
         let scene = RECIPES[0].make();
         let accel = ours::build(&scene, Preset::Balanced).expect("a sound scene");
-        let list = rays::make(Work::Random, &scene, &accel, PictureSize { width: 40, height: 20 });
-        let program = ours::Lumbre { preset: Preset::Balanced, asked: Asked::Each, places_spheres: false };
+        let list = rays::make(Work::Random, &scene, &accel, PictureSize { width: 40, height: 20 }).list;
+        let (preset, asked, precision) = (Preset::Balanced, Asked::Each, Precision::Single);
+        let program = ours::Lumbre { preset, asked, precision, places_spheres: false };
         let built = program.build(&scene, 1).expect("a sound scene");
         let mut pass = built.tree.prepare(Query::Closest, &list);
         pass.run();

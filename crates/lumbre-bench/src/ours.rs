@@ -5,7 +5,7 @@ use std::sync::Arc;
 use anyhow::{Context, Result, ensure};
 use lumbre_geometry::{PlacedShape, Ray, Sphere};
 use lumbre_kernel::{
-    Accel, BuildOptions, Geometry, GeometryKind, Hit, Instance, PreciseMesh, Preset, QueryOptions,
+    Accel, BuildOptions, Geometry, GeometryKind, Hit, Hit32, Instance, PreciseMesh, Preset, QueryOptions,
     TriangleMesh,
 };
 use lumbre_math::{DVec3, Transform};
@@ -22,11 +22,22 @@ pub struct Lumbre {
     pub preset: Preset,
     /// How it is asked.
     pub asked: Asked,
+    /// In which precision.
+    pub precision: Precision,
     /// Whether every sphere is a shape of its own, not one of a cloud.
     pub places_spheres: bool,
 }
 
-/// How a tree is asked: the same answers in every way.
+/// The precision of rays and answers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Precision {
+    /// As the rays are made, and as other programs have it.
+    Single,
+    /// The same rays in double precision.
+    Double,
+}
+
+/// How a tree is asked: the same answers in every way. In single precision, in the first two.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Asked {
     /// One ray at a time.
@@ -66,7 +77,7 @@ impl Asked {
         match self {
             Self::Each => "",
             Self::ByBatches => " batches",
-            Self::Plainly => " double alone",
+            Self::Plainly => " alone",
             Self::WithOptions => " options",
             Self::WithMasks => " masks",
             Self::Excluding => " excluding",
@@ -94,7 +105,11 @@ impl Program for Lumbre {
         };
         let asked = self.asked.name();
         let placed = if self.places_spheres { " placed" } else { "" };
-        format!("Lumbre {version}{preset}{asked}{placed}")
+        let precision = match self.precision {
+            Precision::Single => "",
+            Precision::Double => " double",
+        };
+        format!("Lumbre {version}{preset}{precision}{asked}{placed}")
     }
 
     fn refuses(&self, scene: &Scene) -> Option<&'static str> {
@@ -130,7 +145,7 @@ impl Program for Lumbre {
         if self.asked == Asked::Leaking {
             ensure!(accel.leak(), "there is no leaking search of this tree on this machine");
         }
-        let tree = Queried { accel, asked: self.asked, nowhere: nowhere()? };
+        let tree = Queried { accel, asked: self.asked, precision: self.precision, nowhere: nowhere()? };
         Ok(Built { tree: Box::new(tree), seconds, bytes })
     }
 }
@@ -198,6 +213,7 @@ fn placed_sphere([x, y, z, radius]: [f32; 4]) -> PlacedShape {
 struct Queried {
     accel: Accel,
     asked: Asked,
+    precision: Precision,
     /// Of the first geometry, but no primitive of that.
     nowhere: Hit,
 }
@@ -212,8 +228,21 @@ fn nowhere() -> Result<Hit> {
 
 impl Tree for Queried {
     fn prepare<'a>(&'a self, query: Query, rays: &[Ray32]) -> Box<dyn Pass + 'a> {
-        let rays: Vec<Ray> = rays.iter().map(|ray| ray.to_f64()).collect();
         let tree = self;
+        if self.precision == Precision::Single {
+            let rays: Vec<_> = rays.iter().map(|ray| ray.to_ours()).collect();
+            return match query {
+                Query::Closest => {
+                    let found = vec![SingleFound::MISS; rays.len()];
+                    Box::new(SingleClosest { tree, rays, found, batch: vec![None; BATCH] })
+                }
+                Query::Any => {
+                    let found = vec![false; rays.len()];
+                    Box::new(SingleAny { tree, rays, found })
+                }
+            };
+        }
+        let rays: Vec<Ray> = rays.iter().map(|ray| ray.to_f64()).collect();
         match query {
             Query::Closest => {
                 let found = vec![Found::MISS; rays.len()];
@@ -276,7 +305,7 @@ impl Pass for Closest<'_> {
     }
 
     fn run(&mut self) {
-        let Queried { accel, asked, nowhere } = self.tree;
+        let Queried { accel, asked, nowhere, .. } = self.tree;
         if *asked == Asked::ByBatches {
             for (rays, found) in self.rays.chunks(BATCH).zip(self.found.chunks_mut(BATCH)) {
                 let hits = &mut self.batch[..rays.len()];
@@ -324,7 +353,7 @@ impl Pass for Any<'_> {
     }
 
     fn run(&mut self) {
-        let Queried { accel, asked, nowhere } = self.tree;
+        let Queried { accel, asked, nowhere, .. } = self.tree;
         if *asked == Asked::ByBatches {
             for (rays, found) in self.rays.chunks(BATCH).zip(self.found.chunks_mut(BATCH)) {
                 accel.any_batch(rays, found);
@@ -340,6 +369,88 @@ impl Pass for Any<'_> {
                 self.each(|ray| accel.any_filtered(ray, |hit| hit.primitive != nowhere.primitive))
             }
             _ => self.each(|ray| accel.any(ray)),
+        }
+    }
+
+    fn answers(&self) -> Vec<Option<f64>> {
+        self.found.iter().map(|found| found.then_some(0.0)).collect()
+    }
+}
+
+/// What is written down of a hit in single precision, alike.
+#[derive(Clone, Copy)]
+struct SingleFound {
+    t_and_barycentrics: [f32; 3],
+    geometry_and_primitive: [u32; 2],
+}
+
+impl SingleFound {
+    const MISS: Self = Self { t_and_barycentrics: [f32::INFINITY; 3], geometry_and_primitive: [u32::MAX; 2] };
+
+    // Field by field: a whole that was written in parts is slow to be read at once.
+    #[inline(always)]
+    fn put(&mut self, hit: Option<&Hit32>) {
+        if let Some(hit) = hit {
+            self.t_and_barycentrics = [hit.t, hit.local[0], hit.local[1]];
+            self.geometry_and_primitive = [hit.geometry, hit.primitive];
+        }
+    }
+}
+
+struct SingleClosest<'a> {
+    tree: &'a Queried,
+    rays: Vec<lumbre_kernel::Ray32>,
+    found: Vec<SingleFound>,
+    batch: Vec<Option<Hit32>>,
+}
+
+impl Pass for SingleClosest<'_> {
+    fn reset(&mut self) {
+        self.found.fill(SingleFound::MISS);
+    }
+
+    fn run(&mut self) {
+        let Queried { accel, asked, .. } = self.tree;
+        if *asked == Asked::ByBatches {
+            for (rays, found) in self.rays.chunks(BATCH).zip(self.found.chunks_mut(BATCH)) {
+                let hits = &mut self.batch[..rays.len()];
+                accel.closest_batch_f32(rays, hits);
+                found.iter_mut().zip(hits).for_each(|(found, hit)| found.put(hit.as_ref()));
+            }
+            return;
+        }
+        for (ray, found) in self.rays.iter().zip(&mut self.found) {
+            found.put(accel.closest_f32(ray).as_ref());
+        }
+    }
+
+    fn answers(&self) -> Vec<Option<f64>> {
+        let is_hit = |found: &SingleFound| found.geometry_and_primitive[0] != u32::MAX;
+        self.found.iter().map(|found| is_hit(found).then(|| found.t_and_barycentrics[0].into())).collect()
+    }
+}
+
+struct SingleAny<'a> {
+    tree: &'a Queried,
+    rays: Vec<lumbre_kernel::Ray32>,
+    found: Vec<bool>,
+}
+
+impl Pass for SingleAny<'_> {
+    fn reset(&mut self) {
+        self.found.fill(false);
+    }
+
+    fn run(&mut self) {
+        let Queried { accel, asked, .. } = self.tree;
+        if *asked == Asked::ByBatches {
+            for (rays, found) in self.rays.chunks(BATCH).zip(self.found.chunks_mut(BATCH)) {
+                accel.any_batch_f32(rays, found);
+            }
+            return;
+        }
+        for (ray, found) in self.rays.iter().zip(&mut self.found) {
+            *found = accel.any_f32(ray);
         }
     }
 

@@ -26,6 +26,11 @@ impl Ray32 {
         Ray::new(wide(self.origin), wide(self.direction)).with_range(0.0, f64::from(self.t_max))
     }
 
+    /// The same ray as the kernel takes it.
+    pub fn to_ours(self) -> lumbre_kernel::Ray32 {
+        lumbre_kernel::Ray32::new(self.origin.into(), self.direction.into()).with_range(0.0, self.t_max)
+    }
+
     fn new(origin: DVec3, direction: DVec3, t_max: f64) -> Self {
         let narrow = |v: DVec3| v.as_vec3().to_array();
         Self { origin: narrow(origin), direction: narrow(direction), t_max: t_max as f32 }
@@ -89,20 +94,31 @@ impl PictureSize {
     }
 }
 
+/// Rays, and another order of them.
+pub struct Rays {
+    /// By the scanlines' pixels that they belong to, where they do.
+    pub list: Vec<Ray32>,
+    /// Their positions in the list, by squares of four by four pixels; where they belong to none, as in the list.
+    pub by_squares: Vec<usize>,
+}
+
 /// The rays of one kind of work, about as many as the picture has pixels. `accel` is asked where rays hit.
-pub fn make(work: Work, scene: &Scene, accel: &Accel, size: PictureSize) -> Vec<Ray32> {
+pub fn make(work: Work, scene: &Scene, accel: &Accel, size: PictureSize) -> Rays {
     match work {
-        Work::Primary => (0..size.count()).map(|pixel| camera_ray(scene, size, pixel, [0.5; 2])).collect(),
+        Work::Primary => Rays {
+            list: (0..size.count()).map(|pixel| camera_ray(scene, size, pixel, [0.5; 2])).collect(),
+            by_squares: by_squares(size),
+        },
         Work::Random => {
             let mut random = RandomStream::new(21);
             let bounds = accel.bounds();
-            (0..size.count())
-                .map(|_| {
-                    let mut at = || random.next_f64();
-                    let from = bounds.min + bounds.size() * DVec3::new(at(), at(), at());
-                    Ray32::new(from, crate::shaping::direction(&mut random), f64::INFINITY)
-                })
-                .collect()
+            let mut ray = || {
+                let mut at = || random.next_f64();
+                let from = bounds.min + bounds.size() * DVec3::new(at(), at(), at());
+                Ray32::new(from, crate::shaping::direction(&mut random), f64::INFINITY)
+            };
+            let list: Vec<_> = (0..size.count()).map(|_| ray()).collect();
+            Rays { by_squares: (0..list.len()).collect(), list }
         }
         Work::Bounce1 | Work::Bounce3 | Work::Shadow | Work::ShortOcclusion => {
             secondary(work, scene, accel, size)
@@ -112,21 +128,35 @@ pub fn make(work: Work, scene: &Scene, accel: &Accel, size: PictureSize) -> Vec<
 
 /// From the hits of one camera ray a pixel. Pixels that see nothing are made up for by more rays through the others, in
 /// the order of the pixels, at most sixteen times over.
-fn secondary(work: Work, scene: &Scene, accel: &Accel, size: PictureSize) -> Vec<Ray32> {
-    let mut rays = Vec::with_capacity(size.count());
-    for turn in 0..16 {
-        for pixel in 0..size.count() {
+fn secondary(work: Work, scene: &Scene, accel: &Accel, size: PictureSize) -> Rays {
+    let mut list = Vec::with_capacity(size.count());
+    // Of each, the turn, and the place of its pixel by squares.
+    let mut places = Vec::with_capacity(size.count());
+    let mut place_of = vec![0; size.count()];
+    for (place, pixel) in by_squares(size).into_iter().enumerate() {
+        place_of[pixel] = place;
+    }
+    for turn in 0..16u64 {
+        for (pixel, &place) in place_of.iter().enumerate() {
             let mut random =
                 RandomStream::new(lumbre_math::random::hash_words(&[turn, pixel as u64, work as u64]));
             let jitter = [random.next_f64(), random.next_f64()];
             let first = camera_ray(scene, size, pixel, jitter);
-            rays.extend(secondary_of(work, scene, accel, first, &mut random));
-            if rays.len() == size.count() {
-                return rays;
+            if let Some(ray) = secondary_of(work, scene, accel, first, &mut random) {
+                list.push(ray);
+                places.push((turn, place));
+            }
+            if list.len() == size.count() {
+                break;
             }
         }
+        if list.len() == size.count() {
+            break;
+        }
     }
-    rays
+    let mut by_squares: Vec<_> = (0..list.len()).collect();
+    by_squares.sort_by_key(|&i| places[i]);
+    Rays { list, by_squares }
 }
 
 fn secondary_of(
@@ -185,7 +215,7 @@ fn camera_ray(scene: &Scene, size: PictureSize, pixel: usize, jitter: [f64; 2]) 
 }
 
 /// For packets of sixteen: the scanlines' pixels in the order of squares of four by four.
-pub fn by_squares(size: PictureSize) -> Vec<usize> {
+fn by_squares(size: PictureSize) -> Vec<usize> {
     let squares = (0..size.height / 4).flat_map(|y| (0..size.width / 4).map(move |x| (x, y)));
     squares.flat_map(|(x, y)| (0..16).map(move |i| (4 * y + i / 4) * size.width + 4 * x + i % 4)).collect()
 }
