@@ -3,7 +3,7 @@
 use std::marker::PhantomData;
 
 use super::packet::{self, Packet};
-use super::{Goal, stream};
+use super::{Goal, alone, stream};
 use crate::blocks::Unit;
 use crate::holds::{Contents, SingleStart};
 use crate::lanes::{Lanes, Level, Task};
@@ -54,8 +54,6 @@ impl<G: Goal> Task for Batch<'_, '_, G> {
     fn run<L: Lanes>(self) {
         let Self { accel, start, rays, answers, is_far, .. } = self;
         let exact = Exact::new(accel, start);
-        // By a call, which is less than what a ray takes, rather than once more in this place.
-        let alone = G::alone_at(L::level());
         let mut packet = Packet::new(accel, start);
         // After a packet that did not pay, others go alone before the next is tried: ever more while none does, and at once many where
         // none has.
@@ -83,11 +81,13 @@ impl<G: Goal> Task for Batch<'_, '_, G> {
             }
             others.extend(PACKET * packets.len()..rays.len());
             if is_far {
-                stream::fly::<G, L>(&exact, alone, rays, &others, answers);
+                stream::fly::<G, L>(&exact, rays, &others, answers);
                 continue;
             }
+            // Here, and not by a call: a hit that was put together elsewhere would be waited for. Nor in a closure, which does not take
+            // on the instruction set.
             for &i in &others {
-                answers[i] = alone.ask(accel, &rays[i]);
+                answers[i] = alone::search::<G, L>(&exact, &rays[i]);
             }
         }
     }

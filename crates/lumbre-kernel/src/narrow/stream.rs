@@ -5,7 +5,7 @@
 use super::{Goal, NarrowRay, Nearest, Seeker};
 use crate::Ray32;
 use crate::batch::Queue;
-use crate::lanes::{self, Asked, Lanes, Slots, Vector};
+use crate::lanes::{self, Lanes, Slots, Vector};
 use crate::node::{Node, Slabs, WIDTH, tag};
 use crate::single::Exact;
 use crate::stack::{Order, STACK};
@@ -138,16 +138,17 @@ impl<'r, E: Copy> Flight<'r, E> {
     }
 }
 
-/// Searches along those of the rays that have these positions; `alone` asks about those whose stack is full.
+/// Searches along those of the rays that have these positions.
 #[inline(always)]
 pub(super) fn fly<G: Goal, L: Lanes>(
     exact: &Exact,
-    alone: Asked<G::Answer, Ray32>,
     rays: &[Ray32],
     positions: &[usize],
     answers: &mut [G::Answer],
 ) {
     let mut waiting = positions.iter();
+    // For a ray whose stack is full, by a call: that is rare.
+    let alone = G::alone_at(L::level());
     let bottom = G::Order::entry(END);
     let mut flights: Vec<Flight<<G::Order as Order>::Entry>> = Vec::with_capacity(FLIGHTS);
     let mut stations = Stations {
