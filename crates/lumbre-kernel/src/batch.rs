@@ -23,12 +23,12 @@ use crate::way::{Met, Way};
 const FEW: usize = 4;
 const MANY: usize = 32;
 /// Bytes of nodes and triangles from which on they do not.
-const FAR: usize = 1 << 24;
+pub(crate) const FAR: usize = 1 << 24;
 
 /// Packets in a row that may go alone without a try.
-const LEAST_OFTEN: usize = 16;
+pub(crate) const LEAST_OFTEN: usize = 16;
 /// Rays among which those that are alike are sought before the others set out.
-const AT_ONCE: usize = 4096;
+pub(crate) const AT_ONCE: usize = 4096;
 
 /// How many packets ahead rays are asked for.
 const AHEAD: usize = 2;

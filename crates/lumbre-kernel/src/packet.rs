@@ -60,20 +60,20 @@ const fn most_distance(is_mixed: bool) -> f32 {
 /// How far from their middle directions may be, by the largest component.
 const MOST_SPREAD: f32 = 0.125;
 /// How many there have to be.
-const LEAST: u32 = 4;
+pub(crate) const LEAST: u32 = 4;
 
 /// How much rays may do together, in nodes met; a block of triangles is as much as two, and so is a triangle.
 #[derive(Clone, Copy)]
-struct Effort {
+pub(crate) struct Effort {
     /// Before they go alone: where boxes and triangles are small beside the distances between the rays, that is faster.
-    most: u32,
+    pub(crate) most: u32,
     /// And have it pay.
-    paying: u32,
+    pub(crate) paying: u32,
 }
 
 impl Effort {
     /// Less for any hit, which a ray alone has sooner; more where there is anything but triangles, of which one alone has more to do.
-    const fn new(is_any: bool, is_mixed: bool) -> Self {
+    pub(crate) const fn new(is_any: bool, is_mixed: bool) -> Self {
         match (is_any, is_mixed) {
             (true, false) => Self { most: 160, paying: 100 },
             (false, false) => Self { most: 300, paying: 120 },
@@ -84,7 +84,7 @@ impl Effort {
 }
 
 /// What the corners of triangles may be wrong by, by their size: 32u, see above.
-const CULL_ERROR: f32 = 32.0 / (1 << 24) as f32;
+pub(crate) const CULL_ERROR: f32 = 32.0 / (1 << 24) as f32;
 
 /// What holds all the rays among boxes: see above.
 pub(crate) struct Frustum {

@@ -2,22 +2,17 @@
 
 use std::marker::PhantomData;
 
-use super::packet::{self, Packet};
+use super::packet::Packet;
 use super::{Goal, alone, stream};
+use crate::batch::{AT_ONCE, FAR, LEAST_OFTEN};
 use crate::blocks::Unit;
 use crate::holds::{Contents, SingleStart};
 use crate::lanes::{Lanes, Level, Task};
 use crate::node::Node;
-use crate::packet::PACKET;
+use crate::packet::{ALL, PACKET};
 use crate::single::Exact;
 use crate::{Accel, Ray32};
 
-/// Packets in a row that may go alone without a try.
-const LEAST_OFTEN: usize = 16;
-/// Bytes of nodes and triangles from which on the caches hold little of a tree.
-const FAR: usize = 1 << 24;
-/// Rays among which those that are alike are sought before the others set out.
-const AT_ONCE: usize = 4096;
 /// Rays that are taken to double precision at a time.
 const WIDELY: usize = 1024;
 
@@ -73,7 +68,7 @@ impl<G: Goal> Task for Batch<'_, '_, G> {
                     (without, patience) =
                         if together.pays { (0, 0) } else { (patience, (2 * patience).clamp(1, LEAST_OFTEN)) };
                 }
-                if answered != packet::ALL {
+                if answered != ALL {
                     others.extend(
                         (0..PACKET).filter(|place| answered >> place & 1 == 0).map(|place| first + place),
                     );

@@ -11,7 +11,7 @@ use crate::blocks::{Blocks, TriangleBlock};
 use crate::holds::SingleStart;
 use crate::lanes::{self, Axes, Corners, Eight, Lanes, Row, Sides, Vector, WIDE, Wide};
 use crate::node::{END_FACTOR, LITTLE, Node, START_FACTOR, Units, tag};
-use crate::packet::{Frustum, PACKET};
+use crate::packet::{ALL, CULL_ERROR, Effort, Frustum, LEAST, PACKET};
 use crate::single::Exact;
 use crate::stack::{Order, Stack};
 use crate::triangles::{BEYOND, BLOCK, beyond};
@@ -22,29 +22,8 @@ use crate::{Accel, Hit32, Ray32};
 const MOST_DISTANCE: f32 = 0.125;
 /// How far from their middle directions may be, by the largest component.
 const MOST_SPREAD: f32 = 0.3;
-/// How many there are, and have to be.
-const MOST: u32 = PACKET as u32;
-const LEAST: u32 = 4;
-/// A mask of all the rays.
-pub(super) const ALL: u32 = (1 << PACKET) - 1;
-/// What the corners of triangles may be wrong by, by their size.
-const CULL_ERROR: f32 = 32.0 / (1 << 24) as f32;
 /// No triangle.
 const NONE: u32 = u32::MAX;
-
-/// How much rays may do together, in nodes met; a block of triangles is as much as two, and so is a triangle.
-struct Effort {
-    /// Before they go alone.
-    most: u32,
-    /// And have it pay.
-    paying: u32,
-}
-
-impl Effort {
-    const fn new(is_any: bool) -> Self {
-        if is_any { Self { most: 160, paying: 100 } } else { Self { most: 300, paying: 120 } }
-    }
-}
 
 /// The rays among triangles, and what holds them all.
 struct Bundle {
@@ -154,7 +133,7 @@ impl<'a> Packet<'a> {
             self.chosen = alike & !together.answered;
             if !self.start::<L>(signs, axes) {
                 // A few are left, or all.
-                together.pays &= together.answered.count_ones() >= MOST / 2;
+                together.pays &= together.answered.count_ones() >= ALL.count_ones() / 2;
                 break;
             }
             let is_done = self.run::<G, L>();
@@ -164,7 +143,7 @@ impl<'a> Packet<'a> {
             }
             G::answer_together::<L>(self, answers);
             together.answered |= self.chosen;
-            together.pays &= is_done && self.work <= Effort::new(G::IS_ANY).paying;
+            together.pays &= is_done && self.work <= Effort::new(G::IS_ANY, false).paying;
             if !is_done {
                 break;
             }
@@ -497,7 +476,7 @@ impl<'a> Packet<'a> {
     fn run<G: Goal, L: Lanes>(&mut self) -> bool {
         (self.alive, self.met, self.work) = (self.chosen, 0, 0);
         let nodes: &[Node] = self.exact.nodes();
-        let most_work = Effort::new(G::IS_ANY).most;
+        let most_work = Effort::new(G::IS_ANY, false).most;
         let mut stack: Stack<<G::Order as Order>::Entry> = Stack::new();
         let mut reference = self.exact.start.root;
         loop {
