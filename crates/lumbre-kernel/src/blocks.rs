@@ -201,10 +201,22 @@ impl TriangleBlock {
         units.first_chunk::<{ units_of(USUAL[1]) }>().map(lanes::fetch);
     }
 
+    /// Whether it is the last of its leaf.
+    #[inline(always)]
+    pub(crate) fn is_last(&self) -> bool {
+        self.head.followers == 0
+    }
+
+    /// The place behind it, where it stands at `place`.
+    #[inline(always)]
+    pub(crate) fn place_behind(&self, place: u32) -> u32 {
+        place + units_of(self.room()) as u32
+    }
+
     /// The place of the next block of its leaf, where this one stands at `place`.
     #[inline(always)]
     pub(crate) fn next(&self, place: u32) -> Option<u32> {
-        (self.head.followers != 0).then(|| place + units_of(self.room()) as u32)
+        (!self.is_last()).then(|| self.place_behind(place))
     }
 }
 

@@ -103,7 +103,20 @@ impl Precise {
 /// What products may lose by underflow is nothing beside this.
 const TINY: f32 = 1.0 / (1u128 << 80) as f32;
 
+/// How a line passes the triangles of a block.
+#[derive(Clone, Copy)]
+struct Pass<E> {
+    /// A bit for each that it may pass through.
+    mask: u32,
+    /// The first of the two products that each edge function is the difference of.
+    products: [E; 3],
+    edges: [E; 3],
+    /// Of the corners, along the ray.
+    heights: [E; 3],
+}
+
 /// The triangles of a block that a line may pass through.
+#[derive(Clone, Copy)]
 struct Passed<E> {
     /// A bit for each whose crossing is precise, and in range.
     met: u32,
@@ -153,25 +166,37 @@ impl Nearest {
 }
 
 impl NarrowRay {
+    /// How the line of the ray passes the triangles of a block. `IS_ALONE` as in [`Lanes::narrow_corners`].
+    #[inline(always)]
+    fn pass_edges<L: Lanes, const IS_ALONE: bool>(&self, block: &TriangleBlock) -> Pass<L::Eight> {
+        let [x, y, heights] = L::narrow_corners::<IS_ALONE>(block, lanes::opaque(self));
+        let products = [x[2] * y[1], x[0] * y[2], x[1] * y[0]];
+        let edges @ [u, v, w] =
+            [products[0] - y[2] * x[1], products[1] - y[0] * x[2], products[2] - y[1] * x[0]];
+        let zero = L::Eight::splat(0.0);
+        let mask = (zero.at_most(u.min(v).min(w)) | u.max(v).max(w).at_most(zero)) & block.taken();
+        Pass { mask, products, edges, heights }
+    }
+
+    /// Which of them the ray meets.
+    #[inline(always)]
+    fn cross<L: Lanes>(&self, pass: &Pass<L::Eight>) -> Passed<L::Eight> {
+        // Read again: most lines pass through few blocks.
+        let ray = lanes::opaque(self);
+        let &Pass { mask, products, edges: [u, v, w], heights: z } = pass;
+        let det = u + v + w;
+        let height = u * z[0] + v * z[1] + w * z[2];
+        let precise = ray.precise.of(products, [u, v, w], det, z);
+        let t = height.over(det) * L::Eight::splat(ray.minus_inverse);
+        let in_range = L::Eight::splat(ray.t_min).at_most(t) & t.at_most(L::Eight::splat(ray.t_max));
+        Passed { met: mask & precise & in_range, unclear: mask & !precise, t, weights: [v, w, det] }
+    }
+
     /// Which triangles of a block the ray meets; `None` where its line passes through none.
     #[inline(always)]
     fn pass<L: Lanes>(&self, block: &TriangleBlock) -> Option<Passed<L::Eight>> {
-        let [x, y, z] = L::narrow_corners(block, lanes::opaque(self));
-        let (bc, ca, ab) = (x[2] * y[1], x[0] * y[2], x[1] * y[0]);
-        let (u, v, w) = (bc - y[2] * x[1], ca - y[0] * x[2], ab - y[1] * x[0]);
-        let zero = L::Eight::splat(0.0);
-        let mask = (zero.at_most(u.min(v).min(w)) | u.max(v).max(w).at_most(zero)) & block.taken();
-        if mask == 0 {
-            return None;
-        }
-        // Read again: most lines pass through few blocks.
-        let ray = lanes::opaque(self);
-        let det = u + v + w;
-        let height = u * z[0] + v * z[1] + w * z[2];
-        let precise = ray.precise.of([bc, ca, ab], [u, v, w], det, z);
-        let t = height.over(det) * L::Eight::splat(ray.minus_inverse);
-        let in_range = L::Eight::splat(ray.t_min).at_most(t) & t.at_most(L::Eight::splat(ray.t_max));
-        Some(Passed { met: mask & precise & in_range, unclear: mask & !precise, t, weights: [v, w, det] })
+        let pass = self.pass_edges::<L, true>(block);
+        if pass.mask == 0 { None } else { Some(self.cross::<L>(&pass)) }
     }
 
     /// Where the ray meets a triangle, by exact products; the weights of the second and third corner, and the sum of all.
@@ -235,6 +260,12 @@ impl Seeker<'_, '_> {
     #[inline(always)]
     fn meet_block<L: Lanes>(&mut self, block: &TriangleBlock, place: u32) -> bool {
         let Some(passed) = self.ray.pass::<L>(block) else { return false };
+        self.take::<L>(block, place, &passed)
+    }
+
+    /// Takes what is nearer; whether there was anything.
+    #[inline(always)]
+    fn take<L: Lanes>(&mut self, block: &TriangleBlock, place: u32, passed: &Passed<L::Eight>) -> bool {
         let mut is_nearer = false;
         if passed.met != 0 {
             let t = passed.t.to_array();
@@ -304,8 +335,8 @@ pub(crate) trait Goal: Sized {
     fn widely(accel: &Accel, ray: &Ray32) -> Self::Answer;
     /// The same for every ray.
     fn all_widely(level: Level, accel: &Accel, rays: &[Ray], answers: &mut [Self::Answer]);
-    /// The answer where that is the nearest, at this `t`.
-    fn answer(exact: &Exact, nearest: &Nearest, t: f32) -> Self::Answer;
+    /// The answer of a ray in flight: whether any hit `is_met`, or the nearest, at this `t`.
+    fn answer(exact: &Exact, is_met: bool, nearest: &Nearest, t: f32) -> Self::Answer;
     /// Puts the answers of rays that went together.
     fn answer_together<L: Lanes>(packet: &Packet, answers: &mut [Self::Answer; PACKET]);
 }
@@ -340,7 +371,7 @@ impl Goal for Closest {
     }
 
     #[inline(always)]
-    fn answer(exact: &Exact, nearest: &Nearest, t: f32) -> Option<Hit32> {
+    fn answer(exact: &Exact, _: bool, nearest: &Nearest, t: f32) -> Option<Hit32> {
         nearest.hit(exact, t)
     }
 
@@ -370,8 +401,8 @@ impl Goal for Any {
     }
 
     #[inline(always)]
-    fn answer(_: &Exact, nearest: &Nearest, _: f32) -> bool {
-        nearest.is_some()
+    fn answer(_: &Exact, is_met: bool, _: &Nearest, _: f32) -> bool {
+        is_met
     }
 
     #[inline(always)]

@@ -3,8 +3,8 @@
 use crate::lanes::{self, Lanes, Room, Slots};
 use crate::node::{Node, WIDTH};
 
-/// Entries in the array: a power of two, many more than a search usually has.
-pub(crate) const STACK: usize = 256;
+/// Entries in the array: many more than a search usually has, but few in tests, where they are not to do always.
+pub(crate) const STACK: usize = if cfg!(test) { 2 * WIDTH } else { 256 };
 
 /// The key of a distance above, a reference below: entries have the order of their distances.
 #[inline(always)]
@@ -26,6 +26,9 @@ pub(crate) trait Order {
     fn is_beyond(entry: Self::Entry, limit: i64) -> bool;
     /// Puts the children in `mask`, two or more, or one or more, onto the stack but for the first to be taken, which it answers.
     fn push_children<L: Lanes>(node: &Node, mask: u32, enter: L::Wide, room: Room<Self::Entry>) -> u32;
+    /// The same without a branch, as far as it can be: puts all, and takes what then is the last. Where one alone is put as many are,
+    /// `mask` may be empty, too: that is what was there before, then.
+    fn put_and_take<L: Lanes>(node: &Node, mask: u32, enter: L::Wide, slots: &mut Slots<Self::Entry>) -> u32;
 }
 
 /// The nearest first.
@@ -54,6 +57,11 @@ impl Order for ByDistance {
     fn push_children<L: Lanes>(node: &Node, mask: u32, enter: L::Wide, room: Room<i64>) -> u32 {
         lanes::push_by_distance(node, mask, enter, room)
     }
+
+    #[inline(always)]
+    fn put_and_take<L: Lanes>(node: &Node, mask: u32, enter: L::Wide, slots: &mut Slots<i64>) -> u32 {
+        lanes::put_and_take_by_distance(node, mask, enter, slots)
+    }
 }
 
 /// The largest first, wherever they are.
@@ -81,6 +89,11 @@ impl Order for AsBuilt {
     #[inline(always)]
     fn push_children<L: Lanes>(node: &Node, mask: u32, _: L::Wide, room: Room<u32>) -> u32 {
         lanes::push_as_built::<L::Wide>(node, mask, room)
+    }
+
+    #[inline(always)]
+    fn put_and_take<L: Lanes>(node: &Node, mask: u32, _: L::Wide, slots: &mut Slots<u32>) -> u32 {
+        lanes::put_and_take_as_built::<L::Wide>(node, mask, slots)
     }
 }
 

@@ -1,8 +1,9 @@
 //! Boxes by sixteen: which children of a node a ray meets, and in what order it takes them.
 
+use std::hint::select_unpredictable;
 use std::mem::MaybeUninit;
 
-use super::{Room, Sides, WIDE, Wide};
+use super::{Room, Sides, Slots, WIDE, Wide};
 use crate::node::{Node, Slabs, WIDTH};
 use crate::packet::Frustum;
 use crate::stack::stack_entry;
@@ -103,6 +104,19 @@ pub(crate) fn push_by_distance<W: Wide>(node: &Node, mask: u32, enter: W, room: 
 /// The same of any two or more.
 #[inline(always)]
 fn push_many<W: Wide>(node: &Node, mask: u32, enter: W, room: Room<i64>) -> u32 {
+    put_in_order(node, mask, enter, room.window);
+    let count = mask.count_ones() as usize - 1;
+    // SAFETY: as many were written, and one more.
+    unsafe {
+        let nearest = room.window[count % WIDTH].assume_init() as u32;
+        room.add(count);
+        nearest
+    }
+}
+
+/// Puts the children in `mask` there, the nearest last.
+#[inline(always)]
+fn put_in_order<W: Wide>(node: &Node, mask: u32, enter: W, window: &mut [MaybeUninit<i64>; WIDTH]) {
     let keys = enter.lanes_in_bits();
     let by_lane = keys.bits();
     // Where each goes is how many are farther: no two have one key, so that the first places are all written.
@@ -111,15 +125,27 @@ fn push_many<W: Wide>(node: &Node, mask: u32, enter: W, room: Room<i64>) -> u32 
         let lane = rest.trailing_zeros() as usize % WIDTH;
         rest &= rest - 1;
         let place = (keys.bits_above(by_lane[lane]) & mask).count_ones() as usize % WIDTH;
-        room.window[place] = MaybeUninit::new(stack_entry(by_lane[lane], node.children[lane]));
+        window[place] = MaybeUninit::new(stack_entry(by_lane[lane], node.children[lane]));
     }
-    let count = mask.count_ones() as usize - 1;
-    // SAFETY: as many were written, and one more.
-    unsafe {
-        let nearest = room.window[count % WIDTH].assume_init() as u32;
-        room.add(count);
-        nearest
+}
+
+/// The same as [`push_by_distance`], hardly with a branch: only where there are more than four.
+#[inline(always)]
+pub(crate) fn put_and_take_by_distance<W: Wide>(
+    node: &Node,
+    mask: u32,
+    enter: W,
+    slots: &mut Slots<i64>,
+) -> u32 {
+    let count = mask.count_ones() as usize;
+    let room = slots.room();
+    match room.window.first_chunk_mut() {
+        Some(four) if count <= 4 => enter.put_falling(mask, &node.children, four),
+        _ => put_in_order(node, mask, enter, room.window),
     }
+    // SAFETY: as many were written.
+    unsafe { room.add(count) };
+    slots.pop().map_or(Node::ABSENT, |entry| entry as u32)
 }
 
 /// Puts the children in `mask`, one or more, onto the stack in the order in which they stand in the node, but for the last, which it
@@ -130,4 +156,20 @@ pub(crate) fn push_as_built<W: Wide>(node: &Node, mask: u32, room: Room<u32>) ->
     // SAFETY: as many were written, and one more.
     unsafe { room.add(mask.count_ones() as usize - 1) };
     node.children[(31 - mask.leading_zeros()) as usize % WIDTH]
+}
+
+/// Puts the children in `mask`, if there are any, onto the stack in the order in which they stand in the node, and takes what then is
+/// the last there: without a branch.
+#[inline(always)]
+pub(crate) fn put_and_take_as_built<W: Wide>(node: &Node, mask: u32, slots: &mut Slots<u32>) -> u32 {
+    let Some(last) = slots.len.checked_sub(1) else { return Node::ABSENT };
+    let child = &node.children[(mask.leading_zeros() ^ 31) as usize % WIDTH];
+    // SAFETY: it is one of the first `len`, which are initialised.
+    let top = unsafe { slots.entries[last].assume_init_ref() };
+    let taken = *select_unpredictable(mask != 0, child, top);
+    let room = slots.room();
+    W::put_chosen(mask, &node.children, room.window);
+    // As many were written as there are bits; one less, or the last, is taken.
+    slots.len = last + mask.count_ones() as usize;
+    taken
 }

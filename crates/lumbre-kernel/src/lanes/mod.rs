@@ -32,7 +32,10 @@ use crate::stack::STACK;
 use crate::triangles::{BLOCK, BlockRay, Inside, Passage, Shear};
 
 pub(crate) use asked::{Asked, Question};
-pub(crate) use boxes::{meet_boxes, meet_frustum, only_child, push_as_built, push_by_distance};
+pub(crate) use boxes::{
+    meet_boxes, meet_frustum, only_child, push_as_built, push_by_distance, put_and_take_as_built,
+    put_and_take_by_distance,
+};
 #[cfg(test)]
 pub(crate) use hulls::meet_hulls_at;
 pub(crate) use hulls::{Lines, MetHulls, SureLines, meet_hulls, meet_one_hull, pass_hulls};
@@ -85,8 +88,9 @@ pub(crate) trait Lanes: SphereLanes {
     fn start_narrow_blocks(start: &SingleStart, ray: &Ray32, slabs: &Slabs) -> NarrowRay;
 
     /// The corners of the triangles of a block in the ray's sheared space, `[x, y or z][corner]`, all with the sign turned; what lanes
-    /// without a triangle have means nothing. No product is fused with a sum: it is the same on every machine.
-    fn narrow_corners(block: &TriangleBlock, ray: &NarrowRay) -> [[Self::Eight; 3]; 3];
+    /// without a triangle have means nothing. No product is fused with a sum: it is the same on every machine. `IS_ALONE` says that the
+    /// ray waits for it, so that to foresee how the block is made is worth a branch.
+    fn narrow_corners<const IS_ALONE: bool>(block: &TriangleBlock, ray: &NarrowRay) -> [[Self::Eight; 3]; 3];
 
     /// The numbers of rays in single precision, side by side: origin, start, direction, end.
     fn narrow_rows(rays: &[Ray32; WIDE], rows: &mut [Row<f32>; 8]);
@@ -349,6 +353,18 @@ impl<E: Copy> Slots<E> {
         self.len = 0;
     }
 
+    /// The last, which stays where it is not so.
+    #[inline(always)]
+    pub(crate) fn pop_if(&mut self, is_so: bool) -> Option<E> {
+        if self.len == 0 {
+            return None;
+        }
+        let last = self.len - 1;
+        self.len -= usize::from(is_so);
+        // SAFETY: it was one of the first `len`, which are initialised, and there are no more than `STACK`.
+        Some(unsafe { self.entries.get_unchecked(last).assume_init() })
+    }
+
     #[inline(always)]
     pub(crate) fn pop(&mut self) -> Option<E> {
         if self.len == 0 {
@@ -556,13 +572,25 @@ pub(crate) fn meet_boxes_at(level: Level, node: &Node, ray: &Slabs) -> (u32, [i3
             node.children = std::array::from_fn(|lane| lane as u32);
             let (mask, enter) = meet_boxes::<L::Wide>(&node, self.1);
             let mut by_lane = [i32::MAX; WIDTH];
+            // On what was there before: as they stand in the node.
+            let mut slots = Slots::new();
+            slots.push(99);
+            let mut taken = vec![put_and_take_as_built::<L::Wide>(&node, mask, &mut slots)];
+            taken.extend(std::iter::from_fn(|| slots.pop()));
+            let met = (0..WIDTH as u32).filter(|lane| mask >> lane & 1 != 0);
+            assert_eq!(taken, std::iter::once(99).chain(met).rev().collect::<Vec<_>>());
             if mask.count_ones() > 1 {
                 let mut slots = Slots::new();
+                let mut together = Slots::new();
+                together.push(i64::MIN);
+                let first = put_and_take_by_distance(&node, mask, enter, &mut together);
                 let nearest = push_by_distance(&node, mask, enter, slots.room());
+                assert_eq!(first, nearest);
                 assert_eq!(slots.len() + 1, mask.count_ones() as usize);
                 by_lane[nearest as usize] = i32::MIN;
                 let mut last = i64::MIN;
                 while let Some(entry) = slots.pop() {
+                    assert_eq!(together.pop(), Some(entry), "the same, with fewer branches");
                     assert!(last < entry, "the nearest are on top");
                     last = entry;
                     by_lane[entry as usize % WIDTH] = (entry >> 32) as i32;

@@ -162,7 +162,7 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
-    fn narrow_corners(block: &TriangleBlock, ray: &NarrowRay) -> [[Self::Eight; 3]; 3] {
+    fn narrow_corners<const IS_ALONE: bool>(block: &TriangleBlock, ray: &NarrowRay) -> [[Self::Eight; 3]; 3] {
         let splat = Self::Eight::splat;
         let [kx, ky, kz] = ray.axes.order();
         let Corners(corners) = Self::corners(block);

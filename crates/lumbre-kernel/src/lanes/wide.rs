@@ -51,6 +51,8 @@ pub(crate) trait Vector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Ou
 /// Eight.
 pub(crate) trait Eight: Vector<Array = [f32; 8]> {
     fn load(eight: &[f32; 8]) -> Self;
+    /// The least of those in the mask, of which none is a NaN; infinity where there are none.
+    fn least_of(self, mask: u32) -> f32;
 }
 
 /// Sixteen.
@@ -119,6 +121,20 @@ pub(crate) trait Wide: Vector<Array = [f32; WIDE]> {
             *one = stack_entry(bits[lane], words[lane]);
         }
         four
+    }
+
+    /// Puts the first four of those there, the largest first; where there are fewer, zeros behind them.
+    #[inline(always)]
+    fn put_falling(self, mask: u32, words: &[u32; WIDE], place: &mut [MaybeUninit<i64>; 4]) {
+        let mut four = self.first_four(mask, words);
+        for (at, one) in four.iter_mut().enumerate() {
+            *one = if mask.count_ones() as usize > at { *one } else { 0 };
+        }
+        let [a, b, c, d] = four;
+        let (a, b, c, d) = (a.max(b), a.min(b), c.max(d), c.min(d));
+        let (a, c, b, d) = (a.max(c), a.min(c), b.max(d), b.min(d));
+        let (b, c) = (b.max(c), b.min(c));
+        *place = [a, b, c, d].map(MaybeUninit::new);
     }
 
     /// Puts the words that the mask chooses there, in their order.
@@ -257,6 +273,15 @@ impl Eight for Portable8 {
     #[inline(always)]
     fn load(eight: &[f32; 8]) -> Self {
         Self(*eight)
+    }
+
+    #[inline(always)]
+    fn least_of(self, mask: u32) -> f32 {
+        let mut least = f32::INFINITY;
+        for lane in 0..8 {
+            least = if mask >> lane & 1 != 0 && self.0[lane] < least { self.0[lane] } else { least };
+        }
+        least
     }
 }
 
@@ -773,6 +798,25 @@ mod x86 {
         }
 
         #[inline(always)]
+        fn put_falling(self, mask: u32, words: &[u32; WIDE], place: &mut [MaybeUninit<i64>; 4]) {
+            // SAFETY: see the type. The load is of sixteen u32, the store of four i64.
+            unsafe {
+                let words = _mm512_loadu_si512(words.as_ptr().cast());
+                let bits = _mm512_castsi512_si128(_mm512_maskz_compress_epi32(mask as u16, self.integers()));
+                let words = _mm512_castsi512_si128(_mm512_maskz_compress_epi32(mask as u16, words));
+                let (two, more) = (_mm_unpacklo_epi32(words, bits), _mm_unpackhi_epi32(words, bits));
+                let four = _mm256_inserti128_si256::<1>(_mm256_castsi128_si256(two), more);
+                let other = _mm256_permute4x64_epi64::<0b10_11_00_01>(four);
+                let four = _mm256_mask_min_epi64(_mm256_max_epi64(four, other), 0b1010, four, other);
+                let other = _mm256_permute4x64_epi64::<0b01_00_11_10>(four);
+                let four = _mm256_mask_min_epi64(_mm256_max_epi64(four, other), 0b1100, four, other);
+                let other = _mm256_permute4x64_epi64::<0b11_01_10_00>(four);
+                let four = _mm256_mask_min_epi64(_mm256_max_epi64(four, other), 0b0100, four, other);
+                _mm256_storeu_si256(place.as_mut_ptr().cast(), four);
+            }
+        }
+
+        #[inline(always)]
         fn put_chosen(mask: u32, words: &[u32; WIDE], place: &mut [MaybeUninit<u32>; WIDE]) {
             // SAFETY: see the type. The load and the store are of sixteen u32.
             unsafe {
@@ -987,6 +1031,20 @@ mod x86 {
         fn load(eight: &[f32; 8]) -> Self {
             // SAFETY: see the type. The load is of eight f32.
             unsafe { Self(_mm256_loadu_ps(eight.as_ptr())) }
+        }
+
+        #[inline(always)]
+        fn least_of(self, mask: u32) -> f32 {
+            // SAFETY: see the type.
+            unsafe {
+                let bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+                let chosen = _mm256_and_si256(_mm256_set1_epi32(mask as i32), bits);
+                let chosen = _mm256_castsi256_ps(_mm256_cmpeq_epi32(chosen, bits));
+                let eight = _mm256_blendv_ps(_mm256_set1_ps(f32::INFINITY), self.0, chosen);
+                let four = _mm_min_ps(_mm256_castps256_ps128(eight), _mm256_extractf128_ps::<1>(eight));
+                let two = _mm_min_ps(four, _mm_movehl_ps(four, four));
+                _mm_cvtss_f32(_mm_min_ss(two, _mm_movehdup_ps(two)))
+            }
         }
     }
 

@@ -181,12 +181,16 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
     /// The corners of the triangles of a block in the ray's sheared space, `[x, y or z][corner]`, all with the sign turned, which
     /// their products do not have: so one operand can come from memory. What lanes without a triangle have means nothing.
     #[inline(always)]
-    fn sheared_corners<S: Shears>(block: &TriangleBlock, ray: &S) -> [[__m256; 3]; 3] {
-        // Nothing waits for a block to say where its rows are, as long as that is foreseen: hence the branches, which the
-        // compiler must not take out.
+    fn sheared_corners<S: Shears, const IS_ALONE: bool>(block: &TriangleBlock, ray: &S) -> [[__m256; 3]; 3] {
+        // Alone, a ray does not wait for a block to say where its rows are, as long as that is foreseen: hence the branches, which the
+        // compiler must not take out. Among others it may wait.
         let room = block.room();
         let rows_by_room = &ray.axes().rows_by_room;
-        let rows = if room == USUAL[0] {
+        let order = &ray.axes().order;
+        let by_room = [order[0] * room as u32, order[1] * room as u32, order[2] * room as u32];
+        let rows = if !IS_ALONE {
+            &by_room
+        } else if room == USUAL[0] {
             super::opaque(&rows_by_room[0])
         } else if room == USUAL[1] {
             super::opaque(&rows_by_room[1])
@@ -718,8 +722,11 @@ where
     }
 
     #[inline(always)]
-    fn narrow_corners(block: &TriangleBlock, ray: &NarrowRay) -> [[wide::Eight256; 3]; 3] {
-        let [[a, b, c], [d, e, f], [g, h, i]] = Self::sheared_corners(block, ray);
+    fn narrow_corners<const IS_ALONE: bool>(
+        block: &TriangleBlock,
+        ray: &NarrowRay,
+    ) -> [[wide::Eight256; 3]; 3] {
+        let [[a, b, c], [d, e, f], [g, h, i]] = Self::sheared_corners::<_, IS_ALONE>(block, ray);
         let of = wide::Eight256::new;
         // SAFETY: see `X86`.
         unsafe { [[of(a), of(b), of(c)], [of(d), of(e), of(f)], [of(g), of(h), of(i)]] }
@@ -883,7 +890,7 @@ where
 
     #[inline(always)]
     fn meet_triangles(block: &TriangleBlock, ray: &BlockRay) -> (u32, Edges) {
-        let [x, y, z] = Self::sheared_corners(block, ray);
+        let [x, y, z] = Self::sheared_corners::<_, true>(block, ray);
         // SAFETY: see `X86`.
         unsafe {
             let u = _mm256_fmsub_ps(x[2], y[1], _mm256_mul_ps(y[2], x[1]));

@@ -1,4 +1,4 @@
-//! Many rays at once: those that are alike together, the others one after another or, in large trees, in flight.
+//! Many rays at once: those that are alike together, the others in flight.
 
 use std::marker::PhantomData;
 
@@ -13,6 +13,8 @@ use crate::packet::{ALL, PACKET};
 use crate::single::Exact;
 use crate::{Accel, Ray32};
 
+/// Rays that are faster in flight than one after another, if there are as many.
+const LEAST_FLIGHTS: usize = 8;
 /// Rays that are taken to double precision at a time.
 const WIDELY: usize = 1024;
 
@@ -75,14 +77,14 @@ impl<G: Goal> Task for Batch<'_, '_, G> {
                 }
             }
             others.extend(PACKET * packets.len()..rays.len());
-            if is_far {
-                stream::fly::<G, L>(&exact, rays, &others, answers);
-                continue;
-            }
-            // Here, and not by a call: a hit that was put together elsewhere would be waited for. Nor in a closure, which does not take
-            // on the instruction set.
-            for &i in &others {
-                answers[i] = alone::search::<G, L>(&exact, &rays[i]);
+            if others.len() < LEAST_FLIGHTS {
+                // Here, and not by a call: a hit that was put together elsewhere would be waited for. Nor in a closure, which does not
+                // take on the instruction set.
+                for &i in &others {
+                    answers[i] = alone::search::<G, L>(&exact, &rays[i]);
+                }
+            } else {
+                stream::fly::<G, L>(&exact, is_far, rays, &others, answers);
             }
         }
     }

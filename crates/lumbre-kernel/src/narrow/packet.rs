@@ -67,6 +67,11 @@ pub(crate) struct Packet<'a> {
     work: u32,
 }
 
+/// Less than in double precision, since rays in flight are faster.
+const fn effort(is_any: bool) -> Effort {
+    if is_any { Effort { most: 112, paying: 70 } } else { Effort { most: 210, paying: 84 } }
+}
+
 /// How rays went together.
 pub(super) struct Together {
     /// A bit for each that was answered.
@@ -143,7 +148,7 @@ impl<'a> Packet<'a> {
             }
             G::answer_together::<L>(self, answers);
             together.answered |= self.chosen;
-            together.pays &= is_done && self.work <= Effort::new(G::IS_ANY, false).paying;
+            together.pays &= is_done && self.work <= effort(G::IS_ANY).paying;
             if !is_done {
                 break;
             }
@@ -476,7 +481,7 @@ impl<'a> Packet<'a> {
     fn run<G: Goal, L: Lanes>(&mut self) -> bool {
         (self.alive, self.met, self.work) = (self.chosen, 0, 0);
         let nodes: &[Node] = self.exact.nodes();
-        let most_work = Effort::new(G::IS_ANY, false).most;
+        let most_work = effort(G::IS_ANY).most;
         let mut stack: Stack<<G::Order as Order>::Entry> = Stack::new();
         let mut reference = self.exact.start.root;
         loop {
