@@ -42,7 +42,7 @@ pub enum Precision {
 pub enum Asked {
     /// One ray at a time.
     Each,
-    /// By batches of [`BATCH`] rays. In a tree below 16 MiB, those that are alike go together, and the others one after another.
+    /// By batches of [`BATCH`] rays: those that are alike together, and the others in flight.
     ByBatches,
     /// One ray at a time, in double precision from the start.
     Plainly,
@@ -93,7 +93,7 @@ const MASK_OF_ALL: u32 = 0b0110;
 const MASK_ASKED: u32 = 0b1010;
 
 /// Rays that a batch has at most.
-const BATCH: usize = 256;
+const BATCH: usize = 1024;
 
 impl Program for Lumbre {
     fn name(&self) -> String {

@@ -275,8 +275,9 @@ impl Accel {
 
     /// [`Accel::closest_f32`] for every ray, with the same answers to the bit; `hits` has a place for each.
     ///
-    /// What is said of [`Accel::closest_batch`] holds here, too: sixteen rays in a row that are much alike go together, and in a large
-    /// tree of meshes others are in flight at the same time.
+    /// As in [`Accel::closest_batch`], sixteen rays in a row that are much alike go together. Others are in flight at the same time where
+    /// they are many: in a tree of meshes that the caches hold, from about two hundred on, so that a thousand rays or more at a time
+    /// are answered soonest.
     ///
     /// # Panics
     /// When `rays` and `hits` differ in length.

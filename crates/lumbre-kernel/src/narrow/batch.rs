@@ -13,8 +13,10 @@ use crate::packet::{ALL, PACKET};
 use crate::single::Exact;
 use crate::{Accel, Ray32};
 
-/// Rays that are faster in flight than one after another, if there are as many.
-const LEAST_FLIGHTS: usize = 8;
+/// From so many on, rays are faster in flight than one after another, where the caches hold little of the tree, and where they do: to
+/// set out, and to wait for the last, takes its time.
+const LEAST_FAR: usize = 32;
+const LEAST_NEAR: usize = 192;
 /// Rays that are taken to double precision at a time.
 const WIDELY: usize = 1024;
 
@@ -77,7 +79,7 @@ impl<G: Goal> Task for Batch<'_, '_, G> {
                 }
             }
             others.extend(PACKET * packets.len()..rays.len());
-            if others.len() < LEAST_FLIGHTS {
+            if others.len() < if is_far { LEAST_FAR } else { LEAST_NEAR } {
                 // Here, and not by a call: a hit that was put together elsewhere would be waited for. Nor in a closure, which does not
                 // take on the instruction set.
                 for &i in &others {
