@@ -351,32 +351,32 @@ fn is_node(reference: u32) -> bool {
 }
 
 /// Whose turn comes next. The places of a turn are read one by one, as they were written: a wide read would wait for them.
-pub(crate) struct Queue<const N: usize> {
+struct Queue<const N: usize> {
     // Those whose turn it is, and those who come after, by turns.
     flights: [[u8; N]; 2],
     next: usize,
-    pub(crate) len: usize,
+    len: usize,
 }
 
 impl<const N: usize> Queue<N> {
-    pub(crate) const EMPTY: Self = Self { flights: [[0; N]; 2], next: 0, len: 0 };
+    const EMPTY: Self = Self { flights: [[0; N]; 2], next: 0, len: 0 };
 
     #[inline(always)]
-    pub(crate) fn put(&mut self, flight: usize) {
+    fn put(&mut self, flight: usize) {
         self.flights[self.next][self.len % N] = flight as u8;
         self.len += 1;
     }
 
     /// Begins a turn of all that were put: how many they are.
     #[inline(always)]
-    pub(crate) fn begin(&mut self) -> usize {
+    fn begin(&mut self) -> usize {
         self.next ^= 1;
         std::mem::take(&mut self.len)
     }
 
     /// One of those whose turn it is.
     #[inline(always)]
-    pub(crate) fn at(&self, place: usize) -> usize {
+    fn at(&self, place: usize) -> usize {
         self.flights[self.next ^ 1][place % N] as usize
     }
 }
