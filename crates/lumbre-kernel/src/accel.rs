@@ -14,7 +14,7 @@ use crate::batch::Ends;
 use crate::collapse::{Entry, Packed};
 use crate::holds::{Contents, Holds, SingleStart};
 use crate::hulls::Hulls;
-use crate::lanes::Level;
+use crate::lanes::{self, Level};
 use crate::narrow::{self, NarrowQuestions};
 use crate::node::{Units, tag};
 use crate::query::{All, Any, Batch, Closest, Count, Filter, If};
@@ -275,9 +275,7 @@ impl Accel {
 
     /// [`Accel::closest_f32`] for every ray, with the same answers to the bit; `hits` has a place for each.
     ///
-    /// As in [`Accel::closest_batch`], sixteen rays in a row that are much alike go together. Others are in flight at the same time where
-    /// they are many: in a tree of meshes that the caches hold, from about two hundred on, so that a thousand rays or more at a time
-    /// are answered soonest.
+    /// Which go together and which are in flight: as in [`Accel::closest_batch`].
     ///
     /// # Panics
     /// When `rays` and `hits` differ in length.
@@ -311,7 +309,7 @@ impl Accel {
     /// The same by the search that knows no other precision than double.
     #[inline(never)]
     pub(crate) fn closest_plainly_at(&self, level: Level, ray: &Ray) -> Option<Hit> {
-        let mut search = Closest::new(ray, All);
+        let mut search = Closest::new(ray, &All);
         traverse::search(level, self, ray, &mut search);
         search.take_hit()
     }
@@ -361,7 +359,7 @@ impl Accel {
         ray: &Ray,
         options: &QueryOptions,
     ) -> Option<Hit> {
-        let mut search = Closest::new(ray, *options);
+        let mut search = Closest::new(ray, options);
         traverse::search(level, self, ray, &mut search);
         search.take_hit()
     }
@@ -382,7 +380,7 @@ impl Accel {
     /// The same by the search that knows no other precision than double.
     #[inline(never)]
     pub(crate) fn any_with_plainly_at(&self, level: Level, ray: &Ray, options: &QueryOptions) -> bool {
-        let mut search = Any::new(ray, *options);
+        let mut search = Any::new(ray, options);
         traverse::search(level, self, ray, &mut search);
         search.is_hit
     }
@@ -401,10 +399,10 @@ impl Accel {
     /// [`Accel::closest`] for every ray, with the same answers to the bit; `hits` has a place for each.
     ///
     /// In a tree of triangles, or of shapes too, sixteen rays in a row that are much alike (those of a square of four by four pixels,
-    /// say, rather than of sixteen pixels in a line) are traced together, which takes down to two fifths of the time. Of the others
-    /// several are in flight at a time in a tree of triangles, which hides waits, for memory above all: many in a large one (some
-    /// hundred thousand triangles). In trees of anything else, rays are traced one after another. Hundreds of rays at a time suffice.
-    /// It works on the calling thread: to use more, split `rays` and `hits`.
+    /// say, rather than of sixteen pixels in a line) are traced together, which takes down to two fifths of the time. In a tree of
+    /// triangles, many of the others are in flight at the same time, where there are enough of them: in a tree that the nearest caches
+    /// hold, from about a hundred on, so that a thousand rays or more at a time are answered soonest. In trees of anything else, rays
+    /// are traced one after another. It works on the calling thread: to use more, split `rays` and `hits`.
     ///
     /// # Panics
     /// When `rays` and `hits` differ in length.
@@ -470,7 +468,7 @@ impl Accel {
         if let Outcome::Settled(found) = self.ask_singly::<Nearest, _>(level, ray, &filter) {
             return found;
         }
-        let mut search = Closest::new(ray, filter);
+        let mut search = Closest::new(ray, &filter);
         traverse::search(level, self, ray, &mut search);
         search.take_hit()
     }
@@ -489,7 +487,7 @@ impl Accel {
     /// The same by the search that knows no other precision than double.
     #[inline(never)]
     pub(crate) fn any_plainly_at(&self, level: Level, ray: &Ray) -> bool {
-        let mut search = Any::new(ray, All);
+        let mut search = Any::new(ray, &All);
         traverse::search(level, self, ray, &mut search);
         search.is_hit
     }
@@ -534,7 +532,7 @@ impl Accel {
         if let Outcome::Settled(is_hit) = self.ask_singly::<Whether, _>(level, ray, &filter) {
             return is_hit;
         }
-        let mut search = Any::new(ray, filter);
+        let mut search = Any::new(ray, &filter);
         traverse::search(level, self, ray, &mut search);
         search.is_hit
     }
@@ -749,6 +747,11 @@ impl Ends<Option<Winner>> for Answers<'_, Option<Hit>> {
             Outcome::Settled(None) => *place = None,
             Outcome::Unsettled => *place = self.accel.closest_plainly_at(self.level, &self.rays[position]),
         }
+    }
+
+    #[inline(always)]
+    fn fetch(&self, position: usize) {
+        self.places.get(position).map(lanes::fetch);
     }
 }
 

@@ -10,7 +10,7 @@ use crate::triangles::{Shear, intersect};
 use crate::{Accel, GeometryKind, Hit, precise};
 
 pub(crate) fn closest(accel: &Accel, ray: &Ray) -> Option<Hit> {
-    let mut search = Closest::new(ray, All);
+    let mut search = Closest::new(ray, &All);
     visit(accel, ray, &mut search);
     search.take_hit()
 }

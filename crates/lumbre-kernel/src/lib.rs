@@ -13,6 +13,7 @@ mod collapse;
 mod deforming;
 mod few;
 mod file;
+mod fleet;
 mod geometry;
 mod hit;
 mod holds;

@@ -37,17 +37,18 @@
 
 mod alone;
 mod batch;
+mod flyer;
 mod packet;
-mod stream;
 
 use std::marker::PhantomData;
 
+use bytemuck::Zeroable;
 use lumbre_geometry::Ray;
 
+use crate::batch::Ends;
 use crate::blocks::TriangleBlock;
 use crate::holds::{Contents, SingleStart};
 use crate::lanes::{self, Asked, Axes, Lanes, Level, Question, Vector};
-use crate::packet::PACKET;
 use crate::single::{Exact, Outcome};
 use crate::stack::{AsBuilt, ByDistance, Order};
 use crate::triangles::BLOCK;
@@ -104,10 +105,8 @@ impl Precise {
 const TINY: f32 = 1.0 / (1u128 << 80) as f32;
 
 /// How a line passes the triangles of a block.
-#[derive(Clone, Copy)]
-struct Pass<E> {
-    /// A bit for each that it may pass through.
-    mask: u32,
+#[derive(Clone, Copy, Zeroable)]
+pub(crate) struct Pass<E> {
     /// The first of the two products that each edge function is the difference of.
     products: [E; 3],
     edges: [E; 3],
@@ -116,8 +115,8 @@ struct Pass<E> {
 }
 
 /// The triangles of a block that a line may pass through.
-#[derive(Clone, Copy)]
-struct Passed<E> {
+#[derive(Clone, Copy, Zeroable)]
+pub(crate) struct Passed<E> {
     /// A bit for each whose crossing is precise, and in range.
     met: u32,
     /// A bit for each that has to be looked at closer.
@@ -166,24 +165,24 @@ impl Nearest {
 }
 
 impl NarrowRay {
-    /// How the line of the ray passes the triangles of a block. `IS_ALONE` as in [`Lanes::narrow_corners`].
+    /// How the line of the ray passes the triangles of a block, and a bit for each that it may pass through. `IS_ALONE` as in [`Lanes::narrow_corners`].
     #[inline(always)]
-    fn pass_edges<L: Lanes, const IS_ALONE: bool>(&self, block: &TriangleBlock) -> Pass<L::Eight> {
+    fn pass_edges<L: Lanes, const IS_ALONE: bool>(&self, block: &TriangleBlock) -> (u32, Pass<L::Eight>) {
         let [x, y, heights] = L::narrow_corners::<IS_ALONE>(block, lanes::opaque(self));
         let products = [x[2] * y[1], x[0] * y[2], x[1] * y[0]];
         let edges @ [u, v, w] =
             [products[0] - y[2] * x[1], products[1] - y[0] * x[2], products[2] - y[1] * x[0]];
         let zero = L::Eight::splat(0.0);
         let mask = (zero.at_most(u.min(v).min(w)) | u.max(v).max(w).at_most(zero)) & block.taken();
-        Pass { mask, products, edges, heights }
+        (mask, Pass { products, edges, heights })
     }
 
-    /// Which of them the ray meets.
+    /// Which of those in the mask the ray meets.
     #[inline(always)]
-    fn cross<L: Lanes>(&self, pass: &Pass<L::Eight>) -> Passed<L::Eight> {
+    fn cross<L: Lanes>(&self, mask: u32, pass: &Pass<L::Eight>) -> Passed<L::Eight> {
         // Read again: most lines pass through few blocks.
         let ray = lanes::opaque(self);
-        let &Pass { mask, products, edges: [u, v, w], heights: z } = pass;
+        let &Pass { products, edges: [u, v, w], heights: z } = pass;
         let det = u + v + w;
         let height = u * z[0] + v * z[1] + w * z[2];
         let precise = ray.precise.of(products, [u, v, w], det, z);
@@ -195,8 +194,8 @@ impl NarrowRay {
     /// Which triangles of a block the ray meets; `None` where its line passes through none.
     #[inline(always)]
     fn pass<L: Lanes>(&self, block: &TriangleBlock) -> Option<Passed<L::Eight>> {
-        let pass = self.pass_edges::<L, true>(block);
-        if pass.mask == 0 { None } else { Some(self.cross::<L>(&pass)) }
+        let (mask, pass) = self.pass_edges::<L, true>(block);
+        if mask == 0 { None } else { Some(self.cross::<L>(mask, &pass)) }
     }
 
     /// Where the ray meets a triangle, by exact products; the weights of the second and third corner, and the sum of all.
@@ -337,8 +336,8 @@ pub(crate) trait Goal: Sized {
     fn all_widely(level: Level, accel: &Accel, rays: &[Ray], answers: &mut [Self::Answer]);
     /// The answer of a ray in flight: whether any hit `is_met`, or the nearest, at this `t`.
     fn answer(exact: &Exact, is_met: bool, nearest: &Nearest, t: f32) -> Self::Answer;
-    /// Puts the answers of rays that went together.
-    fn answer_together<L: Lanes>(packet: &Packet, answers: &mut [Self::Answer; PACKET]);
+    /// Puts the answers of rays that went together, the first of which has this position.
+    fn answer_together<L: Lanes>(packet: &Packet, first: usize, ends: &mut impl Ends<Self::Answer>);
 }
 
 /// The nearest hit.
@@ -376,8 +375,8 @@ impl Goal for Closest {
     }
 
     #[inline(always)]
-    fn answer_together<L: Lanes>(packet: &Packet, answers: &mut [Option<Hit32>; PACKET]) {
-        packet.put_nearest::<L>(answers);
+    fn answer_together<L: Lanes>(packet: &Packet, first: usize, ends: &mut impl Ends<Option<Hit32>>) {
+        packet.put_nearest::<L>(first, ends);
     }
 }
 
@@ -406,8 +405,8 @@ impl Goal for Any {
     }
 
     #[inline(always)]
-    fn answer_together<L: Lanes>(packet: &Packet, answers: &mut [bool; PACKET]) {
-        packet.put_met(answers);
+    fn answer_together<L: Lanes>(packet: &Packet, first: usize, ends: &mut impl Ends<bool>) {
+        packet.put_met(first, ends);
     }
 }
 

@@ -64,41 +64,6 @@ pub(crate) trait Filter {
     fn keep_answers(&self) {}
 }
 
-/// The same, lent to a search within a search.
-impl<F: Filter> Filter for &F {
-    const TAKES_ALL: bool = F::TAKES_ALL;
-    const FACES: bool = F::FACES;
-
-    #[inline(always)]
-    fn takes(&self, found: &Found) -> bool {
-        (**self).takes(found)
-    }
-
-    #[inline(always)]
-    fn enters(&self, accel: &Accel, geometry: u32) -> bool {
-        (**self).enters(accel, geometry)
-    }
-
-    type Selection<'s>
-        = F::Selection<'s>
-    where
-        Self: 's;
-    #[inline(always)]
-    fn select<'s>(&'s self, accel: &'s Accel, standing: Standing<'s>) -> F::Selection<'s> {
-        (**self).select(accel, standing)
-    }
-
-    #[inline(always)]
-    fn forget(&self) {
-        (**self).forget();
-    }
-
-    #[inline(always)]
-    fn keep_answers(&self) {
-        (**self).keep_answers();
-    }
-}
-
 /// Takes everything.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct All;
@@ -253,13 +218,13 @@ impl MetInParts {
 }
 
 /// The nearest hit.
-pub(crate) struct Closest<'a, F> {
+pub(crate) struct Closest<'a, 'f, F> {
     best: Option<Best<'a>>,
     // Of the best, where that is in an instance.
     place: Option<Place>,
     limit: f64,
     floor: f64,
-    filter: F,
+    filter: &'f F,
 }
 
 /// As little as the winner can be told by.
@@ -275,9 +240,9 @@ enum Crossing {
     Root(Root),
 }
 
-impl<'a, F> Closest<'a, F> {
+impl<'a, 'f, F> Closest<'a, 'f, F> {
     #[inline(always)]
-    pub(crate) fn new(ray: &Ray, filter: F) -> Self {
+    pub(crate) fn new(ray: &Ray, filter: &'f F) -> Self {
         Self { best: None, place: None, limit: ray.t_max, floor: ray.t_min, filter }
     }
 
@@ -338,7 +303,7 @@ impl<'a, F> Closest<'a, F> {
     }
 }
 
-impl<'a, F: Filter> Search<'a> for Closest<'a, F> {
+impl<'a, F: Filter> Search<'a> for Closest<'a, '_, F> {
     const ASK: Ask = if F::TAKES_ALL { Ask::First } else { Ask::Every };
     const FACES: bool = F::FACES;
     type Order = ByDistance;
@@ -411,21 +376,21 @@ impl<'a, F: Filter> Search<'a> for Closest<'a, F> {
 }
 
 /// Whether there is a hit.
-pub(crate) struct Any<F> {
+pub(crate) struct Any<'f, F> {
     pub(crate) is_hit: bool,
     limit: f64,
     floor: f64,
-    filter: F,
+    filter: &'f F,
 }
 
-impl<F> Any<F> {
+impl<'f, F> Any<'f, F> {
     #[inline(always)]
-    pub(crate) fn new(ray: &Ray, filter: F) -> Self {
+    pub(crate) fn new(ray: &Ray, filter: &'f F) -> Self {
         Self { is_hit: false, limit: ray.t_max, floor: ray.t_min, filter }
     }
 }
 
-impl<'a, F: Filter> Search<'a> for Any<F> {
+impl<'a, F: Filter> Search<'a> for Any<'_, F> {
     const ASK: Ask = if F::TAKES_ALL { Ask::Whether } else { Ask::Every };
     const FACES: bool = F::FACES;
     type Order = AsBuilt;

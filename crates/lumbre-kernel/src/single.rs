@@ -89,16 +89,14 @@ impl Winner {
     }
 }
 
-/// What a step of a search leads to.
+/// How a search ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Step {
-    /// To go on from here.
-    On(u32),
-    /// Nothing: all was seen.
+    /// All was seen.
     Out,
     /// Any hit will do, and there is one.
     Met,
-    /// Nothing: the plain search has to answer.
+    /// The plain search has to answer.
     Unsettled,
 }
 
@@ -334,6 +332,23 @@ impl<'a> Exact<'a> {
         }
     }
 
+    /// The nearest hit, where that is this triangle that the ray does meet, if it is any.
+    #[inline(always)]
+    pub(crate) fn answer<L: Lanes>(
+        &self,
+        ray: &Ray,
+        axes: &'static Axes,
+        nearest: &Candidate,
+    ) -> Outcome<Option<Winner>> {
+        if !nearest.is_some() {
+            return Outcome::Settled(None);
+        }
+        match self.winner::<L>(ray, axes, nearest) {
+            Some(winner) => Outcome::Settled(Some(winner)),
+            None => Outcome::Unsettled,
+        }
+    }
+
     /// A triangle that the ray does meet as the nearest hit; `None` where the plain search has to answer.
     #[inline(always)]
     pub(crate) fn winner<L: Lanes>(
@@ -479,7 +494,7 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
         block: &TriangleBlock,
         mask: u32,
         edges: &L::Edges,
-        crossings: &Crossings<L::Floats>,
+        crossings: &Crossings<L::Eight>,
     ) -> u32 {
         if S::TAKES_ALL {
             return mask;
@@ -505,7 +520,7 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
         let mut place = leaf & tag::PLACE;
         loop {
             let block = self.exact.triangles.block(place);
-            let (mask, edges) = L::meet_triangles(block, lanes::opaque(&self.blocks));
+            let (mask, edges) = L::meet_triangles::<true>(block, lanes::opaque(&self.blocks));
             if mask != 0 {
                 let crossings = L::place_crossings(&edges, &self.blocks);
                 let mask = self.select::<L>(block, mask, &edges, &crossings);
@@ -518,7 +533,7 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
                     let lane = rest.trailing_zeros();
                     let is_sure = crossings.sure >> lane & 1 != 0;
                     rest &= rest - 1;
-                    let (from, to) = crossings.between::<L>(lane as usize);
+                    let (from, to) = crossings.between(lane as usize);
                     if S::ASKS {
                         if from > self.best.to {
                             continue;
@@ -724,7 +739,7 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
         let mut place = leaf & tag::PLACE;
         loop {
             let block = self.exact.triangles.block(place);
-            let (mask, edges) = L::meet_triangles(block, lanes::opaque(&self.blocks));
+            let (mask, edges) = L::meet_triangles::<true>(block, lanes::opaque(&self.blocks));
             if mask != 0 {
                 let crossings = L::place_crossings(&edges, &self.blocks);
                 let mask = self.select::<L>(block, mask, &edges, &crossings);
@@ -771,15 +786,9 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
     /// The nearest hit, once all was seen.
     #[inline(always)]
     pub(crate) fn winner<L: Lanes>(&self, ray: &Ray) -> Outcome<Option<Winner>> {
-        if !self.best.is_some() {
-            return Outcome::Settled(None);
-        }
-        if let Some(crossed) = self.crossed() {
-            return Outcome::Settled(Some(crossed));
-        }
-        match self.exact.winner::<L>(ray, self.blocks.axes, &self.best) {
-            Some(winner) => Outcome::Settled(Some(winner)),
-            None => Outcome::Unsettled,
+        match self.crossed() {
+            Some(crossed) => Outcome::Settled(Some(crossed)),
+            None => self.exact.answer::<L>(ray, self.blocks.axes, &self.best),
         }
     }
 }
@@ -852,6 +861,15 @@ pub(crate) trait Goal {
         last: Step,
     ) -> Outcome<Self::Answer>;
 
+    /// What a ray in flight has come to among triangles: whether any hit `is_met`, or the nearest.
+    fn answer_in_flight<L: Lanes>(
+        exact: &Exact,
+        ray: &Ray,
+        axes: &'static Axes,
+        is_met: bool,
+        nearest: &Candidate,
+    ) -> Outcome<Self::Answer>;
+
     /// What came of rays that went together, by their places in the packet.
     fn answer_together<L: Lanes, const MIXED: bool>(
         packet: &Packet<MIXED>,
@@ -907,6 +925,17 @@ impl Goal for Nearest {
         last: Step,
     ) -> Outcome<Option<Winner>> {
         if last == Step::Unsettled { Outcome::Unsettled } else { single.winner::<L>(ray) }
+    }
+
+    #[inline(always)]
+    fn answer_in_flight<L: Lanes>(
+        exact: &Exact,
+        ray: &Ray,
+        axes: &'static Axes,
+        _: bool,
+        nearest: &Candidate,
+    ) -> Outcome<Option<Winner>> {
+        exact.answer::<L>(ray, axes, nearest)
     }
 
     #[inline(always)]
@@ -970,6 +999,17 @@ impl Goal for Whether {
         last: Step,
     ) -> Outcome<bool> {
         if last == Step::Unsettled { Outcome::Unsettled } else { Outcome::Settled(last == Step::Met) }
+    }
+
+    #[inline(always)]
+    fn answer_in_flight<L: Lanes>(
+        _: &Exact,
+        _: &Ray,
+        _: &'static Axes,
+        is_met: bool,
+        _: &Candidate,
+    ) -> Outcome<bool> {
+        Outcome::Settled(is_met)
     }
 
     #[inline(always)]

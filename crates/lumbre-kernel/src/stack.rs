@@ -4,7 +4,7 @@ use crate::lanes::{self, Lanes, Room, Slots};
 use crate::node::{Node, WIDTH};
 
 /// Entries in the array: many more than a search usually has, but few in tests, where they are not to do always.
-pub(crate) const STACK: usize = if cfg!(test) { 2 * WIDTH } else { 256 };
+pub(crate) const STACK: usize = if cfg!(test) { 3 * WIDTH } else { 256 };
 
 /// The key of a distance above, a reference below: entries have the order of their distances.
 #[inline(always)]
@@ -113,13 +113,6 @@ impl<E: Copy> Stack<E> {
     #[inline(always)]
     pub(crate) fn new() -> Self {
         Self { slots: Slots::new(), spilled: None }
-    }
-
-    /// Drops everything.
-    #[inline(always)]
-    pub(crate) fn clear(&mut self) {
-        self.slots.clear();
-        self.spilled = None;
     }
 
     /// Has entries put into the room for all children of a node that there always is. Only afterwards, when nothing else has to be

@@ -15,21 +15,6 @@ pub(crate) struct Way<'a, L> {
     lanes: PhantomData<L>,
 }
 
-/// The children of a node that a ray meets.
-pub(crate) struct Met<'a, L: Lanes> {
-    node: &'a Node,
-    mask: u32,
-    enter: L::Wide,
-}
-
-impl<L: Lanes> Clone for Met<'_, L> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<L: Lanes> Copy for Met<'_, L> {}
-
 impl<'a, L: Lanes> Way<'a, L> {
     #[inline(always)]
     pub(crate) fn new(nodes: &'a [Node], slabs: Slabs) -> Self {
@@ -51,25 +36,8 @@ impl<'a, L: Lanes> Way<'a, L> {
     /// Goes on from a node: to a child, to what stands on the stack, or nowhere.
     #[inline(always)]
     pub(crate) fn meet_node<O: Order>(&self, reference: u32, stack: &mut Stack<O::Entry>) -> Option<u32> {
-        let met = self.look_at(reference);
-        self.go_on::<O>(&met, stack)
-    }
-
-    /// Which children of a node are met.
-    #[inline(always)]
-    pub(crate) fn look_at(&self, reference: u32) -> Met<'a, L> {
         let Some(node) = self.nodes.get(reference as usize) else { out_of_tree() };
         let (mask, enter) = lanes::meet_boxes::<L::Wide>(node, lanes::opaque(&self.slabs));
-        Met { node, mask, enter }
-    }
-
-    /// Goes on from what was met.
-    #[inline(always)]
-    pub(crate) fn go_on<O: Order>(
-        &self,
-        &Met { node, mask, enter }: &Met<'a, L>,
-        stack: &mut Stack<O::Entry>,
-    ) -> Option<u32> {
         if mask & mask.wrapping_sub(1) != 0 || O::PUTS_ONE && mask != 0 {
             Some(stack.put(
                 #[inline(always)]
@@ -82,12 +50,18 @@ impl<'a, L: Lanes> Way<'a, L> {
         }
     }
 
+    /// Whether an entry of a stack lies wholly beyond the limit.
+    #[inline(always)]
+    pub(crate) fn is_beyond<O: Order>(&self, entry: O::Entry) -> bool {
+        O::is_beyond(entry, self.limit)
+    }
+
     /// The next on the stack that is not beyond the limit.
     #[inline(always)]
     pub(crate) fn pop<O: Order>(&self, stack: &mut Stack<O::Entry>) -> Option<u32> {
         loop {
             let entry = stack.pop()?;
-            if !O::is_beyond(entry, self.limit) {
+            if !self.is_beyond::<O>(entry) {
                 return Some(O::reference(entry));
             }
         }

@@ -18,6 +18,7 @@ mod x86;
 use std::mem::MaybeUninit;
 use std::sync::OnceLock;
 
+use bytemuck::Zeroable;
 use lumbre_geometry::Ray;
 use lumbre_math::{DVec3, Transform};
 
@@ -48,11 +49,9 @@ pub(crate) use wide::{Eight, LANE_BITS, Row, Vector, WIDE, Wide};
 /// What a search does many at a time: boxes by sixteen, and triangles by eight.
 pub(crate) trait Lanes: SphereLanes {
     /// Eight numbers.
-    type Floats: Copy;
-    /// How a line passes the edges of eight triangles.
-    type Edges: Copy;
-    /// The same, for arithmetic.
     type Eight: Eight;
+    /// How a line passes the edges of eight triangles.
+    type Edges: Copy + Zeroable;
     /// Sixteen numbers, alike.
     type Wide: Wide;
 
@@ -99,8 +98,8 @@ pub(crate) trait Lanes: SphereLanes {
     fn columns(rays: &[Ray; WIDE], columns: &mut [Row<f64>; 8]);
 
     /// A bit for each triangle that the line of the ray may meet, among them all that it does, and what [`Lanes::place_crossings`]
-    /// wants to know: see [`BlockRay`].
-    fn meet_triangles(block: &TriangleBlock, ray: &BlockRay) -> (u32, Self::Edges);
+    /// wants to know: see [`BlockRay`]. `IS_ALONE` as in [`Lanes::narrow_corners`].
+    fn meet_triangles<const IS_ALONE: bool>(block: &TriangleBlock, ray: &BlockRay) -> (u32, Self::Edges);
 
     /// For each number of a list, a bit for each place before it that has the same.
     fn equals_before(list: &[u32; 3 * BLOCK]) -> [u32; 3 * BLOCK];
@@ -112,13 +111,10 @@ pub(crate) trait Lanes: SphereLanes {
     fn corners(block: &TriangleBlock) -> Corners;
 
     /// Where along the ray that is.
-    fn place_crossings(edges: &Self::Edges, ray: &BlockRay) -> Crossings<Self::Floats>;
+    fn place_crossings(edges: &Self::Edges, ray: &BlockRay) -> Crossings<Self::Eight>;
 
     /// Of those that certainly are met ([`Crossings::sure`]), a bit for each whose front it is; other bits mean nothing.
     fn fronts(edges: &Self::Edges) -> u32;
-
-    /// The number in a lane.
-    fn lane(floats: Self::Floats, lane: usize) -> f32;
 
     /// [`Axes::new`] of a ray's direction.
     fn axes(ray: &Ray) -> &'static Axes;
@@ -137,21 +133,21 @@ pub(crate) struct Corners(pub(crate) [[[f32; BLOCK]; 3]; 3]);
 
 /// Where a ray may meet the triangles of a block.
 #[derive(Clone, Copy)]
-pub(crate) struct Crossings<F> {
+pub(crate) struct Crossings<E> {
     /// A bit for each that may be met within the range, if its line meets it: among them all that are.
     pub(crate) in_range: u32,
     /// A bit for each that certainly is met there.
     pub(crate) sure: u32,
     /// Heights along the ray between which the crossing lies.
-    pub(crate) from: F,
-    pub(crate) to: F,
+    pub(crate) from: E,
+    pub(crate) to: E,
 }
 
-impl<F: Copy> Crossings<F> {
+impl<E: Eight> Crossings<E> {
     /// The heights between which the crossing in a lane lies.
     #[inline(always)]
-    pub(crate) fn between<L: Lanes<Floats = F>>(&self, lane: usize) -> (f32, f32) {
-        (L::lane(self.from, lane), L::lane(self.to, lane))
+    pub(crate) fn between(&self, lane: usize) -> (f32, f32) {
+        (self.from.lane(lane), self.to.lane(lane))
     }
 }
 
@@ -617,9 +613,9 @@ pub(crate) fn meet_triangles_at(
         type Output = (u32, u32, [[f32; 2]; BLOCK]);
         #[inline(always)]
         fn run<L: Lanes>(self) -> Self::Output {
-            let (mask, edges) = L::meet_triangles(self.0, self.1);
+            let (mask, edges) = L::meet_triangles::<true>(self.0, self.1);
             let crossings = L::place_crossings(&edges, self.1);
-            let between = std::array::from_fn(|lane| <[f32; 2]>::from(crossings.between::<L>(lane)));
+            let between = std::array::from_fn(|lane| <[f32; 2]>::from(crossings.between(lane)));
             (mask & crossings.in_range, mask & crossings.sure, between)
         }
     }

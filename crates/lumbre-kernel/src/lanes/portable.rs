@@ -1,8 +1,10 @@
 //! Plain loops over arrays, for any machine.
 
+use bytemuck::Zeroable;
 use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
 
+use super::wide::{Portable8, Portable16};
 use super::{Axes, Corners, Crossings, Eight, Lanes, Level, Row, Set, Sides, Vector, WIDE};
 use crate::Ray32;
 use crate::blocks::TriangleBlock;
@@ -17,7 +19,7 @@ use crate::triangles::{
 pub(crate) struct Portable;
 
 /// How a line passes the edges of eight triangles.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Zeroable)]
 pub(crate) struct Edges {
     /// The edge functions.
     values: [[f32; BLOCK]; 3],
@@ -47,23 +49,23 @@ fn local(start: &SingleStart, ray: &Ray32) -> [f32; 4] {
     [x, y, z, 0.0]
 }
 
+// There is no instruction set to be taken on: these are ordinary functions, and the compiler chooses where they go.
 impl Lanes for Portable {
-    type Floats = [f32; BLOCK];
+    type Eight = Portable8;
     type Edges = Edges;
-    type Eight = super::wide::Portable8;
-    type Wide = super::wide::Portable16;
+    type Wide = Portable16;
 
-    #[inline(always)]
+    #[inline]
     fn level() -> Level {
         Level(Set::Portable)
     }
 
-    #[inline(always)]
+    #[inline]
     fn start_nearby(units: &Units, ray: &Ray, t_min: f64, t_max: f64, boxes: &mut BoxRay) -> bool {
         boxes.start_nearby(units, ray, t_min, t_max)
     }
 
-    #[inline(always)]
+    #[inline]
     fn start_single(start: &SingleStart, ray: &Ray) -> Option<Slabs> {
         let (t_min, t_max) = (ray.t_min as f32, ray.t_max as f32);
         // Every comparison with a NaN is false.
@@ -91,7 +93,7 @@ impl Lanes for Portable {
         Some(slabs)
     }
 
-    #[inline(always)]
+    #[inline]
     fn start_blocks(start: &SingleStart, ray: &Ray, slabs: &Slabs) -> (BlockRay, f32) {
         let (mut origin, mut rest) = ([0.0; 4], [0.0; 4]);
         for axis in 0..3 {
@@ -117,7 +119,7 @@ impl Lanes for Portable {
         (blocks, inverse.abs())
     }
 
-    #[inline(always)]
+    #[inline]
     fn start_narrow(start: &SingleStart, ray: &Ray32) -> Option<Slabs> {
         let (t_min, t_max) = (ray.t_min, ray.t_max);
         // Every comparison with a NaN is false.
@@ -145,7 +147,7 @@ impl Lanes for Portable {
         Some(slabs)
     }
 
-    #[inline(always)]
+    #[inline]
     fn start_narrow_blocks(start: &SingleStart, ray: &Ray32, slabs: &Slabs) -> NarrowRay {
         let axes = Axes::new(&ray.direction.as_dvec3());
         let inverse = axes.permute_single(&slabs.inverse)[2] * start.units_per_space;
@@ -161,7 +163,7 @@ impl Lanes for Portable {
         }
     }
 
-    #[inline(always)]
+    #[inline]
     fn narrow_corners<const IS_ALONE: bool>(block: &TriangleBlock, ray: &NarrowRay) -> [[Self::Eight; 3]; 3] {
         let splat = Self::Eight::splat;
         let [kx, ky, kz] = ray.axes.order();
@@ -179,7 +181,7 @@ impl Lanes for Portable {
         sheared
     }
 
-    #[inline(always)]
+    #[inline]
     fn narrow_rows(rays: &[Ray32; WIDE], rows: &mut [Row<f32>; 8]) {
         for (i, ray) in rays.iter().enumerate() {
             for axis in 0..3 {
@@ -190,7 +192,7 @@ impl Lanes for Portable {
         }
     }
 
-    #[inline(always)]
+    #[inline]
     fn columns(rays: &[Ray; WIDE], columns: &mut [Row<f64>; 8]) {
         for (i, ray) in rays.iter().enumerate() {
             for axis in 0..3 {
@@ -201,8 +203,8 @@ impl Lanes for Portable {
         }
     }
 
-    #[inline(always)]
-    fn meet_triangles(block: &TriangleBlock, ray: &BlockRay) -> (u32, Edges) {
+    #[inline]
+    fn meet_triangles<const IS_ALONE: bool>(block: &TriangleBlock, ray: &BlockRay) -> (u32, Edges) {
         let mut x = [[0.0; BLOCK]; 3];
         let mut y = [[0.0; BLOCK]; 3];
         let mut z = [[0.0; BLOCK]; 3];
@@ -237,7 +239,7 @@ impl Lanes for Portable {
         (mask & block.taken(), Edges { values, heights: z, error, height_error })
     }
 
-    #[inline(always)]
+    #[inline]
     fn equals_before(list: &[u32; 3 * BLOCK]) -> [u32; 3 * BLOCK] {
         std::array::from_fn(|at| {
             let before = list[..at].iter().enumerate();
@@ -245,12 +247,12 @@ impl Lanes for Portable {
         })
     }
 
-    #[inline(always)]
+    #[inline]
     fn truncated(numbers: &[f32; BLOCK]) -> [i32; BLOCK] {
         numbers.map(|number| number as i32)
     }
 
-    #[inline(always)]
+    #[inline]
     fn corners(block: &TriangleBlock) -> Corners {
         let (rows, room) = (block.coordinates(), block.room());
         Corners([0, 1, 2].map(|corner| {
@@ -259,10 +261,10 @@ impl Lanes for Portable {
         }))
     }
 
-    #[inline(always)]
-    fn place_crossings(edges: &Edges, ray: &BlockRay) -> Crossings<[f32; BLOCK]> {
-        let none = [0.0; BLOCK];
-        let mut crossings = Crossings { in_range: 0, sure: 0, from: none, to: none };
+    #[inline]
+    fn place_crossings(edges: &Edges, ray: &BlockRay) -> Crossings<Portable8> {
+        let (mut all_in_range, mut sure) = (0, 0);
+        let (mut froms, mut tos) = ([0.0; BLOCK], [0.0; BLOCK]);
         for lane in 0..BLOCK {
             let [u, v, w] = [edges.values[0][lane], edges.values[1][lane], edges.values[2][lane]];
             let [a, b, c] = [edges.heights[0][lane], edges.heights[1][lane], edges.heights[2][lane]];
@@ -279,18 +281,18 @@ impl Lanes for Portable {
             let (from, to) = (ahead - spread, ahead + spread);
             // What is no number may be in range.
             let is_out = to < ray.range.first * weight || from > ray.range.last * weight;
-            crossings.in_range |= u32::from(!is_out) << lane;
+            all_in_range |= u32::from(!is_out) << lane;
             let (least, most) = (u.min(v).min(w), u.max(v).max(w));
             let is_inside = least > error || most < -error;
             let is_in_range = ray.range.surely_first * weight <= from && to <= ray.range.surely_last * weight;
-            crossings.sure |= u32::from(is_inside && is_in_range) << lane;
+            sure |= u32::from(is_inside && is_in_range) << lane;
             let inverse = 1.0 / weight;
-            (crossings.from[lane], crossings.to[lane]) = (from * inverse, to * inverse);
+            (froms[lane], tos[lane]) = (from * inverse, to * inverse);
         }
-        crossings
+        Crossings { in_range: all_in_range, sure, from: Portable8::load(&froms), to: Portable8::load(&tos) }
     }
 
-    #[inline(always)]
+    #[inline]
     fn fronts(edges: &Edges) -> u32 {
         let [u, v, w] = &edges.values;
         let mut fronts = 0;
@@ -300,23 +302,18 @@ impl Lanes for Portable {
         fronts
     }
 
-    #[inline(always)]
-    fn lane(floats: [f32; BLOCK], lane: usize) -> f32 {
-        floats[lane % BLOCK]
-    }
-
-    #[inline(always)]
+    #[inline]
     fn axes(ray: &Ray) -> &'static Axes {
         Axes::new(&ray.direction)
     }
 
-    #[inline(always)]
+    #[inline]
     fn shear(ray: &Ray, axes: &'static Axes, &[x, y, z, _]: &[f64; 4]) -> (Shear, [f64; 3]) {
         let shear = Shear::along(axes, &ray.direction);
         (shear, shear.local_origin(&ray.origin, &DVec3::new(x, y, z)))
     }
 
-    #[inline(always)]
+    #[inline]
     fn pass(block: &TriangleBlock, lane: usize, shear: &Shear, origin: &[f64; 3]) -> (Passage, Inside) {
         passage(shear, origin, &shear.axes.gather(block, lane))
     }

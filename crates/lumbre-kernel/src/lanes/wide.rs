@@ -3,6 +3,8 @@
 use std::mem::MaybeUninit;
 use std::ops::{Add, Index, Mul, Sub};
 
+use bytemuck::Zeroable;
+
 use crate::stack::stack_entry;
 
 /// Those that are sixteen.
@@ -49,10 +51,12 @@ pub(crate) trait Vector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Ou
 }
 
 /// Eight.
-pub(crate) trait Eight: Vector<Array = [f32; 8]> {
+pub(crate) trait Eight: Vector<Array = [f32; 8]> + Zeroable {
     fn load(eight: &[f32; 8]) -> Self;
     /// The least of those in the mask, of which none is a NaN; infinity where there are none.
     fn least_of(self, mask: u32) -> f32;
+    /// That in a lane.
+    fn lane(self, lane: usize) -> f32;
 }
 
 /// Sixteen.
@@ -150,7 +154,7 @@ pub(crate) trait Wide: Vector<Array = [f32; WIDE]> {
     }
 }
 
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Zeroable)]
 pub(crate) struct PortableVector<const N: usize>([f32; N]);
 pub(crate) type Portable8 = PortableVector<8>;
 pub(crate) type Portable16 = PortableVector<WIDE>;
@@ -282,6 +286,11 @@ impl Eight for Portable8 {
             least = if mask >> lane & 1 != 0 && self.0[lane] < least { self.0[lane] } else { least };
         }
         least
+    }
+
+    #[inline(always)]
+    fn lane(self, lane: usize) -> f32 {
+        self.0[lane % 8]
     }
 }
 
@@ -462,6 +471,8 @@ mod x86 {
     use std::mem::MaybeUninit;
     use std::ops::{Add, Mul, Sub};
 
+    use bytemuck::Zeroable;
+
     use super::{AFTER_MIDDLE, BEFORE_MIDDLE, Eight, LANE_BITS, Row, Vector, WIDE, Wide};
 
     /// Only where `lanes::x86::X86<true>` is: the instructions are there.
@@ -473,7 +484,7 @@ mod x86 {
     pub(crate) struct Avx2([__m256; 2]);
 
     /// Only where either is.
-    #[derive(Clone, Copy)]
+    #[derive(Clone, Copy, Zeroable)]
     pub(crate) struct Eight256(__m256);
 
     const SIGN: i32 = i32::MIN;
@@ -1045,6 +1056,12 @@ mod x86 {
                 let two = _mm_min_ps(four, _mm_movehl_ps(four, four));
                 _mm_cvtss_f32(_mm_min_ss(two, _mm_movehdup_ps(two)))
             }
+        }
+
+        #[inline(always)]
+        fn lane(self, lane: usize) -> f32 {
+            // SAFETY: see the type.
+            unsafe { _mm256_cvtss_f32(_mm256_permutevar8x32_ps(self.0, _mm256_set1_epi32(lane as i32))) }
         }
     }
 

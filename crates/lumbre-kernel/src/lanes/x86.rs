@@ -3,6 +3,7 @@
 use std::arch::x86_64::*;
 use std::mem::offset_of;
 
+use bytemuck::Zeroable;
 use lumbre_geometry::Ray;
 use lumbre_math::{DAffine3, DVec3, Transform};
 
@@ -558,7 +559,7 @@ impl Shears for NarrowRay {
 }
 
 /// How a line passes the edges of eight triangles.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Zeroable)]
 pub(crate) struct Edges {
     /// The edge functions.
     values: [__m256; 3],
@@ -588,9 +589,8 @@ impl<const AVX512: bool, const LEAKS: bool> Lanes for X86<AVX512, LEAKS>
 where
     Self: HasWide,
 {
-    type Floats = __m256;
-    type Edges = Edges;
     type Eight = wide::Eight256;
+    type Edges = Edges;
     type Wide = <Self as HasWide>::Wide;
 
     #[inline(always)]
@@ -889,8 +889,8 @@ where
     }
 
     #[inline(always)]
-    fn meet_triangles(block: &TriangleBlock, ray: &BlockRay) -> (u32, Edges) {
-        let [x, y, z] = Self::sheared_corners::<_, true>(block, ray);
+    fn meet_triangles<const IS_ALONE: bool>(block: &TriangleBlock, ray: &BlockRay) -> (u32, Edges) {
+        let [x, y, z] = Self::sheared_corners::<_, IS_ALONE>(block, ray);
         // SAFETY: see `X86`.
         unsafe {
             let u = _mm256_fmsub_ps(x[2], y[1], _mm256_mul_ps(y[2], x[1]));
@@ -992,7 +992,7 @@ where
     }
 
     #[inline(always)]
-    fn place_crossings(edges: &Edges, ray: &BlockRay) -> Crossings<__m256> {
+    fn place_crossings(edges: &Edges, ray: &BlockRay) -> Crossings<wide::Eight256> {
         // SAFETY: see `X86`.
         unsafe {
             let ([u, v, w], z) = (edges.values, edges.heights);
@@ -1014,6 +1014,7 @@ where
                     [at, _mm256_set1_ps(range.last)],
                 );
                 let in_range = in_range & Self::compare::<_CMP_GT_OQ>(weight, _mm256_setzero_ps());
+                let at = wide::Eight256::new(at);
                 return Crossings { in_range, sure: in_range, from: at, to: at };
             }
             let low = _mm256_min_ps(_mm256_min_ps(z[0], z[1]), z[2]);
@@ -1041,6 +1042,7 @@ where
                 [to, _mm256_mul_ps(weight, _mm256_set1_ps(range.surely_last))],
             );
             let (from, to) = (_mm256_mul_ps(from, inverse), _mm256_mul_ps(to, inverse));
+            let (from, to) = (wide::Eight256::new(from), wide::Eight256::new(to));
             Crossings { in_range, sure: inside & surely_in_range, from, to }
         }
     }
@@ -1050,12 +1052,6 @@ where
         // SAFETY: see `X86`.
         let backs = unsafe { _mm256_movemask_ps(edges.values[0]) };
         !backs as u32
-    }
-
-    #[inline(always)]
-    fn lane(floats: __m256, lane: usize) -> f32 {
-        // SAFETY: see `X86`.
-        unsafe { _mm256_cvtss_f32(_mm256_permutevar8x32_ps(floats, _mm256_set1_epi32(lane as i32))) }
     }
 
     #[inline(always)]

@@ -1,22 +1,20 @@
-//! Many rays at once: those that are alike together, the others in flight.
+//! Many rays at once: as in double precision, see [`batch`].
+//!
+//! [`batch`]: crate::batch
 
 use std::marker::PhantomData;
 
+use super::Goal;
+use super::flyer::NarrowFlyer;
 use super::packet::Packet;
-use super::{Goal, alone, stream};
-use crate::batch::{AT_ONCE, FAR, LEAST_OFTEN};
-use crate::blocks::Unit;
+use crate::batch::{self, AllAtOnce, Ends, Manner};
+use crate::fleet;
 use crate::holds::{Contents, SingleStart};
-use crate::lanes::{Lanes, Level, Task};
-use crate::node::Node;
-use crate::packet::{ALL, PACKET};
-use crate::single::Exact;
+use crate::lanes::{Lanes, Level};
+use crate::packet::{PACKET, Together};
+use crate::single::{Exact, Outcome};
 use crate::{Accel, Ray32};
 
-/// From so many on, rays are faster in flight than one after another, where the caches hold little of the tree, and where they do: to
-/// set out, and to wait for the last, takes its time.
-const LEAST_FAR: usize = 32;
-const LEAST_NEAR: usize = 192;
 /// Rays that are taken to double precision at a time.
 const WIDELY: usize = 1024;
 
@@ -32,62 +30,65 @@ pub(crate) fn search_all<G: Goal>(level: Level, accel: &Accel, rays: &[Ray32], a
         }
         return;
     };
-    let tree = &accel.tree;
-    let is_far = size_of_val::<[Node]>(&tree.nodes) + size_of_val::<[Unit]>(&tree.blocks) >= FAR;
-    level.run(Batch::<G> { accel, start, rays, answers, is_far, goal: PhantomData });
+    let (ends, is_far) = (Answers::<G> { accel, level, rays, places: answers }, batch::is_far(accel));
+    level.run(AllAtOnce::<InSingle<G>, _> { accel, start, rays, ends, is_far, has_packets: true });
 }
 
-struct Batch<'a, 'r, G: Goal> {
-    accel: &'a Accel,
-    start: &'a SingleStart,
-    rays: &'r [Ray32],
-    answers: &'r mut [G::Answer],
-    is_far: bool,
-    goal: PhantomData<G>,
-}
+/// In single precision.
+struct InSingle<G>(PhantomData<G>);
 
-impl<G: Goal> Task for Batch<'_, '_, G> {
-    type Output = ();
+impl<G: Goal> Manner for InSingle<G> {
+    type Ray = Ray32;
+    type Answer = G::Answer;
+    type Packet<'a> = Packet<'a>;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) {
-        let Self { accel, start, rays, answers, is_far, .. } = self;
-        let exact = Exact::new(accel, start);
-        let mut packet = Packet::new(accel, start);
-        // After a packet that did not pay, others go alone before the next is tried: ever more while none does, and at once many where
-        // none has.
-        let (mut without, mut patience) = (0, LEAST_OFTEN);
-        let mut others: Vec<usize> = Vec::new();
-        for (rays, answers) in rays.chunks(AT_ONCE).zip(answers.chunks_mut(AT_ONCE)) {
-            others.clear();
-            let (packets, _) = rays.as_chunks::<PACKET>();
-            for (i, rays) in packets.iter().enumerate() {
-                let first = PACKET * i;
-                let mut answered = 0;
-                if without > 0 {
-                    without -= 1;
-                } else if let Some(answers) = answers[first..].first_chunk_mut() {
-                    let together = packet.search::<G, L>(rays, answers);
-                    answered = together.answered;
-                    (without, patience) =
-                        if together.pays { (0, 0) } else { (patience, (2 * patience).clamp(1, LEAST_OFTEN)) };
-                }
-                if answered != ALL {
-                    others.extend(
-                        (0..PACKET).filter(|place| answered >> place & 1 == 0).map(|place| first + place),
-                    );
-                }
-            }
-            others.extend(PACKET * packets.len()..rays.len());
-            if others.len() < if is_far { LEAST_FAR } else { LEAST_NEAR } {
-                // Here, and not by a call: a hit that was put together elsewhere would be waited for. Nor in a closure, which does not
-                // take on the instruction set.
-                for &i in &others {
-                    answers[i] = alone::search::<G, L>(&exact, &rays[i]);
-                }
-            } else {
-                stream::fly::<G, L>(&exact, is_far, rays, &others, answers);
-            }
-        }
+    fn packet<'a>(accel: &'a Accel, start: &'a SingleStart) -> Packet<'a> {
+        Packet::new(accel, start)
+    }
+
+    #[inline(always)]
+    fn search_together<'a, L: Lanes>(
+        packet: &mut Packet<'a>,
+        _: &Exact<'a>,
+        rays: &[Ray32; PACKET],
+        first: usize,
+        ends: &mut impl Ends<G::Answer>,
+    ) -> Together {
+        packet.search::<G, L>(rays, first, ends)
+    }
+
+    #[inline(always)]
+    fn search_alone<L: Lanes>(exact: &Exact, ray: &Ray32) -> Outcome<G::Answer> {
+        G::alone::<L>(exact, ray)
+    }
+
+    #[inline(always)]
+    fn fly<L: Lanes>(
+        exact: &Exact,
+        is_far: bool,
+        rays: &[Ray32],
+        positions: &[usize],
+        ends: &mut impl Ends<G::Answer>,
+    ) {
+        fleet::fly::<NarrowFlyer<G>, L>(exact, is_far, rays, positions, ends);
+    }
+}
+
+/// The places for what came of a batch of rays.
+struct Answers<'a, G: Goal> {
+    accel: &'a Accel,
+    level: Level,
+    rays: &'a [Ray32],
+    places: &'a mut [G::Answer],
+}
+
+impl<G: Goal> Ends<G::Answer> for Answers<'_, G> {
+    #[inline(always)]
+    fn put(&mut self, position: usize, outcome: Outcome<G::Answer>) {
+        self.places[position] = match outcome {
+            Outcome::Settled(answer) => answer,
+            Outcome::Unsettled => G::alone_at(self.level).ask(self.accel, &self.rays[position]),
+        };
     }
 }

@@ -7,12 +7,13 @@
 //! 8.1u and a little more.
 
 use super::{Goal, NarrowRay, Precise, TINY};
+use crate::batch::Ends;
 use crate::blocks::{Blocks, TriangleBlock};
 use crate::holds::SingleStart;
 use crate::lanes::{self, Axes, Corners, Eight, Lanes, Row, Sides, Vector, WIDE, Wide};
 use crate::node::{END_FACTOR, LITTLE, Node, START_FACTOR, Units, tag};
-use crate::packet::{ALL, CULL_ERROR, Effort, Frustum, LEAST, PACKET};
-use crate::single::Exact;
+use crate::packet::{ALL, CULL_ERROR, Effort, Frustum, LEAST, PACKET, Together};
+use crate::single::{Exact, Outcome};
 use crate::stack::{Order, Stack};
 use crate::triangles::{BEYOND, BLOCK, beyond};
 use crate::way::limit_of;
@@ -72,14 +73,6 @@ const fn effort(is_any: bool) -> Effort {
     if is_any { Effort { most: 112, paying: 70 } } else { Effort { most: 210, paying: 84 } }
 }
 
-/// How rays went together.
-pub(super) struct Together {
-    /// A bit for each that was answered.
-    pub(super) answered: u32,
-    /// Whether that is faster than each alone.
-    pub(super) pays: bool,
-}
-
 impl<'a> Packet<'a> {
     #[inline(always)]
     pub(super) fn new(accel: &'a Accel, start: &'a SingleStart) -> Self {
@@ -124,14 +117,15 @@ impl<'a> Packet<'a> {
         }
     }
 
-    /// Searches along rays together. Those that go another way than others do so together, too.
+    /// Searches along rays together, the first of which has this position. Those that go another way than others do so together, too.
     #[inline(always)]
     pub(super) fn search<G: Goal, L: Lanes>(
         &mut self,
         rays: &[Ray32; PACKET],
-        answers: &mut [G::Answer; PACKET],
+        first: usize,
+        ends: &mut impl Ends<G::Answer>,
     ) -> Together {
-        let mut together = Together { answered: 0, pays: true };
+        let mut together = Together { answered: 0, pays: true, is_done: true };
         while together.answered != ALL {
             L::narrow_rows(rays, &mut self.rows);
             let (alike, signs, axes) = self.ways::<L>((!together.answered).trailing_zeros());
@@ -146,10 +140,11 @@ impl<'a> Packet<'a> {
                 // Any hit will do for those that have one.
                 self.chosen &= if G::IS_ANY { !self.alive } else { 0 };
             }
-            G::answer_together::<L>(self, answers);
+            G::answer_together::<L>(self, first, ends);
             together.answered |= self.chosen;
             together.pays &= is_done && self.work <= effort(G::IS_ANY).paying;
             if !is_done {
+                together.is_done = false;
                 break;
             }
         }
@@ -545,7 +540,7 @@ impl<'a> Packet<'a> {
 
     /// The nearest hits of those that were chosen.
     #[inline(always)]
-    pub(super) fn put_nearest<L: Lanes>(&self, answers: &mut [Option<Hit32>; PACKET]) {
+    pub(super) fn put_nearest<L: Lanes>(&self, first: usize, ends: &mut impl Ends<Option<Hit32>>) {
         let load = L::Wide::load;
         let triangle = load(&self.triangle.0);
         let hits = if self.is_among_triangles { self.chosen & !triangle.with_bits(NONE) } else { 0 };
@@ -553,7 +548,7 @@ impl<'a> Packet<'a> {
         while misses != 0 {
             let i = misses.trailing_zeros() as usize % PACKET;
             misses &= misses - 1;
-            answers[i] = None;
+            ends.put(first + i, Outcome::Settled(None));
         }
         if hits == 0 {
             return;
@@ -573,24 +568,25 @@ impl<'a> Packet<'a> {
             while with_this != 0 {
                 let i = with_this.trailing_zeros() as usize % PACKET;
                 with_this &= with_this - 1;
-                answers[i] = Some(Hit32 {
+                let hit = Hit32 {
                     t: self.bundle.t_max.0[i],
                     local: [v.0[i], w.0[i]],
                     id,
                     primitive,
                     geometry,
                     instance: Hit32::NO_INSTANCE,
-                });
+                };
+                ends.put(first + i, Outcome::Settled(Some(hit)));
             }
         }
     }
 
     /// Whether each that was chosen met anything.
     #[inline(always)]
-    pub(super) fn put_met(&self, answers: &mut [bool; PACKET]) {
+    pub(super) fn put_met(&self, first: usize, ends: &mut impl Ends<bool>) {
         if self.chosen == ALL {
-            for (i, answer) in answers.iter_mut().enumerate() {
-                *answer = self.met >> i & 1 != 0;
+            for i in 0..PACKET {
+                ends.put(first + i, Outcome::Settled(self.met >> i & 1 != 0));
             }
             return;
         }
@@ -598,7 +594,7 @@ impl<'a> Packet<'a> {
         while rest != 0 {
             let i = rest.trailing_zeros() as usize % PACKET;
             rest &= rest - 1;
-            answers[i] = self.met >> i & 1 != 0;
+            ends.put(first + i, Outcome::Settled(self.met >> i & 1 != 0));
         }
     }
 }

@@ -1,0 +1,111 @@
+//! Rays that fly in single precision.
+
+use std::marker::PhantomData;
+
+use bytemuck::Zeroable;
+
+use super::{Goal, NarrowRay, Nearest, Pass, Passed, Seeker};
+use crate::Ray32;
+use crate::blocks::TriangleBlock;
+use crate::fleet::{Crossed, Flyer};
+use crate::holds::SingleStart;
+use crate::lanes::{Eight, Lanes, Vector};
+use crate::node::Slabs;
+use crate::single::{Exact, Outcome};
+use crate::triangles;
+use crate::way::Way;
+
+/// A ray in single precision among triangles, and the nearest that it has met.
+pub(super) struct NarrowFlyer<G> {
+    /// Ends at the nearest.
+    ray: NarrowRay,
+    nearest: Nearest,
+    goal: PhantomData<G>,
+}
+
+impl<E: Copy + Zeroable> Crossed for Passed<E> {
+    #[inline(always)]
+    fn met(&self) -> u32 {
+        self.met
+    }
+
+    #[inline(always)]
+    fn unclear(&self) -> u32 {
+        self.unclear
+    }
+}
+
+impl<G: Goal, L: Lanes> Flyer<L> for NarrowFlyer<G> {
+    type Ray = Ray32;
+    type Answer = G::Answer;
+    type Order = G::Order;
+    const IS_ANY: bool = G::IS_ANY;
+    type Pass = Pass<L::Eight>;
+    type Crossed = Passed<L::Eight>;
+
+    #[inline(always)]
+    fn start(start: &SingleStart, ray: &Ray32) -> Option<Slabs> {
+        L::start_narrow(start, ray)
+    }
+
+    #[inline(always)]
+    fn new(start: &SingleStart, ray: &Ray32, slabs: &Slabs) -> Self {
+        let ray = L::start_narrow_blocks(start, ray, slabs);
+        Self { ray, nearest: Nearest::NONE, goal: PhantomData }
+    }
+
+    #[inline(always)]
+    fn renew(&mut self, start: &SingleStart, ray: &Ray32, slabs: &Slabs) {
+        self.ray = L::start_narrow_blocks(start, ray, slabs);
+        self.nearest.block = Nearest::NONE.block;
+    }
+
+    #[inline(always)]
+    fn pass(&self, block: &TriangleBlock) -> (u32, Pass<L::Eight>) {
+        self.ray.pass_edges::<L, false>(block)
+    }
+
+    #[inline(always)]
+    fn cross(&self, mask: u32, pass: &Pass<L::Eight>) -> Passed<L::Eight> {
+        self.ray.cross::<L>(mask, pass)
+    }
+
+    #[inline(always)]
+    fn meets_closely(&self, exact: &Exact, _: &Ray32, block: u32, unclear: u32) -> Outcome<bool> {
+        Outcome::Settled(self.ray.meets_exactly(exact.block(block), unclear))
+    }
+
+    #[inline(always)]
+    fn take_nearest(
+        &mut self,
+        exact: &Exact,
+        _: &Ray32,
+        block: u32,
+        passed: &Passed<L::Eight>,
+        way: &mut Way<L>,
+    ) -> bool {
+        let t = passed.t.least_of(passed.met);
+        let which = passed.t.at_most(L::Eight::splat(t)) & passed.met;
+        let is_alone = which & which.wrapping_sub(1) == 0;
+        if passed.unclear == 0 && is_alone && t < self.ray.t_max {
+            let nearest = &mut self.nearest;
+            (nearest.block, nearest.lane) = (block, which.trailing_zeros());
+            let [v, w, det] = passed.weights;
+            nearest.weights = [v.to_array(), w.to_array(), det.to_array()];
+            self.ray.t_max = t;
+            way.end_at(triangles::beyond(t));
+            return true;
+        }
+        // One has to be looked at closer, or two are met at the same place, of whatever block.
+        let mut seeker = Seeker { exact: *exact, ray: &mut self.ray, nearest: &mut self.nearest };
+        if seeker.take::<L>(exact.block(block), block, passed) {
+            way.end_at(triangles::beyond(self.ray.t_max));
+        }
+        true
+    }
+
+    #[inline(always)]
+    fn answer(&self, exact: &Exact, _: &Ray32, is_met: bool) -> Outcome<G::Answer> {
+        Outcome::Settled(G::answer(exact, is_met, &self.nearest, self.ray.t_max))
+    }
+}
