@@ -405,7 +405,9 @@ pub(crate) fn fly<F: Flyer<L>, L: Lanes>(
             fleet.answer(at_ends, ends);
             under_way &= !at_ends;
             for place in Bits(at_ends) {
-                waiting.as_slice().get(AHEAD).map(|&position| lanes::fetch(&rays[position]));
+                if let Some(&position) = waiting.as_slice().get(AHEAD) {
+                    lanes::fetch(&rays[position]);
+                }
                 for &position in waiting.by_ref() {
                     if fleet.flights[place].restart(exact, position, &rays[position]) {
                         ends.fetch(position);
