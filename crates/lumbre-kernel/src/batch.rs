@@ -4,6 +4,7 @@
 //! bits that it has alone.
 
 use std::marker::PhantomData;
+use std::slice::Chunks;
 
 use lumbre_geometry::Ray;
 
@@ -33,12 +34,28 @@ const AT_ONCE: usize = 4096;
 /// How many packets ahead rays are asked for.
 const AHEAD: usize = 2;
 
-/// Asks for the rays of a packet, before they are read: by packets, they are read faster than caches foresee. Where any hit will do,
+/// Asks for the rays of packets, before they are read: by packets, they are read faster than caches foresee. Where any hit will do,
 /// nothing else keeps the memory busy, and they do.
-#[inline(always)]
-fn fetch_rays<G: Goal>(rays: &[Ray]) {
-    if !G::IS_ANY {
-        rays.first_chunk::<PACKET>().map(lanes::fetch);
+struct Coming<'r, R> {
+    packets: Chunks<'r, R>,
+}
+
+impl<'r, R> Coming<'r, R> {
+    /// Asks for the first of these, if `asks`; never for any, else.
+    #[inline(always)]
+    fn new(rays: &'r [R], asks: bool) -> Self {
+        let mut coming = Self { packets: if asks { rays } else { &[] }.chunks(PACKET) };
+        for _ in 0..AHEAD {
+            coming.fetch_next();
+        }
+        coming
+    }
+
+    #[inline(always)]
+    fn fetch_next(&mut self) {
+        if let Some(rays) = self.packets.next().and_then(<[R]>::first_chunk::<PACKET>) {
+            lanes::fetch(rays);
+        }
     }
 }
 
@@ -125,6 +142,8 @@ pub(crate) trait Manner {
     type Answer;
     /// Those that go together.
     type Packet<'a>;
+    /// Whether their rays are asked for ahead.
+    const ASKS_AHEAD: bool;
 
     /// Rays that will go together.
     fn packet<'a>(accel: &'a Accel, start: &'a SingleStart) -> Self::Packet<'a>;
@@ -158,6 +177,7 @@ impl<G: Goal> Manner for InDouble<G> {
     type Ray = Ray;
     type Answer = G::Answer;
     type Packet<'a> = Packet<'a, false>;
+    const ASKS_AHEAD: bool = !G::IS_ANY;
 
     #[inline(always)]
     fn packet<'a>(accel: &'a Accel, start: &'a SingleStart) -> Packet<'a, false> {
@@ -254,11 +274,10 @@ impl<'a, G: Goal, O: Others<'a, G>, E: Ends<O::Found>> Task for OneByOne<'a, '_,
         let Self { accel, start, rays, mut others, mut ends, .. } = self;
         let mut packet = Packet::<true>::new(accel, start);
         let mut trials = Trials::NEW;
-        let mut coming = rays.chunks(PACKET);
-        coming.by_ref().take(AHEAD).for_each(fetch_rays::<G>);
+        let mut coming = Coming::new(rays, !G::IS_ANY);
         for (number, rays) in rays.chunks(PACKET).enumerate() {
             let first = number * PACKET;
-            coming.next().map(fetch_rays::<G>);
+            coming.fetch_next();
             let mut answered = 0;
             if let Ok(rays) = rays.try_into()
                 && trials.is_next()
@@ -302,7 +321,9 @@ impl<M: Manner, E: Ends<M::Answer>> Task for AllAtOnce<'_, '_, M, E> {
         for (number, chunk) in rays.chunks(AT_ONCE).enumerate() {
             let first = number * AT_ONCE;
             let (packets, _) = chunk.as_chunks::<PACKET>();
+            let mut coming = Coming::new(chunk, M::ASKS_AHEAD);
             for (i, rays) in packets.iter().enumerate() {
+                coming.fetch_next();
                 let first = first + PACKET * i;
                 let mut answered = 0;
                 if has_packets && trials.is_next() {

@@ -41,6 +41,7 @@ impl<G: Goal> Manner for InSingle<G> {
     type Ray = Ray32;
     type Answer = G::Answer;
     type Packet<'a> = Packet<'a>;
+    const ASKS_AHEAD: bool = false;
 
     #[inline(always)]
     fn packet<'a>(accel: &'a Accel, start: &'a SingleStart) -> Packet<'a> {
