@@ -4,6 +4,11 @@
 //! for ten or twelve of them, for sixteen, or for all, and is as long as that. Blocks stand one behind another in a list of units of sixteen bytes, and references in nodes name the unit where
 //! the first block of a leaf begins. What a block's triangles are called stands elsewhere, for only the winner of a search is
 //! asked.
+//!
+//! Vertices stand where lanes find them without a look across the middle of a vector of 256 bits, which takes AVX2 several times as
+//! long: those of the first four triangles are 0 to 3 and 8 to 11, those of the last four 4 to 7 and 8 to 11, or 12 to 15 in a room of
+//! sixteen. Which triangles are the first four is chosen so that this takes as little room as it can: a strip of eight has ten vertices,
+//! four of either half alone and two between them.
 
 use std::mem::offset_of;
 
@@ -80,8 +85,8 @@ struct Head {
     followers: u8,
     // So that no byte of it is left open.
     rest: u8,
-    /// Which vertex each corner is, four bits for each lane; lanes without a triangle have those of the first. Means nothing where
-    /// each corner has a vertex of its own.
+    /// Which vertex each corner is, four bits for each lane; lanes without a triangle have those of one that is there, or the first that
+    /// they could have. Means nothing where each corner has a vertex of its own.
     corners: [u32; 3],
 }
 
@@ -92,6 +97,8 @@ const _: () = assert!(size_of::<Head>() == 20);
 pub(crate) const USUAL: [usize; 2] = [10, 12];
 /// As many as 512 bits hold.
 pub(crate) const MOST_SHARED: usize = 16;
+/// Half of a block's lanes, and as many vertices as 128 bits hold.
+pub(crate) const QUAD: usize = BLOCK / 2;
 /// Where triangles share less: each corner has a vertex of its own, corner by corner and lane by lane.
 const UNSHARED: usize = 3 * BLOCK;
 /// All rooms that there are.
@@ -127,6 +134,20 @@ fn vertex_at(corners: &[u32; 3], is_unshared: bool, corner: usize, lane: usize) 
         return BLOCK * corner + lane;
     }
     (corners[corner] >> (4 * lane)) as usize % MOST_SHARED
+}
+
+/// Where the second four vertices begin that the last four lanes of a block with a room for no more than sixteen have: the first four
+/// have theirs from twice [`QUAD`] on, and so do these but in a room of sixteen.
+#[inline(always)]
+pub(crate) const fn far_of_last(room: usize) -> usize {
+    2 * QUAD + (room & MOST_SHARED) / QUAD
+}
+
+/// Whether a lane may have that vertex.
+fn is_within_reach(room: usize, lane: usize, vertex: usize) -> bool {
+    let is_last = lane / QUAD != 0;
+    let far = if is_last { far_of_last(room) } else { 2 * QUAD };
+    vertex / QUAD == usize::from(is_last) || vertex / QUAD == far / QUAD
 }
 
 impl TriangleBlock {
@@ -288,7 +309,10 @@ impl<'a> Blocks<'a> {
             let named = names.primitives.iter().enumerate();
             let named = named.fold(0, |lanes, (lane, &name)| lanes | u8::from(name != u32::MAX) << lane);
             let mut corners = (0..3).flat_map(|corner| (0..BLOCK).map(move |lane| (corner, lane)));
-            let are_there = corners.all(|(corner, lane)| block.vertex_at(corner, lane) < block.room());
+            let are_there = corners.all(|(corner, lane)| {
+                let (vertex, room) = (block.vertex_at(corner, lane), block.room());
+                vertex < room && (block.is_unshared() || is_within_reach(room, lane, vertex))
+            });
             let is_sound = head.number as usize == number
                 && head.taken & !named == 0
                 && ROOMS.contains(&head.room.into())
@@ -315,6 +339,47 @@ const MARGIN: usize = WINDOW - 1;
 pub(crate) struct Filled {
     pub(crate) units: Vec<Unit>,
     pub(crate) places: Vec<u32>,
+    /// In which order the names of each are to stand from now on.
+    pub(crate) orders: Vec<LaneOrder>,
+}
+
+/// Of the lanes of a block, in which each comes from: four bits for each.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct LaneOrder(u32);
+
+impl LaneOrder {
+    const SAME: Self = Self(0x7654_3210);
+
+    /// With those first of which there is a bit: four of them.
+    #[inline(always)]
+    fn of_first(first: usize) -> Self {
+        let (mut order, mut ends) = (0, [0, QUAD]);
+        for lane in 0..BLOCK {
+            let end = &mut ends[usize::from(first >> lane & 1 == 0)];
+            order |= lane << (4 * *end);
+            *end += 1;
+        }
+        Self(order as u32)
+    }
+
+    /// Whether none goes elsewhere.
+    pub(crate) fn is_same(self) -> bool {
+        self == Self::SAME
+    }
+
+    /// In which lane that stood which now stands there.
+    #[inline(always)]
+    pub(crate) fn lane_before(self, lane: usize) -> usize {
+        (self.0 >> (4 * lane)) as usize % BLOCK
+    }
+
+    /// Puts the names of a block in this order.
+    pub(crate) fn put(self, names: &mut BlockNames) {
+        let before = names.primitives;
+        for (lane, primitive) in names.primitives.iter_mut().enumerate() {
+            *primitive = before[self.lane_before(lane)];
+        }
+    }
 }
 
 /// Blocks that are packed at once, one lot after another.
@@ -356,11 +421,10 @@ impl Task for Look<'_> {
         let mut by_place = false;
         for names in some {
             let mesh = mesh(self.geometries, names.geometry);
-            let shared = Shared::of::<L, true>(mesh, names);
-            by_place |=
-                shared.room() <= MOST_SHARED && Shared::of::<L, false>(mesh, names).room() > MOST_SHARED;
+            let halves = Halves::of::<L, true>(mesh, names, USUAL[0]);
+            by_place |= halves.do_share() && !Halves::of::<L, false>(mesh, names, USUAL[0]).do_share();
             for i in 0..2 {
-                let room = shared.with_room(USUAL[i]).room();
+                let room = halves.room(USUAL[i]);
                 usual[i] += usize::from(room == USUAL[i]);
                 units[i] += units_of(room);
             }
@@ -384,7 +448,11 @@ pub(crate) fn pack(
     may_lack_area: bool,
 ) -> Result<Filled, BuildError> {
     let Survey { usual, by_place, units: expected } = level.run(Look { geometries, names });
-    let mut filled = Filled { units: Vec::new(), places: Vec::with_capacity(names.len()) };
+    let mut filled = Filled {
+        units: Vec::new(),
+        places: Vec::with_capacity(names.len()),
+        orders: Vec::with_capacity(names.len()),
+    };
     let is_all_at_once = names.len() <= WAVE;
     let mut shared = Vec::new();
     let mut end = 0;
@@ -397,6 +465,7 @@ pub(crate) fn pack(
         let start = end;
         for shared in &shared {
             filled.places.push(end as u32);
+            filled.orders.push(shared.order);
             end += units_of(shared.room());
         }
         if end > tag::PLACE as usize {
@@ -459,7 +528,7 @@ impl FindShared<'_> {
     fn find<L: Lanes, const BY_PLACE: bool>(self) {
         for (shared, names) in self.shared.iter_mut().zip(self.names) {
             let mesh = mesh(self.geometries, names.geometry);
-            *shared = Shared::of::<L, BY_PLACE>(mesh, names).with_room(self.usual);
+            *shared = Halves::of::<L, BY_PLACE>(mesh, names, self.usual).in_room(self.usual);
         }
     }
 }
@@ -486,7 +555,8 @@ impl PackShare<'_> {
             let own = units.split_off_mut(..units_of(room)).expect("there is room for all");
             let (head, coordinates) = parts_of_first(own);
             let mut taken = 0;
-            for (lane, primitive) in names.primitives().enumerate() {
+            for lane in 0..names.primitives().count() {
+                let primitive = names.primitives[shared.order.lane_before(lane)];
                 let triangle = mesh.indices[primitive as usize];
                 let corners = triangle.map(|vertex| mesh.positions[vertex as usize]);
                 taken |= u8::from(!may_lack_area || has_area(&corners)) << lane;
@@ -625,16 +695,18 @@ fn mesh(geometries: &[Geometry], geometry: u32) -> &TriangleMesh {
     }
 }
 
-/// Which vertices the triangles of a block share.
+/// Which vertices the triangles of a block share, as they stand in a room.
 #[derive(Clone, Copy)]
 struct Shared {
     /// As in the head of a block.
     corners: [u32; 3],
+    order: LaneOrder,
     room: u8,
 }
 
 impl Shared {
-    const NOTHING: Self = Self { corners: [0; 3], room: 0 };
+    /// Each corner has a vertex of its own.
+    const NOTHING: Self = Self { corners: [0; 3], order: LaneOrder::SAME, room: UNSHARED as u8 };
 
     fn room(&self) -> usize {
         self.room.into()
@@ -645,22 +717,44 @@ impl Shared {
     fn vertex_at(&self, corner: usize, lane: usize) -> usize {
         vertex_at(&self.corners, self.room() > MOST_SHARED, corner, lane)
     }
+}
 
-    /// With one of the rooms that there are.
-    #[inline(always)]
-    fn with_room(self, usual: usize) -> Self {
-        let room = match self.room() {
-            room if room <= usual => usual,
-            room if room <= MOST_SHARED => MOST_SHARED,
-            _ => UNSHARED,
-        };
-        Self { room: room as u8, ..self }
+/// The triangles of a block in two halves, and their vertices. Of corners that are the same vertex, a bit stands for the first.
+#[derive(Clone, Copy)]
+struct Halves {
+    /// For the corners in each lane, the bit of its vertex; nothing where there is no triangle.
+    corners: [[u32; 3]; BLOCK],
+    /// The vertices of either half.
+    vertices: [u32; 2],
+    order: LaneOrder,
+    /// How many triangles there are.
+    len: usize,
+}
+
+/// The ways to choose four of five, six, seven and eight triangles, a bit for each that is; of eight, those with the first triangle.
+static FOURS: [([u8; 35], usize); 4] = {
+    let mut fours = [([0; 35], 0); 4];
+    let mut len = QUAD + 1;
+    while len <= BLOCK {
+        let (mut four, mut count) = (0u32, 0);
+        while four < 1 << len {
+            if four.count_ones() == QUAD as u32 && (len < BLOCK || four & 1 != 0) {
+                fours[len - QUAD - 1].0[count] = four as u8;
+                count += 1;
+            }
+            four += 1;
+        }
+        fours[len - QUAD - 1].1 = count;
+        len += 1;
     }
+    fours
+};
 
-    /// With room for no more than they have. Without branches that could not be foreseen: every corner is compared with all before
-    /// it; and where that is not enough and `BY_PLACE`, so is where they stand.
+impl Halves {
+    /// Of the triangles with these names, so that they do with the usual room if they can. Almost without branches that could not be
+    /// foreseen: every corner is compared with all before it; and where that is not enough and `BY_PLACE`, so is where they stand.
     #[inline(always)]
-    fn of<L: Lanes, const BY_PLACE: bool>(mesh: &TriangleMesh, names: &BlockNames) -> Self {
+    fn of<L: Lanes, const BY_PLACE: bool>(mesh: &TriangleMesh, names: &BlockNames, usual: usize) -> Self {
         let mut all = [0; UNSHARED];
         let (triangles, _) = all.as_chunks_mut::<3>();
         let mut len = 0;
@@ -670,43 +764,170 @@ impl Shared {
         }
         let first = triangles[0];
         triangles[len..].fill(first);
-        let mut equals = L::equals_before(&all);
-        let mut are_first = firsts_of(&equals);
-        if BY_PLACE && are_first.count_ones() as usize > MOST_SHARED {
-            // Vertices of different names may stand in one place.
-            equals = [u32::MAX; UNSHARED];
-            for axis in 0..3 {
-                let mut coordinates = all;
-                for vertex in &mut coordinates {
-                    *vertex = mesh.positions[*vertex as usize][axis].to_bits();
-                }
-                for (equals, own) in equals.iter_mut().zip(L::equals_before(&coordinates)) {
-                    *equals &= own;
+        let halves = Self::by_equals(&L::equals_before(&all), len, usual);
+        if !BY_PLACE || halves.do_share() {
+            return halves;
+        }
+        // Vertices of different names may stand in one place.
+        let mut equals = [u32::MAX; UNSHARED];
+        for axis in 0..3 {
+            let mut coordinates = all;
+            for vertex in &mut coordinates {
+                *vertex = mesh.positions[*vertex as usize][axis].to_bits();
+            }
+            for (equals, own) in equals.iter_mut().zip(L::equals_before(&coordinates)) {
+                *equals &= own;
+            }
+        }
+        Self::by_equals(&equals, len, usual)
+    }
+
+    /// Where for each corner there is a bit for each equal one before it.
+    #[inline(always)]
+    fn by_equals(equals: &[u32; UNSHARED], len: usize, usual: usize) -> Self {
+        let mut corners = [[0u32; 3]; BLOCK];
+        for (at, (corner, before)) in corners[..len].as_flattened_mut().iter_mut().zip(equals).enumerate() {
+            let same = before | 1 << at;
+            *corner = same & same.wrapping_neg();
+        }
+        let as_they_are = Self::of_corners(corners, len, LaneOrder::SAME);
+        // For the usual room, or any that is shared.
+        let count = as_they_are.vertex_count() as usize;
+        let enough = if count <= usual { usual - QUAD } else { 2 * QUAD };
+        if as_they_are.most_in_half() as usize <= enough || count > MOST_SHARED || len <= QUAD {
+            return as_they_are;
+        }
+        as_they_are.divided_better(enough as u32)
+    }
+
+    #[inline(always)]
+    fn of_corners(corners: [[u32; 3]; BLOCK], len: usize, order: LaneOrder) -> Self {
+        let mut vertices = [0; 2];
+        for (lane, [a, b, c]) in corners.iter().enumerate() {
+            vertices[lane / QUAD] |= a | b | c;
+        }
+        Self { corners, vertices, order, len }
+    }
+
+    /// With other triangles in the halves, so that neither has more vertices than are enough, or as few as can be.
+    #[inline(always)]
+    fn divided_better(self, enough: u32) -> Self {
+        // The vertices of some of the first four triangles, and of some of the last four.
+        let mut some = [[0u32; 1 << QUAD]; 2];
+        for (half, some) in some.iter_mut().enumerate() {
+            for lane in 0..QUAD {
+                let [a, b, c] = self.corners[half * QUAD + lane];
+                for others in 0..1 << lane {
+                    some[others | 1 << lane] = some[others] | a | b | c;
                 }
             }
-            are_first = firsts_of(&equals);
         }
-        let count = are_first.count_ones() as usize;
-        if count > MOST_SHARED {
-            return Self { corners: [0; 3], room: UNSHARED as u8 };
+        let vertices = |of: usize| (some[0][of % (1 << QUAD)] | some[1][of >> QUAD]).count_ones();
+        let all = (1 << self.len) - 1;
+        let (mut best, mut most) = (0b1111, self.most_in_half());
+        let (fours, count) = &FOURS[(self.len - QUAD - 1) % FOURS.len()];
+        for &first in &fours[..*count] {
+            let first = usize::from(first);
+            let own = vertices(first).max(vertices(all ^ first));
+            if own < most {
+                (best, most) = (first, own);
+                if most <= enough {
+                    break;
+                }
+            }
         }
-        let mut corners = [0u32; 3];
-        for (at, before) in equals.into_iter().enumerate() {
-            let first = (before | 1 << at).trailing_zeros();
-            corners[at % 3] |= (are_first & ((1 << first) - 1)).count_ones() << (4 * (at / 3));
-        }
-        Self { corners, room: count as u8 }
+        if best == 0b1111 { self } else { self.in_order(LaneOrder::of_first(best)) }
     }
-}
 
-/// A bit for each corner that is equal to none before it.
-#[inline(always)]
-fn firsts_of(equals: &[u32; UNSHARED]) -> u32 {
-    let mut are_first = 0;
-    for (at, &before) in equals.iter().enumerate() {
-        are_first |= u32::from(before == 0) << at;
+    /// The same in another order, in which other corners are the first of their vertices.
+    #[inline(always)]
+    fn in_order(self, order: LaneOrder) -> Self {
+        let mut first_of = [0u32; UNSHARED];
+        let mut corners = [[0u32; 3]; BLOCK];
+        for lane in 0..self.len {
+            for (i, corner) in self.corners[order.lane_before(lane)].into_iter().enumerate() {
+                let first = &mut first_of[corner.trailing_zeros() as usize % UNSHARED];
+                *first = if *first == 0 { 1 << (3 * lane + i) } else { *first };
+                corners[lane][i] = *first;
+            }
+        }
+        Self::of_corners(corners, self.len, order)
     }
-    are_first
+
+    /// How many vertices there are.
+    #[inline(always)]
+    fn vertex_count(&self) -> u32 {
+        (self.vertices[0] | self.vertices[1]).count_ones()
+    }
+
+    /// How many the half has that has more.
+    #[inline(always)]
+    fn most_in_half(&self) -> u32 {
+        self.vertices[0].count_ones().max(self.vertices[1].count_ones())
+    }
+
+    /// Whether there is a room where they share vertices.
+    #[inline(always)]
+    fn do_share(&self) -> bool {
+        self.most_in_half() as usize <= 2 * QUAD
+    }
+
+    /// The room that they take, of those that there are. Where both halves find vertices, there is room for all that are more than
+    /// eight, and for all but four of either half: those that both have may stand with each.
+    #[inline(always)]
+    fn room(&self, usual: usize) -> usize {
+        let (all, most) = (self.vertex_count() as usize, self.most_in_half() as usize);
+        if all.max(most + QUAD) <= usual {
+            usual
+        } else if self.do_share() {
+            MOST_SHARED
+        } else {
+            UNSHARED
+        }
+    }
+
+    /// As they stand in that room.
+    #[inline(always)]
+    fn in_room(&self, usual: usize) -> Shared {
+        let room = self.room(usual);
+        if room == UNSHARED {
+            return Shared::NOTHING;
+        }
+        let [a, b] = self.vertices;
+        let far_of_last = far_of_last(room) as u32;
+        let is_apart = far_of_last != 2 * QUAD as u32;
+        // Those that stand with either half, and those that stand far off: of both, but in a room where each has its own.
+        let (mut near, mut far) = if is_apart { ([a, b], [0; 2]) } else { ([a & !b, b & !a], [a & b; 2]) };
+        for half in 0..2 {
+            while near[half].count_ones() as usize > QUAD {
+                let last = 1 << (31 - near[half].leading_zeros());
+                near[half] ^= last;
+                far[half] |= last;
+                far[1 - half] |= if is_apart { 0 } else { last };
+            }
+        }
+        // Those of both with each, where there is room for that.
+        while !is_apart && far[0] != 0 && near[0].count_ones().max(near[1].count_ones()) < QUAD as u32 {
+            let first = far[0] & far[0].wrapping_neg();
+            far = [far[0] ^ first; 2];
+            near = [near[0] | first, near[1] | first];
+        }
+        let mut words = [0u32; 3];
+        for half in 0..2 {
+            let (near, far) = (near[half], far[half]);
+            let (near_from, far_from) = (QUAD * half, if half == 0 { 2 * QUAD as u32 } else { far_of_last });
+            for lane in near_from..near_from + QUAD {
+                for (word, corner) in words.iter_mut().zip(self.corners[lane]) {
+                    let is_far = far & corner != 0;
+                    let (from, all) = if is_far { (far_from, far) } else { (near_from as u32, near) };
+                    // Where there is no triangle, none comes before it.
+                    let before = all & corner.saturating_sub(1);
+                    *word |= (from + before.count_ones()) << (4 * lane);
+                }
+            }
+        }
+        Shared { corners: words, order: self.order, room: room as u8 }
+    }
 }
 
 /// Turns references to leaves of triangles, of which `number_of` tells the number of the first block, into ones to where this

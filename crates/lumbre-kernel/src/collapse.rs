@@ -9,7 +9,7 @@ use std::cmp::Reverse;
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
-use crate::blocks::{self, BlockNames, Blocks, Filled, TriangleBlock, Unit};
+use crate::blocks::{self, BlockNames, Blocks, Filled, LaneOrder, TriangleBlock, Unit};
 use crate::build::{Binary, BinaryNode, Fork, Name};
 use crate::carve::{self, Cell, LaneCell};
 use crate::lanes::Level;
@@ -154,11 +154,30 @@ impl Packed {
         may_lack_area: bool,
         number_of: impl Fn(u32) -> usize + Sync,
     ) -> Result<(), BuildError> {
-        let Filled { units, places } =
+        let Filled { units, places, orders } =
             blocks::pack(level, geometries, &self.names, followers, may_lack_area)?;
         blocks::refer(self.nodes.to_mut(), &mut self.root, &places, number_of);
         self.blocks = units.into();
+        self.put_in_order(&orders);
         Ok(())
+    }
+
+    /// Moves names, and cells with them, to where triangles were packed.
+    fn put_in_order(&mut self, orders: &[LaneOrder]) {
+        if orders.iter().all(|order| order.is_same()) {
+            return;
+        }
+        let names = self.names.to_mut();
+        names.par_iter_mut().zip(orders).with_min_len(1 << 10).for_each(|(names, order)| order.put(names));
+        if self.has_parts() {
+            let cells = self.cells.to_mut();
+            for cell in cells.iter_mut() {
+                let (block, before) = (cell.lane as usize / BLOCK, cell.lane as usize % BLOCK);
+                let lane = (0..BLOCK).find(|&lane| orders[block].lane_before(lane) == before);
+                cell.lane = (block * BLOCK + lane.expect("every lane stands somewhere")) as u32;
+            }
+            cells.sort_unstable_by_key(|cell| cell.lane);
+        }
     }
 
     /// Whether a triangle may stand in more than one lane.

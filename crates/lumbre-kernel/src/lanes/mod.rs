@@ -23,7 +23,7 @@ use lumbre_geometry::Ray;
 use lumbre_math::{DVec3, Transform};
 
 use crate::Ray32;
-use crate::blocks::{ROOMS, TriangleBlock};
+use crate::blocks::{ROOMS, TriangleBlock, far_of_last};
 use crate::holds::SingleStart;
 use crate::narrow::NarrowRay;
 #[cfg(test)]
@@ -188,8 +188,8 @@ impl Sides {
 pub(crate) struct Axes {
     // Each below three; the fourth only fills up.
     order: [u32; 4],
-    // Where the coordinates along each begin in blocks of each room.
-    rows_by_room: [[u32; 3]; ROOMS.len()],
+    // Where the coordinates along each begin in blocks of each room; and, in each of them, `far_of_last`.
+    rows_by_room: [[u32; 4]; ROOMS.len()],
     // The halves of each.
     halves: [u32; 8],
 }
@@ -203,11 +203,12 @@ impl Axes {
             halves[half] = 2 * order[half / 2] + half as u32 % 2;
             half += 1;
         }
-        let mut rows_by_room = [[0; 3]; ROOMS.len()];
+        let mut rows_by_room = [[0; 4]; ROOMS.len()];
         let mut i = 0;
         while i < ROOMS.len() {
             let room = ROOMS[i] as u32;
-            rows_by_room[i] = [order[0] * room, order[1] * room, order[2] * room];
+            let far = far_of_last(ROOMS[i]) as u32;
+            rows_by_room[i] = [order[0] * room, order[1] * room, order[2] * room, far];
             i += 1;
         }
         Self { order, halves, rows_by_room }

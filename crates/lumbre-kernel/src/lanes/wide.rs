@@ -474,6 +474,7 @@ mod x86 {
     use bytemuck::Zeroable;
 
     use super::{AFTER_MIDDLE, BEFORE_MIDDLE, Eight, LANE_BITS, Row, Vector, WIDE, Wide};
+    use crate::lanes::foreseen;
 
     /// Only where `lanes::x86::X86<true>` is: the instructions are there.
     #[derive(Clone, Copy)]
@@ -970,7 +971,9 @@ mod x86 {
         #[inline(always)]
         fn masks([low, high]: [__m256; 2]) -> u32 {
             // SAFETY: see the type.
-            unsafe { _mm256_movemask_ps(low) as u32 | (_mm256_movemask_ps(high) as u32) << 8 }
+            let (low, high) = unsafe { (_mm256_movemask_ps(low) as u32, _mm256_movemask_ps(high) as u32) };
+            // Else the compiler puts the halves together first, which takes twice as long.
+            low | foreseen(high) << 8
         }
     }
 

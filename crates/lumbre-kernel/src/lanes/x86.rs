@@ -8,7 +8,7 @@ use lumbre_geometry::Ray;
 use lumbre_math::{DAffine3, DVec3, Transform};
 
 use super::{Axes, Corners, Crossings, Lanes, Level, Question, Row, Set, Sides, Task, WIDE, Wide, wide};
-use crate::blocks::{MOST_SHARED, TriangleBlock, USUAL};
+use crate::blocks::{MOST_SHARED, QUAD, TriangleBlock, USUAL, far_of_last};
 use crate::holds::SingleStart;
 use crate::narrow::{NarrowRay, Precise};
 use crate::node::{
@@ -66,6 +66,15 @@ const _: () =
     assert!(offset_of!(Ray, direction) == 24 && offset_of!(Ray, t_min) == 48 && offset_of!(Ray, t_max) == 56);
 
 impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
+    /// The largest of the absolute values of six numbers, and of three others.
+    #[inline(always)]
+    fn sizes(x: &[__m256; 3], y: &[__m256; 3], z: &[__m256; 3]) -> (__m256, __m256) {
+        let (a, b, c) = (Self::larger(x[0], y[0]), Self::larger(x[1], y[1]), Self::larger(x[2], y[2]));
+        let (d, e) = (Self::larger(z[0], z[1]), Self::larger(z[2], z[2]));
+        // SAFETY: see `X86`.
+        unsafe { (_mm256_max_ps(_mm256_max_ps(a, b), c), _mm256_max_ps(d, e)) }
+    }
+
     /// The larger of the absolute values.
     #[inline(always)]
     fn larger(a: __m256, b: __m256) -> __m256 {
@@ -158,15 +167,25 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
         }
     }
 
-    /// Eight numbers of sixteen, `low` and `high`, each by its place.
+    /// Eight numbers of sixteen, each by its place in the same half of `near`, or of `far` from eight on: see [`far_of_last`].
     #[inline(always)]
-    fn of_two(low: __m256, high: __m256, places: __m256i) -> __m256 {
+    fn of_two(near: __m256, far: __m256, places: __m256i) -> __m256 {
         // SAFETY: see `X86`.
         unsafe {
-            let is_high = _mm256_castsi256_ps(_mm256_slli_epi32::<28>(places));
-            let (low, high) = (_mm256_permutevar8x32_ps(low, places), _mm256_permutevar8x32_ps(high, places));
-            _mm256_blendv_ps(low, high, is_high)
+            let is_far = _mm256_castsi256_ps(_mm256_slli_epi32::<28>(places));
+            let (near, far) = (_mm256_permutevar_ps(near, places), _mm256_permutevar_ps(far, places));
+            _mm256_blendv_ps(near, far, is_far)
         }
+    }
+
+    /// The numbers of a row that are far off: four for the first half, and four for the other, which begin at `far_of_last`.
+    ///
+    /// # Safety
+    /// There are as many.
+    #[inline(always)]
+    unsafe fn far(row: *const f32, far_of_last: usize) -> __m256 {
+        // SAFETY: see `X86`, and above.
+        unsafe { _mm256_loadu2_m128(row.add(far_of_last), row.add(2 * QUAD)) }
     }
 
     /// The places of eight vertices, of four bits each: of more bits, what is above means nothing.
@@ -188,7 +207,8 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
         let room = block.room();
         let rows_by_room = &ray.axes().rows_by_room;
         let order = &ray.axes().order;
-        let by_room = [order[0] * room as u32, order[1] * room as u32, order[2] * room as u32];
+        let far = far_of_last(room) as u32;
+        let by_room = [order[0] * room as u32, order[1] * room as u32, order[2] * room as u32, far];
         let rows = if !IS_ALONE {
             &by_room
         } else if room == USUAL[0] {
@@ -201,9 +221,9 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
             super::opaque(&rows_by_room[3])
         };
         if room > MOST_SHARED {
-            let a = Self::sheared_eight(block, ray, rows, 0);
-            let b = Self::sheared_eight(block, ray, rows, BLOCK);
-            let c = Self::sheared_eight(block, ray, rows, 2 * BLOCK);
+            let a = Self::sheared_eight::<_, false>(block, ray, rows, 0);
+            let b = Self::sheared_eight::<_, false>(block, ray, rows, BLOCK);
+            let c = Self::sheared_eight::<_, false>(block, ray, rows, 2 * BLOCK);
             return [[a[0], b[0], c[0]], [a[1], b[1], c[1]], [a[2], b[2], c[2]]];
         }
         // SAFETY: see `X86`.
@@ -217,30 +237,33 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
                 }
             }
         } else {
-            let low = Self::sheared_eight(block, ray, rows, 0);
-            let high = Self::sheared_eight(block, ray, rows, BLOCK);
+            let near = Self::sheared_eight::<_, false>(block, ray, rows, 0);
+            let far = Self::sheared_eight::<_, true>(block, ray, rows, 0);
             for (corner, &places) in block.corners().iter().enumerate() {
                 let places = Self::places(places);
                 for axis in 0..3 {
-                    corners[axis][corner] = Self::of_two(low[axis], high[axis], places);
+                    corners[axis][corner] = Self::of_two(near[axis], far[axis], places);
                 }
             }
         }
         corners
     }
 
-    /// Eight vertices from the `first` of these rows on.
+    /// Eight vertices from the `first` of these rows on, or those that `IS_FAR`: see [`X86::far`].
     #[inline(always)]
-    fn sheared_eight<S: Shears>(
+    fn sheared_eight<S: Shears, const IS_FAR: bool>(
         block: &TriangleBlock,
         ray: &S,
-        &[kx, ky, kz]: &[u32; 3],
+        &[kx, ky, kz, far]: &[u32; 4],
         first: usize,
     ) -> [__m256; 3] {
         let rows = block.coordinates();
-        // SAFETY: see `X86`. Rows begin at 48 at most, and no more of them than 24 are looked at, in an array of 96.
+        // SAFETY: see `X86`. Rows begin at 62 at most, and no more of them than 24 are looked at, in an array of 96.
         unsafe {
-            let load = |row: u32| _mm256_loadu_ps(rows.as_ptr().add(row as usize + first));
+            let load = |row: u32| {
+                let row = rows.as_ptr().add(row as usize);
+                if IS_FAR { Self::far(row, far as usize) } else { _mm256_loadu_ps(row.add(first)) }
+            };
             let (origin, shear) = (ray.origin(), ray.shear());
             let (shear_x, shear_y) = (_mm256_set1_ps(shear[0]), _mm256_set1_ps(shear[1]));
             let z = _mm256_sub_ps(_mm256_set1_ps(origin[2]), load(kz));
@@ -262,7 +285,7 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
 
     /// Sixteen vertices. For AVX-512 alone.
     #[inline(always)]
-    fn sheared_sixteen<S: Shears>(block: &TriangleBlock, ray: &S, [kx, ky, kz]: [u32; 3]) -> [__m512; 3] {
+    fn sheared_sixteen<S: Shears>(block: &TriangleBlock, ray: &S, [kx, ky, kz, _]: [u32; 4]) -> [__m512; 3] {
         let rows = block.coordinates();
         // SAFETY: as there.
         unsafe {
@@ -905,11 +928,7 @@ where
                 let (minus_error, height_error) = (zero, zero);
                 return (mask, Edges { values: [u, v, w], heights: z, within, minus_error, height_error });
             }
-            let across = Self::larger(
-                Self::larger(Self::larger(x[0], y[0]), Self::larger(x[1], y[1])),
-                Self::larger(x[2], y[2]),
-            );
-            let along = Self::larger(Self::larger(z[0], z[1]), z[2]);
+            let (across, along) = Self::sizes(&x, &y, &z);
             let size = _mm256_add_ps(_mm256_add_ps(across, along), _mm256_set1_ps(ray.least_size));
             let minus_error = _mm256_fnmsub_ps(
                 _mm256_mul_ps(size, _mm256_set1_ps(EDGE_ERROR)),
@@ -952,13 +971,17 @@ where
                 return equals;
             }
             let (eights, _) = list.as_chunks::<BLOCK>();
-            for (at, (equals, &number)) in equals.iter_mut().zip(list).enumerate() {
-                let number = _mm256_set1_epi32(number as i32);
-                for (i, eight) in eights.iter().enumerate() {
-                    let is_equal = _mm256_cmpeq_epi32(_mm256_loadu_si256(eight.as_ptr().cast()), number);
-                    *equals |= (_mm256_movemask_ps(_mm256_castsi256_ps(is_equal)) as u32) << (BLOCK * i);
+            for last in 0..3 {
+                for at in BLOCK * last..BLOCK * (last + 1) {
+                    let number = _mm256_set1_epi32(list[at] as i32);
+                    // None of the eights behind its own comes before it.
+                    for (i, eight) in eights[..=last].iter().enumerate() {
+                        let is_equal = _mm256_cmpeq_epi32(_mm256_loadu_si256(eight.as_ptr().cast()), number);
+                        let mask = _mm256_movemask_ps(_mm256_castsi256_ps(is_equal)) as u32;
+                        equals[at] |= mask << (BLOCK * i);
+                    }
+                    equals[at] &= (1 << at) - 1;
                 }
-                *equals &= (1 << at) - 1;
             }
         }
         equals
@@ -968,6 +991,7 @@ where
     fn corners(block: &TriangleBlock) -> Corners {
         let coordinates = block.coordinates().as_ptr();
         let room = block.room();
+        let far = far_of_last(room);
         // No `map`: it does not take on the instruction set of who calls it.
         let [a, b, c] = *block.corners();
         let places = [Self::places(a), Self::places(b), Self::places(c)];
@@ -982,7 +1006,7 @@ where
                     } else if AVX512 {
                         Self::of_sixteen(_mm512_loadu_ps(row), places)
                     } else {
-                        Self::of_two(_mm256_loadu_ps(row), _mm256_loadu_ps(row.add(8)), places)
+                        Self::of_two(_mm256_loadu_ps(row), Self::far(row, far), places)
                     };
                     _mm256_store_ps(corners.0[corner][axis].as_mut_ptr(), found);
                 }

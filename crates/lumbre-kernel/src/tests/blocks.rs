@@ -290,6 +290,42 @@ fn a_block_has_the_corners_of_its_triangles_however_many_they_share() {
     assert_eq!(rooms.into_iter().collect::<Vec<_>>(), [10, 12, 16, 24]);
 }
 
+#[test]
+fn triangles_stand_so_that_either_half_finds_its_vertices_in_little_room() {
+    // A strip of eight, in any order, has ten vertices: six of either half, two of which are those of both.
+    let mut random = Random(87);
+    let positions = (0..10).map(|i| Vec3::new(i as f32, (i % 2) as f32, 0.0)).collect();
+    let indices = (0..8).map(|i| [i, i + 1, i + 2]).collect();
+    let mesh = Arc::new(TriangleMesh { origin: DVec3::ZERO, positions, indices });
+    for len in 1..=8 {
+        for _ in 0..50 {
+            let mut triangles: Vec<u32> = (0..len).collect();
+            for last in (1..triangles.len()).rev() {
+                triangles.swap(last, random.below(last + 1));
+            }
+            let names: Vec<_> = triangles.iter().map(|&triangle| [0, triangle]).collect();
+            let names = [BlockNames::of(&names)];
+            let geometries = [Geometry { id: 0, kind: GeometryKind::Mesh(Arc::clone(&mesh)) }];
+            let filled = blocks::pack(Level::best(), &geometries, &names, &[0], true).unwrap();
+            let block = Blocks::new(&filled.units).at(0).unwrap();
+            assert_eq!(block.room(), 10, "{triangles:?}");
+            let mut names = names;
+            filled.orders[0].put(&mut names[0]);
+            assert!(Blocks::new(&filled.units).places(&names).is_some());
+            let mut stand: Vec<_> = names[0].primitives().collect();
+            stand.sort_unstable();
+            assert_eq!(stand, (0..len).collect::<Vec<_>>(), "{triangles:?}");
+            for (lane, triangle) in names[0].primitives().enumerate() {
+                let corners = mesh.indices[triangle as usize].map(|v| mesh.positions[v as usize].to_array());
+                assert_eq!(block.triangle(lane), corners);
+            }
+            // What stands in that order stays in it.
+            let again = blocks::pack(Level::best(), &geometries, &names, &[0], true).unwrap();
+            assert_eq!(again.units, filled.units);
+        }
+    }
+}
+
 /// The same mesh where every triangle has vertices of its own: no two share one by name.
 fn with_own_vertices(geometry: &Geometry) -> Geometry {
     let GeometryKind::Mesh(mesh) = &geometry.kind else { unreachable!() };
@@ -387,15 +423,20 @@ fn blocks_that_are_not_such_as_are_packed_are_told() {
     assert!(is_sound(&bytes));
     assert!(!is_sound(&bytes[..bytes.len() - 16]));
     assert!(!is_sound(&[&bytes[..], &[0; 16]].concat()));
-    // Of heads: the number, the room, how many follow, and corners beyond the room.
+    // Of heads: the number, the room, how many follow, a vertex of the other half of lanes, and corners beyond the room.
     for place in places {
         let at = 16 * place as usize;
         if bytes[at + 5] > 12 {
             continue;
         }
-        for (byte, value) in
-            [(0, bytes[at] ^ 1), (5, bytes[at + 5] + 1), (5, 31), (6, 255), (9, bytes[at + 9] | 15)]
-        {
+        for (byte, value) in [
+            (0, bytes[at] ^ 1),
+            (5, bytes[at + 5] + 1),
+            (5, 31),
+            (6, 255),
+            (8, bytes[at + 8] & 0xf0 | 4),
+            (9, bytes[at + 9] | 15),
+        ] {
             let mut other = bytes.clone();
             other[at + byte] = value;
             assert!(!is_sound(&other), "{place}: {byte}");

@@ -110,7 +110,7 @@ fn what_is_wrong_with_a_file_is_said() {
     assert!(matches!(with(&longer), LoadError::WrongLength { .. }));
     let mut later = bytes.clone();
     later[8] = 7;
-    assert_eq!(with(&later), LoadError::OtherVersion { found: 7, expected: 5 });
+    assert_eq!(with(&later), LoadError::OtherVersion { found: 7, expected: 6 });
     for place in (12..bytes.len()).step_by(61) {
         let mut damaged = bytes.clone();
         damaged[place] ^= 0x10;
