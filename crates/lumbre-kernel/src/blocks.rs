@@ -797,7 +797,7 @@ impl Halves {
         if as_they_are.most_in_half() as usize <= enough || count > MOST_SHARED || len <= QUAD {
             return as_they_are;
         }
-        as_they_are.divided_better(enough as u32)
+        as_they_are.divided_better()
     }
 
     #[inline(always)]
@@ -809,9 +809,9 @@ impl Halves {
         Self { corners, vertices, order, len }
     }
 
-    /// With other triangles in the halves, so that neither has more vertices than are enough, or as few as can be.
+    /// With other triangles in the halves, so that neither has more vertices than it must.
     #[inline(always)]
-    fn divided_better(self, enough: u32) -> Self {
+    fn divided_better(self) -> Self {
         // The vertices of some of the first four triangles, and of some of the last four.
         let mut some = [[0u32; 1 << QUAD]; 2];
         for (half, some) in some.iter_mut().enumerate() {
@@ -824,19 +824,16 @@ impl Halves {
         }
         let vertices = |of: usize| (some[0][of % (1 << QUAD)] | some[1][of >> QUAD]).count_ones();
         let all = (1 << self.len) - 1;
-        let (mut best, mut most) = (0b1111, self.most_in_half());
+        // How many there are above, and which they are below: of as few, the first.
+        let mut best = self.most_in_half() << BLOCK | 0b1111;
         let (fours, count) = &FOURS[(self.len - QUAD - 1) % FOURS.len()];
         for &first in &fours[..*count] {
-            let first = usize::from(first);
-            let own = vertices(first).max(vertices(all ^ first));
-            if own < most {
-                (best, most) = (first, own);
-                if most <= enough {
-                    break;
-                }
-            }
+            let own = usize::from(first);
+            let most = vertices(own).max(vertices(all ^ own));
+            best = best.min(most << BLOCK | u32::from(first));
         }
-        if best == 0b1111 { self } else { self.in_order(LaneOrder::of_first(best)) }
+        let first = best as usize % (1 << BLOCK);
+        if first == 0b1111 { self } else { self.in_order(LaneOrder::of_first(first)) }
     }
 
     /// The same in another order, in which other corners are the first of their vertices.
@@ -897,21 +894,16 @@ impl Halves {
         let far_of_last = far_of_last(room) as u32;
         let is_apart = far_of_last != 2 * QUAD as u32;
         // Those that stand with either half, and those that stand far off: of both, but in a room where each has its own.
-        let (mut near, mut far) = if is_apart { ([a, b], [0; 2]) } else { ([a & !b, b & !a], [a & b; 2]) };
-        for half in 0..2 {
-            while near[half].count_ones() as usize > QUAD {
-                let last = 1 << (31 - near[half].leading_zeros());
-                near[half] ^= last;
-                far[half] |= last;
-                far[1 - half] |= if is_apart { 0 } else { last };
-            }
-        }
-        // Those of both with each, where there is room for that.
-        while !is_apart && far[0] != 0 && near[0].count_ones().max(near[1].count_ones()) < QUAD as u32 {
-            let first = far[0] & far[0].wrapping_neg();
-            far = [far[0] ^ first; 2];
-            near = [near[0] | first, near[1] | first];
-        }
+        let both = if is_apart { 0 } else { a & b };
+        let mut near = [a & !both, b & !both];
+        let far_of_either = near.map(|near| without_first(near)[QUAD]);
+        near = [near[0] ^ far_of_either[0], near[1] ^ far_of_either[1]];
+        // Those of both stand with each as far as there is room for that.
+        let room_for_both = QUAD as u32 - near[0].count_ones().max(near[1].count_ones());
+        let far_of_both = without_first(both)[room_for_both as usize];
+        near = near.map(|near| near | both ^ far_of_both);
+        let far_of_all = far_of_either[0] | far_of_either[1] | far_of_both;
+        let far = if is_apart { far_of_either } else { [far_of_all; 2] };
         let mut words = [0u32; 3];
         for half in 0..2 {
             let (near, far) = (near[half], far[half]);
@@ -928,6 +920,16 @@ impl Halves {
         }
         Shared { corners: words, order: self.order, room: room as u8 }
     }
+}
+
+/// The bits of a word but for the first of them: none, one, and so on.
+#[inline(always)]
+fn without_first(word: u32) -> [u32; QUAD + 1] {
+    let mut rest = [word; QUAD + 1];
+    for count in 0..QUAD {
+        rest[count + 1] = rest[count] & rest[count].wrapping_sub(1);
+    }
+    rest
 }
 
 /// Turns references to leaves of triangles, of which `number_of` tells the number of the first block, into ones to where this
