@@ -171,7 +171,7 @@ pub(crate) trait Manner {
 }
 
 /// In double precision.
-pub(crate) struct InDouble<G>(PhantomData<G>);
+struct InDouble<G>(PhantomData<G>);
 
 impl<G: Goal> Manner for InDouble<G> {
     type Ray = Ray;

@@ -33,8 +33,8 @@ pub(crate) trait Flyer<L: Lanes>: Sized {
     const IS_ANY: bool;
     /// How its line passes the triangles of a block.
     type Pass: Copy + Zeroable;
-    /// Where it meets them.
-    type Crossed: Crossed;
+    /// Where it meets each.
+    type At: Copy + Zeroable;
 
     /// The ray for boxes; `None` where it does not come from nearby, or is not sound.
     fn start(start: &SingleStart, ray: &Self::Ray) -> Option<Slabs>;
@@ -45,7 +45,7 @@ pub(crate) trait Flyer<L: Lanes>: Sized {
     /// How its line passes the triangles of a block, and a bit for each that it may meet.
     fn pass(&self, block: &TriangleBlock) -> (u32, Self::Pass);
     /// Where it meets those of the mask.
-    fn cross(&self, mask: u32, pass: &Self::Pass) -> Self::Crossed;
+    fn cross(&self, mask: u32, pass: &Self::Pass) -> Crossing<Self::At>;
     /// Whether it meets any of these, which are not clear.
     fn meets_closely(&self, exact: &Exact, ray: &Self::Ray, block: u32, unclear: u32) -> Outcome<bool>;
     /// Takes the nearest of those that it meets in a block, if that is nearer than what it met before; false where that is not to be
@@ -55,7 +55,7 @@ pub(crate) trait Flyer<L: Lanes>: Sized {
         exact: &Exact,
         ray: &Self::Ray,
         block: u32,
-        crossed: &Self::Crossed,
+        crossing: &Crossing<Self::At>,
         way: &mut Way<L>,
     ) -> bool;
     /// What came of it: whether any hit `is_met`, or what it has taken.
@@ -63,11 +63,14 @@ pub(crate) trait Flyer<L: Lanes>: Sized {
 }
 
 /// The triangles of a block that a ray may meet.
-pub(crate) trait Crossed: Copy + Zeroable {
+#[derive(Clone, Copy, Zeroable)]
+pub(crate) struct Crossing<T> {
     /// A bit for each that it certainly does.
-    fn met(&self) -> u32;
+    pub(crate) met: u32,
     /// A bit for each that has to be looked at closer.
-    fn unclear(&self) -> u32;
+    pub(crate) unclear: u32,
+    /// Where, of the others nothing that means anything.
+    pub(crate) at: T,
 }
 
 /// Rays in flight: a bit for each in a word.
@@ -200,7 +203,7 @@ struct Fleet<'a, 'r, F: Flyer<L>, L: Lanes> {
     /// Where each enters the boxes of children.
     enters: [L::Wide; FLIGHTS],
     passes: [F::Pass; FLIGHTS],
-    crossed: [F::Crossed; FLIGHTS],
+    crossings: [Crossing<F::At>; FLIGHTS],
     /// Which triangles have to be looked at closer.
     unclear: [u32; FLIGHTS],
     /// Where the next block of its leaf is.
@@ -217,7 +220,7 @@ impl<'a, 'r, F: Flyer<L>, L: Lanes> Fleet<'a, 'r, F, L> {
             masks: [0; FLIGHTS],
             enters: [L::Wide::splat(0.0); FLIGHTS],
             passes: [F::Pass::zeroed(); FLIGHTS],
-            crossed: [F::Crossed::zeroed(); FLIGHTS],
+            crossings: [Crossing::zeroed(); FLIGHTS],
             unclear: [0; FLIGHTS],
             following: [END; FLIGHTS],
         }
@@ -274,13 +277,13 @@ impl<'a, 'r, F: Flyer<L>, L: Lanes> Fleet<'a, 'r, F, L> {
         }
         let (mut meeting, mut unclear) = (0, 0);
         for place in Bits(passing) {
-            let crossed = self.flights[place].flyer.cross(self.masks[place], &self.passes[place]);
-            meeting |= bit(crossed.met() != 0, place);
-            unclear |= bit(crossed.unclear() != 0, place);
+            let crossing = self.flights[place].flyer.cross(self.masks[place], &self.passes[place]);
+            meeting |= bit(crossing.met != 0, place);
+            unclear |= bit(crossing.unclear != 0, place);
             if F::IS_ANY {
-                self.unclear[place] = crossed.unclear();
+                self.unclear[place] = crossing.unclear;
             } else {
-                self.crossed[place] = crossed;
+                self.crossings[place] = crossing;
             }
         }
         let mut unsettled = 0;
@@ -297,7 +300,7 @@ impl<'a, 'r, F: Flyer<L>, L: Lanes> Fleet<'a, 'r, F, L> {
             for place in Bits(meeting | unclear) {
                 let unit = *self.references.of(place) & tag::PLACE;
                 let Flight { flyer, ray, way, .. } = &mut self.flights[place];
-                let is_settled = flyer.take_nearest(&self.exact, ray, unit, &self.crossed[place], way);
+                let is_settled = flyer.take_nearest(&self.exact, ray, unit, &self.crossings[place], way);
                 unsettled |= bit(!is_settled, place);
             }
             meeting = 0;

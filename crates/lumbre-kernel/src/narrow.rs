@@ -47,6 +47,7 @@ use lumbre_geometry::Ray;
 
 use crate::batch::Ends;
 use crate::blocks::TriangleBlock;
+use crate::fleet::Crossing;
 use crate::holds::{Contents, SingleStart};
 use crate::lanes::{self, Asked, Axes, Lanes, Level, Question, Vector};
 use crate::single::{Exact, Outcome};
@@ -114,13 +115,9 @@ pub(crate) struct Pass<E> {
     heights: [E; 3],
 }
 
-/// The triangles of a block that a line may pass through.
+/// Where a ray meets the triangles of a block.
 #[derive(Clone, Copy, Zeroable)]
-pub(crate) struct Passed<E> {
-    /// A bit for each whose crossing is precise, and in range.
-    met: u32,
-    /// A bit for each that has to be looked at closer.
-    unclear: u32,
+pub(crate) struct Places<E> {
     t: E,
     /// The weights of the second and third corner, and the sum of all.
     weights: [E; 3],
@@ -177,9 +174,9 @@ impl NarrowRay {
         (mask, Pass { products, edges, heights })
     }
 
-    /// Which of those in the mask the ray meets.
+    /// Which of those in the mask the ray meets; it certainly does where the crossing is precise, and in range.
     #[inline(always)]
-    fn cross<L: Lanes>(&self, mask: u32, pass: &Pass<L::Eight>) -> Passed<L::Eight> {
+    fn cross<L: Lanes>(&self, mask: u32, pass: &Pass<L::Eight>) -> Crossing<Places<L::Eight>> {
         // Read again: most lines pass through few blocks.
         let ray = lanes::opaque(self);
         let &Pass { products, edges: [u, v, w], heights: z } = pass;
@@ -188,12 +185,13 @@ impl NarrowRay {
         let precise = ray.precise.of(products, [u, v, w], det, z);
         let t = height.over(det) * L::Eight::splat(ray.minus_inverse);
         let in_range = L::Eight::splat(ray.t_min).at_most(t) & t.at_most(L::Eight::splat(ray.t_max));
-        Passed { met: mask & precise & in_range, unclear: mask & !precise, t, weights: [v, w, det] }
+        let at = Places { t, weights: [v, w, det] };
+        Crossing { met: mask & precise & in_range, unclear: mask & !precise, at }
     }
 
     /// Which triangles of a block the ray meets; `None` where its line passes through none.
     #[inline(always)]
-    fn pass<L: Lanes>(&self, block: &TriangleBlock) -> Option<Passed<L::Eight>> {
+    fn pass<L: Lanes>(&self, block: &TriangleBlock) -> Option<Crossing<Places<L::Eight>>> {
         let (mask, pass) = self.pass_edges::<L, true>(block);
         if mask == 0 { None } else { Some(self.cross::<L>(mask, &pass)) }
     }
@@ -224,7 +222,7 @@ impl NarrowRay {
     #[inline(always)]
     fn meets_any<L: Lanes>(&self, block: &TriangleBlock) -> bool {
         match self.pass::<L>(block) {
-            Some(Passed { met, unclear, .. }) => {
+            Some(Crossing { met, unclear, .. }) => {
                 met != 0 || unclear != 0 && self.meets_exactly(block, unclear)
             }
             None => false,
@@ -258,23 +256,28 @@ impl Seeker<'_, '_> {
     /// Tests a block for what is nearer; whether there was anything.
     #[inline(always)]
     fn meet_block<L: Lanes>(&mut self, block: &TriangleBlock, place: u32) -> bool {
-        let Some(passed) = self.ray.pass::<L>(block) else { return false };
-        self.take::<L>(block, place, &passed)
+        let Some(crossing) = self.ray.pass::<L>(block) else { return false };
+        self.take::<L>(block, place, &crossing)
     }
 
     /// Takes what is nearer; whether there was anything.
     #[inline(always)]
-    fn take<L: Lanes>(&mut self, block: &TriangleBlock, place: u32, passed: &Passed<L::Eight>) -> bool {
+    fn take<L: Lanes>(
+        &mut self,
+        block: &TriangleBlock,
+        place: u32,
+        crossing: &Crossing<Places<L::Eight>>,
+    ) -> bool {
         let mut is_nearer = false;
-        if passed.met != 0 {
-            let t = passed.t.to_array();
-            let mut rest = passed.met;
+        if crossing.met != 0 {
+            let t = crossing.at.t.to_array();
+            let mut rest = crossing.met;
             while rest != 0 {
                 let lane = rest.trailing_zeros();
                 rest &= rest - 1;
                 let t = t[lane as usize % BLOCK];
                 if t < self.ray.t_max || t == self.ray.t_max && self.comes_first(place, lane) {
-                    let [v, w, det] = passed.weights;
+                    let [v, w, det] = crossing.at.weights;
                     self.nearest.block = place;
                     self.nearest.lane = lane;
                     self.nearest.weights = [v.to_array(), w.to_array(), det.to_array()];
@@ -283,8 +286,8 @@ impl Seeker<'_, '_> {
                 }
             }
         }
-        if passed.unclear != 0 {
-            is_nearer |= self.meet_exactly(block, place, passed.unclear);
+        if crossing.unclear != 0 {
+            is_nearer |= self.meet_exactly(block, place, crossing.unclear);
         }
         is_nearer
     }

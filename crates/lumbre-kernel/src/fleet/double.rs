@@ -4,10 +4,9 @@
 
 use std::marker::PhantomData;
 
-use bytemuck::Zeroable;
 use lumbre_geometry::Ray;
 
-use super::{Crossed, Flyer};
+use super::{Crossing, Flyer};
 use crate::Faces;
 use crate::blocks::TriangleBlock;
 use crate::holds::SingleStart;
@@ -35,7 +34,7 @@ impl<G> DoubleFlyer<G> {
         way.end_at(triangles::beyond(better.to * self.place_per_height));
     }
 
-    /// Looks for what is nearer among triangles of a block that are met, or may be, between these heights.
+    /// Looks for what is nearer among triangles of a block that are met, or may be: between two heights each.
     #[cold]
     #[inline(never)]
     fn seek_closely(
@@ -43,10 +42,10 @@ impl<G> DoubleFlyer<G> {
         level: Level,
         exact: &Exact,
         ray: &Ray,
-        triangles: (u32, u32, u32),
-        heights: &[[f32; BLOCK]; 2],
+        block: u32,
+        crossing: &Crossing<[[f32; BLOCK]; 2]>,
     ) -> Outcome<Option<Candidate>> {
-        level.run(Seeking { exact, ray, axes: self.blocks.axes, best: self.best, triangles, heights })
+        level.run(Seeking { exact, ray, axes: self.blocks.axes, best: self.best, block, crossing })
     }
 }
 
@@ -56,9 +55,9 @@ struct Seeking<'s, 'a> {
     ray: &'s Ray,
     axes: &'static Axes,
     best: Candidate,
-    /// The place of the block, and masks of those that certainly are met, and that may be.
-    triangles: (u32, u32, u32),
-    heights: &'s [[f32; BLOCK]; 2],
+    /// Its place.
+    block: u32,
+    crossing: &'s Crossing<[[f32; BLOCK]; 2]>,
 }
 
 impl Task for Seeking<'_, '_> {
@@ -66,7 +65,8 @@ impl Task for Seeking<'_, '_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Self::Output {
-        let Self { exact, ray, axes, best, triangles: (block, met, unclear), heights: [froms, tos] } = self;
+        let Self { exact, ray, axes, best, block, crossing } = self;
+        let &Crossing { met, unclear, at: [ref froms, ref tos] } = crossing;
         let mut better = None;
         let mut rest = met | unclear;
         while rest != 0 {
@@ -105,11 +105,11 @@ fn meets_closely(
     axes: &'static Axes,
     triangles: (u32, u32),
 ) -> Outcome<bool> {
-    level.run(Meeting { exact, ray, axes, triangles })
+    level.run(MeetsAny { exact, ray, axes, triangles })
 }
 
 /// See [`meets_closely`].
-struct Meeting<'s, 'a> {
+struct MeetsAny<'s, 'a> {
     exact: &'s Exact<'a>,
     ray: &'s Ray,
     axes: &'static Axes,
@@ -117,7 +117,7 @@ struct Meeting<'s, 'a> {
     triangles: (u32, u32),
 }
 
-impl Task for Meeting<'_, '_> {
+impl Task for MeetsAny<'_, '_> {
     type Output = Outcome<bool>;
 
     #[inline(always)]
@@ -139,35 +139,14 @@ impl Task for Meeting<'_, '_> {
     }
 }
 
-/// Where a ray meets the triangles of a block.
-#[derive(Clone, Copy, Zeroable)]
-pub(crate) struct Heights<E> {
-    met: u32,
-    unclear: u32,
-    /// Heights along the ray between which the crossing lies.
-    from: E,
-    to: E,
-}
-
-impl<E: Eight> Crossed for Heights<E> {
-    #[inline(always)]
-    fn met(&self) -> u32 {
-        self.met
-    }
-
-    #[inline(always)]
-    fn unclear(&self) -> u32 {
-        self.unclear
-    }
-}
-
 impl<G: Goal, L: Lanes> Flyer<L> for DoubleFlyer<G> {
     type Ray = Ray;
     type Answer = G::Answer;
     type Order = G::Order;
     const IS_ANY: bool = G::IS_ANY;
     type Pass = L::Edges;
-    type Crossed = Heights<L::Eight>;
+    /// Heights along the ray between which the crossing lies.
+    type At = [L::Eight; 2];
 
     #[inline(always)]
     fn start(start: &SingleStart, ray: &Ray) -> Option<Slabs> {
@@ -192,9 +171,9 @@ impl<G: Goal, L: Lanes> Flyer<L> for DoubleFlyer<G> {
     }
 
     #[inline(always)]
-    fn cross(&self, mask: u32, edges: &L::Edges) -> Heights<L::Eight> {
+    fn cross(&self, mask: u32, edges: &L::Edges) -> Crossing<[L::Eight; 2]> {
         let Crossings { in_range, sure, from, to } = L::place_crossings(edges, lanes::opaque(&self.blocks));
-        Heights { met: mask & sure, unclear: mask & in_range & !sure, from, to }
+        Crossing { met: mask & sure, unclear: mask & in_range & !sure, at: [from, to] }
     }
 
     fn meets_closely(&self, exact: &Exact, ray: &Ray, block: u32, unclear: u32) -> Outcome<bool> {
@@ -207,19 +186,20 @@ impl<G: Goal, L: Lanes> Flyer<L> for DoubleFlyer<G> {
         exact: &Exact,
         ray: &Ray,
         block: u32,
-        of: &Heights<L::Eight>,
+        crossing: &Crossing<[L::Eight; 2]>,
         way: &mut Way<L>,
     ) -> bool {
-        let to = of.to.least_of(of.met);
-        let which = of.from.at_most(L::Eight::splat(to)) & of.met;
+        let &Crossing { met, unclear, at: [from, to] } = crossing;
+        let nearest = to.least_of(met);
+        let which = from.at_most(L::Eight::splat(nearest)) & met;
         let is_alone = which & which.wrapping_sub(1) == 0;
-        if of.unclear == 0 && is_alone && to < self.best.from {
+        if unclear == 0 && is_alone && nearest < self.best.from {
             let lane = which.trailing_zeros();
-            self.keep(Candidate { block, lane, from: of.from.lane(lane as usize), to }, way);
+            self.keep(Candidate { block, lane, from: from.lane(lane as usize), to: nearest }, way);
             return true;
         }
-        let heights = [of.from.to_array(), of.to.to_array()];
-        match self.seek_closely(L::level(), exact, ray, (block, of.met, of.unclear), &heights) {
+        let crossing = Crossing { met, unclear, at: [from.to_array(), to.to_array()] };
+        match self.seek_closely(L::level(), exact, ray, block, &crossing) {
             Outcome::Settled(Some(better)) => self.keep(better, way),
             Outcome::Settled(None) => {}
             Outcome::Unsettled => return false,

@@ -2,12 +2,10 @@
 
 use std::marker::PhantomData;
 
-use bytemuck::Zeroable;
-
-use super::{Goal, NarrowRay, Nearest, Pass, Passed, Seeker};
+use super::{Goal, NarrowRay, Nearest, Pass, Places, Seeker};
 use crate::Ray32;
 use crate::blocks::TriangleBlock;
-use crate::fleet::{Crossed, Flyer};
+use crate::fleet::{Crossing, Flyer};
 use crate::holds::SingleStart;
 use crate::lanes::{Eight, Lanes, Vector};
 use crate::node::Slabs;
@@ -23,25 +21,13 @@ pub(super) struct NarrowFlyer<G> {
     goal: PhantomData<G>,
 }
 
-impl<E: Copy + Zeroable> Crossed for Passed<E> {
-    #[inline(always)]
-    fn met(&self) -> u32 {
-        self.met
-    }
-
-    #[inline(always)]
-    fn unclear(&self) -> u32 {
-        self.unclear
-    }
-}
-
 impl<G: Goal, L: Lanes> Flyer<L> for NarrowFlyer<G> {
     type Ray = Ray32;
     type Answer = G::Answer;
     type Order = G::Order;
     const IS_ANY: bool = G::IS_ANY;
     type Pass = Pass<L::Eight>;
-    type Crossed = Passed<L::Eight>;
+    type At = Places<L::Eight>;
 
     #[inline(always)]
     fn start(start: &SingleStart, ray: &Ray32) -> Option<Slabs> {
@@ -66,7 +52,7 @@ impl<G: Goal, L: Lanes> Flyer<L> for NarrowFlyer<G> {
     }
 
     #[inline(always)]
-    fn cross(&self, mask: u32, pass: &Pass<L::Eight>) -> Passed<L::Eight> {
+    fn cross(&self, mask: u32, pass: &Pass<L::Eight>) -> Crossing<Places<L::Eight>> {
         self.ray.cross::<L>(mask, pass)
     }
 
@@ -81,16 +67,16 @@ impl<G: Goal, L: Lanes> Flyer<L> for NarrowFlyer<G> {
         exact: &Exact,
         _: &Ray32,
         block: u32,
-        passed: &Passed<L::Eight>,
+        crossing: &Crossing<Places<L::Eight>>,
         way: &mut Way<L>,
     ) -> bool {
-        let t = passed.t.least_of(passed.met);
-        let which = passed.t.at_most(L::Eight::splat(t)) & passed.met;
+        let t = crossing.at.t.least_of(crossing.met);
+        let which = crossing.at.t.at_most(L::Eight::splat(t)) & crossing.met;
         let is_alone = which & which.wrapping_sub(1) == 0;
-        if passed.unclear == 0 && is_alone && t < self.ray.t_max {
+        if crossing.unclear == 0 && is_alone && t < self.ray.t_max {
             let nearest = &mut self.nearest;
             (nearest.block, nearest.lane) = (block, which.trailing_zeros());
-            let [v, w, det] = passed.weights;
+            let [v, w, det] = crossing.at.weights;
             nearest.weights = [v.to_array(), w.to_array(), det.to_array()];
             self.ray.t_max = t;
             way.end_at(triangles::beyond(t));
@@ -98,7 +84,7 @@ impl<G: Goal, L: Lanes> Flyer<L> for NarrowFlyer<G> {
         }
         // One has to be looked at closer, or two are met at the same place, of whatever block.
         let mut seeker = Seeker { exact: *exact, ray: &mut self.ray, nearest: &mut self.nearest };
-        if seeker.take::<L>(exact.block(block), block, passed) {
+        if seeker.take::<L>(exact.block(block), block, crossing) {
             way.end_at(triangles::beyond(self.ray.t_max));
         }
         true

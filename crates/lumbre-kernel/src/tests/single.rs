@@ -10,7 +10,7 @@ use crate::holds::Contents;
 use crate::lanes::Level;
 use crate::packet::{self, PACKET};
 use crate::query::{Filter, If};
-use crate::single::{self, Nearest, Outcome, Whether};
+use crate::single::{self, Nearest, Outcome, Whether, Winner};
 use crate::traverse::{Place, Standing};
 use crate::{
     Accel, BuildOptions, Faces, Geometry, GeometryKind, Hit, Instance, Preset, QueryOptions, TriangleMesh,
@@ -112,15 +112,21 @@ impl Tally {
         Self { is_answered: vec![false; rays.len()], unsettled: [0; 2] }
     }
 
-    /// The plain search may have to answer one of the two alone: in flight, many children at once are too many for a short stack.
-    fn count<A: PartialEq + std::fmt::Debug>(&mut self, i: usize, outcome: Outcome<A>, alone: &Outcome<A>) {
+    /// In flight and alone, `of` the level and the ray that are told; `plain` is right. The plain search may have to answer one of the
+    /// two alone: in flight, many children at once are too many for a short stack.
+    fn count<A: PartialEq + std::fmt::Debug>(
+        &mut self,
+        i: usize,
+        outcomes: [Outcome<A>; 2],
+        plain: &A,
+        of: impl std::fmt::Debug,
+    ) {
         assert!(!self.is_answered[i], "once");
         self.is_answered[i] = true;
-        match (&outcome, alone) {
-            (Outcome::Settled(answer), Outcome::Settled(expected)) => assert_eq!(answer, expected),
-            _ => {
-                self.unsettled[0] += usize::from(outcome == Outcome::Unsettled);
-                self.unsettled[1] += usize::from(*alone == Outcome::Unsettled);
+        for (outcome, unsettled) in outcomes.into_iter().zip(&mut self.unsettled) {
+            match outcome {
+                Outcome::Settled(answer) => assert_eq!(answer, *plain, "{of:?}"),
+                Outcome::Unsettled => *unsettled += 1,
             }
         }
     }
@@ -137,6 +143,7 @@ fn check(accel: &Accel, rays: &[Ray], least: u32) {
     let start = accel.single.as_ref().expect("made for this");
     for level in Level::all() {
         let (mut settled, mut hits) = (0, 0);
+        let mut winners = Vec::with_capacity(rays.len());
         let mut in_batch = vec![None; rays.len()];
         accel.closest_batch_at(level, rays, &mut in_batch);
         let mut any_in_batch = vec![false; rays.len()];
@@ -150,23 +157,28 @@ fn check(accel: &Accel, rays: &[Ray], least: u32) {
             let outcome = single::search::<Nearest>(level, accel, start, ray);
             settled += u32::from(outcome != Outcome::Unsettled);
             hits += u32::from(plain.is_some());
+            let winner =
+                |hit: Hit| Winner { root: hit.root, geometry: hit.geometry, primitive: hit.primitive };
+            winners.push(plain.map(winner));
         }
         assert!(hits > least && settled > least, "{hits} hits, {settled} settled");
         if start.contents == Contents::Triangles {
             // No tree of the tests is as large as those that are searched as far ones, and alike rays would go together.
             for is_far in [false, true] {
-                let mut alone = Tally::of(rays);
-                let put = |i, outcome| {
-                    alone.count(i, outcome, &single::search::<Nearest>(level, accel, start, &rays[i]))
+                let mut tally = Tally::of(rays);
+                let put = |i: usize, outcome| {
+                    let alone = single::search::<Nearest>(level, accel, start, &rays[i]);
+                    tally.count(i, [outcome, alone], &winners[i], (level, is_far, &rays[i]));
                 };
                 batch::search_triangles::<Nearest>(level, accel, start, rays, put, is_far, false);
-                alone.end();
-                let mut alone = Tally::of(rays);
-                let put = |i, outcome| {
-                    alone.count(i, outcome, &single::search::<Whether>(level, accel, start, &rays[i]))
+                tally.end();
+                let mut tally = Tally::of(rays);
+                let put = |i: usize, outcome| {
+                    let alone = single::search::<Whether>(level, accel, start, &rays[i]);
+                    tally.count(i, [outcome, alone], &winners[i].is_some(), (level, is_far, &rays[i]));
                 };
                 batch::search_triangles::<Whether>(level, accel, start, rays, put, is_far, false);
-                alone.end();
+                tally.end();
             }
         }
     }
