@@ -85,8 +85,8 @@ struct Head {
     followers: u8,
     // So that no byte of it is left open.
     rest: u8,
-    /// Which vertex each corner is, four bits for each lane; lanes without a triangle have those of one that is there, or the first that
-    /// they could have. Means nothing where each corner has a vertex of its own.
+    /// Which vertex each corner is, four bits for each lane; lanes without a triangle have the first that their half could have. Means
+    /// nothing where each corner has a vertex of its own.
     corners: [u32; 3],
 }
 
@@ -800,6 +800,7 @@ impl Halves {
         as_they_are.divided_better()
     }
 
+    /// As these corners stand, which are in this order.
     #[inline(always)]
     fn of_corners(corners: [[u32; 3]; BLOCK], len: usize, order: LaneOrder) -> Self {
         let mut vertices = [0; 2];

@@ -527,7 +527,7 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
                 let mut rest = mask & crossings.in_range;
                 if rest != 0 && mask & (mask - 1) == 0 {
                     // One alone, known before its range is: the winner need not wait for that.
-                    rest = lanes::foreseen(mask);
+                    rest = lanes::opaque_number(mask);
                 }
                 while rest != 0 {
                     let lane = rest.trailing_zeros();

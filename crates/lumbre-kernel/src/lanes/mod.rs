@@ -478,9 +478,10 @@ pub(crate) fn opaque<T>(value: &T) -> &T {
     value
 }
 
-/// The same number, where it is chosen by a branch that is to stay one: foreseen, nothing waits for what it was asked by.
+/// The same number, of which the compiler knows nothing: a branch that chooses it stays one, which is foreseen, so that nothing waits for
+/// what it was asked by; and what comes of it is made of it, and not otherwise.
 #[inline(always)]
-pub(crate) fn foreseen(number: u32) -> u32 {
+pub(crate) fn opaque_number(number: u32) -> u32 {
     #[cfg(all(target_arch = "x86_64", not(miri)))]
     {
         let mut same = number;

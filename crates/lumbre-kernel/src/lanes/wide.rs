@@ -474,7 +474,7 @@ mod x86 {
     use bytemuck::Zeroable;
 
     use super::{AFTER_MIDDLE, BEFORE_MIDDLE, Eight, LANE_BITS, Row, Vector, WIDE, Wide};
-    use crate::lanes::foreseen;
+    use crate::lanes::opaque_number;
 
     /// Only where `lanes::x86::X86<true>` is: the instructions are there.
     #[derive(Clone, Copy)]
@@ -973,7 +973,7 @@ mod x86 {
             // SAFETY: see the type.
             let (low, high) = unsafe { (_mm256_movemask_ps(low) as u32, _mm256_movemask_ps(high) as u32) };
             // Else the compiler puts the halves together first, which takes twice as long.
-            low | foreseen(high) << 8
+            low | opaque_number(high) << 8
         }
     }
 

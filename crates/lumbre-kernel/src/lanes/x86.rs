@@ -70,9 +70,9 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
     #[inline(always)]
     fn sizes(x: &[__m256; 3], y: &[__m256; 3], z: &[__m256; 3]) -> (__m256, __m256) {
         let (a, b, c) = (Self::larger(x[0], y[0]), Self::larger(x[1], y[1]), Self::larger(x[2], y[2]));
-        let (d, e) = (Self::larger(z[0], z[1]), Self::larger(z[2], z[2]));
         // SAFETY: see `X86`.
-        unsafe { (_mm256_max_ps(_mm256_max_ps(a, b), c), _mm256_max_ps(d, e)) }
+        let across = unsafe { _mm256_max_ps(_mm256_max_ps(a, b), c) };
+        (across, Self::larger(Self::larger(z[0], z[1]), z[2]))
     }
 
     /// The larger of the absolute values.
