@@ -842,11 +842,12 @@ impl Halves {
     fn in_order(self, order: LaneOrder) -> Self {
         let mut first_of = [0u32; UNSHARED];
         let mut corners = [[0u32; 3]; BLOCK];
-        for lane in 0..self.len {
-            for (i, corner) in self.corners[order.lane_before(lane)].into_iter().enumerate() {
-                let first = &mut first_of[corner.trailing_zeros() as usize % UNSHARED];
+        for (lane, triangle) in corners[..self.len].iter_mut().enumerate() {
+            let before = self.corners[order.lane_before(lane)];
+            for (i, (corner, before)) in triangle.iter_mut().zip(before).enumerate() {
+                let first = &mut first_of[before.trailing_zeros() as usize % UNSHARED];
                 *first = if *first == 0 { 1 << (3 * lane + i) } else { *first };
-                corners[lane][i] = *first;
+                *corner = *first;
             }
         }
         Self::of_corners(corners, self.len, order)
