@@ -33,7 +33,7 @@ pub(crate) trait Flyer<L: Lanes>: Sized {
     const IS_ANY: bool;
     /// How its line passes the triangles of a block.
     type Pass: Copy + Zeroable;
-    /// Where it meets each.
+    /// Where it meets each triangle.
     type At: Copy + Zeroable;
 
     /// The ray for boxes; `None` where it does not come from nearby, or is not sound.
@@ -69,7 +69,7 @@ pub(crate) struct Crossing<T> {
     pub(crate) met: u32,
     /// A bit for each that has to be looked at closer.
     pub(crate) unclear: u32,
-    /// Where, of the others nothing that means anything.
+    /// Where it meets each. What stands there of triangles in neither mask means nothing.
     pub(crate) at: T,
 }
 
