@@ -9,6 +9,9 @@
 //! long: those of the first four triangles are 0 to 3 and 8 to 11, those of the last four 4 to 7 and 8 to 11, or 12 to 15 in a room of
 //! sixteen. Which triangles are the first four is chosen so that this takes as little room as it can: a strip of eight has ten vertices,
 //! four of either half alone and two between them.
+//!
+//! Where no instruction finds eight vertices among sixteen, and a tree is so small that caches hold it anyway, nothing is shared:
+//! see [`Vertices`].
 
 use std::mem::offset_of;
 
@@ -435,6 +438,27 @@ impl Task for Look<'_> {
     }
 }
 
+/// Whether the triangles of a block have vertices together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Vertices {
+    /// Those that they share stand there once.
+    Shared,
+    /// Each corner has one of its own.
+    Apart,
+}
+
+impl Vertices {
+    /// So many blocks take twice the room where vertices are apart, some five megabytes: where caches do not hold that, it costs more
+    /// than it gains. In tests there are both.
+    const MOST_APART: usize = if cfg!(test) { 24 } else { 1 << 14 };
+
+    /// As a ray meets so many blocks soonest. Only AVX-512 brings vertices to corners by an instruction each; without it, that takes a
+    /// third of the time of a block.
+    pub(crate) fn of_fastest(level: Level, blocks: usize) -> Self {
+        if level.finds_vertices() || blocks > Self::MOST_APART { Self::Shared } else { Self::Apart }
+    }
+}
+
 /// Packs triangles with these names. Behind each block stand so many more of its leaf. Those without an area are left out; where
 /// there may be none, it is not asked.
 ///
@@ -442,12 +466,17 @@ impl Task for Look<'_> {
 /// [`BuildError::TooMany`] when there are more units than references can name.
 pub(crate) fn pack(
     level: Level,
+    vertices: Vertices,
     geometries: &[Geometry],
     names: &[BlockNames],
     followers: &[u8],
     may_lack_area: bool,
 ) -> Result<Filled, BuildError> {
-    let Survey { usual, by_place, units: expected } = level.run(Look { geometries, names });
+    let survey = match vertices {
+        Vertices::Shared => Some(level.run(Look { geometries, names })),
+        Vertices::Apart => None,
+    };
+    let expected = survey.as_ref().map_or(units_of(UNSHARED) * names.len(), |survey| survey.units);
     let mut filled = Filled {
         units: Vec::new(),
         places: Vec::with_capacity(names.len()),
@@ -459,9 +488,11 @@ pub(crate) fn pack(
     let share = share_of(names.len());
     for (wave, (names, followers)) in names.chunks(WAVE).zip(followers.chunks(WAVE)).enumerate() {
         shared.resize(names.len(), Shared::NOTHING);
-        shared.par_chunks_mut(share).zip(names.par_chunks(share)).for_each(|(shared, names)| {
-            level.run(FindShared { geometries, names, usual, by_place, shared });
-        });
+        if let Some(Survey { usual, by_place, .. }) = survey {
+            shared.par_chunks_mut(share).zip(names.par_chunks(share)).for_each(|(shared, names)| {
+                level.run(FindShared { geometries, names, usual, by_place, shared });
+            });
+        }
         let start = end;
         for shared in &shared {
             filled.places.push(end as u32);

@@ -9,7 +9,7 @@ use std::cmp::Reverse;
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
-use crate::blocks::{self, BlockNames, Blocks, Filled, LaneOrder, TriangleBlock, Unit};
+use crate::blocks::{self, BlockNames, Blocks, Filled, LaneOrder, TriangleBlock, Unit, Vertices};
 use crate::build::{Binary, BinaryNode, Fork, Name};
 use crate::carve::{self, Cell, LaneCell};
 use crate::lanes::Level;
@@ -154,8 +154,9 @@ impl Packed {
         may_lack_area: bool,
         number_of: impl Fn(u32) -> usize + Sync,
     ) -> Result<(), BuildError> {
+        let vertices = Vertices::of_fastest(level, self.names.len());
         let Filled { units, places, orders } =
-            blocks::pack(level, geometries, &self.names, followers, may_lack_area)?;
+            blocks::pack(level, vertices, geometries, &self.names, followers, may_lack_area)?;
         blocks::refer(self.nodes.to_mut(), &mut self.root, &places, number_of);
         self.blocks = units.into();
         self.put_in_order(&orders);

@@ -446,6 +446,17 @@ impl Level {
         all
     }
 
+    /// Whether there is an instruction for what takes eight numbers out of sixteen.
+    pub(crate) fn finds_vertices(self) -> bool {
+        match self.0 {
+            Set::Portable => false,
+            #[cfg(target_arch = "x86_64")]
+            Set::Avx2 => false,
+            #[cfg(target_arch = "x86_64")]
+            Set::Avx512 => true,
+        }
+    }
+
     /// Runs the task with these lanes.
     #[inline(always)]
     pub(crate) fn run<T: Task>(self, task: T) -> T::Output {

@@ -255,6 +255,14 @@ impl Lanes for Portable {
     #[inline]
     fn corners(block: &TriangleBlock) -> Corners {
         let (rows, room) = (block.coordinates(), block.room());
+        if block.is_unshared() {
+            let eight = |start: usize| {
+                *rows[start..].first_chunk().expect("a row for each corner, and one behind them")
+            };
+            return Corners(
+                [0, 1, 2].map(|corner| [0, 1, 2].map(|axis| eight(axis * room + BLOCK * corner))),
+            );
+        }
         Corners([0, 1, 2].map(|corner| {
             let vertices: [usize; BLOCK] = std::array::from_fn(|lane| block.vertex_at(corner, lane));
             [0, 1, 2].map(|axis| vertices.map(|vertex| rows[axis * room + vertex]))

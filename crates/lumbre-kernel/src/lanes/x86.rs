@@ -211,6 +211,8 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
         let by_room = [order[0] * room as u32, order[1] * room as u32, order[2] * room as u32, far];
         let rows = if !IS_ALONE {
             &by_room
+        } else if !AVX512 && room > MOST_SHARED {
+            super::opaque(&rows_by_room[3])
         } else if room == USUAL[0] {
             super::opaque(&rows_by_room[0])
         } else if room == USUAL[1] {

@@ -12,7 +12,7 @@ use lumbre_geometry::Ray;
 use lumbre_math::{DVec3, Vec3};
 
 use super::scenes::Random;
-use crate::blocks::{self, BlockNames, Blocks, TriangleBlock, Unit};
+use crate::blocks::{self, BlockNames, Blocks, TriangleBlock, Unit, Vertices};
 use crate::lanes::{Level, corners_at, equals_before_at, meet_triangles_at, truncated_at};
 use crate::triangles::{BLOCK, BlockRay, Meeting, Shear, intersect};
 use crate::{Accel, BuildOptions, Geometry, GeometryKind, Preset, TriangleMesh};
@@ -44,7 +44,9 @@ fn block(random: &mut Random, shares: f64, center: DVec3, spread: f64, size: f64
     }
     let names: Vec<_> = (0..mesh.indices.len() as u32).map(|triangle| [0, triangle]).collect();
     let geometry = Geometry { id: 0, kind: GeometryKind::Mesh(Arc::new(mesh)) };
-    blocks::pack(Level::best(), &[geometry], &[BlockNames::of(&names)], &[0], true).unwrap().units
+    blocks::pack(Level::best(), Vertices::Shared, &[geometry], &[BlockNames::of(&names)], &[0], true)
+        .unwrap()
+        .units
 }
 
 /// One ray at one block at every level.
@@ -178,7 +180,8 @@ fn a_ray_that_leaves_a_wall_is_seen_to_leave_it() {
         let wall = TriangleMesh { origin: DVec3::ZERO, positions, indices: vec![[0, 1, 2], [0, 2, 3]] };
         let geometry = Geometry { id: 0, kind: GeometryKind::Mesh(Arc::new(wall)) };
         let names = [BlockNames::of(&[[0, 0], [0, 1]])];
-        let units = blocks::pack(Level::best(), &[geometry], &names, &[0], true).unwrap().units;
+        let units =
+            blocks::pack(Level::best(), Vertices::Shared, &[geometry], &names, &[0], true).unwrap().units;
         let block = Blocks::new(&units).at(0).unwrap();
         for _ in 0..50 {
             let at = center + random.between(-1.0, 1.0) * right + random.between(-1.0, 1.0) * up;
@@ -306,7 +309,8 @@ fn triangles_stand_so_that_either_half_finds_its_vertices_in_little_room() {
             let names: Vec<_> = triangles.iter().map(|&triangle| [0, triangle]).collect();
             let names = [BlockNames::of(&names)];
             let geometries = [Geometry { id: 0, kind: GeometryKind::Mesh(Arc::clone(&mesh)) }];
-            let filled = blocks::pack(Level::best(), &geometries, &names, &[0], true).unwrap();
+            let filled =
+                blocks::pack(Level::best(), Vertices::Shared, &geometries, &names, &[0], true).unwrap();
             let block = Blocks::new(&filled.units).at(0).unwrap();
             assert_eq!(block.room(), 10, "{triangles:?}");
             let mut names = names;
@@ -320,7 +324,8 @@ fn triangles_stand_so_that_either_half_finds_its_vertices_in_little_room() {
                 assert_eq!(block.triangle(lane), corners);
             }
             // What stands in that order stays in it.
-            let again = blocks::pack(Level::best(), &geometries, &names, &[0], true).unwrap();
+            let again =
+                blocks::pack(Level::best(), Vertices::Shared, &geometries, &names, &[0], true).unwrap();
             assert_eq!(again.units, filled.units);
         }
     }
