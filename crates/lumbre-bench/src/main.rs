@@ -331,20 +331,23 @@ fn measure_builds<'a>(
     let least = if millions > 2.0 { 1 } else { 3 };
     let mut trees: Vec<Option<Built<'a>>> = taking.iter().map(|_| None).collect();
     for &threads in &plan.threads {
-        let mut build = |i: usize| {
-            // The old tree goes before the new one comes.
-            trees[i] = None;
-            let built = taking[i].build(scene, threads)?;
-            let seconds = built.seconds;
-            trees[i] = Some(built);
-            Ok::<_, anyhow::Error>(seconds)
-        };
-        if millions <= 2.0 && !plan.is_over() {
-            for i in 0..taking.len() {
-                build(i)?;
+        let trees = &mut trees;
+        let rounds = rust_heap::asking(threads, move || {
+            let mut build = |i: usize| {
+                // The old tree goes before the new one comes.
+                trees[i] = None;
+                let built = taking[i].build(scene, threads)?;
+                let seconds = built.seconds;
+                trees[i] = Some(built);
+                Ok::<_, anyhow::Error>(seconds)
+            };
+            if millions <= 2.0 && !plan.is_over() {
+                for i in 0..taking.len() {
+                    build(i)?;
+                }
             }
-        }
-        let rounds = alternate(taking.len(), least, plan.line, plan.deadline, build)?;
+            alternate(taking.len(), least, plan.line, plan.deadline, build)
+        })??;
         let line = Line { scene, taking, work: "build".to_owned(), unit: "Mprim/s", threads };
         let speed = |i: usize| millions / median(rounds.iter().map(|round| round[i]));
         let ratio = |i: usize| Ratio::of(rounds.iter().map(|round| (round[0], round[i])));

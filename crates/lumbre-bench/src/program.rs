@@ -50,7 +50,7 @@ pub struct Bytes {
 }
 
 /// A program that takes part.
-pub trait Program {
+pub trait Program: Sync {
     /// Its name and version, and how it is set.
     fn name(&self) -> String;
 
