@@ -208,7 +208,7 @@ impl Accel {
         save::from_bytes(bytes, geometries)
     }
 
-    /// Writes the tree to a file that [`Accel::map`] uses in place: some thirty bytes a triangle. The geometries are not in it,
+    /// Writes the tree to a file that [`Accel::map`] uses in place: thirty to sixty bytes a triangle. The geometries are not in it,
     /// nor the trees that stand in this one as instances. A file that is there already is replaced as a whole once the new one
     /// is complete; who has it mapped keeps the old one.
     ///

@@ -452,8 +452,8 @@ impl Vertices {
     /// than it gains. In tests there are both.
     const MOST_APART: usize = if cfg!(test) { 24 } else { 1 << 14 };
 
-    /// As a ray meets so many blocks soonest. Only AVX-512 brings vertices to corners by an instruction each; without it, that takes a
-    /// third of the time of a block.
+    /// As a ray meets so many blocks soonest. Only AVX-512 has an instruction that brings vertices to eight corners; without it, that
+    /// is a third of the instructions that a block takes.
     pub(crate) fn of_fastest(level: Level, blocks: usize) -> Self {
         if level.finds_vertices() || blocks > Self::MOST_APART { Self::Shared } else { Self::Apart }
     }
