@@ -8,8 +8,8 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use bytemuck::Zeroable;
-use lumbre_geometry::Ray;
-use lumbre_math::{DVec3, Vec3};
+use lumbre_geometry::{PlacedShape, Ray, Sphere};
+use lumbre_math::{DVec3, Transform, Vec3};
 
 use super::scenes::Random;
 use crate::blocks::{self, BlockNames, Blocks, TriangleBlock, Unit, Vertices};
@@ -329,6 +329,27 @@ fn triangles_stand_so_that_either_half_finds_its_vertices_in_little_room() {
             assert_eq!(again.units, filled.units);
         }
     }
+}
+
+#[test]
+fn small_trees_of_triangles_alone_share_nothing_where_vertices_are_not_found_at_once() {
+    let all = grid(&mut Random(88), 0.0);
+    let GeometryKind::Mesh(mesh) = &all.kind else { unreachable!() };
+    let indices = mesh.indices[..96].to_vec();
+    let few = TriangleMesh { origin: mesh.origin, positions: mesh.positions.clone(), indices };
+    let few = Geometry { id: 0, kind: GeometryKind::Mesh(Arc::new(few)) };
+    let ball = PlacedShape::new(Sphere::new(DVec3::ZERO, 1.0).unwrap().into(), Transform::IDENTITY);
+    let ball = Geometry { id: 1, kind: GeometryKind::Shape(ball) };
+    let do_share = |geometries: Vec<Geometry>| {
+        let accel = Accel::build(geometries, &BuildOptions::default()).unwrap();
+        let places = accel.tree.blocks().places(&accel.tree.names).unwrap();
+        let sharing = places.iter().filter(|&&place| !accel.tree.block(place).is_unshared()).count();
+        assert!(sharing == 0 || 2 * sharing > places.len(), "{sharing} of {}", places.len());
+        sharing != 0
+    };
+    assert_eq!(do_share(vec![few.clone()]), Level::best().finds_vertices());
+    assert!(do_share(vec![few, ball]));
+    assert!(do_share(vec![all]));
 }
 
 /// The same mesh where every triangle has vertices of its own: no two share one by name.
