@@ -50,7 +50,7 @@ use crate::blocks::TriangleBlock;
 use crate::fleet::Crossing;
 use crate::holds::{Contents, SingleStart};
 use crate::lanes::{self, Asked, Axes, Lanes, Level, Question, Vector};
-use crate::single::{Exact, Outcome};
+use crate::single::{self, Exact, Outcome};
 use crate::stack::{AsBuilt, ByDistance, Order};
 use crate::triangles::BLOCK;
 use crate::{Accel, Hit, Hit32, Ray32};
@@ -90,16 +90,23 @@ impl Precise {
         Self { most, little: most * (1.0 / 1024.0) }
     }
 
-    /// A bit for each that is: by products, edge functions, their sum and heights of corners.
+    /// A bit for each that is: by products, how far within the triangle the line is, the sum of the edge functions, and the heights
+    /// of the corners.
     #[inline(always)]
-    fn of<V: Vector>(&self, products: [V; 3], [u, v, w]: [V; 3], sum: V, z: [V; 3]) -> u32 {
-        let zero = V::splat(0.0);
-        let is_strict = zero.below(u.min(v).min(w)) | u.max(v).max(w).below(zero);
-        let largest = products[0].abs().max(products[1].abs()).max(products[2].abs()) + V::splat(TINY);
+    fn of<V: Vector>(&self, [bc, ca, ab]: [V; 3], within: V, sum: V, z: [V; 3]) -> u32 {
+        let is_strict = V::splat(0.0).below(within);
+        let largest = bc.larger(ca).larger(ab) + V::splat(TINY);
         let extent = z[0].max(z[1]).max(z[2]) - z[0].min(z[1]).min(z[2]);
         let least = largest * (extent + V::splat(self.little));
         is_strict & least.at_most(sum.abs() * V::splat(self.most))
     }
+}
+
+/// The least of the edge functions, or of their opposites, whichever is more: how far within the triangle the line is.
+#[inline(always)]
+fn within<V: Vector>([u, v, w]: [V; 3]) -> V {
+    let opposite = u.max(v).max(w).turned_by(V::splat(-0.0));
+    u.min(v).min(w).max(opposite)
 }
 
 /// What products may lose by underflow is nothing beside this.
@@ -111,6 +118,8 @@ pub(crate) struct Pass<E> {
     /// The first of the two products that each edge function is the difference of.
     products: [E; 3],
     edges: [E; 3],
+    /// See [`within`].
+    within: E,
     /// Of the corners, along the ray.
     heights: [E; 3],
 }
@@ -141,6 +150,87 @@ impl Nearest {
         self.block != u32::MAX
     }
 
+    /// Takes what is nearer of what a ray meets in a block, and ends the ray there; whether there was anything.
+    #[inline(always)]
+    fn take<L: Lanes>(
+        &mut self,
+        exact: &Exact,
+        ray: &mut NarrowRay,
+        place: u32,
+        crossing: &Crossing<Places<L::Eight>>,
+    ) -> bool {
+        let &Crossing { met, unclear, ref at } = crossing;
+        if met | unclear == 0 {
+            return false;
+        }
+        let t = at.t.to_array();
+        let lane = single::nearest_of(met, &t);
+        self.take_nearest::<L>(exact, ray, place, crossing, (lane, t[lane]))
+    }
+
+    /// The same where it is known in which lane the ray meets the nearest, if it does meet any, and at which `t`.
+    #[inline(always)]
+    fn take_nearest<L: Lanes>(
+        &mut self,
+        exact: &Exact,
+        ray: &mut NarrowRay,
+        place: u32,
+        crossing: &Crossing<Places<L::Eight>>,
+        (lane, t): (usize, f32),
+    ) -> bool {
+        let &Crossing { met, unclear, at: Places { t: all, weights: [v, w, det] } } = crossing;
+        let others = all.at_most(L::Eight::splat(t)) & met & !(1 << lane);
+        if unclear | others == 0 && t < ray.t_max {
+            *self = Self {
+                block: place,
+                lane: lane as u32,
+                weights: [v.to_array(), w.to_array(), det.to_array()],
+            };
+            ray.t_max = t;
+            return true;
+        }
+        let at = Places { t: all.to_array(), weights: [v.to_array(), w.to_array(), det.to_array()] };
+        self.take_closely(exact, ray, place, &Crossing { met, unclear, at })
+    }
+
+    /// The same where a triangle has to be looked at closer, or two are met at the same place, of whatever block.
+    #[cold]
+    #[inline(never)]
+    fn take_closely(
+        &mut self,
+        exact: &Exact,
+        ray: &mut NarrowRay,
+        place: u32,
+        crossing: &Crossing<Places<[f32; BLOCK]>>,
+    ) -> bool {
+        let &Crossing { met, unclear, ref at } = crossing;
+        let mut is_nearer = false;
+        let mut rest = met | unclear;
+        while rest != 0 {
+            let lane = rest.trailing_zeros();
+            rest &= rest - 1;
+            let (t, weights) = if unclear >> lane & 1 == 0 {
+                (at.t[lane as usize % BLOCK], at.weights)
+            } else {
+                match ray.cross_exactly(exact.block(place), lane) {
+                    Some((t, weights)) => (t, weights.map(|weight| [weight; BLOCK])),
+                    None => continue,
+                }
+            };
+            if t < ray.t_max || t == ray.t_max && self.comes_after(exact, place, lane) {
+                *self = Self { block: place, lane, weights };
+                ray.t_max = t;
+                is_nearer = true;
+            }
+        }
+        is_nearer
+    }
+
+    /// Whether a triangle that is met where this is comes before it.
+    fn comes_after(&self, exact: &Exact, block: u32, lane: u32) -> bool {
+        !self.is_some() || exact.names(block, lane) < exact.names(self.block, self.lane)
+    }
+
     /// As a hit at this `t`, if there is one.
     #[inline(always)]
     fn hit(&self, exact: &Exact, t: f32) -> Option<Hit32> {
@@ -167,11 +257,10 @@ impl NarrowRay {
     fn pass_edges<L: Lanes, const IS_ALONE: bool>(&self, block: &TriangleBlock) -> (u32, Pass<L::Eight>) {
         let [x, y, heights] = L::narrow_corners::<IS_ALONE>(block, lanes::opaque(self));
         let products = [x[2] * y[1], x[0] * y[2], x[1] * y[0]];
-        let edges @ [u, v, w] =
-            [products[0] - y[2] * x[1], products[1] - y[0] * x[2], products[2] - y[1] * x[0]];
-        let zero = L::Eight::splat(0.0);
-        let mask = (zero.at_most(u.min(v).min(w)) | u.max(v).max(w).at_most(zero)) & block.taken();
-        (mask, Pass { products, edges, heights })
+        let edges = [products[0] - y[2] * x[1], products[1] - y[0] * x[2], products[2] - y[1] * x[0]];
+        let within = within(edges);
+        let mask = L::Eight::splat(0.0).at_most(within) & block.taken();
+        (mask, Pass { products, edges, within, heights })
     }
 
     /// Which of those in the mask the ray meets; it certainly does where the crossing is precise, and in range.
@@ -179,10 +268,10 @@ impl NarrowRay {
     fn cross<L: Lanes>(&self, mask: u32, pass: &Pass<L::Eight>) -> Crossing<Places<L::Eight>> {
         // Read again: most lines pass through few blocks.
         let ray = lanes::opaque(self);
-        let &Pass { products, edges: [u, v, w], heights: z } = pass;
+        let &Pass { products, edges: [u, v, w], within, heights: z } = pass;
         let det = u + v + w;
         let height = u * z[0] + v * z[1] + w * z[2];
-        let precise = ray.precise.of(products, [u, v, w], det, z);
+        let precise = ray.precise.of(products, within, det, z);
         let t = height.over(det) * L::Eight::splat(ray.minus_inverse);
         let in_range = L::Eight::splat(ray.t_min).at_most(t) & t.at_most(L::Eight::splat(ray.t_max));
         let at = Places { t, weights: [v, w, det] };
@@ -241,81 +330,6 @@ impl NarrowRay {
             }
         }
         false
-    }
-}
-
-/// A ray in single precision, and the nearest that it has met.
-struct Seeker<'a, 's> {
-    exact: Exact<'a>,
-    /// Ends at the nearest.
-    ray: &'s mut NarrowRay,
-    nearest: &'s mut Nearest,
-}
-
-impl Seeker<'_, '_> {
-    /// Tests a block for what is nearer; whether there was anything.
-    #[inline(always)]
-    fn meet_block<L: Lanes>(&mut self, block: &TriangleBlock, place: u32) -> bool {
-        let Some(crossing) = self.ray.pass::<L>(block) else { return false };
-        self.take::<L>(block, place, &crossing)
-    }
-
-    /// Takes what is nearer; whether there was anything.
-    #[inline(always)]
-    fn take<L: Lanes>(
-        &mut self,
-        block: &TriangleBlock,
-        place: u32,
-        crossing: &Crossing<Places<L::Eight>>,
-    ) -> bool {
-        let mut is_nearer = false;
-        if crossing.met != 0 {
-            let t = crossing.at.t.to_array();
-            let mut rest = crossing.met;
-            while rest != 0 {
-                let lane = rest.trailing_zeros();
-                rest &= rest - 1;
-                let t = t[lane as usize % BLOCK];
-                if t < self.ray.t_max || t == self.ray.t_max && self.comes_first(place, lane) {
-                    let [v, w, det] = crossing.at.weights;
-                    self.nearest.block = place;
-                    self.nearest.lane = lane;
-                    self.nearest.weights = [v.to_array(), w.to_array(), det.to_array()];
-                    self.ray.t_max = t;
-                    is_nearer = true;
-                }
-            }
-        }
-        if crossing.unclear != 0 {
-            is_nearer |= self.meet_exactly(block, place, crossing.unclear);
-        }
-        is_nearer
-    }
-
-    /// Whether a triangle that is met where the nearest is comes before it.
-    #[cold]
-    #[inline(never)]
-    fn comes_first(&self, block: u32, lane: u32) -> bool {
-        let nearest = &self.nearest;
-        !nearest.is_some() || self.exact.names(block, lane) < self.exact.names(nearest.block, nearest.lane)
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn meet_exactly(&mut self, block: &TriangleBlock, place: u32, mut mask: u32) -> bool {
-        let mut is_nearer = false;
-        while mask != 0 {
-            let lane = mask.trailing_zeros();
-            mask &= mask - 1;
-            let Some((t, weights)) = self.ray.cross_exactly(block, lane) else { continue };
-            if t < self.ray.t_max || self.comes_first(place, lane) {
-                *self.nearest =
-                    Nearest { block: place, lane, weights: weights.map(|weight| [weight; BLOCK]) };
-                self.ray.t_max = t;
-                is_nearer = true;
-            }
-        }
-        is_nearer
     }
 }
 

@@ -1218,11 +1218,11 @@ impl<'a, 'r, G: Goal, const MIXED: bool, S: Selection> Alone<'a, 'r, G, MIXED, S
     }
 }
 
-/// Which of those in the mask, one at least, is the nearest.
+/// Which of those in the mask is the nearest; any where there are none.
 #[inline(always)]
 pub(crate) fn nearest_of(mask: u32, near: &[f32; BLOCK]) -> usize {
     let mut nearest = mask.trailing_zeros() as usize % BLOCK;
-    let mut others = mask & (mask - 1);
+    let mut others = mask & mask.wrapping_sub(1);
     while others != 0 {
         let other = others.trailing_zeros() as usize % BLOCK;
         others &= others - 1;

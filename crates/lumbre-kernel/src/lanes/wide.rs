@@ -44,6 +44,11 @@ pub(crate) trait Vector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Ou
     fn min(self, other: Self) -> Self;
     fn max(self, other: Self) -> Self;
     fn abs(self) -> Self;
+    /// The larger of the absolute values.
+    #[inline(always)]
+    fn larger(self, other: Self) -> Self {
+        self.abs().max(other.abs())
+    }
     /// With the sign changed wherever the other has one.
     fn turned_by(self, other: Self) -> Self;
     fn at_most(self, other: Self) -> u32;
@@ -1010,6 +1015,19 @@ mod x86 {
         }
 
         #[inline(always)]
+        fn larger(self, other: Self) -> Self {
+            // Numbers without a sign have the order of their bits. As integers, for that is done beside sums and comparisons, not between
+            // them.
+            // SAFETY: see the type.
+            unsafe {
+                let without_sign = _mm256_set1_epi32(i32::MAX);
+                let a = _mm256_and_si256(_mm256_castps_si256(self.0), without_sign);
+                let b = _mm256_and_si256(_mm256_castps_si256(other.0), without_sign);
+                Self(_mm256_castsi256_ps(_mm256_max_epi32(a, b)))
+            }
+        }
+
+        #[inline(always)]
         fn turned_by(self, other: Self) -> Self {
             // SAFETY: see the type.
             unsafe {
@@ -1099,6 +1117,7 @@ mod x86 {
         by_halves!(min(other));
         by_halves!(max(other));
         by_halves!(abs());
+        by_halves!(larger(other));
         by_halves!(turned_by(other));
 
         #[inline(always)]

@@ -1,6 +1,6 @@
 //! One ray at a time.
 
-use super::{Goal, Nearest, Seeker};
+use super::{Goal, Nearest};
 use crate::lanes::{self, Lanes};
 use crate::node::tag;
 use crate::single::{Exact, Outcome};
@@ -29,13 +29,14 @@ pub(super) fn closest<L: Lanes>(exact: &Exact, ray: &Ray32) -> Outcome<Option<Hi
     };
     let mut ray = L::start_narrow_blocks(start, lanes::opaque(ray), way.slabs());
     let mut nearest = Nearest::NONE;
-    let mut seeker = Seeker { exact: *exact, ray: &mut ray, nearest: &mut nearest };
     loop {
         let mut place = leaf & tag::PLACE;
         loop {
-            let block = seeker.exact.block(place);
-            if seeker.meet_block::<L>(block, place) {
-                way.end_at(triangles::beyond(seeker.ray.t_max));
+            let block = exact.block(place);
+            if let Some(crossing) = ray.pass::<L>(block)
+                && nearest.take::<L>(exact, &mut ray, place, &crossing)
+            {
+                way.end_at(triangles::beyond(ray.t_max));
             }
             match block.next(place) {
                 Some(next) => place = next,
@@ -46,7 +47,7 @@ pub(super) fn closest<L: Lanes>(exact: &Exact, ray: &Ray32) -> Outcome<Option<Hi
         let Some(next) = way.descend::<ByDistance>(next, &mut stack) else { break };
         leaf = next;
     }
-    Outcome::Settled(seeker.nearest.hit(&seeker.exact, seeker.ray.t_max))
+    Outcome::Settled(nearest.hit(exact, ray.t_max))
 }
 
 #[inline(always)]

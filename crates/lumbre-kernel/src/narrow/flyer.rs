@@ -2,7 +2,7 @@
 
 use std::marker::PhantomData;
 
-use super::{Goal, NarrowRay, Nearest, Pass, Places, Seeker};
+use super::{Goal, NarrowRay, Nearest, Pass, Places};
 use crate::Ray32;
 use crate::blocks::TriangleBlock;
 use crate::fleet::{Crossing, Flyer};
@@ -10,7 +10,7 @@ use crate::holds::SingleStart;
 use crate::lanes::{Eight, Lanes, Vector};
 use crate::node::Slabs;
 use crate::single::{Exact, Outcome};
-use crate::triangles;
+use crate::triangles::{self, BLOCK};
 use crate::way::Way;
 
 /// A ray in single precision among triangles, and the nearest that it has met.
@@ -72,19 +72,8 @@ impl<G: Goal, L: Lanes> Flyer<L> for NarrowFlyer<G> {
     ) -> bool {
         let t = crossing.at.t.least_of(crossing.met);
         let which = crossing.at.t.at_most(L::Eight::splat(t)) & crossing.met;
-        let is_alone = which & which.wrapping_sub(1) == 0;
-        if crossing.unclear == 0 && is_alone && t < self.ray.t_max {
-            let nearest = &mut self.nearest;
-            (nearest.block, nearest.lane) = (block, which.trailing_zeros());
-            let [v, w, det] = crossing.at.weights;
-            nearest.weights = [v.to_array(), w.to_array(), det.to_array()];
-            self.ray.t_max = t;
-            way.end_at(triangles::beyond(t));
-            return true;
-        }
-        // One has to be looked at closer, or two are met at the same place, of whatever block.
-        let mut seeker = Seeker { exact: *exact, ray: &mut self.ray, nearest: &mut self.nearest };
-        if seeker.take::<L>(exact.block(block), block, crossing) {
+        let lane = which.trailing_zeros() as usize % BLOCK;
+        if self.nearest.take_nearest::<L>(exact, &mut self.ray, block, crossing, (lane, t)) {
             way.end_at(triangles::beyond(self.ray.t_max));
         }
         true

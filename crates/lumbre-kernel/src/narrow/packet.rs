@@ -6,7 +6,7 @@
 //! the same bounds, which allow 32u of their size for the roundings of a ray's sheared corners and of the middle's, where these are off by
 //! 8.1u and a little more.
 
-use super::{Goal, NarrowRay, Precise, TINY};
+use super::{Goal, NarrowRay, Precise, TINY, within};
 use crate::batch::Ends;
 use crate::blocks::{Blocks, TriangleBlock};
 use crate::holds::SingleStart;
@@ -375,14 +375,14 @@ impl<'a> Packet<'a> {
         let cy = (oy - splat(corners[2][ky][lane])) - sy * cz;
         let (bc, ca, ab) = (cx * by, ax * cy, bx * ay);
         let (u, v, w) = (bc - cy * bx, ca - ay * cx, ab - by * ax);
-        let zero = splat(0.0);
-        let mask = (zero.at_most(u.min(v).min(w)) | u.max(v).max(w).at_most(zero)) & self.alive;
+        let within = within([u, v, w]);
+        let mask = splat(0.0).at_most(within) & self.alive;
         if mask == 0 {
             return;
         }
         let det = u + v + w;
         let height = u * az + v * bz + w * cz;
-        let precise = bundle.precise.of([bc, ca, ab], [u, v, w], det, [az, bz, cz]);
+        let precise = bundle.precise.of([bc, ca, ab], within, det, [az, bz, cz]);
         let t = height.over(det) * load(&bundle.minus_inverse.0);
         let t_max = load(&bundle.t_max.0);
         let in_range = mask & precise & load(&bundle.t_min.0).at_most(t) & t.at_most(t_max);
