@@ -21,10 +21,39 @@ use crate::single::{Alone, Exact, Goal, Outcome};
 const FAR: usize = 1 << 24;
 /// Below this, the nearest caches hold them.
 const NEAR: usize = 1 << 20;
-/// From so many on, rays are faster in flight than one after another, among what the nearest caches hold and else: to set out, and to
-/// wait for the last, takes its time.
-const LEAST_NEAR: usize = 128;
-const LEAST: usize = 32;
+
+/// How the rays of a batch go that do not go together.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Flying {
+    /// From so many on, they are in flight; fewer go one after another.
+    least: usize,
+    /// Whether what a ray will read next is asked for before it is its turn.
+    pub(crate) asks_ahead: bool,
+}
+
+impl Flying {
+    /// From so many on, rays are faster in flight, among what the nearest caches hold and else: to set out, and to wait for the last,
+    /// takes its time.
+    pub(crate) const NEAR: Self = Self { least: 128, asks_ahead: false };
+    pub(crate) const MIDDLE: Self = Self { least: 32, asks_ahead: false };
+    pub(crate) const FAR: Self = Self { least: 32, asks_ahead: true };
+    const NEVER: Self = Self { least: usize::MAX, asks_ahead: false };
+
+    /// As is fastest in a tree.
+    #[inline(always)]
+    fn through<L: Lanes>(accel: &Accel) -> Self {
+        let bytes = bytes_of(accel);
+        if bytes >= FAR {
+            Self::FAR
+        } else if !L::FLIES_NEARBY {
+            Self::NEVER
+        } else if bytes >= NEAR {
+            Self::MIDDLE
+        } else {
+            Self::NEAR
+        }
+    }
+}
 
 /// Packets in a row that may go alone without a try.
 const LEAST_OFTEN: usize = 16;
@@ -91,7 +120,7 @@ pub(crate) fn search_all<G: Goal>(
     ends: impl Ends<G::Answer>,
 ) {
     if start.contents == Contents::Triangles {
-        search_triangles::<G>(level, accel, start, rays, ends, is_far(accel), true);
+        search_triangles::<G>(level, accel, start, rays, ends, None, true);
     } else {
         let others = NoOthers::<true> { accel, start };
         level.run(OneByOne::<G, _, _> { accel, start, rays, others, ends, goal: PhantomData });
@@ -102,11 +131,6 @@ pub(crate) fn search_all<G: Goal>(
 fn bytes_of(accel: &Accel) -> usize {
     let tree = &accel.tree;
     size_of_val::<[Node]>(&tree.nodes) + size_of_val::<[Unit]>(&tree.blocks)
-}
-
-/// Whether the caches hold little of a tree.
-pub(crate) fn is_far(accel: &Accel) -> bool {
-    bytes_of(accel) >= FAR
 }
 
 /// Searches along every ray in a tree of anything.
@@ -121,17 +145,17 @@ pub(crate) fn search_anything<G: Companion>(
     level.run(OneByOne::<G, _, _> { accel, start, rays, others, ends, goal: PhantomData });
 }
 
-/// Searches a tree of triangles along every ray, as where the caches hold little of it or much, and with or without packets.
+/// Searches a tree of triangles along every ray, with or without packets, and the others as they are to go, if that is said.
 pub(crate) fn search_triangles<G: Goal>(
     level: Level,
     accel: &Accel,
     start: &SingleStart,
     rays: &[Ray],
     ends: impl Ends<G::Answer>,
-    is_far: bool,
+    flying: Option<Flying>,
     has_packets: bool,
 ) {
-    level.run(AllAtOnce::<InDouble<G>, _> { accel, start, rays, ends, is_far, has_packets });
+    level.run(AllAtOnce::<InDouble<G>, _> { accel, start, rays, ends, flying, has_packets });
 }
 
 /// In which precision rays are asked among triangles, and what.
@@ -163,7 +187,7 @@ pub(crate) trait Manner {
     /// Searches along those of the rays that have these positions, in flight.
     fn fly<L: Lanes>(
         exact: &Exact,
-        is_far: bool,
+        asks_ahead: bool,
         rays: &[Self::Ray],
         positions: &[usize],
         ends: &mut impl Ends<Self::Answer>,
@@ -204,12 +228,12 @@ impl<G: Goal> Manner for InDouble<G> {
     #[inline(always)]
     fn fly<L: Lanes>(
         exact: &Exact,
-        is_far: bool,
+        asks_ahead: bool,
         rays: &[Ray],
         positions: &[usize],
         ends: &mut impl Ends<G::Answer>,
     ) {
-        fleet::fly::<DoubleFlyer<G>, L>(exact, is_far, rays, positions, ends);
+        fleet::fly::<DoubleFlyer<G>, L>(exact, asks_ahead, rays, positions, ends);
     }
 }
 
@@ -296,14 +320,14 @@ impl<'a, G: Goal, O: Others<'a, G>, E: Ends<O::Found>> Task for OneByOne<'a, '_,
     }
 }
 
-/// Rays through a tree of triangles: those that are alike together, and the others in flight, or one after another where they are few.
+/// Rays through a tree of triangles: those that are alike together, and the others in flight, or one after another.
 pub(crate) struct AllAtOnce<'a, 'r, M: Manner, E> {
     pub(crate) accel: &'a Accel,
     pub(crate) start: &'a SingleStart,
     pub(crate) rays: &'r [M::Ray],
     pub(crate) ends: E,
-    /// Whether what a ray will read next is asked for before it is its turn.
-    pub(crate) is_far: bool,
+    /// Where it is said how the others go.
+    pub(crate) flying: Option<Flying>,
     pub(crate) has_packets: bool,
 }
 
@@ -312,11 +336,14 @@ impl<M: Manner, E: Ends<M::Answer>> Task for AllAtOnce<'_, '_, M, E> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        let Self { accel, start, rays, mut ends, is_far, has_packets } = self;
+        let Self { accel, start, rays, mut ends, flying, has_packets } = self;
+        let flying = flying.unwrap_or_else(
+            #[inline(always)]
+            || Flying::through::<L>(accel),
+        );
         let exact = Exact::new(accel, start);
         let mut packet = M::packet(accel, start);
         let mut trials = Trials::NEW;
-        let least = if bytes_of(accel) < NEAR { LEAST_NEAR } else { LEAST };
         let mut others = Vec::with_capacity(rays.len().min(AT_ONCE));
         for (number, chunk) in rays.chunks(AT_ONCE).enumerate() {
             let first = number * AT_ONCE;
@@ -338,14 +365,14 @@ impl<M: Manner, E: Ends<M::Answer>> Task for AllAtOnce<'_, '_, M, E> {
                 }
             }
             others.extend(first + PACKET * packets.len()..first + chunk.len());
-            if others.len() < least {
+            if others.len() < flying.least {
                 // Here, and not by a call: a hit that was put together elsewhere would be waited for. Nor in a closure, which does not
                 // take on the instruction set.
                 for &i in &others {
                     ends.put(i, M::search_alone::<L>(&exact, &rays[i]));
                 }
             } else {
-                M::fly::<L>(&exact, is_far, rays, &others, &mut ends);
+                M::fly::<L>(&exact, flying.asks_ahead, rays, &others, &mut ends);
             }
             others.clear();
         }

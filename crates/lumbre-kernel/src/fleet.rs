@@ -73,8 +73,8 @@ pub(crate) struct Crossing<T> {
     pub(crate) at: T,
 }
 
-/// Rays in flight: a bit for each in a word.
-const FLIGHTS: usize = 64;
+/// Rays in flight at most: a bit for each in a word.
+pub(crate) const FLIGHTS: usize = 64;
 /// How many have to have come to their end, or all, before others set out.
 const ENOUGH: u32 = 8;
 /// How many rays ahead one is asked for.
@@ -373,12 +373,12 @@ impl<'a, 'r, F: Flyer<L>, L: Lanes> Fleet<'a, 'r, F, L> {
     }
 }
 
-/// Searches along those of the rays that have these positions. Where the tree `is_far`, what a ray comes to next is asked for before it
-/// is its turn.
+/// Searches along those of the rays that have these positions. If that is asked for, a ray `asks_ahead` for what it comes to next,
+/// before it is its turn.
 #[inline(always)]
 pub(crate) fn fly<F: Flyer<L>, L: Lanes>(
     exact: &Exact,
-    is_far: bool,
+    asks_ahead: bool,
     rays: &[F::Ray],
     positions: &[usize],
     ends: &mut impl Ends<F::Answer>,
@@ -387,7 +387,7 @@ pub(crate) fn fly<F: Flyer<L>, L: Lanes>(
     let mut waiting = positions.iter();
     let mut fleet = Fleet::<F, L>::new(exact);
     let mut under_way = 0;
-    while fleet.flights.len() < FLIGHTS
+    while fleet.flights.len() < L::FLIGHTS.min(FLIGHTS)
         && let Some(&position) = waiting.next()
     {
         match Flight::new(exact, position, &rays[position]) {
@@ -431,7 +431,7 @@ pub(crate) fn fly<F: Flyer<L>, L: Lanes>(
             fleet.meet_blocks(at.leaves, ends);
             at.leaves
         };
-        if is_far {
+        if asks_ahead {
             fleet.fetch(moving);
         }
     }

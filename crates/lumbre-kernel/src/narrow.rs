@@ -56,6 +56,8 @@ use crate::triangles::BLOCK;
 use crate::{Accel, Hit, Hit32, Ray32};
 
 pub(crate) use self::batch::search_all;
+#[cfg(test)]
+pub(crate) use self::batch::search_triangles;
 use self::packet::Packet;
 
 /// A ray in single precision among triangles.

@@ -67,7 +67,7 @@ pub(crate) const LEAST: u32 = 4;
 pub(crate) struct Effort {
     /// Before they go alone: where boxes and triangles are small beside the distances between the rays, that is faster.
     pub(crate) most: u32,
-    /// And have it pay.
+    /// And have it pay, if they are all of a packet; for fewer, as much less.
     pub(crate) paying: u32,
 }
 
@@ -80,6 +80,12 @@ impl Effort {
             (true, true) => Self { most: 600, paying: 400 },
             (false, true) => Self { most: 800, paying: 400 },
         }
+    }
+
+    /// Whether so much work paid for these rays.
+    #[inline(always)]
+    pub(crate) fn pays(self, work: u32, those: u32) -> bool {
+        work * ALL.count_ones() <= self.paying * those.count_ones()
     }
 }
 
@@ -269,7 +275,7 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
             );
             G::answer_together::<L, MIXED>(self, rays, &mut answers);
             together.answered |= self.chosen;
-            together.pays &= is_done && self.work <= Effort::new(G::IS_ANY, MIXED).paying;
+            together.pays &= is_done && Effort::new(G::IS_ANY, MIXED).pays(self.work, self.chosen);
             if !is_done {
                 together.is_done = false;
                 break;

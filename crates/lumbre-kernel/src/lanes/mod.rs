@@ -24,6 +24,7 @@ use lumbre_math::{DVec3, Transform};
 
 use crate::Ray32;
 use crate::blocks::{ROOMS, TriangleBlock, far_of_last};
+use crate::fleet;
 use crate::holds::SingleStart;
 use crate::narrow::NarrowRay;
 #[cfg(test)]
@@ -54,6 +55,10 @@ pub(crate) trait Lanes: SphereLanes {
     type Edges: Copy + Zeroable;
     /// Sixteen numbers, alike.
     type Wide: Wide;
+    /// How many rays fly at once.
+    const FLIGHTS: usize = fleet::FLIGHTS;
+    /// Whether rays also fly through trees that caches hold.
+    const FLIES_NEARBY: bool = true;
 
     /// The instruction set that these are of.
     fn level() -> Level;

@@ -7,7 +7,7 @@ use std::marker::PhantomData;
 use super::Goal;
 use super::flyer::NarrowFlyer;
 use super::packet::Packet;
-use crate::batch::{self, AllAtOnce, Ends, Manner};
+use crate::batch::{AllAtOnce, Ends, Flying, Manner};
 use crate::fleet;
 use crate::holds::{Contents, SingleStart};
 use crate::lanes::{Lanes, Level};
@@ -30,8 +30,20 @@ pub(crate) fn search_all<G: Goal>(level: Level, accel: &Accel, rays: &[Ray32], a
         }
         return;
     };
-    let (ends, is_far) = (Answers::<G> { accel, level, rays, places: answers }, batch::is_far(accel));
-    level.run(AllAtOnce::<InSingle<G>, _> { accel, start, rays, ends, is_far, has_packets: true });
+    search_triangles::<G>(level, accel, start, rays, answers, None);
+}
+
+/// The same in a tree of triangles, where those that do not go together go as is said, if it is.
+pub(crate) fn search_triangles<G: Goal>(
+    level: Level,
+    accel: &Accel,
+    start: &SingleStart,
+    rays: &[Ray32],
+    answers: &mut [G::Answer],
+    flying: Option<Flying>,
+) {
+    let ends = Answers::<G> { accel, level, rays, places: answers };
+    level.run(AllAtOnce::<InSingle<G>, _> { accel, start, rays, ends, flying, has_packets: true });
 }
 
 /// In single precision.
@@ -67,12 +79,12 @@ impl<G: Goal> Manner for InSingle<G> {
     #[inline(always)]
     fn fly<L: Lanes>(
         exact: &Exact,
-        is_far: bool,
+        asks_ahead: bool,
         rays: &[Ray32],
         positions: &[usize],
         ends: &mut impl Ends<G::Answer>,
     ) {
-        fleet::fly::<NarrowFlyer<G>, L>(exact, is_far, rays, positions, ends);
+        fleet::fly::<NarrowFlyer<G>, L>(exact, asks_ahead, rays, positions, ends);
     }
 }
 

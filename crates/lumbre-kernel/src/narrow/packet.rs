@@ -142,7 +142,7 @@ impl<'a> Packet<'a> {
             }
             G::answer_together::<L>(self, first, ends);
             together.answered |= self.chosen;
-            together.pays &= is_done && self.work <= effort(G::IS_ANY).paying;
+            together.pays &= is_done && effort(G::IS_ANY).pays(self.work, self.chosen);
             if !is_done {
                 together.is_done = false;
                 break;

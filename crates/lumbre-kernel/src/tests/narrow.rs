@@ -10,9 +10,11 @@ use super::scenes::{
     self, Random, build, bumpy, cube, icosphere, mixture, options, precise, soup, torus, vertex,
     with_every_preset,
 };
+use crate::batch::Flying;
 use crate::blocks::Unit;
 use crate::holds::{Contents, SingleStart};
 use crate::lanes::Level;
+use crate::narrow::{self, search_triangles};
 use crate::node::Node;
 use crate::packet::PACKET;
 use crate::{Accel, BuildOptions, Geometry, GeometryKind, Hit, Hit32, Instance, Preset, Ray32, TriangleMesh};
@@ -163,23 +165,42 @@ fn check(accel: &Accel, rays: &[Ray32], expected: &[Option<Hit32>], sizes: &[usi
     check_batches(accel, rays, expected, sizes)
 }
 
+/// What a batch meets, and whether; also where those that do not go together do not fly as a rule.
+fn in_batch(accel: &Accel, level: Level, rays: &[Ray32], flies: bool) -> (Vec<Option<Hit32>>, Vec<bool>) {
+    let mut hits = vec![Some(STALE); rays.len()];
+    // What would be wrong everywhere.
+    let mut met: Vec<bool> = rays.iter().map(|ray| !accel.any_f32(ray)).collect();
+    let start = accel.single.as_ref().filter(|start| start.contents == Contents::Triangles);
+    match start.filter(|_| flies) {
+        Some(start) => {
+            let flying = Some(Flying::MIDDLE);
+            search_triangles::<narrow::Closest>(level, accel, start, rays, &mut hits, flying);
+            search_triangles::<narrow::Any>(level, accel, start, rays, &mut met, flying);
+        }
+        None => {
+            accel.closest_batch_f32_at(level, rays, &mut hits);
+            accel.any_batch_f32_at(level, rays, &mut met);
+        }
+    }
+    (hits, met)
+}
+
 /// The same in batches alone.
 #[track_caller]
 fn check_batches(accel: &Accel, rays: &[Ray32], expected: &[Option<Hit32>], sizes: &[usize]) -> usize {
     for level in Level::all() {
         for &size in sizes {
             for (rays, expected) in rays.chunks(size).zip(expected.chunks(size)) {
-                let mut hits = vec![Some(STALE); rays.len()];
-                accel.closest_batch_f32_at(level, rays, &mut hits);
-                let mut met: Vec<bool> = expected.iter().map(Option::is_none).collect();
-                accel.any_batch_f32_at(level, rays, &mut met);
-                for (((ray, expected), hit), met) in rays.iter().zip(expected).zip(&hits).zip(met) {
-                    assert_eq!(
-                        bits(hit),
-                        bits(expected),
-                        "{level:?} {size} {ray:?}: {hit:?}, not {expected:?}"
-                    );
-                    assert_eq!(met, expected.is_some(), "{level:?} {size} {ray:?}");
+                for flies in [false, true] {
+                    let (hits, met) = in_batch(accel, level, rays, flies);
+                    for (((ray, expected), hit), met) in rays.iter().zip(expected).zip(&hits).zip(met) {
+                        assert_eq!(
+                            bits(hit),
+                            bits(expected),
+                            "{level:?} {size} {flies} {ray:?}: {hit:?}, not {expected:?}"
+                        );
+                        assert_eq!(met, expected.is_some(), "{level:?} {size} {flies} {ray:?}");
+                    }
                 }
             }
         }
@@ -670,11 +691,12 @@ fn no_ray_from_within_leaks_at_a_corner_or_an_edge() {
                         assert!(!is_leak, "{name}, place {number}, {level:?}: a leak along {ray:?}");
                     }
                     for rays in [&rays[..], &rays[16..32], &rays[64..81]] {
-                        let (mut hits, mut met) = (vec![None; rays.len()], vec![false; rays.len()]);
-                        accel.closest_batch_f32_at(level, rays, &mut hits);
-                        accel.any_batch_f32_at(level, rays, &mut met);
-                        let leak = hits.iter().zip(met).position(|(hit, met)| hit.is_none() || !met);
-                        assert_eq!(leak, None, "{name}, place {number}, {level:?}: a leak along {rays:?}");
+                        for flies in [false, true] {
+                            let (hits, met) = in_batch(&accel, level, rays, flies);
+                            let leak = hits.iter().zip(met).position(|(hit, met)| hit.is_none() || !met);
+                            let about = format!("{name}, place {number}, {level:?}, {flies}");
+                            assert_eq!(leak, None, "{about}: a leak along {rays:?}");
+                        }
                     }
                 }
                 shot += rays.len();
