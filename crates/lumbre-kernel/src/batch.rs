@@ -246,7 +246,7 @@ fn search_packet<'a, G: Goal, L: Lanes, O: Others<'a, G>, const MIXED: bool>(
     others: &mut O,
     ends: &mut impl Ends<O::Found>,
 ) -> Together {
-    let whole = packet.whole::<G>();
+    let whole = packet.whole::<G, L>();
     let mut ends = self::ends(
         #[inline(always)]
         |place, outcome| ends.put(first + place, outcome),

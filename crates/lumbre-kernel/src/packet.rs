@@ -73,13 +73,18 @@ pub(crate) struct Effort {
 
 impl Effort {
     /// Less for any hit, which a ray alone has sooner; more where there is anything but triangles, of which one alone has more to do.
-    pub(crate) const fn new(is_any: bool, is_mixed: bool) -> Self {
+    const fn new<L: Lanes>(is_any: bool, is_mixed: bool) -> Self {
         match (is_any, is_mixed) {
-            (true, false) => Self { most: 160, paying: 100 },
-            (false, false) => Self { most: 300, paying: 120 },
+            (true, false) => Self { most: 160, paying: 100 }.among_triangles::<L>(),
+            (false, false) => Self { most: 300, paying: 120 }.among_triangles::<L>(),
             (true, true) => Self { most: 600, paying: 400 },
             (false, true) => Self { most: 800, paying: 400 },
         }
+    }
+
+    /// The same by these lanes, where there is nothing but triangles.
+    pub(crate) const fn among_triangles<L: Lanes>(self) -> Self {
+        if L::GOES_ON_TOGETHER { self } else { Self { most: self.paying, paying: self.paying } }
     }
 
     /// Whether so much work paid for these rays.
@@ -241,8 +246,8 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
 
     /// All there is, from the root on.
     #[inline(always)]
-    pub(crate) fn whole<G: Goal>(&self) -> Asked {
-        let most_work = Effort::new(G::IS_ANY, MIXED).most;
+    pub(crate) fn whole<G: Goal, L: Lanes>(&self) -> Asked {
+        let most_work = Effort::new::<L>(G::IS_ANY, MIXED).most;
         Asked { those: ALL, root: self.exact.start.root, most_work }
     }
 
@@ -275,7 +280,7 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
             );
             G::answer_together::<L, MIXED>(self, rays, &mut answers);
             together.answered |= self.chosen;
-            together.pays &= is_done && Effort::new(G::IS_ANY, MIXED).pays(self.work, self.chosen);
+            together.pays &= is_done && Effort::new::<L>(G::IS_ANY, MIXED).pays(self.work, self.chosen);
             if !is_done {
                 together.is_done = false;
                 break;
@@ -1017,7 +1022,7 @@ pub(crate) fn answered_together(level: Level, accel: &Accel, rays: &[Ray; PACKET
         fn run<L: Lanes>(mut self) -> u32 {
             let (accel, start) = (self.0.exact.accel(), self.0.exact.start);
             let others = &mut NoOthers::<MIXED> { accel, start };
-            let whole = self.0.whole::<Nearest>();
+            let whole = self.0.whole::<Nearest, L>();
             self.0.search::<Nearest, L, _>(self.1, whole, others, &mut |_, _| {}).answered
         }
     }

@@ -59,6 +59,8 @@ pub(crate) trait Lanes: SphereLanes {
     const FLIGHTS: usize = fleet::FLIGHTS;
     /// Whether rays also fly through trees that caches hold.
     const FLIES_NEARBY: bool = true;
+    /// Whether rays go on together for a while where that no longer pays, for what they have done: see `packet`.
+    const GOES_ON_TOGETHER: bool = true;
 
     /// The instruction set that these are of.
     fn level() -> Level;

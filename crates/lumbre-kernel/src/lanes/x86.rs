@@ -623,6 +623,8 @@ where
     // in flight take up to 1.5 times as long. Far away, all gain; and sixty-four would leave little of the nearest cache to two threads.
     const FLIGHTS: usize = if AVX512 { fleet::FLIGHTS } else { fleet::FLIGHTS / 2 };
     const FLIES_NEARBY: bool = AVX512;
+    // Packets take twice the instructions then, and a ray alone hardly more.
+    const GOES_ON_TOGETHER: bool = AVX512;
 
     #[inline(always)]
     fn level() -> Level {

@@ -69,8 +69,9 @@ pub(crate) struct Packet<'a> {
 }
 
 /// Less than in double precision, since rays in flight are faster.
-const fn effort(is_any: bool) -> Effort {
-    if is_any { Effort { most: 112, paying: 70 } } else { Effort { most: 210, paying: 84 } }
+const fn effort<L: Lanes>(is_any: bool) -> Effort {
+    let effort = if is_any { Effort { most: 112, paying: 70 } } else { Effort { most: 210, paying: 84 } };
+    effort.among_triangles::<L>()
 }
 
 impl<'a> Packet<'a> {
@@ -142,7 +143,7 @@ impl<'a> Packet<'a> {
             }
             G::answer_together::<L>(self, first, ends);
             together.answered |= self.chosen;
-            together.pays &= is_done && effort(G::IS_ANY).pays(self.work, self.chosen);
+            together.pays &= is_done && effort::<L>(G::IS_ANY).pays(self.work, self.chosen);
             if !is_done {
                 together.is_done = false;
                 break;
@@ -476,7 +477,7 @@ impl<'a> Packet<'a> {
     fn run<G: Goal, L: Lanes>(&mut self) -> bool {
         (self.alive, self.met, self.work) = (self.chosen, 0, 0);
         let nodes: &[Node] = self.exact.nodes();
-        let most_work = effort(G::IS_ANY).most;
+        let most_work = effort::<L>(G::IS_ANY).most;
         let mut stack: Stack<<G::Order as Order>::Entry> = Stack::new();
         let mut reference = self.exact.start.root;
         loop {
