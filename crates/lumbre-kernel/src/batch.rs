@@ -28,7 +28,7 @@ pub(crate) struct Flying {
     /// From so many on, they are in flight; fewer go one after another.
     least: usize,
     /// Whether what a ray will read next is asked for before it is its turn.
-    pub(crate) asks_ahead: bool,
+    asks_ahead: bool,
 }
 
 impl Flying {
@@ -358,7 +358,9 @@ impl<M: Manner, E: Ends<M::Answer>> Task for AllAtOnce<'_, '_, M, E> {
                     trials.heed(together.pays);
                     answered = together.answered;
                 }
-                if answered != packet::ALL {
+                if answered == 0 {
+                    others.extend(first..first + PACKET);
+                } else if answered != packet::ALL {
                     others.extend(
                         (0..PACKET).filter(|place| answered >> place & 1 == 0).map(|place| first + place),
                     );

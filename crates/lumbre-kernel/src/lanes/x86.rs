@@ -619,8 +619,8 @@ where
     type Edges = Edges;
     type Wide = <Self as HasWide>::Wide;
     // In flight, where sixteen numbers are two vectors, a ray takes 1.6 times the instructions that it takes alone. What it gains by them
-    // is waits that are filled, by a sixth at most in caches; but where another thread shares the core, that fills them, too, and rays
-    // in flight take up to 1.5 times as long. Far away, all gain; and sixty-four would leave little of the nearest cache to two threads.
+    // is waits that are filled, up to a fifth of the time in caches; but where another thread shares the core, that one fills them, and
+    // rays in flight take up to 1.5 times as long. Far away, all gain; and sixty-four would leave little of the nearest cache to two.
     const FLIGHTS: usize = if AVX512 { fleet::FLIGHTS } else { fleet::FLIGHTS / 2 };
     const FLIES_NEARBY: bool = AVX512;
     // Packets take twice the instructions then, and a ray alone hardly more.
