@@ -402,7 +402,7 @@ impl Accel {
     /// say, rather than of sixteen pixels in a line) are traced together, which takes down to two fifths of the time. In a tree of
     /// triangles, many of the others are in flight at the same time, where there are enough of them: in a tree that the nearest caches
     /// hold, from about a hundred on, so that a thousand rays or more at a time are answered soonest. In trees of anything else, rays
-    /// are traced one after another, as they are without AVX-512 in trees that caches hold. It works on the calling thread: to use
+    /// are traced one after another, as they are with AVX2 alone in trees that caches hold. It works on the calling thread: to use
     /// more, split `rays` and `hits`.
     ///
     /// # Panics
