@@ -10,7 +10,7 @@
 //! sixteen. Which triangles are the first four is chosen so that this takes as little room as it can: a strip of eight has ten vertices,
 //! four of either half alone and two between them.
 //!
-//! Where no instruction finds eight vertices among sixteen, and a tree is so small that caches hold it anyway, nothing is shared:
+//! Where a tree is so small that caches hold it anyway, nothing is shared, for it takes time to find eight vertices among sixteen:
 //! see [`Vertices`].
 
 use std::mem::offset_of;
@@ -20,7 +20,7 @@ use lumbre_math::Vec3;
 use rayon::prelude::*;
 
 use crate::build::Name;
-use crate::lanes::{self, Lanes, Level, Task};
+use crate::lanes::{self, Corners, Lanes, Level, Task};
 use crate::node::{Node, tag};
 use crate::prepare::has_area;
 use crate::triangles::BLOCK;
@@ -215,6 +215,14 @@ impl TriangleBlock {
     pub(crate) fn triangle(&self, lane: usize) -> [[f32; 3]; 3] {
         self.vertices_at(lane)
             .map(|vertex| [0, 1, 2].map(|axis| self.coordinates[axis * self.room() + vertex]))
+    }
+
+    /// The corners of its triangles, where each has a vertex of its own.
+    #[inline(always)]
+    pub(crate) fn own_corners(&self) -> &Corners {
+        let (own, _) =
+            self.coordinates.split_first_chunk::<{ 3 * UNSHARED }>().expect("there is room for more");
+        bytemuck::cast_ref(own)
     }
 
     /// Asks for it to be brought near, before it is needed.
@@ -452,10 +460,10 @@ impl Vertices {
     /// than it gains. In tests there are both.
     const MOST_APART: usize = if cfg!(test) { 24 } else { 1 << 14 };
 
-    /// As a ray meets so many blocks soonest. Only AVX-512 has an instruction that brings vertices to eight corners; without it, that
-    /// is a third of the instructions that a block takes.
-    pub(crate) fn of_fastest(level: Level, blocks: usize) -> Self {
-        if level.finds_vertices() || blocks > Self::MOST_APART { Self::Shared } else { Self::Apart }
+    /// As a ray meets so many blocks soonest. To bring vertices to eight corners takes a third of the instructions of a block with AVX2,
+    /// and with AVX-512, which has one for it, longer than to read twice as much from a cache.
+    pub(crate) fn of_fastest(blocks: usize) -> Self {
+        if blocks > Self::MOST_APART { Self::Shared } else { Self::Apart }
     }
 }
 

@@ -156,8 +156,7 @@ impl Packed {
     ) -> Result<(), BuildError> {
         // Among other things, rays meet so few triangles that they gain nothing by more room for them.
         let are_alone = self.entries.is_empty() && self.sphere_blocks.is_empty();
-        let vertices =
-            if are_alone { Vertices::of_fastest(level, self.names.len()) } else { Vertices::Shared };
+        let vertices = if are_alone { Vertices::of_fastest(self.names.len()) } else { Vertices::Shared };
         let Filled { units, places, orders } =
             blocks::pack(level, vertices, geometries, &self.names, followers, may_lack_area)?;
         blocks::refer(self.nodes.to_mut(), &mut self.root, &places, number_of);

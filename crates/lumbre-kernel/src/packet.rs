@@ -35,7 +35,7 @@ use crate::batch::{self, Ends};
 use crate::blocks::Blocks;
 use crate::collapse::Entry;
 use crate::holds::SingleStart;
-use crate::lanes::{self, Axes, Corners, Lanes, Level, Row, Sides, Task, Vector, WIDE, Wide};
+use crate::lanes::{self, Axes, Corners, CornersRoom, Lanes, Level, Row, Sides, Task, Vector, WIDE, Wide};
 use crate::node::{END_FACTOR, LITTLE, Node, START_FACTOR, tag};
 #[cfg(test)]
 use crate::single::Nearest;
@@ -491,26 +491,26 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
 
     /// Which triangles of a block are left.
     #[inline(always)]
-    fn bounds<W: Wide>(&self, Corners(corners): &Corners, taken: u32) -> Bounds {
+    fn bounds<W: Wide>(&self, corners: &Corners, taken: u32) -> Bounds {
         let bundle = lanes::opaque(&self.bundle);
         let [kx, ky, kz] = bundle.axes.order();
         let [ox, oy, oz] = bundle.middle;
         let (ox, oy, oz) = (W::splat(ox), W::splat(oy), W::splat(oz));
         let (sx, sy) = (W::splat(bundle.middle_shear[0]), W::splat(bundle.middle_shear[1]));
         let (az, bz, cz) = (
-            oz - W::load_twice(&corners[0][kz]),
-            oz - W::load_twice(&corners[1][kz]),
-            oz - W::load_twice(&corners[2][kz]),
+            oz - W::load_twice(&corners[kz][0]),
+            oz - W::load_twice(&corners[kz][1]),
+            oz - W::load_twice(&corners[kz][2]),
         );
         let (ax, bx, cx) = (
-            sx.times_from(az, ox - W::load_twice(&corners[0][kx])),
-            sx.times_from(bz, ox - W::load_twice(&corners[1][kx])),
-            sx.times_from(cz, ox - W::load_twice(&corners[2][kx])),
+            sx.times_from(az, ox - W::load_twice(&corners[kx][0])),
+            sx.times_from(bz, ox - W::load_twice(&corners[kx][1])),
+            sx.times_from(cz, ox - W::load_twice(&corners[kx][2])),
         );
         let (ay, by, cy) = (
-            sy.times_from(az, oy - W::load_twice(&corners[0][ky])),
-            sy.times_from(bz, oy - W::load_twice(&corners[1][ky])),
-            sy.times_from(cz, oy - W::load_twice(&corners[2][ky])),
+            sy.times_from(az, oy - W::load_twice(&corners[ky][0])),
+            sy.times_from(bz, oy - W::load_twice(&corners[ky][1])),
+            sy.times_from(cz, oy - W::load_twice(&corners[ky][2])),
         );
         let (low_x, high_x) = (ax.min(bx).min(cx), ax.max(bx).max(cx));
         let (low_y, high_y) = (ay.min(by).min(cy), ay.max(by).max(cy));
@@ -555,7 +555,7 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
     #[inline(always)]
     fn meet_triangle<G: Goal, L: Lanes>(
         &mut self,
-        Corners(corners): &Corners,
+        corners: &Corners,
         number: u32,
         lane: usize,
         bounds: &Bounds,
@@ -571,7 +571,7 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
         let (rx, ry) = (L::Wide::load(&bundle.rest[0].0), L::Wide::load(&bundle.rest[1].0));
         let (sx, sy) = (L::Wide::load(&bundle.shear[0].0), L::Wide::load(&bundle.shear[1].0));
         let lane = lane % BLOCK;
-        let at = |corner: usize, axis: usize| corners[corner][axis][lane];
+        let at = |corner: usize, axis: usize| corners[axis][corner][lane];
         // As `Lanes::meet_triangles`, with the signs turned.
         let az = oz - L::Wide::splat(at(0, kz));
         let bz = oz - L::Wide::splat(at(1, kz));
@@ -820,17 +820,18 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
     #[inline(always)]
     fn meet_triangles<G: Goal, L: Lanes>(&mut self, leaf: u32, rays: &[Ray; PACKET]) {
         let mut following = Some(leaf & tag::PLACE);
+        let mut room = CornersRoom::new();
         while let Some(place) = following {
             let block = self.triangles.block(place);
             following = block.next(place);
-            let corners = L::corners(block);
-            let bounds = self.bounds::<L::Wide>(&corners, block.taken());
+            let corners = L::corners(block, &mut room);
+            let bounds = self.bounds::<L::Wide>(corners, block.taken());
             let mut rest = bounds.mask;
             self.work += 2 + 2 * rest.count_ones();
             while rest != 0 {
                 let lane = rest.trailing_zeros() as usize;
                 rest &= rest - 1;
-                self.meet_triangle::<G, L>(&corners, place, lane, &bounds, rays);
+                self.meet_triangle::<G, L>(corners, place, lane, &bounds, rays);
             }
         }
     }

@@ -114,8 +114,8 @@ pub(crate) trait Lanes: SphereLanes {
     /// Whole numbers without what stands behind the point. None is to be 2^31 or more, or to be no number.
     fn truncated(numbers: &[f32; BLOCK]) -> [i32; BLOCK];
 
-    /// The corners of the triangles of a block.
-    fn corners(block: &TriangleBlock) -> Corners;
+    /// The corners of the triangles of a block: where they stand there, or in this room.
+    fn corners<'a>(block: &'a TriangleBlock, room: &'a mut CornersRoom) -> &'a Corners;
 
     /// Where along the ray that is.
     fn place_crossings(edges: &Self::Edges, ray: &BlockRay) -> Crossings<Self::Eight>;
@@ -134,9 +134,19 @@ pub(crate) trait Lanes: SphereLanes {
     fn pass(block: &TriangleBlock, lane: usize, shear: &Shear, origin: &[f64; 3]) -> (Passage, Inside);
 }
 
-/// Corners of triangles side by side, `[corner][axis][lane]`; those of lanes without a triangle mean nothing.
+/// Corners of triangles side by side, `[axis][corner][lane]`; those of lanes without a triangle mean nothing.
+pub(crate) type Corners = [[[f32; BLOCK]; 3]; 3];
+
+/// Room for corners.
 #[repr(align(32))]
-pub(crate) struct Corners(pub(crate) [[[f32; BLOCK]; 3]; 3]);
+pub(crate) struct CornersRoom(Corners);
+
+impl CornersRoom {
+    #[inline(always)]
+    pub(crate) fn new() -> Self {
+        Self([[[0.0; BLOCK]; 3]; 3])
+    }
+}
 
 /// Where a ray may meet the triangles of a block.
 #[derive(Clone, Copy)]
@@ -453,17 +463,6 @@ impl Level {
         all
     }
 
-    /// Whether there is an instruction for what takes eight numbers out of sixteen.
-    pub(crate) fn finds_vertices(self) -> bool {
-        match self.0 {
-            Set::Portable => false,
-            #[cfg(target_arch = "x86_64")]
-            Set::Avx2 => false,
-            #[cfg(target_arch = "x86_64")]
-            Set::Avx512 => true,
-        }
-    }
-
     /// Runs the task with these lanes.
     #[inline(always)]
     pub(crate) fn run<T: Task>(self, task: T) -> T::Output {
@@ -644,13 +643,13 @@ pub(crate) fn meet_triangles_at(
 
 /// [`Lanes::corners`] at a level, for tests.
 #[cfg(test)]
-pub(crate) fn corners_at(level: Level, block: &TriangleBlock) -> [[[f32; BLOCK]; 3]; 3] {
+pub(crate) fn corners_at(level: Level, block: &TriangleBlock) -> Corners {
     struct Taking<'a>(&'a TriangleBlock);
     impl Task for Taking<'_> {
-        type Output = [[[f32; BLOCK]; 3]; 3];
+        type Output = Corners;
         #[inline(always)]
         fn run<L: Lanes>(self) -> Self::Output {
-            L::corners(self.0).0
+            *L::corners(self.0, &mut CornersRoom::new())
         }
     }
     level.run(Taking(block))

@@ -5,7 +5,7 @@ use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
 
 use super::wide::{Portable8, Portable16};
-use super::{Axes, Corners, Crossings, Eight, Lanes, Level, Row, Set, Sides, Vector, WIDE};
+use super::{Axes, Corners, CornersRoom, Crossings, Eight, Lanes, Level, Row, Set, Sides, Vector, WIDE};
 use crate::Ray32;
 use crate::blocks::TriangleBlock;
 use crate::holds::SingleStart;
@@ -167,13 +167,14 @@ impl Lanes for Portable {
     fn narrow_corners<const IS_ALONE: bool>(block: &TriangleBlock, ray: &NarrowRay) -> [[Self::Eight; 3]; 3] {
         let splat = Self::Eight::splat;
         let [kx, ky, kz] = ray.axes.order();
-        let Corners(corners) = Self::corners(block);
+        let mut room = CornersRoom::new();
+        let corners = Self::corners(block, &mut room);
         let mut sheared = [[splat(0.0); 3]; 3];
-        for (corner, axes) in corners.iter().enumerate() {
+        for corner in 0..3 {
             // All three with the sign turned, which their products do not have.
-            let z = splat(ray.origin[2]) - Self::Eight::load(&axes[kz]);
-            let across = splat(ray.origin[0]) - Self::Eight::load(&axes[kx]);
-            let up = splat(ray.origin[1]) - Self::Eight::load(&axes[ky]);
+            let z = splat(ray.origin[2]) - Self::Eight::load(&corners[kz][corner]);
+            let across = splat(ray.origin[0]) - Self::Eight::load(&corners[kx][corner]);
+            let up = splat(ray.origin[1]) - Self::Eight::load(&corners[ky][corner]);
             sheared[0][corner] = across - splat(ray.shear[0]) * z;
             sheared[1][corner] = up - splat(ray.shear[1]) * z;
             sheared[2][corner] = z;
@@ -210,9 +211,10 @@ impl Lanes for Portable {
         let mut z = [[0.0; BLOCK]; 3];
         let [kx, ky, kz] = ray.axes.order();
         let (origin, rest, shear) = (&ray.origin, &ray.rest, &ray.shear);
-        let Corners(corners) = Self::corners(block);
+        let mut room = CornersRoom::new();
+        let corners = Self::corners(block, &mut room);
         for corner in 0..3 {
-            let [across, up, along] = [kx, ky, kz].map(|axis| &corners[corner][axis]);
+            let [across, up, along] = [kx, ky, kz].map(|axis| &corners[axis][corner]);
             for lane in 0..BLOCK {
                 // All three with the sign turned, which their products do not have.
                 let height = origin[2] - along[lane];
@@ -253,20 +255,19 @@ impl Lanes for Portable {
     }
 
     #[inline]
-    fn corners(block: &TriangleBlock) -> Corners {
-        let (rows, room) = (block.coordinates(), block.room());
+    fn corners<'a>(block: &'a TriangleBlock, room: &'a mut CornersRoom) -> &'a Corners {
         if block.is_unshared() {
-            let eight = |start: usize| {
-                *rows[start..].first_chunk().expect("a row for each corner, and one behind them")
-            };
-            return Corners(
-                [0, 1, 2].map(|corner| [0, 1, 2].map(|axis| eight(axis * room + BLOCK * corner))),
-            );
+            return block.own_corners();
         }
-        Corners([0, 1, 2].map(|corner| {
-            let vertices: [usize; BLOCK] = std::array::from_fn(|lane| block.vertex_at(corner, lane));
-            [0, 1, 2].map(|axis| vertices.map(|vertex| rows[axis * room + vertex]))
-        }))
+        let CornersRoom(corners) = room;
+        let rows = block.coordinates();
+        for (axis, corners) in corners.iter_mut().enumerate() {
+            for (corner, lanes) in corners.iter_mut().enumerate() {
+                *lanes =
+                    std::array::from_fn(|lane| rows[axis * block.room() + block.vertex_at(corner, lane)]);
+            }
+        }
+        corners
     }
 
     #[inline]

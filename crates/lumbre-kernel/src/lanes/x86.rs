@@ -7,7 +7,9 @@ use bytemuck::Zeroable;
 use lumbre_geometry::Ray;
 use lumbre_math::{DAffine3, DVec3, Transform};
 
-use super::{Axes, Corners, Crossings, Lanes, Level, Question, Row, Set, Sides, Task, WIDE, Wide, wide};
+use super::{
+    Axes, Corners, CornersRoom, Crossings, Lanes, Level, Question, Row, Set, Sides, Task, WIDE, Wide, wide,
+};
 use crate::blocks::{MOST_SHARED, QUAD, TriangleBlock, USUAL, far_of_last};
 use crate::fleet;
 use crate::holds::SingleStart;
@@ -212,7 +214,7 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
         let by_room = [order[0] * room as u32, order[1] * room as u32, order[2] * room as u32, far];
         let rows = if !IS_ALONE {
             &by_room
-        } else if !AVX512 && room > MOST_SHARED {
+        } else if room > MOST_SHARED {
             super::opaque(&rows_by_room[3])
         } else if room == USUAL[0] {
             super::opaque(&rows_by_room[0])
@@ -998,27 +1000,28 @@ where
     }
 
     #[inline(always)]
-    fn corners(block: &TriangleBlock) -> Corners {
+    fn corners<'a>(block: &'a TriangleBlock, room: &'a mut CornersRoom) -> &'a Corners {
+        if block.is_unshared() {
+            return block.own_corners();
+        }
+        let CornersRoom(corners) = room;
         let coordinates = block.coordinates().as_ptr();
         let room = block.room();
         let far = far_of_last(room);
         // No `map`: it does not take on the instruction set of who calls it.
         let [a, b, c] = *block.corners();
         let places = [Self::places(a), Self::places(b), Self::places(c)];
-        let mut corners = Corners([[[0.0; BLOCK]; 3]; 3]);
         // SAFETY: see `X86`. A row begins at 62 at most, in an array of 96: behind that are 32 more, and no more are looked at.
         unsafe {
-            for axis in 0..3 {
+            for (axis, corners) in corners.iter_mut().enumerate() {
                 let row = coordinates.add(axis * room);
-                for (corner, &places) in places.iter().enumerate() {
-                    let found = if block.is_unshared() {
-                        _mm256_loadu_ps(row.add(BLOCK * corner))
-                    } else if AVX512 {
+                for (corner, &places) in corners.iter_mut().zip(&places) {
+                    let found = if AVX512 {
                         Self::of_sixteen(_mm512_loadu_ps(row), places)
                     } else {
                         Self::of_two(_mm256_loadu_ps(row), Self::far(row, far), places)
                     };
-                    _mm256_store_ps(corners.0[corner][axis].as_mut_ptr(), found);
+                    _mm256_storeu_ps(corner.as_mut_ptr(), found);
                 }
             }
         }

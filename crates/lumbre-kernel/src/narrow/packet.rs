@@ -10,7 +10,7 @@ use super::{Goal, NarrowRay, Precise, TINY, within};
 use crate::batch::Ends;
 use crate::blocks::{Blocks, TriangleBlock};
 use crate::holds::SingleStart;
-use crate::lanes::{self, Axes, Corners, Eight, Lanes, Row, Sides, Vector, WIDE, Wide};
+use crate::lanes::{self, Axes, Corners, CornersRoom, Eight, Lanes, Row, Sides, Vector, WIDE, Wide};
 use crate::node::{END_FACTOR, LITTLE, Node, START_FACTOR, Units, tag};
 use crate::packet::{ALL, CULL_ERROR, Effort, Frustum, LEAST, PACKET, Together};
 use crate::single::{Exact, Outcome};
@@ -306,23 +306,23 @@ impl<'a> Packet<'a> {
 
     /// A bit for each triangle of a block that any of the rays may meet; those of lanes without one mean nothing.
     #[inline(always)]
-    fn left<V: Eight>(&self, Corners(corners): &Corners) -> u32 {
+    fn left<V: Eight>(&self, corners: &Corners) -> u32 {
         let bundle = lanes::opaque(&self.bundle);
         let [kx, ky, kz] = bundle.axes.order();
         let [ox, oy, oz] = bundle.middle;
         let (ox, oy, oz) = (V::splat(ox), V::splat(oy), V::splat(oz));
         let (sx, sy) = (V::splat(bundle.middle_shear[0]), V::splat(bundle.middle_shear[1]));
         let (az, bz, cz) =
-            (oz - V::load(&corners[0][kz]), oz - V::load(&corners[1][kz]), oz - V::load(&corners[2][kz]));
+            (oz - V::load(&corners[kz][0]), oz - V::load(&corners[kz][1]), oz - V::load(&corners[kz][2]));
         let (ax, bx, cx) = (
-            sx.times_from(az, ox - V::load(&corners[0][kx])),
-            sx.times_from(bz, ox - V::load(&corners[1][kx])),
-            sx.times_from(cz, ox - V::load(&corners[2][kx])),
+            sx.times_from(az, ox - V::load(&corners[kx][0])),
+            sx.times_from(bz, ox - V::load(&corners[kx][1])),
+            sx.times_from(cz, ox - V::load(&corners[kx][2])),
         );
         let (ay, by, cy) = (
-            sy.times_from(az, oy - V::load(&corners[0][ky])),
-            sy.times_from(bz, oy - V::load(&corners[1][ky])),
-            sy.times_from(cz, oy - V::load(&corners[2][ky])),
+            sy.times_from(az, oy - V::load(&corners[ky][0])),
+            sy.times_from(bz, oy - V::load(&corners[ky][1])),
+            sy.times_from(cz, oy - V::load(&corners[ky][2])),
         );
         let (low_x, high_x) = (ax.min(bx).min(cx), ax.max(bx).max(cx));
         let (low_y, high_y) = (ay.min(by).min(cy), ay.max(by).max(cy));
@@ -352,7 +352,7 @@ impl<'a> Packet<'a> {
     #[inline(always)]
     fn meet_triangle<G: Goal, L: Lanes>(
         &mut self,
-        Corners(corners): &Corners,
+        corners: &Corners,
         block: &TriangleBlock,
         place: u32,
         lane: usize,
@@ -365,15 +365,15 @@ impl<'a> Packet<'a> {
         let lane = lane % BLOCK;
         let splat = L::Wide::splat;
         // As `NarrowRay::pass`, with the signs turned.
-        let az = oz - splat(corners[0][kz][lane]);
-        let bz = oz - splat(corners[1][kz][lane]);
-        let cz = oz - splat(corners[2][kz][lane]);
-        let ax = (ox - splat(corners[0][kx][lane])) - sx * az;
-        let bx = (ox - splat(corners[1][kx][lane])) - sx * bz;
-        let cx = (ox - splat(corners[2][kx][lane])) - sx * cz;
-        let ay = (oy - splat(corners[0][ky][lane])) - sy * az;
-        let by = (oy - splat(corners[1][ky][lane])) - sy * bz;
-        let cy = (oy - splat(corners[2][ky][lane])) - sy * cz;
+        let az = oz - splat(corners[kz][0][lane]);
+        let bz = oz - splat(corners[kz][1][lane]);
+        let cz = oz - splat(corners[kz][2][lane]);
+        let ax = (ox - splat(corners[kx][0][lane])) - sx * az;
+        let bx = (ox - splat(corners[kx][1][lane])) - sx * bz;
+        let cx = (ox - splat(corners[kx][2][lane])) - sx * cz;
+        let ay = (oy - splat(corners[ky][0][lane])) - sy * az;
+        let by = (oy - splat(corners[ky][1][lane])) - sy * bz;
+        let cy = (oy - splat(corners[ky][2][lane])) - sy * cz;
         let (bc, ca, ab) = (cx * by, ax * cy, bx * ay);
         let (u, v, w) = (bc - cy * bx, ca - ay * cx, ab - by * ax);
         let within = within([u, v, w]);
@@ -480,6 +480,7 @@ impl<'a> Packet<'a> {
         let most_work = effort::<L>(G::IS_ANY).most;
         let mut stack: Stack<<G::Order as Order>::Entry> = Stack::new();
         let mut reference = self.exact.start.root;
+        let mut room = CornersRoom::new();
         loop {
             while reference >> tag::SHIFT == tag::INNER {
                 self.work += 1;
@@ -506,13 +507,13 @@ impl<'a> Packet<'a> {
             while let Some(place) = following {
                 let block = self.triangles.block(place);
                 following = block.next(place);
-                let corners = L::corners(block);
-                let mut rest = self.left::<L::Eight>(&corners) & block.taken();
+                let corners = L::corners(block, &mut room);
+                let mut rest = self.left::<L::Eight>(corners) & block.taken();
                 self.work += 2 + 2 * rest.count_ones();
                 while rest != 0 {
                     let lane = rest.trailing_zeros() as usize;
                     rest &= rest - 1;
-                    self.meet_triangle::<G, L>(&corners, block, place, lane);
+                    self.meet_triangle::<G, L>(corners, block, place, lane);
                 }
             }
             if self.alive == 0 {

@@ -284,7 +284,7 @@ fn a_block_has_the_corners_of_its_triangles_however_many_they_share() {
                 assert_eq!(block.triangle(lane), corners);
                 for level in Level::all() {
                     let side_by_side = corners_at(level, block);
-                    let corner = |corner: usize| [0, 1, 2].map(|axis| side_by_side[corner][axis][lane]);
+                    let corner = |corner: usize| [0, 1, 2].map(|axis| side_by_side[axis][corner][lane]);
                     assert_eq!([corner(0), corner(1), corner(2)], corners, "{level:?}");
                 }
             }
@@ -332,7 +332,7 @@ fn triangles_stand_so_that_either_half_finds_its_vertices_in_little_room() {
 }
 
 #[test]
-fn small_trees_of_triangles_alone_share_nothing_where_vertices_are_not_found_at_once() {
+fn small_trees_of_triangles_alone_share_nothing() {
     let all = grid(&mut Random(88), 0.0);
     let GeometryKind::Mesh(mesh) = &all.kind else { unreachable!() };
     let indices = mesh.indices[..96].to_vec();
@@ -347,7 +347,7 @@ fn small_trees_of_triangles_alone_share_nothing_where_vertices_are_not_found_at_
         assert!(sharing == 0 || 2 * sharing > places.len(), "{sharing} of {}", places.len());
         sharing != 0
     };
-    assert_eq!(do_share(vec![few.clone()]), Level::best().finds_vertices());
+    assert!(!do_share(vec![few.clone()]));
     assert!(do_share(vec![few, ball]));
     assert!(do_share(vec![all]));
 }

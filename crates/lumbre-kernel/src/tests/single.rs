@@ -213,10 +213,10 @@ fn rays_that_go_together_are_answered_as_each_alone() {
             let kinds = meshes.iter().map(|mesh| GeometryKind::Mesh(mesh.clone().into()));
             let list = kinds.zip(5..).map(|(kind, id)| Geometry { id, kind }).collect();
             let accel = Accel::build(list, &BuildOptions { preset }).unwrap();
-            let packets: Vec<_> = (0..500).map(|i| alike(&mut random, &meshes[i % 2], size)).collect();
+            let packets: Vec<_> = (0..800).map(|i| alike(&mut random, &meshes[i % 2], size)).collect();
             let together = |packet: &&_| packet::answered_together(accel.level, &accel, packet) != 0;
             let count = packets.iter().filter(together).count();
-            assert!(count > 40, "{count}");
+            assert!(count > 60, "{count}");
             check(&accel, packets.as_flattened(), 1_500);
             // In a long batch, those that do not gain by it are seldom tried.
             packets.iter().for_each(|packet| check_packet(&accel, packet));
