@@ -104,6 +104,9 @@ pub(crate) struct SingleStart {
     pub(crate) tree_origin: [f64; 4],
     /// What the corners are relative to, and a zero.
     pub(crate) mesh_origin: [f64; 4],
+    /// The latter in single precision, if nothing is lost by that: numbers in single precision then differ from it by the same, to the
+    /// bit, in either precision.
+    pub(crate) single_mesh_origin: Option<[f32; 4]>,
     /// Tree units per unit of space.
     pub(crate) scale: f64,
     /// How far from zero a ray may start on each axis, in tree units.
@@ -158,6 +161,9 @@ impl SingleStart {
             },
             tree_origin: padded(units.origin, 0.0),
             mesh_origin: padded(mesh_origin, 0.0),
+            single_mesh_origin: Some(mesh_origin.as_vec3())
+                .filter(|single| single.as_dvec3() == mesh_origin)
+                .map(|single| single.extend(0.0).to_array()),
             scale: units.scale,
             farthest: [units.near as f32, units.near as f32, units.near as f32, f32::INFINITY],
             margin: units.single_margin(),

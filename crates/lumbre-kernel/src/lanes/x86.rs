@@ -500,8 +500,11 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
     /// Three coordinates relative to the mesh, rounded once.
     #[inline(always)]
     fn local(start: &SingleStart, origin: __m128) -> __m128 {
-        // SAFETY: see `X86`. The load is of an array of four.
+        // SAFETY: see `X86`. The loads are of arrays of four.
         unsafe {
+            if let Some(mesh_origin) = &start.single_mesh_origin {
+                return _mm_sub_ps(origin, _mm_loadu_ps(mesh_origin.as_ptr()));
+            }
             let origin = _mm256_sub_pd(_mm256_cvtps_pd(origin), _mm256_loadu_pd(start.mesh_origin.as_ptr()));
             _mm256_cvtpd_ps(origin)
         }

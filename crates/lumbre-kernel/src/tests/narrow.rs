@@ -922,3 +922,27 @@ fn a_tree_that_was_moved_answers_as_one_that_is_built_anew() {
         }
     });
 }
+
+#[test]
+fn numbers_in_single_precision_differ_by_the_same_in_either_precision() {
+    // What `SingleStart::single_mesh_origin` relies on.
+    let mut random = Random(131);
+    let mut inexact = 0;
+    for _ in 0..if cfg!(miri) { 1_000 } else { 1_000_000 } {
+        let a = f32::from_bits(random.bits() as u32);
+        // Of any size, or of about the same, and with few digits or all: halfway cases are among them.
+        let b = match random.below(3) {
+            0 => f32::from_bits(random.bits() as u32),
+            1 => f32::from_bits(a.to_bits().wrapping_add((random.bits() as u32) << 20)),
+            _ => f32::from_bits(
+                (a.to_bits() ^ 1 << 31).wrapping_sub((random.below(40) as u32) << 23) & !0 << 12,
+            ),
+        };
+        let wide = f64::from(a) - f64::from(b);
+        inexact += usize::from(wide + f64::from(b) != f64::from(a));
+        if a.is_finite() && b.is_finite() {
+            assert_eq!((a - b).to_bits(), (wide as f32).to_bits(), "{a:e} {b:e}");
+        }
+    }
+    assert!(inexact > 100, "{inexact}");
+}
