@@ -18,7 +18,9 @@ use crate::lanes::{self, Lanes, Level, Question, Task};
 use crate::node::tag;
 use crate::opening::Start;
 use crate::query::{All, Any, Closest, Filter};
-use crate::single::{self, Alone, Candidate, Goal, Nearest, Outcome, SingleRay, Step, Whether, Winner};
+use crate::single::{
+    self, Alone, AskedRay, Candidate, Goal, Nearest, Outcome, SingleRay, Step, Whether, Winner,
+};
 use crate::sphere_search::{self, CloudRay};
 use crate::stack::Stack;
 use crate::traverse::{self, Place, Search, Standing};
@@ -53,7 +55,7 @@ pub(crate) fn search<G: Sought, F: Filter>(
     filter: &F,
 ) -> Outcome<G::Found> {
     let (root, around) = (start.root, &Place::default());
-    level.run(Whole::<G, F> { accel, start, root, around, ray, filter, goal: PhantomData })
+    level.run(Whole::<G, F> { accel, start, root, around, ray: ray.into(), filter, goal: PhantomData })
 }
 
 /// A search with one ray, from a node on.
@@ -63,7 +65,7 @@ pub(crate) struct Whole<'a, 'r, G, F> {
     root: u32,
     /// Where the tree stands.
     around: &'r Place,
-    ray: &'r Ray,
+    ray: AskedRay<'r>,
     filter: &'r F,
     goal: PhantomData<G>,
 }
@@ -71,8 +73,13 @@ pub(crate) struct Whole<'a, 'r, G, F> {
 impl<'a, 'r, G> Whole<'a, 'r, G, All> {
     /// In a tree that stands nowhere else, among all there is.
     #[inline(always)]
-    pub(crate) fn new(accel: &'a Accel, start: &'a SingleStart, around: &'r Place, ray: &'r Ray) -> Self {
-        Self { accel, start, root: start.root, around, ray, filter: &All, goal: PhantomData }
+    pub(crate) fn new(
+        accel: &'a Accel,
+        start: &'a SingleStart,
+        around: &'r Place,
+        ray: impl Into<AskedRay<'r>>,
+    ) -> Self {
+        Self { accel, start, root: start.root, around, ray: ray.into(), filter: &All, goal: PhantomData }
     }
 }
 
@@ -81,8 +88,9 @@ impl<G: Sought, F: Filter> Task for Whole<'_, '_, G, F> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Self::Output {
-        let Self { accel, start, root, around, ray, filter, .. } = self;
-        let Some(slabs) = L::start_single(start, lanes::opaque(ray)) else { return Outcome::Unsettled };
+        let Self { accel, start, root, around, ray: asked, filter, .. } = self;
+        let ray = asked.ray;
+        let Some(slabs) = asked.start::<L>(start) else { return Outcome::Unsettled };
         let mut way = Way::<L>::new(&accel.tree.nodes, slabs);
         let mut stack = Stack::new();
         let mut next = way.descend::<G::Order>(root, &mut stack);
@@ -91,7 +99,8 @@ impl<G: Sought, F: Filter> Task for Whole<'_, '_, G, F> {
             return Outcome::Settled(G::found(accel, G::NOTHING));
         }
         let selection = filter.select(accel, Standing::at(around));
-        let single = SingleRay::new::<L>(accel, start, ray, way.slabs(), selection);
+        let blocks = asked.start_blocks::<L>(start, way.slabs());
+        let single = SingleRay::new(accel, start, blocks, selection);
         let mut among = AmongOthers { accel, single, filter, around, within: None, clouds: None };
         for entry in &*accel.infinite {
             if let Some(last) = among.meet_infinite::<G, L>(entry, ray, &mut way) {
@@ -370,7 +379,7 @@ impl<'a> Placed<'a> {
                     start,
                     root,
                     around: &place,
-                    ray: &ray,
+                    ray: (&ray).into(),
                     filter,
                     goal: PhantomData,
                 }),

@@ -43,15 +43,18 @@ mod packet;
 use std::marker::PhantomData;
 
 use bytemuck::Zeroable;
-use lumbre_geometry::Ray;
 
+use crate::anything::Whole;
 use crate::batch::Ends;
 use crate::blocks::TriangleBlock;
 use crate::fleet::Crossing;
 use crate::holds::{Contents, SingleStart};
-use crate::lanes::{self, Asked, Axes, Lanes, Level, Question, Vector};
-use crate::single::{self, Exact, Outcome};
+use crate::lanes::{self, Asked, Axes, Lanes, Level, Question, Task, Vector};
+use crate::packet::Companion;
+use crate::query::All;
+use crate::single::{self, Alone, AskedRay, Exact, Outcome, Winner};
 use crate::stack::{AsBuilt, ByDistance, Order};
+use crate::traverse::Place;
 use crate::triangles::BLOCK;
 use crate::{Accel, Hit, Hit32, Ray32};
 
@@ -347,12 +350,16 @@ pub(crate) trait Goal: Sized {
     fn alone_at(level: Level) -> Asked<Self::Answer, Ray32> {
         level.asked::<Narrowly<Self>>()
     }
+    /// The same in double precision.
+    type Wide: Companion;
+    /// What that finds in a tree itself, rounded.
+    fn rounded(accel: &Accel, answer: <Self::Wide as single::Goal>::Answer) -> Self::Answer;
+    /// The same of what it hands out.
+    fn rounded_found(found: <Self::Wide as single::Goal>::Found) -> Self::Answer;
     /// Searches along a ray alone; not where it does not come from nearby.
     fn alone<L: Lanes>(exact: &Exact, ray: &Ray32) -> Outcome<Self::Answer>;
     /// What double precision says.
     fn widely(accel: &Accel, ray: &Ray32) -> Self::Answer;
-    /// The same for every ray.
-    fn all_widely(level: Level, accel: &Accel, rays: &[Ray], answers: &mut [Self::Answer]);
     /// The answer of a ray in flight: whether any hit `is_met`, or the nearest, at this `t`.
     fn answer(exact: &Exact, is_met: bool, nearest: &Nearest, t: f32) -> Self::Answer;
     /// Puts the answers of rays that went together, the first of which has this position.
@@ -368,7 +375,27 @@ pub(crate) enum Any {}
 impl Goal for Closest {
     type Order = ByDistance;
     type Answer = Option<Hit32>;
+    type Wide = single::Nearest;
     const IS_ANY: bool = false;
+
+    #[inline(always)]
+    fn rounded(accel: &Accel, winner: Option<Winner>) -> Option<Hit32> {
+        // No `map`: it does not take on the instruction set of who calls it.
+        let Winner { root, geometry, primitive } = winner?;
+        Some(Hit32 {
+            t: root.t as f32,
+            local: [root.local.x as f32, root.local.y as f32],
+            id: accel.geometries[geometry as usize].id,
+            primitive,
+            geometry,
+            instance: Hit32::NO_INSTANCE,
+        })
+    }
+
+    #[inline(always)]
+    fn rounded_found(found: Option<Hit>) -> Option<Hit32> {
+        found.as_ref().map(narrowed)
+    }
 
     #[inline(always)]
     fn alone<L: Lanes>(exact: &Exact, ray: &Ray32) -> Outcome<Self::Answer> {
@@ -378,14 +405,6 @@ impl Goal for Closest {
     #[inline(never)]
     fn widely(accel: &Accel, ray: &Ray32) -> Option<Hit32> {
         accel.closest(&ray.to_f64()).map(|hit| narrowed(&hit))
-    }
-
-    fn all_widely(level: Level, accel: &Accel, rays: &[Ray], answers: &mut [Option<Hit32>]) {
-        let mut hits = vec![None; rays.len()];
-        accel.closest_batch_at(level, rays, &mut hits);
-        for (answer, hit) in answers.iter_mut().zip(&hits) {
-            *answer = hit.as_ref().map(narrowed);
-        }
     }
 
     #[inline(always)]
@@ -402,7 +421,18 @@ impl Goal for Closest {
 impl Goal for Any {
     type Order = AsBuilt;
     type Answer = bool;
+    type Wide = single::Whether;
     const IS_ANY: bool = true;
+
+    #[inline(always)]
+    fn rounded(_: &Accel, is_met: bool) -> bool {
+        is_met
+    }
+
+    #[inline(always)]
+    fn rounded_found(is_met: bool) -> bool {
+        is_met
+    }
 
     #[inline(always)]
     fn alone<L: Lanes>(exact: &Exact, ray: &Ray32) -> Outcome<bool> {
@@ -412,10 +442,6 @@ impl Goal for Any {
     #[inline(never)]
     fn widely(accel: &Accel, ray: &Ray32) -> bool {
         accel.any(&ray.to_f64())
-    }
-
-    fn all_widely(level: Level, accel: &Accel, rays: &[Ray], answers: &mut [bool]) {
-        accel.any_batch_at(level, rays, answers);
     }
 
     #[inline(always)]
@@ -456,13 +482,25 @@ impl NarrowQuestions {
             Some(Contents::Triangles) => {
                 Self { closest: level.asked::<Narrowly<Closest>>(), any: level.asked::<Narrowly<Any>>() }
             }
-            _ => Self { closest: level.asked::<Widely<Closest>>(), any: level.asked::<Widely<Any>>() },
+            Some(Contents::Shapes) => Self {
+                closest: level.asked::<AmongShapes<Closest>>(),
+                any: level.asked::<AmongShapes<Any>>(),
+            },
+            Some(Contents::Anything) => Self {
+                closest: level.asked::<AmongAnything<Closest>>(),
+                any: level.asked::<AmongAnything<Any>>(),
+            },
+            None => Self { closest: level.asked::<Widely<Closest>>(), any: level.asked::<Widely<Any>>() },
         }
     }
 }
 
 /// In single precision.
 struct Narrowly<G>(PhantomData<G>);
+/// In double precision, rounded, in a tree of shapes and custom geometry, too.
+struct AmongShapes<G>(PhantomData<G>);
+/// The same in a tree of anything.
+struct AmongAnything<G>(PhantomData<G>);
 /// In double precision, rounded.
 struct Widely<G>(PhantomData<G>);
 
@@ -476,6 +514,41 @@ impl<G: Goal> Question for Narrowly<G> {
             Some(start) => alone::search::<G, L>(&Exact::new(accel, start), ray),
             None => G::widely(accel, ray),
         }
+    }
+}
+
+impl<G: Goal> Question for AmongShapes<G> {
+    type Ray = Ray32;
+    type Answer = G::Answer;
+
+    #[inline(always)]
+    fn ask<L: Lanes>(accel: &Accel, ray: &Ray32) -> G::Answer {
+        let wide = ray.to_f64();
+        if let Some(start) = &accel.single
+            && let asked = AskedRay::of(ray, &wide)
+            && let Outcome::Settled(answer) = Alone::<G::Wide, true>::new(accel, start, asked).run::<L>()
+        {
+            return G::rounded(accel, answer);
+        }
+        G::widely(accel, ray)
+    }
+}
+
+impl<G: Goal> Question for AmongAnything<G> {
+    type Ray = Ray32;
+    type Answer = G::Answer;
+
+    #[inline(always)]
+    fn ask<L: Lanes>(accel: &Accel, ray: &Ray32) -> G::Answer {
+        let (wide, around) = (ray.to_f64(), Place::default());
+        if let Some(start) = &accel.single
+            && let asked = AskedRay::of(ray, &wide)
+            && let Outcome::Settled(found) =
+                Whole::<G::Wide, All>::new(accel, start, &around, asked).run::<L>()
+        {
+            return G::rounded_found(found);
+        }
+        G::widely(accel, ray)
     }
 }
 

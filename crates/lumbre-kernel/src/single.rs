@@ -31,7 +31,7 @@ use crate::stack::{AsBuilt, ByDistance, Order, Stack};
 use crate::traverse::{PlacedTree, What};
 use crate::triangles::{self, BLOCK, BlockRay, Inside, Meeting, Passage, Shear};
 use crate::way::Way;
-use crate::{Accel, Faces, Hit, InstancePath, traverse};
+use crate::{Accel, Faces, Hit, InstancePath, Ray32, traverse};
 
 /// What came of a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -403,16 +403,14 @@ pub(crate) struct SingleRay<'a, const MIXED: bool, S = All> {
 }
 
 impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
-    /// Starts with a ray that is on its way.
+    /// Starts with a ray for triangles, and what takes heights along it to places in the range of boxes: see [`Lanes::start_blocks`].
     #[inline(always)]
-    pub(crate) fn new<L: Lanes>(
+    pub(crate) fn new(
         accel: &'a Accel,
         start: &'a SingleStart,
-        ray: &Ray,
-        slabs: &Slabs,
+        (blocks, place_per_height): (BlockRay, f32),
         selection: S,
     ) -> Self {
-        let (blocks, place_per_height) = L::start_blocks(start, ray, slabs);
         let exact = Exact::new(accel, start);
         let best = Candidate::NONE;
         Self { exact, blocks, hulls: None, place_per_height, best, crossed: None, selection }
@@ -1094,13 +1092,55 @@ impl<G: Goal> Question for Plainly<G> {
     }
 }
 
+/// A ray in double precision, and how it was asked.
+#[derive(Clone, Copy)]
+pub(crate) struct AskedRay<'r> {
+    pub(crate) ray: &'r Ray,
+    /// What it was made of just now, if it was: to read in wide pieces what was written number by number would have to wait.
+    narrow: Option<&'r Ray32>,
+}
+
+impl<'r> From<&'r Ray> for AskedRay<'r> {
+    #[inline(always)]
+    fn from(ray: &'r Ray) -> Self {
+        Self { ray, narrow: None }
+    }
+}
+
+impl<'r> AskedRay<'r> {
+    /// A ray that is this one in single precision.
+    #[inline(always)]
+    pub(crate) fn of(narrow: &'r Ray32, ray: &'r Ray) -> Self {
+        Self { ray, narrow: Some(narrow) }
+    }
+
+    /// The ray for boxes: see [`Lanes::start_single`].
+    // Opaque here and where it is read again: what was read would else be written down, to be kept until then.
+    #[inline(always)]
+    pub(crate) fn start<L: Lanes>(&self, start: &SingleStart) -> Option<Slabs> {
+        match self.narrow {
+            Some(narrow) => L::start_widened(start, lanes::opaque(narrow)),
+            None => L::start_single(start, lanes::opaque(self.ray)),
+        }
+    }
+
+    /// The same for triangles: see [`Lanes::start_blocks`].
+    #[inline(always)]
+    pub(crate) fn start_blocks<L: Lanes>(&self, start: &SingleStart, slabs: &Slabs) -> (BlockRay, f32) {
+        match self.narrow {
+            Some(narrow) => L::start_blocks_widened(start, lanes::opaque(narrow), slabs),
+            None => L::start_blocks(start, self.ray, slabs),
+        }
+    }
+}
+
 /// A search with one ray. `MIXED` where there is anything but triangles.
 pub(crate) struct Alone<'a, 'r, G, const MIXED: bool, S = All> {
     accel: &'a Accel,
     start: &'a SingleStart,
     /// The node that it starts at.
     root: u32,
-    ray: &'r Ray,
+    ray: AskedRay<'r>,
     selection: S,
     goal: PhantomData<G>,
 }
@@ -1148,7 +1188,7 @@ pub(crate) fn search_placed<G: Goal, L: Lanes, S: Selection>(
 
 impl<'a, 'r, G: Goal, const MIXED: bool> Alone<'a, 'r, G, MIXED> {
     #[inline(always)]
-    pub(crate) fn new(accel: &'a Accel, start: &'a SingleStart, ray: &'r Ray) -> Self {
+    pub(crate) fn new(accel: &'a Accel, start: &'a SingleStart, ray: impl Into<AskedRay<'r>>) -> Self {
         Self::among(accel, start, start.root, ray, All)
     }
 }
@@ -1158,8 +1198,7 @@ impl<G: Goal, const MIXED: bool, S: Selection> Task for Alone<'_, '_, G, MIXED, 
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Self::Output {
-        // Opaque here and where the ray is read again: what was read would else be written down, to be kept until then.
-        match L::start_single(self.start, lanes::opaque(self.ray)) {
+        match self.ray.start::<L>(self.start) {
             Some(slabs) => self.go::<L>(slabs),
             None => Outcome::Unsettled,
         }
@@ -1173,16 +1212,17 @@ impl<'a, 'r, G: Goal, const MIXED: bool, S: Selection> Alone<'a, 'r, G, MIXED, S
         accel: &'a Accel,
         start: &'a SingleStart,
         root: u32,
-        ray: &'r Ray,
+        ray: impl Into<AskedRay<'r>>,
         selection: S,
     ) -> Self {
-        Self { accel, start, root, ray, selection, goal: PhantomData }
+        Self { accel, start, root, ray: ray.into(), selection, goal: PhantomData }
     }
 
     /// Goes through the tree with a ray that has started.
     #[inline(always)]
     pub(crate) fn go<L: Lanes>(self, slabs: Slabs) -> Outcome<G::Answer> {
-        let Self { accel, start, root, ray, selection, .. } = self;
+        let Self { accel, start, root, ray: asked, selection, .. } = self;
+        let ray = asked.ray;
         let mut way = Way::<L>::new(&accel.tree.nodes, slabs);
         let mut stack = Stack::new();
         let infinite = if MIXED { &*accel.infinite } else { &[] };
@@ -1194,7 +1234,8 @@ impl<'a, 'r, G: Goal, const MIXED: bool, S: Selection> Alone<'a, 'r, G, MIXED, S
                 None => return Outcome::Settled(G::NOTHING),
             }
         }
-        let mut single = SingleRay::<MIXED, S>::new::<L>(accel, start, ray, way.slabs(), selection);
+        let blocks = asked.start_blocks::<L>(start, way.slabs());
+        let mut single = SingleRay::<MIXED, S>::new(accel, start, blocks, selection);
         if !infinite.is_empty() {
             for entry in infinite {
                 if let Some(last) = G::meet_entry(&mut single, entry, ray, &mut way) {

@@ -72,6 +72,12 @@ pub(crate) trait Lanes: SphereLanes {
     /// The ray for boxes in single precision; `None` where it does not come from nearby, or is not sound.
     fn start_single(start: &SingleStart, ray: &Ray) -> Option<Slabs>;
 
+    /// The same of a ray that is in single precision, with the same bits as in double precision.
+    #[inline(always)]
+    fn start_widened(start: &SingleStart, ray: &Ray32) -> Option<Slabs> {
+        Self::start_single(start, &ray.to_f64())
+    }
+
     /// The ray in the space of what a map places, with another range, and for boxes there: see [`Ray::into_object`].
     #[inline(always)]
     fn start_placed(
@@ -86,6 +92,12 @@ pub(crate) trait Lanes: SphereLanes {
 
     /// The same ray for triangles, and from heights along it to places in the range of boxes.
     fn start_blocks(start: &SingleStart, ray: &Ray, slabs: &Slabs) -> (BlockRay, f32);
+
+    /// The same of a ray that is in single precision, with the same bits as in double precision.
+    #[inline(always)]
+    fn start_blocks_widened(start: &SingleStart, ray: &Ray32, slabs: &Slabs) -> (BlockRay, f32) {
+        Self::start_blocks(start, &ray.to_f64(), slabs)
+    }
 
     /// The ray in single precision for boxes; `None` where it does not come from nearby, or is not sound.
     fn start_narrow(start: &SingleStart, ray: &Ray32) -> Option<Slabs>;
@@ -548,6 +560,26 @@ pub(crate) fn start_single_at(
         fn run<L: Lanes>(self) -> Self::Output {
             let slabs = L::start_single(self.0, self.1)?;
             let (blocks, place_per_height) = L::start_blocks(self.0, self.1, &slabs);
+            Some((slabs, blocks, place_per_height))
+        }
+    }
+    level.run(Starting(start, ray))
+}
+
+/// The same of [`Lanes::start_widened`] and [`Lanes::start_blocks_widened`].
+#[cfg(test)]
+pub(crate) fn start_widened_at(
+    level: Level,
+    start: &SingleStart,
+    ray: &Ray32,
+) -> Option<(Slabs, BlockRay, f32)> {
+    struct Starting<'a>(&'a SingleStart, &'a Ray32);
+    impl Task for Starting<'_> {
+        type Output = Option<(Slabs, BlockRay, f32)>;
+        #[inline(always)]
+        fn run<L: Lanes>(self) -> Self::Output {
+            let slabs = L::start_widened(self.0, self.1)?;
+            let (blocks, place_per_height) = L::start_blocks_widened(self.0, self.1, &slabs);
             Some((slabs, blocks, place_per_height))
         }
     }

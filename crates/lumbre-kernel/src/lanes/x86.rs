@@ -489,6 +489,86 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
         }
     }
 
+    /// [`Lanes::start_blocks`] of a ray by its numbers, as above, and by its axes.
+    #[inline(always)]
+    fn blocks(
+        start: &SingleStart,
+        axes: &'static Axes,
+        origin: __m256d,
+        direction: __m128,
+        range: __m128,
+        slabs: &Slabs,
+    ) -> (BlockRay, f32) {
+        // As the portable one, three axes at a time.
+        // SAFETY: see `X86`. The loads are of arrays of four.
+        unsafe {
+            let exact = _mm256_sub_pd(origin, _mm256_loadu_pd(start.mesh_origin.as_ptr()));
+            let origin = _mm256_cvtpd_ps(exact);
+            let rest = if LEAKS {
+                _mm_setzero_ps()
+            } else {
+                _mm256_cvtpd_ps(_mm256_sub_pd(exact, _mm256_cvtps_pd(origin)))
+            };
+            let range = _mm_movelh_ps(range, range);
+
+            let sign = _mm_set1_ps(-0.0);
+            let length = _mm_andnot_ps(sign, direction);
+            let order = _mm_loadu_si128(axes.order.as_ptr().cast());
+            let last = _mm_shuffle_epi32::<0b10_10_10_10>(order);
+            let inverse = _mm_permutevar_ps(_mm_loadu_ps(slabs.inverse.as_ptr()), last);
+            let inverse = _mm_mul_ps(inverse, _mm_set1_ps(start.units_per_space));
+            let length = _mm_permutevar_ps(length, last);
+            // Start, end, start, end; none of them negative.
+            let heights = _mm_min_ps(_mm_mul_ps(range, length), _mm_set1_ps(FAR));
+            const LESS: f32 = 1.0 - ROUNDINGS;
+            const MORE: f32 = 1.0 + ROUNDINGS;
+            let heights = _mm_mul_ps(heights, _mm_setr_ps(LESS, MORE, MORE, LESS));
+            let shear = _mm_permutevar_ps(_mm_mul_ps(direction, inverse), order);
+            let rest = _mm_permutevar_ps(rest, order);
+            // Only of the first two: the shear of the last would be one.
+            let sheared = _mm_fnmadd_ps(shear, _mm_shuffle_ps::<0b10_10_10_10>(rest, rest), rest);
+            let blocks = BlockRay {
+                axes,
+                origin: Self::array(_mm_permutevar_ps(origin, order)),
+                rest: Self::array(_mm_blend_ps::<0b1100>(sheared, rest)),
+                shear: Self::array(shear),
+                least_size: start.least_size,
+                range: std::mem::transmute::<[f32; 4], HeightRange>(Self::array(heights)),
+                turn: _mm_cvtss_f32(_mm_andnot_ps(inverse, sign)),
+            };
+            (blocks, _mm_cvtss_f32(_mm_andnot_ps(sign, inverse)))
+        }
+    }
+
+    /// The axes for a direction in single precision.
+    #[inline(always)]
+    fn narrow_axes(direction: __m128) -> &'static Axes {
+        // SAFETY: see `X86`.
+        unsafe {
+            let size = _mm_andnot_ps(_mm_set1_ps(-0.0), direction);
+            // x, y, x and y, z, z.
+            let sizes = _mm_cmpge_ps(
+                _mm_shuffle_ps::<0b00_00_01_00>(size, size),
+                _mm_shuffle_ps::<0b10_10_10_01>(size, size),
+            );
+            Axes::by_bits(_mm_movemask_ps(direction) as u32, _mm_movemask_ps(sizes) as u32)
+        }
+    }
+
+    /// The numbers of a ray that [`X86::slabs`] and [`X86::blocks`] take, in double precision where they have it.
+    #[inline(always)]
+    fn widened(ray: &Ray32) -> (__m256d, __m128, __m128) {
+        let (origin, direction) = Self::narrow_numbers(ray);
+        // SAFETY: see `X86`.
+        unsafe {
+            (
+                _mm256_cvtps_pd(origin),
+                direction,
+                _mm_unpackhi_ps(_mm_movehdup_ps(origin), _mm_movehdup_ps(direction)),
+            )
+        }
+    }
+
     /// Origin and start, direction and end.
     #[inline(always)]
     fn narrow_numbers(ray: &Ray32) -> (__m128, __m128) {
@@ -690,6 +770,13 @@ where
     }
 
     #[inline(always)]
+    fn start_widened(start: &SingleStart, ray: &Ray32) -> Option<Slabs> {
+        // Of what is in registers still: to read in wide pieces what was just written number by number would have to wait.
+        let (origin, direction, range) = Self::widened(ray);
+        Self::slabs(start, origin, direction, range)
+    }
+
+    #[inline(always)]
     fn start_narrow(start: &SingleStart, ray: &Ray32) -> Option<Slabs> {
         // As the portable one, three axes at a time.
         // SAFETY: see `X86`. The loads are of arrays of four.
@@ -735,13 +822,7 @@ where
         unsafe {
             let (origin, direction) = Self::narrow_numbers(ray);
             let local = Self::local(start, origin);
-            let size = _mm_andnot_ps(_mm_set1_ps(-0.0), direction);
-            // x, y, x and y, z, z.
-            let sizes = _mm_cmpge_ps(
-                _mm_shuffle_ps::<0b00_00_01_00>(size, size),
-                _mm_shuffle_ps::<0b10_10_10_01>(size, size),
-            );
-            let axes = Axes::by_bits(_mm_movemask_ps(direction) as u32, _mm_movemask_ps(sizes) as u32);
+            let axes = Self::narrow_axes(direction);
             let order = _mm_loadu_si128(axes.order.as_ptr().cast());
             let last = _mm_shuffle_epi32::<0b10_10_10_10>(order);
             let inverse = _mm_permutevar_ps(_mm_loadu_ps(slabs.inverse.as_ptr()), last);
@@ -807,49 +888,16 @@ where
 
     #[inline(always)]
     fn start_blocks(start: &SingleStart, ray: &Ray, slabs: &Slabs) -> (BlockRay, f32) {
-        // As the portable one, three axes at a time.
-        // SAFETY: see `X86`. The loads are of the first eight numbers of a ray, see above, and of arrays of four.
-        unsafe {
-            let origin = _mm256_loadu_pd(Self::numbers(ray));
-            let exact = _mm256_sub_pd(origin, _mm256_loadu_pd(start.mesh_origin.as_ptr()));
-            let origin = _mm256_cvtpd_ps(exact);
-            let rest = if LEAKS {
-                _mm_setzero_ps()
-            } else {
-                _mm256_cvtpd_ps(_mm256_sub_pd(exact, _mm256_cvtps_pd(origin)))
-            };
-            let direction = Self::single_direction(ray);
-            let range = Self::single_range(ray);
-            let range = _mm_movelh_ps(range, range);
+        // SAFETY: see `X86`. The load is of four of the first eight numbers of a ray, see above.
+        let origin = unsafe { _mm256_loadu_pd(Self::numbers(ray)) };
+        let (direction, range) = (Self::single_direction(ray), Self::single_range(ray));
+        Self::blocks(start, Self::axes(ray), origin, direction, range, slabs)
+    }
 
-            let sign = _mm_set1_ps(-0.0);
-            let length = _mm_andnot_ps(sign, direction);
-            let axes = Self::axes(ray);
-            let order = _mm_loadu_si128(axes.order.as_ptr().cast());
-            let last = _mm_shuffle_epi32::<0b10_10_10_10>(order);
-            let inverse = _mm_permutevar_ps(_mm_loadu_ps(slabs.inverse.as_ptr()), last);
-            let inverse = _mm_mul_ps(inverse, _mm_set1_ps(start.units_per_space));
-            let length = _mm_permutevar_ps(length, last);
-            // Start, end, start, end; none of them negative.
-            let heights = _mm_min_ps(_mm_mul_ps(range, length), _mm_set1_ps(FAR));
-            const LESS: f32 = 1.0 - ROUNDINGS;
-            const MORE: f32 = 1.0 + ROUNDINGS;
-            let heights = _mm_mul_ps(heights, _mm_setr_ps(LESS, MORE, MORE, LESS));
-            let shear = _mm_permutevar_ps(_mm_mul_ps(direction, inverse), order);
-            let rest = _mm_permutevar_ps(rest, order);
-            // Only of the first two: the shear of the last would be one.
-            let sheared = _mm_fnmadd_ps(shear, _mm_shuffle_ps::<0b10_10_10_10>(rest, rest), rest);
-            let blocks = BlockRay {
-                axes,
-                origin: Self::array(_mm_permutevar_ps(origin, order)),
-                rest: Self::array(_mm_blend_ps::<0b1100>(sheared, rest)),
-                shear: Self::array(shear),
-                least_size: start.least_size,
-                range: std::mem::transmute::<[f32; 4], HeightRange>(Self::array(heights)),
-                turn: _mm_cvtss_f32(_mm_andnot_ps(inverse, sign)),
-            };
-            (blocks, _mm_cvtss_f32(_mm_andnot_ps(sign, inverse)))
-        }
+    #[inline(always)]
+    fn start_blocks_widened(start: &SingleStart, ray: &Ray32, slabs: &Slabs) -> (BlockRay, f32) {
+        let (origin, direction, range) = Self::widened(ray);
+        Self::blocks(start, Self::narrow_axes(direction), origin, direction, range, slabs)
     }
 
     #[inline(always)]

@@ -7,30 +7,69 @@ use std::marker::PhantomData;
 use super::Goal;
 use super::flyer::NarrowFlyer;
 use super::packet::Packet;
-use crate::batch::{AllAtOnce, Ends, Flying, Manner};
+use crate::batch::{self, AllAtOnce, Ends, Flying, Manner};
 use crate::fleet;
 use crate::holds::{Contents, SingleStart};
 use crate::lanes::{Lanes, Level};
 use crate::packet::{PACKET, Together};
-use crate::single::{Exact, Outcome};
+use crate::single::{self, Exact, Outcome};
 use crate::{Accel, Ray32};
 
 /// Rays that are taken to double precision at a time.
-const WIDELY: usize = 1024;
+const WIDELY: usize = 256;
 
 /// Searches along every ray.
 pub(crate) fn search_all<G: Goal>(level: Level, accel: &Accel, rays: &[Ray32], answers: &mut [G::Answer]) {
-    let start = accel.single.as_ref().filter(|start| start.contents == Contents::Triangles);
-    let Some(start) = start else {
-        let mut wide = Vec::with_capacity(rays.len().min(WIDELY));
-        for (rays, answers) in rays.chunks(WIDELY).zip(answers.chunks_mut(WIDELY)) {
-            wide.clear();
-            wide.extend(rays.iter().map(|ray| ray.to_f64()));
-            G::all_widely(level, accel, &wide, answers);
-        }
+    let Some(start) = &accel.single else {
+        answers.iter_mut().zip(rays).for_each(|(answer, ray)| *answer = G::widely(accel, ray));
         return;
     };
-    search_triangles::<G>(level, accel, start, rays, answers, None);
+    if start.contents == Contents::Triangles {
+        search_triangles::<G>(level, accel, start, rays, answers, None);
+        return;
+    }
+    let mut wide = Vec::with_capacity(rays.len().min(WIDELY));
+    for (rays, places) in rays.chunks(WIDELY).zip(answers.chunks_mut(WIDELY)) {
+        wide.clear();
+        wide.extend(rays.iter().map(|ray| ray.to_f64()));
+        let rounded = Rounded::<G> { accel, rays, places };
+        if start.contents == Contents::Anything {
+            batch::search_anything::<G::Wide>(level, accel, start, &wide, Found(rounded));
+        } else {
+            batch::search_all::<G::Wide>(level, accel, start, &wide, rounded);
+        }
+    }
+}
+
+/// The places for what came of rays in double precision, rounded.
+struct Rounded<'a, G: Goal> {
+    accel: &'a Accel,
+    rays: &'a [Ray32],
+    places: &'a mut [G::Answer],
+}
+
+impl<G: Goal> Ends<<G::Wide as single::Goal>::Answer> for Rounded<'_, G> {
+    #[inline(always)]
+    fn put(&mut self, position: usize, outcome: Outcome<<G::Wide as single::Goal>::Answer>) {
+        self.places[position] = match outcome {
+            Outcome::Settled(answer) => G::rounded(self.accel, answer),
+            Outcome::Unsettled => G::widely(self.accel, &self.rays[position]),
+        };
+    }
+}
+
+/// The same of what is handed out.
+struct Found<'a, G: Goal>(Rounded<'a, G>);
+
+impl<G: Goal> Ends<<G::Wide as single::Goal>::Found> for Found<'_, G> {
+    #[inline(always)]
+    fn put(&mut self, position: usize, outcome: Outcome<<G::Wide as single::Goal>::Found>) {
+        let Self(Rounded { accel, rays, places }) = self;
+        places[position] = match outcome {
+            Outcome::Settled(found) => G::rounded_found(found),
+            Outcome::Unsettled => G::widely(accel, &rays[position]),
+        };
+    }
 }
 
 /// The same in a tree of triangles, where those that do not go together go as is said, if it is.
