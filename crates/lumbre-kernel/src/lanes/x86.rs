@@ -540,6 +540,45 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
         }
     }
 
+    /// The numbers of eight rays in single precision, side by side.
+    #[inline(always)]
+    fn rows_of_eight(rays: &[Ray32; 8]) -> [__m256; 8] {
+        const LOW: i32 = 0b01_00_01_00;
+        const HIGH: i32 = 0b11_10_11_10;
+        // SAFETY: see `X86`. The loads are of the eight numbers of a ray.
+        unsafe {
+            let at = rays.as_ptr().cast::<f32>();
+            let (a, b) = (_mm256_loadu_ps(at), _mm256_loadu_ps(at.add(8)));
+            let (c, d) = (_mm256_loadu_ps(at.add(16)), _mm256_loadu_ps(at.add(24)));
+            let (e, f) = (_mm256_loadu_ps(at.add(32)), _mm256_loadu_ps(at.add(40)));
+            let (g, h) = (_mm256_loadu_ps(at.add(48)), _mm256_loadu_ps(at.add(56)));
+            // One by one: what is handed to a closure may become a call.
+            let (ab, ab2) = (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
+            let (cd, cd2) = (_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
+            let (ef, ef2) = (_mm256_unpacklo_ps(e, f), _mm256_unpackhi_ps(e, f));
+            let (gh, gh2) = (_mm256_unpacklo_ps(g, h), _mm256_unpackhi_ps(g, h));
+            // Numbers 0 and 4, 1 and 5, 2 and 6, 3 and 7, of the first four rays and of the others.
+            let first = [
+                _mm256_shuffle_ps::<LOW>(ab, cd),
+                _mm256_shuffle_ps::<HIGH>(ab, cd),
+                _mm256_shuffle_ps::<LOW>(ab2, cd2),
+                _mm256_shuffle_ps::<HIGH>(ab2, cd2),
+            ];
+            let others = [
+                _mm256_shuffle_ps::<LOW>(ef, gh),
+                _mm256_shuffle_ps::<HIGH>(ef, gh),
+                _mm256_shuffle_ps::<LOW>(ef2, gh2),
+                _mm256_shuffle_ps::<HIGH>(ef2, gh2),
+            ];
+            let mut rows = [_mm256_setzero_ps(); 8];
+            for number in 0..4 {
+                rows[number] = _mm256_permute2f128_ps::<0x20>(first[number], others[number]);
+                rows[4 + number] = _mm256_permute2f128_ps::<0x31>(first[number], others[number]);
+            }
+            rows
+        }
+    }
+
     /// The axes for a direction in single precision.
     #[inline(always)]
     fn narrow_axes(direction: __m128) -> &'static Axes {
@@ -902,41 +941,25 @@ where
 
     #[inline(always)]
     fn narrow_rows(rays: &[Ray32; WIDE], rows: &mut [Row<f32>; 8]) {
-        // Eight rays of eight numbers each, twice.
-        for half in 0..2 {
-            // SAFETY: see `X86`. The loads are of the eight numbers of a ray; the stores of eight f32 from the first or the ninth on, into
-            // arrays of sixteen.
+        let (first, last) = rays.split_at(8);
+        let (Ok(first), Ok(last)) = (first.try_into(), last.try_into()) else {
+            unreachable!("sixteen are twice eight")
+        };
+        let (low, high) = (Self::rows_of_eight(first), Self::rows_of_eight(last));
+        for (row, (low, high)) in rows.iter_mut().zip(low.into_iter().zip(high)) {
+            // SAFETY: see `X86`. The stores are of sixteen f32, or of eight from the first or the ninth on, into an array of sixteen.
             unsafe {
-                let at = rays.as_ptr().add(8 * half).cast::<f32>();
-                let (a, b) = (_mm256_loadu_ps(at), _mm256_loadu_ps(at.add(8)));
-                let (c, d) = (_mm256_loadu_ps(at.add(16)), _mm256_loadu_ps(at.add(24)));
-                let (e, f) = (_mm256_loadu_ps(at.add(32)), _mm256_loadu_ps(at.add(40)));
-                let (g, h) = (_mm256_loadu_ps(at.add(48)), _mm256_loadu_ps(at.add(56)));
-                // One by one: what is handed to a closure may become a call.
-                let (ab, ab2) = (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
-                let (cd, cd2) = (_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
-                let (ef, ef2) = (_mm256_unpacklo_ps(e, f), _mm256_unpackhi_ps(e, f));
-                let (gh, gh2) = (_mm256_unpacklo_ps(g, h), _mm256_unpackhi_ps(g, h));
-                const LOW: i32 = 0b01_00_01_00;
-                const HIGH: i32 = 0b11_10_11_10;
-                // Numbers 0 and 4, 1 and 5, 2 and 6, 3 and 7, of the first four rays and of the others.
-                let first = [
-                    _mm256_shuffle_ps::<LOW>(ab, cd),
-                    _mm256_shuffle_ps::<HIGH>(ab, cd),
-                    _mm256_shuffle_ps::<LOW>(ab2, cd2),
-                    _mm256_shuffle_ps::<HIGH>(ab2, cd2),
-                ];
-                let others = [
-                    _mm256_shuffle_ps::<LOW>(ef, gh),
-                    _mm256_shuffle_ps::<HIGH>(ef, gh),
-                    _mm256_shuffle_ps::<LOW>(ef2, gh2),
-                    _mm256_shuffle_ps::<HIGH>(ef2, gh2),
-                ];
-                for number in 0..4 {
-                    let low = _mm256_permute2f128_ps::<0x20>(first[number], others[number]);
-                    let high = _mm256_permute2f128_ps::<0x31>(first[number], others[number]);
-                    _mm256_storeu_ps(rows[number].0.as_mut_ptr().add(8 * half), low);
-                    _mm256_storeu_ps(rows[4 + number].0.as_mut_ptr().add(8 * half), high);
+                let row = row.0.as_mut_ptr();
+                if AVX512 {
+                    // As wide as it is read: what is put together of two writes is waited for.
+                    let both = _mm512_insertf64x4::<1>(
+                        _mm512_castps_pd(_mm512_castps256_ps512(low)),
+                        _mm256_castps_pd(high),
+                    );
+                    _mm512_storeu_ps(row, _mm512_castpd_ps(both));
+                } else {
+                    _mm256_storeu_ps(row, low);
+                    _mm256_storeu_ps(row.add(8), high);
                 }
             }
         }
