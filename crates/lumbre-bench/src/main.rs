@@ -83,9 +83,10 @@ struct Options {
     /// Lumbre takes rays in double precision.
     #[arg(long)]
     double: bool,
-    /// Peers are Lumbre itself, asked otherwise; all take rays in double precision, but for one: by batches, in double precision alone,
-    /// with options, with masks, but for a primitive, with a closure, with vertices in double precision, in single precision alone, which
-    /// leaks, and with rays in single precision. The ratios are what that costs.
+    /// Peers are Lumbre itself, asked otherwise; all take rays in double precision, but for two: by batches, with each ray written just
+    /// before, in double precision alone, with options, with masks, but for a primitive, with a closure, with vertices in double precision,
+    /// in single precision alone, which leaks, and with rays in single precision, also each written just before. The ratios are what that
+    /// costs.
     #[arg(long, conflicts_with = "batches")]
     costs: bool,
     /// Lumbre keeps every sphere as a shape of its own, not in a cloud.
@@ -190,7 +191,10 @@ fn main() -> Result<()> {
     let peers = if options.costs {
         let others = Asked::OTHERS.into_iter().map(|asked| ours::Lumbre { asked, ..lumbre });
         let single = ours::Lumbre { precision: Precision::Single, ..lumbre };
-        others.chain([single]).map(|other| Box::new(other) as Box<dyn Program>).collect()
+        others
+            .chain([single, ours::Lumbre { asked: Asked::Fresh, ..single }])
+            .map(|other| Box::new(other) as Box<dyn Program>)
+            .collect()
     } else {
         let mut peers = peers()?;
         if !options.double {

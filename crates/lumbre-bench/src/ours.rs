@@ -1,5 +1,6 @@
 //! Lumbre's kernel.
 
+use std::hint::black_box;
 use std::sync::Arc;
 
 use anyhow::{Context, Result, ensure};
@@ -8,7 +9,7 @@ use lumbre_kernel::{
     Accel, BuildOptions, Geometry, GeometryKind, Hit, Hit32, Instance, PreciseMesh, Preset, QueryOptions,
     TriangleMesh,
 };
-use lumbre_math::{DVec3, Transform};
+use lumbre_math::{DVec3, Transform, Vec3};
 
 use crate::program::{Built, Pass, Program, Query, Tree};
 use crate::rays::Ray32;
@@ -37,13 +38,15 @@ pub enum Precision {
     Double,
 }
 
-/// How a tree is asked: the same answers in every way. In single precision, in the first two.
+/// How a tree is asked: the same answers in every way. In single precision, in the first three.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Asked {
     /// One ray at a time.
     Each,
     /// By batches of [`BATCH`] rays: those that are alike together, and the others in flight.
     ByBatches,
+    /// One ray at a time, each written number by number just before, as by who makes it.
+    Fresh,
     /// One ray at a time, in double precision from the start.
     Plainly,
     /// One ray at a time, with options that leave nothing out.
@@ -62,8 +65,9 @@ pub enum Asked {
 
 impl Asked {
     /// All but the first: what else costs what.
-    pub const OTHERS: [Self; 8] = [
+    pub const OTHERS: [Self; 9] = [
         Self::ByBatches,
+        Self::Fresh,
         Self::Plainly,
         Self::WithOptions,
         Self::WithMasks,
@@ -77,6 +81,7 @@ impl Asked {
         match self {
             Self::Each => "",
             Self::ByBatches => " batches",
+            Self::Fresh => " fresh",
             Self::Plainly => " alone",
             Self::WithOptions => " options",
             Self::WithMasks => " masks",
@@ -282,6 +287,31 @@ impl Found {
     }
 }
 
+/// The same ray, written number by number.
+#[inline(always)]
+fn written_now(ray: &Ray) -> Ray {
+    let vector = |v: &DVec3| DVec3::new(black_box(v.x), black_box(v.y), black_box(v.z));
+    Ray {
+        origin: vector(&ray.origin),
+        direction: vector(&ray.direction),
+        t_min: black_box(ray.t_min),
+        t_max: black_box(ray.t_max),
+        time: ray.time,
+    }
+}
+
+/// The same in single precision.
+#[inline(always)]
+fn written_now_f32(ray: &lumbre_kernel::Ray32) -> lumbre_kernel::Ray32 {
+    let vector = |v: &Vec3| Vec3::new(black_box(v.x), black_box(v.y), black_box(v.z));
+    lumbre_kernel::Ray32 {
+        origin: vector(&ray.origin),
+        t_min: black_box(ray.t_min),
+        direction: vector(&ray.direction),
+        t_max: black_box(ray.t_max),
+    }
+}
+
 struct Closest<'a> {
     tree: &'a Queried,
     rays: Vec<Ray>,
@@ -315,6 +345,7 @@ impl Pass for Closest<'_> {
             return;
         }
         match asked {
+            Asked::Fresh => self.each(|ray| accel.closest(&written_now(ray))),
             Asked::Plainly => self.each(|ray| accel.closest_plainly(ray)),
             Asked::WithOptions => self.each(|ray| accel.closest_with(ray, &QueryOptions::default())),
             Asked::WithMasks => self.each(|ray| accel.closest_with(ray, &masked())),
@@ -361,6 +392,7 @@ impl Pass for Any<'_> {
             return;
         }
         match asked {
+            Asked::Fresh => self.each(|ray| accel.any(&written_now(ray))),
             Asked::Plainly => self.each(|ray| accel.any_plainly(ray)),
             Asked::WithOptions => self.each(|ray| accel.any_with(ray, &QueryOptions::default())),
             Asked::WithMasks => self.each(|ray| accel.any_with(ray, &masked())),
@@ -419,6 +451,12 @@ impl Pass for SingleClosest<'_> {
             }
             return;
         }
+        if *asked == Asked::Fresh {
+            for (ray, found) in self.rays.iter().zip(&mut self.found) {
+                found.put(accel.closest_f32(&written_now_f32(ray)).as_ref());
+            }
+            return;
+        }
         for (ray, found) in self.rays.iter().zip(&mut self.found) {
             found.put(accel.closest_f32(ray).as_ref());
         }
@@ -446,6 +484,12 @@ impl Pass for SingleAny<'_> {
         if *asked == Asked::ByBatches {
             for (rays, found) in self.rays.chunks(BATCH).zip(self.found.chunks_mut(BATCH)) {
                 accel.any_batch_f32(rays, found);
+            }
+            return;
+        }
+        if *asked == Asked::Fresh {
+            for (ray, found) in self.rays.iter().zip(&mut self.found) {
+                *found = accel.any_f32(&written_now_f32(ray));
             }
             return;
         }

@@ -18,9 +18,7 @@ use crate::lanes::{self, Lanes, Level, Question, Task};
 use crate::node::tag;
 use crate::opening::Start;
 use crate::query::{All, Any, Closest, Filter};
-use crate::single::{
-    self, Alone, AskedRay, Candidate, Goal, Nearest, Outcome, SingleRay, Step, Whether, Winner,
-};
+use crate::single::{self, Alone, Candidate, Goal, Nearest, Outcome, SingleRay, Step, Whether, Winner};
 use crate::sphere_search::{self, CloudRay};
 use crate::stack::Stack;
 use crate::traverse::{self, Place, Search, Standing};
@@ -37,7 +35,7 @@ impl<G: Sought> Question for Amidst<G> {
     #[inline(always)]
     fn ask<L: Lanes>(accel: &Accel, ray: &Ray) -> G::Found {
         if let Some(start) = &accel.single {
-            let around = &Place::default();
+            let (around, ray) = (&Place::default(), &L::read(ray));
             if let Outcome::Settled(found) = Whole::<G, All>::new(accel, start, around, ray).run::<L>() {
                 return found;
             }
@@ -55,7 +53,7 @@ pub(crate) fn search<G: Sought, F: Filter>(
     filter: &F,
 ) -> Outcome<G::Found> {
     let (root, around) = (start.root, &Place::default());
-    level.run(Whole::<G, F> { accel, start, root, around, ray: ray.into(), filter, goal: PhantomData })
+    level.run(Whole::<G, F> { accel, start, root, around, ray, filter, goal: PhantomData })
 }
 
 /// A search with one ray, from a node on.
@@ -65,7 +63,7 @@ pub(crate) struct Whole<'a, 'r, G, F> {
     root: u32,
     /// Where the tree stands.
     around: &'r Place,
-    ray: AskedRay<'r>,
+    ray: &'r Ray,
     filter: &'r F,
     goal: PhantomData<G>,
 }
@@ -73,13 +71,8 @@ pub(crate) struct Whole<'a, 'r, G, F> {
 impl<'a, 'r, G> Whole<'a, 'r, G, All> {
     /// In a tree that stands nowhere else, among all there is.
     #[inline(always)]
-    pub(crate) fn new(
-        accel: &'a Accel,
-        start: &'a SingleStart,
-        around: &'r Place,
-        ray: impl Into<AskedRay<'r>>,
-    ) -> Self {
-        Self { accel, start, root: start.root, around, ray: ray.into(), filter: &All, goal: PhantomData }
+    pub(crate) fn new(accel: &'a Accel, start: &'a SingleStart, around: &'r Place, ray: &'r Ray) -> Self {
+        Self { accel, start, root: start.root, around, ray, filter: &All, goal: PhantomData }
     }
 }
 
@@ -88,9 +81,8 @@ impl<G: Sought, F: Filter> Task for Whole<'_, '_, G, F> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Self::Output {
-        let Self { accel, start, root, around, ray: asked, filter, .. } = self;
-        let ray = asked.ray;
-        let Some(slabs) = asked.start::<L>(start) else { return Outcome::Unsettled };
+        let Self { accel, start, root, around, ray, filter, .. } = self;
+        let Some(slabs) = L::start_single(start, ray) else { return Outcome::Unsettled };
         let mut way = Way::<L>::new(&accel.tree.nodes, slabs);
         let mut stack = Stack::new();
         let mut next = way.descend::<G::Order>(root, &mut stack);
@@ -99,7 +91,7 @@ impl<G: Sought, F: Filter> Task for Whole<'_, '_, G, F> {
             return Outcome::Settled(G::found(accel, G::NOTHING));
         }
         let selection = filter.select(accel, Standing::at(around));
-        let blocks = asked.start_blocks::<L>(start, way.slabs());
+        let blocks = L::start_blocks(start, lanes::opaque(ray), way.slabs());
         let single = SingleRay::new(accel, start, blocks, selection);
         let mut among = AmongOthers { accel, single, filter, around, within: None, clouds: None };
         for entry in &*accel.infinite {
@@ -379,7 +371,7 @@ impl<'a> Placed<'a> {
                     start,
                     root,
                     around: &place,
-                    ray: (&ray).into(),
+                    ray: &ray,
                     filter,
                     goal: PhantomData,
                 }),

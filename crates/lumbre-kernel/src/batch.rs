@@ -313,7 +313,7 @@ impl<'a, G: Goal, O: Others<'a, G>, E: Ends<O::Found>> Task for OneByOne<'a, '_,
             }
             for (place, ray) in rays.iter().enumerate() {
                 if answered >> place & 1 == 0 {
-                    ends.put(first + place, others.search_alone::<L>(ray));
+                    ends.put(first + place, others.search_alone::<L>(lanes::opaque(ray)));
                 }
             }
         }
@@ -371,7 +371,7 @@ impl<M: Manner, E: Ends<M::Answer>> Task for AllAtOnce<'_, '_, M, E> {
                 // Here, and not by a call: a hit that was put together elsewhere would be waited for. Nor in a closure, which does not
                 // take on the instruction set.
                 for &i in &others {
-                    ends.put(i, M::search_alone::<L>(&exact, &rays[i]));
+                    ends.put(i, M::search_alone::<L>(&exact, lanes::opaque(&rays[i])));
                 }
             } else {
                 M::fly::<L>(&exact, flying.asks_ahead, rays, &others, &mut ends);

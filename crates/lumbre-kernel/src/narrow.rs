@@ -52,7 +52,7 @@ use crate::holds::{Contents, SingleStart};
 use crate::lanes::{self, Asked, Axes, Lanes, Level, Question, Task, Vector};
 use crate::packet::Companion;
 use crate::query::All;
-use crate::single::{self, Alone, AskedRay, Exact, Outcome, Winner};
+use crate::single::{self, Alone, Exact, Outcome, Winner};
 use crate::stack::{AsBuilt, ByDistance, Order};
 use crate::traverse::Place;
 use crate::triangles::BLOCK;
@@ -523,10 +523,9 @@ impl<G: Goal> Question for AmongShapes<G> {
 
     #[inline(always)]
     fn ask<L: Lanes>(accel: &Accel, ray: &Ray32) -> G::Answer {
-        let wide = ray.to_f64();
         if let Some(start) = &accel.single
-            && let asked = AskedRay::of(ray, &wide)
-            && let Outcome::Settled(answer) = Alone::<G::Wide, true>::new(accel, start, asked).run::<L>()
+            && let wide = L::read_widened(ray)
+            && let Outcome::Settled(answer) = Alone::<G::Wide, true>::new(accel, start, &wide).run::<L>()
         {
             return G::rounded(accel, answer);
         }
@@ -540,11 +539,11 @@ impl<G: Goal> Question for AmongAnything<G> {
 
     #[inline(always)]
     fn ask<L: Lanes>(accel: &Accel, ray: &Ray32) -> G::Answer {
-        let (wide, around) = (ray.to_f64(), Place::default());
+        let around = &Place::default();
         if let Some(start) = &accel.single
-            && let asked = AskedRay::of(ray, &wide)
+            && let wide = L::read_widened(ray)
             && let Outcome::Settled(found) =
-                Whole::<G::Wide, All>::new(accel, start, &around, asked).run::<L>()
+                Whole::<G::Wide, All>::new(accel, start, around, &wide).run::<L>()
         {
             return G::rounded_found(found);
         }

@@ -31,7 +31,7 @@ use crate::stack::{AsBuilt, ByDistance, Order, Stack};
 use crate::traverse::{PlacedTree, What};
 use crate::triangles::{self, BLOCK, BlockRay, Inside, Meeting, Passage, Shear};
 use crate::way::Way;
-use crate::{Accel, Faces, Hit, InstancePath, Ray32, traverse};
+use crate::{Accel, Faces, Hit, InstancePath, traverse};
 
 /// What came of a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -1074,7 +1074,8 @@ impl<G: Goal, const MIXED: bool> Question for Singly<G, MIXED> {
     #[inline(always)]
     fn ask<L: Lanes>(accel: &Accel, ray: &Ray) -> G::Found {
         if let Some(start) = &accel.single
-            && let Outcome::Settled(answer) = Alone::<G, MIXED>::new(accel, start, ray).run::<L>()
+            && let ray = L::read(ray)
+            && let Outcome::Settled(answer) = Alone::<G, MIXED>::new(accel, start, &ray).run::<L>()
         {
             return G::found(accel, answer);
         }
@@ -1092,55 +1093,13 @@ impl<G: Goal> Question for Plainly<G> {
     }
 }
 
-/// A ray in double precision, and how it was asked.
-#[derive(Clone, Copy)]
-pub(crate) struct AskedRay<'r> {
-    pub(crate) ray: &'r Ray,
-    /// What it was made of just now, if it was: to read in wide pieces what was written number by number would have to wait.
-    narrow: Option<&'r Ray32>,
-}
-
-impl<'r> From<&'r Ray> for AskedRay<'r> {
-    #[inline(always)]
-    fn from(ray: &'r Ray) -> Self {
-        Self { ray, narrow: None }
-    }
-}
-
-impl<'r> AskedRay<'r> {
-    /// A ray that is this one in single precision.
-    #[inline(always)]
-    pub(crate) fn of(narrow: &'r Ray32, ray: &'r Ray) -> Self {
-        Self { ray, narrow: Some(narrow) }
-    }
-
-    /// The ray for boxes: see [`Lanes::start_single`].
-    // Opaque here and where it is read again: what was read would else be written down, to be kept until then.
-    #[inline(always)]
-    pub(crate) fn start<L: Lanes>(&self, start: &SingleStart) -> Option<Slabs> {
-        match self.narrow {
-            Some(narrow) => L::start_widened(start, lanes::opaque(narrow)),
-            None => L::start_single(start, lanes::opaque(self.ray)),
-        }
-    }
-
-    /// The same for triangles: see [`Lanes::start_blocks`].
-    #[inline(always)]
-    pub(crate) fn start_blocks<L: Lanes>(&self, start: &SingleStart, slabs: &Slabs) -> (BlockRay, f32) {
-        match self.narrow {
-            Some(narrow) => L::start_blocks_widened(start, lanes::opaque(narrow), slabs),
-            None => L::start_blocks(start, self.ray, slabs),
-        }
-    }
-}
-
 /// A search with one ray. `MIXED` where there is anything but triangles.
 pub(crate) struct Alone<'a, 'r, G, const MIXED: bool, S = All> {
     accel: &'a Accel,
     start: &'a SingleStart,
     /// The node that it starts at.
     root: u32,
-    ray: AskedRay<'r>,
+    ray: &'r Ray,
     selection: S,
     goal: PhantomData<G>,
 }
@@ -1188,7 +1147,7 @@ pub(crate) fn search_placed<G: Goal, L: Lanes, S: Selection>(
 
 impl<'a, 'r, G: Goal, const MIXED: bool> Alone<'a, 'r, G, MIXED> {
     #[inline(always)]
-    pub(crate) fn new(accel: &'a Accel, start: &'a SingleStart, ray: impl Into<AskedRay<'r>>) -> Self {
+    pub(crate) fn new(accel: &'a Accel, start: &'a SingleStart, ray: &'r Ray) -> Self {
         Self::among(accel, start, start.root, ray, All)
     }
 }
@@ -1198,7 +1157,7 @@ impl<G: Goal, const MIXED: bool, S: Selection> Task for Alone<'_, '_, G, MIXED, 
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Self::Output {
-        match self.ray.start::<L>(self.start) {
+        match L::start_single(self.start, self.ray) {
             Some(slabs) => self.go::<L>(slabs),
             None => Outcome::Unsettled,
         }
@@ -1212,17 +1171,16 @@ impl<'a, 'r, G: Goal, const MIXED: bool, S: Selection> Alone<'a, 'r, G, MIXED, S
         accel: &'a Accel,
         start: &'a SingleStart,
         root: u32,
-        ray: impl Into<AskedRay<'r>>,
+        ray: &'r Ray,
         selection: S,
     ) -> Self {
-        Self { accel, start, root, ray: ray.into(), selection, goal: PhantomData }
+        Self { accel, start, root, ray, selection, goal: PhantomData }
     }
 
     /// Goes through the tree with a ray that has started.
     #[inline(always)]
     pub(crate) fn go<L: Lanes>(self, slabs: Slabs) -> Outcome<G::Answer> {
-        let Self { accel, start, root, ray: asked, selection, .. } = self;
-        let ray = asked.ray;
+        let Self { accel, start, root, ray, selection, .. } = self;
         let mut way = Way::<L>::new(&accel.tree.nodes, slabs);
         let mut stack = Stack::new();
         let infinite = if MIXED { &*accel.infinite } else { &[] };
@@ -1234,7 +1192,8 @@ impl<'a, 'r, G: Goal, const MIXED: bool, S: Selection> Alone<'a, 'r, G, MIXED, S
                 None => return Outcome::Settled(G::NOTHING),
             }
         }
-        let blocks = asked.start_blocks::<L>(start, way.slabs());
+        // Opaque: what was read at the start would else be written down, to be kept until here.
+        let blocks = L::start_blocks(start, lanes::opaque(ray), way.slabs());
         let mut single = SingleRay::<MIXED, S>::new(accel, start, blocks, selection);
         if !infinite.is_empty() {
             for entry in infinite {

@@ -72,12 +72,6 @@ pub(crate) trait Lanes: SphereLanes {
     /// The ray for boxes in single precision; `None` where it does not come from nearby, or is not sound.
     fn start_single(start: &SingleStart, ray: &Ray) -> Option<Slabs>;
 
-    /// The same of a ray that is in single precision, with the same bits as in double precision.
-    #[inline(always)]
-    fn start_widened(start: &SingleStart, ray: &Ray32) -> Option<Slabs> {
-        Self::start_single(start, &ray.to_f64())
-    }
-
     /// The ray in the space of what a map places, with another range, and for boxes there: see [`Ray::into_object`].
     #[inline(always)]
     fn start_placed(
@@ -93,10 +87,23 @@ pub(crate) trait Lanes: SphereLanes {
     /// The same ray for triangles, and from heights along it to places in the range of boxes.
     fn start_blocks(start: &SingleStart, ray: &Ray, slabs: &Slabs) -> (BlockRay, f32);
 
-    /// The same of a ray that is in single precision, with the same bits as in double precision.
+    /// A ray as it can be read in wide pieces at once, though it may have been written number by number just now: what is read so would
+    /// wait until that is out of sight, and with it the rays one for another.
     #[inline(always)]
-    fn start_blocks_widened(start: &SingleStart, ray: &Ray32, slabs: &Slabs) -> (BlockRay, f32) {
-        Self::start_blocks(start, &ray.to_f64(), slabs)
+    fn read(ray: &Ray) -> Ray {
+        *ray
+    }
+
+    /// The same in single precision.
+    #[inline(always)]
+    fn read_narrow(ray: &Ray32) -> Ray32 {
+        *ray
+    }
+
+    /// The same in double precision, of one in single precision: see [`Ray32::to_f64`].
+    #[inline(always)]
+    fn read_widened(ray: &Ray32) -> Ray {
+        ray.to_f64()
     }
 
     /// The ray in single precision for boxes; `None` where it does not come from nearby, or is not sound.
@@ -134,9 +141,6 @@ pub(crate) trait Lanes: SphereLanes {
 
     /// Of those that certainly are met ([`Crossings::sure`]), a bit for each whose front it is; other bits mean nothing.
     fn fronts(edges: &Self::Edges) -> u32;
-
-    /// [`Axes::new`] of a ray's direction.
-    fn axes(ray: &Ray) -> &'static Axes;
 
     /// [`Shear::new`] and [`Shear::local_origin`] of a ray that has these axes, for a mesh.
     fn shear(ray: &Ray, axes: &'static Axes, mesh_origin: &[f64; 4]) -> (Shear, [f64; 3]);
@@ -566,24 +570,18 @@ pub(crate) fn start_single_at(
     level.run(Starting(start, ray))
 }
 
-/// The same of [`Lanes::start_widened`] and [`Lanes::start_blocks_widened`].
+/// What [`Lanes::read`], [`Lanes::read_narrow`] and [`Lanes::read_widened`] give at a level, for tests.
 #[cfg(test)]
-pub(crate) fn start_widened_at(
-    level: Level,
-    start: &SingleStart,
-    ray: &Ray32,
-) -> Option<(Slabs, BlockRay, f32)> {
-    struct Starting<'a>(&'a SingleStart, &'a Ray32);
-    impl Task for Starting<'_> {
-        type Output = Option<(Slabs, BlockRay, f32)>;
+pub(crate) fn read_at(level: Level, ray: &Ray, narrow: &Ray32) -> (Ray, Ray32, Ray) {
+    struct Reading<'a>(&'a Ray, &'a Ray32);
+    impl Task for Reading<'_> {
+        type Output = (Ray, Ray32, Ray);
         #[inline(always)]
         fn run<L: Lanes>(self) -> Self::Output {
-            let slabs = L::start_widened(self.0, self.1)?;
-            let (blocks, place_per_height) = L::start_blocks_widened(self.0, self.1, &slabs);
-            Some((slabs, blocks, place_per_height))
+            (L::read(self.0), L::read_narrow(self.1), L::read_widened(self.1))
         }
     }
-    level.run(Starting(start, ray))
+    level.run(Reading(ray, narrow))
 }
 
 /// What [`Lanes::start_placed`] gives at a level, for tests.

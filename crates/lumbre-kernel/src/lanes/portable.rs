@@ -102,7 +102,7 @@ impl Lanes for Portable {
             rest[axis] = (exact - f64::from(origin[axis])) as f32;
         }
         let direction = single_direction(ray);
-        let axes = Self::axes(ray);
+        let axes = Axes::new(&ray.direction);
         let inverse = axes.permute_single(&slabs.inverse)[2] * start.units_per_space;
         let shear = axes.permute_single(&direction).map(|d| d * inverse);
         let rest = axes.permute_single(&rest);
@@ -309,11 +309,6 @@ impl Lanes for Portable {
             fronts |= u32::from(u[lane].min(v[lane]).min(w[lane]) > 0.0) << lane;
         }
         fronts
-    }
-
-    #[inline]
-    fn axes(ray: &Ray) -> &'static Axes {
-        Axes::new(&ray.direction)
     }
 
     #[inline]

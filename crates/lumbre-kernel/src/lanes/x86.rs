@@ -1,7 +1,7 @@
 //! AVX2 with FMA, and AVX-512 on vectors of 256 bits.
 
 use std::arch::x86_64::*;
-use std::mem::offset_of;
+use std::mem::{MaybeUninit, offset_of};
 
 use bytemuck::Zeroable;
 use lumbre_geometry::Ray;
@@ -67,6 +67,7 @@ pub(crate) struct X86<const AVX512: bool, const LEAKS: bool = false>;
 const _: () = assert!(size_of::<Ray32>() == 32 && offset_of!(Ray32, direction) == 16);
 const _: () =
     assert!(offset_of!(Ray, direction) == 24 && offset_of!(Ray, t_min) == 48 && offset_of!(Ray, t_max) == 56);
+const _: () = assert!(size_of::<Ray>() == 72 && offset_of!(Ray, time) == 64);
 
 impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
     /// The largest of the absolute values of six numbers, and of three others.
@@ -425,18 +426,45 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
         }
     }
 
-    /// The direction; the last of four means nothing.
+    /// The first four numbers, and the last four of eight: other pieces would be read of two writes.
     #[inline(always)]
-    fn single_direction(ray: &Ray) -> __m128 {
-        // SAFETY: see `X86`. The load is of four of the numbers of a ray.
-        unsafe { _mm256_cvtpd_ps(_mm256_loadu_pd(Self::numbers(ray).add(3))) }
+    fn halves(ray: &Ray) -> (__m256d, __m256d) {
+        let numbers = Self::numbers(ray);
+        // SAFETY: see `X86`. The loads are of the eight numbers of a ray.
+        unsafe { (_mm256_loadu_pd(numbers), _mm256_loadu_pd(numbers.add(4))) }
     }
 
-    /// The ends of the range in the first two lanes.
+    /// The ray of these halves.
     #[inline(always)]
-    fn single_range(ray: &Ray) -> __m128 {
-        // SAFETY: see `X86`. The load is of two of the numbers of a ray.
-        unsafe { _mm_cvtpd_ps(_mm_loadu_pd(Self::numbers(ray).add(6))) }
+    fn of_halves(first: __m256d, last: __m256d, time: f64) -> Ray {
+        let mut ray = MaybeUninit::<Ray>::uninit();
+        let to = ray.as_mut_ptr();
+        // SAFETY: see `X86`. A ray is eight numbers and its time, which are all written.
+        unsafe {
+            _mm256_storeu_pd(to.cast(), first);
+            _mm256_storeu_pd(to.cast::<f64>().add(4), last);
+            (&raw mut (*to).time).write(time);
+            ray.assume_init()
+        }
+    }
+
+    /// The origin, the direction and the ends of the range of these halves; the last of four mean nothing.
+    #[inline(always)]
+    fn parts((first, last): (__m256d, __m256d)) -> (__m256d, __m256d, __m128d) {
+        // SAFETY: see `X86`.
+        unsafe {
+            let middle = _mm256_permute2f128_pd::<0x21>(first, last);
+            let direction = _mm256_shuffle_pd::<0b0101>(middle, last);
+            (first, direction, _mm256_extractf128_pd::<1>(last))
+        }
+    }
+
+    /// The direction in single precision; the last of four means nothing.
+    #[inline(always)]
+    fn single_direction(ray: &Ray) -> __m128 {
+        let (_, direction, _) = Self::parts(Self::halves(ray));
+        // SAFETY: see `X86`.
+        unsafe { _mm256_cvtpd_ps(direction) }
     }
 
     /// [`Lanes::start_single`] of a ray by its numbers: the ends of the range are the first two; the last of the others mean nothing.
@@ -489,57 +517,6 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
         }
     }
 
-    /// [`Lanes::start_blocks`] of a ray by its numbers, as above, and by its axes.
-    #[inline(always)]
-    fn blocks(
-        start: &SingleStart,
-        axes: &'static Axes,
-        origin: __m256d,
-        direction: __m128,
-        range: __m128,
-        slabs: &Slabs,
-    ) -> (BlockRay, f32) {
-        // As the portable one, three axes at a time.
-        // SAFETY: see `X86`. The loads are of arrays of four.
-        unsafe {
-            let exact = _mm256_sub_pd(origin, _mm256_loadu_pd(start.mesh_origin.as_ptr()));
-            let origin = _mm256_cvtpd_ps(exact);
-            let rest = if LEAKS {
-                _mm_setzero_ps()
-            } else {
-                _mm256_cvtpd_ps(_mm256_sub_pd(exact, _mm256_cvtps_pd(origin)))
-            };
-            let range = _mm_movelh_ps(range, range);
-
-            let sign = _mm_set1_ps(-0.0);
-            let length = _mm_andnot_ps(sign, direction);
-            let order = _mm_loadu_si128(axes.order.as_ptr().cast());
-            let last = _mm_shuffle_epi32::<0b10_10_10_10>(order);
-            let inverse = _mm_permutevar_ps(_mm_loadu_ps(slabs.inverse.as_ptr()), last);
-            let inverse = _mm_mul_ps(inverse, _mm_set1_ps(start.units_per_space));
-            let length = _mm_permutevar_ps(length, last);
-            // Start, end, start, end; none of them negative.
-            let heights = _mm_min_ps(_mm_mul_ps(range, length), _mm_set1_ps(FAR));
-            const LESS: f32 = 1.0 - ROUNDINGS;
-            const MORE: f32 = 1.0 + ROUNDINGS;
-            let heights = _mm_mul_ps(heights, _mm_setr_ps(LESS, MORE, MORE, LESS));
-            let shear = _mm_permutevar_ps(_mm_mul_ps(direction, inverse), order);
-            let rest = _mm_permutevar_ps(rest, order);
-            // Only of the first two: the shear of the last would be one.
-            let sheared = _mm_fnmadd_ps(shear, _mm_shuffle_ps::<0b10_10_10_10>(rest, rest), rest);
-            let blocks = BlockRay {
-                axes,
-                origin: Self::array(_mm_permutevar_ps(origin, order)),
-                rest: Self::array(_mm_blend_ps::<0b1100>(sheared, rest)),
-                shear: Self::array(shear),
-                least_size: start.least_size,
-                range: std::mem::transmute::<[f32; 4], HeightRange>(Self::array(heights)),
-                turn: _mm_cvtss_f32(_mm_andnot_ps(inverse, sign)),
-            };
-            (blocks, _mm_cvtss_f32(_mm_andnot_ps(sign, inverse)))
-        }
-    }
-
     /// The numbers of eight rays in single precision, side by side.
     #[inline(always)]
     fn rows_of_eight(rays: &[Ray32; 8]) -> [__m256; 8] {
@@ -579,6 +556,21 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
         }
     }
 
+    /// The axes for a direction: see [`Axes::new`].
+    #[inline(always)]
+    fn axes_of(direction: __m256d) -> &'static Axes {
+        // SAFETY: see `X86`.
+        unsafe {
+            let size = _mm256_andnot_pd(_mm256_set1_pd(-0.0), direction);
+            // x, y, x and y, z, z.
+            let sizes = _mm256_cmp_pd::<_CMP_GE_OQ>(
+                _mm256_permute4x64_pd::<0b00_00_01_00>(size),
+                _mm256_permute4x64_pd::<0b10_10_10_01>(size),
+            );
+            Axes::by_bits(_mm256_movemask_pd(direction) as u32, _mm256_movemask_pd(sizes) as u32)
+        }
+    }
+
     /// The axes for a direction in single precision.
     #[inline(always)]
     fn narrow_axes(direction: __m128) -> &'static Axes {
@@ -594,26 +586,19 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
         }
     }
 
-    /// The numbers of a ray that [`X86::slabs`] and [`X86::blocks`] take, in double precision where they have it.
+    /// The numbers of a ray in single precision, eight in all: see above.
     #[inline(always)]
-    fn widened(ray: &Ray32) -> (__m256d, __m128, __m128) {
-        let (origin, direction) = Self::narrow_numbers(ray);
-        // SAFETY: see `X86`.
-        unsafe {
-            (
-                _mm256_cvtps_pd(origin),
-                direction,
-                _mm_unpackhi_ps(_mm_movehdup_ps(origin), _mm_movehdup_ps(direction)),
-            )
-        }
+    fn narrow_start(ray: &Ray32) -> *const f32 {
+        let ray: *const Ray32 = ray;
+        ray.cast()
     }
 
     /// Origin and start, direction and end.
     #[inline(always)]
     fn narrow_numbers(ray: &Ray32) -> (__m128, __m128) {
-        let ray: *const Ray32 = ray;
+        let numbers = Self::narrow_start(ray);
         // SAFETY: see `X86`. A ray is eight f32 in this order.
-        unsafe { (_mm_loadu_ps(ray.cast()), _mm_loadu_ps(ray.cast::<f32>().add(4))) }
+        unsafe { (_mm_loadu_ps(numbers), _mm_loadu_ps(numbers.add(4))) }
     }
 
     /// Three coordinates relative to the mesh, rounded once.
@@ -634,15 +619,6 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
     fn three(v: &DVec3) -> __m256d {
         // SAFETY: see `X86`. Only the first three are loaded.
         unsafe { _mm256_maskload_pd(v.as_ref().as_ptr(), _mm256_setr_epi64x(-1, -1, -1, 0)) }
-    }
-
-    /// The first three of four numbers.
-    #[inline(always)]
-    fn vector(v: __m256d) -> DVec3 {
-        let mut array = [0.0; 4];
-        // SAFETY: see `X86`. The store is of four f64 into an array of four.
-        unsafe { _mm256_storeu_pd(array.as_mut_ptr(), v) };
-        DVec3::new(array[0], array[1], array[2])
     }
 
     #[inline(always)]
@@ -803,16 +779,49 @@ where
 
     #[inline(always)]
     fn start_single(start: &SingleStart, ray: &Ray) -> Option<Slabs> {
-        // SAFETY: see `X86`. The load is of four of the first eight numbers of a ray, see above.
-        let origin = unsafe { _mm256_loadu_pd(Self::numbers(ray)) };
-        Self::slabs(start, origin, Self::single_direction(ray), Self::single_range(ray))
+        let (origin, direction, range) = Self::parts(Self::halves(ray));
+        // SAFETY: see `X86`.
+        let (direction, range) = unsafe { (_mm256_cvtpd_ps(direction), _mm_cvtpd_ps(range)) };
+        Self::slabs(start, origin, direction, range)
     }
 
     #[inline(always)]
-    fn start_widened(start: &SingleStart, ray: &Ray32) -> Option<Slabs> {
-        // Of what is in registers still: to read in wide pieces what was just written number by number would have to wait.
-        let (origin, direction, range) = Self::widened(ray);
-        Self::slabs(start, origin, direction, range)
+    fn read(ray: &Ray) -> Ray {
+        let from = Self::numbers(ray);
+        // SAFETY: see `X86`. Eight numbers of a ray are read. Volatile, for the compiler would else read in one what has to be read one by
+        // one.
+        unsafe {
+            let at = |i: usize| from.add(i).read_volatile();
+            let (first, last) =
+                (_mm256_setr_pd(at(0), at(1), at(2), at(3)), _mm256_setr_pd(at(4), at(5), at(6), at(7)));
+            Self::of_halves(first, last, ray.time)
+        }
+    }
+
+    #[inline(always)]
+    fn read_narrow(ray: &Ray32) -> Ray32 {
+        let from = Self::narrow_start(ray);
+        let mut own = MaybeUninit::<Ray32>::uninit();
+        let to: *mut f32 = own.as_mut_ptr().cast();
+        // SAFETY: as there. A ray is eight f32, which are all read, and written.
+        unsafe {
+            let at = |i: usize| from.add(i).read_volatile();
+            _mm_storeu_ps(to, _mm_setr_ps(at(0), at(1), at(2), at(3)));
+            _mm_storeu_ps(to.add(4), _mm_setr_ps(at(4), at(5), at(6), at(7)));
+            own.assume_init()
+        }
+    }
+
+    #[inline(always)]
+    fn read_widened(ray: &Ray32) -> Ray {
+        let from = Self::narrow_start(ray);
+        // SAFETY: as there. A ray is eight f32: origin, start, direction, end.
+        unsafe {
+            let at = |i: usize| from.add(i).read_volatile();
+            let (first, last) =
+                (_mm_setr_ps(at(0), at(1), at(2), at(4)), _mm_setr_ps(at(5), at(6), at(3), at(7)));
+            Self::of_halves(_mm256_cvtps_pd(first), _mm256_cvtps_pd(last), 0.0)
+        }
     }
 
     #[inline(always)]
@@ -912,31 +921,60 @@ where
             let direction = _mm256_mul_pd(x, _mm256_set1_pd(along.x));
             let direction = _mm256_add_pd(direction, _mm256_mul_pd(y, _mm256_set1_pd(along.y)));
             let direction = _mm256_add_pd(direction, _mm256_mul_pd(z, _mm256_set1_pd(along.z)));
-            let range = _mm_cvtpd_ps(_mm_setr_pd(t_min, t_max));
-            let slabs = Self::slabs(start, origin, _mm256_cvtpd_ps(direction), range);
-            let ray = Ray {
-                origin: Self::vector(origin),
-                direction: Self::vector(direction),
-                t_min,
-                t_max,
-                ..*ray
-            };
+            let ends = _mm_setr_pd(t_min, t_max);
+            let slabs = Self::slabs(start, origin, _mm256_cvtpd_ps(direction), _mm_cvtpd_ps(ends));
+            let first = _mm256_blend_pd::<0b1000>(origin, _mm256_permute4x64_pd::<0b00_00_00_00>(direction));
+            let rest = _mm256_castpd256_pd128(_mm256_permute4x64_pd::<0b00_00_10_01>(direction));
+            let last = _mm256_insertf128_pd::<1>(_mm256_castpd128_pd256(rest), ends);
+            let ray = Self::of_halves(first, last, ray.time);
             (ray, slabs)
         }
     }
 
     #[inline(always)]
     fn start_blocks(start: &SingleStart, ray: &Ray, slabs: &Slabs) -> (BlockRay, f32) {
-        // SAFETY: see `X86`. The load is of four of the first eight numbers of a ray, see above.
-        let origin = unsafe { _mm256_loadu_pd(Self::numbers(ray)) };
-        let (direction, range) = (Self::single_direction(ray), Self::single_range(ray));
-        Self::blocks(start, Self::axes(ray), origin, direction, range, slabs)
-    }
+        // As the portable one, three axes at a time.
+        // SAFETY: see `X86`. The loads are of arrays of four.
+        unsafe {
+            let (origin, direction, range) = Self::parts(Self::halves(ray));
+            let axes = Self::axes_of(direction);
+            let (direction, range) = (_mm256_cvtpd_ps(direction), _mm_cvtpd_ps(range));
+            let exact = _mm256_sub_pd(origin, _mm256_loadu_pd(start.mesh_origin.as_ptr()));
+            let origin = _mm256_cvtpd_ps(exact);
+            let rest = if LEAKS {
+                _mm_setzero_ps()
+            } else {
+                _mm256_cvtpd_ps(_mm256_sub_pd(exact, _mm256_cvtps_pd(origin)))
+            };
+            let range = _mm_movelh_ps(range, range);
 
-    #[inline(always)]
-    fn start_blocks_widened(start: &SingleStart, ray: &Ray32, slabs: &Slabs) -> (BlockRay, f32) {
-        let (origin, direction, range) = Self::widened(ray);
-        Self::blocks(start, Self::narrow_axes(direction), origin, direction, range, slabs)
+            let sign = _mm_set1_ps(-0.0);
+            let length = _mm_andnot_ps(sign, direction);
+            let order = _mm_loadu_si128(axes.order.as_ptr().cast());
+            let last = _mm_shuffle_epi32::<0b10_10_10_10>(order);
+            let inverse = _mm_permutevar_ps(_mm_loadu_ps(slabs.inverse.as_ptr()), last);
+            let inverse = _mm_mul_ps(inverse, _mm_set1_ps(start.units_per_space));
+            let length = _mm_permutevar_ps(length, last);
+            // Start, end, start, end; none of them negative.
+            let heights = _mm_min_ps(_mm_mul_ps(range, length), _mm_set1_ps(FAR));
+            const LESS: f32 = 1.0 - ROUNDINGS;
+            const MORE: f32 = 1.0 + ROUNDINGS;
+            let heights = _mm_mul_ps(heights, _mm_setr_ps(LESS, MORE, MORE, LESS));
+            let shear = _mm_permutevar_ps(_mm_mul_ps(direction, inverse), order);
+            let rest = _mm_permutevar_ps(rest, order);
+            // Only of the first two: the shear of the last would be one.
+            let sheared = _mm_fnmadd_ps(shear, _mm_shuffle_ps::<0b10_10_10_10>(rest, rest), rest);
+            let blocks = BlockRay {
+                axes,
+                origin: Self::array(_mm_permutevar_ps(origin, order)),
+                rest: Self::array(_mm_blend_ps::<0b1100>(sheared, rest)),
+                shear: Self::array(shear),
+                least_size: start.least_size,
+                range: std::mem::transmute::<[f32; 4], HeightRange>(Self::array(heights)),
+                turn: _mm_cvtss_f32(_mm_andnot_ps(inverse, sign)),
+            };
+            (blocks, _mm_cvtss_f32(_mm_andnot_ps(sign, inverse)))
+        }
     }
 
     #[inline(always)]
@@ -1163,21 +1201,6 @@ where
         // SAFETY: see `X86`.
         let backs = unsafe { _mm256_movemask_ps(edges.values[0]) };
         !backs as u32
-    }
-
-    #[inline(always)]
-    fn axes(ray: &Ray) -> &'static Axes {
-        // SAFETY: see `X86`. The load is of four of the first eight numbers of a ray, see above.
-        unsafe {
-            let direction = _mm256_loadu_pd(Self::numbers(ray).add(3));
-            let size = _mm256_andnot_pd(_mm256_set1_pd(-0.0), direction);
-            // x, y, x and y, z, z.
-            let sizes = _mm256_cmp_pd::<_CMP_GE_OQ>(
-                _mm256_permute4x64_pd::<0b00_00_01_00>(size),
-                _mm256_permute4x64_pd::<0b10_10_10_01>(size),
-            );
-            Axes::by_bits(_mm256_movemask_pd(direction) as u32, _mm256_movemask_pd(sizes) as u32)
-        }
     }
 
     #[inline(always)]

@@ -20,8 +20,8 @@ pub(super) fn search<G: Goal, L: Lanes>(exact: &Exact, ray: &Ray32) -> G::Answer
 
 #[inline(always)]
 pub(super) fn closest<L: Lanes>(exact: &Exact, ray: &Ray32) -> Outcome<Option<Hit32>> {
-    let start = exact.start;
-    let Some(slabs) = L::start_narrow(start, lanes::opaque(ray)) else { return Outcome::Unsettled };
+    let (start, ray) = (exact.start, &L::read_narrow(ray));
+    let Some(slabs) = L::start_narrow(start, ray) else { return Outcome::Unsettled };
     let mut way = Way::<L>::new(exact.nodes(), slabs);
     let mut stack = Stack::new();
     let Some(mut leaf) = way.descend::<ByDistance>(start.root, &mut stack) else {
@@ -52,8 +52,8 @@ pub(super) fn closest<L: Lanes>(exact: &Exact, ray: &Ray32) -> Outcome<Option<Hi
 
 #[inline(always)]
 pub(super) fn any<L: Lanes>(exact: &Exact, ray: &Ray32) -> Outcome<bool> {
-    let start = exact.start;
-    let Some(slabs) = L::start_narrow(start, lanes::opaque(ray)) else { return Outcome::Unsettled };
+    let (start, ray) = (exact.start, &L::read_narrow(ray));
+    let Some(slabs) = L::start_narrow(start, ray) else { return Outcome::Unsettled };
     let way = Way::<L>::new(exact.nodes(), slabs);
     let mut stack = Stack::new();
     let Some(mut leaf) = way.descend::<AsBuilt>(start.root, &mut stack) else {
