@@ -82,6 +82,14 @@ impl<G: Sought, F: Filter> Task for Whole<'_, '_, G, F> {
     #[inline(always)]
     fn run<L: Lanes>(self) -> Self::Output {
         let Self { accel, start, root, around, ray, filter, .. } = self;
+        // Where all is taken, who asks has read it.
+        let own;
+        let ray = if F::TAKES_ALL {
+            ray
+        } else {
+            own = L::read(ray);
+            &own
+        };
         let Some(slabs) = L::start_single(start, ray) else { return Outcome::Unsettled };
         let mut way = Way::<L>::new(&accel.tree.nodes, slabs);
         let mut stack = Stack::new();

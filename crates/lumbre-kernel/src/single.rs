@@ -1157,8 +1157,17 @@ impl<G: Goal, const MIXED: bool, S: Selection> Task for Alone<'_, '_, G, MIXED, 
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Self::Output {
-        match L::start_single(self.start, self.ray) {
-            Some(slabs) => self.go::<L>(slabs),
+        let Self { accel, start, root, ray, selection, .. } = self;
+        // Where all is taken, who asks has read it.
+        let own;
+        let ray = if S::TAKES_ALL {
+            ray
+        } else {
+            own = L::read(ray);
+            &own
+        };
+        match L::start_single(start, ray) {
+            Some(slabs) => Alone::<G, MIXED, S>::among(accel, start, root, ray, selection).go::<L>(slabs),
             None => Outcome::Unsettled,
         }
     }

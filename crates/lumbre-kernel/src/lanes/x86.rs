@@ -1208,11 +1208,10 @@ where
         if LEAKS {
             return Self::rounded_shear(ray, axes, mesh_origin);
         }
-        // SAFETY: see `X86`. The loads are of the first eight numbers of a ray, see above, and of arrays of four and eight.
+        let (origin, direction, _) = Self::parts(Self::halves(ray));
+        // SAFETY: see `X86`. The loads are of arrays of four and eight.
         unsafe {
-            let direction = _mm256_loadu_pd(Self::numbers(ray).add(3));
             let halves = _mm256_loadu_si256(axes.halves.as_ptr().cast());
-            let origin = _mm256_loadu_pd(Self::numbers(ray));
             let origin = _mm256_sub_pd(origin, _mm256_loadu_pd(mesh_origin.as_ptr()));
             let origin = _mm256_permutevar8x32_ps(_mm256_castpd_ps(origin), halves);
             let direction = _mm256_permutevar8x32_ps(_mm256_castpd_ps(direction), halves);
