@@ -400,7 +400,7 @@ fn over_mapped(file: Arc<Mmap>, geometries: Vec<Geometry>) -> Result<Accel, Load
     check_names(&tree, &geometries)?;
     let masks: Store<u32> = array(&file, &header, 7)?;
     let units = units_of(&geometries, &parts);
-    let holds = Holds::new(&geometries, parts.largest_corner, parts.sphere_reach);
+    let holds = Holds::new(&geometries, parts.sizes);
     let level = Level::best();
     let single = SingleStart::new(&holds, &units, tree.root);
     let accel = Accel {

@@ -2,6 +2,7 @@
 
 use lumbre_math::DVec3;
 
+use crate::narrow::Precise;
 use crate::node::{LARGEST_NEAR, SMALLEST_NEAR, TINY_NEAR, Units, round_up};
 use crate::triangles::LEAST_SIZE;
 use crate::{Geometry, GeometryKind, Instance};
@@ -21,21 +22,18 @@ pub(crate) struct Holds {
     pub(crate) has_one_origin: bool,
     /// That of the first mesh; a NaN where there is none.
     pub(crate) first_origin: DVec3,
-    /// No corner of a triangle has a larger coordinate, relative to its mesh's origin.
-    pub(crate) largest_corner: f32,
+    /// The sizes of what was put into the tree.
+    pub(crate) sizes: Sizes,
     /// Whether it holds nothing but spheres of clouds, and some.
     pub(crate) only_spheres: bool,
     /// Whether the centres of all spheres are relative to one origin.
     pub(crate) has_one_cloud_origin: bool,
-    /// No coordinate of a sphere's centre, relative to its cloud's origin, plus a radius is larger.
-    pub(crate) sphere_reach: f64,
     /// Whether geometries in instances have masks.
     pub(crate) masks_within: bool,
 }
 
 impl Holds {
-    /// `largest_corner` and `sphere_reach` are of what was put into the tree.
-    pub(crate) fn new(geometries: &[Geometry], largest_corner: f32, sphere_reach: f64) -> Self {
+    pub(crate) fn new(geometries: &[Geometry], sizes: Sizes) -> Self {
         let mut origins = geometries.iter().filter_map(|geometry| match &geometry.kind {
             GeometryKind::Mesh(mesh) => Some(mesh.origin),
             _ => None,
@@ -55,7 +53,6 @@ impl Holds {
         Self {
             only_spheres: first_cloud_origin.is_some() && geometries.iter().all(is_cloud),
             has_one_cloud_origin: cloud_origins.all(|origin| Some(origin) == first_cloud_origin),
-            sphere_reach,
             only_triangles: geometries.iter().all(|geometry| matches!(geometry.kind, GeometryKind::Mesh(_))),
             only_triangles_and_entries: geometries.iter().all(|geometry| {
                 matches!(
@@ -67,7 +64,7 @@ impl Holds {
             nesting: geometries.iter().map(nesting_of).max().unwrap_or(0),
             has_one_origin: origins.all(|origin| origin == first_origin),
             first_origin,
-            largest_corner,
+            sizes,
             masks_within: geometries.iter().any(|geometry| match &geometry.kind {
                 GeometryKind::Instance(Instance { accel, .. }) => {
                     !accel.masks.is_empty() || accel.holds.masks_within
@@ -75,6 +72,26 @@ impl Holds {
                 _ => false,
             }),
         }
+    }
+}
+
+/// The sizes of what is put into a tree.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Sizes {
+    /// No corner of a triangle has a larger coordinate, relative to its mesh's origin.
+    pub(crate) largest_corner: f32,
+    /// No side of the box of a triangle is longer, but for rounding.
+    pub(crate) longest_side: f32,
+    /// No coordinate of a sphere's centre, relative to its cloud's origin, plus a radius is larger.
+    pub(crate) sphere_reach: f64,
+}
+
+impl Sizes {
+    /// The larger ones.
+    pub(crate) fn grow(&mut self, other: &Self) {
+        self.largest_corner = self.largest_corner.max(other.largest_corner);
+        self.longest_side = self.longest_side.max(other.longest_side);
+        self.sphere_reach = self.sphere_reach.max(other.sphere_reach);
     }
 }
 
@@ -114,18 +131,20 @@ pub(crate) struct SingleStart {
     /// By how much planes are moved, and by how much more for each unit of the ray's start.
     pub(crate) margin: f32,
     pub(crate) margin_per_distance: f32,
-    /// What the tree's boxes are relative to as seen from where the corners are, and a zero.
+    /// What the tree's boxes are relative to as seen from where the corners are, in tree units, and a zero.
     pub(crate) shift: [f32; 4],
     /// By how much planes are moved for rays in single precision: see `narrow`.
     pub(crate) narrow_margin: f32,
     /// The scale, and its inverse.
     pub(crate) units_per_space: f32,
     pub(crate) space_per_unit: f32,
+    /// Where weights are precise enough.
+    pub(crate) precise: Precise,
     /// That of [`BlockRay`](crate::triangles::BlockRay) for every ray from nearby.
     pub(crate) least_size: f32,
     /// The bounds on the largest component of a direction, and that below which one is replaced.
     pub(crate) shortest: f32,
-    pub(crate) longest: f32,
+    pub(crate) longest: [f32; 4],
     pub(crate) tiny: f32,
 }
 
@@ -136,9 +155,9 @@ impl SingleStart {
     pub(crate) fn new(holds: &Holds, units: &Units, root: Option<u32>) -> Option<Self> {
         let two_to = |exponent: i32| 2.0f64.powi(exponent);
         // Without a triangle, any place will do.
-        let has_triangles = holds.first_origin.is_finite() && holds.largest_corner > 0.0;
+        let has_triangles = holds.first_origin.is_finite() && holds.sizes.largest_corner > 0.0;
         let (mesh_origin, largest_corner) = if has_triangles {
-            (holds.first_origin, f64::from(holds.largest_corner))
+            (holds.first_origin, f64::from(holds.sizes.largest_corner))
         } else {
             (units.origin, 1.0 / units.scale)
         };
@@ -168,13 +187,14 @@ impl SingleStart {
             farthest: [units.near as f32, units.near as f32, units.near as f32, f32::INFINITY],
             margin: units.single_margin(),
             margin_per_distance: Units::SINGLE_MARGIN_PER_DISTANCE,
-            shift: (units.origin - mesh_origin).extend(0.0).as_vec4().to_array(),
+            shift: ((units.origin - mesh_origin) * units.scale).extend(0.0).as_vec4().to_array(),
             narrow_margin: units.narrow_margin(shift * units.scale),
             units_per_space: units.scale as f32,
             space_per_unit: (1.0 / units.scale) as f32,
+            precise: Precise::new((1.0 / units.scale) as f32, holds.sizes.longest_side),
             least_size: round_up(reach * f64::from(LEAST_SIZE)),
             shortest: (SMALLEST_NEAR / units.scale) as f32,
-            longest: (LARGEST_NEAR / units.scale) as f32,
+            longest: [(LARGEST_NEAR / units.scale) as f32; 4],
             tiny: (TINY_NEAR / units.scale) as f32,
         })
     }

@@ -68,42 +68,51 @@ use self::packet::Packet;
 pub(crate) struct NarrowRay {
     /// The axes that become x, y and z; z is the direction's largest.
     pub(crate) axes: &'static Axes,
-    /// Relative to the mesh, in the order of the axes; the last of four means nothing, here and below.
+    /// Relative to the mesh, in the order of the axes; the last of four is the smallest `t`.
     pub(crate) origin: [f32; 4],
-    /// The direction by its last component.
+    /// The direction by its last component, which means nothing here; the last of four is the largest `t`.
     pub(crate) shear: [f32; 4],
     /// From what is behind a corner, with the sign turned, to `t`.
     pub(crate) minus_inverse: f32,
-    pub(crate) t_min: f32,
-    pub(crate) t_max: f32,
     /// See [`Precise`].
     pub(crate) precise: Precise,
 }
 
-/// Where weights are precise enough: the largest product times the extent of the triangle, or a little if that is less, is no more
-/// than their sum times so much. See above.
+/// Where weights are precise enough: the largest product times the extent of the triangle and a little is no more than their sum times
+/// so much. See above.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Precise {
+    /// The same by the longest side of all boxes in place of the extent: where the largest product is no more than the sum times this, one
+    /// need not look at heights. What these are wrong by, as rounded, is less than the little.
+    at_once: f32,
     most: f32,
     little: f32,
 }
 
 impl Precise {
-    #[inline(always)]
-    pub(crate) fn new(start: &SingleStart) -> Self {
-        let most = 2.0 * start.space_per_unit;
-        Self { most, little: most * (1.0 / 1024.0) }
+    /// For a tree in which no side of a triangle's box is longer, but for rounding.
+    pub(crate) fn new(space_per_unit: f32, longest_side: f32) -> Self {
+        let most = 2.0 * space_per_unit;
+        let little = most * (1.0 / 1024.0);
+        // More than what rounding may take away, here and of the side.
+        const MORE: f32 = 1.0 + 8.0 * f32::EPSILON;
+        Self { at_once: most / (MORE * (longest_side + little)), most, little }
     }
 
-    /// A bit for each that is: by products, how far within the triangle the line is, the sum of the edge functions, and the heights
-    /// of the corners.
+    /// A bit for each of the mask that is: by products, how far within the triangle the line is, the sum of the edge functions, and the
+    /// heights of the corners. Other bits mean nothing.
     #[inline(always)]
-    fn of<V: Vector>(&self, [bc, ca, ab]: [V; 3], within: V, sum: V, z: [V; 3]) -> u32 {
+    pub(crate) fn of<V: Vector>(&self, mask: u32, [bc, ca, ab]: [V; 3], within: V, sum: V, z: [V; 3]) -> u32 {
         let is_strict = V::splat(0.0).below(within);
         let largest = bc.larger(ca).larger(ab) + V::splat(TINY);
+        let sum = sum.abs();
+        let at_once = is_strict & largest.at_most(sum * V::splat(self.at_once));
+        if mask & !at_once == 0 {
+            return at_once;
+        }
         let extent = z[0].max(z[1]).max(z[2]) - z[0].min(z[1]).min(z[2]);
         let least = largest * (extent + V::splat(self.little));
-        is_strict & least.at_most(sum.abs() * V::splat(self.most))
+        at_once | is_strict & least.at_most(sum * V::splat(self.most))
     }
 }
 
@@ -137,10 +146,13 @@ pub(crate) struct Places<E> {
     weights: [E; 3],
 }
 
-/// The nearest crossing so far.
+/// The nearest crossing so far, if there is one.
 #[derive(Clone, Copy)]
-pub(crate) struct Nearest {
-    /// Its place; [`u32::MAX`] for none.
+pub(crate) struct Nearest(Option<Met>);
+
+/// A crossing by its place.
+#[derive(Clone, Copy)]
+struct Met {
     block: u32,
     lane: u32,
     /// The weights of the second and third corner in that lane, and the sum of all.
@@ -148,12 +160,7 @@ pub(crate) struct Nearest {
 }
 
 impl Nearest {
-    const NONE: Self = Self { block: u32::MAX, lane: 0, weights: [[0.0; BLOCK]; 3] };
-
-    #[inline(always)]
-    fn is_some(&self) -> bool {
-        self.block != u32::MAX
-    }
+    const NONE: Self = Self(None);
 
     /// Takes what is nearer of what a ray meets in a block, and ends the ray there; whether there was anything.
     #[inline(always)]
@@ -185,13 +192,13 @@ impl Nearest {
     ) -> bool {
         let &Crossing { met, unclear, at: Places { t: all, weights: [v, w, det] } } = crossing;
         let others = all.at_most(L::Eight::splat(t)) & met & !(1 << lane);
-        if unclear | others == 0 && t < ray.t_max {
-            *self = Self {
+        if unclear | others == 0 && t < ray.t_max() {
+            self.0 = Some(Met {
                 block: place,
                 lane: lane as u32,
                 weights: [v.to_array(), w.to_array(), det.to_array()],
-            };
-            ray.t_max = t;
+            });
+            ray.end_at(t);
             return true;
         }
         let at = Places { t: all.to_array(), weights: [v.to_array(), w.to_array(), det.to_array()] };
@@ -222,9 +229,9 @@ impl Nearest {
                     None => continue,
                 }
             };
-            if t < ray.t_max || t == ray.t_max && self.comes_after(exact, place, lane) {
-                *self = Self { block: place, lane, weights };
-                ray.t_max = t;
+            if t < ray.t_max() || t == ray.t_max() && self.comes_after(exact, place, lane) {
+                self.0 = Some(Met { block: place, lane, weights });
+                ray.end_at(t);
                 is_nearer = true;
             }
         }
@@ -233,18 +240,18 @@ impl Nearest {
 
     /// Whether a triangle that is met where this is comes before it.
     fn comes_after(&self, exact: &Exact, block: u32, lane: u32) -> bool {
-        !self.is_some() || exact.names(block, lane) < exact.names(self.block, self.lane)
+        match self.0 {
+            Some(own) => exact.names(block, lane) < exact.names(own.block, own.lane),
+            None => true,
+        }
     }
 
     /// As a hit at this `t`, if there is one.
     #[inline(always)]
     fn hit(&self, exact: &Exact, t: f32) -> Option<Hit32> {
-        if !self.is_some() {
-            return None;
-        }
-        let (geometry, primitive) = exact.names(self.block, self.lane);
-        let lane = self.lane as usize % BLOCK;
-        let [v, w, det] = &self.weights;
+        let Met { block, lane, weights: [v, w, det] } = self.0.as_ref()?;
+        let (geometry, primitive) = exact.names(*block, *lane);
+        let lane = *lane as usize % BLOCK;
         Some(Hit32 {
             t,
             local: [v[lane] / det[lane], w[lane] / det[lane]],
@@ -257,6 +264,21 @@ impl Nearest {
 }
 
 impl NarrowRay {
+    #[inline(always)]
+    fn t_min(&self) -> f32 {
+        self.origin[3]
+    }
+
+    #[inline(always)]
+    fn t_max(&self) -> f32 {
+        self.shear[3]
+    }
+
+    #[inline(always)]
+    fn end_at(&mut self, t_max: f32) {
+        self.shear[3] = t_max;
+    }
+
     /// How the line of the ray passes the triangles of a block, and a bit for each that it may pass through. `IS_ALONE` as in [`Lanes::narrow_corners`].
     #[inline(always)]
     fn pass_edges<L: Lanes, const IS_ALONE: bool>(&self, block: &TriangleBlock) -> (u32, Pass<L::Eight>) {
@@ -276,9 +298,9 @@ impl NarrowRay {
         let &Pass { products, edges: [u, v, w], within, heights: z } = pass;
         let det = u + v + w;
         let height = u * z[0] + v * z[1] + w * z[2];
-        let precise = ray.precise.of(products, within, det, z);
+        let precise = ray.precise.of(mask, products, within, det, z);
         let t = height.over(det) * L::Eight::splat(ray.minus_inverse);
-        let in_range = L::Eight::splat(ray.t_min).at_most(t) & t.at_most(L::Eight::splat(ray.t_max));
+        let in_range = L::Eight::splat(ray.t_min()).at_most(t) & t.at_most(L::Eight::splat(ray.t_max()));
         let at = Places { t, weights: [v, w, det] };
         Crossing { met: mask & precise & in_range, unclear: mask & !precise, at }
     }
@@ -309,7 +331,7 @@ impl NarrowRay {
             return None;
         }
         let t = ((u * a[2] + v * b[2] + w * c[2]) / det * f64::from(self.minus_inverse)) as f32;
-        (self.t_min <= t && t <= self.t_max).then(|| (t, [(v / det) as f32, (w / det) as f32, 1.0]))
+        (self.t_min() <= t && t <= self.t_max()).then(|| (t, [(v / det) as f32, (w / det) as f32, 1.0]))
     }
 
     /// Whether the ray meets any triangle of a block.

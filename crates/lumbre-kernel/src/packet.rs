@@ -45,7 +45,6 @@ use crate::triangles::{
     self, BEYOND, BLOCK, EDGE_ERROR, ERRORS_OF_EDGES, ERRORS_OF_EXTENT, FAR, HEIGHT_ERROR, Meeting, Pairs,
     ROUNDINGS, SIZE_ERROR, TINY, beyond,
 };
-use crate::way::limit_of;
 use crate::{Accel, Faces};
 
 /// Rays in a packet.
@@ -379,7 +378,7 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
         let has_one_origin = self.has_one_origin;
         for axis in 0..3 {
             let direction = L::Wide::rounded(&columns[3 + axis]);
-            fits &= direction.abs().at_most(splat(start.longest));
+            fits &= direction.abs().at_most(splat(start.longest[axis]));
             is_long |= splat(start.shortest).at_most(direction.abs());
             inverse[axis] = inverse_of(start, direction);
             let (origin, scale) = (start.tree_origin[axis], start.scale);
@@ -905,10 +904,9 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
 
     #[inline(always)]
     fn pop<G: Goal>(&self, stack: &mut Stack<<G::Order as Order>::Entry>) -> Option<u32> {
-        let limit = limit_of(self.frustum.s_max);
         loop {
             let entry = stack.pop()?;
-            if !G::Order::is_beyond(entry, limit) {
+            if !G::Order::is_beyond(entry, self.frustum.s_max) {
                 return Some(G::Order::reference(entry));
             }
         }

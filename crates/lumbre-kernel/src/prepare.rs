@@ -11,7 +11,7 @@ use crate::boxes::Boxes;
 use crate::build::{Effort, Grown, PARALLEL, binary_tree};
 use crate::clouds::CloudSurvey;
 use crate::collapse::{Entry, Packed, lay_out};
-use crate::holds::{Holds, SingleStart};
+use crate::holds::{Holds, SingleStart, Sizes};
 use crate::hulls::Hulls;
 use crate::lanes::{Lanes, Level, Task};
 use crate::narrow::NarrowQuestions;
@@ -96,7 +96,7 @@ fn build_here(geometries: Vec<Geometry>, effort: Effort) -> Result<Accel, BuildE
         drop(primitives);
         layout.pack(level, &geometries, names, cells)?
     };
-    let holds = Holds::new(&geometries, parts.largest_corner, parts.sphere_reach);
+    let holds = Holds::new(&geometries, parts.sizes);
     let single = SingleStart::new(&holds, &units, tree.root);
     Ok(Accel {
         hulls: Hulls::new(&geometries, &tree.entries, &units),
@@ -122,7 +122,7 @@ pub(crate) fn empty_over(geometries: Vec<Geometry>) -> Accel {
     let level = Level::best();
     Accel {
         units: Units::new(DVec3::ZERO, 1.0, 0.0, 1.0),
-        holds: Holds::new(&geometries, 0.0, 0.0),
+        holds: Holds::new(&geometries, Sizes::default()),
         single: None,
         questions: Questions::new(level, None),
         narrow_questions: NarrowQuestions::new(level, None),
@@ -153,14 +153,11 @@ pub(crate) struct Parts {
     pub(crate) triangles: usize,
     /// Whether there are others, which have no area.
     pub(crate) has_flat: bool,
-    /// No corner of a triangle has a larger coordinate, relative to its mesh's origin.
-    pub(crate) largest_corner: f32,
     /// Of every cloud of spheres.
     pub(crate) clouds: Vec<CloudSurvey>,
     /// Of all clouds.
     pub(crate) spheres: usize,
-    /// No coordinate of a sphere's centre, relative to its cloud's origin, plus a radius is larger.
-    pub(crate) sphere_reach: f64,
+    pub(crate) sizes: Sizes,
 }
 
 /// What was seen of a mesh.
@@ -189,10 +186,9 @@ pub(crate) fn take_apart(geometries: &[Geometry]) -> Result<Parts, BuildError> {
         surveys: Vec::new(),
         triangles: 0,
         has_flat: false,
-        largest_corner: 0.0,
         clouds: Vec::new(),
         spheres: 0,
-        sphere_reach: 0.0,
+        sizes: Sizes::default(),
     };
     let boxes = boxes_of(geometries);
     for (position, geometry) in geometries.iter().enumerate() {
@@ -202,8 +198,8 @@ pub(crate) fn take_apart(geometries: &[Geometry]) -> Result<Parts, BuildError> {
                 if mesh.indices.len() > room {
                     return Err(BuildError::TooMany);
                 }
-                let (survey, bounds, largest) = survey_mesh(position, mesh)?;
-                parts.largest_corner = parts.largest_corner.max(largest);
+                let (survey, bounds, sizes) = survey_mesh(position, mesh)?;
+                parts.sizes.grow(&sizes);
                 parts.tree_bounds = parts.tree_bounds.union(bounds);
                 parts.triangles += survey.triangles;
                 parts.has_flat |= survey.triangles < mesh.indices.len();
@@ -214,7 +210,7 @@ pub(crate) fn take_apart(geometries: &[Geometry]) -> Result<Parts, BuildError> {
                     return Err(BuildError::TooMany);
                 }
                 let survey = CloudSurvey::of(position, cloud)?;
-                parts.sphere_reach = parts.sphere_reach.max(survey.reach);
+                parts.sizes.grow(&Sizes { sphere_reach: survey.reach, ..Sizes::default() });
                 parts.tree_bounds = parts.tree_bounds.union(survey.bounds);
                 parts.spheres += survey.spheres;
                 parts.clouds.push(survey);
@@ -340,8 +336,8 @@ fn least_chunks(mesh: &TriangleMesh) -> usize {
     if mesh.indices.len() > PARALLEL { 1 } else { usize::MAX }
 }
 
-/// Checks a mesh, and finds the box around its triangles that have an area.
-fn survey_mesh(position: usize, mesh: &TriangleMesh) -> Result<(Survey, Aabb, f32), BuildError> {
+/// Checks a mesh, and finds the box around its triangles that have an area, and their sizes.
+fn survey_mesh(position: usize, mesh: &TriangleMesh) -> Result<(Survey, Aabb, Sizes), BuildError> {
     if !mesh.origin.is_finite() {
         return Err(BuildError::NotFinite { geometry: position, element: 0 });
     }
@@ -362,43 +358,49 @@ fn survey_mesh(position: usize, mesh: &TriangleMesh) -> Result<(Survey, Aabb, f3
         mesh.indices.par_chunks(CHUNK).with_min_len(least).enumerate().map(survey_chunk).collect();
     let mut survey =
         Survey { geometry: position as u32, triangles: 0, chunks: Vec::with_capacity(chunks.len()) };
-    let mut bounds = MeshBox::EMPTY;
+    let (mut bounds, mut longest_side) = (MeshBox::EMPTY, 0.0f32);
     for chunk in chunks {
-        let (around, count) = chunk?;
+        let (around, longest, count) = chunk?;
         bounds.grow(&around);
+        longest_side = longest_side.max(longest);
         survey.triangles += count as usize;
         survey.chunks.push(count);
     }
     if survey.triangles == 0 {
-        return Ok((survey, Aabb::EMPTY, 0.0));
+        return Ok((survey, Aabb::EMPTY, Sizes::default()));
     }
     let [low, high] = bounds.corners();
-    let largest = low.abs().max(high.abs()).max_element();
+    let largest_corner = low.abs().max(high.abs()).max_element();
     let bounds = Aabb { min: mesh.origin + low.as_dvec3(), max: mesh.origin + high.as_dvec3() };
-    Ok((survey, bounds, largest))
+    Ok((survey, bounds, Sizes { largest_corner, longest_side, ..Sizes::default() }))
 }
 
-/// Looks at some triangles: the box around those that have an area, and how many have; or the place of one that lacks a vertex.
+/// Looks at some triangles: the box around those that have an area, the longest side of a box around one of them, and how many they are;
+/// or the place of one that lacks a vertex.
 struct SurveyChunk<'a> {
     mesh: &'a TriangleMesh,
     triangles: &'a [[u32; 3]],
 }
 
 impl Task for SurveyChunk<'_> {
-    type Output = Result<(MeshBox, u32), usize>;
+    type Output = Result<(MeshBox, f32, u32), usize>;
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Self::Output {
         let Self { mesh, triangles } = self;
-        let (mut bounds, mut count) = (MeshBox::EMPTY, 0);
+        let (mut bounds, mut sides, mut count) = (MeshBox::EMPTY, [0.0f32; 4], 0);
         for (place, triangle) in triangles.iter().enumerate() {
             let Some(corners) = corners(mesh, triangle) else { return Err(place) };
             if has_area(&corners) {
                 count += 1;
-                bounds.grow(&MeshBox::around(&corners));
+                let around = MeshBox::around(&corners);
+                bounds.grow(&around);
+                for (longest, side) in sides.iter_mut().zip(around.sides()) {
+                    *longest = if *longest > side { *longest } else { side };
+                }
             }
         }
-        Ok((bounds, count))
+        Ok((bounds, sides.into_iter().fold(0.0, f32::max), count))
     }
 }
 
@@ -435,6 +437,13 @@ impl MeshBox {
             // One instruction, which f32::min is not.
             *own = if *own < other { *own } else { other };
         }
+    }
+
+    /// How long it is on each axis; the last means nothing, and is none.
+    #[inline(always)]
+    fn sides(&self) -> [f32; 4] {
+        let [x, y, z, last, minus_x, minus_y, minus_z, minus_last] = self.0;
+        [-(x + minus_x), -(y + minus_y), -(z + minus_z), -(last + minus_last)]
     }
 
     /// The lower and the upper one.

@@ -197,7 +197,7 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts, places: Places) {
         }
     }
 
-    accel.holds = Holds::new(geometries, parts.largest_corner, parts.sphere_reach);
+    accel.holds = Holds::new(geometries, parts.sizes);
     accel.primitives = parts.count();
     accel.infinite = parts.infinite;
     accel.units = units;

@@ -25,7 +25,7 @@ impl CloudRay {
     #[inline(always)]
     fn new<'a, S: Search<'a>>(accel: &Accel, ray: &Ray, geometry: u32, search: &S) -> Self {
         let origin = accel.cloud(geometry).origin;
-        let mut spheres = SphereRay::new(ray, &origin, accel.holds.sphere_reach);
+        let mut spheres = SphereRay::new(ray, &origin, accel.holds.sizes.sphere_reach);
         spheres.set_range(search.floor(), search.limit());
         Self { geometry, origin, spheres }
     }

@@ -1,6 +1,6 @@
 //! The stack of a search: a short array, and the heap for what no longer fits.
 
-use crate::lanes::{self, Lanes, Room, Slots};
+use crate::lanes::{self, LANE_BITS, Lanes, Room, Slots};
 use crate::node::{Node, WIDTH};
 
 /// Entries in the array: many more than a search usually has, but few in tests, where they are not to do always.
@@ -22,8 +22,8 @@ pub(crate) trait Order {
     fn entry(reference: u32) -> Self::Entry;
     /// What it refers to.
     fn reference(entry: Self::Entry) -> u32;
-    /// Whether it lies wholly beyond the limit: the largest entry that does not.
-    fn is_beyond(entry: Self::Entry, limit: i64) -> bool;
+    /// Whether it lies wholly beyond where a ray ends.
+    fn is_beyond(entry: Self::Entry, s_max: f32) -> bool;
     /// Puts the children in `mask`, two or more, or one or more, onto the stack but for the first to be taken, which it answers.
     fn push_children<L: Lanes>(node: &Node, mask: u32, enter: L::Wide, room: Room<Self::Entry>) -> u32;
     /// The same without a branch, as far as it can be: puts all, and takes what then is the last. Where one alone is put as many are,
@@ -49,8 +49,8 @@ impl Order for ByDistance {
     }
 
     #[inline(always)]
-    fn is_beyond(entry: i64, limit: i64) -> bool {
-        entry > limit
+    fn is_beyond(entry: i64, s_max: f32) -> bool {
+        (entry >> 32) as i32 > s_max.to_bits() as i32 | LANE_BITS
     }
 
     #[inline(always)]
@@ -82,7 +82,7 @@ impl Order for AsBuilt {
     }
 
     #[inline(always)]
-    fn is_beyond(_: u32, _: i64) -> bool {
+    fn is_beyond(_: u32, _: f32) -> bool {
         false
     }
 

@@ -12,7 +12,7 @@ use smallvec::SmallVec;
 
 use crate::blocks::{Blocks, TriangleBlock};
 use crate::collapse::Entry;
-use crate::holds::{Contents, Holds, SingleStart};
+use crate::holds::{Contents, Holds, SingleStart, Sizes};
 use crate::hulls::HullRay;
 use crate::lanes::{self, Lanes, Level, MetHulls, Task};
 use crate::node::{BoxRay, Progress, Slabs, tag};
@@ -345,7 +345,8 @@ impl<'a, R: Borrow<Ray>, L: Lanes> Frame<'a, R, L> {
     /// Turns to the mesh of a block: to the first that the ray comes to, and where meshes have different origins to each.
     #[inline(always)]
     fn turn_to(&mut self, block: &TriangleBlock) {
-        let Holds { has_one_origin, first_origin, largest_corner, .. } = self.accel.holds;
+        let Holds { has_one_origin, first_origin, sizes: Sizes { largest_corner, .. }, .. } =
+            self.accel.holds;
         if has_one_origin && self.mesh.is_some() {
             return;
         }

@@ -2,30 +2,27 @@
 
 use std::marker::PhantomData;
 
-use crate::lanes::{self, LANE_BITS, Lanes};
+use crate::lanes::{self, Lanes};
 use crate::node::{Node, Slabs, tag};
-use crate::stack::{Order, Stack, stack_entry};
+use crate::stack::{Order, Stack};
 
 /// A ray among the boxes of a tree.
 pub(crate) struct Way<'a, L> {
     nodes: &'a [Node],
     slabs: Slabs,
-    /// No entry of a stack that is larger is of interest.
-    limit: i64,
     lanes: PhantomData<L>,
 }
 
 impl<'a, L: Lanes> Way<'a, L> {
     #[inline(always)]
     pub(crate) fn new(nodes: &'a [Node], slabs: Slabs) -> Self {
-        Self { nodes, limit: limit_of(slabs.s_max), slabs, lanes: PhantomData }
+        Self { nodes, slabs, lanes: PhantomData }
     }
 
     /// Leaves out the boxes that the ray enters after this.
     #[inline(always)]
     pub(crate) fn end_at(&mut self, s_max: f32) {
         self.slabs.s_max = s_max;
-        self.limit = limit_of(s_max);
     }
 
     #[inline(always)]
@@ -50,13 +47,13 @@ impl<'a, L: Lanes> Way<'a, L> {
         }
     }
 
-    /// Whether an entry of a stack lies wholly beyond the limit.
+    /// Whether an entry of a stack lies wholly beyond the end of the ray.
     #[inline(always)]
     pub(crate) fn is_beyond<O: Order>(&self, entry: O::Entry) -> bool {
-        O::is_beyond(entry, self.limit)
+        O::is_beyond(entry, self.slabs.s_max)
     }
 
-    /// The next on the stack that is not beyond the limit.
+    /// The next on the stack that is not beyond the end of the ray.
     #[inline(always)]
     pub(crate) fn pop<O: Order>(&self, stack: &mut Stack<O::Entry>) -> Option<u32> {
         loop {
@@ -82,10 +79,4 @@ impl<'a, L: Lanes> Way<'a, L> {
 #[inline(never)]
 pub(crate) fn out_of_tree() -> ! {
     panic!("a reference leads out of its tree")
-}
-
-/// No entry of a stack that is larger is of interest to what ends here.
-#[inline(always)]
-pub(crate) fn limit_of(s_max: f32) -> i64 {
-    stack_entry(s_max.to_bits() as i32 | LANE_BITS, u32::MAX)
 }

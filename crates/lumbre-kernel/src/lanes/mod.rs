@@ -185,17 +185,19 @@ impl<E: Eight> Crossings<E> {
 }
 
 /// The planes of a node that a ray meets first.
-#[derive(Debug)]
+#[derive(Debug, PartialEq)]
+#[repr(align(32))]
 pub(crate) struct Sides {
     // On each axis, where the planes start in the flat array of a node's planes: `WIDTH` times 2 axis + side. The other planes are
     // at that place with `WIDTH` flipped.
     near: [usize; 3],
 }
 
-static SIDES: [Sides; 8] = {
-    let mut sides = [const { Sides { near: [0; 3] } }; 8];
+// The fourth bit makes no difference.
+static SIDES: [Sides; 16] = {
+    let mut sides = [const { Sides { near: [0; 3] } }; 16];
     let mut signs = 0;
-    while signs < 8 {
+    while signs < 16 {
         let mut axis = 0;
         while axis < 3 {
             sides[signs].near[axis] = 2 * WIDTH * axis + WIDTH * (signs >> axis & 1);
@@ -207,10 +209,10 @@ static SIDES: [Sides; 8] = {
 };
 
 impl Sides {
-    /// For a direction that has these signs: a bit for each negative component.
+    /// For a direction that has these signs: a bit for each negative component, and one of any that follows.
     #[inline(always)]
     pub(crate) fn new(signs: u32) -> &'static Self {
-        &SIDES[signs as usize % 8]
+        &SIDES[signs as usize % 16]
     }
 }
 

@@ -9,7 +9,7 @@ use super::{Axes, Corners, CornersRoom, Crossings, Eight, Lanes, Level, Row, Set
 use crate::Ray32;
 use crate::blocks::TriangleBlock;
 use crate::holds::SingleStart;
-use crate::narrow::{NarrowRay, Precise};
+use crate::narrow::NarrowRay;
 use crate::node::{BoxRay, END_FACTOR, LITTLE, START_FACTOR, Slabs, Units};
 use crate::triangles::{
     BLOCK, BlockRay, EDGE_ERROR, ERRORS_OF_EDGES, ERRORS_OF_EXTENT, HEIGHT_ERROR, HeightRange, Inside,
@@ -75,7 +75,7 @@ impl Lanes for Portable {
         let direction = single_direction(ray);
         for (axis, &d) in direction.iter().enumerate().take(3) {
             let from = ((ray.origin[axis] - start.tree_origin[axis]) * start.scale) as f32;
-            fits &= from.abs() <= start.farthest[axis] && d.abs() <= start.longest;
+            fits &= from.abs() <= start.farthest[axis] && d.abs() <= start.longest[axis];
             is_long |= d.abs() >= start.shortest;
             let inverse = start.space_per_unit / greater(d.abs(), start.tiny);
             let margin = inverse * (from.abs() * start.margin_per_distance + start.margin);
@@ -128,8 +128,8 @@ impl Lanes for Portable {
         let mut slabs = BoxRay::passing_all().slabs;
         for (axis, &local) in local(start, ray).iter().enumerate().take(3) {
             let d = ray.direction[axis];
-            let from = (local - start.shift[axis]) * start.units_per_space;
-            fits &= from.abs() <= start.farthest[axis] && d.abs() <= start.longest;
+            let from = local * start.units_per_space - start.shift[axis];
+            fits &= from.abs() <= start.farthest[axis] && d.abs() <= start.longest[axis];
             is_long |= d.abs() >= start.shortest;
             let inverse = start.space_per_unit / greater(d.abs(), start.tiny);
             let margin = inverse * (from.abs() * Units::NARROW_MARGIN_PER_DISTANCE + start.narrow_margin);
@@ -152,15 +152,10 @@ impl Lanes for Portable {
         let axes = Axes::new(&ray.direction.as_dvec3());
         let inverse = axes.permute_single(&slabs.inverse)[2] * start.units_per_space;
         let [x, y, z] = ray.direction.to_array();
-        NarrowRay {
-            axes,
-            origin: axes.permute_single(&local(start, ray)),
-            shear: axes.permute_single(&[x, y, z, 0.0]).map(|d| d * inverse),
-            minus_inverse: -inverse,
-            t_min: ray.t_min,
-            t_max: ray.t_max,
-            precise: Precise::new(start),
-        }
+        let mut origin = axes.permute_single(&local(start, ray));
+        let mut shear = axes.permute_single(&[x, y, z, 0.0]).map(|d| d * inverse);
+        (origin[3], shear[3]) = (ray.t_min, ray.t_max);
+        NarrowRay { axes, origin, shear, minus_inverse: -inverse, precise: start.precise }
     }
 
     #[inline]

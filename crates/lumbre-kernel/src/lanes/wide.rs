@@ -489,9 +489,9 @@ mod x86 {
     #[derive(Clone, Copy)]
     pub(crate) struct Avx2([__m256; 2]);
 
-    /// Only where either is.
+    /// Only where `lanes::x86::X86<AVX512>` is.
     #[derive(Clone, Copy, Zeroable)]
-    pub(crate) struct Eight256(__m256);
+    pub(crate) struct Eight256<const AVX512: bool>(__m256);
 
     const SIGN: i32 = i32::MIN;
 
@@ -505,7 +505,7 @@ mod x86 {
                     unsafe { Self($wide(self.0, other.0)) }
                 }
             }
-            impl $trait for Eight256 {
+            impl<const AVX512: bool> $trait for Eight256<AVX512> {
                 type Output = Self;
                 #[inline(always)]
                 fn $name(self, other: Self) -> Self {
@@ -982,7 +982,7 @@ mod x86 {
         }
     }
 
-    impl Vector for Eight256 {
+    impl<const AVX512: bool> Vector for Eight256<AVX512> {
         const COUNT: usize = 8;
         type Array = [f32; 8];
 
@@ -1016,10 +1016,14 @@ mod x86 {
 
         #[inline(always)]
         fn larger(self, other: Self) -> Self {
-            // Numbers without a sign have the order of their bits. As integers, for that is done beside sums and comparisons, not between
-            // them.
             // SAFETY: see the type.
             unsafe {
+                if AVX512 {
+                    // The maximum by magnitude, without its sign.
+                    return Self(_mm256_range_ps::<0b1011>(self.0, other.0));
+                }
+                // Numbers without a sign have the order of their bits. As integers, for that is done beside sums and comparisons, not
+                // between them.
                 let without_sign = _mm256_set1_epi32(i32::MAX);
                 let a = _mm256_and_si256(_mm256_castps_si256(self.0), without_sign);
                 let b = _mm256_and_si256(_mm256_castps_si256(other.0), without_sign);
@@ -1039,26 +1043,38 @@ mod x86 {
         #[inline(always)]
         fn at_most(self, other: Self) -> u32 {
             // SAFETY: see the type.
-            unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, other.0)) as u32 }
+            unsafe {
+                if AVX512 {
+                    u32::from(_mm256_cmp_ps_mask::<_CMP_LE_OQ>(self.0, other.0))
+                } else {
+                    _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, other.0)) as u32
+                }
+            }
         }
 
         #[inline(always)]
         fn below(self, other: Self) -> u32 {
             // SAFETY: see the type.
-            unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(self.0, other.0)) as u32 }
+            unsafe {
+                if AVX512 {
+                    u32::from(_mm256_cmp_ps_mask::<_CMP_LT_OQ>(self.0, other.0))
+                } else {
+                    _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(self.0, other.0)) as u32
+                }
+            }
         }
     }
 
-    impl Eight256 {
+    impl<const AVX512: bool> Eight256<AVX512> {
         /// # Safety
-        /// There must be AVX2.
+        /// There must be what `lanes::x86::X86<AVX512>` has.
         #[inline(always)]
         pub(in crate::lanes) unsafe fn new(eight: __m256) -> Self {
             Self(eight)
         }
     }
 
-    impl Eight for Eight256 {
+    impl<const AVX512: bool> Eight for Eight256<AVX512> {
         #[inline(always)]
         fn load(eight: &[f32; 8]) -> Self {
             // SAFETY: see the type. The load is of eight f32.
@@ -1091,8 +1107,8 @@ mod x86 {
             #[inline(always)]
             fn $name(self $(, $other: Self)*) -> Self {
                 Self([
-                    Eight256(self.0[0]).$name($(Eight256($other.0[0])),*).0,
-                    Eight256(self.0[1]).$name($(Eight256($other.0[1])),*).0,
+                    Eight256::<false>(self.0[0]).$name($(Eight256::<false>($other.0[0])),*).0,
+                    Eight256::<false>(self.0[1]).$name($(Eight256::<false>($other.0[1])),*).0,
                 ])
             }
         };
@@ -1122,7 +1138,7 @@ mod x86 {
 
         #[inline(always)]
         fn splat(value: f32) -> Self {
-            Self([Eight256::splat(value).0; 2])
+            Self([Eight256::<false>::splat(value).0; 2])
         }
 
         #[inline(always)]

@@ -13,7 +13,7 @@ use super::{
 use crate::blocks::{MOST_SHARED, QUAD, TriangleBlock, USUAL, far_of_last};
 use crate::fleet;
 use crate::holds::SingleStart;
-use crate::narrow::{NarrowRay, Precise};
+use crate::narrow::NarrowRay;
 use crate::node::{
     BoxRay, END_FACTOR, LARGEST_NEAR, LITTLE, SMALLEST_NEAR, START_FACTOR, Slabs, TINY_NEAR, Units,
 };
@@ -482,7 +482,7 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
             let fits = _mm_and_ps(
                 _mm_and_ps(
                     _mm_cmple_ps(distance, _mm_loadu_ps(start.farthest.as_ptr())),
-                    _mm_cmple_ps(length, _mm_set1_ps(start.longest)),
+                    _mm_cmple_ps(length, _mm_loadu_ps(start.longest.as_ptr())),
                 ),
                 // 0 <= t_min, t_min <= t_max, and the first again.
                 _mm_cmple_ps(_mm_unpacklo_ps(_mm_setzero_ps(), range), range),
@@ -601,7 +601,7 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
         unsafe { (_mm_loadu_ps(numbers), _mm_loadu_ps(numbers.add(4))) }
     }
 
-    /// Three coordinates relative to the mesh, rounded once.
+    /// Three coordinates relative to the mesh, rounded once; the fourth number stays what it is.
     #[inline(always)]
     fn local(start: &SingleStart, origin: __m128) -> __m128 {
         // SAFETY: see `X86`. The loads are of arrays of four.
@@ -715,7 +715,7 @@ impl<const AVX512: bool, const LEAKS: bool> Lanes for X86<AVX512, LEAKS>
 where
     Self: HasWide,
 {
-    type Eight = wide::Eight256;
+    type Eight = wide::Eight256<AVX512>;
     type Edges = Edges;
     type Wide = <Self as HasWide>::Wide;
     // In flight, where sixteen numbers are two vectors, a ray takes 1.6 times the instructions that it takes alone. What it gains by them
@@ -830,21 +830,32 @@ where
         // SAFETY: see `X86`. The loads are of arrays of four.
         unsafe {
             let (origin, direction) = Self::narrow_numbers(ray);
-            let from = _mm_sub_ps(Self::local(start, origin), _mm_loadu_ps(start.shift.as_ptr()));
-            let from = _mm_mul_ps(from, _mm_set1_ps(start.units_per_space));
+            // Fused or not: units are powers of two.
+            let from = _mm_fmsub_ps(
+                Self::local(start, origin),
+                _mm_set1_ps(start.units_per_space),
+                _mm_loadu_ps(start.shift.as_ptr()),
+            );
             let sign = _mm_set1_ps(-0.0);
             let (distance, length) = (_mm_andnot_ps(sign, from), _mm_andnot_ps(sign, direction));
             // Every comparison with a NaN is false. The last of four: t_min is not below zero, and t_min <= t_max.
-            let fits = _mm_and_ps(
-                _mm_cmple_ps(distance, _mm_loadu_ps(start.farthest.as_ptr())),
-                _mm_cmple_ps(
-                    _mm_blend_ps::<0b1000>(length, origin),
-                    _mm_blend_ps::<0b1000>(_mm_set1_ps(start.longest), direction),
-                ),
-            );
-            let is_long = _mm_cmpge_ps(length, _mm_set1_ps(start.shortest));
-            let is_before = _mm_movemask_ps(origin) & 0b1000;
-            if _mm_movemask_ps(fits) != 0b1111 || _mm_movemask_ps(is_long) & 0b111 == 0 || is_before != 0 {
+            let farthest = _mm_loadu_ps(start.farthest.as_ptr());
+            let size = _mm_blend_ps::<0b1000>(length, origin);
+            let largest = _mm_blend_ps::<0b1000>(_mm_loadu_ps(start.longest.as_ptr()), direction);
+            let shortest = _mm_set1_ps(start.shortest);
+            let (fits, is_long) = if AVX512 {
+                let is_near = _mm_cmp_ps_mask::<_CMP_LE_OQ>(distance, farthest);
+                let fits = _mm_mask_cmp_ps_mask::<_CMP_LE_OQ>(is_near, size, largest);
+                let sign_of_last = _mm_setr_epi32(0, 0, 0, i32::MIN);
+                let fits = _mm_mask_testn_epi32_mask(fits, _mm_castps_si128(origin), sign_of_last);
+                (fits == 0b1111, _mm_cmp_ps_mask::<_CMP_GE_OQ>(length, shortest) & 0b111 != 0)
+            } else {
+                let fits = _mm_and_ps(_mm_cmple_ps(distance, farthest), _mm_cmple_ps(size, largest));
+                let is_before = _mm_movemask_ps(origin) & 0b1000 != 0;
+                let is_long = _mm_movemask_ps(_mm_cmpge_ps(length, shortest)) & 0b111 != 0;
+                (_mm_movemask_ps(fits) == 0b1111 && !is_before, is_long)
+            };
+            if !(fits && is_long) {
                 return None;
             }
             let size = _mm_max_ps(length, _mm_set1_ps(start.tiny));
@@ -875,15 +886,15 @@ where
             let last = _mm_shuffle_epi32::<0b10_10_10_10>(order);
             let inverse = _mm_permutevar_ps(_mm_loadu_ps(slabs.inverse.as_ptr()), last);
             let inverse = _mm_mul_ps(inverse, _mm_set1_ps(start.units_per_space));
-            let shear = _mm_permutevar_ps(_mm_mul_ps(direction, inverse), order);
+            // The fourth stays where it is: the start and the end of the ray.
+            let shear = _mm_blend_ps::<0b1000>(_mm_mul_ps(direction, inverse), direction);
+            let shear = _mm_permutevar_ps(shear, order);
             NarrowRay {
                 axes,
                 origin: Self::array(_mm_permutevar_ps(local, order)),
                 shear: Self::array(shear),
                 minus_inverse: -_mm_cvtss_f32(inverse),
-                t_min: ray.t_min,
-                t_max: ray.t_max,
-                precise: Precise::new(start),
+                precise: start.precise,
             }
         }
     }
@@ -892,9 +903,9 @@ where
     fn narrow_corners<const IS_ALONE: bool>(
         block: &TriangleBlock,
         ray: &NarrowRay,
-    ) -> [[wide::Eight256; 3]; 3] {
+    ) -> [[wide::Eight256<AVX512>; 3]; 3] {
         let [[a, b, c], [d, e, f], [g, h, i]] = Self::sheared_corners::<_, IS_ALONE>(block, ray);
-        let of = wide::Eight256::new;
+        let of = wide::Eight256::<AVX512>::new;
         // SAFETY: see `X86`.
         unsafe { [[of(a), of(b), of(c)], [of(d), of(e), of(f)], [of(g), of(h), of(i)]] }
     }
@@ -1141,7 +1152,7 @@ where
     }
 
     #[inline(always)]
-    fn place_crossings(edges: &Edges, ray: &BlockRay) -> Crossings<wide::Eight256> {
+    fn place_crossings(edges: &Edges, ray: &BlockRay) -> Crossings<wide::Eight256<AVX512>> {
         // SAFETY: see `X86`.
         unsafe {
             let ([u, v, w], z) = (edges.values, edges.heights);

@@ -36,7 +36,7 @@ pub(super) fn closest<L: Lanes>(exact: &Exact, ray: &Ray32) -> Outcome<Option<Hi
             if let Some(crossing) = ray.pass::<L>(block)
                 && nearest.take::<L>(exact, &mut ray, place, &crossing)
             {
-                way.end_at(triangles::beyond(ray.t_max));
+                way.end_at(triangles::beyond(ray.t_max()));
             }
             match block.next(place) {
                 Some(next) => place = next,
@@ -47,7 +47,7 @@ pub(super) fn closest<L: Lanes>(exact: &Exact, ray: &Ray32) -> Outcome<Option<Hi
         let Some(next) = way.descend::<ByDistance>(next, &mut stack) else { break };
         leaf = next;
     }
-    Outcome::Settled(nearest.hit(exact, ray.t_max))
+    Outcome::Settled(nearest.hit(exact, ray.t_max()))
 }
 
 #[inline(always)]

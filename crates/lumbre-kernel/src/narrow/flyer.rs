@@ -43,7 +43,7 @@ impl<G: Goal, L: Lanes> Flyer<L> for NarrowFlyer<G> {
     #[inline(always)]
     fn renew(&mut self, start: &SingleStart, ray: &Ray32, slabs: &Slabs) {
         self.ray = L::start_narrow_blocks(start, ray, slabs);
-        self.nearest.block = Nearest::NONE.block;
+        self.nearest = Nearest::NONE;
     }
 
     #[inline(always)]
@@ -74,13 +74,13 @@ impl<G: Goal, L: Lanes> Flyer<L> for NarrowFlyer<G> {
         let which = crossing.at.t.at_most(L::Eight::splat(t)) & crossing.met;
         let lane = which.trailing_zeros() as usize % BLOCK;
         if self.nearest.take_nearest::<L>(exact, &mut self.ray, block, crossing, (lane, t)) {
-            way.end_at(triangles::beyond(self.ray.t_max));
+            way.end_at(triangles::beyond(self.ray.t_max()));
         }
         true
     }
 
     #[inline(always)]
     fn answer(&self, exact: &Exact, _: &Ray32, is_met: bool) -> Outcome<G::Answer> {
-        Outcome::Settled(G::answer(exact, is_met, &self.nearest, self.ray.t_max))
+        Outcome::Settled(G::answer(exact, is_met, &self.nearest, self.ray.t_max()))
     }
 }

@@ -16,7 +16,6 @@ use crate::packet::{ALL, CULL_ERROR, Effort, Frustum, LEAST, PACKET, Together};
 use crate::single::{Exact, Outcome};
 use crate::stack::{Order, Stack};
 use crate::triangles::{BEYOND, BLOCK, beyond};
-use crate::way::limit_of;
 use crate::{Accel, Hit32, Ray32};
 
 /// How far from their middle rays may start on an axis, in tree units.
@@ -100,7 +99,7 @@ impl<'a> Packet<'a> {
                 minus_inverse: row,
                 t_min: row,
                 t_max: row,
-                precise: Precise::new(start),
+                precise: start.precise,
                 least_size: start.least_size,
                 middle: none,
                 middle_shear: [0.0; 2],
@@ -221,7 +220,7 @@ impl<'a> Packet<'a> {
         for axis in 0..3 {
             let direction = L::Wide::load(&rows[4 + axis].0);
             let length = direction.abs();
-            fits &= length.at_most(splat(start.longest));
+            fits &= length.at_most(splat(start.longest[axis]));
             is_long |= splat(start.shortest).at_most(length);
             inverse[axis] =
                 splat(start.space_per_unit).over(length.max(splat(start.tiny))).turned_by(direction);
@@ -229,13 +228,13 @@ impl<'a> Packet<'a> {
             if has_one_origin {
                 let local = (f64::from(rows[axis].0[0]) - start.mesh_origin[axis]) as f32;
                 splat(local).store(&mut rows[axis]);
-                let center = (local - start.shift[axis]) * start.units_per_space;
+                let center = local * start.units_per_space - start.shift[axis];
                 is_near &= center.abs() <= start.farthest[axis];
                 frustum.center[axis] = center;
             } else {
                 let local = L::Wide::load(&rows[axis].0).rounded_less(start.mesh_origin[axis]);
                 local.store(&mut rows[axis]);
-                let from = (local - splat(start.shift[axis])) * splat(start.units_per_space);
+                let from = local * splat(start.units_per_space) - splat(start.shift[axis]);
                 let center = from.middle();
                 fits &= from.abs().at_most(splat(start.farthest[axis]));
                 off[axis] = (from - center).abs();
@@ -383,7 +382,7 @@ impl<'a> Packet<'a> {
         }
         let det = u + v + w;
         let height = u * az + v * bz + w * cz;
-        let precise = bundle.precise.of([bc, ca, ab], within, det, [az, bz, cz]);
+        let precise = bundle.precise.of(mask, [bc, ca, ab], within, det, [az, bz, cz]);
         let t = height.over(det) * load(&bundle.minus_inverse.0);
         let t_max = load(&bundle.t_max.0);
         let in_range = mask & precise & load(&bundle.t_min.0).at_most(t) & t.at_most(t_max);
@@ -436,11 +435,9 @@ impl<'a> Packet<'a> {
         let [x, y, z] = [0, 1, 2].map(|axis| bundle.origin[axis].0[i]);
         NarrowRay {
             axes: bundle.axes,
-            origin: [x, y, z, 0.0],
-            shear: [bundle.shear[0].0[i], bundle.shear[1].0[i], 1.0, 0.0],
+            origin: [x, y, z, bundle.t_min.0[i]],
+            shear: [bundle.shear[0].0[i], bundle.shear[1].0[i], 1.0, bundle.t_max.0[i]],
             minus_inverse: bundle.minus_inverse.0[i],
-            t_min: bundle.t_min.0[i],
-            t_max: bundle.t_max.0[i],
             precise: bundle.precise,
         }
     }
@@ -531,10 +528,9 @@ impl<'a> Packet<'a> {
 
     #[inline(always)]
     fn pop<G: Goal>(&self, stack: &mut Stack<<G::Order as Order>::Entry>) -> Option<u32> {
-        let limit = limit_of(self.frustum.s_max);
         loop {
             let entry = stack.pop()?;
-            if !G::Order::is_beyond(entry, limit) {
+            if !G::Order::is_beyond(entry, self.frustum.s_max) {
                 return Some(G::Order::reference(entry));
             }
         }

@@ -7,7 +7,7 @@ use lumbre_math::{DVec3, Transform, Vec3};
 
 use super::scenes::Random;
 use crate::Ray32;
-use crate::holds::{Holds, SingleStart};
+use crate::holds::{Holds, SingleStart, Sizes};
 use crate::lanes::{LANE_BITS, Level, meet_boxes_at, read_at, start_placed_at, start_single_at};
 use crate::node::{BoxRay, Node, Slabs, Units, WIDTH};
 use crate::primitive::Bounds;
@@ -124,8 +124,8 @@ fn reached_boxes_are_met(level: Level, seed: u64, rounds: usize) {
 
 /// For a tree of a mesh at this origin.
 fn start_of(units: &Units, first_origin: DVec3) -> Option<SingleStart> {
-    let largest_corner = (1.0 / units.scale) as f32;
-    let holds = Holds { first_origin, largest_corner, ..Holds::new(&[], 0.0, 0.0) };
+    let sizes = Sizes { largest_corner: (1.0 / units.scale) as f32, ..Sizes::default() };
+    let holds = Holds { first_origin, ..Holds::new(&[], sizes) };
     SingleStart::new(&Holds { has_more_than_precise: true, has_one_origin: true, ..holds }, units, Some(0))
 }
 
@@ -157,7 +157,7 @@ fn rays_start_in_placed_trees_as_they_would_there() {
             assert_eq!(slabs.is_some(), expected.is_some(), "{level:?}");
             let (Some(slabs), Some(expected)) = (slabs, expected) else { continue };
             assert_eq!(bits_of(&slabs), bits_of(&expected), "{level:?} of {there:?}");
-            assert!(std::ptr::eq(slabs.sides, expected.sides), "{level:?} of {there:?}");
+            assert_eq!(slabs.sides, expected.sides, "{level:?} of {there:?}");
             started += 1;
         }
     }

@@ -13,8 +13,8 @@ use super::scenes::{
 use crate::batch::Flying;
 use crate::blocks::Unit;
 use crate::holds::{Contents, SingleStart};
-use crate::lanes::Level;
-use crate::narrow::{self, search_triangles};
+use crate::lanes::{Eight, Lanes, Level, Portable};
+use crate::narrow::{self, Precise, search_triangles};
 use crate::node::Node;
 use crate::packet::PACKET;
 use crate::{Accel, BuildOptions, Geometry, GeometryKind, Hit, Hit32, Instance, Preset, Ray32, TriangleMesh};
@@ -39,8 +39,8 @@ impl PlainRay {
         let local = [0, 1, 2].map(|axis| (f64::from(ray.origin[axis]) - start.mesh_origin[axis]) as f32);
         let direction = ray.direction.to_array();
         let is_near = (0..3).all(|axis| {
-            let from = (local[axis] - start.shift[axis]) * start.units_per_space;
-            from.abs() <= start.farthest[axis] && direction[axis].abs() <= start.longest
+            let from = local[axis] * start.units_per_space - start.shift[axis];
+            from.abs() <= start.farthest[axis] && direction[axis].abs() <= start.longest[axis]
         });
         let is_long = direction.iter().any(|d| d.abs() >= start.shortest);
         let is_ahead = ray.t_min.is_sign_positive() && ray.t_min <= ray.t_max;
@@ -945,4 +945,65 @@ fn numbers_in_single_precision_differ_by_the_same_in_either_precision() {
         }
     }
     assert!(inexact > 100, "{inexact}");
+}
+
+#[test]
+fn what_is_precise_at_once_is_precise_by_its_extent() {
+    type Numbers = <Portable as Lanes>::Eight;
+    let mut random = Random(143);
+    let (mut precise, mut others, rounds) = (0, 0, if cfg!(miri) { 200 } else { 50_000 });
+    for _ in 0..rounds {
+        let space_per_unit = 10f64.powf(random.between(-4.0, 4.0)) as f32;
+        let side = space_per_unit * 10f64.powf(random.between(-4.0, 0.3)) as f32;
+        let [mut products, mut z] = [[[0.0; 8]; 3]; 2];
+        let [mut within, mut sum] = [[0.0; 8]; 2];
+        for lane in 0..8 {
+            let size = 10f64.powf(random.between(-3.0, 3.0));
+            for corner in 0..3 {
+                products[corner][lane] = (size * random.between(-1.0, 1.0)) as f32;
+                z[corner][lane] = side * random.unit() as f32;
+            }
+            within[lane] = if random.below(16) == 0 { 0.0 } else { size as f32 };
+            sum[lane] =
+                (size * 10f64.powf(random.between(-2.0, 1.0)) * random.between(-1.0, 1.0).signum()) as f32;
+        }
+        let [products, z] = [products, z].map(|rows| rows.map(|row| Numbers::load(&row)));
+        let (within, sum) = (Numbers::load(&within), Numbers::load(&sum));
+        // Where triangles are of any size, nothing is at once.
+        let [at_once, by_extent] = [side, f32::MAX].map(|longest_side| {
+            Precise::new(space_per_unit, longest_side).of(0xff, products, within, sum, z) & 0xff
+        });
+        assert_eq!(at_once, by_extent);
+        (precise, others) = (precise + at_once.count_ones(), others + at_once.count_zeros() - 24);
+    }
+    assert!(precise > 2 * rounds && others > rounds, "{precise} {others}");
+}
+
+#[test]
+fn the_longest_side_of_all_triangles_is_known() {
+    let longest = |meshes: &[TriangleMesh]| {
+        let corners = |mesh: &TriangleMesh, triangle: [u32; 3]| triangle.map(|i| mesh.positions[i as usize]);
+        let side = |[a, b, c]: [Vec3; 3]| (a.max(b).max(c) - a.min(b).min(c)).max_element();
+        let sides = meshes.iter().flat_map(|mesh| mesh.indices.iter().map(|&t| side(corners(mesh, t))));
+        sides.fold(0.0, f32::max)
+    };
+    let meshes = sheets();
+    let small = meshes.clone().map(|TriangleMesh { origin, positions, indices }| TriangleMesh {
+        origin,
+        positions: positions.into_iter().map(|p| 0.3 * p).collect(),
+        indices,
+    });
+    let geometries = |meshes: &[TriangleMesh]| -> Vec<Geometry> {
+        let mesh = |(id, mesh): (usize, &TriangleMesh)| Geometry {
+            id: id as u32,
+            kind: GeometryKind::Mesh(Arc::new(mesh.clone())),
+        };
+        meshes.iter().enumerate().map(mesh).collect()
+    };
+    let mut accel = Accel::build(geometries(&meshes), &BuildOptions::default()).unwrap();
+    assert_eq!(accel.holds.sizes.longest_side, longest(&meshes));
+    let again = Accel::from_bytes(&accel.to_bytes(), geometries(&meshes)).unwrap();
+    assert_eq!(again.holds.sizes.longest_side, longest(&meshes));
+    accel.refit(geometries(&small)).unwrap();
+    assert_eq!(accel.holds.sizes.longest_side, longest(&small));
 }
