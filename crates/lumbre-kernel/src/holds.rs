@@ -142,7 +142,8 @@ pub(crate) struct SingleStart {
     pub(crate) precise: Precise,
     /// That of [`BlockRay`](crate::triangles::BlockRay) for every ray from nearby.
     pub(crate) least_size: f32,
-    /// The bounds on the largest component of a direction, and that below which one is replaced.
+    /// The bounds on the largest component of a direction, the upper one four times, to be compared with four at once; and that below which
+    /// one is replaced.
     pub(crate) shortest: f32,
     pub(crate) longest: [f32; 4],
     pub(crate) tiny: f32,
@@ -170,6 +171,7 @@ impl SingleStart {
             && (two_to(-40)..=two_to(40)).contains(&units.scale)
             && largest_corner > two_to(-39)
             && reach < two_to(38);
+        let space_per_unit = (1.0 / units.scale) as f32;
         let padded = |v: DVec3, last: f64| [v.x, v.y, v.z, last];
         root.filter(|_| is_fit).map(|root| Self {
             root,
@@ -190,8 +192,8 @@ impl SingleStart {
             shift: ((units.origin - mesh_origin) * units.scale).extend(0.0).as_vec4().to_array(),
             narrow_margin: units.narrow_margin(shift * units.scale),
             units_per_space: units.scale as f32,
-            space_per_unit: (1.0 / units.scale) as f32,
-            precise: Precise::new((1.0 / units.scale) as f32, holds.sizes.longest_side),
+            space_per_unit,
+            precise: Precise::new(space_per_unit, holds.sizes.longest_side),
             least_size: round_up(reach * f64::from(LEAST_SIZE)),
             shortest: (SMALLEST_NEAR / units.scale) as f32,
             longest: [(LARGEST_NEAR / units.scale) as f32; 4],

@@ -70,7 +70,7 @@ pub(crate) struct NarrowRay {
     pub(crate) axes: &'static Axes,
     /// Relative to the mesh, in the order of the axes; the last of four is the smallest `t`.
     pub(crate) origin: [f32; 4],
-    /// The direction by its last component, which means nothing here; the last of four is the largest `t`.
+    /// The direction by its z, of which x and y count; the last of four is the largest `t`.
     pub(crate) shear: [f32; 4],
     /// From what is behind a corner, with the sign turned, to `t`.
     pub(crate) minus_inverse: f32,

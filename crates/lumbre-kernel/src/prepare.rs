@@ -157,6 +157,7 @@ pub(crate) struct Parts {
     pub(crate) clouds: Vec<CloudSurvey>,
     /// Of all clouds.
     pub(crate) spheres: usize,
+    /// The sizes of all meshes and clouds.
     pub(crate) sizes: Sizes,
 }
 
