@@ -6,18 +6,15 @@
 
 mod double;
 
-use std::hint::select_unpredictable;
-
 use bytemuck::Zeroable;
 
 use crate::batch::Ends;
-use crate::blocks::TriangleBlock;
+use crate::blocks::{Blocks, TriangleBlock};
 use crate::holds::SingleStart;
 use crate::lanes::{self, Lanes, Slots, Vector, WIDE, Wide};
 use crate::node::{Node, Slabs, WIDTH, tag};
 use crate::single::{Exact, Outcome};
 use crate::stack::{Order, STACK};
-use crate::way::Way;
 
 pub(crate) use double::DoubleFlyer;
 
@@ -36,12 +33,12 @@ pub(crate) trait Flyer<L: Lanes>: Sized {
     /// Where it meets each triangle.
     type At: Copy + Zeroable;
 
+    /// One that has not set out.
+    fn new(start: &SingleStart) -> Self;
     /// The ray for boxes; `None` where it does not come from nearby, or is not sound.
     fn start(start: &SingleStart, ray: &Self::Ray) -> Option<Slabs>;
-    /// The same for triangles.
-    fn new(start: &SingleStart, ray: &Self::Ray, slabs: &Slabs) -> Self;
-    /// The same in the place of another, of which may stand what means nothing.
-    fn renew(&mut self, start: &SingleStart, ray: &Self::Ray, slabs: &Slabs);
+    /// Sets out as a ray, in the place of another.
+    fn set_out(&mut self, start: &SingleStart, ray: &Self::Ray, slabs: &Slabs);
     /// How its line passes the triangles of a block, and a bit for each that it may meet.
     fn pass(&self, block: &TriangleBlock) -> (u32, Self::Pass);
     /// Where it meets those of the mask.
@@ -56,7 +53,7 @@ pub(crate) trait Flyer<L: Lanes>: Sized {
         ray: &Self::Ray,
         block: u32,
         crossing: &Crossing<Self::At>,
-        way: &mut Way<L>,
+        slabs: &mut Slabs,
     ) -> bool;
     /// What came of it: whether any hit `is_met`, or what it has taken.
     fn answer(&self, exact: &Exact, ray: &Self::Ray, is_met: bool) -> Outcome<Self::Answer>;
@@ -89,55 +86,10 @@ const MET: u32 = tag::reference(tag::RETURN, 1);
 type Entry<F, L> = <<F as Flyer<L>>::Order as Order>::Entry;
 
 /// A ray under way.
-struct Flight<'a, 'r, F: Flyer<L>, L: Lanes> {
-    way: Way<'a, L>,
+struct Flight<F> {
     flyer: F,
-    stack: Slots<Entry<F, L>>,
+    slabs: Slabs,
     position: usize,
-    ray: &'r F::Ray,
-}
-
-impl<'a, 'r, F: Flyer<L>, L: Lanes> Flight<'a, 'r, F, L> {
-    /// What is at the bottom of every stack.
-    #[inline(always)]
-    fn bottom() -> Entry<F, L> {
-        F::Order::entry(END)
-    }
-
-    /// A ray that sets out; `None` where it does not come from nearby, or is not sound.
-    #[inline(always)]
-    fn new(exact: &Exact<'a>, position: usize, ray: &'r F::Ray) -> Option<Self> {
-        let slabs = F::start(exact.start, lanes::opaque(ray))?;
-        let flyer = F::new(exact.start, lanes::opaque(ray), &slabs);
-        let mut stack = Slots::new();
-        stack.push(Self::bottom());
-        Some(Self { way: Way::new(exact.nodes(), slabs), flyer, stack, position, ray })
-    }
-
-    /// The same in the place of another, whose stack is not moved; false where there is none.
-    #[inline(always)]
-    fn restart(&mut self, exact: &Exact<'a>, position: usize, ray: &'r F::Ray) -> bool {
-        let ray = lanes::opaque(ray);
-        let Some(slabs) = F::start(exact.start, ray) else { return false };
-        self.flyer.renew(exact.start, ray, &slabs);
-        self.way = Way::new(exact.nodes(), slabs);
-        (self.position, self.ray) = (position, ray);
-        self.stack.clear();
-        self.stack.push(Self::bottom());
-        true
-    }
-
-    /// Whether there may be no room for the children of another node.
-    #[inline(always)]
-    fn is_too_deep(&self) -> bool {
-        self.stack.len() > STACK - WIDTH
-    }
-
-    /// Whether an entry of its stack lies wholly beyond its end.
-    #[inline(always)]
-    fn is_beyond(&self, entry: Entry<F, L>) -> bool {
-        self.way.is_beyond::<F::Order>(entry)
-    }
 }
 
 /// The places of bits, the lowest first.
@@ -159,6 +111,12 @@ impl Iterator for Bits {
 #[inline(always)]
 fn bit(is: bool, place: usize) -> u64 {
     u64::from(is) << place
+}
+
+/// How many of these places are before one: where what is written of one after another stands.
+#[inline(always)]
+fn rank(places: u64, place: usize) -> usize {
+    (places & !(u64::MAX << place)).count_ones() as usize % FLIGHTS
 }
 
 /// Where each flight is.
@@ -196,8 +154,14 @@ impl References {
 /// All that are under way, and what one loop hands on to another.
 struct Fleet<'a, 'r, F: Flyer<L>, L: Lanes> {
     exact: Exact<'a>,
-    flights: Vec<Flight<'a, 'r, F, L>>,
+    nodes: &'a [Node],
+    blocks: Blocks<'a>,
+    rays: &'r [F::Ray],
+    flights: Box<[Flight<F>; FLIGHTS]>,
+    stacks: Box<[Slots<Entry<F, L>>; FLIGHTS]>,
     references: References,
+    /// The nodes that they come from.
+    parents: References,
     /// Which children of its node, or triangles of its block, each may meet.
     masks: [u32; FLIGHTS],
     /// Where each enters the boxes of children.
@@ -206,58 +170,90 @@ struct Fleet<'a, 'r, F: Flyer<L>, L: Lanes> {
     crossings: [Crossing<F::At>; FLIGHTS],
     /// Which triangles have to be looked at closer.
     unclear: [u32; FLIGHTS],
-    /// Where the next block of its leaf is.
-    following: [u32; FLIGHTS],
 }
 
 impl<'a, 'r, F: Flyer<L>, L: Lanes> Fleet<'a, 'r, F, L> {
     #[inline(always)]
-    fn new(exact: &Exact<'a>) -> Self {
+    fn new(exact: &Exact<'a>, rays: &'r [F::Ray]) -> Self {
         Self {
             exact: *exact,
-            flights: Vec::with_capacity(FLIGHTS),
+            nodes: exact.nodes(),
+            blocks: exact.blocks(),
+            rays,
+            flights: Box::new(std::array::from_fn(
+                #[inline(always)]
+                |_| Flight { flyer: F::new(exact.start), slabs: Slabs::ZERO, position: NOWHERE },
+            )),
+            stacks: Slots::many(),
             references: References([END; FLIGHTS]),
+            parents: References([END; FLIGHTS]),
             masks: [0; FLIGHTS],
             enters: [L::Wide::splat(0.0); FLIGHTS],
             passes: [F::Pass::zeroed(); FLIGHTS],
             crossings: [Crossing::zeroed(); FLIGHTS],
             unclear: [0; FLIGHTS],
-            following: [END; FLIGHTS],
         }
+    }
+
+    /// What is at the bottom of every stack.
+    #[inline(always)]
+    fn bottom() -> Entry<F, L> {
+        F::Order::entry(END)
+    }
+
+    /// A ray sets out at the root, in the place of one of which nothing is left; false where it does not come from nearby, or is not sound.
+    #[inline(always)]
+    fn set_out(&mut self, place: usize, position: usize) -> bool {
+        let (start, ray) = (self.exact.start, lanes::opaque(&self.rays[position]));
+        let Some(slabs) = F::start(start, ray) else { return false };
+        let flight = &mut self.flights[place];
+        flight.flyer.set_out(start, ray, &slabs);
+        (flight.slabs, flight.position) = (slabs, position);
+        let stack = &mut self.stacks[place];
+        stack.clear();
+        stack.push(Self::bottom());
+        *self.references.of(place) = start.root;
+        true
+    }
+
+    /// The ray of a flight, as it was asked.
+    #[inline(always)]
+    fn ray(&self, place: usize) -> &'r F::Ray {
+        &self.rays[self.flights[place].position]
     }
 
     /// Those that are at nodes go on to the child that comes first, or to what stands on their stacks.
     #[inline(always)]
     fn meet_nodes(&mut self, at_nodes: u64, ends: &mut impl Ends<F::Answer>) {
-        let nodes = self.exact.nodes();
+        let nodes = self.nodes;
         let (mut none, mut many) = (0, 0);
-        for place in Bits(at_nodes) {
-            let node = &nodes[*self.references.of(place) as usize];
-            let slabs = lanes::opaque(self.flights[place].way.slabs());
+        for (at, place) in Bits(at_nodes).enumerate() {
+            let at = at % FLIGHTS;
+            let reference = self.references.of(place);
+            let node = &nodes[*reference as usize];
+            let slabs = lanes::opaque(&self.flights[place].slabs);
             let (mask, enter) = lanes::meet_boxes::<L::Wide>(node, slabs);
             self.masks[place] = mask;
+            *self.parents.of(place) = *reference;
             if !F::Order::PUTS_ONE {
-                self.enters[place] = enter;
+                self.enters[at] = enter;
+                // Of more than one or none, anything.
+                *reference = lanes::only_child(node, mask);
                 none |= bit(mask == 0, place);
                 many |= bit(mask & mask.wrapping_sub(1) != 0, place);
             }
         }
-        let mut one = at_nodes & !none & !many;
         if F::Order::PUTS_ONE {
-            (many, one) = (at_nodes, 0);
-        }
-        for place in Bits(one) {
-            let reference = self.references.of(place);
-            *reference = lanes::only_child(&nodes[*reference as usize], self.masks[place]);
+            many = at_nodes;
         }
         let mut too_deep = 0;
         for place in Bits(many) {
-            let flight = &mut self.flights[place];
-            let reference = self.references.of(place);
-            let node = &nodes[*reference as usize];
-            let (mask, enter) = (self.masks[place], self.enters[place]);
-            *reference = F::Order::put_and_take::<L>(node, mask, enter, &mut flight.stack);
-            too_deep |= bit(flight.is_too_deep(), place);
+            let stack = &mut self.stacks[place];
+            let node = &nodes[*self.parents.of(place) as usize];
+            let (mask, enter) = (self.masks[place], self.enters[rank(at_nodes, place)]);
+            *self.references.of(place) = F::Order::put_and_take::<L>(node, mask, enter, stack);
+            // There may be no room for the children of another node.
+            too_deep |= bit(stack.len() > STACK - WIDTH, place);
         }
         self.give_up(too_deep, ends);
         self.pop(none);
@@ -266,59 +262,58 @@ impl<'a, 'r, F: Flyer<L>, L: Lanes> Fleet<'a, 'r, F, L> {
     /// Those that are at leaves go on to the next block, or to what stands on their stacks.
     #[inline(always)]
     fn meet_blocks(&mut self, at_leaves: u64, ends: &mut impl Ends<F::Answer>) {
-        let mut passing = 0;
-        for place in Bits(at_leaves) {
-            let unit = *self.references.of(place) & tag::PLACE;
-            let block = self.exact.block(unit);
-            (self.masks[place], self.passes[place]) = self.flights[place].flyer.pass(block);
-            passing |= bit(self.masks[place] != 0, place);
-            let next = tag::reference(tag::TRIANGLES, block.place_behind(unit));
-            self.following[place] = select_unpredictable(block.is_last(), END, next);
+        let (mut passing, mut last) = (0, 0);
+        for (at, place) in Bits(at_leaves).enumerate() {
+            let block = self.blocks.block(*self.references.of(place) & tag::PLACE);
+            let (mask, pass) = self.flights[place].flyer.pass(block);
+            (self.masks[place], self.passes[at % FLIGHTS]) = (mask, pass);
+            passing |= bit(mask != 0, place);
+            last |= bit(block.is_last(), place);
         }
         let (mut meeting, mut unclear) = (0, 0);
-        for place in Bits(passing) {
-            let crossing = self.flights[place].flyer.cross(self.masks[place], &self.passes[place]);
+        for (at, place) in Bits(passing).enumerate() {
+            let pass = &self.passes[rank(at_leaves, place)];
+            let crossing = self.flights[place].flyer.cross(self.masks[place], pass);
             meeting |= bit(crossing.met != 0, place);
             unclear |= bit(crossing.unclear != 0, place);
             if F::IS_ANY {
                 self.unclear[place] = crossing.unclear;
             } else {
-                self.crossings[place] = crossing;
+                self.crossings[at % FLIGHTS] = crossing;
             }
         }
         let mut unsettled = 0;
         if F::IS_ANY {
             for place in Bits(unclear & !meeting) {
                 let unit = *self.references.of(place) & tag::PLACE;
-                let Flight { flyer, ray, .. } = &self.flights[place];
-                match flyer.meets_closely(&self.exact, ray, unit, self.unclear[place]) {
+                let (flight, ray) = (&self.flights[place], self.ray(place));
+                match flight.flyer.meets_closely(&self.exact, ray, unit, self.unclear[place]) {
                     Outcome::Settled(is_met) => meeting |= bit(is_met, place),
                     Outcome::Unsettled => unsettled |= bit(true, place),
                 }
             }
+            for place in Bits(meeting) {
+                *self.references.of(place) = MET;
+            }
         } else {
             for place in Bits(meeting | unclear) {
                 let unit = *self.references.of(place) & tag::PLACE;
-                let Flight { flyer, ray, way, .. } = &mut self.flights[place];
-                let is_settled = flyer.take_nearest(&self.exact, ray, unit, &self.crossings[place], way);
+                let ray = self.ray(place);
+                let Flight { flyer, slabs, .. } = &mut self.flights[place];
+                let crossing = &self.crossings[rank(passing, place)];
+                let is_settled = flyer.take_nearest(&self.exact, ray, unit, crossing, slabs);
                 unsettled |= bit(!is_settled, place);
             }
             meeting = 0;
         }
-        let mut beyond = 0;
-        for place in Bits(at_leaves) {
-            let flight = &mut self.flights[place];
-            let next = self.following[place];
-            let is_last = next == END;
-            let bottom = Flight::<F, L>::bottom();
-            let entry = flight.stack.pop_if(is_last).unwrap_or(bottom);
-            let next = select_unpredictable(is_last, F::Order::reference(entry), next);
-            let is_met = meeting >> place & 1 != 0;
-            *self.references.of(place) = select_unpredictable(is_met, MET, next);
-            beyond |= bit(is_last & !is_met & flight.is_beyond(entry), place);
+        let going_on = at_leaves & !meeting & !unsettled;
+        for place in Bits(going_on & !last) {
+            let reference = self.references.of(place);
+            let unit = *reference & tag::PLACE;
+            *reference = tag::reference(tag::TRIANGLES, self.blocks.block(unit).place_behind(unit));
         }
         self.give_up(unsettled, ends);
-        self.pop(beyond & !unsettled);
+        self.pop(going_on & last);
     }
 
     /// Leaves those to the plain search.
@@ -338,11 +333,9 @@ impl<'a, 'r, F: Flyer<L>, L: Lanes> Fleet<'a, 'r, F, L> {
         while those != 0 {
             let mut beyond = 0;
             for place in Bits(those) {
-                let flight = &mut self.flights[place];
-                let bottom = Flight::<F, L>::bottom();
-                let entry = flight.stack.pop().unwrap_or(bottom);
+                let entry = self.stacks[place].pop().unwrap_or(Self::bottom());
                 *self.references.of(place) = F::Order::reference(entry);
-                beyond |= bit(flight.is_beyond(entry), place);
+                beyond |= bit(F::Order::is_beyond(entry, self.flights[place].slabs.s_max()), place);
             }
             those = beyond;
         }
@@ -353,10 +346,10 @@ impl<'a, 'r, F: Flyer<L>, L: Lanes> Fleet<'a, 'r, F, L> {
     fn fetch(&mut self, those: u64) {
         let at = self.references.stations::<L>();
         for place in Bits(at.nodes & those) {
-            self.exact.nodes().get(*self.references.of(place) as usize).map(lanes::fetch::<Node>);
+            self.nodes.get(*self.references.of(place) as usize).map(lanes::fetch::<Node>);
         }
         for place in Bits(at.leaves & those) {
-            self.exact.block(*self.references.of(place) & tag::PLACE).fetch();
+            self.blocks.block(*self.references.of(place) & tag::PLACE).fetch();
         }
     }
 
@@ -367,7 +360,8 @@ impl<'a, 'r, F: Flyer<L>, L: Lanes> Fleet<'a, 'r, F, L> {
             let flight = &self.flights[place];
             if flight.position != NOWHERE {
                 let is_met = *self.references.of(place) == MET;
-                ends.put(flight.position, flight.flyer.answer(&self.exact, flight.ray, is_met));
+                let ray = &self.rays[flight.position];
+                ends.put(flight.position, flight.flyer.answer(&self.exact, ray, is_met));
             }
         }
     }
@@ -383,24 +377,10 @@ pub(crate) fn fly<F: Flyer<L>, L: Lanes>(
     positions: &[usize],
     ends: &mut impl Ends<F::Answer>,
 ) {
-    let root = exact.start.root;
     let mut waiting = positions.iter();
-    let mut fleet = Fleet::<F, L>::new(exact);
-    let mut under_way = 0;
-    while fleet.flights.len() < L::FLIGHTS.min(FLIGHTS)
-        && let Some(&position) = waiting.next()
-    {
-        match Flight::new(exact, position, &rays[position]) {
-            Some(flight) => {
-                ends.fetch(position);
-                let place = fleet.flights.len();
-                *fleet.references.of(place) = root;
-                under_way |= bit(true, place);
-                fleet.flights.push(flight);
-            }
-            None => ends.put(position, Outcome::Unsettled),
-        }
-    }
+    let mut fleet = Fleet::<F, L>::new(exact, rays);
+    // All of which have come to their end.
+    let mut under_way = u64::MAX >> (u64::BITS as usize - L::FLIGHTS.min(FLIGHTS));
     while under_way != 0 {
         let at = fleet.references.stations::<L>();
         let at_ends = at.ends & under_way;
@@ -412,9 +392,8 @@ pub(crate) fn fly<F: Flyer<L>, L: Lanes>(
                     lanes::fetch(&rays[position]);
                 }
                 for &position in waiting.by_ref() {
-                    if fleet.flights[place].restart(exact, position, &rays[position]) {
+                    if fleet.set_out(place, position) {
                         ends.fetch(position);
-                        *fleet.references.of(place) = root;
                         under_way |= bit(true, place);
                         break;
                     }

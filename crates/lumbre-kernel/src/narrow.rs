@@ -99,12 +99,12 @@ impl Precise {
         Self { at_once: most / (MORE * (longest_side + little)), most, little }
     }
 
-    /// A bit for each of the mask that is: by products, how far within the triangle the line is, the sum of the edge functions, and the
+    /// A bit for each of the mask that is: by the largest product, how far within the triangle the line is, the sum of the edge functions, and the
     /// heights of the corners. Other bits mean nothing.
     #[inline(always)]
-    pub(crate) fn of<V: Vector>(&self, mask: u32, [bc, ca, ab]: [V; 3], within: V, sum: V, z: [V; 3]) -> u32 {
+    pub(crate) fn of<V: Vector>(&self, mask: u32, largest: V, within: V, sum: V, z: [V; 3]) -> u32 {
         let is_strict = V::splat(0.0).below(within);
-        let largest = bc.larger(ca).larger(ab) + V::splat(TINY);
+        let largest = largest + V::splat(TINY);
         let sum = sum.abs();
         let at_once = is_strict & largest.at_most(sum * V::splat(self.at_once));
         if mask & !at_once == 0 {
@@ -129,8 +129,8 @@ const TINY: f32 = 1.0 / (1u128 << 80) as f32;
 /// How a line passes the triangles of a block.
 #[derive(Clone, Copy, Zeroable)]
 pub(crate) struct Pass<E> {
-    /// The first of the two products that each edge function is the difference of.
-    products: [E; 3],
+    /// The largest, by magnitude, of the first of the two products that each edge function is the difference of.
+    largest: E,
     edges: [E; 3],
     /// See [`within`].
     within: E,
@@ -287,7 +287,8 @@ impl NarrowRay {
         let edges = [products[0] - y[2] * x[1], products[1] - y[0] * x[2], products[2] - y[1] * x[0]];
         let within = within(edges);
         let mask = L::Eight::splat(0.0).at_most(within) & block.taken();
-        (mask, Pass { products, edges, within, heights })
+        let largest = products[0].larger(products[1]).larger(products[2]);
+        (mask, Pass { largest, edges, within, heights })
     }
 
     /// Which of those in the mask the ray meets; it certainly does where the crossing is precise, and in range.
@@ -295,10 +296,10 @@ impl NarrowRay {
     fn cross<L: Lanes>(&self, mask: u32, pass: &Pass<L::Eight>) -> Crossing<Places<L::Eight>> {
         // Read again: most lines pass through few blocks.
         let ray = lanes::opaque(self);
-        let &Pass { products, edges: [u, v, w], within, heights: z } = pass;
+        let &Pass { largest, edges: [u, v, w], within, heights: z } = pass;
         let det = u + v + w;
         let height = u * z[0] + v * z[1] + w * z[2];
-        let precise = ray.precise.of(mask, products, within, det, z);
+        let precise = ray.precise.of(mask, largest, within, det, z);
         let t = height.over(det) * L::Eight::splat(ray.minus_inverse);
         let in_range = L::Eight::splat(ray.t_min()).at_most(t) & t.at_most(L::Eight::splat(ray.t_max()));
         let at = Places { t, weights: [v, w, det] };

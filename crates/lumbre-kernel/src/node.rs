@@ -209,15 +209,45 @@ fn slop(condition: f64, reach: f64) -> f64 {
 /// A ray in tree units, ready for the boxes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Slabs {
-    // The last of four means nothing.
+    /// The last of four means nothing.
     pub(crate) inverse: [f32; 4],
+    /// The last is where the range starts: never negative.
     pub(crate) near_offset: [f32; 4],
+    /// The last is where it ends.
     pub(crate) far_offset: [f32; 4],
     /// The planes that are met first.
     pub(crate) sides: &'static Sides,
-    /// Never negative.
-    pub(crate) s_min: f32,
-    pub(crate) s_max: f32,
+}
+
+impl Slabs {
+    /// Of no ray.
+    pub(crate) const ZERO: Self = Self {
+        inverse: [0.0; 4],
+        near_offset: [0.0; 4],
+        far_offset: [0.0; 4],
+        sides: Sides::OF_NONE_NEGATIVE,
+    };
+
+    #[inline(always)]
+    pub(crate) fn s_min(&self) -> f32 {
+        self.near_offset[3]
+    }
+
+    #[inline(always)]
+    pub(crate) fn s_max(&self) -> f32 {
+        self.far_offset[3]
+    }
+
+    #[inline(always)]
+    pub(crate) fn start_at(&mut self, s_min: f32) {
+        self.near_offset[3] = s_min;
+    }
+
+    /// Leaves out the boxes that the ray enters after this.
+    #[inline(always)]
+    pub(crate) fn end_at(&mut self, s_max: f32) {
+        self.far_offset[3] = s_max;
+    }
 }
 
 /// The same, and how to go on with its range.
@@ -265,8 +295,8 @@ impl BoxRay {
     #[inline(always)]
     pub(crate) fn set_range_nearby(&mut self, t_min: f64, t_max: f64) {
         self.progress = Progress { s_per_t: 1.0, s_at_zero: 0.0 };
-        self.slabs.s_min = self.progress.down(t_min);
-        self.slabs.s_max = self.progress.up(t_max);
+        self.slabs.start_at(self.progress.down(t_min));
+        self.slabs.end_at(self.progress.up(t_max));
     }
 
     /// Makes it the ray from `t_min` to `t_max` for a tree in these units, from wherever; false where it passes by the tree
@@ -310,8 +340,8 @@ impl BoxRay {
         let margin = 4.0 * ROUNDOFF * LARGEST_PLANE + slop;
         self.set_slabs(start.to_array(), direction.to_array(), TINY_DIRECTION, 4.0 * ROUNDOFF, margin);
         self.progress = Progress { s_per_t, s_at_zero: back - to_middle };
-        self.slabs.s_min = self.progress.down(t_min);
-        self.slabs.s_max = self.progress.up(t_max);
+        self.slabs.start_at(self.progress.down(t_min));
+        self.slabs.end_at(self.progress.up(t_max));
         true
     }
 
@@ -321,11 +351,9 @@ impl BoxRay {
         let far = f32::MAX * f32::EPSILON;
         let slabs = Slabs {
             inverse: [1.0; 4],
-            near_offset: [-far; 4],
-            far_offset: [far; 4],
-            sides: Sides::new(0),
-            s_min: 0.0,
-            s_max: f32::INFINITY,
+            near_offset: [-far, -far, -far, 0.0],
+            far_offset: [far, far, far, f32::INFINITY],
+            sides: Sides::OF_NONE_NEGATIVE,
         };
         Self { slabs, progress: Progress { s_per_t: 1.0, s_at_zero: f64::INFINITY } }
     }

@@ -1,9 +1,10 @@
 //! Sixteen rays together, where they are much alike: rays of a camera, or shadow rays of neighbours.
 //!
-//! They go from box to box as one frustum, of which a node costs little more than of one ray. At a leaf, triangles that none of
-//! them can meet are left out eight at a time; each of the others is tested against all sixteen, by the operations and with the
-//! bounds of [`BlockRay`](crate::triangles::BlockRay), so that an answer has the bits that it has alone. Where
-//! that turns out to be more work than it is worth, they go alone after all.
+//! They go from box to box as one frustum, of which a node costs little more than of one ray. Where they start at different places,
+//! there is much in a frustum that none of them meets: then those of a node's boxes that it meets are tested once more, each against
+//! all sixteen. At a leaf, triangles that none of them can meet are left out eight at a time; each of the others is tested against all
+//! sixteen, by the operations and with the bounds of [`BlockRay`](crate::triangles::BlockRay), so that an answer has the bits that it
+//! has alone. Where that turns out to be more work than it is worth, they go alone after all.
 //!
 //! # Why the frustum loses no box
 //!
@@ -71,13 +72,15 @@ pub(crate) struct Effort {
 }
 
 impl Effort {
-    /// Less for any hit, which a ray alone has sooner; more where there is anything but triangles, of which one alone has more to do.
-    const fn new<L: Lanes>(is_any: bool, is_mixed: bool) -> Self {
-        match (is_any, is_mixed) {
-            (true, false) => Self { most: 160, paying: 100 }.among_triangles::<L>(),
-            (false, false) => Self { most: 300, paying: 120 }.among_triangles::<L>(),
-            (true, true) => Self { most: 600, paying: 400 },
-            (false, true) => Self { most: 800, paying: 400 },
+    /// Less for any hit, which a ray alone has sooner, and where they start at different places, and soon meet others; more where there is
+    /// anything but triangles, of which one alone has more to do.
+    const fn new<L: Lanes>(is_any: bool, is_mixed: bool, has_one_origin: bool) -> Self {
+        match (is_mixed, has_one_origin, is_any) {
+            (false, true, true) => Self { most: 160, paying: 100 }.among_triangles::<L>(),
+            (false, true, false) => Self { most: 300, paying: 120 }.among_triangles::<L>(),
+            (false, false, _) => Self { most: 70, paying: 50 }.among_triangles::<L>(),
+            (true, _, true) => Self { most: 600, paying: 400 },
+            (true, _, false) => Self { most: 800, paying: 400 },
         }
     }
 
@@ -93,6 +96,9 @@ impl Effort {
     }
 }
 
+/// Of children for whose boxes each ray is asked, so many are as much to do as a node.
+pub(crate) const CHILDREN_AS_A_NODE: u32 = 4;
+
 /// What the corners of triangles may be wrong by, by their size: 32u, see above.
 pub(crate) const CULL_ERROR: f32 = 32.0 / (1 << 24) as f32;
 
@@ -106,6 +112,39 @@ pub(crate) struct Frustum {
     pub(crate) s_min: f32,
     pub(crate) s_max: f32,
     pub(crate) sides: &'static Sides,
+}
+
+/// The rays among boxes, each as [`Slabs`](crate::node::Slabs).
+pub(crate) struct SlabRows {
+    pub(crate) inverse: [Row<f32>; 3],
+    pub(crate) near_offset: [Row<f32>; 3],
+    pub(crate) far_offset: [Row<f32>; 3],
+    pub(crate) s_min: Row<f32>,
+    /// Where each need no longer meet boxes.
+    pub(crate) s_max: Row<f32>,
+}
+
+impl SlabRows {
+    pub(crate) const NONE: Self = {
+        let row = Row::of(0.0);
+        Self { inverse: [row; 3], near_offset: [row; 3], far_offset: [row; 3], s_min: row, s_max: row }
+    };
+}
+
+/// By how much planes are moved, and by how much more for each unit of the ray's start.
+pub(crate) struct Margins {
+    pub(crate) least: f32,
+    pub(crate) per_distance: f32,
+}
+
+impl Margins {
+    /// What is added to planes that are met first, and last, on an axis where rays start there.
+    #[inline(always)]
+    pub(crate) fn offsets<W: Wide>(&self, from: W, inverse: W) -> [W; 2] {
+        let distance = from.abs();
+        let margin = inverse.abs() * distance.times_plus(W::splat(self.per_distance), W::splat(self.least));
+        [from.times_from(inverse, W::splat(0.0) - margin), from.times_from(inverse, margin)]
+    }
 }
 
 #[inline(always)]
@@ -171,8 +210,8 @@ pub(crate) struct Packet<'a, const MIXED: bool> {
     is_among_triangles: bool,
     /// Those that are asked for; the others go along with one of them.
     chosen: u32,
-    /// Where each need no longer meet boxes.
-    s_max: Row<f32>,
+    /// Each among boxes by itself: where it ends, and the rest only unless they start at one place.
+    slabs: SlabRows,
     /// The nearest so far, by heights; its triangle is one of eight times the place of the block, and the lane. Where it is none,
     /// what it is stands among the shapes.
     from: Row<f32>,
@@ -231,7 +270,7 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
             has_one_origin: false,
             is_among_triangles: false,
             chosen: 0,
-            s_max: row,
+            slabs: SlabRows::NONE,
             from: row,
             to: row,
             triangle: row,
@@ -246,7 +285,8 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
     /// All there is, from the root on.
     #[inline(always)]
     pub(crate) fn whole<G: Goal, L: Lanes>(&self) -> Asked {
-        let most_work = Effort::new::<L>(G::IS_ANY, MIXED).most;
+        // What it is less where they start at different places is seen then.
+        let most_work = Effort::new::<L>(G::IS_ANY, MIXED, true).most;
         Asked { those: ALL, root: self.exact.start.root, most_work }
     }
 
@@ -268,7 +308,8 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
                 together.pays = false;
                 break;
             }
-            let is_done = self.run::<G, L, O>(root, most_work, rays, others);
+            let effort = Effort::new::<L>(G::IS_ANY, MIXED, self.has_one_origin);
+            let is_done = self.run::<G, L, O>(root, most_work.min(effort.most), rays, others);
             if !is_done {
                 // Any hit will do for those that have one.
                 self.chosen &= if G::IS_ANY { !self.alive } else { 0 };
@@ -279,7 +320,7 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
             );
             G::answer_together::<L, MIXED>(self, rays, &mut answers);
             together.answered |= self.chosen;
-            together.pays &= is_done && Effort::new::<L>(G::IS_ANY, MIXED).pays(self.work, self.chosen);
+            together.pays &= is_done && effort.pays(self.work, self.chosen);
             if !is_done {
                 together.is_done = false;
                 break;
@@ -344,13 +385,13 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
     }
 
     /// Makes those that are not chosen like one that is.
-    #[cold]
-    #[inline(never)]
+    #[inline(always)]
     fn fill_up(&mut self) {
         let one = self.chosen.trailing_zeros() as usize % PACKET;
         for Row(column) in &mut self.columns {
-            for i in 0..PACKET {
-                column[i] = if self.chosen >> i & 1 != 0 { column[i] } else { column[one] };
+            let own = column[one];
+            for (i, number) in column.iter_mut().enumerate() {
+                *number = if self.chosen >> i & 1 != 0 { *number } else { own };
             }
         }
     }
@@ -368,7 +409,7 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
         self.has_one_origin = L::Wide::are_same(&self.columns[0])
             && L::Wide::are_same(&self.columns[1])
             && L::Wide::are_same(&self.columns[2]);
-        let Self { columns, frustum, exact: Exact { start, .. }, .. } = self;
+        let Self { columns, frustum, slabs, exact: Exact { start, .. }, .. } = self;
         let splat = L::Wide::splat;
         let zero = splat(0.0);
         let (t_min, t_max) = (L::Wide::rounded(&columns[6]), L::Wide::rounded(&columns[7]));
@@ -376,6 +417,7 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
         let (mut is_long, mut is_near) = (0, true);
         let (mut inverse, mut off) = ([zero; 3], [zero; 3]);
         let has_one_origin = self.has_one_origin;
+        let margins = Margins { least: start.margin, per_distance: start.margin_per_distance };
         for axis in 0..3 {
             let direction = L::Wide::rounded(&columns[3 + axis]);
             fits &= direction.abs().at_most(splat(start.longest[axis]));
@@ -389,6 +431,10 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
                 let from = L::Wide::rounded_from(&columns[axis], origin, scale);
                 let center = from.middle();
                 fits &= from.abs().at_most(splat(start.farthest[axis]));
+                let [near, far] = margins.offsets(from, inverse[axis]);
+                inverse[axis].store(&mut slabs.inverse[axis]);
+                near.store(&mut slabs.near_offset[axis]);
+                far.store(&mut slabs.far_offset[axis]);
                 off[axis] = (from - center).abs();
                 frustum.center[axis] = center.first();
             }
@@ -397,7 +443,8 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
             return false;
         }
         let s_max = t_max.times_plus(splat(END_FACTOR), splat(LITTLE as f32));
-        L::Wide::select(self.chosen, s_max, splat(-1.0)).store(&mut self.s_max);
+        L::Wide::select(self.chosen, s_max, splat(-1.0)).store(&mut slabs.s_max);
+        (t_min * splat(START_FACTOR)).store(&mut slabs.s_min);
 
         let [x, y, z] = inverse;
         let [minus_x, minus_y, minus_z] = [zero - x, zero - y, zero - z];
@@ -634,8 +681,8 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
             L::Wide::select(better, to, L::Wide::load(&self.bundle.last.0)).store(&mut self.bundle.last);
             let place = to * L::Wide::load(&self.bundle.place_per_height.0);
             let end = place.times_plus(L::Wide::splat(BEYOND), L::Wide::splat(f32::MIN_POSITIVE));
-            let s_max = L::Wide::select(better, end, L::Wide::load(&self.s_max.0));
-            s_max.store(&mut self.s_max);
+            let s_max = L::Wide::select(better, end, L::Wide::load(&self.slabs.s_max.0));
+            s_max.store(&mut self.slabs.s_max);
             self.frustum.s_max = s_max.most();
         }
         let doubtful = in_range & !better & !best_to.below(from);
@@ -688,7 +735,7 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
         (self.from.0[i], self.to.0[i]) = (from, to);
         self.triangle.0[i] = f32::from_bits(triangle);
         self.bundle.last.0[i] = to;
-        self.s_max.0[i] = beyond(to * self.bundle.place_per_height.0[i]);
+        self.slabs.s_max.0[i] = beyond(to * self.bundle.place_per_height.0[i]);
     }
 
     /// Leaves one to the plain search.
@@ -696,13 +743,13 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
     fn give_up(&mut self, i: usize) {
         self.unsettled |= 1 << i;
         self.alive &= !(1 << i);
-        self.s_max.0[i] = -1.0;
+        self.slabs.s_max.0[i] = -1.0;
     }
 
     /// Lets the frustum end where none of the rays goes on.
     #[inline(always)]
     fn end_frustum(&mut self) {
-        self.frustum.s_max = self.s_max.0.iter().fold(-1.0, |most, &s_max| greater(most, s_max));
+        self.frustum.s_max = self.slabs.s_max.0.iter().fold(-1.0, |most, &s_max| greater(most, s_max));
     }
 
     /// Whether a crossing, of what has these names, is nearer than the nearest of one so far, or as near and before it.
@@ -860,7 +907,20 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
             while reference >> tag::SHIFT == tag::INNER {
                 self.work += 1;
                 let node = &nodes[reference as usize];
-                let (mask, keys) = lanes::meet_frustum::<L::Wide>(node, lanes::opaque(&self.frustum));
+                let (mut mask, mut keys) = lanes::meet_frustum::<L::Wide>(node, lanes::opaque(&self.frustum));
+                if !self.has_one_origin {
+                    self.work += mask.count_ones() / CHILDREN_AS_A_NODE;
+                    let (alive, frustum) = (self.alive, &self.frustum);
+                    let slabs = lanes::opaque(&self.slabs);
+                    (mask, keys) = lanes::meet_each::<L::Wide>(
+                        node,
+                        slabs,
+                        frustum.sides,
+                        (mask, keys),
+                        alive,
+                        !G::IS_ANY,
+                    );
+                }
                 if mask & mask.wrapping_sub(1) != 0 {
                     reference = stack.put(
                         #[inline(always)]

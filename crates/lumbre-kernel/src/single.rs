@@ -164,6 +164,12 @@ impl<'a> Exact<'a> {
         self.triangles.block(place)
     }
 
+    /// All of them.
+    #[inline(always)]
+    pub(crate) fn blocks(&self) -> Blocks<'a> {
+        self.triangles
+    }
+
     /// The nodes of the tree.
     #[inline(always)]
     pub(crate) fn nodes(&self) -> &'a [Node] {

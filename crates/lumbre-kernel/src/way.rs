@@ -22,7 +22,7 @@ impl<'a, L: Lanes> Way<'a, L> {
     /// Leaves out the boxes that the ray enters after this.
     #[inline(always)]
     pub(crate) fn end_at(&mut self, s_max: f32) {
-        self.slabs.s_max = s_max;
+        self.slabs.end_at(s_max);
     }
 
     #[inline(always)]
@@ -50,7 +50,7 @@ impl<'a, L: Lanes> Way<'a, L> {
     /// Whether an entry of a stack lies wholly beyond the end of the ray.
     #[inline(always)]
     pub(crate) fn is_beyond<O: Order>(&self, entry: O::Entry) -> bool {
-        O::is_beyond(entry, self.slabs.s_max)
+        O::is_beyond(entry, self.slabs.s_max())
     }
 
     /// The next on the stack that is not beyond the end of the ray.

@@ -13,8 +13,7 @@ use crate::holds::SingleStart;
 use crate::lanes::{self, Axes, Crossings, Eight, Lanes, Level, Task, Vector};
 use crate::node::Slabs;
 use crate::single::{Candidate, Exact, Goal, Outcome, heights, largest_component};
-use crate::triangles::{self, BLOCK, BlockRay};
-use crate::way::Way;
+use crate::triangles::{self, BLOCK, BlockRay, HeightRange};
 
 /// A ray in double precision among triangles.
 pub(crate) struct DoubleFlyer<G> {
@@ -28,10 +27,10 @@ pub(crate) struct DoubleFlyer<G> {
 
 impl<G> DoubleFlyer<G> {
     #[inline(always)]
-    fn keep<L: Lanes>(&mut self, better: Candidate, way: &mut Way<L>) {
+    fn keep(&mut self, better: Candidate, slabs: &mut Slabs) {
         self.best = better;
         self.blocks.range.last = better.to;
-        way.end_at(triangles::beyond(better.to * self.place_per_height));
+        slabs.end_at(triangles::beyond(better.to * self.place_per_height));
     }
 
     /// Looks for what is nearer among triangles of a block that are met, or may be: between two heights each.
@@ -149,18 +148,26 @@ impl<G: Goal, L: Lanes> Flyer<L> for DoubleFlyer<G> {
     type At = [L::Eight; 2];
 
     #[inline(always)]
+    fn new(start: &SingleStart) -> Self {
+        let blocks = BlockRay {
+            axes: Axes::by_bits(0, 0),
+            origin: [0.0; 4],
+            rest: [0.0; 4],
+            shear: [0.0; 4],
+            least_size: start.least_size,
+            range: HeightRange::ahead(0.0, 0.0),
+            turn: 0.0,
+        };
+        Self { blocks, place_per_height: 0.0, best: Candidate::NONE, goal: PhantomData }
+    }
+
+    #[inline(always)]
     fn start(start: &SingleStart, ray: &Ray) -> Option<Slabs> {
         L::start_single(start, ray)
     }
 
     #[inline(always)]
-    fn new(start: &SingleStart, ray: &Ray, slabs: &Slabs) -> Self {
-        let (blocks, place_per_height) = L::start_blocks(start, ray, slabs);
-        Self { blocks, place_per_height, best: Candidate::NONE, goal: PhantomData }
-    }
-
-    #[inline(always)]
-    fn renew(&mut self, start: &SingleStart, ray: &Ray, slabs: &Slabs) {
+    fn set_out(&mut self, start: &SingleStart, ray: &Ray, slabs: &Slabs) {
         (self.blocks, self.place_per_height) = L::start_blocks(start, ray, slabs);
         self.best = Candidate::NONE;
     }
@@ -187,7 +194,7 @@ impl<G: Goal, L: Lanes> Flyer<L> for DoubleFlyer<G> {
         ray: &Ray,
         block: u32,
         crossing: &Crossing<[L::Eight; 2]>,
-        way: &mut Way<L>,
+        slabs: &mut Slabs,
     ) -> bool {
         let &Crossing { met, unclear, at: [from, to] } = crossing;
         let nearest = to.least_of(met);
@@ -195,12 +202,12 @@ impl<G: Goal, L: Lanes> Flyer<L> for DoubleFlyer<G> {
         let is_alone = which & which.wrapping_sub(1) == 0;
         if unclear == 0 && is_alone && nearest < self.best.from {
             let lane = which.trailing_zeros();
-            self.keep(Candidate { block, lane, from: from.lane(lane as usize), to: nearest }, way);
+            self.keep(Candidate { block, lane, from: from.lane(lane as usize), to: nearest }, slabs);
             return true;
         }
         let crossing = Crossing { met, unclear, at: [from.to_array(), to.to_array()] };
         match self.seek_closely(L::level(), exact, ray, block, &crossing) {
-            Outcome::Settled(Some(better)) => self.keep(better, way),
+            Outcome::Settled(Some(better)) => self.keep(better, slabs),
             Outcome::Settled(None) => {}
             Outcome::Unsettled => return false,
         }

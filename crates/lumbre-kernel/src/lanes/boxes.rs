@@ -5,7 +5,7 @@ use std::mem::MaybeUninit;
 
 use super::{Room, Sides, Slots, WIDE, Wide};
 use crate::node::{Node, Slabs, WIDTH};
-use crate::packet::Frustum;
+use crate::packet::{Frustum, SlabRows};
 use crate::stack::stack_entry;
 
 const _: () = assert!(WIDTH == WIDE);
@@ -34,8 +34,8 @@ pub(crate) fn meet_boxes<W: Wide>(node: &Node, ray: &Slabs) -> (u32, W) {
     let far_y = W::load(far_y).times_plus(W::splat(y), W::splat(far[1]));
     let far_z = W::load(far_z).times_plus(W::splat(z), W::splat(far[2]));
     // 0 <= s_min. What is negative gives way to it where the box is entered, and is a miss where it is left.
-    let enter = near_x.later(near_y).later(near_z.later(W::splat(ray.s_min)));
-    let leave = far_x.earlier(far_y).earlier(far_z.earlier(W::splat(ray.s_max)));
+    let enter = near_x.later(near_y).later(near_z.later(W::splat(ray.s_min())));
+    let leave = far_x.earlier(far_y).earlier(far_z.earlier(W::splat(ray.s_max())));
     (enter.no_later(leave), enter)
 }
 
@@ -56,6 +56,50 @@ pub(crate) fn meet_frustum<W: Wide>(node: &Node, frustum: &Frustum) -> (u32, W) 
         leave = leave.earlier(last);
     }
     (enter.no_later(leave), enter)
+}
+
+/// Of the children in the mask, those whose boxes any of the rays that are alive meets; and, if `is_ordered`, where the first of them
+/// enters each.
+#[inline(always)]
+pub(crate) fn meet_each<W: Wide>(
+    node: &Node,
+    rays: &SlabRows,
+    sides: &Sides,
+    (children, mut enters): (u32, W),
+    alive: u32,
+    is_ordered: bool,
+) -> (u32, W) {
+    let (near_x, far_x) = near_and_far(node, sides, 0);
+    let (near_y, far_y) = near_and_far(node, sides, 1);
+    let (near_z, far_z) = near_and_far(node, sides, 2);
+    let [x, y, z] = &rays.inverse;
+    let (x, y, z) = (W::load(&x.0), W::load(&y.0), W::load(&z.0));
+    let [first_x, first_y, first_z] = &rays.near_offset;
+    let (first_x, first_y, first_z) = (W::load(&first_x.0), W::load(&first_y.0), W::load(&first_z.0));
+    let [last_x, last_y, last_z] = &rays.far_offset;
+    let (last_x, last_y, last_z) = (W::load(&last_x.0), W::load(&last_y.0), W::load(&last_z.0));
+    let (s_min, s_max) = (W::load(&rays.s_min.0), W::load(&rays.s_max.0));
+    let (mut met, mut rest) = (0, children);
+    while rest != 0 {
+        let child = rest.trailing_zeros() as usize % WIDTH;
+        rest &= rest - 1;
+        let enter_x = x.times_plus(W::splat(near_x[child]), first_x);
+        let enter_y = y.times_plus(W::splat(near_y[child]), first_y);
+        let enter_z = z.times_plus(W::splat(near_z[child]), first_z);
+        let leave_x = x.times_plus(W::splat(far_x[child]), last_x);
+        let leave_y = y.times_plus(W::splat(far_y[child]), last_y);
+        let leave_z = z.times_plus(W::splat(far_z[child]), last_z);
+        // As for one ray: see `meet_boxes`.
+        let enter = enter_x.later(enter_y).later(enter_z.later(s_min));
+        let leave = leave_x.earlier(leave_y).earlier(leave_z.earlier(s_max));
+        let those = enter.no_later(leave) & alive;
+        met |= u32::from(those != 0) << child;
+        if is_ordered && those != 0 {
+            let before = W::splat(0.0) - W::select(those, enter, W::splat(f32::INFINITY));
+            enters = W::select(1 << child, W::splat(-before.most()), enters);
+        }
+    }
+    (met, enters)
 }
 
 /// The child of which `mask` has the bit: no more than one.

@@ -30,12 +30,14 @@ use crate::narrow::NarrowRay;
 #[cfg(test)]
 use crate::node::Node;
 use crate::node::{BoxRay, Slabs, Units, WIDTH};
+#[cfg(test)]
+use crate::packet::SlabRows;
 use crate::stack::STACK;
 use crate::triangles::{BLOCK, BlockRay, Inside, Passage, Shear};
 
 pub(crate) use asked::{Asked, Question};
 pub(crate) use boxes::{
-    meet_boxes, meet_frustum, only_child, push_as_built, push_by_distance, put_and_take_as_built,
+    meet_boxes, meet_each, meet_frustum, only_child, push_as_built, push_by_distance, put_and_take_as_built,
     put_and_take_by_distance,
 };
 #[cfg(test)]
@@ -209,6 +211,9 @@ static SIDES: [Sides; 16] = {
 };
 
 impl Sides {
+    /// Where no component is negative.
+    pub(crate) const OF_NONE_NEGATIVE: &'static Self = &SIDES[0];
+
     /// For a direction that has these signs: a bit for each negative component, and one of any that follows.
     #[inline(always)]
     pub(crate) fn new(signs: u32) -> &'static Self {
@@ -342,16 +347,31 @@ impl Axes {
 }
 
 /// The array of a stack, which is not cleared for every ray.
+#[repr(C)]
 pub(crate) struct Slots<E> {
+    // Beside the first entries.
+    len: usize,
     // The first `len` are initialised, and `len <= STACK`.
     entries: [MaybeUninit<E>; STACK],
-    len: usize,
 }
 
 impl<E: Copy> Slots<E> {
     #[inline(always)]
     pub(crate) fn new() -> Self {
         Self { entries: [const { MaybeUninit::uninit() }; STACK], len: 0 }
+    }
+
+    /// Many: none is moved to where it is.
+    pub(crate) fn many<const N: usize>() -> Box<[Self; N]> {
+        let mut many = Box::<[Self; N]>::new_uninit();
+        let first: *mut Self = many.as_mut_ptr().cast();
+        // SAFETY: of `N` from the first on, the lengths are written, and entries may be uninitialised.
+        unsafe {
+            for i in 0..N {
+                (&raw mut (*first.add(i)).len).write(0);
+            }
+            many.assume_init()
+        }
     }
 
     #[inline(always)]
@@ -383,18 +403,6 @@ impl<E: Copy> Slots<E> {
     #[inline(always)]
     pub(crate) fn clear(&mut self) {
         self.len = 0;
-    }
-
-    /// The last, which stays where it is not so.
-    #[inline(always)]
-    pub(crate) fn pop_if(&mut self, is_so: bool) -> Option<E> {
-        if self.len == 0 {
-            return None;
-        }
-        let last = self.len - 1;
-        self.len -= usize::from(is_so);
-        // SAFETY: it was one of the first `len`, which are initialised, and there are no more than `STACK`.
-        Some(unsafe { self.entries.get_unchecked(last).assume_init() })
     }
 
     #[inline(always)]
@@ -649,6 +657,46 @@ pub(crate) fn meet_boxes_at(level: Level, node: &Node, ray: &Slabs) -> (u32, [i3
         }
     }
     level.run(Boxes(node, ray))
+}
+
+/// What [`meet_each`] gives of some children at a level for those of the rays that are alive, and what [`meet_boxes`] gives for each
+/// of them: a mask, and where children are entered; for tests. All have the sides of the first.
+#[cfg(test)]
+pub(crate) fn meet_each_at(
+    level: Level,
+    node: &Node,
+    rays: &[Slabs; WIDE],
+    alive: u32,
+    children: u32,
+) -> ((u32, [f32; WIDTH]), [(u32, [f32; WIDTH]); WIDE]) {
+    struct Each<'a>(&'a Node, &'a [Slabs; WIDE], u32, u32);
+    impl Task for Each<'_> {
+        type Output = ((u32, [f32; WIDTH]), [(u32, [f32; WIDTH]); WIDE]);
+        #[inline(always)]
+        fn run<L: Lanes>(self) -> Self::Output {
+            let Self(node, rays, alive, children) = self;
+            let row = |number: &dyn Fn(&Slabs) -> f32| Row(std::array::from_fn(|i| number(&rays[i])));
+            let rows = SlabRows {
+                inverse: std::array::from_fn(|axis| row(&|ray| ray.inverse[axis])),
+                near_offset: std::array::from_fn(|axis| row(&|ray| ray.near_offset[axis])),
+                far_offset: std::array::from_fn(|axis| row(&|ray| ray.far_offset[axis])),
+                s_min: row(&Slabs::s_min),
+                s_max: row(&Slabs::s_max),
+            };
+            let mut enters = Row::of(0.0);
+            let boxes = (children, L::Wide::splat(-1.0));
+            let (met, enter) = meet_each::<L::Wide>(node, &rows, rays[0].sides, boxes, alive, true);
+            enter.store(&mut enters);
+            let alone = std::array::from_fn(|i| {
+                let mut enters = Row::of(0.0);
+                let (met, enter) = meet_boxes::<L::Wide>(node, &rays[i]);
+                enter.store(&mut enters);
+                (met, enters.0)
+            });
+            ((met, enters.0), alone)
+        }
+    }
+    level.run(Each(node, rays, alive, children))
 }
 
 /// The triangles of a block that the ray may meet in its range and those that it certainly does, at a level, with the heights

@@ -89,7 +89,8 @@ impl Lanes for Portable {
             return None;
         }
         slabs.sides = Sides::new(signs);
-        (slabs.s_min, slabs.s_max) = (t_min * START_FACTOR, t_max * END_FACTOR + LITTLE as f32);
+        slabs.start_at(t_min * START_FACTOR);
+        slabs.end_at(t_max * END_FACTOR + LITTLE as f32);
         Some(slabs)
     }
 
@@ -143,7 +144,8 @@ impl Lanes for Portable {
             return None;
         }
         slabs.sides = Sides::new(signs);
-        (slabs.s_min, slabs.s_max) = (t_min * START_FACTOR, t_max * END_FACTOR + LITTLE as f32);
+        slabs.start_at(t_min * START_FACTOR);
+        slabs.end_at(t_max * END_FACTOR + LITTLE as f32);
         Some(slabs)
     }
 

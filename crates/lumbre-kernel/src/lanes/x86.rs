@@ -506,13 +506,13 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
                 _mm_setr_ps(START_FACTOR, END_FACTOR, 0.0, 0.0),
                 _mm_setr_ps(0.0, LITTLE as f32, 0.0, 0.0),
             );
+            let (near, far) = (_mm_fnmsub_ps(from, inverse, margin), _mm_fnmadd_ps(from, inverse, margin));
             Some(Slabs {
                 inverse: Self::array(inverse),
-                near_offset: Self::array(_mm_fnmsub_ps(from, inverse, margin)),
-                far_offset: Self::array(_mm_fnmadd_ps(from, inverse, margin)),
+                // The first of the ends, and the second, become the fourth.
+                near_offset: Self::array(_mm_insert_ps::<0b00_11_0000>(near, ends)),
+                far_offset: Self::array(_mm_insert_ps::<0b01_11_0000>(far, ends)),
                 sides: Sides::new(_mm_movemask_ps(direction) as u32),
-                s_min: _mm_cvtss_f32(ends),
-                s_max: _mm_cvtss_f32(_mm_movehdup_ps(ends)),
             })
         }
     }
@@ -864,13 +864,16 @@ where
             let per_distance = _mm_set1_ps(Units::NARROW_MARGIN_PER_DISTANCE);
             let margin =
                 _mm_mul_ps(size, _mm_fmadd_ps(distance, per_distance, _mm_set1_ps(start.narrow_margin)));
+            let (near, far) = (_mm_fnmsub_ps(from, inverse, margin), _mm_fnmadd_ps(from, inverse, margin));
+            // Of the fourth numbers. Not fused.
+            let first = _mm_mul_ps(origin, _mm_set1_ps(START_FACTOR));
+            let last = _mm_mul_ps(direction, _mm_set1_ps(END_FACTOR));
+            let last = _mm_add_ps(last, _mm_set1_ps(LITTLE as f32));
             Some(Slabs {
                 inverse: Self::array(inverse),
-                near_offset: Self::array(_mm_fnmsub_ps(from, inverse, margin)),
-                far_offset: Self::array(_mm_fnmadd_ps(from, inverse, margin)),
+                near_offset: Self::array(_mm_blend_ps::<0b1000>(near, first)),
+                far_offset: Self::array(_mm_blend_ps::<0b1000>(far, last)),
                 sides: Sides::new(_mm_movemask_ps(direction) as u32),
-                s_min: ray.t_min * START_FACTOR,
-                s_max: ray.t_max * END_FACTOR + LITTLE as f32,
             })
         }
     }

@@ -7,11 +7,10 @@ use crate::Ray32;
 use crate::blocks::TriangleBlock;
 use crate::fleet::{Crossing, Flyer};
 use crate::holds::SingleStart;
-use crate::lanes::{Eight, Lanes, Vector};
+use crate::lanes::{Axes, Eight, Lanes, Vector};
 use crate::node::Slabs;
 use crate::single::{Exact, Outcome};
 use crate::triangles::{self, BLOCK};
-use crate::way::Way;
 
 /// A ray in single precision among triangles, and the nearest that it has met.
 pub(super) struct NarrowFlyer<G> {
@@ -30,20 +29,26 @@ impl<G: Goal, L: Lanes> Flyer<L> for NarrowFlyer<G> {
     type At = Places<L::Eight>;
 
     #[inline(always)]
+    fn new(start: &SingleStart) -> Self {
+        let ray = NarrowRay {
+            axes: Axes::by_bits(0, 0),
+            origin: [0.0; 4],
+            shear: [0.0; 4],
+            minus_inverse: 0.0,
+            precise: start.precise,
+        };
+        Self { ray, nearest: Nearest::NONE, goal: PhantomData }
+    }
+
+    #[inline(always)]
     fn start(start: &SingleStart, ray: &Ray32) -> Option<Slabs> {
         L::start_narrow(start, ray)
     }
 
     #[inline(always)]
-    fn new(start: &SingleStart, ray: &Ray32, slabs: &Slabs) -> Self {
-        let ray = L::start_narrow_blocks(start, ray, slabs);
-        Self { ray, nearest: Nearest::NONE, goal: PhantomData }
-    }
-
-    #[inline(always)]
-    fn renew(&mut self, start: &SingleStart, ray: &Ray32, slabs: &Slabs) {
+    fn set_out(&mut self, start: &SingleStart, ray: &Ray32, slabs: &Slabs) {
         self.ray = L::start_narrow_blocks(start, ray, slabs);
-        self.nearest = Nearest::NONE;
+        self.nearest.0 = None;
     }
 
     #[inline(always)]
@@ -68,13 +73,13 @@ impl<G: Goal, L: Lanes> Flyer<L> for NarrowFlyer<G> {
         _: &Ray32,
         block: u32,
         crossing: &Crossing<Places<L::Eight>>,
-        way: &mut Way<L>,
+        slabs: &mut Slabs,
     ) -> bool {
         let t = crossing.at.t.least_of(crossing.met);
         let which = crossing.at.t.at_most(L::Eight::splat(t)) & crossing.met;
         let lane = which.trailing_zeros() as usize % BLOCK;
         if self.nearest.take_nearest::<L>(exact, &mut self.ray, block, crossing, (lane, t)) {
-            way.end_at(triangles::beyond(self.ray.t_max()));
+            slabs.end_at(triangles::beyond(self.ray.t_max()));
         }
         true
     }

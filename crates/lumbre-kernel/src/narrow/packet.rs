@@ -12,7 +12,9 @@ use crate::blocks::{Blocks, TriangleBlock};
 use crate::holds::SingleStart;
 use crate::lanes::{self, Axes, Corners, CornersRoom, Eight, Lanes, Row, Sides, Vector, WIDE, Wide};
 use crate::node::{END_FACTOR, LITTLE, Node, START_FACTOR, Units, tag};
-use crate::packet::{ALL, CULL_ERROR, Effort, Frustum, LEAST, PACKET, Together};
+use crate::packet::{
+    ALL, CHILDREN_AS_A_NODE, CULL_ERROR, Effort, Frustum, LEAST, Margins, PACKET, SlabRows, Together,
+};
 use crate::single::{Exact, Outcome};
 use crate::stack::{Order, Stack};
 use crate::triangles::{BEYOND, BLOCK, beyond};
@@ -49,15 +51,14 @@ pub(crate) struct Packet<'a> {
     /// The rays, number by number: origin, start, direction, end.
     rows: [Row<f32>; 8],
     frustum: Frustum,
-    /// Of their directions, in tree units.
-    inverse: [Row<f32>; 3],
     /// Whether they start where the first does.
     has_one_origin: bool,
     bundle: Bundle,
     is_among_triangles: bool,
     /// Those that are asked for; the others go along with one of them.
     chosen: u32,
-    s_max: Row<f32>,
+    /// Each among boxes by itself; of where they start, only unless that is one place.
+    slabs: SlabRows,
     /// The nearest: eight times the place of the block, and the lane.
     triangle: Row<f32>,
     /// Its weights: of the second and the third corner, and of all.
@@ -68,8 +69,12 @@ pub(crate) struct Packet<'a> {
 }
 
 /// Less than in double precision, since rays in flight are faster.
-const fn effort<L: Lanes>(is_any: bool) -> Effort {
-    let effort = if is_any { Effort { most: 112, paying: 70 } } else { Effort { most: 210, paying: 84 } };
+const fn effort<L: Lanes>(is_any: bool, has_one_origin: bool) -> Effort {
+    let effort = match (has_one_origin, is_any) {
+        (true, true) => Effort { most: 112, paying: 70 },
+        (true, false) => Effort { most: 210, paying: 84 },
+        (false, _) => Effort { most: 50, paying: 40 },
+    };
     effort.among_triangles::<L>()
 }
 
@@ -90,7 +95,6 @@ impl<'a> Packet<'a> {
                 s_max: 0.0,
                 sides: Sides::new(0),
             },
-            inverse: [row; 3],
             has_one_origin: false,
             bundle: Bundle {
                 axes: Axes::by_bits(0, 0),
@@ -108,7 +112,7 @@ impl<'a> Packet<'a> {
             },
             is_among_triangles: false,
             chosen: 0,
-            s_max: row,
+            slabs: SlabRows::NONE,
             triangle: row,
             weights: [row; 3],
             alive: 0,
@@ -142,7 +146,8 @@ impl<'a> Packet<'a> {
             }
             G::answer_together::<L>(self, first, ends);
             together.answered |= self.chosen;
-            together.pays &= is_done && effort::<L>(G::IS_ANY).pays(self.work, self.chosen);
+            together.pays &=
+                is_done && effort::<L>(G::IS_ANY, self.has_one_origin).pays(self.work, self.chosen);
             if !is_done {
                 together.is_done = false;
                 break;
@@ -184,14 +189,12 @@ impl<'a> Packet<'a> {
     }
 
     /// Makes those that are not chosen like one that is.
-    #[cold]
-    #[inline(never)]
-    fn fill_up(&mut self) {
+    #[inline(always)]
+    fn fill_up<L: Lanes>(&mut self) {
         let one = self.chosen.trailing_zeros() as usize % PACKET;
-        for Row(row) in &mut self.rows {
-            for i in 0..PACKET {
-                row[i] = if self.chosen >> i & 1 != 0 { row[i] } else { row[one] };
-            }
+        for row in &mut self.rows {
+            let (own, all) = (L::Wide::splat(row.0[one]), L::Wide::load(&row.0));
+            L::Wide::select(self.chosen, all, own).store(row);
         }
     }
 
@@ -203,9 +206,9 @@ impl<'a> Packet<'a> {
             return false;
         }
         if self.chosen != ALL {
-            self.fill_up();
+            self.fill_up::<L>();
         }
-        let Self { rows, frustum, bundle, exact: Exact { start, .. }, .. } = self;
+        let Self { rows, frustum, bundle, slabs, exact: Exact { start, .. }, .. } = self;
         let splat = L::Wide::splat;
         let zero = splat(0.0);
         let (t_min, t_max) = (L::Wide::load(&rows[3].0), L::Wide::load(&rows[7].0));
@@ -217,6 +220,7 @@ impl<'a> Packet<'a> {
         self.has_one_origin = x.are_equal() & y.are_equal() & z.are_equal();
         let has_one_origin = self.has_one_origin;
         let (mut inverse, mut off) = ([zero; 3], [zero; 3]);
+        let margins = Margins { least: start.narrow_margin, per_distance: Units::NARROW_MARGIN_PER_DISTANCE };
         for axis in 0..3 {
             let direction = L::Wide::load(&rows[4 + axis].0);
             let length = direction.abs();
@@ -224,7 +228,7 @@ impl<'a> Packet<'a> {
             is_long |= splat(start.shortest).at_most(length);
             inverse[axis] =
                 splat(start.space_per_unit).over(length.max(splat(start.tiny))).turned_by(direction);
-            inverse[axis].store(&mut self.inverse[axis]);
+            inverse[axis].store(&mut slabs.inverse[axis]);
             if has_one_origin {
                 let local = (f64::from(rows[axis].0[0]) - start.mesh_origin[axis]) as f32;
                 splat(local).store(&mut rows[axis]);
@@ -237,6 +241,9 @@ impl<'a> Packet<'a> {
                 let from = local * splat(start.units_per_space) - splat(start.shift[axis]);
                 let center = from.middle();
                 fits &= from.abs().at_most(splat(start.farthest[axis]));
+                let [near, far] = margins.offsets(from, inverse[axis]);
+                near.store(&mut slabs.near_offset[axis]);
+                far.store(&mut slabs.far_offset[axis]);
                 off[axis] = (from - center).abs();
                 frustum.center[axis] = center.first();
             }
@@ -245,7 +252,8 @@ impl<'a> Packet<'a> {
             return false;
         }
         let s_max = t_max * splat(END_FACTOR) + splat(LITTLE as f32);
-        L::Wide::select(self.chosen, s_max, splat(-1.0)).store(&mut self.s_max);
+        L::Wide::select(self.chosen, s_max, splat(-1.0)).store(&mut slabs.s_max);
+        (t_min * splat(START_FACTOR)).store(&mut slabs.s_min);
         let [x, y, z] = inverse;
         let [minus_x, minus_y, minus_z] = [zero - x, zero - y, zero - z];
         let minus_s_min = t_min * splat(-START_FACTOR);
@@ -274,7 +282,7 @@ impl<'a> Packet<'a> {
         let Self { rows, bundle, exact: Exact { start, .. }, .. } = self;
         let splat = L::Wide::splat;
         let order = bundle.axes.order();
-        let inverse = L::Wide::load(&self.inverse[order[2]].0) * splat(start.units_per_space);
+        let inverse = L::Wide::load(&self.slabs.inverse[order[2]].0) * splat(start.units_per_space);
         (splat(0.0) - inverse).store(&mut bundle.minus_inverse);
         let mut off = [splat(0.0); 3];
         for (place, &axis) in order.iter().enumerate() {
@@ -382,7 +390,7 @@ impl<'a> Packet<'a> {
         }
         let det = u + v + w;
         let height = u * az + v * bz + w * cz;
-        let precise = bundle.precise.of(mask, [bc, ca, ab], within, det, [az, bz, cz]);
+        let precise = bundle.precise.of(mask, bc.larger(ca).larger(ab), within, det, [az, bz, cz]);
         let t = height.over(det) * load(&bundle.minus_inverse.0);
         let t_max = load(&bundle.t_max.0);
         let in_range = mask & precise & load(&bundle.t_min.0).at_most(t) & t.at_most(t_max);
@@ -405,8 +413,8 @@ impl<'a> Packet<'a> {
             let t_max = L::Wide::select(nearer, t, t_max);
             t_max.store(&mut self.bundle.t_max);
             let end = t * splat(BEYOND) + splat(f32::MIN_POSITIVE);
-            let s_max = L::Wide::select(nearer, end, load(&self.s_max.0));
-            s_max.store(&mut self.s_max);
+            let s_max = L::Wide::select(nearer, end, load(&self.slabs.s_max.0));
+            s_max.store(&mut self.slabs.s_max);
             self.frustum.s_max = s_max.most();
         }
         if unclear != 0 {
@@ -462,11 +470,11 @@ impl<'a> Packet<'a> {
                     row.0[i] = weight;
                 }
                 self.bundle.t_max.0[i] = t;
-                self.s_max.0[i] = beyond(t);
+                self.slabs.s_max.0[i] = beyond(t);
             }
         }
         self.frustum.s_max =
-            self.s_max.0.iter().fold(-1.0, |most, &s_max| if s_max > most { s_max } else { most });
+            self.slabs.s_max.0.iter().fold(-1.0, |most, &s_max| if s_max > most { s_max } else { most });
     }
 
     /// Goes through the tree; false where it gave up.
@@ -474,7 +482,7 @@ impl<'a> Packet<'a> {
     fn run<G: Goal, L: Lanes>(&mut self) -> bool {
         (self.alive, self.met, self.work) = (self.chosen, 0, 0);
         let nodes: &[Node] = self.exact.nodes();
-        let most_work = effort::<L>(G::IS_ANY).most;
+        let most_work = effort::<L>(G::IS_ANY, self.has_one_origin).most;
         let mut stack: Stack<<G::Order as Order>::Entry> = Stack::new();
         let mut reference = self.exact.start.root;
         let mut room = CornersRoom::new();
@@ -482,7 +490,20 @@ impl<'a> Packet<'a> {
             while reference >> tag::SHIFT == tag::INNER {
                 self.work += 1;
                 let node = &nodes[reference as usize];
-                let (mask, keys) = lanes::meet_frustum::<L::Wide>(node, lanes::opaque(&self.frustum));
+                let (mut mask, mut keys) = lanes::meet_frustum::<L::Wide>(node, lanes::opaque(&self.frustum));
+                if !self.has_one_origin {
+                    self.work += mask.count_ones() / CHILDREN_AS_A_NODE;
+                    let (alive, frustum) = (self.alive, &self.frustum);
+                    let slabs = lanes::opaque(&self.slabs);
+                    (mask, keys) = lanes::meet_each::<L::Wide>(
+                        node,
+                        slabs,
+                        frustum.sides,
+                        (mask, keys),
+                        alive,
+                        !G::IS_ANY,
+                    );
+                }
                 if mask & mask.wrapping_sub(1) != 0 {
                     reference = stack.put(
                         #[inline(always)]

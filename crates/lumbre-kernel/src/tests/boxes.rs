@@ -8,7 +8,9 @@ use lumbre_math::{DVec3, Transform, Vec3};
 use super::scenes::Random;
 use crate::Ray32;
 use crate::holds::{Holds, SingleStart, Sizes};
-use crate::lanes::{LANE_BITS, Level, meet_boxes_at, read_at, start_placed_at, start_single_at};
+use crate::lanes::{
+    LANE_BITS, Level, meet_boxes_at, meet_each_at, read_at, start_placed_at, start_single_at,
+};
 use crate::node::{BoxRay, Node, Slabs, Units, WIDTH};
 use crate::primitive::Bounds;
 
@@ -188,7 +190,7 @@ fn rays_are_read_as_they_were_written() {
 /// All numbers that mean anything.
 fn bits_of(slabs: &Slabs) -> Vec<u32> {
     let rows = [&slabs.inverse, &slabs.near_offset, &slabs.far_offset];
-    let ends = [slabs.s_min, slabs.s_max];
+    let ends = [slabs.s_min(), slabs.s_max()];
     rows.into_iter().flat_map(|row| &row[..3]).chain(&ends).map(|x| x.to_bits()).collect()
 }
 
@@ -197,6 +199,52 @@ fn a_box_that_holds_the_point_at_t_is_always_met() {
     for (i, level) in Level::all().into_iter().enumerate() {
         reached_boxes_are_met(level, 51 + i as u64, 70_000);
     }
+}
+
+#[test]
+fn rays_together_meet_the_boxes_that_each_meets_alone() {
+    let mut random = Random(77);
+    let (mut met_by_few, mut missed) = (0, 0);
+    let rounds = if cfg!(miri) { 20 } else { 3_000 };
+    for round in 0..rounds {
+        let whole = Aabb { min: DVec3::splat(-1.0), max: DVec3::splat(1.0) };
+        let units = units(&whole);
+        let mut node = Node::EMPTY;
+        for lane in 0..WIDTH - round % 3 {
+            let center = random.vector();
+            let half = random.between(0.05, 0.6) * DVec3::new(random.unit(), random.unit(), random.unit());
+            put_box(&mut node, lane, &units, &Aabb { min: center - half, max: center + half });
+        }
+        let start = start_of(&units, DVec3::ZERO).expect("it is of a usual size");
+        let (from, to) = (4.0 * random.vector(), random.vector());
+        let signs = (to - from).signum();
+        for level in Level::all() {
+            let rays: [Slabs; WIDTH] = std::array::from_fn(|_| {
+                let origin = from + 0.3 * random.vector();
+                let direction = (to + 0.5 * random.vector() - origin).abs() * signs;
+                let ray = Ray::new(origin, direction).with_range(0.0, random.between(0.5, 3.0));
+                let (slabs, ..) = start_single_at(level, &start, &ray).expect("it is from nearby");
+                slabs
+            });
+            let (alive, children) = (random.below(1 << 16) as u32, random.below(1 << 16) as u32);
+            let ((met, enters), alone) = meet_each_at(level, &node, &rays, alive, children);
+            for child in (0..WIDTH).filter(|child| children >> child & 1 != 0) {
+                let those =
+                    alone.iter().enumerate().filter(|(i, (met, _))| alive >> i & 1 & met >> child != 0);
+                let first = those.clone().map(|(_, (_, enters))| enters[child]).reduce(f32::min);
+                assert_eq!(met >> child & 1 != 0, first.is_some(), "{level:?}");
+                if let Some(first) = first {
+                    // What is negative gives way to where the ray starts, which is zero.
+                    assert_eq!(enters[child], first, "{level:?}");
+                    met_by_few += usize::from(those.count() < 4);
+                } else {
+                    missed += 1;
+                }
+            }
+            assert_eq!(met & !children, 0);
+        }
+    }
+    assert!(met_by_few > rounds && missed > rounds, "{met_by_few} {missed}");
 }
 
 #[test]

@@ -13,7 +13,7 @@ use super::scenes::{
 use crate::batch::Flying;
 use crate::blocks::Unit;
 use crate::holds::{Contents, SingleStart};
-use crate::lanes::{Eight, Lanes, Level, Portable};
+use crate::lanes::{Eight, Lanes, Level, Portable, Vector};
 use crate::narrow::{self, Precise, search_triangles};
 use crate::node::Node;
 use crate::packet::PACKET;
@@ -969,9 +969,10 @@ fn what_is_precise_at_once_is_precise_by_its_extent() {
         }
         let [products, z] = [products, z].map(|rows| rows.map(|row| Numbers::load(&row)));
         let (within, sum) = (Numbers::load(&within), Numbers::load(&sum));
+        let largest = products[0].larger(products[1]).larger(products[2]);
         // Where triangles are of any size, nothing is at once.
         let [at_once, by_extent] = [side, f32::MAX].map(|longest_side| {
-            Precise::new(space_per_unit, longest_side).of(0xff, products, within, sum, z) & 0xff
+            Precise::new(space_per_unit, longest_side).of(0xff, largest, within, sum, z) & 0xff
         });
         assert_eq!(at_once, by_extent);
         (precise, others) = (precise + at_once.count_ones(), others + at_once.count_zeros() - 24);
