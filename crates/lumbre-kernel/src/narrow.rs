@@ -126,10 +126,28 @@ fn within<V: Vector>([u, v, w]: [V; 3]) -> V {
 /// What products may lose by underflow is nothing beside this.
 const TINY: f32 = 1.0 / (1u128 << 80) as f32;
 
+/// How a line passes the triangles of a block, as it is seen at first.
+struct Lines<E> {
+    /// The first of the two products that each edge function is the difference of.
+    products: [E; 3],
+    edges: [E; 3],
+    within: E,
+    heights: [E; 3],
+}
+
+impl<E: Vector> Lines<E> {
+    /// What is needed of triangles that it may pass through.
+    #[inline(always)]
+    fn pass(self) -> Pass<E> {
+        let Self { products: [bc, ca, ab], edges, within, heights } = self;
+        Pass { largest: bc.larger(ca).larger(ab), edges, within, heights }
+    }
+}
+
 /// How a line passes the triangles of a block.
 #[derive(Clone, Copy, Zeroable)]
 pub(crate) struct Pass<E> {
-    /// The largest, by magnitude, of the first of the two products that each edge function is the difference of.
+    /// The largest of the products, by magnitude.
     largest: E,
     edges: [E; 3],
     /// See [`within`].
@@ -281,14 +299,13 @@ impl NarrowRay {
 
     /// How the line of the ray passes the triangles of a block, and a bit for each that it may pass through. `IS_ALONE` as in [`Lanes::narrow_corners`].
     #[inline(always)]
-    fn pass_edges<L: Lanes, const IS_ALONE: bool>(&self, block: &TriangleBlock) -> (u32, Pass<L::Eight>) {
+    fn lines<L: Lanes, const IS_ALONE: bool>(&self, block: &TriangleBlock) -> (u32, Lines<L::Eight>) {
         let [x, y, heights] = L::narrow_corners::<IS_ALONE>(block, lanes::opaque(self));
         let products = [x[2] * y[1], x[0] * y[2], x[1] * y[0]];
         let edges = [products[0] - y[2] * x[1], products[1] - y[0] * x[2], products[2] - y[1] * x[0]];
         let within = within(edges);
         let mask = L::Eight::splat(0.0).at_most(within) & block.taken();
-        let largest = products[0].larger(products[1]).larger(products[2]);
-        (mask, Pass { largest, edges, within, heights })
+        (mask, Lines { products, edges, within, heights })
     }
 
     /// Which of those in the mask the ray meets; it certainly does where the crossing is precise, and in range.
@@ -309,8 +326,8 @@ impl NarrowRay {
     /// Which triangles of a block the ray meets; `None` where its line passes through none.
     #[inline(always)]
     fn pass<L: Lanes>(&self, block: &TriangleBlock) -> Option<Crossing<Places<L::Eight>>> {
-        let (mask, pass) = self.pass_edges::<L, true>(block);
-        if mask == 0 { None } else { Some(self.cross::<L>(mask, &pass)) }
+        let (mask, lines) = self.lines::<L, true>(block);
+        if mask == 0 { None } else { Some(self.cross::<L>(mask, &lines.pass())) }
     }
 
     /// Where the ray meets a triangle, by exact products; the weights of the second and third corner, and the sum of all.

@@ -53,7 +53,8 @@ impl<G: Goal, L: Lanes> Flyer<L> for NarrowFlyer<G> {
 
     #[inline(always)]
     fn pass(&self, block: &TriangleBlock) -> (u32, Pass<L::Eight>) {
-        self.ray.pass_edges::<L, false>(block)
+        let (mask, lines) = self.ray.lines::<L, false>(block);
+        (mask, lines.pass())
     }
 
     #[inline(always)]
