@@ -659,6 +659,10 @@ pub(crate) fn meet_boxes_at(level: Level, node: &Node, ray: &Slabs) -> (u32, [i3
     level.run(Boxes(node, ray))
 }
 
+/// A mask of children, and where they are entered.
+#[cfg(test)]
+type Entered = (u32, [f32; WIDTH]);
+
 /// What [`meet_each`] gives of some children at a level for those of the rays that are alive, and what [`meet_boxes`] gives for each
 /// of them: a mask, and where children are entered; for tests. All have the sides of the first.
 #[cfg(test)]
@@ -668,10 +672,10 @@ pub(crate) fn meet_each_at(
     rays: &[Slabs; WIDE],
     alive: u32,
     children: u32,
-) -> ((u32, [f32; WIDTH]), [(u32, [f32; WIDTH]); WIDE]) {
+) -> (Entered, [Entered; WIDE]) {
     struct Each<'a>(&'a Node, &'a [Slabs; WIDE], u32, u32);
     impl Task for Each<'_> {
-        type Output = ((u32, [f32; WIDTH]), [(u32, [f32; WIDTH]); WIDE]);
+        type Output = (Entered, [Entered; WIDE]);
         #[inline(always)]
         fn run<L: Lanes>(self) -> Self::Output {
             let Self(node, rays, alive, children) = self;

@@ -510,8 +510,8 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
             Some(Slabs {
                 inverse: Self::array(inverse),
                 // The first of the ends, and the second, become the fourth.
-                near_offset: Self::array(_mm_insert_ps::<0b00_11_0000>(near, ends)),
-                far_offset: Self::array(_mm_insert_ps::<0b01_11_0000>(far, ends)),
+                near_offset: Self::array(_mm_insert_ps::<0x30>(near, ends)),
+                far_offset: Self::array(_mm_insert_ps::<0x70>(far, ends)),
                 sides: Sides::new(_mm_movemask_ps(direction) as u32),
             })
         }
