@@ -93,6 +93,14 @@ pub(crate) trait Ends<A> {
     /// To be `#[inline(always)]`: an answer that goes through memory is waited for.
     fn put(&mut self, position: usize, outcome: Outcome<A>);
 
+    /// The same of as many as go together, the first of which has this position.
+    #[inline(always)]
+    fn put_row(&mut self, first: usize, answers: [A; PACKET]) {
+        for (i, answer) in answers.into_iter().enumerate() {
+            self.put(first + i, Outcome::Settled(answer));
+        }
+    }
+
     /// Asks for where that will be put.
     #[inline(always)]
     fn fetch(&self, _position: usize) {}

@@ -97,7 +97,7 @@ impl Effort {
 }
 
 /// Of children for whose boxes each ray is asked, so many are as much to do as a node.
-pub(crate) const CHILDREN_AS_A_NODE: u32 = 4;
+const CHILDREN_AS_A_NODE: u32 = 4;
 
 /// What the corners of triangles may be wrong by, by their size: 32u, see above.
 pub(crate) const CULL_ERROR: f32 = 32.0 / (1 << 24) as f32;
@@ -145,6 +145,23 @@ impl Margins {
         let margin = inverse.abs() * distance.times_plus(W::splat(self.per_distance), W::splat(self.least));
         [from.times_from(inverse, W::splat(0.0) - margin), from.times_from(inverse, margin)]
     }
+}
+
+/// The children of a node whose boxes rays that are alive may meet, where they enter each at the earliest, and how much it was to find
+/// that out, in nodes. With rows for `each` ray, only children that one of them meets, and, if `is_ordered`, where the first of them does.
+#[inline(always)]
+pub(crate) fn meet_children<W: Wide>(
+    node: &Node,
+    frustum: &Frustum,
+    each: Option<&SlabRows>,
+    alive: u32,
+    is_ordered: bool,
+) -> (u32, W, u32) {
+    let (mask, enters) = lanes::meet_frustum::<W>(node, frustum);
+    let Some(each) = each else { return (mask, enters, 1) };
+    let work = 1 + mask.count_ones() / CHILDREN_AS_A_NODE;
+    let (mask, enters) = lanes::meet_each::<W>(node, each, frustum.sides, (mask, enters), alive, is_ordered);
+    (mask, enters, work)
 }
 
 #[inline(always)]
@@ -905,22 +922,12 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
         }
         loop {
             while reference >> tag::SHIFT == tag::INNER {
-                self.work += 1;
                 let node = &nodes[reference as usize];
-                let (mut mask, mut keys) = lanes::meet_frustum::<L::Wide>(node, lanes::opaque(&self.frustum));
-                if !self.has_one_origin {
-                    self.work += mask.count_ones() / CHILDREN_AS_A_NODE;
-                    let (alive, frustum) = (self.alive, &self.frustum);
-                    let slabs = lanes::opaque(&self.slabs);
-                    (mask, keys) = lanes::meet_each::<L::Wide>(
-                        node,
-                        slabs,
-                        frustum.sides,
-                        (mask, keys),
-                        alive,
-                        !G::IS_ANY,
-                    );
-                }
+                let each = if self.has_one_origin { None } else { Some(lanes::opaque(&self.slabs)) };
+                let frustum = lanes::opaque(&self.frustum);
+                let (mask, keys, work) =
+                    meet_children::<L::Wide>(node, frustum, each, self.alive, !G::IS_ANY);
+                self.work += work;
                 if mask & mask.wrapping_sub(1) != 0 {
                     reference = stack.put(
                         #[inline(always)]

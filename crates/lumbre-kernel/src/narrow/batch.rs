@@ -143,4 +143,9 @@ impl<G: Goal> Ends<G::Answer> for Answers<'_, G> {
             Outcome::Unsettled => G::alone_at(self.level).ask(self.accel, &self.rays[position]),
         };
     }
+
+    #[inline(always)]
+    fn put_row(&mut self, first: usize, answers: [G::Answer; PACKET]) {
+        self.places[first..first + PACKET].copy_from_slice(&answers);
+    }
 }

@@ -13,7 +13,7 @@ use crate::holds::SingleStart;
 use crate::lanes::{self, Axes, Corners, CornersRoom, Eight, Lanes, Row, Sides, Vector, WIDE, Wide};
 use crate::node::{END_FACTOR, LITTLE, Node, START_FACTOR, Units, tag};
 use crate::packet::{
-    ALL, CHILDREN_AS_A_NODE, CULL_ERROR, Effort, Frustum, LEAST, Margins, PACKET, SlabRows, Together,
+    ALL, CULL_ERROR, Effort, Frustum, LEAST, Margins, PACKET, SlabRows, Together, meet_children,
 };
 use crate::single::{Exact, Outcome};
 use crate::stack::{Order, Stack};
@@ -488,22 +488,12 @@ impl<'a> Packet<'a> {
         let mut room = CornersRoom::new();
         loop {
             while reference >> tag::SHIFT == tag::INNER {
-                self.work += 1;
                 let node = &nodes[reference as usize];
-                let (mut mask, mut keys) = lanes::meet_frustum::<L::Wide>(node, lanes::opaque(&self.frustum));
-                if !self.has_one_origin {
-                    self.work += mask.count_ones() / CHILDREN_AS_A_NODE;
-                    let (alive, frustum) = (self.alive, &self.frustum);
-                    let slabs = lanes::opaque(&self.slabs);
-                    (mask, keys) = lanes::meet_each::<L::Wide>(
-                        node,
-                        slabs,
-                        frustum.sides,
-                        (mask, keys),
-                        alive,
-                        !G::IS_ANY,
-                    );
-                }
+                let each = if self.has_one_origin { None } else { Some(lanes::opaque(&self.slabs)) };
+                let frustum = lanes::opaque(&self.frustum);
+                let (mask, keys, work) =
+                    meet_children::<L::Wide>(node, frustum, each, self.alive, !G::IS_ANY);
+                self.work += work;
                 if mask & mask.wrapping_sub(1) != 0 {
                     reference = stack.put(
                         #[inline(always)]
@@ -604,9 +594,11 @@ impl<'a> Packet<'a> {
     #[inline(always)]
     pub(super) fn put_met(&self, first: usize, ends: &mut impl Ends<bool>) {
         if self.chosen == ALL {
-            for i in 0..PACKET {
-                ends.put(first + i, Outcome::Settled(self.met >> i & 1 != 0));
+            let mut are_met = [false; PACKET];
+            for (i, is_met) in are_met.iter_mut().enumerate() {
+                *is_met = self.met >> i & 1 != 0;
             }
+            ends.put_row(first, are_met);
             return;
         }
         let mut rest = self.chosen;
