@@ -254,7 +254,7 @@ fn search_packet<'a, G: Goal, L: Lanes, O: Others<'a, G>, const MIXED: bool>(
     others: &mut O,
     ends: &mut impl Ends<O::Found>,
 ) -> Together {
-    let whole = packet.whole::<G, L>();
+    let whole = packet.whole();
     let mut ends = self::ends(
         #[inline(always)]
         |place, outcome| ends.put(first + place, outcome),

@@ -301,10 +301,8 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
 
     /// All there is, from the root on.
     #[inline(always)]
-    pub(crate) fn whole<G: Goal, L: Lanes>(&self) -> Asked {
-        // What it is less where they start at different places is seen then.
-        let most_work = Effort::new::<L>(G::IS_ANY, MIXED, true).most;
-        Asked { those: ALL, root: self.exact.start.root, most_work }
+    pub(crate) fn whole(&self) -> Asked {
+        Asked { those: ALL, root: self.exact.start.root, most_work: u32::MAX }
     }
 
     /// Searches along some of these rays together, from a node on. Those that go another way than others do so together, too.
@@ -1072,7 +1070,7 @@ pub(crate) struct Asked {
     pub(crate) those: u32,
     /// The node that they start at.
     pub(crate) root: u32,
-    /// What they may do before they go alone.
+    /// What is left that they may do before they go alone, where that is less than their [`Effort`].
     pub(crate) most_work: u32,
 }
 
@@ -1088,7 +1086,7 @@ pub(crate) fn answered_together(level: Level, accel: &Accel, rays: &[Ray; PACKET
         fn run<L: Lanes>(mut self) -> u32 {
             let (accel, start) = (self.0.exact.accel(), self.0.exact.start);
             let others = &mut NoOthers::<MIXED> { accel, start };
-            let whole = self.0.whole::<Nearest, L>();
+            let whole = self.0.whole();
             self.0.search::<Nearest, L, _>(self.1, whole, others, &mut |_, _| {}).answered
         }
     }

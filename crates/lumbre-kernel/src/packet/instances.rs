@@ -260,7 +260,7 @@ impl Task for Searching<'_> {
         let Self(accel, start, rays) = self;
         let mut packet = Packet::<true>::new(accel, start);
         let others = &mut AmongInstances::new(accel, start);
-        let whole = packet.whole::<Nearest, L>();
+        let whole = packet.whole();
         packet.search::<Nearest, L, _>(rays, whole, others, &mut |_, _| {}).answered
     }
 }
