@@ -10,7 +10,7 @@ use lumbre_geometry::Ray;
 
 use crate::Accel;
 use crate::blocks::Unit;
-use crate::fleet::{self, DoubleFlyer};
+use crate::fleet::{self, Beside, DoubleFlyer, Shapes, Triangles};
 use crate::holds::{Contents, SingleStart};
 use crate::lanes::{self, Lanes, Level, Task};
 use crate::node::Node;
@@ -127,12 +127,7 @@ pub(crate) fn search_all<G: Goal>(
     rays: &[Ray],
     ends: impl Ends<G::Answer>,
 ) {
-    if start.contents == Contents::Triangles {
-        search_triangles::<G>(level, accel, start, rays, ends, None, true);
-    } else {
-        let others = NoOthers::<true> { accel, start };
-        level.run(OneByOne::<G, _, _> { accel, start, rays, others, ends, goal: PhantomData });
-    }
+    search_as_said::<G>(level, accel, start, rays, ends, None, true);
 }
 
 /// Bytes of nodes and triangles.
@@ -153,8 +148,8 @@ pub(crate) fn search_anything<G: Companion>(
     level.run(OneByOne::<G, _, _> { accel, start, rays, others, ends, goal: PhantomData });
 }
 
-/// Searches a tree of triangles along every ray, with or without packets, and the others as they are to go, if that is said.
-pub(crate) fn search_triangles<G: Goal>(
+/// The same with or without packets, where the others go as is said, if it is.
+pub(crate) fn search_as_said<G: Goal>(
     level: Level,
     accel: &Accel,
     start: &SingleStart,
@@ -163,10 +158,16 @@ pub(crate) fn search_triangles<G: Goal>(
     flying: Option<Flying>,
     has_packets: bool,
 ) {
-    level.run(AllAtOnce::<InDouble<G>, _> { accel, start, rays, ends, flying, has_packets });
+    if start.contents == Contents::Triangles {
+        type AmongTriangles<G> = InDouble<G, Triangles, false>;
+        level.run(AllAtOnce::<AmongTriangles<G>, _> { accel, start, rays, ends, flying, has_packets });
+    } else {
+        type AmongShapes<G> = InDouble<G, Shapes, true>;
+        level.run(AllAtOnce::<AmongShapes<G>, _> { accel, start, rays, ends, flying, has_packets });
+    }
 }
 
-/// In which precision rays are asked among triangles, and what.
+/// In which precision rays are asked, what, and among what.
 pub(crate) trait Manner {
     /// As it is asked.
     type Ray;
@@ -202,35 +203,35 @@ pub(crate) trait Manner {
     );
 }
 
-/// In double precision.
-struct InDouble<G>(PhantomData<G>);
+/// In double precision. `MIXED` where anything stands beside triangles.
+struct InDouble<G, B, const MIXED: bool>(PhantomData<(G, B)>);
 
-impl<G: Goal> Manner for InDouble<G> {
+impl<G: Goal, B: Beside, const MIXED: bool> Manner for InDouble<G, B, MIXED> {
     type Ray = Ray;
     type Answer = G::Answer;
-    type Packet<'a> = Packet<'a, false>;
+    type Packet<'a> = Packet<'a, MIXED>;
     const ASKS_AHEAD: bool = !G::IS_ANY;
 
     #[inline(always)]
-    fn packet<'a>(accel: &'a Accel, start: &'a SingleStart) -> Packet<'a, false> {
+    fn packet<'a>(accel: &'a Accel, start: &'a SingleStart) -> Packet<'a, MIXED> {
         Packet::new(accel, start)
     }
 
     #[inline(always)]
     fn search_together<'a, L: Lanes>(
-        packet: &mut Packet<'a, false>,
+        packet: &mut Packet<'a, MIXED>,
         exact: &Exact<'a>,
         rays: &[Ray; PACKET],
         first: usize,
         ends: &mut impl Ends<G::Answer>,
     ) -> Together {
-        let nothing = &mut NoOthers::<false> { accel: exact.accel(), start: exact.start };
-        search_packet::<G, L, _, false>(packet, rays, first, nothing, ends)
+        let nothing = &mut NoOthers::<MIXED> { accel: exact.accel(), start: exact.start };
+        search_packet::<G, L, _, MIXED>(packet, rays, first, nothing, ends)
     }
 
     #[inline(always)]
     fn search_alone<L: Lanes>(exact: &Exact, ray: &Ray) -> Outcome<G::Answer> {
-        Alone::<G, false>::new(exact.accel(), exact.start, ray).run::<L>()
+        Alone::<G, MIXED>::new(exact.accel(), exact.start, ray).run::<L>()
     }
 
     #[inline(always)]
@@ -241,7 +242,7 @@ impl<G: Goal> Manner for InDouble<G> {
         positions: &[usize],
         ends: &mut impl Ends<G::Answer>,
     ) {
-        fleet::fly::<DoubleFlyer<G>, L>(exact, asks_ahead, rays, positions, ends);
+        fleet::fly::<DoubleFlyer<G, B>, L>(exact, asks_ahead, rays, positions, ends);
     }
 }
 
@@ -288,7 +289,7 @@ impl Trials {
     }
 }
 
-/// Rays through a tree where shapes take most of the time: those that are alike together, and the others one after another.
+/// Rays through a tree of anything: those that are alike together, and the others one after another.
 struct OneByOne<'a, 'r, G, O, E> {
     accel: &'a Accel,
     start: &'a SingleStart,
@@ -328,7 +329,7 @@ impl<'a, G: Goal, O: Others<'a, G>, E: Ends<O::Found>> Task for OneByOne<'a, '_,
     }
 }
 
-/// Rays through a tree of triangles: those that are alike together, and the others in flight, or one after another.
+/// Rays through a tree of triangles and shapes: those that are alike together, and the others in flight, or one after another.
 pub(crate) struct AllAtOnce<'a, 'r, M: Manner, E> {
     pub(crate) accel: &'a Accel,
     pub(crate) start: &'a SingleStart,

@@ -10,15 +10,18 @@ use bytemuck::Zeroable;
 
 use crate::batch::Ends;
 use crate::blocks::{Blocks, TriangleBlock};
+use crate::collapse;
 use crate::holds::SingleStart;
-use crate::lanes::{self, Lanes, Slots, Vector, WIDE, Wide};
+use crate::hulls::HullBlock;
+use crate::lanes::{self, Lanes, MetHulls, Slots, Vector, WIDE, Wide};
 use crate::node::{Node, Slabs, WIDTH, tag};
-use crate::single::{Exact, Outcome};
+use crate::single::{Exact, Outcome, Step, nearest_of};
 use crate::stack::{Order, STACK};
+use crate::triangles::BLOCK;
 
-pub(crate) use double::DoubleFlyer;
+pub(crate) use double::{Beside, DoubleFlyer, Shapes, Triangles};
 
-/// A ray among triangles, in either precision, that flies.
+/// A ray that flies: among triangles in either precision, and in double precision among what stands beside them.
 pub(crate) trait Flyer<L: Lanes>: Sized {
     /// As it is asked.
     type Ray;
@@ -28,6 +31,8 @@ pub(crate) trait Flyer<L: Lanes>: Sized {
     type Order: Order;
     /// Whether any hit will do.
     const IS_ANY: bool;
+    /// Whether it flies among anything but triangles.
+    const IS_MIXED: bool;
     /// How its line passes the triangles of a block.
     type Pass: Copy + Zeroable;
     /// Where it meets each triangle.
@@ -38,7 +43,7 @@ pub(crate) trait Flyer<L: Lanes>: Sized {
     /// The ray for boxes; `None` where it does not come from nearby, or is not sound.
     fn start(start: &SingleStart, ray: &Self::Ray) -> Option<Slabs>;
     /// Sets out as a ray, in the place of another.
-    fn set_out(&mut self, start: &SingleStart, ray: &Self::Ray, slabs: &Slabs);
+    fn set_out(&mut self, exact: &Exact, ray: &Self::Ray, slabs: &Slabs);
     /// How its line passes the triangles of a block, and a bit for each that it may meet.
     fn pass(&self, block: &TriangleBlock) -> (u32, Self::Pass);
     /// Where it meets those of the mask.
@@ -55,6 +60,37 @@ pub(crate) trait Flyer<L: Lanes>: Sized {
         crossing: &Crossing<Self::At>,
         slabs: &mut Slabs,
     ) -> bool;
+    /// What it may meet of a block of hulls, tubes left aside, and a bit for each ring among that. Where there are no shapes, it meets
+    /// nothing, here and below.
+    #[inline(always)]
+    fn glance_at_hulls(&self, _block: &HullBlock) -> (MetHulls, u32) {
+        (MetHulls::NONE, 0)
+    }
+
+    /// The same with a look at tubes.
+    #[inline(always)]
+    fn meet_hulls(&self, _block: &HullBlock) -> MetHulls {
+        MetHulls::NONE
+    }
+
+    /// The height at which it ends among shapes.
+    #[inline(always)]
+    fn last(&self) -> f32 {
+        f32::INFINITY
+    }
+
+    /// Tests a shape, or a primitive of custom geometry; how the search ends, if it does.
+    #[inline(always)]
+    fn meet_entry(
+        &mut self,
+        _exact: &Exact,
+        _ray: &Self::Ray,
+        _entry: &collapse::Entry,
+        _slabs: &mut Slabs,
+    ) -> Option<Step> {
+        None
+    }
+
     /// What came of it: whether any hit `is_met`, or what it has taken.
     fn answer(&self, exact: &Exact, ray: &Self::Ray, is_met: bool) -> Outcome<Self::Answer>;
 }
@@ -123,11 +159,12 @@ fn rank(places: u64, place: usize) -> usize {
 #[repr(align(64))]
 struct References([u32; FLIGHTS]);
 
-/// A bit for each flight that is at a node, at a leaf, and at its end.
+/// A bit for each flight that is at a node, at a leaf of triangles or of anything else, and at its end.
 #[derive(Clone, Copy)]
 struct Stations {
     nodes: u64,
     leaves: u64,
+    others: u64,
     ends: u64,
 }
 
@@ -137,17 +174,50 @@ impl References {
         &mut self.0[flight % FLIGHTS]
     }
 
+    /// Of a fleet that `is_mixed` or not.
     #[inline(always)]
-    fn stations<L: Lanes>(&self) -> Stations {
+    fn stations<L: Lanes>(&self, is_mixed: bool) -> Stations {
+        /// The last reference of each kind, in the order of integers with signs.
+        const LAST_NODE: i32 = tag::PLACE as i32;
+        const LAST_TRIANGLES: i32 = tag::reference(tag::TRIANGLES, tag::PLACE) as i32;
+        const LAST_BEFORE_END: i32 = END as i32 - 1;
         let (rows, _) = self.0.as_chunks::<WIDE>();
-        let (mut on_the_way, mut leaves) = (0, 0);
+        // Those that are no node; neither that nor triangles; and what has a sign: other leaves, and ends, which come behind them.
+        let (mut leaves, mut others, mut signs, mut ends) = (0, 0, 0, 0);
         for (i, row) in rows.iter().enumerate() {
             let row = L::Wide::load(bytemuck::cast_ref(row));
-            // As an integer, the end has a sign.
-            on_the_way |= u64::from(row.bits_above(-1)) << (WIDE * i);
-            leaves |= u64::from(row.bits_above(tag::PLACE as i32)) << (WIDE * i);
+            let above = |last: i32| u64::from(row.bits_above(last)) << (WIDE * i);
+            signs |= !above(-1) & 0xffff << (WIDE * i);
+            leaves |= above(LAST_NODE);
+            if is_mixed {
+                others |= above(LAST_TRIANGLES);
+                ends |= above(LAST_BEFORE_END);
+            }
         }
-        Stations { nodes: on_the_way & !leaves, leaves, ends: !on_the_way }
+        if !is_mixed {
+            return Stations { nodes: !(leaves | signs), leaves, others: 0, ends: signs };
+        }
+        ends &= signs;
+        Stations { nodes: !(leaves | signs), leaves: leaves & !others, others: others | signs & !ends, ends }
+    }
+}
+
+/// A bit for each flight that any hit will do for and has one, and for each that the plain search has to answer.
+struct Ended {
+    met: u64,
+    unsettled: u64,
+}
+
+impl Ended {
+    /// How a flight ends, if it does.
+    #[inline(always)]
+    fn heed(&mut self, place: usize, step: Option<Step>) -> bool {
+        match step {
+            None => return false,
+            Some(Step::Unsettled) => self.unsettled |= bit(true, place),
+            Some(Step::Met | Step::Out) => self.met |= bit(true, place),
+        }
+        true
     }
 }
 
@@ -170,6 +240,8 @@ struct Fleet<'a, 'r, F: Flyer<L>, L: Lanes> {
     crossings: [Crossing<F::At>; FLIGHTS],
     /// Which triangles have to be looked at closer.
     unclear: [u32; FLIGHTS],
+    /// No shape of the block of hulls that each is at is met at a lesser height.
+    nears: [[f32; BLOCK]; FLIGHTS],
 }
 
 impl<'a, 'r, F: Flyer<L>, L: Lanes> Fleet<'a, 'r, F, L> {
@@ -192,6 +264,7 @@ impl<'a, 'r, F: Flyer<L>, L: Lanes> Fleet<'a, 'r, F, L> {
             passes: [F::Pass::zeroed(); FLIGHTS],
             crossings: [Crossing::zeroed(); FLIGHTS],
             unclear: [0; FLIGHTS],
+            nears: [[0.0; BLOCK]; FLIGHTS],
         }
     }
 
@@ -207,12 +280,34 @@ impl<'a, 'r, F: Flyer<L>, L: Lanes> Fleet<'a, 'r, F, L> {
         let (start, ray) = (self.exact.start, lanes::opaque(&self.rays[position]));
         let Some(slabs) = F::start(start, ray) else { return false };
         let flight = &mut self.flights[place];
-        flight.flyer.set_out(start, ray, &slabs);
+        flight.flyer.set_out(&self.exact, ray, &slabs);
         (flight.slabs, flight.position) = (slabs, position);
         let stack = &mut self.stacks[place];
         stack.clear();
         stack.push(Self::bottom());
         *self.references.of(place) = start.root;
+        if F::IS_MIXED { self.meet_infinite(place) } else { true }
+    }
+
+    /// One that sets out meets what has no bounds; false where the plain search has to answer.
+    #[inline(always)]
+    fn meet_infinite(&mut self, place: usize) -> bool {
+        let ray = self.ray(place);
+        let Flight { flyer, slabs, position } = &mut self.flights[place];
+        for entry in &self.exact.accel().infinite {
+            match flyer.meet_entry(&self.exact, ray, entry, slabs) {
+                None => {}
+                Some(Step::Unsettled) => {
+                    *position = NOWHERE;
+                    *self.references.of(place) = END;
+                    return false;
+                }
+                Some(Step::Met | Step::Out) => {
+                    *self.references.of(place) = MET;
+                    return true;
+                }
+            }
+        }
         true
     }
 
@@ -316,6 +411,76 @@ impl<'a, 'r, F: Flyer<L>, L: Lanes> Fleet<'a, 'r, F, L> {
         self.pop(going_on & last);
     }
 
+    /// Those that are at leaves of anything but triangles go on to the next block of hulls, or to what stands on their stacks.
+    #[inline(always)]
+    fn meet_others(&mut self, at_others: u64, ends: &mut impl Ends<F::Answer>) {
+        let accel = self.exact.accel();
+        let entries = &*accel.tree.entries;
+        let (mut with_hulls, mut passing, mut ringing, mut met, mut more) = (0, 0, 0, 0, 0);
+        for place in Bits(at_others) {
+            let reference = *self.references.of(place);
+            if reference >> tag::SHIFT != tag::SHAPES {
+                continue;
+            }
+            let Some((block, goes_on)) = accel.hulls.block((reference & tag::PLACE) as usize) else {
+                continue;
+            };
+            let (MetHulls { mask, sure, near }, rings) = self.flights[place].flyer.glance_at_hulls(block);
+            (self.masks[place], self.nears[place]) = (mask, near);
+            with_hulls |= bit(true, place);
+            passing |= bit(mask != 0, place);
+            ringing |= bit(rings != 0, place);
+            met |= bit(sure != 0, place);
+            more |= bit(goes_on, place);
+        }
+        for place in Bits(ringing & !met) {
+            let first = (*self.references.of(place) & tag::PLACE) as usize;
+            let Some((block, _)) = accel.hulls.block(first) else { continue };
+            let MetHulls { mask, sure, .. } = self.flights[place].flyer.meet_hulls(block);
+            self.masks[place] = mask;
+            met |= bit(sure != 0, place);
+        }
+        let mut ended = Ended { met, unsettled: 0 };
+        for place in Bits(passing & !met) {
+            let first = (*self.references.of(place) & tag::PLACE) as usize;
+            let (mut mask, near, ray) = (self.masks[place], &self.nears[place], self.ray(place));
+            let Flight { flyer, slabs, .. } = &mut self.flights[place];
+            while mask != 0 {
+                let lane =
+                    if F::IS_ANY { mask.trailing_zeros() as usize % BLOCK } else { nearest_of(mask, near) };
+                mask &= !(1 << lane);
+                if !F::IS_ANY && near[lane] > flyer.last() {
+                    continue;
+                }
+                let step = flyer.meet_entry(&self.exact, ray, &entries[first + lane], slabs);
+                if ended.heed(place, step) {
+                    break;
+                }
+            }
+        }
+        for place in Bits(at_others & !with_hulls) {
+            let first = (*self.references.of(place) & tag::PLACE) as usize;
+            let ray = self.ray(place);
+            let Flight { flyer, slabs, .. } = &mut self.flights[place];
+            for entry in &entries[first..] {
+                let step = flyer.meet_entry(&self.exact, ray, entry, slabs);
+                if ended.heed(place, step) || entry.is_last() {
+                    break;
+                }
+            }
+        }
+        let Ended { met, unsettled } = ended;
+        for place in Bits(met) {
+            *self.references.of(place) = MET;
+        }
+        let going_on = at_others & !met & !unsettled;
+        for place in Bits(going_on & more) {
+            *self.references.of(place) += BLOCK as u32;
+        }
+        self.give_up(unsettled, ends);
+        self.pop(going_on & !more);
+    }
+
     /// Leaves those to the plain search.
     #[inline(always)]
     fn give_up(&mut self, those: u64, ends: &mut impl Ends<F::Answer>) {
@@ -344,7 +509,7 @@ impl<'a, 'r, F: Flyer<L>, L: Lanes> Fleet<'a, 'r, F, L> {
     /// Asks for what those of them read next.
     #[inline(always)]
     fn fetch(&mut self, those: u64) {
-        let at = self.references.stations::<L>();
+        let at = self.references.stations::<L>(F::IS_MIXED);
         for place in Bits(at.nodes & those) {
             self.nodes.get(*self.references.of(place) as usize).map(lanes::fetch::<Node>);
         }
@@ -382,7 +547,7 @@ pub(crate) fn fly<F: Flyer<L>, L: Lanes>(
     // All of which have come to their end.
     let mut under_way = u64::MAX >> (u64::BITS as usize - L::FLIGHTS.min(FLIGHTS));
     while under_way != 0 {
-        let at = fleet.references.stations::<L>();
+        let at = fleet.references.stations::<L>(F::IS_MIXED);
         let at_ends = at.ends & under_way;
         if at_ends.count_ones() >= ENOUGH || at_ends == under_way {
             fleet.answer(at_ends, ends);
@@ -403,7 +568,11 @@ pub(crate) fn fly<F: Flyer<L>, L: Lanes>(
             continue;
         }
         // Where most of them are.
-        let moving = if at.nodes.count_ones() >= at.leaves.count_ones() {
+        let [nodes, leaves, others] = [at.nodes, at.leaves, at.others].map(u64::count_ones);
+        let moving = if F::IS_MIXED && others > nodes.max(leaves) {
+            fleet.meet_others(at.others, ends);
+            at.others
+        } else if nodes >= leaves {
             fleet.meet_nodes(at.nodes, ends);
             at.nodes
         } else {

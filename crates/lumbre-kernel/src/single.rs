@@ -114,13 +114,19 @@ impl Candidate {
     /// Of what is no triangle.
     const CROSSED: u32 = u32::MAX - 1;
 
+    /// The crossing of what is no triangle, which lies between these heights.
+    #[inline(always)]
+    pub(crate) fn crossed((from, to): (f32, f32)) -> Self {
+        Self { block: Self::CROSSED, lane: 0, from, to }
+    }
+
     #[inline(always)]
     pub(crate) fn is_some(&self) -> bool {
         self.block != u32::MAX
     }
 
     #[inline(always)]
-    fn is_triangle(&self) -> bool {
+    pub(crate) fn is_triangle(&self) -> bool {
         self.block < Self::CROSSED
     }
 
@@ -335,6 +341,29 @@ impl<'a> Exact<'a> {
                 Outcome::Settled(t < root.t || t == root.t && names < self.names(block, lane))
             }
             Meeting::Miss | Meeting::Touch { .. } => Outcome::Unsettled,
+        }
+    }
+
+    /// The heights between which a crossing of what is no triangle lies, where it is in the ray's range and the nearest.
+    #[inline(always)]
+    pub(crate) fn contest_crossing(
+        &self,
+        ray: &Ray,
+        t: f64,
+        names: (u32, u32),
+        (best, crossed): (&Candidate, Option<Winner>),
+    ) -> Outcome<Option<(f32, f32)>> {
+        let heights @ (from, to) = heights(t, largest_component(ray));
+        // Also keeps out a NaN.
+        if !ray.contains(t) || from > best.to {
+            return Outcome::Settled(None);
+        }
+        if to < best.from {
+            return Outcome::Settled(Some(heights));
+        }
+        match self.is_better(ray, t, names, best, crossed) {
+            Outcome::Settled(is_better) => Outcome::Settled(is_better.then_some(heights)),
+            Outcome::Unsettled => Outcome::Unsettled,
         }
     }
 
@@ -599,8 +628,7 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
             return None;
         }
         self.crossed = Some(found);
-        let (from, to) = heights(found.root.t, largest_component(ray));
-        Some(Candidate { block: Candidate::CROSSED, lane: 0, from, to })
+        Some(Candidate::crossed(heights(found.root.t, largest_component(ray))))
     }
 
     /// Looks closer at a triangle that may be met, and nearer than the best: what is better, if anything.
@@ -684,35 +712,22 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
         ray: &Ray,
         way: &mut Way<L>,
     ) -> bool {
-        let (from, to) = heights(root.t, largest_component(ray));
-        // Also keeps out a NaN.
-        if !ray.contains(root.t) || from > self.best.to {
-            return true;
-        }
-        let is_nearer = if to < self.best.from {
-            true
-        } else {
-            match self.is_better(ray, root.t, (geometry, primitive)) {
-                Outcome::Settled(is_better) => is_better,
-                Outcome::Unsettled => return false,
+        let best = (&self.best, self.crossed());
+        match self.exact.contest_crossing(ray, root.t, (geometry, primitive), best) {
+            Outcome::Settled(Some(heights)) => {
+                self.keep_crossed(Winner { root, geometry, primitive }, heights, way);
             }
-        };
-        if is_nearer {
-            self.keep_crossed(Winner { root, geometry, primitive }, (from, to), way);
+            Outcome::Settled(None) => {}
+            Outcome::Unsettled => return false,
         }
         true
     }
 
     /// Takes a crossing of what is no triangle, which lies between these heights.
     #[inline(always)]
-    pub(crate) fn keep_crossed<L: Lanes>(
-        &mut self,
-        crossed: Winner,
-        (from, to): (f32, f32),
-        way: &mut Way<L>,
-    ) {
+    pub(crate) fn keep_crossed<L: Lanes>(&mut self, crossed: Winner, heights: (f32, f32), way: &mut Way<L>) {
         self.crossed = Some(crossed);
-        self.keep(Candidate { block: Candidate::CROSSED, lane: 0, from, to }, way);
+        self.keep(Candidate::crossed(heights), way);
     }
 
     /// Tests what is no triangle for any hit.
@@ -790,10 +805,13 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
     /// The nearest hit, once all was seen.
     #[inline(always)]
     pub(crate) fn winner<L: Lanes>(&self, ray: &Ray) -> Outcome<Option<Winner>> {
-        match self.crossed() {
-            Some(crossed) => Outcome::Settled(Some(crossed)),
-            None => self.exact.answer::<L>(ray, self.blocks.axes, &self.best),
-        }
+        Nearest::answer_in_flight::<L>(
+            &self.exact,
+            ray,
+            self.blocks.axes,
+            false,
+            (&self.best, self.crossed()),
+        )
     }
 }
 
@@ -865,13 +883,13 @@ pub(crate) trait Goal {
         last: Step,
     ) -> Outcome<Self::Answer>;
 
-    /// What a ray in flight has come to among triangles: whether any hit `is_met`, or the nearest.
+    /// What a ray in flight has come to: whether any hit `is_met`, or the nearest, which is the crossing if there is that.
     fn answer_in_flight<L: Lanes>(
         exact: &Exact,
         ray: &Ray,
         axes: &'static Axes,
         is_met: bool,
-        nearest: &Candidate,
+        nearest: (&Candidate, Option<Winner>),
     ) -> Outcome<Self::Answer>;
 
     /// What came of rays that went together, by their places in the packet.
@@ -937,9 +955,12 @@ impl Goal for Nearest {
         ray: &Ray,
         axes: &'static Axes,
         _: bool,
-        nearest: &Candidate,
+        (nearest, crossed): (&Candidate, Option<Winner>),
     ) -> Outcome<Option<Winner>> {
-        exact.answer::<L>(ray, axes, nearest)
+        match crossed {
+            Some(crossed) => Outcome::Settled(Some(crossed)),
+            None => exact.answer::<L>(ray, axes, nearest),
+        }
     }
 
     #[inline(always)]
@@ -1011,7 +1032,7 @@ impl Goal for Whether {
         _: &Ray,
         _: &'static Axes,
         is_met: bool,
-        _: &Candidate,
+        _: (&Candidate, Option<Winner>),
     ) -> Outcome<bool> {
         Outcome::Settled(is_met)
     }

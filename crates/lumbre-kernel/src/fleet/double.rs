@@ -7,25 +7,102 @@ use std::marker::PhantomData;
 use lumbre_geometry::Ray;
 
 use super::{Crossing, Flyer};
-use crate::Faces;
 use crate::blocks::TriangleBlock;
+use crate::collapse::Entry;
 use crate::holds::SingleStart;
-use crate::lanes::{self, Axes, Crossings, Eight, Lanes, Level, Task, Vector};
-use crate::node::Slabs;
-use crate::single::{Candidate, Exact, Goal, Outcome, heights, largest_component};
+use crate::hulls::{HullBlock, HullRay};
+use crate::lanes::{self, Axes, Crossings, Eight, Lanes, Level, MetHulls, Task, Vector};
+use crate::node::{Slabs, Units};
+use crate::single::{Candidate, Exact, Goal, Outcome, Step, Winner, heights, largest_component};
 use crate::triangles::{self, BLOCK, BlockRay, HeightRange};
+use crate::{Faces, traverse};
 
-/// A ray in double precision among triangles.
-pub(crate) struct DoubleFlyer<G> {
+/// What a ray has to know of shapes and custom geometry.
+pub(crate) trait Beside {
+    /// Whether there are any beside triangles.
+    const ARE_ANY: bool;
+    /// Of a ray that has not set out.
+    const NOTHING: Self;
+
+    /// That of another ray.
+    fn set_out(&mut self, units: &Units, ray: &Ray);
+    /// The ray for hulls.
+    fn hulls(&self) -> Option<&HullRay>;
+    /// The last of its nearest hits that was of no triangle.
+    fn crossed(&self) -> Option<Winner>;
+    /// Takes that.
+    fn keep(&mut self, crossed: Winner);
+}
+
+/// Triangles are all there is.
+pub(crate) struct Triangles;
+
+impl Beside for Triangles {
+    const ARE_ANY: bool = false;
+    const NOTHING: Self = Self;
+
+    #[inline(always)]
+    fn set_out(&mut self, _: &Units, _: &Ray) {}
+
+    #[inline(always)]
+    fn hulls(&self) -> Option<&HullRay> {
+        None
+    }
+
+    #[inline(always)]
+    fn crossed(&self) -> Option<Winner> {
+        None
+    }
+
+    #[inline(always)]
+    fn keep(&mut self, _: Winner) {}
+}
+
+/// There may be shapes and custom geometry.
+pub(crate) struct Shapes {
+    hulls: HullRay,
+    crossed: Option<Winner>,
+}
+
+impl Beside for Shapes {
+    const ARE_ANY: bool = true;
+    const NOTHING: Self =
+        Self { hulls: HullRay { origin: [0.0; 3], rest: [0.0; 3], direction: [0.0; 3] }, crossed: None };
+
+    #[inline(always)]
+    fn set_out(&mut self, units: &Units, ray: &Ray) {
+        self.hulls = HullRay::new(units, ray, largest_component(ray));
+        self.crossed = None;
+    }
+
+    #[inline(always)]
+    fn hulls(&self) -> Option<&HullRay> {
+        Some(&self.hulls)
+    }
+
+    #[inline(always)]
+    fn crossed(&self) -> Option<Winner> {
+        self.crossed
+    }
+
+    #[inline(always)]
+    fn keep(&mut self, crossed: Winner) {
+        self.crossed = Some(crossed);
+    }
+}
+
+/// A ray in double precision, among triangles and what stands beside them.
+pub(crate) struct DoubleFlyer<G, B> {
     blocks: BlockRay,
     /// From heights to places in the range of boxes.
     place_per_height: f32,
     /// The nearest so far.
     best: Candidate,
+    beside: B,
     goal: PhantomData<G>,
 }
 
-impl<G> DoubleFlyer<G> {
+impl<G, B: Beside> DoubleFlyer<G, B> {
     #[inline(always)]
     fn keep(&mut self, better: Candidate, slabs: &mut Slabs) {
         self.best = better;
@@ -44,7 +121,14 @@ impl<G> DoubleFlyer<G> {
         block: u32,
         crossing: &Crossing<[[f32; BLOCK]; 2]>,
     ) -> Outcome<Option<Candidate>> {
-        level.run(Seeking { exact, ray, axes: self.blocks.axes, best: self.best, block, crossing })
+        let (best, crossed) = (self.best, self.crossed());
+        level.run(Seeking { exact, ray, axes: self.blocks.axes, best, crossed, block, crossing })
+    }
+
+    /// The best, where it is no triangle.
+    #[inline(always)]
+    fn crossed(&self) -> Option<Winner> {
+        if self.best.is_triangle() { None } else { self.beside.crossed() }
     }
 }
 
@@ -54,6 +138,8 @@ struct Seeking<'s, 'a> {
     ray: &'s Ray,
     axes: &'static Axes,
     best: Candidate,
+    /// The best, where it is no triangle.
+    crossed: Option<Winner>,
     /// Its place.
     block: u32,
     crossing: &'s Crossing<[[f32; BLOCK]; 2]>,
@@ -64,14 +150,17 @@ impl Task for Seeking<'_, '_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Self::Output {
-        let Self { exact, ray, axes, best, block, crossing } = self;
+        let Self { exact, ray, axes, best, crossed, block, crossing } = self;
         let &Crossing { met, unclear, at: [ref froms, ref tos] } = crossing;
         let mut better = None;
         let mut rest = met | unclear;
         while rest != 0 {
             let lane = rest.trailing_zeros();
             rest &= rest - 1;
-            let best = better.unwrap_or(best);
+            let (best, crossed) = match better {
+                Some(better) => (better, None),
+                None => (best, crossed),
+            };
             let (from, to) = (froms[lane as usize % BLOCK], tos[lane as usize % BLOCK]);
             // What is no number is not farther.
             if from > best.to {
@@ -81,7 +170,7 @@ impl Task for Seeking<'_, '_> {
                 better = Some(Candidate { block, lane, from, to });
                 continue;
             }
-            match exact.contest::<L>(ray, axes, (block, lane), (&best, None), Faces::Both) {
+            match exact.contest::<L>(ray, axes, (block, lane), (&best, crossed), Faces::Both) {
                 Outcome::Settled(Some(t)) => {
                     let (from, to) = heights(t, largest_component(ray));
                     better = Some(Candidate { block, lane, from, to });
@@ -138,11 +227,12 @@ impl Task for MeetsAny<'_, '_> {
     }
 }
 
-impl<G: Goal, L: Lanes> Flyer<L> for DoubleFlyer<G> {
+impl<G: Goal, B: Beside, L: Lanes> Flyer<L> for DoubleFlyer<G, B> {
     type Ray = Ray;
     type Answer = G::Answer;
     type Order = G::Order;
     const IS_ANY: bool = G::IS_ANY;
+    const IS_MIXED: bool = B::ARE_ANY;
     type Pass = L::Edges;
     /// Heights along the ray between which the crossing lies.
     type At = [L::Eight; 2];
@@ -158,7 +248,7 @@ impl<G: Goal, L: Lanes> Flyer<L> for DoubleFlyer<G> {
             range: HeightRange::ahead(0.0, 0.0),
             turn: 0.0,
         };
-        Self { blocks, place_per_height: 0.0, best: Candidate::NONE, goal: PhantomData }
+        Self { blocks, place_per_height: 0.0, best: Candidate::NONE, beside: B::NOTHING, goal: PhantomData }
     }
 
     #[inline(always)]
@@ -167,9 +257,10 @@ impl<G: Goal, L: Lanes> Flyer<L> for DoubleFlyer<G> {
     }
 
     #[inline(always)]
-    fn set_out(&mut self, start: &SingleStart, ray: &Ray, slabs: &Slabs) {
-        (self.blocks, self.place_per_height) = L::start_blocks(start, ray, slabs);
+    fn set_out(&mut self, exact: &Exact, ray: &Ray, slabs: &Slabs) {
+        (self.blocks, self.place_per_height) = L::start_blocks(exact.start, ray, slabs);
         self.best = Candidate::NONE;
+        self.beside.set_out(&exact.accel().units, ray);
     }
 
     #[inline(always)]
@@ -215,7 +306,54 @@ impl<G: Goal, L: Lanes> Flyer<L> for DoubleFlyer<G> {
     }
 
     #[inline(always)]
+    fn glance_at_hulls(&self, block: &HullBlock) -> (MetHulls, u32) {
+        match self.beside.hulls() {
+            Some(hulls) if G::IS_ANY => {
+                lanes::glance_at_hulls::<L, true>(block, lanes::opaque(hulls), &self.blocks.range)
+            }
+            Some(hulls) => {
+                lanes::glance_at_hulls::<L, false>(block, lanes::opaque(hulls), &self.blocks.range)
+            }
+            None => (MetHulls::NONE, 0),
+        }
+    }
+
+    #[inline(always)]
+    fn meet_hulls(&self, block: &HullBlock) -> MetHulls {
+        match self.beside.hulls() {
+            Some(hulls) if G::IS_ANY => lanes::meet_hulls::<L, true>(block, hulls, &self.blocks.range),
+            Some(hulls) => lanes::meet_hulls::<L, false>(block, hulls, &self.blocks.range),
+            None => MetHulls::NONE,
+        }
+    }
+
+    #[inline(always)]
+    fn last(&self) -> f32 {
+        self.blocks.range.last
+    }
+
+    #[inline(always)]
+    fn meet_entry(&mut self, exact: &Exact, ray: &Ray, entry: &Entry, slabs: &mut Slabs) -> Option<Step> {
+        let (geometry, primitive) = (entry.geometry, entry.primitive());
+        let kind = &exact.accel().geometries[geometry as usize].kind;
+        if G::IS_ANY {
+            return traverse::is_crossed(kind, primitive, ray).then_some(Step::Met);
+        }
+        let root = traverse::first_crossing(kind, primitive, ray)?;
+        let best = (&self.best, self.crossed());
+        match exact.contest_crossing(ray, root.t, (geometry, primitive), best) {
+            Outcome::Settled(Some(heights)) => {
+                self.beside.keep(Winner { root, geometry, primitive });
+                self.keep(Candidate::crossed(heights), slabs);
+            }
+            Outcome::Settled(None) => {}
+            Outcome::Unsettled => return Some(Step::Unsettled),
+        }
+        None
+    }
+
+    #[inline(always)]
     fn answer(&self, exact: &Exact, ray: &Ray, is_met: bool) -> Outcome<G::Answer> {
-        G::answer_in_flight::<L>(exact, ray, self.blocks.axes, is_met, &self.best)
+        G::answer_in_flight::<L>(exact, ray, self.blocks.axes, is_met, (&self.best, self.crossed()))
     }
 }

@@ -18,6 +18,10 @@ pub(crate) struct MetHulls {
     pub(crate) near: [f32; BLOCK],
 }
 
+impl MetHulls {
+    pub(crate) const NONE: Self = Self { mask: 0, sure: 0, near: [0.0; BLOCK] };
+}
+
 /// Hulls, side by side: see [`HullBlock`].
 trait Bodies<V> {
     fn center(&self, axis: usize) -> V;
@@ -379,14 +383,28 @@ pub(crate) fn meet_hulls<L: Lanes, const SURE: bool>(
     let (hulls, line) = (AllHulls(block), OneLine(ray, range));
     let passages = pass::<L::Eight>(&hulls, &line);
     if passages.missed == <L::Eight as Vector>::ALL {
-        return MetHulls { mask: 0, sure: 0, near: [0.0; BLOCK] };
+        return MetHulls::NONE;
     }
     let chords = look_into::<L::Eight, SURE>(&hulls, &line, &passages);
     if chords.mask == 0 {
-        return MetHulls { mask: 0, sure: 0, near: [0.0; BLOCK] };
+        return MetHulls::NONE;
     }
     let (mask, sure) = chords.meet_tubes::<L::Wide, SURE>(&hulls, &line);
     MetHulls { mask, sure, near: chords.from.to_array() }
+}
+
+/// The same without a branch, and without a look at tubes: beside it stands a bit for each ring that has yet to be looked at.
+#[inline(always)]
+pub(crate) fn glance_at_hulls<L: Lanes, const SURE: bool>(
+    block: &HullBlock,
+    ray: &HullRay,
+    range: &HeightRange,
+) -> (MetHulls, u32) {
+    let (hulls, line) = (AllHulls(block), OneLine(ray, range));
+    let passages = pass::<L::Eight>(&hulls, &line);
+    let Chords { mask, sure, from, .. } = look_into::<L::Eight, SURE>(&hulls, &line, &passages);
+    let tubes: L::Eight = hulls.tube();
+    (MetHulls { mask, sure, near: from.to_array() }, L::Eight::splat(0.0).below(tubes) & mask)
 }
 
 /// Which of the cubes of a block lines may pass, a bit for each, and no sooner than where; by `lines` that stand for more.

@@ -42,7 +42,7 @@ pub(crate) use boxes::{
 };
 #[cfg(test)]
 pub(crate) use hulls::meet_hulls_at;
-pub(crate) use hulls::{Lines, MetHulls, SureLines, meet_hulls, meet_one_hull, pass_hulls};
+pub(crate) use hulls::{Lines, MetHulls, SureLines, glance_at_hulls, meet_hulls, meet_one_hull, pass_hulls};
 pub(crate) use portable::Portable;
 pub(crate) use spheres::SphereLanes;
 #[cfg(test)]

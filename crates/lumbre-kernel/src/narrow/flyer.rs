@@ -25,6 +25,7 @@ impl<G: Goal, L: Lanes> Flyer<L> for NarrowFlyer<G> {
     type Answer = G::Answer;
     type Order = G::Order;
     const IS_ANY: bool = G::IS_ANY;
+    const IS_MIXED: bool = false;
     type Pass = Pass<L::Eight>;
     type At = Places<L::Eight>;
 
@@ -46,8 +47,8 @@ impl<G: Goal, L: Lanes> Flyer<L> for NarrowFlyer<G> {
     }
 
     #[inline(always)]
-    fn set_out(&mut self, start: &SingleStart, ray: &Ray32, slabs: &Slabs) {
-        self.ray = L::start_narrow_blocks(start, ray, slabs);
+    fn set_out(&mut self, exact: &Exact, ray: &Ray32, slabs: &Slabs) {
+        self.ray = L::start_narrow_blocks(exact.start, ray, slabs);
         self.nearest.0 = None;
     }
 

@@ -7,7 +7,6 @@ use lumbre_math::{DVec3, Transform, Vec3};
 
 use super::scenes::{self, Random};
 use crate::batch::Flying;
-use crate::holds::Contents;
 use crate::lanes::Level;
 use crate::packet::{self, PACKET};
 use crate::query::{Filter, If};
@@ -163,24 +162,22 @@ fn check(accel: &Accel, rays: &[Ray], least: u32) {
             winners.push(plain.map(winner));
         }
         assert!(hits > least && settled > least, "{hits} hits, {settled} settled");
-        if start.contents == Contents::Triangles {
-            // No tree of the tests is as large as those that are searched as far ones, and alike rays would go together.
-            for flying in [Flying::NEAR, Flying::FAR] {
-                let mut tally = Tally::of(rays);
-                let put = |i: usize, outcome| {
-                    let alone = single::search::<Nearest>(level, accel, start, &rays[i]);
-                    tally.count(i, [outcome, alone], &winners[i], (level, flying, &rays[i]));
-                };
-                batch::search_triangles::<Nearest>(level, accel, start, rays, put, Some(flying), false);
-                tally.end();
-                let mut tally = Tally::of(rays);
-                let put = |i: usize, outcome| {
-                    let alone = single::search::<Whether>(level, accel, start, &rays[i]);
-                    tally.count(i, [outcome, alone], &winners[i].is_some(), (level, flying, &rays[i]));
-                };
-                batch::search_triangles::<Whether>(level, accel, start, rays, put, Some(flying), false);
-                tally.end();
-            }
+        // No tree of the tests is as large as those that are searched as far ones, and alike rays would go together.
+        for flying in [Flying::NEAR, Flying::FAR] {
+            let mut tally = Tally::of(rays);
+            let put = |i: usize, outcome| {
+                let alone = single::search::<Nearest>(level, accel, start, &rays[i]);
+                tally.count(i, [outcome, alone], &winners[i], (level, flying, &rays[i]));
+            };
+            batch::search_as_said::<Nearest>(level, accel, start, rays, put, Some(flying), false);
+            tally.end();
+            let mut tally = Tally::of(rays);
+            let put = |i: usize, outcome| {
+                let alone = single::search::<Whether>(level, accel, start, &rays[i]);
+                tally.count(i, [outcome, alone], &winners[i].is_some(), (level, flying, &rays[i]));
+            };
+            batch::search_as_said::<Whether>(level, accel, start, rays, put, Some(flying), false);
+            tally.end();
         }
     }
 }
