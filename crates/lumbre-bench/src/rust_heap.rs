@@ -9,37 +9,27 @@ use crate::program::Bytes;
 #[global_allocator]
 static HEAP: PeakAlloc = PeakAlloc;
 
-/// Runs what asks for builds on so many threads where it is to be measured: for one thread, on one that is all that there is. So it
-/// is the same for every program, whose code and data then are where it last ran.
+/// Runs what asks for builds on a thread that is one of so many, as with Embree: it takes part in the work, and waits for none to wake
+/// up before that begins. So it is the same for every program, whose code and data then are where it last ran.
 pub fn asking<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> Result<T> {
-    if threads != 1 || rayon::current_num_threads() == 1 {
+    if rayon::current_thread_index().is_some() && rayon::current_num_threads() == threads {
         return Ok(work());
     }
     // A thread that has joined a pool never leaves it.
     std::thread::scope(|scope| {
         let asking = scope.spawn(|| {
-            let _pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build()?;
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).use_current_thread().build()?;
+            // The threads are there before any clock starts.
+            pool.broadcast(|_| ());
             Ok(work())
         });
         asking.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     })
 }
 
-/// Runs a build on so many threads, with the seconds and the bytes that it took. One thread alone is that which asks for it, as it
-/// is with Embree, so that none has to wake another before the work begins. As many as the machine has are those that every
-/// program has: it is for the build to hand its work to them, if there is enough of it.
+/// Runs a build on so many threads, with the seconds and the bytes that it took.
 pub fn measure<T: Send>(threads: usize, build: impl FnOnce() -> T + Send) -> Result<(T, f64, Bytes)> {
-    if threads == rayon::current_num_threads() {
-        // The threads are there before the clock starts.
-        rayon::broadcast(|_| ());
-        return Ok(measure_here(threads, build));
-    }
-    if threads == 1 {
-        return asking(1, || measure_here(1, build));
-    }
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
-    pool.broadcast(|_| ());
-    Ok(measure_here(threads, || pool.install(build)))
+    asking(threads, || measure_here(threads, build))
 }
 
 fn measure_here<T>(threads: usize, build: impl FnOnce() -> T) -> (T, f64, Bytes) {
