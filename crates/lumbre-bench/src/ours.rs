@@ -238,8 +238,12 @@ impl Tree for Queried {
             let rays: Vec<_> = rays.iter().map(|ray| ray.to_ours()).collect();
             return match query {
                 Query::Closest => {
+                    if self.asked == Asked::ByBatches {
+                        let hits = vec![None; rays.len()];
+                        return Box::new(SingleClosestBatches { tree, rays, hits });
+                    }
                     let found = vec![SingleFound::MISS; rays.len()];
-                    Box::new(SingleClosest { tree, rays, found, batch: vec![None; BATCH] })
+                    Box::new(SingleClosest { tree, rays, found })
                 }
                 Query::Any => {
                     let found = vec![false; rays.len()];
@@ -433,7 +437,6 @@ struct SingleClosest<'a> {
     tree: &'a Queried,
     rays: Vec<lumbre_kernel::Ray32>,
     found: Vec<SingleFound>,
-    batch: Vec<Option<Hit32>>,
 }
 
 impl Pass for SingleClosest<'_> {
@@ -443,14 +446,6 @@ impl Pass for SingleClosest<'_> {
 
     fn run(&mut self) {
         let Queried { accel, asked, .. } = self.tree;
-        if *asked == Asked::ByBatches {
-            for (rays, found) in self.rays.chunks(BATCH).zip(self.found.chunks_mut(BATCH)) {
-                let hits = &mut self.batch[..rays.len()];
-                accel.closest_batch_f32(rays, hits);
-                found.iter_mut().zip(hits).for_each(|(found, hit)| found.put(hit.as_ref()));
-            }
-            return;
-        }
         if *asked == Asked::Fresh {
             for (ray, found) in self.rays.iter().zip(&mut self.found) {
                 found.put(accel.closest_f32(&written_now_f32(ray)).as_ref());
@@ -465,6 +460,29 @@ impl Pass for SingleClosest<'_> {
     fn answers(&self) -> Vec<Option<f64>> {
         let is_hit = |found: &SingleFound| found.geometry_and_primitive[0] != u32::MAX;
         self.found.iter().map(|found| is_hit(found).then(|| found.t_and_barycentrics[0].into())).collect()
+    }
+}
+
+/// Batches write the hits down by themselves.
+struct SingleClosestBatches<'a> {
+    tree: &'a Queried,
+    rays: Vec<lumbre_kernel::Ray32>,
+    hits: Vec<Option<Hit32>>,
+}
+
+impl Pass for SingleClosestBatches<'_> {
+    fn reset(&mut self) {
+        self.hits.fill(None);
+    }
+
+    fn run(&mut self) {
+        for (rays, hits) in self.rays.chunks(BATCH).zip(self.hits.chunks_mut(BATCH)) {
+            self.tree.accel.closest_batch_f32(rays, hits);
+        }
+    }
+
+    fn answers(&self) -> Vec<Option<f64>> {
+        self.hits.iter().map(|hit| hit.map(|hit| hit.t.into())).collect()
     }
 }
 

@@ -93,11 +93,11 @@ pub(crate) trait Ends<A> {
     /// To be `#[inline(always)]`: an answer that goes through memory is waited for.
     fn put(&mut self, position: usize, outcome: Outcome<A>);
 
-    /// The same of as many as go together, the first of which has this position.
+    /// The same of as many as go together, the first of which has this position; the answer to each by its place among them.
     #[inline(always)]
-    fn put_row(&mut self, first: usize, answers: [A; PACKET]) {
-        for (i, answer) in answers.into_iter().enumerate() {
-            self.put(first + i, Outcome::Settled(answer));
+    fn put_row(&mut self, first: usize, answer: impl Fn(usize) -> A) {
+        for i in 0..PACKET {
+            self.put(first + i, Outcome::Settled(answer(i)));
         }
     }
 

@@ -145,7 +145,9 @@ impl<G: Goal> Ends<G::Answer> for Answers<'_, G> {
     }
 
     #[inline(always)]
-    fn put_row(&mut self, first: usize, answers: [G::Answer; PACKET]) {
-        self.places[first..first + PACKET].copy_from_slice(&answers);
+    fn put_row(&mut self, first: usize, answer: impl Fn(usize) -> G::Answer) {
+        for (i, place) in self.places[first..first + PACKET].iter_mut().enumerate() {
+            *place = answer(i);
+        }
     }
 }

@@ -553,59 +553,63 @@ impl<'a> Packet<'a> {
         let load = L::Wide::load;
         let triangle = load(&self.triangle.0);
         let hits = if self.is_among_triangles { self.chosen & !triangle.with_bits(NONE) } else { 0 };
-        let mut misses = self.chosen & !hits;
-        while misses != 0 {
-            let i = misses.trailing_zeros() as usize % PACKET;
-            misses &= misses - 1;
-            ends.put(first + i, Outcome::Settled(None));
-        }
-        if hits == 0 {
-            return;
-        }
-        let det = load(&self.weights[2].0);
-        let (mut v, mut w) = (Row::of(0.0), Row::of(0.0));
-        load(&self.weights[0].0).over(det).store(&mut v);
-        load(&self.weights[1].0).over(det).store(&mut w);
-        let mut rest = hits;
-        while rest != 0 {
-            // Many may have met the same.
-            let own = self.triangle.0[rest.trailing_zeros() as usize % PACKET].to_bits();
-            let mut with_this = triangle.with_bits(own) & hits;
-            rest &= !with_this;
-            let (geometry, primitive) = self.exact.names(own >> 3, own & 7);
-            let id = self.exact.accel().geometries[geometry as usize].id;
-            while with_this != 0 {
-                let i = with_this.trailing_zeros() as usize % PACKET;
-                with_this &= with_this - 1;
-                let hit = Hit32 {
-                    t: self.bundle.t_max.0[i],
-                    local: [v.0[i], w.0[i]],
-                    id,
-                    primitive,
-                    geometry,
-                    instance: Hit32::NO_INSTANCE,
-                };
-                ends.put(first + i, Outcome::Settled(Some(hit)));
+        let row = Row::of(0.0);
+        let (mut local, mut id, mut primitive, mut geometry) = ([row; 2], row, row, row);
+        if hits != 0 {
+            let det = load(&self.weights[2].0);
+            for (local, weight) in local.iter_mut().zip(&self.weights) {
+                load(&weight.0).over(det).store(local);
             }
+            let mut names = [L::Wide::splat(0.0); 3];
+            let mut rest = hits;
+            while rest != 0 {
+                // Many may have met the same.
+                let own = self.triangle.0[rest.trailing_zeros() as usize % PACKET].to_bits();
+                let with_this = triangle.with_bits(own);
+                rest &= !with_this;
+                let (geometry, primitive) = self.exact.names(own >> 3, own & 7);
+                let id = self.exact.accel().geometries[geometry as usize].id;
+                for (name, own) in names.iter_mut().zip([id, primitive, geometry]) {
+                    *name = L::Wide::select(with_this, L::Wide::splat(f32::from_bits(own)), *name);
+                }
+            }
+            names[0].store(&mut id);
+            names[1].store(&mut primitive);
+            names[2].store(&mut geometry);
+        }
+        let hit = |i: usize| Hit32 {
+            t: self.bundle.t_max.0[i],
+            local: [local[0].0[i], local[1].0[i]],
+            id: id.0[i].to_bits(),
+            primitive: primitive.0[i].to_bits(),
+            geometry: geometry.0[i].to_bits(),
+            instance: Hit32::NO_INSTANCE,
+        };
+        if hits == ALL {
+            ends.put_row(first, |i| Some(hit(i)));
+        } else {
+            self.put_chosen(first, |i| (hits >> i & 1 != 0).then(|| hit(i)), ends);
         }
     }
 
     /// Whether each that was chosen met anything.
     #[inline(always)]
     pub(super) fn put_met(&self, first: usize, ends: &mut impl Ends<bool>) {
+        self.put_chosen(first, |i| self.met >> i & 1 != 0, ends);
+    }
+
+    /// The answers to those that were chosen, by their places.
+    #[inline(always)]
+    fn put_chosen<A>(&self, first: usize, answer: impl Fn(usize) -> A, ends: &mut impl Ends<A>) {
         if self.chosen == ALL {
-            let mut are_met = [false; PACKET];
-            for (i, is_met) in are_met.iter_mut().enumerate() {
-                *is_met = self.met >> i & 1 != 0;
-            }
-            ends.put_row(first, are_met);
+            ends.put_row(first, answer);
             return;
         }
         let mut rest = self.chosen;
         while rest != 0 {
             let i = rest.trailing_zeros() as usize % PACKET;
             rest &= rest - 1;
-            ends.put(first + i, Outcome::Settled(self.met >> i & 1 != 0));
+            ends.put(first + i, Outcome::Settled(answer(i)));
         }
     }
 }
