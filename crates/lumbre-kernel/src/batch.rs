@@ -61,10 +61,10 @@ const LEAST_OFTEN: usize = 16;
 const AT_ONCE: usize = 4096;
 
 /// How many packets ahead rays are asked for.
-const AHEAD: usize = 2;
+const AHEAD: usize = 3;
 
-/// Asks for the rays of packets, before they are read: by packets, they are read faster than caches foresee. Where any hit will do,
-/// nothing else keeps the memory busy, and they do.
+/// Asks for the rays of packets, before they are read: by packets, they are read faster than caches foresee. Where any hit will do in
+/// double precision, nothing else keeps the memory busy, and they do.
 struct Coming<'r, R> {
     packets: Chunks<'r, R>,
 }

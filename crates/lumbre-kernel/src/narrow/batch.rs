@@ -92,7 +92,7 @@ impl<G: Goal> Manner for InSingle<G> {
     type Ray = Ray32;
     type Answer = G::Answer;
     type Packet<'a> = Packet<'a>;
-    const ASKS_AHEAD: bool = false;
+    const ASKS_AHEAD: bool = true;
 
     #[inline(always)]
     fn packet<'a>(accel: &'a Accel, start: &'a SingleStart) -> Packet<'a> {
