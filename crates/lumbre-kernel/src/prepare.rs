@@ -642,7 +642,7 @@ pub(crate) fn traits_of(geometry: &Geometry) -> Traits {
         GeometryKind::Mesh(_) => (Kind::Triangle, Traits::COST_OF_PACKED, BLOCK),
         GeometryKind::Spheres(_) => (Kind::Sphere, Traits::COST_OF_PACKED, BLOCK),
         // Its share in the first test of eight, which nearly always spares the others: its own cost is the same in any leaf.
-        GeometryKind::Shape(_) => (Kind::Shape, 3, BLOCK),
+        GeometryKind::Shape(_) => (Kind::Shape, 4, BLOCK),
         GeometryKind::Instance(_) => (Kind::Instance, 96, 1),
         GeometryKind::Custom(_) => (Kind::Custom, 48, 4),
         GeometryKind::PreciseMesh(_) => (Kind::Precise, 16, 4),

@@ -446,6 +446,13 @@ pub(crate) fn meet_hulls_at(
             let met = meet_hulls::<L, true>(self.0, self.1, self.2);
             let same = meet_hulls::<L, false>(self.0, self.1, self.2);
             assert_eq!((same.mask, same.sure), (met.mask, 0));
+            // At a glance, all but what is seen of rings by a closer look.
+            let (glanced, rings) = glance_at_hulls::<L, true>(self.0, self.1, self.2);
+            assert_eq!((glanced.mask & !rings, glanced.sure), (met.mask & !rings, met.sure & !rings));
+            assert_eq!(met.mask & !glanced.mask, 0);
+            (0..BLOCK).filter(|lane| met.mask >> lane & 1 != 0).for_each(|lane| {
+                assert_eq!(glanced.near[lane].to_bits(), met.near[lane].to_bits());
+            });
             met
         }
     }
