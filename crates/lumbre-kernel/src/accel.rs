@@ -137,6 +137,9 @@ impl std::error::Error for BuildError {}
 impl Accel {
     /// Builds a tree over `geometries`. Zero-area triangles and spheres without a radius are kept out: they are never hit.
     ///
+    /// It works on the threads of the rayon pool that it is called in. A thread that is none of these waits until they have woken up,
+    /// which may take as long as a small tree; one that joined the pool by `use_current_thread` begins at once.
+    ///
     /// # Errors
     /// [`BuildError`] when a mesh names vertices that it lacks, a coordinate or a radius is not finite, or there are 2^29 primitives
     /// or more.
@@ -399,11 +402,11 @@ impl Accel {
     /// [`Accel::closest`] for every ray, with the same answers to the bit; `hits` has a place for each.
     ///
     /// In a tree of triangles, or of shapes too, sixteen rays in a row that are much alike (those of a square of four by four pixels,
-    /// say, rather than of sixteen pixels in a line) are traced together, which takes down to two fifths of the time. In a tree of
-    /// triangles, many of the others are in flight at the same time, where there are enough of them: in a tree that the nearest caches
-    /// hold, from about a hundred on, so that a thousand rays or more at a time are answered soonest. In trees of anything else, rays
-    /// are traced one after another, as they are with AVX2 alone in trees that caches hold. It works on the calling thread: to use
-    /// more, split `rays` and `hits`.
+    /// say, rather than of sixteen pixels in a line) are traced together, which takes down to two fifths of the time. There, many of the
+    /// others are in flight at the same time, where there are enough of them: in a tree that the nearest caches hold, from about a
+    /// hundred on, so that a thousand rays or more at a time are answered soonest. In trees of anything else, the others are traced one
+    /// after another, as they are with AVX2 alone in trees that caches hold. It works on the calling thread: to use more, split `rays`
+    /// and `hits`.
     ///
     /// # Panics
     /// When `rays` and `hits` differ in length.
