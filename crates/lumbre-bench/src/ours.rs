@@ -98,7 +98,7 @@ const MASK_OF_ALL: u32 = 0b0110;
 const MASK_ASKED: u32 = 0b1010;
 
 /// Rays that a batch has at most.
-const BATCH: usize = 1024;
+const BATCH: usize = 4096;
 
 impl Program for Lumbre {
     fn name(&self) -> String {

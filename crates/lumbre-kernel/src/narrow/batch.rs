@@ -16,7 +16,7 @@ use crate::single::{self, Exact, Outcome};
 use crate::{Accel, Ray32};
 
 /// Rays that are taken to double precision at a time.
-const WIDELY: usize = 1024;
+const WIDELY: usize = 4096;
 
 /// Searches along every ray.
 pub(crate) fn search_all<G: Goal>(level: Level, accel: &Accel, rays: &[Ray32], answers: &mut [G::Answer]) {
