@@ -385,7 +385,8 @@ impl<'a> Packet<'a> {
         let (u, v, w) = (bc - cy * bx, ca - ay * cx, ab - by * ax);
         let within = within([u, v, w]);
         let mask = splat(0.0).at_most(within) & self.alive;
-        if mask == 0 {
+        // Where any hit will do, to go on is less than to foresee wrongly.
+        if mask == 0 && !G::IS_ANY {
             return;
         }
         let det = u + v + w;

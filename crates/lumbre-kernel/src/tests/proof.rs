@@ -14,7 +14,7 @@ use super::scenes::{
     with_parts_everywhere,
 };
 use crate::packet::PACKET;
-use crate::{Accel, BuildOptions, Geometry, GeometryKind, Instance, Preset, TriangleMesh, brute};
+use crate::{Accel, BuildOptions, Geometry, GeometryKind, Hit, Instance, Preset, TriangleMesh, brute};
 
 /// Closed meshes, each with a point inside.
 fn closed_meshes() -> Vec<(&'static str, TriangleMesh, DVec3)> {
@@ -64,10 +64,13 @@ fn placements(mesh: &TriangleMesh, preset: Preset) -> [(Accel, Transform); 4] {
 
 /// Rays of a chunk; each has its own random numbers.
 const CHUNK: u64 = 1 << 14;
+/// Rays of a batch, where they are to fly.
+const FLOCK: usize = 256;
 
 /// Half as many rays at vertices as `rays`, half at edges, from within: every one has a closest hit, every fourth is
 /// asked for all its crossings as well, which must be odd in number, and every other fourth whether it hits at all. Half of them
-/// are aimed at triangles that follow one another, and are asked by batches of sixteen, too. Answers how many rays there were.
+/// are aimed at triangles that follow one another, and are asked by batches of sixteen, too; the others by larger ones, in which they
+/// fly. Answers how many rays there were.
 fn bombard(rays: u64, seed: u64) -> u64 {
     let meshes = closed_meshes();
     let ways = || Preset::ALL.map(|preset| (preset, false)).into_iter().chain([(Preset::Best, true)]);
@@ -86,6 +89,7 @@ fn bombard(rays: u64, seed: u64) -> u64 {
                 (0..chunks_each).into_par_iter().for_each(|chunk| {
                     let mut random = Random(seed ^ (chunk << 20) ^ (place as u64) << 8);
                     let mut alike = Vec::with_capacity(PACKET);
+                    let mut flock = Vec::with_capacity(FLOCK);
                     let mut number = 0;
                     for i in 0..CHUNK {
                         let are_alike = (i as usize / PACKET).is_multiple_of(2);
@@ -109,16 +113,14 @@ fn bombard(rays: u64, seed: u64) -> u64 {
                         } else if i % 8 < 4 {
                             assert!(accel.any(&ray), "{name}, {preset:?}, place {place}: {ray:?}");
                         }
-                        if are_alike {
-                            alike.push(ray);
-                        }
-                        if alike.len() == PACKET {
-                            let (mut hits, mut any) = ([const { None }; PACKET], [false; PACKET]);
-                            accel.closest_batch(&alike, &mut hits);
-                            accel.any_batch(&alike, &mut any);
+                        let (batch, full) =
+                            if are_alike { (&mut alike, PACKET) } else { (&mut flock, FLOCK) };
+                        batch.push(ray);
+                        if batch.len() == full {
+                            let (hits, any) = by_batch(accel, batch);
                             let none = hits.iter().zip(any).position(|(hit, any)| hit.is_none() || !any);
-                            assert_eq!(none, None, "{name}, {preset:?}, place {place}: {alike:?}");
-                            alike.clear();
+                            assert_eq!(none, None, "{name}, {preset:?}, place {place}: {batch:?}");
+                            batch.clear();
                         }
                     }
                     shot.fetch_add(CHUNK, Ordering::Relaxed);
@@ -155,8 +157,17 @@ fn proof_that_no_aimed_ray_leaks() {
     eprintln!("{shot} rays aimed at edges and vertices, 0 leaks");
 }
 
-/// Trees against the loop: the same hit, with the same bits of t, and any hit where there is one. Half of the rays follow one
-/// another closely, and are asked by batches of sixteen. Answers how many of the rays hit something.
+/// The nearest hits, and any, of a batch.
+fn by_batch(accel: &Accel, rays: &[Ray]) -> (Vec<Option<Hit>>, Vec<bool>) {
+    let (mut hits, mut any) = (vec![None; rays.len()], vec![false; rays.len()]);
+    accel.closest_batch(rays, &mut hits);
+    accel.any_batch(rays, &mut any);
+    (hits, any)
+}
+
+/// Trees against the loop: the same hit, with the same bits of t, and any hit where there is one. A third of the rays follow one
+/// another closely, and are asked by batches of sixteen; a third are asked by larger ones, in which they fly. Answers how many of the
+/// rays hit something.
 fn compare(rays: u64, seed: u64) -> u64 {
     let chunks = rays.div_ceil(CHUNK);
     let center = DVec3::new(1.5, -2.25, 4.0);
@@ -178,27 +189,29 @@ fn compare(rays: u64, seed: u64) -> u64 {
             }
         };
         let mut found = 0;
-        for group in 0..CHUNK as usize / PACKET {
-            let mut rays = [ray(&mut random, center, 3.0); PACKET];
-            let (mut hits, mut any) = ([const { None }; PACKET], [false; PACKET]);
-            if group.is_multiple_of(2) {
-                // From one place, or from places that are near to each other.
-                let apart = [0.0, 0.01][group / 2 % 2];
-                for ray in &mut rays {
-                    ray.origin += apart * random.vector();
-                    ray.direction += 0.02 * ray.direction.length() * random.vector();
+        for flock in 0..CHUNK as usize / FLOCK {
+            let mut rays: Vec<_> = (0..FLOCK).map(|_| ray(&mut random, center, 3.0)).collect();
+            let (hits, any) = match flock % 3 {
+                0 => {
+                    let packets = rays.chunks_mut(PACKET).enumerate().map(|(number, rays)| {
+                        // From one place, or from places that are near to each other.
+                        let (first, apart) = (rays[0], [0.0, 0.01][number % 2]);
+                        for ray in rays.iter_mut() {
+                            ray.origin = first.origin + apart * random.vector();
+                            ray.direction =
+                                first.direction + 0.02 * first.direction.length() * random.vector();
+                        }
+                        by_batch(&accel, rays)
+                    });
+                    let (hits, any): (Vec<_>, Vec<_>) = packets.unzip();
+                    (hits.concat(), any.concat())
                 }
-                accel.closest_batch(&rays, &mut hits);
-                accel.any_batch(&rays, &mut any);
-            } else {
-                for ((one, hit), any) in rays.iter_mut().zip(&mut hits).zip(&mut any) {
-                    *one = ray(&mut random, center, 3.0);
-                    (*hit, *any) = (accel.closest(one), accel.any(one));
-                }
-            }
+                1 => by_batch(&accel, &rays),
+                _ => rays.iter().map(|ray| (accel.closest(ray), accel.any(ray))).unzip(),
+            };
             for ((ray, hit), any) in rays.iter().zip(hits).zip(any) {
                 let expected = brute::closest(&accel, ray);
-                let bits = |hit: &Option<crate::Hit>| hit.as_ref().map(|hit| hit.root.t.to_bits());
+                let bits = |hit: &Option<Hit>| hit.as_ref().map(|hit| hit.root.t.to_bits());
                 assert_eq!(hit, expected, "{ray:?}");
                 assert_eq!(bits(&hit), bits(&expected), "{ray:?}");
                 assert_eq!(any, expected.is_some(), "{ray:?}");
