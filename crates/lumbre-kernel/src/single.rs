@@ -367,16 +367,16 @@ impl<'a> Exact<'a> {
         }
     }
 
-    /// The nearest hit, where that is this triangle that the ray does meet, if it is any.
+    /// The nearest hit: the crossing if there is that, else this triangle that the ray does meet, if it is any.
     #[inline(always)]
     pub(crate) fn answer<L: Lanes>(
         &self,
         ray: &Ray,
         axes: &'static Axes,
-        nearest: &Candidate,
+        (nearest, crossed): (&Candidate, Option<Winner>),
     ) -> Outcome<Option<Winner>> {
-        if !nearest.is_some() {
-            return Outcome::Settled(None);
+        if crossed.is_some() || !nearest.is_some() {
+            return Outcome::Settled(crossed);
         }
         match self.winner::<L>(ray, axes, nearest) {
             Some(winner) => Outcome::Settled(Some(winner)),
@@ -805,13 +805,7 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
     /// The nearest hit, once all was seen.
     #[inline(always)]
     pub(crate) fn winner<L: Lanes>(&self, ray: &Ray) -> Outcome<Option<Winner>> {
-        Nearest::answer_in_flight::<L>(
-            &self.exact,
-            ray,
-            self.blocks.axes,
-            false,
-            (&self.best, self.crossed()),
-        )
+        self.exact.answer::<L>(ray, self.blocks.axes, (&self.best, self.crossed()))
     }
 }
 
@@ -955,12 +949,9 @@ impl Goal for Nearest {
         ray: &Ray,
         axes: &'static Axes,
         _: bool,
-        (nearest, crossed): (&Candidate, Option<Winner>),
+        nearest: (&Candidate, Option<Winner>),
     ) -> Outcome<Option<Winner>> {
-        match crossed {
-            Some(crossed) => Outcome::Settled(Some(crossed)),
-            None => exact.answer::<L>(ray, axes, nearest),
-        }
+        exact.answer::<L>(ray, axes, nearest)
     }
 
     #[inline(always)]
