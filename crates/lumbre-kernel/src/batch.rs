@@ -144,8 +144,7 @@ pub(crate) fn search_anything<G: Companion>(
     rays: &[Ray],
     ends: impl Ends<G::Found>,
 ) {
-    let others = AmongInstances::new(accel, start);
-    level.run(OneByOne::<G, _, _> { accel, start, rays, others, ends, goal: PhantomData });
+    level.run(OneByOne::<G, _> { accel, start, rays, ends, goal: PhantomData });
 }
 
 /// The same with or without packets, where the others go as is said, if it is.
@@ -220,13 +219,12 @@ impl<G: Goal, B: Beside, const MIXED: bool> Manner for InDouble<G, B, MIXED> {
     #[inline(always)]
     fn search_together<'a, L: Lanes>(
         packet: &mut Packet<'a, MIXED>,
-        exact: &Exact<'a>,
+        _: &Exact<'a>,
         rays: &[Ray; PACKET],
         first: usize,
         ends: &mut impl Ends<G::Answer>,
     ) -> Together {
-        let nothing = &mut NoOthers::<MIXED> { accel: exact.accel(), start: exact.start };
-        search_packet::<G, L, _, MIXED>(packet, rays, first, nothing, ends)
+        search_packet::<G, L, _, MIXED>(packet, rays, first, &mut NoOthers, ends)
     }
 
     #[inline(always)]
@@ -290,21 +288,21 @@ impl Trials {
 }
 
 /// Rays through a tree of anything: those that are alike together, and the others one after another.
-struct OneByOne<'a, 'r, G, O, E> {
+struct OneByOne<'a, 'r, G, E> {
     accel: &'a Accel,
     start: &'a SingleStart,
     rays: &'r [Ray],
-    others: O,
     ends: E,
     goal: PhantomData<G>,
 }
 
-impl<'a, G: Goal, O: Others<'a, G>, E: Ends<O::Found>> Task for OneByOne<'a, '_, G, O, E> {
+impl<G: Companion, E: Ends<G::Found>> Task for OneByOne<'_, '_, G, E> {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        let Self { accel, start, rays, mut others, mut ends, .. } = self;
+        let Self { accel, start, rays, mut ends, .. } = self;
+        let mut others = AmongInstances::new(accel, start);
         let mut packet = Packet::<true>::new(accel, start);
         let mut trials = Trials::NEW;
         let mut coming = Coming::new(rays, !G::IS_ANY);
@@ -316,13 +314,13 @@ impl<'a, G: Goal, O: Others<'a, G>, E: Ends<O::Found>> Task for OneByOne<'a, '_,
                 && trials.is_next()
             {
                 let together =
-                    search_packet::<G, L, O, true>(&mut packet, rays, first, &mut others, &mut ends);
+                    search_packet::<G, L, _, true>(&mut packet, rays, first, &mut others, &mut ends);
                 trials.heed(together.pays);
                 answered = together.answered;
             }
             for (place, ray) in rays.iter().enumerate() {
                 if answered >> place & 1 == 0 {
-                    ends.put(first + place, others.search_alone::<L>(lanes::opaque(ray)));
+                    ends.put(first + place, others.search_alone::<G, L>(lanes::opaque(ray)));
                 }
             }
         }

@@ -40,7 +40,7 @@ use crate::lanes::{self, Axes, Corners, CornersRoom, Lanes, Level, Row, Sides, T
 use crate::node::{END_FACTOR, LITTLE, Node, START_FACTOR, tag};
 #[cfg(test)]
 use crate::single::Nearest;
-use crate::single::{Alone, Candidate, Exact, Goal, Outcome, Winner, heights, largest_component};
+use crate::single::{Candidate, Exact, Goal, Outcome, Winner, heights, largest_component};
 use crate::stack::{Order, Stack};
 use crate::triangles::{
     self, BEYOND, BLOCK, EDGE_ERROR, ERRORS_OF_EDGES, ERRORS_OF_EXTENT, FAR, HEIGHT_ERROR, Meeting, Pairs,
@@ -978,7 +978,7 @@ impl<'a, const MIXED: bool> Packet<'a, MIXED> {
     }
 }
 
-/// What takes part in a search by packets in a tree: instances, and rays that go alone.
+/// What takes part in a search by packets in a tree: instances.
 pub(crate) trait Others<'a, G: Goal> {
     /// What is handed out.
     type Found;
@@ -994,18 +994,12 @@ pub(crate) trait Others<'a, G: Goal> {
 
     /// Hands out what came of a ray.
     fn put(&mut self, place: usize, outcome: Outcome<G::Answer>, ends: &mut impl Ends<Self::Found>);
-
-    /// Searches along a ray alone.
-    fn search_alone<L: Lanes>(&self, ray: &Ray) -> Outcome<Self::Found>;
 }
 
-/// Nothing: triangles and shapes are all there is. `MIXED` where there are shapes.
-pub(crate) struct NoOthers<'a, const MIXED: bool> {
-    pub(crate) accel: &'a Accel,
-    pub(crate) start: &'a SingleStart,
-}
+/// Nothing: triangles and shapes are all there is.
+pub(crate) struct NoOthers;
 
-impl<'a, G: Goal, const ARE_MIXED: bool> Others<'a, G> for NoOthers<'a, ARE_MIXED> {
+impl<'a, G: Goal> Others<'a, G> for NoOthers {
     type Found = G::Answer;
 
     #[inline(always)]
@@ -1022,11 +1016,6 @@ impl<'a, G: Goal, const ARE_MIXED: bool> Others<'a, G> for NoOthers<'a, ARE_MIXE
     #[inline(always)]
     fn put(&mut self, place: usize, outcome: Outcome<G::Answer>, ends: &mut impl Ends<G::Answer>) {
         ends.put(place, outcome);
-    }
-
-    #[inline(always)]
-    fn search_alone<L: Lanes>(&self, ray: &Ray) -> Outcome<G::Answer> {
-        Alone::<G, ARE_MIXED>::new(self.accel, self.start, ray).run::<L>()
     }
 }
 
@@ -1084,10 +1073,8 @@ pub(crate) fn answered_together(level: Level, accel: &Accel, rays: &[Ray; PACKET
         type Output = u32;
         #[inline(always)]
         fn run<L: Lanes>(mut self) -> u32 {
-            let (accel, start) = (self.0.exact.accel(), self.0.exact.start);
-            let others = &mut NoOthers::<MIXED> { accel, start };
             let whole = self.0.whole();
-            self.0.search::<Nearest, L, _>(self.1, whole, others, &mut |_, _| {}).answered
+            self.0.search::<Nearest, L, _>(self.1, whole, &mut NoOthers, &mut |_, _| {}).answered
         }
     }
     let single = accel.single.as_ref().expect("what single precision searches");

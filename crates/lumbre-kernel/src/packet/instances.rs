@@ -37,6 +37,12 @@ impl<'a> AmongInstances<'a> {
     pub(crate) fn new(accel: &'a Accel, start: &'a SingleStart) -> Self {
         Self { accel, start, around: Place::default(), within: [const { None }; PACKET] }
     }
+
+    /// Searches along a ray alone.
+    #[inline(always)]
+    pub(crate) fn search_alone<G: Companion, L: Lanes>(&self, ray: &Ray) -> Outcome<G::Found> {
+        Whole::<G, All>::new(self.accel, self.start, &self.around, ray).run::<L>()
+    }
 }
 
 /// Rays of a packet at an instance.
@@ -132,11 +138,6 @@ impl<'a, G: Companion> Others<'a, G> for AmongInstances<'a> {
         };
         ends.put(place, found);
     }
-
-    #[inline(always)]
-    fn search_alone<L: Lanes>(&self, ray: &Ray) -> Outcome<G::Found> {
-        Whole::<G, All>::new(self.accel, self.start, &self.around, ray).run::<L>()
-    }
 }
 
 /// Has those of a packet that go on meet an instance; false where that is more work than they may do.
@@ -192,8 +193,8 @@ impl<const MIXED: bool> Visit<'_, '_, MIXED> {
                 Outcome::Unsettled => unsettled |= 1 << i,
             },
         );
-        let nothing = &mut NoOthers::<false> { accel, start };
-        let Together { answered, is_done, .. } = packet.search::<G, L, _>(&rays, asked, nothing, &mut take);
+        let Together { answered, is_done, .. } =
+            packet.search::<G, L, _>(&rays, asked, &mut NoOthers, &mut take);
         self.packet.work += WORK_OF_START + packet.work;
         is_done.then_some(those & (!answered | unsettled))
     }
