@@ -13,7 +13,7 @@ use crate::blocks::{Blocks, TriangleBlock};
 use crate::collapse;
 use crate::holds::SingleStart;
 use crate::hulls::HullBlock;
-use crate::lanes::{self, Lanes, MetHulls, Slots, Vector, WIDE, Wide};
+use crate::lanes::{self, Glanced, Lanes, MetHulls, Slots, Vector, WIDE, Wide};
 use crate::node::{Node, Slabs, WIDTH, tag};
 use crate::single::{Exact, Outcome, Step, nearest_of};
 use crate::stack::{Order, STACK};
@@ -34,7 +34,9 @@ pub(crate) trait Flyer<L: Lanes>: Sized {
     /// Whether it flies among anything but triangles.
     const IS_MIXED: bool;
     /// How its line passes the triangles of a block.
-    type Pass: Copy + Zeroable;
+    type Pass;
+    /// How two lines do, each those of its block.
+    type Passes: Copy + Zeroable;
     /// Where it meets each triangle.
     type At: Copy + Zeroable;
 
@@ -44,8 +46,11 @@ pub(crate) trait Flyer<L: Lanes>: Sized {
     fn start(start: &SingleStart, ray: &Self::Ray) -> Option<Slabs>;
     /// Sets out as a ray, in the place of another.
     fn set_out(&mut self, exact: &Exact, ray: &Self::Ray, slabs: &Slabs);
-    /// How its line passes the triangles of a block, and a bit for each that it may meet.
-    fn pass(&self, block: &TriangleBlock) -> (u32, Self::Pass);
+    /// How the lines of two pass the triangles of two blocks, each those of its own, and a bit for each that they may meet: eight of the
+    /// first, and eight of the second.
+    fn pass_by_two(flyers: [&Self; 2], blocks: [&TriangleBlock; 2]) -> (u32, Self::Passes);
+    /// That of one of the two: `which` is 0 or 1.
+    fn one_of(passes: &Self::Passes, which: usize) -> Self::Pass;
     /// Where it meets those of the mask.
     fn cross(&self, mask: u32, pass: &Self::Pass) -> Crossing<Self::At>;
     /// Whether it meets any of these, which are not clear.
@@ -60,11 +65,11 @@ pub(crate) trait Flyer<L: Lanes>: Sized {
         crossing: &Crossing<Self::At>,
         slabs: &mut Slabs,
     ) -> bool;
-    /// What it may meet of a block of hulls, tubes left aside, and a bit for each ring among that. Where there are no shapes, it meets
-    /// nothing, here and below.
+    /// What two may meet of two blocks of hulls, each of its own, tubes left aside. Where there are no shapes, it is nothing, here and
+    /// below.
     #[inline(always)]
-    fn glance_at_hulls(&self, _block: &HullBlock) -> (MetHulls, u32) {
-        (MetHulls::NONE, 0)
+    fn glance_by_two(_flyers: [&Self; 2], _blocks: [&HullBlock; 2]) -> Glanced {
+        Glanced::NOTHING
     }
 
     /// The same with a look at tubes.
@@ -140,6 +145,30 @@ impl Iterator for Bits {
         let first = self.0.trailing_zeros();
         self.0 &= self.0.wrapping_sub(1);
         (first < u64::BITS).then_some(first as usize % FLIGHTS)
+    }
+}
+
+impl Bits {
+    /// Two at a time; the last of an odd number comes with itself.
+    #[inline(always)]
+    fn by_two(self) -> ByTwo {
+        ByTwo(self)
+    }
+}
+
+/// See [`Bits::by_two`].
+struct ByTwo(Bits);
+
+impl Iterator for ByTwo {
+    type Item = [usize; 2];
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<[usize; 2]> {
+        let Self(bits) = self;
+        match (bits.next(), bits.next()) {
+            (Some(first), second) => Some([first, second.unwrap_or(first)]),
+            (None, _) => None,
+        }
     }
 }
 
@@ -236,12 +265,12 @@ struct Fleet<'a, 'r, F: Flyer<L>, L: Lanes> {
     masks: [u32; FLIGHTS],
     /// Where each enters the boxes of children.
     enters: [L::Wide; FLIGHTS],
-    passes: [F::Pass; FLIGHTS],
+    passes: [F::Passes; FLIGHTS / 2],
     crossings: [Crossing<F::At>; FLIGHTS],
     /// Which triangles have to be looked at closer.
     unclear: [u32; FLIGHTS],
-    /// No shape of the block of hulls that each is at is met at a lesser height.
-    nears: [[f32; BLOCK]; FLIGHTS],
+    /// No shape of the blocks of hulls that two are at is met at a lesser height.
+    nears: [[[f32; BLOCK]; 2]; FLIGHTS / 2],
 }
 
 impl<'a, 'r, F: Flyer<L>, L: Lanes> Fleet<'a, 'r, F, L> {
@@ -261,10 +290,10 @@ impl<'a, 'r, F: Flyer<L>, L: Lanes> Fleet<'a, 'r, F, L> {
             parents: References([END; FLIGHTS]),
             masks: [0; FLIGHTS],
             enters: [L::Wide::splat(0.0); FLIGHTS],
-            passes: [F::Pass::zeroed(); FLIGHTS],
+            passes: [F::Passes::zeroed(); FLIGHTS / 2],
             crossings: [Crossing::zeroed(); FLIGHTS],
             unclear: [0; FLIGHTS],
-            nears: [[0.0; BLOCK]; FLIGHTS],
+            nears: [[[0.0; BLOCK]; 2]; FLIGHTS / 2],
         }
     }
 
@@ -358,17 +387,22 @@ impl<'a, 'r, F: Flyer<L>, L: Lanes> Fleet<'a, 'r, F, L> {
     #[inline(always)]
     fn meet_blocks(&mut self, at_leaves: u64, ends: &mut impl Ends<F::Answer>) {
         let (mut passing, mut last) = (0, 0);
-        for (at, place) in Bits(at_leaves).enumerate() {
-            let block = self.blocks.block(*self.references.of(place) & tag::PLACE);
-            let (mask, pass) = self.flights[place].flyer.pass(block);
-            (self.masks[place], self.passes[at % FLIGHTS]) = (mask, pass);
-            passing |= bit(mask != 0, place);
-            last |= bit(block.is_last(), place);
+        for (at, [first, second]) in Bits(at_leaves).by_two().enumerate() {
+            let unit = |place: usize| self.references.0[place] & tag::PLACE;
+            let (one, other) = (self.blocks.block(unit(first)), self.blocks.block(unit(second)));
+            let flyers = [&self.flights[first].flyer, &self.flights[second].flyer];
+            let (mask, passes) = F::pass_by_two(flyers, [one, other]);
+            self.passes[at % (FLIGHTS / 2)] = passes;
+            let (of_first, of_second) = (mask & L::Eight::ALL, mask >> BLOCK);
+            (self.masks[first], self.masks[second]) = (of_first, of_second);
+            passing |= bit(of_first != 0, first) | bit(of_second != 0, second);
+            last |= bit(one.is_last(), first) | bit(other.is_last(), second);
         }
         let (mut meeting, mut unclear) = (0, 0);
         for (at, place) in Bits(passing).enumerate() {
-            let pass = &self.passes[rank(at_leaves, place)];
-            let crossing = self.flights[place].flyer.cross(self.masks[place], pass);
+            let rank = rank(at_leaves, place);
+            let pass = F::one_of(&self.passes[rank / 2], rank % 2);
+            let crossing = self.flights[place].flyer.cross(self.masks[place], &pass);
             meeting |= bit(crossing.met != 0, place);
             unclear |= bit(crossing.unclear != 0, place);
             if F::IS_ANY {
@@ -419,19 +453,26 @@ impl<'a, 'r, F: Flyer<L>, L: Lanes> Fleet<'a, 'r, F, L> {
         let (mut with_hulls, mut passing, mut ringing, mut met, mut more) = (0, 0, 0, 0, 0);
         for place in Bits(at_others) {
             let reference = *self.references.of(place);
-            if reference >> tag::SHIFT != tag::SHAPES {
-                continue;
-            }
-            let Some((block, goes_on)) = accel.hulls.block((reference & tag::PLACE) as usize) else {
+            let are_shapes = reference >> tag::SHIFT == tag::SHAPES;
+            let is_there = accel.hulls.block((reference & tag::PLACE) as usize).is_some();
+            with_hulls |= bit(are_shapes && is_there, place);
+        }
+        for (at, [first, second]) in Bits(with_hulls).by_two().enumerate() {
+            let place_of = |flight: usize| (self.references.0[flight] & tag::PLACE) as usize;
+            let (Some((one, one_goes_on)), Some((other, other_goes_on))) =
+                (accel.hulls.block(place_of(first)), accel.hulls.block(place_of(second)))
+            else {
                 continue;
             };
-            let (MetHulls { mask, sure, near }, rings) = self.flights[place].flyer.glance_at_hulls(block);
-            (self.masks[place], self.nears[place]) = (mask, near);
-            with_hulls |= bit(true, place);
-            passing |= bit(mask != 0, place);
-            ringing |= bit(rings != 0, place);
-            met |= bit(sure != 0, place);
-            more |= bit(goes_on, place);
+            let flyers = [&self.flights[first].flyer, &self.flights[second].flyer];
+            let Glanced { mask, sure, rings, near } = F::glance_by_two(flyers, [one, other]);
+            self.nears[at % (FLIGHTS / 2)] = near;
+            (self.masks[first], self.masks[second]) = (mask & L::Eight::ALL, mask >> BLOCK);
+            let of_both = |mask: u32| bit(mask & L::Eight::ALL != 0, first) | bit(mask >> BLOCK != 0, second);
+            passing |= of_both(mask);
+            ringing |= of_both(rings);
+            met |= of_both(sure);
+            more |= bit(one_goes_on, first) | bit(other_goes_on, second);
         }
         for place in Bits(ringing & !met) {
             let first = (*self.references.of(place) & tag::PLACE) as usize;
@@ -443,7 +484,8 @@ impl<'a, 'r, F: Flyer<L>, L: Lanes> Fleet<'a, 'r, F, L> {
         let mut ended = Ended { met, unsettled: 0 };
         for place in Bits(passing & !met) {
             let first = (*self.references.of(place) & tag::PLACE) as usize;
-            let (mut mask, near, ray) = (self.masks[place], &self.nears[place], self.ray(place));
+            let rank = rank(with_hulls, place);
+            let (mut mask, near, ray) = (self.masks[place], &self.nears[rank / 2][rank % 2], self.ray(place));
             let Flight { flyer, slabs, .. } = &mut self.flights[place];
             while mask != 0 {
                 let lane =

@@ -49,7 +49,7 @@ use crate::batch::Ends;
 use crate::blocks::TriangleBlock;
 use crate::fleet::Crossing;
 use crate::holds::{Contents, SingleStart};
-use crate::lanes::{self, Asked, Axes, Lanes, Level, Question, Task, Vector};
+use crate::lanes::{self, Asked, Axes, Lanes, Level, Question, Task, Vector, Wide};
 use crate::packet::Companion;
 use crate::query::All;
 use crate::single::{self, Alone, Exact, Outcome, Winner};
@@ -136,6 +136,15 @@ struct Lines<E> {
 }
 
 impl<E: Vector> Lines<E> {
+    /// By corners in the sheared space of the ray, and a bit for each triangle that it may pass through.
+    #[inline(always)]
+    fn of([x, y, heights]: [[E; 3]; 3]) -> (u32, Self) {
+        let products = [x[2] * y[1], x[0] * y[2], x[1] * y[0]];
+        let edges = [products[0] - y[2] * x[1], products[1] - y[0] * x[2], products[2] - y[1] * x[0]];
+        let within = within(edges);
+        (E::splat(0.0).at_most(within), Self { products, edges, within, heights })
+    }
+
     /// What is needed of triangles that it may pass through.
     #[inline(always)]
     fn pass(self) -> Pass<E> {
@@ -154,6 +163,31 @@ pub(crate) struct Pass<E> {
     within: E,
     /// Of the corners, along the ray.
     heights: [E; 3],
+}
+
+impl<W: Wide> Pass<W> {
+    /// That of one of the two: `which` is 0 or 1.
+    #[inline(always)]
+    fn half(&self, which: usize) -> Pass<W::Half> {
+        let Self { largest, edges: [u, v, w], within, heights: [a, b, c] } = self;
+        Pass {
+            largest: largest.half(which),
+            edges: [u.half(which), v.half(which), w.half(which)],
+            within: within.half(which),
+            heights: [a.half(which), b.half(which), c.half(which)],
+        }
+    }
+
+    /// Those of two.
+    #[inline(always)]
+    fn of_two(first: &Pass<W::Half>, second: &Pass<W::Half>) -> Self {
+        Self {
+            largest: W::of_two(first.largest, second.largest),
+            edges: lanes::three_of_two(&first.edges, &second.edges),
+            within: W::of_two(first.within, second.within),
+            heights: lanes::three_of_two(&first.heights, &second.heights),
+        }
+    }
 }
 
 /// Where a ray meets the triangles of a block.
@@ -300,12 +334,15 @@ impl NarrowRay {
     /// How the line of the ray passes the triangles of a block, and a bit for each that it may pass through. `IS_ALONE` as in [`Lanes::narrow_corners`].
     #[inline(always)]
     fn lines<L: Lanes, const IS_ALONE: bool>(&self, block: &TriangleBlock) -> (u32, Lines<L::Eight>) {
-        let [x, y, heights] = L::narrow_corners::<IS_ALONE>(block, lanes::opaque(self));
-        let products = [x[2] * y[1], x[0] * y[2], x[1] * y[0]];
-        let edges = [products[0] - y[2] * x[1], products[1] - y[0] * x[2], products[2] - y[1] * x[0]];
-        let within = within(edges);
-        let mask = L::Eight::splat(0.0).at_most(within) & block.taken();
-        (mask, Lines { products, edges, within, heights })
+        let (mask, lines) = Lines::of(L::narrow_corners::<IS_ALONE>(block, lanes::opaque(self)));
+        (mask & block.taken(), lines)
+    }
+
+    /// The same of two rays, each among the triangles of its block: those of the first, and those of the second.
+    #[inline(always)]
+    fn lines_by_two<L: Lanes>(rays: [&Self; 2], blocks: [&TriangleBlock; 2]) -> (u32, Lines<L::Wide>) {
+        let (mask, lines) = Lines::of(L::narrow_corners_by_two(blocks, rays));
+        (mask & (blocks[0].taken() | blocks[1].taken() << BLOCK), lines)
     }
 
     /// Which of those in the mask the ray meets; it certainly does where the crossing is precise, and in range.

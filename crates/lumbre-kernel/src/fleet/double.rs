@@ -11,7 +11,7 @@ use crate::blocks::TriangleBlock;
 use crate::collapse::Entry;
 use crate::holds::SingleStart;
 use crate::hulls::{HullBlock, HullRay};
-use crate::lanes::{self, Axes, Crossings, Eight, Lanes, Level, MetHulls, Task, Vector};
+use crate::lanes::{self, Axes, Crossings, Eight, Glanced, Lanes, Level, MetHulls, Task, Vector};
 use crate::node::{Slabs, Units};
 use crate::single::{Candidate, Exact, Goal, Outcome, Step, Winner, heights, largest_component};
 use crate::triangles::{self, BLOCK, BlockRay, HeightRange};
@@ -234,6 +234,7 @@ impl<G: Goal, B: Beside, L: Lanes> Flyer<L> for DoubleFlyer<G, B> {
     const IS_ANY: bool = G::IS_ANY;
     const IS_MIXED: bool = B::ARE_ANY;
     type Pass = L::Edges;
+    type Passes = L::EdgesByTwo;
     /// Heights along the ray between which the crossing lies.
     type At = [L::Eight; 2];
 
@@ -264,8 +265,13 @@ impl<G: Goal, B: Beside, L: Lanes> Flyer<L> for DoubleFlyer<G, B> {
     }
 
     #[inline(always)]
-    fn pass(&self, block: &TriangleBlock) -> (u32, L::Edges) {
-        L::meet_triangles::<false>(block, lanes::opaque(&self.blocks))
+    fn pass_by_two(flyers: [&Self; 2], blocks: [&TriangleBlock; 2]) -> (u32, L::EdgesByTwo) {
+        L::meet_triangles_by_two(blocks, [&flyers[0].blocks, &flyers[1].blocks])
+    }
+
+    #[inline(always)]
+    fn one_of(passes: &L::EdgesByTwo, which: usize) -> L::Edges {
+        L::edges_of(passes, which)
     }
 
     #[inline(always)]
@@ -306,15 +312,16 @@ impl<G: Goal, B: Beside, L: Lanes> Flyer<L> for DoubleFlyer<G, B> {
     }
 
     #[inline(always)]
-    fn glance_at_hulls(&self, block: &HullBlock) -> (MetHulls, u32) {
-        match self.beside.hulls() {
-            Some(hulls) if G::IS_ANY => {
-                lanes::glance_at_hulls::<L, true>(block, lanes::opaque(hulls), &self.blocks.range)
-            }
-            Some(hulls) => {
-                lanes::glance_at_hulls::<L, false>(block, lanes::opaque(hulls), &self.blocks.range)
-            }
-            None => (MetHulls::NONE, 0),
+    fn glance_by_two(flyers: [&Self; 2], blocks: [&HullBlock; 2]) -> Glanced {
+        let (Some(first), Some(second)) = (flyers[0].beside.hulls(), flyers[1].beside.hulls()) else {
+            return Glanced::NOTHING;
+        };
+        let rays = [lanes::opaque(first), lanes::opaque(second)];
+        let ranges = [&flyers[0].blocks.range, &flyers[1].blocks.range];
+        if G::IS_ANY {
+            lanes::glance_by_two::<L, true>(blocks, rays, ranges)
+        } else {
+            lanes::glance_by_two::<L, false>(blocks, rays, ranges)
         }
     }
 

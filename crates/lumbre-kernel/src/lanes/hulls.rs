@@ -1,6 +1,6 @@
 //! The first test of hulls: eight of them against a ray, or one against sixteen rays.
 
-use super::{Eight, Lanes, Row, Vector, WIDE, Wide};
+use super::{Eight, Lanes, LastEight, Row, Vector, WIDE, Wide};
 use crate::hulls::{
     HullBlock, HullRay, LEAST_COMPONENT, LEAST_TOLERANCE, LEAST_TUBE_ERROR, TOLERANCE_PER_MARGIN,
     TUBE_ERROR_PER_MARGIN,
@@ -89,6 +89,93 @@ impl<V: Eight> Bodies<V> for AllHulls<'_> {
     }
 }
 
+/// The hulls of two blocks: those of the first, and those of the second.
+struct TwoBlocks<'a>([&'a HullBlock; 2]);
+
+impl TwoBlocks<'_> {
+    #[inline(always)]
+    fn load<V: Wide>(&self, row: impl Fn(&HullBlock) -> &[f32; BLOCK]) -> V {
+        let Self([first, second]) = self;
+        V::of_two(V::Half::load(row(first)), V::Half::load(row(second)))
+    }
+}
+
+impl<V: Wide> Bodies<V> for TwoBlocks<'_> {
+    #[inline(always)]
+    fn center(&self, axis: usize) -> V {
+        self.load(
+            #[inline(always)]
+            |block| &block.centers[axis],
+        )
+    }
+
+    #[inline(always)]
+    fn row(&self, axis: usize) -> [V; 3] {
+        [
+            self.load(
+                #[inline(always)]
+                |block| &block.rows[axis][0],
+            ),
+            self.load(
+                #[inline(always)]
+                |block| &block.rows[axis][1],
+            ),
+            self.load(
+                #[inline(always)]
+                |block| &block.rows[axis][2],
+            ),
+        ]
+    }
+
+    #[inline(always)]
+    fn height(&self) -> V {
+        self.load(
+            #[inline(always)]
+            |block| &block.heights,
+        )
+    }
+
+    #[inline(always)]
+    fn profile(&self) -> [V; 3] {
+        [
+            self.load(
+                #[inline(always)]
+                |block| &block.profiles[0],
+            ),
+            self.load(
+                #[inline(always)]
+                |block| &block.profiles[1],
+            ),
+            self.load(
+                #[inline(always)]
+                |block| &block.profiles[2],
+            ),
+        ]
+    }
+
+    #[inline(always)]
+    fn tube(&self) -> V {
+        self.load(
+            #[inline(always)]
+            |block| &block.tubes,
+        )
+    }
+
+    #[inline(always)]
+    fn margins(&self) -> [V; 2] {
+        [
+            self.load(
+                #[inline(always)]
+                |block| &block.margins,
+            ),
+            self.load(
+                #[inline(always)]
+                |block| &block.least_margins,
+            ),
+        ]
+    }
+}
+
 /// A hull, in a lane of a block below eight.
 struct OneHull<'a>(&'a HullBlock, usize);
 
@@ -155,6 +242,54 @@ impl<V: Vector> SureLines<V> for OneLine<'_> {
     #[inline(always)]
     fn sure_range(&self) -> [V; 2] {
         [V::splat(self.1.surely_first), V::splat(self.1.surely_last)]
+    }
+}
+
+/// Two rays, each for eight.
+struct TwoLines<'a> {
+    rays: [&'a HullRay; 2],
+    ranges: [&'a HeightRange; 2],
+    last: LastEight,
+}
+
+impl TwoLines<'_> {
+    #[inline(always)]
+    fn splat<V: Wide>(&self, [first, second]: [f32; 2]) -> V {
+        V::splat_two(first, second, self.last)
+    }
+}
+
+impl<V: Wide> Lines<V> for TwoLines<'_> {
+    #[inline(always)]
+    fn origin(&self, axis: usize) -> V {
+        self.splat([self.rays[0].origin[axis], self.rays[1].origin[axis]])
+    }
+
+    #[inline(always)]
+    fn rest(&self, axis: usize) -> V {
+        self.splat([self.rays[0].rest[axis], self.rays[1].rest[axis]])
+    }
+
+    #[inline(always)]
+    fn direction(&self, axis: usize) -> V {
+        self.splat([self.rays[0].direction[axis], self.rays[1].direction[axis]])
+    }
+
+    #[inline(always)]
+    fn range(&self) -> [V; 2] {
+        let [first, second] = self.ranges;
+        [self.splat([first.first, second.first]), self.splat([first.last, second.last])]
+    }
+}
+
+impl<V: Wide> SureLines<V> for TwoLines<'_> {
+    #[inline(always)]
+    fn sure_range(&self) -> [V; 2] {
+        let [first, second] = self.ranges;
+        [
+            self.splat([first.surely_first, second.surely_first]),
+            self.splat([first.surely_last, second.surely_last]),
+        ]
     }
 }
 
@@ -395,7 +530,7 @@ pub(crate) fn meet_hulls<L: Lanes, const SURE: bool>(
 
 /// The same without a branch, and without a look at tubes: beside it stands a bit for each ring that has yet to be looked at.
 #[inline(always)]
-pub(crate) fn glance_at_hulls<L: Lanes, const SURE: bool>(
+fn glance_at_hulls<L: Lanes, const SURE: bool>(
     block: &HullBlock,
     ray: &HullRay,
     range: &HeightRange,
@@ -405,6 +540,46 @@ pub(crate) fn glance_at_hulls<L: Lanes, const SURE: bool>(
     let Chords { mask, sure, from, .. } = look_into::<L::Eight, SURE>(&hulls, &line, &passages);
     let tubes: L::Eight = hulls.tube();
     (MetHulls { mask, sure, near: from.to_array() }, L::Eight::splat(0.0).below(tubes) & mask)
+}
+
+/// What came of a glance at eight hulls, and at eight others: a bit for each of the first, and for each of the others.
+pub(crate) struct Glanced {
+    /// As [`MetHulls::mask`] and [`MetHulls::sure`].
+    pub(crate) mask: u32,
+    pub(crate) sure: u32,
+    /// Rings of the mask: they have yet to be looked at.
+    pub(crate) rings: u32,
+    /// As [`MetHulls::near`].
+    pub(crate) near: [[f32; BLOCK]; 2],
+}
+
+impl Glanced {
+    pub(crate) const NOTHING: Self = Self { mask: 0, sure: 0, rings: 0, near: [[0.0; BLOCK]; 2] };
+}
+
+/// [`glance_at_hulls`] of two rays, each with the hulls of its block.
+#[inline(always)]
+pub(crate) fn glance_by_two<L: Lanes, const SURE: bool>(
+    blocks: [&HullBlock; 2],
+    rays: [&HullRay; 2],
+    ranges: [&HeightRange; 2],
+) -> Glanced {
+    if !L::MEETS_BY_TWO {
+        let (first, rings) = glance_at_hulls::<L, SURE>(blocks[0], rays[0], ranges[0]);
+        let (second, others) = glance_at_hulls::<L, SURE>(blocks[1], rays[1], ranges[1]);
+        return Glanced {
+            mask: first.mask | second.mask << BLOCK,
+            sure: first.sure | second.sure << BLOCK,
+            rings: rings | others << BLOCK,
+            near: [first.near, second.near],
+        };
+    }
+    let (hulls, lines) = (TwoBlocks(blocks), TwoLines { rays, ranges, last: LastEight::new() });
+    let passages = pass::<L::Wide>(&hulls, &lines);
+    let Chords { mask, sure, from, .. } = look_into::<L::Wide, SURE>(&hulls, &lines, &passages);
+    let tubes: L::Wide = hulls.tube();
+    let rings = L::Wide::splat(0.0).below(tubes) & mask;
+    Glanced { mask, sure, rings, near: bytemuck::cast(from.to_array()) }
 }
 
 /// Which of the cubes of a block lines may pass, a bit for each, and no sooner than where; by `lines` that stand for more.
@@ -429,6 +604,47 @@ pub(crate) fn meet_one_hull<W: Wide, const SURE: bool>(
     }
     look_into::<W, SURE>(&hull, lines, &passages).meet_tubes::<W, SURE>(&hull, lines)
 }
+
+/// What [`glance_by_two`] gives at a level of two blocks, and what [`glance_at_hulls`] gives of each: masks, those that are certain, rings,
+/// and how near what is in the mask is; for tests.
+#[cfg(test)]
+pub(crate) fn glances_at(
+    level: super::Level,
+    blocks: [&HullBlock; 2],
+    rays: [&HullRay; 2],
+    ranges: [&HeightRange; 2],
+) -> [[Glance; 2]; 2] {
+    struct Glancing<'a>([&'a HullBlock; 2], [&'a HullRay; 2], [&'a HeightRange; 2]);
+    impl super::Task for Glancing<'_> {
+        type Output = [[Glance; 2]; 2];
+        #[inline(always)]
+        fn run<L: Lanes>(self) -> Self::Output {
+            let Self(blocks, rays, ranges) = self;
+            let glance = |mask: u32, sure, rings, near: &[f32; BLOCK]| {
+                let near = std::array::from_fn(|lane| (mask >> lane & 1) * near[lane].to_bits());
+                ([mask, sure, rings], near)
+            };
+            let Glanced { mask, sure, rings, near } = glance_by_two::<L, true>(blocks, rays, ranges);
+            let unsure = glance_by_two::<L, false>(blocks, rays, ranges);
+            assert_eq!((unsure.mask, unsure.sure, unsure.rings), (mask, 0, rings));
+            let together = [
+                glance(mask & L::Eight::ALL, sure & L::Eight::ALL, rings & L::Eight::ALL, &near[0]),
+                glance(mask >> BLOCK, sure >> BLOCK, rings >> BLOCK, &near[1]),
+            ];
+            let alone = [0, 1].map(|which| {
+                let (MetHulls { mask, sure, near }, rings) =
+                    glance_at_hulls::<L, true>(blocks[which], rays[which], ranges[which]);
+                glance(mask, sure, rings, &near)
+            });
+            [together, alone]
+        }
+    }
+    level.run(Glancing(blocks, rays, ranges))
+}
+
+/// See [`glances_at`].
+#[cfg(test)]
+type Glance = ([u32; 3], [u32; BLOCK]);
 
 /// What [`meet_hulls`] gives at a level, for tests.
 #[cfg(test)]

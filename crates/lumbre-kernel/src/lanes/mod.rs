@@ -40,14 +40,16 @@ pub(crate) use boxes::{
     meet_boxes, meet_each, meet_frustum, only_child, push_as_built, push_by_distance, put_and_take_as_built,
     put_and_take_by_distance,
 };
+pub(crate) use hulls::{
+    Glanced, Lines, MetHulls, SureLines, glance_by_two, meet_hulls, meet_one_hull, pass_hulls,
+};
 #[cfg(test)]
-pub(crate) use hulls::meet_hulls_at;
-pub(crate) use hulls::{Lines, MetHulls, SureLines, glance_at_hulls, meet_hulls, meet_one_hull, pass_hulls};
+pub(crate) use hulls::{glances_at, meet_hulls_at};
 pub(crate) use portable::Portable;
 pub(crate) use spheres::SphereLanes;
 #[cfg(test)]
 pub(crate) use spheres::meet_spheres_at;
-pub(crate) use wide::{Eight, LANE_BITS, Row, Vector, WIDE, Wide};
+pub(crate) use wide::{Eight, LANE_BITS, LastEight, Row, Vector, WIDE, Wide};
 
 /// What a search does many at a time: boxes by sixteen, and triangles by eight.
 pub(crate) trait Lanes: SphereLanes {
@@ -55,8 +57,12 @@ pub(crate) trait Lanes: SphereLanes {
     type Eight: Eight;
     /// How a line passes the edges of eight triangles.
     type Edges: Copy + Zeroable;
+    /// The same of two lines, each with its block.
+    type EdgesByTwo: Copy + Zeroable;
     /// Sixteen numbers, alike.
-    type Wide: Wide;
+    type Wide: Wide<Half = Self::Eight>;
+    /// Whether two rays, each at a block of its own, are better met together than one after the other.
+    const MEETS_BY_TWO: bool = false;
     /// How many rays fly at once.
     const FLIGHTS: usize = fleet::FLIGHTS;
     /// Whether rays also fly through trees that caches hold.
@@ -119,6 +125,14 @@ pub(crate) trait Lanes: SphereLanes {
     /// ray waits for it, so that to foresee how the block is made is worth a branch.
     fn narrow_corners<const IS_ALONE: bool>(block: &TriangleBlock, ray: &NarrowRay) -> [[Self::Eight; 3]; 3];
 
+    /// The same of two blocks, each by its ray: those of the first, and those of the second.
+    #[inline(always)]
+    fn narrow_corners_by_two(blocks: [&TriangleBlock; 2], rays: [&NarrowRay; 2]) -> [[Self::Wide; 3]; 3] {
+        let first = Self::narrow_corners::<false>(blocks[0], rays[0]);
+        let second = Self::narrow_corners::<false>(blocks[1], rays[1]);
+        corners_of_two(&first, &second)
+    }
+
     /// The numbers of rays in single precision, side by side: origin, start, direction, end.
     fn narrow_rows(rays: &[Ray32; WIDE], rows: &mut [Row<f32>; 8]);
 
@@ -128,6 +142,12 @@ pub(crate) trait Lanes: SphereLanes {
     /// A bit for each triangle that the line of the ray may meet, among them all that it does, and what [`Lanes::place_crossings`]
     /// wants to know: see [`BlockRay`]. `IS_ALONE` as in [`Lanes::narrow_corners`].
     fn meet_triangles<const IS_ALONE: bool>(block: &TriangleBlock, ray: &BlockRay) -> (u32, Self::Edges);
+
+    /// The same of two blocks, each by its ray: those of the first, and those of the second.
+    fn meet_triangles_by_two(blocks: [&TriangleBlock; 2], rays: [&BlockRay; 2]) -> (u32, Self::EdgesByTwo);
+
+    /// Of one of the two: `which` is 0 or 1.
+    fn edges_of(both: &Self::EdgesByTwo, which: usize) -> Self::Edges;
 
     /// For each number of a list, a bit for each place before it that has the same.
     fn equals_before(list: &[u32; 3 * BLOCK]) -> [u32; 3 * BLOCK];
@@ -150,6 +170,19 @@ pub(crate) trait Lanes: SphereLanes {
     /// How a ray passes the triangle in a lane, in double precision, and what its crossing inside is made of. `origin` has the order
     /// of the shear's axes.
     fn pass(block: &TriangleBlock, lane: usize, shear: &Shear, origin: &[f64; 3]) -> (Passage, Inside);
+}
+
+/// Eight, and eight others, three times.
+#[inline(always)]
+pub(crate) fn three_of_two<W: Wide>(first: &[W::Half; 3], second: &[W::Half; 3]) -> [W; 3] {
+    [W::of_two(first[0], second[0]), W::of_two(first[1], second[1]), W::of_two(first[2], second[2])]
+}
+
+/// The corners of the triangles of a block, and those of another.
+#[inline(always)]
+fn corners_of_two<W: Wide>(first: &[[W::Half; 3]; 3], second: &[[W::Half; 3]; 3]) -> [[W; 3]; 3] {
+    let [x, y, z] = first;
+    [three_of_two(x, &second[0]), three_of_two(y, &second[1]), three_of_two(z, &second[2])]
 }
 
 /// Corners of triangles side by side, `[axis][corner][lane]`; those of lanes without a triangle mean nothing.
@@ -723,6 +756,78 @@ pub(crate) fn meet_triangles_at(
         }
     }
     level.run(Triangles(block, ray))
+}
+
+/// What a ray is told of a block, bit by bit, of lanes with a triangle: which it may meet, those in its range, those that it surely meets,
+/// where, and the corners as single precision has them.
+#[cfg(test)]
+#[derive(Debug, PartialEq)]
+pub(crate) struct Told {
+    masks: [u32; 3],
+    heights: [[u32; BLOCK]; 2],
+    corners: [[[u32; BLOCK]; 3]; 3],
+}
+
+#[cfg(test)]
+impl Told {
+    #[inline(always)]
+    fn of<L: Lanes>(
+        (block, ray): (&TriangleBlock, &BlockRay),
+        (mask, edges): (u32, L::Edges),
+        corners: [[L::Eight; 3]; 3],
+    ) -> Self {
+        let taken = block.taken();
+        let crossings = L::place_crossings(&edges, ray);
+        let mut told = Self {
+            masks: [mask, mask & crossings.in_range, mask & crossings.sure],
+            heights: [[0; BLOCK]; 2],
+            corners: [[[0; BLOCK]; 3]; 3],
+        };
+        for lane in (0..BLOCK).filter(|lane| taken >> lane & 1 != 0) {
+            let (from, to) = crossings.between(lane);
+            (told.heights[0][lane], told.heights[1][lane]) = (from.to_bits(), to.to_bits());
+            for (told, corners) in told.corners.iter_mut().zip(&corners) {
+                for (told, corner) in told.iter_mut().zip(corners) {
+                    told[lane] = corner.lane(lane).to_bits();
+                }
+            }
+        }
+        told
+    }
+}
+
+/// What two rays are told of two blocks at a level, each of its own: by both together, and by each alone; for tests.
+#[cfg(test)]
+pub(crate) fn told_at(
+    level: Level,
+    blocks: [&TriangleBlock; 2],
+    rays: [&BlockRay; 2],
+    narrow: [&NarrowRay; 2],
+) -> [[Told; 2]; 2] {
+    struct Telling<'a>([&'a TriangleBlock; 2], [&'a BlockRay; 2], [&'a NarrowRay; 2]);
+    impl Task for Telling<'_> {
+        type Output = [[Told; 2]; 2];
+        #[inline(always)]
+        fn run<L: Lanes>(self) -> Self::Output {
+            let Self(blocks, rays, narrow) = self;
+            let (mask, edges) = L::meet_triangles_by_two(blocks, rays);
+            let [x, y, z] = L::narrow_corners_by_two(blocks, narrow);
+            let one =
+                |row: &[L::Wide; 3], which| [row[0].half(which), row[1].half(which), row[2].half(which)];
+            let together = |which: usize| {
+                let of_one = (mask >> (BLOCK * which) & L::Eight::ALL, L::edges_of(&edges, which));
+                let corners = [one(&x, which), one(&y, which), one(&z, which)];
+                Told::of::<L>((blocks[which], rays[which]), of_one, corners)
+            };
+            let alone = |which: usize| {
+                let (block, ray) = (blocks[which], rays[which]);
+                let corners = L::narrow_corners::<false>(block, narrow[which]);
+                Told::of::<L>((block, ray), L::meet_triangles::<false>(block, ray), corners)
+            };
+            [[together(0), together(1)], [alone(0), alone(1)]]
+        }
+    }
+    level.run(Telling(blocks, rays, narrow))
 }
 
 /// [`Lanes::corners`] at a level, for tests.

@@ -53,6 +53,7 @@ fn local(start: &SingleStart, ray: &Ray32) -> [f32; 4] {
 impl Lanes for Portable {
     type Eight = Portable8;
     type Edges = Edges;
+    type EdgesByTwo = [Edges; 2];
     type Wide = Portable16;
 
     #[inline]
@@ -265,6 +266,18 @@ impl Lanes for Portable {
             }
         }
         corners
+    }
+
+    #[inline]
+    fn meet_triangles_by_two(blocks: [&TriangleBlock; 2], rays: [&BlockRay; 2]) -> (u32, [Edges; 2]) {
+        let (first, of_first) = Self::meet_triangles::<false>(blocks[0], rays[0]);
+        let (second, of_second) = Self::meet_triangles::<false>(blocks[1], rays[1]);
+        (first | second << BLOCK, [of_first, of_second])
+    }
+
+    #[inline]
+    fn edges_of(both: &[Edges; 2], which: usize) -> Edges {
+        both[which % 2]
     }
 
     #[inline]

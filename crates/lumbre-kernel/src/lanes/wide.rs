@@ -5,6 +5,7 @@ use std::ops::{Add, Index, Mul, Sub};
 
 use bytemuck::Zeroable;
 
+use super::opaque_number;
 use crate::stack::stack_entry;
 
 /// Those that are sixteen.
@@ -65,7 +66,15 @@ pub(crate) trait Eight: Vector<Array = [f32; 8]> + Zeroable {
 }
 
 /// Sixteen.
-pub(crate) trait Wide: Vector<Array = [f32; WIDE]> {
+pub(crate) trait Wide: Vector<Array = [f32; WIDE]> + Zeroable {
+    /// Eight of them.
+    type Half: Eight;
+    /// Eight, and eight others.
+    fn of_two(first: Self::Half, second: Self::Half) -> Self;
+    /// Eight times the one, and eight times the other.
+    fn splat_two(first: f32, second: f32, last: LastEight) -> Self;
+    /// The first eight, or the last: `which` is 0 or 1.
+    fn half(&self, which: usize) -> Self::Half;
     fn load(row: &[f32; WIDE]) -> Self;
     /// Eight, and the same again.
     fn load_twice(row: &[f32; 8]) -> Self;
@@ -156,6 +165,24 @@ pub(crate) trait Wide: Vector<Array = [f32; WIDE]> {
             count += 1;
             rest &= rest - 1;
         }
+    }
+}
+
+/// The last eight of sixteen, as a mask of which the compiler knows nothing: where it does know, it shuffles numbers instead of reading each
+/// to where it belongs.
+#[derive(Clone, Copy)]
+pub(crate) struct LastEight(u32);
+
+impl LastEight {
+    #[inline(always)]
+    pub(crate) fn new() -> Self {
+        Self(opaque_number(0xff00))
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    pub(in crate::lanes) fn mask(self) -> u16 {
+        self.0 as u16
     }
 }
 
@@ -300,6 +327,31 @@ impl Eight for Portable8 {
 }
 
 impl Wide for Portable16 {
+    type Half = Portable8;
+
+    #[inline(always)]
+    fn of_two(first: Portable8, second: Portable8) -> Self {
+        let mut all = [0.0; WIDE];
+        for lane in 0..8 {
+            (all[lane], all[8 + lane]) = (first.0[lane], second.0[lane]);
+        }
+        Self(all)
+    }
+
+    #[inline(always)]
+    fn splat_two(first: f32, second: f32, _: LastEight) -> Self {
+        Self::of_two(Portable8::splat(first), Portable8::splat(second))
+    }
+
+    #[inline(always)]
+    fn half(&self, which: usize) -> Portable8 {
+        let mut half = [0.0; 8];
+        for (lane, one) in half.iter_mut().enumerate() {
+            *one = self.0[8 * (which % 2) + lane];
+        }
+        PortableVector(half)
+    }
+
     #[inline(always)]
     fn load(row: &[f32; WIDE]) -> Self {
         Self(*row)
@@ -478,15 +530,18 @@ mod x86 {
 
     use bytemuck::Zeroable;
 
-    use super::{AFTER_MIDDLE, BEFORE_MIDDLE, Eight, LANE_BITS, Row, Vector, WIDE, Wide};
+    use super::{AFTER_MIDDLE, BEFORE_MIDDLE, Eight, LANE_BITS, LastEight, Row, Vector, WIDE, Wide};
     use crate::lanes::opaque_number;
 
     /// Only where `lanes::x86::X86<true>` is: the instructions are there.
     #[derive(Clone, Copy)]
     pub(crate) struct Avx512(__m512);
 
+    // SAFETY: sixteen zeros are sixteen numbers.
+    unsafe impl Zeroable for Avx512 {}
+
     /// Only where `lanes::x86::X86<false>` is, alike.
-    #[derive(Clone, Copy)]
+    #[derive(Clone, Copy, Zeroable)]
     pub(crate) struct Avx2([__m256; 2]);
 
     /// Only where `lanes::x86::X86<AVX512>` is.
@@ -569,6 +624,13 @@ mod x86 {
         }
 
         #[inline(always)]
+        fn larger(self, other: Self) -> Self {
+            // The maximum by magnitude, without its sign.
+            // SAFETY: see the type.
+            unsafe { Self(_mm512_range_ps::<0b1011>(self.0, other.0)) }
+        }
+
+        #[inline(always)]
         fn turned_by(self, other: Self) -> Self {
             // SAFETY: see the type.
             unsafe {
@@ -591,6 +653,28 @@ mod x86 {
     }
 
     impl Wide for Avx512 {
+        type Half = Eight256<true>;
+
+        #[inline(always)]
+        fn of_two(first: Self::Half, second: Self::Half) -> Self {
+            // SAFETY: see the type.
+            unsafe { Self(_mm512_insertf32x8::<1>(_mm512_castps256_ps512(first.0), second.0)) }
+        }
+
+        #[inline(always)]
+        fn splat_two(first: f32, second: f32, last: LastEight) -> Self {
+            // SAFETY: see the type.
+            unsafe { Self(_mm512_mask_mov_ps(_mm512_set1_ps(first), last.mask(), _mm512_set1_ps(second))) }
+        }
+
+        #[inline(always)]
+        fn half(&self, which: usize) -> Self::Half {
+            // Where it is in memory, that is read from there.
+            let first: *const f32 = (&raw const self.0).cast();
+            // SAFETY: see the type. The load is of eight f32 of sixteen.
+            unsafe { Eight256(_mm256_loadu_ps(first.add(8 * (which % 2)))) }
+        }
+
         #[inline(always)]
         fn load(row: &[f32; WIDE]) -> Self {
             // SAFETY: see the type. The load is of sixteen f32.
@@ -1065,12 +1149,26 @@ mod x86 {
         }
     }
 
+    impl Avx512 {
+        /// # Safety
+        /// There must be what `lanes::x86::X86<true>` has.
+        #[inline(always)]
+        pub(in crate::lanes) unsafe fn new(sixteen: __m512) -> Self {
+            Self(sixteen)
+        }
+    }
+
     impl<const AVX512: bool> Eight256<AVX512> {
         /// # Safety
         /// There must be what `lanes::x86::X86<AVX512>` has.
         #[inline(always)]
         pub(in crate::lanes) unsafe fn new(eight: __m256) -> Self {
             Self(eight)
+        }
+
+        #[inline(always)]
+        pub(in crate::lanes) fn raw(self) -> __m256 {
+            self.0
         }
     }
 
@@ -1157,6 +1255,23 @@ mod x86 {
     }
 
     impl Wide for Avx2 {
+        type Half = Eight256<false>;
+
+        #[inline(always)]
+        fn of_two(first: Self::Half, second: Self::Half) -> Self {
+            Self([first.0, second.0])
+        }
+
+        #[inline(always)]
+        fn splat_two(first: f32, second: f32, _: LastEight) -> Self {
+            Self::of_two(Eight256::splat(first), Eight256::splat(second))
+        }
+
+        #[inline(always)]
+        fn half(&self, which: usize) -> Self::Half {
+            Eight256(self.0[which % 2])
+        }
+
         #[inline(always)]
         fn load(row: &[f32; WIDE]) -> Self {
             // SAFETY: see the type. The loads are of eight f32 each, of sixteen.

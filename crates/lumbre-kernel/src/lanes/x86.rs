@@ -8,7 +8,8 @@ use lumbre_geometry::Ray;
 use lumbre_math::{DAffine3, DVec3, Transform};
 
 use super::{
-    Axes, Corners, CornersRoom, Crossings, Lanes, Level, Question, Row, Set, Sides, Task, WIDE, Wide, wide,
+    Axes, Corners, CornersRoom, Crossings, Lanes, LastEight, Level, Question, Row, Set, Sides, Task, Vector,
+    WIDE, Wide, wide,
 };
 use crate::blocks::{MOST_SHARED, QUAD, TriangleBlock, USUAL, far_of_last};
 use crate::fleet;
@@ -70,30 +71,6 @@ const _: () =
 const _: () = assert!(size_of::<Ray>() == 72 && offset_of!(Ray, time) == 64);
 
 impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
-    /// The largest of the absolute values of six numbers, and of three others.
-    #[inline(always)]
-    fn sizes(x: &[__m256; 3], y: &[__m256; 3], z: &[__m256; 3]) -> (__m256, __m256) {
-        let (a, b, c) = (Self::larger(x[0], y[0]), Self::larger(x[1], y[1]), Self::larger(x[2], y[2]));
-        // SAFETY: see `X86`.
-        let across = unsafe { _mm256_max_ps(_mm256_max_ps(a, b), c) };
-        (across, Self::larger(Self::larger(z[0], z[1]), z[2]))
-    }
-
-    /// The larger of the absolute values.
-    #[inline(always)]
-    fn larger(a: __m256, b: __m256) -> __m256 {
-        // SAFETY: see `X86`.
-        unsafe {
-            if AVX512 {
-                // The maximum by magnitude, without its sign.
-                _mm256_range_ps::<0b1011>(a, b)
-            } else {
-                let without_sign = _mm256_castsi256_ps(_mm256_set1_epi32(i32::MAX));
-                _mm256_max_ps(_mm256_and_ps(a, without_sign), _mm256_and_ps(b, without_sign))
-            }
-        }
-    }
-
     /// A bit for each lane in which the comparison is true.
     #[inline(always)]
     fn compare<const HOW: i32>(a: __m256, b: __m256) -> u32 {
@@ -210,9 +187,7 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
         // compiler must not take out. Among others it may wait.
         let room = block.room();
         let rows_by_room = &ray.axes().rows_by_room;
-        let order = &ray.axes().order;
-        let far = far_of_last(room) as u32;
-        let by_room = [order[0] * room as u32, order[1] * room as u32, order[2] * room as u32, far];
+        let by_room = Self::rows_of(block, ray);
         let rows = if !IS_ALONE {
             &by_room
         } else if room > MOST_SHARED {
@@ -253,6 +228,33 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
             }
         }
         corners
+    }
+
+    /// Where the rows of a block begin, in the order of the ray's axes, and `far_of_last` in each of them.
+    #[inline(always)]
+    fn rows_of<S: Shears>(block: &TriangleBlock, ray: &S) -> [u32; 4] {
+        let (room, order) = (block.room(), &ray.axes().order);
+        let far = far_of_last(room) as u32;
+        [order[0] * room as u32, order[1] * room as u32, order[2] * room as u32, far]
+    }
+
+    /// The corners as numbers.
+    #[inline(always)]
+    fn eights([[a, b, c], [d, e, f], [g, h, i]]: [[__m256; 3]; 3]) -> [[wide::Eight256<AVX512>; 3]; 3] {
+        let of = wide::Eight256::<AVX512>::new;
+        // SAFETY: see `X86`.
+        unsafe { [[of(a), of(b), of(c)], [of(d), of(e), of(f)], [of(g), of(h), of(i)]] }
+    }
+
+    /// [`X86::sheared_corners`] of two blocks, each by its ray, one block after the other: those of the first, and those of the second.
+    #[inline(always)]
+    fn corners_of_each<S: Shears, W>(blocks: [&TriangleBlock; 2], rays: [&S; 2]) -> [[W; 3]; 3]
+    where
+        W: Wide<Half = wide::Eight256<AVX512>>,
+    {
+        let first = Self::eights(Self::sheared_corners::<_, false>(blocks[0], rays[0]));
+        let second = Self::eights(Self::sheared_corners::<_, false>(blocks[1], rays[1]));
+        super::corners_of_two(&first, &second)
     }
 
     /// Eight vertices from the `first` of these rows on, or those that `IS_FAR`: see [`X86::far`].
@@ -631,7 +633,7 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
 }
 
 /// What shears the corners of triangles.
-trait Shears {
+pub(crate) trait Shears {
     fn axes(&self) -> &'static Axes;
     /// In the order of the axes, here and below.
     fn origin(&self) -> &[f32; 4];
@@ -684,40 +686,183 @@ impl Shears for NarrowRay {
     }
 }
 
-/// How a line passes the edges of eight triangles.
+/// How a line passes the edges of eight triangles, or two lines those of eight each.
 #[derive(Clone, Copy, Zeroable)]
-pub(crate) struct Edges {
+pub(crate) struct Edges<V> {
     /// The edge functions.
-    values: [__m256; 3],
+    values: [V; 3],
     /// Of the corners.
-    heights: [__m256; 3],
+    heights: [V; 3],
     /// The least of them or of their opposites, whichever is more: how far within the triangle the line is.
-    within: __m256,
+    within: V,
     /// By how much they may be wrong, below zero, and the heights.
-    minus_error: __m256,
-    height_error: __m256,
+    minus_error: V,
+    height_error: V,
 }
 
-/// Which sixteen numbers go with which level.
-pub(crate) trait HasWide {
-    type Wide: Wide;
+impl<V: Vector> Edges<V> {
+    /// Of corners in the sheared spaces of the rays, which have these [`least_size`](BlockRay::least_size)s, and a bit for each triangle that is
+    /// perhaps met.
+    #[inline(always)]
+    fn of<const LEAKS: bool>([x, y, z]: [[V; 3]; 3], least_size: V) -> (u32, Self) {
+        let u = x[2].times_minus(y[1], y[2] * x[1]);
+        let v = x[0].times_minus(y[2], y[0] * x[2]);
+        let w = x[1].times_minus(y[0], y[1] * x[0]);
+        let within = u.min(v).min(w).max(u.max(v).max(w).turned_by(V::splat(-0.0)));
+        if LEAKS {
+            let (minus_error, height_error) = (V::splat(0.0), V::splat(0.0));
+            let edges = Self { values: [u, v, w], heights: z, within, minus_error, height_error };
+            return (minus_error.at_most(within), edges);
+        }
+        let across = x[0].larger(y[0]).max(x[1].larger(y[1])).max(x[2].larger(y[2]));
+        let along = z[0].larger(z[1]).larger(z[2]);
+        let size = across + along + least_size;
+        let minus_error = (size * V::splat(-EDGE_ERROR))
+            .times_minus(size.times_plus(V::splat(SIZE_ERROR), across), V::splat(TINY));
+        let height_error = size * V::splat(HEIGHT_ERROR);
+        let edges = Self { values: [u, v, w], heights: z, within, minus_error, height_error };
+        (minus_error.at_most(within), edges)
+    }
 }
 
-impl<const LEAKS: bool> HasWide for X86<true, LEAKS> {
+impl<W: Wide> Edges<W> {
+    /// Those of one of the two lines: `which` is 0 or 1.
+    #[inline(always)]
+    fn half(&self, which: usize) -> Edges<W::Half> {
+        let Self { values: [u, v, w], heights: [a, b, c], within, minus_error, height_error } = self;
+        Edges {
+            values: [u.half(which), v.half(which), w.half(which)],
+            heights: [a.half(which), b.half(which), c.half(which)],
+            within: within.half(which),
+            minus_error: minus_error.half(which),
+            height_error: height_error.half(which),
+        }
+    }
+
+    /// Those of two lines.
+    #[inline(always)]
+    fn of_two(first: &Edges<W::Half>, second: &Edges<W::Half>) -> Self {
+        Self {
+            values: super::three_of_two(&first.values, &second.values),
+            heights: super::three_of_two(&first.heights, &second.heights),
+            within: W::of_two(first.within, second.within),
+            minus_error: W::of_two(first.minus_error, second.minus_error),
+            height_error: W::of_two(first.height_error, second.height_error),
+        }
+    }
+}
+
+impl<const LEAKS: bool> X86<true, LEAKS> {
+    /// The corners of two blocks that share vertices.
+    #[inline(always)]
+    fn shared_by_two<S: Shears>(blocks: [&TriangleBlock; 2], rays: [&S; 2]) -> [[wide::Avx512; 3]; 3] {
+        let [first, second] = blocks;
+        let a = Self::sheared_sixteen(first, super::opaque(rays[0]), Self::rows_of(first, rays[0]));
+        let b = Self::sheared_sixteen(second, super::opaque(rays[1]), Self::rows_of(second, rays[1]));
+        let last = LastEight::new().mask();
+        let mut corners = [[wide::Avx512::zeroed(); 3]; 3];
+        // SAFETY: see `X86`.
+        unsafe {
+            let shifts = _mm512_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28, 0, 4, 8, 12, 16, 20, 24, 28);
+            let places = _mm512_set1_epi32(MOST_SHARED as i32 - 1);
+            // Of thirty-two numbers, the last sixteen.
+            let of_second = _mm512_maskz_set1_epi32(0xff00, MOST_SHARED as i32);
+            const OR_AND: i32 = 0b1111_1000;
+            for (corner, (&of_a, &of_b)) in first.corners().iter().zip(second.corners()).enumerate() {
+                let both = _mm512_mask_set1_epi32(_mm512_set1_epi32(of_a as i32), last, of_b as i32);
+                let both = _mm512_srlv_epi32(both, shifts);
+                let both = _mm512_ternarylogic_epi32::<OR_AND>(of_second, both, places);
+                corners[0][corner] = wide::Avx512::new(_mm512_permutex2var_ps(a[0], both, b[0]));
+                corners[1][corner] = wide::Avx512::new(_mm512_permutex2var_ps(a[1], both, b[1]));
+                corners[2][corner] = wide::Avx512::new(_mm512_permutex2var_ps(a[2], both, b[2]));
+            }
+        }
+        corners
+    }
+
+    /// The corners of two blocks that share none; `rests` are what rounding took from the origins of the rays.
+    #[inline(always)]
+    fn unshared_by_two<S: Shears>(
+        blocks: [&TriangleBlock; 2],
+        rays: [&S; 2],
+        rests: [&[f32; 4]; 2],
+    ) -> [[wide::Avx512; 3]; 3] {
+        let splat = wide::Avx512::splat_two;
+        let last = LastEight::new();
+        let [a, b] = [super::opaque(rays[0]), super::opaque(rays[1])];
+        let ([ax, ay, az, _], [bx, by, bz, _]) = (*a.origin(), *b.origin());
+        let origin = [splat(ax, bx, last), splat(ay, by, last), splat(az, bz, last)];
+        let rest = [splat(rests[0][0], rests[1][0], last), splat(rests[0][1], rests[1][1], last)];
+        let shear = [splat(a.shear()[0], b.shear()[0], last), splat(a.shear()[1], b.shear()[1], last)];
+        let [rows_a, rows_b] = [Self::rows_of(blocks[0], a), Self::rows_of(blocks[1], b)];
+        let [first, second] = [blocks[0].coordinates().as_ptr(), blocks[1].coordinates().as_ptr()];
+        let mut corners = [[wide::Avx512::zeroed(); 3]; 3];
+        for (corner, sheared) in corners.iter_mut().enumerate() {
+            let mut arms = [wide::Avx512::zeroed(); 3];
+            for (axis, arm) in arms.iter_mut().enumerate() {
+                let (of_a, of_b) = (rows_a[axis] as usize, rows_b[axis] as usize);
+                // SAFETY: see `X86`. Rows begin at 48 at most, and no more of them than 24 are looked at, in arrays of 96.
+                let vertices = unsafe {
+                    let low = _mm256_loadu_ps(first.add(of_a + BLOCK * corner));
+                    let high = _mm256_loadu_ps(second.add(of_b + BLOCK * corner));
+                    wide::Avx512::new(_mm512_insertf32x8::<1>(_mm512_castps256_ps512(low), high))
+                };
+                *arm = origin[axis] - vertices;
+            }
+            let [across, up, z] = arms;
+            *sheared = [shear[0].times_from(z, across + rest[0]), shear[1].times_from(z, up + rest[1]), z];
+        }
+        let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = corners;
+        [[ax, bx, cx], [ay, by, cy], [az, bz, cz]]
+    }
+}
+
+/// Which sixteen numbers go with which level, and what is different with them.
+pub(crate) trait HasWide<const AVX512: bool> {
+    type Wide: Wide<Half = wide::Eight256<AVX512>>;
+
+    /// [`X86::sheared_corners`] of two blocks, each by its ray: those of the first, and those of the second.
+    fn corners_by_two<S: Shears>(blocks: [&TriangleBlock; 2], rays: [&S; 2]) -> [[Self::Wide; 3]; 3];
+}
+
+impl<const LEAKS: bool> HasWide<true> for X86<true, LEAKS> {
     type Wide = wide::Avx512;
+
+    #[inline(always)]
+    fn corners_by_two<S: Shears>(blocks: [&TriangleBlock; 2], rays: [&S; 2]) -> [[Self::Wide; 3]; 3] {
+        let [first, second] = [blocks[0].is_unshared(), blocks[1].is_unshared()];
+        if !(first | second) {
+            return Self::shared_by_two(blocks, rays);
+        }
+        // Where there are no rests, there is so little to do that it pays no more to put both side by side first.
+        if !LEAKS
+            && first & second
+            && let (Some(a), Some(b)) = (rays[0].rest(), rays[1].rest())
+        {
+            return Self::unshared_by_two(blocks, rays, [a, b]);
+        }
+        Self::corners_of_each(blocks, rays)
+    }
 }
 
-impl<const LEAKS: bool> HasWide for X86<false, LEAKS> {
+impl<const LEAKS: bool> HasWide<false> for X86<false, LEAKS> {
     type Wide = wide::Avx2;
+
+    #[inline(always)]
+    fn corners_by_two<S: Shears>(blocks: [&TriangleBlock; 2], rays: [&S; 2]) -> [[Self::Wide; 3]; 3] {
+        Self::corners_of_each(blocks, rays)
+    }
 }
 
 impl<const AVX512: bool, const LEAKS: bool> Lanes for X86<AVX512, LEAKS>
 where
-    Self: HasWide,
+    Self: HasWide<AVX512>,
 {
     type Eight = wide::Eight256<AVX512>;
-    type Edges = Edges;
-    type Wide = <Self as HasWide>::Wide;
+    type Edges = Edges<Self::Eight>;
+    type EdgesByTwo = Edges<Self::Wide>;
+    type Wide = <Self as HasWide<AVX512>>::Wide;
+    const MEETS_BY_TWO: bool = AVX512;
     // In flight, where sixteen numbers are two vectors, a ray takes 1.6 times the instructions that it takes alone. What it gains by them
     // is waits that are filled, up to a fifth of the time in caches; but where another thread shares the core, that one fills them, and
     // rays in flight take up to 1.5 times as long. Far away, all gain; and sixty-four would leave little of the nearest cache to two.
@@ -907,10 +1052,12 @@ where
         block: &TriangleBlock,
         ray: &NarrowRay,
     ) -> [[wide::Eight256<AVX512>; 3]; 3] {
-        let [[a, b, c], [d, e, f], [g, h, i]] = Self::sheared_corners::<_, IS_ALONE>(block, ray);
-        let of = wide::Eight256::<AVX512>::new;
-        // SAFETY: see `X86`.
-        unsafe { [[of(a), of(b), of(c)], [of(d), of(e), of(f)], [of(g), of(h), of(i)]] }
+        Self::eights(Self::sheared_corners::<_, IS_ALONE>(block, ray))
+    }
+
+    #[inline(always)]
+    fn narrow_corners_by_two(blocks: [&TriangleBlock; 2], rays: [&NarrowRay; 2]) -> [[Self::Wide; 3]; 3] {
+        Self::corners_by_two(blocks, rays)
     }
 
     #[inline(always)]
@@ -1050,33 +1197,27 @@ where
     }
 
     #[inline(always)]
-    fn meet_triangles<const IS_ALONE: bool>(block: &TriangleBlock, ray: &BlockRay) -> (u32, Edges) {
-        let [x, y, z] = Self::sheared_corners::<_, IS_ALONE>(block, ray);
-        // SAFETY: see `X86`.
-        unsafe {
-            let u = _mm256_fmsub_ps(x[2], y[1], _mm256_mul_ps(y[2], x[1]));
-            let v = _mm256_fmsub_ps(x[0], y[2], _mm256_mul_ps(y[0], x[2]));
-            let w = _mm256_fmsub_ps(x[1], y[0], _mm256_mul_ps(y[1], x[0]));
-            let least = _mm256_min_ps(_mm256_min_ps(u, v), w);
-            let most = _mm256_max_ps(_mm256_max_ps(u, v), w);
-            let within = _mm256_max_ps(least, _mm256_xor_ps(most, _mm256_set1_ps(-0.0)));
-            if LEAKS {
-                let zero = _mm256_setzero_ps();
-                let mask = Self::compare::<_CMP_GE_OQ>(within, zero) & block.taken();
-                let (minus_error, height_error) = (zero, zero);
-                return (mask, Edges { values: [u, v, w], heights: z, within, minus_error, height_error });
-            }
-            let (across, along) = Self::sizes(&x, &y, &z);
-            let size = _mm256_add_ps(_mm256_add_ps(across, along), _mm256_set1_ps(ray.least_size));
-            let minus_error = _mm256_fnmsub_ps(
-                _mm256_mul_ps(size, _mm256_set1_ps(EDGE_ERROR)),
-                _mm256_fmadd_ps(size, _mm256_set1_ps(SIZE_ERROR), across),
-                _mm256_set1_ps(TINY),
-            );
-            let height_error = _mm256_mul_ps(size, _mm256_set1_ps(HEIGHT_ERROR));
-            let mask = Self::compare::<_CMP_GE_OQ>(within, minus_error) & block.taken();
-            (mask, Edges { values: [u, v, w], heights: z, within, minus_error, height_error })
+    fn meet_triangles<const IS_ALONE: bool>(block: &TriangleBlock, ray: &BlockRay) -> (u32, Self::Edges) {
+        let corners = Self::eights(Self::sheared_corners::<_, IS_ALONE>(block, ray));
+        let (mask, edges) = Edges::of::<LEAKS>(corners, Self::Eight::splat(ray.least_size));
+        (mask & block.taken(), edges)
+    }
+
+    #[inline(always)]
+    fn meet_triangles_by_two(blocks: [&TriangleBlock; 2], rays: [&BlockRay; 2]) -> (u32, Self::EdgesByTwo) {
+        if !AVX512 {
+            let (first, of_first) = Self::meet_triangles::<false>(blocks[0], rays[0]);
+            let (second, of_second) = Self::meet_triangles::<false>(blocks[1], rays[1]);
+            return (first | second << BLOCK, Edges::of_two(&of_first, &of_second));
         }
+        let least_size = Self::Wide::splat_two(rays[0].least_size, rays[1].least_size, LastEight::new());
+        let (mask, edges) = Edges::of::<LEAKS>(Self::corners_by_two(blocks, rays), least_size);
+        (mask & (blocks[0].taken() | blocks[1].taken() << BLOCK), edges)
+    }
+
+    #[inline(always)]
+    fn edges_of(both: &Self::EdgesByTwo, which: usize) -> Self::Edges {
+        both.half(which)
     }
 
     #[inline(always)]
@@ -1155,10 +1296,12 @@ where
     }
 
     #[inline(always)]
-    fn place_crossings(edges: &Edges, ray: &BlockRay) -> Crossings<wide::Eight256<AVX512>> {
+    fn place_crossings(edges: &Self::Edges, ray: &BlockRay) -> Crossings<wide::Eight256<AVX512>> {
         // SAFETY: see `X86`.
         unsafe {
-            let ([u, v, w], z) = (edges.values, edges.heights);
+            let ([u, v, w], [a, b, c]) = (edges.values, edges.heights);
+            let ([u, v, w], z) = ([u.raw(), v.raw(), w.raw()], [a.raw(), b.raw(), c.raw()]);
+            let (minus_error, height_error) = (edges.minus_error.raw(), edges.height_error.raw());
             let sign = _mm256_set1_ps(-0.0);
             let det = _mm256_add_ps(_mm256_add_ps(u, v), w);
             let weight = _mm256_andnot_ps(sign, det);
@@ -1183,12 +1326,12 @@ where
             let low = _mm256_min_ps(_mm256_min_ps(z[0], z[1]), z[2]);
             let high = _mm256_max_ps(_mm256_max_ps(z[0], z[1]), z[2]);
             let along_edges = _mm256_fmadd_ps(
-                edges.height_error,
-                _mm256_fmadd_ps(edges.minus_error, _mm256_set1_ps(-ERRORS_OF_EDGES), weight),
+                height_error,
+                _mm256_fmadd_ps(minus_error, _mm256_set1_ps(-ERRORS_OF_EDGES), weight),
                 _mm256_set1_ps(TINY),
             );
             let spread = _mm256_fmadd_ps(
-                _mm256_mul_ps(edges.minus_error, _mm256_set1_ps(-ERRORS_OF_EXTENT)),
+                _mm256_mul_ps(minus_error, _mm256_set1_ps(-ERRORS_OF_EXTENT)),
                 _mm256_sub_ps(high, low),
                 along_edges,
             );
@@ -1198,8 +1341,8 @@ where
                 [to, _mm256_mul_ps(weight, _mm256_set1_ps(range.first))],
                 [from, _mm256_mul_ps(weight, _mm256_set1_ps(range.last))],
             );
-            let error = _mm256_xor_ps(edges.minus_error, sign);
-            let inside = Self::compare::<_CMP_GT_OQ>(edges.within, error);
+            let error = _mm256_xor_ps(minus_error, sign);
+            let inside = Self::compare::<_CMP_GT_OQ>(edges.within.raw(), error);
             let surely_in_range = Self::both::<_CMP_GE_OQ, _CMP_LE_OQ>(
                 [from, _mm256_mul_ps(weight, _mm256_set1_ps(range.surely_first))],
                 [to, _mm256_mul_ps(weight, _mm256_set1_ps(range.surely_last))],
@@ -1211,9 +1354,9 @@ where
     }
 
     #[inline(always)]
-    fn fronts(edges: &Edges) -> u32 {
+    fn fronts(edges: &Self::Edges) -> u32 {
         // SAFETY: see `X86`.
-        let backs = unsafe { _mm256_movemask_ps(edges.values[0]) };
+        let backs = unsafe { _mm256_movemask_ps(edges.values[0].raw()) };
         !backs as u32
     }
 

@@ -27,6 +27,7 @@ impl<G: Goal, L: Lanes> Flyer<L> for NarrowFlyer<G> {
     const IS_ANY: bool = G::IS_ANY;
     const IS_MIXED: bool = false;
     type Pass = Pass<L::Eight>;
+    type Passes = Pass<L::Wide>;
     type At = Places<L::Eight>;
 
     #[inline(always)]
@@ -53,9 +54,19 @@ impl<G: Goal, L: Lanes> Flyer<L> for NarrowFlyer<G> {
     }
 
     #[inline(always)]
-    fn pass(&self, block: &TriangleBlock) -> (u32, Pass<L::Eight>) {
-        let (mask, lines) = self.ray.lines::<L, false>(block);
-        (mask, lines.pass())
+    fn pass_by_two(flyers: [&Self; 2], blocks: [&TriangleBlock; 2]) -> (u32, Pass<L::Wide>) {
+        if L::MEETS_BY_TWO {
+            let (mask, lines) = NarrowRay::lines_by_two::<L>([&flyers[0].ray, &flyers[1].ray], blocks);
+            return (mask, lines.pass());
+        }
+        let (first, of_first) = flyers[0].ray.lines::<L, false>(blocks[0]);
+        let (second, of_second) = flyers[1].ray.lines::<L, false>(blocks[1]);
+        (first | second << BLOCK, Pass::of_two(&of_first.pass(), &of_second.pass()))
+    }
+
+    #[inline(always)]
+    fn one_of(passes: &Pass<L::Wide>, which: usize) -> Pass<L::Eight> {
+        passes.half(which)
     }
 
     #[inline(always)]

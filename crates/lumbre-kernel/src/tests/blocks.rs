@@ -13,7 +13,8 @@ use lumbre_math::{DVec3, Transform, Vec3};
 
 use super::scenes::Random;
 use crate::blocks::{self, BlockNames, Blocks, TriangleBlock, Unit, Vertices};
-use crate::lanes::{Level, corners_at, equals_before_at, meet_triangles_at, truncated_at};
+use crate::lanes::{Level, corners_at, equals_before_at, meet_triangles_at, told_at, truncated_at};
+use crate::narrow::{NarrowRay, Precise};
 use crate::triangles::{BLOCK, BlockRay, Meeting, Shear, intersect};
 use crate::{Accel, BuildOptions, Geometry, GeometryKind, Preset, TriangleMesh};
 
@@ -152,6 +153,41 @@ fn the_test_of_a_block_loses_nothing_and_invents_nothing() {
             assert!(tally.hits > 6000, "{}", tally.hits);
         }
     }
+}
+
+#[test]
+fn what_two_rays_are_told_of_two_blocks_together_is_what_each_is_told_alone() {
+    let mut random = Random(81);
+    let mut sharing = [0; 3];
+    for _ in 0..600 {
+        // Such as share many of their corners, and such as do not.
+        let units = [(); 2].map(|()| {
+            let shares = [0.0, 0.0, 0.9][random.below(3)];
+            block(&mut random, shares, DVec3::ZERO, 1.0, 0.5)
+        });
+        let blocks = [&units[0], &units[1]].map(|units| Blocks::new(units).at(0).unwrap());
+        sharing[blocks.iter().filter(|block| !block.is_unshared()).count()] += 1;
+        let rays = [(); 2].map(|()| {
+            let (origin, direction) = (3.0 * random.vector(), random.vector());
+            let shear = Shear::new(&direction);
+            let local = shear.local_origin(&origin, &DVec3::ZERO);
+            let narrow = NarrowRay {
+                axes: shear.axes,
+                origin: [local[0] as f32, local[1] as f32, local[2] as f32, 0.0],
+                shear: [shear.x as f32, shear.y as f32, 0.0, f32::INFINITY],
+                minus_inverse: -1.0,
+                precise: Precise::new(1.0, 1.0),
+            };
+            let t_max = random.between(0.5, 6.0);
+            (BlockRay::new(&shear, &local, 3.0, 0.0, t_max).unwrap(), narrow)
+        });
+        for level in Level::all() {
+            let [together, alone] =
+                told_at(level, blocks, [&rays[0].0, &rays[1].0], [&rays[0].1, &rays[1].1]);
+            assert_eq!(together, alone, "{level:?}");
+        }
+    }
+    assert!(sharing.iter().all(|&pairs| pairs > 50), "{sharing:?}");
 }
 
 #[test]
