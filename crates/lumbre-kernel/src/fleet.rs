@@ -3,6 +3,9 @@
 //! Rays take their steps together, in short loops without branches, as long as it can be: which rays a loop is for is told by bits that
 //! one before it has put together. So little is foreseen wrongly but where loops end, and the processor has the steps of several rays in
 //! view at once, where a branch that was foreseen wrongly, or a longer step, would leave it one.
+//!
+//! Blocks are met by two rays at a time, each at its own: eight triangles or hulls of the one and eight of the other stand side by side where
+//! vectors hold sixteen numbers.
 
 mod double;
 
