@@ -13,12 +13,12 @@ use crate::blocks::{self, BlockNames, Blocks, Filled, LaneOrder, TriangleBlock, 
 use crate::build::{Binary, BinaryNode, Fork, Name};
 use crate::carve::{self, Cell, LaneCell};
 use crate::lanes::Level;
-use crate::node::{Node, WIDTH, tag};
+use crate::node::{Node, Units, WIDTH, tag};
 use crate::primitive::{Bounds, Kind, Primitive, Traits};
 use crate::spheres::SphereBlock;
 use crate::store::Store;
 use crate::triangles::BLOCK;
-use crate::{BuildError, Geometry, GeometryKind, SphereCloud};
+use crate::{BuildError, Geometry, GeometryKind, SphereCloud, occlusion};
 
 /// A primitive in a leaf that is no triangle, or outside the tree.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -595,7 +595,7 @@ pub(crate) fn lay_out(
 }
 
 impl Layout {
-    /// Fills the blocks. They are most of the tree: nothing of its making but names is to be left by now, and these are given
+    /// Fills the blocks, and sorts the children of nodes by what is in them. They are most of the tree: nothing of its making but names is to be left by now, and these are given
     /// back before.
     ///
     /// # Errors
@@ -603,6 +603,7 @@ impl Layout {
     pub(crate) fn pack(
         self,
         level: Level,
+        units: &Units,
         geometries: &[Geometry],
         names: Vec<Name>,
         cells: Vec<Cell>,
@@ -629,6 +630,8 @@ impl Layout {
             root: Some(root),
         };
         packed.pack_triangles(level, geometries, false)?;
+        let Packed { nodes, blocks, .. } = &mut packed;
+        occlusion::sort_children(level, units, nodes.to_mut(), Blocks::new(blocks));
         Ok(packed)
     }
 }

@@ -24,6 +24,7 @@ mod morton;
 mod narrow;
 mod nearest;
 mod node;
+mod occlusion;
 mod opening;
 mod options;
 mod outline;

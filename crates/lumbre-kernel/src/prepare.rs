@@ -94,7 +94,7 @@ fn build_here(geometries: Vec<Geometry>, effort: Effort) -> Result<Accel, BuildE
         let layout = lay_out(&traits, &tree, &names, &instances)?;
         drop((tree, instances));
         drop(primitives);
-        layout.pack(level, &geometries, names, cells)?
+        layout.pack(level, &units, &geometries, names, cells)?
     };
     let holds = Holds::new(&geometries, parts.sizes);
     let single = SingleStart::new(&holds, &units, tree.root);

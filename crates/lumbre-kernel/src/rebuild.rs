@@ -15,7 +15,7 @@ use crate::prepare::{self, take_apart};
 use crate::primitive::{Bounds, Kind, Primitive, Traits};
 use crate::refit::{Places, check_places, cost};
 use crate::triangles::BLOCK;
-use crate::{Accel, BuildOptions};
+use crate::{Accel, BuildOptions, occlusion};
 
 /// See [`Accel::rebuild_partially`].
 pub(crate) fn rebuild_partially(accel: &mut Accel, options: &BuildOptions) -> f64 {
@@ -25,11 +25,12 @@ pub(crate) fn rebuild_partially(accel: &mut Accel, options: &BuildOptions) -> f6
     let is_much = accel.tree.names.len() + accel.tree.entries.len() > PARALLEL;
     let relaid =
         if is_much { rayon::scope(|_| over_leaves(accel, effort)) } else { over_leaves(accel, effort) };
-    if let Some(Relaid { nodes, entries, root }) = relaid
+    if let Some(Relaid { mut nodes, entries, root }) = relaid
         && let new_cost = cost(&nodes)
         && new_cost < best
     {
         best = new_cost;
+        occlusion::sort_children(accel.level, &accel.units, &mut nodes, accel.tree.blocks());
         let tree = &mut accel.tree;
         (tree.nodes, tree.entries, tree.root) = (nodes.into(), entries.into(), Some(root));
         accel.follow_tree();

@@ -12,6 +12,7 @@ mod inside;
 mod motion;
 mod narrow;
 mod nearest;
+mod occlusion;
 mod opening;
 mod options;
 mod oracle;
