@@ -495,17 +495,31 @@ impl<'a> Cursor<'a> {
     }
 }
 
-/// Children of a wide node by rank, and of one rank the largest last: where any hit will do, it is asked first, for it is the
-/// likeliest to have one.
+/// Children of a wide node.
 struct Gathered<'a> {
+    order: ChildOrder,
     children: [Cursor<'a>; WIDTH],
     keys: [(u8, f32); WIDTH],
     len: usize,
 }
 
+/// In which order they are gathered.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum ChildOrder {
+    /// By rank, and of one rank the largest last: where any hit will do, it is asked first, for it is the likeliest to have one.
+    BySize,
+    /// Whichever: they are only counted, or sorted later, as those are below which there is nothing but triangles (see [`occlusion`]).
+    Any,
+}
+
 impl<'a> Gathered<'a> {
     #[inline(always)]
     fn put(&mut self, rank: u8, child: Cursor<'a>) {
+        if self.order == ChildOrder::Any {
+            self.children[self.len] = child;
+            self.len += 1;
+            return;
+        }
         let key = (rank, child.bounds().half_area());
         let mut at = self.len;
         while at > 0 && self.keys[at - 1] > key {
@@ -569,7 +583,9 @@ pub(crate) fn lay_out(
     names: &[Name],
     instances: &[Primitive],
 ) -> Result<Layout, BuildError> {
-    let packer = Packer { traits, names, instances };
+    let is_triangle = |traits: &Traits| traits.kind == Kind::Triangle;
+    let order = if traits.iter().all(is_triangle) { ChildOrder::Any } else { ChildOrder::BySize };
+    let packer = Packer { traits, names, instances, order };
     let root = Cursor::new(binary);
     let plan = packer.plan(root);
     let total = plan.as_ref().map_or_else(|| packer.count(root), |plan| plan.total);
@@ -721,6 +737,8 @@ struct Packer<'a> {
     traits: &'a [Traits],
     names: &'a [Name],
     instances: &'a [Primitive],
+    /// Of what is put.
+    order: ChildOrder,
 }
 
 impl<'a> Packer<'a> {
@@ -739,8 +757,8 @@ impl<'a> Packer<'a> {
 
     /// The children in the wide tree of what is no leaf there.
     #[inline(always)]
-    fn gather(&self, root: Cursor<'a>) -> ([Cursor<'a>; WIDTH], usize) {
-        let mut found = Gathered { children: [root; WIDTH], keys: [(0, 0.0); WIDTH], len: 0 };
+    fn gather(&self, root: Cursor<'a>, order: ChildOrder) -> ([Cursor<'a>; WIDTH], usize) {
+        let mut found = Gathered { order, children: [root; WIDTH], keys: [(0, 0.0); WIDTH], len: 0 };
         let mut pending = [(root, WIDTH, 0); WIDTH];
         let mut waiting = 1;
         while waiting > 0 {
@@ -779,7 +797,7 @@ impl<'a> Packer<'a> {
     /// `None` for a leaf, or a node over few primitives.
     fn plan(&self, root: Cursor<'a>) -> Option<Box<Plan<'a>>> {
         let Cursor::Fork(Fork { nodes: MANY.., .. }) = root else { return None };
-        let (children, len) = self.gather(root);
+        let (children, len) = self.gather(root, self.order);
         let mut plans: [Option<Box<Plan>>; WIDTH] = Default::default();
         let mut counts = [Counts::default(); WIDTH];
         plans[..len].par_iter_mut().zip(&mut counts[..len]).zip(&children[..len]).for_each(
@@ -804,7 +822,7 @@ impl<'a> Packer<'a> {
                 }
             };
         }
-        let (children, len) = self.gather(root);
+        let (children, len) = self.gather(root, ChildOrder::Any);
         let mut total = Counts { nodes: 1, ..Counts::default() };
         children[..len].iter().for_each(|&child| total += self.count(child));
         total
@@ -834,7 +852,7 @@ impl<'a> Packer<'a> {
         if let Some(names) = self.leaf(root) {
             return self.put_leaf(names, room);
         }
-        let (children, len) = self.gather(root);
+        let (children, len) = self.gather(root, self.order);
         let place = room.start.nodes;
         let own = room.take(Counts { nodes: 1, ..Counts::default() });
         let mut references = [Node::ABSENT; WIDTH];

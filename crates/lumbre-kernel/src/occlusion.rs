@@ -15,7 +15,7 @@
 use rayon::prelude::*;
 
 use crate::blocks::{Blocks, TriangleBlock};
-use crate::lanes::{CornersRoom, Eight, Lanes, Level, Task, Vector};
+use crate::lanes::{CornersRoom, Eight, Lanes, Level, Task, Vector, Wide};
 use crate::node::{Node, Units, WIDTH, tag};
 
 /// What is to be expected of a ray that meets a box.
@@ -27,19 +27,16 @@ struct Odds {
     cost: f32,
 }
 
-impl Odds {
-    const NONE: Self = Self { stops: 0.0, cost: 1.0 };
-}
+/// Nodes of which one thread sorts the children at once.
+const FEW: usize = if cfg!(test) { 8 } else { 256 };
 
-/// From how many nodes on threads share the work.
-const MANY: usize = if cfg!(test) { 8 } else { 256 };
-
-/// Sorts the children of every node below which there is nothing but triangles. Nodes stand depth first, those below one child behind
+/// Sorts the children of every node below which there is nothing but triangles. Nodes stand depth first: those below one child behind
 /// those below the children that stand before it.
 pub(crate) fn sort_children(level: Level, units: &Units, nodes: &mut [Node], blocks: Blocks) {
     Sorter { level, blocks, scale: units.scale as f32 }.sort(nodes, 0);
 }
 
+#[derive(Clone, Copy)]
 struct Sorter<'a> {
     level: Level,
     blocks: Blocks<'a>,
@@ -51,66 +48,127 @@ impl Sorter<'_> {
     /// Sorts the children of a node and of those below it, the first of which stands at this place; what is to be expected of it,
     /// where that is known.
     fn sort(&self, nodes: &mut [Node], place: usize) -> Option<Odds> {
-        let is_shared = nodes.len() > MANY;
+        if nodes.len() <= FEW {
+            return self.level.run(SortFew { sorter: *self, nodes, place });
+        }
         let (node, mut rest) = nodes.split_first_mut()?;
-        let len = node.len();
         let children = node.children;
-        let is_inner = |child: u32| child >> tag::SHIFT == tag::INNER;
-        let (mut below, mut first) = (<[&mut [Node]; WIDTH]>::default(), place + 1);
-        for lane in 0..len {
-            if is_inner(children[lane]) {
-                let next = children[lane + 1..len].iter().copied().find(|&child| is_inner(child));
-                let end = next.map_or(first + rest.len(), |next| next as usize);
-                below[lane] = rest.split_off_mut(..end - first).expect("nodes stand depth first");
-                first = end;
-            }
+        let inner = || children.iter().enumerate().filter(|(_, child)| *child >> tag::SHIFT == tag::INNER);
+        let mut ends = inner().skip(1).map(|(_, &child)| child as usize);
+        let mut first = place + 1;
+        let mut below = Vec::with_capacity(WIDTH);
+        for (lane, _) in inner() {
+            let end = ends.next().unwrap_or(first + rest.len());
+            below.push((lane, first, rest.split_off_mut(..end - first).expect("nodes stand depth first")));
+            first = end;
         }
-        let seen = self.level.run(Look { sorter: self, node });
-        let odds_of = |lane: usize, below: &mut [Node]| match children[lane] >> tag::SHIFT {
-            tag::INNER => self.sort(below, children[lane] as usize),
-            tag::TRIANGLES => Some(seen.leaves[lane]),
-            _ => None,
-        };
+        let found: Vec<_> =
+            below.into_par_iter().map(|(lane, first, nodes)| (lane, self.sort(nodes, first))).collect();
         let mut odds = [None; WIDTH];
-        let lanes = odds[..len].iter_mut().zip(&mut below[..len]).enumerate();
-        if is_shared {
-            let mut lanes: Vec<_> = lanes.collect();
-            lanes.par_iter_mut().for_each(|(lane, (odds, below))| **odds = odds_of(*lane, below));
-        } else {
-            lanes.for_each(|(lane, (odds, below))| *odds = odds_of(lane, below));
+        found.into_iter().for_each(|(lane, found)| odds[lane] = found);
+        self.level.run(SortOne { sorter: *self, node, odds })
+    }
+
+    /// Sorts the children of a node, where this is what is to be expected of those that are nodes.
+    #[inline(always)]
+    fn sort_one<L: Lanes>(
+        &self,
+        node: &mut Node,
+        inner: &[Option<Odds>; WIDTH],
+        room: &mut CornersRoom,
+    ) -> Option<Odds> {
+        let areas = Areas::of::<L>(node);
+        let (mut stops, mut costs) = ([0.0; WIDTH], [1.0; WIDTH]);
+        let mut len = 0;
+        for (lane, &child) in node.children.iter().enumerate() {
+            let odds = match child >> tag::SHIFT {
+                tag::INNER => inner[lane]?,
+                tag::TRIANGLES => {
+                    let (mut triangles, mut cost) = (0.0, 0.0);
+                    for block in self.blocks.leaf(child) {
+                        triangles += area_of::<L>(block, self.scale, room);
+                        cost += 1.0;
+                    }
+                    // A number, whatever the box.
+                    Odds { stops: (triangles / areas.of_children[lane]).min(1.0), cost }
+                }
+                _ if child == Node::ABSENT => break,
+                _ => return None,
+            };
+            (stops[lane], costs[lane]) = (odds.stops, odds.cost);
+            len += 1;
         }
-        let mut known = [Odds::NONE; WIDTH];
-        for (known, odds) in known.iter_mut().zip(&odds[..len]) {
-            *known = (*odds)?;
+        // From the last to the first: by falling odds for their cost.
+        let keys = L::Wide::load(&stops).over(L::Wide::load(&costs)).lanes_in_bits();
+        let by_lane = keys.bits();
+        let mut order = [0; WIDTH];
+        for (lane, &key) in by_lane[..len].iter().enumerate() {
+            let above = keys.bits_above(key) & ((1 << len) - 1);
+            order[(len - 1 - above.count_ones() as usize) % WIDTH] = lane;
         }
-        let order = order_of(&known[..len]);
         put_in_order(node, &order[..len]);
-        Some(seen.odds(&known, &order[..len]))
+        let (mut goes_on, mut cost) = (1.0, 1.0);
+        for &lane in order[..len].iter().rev() {
+            let lane = lane % WIDTH;
+            let share = areas.of_children[lane] * areas.inverse;
+            cost += goes_on * share * costs[lane];
+            goes_on *= 1.0 - share * stops[lane];
+        }
+        Some(Odds { stops: 1.0 - goes_on, cost })
     }
 }
 
-/// The lanes by rising odds for their cost; of equal ones as they were.
-fn order_of(odds: &[Odds]) -> [usize; WIDTH] {
-    let (mut order, mut keys) = ([0; WIDTH], [0.0; WIDTH]);
-    for (lane, odds) in odds.iter().enumerate() {
-        let key = odds.stops / odds.cost;
-        let mut at = lane;
-        while at > 0 && keys[at - 1] > key {
-            (order[at], keys[at]) = (order[at - 1], keys[at - 1]);
-            at -= 1;
+/// Sorts the children of these nodes, all that there are below the first, which stands at this place.
+struct SortFew<'a> {
+    sorter: Sorter<'a>,
+    nodes: &'a mut [Node],
+    place: usize,
+}
+
+impl Task for SortFew<'_> {
+    type Output = Option<Odds>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Option<Odds> {
+        let Self { sorter, nodes, place } = self;
+        let mut room = CornersRoom::new();
+        let mut odds = [None; FEW];
+        for at in (0..nodes.len()).rev() {
+            let node = &mut nodes[at];
+            let mut inner = [None; WIDTH];
+            for (odds_of, &child) in inner.iter_mut().zip(&node.children) {
+                if child >> tag::SHIFT == tag::INNER {
+                    *odds_of = odds[(child as usize - place) % FEW];
+                }
+            }
+            odds[at % FEW] = sorter.sort_one::<L>(node, &inner, &mut room);
         }
-        (order[at], keys[at]) = (lane, key);
+        odds[0]
     }
-    order
+}
+
+/// Sorts the children of a node, where this is what is to be expected of those that are nodes.
+struct SortOne<'a> {
+    sorter: Sorter<'a>,
+    node: &'a mut Node,
+    odds: [Option<Odds>; WIDTH],
+}
+
+impl Task for SortOne<'_> {
+    type Output = Option<Odds>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Option<Odds> {
+        self.sorter.sort_one::<L>(self.node, &self.odds, &mut CornersRoom::new())
+    }
 }
 
 /// Puts the children of a node in an order of their lanes.
+#[inline(always)]
 fn put_in_order(node: &mut Node, order: &[usize]) {
-    if order.is_sorted() {
-        return;
-    }
     let before = *node;
     for (lane, &from) in order.iter().enumerate() {
+        let from = from % WIDTH;
         node.children[lane] = before.children[from];
         for (row, before) in node.planes.iter_mut().zip(&before.planes) {
             row[lane] = before[from];
@@ -118,80 +176,36 @@ fn put_in_order(node: &mut Node, order: &[usize]) {
     }
 }
 
-/// What is seen of a node at once.
-struct Seen {
-    /// What is to be expected of its leaves of triangles; of other children it means nothing.
-    leaves: [Odds; WIDTH],
-    /// Of the surface of its box, the shares of the children's, in the order in which they stood.
-    shares: [f32; WIDTH],
+/// Of the boxes of a node.
+struct Areas {
+    /// Half the surfaces of those of its children; none of one that is inside out, as of leaves in which nothing has an area any more.
+    of_children: [f32; WIDTH],
+    /// One by that of its own, or zero where it has none.
+    inverse: f32,
 }
 
-impl Seen {
-    /// What is to be expected of it, where this is of its children, which are asked in this order, the last first.
-    fn odds(&self, children: &[Odds; WIDTH], order: &[usize]) -> Odds {
-        let (mut goes_on, mut cost) = (1.0, 1.0);
-        for &lane in order.iter().rev() {
-            let (share, odds) = (self.shares[lane], children[lane]);
-            cost += goes_on * share * odds.cost;
-            goes_on *= 1.0 - share * odds.stops;
-        }
-        Odds { stops: 1.0 - goes_on, cost }
-    }
-}
-
-/// Looks at the boxes of a node, and at the triangles of its leaves.
-struct Look<'a> {
-    sorter: &'a Sorter<'a>,
-    node: &'a Node,
-}
-
-impl Task for Look<'_> {
-    type Output = Seen;
-
+impl Areas {
     #[inline(always)]
-    fn run<L: Lanes>(self) -> Seen {
-        let Self { sorter: Sorter { blocks, scale, .. }, node } = self;
-        let len = node.len();
-        let mut areas = [0.0; WIDTH];
-        let (mut low, mut high) = ([f32::MAX; 3], [-f32::MAX; 3]);
-        for (lane, area) in areas[..len].iter_mut().enumerate() {
-            let [from, to] = [0, 1].map(|side| [0, 2, 4].map(|axis| node.planes[axis + side][lane]));
-            for axis in 0..3 {
-                (low[axis], high[axis]) = (low[axis].min(from[axis]), high[axis].max(to[axis]));
-            }
-            *area = half_area(from, to);
+    fn of<L: Lanes>(node: &Node) -> Self {
+        let zero = L::Wide::splat(0.0);
+        let (mut sizes, mut all) = ([zero; 3], [0.0_f32; 3]);
+        for axis in 0..3 {
+            let low = L::Wide::load(&node.planes[2 * axis]);
+            let high = L::Wide::load(&node.planes[2 * axis + 1]);
+            sizes[axis] = (high - low).max(zero);
+            all[axis] = (high.most() + (zero - low).most()).max(0.0);
         }
-        let whole = half_area(low, high);
-        let mut seen = Seen { leaves: [Odds::NONE; WIDTH], shares: [0.0; WIDTH] };
-        for (lane, &area) in areas[..len].iter().enumerate() {
-            // A number, and no more than one, whatever the boxes.
-            seen.shares[lane] = (area / whole).min(1.0);
-            let child = node.children[lane];
-            if child >> tag::SHIFT == tag::TRIANGLES {
-                let (mut triangles, mut cost) = (0.0, 0.0);
-                for block in blocks.leaf(child) {
-                    triangles += area_of::<L>(block, *scale);
-                    cost += 1.0;
-                }
-                seen.leaves[lane] = Odds { stops: (triangles / area).min(1.0), cost };
-            }
-        }
-        seen
+        let ([x, y, z], [all_x, all_y, all_z]) = (sizes, all);
+        let of_children = (x * y + y * z + z * x).to_array();
+        let whole = all_x * all_y + all_y * all_z + all_z * all_x;
+        Self { of_children, inverse: if whole > 0.0 { 1.0 / whole } else { 0.0 } }
     }
-}
-
-/// Half of the surface of a box: none of one that is inside out, as of leaves in which nothing has an area any more.
-#[inline(always)]
-fn half_area(low: [f32; 3], high: [f32; 3]) -> f32 {
-    let [x, y, z] = [0, 1, 2].map(|axis| (high[axis] - low[axis]).max(0.0));
-    x * y + y * z + z * x
 }
 
 /// The area of the triangles of a block, in tree units.
 #[inline(always)]
-fn area_of<L: Lanes>(block: &TriangleBlock, scale: f32) -> f32 {
-    let mut room = CornersRoom::new();
-    let corners = L::corners(block, &mut room);
+fn area_of<L: Lanes>(block: &TriangleBlock, scale: f32, room: &mut CornersRoom) -> f32 {
+    let corners = L::corners(block, room);
     let scale = L::Eight::splat(scale);
     let (mut a, mut b) = ([scale; 3], [scale; 3]);
     for (axis, [first, second, third]) in corners.iter().enumerate() {
@@ -201,10 +215,7 @@ fn area_of<L: Lanes>(block: &TriangleBlock, scale: f32) -> f32 {
     }
     let ([ax, ay, az], [bx, by, bz]) = (a, b);
     let (x, y, z) = (ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx);
-    let doubled = (x * x + y * y + z * z).sqrt().to_array();
-    let mut sum = 0.0;
-    for (lane, area) in doubled.into_iter().enumerate() {
-        sum += if block.taken() >> lane & 1 != 0 { area } else { 0.0 };
-    }
-    0.5 * sum
+    // Lanes without a triangle have all corners in one place.
+    let [a, b, c, d, e, f, g, h] = (x * x + y * y + z * z).sqrt().to_array();
+    0.5 * (((a + e) + (c + g)) + ((b + f) + (d + h)))
 }
