@@ -49,6 +49,19 @@ pub(crate) trait Flyer<L: Lanes>: Sized {
     fn start(start: &SingleStart, ray: &Self::Ray) -> Option<Slabs>;
     /// Sets out as a ray, in the place of another.
     fn set_out(&mut self, exact: &Exact, ray: &Self::Ray, slabs: &Slabs);
+    /// Four set out, as far as [`start`](Self::start) does; a bit for each that does.
+    #[inline(always)]
+    fn set_out_by_four(exact: &Exact, rays: [&Self::Ray; 4], flights: [(&mut Self, &mut Slabs); 4]) -> u32 {
+        let mut started = 0;
+        for (i, (ray, (flyer, slabs))) in rays.into_iter().zip(flights).enumerate() {
+            if let Some(own) = Self::start(exact.start, ray) {
+                flyer.set_out(exact, ray, &own);
+                *slabs = own;
+                started |= 1 << i;
+            }
+        }
+        started
+    }
     /// How the lines of two pass the triangles of two blocks, each those of its own, and a bit for each that they may meet: eight of the
     /// first, and eight of the second.
     fn pass_by_two(flyers: [&Self; 2], blocks: [&TriangleBlock; 2]) -> (u32, Self::Passes);
@@ -152,6 +165,12 @@ impl Iterator for Bits {
 }
 
 impl Bits {
+    /// The first four, if there are as many.
+    #[inline(always)]
+    fn first_four(mut self) -> Option<[usize; 4]> {
+        Some([self.next()?, self.next()?, self.next()?, self.next()?])
+    }
+
     /// Two at a time; the last of an odd number comes with itself.
     #[inline(always)]
     fn by_two(self) -> ByTwo {
@@ -319,6 +338,30 @@ impl<'a, 'r, F: Flyer<L>, L: Lanes> Fleet<'a, 'r, F, L> {
         stack.push(Self::bottom());
         *self.references.of(place) = start.root;
         if F::IS_MIXED { self.meet_infinite(place) } else { true }
+    }
+
+    /// The same of four, where there is nothing but triangles; a bit for each.
+    #[inline(always)]
+    fn set_out_by_four(&mut self, places: [usize; 4], positions: [usize; 4]) -> u32 {
+        let Self { exact, rays, flights, .. } = self;
+        let Ok([a, b, c, d]) = flights.get_disjoint_mut(places) else { return 0 };
+        [a.position, b.position, c.position, d.position] = positions;
+        let [w, x, y, z] = positions;
+        let rays = [&rays[w], &rays[x], &rays[y], &rays[z]];
+        let flights = [
+            (&mut a.flyer, &mut a.slabs),
+            (&mut b.flyer, &mut b.slabs),
+            (&mut c.flyer, &mut c.slabs),
+            (&mut d.flyer, &mut d.slabs),
+        ];
+        let started = F::set_out_by_four(exact, rays, flights);
+        for (i, place) in places.into_iter().enumerate() {
+            let stack = &mut self.stacks[place];
+            stack.clear();
+            stack.push(Self::bottom());
+            *self.references.of(place) = if started >> i & 1 != 0 { exact.start.root } else { END };
+        }
+        started
     }
 
     /// One that sets out meets what has no bounds; false where the plain search has to answer.
@@ -597,7 +640,28 @@ pub(crate) fn fly<F: Flyer<L>, L: Lanes>(
         if at_ends.count_ones() >= ENOUGH || at_ends == under_way {
             fleet.answer(at_ends, ends);
             under_way &= !at_ends;
-            for place in Bits(at_ends) {
+            let mut free = at_ends;
+            if !F::IS_MIXED && L::STARTS_BY_FOUR {
+                while let Some((&four, _)) = waiting.as_slice().split_first_chunk()
+                    && let Some(places) = Bits(free).first_four()
+                {
+                    for &position in waiting.as_slice().iter().skip(AHEAD).take(4) {
+                        lanes::fetch(&rays[position]);
+                    }
+                    waiting = waiting.as_slice()[4..].iter();
+                    let started = fleet.set_out_by_four(places, four);
+                    for (i, (place, position)) in places.into_iter().zip(four).enumerate() {
+                        if started >> i & 1 != 0 {
+                            ends.fetch(position);
+                            under_way |= bit(true, place);
+                            free &= !bit(true, place);
+                        } else {
+                            ends.put(position, Outcome::Unsettled);
+                        }
+                    }
+                }
+            }
+            for place in Bits(free) {
                 if let Some(&position) = waiting.as_slice().get(AHEAD) {
                     lanes::fetch(&rays[position]);
                 }

@@ -316,6 +316,17 @@ impl Nearest {
 }
 
 impl NarrowRay {
+    /// Of no ray.
+    pub(crate) fn of_none(start: &SingleStart) -> Self {
+        Self {
+            axes: Axes::by_bits(0, 0),
+            origin: [0.0; 4],
+            shear: [0.0; 4],
+            minus_inverse: 0.0,
+            precise: start.precise,
+        }
+    }
+
     #[inline(always)]
     fn t_min(&self) -> f32 {
         self.origin[3]

@@ -63,6 +63,8 @@ pub(crate) trait Lanes: SphereLanes {
     type Wide: Wide<Half = Self::Eight>;
     /// Whether two rays, each at a block of its own, are better met together than one after the other.
     const MEETS_BY_TWO: bool = false;
+    /// Whether rays in single precision are better started by four than one after the other.
+    const STARTS_BY_FOUR: bool = false;
     /// How many rays fly at once.
     const FLIGHTS: usize = fleet::FLIGHTS;
     /// Whether rays also fly through trees that caches hold.
@@ -119,6 +121,16 @@ pub(crate) trait Lanes: SphereLanes {
 
     /// The same ray for triangles.
     fn start_narrow_blocks(start: &SingleStart, ray: &Ray32, slabs: &Slabs) -> NarrowRay;
+
+    /// Both of four rays, and a bit for each that comes from nearby and is sound; what is made of the others means nothing.
+    #[inline(always)]
+    fn start_narrow_by_four(
+        start: &SingleStart,
+        rays: [&Ray32; 4],
+        places: [(&mut Slabs, &mut NarrowRay); 4],
+    ) -> u32 {
+        start_narrow_one_by_one::<Self>(start, rays, places)
+    }
 
     /// The corners of the triangles of a block in the ray's sheared space, `[x, y or z][corner]`, all with the sign turned; what lanes
     /// without a triangle have means nothing. No product is fused with a sum: it is the same on every machine. `IS_ALONE` says that the
@@ -183,6 +195,24 @@ pub(crate) fn three_of_two<W: Wide>(first: &[W::Half; 3], second: &[W::Half; 3])
 fn corners_of_two<W: Wide>(first: &[[W::Half; 3]; 3], second: &[[W::Half; 3]; 3]) -> [[W; 3]; 3] {
     let [x, y, z] = first;
     [three_of_two(x, &second[0]), three_of_two(y, &second[1]), three_of_two(z, &second[2])]
+}
+
+/// [`Lanes::start_narrow_by_four`], one ray after the other.
+#[inline(always)]
+fn start_narrow_one_by_one<L: Lanes + ?Sized>(
+    start: &SingleStart,
+    rays: [&Ray32; 4],
+    places: [(&mut Slabs, &mut NarrowRay); 4],
+) -> u32 {
+    let mut fit = 0;
+    for (i, (ray, (slabs, narrow))) in rays.into_iter().zip(places).enumerate() {
+        if let Some(started) = L::start_narrow(start, ray) {
+            *narrow = L::start_narrow_blocks(start, ray, &started);
+            *slabs = started;
+            fit |= 1 << i;
+        }
+    }
+    fit
 }
 
 /// Corners of triangles side by side, `[axis][corner][lane]`; those of lanes without a triangle mean nothing.
@@ -625,6 +655,35 @@ pub(crate) fn read_at(level: Level, ray: &Ray, narrow: &Ray32) -> (Ray, Ray32, R
         }
     }
     level.run(Reading(ray, narrow))
+}
+
+/// What [`Lanes::start_narrow_by_four`] gives at a level, and what it gives one by one, for tests.
+#[cfg(test)]
+pub(crate) fn start_narrow_by_four_at(
+    level: Level,
+    start: &SingleStart,
+    rays: [&Ray32; 4],
+) -> [[Option<(Slabs, NarrowRay)>; 4]; 2] {
+    struct Starting<'a>(&'a SingleStart, [&'a Ray32; 4]);
+    impl Task for Starting<'_> {
+        type Output = [[Option<(Slabs, NarrowRay)>; 4]; 2];
+        #[inline(always)]
+        fn run<L: Lanes>(self) -> Self::Output {
+            let Self(start, rays) = self;
+            [true, false].map(|is_together| {
+                let mut starts = [(Slabs::ZERO, NarrowRay::of_none(start)); 4];
+                let [a, b, c, d] = &mut starts;
+                let places = [a, b, c, d].map(|(slabs, narrow)| (slabs, narrow));
+                let fit = if is_together {
+                    L::start_narrow_by_four(start, rays, places)
+                } else {
+                    start_narrow_one_by_one::<L>(start, rays, places)
+                };
+                std::array::from_fn(|i| (fit >> i & 1 != 0).then_some(starts[i]))
+            })
+        }
+    }
+    level.run(Starting(start, rays))
 }
 
 /// What [`Lanes::start_placed`] gives at a level, for tests.

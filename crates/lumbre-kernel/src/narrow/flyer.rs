@@ -7,7 +7,7 @@ use crate::Ray32;
 use crate::blocks::TriangleBlock;
 use crate::fleet::{Crossing, Flyer};
 use crate::holds::SingleStart;
-use crate::lanes::{Axes, Eight, Lanes, Vector};
+use crate::lanes::{Eight, Lanes, Vector};
 use crate::node::Slabs;
 use crate::single::{Exact, Outcome};
 use crate::triangles::{self, BLOCK};
@@ -32,14 +32,7 @@ impl<G: Goal, L: Lanes> Flyer<L> for NarrowFlyer<G> {
 
     #[inline(always)]
     fn new(start: &SingleStart) -> Self {
-        let ray = NarrowRay {
-            axes: Axes::by_bits(0, 0),
-            origin: [0.0; 4],
-            shear: [0.0; 4],
-            minus_inverse: 0.0,
-            precise: start.precise,
-        };
-        Self { ray, nearest: Nearest::NONE, goal: PhantomData }
+        Self { ray: NarrowRay::of_none(start), nearest: Nearest::NONE, goal: PhantomData }
     }
 
     #[inline(always)]
@@ -51,6 +44,15 @@ impl<G: Goal, L: Lanes> Flyer<L> for NarrowFlyer<G> {
     fn set_out(&mut self, exact: &Exact, ray: &Ray32, slabs: &Slabs) {
         self.ray = L::start_narrow_blocks(exact.start, ray, slabs);
         self.nearest.0 = None;
+    }
+
+    #[inline(always)]
+    fn set_out_by_four(exact: &Exact, rays: [&Ray32; 4], flights: [(&mut Self, &mut Slabs); 4]) -> u32 {
+        let [(a, a_slabs), (b, b_slabs), (c, c_slabs), (d, d_slabs)] = flights;
+        (a.nearest.0, b.nearest.0, c.nearest.0, d.nearest.0) = (None, None, None, None);
+        let places =
+            [(a_slabs, &mut a.ray), (b_slabs, &mut b.ray), (c_slabs, &mut c.ray), (d_slabs, &mut d.ray)];
+        L::start_narrow_by_four(exact.start, rays, places)
     }
 
     #[inline(always)]

@@ -13,7 +13,7 @@ use super::scenes::{
 use crate::batch::Flying;
 use crate::blocks::Unit;
 use crate::holds::{Contents, SingleStart};
-use crate::lanes::{Eight, Lanes, Level, Portable, Vector};
+use crate::lanes::{Eight, Lanes, Level, Portable, Vector, start_narrow_by_four_at};
 use crate::narrow::{self, Precise, search_triangles};
 use crate::node::Node;
 use crate::packet::PACKET;
@@ -452,6 +452,32 @@ fn odd_ones(good: Ray32) -> Vec<Ray32> {
         Ray32 { direction: 1e12 * direction, ..good },
         Ray32 { direction: 1e-40 * direction, ..good },
     ]
+}
+
+#[test]
+fn four_rays_start_together_as_each_does_alone() {
+    let mut random = Random(713);
+    let (mut started, mut refused) = (0, 0);
+    for (size, origin) in SIZES_AND_ORIGINS {
+        for (_, meshes) in meshes(&mut random) {
+            let meshes: Vec<_> = meshes.iter().map(|mesh| placed(mesh, size, origin)).collect();
+            let accel = build(kinds(&meshes));
+            let Some(start) = &accel.single else { continue };
+            let mut rays: Vec<_> = (0..100).map(|_| ray(&mut random, &meshes, size)).collect();
+            let odd = odd_ones(rays[0]);
+            rays.extend(odd);
+            for _ in 0..100 {
+                let four = [(); 4].map(|()| &rays[random.below(rays.len())]);
+                for level in Level::all() {
+                    let [together, one_by_one] = start_narrow_by_four_at(level, start, four);
+                    assert_eq!(format!("{together:?}"), format!("{one_by_one:?}"), "{level:?} {four:?}");
+                    started += together.iter().flatten().count();
+                    refused += together.iter().filter(|one| one.is_none()).count();
+                }
+            }
+        }
+    }
+    assert!(started > 10_000 && refused > 1000, "{started} {refused}");
 }
 
 #[test]
