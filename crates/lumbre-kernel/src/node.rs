@@ -98,8 +98,8 @@ pub(crate) const WIDTH: usize = 16;
 pub(crate) struct Node {
     /// Lower and upper x, y and z planes of the boxes: `planes[2 * axis + side]`.
     pub(crate) planes: [[f32; WIDTH]; 6],
-    /// Tagged references, in the first lanes; [`Node::ABSENT`] in the others. The last are the largest: where any hit will do, they
-    /// are the likeliest to have one.
+    /// Tagged references, in the first lanes; [`Node::ABSENT`] in the others. The last are asked first where any hit will do: they are the
+    /// likeliest to have one for what they cost, or the largest; see [`occlusion`](crate::occlusion).
     pub(crate) children: [u32; WIDTH],
 }
 

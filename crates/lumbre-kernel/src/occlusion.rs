@@ -30,8 +30,8 @@ struct Odds {
 /// Nodes of which one thread sorts the children at once.
 const FEW: usize = if cfg!(test) { 8 } else { 256 };
 
-/// Sorts the children of every node below which there is nothing but triangles. Nodes stand depth first: those below one child behind
-/// those below the children that stand before it.
+/// Sorts the children of every node below which there is nothing but triangles. Nodes stand depth first: behind each all those below it,
+/// and then others.
 pub(crate) fn sort_children(level: Level, units: &Units, nodes: &mut [Node], blocks: Blocks) {
     Sorter { level, blocks, scale: units.scale as f32 }.sort(nodes, 0);
 }
@@ -52,15 +52,15 @@ impl Sorter<'_> {
             return self.level.run(SortFew { sorter: *self, nodes, place });
         }
         let (node, mut rest) = nodes.split_first_mut()?;
-        let children = node.children;
-        let inner = || children.iter().enumerate().filter(|(_, child)| *child >> tag::SHIFT == tag::INNER);
-        let mut ends = inner().skip(1).map(|(_, &child)| child as usize);
-        let mut first = place + 1;
-        let mut below = Vec::with_capacity(WIDTH);
-        for (lane, _) in inner() {
-            let end = ends.next().unwrap_or(first + rest.len());
+        let mut inner: Vec<(usize, usize)> = (0..WIDTH)
+            .filter(|&lane| node.children[lane] >> tag::SHIFT == tag::INNER)
+            .map(|lane| (node.children[lane] as usize, lane))
+            .collect();
+        inner.sort_unstable();
+        let mut below = Vec::with_capacity(inner.len());
+        for (at, &(first, lane)) in inner.iter().enumerate() {
+            let end = inner.get(at + 1).map_or(first + rest.len(), |&(next, _)| next);
             below.push((lane, first, rest.split_off_mut(..end - first).expect("nodes stand depth first")));
-            first = end;
         }
         let found: Vec<_> =
             below.into_par_iter().map(|(lane, first, nodes)| (lane, self.sort(nodes, first))).collect();

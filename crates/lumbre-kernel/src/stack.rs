@@ -64,7 +64,7 @@ impl Order for ByDistance {
     }
 }
 
-/// The largest first, wherever they are.
+/// The last of a node first, wherever they are.
 pub(crate) enum AsBuilt {}
 
 impl Order for AsBuilt {

@@ -6,8 +6,9 @@ use lumbre_math::DVec3;
 
 use super::refit::moved;
 use super::scenes::{Random, build, icosphere, mesh, mixture, options, room, soup, with_every_preset};
+use crate::lanes::Level;
 use crate::node::{Node, tag};
-use crate::{Accel, GeometryKind, TriangleMesh};
+use crate::{Accel, GeometryKind, TriangleMesh, occlusion};
 
 const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
 
@@ -150,4 +151,34 @@ fn a_wall_is_asked_before_a_larger_bush() {
             .collect();
         assert!(areas.iter().any(|&area| area > 2.0 * areas[areas.len() - 1]), "{areas:?}");
     });
+}
+
+#[test]
+fn the_order_is_the_same_by_every_instruction_set() {
+    let random = &mut Random(913);
+    for mesh in [soup(random, 3000, CENTER, 2.0), room(random, 300)] {
+        let accel = build(vec![GeometryKind::Mesh(Arc::new(mesh))]);
+        // Which is another one.
+        let reversed: Vec<Node> = accel
+            .tree
+            .nodes
+            .iter()
+            .map(|node| {
+                let mut reversed = *node;
+                reversed.planes.iter_mut().for_each(|row| row[..node.len()].reverse());
+                reversed.children[..node.len()].reverse();
+                reversed
+            })
+            .collect();
+        let sorted: Vec<String> = Level::all()
+            .into_iter()
+            .map(|level| {
+                let mut nodes = reversed.clone();
+                occlusion::sort_children(level, &accel.units, &mut nodes, accel.tree.blocks());
+                format!("{nodes:?}")
+            })
+            .collect();
+        assert_ne!(sorted[0], format!("{reversed:?}"));
+        assert!(sorted.iter().all(|nodes| *nodes == sorted[0]));
+    }
 }
