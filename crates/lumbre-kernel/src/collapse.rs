@@ -611,8 +611,8 @@ pub(crate) fn lay_out(
 }
 
 impl Layout {
-    /// Fills the blocks, and sorts the children of nodes by what is in them. They are most of the tree: nothing of its making but names is to be left by now, and these are given
-    /// back before.
+    /// Fills the blocks, and sorts the children of nodes by what is in them. Blocks are most of the tree: nothing of its making but names
+    /// is to be left by now, and these are given back before.
     ///
     /// # Errors
     /// [`BuildError::TooMany`] when there is more than references can name.

@@ -36,6 +36,8 @@ pub(crate) trait Flyer<L: Lanes>: Sized {
     const IS_ANY: bool;
     /// Whether it flies among anything but triangles.
     const IS_MIXED: bool;
+    /// Whether four better set out together than one after the other; not where it is mixed.
+    const STARTS_BY_FOUR: bool = false;
     /// How its line passes the triangles of a block.
     type Pass;
     /// How two lines do, each those of its block.
@@ -641,7 +643,7 @@ pub(crate) fn fly<F: Flyer<L>, L: Lanes>(
             fleet.answer(at_ends, ends);
             under_way &= !at_ends;
             let mut free = at_ends;
-            if !F::IS_MIXED && L::STARTS_BY_FOUR {
+            if F::STARTS_BY_FOUR {
                 while let Some((&four, _)) = waiting.as_slice().split_first_chunk()
                     && let Some(places) = Bits(free).first_four()
                 {

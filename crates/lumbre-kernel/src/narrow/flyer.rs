@@ -26,6 +26,7 @@ impl<G: Goal, L: Lanes> Flyer<L> for NarrowFlyer<G> {
     type Order = G::Order;
     const IS_ANY: bool = G::IS_ANY;
     const IS_MIXED: bool = false;
+    const STARTS_BY_FOUR: bool = L::STARTS_BY_FOUR;
     type Pass = Pass<L::Eight>;
     type Passes = Pass<L::Wide>;
     type At = Places<L::Eight>;
