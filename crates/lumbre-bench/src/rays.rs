@@ -127,31 +127,42 @@ pub fn make(work: Work, scene: &Scene, accel: &Accel, size: PictureSize) -> Rays
 }
 
 /// From the hits of one camera ray a pixel. Pixels that see nothing are made up for by more rays through the others, in
-/// the order of the pixels, at most sixteen times over.
+/// the order of the pixels, at most sixteen times over; where few come so far, by more rays from the same places: a few hundred that
+/// are asked again and again are foreseen by the processor, branch by branch.
 fn secondary(work: Work, scene: &Scene, accel: &Accel, size: PictureSize) -> Rays {
-    let mut list = Vec::with_capacity(size.count());
-    // Of each, the turn, and the place of its pixel by squares.
-    let mut places = Vec::with_capacity(size.count());
-    let mut place_of = vec![0; size.count()];
+    const TURNS: u64 = 16;
+    let count = size.count();
+    let random_of = |turn: u64, number: usize| {
+        RandomStream::new(lumbre_math::random::hash_words(&[turn, number as u64, work as u64]))
+    };
+    let mut list = Vec::with_capacity(count);
+    // Of each, where it starts, the turn, and the place of its pixel by squares.
+    let (mut starts, mut places) = (Vec::with_capacity(count), Vec::with_capacity(count));
+    let mut place_of = vec![0; count];
     for (place, pixel) in by_squares(size).into_iter().enumerate() {
         place_of[pixel] = place;
     }
-    for turn in 0..16u64 {
-        for (pixel, &place) in place_of.iter().enumerate() {
-            let mut random =
-                RandomStream::new(lumbre_math::random::hash_words(&[turn, pixel as u64, work as u64]));
-            let jitter = [random.next_f64(), random.next_f64()];
-            let first = camera_ray(scene, size, pixel, jitter);
-            if let Some(ray) = secondary_of(work, scene, accel, first, &mut random) {
-                list.push(ray);
-                places.push((turn, place));
-            }
-            if list.len() == size.count() {
-                break;
-            }
+    let pixels =
+        (0..TURNS).flat_map(|turn| place_of.iter().enumerate().map(move |(pixel, &at)| (turn, pixel, at)));
+    for (turn, pixel, place) in pixels {
+        let random = &mut random_of(turn, pixel);
+        let jitter = [random.next_f64(), random.next_f64()];
+        let first = camera_ray(scene, size, pixel, jitter);
+        if let Some(start) = start_of(work, accel, first, random) {
+            list.push(ray_from(work, scene, accel, start, random));
+            starts.push(start);
+            places.push((turn, place));
         }
-        if list.len() == size.count() {
+        if list.len() == count {
             break;
+        }
+    }
+    let found = list.len();
+    if found > 0 {
+        for number in found..count {
+            let (turn, at) = ((number / found) as u64 + TURNS, number % found);
+            list.push(ray_from(work, scene, accel, starts[at], &mut random_of(turn, at)));
+            places.push((turn, places[at].1));
         }
     }
     let mut by_squares: Vec<_> = (0..list.len()).collect();
@@ -159,46 +170,53 @@ fn secondary(work: Work, scene: &Scene, accel: &Accel, size: PictureSize) -> Ray
     Rays { list, by_squares }
 }
 
-fn secondary_of(
-    work: Work,
-    scene: &Scene,
-    accel: &Accel,
-    first: Ray32,
-    random: &mut RandomStream,
-) -> Option<Ray32> {
-    let extent = accel.bounds().size().max_element();
-    let start = leave(accel, first, extent)?;
-    let mut cosine = |normal: DVec3| {
-        let u = DVec2::new(random.next_f64(), random.next_f64());
-        Frame::from_z(normal).to_world(square_to_cosine_hemisphere(u))
-    };
-    match work {
-        Work::Bounce1 => Some(Ray32::new(start.0, cosine(start.1), f64::INFINITY)),
-        Work::Bounce3 => {
-            let second = Ray32::new(start.0, cosine(start.1), f64::INFINITY);
-            let start = leave(accel, second, extent)?;
-            let third = Ray32::new(start.0, cosine(start.1), f64::INFINITY);
-            let start = leave(accel, third, extent)?;
-            Some(Ray32::new(start.0, cosine(start.1), f64::INFINITY))
+/// A place on a surface, moved off it, and the normal there.
+type Start = (DVec3, DVec3);
+
+/// Where the ray of a camera ray starts, if that comes so far.
+fn start_of(work: Work, accel: &Accel, first: Ray32, random: &mut RandomStream) -> Option<Start> {
+    let mut start = leave(accel, first)?;
+    if work == Work::Bounce3 {
+        for _ in 0..2 {
+            start = leave(accel, Ray32::new(start.0, cosine(start.1, random), f64::INFINITY))?;
         }
-        Work::ShortOcclusion => Some(Ray32::new(start.0, cosine(start.1), 0.05 * extent)),
+    }
+    Some(start)
+}
+
+/// A ray that starts there.
+fn ray_from(work: Work, scene: &Scene, accel: &Accel, start: Start, random: &mut RandomStream) -> Ray32 {
+    match work {
         Work::Shadow => {
             let (middle, side) = scene.lamp;
             let at = DVec3::new(random.next_f64() - 0.5, 0.0, random.next_f64() - 0.5);
-            Some(Ray32::new(start.0, middle + side * at - start.0, 1.0))
+            Ray32::new(start.0, middle + side * at - start.0, 1.0)
         }
-        Work::Primary | Work::Random => None,
+        Work::ShortOcclusion => Ray32::new(start.0, cosine(start.1, random), 0.05 * extent_of(accel)),
+        Work::Bounce1 | Work::Bounce3 | Work::Primary | Work::Random => {
+            Ray32::new(start.0, cosine(start.1, random), f64::INFINITY)
+        }
     }
+}
+
+/// A direction around a normal, by the cosine.
+fn cosine(normal: DVec3, random: &mut RandomStream) -> DVec3 {
+    let u = DVec2::new(random.next_f64(), random.next_f64());
+    Frame::from_z(normal).to_world(square_to_cosine_hemisphere(u))
+}
+
+fn extent_of(accel: &Accel) -> f64 {
+    accel.bounds().size().max_element()
 }
 
 /// Where a ray hits, moved off the surface, and the normal on the side that it came from. The move is a hundred-thousandth
 /// of the scene: far more than single precision rounds off, so that no program finds the surface that a ray starts on.
-fn leave(accel: &Accel, ray: Ray32, extent: f64) -> Option<(DVec3, DVec3)> {
+fn leave(accel: &Accel, ray: Ray32) -> Option<Start> {
     let ray = ray.to_f64();
     let hit = accel.closest(&ray)?;
     let surface = accel.surface(&ray, &hit);
     let normal = if surface.normal.dot(ray.direction) < 0.0 { surface.normal } else { -surface.normal };
-    Some((surface.point + 1e-5 * extent * normal, normal))
+    Some((surface.point + 1e-5 * extent_of(accel) * normal, normal))
 }
 
 fn camera_ray(scene: &Scene, size: PictureSize, pixel: usize, jitter: [f64; 2]) -> Ray32 {
@@ -232,6 +250,32 @@ mod tests {
         let mut sorted = order.clone();
         sorted.sort_unstable();
         assert_eq!(sorted, (0..size.count()).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn there_are_as_many_rays_as_pixels_however_few_come_so_far() {
+        let recipe = crate::worlds::RECIPES.iter().find(|recipe| recipe.name == "scan-1k").expect("a recipe");
+        let scene = recipe.make();
+        let accel = crate::ours::build(&scene, lumbre_kernel::Preset::Balanced).expect("a tree");
+        let size = PictureSize::of_about(2000);
+        for work in Work::ALL {
+            let rays = make(work, &scene, &accel, size);
+            assert_eq!(rays.list.len(), size.count(), "{work:?}");
+            let mut order = rays.by_squares;
+            order.sort_unstable();
+            assert_eq!(order, (0..size.count()).collect::<Vec<_>>(), "{work:?}");
+            let key = |ray: &Ray32| [ray.origin, ray.direction].map(|v| v.map(f32::to_bits));
+            let mut keys: Vec<_> = rays.list.iter().map(key).collect();
+            keys.sort_unstable();
+            keys.dedup();
+            assert_eq!(keys.len(), size.count(), "{work:?}: some rays are the same");
+            if work == Work::Bounce3 {
+                // Hardly one of two thousand bounces off a scan twice.
+                let mut starts: Vec<_> = keys.iter().map(|key| key[0]).collect();
+                starts.dedup();
+                assert!((1..size.count() / 4).contains(&starts.len()), "{}", starts.len());
+            }
+        }
     }
 
     #[test]
