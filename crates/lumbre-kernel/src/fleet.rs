@@ -70,7 +70,7 @@ pub(crate) trait Flyer<L: Lanes>: Sized {
     /// That of one of the two: `which` is 0 or 1.
     fn one_of(passes: &Self::Passes, which: usize) -> Self::Pass;
     /// Where it meets those of the mask.
-    fn cross(&self, mask: u32, pass: &Self::Pass) -> Crossing<Self::At>;
+    fn cross(&self, exact: &Exact, mask: u32, pass: &Self::Pass) -> Crossing<Self::At>;
     /// Whether it meets any of these, which are not clear.
     fn meets_closely(&self, exact: &Exact, ray: &Self::Ray, block: u32, unclear: u32) -> Outcome<bool>;
     /// Takes the nearest of those that it meets in a block, if that is nearer than what it met before; false where that is not to be
@@ -144,11 +144,12 @@ const MET: u32 = tag::reference(tag::RETURN, 1);
 
 type Entry<F, L> = <<F as Flyer<L>>::Order as Order>::Entry;
 
-/// A ray under way.
+/// A ray under way: what boxes are asked with is a cache line, and what triangles are, the next.
+#[repr(C, align(64))]
 struct Flight<F> {
-    flyer: F,
     slabs: Slabs,
     position: usize,
+    flyer: F,
 }
 
 /// The places of bits, the lowest first.
@@ -450,7 +451,7 @@ impl<'a, 'r, F: Flyer<L>, L: Lanes> Fleet<'a, 'r, F, L> {
         for (at, place) in Bits(passing).enumerate() {
             let rank = rank(at_leaves, place);
             let pass = F::one_of(&self.passes[rank / 2], rank % 2);
-            let crossing = self.flights[place].flyer.cross(self.masks[place], &pass);
+            let crossing = self.flights[place].flyer.cross(&self.exact, self.masks[place], &pass);
             meeting |= bit(crossing.met != 0, place);
             unclear |= bit(crossing.unclear != 0, place);
             if F::IS_ANY {

@@ -49,7 +49,7 @@ use crate::batch::Ends;
 use crate::blocks::TriangleBlock;
 use crate::fleet::Crossing;
 use crate::holds::{Contents, SingleStart};
-use crate::lanes::{self, Asked, Axes, Lanes, Level, Question, Task, Vector, Wide};
+use crate::lanes::{self, Asked, Axes, Eight, Lanes, Level, Question, Task, Vector, Wide};
 use crate::packet::Companion;
 use crate::query::All;
 use crate::single::{self, Alone, Exact, Outcome, Winner};
@@ -74,8 +74,6 @@ pub(crate) struct NarrowRay {
     pub(crate) shear: [f32; 4],
     /// From what is behind a corner, with the sign turned, to `t`.
     pub(crate) minus_inverse: f32,
-    /// See [`Precise`].
-    pub(crate) precise: Precise,
 }
 
 /// Where weights are precise enough: the largest product times the extent of the triangle and a little is no more than their sum times
@@ -198,21 +196,35 @@ pub(crate) struct Places<E> {
     weights: [E; 3],
 }
 
-/// The nearest crossing so far, if there is one.
+/// The nearest crossing so far, if there is one. With a ray it takes a cache line, which many rays in flight are to find there.
 #[derive(Clone, Copy)]
-pub(crate) struct Nearest(Option<Met>);
-
-/// A crossing by its place.
-#[derive(Clone, Copy)]
-struct Met {
-    block: u32,
-    lane: u32,
-    /// The weights of the second and third corner in that lane, and the sum of all.
-    weights: [[f32; BLOCK]; 3],
+pub(crate) struct Nearest {
+    /// The place of its block, and the lane in the last three bits.
+    place: u32,
+    /// The weights of the second and third corner, and the sum of all.
+    weights: [f32; 3],
 }
 
+const _: () = assert!(size_of::<NarrowRay>() + size_of::<Nearest>() <= 64);
+
 impl Nearest {
-    const NONE: Self = Self(None);
+    /// No block is as long as that there could be one in its place.
+    const NONE: Self = Self { place: u32::MAX, weights: [0.0; 3] };
+
+    #[inline(always)]
+    fn new(block: u32, lane: u32, weights: [f32; 3]) -> Self {
+        Self { place: block * BLOCK as u32 + lane, weights }
+    }
+
+    /// The place of its block, and the lane.
+    #[inline(always)]
+    fn triangle(&self) -> Option<(u32, u32)> {
+        if self.place == u32::MAX {
+            None
+        } else {
+            Some((self.place / BLOCK as u32, self.place % BLOCK as u32))
+        }
+    }
 
     /// Takes what is nearer of what a ray meets in a block, and ends the ray there; whether there was anything.
     #[inline(always)]
@@ -245,11 +257,7 @@ impl Nearest {
         let &Crossing { met, unclear, at: Places { t: all, weights: [v, w, det] } } = crossing;
         let others = all.at_most(L::Eight::splat(t)) & met & !(1 << lane);
         if unclear | others == 0 && t < ray.t_max() {
-            self.0 = Some(Met {
-                block: place,
-                lane: lane as u32,
-                weights: [v.to_array(), w.to_array(), det.to_array()],
-            });
+            *self = Self::new(place, lane as u32, [v.lane(lane), w.lane(lane), det.lane(lane)]);
             ray.end_at(t);
             return true;
         }
@@ -274,15 +282,16 @@ impl Nearest {
             let lane = rest.trailing_zeros();
             rest &= rest - 1;
             let (t, weights) = if unclear >> lane & 1 == 0 {
-                (at.t[lane as usize % BLOCK], at.weights)
+                let lane = lane as usize % BLOCK;
+                (at.t[lane], at.weights.map(|weights| weights[lane]))
             } else {
                 match ray.cross_exactly(exact.block(place), lane) {
-                    Some((t, weights)) => (t, weights.map(|weight| [weight; BLOCK])),
+                    Some(crossing) => crossing,
                     None => continue,
                 }
             };
             if t < ray.t_max() || t == ray.t_max() && self.comes_after(exact, place, lane) {
-                self.0 = Some(Met { block: place, lane, weights });
+                *self = Self::new(place, lane, weights);
                 ray.end_at(t);
                 is_nearer = true;
             }
@@ -292,8 +301,8 @@ impl Nearest {
 
     /// Whether a triangle that is met where this is comes before it.
     fn comes_after(&self, exact: &Exact, block: u32, lane: u32) -> bool {
-        match self.0 {
-            Some(own) => exact.names(block, lane) < exact.names(own.block, own.lane),
+        match self.triangle() {
+            Some((own_block, own_lane)) => exact.names(block, lane) < exact.names(own_block, own_lane),
             None => true,
         }
     }
@@ -301,12 +310,12 @@ impl Nearest {
     /// As a hit at this `t`, if there is one.
     #[inline(always)]
     fn hit(&self, exact: &Exact, t: f32) -> Option<Hit32> {
-        let Met { block, lane, weights: [v, w, det] } = self.0.as_ref()?;
-        let (geometry, primitive) = exact.names(*block, *lane);
-        let lane = *lane as usize % BLOCK;
+        let (block, lane) = self.triangle()?;
+        let (geometry, primitive) = exact.names(block, lane);
+        let [v, w, det] = self.weights;
         Some(Hit32 {
             t,
-            local: [v[lane] / det[lane], w[lane] / det[lane]],
+            local: [v / det, w / det],
             id: exact.accel().geometries[geometry as usize].id,
             primitive,
             geometry,
@@ -317,14 +326,8 @@ impl Nearest {
 
 impl NarrowRay {
     /// Of no ray.
-    pub(crate) fn of_none(start: &SingleStart) -> Self {
-        Self {
-            axes: Axes::by_bits(0, 0),
-            origin: [0.0; 4],
-            shear: [0.0; 4],
-            minus_inverse: 0.0,
-            precise: start.precise,
-        }
+    pub(crate) fn of_none() -> Self {
+        Self { axes: Axes::by_bits(0, 0), origin: [0.0; 4], shear: [0.0; 4], minus_inverse: 0.0 }
     }
 
     #[inline(always)]
@@ -358,13 +361,18 @@ impl NarrowRay {
 
     /// Which of those in the mask the ray meets; it certainly does where the crossing is precise, and in range.
     #[inline(always)]
-    fn cross<L: Lanes>(&self, mask: u32, pass: &Pass<L::Eight>) -> Crossing<Places<L::Eight>> {
+    fn cross<L: Lanes>(
+        &self,
+        precise: &Precise,
+        mask: u32,
+        pass: &Pass<L::Eight>,
+    ) -> Crossing<Places<L::Eight>> {
         // Read again: most lines pass through few blocks.
         let ray = lanes::opaque(self);
         let &Pass { largest, edges: [u, v, w], within, heights: z } = pass;
         let det = u + v + w;
         let height = u * z[0] + v * z[1] + w * z[2];
-        let precise = ray.precise.of(mask, largest, within, det, z);
+        let precise = precise.of(mask, largest, within, det, z);
         let t = height.over(det) * L::Eight::splat(ray.minus_inverse);
         let in_range = L::Eight::splat(ray.t_min()).at_most(t) & t.at_most(L::Eight::splat(ray.t_max()));
         let at = Places { t, weights: [v, w, det] };
@@ -373,9 +381,9 @@ impl NarrowRay {
 
     /// Which triangles of a block the ray meets; `None` where its line passes through none.
     #[inline(always)]
-    fn pass<L: Lanes>(&self, block: &TriangleBlock) -> Option<Crossing<Places<L::Eight>>> {
+    fn pass<L: Lanes>(&self, precise: &Precise, block: &TriangleBlock) -> Option<Crossing<Places<L::Eight>>> {
         let (mask, lines) = self.lines::<L, true>(block);
-        if mask == 0 { None } else { Some(self.cross::<L>(mask, &lines.pass())) }
+        if mask == 0 { None } else { Some(self.cross::<L>(precise, mask, &lines.pass())) }
     }
 
     /// Where the ray meets a triangle, by exact products; the weights of the second and third corner, and the sum of all.
@@ -402,8 +410,8 @@ impl NarrowRay {
 
     /// Whether the ray meets any triangle of a block.
     #[inline(always)]
-    fn meets_any<L: Lanes>(&self, block: &TriangleBlock) -> bool {
-        match self.pass::<L>(block) {
+    fn meets_any<L: Lanes>(&self, precise: &Precise, block: &TriangleBlock) -> bool {
+        match self.pass::<L>(precise, block) {
             Some(Crossing { met, unclear, .. }) => {
                 met != 0 || unclear != 0 && self.meets_exactly(block, unclear)
             }

@@ -275,7 +275,7 @@ impl<G: Goal, B: Beside, L: Lanes> Flyer<L> for DoubleFlyer<G, B> {
     }
 
     #[inline(always)]
-    fn cross(&self, mask: u32, edges: &L::Edges) -> Crossing<[L::Eight; 2]> {
+    fn cross(&self, _: &Exact, mask: u32, edges: &L::Edges) -> Crossing<[L::Eight; 2]> {
         let Crossings { in_range, sure, from, to } = L::place_crossings(edges, lanes::opaque(&self.blocks));
         Crossing { met: mask & sure, unclear: mask & in_range & !sure, at: [from, to] }
     }

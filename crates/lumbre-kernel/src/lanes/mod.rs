@@ -410,7 +410,7 @@ impl Axes {
 }
 
 /// The array of a stack, which is not cleared for every ray.
-#[repr(C)]
+#[repr(C, align(64))]
 pub(crate) struct Slots<E> {
     // Beside the first entries.
     len: usize,
@@ -671,7 +671,7 @@ pub(crate) fn start_narrow_by_four_at(
         fn run<L: Lanes>(self) -> Self::Output {
             let Self(start, rays) = self;
             [true, false].map(|is_together| {
-                let mut starts = [(Slabs::ZERO, NarrowRay::of_none(start)); 4];
+                let mut starts = [(Slabs::ZERO, NarrowRay::of_none()); 4];
                 let [a, b, c, d] = &mut starts;
                 let places = [a, b, c, d].map(|(slabs, narrow)| (slabs, narrow));
                 let fit = if is_together {

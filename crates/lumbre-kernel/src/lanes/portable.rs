@@ -158,7 +158,7 @@ impl Lanes for Portable {
         let mut origin = axes.permute_single(&local(start, ray));
         let mut shear = axes.permute_single(&[x, y, z, 0.0]).map(|d| d * inverse);
         (origin[3], shear[3]) = (ray.t_min, ray.t_max);
-        NarrowRay { axes, origin, shear, minus_inverse: -inverse, precise: start.precise }
+        NarrowRay { axes, origin, shear, minus_inverse: -inverse }
     }
 
     #[inline]

@@ -1081,7 +1081,6 @@ where
                 origin: Self::array(_mm_permutevar_ps(local, order)),
                 shear: Self::array(shear),
                 minus_inverse: -_mm_cvtss_f32(inverse),
-                precise: start.precise,
             }
         }
     }

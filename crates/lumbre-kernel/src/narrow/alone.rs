@@ -33,7 +33,7 @@ pub(super) fn closest<L: Lanes>(exact: &Exact, ray: &Ray32) -> Outcome<Option<Hi
         let mut place = leaf & tag::PLACE;
         loop {
             let block = exact.block(place);
-            if let Some(crossing) = ray.pass::<L>(block)
+            if let Some(crossing) = ray.pass::<L>(&start.precise, block)
                 && nearest.take::<L>(exact, &mut ray, place, &crossing)
             {
                 way.end_at(triangles::beyond(ray.t_max()));
@@ -64,7 +64,7 @@ pub(super) fn any<L: Lanes>(exact: &Exact, ray: &Ray32) -> Outcome<bool> {
         let mut place = leaf & tag::PLACE;
         loop {
             let block = exact.block(place);
-            if ray.meets_any::<L>(block) {
+            if ray.meets_any::<L>(&start.precise, block) {
                 return Outcome::Settled(true);
             }
             match block.next(place) {

@@ -32,8 +32,8 @@ impl<G: Goal, L: Lanes> Flyer<L> for NarrowFlyer<G> {
     type At = Places<L::Eight>;
 
     #[inline(always)]
-    fn new(start: &SingleStart) -> Self {
-        Self { ray: NarrowRay::of_none(start), nearest: Nearest::NONE, goal: PhantomData }
+    fn new(_: &SingleStart) -> Self {
+        Self { ray: NarrowRay::of_none(), nearest: Nearest::NONE, goal: PhantomData }
     }
 
     #[inline(always)]
@@ -44,13 +44,15 @@ impl<G: Goal, L: Lanes> Flyer<L> for NarrowFlyer<G> {
     #[inline(always)]
     fn set_out(&mut self, exact: &Exact, ray: &Ray32, slabs: &Slabs) {
         self.ray = L::start_narrow_blocks(exact.start, ray, slabs);
-        self.nearest.0 = None;
+        self.nearest = Nearest::NONE;
     }
 
     #[inline(always)]
     fn set_out_by_four(exact: &Exact, rays: [&Ray32; 4], flights: [(&mut Self, &mut Slabs); 4]) -> u32 {
         let [(a, a_slabs), (b, b_slabs), (c, c_slabs), (d, d_slabs)] = flights;
-        (a.nearest.0, b.nearest.0, c.nearest.0, d.nearest.0) = (None, None, None, None);
+        for one in [&mut *a, &mut *b, &mut *c, &mut *d] {
+            one.nearest = Nearest::NONE;
+        }
         let places =
             [(a_slabs, &mut a.ray), (b_slabs, &mut b.ray), (c_slabs, &mut c.ray), (d_slabs, &mut d.ray)];
         L::start_narrow_by_four(exact.start, rays, places)
@@ -73,8 +75,8 @@ impl<G: Goal, L: Lanes> Flyer<L> for NarrowFlyer<G> {
     }
 
     #[inline(always)]
-    fn cross(&self, mask: u32, pass: &Pass<L::Eight>) -> Crossing<Places<L::Eight>> {
-        self.ray.cross::<L>(mask, pass)
+    fn cross(&self, exact: &Exact, mask: u32, pass: &Pass<L::Eight>) -> Crossing<Places<L::Eight>> {
+        self.ray.cross::<L>(&exact.start.precise, mask, pass)
     }
 
     #[inline(always)]

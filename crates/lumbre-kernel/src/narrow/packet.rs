@@ -447,7 +447,6 @@ impl<'a> Packet<'a> {
             origin: [x, y, z, bundle.t_min.0[i]],
             shear: [bundle.shear[0].0[i], bundle.shear[1].0[i], 1.0, bundle.t_max.0[i]],
             minus_inverse: bundle.minus_inverse.0[i],
-            precise: bundle.precise,
         }
     }
 

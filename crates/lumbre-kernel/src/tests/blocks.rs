@@ -14,7 +14,7 @@ use lumbre_math::{DVec3, Transform, Vec3};
 use super::scenes::Random;
 use crate::blocks::{self, BlockNames, Blocks, TriangleBlock, Unit, Vertices};
 use crate::lanes::{Level, corners_at, equals_before_at, meet_triangles_at, told_at, truncated_at};
-use crate::narrow::{NarrowRay, Precise};
+use crate::narrow::NarrowRay;
 use crate::triangles::{BLOCK, BlockRay, Meeting, Shear, intersect};
 use crate::{Accel, BuildOptions, Geometry, GeometryKind, Preset, TriangleMesh};
 
@@ -176,7 +176,6 @@ fn what_two_rays_are_told_of_two_blocks_together_is_what_each_is_told_alone() {
                 origin: [local[0] as f32, local[1] as f32, local[2] as f32, 0.0],
                 shear: [shear.x as f32, shear.y as f32, 0.0, f32::INFINITY],
                 minus_inverse: -1.0,
-                precise: Precise::new(1.0, 1.0),
             };
             let t_max = random.between(0.5, 6.0);
             (BlockRay::new(&shear, &local, 3.0, 0.0, t_max).unwrap(), narrow)
