@@ -64,13 +64,13 @@ pub(crate) trait Flyer<L: Lanes>: Sized {
         }
         started
     }
-    /// How the lines of two pass the triangles of two blocks, each those of its own, and a bit for each that they may meet: eight of the
-    /// first, and eight of the second.
-    fn pass_by_two(flyers: [&Self; 2], blocks: [&TriangleBlock; 2]) -> (u32, Self::Passes);
+    /// How the lines of two pass the triangles of two blocks, each those of its own.
+    fn pass_by_two(exact: &Exact, flyers: [&Self; 2], blocks: [&TriangleBlock; 2])
+    -> (Passing, Self::Passes);
     /// That of one of the two: `which` is 0 or 1.
     fn one_of(passes: &Self::Passes, which: usize) -> Self::Pass;
     /// Where it meets those of the mask.
-    fn cross(&self, exact: &Exact, mask: u32, pass: &Self::Pass) -> Crossing<Self::At>;
+    fn cross(&self, mask: u32, pass: &Self::Pass) -> Crossing<Self::At>;
     /// Whether it meets any of these, which are not clear.
     fn meets_closely(&self, exact: &Exact, ray: &Self::Ray, block: u32, unclear: u32) -> Outcome<bool>;
     /// Takes the nearest of those that it meets in a block, if that is nearer than what it met before; false where that is not to be
@@ -81,6 +81,7 @@ pub(crate) trait Flyer<L: Lanes>: Sized {
         ray: &Self::Ray,
         block: u32,
         crossing: &Crossing<Self::At>,
+        pass: &Self::Pass,
         slabs: &mut Slabs,
     ) -> bool;
     /// What two may meet of two blocks of hulls, each of its own, tubes left aside. Where there are no shapes, it is nothing, here and
@@ -116,6 +117,14 @@ pub(crate) trait Flyer<L: Lanes>: Sized {
 
     /// What came of it: whether any hit `is_met`, or what it has taken.
     fn answer(&self, exact: &Exact, ray: &Self::Ray, is_met: bool) -> Outcome<Self::Answer>;
+}
+
+/// The triangles of two blocks that two lines pass: eight bits for those of the first, and eight for those of the second.
+pub(crate) struct Passing {
+    /// Those that the rays may meet.
+    pub(crate) mask: u32,
+    /// Those that have to be looked at closer.
+    pub(crate) unclear: u32,
 }
 
 /// The triangles of a block that a ray may meet.
@@ -440,24 +449,27 @@ impl<'a, 'r, F: Flyer<L>, L: Lanes> Fleet<'a, 'r, F, L> {
             let unit = |place: usize| self.references.0[place] & tag::PLACE;
             let (one, other) = (self.blocks.block(unit(first)), self.blocks.block(unit(second)));
             let flyers = [&self.flights[first].flyer, &self.flights[second].flyer];
-            let (mask, passes) = F::pass_by_two(flyers, [one, other]);
+            let (both, passes) = F::pass_by_two(&self.exact, flyers, [one, other]);
             self.passes[at % (FLIGHTS / 2)] = passes;
-            let (of_first, of_second) = (mask & L::Eight::ALL, mask >> BLOCK);
-            (self.masks[first], self.masks[second]) = (of_first, of_second);
-            passing |= bit(of_first != 0, first) | bit(of_second != 0, second);
+            let halves = |mask: u32| (mask & L::Eight::ALL, mask >> BLOCK);
+            let of_both = |(of_first, of_second)| bit(of_first != 0, first) | bit(of_second != 0, second);
+            (self.masks[first], self.masks[second]) = halves(both.mask);
+            (self.unclear[first], self.unclear[second]) = halves(both.unclear);
+            passing |= of_both(halves(both.mask | both.unclear));
             last |= bit(one.is_last(), first) | bit(other.is_last(), second);
         }
         let (mut meeting, mut unclear) = (0, 0);
-        for (at, place) in Bits(passing).enumerate() {
+        for place in Bits(passing) {
             let rank = rank(at_leaves, place);
             let pass = F::one_of(&self.passes[rank / 2], rank % 2);
-            let crossing = self.flights[place].flyer.cross(&self.exact, self.masks[place], &pass);
+            let mut crossing = self.flights[place].flyer.cross(self.masks[place], &pass);
             meeting |= bit(crossing.met != 0, place);
+            crossing.unclear |= self.unclear[place];
             unclear |= bit(crossing.unclear != 0, place);
             if F::IS_ANY {
                 self.unclear[place] = crossing.unclear;
             } else {
-                self.crossings[at % FLIGHTS] = crossing;
+                self.crossings[rank] = crossing;
             }
         }
         let mut unsettled = 0;
@@ -478,8 +490,10 @@ impl<'a, 'r, F: Flyer<L>, L: Lanes> Fleet<'a, 'r, F, L> {
                 let unit = *self.references.of(place) & tag::PLACE;
                 let ray = self.ray(place);
                 let Flight { flyer, slabs, .. } = &mut self.flights[place];
-                let crossing = &self.crossings[rank(passing, place)];
-                let is_settled = flyer.take_nearest(&self.exact, ray, unit, crossing, slabs);
+                let rank = rank(at_leaves, place);
+                let pass = F::one_of(&self.passes[rank / 2], rank % 2);
+                let crossing = &self.crossings[rank];
+                let is_settled = flyer.take_nearest(&self.exact, ray, unit, crossing, &pass, slabs);
                 unsettled |= bit(!is_settled, place);
             }
             meeting = 0;

@@ -143,57 +143,58 @@ impl<E: Vector> Lines<E> {
         (E::splat(0.0).at_most(within), Self { products, edges, within, heights })
     }
 
-    /// What is needed of triangles that it may pass through.
+    /// What is needed of triangles that it may pass through, and a bit for each of the mask that has to be looked at closer.
     #[inline(always)]
-    fn pass(self) -> Pass<E> {
-        let Self { products: [bc, ca, ab], edges, within, heights } = self;
-        Pass { largest: bc.larger(ca).larger(ab), edges, within, heights }
+    fn pass(self, mask: u32, precise: &Precise) -> (u32, Pass<E>) {
+        let Self { products: [bc, ca, ab], edges: [u, v, w], within, heights: z } = self;
+        let det = u + v + w;
+        let largest = bc.larger(ca).larger(ab);
+        let unclear = mask & !precise.of(mask, largest, within, det, z);
+        (unclear, Pass { height: u * z[0] + v * z[1] + w * z[2], weights: [v, w, det] })
     }
 }
 
 /// How a line passes the triangles of a block.
 #[derive(Clone, Copy, Zeroable)]
 pub(crate) struct Pass<E> {
-    /// The largest of the products, by magnitude.
-    largest: E,
-    edges: [E; 3],
-    /// See [`within`].
-    within: E,
-    /// Of the corners, along the ray.
-    heights: [E; 3],
+    /// Where along it, times the sum of all weights.
+    height: E,
+    /// Those of the second and third corner, and the sum of all.
+    weights: [E; 3],
+}
+
+impl<E: Eight> Pass<E> {
+    /// The weights of one.
+    #[inline(always)]
+    fn weights_of(&self, lane: usize) -> [f32; 3] {
+        let [v, w, det] = self.weights;
+        [v.lane(lane), w.lane(lane), det.lane(lane)]
+    }
+
+    /// Those of all.
+    #[inline(always)]
+    fn all_weights(&self) -> [[f32; BLOCK]; 3] {
+        let [v, w, det] = self.weights;
+        [v.to_array(), w.to_array(), det.to_array()]
+    }
 }
 
 impl<W: Wide> Pass<W> {
     /// That of one of the two: `which` is 0 or 1.
     #[inline(always)]
     fn half(&self, which: usize) -> Pass<W::Half> {
-        let Self { largest, edges: [u, v, w], within, heights: [a, b, c] } = self;
-        Pass {
-            largest: largest.half(which),
-            edges: [u.half(which), v.half(which), w.half(which)],
-            within: within.half(which),
-            heights: [a.half(which), b.half(which), c.half(which)],
-        }
+        let Self { height, weights: [v, w, det] } = self;
+        Pass { height: height.half(which), weights: [v.half(which), w.half(which), det.half(which)] }
     }
 
     /// Those of two.
     #[inline(always)]
     fn of_two(first: &Pass<W::Half>, second: &Pass<W::Half>) -> Self {
         Self {
-            largest: W::of_two(first.largest, second.largest),
-            edges: lanes::three_of_two(&first.edges, &second.edges),
-            within: W::of_two(first.within, second.within),
-            heights: lanes::three_of_two(&first.heights, &second.heights),
+            height: W::of_two(first.height, second.height),
+            weights: lanes::three_of_two(&first.weights, &second.weights),
         }
     }
-}
-
-/// Where a ray meets the triangles of a block.
-#[derive(Clone, Copy, Zeroable)]
-pub(crate) struct Places<E> {
-    t: E,
-    /// The weights of the second and third corner, and the sum of all.
-    weights: [E; 3],
 }
 
 /// The nearest crossing so far, if there is one. With a ray it takes a cache line, which many rays in flight are to find there.
@@ -228,41 +229,43 @@ impl Nearest {
 
     /// Takes what is nearer of what a ray meets in a block, and ends the ray there; whether there was anything.
     #[inline(always)]
-    fn take<L: Lanes>(
+    fn take<E: Eight>(
         &mut self,
         exact: &Exact,
         ray: &mut NarrowRay,
         place: u32,
-        crossing: &Crossing<Places<L::Eight>>,
+        crossing: &Crossing<E>,
+        pass: &Pass<E>,
     ) -> bool {
-        let &Crossing { met, unclear, ref at } = crossing;
+        let &Crossing { met, unclear, at } = crossing;
         if met | unclear == 0 {
             return false;
         }
-        let t = at.t.to_array();
+        let t = at.to_array();
         let lane = single::nearest_of(met, &t);
-        self.take_nearest::<L>(exact, ray, place, crossing, (lane, t[lane]))
+        self.take_nearest(exact, ray, place, crossing, pass, (lane, t[lane]))
     }
 
     /// The same where it is known in which lane the ray meets the nearest, if it does meet any, and at which `t`.
     #[inline(always)]
-    fn take_nearest<L: Lanes>(
+    fn take_nearest<E: Eight>(
         &mut self,
         exact: &Exact,
         ray: &mut NarrowRay,
         place: u32,
-        crossing: &Crossing<Places<L::Eight>>,
+        crossing: &Crossing<E>,
+        pass: &Pass<E>,
         (lane, t): (usize, f32),
     ) -> bool {
-        let &Crossing { met, unclear, at: Places { t: all, weights: [v, w, det] } } = crossing;
-        let others = all.at_most(L::Eight::splat(t)) & met & !(1 << lane);
+        let &Crossing { met, unclear, at } = crossing;
+        let others = at.at_most(E::splat(t)) & met & !(1 << lane);
         if unclear | others == 0 && t < ray.t_max() {
-            *self = Self::new(place, lane as u32, [v.lane(lane), w.lane(lane), det.lane(lane)]);
+            *self = Self::new(place, lane as u32, pass.weights_of(lane));
             ray.end_at(t);
             return true;
         }
-        let at = Places { t: all.to_array(), weights: [v.to_array(), w.to_array(), det.to_array()] };
-        self.take_closely(exact, ray, place, &Crossing { met, unclear, at })
+        let at = at.to_array();
+        self.take_closely(exact, ray, place, &Crossing { met, unclear, at }, &pass.all_weights())
     }
 
     /// The same where a triangle has to be looked at closer, or two are met at the same place, of whatever block.
@@ -273,7 +276,8 @@ impl Nearest {
         exact: &Exact,
         ray: &mut NarrowRay,
         place: u32,
-        crossing: &Crossing<Places<[f32; BLOCK]>>,
+        crossing: &Crossing<[f32; BLOCK]>,
+        weights: &[[f32; BLOCK]; 3],
     ) -> bool {
         let &Crossing { met, unclear, ref at } = crossing;
         let mut is_nearer = false;
@@ -283,7 +287,7 @@ impl Nearest {
             rest &= rest - 1;
             let (t, weights) = if unclear >> lane & 1 == 0 {
                 let lane = lane as usize % BLOCK;
-                (at.t[lane], at.weights.map(|weights| weights[lane]))
+                (at[lane], weights.map(|weights| weights[lane]))
             } else {
                 match ray.cross_exactly(exact.block(place), lane) {
                     Some(crossing) => crossing,
@@ -359,31 +363,29 @@ impl NarrowRay {
         (mask & (blocks[0].taken() | blocks[1].taken() << BLOCK), lines)
     }
 
-    /// Which of those in the mask the ray meets; it certainly does where the crossing is precise, and in range.
+    /// Where the ray meets the triangles of a block that its line passes so, and which of those in the mask it does meet.
     #[inline(always)]
-    fn cross<L: Lanes>(
-        &self,
-        precise: &Precise,
-        mask: u32,
-        pass: &Pass<L::Eight>,
-    ) -> Crossing<Places<L::Eight>> {
+    fn cross<E: Eight>(&self, mask: u32, pass: &Pass<E>) -> (u32, E) {
         // Read again: most lines pass through few blocks.
         let ray = lanes::opaque(self);
-        let &Pass { largest, edges: [u, v, w], within, heights: z } = pass;
-        let det = u + v + w;
-        let height = u * z[0] + v * z[1] + w * z[2];
-        let precise = precise.of(mask, largest, within, det, z);
-        let t = height.over(det) * L::Eight::splat(ray.minus_inverse);
-        let in_range = L::Eight::splat(ray.t_min()).at_most(t) & t.at_most(L::Eight::splat(ray.t_max()));
-        let at = Places { t, weights: [v, w, det] };
-        Crossing { met: mask & precise & in_range, unclear: mask & !precise, at }
+        let t = pass.height.over(pass.weights[2]) * E::splat(ray.minus_inverse);
+        (mask & E::splat(ray.t_min()).at_most(t) & t.at_most(E::splat(ray.t_max())), t)
     }
 
     /// Which triangles of a block the ray meets; `None` where its line passes through none.
     #[inline(always)]
-    fn pass<L: Lanes>(&self, precise: &Precise, block: &TriangleBlock) -> Option<Crossing<Places<L::Eight>>> {
+    fn pass<L: Lanes>(
+        &self,
+        precise: &Precise,
+        block: &TriangleBlock,
+    ) -> Option<(Crossing<L::Eight>, Pass<L::Eight>)> {
         let (mask, lines) = self.lines::<L, true>(block);
-        if mask == 0 { None } else { Some(self.cross::<L>(precise, mask, &lines.pass())) }
+        if mask == 0 {
+            return None;
+        }
+        let (unclear, pass) = lines.pass(mask, precise);
+        let (met, at) = self.cross(mask & !unclear, &pass);
+        Some((Crossing { met, unclear, at }, pass))
     }
 
     /// Where the ray meets a triangle, by exact products; the weights of the second and third corner, and the sum of all.
@@ -412,7 +414,7 @@ impl NarrowRay {
     #[inline(always)]
     fn meets_any<L: Lanes>(&self, precise: &Precise, block: &TriangleBlock) -> bool {
         match self.pass::<L>(precise, block) {
-            Some(Crossing { met, unclear, .. }) => {
+            Some((Crossing { met, unclear, .. }, _)) => {
                 met != 0 || unclear != 0 && self.meets_exactly(block, unclear)
             }
             None => false,

@@ -6,7 +6,7 @@ use std::marker::PhantomData;
 
 use lumbre_geometry::Ray;
 
-use super::{Crossing, Flyer};
+use super::{Crossing, Flyer, Passing};
 use crate::blocks::TriangleBlock;
 use crate::collapse::Entry;
 use crate::holds::SingleStart;
@@ -265,8 +265,9 @@ impl<G: Goal, B: Beside, L: Lanes> Flyer<L> for DoubleFlyer<G, B> {
     }
 
     #[inline(always)]
-    fn pass_by_two(flyers: [&Self; 2], blocks: [&TriangleBlock; 2]) -> (u32, L::EdgesByTwo) {
-        L::meet_triangles_by_two(blocks, [&flyers[0].blocks, &flyers[1].blocks])
+    fn pass_by_two(_: &Exact, flyers: [&Self; 2], blocks: [&TriangleBlock; 2]) -> (Passing, L::EdgesByTwo) {
+        let (mask, edges) = L::meet_triangles_by_two(blocks, [&flyers[0].blocks, &flyers[1].blocks]);
+        (Passing { mask, unclear: 0 }, edges)
     }
 
     #[inline(always)]
@@ -275,7 +276,7 @@ impl<G: Goal, B: Beside, L: Lanes> Flyer<L> for DoubleFlyer<G, B> {
     }
 
     #[inline(always)]
-    fn cross(&self, _: &Exact, mask: u32, edges: &L::Edges) -> Crossing<[L::Eight; 2]> {
+    fn cross(&self, mask: u32, edges: &L::Edges) -> Crossing<[L::Eight; 2]> {
         let Crossings { in_range, sure, from, to } = L::place_crossings(edges, lanes::opaque(&self.blocks));
         Crossing { met: mask & sure, unclear: mask & in_range & !sure, at: [from, to] }
     }
@@ -291,6 +292,7 @@ impl<G: Goal, B: Beside, L: Lanes> Flyer<L> for DoubleFlyer<G, B> {
         ray: &Ray,
         block: u32,
         crossing: &Crossing<[L::Eight; 2]>,
+        _: &L::Edges,
         slabs: &mut Slabs,
     ) -> bool {
         let &Crossing { met, unclear, at: [from, to] } = crossing;

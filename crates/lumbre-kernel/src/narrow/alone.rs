@@ -33,8 +33,8 @@ pub(super) fn closest<L: Lanes>(exact: &Exact, ray: &Ray32) -> Outcome<Option<Hi
         let mut place = leaf & tag::PLACE;
         loop {
             let block = exact.block(place);
-            if let Some(crossing) = ray.pass::<L>(&start.precise, block)
-                && nearest.take::<L>(exact, &mut ray, place, &crossing)
+            if let Some((crossing, pass)) = ray.pass::<L>(&start.precise, block)
+                && nearest.take(exact, &mut ray, place, &crossing, &pass)
             {
                 way.end_at(triangles::beyond(ray.t_max()));
             }

@@ -2,10 +2,10 @@
 
 use std::marker::PhantomData;
 
-use super::{Goal, NarrowRay, Nearest, Pass, Places};
+use super::{Goal, NarrowRay, Nearest, Pass};
 use crate::Ray32;
 use crate::blocks::TriangleBlock;
-use crate::fleet::{Crossing, Flyer};
+use crate::fleet::{Crossing, Flyer, Passing};
 use crate::holds::SingleStart;
 use crate::lanes::{Eight, Lanes, Vector};
 use crate::node::Slabs;
@@ -29,7 +29,8 @@ impl<G: Goal, L: Lanes> Flyer<L> for NarrowFlyer<G> {
     const STARTS_BY_FOUR: bool = L::STARTS_BY_FOUR;
     type Pass = Pass<L::Eight>;
     type Passes = Pass<L::Wide>;
-    type At = Places<L::Eight>;
+    /// `t`.
+    type At = L::Eight;
 
     #[inline(always)]
     fn new(_: &SingleStart) -> Self {
@@ -59,14 +60,24 @@ impl<G: Goal, L: Lanes> Flyer<L> for NarrowFlyer<G> {
     }
 
     #[inline(always)]
-    fn pass_by_two(flyers: [&Self; 2], blocks: [&TriangleBlock; 2]) -> (u32, Pass<L::Wide>) {
+    fn pass_by_two(
+        exact: &Exact,
+        flyers: [&Self; 2],
+        blocks: [&TriangleBlock; 2],
+    ) -> (Passing, Pass<L::Wide>) {
+        let precise = &exact.start.precise;
         if L::MEETS_BY_TWO {
             let (mask, lines) = NarrowRay::lines_by_two::<L>([&flyers[0].ray, &flyers[1].ray], blocks);
-            return (mask, lines.pass());
+            let (unclear, passes) = lines.pass(mask, precise);
+            return (Passing { mask: mask & !unclear, unclear }, passes);
         }
         let (first, of_first) = flyers[0].ray.lines::<L, false>(blocks[0]);
         let (second, of_second) = flyers[1].ray.lines::<L, false>(blocks[1]);
-        (first | second << BLOCK, Pass::of_two(&of_first.pass(), &of_second.pass()))
+        let (first_unclear, of_first) = of_first.pass(first, precise);
+        let (second_unclear, of_second) = of_second.pass(second, precise);
+        let unclear = first_unclear | second_unclear << BLOCK;
+        let mask = (first | second << BLOCK) & !unclear;
+        (Passing { mask, unclear }, Pass::of_two(&of_first, &of_second))
     }
 
     #[inline(always)]
@@ -75,8 +86,9 @@ impl<G: Goal, L: Lanes> Flyer<L> for NarrowFlyer<G> {
     }
 
     #[inline(always)]
-    fn cross(&self, exact: &Exact, mask: u32, pass: &Pass<L::Eight>) -> Crossing<Places<L::Eight>> {
-        self.ray.cross::<L>(&exact.start.precise, mask, pass)
+    fn cross(&self, mask: u32, pass: &Pass<L::Eight>) -> Crossing<L::Eight> {
+        let (met, at) = self.ray.cross(mask, pass);
+        Crossing { met, unclear: 0, at }
     }
 
     #[inline(always)]
@@ -90,13 +102,14 @@ impl<G: Goal, L: Lanes> Flyer<L> for NarrowFlyer<G> {
         exact: &Exact,
         _: &Ray32,
         block: u32,
-        crossing: &Crossing<Places<L::Eight>>,
+        crossing: &Crossing<L::Eight>,
+        pass: &Pass<L::Eight>,
         slabs: &mut Slabs,
     ) -> bool {
-        let t = crossing.at.t.least_of(crossing.met);
-        let which = crossing.at.t.at_most(L::Eight::splat(t)) & crossing.met;
+        let t = crossing.at.least_of(crossing.met);
+        let which = crossing.at.at_most(L::Eight::splat(t)) & crossing.met;
         let lane = which.trailing_zeros() as usize % BLOCK;
-        if self.nearest.take_nearest::<L>(exact, &mut self.ray, block, crossing, (lane, t)) {
+        if self.nearest.take_nearest(exact, &mut self.ray, block, crossing, pass, (lane, t)) {
             slabs.end_at(triangles::beyond(self.ray.t_max()));
         }
         true
