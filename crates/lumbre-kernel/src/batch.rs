@@ -9,7 +9,7 @@ use std::slice::Chunks;
 use lumbre_geometry::Ray;
 
 use crate::Accel;
-use crate::blocks::Unit;
+use crate::blocks::Line;
 use crate::fleet::{self, Beside, DoubleFlyer, Shapes, Triangles};
 use crate::holds::{Contents, SingleStart};
 use crate::lanes::{self, Lanes, Level, Task};
@@ -133,7 +133,7 @@ pub(crate) fn search_all<G: Goal>(
 /// Bytes of nodes and triangles.
 fn bytes_of(accel: &Accel) -> usize {
     let tree = &accel.tree;
-    size_of_val::<[Node]>(&tree.nodes) + size_of_val::<[Unit]>(&tree.blocks)
+    size_of_val::<[Node]>(&tree.nodes) + size_of_val::<[Line]>(&tree.blocks)
 }
 
 /// Searches along every ray in a tree of anything.

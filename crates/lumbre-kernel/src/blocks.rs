@@ -74,6 +74,14 @@ impl BlockNames {
 #[repr(C, align(16))]
 pub(crate) struct Unit([u32; 4]);
 
+/// A cache line of them. The list consists of these, for where each corner has a vertex of its own a block is five, and no eight
+/// coordinates lie in two.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C, align(64))]
+pub(crate) struct Line([Unit; LINE]);
+
+const LINE: usize = 4;
+
 /// What stands before the vertices of a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
@@ -104,6 +112,11 @@ pub(crate) const MOST_SHARED: usize = 16;
 pub(crate) const QUAD: usize = BLOCK / 2;
 /// Where triangles share less: each corner has a vertex of its own, corner by corner and lane by lane.
 const UNSHARED: usize = 3 * BLOCK;
+/// Of those, the first; what is before it is open, so that eight coordinates begin at a multiple of their size. Of others it is zero.
+pub(crate) const FIRST_UNSHARED: usize = 3;
+
+const _: () = assert!((size_of::<Head>() + FIRST_UNSHARED * size_of::<f32>()).is_multiple_of(32));
+const _: () = assert!(units_of(UNSHARED).is_multiple_of(LINE));
 /// All rooms that there are.
 pub(crate) const ROOMS: [usize; 4] = [USUAL[0], USUAL[1], MOST_SHARED, UNSHARED];
 /// Rooms and vertices are taken modulo this, so that they lead nowhere whatever they are.
@@ -127,14 +140,20 @@ const WINDOW: usize = size_of::<TriangleBlock>() / size_of::<Unit>();
 
 /// Units that a block with room for so many vertices takes.
 const fn units_of(room: usize) -> usize {
-    (size_of::<Head>() + room * size_of::<[f32; 3]>()).div_ceil(size_of::<Unit>())
+    let first = if room > MOST_SHARED { FIRST_UNSHARED } else { 0 };
+    (size_of::<Head>() + first * size_of::<f32>() + room * size_of::<[f32; 3]>()).div_ceil(size_of::<Unit>())
+}
+
+/// Lines that so many units take.
+const fn lines_of(units: usize) -> usize {
+    units.div_ceil(LINE)
 }
 
 /// Which vertex a corner in a lane, below eight, is: see [`Head::corners`].
 #[inline(always)]
 fn vertex_at(corners: &[u32; 3], is_unshared: bool, corner: usize, lane: usize) -> usize {
     if is_unshared {
-        return BLOCK * corner + lane;
+        return FIRST_UNSHARED + BLOCK * corner + lane;
     }
     (corners[corner] >> (4 * lane)) as usize % MOST_SHARED
 }
@@ -192,7 +211,7 @@ impl TriangleBlock {
         (&words[FIRST..FIRST + 4]).try_into().expect("four")
     }
 
-    /// The coordinates from the first vertex on: the x of as many as there is room for, then y, then z, and then what means nothing.
+    /// The coordinates from the first vertex that there may be on: the x of as many as there is room for, then y, then z, and then what means nothing.
     #[inline(always)]
     pub(crate) fn coordinates(&self) -> &[f32; COORDINATES] {
         &self.coordinates
@@ -220,9 +239,8 @@ impl TriangleBlock {
     /// The corners of its triangles, where each has a vertex of its own.
     #[inline(always)]
     pub(crate) fn own_corners(&self) -> &Corners {
-        let (own, _) =
-            self.coordinates.split_first_chunk::<{ 3 * UNSHARED }>().expect("there is room for more");
-        bytemuck::cast_ref(own)
+        let own = self.coordinates[FIRST_UNSHARED..].first_chunk::<{ 3 * UNSHARED }>();
+        bytemuck::cast_ref(own.expect("there is room for more"))
     }
 
     /// Asks for it to be brought near, before it is needed.
@@ -257,8 +275,9 @@ impl TriangleBlock {
 pub(crate) struct Blocks<'a>(&'a [Unit]);
 
 impl<'a> Blocks<'a> {
-    pub(crate) fn new(units: &'a [Unit]) -> Self {
-        Self(units)
+    #[inline(always)]
+    pub(crate) fn new(lines: &'a [Line]) -> Self {
+        Self(bytemuck::cast_slice(lines))
     }
 
     /// The block at a unit, which a reference names.
@@ -322,7 +341,7 @@ impl<'a> Blocks<'a> {
             let mut corners = (0..3).flat_map(|corner| (0..BLOCK).map(move |lane| (corner, lane)));
             let are_there = corners.all(|(corner, lane)| {
                 let (vertex, room) = (block.vertex_at(corner, lane), block.room());
-                vertex < room && (block.is_unshared() || is_within_reach(room, lane, vertex))
+                block.is_unshared() || vertex < room && is_within_reach(room, lane, vertex)
             });
             let is_sound = head.number as usize == number
                 && head.taken & !named == 0
@@ -337,9 +356,8 @@ impl<'a> Blocks<'a> {
             places.push(place);
             place += units_of(block.room()) as u32;
         }
-        let is_all =
-            followers == 0 && self.0.len() == if names.is_empty() { 0 } else { place as usize + MARGIN };
-        is_all.then_some(places)
+        let all = if names.is_empty() { 0 } else { LINE * lines_of(place as usize + MARGIN) };
+        (followers == 0 && self.0.len() == all).then_some(places)
     }
 }
 
@@ -348,7 +366,7 @@ const MARGIN: usize = WINDOW - 1;
 
 /// Blocks, and where each begins.
 pub(crate) struct Filled {
-    pub(crate) units: Vec<Unit>,
+    pub(crate) lines: Vec<Line>,
     pub(crate) places: Vec<u32>,
     /// In which order the names of each are to stand from now on.
     pub(crate) orders: Vec<LaneOrder>,
@@ -486,7 +504,7 @@ pub(crate) fn pack(
     };
     let expected = survey.as_ref().map_or(units_of(UNSHARED) * names.len(), |survey| survey.units);
     let mut filled = Filled {
-        units: Vec::new(),
+        lines: Vec::new(),
         places: Vec::with_capacity(names.len()),
         orders: Vec::with_capacity(names.len()),
     };
@@ -512,11 +530,11 @@ pub(crate) fn pack(
         }
         if wave == 0 {
             let len = if is_all_at_once { end } else { end.max(expected) };
-            filled.units = vec![Unit::default(); len + MARGIN];
-        } else if filled.units.len() < end + MARGIN {
-            filled.units.resize(end + end / 8 + MARGIN, Unit::default());
+            filled.lines = vec![Line::default(); lines_of(len + MARGIN)];
+        } else if filled.lines.len() < lines_of(end + MARGIN) {
+            filled.lines.resize(lines_of(end + end / 8 + MARGIN), Line::default());
         }
-        let mut rest = &mut filled.units[start..end];
+        let mut rest = &mut bytemuck::cast_slice_mut::<Line, Unit>(&mut filled.lines)[start..end];
         let mut shares = Vec::with_capacity(names.len().div_ceil(share));
         let mut first = wave * WAVE;
         for ((names, followers), shared) in
@@ -538,8 +556,8 @@ pub(crate) fn pack(
         shares.into_par_iter().for_each(PackShare::run);
     }
     if !is_all_at_once {
-        filled.units.truncate(end + MARGIN);
-        filled.units.shrink_to_fit();
+        filled.lines.truncate(lines_of(end + MARGIN));
+        filled.lines.shrink_to_fit();
     }
     Ok(filled)
 }
@@ -614,8 +632,9 @@ pub(crate) fn move_triangles(
     geometries: &[Geometry],
     names: &[BlockNames],
     may_lack_area: bool,
-    mut units: &mut [Unit],
+    lines: &mut [Line],
 ) -> bool {
+    let mut units = bytemuck::cast_slice_mut::<Line, Unit>(lines);
     let share = share_of(names.len());
     let mut shares = Vec::with_capacity(names.len().div_ceil(share));
     for names in names.chunks(share) {

@@ -9,7 +9,7 @@ use std::cmp::Reverse;
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
-use crate::blocks::{self, BlockNames, Blocks, Filled, LaneOrder, TriangleBlock, Unit, Vertices};
+use crate::blocks::{self, BlockNames, Blocks, Filled, LaneOrder, Line, TriangleBlock, Vertices};
 use crate::build::{Binary, BinaryNode, Fork, Name};
 use crate::carve::{self, Cell, LaneCell};
 use crate::lanes::Level;
@@ -63,7 +63,7 @@ pub(crate) struct Packed {
     /// Each before all that are below it.
     pub(crate) nodes: Store<Node>,
     /// The blocks of triangles: see [`blocks`].
-    pub(crate) blocks: Store<Unit>,
+    pub(crate) blocks: Store<Line>,
     /// As many as there are blocks.
     pub(crate) names: Store<BlockNames>,
     pub(crate) entries: Store<Entry>,
@@ -157,10 +157,10 @@ impl Packed {
         // Among other things, rays meet so few triangles that they gain nothing by more room for them.
         let are_alone = self.entries.is_empty() && self.sphere_blocks.is_empty();
         let vertices = if are_alone { Vertices::of_fastest(self.names.len()) } else { Vertices::Shared };
-        let Filled { units, places, orders } =
+        let Filled { lines, places, orders } =
             blocks::pack(level, vertices, geometries, &self.names, followers, may_lack_area)?;
         blocks::refer(self.nodes.to_mut(), &mut self.root, &places, number_of);
-        self.blocks = units.into();
+        self.blocks = lines.into();
         self.put_in_order(&orders);
         Ok(())
     }

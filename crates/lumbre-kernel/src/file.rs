@@ -8,7 +8,7 @@
 //! there are, the reference to the root, and a zero; as u64 how many elements each array has; a fingerprint of the
 //! geometries; a checksum of everything behind the header; a fingerprint of the parts of instances that were opened; and a
 //! checksum of the header before itself. Then come the arrays, each at
-//! a multiple of 64 bytes: nodes, units of blocks (see `blocks`) and names of triangles, those of spheres, entries, parts of triangles, masks.
+//! a multiple of 64 bytes: nodes, lines of blocks (see `blocks`) and names of triangles, those of spheres, entries, parts of triangles, masks.
 //!
 //! What a file says is checked when it is mapped: checksums, the length, every reference and every name, that all that has
 //! no place in an array is marked as such, and that the geometries are those that it was saved with. A file that somebody
@@ -25,7 +25,7 @@ use std::sync::{Arc, OnceLock};
 use bytemuck::Pod;
 use memmap2::Mmap;
 
-use crate::blocks::{BlockNames, Unit};
+use crate::blocks::{BlockNames, Line};
 use crate::carve::LaneCell;
 use crate::collapse::{Entry, Packed};
 use crate::holds::{Holds, SingleStart};
@@ -44,7 +44,7 @@ use crate::{Accel, Geometry, GeometryKind, LoadError, RefitError};
 
 const MAGIC: [u8; 8] = *b"LumbMap\0";
 /// Changes with the format, and with the layout of what is in it.
-const VERSION: u32 = 6;
+const VERSION: u32 = 7;
 const BYTE_ORDER: u32 = 0x0102_0304;
 const NONE: u32 = u32::MAX;
 const HEADER: usize = 256;
@@ -193,7 +193,7 @@ fn arrays(accel: &Accel) -> [&[u8]; ARRAYS] {
 
 const SIZES: [usize; ARRAYS] = [
     size_of::<Node>(),
-    size_of::<Unit>(),
+    size_of::<Line>(),
     size_of::<BlockNames>(),
     size_of::<SphereBlock>(),
     size_of::<BlockNames>(),

@@ -11,7 +11,7 @@ use super::{
     Axes, Corners, CornersRoom, Crossings, Lanes, LastEight, Level, Question, Row, Set, Sides, Task, Vector,
     WIDE, Wide, wide,
 };
-use crate::blocks::{MOST_SHARED, QUAD, TriangleBlock, USUAL, far_of_last};
+use crate::blocks::{FIRST_UNSHARED, MOST_SHARED, QUAD, TriangleBlock, USUAL, far_of_last};
 use crate::fleet;
 use crate::holds::SingleStart;
 use crate::narrow::NarrowRay;
@@ -202,9 +202,9 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
             super::opaque(&rows_by_room[3])
         };
         if room > MOST_SHARED {
-            let a = Self::sheared_eight::<_, false>(block, ray, rows, 0);
-            let b = Self::sheared_eight::<_, false>(block, ray, rows, BLOCK);
-            let c = Self::sheared_eight::<_, false>(block, ray, rows, 2 * BLOCK);
+            let a = Self::sheared_eight::<_, false>(block, ray, rows, FIRST_UNSHARED);
+            let b = Self::sheared_eight::<_, false>(block, ray, rows, FIRST_UNSHARED + BLOCK);
+            let c = Self::sheared_eight::<_, false>(block, ray, rows, FIRST_UNSHARED + 2 * BLOCK);
             return [[a[0], b[0], c[0]], [a[1], b[1], c[1]], [a[2], b[2], c[2]]];
         }
         // SAFETY: see `X86`.
@@ -266,7 +266,7 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
         first: usize,
     ) -> [__m256; 3] {
         let rows = block.coordinates();
-        // SAFETY: see `X86`. Rows begin at 62 at most, and no more of them than 24 are looked at, in an array of 96.
+        // SAFETY: see `X86`. Rows begin at 62 at most, and no more of them than 27 are looked at, in an array of 96.
         unsafe {
             let load = |row: u32| {
                 let row = rows.as_ptr().add(row as usize);
@@ -839,10 +839,11 @@ impl<const LEAKS: bool> X86<true, LEAKS> {
             let mut arms = [wide::Avx512::zeroed(); 3];
             for (axis, arm) in arms.iter_mut().enumerate() {
                 let (of_a, of_b) = (rows_a[axis] as usize, rows_b[axis] as usize);
-                // SAFETY: see `X86`. Rows begin at 48 at most, and no more of them than 24 are looked at, in arrays of 96.
+                let own = FIRST_UNSHARED + BLOCK * corner;
+                // SAFETY: see `X86`. Rows begin at 62 at most, and no more of them than 27 are looked at, in arrays of 96.
                 let vertices = unsafe {
-                    let low = _mm256_loadu_ps(first.add(of_a + BLOCK * corner));
-                    let high = _mm256_loadu_ps(second.add(of_b + BLOCK * corner));
+                    let low = _mm256_loadu_ps(first.add(of_a + own));
+                    let high = _mm256_loadu_ps(second.add(of_b + own));
                     wide::Avx512::new(_mm512_insertf32x8::<1>(_mm512_castps256_ps512(low), high))
                 };
                 *arm = origin[axis] - vertices;

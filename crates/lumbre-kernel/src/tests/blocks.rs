@@ -7,12 +7,11 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use bytemuck::Zeroable;
 use lumbre_geometry::{PlacedShape, Ray, Sphere};
 use lumbre_math::{DVec3, Transform, Vec3};
 
 use super::scenes::Random;
-use crate::blocks::{self, BlockNames, Blocks, TriangleBlock, Unit, Vertices};
+use crate::blocks::{self, BlockNames, Blocks, Line, TriangleBlock, Vertices};
 use crate::lanes::{Level, corners_at, equals_before_at, meet_triangles_at, told_at, truncated_at};
 use crate::narrow::NarrowRay;
 use crate::triangles::{BLOCK, BlockRay, Meeting, Shear, intersect};
@@ -26,7 +25,7 @@ struct Tally {
 
 /// A block of triangles of about `size`, within `spread` of each other, at `center`, of whose corners about so many are
 /// those of others; the last lane stays empty.
-fn block(random: &mut Random, shares: f64, center: DVec3, spread: f64, size: f64) -> Vec<Unit> {
+fn block(random: &mut Random, shares: f64, center: DVec3, spread: f64, size: f64) -> Vec<Line> {
     let mut mesh = TriangleMesh { origin: DVec3::ZERO, positions: Vec::new(), indices: Vec::new() };
     for lane in 0..BLOCK - 1 {
         let middle = center + spread * random.vector();
@@ -47,7 +46,7 @@ fn block(random: &mut Random, shares: f64, center: DVec3, spread: f64, size: f64
     let geometry = Geometry { id: 0, kind: GeometryKind::Mesh(Arc::new(mesh)) };
     blocks::pack(Level::best(), Vertices::Shared, &[geometry], &[BlockNames::of(&names)], &[0], true)
         .unwrap()
-        .units
+        .lines
 }
 
 /// One ray at one block at every level.
@@ -216,7 +215,7 @@ fn a_ray_that_leaves_a_wall_is_seen_to_leave_it() {
         let geometry = Geometry { id: 0, kind: GeometryKind::Mesh(Arc::new(wall)) };
         let names = [BlockNames::of(&[[0, 0], [0, 1]])];
         let units =
-            blocks::pack(Level::best(), Vertices::Shared, &[geometry], &names, &[0], true).unwrap().units;
+            blocks::pack(Level::best(), Vertices::Shared, &[geometry], &names, &[0], true).unwrap().lines;
         let block = Blocks::new(&units).at(0).unwrap();
         for _ in 0..50 {
             let at = center + random.between(-1.0, 1.0) * right + random.between(-1.0, 1.0) * up;
@@ -346,11 +345,11 @@ fn triangles_stand_so_that_either_half_finds_its_vertices_in_little_room() {
             let geometries = [Geometry { id: 0, kind: GeometryKind::Mesh(Arc::clone(&mesh)) }];
             let filled =
                 blocks::pack(Level::best(), Vertices::Shared, &geometries, &names, &[0], true).unwrap();
-            let block = Blocks::new(&filled.units).at(0).unwrap();
+            let block = Blocks::new(&filled.lines).at(0).unwrap();
             assert_eq!(block.room(), 10, "{triangles:?}");
             let mut names = names;
             filled.orders[0].put(&mut names[0]);
-            assert!(Blocks::new(&filled.units).places(&names).is_some());
+            assert!(Blocks::new(&filled.lines).places(&names).is_some());
             let mut stand: Vec<_> = names[0].primitives().collect();
             stand.sort_unstable();
             assert_eq!(stand, (0..len).collect::<Vec<_>>(), "{triangles:?}");
@@ -361,7 +360,7 @@ fn triangles_stand_so_that_either_half_finds_its_vertices_in_little_room() {
             // What stands in that order stays in it.
             let again =
                 blocks::pack(Level::best(), Vertices::Shared, &geometries, &names, &[0], true).unwrap();
-            assert_eq!(again.units, filled.units);
+            assert_eq!(again.lines, filled.lines);
         }
     }
 }
@@ -477,13 +476,13 @@ fn blocks_that_are_not_such_as_are_packed_are_told() {
     let bytes: Vec<u8> = bytemuck::cast_slice(&accel.tree.blocks).to_vec();
     let places = accel.tree.blocks().places(&accel.tree.names).unwrap();
     let is_sound = |bytes: &[u8]| {
-        let mut units: Vec<Unit> = vec![Unit::zeroed(); bytes.len() / 16];
-        bytemuck::cast_slice_mut(&mut units).copy_from_slice(bytes);
-        Blocks::new(&units).places(&accel.tree.names).is_some()
+        let mut lines = vec![Line::default(); bytes.len() / 64];
+        bytemuck::cast_slice_mut(&mut lines).copy_from_slice(bytes);
+        Blocks::new(&lines).places(&accel.tree.names).is_some()
     };
     assert!(is_sound(&bytes));
-    assert!(!is_sound(&bytes[..bytes.len() - 16]));
-    assert!(!is_sound(&[&bytes[..], &[0; 16]].concat()));
+    assert!(!is_sound(&bytes[..bytes.len() - 64]));
+    assert!(!is_sound(&[&bytes[..], &[0; 64]].concat()));
     // Of heads: the number, the room, how many follow, a vertex of the other half of lanes, and corners beyond the room.
     for place in places {
         let at = 16 * place as usize;

@@ -11,7 +11,7 @@ use super::scenes::{
     with_every_preset,
 };
 use crate::batch::Flying;
-use crate::blocks::Unit;
+use crate::blocks::Line;
 use crate::holds::{Contents, SingleStart};
 use crate::lanes::{Eight, Lanes, Level, Portable, Vector, start_narrow_by_four_at};
 use crate::narrow::{self, Precise, search_triangles};
@@ -585,7 +585,7 @@ fn in_a_tree_that_caches_do_not_hold_batches_answer_as_single_rays_do() {
     let geometries = kinds(&meshes).into_iter().zip(5..).map(|(kind, id)| Geometry { id, kind }).collect();
     let accel = Accel::build(geometries, &BuildOptions { preset: Preset::Fast }).unwrap();
     let tree = &accel.tree;
-    let bytes = size_of_val::<[Node]>(&tree.nodes) + size_of_val::<[Unit]>(&tree.blocks);
+    let bytes = size_of_val::<[Node]>(&tree.nodes) + size_of_val::<[Line]>(&tree.blocks);
     assert!(bytes >= 1 << 24, "{bytes} bytes are not far");
 
     let mut rays = Vec::new();
