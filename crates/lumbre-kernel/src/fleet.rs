@@ -177,10 +177,10 @@ impl Iterator for Bits {
 }
 
 impl Bits {
-    /// The first four, if there are as many.
+    /// The first four, if there are as many, and the others.
     #[inline(always)]
-    fn first_four(mut self) -> Option<[usize; 4]> {
-        Some([self.next()?, self.next()?, self.next()?, self.next()?])
+    fn first_four(mut self) -> Option<([usize; 4], Self)> {
+        Some(([self.next()?, self.next()?, self.next()?, self.next()?], self))
     }
 
     /// Two at a time; the last of an odd number comes with itself.
@@ -407,26 +407,44 @@ impl<'a, 'r, F: Flyer<L>, L: Lanes> Fleet<'a, 'r, F, L> {
     /// Those that are at nodes go on to the child that comes first, or to what stands on their stacks.
     #[inline(always)]
     fn meet_nodes(&mut self, at_nodes: u64, ends: &mut impl Ends<F::Answer>) {
+        let too_deep = if F::Order::PUTS_ONE { self.put_and_take(at_nodes) } else { self.put_many(at_nodes) };
+        self.give_up(too_deep, ends);
+    }
+
+    /// Puts what each meets of its node, and takes the last that then stands there. A bit for each that may not have room for the
+    /// children of another node.
+    #[inline(always)]
+    fn put_and_take(&mut self, at_nodes: u64) -> u64 {
+        let mut too_deep = 0;
+        for place in Bits(at_nodes) {
+            let reference = self.references.of(place);
+            let node = &self.nodes[*reference as usize];
+            let slabs = lanes::opaque(&self.flights[place].slabs);
+            let (mask, enter) = lanes::meet_boxes::<L::Wide>(node, slabs);
+            let stack = &mut self.stacks[place];
+            *reference = F::Order::put_and_take::<L>(node, mask, enter, stack);
+            too_deep |= bit(stack.len() > STACK - WIDTH, place);
+        }
+        too_deep
+    }
+
+    /// The same where those that meet one or none are better told apart from those that have something to put, and taken care of first.
+    #[inline(always)]
+    fn put_many(&mut self, at_nodes: u64) -> u64 {
         let nodes = self.nodes;
         let (mut none, mut many) = (0, 0);
         for (at, place) in Bits(at_nodes).enumerate() {
-            let at = at % FLIGHTS;
             let reference = self.references.of(place);
             let node = &nodes[*reference as usize];
             let slabs = lanes::opaque(&self.flights[place].slabs);
             let (mask, enter) = lanes::meet_boxes::<L::Wide>(node, slabs);
             self.masks[place] = mask;
             *self.parents.of(place) = *reference;
-            if !F::Order::PUTS_ONE {
-                self.enters[at] = enter;
-                // Of more than one or none, anything.
-                *reference = lanes::only_child(node, mask);
-                none |= bit(mask == 0, place);
-                many |= bit(mask & mask.wrapping_sub(1) != 0, place);
-            }
-        }
-        if F::Order::PUTS_ONE {
-            many = at_nodes;
+            self.enters[at % FLIGHTS] = enter;
+            // Of more than one or none, anything.
+            *reference = lanes::only_child(node, mask);
+            none |= bit(mask == 0, place);
+            many |= bit(mask & mask.wrapping_sub(1) != 0, place);
         }
         let mut too_deep = 0;
         for place in Bits(many) {
@@ -434,11 +452,10 @@ impl<'a, 'r, F: Flyer<L>, L: Lanes> Fleet<'a, 'r, F, L> {
             let node = &nodes[*self.parents.of(place) as usize];
             let (mask, enter) = (self.masks[place], self.enters[rank(at_nodes, place)]);
             *self.references.of(place) = F::Order::put_and_take::<L>(node, mask, enter, stack);
-            // There may be no room for the children of another node.
             too_deep |= bit(stack.len() > STACK - WIDTH, place);
         }
-        self.give_up(too_deep, ends);
         self.pop(none);
+        too_deep
     }
 
     /// Those that are at leaves go on to the next block, or to what stands on their stacks.
@@ -659,14 +676,25 @@ pub(crate) fn fly<F: Flyer<L>, L: Lanes>(
             under_way &= !at_ends;
             let mut free = at_ends;
             if F::STARTS_BY_FOUR {
-                while let Some((&four, _)) = waiting.as_slice().split_first_chunk()
-                    && let Some(places) = Bits(free).first_four()
+                while let Some((&four, behind)) = waiting.as_slice().split_first_chunk()
+                    && let Some((places, others)) = Bits(free).first_four()
                 {
-                    for &position in waiting.as_slice().iter().skip(AHEAD).take(4) {
-                        lanes::fetch(&rays[position]);
+                    // Every other one: most come one behind another, two in a cache line.
+                    for ahead in [AHEAD, AHEAD + 2] {
+                        if let Some(&position) = waiting.as_slice().get(ahead) {
+                            lanes::fetch(&rays[position]);
+                        }
                     }
-                    waiting = waiting.as_slice()[4..].iter();
+                    waiting = behind.iter();
                     let started = fleet.set_out_by_four(places, four);
+                    if started == 0b1111 {
+                        for position in four {
+                            ends.fetch(position);
+                        }
+                        under_way |= free & !others.0;
+                        free = others.0;
+                        continue;
+                    }
                     for (i, (place, position)) in places.into_iter().zip(four).enumerate() {
                         if started >> i & 1 != 0 {
                             ends.fetch(position);
