@@ -163,6 +163,9 @@ pub(crate) struct Pass<E> {
     weights: [E; 3],
 }
 
+/// How a line passes the triangles of a block, and which of these its ray meets.
+type Passed<E> = (Crossing<E>, Pass<E>);
+
 impl<E: Eight> Pass<E> {
     /// The weights of one.
     #[inline(always)]
@@ -209,7 +212,7 @@ pub(crate) struct Nearest {
 const _: () = assert!(size_of::<NarrowRay>() + size_of::<Nearest>() <= 64);
 
 impl Nearest {
-    /// No block is as long as that there could be one in its place.
+    /// There is no block there: it would reach beyond where blocks may begin.
     const NONE: Self = Self { place: u32::MAX, weights: [0.0; 3] };
 
     #[inline(always)]
@@ -374,11 +377,7 @@ impl NarrowRay {
 
     /// Which triangles of a block the ray meets; `None` where its line passes through none.
     #[inline(always)]
-    fn pass<L: Lanes>(
-        &self,
-        precise: &Precise,
-        block: &TriangleBlock,
-    ) -> Option<(Crossing<L::Eight>, Pass<L::Eight>)> {
+    fn pass<L: Lanes>(&self, precise: &Precise, block: &TriangleBlock) -> Option<Passed<L::Eight>> {
         let (mask, lines) = self.lines::<L, true>(block);
         if mask == 0 {
             return None;

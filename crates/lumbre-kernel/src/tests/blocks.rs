@@ -10,7 +10,7 @@ use std::sync::Arc;
 use lumbre_geometry::{PlacedShape, Ray, Sphere};
 use lumbre_math::{DVec3, Transform, Vec3};
 
-use super::scenes::Random;
+use super::scenes::{Random, soup};
 use crate::blocks::{self, BlockNames, Blocks, Line, TriangleBlock, Vertices};
 use crate::lanes::{Level, corners_at, equals_before_at, meet_triangles_at, told_at, truncated_at};
 use crate::narrow::NarrowRay;
@@ -393,6 +393,23 @@ fn with_own_vertices(geometry: &Geometry) -> Geometry {
     let indices = (0..mesh.indices.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
     let mesh = TriangleMesh { origin: mesh.origin, positions, indices };
     Geometry { id: geometry.id, kind: GeometryKind::Mesh(Arc::new(mesh)) }
+}
+
+#[test]
+fn no_eight_coordinates_lie_in_two_cache_lines_where_corners_have_their_own() {
+    let mesh = Arc::new(soup(&mut Random(91), 100, DVec3::ZERO, 4.0));
+    let geometry = Geometry { id: 0, kind: GeometryKind::Mesh(mesh) };
+    let accel = Accel::build(vec![geometry], &BuildOptions::default()).unwrap();
+    let places = accel.tree.blocks().places(&accel.tree.names).unwrap();
+    assert!(places.len() > 8);
+    for place in places {
+        let block = accel.tree.block(place);
+        assert!(block.is_unshared());
+        for eight in block.own_corners().as_flattened() {
+            let [first, last] = [&raw const eight[0], &raw const eight[BLOCK - 1]].map(|at| at.addr() / 64);
+            assert_eq!(first, last);
+        }
+    }
 }
 
 #[test]
