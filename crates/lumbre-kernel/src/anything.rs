@@ -1,7 +1,7 @@
 //! The nearest hit and any hit, in single precision wherever that can decide, in trees that hold instances, clouds of spheres or
 //! meshes in double precision.
 //!
-//! What stands in the tree itself is searched as in [`single`](crate::single); what those leaves have found bounds what is still
+//! What stands in the tree itself is searched as in [`single`]; what those leaves have found bounds what is still
 //! sought here, and the other way round. A placed tree is searched in single precision as well, where that can tell: one of
 //! triangles at once, with the ray that the instance's map gives; any other by a search of its own, which goes no deeper than
 //! [`SingleStart`] allows. Where single precision cannot tell about a placed tree, the plain search answers for that alone. What

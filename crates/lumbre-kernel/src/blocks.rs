@@ -112,7 +112,8 @@ pub(crate) const MOST_SHARED: usize = 16;
 pub(crate) const QUAD: usize = BLOCK / 2;
 /// Where triangles share less: each corner has a vertex of its own, corner by corner and lane by lane.
 const UNSHARED: usize = 3 * BLOCK;
-/// Of those, the first; what is before it is open, so that eight coordinates begin at a multiple of their size. Of others it is zero.
+/// The number of the first of those: what is before it is open, so that eight coordinates begin at a multiple of their size. Where
+/// vertices are shared, the first is 0.
 pub(crate) const FIRST_UNSHARED: usize = 3;
 
 const _: () = assert!((size_of::<Head>() + FIRST_UNSHARED * size_of::<f32>()).is_multiple_of(32));
@@ -211,7 +212,8 @@ impl TriangleBlock {
         (&words[FIRST..FIRST + 4]).try_into().expect("four")
     }
 
-    /// The coordinates from the first vertex that there may be on: the x of as many as there is room for, then y, then z, and then what means nothing.
+    /// The x of as many vertices as there is room for, then y, then z, and then what means nothing. Where each corner has a vertex of its
+    /// own, all stand [`FIRST_UNSHARED`] places further on.
     #[inline(always)]
     pub(crate) fn coordinates(&self) -> &[f32; COORDINATES] {
         &self.coordinates
