@@ -451,6 +451,11 @@ pub(crate) trait Goal: Sized {
     type Wide: Companion;
     /// What that finds in a tree itself, rounded.
     fn rounded(accel: &Accel, answer: <Self::Wide as single::Goal>::Answer) -> Self::Answer;
+    /// The same, put there: what goes through memory is waited for.
+    #[inline(always)]
+    fn put_rounded(accel: &Accel, answer: <Self::Wide as single::Goal>::Answer, place: &mut Self::Answer) {
+        *place = Self::rounded(accel, answer);
+    }
     /// The same of what it hands out.
     fn rounded_found(found: <Self::Wide as single::Goal>::Found) -> Self::Answer;
     /// Searches along a ray alone; not where it does not come from nearby.
@@ -478,15 +483,15 @@ impl Goal for Closest {
     #[inline(always)]
     fn rounded(accel: &Accel, winner: Option<Winner>) -> Option<Hit32> {
         // No `map`: it does not take on the instruction set of who calls it.
-        let Winner { root, geometry, primitive } = winner?;
-        Some(Hit32 {
-            t: root.t as f32,
-            local: [root.local.x as f32, root.local.y as f32],
-            id: accel.geometries[geometry as usize].id,
-            primitive,
-            geometry,
-            instance: Hit32::NO_INSTANCE,
-        })
+        Some(rounded(accel, &winner?))
+    }
+
+    #[inline(always)]
+    fn put_rounded(accel: &Accel, winner: Option<Winner>, place: &mut Option<Hit32>) {
+        match winner {
+            Some(winner) => *place = Some(rounded(accel, &winner)),
+            None => *place = None,
+        }
     }
 
     #[inline(always)]
@@ -549,6 +554,20 @@ impl Goal for Any {
     #[inline(always)]
     fn answer_together<L: Lanes>(packet: &Packet, first: usize, ends: &mut impl Ends<bool>) {
         packet.put_met(first, ends);
+    }
+}
+
+/// A hit that a tree has itself, in double precision, rounded.
+#[inline(always)]
+fn rounded(accel: &Accel, winner: &Winner) -> Hit32 {
+    let &Winner { root, geometry, primitive } = winner;
+    Hit32 {
+        t: root.t as f32,
+        local: [root.local.x as f32, root.local.y as f32],
+        id: accel.geometries[geometry as usize].id,
+        primitive,
+        geometry,
+        instance: Hit32::NO_INSTANCE,
     }
 }
 

@@ -51,10 +51,11 @@ struct Rounded<'a, G: Goal> {
 impl<G: Goal> Ends<<G::Wide as single::Goal>::Answer> for Rounded<'_, G> {
     #[inline(always)]
     fn put(&mut self, position: usize, outcome: Outcome<<G::Wide as single::Goal>::Answer>) {
-        self.places[position] = match outcome {
-            Outcome::Settled(answer) => G::rounded(self.accel, answer),
-            Outcome::Unsettled => G::widely(self.accel, &self.rays[position]),
-        };
+        let place = &mut self.places[position];
+        match outcome {
+            Outcome::Settled(answer) => G::put_rounded(self.accel, answer, place),
+            Outcome::Unsettled => *place = G::widely(self.accel, &self.rays[position]),
+        }
     }
 }
 
