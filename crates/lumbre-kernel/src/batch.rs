@@ -3,6 +3,7 @@
 //! Those that are alike go together: see [`packet`]. The others are in flight (see [`fleet`]), where they are many: an answer has the
 //! bits that it has alone.
 
+use std::borrow::Borrow;
 use std::marker::PhantomData;
 use std::slice::Chunks;
 
@@ -10,7 +11,7 @@ use lumbre_geometry::Ray;
 
 use crate::Accel;
 use crate::blocks::Line;
-use crate::fleet::{self, Beside, DoubleFlyer, Shapes, Triangles};
+use crate::fleet::{self, Beside, DoubleFlyer, Doubled, Shapes, Triangles};
 use crate::holds::{Contents, SingleStart};
 use crate::lanes::{self, Lanes, Level, Task};
 use crate::node::Node;
@@ -120,14 +121,14 @@ pub(crate) fn ends<A, F: FnMut(usize, Outcome<A>)>(ends: F) -> F {
 }
 
 /// Searches along every ray, in a tree of triangles, or of shapes and custom geometry too.
-pub(crate) fn search_all<G: Goal>(
+pub(crate) fn search_all<G: Goal, R: Doubled>(
     level: Level,
     accel: &Accel,
     start: &SingleStart,
-    rays: &[Ray],
+    rays: &[R],
     ends: impl Ends<G::Answer>,
 ) {
-    search_as_said::<G>(level, accel, start, rays, ends, None, true);
+    search_as_said::<G, R>(level, accel, start, rays, ends, None, true);
 }
 
 /// Bytes of nodes and triangles.
@@ -148,21 +149,21 @@ pub(crate) fn search_anything<G: Companion>(
 }
 
 /// The same with or without packets, where the others go as is said, if it is.
-pub(crate) fn search_as_said<G: Goal>(
+pub(crate) fn search_as_said<G: Goal, R: Doubled>(
     level: Level,
     accel: &Accel,
     start: &SingleStart,
-    rays: &[Ray],
+    rays: &[R],
     ends: impl Ends<G::Answer>,
     flying: Option<Flying>,
     has_packets: bool,
 ) {
     if start.contents == Contents::Triangles {
-        type AmongTriangles<G> = InDouble<G, Triangles, false>;
-        level.run(AllAtOnce::<AmongTriangles<G>, _> { accel, start, rays, ends, flying, has_packets });
+        type AmongTriangles<G, R> = InDouble<G, Triangles, R, false>;
+        level.run(AllAtOnce::<AmongTriangles<G, R>, _> { accel, start, rays, ends, flying, has_packets });
     } else {
-        type AmongShapes<G> = InDouble<G, Shapes, true>;
-        level.run(AllAtOnce::<AmongShapes<G>, _> { accel, start, rays, ends, flying, has_packets });
+        type AmongShapes<G, R> = InDouble<G, Shapes, R, true>;
+        level.run(AllAtOnce::<AmongShapes<G, R>, _> { accel, start, rays, ends, flying, has_packets });
     }
 }
 
@@ -203,10 +204,10 @@ pub(crate) trait Manner {
 }
 
 /// In double precision. `MIXED` where anything stands beside triangles.
-struct InDouble<G, B, const MIXED: bool>(PhantomData<(G, B)>);
+struct InDouble<G, B, R, const MIXED: bool>(PhantomData<(G, B, R)>);
 
-impl<G: Goal, B: Beside, const MIXED: bool> Manner for InDouble<G, B, MIXED> {
-    type Ray = Ray;
+impl<G: Goal, B: Beside, R: Doubled, const MIXED: bool> Manner for InDouble<G, B, R, MIXED> {
+    type Ray = R;
     type Answer = G::Answer;
     type Packet<'a> = Packet<'a, MIXED>;
     const ASKS_AHEAD: bool = !G::IS_ANY;
@@ -220,27 +221,29 @@ impl<G: Goal, B: Beside, const MIXED: bool> Manner for InDouble<G, B, MIXED> {
     fn search_together<'a, L: Lanes>(
         packet: &mut Packet<'a, MIXED>,
         _: &Exact<'a>,
-        rays: &[Ray; PACKET],
+        rays: &[R; PACKET],
         first: usize,
         ends: &mut impl Ends<G::Answer>,
     ) -> Together {
-        search_packet::<G, L, _, MIXED>(packet, rays, first, &mut NoOthers, ends)
+        let rays = R::all_doubled::<L>(rays);
+        search_packet::<G, L, _, MIXED>(packet, rays.borrow(), first, &mut NoOthers, ends)
     }
 
     #[inline(always)]
-    fn search_alone<L: Lanes>(exact: &Exact, ray: &Ray) -> Outcome<G::Answer> {
-        Alone::<G, MIXED>::new(exact.accel(), exact.start, ray).run::<L>()
+    fn search_alone<L: Lanes>(exact: &Exact, ray: &R) -> Outcome<G::Answer> {
+        let ray = ray.doubled::<L>();
+        Alone::<G, MIXED>::new(exact.accel(), exact.start, ray.borrow()).run::<L>()
     }
 
     #[inline(always)]
     fn fly<L: Lanes>(
         exact: &Exact,
         asks_ahead: bool,
-        rays: &[Ray],
+        rays: &[R],
         positions: &[usize],
         ends: &mut impl Ends<G::Answer>,
     ) {
-        fleet::fly::<DoubleFlyer<G, B>, L>(exact, asks_ahead, rays, positions, ends);
+        fleet::fly::<DoubleFlyer<G, B, R>, L>(exact, asks_ahead, rays, positions, ends);
     }
 }
 

@@ -22,7 +22,7 @@ use crate::single::{Exact, Outcome, Step, nearest_of};
 use crate::stack::{Order, STACK};
 use crate::triangles::BLOCK;
 
-pub(crate) use double::{Beside, DoubleFlyer, Shapes, Triangles};
+pub(crate) use double::{Beside, DoubleFlyer, Doubled, Shapes, Triangles};
 
 /// A ray that flies: among triangles in either precision, and in double precision among what stands beside them.
 pub(crate) trait Flyer<L: Lanes>: Sized {

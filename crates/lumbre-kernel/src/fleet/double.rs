@@ -2,9 +2,11 @@
 //!
 //! [`single`]: crate::single
 
+use std::borrow::Borrow;
 use std::marker::PhantomData;
 
 use lumbre_geometry::Ray;
+use lumbre_math::DVec3;
 
 use super::{Crossing, Flyer, Passing};
 use crate::blocks::TriangleBlock;
@@ -13,9 +15,10 @@ use crate::holds::SingleStart;
 use crate::hulls::{HullBlock, HullRay};
 use crate::lanes::{self, Axes, Crossings, Eight, Glanced, Lanes, Level, MetHulls, Task, Vector};
 use crate::node::{Slabs, Units};
+use crate::packet::PACKET;
 use crate::single::{Candidate, Exact, Goal, Outcome, Step, Winner, heights, largest_component};
 use crate::triangles::{self, BLOCK, BlockRay, HeightRange};
-use crate::{Faces, traverse};
+use crate::{Faces, Ray32, traverse};
 
 /// What a ray has to know of shapes and custom geometry.
 pub(crate) trait Beside {
@@ -91,18 +94,56 @@ impl Beside for Shapes {
     }
 }
 
+/// A ray that is asked in either precision, and searched for in double.
+pub(crate) trait Doubled {
+    /// In double precision.
+    fn doubled<L: Lanes>(&self) -> impl Borrow<Ray>;
+    /// The same of a packet.
+    fn all_doubled<L: Lanes>(rays: &[Self; PACKET]) -> impl Borrow<[Ray; PACKET]>
+    where
+        Self: Sized;
+}
+
+impl Doubled for Ray {
+    #[inline(always)]
+    fn doubled<L: Lanes>(&self) -> impl Borrow<Self> {
+        self
+    }
+
+    #[inline(always)]
+    fn all_doubled<L: Lanes>(rays: &[Self; PACKET]) -> impl Borrow<[Self; PACKET]> {
+        rays
+    }
+}
+
+impl Doubled for Ray32 {
+    #[inline(always)]
+    fn doubled<L: Lanes>(&self) -> impl Borrow<Ray> {
+        L::widened(self)
+    }
+
+    #[inline(always)]
+    fn all_doubled<L: Lanes>(rays: &[Self; PACKET]) -> impl Borrow<[Ray; PACKET]> {
+        let mut doubled = [Ray::new(DVec3::ZERO, DVec3::ZERO); PACKET];
+        for (doubled, ray) in doubled.iter_mut().zip(rays) {
+            *doubled = L::widened(ray);
+        }
+        doubled
+    }
+}
+
 /// A ray in double precision, among triangles and what stands beside them.
-pub(crate) struct DoubleFlyer<G, B> {
+pub(crate) struct DoubleFlyer<G, B, R> {
     blocks: BlockRay,
     /// From heights to places in the range of boxes.
     place_per_height: f32,
     /// The nearest so far.
     best: Candidate,
     beside: B,
-    goal: PhantomData<G>,
+    asked: PhantomData<(G, R)>,
 }
 
-impl<G, B: Beside> DoubleFlyer<G, B> {
+impl<G, B: Beside, R> DoubleFlyer<G, B, R> {
     #[inline(always)]
     fn keep(&mut self, better: Candidate, slabs: &mut Slabs) {
         self.best = better;
@@ -227,8 +268,8 @@ impl Task for MeetsAny<'_, '_> {
     }
 }
 
-impl<G: Goal, B: Beside, L: Lanes> Flyer<L> for DoubleFlyer<G, B> {
-    type Ray = Ray;
+impl<G: Goal, B: Beside, R: Doubled, L: Lanes> Flyer<L> for DoubleFlyer<G, B, R> {
+    type Ray = R;
     type Answer = G::Answer;
     type Order = G::Order;
     const IS_ANY: bool = G::IS_ANY;
@@ -249,16 +290,18 @@ impl<G: Goal, B: Beside, L: Lanes> Flyer<L> for DoubleFlyer<G, B> {
             range: HeightRange::ahead(0.0, 0.0),
             turn: 0.0,
         };
-        Self { blocks, place_per_height: 0.0, best: Candidate::NONE, beside: B::NOTHING, goal: PhantomData }
+        Self { blocks, place_per_height: 0.0, best: Candidate::NONE, beside: B::NOTHING, asked: PhantomData }
     }
 
     #[inline(always)]
-    fn start(start: &SingleStart, ray: &Ray) -> Option<Slabs> {
-        L::start_single(start, ray)
+    fn start(start: &SingleStart, ray: &R) -> Option<Slabs> {
+        L::start_single(start, ray.doubled::<L>().borrow())
     }
 
     #[inline(always)]
-    fn set_out(&mut self, exact: &Exact, ray: &Ray, slabs: &Slabs) {
+    fn set_out(&mut self, exact: &Exact, ray: &R, slabs: &Slabs) {
+        let ray = ray.doubled::<L>();
+        let ray = ray.borrow();
         (self.blocks, self.place_per_height) = L::start_blocks(exact.start, ray, slabs);
         self.best = Candidate::NONE;
         self.beside.set_out(&exact.accel().units, ray);
@@ -281,15 +324,15 @@ impl<G: Goal, B: Beside, L: Lanes> Flyer<L> for DoubleFlyer<G, B> {
         Crossing { met: mask & sure, unclear: mask & in_range & !sure, at: [from, to] }
     }
 
-    fn meets_closely(&self, exact: &Exact, ray: &Ray, block: u32, unclear: u32) -> Outcome<bool> {
-        meets_closely(L::level(), exact, ray, self.blocks.axes, (block, unclear))
+    fn meets_closely(&self, exact: &Exact, ray: &R, block: u32, unclear: u32) -> Outcome<bool> {
+        meets_closely(L::level(), exact, ray.doubled::<L>().borrow(), self.blocks.axes, (block, unclear))
     }
 
     #[inline(always)]
     fn take_nearest(
         &mut self,
         exact: &Exact,
-        ray: &Ray,
+        ray: &R,
         block: u32,
         crossing: &Crossing<[L::Eight; 2]>,
         _: &L::Edges,
@@ -305,7 +348,7 @@ impl<G: Goal, B: Beside, L: Lanes> Flyer<L> for DoubleFlyer<G, B> {
             return true;
         }
         let crossing = Crossing { met, unclear, at: [from.to_array(), to.to_array()] };
-        match self.seek_closely(L::level(), exact, ray, block, &crossing) {
+        match self.seek_closely(L::level(), exact, ray.doubled::<L>().borrow(), block, &crossing) {
             Outcome::Settled(Some(better)) => self.keep(better, slabs),
             Outcome::Settled(None) => {}
             Outcome::Unsettled => return false,
@@ -342,7 +385,9 @@ impl<G: Goal, B: Beside, L: Lanes> Flyer<L> for DoubleFlyer<G, B> {
     }
 
     #[inline(always)]
-    fn meet_entry(&mut self, exact: &Exact, ray: &Ray, entry: &Entry, slabs: &mut Slabs) -> Option<Step> {
+    fn meet_entry(&mut self, exact: &Exact, ray: &R, entry: &Entry, slabs: &mut Slabs) -> Option<Step> {
+        let ray = ray.doubled::<L>();
+        let ray = ray.borrow();
         let (geometry, primitive) = (entry.geometry, entry.primitive());
         let kind = &exact.accel().geometries[geometry as usize].kind;
         if G::IS_ANY {
@@ -362,7 +407,9 @@ impl<G: Goal, B: Beside, L: Lanes> Flyer<L> for DoubleFlyer<G, B> {
     }
 
     #[inline(always)]
-    fn answer(&self, exact: &Exact, ray: &Ray, is_met: bool) -> Outcome<G::Answer> {
+    fn answer(&self, exact: &Exact, ray: &R, is_met: bool) -> Outcome<G::Answer> {
+        let ray = ray.doubled::<L>();
+        let ray = ray.borrow();
         G::answer_in_flight::<L>(exact, ray, self.blocks.axes, is_met, (&self.best, self.crossed()))
     }
 }

@@ -116,6 +116,12 @@ pub(crate) trait Lanes: SphereLanes {
         ray.to_f64()
     }
 
+    /// The same of a ray that was there before: it is read at once.
+    #[inline(always)]
+    fn widened(ray: &Ray32) -> Ray {
+        ray.to_f64()
+    }
+
     /// The ray in single precision for boxes; `None` where it does not come from nearby, or is not sound.
     fn start_narrow(start: &SingleStart, ray: &Ray32) -> Option<Slabs>;
 
@@ -643,15 +649,15 @@ pub(crate) fn start_single_at(
     level.run(Starting(start, ray))
 }
 
-/// What [`Lanes::read`], [`Lanes::read_narrow`] and [`Lanes::read_widened`] give at a level, for tests.
+/// What [`Lanes::read`], [`Lanes::read_narrow`], [`Lanes::read_widened`] and [`Lanes::widened`] give at a level, for tests.
 #[cfg(test)]
-pub(crate) fn read_at(level: Level, ray: &Ray, narrow: &Ray32) -> (Ray, Ray32, Ray) {
+pub(crate) fn read_at(level: Level, ray: &Ray, narrow: &Ray32) -> (Ray, Ray32, [Ray; 2]) {
     struct Reading<'a>(&'a Ray, &'a Ray32);
     impl Task for Reading<'_> {
-        type Output = (Ray, Ray32, Ray);
+        type Output = (Ray, Ray32, [Ray; 2]);
         #[inline(always)]
         fn run<L: Lanes>(self) -> Self::Output {
-            (L::read(self.0), L::read_narrow(self.1), L::read_widened(self.1))
+            (L::read(self.0), L::read_narrow(self.1), [L::read_widened(self.1), L::widened(self.1)])
         }
     }
     level.run(Reading(ray, narrow))

@@ -998,6 +998,20 @@ where
     }
 
     #[inline(always)]
+    fn widened(ray: &Ray32) -> Ray {
+        let from = Self::narrow_start(ray);
+        // SAFETY: as there. A ray is eight f32: origin, start, direction, end.
+        unsafe {
+            let (origin, direction) = (_mm_loadu_ps(from), _mm_loadu_ps(from.add(4)));
+            // The first number of the direction goes behind the origin, and the ends of the range behind the other two.
+            let first = _mm_insert_ps::<0b0011_0000>(origin, direction);
+            let ends = _mm_unpackhi_ps(origin, direction);
+            let last = _mm_shuffle_ps::<0b11_10_10_01>(direction, ends);
+            Self::of_halves(_mm256_cvtps_pd(first), _mm256_cvtps_pd(last), 0.0)
+        }
+    }
+
+    #[inline(always)]
     fn read_widened(ray: &Ray32) -> Ray {
         let from = Self::narrow_start(ray);
         // SAFETY: as there. A ray is eight f32: origin, start, direction, end.

@@ -28,16 +28,17 @@ pub(crate) fn search_all<G: Goal>(level: Level, accel: &Accel, rays: &[Ray32], a
         search_triangles::<G>(level, accel, start, rays, answers, None);
         return;
     }
+    if start.contents == Contents::Shapes {
+        let rounded = Rounded::<G> { accel, rays, places: answers };
+        batch::search_all::<G::Wide, Ray32>(level, accel, start, rays, rounded);
+        return;
+    }
     let mut wide = Vec::with_capacity(rays.len().min(WIDELY));
     for (rays, places) in rays.chunks(WIDELY).zip(answers.chunks_mut(WIDELY)) {
         wide.clear();
         wide.extend(rays.iter().map(|ray| ray.to_f64()));
-        let rounded = Rounded::<G> { accel, rays, places };
-        if start.contents == Contents::Anything {
-            batch::search_anything::<G::Wide>(level, accel, start, &wide, Found(rounded));
-        } else {
-            batch::search_all::<G::Wide>(level, accel, start, &wide, rounded);
-        }
+        let found = Found(Rounded::<G> { accel, rays, places });
+        batch::search_anything::<G::Wide>(level, accel, start, &wide, found);
     }
 }
 

@@ -182,7 +182,8 @@ fn rays_are_read_as_they_were_written() {
             (Vec3::new(single(), single(), single()), Vec3::new(single(), single(), single()));
         let narrow = Ray32 { origin, t_min: single(), direction, t_max: single() };
         for level in Level::all() {
-            assert_eq!(read_at(level, &ray, &narrow), (ray, narrow, narrow.to_f64()), "{level:?}");
+            let expected = (ray, narrow, [narrow.to_f64(); 2]);
+            assert_eq!(read_at(level, &ray, &narrow), expected, "{level:?}");
         }
     }
 }

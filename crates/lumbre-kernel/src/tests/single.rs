@@ -169,14 +169,14 @@ fn check(accel: &Accel, rays: &[Ray], least: u32) {
                 let alone = single::search::<Nearest>(level, accel, start, &rays[i]);
                 tally.count(i, [outcome, alone], &winners[i], (level, flying, &rays[i]));
             };
-            batch::search_as_said::<Nearest>(level, accel, start, rays, put, Some(flying), false);
+            batch::search_as_said::<Nearest, _>(level, accel, start, rays, put, Some(flying), false);
             tally.end();
             let mut tally = Tally::of(rays);
             let put = |i: usize, outcome| {
                 let alone = single::search::<Whether>(level, accel, start, &rays[i]);
                 tally.count(i, [outcome, alone], &winners[i].is_some(), (level, flying, &rays[i]));
             };
-            batch::search_as_said::<Whether>(level, accel, start, rays, put, Some(flying), false);
+            batch::search_as_said::<Whether, _>(level, accel, start, rays, put, Some(flying), false);
             tally.end();
         }
     }
