@@ -436,7 +436,7 @@ impl Torus {
         for _ in 0..8 {
             let (value, slope) = quartic.at(s);
             let (curvature, squared) = (quartic.curvature(s), slope * slope);
-            // At the end of a parabola that is deeper than noise, the slope squared is twice that by the curvature. A NaN does nothing.
+            // Where a parabola comes to zero, its slope squared is twice its depth times the curvature. A NaN falls nowhere.
             let falls = low <= s && s <= high && slope < 0.0 && squared > noise * curvature.abs();
             if !falls {
                 break;

@@ -423,9 +423,9 @@ impl Accel {
         };
         let ends = Answers { accel: self, level, rays, places: hits };
         if start.contents == Contents::Anything {
-            batch::search_anything::<Nearest>(level, self, start, rays, ends);
+            batch::search_anything::<Nearest, _>(level, self, start, rays, ends);
         } else {
-            batch::search_all::<Nearest, Ray>(level, self, start, rays, ends);
+            batch::search_all::<Nearest, _>(level, self, start, rays, ends);
         }
     }
 
@@ -446,9 +446,9 @@ impl Accel {
         };
         let ends = Answers { accel: self, level, rays, places: hits };
         if start.contents == Contents::Anything {
-            batch::search_anything::<Whether>(level, self, start, rays, ends);
+            batch::search_anything::<Whether, _>(level, self, start, rays, ends);
         } else {
-            batch::search_all::<Whether, Ray>(level, self, start, rays, ends);
+            batch::search_all::<Whether, _>(level, self, start, rays, ends);
         }
     }
 

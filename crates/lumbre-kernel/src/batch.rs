@@ -138,14 +138,14 @@ fn bytes_of(accel: &Accel) -> usize {
 }
 
 /// Searches along every ray in a tree of anything.
-pub(crate) fn search_anything<G: Companion>(
+pub(crate) fn search_anything<G: Companion, R: Doubled>(
     level: Level,
     accel: &Accel,
     start: &SingleStart,
-    rays: &[Ray],
+    rays: &[R],
     ends: impl Ends<G::Found>,
 ) {
-    level.run(OneByOne::<G, _> { accel, start, rays, ends, goal: PhantomData });
+    level.run(OneByOne::<G, R, _> { accel, start, rays, ends, goal: PhantomData });
 }
 
 /// The same with or without packets, where the others go as is said, if it is.
@@ -291,15 +291,15 @@ impl Trials {
 }
 
 /// Rays through a tree of anything: those that are alike together, and the others one after another.
-struct OneByOne<'a, 'r, G, E> {
+struct OneByOne<'a, 'r, G, R, E> {
     accel: &'a Accel,
     start: &'a SingleStart,
-    rays: &'r [Ray],
+    rays: &'r [R],
     ends: E,
     goal: PhantomData<G>,
 }
 
-impl<G: Companion, E: Ends<G::Found>> Task for OneByOne<'_, '_, G, E> {
+impl<G: Companion, R: Doubled, E: Ends<G::Found>> Task for OneByOne<'_, '_, G, R, E> {
     type Output = ();
 
     #[inline(always)]
@@ -316,14 +316,16 @@ impl<G: Companion, E: Ends<G::Found>> Task for OneByOne<'_, '_, G, E> {
             if let Ok(rays) = rays.try_into()
                 && trials.is_next()
             {
+                let rays = R::all_doubled::<L>(rays);
                 let together =
-                    search_packet::<G, L, _, true>(&mut packet, rays, first, &mut others, &mut ends);
+                    search_packet::<G, L, _, true>(&mut packet, rays.borrow(), first, &mut others, &mut ends);
                 trials.heed(together.pays);
                 answered = together.answered;
             }
             for (place, ray) in rays.iter().enumerate() {
                 if answered >> place & 1 == 0 {
-                    ends.put(first + place, others.search_alone::<G, L>(lanes::opaque(ray)));
+                    let ray = lanes::opaque(ray).doubled::<L>();
+                    ends.put(first + place, others.search_alone::<G, L>(ray.borrow()));
                 }
             }
         }

@@ -15,30 +15,19 @@ use crate::packet::{PACKET, Together};
 use crate::single::{self, Exact, Outcome};
 use crate::{Accel, Ray32};
 
-/// Rays that are taken to double precision at a time.
-const WIDELY: usize = 4096;
-
 /// Searches along every ray.
 pub(crate) fn search_all<G: Goal>(level: Level, accel: &Accel, rays: &[Ray32], answers: &mut [G::Answer]) {
     let Some(start) = &accel.single else {
         answers.iter_mut().zip(rays).for_each(|(answer, ray)| *answer = G::widely(accel, ray));
         return;
     };
-    if start.contents == Contents::Triangles {
-        search_triangles::<G>(level, accel, start, rays, answers, None);
-        return;
-    }
-    if start.contents == Contents::Shapes {
-        let rounded = Rounded::<G> { accel, rays, places: answers };
-        batch::search_all::<G::Wide, Ray32>(level, accel, start, rays, rounded);
-        return;
-    }
-    let mut wide = Vec::with_capacity(rays.len().min(WIDELY));
-    for (rays, places) in rays.chunks(WIDELY).zip(answers.chunks_mut(WIDELY)) {
-        wide.clear();
-        wide.extend(rays.iter().map(|ray| ray.to_f64()));
-        let found = Found(Rounded::<G> { accel, rays, places });
-        batch::search_anything::<G::Wide>(level, accel, start, &wide, found);
+    let rounded = |places| Rounded::<G> { accel, rays, places };
+    match start.contents {
+        Contents::Triangles => search_triangles::<G>(level, accel, start, rays, answers, None),
+        Contents::Shapes => batch::search_all::<G::Wide, _>(level, accel, start, rays, rounded(answers)),
+        Contents::Anything => {
+            batch::search_anything::<G::Wide, _>(level, accel, start, rays, Found(rounded(answers)));
+        }
     }
 }
 
