@@ -134,9 +134,9 @@ impl<F: FnMut(f64, u8) -> bool> Pieces<'_, F> {
     #[inline]
     fn until_sign(&mut self, s: f64, sign: f64, quartic: f64) -> Option<()> {
         let left = std::mem::replace(&mut self.left, (s, sign, quartic));
-        let first =
+        let known =
             if sign == left.1 { First::Unclear } else { std::mem::replace(&mut self.first, First::Unclear) };
-        if let First::Emitted = first {
+        if let First::Emitted = known {
             return Some(());
         }
         let (root, multiplicity) = if let Some((first, last, n)) = self.touching.take() {
@@ -155,7 +155,7 @@ impl<F: FnMut(f64, u8) -> bool> Pieces<'_, F> {
             let (minimum, depth, outwards) =
                 if sign < 0.0 { (s, quartic, -1.0) } else { (left.0, left.2, 1.0) };
             let half_width = (-2.0 * depth / self.quartic.curvature(minimum)).sqrt();
-            let by_descent = match first {
+            let by_descent = match known {
                 First::Unsought => self.torus.descend(self.line, &self.quartic),
                 First::Emitted | First::Unclear => None,
             };
@@ -461,11 +461,8 @@ impl Torus {
     #[inline]
     fn last_step(&self, line: &Line, s: f64, slope: f64) -> f64 {
         let p = line.p + s * line.u;
-        let rho = (p.x * p.x + p.y * p.y).sqrt();
-        let from_circle = rho - self.major;
-        let outer = (from_circle - self.minor) * (from_circle + self.minor) + p.z * p.z;
-        // The quartic is the product of this and the other factor, which is larger by 4 ρ R.
-        outer * (4.0 * self.major * rho + outer) / slope
+        let (outer, inner) = self.factors((p.x * p.x + p.y * p.y).sqrt(), p.z);
+        outer * inner / slope
     }
 
     /// The same piece by piece, without the first if it was emitted.
@@ -709,6 +706,8 @@ impl Torus {
 
 #[cfg(test)]
 mod tests {
+    use lumbre_math::random::RandomStream;
+
     use super::*;
 
     fn hits(torus: &Torus, origin: [f64; 3], direction: [f64; 3]) -> Vec<(f64, u8)> {
@@ -756,13 +755,8 @@ mod tests {
 
     /// Lines of every kind about a ring: far and near, steep and flat, many of which pass close to touching.
     fn lines(count: u32) -> impl Iterator<Item = Ray> {
-        let mut state = 0x9e37_79b9_7f4a_7c15_u64;
-        let mut next = move || {
-            state ^= state << 13;
-            state ^= state >> 7;
-            state ^= state << 17;
-            (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-        };
+        let mut random = RandomStream::new(33);
+        let mut next = move || 2.0 * random.next_f64() - 1.0;
         (0..count).map(move |i| {
             let through = 1.3 * DVec3::new(next(), next(), 0.4 * next());
             let direction = DVec3::new(next(), next(), next() * 0.5f64.powi(i as i32 % 12));
