@@ -19,6 +19,7 @@ use crate::node::tag;
 use crate::opening::Start;
 use crate::query::{All, Any, Closest, Filter};
 use crate::single::{self, Alone, Candidate, Goal, Nearest, Outcome, SingleRay, Step, Whether, Winner};
+use crate::single_spheres::AloneAmongSpheres;
 use crate::sphere_search::{self, CloudRay};
 use crate::stack::Stack;
 use crate::traverse::{self, Place, Search, Standing};
@@ -374,6 +375,13 @@ impl<'a> Placed<'a> {
                         Outcome::Unsettled => Outcome::Unsettled,
                     }
                 }
+                Contents::Spheres if F::TAKES_ALL => {
+                    match level.run(AloneAmongSpheres::<G>::new(inner, start, root, &ray)) {
+                        Outcome::Settled(answer) => Outcome::Settled(G::found_at(inner, answer, &place)),
+                        Outcome::Unsettled => Outcome::Unsettled,
+                    }
+                }
+                Contents::Spheres => Outcome::Unsettled,
                 Contents::Anything => level.run(Whole::<G, F> {
                     accel: inner,
                     start,

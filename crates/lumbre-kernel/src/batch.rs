@@ -17,6 +17,8 @@ use crate::lanes::{self, Lanes, Level, Task};
 use crate::node::Node;
 use crate::packet::{self, AmongInstances, Companion, NoOthers, Others, PACKET, Packet, Together};
 use crate::single::{Alone, Exact, Goal, Outcome};
+use crate::single_spheres::{AloneAmongSpheres, SphereFlyer};
+use crate::spheres::SphereBlock;
 
 /// Bytes of nodes and triangles from which on the caches hold little of them.
 const FAR: usize = 1 << 24;
@@ -131,10 +133,11 @@ pub(crate) fn search_all<G: Goal, R: Doubled>(
     search_as_said::<G, R>(level, accel, start, rays, ends, None, true);
 }
 
-/// Bytes of nodes and triangles.
+/// Bytes of nodes, triangles and spheres of clouds.
 fn bytes_of(accel: &Accel) -> usize {
     let tree = &accel.tree;
-    size_of_val::<[Node]>(&tree.nodes) + size_of_val::<[Line]>(&tree.blocks)
+    let blocks = size_of_val::<[Line]>(&tree.blocks) + size_of_val::<[SphereBlock]>(&tree.sphere_blocks);
+    size_of_val::<[Node]>(&tree.nodes) + blocks
 }
 
 /// Searches along every ray in a tree of anything.
@@ -158,12 +161,19 @@ pub(crate) fn search_as_said<G: Goal, R: Doubled>(
     flying: Option<Flying>,
     has_packets: bool,
 ) {
-    if start.contents == Contents::Triangles {
-        type AmongTriangles<G, R> = InDouble<G, Triangles, R, false>;
-        level.run(AllAtOnce::<AmongTriangles<G, R>, _> { accel, start, rays, ends, flying, has_packets });
-    } else {
-        type AmongShapes<G, R> = InDouble<G, Shapes, R, true>;
-        level.run(AllAtOnce::<AmongShapes<G, R>, _> { accel, start, rays, ends, flying, has_packets });
+    type AmongTriangles<G, R> = InDouble<G, Triangles, R, false>;
+    type AmongShapes<G, R> = InDouble<G, Shapes, R, true>;
+    match start.contents {
+        Contents::Triangles => {
+            level.run(AllAtOnce::<AmongTriangles<G, R>, _> { accel, start, rays, ends, flying, has_packets });
+        }
+        Contents::Spheres => {
+            let has_packets = false;
+            level.run(AllAtOnce::<AmongSpheres<G, R>, _> { accel, start, rays, ends, flying, has_packets });
+        }
+        Contents::Shapes | Contents::Anything => {
+            level.run(AllAtOnce::<AmongShapes<G, R>, _> { accel, start, rays, ends, flying, has_packets });
+        }
     }
 }
 
@@ -244,6 +254,46 @@ impl<G: Goal, B: Beside, R: Doubled, const MIXED: bool> Manner for InDouble<G, B
         ends: &mut impl Ends<G::Answer>,
     ) {
         fleet::fly::<DoubleFlyer<G, B, R>, L>(exact, asks_ahead, rays, positions, ends);
+    }
+}
+
+/// Among spheres, where none go together.
+struct AmongSpheres<G, R>(PhantomData<(G, R)>);
+
+impl<G: Goal, R: Doubled> Manner for AmongSpheres<G, R> {
+    type Ray = R;
+    type Answer = G::Answer;
+    type Packet<'a> = ();
+    const ASKS_AHEAD: bool = true;
+
+    fn packet<'a>(_: &'a Accel, _: &'a SingleStart) {}
+
+    #[inline(always)]
+    fn search_together<'a, L: Lanes>(
+        _: &mut (),
+        _: &Exact<'a>,
+        _: &[R; PACKET],
+        _: usize,
+        _: &mut impl Ends<G::Answer>,
+    ) -> Together {
+        Together { answered: 0, pays: false, is_done: false }
+    }
+
+    #[inline(always)]
+    fn search_alone<L: Lanes>(exact: &Exact, ray: &R) -> Outcome<G::Answer> {
+        let ray = ray.doubled::<L>();
+        AloneAmongSpheres::<G>::new(exact.accel(), exact.start, exact.start.root, ray.borrow()).run::<L>()
+    }
+
+    #[inline(always)]
+    fn fly<L: Lanes>(
+        exact: &Exact,
+        asks_ahead: bool,
+        rays: &[R],
+        positions: &[usize],
+        ends: &mut impl Ends<G::Answer>,
+    ) {
+        fleet::fly::<SphereFlyer<G, R>, L>(exact, asks_ahead, rays, positions, ends);
     }
 }
 

@@ -38,6 +38,12 @@ pub(crate) trait Flyer<L: Lanes>: Sized {
     const IS_MIXED: bool;
     /// Whether four better set out together than one after the other; not where it is mixed.
     const STARTS_BY_FOUR: bool = false;
+    /// What leaves are of; below, the triangles of a block may be spheres.
+    type Block: 'static;
+    /// All of them.
+    type Blocks<'a>: LeafBlocks<'a, Block = Self::Block>;
+    /// Whether the references to such leaves have a sign, as those have that come to their end.
+    const LEAVES_HAVE_SIGNS: bool = false;
     /// How its line passes the triangles of a block.
     type Pass;
     /// How two lines do, each those of its block.
@@ -65,8 +71,7 @@ pub(crate) trait Flyer<L: Lanes>: Sized {
         started
     }
     /// How the lines of two pass the triangles of two blocks, each those of its own.
-    fn pass_by_two(exact: &Exact, flyers: [&Self; 2], blocks: [&TriangleBlock; 2])
-    -> (Passing, Self::Passes);
+    fn pass_by_two(exact: &Exact, flyers: [&Self; 2], blocks: [&Self::Block; 2]) -> (Passing, Self::Passes);
     /// That of one of the two: `which` is 0 or 1.
     fn one_of(passes: &Self::Passes, which: usize) -> Self::Pass;
     /// Where it meets those of the mask.
@@ -117,6 +122,58 @@ pub(crate) trait Flyer<L: Lanes>: Sized {
 
     /// What came of it: whether any hit `is_met`, or what it has taken.
     fn answer(&self, exact: &Exact, ray: &Self::Ray, is_met: bool) -> Outcome<Self::Answer>;
+}
+
+/// The blocks of a tree that leaves of one kind are of, by what refers to such a leaf, or to what is left of it.
+pub(crate) trait LeafBlocks<'a>: Copy {
+    type Block: 'a;
+    /// Those of a tree.
+    fn of(exact: &Exact<'a>) -> Self;
+    /// The place of the first.
+    fn place(leaf: u32) -> u32;
+    /// The first.
+    fn block(self, leaf: u32) -> &'a Self::Block;
+    /// Whether it is the last.
+    fn is_last(leaf: u32, block: &Self::Block) -> bool;
+    /// What is left behind the first, which is not the last.
+    fn next(self, leaf: u32) -> u32;
+    /// Asks for the first to be brought near.
+    fn fetch(self, leaf: u32);
+}
+
+impl<'a> LeafBlocks<'a> for Blocks<'a> {
+    type Block = TriangleBlock;
+
+    #[inline(always)]
+    fn of(exact: &Exact<'a>) -> Self {
+        exact.blocks()
+    }
+
+    #[inline(always)]
+    fn place(leaf: u32) -> u32 {
+        leaf & tag::PLACE
+    }
+
+    #[inline(always)]
+    fn block(self, leaf: u32) -> &'a TriangleBlock {
+        self.block(Self::place(leaf))
+    }
+
+    #[inline(always)]
+    fn is_last(_: u32, block: &TriangleBlock) -> bool {
+        block.is_last()
+    }
+
+    #[inline(always)]
+    fn next(self, leaf: u32) -> u32 {
+        let place = Self::place(leaf);
+        tag::reference(tag::TRIANGLES, self.block(place).place_behind(place))
+    }
+
+    #[inline(always)]
+    fn fetch(self, leaf: u32) {
+        self.block(Self::place(leaf)).fetch();
+    }
 }
 
 /// The triangles of two blocks that two lines pass: eight bits for those of the first, and eight for those of the second.
@@ -237,9 +294,9 @@ impl References {
         &mut self.0[flight % FLIGHTS]
     }
 
-    /// Of a fleet that `is_mixed` or not.
+    /// Of a fleet of such.
     #[inline(always)]
-    fn stations<L: Lanes>(&self, is_mixed: bool) -> Stations {
+    fn stations<F: Flyer<L>, L: Lanes>(&self) -> Stations {
         /// The last reference of each kind, in the order of integers with signs.
         const LAST_NODE: i32 = tag::PLACE as i32;
         const LAST_TRIANGLES: i32 = tag::reference(tag::TRIANGLES, tag::PLACE) as i32;
@@ -252,12 +309,18 @@ impl References {
             let above = |last: i32| u64::from(row.bits_above(last)) << (WIDE * i);
             signs |= !above(-1) & 0xffff << (WIDE * i);
             leaves |= above(LAST_NODE);
-            if is_mixed {
+            if F::IS_MIXED {
                 others |= above(LAST_TRIANGLES);
+            }
+            if F::IS_MIXED || F::LEAVES_HAVE_SIGNS {
                 ends |= above(LAST_BEFORE_END);
             }
         }
-        if !is_mixed {
+        if F::LEAVES_HAVE_SIGNS {
+            ends &= signs;
+            return Stations { nodes: !signs, leaves: signs & !ends, others: 0, ends };
+        }
+        if !F::IS_MIXED {
             return Stations { nodes: !(leaves | signs), leaves, others: 0, ends: signs };
         }
         ends &= signs;
@@ -288,7 +351,7 @@ impl Ended {
 struct Fleet<'a, 'r, F: Flyer<L>, L: Lanes> {
     exact: Exact<'a>,
     nodes: &'a [Node],
-    blocks: Blocks<'a>,
+    blocks: F::Blocks<'a>,
     rays: &'r [F::Ray],
     flights: Box<[Flight<F>; FLIGHTS]>,
     stacks: Box<[Slots<Entry<F, L>>; FLIGHTS]>,
@@ -313,7 +376,7 @@ impl<'a, 'r, F: Flyer<L>, L: Lanes> Fleet<'a, 'r, F, L> {
         Self {
             exact: *exact,
             nodes: exact.nodes(),
-            blocks: exact.blocks(),
+            blocks: F::Blocks::of(exact),
             rays,
             flights: Box::new(std::array::from_fn(
                 #[inline(always)]
@@ -463,8 +526,8 @@ impl<'a, 'r, F: Flyer<L>, L: Lanes> Fleet<'a, 'r, F, L> {
     fn meet_blocks(&mut self, at_leaves: u64, ends: &mut impl Ends<F::Answer>) {
         let (mut passing, mut last) = (0, 0);
         for (at, [first, second]) in Bits(at_leaves).by_two().enumerate() {
-            let unit = |place: usize| self.references.0[place] & tag::PLACE;
-            let (one, other) = (self.blocks.block(unit(first)), self.blocks.block(unit(second)));
+            let (leaf, other_leaf) = (self.references.0[first], self.references.0[second]);
+            let (one, other) = (self.blocks.block(leaf), self.blocks.block(other_leaf));
             let flyers = [&self.flights[first].flyer, &self.flights[second].flyer];
             let (both, passes) = F::pass_by_two(&self.exact, flyers, [one, other]);
             self.passes[at % (FLIGHTS / 2)] = passes;
@@ -473,7 +536,8 @@ impl<'a, 'r, F: Flyer<L>, L: Lanes> Fleet<'a, 'r, F, L> {
             (self.masks[first], self.masks[second]) = halves(both.mask);
             (self.unclear[first], self.unclear[second]) = halves(both.unclear);
             passing |= of_both(halves(both.mask | both.unclear));
-            last |= bit(one.is_last(), first) | bit(other.is_last(), second);
+            let is_last = F::Blocks::is_last;
+            last |= bit(is_last(leaf, one), first) | bit(is_last(other_leaf, other), second);
         }
         let (mut meeting, mut unclear) = (0, 0);
         for place in Bits(passing) {
@@ -492,7 +556,7 @@ impl<'a, 'r, F: Flyer<L>, L: Lanes> Fleet<'a, 'r, F, L> {
         let mut unsettled = 0;
         if F::IS_ANY {
             for place in Bits(unclear & !meeting) {
-                let unit = *self.references.of(place) & tag::PLACE;
+                let unit = F::Blocks::place(*self.references.of(place));
                 let (flight, ray) = (&self.flights[place], self.ray(place));
                 match flight.flyer.meets_closely(&self.exact, ray, unit, self.unclear[place]) {
                     Outcome::Settled(is_met) => meeting |= bit(is_met, place),
@@ -504,7 +568,7 @@ impl<'a, 'r, F: Flyer<L>, L: Lanes> Fleet<'a, 'r, F, L> {
             }
         } else {
             for place in Bits(meeting | unclear) {
-                let unit = *self.references.of(place) & tag::PLACE;
+                let unit = F::Blocks::place(*self.references.of(place));
                 let ray = self.ray(place);
                 let Flight { flyer, slabs, .. } = &mut self.flights[place];
                 let rank = rank(at_leaves, place);
@@ -518,8 +582,7 @@ impl<'a, 'r, F: Flyer<L>, L: Lanes> Fleet<'a, 'r, F, L> {
         let going_on = at_leaves & !meeting & !unsettled;
         for place in Bits(going_on & !last) {
             let reference = self.references.of(place);
-            let unit = *reference & tag::PLACE;
-            *reference = tag::reference(tag::TRIANGLES, self.blocks.block(unit).place_behind(unit));
+            *reference = self.blocks.next(*reference);
         }
         self.give_up(unsettled, ends);
         self.pop(going_on & last);
@@ -631,12 +694,12 @@ impl<'a, 'r, F: Flyer<L>, L: Lanes> Fleet<'a, 'r, F, L> {
     /// Asks for what those of them read next.
     #[inline(always)]
     fn fetch(&mut self, those: u64) {
-        let at = self.references.stations::<L>(F::IS_MIXED);
+        let at = self.references.stations::<F, L>();
         for place in Bits(at.nodes & those) {
             self.nodes.get(*self.references.of(place) as usize).map(lanes::fetch::<Node>);
         }
         for place in Bits(at.leaves & those) {
-            self.blocks.block(*self.references.of(place) & tag::PLACE).fetch();
+            self.blocks.fetch(*self.references.of(place));
         }
     }
 
@@ -669,7 +732,7 @@ pub(crate) fn fly<F: Flyer<L>, L: Lanes>(
     // All of which have come to their end.
     let mut under_way = u64::MAX >> (u64::BITS as usize - L::FLIGHTS.min(FLIGHTS));
     while under_way != 0 {
-        let at = fleet.references.stations::<L>(F::IS_MIXED);
+        let at = fleet.references.stations::<F, L>();
         let at_ends = at.ends & under_way;
         if at_ends.count_ones() >= ENOUGH || at_ends == under_way {
             fleet.answer(at_ends, ends);

@@ -4,6 +4,7 @@ use lumbre_math::DVec3;
 
 use crate::narrow::Precise;
 use crate::node::{LARGEST_NEAR, SMALLEST_NEAR, TINY_NEAR, Units, round_up};
+use crate::spheres::SphereRay;
 use crate::triangles::LEAST_SIZE;
 use crate::{Geometry, GeometryKind, Instance};
 
@@ -28,6 +29,8 @@ pub(crate) struct Holds {
     pub(crate) only_spheres: bool,
     /// Whether the centres of all spheres are relative to one origin.
     pub(crate) has_one_cloud_origin: bool,
+    /// That of the first cloud; a NaN where there is none.
+    pub(crate) first_cloud_origin: DVec3,
     /// Whether geometries in instances have masks.
     pub(crate) masks_within: bool,
 }
@@ -43,7 +46,7 @@ impl Holds {
             GeometryKind::Spheres(cloud) => Some(cloud.origin),
             _ => None,
         });
-        let first_cloud_origin = cloud_origins.next();
+        let first_cloud_origin = cloud_origins.next().unwrap_or(DVec3::NAN);
         let is_cloud = |geometry: &Geometry| matches!(geometry.kind, GeometryKind::Spheres(_));
         let is_precise = |geometry: &Geometry| matches!(geometry.kind, GeometryKind::PreciseMesh(_));
         let nesting_of = |geometry: &Geometry| match &geometry.kind {
@@ -51,8 +54,9 @@ impl Holds {
             _ => 0,
         };
         Self {
-            only_spheres: first_cloud_origin.is_some() && geometries.iter().all(is_cloud),
-            has_one_cloud_origin: cloud_origins.all(|origin| Some(origin) == first_cloud_origin),
+            only_spheres: first_cloud_origin.is_finite() && geometries.iter().all(is_cloud),
+            has_one_cloud_origin: cloud_origins.all(|origin| origin == first_cloud_origin),
+            first_cloud_origin,
             only_triangles: geometries.iter().all(|geometry| matches!(geometry.kind, GeometryKind::Mesh(_))),
             only_triangles_and_entries: geometries.iter().all(|geometry| {
                 matches!(
@@ -102,6 +106,8 @@ pub(crate) enum Contents {
     Triangles,
     /// Among shapes and custom geometry, too.
     Shapes,
+    /// That among nothing but spheres of clouds.
+    Spheres,
     /// Among instances, clouds of spheres and meshes in double precision, too.
     Anything,
 }
@@ -147,11 +153,14 @@ pub(crate) struct SingleStart {
     pub(crate) shortest: f32,
     pub(crate) longest: [f32; 4],
     pub(crate) tiny: f32,
+    /// Where there is nothing but spheres: what their centres are relative to, and the largest coordinate of these plus a radius.
+    pub(crate) cloud_origin: DVec3,
+    pub(crate) sphere_reach: f64,
 }
 
 impl SingleStart {
-    /// `None` where the tree holds nothing but clouds and meshes in double precision, instances too deep within one another, or meshes
-    /// with different origins, or is so small, so large or so far from its origin that single precision would
+    /// `None` where the tree holds nothing but clouds, which have different origins, and meshes in double precision, or instances too deep
+    /// within one another, or meshes with different origins, or is so small, so large or so far from its origin that single precision would
     /// overflow, underflow or tell nothing.
     pub(crate) fn new(holds: &Holds, units: &Units, root: Option<u32>) -> Option<Self> {
         let two_to = |exponent: i32| 2.0f64.powi(exponent);
@@ -164,7 +173,12 @@ impl SingleStart {
         };
         let shift = (units.origin - mesh_origin).abs().max_element();
         let reach = units.near / units.scale + shift + largest_corner;
-        let is_fit = holds.has_more_than_precise
+        let is_cloud = holds.only_spheres && holds.has_one_cloud_origin;
+        let farthest =
+            units.near / units.scale + (units.origin - holds.first_cloud_origin).abs().max_element();
+        let are_sharp = SphereRay::is_sharp(holds.sizes.sphere_reach)
+            && SphereRay::is_sharp(holds.sizes.sphere_reach + farthest);
+        let is_fit = (holds.has_more_than_precise || is_cloud && are_sharp)
             && holds.nesting <= DEEPEST
             && holds.has_one_origin
             && units.near > 0.0
@@ -178,6 +192,7 @@ impl SingleStart {
             contents: match holds {
                 Holds { only_triangles: true, .. } => Contents::Triangles,
                 Holds { only_triangles_and_entries: true, .. } => Contents::Shapes,
+                Holds { only_spheres: true, .. } => Contents::Spheres,
                 _ => Contents::Anything,
             },
             tree_origin: padded(units.origin, 0.0),
@@ -198,6 +213,8 @@ impl SingleStart {
             shortest: (SMALLEST_NEAR / units.scale) as f32,
             longest: [(LARGEST_NEAR / units.scale) as f32; 4],
             tiny: (TINY_NEAR / units.scale) as f32,
+            cloud_origin: holds.first_cloud_origin,
+            sphere_reach: holds.sizes.sphere_reach,
         })
     }
 }

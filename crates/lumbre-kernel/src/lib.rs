@@ -40,6 +40,7 @@ mod refit;
 mod reinsert;
 mod save;
 mod single;
+mod single_spheres;
 mod sphere_search;
 mod spheres;
 mod stack;

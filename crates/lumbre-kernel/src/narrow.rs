@@ -53,6 +53,7 @@ use crate::lanes::{self, Asked, Axes, Eight, Lanes, Level, Question, Task, Vecto
 use crate::packet::Companion;
 use crate::query::All;
 use crate::single::{self, Alone, Exact, Outcome, Winner};
+use crate::single_spheres::AloneAmongSpheres;
 use crate::stack::{AsBuilt, ByDistance, Order};
 use crate::traverse::Place;
 use crate::triangles::BLOCK;
@@ -602,6 +603,10 @@ impl NarrowQuestions {
                 closest: level.asked::<AmongShapes<Closest>>(),
                 any: level.asked::<AmongShapes<Any>>(),
             },
+            Some(Contents::Spheres) => Self {
+                closest: level.asked::<AmongSpheres<Closest>>(),
+                any: level.asked::<AmongSpheres<Any>>(),
+            },
             Some(Contents::Anything) => Self {
                 closest: level.asked::<AmongAnything<Closest>>(),
                 any: level.asked::<AmongAnything<Any>>(),
@@ -615,6 +620,8 @@ impl NarrowQuestions {
 struct Narrowly<G>(PhantomData<G>);
 /// In double precision, rounded, in a tree of shapes and custom geometry, too.
 struct AmongShapes<G>(PhantomData<G>);
+/// The same in a tree of nothing but spheres.
+struct AmongSpheres<G>(PhantomData<G>);
 /// The same in a tree of anything.
 struct AmongAnything<G>(PhantomData<G>);
 /// In double precision, rounded.
@@ -642,6 +649,23 @@ impl<G: Goal> Question for AmongShapes<G> {
         if let Some(start) = &accel.single
             && let wide = L::read_widened(ray)
             && let Outcome::Settled(answer) = Alone::<G::Wide, true>::new(accel, start, &wide).run::<L>()
+        {
+            return G::rounded(accel, answer);
+        }
+        G::widely(accel, ray)
+    }
+}
+
+impl<G: Goal> Question for AmongSpheres<G> {
+    type Ray = Ray32;
+    type Answer = G::Answer;
+
+    #[inline(always)]
+    fn ask<L: Lanes>(accel: &Accel, ray: &Ray32) -> G::Answer {
+        if let Some(start) = &accel.single
+            && let wide = L::read_widened(ray)
+            && let Outcome::Settled(answer) =
+                AloneAmongSpheres::<G::Wide>::new(accel, start, start.root, &wide).run::<L>()
         {
             return G::rounded(accel, answer);
         }

@@ -81,6 +81,12 @@ pub(crate) mod tag {
         reference(SPHERES, first << COUNT_BITS | (count - 1))
     }
 
+    /// What is left of a leaf of spheres behind its first block, where that is not its last.
+    #[inline(always)]
+    pub(crate) const fn behind_first(leaf: u32) -> u32 {
+        leaf + MOST_BLOCKS - 1
+    }
+
     /// The blocks of a leaf of triangles or of spheres.
     #[inline(always)]
     pub(crate) const fn blocks(reference: u32) -> std::ops::Range<usize> {

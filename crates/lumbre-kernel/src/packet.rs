@@ -1081,6 +1081,7 @@ pub(crate) fn answered_together(level: Level, accel: &Accel, rays: &[Ray; PACKET
     match single.contents {
         Contents::Triangles => level.run(Searching(Packet::<false>::new(accel, single), rays)),
         Contents::Shapes => level.run(Searching(Packet::<true>::new(accel, single), rays)),
+        Contents::Spheres => unreachable!("they do not go together"),
         Contents::Anything => level.run(instances::Searching(accel, single, rays)),
     }
 }

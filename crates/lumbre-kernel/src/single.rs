@@ -27,6 +27,7 @@ use crate::node::{Node, Slabs, tag};
 use crate::options::{self, Selection};
 use crate::packet::{PACKET, Packet};
 use crate::query::All;
+use crate::single_spheres::AmongSpheres;
 use crate::stack::{AsBuilt, ByDistance, Order, Stack};
 use crate::traverse::{PlacedTree, What};
 use crate::triangles::{self, BLOCK, BlockRay, Inside, Meeting, Passage, Shear};
@@ -848,6 +849,9 @@ pub(crate) trait Goal {
     /// Whether any hit will do.
     const IS_ANY: bool;
 
+    /// Whether any hit `is_met`, or the nearest.
+    fn known(is_met: bool, nearest: Option<Winner>) -> Self::Answer;
+
     /// Hands out an answer of a tree.
     fn found(accel: &Accel, answer: Self::Answer) -> Self::Found;
 
@@ -903,6 +907,11 @@ impl Goal for Nearest {
     type Found = Option<Hit>;
     const NOTHING: Option<Winner> = None;
     const IS_ANY: bool = false;
+
+    #[inline(always)]
+    fn known(_: bool, nearest: Option<Winner>) -> Option<Winner> {
+        nearest
+    }
 
     #[inline(always)]
     fn found(accel: &Accel, answer: Option<Winner>) -> Option<Hit> {
@@ -973,6 +982,11 @@ impl Goal for Whether {
     type Found = bool;
     const NOTHING: bool = false;
     const IS_ANY: bool = true;
+
+    #[inline(always)]
+    fn known(is_met: bool, _: Option<Winner>) -> bool {
+        is_met
+    }
 
     #[inline(always)]
     fn found(_: &Accel, answer: bool) -> bool {
@@ -1059,6 +1073,10 @@ impl Questions {
                 closest: level.asked::<Singly<Nearest, true>>(),
                 any: level.asked::<Singly<Whether, true>>(),
             },
+            Some(Contents::Spheres) => Self {
+                closest: level.asked::<AmongSpheres<Nearest>>(),
+                any: level.asked::<AmongSpheres<Whether>>(),
+            },
             Some(Contents::Anything) => {
                 Self { closest: level.asked::<Amidst<Nearest>>(), any: level.asked::<Amidst<Whether>>() }
             }
@@ -1134,7 +1152,7 @@ pub(crate) fn search<G: Goal>(
     search_among::<G, All>(level, accel, start, ray, All)
 }
 
-/// The same among what a selection takes.
+/// The same among what a selection takes; among spheres and in a tree of anything, it is not for this to say.
 #[inline(always)]
 pub(crate) fn search_among<G: Goal, S: Selection>(
     level: Level,
@@ -1147,7 +1165,7 @@ pub(crate) fn search_among<G: Goal, S: Selection>(
     match start.contents {
         Contents::Triangles => level.run(Alone::<G, false, S>::among(accel, start, root, ray, selection)),
         Contents::Shapes => level.run(Alone::<G, true, S>::among(accel, start, root, ray, selection)),
-        Contents::Anything => unreachable!("what it finds is no winner, but a hit"),
+        Contents::Spheres | Contents::Anything => Outcome::Unsettled,
     }
 }
 

@@ -3,7 +3,7 @@
 use lumbre_geometry::{Ray, Root, Roots};
 use lumbre_math::DVec3;
 
-use crate::lanes::{Lanes, Task};
+use crate::lanes::{self, Lanes, Task, Vector};
 use crate::node::{BoxRay, tag};
 use crate::opening::Start;
 use crate::spheres::{ExactSphere, SphereRay};
@@ -18,21 +18,25 @@ pub(crate) struct CloudRay {
     geometry: u32,
     /// The cloud's.
     origin: DVec3,
-    spheres: SphereRay,
+    /// Where the first test tells anything; and how many units of space there are for each of `t`.
+    spheres: Option<(SphereRay, f64)>,
 }
 
 impl CloudRay {
     #[inline(always)]
     fn new<'a, S: Search<'a>>(accel: &Accel, ray: &Ray, geometry: u32, search: &S) -> Self {
         let origin = accel.cloud(geometry).origin;
-        let mut spheres = SphereRay::new(ray, &origin, accel.holds.sizes.sphere_reach);
-        spheres.set_range(search.floor(), search.limit());
-        Self { geometry, origin, spheres }
+        let spheres = SphereRay::new(ray, &origin, accel.holds.sizes.sphere_reach);
+        let mut cloud = Self { geometry, origin, spheres };
+        cloud.set_range(search.floor(), search.limit());
+        cloud
     }
 
     #[inline(always)]
     pub(crate) fn set_range(&mut self, t_min: f64, t_max: f64) {
-        self.spheres.set_range(t_min, t_max);
+        if let Some((spheres, length)) = &mut self.spheres {
+            spheres.set_range(*length, t_min, t_max);
+        }
     }
 }
 
@@ -58,9 +62,9 @@ pub(crate) fn meet_leaf<'a, L: Lanes, S: Search<'a>>(
             *turned = Some(CloudRay::new(accel, ray, geometry, search));
         }
         let Some(cloud) = turned else { return false };
-        let (mut mask, sure) = match S::ASK {
-            Ask::Whether => L::meet_spheres::<true>(block, &cloud.spheres),
-            Ask::First | Ask::Every | Ask::Nothing => L::meet_spheres::<false>(block, &cloud.spheres),
+        let (mut mask, sure) = match &cloud.spheres {
+            Some((ray, _)) => lanes::meet_spheres::<L>(block, ray),
+            None => (L::Eight::ALL, 0),
         };
         if S::ASK == Ask::Whether && sure != 0 {
             search.settle();
@@ -76,7 +80,7 @@ pub(crate) fn meet_leaf<'a, L: Lanes, S: Search<'a>>(
             }
         }
         if search.limit() < limit {
-            cloud.spheres.set_range(search.floor(), search.limit());
+            cloud.set_range(search.floor(), search.limit());
         }
     }
     false

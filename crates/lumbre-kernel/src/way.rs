@@ -30,6 +30,11 @@ impl<'a, L: Lanes> Way<'a, L> {
         &self.slabs
     }
 
+    #[inline(always)]
+    pub(crate) fn slabs_mut(&mut self) -> &mut Slabs {
+        &mut self.slabs
+    }
+
     /// Goes on from a node: to a child, to what stands on the stack, or nowhere.
     #[inline(always)]
     pub(crate) fn meet_node<O: Order>(&self, reference: u32, stack: &mut Stack<O::Entry>) -> Option<u32> {

@@ -9,7 +9,7 @@ use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
 
 use super::{Crossing, Flyer, Passing};
-use crate::blocks::TriangleBlock;
+use crate::blocks::{Blocks, TriangleBlock};
 use crate::collapse::Entry;
 use crate::holds::SingleStart;
 use crate::hulls::{HullBlock, HullRay};
@@ -272,6 +272,8 @@ impl<G: Goal, B: Beside, R: Doubled, L: Lanes> Flyer<L> for DoubleFlyer<G, B, R>
     type Ray = R;
     type Answer = G::Answer;
     type Order = G::Order;
+    type Block = TriangleBlock;
+    type Blocks<'a> = Blocks<'a>;
     const IS_ANY: bool = G::IS_ANY;
     const IS_MIXED: bool = B::ARE_ANY;
     type Pass = L::Edges;

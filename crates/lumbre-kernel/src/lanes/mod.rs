@@ -46,13 +46,15 @@ pub(crate) use hulls::{
 #[cfg(test)]
 pub(crate) use hulls::{glances_at, meet_hulls_at};
 pub(crate) use portable::Portable;
-pub(crate) use spheres::SphereLanes;
 #[cfg(test)]
 pub(crate) use spheres::meet_spheres_at;
+pub(crate) use spheres::{
+    SphereCrossings, SpherePass, cross_spheres, meet_spheres, pass_spheres, pass_spheres_by_two,
+};
 pub(crate) use wide::{Eight, LANE_BITS, LastEight, Row, Vector, WIDE, Wide};
 
 /// What a search does many at a time: boxes by sixteen, and triangles by eight.
-pub(crate) trait Lanes: SphereLanes {
+pub(crate) trait Lanes {
     /// Eight numbers.
     type Eight: Eight;
     /// How a line passes the edges of eight triangles.

@@ -24,7 +24,9 @@ pub(crate) fn search_all<G: Goal>(level: Level, accel: &Accel, rays: &[Ray32], a
     let rounded = |places| Rounded::<G> { accel, rays, places };
     match start.contents {
         Contents::Triangles => search_triangles::<G>(level, accel, start, rays, answers, None),
-        Contents::Shapes => batch::search_all::<G::Wide, _>(level, accel, start, rays, rounded(answers)),
+        Contents::Shapes | Contents::Spheres => {
+            batch::search_all::<G::Wide, _>(level, accel, start, rays, rounded(answers))
+        }
         Contents::Anything => {
             batch::search_anything::<G::Wide, _>(level, accel, start, rays, Found(rounded(answers)));
         }

@@ -4,7 +4,7 @@ use std::marker::PhantomData;
 
 use super::{Goal, NarrowRay, Nearest, Pass};
 use crate::Ray32;
-use crate::blocks::TriangleBlock;
+use crate::blocks::{Blocks, TriangleBlock};
 use crate::fleet::{Crossing, Flyer, Passing};
 use crate::holds::SingleStart;
 use crate::lanes::{Eight, Lanes, Vector};
@@ -24,6 +24,8 @@ impl<G: Goal, L: Lanes> Flyer<L> for NarrowFlyer<G> {
     type Ray = Ray32;
     type Answer = G::Answer;
     type Order = G::Order;
+    type Block = TriangleBlock;
+    type Blocks<'a> = Blocks<'a>;
     const IS_ANY: bool = G::IS_ANY;
     const IS_MIXED: bool = false;
     const STARTS_BY_FOUR: bool = L::STARTS_BY_FOUR;

@@ -57,7 +57,7 @@ fn everything(random: &mut Random) -> Accel {
             ],
             None,
         ),
-        (vec![GeometryKind::Spheres(Arc::new(cloud(random, 30, zero, zero, 1.0)))], None),
+        (vec![GeometryKind::Spheres(Arc::new(cloud(random, 30, zero, zero, 1.0)))], Some(Contents::Spheres)),
         (vec![GeometryKind::PreciseMesh(Arc::new(precise(&icosphere(2, zero, 0.8))))], None),
     ];
     let mut trees: Vec<_> = trees
