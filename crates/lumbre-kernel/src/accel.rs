@@ -404,9 +404,9 @@ impl Accel {
     /// In a tree of triangles, or of shapes too, sixteen rays in a row that are much alike (those of a square of four by four pixels,
     /// say, rather than of sixteen pixels in a line) are traced together, which takes down to two fifths of the time. There, many of the
     /// others are in flight at the same time, where there are enough of them: in a tree that the nearest caches hold, from about a
-    /// hundred on, so that a thousand rays or more at a time are answered soonest. In trees of anything else, the others are traced one
-    /// after another, as they are with AVX2 alone in trees that caches hold. It works on the calling thread: to use more, split `rays`
-    /// and `hits`.
+    /// hundred on, so that a thousand rays or more at a time are answered soonest. In a tree of nothing but clouds of spheres that have one
+    /// origin, all of them are. In trees of anything else, the others are traced one after another, as they are with AVX2 alone in trees
+    /// that caches hold. It works on the calling thread: to use more, split `rays` and `hits`.
     ///
     /// # Panics
     /// When `rays` and `hits` differ in length.

@@ -10,8 +10,8 @@ use lumbre_math::{DVec3, Transform};
 use rayon::prelude::*;
 
 use super::scenes::{
-    Random, build, bumpy, cube, icosphere, mixture, ray, shape, soup, torus, vertex, with_every_preset,
-    with_parts_everywhere,
+    Random, build, bumpy, cloud, cube, icosphere, mixture, ray, shape, soup, torus, vertex,
+    with_every_preset, with_parts_everywhere,
 };
 use crate::packet::PACKET;
 use crate::{Accel, BuildOptions, Geometry, GeometryKind, Hit, Instance, Preset, TriangleMesh, brute};
@@ -180,6 +180,9 @@ fn compare(rays: u64, seed: u64) -> u64 {
             let shapes = (0..60).map(|_| GeometryKind::Shape(shape(&mut random, center, 3.0))).collect();
             let mesh = GeometryKind::Mesh(Arc::new(soup(&mut random, 60, center, 3.0)));
             build([shapes, vec![mesh]].concat())
+        } else if chunk % 8 == 2 {
+            let origin = center - 2.0 * random.vector();
+            build(vec![GeometryKind::Spheres(Arc::new(cloud(&mut random, 200, origin, center, 3.0)))])
         } else {
             let mesh = soup(&mut random, 100, center, 3.0);
             let mesh = GeometryKind::Mesh(Arc::new(mesh));
