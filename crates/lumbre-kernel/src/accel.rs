@@ -509,7 +509,10 @@ impl Accel {
 
     /// Among what a filter takes, in single precision; where that cannot tell, a filter that asks keeps what was answered.
     fn ask_singly<G: Sought, F: Filter>(&self, level: Level, ray: &Ray, filter: &F) -> Outcome<G::Found> {
-        let Some(start) = &self.single else { return Outcome::Unsettled };
+        // What is left out among spheres is for the plain search: no filter is asked before.
+        let Some(start) = self.single.as_ref().filter(|start| start.contents != Contents::Spheres) else {
+            return Outcome::Unsettled;
+        };
         let found = if start.contents == Contents::Anything {
             anything::search::<G, F>(level, self, start, ray, filter)
         } else {

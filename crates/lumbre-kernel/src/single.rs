@@ -1152,7 +1152,7 @@ pub(crate) fn search<G: Goal>(
     search_among::<G, All>(level, accel, start, ray, All)
 }
 
-/// The same among what a selection takes; among spheres and in a tree of anything, it is not for this to say.
+/// The same among what a selection takes.
 #[inline(always)]
 pub(crate) fn search_among<G: Goal, S: Selection>(
     level: Level,
@@ -1165,7 +1165,8 @@ pub(crate) fn search_among<G: Goal, S: Selection>(
     match start.contents {
         Contents::Triangles => level.run(Alone::<G, false, S>::among(accel, start, root, ray, selection)),
         Contents::Shapes => level.run(Alone::<G, true, S>::among(accel, start, root, ray, selection)),
-        Contents::Spheres | Contents::Anything => Outcome::Unsettled,
+        Contents::Spheres => unreachable!("what is left out among spheres is for the plain search"),
+        Contents::Anything => unreachable!("what it finds is no winner, but a hit"),
     }
 }
 
