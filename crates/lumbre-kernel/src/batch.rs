@@ -40,16 +40,13 @@ impl Flying {
     pub(crate) const NEAR: Self = Self { least: 128, asks_ahead: false };
     pub(crate) const MIDDLE: Self = Self { least: 32, asks_ahead: false };
     pub(crate) const FAR: Self = Self { least: 32, asks_ahead: true };
-    const NEVER: Self = Self { least: usize::MAX, asks_ahead: false };
 
     /// As is fastest in a tree.
     #[inline(always)]
-    fn through<L: Lanes>(accel: &Accel) -> Self {
+    fn through(accel: &Accel) -> Self {
         let bytes = bytes_of(accel);
         if bytes >= FAR {
             Self::FAR
-        } else if !L::FLIES_NEARBY {
-            Self::NEVER
         } else if bytes >= NEAR {
             Self::MIDDLE
         } else {
@@ -401,7 +398,7 @@ impl<M: Manner, E: Ends<M::Answer>> Task for AllAtOnce<'_, '_, M, E> {
         let Self { accel, start, rays, mut ends, flying, has_packets } = self;
         let flying = flying.unwrap_or_else(
             #[inline(always)]
-            || Flying::through::<L>(accel),
+            || Flying::through(accel),
         );
         let exact = Exact::new(accel, start);
         let mut packet = M::packet(accel, start);

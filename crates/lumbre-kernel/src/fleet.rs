@@ -196,7 +196,7 @@ pub(crate) struct Crossing<T> {
 }
 
 /// Rays in flight at most: a bit for each in a word.
-pub(crate) const FLIGHTS: usize = 64;
+const FLIGHTS: usize = 64;
 /// How many have to have come to their end, or all, before others set out.
 const ENOUGH: u32 = 8;
 /// How many rays ahead one is asked for.
@@ -730,7 +730,7 @@ pub(crate) fn fly<F: Flyer<L>, L: Lanes>(
     let mut waiting = positions.iter();
     let mut fleet = Fleet::<F, L>::new(exact, rays);
     // All of which have come to their end.
-    let mut under_way = u64::MAX >> (u64::BITS as usize - L::FLIGHTS.min(FLIGHTS));
+    let mut under_way = u64::MAX >> (u64::BITS as usize - FLIGHTS);
     while under_way != 0 {
         let at = fleet.references.stations::<F, L>();
         let at_ends = at.ends & under_way;

@@ -173,7 +173,7 @@ fn put_in_order<W: Wide>(node: &Node, mask: u32, enter: W, window: &mut [MaybeUn
     }
 }
 
-/// The same as [`push_by_distance`], hardly with a branch: only where there are more than four.
+/// The same as [`push_by_distance`], hardly with a branch where there are instructions for it: only where there are more than four.
 #[inline(always)]
 pub(crate) fn put_and_take_by_distance<W: Wide>(
     node: &Node,
@@ -184,7 +184,11 @@ pub(crate) fn put_and_take_by_distance<W: Wide>(
     let count = mask.count_ones() as usize;
     let room = slots.room();
     match room.window.first_chunk_mut() {
-        Some(four) if count <= 4 => enter.put_falling(mask, &node.children, four),
+        Some(four) if count <= 4 => {
+            if !enter.put_falling(mask, &node.children, four) {
+                return push_by_distance(node, mask, enter, room);
+            }
+        }
         _ => put_in_order(node, mask, enter, room.window),
     }
     // SAFETY: as many were written.

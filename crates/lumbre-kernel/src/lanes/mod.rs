@@ -24,7 +24,6 @@ use lumbre_math::{DVec3, Transform};
 
 use crate::Ray32;
 use crate::blocks::{ROOMS, TriangleBlock, far_of_last};
-use crate::fleet;
 use crate::holds::SingleStart;
 use crate::narrow::NarrowRay;
 #[cfg(test)]
@@ -67,10 +66,6 @@ pub(crate) trait Lanes {
     const MEETS_BY_TWO: bool = false;
     /// Whether rays in single precision are better started by four than one after the other.
     const STARTS_BY_FOUR: bool = false;
-    /// How many rays fly at once.
-    const FLIGHTS: usize = fleet::FLIGHTS;
-    /// Whether rays also fly through trees that caches hold.
-    const FLIES_NEARBY: bool = true;
     /// Whether rays go on together for a while where that no longer pays, for what they have done: see `packet`.
     const GOES_ON_TOGETHER: bool = true;
 

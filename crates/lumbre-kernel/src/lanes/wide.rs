@@ -141,18 +141,11 @@ pub(crate) trait Wide: Vector<Array = [f32; WIDE]> + Zeroable {
         four
     }
 
-    /// Puts the first four of those there, the largest first; where there are fewer, zeros behind them.
+    /// Puts the first four of those there, the largest first, where there are instructions for that; where there are fewer, zeros behind
+    /// them. False where there are none, and nothing is put.
     #[inline(always)]
-    fn put_falling(self, mask: u32, words: &[u32; WIDE], place: &mut [MaybeUninit<i64>; 4]) {
-        let mut four = self.first_four(mask, words);
-        for (at, one) in four.iter_mut().enumerate() {
-            *one = if mask.count_ones() as usize > at { *one } else { 0 };
-        }
-        let [a, b, c, d] = four;
-        let (a, b, c, d) = (a.max(b), a.min(b), c.max(d), c.min(d));
-        let (a, c, b, d) = (a.max(c), a.min(c), b.max(d), b.min(d));
-        let (b, c) = (b.max(c), b.min(c));
-        *place = [a, b, c, d].map(MaybeUninit::new);
+    fn put_falling(self, _mask: u32, _words: &[u32; WIDE], _place: &mut [MaybeUninit<i64>; 4]) -> bool {
+        false
     }
 
     /// Puts the words that the mask chooses there, in their order.
@@ -899,7 +892,7 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn put_falling(self, mask: u32, words: &[u32; WIDE], place: &mut [MaybeUninit<i64>; 4]) {
+        fn put_falling(self, mask: u32, words: &[u32; WIDE], place: &mut [MaybeUninit<i64>; 4]) -> bool {
             // SAFETY: see the type. The load is of sixteen u32, the store of four i64.
             unsafe {
                 let words = _mm512_loadu_si512(words.as_ptr().cast());
@@ -915,6 +908,7 @@ mod x86 {
                 let four = _mm256_mask_min_epi64(_mm256_max_epi64(four, other), 0b0100, four, other);
                 _mm256_storeu_si256(place.as_mut_ptr().cast(), four);
             }
+            true
         }
 
         #[inline(always)]

@@ -12,7 +12,6 @@ use super::{
     WIDE, Wide, wide,
 };
 use crate::blocks::{FIRST_UNSHARED, MOST_SHARED, QUAD, TriangleBlock, USUAL, far_of_last};
-use crate::fleet;
 use crate::holds::SingleStart;
 use crate::narrow::NarrowRay;
 use crate::node::{
@@ -641,6 +640,101 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
         four
     }
 
+    /// [`Lanes::start_narrow_by_four`] of two.
+    #[inline(always)]
+    fn start_narrow_by_two(
+        start: &SingleStart,
+        rays: [&Ray32; 2],
+        places: [(&mut Slabs, &mut NarrowRay); 2],
+    ) -> u32 {
+        /// The last of each four.
+        const LAST: i32 = 0x88;
+        // As `start_narrow` and `start_narrow_blocks`, four numbers of the second ray behind those of the first.
+        // SAFETY: see `X86`. The loads are of arrays of four.
+        unsafe {
+            let ((first_origin, first_direction), (second_origin, second_direction)) =
+                (Self::narrow_numbers(rays[0]), Self::narrow_numbers(rays[1]));
+            let origin = _mm256_set_m128(second_origin, first_origin);
+            let direction = _mm256_set_m128(second_direction, first_direction);
+            let local = if let Some(mesh_origin) = &start.single_mesh_origin {
+                _mm256_sub_ps(origin, Self::twice(mesh_origin))
+            } else {
+                _mm256_set_m128(Self::local(start, second_origin), Self::local(start, first_origin))
+            };
+            let units_per_space = _mm256_set1_ps(start.units_per_space);
+            let from = _mm256_fmsub_ps(local, units_per_space, Self::twice(&start.shift));
+            let sign = _mm256_set1_ps(-0.0);
+            let (distance, length) = (_mm256_andnot_ps(sign, from), _mm256_andnot_ps(sign, direction));
+            let size = _mm256_blend_ps::<LAST>(length, origin);
+            let largest = _mm256_blend_ps::<LAST>(Self::twice(&start.longest), direction);
+            let fits = _mm256_and_ps(
+                _mm256_cmp_ps::<_CMP_LE_OQ>(distance, Self::twice(&start.farthest)),
+                _mm256_cmp_ps::<_CMP_LE_OQ>(size, largest),
+            );
+            let fits = _mm256_movemask_ps(fits) & !(_mm256_movemask_ps(origin) & LAST);
+            let is_long = _mm256_cmp_ps::<_CMP_GE_OQ>(length, _mm256_set1_ps(start.shortest));
+            let is_long = _mm256_movemask_ps(is_long) & !LAST;
+            let tiny_or_more = _mm256_max_ps(length, _mm256_set1_ps(start.tiny));
+            let size = _mm256_div_ps(_mm256_set1_ps(start.space_per_unit), tiny_or_more);
+            let inverse = _mm256_or_ps(size, _mm256_and_ps(direction, sign));
+            let per_distance = _mm256_set1_ps(Units::NARROW_MARGIN_PER_DISTANCE);
+            let margin = _mm256_fmadd_ps(distance, per_distance, _mm256_set1_ps(start.narrow_margin));
+            let margin = _mm256_mul_ps(size, margin);
+            let first = _mm256_mul_ps(origin, _mm256_set1_ps(START_FACTOR));
+            let last = _mm256_mul_ps(direction, _mm256_set1_ps(END_FACTOR));
+            let last = _mm256_add_ps(last, _mm256_set1_ps(LITTLE as f32));
+            let near = _mm256_blend_ps::<LAST>(_mm256_fnmsub_ps(from, inverse, margin), first);
+            let far = _mm256_blend_ps::<LAST>(_mm256_fnmadd_ps(from, inverse, margin), last);
+            let signs = _mm256_movemask_ps(direction) as u32;
+            // x, y, x and y, z, z.
+            let sizes = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GE_OQ>(
+                _mm256_shuffle_ps::<0b00_00_01_00>(length, length),
+                _mm256_shuffle_ps::<0b10_10_10_01>(length, length),
+            )) as u32;
+            let axes = [Axes::by_bits(signs, sizes), Axes::by_bits(signs >> 4, sizes >> 4)];
+            let order_of = |axes: &Axes| _mm_loadu_si128(axes.order.as_ptr().cast());
+            let order = _mm256_set_m128i(order_of(axes[1]), order_of(axes[0]));
+            let of_last = _mm256_permutevar_ps(inverse, _mm256_shuffle_epi32::<0b10_10_10_10>(order));
+            let of_last = _mm256_mul_ps(of_last, units_per_space);
+            let shear = _mm256_blend_ps::<LAST>(_mm256_mul_ps(direction, of_last), direction);
+            let (shear, local) = (_mm256_permutevar_ps(shear, order), _mm256_permutevar_ps(local, order));
+            let minus_inverse = _mm256_xor_ps(of_last, sign);
+            let (inverse, near, far) = (Self::by_two(inverse), Self::by_two(near), Self::by_two(far));
+            let (shear, local, minus_inverse) =
+                (Self::by_two(shear), Self::by_two(local), Self::by_two(minus_inverse));
+            let mut fit = 0;
+            for (i, (slabs, narrow)) in places.into_iter().enumerate() {
+                slabs.inverse = inverse[i];
+                slabs.near_offset = near[i];
+                slabs.far_offset = far[i];
+                slabs.sides = Sides::new(signs >> (4 * i));
+                narrow.axes = axes[i];
+                narrow.origin = local[i];
+                narrow.shear = shear[i];
+                narrow.minus_inverse = minus_inverse[i][0];
+                let is_fit = fits >> (4 * i) & 0b1111 == 0b1111 && is_long >> (4 * i) & 0b111 != 0;
+                fit |= u32::from(is_fit) << i;
+            }
+            fit
+        }
+    }
+
+    /// The same four twice.
+    #[inline(always)]
+    fn twice(numbers: &[f32; 4]) -> __m256 {
+        // SAFETY: see `X86`. The load is of an array of four.
+        unsafe { _mm256_broadcast_ps(&_mm_loadu_ps(numbers.as_ptr())) }
+    }
+
+    /// Its numbers by four.
+    #[inline(always)]
+    fn by_two(v: __m256) -> [[f32; 4]; 2] {
+        let mut two = [[0.0; 4]; 2];
+        // SAFETY: see `X86`. The store is of eight f32.
+        unsafe { _mm256_storeu_ps(two.as_mut_ptr().cast(), v) };
+        two
+    }
+
     /// Three coordinates relative to the mesh, rounded once; the fourth number stays what it is.
     #[inline(always)]
     fn local(start: &SingleStart, origin: __m128) -> __m128 {
@@ -902,12 +996,7 @@ where
     type EdgesByTwo = Edges<Self::Wide>;
     type Wide = <Self as HasWide<AVX512>>::Wide;
     const MEETS_BY_TWO: bool = AVX512;
-    const STARTS_BY_FOUR: bool = AVX512;
-    // In flight, where sixteen numbers are two vectors, a ray takes 1.6 times the instructions that it takes alone. What it gains by them
-    // is waits that are filled, up to a fifth of the time in caches; but where another thread shares the core, that one fills them, and
-    // rays in flight take up to 1.5 times as long. Far away, all gain; and sixty-four would leave little of the nearest cache to two.
-    const FLIGHTS: usize = if AVX512 { fleet::FLIGHTS } else { fleet::FLIGHTS / 2 };
-    const FLIES_NEARBY: bool = AVX512;
+    const STARTS_BY_FOUR: bool = true;
     // Packets take twice the instructions then, and a ray alone hardly more.
     const GOES_ON_TOGETHER: bool = AVX512;
 
@@ -1107,7 +1196,9 @@ where
         places: [(&mut Slabs, &mut NarrowRay); 4],
     ) -> u32 {
         if !AVX512 {
-            return super::start_narrow_one_by_one::<Self>(start, rays, places);
+            let ([a, b, c, d], [for_a, for_b, for_c, for_d]) = (rays, places);
+            let first = Self::start_narrow_by_two(start, [a, b], [for_a, for_b]);
+            return first | Self::start_narrow_by_two(start, [c, d], [for_c, for_d]) << 2;
         }
         /// The last of each four.
         const LAST: u16 = 0x8888;
