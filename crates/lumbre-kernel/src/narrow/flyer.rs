@@ -73,7 +73,6 @@ impl<G: Goal, L: Lanes> Flyer<L> for NarrowFlyer<G> {
             let (unclear, passes) = lines.pass(mask, precise);
             return (Passing { mask: mask & !unclear, unclear }, passes);
         }
-        // One after the other as a whole: there are registers for one.
         let (first, of_first) = flyers[0].ray.lines::<L, false>(blocks[0]);
         let (first_unclear, of_first) = of_first.pass(first, precise);
         let (second, of_second) = flyers[1].ray.lines::<L, false>(blocks[1]);
