@@ -81,6 +81,10 @@ impl Seeking {
             mask &= mask - 1;
             let Some(root) = root_of(exact, ray, block, lane) else { continue };
             let nearest = nearest.get_or_insert_with(|| self.nearest(exact, ray));
+            if nearest.is_none() && self.nearest != NOWHERE {
+                // Denied: the answer will tell.
+                return;
+            }
             let names = names_of(exact, block, lane);
             if nearest.is_none_or(|nearest| nearest.comes_after(root.t, names)) {
                 *nearest = Some(Winner { root, geometry: names.0, primitive: names.1 });
@@ -114,10 +118,17 @@ impl Seeking {
         Some(Winner { root, geometry, primitive })
     }
 
-    /// What came of it: whether any hit `is_met`, or what it has taken.
+    /// What came of it: whether any hit `is_met`, or what it has taken. Should double precision deny what single precision was certain of,
+    /// the plain search has to answer.
     #[inline(always)]
-    fn answer<G: Goal>(&self, exact: &Exact, ray: &Ray, is_met: bool) -> G::Answer {
-        G::known(is_met, if G::IS_ANY { None } else { self.nearest(exact, ray) })
+    fn answer<G: Goal>(&self, exact: &Exact, ray: &Ray, is_met: bool) -> Outcome<G::Answer> {
+        if G::IS_ANY {
+            return Outcome::Settled(G::known(is_met, None));
+        }
+        match self.nearest(exact, ray) {
+            None if self.nearest != NOWHERE => Outcome::Unsettled,
+            nearest => Outcome::Settled(G::known(false, nearest)),
+        }
     }
 }
 
@@ -271,7 +282,7 @@ impl<G: Goal, R: Doubled, L: Lanes> Flyer<L> for SphereFlyer<G, R> {
 
     #[inline(always)]
     fn answer(&self, exact: &Exact, ray: &R, is_met: bool) -> Outcome<G::Answer> {
-        Outcome::Settled(self.seeking.answer::<G>(exact, ray.doubled::<L>().borrow(), is_met))
+        self.seeking.answer::<G>(exact, ray.doubled::<L>().borrow(), is_met)
     }
 }
 
@@ -332,7 +343,7 @@ impl<G: Goal> Task for AloneAmongSpheres<'_, '_, G> {
             let Some(next) = way.descend::<G::Order>(next, &mut stack) else { break };
             leaf = next;
         }
-        Outcome::Settled(seeking.answer::<G>(exact, ray, false))
+        seeking.answer::<G>(exact, ray, false)
     }
 }
 
