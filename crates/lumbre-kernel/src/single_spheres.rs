@@ -74,6 +74,7 @@ impl Seeking {
     /// The same of those in the mask, of which it is not clear which is met first, or whether one is.
     #[inline(never)]
     fn take_closely(&mut self, exact: &Exact, ray: &Ray, block: u32, mut mask: u32, slabs: &mut Slabs) {
+        // As double precision has it, once that is asked.
         let mut nearest = None;
         let mut kept = None;
         while mask != 0 {
@@ -81,10 +82,8 @@ impl Seeking {
             mask &= mask - 1;
             let Some(root) = root_of(exact, ray, block, lane) else { continue };
             let nearest = nearest.get_or_insert_with(|| self.nearest(exact, ray));
-            if nearest.is_none() && self.nearest != NOWHERE {
-                // Denied: the answer will tell.
-                return;
-            }
+            // What is denied stays, so that the answer tells.
+            let Outcome::Settled(nearest) = nearest else { return };
             let names = names_of(exact, block, lane);
             if nearest.is_none_or(|nearest| nearest.comes_after(root.t, names)) {
                 *nearest = Some(Winner { root, geometry: names.0, primitive: names.1 });
@@ -106,28 +105,27 @@ impl Seeking {
         slabs.end_at(triangles::beyond(self.ray.far * self.range_per_length));
     }
 
-    /// The nearest, as double precision has it.
+    /// The nearest, as double precision has it. Should that ever deny what single precision was certain of, the plain search has to answer.
     #[inline(always)]
-    fn nearest(&self, exact: &Exact, ray: &Ray) -> Option<Winner> {
+    fn nearest(&self, exact: &Exact, ray: &Ray) -> Outcome<Option<Winner>> {
         if self.nearest == NOWHERE {
-            return None;
+            return Outcome::Settled(None);
         }
         let (block, lane) = (self.nearest / BLOCK as u32, self.nearest as usize % BLOCK);
-        let root = root_of(exact, ray, block, lane)?;
+        let Some(root) = root_of(exact, ray, block, lane) else { return Outcome::Unsettled };
         let (geometry, primitive) = names_of(exact, block, lane);
-        Some(Winner { root, geometry, primitive })
+        Outcome::Settled(Some(Winner { root, geometry, primitive }))
     }
 
-    /// What came of it: whether any hit `is_met`, or what it has taken. Should double precision deny what single precision was certain of,
-    /// the plain search has to answer.
+    /// What came of it: whether any hit `is_met`, or what it has taken.
     #[inline(always)]
     fn answer<G: Goal>(&self, exact: &Exact, ray: &Ray, is_met: bool) -> Outcome<G::Answer> {
         if G::IS_ANY {
             return Outcome::Settled(G::known(is_met, None));
         }
         match self.nearest(exact, ray) {
-            None if self.nearest != NOWHERE => Outcome::Unsettled,
-            nearest => Outcome::Settled(G::known(false, nearest)),
+            Outcome::Settled(nearest) => Outcome::Settled(G::known(false, nearest)),
+            Outcome::Unsettled => Outcome::Unsettled,
         }
     }
 }
