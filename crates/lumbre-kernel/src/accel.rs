@@ -425,7 +425,7 @@ impl Accel {
         if start.contents == Contents::Anything {
             batch::search_anything::<Nearest, _>(level, self, start, rays, ends);
         } else {
-            batch::search_all::<Nearest, _>(level, self, start, rays, ends);
+            batch::search_all::<Nearest>(level, self, start, rays, ends);
         }
     }
 
@@ -448,7 +448,7 @@ impl Accel {
         if start.contents == Contents::Anything {
             batch::search_anything::<Whether, _>(level, self, start, rays, ends);
         } else {
-            batch::search_all::<Whether, _>(level, self, start, rays, ends);
+            batch::search_all::<Whether>(level, self, start, rays, ends);
         }
     }
 

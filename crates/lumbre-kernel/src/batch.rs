@@ -40,13 +40,16 @@ impl Flying {
     pub(crate) const NEAR: Self = Self { least: 128, asks_ahead: false };
     pub(crate) const MIDDLE: Self = Self { least: 32, asks_ahead: false };
     pub(crate) const FAR: Self = Self { least: 32, asks_ahead: true };
+    const NEVER: Self = Self { least: usize::MAX, asks_ahead: false };
 
     /// As is fastest in a tree.
     #[inline(always)]
-    fn through(accel: &Accel) -> Self {
+    fn through<L: Lanes>(accel: &Accel) -> Self {
         let bytes = bytes_of(accel);
         if bytes >= FAR {
             Self::FAR
+        } else if !L::FLIES {
+            Self::NEVER
         } else if bytes >= NEAR {
             Self::MIDDLE
         } else {
@@ -120,14 +123,14 @@ pub(crate) fn ends<A, F: FnMut(usize, Outcome<A>)>(ends: F) -> F {
 }
 
 /// Searches along every ray, in a tree of triangles, or of shapes and custom geometry too.
-pub(crate) fn search_all<G: Goal, R: Doubled>(
+pub(crate) fn search_all<G: Goal>(
     level: Level,
     accel: &Accel,
     start: &SingleStart,
-    rays: &[R],
+    rays: &[Ray],
     ends: impl Ends<G::Answer>,
 ) {
-    search_as_said::<G, R>(level, accel, start, rays, ends, None, true);
+    search_as_said::<G>(level, accel, start, rays, ends, None, true);
 }
 
 /// Bytes of nodes, triangles and spheres of clouds.
@@ -148,8 +151,26 @@ pub(crate) fn search_anything<G: Companion, R: Doubled>(
     level.run(OneByOne::<G, R, _> { accel, start, rays, ends, goal: PhantomData });
 }
 
-/// The same with or without packets, where the others go as is said, if it is.
-pub(crate) fn search_as_said<G: Goal, R: Doubled>(
+/// The same as [`search_all`] with or without packets, where the others go as is said, if it is.
+pub(crate) fn search_as_said<G: Goal>(
+    level: Level,
+    accel: &Accel,
+    start: &SingleStart,
+    rays: &[Ray],
+    ends: impl Ends<G::Answer>,
+    flying: Option<Flying>,
+    has_packets: bool,
+) {
+    type AmongTriangles<G> = InDouble<G, Triangles, Ray, false>;
+    if start.contents == Contents::Triangles {
+        level.run(AllAtOnce::<AmongTriangles<G>, _> { accel, start, rays, ends, flying, has_packets });
+    } else {
+        search_beside::<G, Ray>(level, accel, start, rays, ends, flying, has_packets);
+    }
+}
+
+/// The same in a tree that has not triangles alone, where rays in single precision are asked in double, too.
+pub(crate) fn search_beside<G: Goal, R: Doubled>(
     level: Level,
     accel: &Accel,
     start: &SingleStart,
@@ -158,19 +179,12 @@ pub(crate) fn search_as_said<G: Goal, R: Doubled>(
     flying: Option<Flying>,
     has_packets: bool,
 ) {
-    type AmongTriangles<G, R> = InDouble<G, Triangles, R, false>;
     type AmongShapes<G, R> = InDouble<G, Shapes, R, true>;
-    match start.contents {
-        Contents::Triangles => {
-            level.run(AllAtOnce::<AmongTriangles<G, R>, _> { accel, start, rays, ends, flying, has_packets });
-        }
-        Contents::Spheres => {
-            let has_packets = false;
-            level.run(AllAtOnce::<AmongSpheres<G, R>, _> { accel, start, rays, ends, flying, has_packets });
-        }
-        Contents::Shapes | Contents::Anything => {
-            level.run(AllAtOnce::<AmongShapes<G, R>, _> { accel, start, rays, ends, flying, has_packets });
-        }
+    if start.contents == Contents::Spheres {
+        let has_packets = false;
+        level.run(AllAtOnce::<AmongSpheres<G, R>, _> { accel, start, rays, ends, flying, has_packets });
+    } else {
+        level.run(AllAtOnce::<AmongShapes<G, R>, _> { accel, start, rays, ends, flying, has_packets });
     }
 }
 
@@ -184,6 +198,8 @@ pub(crate) trait Manner {
     type Packet<'a>;
     /// Whether their rays are asked for ahead.
     const ASKS_AHEAD: bool;
+    /// Whether there may be shapes or custom geometry.
+    const MIXED: bool;
 
     /// Rays that will go together.
     fn packet<'a>(accel: &'a Accel, start: &'a SingleStart) -> Self::Packet<'a>;
@@ -218,6 +234,7 @@ impl<G: Goal, B: Beside, R: Doubled, const MIXED: bool> Manner for InDouble<G, B
     type Answer = G::Answer;
     type Packet<'a> = Packet<'a, MIXED>;
     const ASKS_AHEAD: bool = !G::IS_ANY;
+    const MIXED: bool = MIXED;
 
     #[inline(always)]
     fn packet<'a>(accel: &'a Accel, start: &'a SingleStart) -> Packet<'a, MIXED> {
@@ -262,6 +279,7 @@ impl<G: Goal, R: Doubled> Manner for AmongSpheres<G, R> {
     type Answer = G::Answer;
     type Packet<'a> = ();
     const ASKS_AHEAD: bool = true;
+    const MIXED: bool = false;
 
     fn packet<'a>(_: &'a Accel, _: &'a SingleStart) {}
 
@@ -398,7 +416,7 @@ impl<M: Manner, E: Ends<M::Answer>> Task for AllAtOnce<'_, '_, M, E> {
         let Self { accel, start, rays, mut ends, flying, has_packets } = self;
         let flying = flying.unwrap_or_else(
             #[inline(always)]
-            || Flying::through(accel),
+            || Flying::through::<L>(accel),
         );
         let exact = Exact::new(accel, start);
         let mut packet = M::packet(accel, start);
@@ -426,7 +444,7 @@ impl<M: Manner, E: Ends<M::Answer>> Task for AllAtOnce<'_, '_, M, E> {
                 }
             }
             others.extend(first + PACKET * packets.len()..first + chunk.len());
-            if others.len() < flying.least {
+            if others.len() < flying.least || M::MIXED && !L::FLIES {
                 // Here, and not by a call: a hit that was put together elsewhere would be waited for. Nor in a closure, which does not
                 // take on the instruction set.
                 for &i in &others {

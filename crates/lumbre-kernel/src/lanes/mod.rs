@@ -66,6 +66,9 @@ pub(crate) trait Lanes {
     const MEETS_BY_TWO: bool = false;
     /// Whether rays in single precision are better started by four than one after the other.
     const STARTS_BY_FOUR: bool = false;
+    /// Whether rays in flight are faster than one after another wherever they are many; else they are among the triangles or spheres of large
+    /// trees alone, where there is more to wait for.
+    const FLIES: bool = true;
     /// Whether rays go on together for a while where that no longer pays, for what they have done: see `packet`.
     const GOES_ON_TOGETHER: bool = true;
 

@@ -55,6 +55,7 @@ impl Lanes for Portable {
     type Edges = Edges;
     type EdgesByTwo = [Edges; 2];
     type Wide = Portable16;
+    const FLIES: bool = false;
 
     #[inline]
     fn level() -> Level {

@@ -25,7 +25,7 @@ pub(crate) fn search_all<G: Goal>(level: Level, accel: &Accel, rays: &[Ray32], a
     match start.contents {
         Contents::Triangles => search_triangles::<G>(level, accel, start, rays, answers, None),
         Contents::Shapes | Contents::Spheres => {
-            batch::search_all::<G::Wide, _>(level, accel, start, rays, rounded(answers))
+            batch::search_beside::<G::Wide, _>(level, accel, start, rays, rounded(answers), None, true);
         }
         Contents::Anything => {
             batch::search_anything::<G::Wide, _>(level, accel, start, rays, Found(rounded(answers)));
@@ -86,6 +86,7 @@ impl<G: Goal> Manner for InSingle<G> {
     type Answer = G::Answer;
     type Packet<'a> = Packet<'a>;
     const ASKS_AHEAD: bool = true;
+    const MIXED: bool = false;
 
     #[inline(always)]
     fn packet<'a>(accel: &'a Accel, start: &'a SingleStart) -> Packet<'a> {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use lumbre_geometry::{PlacedShape, Plane, Ray};
 use lumbre_math::{DVec3, Transform, Vec3};
 
+use super::oracle::Put;
 use super::scenes::{self, Random};
 use crate::batch::Flying;
 use crate::lanes::Level;
@@ -165,18 +166,18 @@ fn check(accel: &Accel, rays: &[Ray], least: u32) {
         // No tree of the tests is as large as those that are searched as far ones, and alike rays would go together.
         for flying in [Flying::NEAR, Flying::FAR] {
             let mut tally = Tally::of(rays);
-            let put = |i: usize, outcome| {
+            let put: Put<Option<Winner>> = &mut |i, outcome| {
                 let alone = single::search::<Nearest>(level, accel, start, &rays[i]);
                 tally.count(i, [outcome, alone], &winners[i], (level, flying, &rays[i]));
             };
-            batch::search_as_said::<Nearest, _>(level, accel, start, rays, put, Some(flying), false);
+            batch::search_as_said::<Nearest>(level, accel, start, rays, put, Some(flying), false);
             tally.end();
             let mut tally = Tally::of(rays);
-            let put = |i: usize, outcome| {
+            let put: Put<bool> = &mut |i, outcome| {
                 let alone = single::search::<Whether>(level, accel, start, &rays[i]);
                 tally.count(i, [outcome, alone], &winners[i].is_some(), (level, flying, &rays[i]));
             };
-            batch::search_as_said::<Whether, _>(level, accel, start, rays, put, Some(flying), false);
+            batch::search_as_said::<Whether>(level, accel, start, rays, put, Some(flying), false);
             tally.end();
         }
     }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use lumbre_geometry::{PlacedShape, Ray, Sphere};
 use lumbre_math::{DVec3, Transform};
 
-use super::oracle::{check, check_batches, check_many};
+use super::oracle::{Put, check, check_batches, check_many};
 use super::scenes::{Random, build, cloud, ray, with_every_preset};
 use crate::batch::{self, Flying};
 use crate::holds::Contents;
@@ -136,8 +136,8 @@ fn single_precision_answers_with_the_bits_of_double_precision_among_spheres() {
                 check(i, level.run(AloneAmongSpheres::<Nearest>::new(&accel, start, start.root, ray)));
             }
             for flying in [Flying::NEAR, Flying::FAR] {
-                let (flying, check) = (Some(flying), &mut check);
-                batch::search_as_said::<Nearest, _>(level, &accel, start, &rays, check, flying, false);
+                let check: Put<Option<Winner>> = &mut check;
+                batch::search_as_said::<Nearest>(level, &accel, start, &rays, check, Some(flying), false);
             }
             let mut check = |i: usize, outcome: Outcome<bool>| match outcome {
                 Outcome::Settled(is_met) => {
@@ -149,8 +149,8 @@ fn single_precision_answers_with_the_bits_of_double_precision_among_spheres() {
                 check(i, level.run(AloneAmongSpheres::<Whether>::new(&accel, start, start.root, ray)));
             }
             for flying in [Flying::NEAR, Flying::FAR] {
-                let (flying, check) = (Some(flying), &mut check);
-                batch::search_as_said::<Whether, _>(level, &accel, start, &rays, check, flying, false);
+                let check: Put<bool> = &mut check;
+                batch::search_as_said::<Whether>(level, &accel, start, &rays, check, Some(flying), false);
             }
             // One that is nothing and one from afar, six times each; and hardly another.
             assert!((12..60).contains(&unsettled), "{level:?}: {unsettled}");
