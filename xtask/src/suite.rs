@@ -35,7 +35,7 @@ fn deny() -> Result<()> {
     let program = program.to_string_lossy().into_owned();
     if !succeeds(&program, &["--version"]) {
         let version = format!("cargo-deny@{CARGO_DENY}");
-        command::run("cargo", &["install", "--locked", "--root", &tools_argument, &version])?;
+        command::run("cargo", &["install", "--locked", "--debug", "--root", &tools_argument, &version])?;
     }
     command::run(&program, &check)
 }
