@@ -405,8 +405,8 @@ impl Accel {
     /// say, rather than of sixteen pixels in a line) are traced together, which takes down to two fifths of the time. There, many of the
     /// others are in flight at the same time, where there are enough of them: in a tree that the nearest caches hold, from about a
     /// hundred on, so that a thousand rays or more at a time are answered soonest. In a tree of nothing but clouds of spheres that have one
-    /// origin, all of them are. In trees of anything else, the others are traced one after another, as they are with AVX2 alone in trees
-    /// that caches hold. It works on the calling thread: to use more, split `rays` and `hits`.
+    /// origin, all of them are. In trees of anything else, the others are traced one after another; without AVX2, they are in all trees but
+    /// large ones of triangles or of spheres. It works on the calling thread: to use more, split `rays` and `hits`.
     ///
     /// # Panics
     /// When `rays` and `hits` differ in length.

@@ -40,6 +40,7 @@ impl Flying {
     pub(crate) const NEAR: Self = Self { least: 128, asks_ahead: false };
     pub(crate) const MIDDLE: Self = Self { least: 32, asks_ahead: false };
     pub(crate) const FAR: Self = Self { least: 32, asks_ahead: true };
+    /// One after another, however many.
     const NEVER: Self = Self { least: usize::MAX, asks_ahead: false };
 
     /// As is fastest in a tree.
