@@ -3,21 +3,26 @@
 //! Those that are alike go together: see [`packet`]. The others are in flight (see [`fleet`]), where they are many: an answer has the
 //! bits that it has alone.
 
-use std::borrow::Borrow;
+mod double;
+mod one_by_one;
+mod spheres;
+
 use std::marker::PhantomData;
 use std::slice::Chunks;
 
 use lumbre_geometry::Ray;
 
+use self::double::InDouble;
+use self::one_by_one::OneByOne;
+use self::spheres::AmongSpheres;
 use crate::Accel;
 use crate::blocks::Line;
-use crate::fleet::{self, Beside, DoubleFlyer, Doubled, Shapes, Triangles};
+use crate::fleet::{Doubled, Shapes, Triangles};
 use crate::holds::{Contents, SingleStart};
 use crate::lanes::{self, Lanes, Level, Task};
 use crate::node::Node;
-use crate::packet::{self, AmongInstances, Companion, NoOthers, Others, PACKET, Packet, Together};
-use crate::single::{Alone, Exact, Goal, Outcome};
-use crate::single_spheres::{AloneAmongSpheres, SphereFlyer};
+use crate::packet::{self, Companion, Others, PACKET, Packet, Together};
+use crate::single::{Exact, Goal, Outcome};
 use crate::spheres::SphereBlock;
 
 /// Bytes of nodes and triangles from which on the caches hold little of them.
@@ -164,7 +169,7 @@ pub(crate) fn search_as_said<G: Goal>(
 ) {
     type AmongTriangles<G> = InDouble<G, Triangles, Ray, false>;
     if start.contents == Contents::Triangles {
-        level.run(AllAtOnce::<AmongTriangles<G>, _> { accel, start, rays, ends, flying, has_packets });
+        AllAtOnce::<AmongTriangles<G>, _> { accel, start, rays, ends, flying, has_packets }.run_at(level);
     } else {
         search_beside::<G, Ray>(level, accel, start, rays, ends, flying, has_packets);
     }
@@ -183,9 +188,9 @@ pub(crate) fn search_beside<G: Goal, R: Doubled>(
     type AmongShapes<G, R> = InDouble<G, Shapes, R, true>;
     if start.contents == Contents::Spheres {
         let has_packets = false;
-        level.run(AllAtOnce::<AmongSpheres<G, R>, _> { accel, start, rays, ends, flying, has_packets });
+        AllAtOnce::<AmongSpheres<G, R>, _> { accel, start, rays, ends, flying, has_packets }.run_at(level);
     } else {
-        level.run(AllAtOnce::<AmongShapes<G, R>, _> { accel, start, rays, ends, flying, has_packets });
+        AllAtOnce::<AmongShapes<G, R>, _> { accel, start, rays, ends, flying, has_packets }.run_at(level);
     }
 }
 
@@ -225,92 +230,6 @@ pub(crate) trait Manner {
         positions: &[usize],
         ends: &mut impl Ends<Self::Answer>,
     );
-}
-
-/// In double precision. `MIXED` where anything stands beside triangles.
-struct InDouble<G, B, R, const MIXED: bool>(PhantomData<(G, B, R)>);
-
-impl<G: Goal, B: Beside, R: Doubled, const MIXED: bool> Manner for InDouble<G, B, R, MIXED> {
-    type Ray = R;
-    type Answer = G::Answer;
-    type Packet<'a> = Packet<'a, MIXED>;
-    const ASKS_AHEAD: bool = !G::IS_ANY;
-    const MIXED: bool = MIXED;
-
-    #[inline(always)]
-    fn packet<'a>(accel: &'a Accel, start: &'a SingleStart) -> Packet<'a, MIXED> {
-        Packet::new(accel, start)
-    }
-
-    #[inline(always)]
-    fn search_together<'a, L: Lanes>(
-        packet: &mut Packet<'a, MIXED>,
-        _: &Exact<'a>,
-        rays: &[R; PACKET],
-        first: usize,
-        ends: &mut impl Ends<G::Answer>,
-    ) -> Together {
-        let rays = R::all_doubled::<L>(rays);
-        search_packet::<G, L, _, MIXED>(packet, rays.borrow(), first, &mut NoOthers, ends)
-    }
-
-    #[inline(always)]
-    fn search_alone<L: Lanes>(exact: &Exact, ray: &R) -> Outcome<G::Answer> {
-        let ray = ray.doubled::<L>();
-        Alone::<G, MIXED>::new(exact.accel(), exact.start, ray.borrow()).run::<L>()
-    }
-
-    #[inline(always)]
-    fn fly<L: Lanes>(
-        exact: &Exact,
-        asks_ahead: bool,
-        rays: &[R],
-        positions: &[usize],
-        ends: &mut impl Ends<G::Answer>,
-    ) {
-        fleet::fly::<DoubleFlyer<G, B, R>, L>(exact, asks_ahead, rays, positions, ends);
-    }
-}
-
-/// Among spheres, where none go together.
-struct AmongSpheres<G, R>(PhantomData<(G, R)>);
-
-impl<G: Goal, R: Doubled> Manner for AmongSpheres<G, R> {
-    type Ray = R;
-    type Answer = G::Answer;
-    type Packet<'a> = ();
-    const ASKS_AHEAD: bool = true;
-    const MIXED: bool = false;
-
-    fn packet<'a>(_: &'a Accel, _: &'a SingleStart) {}
-
-    #[inline(always)]
-    fn search_together<'a, L: Lanes>(
-        _: &mut (),
-        _: &Exact<'a>,
-        _: &[R; PACKET],
-        _: usize,
-        _: &mut impl Ends<G::Answer>,
-    ) -> Together {
-        Together { answered: 0, pays: false, is_done: false }
-    }
-
-    #[inline(always)]
-    fn search_alone<L: Lanes>(exact: &Exact, ray: &R) -> Outcome<G::Answer> {
-        let ray = ray.doubled::<L>();
-        AloneAmongSpheres::<G>::new(exact.accel(), exact.start, exact.start.root, ray.borrow()).run::<L>()
-    }
-
-    #[inline(always)]
-    fn fly<L: Lanes>(
-        exact: &Exact,
-        asks_ahead: bool,
-        rays: &[R],
-        positions: &[usize],
-        ends: &mut impl Ends<G::Answer>,
-    ) {
-        fleet::fly::<SphereFlyer<G, R>, L>(exact, asks_ahead, rays, positions, ends);
-    }
 }
 
 /// Searches along rays together, the first of which has this position.
@@ -356,48 +275,6 @@ impl Trials {
     }
 }
 
-/// Rays through a tree of anything: those that are alike together, and the others one after another.
-struct OneByOne<'a, 'r, G, R, E> {
-    accel: &'a Accel,
-    start: &'a SingleStart,
-    rays: &'r [R],
-    ends: E,
-    goal: PhantomData<G>,
-}
-
-impl<G: Companion, R: Doubled, E: Ends<G::Found>> Task for OneByOne<'_, '_, G, R, E> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<L: Lanes>(self) {
-        let Self { accel, start, rays, mut ends, .. } = self;
-        let mut others = AmongInstances::new(accel, start);
-        let mut packet = Packet::<true>::new(accel, start);
-        let mut trials = Trials::NEW;
-        let mut coming = Coming::new(rays, !G::IS_ANY);
-        for (number, rays) in rays.chunks(PACKET).enumerate() {
-            let first = number * PACKET;
-            coming.fetch_next();
-            let mut answered = 0;
-            if let Ok(rays) = rays.try_into()
-                && trials.is_next()
-            {
-                let rays = R::all_doubled::<L>(rays);
-                let together =
-                    search_packet::<G, L, _, true>(&mut packet, rays.borrow(), first, &mut others, &mut ends);
-                trials.heed(together.pays);
-                answered = together.answered;
-            }
-            for (place, ray) in rays.iter().enumerate() {
-                if answered >> place & 1 == 0 {
-                    let ray = lanes::opaque(ray).doubled::<L>();
-                    ends.put(first + place, others.search_alone::<G, L>(ray.borrow()));
-                }
-            }
-        }
-    }
-}
-
 /// Rays through a tree of triangles and shapes: those that are alike together, and the others in flight, or one after another.
 pub(crate) struct AllAtOnce<'a, 'r, M: Manner, E> {
     pub(crate) accel: &'a Accel,
@@ -407,6 +284,13 @@ pub(crate) struct AllAtOnce<'a, 'r, M: Manner, E> {
     /// Where it is said how the others go.
     pub(crate) flying: Option<Flying>,
     pub(crate) has_packets: bool,
+}
+
+impl<M: Manner, E: Ends<M::Answer>> AllAtOnce<'_, '_, M, E> {
+    /// Does it with these lanes, compiled beside the manner: together, the manners would be half of the kernel.
+    pub(crate) fn run_at(self, level: Level) {
+        level.run_beside::<M, _>(self);
+    }
 }
 
 impl<M: Manner, E: Ends<M::Answer>> Task for AllAtOnce<'_, '_, M, E> {

@@ -5,7 +5,7 @@ use std::fmt;
 use lumbre_geometry::Ray;
 
 #[cfg(target_arch = "x86_64")]
-use super::x86;
+use super::x86::AskOnX86;
 use super::{Lanes, Level, Set, portable};
 use crate::Accel;
 
@@ -50,9 +50,9 @@ impl Level {
         Asked(match self.0 {
             Set::Portable => Q::ask::<portable::Portable>,
             #[cfg(target_arch = "x86_64")]
-            Set::Avx2 => x86::ask_avx2::<Q>,
+            Set::Avx2 => Q::ask_avx2,
             #[cfg(target_arch = "x86_64")]
-            Set::Avx512 => x86::ask_avx512::<Q>,
+            Set::Avx512 => Q::ask_avx512,
         })
     }
 
@@ -62,9 +62,9 @@ impl Level {
         match self.0 {
             Set::Portable => None,
             #[cfg(target_arch = "x86_64")]
-            Set::Avx2 => Some(Asked(x86::ask_leaking_avx2::<Q>)),
+            Set::Avx2 => Some(Asked(Q::ask_leaking_avx2)),
             #[cfg(target_arch = "x86_64")]
-            Set::Avx512 => Some(Asked(x86::ask_leaking_avx512::<Q>)),
+            Set::Avx512 => Some(Asked(Q::ask_leaking_avx512)),
         }
     }
 }

@@ -22,6 +22,8 @@ use bytemuck::Zeroable;
 use lumbre_geometry::Ray;
 use lumbre_math::{DVec3, Transform};
 
+#[cfg(target_arch = "x86_64")]
+use self::x86::OnX86;
 use crate::Ray32;
 use crate::blocks::{ROOMS, TriangleBlock, far_of_last};
 use crate::holds::SingleStart;
@@ -512,6 +514,21 @@ pub(crate) trait Task {
     fn run<L: Lanes>(self) -> Self::Output;
 }
 
+/// Beside what a task is compiled: beside itself, or beside the type that is named.
+///
+/// To a compiler, a generic method stands where the type stands whose method it is, and what stands in one module is compiled as one piece. So
+/// the searches of different modules are compiled at the same time; as functions of this module they were all one piece, and it took as
+/// long as all the others together, however many cores there were.
+trait Home {
+    // Out of the way of the others.
+    #[inline(never)]
+    fn run_portable<T: Task>(task: T) -> T::Output {
+        task.run::<Portable>()
+    }
+}
+
+impl<H> Home for H {}
+
 /// An instruction set that this machine has: there is no other way to one than asking it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Level(Set);
@@ -561,14 +578,20 @@ impl Level {
     /// Runs the task with these lanes.
     #[inline(always)]
     pub(crate) fn run<T: Task>(self, task: T) -> T::Output {
+        self.run_beside::<T, T>(task)
+    }
+
+    /// The same, compiled beside this type: see [`Home`].
+    #[inline(always)]
+    pub(crate) fn run_beside<H, T: Task>(self, task: T) -> T::Output {
         match self.0 {
-            Set::Portable => run_portable(task),
+            Set::Portable => H::run_portable(task),
             #[cfg(target_arch = "x86_64")]
             // SAFETY: `all` alone makes this value, after finding on this machine all the features of `run_avx2`.
-            Set::Avx2 => unsafe { x86::run_avx2(task) },
+            Set::Avx2 => unsafe { H::run_avx2(task) },
             #[cfg(target_arch = "x86_64")]
             // SAFETY: as above, of `run_avx512`.
-            Set::Avx512 => unsafe { x86::run_avx512(task) },
+            Set::Avx512 => unsafe { H::run_avx512(task) },
         }
     }
 }
@@ -605,12 +628,6 @@ pub(crate) fn opaque_number(number: u32) -> u32 {
     }
     #[cfg(not(all(target_arch = "x86_64", not(miri))))]
     number
-}
-
-// Out of the way of the others.
-#[inline(never)]
-fn run_portable<T: Task>(task: T) -> T::Output {
-    task.run::<Portable>()
 }
 
 /// Asks for what stands there to be brought near, where the machine can be asked.

@@ -23,38 +23,61 @@ use crate::triangles::{
 };
 use crate::{Accel, Ray32};
 
-#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
-pub(super) fn run_avx2<T: Task>(task: T) -> T::Output {
-    task.run::<X86<false>>()
+/// Tasks at a level: see [`Home`](super::Home).
+pub(super) trait OnX86 {
+    /// # Safety
+    /// The machine has these features.
+    #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+    unsafe fn run_avx2<T: Task>(task: T) -> T::Output {
+        task.run::<X86<false>>()
+    }
+
+    /// # Safety
+    /// The machine has these features.
+    #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512cd,avx512dq,avx512vl")]
+    unsafe fn run_avx512<T: Task>(task: T) -> T::Output {
+        task.run::<X86<true>>()
+    }
 }
 
-#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512cd,avx512dq,avx512vl")]
-pub(super) fn run_avx512<T: Task>(task: T) -> T::Output {
-    task.run::<X86<true>>()
+impl<H> OnX86 for H {}
+
+/// Questions at a level, each at home where it stands.
+pub(super) trait AskOnX86: Question {
+    /// # Safety
+    /// The machine has these features.
+    #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+    unsafe fn ask_avx2(accel: &Accel, ray: &Self::Ray) -> Self::Answer {
+        Self::ask::<X86<false>>(accel, ray)
+    }
+
+    /// # Safety
+    /// The machine has these features.
+    #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512cd,avx512dq,avx512vl")]
+    unsafe fn ask_avx512(accel: &Accel, ray: &Self::Ray) -> Self::Answer {
+        Self::ask::<X86<true>>(accel, ray)
+    }
+
+    /// The same as it may leak: see `X86`.
+    ///
+    /// # Safety
+    /// The machine has these features.
+    #[cfg(feature = "measure")]
+    #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+    unsafe fn ask_leaking_avx2(accel: &Accel, ray: &Self::Ray) -> Self::Answer {
+        Self::ask::<X86<false, true>>(accel, ray)
+    }
+
+    /// # Safety
+    /// The machine has these features.
+    #[cfg(feature = "measure")]
+    #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512cd,avx512dq,avx512vl")]
+    unsafe fn ask_leaking_avx512(accel: &Accel, ray: &Self::Ray) -> Self::Answer {
+        Self::ask::<X86<true, true>>(accel, ray)
+    }
 }
 
-#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
-pub(super) fn ask_avx2<Q: Question>(accel: &Accel, ray: &Q::Ray) -> Q::Answer {
-    Q::ask::<X86<false>>(accel, ray)
-}
-
-#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512cd,avx512dq,avx512vl")]
-pub(super) fn ask_avx512<Q: Question>(accel: &Accel, ray: &Q::Ray) -> Q::Answer {
-    Q::ask::<X86<true>>(accel, ray)
-}
-
-/// The same as it may leak: see `X86`.
-#[cfg(feature = "measure")]
-#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
-pub(super) fn ask_leaking_avx2<Q: Question>(accel: &Accel, ray: &Q::Ray) -> Q::Answer {
-    Q::ask::<X86<false, true>>(accel, ray)
-}
-
-#[cfg(feature = "measure")]
-#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512cd,avx512dq,avx512vl")]
-pub(super) fn ask_leaking_avx512<Q: Question>(accel: &Accel, ray: &Q::Ray) -> Q::Answer {
-    Q::ask::<X86<true, true>>(accel, ray)
-}
+impl<Q: Question> AskOnX86 for Q {}
 
 /// Of the two levels: only what is named after AVX-512 above instantiates `X86<true>`, and only what is named after AVX2 `X86<false>`.
 /// That is why the instructions below are there.

@@ -75,7 +75,7 @@ pub(crate) fn search_triangles<G: Goal>(
     flying: Option<Flying>,
 ) {
     let ends = Answers::<G> { accel, level, rays, places: answers };
-    level.run(AllAtOnce::<InSingle<G>, _> { accel, start, rays, ends, flying, has_packets: true });
+    AllAtOnce::<InSingle<G>, _> { accel, start, rays, ends, flying, has_packets: true }.run_at(level);
 }
 
 /// In single precision.
