@@ -6,8 +6,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use clap::Subcommand;
-
-use crate::command::{release_folder, release_program, root, run, succeeds};
+use xtask::command::{Profile, release_program, root, run_ours, succeeds};
 
 /// What can be measured.
 #[derive(Subcommand)]
@@ -38,24 +37,10 @@ impl Bench {
     /// Measures and prints a table.
     pub fn run(self) -> Result<()> {
         match self {
-            Self::Kernel { arguments } => kernel(&arguments),
+            Self::Kernel { arguments } => run_ours("lumbre-bench", Profile::Release, &arguments),
             Self::Field { pov, runs, threads } => field(pov.as_deref(), runs, threads),
         }
     }
-}
-
-/// Runs the benchmark where the user stands, so that its paths mean what they say.
-fn kernel(arguments: &[String]) -> Result<()> {
-    run("cargo", &["build", "--release", "--package", "lumbre-bench"])?;
-    let program = release_folder().join(format!("lumbre-bench{}", std::env::consts::EXE_SUFFIX));
-    let status = Command::new(&program)
-        .args(arguments)
-        .status()
-        .with_context(|| format!("cannot start {}", program.display()))?;
-    if !status.success() {
-        bail!("the benchmark failed: {status}");
-    }
-    Ok(())
 }
 
 /// Times whole commands: reading, building, rendering and writing all count.

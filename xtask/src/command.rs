@@ -35,14 +35,46 @@ pub fn succeeds(program: &str, arguments: &[&str]) -> bool {
     Command::new(program).args(arguments).current_dir(root()).output().is_ok_and(|out| out.status.success())
 }
 
-/// Builds the program and says where it lies.
-pub fn release_program() -> Result<PathBuf> {
-    run("cargo", &["build", "--release", "--package", "lumbre-cli"])?;
-    Ok(release_folder().join(if cfg!(windows) { "lumbre.exe" } else { "lumbre" }))
+/// How cargo builds what is run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Profile {
+    /// As for tests.
+    Dev,
+    /// As for users.
+    Release,
 }
 
-/// Where cargo puts what it builds for release.
-pub fn release_folder() -> PathBuf {
-    let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from);
-    target.join("release")
+/// Builds the program of one of our packages and runs it where the user stands, so that its paths mean what they say.
+pub fn run_ours(package: &str, profile: Profile, arguments: &[String]) -> Result<()> {
+    let program = build(package, package, profile)?;
+    let status = Command::new(&program)
+        .args(arguments)
+        .status()
+        .with_context(|| format!("cannot start {}", program.display()))?;
+    if !status.success() {
+        bail!("{package} failed: {status}");
+    }
+    Ok(())
+}
+
+/// Builds Lumbre's program and says where it lies.
+pub fn release_program() -> Result<PathBuf> {
+    build("lumbre-cli", "lumbre", Profile::Release)
+}
+
+/// Builds the program of this name in one of our packages and says where it lies.
+fn build(package: &str, name: &str, profile: Profile) -> Result<PathBuf> {
+    let target = root().join(std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into()));
+    let build = ["build", "--package", package];
+    let folder = match profile {
+        Profile::Dev => {
+            run("cargo", &build)?;
+            "debug"
+        }
+        Profile::Release => {
+            run("cargo", &[&build[..], &["--release"]].concat())?;
+            "release"
+        }
+    };
+    Ok(target.join(folder).join(format!("{name}{}", std::env::consts::EXE_SUFFIX)))
 }

@@ -1,22 +1,19 @@
 //! What the project runs on itself: `cargo xtask test`, `cargo xtask scenes`, `cargo xtask bench …`.
 
-use std::path::PathBuf;
+use std::io::{self, Write};
 
 use anyhow::Result;
-use clap::{Parser, Subcommand};
+use clap::{Args, Parser, Subcommand};
+use xtask::command::{self, Profile};
 
-mod agree;
-mod assets;
 mod bench;
-mod command;
-mod contact;
 mod field;
 mod pictures;
 mod proof;
 mod suite;
 
 #[derive(Parser)]
-#[command(name = "cargo xtask", about = "What the project runs on itself")]
+#[command(name = "cargo xtask", bin_name = "cargo xtask", about = "What the project runs on itself")]
 struct Arguments {
     #[command(subcommand)]
     task: Task,
@@ -33,25 +30,16 @@ enum Task {
         filter: Option<String>,
     },
     /// Writes the meshes, textures and environments that scenes/ are made of.
-    Assets,
-    /// Renders every glTF below a folder, small, and joins the pictures with their names to one PNG.
-    Contact {
-        /// The folder; by default that of the sample models, where it lies beside the workspace.
-        folder: Option<PathBuf>,
-        /// The sheet; by default docs/gltf-models.png.
-        #[arg(short, long)]
-        output: Option<PathBuf>,
-        /// Pictures in a row.
-        #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=100))]
-        columns: u32,
-        /// Samples a pixel.
-        #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
-        spp: u32,
-    },
+    #[command(disable_help_flag = true)]
+    Assets(PassedOn),
+    /// Renders every glTF below a folder, small, and joins the pictures with their names to one PNG: `contact --help`.
+    #[command(disable_help_flag = true)]
+    Contact(PassedOn),
     /// Prints the field of exact shapes of scenes/field as a pbrt scene.
     Field,
-    /// Compares a picture with a reference of the same scene: means, and each pixel by its noise.
-    Agree(agree::Agree),
+    /// Compares a picture with a reference of the same scene, means, and each pixel by its noise: `agree --help`.
+    #[command(disable_help_flag = true)]
+    Agree(PassedOn),
     /// Proves the kernel by numbers, more of them than the tests have: `leaks` sends rays at edges and vertices of closed
     /// meshes, `loop` compares trees with a loop over everything.
     Proof {
@@ -75,19 +63,33 @@ enum Task {
     Bench(bench::Bench),
 }
 
+/// What is told to a program of the workspace that needs Lumbre itself: so that this one, which the first check waits for, need not.
+#[derive(Args)]
+struct PassedOn {
+    /// Its arguments.
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+    arguments: Vec<String>,
+}
+
+impl PassedOn {
+    fn hand_to_pictures(self, task: &str) -> Result<()> {
+        let arguments: Vec<String> = std::iter::once(task.to_owned()).chain(self.arguments).collect();
+        command::run_ours("lumbre-pictures", Profile::Dev, &arguments)
+    }
+}
+
 fn main() -> Result<()> {
     match Arguments::parse().task {
         Task::Test => suite::run(),
         Task::Scenes { filter } => pictures::render_all(filter.as_deref()),
-        Task::Assets => assets::write(),
-        Task::Contact { folder, output, columns, spp } => {
-            contact::sheet(folder.as_deref(), output.as_deref(), columns, spp)
-        }
-        Task::Field => {
-            print!("{}", field::scene());
-            Ok(())
-        }
-        Task::Agree(what) => agree::run_comparison(&what),
+        Task::Assets(passed) => passed.hand_to_pictures("assets"),
+        Task::Contact(passed) => passed.hand_to_pictures("contact"),
+        Task::Field => match io::stdout().write_all(field::scene().as_bytes()) {
+            // Who reads it has read enough.
+            Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+            written => Ok(written?),
+        },
+        Task::Agree(passed) => passed.hand_to_pictures("agree"),
         Task::Proof { what, rays, seed } => proof::run_proof(what, rays, seed),
         Task::Miri => proof::miri(),
         Task::Asan => proof::asan(),

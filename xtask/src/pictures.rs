@@ -4,8 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
-
-use crate::command::{release_program, root, run};
+use xtask::command::{release_program, root, run};
 
 /// Renders every scene under `scenes/` whose path contains `filter` to a PNG beside it.
 pub fn render_all(filter: Option<&str>) -> Result<()> {

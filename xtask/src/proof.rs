@@ -2,8 +2,7 @@
 
 use anyhow::Result;
 use clap::ValueEnum;
-
-use crate::command::run_with;
+use xtask::command::run_with;
 
 /// What can be proved by numbers.
 #[derive(Clone, Copy, ValueEnum)]

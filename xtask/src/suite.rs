@@ -1,8 +1,7 @@
 //! The test command: everything that must hold before a change lands.
 
 use anyhow::Result;
-
-use crate::command::{self, root, run_with, succeeds};
+use xtask::command::{self, root, run_with, succeeds};
 
 /// The version of cargo-deny that the gate was written for.
 const CARGO_DENY: &str = "0.20.2";

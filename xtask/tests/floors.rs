@@ -13,6 +13,7 @@ const FLOORS: &[(u32, &[&str])] = &[
     (5, &["lumbre-render", "lumbre-formats"]),
     (6, &["lumbre"]),
     (7, &["lumbre-cli", "lumbre-bench", "xtask"]),
+    (8, &["lumbre-pictures"]),
 ];
 
 /// Floors whose crates must not do input or output: no crate here may lean on these.

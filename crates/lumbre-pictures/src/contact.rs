@@ -5,8 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use lumbre::image::{Image, Rgb, srgb_to_linear};
-
-use crate::command::{release_program, root, run};
+use xtask::command::{release_program, root, run};
 
 /// Pixels of a picture, and the strip below it for its name.
 const WIDTH: u32 = 240;

@@ -6,8 +6,7 @@ use std::io::Write;
 
 use anyhow::Result;
 use lumbre::image::{Image, Rgb};
-
-use crate::command::root;
+use xtask::command::root;
 
 /// Writes every generated file under scenes/.
 pub fn write() -> Result<()> {

@@ -6,8 +6,7 @@ use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use lumbre::image::Image;
 use lumbre::read_image;
-
-use crate::command::{release_program, root, run};
+use xtask::command::{release_program, root, run};
 
 /// Parts that the samples are rendered in, each with a seed of its own: they show the noise.
 const PARTS: u32 = 8;

@@ -1,0 +1,3 @@
+//! What tasks of the project have in common.
+
+pub mod command;
