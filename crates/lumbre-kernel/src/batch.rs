@@ -287,9 +287,9 @@ pub(crate) struct AllAtOnce<'a, 'r, M: Manner, E> {
 }
 
 impl<M: Manner, E: Ends<M::Answer>> AllAtOnce<'_, '_, M, E> {
-    /// Does it with these lanes, compiled beside the manner: together, the manners would be half of the kernel.
+    /// Does it with these lanes, compiled beside what takes the answers: all together would be half of the kernel.
     pub(crate) fn run_at(self, level: Level) {
-        level.run_beside::<M, _>(self);
+        level.run_beside::<E, _>(self);
     }
 }
 
