@@ -516,9 +516,9 @@ pub(crate) trait Task {
 
 /// Beside what a task is compiled: beside itself, or beside the type that is named.
 ///
-/// To a compiler, a generic method stands where the type stands whose method it is, and what stands in one module is compiled as one piece. So
-/// the searches of different modules are compiled at the same time; as functions of this module they were all one piece, and it took as
-/// long as all the others together, however many cores there were.
+/// To the compiler, a generic method stands where the type stands whose method it is, and what stands in one module is one piece of work. So
+/// the searches of different modules are compiled at the same time. As functions of this module, those with vectors were one piece: more
+/// than half of all that there is to compile, by one core, however many there are.
 trait Home {
     // Out of the way of the others.
     #[inline(never)]
