@@ -44,17 +44,15 @@ pub enum Profile {
     Release,
 }
 
-/// Builds the program of one of our packages and runs it where the user stands, so that its paths mean what they say.
+/// Builds the program of one of our packages and runs it where the user stands, so that its paths mean what they say. Where it fails it has
+/// said why, and this program ends as it did.
 pub fn run_ours(package: &str, profile: Profile, arguments: &[String]) -> Result<()> {
     let program = build(package, package, profile)?;
     let status = Command::new(&program)
         .args(arguments)
         .status()
         .with_context(|| format!("cannot start {}", program.display()))?;
-    if !status.success() {
-        bail!("{package} failed: {status}");
-    }
-    Ok(())
+    if status.success() { Ok(()) } else { std::process::exit(status.code().unwrap_or(1)) }
 }
 
 /// Builds Lumbre's program and says where it lies.
