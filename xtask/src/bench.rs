@@ -8,17 +8,15 @@ use anyhow::{Context, Result, bail};
 use clap::Subcommand;
 use xtask::command::{Profile, release_program, root, run_ours, succeeds};
 
+use crate::PassedOn;
+
 /// What can be measured.
 #[derive(Subcommand)]
 pub enum Bench {
     /// Rays a second, build speed and memory of the kernel, beside Embree 4 where EMBREE_LIB names its shared library, and
     /// beside the crates obvhs and bvh. All options are passed through: `kernel --help`.
     #[command(disable_help_flag = true)]
-    Kernel {
-        /// --quick, --costs, --json FILE, --scene NAME, --work NAME, --peer NAME, --threads 1,2, --mesh FILE, --list …
-        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
-        arguments: Vec<String>,
-    },
+    Kernel(PassedOn),
     /// The field of exact shapes, against POV-Ray where it is on the PATH.
     Field {
         /// A POV-Ray scene of the same field.
@@ -37,7 +35,7 @@ impl Bench {
     /// Measures and prints a table.
     pub fn run(self) -> Result<()> {
         match self {
-            Self::Kernel { arguments } => run_ours("lumbre-bench", Profile::Release, &arguments),
+            Self::Kernel(passed) => run_ours("lumbre-bench", Profile::Release, &passed.arguments),
             Self::Field { pov, runs, threads } => field(pov.as_deref(), runs, threads),
         }
     }

@@ -514,7 +514,7 @@ pub(crate) trait Task {
     fn run<L: Lanes>(self) -> Self::Output;
 }
 
-/// Beside what a task is compiled: beside itself, or beside the type that is named.
+/// Where a task is compiled: beside the type whose methods these are, which is its own or one that is named.
 ///
 /// To the compiler, a generic method stands where the type stands whose method it is, and what stands in one module is one piece of work. So
 /// the searches of different modules are compiled at the same time. As functions of this module, those with vectors were one piece: more
