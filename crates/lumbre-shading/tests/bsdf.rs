@@ -6,6 +6,7 @@
 //! a transmission those of weights and reciprocity.
 
 use std::f64::consts::{PI, TAU};
+use std::thread;
 
 use lumbre_math::random::RandomStream;
 use lumbre_math::{Vec2, Vec3};
@@ -351,48 +352,55 @@ fn sampling_follows_the_density_and_the_density_integrates_to_what_is_sampled() 
     let tests = (list.len() * views().len()) as f64;
     // Šidák: all tests together fail by chance once in a thousand.
     let significance = 1.0 - (1.0_f64 - 1e-3).powf(1.0 / tests);
-    let mut compared = 0;
-    for (b, (name, bsdf)) in list.iter().enumerate() {
-        for (v, &wo) in views().iter().enumerate() {
-            let (probabilities, counts, rest) = histogram(bsdf, wo, (b * 100 + v) as u64);
-            let total = f64::from(SAMPLES);
-            let integral: f64 = probabilities.iter().sum();
-            let sampled = 1.0 - f64::from(rest) / total;
-            let deviation = (sampled * (1.0 - sampled) / total).sqrt();
-            assert!(
-                (integral - sampled).abs() < 4.5 * deviation + 1e-3,
-                "{name} from {:?}: the density integrates to {integral}, {sampled} are sampled",
-                wo.vec()
-            );
-            // Cells with few expected are counted together with their neighbours.
-            let (mut chi, mut cells) = (0.0, 0);
-            let (mut expected, mut observed) = (0.0, 0.0);
-            for (p, &n) in probabilities.iter().zip(&counts) {
-                expected += p * total;
-                observed += f64::from(n);
-                if expected >= 8.0 {
-                    chi += (observed - expected).powi(2) / expected;
-                    cells += 1;
-                    compared += 1;
-                    (expected, observed) = (0.0, 0.0);
-                }
-            }
-            assert!(
-                observed <= expected + 8.0 * expected.sqrt() + 8.0,
-                "{name}: {observed} where {expected} are expected"
-            );
-            if cells < 2 {
-                continue;
-            }
-            let tail = chi_square_tail(chi, f64::from(cells - 1));
-            assert!(
-                tail > significance,
-                "{name} from {:?}: χ² {chi} over {cells} cells, p {tail:e}",
-                wo.vec()
-            );
-        }
-    }
+    let compared: usize = thread::scope(|scope| {
+        let threads: Vec<_> = (list.iter().enumerate())
+            .map(|(b, (name, bsdf))| {
+                scope.spawn(move || assert_sampling_follows(name, bsdf, 100 * b as u64, significance))
+            })
+            .collect();
+        threads.into_iter().map(|thread| thread.join().unwrap()).sum()
+    });
     assert!(compared > 10_000, "{compared}");
+}
+
+/// By χ² from every view; returns how many cells were compared.
+fn assert_sampling_follows(name: &str, bsdf: &Bsdf, first_seed: u64, significance: f64) -> usize {
+    let mut compared = 0;
+    for (seed, wo) in (first_seed..).zip(views()) {
+        let (probabilities, counts, rest) = histogram(bsdf, wo, seed);
+        let total = f64::from(SAMPLES);
+        let integral: f64 = probabilities.iter().sum();
+        let sampled = 1.0 - f64::from(rest) / total;
+        let deviation = (sampled * (1.0 - sampled) / total).sqrt();
+        assert!(
+            (integral - sampled).abs() < 4.5 * deviation + 1e-3,
+            "{name} from {:?}: the density integrates to {integral}, {sampled} are sampled",
+            wo.vec()
+        );
+        // Cells with few expected are counted together with their neighbours.
+        let (mut chi, mut cells) = (0.0, 0);
+        let (mut expected, mut observed) = (0.0, 0.0);
+        for (p, &n) in probabilities.iter().zip(&counts) {
+            expected += p * total;
+            observed += f64::from(n);
+            if expected >= 8.0 {
+                chi += (observed - expected).powi(2) / expected;
+                cells += 1;
+                compared += 1;
+                (expected, observed) = (0.0, 0.0);
+            }
+        }
+        assert!(
+            observed <= expected + 8.0 * expected.sqrt() + 8.0,
+            "{name}: {observed} where {expected} are expected"
+        );
+        if cells < 2 {
+            continue;
+        }
+        let tail = chi_square_tail(chi, f64::from(cells - 1));
+        assert!(tail > significance, "{name} from {:?}: χ² {chi} over {cells} cells, p {tail:e}", wo.vec());
+    }
+    compared
 }
 
 #[test]
