@@ -452,6 +452,26 @@ impl Accel {
         }
     }
 
+    /// Puts what comes of rays in flight, and tells how many of these the plain search had to answer. It is the search that batches take:
+    /// what takes answers otherwise has a search of its own compiled, at every level.
+    #[cfg(test)]
+    pub(crate) fn fly_at<'a, G: single::Goal, T>(
+        &'a self,
+        level: Level,
+        rays: &'a [Ray],
+        places: &'a mut [T],
+        flying: batch::Flying,
+    ) -> usize
+    where
+        Answers<'a, T>: Ends<G::Answer>,
+    {
+        let start = self.single.as_ref().expect("what single precision searches");
+        let before = UNSETTLED.get();
+        let ends = Answers { accel: self, level, rays, places };
+        batch::search_as_said::<G>(level, self, start, rays, ends, Some(flying), false);
+        UNSETTLED.get() - before
+    }
+
     fn questions_at(&self, level: Level) -> Questions {
         if level == self.level { self.questions } else { Questions::new(level, self.single.as_ref()) }
     }
@@ -738,11 +758,24 @@ impl Accel {
 }
 
 /// The places for what came of a batch of rays.
-struct Answers<'a, T> {
+pub(crate) struct Answers<'a, T> {
     accel: &'a Accel,
     level: Level,
     rays: &'a [Ray],
     places: &'a mut [T],
+}
+
+#[cfg(test)]
+thread_local! {
+    /// How many rays of batches the plain search had to answer.
+    static UNSETTLED: std::cell::Cell<usize> = const { std::cell::Cell::new(0) };
+}
+
+/// Counts one, in tests.
+#[inline(always)]
+fn count_unsettled() {
+    #[cfg(test)]
+    UNSETTLED.set(UNSETTLED.get() + 1);
 }
 
 impl Ends<Option<Winner>> for Answers<'_, Option<Hit>> {
@@ -752,7 +785,10 @@ impl Ends<Option<Winner>> for Answers<'_, Option<Hit>> {
         match outcome {
             Outcome::Settled(Some(winner)) => winner.put(self.accel, place),
             Outcome::Settled(None) => *place = None,
-            Outcome::Unsettled => *place = self.accel.closest_plainly_at(self.level, &self.rays[position]),
+            Outcome::Unsettled => {
+                count_unsettled();
+                *place = self.accel.closest_plainly_at(self.level, &self.rays[position]);
+            }
         }
     }
 
@@ -767,7 +803,10 @@ impl Ends<Option<Hit>> for Answers<'_, Option<Hit>> {
     fn put(&mut self, position: usize, outcome: Outcome<Option<Hit>>) {
         self.places[position] = match outcome {
             Outcome::Settled(hit) => hit,
-            Outcome::Unsettled => self.accel.closest_plainly_at(self.level, &self.rays[position]),
+            Outcome::Unsettled => {
+                count_unsettled();
+                self.accel.closest_plainly_at(self.level, &self.rays[position])
+            }
         };
     }
 }
@@ -777,7 +816,10 @@ impl Ends<bool> for Answers<'_, bool> {
     fn put(&mut self, position: usize, outcome: Outcome<bool>) {
         self.places[position] = match outcome {
             Outcome::Settled(is_hit) => is_hit,
-            Outcome::Unsettled => self.accel.any_plainly_at(self.level, &self.rays[position]),
+            Outcome::Unsettled => {
+                count_unsettled();
+                self.accel.any_plainly_at(self.level, &self.rays[position])
+            }
         };
     }
 }

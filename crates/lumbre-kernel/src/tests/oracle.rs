@@ -8,11 +8,7 @@ use lumbre_math::{DVec3, Transform};
 
 use super::scenes::{Random, balls, build, cube, icosphere, mixture, ray, soup, with_every_preset};
 use crate::lanes::Level;
-use crate::single::Outcome;
 use crate::{Accel, GeometryKind, Hit, Instance, TriangleMesh, brute};
-
-/// What takes the answers of a batch. Of one type for all tests, for whatever takes them has searches of its own compiled, at every level.
-pub(crate) type Put<'a, A> = &'a mut dyn FnMut(usize, Outcome<A>);
 
 fn every(level: Level, accel: &Accel, ray: &Ray) -> Vec<Hit> {
     let mut hits = Vec::new();

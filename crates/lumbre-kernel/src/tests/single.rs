@@ -5,17 +5,16 @@ use std::sync::Arc;
 use lumbre_geometry::{PlacedShape, Plane, Ray};
 use lumbre_math::{DVec3, Transform, Vec3};
 
-use super::oracle::Put;
 use super::scenes::{self, Random};
 use crate::batch::Flying;
 use crate::lanes::Level;
 use crate::packet::{self, PACKET};
 use crate::query::{Filter, If};
-use crate::single::{self, Nearest, Outcome, Whether, Winner};
+use crate::single::{self, Nearest, Outcome, Whether};
 use crate::traverse::{Place, Standing};
 use crate::{
     Accel, BuildOptions, Faces, Geometry, GeometryKind, Hit, Instance, Preset, QueryOptions, TriangleMesh,
-    batch, brute,
+    brute,
 };
 
 /// A grid of hills, with a sheet twice in the same place, needles and some triangles seen on edge.
@@ -101,50 +100,13 @@ fn alike(random: &mut Random, mesh: &TriangleMesh, size: f64) -> [Ray; PACKET] {
     })
 }
 
-/// What came of rays in flight, beside what comes of each alone.
-struct Tally {
-    is_answered: Vec<bool>,
-    /// By the plain search, in flight and alone.
-    unsettled: [usize; 2],
-}
-
-impl Tally {
-    fn of(rays: &[Ray]) -> Self {
-        Self { is_answered: vec![false; rays.len()], unsettled: [0; 2] }
-    }
-
-    /// In flight and alone, `of` the level and the ray that are told; `plain` is right. The plain search may have to answer one of the
-    /// two alone: in flight, many children at once are too many for a short stack.
-    fn count<A: PartialEq + std::fmt::Debug>(
-        &mut self,
-        i: usize,
-        outcomes: [Outcome<A>; 2],
-        plain: &A,
-        of: impl std::fmt::Debug,
-    ) {
-        assert!(!self.is_answered[i], "once");
-        self.is_answered[i] = true;
-        for (outcome, unsettled) in outcomes.into_iter().zip(&mut self.unsettled) {
-            match outcome {
-                Outcome::Settled(answer) => assert_eq!(answer, *plain, "{of:?}"),
-                Outcome::Unsettled => *unsettled += 1,
-            }
-        }
-    }
-
-    fn end(self) {
-        assert!(self.is_answered.iter().all(|&is_answered| is_answered), "every ray");
-        let [in_flight, alone] = self.unsettled;
-        assert!(in_flight <= alone + self.is_answered.len() / 2, "{in_flight} and {alone}");
-    }
-}
-
 /// Every search of a tree beside the plain one, which answers with the same bits.
 fn check(accel: &Accel, rays: &[Ray], least: u32) {
     let start = accel.single.as_ref().expect("made for this");
     for level in Level::all() {
-        let (mut settled, mut hits) = (0, 0);
-        let mut winners = Vec::with_capacity(rays.len());
+        // For closest and any hits: rays that the plain search has to answer.
+        let (mut unsettled, mut hits) = ([0; 2], 0);
+        let mut expected = Vec::with_capacity(rays.len());
         let mut in_batch = vec![None; rays.len()];
         accel.closest_batch_at(level, rays, &mut in_batch);
         let mut any_in_batch = vec![false; rays.len()];
@@ -155,32 +117,45 @@ fn check(accel: &Accel, rays: &[Ray], least: u32) {
             assert_eq!(*in_batch, plain, "{level:?} {ray:?}");
             assert_eq!(accel.any_at(level, ray), plain.is_some(), "{level:?} {ray:?}");
             assert_eq!(*any_in_batch, plain.is_some(), "{level:?} {ray:?}");
-            let outcome = single::search::<Nearest>(level, accel, start, ray);
-            settled += u32::from(outcome != Outcome::Unsettled);
+            let closest = single::search::<Nearest>(level, accel, start, ray);
+            let any = single::search::<Whether>(level, accel, start, ray);
+            unsettled[0] += usize::from(closest == Outcome::Unsettled);
+            unsettled[1] += usize::from(any == Outcome::Unsettled);
             hits += u32::from(plain.is_some());
-            let winner =
-                |hit: Hit| Winner { root: hit.root, geometry: hit.geometry, primitive: hit.primitive };
-            winners.push(plain.map(winner));
+            expected.push(plain);
         }
-        assert!(hits > least && settled > least, "{hits} hits, {settled} settled");
+        assert!(hits > least && rays.len() - unsettled[0] > least as usize, "{hits} hits, {unsettled:?}");
         // No tree of the tests is as large as those that are searched as far ones, and alike rays would go together.
         for flying in [Flying::NEAR, Flying::FAR] {
-            let mut tally = Tally::of(rays);
-            let put: Put<Option<Winner>> = &mut |i, outcome| {
-                let alone = single::search::<Nearest>(level, accel, start, &rays[i]);
-                tally.count(i, [outcome, alone], &winners[i], (level, flying, &rays[i]));
-            };
-            batch::search_as_said::<Nearest>(level, accel, start, rays, put, Some(flying), false);
-            tally.end();
-            let mut tally = Tally::of(rays);
-            let put: Put<bool> = &mut |i, outcome| {
-                let alone = single::search::<Whether>(level, accel, start, &rays[i]);
-                tally.count(i, [outcome, alone], &winners[i].is_some(), (level, flying, &rays[i]));
-            };
-            batch::search_as_said::<Whether>(level, accel, start, rays, put, Some(flying), false);
-            tally.end();
+            let in_flight = assert_flights(accel, level, rays, &expected, flying);
+            // The plain search may have to answer one in flight that is settled alone: many children at once are too many for a short stack.
+            for (in_flight, alone) in in_flight.into_iter().zip(unsettled) {
+                assert!(in_flight <= alone + rays.len() / 2, "{in_flight} and {alone}");
+            }
         }
     }
+}
+
+/// Every ray in flight has its answer; returns how many closest and any hits the plain search had to find.
+pub(super) fn assert_flights(
+    accel: &Accel,
+    level: Level,
+    rays: &[Ray],
+    expected: &[Option<Hit>],
+    flying: Flying,
+) -> [usize; 2] {
+    let other = expected.iter().flatten().next();
+    // What is wrong for each, so that none is left out.
+    let mut hits: Vec<_> =
+        expected.iter().map(|hit| if hit.is_some() { None } else { other.cloned() }).collect();
+    let closest = accel.fly_at::<Nearest, _>(level, rays, &mut hits, flying);
+    let mut is_hit: Vec<_> = expected.iter().map(Option::is_none).collect();
+    let any = accel.fly_at::<Whether, _>(level, rays, &mut is_hit, flying);
+    for (((ray, hit), is_hit), expected) in rays.iter().zip(&hits).zip(is_hit).zip(expected) {
+        assert_eq!(hit, expected, "{level:?} {flying:?} {ray:?}");
+        assert_eq!(is_hit, expected.is_some(), "{level:?} {flying:?} {ray:?}");
+    }
+    [closest, any]
 }
 
 const SIZES_AND_OFFSETS: [(f64, f64); 5] = [(1.0, 0.0), (1e-6, 0.0), (3e7, 1.0), (0.02, 1e6), (400.0, 50.0)];
