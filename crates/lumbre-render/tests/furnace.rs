@@ -64,7 +64,7 @@ fn assert_white(desc: SceneDesc, what: &str, ways: &[Way]) {
 }
 
 // Rooms keep a half or a quarter of the light at every wall: after twenty-four bounces 10⁻⁷ of it in one that is empty, and about
-// 10⁻⁴ around a ring of glass.
+// 10⁻⁴ around a ring of thin glass.
 const BOTH: Way = Way { strategy: Strategy::Both, spp: 320, bounces: 24, share: 2e-3 };
 /// Without diffuse light there is less noise.
 const QUIET: Way = Way { spp: 64, ..BOTH };
