@@ -452,7 +452,7 @@ impl Accel {
         }
     }
 
-    /// Puts what comes of rays in flight, and tells how many of these the plain search had to answer. It is the search that batches take:
+    /// Puts what comes of rays in flight, once each, and tells how many the plain search had to answer. It is the search that batches take:
     /// what takes answers otherwise has a search of its own compiled, at every level.
     #[cfg(test)]
     pub(crate) fn fly_at<'a, G: single::Goal, T>(
@@ -466,10 +466,12 @@ impl Accel {
         Answers<'a, T>: Ends<G::Answer>,
     {
         let start = self.single.as_ref().expect("what single precision searches");
-        let before = UNSETTLED.get();
         let ends = Answers { accel: self, level, rays, places };
+        ANSWERED.set([0; 2]);
         batch::search_as_said::<G>(level, self, start, rays, ends, Some(flying), false);
-        UNSETTLED.get() - before
+        let [all, plainly] = ANSWERED.get();
+        assert_eq!(all, rays.len(), "each once");
+        plainly
     }
 
     fn questions_at(&self, level: Level) -> Questions {
@@ -767,28 +769,27 @@ pub(crate) struct Answers<'a, T> {
 
 #[cfg(test)]
 thread_local! {
-    /// How many rays of batches the plain search had to answer.
-    static UNSETTLED: std::cell::Cell<usize> = const { std::cell::Cell::new(0) };
+    /// How many rays of batches were answered, and how many of them by the plain search.
+    static ANSWERED: std::cell::Cell<[usize; 2]> = const { std::cell::Cell::new([0; 2]) };
 }
 
-/// Counts one, in tests.
-#[inline(always)]
-fn count_unsettled() {
-    #[cfg(test)]
-    UNSETTLED.set(UNSETTLED.get() + 1);
+/// Counts a ray of a batch.
+#[cfg(test)]
+fn count<A>(outcome: &Outcome<A>) {
+    let [all, plainly] = ANSWERED.get();
+    ANSWERED.set([all + 1, plainly + usize::from(matches!(outcome, Outcome::Unsettled))]);
 }
 
 impl Ends<Option<Winner>> for Answers<'_, Option<Hit>> {
     #[inline(always)]
     fn put(&mut self, position: usize, outcome: Outcome<Option<Winner>>) {
+        #[cfg(test)]
+        count(&outcome);
         let place = &mut self.places[position];
         match outcome {
             Outcome::Settled(Some(winner)) => winner.put(self.accel, place),
             Outcome::Settled(None) => *place = None,
-            Outcome::Unsettled => {
-                count_unsettled();
-                *place = self.accel.closest_plainly_at(self.level, &self.rays[position]);
-            }
+            Outcome::Unsettled => *place = self.accel.closest_plainly_at(self.level, &self.rays[position]),
         }
     }
 
@@ -801,12 +802,11 @@ impl Ends<Option<Winner>> for Answers<'_, Option<Hit>> {
 impl Ends<Option<Hit>> for Answers<'_, Option<Hit>> {
     #[inline(always)]
     fn put(&mut self, position: usize, outcome: Outcome<Option<Hit>>) {
+        #[cfg(test)]
+        count(&outcome);
         self.places[position] = match outcome {
             Outcome::Settled(hit) => hit,
-            Outcome::Unsettled => {
-                count_unsettled();
-                self.accel.closest_plainly_at(self.level, &self.rays[position])
-            }
+            Outcome::Unsettled => self.accel.closest_plainly_at(self.level, &self.rays[position]),
         };
     }
 }
@@ -814,12 +814,11 @@ impl Ends<Option<Hit>> for Answers<'_, Option<Hit>> {
 impl Ends<bool> for Answers<'_, bool> {
     #[inline(always)]
     fn put(&mut self, position: usize, outcome: Outcome<bool>) {
+        #[cfg(test)]
+        count(&outcome);
         self.places[position] = match outcome {
             Outcome::Settled(is_hit) => is_hit,
-            Outcome::Unsettled => {
-                count_unsettled();
-                self.accel.any_plainly_at(self.level, &self.rays[position])
-            }
+            Outcome::Unsettled => self.accel.any_plainly_at(self.level, &self.rays[position]),
         };
     }
 }

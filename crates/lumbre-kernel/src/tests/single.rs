@@ -10,7 +10,7 @@ use crate::batch::Flying;
 use crate::lanes::Level;
 use crate::packet::{self, PACKET};
 use crate::query::{Filter, If};
-use crate::single::{self, Nearest, Outcome, Whether};
+use crate::single::{self, Nearest, Outcome, Whether, Winner};
 use crate::traverse::{Place, Standing};
 use crate::{
     Accel, BuildOptions, Faces, Geometry, GeometryKind, Hit, Instance, Preset, QueryOptions, TriangleMesh,
@@ -117,10 +117,19 @@ fn check(accel: &Accel, rays: &[Ray], least: u32) {
             assert_eq!(*in_batch, plain, "{level:?} {ray:?}");
             assert_eq!(accel.any_at(level, ray), plain.is_some(), "{level:?} {ray:?}");
             assert_eq!(*any_in_batch, plain.is_some(), "{level:?} {ray:?}");
-            let closest = single::search::<Nearest>(level, accel, start, ray);
-            let any = single::search::<Whether>(level, accel, start, ray);
-            unsettled[0] += usize::from(closest == Outcome::Unsettled);
-            unsettled[1] += usize::from(any == Outcome::Unsettled);
+            let winner = plain.as_ref().map(|&Hit { root, geometry, primitive, .. }| Winner {
+                root,
+                geometry,
+                primitive,
+            });
+            match single::search::<Nearest>(level, accel, start, ray) {
+                Outcome::Settled(answer) => assert_eq!(answer, winner, "{level:?} {ray:?}"),
+                Outcome::Unsettled => unsettled[0] += 1,
+            }
+            match single::search::<Whether>(level, accel, start, ray) {
+                Outcome::Settled(answer) => assert_eq!(answer, plain.is_some(), "{level:?} {ray:?}"),
+                Outcome::Unsettled => unsettled[1] += 1,
+            }
             hits += u32::from(plain.is_some());
             expected.push(plain);
         }
