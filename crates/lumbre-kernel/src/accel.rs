@@ -79,9 +79,7 @@ pub enum Preset {
     #[default]
     Balanced,
     /// The balanced tree, then made better by putting subtrees of any size elsewhere (D. Meister, J. Bittner, "Parallel Reinsertion for
-    /// Bounding Volume Hierarchy Optimization", 2018): for what is built once and asked often. Where most of a tree is empty
-    /// space in the boxes of long and slanted triangles, these stand in several leaves, each for a part of it (M. Stich and
-    /// others, "Spatial Splits in Bounding Volume Hierarchies", 2009): no more than 1.3 times as many places as triangles.
+    /// Bounding Volume Hierarchy Optimization", 2018): for what is built once and asked often.
     Best,
 }
 
@@ -725,7 +723,6 @@ impl Accel {
             + self.tree.blocks.own_bytes()
             + self.tree.names.own_bytes()
             + self.tree.entries.own_bytes()
-            + self.tree.cells.own_bytes()
             + self.tree.sphere_blocks.own_bytes()
             + self.tree.sphere_names.own_bytes()
             + self.hulls.memory_bytes()

@@ -25,7 +25,7 @@ impl Centers {
     const EMPTY: Self = Self { low: [i32::MAX; 4], high: [i32::MIN; 4] };
 
     #[inline(always)]
-    fn grow(&mut self, centers: &Self) {
+    pub(crate) fn grow(&mut self, centers: &Self) {
         for lane in 0..4 {
             self.low[lane] = self.low[lane].min(centers.low[lane]);
             self.high[lane] = self.high[lane].max(centers.high[lane]);
@@ -313,31 +313,23 @@ impl<const COSTS: bool> Task for BestSplit<'_, COSTS> {
     }
 }
 
-/// Measures where primitives and their centres are.
-pub(crate) struct Measure<'a> {
+/// Measures where the centres of primitives are.
+pub(crate) struct FindCenters<'a> {
     pub(crate) primitives: &'a [Primitive],
 }
 
-impl Task for Measure<'_> {
-    type Output = (Bounds, Centers);
+impl Task for FindCenters<'_> {
+    type Output = Centers;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> (Bounds, Centers) {
-        let (mut bounds, mut centers) = (Bounds::EMPTY, Centers::EMPTY);
+    fn run<L: Lanes>(self) -> Centers {
+        let mut centers = Centers::EMPTY;
         for primitive in self.primitives {
-            bounds.grow(primitive);
             let center2 = primitive.center2();
             centers.grow(&Centers { low: center2, high: center2 });
         }
-        (bounds, centers)
+        centers
     }
-}
-
-pub(crate) fn join((a, b): ((Bounds, Centers), (Bounds, Centers))) -> (Bounds, Centers) {
-    let (mut bounds, mut centers) = a;
-    bounds.grow(&b.0);
-    centers.grow(&b.1);
-    (bounds, centers)
 }
 
 /// The bins of primitives whose centres were measured.

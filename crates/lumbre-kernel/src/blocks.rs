@@ -238,6 +238,11 @@ impl TriangleBlock {
             .map(|vertex| [0, 1, 2].map(|axis| self.coordinates[axis * self.room() + vertex]))
     }
 
+    /// The corners of each triangle.
+    pub(crate) fn triangles(&self) -> impl Iterator<Item = [[f32; 3]; 3]> {
+        (0..BLOCK).filter(|lane| self.taken() >> lane & 1 != 0).map(|lane| self.triangle(lane))
+    }
+
     /// The corners of its triangles, where each has a vertex of its own.
     #[inline(always)]
     pub(crate) fn own_corners(&self) -> &Corners {

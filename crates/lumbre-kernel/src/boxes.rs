@@ -72,7 +72,10 @@ mod tests {
             boxes.shorten(kept);
             assert_eq!(boxes.len(), count.min(kept));
             for (place, bounds) in boxes.iter().enumerate() {
-                assert_eq!((bounds.first(), bounds.second(), bounds.range(1)[1]), (place as u32, 7, 1 << 27));
+                assert_eq!(
+                    (bounds.first(), bounds.second(), bounds.range2(1)[1]),
+                    (place as u32, 7, 1 << 28)
+                );
             }
         }
     }

@@ -4,24 +4,18 @@
 //! done does not depend on how it is shared: boxes grow in any order, costs are whole numbers, and primitives are parted in
 //! pieces of one length. The depth is bounded: past [`SAH_DEPTH`] levels every split is in the middle.
 
-pub(crate) mod spatial;
-
 use std::borrow::Cow;
 
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
-use crate::Geometry;
 use crate::accel::Preset;
-use crate::bins::{self, BestSplit, Binning, Bins, Fill, Measure, Part, Split};
+use crate::bins::{BestSplit, Binning, Bins, Centers, Fill, FindCenters, Part, Split};
 use crate::boxes::Boxes;
-use crate::build::spatial::Eagerness;
-use crate::carve::Cell;
 use crate::collapse::{Choices, Costs, Known, choose};
 use crate::few::{Decide, FEW, Few, group_of};
 use crate::lanes::Level;
 use crate::morton::{self, Code};
-use crate::node::Units;
 use crate::parting::part;
 use crate::primitive::{Bounds, Kind, Primitive, Traits};
 use crate::reinsert::reinsert;
@@ -156,22 +150,6 @@ pub(crate) struct Grown<'p> {
     pub(crate) names: Vec<Name>,
     /// Instances with their boxes; their names are the first.
     pub(crate) instances: Vec<Primitive>,
-    /// Of each name, which part of it; without any, all is whole.
-    pub(crate) cells: Vec<Cell>,
-}
-
-/// How much care a tree is given.
-#[derive(Clone, Copy)]
-pub(crate) struct Effort {
-    pub(crate) preset: Preset,
-    eagerness: Eagerness,
-}
-
-impl Effort {
-    /// Of a preset, on the thread that asks for a tree.
-    pub(crate) fn of(preset: Preset) -> Self {
-        Self { preset, eagerness: Eagerness::now() }
-    }
 }
 
 /// The binary tree over primitives (not none) of geometries: packed ones, and all others.
@@ -182,12 +160,10 @@ impl Effort {
 /// are given back here, before the tree is laid out, but for instances.
 pub(crate) fn binary_tree<'p>(
     level: Level,
-    Effort { preset, eagerness }: Effort,
+    preset: Preset,
     mut others: Vec<Primitive>,
     packed: &'p mut Boxes,
     traits: &[Traits],
-    geometries: &[Geometry],
-    units: &Units,
 ) -> Grown<'p> {
     // Below, there is a node for every thread.
     let shared = (2 * rayon::current_num_threads()).ilog2();
@@ -206,32 +182,14 @@ pub(crate) fn binary_tree<'p>(
         if first_packed > 0 { rayon::join(of_others, of_packed) } else { (Vec::new(), of_packed()) };
     others.truncate(counts[Kind::Instance.rank()]);
     others.shrink_to_fit();
-    let mut cells = Vec::new();
-    if let Some(PackedTree { mut tree, names: packed_names }) = packed_tree {
+    if let Some(PackedTree { tree, names: packed_names }) = packed_tree {
         names = with_all(names, &packed_names);
-        if preset == Preset::Best
-            && let Some(found) = spatial::in_parts(
-                builder,
-                eagerness,
-                geometries,
-                units,
-                &tree,
-                &names[first_packed..],
-                first_packed,
-            )
-        {
-            tree = found.tree;
-            names.truncate(first_packed);
-            names.extend(found.names);
-            cells = fill(first_packed, Cell::WHOLE);
-            cells.extend(found.cells);
-        }
         trees.push(tree);
     }
     let better = |tree| if preset == Preset::Best { reinsert(tree) } else { tree };
     let join = |low, high| Binary::Fork(Box::new(Fork { is_ranked: true, ..Fork::over([low, high]) }));
     let tree = trees.into_iter().map(better).reduce(join).expect("there are primitives");
-    Grown { tree, names, instances: others, cells }
+    Grown { tree, names, instances: others }
 }
 
 /// Names, and others behind them.
@@ -504,7 +462,7 @@ impl Builder<'_> {
 
     /// Puts as many primitives in the order along a curve there; their codes.
     fn sort(&self, primitives: &[Primitive], sorted: &mut [Primitive]) -> Vec<Code> {
-        let (_, centers) = self.measure(primitives);
+        let centers = self.centers(primitives);
         morton::sort(primitives, sorted, &centers)
     }
 
@@ -696,19 +654,21 @@ impl Builder<'_> {
         if split.is_some_and(|split| split.spread > 4) {
             return split;
         }
-        let (_, centers) = self.measure(primitives);
+        let centers = self.centers(primitives);
         if centers.are_one() {
             return None;
         }
         self.binned::<COSTS>(primitives, Binning::new(&centers, primitives.len()), bins, depth)
     }
 
-    fn measure(&self, primitives: &[Primitive]) -> (Bounds, bins::Centers) {
+    fn centers(&self, primitives: &[Primitive]) -> Centers {
         if primitives.len() <= CHUNK {
-            return self.level.run(Measure { primitives });
+            return self.level.run(FindCenters { primitives });
         }
         let (left, right) = primitives.split_at(primitives.len() / 2);
-        bins::join(rayon::join(|| self.measure(left), || self.measure(right)))
+        let (mut centers, others) = rayon::join(|| self.centers(left), || self.centers(right));
+        centers.grow(&others);
+        centers
     }
 
     fn fill<const COSTS: bool>(
@@ -799,7 +759,7 @@ impl Builder<'_> {
     /// Without a SAH split: in the middle by kind, then geometry, then along the longest axis, so that leaves of one kind
     /// come about even where everything stands in one place.
     fn by_order(&self, primitives: &mut [Primitive]) -> usize {
-        let axis = self.measure(primitives).1.longest_axis();
+        let axis = self.centers(primitives).longest_axis();
         let group = |p: &Primitive| group_of(p, self.traits);
         let order = |a: &Primitive, b: &Primitive| {
             group(a)

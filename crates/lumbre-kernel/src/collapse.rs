@@ -11,7 +11,6 @@ use rayon::prelude::*;
 
 use crate::blocks::{self, BlockNames, Blocks, Filled, LaneOrder, Line, TriangleBlock, Vertices};
 use crate::build::{Binary, BinaryNode, Fork, Name};
-use crate::carve::{self, Cell, LaneCell};
 use crate::lanes::Level;
 use crate::node::{Node, Units, WIDTH, tag};
 use crate::primitive::{Bounds, Kind, Primitive, Traits};
@@ -70,8 +69,6 @@ pub(crate) struct Packed {
     pub(crate) sphere_blocks: Store<SphereBlock>,
     /// As many as there are blocks of spheres.
     pub(crate) sphere_names: Store<BlockNames>,
-    /// The triangles of which but a part stands in a lane of a block, in the order of lanes; others are whole.
-    pub(crate) cells: Store<LaneCell>,
     /// The reference to the root; `None` when there is nothing finite.
     pub(crate) root: Option<u32>,
 }
@@ -165,42 +162,13 @@ impl Packed {
         Ok(())
     }
 
-    /// Moves names, and cells with them, to where triangles were packed.
+    /// Moves names to where triangles were packed.
     fn put_in_order(&mut self, orders: &[LaneOrder]) {
         if orders.iter().all(|order| order.is_same()) {
             return;
         }
         let names = self.names.to_mut();
         names.par_iter_mut().zip(orders).with_min_len(1 << 10).for_each(|(names, order)| order.put(names));
-        if self.has_parts() {
-            let cells = self.cells.to_mut();
-            for cell in cells.iter_mut() {
-                let (block, before) = (cell.lane as usize / BLOCK, cell.lane as usize % BLOCK);
-                let lane = (0..BLOCK).find(|&lane| orders[block].lane_before(lane) == before);
-                cell.lane = (block * BLOCK + lane.expect("every lane stands somewhere")) as u32;
-            }
-            cells.sort_unstable_by_key(|cell| cell.lane);
-        }
-    }
-
-    /// Whether a triangle may stand in more than one lane.
-    pub(crate) fn has_parts(&self) -> bool {
-        !self.cells.is_empty()
-    }
-
-    /// Whether but a part of a triangle stands in a lane.
-    #[inline]
-    pub(crate) fn is_part(&self, block: u32, lane: u32) -> bool {
-        self.has_parts() && carve::is_part(&self.cells, block, lane)
-    }
-
-    /// The parts that stand in lanes, each with the name of its triangle; of a lane that is not there, there is no name.
-    pub(crate) fn parts(&self) -> impl Iterator<Item = (Option<Name>, Cell)> {
-        self.cells.iter().map(|at| {
-            let (block, lane) = (at.lane as usize / BLOCK, at.lane as usize % BLOCK);
-            let name = self.names.get(block).map(|names| [names.geometry, names.primitives[lane]]);
-            (name.filter(|name| name[1] != u32::MAX), at.cell)
-        })
     }
 }
 
@@ -622,15 +590,12 @@ impl Layout {
         units: &Units,
         geometries: &[Geometry],
         names: Vec<Name>,
-        cells: Vec<Cell>,
     ) -> Result<Packed, BuildError> {
         let Self { nodes, entries, spans, sphere_spans, root } = self;
         let named = |spans: Vec<Span>| -> Vec<BlockNames> {
             let name = |span: &Span| BlockNames::of(&names[span.first as usize..][..span.count as usize]);
             spans.par_iter().with_min_len(blocks::share_of(spans.len())).map(name).collect()
         };
-        let lane_cells = if cells.is_empty() { Vec::new() } else { lane_cells(&spans, &cells) };
-        drop(cells);
         let (block_names, sphere_names) = (named(spans), named(sphere_spans));
         drop(names);
         let block = |names: &BlockNames| fill_sphere_block(cloud(geometries, names.geometry), names);
@@ -642,7 +607,6 @@ impl Layout {
             entries: entries.into(),
             sphere_blocks: sphere_blocks.into(),
             sphere_names: sphere_names.into(),
-            cells: lane_cells.into(),
             root: Some(root),
         };
         packed.pack_triangles(level, geometries, false)?;
@@ -673,18 +637,6 @@ impl Layout {
         stands_for(&mut root);
         Relaid { nodes, entries, root }
     }
-}
-
-/// The cells of triangles that are in parts, lane by lane.
-fn lane_cells(spans: &[Span], cells: &[Cell]) -> Vec<LaneCell> {
-    let of_block = |(block, span): (usize, &Span)| {
-        let own = &cells[span.first as usize..][..span.count as usize];
-        let lanes = (block * BLOCK) as u32..;
-        lanes.zip(own).filter(|&(_, cell)| *cell != Cell::WHOLE).map(|(lane, &cell)| LaneCell { lane, cell })
-    };
-    let mut found: Vec<LaneCell> = spans.iter().enumerate().flat_map(of_block).collect();
-    found.shrink_to_fit();
-    found
 }
 
 fn cloud(geometries: &[Geometry], geometry: u32) -> &SphereCloud {

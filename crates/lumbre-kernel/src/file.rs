@@ -7,8 +7,8 @@
 //! A header of 256 bytes: eight bytes of magic; as u32 the version, a mark of the byte order, how many geometries and masks
 //! there are, the reference to the root, and a zero; as u64 how many elements each array has; a fingerprint of the
 //! geometries; a checksum of everything behind the header; a fingerprint of the parts of instances that were opened; and a
-//! checksum of the header before itself. Then come the arrays, each at
-//! a multiple of 64 bytes: nodes, lines of blocks (see `blocks`) and names of triangles, those of spheres, entries, parts of triangles, masks.
+//! checksum of the header before itself. Then come the arrays, each at a multiple of 64 bytes: nodes, lines of blocks (see
+//! `blocks`) and names of triangles, those of spheres, entries, masks.
 //!
 //! What a file says is checked when it is mapped: checksums, the length, every reference and every name, that all that has
 //! no place in an array is marked as such, and that the geometries are those that it was saved with. A file that somebody
@@ -26,7 +26,6 @@ use bytemuck::Pod;
 use memmap2::Mmap;
 
 use crate::blocks::{BlockNames, Line};
-use crate::carve::LaneCell;
 use crate::collapse::{Entry, Packed};
 use crate::holds::{Holds, SingleStart};
 use crate::hulls::Hulls;
@@ -44,13 +43,13 @@ use crate::{Accel, Geometry, GeometryKind, LoadError, RefitError};
 
 const MAGIC: [u8; 8] = *b"LumbMap\0";
 /// Changes with the format, and with the layout of what is in it.
-const VERSION: u32 = 7;
+const VERSION: u32 = 8;
 const BYTE_ORDER: u32 = 0x0102_0304;
 const NONE: u32 = u32::MAX;
 const HEADER: usize = 256;
 /// Where the header's own checksum stands, behind all that it is of.
 const SEAL: usize = 128;
-const ARRAYS: usize = 8;
+const ARRAYS: usize = 7;
 const ALIGNMENT: usize = 64;
 
 /// Why a file is not mapped.
@@ -186,7 +185,6 @@ fn arrays(accel: &Accel) -> [&[u8]; ARRAYS] {
         bytemuck::cast_slice(&tree.sphere_blocks),
         bytemuck::cast_slice(&tree.sphere_names),
         bytemuck::cast_slice(&tree.entries),
-        bytemuck::cast_slice(&tree.cells),
         bytemuck::cast_slice(&accel.masks),
     ]
 }
@@ -198,7 +196,6 @@ const SIZES: [usize; ARRAYS] = [
     size_of::<SphereBlock>(),
     size_of::<BlockNames>(),
     size_of::<Entry>(),
-    size_of::<LaneCell>(),
     size_of::<u32>(),
 ];
 
@@ -386,7 +383,6 @@ fn over_mapped(file: Arc<Mmap>, geometries: Vec<Geometry>) -> Result<Accel, Load
         sphere_blocks: array(&file, &header, 3)?,
         sphere_names: array(&file, &header, 4)?,
         entries: array(&file, &header, 5)?,
-        cells: array(&file, &header, 6)?,
         root: (header.root != NONE).then_some(header.root),
     };
     check_lanes(&tree)?;
@@ -398,7 +394,7 @@ fn over_mapped(file: Arc<Mmap>, geometries: Vec<Geometry>) -> Result<Accel, Load
         (places.get(numbers.start) == Some(&(leaf & tag::PLACE))).then_some(numbers)
     })?;
     check_names(&tree, &geometries)?;
-    let masks: Store<u32> = array(&file, &header, 7)?;
+    let masks: Store<u32> = array(&file, &header, 6)?;
     let units = units_of(&geometries, &parts);
     let holds = Holds::new(&geometries, parts.sizes);
     let level = Level::best();

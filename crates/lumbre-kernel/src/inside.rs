@@ -5,7 +5,6 @@ use lumbre_math::DVec3;
 
 use crate::node::tag;
 use crate::opening::Start;
-use crate::query::MetInParts;
 use crate::spheres::ExactSphere;
 use crate::stack::AsBuilt;
 use crate::traverse::{self, Ask, Found, Search};
@@ -27,7 +26,7 @@ pub(crate) fn is_inside(accel: &Accel, point: DVec3, time: f64) -> bool {
     }
     let in_solids = solids_around(accel, point, time) % 2 == 1;
     let is_odd = |direction: &&DVec3| {
-        let mut crossings = Crossings { odd: false, met: MetInParts::default() };
+        let mut crossings = Crossings { odd: false };
         traverse::search(accel.level, accel, &Ray::new(point, **direction).at_time(time), &mut crossings);
         crossings.odd
     };
@@ -117,7 +116,6 @@ fn solids_around(accel: &Accel, point: DVec3, time: f64) -> usize {
 /// The parity of the crossings of what is no solid shape.
 struct Crossings {
     odd: bool,
-    met: MetInParts,
 }
 
 impl Search<'_> for Crossings {
@@ -135,8 +133,7 @@ impl Search<'_> for Crossings {
     fn offer(&mut self, found: &Found<'_, '_>) -> bool {
         let (geometry, _) = found.what.names(found.accel);
         let crosses = found.root.multiplicity % 2 == 1;
-        let counts = crosses && !is_solid(&found.accel.geometries[geometry as usize].kind);
-        self.odd ^= counts && self.met.is_first(found);
+        self.odd ^= crosses && !is_solid(&found.accel.geometries[geometry as usize].kind);
         false
     }
 }

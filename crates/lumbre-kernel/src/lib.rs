@@ -7,7 +7,6 @@ mod bins;
 mod blocks;
 mod boxes;
 mod build;
-mod carve;
 mod clouds;
 mod collapse;
 mod deforming;

@@ -11,8 +11,7 @@
 //! largest component lies in [1, 2), and `o` lies a little before the point of the line nearest to the tree's origin, so
 //! that a ray from far away is as precise as one from nearby.
 //!
-//! A hit's point, as the leaf computed it, lies within `slop` (tree units, on each axis) of its box (of a triangle in parts,
-//! of the box of one part: the point is near to one of the triangle, and each of these is in such a box) and of the line
+//! A hit's point, as the leaf computed it, lies within `slop` (tree units, on each axis) of its box and of the line
 //! `o + s d`, for the f64 arithmetic of leaves, instances and of this set-up is wrong by a few 2⁻⁵³ of the coordinates
 //! that take part; `slop` allows 2⁻⁴⁷ of them times the condition of the transforms, and at least 2⁻⁴⁰.
 //!

@@ -125,10 +125,9 @@ pub(crate) trait Selection: Copy {
     fn lanes(&self, _names: &BlockNames) -> u32 {
         u32::MAX
     }
-    /// Whether it takes a hit, which is the crossing of this order of its primitive; where it `may_come_again`, the answer is known
-    /// the second time.
+    /// Whether it takes a hit, which is the crossing of this order of its primitive.
     #[inline(always)]
-    fn accepts(&self, _winner: &Winner, _order: u32, _may_come_again: bool) -> bool {
+    fn accepts(&self, _winner: &Winner, _order: u32) -> bool {
         true
     }
 }

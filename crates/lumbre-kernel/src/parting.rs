@@ -84,7 +84,7 @@ fn pair<'a>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bins::{BestSplit, Binning, Bins, Fill, Measure};
+    use crate::bins::{BestSplit, Binning, Bins, Fill, FindCenters};
 
     #[test]
     fn what_is_left_of_a_split_comes_first_from_any_number_of_threads() {
@@ -99,7 +99,7 @@ mod tests {
                 Bounds::new(low, low.map(|x| x + 0.001), 0, i as u32)
             };
             let primitives: Vec<Primitive> = (0..count).map(boxed).collect();
-            let (_, centers) = level.run(Measure { primitives: &primitives });
+            let centers = level.run(FindCenters { primitives: &primitives });
             let binning = Binning::new(&centers, count);
             let mut bins = Bins::EMPTY;
             level.run(Fill::<false> { primitives: &primitives, binning, bins: &mut bins, traits: &[] });

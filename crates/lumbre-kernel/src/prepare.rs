@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 use crate::boxes::Boxes;
-use crate::build::{Effort, Grown, PARALLEL, binary_tree};
+use crate::build::{Grown, PARALLEL, binary_tree};
 use crate::clouds::CloudSurvey;
 use crate::collapse::{Entry, Packed, lay_out};
 use crate::holds::{Holds, SingleStart, Sizes};
@@ -34,13 +34,13 @@ pub(crate) fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result
         return Err(BuildError::TooMany);
     }
     // Handed to a pool of threads once, not with every piece of work; what one thread does alone is not handed over at all.
-    let effort = Effort::of(options.preset);
+    let preset = options.preset;
     let mut work = 0;
     let is_much = geometries.iter().any(|geometry| {
         work += size_of_geometry(geometry);
         work > PARALLEL
     });
-    if is_much { rayon::scope(|_| build_here(geometries, effort)) } else { build_here(geometries, effort) }
+    if is_much { rayon::scope(|_| build_here(geometries, preset)) } else { build_here(geometries, preset) }
 }
 
 /// About how many primitives it has.
@@ -57,7 +57,7 @@ fn size_of_geometry(geometry: &Geometry) -> usize {
 }
 
 /// The same on the calling thread and those of its pool.
-fn build_here(geometries: Vec<Geometry>, effort: Effort) -> Result<Accel, BuildError> {
+fn build_here(geometries: Vec<Geometry>, preset: Preset) -> Result<Accel, BuildError> {
     let mut parts = take_apart(&geometries)?;
     let units = units_of(&geometries, &parts);
     let traits: Vec<Traits> = geometries.iter().map(traits_of).collect();
@@ -68,7 +68,7 @@ fn build_here(geometries: Vec<Geometry>, effort: Effort) -> Result<Accel, BuildE
     let near = |part: &Boxed| Bounds::near(&units, &part.bounds, part.geometry, part.primitive);
     let mut others: Vec<Primitive> =
         std::mem::take(&mut parts.boxed).par_iter().with_min_len(1024).map(near).collect();
-    if effort.preset != Preset::Fast {
+    if preset != Preset::Fast {
         opening::open(&mut others, &geometries, &units, room);
     }
     let packed = parts.triangles + parts.spheres;
@@ -89,12 +89,11 @@ fn build_here(geometries: Vec<Geometry>, effort: Effort) -> Result<Accel, BuildE
                 survey.put_boxes(cloud, &units, own);
             }
         }
-        let grown = binary_tree(level, effort, others, &mut primitives, &traits, &geometries, &units);
-        let Grown { tree, names, instances, cells } = grown;
+        let Grown { tree, names, instances } = binary_tree(level, preset, others, &mut primitives, &traits);
         let layout = lay_out(&traits, &tree, &names, &instances)?;
         drop((tree, instances));
         drop(primitives);
-        layout.pack(level, &units, &geometries, names, cells)?
+        layout.pack(level, &units, &geometries, names)?
     };
     let holds = Holds::new(&geometries, parts.sizes);
     let single = SingleStart::new(&holds, &units, tree.root);

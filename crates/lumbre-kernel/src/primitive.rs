@@ -92,25 +92,13 @@ impl Bounds {
         for number in &mut numbers {
             *number *= ONE as f32;
         }
-        Self::truncated::<L>(&numbers)
-    }
-
-    /// The same in fixed-point numbers.
-    #[inline(always)]
-    pub(crate) fn truncated<L: Lanes>(numbers: &[f32; 8]) -> Self {
-        Self { lanes: L::truncated(numbers) }
+        Self { lanes: L::truncated(&numbers) }
     }
 
     /// What is in both; without a size where that is nothing.
     #[inline(always)]
     pub(crate) fn common(&self, other: &Self) -> Self {
         Self { lanes: std::array::from_fn(|lane| self.lanes[lane].max(other.lanes[lane])) }
-    }
-
-    /// Where it begins and ends on an axis.
-    #[inline(always)]
-    pub(crate) fn range(&self, axis: usize) -> [i32; 2] {
-        [self.lanes[axis], -self.lanes[axis + 4]]
     }
 
     /// The nearest one to a box in space.

@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 use std::cmp::Ordering;
-use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
+use std::collections::{BTreeMap, BinaryHeap};
 
 use lumbre_geometry::{Ray, Root};
 use smallvec::SmallVec;
@@ -121,13 +121,7 @@ impl<F: FnMut(&Hit) -> bool> Filter for If<F> {
     const TAKES_ALL: bool = false;
     fn takes(&self, found: &Found) -> bool {
         let asked = &mut *self.asked.borrow_mut();
-        let is_part = match found.what {
-            What::Lane { block, lane } => {
-                found.accel.tree.is_part(found.accel.tree.block(block).number(), lane)
-            }
-            _ => false,
-        };
-        if !is_part && !asked.keeps_all {
+        if !asked.keeps_all {
             return (asked.accept)(&found.to_hit());
         }
         let (geometry, primitive) = found.what.names(found.accel);
@@ -175,45 +169,18 @@ impl<F: FnMut(&Hit) -> bool> Selection for Asking<'_, F> {
     const ASKS: bool = true;
 
     #[inline(never)]
-    fn accepts(&self, winner: &Winner, order: u32, may_come_again: bool) -> bool {
+    fn accepts(&self, winner: &Winner, order: u32) -> bool {
         let mut hit = winner.to_hit(self.accel);
         let place = self.standing.place();
         (hit.instances, hit.route) = (place.ids, place.route);
         let asked = &mut *self.filter.asked.borrow_mut();
         let name = (hit.route.clone(), hit.geometry, hit.primitive, order);
-        if may_come_again || asked.keeps_all {
+        if asked.keeps_all {
             return asked.take_once(name, || hit);
         }
         let is_taken = (asked.accept)(&hit);
         asked.latest.push((name, is_taken));
         is_taken
-    }
-}
-
-/// The triangles in parts that a search has met: it may meet more than one part of each, at the same crossing.
-#[derive(Default)]
-pub(crate) struct MetInParts {
-    met: BTreeSet<(InstancePath, u32, u32)>,
-}
-
-impl MetInParts {
-    /// Whether a crossing was not yet met.
-    #[inline]
-    pub(crate) fn is_first(&mut self, found: &Found) -> bool {
-        match found.what {
-            What::Lane { block, lane }
-                if found.accel.tree.is_part(found.accel.tree.block(block).number(), lane) =>
-            {
-                self.add(found)
-            }
-            _ => true,
-        }
-    }
-
-    #[cold]
-    fn add(&mut self, found: &Found) -> bool {
-        let (geometry, primitive) = found.what.names(found.accel);
-        self.met.insert((found.place.route.clone(), geometry, primitive))
     }
 }
 
@@ -454,14 +421,13 @@ impl<'a, F: Filter> Search<'a> for Any<'_, F> {
 /// How many hits.
 pub(crate) struct Count {
     pub(crate) hits: usize,
-    met: MetInParts,
     limit: f64,
     floor: f64,
 }
 
 impl Count {
     pub(crate) fn new(ray: &Ray) -> Self {
-        Self { hits: 0, met: MetInParts::default(), limit: ray.t_max, floor: ray.t_min }
+        Self { hits: 0, limit: ray.t_max, floor: ray.t_min }
     }
 }
 
@@ -477,8 +443,8 @@ impl Search<'_> for Count {
         self.floor
     }
 
-    fn offer(&mut self, found: &Found<'_, '_>) -> bool {
-        self.hits += usize::from(self.met.is_first(found));
+    fn offer(&mut self, _: &Found<'_, '_>) -> bool {
+        self.hits += 1;
         false
     }
 }
@@ -534,10 +500,7 @@ impl<'a> Batch<'a> {
     /// The hits in order, and whether there may be more.
     pub(crate) fn into_hits(self) -> (Vec<Ranked>, bool) {
         let is_full = self.nearest.len() == self.size;
-        let mut hits = self.nearest.into_sorted_vec();
-        // Triangles in parts; they took the places of others, but of none that is nearer than the last.
-        hits.dedup();
-        (hits, is_full)
+        (self.nearest.into_sorted_vec(), is_full)
     }
 }
 

@@ -8,23 +8,23 @@
 use lumbre_geometry::Aabb;
 
 use crate::boxes::Boxes;
-use crate::build::{Effort, Grown, PARALLEL, binary_tree};
+use crate::build::{Grown, PARALLEL, binary_tree};
 use crate::collapse::{Entry, Relaid, lay_out};
 use crate::node::tag;
 use crate::prepare::{self, take_apart};
 use crate::primitive::{Bounds, Kind, Primitive, Traits};
 use crate::refit::{Places, check_places, cost};
 use crate::triangles::BLOCK;
-use crate::{Accel, BuildOptions, occlusion};
+use crate::{Accel, BuildOptions, Preset, occlusion};
 
 /// See [`Accel::rebuild_partially`].
 pub(crate) fn rebuild_partially(accel: &mut Accel, options: &BuildOptions) -> f64 {
     let mut best = cost(&accel.tree.nodes);
     let built_cost = *accel.built_cost.get_or_insert(best);
-    let effort = Effort::of(options.preset);
+    let preset = options.preset;
     let is_much = accel.tree.names.len() + accel.tree.entries.len() > PARALLEL;
     let relaid =
-        if is_much { rayon::scope(|_| over_leaves(accel, effort)) } else { over_leaves(accel, effort) };
+        if is_much { rayon::scope(|_| over_leaves(accel, preset)) } else { over_leaves(accel, preset) };
     if let Some(Relaid { mut nodes, entries, root }) = relaid
         && let new_cost = cost(&nodes)
         && new_cost < best
@@ -39,8 +39,8 @@ pub(crate) fn rebuild_partially(accel: &mut Accel, options: &BuildOptions) -> f6
 }
 
 /// A tree of the leaves of another; `None` where there is nothing to put together, or more than a tree can name.
-fn over_leaves(accel: &Accel, effort: Effort) -> Option<Relaid> {
-    let Accel { geometries, tree, units, .. } = accel;
+fn over_leaves(accel: &Accel, preset: Preset) -> Option<Relaid> {
+    let Accel { geometries, tree, .. } = accel;
     tree.root.filter(|root| root >> tag::SHIFT == tag::INNER)?;
     let mut primitives = entries_of(accel)?;
     // Every leaf is as a geometry of its own, behind the others, with one sphere in it.
@@ -62,8 +62,7 @@ fn over_leaves(accel: &Accel, effort: Effort) -> Option<Relaid> {
         }
     }
     let nothing = &mut Boxes::empty(0);
-    let grown = binary_tree(accel.level, effort, primitives, nothing, &traits, geometries, units);
-    let Grown { tree, names, instances, .. } = grown;
+    let Grown { tree, names, instances } = binary_tree(accel.level, preset, primitives, nothing, &traits);
     let layout = lay_out(&traits, &tree, &names, &instances).ok()?;
     Some(layout.over_leaves(&names, |geometry| leaves[geometry as usize - first]))
 }

@@ -6,17 +6,16 @@ use lumbre_geometry::Aabb;
 use lumbre_math::DVec3;
 use rayon::prelude::*;
 
-use crate::blocks::{BlockNames, Blocks, TriangleBlock};
-use crate::carve::{Carver, LaneCell, cells_in, part_of};
+use crate::blocks::{BlockNames, Blocks};
 use crate::clouds::box_of;
 use crate::collapse::Entry;
 use crate::holds::Holds;
+use crate::lanes::Portable;
 use crate::node::{Node, Units, tag};
 use crate::opening::{self, Families, Start};
-use crate::prepare::{Parts, has_area, take_apart, units_of};
+use crate::prepare::{Boxer, Parts, has_area, take_apart, units_of};
 use crate::primitive::Bounds;
 use crate::spheres::{SphereBlock, has_radius};
-use crate::triangles::BLOCK;
 use crate::{Accel, BuildError, Geometry, GeometryKind, SphereCloud};
 
 /// Why a tree cannot be refitted. It is as it was before.
@@ -125,7 +124,11 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts, places: Places) {
     let Places { boxes, starts } = places;
     let geometries = &accel.geometries;
     let units = units_of(geometries, &parts);
-    let carvers = Carver::of_all(geometries, &units);
+    let boxer = |geometry: &Geometry| match &geometry.kind {
+        GeometryKind::Mesh(mesh) => Some(Boxer::new(mesh, &units)),
+        _ => None,
+    };
+    let boxers: Vec<Option<Boxer>> = geometries.iter().map(boxer).collect();
     let tree = &mut accel.tree;
     for (place, start) in starts {
         let old = tree.entries[place];
@@ -152,7 +155,7 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts, places: Places) {
     // What is in leaves, then what is above: children stand behind their parents.
     let mut node_boxes = vec![Bounds::EMPTY; tree.nodes.len()];
     let (nodes, blocks) = (tree.nodes.to_mut(), Blocks::new(&tree.blocks));
-    let (names, entries, cells) = (&*tree.names, &*tree.entries, &*tree.cells);
+    let (names, entries) = (&*tree.names, &*tree.entries);
     nodes.par_iter_mut().zip(&mut node_boxes).with_min_len(64).for_each(|(node, whole)| {
         for lane in 0..node.len() {
             let child = node.children[lane];
@@ -162,10 +165,9 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts, places: Places) {
                 tag::INNER => continue,
                 tag::TRIANGLES => {
                     for block in blocks.leaf(child) {
-                        let number = block.number() as usize;
-                        let names = &names[number];
-                        if let Some(carver) = &carvers[names.geometry as usize] {
-                            around.grow(&block_box(block, names, cells_in(cells, number), carver));
+                        let names = &names[block.number() as usize];
+                        if let Some(boxer) = &boxers[names.geometry as usize] {
+                            around.grow(&boxer.around_all::<Portable>(block.triangles()));
                         }
                     }
                 }
@@ -249,8 +251,7 @@ fn check_triangles(accel: &Accel, geometries: &[Geometry]) -> Result<(), RefitEr
     }
     for (geometry, standing) in geometries.iter().enumerate() {
         let GeometryKind::Mesh(mesh) = &standing.kind else { continue };
-        // Those in parts are named more than once.
-        if named[geometry] == mesh.indices.len() && !accel.tree.has_parts() {
+        if named[geometry] == mesh.indices.len() {
             continue;
         }
         let mut has_place = vec![false; mesh.indices.len()];
@@ -334,20 +335,6 @@ fn entry_boxes(accel: &Accel, parts: &Parts) -> Result<Places, RefitError> {
         }
     }
     Ok(Places { boxes, starts })
-}
-
-/// The box around the triangles of a block with these names, of which those in parts are `cells`.
-fn block_box(block: &TriangleBlock, names: &BlockNames, cells: &[LaneCell], carver: &Carver) -> Bounds {
-    let lane_of = |at: &LaneCell| at.lane as usize % BLOCK;
-    let is_there = |lane: usize| block.taken() >> lane & 1 != 0;
-    let is_whole = |lane: &usize| is_there(*lane) && cells.iter().all(|at| lane_of(at) != *lane);
-    let mut around = carver.around((0..BLOCK).filter(is_whole).map(|lane| block.triangle(lane)));
-    for at in cells.iter().filter(|at| is_there(lane_of(at))) {
-        // What has moved may have left a cell.
-        let part = part_of(&carver.corners(names.primitives[lane_of(at)]), &at.cell);
-        part.iter().for_each(|part| around.grow(part));
-    }
-    around
 }
 
 /// Takes the spheres over; one without a radius becomes one that is never hit.

@@ -6,14 +6,12 @@
 //! are refused, or they say how to arrange what is there. To map a tree into memory as it is, see `file`.
 //!
 //! All numbers are u32, the least byte first. The file: eight bytes of magic; the version; how many geometries, nodes, blocks,
-//! blocks of spheres, entries, masks and parts of triangles there are; the reference to the root, or 2³² - 1; for each geometry
-//! its kind and how many primitives it has; for each node how many children it has, and references to them; for each block its
-//! geometry and eight triangles, 2³² - 1 for none; for each block of spheres the same; for each entry its geometry, and which
-//! primitive (of an instance that was opened, the node of its tree where that is entered: see `opening`), with the top bit set in
-//! the last of a leaf; the masks; for each part of a triangle (see `carve`) eight times the block
-//! plus the lane that it stands in, and where its cell begins and ends on each axis, the end in the upper half. Then a checksum of
-//! eight bytes of everything before it: FNV-1a of 64 bits (G. Fowler, L. Noll, K. Vo, D. Eastlake, "The FNV Non-Cryptographic Hash
-//! Algorithm").
+//! blocks of spheres, entries and masks there are; the reference to the root, or 2³² - 1; for each geometry its kind and how many
+//! primitives it has; for each node how many children it has, and references to them; for each block its geometry and eight
+//! triangles, 2³² - 1 for none; for each block of spheres the same; for each entry its geometry, and which primitive (of an
+//! instance that was opened, the node of its tree where that is entered: see `opening`), with the top bit set in the last of a
+//! leaf; the masks. Then a checksum of eight bytes of everything before it: FNV-1a of 64 bits (G. Fowler, L. Noll, K. Vo,
+//! D. Eastlake, "The FNV Non-Cryptographic Hash Algorithm").
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -21,7 +19,6 @@ use std::ops::Range;
 
 use crate::accel::Accel;
 use crate::blocks::BlockNames;
-use crate::carve::{Cell, LaneCell, find_incomplete};
 use crate::collapse::{Entry, Packed};
 use crate::lanes::Level;
 use crate::node::{Node, WIDTH, tag};
@@ -33,7 +30,7 @@ use crate::{BuildError, Geometry, GeometryKind};
 
 const MAGIC: [u8; 8] = *b"LumbTree";
 /// Changes with the format, and with what the numbers mean.
-const VERSION: u32 = 6;
+const VERSION: u32 = 7;
 const NONE: u32 = u32::MAX;
 
 /// Why bytes are no tree over these geometries.
@@ -127,7 +124,6 @@ pub(crate) fn to_bytes(accel: &Accel) -> Vec<u8> {
     put(tree.sphere_names.len() as u32);
     put(tree.entries.len() as u32);
     put(accel.masks.len() as u32);
-    put(tree.cells.len() as u32);
     // References to triangles number blocks: where these begin is found again.
     let numbered = |reference: u32| {
         if reference >> tag::SHIFT == tag::TRIANGLES {
@@ -151,12 +147,6 @@ pub(crate) fn to_bytes(accel: &Accel) -> Vec<u8> {
         entry.to_words().into_iter().for_each(&mut put);
     }
     accel.masks.iter().copied().for_each(&mut put);
-    for LaneCell { lane, cell } in &tree.cells {
-        put(*lane);
-        for axis in 0..3 {
-            put(u32::from(cell.low[axis]) | u32::from(cell.high[axis]) << 16);
-        }
-    }
     let checksum = checksum(&bytes);
     bytes.extend_from_slice(&checksum.to_le_bytes());
     bytes
@@ -182,7 +172,7 @@ impl Words<'_> {
     }
 }
 
-const HEADER: usize = MAGIC.len() + 9 * 4;
+const HEADER: usize = MAGIC.len() + 8 * 4;
 const CHECKSUM: usize = 8;
 
 /// See [`Accel::from_bytes`].
@@ -199,16 +189,8 @@ pub(crate) fn from_bytes(bytes: &[u8], geometries: Vec<Geometry>) -> Result<Acce
     if version != VERSION {
         return Err(LoadError::OtherVersion { found: version, expected: VERSION });
     }
-    let [
-        geometry_count,
-        node_count,
-        block_count,
-        sphere_block_count,
-        entry_count,
-        mask_count,
-        cell_count,
-        root,
-    ] = words.array().unwrap_or_default();
+    let [geometry_count, node_count, block_count, sphere_block_count, entry_count, mask_count, root] =
+        words.array().unwrap_or_default();
     let counted = |count: u32, least: u64| u64::from(count) * least;
     // A node has a length and one child at least.
     let least = (HEADER + CHECKSUM) as u64
@@ -217,8 +199,7 @@ pub(crate) fn from_bytes(bytes: &[u8], geometries: Vec<Geometry>) -> Result<Acce
         + counted(block_count, 36)
         + counted(sphere_block_count, 36)
         + counted(entry_count, 8)
-        + counted(mask_count, 4)
-        + counted(cell_count, 16);
+        + counted(mask_count, 4);
     if (found as u64) < least || !found.is_multiple_of(4) {
         let expected = usize::try_from(least).unwrap_or(usize::MAX);
         return Err(LoadError::WrongLength { found, expected });
@@ -280,14 +261,6 @@ pub(crate) fn from_bytes(bytes: &[u8], geometries: Vec<Geometry>) -> Result<Acce
     for _ in 0..mask_count {
         masks.push(words.next().ok_or_else(ends)?);
     }
-    let mut cells = Vec::with_capacity(cell_count as usize);
-    for _ in 0..cell_count {
-        let lane = words.next().ok_or_else(ends)?;
-        let planes: [u32; 3] = words.array().ok_or_else(ends)?;
-        let cell = Cell { low: planes.map(|word| word as u16), high: planes.map(|word| (word >> 16) as u16) };
-        cells.push(LaneCell { lane, cell });
-    }
-    tree.cells = cells.into();
     if !words.words.is_empty() {
         return Err(LoadError::WrongLength { found, expected: found - 4 * words.words.len() });
     }
@@ -304,23 +277,6 @@ pub(crate) fn from_bytes(bytes: &[u8], geometries: Vec<Geometry>) -> Result<Acce
     let places = refit::check_places(&accel, &parts).map_err(LoadError::OtherGeometries)?;
     refit::fit(&mut accel, parts, places);
     Ok(accel)
-}
-
-/// Parts of triangles are to be in lanes that are there, in their order, and none is to be missing.
-fn check_cells(tree: &Packed) -> Result<(), LoadError> {
-    let is_sound = |at: &LaneCell| at.cell.is_sound() && at.cell != Cell::WHOLE;
-    if !tree.cells.is_sorted_by(|a, b| a.lane < b.lane) || !tree.cells.iter().all(is_sound) {
-        return inconsistent("a part of a triangle is none".to_owned());
-    }
-    let Some(parts) = tree.parts().map(|(name, cell)| Some((name?, cell))).collect::<Option<Vec<_>>>() else {
-        return inconsistent("a part of a triangle stands nowhere".to_owned());
-    };
-    match find_incomplete(parts.into_iter()) {
-        Some([geometry, triangle]) => inconsistent(format!(
-            "triangle {triangle} of geometry {geometry} lacks a part or has one too many"
-        )),
-        None => Ok(()),
-    }
 }
 
 fn inconsistent<T>(what: String) -> Result<T, LoadError> {
@@ -405,10 +361,8 @@ fn are_of_one(names: &[BlockNames]) -> Option<()> {
     names.iter().all(|block| block.geometry == names[0].geometry).then_some(())
 }
 
-/// Every primitive is to be there, and named once, or in parts that together are all of it.
+/// Every name is to be of a primitive, which is named once but for instances that were opened.
 pub(crate) fn check_names(tree: &Packed, geometries: &[Geometry]) -> Result<(), LoadError> {
-    check_cells(tree)?;
-    let mut named_in_parts = BTreeSet::new();
     // Where the primitives of each geometry begin, in one list.
     let mut starts = Vec::with_capacity(geometries.len());
     let mut all = 0;
@@ -434,12 +388,7 @@ pub(crate) fn check_names(tree: &Packed, geometries: &[Geometry]) -> Result<(), 
             let geometry = names.geometry;
             // Without anything in it, a block would be of no geometry of its kind.
             let is_right = geometries.get(geometry as usize).is_some_and(|g| signature(g)[0] == kind);
-            let lanes = (0..).zip(names.primitives).filter(|&(_, primitive)| primitive != NONE);
-            for (lane, primitive) in lanes {
-                let is_part = kind == tag::TRIANGLES && tree.is_part(block as u32, lane);
-                if is_part && !named_in_parts.insert([geometry, primitive]) {
-                    continue;
-                }
+            for primitive in names.primitives.into_iter().filter(|&primitive| primitive != NONE) {
                 if name(Some(kind), geometry, primitive).is_none() {
                     return inconsistent(format!(
                         "{what} {block} names {one} {primitive} of geometry {geometry}, which is not there or was named"
@@ -451,10 +400,11 @@ pub(crate) fn check_names(tree: &Packed, geometries: &[Geometry]) -> Result<(), 
             }
         }
     }
+    let mut opened = BTreeSet::new();
     for (place, entry) in tree.entries.iter().enumerate() {
         // Whether the parts of an instance are all of it is seen later, where their boxes are made.
         let is_part = is_part(entry, geometries);
-        if is_part && !named_in_parts.insert([entry.geometry, 0]) {
+        if is_part && !opened.insert(entry.geometry) {
             continue;
         }
         if name(None, entry.geometry, if is_part { 0 } else { entry.primitive() }).is_none() {

@@ -302,12 +302,6 @@ impl<'a> Exact<'a> {
         Outcome::Settled(root.map(|root| Winner { root, geometry, primitive }))
     }
 
-    /// Whether a triangle stands in the tree in parts, of which a ray may meet more than one.
-    #[inline(always)]
-    fn is_in_parts(&self, block: u32, lane: u32) -> bool {
-        self.accel.tree.is_part(self.triangles.block(block).number(), lane)
-    }
-
     /// Geometry and primitive of a triangle.
     #[inline(always)]
     pub(crate) fn names(&self, block: u32, lane: u32) -> (u32, u32) {
@@ -615,17 +609,17 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
             Outcome::Settled(None) => return Outcome::Settled(None),
             Outcome::Unsettled => return Outcome::Unsettled,
         };
-        Outcome::Settled(self.ask_about(ray, found, 0, self.exact.is_in_parts(block, lane)))
+        Outcome::Settled(self.ask_about(ray, found, 0))
     }
 
     /// Asks about a crossing in range, if it is nearer than the best, or as near and before it: the new best, if it is.
-    fn ask_about(&mut self, ray: &Ray, found: Winner, order: u32, may_come_again: bool) -> Option<Candidate> {
+    fn ask_about(&mut self, ray: &Ray, found: Winner, order: u32) -> Option<Candidate> {
         if let Some(best) = self.crossed()
             && !best.comes_after(found.root.t, (found.geometry, found.primitive))
         {
             return None;
         }
-        if !self.selection.accepts(&found, order, may_come_again) {
+        if !self.selection.accepts(&found, order) {
             return None;
         }
         self.crossed = Some(found);
@@ -663,7 +657,7 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
             for (order, root) in traverse::all_crossings(kind, primitive, ray).into_iter().enumerate() {
                 let found = Winner { root, geometry, primitive };
                 if ray.contains(root.t)
-                    && let Some(better) = self.ask_about(ray, found, order as u32, false)
+                    && let Some(better) = self.ask_about(ray, found, order as u32)
                 {
                     self.keep(better, way);
                 }
@@ -743,7 +737,7 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
             let roots = traverse::all_crossings(kind, primitive, ray);
             return roots.into_iter().enumerate().any(|(order, root)| {
                 ray.contains(root.t)
-                    && self.selection.accepts(&Winner { root, geometry, primitive }, order as u32, false)
+                    && self.selection.accepts(&Winner { root, geometry, primitive }, order as u32)
             });
         }
         if self.selection.faces() != Faces::Both {
@@ -773,7 +767,7 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
                     if S::ASKS {
                         match self.exact.crossing::<L>(ray, self.blocks.axes, place, lane) {
                             Outcome::Settled(Some(found)) => {
-                                if self.selection.accepts(&found, 0, self.exact.is_in_parts(place, lane)) {
+                                if self.selection.accepts(&found, 0) {
                                     return Outcome::Settled(true);
                                 }
                             }

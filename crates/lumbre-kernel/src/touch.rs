@@ -118,8 +118,6 @@ fn at_borders(touches: &[Touch]) -> Vec<usize> {
     let mesh = |i: usize| (touches[i].place.route.as_slice(), touches[i].geometry);
     order.sort_by(|&a, &b| mesh(a).cmp(&mesh(b)).then(touches[a].primitive.cmp(&touches[b].primitive)));
     let mut result = Vec::new();
-    // A triangle that is in parts may have been met more than once.
-    order.dedup_by_key(|i| (mesh(*i), touches[*i].primitive));
     for group in order.chunk_by(|&a, &b| mesh(a) == mesh(b)) {
         let mut edges: HashMap<[Position; 2], Shared> = HashMap::new();
         let key = |a: Position, b: Position| if a < b { [a, b] } else { [b, a] };

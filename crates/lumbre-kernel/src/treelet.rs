@@ -154,13 +154,11 @@ mod tests {
     use super::*;
     use crate::accel::Preset;
     use crate::boxes::Boxes;
-    use crate::build::{Effort, Grown, Name, binary_tree};
+    use crate::build::{Grown, Name, binary_tree};
     use crate::collapse::choose;
     use crate::lanes::Level;
-    use crate::node::Units;
     use crate::primitive::{Kind, Traits};
     use crate::tests::scenes::Random;
-    use lumbre_math::DVec3;
 
     /// Boxes as of a room: things of many small ones, and among them walls and boards; or, without these, all as small anywhere.
     fn boxes(count: usize, is_room: bool) -> Boxes {
@@ -188,8 +186,7 @@ mod tests {
 
     fn grow<'p>(preset: Preset, boxes: &'p mut Boxes) -> Grown<'p> {
         let traits = [Traits { kind: Kind::Triangle, cost: 4, most: 8 }];
-        let units = Units::new(DVec3::ZERO, 1.0, 1.0, 1.0);
-        binary_tree(Level::best(), Effort::of(preset), Vec::new(), boxes, &traits, &[], &units)
+        binary_tree(Level::best(), preset, Vec::new(), boxes, &traits)
     }
 
     /// Lists the nodes of a tree, left before right, and tells of every leaf; sees that boxes hold those below them.
@@ -291,9 +288,6 @@ mod tests {
         let before = area(&tree);
         let tree = reinsert_upper(tree, 1_000_000);
         assert!(area(&tree) < 0.7 * before, "{} of {before}", area(&tree));
-        check(
-            &Grown { tree, names: (0..200).map(|i| [0, i]).collect(), instances: vec![], cells: vec![] },
-            200,
-        );
+        check(&Grown { tree, names: (0..200).map(|i| [0, i]).collect(), instances: vec![] }, 200);
     }
 }

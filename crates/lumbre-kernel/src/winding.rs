@@ -6,7 +6,6 @@
 //! as in G. Barill, N. Dickson, R. Schmidt, D. Levin, A. Jacobson, "Fast Winding Numbers for Soups and Clouds", ACM
 //! Transactions on Graphics 37(4), 2018: a node's triangles become a dipole with its first and second moments.
 
-use std::collections::BTreeSet;
 use std::f64::consts::PI;
 use std::fmt;
 
@@ -19,7 +18,6 @@ use crate::nearest::Frame;
 use crate::node::{Node, WIDTH, tag};
 use crate::prepare::has_area;
 use crate::spheres::ExactSphere;
-use crate::triangles::BLOCK;
 use crate::{Accel, GeometryKind, InstancePath, PreciseMesh, TriangleMesh, precise};
 
 /// Why there is no winding number: an open shape, or custom geometry that offers none.
@@ -169,8 +167,6 @@ fn meshes_around(accel: &Accel, point: DVec3, linear: Option<DMat3>) -> f64 {
 #[derive(Debug)]
 pub(crate) struct Moments {
     nodes: Vec<Moment>,
-    /// Lanes of triangles that are in parts and stand in a lane before, in their order: a triangle counts once.
-    repeated: Vec<u32>,
 }
 
 /// Of some triangles with normals n of the length of their areas, at δ from the center.
@@ -268,19 +264,13 @@ impl Moment {
 impl Moments {
     pub(crate) fn of(accel: &Accel) -> Self {
         let tree = &accel.tree;
-        let mut named = BTreeSet::new();
-        let is_new = |name: Option<[u32; 2]>| name.is_some_and(|name| named.insert(name));
-        let news: Vec<bool> = tree.parts().map(|(name, _)| name).map(is_new).collect();
-        let repeated: Vec<u32> =
-            tree.cells.iter().zip(news).filter(|(_, is_new)| !is_new).map(|(at, _)| at.lane).collect();
         // Of every block, then of the nodes from below: children stand behind their parents.
-        let block = |(place, names): (usize, &BlockNames)| {
+        let block = |names: &BlockNames| {
             let GeometryKind::Mesh(mesh) = &accel.geometries[names.geometry as usize].kind else {
                 return Moment::NOTHING;
             };
             let from_origin = mesh.origin - accel.units.origin;
-            let there = once(&repeated, place, names);
-            let triangles = there.filter_map(|primitive| corners(mesh, from_origin, primitive as usize));
+            let triangles = triangles_of(names, mesh, from_origin);
             let mut parts = [Moment::NOTHING; WIDTH];
             let mut count = 0;
             for (part, corners) in parts.iter_mut().zip(triangles) {
@@ -289,7 +279,7 @@ impl Moments {
             }
             Moment::of_all(&parts[..count])
         };
-        let blocks: Vec<Moment> = tree.names.par_iter().enumerate().with_min_len(256).map(block).collect();
+        let blocks: Vec<Moment> = tree.names.par_iter().with_min_len(256).map(block).collect();
         let mut nodes = vec![Moment::NOTHING; tree.nodes.len()];
         let mut parts = Vec::new();
         for (place, node) in tree.nodes.iter().enumerate().rev() {
@@ -305,17 +295,14 @@ impl Moments {
                 }
             }
             nodes[place] = Moment::of_all(&parts);
-            // Boxes do not hold all of triangles that are in parts.
-            if repeated.is_empty() {
-                nodes[place].radius = nodes[place].radius.min(reach(node, accel, nodes[place].center));
-            }
+            nodes[place].radius = nodes[place].radius.min(reach(node, accel, nodes[place].center));
         }
-        Self { nodes, repeated }
+        Self { nodes }
     }
 
     /// Bytes that they take.
     pub(crate) fn memory_bytes(&self) -> usize {
-        self.nodes.capacity() * size_of::<Moment>() + self.repeated.capacity() * size_of::<u32>()
+        self.nodes.capacity() * size_of::<Moment>()
     }
 
     /// The winding number of all meshes of a tree.
@@ -339,15 +326,12 @@ impl Moments {
                     stack.extend_from_slice(&node.children[..node.len()]);
                 }
                 tag::TRIANGLES => {
-                    let places = accel.tree.numbers(reference);
-                    for (place, names) in places.clone().zip(&accel.tree.names[places]) {
+                    for names in &accel.tree.names[accel.tree.numbers(reference)] {
                         let GeometryKind::Mesh(mesh) = &accel.geometries[names.geometry as usize].kind else {
                             continue;
                         };
-                        for primitive in once(&self.repeated, place, names) {
-                            if let Some([a, b, c]) = corners(mesh, mesh.origin - point, primitive as usize) {
-                                sum += solid_angle(a, b, c);
-                            }
+                        for [a, b, c] in triangles_of(names, mesh, mesh.origin - point) {
+                            sum += solid_angle(a, b, c);
                         }
                     }
                 }
@@ -361,15 +345,10 @@ impl Moments {
     }
 }
 
-/// The triangles of a block that count there.
-fn once(repeated: &[u32], block: usize, names: &BlockNames) -> impl Iterator<Item = u32> {
-    let lanes = (block * BLOCK) as u32..;
-    lanes
-        .zip(&names.primitives)
-        .filter(|&(lane, &primitive)| {
-            primitive != u32::MAX && (repeated.is_empty() || repeated.binary_search(&lane).is_err())
-        })
-        .map(|(_, &primitive)| primitive)
+/// The corners of the triangles of a block that have an area.
+fn triangles_of(names: &BlockNames, mesh: &TriangleMesh, shift: DVec3) -> impl Iterator<Item = [DVec3; 3]> {
+    let there = names.primitives.into_iter().filter(|&primitive| primitive != u32::MAX);
+    there.filter_map(move |primitive| corners(mesh, shift, primitive as usize))
 }
 
 /// How far the boxes of a node reach from a place that is relative to the tree's origin.

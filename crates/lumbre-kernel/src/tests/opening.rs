@@ -10,7 +10,6 @@ use super::oracle::check;
 use super::scenes::{
     Balls, Random, build, cube, icosphere, options, precise, ray, soup, vertex, with_every_preset,
 };
-use crate::build::spatial::tests::IS_FORCED;
 use crate::collapse::Entry;
 use crate::opening::{Start, is_part};
 use crate::{
@@ -162,16 +161,14 @@ fn parts_of_trees_with_instances_in_them_are_found_as_by_a_loop() {
     });
 }
 
-/// Long triangles in parts lie in several parts of their tree.
 #[test]
-fn a_triangle_that_is_met_in_two_parts_of_an_instance_counts_once() {
-    let mut random = Random(303);
-    super::scenes::with_parts_everywhere(|| {
+fn long_triangles_beside_short_ones_are_found_in_opened_instances_as_by_a_loop() {
+    with_every_preset(|| {
+        let mut random = Random(303);
         let mut mesh = bar(3);
         mesh.indices.extend(bar(300).indices.iter().map(|t| t.map(|i| i + mesh.positions.len() as u32)));
         mesh.positions.extend(bar(300).positions.iter().map(|&p| p * Vec3::new(1.0, 0.9, 0.8)));
         let inner = Arc::new(build(vec![GeometryKind::Mesh(Arc::new(mesh))]));
-        assert!(inner.tree.has_parts());
         let accel = scattered(&mut random, &[inner], 20);
         assert_opened(&accel);
         check_rays(&accel, &mut random, 800);
@@ -301,11 +298,10 @@ fn instances_fill_their_nodes() {
 fn opened_trees_are_the_same_from_any_number_of_threads() {
     with_every_preset(|| {
         // Threads of a pool do not know this thread's.
-        let (options, is_forced) = (options(), IS_FORCED.get());
+        let options = options();
         let print = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| {
-                IS_FORCED.set(is_forced);
                 let mut random = Random(307);
                 let mesh = Geometry { id: 3, kind: GeometryKind::Mesh(Arc::new(bar(300))) };
                 let bar = Arc::new(Accel::build(vec![mesh], &options).unwrap());

@@ -5,9 +5,7 @@ use std::sync::Arc;
 use lumbre_geometry::Ray;
 use lumbre_math::{DVec3, Transform, Vec3};
 
-use super::scenes::{
-    Random, balls, build, cube, icosphere, mixture, ray, shape, soup, with_parts_everywhere,
-};
+use super::scenes::{Random, balls, build, cube, icosphere, mixture, ray, shape, soup, with_every_preset};
 use crate::holds::Contents;
 use crate::lanes::Level;
 use crate::{Accel, Faces, GeometryKind, Hit, Instance, QueryOptions, TriangleMesh, brute};
@@ -82,13 +80,14 @@ fn they_do_so_in_trees_that_single_precision_searches() {
     mixed.extend((0..30).map(|_| GeometryKind::Shape(shape(&mut random, CENTER, 3.0))));
     mixed.push(GeometryKind::Custom(Arc::new(balls(&mut random, 10, CENTER, 3.0, Some(CENTER.y - 2.0)))));
     for kinds in [meshes, mixed] {
-        for accel in [build(kinds.clone()), with_parts_everywhere(|| build(kinds.clone()))] {
+        with_every_preset(|| {
+            let accel = build(kinds.clone());
             assert!(accel.single.is_some());
             let masks = [0b011_0000, 0b101_0000, 0b010_0000].into_iter().cycle();
             let masks = masks.take(accel.geometries.len()).collect();
             let accel = accel.with_masks(masks);
             check(&accel, &mut random);
-        }
+        });
     }
 }
 
@@ -103,7 +102,7 @@ fn they_do_so_in_placed_trees_that_single_precision_searches() {
     let trees = meshes.map(|(mesh, radius)| {
         let other = icosphere(1, zero, radius);
         let kinds = [mesh, other].map(|mesh| GeometryKind::Mesh(Arc::new(mesh)));
-        let tree = with_parts_everywhere(|| build(kinds.to_vec()));
+        let tree = build(kinds.to_vec());
         assert!(tree.single.as_ref().is_some_and(|start| start.contents == Contents::Triangles));
         Arc::new(tree.with_masks(vec![0b011_0000, 0b101_0000]))
     });

@@ -1,5 +1,6 @@
 //! Every query against the loop over everything.
 
+use std::collections::HashSet;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -195,6 +196,48 @@ fn placed_meshes_are_found_as_by_a_loop() {
         }
         assert!(hits > 300, "{hits}");
     });
+}
+
+/// Triangles that pass through each other, in instances and beside them.
+fn soup_in_and_beside_instances(random: &mut Random) -> Accel {
+    let soup = GeometryKind::Mesh(Arc::new(soup(random, 150, CENTER, 3.0)));
+    let inner = Arc::new(build(vec![GeometryKind::Mesh(Arc::new(icosphere(2, CENTER, 2.5))), soup.clone()]));
+    let map = random.placement(CENTER, 0.5, 1.0) * Transform::translate(-CENTER);
+    let instance = |accel: &Arc<Accel>, map: Transform| {
+        GeometryKind::Instance(Instance { accel: Arc::clone(accel), world_from_object: map.into() })
+    };
+    build(vec![soup, instance(&inner, map), instance(&inner, Transform::IDENTITY)])
+}
+
+#[test]
+fn a_filter_is_asked_once_about_each_crossing() {
+    let mut random = Random(75);
+    let accel = soup_in_and_beside_instances(&mut random);
+    let mut asked = 0;
+    for _ in 0..3000 {
+        let ray = ray(&mut random, CENTER, 3.0);
+        let all = brute::every(&accel, &ray);
+        let mut names = HashSet::new();
+        let found = accel.closest_filtered(&ray, |hit| {
+            assert!(names.insert((hit.route.clone(), hit.geometry, hit.primitive)), "{hit:?} twice");
+            false
+        });
+        assert_eq!((found, names.len()), (None, all.len()));
+        names.clear();
+        accel.any_filtered(&ray, |hit| {
+            assert!(names.insert((hit.route.clone(), hit.geometry, hit.primitive)), "{hit:?} twice");
+            false
+        });
+        assert_eq!(names.len(), all.len());
+        asked += names.len();
+        let mut first = Vec::new();
+        accel.all(&ray, |hit| {
+            first.push(hit.clone());
+            if first.len() == 3 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
+        assert_eq!(first, all[..all.len().min(3)]);
+    }
+    assert!(asked > 3000, "{asked}");
 }
 
 #[test]

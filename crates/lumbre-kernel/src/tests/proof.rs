@@ -10,8 +10,7 @@ use lumbre_math::{DVec3, Transform};
 use rayon::prelude::*;
 
 use super::scenes::{
-    Random, build, bumpy, cloud, cube, icosphere, mixture, ray, shape, soup, torus, vertex,
-    with_every_preset, with_parts_everywhere,
+    Random, build, bumpy, cloud, cube, icosphere, mixture, ray, shape, soup, torus, vertex, with_every_preset,
 };
 use crate::packet::PACKET;
 use crate::{Accel, BuildOptions, Geometry, GeometryKind, Hit, Instance, Preset, TriangleMesh, brute};
@@ -73,18 +72,12 @@ const FLOCK: usize = 256;
 /// fly. Answers how many rays there were.
 fn bombard(rays: u64, seed: u64) -> u64 {
     let meshes = closed_meshes();
-    let ways = || Preset::ALL.map(|preset| (preset, false)).into_iter().chain([(Preset::Best, true)]);
-    let places = (meshes.len() * ways().count() * 4) as u64;
+    let places = (meshes.len() * Preset::ALL.len() * 4) as u64;
     let chunks_each = rays.div_ceil(places * CHUNK);
     let shot = AtomicU64::new(0);
     for (name, mesh, inside) in &meshes {
-        for (preset, is_in_parts) in ways() {
-            let trees = || placements(mesh, preset);
-            let trees = if is_in_parts { with_parts_everywhere(trees) } else { trees() };
-            for (place, (accel, map)) in trees.iter().enumerate() {
-                // A cube is but two leaves.
-                let is_large = mesh.indices.len() > 12;
-                assert!(accel.tree.has_parts() || !is_in_parts || !is_large || place > 1, "{name}");
+        for preset in Preset::ALL {
+            for (place, (accel, map)) in placements(mesh, preset).iter().enumerate() {
                 let from = map.point(*inside);
                 (0..chunks_each).into_par_iter().for_each(|chunk| {
                     let mut random = Random(seed ^ (chunk << 20) ^ (place as u64) << 8);
@@ -186,10 +179,7 @@ fn compare(rays: u64, seed: u64) -> u64 {
         } else {
             let mesh = soup(&mut random, 100, center, 3.0);
             let mesh = GeometryKind::Mesh(Arc::new(mesh));
-            match chunk as usize % 5 {
-                preset @ 0..3 => tree(mesh, Preset::ALL[preset]),
-                _ => with_parts_everywhere(|| tree(mesh, Preset::Best)),
-            }
+            tree(mesh, Preset::ALL[chunk as usize % 3])
         };
         let mut found = 0;
         for flock in 0..CHUNK as usize / FLOCK {

@@ -84,8 +84,8 @@ fn what_is_wrong_with_bytes_is_said() {
         assert!(is_said, "{cut}: {error}");
     }
     let mut later = bytes.clone();
-    later[8] = 7;
-    assert_eq!(load(&later), LoadError::OtherVersion { found: 7, expected: 6 });
+    later[8] = 8;
+    assert_eq!(load(&later), LoadError::OtherVersion { found: 8, expected: 7 });
     let mut longer = bytes.clone();
     longer.extend([0; 4]);
     assert_eq!(load(&longer), LoadError::Damaged);

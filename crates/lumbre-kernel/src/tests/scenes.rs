@@ -9,7 +9,6 @@ use lumbre_geometry::{
 };
 use lumbre_math::{DVec2, DVec3, Transform, Vec3};
 
-use crate::build::spatial::tests::IS_FORCED;
 use crate::{
     Accel, BuildOptions, CustomGeometry, Geometry, GeometryKind, Instance, PreciseMesh, Preset, SphereCloud,
     TriangleMesh,
@@ -58,23 +57,13 @@ thread_local! {
     static PRESET: Cell<Preset> = const { Cell::new(Preset::Balanced) };
 }
 
-/// Runs a test once with every preset for what it builds, and once with triangles in parts.
+/// Runs a test once with every preset for what it builds.
 pub(crate) fn with_every_preset(mut run: impl FnMut()) {
     for preset in Preset::ALL {
         PRESET.set(preset);
         run();
     }
-    with_parts_everywhere(run);
-}
-
-/// Runs a test with the best preset, and with triangles in parts wherever there can be.
-pub(crate) fn with_parts_everywhere<T>(run: impl FnOnce() -> T) -> T {
-    PRESET.set(Preset::Best);
-    IS_FORCED.set(true);
-    let result = run();
-    IS_FORCED.set(false);
     PRESET.set(Preset::default());
-    result
 }
 
 pub(crate) fn build(kinds: Vec<GeometryKind>) -> Accel {
