@@ -3,10 +3,10 @@
 use std::hint::black_box;
 use std::sync::Arc;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result};
 use lumbre_geometry::{PlacedShape, Ray, Sphere};
 use lumbre_kernel::{
-    Accel, BuildOptions, Geometry, GeometryKind, Hit, Hit32, Instance, PreciseMesh, Preset, QueryOptions,
+    Accel, BuildOptions, Geometry, GeometryKind, Hit, Hit32, Instance, PreciseMesh, Preset,
     TriangleMesh,
 };
 use lumbre_math::{DVec3, Transform, Vec3};
@@ -59,13 +59,11 @@ pub enum Asked {
     Filtered,
     /// One ray at a time, of meshes whose vertices are in double precision, too.
     OfPreciseMeshes,
-    /// One ray at a time, in single precision alone, which leaks at edges. These answers may differ.
-    Leaking,
 }
 
 impl Asked {
     /// All but the first: what else costs what.
-    pub const OTHERS: [Self; 9] = [
+    pub const OTHERS: [Self; 8] = [
         Self::ByBatches,
         Self::Fresh,
         Self::Plainly,
@@ -74,7 +72,6 @@ impl Asked {
         Self::Excluding,
         Self::Filtered,
         Self::OfPreciseMeshes,
-        Self::Leaking,
     ];
 
     fn name(self) -> &'static str {
@@ -88,7 +85,6 @@ impl Asked {
             Self::Excluding => " excluding",
             Self::Filtered => " filtered",
             Self::OfPreciseMeshes => " f64 meshes",
-            Self::Leaking => " leaking",
         }
     }
 }
@@ -119,11 +115,8 @@ impl Program for Lumbre {
 
     fn refuses(&self, scene: &Scene) -> Option<&'static str> {
         let has_meshes = !scene.meshes.is_empty() || !scene.placed_meshes.is_empty();
-        let holds_others =
-            !(scene.shapes.is_empty() && scene.placements.is_empty() && scene.sphere_count() == 0);
         match self.asked {
             Asked::OfPreciseMeshes if !has_meshes => Some("there is no mesh"),
-            Asked::Leaking if holds_others => Some("there is more than meshes"),
             _ => None,
         }
     }
@@ -146,9 +139,6 @@ impl Program for Lumbre {
         let mut accel = accel?;
         if self.asked == Asked::WithMasks {
             accel = accel.with_masks(vec![MASK_OF_ALL; count]);
-        }
-        if self.asked == Asked::Leaking {
-            ensure!(accel.leak(), "there is no leaking search of this tree on this machine");
         }
         let tree = Queried { accel, asked: self.asked, precision: self.precision, nowhere: nowhere()? };
         Ok(Built { tree: Box::new(tree), seconds, bytes })
@@ -265,12 +255,12 @@ impl Tree for Queried {
     }
 }
 
-fn masked() -> QueryOptions<'static> {
-    QueryOptions { mask: MASK_ASKED, ..QueryOptions::default() }
+fn masked() -> lumbre_kernel::Query<'static> {
+    lumbre_kernel::Query::new().mask(MASK_ASKED)
 }
 
-fn excluding(hit: &Hit) -> QueryOptions<'_> {
-    QueryOptions { exclude: Some(hit), ..QueryOptions::default() }
+fn excluding(hit: &Hit) -> lumbre_kernel::Query<'_> {
+    lumbre_kernel::Query::new().exclude(hit)
 }
 
 /// What is written down of a hit: about what Embree writes.
@@ -350,12 +340,13 @@ impl Pass for Closest<'_> {
         }
         match asked {
             Asked::Fresh => self.each(|ray| accel.closest(&written_now(ray))),
-            Asked::Plainly => self.each(|ray| accel.closest_plainly(ray)),
-            Asked::WithOptions => self.each(|ray| accel.closest_with(ray, &QueryOptions::default())),
+            Asked::Plainly => self.each(|ray| accel.closest_exact(ray)),
+            Asked::WithOptions => self.each(|ray| accel.closest_with(ray, &lumbre_kernel::Query::new())),
             Asked::WithMasks => self.each(|ray| accel.closest_with(ray, &masked())),
             Asked::Excluding => self.each(|ray| accel.closest_with(ray, &excluding(nowhere))),
             Asked::Filtered => {
-                self.each(|ray| accel.closest_filtered(ray, |hit| hit.primitive != nowhere.primitive))
+                let accept = |hit: &Hit| hit.primitive != nowhere.primitive;
+                self.each(|ray| accel.closest_with(ray, &lumbre_kernel::Query::new().filter(&accept)));
             }
             _ => self.each(|ray| accel.closest(ray)),
         }
@@ -397,12 +388,13 @@ impl Pass for Any<'_> {
         }
         match asked {
             Asked::Fresh => self.each(|ray| accel.any(&written_now(ray))),
-            Asked::Plainly => self.each(|ray| accel.any_plainly(ray)),
-            Asked::WithOptions => self.each(|ray| accel.any_with(ray, &QueryOptions::default())),
+            Asked::Plainly => self.each(|ray| accel.any_exact(ray)),
+            Asked::WithOptions => self.each(|ray| accel.any_with(ray, &lumbre_kernel::Query::new())),
             Asked::WithMasks => self.each(|ray| accel.any_with(ray, &masked())),
             Asked::Excluding => self.each(|ray| accel.any_with(ray, &excluding(nowhere))),
             Asked::Filtered => {
-                self.each(|ray| accel.any_filtered(ray, |hit| hit.primitive != nowhere.primitive))
+                let accept = |hit: &Hit| hit.primitive != nowhere.primitive;
+                self.each(|ray| accel.any_with(ray, &lumbre_kernel::Query::new().filter(&accept)));
             }
             _ => self.each(|ray| accel.any(ray)),
         }

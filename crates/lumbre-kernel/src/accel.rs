@@ -9,22 +9,21 @@ use std::sync::OnceLock;
 use lumbre_geometry::{Aabb, Ray, Surface};
 use lumbre_math::{DVec3, Transform};
 
-use crate::anything::{self, Sought};
-use crate::batch::Ends;
 use crate::collapse::{Entry, Packed};
-use crate::holds::{Contents, Holds, SingleStart};
+use crate::holds::{Holds, SingleStart};
 use crate::hulls::Hulls;
-use crate::lanes::{self, Level};
-use crate::narrow::{self, NarrowQuestions};
+use crate::lanes::Level;
 use crate::node::{Units, tag};
-use crate::query::{All, Any, Batch, Closest, Count, Filter, If};
-use crate::single::{self, Nearest, Outcome, Questions, Whether, Winner};
-use crate::traverse::{Place, Standing};
+use crate::trace::f32_ray::{self, F32Queries};
+use crate::trace::filtered::{self, Queries};
+use crate::trace::stack::{AnyHit, ClosestHit};
+use crate::trace::visitors::{Count, NextHits};
+use crate::trace::{ContextRef, Outcome, exact};
 use crate::winding::{self, Moments};
 use crate::{
     ClosestPoint, Geometry, GeometryKind, Hit, Hit32, LoadError, MapError, NoClosestPoint, NoWindingNumber,
-    QueryOptions, Ray32, RefitError, SphereCloud, batch, file, inside, nearest, prepare, rebuild, refit,
-    save, surface, traverse,
+    Query, Ray32, RefitError, SphereCloud, batch, file, inside, nearest, prepare, rebuild, refit, save,
+    surface,
 };
 
 /// A bounding volume hierarchy over geometries, ready for queries from any number of threads.
@@ -42,12 +41,11 @@ pub struct Accel {
     pub(crate) primitives: usize,
     pub(crate) level: Level,
     pub(crate) holds: Holds,
-    /// Where single precision can search the tree.
+    /// Where single precision can traverse the tree.
     pub(crate) single: Option<SingleStart>,
-    /// What is asked of it at the best level.
-    pub(crate) questions: Questions,
-    /// The same of rays in single precision.
-    pub(crate) narrow_questions: NarrowQuestions,
+    pub(crate) queries: Queries,
+    /// Those of rays in single precision, where these are not asked in double.
+    pub(crate) f32_queries: Option<F32Queries>,
     /// What is asked of shapes first.
     pub(crate) hulls: Hulls,
     /// What a ray cost after the build, once that was asked for.
@@ -185,8 +183,8 @@ impl Accel {
     /// Makes anew what searches keep of the tree, which has changed.
     pub(crate) fn follow_tree(&mut self) {
         self.single = SingleStart::new(&self.holds, &self.units, self.tree.root);
-        self.questions = Questions::new(self.level, self.single.as_ref());
-        self.narrow_questions = NarrowQuestions::new(self.level, self.single.as_ref());
+        self.queries = Queries::new(self.level, self.single.as_ref());
+        self.f32_queries = F32Queries::new(self.level, self.single.as_ref());
         self.hulls = Hulls::new(&self.geometries, &self.tree.entries, &self.units);
         self.moments = OnceLock::new();
     }
@@ -236,337 +234,60 @@ impl Accel {
         file::map(path.as_ref(), geometries)
     }
 
-    /// The nearest hit in the ray's range. Of hits at the same `t`, the one whose (path, geometry, primitive) comes
+    /// The closest hit in the ray's range. Of hits at the same `t`, the one whose (path, geometry, primitive) comes
     /// first, by positions in the lists that the trees were built from.
     #[inline]
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
-        self.questions.closest.ask(self, ray)
-    }
-
-    /// The nearest hit of a ray in single precision: faster than [`Accel::closest`], and as watertight.
-    ///
-    /// A tree of nothing but meshes answers in single precision. It meets the triangles as they are seen from the ray, with their
-    /// corners rounded: a ray that passes through a closed mesh meets it, at edges and corners, too, which belong to all triangles that
-    /// have them. The point at `t` lies within some 2⁻²⁰ of its distance and of the tree's size from the triangle; so near to an edge,
-    /// another triangle may be met than in double precision, and where a triangle is seen nearly on edge, `t` may differ by more. Of hits
-    /// at the same `t`, the one whose geometry and primitive come first is the answer. It is the same on any machine, and however the
-    /// tree was built.
-    ///
-    /// Other trees, and rays that come from afar (sixteen sizes of the tree), answer in double precision; the answer is rounded.
-    #[inline]
-    pub fn closest_f32(&self, ray: &Ray32) -> Option<Hit32> {
-        self.narrow_questions.closest.ask(self, ray)
-    }
-
-    /// Whether a ray in single precision hits anything in its range: whether there is an answer of [`Accel::closest_f32`].
-    #[inline]
-    pub fn any_f32(&self, ray: &Ray32) -> bool {
-        self.narrow_questions.any.ask(self, ray)
-    }
-
-    #[cfg(test)]
-    pub(crate) fn closest_f32_at(&self, level: Level, ray: &Ray32) -> Option<Hit32> {
-        NarrowQuestions::new(level, self.single.as_ref()).closest.ask(self, ray)
-    }
-
-    #[cfg(test)]
-    pub(crate) fn any_f32_at(&self, level: Level, ray: &Ray32) -> bool {
-        NarrowQuestions::new(level, self.single.as_ref()).any.ask(self, ray)
-    }
-
-    /// [`Accel::closest_f32`] for every ray, with the same answers to the bit; `hits` has a place for each.
-    ///
-    /// Which go together and which are in flight: as in [`Accel::closest_batch`].
-    ///
-    /// # Panics
-    /// When `rays` and `hits` differ in length.
-    pub fn closest_batch_f32(&self, rays: &[Ray32], hits: &mut [Option<Hit32>]) {
-        self.closest_batch_f32_at(self.level, rays, hits);
-    }
-
-    pub(crate) fn closest_batch_f32_at(&self, level: Level, rays: &[Ray32], hits: &mut [Option<Hit32>]) {
-        assert_eq!(rays.len(), hits.len(), "a place for the hit of every ray");
-        narrow::search_all::<narrow::Closest>(level, self, rays, hits);
-    }
-
-    /// [`Accel::any_f32`] for every ray: see [`Accel::closest_batch_f32`].
-    ///
-    /// # Panics
-    /// When `rays` and `hits` differ in length.
-    pub fn any_batch_f32(&self, rays: &[Ray32], hits: &mut [bool]) {
-        self.any_batch_f32_at(self.level, rays, hits);
-    }
-
-    pub(crate) fn any_batch_f32_at(&self, level: Level, rays: &[Ray32], hits: &mut [bool]) {
-        assert_eq!(rays.len(), hits.len(), "a place for the answer of every ray");
-        narrow::search_all::<narrow::Any>(level, self, rays, hits);
-    }
-
-    #[cfg(test)]
-    pub(crate) fn closest_at(&self, level: Level, ray: &Ray) -> Option<Hit> {
-        self.questions_at(level).closest.ask(self, ray)
-    }
-
-    /// The same by the search that knows no other precision than double.
-    #[inline(never)]
-    pub(crate) fn closest_plainly_at(&self, level: Level, ray: &Ray) -> Option<Hit> {
-        let mut search = Closest::new(ray, &All);
-        traverse::search(level, self, ray, &mut search);
-        search.take_hit()
-    }
-
-    /// [`Accel::closest`] by the search that knows no other precision than double: the same answer to the bit. To be
-    /// measured beside it.
-    #[doc(hidden)]
-    pub fn closest_plainly(&self, ray: &Ray) -> Option<Hit> {
-        self.closest_plainly_at(self.level, ray)
-    }
-
-    /// [`Accel::closest`] and [`Accel::any`] as they would be if triangles were met in single precision alone and boxes had no margin:
-    /// rays may then pass between two triangles, and answers are rounded. To be measured beside them; whether there is such a thing
-    /// for this tree and on this machine.
-    #[cfg(feature = "measure")]
-    #[doc(hidden)]
-    pub fn leak(&mut self) -> bool {
-        let leaking = Questions::leaking(self.level, self.single.as_ref());
-        if let Some(leaking) = leaking {
-            self.questions = leaking;
-        }
-        leaking.is_some()
-    }
-
-    /// [`Accel::closest`] among what the options leave. Of the crossings of a shape, each is asked by itself.
-    #[inline]
-    pub fn closest_with(&self, ray: &Ray, options: &QueryOptions) -> Option<Hit> {
-        if options.take_all(self) {
-            self.closest(ray)
-        } else {
-            self.closest_with_at(self.level, ray, options)
-        }
-    }
-
-    pub(crate) fn closest_with_at(&self, level: Level, ray: &Ray, options: &QueryOptions) -> Option<Hit> {
-        if let Outcome::Settled(found) = self.ask_singly::<Nearest, _>(level, ray, options) {
-            return found;
-        }
-        self.closest_with_plainly_at(level, ray, options)
-    }
-
-    /// The same by the search that knows no other precision than double.
-    #[inline(never)]
-    pub(crate) fn closest_with_plainly_at(
-        &self,
-        level: Level,
-        ray: &Ray,
-        options: &QueryOptions,
-    ) -> Option<Hit> {
-        let mut search = Closest::new(ray, options);
-        traverse::search(level, self, ray, &mut search);
-        search.take_hit()
-    }
-
-    /// [`Accel::any`] among what the options leave.
-    #[inline]
-    pub fn any_with(&self, ray: &Ray, options: &QueryOptions) -> bool {
-        if options.take_all(self) { self.any(ray) } else { self.any_with_at(self.level, ray, options) }
-    }
-
-    pub(crate) fn any_with_at(&self, level: Level, ray: &Ray, options: &QueryOptions) -> bool {
-        if let Outcome::Settled(is_hit) = self.ask_singly::<Whether, _>(level, ray, options) {
-            return is_hit;
-        }
-        self.any_with_plainly_at(level, ray, options)
-    }
-
-    /// The same by the search that knows no other precision than double.
-    #[inline(never)]
-    pub(crate) fn any_with_plainly_at(&self, level: Level, ray: &Ray, options: &QueryOptions) -> bool {
-        let mut search = Any::new(ray, options);
-        traverse::search(level, self, ray, &mut search);
-        search.is_hit
-    }
-
-    /// The tree with a mask for each of its geometries, by position, for [`QueryOptions::mask`]; without, all bits are set.
-    /// They are saved with it, and stay through a refit.
-    ///
-    /// # Panics
-    /// When there are not as many masks as geometries.
-    #[must_use]
-    pub fn with_masks(self, masks: Vec<u32>) -> Self {
-        assert_eq!(masks.len(), self.geometries.len(), "a mask for each geometry");
-        Self { masks, ..self }
-    }
-
-    /// [`Accel::closest`] for every ray, with the same answers to the bit; `hits` has a place for each.
-    ///
-    /// In a tree of triangles, or of shapes too, sixteen rays in a row that are much alike (those of a square of four by four pixels,
-    /// say, rather than of sixteen pixels in a line) are traced together, which takes down to two fifths of the time. There, many of the
-    /// others are in flight at the same time, where there are enough of them: in a tree that the nearest caches hold, from about a
-    /// hundred on, so that a thousand rays or more at a time are answered soonest. In a tree of nothing but clouds of spheres that have one
-    /// origin, all of them are. In trees of anything else, the others are traced one after another; without AVX2, they are in all trees but
-    /// large ones of triangles or of spheres. It works on the calling thread: to use more, split `rays` and `hits`.
-    ///
-    /// # Panics
-    /// When `rays` and `hits` differ in length.
-    pub fn closest_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
-        self.closest_batch_at(self.level, rays, hits);
-    }
-
-    pub(crate) fn closest_batch_at(&self, level: Level, rays: &[Ray], hits: &mut [Option<Hit>]) {
-        assert_eq!(rays.len(), hits.len(), "a place for the hit of every ray");
-        let Some(start) = &self.single else {
-            let asked = self.questions_at(level).closest;
-            hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = asked.ask(self, ray));
-            return;
-        };
-        let ends = Answers { accel: self, level, rays, places: hits };
-        if start.contents == Contents::Anything {
-            batch::search_anything::<Nearest, _>(level, self, start, rays, ends);
-        } else {
-            batch::search_all::<Nearest>(level, self, start, rays, ends);
-        }
-    }
-
-    /// [`Accel::any`] for every ray: see [`Accel::closest_batch`].
-    ///
-    /// # Panics
-    /// When `rays` and `hits` differ in length.
-    pub fn any_batch(&self, rays: &[Ray], hits: &mut [bool]) {
-        self.any_batch_at(self.level, rays, hits);
-    }
-
-    pub(crate) fn any_batch_at(&self, level: Level, rays: &[Ray], hits: &mut [bool]) {
-        assert_eq!(rays.len(), hits.len(), "a place for the answer of every ray");
-        let Some(start) = &self.single else {
-            let asked = self.questions_at(level).any;
-            hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = asked.ask(self, ray));
-            return;
-        };
-        let ends = Answers { accel: self, level, rays, places: hits };
-        if start.contents == Contents::Anything {
-            batch::search_anything::<Whether, _>(level, self, start, rays, ends);
-        } else {
-            batch::search_all::<Whether>(level, self, start, rays, ends);
-        }
-    }
-
-    /// Puts what comes of rays in flight, once each, and tells how many the plain search had to answer. It is the search that batches take:
-    /// what takes answers otherwise has a search of its own compiled, at every level.
-    #[cfg(test)]
-    pub(crate) fn fly_at<'a, G: single::Goal, T>(
-        &'a self,
-        level: Level,
-        rays: &'a [Ray],
-        places: &'a mut [T],
-        flying: batch::Flying,
-    ) -> usize
-    where
-        Answers<'a, T>: Ends<G::Answer>,
-    {
-        let start = self.single.as_ref().expect("what single precision searches");
-        let ends = Answers { accel: self, level, rays, places };
-        ANSWERED.set([0; 2]);
-        batch::search_as_said::<G>(level, self, start, rays, ends, Some(flying), false);
-        let [all, plainly] = ANSWERED.get();
-        assert_eq!(all, rays.len(), "each once");
-        plainly
-    }
-
-    fn questions_at(&self, level: Level) -> Questions {
-        if level == self.level { self.questions } else { Questions::new(level, self.single.as_ref()) }
-    }
-
-    /// The nearest hit that `accept` takes; it may be asked in any order of `t`, but about no crossing twice, and its answer must
-    /// depend on the hit alone.
-    pub fn closest_filtered(&self, ray: &Ray, mut accept: impl FnMut(&Hit) -> bool) -> Option<Hit> {
-        self.closest_filtered_at(self.level, ray, &mut accept)
-    }
-
-    pub(crate) fn closest_filtered_at(
-        &self,
-        level: Level,
-        ray: &Ray,
-        accept: &mut dyn FnMut(&Hit) -> bool,
-    ) -> Option<Hit> {
-        let filter = If::new(accept);
-        if let Outcome::Settled(found) = self.ask_singly::<Nearest, _>(level, ray, &filter) {
-            return found;
-        }
-        let mut search = Closest::new(ray, &filter);
-        traverse::search(level, self, ray, &mut search);
-        search.take_hit()
+        self.queries.closest.ask(self, ray)
     }
 
     /// Whether anything is hit in the ray's range.
     #[inline]
     pub fn any(&self, ray: &Ray) -> bool {
-        self.questions.any.ask(self, ray)
+        self.queries.any.ask(self, ray)
     }
 
-    #[cfg(test)]
-    pub(crate) fn any_at(&self, level: Level, ray: &Ray) -> bool {
-        self.questions_at(level).any.ask(self, ray)
+    /// [`Accel::closest`] among what a query takes into account. Of a shape, each crossing counts by itself.
+    #[inline]
+    pub fn closest_with(&self, ray: &Ray, query: &Query) -> Option<Hit> {
+        if query.takes_all(self) { self.closest(ray) } else { self.closest_with_at(self.level, ray, query) }
     }
 
-    /// The same by the search that knows no other precision than double.
-    #[inline(never)]
-    pub(crate) fn any_plainly_at(&self, level: Level, ray: &Ray) -> bool {
-        let mut search = Any::new(ray, &All);
-        traverse::search(level, self, ray, &mut search);
-        search.is_hit
+    /// [`Accel::any`] among what a query takes into account.
+    #[inline]
+    pub fn any_with(&self, ray: &Ray, query: &Query) -> bool {
+        if query.takes_all(self) { self.any(ray) } else { self.any_with_at(self.level, ray, query) }
     }
 
-    /// [`Accel::any`] by the search that knows no other precision than double. To be measured beside it.
+    pub(crate) fn closest_with_at(&self, level: Level, ray: &Ray, query: &Query) -> Option<Hit> {
+        match filtered::with_query::<ClosestHit>(level, self, ray, query) {
+            Outcome::Certain(found) => found.into_hit(self, ContextRef::OUTSIDE),
+            Outcome::Uncertain => exact::closest(level, self, ray, Some(query)),
+        }
+    }
+
+    pub(crate) fn any_with_at(&self, level: Level, ray: &Ray, query: &Query) -> bool {
+        match filtered::with_query::<AnyHit>(level, self, ray, query) {
+            Outcome::Certain(found) => found.winner.is_some(),
+            Outcome::Uncertain => exact::any(level, self, ray, Some(query)),
+        }
+    }
+
+    /// [`Accel::closest`] by double precision alone: the same answer to the bit, slower. To be measured beside it.
     #[doc(hidden)]
-    pub fn any_plainly(&self, ray: &Ray) -> bool {
-        self.any_plainly_at(self.level, ray)
+    pub fn closest_exact(&self, ray: &Ray) -> Option<Hit> {
+        exact::closest(self.level, self, ray, None)
     }
 
-    /// Whether anything that `accept` takes, asked as by [`Accel::closest_filtered`], is hit in the ray's range.
-    pub fn any_filtered(&self, ray: &Ray, mut accept: impl FnMut(&Hit) -> bool) -> bool {
-        self.any_filtered_at(self.level, ray, &mut accept)
-    }
-
-    /// Among what a filter takes, in single precision; where that cannot tell, a filter that asks keeps what was answered.
-    fn ask_singly<G: Sought, F: Filter>(&self, level: Level, ray: &Ray, filter: &F) -> Outcome<G::Found> {
-        // What is left out among spheres is for the plain search: no filter is asked before.
-        let Some(start) = self.single.as_ref().filter(|start| start.contents != Contents::Spheres) else {
-            return Outcome::Unsettled;
-        };
-        let found = if start.contents == Contents::Anything {
-            anything::search::<G, F>(level, self, start, ray, filter)
-        } else {
-            let place = Place::default();
-            let selection = filter.select(self, Standing::at(&place));
-            match single::search_among::<G, _>(level, self, start, ray, selection) {
-                Outcome::Settled(answer) => Outcome::Settled(G::found(self, answer)),
-                Outcome::Unsettled => Outcome::Unsettled,
-            }
-        };
-        if matches!(found, Outcome::Unsettled) {
-            filter.keep_answers();
-        }
-        found
-    }
-
-    pub(crate) fn any_filtered_at(
-        &self,
-        level: Level,
-        ray: &Ray,
-        accept: &mut dyn FnMut(&Hit) -> bool,
-    ) -> bool {
-        let filter = If::new(accept);
-        if let Outcome::Settled(is_hit) = self.ask_singly::<Whether, _>(level, ray, &filter) {
-            return is_hit;
-        }
-        let mut search = Any::new(ray, &filter);
-        traverse::search(level, self, ray, &mut search);
-        search.is_hit
+    /// [`Accel::any`] by double precision alone. To be measured beside it.
+    #[doc(hidden)]
+    pub fn any_exact(&self, ray: &Ray) -> bool {
+        exact::any(self.level, self, ray, None)
     }
 
     /// Every hit in the ray's range in ascending order of `t` (ties by path, geometry, primitive), until `visit` breaks.
     ///
-    /// Hits are sought in batches of 32, 128, 512 and so on, so that an early end costs little and memory is at most
+    /// Hits are found 32, 128, 512 and so on at a time, so that an early end costs little and memory is at most
     /// proportional to the hits visited.
     pub fn all(&self, ray: &Ray, visit: impl FnMut(&Hit) -> ControlFlow<()>) {
         self.all_at(self.level, ray, visit);
@@ -576,9 +297,9 @@ impl Accel {
         let mut size = 32;
         let mut last = None;
         loop {
-            let mut search = Batch::new(ray, size, last.as_ref());
-            traverse::search(level, self, ray, &mut search);
-            let (mut hits, may_go_on) = search.into_hits();
+            let mut visitor = NextHits::new(ray, size, last.as_ref());
+            exact::traverse(level, self, ray, &mut visitor);
+            let (mut hits, may_go_on) = visitor.into_hits();
             if hits.iter().any(|ranked| visit(&ranked.hit).is_break()) || !may_go_on {
                 return;
             }
@@ -593,9 +314,110 @@ impl Accel {
     }
 
     pub(crate) fn count_at(&self, level: Level, ray: &Ray) -> usize {
-        let mut search = Count::new(ray);
-        traverse::search(level, self, ray, &mut search);
-        search.hits
+        let mut visitor = Count::new(ray);
+        exact::traverse(level, self, ray, &mut visitor);
+        visitor.hits
+    }
+
+    /// The closest hit of a ray in single precision: faster than [`Accel::closest`], and as watertight.
+    ///
+    /// A tree of nothing but meshes answers in single precision. It tests the triangles as they are seen from the ray, with their
+    /// corners rounded: a ray that passes through a closed mesh hits it, at edges and corners, too, which belong to all triangles that
+    /// have them. The point at `t` lies within some 2⁻²⁰ of its distance and of the tree's size from the triangle; so near to an edge,
+    /// another triangle may be hit than in double precision, and where a triangle is seen nearly on edge, `t` may differ by more. Of hits
+    /// at the same `t`, the one whose geometry and primitive come first is the answer. It is the same on any machine, and however the
+    /// tree was built.
+    ///
+    /// Other trees, and rays that come from afar (sixteen sizes of the tree), answer in double precision; the answer is rounded.
+    #[inline]
+    pub fn closest_f32(&self, ray: &Ray32) -> Option<Hit32> {
+        match &self.f32_queries {
+            Some(queries) => queries.closest.ask(self, ray),
+            None => self.closest_widened(ray),
+        }
+    }
+
+    /// Whether a ray in single precision hits anything in its range: whether there is an answer of [`Accel::closest_f32`].
+    #[inline]
+    pub fn any_f32(&self, ray: &Ray32) -> bool {
+        match &self.f32_queries {
+            Some(queries) => queries.any.ask(self, ray),
+            None => self.any_widened(ray),
+        }
+    }
+
+    /// [`Accel::closest`] of a ray in single precision, rounded.
+    #[inline(never)]
+    pub(crate) fn closest_widened(&self, ray: &Ray32) -> Option<Hit32> {
+        self.closest(&ray.to_f64()).as_ref().map(f32_ray::rounded)
+    }
+
+    /// [`Accel::any`] of a ray in single precision.
+    #[inline(never)]
+    pub(crate) fn any_widened(&self, ray: &Ray32) -> bool {
+        self.any(&ray.to_f64())
+    }
+
+    /// [`Accel::closest`] for every ray, with the same answers to the bit; `hits` has a slot for each.
+    ///
+    /// In a tree with triangles, sixteen rays in a row that are coherent (those of a square of four by four pixels, rather than of
+    /// sixteen pixels in a line) are traversed as a packet, which takes down to two fifths of the time; many of the others are
+    /// interleaved. A thousand rays or more at a time are answered fastest. Leaves of anything but triangles, and all trees on a machine
+    /// without AVX2, are traversed ray by ray. It works on the calling thread: to use more, split `rays` and `hits`.
+    ///
+    /// # Panics
+    /// When `rays` and `hits` differ in length.
+    pub fn closest_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        assert_eq!(rays.len(), hits.len(), "a slot for the hit of every ray");
+        batch::closest(self.level, self, rays, hits);
+    }
+
+    /// [`Accel::any`] for every ray: see [`Accel::closest_batch`].
+    ///
+    /// # Panics
+    /// When `rays` and `hits` differ in length.
+    pub fn any_batch(&self, rays: &[Ray], hits: &mut [bool]) {
+        assert_eq!(rays.len(), hits.len(), "a slot for the answer of every ray");
+        batch::any(self.level, self, rays, hits);
+    }
+
+    /// [`Accel::closest_f32`] for every ray: see [`Accel::closest_batch`].
+    ///
+    /// # Panics
+    /// When `rays` and `hits` differ in length.
+    pub fn closest_batch_f32(&self, rays: &[Ray32], hits: &mut [Option<Hit32>]) {
+        assert_eq!(rays.len(), hits.len(), "a slot for the hit of every ray");
+        batch::closest_f32(self.level, self, rays, hits);
+    }
+
+    /// [`Accel::any_f32`] for every ray: see [`Accel::closest_batch`].
+    ///
+    /// # Panics
+    /// When `rays` and `hits` differ in length.
+    pub fn any_batch_f32(&self, rays: &[Ray32], hits: &mut [bool]) {
+        assert_eq!(rays.len(), hits.len(), "a slot for the answer of every ray");
+        batch::any_f32(self.level, self, rays, hits);
+    }
+
+    /// The tree with a mask for each of its geometries, by position, for [`Query::mask`]; without, all bits are set.
+    /// They are saved with it, and stay through a refit.
+    ///
+    /// # Panics
+    /// When there are not as many masks as geometries.
+    #[must_use]
+    pub fn with_masks(self, masks: Vec<u32>) -> Self {
+        assert_eq!(masks.len(), self.geometries.len(), "a mask for each geometry");
+        Self { masks, ..self }
+    }
+
+    /// The queries at an instruction set.
+    pub(crate) fn queries_at(&self, level: Level) -> Queries {
+        if level == self.level { self.queries } else { Queries::new(level, self.single.as_ref()) }
+    }
+
+    /// The same in single precision; `None` where they are asked in double.
+    pub(crate) fn f32_queries_at(&self, level: Level) -> Option<F32Queries> {
+        if level == self.level { self.f32_queries } else { F32Queries::new(level, self.single.as_ref()) }
     }
 
     /// The nearest point of all surfaces within `max_distance` (itself included; infinite for anywhere), or `None` where there
@@ -739,6 +561,14 @@ impl Accel {
         }
     }
 
+    /// The corners of a triangle in double precision.
+    pub(crate) fn precise_corners(&self, geometry: u32, primitive: u32) -> [DVec3; 3] {
+        match &self.geometries[geometry as usize].kind {
+            GeometryKind::PreciseMesh(mesh) => mesh.corners(primitive),
+            _ => unreachable!("the leaf says so"),
+        }
+    }
+
     /// A cloud of spheres.
     #[inline(always)]
     pub(crate) fn cloud(&self, geometry: u32) -> &SphereCloud {
@@ -753,69 +583,5 @@ impl Accel {
     pub(crate) fn instance_entry(&self, index: usize) -> &Entry {
         let inside = &self.tree.entries;
         inside.get(index).unwrap_or_else(|| &self.infinite[index - inside.len()])
-    }
-}
-
-/// The places for what came of a batch of rays.
-pub(crate) struct Answers<'a, T> {
-    accel: &'a Accel,
-    level: Level,
-    rays: &'a [Ray],
-    places: &'a mut [T],
-}
-
-#[cfg(test)]
-thread_local! {
-    /// How many rays of batches were answered, and how many of them by the plain search.
-    static ANSWERED: std::cell::Cell<[usize; 2]> = const { std::cell::Cell::new([0; 2]) };
-}
-
-/// Counts a ray of a batch.
-#[cfg(test)]
-fn count<A>(outcome: &Outcome<A>) {
-    let [all, plainly] = ANSWERED.get();
-    ANSWERED.set([all + 1, plainly + usize::from(matches!(outcome, Outcome::Unsettled))]);
-}
-
-impl Ends<Option<Winner>> for Answers<'_, Option<Hit>> {
-    #[inline(always)]
-    fn put(&mut self, position: usize, outcome: Outcome<Option<Winner>>) {
-        #[cfg(test)]
-        count(&outcome);
-        let place = &mut self.places[position];
-        match outcome {
-            Outcome::Settled(Some(winner)) => winner.put(self.accel, place),
-            Outcome::Settled(None) => *place = None,
-            Outcome::Unsettled => *place = self.accel.closest_plainly_at(self.level, &self.rays[position]),
-        }
-    }
-
-    #[inline(always)]
-    fn fetch(&self, position: usize) {
-        self.places.get(position).map(lanes::fetch);
-    }
-}
-
-impl Ends<Option<Hit>> for Answers<'_, Option<Hit>> {
-    #[inline(always)]
-    fn put(&mut self, position: usize, outcome: Outcome<Option<Hit>>) {
-        #[cfg(test)]
-        count(&outcome);
-        self.places[position] = match outcome {
-            Outcome::Settled(hit) => hit,
-            Outcome::Unsettled => self.accel.closest_plainly_at(self.level, &self.rays[position]),
-        };
-    }
-}
-
-impl Ends<bool> for Answers<'_, bool> {
-    #[inline(always)]
-    fn put(&mut self, position: usize, outcome: Outcome<bool>) {
-        #[cfg(test)]
-        count(&outcome);
-        self.places[position] = match outcome {
-            Outcome::Settled(is_hit) => is_hit,
-            Outcome::Unsettled => self.accel.any_plainly_at(self.level, &self.rays[position]),
-        };
     }
 }

@@ -24,7 +24,7 @@ use crate::lanes::{self, Corners, Lanes, Level, Task};
 use crate::node::{Node, tag};
 use crate::prepare::has_area;
 use crate::triangles::BLOCK;
-use crate::way::out_of_tree;
+use crate::node::out_of_tree;
 use crate::{BuildError, Geometry, GeometryKind, TriangleMesh};
 
 /// What the triangles of a block are called.
@@ -38,16 +38,6 @@ pub(crate) struct BlockNames {
 }
 
 impl BlockNames {
-    /// A bit for each lane that has this primitive of the geometry.
-    #[inline(always)]
-    pub(crate) fn lanes_of(&self, primitive: u32) -> u32 {
-        let mut lanes = 0;
-        for (lane, &own) in self.primitives.iter().enumerate() {
-            lanes |= u32::from(own == primitive) << lane;
-        }
-        lanes
-    }
-
     /// The names in a block without triangles.
     pub(crate) fn empty(geometry: u32) -> Self {
         Self { primitives: [u32::MAX; BLOCK], geometry }

@@ -2,29 +2,31 @@
 
 use lumbre_geometry::Ray;
 
-use crate::query::{All, Batch, Closest};
 use crate::spheres::has_radius;
-use crate::touch::{offer_borders_of_all, offer_meeting};
-use crate::traverse::{Place, Search, What, is_sound, meet_primitive};
+use crate::trace::edges::{Triangle, intersect_precise, visit_borders_of_all};
+use crate::trace::exact::{Visitor, visit_primitive};
+use crate::trace::visitors::{Closest, NextHits};
+use crate::trace::{Context, is_sound};
 use crate::triangles::{Shear, intersect};
-use crate::{Accel, GeometryKind, Hit, precise};
+use crate::{Accel, GeometryKind, Hit};
 
 pub(crate) fn closest(accel: &Accel, ray: &Ray) -> Option<Hit> {
-    let mut search = Closest::new(ray, &All);
-    visit(accel, ray, &mut search);
-    search.take_hit()
+    let mut visitor = Closest::new(ray, None);
+    visit(accel, ray, &mut visitor);
+    visitor.into_hit()
 }
 
 pub(crate) fn every(accel: &Accel, ray: &Ray) -> Vec<Hit> {
-    let mut search = Batch::new(ray, usize::MAX, None);
-    visit(accel, ray, &mut search);
-    search.into_hits().0.into_iter().map(|ranked| ranked.hit).collect()
+    let mut visitor = NextHits::new(ray, usize::MAX, None);
+    visit(accel, ray, &mut visitor);
+    visitor.into_hits().0.into_iter().map(|ranked| ranked.hit).collect()
 }
 
-fn visit<'a, S: Search<'a>>(accel: &'a Accel, ray: &Ray, search: &mut S) {
-    let mut touches = Vec::new();
-    let mut pending = vec![(accel, *ray, Place::default())];
-    while let Some((accel, ray, place)) = pending.pop() {
+fn visit(accel: &Accel, ray: &Ray, visitor: &mut dyn Visitor) {
+    let mut edge_hits = Vec::new();
+    let wanted = visitor.wanted();
+    let mut pending = vec![(accel, *ray, Context::default())];
+    while let Some((accel, ray, context)) = pending.pop() {
         if !is_sound(&ray) {
             continue;
         }
@@ -45,42 +47,43 @@ fn visit<'a, S: Search<'a>>(accel: &'a Accel, ray: &Ray, search: &mut S) {
                             let corner = lumbre_math::Vec3::from_array(corner).as_dvec3();
                             shear.axes.permute(&corner).map(|x| x as f32)
                         });
-                        let primitive = primitive as u32;
-                        let geometry = position;
                         let meeting = intersect(&ray, shear, origin, permuted);
                         let corners = corners.map(|corner| corner.map(f64::from));
-                        let what = What::Named { geometry, primitive };
-                        offer_meeting(meeting, &ray, corners, what, accel, &place, search, &mut touches);
+                        let triangle = Triangle { corners, ids: (position, primitive as u32), accel };
+                        triangle.visit(meeting, &ray, &context, visitor, &mut edge_hits);
                     }
                 }
                 GeometryKind::PreciseMesh(mesh) => {
                     for primitive in 0..mesh.indices.len() as u32 {
-                        precise::meet(accel, &ray, [position, primitive], &place, search, &mut touches);
+                        let meeting = intersect_precise(accel, &ray, position, primitive);
+                        let corners = mesh.corners(primitive).map(|corner| corner.to_array());
+                        let triangle = Triangle { corners, ids: (position, primitive), accel };
+                        triangle.visit(meeting, &ray, &context, visitor, &mut edge_hits);
                     }
                 }
                 GeometryKind::Instance(instance) => {
-                    let mut inner = place.clone();
+                    let mut inner = context.clone();
                     inner.route.push(position);
                     inner.ids.push(geometry.id);
                     pending.push((&instance.accel, instance.world_from_object.object_ray(&ray), inner));
                 }
                 GeometryKind::Shape(_) => {
-                    meet_primitive(accel, &ray, position, 0, &place, search);
+                    visit_primitive(accel, &ray, (position, 0), wanted, &context, visitor);
                 }
                 GeometryKind::Spheres(cloud) => {
                     for primitive in 0..cloud.spheres.len() as u32 {
                         if has_radius(&cloud.spheres[primitive as usize]) {
-                            meet_primitive(accel, &ray, position, primitive, &place, search);
+                            visit_primitive(accel, &ray, (position, primitive), wanted, &context, visitor);
                         }
                     }
                 }
                 GeometryKind::Custom(custom) => {
                     for primitive in 0..custom.primitive_count() {
-                        meet_primitive(accel, &ray, position, primitive, &place, search);
+                        visit_primitive(accel, &ray, (position, primitive), wanted, &context, visitor);
                     }
                 }
             }
         }
     }
-    offer_borders_of_all(ray, &touches, search);
+    visit_borders_of_all(ray, &edge_hits, visitor);
 }

@@ -9,7 +9,7 @@ use std::cmp::Reverse;
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
-use crate::blocks::{self, BlockNames, Blocks, Filled, LaneOrder, Line, TriangleBlock, Vertices};
+use crate::blocks::{self, BlockNames, Blocks, Filled, LaneOrder, Line, Vertices};
 use crate::build::{Binary, BinaryNode, Fork, Name};
 use crate::lanes::Level;
 use crate::node::{Node, Units, WIDTH, tag};
@@ -78,12 +78,6 @@ impl Packed {
     #[inline(always)]
     pub(crate) fn blocks(&self) -> Blocks<'_> {
         Blocks::new(&self.blocks)
-    }
-
-    /// The block of triangles that begins there.
-    #[inline(always)]
-    pub(crate) fn block(&self, place: u32) -> &TriangleBlock {
-        self.blocks().block(place)
     }
 
     /// The numbers of the blocks of a leaf of triangles, by which their names stand.

@@ -30,13 +30,13 @@ use crate::collapse::{Entry, Packed};
 use crate::holds::{Holds, SingleStart};
 use crate::hulls::Hulls;
 use crate::lanes::Level;
-use crate::narrow::NarrowQuestions;
+use crate::trace::f32_ray::F32Queries;
 use crate::node::{Node, WIDTH, tag};
 use crate::opening::Start;
 use crate::prepare::{Parts, take_apart, units_of};
 use crate::refit::{Places, check_places};
 use crate::save::{check_names, check_structure, signature};
-use crate::single::Questions;
+use crate::trace::filtered::Queries;
 use crate::spheres::SphereBlock;
 use crate::store::Store;
 use crate::{Accel, Geometry, GeometryKind, LoadError, RefitError};
@@ -401,8 +401,8 @@ fn over_mapped(file: Arc<Mmap>, geometries: Vec<Geometry>) -> Result<Accel, Load
     let single = SingleStart::new(&holds, &units, tree.root);
     let accel = Accel {
         hulls: Hulls::new(&geometries, &tree.entries, &units),
-        questions: Questions::new(level, single.as_ref()),
-        narrow_questions: NarrowQuestions::new(level, single.as_ref()),
+        queries: Queries::new(level, single.as_ref()),
+        f32_queries: F32Queries::new(level, single.as_ref()),
         single,
         units,
         holds,

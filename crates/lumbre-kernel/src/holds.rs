@@ -2,9 +2,8 @@
 
 use lumbre_math::DVec3;
 
-use crate::narrow::Precise;
+use crate::trace::f32_ray::Precise;
 use crate::node::{LARGEST_NEAR, SMALLEST_NEAR, TINY_NEAR, Units, round_up};
-use crate::spheres::SphereRay;
 use crate::triangles::LEAST_SIZE;
 use crate::{Geometry, GeometryKind, Instance};
 
@@ -13,10 +12,6 @@ use crate::{Geometry, GeometryKind, Instance};
 pub(crate) struct Holds {
     /// Whether it holds nothing but triangles.
     pub(crate) only_triangles: bool,
-    /// Whether it holds nothing but triangles, shapes and custom geometry.
-    pub(crate) only_triangles_and_entries: bool,
-    /// Whether it holds any of those, or instances.
-    pub(crate) has_more_than_precise: bool,
     /// How many instances are around what is innermost.
     pub(crate) nesting: u32,
     /// Whether the corners of all triangles are relative to one origin.
@@ -25,12 +20,8 @@ pub(crate) struct Holds {
     pub(crate) first_origin: DVec3,
     /// The sizes of what was put into the tree.
     pub(crate) sizes: Sizes,
-    /// Whether it holds nothing but spheres of clouds, and some.
-    pub(crate) only_spheres: bool,
     /// Whether the centres of all spheres are relative to one origin.
     pub(crate) has_one_cloud_origin: bool,
-    /// That of the first cloud; a NaN where there is none.
-    pub(crate) first_cloud_origin: DVec3,
     /// Whether geometries in instances have masks.
     pub(crate) masks_within: bool,
 }
@@ -46,25 +37,14 @@ impl Holds {
             GeometryKind::Spheres(cloud) => Some(cloud.origin),
             _ => None,
         });
-        let first_cloud_origin = cloud_origins.next().unwrap_or(DVec3::NAN);
-        let is_cloud = |geometry: &Geometry| matches!(geometry.kind, GeometryKind::Spheres(_));
-        let is_precise = |geometry: &Geometry| matches!(geometry.kind, GeometryKind::PreciseMesh(_));
+        let first_cloud_origin = cloud_origins.next();
         let nesting_of = |geometry: &Geometry| match &geometry.kind {
             GeometryKind::Instance(Instance { accel, .. }) => accel.holds.nesting.saturating_add(1),
             _ => 0,
         };
         Self {
-            only_spheres: first_cloud_origin.is_finite() && geometries.iter().all(is_cloud),
-            has_one_cloud_origin: cloud_origins.all(|origin| origin == first_cloud_origin),
-            first_cloud_origin,
+            has_one_cloud_origin: cloud_origins.all(|origin| Some(origin) == first_cloud_origin),
             only_triangles: geometries.iter().all(|geometry| matches!(geometry.kind, GeometryKind::Mesh(_))),
-            only_triangles_and_entries: geometries.iter().all(|geometry| {
-                matches!(
-                    geometry.kind,
-                    GeometryKind::Mesh(_) | GeometryKind::Shape(_) | GeometryKind::Custom(_)
-                )
-            }),
-            has_more_than_precise: !geometries.iter().all(|one| is_cloud(one) || is_precise(one)),
             nesting: geometries.iter().map(nesting_of).max().unwrap_or(0),
             has_one_origin: origins.all(|origin| origin == first_origin),
             first_origin,
@@ -99,20 +79,7 @@ impl Sizes {
     }
 }
 
-/// Which search in single precision goes through a tree.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Contents {
-    /// That among nothing but triangles.
-    Triangles,
-    /// Among shapes and custom geometry, too.
-    Shapes,
-    /// That among nothing but spheres of clouds.
-    Spheres,
-    /// Among instances, clouds of spheres and meshes in double precision, too.
-    Anything,
-}
-
-/// Instances within one another are searched in single precision no deeper: there, each takes a few kilobytes of the thread's stack.
+/// Instances within one another are traversed in single precision no deeper: each takes a few kilobytes of the thread's stack.
 const DEEPEST: u32 = 8;
 
 /// What a ray from nearby needs to start in single precision, in a tree where the corners of all triangles in single precision are
@@ -121,8 +88,8 @@ const DEEPEST: u32 = 8;
 pub(crate) struct SingleStart {
     /// Of the tree.
     pub(crate) root: u32,
-    /// What it holds.
-    pub(crate) contents: Contents,
+    /// Whether it holds nothing but triangles in single precision.
+    pub(crate) only_triangles: bool,
     /// What the tree's boxes are relative to, and a zero.
     pub(crate) tree_origin: [f64; 4],
     /// What the corners are relative to, and a zero.
@@ -153,15 +120,11 @@ pub(crate) struct SingleStart {
     pub(crate) shortest: f32,
     pub(crate) longest: [f32; 4],
     pub(crate) tiny: f32,
-    /// Where there is nothing but spheres: what their centres are relative to, and the largest coordinate of these plus a radius.
-    pub(crate) cloud_origin: DVec3,
-    pub(crate) sphere_reach: f64,
 }
 
 impl SingleStart {
-    /// `None` where the tree holds nothing but clouds, which have different origins, and meshes in double precision, or instances too deep
-    /// within one another, or meshes with different origins, or is so small, so large or so far from its origin that single precision would
-    /// overflow, underflow or tell nothing.
+    /// `None` where the tree holds instances too deep within one another or meshes with different origins, or is so small, so large or so
+    /// far from its origin that single precision would overflow, underflow or tell nothing.
     pub(crate) fn new(holds: &Holds, units: &Units, root: Option<u32>) -> Option<Self> {
         let two_to = |exponent: i32| 2.0f64.powi(exponent);
         // Without a triangle, any place will do.
@@ -173,13 +136,7 @@ impl SingleStart {
         };
         let shift = (units.origin - mesh_origin).abs().max_element();
         let reach = units.near / units.scale + shift + largest_corner;
-        let is_cloud = holds.only_spheres && holds.has_one_cloud_origin;
-        let farthest =
-            units.near / units.scale + (units.origin - holds.first_cloud_origin).abs().max_element();
-        let are_sharp = SphereRay::is_sharp(holds.sizes.sphere_reach)
-            && SphereRay::is_sharp(holds.sizes.sphere_reach + farthest);
-        let is_fit = (holds.has_more_than_precise || is_cloud && are_sharp)
-            && holds.nesting <= DEEPEST
+        let is_fit = holds.nesting <= DEEPEST
             && holds.has_one_origin
             && units.near > 0.0
             && (two_to(-40)..=two_to(40)).contains(&units.scale)
@@ -189,12 +146,7 @@ impl SingleStart {
         let padded = |v: DVec3, last: f64| [v.x, v.y, v.z, last];
         root.filter(|_| is_fit).map(|root| Self {
             root,
-            contents: match holds {
-                Holds { only_triangles: true, .. } => Contents::Triangles,
-                Holds { only_triangles_and_entries: true, .. } => Contents::Shapes,
-                Holds { only_spheres: true, .. } => Contents::Spheres,
-                _ => Contents::Anything,
-            },
+            only_triangles: holds.only_triangles,
             tree_origin: padded(units.origin, 0.0),
             mesh_origin: padded(mesh_origin, 0.0),
             single_mesh_origin: Some(mesh_origin.as_vec3())
@@ -213,8 +165,6 @@ impl SingleStart {
             shortest: (SMALLEST_NEAR / units.scale) as f32,
             longest: [(LARGEST_NEAR / units.scale) as f32; 4],
             tiny: (TINY_NEAR / units.scale) as f32,
-            cloud_origin: holds.first_cloud_origin,
-            sphere_reach: holds.sizes.sphere_reach,
         })
     }
 }

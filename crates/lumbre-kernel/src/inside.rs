@@ -6,8 +6,7 @@ use lumbre_math::DVec3;
 use crate::node::tag;
 use crate::opening::Start;
 use crate::spheres::ExactSphere;
-use crate::stack::AsBuilt;
-use crate::traverse::{self, Ask, Found, Search};
+use crate::trace::exact::{self, Crossing, Visitor, Wanted};
 use crate::{Accel, GeometryKind};
 
 /// Which ways are looked: no axes of symmetry of anything likely, and no two near one line.
@@ -26,8 +25,8 @@ pub(crate) fn is_inside(accel: &Accel, point: DVec3, time: f64) -> bool {
     }
     let in_solids = solids_around(accel, point, time) % 2 == 1;
     let is_odd = |direction: &&DVec3| {
-        let mut crossings = Crossings { odd: false };
-        traverse::search(accel.level, accel, &Ray::new(point, **direction).at_time(time), &mut crossings);
+        let mut crossings = Parity { odd: false };
+        exact::traverse(accel.level, accel, &Ray::new(point, **direction).at_time(time), &mut crossings);
         crossings.odd
     };
     let odd = if has_surfaces(accel) { DIRECTIONS.iter().filter(is_odd).count() } else { 0 };
@@ -114,26 +113,22 @@ fn solids_around(accel: &Accel, point: DVec3, time: f64) -> usize {
 }
 
 /// The parity of the crossings of what is no solid shape.
-struct Crossings {
+struct Parity {
     odd: bool,
 }
 
-impl Search<'_> for Crossings {
-    const ASK: Ask = Ask::Every;
-    type Order = AsBuilt;
-
-    fn limit(&self) -> f64 {
-        f64::INFINITY
+impl Visitor for Parity {
+    fn wanted(&self) -> Wanted {
+        Wanted::Every
     }
 
-    fn floor(&self) -> f64 {
-        0.0
+    fn range(&self) -> [f64; 2] {
+        [0.0, f64::INFINITY]
     }
 
-    fn offer(&mut self, found: &Found<'_, '_>) -> bool {
-        let (geometry, _) = found.what.names(found.accel);
-        let crosses = found.root.multiplicity % 2 == 1;
-        self.odd ^= crosses && !is_solid(&found.accel.geometries[geometry as usize].kind);
+    fn visit(&mut self, crossing: &Crossing) -> bool {
+        let crosses = crossing.root.multiplicity % 2 == 1;
+        self.odd ^= crosses && !is_solid(&crossing.accel.geometries[crossing.geometry as usize].kind);
         false
     }
 }

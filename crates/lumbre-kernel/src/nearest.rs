@@ -15,7 +15,7 @@ use crate::node::{Node, tag};
 use crate::opening::Start;
 use crate::prepare::has_area;
 use crate::spheres::{ExactSphere, has_radius};
-use crate::traverse::Place;
+use crate::trace::Context;
 use crate::{Accel, GeometryKind, Instance, InstancePath, TriangleMesh, precise};
 
 /// The point of all surfaces that is nearest to a given one.
@@ -203,7 +203,7 @@ pub(crate) struct Frame<'a> {
     pub(crate) local: DVec3,
     /// When what moves is looked at.
     time: f64,
-    pub(crate) place: Place,
+    pub(crate) context: Context,
     /// The same in tree units, and what distances to boxes there may be wrong by.
     in_units: DVec3,
     slop: f64,
@@ -211,20 +211,20 @@ pub(crate) struct Frame<'a> {
 
 impl<'a> Frame<'a> {
     pub(crate) fn outermost(accel: &'a Accel, point: DVec3, time: f64) -> Self {
-        Self::new(accel, Transform::IDENTITY, point, time, Place::default())
+        Self::new(accel, Transform::IDENTITY, point, time, Context::default())
     }
 
     /// A tree placed in this one.
     pub(crate) fn within(&self, geometry: u32, instance: &'a Instance) -> Self {
-        let mut place = self.place.clone();
-        place.route.push(geometry);
-        place.ids.push(self.accel.geometries[geometry as usize].id);
+        let mut context = self.context.clone();
+        context.route.push(geometry);
+        context.ids.push(self.accel.geometries[geometry as usize].id);
         let world_from_object = instance.world_from_object.at(self.time);
         let local = world_from_object.inverse_point(self.local);
-        Self::new(&instance.accel, self.map * world_from_object, local, self.time, place)
+        Self::new(&instance.accel, self.map * world_from_object, local, self.time, context)
     }
 
-    fn new(accel: &'a Accel, map: Transform, local: DVec3, time: f64, place: Place) -> Self {
+    fn new(accel: &'a Accel, map: Transform, local: DVec3, time: f64, context: Context) -> Self {
         let units = &accel.units;
         let in_units = (local - units.origin) * units.scale;
         // The largest singular value of the inverse is no more than the root of the sum of squares.
@@ -234,7 +234,7 @@ impl<'a> Frame<'a> {
         );
         let shrink = (1.0 - 1e-9) / stretch;
         let slop = 4.0 * units.slop_of(local);
-        Self { accel, map, is_identity: map.is_identity(), shrink, local, time, place, in_units, slop }
+        Self { accel, map, is_identity: map.is_identity(), shrink, local, time, context, in_units, slop }
     }
 
     /// How far a child of a node is away at least, in the outermost space.
@@ -291,7 +291,7 @@ impl Search {
     fn offer(&mut self, frame: &Frame, geometry: u32, primitive: u32, found: &NearestPoint) {
         let is_within = found.distance <= self.limit;
         let comes_first = self.best.as_ref().is_none_or(|best| {
-            let order = frame.place.route.as_slice().cmp(best.route.as_slice());
+            let order = frame.context.route.as_slice().cmp(best.route.as_slice());
             found.distance < best.distance
                 || order.then((geometry, primitive).cmp(&(best.geometry, best.primitive))) == Ordering::Less
         });
@@ -307,8 +307,8 @@ impl Search {
             id: frame.accel.geometries[geometry as usize].id,
             primitive,
             geometry,
-            instances: frame.place.ids.clone(),
-            route: frame.place.route.clone(),
+            instances: frame.context.ids.clone(),
+            route: frame.context.route.clone(),
         });
     }
 
@@ -380,7 +380,7 @@ impl Search {
                 };
                 let distance =
                     bounds.map_or(distance, |bounds| distance.max(distance_to(&bounds, self.point)));
-                let instances = frame.place.ids.clone();
+                let instances = frame.context.ids.clone();
                 let no = NoClosestPoint { why, id: standing.id, geometry, instances };
                 if distance <= self.limit {
                     self.refused.push((distance, no));

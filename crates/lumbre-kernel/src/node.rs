@@ -64,6 +64,24 @@ pub(crate) mod tag {
         tag << SHIFT | place
     }
 
+    /// The tag of a reference.
+    #[inline(always)]
+    pub(crate) const fn of(reference: u32) -> u32 {
+        reference >> SHIFT
+    }
+
+    /// The place of a reference.
+    #[inline(always)]
+    pub(crate) const fn place(reference: u32) -> usize {
+        (reference & PLACE) as usize
+    }
+
+    /// Whether a reference names a node.
+    #[inline(always)]
+    pub(crate) const fn is_inner(reference: u32) -> bool {
+        of(reference) == INNER
+    }
+
     /// Blocks that a leaf of triangles, or of spheres, may have.
     pub(crate) const MOST_BLOCKS: u32 = 1 << COUNT_BITS;
     /// Places that blocks may have.
@@ -78,12 +96,6 @@ pub(crate) mod tag {
     /// A leaf of spheres, alike.
     pub(crate) const fn spheres(first: u32, count: u32) -> u32 {
         reference(SPHERES, first << COUNT_BITS | (count - 1))
-    }
-
-    /// What is left of a leaf of spheres behind its first block, where that is not its last.
-    #[inline(always)]
-    pub(crate) const fn behind_first(leaf: u32) -> u32 {
-        leaf + MOST_BLOCKS - 1
     }
 
     /// The blocks of a leaf of triangles or of spheres.
@@ -414,4 +426,11 @@ impl Progress {
 #[inline(always)]
 pub(crate) fn round_up(x: f64) -> f32 {
     (x as f32).next_up()
+}
+
+/// The panic for a reference that no tree has. The place is not told: it would have to be kept at hand for every step.
+#[cold]
+#[inline(never)]
+pub(crate) fn out_of_tree() -> ! {
+    panic!("a reference leads out of its tree")
 }

@@ -4,14 +4,8 @@
 //! test is the same (see `triangles`): after the load, that is in double precision anyway. A corner relative to the ray's
 //! origin is rounded once, and the same way for all the triangles that share it.
 
-use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
 use lumbre_math::quadratic::dop;
-
-use crate::touch::{self, Touch};
-use crate::traverse::{Place, Search, What};
-use crate::triangles::{Meeting, Shear, intersect_precise};
-use crate::{Accel, GeometryKind};
 
 /// Triangles by index, with vertices in double precision: for what is large and fine at once, such as a landscape with its
 /// pebbles in the coordinates of a planet. Watertight as a [`TriangleMesh`](crate::TriangleMesh) is, which takes half the
@@ -36,28 +30,4 @@ pub(crate) fn has_area(&[a, b, c]: &[DVec3; 3]) -> bool {
     let (e, f) = (b - a, c - a);
     let is_clear = |x: usize, y: usize| dop(e[x], f[y], e[y], f[x]) != 0.0;
     is_clear(0, 1) || is_clear(1, 2) || is_clear(2, 0)
-}
-
-/// Tests a triangle; those that are met at an edge or a corner, or seen on edge, join the touches. True ends the search.
-#[inline(never)]
-pub(crate) fn meet<'a, S: Search<'a>>(
-    accel: &'a Accel,
-    ray: &Ray,
-    [geometry, primitive]: [u32; 2],
-    place: &Place,
-    search: &mut S,
-    touches: &mut Vec<Touch<'a>>,
-) -> bool {
-    let GeometryKind::PreciseMesh(mesh) = &accel.geometries[geometry as usize].kind else {
-        unreachable!("the leaf says so");
-    };
-    let corners = mesh.corners(primitive);
-    let meeting = intersect_precise(ray, Shear::new(&ray.direction), &corners);
-    // After a refit, some in the tree may have lost their area.
-    if matches!(meeting, Meeting::Miss) || !has_area(&corners) {
-        return false;
-    }
-    let what = What::Named { geometry, primitive };
-    let corners = corners.map(|corner| corner.to_array());
-    touch::offer_meeting(meeting, ray, corners, what, accel, place, search, touches)
 }

@@ -14,11 +14,11 @@ use crate::collapse::{Entry, Packed, lay_out};
 use crate::holds::{Holds, SingleStart, Sizes};
 use crate::hulls::Hulls;
 use crate::lanes::{Lanes, Level, Task};
-use crate::narrow::NarrowQuestions;
+use crate::trace::f32_ray::F32Queries;
 use crate::node::Units;
 use crate::outline::Outline;
 use crate::primitive::{Bounds, Kind, Primitive, Traits};
-use crate::single::Questions;
+use crate::trace::filtered::Queries;
 use crate::triangles::BLOCK;
 use crate::{
     Accel, BuildError, BuildOptions, Geometry, GeometryKind, Placement, PreciseMesh, Preset, TriangleMesh,
@@ -99,8 +99,8 @@ fn build_here(geometries: Vec<Geometry>, preset: Preset) -> Result<Accel, BuildE
     let single = SingleStart::new(&holds, &units, tree.root);
     Ok(Accel {
         hulls: Hulls::new(&geometries, &tree.entries, &units),
-        questions: Questions::new(level, single.as_ref()),
-        narrow_questions: NarrowQuestions::new(level, single.as_ref()),
+        queries: Queries::new(level, single.as_ref()),
+        f32_queries: F32Queries::new(level, single.as_ref()),
         single,
         units,
         holds,
@@ -123,8 +123,8 @@ pub(crate) fn empty_over(geometries: Vec<Geometry>) -> Accel {
         units: Units::new(DVec3::ZERO, 1.0, 0.0, 1.0),
         holds: Holds::new(&geometries, Sizes::default()),
         single: None,
-        questions: Questions::new(level, None),
-        narrow_questions: NarrowQuestions::new(level, None),
+        queries: Queries::new(level, None),
+        f32_queries: F32Queries::new(level, None),
         hulls: Hulls::default(),
         tree: Packed::default(),
         infinite: Vec::new(),

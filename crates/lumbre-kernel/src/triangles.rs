@@ -12,7 +12,6 @@ use lumbre_geometry::{Ray, Root};
 use lumbre_math::{DVec2, DVec3};
 
 use crate::lanes::{Axes, Row, WIDE};
-use crate::touch::Feature;
 
 /// Triangles in a block.
 pub(crate) const BLOCK: usize = 8;
@@ -246,6 +245,17 @@ struct Corner {
     x: f64,
     y: f64,
     z: f64,
+}
+
+/// Where a ray hits a triangle at its edge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Feature {
+    /// The edge opposite this corner.
+    Edge(usize),
+    /// This corner.
+    Vertex(usize),
+    /// Seen on edge: never hit, but a neighbour of others.
+    EdgeOn,
 }
 
 /// How a ray meets a triangle.

@@ -72,7 +72,7 @@ pub(crate) fn winding_number(
         }
         for (geometry, standing) in frame.accel.geometries.iter().enumerate() {
             let geometry = geometry as u32;
-            let no = || NoWindingNumber { id: standing.id, geometry, instances: frame.place.ids.clone() };
+            let no = || NoWindingNumber { id: standing.id, geometry, instances: frame.context.ids.clone() };
             match &standing.kind {
                 GeometryKind::Mesh(_) | GeometryKind::PreciseMesh(_) => {}
                 GeometryKind::Instance(instance) => {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use lumbre_geometry::{Aabb, Ray, Surface};
-use lumbre_kernel::{Accel, Hit};
+use lumbre_kernel::{Accel, Hit, Query};
 use lumbre_math::distribution::AliasTable;
 use lumbre_math::random::{combine, hash_dvec3, uniform_f32};
 use lumbre_math::{DVec2, DVec3, Transform};
@@ -164,7 +164,8 @@ impl Scene {
     /// The nearest hit that light sees: cut-outs and interfaces let it pass.
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
         if self.has_holes {
-            self.accel.closest_filtered(ray, |hit| self.is_solid(ray, hit))
+            let is_solid = |hit: &Hit| self.is_solid(ray, hit);
+            self.accel.closest_with(ray, &Query::new().filter(&is_solid))
         } else {
             self.accel.closest(ray)
         }
@@ -173,8 +174,8 @@ impl Scene {
     /// The nearest hit that a camera sees: as [`Scene::closest`], but for the backs of what is one-sided.
     pub fn closest_seen(&self, ray: &Ray) -> Option<Hit> {
         if self.has_one_sided {
-            self.accel
-                .closest_filtered(ray, |hit| !self.is_back_of_one_sided(ray, hit) && self.is_solid(ray, hit))
+            let is_seen = |hit: &Hit| !self.is_back_of_one_sided(ray, hit) && self.is_solid(ray, hit);
+            self.accel.closest_with(ray, &Query::new().filter(&is_seen))
         } else {
             self.closest(ray)
         }
@@ -183,7 +184,8 @@ impl Scene {
     /// Whether something stands in the way of light.
     pub fn is_occluded(&self, ray: &Ray) -> bool {
         if self.has_holes {
-            self.accel.any_filtered(ray, |hit| self.is_solid(ray, hit))
+            let is_solid = |hit: &Hit| self.is_solid(ray, hit);
+            self.accel.any_with(ray, &Query::new().filter(&is_solid))
         } else {
             self.accel.any(ray)
         }

@@ -5,8 +5,8 @@ use std::mem::MaybeUninit;
 
 use super::{Room, Sides, Slots, WIDE, Wide};
 use crate::node::{Node, Slabs, WIDTH};
-use crate::packet::{Frustum, SlabRows};
-use crate::stack::stack_entry;
+use crate::batch::packet::{Frustum, SlabRows};
+use crate::trace::stack::stack_entry;
 
 const _: () = assert!(WIDTH == WIDE);
 

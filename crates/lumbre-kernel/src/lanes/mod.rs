@@ -27,13 +27,13 @@ use self::x86::OnX86;
 use crate::Ray32;
 use crate::blocks::{ROOMS, TriangleBlock, far_of_last};
 use crate::holds::SingleStart;
-use crate::narrow::NarrowRay;
+use crate::trace::f32_ray::F32Ray;
 #[cfg(test)]
 use crate::node::Node;
 use crate::node::{BoxRay, Slabs, Units, WIDTH};
 #[cfg(test)]
-use crate::packet::SlabRows;
-use crate::stack::STACK;
+use crate::batch::packet::SlabRows;
+use crate::trace::stack::STACK;
 use crate::triangles::{BLOCK, BlockRay, Inside, Passage, Shear};
 
 pub(crate) use asked::{Asked, Question};
@@ -41,17 +41,13 @@ pub(crate) use boxes::{
     meet_boxes, meet_each, meet_frustum, only_child, push_as_built, push_by_distance, put_and_take_as_built,
     put_and_take_by_distance,
 };
-pub(crate) use hulls::{
-    Glanced, Lines, MetHulls, SureLines, glance_by_two, meet_hulls, meet_one_hull, pass_hulls,
-};
+pub(crate) use hulls::{MetHulls, meet_hulls};
 #[cfg(test)]
-pub(crate) use hulls::{glances_at, meet_hulls_at};
+pub(crate) use hulls::meet_hulls_at;
 pub(crate) use portable::Portable;
 #[cfg(test)]
 pub(crate) use spheres::meet_spheres_at;
-pub(crate) use spheres::{
-    SphereCrossings, SpherePass, cross_spheres, meet_spheres, pass_spheres, pass_spheres_by_two,
-};
+pub(crate) use spheres::meet_spheres;
 pub(crate) use wide::{Eight, LANE_BITS, LastEight, Row, Vector, WIDE, Wide};
 
 /// What a search does many at a time: boxes by sixteen, and triangles by eight.
@@ -68,9 +64,6 @@ pub(crate) trait Lanes {
     const MEETS_BY_TWO: bool = false;
     /// Whether rays in single precision are better started by four than one after the other.
     const STARTS_BY_FOUR: bool = false;
-    /// Whether rays in flight are faster than one after another wherever they are many; else they are among the triangles or spheres of large
-    /// trees alone, where there is more to wait for.
-    const FLIES: bool = true;
     /// Whether rays go on together for a while where that no longer pays, for what they have done: see `packet`.
     const GOES_ON_TOGETHER: bool = true;
 
@@ -112,30 +105,18 @@ pub(crate) trait Lanes {
         *ray
     }
 
-    /// The same in double precision, of one in single precision: see [`Ray32::to_f64`].
-    #[inline(always)]
-    fn read_widened(ray: &Ray32) -> Ray {
-        ray.to_f64()
-    }
-
-    /// The same of a ray that was there before: it is read at once.
-    #[inline(always)]
-    fn widened(ray: &Ray32) -> Ray {
-        ray.to_f64()
-    }
-
     /// The ray in single precision for boxes; `None` where it does not come from nearby, or is not sound.
     fn start_narrow(start: &SingleStart, ray: &Ray32) -> Option<Slabs>;
 
     /// The same ray for triangles.
-    fn start_narrow_blocks(start: &SingleStart, ray: &Ray32, slabs: &Slabs) -> NarrowRay;
+    fn start_narrow_blocks(start: &SingleStart, ray: &Ray32, slabs: &Slabs) -> F32Ray;
 
     /// Both of four rays, and a bit for each that comes from nearby and is sound; what is made of the others means nothing.
     #[inline(always)]
     fn start_narrow_by_four(
         start: &SingleStart,
         rays: [&Ray32; 4],
-        places: [(&mut Slabs, &mut NarrowRay); 4],
+        places: [(&mut Slabs, &mut F32Ray); 4],
     ) -> u32 {
         start_narrow_one_by_one::<Self>(start, rays, places)
     }
@@ -143,11 +124,11 @@ pub(crate) trait Lanes {
     /// The corners of the triangles of a block in the ray's sheared space, `[x, y or z][corner]`, all with the sign turned; what lanes
     /// without a triangle have means nothing. No product is fused with a sum: it is the same on every machine. `IS_ALONE` says that the
     /// ray waits for it, so that to foresee how the block is made is worth a branch.
-    fn narrow_corners<const IS_ALONE: bool>(block: &TriangleBlock, ray: &NarrowRay) -> [[Self::Eight; 3]; 3];
+    fn narrow_corners<const IS_ALONE: bool>(block: &TriangleBlock, ray: &F32Ray) -> [[Self::Eight; 3]; 3];
 
     /// The same of two blocks, each by its ray: those of the first, and those of the second.
     #[inline(always)]
-    fn narrow_corners_by_two(blocks: [&TriangleBlock; 2], rays: [&NarrowRay; 2]) -> [[Self::Wide; 3]; 3] {
+    fn narrow_corners_by_two(blocks: [&TriangleBlock; 2], rays: [&F32Ray; 2]) -> [[Self::Wide; 3]; 3] {
         let first = Self::narrow_corners::<false>(blocks[0], rays[0]);
         let second = Self::narrow_corners::<false>(blocks[1], rays[1]);
         corners_of_two(&first, &second)
@@ -181,9 +162,6 @@ pub(crate) trait Lanes {
     /// Where along the ray that is.
     fn place_crossings(edges: &Self::Edges, ray: &BlockRay) -> Crossings<Self::Eight>;
 
-    /// Of those that certainly are met ([`Crossings::sure`]), a bit for each whose front it is; other bits mean nothing.
-    fn fronts(edges: &Self::Edges) -> u32;
-
     /// [`Shear::new`] and [`Shear::local_origin`] of a ray that has these axes, for a mesh.
     fn shear(ray: &Ray, axes: &'static Axes, mesh_origin: &[f64; 4]) -> (Shear, [f64; 3]);
 
@@ -210,7 +188,7 @@ fn corners_of_two<W: Wide>(first: &[[W::Half; 3]; 3], second: &[[W::Half; 3]; 3]
 fn start_narrow_one_by_one<L: Lanes + ?Sized>(
     start: &SingleStart,
     rays: [&Ray32; 4],
-    places: [(&mut Slabs, &mut NarrowRay); 4],
+    places: [(&mut Slabs, &mut F32Ray); 4],
 ) -> u32 {
     let mut fit = 0;
     for (i, (ray, (slabs, narrow))) in rays.into_iter().zip(places).enumerate() {
@@ -575,6 +553,25 @@ impl Level {
         all
     }
 
+    /// Whether there are vectors of eight numbers.
+    pub(crate) fn has_vectors(self) -> bool {
+        self.0 != Set::Portable
+    }
+
+    /// Runs a task that is only compiled for instruction sets with vectors.
+    #[inline(always)]
+    pub(crate) fn run_with_vectors<T: Task>(self, task: T) -> T::Output {
+        match self.0 {
+            Set::Portable => unreachable!("who calls it asks `has_vectors`"),
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: `all` alone makes this value, after finding on this machine all the features of `run_avx2`.
+            Set::Avx2 => unsafe { T::run_avx2(task) },
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: as above, of `run_avx512`.
+            Set::Avx512 => unsafe { T::run_avx512(task) },
+        }
+    }
+
     /// Runs the task with these lanes.
     #[inline(always)]
     pub(crate) fn run<T: Task>(self, task: T) -> T::Output {
@@ -666,15 +663,15 @@ pub(crate) fn start_single_at(
     level.run(Starting(start, ray))
 }
 
-/// What [`Lanes::read`], [`Lanes::read_narrow`], [`Lanes::read_widened`] and [`Lanes::widened`] give at a level, for tests.
+/// What [`Lanes::read`] and [`Lanes::read_narrow`] give at a level, for tests.
 #[cfg(test)]
-pub(crate) fn read_at(level: Level, ray: &Ray, narrow: &Ray32) -> (Ray, Ray32, [Ray; 2]) {
+pub(crate) fn read_at(level: Level, ray: &Ray, narrow: &Ray32) -> (Ray, Ray32) {
     struct Reading<'a>(&'a Ray, &'a Ray32);
     impl Task for Reading<'_> {
-        type Output = (Ray, Ray32, [Ray; 2]);
+        type Output = (Ray, Ray32);
         #[inline(always)]
         fn run<L: Lanes>(self) -> Self::Output {
-            (L::read(self.0), L::read_narrow(self.1), [L::read_widened(self.1), L::widened(self.1)])
+            (L::read(self.0), L::read_narrow(self.1))
         }
     }
     level.run(Reading(ray, narrow))
@@ -686,15 +683,15 @@ pub(crate) fn start_narrow_by_four_at(
     level: Level,
     start: &SingleStart,
     rays: [&Ray32; 4],
-) -> [[Option<(Slabs, NarrowRay)>; 4]; 2] {
+) -> [[Option<(Slabs, F32Ray)>; 4]; 2] {
     struct Starting<'a>(&'a SingleStart, [&'a Ray32; 4]);
     impl Task for Starting<'_> {
-        type Output = [[Option<(Slabs, NarrowRay)>; 4]; 2];
+        type Output = [[Option<(Slabs, F32Ray)>; 4]; 2];
         #[inline(always)]
         fn run<L: Lanes>(self) -> Self::Output {
             let Self(start, rays) = self;
             [true, false].map(|is_together| {
-                let mut starts = [(Slabs::ZERO, NarrowRay::of_none()); 4];
+                let mut starts = [(Slabs::ZERO, F32Ray::of_none()); 4];
                 let [a, b, c, d] = &mut starts;
                 let places = [a, b, c, d].map(|(slabs, narrow)| (slabs, narrow));
                 let fit = if is_together {
@@ -884,9 +881,9 @@ pub(crate) fn told_at(
     level: Level,
     blocks: [&TriangleBlock; 2],
     rays: [&BlockRay; 2],
-    narrow: [&NarrowRay; 2],
+    narrow: [&F32Ray; 2],
 ) -> [[Told; 2]; 2] {
-    struct Telling<'a>([&'a TriangleBlock; 2], [&'a BlockRay; 2], [&'a NarrowRay; 2]);
+    struct Telling<'a>([&'a TriangleBlock; 2], [&'a BlockRay; 2], [&'a F32Ray; 2]);
     impl Task for Telling<'_> {
         type Output = [[Told; 2]; 2];
         #[inline(always)]

@@ -9,7 +9,7 @@ use super::{Axes, Corners, CornersRoom, Crossings, Eight, Lanes, Level, Row, Set
 use crate::Ray32;
 use crate::blocks::TriangleBlock;
 use crate::holds::SingleStart;
-use crate::narrow::NarrowRay;
+use crate::trace::f32_ray::F32Ray;
 use crate::node::{BoxRay, END_FACTOR, LITTLE, START_FACTOR, Slabs, Units};
 use crate::triangles::{
     BLOCK, BlockRay, EDGE_ERROR, ERRORS_OF_EDGES, ERRORS_OF_EXTENT, HEIGHT_ERROR, HeightRange, Inside,
@@ -55,7 +55,6 @@ impl Lanes for Portable {
     type Edges = Edges;
     type EdgesByTwo = [Edges; 2];
     type Wide = Portable16;
-    const FLIES: bool = false;
 
     #[inline]
     fn level() -> Level {
@@ -152,18 +151,18 @@ impl Lanes for Portable {
     }
 
     #[inline]
-    fn start_narrow_blocks(start: &SingleStart, ray: &Ray32, slabs: &Slabs) -> NarrowRay {
+    fn start_narrow_blocks(start: &SingleStart, ray: &Ray32, slabs: &Slabs) -> F32Ray {
         let axes = Axes::new(&ray.direction.as_dvec3());
         let inverse = axes.permute_single(&slabs.inverse)[2] * start.units_per_space;
         let [x, y, z] = ray.direction.to_array();
         let mut origin = axes.permute_single(&local(start, ray));
         let mut shear = axes.permute_single(&[x, y, z, 0.0]).map(|d| d * inverse);
         (origin[3], shear[3]) = (ray.t_min, ray.t_max);
-        NarrowRay { axes, origin, shear, minus_inverse: -inverse }
+        F32Ray { axes, origin, shear, minus_inverse: -inverse }
     }
 
     #[inline]
-    fn narrow_corners<const IS_ALONE: bool>(block: &TriangleBlock, ray: &NarrowRay) -> [[Self::Eight; 3]; 3] {
+    fn narrow_corners<const IS_ALONE: bool>(block: &TriangleBlock, ray: &F32Ray) -> [[Self::Eight; 3]; 3] {
         let splat = Self::Eight::splat;
         let [kx, ky, kz] = ray.axes.order();
         let mut room = CornersRoom::new();
@@ -310,16 +309,6 @@ impl Lanes for Portable {
             (froms[lane], tos[lane]) = (from * inverse, to * inverse);
         }
         Crossings { in_range: all_in_range, sure, from: Portable8::load(&froms), to: Portable8::load(&tos) }
-    }
-
-    #[inline]
-    fn fronts(edges: &Edges) -> u32 {
-        let [u, v, w] = &edges.values;
-        let mut fronts = 0;
-        for lane in 0..BLOCK {
-            fronts |= u32::from(u[lane].min(v[lane]).min(w[lane]) > 0.0) << lane;
-        }
-        fronts
     }
 
     #[inline]

@@ -6,7 +6,7 @@ use std::ops::{Add, Index, Mul, Sub};
 use bytemuck::Zeroable;
 
 use super::opaque_number;
-use crate::stack::stack_entry;
+use crate::trace::stack::stack_entry;
 
 /// Those that are sixteen.
 pub(crate) const WIDE: usize = 16;
@@ -76,8 +76,6 @@ pub(crate) trait Wide: Vector<Array = [f32; WIDE]> + Zeroable {
     /// The first eight, or the last: `which` is 0 or 1.
     fn half(&self, which: usize) -> Self::Half;
     fn load(row: &[f32; WIDE]) -> Self;
-    /// Eight, and the same again.
-    fn load_twice(row: &[f32; 8]) -> Self;
     fn store(self, row: &mut Row<f32>);
     /// Rounded.
     fn rounded(row: &Row<f64>) -> Self;
@@ -91,8 +89,6 @@ pub(crate) trait Wide: Vector<Array = [f32; WIDE]> + Zeroable {
     fn parted_from(row: &Row<f64>, place: f64) -> (Self, Self);
     /// The largest of all; any of them where one is a NaN.
     fn most(self) -> f32;
-    /// The largest of each of sixteen; any of them where one is a NaN.
-    fn most_of_each(them: [Self; WIDE]) -> Row<f32>;
     /// The same of each of eight.
     fn most_of_eight(them: [Self; 8]) -> [f32; 8];
     /// Whether all are the same number.
@@ -351,15 +347,6 @@ impl Wide for Portable16 {
     }
 
     #[inline(always)]
-    fn load_twice(row: &[f32; 8]) -> Self {
-        let mut all = [0.0; WIDE];
-        for (lane, one) in all.iter_mut().enumerate() {
-            *one = row[lane % 8];
-        }
-        Self(all)
-    }
-
-    #[inline(always)]
     fn store(self, row: &mut Row<f32>) {
         row.0 = self.0;
     }
@@ -415,15 +402,6 @@ impl Wide for Portable16 {
         let mut most = self.0[0];
         for lane in 1..WIDE {
             most = if self.0[lane] > most { self.0[lane] } else { most };
-        }
-        most
-    }
-
-    #[inline(always)]
-    fn most_of_each(them: [Self; WIDE]) -> Row<f32> {
-        let mut most = Row::of(0.0);
-        for (most, one) in most.0.iter_mut().zip(them) {
-            *most = one.most();
         }
         most
     }
@@ -675,15 +653,6 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn load_twice(row: &[f32; 8]) -> Self {
-            // SAFETY: see the type. The load is of eight f32.
-            unsafe {
-                let once = _mm256_castps_pd(_mm256_loadu_ps(row.as_ptr()));
-                Self(_mm512_castpd_ps(_mm512_broadcast_f64x4(once)))
-            }
-        }
-
-        #[inline(always)]
         fn store(self, row: &mut Row<f32>) {
             // SAFETY: see the type. The store is of sixteen f32.
             unsafe { _mm512_storeu_ps(row.0.as_mut_ptr(), self.0) }
@@ -753,32 +722,6 @@ mod x86 {
                 let low = _mm512_castps512_ps256(self.0);
                 most_of_eight(_mm256_max_ps(low, _mm512_extractf32x8_ps::<1>(self.0)))
             }
-        }
-
-        #[inline(always)]
-        fn most_of_each(them: [Self; WIDE]) -> Row<f32> {
-            let mut most = Row::of(0.0);
-            let [abcd, efgh, ijkl, mnop] = [
-                Self::most_of_four(them[0], them[1], them[2], them[3]),
-                Self::most_of_four(them[4], them[5], them[6], them[7]),
-                Self::most_of_four(them[8], them[9], them[10], them[11]),
-                Self::most_of_four(them[12], them[13], them[14], them[15]),
-            ];
-            // SAFETY: see the type.
-            unsafe {
-                let first = _mm512_max_ps(
-                    _mm512_shuffle_f32x4::<0b01_00_01_00>(abcd, efgh),
-                    _mm512_shuffle_f32x4::<0b11_10_11_10>(abcd, efgh),
-                );
-                let second = _mm512_max_ps(
-                    _mm512_shuffle_f32x4::<0b01_00_01_00>(ijkl, mnop),
-                    _mm512_shuffle_f32x4::<0b11_10_11_10>(ijkl, mnop),
-                );
-                let even = _mm512_shuffle_f32x4::<0b10_00_10_00>(first, second);
-                Self(_mm512_max_ps(even, _mm512_shuffle_f32x4::<0b11_01_11_01>(first, second)))
-                    .store(&mut most);
-            }
-            most
         }
 
         #[inline(always)]
@@ -1273,12 +1216,6 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn load_twice(row: &[f32; 8]) -> Self {
-            // SAFETY: see the type. The load is of eight f32.
-            unsafe { Self([_mm256_loadu_ps(row.as_ptr()); 2]) }
-        }
-
-        #[inline(always)]
         fn store(self, row: &mut Row<f32>) {
             let [low, high] = self.0;
             // SAFETY: see the type. The stores are of eight f32 each, of sixteen.
@@ -1367,22 +1304,6 @@ mod x86 {
         fn most(self) -> f32 {
             // SAFETY: see the type.
             unsafe { most_of_eight(_mm256_max_ps(self.0[0], self.0[1])) }
-        }
-
-        #[inline(always)]
-        fn most_of_each(them: [Self; WIDE]) -> Row<f32> {
-            let mut most = Row::of(0.0);
-            for (half, of_half) in most.0.chunks_exact_mut(8).zip(them.chunks_exact(8)) {
-                let abcd = Self::most_of_four(of_half[0], of_half[1], of_half[2], of_half[3]);
-                let efgh = Self::most_of_four(of_half[4], of_half[5], of_half[6], of_half[7]);
-                // SAFETY: see the type. The store is of eight f32.
-                unsafe {
-                    let low = _mm256_permute2f128_ps::<0x20>(abcd, efgh);
-                    let all = _mm256_max_ps(low, _mm256_permute2f128_ps::<0x31>(abcd, efgh));
-                    _mm256_storeu_ps(half.as_mut_ptr(), all);
-                }
-            }
-            most
         }
 
         #[inline(always)]

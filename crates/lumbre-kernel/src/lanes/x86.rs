@@ -13,7 +13,7 @@ use super::{
 };
 use crate::blocks::{FIRST_UNSHARED, MOST_SHARED, QUAD, TriangleBlock, USUAL, far_of_last};
 use crate::holds::SingleStart;
-use crate::narrow::NarrowRay;
+use crate::trace::f32_ray::F32Ray;
 use crate::node::{
     BoxRay, END_FACTOR, LARGEST_NEAR, LITTLE, SMALLEST_NEAR, START_FACTOR, Slabs, TINY_NEAR, Units,
 };
@@ -668,7 +668,7 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
     fn start_narrow_by_two(
         start: &SingleStart,
         rays: [&Ray32; 2],
-        places: [(&mut Slabs, &mut NarrowRay); 2],
+        places: [(&mut Slabs, &mut F32Ray); 2],
     ) -> u32 {
         /// The last of each four.
         const LAST: i32 = 0x88;
@@ -819,7 +819,7 @@ impl Shears for BlockRay {
     }
 }
 
-impl Shears for NarrowRay {
+impl Shears for F32Ray {
     #[inline(always)]
     fn axes(&self) -> &'static Axes {
         self.axes
@@ -1110,32 +1110,6 @@ where
     }
 
     #[inline(always)]
-    fn widened(ray: &Ray32) -> Ray {
-        let from = Self::narrow_start(ray);
-        // SAFETY: as there. A ray is eight f32: origin, start, direction, end.
-        unsafe {
-            let (origin, direction) = (_mm_loadu_ps(from), _mm_loadu_ps(from.add(4)));
-            // The first number of the direction goes behind the origin, and the ends of the range behind the other two.
-            let first = _mm_insert_ps::<0b0011_0000>(origin, direction);
-            let ends = _mm_unpackhi_ps(origin, direction);
-            let last = _mm_shuffle_ps::<0b11_10_10_01>(direction, ends);
-            Self::of_halves(_mm256_cvtps_pd(first), _mm256_cvtps_pd(last), 0.0)
-        }
-    }
-
-    #[inline(always)]
-    fn read_widened(ray: &Ray32) -> Ray {
-        let from = Self::narrow_start(ray);
-        // SAFETY: as there. A ray is eight f32: origin, start, direction, end.
-        unsafe {
-            let at = |i: usize| from.add(i).read_volatile();
-            let (first, last) =
-                (_mm_setr_ps(at(0), at(1), at(2), at(4)), _mm_setr_ps(at(5), at(6), at(3), at(7)));
-            Self::of_halves(_mm256_cvtps_pd(first), _mm256_cvtps_pd(last), 0.0)
-        }
-    }
-
-    #[inline(always)]
     fn start_narrow(start: &SingleStart, ray: &Ray32) -> Option<Slabs> {
         // As the portable one, three axes at a time.
         // SAFETY: see `X86`. The loads are of arrays of four.
@@ -1190,7 +1164,7 @@ where
     }
 
     #[inline(always)]
-    fn start_narrow_blocks(start: &SingleStart, ray: &Ray32, slabs: &Slabs) -> NarrowRay {
+    fn start_narrow_blocks(start: &SingleStart, ray: &Ray32, slabs: &Slabs) -> F32Ray {
         // SAFETY: see `X86`. The loads are of arrays of four.
         unsafe {
             let (origin, direction) = Self::narrow_numbers(ray);
@@ -1203,7 +1177,7 @@ where
             // The fourth stays where it is: the start and the end of the ray.
             let shear = _mm_blend_ps::<0b1000>(_mm_mul_ps(direction, inverse), direction);
             let shear = _mm_permutevar_ps(shear, order);
-            NarrowRay {
+            F32Ray {
                 axes,
                 origin: Self::array(_mm_permutevar_ps(local, order)),
                 shear: Self::array(shear),
@@ -1216,7 +1190,7 @@ where
     fn start_narrow_by_four(
         start: &SingleStart,
         rays: [&Ray32; 4],
-        places: [(&mut Slabs, &mut NarrowRay); 4],
+        places: [(&mut Slabs, &mut F32Ray); 4],
     ) -> u32 {
         if !AVX512 {
             let ([a, b, c, d], [for_a, for_b, for_c, for_d]) = (rays, places);
@@ -1311,13 +1285,13 @@ where
     #[inline(always)]
     fn narrow_corners<const IS_ALONE: bool>(
         block: &TriangleBlock,
-        ray: &NarrowRay,
+        ray: &F32Ray,
     ) -> [[wide::Eight256<AVX512>; 3]; 3] {
         Self::eights(Self::sheared_corners::<_, IS_ALONE>(block, ray))
     }
 
     #[inline(always)]
-    fn narrow_corners_by_two(blocks: [&TriangleBlock; 2], rays: [&NarrowRay; 2]) -> [[Self::Wide; 3]; 3] {
+    fn narrow_corners_by_two(blocks: [&TriangleBlock; 2], rays: [&F32Ray; 2]) -> [[Self::Wide; 3]; 3] {
         Self::corners_by_two(blocks, rays)
     }
 
@@ -1612,13 +1586,6 @@ where
             let (from, to) = (wide::Eight256::new(from), wide::Eight256::new(to));
             Crossings { in_range, sure: inside & surely_in_range, from, to }
         }
-    }
-
-    #[inline(always)]
-    fn fronts(edges: &Self::Edges) -> u32 {
-        // SAFETY: see `X86`.
-        let backs = unsafe { _mm256_movemask_ps(edges.values[0].raw()) };
-        !backs as u32
     }
 
     #[inline(always)]

@@ -1,4 +1,4 @@
-//! Single precision among instances, clouds and meshes in double precision: the search in `anything` beside the plain one.
+//! Single precision among instances, clouds and meshes in double precision: the filtered traversal beside the exact one.
 
 use std::sync::Arc;
 
@@ -8,13 +8,11 @@ use lumbre_math::{AnimatedTransform, DVec3, Transform, Vec3};
 use super::oracle;
 use super::scenes::{Random, build, cloud, icosphere, mixture, precise, ray, shape, soup, vertex};
 use super::single::check_packet;
-use crate::anything::search_at;
-use crate::holds::Contents;
 use crate::lanes::Level;
-use crate::packet::{self, PACKET};
-use crate::query::All;
-use crate::single::{Nearest, Outcome};
-use crate::{Accel, Faces, GeometryKind, Hit, Instance, QueryOptions, TriangleMesh, brute};
+use crate::batch;
+use crate::batch::packet::{self, PACKET};
+use crate::trace::Outcome;
+use crate::{Accel, Faces, GeometryKind, Hit, Instance, Query, TriangleMesh, brute};
 
 const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
 
@@ -22,9 +20,6 @@ fn placed(accel: &Arc<Accel>, map: Transform) -> GeometryKind {
     GeometryKind::Instance(Instance { accel: Arc::clone(accel), world_from_object: map.into() })
 }
 
-fn contents(accel: &Accel) -> Option<Contents> {
-    accel.single.as_ref().map(|start| start.contents)
-}
 
 /// A closed mesh, long and thin, so that it is opened where it is placed.
 fn needle() -> TriangleMesh {
@@ -47,9 +42,9 @@ fn everything(random: &mut Random) -> Accel {
     let mut other_origin = icosphere(1, zero, 0.9);
     other_origin.origin = DVec3::new(0.1, 0.2, 0.3);
     let trees = [
-        (vec![GeometryKind::Mesh(Arc::new(needle()))], Some(Contents::Triangles)),
-        (shapes(random), Some(Contents::Shapes)),
-        (endless, Some(Contents::Shapes)),
+        (vec![GeometryKind::Mesh(Arc::new(needle()))], Some(true)),
+        (shapes(random), Some(false)),
+        (endless, Some(false)),
         (
             vec![
                 GeometryKind::Mesh(Arc::new(icosphere(1, zero, 0.7))),
@@ -57,14 +52,14 @@ fn everything(random: &mut Random) -> Accel {
             ],
             None,
         ),
-        (vec![GeometryKind::Spheres(Arc::new(cloud(random, 30, zero, zero, 1.0)))], Some(Contents::Spheres)),
+        (vec![GeometryKind::Spheres(Arc::new(cloud(random, 30, zero, zero, 1.0)))], Some(false)),
         (vec![GeometryKind::PreciseMesh(Arc::new(precise(&icosphere(2, zero, 0.8))))], None),
     ];
     let mut trees: Vec<_> = trees
         .into_iter()
         .map(|(kinds, expected)| {
             let tree = Arc::new(build(kinds));
-            assert_eq!(contents(&tree), expected);
+            assert_eq!(tree.only_triangles(), expected);
             tree
         })
         .collect();
@@ -121,16 +116,16 @@ fn check(accel: &Accel, rays: &[Ray]) -> usize {
         accel.any_batch_at(level, rays, &mut are_hit);
         told = 0;
         for ((ray, hit), is_hit) in rays.iter().zip(&hits).zip(&are_hit) {
-            let plain = accel.closest_plainly_at(level, ray);
+            let plain = accel.closest_exact_at(level, ray);
             let bits = |hit: &Option<Hit>| hit.as_ref().map(|hit| hit.root.t.to_bits());
             assert_eq!(*hit, plain, "{level:?} {ray:?}");
             assert_eq!(bits(hit), bits(&plain), "{level:?} {ray:?}");
             assert_eq!(*is_hit, plain.is_some(), "{level:?} {ray:?}");
             assert_eq!(accel.closest_at(level, ray), plain, "{level:?} {ray:?}");
             assert_eq!(accel.any_at(level, ray), plain.is_some(), "{level:?} {ray:?}");
-            let single = search_at::<Nearest, _>(level, accel, ray, &All);
-            assert!(single == Outcome::Unsettled || single == Outcome::Settled(plain), "{level:?} {ray:?}");
-            told += usize::from(single != Outcome::Unsettled);
+            let single = accel.filtered_at(level, ray);
+            assert!(single == Outcome::Uncertain || single == Outcome::Certain(plain), "{level:?} {ray:?}");
+            told += usize::from(single != Outcome::Uncertain);
         }
     }
     told
@@ -141,7 +136,7 @@ fn single_precision_answers_with_the_bits_of_double_precision_among_anything() {
     super::scenes::with_every_preset(|| {
         let mut random = Random(401);
         let accel = everything(&mut random);
-        assert_eq!(contents(&accel), Some(Contents::Anything));
+        assert_eq!(accel.only_triangles(), Some(false));
         let rays: Vec<_> = (0..2_000).map(|_| some_ray(&mut random, &accel)).collect();
         let is_hit = |ray: &&Ray| accel.any(ray);
         let hits = rays.iter().filter(is_hit).count();
@@ -168,9 +163,9 @@ fn options_leave_the_same_bits_among_anything() {
         let exclude = accel.closest(&ray);
         let faces = [Faces::Both, Faces::Front, Faces::Back][random.below(3)];
         let exclude = exclude.as_ref().filter(|_| random.unit() < 0.5);
-        let options = QueryOptions { mask: 1 << random.below(3), exclude, faces };
+        let options = Query { mask: 1 << random.below(3), exclude, faces, filter: None };
         for level in Level::all() {
-            let plain = accel.closest_with_plainly_at(level, &ray, &options);
+            let plain = accel.closest_with_exact_at(level, &ray, &options);
             let bits = |hit: &Option<Hit>| hit.as_ref().map(|hit| hit.root.t.to_bits());
             let found = accel.closest_with_at(level, &ray, &options);
             assert_eq!(found, plain, "{level:?} {ray:?} {options:?}");
@@ -180,9 +175,9 @@ fn options_leave_the_same_bits_among_anything() {
                 plain.is_some(),
                 "{level:?} {ray:?} {options:?}"
             );
-            let single = search_at::<Nearest, _>(level, &accel, &ray, &options);
+            let single = accel.filtered_closest_at(level, &ray, &options);
             free += u32::from(is_free);
-            told += u32::from(is_free && single != Outcome::Unsettled);
+            told += u32::from(is_free && single != Outcome::Uncertain);
             hits += u32::from(plain.is_some());
         }
     }
@@ -245,7 +240,7 @@ fn rays_that_go_together_through_instances_are_answered_as_each_alone() {
         let mut random = Random(408);
         for is_endless in [false, true] {
             let accel = company(&mut random, is_endless);
-            assert_eq!(contents(&accel), Some(Contents::Anything));
+            assert_eq!(accel.only_triangles(), Some(false));
             let (mut together, mut within) = (0, 0);
             for i in 0..600 {
                 let spread = [1e-4, 3e-3, 0.03, 0.1][i % 4];
@@ -264,7 +259,7 @@ fn rays_that_go_together_through_instances_are_answered_as_each_alone() {
                     Ray::new(from, direction).with_range(1e-3, t_max).at_time(random.unit())
                 });
                 check_packet(&accel, &rays);
-                let answered = packet::answered_together(accel.level, &accel, &rays);
+                let answered = batch::shims::answered_by_packet(accel.level, &accel, &rays);
                 together += answered.count_ones();
                 let is_within = |ray: &&Ray| accel.closest(ray).is_some_and(|hit| !hit.route.is_empty());
                 if answered == packet::ALL {
@@ -332,7 +327,7 @@ fn trees_are_searched_however_deep_they_stand() {
                 Transform::translate(-shift) * Transform::scale(DVec3::new(-1.0, 0.7, 0.9)).unwrap(),
             ),
         ]);
-        assert_eq!(contents(&accel), (depth <= 8).then_some(Contents::Anything), "{depth}");
+        assert_eq!(accel.only_triangles(), (depth <= 8).then_some(false), "{depth}");
         if depth < 7 {
             let rays: Vec<_> = (0..100 >> (depth / 2)).map(|_| ray(&mut random, DVec3::ZERO, 2.0)).collect();
             check(&accel, &rays);

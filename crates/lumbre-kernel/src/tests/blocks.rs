@@ -13,7 +13,7 @@ use lumbre_math::{DVec3, Transform, Vec3};
 use super::scenes::{Random, soup};
 use crate::blocks::{self, BlockNames, Blocks, Line, TriangleBlock, Vertices};
 use crate::lanes::{Level, corners_at, equals_before_at, meet_triangles_at, told_at, truncated_at};
-use crate::narrow::NarrowRay;
+use crate::trace::f32_ray::F32Ray;
 use crate::triangles::{BLOCK, BlockRay, Meeting, Shear, intersect};
 use crate::{Accel, BuildOptions, Geometry, GeometryKind, Preset, TriangleMesh};
 
@@ -170,7 +170,7 @@ fn what_two_rays_are_told_of_two_blocks_together_is_what_each_is_told_alone() {
             let (origin, direction) = (3.0 * random.vector(), random.vector());
             let shear = Shear::new(&direction);
             let local = shear.local_origin(&origin, &DVec3::ZERO);
-            let narrow = NarrowRay {
+            let narrow = F32Ray {
                 axes: shear.axes,
                 origin: [local[0] as f32, local[1] as f32, local[2] as f32, 0.0],
                 shear: [shear.x as f32, shear.y as f32, 0.0, f32::INFINITY],
@@ -377,7 +377,7 @@ fn small_trees_of_triangles_alone_share_nothing() {
     let do_share = |geometries: Vec<Geometry>| {
         let accel = Accel::build(geometries, &BuildOptions::default()).unwrap();
         let places = accel.tree.blocks().places(&accel.tree.names).unwrap();
-        let sharing = places.iter().filter(|&&place| !accel.tree.block(place).is_unshared()).count();
+        let sharing = places.iter().filter(|&&place| !accel.tree.blocks().block(place).is_unshared()).count();
         assert!(sharing == 0 || 2 * sharing > places.len(), "{sharing} of {}", places.len());
         sharing != 0
     };
@@ -403,7 +403,7 @@ fn no_eight_coordinates_lie_in_two_cache_lines_where_corners_have_their_own() {
     let places = accel.tree.blocks().places(&accel.tree.names).unwrap();
     assert!(places.len() > 8);
     for place in places {
-        let block = accel.tree.block(place);
+        let block = accel.tree.blocks().block(place);
         assert!(block.is_unshared());
         for eight in block.own_corners().as_flattened() {
             let [first, last] = [&raw const eight[0], &raw const eight[BLOCK - 1]].map(|at| at.addr() / 64);
@@ -533,7 +533,7 @@ fn refitted_triangles_may_share_other_vertices() {
         assert!(accel.tree.blocks().places(&accel.tree.names).is_some());
         let rooms = |accel: &Accel| {
             let places = accel.tree.blocks().places(&accel.tree.names).unwrap();
-            places.iter().map(|&place| accel.tree.block(place).room()).max()
+            places.iter().map(|&place| accel.tree.blocks().block(place).room()).max()
         };
         assert_eq!(rooms(&accel), rooms(&fresh));
         for _ in 0..500 {

@@ -15,10 +15,11 @@ use super::scenes::{self, Random, build, with_every_preset};
 use super::single::check_packet;
 use crate::collapse::Entry;
 use crate::hulls::{HullBlock, HullRay, Hulls};
-use crate::lanes::{Level, glances_at, meet_hulls_at};
+use crate::lanes::{Level, meet_hulls_at};
 use crate::node::Units;
-use crate::packet::{self, PACKET};
-use crate::single;
+use crate::batch;
+use crate::batch::packet::PACKET;
+use crate::trace::decide::heights;
 use crate::triangles::{BLOCK, HeightRange};
 use crate::{Geometry, GeometryKind};
 
@@ -113,8 +114,6 @@ fn no_shape_that_is_met_is_lost_and_none_is_certain_that_is_not() {
         for reach in [1.5, 40.0, 3000.0] {
             let units = units(origin, reach * size);
             let (mut hits, mut misses, mut sure, mut spared) = (0, 0, 0, 0);
-            // What was asked before.
-            let mut before: Option<(HullBlock, HullRay, HeightRange)> = None;
             for _ in 0..150 {
                 let center = origin + 0.9 * (reach - 1.4) * size * random.vector();
                 let shapes: Vec<PlacedShape> =
@@ -126,14 +125,6 @@ fn no_shape_that_is_met_is_lost_and_none_is_certain_that_is_not() {
                     let length = ray.direction.abs().max_element();
                     let hulls = HullRay::new(&units, &ray, length);
                     let range = HeightRange::new((ray.t_min * length) as f32, (ray.t_max * length) as f32);
-                    if let Some((other, of_other, its_range)) = &before {
-                        for level in Level::all() {
-                            let (rays, ranges) = ([of_other, &hulls], [its_range, &range]);
-                            let [together, alone] = glances_at(level, [other, &block], rays, ranges);
-                            assert_eq!(together, alone, "{level:?}");
-                        }
-                    }
-                    before = Some((block, hulls, range));
                     for level in Level::all() {
                         let met = meet_hulls_at(level, &block, &hulls, &range);
                         assert_eq!(met.mask >> shapes.len(), 0, "{level:?}: of lanes that are not there");
@@ -141,7 +132,7 @@ fn no_shape_that_is_met_is_lost_and_none_is_certain_that_is_not() {
                             let (is_met, is_sure) = (met.mask >> lane & 1 == 1, met.sure >> lane & 1 == 1);
                             if let Some(root) = shape.closest(&ray) {
                                 assert!(is_met, "{level:?}: {shape:?} along {ray:?}");
-                                let (from, to) = single::heights(root.t, length);
+                                let (from, to) = heights(root.t, length);
                                 assert!(met.near[lane] <= to, "{from}: {shape:?} along {ray:?}");
                                 hits += 1;
                             } else {
@@ -294,7 +285,7 @@ fn rays_that_go_together_among_shapes_are_answered_as_each_alone() {
             for i in 0..if cfg!(miri) { 2 } else { 400 } {
                 let rays = alike(&mut random, &shapes[i % shapes.len()], center, size);
                 check_packet(&accel, &rays);
-                let answered = packet::answered_together(accel.level, &accel, &rays);
+                let answered = batch::shims::answered_by_packet(accel.level, &accel, &rays);
                 together += answered.count_ones();
                 apart += answered.count_zeros() - (32 - PACKET as u32);
             }

@@ -24,6 +24,7 @@ mod rebuild;
 mod refit;
 mod save;
 pub(crate) mod scenes;
+mod shims;
 mod single;
 mod small;
 mod spheres;

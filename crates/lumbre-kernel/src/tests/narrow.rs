@@ -10,13 +10,13 @@ use super::scenes::{
     self, Random, build, bumpy, cube, icosphere, mixture, options, precise, soup, torus, vertex,
     with_every_preset,
 };
-use crate::batch::Flying;
+use crate::batch;
 use crate::blocks::Line;
-use crate::holds::{Contents, SingleStart};
+use crate::holds::SingleStart;
 use crate::lanes::{Eight, Lanes, Level, Portable, Vector, start_narrow_by_four_at};
-use crate::narrow::{self, Precise, search_triangles};
+use crate::trace::f32_ray::Precise;
 use crate::node::Node;
-use crate::packet::PACKET;
+use crate::batch::packet::PACKET;
 use crate::{Accel, BuildOptions, Geometry, GeometryKind, Hit, Hit32, Instance, Preset, Ray32, TriangleMesh};
 
 const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
@@ -108,7 +108,7 @@ fn has_one_sign(edges: [f64; 3]) -> bool {
 /// What a tree of nothing but meshes answers, by a loop over all triangles where the ray comes from nearby; and whether it does.
 fn plainly(accel: &Accel, ray: &Ray32) -> (Option<Hit32>, bool) {
     let start = accel.single.as_ref().expect("made for this");
-    assert_eq!(start.contents, Contents::Triangles);
+    assert!(start.only_triangles);
     let Some(plain) = PlainRay::new(start, ray) else { return (widely(accel, ray), false) };
     let mut nearest: Option<Hit32> = None;
     for (geometry, Geometry { id, kind }) in accel.geometries.iter().enumerate() {
@@ -170,17 +170,11 @@ fn in_batch(accel: &Accel, level: Level, rays: &[Ray32], flies: bool) -> (Vec<Op
     let mut hits = vec![Some(STALE); rays.len()];
     // What would be wrong everywhere.
     let mut met: Vec<bool> = rays.iter().map(|ray| !accel.any_f32(ray)).collect();
-    let start = accel.single.as_ref().filter(|start| start.contents == Contents::Triangles);
-    match start.filter(|_| flies) {
-        Some(start) => {
-            let flying = Some(Flying::MIDDLE);
-            search_triangles::<narrow::Closest>(level, accel, start, rays, &mut hits, flying);
-            search_triangles::<narrow::Any>(level, accel, start, rays, &mut met, flying);
-        }
-        None => {
-            accel.closest_batch_f32_at(level, rays, &mut hits);
-            accel.any_batch_f32_at(level, rays, &mut met);
-        }
+    if flies {
+        batch::shims::f32(level, accel, rays, &mut hits, &mut met);
+    } else {
+        accel.closest_batch_f32_at(level, rays, &mut hits);
+        accel.any_batch_f32_at(level, rays, &mut met);
     }
     (hits, met)
 }
@@ -685,7 +679,7 @@ fn no_ray_from_within_leaks_at_a_corner_or_an_edge() {
         for (name, mesh, inside) in closed_meshes() {
             for (number, (mesh, from)) in placements(&mesh, inside).into_iter().enumerate() {
                 let accel = build(kinds(std::slice::from_ref(&mesh)));
-                assert_eq!(accel.single.as_ref().map(|start| start.contents), Some(Contents::Triangles));
+                assert_eq!(accel.only_triangles(), Some(true));
                 let mut triangle = 0;
                 let mut rays = Vec::new();
                 for i in 0..1608 {

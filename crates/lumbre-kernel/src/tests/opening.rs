@@ -14,7 +14,7 @@ use crate::collapse::Entry;
 use crate::opening::{Start, is_part};
 use crate::{
     Accel, BuildOptions, Geometry, GeometryKind, Instance, LoadError, MapError, Placement, Preset,
-    QueryOptions, SphereCloud, TriangleMesh,
+    Query, SphereCloud, TriangleMesh,
 };
 
 const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
@@ -240,8 +240,8 @@ fn other_queries_answer_as_without_opening() {
             let ray = ray(&mut random, CENTER, 2.0);
             let hit = opened.closest(&ray);
             for options in [
-                QueryOptions { mask: 1, ..Default::default() },
-                QueryOptions { mask: 6, exclude: hit.as_ref(), ..Default::default() },
+                Query { mask: 1, ..Query::new() },
+                Query { mask: 6, exclude: hit.as_ref(), ..Query::new() },
             ] {
                 assert_eq!(opened.closest_with(&ray, &options), whole.closest_with(&ray, &options));
                 assert_eq!(opened.any_with(&ray, &options), whole.any_with(&ray, &options));

@@ -6,9 +6,8 @@ use lumbre_geometry::Ray;
 use lumbre_math::{DVec3, Transform, Vec3};
 
 use super::scenes::{Random, balls, build, cube, icosphere, mixture, ray, shape, soup, with_every_preset};
-use crate::holds::Contents;
 use crate::lanes::Level;
-use crate::{Accel, Faces, GeometryKind, Hit, Instance, QueryOptions, TriangleMesh, brute};
+use crate::{Accel, Faces, GeometryKind, Hit, Instance, Query, TriangleMesh, brute};
 
 const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
 
@@ -25,7 +24,7 @@ fn masks(accel: &Accel, hit: &Hit) -> Vec<u32> {
     masks
 }
 
-fn counts(accel: &Accel, ray: &Ray, hit: &Hit, options: &QueryOptions) -> bool {
+fn counts(accel: &Accel, ray: &Ray, hit: &Hit, options: &Query) -> bool {
     let is_front = accel.surface(ray, hit).normal.dot(ray.direction) < 0.0;
     let is_face = match options.faces {
         Faces::Both => true,
@@ -59,8 +58,7 @@ fn options_leave_what_a_filter_leaves() {
         }));
     }
     let accel = build(kinds);
-    let contents = accel.single.as_ref().map(|start| start.contents);
-    assert!(matches!(contents, None | Some(Contents::Anything | Contents::Spheres)));
+    assert_ne!(accel.only_triangles(), Some(true));
     // At first there are masks in instances alone, and then everywhere.
     check(&accel, &mut random);
     let placed = Instance { accel: Arc::new(accel), world_from_object: Transform::IDENTITY.into() };
@@ -103,7 +101,7 @@ fn they_do_so_in_placed_trees_that_single_precision_searches() {
         let other = icosphere(1, zero, radius);
         let kinds = [mesh, other].map(|mesh| GeometryKind::Mesh(Arc::new(mesh)));
         let tree = build(kinds.to_vec());
-        assert!(tree.single.as_ref().is_some_and(|start| start.contents == Contents::Triangles));
+        assert_eq!(tree.only_triangles(), Some(true));
         Arc::new(tree.with_masks(vec![0b011_0000, 0b101_0000]))
     });
     let placed = |random: &mut Random, accel: &Arc<Accel>, at: DVec3| {
@@ -126,10 +124,11 @@ fn check(accel: &Accel, random: &mut Random) {
     for i in 0..3000 {
         let ray = ray(random, CENTER, 3.0);
         let all = brute::every(accel, &ray);
-        let options = QueryOptions {
+        let options = Query {
             mask: [u32::MAX, 0b001_0000, 0b110_0000][i % 3],
             exclude: if i % 2 == 0 { all.first() } else { None },
             faces: [Faces::Both, Faces::Front, Faces::Back][random.below(3)],
+            filter: None,
         };
         let expected = all.iter().find(|hit| counts(accel, &ray, hit, &options)).cloned();
         for level in Level::all() {
@@ -156,7 +155,7 @@ fn a_closed_mesh_has_as_many_fronts_as_backs() {
         let outside = CENTER + 9.0 * random.vector().normalize();
         let target = CENTER + 0.7 * random.vector();
         let ray = Ray::new(outside, target - outside);
-        let nearest = |faces| accel.closest_with(&ray, &QueryOptions { faces, ..QueryOptions::default() });
+        let nearest = |faces| accel.closest_with(&ray, &Query { faces, ..Query::new() });
         let (both, front, back) = (nearest(Faces::Both), nearest(Faces::Front), nearest(Faces::Back));
         // From without, a front comes first, and a back behind it.
         assert_eq!(both, front);
@@ -166,7 +165,7 @@ fn a_closed_mesh_has_as_many_fronts_as_backs() {
             // The other way round, what was a back is a front.
             let far = ray.at(back.root.t);
             let return_ray = Ray::new(far, outside - far).with_range(-1e-9, 1.0);
-            let options = QueryOptions { faces: Faces::Front, ..QueryOptions::default() };
+            let options = Query { faces: Faces::Front, ..Query::new() };
             assert!(accel.any_with(&return_ray, &options));
             hits += 1;
         }
@@ -181,9 +180,9 @@ fn by_default_nothing_is_left_out() {
     let mut hits = 0;
     for _ in 0..1500 {
         let ray = ray(&mut random, CENTER, 3.0);
-        let hit = accel.closest_with(&ray, &QueryOptions::default());
+        let hit = accel.closest_with(&ray, &Query::new());
         assert_eq!(hit, accel.closest(&ray));
-        assert_eq!(accel.any_with(&ray, &QueryOptions::default()), hit.is_some());
+        assert_eq!(accel.any_with(&ray, &Query::new()), hit.is_some());
         hits += usize::from(hit.is_some());
     }
     assert!(hits > 400, "{hits}");

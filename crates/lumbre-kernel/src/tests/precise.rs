@@ -10,7 +10,7 @@ use super::scenes::{
     Random, build, bumpy, cube, icosphere, mesh, precise, ray, soup, torus, with_every_preset,
 };
 use crate::{
-    Accel, BuildError, Faces, Geometry, GeometryKind, Instance, PreciseMesh, QueryOptions, TriangleMesh,
+    Accel, BuildError, Faces, Geometry, GeometryKind, Instance, PreciseMesh, Query, TriangleMesh,
 };
 
 fn kind(mesh: PreciseMesh) -> GeometryKind {
@@ -113,7 +113,7 @@ fn without_an_offset_it_answers_as_a_mesh_in_single_precision_does() {
         assert_eq!(a, b);
         assert_eq!(double.count(&ray), single.count(&ray));
         for faces in [Faces::Front, Faces::Back] {
-            let options = QueryOptions { faces, ..Default::default() };
+            let options = Query { faces, ..Query::new() };
             assert_eq!(double.closest_with(&ray, &options), single.closest_with(&ray, &options));
         }
         if let (Some(a), Some(b)) = (a, b) {

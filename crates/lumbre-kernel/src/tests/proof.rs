@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::scenes::{
     Random, build, bumpy, cloud, cube, icosphere, mixture, ray, shape, soup, torus, vertex, with_every_preset,
 };
-use crate::packet::PACKET;
+use crate::batch::packet::PACKET;
 use crate::{Accel, BuildOptions, Geometry, GeometryKind, Hit, Instance, Preset, TriangleMesh, brute};
 
 /// Closed meshes, each with a point inside.

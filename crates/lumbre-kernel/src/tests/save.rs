@@ -11,7 +11,7 @@ use crate::blocks::BlockNames;
 use crate::collapse::Packed;
 use crate::node::{Node, tag};
 use crate::save::check_structure;
-use crate::{Accel, BuildError, Geometry, GeometryKind, LoadError, QueryOptions, RefitError, TriangleMesh};
+use crate::{Accel, BuildError, Geometry, GeometryKind, LoadError, Query, RefitError, TriangleMesh};
 
 const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
 
@@ -160,7 +160,7 @@ fn masks_are_saved_and_stay_through_a_refit() {
     let ray = Ray::new(CENTER - 9.0 * DVec3::Z, DVec3::Z);
     let both = |accel: &Accel| {
         [1, 2, 8].map(|mask| {
-            let options = QueryOptions { mask, ..Default::default() };
+            let options = Query { mask, ..Query::new() };
             accel.closest_with(&ray, &options).map(|hit| hit.geometry)
         })
     };

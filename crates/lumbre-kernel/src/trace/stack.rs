@@ -1,42 +1,41 @@
-//! The stack of a search: a short array, and the heap for what no longer fits.
+//! The stack of a traversal, and the two goals that decide in which order it is filled: the closest hit and any hit.
 
 use crate::lanes::{self, LANE_BITS, Lanes, Room, Slots};
 use crate::node::{Node, WIDTH};
 
-/// Entries in the array: many more than a search usually has, but few in tests, where they are not to do always.
+/// Entries in the array. Few in tests, so that spilling is tested.
 pub(crate) const STACK: usize = if cfg!(test) { 3 * WIDTH } else { 256 };
 
-/// The key of a distance above, a reference below: entries have the order of their distances.
+/// The key of a distance in the upper half, a reference in the lower: entries order by distance.
 #[inline(always)]
 pub(crate) fn stack_entry(key: i32, reference: u32) -> i64 {
     (i64::from(key) << 32) | i64::from(reference)
 }
 
-/// In which order a search takes the children of a node.
-pub(crate) trait Order {
-    /// What stands on the stack.
+/// What a traversal looks for, which decides the order of a node's children.
+pub(crate) trait Goal {
+    /// Whether any hit ends the traversal.
+    const IS_ANY: bool;
+    /// What the stack holds for a subtree.
     type Entry: Copy;
-    /// Whether a child alone is put as many are, without a branch that would often be foreseen wrongly.
-    const PUTS_ONE: bool;
-    /// An entry that is never left out.
+    /// An entry that is never culled.
     fn entry(reference: u32) -> Self::Entry;
-    /// What it refers to.
+    /// The subtree of an entry.
     fn reference(entry: Self::Entry) -> u32;
-    /// Whether it lies wholly beyond where a ray ends.
+    /// Whether its bounding box lies beyond the end of the ray.
     fn is_beyond(entry: Self::Entry, s_max: f32) -> bool;
-    /// Puts the children in `mask`, two or more, or one or more, onto the stack but for the first to be taken, which it answers.
+    /// Pushes the children in `mask` (two or more; for any hit one or more) but for the first to be visited, which is returned.
     fn push_children<L: Lanes>(node: &Node, mask: u32, enter: L::Wide, room: Room<Self::Entry>) -> u32;
-    /// The same without a branch, as far as it can be: puts all, and takes what then is the last. Where one alone is put as many are,
-    /// `mask` may be empty, too: that is what was there before, then.
-    fn put_and_take<L: Lanes>(node: &Node, mask: u32, enter: L::Wide, slots: &mut Slots<Self::Entry>) -> u32;
+    /// The same with hardly a branch: pushes all, then pops one. For any hit `mask` may be empty.
+    fn push_and_pop<L: Lanes>(node: &Node, mask: u32, enter: L::Wide, slots: &mut Slots<Self::Entry>) -> u32;
 }
 
-/// The nearest first.
-pub(crate) enum ByDistance {}
+/// The closest hit: nearer children first.
+pub(crate) enum ClosestHit {}
 
-impl Order for ByDistance {
+impl Goal for ClosestHit {
+    const IS_ANY: bool = false;
     type Entry = i64;
-    const PUTS_ONE: bool = false;
 
     #[inline(always)]
     fn entry(reference: u32) -> i64 {
@@ -59,17 +58,17 @@ impl Order for ByDistance {
     }
 
     #[inline(always)]
-    fn put_and_take<L: Lanes>(node: &Node, mask: u32, enter: L::Wide, slots: &mut Slots<i64>) -> u32 {
+    fn push_and_pop<L: Lanes>(node: &Node, mask: u32, enter: L::Wide, slots: &mut Slots<i64>) -> u32 {
         lanes::put_and_take_by_distance(node, mask, enter, slots)
     }
 }
 
-/// The last of a node first, wherever they are.
-pub(crate) enum AsBuilt {}
+/// Any hit: children in the order that the build chose for that, the last first.
+pub(crate) enum AnyHit {}
 
-impl Order for AsBuilt {
+impl Goal for AnyHit {
+    const IS_ANY: bool = true;
     type Entry = u32;
-    const PUTS_ONE: bool = true;
 
     #[inline(always)]
     fn entry(reference: u32) -> u32 {
@@ -92,16 +91,16 @@ impl Order for AsBuilt {
     }
 
     #[inline(always)]
-    fn put_and_take<L: Lanes>(node: &Node, mask: u32, _: L::Wide, slots: &mut Slots<u32>) -> u32 {
+    fn push_and_pop<L: Lanes>(node: &Node, mask: u32, _: L::Wide, slots: &mut Slots<u32>) -> u32 {
         lanes::put_and_take_as_built::<L::Wide>(node, mask, slots)
     }
 }
 
-/// Last in, first out.
+/// A stack that grows without bound: an array, and the heap for what no longer fits.
 pub(crate) struct Stack<E> {
-    // With room for all children of a node.
+    // Always has room for all children of a node.
     slots: Slots<E>,
-    // The ones below them: apart, for there seldom are any.
+    // The entries below those of the array; rarely used.
     spilled: Option<Box<Spilled<E>>>,
 }
 
@@ -115,8 +114,7 @@ impl<E: Copy> Stack<E> {
         Self { slots: Slots::new(), spilled: None }
     }
 
-    /// Has entries put into the room for all children of a node that there always is. Only afterwards, when nothing else has to be
-    /// kept in registers meanwhile, it is made anew.
+    /// Pushes the children of a node. The array spills afterwards, when fewer registers are live.
     #[inline(always)]
     pub(crate) fn put<T>(&mut self, put: impl FnOnce(Room<'_, E>) -> T) -> T {
         let result = put(self.slots.room());

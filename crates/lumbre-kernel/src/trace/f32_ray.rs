@@ -1,4 +1,4 @@
-//! Rays in single precision, in trees of nothing but meshes: what is asked where speed counts more than the last digits.
+//! Rays in single precision, in trees of nothing but triangles: for those to whom speed counts more than the last digits.
 //!
 //! The test is that of S. Woop, C. Benthin, I. Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013, and simpler than the one
 //! in double precision (see [`triangles`](crate::triangles)): triangles are closed, so that a ray through an edge meets all that have it,
@@ -35,38 +35,23 @@
 //! So no box is passed by with a hit in it that is as near as the nearest: the answer is that of a loop over all triangles, whatever
 //! the tree.
 
-mod alone;
-mod batch;
-mod flyer;
-mod packet;
-
-use std::marker::PhantomData;
-
 use bytemuck::Zeroable;
 
-use crate::anything::Whole;
-use crate::batch::Ends;
+use super::cursor::NodeCursor;
+use super::decide::Decider;
+use super::leaves::nearest_of;
+use super::stack::{AnyHit, ClosestHit, Goal, Stack};
+use super::{LaneHits, Outcome};
 use crate::blocks::TriangleBlock;
-use crate::fleet::Crossing;
-use crate::holds::{Contents, SingleStart};
-use crate::lanes::{self, Asked, Axes, Eight, Lanes, Level, Question, Task, Vector, Wide};
-use crate::packet::Companion;
-use crate::query::All;
-use crate::single::{self, Alone, Exact, Outcome, Winner};
-use crate::single_spheres::AloneAmongSpheres;
-use crate::stack::{AsBuilt, ByDistance, Order};
-use crate::traverse::Place;
-use crate::triangles::BLOCK;
+use crate::holds::SingleStart;
+use crate::lanes::{self, Asked, Axes, Eight, Lanes, Level, Question, Vector, Wide};
+use crate::node::tag;
+use crate::triangles::{self, BLOCK};
 use crate::{Accel, Hit, Hit32, Ray32};
-
-pub(crate) use self::batch::search_all;
-#[cfg(test)]
-pub(crate) use self::batch::search_triangles;
-use self::packet::Packet;
 
 /// A ray in single precision among triangles.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct NarrowRay {
+pub(crate) struct F32Ray {
     /// The axes that become x, y and z; z is the direction's largest.
     pub(crate) axes: &'static Axes,
     /// Relative to the mesh, in the order of the axes; the last of four is the smallest `t`.
@@ -117,7 +102,7 @@ impl Precise {
 
 /// The least of the edge functions, or of their opposites, whichever is more: how far within the triangle the line is.
 #[inline(always)]
-fn within<V: Vector>([u, v, w]: [V; 3]) -> V {
+pub(crate) fn within<V: Vector>([u, v, w]: [V; 3]) -> V {
     let opposite = u.max(v).max(w).turned_by(V::splat(-0.0));
     u.min(v).min(w).max(opposite)
 }
@@ -126,7 +111,7 @@ fn within<V: Vector>([u, v, w]: [V; 3]) -> V {
 const TINY: f32 = 1.0 / (1u128 << 80) as f32;
 
 /// How a line passes the triangles of a block, as it is seen at first.
-struct Lines<E> {
+pub(crate) struct Lines<E> {
     /// The first of the two products that each edge function is the difference of.
     products: [E; 3],
     edges: [E; 3],
@@ -146,7 +131,7 @@ impl<E: Vector> Lines<E> {
 
     /// What is needed of triangles that it may pass through, and a bit for each of the mask that has to be looked at closer.
     #[inline(always)]
-    fn pass(self, mask: u32, precise: &Precise) -> (u32, Pass<E>) {
+    pub(crate) fn pass(self, mask: u32, precise: &Precise) -> (u32, Pass<E>) {
         let Self { products: [bc, ca, ab], edges: [u, v, w], within, heights: z } = self;
         let det = u + v + w;
         let largest = bc.larger(ca).larger(ab);
@@ -165,7 +150,7 @@ pub(crate) struct Pass<E> {
 }
 
 /// How a line passes the triangles of a block, and which of these its ray meets.
-type Passed<E> = (Crossing<E>, Pass<E>);
+type Passed<E> = (LaneHits<E>, Pass<E>);
 
 impl<E: Eight> Pass<E> {
     /// The weights of one.
@@ -186,14 +171,14 @@ impl<E: Eight> Pass<E> {
 impl<W: Wide> Pass<W> {
     /// That of one of the two: `which` is 0 or 1.
     #[inline(always)]
-    fn half(&self, which: usize) -> Pass<W::Half> {
+    pub(crate) fn half(&self, which: usize) -> Pass<W::Half> {
         let Self { height, weights: [v, w, det] } = self;
         Pass { height: height.half(which), weights: [v.half(which), w.half(which), det.half(which)] }
     }
 
     /// Those of two.
     #[inline(always)]
-    fn of_two(first: &Pass<W::Half>, second: &Pass<W::Half>) -> Self {
+    pub(crate) fn of_two(first: &Pass<W::Half>, second: &Pass<W::Half>) -> Self {
         Self {
             height: W::of_two(first.height, second.height),
             weights: lanes::three_of_two(&first.weights, &second.weights),
@@ -210,11 +195,11 @@ pub(crate) struct Nearest {
     weights: [f32; 3],
 }
 
-const _: () = assert!(size_of::<NarrowRay>() + size_of::<Nearest>() <= 64);
+const _: () = assert!(size_of::<F32Ray>() + size_of::<Nearest>() <= 64);
 
 impl Nearest {
     /// There is no block there: it would reach beyond where blocks may begin.
-    const NONE: Self = Self { place: u32::MAX, weights: [0.0; 3] };
+    pub(crate) const NONE: Self = Self { place: u32::MAX, weights: [0.0; 3] };
 
     #[inline(always)]
     fn new(block: u32, lane: u32, weights: [f32; 3]) -> Self {
@@ -235,33 +220,33 @@ impl Nearest {
     #[inline(always)]
     fn take<E: Eight>(
         &mut self,
-        exact: &Exact,
-        ray: &mut NarrowRay,
+        decider: &Decider,
+        ray: &mut F32Ray,
         place: u32,
-        crossing: &Crossing<E>,
+        crossing: &LaneHits<E>,
         pass: &Pass<E>,
     ) -> bool {
-        let &Crossing { met, unclear, at } = crossing;
+        let &LaneHits { met, unclear, at } = crossing;
         if met | unclear == 0 {
             return false;
         }
         let t = at.to_array();
-        let lane = single::nearest_of(met, &t);
-        self.take_nearest(exact, ray, place, crossing, pass, (lane, t[lane]))
+        let lane = nearest_of(met, &t);
+        self.take_nearest(decider, ray, place, crossing, pass, (lane, t[lane]))
     }
 
     /// The same where it is known in which lane the ray meets the nearest, if it does meet any, and at which `t`.
     #[inline(always)]
-    fn take_nearest<E: Eight>(
+    pub(crate) fn take_nearest<E: Eight>(
         &mut self,
-        exact: &Exact,
-        ray: &mut NarrowRay,
+        decider: &Decider,
+        ray: &mut F32Ray,
         place: u32,
-        crossing: &Crossing<E>,
+        crossing: &LaneHits<E>,
         pass: &Pass<E>,
         (lane, t): (usize, f32),
     ) -> bool {
-        let &Crossing { met, unclear, at } = crossing;
+        let &LaneHits { met, unclear, at } = crossing;
         let others = at.at_most(E::splat(t)) & met & !(1 << lane);
         if unclear | others == 0 && t < ray.t_max() {
             *self = Self::new(place, lane as u32, pass.weights_of(lane));
@@ -269,7 +254,7 @@ impl Nearest {
             return true;
         }
         let at = at.to_array();
-        self.take_closely(exact, ray, place, &Crossing { met, unclear, at }, &pass.all_weights())
+        self.take_closely(decider, ray, place, &LaneHits { met, unclear, at }, &pass.all_weights())
     }
 
     /// The same where a triangle has to be looked at closer, or two are met at the same place, of whatever block.
@@ -277,13 +262,13 @@ impl Nearest {
     #[inline(never)]
     fn take_closely(
         &mut self,
-        exact: &Exact,
-        ray: &mut NarrowRay,
+        decider: &Decider,
+        ray: &mut F32Ray,
         place: u32,
-        crossing: &Crossing<[f32; BLOCK]>,
+        crossing: &LaneHits<[f32; BLOCK]>,
         weights: &[[f32; BLOCK]; 3],
     ) -> bool {
-        let &Crossing { met, unclear, ref at } = crossing;
+        let &LaneHits { met, unclear, ref at } = crossing;
         let mut is_nearer = false;
         let mut rest = met | unclear;
         while rest != 0 {
@@ -293,12 +278,12 @@ impl Nearest {
                 let lane = lane as usize % BLOCK;
                 (at[lane], weights.map(|weights| weights[lane]))
             } else {
-                match ray.cross_exactly(exact.block(place), lane) {
+                match ray.cross_exactly(decider.block(place), lane) {
                     Some(crossing) => crossing,
                     None => continue,
                 }
             };
-            if t < ray.t_max() || t == ray.t_max() && self.comes_after(exact, place, lane) {
+            if t < ray.t_max() || t == ray.t_max() && self.comes_after(decider, place, lane) {
                 *self = Self::new(place, lane, weights);
                 ray.end_at(t);
                 is_nearer = true;
@@ -308,23 +293,23 @@ impl Nearest {
     }
 
     /// Whether a triangle that is met where this is comes before it.
-    fn comes_after(&self, exact: &Exact, block: u32, lane: u32) -> bool {
+    fn comes_after(&self, decider: &Decider, block: u32, lane: u32) -> bool {
         match self.triangle() {
-            Some((own_block, own_lane)) => exact.names(block, lane) < exact.names(own_block, own_lane),
+            Some((own_block, own_lane)) => decider.ids(block, lane) < decider.ids(own_block, own_lane),
             None => true,
         }
     }
 
     /// As a hit at this `t`, if there is one.
     #[inline(always)]
-    fn hit(&self, exact: &Exact, t: f32) -> Option<Hit32> {
+    pub(crate) fn hit(&self, decider: &Decider, t: f32) -> Option<Hit32> {
         let (block, lane) = self.triangle()?;
-        let (geometry, primitive) = exact.names(block, lane);
+        let (geometry, primitive) = decider.ids(block, lane);
         let [v, w, det] = self.weights;
         Some(Hit32 {
             t,
             local: [v / det, w / det],
-            id: exact.accel().geometries[geometry as usize].id,
+            id: decider.accel().geometries[geometry as usize].id,
             primitive,
             geometry,
             instance: Hit32::NO_INSTANCE,
@@ -332,7 +317,7 @@ impl Nearest {
     }
 }
 
-impl NarrowRay {
+impl F32Ray {
     /// Of no ray.
     pub(crate) fn of_none() -> Self {
         Self { axes: Axes::by_bits(0, 0), origin: [0.0; 4], shear: [0.0; 4], minus_inverse: 0.0 }
@@ -344,7 +329,7 @@ impl NarrowRay {
     }
 
     #[inline(always)]
-    fn t_max(&self) -> f32 {
+    pub(crate) fn t_max(&self) -> f32 {
         self.shear[3]
     }
 
@@ -355,21 +340,21 @@ impl NarrowRay {
 
     /// How the line of the ray passes the triangles of a block, and a bit for each that it may pass through. `IS_ALONE` as in [`Lanes::narrow_corners`].
     #[inline(always)]
-    fn lines<L: Lanes, const IS_ALONE: bool>(&self, block: &TriangleBlock) -> (u32, Lines<L::Eight>) {
+    pub(crate) fn lines<L: Lanes, const IS_ALONE: bool>(&self, block: &TriangleBlock) -> (u32, Lines<L::Eight>) {
         let (mask, lines) = Lines::of(L::narrow_corners::<IS_ALONE>(block, lanes::opaque(self)));
         (mask & block.taken(), lines)
     }
 
     /// The same of two rays, each among the triangles of its block: those of the first, and those of the second.
     #[inline(always)]
-    fn lines_by_two<L: Lanes>(rays: [&Self; 2], blocks: [&TriangleBlock; 2]) -> (u32, Lines<L::Wide>) {
+    pub(crate) fn lines_by_two<L: Lanes>(rays: [&Self; 2], blocks: [&TriangleBlock; 2]) -> (u32, Lines<L::Wide>) {
         let (mask, lines) = Lines::of(L::narrow_corners_by_two(blocks, rays));
         (mask & (blocks[0].taken() | blocks[1].taken() << BLOCK), lines)
     }
 
     /// Where the ray meets the triangles of a block that its line passes so, and which of those in the mask it does meet.
     #[inline(always)]
-    fn cross<E: Eight>(&self, mask: u32, pass: &Pass<E>) -> (u32, E) {
+    pub(crate) fn cross<E: Eight>(&self, mask: u32, pass: &Pass<E>) -> (u32, E) {
         // Read again: most lines pass through few blocks.
         let ray = lanes::opaque(self);
         let t = pass.height.over(pass.weights[2]) * E::splat(ray.minus_inverse);
@@ -385,13 +370,13 @@ impl NarrowRay {
         }
         let (unclear, pass) = lines.pass(mask, precise);
         let (met, at) = self.cross(mask & !unclear, &pass);
-        Some((Crossing { met, unclear, at }, pass))
+        Some((LaneHits { met, unclear, at }, pass))
     }
 
     /// Where the ray meets a triangle, by exact products; the weights of the second and third corner, and the sum of all.
     #[cold]
     #[inline(never)]
-    fn cross_exactly(&self, block: &TriangleBlock, lane: u32) -> Option<(f32, [f32; 3])> {
+    pub(crate) fn cross_exactly(&self, block: &TriangleBlock, lane: u32) -> Option<(f32, [f32; 3])> {
         let corners = self.axes.gather(block, lane as usize).map(|[x, y, z]| {
             let height = self.origin[2] - z;
             let x = (self.origin[0] - x) - self.shear[0] * height;
@@ -414,7 +399,7 @@ impl NarrowRay {
     #[inline(always)]
     fn meets_any<L: Lanes>(&self, precise: &Precise, block: &TriangleBlock) -> bool {
         match self.pass::<L>(precise, block) {
-            Some((Crossing { met, unclear, .. }, _)) => {
+            Some((LaneHits { met, unclear, .. }, _)) => {
                 met != 0 || unclear != 0 && self.meets_exactly(block, unclear)
             }
             None => false,
@@ -424,7 +409,7 @@ impl NarrowRay {
     /// Whether the ray meets one of these.
     #[cold]
     #[inline(never)]
-    fn meets_exactly(&self, block: &TriangleBlock, mut mask: u32) -> bool {
+    pub(crate) fn meets_exactly(&self, block: &TriangleBlock, mut mask: u32) -> bool {
         while mask != 0 {
             let lane = mask.trailing_zeros();
             mask &= mask - 1;
@@ -436,144 +421,47 @@ impl NarrowRay {
     }
 }
 
-/// What is asked of a ray.
-pub(crate) trait Goal: Sized {
-    /// Which boxes come first.
-    type Order: Order;
-    /// What is handed out.
-    type Answer: Copy;
-    /// Whether any hit will do.
-    const IS_ANY: bool;
-    /// The question of a ray alone, at a level.
-    fn alone_at(level: Level) -> Asked<Self::Answer, Ray32> {
-        level.asked::<Narrowly<Self>>()
-    }
-    /// The same in double precision.
-    type Wide: Companion;
-    /// What that finds in a tree itself, rounded.
-    fn rounded(accel: &Accel, answer: <Self::Wide as single::Goal>::Answer) -> Self::Answer;
-    /// The same, put there: what goes through memory is waited for.
-    #[inline(always)]
-    fn put_rounded(accel: &Accel, answer: <Self::Wide as single::Goal>::Answer, place: &mut Self::Answer) {
-        *place = Self::rounded(accel, answer);
-    }
-    /// The same of what it hands out.
-    fn rounded_found(found: <Self::Wide as single::Goal>::Found) -> Self::Answer;
-    /// Searches along a ray alone; not where it does not come from nearby.
-    fn alone<L: Lanes>(exact: &Exact, ray: &Ray32) -> Outcome<Self::Answer>;
-    /// What double precision says.
-    fn widely(accel: &Accel, ray: &Ray32) -> Self::Answer;
-    /// The answer of a ray in flight: whether any hit `is_met`, or the nearest, at this `t`.
-    fn answer(exact: &Exact, is_met: bool, nearest: &Nearest, t: f32) -> Self::Answer;
-    /// Puts the answers of rays that went together, the first of which has this position.
-    fn answer_together<L: Lanes>(packet: &Packet, first: usize, ends: &mut impl Ends<Self::Answer>);
-}
-
-/// The nearest hit.
-pub(crate) enum Closest {}
-
-/// Whether there is a hit.
-pub(crate) enum Any {}
-
-impl Goal for Closest {
-    type Order = ByDistance;
-    type Answer = Option<Hit32>;
-    type Wide = single::Nearest;
-    const IS_ANY: bool = false;
-
-    #[inline(always)]
-    fn rounded(accel: &Accel, winner: Option<Winner>) -> Option<Hit32> {
-        // No `map`: it does not take on the instruction set of who calls it.
-        Some(rounded(accel, &winner?))
-    }
-
-    #[inline(always)]
-    fn put_rounded(accel: &Accel, winner: Option<Winner>, place: &mut Option<Hit32>) {
-        match winner {
-            Some(winner) => *place = Some(rounded(accel, &winner)),
-            None => *place = None,
+/// Traverses a tree of triangles. Where any hit will do, there is no more to know of it.
+#[inline(always)]
+pub(crate) fn traverse<G: Goal, L: Lanes>(decider: &Decider, ray: &Ray32) -> Outcome<Option<Hit32>> {
+    let start = decider.start;
+    let Some(slabs) = L::start_narrow(start, ray) else { return Outcome::Uncertain };
+    let mut cursor = NodeCursor::<L>::new(decider.nodes(), slabs);
+    let mut stack = Stack::new();
+    let Some(mut leaf) = cursor.descend::<G>(start.root, &mut stack) else { return Outcome::Certain(None) };
+    let mut ray = L::start_narrow_blocks(start, lanes::opaque(ray), &cursor.slabs);
+    let mut nearest = Nearest::NONE;
+    loop {
+        let mut place = leaf & tag::PLACE;
+        loop {
+            let block = decider.block(place);
+            if G::IS_ANY {
+                if ray.meets_any::<L>(&start.precise, block) {
+                    return Outcome::Certain(Some(SOME_HIT));
+                }
+            } else if let Some((hits, pass)) = ray.pass::<L>(&start.precise, block)
+                && nearest.take(decider, &mut ray, place, &hits, &pass)
+            {
+                cursor.slabs.end_at(triangles::beyond(ray.t_max()));
+            }
+            match block.next(place) {
+                Some(next) => place = next,
+                None => break,
+            }
+        }
+        match cursor.next_leaf::<G>(&mut stack) {
+            Some(next) => leaf = next,
+            None => return Outcome::Certain(nearest.hit(decider, ray.t_max())),
         }
     }
-
-    #[inline(always)]
-    fn rounded_found(found: Option<Hit>) -> Option<Hit32> {
-        found.as_ref().map(narrowed)
-    }
-
-    #[inline(always)]
-    fn alone<L: Lanes>(exact: &Exact, ray: &Ray32) -> Outcome<Self::Answer> {
-        alone::closest::<L>(exact, ray)
-    }
-
-    #[inline(never)]
-    fn widely(accel: &Accel, ray: &Ray32) -> Option<Hit32> {
-        accel.closest(&ray.to_f64()).map(|hit| narrowed(&hit))
-    }
-
-    #[inline(always)]
-    fn answer(exact: &Exact, _: bool, nearest: &Nearest, t: f32) -> Option<Hit32> {
-        nearest.hit(exact, t)
-    }
-
-    #[inline(always)]
-    fn answer_together<L: Lanes>(packet: &Packet, first: usize, ends: &mut impl Ends<Option<Hit32>>) {
-        packet.put_nearest::<L>(first, ends);
-    }
 }
 
-impl Goal for Any {
-    type Order = AsBuilt;
-    type Answer = bool;
-    type Wide = single::Whether;
-    const IS_ANY: bool = true;
-
-    #[inline(always)]
-    fn rounded(_: &Accel, is_met: bool) -> bool {
-        is_met
-    }
-
-    #[inline(always)]
-    fn rounded_found(is_met: bool) -> bool {
-        is_met
-    }
-
-    #[inline(always)]
-    fn alone<L: Lanes>(exact: &Exact, ray: &Ray32) -> Outcome<bool> {
-        alone::any::<L>(exact, ray)
-    }
-
-    #[inline(never)]
-    fn widely(accel: &Accel, ray: &Ray32) -> bool {
-        accel.any(&ray.to_f64())
-    }
-
-    #[inline(always)]
-    fn answer(_: &Exact, is_met: bool, _: &Nearest, _: f32) -> bool {
-        is_met
-    }
-
-    #[inline(always)]
-    fn answer_together<L: Lanes>(packet: &Packet, first: usize, ends: &mut impl Ends<bool>) {
-        packet.put_met(first, ends);
-    }
-}
-
-/// A hit that a tree has itself, in double precision, rounded.
-#[inline(always)]
-fn rounded(accel: &Accel, winner: &Winner) -> Hit32 {
-    let &Winner { root, geometry, primitive } = winner;
-    Hit32 {
-        t: root.t as f32,
-        local: [root.local.x as f32, root.local.y as f32],
-        id: accel.geometries[geometry as usize].id,
-        primitive,
-        geometry,
-        instance: Hit32::NO_INSTANCE,
-    }
-}
+/// Where any hit will do.
+pub(crate) const SOME_HIT: Hit32 =
+    Hit32 { t: 0.0, local: [0.0; 2], id: 0, primitive: 0, geometry: 0, instance: Hit32::NO_INSTANCE };
 
 /// An answer in double precision, rounded.
-fn narrowed(hit: &Hit) -> Hit32 {
+pub(crate) fn rounded(hit: &Hit) -> Hit32 {
     Hit32 {
         t: hit.root.t as f32,
         local: [hit.root.local.x as f32, hit.root.local.y as f32],
@@ -584,119 +472,45 @@ fn narrowed(hit: &Hit) -> Hit32 {
     }
 }
 
-/// What is asked of rays in single precision, one after another.
+/// [`Accel::closest_f32`] and [`Accel::any_f32`] in trees of triangles, by function pointers for the instruction set.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct NarrowQuestions {
-    /// [`Accel::closest_f32`].
+pub(crate) struct F32Queries {
     pub(crate) closest: Asked<Option<Hit32>, Ray32>,
-    /// [`Accel::any_f32`].
     pub(crate) any: Asked<bool, Ray32>,
 }
 
-impl NarrowQuestions {
-    pub(crate) fn new(level: Level, start: Option<&SingleStart>) -> Self {
-        match start.map(|start| start.contents) {
-            Some(Contents::Triangles) => {
-                Self { closest: level.asked::<Narrowly<Closest>>(), any: level.asked::<Narrowly<Any>>() }
-            }
-            Some(Contents::Shapes) => Self {
-                closest: level.asked::<AmongShapes<Closest>>(),
-                any: level.asked::<AmongShapes<Any>>(),
-            },
-            Some(Contents::Spheres) => Self {
-                closest: level.asked::<AmongSpheres<Closest>>(),
-                any: level.asked::<AmongSpheres<Any>>(),
-            },
-            Some(Contents::Anything) => Self {
-                closest: level.asked::<AmongAnything<Closest>>(),
-                any: level.asked::<AmongAnything<Any>>(),
-            },
-            None => Self { closest: level.asked::<Widely<Closest>>(), any: level.asked::<Widely<Any>>() },
+impl F32Queries {
+    /// `None` for a tree of anything else.
+    pub(crate) fn new(level: Level, start: Option<&SingleStart>) -> Option<Self> {
+        let start = start?;
+        start.only_triangles.then(|| Self { closest: level.asked::<ClosestHit>(), any: level.asked::<AnyHit>() })
+    }
+}
+
+impl Question for ClosestHit {
+    type Ray = Ray32;
+    type Answer = Option<Hit32>;
+
+    #[inline(always)]
+    fn ask<L: Lanes>(accel: &Accel, ray: &Ray32) -> Option<Hit32> {
+        let Some(start) = &accel.single else { return accel.closest_widened(ray) };
+        match traverse::<Self, L>(&Decider::new(accel, start), &L::read_narrow(ray)) {
+            Outcome::Certain(hit) => hit,
+            Outcome::Uncertain => accel.closest_widened(ray),
         }
     }
 }
 
-/// In single precision.
-struct Narrowly<G>(PhantomData<G>);
-/// In double precision, rounded, in a tree of shapes and custom geometry, too.
-struct AmongShapes<G>(PhantomData<G>);
-/// The same in a tree of nothing but spheres.
-struct AmongSpheres<G>(PhantomData<G>);
-/// The same in a tree of anything.
-struct AmongAnything<G>(PhantomData<G>);
-/// In double precision, rounded.
-struct Widely<G>(PhantomData<G>);
-
-impl<G: Goal> Question for Narrowly<G> {
+impl Question for AnyHit {
     type Ray = Ray32;
-    type Answer = G::Answer;
+    type Answer = bool;
 
     #[inline(always)]
-    fn ask<L: Lanes>(accel: &Accel, ray: &Ray32) -> G::Answer {
-        match &accel.single {
-            Some(start) => alone::search::<G, L>(&Exact::new(accel, start), ray),
-            None => G::widely(accel, ray),
+    fn ask<L: Lanes>(accel: &Accel, ray: &Ray32) -> bool {
+        let Some(start) = &accel.single else { return accel.any_widened(ray) };
+        match traverse::<Self, L>(&Decider::new(accel, start), &L::read_narrow(ray)) {
+            Outcome::Certain(hit) => hit.is_some(),
+            Outcome::Uncertain => accel.any_widened(ray),
         }
-    }
-}
-
-impl<G: Goal> Question for AmongShapes<G> {
-    type Ray = Ray32;
-    type Answer = G::Answer;
-
-    #[inline(always)]
-    fn ask<L: Lanes>(accel: &Accel, ray: &Ray32) -> G::Answer {
-        if let Some(start) = &accel.single
-            && let wide = L::read_widened(ray)
-            && let Outcome::Settled(answer) = Alone::<G::Wide, true>::new(accel, start, &wide).run::<L>()
-        {
-            return G::rounded(accel, answer);
-        }
-        G::widely(accel, ray)
-    }
-}
-
-impl<G: Goal> Question for AmongSpheres<G> {
-    type Ray = Ray32;
-    type Answer = G::Answer;
-
-    #[inline(always)]
-    fn ask<L: Lanes>(accel: &Accel, ray: &Ray32) -> G::Answer {
-        if let Some(start) = &accel.single
-            && let wide = L::read_widened(ray)
-            && let Outcome::Settled(answer) =
-                AloneAmongSpheres::<G::Wide>::new(accel, start, start.root, &wide).run::<L>()
-        {
-            return G::rounded(accel, answer);
-        }
-        G::widely(accel, ray)
-    }
-}
-
-impl<G: Goal> Question for AmongAnything<G> {
-    type Ray = Ray32;
-    type Answer = G::Answer;
-
-    #[inline(always)]
-    fn ask<L: Lanes>(accel: &Accel, ray: &Ray32) -> G::Answer {
-        let around = &Place::default();
-        if let Some(start) = &accel.single
-            && let wide = L::read_widened(ray)
-            && let Outcome::Settled(found) =
-                Whole::<G::Wide, All>::new(accel, start, around, &wide).run::<L>()
-        {
-            return G::rounded_found(found);
-        }
-        G::widely(accel, ray)
-    }
-}
-
-impl<G: Goal> Question for Widely<G> {
-    type Ray = Ray32;
-    type Answer = G::Answer;
-
-    #[inline(always)]
-    fn ask<L: Lanes>(accel: &Accel, ray: &Ray32) -> G::Answer {
-        G::widely(accel, ray)
     }
 }

@@ -1,0 +1,384 @@
+//! Packets in single precision: triangles are tested by the operations of [`F32Ray`].
+//!
+//! What [`packet`](super::packet) says of boxes and triangles holds here. A ray's margin among boxes is that of its triangles and of the
+//! arithmetic; of the latter, which a frustum does in another order, twice as much is added. Triangles are culled by the same bounds,
+//! which allow 32u of their size for the roundings of a ray's sheared corners and of the middle's, where these are off by
+//! 8.1u and a little more.
+
+use std::marker::PhantomData;
+
+use super::Sink;
+use super::packet::{ALL, Bundle, Cull, CullBounds, Effort, PACKET, Signs, SlabRows, Start, State};
+use crate::blocks::TriangleBlock;
+use crate::lanes::{self, Axes, Corners, Lanes, Row, Vector, Wide};
+use crate::node::Units;
+use crate::trace::Outcome;
+use crate::trace::decide::Decider;
+use crate::trace::f32_ray::{F32Ray, SOME_HIT, within};
+use crate::trace::stack::Goal;
+use crate::triangles::{BEYOND, beyond};
+use crate::{Hit32, Ray32};
+
+/// The rays of a packet.
+pub(super) struct F32Bundle<'a, 'd, G> {
+    decider: &'d Decider<'a>,
+    /// The rays, number by number: origin (relative to the mesh once they have started), first `t`, direction, last `t`.
+    rows: [Row<f32>; 8],
+    axes: &'static Axes,
+    /// Each among triangles, as a [`F32Ray`].
+    origin: [Row<f32>; 3],
+    shear: [Row<f32>; 2],
+    minus_inverse: Row<f32>,
+    t_min: Row<f32>,
+    /// Ends at the closest hit.
+    t_max: Row<f32>,
+    /// The triangle of the closest hit: eight times the place of its block, and the lane.
+    triangle: Row<f32>,
+    /// Its weights: of the second and the third corner, and of all.
+    weights: [Row<f32>; 3],
+    has_one_origin: bool,
+    goal: PhantomData<G>,
+}
+
+/// No triangle.
+const NONE: u32 = u32::MAX;
+
+impl<G: Goal> F32Bundle<'_, '_, G> {
+    /// Those of some rays for which a triangle that they hit at the same `t` as the best comes first by its ids.
+    #[cold]
+    #[inline(never)]
+    fn first_by_ids(&self, mut mask: u32, place: u32, lane: u32) -> u32 {
+        let mut first = 0;
+        while mask != 0 {
+            let i = mask.trailing_zeros() as usize % PACKET;
+            mask &= mask - 1;
+            let best = self.triangle.0[i].to_bits();
+            let is_first = self.decider.ids(place, lane) < self.decider.ids(best >> 3, best & 7);
+            first |= u32::from(is_first) << i;
+        }
+        first
+    }
+
+    /// One of the rays among triangles.
+    fn ray(&self, i: usize) -> F32Ray {
+        let [x, y, z] = [0, 1, 2].map(|axis| self.origin[axis].0[i]);
+        F32Ray {
+            axes: self.axes,
+            origin: [x, y, z, self.t_min.0[i]],
+            shear: [self.shear[0].0[i], self.shear[1].0[i], 1.0, self.t_max.0[i]],
+            minus_inverse: self.minus_inverse.0[i],
+        }
+    }
+
+    /// Decides exactly about a triangle that these rays may hit.
+    #[cold]
+    #[inline(never)]
+    fn decide(&mut self, state: &mut State, mut mask: u32, block: &TriangleBlock, place: u32, lane: u32) {
+        while mask != 0 {
+            let i = mask.trailing_zeros() as usize % PACKET;
+            mask &= mask - 1;
+            let Some((t, weights)) = self.ray(i).cross_exactly(block, lane) else { continue };
+            if G::IS_ANY {
+                state.stop_at_hits(1 << i);
+                continue;
+            }
+            let is_first = self.triangle.0[i].to_bits() == NONE || t < self.t_max.0[i];
+            if is_first || self.first_by_ids(1 << i, place, lane) != 0 {
+                self.triangle.0[i] = f32::from_bits(place << 3 | lane);
+                for (row, weight) in self.weights.iter_mut().zip(weights) {
+                    row.0[i] = weight;
+                }
+                self.t_max.0[i] = t;
+                state.slabs.s_max.0[i] = beyond(t);
+            }
+        }
+        state.end_frustum();
+    }
+}
+
+impl<'a, 'd, G: Goal> Bundle<'a, 'd> for F32Bundle<'a, 'd, G> {
+    type Goal = G;
+    type Ray = Ray32;
+    type Answer = Option<Hit32>;
+    const GENERAL: bool = false;
+    const NEEDS_BOUNDS: bool = false;
+    const MOST_SPREAD: f32 = 0.3;
+
+    #[inline(always)]
+    fn new(decider: &'d Decider<'a>) -> Self {
+        let row = Row::of(0.0);
+        Self {
+            decider,
+            rows: [row; 8],
+            axes: Axes::by_bits(0, 0),
+            origin: [row; 3],
+            shear: [row; 2],
+            minus_inverse: row,
+            t_min: row,
+            t_max: row,
+            triangle: row,
+            weights: [row; 3],
+            has_one_origin: false,
+            goal: PhantomData,
+        }
+    }
+
+    // Less than in double precision, since interleaved rays are faster.
+    #[inline(always)]
+    fn effort(has_one_origin: bool) -> Effort {
+        match (has_one_origin, G::IS_ANY) {
+            (true, true) => Effort { most: 112, paying: 70 },
+            (true, false) => Effort { most: 210, paying: 84 },
+            (false, _) => Effort { most: 50, paying: 40 },
+        }
+    }
+
+    #[inline(always)]
+    fn load<L: Lanes>(&mut self, rays: &[Ray32; PACKET]) {
+        L::narrow_rows(rays, &mut self.rows);
+    }
+
+    #[inline(always)]
+    fn alike<L: Lanes>(&self, one: u32) -> (u32, Signs) {
+        let zero = L::Wide::splat(0.0);
+        let plus = L::Wide::splat(1.0);
+        let (x, y, z) =
+            (L::Wide::load(&self.rows[4].0), L::Wide::load(&self.rows[5].0), L::Wide::load(&self.rows[6].0));
+        let negative =
+            [plus.turned_by(x).below(zero), plus.turned_by(y).below(zero), plus.turned_by(z).below(zero)];
+        let (x, y, z) = (x.abs(), y.abs(), z.abs());
+        let x_is_last = y.at_most(x) & z.at_most(x);
+        let y_is_last = z.at_most(y) & !x_is_last;
+        Signs::of(one, negative, x_is_last, y_is_last)
+    }
+
+    #[inline(always)]
+    fn fill_up<L: Lanes>(&mut self, mask: u32) {
+        let one = mask.trailing_zeros() as usize % PACKET;
+        for row in &mut self.rows {
+            let (own, all) = (L::Wide::splat(row.0[one]), L::Wide::load(&row.0));
+            L::Wide::select(mask, all, own).store(row);
+        }
+    }
+
+    #[inline(always)]
+    fn start<L: Lanes>(&mut self, decider: &Decider, slabs: &mut SlabRows) -> Option<Start<L::Wide>> {
+        let (rows, start, splat) = (&mut self.rows, decider.start, L::Wide::splat);
+        let zero = splat(0.0);
+        let (t_min, t_max) = (L::Wide::load(&rows[3].0), L::Wide::load(&rows[7].0));
+        // As of a single ray: minus zero is negative.
+        let is_before = splat(1.0).turned_by(t_min).below(zero);
+        let mut fits = zero.at_most(t_min) & t_min.at_most(t_max) & !is_before;
+        let (mut is_long, mut is_near) = (0, true);
+        let (x, y, z) = (L::Wide::load(&rows[0].0), L::Wide::load(&rows[1].0), L::Wide::load(&rows[2].0));
+        let has_one_origin = x.are_equal() & y.are_equal() & z.are_equal();
+        self.has_one_origin = has_one_origin;
+        let (mut inverse, mut center, mut off) = ([zero; 3], [0.0; 3], [0.0; 3]);
+        for axis in 0..3 {
+            let direction = L::Wide::load(&rows[4 + axis].0);
+            let length = direction.abs();
+            fits &= length.at_most(splat(start.longest[axis]));
+            is_long |= splat(start.shortest).at_most(length);
+            inverse[axis] =
+                splat(start.space_per_unit).over(length.max(splat(start.tiny))).turned_by(direction);
+            inverse[axis].store(&mut slabs.inverse[axis]);
+            if has_one_origin {
+                let local = (f64::from(rows[axis].0[0]) - start.mesh_origin[axis]) as f32;
+                splat(local).store(&mut rows[axis]);
+                center[axis] = local * start.units_per_space - start.shift[axis];
+                is_near &= center[axis].abs() <= start.farthest[axis];
+            } else {
+                let local = L::Wide::load(&rows[axis].0).rounded_less(start.mesh_origin[axis]);
+                local.store(&mut rows[axis]);
+                let from = local * splat(start.units_per_space) - splat(start.shift[axis]);
+                let middle = from.middle();
+                fits &= from.abs().at_most(splat(start.farthest[axis]));
+                let margins = [start.narrow_margin, Units::NARROW_MARGIN_PER_DISTANCE];
+                slabs.set_axis(axis, from, inverse[axis], margins);
+                off[axis] = (from - middle).abs().most();
+                center[axis] = middle.first();
+            }
+        }
+        (fits & is_long == ALL && is_near).then_some(Start {
+            inverse,
+            range: [t_min, t_max],
+            center,
+            off,
+            // That of a single ray, and twice that of its arithmetic among boxes.
+            margin_per_distance: Units::NARROW_MARGIN_PER_DISTANCE + 2.0 * start.margin_per_distance,
+            margin: start.narrow_margin + 2.0 * start.margin,
+            has_one_origin,
+        })
+    }
+
+    #[inline(always)]
+    fn start_triangles<L: Lanes>(
+        &mut self,
+        decider: &Decider,
+        axes: &'static Axes,
+        slabs: &SlabRows,
+        cull: &mut Cull,
+    ) {
+        let (splat, order) = (L::Wide::splat, axes.order());
+        let inverse = L::Wide::load(&slabs.inverse[order[2]].0) * splat(decider.start.units_per_space);
+        (splat(0.0) - inverse).store(&mut self.minus_inverse);
+        let mut off = [splat(0.0); 3];
+        for (place, &axis) in order.iter().enumerate() {
+            let origin = L::Wide::load(&self.rows[axis].0);
+            origin.store(&mut self.origin[place]);
+            let middle = if self.has_one_origin { origin } else { origin.middle() };
+            off[place] = origin - middle;
+            cull.middle[place] = middle.first();
+        }
+        for place in 0..2 {
+            let shear = L::Wide::load(&self.rows[4 + order[place]].0) * inverse;
+            let middle = shear.middle();
+            shear.store(&mut self.shear[place]);
+            cull.middle_shear[place] = middle.first();
+            cull.spread[place] = (shear - middle).abs().most();
+            cull.apart[place] =
+                if self.has_one_origin { 0.0 } else { off[2].times_from(shear, off[place]).abs().most() };
+        }
+        cull.apart[2] = if self.has_one_origin { 0.0 } else { off[2].abs().most() };
+        (self.t_min, self.t_max, self.axes) = (self.rows[3], self.rows[7], axes);
+        splat(f32::from_bits(NONE)).store(&mut self.triangle);
+    }
+
+    #[inline(always)]
+    fn test_triangle<L: Lanes>(
+        &mut self,
+        state: &mut State,
+        _: &Cull,
+        (place, block, corners): (u32, &TriangleBlock, &Corners),
+        lane: usize,
+        _: &CullBounds,
+        _: &[Ray32; PACKET],
+    ) {
+        let own = lanes::opaque(self);
+        let (load, splat) = (L::Wide::load, L::Wide::splat);
+        let [kx, ky, kz] = own.axes.order();
+        let (ox, oy, oz) = (load(&own.origin[0].0), load(&own.origin[1].0), load(&own.origin[2].0));
+        let (sx, sy) = (load(&own.shear[0].0), load(&own.shear[1].0));
+        let at = |axis: usize, corner: usize| splat(corners[axis][corner][lane]);
+        // As `F32Ray::pass`, with the signs turned.
+        let (az, bz, cz) = (oz - at(kz, 0), oz - at(kz, 1), oz - at(kz, 2));
+        let ax = (ox - at(kx, 0)) - sx * az;
+        let bx = (ox - at(kx, 1)) - sx * bz;
+        let cx = (ox - at(kx, 2)) - sx * cz;
+        let ay = (oy - at(ky, 0)) - sy * az;
+        let by = (oy - at(ky, 1)) - sy * bz;
+        let cy = (oy - at(ky, 2)) - sy * cz;
+        let (bc, ca, ab) = (cx * by, ax * cy, bx * ay);
+        let (u, v, w) = (bc - cy * bx, ca - ay * cx, ab - by * ax);
+        let within = within([u, v, w]);
+        let mask = splat(0.0).at_most(within) & state.alive;
+        // Where any hit will do, to go on costs less than a branch that is often mispredicted.
+        if mask == 0 && !G::IS_ANY {
+            return;
+        }
+        let det = u + v + w;
+        let height = u * az + v * bz + w * cz;
+        let precise = &own.decider.start.precise;
+        let precise = precise.of(mask, bc.larger(ca).larger(ab), within, det, [az, bz, cz]);
+        let t = height.over(det) * load(&own.minus_inverse.0);
+        let t_max = load(&own.t_max.0);
+        let in_range = mask & precise & load(&own.t_min.0).at_most(t) & t.at_most(t_max);
+        let unclear = mask & !precise;
+        if G::IS_ANY {
+            state.stop_at_hits(in_range);
+        } else if in_range != 0 {
+            let triangle = load(&self.triangle.0);
+            let mut closer = t.below(t_max) | triangle.with_bits(NONE);
+            if in_range & !closer != 0 {
+                closer |= self.first_by_ids(in_range & !closer, place, lane as u32);
+            }
+            let closer = closer & in_range;
+            let own = splat(f32::from_bits(place << 3 | lane as u32));
+            L::Wide::select(closer, own, triangle).store(&mut self.triangle);
+            for (row, weight) in self.weights.iter_mut().zip([v, w, det]) {
+                L::Wide::select(closer, weight, load(&row.0)).store(row);
+            }
+            let t_max = L::Wide::select(closer, t, t_max);
+            t_max.store(&mut self.t_max);
+            let end = t * splat(BEYOND) + splat(f32::MIN_POSITIVE);
+            let s_max = L::Wide::select(closer, end, load(&state.slabs.s_max.0));
+            s_max.store(&mut state.slabs.s_max);
+            state.frustum.s_max = s_max.most();
+        }
+        if unclear != 0 {
+            self.decide(state, unclear, block, place, lane as u32);
+        }
+    }
+
+    #[inline(always)]
+    fn put<L: Lanes>(
+        &mut self,
+        decider: &Decider,
+        state: &State,
+        _: &[Ray32; PACKET],
+        first: usize,
+        sink: &mut impl Sink<Option<Hit32>>,
+    ) {
+        if G::IS_ANY {
+            return put_chosen(state.chosen, first, |i| (state.met >> i & 1 != 0).then_some(SOME_HIT), sink);
+        }
+        let load = L::Wide::load;
+        let triangle = load(&self.triangle.0);
+        let hits = if state.is_among_triangles { state.chosen & !triangle.with_bits(NONE) } else { 0 };
+        let row = Row::of(0.0);
+        let (mut local, mut id, mut primitive, mut geometry) = ([row; 2], row, row, row);
+        if hits != 0 {
+            let det = load(&self.weights[2].0);
+            for (local, weight) in local.iter_mut().zip(&self.weights) {
+                load(&weight.0).over(det).store(local);
+            }
+            let mut ids = [L::Wide::splat(0.0); 3];
+            let mut rest = hits;
+            while rest != 0 {
+                // Many may have hit the same.
+                let own = self.triangle.0[rest.trailing_zeros() as usize % PACKET].to_bits();
+                let with_this = triangle.with_bits(own);
+                rest &= !with_this;
+                let (geometry, primitive) = decider.ids(own >> 3, own & 7);
+                let id = decider.accel().geometries[geometry as usize].id;
+                for (row, own) in ids.iter_mut().zip([id, primitive, geometry]) {
+                    *row = L::Wide::select(with_this, L::Wide::splat(f32::from_bits(own)), *row);
+                }
+            }
+            ids[0].store(&mut id);
+            ids[1].store(&mut primitive);
+            ids[2].store(&mut geometry);
+        }
+        let hit = |i: usize| Hit32 {
+            t: self.t_max.0[i],
+            local: [local[0].0[i], local[1].0[i]],
+            id: id.0[i].to_bits(),
+            primitive: primitive.0[i].to_bits(),
+            geometry: geometry.0[i].to_bits(),
+            instance: Hit32::NO_INSTANCE,
+        };
+        if hits == ALL {
+            sink.put_row(first, |i| Some(hit(i)));
+        } else {
+            put_chosen(state.chosen, first, |i| (hits >> i & 1 != 0).then(|| hit(i)), sink);
+        }
+    }
+}
+
+/// Hands out the answers of those in the mask.
+#[inline(always)]
+fn put_chosen(
+    mut mask: u32,
+    first: usize,
+    answer: impl Fn(usize) -> Option<Hit32>,
+    sink: &mut impl Sink<Option<Hit32>>,
+) {
+    if mask == ALL {
+        return sink.put_row(first, answer);
+    }
+    while mask != 0 {
+        let i = mask.trailing_zeros() as usize % PACKET;
+        mask &= mask - 1;
+        sink.put(first + i, Outcome::Certain(answer(i)));
+    }
+}

@@ -1,0 +1,123 @@
+//! An interleaved ray in single precision.
+
+use std::marker::PhantomData;
+
+use super::interleaved::{PassedLanes, RaySlot};
+use crate::blocks::TriangleBlock;
+use crate::lanes::{Eight, Lanes, Vector};
+use crate::node::Slabs;
+use crate::trace::decide::Decider;
+use crate::trace::f32_ray::{F32Ray, Nearest, Pass, SOME_HIT};
+use crate::trace::stack::Goal;
+use crate::trace::{LaneHits, Outcome};
+use crate::triangles::{self, BLOCK};
+use crate::{Hit32, Ray32};
+
+/// A ray among triangles, and the nearest that it has hit: a cache line.
+pub(super) struct F32Slot<'a, 'd, G> {
+    /// Ends at the nearest.
+    ray: F32Ray,
+    nearest: Nearest,
+    goal: PhantomData<(G, &'d Decider<'a>)>,
+}
+
+impl<'a, 'd, G: Goal, L: Lanes> RaySlot<'a, 'd, L> for F32Slot<'a, 'd, G> {
+    type Goal = G;
+    type Ray = Ray32;
+    type Answer = Option<Hit32>;
+    const GENERAL: bool = false;
+    const STARTS_BY_FOUR: bool = L::STARTS_BY_FOUR;
+    type Pass = Pass<L::Eight>;
+    type Passes = Pass<L::Wide>;
+    /// `t`.
+    type At = L::Eight;
+
+    #[inline(always)]
+    fn new(_: &'d Decider<'a>) -> Self {
+        Self { ray: F32Ray::of_none(), nearest: Nearest::NONE, goal: PhantomData }
+    }
+
+    #[inline(always)]
+    fn start(&mut self, decider: &'d Decider<'a>, ray: &Ray32) -> Option<Slabs> {
+        let slabs = L::start_narrow(decider.start, ray)?;
+        self.ray = L::start_narrow_blocks(decider.start, ray, &slabs);
+        self.nearest = Nearest::NONE;
+        Some(slabs)
+    }
+
+    #[inline(always)]
+    fn start_by_four(decider: &'d Decider<'a>, rays: [&Ray32; 4], slots: [(&mut Self, &mut Slabs); 4]) -> u32 {
+        let [(a, a_slabs), (b, b_slabs), (c, c_slabs), (d, d_slabs)] = slots;
+        for one in [&mut *a, &mut *b, &mut *c, &mut *d] {
+            one.nearest = Nearest::NONE;
+        }
+        let starts =
+            [(a_slabs, &mut a.ray), (b_slabs, &mut b.ray), (c_slabs, &mut c.ray), (d_slabs, &mut d.ray)];
+        L::start_narrow_by_four(decider.start, rays, starts)
+    }
+
+    #[inline(always)]
+    fn pass_by_two(
+        decider: &Decider,
+        slots: [&Self; 2],
+        blocks: [&TriangleBlock; 2],
+    ) -> (PassedLanes, Pass<L::Wide>) {
+        let precise = &decider.start.precise;
+        if L::MEETS_BY_TWO {
+            let (mask, lines) = F32Ray::lines_by_two::<L>([&slots[0].ray, &slots[1].ray], blocks);
+            let (unclear, passes) = lines.pass(mask, precise);
+            return (PassedLanes { mask: mask & !unclear, unclear }, passes);
+        }
+        let (first, of_first) = slots[0].ray.lines::<L, false>(blocks[0]);
+        let (first_unclear, of_first) = of_first.pass(first, precise);
+        let (second, of_second) = slots[1].ray.lines::<L, false>(blocks[1]);
+        let (second_unclear, of_second) = of_second.pass(second, precise);
+        let unclear = first_unclear | second_unclear << BLOCK;
+        let mask = (first | second << BLOCK) & !unclear;
+        (PassedLanes { mask, unclear }, Pass::of_two(&of_first, &of_second))
+    }
+
+    #[inline(always)]
+    fn one_of(passes: &Pass<L::Wide>, which: usize) -> Pass<L::Eight> {
+        passes.half(which)
+    }
+
+    #[inline(always)]
+    fn intersect(&self, mask: u32, pass: &Pass<L::Eight>) -> LaneHits<L::Eight> {
+        let (met, at) = self.ray.cross(mask, pass);
+        LaneHits { met, unclear: 0, at }
+    }
+
+    #[inline(always)]
+    fn hits_any(&self, decider: &Decider, _: &Ray32, block: u32, unclear: u32) -> Outcome<bool> {
+        Outcome::Certain(self.ray.meets_exactly(decider.block(block), unclear))
+    }
+
+    #[inline(always)]
+    fn take_nearest(
+        &mut self,
+        decider: &Decider,
+        _: &Ray32,
+        block: u32,
+        hits: &LaneHits<L::Eight>,
+        pass: &Pass<L::Eight>,
+        slabs: &mut Slabs,
+    ) -> bool {
+        let t = hits.at.least_of(hits.met);
+        let which = hits.at.at_most(L::Eight::splat(t)) & hits.met;
+        let lane = which.trailing_zeros() as usize % BLOCK;
+        if self.nearest.take_nearest(decider, &mut self.ray, block, hits, pass, (lane, t)) {
+            slabs.end_at(triangles::beyond(self.ray.t_max()));
+        }
+        true
+    }
+
+    #[inline(always)]
+    fn answer(&mut self, decider: &Decider, _: &Ray32, is_hit: bool) -> Outcome<Option<Hit32>> {
+        Outcome::Certain(if G::IS_ANY {
+            is_hit.then_some(SOME_HIT)
+        } else {
+            self.nearest.hit(decider, self.ray.t_max())
+        })
+    }
+}

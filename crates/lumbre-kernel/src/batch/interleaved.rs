@@ -1,0 +1,602 @@
+//! Many rays interleaved, so that the arithmetic of some fills the memory and branch latency of others.
+//!
+//! Up to 64 rays stand in slots. In each turn, those that are at nodes, or those that are at leaves, take a step in short loops with
+//! few branches: which slots a loop is for is told by a mask that the loop before it made. Triangles are tested for two rays at a time,
+//! each at a block of its own: eight of the one and eight of the other fill a vector of sixteen.
+
+use bytemuck::Zeroable;
+
+use super::Sink;
+use crate::blocks::{Blocks, TriangleBlock};
+use crate::lanes::{self, Lanes, Slots, Vector, WIDE, Wide};
+use crate::node::{Node, Slabs, WIDTH, tag};
+use crate::trace::decide::Decider;
+use crate::trace::stack::{Goal, STACK};
+use crate::trace::{LaneHits, Outcome, Stop};
+use crate::triangles::BLOCK;
+
+/// A ray in a slot, in either precision.
+pub(super) trait RaySlot<'a, 'd, L: Lanes>: Sized {
+    type Goal: Goal;
+    type Ray;
+    type Answer;
+    /// Whether the tree has leaves of anything but triangles.
+    const GENERAL: bool;
+    /// Whether four better start together.
+    const STARTS_BY_FOUR: bool = false;
+    /// How its line passes the triangles of a block, and how two lines do, each those of its block.
+    type Pass;
+    type Passes: Copy + Zeroable;
+    /// Where it hits each triangle.
+    type At: Copy + Zeroable;
+
+    /// An empty slot.
+    fn new(decider: &'d Decider<'a>) -> Self;
+    /// Starts with a ray; `None` where it is not sound, or starts too far away for single precision.
+    fn start(&mut self, decider: &'d Decider<'a>, ray: &Self::Ray) -> Option<Slabs>;
+    /// Starts with four; a bit for each that does.
+    #[inline(always)]
+    fn start_by_four(decider: &'d Decider<'a>, rays: [&Self::Ray; 4], slots: [(&mut Self, &mut Slabs); 4]) -> u32 {
+        let mut started = 0;
+        for (i, (ray, (slot, slabs))) in rays.into_iter().zip(slots).enumerate() {
+            if let Some(own) = slot.start(decider, ray) {
+                *slabs = own;
+                started |= 1 << i;
+            }
+        }
+        started
+    }
+    /// How the lines of two pass the triangles of two blocks, each those of its own.
+    fn pass_by_two(decider: &Decider, slots: [&Self; 2], blocks: [&TriangleBlock; 2]) -> (PassedLanes, Self::Passes);
+    /// That of one of the two: `which` is 0 or 1.
+    fn one_of(passes: &Self::Passes, which: usize) -> Self::Pass;
+    /// Which triangles in the mask it hits, and where.
+    fn intersect(&self, mask: u32, pass: &Self::Pass) -> LaneHits<Self::At>;
+    /// Whether it hits any of these, which are to be decided exactly.
+    fn hits_any(&self, decider: &Decider, ray: &Self::Ray, block: u32, unclear: u32) -> Outcome<bool>;
+    /// Takes the closest hit in a block, if it is closer than the best; false where that is uncertain.
+    fn take_nearest(
+        &mut self,
+        decider: &Decider,
+        ray: &Self::Ray,
+        block: u32,
+        hits: &LaneHits<Self::At>,
+        pass: &Self::Pass,
+        slabs: &mut Slabs,
+    ) -> bool;
+    /// Tests what has no bounds.
+    #[inline(always)]
+    fn test_infinite(&mut self, _ray: &Self::Ray, _slabs: &mut Slabs) -> Option<Stop> {
+        None
+    }
+    /// Tests a leaf of anything but triangles, as a single ray does.
+    #[inline(always)]
+    fn test_leaf(&mut self, _leaf: u32, _ray: &Self::Ray, _slabs: &mut Slabs) -> Option<Stop> {
+        None
+    }
+    /// What was found; `is_hit` where any hit will do.
+    fn answer(&mut self, decider: &Decider, ray: &Self::Ray, is_hit: bool) -> Outcome<Self::Answer>;
+}
+
+/// The triangles of two blocks that two lines pass: eight bits for the first, and eight for the second.
+pub(super) struct PassedLanes {
+    /// Those that the rays may hit.
+    pub(super) mask: u32,
+    /// Those that are to be decided exactly.
+    pub(super) unclear: u32,
+}
+
+/// A bit for each in a word.
+const SLOTS: usize = 64;
+/// How many have to be done, or all, before others start.
+const ENOUGH: u32 = 8;
+/// How many rays ahead one is prefetched.
+const AHEAD: usize = 2 * ENOUGH as usize;
+/// The position of a ray that was answered already.
+const ANSWERED: usize = usize::MAX;
+/// The reference of a ray that is done, and of one that is done because it has a hit and any will do.
+const DONE: u32 = tag::reference(tag::RETURN, 0);
+const HIT: u32 = tag::reference(tag::RETURN, 1);
+
+type Entry<'a, 'd, R, L> = <<R as RaySlot<'a, 'd, L>>::Goal as Goal>::Entry;
+
+/// A ray: what nodes are tested with is a cache line, and what triangles are, the next.
+#[repr(C, align(64))]
+struct Slot<R> {
+    slabs: Slabs,
+    position: usize,
+    ray: R,
+}
+
+/// The positions of the bits that are set, the lowest first.
+#[derive(Clone, Copy)]
+struct Bits(u64);
+
+impl Iterator for Bits {
+    type Item = usize;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<usize> {
+        let first = self.0.trailing_zeros();
+        self.0 &= self.0.wrapping_sub(1);
+        (first < u64::BITS).then_some(first as usize % SLOTS)
+    }
+}
+
+impl Bits {
+    /// The first four, if there are as many.
+    #[inline(always)]
+    fn first_four(mut self) -> Option<[usize; 4]> {
+        Some([self.next()?, self.next()?, self.next()?, self.next()?])
+    }
+
+    /// Two at a time; the last of an odd number comes with itself.
+    #[inline(always)]
+    fn by_two(self) -> ByTwo {
+        ByTwo(self)
+    }
+}
+
+/// See [`Bits::by_two`].
+struct ByTwo(Bits);
+
+impl Iterator for ByTwo {
+    type Item = [usize; 2];
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<[usize; 2]> {
+        let Self(bits) = self;
+        match (bits.next(), bits.next()) {
+            (Some(first), second) => Some([first, second.unwrap_or(first)]),
+            (None, _) => None,
+        }
+    }
+}
+
+/// The bit of a slot, if that is so.
+#[inline(always)]
+fn bit(is: bool, slot: usize) -> u64 {
+    u64::from(is) << slot
+}
+
+/// The rank of a slot among those of a mask: where arrays that are written in their order hold what belongs to it.
+#[inline(always)]
+fn rank(slots: u64, slot: usize) -> usize {
+    (slots & !(u64::MAX << slot)).count_ones() as usize % SLOTS
+}
+
+/// The subtree that each ray is at.
+#[repr(align(64))]
+struct References([u32; SLOTS]);
+
+/// A bit for each ray that is at a node, at a leaf of triangles, at another leaf, and done.
+#[derive(Clone, Copy)]
+struct Stations {
+    nodes: u64,
+    triangles: u64,
+    others: u64,
+    done: u64,
+}
+
+impl References {
+    #[inline(always)]
+    fn of(&mut self, slot: usize) -> &mut u32 {
+        &mut self.0[slot % SLOTS]
+    }
+
+    #[inline(always)]
+    fn stations<W: Wide, const GENERAL: bool>(&self) -> Stations {
+        /// The last reference of each kind, in the order of signed integers.
+        const LAST_NODE: i32 = tag::reference(tag::INNER, tag::PLACE) as i32;
+        const LAST_TRIANGLES: i32 = tag::reference(tag::TRIANGLES, tag::PLACE) as i32;
+        const BEFORE_DONE: i32 = DONE as i32 - 1;
+        const { assert!(LAST_NODE > 0 && LAST_TRIANGLES > LAST_NODE && BEFORE_DONE < 0) };
+        let (rows, _) = self.0.as_chunks::<WIDE>();
+        let (mut leaves, mut others, mut negative, mut done) = (0, 0, 0, 0);
+        for (i, row) in rows.iter().enumerate() {
+            let row = W::load(bytemuck::cast_ref(row));
+            let above = |last: i32| u64::from(row.bits_above(last)) << (WIDE * i);
+            negative |= !above(-1) & 0xffff << (WIDE * i);
+            leaves |= above(LAST_NODE);
+            if GENERAL {
+                others |= above(LAST_TRIANGLES);
+                done |= above(BEFORE_DONE);
+            }
+        }
+        let nodes = !(leaves | negative);
+        if !GENERAL {
+            return Stations { nodes, triangles: leaves, others: 0, done: negative };
+        }
+        // Of the negative ones, those that are done come last.
+        done &= negative;
+        Stations { nodes, triangles: leaves & !others, others: others | negative & !done, done }
+    }
+}
+
+/// All rays in slots, and what one loop hands on to another.
+struct Interleaved<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Lanes> {
+    decider: &'d Decider<'a>,
+    nodes: &'a [Node],
+    blocks: Blocks<'a>,
+    rays: &'r [R::Ray],
+    slots: Box<[Slot<R>; SLOTS]>,
+    stacks: Box<[Slots<Entry<'a, 'd, R, L>>; SLOTS]>,
+    references: References,
+    /// The nodes that they come from.
+    parents: References,
+    /// Which children of its node, or triangles of its block, each may hit.
+    masks: [u32; SLOTS],
+    /// Where each enters the bounding boxes of the children.
+    enters: [L::Wide; SLOTS],
+    passes: [R::Passes; SLOTS / 2],
+    hits: [LaneHits<R::At>; SLOTS],
+    /// Which triangles are to be decided exactly.
+    unclear: [u32; SLOTS],
+}
+
+impl<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Lanes> Interleaved<'a, 'd, 'r, R, L> {
+    #[inline(always)]
+    fn new(decider: &'d Decider<'a>, rays: &'r [R::Ray]) -> Self {
+        Self {
+            decider,
+            nodes: decider.nodes(),
+            blocks: decider.blocks(),
+            rays,
+            slots: Box::new(std::array::from_fn(
+                #[inline(always)]
+                |_| Slot { ray: R::new(decider), slabs: Slabs::ZERO, position: ANSWERED },
+            )),
+            stacks: Slots::many(),
+            references: References([DONE; SLOTS]),
+            parents: References([DONE; SLOTS]),
+            masks: [0; SLOTS],
+            enters: [L::Wide::splat(0.0); SLOTS],
+            passes: [R::Passes::zeroed(); SLOTS / 2],
+            hits: [LaneHits::zeroed(); SLOTS],
+            unclear: [0; SLOTS],
+        }
+    }
+
+    /// What is at the bottom of every stack.
+    #[inline(always)]
+    fn bottom() -> Entry<'a, 'd, R, L> {
+        R::Goal::entry(DONE)
+    }
+
+    /// Starts with a ray at the root; false where the exact traversal has to answer.
+    #[inline(always)]
+    fn start(&mut self, slot: usize, position: usize) -> bool {
+        let ray = lanes::opaque(&self.rays[position]);
+        let own = &mut self.slots[slot];
+        let Some(slabs) = own.ray.start(self.decider, ray) else { return false };
+        (own.slabs, own.position) = (slabs, position);
+        let stack = &mut self.stacks[slot];
+        stack.clear();
+        stack.push(Self::bottom());
+        let reference = self.references.of(slot);
+        *reference = self.decider.start.root;
+        if R::GENERAL && let Some(stop) = own.ray.test_infinite(ray, &mut own.slabs) {
+            *reference = if stop == Stop::Hit { HIT } else { DONE };
+            return stop == Stop::Hit;
+        }
+        true
+    }
+
+    /// The same with four, in a tree of triangles; a bit for each.
+    #[inline(always)]
+    fn start_by_four(&mut self, four: [usize; 4], positions: [usize; 4]) -> u32 {
+        let Self { decider, rays, slots, .. } = self;
+        let Ok([a, b, c, d]) = slots.get_disjoint_mut(four) else { return 0 };
+        [a.position, b.position, c.position, d.position] = positions;
+        let rays = positions.map(|position| &rays[position]);
+        let slots = [
+            (&mut a.ray, &mut a.slabs),
+            (&mut b.ray, &mut b.slabs),
+            (&mut c.ray, &mut c.slabs),
+            (&mut d.ray, &mut d.slabs),
+        ];
+        let started = R::start_by_four(decider, rays, slots);
+        for (i, slot) in four.into_iter().enumerate() {
+            let stack = &mut self.stacks[slot];
+            stack.clear();
+            stack.push(Self::bottom());
+            *self.references.of(slot) = if started >> i & 1 != 0 { decider.start.root } else { DONE };
+        }
+        started
+    }
+
+    /// The ray of a slot, as it was asked.
+    #[inline(always)]
+    fn ray(&self, slot: usize) -> &'r R::Ray {
+        &self.rays[self.slots[slot].position]
+    }
+
+    /// Those that are at nodes go on to the child that comes first, or to the top of their stacks.
+    #[inline(always)]
+    fn step_nodes(&mut self, at_nodes: u64, sink: &mut impl Sink<R::Answer>) {
+        let too_deep = if R::Goal::IS_ANY { self.step_any(at_nodes) } else { self.step_closest(at_nodes) };
+        self.give_up(too_deep, sink);
+    }
+
+    /// For any hit: pushes the children, and pops one. A bit for each whose stack may not hold the children of another node.
+    #[inline(always)]
+    fn step_any(&mut self, at_nodes: u64) -> u64 {
+        let mut too_deep = 0;
+        for slot in Bits(at_nodes) {
+            let reference = self.references.of(slot);
+            let node = &self.nodes[*reference as usize];
+            let slabs = lanes::opaque(&self.slots[slot].slabs);
+            let (mask, enter) = lanes::meet_boxes::<L::Wide>(node, slabs);
+            let stack = &mut self.stacks[slot];
+            *reference = R::Goal::push_and_pop::<L>(node, mask, enter, stack);
+            too_deep |= bit(stack.len() > STACK - WIDTH, slot);
+        }
+        too_deep
+    }
+
+    /// For the closest hit, where it pays to take care first of those that hit one child or none.
+    #[inline(always)]
+    fn step_closest(&mut self, at_nodes: u64) -> u64 {
+        let nodes = self.nodes;
+        let (mut none, mut many) = (0, 0);
+        for (at, slot) in Bits(at_nodes).enumerate() {
+            let reference = self.references.of(slot);
+            let node = &nodes[*reference as usize];
+            let slabs = lanes::opaque(&self.slots[slot].slabs);
+            let (mask, enter) = lanes::meet_boxes::<L::Wide>(node, slabs);
+            self.masks[slot] = mask;
+            *self.parents.of(slot) = *reference;
+            self.enters[at % SLOTS] = enter;
+            // Anything, where there is not just one.
+            *reference = lanes::only_child(node, mask);
+            none |= bit(mask == 0, slot);
+            many |= bit(mask & mask.wrapping_sub(1) != 0, slot);
+        }
+        let mut too_deep = 0;
+        for slot in Bits(many) {
+            let stack = &mut self.stacks[slot];
+            let node = &nodes[*self.parents.of(slot) as usize];
+            let (mask, enter) = (self.masks[slot], self.enters[rank(at_nodes, slot)]);
+            *self.references.of(slot) = R::Goal::push_and_pop::<L>(node, mask, enter, stack);
+            too_deep |= bit(stack.len() > STACK - WIDTH, slot);
+        }
+        self.pop(none);
+        too_deep
+    }
+
+    /// Those that are at leaves of triangles go on to the next block, or to the top of their stacks.
+    #[inline(always)]
+    fn step_triangles(&mut self, at_leaves: u64, sink: &mut impl Sink<R::Answer>) {
+        let (mut passing, mut last) = (0, 0);
+        for (at, [first, second]) in Bits(at_leaves).by_two().enumerate() {
+            let block_of = |slot: usize| self.blocks.block(self.references.0[slot] & tag::PLACE);
+            let (one, other) = (block_of(first), block_of(second));
+            let rays = [&self.slots[first].ray, &self.slots[second].ray];
+            let (both, passes) = R::pass_by_two(self.decider, rays, [one, other]);
+            self.passes[at % (SLOTS / 2)] = passes;
+            let halves = |mask: u32| (mask & L::Eight::ALL, mask >> BLOCK);
+            let of_both = |(of_first, of_second)| bit(of_first != 0, first) | bit(of_second != 0, second);
+            (self.masks[first], self.masks[second]) = halves(both.mask);
+            (self.unclear[first], self.unclear[second]) = halves(both.unclear);
+            passing |= of_both(halves(both.mask | both.unclear));
+            last |= bit(one.is_last(), first) | bit(other.is_last(), second);
+        }
+        let (mut met, mut unclear) = (0, 0);
+        for slot in Bits(passing) {
+            let rank = rank(at_leaves, slot);
+            let pass = R::one_of(&self.passes[rank / 2], rank % 2);
+            let mut hits = self.slots[slot].ray.intersect(self.masks[slot], &pass);
+            met |= bit(hits.met != 0, slot);
+            hits.unclear |= self.unclear[slot];
+            unclear |= bit(hits.unclear != 0, slot);
+            if R::Goal::IS_ANY {
+                self.unclear[slot] = hits.unclear;
+            } else {
+                self.hits[rank] = hits;
+            }
+        }
+        let mut uncertain = 0;
+        if R::Goal::IS_ANY {
+            for slot in Bits(unclear & !met) {
+                let place = *self.references.of(slot) & tag::PLACE;
+                let (own, ray) = (&self.slots[slot], self.ray(slot));
+                match own.ray.hits_any(self.decider, ray, place, self.unclear[slot]) {
+                    Outcome::Certain(is_hit) => met |= bit(is_hit, slot),
+                    Outcome::Uncertain => uncertain |= bit(true, slot),
+                }
+            }
+            self.stop_at_hits(met);
+        } else {
+            for slot in Bits(met | unclear) {
+                let place = *self.references.of(slot) & tag::PLACE;
+                let ray = self.ray(slot);
+                let own = &mut self.slots[slot];
+                let rank = rank(at_leaves, slot);
+                let pass = R::one_of(&self.passes[rank / 2], rank % 2);
+                let hits = &self.hits[rank];
+                let is_certain = own.ray.take_nearest(self.decider, ray, place, hits, &pass, &mut own.slabs);
+                uncertain |= bit(!is_certain, slot);
+            }
+            met = 0;
+        }
+        let going_on = at_leaves & !met & !uncertain;
+        for slot in Bits(going_on & !last) {
+            let reference = self.references.of(slot);
+            let place = *reference & tag::PLACE;
+            *reference = tag::reference(tag::TRIANGLES, self.blocks.block(place).place_behind(place));
+        }
+        self.give_up(uncertain, sink);
+        self.pop(going_on & last);
+    }
+
+    /// Those that are at other leaves test them one by one, and go on to the top of their stacks.
+    #[inline(always)]
+    fn step_others(&mut self, at_others: u64, sink: &mut impl Sink<R::Answer>) {
+        let (mut met, mut uncertain) = (0, 0);
+        for slot in Bits(at_others) {
+            let (leaf, ray) = (*self.references.of(slot), self.ray(slot));
+            let own = &mut self.slots[slot];
+            let stop = own.ray.test_leaf(leaf, ray, &mut own.slabs);
+            met |= bit(stop == Some(Stop::Hit), slot);
+            uncertain |= bit(stop == Some(Stop::Uncertain), slot);
+        }
+        self.stop_at_hits(met);
+        self.give_up(uncertain, sink);
+        self.pop(at_others & !met & !uncertain);
+    }
+
+    /// Those are done: they have a hit, and any will do.
+    #[inline(always)]
+    fn stop_at_hits(&mut self, slots: u64) {
+        for slot in Bits(slots) {
+            *self.references.of(slot) = HIT;
+        }
+    }
+
+    /// Leaves those to the exact traversal.
+    #[inline(always)]
+    fn give_up(&mut self, slots: u64, sink: &mut impl Sink<R::Answer>) {
+        for slot in Bits(slots) {
+            let position = &mut self.slots[slot].position;
+            sink.put(*position, Outcome::Uncertain);
+            *position = ANSWERED;
+            *self.references.of(slot) = DONE;
+        }
+    }
+
+    /// Those take the top of their stacks that is not beyond the end of the ray.
+    #[inline(always)]
+    fn pop(&mut self, mut slots: u64) {
+        while slots != 0 {
+            let mut beyond = 0;
+            for slot in Bits(slots) {
+                let entry = self.stacks[slot].pop().unwrap_or(Self::bottom());
+                *self.references.of(slot) = R::Goal::reference(entry);
+                beyond |= bit(R::Goal::is_beyond(entry, self.slots[slot].slabs.s_max()), slot);
+            }
+            slots = beyond;
+        }
+    }
+
+    /// Prefetches what those read next.
+    #[inline(always)]
+    fn prefetch(&mut self, slots: u64) {
+        let Stations { nodes, triangles, .. } = self.stations();
+        for slot in Bits(nodes & slots) {
+            self.nodes.get(*self.references.of(slot) as usize).map(lanes::fetch::<Node>);
+        }
+        for slot in Bits(triangles & slots) {
+            self.blocks.block(*self.references.of(slot) & tag::PLACE).fetch();
+        }
+    }
+
+    #[inline(always)]
+    fn stations(&self) -> Stations {
+        if R::GENERAL {
+            self.references.stations::<L::Wide, true>()
+        } else {
+            self.references.stations::<L::Wide, false>()
+        }
+    }
+
+    /// Hands out the answers of those that are done.
+    #[inline(always)]
+    fn answer(&mut self, done: u64, sink: &mut impl Sink<R::Answer>) {
+        for slot in Bits(done) {
+            let own = &mut self.slots[slot];
+            if own.position != ANSWERED {
+                let is_hit = *self.references.of(slot) == HIT;
+                let ray = &self.rays[own.position];
+                sink.put(own.position, own.ray.answer(self.decider, ray, is_hit));
+            }
+        }
+    }
+}
+
+/// Traverses the tree with those of the rays that have these positions; with `prefetches`, a ray prefetches what it reads next.
+#[inline(always)]
+pub(super) fn traverse<'a, 'd, R: RaySlot<'a, 'd, L>, L: Lanes>(
+    decider: &'d Decider<'a>,
+    prefetches: bool,
+    rays: &[R::Ray],
+    positions: &[usize],
+    sink: &mut impl Sink<R::Answer>,
+) {
+    let mut waiting = positions.iter();
+    let mut all = Interleaved::<R, L>::new(decider, rays);
+    // All are done at first.
+    let mut taken = u64::MAX;
+    while taken != 0 {
+        let at = all.stations();
+        let done = at.done & taken;
+        if done.count_ones() >= ENOUGH || done == taken {
+            all.answer(done, sink);
+            taken &= !done;
+            taken |= start_others(&mut all, done, &mut waiting, sink);
+            continue;
+        }
+        // Where most of them are.
+        let [nodes, triangles, others] = [at.nodes, at.triangles, at.others].map(u64::count_ones);
+        let moving = if R::GENERAL && others > nodes.max(triangles) {
+            all.step_others(at.others, sink);
+            at.others
+        } else if nodes >= triangles {
+            all.step_nodes(at.nodes, sink);
+            at.nodes
+        } else {
+            all.step_triangles(at.triangles, sink);
+            at.triangles
+        };
+        if prefetches {
+            all.prefetch(moving);
+        }
+    }
+}
+
+/// Starts rays that wait in free slots: the slots that were taken.
+#[inline(always)]
+fn start_others<'a, 'd, R: RaySlot<'a, 'd, L>, L: Lanes>(
+    all: &mut Interleaved<'a, 'd, '_, R, L>,
+    mut free: u64,
+    waiting: &mut std::slice::Iter<usize>,
+    sink: &mut impl Sink<R::Answer>,
+) -> u64 {
+    let mut taken = 0;
+    if R::STARTS_BY_FOUR {
+        while let Some((&positions, behind)) = waiting.as_slice().split_first_chunk()
+            && let Some(four) = Bits(free).first_four()
+        {
+            // Every other one: two lie in a cache line.
+            for ahead in [AHEAD, AHEAD + 2] {
+                if let Some(&position) = waiting.as_slice().get(ahead) {
+                    lanes::fetch(&all.rays[position]);
+                }
+            }
+            *waiting = behind.iter();
+            let started = all.start_by_four(four, positions);
+            for (i, (slot, position)) in four.into_iter().zip(positions).enumerate() {
+                if started >> i & 1 != 0 {
+                    sink.prefetch(position);
+                    taken |= bit(true, slot);
+                } else {
+                    sink.put(position, Outcome::Uncertain);
+                }
+            }
+            free &= !taken;
+        }
+    }
+    for slot in Bits(free) {
+        if let Some(&position) = waiting.as_slice().get(AHEAD) {
+            lanes::fetch(&all.rays[position]);
+        }
+        for &position in waiting.by_ref() {
+            if all.start(slot, position) {
+                sink.prefetch(position);
+                taken |= bit(true, slot);
+                break;
+            }
+            sink.put(position, Outcome::Uncertain);
+        }
+    }
+    taken
+}

@@ -1,0 +1,448 @@
+//! Many rays at once, in trees that have triangles: each answer has the bits that it has alone.
+//!
+//! Rays that are coherent are traversed as packets of sixteen (see [`packet`]), the others interleaved (see [`interleaved`]). Triangles
+//! are tested so in either precision; leaves of anything else ray by ray, by the code of single rays.
+
+mod f32_packet;
+mod f32_slot;
+mod f64_packet;
+mod f64_slot;
+mod interleaved;
+pub(crate) mod packet;
+#[cfg(test)]
+pub(crate) mod shims;
+
+use std::marker::PhantomData;
+use std::slice::Chunks;
+
+use lumbre_geometry::Ray;
+
+use self::f32_packet::F32Bundle;
+use self::f32_slot::F32Slot;
+use self::f64_packet::F64Bundle;
+use self::f64_slot::F64Slot;
+use self::interleaved::RaySlot;
+use self::packet::{Bundle, PACKET, Packet};
+use crate::blocks::Line;
+use crate::holds::SingleStart;
+use crate::lanes::{self, Lanes, Level, Task};
+use crate::node::Node;
+use crate::trace::decide::Decider;
+use crate::trace::f32_ray;
+use crate::trace::filtered::{Found, Traversal};
+use crate::trace::stack::{AnyHit, ClosestHit, Goal};
+use crate::trace::{Outcome, exact};
+use crate::{Accel, Hit, Hit32, Ray32};
+
+/// Trees of more bytes than this are hardly in the caches; interleaved rays prefetch what they read next.
+const FAR: usize = 1 << 24;
+/// Trees of fewer bytes are in the nearest caches; interleaving pays for many rays only.
+const NEAR: usize = 1 << 20;
+/// Packets in a row that may be skipped without a try.
+const MOST_SKIPPED: usize = 16;
+/// Rays among which packets are sought before the others are interleaved.
+const CHUNK: usize = 4096;
+/// How many packets ahead rays are prefetched.
+const AHEAD: usize = 3;
+/// Rays in single precision that are asked in double at a time.
+const WIDENED: usize = 1024;
+
+/// [`Accel::closest`] for every ray.
+pub(crate) fn closest(level: Level, accel: &Accel, rays: &[Ray], hits: &mut [Option<Hit>]) {
+    let sink = &mut ClosestSink { accel, level, rays, hits };
+    if !batch_f64::<ClosestHit, _>(level, accel, rays, sink, Plan::of(accel)) {
+        let closest = accel.queries_at(level).closest;
+        hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = closest.ask(accel, ray));
+    }
+}
+
+/// [`Accel::any`] for every ray.
+pub(crate) fn any(level: Level, accel: &Accel, rays: &[Ray], hits: &mut [bool]) {
+    let sink = &mut AnySink { accel, level, rays, hits };
+    if !batch_f64::<AnyHit, _>(level, accel, rays, sink, Plan::of(accel)) {
+        let any = accel.queries_at(level).any;
+        hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = any.ask(accel, ray));
+    }
+}
+
+/// [`Accel::closest_f32`] for every ray.
+pub(crate) fn closest_f32(level: Level, accel: &Accel, rays: &[Ray32], hits: &mut [Option<Hit32>]) {
+    match accel.f32_queries_at(level) {
+        None => {
+            let mut widened = Vec::with_capacity(rays.len().min(WIDENED));
+            let mut found = vec![None; rays.len().min(WIDENED)];
+            for (rays, hits) in rays.chunks(WIDENED).zip(hits.chunks_mut(WIDENED)) {
+                widened.clear();
+                widened.extend(rays.iter().map(|ray| ray.to_f64()));
+                let found = &mut found[..rays.len()];
+                closest(level, accel, &widened, found);
+                for (hit, found) in hits.iter_mut().zip(found) {
+                    *hit = found.as_ref().map(f32_ray::rounded);
+                }
+            }
+        }
+        Some(queries) => {
+            let sink = &mut F32ClosestSink { accel, rays, hits };
+            if !batch_f32::<ClosestHit, _>(level, accel, rays, sink, Plan::of(accel)) {
+                hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = queries.closest.ask(accel, ray));
+            }
+        }
+    }
+}
+
+/// [`Accel::any_f32`] for every ray.
+pub(crate) fn any_f32(level: Level, accel: &Accel, rays: &[Ray32], hits: &mut [bool]) {
+    match accel.f32_queries_at(level) {
+        None => {
+            let mut widened = Vec::with_capacity(rays.len().min(WIDENED));
+            for (rays, hits) in rays.chunks(WIDENED).zip(hits.chunks_mut(WIDENED)) {
+                widened.clear();
+                widened.extend(rays.iter().map(|ray| ray.to_f64()));
+                any(level, accel, &widened, hits);
+            }
+        }
+        Some(queries) => {
+            let sink = &mut F32AnySink { accel, rays, hits };
+            if !batch_f32::<AnyHit, _>(level, accel, rays, sink, Plan::of(accel)) {
+                hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = queries.any.ask(accel, ray));
+            }
+        }
+    }
+}
+
+/// Whether a tree is traversed by batches: one of triangles, among others, on a machine with vectors.
+fn batched(level: Level, accel: &Accel) -> Option<&SingleStart> {
+    let has_triangles = !accel.tree.blocks.is_empty();
+    accel.single.as_ref().filter(|_| has_triangles && level.has_vectors())
+}
+
+/// False where the tree is not traversed by batches.
+fn batch_f64<G: Goal, S: Sink<Found>>(
+    level: Level,
+    accel: &Accel,
+    rays: &[Ray],
+    sink: &mut S,
+    plan: Plan,
+) -> bool {
+    let Some(start) = batched(level, accel) else { return false };
+    if start.only_triangles {
+        level.run_with_vectors(Batch::<F64<G, false>, S> { accel, start, rays, sink, plan });
+    } else {
+        level.run_with_vectors(Batch::<F64<G, true>, S> { accel, start, rays, sink, plan });
+    }
+    true
+}
+
+/// The same in a tree of triangles.
+fn batch_f32<G: Goal, S: Sink<Option<Hit32>>>(
+    level: Level,
+    accel: &Accel,
+    rays: &[Ray32],
+    sink: &mut S,
+    plan: Plan,
+) -> bool {
+    let Some(start) = batched(level, accel) else { return false };
+    level.run_with_vectors(Batch::<F32<G>, S> { accel, start, rays, sink, plan });
+    true
+}
+
+/// Takes the answers, in any order. Methods are to be `#[inline(always)]`: an answer that goes through memory is waited for.
+pub(crate) trait Sink<A> {
+    /// The answer to the ray at a position.
+    fn put(&mut self, position: usize, outcome: Outcome<A>);
+
+    /// The answers to a packet, the first ray of which has this position.
+    #[inline(always)]
+    fn put_row(&mut self, first: usize, answer: impl Fn(usize) -> A) {
+        for i in 0..PACKET {
+            self.put(first + i, Outcome::Certain(answer(i)));
+        }
+    }
+
+    /// Prefetches where an answer will be written.
+    #[inline(always)]
+    fn prefetch(&self, _position: usize) {}
+}
+
+/// See [`closest`].
+struct ClosestSink<'a> {
+    accel: &'a Accel,
+    level: Level,
+    rays: &'a [Ray],
+    hits: &'a mut [Option<Hit>],
+}
+
+impl Sink<Found> for ClosestSink<'_> {
+    #[inline(always)]
+    fn put(&mut self, position: usize, outcome: Outcome<Found>) {
+        #[cfg(test)]
+        shims::count(&outcome);
+        let slot = &mut self.hits[position];
+        match outcome {
+            Outcome::Certain(Found { winner: None, .. }) => *slot = None,
+            Outcome::Certain(Found { in_instance: Some(hit), .. }) => *slot = Some(hit),
+            Outcome::Certain(Found { winner: Some(winner), .. }) => winner.put(self.accel, slot),
+            Outcome::Uncertain => *slot = exact::closest(self.level, self.accel, &self.rays[position], None),
+        }
+    }
+
+    #[inline(always)]
+    fn prefetch(&self, position: usize) {
+        self.hits.get(position).map(lanes::fetch);
+    }
+}
+
+/// See [`any`].
+struct AnySink<'a> {
+    accel: &'a Accel,
+    level: Level,
+    rays: &'a [Ray],
+    hits: &'a mut [bool],
+}
+
+impl Sink<Found> for AnySink<'_> {
+    #[inline(always)]
+    fn put(&mut self, position: usize, outcome: Outcome<Found>) {
+        #[cfg(test)]
+        shims::count(&outcome);
+        self.hits[position] = match outcome {
+            Outcome::Certain(found) => found.winner.is_some(),
+            Outcome::Uncertain => exact::any(self.level, self.accel, &self.rays[position], None),
+        };
+    }
+}
+
+/// See [`closest_f32`].
+struct F32ClosestSink<'a> {
+    accel: &'a Accel,
+    rays: &'a [Ray32],
+    hits: &'a mut [Option<Hit32>],
+}
+
+impl Sink<Option<Hit32>> for F32ClosestSink<'_> {
+    #[inline(always)]
+    fn put(&mut self, position: usize, outcome: Outcome<Option<Hit32>>) {
+        self.hits[position] = match outcome {
+            Outcome::Certain(hit) => hit,
+            Outcome::Uncertain => self.accel.closest_widened(&self.rays[position]),
+        };
+    }
+
+    #[inline(always)]
+    fn put_row(&mut self, first: usize, answer: impl Fn(usize) -> Option<Hit32>) {
+        for (i, slot) in self.hits[first..first + PACKET].iter_mut().enumerate() {
+            *slot = answer(i);
+        }
+    }
+}
+
+/// See [`any_f32`].
+struct F32AnySink<'a> {
+    accel: &'a Accel,
+    rays: &'a [Ray32],
+    hits: &'a mut [bool],
+}
+
+impl Sink<Option<Hit32>> for F32AnySink<'_> {
+    #[inline(always)]
+    fn put(&mut self, position: usize, outcome: Outcome<Option<Hit32>>) {
+        self.hits[position] = match outcome {
+            Outcome::Certain(hit) => hit.is_some(),
+            Outcome::Uncertain => self.accel.any_widened(&self.rays[position]),
+        };
+    }
+}
+
+/// When rays are interleaved, and how.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Plan {
+    /// Fewer rays go one after another: to start many, and to wait for the last, takes its time.
+    least: usize,
+    /// Whether a ray prefetches what it reads next.
+    prefetches: bool,
+    has_packets: bool,
+}
+
+impl Plan {
+    pub(crate) const NEAR: Self = Self { least: 128, prefetches: false, has_packets: true };
+    pub(crate) const MIDDLE: Self = Self { least: 32, prefetches: false, has_packets: true };
+    pub(crate) const FAR: Self = Self { least: 32, prefetches: true, has_packets: true };
+
+    /// The fastest for a tree.
+    fn of(accel: &Accel) -> Self {
+        let tree = &accel.tree;
+        let bytes = size_of_val::<[Line]>(&tree.blocks) + size_of_val::<[Node]>(&tree.nodes);
+        if bytes >= FAR {
+            Self::FAR
+        } else if bytes >= NEAR {
+            Self::MIDDLE
+        } else {
+            Self::NEAR
+        }
+    }
+}
+
+/// In which precision rays are traversed, for which goal, and in which trees.
+trait Precision {
+    type Goal: Goal;
+    type Ray: 'static;
+    type Answer;
+    type Bundle<'a, 'd>: Bundle<'a, 'd, Ray = Self::Ray, Answer = Self::Answer>
+    where
+        'a: 'd;
+    type Slot<'a, 'd, L: Lanes>: RaySlot<'a, 'd, L, Ray = Self::Ray, Answer = Self::Answer>
+    where
+        'a: 'd;
+    /// Whether the rays of packets are prefetched.
+    const PREFETCHES_RAYS: bool;
+
+    /// Traverses the tree with one ray.
+    fn traverse_alone<L: Lanes>(decider: &Decider, ray: &Self::Ray) -> Outcome<Self::Answer>;
+}
+
+/// Double precision; `GENERAL` in trees of anything among triangles.
+struct F64<G, const GENERAL: bool>(PhantomData<G>);
+
+impl<G: Goal, const GENERAL: bool> Precision for F64<G, GENERAL> {
+    type Goal = G;
+    type Ray = Ray;
+    type Answer = Found;
+    type Bundle<'a, 'd>
+        = F64Bundle<'a, 'd, G, GENERAL>
+    where
+        'a: 'd;
+    type Slot<'a, 'd, L: Lanes>
+        = F64Slot<'a, 'd, G, GENERAL>
+    where
+        'a: 'd;
+    // Where any hit will do, nothing else keeps the memory busy, and the caches foresee it.
+    const PREFETCHES_RAYS: bool = !G::IS_ANY;
+
+    #[inline(always)]
+    fn traverse_alone<L: Lanes>(decider: &Decider, ray: &Ray) -> Outcome<Found> {
+        Traversal::<G, GENERAL, false>::whole(decider.accel(), decider.start, ray).run::<L>()
+    }
+}
+
+/// Single precision.
+struct F32<G>(PhantomData<G>);
+
+impl<G: Goal> Precision for F32<G> {
+    type Goal = G;
+    type Ray = Ray32;
+    type Answer = Option<Hit32>;
+    type Bundle<'a, 'd>
+        = F32Bundle<'a, 'd, G>
+    where
+        'a: 'd;
+    type Slot<'a, 'd, L: Lanes>
+        = F32Slot<'a, 'd, G>
+    where
+        'a: 'd;
+    const PREFETCHES_RAYS: bool = true;
+
+    #[inline(always)]
+    fn traverse_alone<L: Lanes>(decider: &Decider, ray: &Ray32) -> Outcome<Option<Hit32>> {
+        f32_ray::traverse::<G, L>(decider, ray)
+    }
+}
+
+/// When to try a packet. After one that did not pay, others are skipped before the next try: ever more while none pays.
+struct Trials {
+    to_skip: usize,
+    patience: usize,
+}
+
+impl Trials {
+    const NEW: Self = Self { to_skip: 0, patience: MOST_SKIPPED };
+
+    /// Whether the next packet is to be tried.
+    #[inline(always)]
+    fn is_next(&mut self) -> bool {
+        let is_next = self.to_skip == 0;
+        self.to_skip = self.to_skip.saturating_sub(1);
+        is_next
+    }
+
+    /// What came of it.
+    #[inline(always)]
+    fn record(&mut self, pays: bool) {
+        (self.to_skip, self.patience) =
+            if pays { (0, 0) } else { (self.patience, (2 * self.patience).clamp(1, MOST_SKIPPED)) };
+    }
+}
+
+/// Prefetches the rays of packets, which are read faster than caches foresee.
+struct RaysAhead<'r, R> {
+    packets: Chunks<'r, R>,
+}
+
+impl<'r, R> RaysAhead<'r, R> {
+    #[inline(always)]
+    fn new(rays: &'r [R], prefetches: bool) -> Self {
+        let mut ahead = Self { packets: if prefetches { rays } else { &[] }.chunks(PACKET) };
+        for _ in 0..AHEAD {
+            ahead.prefetch_next();
+        }
+        ahead
+    }
+
+    #[inline(always)]
+    fn prefetch_next(&mut self) {
+        if let Some(rays) = self.packets.next().and_then(<[R]>::first_chunk::<PACKET>) {
+            lanes::fetch(rays);
+        }
+    }
+}
+
+/// Rays through a tree: packets first, and the others interleaved, or one after another where they are few.
+struct Batch<'a, 'r, P: Precision, S> {
+    accel: &'a Accel,
+    start: &'a SingleStart,
+    rays: &'r [P::Ray],
+    sink: &'r mut S,
+    plan: Plan,
+}
+
+impl<P: Precision, S: Sink<P::Answer>> Task for Batch<'_, '_, P, S> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let Self { accel, start, rays, sink, plan } = self;
+        let decider = &Decider::new(accel, start);
+        let mut packet = Packet::<P::Bundle<'_, '_>>::new(decider);
+        let mut trials = Trials::NEW;
+        let mut others = Vec::with_capacity(rays.len().min(CHUNK));
+        for (number, chunk) in rays.chunks(CHUNK).enumerate() {
+            let first = number * CHUNK;
+            let (packets, _) = chunk.as_chunks::<PACKET>();
+            let mut ahead = RaysAhead::new(chunk, P::PREFETCHES_RAYS);
+            for (i, rays) in packets.iter().enumerate() {
+                ahead.prefetch_next();
+                let first = first + PACKET * i;
+                let mut answered = 0;
+                if plan.has_packets && trials.is_next() {
+                    let result = packet.traverse::<L>(rays, first, sink);
+                    trials.record(result.pays);
+                    answered = result.answered;
+                }
+                if answered == 0 {
+                    others.extend(first..first + PACKET);
+                } else if answered != packet::ALL {
+                    others.extend((0..PACKET).filter(|i| answered >> i & 1 == 0).map(|i| first + i));
+                }
+            }
+            others.extend(first + PACKET * packets.len()..first + chunk.len());
+            if others.len() < plan.least {
+                // Neither a call nor a closure: neither takes on the instruction set of the code around it.
+                for &i in &others {
+                    sink.put(i, P::traverse_alone::<L>(decider, lanes::opaque(&rays[i])));
+                }
+            } else {
+                interleaved::traverse::<P::Slot<'_, '_, L>, L>(decider, plan.prefetches, rays, &others, sink);
+            }
+            others.clear();
+        }
+    }
+}

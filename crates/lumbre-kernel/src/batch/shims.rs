@@ -1,0 +1,94 @@
+//! Batches as tests want them: with a plan, at an instruction set, and with a look at what the exact traversal had to answer.
+
+use std::cell::Cell;
+
+use lumbre_geometry::Ray;
+
+use super::packet::{PACKET, Packet};
+use super::{
+    AnySink, ClosestSink, F32AnySink, F32ClosestSink, F64Bundle, Plan, Sink, batch_f32, batch_f64,
+};
+use crate::lanes::{Lanes, Level, Task};
+use crate::trace::Outcome;
+use crate::trace::decide::Decider;
+use crate::trace::filtered::Found;
+use crate::trace::stack::{AnyHit, ClosestHit};
+use crate::{Accel, Hit, Hit32, Ray32};
+
+/// Plans without packets.
+pub(crate) const INTERLEAVED: [Plan; 2] =
+    [Plan { has_packets: false, ..Plan::NEAR }, Plan { has_packets: false, ..Plan::FAR }];
+
+thread_local! {
+    /// How many rays were answered, and how many of them by the exact traversal.
+    static ANSWERED: Cell<[usize; 2]> = const { Cell::new([0; 2]) };
+}
+
+pub(super) fn count<A>(outcome: &Outcome<A>) {
+    let [all, exactly] = ANSWERED.get();
+    ANSWERED.set([all + 1, exactly + usize::from(matches!(outcome, Outcome::Uncertain))]);
+}
+
+/// Closest hits by a plan, each answered once; how many the exact traversal had to find.
+pub(crate) fn closest(level: Level, accel: &Accel, rays: &[Ray], hits: &mut [Option<Hit>], plan: Plan) -> usize {
+    ANSWERED.set([0; 2]);
+    if !batch_f64::<ClosestHit, _>(level, accel, rays, &mut ClosestSink { accel, level, rays, hits }, plan) {
+        super::closest(level, accel, rays, hits);
+        return 0;
+    }
+    let [all, exactly] = ANSWERED.get();
+    assert_eq!(all, rays.len(), "each once");
+    exactly
+}
+
+/// The same of any hits.
+pub(crate) fn any(level: Level, accel: &Accel, rays: &[Ray], hits: &mut [bool], plan: Plan) -> usize {
+    ANSWERED.set([0; 2]);
+    if !batch_f64::<AnyHit, _>(level, accel, rays, &mut AnySink { accel, level, rays, hits }, plan) {
+        super::any(level, accel, rays, hits);
+        return 0;
+    }
+    let [all, exactly] = ANSWERED.get();
+    assert_eq!(all, rays.len(), "each once");
+    exactly
+}
+
+/// Closest and any hits in single precision by a plan that interleaves rays soon.
+pub(crate) fn f32(level: Level, accel: &Accel, rays: &[Ray32], hits: &mut [Option<Hit32>], are_hit: &mut [bool]) {
+    let plan = Plan::MIDDLE;
+    if accel.f32_queries_at(level).is_none()
+        || !batch_f32::<ClosestHit, _>(level, accel, rays, &mut F32ClosestSink { accel, rays, hits }, plan)
+    {
+        super::closest_f32(level, accel, rays, hits);
+        super::any_f32(level, accel, rays, are_hit);
+        return;
+    }
+    batch_f32::<AnyHit, _>(level, accel, rays, &mut F32AnySink { accel, rays, hits: are_hit }, plan);
+}
+
+/// Those of some rays that a packet answers; none without vectors.
+pub(crate) fn answered_by_packet(level: Level, accel: &Accel, rays: &[Ray; PACKET]) -> u32 {
+    struct Traversing<'a, const GENERAL: bool>(Decider<'a>, &'a [Ray; PACKET]);
+    struct Nowhere;
+    impl Sink<Found> for Nowhere {
+        fn put(&mut self, _: usize, _: Outcome<Found>) {}
+    }
+    impl<const GENERAL: bool> Task for Traversing<'_, GENERAL> {
+        type Output = u32;
+        #[inline(always)]
+        fn run<L: Lanes>(self) -> u32 {
+            let mut packet = Packet::<F64Bundle<ClosestHit, GENERAL>>::new(&self.0);
+            packet.traverse::<L>(self.1, 0, &mut Nowhere).answered
+        }
+    }
+    if !level.has_vectors() {
+        return 0;
+    }
+    let start = accel.single.as_ref().expect("single precision traverses it");
+    let decider = Decider::new(accel, start);
+    if start.only_triangles {
+        level.run_with_vectors(Traversing::<false>(decider, rays))
+    } else {
+        level.run_with_vectors(Traversing::<true>(decider, rays))
+    }
+}

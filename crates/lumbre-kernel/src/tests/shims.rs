@@ -1,0 +1,90 @@
+//! Queries at an instruction set, and what each traversal comes to by itself.
+
+use lumbre_geometry::Ray;
+
+use crate::lanes::Level;
+use crate::trace::filtered::{self, Found};
+use crate::trace::stack::{AnyHit, ClosestHit};
+use crate::trace::{ContextRef, Outcome, exact};
+use crate::{Accel, Hit, Hit32, Query, Ray32, batch};
+
+impl Accel {
+    pub(crate) fn closest_at(&self, level: Level, ray: &Ray) -> Option<Hit> {
+        self.queries_at(level).closest.ask(self, ray)
+    }
+
+    pub(crate) fn any_at(&self, level: Level, ray: &Ray) -> bool {
+        self.queries_at(level).any.ask(self, ray)
+    }
+
+    pub(crate) fn closest_exact_at(&self, level: Level, ray: &Ray) -> Option<Hit> {
+        exact::closest(level, self, ray, None)
+    }
+
+    pub(crate) fn closest_with_exact_at(&self, level: Level, ray: &Ray, query: &Query) -> Option<Hit> {
+        exact::closest(level, self, ray, Some(query))
+    }
+
+    pub(crate) fn any_with_exact_at(&self, level: Level, ray: &Ray, query: &Query) -> bool {
+        exact::any(level, self, ray, Some(query))
+    }
+
+    pub(crate) fn closest_batch_at(&self, level: Level, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        batch::closest(level, self, rays, hits);
+    }
+
+    pub(crate) fn any_batch_at(&self, level: Level, rays: &[Ray], hits: &mut [bool]) {
+        batch::any(level, self, rays, hits);
+    }
+
+    pub(crate) fn closest_f32_at(&self, level: Level, ray: &Ray32) -> Option<Hit32> {
+        match self.f32_queries_at(level) {
+            Some(queries) => queries.closest.ask(self, ray),
+            None => self.closest_widened(ray),
+        }
+    }
+
+    pub(crate) fn any_f32_at(&self, level: Level, ray: &Ray32) -> bool {
+        match self.f32_queries_at(level) {
+            Some(queries) => queries.any.ask(self, ray),
+            None => self.any_widened(ray),
+        }
+    }
+
+    pub(crate) fn closest_batch_f32_at(&self, level: Level, rays: &[Ray32], hits: &mut [Option<Hit32>]) {
+        batch::closest_f32(level, self, rays, hits);
+    }
+
+    pub(crate) fn any_batch_f32_at(&self, level: Level, rays: &[Ray32], hits: &mut [bool]) {
+        batch::any_f32(level, self, rays, hits);
+    }
+
+    /// What the filtered traversal comes to.
+    pub(crate) fn filtered_closest_at(&self, level: Level, ray: &Ray, query: &Query) -> Outcome<Option<Hit>> {
+        match filtered::with_query::<ClosestHit>(level, self, ray, query) {
+            Outcome::Certain(found) => Outcome::Certain(Found::into_hit(found, self, ContextRef::OUTSIDE)),
+            Outcome::Uncertain => Outcome::Uncertain,
+        }
+    }
+
+    /// The same of the traversal for any hit.
+    pub(crate) fn filtered_any_at(&self, level: Level, ray: &Ray) -> Outcome<bool> {
+        match filtered::without_query::<AnyHit>(level, self, ray) {
+            Outcome::Certain(found) => Outcome::Certain(found.winner.is_some()),
+            Outcome::Uncertain => Outcome::Uncertain,
+        }
+    }
+
+    /// The same of the traversal for the closest hit that takes everything.
+    pub(crate) fn filtered_at(&self, level: Level, ray: &Ray) -> Outcome<Option<Hit>> {
+        match filtered::without_query::<ClosestHit>(level, self, ray) {
+            Outcome::Certain(found) => Outcome::Certain(Found::into_hit(found, self, ContextRef::OUTSIDE)),
+            Outcome::Uncertain => Outcome::Uncertain,
+        }
+    }
+
+    /// Whether the tree is of nothing but triangles to the filtered traversal; `None` where only the exact one traverses it.
+    pub(crate) fn only_triangles(&self) -> Option<bool> {
+        self.single.as_ref().map(|start| start.only_triangles)
+    }
+}

@@ -1,0 +1,322 @@
+//! What single precision leaves undecided, decided in double precision.
+//!
+//! A hit that single precision is certain of (see [`BlockRay`]) is kept by its place in the tree and an interval of heights around it.
+//! Double precision is asked about a triangle whose edge or range the ray hardly misses, about which of two hits is nearer where
+//! their intervals overlap, and once a ray about the closest.
+
+use lumbre_geometry::Ray;
+use lumbre_math::DVec3;
+
+use super::{Outcome, Winner};
+use crate::Accel;
+use crate::blocks::{Blocks, TriangleBlock};
+use crate::holds::SingleStart;
+use crate::lanes::{self, Axes, Lanes};
+use crate::node::Node;
+use crate::triangles::{self, BLOCK, Inside, Meeting, Passage, Shear};
+
+/// The closest hit so far, as far as single precision knows it: a triangle by its place in the tree, or what is none, and the interval
+/// of heights along the ray that holds the crossing.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Candidate {
+    pub(crate) block: u32,
+    pub(crate) lane: u32,
+    pub(crate) from: f32,
+    pub(crate) to: f32,
+}
+
+impl Candidate {
+    pub(crate) const NONE: Self = Self { block: u32::MAX, lane: 0, from: f32::INFINITY, to: f32::INFINITY };
+    /// Of what is known in double precision: no triangle, or one that a query was asked about.
+    const EXACT: u32 = u32::MAX - 1;
+
+    /// A crossing that is known in double precision.
+    #[inline(always)]
+    pub(crate) fn exact((from, to): (f32, f32)) -> Self {
+        Self { block: Self::EXACT, lane: 0, from, to }
+    }
+
+    #[inline(always)]
+    pub(crate) fn is_some(&self) -> bool {
+        self.block != u32::MAX
+    }
+
+    #[inline(always)]
+    pub(crate) fn is_exact(&self) -> bool {
+        self.block == Self::EXACT
+    }
+
+    /// The largest `t` of a hit that is as near.
+    #[inline(always)]
+    pub(crate) fn limit(&self, ray: &Ray) -> f64 {
+        if !self.is_some() {
+            return ray.t_max;
+        }
+        // Rounded upwards as a whole.
+        const UP: f64 = 1.0 + 4.0 * f64::EPSILON;
+        let limit = f64::from(self.to) / largest_component(ray) * UP;
+        if limit < ray.t_max { limit } else { ray.t_max }
+    }
+}
+
+/// The interval of heights that holds a crossing in double precision, for a direction whose largest component has this length.
+#[inline(always)]
+pub(crate) fn heights(t: f64, length: f64) -> (f32, f32) {
+    let height = (t * length) as f32;
+    let error = height.abs() * triangles::ROUNDINGS + f32::MIN_POSITIVE;
+    (height - error, height + error)
+}
+
+/// The height along a ray per unit of `t`.
+#[inline(always)]
+pub(crate) fn largest_component(ray: &Ray) -> f64 {
+    ray.direction.abs().max_element()
+}
+
+/// A tree whose triangles double precision decides about.
+#[derive(Clone, Copy)]
+pub(crate) struct Decider<'a> {
+    accel: &'a Accel,
+    pub(crate) start: &'a SingleStart,
+    // Those of the tree, which may be mapped from a file.
+    blocks: Blocks<'a>,
+}
+
+impl<'a> Decider<'a> {
+    #[inline(always)]
+    pub(crate) fn new(accel: &'a Accel, start: &'a SingleStart) -> Self {
+        Self { accel, start, blocks: accel.tree.blocks() }
+    }
+
+    #[inline(always)]
+    pub(crate) fn accel(&self) -> &'a Accel {
+        self.accel
+    }
+
+    #[inline(always)]
+    pub(crate) fn block(&self, place: u32) -> &'a TriangleBlock {
+        self.blocks.block(place)
+    }
+
+    #[inline(always)]
+    pub(crate) fn blocks(&self) -> Blocks<'a> {
+        self.blocks
+    }
+
+    #[inline(always)]
+    pub(crate) fn nodes(&self) -> &'a [Node] {
+        &self.accel.tree.nodes
+    }
+
+    /// Geometry and primitive of a triangle.
+    #[inline(always)]
+    pub(crate) fn ids(&self, block: u32, lane: u32) -> (u32, u32) {
+        self.ids_in(self.block(block), lane)
+    }
+
+    #[inline(always)]
+    fn ids_in(&self, block: &TriangleBlock, lane: u32) -> (u32, u32) {
+        let ids = &self.accel.tree.names[block.number() as usize];
+        (ids.geometry, ids.primitives[lane as usize % BLOCK])
+    }
+
+    /// Whether the ray certainly misses a triangle, or hits it out of its range; a quick reject.
+    #[inline(always)]
+    pub(crate) fn misses<L: Lanes>(
+        &self,
+        ray: &Ray,
+        axes: &'static Axes,
+        block: &TriangleBlock,
+        lane: u32,
+    ) -> bool {
+        let ray = lanes::opaque(ray);
+        let (shear, origin) = L::shear(ray, axes, &self.start.mesh_origin);
+        match L::pass(block, lane as usize, &shear, &origin) {
+            (Passage::Outside, _) => true,
+            (Passage::Inside, inside) => !triangles::is_in_range(ray, inside.t(&shear)),
+            (Passage::Unclear, _) => false,
+        }
+    }
+
+    /// Where a triangle is hit, if it is and is closer than the best, which is `exact` if there is that.
+    #[inline(always)]
+    pub(crate) fn compare<L: Lanes>(
+        &self,
+        ray: &Ray,
+        axes: &'static Axes,
+        (block, lane): (u32, u32),
+        (best, exact): (&Candidate, Option<Winner>),
+    ) -> Outcome<Option<f64>> {
+        let closely = || self.compare_closely(ray, (block, lane), (best, exact));
+        let (shear, origin) = L::shear(ray, axes, &self.start.mesh_origin);
+        let inside = match self.pass::<L>(&shear, &origin, block, lane) {
+            (Passage::Inside, inside) => inside,
+            (Passage::Outside, _) => return Outcome::Certain(None),
+            (Passage::Unclear, _) => return closely(),
+        };
+        let t = inside.t(&shear);
+        if !triangles::is_in_range(ray, t) {
+            return Outcome::Certain(None);
+        }
+        let is_closer = if let Some(exact) = exact {
+            exact.comes_after(t, self.ids(block, lane))
+        } else if best.is_some() {
+            let (Passage::Inside, inside) = self.pass::<L>(&shear, &origin, best.block, best.lane) else {
+                return closely();
+            };
+            let nearest = inside.t(&shear);
+            t < nearest || t == nearest && self.ids(block, lane) < self.ids(best.block, best.lane)
+        } else {
+            true
+        };
+        Outcome::Certain(is_closer.then_some(t))
+    }
+
+    /// The same where the quick test of one of the two is not certain.
+    #[inline(never)]
+    fn compare_closely(
+        &self,
+        ray: &Ray,
+        (block, lane): (u32, u32),
+        (best, exact): (&Candidate, Option<Winner>),
+    ) -> Outcome<Option<f64>> {
+        let t = match self.intersect(ray, block, lane) {
+            Meeting::Miss => return Outcome::Certain(None),
+            Meeting::Touch { .. } => return Outcome::Uncertain,
+            Meeting::Hit { root, .. } => root.t,
+        };
+        match self.is_closer(ray, t, self.ids(block, lane), best, exact) {
+            Outcome::Certain(is_closer) => Outcome::Certain(is_closer.then_some(t)),
+            Outcome::Uncertain => Outcome::Uncertain,
+        }
+    }
+
+    /// Whether a crossing at `t` of the primitive with these ids is closer than the best, or as close and first by the ids.
+    pub(crate) fn is_closer(
+        &self,
+        ray: &Ray,
+        t: f64,
+        ids: (u32, u32),
+        best: &Candidate,
+        exact: Option<Winner>,
+    ) -> Outcome<bool> {
+        if let Some(exact) = exact {
+            return Outcome::Certain(exact.comes_after(t, ids));
+        }
+        let &Candidate { block, lane, .. } = best;
+        if !best.is_some() {
+            return Outcome::Certain(true);
+        }
+        match self.intersect(ray, block, lane) {
+            Meeting::Hit { root, .. } => {
+                Outcome::Certain(t < root.t || t == root.t && ids < self.ids(block, lane))
+            }
+            Meeting::Miss | Meeting::Touch { .. } => Outcome::Uncertain,
+        }
+    }
+
+    /// The interval of heights of a crossing that is known in double precision, if it is in range and closer than the best.
+    #[inline(always)]
+    pub(crate) fn compare_exact(
+        &self,
+        ray: &Ray,
+        t: f64,
+        ids: impl FnOnce() -> (u32, u32),
+        (best, exact): (&Candidate, Option<Winner>),
+    ) -> Outcome<Option<(f32, f32)>> {
+        let heights @ (from, to) = heights(t, largest_component(ray));
+        // Also keeps out a NaN.
+        if !ray.contains(t) || from > best.to {
+            return Outcome::Certain(None);
+        }
+        if to < best.from {
+            return Outcome::Certain(Some(heights));
+        }
+        match self.is_closer(ray, t, ids(), best, exact) {
+            Outcome::Certain(is_closer) => Outcome::Certain(is_closer.then_some(heights)),
+            Outcome::Uncertain => Outcome::Uncertain,
+        }
+    }
+
+    #[inline(always)]
+    fn pass<L: Lanes>(&self, shear: &Shear, origin: &[f64; 3], block: u32, lane: u32) -> (Passage, Inside) {
+        L::pass(self.block(block), lane as usize, shear, origin)
+    }
+
+    /// The watertight test of a triangle.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn intersect(&self, ray: &Ray, block: u32, lane: u32) -> Meeting {
+        let shear = Shear::new(&ray.direction);
+        let origin = shear.local_origin(&ray.origin, &DVec3::from_slice(&self.start.mesh_origin));
+        let corners = shear.axes.gather(self.block(block), lane as usize);
+        triangles::intersect(ray, shear, origin, corners)
+    }
+
+    /// The crossing of a triangle in the ray's range, if there is one, and whether it meets the front.
+    #[inline(always)]
+    pub(crate) fn crossing<L: Lanes>(
+        &self,
+        ray: &Ray,
+        axes: &'static Axes,
+        block: u32,
+        lane: u32,
+    ) -> Outcome<Option<(Winner, bool)>> {
+        let (shear, origin) = L::shear(ray, axes, &self.start.mesh_origin);
+        let corners = self.block(block);
+        let found = match L::pass(corners, lane as usize, &shear, &origin) {
+            (Passage::Outside, _) => None,
+            (Passage::Inside, inside) => {
+                let t = inside.t(&shear);
+                triangles::is_in_range(ray, t).then(|| (inside.root(t), inside.det > 0.0))
+            }
+            (Passage::Unclear, _) => match self.intersect(ray, block, lane) {
+                Meeting::Miss => None,
+                Meeting::Hit { root, is_front } => Some((root, is_front)),
+                Meeting::Touch { .. } => return Outcome::Uncertain,
+            },
+        };
+        let (geometry, primitive) = self.ids_in(corners, lane);
+        Outcome::Certain(found.map(|(root, is_front)| (Winner { root, geometry, primitive }, is_front)))
+    }
+
+    /// The closest hit in double precision: `exact` if there is that, else the triangle.
+    #[inline(always)]
+    pub(crate) fn closest<L: Lanes>(
+        &self,
+        ray: &Ray,
+        axes: &'static Axes,
+        (best, exact): (&Candidate, Option<Winner>),
+    ) -> Outcome<Option<Winner>> {
+        if exact.is_some() || !best.is_some() {
+            return Outcome::Certain(exact);
+        }
+        match self.winner::<L>(ray, axes, best) {
+            Some(winner) => Outcome::Certain(Some(winner)),
+            None => Outcome::Uncertain,
+        }
+    }
+
+    /// The crossing of a triangle that is hit; `None` should double precision deny that.
+    #[inline(always)]
+    pub(crate) fn winner<L: Lanes>(
+        &self,
+        ray: &Ray,
+        axes: &'static Axes,
+        &Candidate { block, lane, .. }: &Candidate,
+    ) -> Option<Winner> {
+        let (shear, origin) = L::shear(lanes::opaque(ray), axes, &self.start.mesh_origin);
+        let corners = self.block(block);
+        let (passage, inside) = L::pass(corners, lane as usize, &shear, &origin);
+        let (t, local) = if passage == Passage::Inside {
+            (inside.t(&shear), inside.local())
+        } else {
+            match self.intersect(ray, block, lane) {
+                Meeting::Hit { root, .. } => (root.t, root.local),
+                Meeting::Miss | Meeting::Touch { .. } => return None,
+            }
+        };
+        let (geometry, primitive) = self.ids_in(corners, lane);
+        Some(Winner { root: triangles::root(t, local), geometry, primitive })
+    }
+}

@@ -1,0 +1,582 @@
+//! The traversal in double precision: every crossing, for any visitor, in any tree.
+//!
+//! It answers where single precision cannot tell (see [`filtered`](super::filtered)), finds every hit, and is the oracle of the other
+//! traversals. What a visitor gets never depends on the order of the traversal: leaves are tested with the ray's own range and not the
+//! rest of it, so that a crossing has the same bits whenever it is found, and ties have an order.
+//!
+//! There is no recursion, for the input chooses how deep instances stand in instances: an instance suspends the frame around it.
+
+use lumbre_geometry::{Ray, Root};
+use lumbre_math::DVec3;
+
+use super::cursor::NodeCursor;
+use super::decide::largest_component;
+use super::edges::{self, EdgeHit};
+use super::leaves::CloudRay;
+use super::stack::{ClosestHit, Goal, Stack};
+use super::visitors::{Any, Closest};
+use super::{Context, all_crossings, first_crossing, is_sound, meets_front};
+use crate::blocks::{Blocks, TriangleBlock};
+use crate::collapse::Entry;
+use crate::holds::{Holds, Sizes};
+use crate::hulls::HullRay;
+use crate::lanes::{self, Lanes, Level, MetHulls, Task, Vector};
+use crate::node::{BoxRay, Progress, tag};
+use crate::opening::Start;
+use crate::query::Query;
+use crate::triangles::{self, BLOCK, BlockRay, HeightRange, Passage, Shear};
+use crate::{Accel, GeometryKind, Hit};
+
+/// Which crossings of one primitive a visitor wants.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Wanted {
+    /// None: only edge hits are collected.
+    None,
+    /// The first.
+    First,
+    /// Every one.
+    Every,
+}
+
+/// What crossings are shown to.
+pub(crate) trait Visitor {
+    /// Which crossings it wants.
+    fn wanted(&self) -> Wanted;
+
+    /// The `t` that it wants, from the first to the last; never grows.
+    fn range(&self) -> [f64; 2];
+
+    /// Whether it wants anything in an instance.
+    fn enters(&self, _accel: &Accel, _geometry: u32) -> bool {
+        true
+    }
+
+    /// Takes a crossing; true ends the traversal.
+    fn visit(&mut self, crossing: &Crossing) -> bool;
+}
+
+/// A crossing of a ray.
+pub(crate) struct Crossing<'c> {
+    pub(crate) root: Root,
+    pub(crate) geometry: u32,
+    pub(crate) primitive: u32,
+    /// Which of the primitive's crossings.
+    pub(crate) order: u32,
+    /// Whether the front is met, where that is known already.
+    pub(crate) is_front: Option<bool>,
+    /// The ray in the space of the geometry's tree.
+    pub(crate) ray: &'c Ray,
+    pub(crate) accel: &'c Accel,
+    pub(crate) context: &'c Context,
+}
+
+impl Crossing<'_> {
+    /// Whether the front is met.
+    pub(crate) fn is_front(&self) -> bool {
+        let kind = &self.accel.geometries[self.geometry as usize].kind;
+        self.is_front.unwrap_or_else(|| meets_front(kind, self.primitive, self.ray, &self.root))
+    }
+
+    pub(crate) fn to_hit(&self) -> Hit {
+        let &Self { root, geometry, primitive, accel, context, .. } = self;
+        Hit {
+            root,
+            id: accel.geometries[geometry as usize].id,
+            primitive,
+            geometry,
+            instances: context.ids.clone(),
+            route: context.route.clone(),
+        }
+    }
+}
+
+/// The closest hit.
+#[inline(never)]
+pub(crate) fn closest(level: Level, accel: &Accel, ray: &Ray, query: Option<&Query>) -> Option<Hit> {
+    closest_from(level, accel, Start::WHOLE, &Context::default(), ray, query)
+}
+
+/// Whether anything is hit.
+#[inline(never)]
+pub(crate) fn any(level: Level, accel: &Accel, ray: &Ray, query: Option<&Query>) -> bool {
+    any_from(level, accel, Start::WHOLE, &Context::default(), ray, query)
+}
+
+/// The closest hit in a part of a tree that stands there.
+pub(crate) fn closest_from(
+    level: Level,
+    accel: &Accel,
+    from: Start,
+    context: &Context,
+    ray: &Ray,
+    query: Option<&Query>,
+) -> Option<Hit> {
+    let mut closest = Closest::new(ray, query);
+    traverse_from(level, accel, from, context, ray, &mut closest);
+    closest.into_hit()
+}
+
+/// Whether anything is hit in a part of a tree that stands there.
+pub(crate) fn any_from(
+    level: Level,
+    accel: &Accel,
+    from: Start,
+    context: &Context,
+    ray: &Ray,
+    query: Option<&Query>,
+) -> bool {
+    let mut any = Any::new(ray, query);
+    traverse_from(level, accel, from, context, ray, &mut any);
+    any.is_hit
+}
+
+/// Shows a visitor the crossings of a ray.
+pub(crate) fn traverse(level: Level, accel: &Accel, ray: &Ray, visitor: &mut dyn Visitor) {
+    traverse_from(level, accel, Start::WHOLE, &Context::default(), ray, visitor);
+}
+
+/// The same in a part of a tree that stands there. Of edge hits, it may show those of the whole tree.
+fn traverse_from(
+    level: Level,
+    accel: &Accel,
+    from: Start,
+    context: &Context,
+    ray: &Ray,
+    visitor: &mut dyn Visitor,
+) {
+    let context = &mut context.clone();
+    let mut edge_hits = Vec::new();
+    let traversal = Traversal { accel, from, context, ray, visitor: &mut *visitor, edge_hits: &mut edge_hits };
+    let is_over = level.run(traversal);
+    if !is_over && !edge_hits.is_empty() {
+        edges::visit_borders(level, accel, context, ray, &edge_hits, visitor);
+    }
+}
+
+/// The edge hits of the whole line, within a tree that stands there.
+pub(crate) fn all_edge_hits<'a>(
+    level: Level,
+    accel: &'a Accel,
+    context: &mut Context,
+    ray: &Ray,
+) -> Vec<EdgeHit<'a>> {
+    /// Looks along the whole line.
+    struct EdgeHitsOnly;
+    impl Visitor for EdgeHitsOnly {
+        fn wanted(&self) -> Wanted {
+            Wanted::None
+        }
+        fn range(&self) -> [f64; 2] {
+            [f64::NEG_INFINITY, f64::INFINITY]
+        }
+        fn visit(&mut self, _: &Crossing) -> bool {
+            false
+        }
+    }
+    let line = ray.with_range(f64::NEG_INFINITY, f64::INFINITY);
+    let mut edge_hits = Vec::new();
+    level.run(Traversal {
+        accel,
+        from: Start::WHOLE,
+        context,
+        ray: &line,
+        visitor: &mut EdgeHitsOnly,
+        edge_hits: &mut edge_hits,
+    });
+    edge_hits
+}
+
+/// A traversal with one ray.
+struct Traversal<'a, 't> {
+    accel: &'a Accel,
+    from: Start,
+    /// As it was once the traversal is over, unless the visitor ended it.
+    context: &'t mut Context,
+    ray: &'t Ray,
+    visitor: &'t mut dyn Visitor,
+    /// The triangles that are met exactly at an edge or a corner.
+    edge_hits: &'t mut Vec<EdgeHit<'a>>,
+}
+
+impl Task for Traversal<'_, '_> {
+    /// Whether the visitor ended it.
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> bool {
+        let Self { accel, from, context, ray, visitor, edge_hits } = self;
+        if !is_sound(ray) {
+            return false;
+        }
+        let mut stack: Stack<<ClosestHit as Goal>::Entry> = Stack::new();
+        let mut suspended: Vec<Frame<L>> = Vec::new();
+        let mut frame = Frame::<L>::new(accel, *ray, visitor);
+        if frame.enter(from, context, &mut stack, visitor) {
+            return true;
+        }
+        while let Some(leaf) = frame.cursor.next_leaf::<ClosestHit>(&mut stack) {
+            let first = tag::place(leaf);
+            let is_over = match tag::of(leaf) {
+                tag::TRIANGLES => frame.test_triangles(leaf, context, visitor, edge_hits),
+                tag::SPHERES => frame.test_spheres(leaf, context, visitor),
+                tag::SHAPES => frame.test_shapes(first, context, visitor),
+                tag::PRECISE => frame.test_precise(first, context, visitor, edge_hits),
+                tag::CUSTOM => frame.test_entries(first, context, visitor),
+                tag::INSTANCE => {
+                    let entry = frame.accel.instance_entry(first);
+                    match frame.inside(entry, visitor) {
+                        Some((inner, from)) => {
+                            stack.push(ClosestHit::entry(tag::reference(tag::RETURN, 0)));
+                            context.route.push(entry.geometry);
+                            context.ids.push(frame.accel.geometries[entry.geometry as usize].id);
+                            suspended.push(std::mem::replace(&mut frame, inner));
+                            frame.enter(from, context, &mut stack, visitor)
+                        }
+                        None => false,
+                    }
+                }
+                tag::RETURN => {
+                    frame = suspended.pop().expect("a mark for every frame");
+                    context.route.pop();
+                    context.ids.pop();
+                    false
+                }
+                _ => unreachable!("no other tags"),
+            };
+            if is_over {
+                return true;
+            }
+            frame.shorten(visitor);
+        }
+        false
+    }
+}
+
+/// A tree under traversal, with the ray in its space.
+struct Frame<'a, L> {
+    accel: &'a Accel,
+    cursor: NodeCursor<'a, L>,
+    blocks: Blocks<'a>,
+    ray: Ray,
+    progress: Progress,
+    /// Whether the ray meets the bounds of the tree.
+    meets_tree: bool,
+    wanted: Wanted,
+    range: [f64; 2],
+    /// For the mesh, the cloud of spheres and the shapes that the ray came to last.
+    mesh: Option<MeshRay>,
+    cloud: Option<CloudRay>,
+    hulls: Option<HullRay>,
+}
+
+/// The ray for the triangles of one mesh, or of some with one origin.
+#[derive(Clone, Copy)]
+struct MeshRay {
+    shear: Shear,
+    /// Relative to the mesh's.
+    origin: [f64; 3],
+    /// Where single precision tells anything.
+    blocks: Option<BlockRay>,
+}
+
+impl<'a, L: Lanes> Frame<'a, L> {
+    #[inline(always)]
+    fn new(accel: &'a Accel, ray: Ray, visitor: &dyn Visitor) -> Self {
+        let range @ [t_min, t_max] = visitor.range();
+        let mut boxes = BoxRay::passing_all();
+        let meets_tree = accel.tree.root.is_some()
+            && (L::start_nearby(&accel.units, &ray, t_min, t_max, &mut boxes)
+                || is_sound(&ray) && boxes.start_anywhere(&accel.units, &ray, t_min, t_max));
+        Self {
+            accel,
+            cursor: NodeCursor::new(&accel.tree.nodes, boxes.slabs),
+            blocks: accel.tree.blocks(),
+            ray,
+            progress: boxes.progress,
+            meets_tree,
+            wanted: visitor.wanted(),
+            range,
+            mesh: None,
+            cloud: None,
+            hulls: None,
+        }
+    }
+
+    /// Starts on a part of the tree: what has no bounds is tested, the rest goes onto the stack. True ends the traversal.
+    fn enter(
+        &mut self,
+        from: Start,
+        context: &Context,
+        stack: &mut Stack<<ClosestHit as Goal>::Entry>,
+        visitor: &mut dyn Visitor,
+    ) -> bool {
+        if let Some(root) = self.accel.tree.root.filter(|_| self.meets_tree) {
+            stack.push(ClosestHit::entry(from.below(root)));
+        }
+        for (i, entry) in self.accel.infinite.iter().enumerate() {
+            if matches!(self.accel.geometries[entry.geometry as usize].kind, GeometryKind::Instance(_)) {
+                let index = self.accel.tree.entries.len() + i;
+                stack.push(ClosestHit::entry(tag::reference(tag::INSTANCE, index as u32)));
+            } else if self.test_entry(entry, context, visitor) {
+                return true;
+            }
+        }
+        self.shorten(visitor);
+        false
+    }
+
+    /// Ends the ray where the visitor does by now.
+    #[inline(always)]
+    fn shorten(&mut self, visitor: &dyn Visitor) {
+        let [_, limit] = visitor.range();
+        if limit < self.range[1] {
+            self.range[1] = limit;
+            self.cursor.slabs.end_at(self.progress.up(limit));
+            if let Some(MeshRay { shear, blocks: Some(blocks), .. }) = &mut self.mesh {
+                blocks.end_at(shear, limit);
+            }
+        }
+    }
+
+    /// The frame inside an instance, and the part of its tree that is entered; `None` where there is nothing to find.
+    #[inline(always)]
+    fn inside(&self, entry: &Entry, visitor: &dyn Visitor) -> Option<(Self, Start)> {
+        let (geometry, from) = (entry.geometry, Start::of(entry.primitive()));
+        if from.is_nothing() || !visitor.enters(self.accel, geometry) {
+            return None;
+        }
+        let GeometryKind::Instance(instance) = &self.accel.geometries[geometry as usize].kind else {
+            unreachable!("the tag says so");
+        };
+        let inner = &*instance.accel;
+        let ray = instance.world_from_object.object_ray(&self.ray);
+        let frame = Self::new(inner, ray, visitor);
+        let meets_any = frame.meets_tree || !inner.infinite.is_empty() && is_sound(&ray);
+        meets_any.then_some((frame, from))
+    }
+
+    /// Shows the visitor a crossing in the ray's range. True ends the traversal.
+    #[inline(always)]
+    fn visit(
+        &self,
+        root: Root,
+        (geometry, primitive, order): (u32, u32, u32),
+        is_front: Option<bool>,
+        context: &Context,
+        visitor: &mut dyn Visitor,
+    ) -> bool {
+        let &Self { accel, ref ray, .. } = self;
+        visitor.visit(&Crossing { root, geometry, primitive, order, is_front, ray, accel, context })
+    }
+
+    /// Turns to the mesh of a block: to the first that the ray comes to, and to each where meshes have different origins.
+    #[inline(always)]
+    fn turn_to(&mut self, block: &TriangleBlock) -> MeshRay {
+        let &Holds { has_one_origin, first_origin, sizes: Sizes { largest_corner, .. }, .. } =
+            &self.accel.holds;
+        if has_one_origin && let Some(mesh) = self.mesh {
+            return mesh;
+        }
+        let shear = self.mesh.map_or_else(|| Shear::new(&self.ray.direction), |mesh| mesh.shear);
+        let mesh_origin = if has_one_origin {
+            first_origin
+        } else {
+            self.accel.mesh_origin(self.accel.tree.names[block.number() as usize].geometry)
+        };
+        let origin = shear.local_origin(&self.ray.origin, &mesh_origin);
+        let [t_min, t_max] = self.range;
+        let blocks = BlockRay::new(&shear, &origin, largest_corner, t_min, t_max);
+        *self.mesh.insert(MeshRay { shear, origin, blocks })
+    }
+
+    /// Tests a leaf of triangles.
+    #[inline(always)]
+    fn test_triangles(
+        &mut self,
+        leaf: u32,
+        context: &Context,
+        visitor: &mut dyn Visitor,
+        edge_hits: &mut Vec<EdgeHit<'a>>,
+    ) -> bool {
+        // All of a leaf are of one mesh.
+        let MeshRay { shear, origin, blocks } = self.turn_to(self.blocks.block(leaf & tag::PLACE));
+        let mut following = Some(leaf & tag::PLACE);
+        while let Some(place) = following {
+            let block = self.blocks.block(place);
+            following = block.next(place);
+            let mut mask = match &blocks {
+                Some(ray) => {
+                    let (mask, edges) = L::meet_triangles::<true>(block, ray);
+                    if mask == 0 {
+                        continue;
+                    }
+                    mask & L::place_crossings(&edges, ray).in_range
+                }
+                None => block.taken(),
+            };
+            while mask != 0 {
+                let lane = mask.trailing_zeros() as usize % BLOCK;
+                mask &= mask - 1;
+                let ids = || {
+                    let ids = &self.accel.tree.names[block.number() as usize];
+                    (ids.geometry, ids.primitives[lane])
+                };
+                match L::pass(block, lane, &shear, &origin) {
+                    (Passage::Outside, _) => {}
+                    (Passage::Inside, inside) => {
+                        let t = inside.t(&shear);
+                        let is_wanted = self.range[0] <= t && t <= self.range[1] && self.wanted != Wanted::None;
+                        if !is_wanted || !triangles::is_in_range(&self.ray, t) {
+                            continue;
+                        }
+                        let (geometry, primitive) = ids();
+                        let ids = (geometry, primitive, 0);
+                        if self.visit(inside.root(t), ids, Some(inside.det > 0.0), context, visitor) {
+                            return true;
+                        }
+                    }
+                    (Passage::Unclear, _) => {
+                        let corners = shear.axes.gather(block, lane);
+                        let meeting = triangles::intersect(&self.ray, shear, origin, corners);
+                        let corners = block.triangle(lane).map(|corner| corner.map(f64::from));
+                        let triangle = edges::Triangle { corners, ids: ids(), accel: self.accel };
+                        if triangle.visit(meeting, &self.ray, context, visitor, edge_hits) {
+                            return true;
+                        }
+                    }
+                }
+            }
+        }
+        false
+    }
+
+    /// Tests a leaf of spheres of clouds.
+    #[inline(always)]
+    fn test_spheres(&mut self, leaf: u32, context: &Context, visitor: &mut dyn Visitor) -> bool {
+        let tree = &self.accel.tree;
+        let places = tag::blocks(leaf);
+        for (ids, block) in tree.sphere_names[places.clone()].iter().zip(&tree.sphere_blocks[places]) {
+            let cloud = CloudRay::turn(&mut self.cloud, self.accel, &self.ray, ids.geometry);
+            let mut mask = match cloud.within(self.range) {
+                Some(ray) => lanes::meet_spheres::<L>(block, ray).0,
+                None => L::Eight::ALL,
+            };
+            while mask != 0 {
+                let lane = mask.trailing_zeros() as usize % BLOCK;
+                mask &= mask - 1;
+                if self.test_primitive(ids.geometry, ids.primitives[lane], context, visitor) {
+                    return true;
+                }
+            }
+        }
+        false
+    }
+
+    /// Tests a leaf of shapes: those whose bounding volumes are hit.
+    #[inline(always)]
+    fn test_shapes(&mut self, mut first: usize, context: &Context, visitor: &mut dyn Visitor) -> bool {
+        let accel = self.accel;
+        if !self.progress.is_nearby() || accel.hulls.block(first).is_none() {
+            return self.test_entries(first, context, visitor);
+        }
+        let length = largest_component(&self.ray);
+        let hulls = *self.hulls.get_or_insert_with(|| HullRay::new(&accel.units, &self.ray, length));
+        let range = HeightRange::new((self.range[0] * length) as f32, (self.range[1] * length) as f32);
+        while let Some((block, goes_on)) = accel.hulls.block(first) {
+            let MetHulls { mut mask, .. } = lanes::meet_hulls::<L, false>(block, &hulls, &range);
+            while mask != 0 {
+                let entry = &accel.tree.entries[first + mask.trailing_zeros() as usize];
+                mask &= mask - 1;
+                if self.test_entry(entry, context, visitor) {
+                    return true;
+                }
+            }
+            if !goes_on {
+                break;
+            }
+            first += BLOCK;
+        }
+        false
+    }
+
+    /// Tests a leaf of triangles in double precision.
+    fn test_precise(
+        &mut self,
+        first: usize,
+        context: &Context,
+        visitor: &mut dyn Visitor,
+        edge_hits: &mut Vec<EdgeHit<'a>>,
+    ) -> bool {
+        for entry in &self.accel.tree.entries[first..] {
+            let (geometry, primitive) = (entry.geometry, entry.primitive());
+            let meeting = edges::intersect_precise(self.accel, &self.ray, geometry, primitive);
+            if !matches!(meeting, triangles::Meeting::Miss) {
+                let corners = self.accel.precise_corners(geometry, primitive).map(|corner: DVec3| corner.to_array());
+                let triangle = edges::Triangle { corners, ids: (geometry, primitive), accel: self.accel };
+                if triangle.visit(meeting, &self.ray, context, visitor, edge_hits) {
+                    return true;
+                }
+            }
+            if entry.is_last() {
+                break;
+            }
+        }
+        false
+    }
+
+    /// Tests a leaf of user geometry, or of shapes one by one.
+    fn test_entries(&self, first: usize, context: &Context, visitor: &mut dyn Visitor) -> bool {
+        for entry in &self.accel.tree.entries[first..] {
+            if self.test_entry(entry, context, visitor) {
+                return true;
+            }
+            if entry.is_last() {
+                break;
+            }
+        }
+        false
+    }
+
+    /// Tests a shape or a primitive of user geometry.
+    #[inline(always)]
+    fn test_entry(&self, entry: &Entry, context: &Context, visitor: &mut dyn Visitor) -> bool {
+        self.test_primitive(entry.geometry, entry.primitive(), context, visitor)
+    }
+
+    /// Shows the visitor the crossings of a primitive that is neither a triangle nor an instance.
+    fn test_primitive(
+        &self,
+        geometry: u32,
+        primitive: u32,
+        context: &Context,
+        visitor: &mut dyn Visitor,
+    ) -> bool {
+        visit_primitive(self.accel, &self.ray, (geometry, primitive), self.wanted, context, visitor)
+    }
+}
+
+/// Shows a visitor the crossings of a primitive that is neither a triangle nor an instance. True ends the traversal.
+pub(crate) fn visit_primitive(
+    accel: &Accel,
+    ray: &Ray,
+    (geometry, primitive): (u32, u32),
+    wanted: Wanted,
+    context: &Context,
+    visitor: &mut dyn Visitor,
+) -> bool {
+    let kind = &accel.geometries[geometry as usize].kind;
+    let mut visit = |root: Root, order: usize| {
+        let order = order as u32;
+        // Also keeps out a NaN.
+        ray.contains(root.t)
+            && visitor.visit(&Crossing { root, geometry, primitive, order, is_front: None, ray, accel, context })
+    };
+    match wanted {
+        Wanted::None => false,
+        Wanted::First => first_crossing(kind, primitive, ray).is_some_and(|root| visit(root, 0)),
+        Wanted::Every => {
+            let crossings = all_crossings(kind, primitive, ray);
+            crossings.into_iter().enumerate().any(|(order, root)| visit(root, order))
+        }
+    }
+}

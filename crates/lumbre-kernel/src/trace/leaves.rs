@@ -1,0 +1,462 @@
+//! A ray in the leaves of a tree: one method for each kind.
+//!
+//! The main line is [`FilteredRay::test_leaf`]; where a ray meets a triangle is [`FilteredRay::closest_triangle`].
+
+use lumbre_geometry::{Ray, Root};
+use lumbre_math::DVec3;
+
+use super::decide::{Candidate, heights, largest_component};
+use super::edges;
+use super::filtered::FilteredRay;
+use super::stack::Goal;
+use super::{Outcome, Stop, Winner, all_crossings, first_crossing, is_crossed, meets_front};
+use crate::blocks::TriangleBlock;
+use crate::collapse::Entry;
+use crate::hulls::HullRay;
+use crate::lanes::{self, Crossings, Lanes, Level, MetHulls, Task, Vector};
+use crate::node::{Slabs, tag};
+use crate::spheres::SphereRay;
+use crate::triangles::{BLOCK, Meeting};
+use crate::{Accel, GeometryKind};
+
+impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL, FILTERED> {
+    /// Tests a leaf.
+    #[inline(always)]
+    pub(crate) fn test_leaf<G: Goal, L: Lanes>(
+        &mut self,
+        leaf: u32,
+        ray: &Ray,
+        slabs: &mut Slabs,
+    ) -> Option<Stop> {
+        if !GENERAL || tag::of(leaf) == tag::TRIANGLES {
+            return self.test_triangles::<G, L>(leaf, ray, slabs);
+        }
+        // Opaque, so that nothing is computed of the ray before it comes to such a leaf.
+        let ray = lanes::opaque(ray);
+        match tag::of(leaf) {
+            tag::SHAPES => self.test_shapes::<G, L>(leaf, ray, slabs),
+            tag::SPHERES => self.test_spheres::<G, L>(leaf, ray, slabs),
+            tag::PRECISE => self.test_precise::<G>(leaf, ray, slabs),
+            tag::INSTANCE => {
+                let entry = &self.accel().tree.entries[tag::place(leaf)];
+                self.test_instance::<G, L>(entry, ray, slabs)
+            }
+            _ => self.test_entries::<G>(leaf, ray, slabs),
+        }
+    }
+
+    /// Tests what has no bounds, and stands beside the tree.
+    #[inline(always)]
+    pub(crate) fn test_infinite<G: Goal, L: Lanes>(&mut self, ray: &Ray, slabs: &mut Slabs) -> Option<Stop> {
+        let accel = self.accel();
+        for entry in &*accel.infinite {
+            let stop = match accel.geometries[entry.geometry as usize].kind {
+                GeometryKind::Instance(_) => self.test_instance::<G, L>(entry, ray, slabs),
+                _ => self.test_entry::<G>(entry, ray, slabs),
+            };
+            if stop.is_some() {
+                return stop;
+            }
+        }
+        None
+    }
+
+    #[inline(always)]
+    fn accel(&self) -> &'a Accel {
+        self.decider.accel()
+    }
+
+    /// Tests a leaf of triangles, eight at a time.
+    #[inline(always)]
+    fn test_triangles<G: Goal, L: Lanes>(&mut self, leaf: u32, ray: &Ray, slabs: &mut Slabs) -> Option<Stop> {
+        // One block at least, and mostly no more.
+        let mut place = leaf & tag::PLACE;
+        loop {
+            let block = self.decider.block(place);
+            let (mask, edges) = L::meet_triangles::<true>(block, lanes::opaque(&self.blocks));
+            if mask != 0 {
+                let crossings = L::place_crossings(&edges, &self.blocks);
+                let stop = if G::IS_ANY {
+                    self.any_triangle::<L>((place, block), mask, &crossings, ray)
+                } else {
+                    self.closest_triangle::<L>((place, block), mask, &crossings, ray, slabs)
+                };
+                if stop.is_some() {
+                    return stop;
+                }
+            }
+            match block.next(place) {
+                Some(next) => place = next,
+                None => return None,
+            }
+        }
+    }
+
+    /// Takes the closest of the triangles of a block whose lines the ray may pass.
+    #[inline(always)]
+    fn closest_triangle<L: Lanes>(
+        &mut self,
+        (place, block): (u32, &TriangleBlock),
+        mask: u32,
+        crossings: &Crossings<L::Eight>,
+        ray: &Ray,
+        slabs: &mut Slabs,
+    ) -> Option<Stop> {
+        let mut rest = mask & crossings.in_range;
+        if rest != 0 && mask & (mask - 1) == 0 {
+            // One alone, known before its range is: the winner need not wait for that.
+            rest = lanes::opaque_number(mask);
+        }
+        while rest != 0 {
+            let lane = rest.trailing_zeros();
+            let is_certain = crossings.sure >> lane & 1 != 0;
+            rest &= rest - 1;
+            let (from, to) = crossings.between(lane as usize);
+            if FILTERED {
+                if from > self.best.to {
+                    continue;
+                }
+                match self.query_triangle::<L>((place, lane), ray) {
+                    Outcome::Certain(Some(winner)) => {
+                        self.keep_exact(winner, heights(winner.root.t, largest_component(ray)), slabs);
+                    }
+                    Outcome::Certain(None) => {}
+                    Outcome::Uncertain => return Some(Stop::Uncertain),
+                }
+            } else if is_certain && to < self.best.from {
+                self.keep(Candidate { block: place, lane, from, to }, slabs);
+            } else if from > self.best.to || self.decider.misses::<L>(ray, self.blocks.axes, block, lane) {
+                // Farther, which a NaN is not; or missed.
+                continue;
+            } else {
+                match self.compare(L::level(), ray, place, lane) {
+                    Outcome::Certain(Some(closer)) => self.keep(closer, slabs),
+                    Outcome::Certain(None) => {}
+                    Outcome::Uncertain => return Some(Stop::Uncertain),
+                }
+            }
+        }
+        None
+    }
+
+    /// Whether any of the triangles of a block is hit.
+    #[inline(always)]
+    fn any_triangle<L: Lanes>(
+        &self,
+        (place, block): (u32, &TriangleBlock),
+        mask: u32,
+        crossings: &Crossings<L::Eight>,
+        ray: &Ray,
+    ) -> Option<Stop> {
+        if !FILTERED && mask & crossings.sure != 0 {
+            return Some(Stop::Hit);
+        }
+        let mut rest = mask & crossings.in_range;
+        while rest != 0 {
+            let lane = rest.trailing_zeros();
+            rest &= rest - 1;
+            if FILTERED {
+                match self.query_triangle::<L>((place, lane), ray) {
+                    Outcome::Certain(Some(_)) => return Some(Stop::Hit),
+                    Outcome::Certain(None) => continue,
+                    Outcome::Uncertain => return Some(Stop::Uncertain),
+                }
+            }
+            if self.decider.misses::<L>(ray, self.blocks.axes, block, lane) {
+                continue;
+            }
+            match self.decider.intersect(ray, place, lane) {
+                Meeting::Miss => {}
+                Meeting::Hit { .. } => return Some(Stop::Hit),
+                Meeting::Touch { .. } => return Some(Stop::Uncertain),
+            }
+        }
+        None
+    }
+
+    /// The crossing of a triangle, if it is the closest that the query takes.
+    #[inline(always)]
+    fn query_triangle<L: Lanes>(&self, (place, lane): (u32, u32), ray: &Ray) -> Outcome<Option<Winner>> {
+        let (geometry, primitive) = self.decider.ids(place, lane);
+        if !self.query.has_primitive(geometry, primitive) {
+            return Outcome::Certain(None);
+        }
+        let (winner, is_front) = match self.decider.crossing::<L>(ray, self.blocks.axes, place, lane) {
+            Outcome::Certain(Some(found)) => found,
+            Outcome::Certain(None) => return Outcome::Certain(None),
+            Outcome::Uncertain => return Outcome::Uncertain,
+        };
+        let is_closest =
+            self.exact().is_none_or(|best| best.comes_after(winner.root.t, (geometry, primitive)));
+        let is_taken = is_closest && self.query.takes_face(is_front) && self.query.accepts(&winner);
+        Outcome::Certain(is_taken.then_some(winner))
+    }
+
+    /// Compares a triangle that may be hit with the best, in double precision.
+    // Out of line, and so out of the way of the loop around it.
+    #[cold]
+    #[inline(never)]
+    fn compare(&self, level: Level, ray: &Ray, block: u32, lane: u32) -> Outcome<Option<Candidate>> {
+        let (decider, axes, best) = (self.decider, self.blocks.axes, (&self.best, self.exact()));
+        match level.run(Comparison { decider, ray, axes, triangle: (block, lane), best }) {
+            Outcome::Certain(Some(t)) => {
+                let (from, to) = heights(t, largest_component(ray));
+                Outcome::Certain(Some(Candidate { block, lane, from, to }))
+            }
+            Outcome::Certain(None) => Outcome::Certain(None),
+            Outcome::Uncertain => Outcome::Uncertain,
+        }
+    }
+
+    /// Tests a leaf of shapes: those whose bounding volumes are hit, the nearest first.
+    #[inline(always)]
+    fn test_shapes<G: Goal, L: Lanes>(&mut self, leaf: u32, ray: &Ray, slabs: &mut Slabs) -> Option<Stop> {
+        let accel = self.accel();
+        let make = || HullRay::new(&accel.units, ray, largest_component(ray));
+        let hulls = *self.hulls.get_or_insert_with(make);
+        let mut first = tag::place(leaf);
+        loop {
+            let Some((block, goes_on)) = accel.hulls.block(first) else {
+                return self.test_entries::<G>(leaf, ray, slabs);
+            };
+            let entries = &accel.tree.entries[first..];
+            let range = &self.blocks.range;
+            let MetHulls { mut mask, sure, near } = if G::IS_ANY && !FILTERED {
+                lanes::meet_hulls::<L, true>(block, lanes::opaque(&hulls), range)
+            } else {
+                lanes::meet_hulls::<L, false>(block, lanes::opaque(&hulls), range)
+            };
+            if G::IS_ANY && !FILTERED && sure != 0 {
+                return Some(Stop::Hit);
+            }
+            while mask != 0 {
+                let lane =
+                    if G::IS_ANY { mask.trailing_zeros() as usize % BLOCK } else { nearest_of(mask, &near) };
+                mask &= !(1 << lane);
+                if !G::IS_ANY && near[lane] > self.blocks.range.last {
+                    continue;
+                }
+                let stop = self.test_entry::<G>(&entries[lane], ray, slabs);
+                if stop.is_some() {
+                    return stop;
+                }
+            }
+            if !goes_on {
+                return None;
+            }
+            first += BLOCK;
+        }
+    }
+
+    /// Tests a leaf of user geometry, or of shapes one by one.
+    #[inline(always)]
+    fn test_entries<G: Goal>(&mut self, leaf: u32, ray: &Ray, slabs: &mut Slabs) -> Option<Stop> {
+        for entry in &self.accel().tree.entries[tag::place(leaf)..] {
+            let stop = self.test_entry::<G>(entry, ray, slabs);
+            if stop.is_some() || entry.is_last() {
+                return stop;
+            }
+        }
+        None
+    }
+
+    /// Tests a shape, or a primitive of user geometry.
+    #[inline(always)]
+    fn test_entry<G: Goal>(&mut self, entry: &Entry, ray: &Ray, slabs: &mut Slabs) -> Option<Stop> {
+        let (geometry, primitive) = (entry.geometry, entry.primitive());
+        let kind = &self.accel().geometries[geometry as usize].kind;
+        if FILTERED {
+            return self.query_crossings::<G>(kind, (geometry, primitive), ray, slabs);
+        }
+        if G::IS_ANY {
+            return is_crossed(kind, primitive, ray).then_some(Stop::Hit);
+        }
+        self.test_root(first_crossing(kind, primitive, ray)?, || (geometry, primitive), ray, slabs)
+    }
+
+    /// Takes a crossing in double precision, if it is the closest.
+    #[inline(always)]
+    pub(super) fn test_root(
+        &mut self,
+        root: Root,
+        ids: impl Fn() -> (u32, u32),
+        ray: &Ray,
+        slabs: &mut Slabs,
+    ) -> Option<Stop> {
+        match self.decider.compare_exact(ray, root.t, &ids, (&self.best, self.exact())) {
+            Outcome::Certain(Some(heights)) => {
+                let (geometry, primitive) = ids();
+                self.keep_exact(Winner { root, geometry, primitive }, heights, slabs);
+            }
+            Outcome::Certain(None) => {}
+            Outcome::Uncertain => return Some(Stop::Uncertain),
+        }
+        None
+    }
+
+    /// Takes the closest crossing that the query takes, or ends at any.
+    #[inline(never)]
+    fn query_crossings<G: Goal>(
+        &mut self,
+        kind: &GeometryKind,
+        (geometry, primitive): (u32, u32),
+        ray: &Ray,
+        slabs: &mut Slabs,
+    ) -> Option<Stop> {
+        if !self.query.has_primitive(geometry, primitive) {
+            return None;
+        }
+        for root in all_crossings(kind, primitive, ray) {
+            let winner = Winner { root, geometry, primitive };
+            let is_closest = self.exact().is_none_or(|best| best.comes_after(root.t, (geometry, primitive)));
+            let is_taken = ray.contains(root.t)
+                && is_closest
+                && (self.query.takes_both_faces()
+                    || self.query.takes_face(meets_front(kind, primitive, ray, &root)))
+                && self.query.accepts(&winner);
+            if is_taken && G::IS_ANY {
+                return Some(Stop::Hit);
+            }
+            if is_taken {
+                self.keep_exact(winner, heights(root.t, largest_component(ray)), slabs);
+            }
+        }
+        None
+    }
+
+    /// Tests a leaf of spheres of clouds, eight at a time.
+    #[inline(always)]
+    fn test_spheres<G: Goal, L: Lanes>(&mut self, leaf: u32, ray: &Ray, slabs: &mut Slabs) -> Option<Stop> {
+        let accel = self.accel();
+        let places = tag::blocks(leaf);
+        let range = [ray.t_min, if G::IS_ANY { ray.t_max } else { self.best.limit(ray) }];
+        for (ids, block) in accel.tree.sphere_names[places.clone()].iter().zip(&accel.tree.sphere_blocks[places]) {
+            let cloud = CloudRay::turn(&mut self.cloud, accel, ray, ids.geometry);
+            let origin = cloud.origin;
+            let (mut mask, certain) = match cloud.within(range) {
+                Some(spheres) => lanes::meet_spheres::<L>(block, spheres),
+                None => (L::Eight::ALL, 0),
+            };
+            if G::IS_ANY && !FILTERED && certain != 0 {
+                return Some(Stop::Hit);
+            }
+            while mask != 0 {
+                let lane = mask.trailing_zeros() as usize % BLOCK;
+                mask &= mask - 1;
+                let stop = if FILTERED {
+                    let kind = &accel.geometries[ids.geometry as usize].kind;
+                    self.query_crossings::<G>(kind, (ids.geometry, ids.primitives[lane]), ray, slabs)
+                } else {
+                    match block.sphere(lane, &origin).closest(ray) {
+                        Some(_) if G::IS_ANY => Some(Stop::Hit),
+                        Some(root) => {
+                            self.test_root(root, || (ids.geometry, ids.primitives[lane]), ray, slabs)
+                        }
+                        None => None,
+                    }
+                };
+                if stop.is_some() {
+                    return stop;
+                }
+            }
+        }
+        None
+    }
+
+    /// Tests a leaf of triangles in double precision.
+    #[inline(never)]
+    fn test_precise<G: Goal>(&mut self, leaf: u32, ray: &Ray, slabs: &mut Slabs) -> Option<Stop> {
+        let accel = self.accel();
+        for entry in &accel.tree.entries[tag::place(leaf)..] {
+            let (geometry, primitive) = (entry.geometry, entry.primitive());
+            if !FILTERED || self.query.has_primitive(geometry, primitive) {
+                match edges::intersect_precise(accel, ray, geometry, primitive) {
+                    Meeting::Miss => {}
+                    Meeting::Touch { .. } => return Some(Stop::Uncertain),
+                    Meeting::Hit { root, is_front } => {
+                        let winner = Winner { root, geometry, primitive };
+                        let is_taken =
+                            !FILTERED || self.query.takes_face(is_front) && self.query.accepts(&winner);
+                        let stop = match (is_taken, G::IS_ANY) {
+                            (false, _) => None,
+                            (true, true) => Some(Stop::Hit),
+                            (true, false) => self.test_root(root, || (geometry, primitive), ray, slabs),
+                        };
+                        if stop.is_some() {
+                            return stop;
+                        }
+                    }
+                }
+            }
+            if entry.is_last() {
+                break;
+            }
+        }
+        None
+    }
+}
+
+/// See [`FilteredRay::compare`].
+struct Comparison<'s, 'a> {
+    decider: &'s super::decide::Decider<'a>,
+    ray: &'s Ray,
+    axes: &'static lanes::Axes,
+    triangle: (u32, u32),
+    best: (&'s Candidate, Option<Winner>),
+}
+
+impl Task for Comparison<'_, '_> {
+    type Output = Outcome<Option<f64>>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Self::Output {
+        let Self { decider, ray, axes, triangle, best } = self;
+        decider.compare::<L>(ray, axes, triangle, best)
+    }
+}
+
+/// The ray for the spheres of one cloud, or of some with one origin.
+pub(crate) struct CloudRay {
+    geometry: u32,
+    /// The cloud's.
+    origin: DVec3,
+    /// Where single precision tells anything; and how many units of space there are for each of `t`.
+    spheres: Option<(SphereRay, f64)>,
+}
+
+impl CloudRay {
+    /// Turns the ray to a cloud.
+    #[inline(always)]
+    pub(crate) fn turn<'s>(slot: &'s mut Option<Self>, accel: &Accel, ray: &Ray, geometry: u32) -> &'s mut Self {
+        // Where all clouds have one origin, ids need not be read from memory.
+        let is_turned =
+            slot.as_ref().is_some_and(|cloud| accel.holds.has_one_cloud_origin || cloud.geometry == geometry);
+        if !is_turned {
+            let origin = accel.cloud(geometry).origin;
+            let spheres = SphereRay::new(ray, &origin, accel.holds.sizes.sphere_reach);
+            *slot = Some(Self { geometry, origin, spheres });
+        }
+        slot.as_mut().expect("it was turned")
+    }
+
+    /// The ray in this range of `t`; `None` where single precision tells nothing.
+    #[inline(always)]
+    pub(crate) fn within(&mut self, [t_min, t_max]: [f64; 2]) -> Option<&SphereRay> {
+        let (spheres, length) = self.spheres.as_mut()?;
+        spheres.set_range(*length, t_min, t_max);
+        Some(spheres)
+    }
+}
+
+/// Which lane of those in the mask is the nearest; any where there are none.
+#[inline(always)]
+pub(crate) fn nearest_of(mask: u32, near: &[f32; BLOCK]) -> usize {
+    let mut nearest = mask.trailing_zeros() as usize % BLOCK;
+    let mut others = mask & mask.wrapping_sub(1);
+    while others != 0 {
+        let other = others.trailing_zeros() as usize % BLOCK;
+        others &= others - 1;
+        nearest = if near[other] < near[nearest] { other } else { nearest };
+    }
+    nearest
+}

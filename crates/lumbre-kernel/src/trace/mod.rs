@@ -1,0 +1,221 @@
+//! How a ray goes through a tree.
+//!
+//! [`filtered`] is the traversal that every query takes first: single precision decides what it is certain of, and double precision
+//! the rest (see [`decide`]), so that an answer has the bits that double precision alone gives. Where neither can tell, because the ray
+//! meets an edge exactly or starts far away, [`exact`] answers: the traversal in double precision, which finds every hit, and is the
+//! oracle of the other. Rays in single precision have a traversal of their own, [`f32_ray`], in trees of nothing but triangles.
+
+pub(crate) mod cursor;
+pub(crate) mod decide;
+pub(crate) mod edges;
+pub(crate) mod exact;
+pub(crate) mod f32_ray;
+pub(crate) mod filtered;
+mod instances;
+mod leaves;
+pub(crate) mod stack;
+pub(crate) mod visitors;
+
+use bytemuck::Zeroable;
+use lumbre_geometry::{Ray, Root, Roots};
+
+use crate::spheres::ExactSphere;
+use crate::{Accel, GeometryKind, Hit, InstancePath};
+
+/// What single precision, and the double precision that it asks, come to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Outcome<T> {
+    /// The answer.
+    Certain(T),
+    /// The exact traversal has to answer.
+    Uncertain,
+}
+
+/// How a traversal ends early.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Stop {
+    /// Any hit will do, and there is one.
+    Hit,
+    /// The exact traversal has to answer.
+    Uncertain,
+}
+
+/// The triangles of a block that a ray may hit.
+#[derive(Clone, Copy, Zeroable)]
+pub(crate) struct LaneHits<T> {
+    /// A bit for each that it certainly hits.
+    pub(crate) met: u32,
+    /// A bit for each that has to be decided exactly.
+    pub(crate) unclear: u32,
+    /// Where it hits each; anything for triangles in neither mask.
+    pub(crate) at: T,
+}
+
+/// A crossing in a tree, without what a [`Hit`] says of instances.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Winner {
+    pub(crate) root: Root,
+    pub(crate) geometry: u32,
+    pub(crate) primitive: u32,
+}
+
+impl Winner {
+    /// Whether a crossing at `t` of the primitive with these ids is nearer, or as near and first by the ids.
+    #[inline(always)]
+    pub(crate) fn comes_after(&self, t: f64, ids: (u32, u32)) -> bool {
+        t < self.root.t || t == self.root.t && ids < (self.geometry, self.primitive)
+    }
+
+    /// As a hit outside of instances.
+    #[inline(always)]
+    pub(crate) fn to_hit(self, accel: &Accel) -> Hit {
+        let Self { root, geometry, primitive } = self;
+        Hit {
+            root,
+            id: accel.geometries[geometry as usize].id,
+            primitive,
+            geometry,
+            instances: InstancePath::new(),
+            route: InstancePath::new(),
+        }
+    }
+
+    /// As a hit in a tree that stands there.
+    pub(crate) fn to_hit_in(self, accel: &Accel, context: ContextRef) -> Hit {
+        let Context { route, ids } = context.to_context();
+        Hit { instances: ids, route, ..self.to_hit(accel) }
+    }
+
+    /// Writes the hit into a slot, field by field: a whole that is put together elsewhere stalls the store.
+    #[inline(always)]
+    pub(crate) fn put(self, accel: &Accel, slot: &mut Option<Hit>) {
+        let Some(hit) = slot else {
+            *slot = Some(self.to_hit(accel));
+            return;
+        };
+        let Self { root, geometry, primitive } = self;
+        hit.root = root;
+        hit.id = accel.geometries[geometry as usize].id;
+        hit.primitive = primitive;
+        hit.geometry = geometry;
+        // Cheaper than clearing, which looks where a path is stored.
+        hit.instances = InstancePath::new();
+        hit.route = InstancePath::new();
+    }
+}
+
+/// The instances around a tree, outermost first.
+#[derive(Debug, Default)]
+pub(crate) struct Context {
+    /// Their positions in the lists of their trees.
+    pub(crate) route: InstancePath,
+    /// Their ids.
+    pub(crate) ids: InstancePath,
+}
+
+impl Clone for Context {
+    // Faster than the derived one, which copies number by number.
+    #[inline]
+    fn clone(&self) -> Self {
+        Self { route: InstancePath::from_slice(&self.route), ids: InstancePath::from_slice(&self.ids) }
+    }
+}
+
+/// The same, with one more instance that is only written down once something is hit in it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ContextRef<'c> {
+    around: Option<&'c Context>,
+    /// Position and id of the innermost instance, where that is not among those around.
+    innermost: Option<(u32, u32)>,
+}
+
+impl<'c> ContextRef<'c> {
+    /// Outside of all instances.
+    pub(crate) const OUTSIDE: Self = Self { around: None, innermost: None };
+
+    #[inline(always)]
+    pub(crate) fn of(around: &'c Context) -> Self {
+        Self { around: Some(around), innermost: None }
+    }
+
+    /// In one more instance; of several that are not written down, this is to be the first.
+    #[inline(always)]
+    pub(crate) fn within(self, geometry: u32, id: u32) -> Self {
+        debug_assert!(self.innermost.is_none(), "the last one is written down");
+        Self { around: self.around, innermost: Some((geometry, id)) }
+    }
+
+    #[inline(always)]
+    pub(crate) fn to_context(self) -> Context {
+        let mut context = self.around.cloned().unwrap_or_default();
+        if let Some((geometry, id)) = self.innermost {
+            context.route.push(geometry);
+            context.ids.push(id);
+        }
+        context
+    }
+
+    #[inline(always)]
+    pub(crate) fn has_route(&self, route: &[u32]) -> bool {
+        let around = self.around.map_or(&[][..], |around| &around.route);
+        match self.innermost {
+            Some((geometry, _)) => route.split_last() == Some((&geometry, around)),
+            None => *route == *around,
+        }
+    }
+}
+
+/// Whether a ray can hit anything: finite, with a direction and a range.
+pub(crate) fn is_sound(ray: &Ray) -> bool {
+    ray.origin.is_finite()
+        && ray.direction.is_finite()
+        && ray.direction.abs().max_element() > 0.0
+        && ray.t_min <= ray.t_max
+}
+
+/// Whether a shape, a sphere of a cloud or a primitive of user geometry is hit in the ray's range.
+#[inline(always)]
+pub(crate) fn is_crossed(kind: &GeometryKind, primitive: u32, ray: &Ray) -> bool {
+    match kind {
+        GeometryKind::Shape(shape) => shape.any(ray),
+        GeometryKind::Custom(custom) => custom.any(primitive, ray),
+        GeometryKind::Spheres(cloud) => ExactSphere::of(cloud, primitive).closest(ray).is_some(),
+        GeometryKind::Mesh(_) | GeometryKind::PreciseMesh(_) | GeometryKind::Instance(_) => false,
+    }
+}
+
+/// The first of its crossings. That of user geometry may lie out of the range.
+#[inline(always)]
+pub(crate) fn first_crossing(kind: &GeometryKind, primitive: u32, ray: &Ray) -> Option<Root> {
+    match kind {
+        GeometryKind::Shape(shape) => shape.closest(ray),
+        GeometryKind::Custom(custom) => custom.closest(primitive, ray),
+        GeometryKind::Spheres(cloud) => ExactSphere::of(cloud, primitive).closest(ray),
+        GeometryKind::Mesh(_) | GeometryKind::PreciseMesh(_) | GeometryKind::Instance(_) => None,
+    }
+}
+
+/// All of its crossings. Those of user geometry may lie out of the range.
+pub(crate) fn all_crossings(kind: &GeometryKind, primitive: u32, ray: &Ray) -> Roots {
+    let mut roots = Roots::new();
+    match kind {
+        GeometryKind::Shape(shape) => shape.roots(ray, &mut roots),
+        GeometryKind::Custom(custom) => custom.roots(primitive, ray, &mut roots),
+        GeometryKind::Spheres(cloud) => ExactSphere::of(cloud, primitive).roots(ray, &mut roots),
+        GeometryKind::Mesh(_) | GeometryKind::PreciseMesh(_) | GeometryKind::Instance(_) => {}
+    }
+    roots
+}
+
+/// Whether a ray meets the front of what is no triangle, at one of its crossings.
+pub(crate) fn meets_front(kind: &GeometryKind, primitive: u32, ray: &Ray, root: &Root) -> bool {
+    let surface = match kind {
+        GeometryKind::Shape(shape) => shape.surface(ray, root),
+        GeometryKind::Custom(custom) => custom.surface(primitive, ray, root),
+        GeometryKind::Spheres(cloud) => ExactSphere::of(cloud, primitive).surface(ray, root),
+        GeometryKind::Mesh(_) | GeometryKind::PreciseMesh(_) | GeometryKind::Instance(_) => {
+            unreachable!("triangles know their front, and instances have none")
+        }
+    };
+    surface.normal.dot(ray.direction) < 0.0
+}
