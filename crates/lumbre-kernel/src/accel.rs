@@ -9,22 +9,24 @@ use std::sync::OnceLock;
 use lumbre_geometry::{Aabb, Ray, Surface};
 use lumbre_math::{DVec3, Transform};
 
-use crate::collapse::{Entry, Packed};
-use crate::holds::{Holds, SingleStart};
-use crate::hulls::Hulls;
-use crate::lanes::Level;
-use crate::node::{Units, tag};
+use crate::build::collapse::{Entry, Packed};
+use crate::tree::summary::{Holds, SingleStart};
+use crate::tree::bounding_block::Hulls;
+use crate::simd::Level;
+use crate::tree::node::{Units, tag};
 use crate::trace::f32_ray::{self, F32Queries};
 use crate::trace::filtered::{self, Queries};
 use crate::trace::stack::{AnyHit, ClosestHit};
 use crate::trace::visitors::{Count, NextHits};
 use crate::trace::{ContextRef, Outcome, exact};
-use crate::winding::{self, Moments};
+use crate::point::winding::{self, Moments};
 use crate::{
     ClosestPoint, Geometry, GeometryKind, Hit, Hit32, LoadError, MapError, NoClosestPoint, NoWindingNumber,
-    Query, Ray32, RefitError, SphereCloud, batch, file, inside, nearest, prepare, rebuild, refit, save,
-    surface,
+    Query, Ray32, RefitError, SphereCloud, batch, surface,
 };
+use crate::build::{input, rebuild, refit};
+use crate::io::{bytes, mapped};
+use crate::point::{closest_point, inside};
 
 /// A bounding volume hierarchy over geometries, ready for queries from any number of threads.
 ///
@@ -121,7 +123,7 @@ impl fmt::Display for BuildError {
             Self::TooMany => write!(
                 f,
                 "too many primitives for one tree: at most {}, and {} blocks or 8 GiB of triangles",
-                prepare::MOST_PRIMITIVES,
+                input::MOST_PRIMITIVES,
                 tag::BLOCK_PLACES
             ),
         }
@@ -140,7 +142,7 @@ impl Accel {
     /// [`BuildError`] when a mesh names vertices that it lacks, a coordinate or a radius is not finite, or there are 2^29 primitives
     /// or more.
     pub fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result<Self, BuildError> {
-        prepare::build(geometries, options)
+        input::build(geometries, options)
     }
 
     /// Moves what stands in the tree: `geometries` are those that it was built from, with other vertices, shapes,
@@ -192,7 +194,7 @@ impl Accel {
     /// How the tree is put together, as bytes for a file: some six a triangle, whatever the machine. The geometries are not
     /// in them. Trees that stand in this one as instances are saved by themselves.
     pub fn to_bytes(&self) -> Vec<u8> {
-        save::to_bytes(self)
+        bytes::to_bytes(self)
     }
 
     /// The tree that [`Accel::to_bytes`] wrote down, over the geometries that it was built from: it is the same to the bit,
@@ -204,7 +206,7 @@ impl Accel {
     /// # Errors
     /// [`LoadError`] when the bytes are no tree, of another version, incomplete or damaged, or the geometries do not fit.
     pub fn from_bytes(bytes: &[u8], geometries: Vec<Geometry>) -> Result<Self, LoadError> {
-        save::from_bytes(bytes, geometries)
+        bytes::from_bytes(bytes, geometries)
     }
 
     /// Writes the tree to a file that [`Accel::map`] uses in place: thirty to sixty bytes a triangle. The geometries are not in it,
@@ -214,7 +216,7 @@ impl Accel {
     /// # Errors
     /// When the file cannot be written, or the machine is not little-endian.
     pub fn save(&self, path: impl AsRef<Path>) -> io::Result<()> {
-        file::save(self, path.as_ref())
+        mapped::save(self, path.as_ref())
     }
 
     /// The tree that [`Accel::save`] wrote, over the geometries that it was saved with: its nodes and leaves stay in the file,
@@ -231,7 +233,7 @@ impl Accel {
     /// # Errors
     /// [`MapError`] when the file cannot be mapped, is damaged, of another version or of other geometries.
     pub fn map(path: impl AsRef<Path>, geometries: Vec<Geometry>) -> Result<Self, MapError> {
-        file::map(path.as_ref(), geometries)
+        mapped::map(path.as_ref(), geometries)
     }
 
     /// The closest hit in the ray's range. Of hits at the same `t`, the one whose (path, geometry, primitive) comes
@@ -268,7 +270,7 @@ impl Accel {
 
     pub(crate) fn any_with_at(&self, level: Level, ray: &Ray, query: &Query) -> bool {
         match filtered::with_query::<AnyHit>(level, self, ray, query) {
-            Outcome::Certain(found) => found.winner.is_some(),
+            Outcome::Certain(is_hit) => is_hit,
             Outcome::Uncertain => exact::any(level, self, ray, Some(query)),
         }
     }
@@ -435,7 +437,7 @@ impl Accel {
         point: DVec3,
         max_distance: f64,
     ) -> Result<Option<ClosestPoint>, NoClosestPoint> {
-        nearest::closest_point(self, point, max_distance, 0.0)
+        closest_point::closest_point(self, point, max_distance, 0.0)
     }
 
     /// [`Accel::closest_point`] at a time, in the unit of the keys of what moves; without one, it is 0.
@@ -448,7 +450,7 @@ impl Accel {
         max_distance: f64,
         time: f64,
     ) -> Result<Option<ClosestPoint>, NoClosestPoint> {
-        nearest::closest_point(self, point, max_distance, time)
+        closest_point::closest_point(self, point, max_distance, time)
     }
 
     /// Whether a point is inside of what stands here, even-odd: inside of two bodies that overlap, or in a body within a

@@ -48,7 +48,7 @@ impl<'q> Query<'q> {
     }
 
     /// Only geometry whose mask shares a bit with `mask`, and in instances only where theirs does, too: see
-    /// [`Accel::with_masks`].
+    /// [`Accel::with_masks`]. `u32::MAX` takes all geometry, even that with a mask of zero.
     #[must_use]
     pub fn mask(self, mask: u32) -> Self {
         Self { mask, ..self }
@@ -78,7 +78,7 @@ impl<'q> Query<'q> {
     #[inline(always)]
     pub(crate) fn takes_all(&self, accel: &Accel) -> bool {
         let has_masks = !accel.masks.is_empty() || accel.holds.masks_within;
-        !has_masks && self.exclude.is_none() && self.faces == Faces::Both && self.filter.is_none()
+        (!has_masks || self.mask == u32::MAX) && self.exclude.is_none() && self.faces == Faces::Both && self.filter.is_none()
     }
 }
 
@@ -96,8 +96,7 @@ impl fmt::Debug for Query<'_> {
 /// What of one tree a query takes into account.
 #[derive(Clone, Copy)]
 pub(crate) struct TreeQuery<'a> {
-    // `None`: everything.
-    query: Option<&'a Query<'a>>,
+    query: &'a Query<'a>,
     accel: &'a Accel,
     context: ContextRef<'a>,
     /// Geometry and primitive.
@@ -105,44 +104,27 @@ pub(crate) struct TreeQuery<'a> {
 }
 
 impl<'a> TreeQuery<'a> {
-    /// In a tree that stands there; without a query everything.
+    /// In a tree that stands there.
     #[inline(always)]
-    pub(crate) fn new(query: Option<&'a Query<'a>>, accel: &'a Accel, context: ContextRef<'a>) -> Self {
-        let excluded = match query.and_then(|query| query.exclude) {
+    pub(crate) fn new(query: &'a Query<'a>, accel: &'a Accel, context: ContextRef<'a>) -> Self {
+        let excluded = match query.exclude {
             Some(hit) if context.has_route(&hit.route) => Some((hit.geometry, hit.primitive)),
             _ => None,
         };
         Self { query, accel, context, excluded }
     }
 
-    /// The same of a tree inside.
-    #[inline(always)]
-    pub(crate) fn inside<'b>(&self, accel: &'b Accel, context: ContextRef<'b>) -> TreeQuery<'b>
-    where
-        'a: 'b,
-    {
-        TreeQuery::new(self.query, accel, context)
-    }
-
-    /// Where the tree stands.
-    #[inline(always)]
-    pub(crate) fn context(&self) -> ContextRef<'a> {
-        self.context
-    }
-
     /// The query.
     #[inline(always)]
-    pub(crate) fn query(&self) -> Option<&'a Query<'a>> {
+    pub(crate) fn query(&self) -> &'a Query<'a> {
         self.query
     }
 
     /// Whether the mask leaves a geometry.
     #[inline(always)]
     pub(crate) fn has_mask(&self, geometry: u32) -> bool {
-        match (self.query, self.accel.masks.get(geometry as usize)) {
-            (Some(query), Some(own)) => own & query.mask != 0,
-            _ => true,
-        }
+        let mask = self.query.mask;
+        mask == u32::MAX || self.accel.masks.get(geometry as usize).is_none_or(|own| own & mask != 0)
     }
 
     /// Whether a primitive may count, before it is tested.
@@ -154,24 +136,21 @@ impl<'a> TreeQuery<'a> {
     /// Whether both sides of a surface count.
     #[inline(always)]
     pub(crate) fn takes_both_faces(&self) -> bool {
-        self.query.is_none_or(|query| query.faces == Faces::Both)
+        self.query.faces == Faces::Both
     }
 
     /// Whether a side of a surface counts.
     #[inline(always)]
     pub(crate) fn takes_face(&self, is_front: bool) -> bool {
-        match self.query.map(|query| query.faces) {
-            None | Some(Faces::Both) => true,
-            Some(Faces::Front) => is_front,
-            Some(Faces::Back) => !is_front,
+        match self.query.faces {
+            Faces::Both => true,
+            Faces::Front => is_front,
+            Faces::Back => !is_front,
         }
     }
 
     /// Whether the filter takes a hit.
     pub(crate) fn accepts(&self, winner: &Winner) -> bool {
-        match self.query.and_then(|query| query.filter) {
-            Some(filter) => filter(&winner.to_hit_in(self.accel, self.context)),
-            None => true,
-        }
+        self.query.filter.is_none_or(|filter| filter(&winner.to_hit_in(self.accel, self.context)))
     }
 }

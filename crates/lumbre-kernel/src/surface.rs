@@ -5,7 +5,7 @@ use lumbre_math::quadratic::dop;
 use lumbre_math::rounding::{UNIT_ROUNDOFF, gamma};
 use lumbre_math::{DMat3, DVec2, DVec3, Transform, Vec3};
 
-use crate::spheres::ExactSphere;
+use crate::tree::sphere_block::ExactSphere;
 use crate::{Accel, GeometryKind, Hit, Instance};
 
 /// The instances along a hit's route, outermost first, and the tree within the last.

@@ -9,14 +9,14 @@ use std::marker::PhantomData;
 
 use super::Sink;
 use super::packet::{ALL, Bundle, Cull, CullBounds, Effort, PACKET, Signs, SlabRows, Start, State};
-use crate::blocks::TriangleBlock;
-use crate::lanes::{self, Axes, Corners, Lanes, Row, Vector, Wide};
-use crate::node::Units;
+use crate::tree::triangle_block::TriangleBlock;
+use crate::simd::{self, Axes, Corners, Lanes, Row, Vector, Wide};
+use crate::tree::node::Units;
 use crate::trace::Outcome;
 use crate::trace::decide::Decider;
 use crate::trace::f32_ray::{F32Ray, SOME_HIT, within};
 use crate::trace::stack::Goal;
-use crate::triangles::{BEYOND, beyond};
+use crate::trace::watertight::{BEYOND, beyond};
 use crate::{Hit32, Ray32};
 
 /// The rays of a packet.
@@ -254,7 +254,7 @@ impl<'a, 'd, G: Goal> Bundle<'a, 'd> for F32Bundle<'a, 'd, G> {
         _: &CullBounds,
         _: &[Ray32; PACKET],
     ) {
-        let own = lanes::opaque(self);
+        let own = simd::opaque(self);
         let (load, splat) = (L::Wide::load, L::Wide::splat);
         let [kx, ky, kz] = own.axes.order();
         let (ox, oy, oz) = (load(&own.origin[0].0), load(&own.origin[1].0), load(&own.origin[2].0));

@@ -3,14 +3,14 @@
 use std::marker::PhantomData;
 
 use super::interleaved::{PassedLanes, RaySlot};
-use crate::blocks::TriangleBlock;
-use crate::lanes::{Eight, Lanes, Vector};
-use crate::node::Slabs;
+use crate::tree::triangle_block::TriangleBlock;
+use crate::simd::{Eight, Lanes, Vector};
+use crate::tree::node::Slabs;
 use crate::trace::decide::Decider;
 use crate::trace::f32_ray::{F32Ray, Nearest, Pass, SOME_HIT};
 use crate::trace::stack::Goal;
 use crate::trace::{LaneHits, Outcome};
-use crate::triangles::{self, BLOCK};
+use crate::trace::watertight::{self, BLOCK};
 use crate::{Hit32, Ray32};
 
 /// A ray among triangles, and the nearest that it has hit: a cache line.
@@ -107,7 +107,7 @@ impl<'a, 'd, G: Goal, L: Lanes> RaySlot<'a, 'd, L> for F32Slot<'a, 'd, G> {
         let which = hits.at.at_most(L::Eight::splat(t)) & hits.met;
         let lane = which.trailing_zeros() as usize % BLOCK;
         if self.nearest.take_nearest(decider, &mut self.ray, block, hits, pass, (lane, t)) {
-            slabs.end_at(triangles::beyond(self.ray.t_max()));
+            slabs.end_at(watertight::beyond(self.ray.t_max()));
         }
         true
     }

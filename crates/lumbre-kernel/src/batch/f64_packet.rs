@@ -7,17 +7,15 @@ use lumbre_math::DVec2;
 
 use super::Sink;
 use super::packet::{ALL, Bundle, Cull, CullBounds, Effort, PACKET, Signs, SlabRows, Start, State, record};
-use crate::blocks::TriangleBlock;
-use crate::holds::SingleStart;
-use crate::lanes::{self, Axes, Corners, Lanes, Level, Row, Task, Vector, Wide};
-use crate::node::Slabs;
-use crate::query::TreeQuery;
+use crate::tree::triangle_block::TriangleBlock;
+use crate::tree::summary::SingleStart;
+use crate::simd::{self, Axes, Corners, Lanes, Level, Row, Task, Vector, Wide};
+use crate::tree::node::Slabs;
 use crate::trace::decide::{Candidate, Decider, heights, largest_component};
-use crate::trace::filtered::{FilteredRay, Found};
-use crate::trace::stack::Goal;
+use crate::trace::filtered::{FilteredGoal, FilteredRay};
 use crate::trace::{ContextRef, Outcome, Winner};
-use crate::triangles::{
-    self, BEYOND, EDGE_ERROR, ERRORS_OF_EDGES, ERRORS_OF_EXTENT, FAR, HEIGHT_ERROR, Meeting, Pairs,
+use crate::trace::watertight::{
+    self, BEYOND, EDGE_ERROR, ERRORS_OF_EDGES, ERRORS_OF_EXTENT, FAR, HEIGHT_ERROR, Meeting, Met, Pairs,
     ROUNDINGS, SIZE_ERROR, TINY, beyond,
 };
 
@@ -27,7 +25,7 @@ pub(super) struct F64Bundle<'a, 'd, G, const GENERAL: bool> {
     /// The rays, number by number: origin, direction, range.
     columns: [Row<f64>; 8],
     axes: &'static Axes,
-    /// Each among triangles, as a [`BlockRay`](triangles::BlockRay).
+    /// Each among triangles, as a [`BlockRay`](watertight::BlockRay).
     origin: [Row<f32>; 3],
     rest: [Row<f32>; 3],
     shear: [Row<f32>; 2],
@@ -59,7 +57,7 @@ fn inverse_of<W: Wide>(start: &SingleStart, direction: W) -> W {
     size.turned_by(direction)
 }
 
-impl<'a, 'd, G: Goal, const GENERAL: bool> F64Bundle<'a, 'd, G, GENERAL> {
+impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> F64Bundle<'a, 'd, G, GENERAL> {
     /// Where x is no shorter than y, y than z, and x than z, in double precision.
     #[cold]
     #[inline(never)]
@@ -180,7 +178,7 @@ impl<'a, 'd, G: Goal, const GENERAL: bool> F64Bundle<'a, 'd, G, GENERAL> {
             let slabs = if alive >> i & 1 != 0 { L::start_single(decider.start, ray) } else { None };
             self.others.push(slabs.map(|slabs| {
                 let blocks = L::start_blocks(decider.start, ray, &slabs);
-                FilteredRay::new(decider, blocks, TreeQuery::new(None, decider.accel(), ContextRef::OUTSIDE))
+                FilteredRay::new(decider, blocks, None, ContextRef::OUTSIDE)
             }));
             if alive >> i & 1 != 0 && slabs.is_none() {
                 state.give_up(i);
@@ -218,7 +216,7 @@ struct TestOthers<'s, 'a, 'd, G, const GENERAL: bool> {
     rays: &'s [Ray; PACKET],
 }
 
-impl<G: Goal, const GENERAL: bool> Task for TestOthers<'_, '_, '_, G, GENERAL> {
+impl<G: FilteredGoal, const GENERAL: bool> Task for TestOthers<'_, '_, '_, G, GENERAL> {
     type Output = ();
 
     #[inline(always)]
@@ -227,10 +225,10 @@ impl<G: Goal, const GENERAL: bool> Task for TestOthers<'_, '_, '_, G, GENERAL> {
     }
 }
 
-impl<'a, 'd, G: Goal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<'a, 'd, G, GENERAL> {
+impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<'a, 'd, G, GENERAL> {
     type Goal = G;
     type Ray = Ray;
-    type Answer = Found;
+    type Answer = G::Found;
     const GENERAL: bool = GENERAL;
     const NEEDS_BOUNDS: bool = true;
     const MOST_SPREAD: f32 = 0.125;
@@ -429,7 +427,7 @@ impl<'a, 'd, G: Goal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<'a, 'd, 
         bounds: &CullBounds,
         rays: &[Ray; PACKET],
     ) {
-        let own = lanes::opaque(self);
+        let own = simd::opaque(self);
         let (load, splat) = (L::Wide::load, L::Wide::splat);
         let [kx, ky, kz] = own.axes.order();
         let (ox, oy, oz) = (load(&own.origin[0].0), load(&own.origin[1].0), load(&own.origin[2].0));
@@ -522,57 +520,45 @@ impl<'a, 'd, G: Goal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<'a, 'd, 
         state: &State,
         rays: &[Ray; PACKET],
         first: usize,
-        sink: &mut impl Sink<Found>,
+        sink: &mut impl Sink<G::Found>,
     ) {
-        let mut rest = state.chosen;
-        if G::IS_ANY {
-            while rest != 0 {
-                let i = rest.trailing_zeros() as usize % PACKET;
-                rest &= rest - 1;
-                let is_certain = state.uncertain >> i & 1 == 0;
-                let found = Found::some(state.met >> i & 1 != 0);
-                sink.put(first + i, if is_certain { Outcome::Certain(found) } else { Outcome::Uncertain });
-            }
-            return;
-        }
         let triangle = L::Wide::load(&self.triangle.0);
-        let hits = if state.is_among_triangles {
-            !triangle.with_bits(NONE) & !state.uncertain & state.chosen
-        } else {
-            0
-        };
-        rest &= !hits;
+        let mut on_triangles = 0;
+        if !G::IS_ANY && state.is_among_triangles {
+            on_triangles = !triangle.with_bits(NONE) & !state.uncertain & state.chosen;
+        }
+        if GENERAL {
+            on_triangles &= !triangle.with_bits(OTHER);
+        }
+        let met = if on_triangles != 0 { self.intersect_all::<L>(decider, on_triangles) } else { Met::NONE };
+        let mut rest = state.chosen;
         while rest != 0 {
             let i = rest.trailing_zeros() as usize % PACKET;
             rest &= rest - 1;
-            let is_certain = state.uncertain >> i & 1 == 0;
-            sink.put(first + i, if is_certain { Outcome::Certain(Found::NOTHING) } else { Outcome::Uncertain });
-        }
-        let mut others = if GENERAL { triangle.with_bits(OTHER) & hits } else { 0 };
-        let on_triangles = hits & !others;
-        while others != 0 {
-            let i = others.trailing_zeros() as usize % PACKET;
-            others &= others - 1;
-            let other = self.others[i].as_mut().expect("it has a hit");
-            sink.put(first + i, other.found::<L>(&rays[i]));
-        }
-        if on_triangles != 0 {
-            self.put_triangles::<L>(decider, on_triangles, rays, first, sink);
+            let outcome = if state.uncertain >> i & 1 != 0 {
+                Outcome::Uncertain
+            } else if state.met >> i & 1 != 0 {
+                Outcome::Certain(G::hit())
+            } else if on_triangles >> i & 1 != 0 {
+                match self.winner::<L>(decider, &met, i, &rays[i]) {
+                    Some(winner) => Outcome::Certain(G::closest(winner)),
+                    None => Outcome::Uncertain,
+                }
+            } else {
+                match self.others.get_mut(i) {
+                    Some(Some(other)) if GENERAL => G::end::<L, GENERAL, false>(other, &rays[i]),
+                    _ => Outcome::Certain(G::nothing()),
+                }
+            };
+            sink.put(first + i, outcome);
         }
     }
 }
 
-impl<G: Goal, const GENERAL: bool> F64Bundle<'_, '_, G, GENERAL> {
-    /// Hands out the hits of triangles, which are intersected in double precision all at once.
+impl<G: FilteredGoal, const GENERAL: bool> F64Bundle<'_, '_, G, GENERAL> {
+    /// Intersects the triangles of these closest hits in double precision, all at once.
     #[inline(always)]
-    fn put_triangles<L: Lanes>(
-        &self,
-        decider: &Decider,
-        hits: u32,
-        rays: &[Ray; PACKET],
-        first: usize,
-        sink: &mut impl Sink<Found>,
-    ) {
+    fn intersect_all<L: Lanes>(&self, decider: &Decider, hits: u32) -> Met {
         let (axes, triangle) = (self.axes, L::Wide::load(&self.triangle.0));
         // Many may have hit the same.
         let mut corners = [[Row::of(0.0); 3]; 3];
@@ -597,23 +583,19 @@ impl<G: Goal, const GENERAL: bool> F64Bundle<'_, '_, G, GENERAL> {
             direction: [&columns[3 + x], &columns[3 + y], &columns[3 + z]],
             corners: &corners,
         };
-        let met = pairs.meet();
-        let mut rest = hits;
-        while rest != 0 {
-            let i = rest.trailing_zeros() as usize % PACKET;
-            rest &= rest - 1;
-            let best = self.best(i);
-            let t = met.t.0[i];
-            let winner = if t.is_nan() {
-                // Uncertain: by itself, and exactly.
-                decider.winner::<L>(&rays[i], axes, &best)
-            } else {
-                let (geometry, primitive) = decider.ids(best.block, best.lane);
-                let local = DVec2::new(met.local[0].0[i], met.local[1].0[i]);
-                Some(Winner { root: triangles::root(t, local), geometry, primitive })
-            };
-            let found = |winner| Found { winner: Some(winner), in_instance: None };
-            sink.put(first + i, winner.map_or(Outcome::Uncertain, |winner| Outcome::Certain(found(winner))));
+        pairs.meet()
+    }
+
+    /// The closest hit of one, on a triangle; `None` should double precision deny it.
+    #[inline(always)]
+    fn winner<L: Lanes>(&self, decider: &Decider, met: &Met, i: usize, ray: &Ray) -> Option<Winner> {
+        let (best, t) = (self.best(i), met.t.0[i]);
+        if t.is_nan() {
+            // Uncertain: by itself, and exactly.
+            return decider.winner::<L>(ray, self.axes, &best);
         }
+        let (geometry, primitive) = decider.ids(best.block, best.lane);
+        let local = DVec2::new(met.local[0].0[i], met.local[1].0[i]);
+        Some(Winner { root: watertight::root(t, local), geometry, primitive })
     }
 }

@@ -3,15 +3,13 @@
 use lumbre_geometry::Ray;
 
 use super::interleaved::{PassedLanes, RaySlot};
-use crate::blocks::TriangleBlock;
-use crate::lanes::{self, Axes, Crossings, Eight, Lanes, Level, Task, Vector};
-use crate::node::Slabs;
-use crate::query::TreeQuery;
+use crate::tree::triangle_block::TriangleBlock;
+use crate::simd::{self, Axes, Crossings, Eight, Lanes, Level, Task, Vector};
+use crate::tree::node::Slabs;
 use crate::trace::decide::{Candidate, Decider, heights, largest_component};
-use crate::trace::filtered::{FilteredRay, Found};
-use crate::trace::stack::Goal;
+use crate::trace::filtered::{FilteredGoal, FilteredRay};
 use crate::trace::{ContextRef, LaneHits, Outcome, Stop, Winner};
-use crate::triangles::{BLOCK, BlockRay, HeightRange, Meeting};
+use crate::trace::watertight::{BLOCK, BlockRay, HeightRange, Meeting};
 
 /// A ray in the leaves of a tree.
 pub(super) struct F64Slot<'a, 'd, G, const GENERAL: bool> {
@@ -19,11 +17,10 @@ pub(super) struct F64Slot<'a, 'd, G, const GENERAL: bool> {
     goal: std::marker::PhantomData<G>,
 }
 
-impl<'a, 'd, G: Goal, const GENERAL: bool> F64Slot<'a, 'd, G, GENERAL> {
+impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> F64Slot<'a, 'd, G, GENERAL> {
     #[inline(always)]
     fn with(decider: &'d Decider<'a>, blocks: (BlockRay, f32)) -> Self {
-        let query = TreeQuery::new(None, decider.accel(), ContextRef::OUTSIDE);
-        Self { ray: FilteredRay::new(decider, blocks, query), goal: std::marker::PhantomData }
+        Self { ray: FilteredRay::new(decider, blocks, None, ContextRef::OUTSIDE), goal: std::marker::PhantomData }
     }
 
     /// The closest of the triangles of a block, decided one after another.
@@ -117,10 +114,10 @@ fn hits_any(level: Level, decider: &Decider, ray: &Ray, axes: &'static Axes, blo
     level.run(HitsAny(decider, ray, axes, block, mask))
 }
 
-impl<'a, 'd, G: Goal, L: Lanes, const GENERAL: bool> RaySlot<'a, 'd, L> for F64Slot<'a, 'd, G, GENERAL> {
+impl<'a, 'd, G: FilteredGoal, L: Lanes, const GENERAL: bool> RaySlot<'a, 'd, L> for F64Slot<'a, 'd, G, GENERAL> {
     type Goal = G;
     type Ray = Ray;
-    type Answer = Found;
+    type Answer = G::Found;
     const GENERAL: bool = GENERAL;
     type Pass = L::Edges;
     type Passes = L::EdgesByTwo;
@@ -167,7 +164,7 @@ impl<'a, 'd, G: Goal, L: Lanes, const GENERAL: bool> RaySlot<'a, 'd, L> for F64S
     #[inline(always)]
     fn intersect(&self, mask: u32, edges: &L::Edges) -> LaneHits<[L::Eight; 2]> {
         let Crossings { in_range, sure, from, to } =
-            L::place_crossings(edges, lanes::opaque(&self.ray.blocks));
+            L::place_crossings(edges, simd::opaque(&self.ray.blocks));
         LaneHits { met: mask & sure, unclear: mask & in_range & !sure, at: [from, to] }
     }
 
@@ -215,7 +212,7 @@ impl<'a, 'd, G: Goal, L: Lanes, const GENERAL: bool> RaySlot<'a, 'd, L> for F64S
     }
 
     #[inline(always)]
-    fn answer(&mut self, _: &Decider, ray: &Ray, is_hit: bool) -> Outcome<Found> {
-        if G::IS_ANY { Outcome::Certain(Found::some(is_hit)) } else { self.ray.found::<L>(ray) }
+    fn answer(&mut self, _: &Decider, ray: &Ray, is_hit: bool) -> Outcome<G::Found> {
+        if is_hit { Outcome::Certain(G::hit()) } else { G::end::<L, GENERAL, false>(&mut self.ray, ray) }
     }
 }

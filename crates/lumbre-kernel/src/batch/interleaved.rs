@@ -7,13 +7,13 @@
 use bytemuck::Zeroable;
 
 use super::Sink;
-use crate::blocks::{Blocks, TriangleBlock};
-use crate::lanes::{self, Lanes, Slots, Vector, WIDE, Wide};
-use crate::node::{Node, Slabs, WIDTH, tag};
+use crate::tree::triangle_block::{Blocks, TriangleBlock};
+use crate::simd::{self, Lanes, Slots, Vector, WIDE, Wide};
+use crate::tree::node::{Node, Slabs, WIDTH, tag};
 use crate::trace::decide::Decider;
 use crate::trace::stack::{Goal, STACK};
 use crate::trace::{LaneHits, Outcome, Stop};
-use crate::triangles::BLOCK;
+use crate::trace::watertight::BLOCK;
 
 /// A ray in a slot, in either precision.
 pub(super) trait RaySlot<'a, 'd, L: Lanes>: Sized {
@@ -266,7 +266,7 @@ impl<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Lanes> Interleaved<'a, 'd, 'r, R, L> 
     /// Starts with a ray at the root; false where the exact traversal has to answer.
     #[inline(always)]
     fn start(&mut self, slot: usize, position: usize) -> bool {
-        let ray = lanes::opaque(&self.rays[position]);
+        let ray = simd::opaque(&self.rays[position]);
         let own = &mut self.slots[slot];
         let Some(slabs) = own.ray.start(self.decider, ray) else { return false };
         (own.slabs, own.position) = (slabs, position);
@@ -325,8 +325,8 @@ impl<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Lanes> Interleaved<'a, 'd, 'r, R, L> 
         for slot in Bits(at_nodes) {
             let reference = self.references.of(slot);
             let node = &self.nodes[*reference as usize];
-            let slabs = lanes::opaque(&self.slots[slot].slabs);
-            let (mask, enter) = lanes::meet_boxes::<L::Wide>(node, slabs);
+            let slabs = simd::opaque(&self.slots[slot].slabs);
+            let (mask, enter) = simd::meet_boxes::<L::Wide>(node, slabs);
             let stack = &mut self.stacks[slot];
             *reference = R::Goal::push_and_pop::<L>(node, mask, enter, stack);
             too_deep |= bit(stack.len() > STACK - WIDTH, slot);
@@ -342,13 +342,13 @@ impl<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Lanes> Interleaved<'a, 'd, 'r, R, L> 
         for (at, slot) in Bits(at_nodes).enumerate() {
             let reference = self.references.of(slot);
             let node = &nodes[*reference as usize];
-            let slabs = lanes::opaque(&self.slots[slot].slabs);
-            let (mask, enter) = lanes::meet_boxes::<L::Wide>(node, slabs);
+            let slabs = simd::opaque(&self.slots[slot].slabs);
+            let (mask, enter) = simd::meet_boxes::<L::Wide>(node, slabs);
             self.masks[slot] = mask;
             *self.parents.of(slot) = *reference;
             self.enters[at % SLOTS] = enter;
             // Anything, where there is not just one.
-            *reference = lanes::only_child(node, mask);
+            *reference = simd::only_child(node, mask);
             none |= bit(mask == 0, slot);
             many |= bit(mask & mask.wrapping_sub(1) != 0, slot);
         }
@@ -483,7 +483,7 @@ impl<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Lanes> Interleaved<'a, 'd, 'r, R, L> 
     fn prefetch(&mut self, slots: u64) {
         let Stations { nodes, triangles, .. } = self.stations();
         for slot in Bits(nodes & slots) {
-            self.nodes.get(*self.references.of(slot) as usize).map(lanes::fetch::<Node>);
+            self.nodes.get(*self.references.of(slot) as usize).map(simd::fetch::<Node>);
         }
         for slot in Bits(triangles & slots) {
             self.blocks.block(*self.references.of(slot) & tag::PLACE).fetch();
@@ -569,7 +569,7 @@ fn start_others<'a, 'd, R: RaySlot<'a, 'd, L>, L: Lanes>(
             // Every other one: two lie in a cache line.
             for ahead in [AHEAD, AHEAD + 2] {
                 if let Some(&position) = waiting.as_slice().get(ahead) {
-                    lanes::fetch(&all.rays[position]);
+                    simd::fetch(&all.rays[position]);
                 }
             }
             *waiting = behind.iter();
@@ -587,7 +587,7 @@ fn start_others<'a, 'd, R: RaySlot<'a, 'd, L>, L: Lanes>(
     }
     for slot in Bits(free) {
         if let Some(&position) = waiting.as_slice().get(AHEAD) {
-            lanes::fetch(&all.rays[position]);
+            simd::fetch(&all.rays[position]);
         }
         for &position in waiting.by_ref() {
             if all.start(slot, position) {

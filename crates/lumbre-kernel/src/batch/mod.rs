@@ -23,15 +23,15 @@ use self::f64_packet::F64Bundle;
 use self::f64_slot::F64Slot;
 use self::interleaved::RaySlot;
 use self::packet::{Bundle, PACKET, Packet};
-use crate::blocks::Line;
-use crate::holds::SingleStart;
-use crate::lanes::{self, Lanes, Level, Task};
-use crate::node::Node;
+use crate::tree::triangle_block::Line;
+use crate::tree::summary::SingleStart;
+use crate::simd::{self, Lanes, Level, Task};
+use crate::tree::node::Node;
 use crate::trace::decide::Decider;
 use crate::trace::f32_ray;
-use crate::trace::filtered::{Found, Traversal};
+use crate::trace::filtered::{FilteredGoal, Found, Traversal};
 use crate::trace::stack::{AnyHit, ClosestHit, Goal};
-use crate::trace::{Outcome, exact};
+use crate::trace::{ContextRef, Outcome, exact};
 use crate::{Accel, Hit, Hit32, Ray32};
 
 /// Trees of more bytes than this are hardly in the caches; interleaved rays prefetch what they read next.
@@ -117,7 +117,7 @@ fn batched(level: Level, accel: &Accel) -> Option<&SingleStart> {
 }
 
 /// False where the tree is not traversed by batches.
-fn batch_f64<G: Goal, S: Sink<Found>>(
+fn batch_f64<G: FilteredGoal, S: Sink<G::Found>>(
     level: Level,
     accel: &Accel,
     rays: &[Ray],
@@ -180,15 +180,15 @@ impl Sink<Found> for ClosestSink<'_> {
         let slot = &mut self.hits[position];
         match outcome {
             Outcome::Certain(Found { winner: None, .. }) => *slot = None,
-            Outcome::Certain(Found { in_instance: Some(hit), .. }) => *slot = Some(hit),
-            Outcome::Certain(Found { winner: Some(winner), .. }) => winner.put(self.accel, slot),
+            Outcome::Certain(Found { winner: Some(winner), in_instance: None }) => winner.put(self.accel, slot),
+            Outcome::Certain(found) => *slot = found.into_hit(self.accel, ContextRef::OUTSIDE),
             Outcome::Uncertain => *slot = exact::closest(self.level, self.accel, &self.rays[position], None),
         }
     }
 
     #[inline(always)]
     fn prefetch(&self, position: usize) {
-        self.hits.get(position).map(lanes::fetch);
+        self.hits.get(position).map(simd::fetch);
     }
 }
 
@@ -200,13 +200,13 @@ struct AnySink<'a> {
     hits: &'a mut [bool],
 }
 
-impl Sink<Found> for AnySink<'_> {
+impl Sink<bool> for AnySink<'_> {
     #[inline(always)]
-    fn put(&mut self, position: usize, outcome: Outcome<Found>) {
+    fn put(&mut self, position: usize, outcome: Outcome<bool>) {
         #[cfg(test)]
         shims::count(&outcome);
         self.hits[position] = match outcome {
-            Outcome::Certain(found) => found.winner.is_some(),
+            Outcome::Certain(is_hit) => is_hit,
             Outcome::Uncertain => exact::any(self.level, self.accel, &self.rays[position], None),
         };
     }
@@ -303,10 +303,10 @@ trait Precision {
 /// Double precision; `GENERAL` in trees of anything among triangles.
 struct F64<G, const GENERAL: bool>(PhantomData<G>);
 
-impl<G: Goal, const GENERAL: bool> Precision for F64<G, GENERAL> {
+impl<G: FilteredGoal, const GENERAL: bool> Precision for F64<G, GENERAL> {
     type Goal = G;
     type Ray = Ray;
-    type Answer = Found;
+    type Answer = G::Found;
     type Bundle<'a, 'd>
         = F64Bundle<'a, 'd, G, GENERAL>
     where
@@ -319,7 +319,7 @@ impl<G: Goal, const GENERAL: bool> Precision for F64<G, GENERAL> {
     const PREFETCHES_RAYS: bool = !G::IS_ANY;
 
     #[inline(always)]
-    fn traverse_alone<L: Lanes>(decider: &Decider, ray: &Ray) -> Outcome<Found> {
+    fn traverse_alone<L: Lanes>(decider: &Decider, ray: &Ray) -> Outcome<G::Found> {
         Traversal::<G, GENERAL, false>::whole(decider.accel(), decider.start, ray).run::<L>()
     }
 }
@@ -390,7 +390,7 @@ impl<'r, R> RaysAhead<'r, R> {
     #[inline(always)]
     fn prefetch_next(&mut self) {
         if let Some(rays) = self.packets.next().and_then(<[R]>::first_chunk::<PACKET>) {
-            lanes::fetch(rays);
+            simd::fetch(rays);
         }
     }
 }
@@ -437,7 +437,7 @@ impl<P: Precision, S: Sink<P::Answer>> Task for Batch<'_, '_, P, S> {
             if others.len() < plan.least {
                 // Neither a call nor a closure: neither takes on the instruction set of the code around it.
                 for &i in &others {
-                    sink.put(i, P::traverse_alone::<L>(decider, lanes::opaque(&rays[i])));
+                    sink.put(i, P::traverse_alone::<L>(decider, simd::opaque(&rays[i])));
                 }
             } else {
                 interleaved::traverse::<P::Slot<'_, '_, L>, L>(decider, plan.prefetches, rays, &others, sink);

@@ -25,13 +25,13 @@
 //! and s the errors are no smaller than those of every ray.
 
 use super::Sink;
-use crate::blocks::TriangleBlock;
-use crate::lanes::{self, Axes, Corners, CornersRoom, Eight, Lanes, Row, Sides, Vector, WIDE, Wide};
-use crate::node::{END_FACTOR, LITTLE, Node, START_FACTOR, tag};
+use crate::tree::triangle_block::TriangleBlock;
+use crate::simd::{self, Axes, Corners, CornersRoom, Eight, Lanes, Row, Sides, Vector, WIDE, Wide};
+use crate::tree::node::{END_FACTOR, LITTLE, Node, START_FACTOR, tag};
 use crate::trace::Stop;
 use crate::trace::decide::Decider;
 use crate::trace::stack::{Goal, Stack};
-use crate::triangles::TINY;
+use crate::trace::watertight::TINY;
 
 /// Rays in a packet.
 pub(crate) const PACKET: usize = WIDE;
@@ -181,7 +181,7 @@ pub(crate) struct Frustum {
     pub(crate) sides: &'static Sides,
 }
 
-/// The rays among boxes, each as [`Slabs`](crate::node::Slabs).
+/// The rays among boxes, each as [`Slabs`](crate::tree::node::Slabs).
 pub(crate) struct SlabRows {
     pub(crate) inverse: [Row<f32>; 3],
     pub(crate) near_offset: [Row<f32>; 3],
@@ -218,10 +218,10 @@ fn test_children<W: Wide>(
     alive: u32,
     is_ordered: bool,
 ) -> (u32, W, u32) {
-    let (mask, enters) = lanes::meet_frustum::<W>(node, frustum);
+    let (mask, enters) = simd::meet_frustum::<W>(node, frustum);
     let Some(each) = each else { return (mask, enters, 1) };
     let work = 1 + mask.count_ones() / CHILDREN_AS_A_NODE;
-    let (mask, enters) = lanes::meet_each::<W>(node, each, frustum.sides, (mask, enters), alive, is_ordered);
+    let (mask, enters) = simd::meet_each::<W>(node, each, frustum.sides, (mask, enters), alive, is_ordered);
     (mask, enters, work)
 }
 
@@ -249,7 +249,7 @@ impl Cull {
     /// Which triangles of a block are left; lanes without one mean nothing.
     #[inline(always)]
     fn bounds<E: Eight>(&self, corners: &Corners, needs_bounds: bool) -> CullBounds {
-        let own = lanes::opaque(self);
+        let own = simd::opaque(self);
         let [kx, ky, kz] = own.axes.order();
         let [ox, oy, oz] = own.middle.map(E::splat);
         let [sx, sy] = own.middle_shear.map(E::splat);
@@ -476,8 +476,8 @@ impl<'a, 'd, B: Bundle<'a, 'd>> Packet<'a, 'd, B> {
             while tag::is_inner(reference) {
                 let node = &nodes[reference as usize];
                 let state = &mut self.state;
-                let each = if self.has_one_origin { None } else { Some(lanes::opaque(&state.slabs)) };
-                let frustum = lanes::opaque(&state.frustum);
+                let each = if self.has_one_origin { None } else { Some(simd::opaque(&state.slabs)) };
+                let frustum = simd::opaque(&state.frustum);
                 let (mask, keys, work) =
                     test_children::<L::Wide>(node, frustum, each, state.alive, !B::Goal::IS_ANY);
                 state.work += work;
@@ -487,7 +487,7 @@ impl<'a, 'd, B: Bundle<'a, 'd>> Packet<'a, 'd, B> {
                         |room| B::Goal::push_children::<L>(node, mask, keys, room),
                     );
                 } else if mask != 0 {
-                    reference = lanes::only_child(node, mask);
+                    reference = simd::only_child(node, mask);
                 } else {
                     match self.pop(&mut stack) {
                         Some(next) => reference = next,

@@ -8,7 +8,7 @@ use lumbre_math::{AnimatedTransform, DVec3, Transform, Vec3};
 use super::oracle;
 use super::scenes::{Random, build, cloud, icosphere, mixture, precise, ray, shape, soup, vertex};
 use super::single::check_packet;
-use crate::lanes::Level;
+use crate::simd::Level;
 use crate::batch;
 use crate::batch::packet::{self, PACKET};
 use crate::trace::Outcome;

@@ -11,10 +11,10 @@ use lumbre_geometry::{PlacedShape, Ray, Sphere};
 use lumbre_math::{DVec3, Transform, Vec3};
 
 use super::scenes::{Random, soup};
-use crate::blocks::{self, BlockNames, Blocks, Line, TriangleBlock, Vertices};
-use crate::lanes::{Level, corners_at, equals_before_at, meet_triangles_at, told_at, truncated_at};
+use crate::tree::triangle_block::{self, BlockNames, Blocks, Line, TriangleBlock, Vertices};
+use crate::simd::{Level, corners_at, equals_before_at, meet_triangles_at, told_at, truncated_at};
 use crate::trace::f32_ray::F32Ray;
-use crate::triangles::{BLOCK, BlockRay, Meeting, Shear, intersect};
+use crate::trace::watertight::{BLOCK, BlockRay, Meeting, Shear, intersect};
 use crate::{Accel, BuildOptions, Geometry, GeometryKind, Preset, TriangleMesh};
 
 struct Tally {
@@ -44,7 +44,7 @@ fn block(random: &mut Random, shares: f64, center: DVec3, spread: f64, size: f64
     }
     let names: Vec<_> = (0..mesh.indices.len() as u32).map(|triangle| [0, triangle]).collect();
     let geometry = Geometry { id: 0, kind: GeometryKind::Mesh(Arc::new(mesh)) };
-    blocks::pack(Level::best(), Vertices::Shared, &[geometry], &[BlockNames::of(&names)], &[0], true)
+    triangle_block::pack(Level::best(), Vertices::Shared, &[geometry], &[BlockNames::of(&names)], &[0], true)
         .unwrap()
         .lines
 }
@@ -215,7 +215,7 @@ fn a_ray_that_leaves_a_wall_is_seen_to_leave_it() {
         let geometry = Geometry { id: 0, kind: GeometryKind::Mesh(Arc::new(wall)) };
         let names = [BlockNames::of(&[[0, 0], [0, 1]])];
         let units =
-            blocks::pack(Level::best(), Vertices::Shared, &[geometry], &names, &[0], true).unwrap().lines;
+            triangle_block::pack(Level::best(), Vertices::Shared, &[geometry], &names, &[0], true).unwrap().lines;
         let block = Blocks::new(&units).at(0).unwrap();
         for _ in 0..50 {
             let at = center + random.between(-1.0, 1.0) * right + random.between(-1.0, 1.0) * up;
@@ -344,7 +344,7 @@ fn triangles_stand_so_that_either_half_finds_its_vertices_in_little_room() {
             let names = [BlockNames::of(&names)];
             let geometries = [Geometry { id: 0, kind: GeometryKind::Mesh(Arc::clone(&mesh)) }];
             let filled =
-                blocks::pack(Level::best(), Vertices::Shared, &geometries, &names, &[0], true).unwrap();
+                triangle_block::pack(Level::best(), Vertices::Shared, &geometries, &names, &[0], true).unwrap();
             let block = Blocks::new(&filled.lines).at(0).unwrap();
             assert_eq!(block.room(), 10, "{triangles:?}");
             let mut names = names;
@@ -359,7 +359,7 @@ fn triangles_stand_so_that_either_half_finds_its_vertices_in_little_room() {
             }
             // What stands in that order stays in it.
             let again =
-                blocks::pack(Level::best(), Vertices::Shared, &geometries, &names, &[0], true).unwrap();
+                triangle_block::pack(Level::best(), Vertices::Shared, &geometries, &names, &[0], true).unwrap();
             assert_eq!(again.lines, filled.lines);
         }
     }
@@ -474,7 +474,7 @@ fn triangles_that_come_apart_are_packed_again() {
         let mut units = first.clone();
         let mut put = |geometry: &Geometry| {
             let geometries = std::slice::from_ref(geometry);
-            blocks::move_triangles(accel.level, geometries, &accel.tree.names, true, &mut units)
+            triangle_block::move_triangles(accel.level, geometries, &accel.tree.names, true, &mut units)
         };
         assert!(!put(&apart));
         assert!(put(&together));

@@ -7,12 +7,12 @@ use lumbre_math::{DVec3, Transform, Vec3};
 
 use super::scenes::Random;
 use crate::Ray32;
-use crate::holds::{Holds, SingleStart, Sizes};
-use crate::lanes::{
+use crate::tree::summary::{Holds, SingleStart, Sizes};
+use crate::simd::{
     LANE_BITS, Level, meet_boxes_at, meet_each_at, read_at, start_placed_at, start_single_at,
 };
-use crate::node::{BoxRay, Node, Slabs, Units, WIDTH};
-use crate::primitive::Bounds;
+use crate::tree::node::{BoxRay, Node, Slabs, Units, WIDTH};
+use crate::build::primitive::Bounds;
 
 fn units(bounds: &Aabb) -> Units {
     let half = 0.5 * bounds.size();

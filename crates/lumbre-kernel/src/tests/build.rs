@@ -9,7 +9,7 @@ use lumbre_math::{DVec3, Transform, Vec3};
 use super::scenes::{
     Balls, Random, build, cube, icosphere, mixture, options, ray, room, soup, with_every_preset,
 };
-use crate::node::tag;
+use crate::tree::node::tag;
 use crate::{
     Accel, BuildError, BuildOptions, CustomGeometry, Geometry, GeometryKind, Instance, Preset, TriangleMesh,
 };

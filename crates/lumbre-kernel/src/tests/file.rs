@@ -9,7 +9,7 @@ use tempfile::TempDir;
 
 use super::oracle::check;
 use super::scenes::{Random, build, cube, icosphere, mixture, precise, ray, with_every_preset};
-use crate::node::tag;
+use crate::tree::node::tag;
 use crate::{Accel, Geometry, GeometryKind, LoadError, MapError, RefitError, TriangleMesh};
 
 const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
@@ -138,7 +138,7 @@ fn what_is_wrong_with_a_file_is_said() {
 
 /// The file with the right checksums.
 fn sealed(mut bytes: Vec<u8>) -> Vec<u8> {
-    crate::file::seal(&mut bytes);
+    crate::io::mapped::seal(&mut bytes);
     bytes
 }
 

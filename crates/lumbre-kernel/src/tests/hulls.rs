@@ -13,14 +13,14 @@ use lumbre_math::{DVec2, DVec3, Transform};
 use super::oracle::check_many;
 use super::scenes::{self, Random, build, with_every_preset};
 use super::single::check_packet;
-use crate::collapse::Entry;
-use crate::hulls::{HullBlock, HullRay, Hulls};
-use crate::lanes::{Level, meet_hulls_at};
-use crate::node::Units;
+use crate::build::collapse::Entry;
+use crate::tree::bounding_block::{HullBlock, HullRay, Hulls};
+use crate::simd::{Level, meet_hulls_at};
+use crate::tree::node::Units;
 use crate::batch;
 use crate::batch::packet::PACKET;
 use crate::trace::decide::heights;
-use crate::triangles::{BLOCK, HeightRange};
+use crate::trace::watertight::{BLOCK, HeightRange};
 use crate::{Geometry, GeometryKind};
 
 /// A shape of any kind within about `size` of `center`, now and then squeezed to a thousandth on an axis, or tiny.

@@ -11,11 +11,11 @@ use super::scenes::{
     with_every_preset,
 };
 use crate::batch;
-use crate::blocks::Line;
-use crate::holds::SingleStart;
-use crate::lanes::{Eight, Lanes, Level, Portable, Vector, start_narrow_by_four_at};
+use crate::tree::triangle_block::Line;
+use crate::tree::summary::SingleStart;
+use crate::simd::{Eight, Lanes, Level, Portable, Vector, start_narrow_by_four_at};
 use crate::trace::f32_ray::Precise;
-use crate::node::Node;
+use crate::tree::node::Node;
 use crate::batch::packet::PACKET;
 use crate::{Accel, BuildOptions, Geometry, GeometryKind, Hit, Hit32, Instance, Preset, Ray32, TriangleMesh};
 
@@ -545,13 +545,13 @@ fn batches_without_rays_or_without_triangles_end() {
 }
 
 #[test]
-#[should_panic(expected = "a place for the hit of every ray")]
+#[should_panic(expected = "a slot for the hit of every ray")]
 fn a_batch_without_a_place_for_each_hit_is_refused() {
     build(vec![]).closest_batch_f32(&[Ray32::new(Vec3::ZERO, Vec3::X); 3], &mut [None; 2]);
 }
 
 #[test]
-#[should_panic(expected = "a place for the answer of every ray")]
+#[should_panic(expected = "a slot for the answer of every ray")]
 fn a_batch_without_a_place_for_each_answer_is_refused() {
     build(vec![]).any_batch_f32(&[Ray32::new(Vec3::ZERO, Vec3::X); 3], &mut [false; 4]);
 }

@@ -8,7 +8,7 @@ use lumbre_math::{DVec3, Transform};
 use super::scenes::{
     Random, balls, build, bumpy, cloud, cube, icosphere, mixture, precise, soup, with_every_preset,
 };
-use crate::nearest::{Frame, Search};
+use crate::point::closest_point::{Frame, Search};
 use crate::{Accel, ClosestPoint, Geometry, GeometryKind, Instance, TriangleMesh};
 
 const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);

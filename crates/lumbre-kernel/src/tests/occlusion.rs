@@ -6,9 +6,9 @@ use lumbre_math::DVec3;
 
 use super::refit::moved;
 use super::scenes::{Random, build, icosphere, mesh, mixture, options, room, soup, with_every_preset};
-use crate::lanes::Level;
-use crate::node::{Node, tag};
-use crate::{Accel, GeometryKind, TriangleMesh, occlusion};
+use crate::simd::Level;
+use crate::tree::node::{Node, tag};
+use crate::{Accel, GeometryKind, TriangleMesh, build::occlusion_order};
 
 const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
 
@@ -174,7 +174,7 @@ fn the_order_is_the_same_by_every_instruction_set() {
             .into_iter()
             .map(|level| {
                 let mut nodes = reversed.clone();
-                occlusion::sort_children(level, &accel.units, &mut nodes, accel.tree.blocks());
+                occlusion_order::sort_children(level, &accel.units, &mut nodes, accel.tree.blocks());
                 format!("{nodes:?}")
             })
             .collect();

@@ -10,8 +10,8 @@ use super::oracle::check;
 use super::scenes::{
     Balls, Random, build, cube, icosphere, options, precise, ray, soup, vertex, with_every_preset,
 };
-use crate::collapse::Entry;
-use crate::opening::{Start, is_part};
+use crate::build::collapse::Entry;
+use crate::build::open_instances::{Start, is_part};
 use crate::{
     Accel, BuildOptions, Geometry, GeometryKind, Instance, LoadError, MapError, Placement, Preset,
     Query, SphereCloud, TriangleMesh,

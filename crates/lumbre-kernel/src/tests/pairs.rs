@@ -4,8 +4,8 @@ use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
 
 use super::scenes::Random;
-use crate::lanes::{Lanes, Level, Row, Task, WIDE};
-use crate::triangles::{self, Met, Pairs, Passage, Shear};
+use crate::simd::{Lanes, Level, Row, Task, WIDE};
+use crate::trace::watertight::{self, Met, Pairs, Passage, Shear};
 
 struct Meeting<'a>(&'a Pairs<'a>);
 
@@ -74,7 +74,7 @@ fn sixteen_pairs_meet_as_each_alone() {
             for (i, (direction, origin, corners)) in lanes.iter().enumerate() {
                 // Its third axis is the largest and not negative, so that the order stays.
                 let shear = Shear::new(direction);
-                let (passage, crossing) = triangles::passage(&shear, origin, corners);
+                let (passage, crossing) = watertight::passage(&shear, origin, corners);
                 let met = (met.t.0[i], met.local[0].0[i], met.local[1].0[i]);
                 match passage {
                     Passage::Inside => {

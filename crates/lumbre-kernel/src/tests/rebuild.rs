@@ -70,11 +70,11 @@ fn shapes(random: &mut Random) -> Vec<Geometry> {
 /// The cost of a ray after such a refit, after a partial rebuild, and after a build, each as a multiple of that of the tree before.
 fn growths(before: Vec<Geometry>, after: Vec<Geometry>) -> [f64; 3] {
     let mut accel = Accel::build(before, &options()).unwrap();
-    let built = crate::refit::cost(&accel.tree.nodes);
+    let built = crate::build::refit::cost(&accel.tree.nodes);
     let anew = Accel::build(after.clone(), &options()).unwrap();
     let refitted = accel.refit(after).unwrap();
     let rebuilt = accel.rebuild_partially(&options());
-    [refitted, rebuilt, crate::refit::cost(&anew.tree.nodes) / built]
+    [refitted, rebuilt, crate::build::refit::cost(&anew.tree.nodes) / built]
 }
 
 #[test]

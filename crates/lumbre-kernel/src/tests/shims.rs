@@ -2,7 +2,7 @@
 
 use lumbre_geometry::Ray;
 
-use crate::lanes::Level;
+use crate::simd::Level;
 use crate::trace::filtered::{self, Found};
 use crate::trace::stack::{AnyHit, ClosestHit};
 use crate::trace::{ContextRef, Outcome, exact};
@@ -52,10 +52,12 @@ impl Accel {
     }
 
     pub(crate) fn closest_batch_f32_at(&self, level: Level, rays: &[Ray32], hits: &mut [Option<Hit32>]) {
+        assert_eq!(rays.len(), hits.len());
         batch::closest_f32(level, self, rays, hits);
     }
 
     pub(crate) fn any_batch_f32_at(&self, level: Level, rays: &[Ray32], hits: &mut [bool]) {
+        assert_eq!(rays.len(), hits.len());
         batch::any_f32(level, self, rays, hits);
     }
 
@@ -70,7 +72,7 @@ impl Accel {
     /// The same of the traversal for any hit.
     pub(crate) fn filtered_any_at(&self, level: Level, ray: &Ray) -> Outcome<bool> {
         match filtered::without_query::<AnyHit>(level, self, ray) {
-            Outcome::Certain(found) => Outcome::Certain(found.winner.is_some()),
+            Outcome::Certain(is_hit) => Outcome::Certain(is_hit),
             Outcome::Uncertain => Outcome::Uncertain,
         }
     }

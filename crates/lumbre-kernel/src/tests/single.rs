@@ -6,7 +6,7 @@ use lumbre_geometry::{PlacedShape, Plane, Ray};
 use lumbre_math::{DVec3, Transform};
 
 use super::scenes::{self, Random};
-use crate::lanes::Level;
+use crate::simd::Level;
 use crate::batch;
 use crate::batch::packet::{self, PACKET};
 use crate::trace::Outcome;

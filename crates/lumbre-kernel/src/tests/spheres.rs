@@ -9,10 +9,10 @@ use lumbre_math::{DVec3, Transform};
 
 use super::oracle::{check, check_batches, check_many};
 use super::scenes::{Random, build, cloud, ray, with_every_preset};
-use crate::lanes::{Level, meet_spheres_at};
+use crate::simd::{Level, meet_spheres_at};
 use crate::trace::Outcome;
-use crate::spheres::{SphereBlock, SphereRay, has_radius};
-use crate::triangles::BLOCK;
+use crate::tree::sphere_block::{SphereBlock, SphereRay, has_radius};
+use crate::trace::watertight::BLOCK;
 use crate::{
     Accel, BuildError, BuildOptions, Geometry, GeometryKind, Hit, Instance, RefitError, SphereCloud,
 };

@@ -1,7 +1,7 @@
 //! What eight and sixteen numbers give together, beside each alone.
 
 use super::scenes::Random;
-use crate::lanes::{Eight, Lanes, Level, Row, Task, Vector, WIDE, Wide};
+use crate::simd::{Eight, Lanes, Level, Row, Task, Vector, WIDE, Wide};
 
 /// What is looked at of sixteen rows, and of numbers in double precision.
 struct Together<'a> {

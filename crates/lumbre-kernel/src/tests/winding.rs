@@ -7,7 +7,7 @@ use lumbre_geometry::{Disk, PlacedShape, Sphere, Torus, Triangle};
 use lumbre_math::{DVec3, Transform, Vec3};
 
 use super::scenes::{Random, balls, build, bumpy, cube, icosphere, mesh, soup, torus, with_every_preset};
-use crate::winding::winding_number;
+use crate::point::winding::winding_number;
 use crate::{Accel, Geometry, GeometryKind, Instance, TriangleMesh};
 
 fn kind(mesh: TriangleMesh) -> GeometryKind {

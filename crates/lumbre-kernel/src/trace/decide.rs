@@ -9,11 +9,11 @@ use lumbre_math::DVec3;
 
 use super::{Outcome, Winner};
 use crate::Accel;
-use crate::blocks::{Blocks, TriangleBlock};
-use crate::holds::SingleStart;
-use crate::lanes::{self, Axes, Lanes};
-use crate::node::Node;
-use crate::triangles::{self, BLOCK, Inside, Meeting, Passage, Shear};
+use crate::tree::triangle_block::{Blocks, TriangleBlock};
+use crate::tree::summary::SingleStart;
+use crate::simd::{self, Axes, Lanes};
+use crate::tree::node::Node;
+use crate::trace::watertight::{self, BLOCK, Inside, Meeting, Passage, Shear};
 
 /// The closest hit so far, as far as single precision knows it: a triangle by its place in the tree, or what is none, and the interval
 /// of heights along the ray that holds the crossing.
@@ -63,7 +63,7 @@ impl Candidate {
 #[inline(always)]
 pub(crate) fn heights(t: f64, length: f64) -> (f32, f32) {
     let height = (t * length) as f32;
-    let error = height.abs() * triangles::ROUNDINGS + f32::MIN_POSITIVE;
+    let error = height.abs() * watertight::ROUNDINGS + f32::MIN_POSITIVE;
     (height - error, height + error)
 }
 
@@ -129,11 +129,11 @@ impl<'a> Decider<'a> {
         block: &TriangleBlock,
         lane: u32,
     ) -> bool {
-        let ray = lanes::opaque(ray);
+        let ray = simd::opaque(ray);
         let (shear, origin) = L::shear(ray, axes, &self.start.mesh_origin);
         match L::pass(block, lane as usize, &shear, &origin) {
             (Passage::Outside, _) => true,
-            (Passage::Inside, inside) => !triangles::is_in_range(ray, inside.t(&shear)),
+            (Passage::Inside, inside) => !watertight::is_in_range(ray, inside.t(&shear)),
             (Passage::Unclear, _) => false,
         }
     }
@@ -155,7 +155,7 @@ impl<'a> Decider<'a> {
             (Passage::Unclear, _) => return closely(),
         };
         let t = inside.t(&shear);
-        if !triangles::is_in_range(ray, t) {
+        if !watertight::is_in_range(ray, t) {
             return Outcome::Certain(None);
         }
         let is_closer = if let Some(exact) = exact {
@@ -250,7 +250,7 @@ impl<'a> Decider<'a> {
         let shear = Shear::new(&ray.direction);
         let origin = shear.local_origin(&ray.origin, &DVec3::from_slice(&self.start.mesh_origin));
         let corners = shear.axes.gather(self.block(block), lane as usize);
-        triangles::intersect(ray, shear, origin, corners)
+        watertight::intersect(ray, shear, origin, corners)
     }
 
     /// The crossing of a triangle in the ray's range, if there is one, and whether it meets the front.
@@ -268,7 +268,7 @@ impl<'a> Decider<'a> {
             (Passage::Outside, _) => None,
             (Passage::Inside, inside) => {
                 let t = inside.t(&shear);
-                triangles::is_in_range(ray, t).then(|| (inside.root(t), inside.det > 0.0))
+                watertight::is_in_range(ray, t).then(|| (inside.root(t), inside.det > 0.0))
             }
             (Passage::Unclear, _) => match self.intersect(ray, block, lane) {
                 Meeting::Miss => None,
@@ -305,7 +305,7 @@ impl<'a> Decider<'a> {
         axes: &'static Axes,
         &Candidate { block, lane, .. }: &Candidate,
     ) -> Option<Winner> {
-        let (shear, origin) = L::shear(lanes::opaque(ray), axes, &self.start.mesh_origin);
+        let (shear, origin) = L::shear(simd::opaque(ray), axes, &self.start.mesh_origin);
         let corners = self.block(block);
         let (passage, inside) = L::pass(corners, lane as usize, &shear, &origin);
         let (t, local) = if passage == Passage::Inside {
@@ -317,6 +317,6 @@ impl<'a> Decider<'a> {
             }
         };
         let (geometry, primitive) = self.ids_in(corners, lane);
-        Some(Winner { root: triangles::root(t, local), geometry, primitive })
+        Some(Winner { root: watertight::root(t, local), geometry, primitive })
     }
 }

@@ -12,10 +12,10 @@ use lumbre_geometry::{Ray, Root};
 
 use super::Context;
 use super::exact::{self, Crossing, Visitor};
-use crate::lanes::Level;
-use crate::precise::has_area;
+use crate::simd::Level;
+use crate::precise_mesh::has_area;
 use crate::Accel;
-use crate::triangles::{self, Feature, Meeting, Shear};
+use crate::trace::watertight::{self, Feature, Meeting, Shear};
 
 /// A triangle whose edges or corners a ray hits exactly.
 #[derive(Clone, Debug)]
@@ -89,7 +89,7 @@ impl<'a> Triangle<'a> {
 /// How a ray meets a triangle in double precision.
 pub(crate) fn intersect_precise(accel: &Accel, ray: &Ray, geometry: u32, primitive: u32) -> Meeting {
     let corners = accel.precise_corners(geometry, primitive);
-    let meeting = triangles::intersect_precise(ray, Shear::new(&ray.direction), &corners);
+    let meeting = watertight::intersect_precise(ray, Shear::new(&ray.direction), &corners);
     // After a refit, some in the tree may have lost their area.
     if matches!(meeting, Meeting::Miss) || has_area(&corners) { meeting } else { Meeting::Miss }
 }

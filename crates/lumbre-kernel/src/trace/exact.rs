@@ -16,15 +16,15 @@ use super::leaves::CloudRay;
 use super::stack::{ClosestHit, Goal, Stack};
 use super::visitors::{Any, Closest};
 use super::{Context, all_crossings, first_crossing, is_sound, meets_front};
-use crate::blocks::{Blocks, TriangleBlock};
-use crate::collapse::Entry;
-use crate::holds::{Holds, Sizes};
-use crate::hulls::HullRay;
-use crate::lanes::{self, Lanes, Level, MetHulls, Task, Vector};
-use crate::node::{BoxRay, Progress, tag};
-use crate::opening::Start;
+use crate::tree::triangle_block::{Blocks, TriangleBlock};
+use crate::build::collapse::Entry;
+use crate::tree::summary::{Holds, Sizes};
+use crate::tree::bounding_block::HullRay;
+use crate::simd::{self, Lanes, Level, MetHulls, Task, Vector};
+use crate::tree::node::{BoxRay, Progress, tag};
+use crate::build::open_instances::Start;
 use crate::query::Query;
-use crate::triangles::{self, BLOCK, BlockRay, HeightRange, Passage, Shear};
+use crate::trace::watertight::{self, BLOCK, BlockRay, HeightRange, Passage, Shear};
 use crate::{Accel, GeometryKind, Hit};
 
 /// Which crossings of one primitive a visitor wants.
@@ -426,7 +426,7 @@ impl<'a, L: Lanes> Frame<'a, L> {
                     (Passage::Inside, inside) => {
                         let t = inside.t(&shear);
                         let is_wanted = self.range[0] <= t && t <= self.range[1] && self.wanted != Wanted::None;
-                        if !is_wanted || !triangles::is_in_range(&self.ray, t) {
+                        if !is_wanted || !watertight::is_in_range(&self.ray, t) {
                             continue;
                         }
                         let (geometry, primitive) = ids();
@@ -437,7 +437,7 @@ impl<'a, L: Lanes> Frame<'a, L> {
                     }
                     (Passage::Unclear, _) => {
                         let corners = shear.axes.gather(block, lane);
-                        let meeting = triangles::intersect(&self.ray, shear, origin, corners);
+                        let meeting = watertight::intersect(&self.ray, shear, origin, corners);
                         let corners = block.triangle(lane).map(|corner| corner.map(f64::from));
                         let triangle = edges::Triangle { corners, ids: ids(), accel: self.accel };
                         if triangle.visit(meeting, &self.ray, context, visitor, edge_hits) {
@@ -458,8 +458,8 @@ impl<'a, L: Lanes> Frame<'a, L> {
         for (ids, block) in tree.sphere_names[places.clone()].iter().zip(&tree.sphere_blocks[places]) {
             let cloud = CloudRay::turn(&mut self.cloud, self.accel, &self.ray, ids.geometry);
             let mut mask = match cloud.within(self.range) {
-                Some(ray) => lanes::meet_spheres::<L>(block, ray).0,
-                None => L::Eight::ALL,
+                Some(ray) => simd::meet_spheres::<L>(block, ray).0,
+                None => ids.lanes(),
             };
             while mask != 0 {
                 let lane = mask.trailing_zeros() as usize % BLOCK;
@@ -483,7 +483,7 @@ impl<'a, L: Lanes> Frame<'a, L> {
         let hulls = *self.hulls.get_or_insert_with(|| HullRay::new(&accel.units, &self.ray, length));
         let range = HeightRange::new((self.range[0] * length) as f32, (self.range[1] * length) as f32);
         while let Some((block, goes_on)) = accel.hulls.block(first) {
-            let MetHulls { mut mask, .. } = lanes::meet_hulls::<L, false>(block, &hulls, &range);
+            let MetHulls { mut mask, .. } = simd::meet_hulls::<L, false>(block, &hulls, &range);
             while mask != 0 {
                 let entry = &accel.tree.entries[first + mask.trailing_zeros() as usize];
                 mask &= mask - 1;
@@ -510,7 +510,7 @@ impl<'a, L: Lanes> Frame<'a, L> {
         for entry in &self.accel.tree.entries[first..] {
             let (geometry, primitive) = (entry.geometry, entry.primitive());
             let meeting = edges::intersect_precise(self.accel, &self.ray, geometry, primitive);
-            if !matches!(meeting, triangles::Meeting::Miss) {
+            if !matches!(meeting, watertight::Meeting::Miss) {
                 let corners = self.accel.precise_corners(geometry, primitive).map(|corner: DVec3| corner.to_array());
                 let triangle = edges::Triangle { corners, ids: (geometry, primitive), accel: self.accel };
                 if triangle.visit(meeting, &self.ray, context, visitor, edge_hits) {

@@ -1,7 +1,7 @@
 //! Rays in single precision, in trees of nothing but triangles: for those to whom speed counts more than the last digits.
 //!
 //! The test is that of S. Woop, C. Benthin, I. Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013, and simpler than the one
-//! in double precision (see [`triangles`](crate::triangles)): triangles are closed, so that a ray through an edge meets all that have it,
+//! in double precision (see [`triangles`](crate::trace::watertight)): triangles are closed, so that a ray through an edge meets all that have it,
 //! which makes no difference to the nearest hit and to whether there is one. Where that would be imprecise, products are computed exactly.
 //! Nothing depends on the instruction set: no product is fused with a sum.
 //!
@@ -29,7 +29,7 @@
 //!
 //! So the hit lies within u(8.2 + 6.1h) + 24.2u + 7uh of the triangle on each axis, where h ≤ 1.01 + |o|: below
 //! u(47 + 14|o|). And as planes are relative to the tree's origin, which the ray knows rounded, by a little more than u times its
-//! distance from the mesh's: `Units::narrow_margin` has room for all of it beside what is said in [`node`](crate::node). `t` itself is
+//! distance from the mesh's: `Units::narrow_margin` has room for all of it beside what is said in [`node`](crate::tree::node). `t` itself is
 //! off by three roundings, which the ends of the range among boxes have room for, too.
 //!
 //! So no box is passed by with a hit in it that is as near as the nearest: the answer is that of a loop over all triangles, whatever
@@ -42,11 +42,11 @@ use super::decide::Decider;
 use super::leaves::nearest_of;
 use super::stack::{AnyHit, ClosestHit, Goal, Stack};
 use super::{LaneHits, Outcome};
-use crate::blocks::TriangleBlock;
-use crate::holds::SingleStart;
-use crate::lanes::{self, Asked, Axes, Eight, Lanes, Level, Question, Vector, Wide};
-use crate::node::tag;
-use crate::triangles::{self, BLOCK};
+use crate::tree::triangle_block::TriangleBlock;
+use crate::tree::summary::SingleStart;
+use crate::simd::{self, Asked, Axes, Eight, Lanes, Level, Question, Vector, Wide};
+use crate::tree::node::tag;
+use crate::trace::watertight::{self, BLOCK};
 use crate::{Accel, Hit, Hit32, Ray32};
 
 /// A ray in single precision among triangles.
@@ -181,7 +181,7 @@ impl<W: Wide> Pass<W> {
     pub(crate) fn of_two(first: &Pass<W::Half>, second: &Pass<W::Half>) -> Self {
         Self {
             height: W::of_two(first.height, second.height),
-            weights: lanes::three_of_two(&first.weights, &second.weights),
+            weights: simd::three_of_two(&first.weights, &second.weights),
         }
     }
 }
@@ -341,7 +341,7 @@ impl F32Ray {
     /// How the line of the ray passes the triangles of a block, and a bit for each that it may pass through. `IS_ALONE` as in [`Lanes::narrow_corners`].
     #[inline(always)]
     pub(crate) fn lines<L: Lanes, const IS_ALONE: bool>(&self, block: &TriangleBlock) -> (u32, Lines<L::Eight>) {
-        let (mask, lines) = Lines::of(L::narrow_corners::<IS_ALONE>(block, lanes::opaque(self)));
+        let (mask, lines) = Lines::of(L::narrow_corners::<IS_ALONE>(block, simd::opaque(self)));
         (mask & block.taken(), lines)
     }
 
@@ -356,7 +356,7 @@ impl F32Ray {
     #[inline(always)]
     pub(crate) fn cross<E: Eight>(&self, mask: u32, pass: &Pass<E>) -> (u32, E) {
         // Read again: most lines pass through few blocks.
-        let ray = lanes::opaque(self);
+        let ray = simd::opaque(self);
         let t = pass.height.over(pass.weights[2]) * E::splat(ray.minus_inverse);
         (mask & E::splat(ray.t_min()).at_most(t) & t.at_most(E::splat(ray.t_max())), t)
     }
@@ -429,7 +429,7 @@ pub(crate) fn traverse<G: Goal, L: Lanes>(decider: &Decider, ray: &Ray32) -> Out
     let mut cursor = NodeCursor::<L>::new(decider.nodes(), slabs);
     let mut stack = Stack::new();
     let Some(mut leaf) = cursor.descend::<G>(start.root, &mut stack) else { return Outcome::Certain(None) };
-    let mut ray = L::start_narrow_blocks(start, lanes::opaque(ray), &cursor.slabs);
+    let mut ray = L::start_narrow_blocks(start, simd::opaque(ray), &cursor.slabs);
     let mut nearest = Nearest::NONE;
     loop {
         let mut place = leaf & tag::PLACE;
@@ -442,7 +442,7 @@ pub(crate) fn traverse<G: Goal, L: Lanes>(decider: &Decider, ray: &Ray32) -> Out
             } else if let Some((hits, pass)) = ray.pass::<L>(&start.precise, block)
                 && nearest.take(decider, &mut ray, place, &hits, &pass)
             {
-                cursor.slabs.end_at(triangles::beyond(ray.t_max()));
+                cursor.slabs.end_at(watertight::beyond(ray.t_max()));
             }
             match block.next(place) {
                 Some(next) => place = next,

@@ -2,22 +2,22 @@
 
 use std::marker::PhantomData;
 
-use lumbre_geometry::{Ray, Root};
-use lumbre_math::DVec2;
+use lumbre_geometry::Ray;
 
 use super::cursor::NodeCursor;
 use super::decide::{Candidate, Decider};
 use super::exact;
 use super::leaves::CloudRay;
 use super::stack::{AnyHit, ClosestHit, Goal, Stack};
-use super::{ContextRef, Outcome, Stop, Winner};
-use crate::holds::SingleStart;
-use crate::hulls::HullRay;
-use crate::lanes::{self, Asked, Lanes, Level, Question, Task};
-use crate::node::Slabs;
+use super::{Context, ContextRef, Outcome, Stop, Winner};
+use crate::tree::summary::SingleStart;
+use crate::tree::bounding_block::HullRay;
+use crate::simd::{self, Asked, Lanes, Level, Question, Task};
+use crate::tree::node::Slabs;
 use crate::query::{Query, TreeQuery};
-use crate::triangles::{self, BlockRay};
-use crate::{Accel, Hit};
+use crate::trace::watertight::{self, BlockRay};
+use crate::build::open_instances::Start;
+use crate::{Accel, GeometryKind, Hit};
 
 /// A ray in the leaves of a tree. `GENERAL`: of anything, not of triangles alone; `FILTERED`: with a query that leaves something out.
 pub(crate) struct FilteredRay<'a, 'd, const GENERAL: bool, const FILTERED: bool> {
@@ -30,17 +30,44 @@ pub(crate) struct FilteredRay<'a, 'd, const GENERAL: bool, const FILTERED: bool>
     pub(crate) best: Candidate,
     /// That hit, where it is known in double precision.
     exact: Option<Winner>,
-    pub(super) query: TreeQuery<'a>,
+    /// What counts, where `FILTERED`.
+    pub(super) query: Option<&'d TreeQuery<'d>>,
+    /// Where the tree stands.
+    pub(super) context: ContextRef<'d>,
     /// For shapes, once the ray has come to some.
     pub(super) hulls: Option<HullRay>,
     /// For the cloud of spheres that the ray came to last.
     pub(super) cloud: Option<CloudRay>,
     /// The closest hit, where that is in an instance: `exact` has the geometry [`IN_INSTANCE`] then.
-    pub(super) in_instance: Option<Hit>,
+    pub(super) in_instance: Option<InInstance>,
 }
 
 /// No geometry of the tree, and behind all of them: of two hits at the same `t`, one outside of instances comes first.
 pub(super) const IN_INSTANCE: u32 = u32::MAX;
+
+/// A hit in an instance.
+#[derive(Clone)]
+pub(crate) struct InInstance {
+    /// The position of the instance in the list of its tree.
+    pub(super) instance: u32,
+    /// The hit in the instance's own tree.
+    pub(super) winner: Winner,
+    /// The whole hit, where it is in an instance there.
+    pub(super) nested: Option<Box<Hit>>,
+}
+
+impl InInstance {
+    /// As a hit, where the tree that has the instance stands there.
+    #[inline(always)]
+    pub(super) fn into_hit(self, accel: &Accel, context: ContextRef) -> Hit {
+        if let Some(hit) = self.nested {
+            return *hit;
+        }
+        let placed = &accel.geometries[self.instance as usize];
+        let GeometryKind::Instance(instance) = &placed.kind else { unreachable!("it was an instance") };
+        self.winner.to_hit_in(&instance.accel, context.within(self.instance, placed.id))
+    }
+}
 
 impl<'a, 'd, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, 'd, GENERAL, FILTERED> {
     /// With a ray for triangles: see [`Lanes::start_blocks`].
@@ -48,7 +75,8 @@ impl<'a, 'd, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, 'd, GENE
     pub(crate) fn new(
         decider: &'d Decider<'a>,
         (blocks, s_per_height): (BlockRay, f32),
-        query: TreeQuery<'a>,
+        query: Option<&'d TreeQuery<'d>>,
+        context: ContextRef<'d>,
     ) -> Self {
         let best = Candidate::NONE;
         Self {
@@ -58,6 +86,7 @@ impl<'a, 'd, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, 'd, GENE
             best,
             exact: None,
             query,
+            context,
             hulls: None,
             cloud: None,
             in_instance: None,
@@ -82,7 +111,7 @@ impl<'a, 'd, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, 'd, GENE
     pub(crate) fn keep(&mut self, closer: Candidate, slabs: &mut Slabs) {
         self.best = closer;
         self.blocks.range.last = closer.to;
-        slabs.end_at(triangles::beyond(closer.to * self.s_per_height));
+        slabs.end_at(watertight::beyond(closer.to * self.s_per_height));
     }
 
     /// The same of a hit that is known in double precision, and lies in this interval of heights.
@@ -100,7 +129,7 @@ impl<'a, 'd, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, 'd, GENE
 
     /// The closest hit in double precision.
     #[inline(always)]
-    pub(crate) fn found<L: Lanes>(&mut self, ray: &Ray) -> Outcome<Found> {
+    pub(crate) fn closest<L: Lanes>(&mut self, ray: &Ray) -> Outcome<Found> {
         match self.decider.closest::<L>(ray, self.blocks.axes, (&self.best, self.exact())) {
             Outcome::Certain(winner) => {
                 let is_inside = GENERAL && winner.is_some_and(|winner| winner.geometry == IN_INSTANCE);
@@ -117,36 +146,180 @@ impl<'a, 'd, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, 'd, GENE
     }
 }
 
-/// What a traversal found.
+/// The closest hit.
 pub(crate) struct Found {
-    /// The closest hit; where any will do, some.
     pub(crate) winner: Option<Winner>,
     /// The same, where it is in an instance.
-    pub(crate) in_instance: Option<Hit>,
+    pub(crate) in_instance: Option<InInstance>,
 }
 
 impl Found {
     pub(crate) const NOTHING: Self = Self { winner: None, in_instance: None };
 
-    /// Where any hit will do.
-    #[inline(always)]
-    pub(crate) fn some(is_hit: bool) -> Self {
-        Self { winner: is_hit.then_some(SOME_HIT), in_instance: None }
-    }
-
-    /// What the exact traversal found.
-    pub(super) fn of_hit(hit: Option<Hit>) -> Self {
-        let winner = hit.as_ref().map(|hit| Winner { root: hit.root, geometry: IN_INSTANCE, primitive: 0 });
-        Self { winner, in_instance: hit }
-    }
-
     /// As a hit in a tree that stands there.
     #[inline(always)]
     pub(crate) fn into_hit(self, accel: &Accel, context: ContextRef) -> Option<Hit> {
         match self.in_instance {
-            Some(hit) => Some(hit),
+            Some(hit) => Some(hit.into_hit(accel, context)),
             None => self.winner.map(|winner| winner.to_hit_in(accel, context)),
         }
+    }
+}
+
+/// A goal of the filtered traversal, and how it ends.
+pub(crate) trait FilteredGoal: Goal {
+    /// What is found.
+    type Found;
+
+    /// Where no leaf is on the way.
+    fn nothing() -> Self::Found;
+
+    /// Where the traversal stops at a hit.
+    fn hit() -> Self::Found;
+
+    /// Where a triangle is the closest hit of a packet's ray.
+    fn closest(winner: Winner) -> Self::Found;
+
+    /// Where all leaves on the way were tested.
+    fn end<L: Lanes, const GENERAL: bool, const FILTERED: bool>(
+        filtered: &mut FilteredRay<GENERAL, FILTERED>,
+        ray: &Ray,
+    ) -> Outcome<Self::Found>;
+
+    /// By the exact traversal, in a part of a tree that stands there.
+    fn exactly(
+        level: Level,
+        accel: &Accel,
+        from: Start,
+        context: &Context,
+        ray: &Ray,
+        query: Option<&Query>,
+    ) -> Self::Found;
+
+    /// The same, told apart from what a tree around that one finds.
+    fn in_context(found: Self::Found, accel: &Accel, context: ContextRef) -> Self::Found;
+
+    /// Takes what was found in the tree of an instance.
+    fn test_found<const GENERAL: bool, const FILTERED: bool>(
+        filtered: &mut FilteredRay<GENERAL, FILTERED>,
+        found: Self::Found,
+        instance: u32,
+        ray: &Ray,
+        slabs: &mut Slabs,
+    ) -> Option<Stop>;
+}
+
+impl FilteredGoal for ClosestHit {
+    type Found = Found;
+
+    #[inline(always)]
+    fn nothing() -> Found {
+        Found::NOTHING
+    }
+
+    #[inline(always)]
+    fn hit() -> Found {
+        unreachable!("a closest hit ends at no hit")
+    }
+
+    #[inline(always)]
+    fn closest(winner: Winner) -> Found {
+        Found { winner: Some(winner), in_instance: None }
+    }
+
+    #[inline(always)]
+    fn end<L: Lanes, const GENERAL: bool, const FILTERED: bool>(
+        filtered: &mut FilteredRay<GENERAL, FILTERED>,
+        ray: &Ray,
+    ) -> Outcome<Found> {
+        filtered.closest::<L>(ray)
+    }
+
+    fn exactly(
+        level: Level,
+        accel: &Accel,
+        from: Start,
+        context: &Context,
+        ray: &Ray,
+        query: Option<&Query>,
+    ) -> Found {
+        let Some(hit) = exact::closest_from(level, accel, from, context, ray, query) else { return Found::NOTHING };
+        let winner = Winner { root: hit.root, geometry: IN_INSTANCE, primitive: 0 };
+        // The hit is whole already, wherever it is.
+        let nested = Some(Box::new(hit));
+        Found { winner: Some(winner), in_instance: Some(InInstance { instance: 0, winner, nested }) }
+    }
+
+    fn in_context(found: Found, accel: &Accel, context: ContextRef) -> Found {
+        let nest = |hit: InInstance| {
+            let (instance, winner) = (hit.instance, hit.winner);
+            InInstance { instance, winner, nested: Some(Box::new(hit.into_hit(accel, context))) }
+        };
+        Found { winner: found.winner, in_instance: found.in_instance.map(nest) }
+    }
+
+    #[inline(always)]
+    fn test_found<const GENERAL: bool, const FILTERED: bool>(
+        filtered: &mut FilteredRay<GENERAL, FILTERED>,
+        found: Found,
+        instance: u32,
+        ray: &Ray,
+        slabs: &mut Slabs,
+    ) -> Option<Stop> {
+        filtered.test_found(found, instance, ray, slabs)
+    }
+}
+
+impl FilteredGoal for AnyHit {
+    type Found = bool;
+
+    #[inline(always)]
+    fn nothing() -> bool {
+        false
+    }
+
+    #[inline(always)]
+    fn hit() -> bool {
+        true
+    }
+
+    #[inline(always)]
+    fn closest(_: Winner) -> bool {
+        true
+    }
+
+    #[inline(always)]
+    fn end<L: Lanes, const GENERAL: bool, const FILTERED: bool>(
+        _: &mut FilteredRay<GENERAL, FILTERED>,
+        _: &Ray,
+    ) -> Outcome<bool> {
+        Outcome::Certain(false)
+    }
+
+    fn exactly(
+        level: Level,
+        accel: &Accel,
+        from: Start,
+        context: &Context,
+        ray: &Ray,
+        query: Option<&Query>,
+    ) -> bool {
+        exact::any_from(level, accel, from, context, ray, query)
+    }
+
+    fn in_context(is_hit: bool, _: &Accel, _: ContextRef) -> bool {
+        is_hit
+    }
+
+    #[inline(always)]
+    fn test_found<const GENERAL: bool, const FILTERED: bool>(
+        _: &mut FilteredRay<GENERAL, FILTERED>,
+        is_hit: bool,
+        _: u32,
+        _: &Ray,
+        _: &mut Slabs,
+    ) -> Option<Stop> {
+        is_hit.then_some(Stop::Hit)
     }
 }
 
@@ -157,19 +330,14 @@ pub(crate) struct Traversal<'a, 'r, G, const GENERAL: bool, const FILTERED: bool
     /// The subtree to traverse.
     pub(super) root: u32,
     pub(super) ray: &'r Ray,
-    pub(super) query: TreeQuery<'a>,
+    pub(super) query: Option<&'r TreeQuery<'r>>,
+    /// Where the tree stands.
+    pub(super) context: ContextRef<'r>,
     pub(super) goal: PhantomData<G>,
 }
 
-/// Where any hit will do, there is no more to know of it.
-pub(super) const SOME_HIT: Winner = Winner {
-    root: Root { t: 0.0, part: 0, multiplicity: 1, local: DVec2::ZERO },
-    geometry: 0,
-    primitive: 0,
-};
-
-impl<G: Goal, const GENERAL: bool, const FILTERED: bool> Task for Traversal<'_, '_, G, GENERAL, FILTERED> {
-    type Output = Outcome<Found>;
+impl<G: FilteredGoal, const GENERAL: bool, const FILTERED: bool> Task for Traversal<'_, '_, G, GENERAL, FILTERED> {
+    type Output = Outcome<G::Found>;
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Self::Output {
@@ -180,66 +348,71 @@ impl<G: Goal, const GENERAL: bool, const FILTERED: bool> Task for Traversal<'_, 
     }
 }
 
-impl<G: Goal, const GENERAL: bool, const FILTERED: bool> Traversal<'_, '_, G, GENERAL, FILTERED> {
-    /// Traverses the tree with a ray that has started among its bounding boxes. Any hit is answered by some winner.
+impl<G: FilteredGoal, const GENERAL: bool, const FILTERED: bool> Traversal<'_, '_, G, GENERAL, FILTERED> {
+    /// Traverses the tree with a ray that has started among its bounding boxes.
     #[inline(always)]
-    pub(super) fn run_from<L: Lanes>(self, slabs: Slabs) -> Outcome<Found> {
-        let Self { accel, start, root, ray, query, .. } = self;
+    pub(super) fn run_from<L: Lanes>(self, slabs: Slabs) -> Outcome<G::Found> {
+        let Self { accel, start, root, ray, query, context, .. } = self;
         let mut cursor = NodeCursor::<L>::new(&accel.tree.nodes, slabs);
         let mut stack = Stack::new();
         let mut next = cursor.descend::<G>(root, &mut stack);
         if next.is_none() && !(GENERAL && !accel.infinite.is_empty()) {
             // Many rays come to no leaf, and need nothing else.
-            return Outcome::Certain(Found::NOTHING);
+            return Outcome::Certain(G::nothing());
         }
         let decider = &Decider::new(accel, start);
         // Opaque: what was read at the start would else be stored, to be kept until here.
-        let blocks = L::start_blocks(start, lanes::opaque(ray), &cursor.slabs);
-        let mut filtered = FilteredRay::<GENERAL, FILTERED>::new(decider, blocks, query);
+        let blocks = L::start_blocks(start, simd::opaque(ray), &cursor.slabs);
+        let mut filtered = FilteredRay::<GENERAL, FILTERED>::new(decider, blocks, query, context);
         if GENERAL && let Some(stop) = filtered.test_infinite::<G, L>(ray, &mut cursor.slabs) {
-            return stop_early(stop);
+            return stop_early::<G>(stop);
         }
         while let Some(leaf) = next {
             if let Some(stop) = filtered.test_leaf::<G, L>(leaf, ray, &mut cursor.slabs) {
-                return stop_early(stop);
+                return stop_early::<G>(stop);
             }
             next = cursor.next_leaf::<G>(&mut stack);
         }
-        if G::IS_ANY { Outcome::Certain(Found::NOTHING) } else { filtered.found::<L>(ray) }
+        G::end::<L, GENERAL, FILTERED>(&mut filtered, ray)
     }
 }
 
-impl<'a, 'r, G: Goal, const GENERAL: bool> Traversal<'a, 'r, G, GENERAL, false> {
+impl<'a, 'r, G: FilteredGoal, const GENERAL: bool> Traversal<'a, 'r, G, GENERAL, false> {
     /// Of a whole tree that stands in no instance, with everything in it.
     #[inline(always)]
     pub(crate) fn whole(accel: &'a Accel, start: &'a SingleStart, ray: &'r Ray) -> Self {
-        let query = TreeQuery::new(None, accel, ContextRef::OUTSIDE);
-        Self { accel, start, root: start.root, ray, query, goal: PhantomData }
+        Self { accel, start, root: start.root, ray, query: None, context: ContextRef::OUTSIDE, goal: PhantomData }
     }
 }
 
 #[inline(always)]
-fn stop_early(stop: Stop) -> Outcome<Found> {
+fn stop_early<G: FilteredGoal>(stop: Stop) -> Outcome<G::Found> {
     match stop {
-        Stop::Hit => Outcome::Certain(Found::some(true)),
+        Stop::Hit => Outcome::Certain(G::hit()),
         Stop::Uncertain => Outcome::Uncertain,
     }
 }
 
 /// The traversal with a query that leaves something out.
-pub(crate) fn with_query<G: Goal>(level: Level, accel: &Accel, ray: &Ray, query: &Query) -> Outcome<Found> {
+pub(crate) fn with_query<G: FilteredGoal>(
+    level: Level,
+    accel: &Accel,
+    ray: &Ray,
+    query: &Query,
+) -> Outcome<G::Found> {
     let Some(start) = &accel.single else { return Outcome::Uncertain };
-    let (root, query) = (start.root, TreeQuery::new(Some(query), accel, ContextRef::OUTSIDE));
+    let (root, context) = (start.root, ContextRef::OUTSIDE);
+    let query = Some(&TreeQuery::new(query, accel, context));
     if start.only_triangles {
-        level.run(Traversal::<G, false, true> { accel, start, root, ray, query, goal: PhantomData })
+        level.run(Traversal::<G, false, true> { accel, start, root, ray, query, context, goal: PhantomData })
     } else {
-        level.run(Traversal::<G, true, true> { accel, start, root, ray, query, goal: PhantomData })
+        level.run(Traversal::<G, true, true> { accel, start, root, ray, query, context, goal: PhantomData })
     }
 }
 
 /// The same without a query, for tests.
 #[cfg(test)]
-pub(crate) fn without_query<G: Goal>(level: Level, accel: &Accel, ray: &Ray) -> Outcome<Found> {
+pub(crate) fn without_query<G: FilteredGoal>(level: Level, accel: &Accel, ray: &Ray) -> Outcome<G::Found> {
     let Some(start) = &accel.single else { return Outcome::Uncertain };
     if start.only_triangles {
         level.run(Traversal::<G, false, false>::whole(accel, start, ray))
@@ -305,7 +478,7 @@ impl<const GENERAL: bool> Question for FilteredQuery<AnyHit, GENERAL> {
             let ray = &L::read(ray);
             let traversal = Traversal::<AnyHit, GENERAL, false>::whole(accel, start, ray);
             if let Outcome::Certain(found) = traversal.run::<L>() {
-                return found.winner.is_some();
+                return found;
             }
         }
         exact::any(L::level(), accel, ray, None)

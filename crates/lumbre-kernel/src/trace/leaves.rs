@@ -7,22 +7,23 @@ use lumbre_math::DVec3;
 
 use super::decide::{Candidate, heights, largest_component};
 use super::edges;
-use super::filtered::FilteredRay;
+use super::filtered::{FilteredGoal, FilteredRay};
 use super::stack::Goal;
 use super::{Outcome, Stop, Winner, all_crossings, first_crossing, is_crossed, meets_front};
-use crate::blocks::TriangleBlock;
-use crate::collapse::Entry;
-use crate::hulls::HullRay;
-use crate::lanes::{self, Crossings, Lanes, Level, MetHulls, Task, Vector};
-use crate::node::{Slabs, tag};
-use crate::spheres::SphereRay;
-use crate::triangles::{BLOCK, Meeting};
+use crate::tree::triangle_block::TriangleBlock;
+use crate::build::collapse::Entry;
+use crate::tree::bounding_block::HullRay;
+use crate::simd::{self, Crossings, Lanes, Level, MetHulls, Task, Vector};
+use crate::tree::node::{Slabs, tag};
+use crate::query::TreeQuery;
+use crate::tree::sphere_block::SphereRay;
+use crate::trace::watertight::{BLOCK, Meeting};
 use crate::{Accel, GeometryKind};
 
 impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL, FILTERED> {
     /// Tests a leaf.
     #[inline(always)]
-    pub(crate) fn test_leaf<G: Goal, L: Lanes>(
+    pub(crate) fn test_leaf<G: FilteredGoal, L: Lanes>(
         &mut self,
         leaf: u32,
         ray: &Ray,
@@ -32,7 +33,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
             return self.test_triangles::<G, L>(leaf, ray, slabs);
         }
         // Opaque, so that nothing is computed of the ray before it comes to such a leaf.
-        let ray = lanes::opaque(ray);
+        let ray = simd::opaque(ray);
         match tag::of(leaf) {
             tag::SHAPES => self.test_shapes::<G, L>(leaf, ray, slabs),
             tag::SPHERES => self.test_spheres::<G, L>(leaf, ray, slabs),
@@ -47,7 +48,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
 
     /// Tests what has no bounds, and stands beside the tree.
     #[inline(always)]
-    pub(crate) fn test_infinite<G: Goal, L: Lanes>(&mut self, ray: &Ray, slabs: &mut Slabs) -> Option<Stop> {
+    pub(crate) fn test_infinite<G: FilteredGoal, L: Lanes>(&mut self, ray: &Ray, slabs: &mut Slabs) -> Option<Stop> {
         let accel = self.accel();
         for entry in &*accel.infinite {
             let stop = match accel.geometries[entry.geometry as usize].kind {
@@ -73,7 +74,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
         let mut place = leaf & tag::PLACE;
         loop {
             let block = self.decider.block(place);
-            let (mask, edges) = L::meet_triangles::<true>(block, lanes::opaque(&self.blocks));
+            let (mask, edges) = L::meet_triangles::<true>(block, simd::opaque(&self.blocks));
             if mask != 0 {
                 let crossings = L::place_crossings(&edges, &self.blocks);
                 let stop = if G::IS_ANY {
@@ -105,7 +106,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
         let mut rest = mask & crossings.in_range;
         if rest != 0 && mask & (mask - 1) == 0 {
             // One alone, known before its range is: the winner need not wait for that.
-            rest = lanes::opaque_number(mask);
+            rest = simd::opaque_number(mask);
         }
         while rest != 0 {
             let lane = rest.trailing_zeros();
@@ -178,9 +179,9 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
     #[inline(always)]
     fn query_triangle<L: Lanes>(&self, (place, lane): (u32, u32), ray: &Ray) -> Outcome<Option<Winner>> {
         let (geometry, primitive) = self.decider.ids(place, lane);
-        if !self.query.has_primitive(geometry, primitive) {
+        let Some(query) = self.query.filter(|query| query.has_primitive(geometry, primitive)) else {
             return Outcome::Certain(None);
-        }
+        };
         let (winner, is_front) = match self.decider.crossing::<L>(ray, self.blocks.axes, place, lane) {
             Outcome::Certain(Some(found)) => found,
             Outcome::Certain(None) => return Outcome::Certain(None),
@@ -188,7 +189,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
         };
         let is_closest =
             self.exact().is_none_or(|best| best.comes_after(winner.root.t, (geometry, primitive)));
-        let is_taken = is_closest && self.query.takes_face(is_front) && self.query.accepts(&winner);
+        let is_taken = is_closest && query.takes_face(is_front) && query.accepts(&winner);
         Outcome::Certain(is_taken.then_some(winner))
     }
 
@@ -222,9 +223,9 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
             let entries = &accel.tree.entries[first..];
             let range = &self.blocks.range;
             let MetHulls { mut mask, sure, near } = if G::IS_ANY && !FILTERED {
-                lanes::meet_hulls::<L, true>(block, lanes::opaque(&hulls), range)
+                simd::meet_hulls::<L, true>(block, simd::opaque(&hulls), range)
             } else {
-                lanes::meet_hulls::<L, false>(block, lanes::opaque(&hulls), range)
+                simd::meet_hulls::<L, false>(block, simd::opaque(&hulls), range)
             };
             if G::IS_ANY && !FILTERED && sure != 0 {
                 return Some(Stop::Hit);
@@ -303,17 +304,14 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
         ray: &Ray,
         slabs: &mut Slabs,
     ) -> Option<Stop> {
-        if !self.query.has_primitive(geometry, primitive) {
-            return None;
-        }
+        let query = self.query.filter(|query| query.has_primitive(geometry, primitive))?;
         for root in all_crossings(kind, primitive, ray) {
             let winner = Winner { root, geometry, primitive };
             let is_closest = self.exact().is_none_or(|best| best.comes_after(root.t, (geometry, primitive)));
             let is_taken = ray.contains(root.t)
                 && is_closest
-                && (self.query.takes_both_faces()
-                    || self.query.takes_face(meets_front(kind, primitive, ray, &root)))
-                && self.query.accepts(&winner);
+                && (query.takes_both_faces() || query.takes_face(meets_front(kind, primitive, ray, &root)))
+                && query.accepts(&winner);
             if is_taken && G::IS_ANY {
                 return Some(Stop::Hit);
             }
@@ -334,8 +332,8 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
             let cloud = CloudRay::turn(&mut self.cloud, accel, ray, ids.geometry);
             let origin = cloud.origin;
             let (mut mask, certain) = match cloud.within(range) {
-                Some(spheres) => lanes::meet_spheres::<L>(block, spheres),
-                None => (L::Eight::ALL, 0),
+                Some(spheres) => simd::meet_spheres::<L>(block, spheres),
+                None => (ids.lanes(), 0),
             };
             if G::IS_ANY && !FILTERED && certain != 0 {
                 return Some(Stop::Hit);
@@ -369,14 +367,14 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
         let accel = self.accel();
         for entry in &accel.tree.entries[tag::place(leaf)..] {
             let (geometry, primitive) = (entry.geometry, entry.primitive());
-            if !FILTERED || self.query.has_primitive(geometry, primitive) {
+            if self.query.is_none_or(|query| query.has_primitive(geometry, primitive)) {
                 match edges::intersect_precise(accel, ray, geometry, primitive) {
                     Meeting::Miss => {}
                     Meeting::Touch { .. } => return Some(Stop::Uncertain),
                     Meeting::Hit { root, is_front } => {
                         let winner = Winner { root, geometry, primitive };
-                        let is_taken =
-                            !FILTERED || self.query.takes_face(is_front) && self.query.accepts(&winner);
+                        let takes = |query: &TreeQuery| query.takes_face(is_front) && query.accepts(&winner);
+                        let is_taken = self.query.is_none_or(takes);
                         let stop = match (is_taken, G::IS_ANY) {
                             (false, _) => None,
                             (true, true) => Some(Stop::Hit),
@@ -400,7 +398,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
 struct Comparison<'s, 'a> {
     decider: &'s super::decide::Decider<'a>,
     ray: &'s Ray,
-    axes: &'static lanes::Axes,
+    axes: &'static simd::Axes,
     triangle: (u32, u32),
     best: (&'s Candidate, Option<Winner>),
 }

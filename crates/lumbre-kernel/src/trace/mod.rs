@@ -15,11 +15,12 @@ mod instances;
 mod leaves;
 pub(crate) mod stack;
 pub(crate) mod visitors;
+pub(crate) mod watertight;
 
 use bytemuck::Zeroable;
 use lumbre_geometry::{Ray, Root, Roots};
 
-use crate::spheres::ExactSphere;
+use crate::tree::sphere_block::ExactSphere;
 use crate::{Accel, GeometryKind, Hit, InstancePath};
 
 /// What single precision, and the double precision that it asks, come to.

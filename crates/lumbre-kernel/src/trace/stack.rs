@@ -1,7 +1,7 @@
 //! The stack of a traversal, and the two goals that decide in which order it is filled: the closest hit and any hit.
 
-use crate::lanes::{self, LANE_BITS, Lanes, Room, Slots};
-use crate::node::{Node, WIDTH};
+use crate::simd::{self, LANE_BITS, Lanes, Room, Slots};
+use crate::tree::node::{Node, WIDTH};
 
 /// Entries in the array. Few in tests, so that spilling is tested.
 pub(crate) const STACK: usize = if cfg!(test) { 3 * WIDTH } else { 256 };
@@ -54,12 +54,12 @@ impl Goal for ClosestHit {
 
     #[inline(always)]
     fn push_children<L: Lanes>(node: &Node, mask: u32, enter: L::Wide, room: Room<i64>) -> u32 {
-        lanes::push_by_distance(node, mask, enter, room)
+        simd::push_by_distance(node, mask, enter, room)
     }
 
     #[inline(always)]
     fn push_and_pop<L: Lanes>(node: &Node, mask: u32, enter: L::Wide, slots: &mut Slots<i64>) -> u32 {
-        lanes::put_and_take_by_distance(node, mask, enter, slots)
+        simd::put_and_take_by_distance(node, mask, enter, slots)
     }
 }
 
@@ -87,12 +87,12 @@ impl Goal for AnyHit {
 
     #[inline(always)]
     fn push_children<L: Lanes>(node: &Node, mask: u32, _: L::Wide, room: Room<u32>) -> u32 {
-        lanes::push_as_built::<L::Wide>(node, mask, room)
+        simd::push_as_built::<L::Wide>(node, mask, room)
     }
 
     #[inline(always)]
     fn push_and_pop<L: Lanes>(node: &Node, mask: u32, _: L::Wide, slots: &mut Slots<u32>) -> u32 {
-        lanes::put_and_take_as_built::<L::Wide>(node, mask, slots)
+        simd::put_and_take_as_built::<L::Wide>(node, mask, slots)
     }
 }
 

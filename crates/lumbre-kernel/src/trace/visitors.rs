@@ -20,7 +20,7 @@ fn by_t(a: f64, b: f64) -> Ordering {
 fn takes(query: Option<&Query>, crossing: &Crossing) -> bool {
     let Some(query) = query else { return true };
     let &Crossing { root, geometry, primitive, accel, context, .. } = crossing;
-    let tree = TreeQuery::new(Some(query), accel, ContextRef::of(context));
+    let tree = TreeQuery::new(query, accel, ContextRef::of(context));
     tree.has_primitive(geometry, primitive)
         && (tree.takes_both_faces() || tree.takes_face(crossing.is_front()))
         && tree.accepts(&super::Winner { root, geometry, primitive })
@@ -28,7 +28,7 @@ fn takes(query: Option<&Query>, crossing: &Crossing) -> bool {
 
 /// Whether a query takes anything in an instance.
 fn enters(query: Option<&Query>, accel: &Accel, geometry: u32) -> bool {
-    TreeQuery::new(query, accel, ContextRef::OUTSIDE).has_mask(geometry)
+    query.is_none_or(|query| TreeQuery::new(query, accel, ContextRef::OUTSIDE).has_mask(geometry))
 }
 
 /// Without a query, the first crossing of a primitive suffices.

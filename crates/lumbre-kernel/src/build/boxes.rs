@@ -1,0 +1,82 @@
+//! A list of boxes that can be made shorter where it stands.
+
+use std::ops::{Deref, DerefMut};
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::build::binary::fill;
+use crate::build::primitive::Bounds;
+
+/// Half of a box. Of what is aligned to more than 16 bytes, the standard library gives nothing back but by making a copy.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C, align(16))]
+struct Half([i32; 4]);
+
+/// Boxes, as a vector of them would be.
+pub(crate) struct Boxes {
+    // One more than they are, so that they can be aligned.
+    halves: Vec<Half>,
+    count: usize,
+}
+
+impl Boxes {
+    /// So many that are empty.
+    pub(crate) fn empty(count: usize) -> Self {
+        Self { halves: fill(2 * count + 1, Half([Bounds::EMPTY_LANE; 4])), count }
+    }
+
+    /// The halves before the first box.
+    fn start(&self) -> usize {
+        self.halves.as_ptr().addr() % align_of::<Bounds>() / size_of::<Half>()
+    }
+
+    /// Keeps the first ones, and gives back the room of the others.
+    pub(crate) fn shorten(&mut self, count: usize) {
+        let before = self.start();
+        self.count = self.count.min(count);
+        self.halves.truncate(2 * self.count + 1);
+        self.halves.shrink_to_fit();
+        // They stand where they stood, unless the allocator had reasons.
+        let now = self.start();
+        self.halves.copy_within(before..before + 2 * self.count, now);
+    }
+}
+
+impl Deref for Boxes {
+    type Target = [Bounds];
+
+    fn deref(&self) -> &[Bounds] {
+        bytemuck::cast_slice(&self.halves[self.start()..][..2 * self.count])
+    }
+}
+
+impl DerefMut for Boxes {
+    fn deref_mut(&mut self) -> &mut [Bounds] {
+        let start = self.start();
+        bytemuck::cast_slice_mut(&mut self.halves[start..][..2 * self.count])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn boxes_stay_when_others_go() {
+        for (count, kept) in [(0, 0), (1, 1), (1, 0), (1000, 1), (100_000, 33_333), (10, 20)] {
+            let mut boxes = Boxes::empty(count);
+            assert_eq!(boxes.len(), count);
+            for (place, bounds) in boxes.iter_mut().enumerate() {
+                *bounds = Bounds::new([0.0; 3], [0.5; 3], place as u32, 7);
+            }
+            boxes.shorten(kept);
+            assert_eq!(boxes.len(), count.min(kept));
+            for (place, bounds) in boxes.iter().enumerate() {
+                assert_eq!(
+                    (bounds.first(), bounds.second(), bounds.range2(1)[1]),
+                    (place as u32, 7, 1 << 28)
+                );
+            }
+        }
+    }
+}

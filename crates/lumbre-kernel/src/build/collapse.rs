@@ -1,0 +1,937 @@
+//! From the binary tree to sixteen-wide nodes and packed leaves.
+//!
+//! Which nodes of the binary tree become nodes of the wide one is chosen so that the sum of their areas is least, by
+//! dynamic programming: H. Ylitie, T. Karras, S. Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide
+//! BVHs", High Performance Graphics, 2017. Leaves are those of the binary tree.
+
+use std::cmp::Reverse;
+
+use bytemuck::{Pod, Zeroable};
+use rayon::prelude::*;
+
+use crate::tree::triangle_block::{self, BlockNames, Blocks, Filled, LaneOrder, Line, Vertices};
+use crate::build::binary::{Binary, BinaryNode, Fork, Name};
+use crate::simd::Level;
+use crate::tree::node::{Node, Units, WIDTH, tag};
+use crate::build::primitive::{Bounds, Kind, Primitive, Traits};
+use crate::tree::sphere_block::SphereBlock;
+use crate::tree::storage::Store;
+use crate::trace::watertight::BLOCK;
+use crate::build::occlusion_order;
+use crate::{BuildError, Geometry, GeometryKind, SphereCloud};
+
+/// A primitive in a leaf that is no triangle, or outside the tree.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Entry {
+    /// Position in the tree's list.
+    pub(crate) geometry: u32,
+    /// Which primitive of its geometry, or where an instance is entered; the top bit marks the last of its leaf.
+    primitive_and_last: u32,
+}
+
+const LAST: u32 = 1 << 31;
+
+impl Entry {
+    pub(crate) fn new(geometry: u32, primitive: u32, is_last: bool) -> Self {
+        Self { geometry, primitive_and_last: primitive | if is_last { LAST } else { 0 } }
+    }
+
+    /// As it is saved.
+    pub(crate) fn to_words(self) -> [u32; 2] {
+        [self.geometry, self.primitive_and_last]
+    }
+
+    pub(crate) fn from_words([geometry, primitive_and_last]: [u32; 2]) -> Self {
+        Self { geometry, primitive_and_last }
+    }
+
+    #[inline(always)]
+    pub(crate) fn primitive(&self) -> u32 {
+        self.primitive_and_last & !LAST
+    }
+
+    #[inline(always)]
+    pub(crate) fn is_last(&self) -> bool {
+        self.primitive_and_last & LAST != 0
+    }
+}
+
+/// The packed tree.
+#[derive(Debug, Default)]
+pub(crate) struct Packed {
+    /// Each before all that are below it.
+    pub(crate) nodes: Store<Node>,
+    /// The blocks of triangles: see [`blocks`].
+    pub(crate) blocks: Store<Line>,
+    /// As many as there are blocks.
+    pub(crate) names: Store<BlockNames>,
+    pub(crate) entries: Store<Entry>,
+    pub(crate) sphere_blocks: Store<SphereBlock>,
+    /// As many as there are blocks of spheres.
+    pub(crate) sphere_names: Store<BlockNames>,
+    /// The reference to the root; `None` when there is nothing finite.
+    pub(crate) root: Option<u32>,
+}
+
+impl Packed {
+    /// The blocks of triangles.
+    #[inline(always)]
+    pub(crate) fn blocks(&self) -> Blocks<'_> {
+        Blocks::new(&self.blocks)
+    }
+
+    /// The numbers of the blocks of a leaf of triangles, by which their names stand.
+    pub(crate) fn numbers(&self, leaf: u32) -> std::ops::Range<usize> {
+        self.blocks().numbers(leaf).expect("references lead to blocks")
+    }
+
+    /// Puts the triangles of a packed tree where its geometries, which stood elsewhere before, have them now. Where there may be none
+    /// without an area, it is not asked. What fails leaves everything as it was.
+    ///
+    /// # Errors
+    /// [`BuildError::TooMany`] when there is more than references can name.
+    pub(crate) fn move_triangles(
+        &mut self,
+        level: Level,
+        geometries: &[Geometry],
+        before: &[Geometry],
+        may_lack_area: bool,
+    ) -> Result<(), BuildError> {
+        let are_same = triangle_block::name_same_vertices(before, geometries);
+        if are_same && self.put_triangles(level, geometries, may_lack_area) {
+            return Ok(());
+        }
+        let followers = self.blocks().followers(self.names.len());
+        let old = std::mem::take(&mut self.blocks);
+        let number_of = |leaf| Blocks::new(&old).numbers(leaf).map_or(0, |numbers| numbers.start);
+        let packed = self.pack(level, geometries, &followers, may_lack_area, number_of);
+        if packed.is_err() {
+            self.blocks = old;
+            if are_same {
+                // Some may have moved.
+                self.put_triangles(level, before, true);
+            }
+        }
+        packed
+    }
+
+    /// See [`triangle_block::move_triangles`].
+    fn put_triangles(&mut self, level: Level, geometries: &[Geometry], may_lack_area: bool) -> bool {
+        triangle_block::move_triangles(level, geometries, &self.names, may_lack_area, self.blocks.to_mut())
+    }
+
+    /// Packs the triangles, as the names and the nodes say, whose references number blocks. Without an area they are left out;
+    /// where there may be none, it is not asked.
+    ///
+    /// # Errors
+    /// [`BuildError::TooMany`] when there is more than references can name.
+    pub(crate) fn pack_triangles(
+        &mut self,
+        level: Level,
+        geometries: &[Geometry],
+        may_lack_area: bool,
+    ) -> Result<(), BuildError> {
+        let followers = triangle_block::followers_of(&self.nodes, self.root, self.names.len());
+        self.pack(level, geometries, &followers, may_lack_area, |leaf| tag::blocks(leaf).start)
+    }
+
+    /// Packs triangles behind each block of which so many follow, and turns the references in nodes to them. `number_of` tells the
+    /// number of a leaf's first block.
+    fn pack(
+        &mut self,
+        level: Level,
+        geometries: &[Geometry],
+        followers: &[u8],
+        may_lack_area: bool,
+        number_of: impl Fn(u32) -> usize + Sync,
+    ) -> Result<(), BuildError> {
+        // Among other things, rays meet so few triangles that they gain nothing by more room for them.
+        let are_alone = self.entries.is_empty() && self.sphere_blocks.is_empty();
+        let vertices = if are_alone { Vertices::of_fastest(self.names.len()) } else { Vertices::Shared };
+        let Filled { lines, places, orders } =
+            triangle_block::pack(level, vertices, geometries, &self.names, followers, may_lack_area)?;
+        triangle_block::refer(self.nodes.to_mut(), &mut self.root, &places, number_of);
+        self.blocks = lines.into();
+        self.put_in_order(&orders);
+        Ok(())
+    }
+
+    /// Moves names to where triangles were packed.
+    fn put_in_order(&mut self, orders: &[LaneOrder]) {
+        if orders.iter().all(|order| order.is_same()) {
+            return;
+        }
+        let names = self.names.to_mut();
+        names.par_iter_mut().zip(orders).with_min_len(1 << 10).for_each(|(names, order)| order.put(names));
+    }
+}
+
+/// The least costs of putting a subtree into 1 to 15 children of a node; the first of the sixteen means nothing.
+pub(crate) type Costs = [f32; WIDTH];
+
+const LEAF_COSTS: Costs = [0.0; WIDTH];
+
+/// How a node of the binary tree shares the children that it is given, 2 to 16, among its own two, and how many are still too few for
+/// that. How many go to the left is chosen freely for up to eight and for sixteen; from the ninth to the fifteenth, one more goes to
+/// the side that it serves better. So all of it takes 29 bits, and trees are hardly worse for it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Choices(pub(crate) u32);
+
+/// The most children that are shared freely but for all.
+const FREELY: usize = WIDTH / 2;
+/// Where it stands how many go to the left, less one, of up to [`FREELY`].
+const LEFT_AT: [u32; FREELY + 2] = [0, 0, 0, 0, 1, 3, 5, 8, 11, 14];
+/// From here on, a bit each says whether the next goes to the left.
+const NEXT_AT: u32 = LEFT_AT[FREELY + 1];
+const LEFT_OF_ALL_AT: u32 = NEXT_AT + (WIDTH - FREELY - 1) as u32;
+const MOST_AS_ONE_AT: u32 = LEFT_OF_ALL_AT + 4;
+
+// The last bit of the word says that a node is a leaf; four bits hold what is below sixteen.
+const _: () = assert!(MOST_AS_ONE_AT + 4 < u32::BITS && WIDTH == 16);
+
+/// The choices where there is a leaf at the left, or at the right.
+const ALL_BUT_ONE_RIGHT: u32 = 0;
+const ALL_BUT_ONE_LEFT: u32 = {
+    let next = (1 << (LEFT_OF_ALL_AT - NEXT_AT)) - 1;
+    let mut choices = next << NEXT_AT | (WIDTH as u32 - 2) << LEFT_OF_ALL_AT;
+    let mut children = 2;
+    while children <= FREELY {
+        choices |= (children as u32 - 2) << LEFT_AT[children];
+        children += 1;
+    }
+    choices
+};
+
+impl Choices {
+    /// How many go to the left of two or more; 0 where it is better to be one child.
+    #[inline(always)]
+    fn left(self, children: usize) -> usize {
+        let bits = |from: u32, to: u32| (self.0 >> from & ((1 << (to - from)) - 1)) as usize;
+        if children <= bits(MOST_AS_ONE_AT, MOST_AS_ONE_AT + 4) {
+            0
+        } else if children <= FREELY {
+            1 + bits(LEFT_AT[children], LEFT_AT[children + 1])
+        } else if children < WIDTH {
+            let next = bits(NEXT_AT, NEXT_AT + (children - FREELY) as u32).count_ones() as usize;
+            1 + bits(LEFT_AT[FREELY], LEFT_AT[FREELY + 1]) + next
+        } else {
+            1 + bits(LEFT_OF_ALL_AT, MOST_AS_ONE_AT)
+        }
+    }
+}
+
+/// The least cost of sharing so many children, and how many go to the left.
+#[inline(always)]
+fn share_freely(children: usize, left: &Costs, right: &Costs) -> (f32, usize) {
+    let mut best = (f32::INFINITY, 1);
+    for first in 1..children {
+        let cost = left[first] + right[children - first];
+        if cost < best.0 {
+            best = (cost, first);
+        }
+    }
+    best
+}
+
+/// Chooses for a node over two children.
+#[inline(always)]
+fn share(area: f32, left: &Costs, right: &Costs) -> (Costs, Choices) {
+    let mut costs = LEAF_COSTS;
+    let beside_leaf = if left[1] == 0.0 {
+        Some((right, ALL_BUT_ONE_RIGHT))
+    } else if right[1] == 0.0 {
+        Some((left, ALL_BUT_ONE_LEFT))
+    } else {
+        None
+    };
+    if let Some((other, choices)) = beside_leaf {
+        // All but one are of use to the other alone.
+        costs[2..].copy_from_slice(&other[1..WIDTH - 1]);
+        return one_if_no_worse(costs, area + other[WIDTH - 1], choices);
+    }
+    let (mut choices, mut first) = (0, 1);
+    for children in 2..=FREELY {
+        (costs[children], first) = share_freely(children, left, right);
+        choices |= (first as u32 - 1) << LEFT_AT[children];
+    }
+    for children in FREELY + 1..WIDTH {
+        let cost = left[first] + right[children - first];
+        let next = left[first + 1] + right[children - first - 1];
+        let is_left = next < cost;
+        costs[children] = if is_left { next } else { cost };
+        first += usize::from(is_left);
+        choices |= u32::from(is_left) << (NEXT_AT as usize + children - FREELY - 1);
+    }
+    let (cost, first) = share_freely(WIDTH, left, right);
+    choices |= (first as u32 - 1) << LEFT_OF_ALL_AT;
+    one_if_no_worse(costs, area + cost, choices)
+}
+
+/// The costs of a node by those of sharing two children or more, where it may be one child instead.
+#[inline(always)]
+fn one_if_no_worse(mut costs: Costs, as_one: f32, choices: u32) -> (Costs, Choices) {
+    costs[1] = as_one;
+    // More children never cost more, so that those that do not help stand in a row.
+    let mut most_as_one = 1;
+    for (children, cost) in costs.iter_mut().enumerate().skip(2) {
+        if *cost >= as_one {
+            *cost = as_one;
+            most_as_one = children as u32;
+        }
+    }
+    (costs, Choices(choices | most_as_one << MOST_AS_ONE_AT))
+}
+
+/// The costs of putting leaves of so many instances: beside others where there is room for all, or else into a node of their own.
+fn costs_of_instances(count: usize, area: f32) -> Costs {
+    std::array::from_fn(|children| if children < count { area } else { 0.0 })
+}
+
+/// The costs of the larger subtrees of a twig, so that these can be put elsewhere without choosing again.
+#[derive(Default)]
+pub(crate) struct Known {
+    /// With their places, from the last to the first.
+    costs: Vec<(u32, Costs)>,
+}
+
+impl Known {
+    /// From how many nodes on a subtree is a larger one.
+    const LEAST: usize = 32;
+
+    /// Chooses for all nodes of a twig; returns the costs of its root, too.
+    pub(crate) fn choose(nodes: &mut [BinaryNode]) -> (Costs, Self) {
+        let mut known = Self { costs: Vec::with_capacity(nodes.len() / 16) };
+        let costs = choose_and(
+            nodes,
+            false,
+            #[inline(always)]
+            |place, count, costs| {
+                if count >= Self::LEAST {
+                    known.costs.push((place as u32, *costs));
+                }
+            },
+        );
+        (costs, known)
+    }
+
+    /// The costs of the subtree of these nodes, the first of which has that place in the twig.
+    pub(crate) fn costs(&self, place: usize, nodes: &[BinaryNode]) -> Costs {
+        let found = self.costs.binary_search_by_key(&Reverse(place as u32), |&(place, _)| Reverse(place));
+        found.map_or_else(|_| choose(&mut nodes.to_vec(), false), |found| self.costs[found].1)
+    }
+}
+
+/// Chooses for all nodes of a twig; returns the costs of its root.
+pub(crate) fn choose(nodes: &mut [BinaryNode], are_instances: bool) -> Costs {
+    choose_and(
+        nodes,
+        are_instances,
+        #[inline(always)]
+        |_, _, _| {},
+    )
+}
+
+/// The same; tells the place of each inner node, how many nodes its subtree has, and the costs of that.
+#[inline(always)]
+fn choose_and(
+    nodes: &mut [BinaryNode],
+    are_instances: bool,
+    mut tell: impl FnMut(usize, usize, &Costs),
+) -> Costs {
+    // Of the subtrees behind a node that have no parent there, from the last to the first: its children's are the last two.
+    let mut behind = Vec::new();
+    let mut ends = Vec::new();
+    for (place, node) in nodes.iter_mut().enumerate().rev() {
+        let mut costs = LEAF_COSTS;
+        let mut end = place + 1;
+        if let Some(names) = node.names() {
+            if are_instances {
+                costs = costs_of_instances(names.len(), node.bounds().half_area());
+            }
+        } else if let (Some(left), Some(right)) = (behind.pop(), behind.pop()) {
+            let choices;
+            (costs, choices) = share(node.bounds().half_area(), &left, &right);
+            node.choose(choices);
+            end = ends.pop().and_then(|_| ends.pop()).unwrap_or(end);
+            tell(place, end - place, &costs);
+        }
+        behind.push(costs);
+        ends.push(end);
+    }
+    behind.pop().unwrap_or(LEAF_COSTS)
+}
+
+impl Binary<'_> {
+    pub(crate) fn bounds(&self) -> &Bounds {
+        match self {
+            Self::Fork(fork) => &fork.bounds,
+            Self::Twig(twig) => twig.nodes[0].bounds(),
+        }
+    }
+
+    pub(crate) fn costs(&self) -> &Costs {
+        match self {
+            Self::Fork(fork) => &fork.costs,
+            Self::Twig(twig) => &twig.costs,
+        }
+    }
+
+    /// How many nodes it has.
+    fn nodes(&self) -> usize {
+        match self {
+            Self::Fork(fork) => fork.nodes,
+            Self::Twig(twig) => twig.nodes.len(),
+        }
+    }
+}
+
+impl<'p> Fork<'p> {
+    /// The one over two.
+    pub(crate) fn over(children: [Binary<'p>; 2]) -> Self {
+        let mut bounds = *children[0].bounds();
+        bounds.grow(children[1].bounds());
+        let (costs, choices) = share(bounds.half_area(), children[0].costs(), children[1].costs());
+        let nodes = 1 + children[0].nodes() + children[1].nodes();
+        Self { bounds, costs, choices, children, nodes, is_ranked: false }
+    }
+}
+
+/// A node of the binary tree, wherever it is.
+#[derive(Clone, Copy)]
+enum Cursor<'a> {
+    Fork(&'a Fork<'a>),
+    /// From it on.
+    Twig(&'a [BinaryNode]),
+    /// One of the instances of a leaf, and the place of its name.
+    Instance(&'a Primitive, usize),
+}
+
+impl<'a> Cursor<'a> {
+    fn new(tree: &'a Binary<'a>) -> Self {
+        match tree {
+            Binary::Fork(fork) => Self::Fork(fork),
+            Binary::Twig(twig) => Self::Twig(&twig.nodes),
+        }
+    }
+
+    #[inline(always)]
+    fn bounds(&self) -> &'a Bounds {
+        match self {
+            Self::Fork(fork) => &fork.bounds,
+            Self::Twig(nodes) => nodes[0].bounds(),
+            Self::Instance(bounds, _) => bounds,
+        }
+    }
+
+    #[inline(always)]
+    fn names(&self) -> Option<std::ops::Range<usize>> {
+        match self {
+            Self::Fork(_) => None,
+            Self::Twig(nodes) => nodes[0].names(),
+            Self::Instance(_, name) => Some(*name..*name + 1),
+        }
+    }
+
+    #[inline(always)]
+    fn choices(&self) -> Choices {
+        match self {
+            Self::Fork(fork) => fork.choices,
+            Self::Twig(nodes) => nodes[0].choices(),
+            Self::Instance(..) => unreachable!("a leaf"),
+        }
+    }
+
+    #[inline(always)]
+    fn children(&self) -> [Self; 2] {
+        match self {
+            Self::Fork(fork) => [Self::new(&fork.children[0]), Self::new(&fork.children[1])],
+            Self::Twig(nodes) => [Self::Twig(&nodes[1..]), Self::Twig(&nodes[nodes[0].right()..])],
+            Self::Instance(..) => unreachable!("a leaf"),
+        }
+    }
+
+    /// Whether the right child is of a higher rank than the left.
+    #[inline(always)]
+    fn is_ranked(&self) -> bool {
+        matches!(self, Self::Fork(fork) if fork.is_ranked)
+    }
+}
+
+/// Children of a wide node.
+struct Gathered<'a> {
+    order: ChildOrder,
+    children: [Cursor<'a>; WIDTH],
+    keys: [(u8, f32); WIDTH],
+    len: usize,
+}
+
+/// In which order they are gathered.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum ChildOrder {
+    /// By rank, and of one rank the largest last: where any hit will do, it is asked first, for it is the likeliest to have one.
+    BySize,
+    /// Whichever: they are only counted, or sorted later, as those are below which there is nothing but triangles (see [`occlusion`]).
+    Any,
+}
+
+impl<'a> Gathered<'a> {
+    #[inline(always)]
+    fn put(&mut self, rank: u8, child: Cursor<'a>) {
+        if self.order == ChildOrder::Any {
+            self.children[self.len] = child;
+            self.len += 1;
+            return;
+        }
+        let key = (rank, child.bounds().half_area());
+        let mut at = self.len;
+        while at > 0 && self.keys[at - 1] > key {
+            (self.children[at], self.keys[at]) = (self.children[at - 1], self.keys[at - 1]);
+            at -= 1;
+        }
+        (self.children[at], self.keys[at]) = (child, key);
+        self.len += 1;
+    }
+}
+
+/// How much a part of the tree takes.
+#[derive(Clone, Copy, Default)]
+struct Counts {
+    nodes: usize,
+    blocks: usize,
+    sphere_blocks: usize,
+    entries: usize,
+}
+
+impl std::ops::AddAssign for Counts {
+    fn add_assign(&mut self, other: Self) {
+        self.nodes += other.nodes;
+        self.blocks += other.blocks;
+        self.sphere_blocks += other.sphere_blocks;
+        self.entries += other.entries;
+    }
+}
+
+/// From how many nodes of the binary tree on a part of it is shared among threads.
+const MANY: usize = 1024;
+
+/// A wide node over many primitives, with what its children take.
+struct Plan<'a> {
+    children: [Cursor<'a>; WIDTH],
+    len: usize,
+    counts: [Counts; WIDTH],
+    /// Of those children that are over many in turn.
+    plans: [Option<Box<Self>>; WIDTH],
+    total: Counts,
+}
+
+/// A tree whose blocks are still to be filled.
+pub(crate) struct Layout {
+    nodes: Vec<Node>,
+    entries: Vec<Entry>,
+    /// What goes into the blocks.
+    spans: Vec<Span>,
+    sphere_spans: Vec<Span>,
+    root: u32,
+}
+
+/// Lays a binary tree out, with the names in its leaves, the first of which are those of the instances. The depth of its recursions
+/// is that of the tree, which is bounded.
+///
+/// # Errors
+/// [`BuildError::TooMany`] when there are more blocks than references can name.
+pub(crate) fn lay_out(
+    traits: &[Traits],
+    binary: &Binary,
+    names: &[Name],
+    instances: &[Primitive],
+) -> Result<Layout, BuildError> {
+    let is_triangle = |traits: &Traits| traits.kind == Kind::Triangle;
+    let order = if traits.iter().all(is_triangle) { ChildOrder::Any } else { ChildOrder::BySize };
+    let packer = Packer { traits, names, instances, order };
+    let root = Cursor::new(binary);
+    let plan = packer.plan(root);
+    let total = plan.as_ref().map_or_else(|| packer.count(root), |plan| plan.total);
+    if total.blocks.max(total.sphere_blocks) > tag::BLOCK_PLACES as usize {
+        return Err(BuildError::TooMany);
+    }
+    let mut nodes = crate::build::binary::fill(total.nodes, Node::EMPTY);
+    let mut spans = vec![Span { first: 0, count: 0 }; total.blocks];
+    let mut sphere_spans = vec![Span { first: 0, count: 0 }; total.sphere_blocks];
+    let mut entries = vec![Entry::new(0, 0, true); total.entries];
+    let mut room = Room {
+        nodes: &mut nodes,
+        spans: &mut spans,
+        sphere_spans: &mut sphere_spans,
+        entries: &mut entries,
+        start: Counts::default(),
+    };
+    let root = match &plan {
+        Some(plan) => packer.put_many(plan, room),
+        None => packer.put(root, &mut room),
+    };
+    Ok(Layout { nodes, entries, spans, sphere_spans, root })
+}
+
+impl Layout {
+    /// Fills the blocks, and sorts the children of nodes by what is in them. Blocks are most of the tree: nothing of its making but names
+    /// is to be left by now, and these are given back before.
+    ///
+    /// # Errors
+    /// [`BuildError::TooMany`] when there is more than references can name.
+    pub(crate) fn pack(
+        self,
+        level: Level,
+        units: &Units,
+        geometries: &[Geometry],
+        names: Vec<Name>,
+    ) -> Result<Packed, BuildError> {
+        let Self { nodes, entries, spans, sphere_spans, root } = self;
+        let named = |spans: Vec<Span>| -> Vec<BlockNames> {
+            let name = |span: &Span| BlockNames::of(&names[span.first as usize..][..span.count as usize]);
+            spans.par_iter().with_min_len(triangle_block::share_of(spans.len())).map(name).collect()
+        };
+        let (block_names, sphere_names) = (named(spans), named(sphere_spans));
+        drop(names);
+        let block = |names: &BlockNames| fill_sphere_block(cloud(geometries, names.geometry), names);
+        let sphere_blocks: Vec<_> = sphere_names.par_iter().with_min_len(256).map(block).collect();
+        let mut packed = Packed {
+            nodes: nodes.into(),
+            blocks: Store::default(),
+            names: block_names.into(),
+            entries: entries.into(),
+            sphere_blocks: sphere_blocks.into(),
+            sphere_names: sphere_names.into(),
+            root: Some(root),
+        };
+        packed.pack_triangles(level, geometries, false)?;
+        let Packed { nodes, blocks, .. } = &mut packed;
+        occlusion_order::sort_children(level, units, nodes.to_mut(), Blocks::new(blocks));
+        Ok(packed)
+    }
+}
+
+/// A tree of leaves that there were before.
+pub(crate) struct Relaid {
+    pub(crate) nodes: Vec<Node>,
+    pub(crate) entries: Vec<Entry>,
+    pub(crate) root: u32,
+}
+
+impl Layout {
+    /// The tree where each sphere stands for a leaf of another, which is found by the sphere's geometry.
+    pub(crate) fn over_leaves(self, names: &[Name], leaf_of: impl Fn(u32) -> u32) -> Relaid {
+        let Self { mut nodes, entries, sphere_spans, mut root, .. } = self;
+        let stands_for = |reference: &mut u32| {
+            if *reference != Node::ABSENT && *reference >> tag::SHIFT == tag::SPHERES {
+                let span = sphere_spans[tag::blocks(*reference).start];
+                *reference = leaf_of(names[span.first as usize][0]);
+            }
+        };
+        nodes.iter_mut().flat_map(|node| &mut node.children).for_each(stands_for);
+        stands_for(&mut root);
+        Relaid { nodes, entries, root }
+    }
+}
+
+fn cloud(geometries: &[Geometry], geometry: u32) -> &SphereCloud {
+    match &geometries[geometry as usize].kind {
+        GeometryKind::Spheres(cloud) => cloud,
+        _ => unreachable!("spheres come from clouds"),
+    }
+}
+
+#[inline(always)]
+fn fill_sphere_block(cloud: &SphereCloud, names: &BlockNames) -> SphereBlock {
+    let mut block = SphereBlock::EMPTY;
+    for (lane, primitive) in names.primitives().enumerate() {
+        block.put(lane, cloud.spheres[primitive as usize]);
+    }
+    block
+}
+
+/// Those among the names that go into a block.
+#[derive(Clone, Copy)]
+struct Span {
+    first: u32,
+    count: u32,
+}
+
+/// Where a part of the tree goes; it takes up what it is given from the front.
+struct Room<'a> {
+    nodes: &'a mut [Node],
+    spans: &'a mut [Span],
+    sphere_spans: &'a mut [Span],
+    entries: &'a mut [Entry],
+    /// The places of the first ones in the whole tree.
+    start: Counts,
+}
+
+impl<'a> Room<'a> {
+    /// The first part.
+    fn take(&mut self, counts: Counts) -> Self {
+        let nodes = self.nodes.split_off_mut(..counts.nodes).unwrap_or_default();
+        let spans = self.spans.split_off_mut(..counts.blocks).unwrap_or_default();
+        let sphere_spans = self.sphere_spans.split_off_mut(..counts.sphere_blocks).unwrap_or_default();
+        let entries = self.entries.split_off_mut(..counts.entries).unwrap_or_default();
+        let start = self.start;
+        self.start += counts;
+        Room { nodes, spans, sphere_spans, entries, start }
+    }
+}
+
+struct Packer<'a> {
+    traits: &'a [Traits],
+    names: &'a [Name],
+    instances: &'a [Primitive],
+    /// Of what is put.
+    order: ChildOrder,
+}
+
+impl<'a> Packer<'a> {
+    /// The instances of a leaf that holds several: each will have a leaf of its own.
+    #[inline(always)]
+    fn instances_of(&self, leaf: Cursor<'a>) -> Option<(usize, &'a [Primitive])> {
+        let names = leaf.names().filter(|names| names.len() > 1)?;
+        Some((names.start, self.instances.get(names)?))
+    }
+
+    /// What becomes a leaf of the wide tree.
+    #[inline(always)]
+    fn leaf(&self, cursor: Cursor<'a>) -> Option<std::ops::Range<usize>> {
+        if self.instances_of(cursor).is_some() { None } else { cursor.names() }
+    }
+
+    /// The children in the wide tree of what is no leaf there.
+    #[inline(always)]
+    fn gather(&self, root: Cursor<'a>, order: ChildOrder) -> ([Cursor<'a>; WIDTH], usize) {
+        let mut found = Gathered { order, children: [root; WIDTH], keys: [(0, 0.0); WIDTH], len: 0 };
+        let mut pending = [(root, WIDTH, 0); WIDTH];
+        let mut waiting = 1;
+        while waiting > 0 {
+            waiting -= 1;
+            let (cursor, room, rank) = pending[waiting];
+            if cursor.names().is_some() {
+                match self.instances_of(cursor) {
+                    Some((first, instances)) if instances.len() <= room => {
+                        for (name, instance) in (first..).zip(instances) {
+                            found.put(rank, Cursor::Instance(instance, name));
+                        }
+                    }
+                    _ => found.put(rank, cursor),
+                }
+                continue;
+            }
+            let first = if room > 1 { cursor.choices().left(room) } else { 0 };
+            if first == 0 {
+                found.put(rank, cursor);
+                continue;
+            }
+            let [left, right] = cursor.children();
+            // Ranks fork at the left, where the lower ones are, and first at the root, which has the most room.
+            let above = match cursor.is_ranked() {
+                true if room == WIDTH => 2,
+                true => 1,
+                false => rank,
+            };
+            pending[waiting] = (right, room - first, above);
+            pending[waiting + 1] = (left, first, rank);
+            waiting += 2;
+        }
+        (found.children, found.len)
+    }
+
+    /// `None` for a leaf, or a node over few primitives.
+    fn plan(&self, root: Cursor<'a>) -> Option<Box<Plan<'a>>> {
+        let Cursor::Fork(Fork { nodes: MANY.., .. }) = root else { return None };
+        let (children, len) = self.gather(root, self.order);
+        let mut plans: [Option<Box<Plan>>; WIDTH] = Default::default();
+        let mut counts = [Counts::default(); WIDTH];
+        plans[..len].par_iter_mut().zip(&mut counts[..len]).zip(&children[..len]).for_each(
+            |((plan, counts), &child)| {
+                *plan = self.plan(child);
+                *counts = plan.as_ref().map_or_else(|| self.count(child), |plan| plan.total);
+            },
+        );
+        let mut total = Counts { nodes: 1, ..Counts::default() };
+        counts.iter().for_each(|&counts| total += counts);
+        Some(Box::new(Plan { children, len, counts, plans, total }))
+    }
+
+    fn count(&self, root: Cursor<'a>) -> Counts {
+        if let Some(names) = self.leaf(root) {
+            let kind = self.traits[self.names[names.start][0] as usize].kind;
+            return match kind {
+                Kind::Triangle => Counts { blocks: names.len().div_ceil(BLOCK), ..Counts::default() },
+                Kind::Sphere => Counts { sphere_blocks: names.len().div_ceil(BLOCK), ..Counts::default() },
+                Kind::Shape | Kind::Instance | Kind::Custom | Kind::Precise => {
+                    Counts { entries: names.len(), ..Counts::default() }
+                }
+            };
+        }
+        let (children, len) = self.gather(root, ChildOrder::Any);
+        let mut total = Counts { nodes: 1, ..Counts::default() };
+        children[..len].iter().for_each(|&child| total += self.count(child));
+        total
+    }
+
+    fn put_many(&self, plan: &Plan<'a>, mut room: Room) -> u32 {
+        let place = room.start.nodes;
+        let own = room.take(Counts { nodes: 1, ..Counts::default() });
+        let rooms: Vec<Room> = plan.counts[..plan.len].iter().map(|&counts| room.take(counts)).collect();
+        let mut references = [Node::ABSENT; WIDTH];
+        references[..plan.len]
+            .par_iter_mut()
+            .zip(rooms)
+            .zip(&plan.plans[..plan.len])
+            .zip(&plan.children[..plan.len])
+            .for_each(|(((reference, mut room), plan), &child)| {
+                *reference = match plan {
+                    Some(plan) => self.put_many(plan, room),
+                    None => self.put(child, &mut room),
+                };
+            });
+        own.nodes[0] = node_over(&plan.children[..plan.len], references);
+        tag::reference(tag::INNER, place as u32)
+    }
+
+    fn put(&self, root: Cursor<'a>, room: &mut Room) -> u32 {
+        if let Some(names) = self.leaf(root) {
+            return self.put_leaf(names, room);
+        }
+        let (children, len) = self.gather(root, self.order);
+        let place = room.start.nodes;
+        let own = room.take(Counts { nodes: 1, ..Counts::default() });
+        let mut references = [Node::ABSENT; WIDTH];
+        for (reference, &child) in references.iter_mut().zip(&children[..len]) {
+            *reference = self.put(child, room);
+        }
+        own.nodes[0] = node_over(&children[..len], references);
+        tag::reference(tag::INNER, place as u32)
+    }
+
+    fn put_leaf(&self, names: std::ops::Range<usize>, room: &mut Room) -> u32 {
+        let (first, count) = (names.start as u32, names.len() as u32);
+        let names = &self.names[names];
+        let tag = match self.traits[names[0][0] as usize].kind {
+            Kind::Triangle => {
+                let block = room.start.blocks as u32;
+                let blocks = names.len().div_ceil(BLOCK);
+                let own = room.take(Counts { blocks, ..Counts::default() });
+                cut(own.spans, first, count);
+                return tag::triangles(block, blocks as u32);
+            }
+            Kind::Sphere => {
+                let block = room.start.sphere_blocks as u32;
+                let sphere_blocks = names.len().div_ceil(BLOCK);
+                let own = room.take(Counts { sphere_blocks, ..Counts::default() });
+                cut(own.sphere_spans, first, count);
+                return tag::spheres(block, sphere_blocks as u32);
+            }
+            Kind::Shape => tag::SHAPES,
+            Kind::Instance => tag::INSTANCE,
+            Kind::Custom => tag::CUSTOM,
+            Kind::Precise => tag::PRECISE,
+        };
+        let place = room.start.entries as u32;
+        let own = room.take(Counts { entries: names.len(), ..Counts::default() });
+        for (i, (entry, name)) in own.entries.iter_mut().zip(names).enumerate() {
+            *entry = Entry::new(name[0], name[1], i + 1 == names.len());
+        }
+        tag::reference(tag, place)
+    }
+}
+
+/// Shares names among blocks.
+#[inline(always)]
+fn cut(spans: &mut [Span], first: u32, count: u32) {
+    for (i, span) in spans.iter_mut().enumerate() {
+        let before = (i * BLOCK) as u32;
+        *span = Span { first: first + before, count: (count - before).min(BLOCK as u32) };
+    }
+}
+
+/// A node with these children.
+#[inline(always)]
+fn node_over(children: &[Cursor], references: [u32; WIDTH]) -> Node {
+    let mut node = Node { children: references, ..Node::EMPTY };
+    for (lane, child) in children.iter().enumerate() {
+        child.bounds().put(&mut node, lane);
+    }
+    node
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::scenes::Random;
+
+    /// A binary tree over boxes, depth first.
+    fn grow(
+        random: &mut Random,
+        count: usize,
+        low: [f32; 3],
+        size: f32,
+        nodes: &mut Vec<BinaryNode>,
+    ) -> Bounds {
+        if count == 1 {
+            let high = low.map(|x| x + size * random.unit() as f32);
+            let bounds = Bounds::new(low, high, 0, 0);
+            nodes.push(BinaryNode::leaf(&bounds, 0, 1));
+            return bounds;
+        }
+        let place = nodes.len();
+        nodes.push(BinaryNode::inner(&Bounds::EMPTY, 0));
+        let left = 1 + random.below(count - 1);
+        let corner = low.map(|x| x + 0.5 * size * random.unit() as f32);
+        let mut bounds = grow(random, left, low, 0.7 * size, nodes);
+        let right_place = nodes.len() - place;
+        bounds.grow(&grow(random, count - left, corner, 0.7 * size, nodes));
+        nodes[place] = BinaryNode::inner(&bounds, right_place);
+        bounds
+    }
+
+    /// The areas of the wide nodes that a subtree becomes by its choices, where it has room for so many children.
+    fn cost_by_choices(nodes: &[BinaryNode], room: usize) -> f64 {
+        if nodes[0].names().is_some() {
+            return 0.0;
+        }
+        let first = if room > 1 { nodes[0].choices().left(room) } else { 0 };
+        if first == 0 {
+            return f64::from(nodes[0].bounds().half_area()) + cost_by_choices(nodes, WIDTH);
+        }
+        assert!(first < room, "{first} of {room}");
+        cost_by_choices(&nodes[1..], first) + cost_by_choices(&nodes[nodes[0].right()..], room - first)
+    }
+
+    /// The least areas there are, for each number of children.
+    fn least_costs(nodes: &[BinaryNode]) -> [f64; WIDTH] {
+        if nodes[0].names().is_some() {
+            return [0.0; WIDTH];
+        }
+        let (left, right) = (least_costs(&nodes[1..]), least_costs(&nodes[nodes[0].right()..]));
+        let shared = |room: usize| {
+            (1..room).map(|first| left[first] + right[room - first]).fold(f64::INFINITY, f64::min)
+        };
+        let as_one = f64::from(nodes[0].bounds().half_area()) + shared(WIDTH);
+        std::array::from_fn(|room| if room < 2 { as_one } else { as_one.min(shared(room)) })
+    }
+
+    #[test]
+    fn what_is_chosen_costs_what_is_said_and_hardly_more_than_the_least() {
+        let mut random = Random(401);
+        let (mut sum, mut least) = (0.0, 0.0);
+        for round in 0..200 {
+            let mut nodes = Vec::new();
+            let count = 2 + random.below(if round % 4 == 0 { 20 } else { 400 });
+            grow(&mut random, count, [-0.5; 3], 0.5, &mut nodes);
+            let said = f64::from(choose(&mut nodes, false)[1]);
+            let found = cost_by_choices(&nodes, 1);
+            assert!((said - found).abs() <= 1e-4 * found, "{said} said, {found} found");
+            let best = least_costs(&nodes)[1];
+            assert!(found >= best * (1.0 - 1e-6), "{found} is less than {best}");
+            (sum, least) = (sum + found, least + best);
+        }
+        assert!(sum < 1.01 * least, "{sum} where {least} would do");
+    }
+}

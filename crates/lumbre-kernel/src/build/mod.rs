@@ -1,0 +1,22 @@
+//! From geometries to a tree, and what keeps it good when they move.
+//!
+//! [`input`] checks geometries and makes primitives of them, [`binary`] a binary tree, and [`collapse`] the tree of sixteen children that
+//! rays traverse. [`refit`] and [`rebuild`] follow geometries that move.
+
+pub(crate) mod binary;
+mod boxes;
+mod clouds;
+pub(crate) mod collapse;
+pub(crate) mod input;
+mod morton;
+pub(crate) mod occlusion_order;
+pub(crate) mod open_instances;
+mod outline;
+mod partition;
+pub(crate) mod primitive;
+pub(crate) mod rebuild;
+pub(crate) mod refit;
+mod reinsert;
+mod sah;
+mod small;
+mod treelet;

@@ -1,0 +1,369 @@
+//! Boxes that together hold what is in a tree, and the box around them where the tree is placed.
+
+use lumbre_geometry::Aabb;
+use lumbre_math::{AnimatedTransform, DMat3, DVec3, Transform};
+
+use crate::simd::{Lanes, Level, Row, Task, WIDE, Wide};
+use crate::tree::node::{Node, Units, tag};
+use crate::{Accel, Placement};
+
+/// Boxes of an outline, about.
+const OUTLINE: usize = 256;
+
+/// Boxes of a tree that together hold what is finite in it. The box around an instance is that of many boxes, each taken over
+/// by itself, which is tighter than the image of the whole.
+///
+/// # Why nothing sticks out
+///
+/// Boxes are kept in single precision, from the middle of all of them, in units of half their largest extent: |c| + h ≤ 1 + 2u for
+/// each number of a box's middle and half its size, with u = 2⁻²⁴, and each of these is wrong by u/2 at most. A row of a map is
+/// divided by its largest number, so that each is wrong by u at most. The sums of |m c| and of |m h| over a row are together below 3.1,
+/// and their roundings, those of the numbers and that of the last sum or difference less than 8u of that: 25u. What is taken back
+/// from these units in double precision has 32u of them added, and then what rounds in the image of the middle, which is found in
+/// double precision.
+pub(crate) struct Outline {
+    whole: Aabb,
+    /// Its middle, and half its largest extent.
+    center: DVec3,
+    unit: f64,
+    boxes: Vec<SixteenBoxes>,
+    /// No coordinate is larger.
+    reach: DVec3,
+}
+
+/// What the image of an outline may be wrong by, in its units: 32u, see there.
+const IMAGE_ERROR: f64 = 32.0 / (1 << 24) as f64;
+
+impl Outline {
+    /// Of a whole tree.
+    pub(crate) fn of(inner: &Accel) -> Self {
+        let whole = inner.bounds;
+        match inner.tree.root.filter(|_| inner.infinite.is_empty()) {
+            Some(root) => Self { whole, ..Self::below(inner, root, OUTLINE) },
+            None => Self::of_box(whole),
+        }
+    }
+
+    fn of_box(whole: Aabb) -> Self {
+        Self { whole, center: DVec3::ZERO, unit: 0.0, boxes: Vec::new(), reach: DVec3::ZERO }
+    }
+
+    /// Of what is below a node, by one box more than this at most, or by those of its children where they are more; of a leaf, by none.
+    pub(crate) fn below(inner: &Accel, reference: u32, count: usize) -> Self {
+        let node = |reference: u32| {
+            (reference >> tag::SHIFT == tag::INNER).then(|| &inner.tree.nodes[reference as usize])
+        };
+        let Some(root) = node(reference) else { return Self::of_box(Aabb::EMPTY) };
+        let children = |node: &Node| -> Vec<(Aabb, u32)> {
+            (0..node.len())
+                .map(|lane| (box_in_space(&inner.units, node, lane), node.children[lane]))
+                .collect()
+        };
+        let mut open = children(root);
+        while open.len() < count {
+            let area = |i: &usize| open[*i].0.half_area();
+            let inner_ones = (0..open.len()).filter(|&i| node(open[i].1).is_some());
+            let Some(largest) = inner_ones.max_by(|a, b| area(a).total_cmp(&area(b))) else { break };
+            let below = node(open[largest].1).map(children).unwrap_or_default();
+            if open.len() + below.len() > count + 1 {
+                break;
+            }
+            open.swap_remove(largest);
+            open.extend(below);
+        }
+        open.retain(|(bounds, _)| !bounds.is_empty());
+        let boxes: Vec<_> = open.into_iter().map(|(bounds, _)| bounds).collect();
+        Self::of_boxes(&boxes)
+    }
+
+    /// Of these, of which none is empty.
+    fn of_boxes(boxes: &[Aabb]) -> Self {
+        let whole = boxes.iter().fold(Aabb::EMPTY, |whole, bounds| whole.union(*bounds));
+        let boxes: Vec<_> = boxes.iter().map(center_and_half).collect();
+        let reach = boxes.iter().fold(DVec3::ZERO, |most, [center, half]| most.max(center.abs() + *half));
+        let [center, half] = center_and_half(&whole);
+        let unit = half.max_element();
+        if !(f64::MIN_POSITIVE..f64::INFINITY).contains(&unit) {
+            return Self::of_box(whole);
+        }
+        let boxes = boxes.chunks(WIDE).map(|boxes| SixteenBoxes::new(boxes, center, unit)).collect();
+        Self { whole, center, unit, boxes, reach }
+    }
+
+    /// A box around it at all times, whatever is the box around the whole tree; `None` where nothing is known but that.
+    pub(crate) fn part_at(&self, placement: &Placement) -> Option<Aabb> {
+        match placement {
+            Placement::Still(map) => Level::best().run(Around { outline: self, placing: &Placing::of(map) }),
+            Placement::Moving(motion) => (!self.boxes.is_empty()).then(|| self.swept(motion)),
+        }
+    }
+
+    /// A box around it at all times.
+    pub(crate) fn at(&self, placement: &Placement) -> Aabb {
+        match placement {
+            Placement::Still(map) => self.placed(map),
+            Placement::Moving(motion) => self.swept(motion),
+        }
+    }
+
+    fn placed(&self, map: &Transform) -> Aabb {
+        let (whole, placing) = (placed_bounds(&self.whole, map), Placing::of(map));
+        match Level::best().run(Around { outline: self, placing: &placing }) {
+            // Each bounds it, so that their common part does.
+            Some(parts) => Aabb { min: parts.min.max(whole.min), max: parts.max.min(whole.max) },
+            None => whole,
+        }
+    }
+
+    /// The box around the images of its boxes; `None` where there are none.
+    #[inline(always)]
+    pub(crate) fn around<L: Lanes>(&self, placing: &Placing) -> Option<Aabb> {
+        if self.boxes.is_empty() {
+            return None;
+        }
+        let middle = placing.linear * self.center + placing.translation;
+        let rounding = placing.rounding(self.reach);
+        let (mut min, mut max) = (middle - rounding, middle + rounding);
+        for axis in 0..3 {
+            let row = [placing.linear.x_axis[axis], placing.linear.y_axis[axis], placing.linear.z_axis[axis]];
+            let largest =
+                row.iter().fold(f64::MIN_POSITIVE, |largest: f64, number| largest.max(number.abs()));
+            let [low, high] = images::<L::Wide>(&self.boxes, row.map(|number| (number / largest) as f32));
+            let size = largest * self.unit;
+            min[axis] += (f64::from(low) - IMAGE_ERROR) * size;
+            max[axis] += (f64::from(high) + IMAGE_ERROR) * size;
+        }
+        Some(Aabb { min, max })
+    }
+}
+
+/// A map, and what else the images of boxes need of it.
+pub(crate) struct Placing {
+    linear: DMat3,
+    /// The sizes of its numbers.
+    sizes: DMat3,
+    translation: DVec3,
+}
+
+impl Placing {
+    #[inline(always)]
+    pub(crate) fn of(map: &Transform) -> Self {
+        Self { linear: map.linear(), sizes: sizes_of(map), translation: map.affine().translation }
+    }
+
+    /// By how much the image of a box with no larger coordinates than `reach` may be wrong.
+    #[inline(always)]
+    fn rounding(&self, reach: DVec3) -> DVec3 {
+        8.0 * f64::EPSILON * (self.sizes * reach + self.translation.abs())
+    }
+}
+
+impl Outline {
+    /// The same of what moves.
+    ///
+    /// Every point of the outline goes, between two neighbours of a list of steps, along a curve that stays within a certain
+    /// distance of its chord. The ends of the chord lie in the boxes at the two steps, so that all of the chord lies in the
+    /// box around both: the curve lies in that box when it is widened by the distance. Before the first key and after the
+    /// last, everything is as at these. What rounds in a map between two keys is a few 2⁻⁵³ of what the maps at the keys make
+    /// of the outline, times their condition.
+    fn swept(&self, motion: &AnimatedTransform) -> Aabb {
+        let mut swept = Aabb::EMPTY;
+        for (_, map) in motion.keys() {
+            swept = swept.union(self.placed(map));
+        }
+        if self.whole.is_empty() {
+            return swept;
+        }
+        let [center, half] = center_and_half(&self.whole);
+        // An instance grows by a fiftieth of its size.
+        let sizes = |map: &Transform| (sizes_of(map) * half).length();
+        let smallest = motion.keys().iter().map(|(_, map)| sizes(map)).fold(f64::INFINITY, f64::min);
+        for (maps, distance) in motion.steps(center, half, 0.02 * smallest) {
+            let along = maps.iter().fold(Aabb::EMPTY, |along, map| along.union(self.placed(map)));
+            let reach = along.min.abs().max(along.max.abs());
+            let rounding = 64.0 * f64::EPSILON * motion.condition() * reach.max_element();
+            let margin = DVec3::splat(distance + rounding);
+            swept = swept.union(Aabb { min: along.min - margin, max: along.max + margin });
+        }
+        swept
+    }
+}
+
+/// How many boxes are taken over at a time.
+const EIGHT: usize = 8;
+
+/// Half the sizes of eight boxes, by axes.
+pub(crate) struct EightSizes {
+    halves: [[f64; EIGHT]; 3],
+}
+
+impl EightSizes {
+    /// Of any number.
+    pub(crate) fn of(boxes: &[Aabb]) -> Vec<Self> {
+        boxes.chunks(EIGHT).map(Self::new).collect()
+    }
+
+    /// Of some; where there are fewer, the first comes again.
+    fn new(boxes: &[Aabb]) -> Self {
+        let half = |lane: usize| center_and_half(boxes.get(lane).unwrap_or(&boxes[0]))[1];
+        Self { halves: [0, 1, 2].map(|axis| std::array::from_fn(|lane| half(lane)[axis])) }
+    }
+
+    /// Half the areas of the boxes around the images of `count` boxes, together.
+    #[inline(always)]
+    pub(crate) fn placed_area(boxes: &[Self], count: usize, placing: &Placing) -> f64 {
+        let mut area = 0.0;
+        for (i, eight) in boxes.iter().enumerate() {
+            area += eight.area_of_first(count - EIGHT * i, placing);
+        }
+        area
+    }
+
+    #[inline(always)]
+    fn area_of_first(&self, count: usize, placing: &Placing) -> f64 {
+        let (halves, s) = (&self.halves, &placing.sizes);
+        let mut areas = [0.0; EIGHT];
+        for (lane, area) in areas.iter_mut().enumerate() {
+            let [x, y, z] = [0, 1, 2].map(|axis| halves[axis][lane]);
+            let size = |axis: usize| 2.0 * (s.x_axis[axis] * x + s.y_axis[axis] * y + s.z_axis[axis] * z);
+            *area = size(0) * size(1) + size(1) * size(2) + size(2) * size(0);
+        }
+        areas[..count.min(EIGHT)].iter().sum()
+    }
+}
+
+/// The box around the images of an outline's boxes.
+struct Around<'a> {
+    outline: &'a Outline,
+    placing: &'a Placing,
+}
+
+impl Task for Around<'_> {
+    type Output = Option<Aabb>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Option<Aabb> {
+        self.outline.around::<L>(self.placing)
+    }
+}
+
+/// Boxes by sixteen, in an outline's units.
+struct SixteenBoxes {
+    centers: [Row<f32>; 3],
+    halves: [Row<f32>; 3],
+}
+
+impl SixteenBoxes {
+    /// Of some; where there are fewer, the first comes again.
+    fn new(boxes: &[[DVec3; 2]], middle: DVec3, unit: f64) -> Self {
+        let rows = |number: &dyn Fn(&[DVec3; 2], usize) -> f64| {
+            [0, 1, 2].map(|axis| {
+                Row(std::array::from_fn(|lane| {
+                    (number(boxes.get(lane).unwrap_or(&boxes[0]), axis) / unit) as f32
+                }))
+            })
+        };
+        Self {
+            centers: rows(&|[center, _], axis| center[axis] - middle[axis]),
+            halves: rows(&|[_, half], axis| half[axis]),
+        }
+    }
+}
+
+/// Where the images of boxes begin and end on an axis, for that row of a map. In the same operations on every instruction set, so
+/// that trees are the same.
+#[inline(always)]
+fn images<W: Wide>(boxes: &[SixteenBoxes], row: [f32; 3]) -> [f32; 2] {
+    let [x, y, z] = [W::splat(row[0]), W::splat(row[1]), W::splat(row[2])];
+    // The highest places, and the highest of their negatives.
+    let (mut high, mut low) = (W::splat(f32::NEG_INFINITY), W::splat(f32::NEG_INFINITY));
+    for SixteenBoxes { centers, halves } in boxes {
+        let [cx, cy, cz] = [W::load(&centers[0].0), W::load(&centers[1].0), W::load(&centers[2].0)];
+        let [hx, hy, hz] = [W::load(&halves[0].0), W::load(&halves[1].0), W::load(&halves[2].0)];
+        let image = x * cx + y * cy + z * cz;
+        let reach = x.abs() * hx + y.abs() * hy + z.abs() * hz;
+        high = high.max(reach + image);
+        low = low.max(reach - image);
+    }
+    [-low.most(), high.most()]
+}
+
+/// A node's box, back from tree units.
+pub(crate) fn box_in_space(units: &Units, node: &Node, lane: usize) -> Aabb {
+    let plane = |side: usize| {
+        let planes = [0, 2, 4].map(|axis| f64::from(node.planes[axis + side][lane]));
+        DVec3::from_array(planes) / units.scale + units.origin
+    };
+    // Rounded once more than the planes were.
+    Aabb { min: plane(0), max: plane(1) }.outward(2)
+}
+
+/// A box around the image of a box (J. Arvo, "Transforming axis-aligned bounding boxes", Graphics Gems, 1990).
+fn placed_bounds(bounds: &Aabb, map: &Transform) -> Aabb {
+    if bounds.is_empty() {
+        return Aabb::EMPTY;
+    }
+    let placing = Placing::of(map);
+    let [center, half] = center_and_half(bounds);
+    let image = map.affine().transform_point3(center);
+    let reach = placing.sizes * half;
+    let rounding = placing.rounding(center.abs() + half);
+    Aabb { min: image - reach - rounding, max: image + reach + rounding }
+}
+
+/// The middle of a box, and half its size.
+fn center_and_half(bounds: &Aabb) -> [DVec3; 2] {
+    let center = bounds.center();
+    [center, (bounds.max - center).max(center - bounds.min)]
+}
+
+/// The sizes of the numbers of a map's linear part.
+#[inline(always)]
+fn sizes_of(map: &Transform) -> DMat3 {
+    let linear = map.linear();
+    DMat3::from_cols(linear.x_axis.abs(), linear.y_axis.abs(), linear.z_axis.abs())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::scenes::Random;
+
+    #[test]
+    fn what_is_placed_stays_within_its_box_which_is_hardly_larger() {
+        let mut random = Random(411);
+        for (size, offset) in [(1.0, 0.0), (1e-6, 3.0), (1e5, 0.0), (0.3, 1e6), (1e-30, 0.0), (1e30, 1.0)] {
+            let origin = size * offset * DVec3::new(1.0, -0.7, 0.4);
+            for _ in 0..300 {
+                let boxes: Vec<_> = (0..1 + random.below(40))
+                    .map(|_| {
+                        let corner = origin + size * random.vector();
+                        let other = corner + 0.2 * size * random.vector();
+                        Aabb { min: corner.min(other), max: corner.max(other) }
+                    })
+                    .collect();
+                let outline = Outline::of_boxes(&boxes);
+                let mut factors = DVec3::splat(10f64.powf(random.between(-3.0, 3.0)));
+                factors[random.below(3)] *= [1.0, -1.0, 1e-5][random.below(3)];
+                let map = Transform::translate([0.0, 10.0][random.below(2)] * size * random.vector())
+                    * Transform::rotate(random.vector(), random.between(-180.0, 180.0)).unwrap()
+                    * Transform::scale(factors).unwrap();
+                let mut exact = Aabb::EMPTY;
+                for bounds in &boxes {
+                    for corner in 0..8 {
+                        let axis = |i: usize| (if corner >> i & 1 == 1 { bounds.max } else { bounds.min })[i];
+                        let image = map.affine().transform_point3(DVec3::new(axis(0), axis(1), axis(2)));
+                        exact = exact.union(Aabb { min: image, max: image });
+                    }
+                }
+                let around = outline.part_at(&map.into()).expect("boxes");
+                // What rounds in `exact` is far less than what may round in the outline.
+                assert!(around.min.cmple(exact.min).all() && around.max.cmpge(exact.max).all());
+                let largest = factors.abs().max_element() * size;
+                let rounding = 1e-14 * (1.0 + offset + 10.0 / factors.abs().max_element()) * largest;
+                let slack = (exact.min - around.min).max(around.max - exact.max).max_element();
+                assert!(slack < 1e-5 * largest + rounding, "{slack} of {largest}");
+            }
+        }
+    }
+}

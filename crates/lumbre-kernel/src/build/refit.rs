@@ -1,0 +1,384 @@
+//! Moving what stands in a tree without building it again.
+
+use std::fmt;
+
+use lumbre_geometry::Aabb;
+use lumbre_math::DVec3;
+use rayon::prelude::*;
+
+use crate::tree::triangle_block::{BlockNames, Blocks};
+use crate::build::clouds::box_of;
+use crate::build::collapse::Entry;
+use crate::tree::summary::Holds;
+use crate::simd::Portable;
+use crate::tree::node::{Node, Units, tag};
+use crate::build::open_instances::{self, Families, Start};
+use crate::build::input::{Boxer, Parts, has_area, take_apart, units_of};
+use crate::build::primitive::Bounds;
+use crate::tree::sphere_block::{SphereBlock, has_radius};
+use crate::{Accel, BuildError, Geometry, GeometryKind, SphereCloud};
+
+/// Why a tree cannot be refitted. It is as it was before.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum RefitError {
+    /// The geometries themselves are not sound.
+    Unsound(BuildError),
+    /// The list is not of the same length.
+    OtherLength {
+        /// How many geometries the tree has.
+        expected: usize,
+        /// How many were given.
+        found: usize,
+    },
+    /// A geometry is of another kind, or has another number of primitives.
+    OtherTopology {
+        /// Position of the geometry in the list.
+        geometry: usize,
+    },
+    /// Something that was left out of the tree when it was built (a triangle without area, a sphere without a radius, an empty
+    /// or an infinite primitive) would now stand in it, or something in it became infinite: the tree is to be built again.
+    NeedsBuild {
+        /// Position of the geometry in the list.
+        geometry: usize,
+        /// The triangle, sphere or primitive.
+        element: usize,
+    },
+}
+
+impl fmt::Display for RefitError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unsound(error) => error.fmt(f),
+            Self::OtherLength { expected, found } => {
+                write!(f, "{found} geometries for a tree that was built of {expected}")
+            }
+            Self::OtherTopology { geometry } => {
+                write!(f, "geometry {geometry} is not of the kind and size that the tree was built of")
+            }
+            Self::NeedsBuild { geometry, element } => {
+                write!(f, "element {element} of geometry {geometry} has no place in the tree: build it again")
+            }
+        }
+    }
+}
+
+impl std::error::Error for RefitError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Self::Unsound(error) => Some(error),
+            _ => None,
+        }
+    }
+}
+
+/// See [`Accel::refit`].
+pub(crate) fn refit(accel: &mut Accel, geometries: Vec<Geometry>) -> Result<f64, RefitError> {
+    if geometries.len() != accel.geometries.len() {
+        return Err(RefitError::OtherLength { expected: accel.geometries.len(), found: geometries.len() });
+    }
+    for (geometry, (old, new)) in accel.geometries.iter().zip(&geometries).enumerate() {
+        if !is_same_topology(&old.kind, &new.kind) {
+            return Err(RefitError::OtherTopology { geometry });
+        }
+    }
+    let parts = take_apart(&geometries).map_err(RefitError::Unsound)?;
+    check_infinite(accel, &parts)?;
+    let built_cost = accel.built_cost.unwrap_or_else(|| cost(&accel.tree.nodes));
+    let old = std::mem::replace(&mut accel.geometries, geometries);
+    let places = check_places(accel, &parts).and_then(|places| {
+        let (level, geometries) = (accel.level, &accel.geometries);
+        accel.tree.move_triangles(level, geometries, &old, parts.has_flat).map_err(RefitError::Unsound)?;
+        Ok(places)
+    });
+    match places {
+        Ok(places) => fit(accel, parts, places),
+        Err(error) => {
+            accel.geometries = old;
+            return Err(error);
+        }
+    }
+    accel.built_cost = Some(built_cost);
+    let cost = cost(&accel.tree.nodes);
+    Ok(if built_cost > 0.0 { cost / built_cost } else { 1.0 })
+}
+
+/// What the entries of a tree are now.
+pub(crate) struct Places {
+    /// The box of each; `None` of what became empty.
+    pub(crate) boxes: Vec<Option<Aabb>>,
+    /// The entries of instances that were opened, and where these are entered.
+    pub(crate) starts: Vec<(usize, Start)>,
+}
+
+/// Everything that can be hit is to have a place in the tree. Answers what the entries there are.
+pub(crate) fn check_places(accel: &Accel, parts: &Parts) -> Result<Places, RefitError> {
+    check_triangles(accel, &accel.geometries)?;
+    check_spheres(accel, &accel.geometries)?;
+    entry_boxes(accel, parts)
+}
+
+/// Gives the nodes, spheres and entries of a tree what its geometries say, whose parts and places these are. Triangles are packed
+/// already.
+pub(crate) fn fit(accel: &mut Accel, parts: Parts, places: Places) {
+    let Places { boxes, starts } = places;
+    let geometries = &accel.geometries;
+    let units = units_of(geometries, &parts);
+    let boxer = |geometry: &Geometry| match &geometry.kind {
+        GeometryKind::Mesh(mesh) => Some(Boxer::new(mesh, &units)),
+        _ => None,
+    };
+    let boxers: Vec<Option<Boxer>> = geometries.iter().map(boxer).collect();
+    let tree = &mut accel.tree;
+    for (place, start) in starts {
+        let old = tree.entries[place];
+        if old.primitive() != start.word() {
+            tree.entries.to_mut()[place] = Entry::new(old.geometry, start.word(), old.is_last());
+        }
+    }
+    let cloud_boxes: Vec<Bounds> = tree
+        .sphere_blocks
+        .to_mut()
+        .par_iter_mut()
+        .zip(tree.sphere_names.par_iter())
+        .with_min_len(256)
+        .map(|(block, names)| match &geometries[names.geometry as usize].kind {
+            GeometryKind::Spheres(cloud) => fill_sphere_block(block, names, cloud, &units),
+            _ => Bounds::EMPTY,
+        })
+        .collect();
+    let entry_boxes: Vec<Bounds> = boxes
+        .iter()
+        .map(|boxed| boxed.map_or(Bounds::EMPTY, |bounds| Bounds::near(&units, &bounds, 0, 0)))
+        .collect();
+
+    // What is in leaves, then what is above: children stand behind their parents.
+    let mut node_boxes = vec![Bounds::EMPTY; tree.nodes.len()];
+    let (nodes, blocks) = (tree.nodes.to_mut(), Blocks::new(&tree.blocks));
+    let (names, entries) = (&*tree.names, &*tree.entries);
+    nodes.par_iter_mut().zip(&mut node_boxes).with_min_len(64).for_each(|(node, whole)| {
+        for lane in 0..node.len() {
+            let child = node.children[lane];
+            let first = (child & tag::PLACE) as usize;
+            let mut around = Bounds::EMPTY;
+            match child >> tag::SHIFT {
+                tag::INNER => continue,
+                tag::TRIANGLES => {
+                    for block in blocks.leaf(child) {
+                        let names = &names[block.number() as usize];
+                        if let Some(boxer) = &boxers[names.geometry as usize] {
+                            around.grow(&boxer.around_all::<Portable>(block.triangles()));
+                        }
+                    }
+                }
+                tag::SPHERES => {
+                    cloud_boxes[tag::blocks(child)].iter().for_each(|bounds| around.grow(bounds));
+                }
+                _ => {
+                    for (entry, bounds) in entries[first..].iter().zip(&entry_boxes[first..]) {
+                        around.grow(bounds);
+                        if entry.is_last() {
+                            break;
+                        }
+                    }
+                }
+            }
+            around.put(node, lane);
+            whole.grow(&around);
+        }
+    });
+    for place in (0..nodes.len()).rev() {
+        let node = &mut nodes[place];
+        for lane in 0..node.len() {
+            let child = node.children[lane];
+            if child >> tag::SHIFT == tag::INNER {
+                let around = node_boxes[(child & tag::PLACE) as usize];
+                around.put(node, lane);
+                node_boxes[place].grow(&around);
+            }
+        }
+    }
+
+    accel.holds = Holds::new(geometries, parts.sizes);
+    accel.primitives = parts.count();
+    accel.infinite = parts.infinite;
+    accel.units = units;
+    accel.bounds = parts.bounds;
+    accel.follow_tree();
+}
+
+fn is_same_topology(old: &GeometryKind, new: &GeometryKind) -> bool {
+    match (old, new) {
+        (GeometryKind::Mesh(old), GeometryKind::Mesh(new)) => old.indices.len() == new.indices.len(),
+        (GeometryKind::Spheres(old), GeometryKind::Spheres(new)) => old.spheres.len() == new.spheres.len(),
+        (GeometryKind::PreciseMesh(old), GeometryKind::PreciseMesh(new)) => {
+            old.indices.len() == new.indices.len()
+        }
+        (GeometryKind::Custom(old), GeometryKind::Custom(new)) => {
+            old.primitive_count() == new.primitive_count()
+        }
+        (GeometryKind::Shape(_), GeometryKind::Shape(_))
+        | (GeometryKind::Instance(_), GeometryKind::Instance(_)) => true,
+        _ => false,
+    }
+}
+
+/// What is infinite is to be the same as before.
+fn check_infinite(accel: &Accel, parts: &Parts) -> Result<(), RefitError> {
+    let name = |entry: &Entry| (entry.geometry, entry.primitive());
+    let (mut old, mut new) = (accel.infinite.iter().map(name), parts.infinite.iter().map(name));
+    loop {
+        match (old.next(), new.next()) {
+            (None, None) => return Ok(()),
+            (old, new) if old == new => {}
+            (old, new) => {
+                let (geometry, element) = old.min(new).or(old).or(new).unwrap_or_default();
+                return Err(RefitError::NeedsBuild {
+                    geometry: geometry as usize,
+                    element: element as usize,
+                });
+            }
+        }
+    }
+}
+
+/// Every triangle that has an area is to have a place in the tree.
+fn check_triangles(accel: &Accel, geometries: &[Geometry]) -> Result<(), RefitError> {
+    let mut named = vec![0; geometries.len()];
+    for names in &accel.tree.names {
+        let count = names.primitives.iter().filter(|&&primitive| primitive != u32::MAX).count();
+        named[names.geometry as usize] += count;
+    }
+    for (geometry, standing) in geometries.iter().enumerate() {
+        let GeometryKind::Mesh(mesh) = &standing.kind else { continue };
+        if named[geometry] == mesh.indices.len() {
+            continue;
+        }
+        let mut has_place = vec![false; mesh.indices.len()];
+        for names in accel.tree.names.iter().filter(|names| names.geometry as usize == geometry) {
+            for &primitive in names.primitives.iter().filter(|&&primitive| primitive != u32::MAX) {
+                has_place[primitive as usize] = true;
+            }
+        }
+        let missing = (0..mesh.indices.len()).find(|&triangle| {
+            let corners = mesh.indices[triangle].map(|vertex| mesh.positions[vertex as usize]);
+            !has_place[triangle] && has_area(&corners)
+        });
+        if let Some(element) = missing {
+            return Err(RefitError::NeedsBuild { geometry, element });
+        }
+    }
+    Ok(())
+}
+
+/// Every sphere that has a radius is to have a place in the tree.
+fn check_spheres(accel: &Accel, geometries: &[Geometry]) -> Result<(), RefitError> {
+    let is_cloud = |geometry: &Geometry| matches!(geometry.kind, GeometryKind::Spheres(_));
+    if !geometries.iter().any(is_cloud) {
+        return Ok(());
+    }
+    let mut has_place: Vec<Vec<bool>> = geometries
+        .iter()
+        .map(|geometry| match &geometry.kind {
+            GeometryKind::Spheres(cloud) => vec![false; cloud.spheres.len()],
+            _ => Vec::new(),
+        })
+        .collect();
+    for names in &accel.tree.sphere_names {
+        for &primitive in names.primitives.iter().filter(|&&primitive| primitive != u32::MAX) {
+            has_place[names.geometry as usize][primitive as usize] = true;
+        }
+    }
+    for (geometry, standing) in geometries.iter().enumerate() {
+        let GeometryKind::Spheres(cloud) = &standing.kind else { continue };
+        let mut places = cloud.spheres.iter().zip(&has_place[geometry]);
+        if let Some(element) = places.position(|(sphere, has_place)| !has_place && has_radius(sphere)) {
+            return Err(RefitError::NeedsBuild { geometry, element });
+        }
+    }
+    Ok(())
+}
+
+/// What the entries in the tree are now.
+fn entry_boxes(accel: &Accel, parts: &Parts) -> Result<Places, RefitError> {
+    let (entries, geometries) = (&*accel.tree.entries, &accel.geometries);
+    // In the order of their names, as they were taken apart.
+    let mut has_place = vec![false; parts.boxed.len()];
+    let mut boxes: Vec<Option<Aabb>> = entries
+        .iter()
+        .map(|entry| {
+            let primitive = if open_instances::is_part(entry, geometries) { 0 } else { entry.primitive() };
+            let name = (entry.geometry, primitive);
+            let found = parts.boxed.binary_search_by_key(&name, |boxed| (boxed.geometry, boxed.primitive));
+            found.ok().map(|place| {
+                has_place[place] = true;
+                parts.boxed[place].bounds
+            })
+        })
+        .collect();
+    if let Some(missing) = has_place.iter().position(|&has_place| !has_place) {
+        let boxed = &parts.boxed[missing];
+        return Err(RefitError::NeedsBuild {
+            geometry: boxed.geometry as usize,
+            element: boxed.primitive as usize,
+        });
+    }
+    let mut families = Families::default();
+    let mut starts = Vec::new();
+    for (geometry, places) in open_instances::opened(entries, geometries) {
+        let GeometryKind::Instance(instance) = &geometries[geometry as usize].kind else { continue };
+        let old: Vec<Start> = places.iter().map(|&place| Start::of(entries[place].primitive())).collect();
+        let now = open_instances::starts_of(&mut families, instance, boxes[places[0]], &old);
+        for (place, (start, bounds)) in places.into_iter().zip(now) {
+            boxes[place] = bounds;
+            starts.push((place, start));
+        }
+    }
+    Ok(Places { boxes, starts })
+}
+
+/// Takes the spheres over; one without a radius becomes one that is never hit.
+fn fill_sphere_block(
+    block: &mut SphereBlock,
+    names: &BlockNames,
+    cloud: &SphereCloud,
+    units: &Units,
+) -> Bounds {
+    let mut around = Bounds::EMPTY;
+    for (lane, &primitive) in names.primitives.iter().enumerate() {
+        if primitive == u32::MAX {
+            continue;
+        }
+        let sphere = cloud.spheres[primitive as usize];
+        if has_radius(&sphere) {
+            around.grow(&box_of(cloud, primitive, units));
+            block.put(lane, sphere);
+        } else {
+            block.put(lane, [f32::NAN; 4]);
+        }
+    }
+    around
+}
+
+/// How many boxes a ray meets, about: the areas of all, as parts of the area of the whole.
+pub(crate) fn cost(nodes: &[Node]) -> f64 {
+    let area = |node: &Node, lane: usize| {
+        let size =
+            |axis: usize| f64::from(node.planes[2 * axis + 1][lane] - node.planes[2 * axis][lane]).max(0.0);
+        size(0) * size(1) + size(1) * size(2) + size(2) * size(0)
+    };
+    let Some(root) = nodes.first() else { return 0.0 };
+    let whole = {
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for lane in 0..root.len() {
+            let corner =
+                |side: usize| DVec3::from_array([0, 2, 4].map(|axis| root.planes[axis + side][lane].into()));
+            (low, high) = (low.min(corner(0)), high.max(corner(1)));
+        }
+        let size = (high - low).max(DVec3::ZERO);
+        size.x * size.y + size.y * size.z + size.z * size.x
+    };
+    let lanes = |node: &Node| (0..node.len()).map(|lane| area(node, lane)).sum::<f64>();
+    let all: f64 = nodes.iter().map(lanes).sum();
+    if whole > 0.0 { all / whole } else { 0.0 }
+}

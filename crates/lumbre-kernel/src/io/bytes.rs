@@ -1,0 +1,415 @@
+//! A tree as bytes, and back.
+//!
+//! What is written down is how the tree is put together: which nodes are in which, and which primitives in which leaf, some
+//! six bytes a triangle. Boxes and packed corners are not; they are computed again from the geometries when the bytes are
+//! read, in a fraction of the time of a build. So bytes that come from elsewhere cannot make a tree that answers wrongly: they
+//! are refused, or they say how to arrange what is there. To map a tree into memory as it is, see `file`.
+//!
+//! All numbers are u32, the least byte first. The file: eight bytes of magic; the version; how many geometries, nodes, blocks,
+//! blocks of spheres, entries and masks there are; the reference to the root, or 2³² - 1; for each geometry its kind and how many
+//! primitives it has; for each node how many children it has, and references to them; for each block its geometry and eight
+//! triangles, 2³² - 1 for none; for each block of spheres the same; for each entry its geometry, and which primitive (of an
+//! instance that was opened, the node of its tree where that is entered: see `opening`), with the top bit set in the last of a
+//! leaf; the masks. Then a checksum of eight bytes of everything before it: FNV-1a of 64 bits (G. Fowler, L. Noll, K. Vo,
+//! D. Eastlake, "The FNV Non-Cryptographic Hash Algorithm").
+
+use std::collections::BTreeSet;
+use std::fmt;
+use std::ops::Range;
+
+use crate::accel::Accel;
+use crate::tree::triangle_block::BlockNames;
+use crate::build::collapse::{Entry, Packed};
+use crate::simd::Level;
+use crate::tree::node::{Node, WIDTH, tag};
+use crate::build::open_instances::is_part;
+use crate::build::input::{empty_over, take_apart};
+use crate::build::refit::{self, RefitError};
+use crate::tree::sphere_block::SphereBlock;
+use crate::{BuildError, Geometry, GeometryKind};
+
+const MAGIC: [u8; 8] = *b"LumbTree";
+/// Changes with the format, and with what the numbers mean.
+const VERSION: u32 = 7;
+const NONE: u32 = u32::MAX;
+
+/// Why bytes are no tree over these geometries.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum LoadError {
+    /// They do not begin as a saved tree does.
+    NotATree,
+    /// They are of another version of the format.
+    OtherVersion {
+        /// Theirs.
+        found: u32,
+        /// The one that this version of the crate reads.
+        expected: u32,
+    },
+    /// They end too soon, or go on behind the end.
+    WrongLength {
+        /// How many bytes there are.
+        found: usize,
+        /// How many were expected; at least so many where they end within the header.
+        expected: usize,
+    },
+    /// The checksum is another: some bytes were changed.
+    Damaged,
+    /// A reference or a name is out of its range, or used twice: no version of this crate wrote that.
+    Inconsistent {
+        /// What it is, and where.
+        what: String,
+    },
+    /// The geometries are of the right kinds and sizes, but not those that a mapped tree was saved with: vertices, shapes
+    /// or transforms moved.
+    Moved,
+    /// The tree was built of other geometries, or these changed too much.
+    OtherGeometries(RefitError),
+}
+
+impl fmt::Display for LoadError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotATree => write!(f, "these bytes are no saved tree"),
+            Self::OtherVersion { found, expected } => {
+                write!(f, "the tree was saved in version {found} of the format, and {expected} is read")
+            }
+            Self::WrongLength { found, expected } => {
+                write!(f, "the saved tree has {found} bytes instead of {expected}")
+            }
+            Self::Damaged => write!(f, "the saved tree is damaged: its checksum is wrong"),
+            Self::Inconsistent { what } => write!(f, "the saved tree is inconsistent: {what}"),
+            Self::Moved => write!(f, "the saved tree does not fit: the geometries moved since"),
+            Self::OtherGeometries(error) => write!(f, "the saved tree does not fit: {error}"),
+        }
+    }
+}
+
+impl std::error::Error for LoadError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Self::OtherGeometries(error) => Some(error),
+            _ => None,
+        }
+    }
+}
+
+fn checksum(bytes: &[u8]) -> u64 {
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
+    })
+}
+
+/// The kind of a geometry in a file, and how many primitives it has.
+pub(crate) fn signature(geometry: &Geometry) -> [u32; 2] {
+    match &geometry.kind {
+        GeometryKind::Mesh(mesh) => [tag::TRIANGLES, mesh.indices.len() as u32],
+        GeometryKind::Spheres(cloud) => [tag::SPHERES, cloud.spheres.len() as u32],
+        GeometryKind::PreciseMesh(mesh) => [tag::PRECISE, mesh.indices.len() as u32],
+        GeometryKind::Shape(_) => [tag::SHAPES, 1],
+        GeometryKind::Instance(_) => [tag::INSTANCE, 1],
+        GeometryKind::Custom(custom) => [tag::CUSTOM, custom.primitive_count()],
+    }
+}
+
+/// See [`Accel::to_bytes`].
+pub(crate) fn to_bytes(accel: &Accel) -> Vec<u8> {
+    let tree = &accel.tree;
+    let mut bytes = MAGIC.to_vec();
+    let mut put = |number: u32| bytes.extend_from_slice(&number.to_le_bytes());
+    put(VERSION);
+    put(accel.geometries.len() as u32);
+    put(tree.nodes.len() as u32);
+    put(tree.names.len() as u32);
+    put(tree.sphere_names.len() as u32);
+    put(tree.entries.len() as u32);
+    put(accel.masks.len() as u32);
+    // References to triangles number blocks: where these begin is found again.
+    let numbered = |reference: u32| {
+        if reference >> tag::SHIFT == tag::TRIANGLES {
+            let numbers = tree.numbers(reference);
+            tag::triangles(numbers.start as u32, numbers.len() as u32)
+        } else {
+            reference
+        }
+    };
+    put(tree.root.map_or(NONE, numbered));
+    accel.geometries.iter().flat_map(signature).for_each(&mut put);
+    for node in &tree.nodes {
+        put(node.len() as u32);
+        node.children[..node.len()].iter().map(|&child| numbered(child)).for_each(&mut put);
+    }
+    for names in tree.names.iter().chain(&tree.sphere_names) {
+        put(names.geometry);
+        names.primitives.iter().copied().for_each(&mut put);
+    }
+    for entry in &tree.entries {
+        entry.to_words().into_iter().for_each(&mut put);
+    }
+    accel.masks.iter().copied().for_each(&mut put);
+    let checksum = checksum(&bytes);
+    bytes.extend_from_slice(&checksum.to_le_bytes());
+    bytes
+}
+
+/// Takes numbers from the front.
+struct Words<'a> {
+    words: &'a [[u8; 4]],
+}
+
+impl Words<'_> {
+    /// A number; `None` behind the end.
+    fn next(&mut self) -> Option<u32> {
+        self.words.split_off_first().map(|word| u32::from_le_bytes(*word))
+    }
+
+    fn array<const N: usize>(&mut self) -> Option<[u32; N]> {
+        let mut words = [0; N];
+        for word in &mut words {
+            *word = self.next()?;
+        }
+        Some(words)
+    }
+}
+
+const HEADER: usize = MAGIC.len() + 8 * 4;
+const CHECKSUM: usize = 8;
+
+/// See [`Accel::from_bytes`].
+pub(crate) fn from_bytes(bytes: &[u8], geometries: Vec<Geometry>) -> Result<Accel, LoadError> {
+    let found = bytes.len();
+    let Some(rest) = bytes.strip_prefix(&MAGIC) else { return Err(LoadError::NotATree) };
+    if found < HEADER + CHECKSUM {
+        return Err(LoadError::WrongLength { found, expected: HEADER + CHECKSUM });
+    }
+    // The version first: of others, nothing else is known.
+    let (all, _) = rest.as_chunks::<4>();
+    let mut words = Words { words: all };
+    let version = words.next().unwrap_or_default();
+    if version != VERSION {
+        return Err(LoadError::OtherVersion { found: version, expected: VERSION });
+    }
+    let [geometry_count, node_count, block_count, sphere_block_count, entry_count, mask_count, root] =
+        words.array().unwrap_or_default();
+    let counted = |count: u32, least: u64| u64::from(count) * least;
+    // A node has a length and one child at least.
+    let least = (HEADER + CHECKSUM) as u64
+        + counted(geometry_count, 8)
+        + counted(node_count, 8)
+        + counted(block_count, 36)
+        + counted(sphere_block_count, 36)
+        + counted(entry_count, 8)
+        + counted(mask_count, 4);
+    if (found as u64) < least || !found.is_multiple_of(4) {
+        let expected = usize::try_from(least).unwrap_or(usize::MAX);
+        return Err(LoadError::WrongLength { found, expected });
+    }
+    let (content, sum) = bytes.split_at(found - CHECKSUM);
+    if checksum(content).to_le_bytes() != *sum {
+        return Err(LoadError::Damaged);
+    }
+    words.words = &words.words[..words.words.len() - CHECKSUM / 4];
+    let ends = || LoadError::WrongLength { found, expected: found + 4 };
+
+    if geometries.len() != geometry_count as usize {
+        let error = RefitError::OtherLength { expected: geometry_count as usize, found: geometries.len() };
+        return Err(LoadError::OtherGeometries(error));
+    }
+    for (geometry, standing) in geometries.iter().enumerate() {
+        if words.array().ok_or_else(ends)? != signature(standing) {
+            return Err(LoadError::OtherGeometries(RefitError::OtherTopology { geometry }));
+        }
+    }
+    let mut tree = Packed { root: (root != NONE).then_some(root), ..Packed::default() };
+    let mut nodes = Vec::with_capacity(node_count as usize);
+    for place in 0..node_count {
+        let len = words.next().ok_or_else(ends)?;
+        if len == 0 || len as usize > WIDTH {
+            return inconsistent(format!("node {place} has {len} children"));
+        }
+        let mut node = Node::EMPTY;
+        for child in &mut node.children[..len as usize] {
+            *child = words.next().ok_or_else(ends)?;
+        }
+        if node.len() != len as usize {
+            return inconsistent(format!("node {place} lacks a child"));
+        }
+        nodes.push(node);
+    }
+    tree.nodes = nodes.into();
+    let mut names = Vec::with_capacity(block_count as usize);
+    for _ in 0..block_count {
+        let geometry = words.next().ok_or_else(ends)?;
+        names.push(BlockNames { geometry, primitives: words.array().ok_or_else(ends)? });
+    }
+    tree.names = names.into();
+    let mut names = Vec::with_capacity(sphere_block_count as usize);
+    for _ in 0..sphere_block_count {
+        let geometry = words.next().ok_or_else(ends)?;
+        names.push(BlockNames { geometry, primitives: words.array().ok_or_else(ends)? });
+    }
+    tree.sphere_names = names.into();
+    let mut entries = Vec::with_capacity(entry_count as usize);
+    for _ in 0..entry_count {
+        entries.push(Entry::from_words(words.array().ok_or_else(ends)?));
+    }
+    tree.entries = entries.into();
+    if mask_count != 0 && mask_count != geometry_count {
+        return inconsistent(format!("{mask_count} masks for {geometry_count} geometries"));
+    }
+    let mut masks = Vec::with_capacity(mask_count as usize);
+    for _ in 0..mask_count {
+        masks.push(words.next().ok_or_else(ends)?);
+    }
+    if !words.words.is_empty() {
+        return Err(LoadError::WrongLength { found, expected: found - 4 * words.words.len() });
+    }
+    let unsound = |error: BuildError| LoadError::OtherGeometries(RefitError::Unsound(error));
+    let parts = take_apart(&geometries).map_err(unsound)?;
+    check_structure(&tree, &geometries, |leaf| Some(tag::blocks(leaf)))?;
+    check_names(&tree, &geometries)?;
+    tree.pack_triangles(Level::best(), &geometries, parts.has_flat).map_err(unsound)?;
+    tree.sphere_blocks = vec![SphereBlock::EMPTY; tree.sphere_names.len()].into();
+
+    let mut accel = empty_over(geometries);
+    accel.tree = tree;
+    accel.masks = masks;
+    let places = refit::check_places(&accel, &parts).map_err(LoadError::OtherGeometries)?;
+    refit::fit(&mut accel, parts, places);
+    Ok(accel)
+}
+
+fn inconsistent<T>(what: String) -> Result<T, LoadError> {
+    Err(LoadError::Inconsistent { what })
+}
+
+/// Every node but the first, every block and every entry is to be named by one reference, from a node before it. `numbers` tells
+/// those of the blocks of a leaf of triangles.
+pub(crate) fn check_structure(
+    tree: &Packed,
+    geometries: &[Geometry],
+    numbers: impl Fn(u32) -> Option<Range<usize>>,
+) -> Result<(), LoadError> {
+    let mut nodes = vec![false; tree.nodes.len()];
+    let mut blocks = vec![false; tree.names.len()];
+    let mut sphere_blocks = vec![false; tree.sphere_names.len()];
+    let mut entries = vec![false; tree.entries.len()];
+    let mut take = |reference: u32, parent: Option<usize>| -> Option<()> {
+        let once = |taken: &mut [bool], place: usize| {
+            let taken = taken.get_mut(place)?;
+            (!std::mem::replace(taken, true)).then_some(())
+        };
+        let place = (reference & tag::PLACE) as usize;
+        match reference >> tag::SHIFT {
+            tag::INNER => {
+                let is_behind = parent.map_or(place == 0, |parent| place > parent);
+                if is_behind { once(&mut nodes, place) } else { None }
+            }
+            tag::TRIANGLES => {
+                let numbers = numbers(reference)?;
+                are_of_one(tree.names.get(numbers.clone())?)?;
+                numbers.into_iter().try_for_each(|block| once(&mut blocks, block))
+            }
+            tag::SPHERES => {
+                are_of_one(tree.sphere_names.get(tag::blocks(reference))?)?;
+                tag::blocks(reference).try_for_each(|block| once(&mut sphere_blocks, block))
+            }
+            kind @ (tag::SHAPES | tag::INSTANCE | tag::CUSTOM | tag::PRECISE) => {
+                for (place, entry) in tree.entries.iter().enumerate().skip(place) {
+                    once(&mut entries, place)?;
+                    if signature(geometries.get(entry.geometry as usize)?)[0] != kind {
+                        return None;
+                    }
+                    if entry.is_last() {
+                        return Some(());
+                    }
+                    if kind == tag::INSTANCE {
+                        return None;
+                    }
+                }
+                None
+            }
+            _ => None,
+        }
+    };
+    if let Some(root) = tree.root
+        && take(root, None).is_none()
+    {
+        return inconsistent(format!("the root's reference {root:#010x} is out of range"));
+    }
+    for (place, node) in tree.nodes.iter().enumerate() {
+        for &child in &node.children[..node.len()] {
+            if take(child, Some(place)).is_none() {
+                return inconsistent(format!(
+                    "reference {child:#010x} of node {place} is out of range or used twice"
+                ));
+            }
+        }
+    }
+    let unused =
+        [("node", &nodes), ("block", &blocks), ("block of spheres", &sphere_blocks), ("entry", &entries)]
+            .into_iter()
+            .find_map(|(what, taken)| Some((what, taken.iter().position(|taken| !taken)?)));
+    match unused {
+        Some((what, place)) => inconsistent(format!("{what} {place} is named nowhere")),
+        None => Ok(()),
+    }
+}
+
+/// The blocks of a leaf are to be of one geometry: it has one origin.
+fn are_of_one(names: &[BlockNames]) -> Option<()> {
+    names.iter().all(|block| block.geometry == names[0].geometry).then_some(())
+}
+
+/// Every name is to be of a primitive, which is named once but for instances that were opened.
+pub(crate) fn check_names(tree: &Packed, geometries: &[Geometry]) -> Result<(), LoadError> {
+    // Where the primitives of each geometry begin, in one list.
+    let mut starts = Vec::with_capacity(geometries.len());
+    let mut all = 0;
+    for geometry in geometries {
+        starts.push(all);
+        all += signature(geometry)[1] as usize;
+    }
+    let mut named = vec![false; all];
+    let is_packed = |kind: u32| matches!(kind, tag::TRIANGLES | tag::SPHERES);
+    let mut name = |kind: Option<u32>, geometry: u32, primitive: u32| {
+        let [found, count] = signature(geometries.get(geometry as usize)?);
+        let is_right = kind.map_or(!is_packed(found), |kind| kind == found) && primitive < count;
+        if !is_right {
+            return None;
+        }
+        let place = starts[geometry as usize] + primitive as usize;
+        (!std::mem::replace(&mut named[place], true)).then_some(())
+    };
+    let of_triangles = (&tree.names, tag::TRIANGLES, ["block", "triangle", "mesh"]);
+    let of_spheres = (&tree.sphere_names, tag::SPHERES, ["block of spheres", "sphere", "cloud"]);
+    for (list, kind, [what, one, all]) in [of_triangles, of_spheres] {
+        for (block, names) in list.iter().enumerate() {
+            let geometry = names.geometry;
+            // Without anything in it, a block would be of no geometry of its kind.
+            let is_right = geometries.get(geometry as usize).is_some_and(|g| signature(g)[0] == kind);
+            for primitive in names.primitives.into_iter().filter(|&primitive| primitive != NONE) {
+                if name(Some(kind), geometry, primitive).is_none() {
+                    return inconsistent(format!(
+                        "{what} {block} names {one} {primitive} of geometry {geometry}, which is not there or was named"
+                    ));
+                }
+            }
+            if !is_right {
+                return inconsistent(format!("{what} {block} is of geometry {geometry}, which is no {all}"));
+            }
+        }
+    }
+    let mut opened = BTreeSet::new();
+    for (place, entry) in tree.entries.iter().enumerate() {
+        // Whether the parts of an instance are all of it is seen later, where their boxes are made.
+        let is_part = is_part(entry, geometries);
+        if is_part && !opened.insert(entry.geometry) {
+            continue;
+        }
+        if name(None, entry.geometry, if is_part { 0 } else { entry.primitive() }).is_none() {
+            return inconsistent(format!("entry {place} names a primitive that is not there or was named"));
+        }
+    }
+    Ok(())
+}

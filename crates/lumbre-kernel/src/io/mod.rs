@@ -1,0 +1,4 @@
+//! Trees as bytes, and in mapped files.
+
+pub(crate) mod bytes;
+pub(crate) mod mapped;

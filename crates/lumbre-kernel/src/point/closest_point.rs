@@ -1,0 +1,396 @@
+//! The point of all surfaces that is nearest to a given one.
+//!
+//! Branch and bound, the nearest box first, in all trees at once: an instance that is entered adds a frame, with its map to
+//! the outermost space, in which all distances are. A tree's boxes are in single precision and hold their primitives up to a
+//! `slop` (see `node`), which is taken off every distance.
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+use std::fmt;
+
+use lumbre_geometry::{Aabb, NearestPoint, NoNearestPoint, nearest_on_triangle, similarity_factor};
+use lumbre_math::{DVec2, DVec3, Transform};
+
+use crate::tree::node::{Node, tag};
+use crate::build::open_instances::Start;
+use crate::build::input::has_area;
+use crate::tree::sphere_block::{ExactSphere, has_radius};
+use crate::trace::Context;
+use crate::{Accel, GeometryKind, Instance, InstancePath, TriangleMesh, precise_mesh};
+
+/// The point of all surfaces that is nearest to a given one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ClosestPoint {
+    /// How far away it is, never negative.
+    pub distance: f64,
+    /// Where it is, in the space of the tree that was asked.
+    pub point: DVec3,
+    /// The part of a shape: see [`lumbre_geometry::Root::part`].
+    pub part: u32,
+    /// The barycentrics (b1, b2) on a triangle, surface parameters on a shape.
+    pub uv: DVec2,
+    /// The id of the geometry.
+    pub id: u32,
+    /// The triangle of a mesh, the sphere of a cloud, the primitive of a custom geometry, else 0.
+    pub primitive: u32,
+    /// The position of the geometry in the list that its tree was built from.
+    pub geometry: u32,
+    /// The ids of the instances around it.
+    pub instances: InstancePath,
+    /// The positions of those instances in the lists that their trees were built from.
+    pub(crate) route: InstancePath,
+}
+
+/// Why there is no answer: something that may be nearer than all that has one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NoClosestPoint {
+    /// What its geometry says.
+    pub why: NoNearestPoint,
+    /// The id of the geometry.
+    pub id: u32,
+    /// The position of the geometry in the list that its tree was built from.
+    pub geometry: u32,
+    /// The ids of the instances around it.
+    pub instances: InstancePath,
+}
+
+impl fmt::Display for NoClosestPoint {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "no nearest point: geometry {} (id {})", self.geometry, self.id)?;
+        if !self.instances.is_empty() {
+            write!(f, " in the instances {:?}", self.instances.as_slice())?;
+        }
+        write!(f, " may be the nearest, and {}", self.why)
+    }
+}
+
+impl std::error::Error for NoClosestPoint {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        Some(&self.why)
+    }
+}
+
+/// See [`Accel::closest_point`].
+pub(crate) fn closest_point(
+    accel: &Accel,
+    point: DVec3,
+    max_distance: f64,
+    time: f64,
+) -> Result<Option<ClosestPoint>, NoClosestPoint> {
+    let mut search = Search::new(point, max_distance);
+    if !point.is_finite() || max_distance.is_nan() || max_distance < 0.0 {
+        return Ok(None);
+    }
+    let mut frames = vec![Frame::outermost(accel, point, time)];
+    let mut pending = BinaryHeap::new();
+    enter(&frames, Start::WHOLE, 0.0, &mut pending);
+    while let Some(next) = pending.pop() {
+        if next.distance > search.limit {
+            break;
+        }
+        let frame = &frames[next.frame as usize];
+        match next.what {
+            Waiting::Reference(reference) if reference >> tag::SHIFT == tag::INNER => {
+                let node = &frame.accel.tree.nodes[reference as usize];
+                for lane in 0..node.len() {
+                    let distance = frame.distance_to_box(node, lane).max(next.distance);
+                    if distance <= search.limit {
+                        let what = Waiting::Reference(node.children[lane]);
+                        pending.push(Pending { distance, frame: next.frame, what });
+                    }
+                }
+            }
+            Waiting::Reference(reference) if reference >> tag::SHIFT == tag::TRIANGLES => {
+                for names in &frame.accel.tree.names[frame.accel.tree.numbers(reference)] {
+                    if let GeometryKind::Mesh(mesh) = &frame.accel.geometries[names.geometry as usize].kind {
+                        for &primitive in names.primitives.iter().filter(|&&primitive| primitive != u32::MAX)
+                        {
+                            search.meet_triangle(frame, mesh, names.geometry, primitive);
+                        }
+                    }
+                }
+            }
+            Waiting::Reference(reference) if reference >> tag::SHIFT == tag::SPHERES => {
+                for names in &frame.accel.tree.sphere_names[tag::blocks(reference)] {
+                    for &primitive in names.primitives.iter().filter(|&&primitive| primitive != u32::MAX) {
+                        search.meet(frame, names.geometry, primitive, next.distance);
+                    }
+                }
+            }
+            Waiting::Reference(reference) => {
+                let first = (reference & tag::PLACE) as usize;
+                for entry in &frame.accel.tree.entries[first..] {
+                    let what = Waiting::Primitive(entry.geometry, entry.primitive());
+                    pending.push(Pending { distance: next.distance, frame: next.frame, what });
+                    if entry.is_last() {
+                        break;
+                    }
+                }
+            }
+            Waiting::Primitive(geometry, primitive) => {
+                if let GeometryKind::Instance(instance) = &frame.accel.geometries[geometry as usize].kind {
+                    let start = Start::of(primitive);
+                    if start.is_nothing() {
+                        continue;
+                    }
+                    let inner = frame.within(geometry, instance);
+                    frames.push(inner);
+                    enter(&frames, start, next.distance, &mut pending);
+                } else {
+                    search.meet(frame, geometry, primitive, next.distance);
+                }
+            }
+        }
+    }
+    search.into_answer()
+}
+
+/// Puts the tree of the last frame onto the list, or a part of it.
+fn enter(frames: &[Frame], start: Start, distance: f64, pending: &mut BinaryHeap<Pending>) {
+    let position = frames.len() - 1;
+    let frame = position as u32;
+    let accel = frames[position].accel;
+    let root = accel.tree.root.map(|root| Waiting::Reference(start.below(root)));
+    let infinite = accel.infinite.iter().map(|entry| Waiting::Primitive(entry.geometry, entry.primitive()));
+    pending.extend(root.into_iter().chain(infinite).map(|what| Pending { distance, frame, what }));
+}
+
+/// Something to be looked at, and how far away it is at least.
+struct Pending {
+    distance: f64,
+    frame: u32,
+    what: Waiting,
+}
+
+#[derive(Clone, Copy)]
+enum Waiting {
+    /// A node or a leaf.
+    Reference(u32),
+    /// Geometry and primitive of what is no triangle of a mesh; of an instance, where it is entered.
+    Primitive(u32, u32),
+}
+
+// The nearest is the greatest.
+impl Ord for Pending {
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.distance.total_cmp(&self.distance)
+    }
+}
+
+impl PartialOrd for Pending {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Pending {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Pending {}
+
+/// A tree, and where it stands.
+pub(crate) struct Frame<'a> {
+    pub(crate) accel: &'a Accel,
+    /// From the tree's space to the outermost.
+    pub(crate) map: Transform,
+    is_identity: bool,
+    /// By how much distances may shrink on that way, at most.
+    shrink: f64,
+    /// The point that is asked about, in the tree's space.
+    pub(crate) local: DVec3,
+    /// When what moves is looked at.
+    time: f64,
+    pub(crate) context: Context,
+    /// The same in tree units, and what distances to boxes there may be wrong by.
+    in_units: DVec3,
+    slop: f64,
+}
+
+impl<'a> Frame<'a> {
+    pub(crate) fn outermost(accel: &'a Accel, point: DVec3, time: f64) -> Self {
+        Self::new(accel, Transform::IDENTITY, point, time, Context::default())
+    }
+
+    /// A tree placed in this one.
+    pub(crate) fn within(&self, geometry: u32, instance: &'a Instance) -> Self {
+        let mut context = self.context.clone();
+        context.route.push(geometry);
+        context.ids.push(self.accel.geometries[geometry as usize].id);
+        let world_from_object = instance.world_from_object.at(self.time);
+        let local = world_from_object.inverse_point(self.local);
+        Self::new(&instance.accel, self.map * world_from_object, local, self.time, context)
+    }
+
+    fn new(accel: &'a Accel, map: Transform, local: DVec3, time: f64, context: Context) -> Self {
+        let units = &accel.units;
+        let in_units = (local - units.origin) * units.scale;
+        // The largest singular value of the inverse is no more than the root of the sum of squares.
+        let stretch = similarity_factor(&map).map_or_else(
+            || map.inverse_affine().matrix3.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt(),
+            |factor| 1.0 / factor,
+        );
+        let shrink = (1.0 - 1e-9) / stretch;
+        let slop = 4.0 * units.slop_of(local);
+        Self { accel, map, is_identity: map.is_identity(), shrink, local, time, context, in_units, slop }
+    }
+
+    /// How far a child of a node is away at least, in the outermost space.
+    fn distance_to_box(&self, node: &Node, lane: usize) -> f64 {
+        let gap = |axis: usize| {
+            let low = f64::from(node.planes[2 * axis][lane]) - self.in_units[axis];
+            let high = self.in_units[axis] - f64::from(node.planes[2 * axis + 1][lane]);
+            low.max(high).max(0.0)
+        };
+        let distance = DVec3::new(gap(0), gap(1), gap(2)).length() * (1.0 - 1e-12) - self.slop;
+        let distance = distance / self.accel.units.scale * self.shrink;
+        // Also where it is no number.
+        if distance > 0.0 { distance } else { 0.0 }
+    }
+}
+
+/// What was found so far.
+pub(crate) struct Search {
+    point: DVec3,
+    /// Nothing farther away is wanted.
+    limit: f64,
+    best: Option<ClosestPoint>,
+    /// What has no answer, and how far away it is at least.
+    refused: Vec<(f64, NoClosestPoint)>,
+}
+
+impl Search {
+    pub(crate) fn new(point: DVec3, max_distance: f64) -> Self {
+        Self { point, limit: max_distance, best: None, refused: Vec::new() }
+    }
+
+    /// The nearest point, unless something without an answer may be nearer.
+    pub(crate) fn into_answer(self) -> Result<Option<ClosestPoint>, NoClosestPoint> {
+        let limit = self.limit;
+        let nearest = self.refused.into_iter().filter(|(distance, _)| *distance <= limit);
+        let rank = |(distance, no): &(f64, NoClosestPoint)| (*distance, no.instances.clone(), no.geometry);
+        let compare = |a: &(f64, NoClosestPoint), b: &(f64, NoClosestPoint)| {
+            rank(a).partial_cmp(&rank(b)).unwrap_or(Ordering::Equal)
+        };
+        match nearest.min_by(compare) {
+            Some((_, no)) => Err(no),
+            None => Ok(self.best),
+        }
+    }
+
+    /// The nearest point of those that have an answer, and whether nothing without one may be nearer.
+    #[cfg(test)]
+    pub(crate) fn into_parts(self) -> (Option<ClosestPoint>, bool) {
+        let is_sure = self.refused.iter().all(|(distance, _)| *distance > self.limit);
+        (self.best, is_sure)
+    }
+
+    /// Takes what is nearer than the best, or as near and before it in the lists.
+    fn offer(&mut self, frame: &Frame, geometry: u32, primitive: u32, found: &NearestPoint) {
+        let is_within = found.distance <= self.limit;
+        let comes_first = self.best.as_ref().is_none_or(|best| {
+            let order = frame.context.route.as_slice().cmp(best.route.as_slice());
+            found.distance < best.distance
+                || order.then((geometry, primitive).cmp(&(best.geometry, best.primitive))) == Ordering::Less
+        });
+        if !is_within || !comes_first {
+            return;
+        }
+        self.limit = found.distance;
+        self.best = Some(ClosestPoint {
+            distance: found.distance,
+            point: found.point,
+            part: found.part,
+            uv: found.uv,
+            id: frame.accel.geometries[geometry as usize].id,
+            primitive,
+            geometry,
+            instances: frame.context.ids.clone(),
+            route: frame.context.route.clone(),
+        });
+    }
+
+    /// A triangle of a mesh, moved to the outermost space; those without area do not count.
+    pub(crate) fn meet_triangle(
+        &mut self,
+        frame: &Frame,
+        mesh: &TriangleMesh,
+        geometry: u32,
+        primitive: u32,
+    ) {
+        let corners = mesh.indices[primitive as usize].map(|vertex| mesh.positions[vertex as usize]);
+        if !has_area(&corners) {
+            return;
+        }
+        let from_point = mesh.origin - frame.local;
+        self.meet_corners(frame, corners.map(|p| from_point + p.as_dvec3()), geometry, primitive);
+    }
+
+    /// A triangle whose corners are given relative to the point, in the tree's space.
+    fn meet_corners(&mut self, frame: &Frame, corners: [DVec3; 3], geometry: u32, primitive: u32) {
+        let [a, b, c] =
+            if frame.is_identity { corners } else { corners.map(|corner| frame.map.vector(corner)) };
+        let (uv, offset) = nearest_on_triangle(a, b, c);
+        let distance = offset.length();
+        if distance <= self.limit {
+            let found = NearestPoint { point: self.point + offset, distance, part: 0, uv };
+            self.offer(frame, geometry, primitive, &found);
+        }
+    }
+
+    /// A shape, a sphere of a cloud, or a primitive of custom geometry, that is at least `distance` away.
+    pub(crate) fn meet(&mut self, frame: &Frame, geometry: u32, primitive: u32, distance: f64) {
+        let standing = &frame.accel.geometries[geometry as usize];
+        let found = match &standing.kind {
+            GeometryKind::Shape(shape) => shape.closest_point_under(&frame.map, self.point),
+            GeometryKind::Spheres(cloud) => {
+                let sphere = ExactSphere::of(cloud, primitive);
+                if !has_radius(&cloud.spheres[primitive as usize]) {
+                    return;
+                }
+                sphere.to_shape().closest_point(&frame.map, self.point)
+            }
+            GeometryKind::Custom(custom) => match similarity_factor(&frame.map) {
+                Some(factor) => custom.closest_point(primitive, frame.local).map(|found| NearestPoint {
+                    point: frame.map.point(found.point),
+                    distance: factor * found.distance,
+                    ..found
+                }),
+                None => Err(NoNearestPoint::Map),
+            },
+            GeometryKind::PreciseMesh(mesh) => {
+                let corners = mesh.corners(primitive);
+                if precise_mesh::has_area(&corners) {
+                    self.meet_corners(frame, corners.map(|p| p - frame.local), geometry, primitive);
+                }
+                return;
+            }
+            GeometryKind::Mesh(_) | GeometryKind::Instance(_) => return,
+        };
+        match found {
+            Ok(found) => self.offer(frame, geometry, primitive, &found),
+            Err(why) => {
+                let bounds = match &standing.kind {
+                    GeometryKind::Shape(shape) => {
+                        shape.shape().bounds(&(frame.map * shape.world_from_object()))
+                    }
+                    _ => None,
+                };
+                let distance =
+                    bounds.map_or(distance, |bounds| distance.max(distance_to(&bounds, self.point)));
+                let instances = frame.context.ids.clone();
+                let no = NoClosestPoint { why, id: standing.id, geometry, instances };
+                if distance <= self.limit {
+                    self.refused.push((distance, no));
+                }
+            }
+        }
+    }
+}
+
+/// How far a box is away at least.
+fn distance_to(bounds: &Aabb, p: DVec3) -> f64 {
+    (bounds.min - p).max(p - bounds.max).max(DVec3::ZERO).length() * (1.0 - 1e-12)
+}

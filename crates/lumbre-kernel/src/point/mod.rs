@@ -1,0 +1,5 @@
+//! Queries of points: the closest point, inside or not, and winding numbers.
+
+pub(crate) mod closest_point;
+pub(crate) mod inside;
+pub(crate) mod winding;

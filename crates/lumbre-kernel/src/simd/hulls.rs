@@ -1,0 +1,277 @@
+//! A ray against eight bounding volumes of shapes.
+
+use super::{Eight, Lanes, Row, Vector, WIDE, Wide};
+use crate::tree::bounding_block::{
+    HullBlock, HullRay, LEAST_COMPONENT, LEAST_TOLERANCE, LEAST_TUBE_ERROR, TOLERANCE_PER_MARGIN,
+    TUBE_ERROR_PER_MARGIN,
+};
+use crate::trace::watertight::{BLOCK, HeightRange};
+
+/// What came of eight hulls.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MetHulls {
+    /// A bit for each that the ray may meet within the range: among them all whose shapes it does.
+    pub(crate) mask: u32,
+    /// A bit for each whose shape it certainly does meet, where that was asked.
+    pub(crate) sure: u32,
+    /// No shape among them is met at a lesser height.
+    pub(crate) near: [f32; BLOCK],
+}
+
+impl MetHulls {
+    pub(crate) const NONE: Self = Self { mask: 0, sure: 0, near: [0.0; BLOCK] };
+}
+
+/// What lines have between the planes of cubes.
+struct Passages<V> {
+    /// Where they start in the cubes, and whither they go.
+    p: [V; 3],
+    d: [V; 3],
+    margin: V,
+    enters: V,
+    leaves: V,
+    /// The same within their ranges.
+    from: V,
+    to: V,
+    /// A bit for each that is not there.
+    missed: u32,
+}
+
+/// Lines between the planes of cubes.
+#[inline(always)]
+fn pass<V: Eight>(block: &HullBlock, ray: &HullRay, range: &HeightRange) -> Passages<V> {
+    let (zero, one) = (V::splat(0.0), V::splat(1.0));
+    let (load, splat) = (V::load, V::splat);
+    let w = [
+        (splat(ray.origin[0]) - load(&block.centers[0])) + splat(ray.rest[0]),
+        (splat(ray.origin[1]) - load(&block.centers[1])) + splat(ray.rest[1]),
+        (splat(ray.origin[2]) - load(&block.centers[2])) + splat(ray.rest[2]),
+    ];
+    let [ex, ey, ez] = ray.direction;
+    let distance = w[0].abs().max(w[1].abs().max(w[2].abs()));
+    let (per_distance, least_margin) = (load(&block.margins), load(&block.least_margins));
+    let margin = per_distance.times_plus(distance, least_margin);
+    let least = per_distance * V::splat(LEAST_COMPONENT);
+    let half = [one + margin, load(&block.heights) + margin, one + margin];
+    let (mut p, mut d) = ([zero; 3], [zero; 3]);
+    let (mut near, mut far) = ([zero; 3], [zero; 3]);
+    for axis in 0..3 {
+        let [x, y, z] = &block.rows[axis];
+        let (x, y, z) = (load(x), load(y), load(z));
+        p[axis] = x.times_plus(w[0], y.times_plus(w[1], z * w[2]));
+        d[axis] = x.times_plus(splat(ex), y.times_plus(splat(ey), z * splat(ez)));
+        let inverse = one.over(least.max(d[axis].abs()));
+        let at = p[axis].turned_by(d[axis]);
+        near[axis] = (zero - (at + half[axis])) * inverse;
+        far[axis] = (half[axis] - at) * inverse;
+    }
+    let enters = near[0].max(near[1]).max(near[2]);
+    let leaves = far[0].min(far[1]).min(far[2]);
+    let (from, to) = (enters.max(splat(range.first)), leaves.min(splat(range.last)));
+    // Every comparison with a NaN is false, so that what is none is met.
+    Passages { p, d, margin, enters, leaves, from, to, missed: to.below(from) }
+}
+
+/// What lines have in hulls: `p + k d` for k from -1 to 1, at the heights `middle + k reach`.
+struct Chords<V> {
+    p: [V; 3],
+    d: [V; 3],
+    middle: V,
+    reach: V,
+    margin: V,
+    from: V,
+    /// A bit for each that may be met, as far as is seen without a look at tubes: among them all that are.
+    mask: u32,
+    /// A bit for each that certainly is met, tubes left aside, where that was asked.
+    sure: u32,
+    /// A bit for each whose line certainly is outside somewhere, alike.
+    outside: u32,
+}
+
+/// Lines in hulls, between the planes of whose cubes they pass; with `SURE`, also what is certain: see [`HullRay`].
+#[inline(always)]
+fn look_into<V: Eight, const SURE: bool>(
+    block: &HullBlock,
+    range: &HeightRange,
+    passages: &Passages<V>,
+) -> Chords<V> {
+    let &Passages { p, d, margin, enters, leaves, from, to, missed } = passages;
+    let (zero, half, one) = (V::splat(0.0), V::splat(0.5), V::splat(1.0));
+    let (middle, reach) = (half * (from + to), half * (to - from));
+    let [px, py, pz] =
+        [middle.times_plus(d[0], p[0]), middle.times_plus(d[1], p[1]), middle.times_plus(d[2], p[2])];
+    let [dx, dy, dz] = [reach * d[0], reach * d[1], reach * d[2]];
+    let [c, linear, e] = &block.profiles;
+    let (c, linear, e) = (V::load(c), V::load(linear), V::load(e));
+    let tolerance =
+        (V::splat(TOLERANCE_PER_MARGIN) * margin).times_plus(one + margin, V::splat(LEAST_TOLERANCE));
+    let a = dx.times_plus(dx, dy.times_plus(dy, c * dz * dz));
+    let slope = c.times_plus(pz, half * linear);
+    let b = px.times_plus(dx, py.times_plus(dy, slope * dz));
+    let k = px.times_plus(px, py.times_plus(py, c.times_plus(pz, linear).times_plus(pz, e)));
+    let twice = b + b;
+    let (first, last) = (k + (a - twice), k + (a + twice));
+    let is_beside_between = a.at_most(b.abs()) | (b * b).below((k - tolerance) * a);
+    let is_beside = tolerance.below(first) & tolerance.below(last) & is_beside_between;
+    let mask = !(missed | is_beside) & V::ALL;
+    let mut chords =
+        Chords { p: [px, py, pz], d: [dx, dy, dz], middle, reach, margin, from, mask, sure: 0, outside: 0 };
+    if SURE {
+        let (start, end) = (V::splat(range.surely_first), V::splat(range.surely_last));
+        let comes = start.below(enters) | tolerance.below(first);
+        let goes = leaves.below(end) | tolerance.below(last);
+        chords.outside = comes | goes;
+        let deep = one - margin;
+        // Some place between the ends, near to where the parabola is least.
+        let least_at = ((zero - b).over(a)).max(zero - one).min(one);
+        let least = least_at.times_plus(least_at.times_plus(a, twice), k);
+        let x = least_at.times_plus(dx, px).abs();
+        let y = least_at.times_plus(dy, py).abs();
+        let z = least_at.times_plus(dz, pz).abs();
+        let height = least_at.times_plus(reach, middle);
+        let is_inside = x.max(y).max(z).at_most(deep)
+            & start.at_most(height)
+            & height.at_most(end)
+            & least.below(zero - tolerance)
+            & V::load(&block.tubes).below(zero);
+        chords.sure = is_inside & chords.outside & mask;
+    }
+    chords
+}
+
+/// What is seen of a tube from sixteen places on a chord.
+struct SeenTube {
+    /// Whether none of it is met in between, either.
+    misses: bool,
+    /// Whether a place that is surely in range is surely inside.
+    is_inside: bool,
+    /// The same for outside.
+    is_outside: bool,
+}
+
+/// k of places on a chord: the middles of pieces of equal lengths.
+static MIDDLES: Row<f32> = {
+    let mut middles = [0.0; WIDE];
+    let mut i = 0;
+    while i < WIDE {
+        middles[i] = (2 * i + 1) as f32 / WIDE as f32 - 1.0;
+        i += 1;
+    }
+    Row(middles)
+};
+
+/// One of [`Chords`].
+struct Chord {
+    p: [f32; 3],
+    d: [f32; 3],
+    middle: f32,
+    reach: f32,
+    margin: f32,
+}
+
+impl Chord {
+    /// Looks at a tube of this radius; `start` and `end` are between which the line surely is in its range.
+    #[inline(always)]
+    fn meet_tube<W: Wide>(&self, tube: f32, [start, end]: [f32; 2]) -> SeenTube {
+        let Self { p: [px, py, pz], d: [dx, dy, dz], .. } = *self;
+        let error = TUBE_ERROR_PER_MARGIN * self.margin + LEAST_TUBE_ERROR;
+        // In the space of x, y and r z.
+        let (pz, dz) = (tube * pz, tube * dz);
+        let half_piece = (dx * dx + dy * dy + dz * dz).sqrt() * ((1.0 + 1e-6) / WIDE as f32);
+        let splat = W::splat;
+        let k = W::load(&MIDDLES.0);
+        let x = k.times_plus(splat(dx), splat(px));
+        let y = k.times_plus(splat(dy), splat(py));
+        let z = k.times_plus(splat(dz), splat(pz));
+        let from_circle = x.times_plus(x, y * y).sqrt() - splat(1.0 - tube);
+        let out = from_circle.times_plus(from_circle, z * z).sqrt() - splat(tube);
+        let height = k.times_plus(splat(self.reach), splat(self.middle));
+        let in_range = splat(start).at_most(height) & height.at_most(splat(end));
+        SeenTube {
+            misses: splat(half_piece + error).below(out) == W::ALL,
+            is_inside: out.below(splat(-error)) & in_range != 0,
+            is_outside: splat(error).below(out) & in_range != 0,
+        }
+    }
+}
+
+impl<V: Eight> Chords<V> {
+    /// Looks closer at those that pass tubes: a bit for each that may be met, among them all that are, and for each that certainly is.
+    #[inline(always)]
+    fn meet_tubes<W: Wide, const SURE: bool>(
+        &self,
+        block: &HullBlock,
+        range: &HeightRange,
+    ) -> (u32, u32) {
+        let (mut mask, mut sure) = (self.mask, self.sure);
+        let tubes = &block.tubes;
+        let mut rings = V::splat(0.0).below(V::load(tubes)) & mask;
+        if rings == 0 {
+            return (mask, sure);
+        }
+        let [px, py, pz] = [self.p[0].to_array(), self.p[1].to_array(), self.p[2].to_array()];
+        let [dx, dy, dz] = [self.d[0].to_array(), self.d[1].to_array(), self.d[2].to_array()];
+        let (middle, reach) = (self.middle.to_array(), self.reach.to_array());
+        let margin = self.margin.to_array();
+        let sure_range = [range.surely_first, range.surely_last];
+        while rings != 0 {
+            let i = rings.trailing_zeros() as usize % BLOCK;
+            rings &= rings - 1;
+            let chord = Chord {
+                p: [px[i], py[i], pz[i]],
+                d: [dx[i], dy[i], dz[i]],
+                middle: middle[i],
+                reach: reach[i],
+                margin: margin[i],
+            };
+            let seen = chord.meet_tube::<W>(tubes[i], sure_range);
+            mask &= !(u32::from(seen.misses) << i);
+            let is_outside = seen.is_outside || self.outside >> i & 1 == 1;
+            if SURE && seen.is_inside && is_outside {
+                sure |= 1 << i;
+            }
+        }
+        (mask, sure)
+    }
+}
+
+/// Tries a ray against the hulls of a block; with `SURE`, also what is certain: see [`HullRay`].
+#[inline(always)]
+pub(crate) fn meet_hulls<L: Lanes, const SURE: bool>(
+    block: &HullBlock,
+    ray: &HullRay,
+    range: &HeightRange,
+) -> MetHulls {
+    let passages = pass::<L::Eight>(block, ray, range);
+    if passages.missed == <L::Eight as Vector>::ALL {
+        return MetHulls::NONE;
+    }
+    let chords = look_into::<L::Eight, SURE>(block, range, &passages);
+    if chords.mask == 0 {
+        return MetHulls::NONE;
+    }
+    let (mask, sure) = chords.meet_tubes::<L::Wide, SURE>(block, range);
+    MetHulls { mask, sure, near: chords.from.to_array() }
+}
+
+/// What [`meet_hulls`] gives at a level, for tests.
+#[cfg(test)]
+pub(crate) fn meet_hulls_at(
+    level: super::Level,
+    block: &HullBlock,
+    ray: &HullRay,
+    range: &HeightRange,
+) -> MetHulls {
+    struct Hulls<'a>(&'a HullBlock, &'a HullRay, &'a HeightRange);
+    impl super::Task for Hulls<'_> {
+        type Output = MetHulls;
+        #[inline(always)]
+        fn run<L: Lanes>(self) -> Self::Output {
+            let met = meet_hulls::<L, true>(self.0, self.1, self.2);
+            let same = meet_hulls::<L, false>(self.0, self.1, self.2);
+            assert_eq!((same.mask, same.sure), (met.mask, 0));
+            met
+        }
+    }
+    level.run(Hulls(block, ray, range))
+}

@@ -1,0 +1,51 @@
+//! A ray against eight spheres: see [`SphereRay`].
+
+use super::{Eight, Lanes, Vector};
+use crate::tree::sphere_block::{SphereBlock, SphereRay};
+
+/// A bit for each sphere of a block that the ray may hit within its range, among them all that it does; and for each that it certainly
+/// hits. Unused lanes are NaN, and no comparison with a NaN holds.
+#[inline(always)]
+pub(crate) fn meet_spheres<L: Lanes>(block: &SphereBlock, ray: &SphereRay) -> (u32, u32) {
+    let (load, splat) = (L::Eight::load, L::Eight::splat);
+    let zero = splat(0.0);
+    let [ex, ey, ez] = [splat(ray.direction[0]), splat(ray.direction[1]), splat(ray.direction[2])];
+    let x = load(&block.centers[0]) - splat(ray.origin[0]);
+    let y = load(&block.centers[1]) - splat(ray.origin[1]);
+    let z = load(&block.centers[2]) - splat(ray.origin[2]);
+    let (radii, margin) = (load(&block.radii), splat(ray.margin));
+    // How far along the line is what is nearest to the centre, and the square of the distance between them.
+    let along = x.times_plus(ex, y.times_plus(ey, z * ez));
+    let px = along.times_from(ex, x);
+    let py = along.times_from(ey, y);
+    let pz = along.times_from(ez, z);
+    let beside = px.times_plus(px, py.times_plus(py, pz * pz));
+    let size = radii + margin;
+    let rest = size.times_minus(size, beside);
+    let mask = zero.at_most(rest);
+    if mask == 0 {
+        return (0, 0);
+    }
+    let half = rest.sqrt();
+    let (from, last) = (along - half, along + half);
+    let in_range = mask & from.at_most(splat(ray.far)) & splat(ray.near).at_most(last);
+    let inner = radii - margin;
+    let is_crossed = zero.below(inner) & zero.at_most(inner.times_minus(inner, beside));
+    let [start, end] = ray.surely_in;
+    let certain = in_range & is_crossed & splat(start).at_most(from) & along.at_most(splat(end));
+    (in_range, certain)
+}
+
+/// [`meet_spheres`] at an instruction set, for tests.
+#[cfg(test)]
+pub(crate) fn meet_spheres_at(level: super::Level, block: &SphereBlock, ray: &SphereRay) -> (u32, u32) {
+    struct Spheres<'a>(&'a SphereBlock, &'a SphereRay);
+    impl super::Task for Spheres<'_> {
+        type Output = (u32, u32);
+        #[inline(always)]
+        fn run<L: Lanes>(self) -> (u32, u32) {
+            meet_spheres::<L>(self.0, self.1)
+        }
+    }
+    level.run(Spheres(block, ray))
+}

@@ -1,0 +1,1670 @@
+//! AVX2 with FMA, and AVX-512 on vectors of 256 bits.
+
+use std::arch::x86_64::*;
+use std::mem::{MaybeUninit, offset_of};
+
+use bytemuck::Zeroable;
+use lumbre_geometry::Ray;
+use lumbre_math::{DAffine3, DVec3, Transform};
+
+use super::{
+    Axes, Corners, CornersRoom, Crossings, Lanes, LastEight, Level, Question, Row, Set, Sides, Task, Vector,
+    WIDE, Wide, wide,
+};
+use crate::tree::triangle_block::{FIRST_UNSHARED, MOST_SHARED, QUAD, TriangleBlock, USUAL, far_of_last};
+use crate::tree::summary::SingleStart;
+use crate::trace::f32_ray::F32Ray;
+use crate::tree::node::{
+    BoxRay, END_FACTOR, LARGEST_NEAR, LITTLE, SMALLEST_NEAR, START_FACTOR, Slabs, TINY_NEAR, Units,
+};
+use crate::trace::watertight::{
+    BLOCK, BlockRay, EDGE_ERROR, ERRORS_OF_EDGES, ERRORS_OF_EXTENT, FAR, HEIGHT_ERROR, HeightRange, Inside,
+    Passage, ROUNDINGS, SIZE_ERROR, Shear, TINY,
+};
+use crate::{Accel, Ray32};
+
+/// Tasks at a level: see [`Home`](super::Home).
+pub(super) trait OnX86 {
+    /// # Safety
+    /// The machine has these features.
+    #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+    unsafe fn run_avx2<T: Task>(task: T) -> T::Output {
+        task.run::<X86<false>>()
+    }
+
+    /// # Safety
+    /// The machine has these features.
+    #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512cd,avx512dq,avx512vl")]
+    unsafe fn run_avx512<T: Task>(task: T) -> T::Output {
+        task.run::<X86<true>>()
+    }
+}
+
+impl<H> OnX86 for H {}
+
+/// Questions at a level, each at home where it stands.
+pub(super) trait AskOnX86: Question {
+    /// # Safety
+    /// The machine has these features.
+    #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+    unsafe fn ask_avx2(accel: &Accel, ray: &Self::Ray) -> Self::Answer {
+        Self::ask::<X86<false>>(accel, ray)
+    }
+
+    /// # Safety
+    /// The machine has these features.
+    #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512cd,avx512dq,avx512vl")]
+    unsafe fn ask_avx512(accel: &Accel, ray: &Self::Ray) -> Self::Answer {
+        Self::ask::<X86<true>>(accel, ray)
+    }
+
+    /// The same as it may leak: see `X86`.
+    ///
+    /// # Safety
+    /// The machine has these features.
+    #[cfg(feature = "measure")]
+    #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+    unsafe fn ask_leaking_avx2(accel: &Accel, ray: &Self::Ray) -> Self::Answer {
+        Self::ask::<X86<false, true>>(accel, ray)
+    }
+
+    /// # Safety
+    /// The machine has these features.
+    #[cfg(feature = "measure")]
+    #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512cd,avx512dq,avx512vl")]
+    unsafe fn ask_leaking_avx512(accel: &Accel, ray: &Self::Ray) -> Self::Answer {
+        Self::ask::<X86<true, true>>(accel, ray)
+    }
+}
+
+impl<Q: Question> AskOnX86 for Q {}
+
+/// Of the two levels: only what is named after AVX-512 above instantiates `X86<true>`, and only what is named after AVX2 `X86<false>`.
+/// That is why the instructions below are there.
+///
+/// `LEAKS` is there to be measured beside: triangles are met as single precision has it, and boxes without a margin, so that hits may
+/// be lost at edges and the answers are rounded.
+pub(crate) struct X86<const AVX512: bool, const LEAKS: bool = false>;
+
+// The numbers of a ray stand in a row: origin, direction, range.
+const _: () = assert!(size_of::<Ray32>() == 32 && offset_of!(Ray32, direction) == 16);
+const _: () =
+    assert!(offset_of!(Ray, direction) == 24 && offset_of!(Ray, t_min) == 48 && offset_of!(Ray, t_max) == 56);
+const _: () = assert!(size_of::<Ray>() == 72 && offset_of!(Ray, time) == 64);
+
+impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
+    /// A bit for each lane in which the comparison is true.
+    #[inline(always)]
+    fn compare<const HOW: i32>(a: __m256, b: __m256) -> u32 {
+        // SAFETY: see `X86`.
+        unsafe {
+            if AVX512 {
+                u32::from(_mm256_cmp_ps_mask::<HOW>(a, b))
+            } else {
+                _mm256_movemask_ps(_mm256_cmp_ps::<HOW>(a, b)) as u32
+            }
+        }
+    }
+
+    /// A bit for each lane in which both comparisons are true.
+    #[inline(always)]
+    fn both<const A: i32, const B: i32>(a: [__m256; 2], b: [__m256; 2]) -> u32 {
+        // SAFETY: see `X86`.
+        unsafe {
+            if AVX512 {
+                u32::from(_mm256_mask_cmp_ps_mask::<B>(_mm256_cmp_ps_mask::<A>(a[0], a[1]), b[0], b[1]))
+            } else {
+                let both = _mm256_and_ps(_mm256_cmp_ps::<A>(a[0], a[1]), _mm256_cmp_ps::<B>(b[0], b[1]));
+                _mm256_movemask_ps(both) as u32
+            }
+        }
+    }
+
+    /// A component of three corners, the first of which is here.
+    ///
+    /// # Safety
+    /// They are so far behind `row`.
+    #[inline(always)]
+    unsafe fn component(row: *const f32, [a, b, c]: [usize; 3]) -> __m128 {
+        // SAFETY: see `X86`, and above.
+        unsafe { _mm_setr_ps(*row.add(a), *row.add(b), *row.add(c), 0.0) }
+    }
+
+    /// The numbers of a row in three places below sixteen, of more bits than which what is above means nothing; nor does the last.
+    /// For AVX-512 alone.
+    ///
+    /// # Safety
+    /// There are sixteen to be read.
+    #[inline(always)]
+    unsafe fn three_of(row: *const f32, places: __m128i) -> __m128 {
+        // SAFETY: see `X86`, and above.
+        unsafe {
+            let three = _mm512_permutexvar_ps(_mm512_castsi128_si512(places), _mm512_loadu_ps(row));
+            _mm512_castps512_ps128(three)
+        }
+    }
+
+    /// The corners of the triangle in a lane, `[axis][corner]` by the order of the axes; the last of four means nothing.
+    #[inline(always)]
+    fn corners_in(block: &TriangleBlock, lane: usize, axes: &Axes) -> [__m128; 3] {
+        let coordinates = block.coordinates().as_ptr();
+        let [x, y, z] = axes.rows(block);
+        // SAFETY: see `X86`. A row begins at 62 at most, and no more of it than 32 are looked at: in an array of 96. The load is of
+        // four u32.
+        unsafe {
+            if AVX512 && !block.is_unshared() {
+                let corners = _mm_loadu_si128(block.corners_and_more().as_ptr().cast());
+                let vertices = _mm_srl_epi32(corners, _mm_cvtsi32_si128(4 * (lane % BLOCK) as i32));
+                return [
+                    Self::three_of(coordinates.add(x), vertices),
+                    Self::three_of(coordinates.add(y), vertices),
+                    Self::three_of(coordinates.add(z), vertices),
+                ];
+            }
+            let vertices = block.vertices_at(lane);
+            [
+                Self::component(coordinates.add(x), vertices),
+                Self::component(coordinates.add(y), vertices),
+                Self::component(coordinates.add(z), vertices),
+            ]
+        }
+    }
+
+    /// Eight numbers of sixteen, each by its place in the same half of `near`, or of `far` from eight on: see [`far_of_last`].
+    #[inline(always)]
+    fn of_two(near: __m256, far: __m256, places: __m256i) -> __m256 {
+        // SAFETY: see `X86`.
+        unsafe {
+            let is_far = _mm256_castsi256_ps(_mm256_slli_epi32::<28>(places));
+            let (near, far) = (_mm256_permutevar_ps(near, places), _mm256_permutevar_ps(far, places));
+            _mm256_blendv_ps(near, far, is_far)
+        }
+    }
+
+    /// The numbers of a row that are far off: four for the first half, and four for the other, which begin at `far_of_last`.
+    ///
+    /// # Safety
+    /// There are as many.
+    #[inline(always)]
+    unsafe fn far(row: *const f32, far_of_last: usize) -> __m256 {
+        // SAFETY: see `X86`, and above.
+        unsafe { _mm256_loadu2_m128(row.add(far_of_last), row.add(2 * QUAD)) }
+    }
+
+    /// The places of eight vertices, of four bits each: of more bits, what is above means nothing.
+    #[inline(always)]
+    fn places(vertices: u32) -> __m256i {
+        // SAFETY: see `X86`.
+        unsafe {
+            let shifts = _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28);
+            _mm256_srlv_epi32(_mm256_set1_epi32(vertices as i32), shifts)
+        }
+    }
+
+    /// The corners of the triangles of a block in the ray's sheared space, `[x, y or z][corner]`, all with the sign turned, which
+    /// their products do not have: so one operand can come from memory. What lanes without a triangle have means nothing.
+    #[inline(always)]
+    fn sheared_corners<S: Shears, const IS_ALONE: bool>(block: &TriangleBlock, ray: &S) -> [[__m256; 3]; 3] {
+        // Alone, a ray does not wait for a block to say where its rows are, as long as that is foreseen: hence the branches, which the
+        // compiler must not take out. Among others it may wait.
+        let room = block.room();
+        let rows_by_room = &ray.axes().rows_by_room;
+        let by_room = Self::rows_of(block, ray);
+        let rows = if !IS_ALONE {
+            &by_room
+        } else if room > MOST_SHARED {
+            super::opaque(&rows_by_room[3])
+        } else if room == USUAL[0] {
+            super::opaque(&rows_by_room[0])
+        } else if room == USUAL[1] {
+            super::opaque(&rows_by_room[1])
+        } else if room <= MOST_SHARED {
+            super::opaque(&rows_by_room[2])
+        } else {
+            super::opaque(&rows_by_room[3])
+        };
+        if room > MOST_SHARED {
+            let a = Self::sheared_eight::<_, false>(block, ray, rows, FIRST_UNSHARED);
+            let b = Self::sheared_eight::<_, false>(block, ray, rows, FIRST_UNSHARED + BLOCK);
+            let c = Self::sheared_eight::<_, false>(block, ray, rows, FIRST_UNSHARED + 2 * BLOCK);
+            return [[a[0], b[0], c[0]], [a[1], b[1], c[1]], [a[2], b[2], c[2]]];
+        }
+        // SAFETY: see `X86`.
+        let mut corners = [[unsafe { _mm256_setzero_ps() }; 3]; 3];
+        if AVX512 {
+            let vertices = Self::sheared_sixteen(block, super::opaque(ray), *rows);
+            for (corner, &places) in block.corners().iter().enumerate() {
+                let places = Self::places(places);
+                for axis in 0..3 {
+                    corners[axis][corner] = Self::of_sixteen(vertices[axis], places);
+                }
+            }
+        } else {
+            let near = Self::sheared_eight::<_, false>(block, ray, rows, 0);
+            let far = Self::sheared_eight::<_, true>(block, ray, rows, 0);
+            for (corner, &places) in block.corners().iter().enumerate() {
+                let places = Self::places(places);
+                for axis in 0..3 {
+                    corners[axis][corner] = Self::of_two(near[axis], far[axis], places);
+                }
+            }
+        }
+        corners
+    }
+
+    /// Where the rows of a block begin, in the order of the ray's axes, and `far_of_last` in each of them.
+    #[inline(always)]
+    fn rows_of<S: Shears>(block: &TriangleBlock, ray: &S) -> [u32; 4] {
+        let (room, order) = (block.room(), &ray.axes().order);
+        let far = far_of_last(room) as u32;
+        [order[0] * room as u32, order[1] * room as u32, order[2] * room as u32, far]
+    }
+
+    /// The corners as numbers.
+    #[inline(always)]
+    fn eights([[a, b, c], [d, e, f], [g, h, i]]: [[__m256; 3]; 3]) -> [[wide::Eight256<AVX512>; 3]; 3] {
+        let of = wide::Eight256::<AVX512>::new;
+        // SAFETY: see `X86`.
+        unsafe { [[of(a), of(b), of(c)], [of(d), of(e), of(f)], [of(g), of(h), of(i)]] }
+    }
+
+    /// [`X86::sheared_corners`] of two blocks, each by its ray, one block after the other: those of the first, and those of the second.
+    #[inline(always)]
+    fn corners_of_each<S: Shears, W>(blocks: [&TriangleBlock; 2], rays: [&S; 2]) -> [[W; 3]; 3]
+    where
+        W: Wide<Half = wide::Eight256<AVX512>>,
+    {
+        let first = Self::eights(Self::sheared_corners::<_, false>(blocks[0], rays[0]));
+        let second = Self::eights(Self::sheared_corners::<_, false>(blocks[1], rays[1]));
+        super::corners_of_two(&first, &second)
+    }
+
+    /// Eight vertices from the `first` of these rows on, or those that `IS_FAR`: see [`X86::far`].
+    #[inline(always)]
+    fn sheared_eight<S: Shears, const IS_FAR: bool>(
+        block: &TriangleBlock,
+        ray: &S,
+        &[kx, ky, kz, far]: &[u32; 4],
+        first: usize,
+    ) -> [__m256; 3] {
+        let rows = block.coordinates();
+        // SAFETY: see `X86`. Rows begin at 62 at most, and no more of them than 27 are looked at, in an array of 96.
+        unsafe {
+            let load = |row: u32| {
+                let row = rows.as_ptr().add(row as usize);
+                if IS_FAR { Self::far(row, far as usize) } else { _mm256_loadu_ps(row.add(first)) }
+            };
+            let (origin, shear) = (ray.origin(), ray.shear());
+            let (shear_x, shear_y) = (_mm256_set1_ps(shear[0]), _mm256_set1_ps(shear[1]));
+            let z = _mm256_sub_ps(_mm256_set1_ps(origin[2]), load(kz));
+            let across = _mm256_sub_ps(_mm256_set1_ps(origin[0]), load(kx));
+            let up = _mm256_sub_ps(_mm256_set1_ps(origin[1]), load(ky));
+            if LEAKS {
+                return [_mm256_fnmadd_ps(shear_x, z, across), _mm256_fnmadd_ps(shear_y, z, up), z];
+            }
+            let Some(rest) = ray.rest() else {
+                // No fused multiply-add: the same on every machine.
+                let x = _mm256_sub_ps(across, _mm256_mul_ps(shear_x, z));
+                return [x, _mm256_sub_ps(up, _mm256_mul_ps(shear_y, z)), z];
+            };
+            let x = _mm256_fnmadd_ps(shear_x, z, _mm256_add_ps(across, _mm256_set1_ps(rest[0])));
+            let y = _mm256_fnmadd_ps(shear_y, z, _mm256_add_ps(up, _mm256_set1_ps(rest[1])));
+            [x, y, z]
+        }
+    }
+
+    /// Sixteen vertices. For AVX-512 alone.
+    #[inline(always)]
+    fn sheared_sixteen<S: Shears>(block: &TriangleBlock, ray: &S, [kx, ky, kz, _]: [u32; 4]) -> [__m512; 3] {
+        let rows = block.coordinates();
+        // SAFETY: as there.
+        unsafe {
+            let load = |at: u32| _mm512_loadu_ps(rows.as_ptr().add(at as usize));
+            let (origin, shear) = (ray.origin(), ray.shear());
+            let (shear_x, shear_y) = (_mm512_set1_ps(shear[0]), _mm512_set1_ps(shear[1]));
+            let z = _mm512_sub_ps(_mm512_set1_ps(origin[2]), load(kz));
+            let across = _mm512_sub_ps(_mm512_set1_ps(origin[0]), load(kx));
+            let up = _mm512_sub_ps(_mm512_set1_ps(origin[1]), load(ky));
+            if LEAKS {
+                return [_mm512_fnmadd_ps(shear_x, z, across), _mm512_fnmadd_ps(shear_y, z, up), z];
+            }
+            let Some(rest) = ray.rest() else {
+                // No fused multiply-add: the same on every machine.
+                let x = _mm512_sub_ps(across, _mm512_mul_ps(shear_x, z));
+                return [x, _mm512_sub_ps(up, _mm512_mul_ps(shear_y, z)), z];
+            };
+            let x = _mm512_fnmadd_ps(shear_x, z, _mm512_add_ps(across, _mm512_set1_ps(rest[0])));
+            let y = _mm512_fnmadd_ps(shear_y, z, _mm512_add_ps(up, _mm512_set1_ps(rest[1])));
+            [x, y, z]
+        }
+    }
+
+    /// [`Lanes::shear`] in single precision.
+    #[inline(always)]
+    fn rounded_shear(ray: &Ray, axes: &'static Axes, mesh_origin: &[f64; 4]) -> (Shear, [f64; 3]) {
+        // SAFETY: see `X86`. The loads are of the first eight numbers of a ray, see below, and of arrays of four.
+        unsafe {
+            let order = _mm_loadu_si128(axes.order.as_ptr().cast());
+            let origin = _mm256_loadu_pd(Self::numbers(ray));
+            let origin = _mm256_cvtpd_ps(_mm256_sub_pd(origin, _mm256_loadu_pd(mesh_origin.as_ptr())));
+            let origin = Self::array(_mm_permutevar_ps(origin, order));
+            let direction = _mm_permutevar_ps(Self::single_direction(ray), order);
+            let last = _mm_shuffle_ps::<0b10_10_10_10>(direction, direction);
+            let shear = Self::array(_mm_div_ps(direction, last));
+            let shear = Shear {
+                axes,
+                x: shear[0].into(),
+                y: shear[1].into(),
+                direction_z: _mm_cvtss_f32(last).into(),
+            };
+            (shear, [origin[0].into(), origin[1].into(), origin[2].into()])
+        }
+    }
+
+    /// The inside of [`Lanes::pass`] in single precision.
+    #[inline(always)]
+    fn rounded_inside(block: &TriangleBlock, lane: usize, shear: &Shear, origin: &[f64; 3]) -> Inside {
+        let [across, up, z] = Self::corners_in(block, lane, shear.axes);
+        // SAFETY: see `X86`.
+        unsafe {
+            let z = _mm_sub_ps(z, _mm_set1_ps(origin[2] as f32));
+            let across = _mm_sub_ps(across, _mm_set1_ps(origin[0] as f32));
+            let up = _mm_sub_ps(up, _mm_set1_ps(origin[1] as f32));
+            let x = _mm_fnmadd_ps(_mm_set1_ps(shear.x as f32), z, across);
+            let y = _mm_fnmadd_ps(_mm_set1_ps(shear.y as f32), z, up);
+            // c, a, b and b, c, a.
+            let (px, py) = (_mm_permute_ps::<0b11_01_00_10>(x), _mm_permute_ps::<0b11_01_00_10>(y));
+            let (qx, qy) = (_mm_permute_ps::<0b11_00_10_01>(x), _mm_permute_ps::<0b11_00_10_01>(y));
+            let edges = _mm_fmsub_ps(px, qy, _mm_mul_ps(py, qx));
+            let [u, v, w, _] = Self::array(edges);
+            let [a, b, c, _] = Self::array(_mm_mul_ps(edges, z));
+            Inside { height: (a + b + c).into(), det: (u + v + w).into(), v: v.into(), w: w.into() }
+        }
+    }
+
+    /// Eight of sixteen numbers, each by its place. For AVX-512 alone.
+    #[inline(always)]
+    fn of_sixteen(numbers: __m512, places: __m256i) -> __m256 {
+        // SAFETY: see `X86`.
+        unsafe { _mm512_castps512_ps256(_mm512_permutexvar_ps(_mm512_castsi256_si512(places), numbers)) }
+    }
+
+    /// The numbers of a ray, eight at least: see above.
+    #[inline(always)]
+    fn numbers(ray: &Ray) -> *const f64 {
+        let ray: *const Ray = ray;
+        ray.cast()
+    }
+
+    /// Rays by eight, whose columns are then written as wide as they are read: what is put together of two writes is waited for.
+    #[inline(always)]
+    fn columns_by_eight(rays: &[Ray; WIDE], columns: &mut [Row<f64>; 8]) {
+        const EVEN: i32 = 0b10_00_10_00;
+        const ODD: i32 = 0b11_01_11_01;
+        for half in 0..2 {
+            let at = |i: usize| Self::numbers(&rays[8 * half + i]);
+            // SAFETY: see `X86`; only called where `AVX512` is. The loads are of the eight numbers of a ray, see above; the stores of
+            // eight f64 from the first or the ninth on, into arrays of sixteen.
+            unsafe {
+                // One by one: what is handed to a closure may become a call.
+                let (a, b, c, d) = (
+                    _mm512_loadu_pd(at(0)),
+                    _mm512_loadu_pd(at(1)),
+                    _mm512_loadu_pd(at(2)),
+                    _mm512_loadu_pd(at(3)),
+                );
+                let (e, f, g, h) = (
+                    _mm512_loadu_pd(at(4)),
+                    _mm512_loadu_pd(at(5)),
+                    _mm512_loadu_pd(at(6)),
+                    _mm512_loadu_pd(at(7)),
+                );
+                let even = [
+                    _mm512_unpacklo_pd(a, b),
+                    _mm512_unpacklo_pd(c, d),
+                    _mm512_unpacklo_pd(e, f),
+                    _mm512_unpacklo_pd(g, h),
+                ];
+                let odd = [
+                    _mm512_unpackhi_pd(a, b),
+                    _mm512_unpackhi_pd(c, d),
+                    _mm512_unpackhi_pd(e, f),
+                    _mm512_unpackhi_pd(g, h),
+                ];
+                for (first, [a, b, c, d]) in [even, odd].into_iter().enumerate() {
+                    let (low, more_low) =
+                        (_mm512_shuffle_f64x2::<EVEN>(a, b), _mm512_shuffle_f64x2::<EVEN>(c, d));
+                    let (high, more_high) =
+                        (_mm512_shuffle_f64x2::<ODD>(a, b), _mm512_shuffle_f64x2::<ODD>(c, d));
+                    let of_eight = [
+                        _mm512_shuffle_f64x2::<EVEN>(low, more_low),
+                        _mm512_shuffle_f64x2::<EVEN>(high, more_high),
+                        _mm512_shuffle_f64x2::<ODD>(low, more_low),
+                        _mm512_shuffle_f64x2::<ODD>(high, more_high),
+                    ];
+                    for (place, of_eight) in of_eight.into_iter().enumerate() {
+                        _mm512_storeu_pd(columns[first + 2 * place].0.as_mut_ptr().add(8 * half), of_eight);
+                    }
+                }
+            }
+        }
+    }
+
+    /// The first four numbers, and the last four of eight: other pieces would be read of two writes.
+    #[inline(always)]
+    fn halves(ray: &Ray) -> (__m256d, __m256d) {
+        let numbers = Self::numbers(ray);
+        // SAFETY: see `X86`. The loads are of the eight numbers of a ray.
+        unsafe { (_mm256_loadu_pd(numbers), _mm256_loadu_pd(numbers.add(4))) }
+    }
+
+    /// The ray of these halves.
+    #[inline(always)]
+    fn of_halves(first: __m256d, last: __m256d, time: f64) -> Ray {
+        let mut ray = MaybeUninit::<Ray>::uninit();
+        let to = ray.as_mut_ptr();
+        // SAFETY: see `X86`. A ray is eight numbers and its time, which are all written.
+        unsafe {
+            _mm256_storeu_pd(to.cast(), first);
+            _mm256_storeu_pd(to.cast::<f64>().add(4), last);
+            (&raw mut (*to).time).write(time);
+            ray.assume_init()
+        }
+    }
+
+    /// The origin, the direction and the ends of the range of these halves; the last of four mean nothing.
+    #[inline(always)]
+    fn parts((first, last): (__m256d, __m256d)) -> (__m256d, __m256d, __m128d) {
+        // SAFETY: see `X86`.
+        unsafe {
+            let middle = _mm256_permute2f128_pd::<0x21>(first, last);
+            let direction = _mm256_shuffle_pd::<0b0101>(middle, last);
+            (first, direction, _mm256_extractf128_pd::<1>(last))
+        }
+    }
+
+    /// The direction in single precision; the last of four means nothing.
+    #[inline(always)]
+    fn single_direction(ray: &Ray) -> __m128 {
+        let (_, direction, _) = Self::parts(Self::halves(ray));
+        // SAFETY: see `X86`.
+        unsafe { _mm256_cvtpd_ps(direction) }
+    }
+
+    /// [`Lanes::start_single`] of a ray by its numbers: the ends of the range are the first two; the last of the others mean nothing.
+    #[inline(always)]
+    fn slabs(start: &SingleStart, origin: __m256d, direction: __m128, range: __m128) -> Option<Slabs> {
+        // As the portable one, three axes at a time.
+        // SAFETY: see `X86`. The loads are of arrays of four.
+        unsafe {
+            let from = _mm256_sub_pd(origin, _mm256_loadu_pd(start.tree_origin.as_ptr()));
+            let from = _mm256_cvtpd_ps(_mm256_mul_pd(from, _mm256_set1_pd(start.scale)));
+
+            let sign = _mm_set1_ps(-0.0);
+            let (distance, length) = (_mm_andnot_ps(sign, from), _mm_andnot_ps(sign, direction));
+            // Every comparison with a NaN is false.
+            let fits = _mm_and_ps(
+                _mm_and_ps(
+                    _mm_cmple_ps(distance, _mm_loadu_ps(start.farthest.as_ptr())),
+                    _mm_cmple_ps(length, _mm_loadu_ps(start.longest.as_ptr())),
+                ),
+                // 0 <= t_min, t_min <= t_max, and the first again.
+                _mm_cmple_ps(_mm_unpacklo_ps(_mm_setzero_ps(), range), range),
+            );
+            let is_long = _mm_cmpge_ps(length, _mm_set1_ps(start.shortest));
+            if _mm_movemask_ps(fits) & 0b111 != 0b111 || _mm_movemask_ps(is_long) & 0b111 == 0 {
+                return None;
+            }
+
+            let size = _mm_max_ps(length, _mm_set1_ps(start.tiny));
+            let size = _mm_div_ps(_mm_set1_ps(start.space_per_unit), size);
+            let inverse = _mm_or_ps(size, _mm_and_ps(direction, sign));
+            let per_distance = _mm_set1_ps(start.margin_per_distance);
+            let margin = if LEAKS {
+                _mm_setzero_ps()
+            } else {
+                _mm_mul_ps(size, _mm_fmadd_ps(distance, per_distance, _mm_set1_ps(start.margin)))
+            };
+            let ends = _mm_fmadd_ps(
+                range,
+                _mm_setr_ps(START_FACTOR, END_FACTOR, 0.0, 0.0),
+                _mm_setr_ps(0.0, LITTLE as f32, 0.0, 0.0),
+            );
+            let (near, far) = (_mm_fnmsub_ps(from, inverse, margin), _mm_fnmadd_ps(from, inverse, margin));
+            Some(Slabs {
+                inverse: Self::array(inverse),
+                // The first of the ends, and the second, become the fourth.
+                near_offset: Self::array(_mm_insert_ps::<0x30>(near, ends)),
+                far_offset: Self::array(_mm_insert_ps::<0x70>(far, ends)),
+                sides: Sides::new(_mm_movemask_ps(direction) as u32),
+            })
+        }
+    }
+
+    /// The numbers of eight rays in single precision, side by side.
+    #[inline(always)]
+    fn rows_of_eight(rays: &[Ray32; 8]) -> [__m256; 8] {
+        const LOW: i32 = 0b01_00_01_00;
+        const HIGH: i32 = 0b11_10_11_10;
+        // SAFETY: see `X86`. The loads are of the eight numbers of a ray.
+        unsafe {
+            let at = rays.as_ptr().cast::<f32>();
+            let (a, b) = (_mm256_loadu_ps(at), _mm256_loadu_ps(at.add(8)));
+            let (c, d) = (_mm256_loadu_ps(at.add(16)), _mm256_loadu_ps(at.add(24)));
+            let (e, f) = (_mm256_loadu_ps(at.add(32)), _mm256_loadu_ps(at.add(40)));
+            let (g, h) = (_mm256_loadu_ps(at.add(48)), _mm256_loadu_ps(at.add(56)));
+            // One by one: what is handed to a closure may become a call.
+            let (ab, ab2) = (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
+            let (cd, cd2) = (_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
+            let (ef, ef2) = (_mm256_unpacklo_ps(e, f), _mm256_unpackhi_ps(e, f));
+            let (gh, gh2) = (_mm256_unpacklo_ps(g, h), _mm256_unpackhi_ps(g, h));
+            // Numbers 0 and 4, 1 and 5, 2 and 6, 3 and 7, of the first four rays and of the others.
+            let first = [
+                _mm256_shuffle_ps::<LOW>(ab, cd),
+                _mm256_shuffle_ps::<HIGH>(ab, cd),
+                _mm256_shuffle_ps::<LOW>(ab2, cd2),
+                _mm256_shuffle_ps::<HIGH>(ab2, cd2),
+            ];
+            let others = [
+                _mm256_shuffle_ps::<LOW>(ef, gh),
+                _mm256_shuffle_ps::<HIGH>(ef, gh),
+                _mm256_shuffle_ps::<LOW>(ef2, gh2),
+                _mm256_shuffle_ps::<HIGH>(ef2, gh2),
+            ];
+            let mut rows = [_mm256_setzero_ps(); 8];
+            for number in 0..4 {
+                rows[number] = _mm256_permute2f128_ps::<0x20>(first[number], others[number]);
+                rows[4 + number] = _mm256_permute2f128_ps::<0x31>(first[number], others[number]);
+            }
+            rows
+        }
+    }
+
+    /// The axes for a direction: see [`Axes::new`].
+    #[inline(always)]
+    fn axes_of(direction: __m256d) -> &'static Axes {
+        // SAFETY: see `X86`.
+        unsafe {
+            let size = _mm256_andnot_pd(_mm256_set1_pd(-0.0), direction);
+            // x, y, x and y, z, z.
+            let sizes = _mm256_cmp_pd::<_CMP_GE_OQ>(
+                _mm256_permute4x64_pd::<0b00_00_01_00>(size),
+                _mm256_permute4x64_pd::<0b10_10_10_01>(size),
+            );
+            Axes::by_bits(_mm256_movemask_pd(direction) as u32, _mm256_movemask_pd(sizes) as u32)
+        }
+    }
+
+    /// The axes for a direction in single precision.
+    #[inline(always)]
+    fn narrow_axes(direction: __m128) -> &'static Axes {
+        // SAFETY: see `X86`.
+        unsafe {
+            let size = _mm_andnot_ps(_mm_set1_ps(-0.0), direction);
+            // x, y, x and y, z, z.
+            let sizes = _mm_cmpge_ps(
+                _mm_shuffle_ps::<0b00_00_01_00>(size, size),
+                _mm_shuffle_ps::<0b10_10_10_01>(size, size),
+            );
+            Axes::by_bits(_mm_movemask_ps(direction) as u32, _mm_movemask_ps(sizes) as u32)
+        }
+    }
+
+    /// The numbers of a ray in single precision, eight in all: see above.
+    #[inline(always)]
+    fn narrow_start(ray: &Ray32) -> *const f32 {
+        let ray: *const Ray32 = ray;
+        ray.cast()
+    }
+
+    /// Origin and start, direction and end.
+    #[inline(always)]
+    fn narrow_numbers(ray: &Ray32) -> (__m128, __m128) {
+        let numbers = Self::narrow_start(ray);
+        // SAFETY: see `X86`. A ray is eight f32 in this order.
+        unsafe { (_mm_loadu_ps(numbers), _mm_loadu_ps(numbers.add(4))) }
+    }
+
+    /// Four numbers from a place on, the same of others behind them.
+    ///
+    /// # Safety
+    /// There are as many at each, and it is of AVX-512.
+    #[inline(always)]
+    unsafe fn fours(numbers: [*const f32; 4], place: usize) -> __m512 {
+        let [a, b, c, d] = numbers;
+        // SAFETY: that is what is asked for.
+        unsafe {
+            let fours = _mm512_castps128_ps512(_mm_loadu_ps(a.add(place)));
+            let fours = _mm512_insertf32x4::<1>(fours, _mm_loadu_ps(b.add(place)));
+            let fours = _mm512_insertf32x4::<2>(fours, _mm_loadu_ps(c.add(place)));
+            _mm512_insertf32x4::<3>(fours, _mm_loadu_ps(d.add(place)))
+        }
+    }
+
+    /// The same four everywhere.
+    ///
+    /// # Safety
+    /// It is of AVX-512.
+    #[inline(always)]
+    unsafe fn four_times(numbers: &[f32; 4]) -> __m512 {
+        // SAFETY: that is what is asked for; the load is of an array of four.
+        unsafe { _mm512_broadcast_f32x4(_mm_loadu_ps(numbers.as_ptr())) }
+    }
+
+    /// Its numbers by four.
+    ///
+    /// # Safety
+    /// It is of AVX-512.
+    #[inline(always)]
+    unsafe fn by_four(v: __m512) -> [[f32; 4]; 4] {
+        let mut four = [[0.0; 4]; 4];
+        // SAFETY: that is what is asked for; the store is of sixteen f32.
+        unsafe { _mm512_storeu_ps(four.as_mut_ptr().cast(), v) };
+        four
+    }
+
+    /// [`Lanes::start_narrow_by_four`] of two.
+    #[inline(always)]
+    fn start_narrow_by_two(
+        start: &SingleStart,
+        rays: [&Ray32; 2],
+        places: [(&mut Slabs, &mut F32Ray); 2],
+    ) -> u32 {
+        /// The last of each four.
+        const LAST: i32 = 0x88;
+        // As `start_narrow` and `start_narrow_blocks`, four numbers of the second ray behind those of the first.
+        // SAFETY: see `X86`. The loads are of arrays of four.
+        unsafe {
+            let ((first_origin, first_direction), (second_origin, second_direction)) =
+                (Self::narrow_numbers(rays[0]), Self::narrow_numbers(rays[1]));
+            let origin = _mm256_set_m128(second_origin, first_origin);
+            let direction = _mm256_set_m128(second_direction, first_direction);
+            let local = if let Some(mesh_origin) = &start.single_mesh_origin {
+                _mm256_sub_ps(origin, Self::twice(mesh_origin))
+            } else {
+                _mm256_set_m128(Self::local(start, second_origin), Self::local(start, first_origin))
+            };
+            let units_per_space = _mm256_set1_ps(start.units_per_space);
+            let from = _mm256_fmsub_ps(local, units_per_space, Self::twice(&start.shift));
+            let sign = _mm256_set1_ps(-0.0);
+            let (distance, length) = (_mm256_andnot_ps(sign, from), _mm256_andnot_ps(sign, direction));
+            let size = _mm256_blend_ps::<LAST>(length, origin);
+            let largest = _mm256_blend_ps::<LAST>(Self::twice(&start.longest), direction);
+            let fits = _mm256_and_ps(
+                _mm256_cmp_ps::<_CMP_LE_OQ>(distance, Self::twice(&start.farthest)),
+                _mm256_cmp_ps::<_CMP_LE_OQ>(size, largest),
+            );
+            let fits = _mm256_movemask_ps(fits) & !(_mm256_movemask_ps(origin) & LAST);
+            let is_long = _mm256_cmp_ps::<_CMP_GE_OQ>(length, _mm256_set1_ps(start.shortest));
+            let is_long = _mm256_movemask_ps(is_long) & !LAST;
+            let tiny_or_more = _mm256_max_ps(length, _mm256_set1_ps(start.tiny));
+            let size = _mm256_div_ps(_mm256_set1_ps(start.space_per_unit), tiny_or_more);
+            let inverse = _mm256_or_ps(size, _mm256_and_ps(direction, sign));
+            let per_distance = _mm256_set1_ps(Units::NARROW_MARGIN_PER_DISTANCE);
+            let margin = _mm256_fmadd_ps(distance, per_distance, _mm256_set1_ps(start.narrow_margin));
+            let margin = _mm256_mul_ps(size, margin);
+            let first = _mm256_mul_ps(origin, _mm256_set1_ps(START_FACTOR));
+            let last = _mm256_mul_ps(direction, _mm256_set1_ps(END_FACTOR));
+            let last = _mm256_add_ps(last, _mm256_set1_ps(LITTLE as f32));
+            let near = _mm256_blend_ps::<LAST>(_mm256_fnmsub_ps(from, inverse, margin), first);
+            let far = _mm256_blend_ps::<LAST>(_mm256_fnmadd_ps(from, inverse, margin), last);
+            let signs = _mm256_movemask_ps(direction) as u32;
+            // x, y, x and y, z, z.
+            let sizes = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GE_OQ>(
+                _mm256_shuffle_ps::<0b00_00_01_00>(length, length),
+                _mm256_shuffle_ps::<0b10_10_10_01>(length, length),
+            )) as u32;
+            let axes = [Axes::by_bits(signs, sizes), Axes::by_bits(signs >> 4, sizes >> 4)];
+            let order_of = |axes: &Axes| _mm_loadu_si128(axes.order.as_ptr().cast());
+            let order = _mm256_set_m128i(order_of(axes[1]), order_of(axes[0]));
+            let of_last = _mm256_permutevar_ps(inverse, _mm256_shuffle_epi32::<0b10_10_10_10>(order));
+            let of_last = _mm256_mul_ps(of_last, units_per_space);
+            let shear = _mm256_blend_ps::<LAST>(_mm256_mul_ps(direction, of_last), direction);
+            let (shear, local) = (_mm256_permutevar_ps(shear, order), _mm256_permutevar_ps(local, order));
+            let minus_inverse = _mm256_xor_ps(of_last, sign);
+            let (inverse, near, far) = (Self::by_two(inverse), Self::by_two(near), Self::by_two(far));
+            let (shear, local, minus_inverse) =
+                (Self::by_two(shear), Self::by_two(local), Self::by_two(minus_inverse));
+            let mut fit = 0;
+            for (i, (slabs, narrow)) in places.into_iter().enumerate() {
+                slabs.inverse = inverse[i];
+                slabs.near_offset = near[i];
+                slabs.far_offset = far[i];
+                slabs.sides = Sides::new(signs >> (4 * i));
+                narrow.axes = axes[i];
+                narrow.origin = local[i];
+                narrow.shear = shear[i];
+                narrow.minus_inverse = minus_inverse[i][0];
+                let is_fit = fits >> (4 * i) & 0b1111 == 0b1111 && is_long >> (4 * i) & 0b111 != 0;
+                fit |= u32::from(is_fit) << i;
+            }
+            fit
+        }
+    }
+
+    /// The same four twice.
+    #[inline(always)]
+    fn twice(numbers: &[f32; 4]) -> __m256 {
+        // SAFETY: see `X86`. The load is of an array of four.
+        unsafe { _mm256_broadcast_ps(&_mm_loadu_ps(numbers.as_ptr())) }
+    }
+
+    /// Its numbers by four.
+    #[inline(always)]
+    fn by_two(v: __m256) -> [[f32; 4]; 2] {
+        let mut two = [[0.0; 4]; 2];
+        // SAFETY: see `X86`. The store is of eight f32.
+        unsafe { _mm256_storeu_ps(two.as_mut_ptr().cast(), v) };
+        two
+    }
+
+    /// Three coordinates relative to the mesh, rounded once; the fourth number stays what it is.
+    #[inline(always)]
+    fn local(start: &SingleStart, origin: __m128) -> __m128 {
+        // SAFETY: see `X86`. The loads are of arrays of four.
+        unsafe {
+            if let Some(mesh_origin) = &start.single_mesh_origin {
+                return _mm_sub_ps(origin, _mm_loadu_ps(mesh_origin.as_ptr()));
+            }
+            let origin = _mm256_sub_pd(_mm256_cvtps_pd(origin), _mm256_loadu_pd(start.mesh_origin.as_ptr()));
+            _mm256_cvtpd_ps(origin)
+        }
+    }
+
+    /// Three numbers, and a zero.
+    #[inline(always)]
+    fn three(v: &DVec3) -> __m256d {
+        // SAFETY: see `X86`. Only the first three are loaded.
+        unsafe { _mm256_maskload_pd(v.as_ref().as_ptr(), _mm256_setr_epi64x(-1, -1, -1, 0)) }
+    }
+
+    #[inline(always)]
+    fn array(v: __m128) -> [f32; 4] {
+        let mut array = [0.0; 4];
+        // SAFETY: see `X86`. The store is of four f32 into an array of four.
+        unsafe { _mm_storeu_ps(array.as_mut_ptr(), v) };
+        array
+    }
+}
+
+/// What shears the corners of triangles.
+pub(crate) trait Shears {
+    fn axes(&self) -> &'static Axes;
+    /// In the order of the axes, here and below.
+    fn origin(&self) -> &[f32; 4];
+    fn shear(&self) -> &[f32; 4];
+    /// What rounding took from the origin, where that counts.
+    fn rest(&self) -> Option<&[f32; 4]>;
+}
+
+impl Shears for BlockRay {
+    #[inline(always)]
+    fn axes(&self) -> &'static Axes {
+        self.axes
+    }
+
+    #[inline(always)]
+    fn origin(&self) -> &[f32; 4] {
+        &self.origin
+    }
+
+    #[inline(always)]
+    fn shear(&self) -> &[f32; 4] {
+        &self.shear
+    }
+
+    #[inline(always)]
+    fn rest(&self) -> Option<&[f32; 4]> {
+        Some(&self.rest)
+    }
+}
+
+impl Shears for F32Ray {
+    #[inline(always)]
+    fn axes(&self) -> &'static Axes {
+        self.axes
+    }
+
+    #[inline(always)]
+    fn origin(&self) -> &[f32; 4] {
+        &self.origin
+    }
+
+    #[inline(always)]
+    fn shear(&self) -> &[f32; 4] {
+        &self.shear
+    }
+
+    #[inline(always)]
+    fn rest(&self) -> Option<&[f32; 4]> {
+        None
+    }
+}
+
+/// How a line passes the edges of eight triangles, or two lines those of eight each.
+#[derive(Clone, Copy, Zeroable)]
+pub(crate) struct Edges<V> {
+    /// The edge functions.
+    values: [V; 3],
+    /// Of the corners.
+    heights: [V; 3],
+    /// The least of them or of their opposites, whichever is more: how far within the triangle the line is.
+    within: V,
+    /// By how much they may be wrong, below zero, and the heights.
+    minus_error: V,
+    height_error: V,
+}
+
+impl<V: Vector> Edges<V> {
+    /// Of corners in the sheared spaces of the rays, which have these [`least_size`](BlockRay::least_size)s, and a bit for each triangle that is
+    /// perhaps met.
+    #[inline(always)]
+    fn of<const LEAKS: bool>([x, y, z]: [[V; 3]; 3], least_size: V) -> (u32, Self) {
+        let u = x[2].times_minus(y[1], y[2] * x[1]);
+        let v = x[0].times_minus(y[2], y[0] * x[2]);
+        let w = x[1].times_minus(y[0], y[1] * x[0]);
+        let within = u.min(v).min(w).max(u.max(v).max(w).turned_by(V::splat(-0.0)));
+        if LEAKS {
+            let (minus_error, height_error) = (V::splat(0.0), V::splat(0.0));
+            let edges = Self { values: [u, v, w], heights: z, within, minus_error, height_error };
+            return (minus_error.at_most(within), edges);
+        }
+        let across = x[0].larger(y[0]).max(x[1].larger(y[1])).max(x[2].larger(y[2]));
+        let along = z[0].larger(z[1]).larger(z[2]);
+        let size = across + along + least_size;
+        let minus_error = (size * V::splat(-EDGE_ERROR))
+            .times_minus(size.times_plus(V::splat(SIZE_ERROR), across), V::splat(TINY));
+        let height_error = size * V::splat(HEIGHT_ERROR);
+        let edges = Self { values: [u, v, w], heights: z, within, minus_error, height_error };
+        (minus_error.at_most(within), edges)
+    }
+}
+
+impl<W: Wide> Edges<W> {
+    /// Those of one of the two lines: `which` is 0 or 1.
+    #[inline(always)]
+    fn half(&self, which: usize) -> Edges<W::Half> {
+        let Self { values: [u, v, w], heights: [a, b, c], within, minus_error, height_error } = self;
+        Edges {
+            values: [u.half(which), v.half(which), w.half(which)],
+            heights: [a.half(which), b.half(which), c.half(which)],
+            within: within.half(which),
+            minus_error: minus_error.half(which),
+            height_error: height_error.half(which),
+        }
+    }
+
+    /// Those of two lines.
+    #[inline(always)]
+    fn of_two(first: &Edges<W::Half>, second: &Edges<W::Half>) -> Self {
+        Self {
+            values: super::three_of_two(&first.values, &second.values),
+            heights: super::three_of_two(&first.heights, &second.heights),
+            within: W::of_two(first.within, second.within),
+            minus_error: W::of_two(first.minus_error, second.minus_error),
+            height_error: W::of_two(first.height_error, second.height_error),
+        }
+    }
+}
+
+impl<const LEAKS: bool> X86<true, LEAKS> {
+    /// The corners of two blocks that share vertices.
+    #[inline(always)]
+    fn shared_by_two<S: Shears>(blocks: [&TriangleBlock; 2], rays: [&S; 2]) -> [[wide::Avx512; 3]; 3] {
+        let [first, second] = blocks;
+        let a = Self::sheared_sixteen(first, super::opaque(rays[0]), Self::rows_of(first, rays[0]));
+        let b = Self::sheared_sixteen(second, super::opaque(rays[1]), Self::rows_of(second, rays[1]));
+        let last = LastEight::new().mask();
+        let mut corners = [[wide::Avx512::zeroed(); 3]; 3];
+        // SAFETY: see `X86`.
+        unsafe {
+            let shifts = _mm512_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28, 0, 4, 8, 12, 16, 20, 24, 28);
+            let places = _mm512_set1_epi32(MOST_SHARED as i32 - 1);
+            // Of thirty-two numbers, the last sixteen.
+            let of_second = _mm512_maskz_set1_epi32(0xff00, MOST_SHARED as i32);
+            const OR_AND: i32 = 0b1111_1000;
+            for (corner, (&of_a, &of_b)) in first.corners().iter().zip(second.corners()).enumerate() {
+                let both = _mm512_mask_set1_epi32(_mm512_set1_epi32(of_a as i32), last, of_b as i32);
+                let both = _mm512_srlv_epi32(both, shifts);
+                let both = _mm512_ternarylogic_epi32::<OR_AND>(of_second, both, places);
+                corners[0][corner] = wide::Avx512::new(_mm512_permutex2var_ps(a[0], both, b[0]));
+                corners[1][corner] = wide::Avx512::new(_mm512_permutex2var_ps(a[1], both, b[1]));
+                corners[2][corner] = wide::Avx512::new(_mm512_permutex2var_ps(a[2], both, b[2]));
+            }
+        }
+        corners
+    }
+
+    /// The corners of two blocks that share none; `rests` are what rounding took from the origins of the rays.
+    #[inline(always)]
+    fn unshared_by_two<S: Shears>(
+        blocks: [&TriangleBlock; 2],
+        rays: [&S; 2],
+        rests: [&[f32; 4]; 2],
+    ) -> [[wide::Avx512; 3]; 3] {
+        let splat = wide::Avx512::splat_two;
+        let last = LastEight::new();
+        let [a, b] = [super::opaque(rays[0]), super::opaque(rays[1])];
+        let ([ax, ay, az, _], [bx, by, bz, _]) = (*a.origin(), *b.origin());
+        let origin = [splat(ax, bx, last), splat(ay, by, last), splat(az, bz, last)];
+        let rest = [splat(rests[0][0], rests[1][0], last), splat(rests[0][1], rests[1][1], last)];
+        let shear = [splat(a.shear()[0], b.shear()[0], last), splat(a.shear()[1], b.shear()[1], last)];
+        let [rows_a, rows_b] = [Self::rows_of(blocks[0], a), Self::rows_of(blocks[1], b)];
+        let [first, second] = [blocks[0].coordinates().as_ptr(), blocks[1].coordinates().as_ptr()];
+        let mut corners = [[wide::Avx512::zeroed(); 3]; 3];
+        for (corner, sheared) in corners.iter_mut().enumerate() {
+            let mut arms = [wide::Avx512::zeroed(); 3];
+            for (axis, arm) in arms.iter_mut().enumerate() {
+                let (of_a, of_b) = (rows_a[axis] as usize, rows_b[axis] as usize);
+                let own = FIRST_UNSHARED + BLOCK * corner;
+                // SAFETY: see `X86`. Rows begin at 62 at most, and no more of them than 27 are looked at, in arrays of 96.
+                let vertices = unsafe {
+                    let low = _mm256_loadu_ps(first.add(of_a + own));
+                    let high = _mm256_loadu_ps(second.add(of_b + own));
+                    wide::Avx512::new(_mm512_insertf32x8::<1>(_mm512_castps256_ps512(low), high))
+                };
+                *arm = origin[axis] - vertices;
+            }
+            let [across, up, z] = arms;
+            *sheared = [shear[0].times_from(z, across + rest[0]), shear[1].times_from(z, up + rest[1]), z];
+        }
+        let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = corners;
+        [[ax, bx, cx], [ay, by, cy], [az, bz, cz]]
+    }
+}
+
+/// Which sixteen numbers go with which level, and what is different with them.
+pub(crate) trait HasWide<const AVX512: bool> {
+    type Wide: Wide<Half = wide::Eight256<AVX512>>;
+
+    /// [`X86::sheared_corners`] of two blocks, each by its ray: those of the first, and those of the second.
+    fn corners_by_two<S: Shears>(blocks: [&TriangleBlock; 2], rays: [&S; 2]) -> [[Self::Wide; 3]; 3];
+}
+
+impl<const LEAKS: bool> HasWide<true> for X86<true, LEAKS> {
+    type Wide = wide::Avx512;
+
+    #[inline(always)]
+    fn corners_by_two<S: Shears>(blocks: [&TriangleBlock; 2], rays: [&S; 2]) -> [[Self::Wide; 3]; 3] {
+        let [first, second] = [blocks[0].is_unshared(), blocks[1].is_unshared()];
+        if !(first | second) {
+            return Self::shared_by_two(blocks, rays);
+        }
+        // Where there are no rests, there is so little to do that it pays no more to put both side by side first.
+        if !LEAKS
+            && first & second
+            && let (Some(a), Some(b)) = (rays[0].rest(), rays[1].rest())
+        {
+            return Self::unshared_by_two(blocks, rays, [a, b]);
+        }
+        Self::corners_of_each(blocks, rays)
+    }
+}
+
+impl<const LEAKS: bool> HasWide<false> for X86<false, LEAKS> {
+    type Wide = wide::Avx2;
+
+    #[inline(always)]
+    fn corners_by_two<S: Shears>(blocks: [&TriangleBlock; 2], rays: [&S; 2]) -> [[Self::Wide; 3]; 3] {
+        Self::corners_of_each(blocks, rays)
+    }
+}
+
+impl<const AVX512: bool, const LEAKS: bool> Lanes for X86<AVX512, LEAKS>
+where
+    Self: HasWide<AVX512>,
+{
+    type Eight = wide::Eight256<AVX512>;
+    type Edges = Edges<Self::Eight>;
+    type EdgesByTwo = Edges<Self::Wide>;
+    type Wide = <Self as HasWide<AVX512>>::Wide;
+    const MEETS_BY_TWO: bool = AVX512;
+    const STARTS_BY_FOUR: bool = true;
+    // Packets take twice the instructions then, and a ray alone hardly more.
+    const GOES_ON_TOGETHER: bool = AVX512;
+
+    #[inline(always)]
+    fn level() -> Level {
+        Level(if AVX512 { Set::Avx512 } else { Set::Avx2 })
+    }
+
+    #[inline(always)]
+    fn start_nearby(units: &Units, ray: &Ray, t_min: f64, t_max: f64, boxes: &mut BoxRay) -> bool {
+        // As the portable one, three axes at a time.
+        // SAFETY: see `X86`. The loads are of three f64 in arrays of three, and of four in arrays of four; the stores of
+        // four f32 into arrays of four.
+        unsafe {
+            let origin = Self::three(&ray.origin);
+            let direction = Self::three(&ray.direction);
+            let scale = _mm256_set1_pd(units.scale);
+            let tree_origin = _mm256_loadu_pd(units.padded_origin.as_ptr());
+            let start = _mm256_mul_pd(_mm256_sub_pd(origin, tree_origin), scale);
+            let direction = _mm256_mul_pd(direction, scale);
+            let sign = _mm256_set1_pd(-0.0);
+            let distance = _mm256_andnot_pd(sign, start);
+            let size = _mm256_andnot_pd(sign, direction);
+            let fits = _mm256_and_pd(
+                _mm256_cmp_pd::<_CMP_LE_OQ>(distance, _mm256_set1_pd(units.near)),
+                _mm256_cmp_pd::<_CMP_LE_OQ>(size, _mm256_set1_pd(LARGEST_NEAR)),
+            );
+            let is_long = _mm256_cmp_pd::<_CMP_GE_OQ>(size, _mm256_set1_pd(SMALLEST_NEAR));
+            let is_near = _mm256_movemask_pd(fits) == 0b1111 && _mm256_movemask_pd(is_long) != 0;
+            if !(is_near && 0.0 <= t_min && t_min <= t_max) {
+                return false;
+            }
+            let size = _mm256_max_pd(size, _mm256_set1_pd(TINY_NEAR));
+            let signs = _mm256_and_pd(direction, sign);
+            // Always of 1 over something: the sign is put on again afterwards.
+            let size = _mm256_div_pd(_mm256_set1_pd(1.0), size);
+            let inverse = _mm256_or_pd(size, signs);
+            let per_distance = _mm256_set1_pd(units.margin_per_distance);
+            let margin = _mm256_mul_pd(
+                size,
+                _mm256_fmadd_pd(distance, per_distance, _mm256_set1_pd(units.near_margin)),
+            );
+            let near = _mm256_fnmsub_pd(start, inverse, margin);
+            let far = _mm256_fnmadd_pd(start, inverse, margin);
+            let slabs = &mut boxes.slabs;
+            _mm_storeu_ps(slabs.inverse.as_mut_ptr(), _mm256_cvtpd_ps(inverse));
+            _mm_storeu_ps(slabs.near_offset.as_mut_ptr(), _mm256_cvtpd_ps(near));
+            _mm_storeu_ps(slabs.far_offset.as_mut_ptr(), _mm256_cvtpd_ps(far));
+            slabs.sides = Sides::new(_mm256_movemask_pd(direction) as u32);
+        }
+        boxes.set_range_nearby(t_min, t_max);
+        true
+    }
+
+    #[inline(always)]
+    fn start_single(start: &SingleStart, ray: &Ray) -> Option<Slabs> {
+        let (origin, direction, range) = Self::parts(Self::halves(ray));
+        // SAFETY: see `X86`.
+        let (direction, range) = unsafe { (_mm256_cvtpd_ps(direction), _mm_cvtpd_ps(range)) };
+        Self::slabs(start, origin, direction, range)
+    }
+
+    #[inline(always)]
+    fn read(ray: &Ray) -> Ray {
+        let from = Self::numbers(ray);
+        // SAFETY: see `X86`. Eight numbers of a ray are read. Volatile, for the compiler would else read in one what has to be read one by
+        // one.
+        unsafe {
+            let at = |i: usize| from.add(i).read_volatile();
+            let (first, last) =
+                (_mm256_setr_pd(at(0), at(1), at(2), at(3)), _mm256_setr_pd(at(4), at(5), at(6), at(7)));
+            Self::of_halves(first, last, ray.time)
+        }
+    }
+
+    #[inline(always)]
+    fn read_narrow(ray: &Ray32) -> Ray32 {
+        let from = Self::narrow_start(ray);
+        let mut own = MaybeUninit::<Ray32>::uninit();
+        let to: *mut f32 = own.as_mut_ptr().cast();
+        // SAFETY: as there. A ray is eight f32, which are all read, and written.
+        unsafe {
+            let at = |i: usize| from.add(i).read_volatile();
+            _mm_storeu_ps(to, _mm_setr_ps(at(0), at(1), at(2), at(3)));
+            _mm_storeu_ps(to.add(4), _mm_setr_ps(at(4), at(5), at(6), at(7)));
+            own.assume_init()
+        }
+    }
+
+    #[inline(always)]
+    fn start_narrow(start: &SingleStart, ray: &Ray32) -> Option<Slabs> {
+        // As the portable one, three axes at a time.
+        // SAFETY: see `X86`. The loads are of arrays of four.
+        unsafe {
+            let (origin, direction) = Self::narrow_numbers(ray);
+            // Fused or not: units are powers of two.
+            let from = _mm_fmsub_ps(
+                Self::local(start, origin),
+                _mm_set1_ps(start.units_per_space),
+                _mm_loadu_ps(start.shift.as_ptr()),
+            );
+            let sign = _mm_set1_ps(-0.0);
+            let (distance, length) = (_mm_andnot_ps(sign, from), _mm_andnot_ps(sign, direction));
+            // Every comparison with a NaN is false. The last of four: t_min is not below zero, and t_min <= t_max.
+            let farthest = _mm_loadu_ps(start.farthest.as_ptr());
+            let size = _mm_blend_ps::<0b1000>(length, origin);
+            let largest = _mm_blend_ps::<0b1000>(_mm_loadu_ps(start.longest.as_ptr()), direction);
+            let shortest = _mm_set1_ps(start.shortest);
+            let (fits, is_long) = if AVX512 {
+                let is_near = _mm_cmp_ps_mask::<_CMP_LE_OQ>(distance, farthest);
+                let fits = _mm_mask_cmp_ps_mask::<_CMP_LE_OQ>(is_near, size, largest);
+                let sign_of_last = _mm_setr_epi32(0, 0, 0, i32::MIN);
+                let fits = _mm_mask_testn_epi32_mask(fits, _mm_castps_si128(origin), sign_of_last);
+                (fits == 0b1111, _mm_cmp_ps_mask::<_CMP_GE_OQ>(length, shortest) & 0b111 != 0)
+            } else {
+                let fits = _mm_and_ps(_mm_cmple_ps(distance, farthest), _mm_cmple_ps(size, largest));
+                let is_before = _mm_movemask_ps(origin) & 0b1000 != 0;
+                let is_long = _mm_movemask_ps(_mm_cmpge_ps(length, shortest)) & 0b111 != 0;
+                (_mm_movemask_ps(fits) == 0b1111 && !is_before, is_long)
+            };
+            if !(fits && is_long) {
+                return None;
+            }
+            let size = _mm_max_ps(length, _mm_set1_ps(start.tiny));
+            let size = _mm_div_ps(_mm_set1_ps(start.space_per_unit), size);
+            let inverse = _mm_or_ps(size, _mm_and_ps(direction, sign));
+            let per_distance = _mm_set1_ps(Units::NARROW_MARGIN_PER_DISTANCE);
+            let margin =
+                _mm_mul_ps(size, _mm_fmadd_ps(distance, per_distance, _mm_set1_ps(start.narrow_margin)));
+            let (near, far) = (_mm_fnmsub_ps(from, inverse, margin), _mm_fnmadd_ps(from, inverse, margin));
+            // Of the fourth numbers. Not fused.
+            let first = _mm_mul_ps(origin, _mm_set1_ps(START_FACTOR));
+            let last = _mm_mul_ps(direction, _mm_set1_ps(END_FACTOR));
+            let last = _mm_add_ps(last, _mm_set1_ps(LITTLE as f32));
+            Some(Slabs {
+                inverse: Self::array(inverse),
+                near_offset: Self::array(_mm_blend_ps::<0b1000>(near, first)),
+                far_offset: Self::array(_mm_blend_ps::<0b1000>(far, last)),
+                sides: Sides::new(_mm_movemask_ps(direction) as u32),
+            })
+        }
+    }
+
+    #[inline(always)]
+    fn start_narrow_blocks(start: &SingleStart, ray: &Ray32, slabs: &Slabs) -> F32Ray {
+        // SAFETY: see `X86`. The loads are of arrays of four.
+        unsafe {
+            let (origin, direction) = Self::narrow_numbers(ray);
+            let local = Self::local(start, origin);
+            let axes = Self::narrow_axes(direction);
+            let order = _mm_loadu_si128(axes.order.as_ptr().cast());
+            let last = _mm_shuffle_epi32::<0b10_10_10_10>(order);
+            let inverse = _mm_permutevar_ps(_mm_loadu_ps(slabs.inverse.as_ptr()), last);
+            let inverse = _mm_mul_ps(inverse, _mm_set1_ps(start.units_per_space));
+            // The fourth stays where it is: the start and the end of the ray.
+            let shear = _mm_blend_ps::<0b1000>(_mm_mul_ps(direction, inverse), direction);
+            let shear = _mm_permutevar_ps(shear, order);
+            F32Ray {
+                axes,
+                origin: Self::array(_mm_permutevar_ps(local, order)),
+                shear: Self::array(shear),
+                minus_inverse: -_mm_cvtss_f32(inverse),
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn start_narrow_by_four(
+        start: &SingleStart,
+        rays: [&Ray32; 4],
+        places: [(&mut Slabs, &mut F32Ray); 4],
+    ) -> u32 {
+        if !AVX512 {
+            let ([a, b, c, d], [for_a, for_b, for_c, for_d]) = (rays, places);
+            let first = Self::start_narrow_by_two(start, [a, b], [for_a, for_b]);
+            return first | Self::start_narrow_by_two(start, [c, d], [for_c, for_d]) << 2;
+        }
+        /// The last of each four.
+        const LAST: u16 = 0x8888;
+        // As `start_narrow` and `start_narrow_blocks`, four numbers of each ray behind those of the one before.
+        // SAFETY: see `X86`. Rays are eight f32 each, and the other loads are of arrays of four.
+        unsafe {
+            let [a, b, c, d] = rays;
+            let numbers =
+                [Self::narrow_start(a), Self::narrow_start(b), Self::narrow_start(c), Self::narrow_start(d)];
+            let (origin, direction) = (Self::fours(numbers, 0), Self::fours(numbers, 4));
+            let local = if let Some(mesh_origin) = &start.single_mesh_origin {
+                _mm512_sub_ps(origin, Self::four_times(mesh_origin))
+            } else {
+                let mesh_origin = _mm512_broadcast_f64x4(_mm256_loadu_pd(start.mesh_origin.as_ptr()));
+                let (first, last) = (_mm512_castps512_ps256(origin), _mm512_extractf32x8_ps::<1>(origin));
+                let first = _mm512_cvtpd_ps(_mm512_sub_pd(_mm512_cvtps_pd(first), mesh_origin));
+                let last = _mm512_cvtpd_ps(_mm512_sub_pd(_mm512_cvtps_pd(last), mesh_origin));
+                _mm512_insertf32x8::<1>(_mm512_castps256_ps512(first), last)
+            };
+            let units_per_space = _mm512_set1_ps(start.units_per_space);
+            let from = _mm512_fmsub_ps(local, units_per_space, Self::four_times(&start.shift));
+            let (distance, length) = (_mm512_abs_ps(from), _mm512_abs_ps(direction));
+            let size = _mm512_mask_blend_ps(LAST, length, origin);
+            let largest = _mm512_mask_blend_ps(LAST, Self::four_times(&start.longest), direction);
+            let is_near = _mm512_cmp_ps_mask::<_CMP_LE_OQ>(distance, Self::four_times(&start.farthest));
+            let fits = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(is_near, size, largest);
+            let sign_of_last = _mm512_maskz_set1_epi32(LAST, i32::MIN);
+            let fits = _mm512_mask_testn_epi32_mask(fits, _mm512_castps_si512(origin), sign_of_last);
+            let is_long = _mm512_cmp_ps_mask::<_CMP_GE_OQ>(length, _mm512_set1_ps(start.shortest));
+            let tiny_or_more = _mm512_max_ps(length, _mm512_set1_ps(start.tiny));
+            let size = _mm512_div_ps(_mm512_set1_ps(start.space_per_unit), tiny_or_more);
+            let sign = _mm512_set1_ps(-0.0);
+            let inverse = _mm512_or_ps(size, _mm512_and_ps(direction, sign));
+            let per_distance = _mm512_set1_ps(Units::NARROW_MARGIN_PER_DISTANCE);
+            let margin = _mm512_fmadd_ps(distance, per_distance, _mm512_set1_ps(start.narrow_margin));
+            let margin = _mm512_mul_ps(size, margin);
+            let first = _mm512_mul_ps(origin, _mm512_set1_ps(START_FACTOR));
+            let last = _mm512_mul_ps(direction, _mm512_set1_ps(END_FACTOR));
+            let last = _mm512_add_ps(last, _mm512_set1_ps(LITTLE as f32));
+            let near = _mm512_mask_blend_ps(LAST, _mm512_fnmsub_ps(from, inverse, margin), first);
+            let far = _mm512_mask_blend_ps(LAST, _mm512_fnmadd_ps(from, inverse, margin), last);
+            let signs = u32::from(_mm512_movepi32_mask(_mm512_castps_si512(direction)));
+            // x, y, x and y, z, z.
+            let sizes = u32::from(_mm512_cmp_ps_mask::<_CMP_GE_OQ>(
+                _mm512_shuffle_ps::<0b00_00_01_00>(length, length),
+                _mm512_shuffle_ps::<0b10_10_10_01>(length, length),
+            ));
+            let axes = [
+                Axes::by_bits(signs, sizes),
+                Axes::by_bits(signs >> 4, sizes >> 4),
+                Axes::by_bits(signs >> 8, sizes >> 8),
+                Axes::by_bits(signs >> 12, sizes >> 12),
+            ];
+            let orders = [
+                axes[0].order.as_ptr().cast(),
+                axes[1].order.as_ptr().cast(),
+                axes[2].order.as_ptr().cast(),
+                axes[3].order.as_ptr().cast(),
+            ];
+            let order = _mm512_castps_si512(Self::fours(orders, 0));
+            let of_last = _mm512_permutevar_ps(inverse, _mm512_shuffle_epi32::<0b10_10_10_10>(order));
+            let of_last = _mm512_mul_ps(of_last, units_per_space);
+            let shear = _mm512_mask_blend_ps(LAST, _mm512_mul_ps(direction, of_last), direction);
+            let (shear, local) = (_mm512_permutevar_ps(shear, order), _mm512_permutevar_ps(local, order));
+            let minus_inverse = _mm512_xor_ps(of_last, sign);
+            let (inverse, near, far) = (Self::by_four(inverse), Self::by_four(near), Self::by_four(far));
+            let (shear, local, minus_inverse) =
+                (Self::by_four(shear), Self::by_four(local), Self::by_four(minus_inverse));
+            let (fits, is_long) = (u32::from(fits), u32::from(is_long));
+            let mut fit = 0;
+            for (i, (slabs, narrow)) in places.into_iter().enumerate() {
+                slabs.inverse = inverse[i];
+                slabs.near_offset = near[i];
+                slabs.far_offset = far[i];
+                slabs.sides = Sides::new(signs >> (4 * i));
+                narrow.axes = axes[i];
+                narrow.origin = local[i];
+                narrow.shear = shear[i];
+                narrow.minus_inverse = minus_inverse[i][0];
+                let is_fit = fits >> (4 * i) & 0b1111 == 0b1111 && is_long >> (4 * i) & 0b111 != 0;
+                fit |= u32::from(is_fit) << i;
+            }
+            fit
+        }
+    }
+
+    #[inline(always)]
+    fn narrow_corners<const IS_ALONE: bool>(
+        block: &TriangleBlock,
+        ray: &F32Ray,
+    ) -> [[wide::Eight256<AVX512>; 3]; 3] {
+        Self::eights(Self::sheared_corners::<_, IS_ALONE>(block, ray))
+    }
+
+    #[inline(always)]
+    fn narrow_corners_by_two(blocks: [&TriangleBlock; 2], rays: [&F32Ray; 2]) -> [[Self::Wide; 3]; 3] {
+        Self::corners_by_two(blocks, rays)
+    }
+
+    #[inline(always)]
+    fn start_placed(
+        start: &SingleStart,
+        map: &Transform,
+        ray: &Ray,
+        [t_min, t_max]: [f64; 2],
+    ) -> (Ray, Option<Slabs>) {
+        let DAffine3 { matrix3: linear, translation } = map.inverse_affine();
+        // The very operations of `Ray::into_object`, three axes at a time. The slabs are made of what is in registers still: to read
+        // the ray again, which was just written by parts, would have to wait.
+        // SAFETY: see `X86`.
+        unsafe {
+            let (x, y, z) =
+                (Self::three(&linear.x_axis), Self::three(&linear.y_axis), Self::three(&linear.z_axis));
+            let (from, along) = (&ray.origin, &ray.direction);
+            let origin = _mm256_mul_pd(x, _mm256_set1_pd(from.x));
+            let origin = _mm256_add_pd(origin, _mm256_mul_pd(y, _mm256_set1_pd(from.y)));
+            let origin = _mm256_add_pd(origin, _mm256_mul_pd(z, _mm256_set1_pd(from.z)));
+            let origin = _mm256_add_pd(origin, Self::three(translation));
+            let direction = _mm256_mul_pd(x, _mm256_set1_pd(along.x));
+            let direction = _mm256_add_pd(direction, _mm256_mul_pd(y, _mm256_set1_pd(along.y)));
+            let direction = _mm256_add_pd(direction, _mm256_mul_pd(z, _mm256_set1_pd(along.z)));
+            let ends = _mm_setr_pd(t_min, t_max);
+            let slabs = Self::slabs(start, origin, _mm256_cvtpd_ps(direction), _mm_cvtpd_ps(ends));
+            let first = _mm256_blend_pd::<0b1000>(origin, _mm256_permute4x64_pd::<0b00_00_00_00>(direction));
+            let rest = _mm256_castpd256_pd128(_mm256_permute4x64_pd::<0b00_00_10_01>(direction));
+            let last = _mm256_insertf128_pd::<1>(_mm256_castpd128_pd256(rest), ends);
+            let ray = Self::of_halves(first, last, ray.time);
+            (ray, slabs)
+        }
+    }
+
+    #[inline(always)]
+    fn start_blocks(start: &SingleStart, ray: &Ray, slabs: &Slabs) -> (BlockRay, f32) {
+        // As the portable one, three axes at a time.
+        // SAFETY: see `X86`. The loads are of arrays of four.
+        unsafe {
+            let (origin, direction, range) = Self::parts(Self::halves(ray));
+            let axes = Self::axes_of(direction);
+            let (direction, range) = (_mm256_cvtpd_ps(direction), _mm_cvtpd_ps(range));
+            let exact = _mm256_sub_pd(origin, _mm256_loadu_pd(start.mesh_origin.as_ptr()));
+            let origin = _mm256_cvtpd_ps(exact);
+            let rest = if LEAKS {
+                _mm_setzero_ps()
+            } else {
+                _mm256_cvtpd_ps(_mm256_sub_pd(exact, _mm256_cvtps_pd(origin)))
+            };
+            let range = _mm_movelh_ps(range, range);
+
+            let sign = _mm_set1_ps(-0.0);
+            let length = _mm_andnot_ps(sign, direction);
+            let order = _mm_loadu_si128(axes.order.as_ptr().cast());
+            let last = _mm_shuffle_epi32::<0b10_10_10_10>(order);
+            let inverse = _mm_permutevar_ps(_mm_loadu_ps(slabs.inverse.as_ptr()), last);
+            let inverse = _mm_mul_ps(inverse, _mm_set1_ps(start.units_per_space));
+            let length = _mm_permutevar_ps(length, last);
+            // Start, end, start, end; none of them negative.
+            let heights = _mm_min_ps(_mm_mul_ps(range, length), _mm_set1_ps(FAR));
+            const LESS: f32 = 1.0 - ROUNDINGS;
+            const MORE: f32 = 1.0 + ROUNDINGS;
+            let heights = _mm_mul_ps(heights, _mm_setr_ps(LESS, MORE, MORE, LESS));
+            let shear = _mm_permutevar_ps(_mm_mul_ps(direction, inverse), order);
+            let rest = _mm_permutevar_ps(rest, order);
+            // Only of the first two: the shear of the last would be one.
+            let sheared = _mm_fnmadd_ps(shear, _mm_shuffle_ps::<0b10_10_10_10>(rest, rest), rest);
+            let blocks = BlockRay {
+                axes,
+                origin: Self::array(_mm_permutevar_ps(origin, order)),
+                rest: Self::array(_mm_blend_ps::<0b1100>(sheared, rest)),
+                shear: Self::array(shear),
+                least_size: start.least_size,
+                range: std::mem::transmute::<[f32; 4], HeightRange>(Self::array(heights)),
+                turn: _mm_cvtss_f32(_mm_andnot_ps(inverse, sign)),
+            };
+            (blocks, _mm_cvtss_f32(_mm_andnot_ps(sign, inverse)))
+        }
+    }
+
+    #[inline(always)]
+    fn narrow_rows(rays: &[Ray32; WIDE], rows: &mut [Row<f32>; 8]) {
+        let (first, last) = rays.split_at(8);
+        let (Ok(first), Ok(last)) = (first.try_into(), last.try_into()) else {
+            unreachable!("sixteen are twice eight")
+        };
+        let (low, high) = (Self::rows_of_eight(first), Self::rows_of_eight(last));
+        for (row, (low, high)) in rows.iter_mut().zip(low.into_iter().zip(high)) {
+            // SAFETY: see `X86`. The stores are of sixteen f32, or of eight from the first or the ninth on, into an array of sixteen.
+            unsafe {
+                let row = row.0.as_mut_ptr();
+                if AVX512 {
+                    // As wide as it is read: what is put together of two writes is waited for.
+                    let both = _mm512_insertf64x4::<1>(
+                        _mm512_castps_pd(_mm512_castps256_ps512(low)),
+                        _mm256_castps_pd(high),
+                    );
+                    _mm512_storeu_ps(row, _mm512_castpd_ps(both));
+                } else {
+                    _mm256_storeu_ps(row, low);
+                    _mm256_storeu_ps(row.add(8), high);
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn columns(rays: &[Ray; WIDE], columns: &mut [Row<f64>; 8]) {
+        if AVX512 {
+            Self::columns_by_eight(rays, columns);
+            return;
+        }
+        for four in 0..WIDE / 4 {
+            for half in 0..2 {
+                let at = |i: usize| Self::numbers(&rays[4 * four + i]).wrapping_add(4 * half);
+                let (a, b, c, d) = (at(0), at(1), at(2), at(3));
+                let columns = &mut columns[4 * half..][..4];
+                // SAFETY: see `X86`. The loads are of the first or the last four of the eight numbers of a ray, see above; the
+                // stores of four f64 from a multiple of four below sixteen on, into arrays of sixteen.
+                unsafe {
+                    let (a, b) = (_mm256_loadu_pd(a), _mm256_loadu_pd(b));
+                    let (c, d) = (_mm256_loadu_pd(c), _mm256_loadu_pd(d));
+                    let (even, odd) = (_mm256_unpacklo_pd(a, b), _mm256_unpackhi_pd(a, b));
+                    let (more_even, more_odd) = (_mm256_unpacklo_pd(c, d), _mm256_unpackhi_pd(c, d));
+                    let of_four = [
+                        _mm256_permute2f128_pd::<0x20>(even, more_even),
+                        _mm256_permute2f128_pd::<0x20>(odd, more_odd),
+                        _mm256_permute2f128_pd::<0x31>(even, more_even),
+                        _mm256_permute2f128_pd::<0x31>(odd, more_odd),
+                    ];
+                    for (column, of_four) in columns.iter_mut().zip(of_four) {
+                        _mm256_storeu_pd(column.0.as_mut_ptr().add(4 * four), of_four);
+                    }
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn meet_triangles<const IS_ALONE: bool>(block: &TriangleBlock, ray: &BlockRay) -> (u32, Self::Edges) {
+        let corners = Self::eights(Self::sheared_corners::<_, IS_ALONE>(block, ray));
+        let (mask, edges) = Edges::of::<LEAKS>(corners, Self::Eight::splat(ray.least_size));
+        (mask & block.taken(), edges)
+    }
+
+    #[inline(always)]
+    fn meet_triangles_by_two(blocks: [&TriangleBlock; 2], rays: [&BlockRay; 2]) -> (u32, Self::EdgesByTwo) {
+        if !AVX512 {
+            let (first, of_first) = Self::meet_triangles::<false>(blocks[0], rays[0]);
+            let (second, of_second) = Self::meet_triangles::<false>(blocks[1], rays[1]);
+            return (first | second << BLOCK, Edges::of_two(&of_first, &of_second));
+        }
+        let least_size = Self::Wide::splat_two(rays[0].least_size, rays[1].least_size, LastEight::new());
+        let (mask, edges) = Edges::of::<LEAKS>(Self::corners_by_two(blocks, rays), least_size);
+        (mask & (blocks[0].taken() | blocks[1].taken() << BLOCK), edges)
+    }
+
+    #[inline(always)]
+    fn edges_of(both: &Self::EdgesByTwo, which: usize) -> Self::Edges {
+        both.half(which)
+    }
+
+    #[inline(always)]
+    fn truncated(numbers: &[f32; BLOCK]) -> [i32; BLOCK] {
+        let mut whole = [0; BLOCK];
+        // SAFETY: see `X86`. The load and the store are of eight numbers in arrays of eight.
+        unsafe {
+            let truncated = _mm256_cvttps_epi32(_mm256_loadu_ps(numbers.as_ptr()));
+            _mm256_storeu_si256(whole.as_mut_ptr().cast(), truncated);
+        }
+        whole
+    }
+
+    #[inline(always)]
+    fn equals_before(list: &[u32; 3 * BLOCK]) -> [u32; 3 * BLOCK] {
+        let mut equals = [0; 3 * BLOCK];
+        // SAFETY: see `X86`. The loads and stores are of eight or sixteen numbers of arrays of twenty-four.
+        unsafe {
+            if AVX512 {
+                let (first, last) = list.split_at(2 * BLOCK);
+                let sixteen = _mm512_loadu_si512(first.as_ptr().cast());
+                _mm512_storeu_si512(equals.as_mut_ptr().cast(), _mm512_conflict_epi32(sixteen));
+                let eight = _mm256_loadu_si256(last.as_ptr().cast());
+                let before = _mm256_slli_epi32::<16>(_mm256_conflict_epi32(eight));
+                _mm256_storeu_si256(equals.as_mut_ptr().add(2 * BLOCK).cast(), before);
+                for (equals, &number) in equals[2 * BLOCK..].iter_mut().zip(last) {
+                    let number = _mm512_set1_epi32(number as i32);
+                    *equals |= u32::from(_mm512_cmpeq_epi32_mask(sixteen, number));
+                }
+                return equals;
+            }
+            let (eights, _) = list.as_chunks::<BLOCK>();
+            for last in 0..3 {
+                for at in BLOCK * last..BLOCK * (last + 1) {
+                    let number = _mm256_set1_epi32(list[at] as i32);
+                    // None of the eights behind its own comes before it.
+                    for (i, eight) in eights[..=last].iter().enumerate() {
+                        let is_equal = _mm256_cmpeq_epi32(_mm256_loadu_si256(eight.as_ptr().cast()), number);
+                        let mask = _mm256_movemask_ps(_mm256_castsi256_ps(is_equal)) as u32;
+                        equals[at] |= mask << (BLOCK * i);
+                    }
+                    equals[at] &= (1 << at) - 1;
+                }
+            }
+        }
+        equals
+    }
+
+    #[inline(always)]
+    fn corners<'a>(block: &'a TriangleBlock, room: &'a mut CornersRoom) -> &'a Corners {
+        if block.is_unshared() {
+            return block.own_corners();
+        }
+        let CornersRoom(corners) = room;
+        let coordinates = block.coordinates().as_ptr();
+        let room = block.room();
+        let far = far_of_last(room);
+        // No `map`: it does not take on the instruction set of who calls it.
+        let [a, b, c] = *block.corners();
+        let places = [Self::places(a), Self::places(b), Self::places(c)];
+        // SAFETY: see `X86`. A row begins at 62 at most, in an array of 96: behind that are 32 more, and no more are looked at.
+        unsafe {
+            for (axis, corners) in corners.iter_mut().enumerate() {
+                let row = coordinates.add(axis * room);
+                for (corner, &places) in corners.iter_mut().zip(&places) {
+                    let found = if AVX512 {
+                        Self::of_sixteen(_mm512_loadu_ps(row), places)
+                    } else {
+                        Self::of_two(_mm256_loadu_ps(row), Self::far(row, far), places)
+                    };
+                    _mm256_storeu_ps(corner.as_mut_ptr(), found);
+                }
+            }
+        }
+        corners
+    }
+
+    #[inline(always)]
+    fn place_crossings(edges: &Self::Edges, ray: &BlockRay) -> Crossings<wide::Eight256<AVX512>> {
+        // SAFETY: see `X86`.
+        unsafe {
+            let ([u, v, w], [a, b, c]) = (edges.values, edges.heights);
+            let ([u, v, w], z) = ([u.raw(), v.raw(), w.raw()], [a.raw(), b.raw(), c.raw()]);
+            let (minus_error, height_error) = (edges.minus_error.raw(), edges.height_error.raw());
+            let sign = _mm256_set1_ps(-0.0);
+            let det = _mm256_add_ps(_mm256_add_ps(u, v), w);
+            let weight = _mm256_andnot_ps(sign, det);
+            let of_a_and_b = _mm256_fmadd_ps(v, z[1], _mm256_mul_ps(u, z[0]));
+            let of_c = _mm256_mul_ps(w, z[2]);
+            let of_c = if LEAKS { of_c } else { _mm256_fmadd_ps(det, _mm256_set1_ps(ray.rest[2]), of_c) };
+            let height = _mm256_add_ps(of_a_and_b, of_c);
+            let turn = _mm256_xor_ps(_mm256_set1_ps(ray.turn), _mm256_and_ps(det, sign));
+            let ahead = _mm256_xor_ps(height, turn);
+            let inverse = _mm256_div_ps(_mm256_set1_ps(1.0), weight);
+            let range = &ray.range;
+            if LEAKS {
+                let at = _mm256_mul_ps(ahead, inverse);
+                let in_range = Self::both::<_CMP_GE_OQ, _CMP_LE_OQ>(
+                    [at, _mm256_set1_ps(range.first)],
+                    [at, _mm256_set1_ps(range.last)],
+                );
+                let in_range = in_range & Self::compare::<_CMP_GT_OQ>(weight, _mm256_setzero_ps());
+                let at = wide::Eight256::new(at);
+                return Crossings { in_range, sure: in_range, from: at, to: at };
+            }
+            let low = _mm256_min_ps(_mm256_min_ps(z[0], z[1]), z[2]);
+            let high = _mm256_max_ps(_mm256_max_ps(z[0], z[1]), z[2]);
+            let along_edges = _mm256_fmadd_ps(
+                height_error,
+                _mm256_fmadd_ps(minus_error, _mm256_set1_ps(-ERRORS_OF_EDGES), weight),
+                _mm256_set1_ps(TINY),
+            );
+            let spread = _mm256_fmadd_ps(
+                _mm256_mul_ps(minus_error, _mm256_set1_ps(-ERRORS_OF_EXTENT)),
+                _mm256_sub_ps(high, low),
+                along_edges,
+            );
+            let (from, to) = (_mm256_sub_ps(ahead, spread), _mm256_add_ps(ahead, spread));
+            // What is no number may be in range.
+            let in_range = Self::both::<_CMP_NLT_UQ, _CMP_NGT_UQ>(
+                [to, _mm256_mul_ps(weight, _mm256_set1_ps(range.first))],
+                [from, _mm256_mul_ps(weight, _mm256_set1_ps(range.last))],
+            );
+            let error = _mm256_xor_ps(minus_error, sign);
+            let inside = Self::compare::<_CMP_GT_OQ>(edges.within.raw(), error);
+            let surely_in_range = Self::both::<_CMP_GE_OQ, _CMP_LE_OQ>(
+                [from, _mm256_mul_ps(weight, _mm256_set1_ps(range.surely_first))],
+                [to, _mm256_mul_ps(weight, _mm256_set1_ps(range.surely_last))],
+            );
+            let (from, to) = (_mm256_mul_ps(from, inverse), _mm256_mul_ps(to, inverse));
+            let (from, to) = (wide::Eight256::new(from), wide::Eight256::new(to));
+            Crossings { in_range, sure: inside & surely_in_range, from, to }
+        }
+    }
+
+    #[inline(always)]
+    fn shear(ray: &Ray, axes: &'static Axes, mesh_origin: &[f64; 4]) -> (Shear, [f64; 3]) {
+        if LEAKS {
+            return Self::rounded_shear(ray, axes, mesh_origin);
+        }
+        let (origin, direction, _) = Self::parts(Self::halves(ray));
+        // SAFETY: see `X86`. The loads are of arrays of four and eight.
+        unsafe {
+            let halves = _mm256_loadu_si256(axes.halves.as_ptr().cast());
+            let origin = _mm256_sub_pd(origin, _mm256_loadu_pd(mesh_origin.as_ptr()));
+            let origin = _mm256_permutevar8x32_ps(_mm256_castpd_ps(origin), halves);
+            let direction = _mm256_permutevar8x32_ps(_mm256_castpd_ps(direction), halves);
+            let direction = _mm256_castps_pd(direction);
+            let last = _mm256_permute4x64_pd::<0b10_10_10_10>(direction);
+            let shear = _mm_div_pd(_mm256_castpd256_pd128(direction), _mm256_castpd256_pd128(last));
+            let mut local = [0.0; 4];
+            _mm256_storeu_pd(local.as_mut_ptr(), _mm256_castps_pd(origin));
+            let shear = Shear {
+                axes,
+                x: _mm_cvtsd_f64(shear),
+                y: _mm_cvtsd_f64(_mm_unpackhi_pd(shear, shear)),
+                direction_z: _mm256_cvtsd_f64(last),
+            };
+            (shear, [local[0], local[1], local[2]])
+        }
+    }
+
+    #[inline(always)]
+    fn pass(block: &TriangleBlock, lane: usize, shear: &Shear, origin: &[f64; 3]) -> (Passage, Inside) {
+        if LEAKS {
+            return (Passage::Inside, Self::rounded_inside(block, lane, shear, origin));
+        }
+        // The corners in the first three lanes, and the very operations of the portable one.
+        let [across, up, z] = Self::corners_in(block, lane, shear.axes);
+        // SAFETY: see `X86`.
+        unsafe {
+            let (across, up, z) = (_mm256_cvtps_pd(across), _mm256_cvtps_pd(up), _mm256_cvtps_pd(z));
+            let z = _mm256_sub_pd(z, _mm256_set1_pd(origin[2]));
+            let across = _mm256_sub_pd(across, _mm256_set1_pd(origin[0]));
+            let up = _mm256_sub_pd(up, _mm256_set1_pd(origin[1]));
+            // No fused multiply-add here and below.
+            let x = _mm256_sub_pd(across, _mm256_mul_pd(_mm256_set1_pd(shear.x), z));
+            let y = _mm256_sub_pd(up, _mm256_mul_pd(_mm256_set1_pd(shear.y), z));
+            // c, a, b and b, c, a.
+            let (px, py) =
+                (_mm256_permute4x64_pd::<0b11_01_00_10>(x), _mm256_permute4x64_pd::<0b11_01_00_10>(y));
+            let (qx, qy) =
+                (_mm256_permute4x64_pd::<0b11_00_10_01>(x), _mm256_permute4x64_pd::<0b11_00_10_01>(y));
+            let product = _mm256_mul_pd(px, qy);
+            let edges = _mm256_sub_pd(product, _mm256_mul_pd(py, qx));
+            let zero = _mm256_setzero_pd();
+            let is_negative = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(edges, zero)) & 7;
+            let is_positive = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_GT_OQ>(edges, zero)) & 7;
+            if is_positive != 7 && is_negative != 7 {
+                let is_zero = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_EQ_OQ>(edges, zero)) & 7;
+                let is_unclear = is_zero | is_positive == 7 || is_zero | is_negative == 7;
+                return (if is_unclear { Passage::Unclear } else { Passage::Outside }, Inside::NONE);
+            }
+            let (u, w) = (_mm256_castpd256_pd128(edges), _mm256_extractf128_pd::<1>(edges));
+            let v = _mm_unpackhi_pd(u, u);
+            let det = _mm_add_sd(_mm_add_sd(u, v), w);
+            let heights = _mm256_mul_pd(edges, z);
+            let (of_a, of_c) = (_mm256_castpd256_pd128(heights), _mm256_extractf128_pd::<1>(heights));
+            let height = _mm_add_sd(_mm_add_sd(of_a, _mm_unpackhi_pd(of_a, of_a)), of_c);
+            let sign = _mm256_set1_pd(-0.0);
+            let size = _mm256_andnot_pd(sign, _mm256_broadcastsd_pd(det));
+            let least = _mm256_mul_pd(_mm256_andnot_pd(sign, product), _mm256_set1_pd(1.0 / 64.0));
+            if _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(size, least)) & 7 != 0 {
+                return (Passage::Unclear, Inside::NONE);
+            }
+            let inside = Inside {
+                height: _mm_cvtsd_f64(height),
+                det: _mm_cvtsd_f64(det),
+                v: _mm_cvtsd_f64(v),
+                w: _mm_cvtsd_f64(w),
+            };
+            (Passage::Inside, inside)
+        }
+    }
+}

@@ -1,0 +1,249 @@
+//! Shapes by eight: a first test in single precision of the bodies around them, which loses none.
+
+use bytemuck::{Pod, Zeroable};
+use lumbre_geometry::{Hull, Ray};
+use lumbre_math::{DMat3, DVec3};
+use rayon::prelude::*;
+
+use crate::build::collapse::Entry;
+use crate::tree::node::{Units, round_up};
+use crate::trace::watertight::BLOCK;
+use crate::{Geometry, GeometryKind};
+
+/// Up to eight hulls (see [`Hull`]), each by its centre, relative to the tree's origin, and the map from there to its cube.
+///
+/// A lane whose numbers are NaN passes every test; one whose body has a height of -∞ none: it is unused.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C, align(32))]
+pub(crate) struct HullBlock {
+    pub(crate) centers: [[f32; BLOCK]; 3],
+    /// `rows[axis][column][lane]`.
+    pub(crate) rows: [[[f32; BLOCK]; 3]; 3],
+    /// Half the extent along y: 1, or 0 of what is flat.
+    pub(crate) heights: [f32; BLOCK],
+    /// c, d and e.
+    pub(crate) profiles: [[f32; BLOCK]; 3],
+    /// Of rings, the radius of the tube; of other solids -1, else 0.
+    pub(crate) tubes: [f32; BLOCK],
+    /// By how much cube coordinates may be wrong for each unit of distance from the centre, 64uN, and apart from that: see
+    /// [`HullRay`].
+    pub(crate) margins: [f32; BLOCK],
+    pub(crate) least_margins: [f32; BLOCK],
+}
+
+const _: () = assert!(size_of::<HullBlock>() == 608);
+
+/// u.
+const ROUNDOFF: f64 = 1.0 / (1u64 << 24) as f64;
+/// A hull that is smaller, by the size of the tree, tells nothing.
+const LARGEST_NORM: f64 = (1u64 << 18) as f64;
+/// By how much a map and its inverse together may stretch.
+const LARGEST_CONDITION: f64 = (1u64 << 16) as f64;
+
+/// What a block needs to know of a hull.
+struct Mapped {
+    hull: Hull,
+    /// Relative to the tree's origin.
+    center: DVec3,
+    /// From space to the cube.
+    rows: [DVec3; 3],
+    /// N.
+    norm: f64,
+    /// S.
+    size: f64,
+}
+
+impl Mapped {
+    /// `None` where single precision tells nothing.
+    fn new(hull: Hull, units: &Units) -> Option<Self> {
+        let back = hull.axes.inverse();
+        let largest_row = |m: &DMat3| (0..3).map(|axis| m.row(axis).abs().element_sum()).fold(0.0, f64::max);
+        let (norm, size) = (largest_row(&back), largest_row(&hull.axes));
+        let center = hull.center - units.origin;
+        // Every comparison with a NaN is false.
+        let is_fit = norm > 0.0
+            && norm <= LARGEST_NORM * units.scale
+            && norm * size <= LARGEST_CONDITION
+            && center.abs().max_element() * units.scale <= 2.0;
+        is_fit.then_some(Self { hull, center, rows: [0, 1, 2].map(|axis| back.row(axis)), norm, size })
+    }
+}
+
+impl HullBlock {
+    /// A block without hulls.
+    pub(crate) const EMPTY: Self = Self {
+        centers: [[0.0; BLOCK]; 3],
+        rows: [[[0.0; BLOCK]; 3]; 3],
+        heights: [f32::NEG_INFINITY; BLOCK],
+        profiles: [[0.0; BLOCK]; 3],
+        tubes: [0.0; BLOCK],
+        margins: [1.0; BLOCK],
+        least_margins: [1.0; BLOCK],
+    };
+
+    /// Puts the hull of a shape into a lane; without one, or where single precision tells nothing of it, what passes always.
+    pub(crate) fn put(&mut self, lane: usize, hull: Option<Hull>, units: &Units) {
+        let Some(mapped) = hull.and_then(|hull| Mapped::new(hull, units)) else {
+            self.rows.iter_mut().flatten().for_each(|lanes| lanes[lane] = f32::NAN);
+            (self.heights[lane], self.tubes[lane]) = (f32::NAN, 0.0);
+            return;
+        };
+        let Mapped { hull, center, rows, norm, size } = mapped;
+        for axis in 0..3 {
+            self.centers[axis][lane] = center[axis] as f32;
+            for (lanes, number) in self.rows[axis].iter_mut().zip(rows[axis].to_array()) {
+                lanes[lane] = number as f32;
+            }
+        }
+        self.heights[lane] = if hull.is_flat { 0.0 } else { 1.0 };
+        for (lanes, number) in self.profiles.iter_mut().zip(hull.profile) {
+            lanes[lane] = number as f32;
+        }
+        self.tubes[lane] = if hull.is_solid && hull.tube == 0.0 { -1.0 } else { hull.tube as f32 };
+        let per_distance = 64.0 * ROUNDOFF * norm;
+        // The centre was rounded.
+        let moved = ROUNDOFF * center.abs().max_element() + units.nearby_slop() / units.scale;
+        self.margins[lane] = round_up(per_distance);
+        self.least_margins[lane] = round_up(per_distance * size + norm * moved + 16.0 * ROUNDOFF);
+    }
+}
+
+/// The hulls of the shapes in a tree's leaves.
+#[derive(Debug, Default)]
+pub(crate) struct Hulls {
+    blocks: Vec<HullBlock>,
+    /// For each entry of the tree, the block that it is in, and the top bit if that is not the last of its leaf; of what is no
+    /// shape, any number.
+    of_entry: Vec<u32>,
+}
+
+const GOES_ON: u32 = 1 << 31;
+
+impl Hulls {
+    /// Of the entries of a tree; none where single precision would tell nothing.
+    pub(crate) fn new(geometries: &[Geometry], entries: &[Entry], units: &Units) -> Self {
+        let hull = |entry: &Entry| match &geometries[entry.geometry as usize].kind {
+            GeometryKind::Shape(shape) => shape.hull(),
+            _ => None,
+        };
+        let is_shape =
+            |entry: &Entry| matches!(geometries[entry.geometry as usize].kind, GeometryKind::Shape(_));
+        let two_to = |exponent: i32| 2.0f64.powi(exponent);
+        let is_fit = units.near > 0.0 && (two_to(-40)..=two_to(40)).contains(&units.scale);
+        if !is_fit || !entries.iter().any(is_shape) {
+            return Self::default();
+        }
+        // Leaf by leaf, eight at a time.
+        let mut spans = Vec::new();
+        let mut of_entry = Vec::with_capacity(entries.len());
+        for (leaf, first) in leaves(entries) {
+            for (eight, own) in leaf.chunks(BLOCK).enumerate() {
+                if is_shape(&own[0]) {
+                    spans.push(first + eight * BLOCK..first + eight * BLOCK + own.len());
+                }
+                let goes_on = if (eight + 1) * BLOCK < leaf.len() { GOES_ON } else { 0 };
+                of_entry.extend(own.iter().map(|_| spans.len().saturating_sub(1) as u32 | goes_on));
+            }
+        }
+        let block = |span: &std::ops::Range<usize>| {
+            let mut block = HullBlock::EMPTY;
+            for (lane, entry) in entries[span.clone()].iter().enumerate() {
+                block.put(lane, hull(entry), units);
+            }
+            block
+        };
+        Self { blocks: spans.par_iter().with_min_len(64).map(block).collect(), of_entry }
+    }
+
+    /// The block of the entry at a place and of up to seven that follow it in its leaf, and whether more follow these; `None`
+    /// where there are no hulls.
+    #[inline(always)]
+    pub(crate) fn block(&self, entry: usize) -> Option<(&HullBlock, bool)> {
+        let place = *self.of_entry.get(entry)?;
+        Some((self.blocks.get((place & !GOES_ON) as usize)?, place & GOES_ON != 0))
+    }
+
+    /// Bytes of memory.
+    pub(crate) fn memory_bytes(&self) -> usize {
+        self.blocks.capacity() * size_of::<HullBlock>() + self.of_entry.capacity() * size_of::<u32>()
+    }
+}
+
+/// Entries leaf by leaf, each with the place of its first.
+fn leaves(entries: &[Entry]) -> impl Iterator<Item = (&[Entry], usize)> {
+    entries.split_inclusive(Entry::is_last).scan(0, |next, leaf| {
+        let first = *next;
+        *next += leaf.len();
+        Some((leaf, first))
+    })
+}
+
+/// A ray in single precision, for a first test of eight hulls that loses no shape.
+///
+/// # Why none is lost
+///
+/// Places on the ray are o + h e: o is its origin, e its direction by its largest component, which then is of size 1, and h a height
+/// as in [`HeightRange`](crate::trace::watertight::HeightRange), t times that component. Of a hull let W be the largest coordinate of w =
+/// o - center, S the largest of a point of it, N the largest of the sums of the sizes in a row of the map M to its cube, and
+/// u = 2⁻²⁴. At a hit, |h| ≤ W + S, for it is as far from o on the axis of that component.
+///
+/// The point at h is p + h d in the cube, with p = M w and d = M e. As computed here, w is wrong by 2.1u W, for what rounding takes from o is kept
+/// apart, and p by that times N, by u N W for the rounding of M, and by 5u N W for its sums: 8.1u N W. For the same reasons d is wrong
+/// by 7u N; the least size that is kept up, 2⁻⁴⁰ N, is small beside it. So the point of a hit is wrong by less than 15.1u N (W + S). The
+/// centre is rounded, and the hit, as double precision finds it, is by `slop` beside the line or the shape: this is the `moved` by
+/// which the hull seems to have been moved. Let the margin be m = 64u N (W + S) + N `moved` + 16u.
+///
+/// *Slabs.* The planes of the cube, moved outwards by m, are met at near = -(a + w) / |d| and far = (w - a) / |d|, with the sign of
+/// d taken off p for a, and w = 1 + m (or m along y where the hull is flat). Their roundings are worth less than 3u|h d| + 2u (|a| + w)
+/// ≤ 7u N (W + S) + 4u on the axis, for which m has room: near ≤ h ≤ far at every hit.
+///
+/// *Profile.* What is left of the line, between heights among which h is, is again p' + k d' with |k| ≤ 1: p' in its middle, and
+/// p' ± d' at its ends, no coordinate beyond 1 + 2m. There x² + y² + c z² + d z + e is a parabola A k² + 2B k + C. At the hit it
+/// truly is not positive, and it changes by less than 8 (1 + m) m + 3m² with what the point is wrong by, these last roundings
+/// included, which is m at most. Those of A, B, C and of their sum are below 2⁻¹⁷ (1 + m)². So the computed parabola is no greater
+/// than `tolerance` = 12 m (1 + m) + 2⁻¹⁵ there, by 2⁻¹⁶ at least, and so is its least value, which is at an end, or C - B² / A
+/// where |B| < A; that this is greater is seen from (C - tolerance) A > B², with roundings below 4u B² < 4u A².
+///
+/// *Tube.* In the space of x, y and r z, how far a point is outside of a ring's tube is √((ρ - (1 - r))² + r² z²) - r, and changes by
+/// no more than the way that the point goes. So there is no hit on a piece of the line whose middle is farther outside than half
+/// its length: sixteen pieces are looked at. A point is wrong by m on each axis, with its roundings, and in its distance
+/// by less than 2m + 2⁻¹⁶; half the length of a piece by 2⁻²⁰ of itself.
+///
+/// # What is certain
+///
+/// Of a solid, a line that is inside of it somewhere within the range, and outside somewhere else in the range, crosses its border
+/// in between. A point that is inside by m in the cube, and by the tolerance of the profile, is inside, and within the range if its
+/// height surely is; one that is outside by as much is outside: also for double precision, which is wrong by far less. The ends of
+/// the range, 6u of themselves too far out here, are less than 12u N (W + S) off in the cube, for which m has room as well.
+///
+/// A hull that is smaller than 2⁻¹⁸ of the tree, or whose map stretches too much for single precision, is not tried: it passes.
+/// Else 2⁻⁴² ≤ N ≤ 2⁵⁸ and W ≤ 2⁴⁶, by the bounds on what is searched in single precision, and nothing over- or underflows.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct HullRay {
+    /// Relative to the tree's.
+    pub(crate) origin: [f32; 3],
+    /// What rounding took from it.
+    pub(crate) rest: [f32; 3],
+    pub(crate) direction: [f32; 3],
+}
+
+/// Of the tolerance, by m (1 + m), and its last summand.
+pub(crate) const TOLERANCE_PER_MARGIN: f32 = 12.0;
+pub(crate) const LEAST_TOLERANCE: f32 = 1.0 / (1 << 15) as f32;
+/// What a distance from a tube may be wrong by, by m, and apart from that.
+pub(crate) const TUBE_ERROR_PER_MARGIN: f32 = 2.0;
+pub(crate) const LEAST_TUBE_ERROR: f32 = 1.0 / (1 << 16) as f32;
+/// No component of a direction in the cube is taken to be less, by 64uN.
+pub(crate) const LEAST_COMPONENT: f32 = 1.0 / (1u64 << 22) as f32;
+
+impl HullRay {
+    /// For a ray from nearby, whose direction's largest component has the size `length`.
+    #[inline(always)]
+    pub(crate) fn new(units: &Units, ray: &Ray, length: f64) -> Self {
+        let exact = ray.origin - units.origin;
+        let origin = exact.as_vec3();
+        let rest = (exact - origin.as_dvec3()).as_vec3();
+        let direction = (ray.direction * (1.0 / length)).as_vec3();
+        Self { origin: origin.to_array(), rest: rest.to_array(), direction: direction.to_array() }
+    }
+}

@@ -1,0 +1,436 @@
+//! Sixteen-wide nodes, and the single-precision ray that is tested against their boxes without ever losing a hit.
+//!
+//! # Why no hit is lost
+//!
+//! Everything here happens in the tree's own units: positions relative to the tree's origin, times a power of two, so
+//! that every plane of a box is an f32 `p` with |p| ≤ 1.01. A ray is moved there in f64, as `o + s d`, where
+//! `s = t * s_per_t + s_at_zero` is never negative within its range.
+//!
+//! A ray from near the tree stays as it is: `o` is its start, |o| ≤ 16 on each axis, `d` its direction, whose largest
+//! component is between 2⁻²⁰ and 2²⁰, and `s = t`. Of any other ray, the direction is scaled by a power of two until its
+//! largest component lies in [1, 2), and `o` lies a little before the point of the line nearest to the tree's origin, so
+//! that a ray from far away is as precise as one from nearby.
+//!
+//! A hit's point, as the leaf computed it, lies within `slop` (tree units, on each axis) of its box and of the line
+//! `o + s d`, for the f64 arithmetic of leaves, instances and of this set-up is wrong by a few 2⁻⁵³ of the coordinates
+//! that take part; `slop` allows 2⁻⁴⁷ of them times the condition of the transforms, and at least 2⁻⁴⁰.
+//!
+//! On one axis let `R = 1/d > 0` and `p` be the lower plane; the hit has `s ≥ (p - o - slop) R` exactly. We compute
+//! `near = p r + c` with `r = f32(R)`, `|r - R| ≤ u|R|`, u = 2⁻²⁴, and `c = f32(-o R - e)`, wrong by `u|R||o|` and what is
+//! small beside it. With a fused multiply-add, `near ≤ p R - o R - e + u|R|(2|p| + 2|o|)(1 + 4u)`; with a separate
+//! product, one `u|R||p|` more. So `e = |R| (4u (1.01 + |o|) + slop)` makes `near` no greater than the hit's `s`. The same
+//! holds mirrored for the far planes, and for R < 0 with the planes exchanged.
+//!
+//! A ray may also be rounded before: `o`, `d` and `R` in single precision are off by `u|o|`, `u|d|` and a little more than `2u|R|`.
+//! Then `p r` is off by `2.01u|R||p|`, `o r` by `3.1u|R||o|`, and three roundings (one of a separate product among them, for each of
+//! the two) add `2u|R||p| + 3u|R||o|` and what is small beside it: `e = |R| (8u (1.01 + |o|) + slop)` has room for all of it.
+//!
+//! A component below 2⁻⁶⁰ of the least that the largest may be (zeros of both signs among them) is replaced by that
+//! bound: a hit lies within |s d| ≤ 20 + 12 slop on the largest axis, where that moves the line by less than
+//! 2⁻⁵⁴ (1 + slop), which `slop` covers as well. So there is no division by zero, no 0·∞, and no NaN. Where the scaling
+//! itself overflows (coordinates beyond 1e±150 of the tree's size), the ray passes every box: slow, but right.
+//!
+//! A child that is not there has planes of ±f32::MAX, inside out. Since |c| is far below f32::MAX |r|, every ray enters it
+//! at more than 2¹⁰⁶ and leaves it before zero: it is never met.
+
+use bytemuck::{Pod, Zeroable};
+use lumbre_geometry::Ray;
+use lumbre_math::DVec3;
+
+use crate::simd::Sides;
+
+/// What a reference to a child names: three bits of tag, 29 bits of place.
+pub(crate) mod tag {
+    pub(crate) const SHIFT: u32 = 29;
+    pub(crate) const PLACE: u32 = (1 << SHIFT) - 1;
+    /// A node.
+    pub(crate) const INNER: u32 = 0;
+    /// Some triangle blocks in a row: see [`triangles`].
+    pub(crate) const TRIANGLES: u32 = 1;
+    /// The first of some leaf entries that are shapes.
+    pub(crate) const SHAPES: u32 = 2;
+    /// One leaf entry that is an instance.
+    pub(crate) const INSTANCE: u32 = 3;
+    /// The first of some leaf entries that are primitives of custom geometry.
+    pub(crate) const CUSTOM: u32 = 4;
+    /// Some blocks of spheres in a row: see [`spheres`].
+    pub(crate) const SPHERES: u32 = 5;
+    /// The first of some leaf entries that are triangles in double precision.
+    pub(crate) const PRECISE: u32 = 6;
+    /// Not a child: the mark on the stack where an instance was entered.
+    pub(crate) const RETURN: u32 = 7;
+
+    pub(crate) const fn reference(tag: u32, place: u32) -> u32 {
+        tag << SHIFT | place
+    }
+
+    /// The tag of a reference.
+    #[inline(always)]
+    pub(crate) const fn of(reference: u32) -> u32 {
+        reference >> SHIFT
+    }
+
+    /// The place of a reference.
+    #[inline(always)]
+    pub(crate) const fn place(reference: u32) -> usize {
+        (reference & PLACE) as usize
+    }
+
+    /// Whether a reference names a node.
+    #[inline(always)]
+    pub(crate) const fn is_inner(reference: u32) -> bool {
+        of(reference) == INNER
+    }
+
+    /// Blocks that a leaf of triangles, or of spheres, may have.
+    pub(crate) const MOST_BLOCKS: u32 = 1 << COUNT_BITS;
+    /// Places that blocks may have.
+    pub(crate) const BLOCK_PLACES: u32 = 1 << (SHIFT - COUNT_BITS);
+    const COUNT_BITS: u32 = 3;
+
+    /// A leaf of triangles: 26 bits for its first block, three for how many there are, 1 to 8.
+    pub(crate) const fn triangles(first: u32, count: u32) -> u32 {
+        reference(TRIANGLES, first << COUNT_BITS | (count - 1))
+    }
+
+    /// A leaf of spheres, alike.
+    pub(crate) const fn spheres(first: u32, count: u32) -> u32 {
+        reference(SPHERES, first << COUNT_BITS | (count - 1))
+    }
+
+    /// The blocks of a leaf of triangles or of spheres.
+    #[inline(always)]
+    pub(crate) const fn blocks(reference: u32) -> std::ops::Range<usize> {
+        let first = ((reference & PLACE) >> COUNT_BITS) as usize;
+        first..first + (reference & (MOST_BLOCKS - 1)) as usize + 1
+    }
+}
+
+/// Children of a node.
+pub(crate) const WIDTH: usize = 16;
+
+/// Up to sixteen boxes and what they hold.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C, align(64))]
+pub(crate) struct Node {
+    /// Lower and upper x, y and z planes of the boxes: `planes[2 * axis + side]`.
+    pub(crate) planes: [[f32; WIDTH]; 6],
+    /// Tagged references, in the first lanes; [`Node::ABSENT`] in the others. The last are asked first where any hit will do: they are the
+    /// likeliest to have one for what they cost, or the largest; see [`occlusion`](crate::build::occlusion_order).
+    pub(crate) children: [u32; WIDTH],
+}
+
+const _: () = assert!(size_of::<Node>() == 7 * 64);
+
+impl Node {
+    /// A node without children: its boxes are inside out.
+    pub(crate) const EMPTY: Self = {
+        let (low, high) = ([f32::MAX; WIDTH], [-f32::MAX; WIDTH]);
+        Self { planes: [low, high, low, high, low, high], children: [Self::ABSENT; WIDTH] }
+    };
+
+    /// What stands for a child that is not there.
+    pub(crate) const ABSENT: u32 = u32::MAX;
+
+    /// How many children there are.
+    #[inline]
+    pub(crate) fn len(&self) -> usize {
+        self.children.iter().position(|&child| child == Self::ABSENT).unwrap_or(WIDTH)
+    }
+}
+
+/// The units in which a tree's boxes are kept.
+#[derive(Clone, Debug)]
+pub(crate) struct Units {
+    /// What is at zero.
+    pub(crate) origin: DVec3,
+    /// Tree units per unit of space; a power of two.
+    pub(crate) scale: f64,
+    /// Half the diagonal of the tree's bounds, in tree units.
+    pub(crate) radius: f64,
+    /// How much the arithmetic of transforms in the leaves may enlarge rounding errors; 1 without any.
+    pub(crate) condition: f64,
+    /// How far from zero a ray may start on each axis to be one from nearby; negative where none may.
+    pub(crate) near: f64,
+    /// The origin, and a zero.
+    pub(crate) padded_origin: [f64; 4],
+    /// Of rays from nearby: by how much planes are moved, and by how much more for each unit of the ray's start.
+    pub(crate) near_margin: f64,
+    pub(crate) margin_per_distance: f64,
+}
+
+impl Units {
+    pub(crate) fn new(origin: DVec3, scale: f64, radius: f64, condition: f64) -> Self {
+        let reach = 2.0 * origin.abs().max_element() * scale + NEAR + 1.0;
+        let slop = slop(condition, reach);
+        Self {
+            origin,
+            scale,
+            radius,
+            condition,
+            // None where the slop is no number.
+            near: if slop < 1.0 / 65536.0 { NEAR } else { -1.0 },
+            padded_origin: [origin.x, origin.y, origin.z, 0.0],
+            near_margin: 4.0 * ROUNDOFF * LARGEST_PLANE + slop,
+            margin_per_distance: 4.0 * ROUNDOFF,
+        }
+    }
+}
+
+impl Units {
+    /// By how much a box and what is in it may be apart, in tree units, as seen from a point in space.
+    pub(crate) fn slop_of(&self, point: DVec3) -> f64 {
+        slop(self.condition, (point.abs() + self.origin.abs()).max_element() * self.scale + 1.0)
+    }
+
+    /// The same as seen from where a ray from nearby may start.
+    pub(crate) fn nearby_slop(&self) -> f64 {
+        self.near_margin - 4.0 * ROUNDOFF * LARGEST_PLANE
+    }
+
+    /// Of rays that were rounded before: by how much planes are moved, and by how much more for each unit of the ray's start.
+    pub(crate) fn single_margin(&self) -> f32 {
+        round_up(8.0 * ROUNDOFF * LARGEST_PLANE + self.nearby_slop())
+    }
+
+    pub(crate) const SINGLE_MARGIN_PER_DISTANCE: f32 = (8.0 * ROUNDOFF) as f32;
+
+    /// Of rays in single precision, where zero is so far from the mesh's origin on each axis, in tree units: by how much planes are
+    /// moved, and by how much more for each unit of the ray's start. See `narrow`.
+    pub(crate) fn narrow_margin(&self, shift: f64) -> f32 {
+        round_up(f64::from(self.single_margin()) + ROUNDOFF * (56.0 + 2.0 * shift))
+    }
+
+    pub(crate) const NARROW_MARGIN_PER_DISTANCE: f32 = (24.0 * ROUNDOFF) as f32;
+}
+
+/// What moves the ends of a rounded range outwards, together with a little at the far one.
+pub(crate) const START_FACTOR: f32 = 1.0 - 4.0 * ROUNDOFF as f32;
+pub(crate) const END_FACTOR: f32 = 1.0 + 4.0 * ROUNDOFF as f32;
+
+const NEAR: f64 = 16.0;
+/// Of rays from nearby: the bounds on the largest component of the direction, in tree units.
+pub(crate) const SMALLEST_NEAR: f64 = 1.0 / (1u64 << 20) as f64;
+pub(crate) const LARGEST_NEAR: f64 = (1u64 << 20) as f64;
+/// Of rays from nearby: the bound below which a component is replaced.
+pub(crate) const TINY_NEAR: f64 = TINY_DIRECTION * SMALLEST_NEAR;
+const ROUNDOFF: f64 = 1.0 / (1u64 << 24) as f64;
+const TINY_DIRECTION: f64 = 1.0 / (1u64 << 60) as f64;
+/// The bound on |p| that the proof uses.
+const LARGEST_PLANE: f64 = 1.01;
+
+fn slop(condition: f64, reach: f64) -> f64 {
+    f64::from_bits((1023 - 40) << 52) + f64::from_bits((1023 - 47) << 52) * condition * reach
+}
+
+/// A ray in tree units, ready for the boxes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Slabs {
+    /// The last of four means nothing.
+    pub(crate) inverse: [f32; 4],
+    /// The last is where the range starts: never negative.
+    pub(crate) near_offset: [f32; 4],
+    /// The last is where it ends.
+    pub(crate) far_offset: [f32; 4],
+    /// The planes that are met first.
+    pub(crate) sides: &'static Sides,
+}
+
+impl Slabs {
+    /// Of no ray.
+    pub(crate) const ZERO: Self = Self {
+        inverse: [0.0; 4],
+        near_offset: [0.0; 4],
+        far_offset: [0.0; 4],
+        sides: Sides::OF_NONE_NEGATIVE,
+    };
+
+    #[inline(always)]
+    pub(crate) fn s_min(&self) -> f32 {
+        self.near_offset[3]
+    }
+
+    #[inline(always)]
+    pub(crate) fn s_max(&self) -> f32 {
+        self.far_offset[3]
+    }
+
+    #[inline(always)]
+    pub(crate) fn start_at(&mut self, s_min: f32) {
+        self.near_offset[3] = s_min;
+    }
+
+    /// Leaves out the boxes that the ray enters after this.
+    #[inline(always)]
+    pub(crate) fn end_at(&mut self, s_max: f32) {
+        self.far_offset[3] = s_max;
+    }
+}
+
+/// The same, and how to go on with its range.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BoxRay {
+    pub(crate) slabs: Slabs,
+    pub(crate) progress: Progress,
+}
+
+/// From the `t` of a ray to the `s` in which it is tested against boxes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Progress {
+    s_per_t: f64,
+    s_at_zero: f64,
+}
+
+impl Progress {
+    /// Whether the ray is tested as it is, because it comes from nearby.
+    #[inline(always)]
+    pub(crate) fn is_nearby(&self) -> bool {
+        self.s_per_t == 1.0 && self.s_at_zero == 0.0
+    }
+}
+
+impl BoxRay {
+    /// Makes it the ray from `t_min` to `t_max` for a tree in these units, if that is one from nearby, which it answers; also
+    /// checks that the ray is sound.
+    #[inline(always)]
+    pub(crate) fn start_nearby(&mut self, units: &Units, ray: &Ray, t_min: f64, t_max: f64) -> bool {
+        let start = ((ray.origin - units.origin) * units.scale).to_array();
+        let direction = (ray.direction * units.scale).to_array();
+        // Every comparison with a NaN is false.
+        let fits = |axis: usize| start[axis].abs() <= units.near && direction[axis].abs() <= LARGEST_NEAR;
+        let is_long = |axis: usize| direction[axis].abs() >= SMALLEST_NEAR;
+        let is_near = fits(0) && fits(1) && fits(2) && (is_long(0) || is_long(1) || is_long(2));
+        if !(is_near && 0.0 <= t_min && t_min <= t_max) {
+            return false;
+        }
+        self.set_slabs(start, direction, TINY_NEAR, units.margin_per_distance, units.near_margin);
+        self.set_range_nearby(t_min, t_max);
+        true
+    }
+
+    /// The range of a ray from nearby.
+    #[inline(always)]
+    pub(crate) fn set_range_nearby(&mut self, t_min: f64, t_max: f64) {
+        self.progress = Progress { s_per_t: 1.0, s_at_zero: 0.0 };
+        self.slabs.start_at(self.progress.down(t_min));
+        self.slabs.end_at(self.progress.up(t_max));
+    }
+
+    /// Makes it the ray from `t_min` to `t_max` for a tree in these units, from wherever; false where it passes by the tree
+    /// altogether. The ray is finite, and its direction is not zero.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn start_anywhere(&mut self, units: &Units, ray: &Ray, t_min: f64, t_max: f64) -> bool {
+        // Powers of two near the limits of the exponent go in two steps.
+        let largest = ray.direction.abs().max_element();
+        let step = if largest < f64::from_bits(100 << 52) {
+            f64::from_bits((1023 + 200) << 52)
+        } else if largest > f64::from_bits(1900 << 52) {
+            f64::from_bits((1023 - 200) << 52)
+        } else {
+            1.0
+        };
+        let exponent = (largest * step).to_bits() >> 52;
+        let normaliser = f64::from_bits((2046 - exponent) << 52);
+        let direction = ray.direction * step * normaliser;
+        let s_per_t = units.scale / step / normaliser;
+
+        let start = (ray.origin - units.origin) * units.scale;
+        let to_middle = -start.dot(direction) / direction.length_squared();
+        let middle = start + to_middle * direction;
+        let reach = (ray.origin.abs() + units.origin.abs()).max_element() * units.scale + 1.0;
+        let slop = slop(units.condition, reach);
+
+        let distance_squared = middle.length_squared();
+        let fits = s_per_t.is_normal() && slop < 1e6 && distance_squared.is_finite();
+        if !fits {
+            *self = Self::passing_all();
+            return true;
+        }
+        let reach = 1.001 * units.radius + 4.0 * slop;
+        if distance_squared > reach * reach {
+            return false;
+        }
+        // Hits lie within |p| ≤ 1.75 + 1.75 slop of the origin, and no farther than that from the middle.
+        let back = 2.0 + 4.0 * slop;
+        let start = middle - back * direction;
+        let margin = 4.0 * ROUNDOFF * LARGEST_PLANE + slop;
+        self.set_slabs(start.to_array(), direction.to_array(), TINY_DIRECTION, 4.0 * ROUNDOFF, margin);
+        self.progress = Progress { s_per_t, s_at_zero: back - to_middle };
+        self.slabs.start_at(self.progress.down(t_min));
+        self.slabs.end_at(self.progress.up(t_max));
+        true
+    }
+
+    /// What meets every box, and ends nowhere.
+    pub(crate) fn passing_all() -> Self {
+        // Less than f32::MAX times the inverse, so that missing children stay missed.
+        let far = f32::MAX * f32::EPSILON;
+        let slabs = Slabs {
+            inverse: [1.0; 4],
+            near_offset: [-far, -far, -far, 0.0],
+            far_offset: [far, far, far, f32::INFINITY],
+            sides: Sides::OF_NONE_NEGATIVE,
+        };
+        Self { slabs, progress: Progress { s_per_t: 1.0, s_at_zero: f64::INFINITY } }
+    }
+
+    /// Inverse direction, offsets and sides: see the proof. `margin` is 4u · 1.01 + slop.
+    #[inline(always)]
+    fn set_slabs(
+        &mut self,
+        start: [f64; 3],
+        direction: [f64; 3],
+        tiny: f64,
+        margin_per_distance: f64,
+        margin: f64,
+    ) {
+        let mut signs = 0;
+        for axis in 0..3 {
+            let (o, d) = (start[axis], direction[axis]);
+            let d = if d.abs() < tiny { tiny.copysign(d) } else { d };
+            let inverse = 1.0 / d;
+            let center = -o * inverse;
+            let margin = inverse.abs() * (margin_per_distance * o.abs() + margin);
+            self.slabs.inverse[axis] = inverse as f32;
+            self.slabs.near_offset[axis] = (center - margin) as f32;
+            self.slabs.far_offset[axis] = (center + margin) as f32;
+            signs |= u32::from(d.is_sign_negative()) << axis;
+        }
+        self.slabs.sides = Sides::new(signs);
+    }
+}
+
+/// A little that is neither zero nor subnormal as an f32.
+pub(crate) const LITTLE: f64 = 1.0 / (1u128 << 100) as f64;
+
+impl Progress {
+    /// Where `t` is, or a little more; never negative. What rounding to single precision may take away was added before.
+    #[inline(always)]
+    pub(crate) fn up(&self, t: f64) -> f32 {
+        let s = t * self.s_per_t + self.s_at_zero;
+        let above = s + s * (2.0 * ROUNDOFF) + LITTLE;
+        (if above > 0.0 { above } else { 0.0 }) as f32
+    }
+
+    /// Where `t` is, or a little less; 0 where that is negative.
+    #[inline(always)]
+    pub(crate) fn down(&self, t: f64) -> f32 {
+        let s = t * self.s_per_t + self.s_at_zero;
+        let below = s - s * (2.0 * ROUNDOFF) - LITTLE;
+        (if below > 0.0 { below } else { 0.0 }) as f32
+    }
+}
+
+/// An f32 no smaller than `x`.
+#[inline(always)]
+pub(crate) fn round_up(x: f64) -> f32 {
+    (x as f32).next_up()
+}
+
+/// The panic for a reference that no tree has. The place is not told: it would have to be kept at hand for every step.
+#[cold]
+#[inline(never)]
+pub(crate) fn out_of_tree() -> ! {
+    panic!("a reference leads out of its tree")
+}
