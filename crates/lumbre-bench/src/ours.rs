@@ -6,8 +6,7 @@ use std::sync::Arc;
 use anyhow::{Context, Result};
 use lumbre_geometry::{PlacedShape, Ray, Sphere};
 use lumbre_kernel::{
-    Accel, BuildOptions, Geometry, GeometryKind, Hit, Hit32, Instance, PreciseMesh, Preset,
-    TriangleMesh,
+    Accel, BuildOptions, Geometry, GeometryKind, Hit, Hit32, Instance, PreciseMesh, Preset, TriangleMesh,
 };
 use lumbre_math::{DVec3, Transform, Vec3};
 

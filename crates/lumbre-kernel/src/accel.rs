@@ -9,24 +9,26 @@ use std::sync::OnceLock;
 use lumbre_geometry::{Aabb, Ray, Surface};
 use lumbre_math::{DVec3, Transform};
 
-use crate::build::collapse::{Entry, Packed};
-use crate::tree::summary::{Holds, SingleStart};
-use crate::tree::bounding_block::Hulls;
+use crate::build::{input, rebuild, refit};
+use crate::io::{bytes, mapped};
+use crate::point::winding::{self, Moments};
+use crate::point::{closest_point, inside};
 use crate::simd::Level;
-use crate::tree::node::{Units, tag};
 use crate::trace::f32_ray::{self, F32Queries};
 use crate::trace::filtered::{self, Queries};
 use crate::trace::stack::{AnyHit, ClosestHit};
+use crate::trace::start::SingleStart;
 use crate::trace::visitors::{Count, NextHits};
 use crate::trace::{ContextRef, Outcome, exact};
-use crate::point::winding::{self, Moments};
+use crate::tree::bounding_block::Hulls;
+use crate::tree::node::{Units, tag};
+use crate::tree::packed::{Entry, Packed};
+use crate::tree::summary::Holds;
+use crate::tree::summary::Sizes;
 use crate::{
     ClosestPoint, Geometry, GeometryKind, Hit, Hit32, LoadError, MapError, NoClosestPoint, NoWindingNumber,
     Query, Ray32, RefitError, SphereCloud, batch, surface,
 };
-use crate::build::{input, rebuild, refit};
-use crate::io::{bytes, mapped};
-use crate::point::{closest_point, inside};
 
 /// A bounding volume hierarchy over geometries, ready for queries from any number of threads.
 ///
@@ -56,6 +58,16 @@ pub struct Accel {
     pub(crate) masks: Vec<u32>,
     /// For winding numbers, once one was asked for.
     pub(crate) moments: OnceLock<Moments>,
+}
+
+/// What a build, or a file, makes.
+pub(crate) struct AccelParts {
+    pub(crate) units: Units,
+    pub(crate) tree: Packed,
+    pub(crate) sizes: Sizes,
+    pub(crate) bounds: Aabb,
+    pub(crate) infinite: Vec<Entry>,
+    pub(crate) primitives: usize,
 }
 
 /// How a tree is built. Answers do not depend on it; how soon they come does.
@@ -182,7 +194,36 @@ impl Accel {
         rebuild::rebuild_partially(self, options)
     }
 
-    /// Makes anew what searches keep of the tree, which has changed.
+    /// Puts a tree together of what a build, or a file, makes.
+    pub(crate) fn assemble(level: Level, geometries: Vec<Geometry>, parts: AccelParts) -> Self {
+        let AccelParts { units, tree, sizes, bounds, infinite, primitives } = parts;
+        let holds = Holds::new(&geometries, sizes);
+        let single = SingleStart::new(&holds, &units, tree.root);
+        Self {
+            hulls: Hulls::new(&geometries, &tree.entries, &units),
+            queries: Queries::new(level, single.as_ref()),
+            f32_queries: F32Queries::new(level, single.as_ref()),
+            single,
+            units,
+            holds,
+            tree,
+            infinite,
+            bounds,
+            primitives,
+            level,
+            built_cost: None,
+            masks: Vec::new(),
+            moments: OnceLock::new(),
+            geometries,
+        }
+    }
+
+    /// The tree with these masks: one for each of its geometries, or none.
+    pub(crate) fn with_masks_unchecked(self, masks: Vec<u32>) -> Self {
+        Self { masks, ..self }
+    }
+
+    /// Makes anew what traversals keep of the tree, which has changed.
     pub(crate) fn follow_tree(&mut self) {
         self.single = SingleStart::new(&self.holds, &self.units, self.tree.root);
         self.queries = Queries::new(self.level, self.single.as_ref());

@@ -3,7 +3,7 @@
 use lumbre_geometry::{Aabb, Ray, Root, Roots, Surface};
 use lumbre_math::{DVec3, Vec3};
 
-use crate::build::input::has_area;
+use crate::geometry::has_area;
 use crate::trace::watertight::{Meeting, Shear, intersect};
 use crate::{BuildError, CustomGeometry, TriangleMesh, surface};
 

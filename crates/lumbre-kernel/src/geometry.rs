@@ -143,3 +143,23 @@ pub trait CustomGeometry: Debug + Send + Sync {
         self.closest(primitive, ray).is_some()
     }
 }
+
+/// Whether a triangle can be hit at all, as double precision sees it.
+#[inline(always)]
+pub(crate) fn has_area(&[a, b, c]: &[Vec3; 3]) -> bool {
+    // Single precision can tell of all but slivers: its errors are below 2^-20 of the products, and 1e-37.
+    let (e, f) = ((b - a).to_array(), (c - a).to_array());
+    let is_clear = |x: usize, y: usize| {
+        let (p, q) = (e[x] * f[y], e[y] * f[x]);
+        let bound = (p.abs() + q.abs()) * (1.0 / (1 << 20) as f32) + 1e-37;
+        (p - q).abs() > bound && bound < f32::INFINITY
+    };
+    is_clear(0, 1) || is_clear(1, 2) || is_clear(2, 0) || has_area_exactly([a, b, c])
+}
+
+#[cold]
+#[inline(never)]
+fn has_area_exactly(corners: [Vec3; 3]) -> bool {
+    let [a, b, c] = corners.map(|corner| corner.as_dvec3());
+    (b - a).cross(c - a) != DVec3::ZERO
+}

@@ -17,17 +17,17 @@ mod trace;
 mod tree;
 
 pub use accel::{Accel, BuildError, BuildOptions, Preset};
+pub use build::refit::RefitError;
 pub use deforming_mesh::DeformingMesh;
-pub use io::mapped::MapError;
 pub use geometry::{CustomGeometry, Geometry, GeometryKind, Instance, Placement, SphereCloud, TriangleMesh};
 pub use hit::{Hit, InstancePath};
-pub use point::closest_point::{ClosestPoint, NoClosestPoint};
-pub use query::{Faces, Query};
-pub use precise_mesh::PreciseMesh;
-pub use ray32::{Hit32, Ray32};
-pub use build::refit::RefitError;
 pub use io::bytes::LoadError;
+pub use io::mapped::MapError;
+pub use point::closest_point::{ClosestPoint, NoClosestPoint};
 pub use point::winding::NoWindingNumber;
+pub use precise_mesh::PreciseMesh;
+pub use query::{Faces, Query};
+pub use ray32::{Hit32, Ray32};
 
 #[cfg(test)]
 mod brute;

@@ -78,7 +78,10 @@ impl<'q> Query<'q> {
     #[inline(always)]
     pub(crate) fn takes_all(&self, accel: &Accel) -> bool {
         let has_masks = !accel.masks.is_empty() || accel.holds.masks_within;
-        (!has_masks || self.mask == u32::MAX) && self.exclude.is_none() && self.faces == Faces::Both && self.filter.is_none()
+        (!has_masks || self.mask == u32::MAX)
+            && self.exclude.is_none()
+            && self.faces == Faces::Both
+            && self.filter.is_none()
     }
 }
 

@@ -9,14 +9,14 @@ use std::marker::PhantomData;
 
 use super::Sink;
 use super::packet::{ALL, Bundle, Cull, CullBounds, Effort, PACKET, Signs, SlabRows, Start, State};
-use crate::tree::triangle_block::TriangleBlock;
 use crate::simd::{self, Axes, Corners, Lanes, Row, Vector, Wide};
-use crate::tree::node::Units;
 use crate::trace::Outcome;
 use crate::trace::decide::Decider;
 use crate::trace::f32_ray::{F32Ray, SOME_HIT, within};
 use crate::trace::stack::Goal;
 use crate::trace::watertight::{BEYOND, beyond};
+use crate::tree::node::Units;
+use crate::tree::triangle_block::TriangleBlock;
 use crate::{Hit32, Ray32};
 
 /// The rays of a packet.

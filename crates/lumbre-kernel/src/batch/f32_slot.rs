@@ -3,14 +3,15 @@
 use std::marker::PhantomData;
 
 use super::interleaved::{PassedLanes, RaySlot};
-use crate::tree::triangle_block::TriangleBlock;
 use crate::simd::{Eight, Lanes, Vector};
-use crate::tree::node::Slabs;
 use crate::trace::decide::Decider;
 use crate::trace::f32_ray::{F32Ray, Nearest, Pass, SOME_HIT};
 use crate::trace::stack::Goal;
+use crate::trace::watertight;
 use crate::trace::{LaneHits, Outcome};
-use crate::trace::watertight::{self, BLOCK};
+use crate::tree::BLOCK;
+use crate::tree::node::Slabs;
+use crate::tree::triangle_block::TriangleBlock;
 use crate::{Hit32, Ray32};
 
 /// A ray among triangles, and the nearest that it has hit: a cache line.
@@ -46,7 +47,11 @@ impl<'a, 'd, G: Goal, L: Lanes> RaySlot<'a, 'd, L> for F32Slot<'a, 'd, G> {
     }
 
     #[inline(always)]
-    fn start_by_four(decider: &'d Decider<'a>, rays: [&Ray32; 4], slots: [(&mut Self, &mut Slabs); 4]) -> u32 {
+    fn start_by_four(
+        decider: &'d Decider<'a>,
+        rays: [&Ray32; 4],
+        slots: [(&mut Self, &mut Slabs); 4],
+    ) -> u32 {
         let [(a, a_slabs), (b, b_slabs), (c, c_slabs), (d, d_slabs)] = slots;
         for one in [&mut *a, &mut *b, &mut *c, &mut *d] {
             one.nearest = Nearest::NONE;

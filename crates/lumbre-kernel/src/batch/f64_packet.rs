@@ -7,17 +7,17 @@ use lumbre_math::DVec2;
 
 use super::Sink;
 use super::packet::{ALL, Bundle, Cull, CullBounds, Effort, PACKET, Signs, SlabRows, Start, State, record};
-use crate::tree::triangle_block::TriangleBlock;
-use crate::tree::summary::SingleStart;
 use crate::simd::{self, Axes, Corners, Lanes, Level, Row, Task, Vector, Wide};
-use crate::tree::node::Slabs;
 use crate::trace::decide::{Candidate, Decider, heights, largest_component};
 use crate::trace::filtered::{FilteredGoal, FilteredRay};
-use crate::trace::{ContextRef, Outcome, Winner};
+use crate::trace::start::SingleStart;
 use crate::trace::watertight::{
     self, BEYOND, EDGE_ERROR, ERRORS_OF_EDGES, ERRORS_OF_EXTENT, FAR, HEIGHT_ERROR, Meeting, Met, Pairs,
     ROUNDINGS, SIZE_ERROR, TINY, beyond,
 };
+use crate::trace::{ContextRef, Outcome, Winner};
+use crate::tree::node::Slabs;
+use crate::tree::triangle_block::TriangleBlock;
 
 /// The rays of a packet.
 pub(super) struct F64Bundle<'a, 'd, G, const GENERAL: bool> {

@@ -3,13 +3,14 @@
 use lumbre_geometry::Ray;
 
 use super::interleaved::{PassedLanes, RaySlot};
-use crate::tree::triangle_block::TriangleBlock;
 use crate::simd::{self, Axes, Crossings, Eight, Lanes, Level, Task, Vector};
-use crate::tree::node::Slabs;
 use crate::trace::decide::{Candidate, Decider, heights, largest_component};
 use crate::trace::filtered::{FilteredGoal, FilteredRay};
+use crate::trace::watertight::{BlockRay, HeightRange, Meeting};
 use crate::trace::{ContextRef, LaneHits, Outcome, Stop, Winner};
-use crate::trace::watertight::{BLOCK, BlockRay, HeightRange, Meeting};
+use crate::tree::BLOCK;
+use crate::tree::node::Slabs;
+use crate::tree::triangle_block::TriangleBlock;
 
 /// A ray in the leaves of a tree.
 pub(super) struct F64Slot<'a, 'd, G, const GENERAL: bool> {
@@ -20,7 +21,10 @@ pub(super) struct F64Slot<'a, 'd, G, const GENERAL: bool> {
 impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> F64Slot<'a, 'd, G, GENERAL> {
     #[inline(always)]
     fn with(decider: &'d Decider<'a>, blocks: (BlockRay, f32)) -> Self {
-        Self { ray: FilteredRay::new(decider, blocks, None, ContextRef::OUTSIDE), goal: std::marker::PhantomData }
+        Self {
+            ray: FilteredRay::new(decider, blocks, None, ContextRef::OUTSIDE),
+            goal: std::marker::PhantomData,
+        }
     }
 
     /// The closest of the triangles of a block, decided one after another.
@@ -88,7 +92,14 @@ impl Task for ComparisonOfAll<'_, '_> {
 /// Whether a ray hits any of the triangles in a mask, decided one after another.
 #[cold]
 #[inline(never)]
-fn hits_any(level: Level, decider: &Decider, ray: &Ray, axes: &'static Axes, block: u32, mask: u32) -> Outcome<bool> {
+fn hits_any(
+    level: Level,
+    decider: &Decider,
+    ray: &Ray,
+    axes: &'static Axes,
+    block: u32,
+    mask: u32,
+) -> Outcome<bool> {
     struct HitsAny<'s, 'a>(&'s Decider<'a>, &'s Ray, &'static Axes, u32, u32);
     impl Task for HitsAny<'_, '_> {
         type Output = Outcome<bool>;
@@ -114,7 +125,9 @@ fn hits_any(level: Level, decider: &Decider, ray: &Ray, axes: &'static Axes, blo
     level.run(HitsAny(decider, ray, axes, block, mask))
 }
 
-impl<'a, 'd, G: FilteredGoal, L: Lanes, const GENERAL: bool> RaySlot<'a, 'd, L> for F64Slot<'a, 'd, G, GENERAL> {
+impl<'a, 'd, G: FilteredGoal, L: Lanes, const GENERAL: bool> RaySlot<'a, 'd, L>
+    for F64Slot<'a, 'd, G, GENERAL>
+{
     type Goal = G;
     type Ray = Ray;
     type Answer = G::Found;
@@ -151,7 +164,11 @@ impl<'a, 'd, G: FilteredGoal, L: Lanes, const GENERAL: bool> RaySlot<'a, 'd, L> 
     }
 
     #[inline(always)]
-    fn pass_by_two(_: &Decider, slots: [&Self; 2], blocks: [&TriangleBlock; 2]) -> (PassedLanes, L::EdgesByTwo) {
+    fn pass_by_two(
+        _: &Decider,
+        slots: [&Self; 2],
+        blocks: [&TriangleBlock; 2],
+    ) -> (PassedLanes, L::EdgesByTwo) {
         let (mask, edges) = L::meet_triangles_by_two(blocks, [&slots[0].ray.blocks, &slots[1].ray.blocks]);
         (PassedLanes { mask, unclear: 0 }, edges)
     }

@@ -7,13 +7,13 @@
 use bytemuck::Zeroable;
 
 use super::Sink;
-use crate::tree::triangle_block::{Blocks, TriangleBlock};
 use crate::simd::{self, Lanes, Slots, Vector, WIDE, Wide};
-use crate::tree::node::{Node, Slabs, WIDTH, tag};
 use crate::trace::decide::Decider;
 use crate::trace::stack::{Goal, STACK};
 use crate::trace::{LaneHits, Outcome, Stop};
-use crate::trace::watertight::BLOCK;
+use crate::tree::BLOCK;
+use crate::tree::node::{Node, Slabs, WIDTH, tag};
+use crate::tree::triangle_block::{Blocks, TriangleBlock};
 
 /// A ray in a slot, in either precision.
 pub(super) trait RaySlot<'a, 'd, L: Lanes>: Sized {
@@ -36,7 +36,11 @@ pub(super) trait RaySlot<'a, 'd, L: Lanes>: Sized {
     fn start(&mut self, decider: &'d Decider<'a>, ray: &Self::Ray) -> Option<Slabs>;
     /// Starts with four; a bit for each that does.
     #[inline(always)]
-    fn start_by_four(decider: &'d Decider<'a>, rays: [&Self::Ray; 4], slots: [(&mut Self, &mut Slabs); 4]) -> u32 {
+    fn start_by_four(
+        decider: &'d Decider<'a>,
+        rays: [&Self::Ray; 4],
+        slots: [(&mut Self, &mut Slabs); 4],
+    ) -> u32 {
         let mut started = 0;
         for (i, (ray, (slot, slabs))) in rays.into_iter().zip(slots).enumerate() {
             if let Some(own) = slot.start(decider, ray) {
@@ -47,7 +51,11 @@ pub(super) trait RaySlot<'a, 'd, L: Lanes>: Sized {
         started
     }
     /// How the lines of two pass the triangles of two blocks, each those of its own.
-    fn pass_by_two(decider: &Decider, slots: [&Self; 2], blocks: [&TriangleBlock; 2]) -> (PassedLanes, Self::Passes);
+    fn pass_by_two(
+        decider: &Decider,
+        slots: [&Self; 2],
+        blocks: [&TriangleBlock; 2],
+    ) -> (PassedLanes, Self::Passes);
     /// That of one of the two: `which` is 0 or 1.
     fn one_of(passes: &Self::Passes, which: usize) -> Self::Pass;
     /// Which triangles in the mask it hits, and where.
@@ -275,7 +283,9 @@ impl<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Lanes> Interleaved<'a, 'd, 'r, R, L> 
         stack.push(Self::bottom());
         let reference = self.references.of(slot);
         *reference = self.decider.start.root;
-        if R::GENERAL && let Some(stop) = own.ray.test_infinite(ray, &mut own.slabs) {
+        if R::GENERAL
+            && let Some(stop) = own.ray.test_infinite(ray, &mut own.slabs)
+        {
             *reference = if stop == Stop::Hit { HIT } else { DONE };
             return stop == Stop::Hit;
         }

@@ -23,15 +23,15 @@ use self::f64_packet::F64Bundle;
 use self::f64_slot::F64Slot;
 use self::interleaved::RaySlot;
 use self::packet::{Bundle, PACKET, Packet};
-use crate::tree::triangle_block::Line;
-use crate::tree::summary::SingleStart;
 use crate::simd::{self, Lanes, Level, Task};
-use crate::tree::node::Node;
 use crate::trace::decide::Decider;
-use crate::trace::f32_ray;
+use crate::trace::f32_ray::{self, F32Queries};
 use crate::trace::filtered::{FilteredGoal, Found, Traversal};
 use crate::trace::stack::{AnyHit, ClosestHit, Goal};
+use crate::trace::start::SingleStart;
 use crate::trace::{ContextRef, Outcome, exact};
+use crate::tree::node::Node;
+use crate::tree::triangle_block::Line;
 use crate::{Accel, Hit, Hit32, Ray32};
 
 /// Trees of more bytes than this are hardly in the caches; interleaved rays prefetch what they read next.
@@ -82,7 +82,7 @@ pub(crate) fn closest_f32(level: Level, accel: &Accel, rays: &[Ray32], hits: &mu
             }
         }
         Some(queries) => {
-            let sink = &mut F32ClosestSink { accel, rays, hits };
+            let sink = &mut F32ClosestSink { accel, queries, rays, hits };
             if !batch_f32::<ClosestHit, _>(level, accel, rays, sink, Plan::of(accel)) {
                 hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = queries.closest.ask(accel, ray));
             }
@@ -102,7 +102,7 @@ pub(crate) fn any_f32(level: Level, accel: &Accel, rays: &[Ray32], hits: &mut [b
             }
         }
         Some(queries) => {
-            let sink = &mut F32AnySink { accel, rays, hits };
+            let sink = &mut F32AnySink { accel, queries, rays, hits };
             if !batch_f32::<AnyHit, _>(level, accel, rays, sink, Plan::of(accel)) {
                 hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = queries.any.ask(accel, ray));
             }
@@ -180,7 +180,9 @@ impl Sink<Found> for ClosestSink<'_> {
         let slot = &mut self.hits[position];
         match outcome {
             Outcome::Certain(Found { winner: None, .. }) => *slot = None,
-            Outcome::Certain(Found { winner: Some(winner), in_instance: None }) => winner.put(self.accel, slot),
+            Outcome::Certain(Found { winner: Some(winner), in_instance: None }) => {
+                winner.put(self.accel, slot)
+            }
             Outcome::Certain(found) => *slot = found.into_hit(self.accel, ContextRef::OUTSIDE),
             Outcome::Uncertain => *slot = exact::closest(self.level, self.accel, &self.rays[position], None),
         }
@@ -215,6 +217,8 @@ impl Sink<bool> for AnySink<'_> {
 /// See [`closest_f32`].
 struct F32ClosestSink<'a> {
     accel: &'a Accel,
+    /// A batch may give up a ray that single precision answers alone.
+    queries: F32Queries,
     rays: &'a [Ray32],
     hits: &'a mut [Option<Hit32>],
 }
@@ -224,7 +228,7 @@ impl Sink<Option<Hit32>> for F32ClosestSink<'_> {
     fn put(&mut self, position: usize, outcome: Outcome<Option<Hit32>>) {
         self.hits[position] = match outcome {
             Outcome::Certain(hit) => hit,
-            Outcome::Uncertain => self.accel.closest_widened(&self.rays[position]),
+            Outcome::Uncertain => self.queries.closest.ask(self.accel, &self.rays[position]),
         };
     }
 
@@ -239,6 +243,7 @@ impl Sink<Option<Hit32>> for F32ClosestSink<'_> {
 /// See [`any_f32`].
 struct F32AnySink<'a> {
     accel: &'a Accel,
+    queries: F32Queries,
     rays: &'a [Ray32],
     hits: &'a mut [bool],
 }
@@ -248,7 +253,7 @@ impl Sink<Option<Hit32>> for F32AnySink<'_> {
     fn put(&mut self, position: usize, outcome: Outcome<Option<Hit32>>) {
         self.hits[position] = match outcome {
             Outcome::Certain(hit) => hit.is_some(),
-            Outcome::Uncertain => self.accel.any_widened(&self.rays[position]),
+            Outcome::Uncertain => self.queries.any.ask(self.accel, &self.rays[position]),
         };
     }
 }

@@ -25,13 +25,13 @@
 //! and s the errors are no smaller than those of every ray.
 
 use super::Sink;
-use crate::tree::triangle_block::TriangleBlock;
 use crate::simd::{self, Axes, Corners, CornersRoom, Eight, Lanes, Row, Sides, Vector, WIDE, Wide};
-use crate::tree::node::{END_FACTOR, LITTLE, Node, START_FACTOR, tag};
 use crate::trace::Stop;
 use crate::trace::decide::Decider;
 use crate::trace::stack::{Goal, Stack};
 use crate::trace::watertight::TINY;
+use crate::tree::node::{END_FACTOR, LITTLE, Node, START_FACTOR, tag};
+use crate::tree::triangle_block::TriangleBlock;
 
 /// Rays in a packet.
 pub(crate) const PACKET: usize = WIDE;
@@ -93,7 +93,13 @@ pub(super) trait Bundle<'a, 'd>: Sized {
     fn start<L: Lanes>(&mut self, decider: &Decider, slabs: &mut SlabRows) -> Option<Start<L::Wide>>;
 
     /// Starts among triangles.
-    fn start_triangles<L: Lanes>(&mut self, decider: &Decider, axes: &'static Axes, slabs: &SlabRows, cull: &mut Cull);
+    fn start_triangles<L: Lanes>(
+        &mut self,
+        decider: &Decider,
+        axes: &'static Axes,
+        slabs: &SlabRows,
+        cull: &mut Cull,
+    );
 
     /// Tests a triangle against the rays.
     fn test_triangle<L: Lanes>(
@@ -199,7 +205,13 @@ impl SlabRows {
 
     /// The offsets on an axis of rays that start there, where planes are moved by a margin and by more for each unit of distance.
     #[inline(always)]
-    pub(super) fn set_axis<W: Wide>(&mut self, axis: usize, from: W, inverse: W, [least, per_distance]: [f32; 2]) {
+    pub(super) fn set_axis<W: Wide>(
+        &mut self,
+        axis: usize,
+        from: W,
+        inverse: W,
+        [least, per_distance]: [f32; 2],
+    ) {
         let distance = from.abs();
         let margin = inverse.abs() * distance.times_plus(W::splat(per_distance), W::splat(least));
         inverse.store(&mut self.inverse[axis]);
@@ -453,7 +465,8 @@ impl<'a, 'd, B: Bundle<'a, 'd>> Packet<'a, 'd, B> {
             state.frustum.width[axis] = largest * (off + margin);
             is_near &= off <= MOST_DISTANCE;
         }
-        (state.frustum.s_max, state.frustum.s_min, state.frustum.sides) = (most[3], -most[7], Sides::new(signs));
+        (state.frustum.s_max, state.frustum.s_min, state.frustum.sides) =
+            (most[3], -most[7], Sides::new(signs));
         (cull.axes, state.is_among_triangles, *has_one_origin) = (axes, false, start.has_one_origin);
         is_near
     }

@@ -6,7 +6,7 @@ use lumbre_geometry::Ray;
 
 use super::packet::{PACKET, Packet};
 use super::{
-    AnySink, ClosestSink, F32AnySink, F32ClosestSink, F64Bundle, Plan, Sink, batch_f32, batch_f64,
+    AnySink, ClosestSink, F32AnySink, F32ClosestSink, F64Bundle, Plan, Sink, batch_f32, batch_f64, batched,
 };
 use crate::simd::{Lanes, Level, Task};
 use crate::trace::Outcome;
@@ -30,7 +30,13 @@ pub(super) fn count<A>(outcome: &Outcome<A>) {
 }
 
 /// Closest hits by a plan, each answered once; how many the exact traversal had to find.
-pub(crate) fn closest(level: Level, accel: &Accel, rays: &[Ray], hits: &mut [Option<Hit>], plan: Plan) -> usize {
+pub(crate) fn closest(
+    level: Level,
+    accel: &Accel,
+    rays: &[Ray],
+    hits: &mut [Option<Hit>],
+    plan: Plan,
+) -> usize {
     ANSWERED.set([0; 2]);
     if !batch_f64::<ClosestHit, _>(level, accel, rays, &mut ClosestSink { accel, level, rays, hits }, plan) {
         super::closest(level, accel, rays, hits);
@@ -54,16 +60,21 @@ pub(crate) fn any(level: Level, accel: &Accel, rays: &[Ray], hits: &mut [bool], 
 }
 
 /// Closest and any hits in single precision by a plan that interleaves rays soon.
-pub(crate) fn f32(level: Level, accel: &Accel, rays: &[Ray32], hits: &mut [Option<Hit32>], are_hit: &mut [bool]) {
+pub(crate) fn f32(
+    level: Level,
+    accel: &Accel,
+    rays: &[Ray32],
+    hits: &mut [Option<Hit32>],
+    are_hit: &mut [bool],
+) {
     let plan = Plan::MIDDLE;
-    if accel.f32_queries_at(level).is_none()
-        || !batch_f32::<ClosestHit, _>(level, accel, rays, &mut F32ClosestSink { accel, rays, hits }, plan)
-    {
+    let Some(queries) = accel.f32_queries_at(level).filter(|_| batched(level, accel).is_some()) else {
         super::closest_f32(level, accel, rays, hits);
         super::any_f32(level, accel, rays, are_hit);
         return;
-    }
-    batch_f32::<AnyHit, _>(level, accel, rays, &mut F32AnySink { accel, rays, hits: are_hit }, plan);
+    };
+    batch_f32::<ClosestHit, _>(level, accel, rays, &mut F32ClosestSink { accel, queries, rays, hits }, plan);
+    batch_f32::<AnyHit, _>(level, accel, rays, &mut F32AnySink { accel, queries, rays, hits: are_hit }, plan);
 }
 
 /// Those of some rays that a packet answers; none without vectors.

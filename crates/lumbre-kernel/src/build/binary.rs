@@ -10,16 +10,17 @@ use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
 use crate::accel::Preset;
-use crate::build::sah::{BestSplit, Binning, Bins, Centers, Fill, FindCenters, Part, Split};
 use crate::build::boxes::Boxes;
 use crate::build::collapse::{Choices, Costs, Known, choose};
-use crate::build::small::{Decide, FEW, Few, group_of};
-use crate::simd::Level;
 use crate::build::morton::{self, Code};
 use crate::build::partition::part;
 use crate::build::primitive::{Bounds, Kind, Primitive, Traits};
 use crate::build::reinsert::reinsert;
+use crate::build::sah::{BestSplit, Binning, Bins, Centers, Fill, FindCenters, Part, Split};
+use crate::build::small::{Decide, FEW, Few, group_of};
 use crate::build::treelet;
+use crate::simd::Level;
+use crate::tree::Name;
 
 /// Levels that may be split by SAH; then come at most 32 more, each halving.
 const SAH_DEPTH: u32 = 64;
@@ -139,9 +140,6 @@ impl BinaryNode {
         self.0 = self.0.with_names(self.0.first(), choices.0);
     }
 }
-
-/// A primitive by its geometry, and which of it.
-pub(crate) type Name = [u32; 2];
 
 /// A binary tree, and what is in its leaves.
 pub(crate) struct Grown<'p> {

@@ -4,8 +4,8 @@ use lumbre_geometry::Aabb;
 use lumbre_math::DVec3;
 use rayon::prelude::*;
 
-use crate::tree::node::Units;
 use crate::build::primitive::{Bounds, Primitive};
+use crate::tree::node::Units;
 use crate::tree::sphere_block::{ExactSphere, has_radius};
 use crate::{BuildError, SphereCloud};
 

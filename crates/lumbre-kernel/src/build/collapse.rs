@@ -6,86 +6,22 @@
 
 use std::cmp::Reverse;
 
-use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
-use crate::tree::triangle_block::{self, BlockNames, Blocks, Filled, LaneOrder, Line, Vertices};
-use crate::build::binary::{Binary, BinaryNode, Fork, Name};
-use crate::simd::Level;
-use crate::tree::node::{Node, Units, WIDTH, tag};
+use crate::build::binary::{Binary, BinaryNode, Fork};
+use crate::build::occlusion_order;
 use crate::build::primitive::{Bounds, Kind, Primitive, Traits};
+use crate::simd::Level;
+use crate::tree::BLOCK;
+use crate::tree::Name;
+use crate::tree::node::{Node, Units, WIDTH, tag};
+use crate::tree::packed::{Entry, Packed};
 use crate::tree::sphere_block::SphereBlock;
 use crate::tree::storage::Store;
-use crate::trace::watertight::BLOCK;
-use crate::build::occlusion_order;
+use crate::tree::triangle_block::{self, BlockNames, Blocks, Filled, LaneOrder, Vertices};
 use crate::{BuildError, Geometry, GeometryKind, SphereCloud};
 
-/// A primitive in a leaf that is no triangle, or outside the tree.
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-#[repr(C)]
-pub(crate) struct Entry {
-    /// Position in the tree's list.
-    pub(crate) geometry: u32,
-    /// Which primitive of its geometry, or where an instance is entered; the top bit marks the last of its leaf.
-    primitive_and_last: u32,
-}
-
-const LAST: u32 = 1 << 31;
-
-impl Entry {
-    pub(crate) fn new(geometry: u32, primitive: u32, is_last: bool) -> Self {
-        Self { geometry, primitive_and_last: primitive | if is_last { LAST } else { 0 } }
-    }
-
-    /// As it is saved.
-    pub(crate) fn to_words(self) -> [u32; 2] {
-        [self.geometry, self.primitive_and_last]
-    }
-
-    pub(crate) fn from_words([geometry, primitive_and_last]: [u32; 2]) -> Self {
-        Self { geometry, primitive_and_last }
-    }
-
-    #[inline(always)]
-    pub(crate) fn primitive(&self) -> u32 {
-        self.primitive_and_last & !LAST
-    }
-
-    #[inline(always)]
-    pub(crate) fn is_last(&self) -> bool {
-        self.primitive_and_last & LAST != 0
-    }
-}
-
-/// The packed tree.
-#[derive(Debug, Default)]
-pub(crate) struct Packed {
-    /// Each before all that are below it.
-    pub(crate) nodes: Store<Node>,
-    /// The blocks of triangles: see [`blocks`].
-    pub(crate) blocks: Store<Line>,
-    /// As many as there are blocks.
-    pub(crate) names: Store<BlockNames>,
-    pub(crate) entries: Store<Entry>,
-    pub(crate) sphere_blocks: Store<SphereBlock>,
-    /// As many as there are blocks of spheres.
-    pub(crate) sphere_names: Store<BlockNames>,
-    /// The reference to the root; `None` when there is nothing finite.
-    pub(crate) root: Option<u32>,
-}
-
 impl Packed {
-    /// The blocks of triangles.
-    #[inline(always)]
-    pub(crate) fn blocks(&self) -> Blocks<'_> {
-        Blocks::new(&self.blocks)
-    }
-
-    /// The numbers of the blocks of a leaf of triangles, by which their names stand.
-    pub(crate) fn numbers(&self, leaf: u32) -> std::ops::Range<usize> {
-        self.blocks().numbers(leaf).expect("references lead to blocks")
-    }
-
     /// Puts the triangles of a packed tree where its geometries, which stood elsewhere before, have them now. Where there may be none
     /// without an area, it is not asked. What fails leaves everything as it was.
     ///

@@ -1,30 +1,30 @@
 //! What comes before the tree: geometries are checked, bounded and taken apart into primitives.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use lumbre_geometry::Aabb;
 use lumbre_math::{DMat3, DVec3, Transform, Vec3};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
-use crate::build::boxes::Boxes;
+use crate::accel::AccelParts;
 use crate::build::binary::{Grown, PARALLEL, binary_tree};
+use crate::build::boxes::Boxes;
 use crate::build::clouds::CloudSurvey;
-use crate::build::collapse::{Entry, Packed, lay_out};
-use crate::tree::summary::{Holds, SingleStart, Sizes};
-use crate::tree::bounding_block::Hulls;
-use crate::simd::{Lanes, Level, Task};
-use crate::trace::f32_ray::F32Queries;
-use crate::tree::node::Units;
+use crate::build::collapse::lay_out;
+use crate::build::open_instances;
 use crate::build::outline::Outline;
 use crate::build::primitive::{Bounds, Kind, Primitive, Traits};
-use crate::trace::filtered::Queries;
-use crate::trace::watertight::BLOCK;
+use crate::geometry::has_area;
+use crate::precise_mesh;
+use crate::simd::{Lanes, Level, Task};
+use crate::tree::BLOCK;
+use crate::tree::node::Units;
+use crate::tree::packed::{Entry, Packed};
+use crate::tree::summary::Sizes;
 use crate::{
     Accel, BuildError, BuildOptions, Geometry, GeometryKind, Placement, PreciseMesh, Preset, TriangleMesh,
 };
-use crate::build::open_instances;
-use crate::precise_mesh;
 
 /// References have 29 bits of place.
 pub(crate) const MOST_PRIMITIVES: usize = (1 << 29) - 1;
@@ -96,47 +96,25 @@ fn build_here(geometries: Vec<Geometry>, preset: Preset) -> Result<Accel, BuildE
         drop(primitives);
         layout.pack(level, &units, &geometries, names)?
     };
-    let holds = Holds::new(&geometries, parts.sizes);
-    let single = SingleStart::new(&holds, &units, tree.root);
-    Ok(Accel {
-        hulls: Hulls::new(&geometries, &tree.entries, &units),
-        queries: Queries::new(level, single.as_ref()),
-        f32_queries: F32Queries::new(level, single.as_ref()),
-        single,
-        units,
-        holds,
-        tree,
-        infinite: parts.infinite,
-        bounds: parts.bounds,
-        primitives: count,
+    let (sizes, bounds, infinite) = (parts.sizes, parts.bounds, parts.infinite);
+    Ok(Accel::assemble(
         level,
-        built_cost: None,
-        masks: Vec::new(),
-        moments: OnceLock::new(),
         geometries,
-    })
+        AccelParts { units, tree, sizes, bounds, infinite, primitives: count },
+    ))
 }
 
 /// A tree in which nothing stands yet.
 pub(crate) fn empty_over(geometries: Vec<Geometry>) -> Accel {
-    let level = Level::best();
-    Accel {
+    let parts = AccelParts {
         units: Units::new(DVec3::ZERO, 1.0, 0.0, 1.0),
-        holds: Holds::new(&geometries, Sizes::default()),
-        single: None,
-        queries: Queries::new(level, None),
-        f32_queries: F32Queries::new(level, None),
-        hulls: Hulls::default(),
         tree: Packed::default(),
-        infinite: Vec::new(),
+        sizes: Sizes::default(),
         bounds: Aabb::EMPTY,
+        infinite: Vec::new(),
         primitives: 0,
-        level,
-        built_cost: None,
-        masks: Vec::new(),
-        moments: OnceLock::new(),
-        geometries,
-    }
+    };
+    Accel::assemble(Level::best(), geometries, parts)
 }
 
 /// What geometries consist of, triangles apart.
@@ -511,26 +489,6 @@ impl Boxer {
         }
         Bounds::of_lanes::<L>(numbers)
     }
-}
-
-/// Whether a triangle can be hit at all, as double precision sees it.
-#[inline(always)]
-pub(crate) fn has_area(&[a, b, c]: &[Vec3; 3]) -> bool {
-    // Single precision can tell of all but slivers: its errors are below 2^-20 of the products, and 1e-37.
-    let (e, f) = ((b - a).to_array(), (c - a).to_array());
-    let is_clear = |x: usize, y: usize| {
-        let (p, q) = (e[x] * f[y], e[y] * f[x]);
-        let bound = (p.abs() + q.abs()) * (1.0 / (1 << 20) as f32) + 1e-37;
-        (p - q).abs() > bound && bound < f32::INFINITY
-    };
-    is_clear(0, 1) || is_clear(1, 2) || is_clear(2, 0) || has_area_exactly([a, b, c])
-}
-
-#[cold]
-#[inline(never)]
-fn has_area_exactly(corners: [Vec3; 3]) -> bool {
-    let [a, b, c] = corners.map(|corner| corner.as_dvec3());
-    (b - a).cross(c - a) != DVec3::ZERO
 }
 
 /// Writes down the boxes of the triangles that have an area.

@@ -6,8 +6,8 @@
 
 use rayon::prelude::*;
 
-use crate::build::sah::Centers;
 use crate::build::primitive::Primitive;
+use crate::build::sah::Centers;
 
 /// Bits of a code on each axis.
 const BITS: u32 = 10;

@@ -14,9 +14,9 @@
 
 use rayon::prelude::*;
 
-use crate::tree::triangle_block::{Blocks, TriangleBlock};
 use crate::simd::{CornersRoom, Eight, Lanes, Level, Task, Vector, Wide};
 use crate::tree::node::{Node, Units, WIDTH, tag};
+use crate::tree::triangle_block::{Blocks, TriangleBlock};
 
 /// What is to be expected of a ray that meets a box.
 #[derive(Clone, Copy, Debug, PartialEq)]

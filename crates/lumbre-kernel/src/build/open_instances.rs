@@ -19,11 +19,12 @@ use lumbre_math::Transform;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
-use crate::build::collapse::Entry;
-use crate::simd::{Lanes, Level, Task};
-use crate::tree::node::{Units, tag};
 use crate::build::outline::{EightSizes, Outline, Placing, box_in_space};
 use crate::build::primitive::{Bounds, ONE, Primitive};
+use crate::simd::{Lanes, Level, Task};
+use crate::tree::node::{Units, tag};
+use crate::tree::packed::Entry;
+use crate::tree::packed::Start;
 use crate::{Accel, Geometry, GeometryKind, Instance, Placement};
 
 /// How many leaves there may be more for each instance that stands still, and how many more for all: so many that a mean one may be opened once.
@@ -33,50 +34,6 @@ const MORE_FOR_ALL: usize = 64;
 const LARGEST_SHARE: f32 = 0.65;
 /// Boxes of a part's outline, about; those of its children, where they are more.
 const OUTLINE: usize = 8;
-
-/// Where an entry of an instance enters the instance's tree: at the root, or at another node. The parts of an instance
-/// together are all of its tree, no two of them have a node in common, and none is a leaf.
-///
-/// After a refit with another tree in which these are no such nodes, one entry stands for the whole and the others for nothing,
-/// until a tree comes in which they are again.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Start(u32);
-
-impl Start {
-    /// At the root.
-    pub(crate) const WHOLE: Self = Self(0);
-    const AS_WHOLE: u32 = 1;
-    const AS_NOTHING: u32 = 2;
-
-    /// As it stands in an entry.
-    #[inline(always)]
-    pub(crate) fn of(word: u32) -> Self {
-        Self(word)
-    }
-
-    pub(crate) fn word(self) -> u32 {
-        self.0
-    }
-
-    #[inline(always)]
-    pub(crate) fn is_nothing(self) -> bool {
-        self.0 >> tag::SHIFT >= Self::AS_NOTHING
-    }
-
-    /// What is entered of a tree with this root.
-    #[inline(always)]
-    pub(crate) fn below(self, root: u32) -> u32 {
-        if self == Self::WHOLE || self.0 >> tag::SHIFT != tag::INNER { root } else { self.0 }
-    }
-
-    fn node(self) -> u32 {
-        self.0 & tag::PLACE
-    }
-
-    fn marked(self, mark: u32) -> Self {
-        Self(tag::reference(mark, self.node()))
-    }
-}
 
 /// A node of an instance's tree that is to be entered, or the root, with what is below it.
 struct Family {

@@ -5,9 +5,9 @@
 
 use rayon::prelude::*;
 
+use crate::build::primitive::{Bounds, Primitive};
 use crate::build::sah::{PartPiece, Split};
 use crate::simd::Level;
-use crate::build::primitive::{Bounds, Primitive};
 
 /// Primitives that are parted at a time: with room for as many, they fit into a cache of a core.
 const PIECE: usize = 2048;

@@ -7,15 +7,16 @@
 
 use lumbre_geometry::Aabb;
 
-use crate::build::boxes::Boxes;
 use crate::build::binary::{Grown, PARALLEL, binary_tree};
-use crate::build::collapse::{Entry, Relaid, lay_out};
-use crate::tree::node::tag;
+use crate::build::boxes::Boxes;
+use crate::build::collapse::{Relaid, lay_out};
 use crate::build::input::{self, take_apart};
+use crate::build::occlusion_order;
 use crate::build::primitive::{Bounds, Kind, Primitive, Traits};
 use crate::build::refit::{Places, check_places, cost};
-use crate::trace::watertight::BLOCK;
-use crate::build::occlusion_order;
+use crate::tree::BLOCK;
+use crate::tree::node::tag;
+use crate::tree::packed::Entry;
 use crate::{Accel, BuildOptions, Preset};
 
 /// See [`Accel::rebuild_partially`].

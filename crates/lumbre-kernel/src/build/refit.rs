@@ -6,16 +6,18 @@ use lumbre_geometry::Aabb;
 use lumbre_math::DVec3;
 use rayon::prelude::*;
 
-use crate::tree::triangle_block::{BlockNames, Blocks};
 use crate::build::clouds::box_of;
-use crate::build::collapse::Entry;
-use crate::tree::summary::Holds;
+use crate::build::input::{Boxer, Parts, take_apart, units_of};
+use crate::build::open_instances::{self, Families};
+use crate::build::primitive::Bounds;
+use crate::geometry::has_area;
 use crate::simd::Portable;
 use crate::tree::node::{Node, Units, tag};
-use crate::build::open_instances::{self, Families, Start};
-use crate::build::input::{Boxer, Parts, has_area, take_apart, units_of};
-use crate::build::primitive::Bounds;
+use crate::tree::packed::Entry;
+use crate::tree::packed::Start;
 use crate::tree::sphere_block::{SphereBlock, has_radius};
+use crate::tree::summary::Holds;
+use crate::tree::triangle_block::{BlockNames, Blocks};
 use crate::{Accel, BuildError, Geometry, GeometryKind, SphereCloud};
 
 /// Why a tree cannot be refitted. It is as it was before.

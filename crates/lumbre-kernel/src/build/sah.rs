@@ -4,9 +4,9 @@
 //! 2007. Differing from it, the range of a side's centres is not measured but taken to be what is left of the parent's
 //! range, within the side's box; only where bins show that this is much too wide, it is measured.
 
-use crate::simd::{Lanes, Task};
 use crate::build::primitive::{Bounds, Primitive, Traits};
-use crate::trace::watertight::BLOCK;
+use crate::simd::{Lanes, Task};
+use crate::tree::BLOCK;
 
 /// Bins on an axis: a power of two.
 const MOST_BINS: usize = 16;

@@ -1,9 +1,9 @@
 //! The last splits: of sixteen primitives or fewer, every split along every axis is tried.
 
-use crate::simd::{Lanes, Task};
-use crate::tree::node::WIDTH;
 use crate::build::primitive::{Bounds, Kind, Primitive, Traits};
-use crate::trace::watertight::BLOCK;
+use crate::simd::{Lanes, Task};
+use crate::tree::BLOCK;
+use crate::tree::node::WIDTH;
 
 /// How many are few.
 pub(crate) const FEW: usize = 2 * BLOCK;

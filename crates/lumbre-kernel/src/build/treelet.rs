@@ -153,12 +153,13 @@ fn over<'p>(tree: &Tree, place: u32, pieces: &mut [Option<Binary<'p>>]) -> Binar
 mod tests {
     use super::*;
     use crate::accel::Preset;
+    use crate::build::binary::{Grown, binary_tree};
     use crate::build::boxes::Boxes;
-    use crate::build::binary::{Grown, Name, binary_tree};
     use crate::build::collapse::choose;
-    use crate::simd::Level;
     use crate::build::primitive::{Kind, Traits};
+    use crate::simd::Level;
     use crate::tests::scenes::Random;
+    use crate::tree::Name;
 
     /// Boxes as of a room: things of many small ones, and among them walls and boards; or, without these, all as small anywhere.
     fn boxes(count: usize, is_room: bool) -> Boxes {

@@ -18,14 +18,14 @@ use std::fmt;
 use std::ops::Range;
 
 use crate::accel::Accel;
-use crate::tree::triangle_block::BlockNames;
-use crate::build::collapse::{Entry, Packed};
+use crate::build::input::{empty_over, take_apart};
+use crate::build::open_instances::is_part;
+use crate::build::refit::{self, RefitError};
 use crate::simd::Level;
 use crate::tree::node::{Node, WIDTH, tag};
-use crate::build::open_instances::is_part;
-use crate::build::input::{empty_over, take_apart};
-use crate::build::refit::{self, RefitError};
+use crate::tree::packed::{Entry, Packed};
 use crate::tree::sphere_block::SphereBlock;
+use crate::tree::triangle_block::BlockNames;
 use crate::{BuildError, Geometry, GeometryKind};
 
 const MAGIC: [u8; 8] = *b"LumbTree";

@@ -20,25 +20,22 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::ops::Range;
 use std::path::Path;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use bytemuck::Pod;
 use memmap2::Mmap;
 
-use crate::tree::triangle_block::{BlockNames, Line};
-use crate::build::collapse::{Entry, Packed};
-use crate::tree::summary::{Holds, SingleStart};
-use crate::tree::bounding_block::Hulls;
-use crate::simd::Level;
-use crate::trace::f32_ray::F32Queries;
-use crate::tree::node::{Node, WIDTH, tag};
-use crate::build::open_instances::Start;
+use crate::accel::AccelParts;
 use crate::build::input::{Parts, take_apart, units_of};
 use crate::build::refit::{Places, check_places};
 use crate::io::bytes::{check_names, check_structure, signature};
-use crate::trace::filtered::Queries;
+use crate::simd::Level;
+use crate::tree::node::{Node, WIDTH, tag};
+use crate::tree::packed::Start;
+use crate::tree::packed::{Entry, Packed};
 use crate::tree::sphere_block::SphereBlock;
 use crate::tree::storage::Store;
+use crate::tree::triangle_block::{BlockNames, Line};
 use crate::{Accel, Geometry, GeometryKind, LoadError, RefitError};
 
 const MAGIC: [u8; 8] = *b"LumbMap\0";
@@ -396,26 +393,9 @@ fn over_mapped(file: Arc<Mmap>, geometries: Vec<Geometry>) -> Result<Accel, Load
     check_names(&tree, &geometries)?;
     let masks: Store<u32> = array(&file, &header, 6)?;
     let units = units_of(&geometries, &parts);
-    let holds = Holds::new(&geometries, parts.sizes);
-    let level = Level::best();
-    let single = SingleStart::new(&holds, &units, tree.root);
-    let accel = Accel {
-        hulls: Hulls::new(&geometries, &tree.entries, &units),
-        queries: Queries::new(level, single.as_ref()),
-        f32_queries: F32Queries::new(level, single.as_ref()),
-        single,
-        units,
-        holds,
-        tree,
-        bounds: parts.bounds,
-        primitives: parts.count(),
-        level,
-        built_cost: None,
-        masks: masks.to_vec(),
-        moments: OnceLock::new(),
-        infinite: Vec::new(),
-        geometries,
-    };
+    let (sizes, bounds, primitives) = (parts.sizes, parts.bounds, parts.count());
+    let accel_parts = AccelParts { units, tree, sizes, bounds, infinite: Vec::new(), primitives };
+    let accel = Accel::assemble(Level::best(), geometries, accel_parts).with_masks_unchecked(masks.to_vec());
     let places = check_places(&accel, &parts).map_err(LoadError::OtherGeometries)?;
     let is_as_saved =
         |&(place, start): &(usize, Start)| accel.tree.entries[place].primitive() == start.word();

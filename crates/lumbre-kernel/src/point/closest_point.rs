@@ -11,11 +11,11 @@ use std::fmt;
 use lumbre_geometry::{Aabb, NearestPoint, NoNearestPoint, nearest_on_triangle, similarity_factor};
 use lumbre_math::{DVec2, DVec3, Transform};
 
-use crate::tree::node::{Node, tag};
-use crate::build::open_instances::Start;
-use crate::build::input::has_area;
-use crate::tree::sphere_block::{ExactSphere, has_radius};
+use crate::geometry::has_area;
 use crate::trace::Context;
+use crate::tree::node::{Node, tag};
+use crate::tree::packed::Start;
+use crate::tree::sphere_block::{ExactSphere, has_radius};
 use crate::{Accel, GeometryKind, Instance, InstancePath, TriangleMesh, precise_mesh};
 
 /// The point of all surfaces that is nearest to a given one.

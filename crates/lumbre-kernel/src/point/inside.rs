@@ -3,10 +3,10 @@
 use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
 
-use crate::tree::node::tag;
-use crate::build::open_instances::Start;
-use crate::tree::sphere_block::ExactSphere;
 use crate::trace::exact::{self, Crossing, Visitor, Wanted};
+use crate::tree::node::tag;
+use crate::tree::packed::Start;
+use crate::tree::sphere_block::ExactSphere;
 use crate::{Accel, GeometryKind};
 
 /// Which ways are looked: no axes of symmetry of anything likely, and no two near one line.

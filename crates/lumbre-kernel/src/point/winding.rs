@@ -13,11 +13,11 @@ use lumbre_geometry::{Shape, similarity_factor};
 use lumbre_math::{DMat3, DVec3};
 use rayon::prelude::*;
 
-use crate::tree::triangle_block::BlockNames;
+use crate::geometry::has_area;
 use crate::point::closest_point::Frame;
 use crate::tree::node::{Node, WIDTH, tag};
-use crate::build::input::has_area;
 use crate::tree::sphere_block::ExactSphere;
+use crate::tree::triangle_block::BlockNames;
 use crate::{Accel, GeometryKind, InstancePath, PreciseMesh, TriangleMesh, precise_mesh};
 
 /// Why there is no winding number: an open shape, or custom geometry that offers none.

@@ -4,9 +4,9 @@ use std::hint::select_unpredictable;
 use std::mem::MaybeUninit;
 
 use super::{Room, Sides, Slots, WIDE, Wide};
-use crate::tree::node::{Node, Slabs, WIDTH};
 use crate::batch::packet::{Frustum, SlabRows};
 use crate::trace::stack::stack_entry;
+use crate::tree::node::{Node, Slabs, WIDTH};
 
 const _: () = assert!(WIDTH == WIDE);
 

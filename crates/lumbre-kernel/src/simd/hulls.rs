@@ -1,11 +1,12 @@
 //! A ray against eight bounding volumes of shapes.
 
 use super::{Eight, Lanes, Row, Vector, WIDE, Wide};
+use crate::trace::watertight::HeightRange;
+use crate::tree::BLOCK;
 use crate::tree::bounding_block::{
     HullBlock, HullRay, LEAST_COMPONENT, LEAST_TOLERANCE, LEAST_TUBE_ERROR, TOLERANCE_PER_MARGIN,
     TUBE_ERROR_PER_MARGIN,
 };
-use crate::trace::watertight::{BLOCK, HeightRange};
 
 /// What came of eight hulls.
 #[derive(Clone, Copy, Debug)]
@@ -198,11 +199,7 @@ impl Chord {
 impl<V: Eight> Chords<V> {
     /// Looks closer at those that pass tubes: a bit for each that may be met, among them all that are, and for each that certainly is.
     #[inline(always)]
-    fn meet_tubes<W: Wide, const SURE: bool>(
-        &self,
-        block: &HullBlock,
-        range: &HeightRange,
-    ) -> (u32, u32) {
+    fn meet_tubes<W: Wide, const SURE: bool>(&self, block: &HullBlock, range: &HeightRange) -> (u32, u32) {
         let (mut mask, mut sure) = (self.mask, self.sure);
         let tubes = &block.tubes;
         let mut rings = V::splat(0.0).below(V::load(tubes)) & mask;

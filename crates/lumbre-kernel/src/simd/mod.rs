@@ -25,29 +25,30 @@ use lumbre_math::{DVec3, Transform};
 #[cfg(target_arch = "x86_64")]
 use self::x86::OnX86;
 use crate::Ray32;
-use crate::tree::triangle_block::{ROOMS, TriangleBlock, far_of_last};
-use crate::tree::summary::SingleStart;
+#[cfg(test)]
+use crate::batch::packet::SlabRows;
 use crate::trace::f32_ray::F32Ray;
+use crate::trace::stack::STACK;
+use crate::trace::start::SingleStart;
+use crate::trace::watertight::{BlockRay, Inside, Passage, Shear};
+use crate::tree::BLOCK;
 #[cfg(test)]
 use crate::tree::node::Node;
 use crate::tree::node::{BoxRay, Slabs, Units, WIDTH};
-#[cfg(test)]
-use crate::batch::packet::SlabRows;
-use crate::trace::stack::STACK;
-use crate::trace::watertight::{BLOCK, BlockRay, Inside, Passage, Shear};
+use crate::tree::triangle_block::{ROOMS, TriangleBlock, far_of_last};
 
 pub(crate) use asked::{Asked, Question};
 pub(crate) use boxes::{
     meet_boxes, meet_each, meet_frustum, only_child, push_as_built, push_by_distance, put_and_take_as_built,
     put_and_take_by_distance,
 };
-pub(crate) use hulls::{MetHulls, meet_hulls};
 #[cfg(test)]
 pub(crate) use hulls::meet_hulls_at;
+pub(crate) use hulls::{MetHulls, meet_hulls};
 pub(crate) use portable::Portable;
+pub(crate) use spheres::meet_spheres;
 #[cfg(test)]
 pub(crate) use spheres::meet_spheres_at;
-pub(crate) use spheres::meet_spheres;
 pub(crate) use wide::{Eight, LANE_BITS, LastEight, Row, Vector, WIDE, Wide};
 
 /// What a search does many at a time: boxes by sixteen, and triangles by eight.

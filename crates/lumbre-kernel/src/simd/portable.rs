@@ -7,14 +7,15 @@ use lumbre_math::DVec3;
 use super::wide::{Portable8, Portable16};
 use super::{Axes, Corners, CornersRoom, Crossings, Eight, Lanes, Level, Row, Set, Sides, Vector, WIDE};
 use crate::Ray32;
-use crate::tree::triangle_block::TriangleBlock;
-use crate::tree::summary::SingleStart;
 use crate::trace::f32_ray::F32Ray;
-use crate::tree::node::{BoxRay, END_FACTOR, LITTLE, START_FACTOR, Slabs, Units};
+use crate::trace::start::SingleStart;
 use crate::trace::watertight::{
-    BLOCK, BlockRay, EDGE_ERROR, ERRORS_OF_EDGES, ERRORS_OF_EXTENT, HEIGHT_ERROR, HeightRange, Inside,
-    Passage, SIZE_ERROR, Shear, TINY, passage,
+    BlockRay, EDGE_ERROR, ERRORS_OF_EDGES, ERRORS_OF_EXTENT, HEIGHT_ERROR, HeightRange, Inside, Passage,
+    SIZE_ERROR, Shear, TINY, passage,
 };
+use crate::tree::BLOCK;
+use crate::tree::node::{BoxRay, END_FACTOR, LITTLE, START_FACTOR, Slabs, Units};
+use crate::tree::triangle_block::TriangleBlock;
 
 pub(crate) struct Portable;
 

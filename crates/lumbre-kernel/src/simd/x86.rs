@@ -11,16 +11,17 @@ use super::{
     Axes, Corners, CornersRoom, Crossings, Lanes, LastEight, Level, Question, Row, Set, Sides, Task, Vector,
     WIDE, Wide, wide,
 };
-use crate::tree::triangle_block::{FIRST_UNSHARED, MOST_SHARED, QUAD, TriangleBlock, USUAL, far_of_last};
-use crate::tree::summary::SingleStart;
 use crate::trace::f32_ray::F32Ray;
+use crate::trace::start::SingleStart;
+use crate::trace::watertight::{
+    BlockRay, EDGE_ERROR, ERRORS_OF_EDGES, ERRORS_OF_EXTENT, FAR, HEIGHT_ERROR, HeightRange, Inside, Passage,
+    ROUNDINGS, SIZE_ERROR, Shear, TINY,
+};
+use crate::tree::BLOCK;
 use crate::tree::node::{
     BoxRay, END_FACTOR, LARGEST_NEAR, LITTLE, SMALLEST_NEAR, START_FACTOR, Slabs, TINY_NEAR, Units,
 };
-use crate::trace::watertight::{
-    BLOCK, BlockRay, EDGE_ERROR, ERRORS_OF_EDGES, ERRORS_OF_EXTENT, FAR, HEIGHT_ERROR, HeightRange, Inside,
-    Passage, ROUNDINGS, SIZE_ERROR, Shear, TINY,
-};
+use crate::tree::triangle_block::{FIRST_UNSHARED, MOST_SHARED, QUAD, TriangleBlock, USUAL, far_of_last};
 use crate::{Accel, Ray32};
 
 /// Tasks at a level: see [`Home`](super::Home).

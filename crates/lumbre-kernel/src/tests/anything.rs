@@ -8,9 +8,9 @@ use lumbre_math::{AnimatedTransform, DVec3, Transform, Vec3};
 use super::oracle;
 use super::scenes::{Random, build, cloud, icosphere, mixture, precise, ray, shape, soup, vertex};
 use super::single::check_packet;
-use crate::simd::Level;
 use crate::batch;
 use crate::batch::packet::{self, PACKET};
+use crate::simd::Level;
 use crate::trace::Outcome;
 use crate::{Accel, Faces, GeometryKind, Hit, Instance, Query, TriangleMesh, brute};
 
@@ -19,7 +19,6 @@ const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
 fn placed(accel: &Arc<Accel>, map: Transform) -> GeometryKind {
     GeometryKind::Instance(Instance { accel: Arc::clone(accel), world_from_object: map.into() })
 }
-
 
 /// A closed mesh, long and thin, so that it is opened where it is placed.
 fn needle() -> TriangleMesh {
@@ -53,7 +52,7 @@ fn everything(random: &mut Random) -> Accel {
             None,
         ),
         (vec![GeometryKind::Spheres(Arc::new(cloud(random, 30, zero, zero, 1.0)))], Some(false)),
-        (vec![GeometryKind::PreciseMesh(Arc::new(precise(&icosphere(2, zero, 0.8))))], None),
+        (vec![GeometryKind::PreciseMesh(Arc::new(precise(&icosphere(2, zero, 0.8))))], Some(false)),
     ];
     let mut trees: Vec<_> = trees
         .into_iter()

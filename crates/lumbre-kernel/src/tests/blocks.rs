@@ -11,10 +11,11 @@ use lumbre_geometry::{PlacedShape, Ray, Sphere};
 use lumbre_math::{DVec3, Transform, Vec3};
 
 use super::scenes::{Random, soup};
-use crate::tree::triangle_block::{self, BlockNames, Blocks, Line, TriangleBlock, Vertices};
 use crate::simd::{Level, corners_at, equals_before_at, meet_triangles_at, told_at, truncated_at};
 use crate::trace::f32_ray::F32Ray;
-use crate::trace::watertight::{BLOCK, BlockRay, Meeting, Shear, intersect};
+use crate::trace::watertight::{BlockRay, Meeting, Shear, intersect};
+use crate::tree::BLOCK;
+use crate::tree::triangle_block::{self, BlockNames, Blocks, Line, TriangleBlock, Vertices};
 use crate::{Accel, BuildOptions, Geometry, GeometryKind, Preset, TriangleMesh};
 
 struct Tally {
@@ -214,8 +215,9 @@ fn a_ray_that_leaves_a_wall_is_seen_to_leave_it() {
         let wall = TriangleMesh { origin: DVec3::ZERO, positions, indices: vec![[0, 1, 2], [0, 2, 3]] };
         let geometry = Geometry { id: 0, kind: GeometryKind::Mesh(Arc::new(wall)) };
         let names = [BlockNames::of(&[[0, 0], [0, 1]])];
-        let units =
-            triangle_block::pack(Level::best(), Vertices::Shared, &[geometry], &names, &[0], true).unwrap().lines;
+        let units = triangle_block::pack(Level::best(), Vertices::Shared, &[geometry], &names, &[0], true)
+            .unwrap()
+            .lines;
         let block = Blocks::new(&units).at(0).unwrap();
         for _ in 0..50 {
             let at = center + random.between(-1.0, 1.0) * right + random.between(-1.0, 1.0) * up;
@@ -344,7 +346,8 @@ fn triangles_stand_so_that_either_half_finds_its_vertices_in_little_room() {
             let names = [BlockNames::of(&names)];
             let geometries = [Geometry { id: 0, kind: GeometryKind::Mesh(Arc::clone(&mesh)) }];
             let filled =
-                triangle_block::pack(Level::best(), Vertices::Shared, &geometries, &names, &[0], true).unwrap();
+                triangle_block::pack(Level::best(), Vertices::Shared, &geometries, &names, &[0], true)
+                    .unwrap();
             let block = Blocks::new(&filled.lines).at(0).unwrap();
             assert_eq!(block.room(), 10, "{triangles:?}");
             let mut names = names;
@@ -359,7 +362,8 @@ fn triangles_stand_so_that_either_half_finds_its_vertices_in_little_room() {
             }
             // What stands in that order stays in it.
             let again =
-                triangle_block::pack(Level::best(), Vertices::Shared, &geometries, &names, &[0], true).unwrap();
+                triangle_block::pack(Level::best(), Vertices::Shared, &geometries, &names, &[0], true)
+                    .unwrap();
             assert_eq!(again.lines, filled.lines);
         }
     }

@@ -13,14 +13,15 @@ use lumbre_math::{DVec2, DVec3, Transform};
 use super::oracle::check_many;
 use super::scenes::{self, Random, build, with_every_preset};
 use super::single::check_packet;
-use crate::build::collapse::Entry;
-use crate::tree::bounding_block::{HullBlock, HullRay, Hulls};
-use crate::simd::{Level, meet_hulls_at};
-use crate::tree::node::Units;
 use crate::batch;
 use crate::batch::packet::PACKET;
+use crate::simd::{Level, meet_hulls_at};
 use crate::trace::decide::heights;
-use crate::trace::watertight::{BLOCK, HeightRange};
+use crate::trace::watertight::HeightRange;
+use crate::tree::BLOCK;
+use crate::tree::bounding_block::{HullBlock, HullRay, Hulls};
+use crate::tree::node::Units;
+use crate::tree::packed::Entry;
 use crate::{Geometry, GeometryKind};
 
 /// A shape of any kind within about `size` of `center`, now and then squeezed to a thousandth on an axis, or tiny.

@@ -11,12 +11,12 @@ use super::scenes::{
     with_every_preset,
 };
 use crate::batch;
-use crate::tree::triangle_block::Line;
-use crate::tree::summary::SingleStart;
+use crate::batch::packet::PACKET;
 use crate::simd::{Eight, Lanes, Level, Portable, Vector, start_narrow_by_four_at};
 use crate::trace::f32_ray::Precise;
+use crate::trace::start::SingleStart;
 use crate::tree::node::Node;
-use crate::batch::packet::PACKET;
+use crate::tree::triangle_block::Line;
 use crate::{Accel, BuildOptions, Geometry, GeometryKind, Hit, Hit32, Instance, Preset, Ray32, TriangleMesh};
 
 const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);

@@ -10,11 +10,12 @@ use super::oracle::check;
 use super::scenes::{
     Balls, Random, build, cube, icosphere, options, precise, ray, soup, vertex, with_every_preset,
 };
-use crate::build::collapse::Entry;
-use crate::build::open_instances::{Start, is_part};
+use crate::build::open_instances::is_part;
+use crate::tree::packed::Entry;
+use crate::tree::packed::Start;
 use crate::{
-    Accel, BuildOptions, Geometry, GeometryKind, Instance, LoadError, MapError, Placement, Preset,
-    Query, SphereCloud, TriangleMesh,
+    Accel, BuildOptions, Geometry, GeometryKind, Instance, LoadError, MapError, Placement, Preset, Query,
+    SphereCloud, TriangleMesh,
 };
 
 const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
@@ -239,10 +240,9 @@ fn other_queries_answer_as_without_opening() {
             inside += usize::from(opened.is_inside(p));
             let ray = ray(&mut random, CENTER, 2.0);
             let hit = opened.closest(&ray);
-            for options in [
-                Query { mask: 1, ..Query::new() },
-                Query { mask: 6, exclude: hit.as_ref(), ..Query::new() },
-            ] {
+            for options in
+                [Query { mask: 1, ..Query::new() }, Query { mask: 6, exclude: hit.as_ref(), ..Query::new() }]
+            {
                 assert_eq!(opened.closest_with(&ray, &options), whole.closest_with(&ray, &options));
                 assert_eq!(opened.any_with(&ray, &options), whole.any_with(&ray, &options));
             }

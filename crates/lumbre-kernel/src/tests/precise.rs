@@ -9,9 +9,7 @@ use super::oracle::check;
 use super::scenes::{
     Random, build, bumpy, cube, icosphere, mesh, precise, ray, soup, torus, with_every_preset,
 };
-use crate::{
-    Accel, BuildError, Faces, Geometry, GeometryKind, Instance, PreciseMesh, Query, TriangleMesh,
-};
+use crate::{Accel, BuildError, Faces, Geometry, GeometryKind, Instance, PreciseMesh, Query, TriangleMesh};
 
 fn kind(mesh: PreciseMesh) -> GeometryKind {
     GeometryKind::PreciseMesh(Arc::new(mesh))

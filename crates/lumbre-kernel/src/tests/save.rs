@@ -7,10 +7,10 @@ use lumbre_math::DVec3;
 
 use super::oracle::check;
 use super::scenes::{Random, build, cube, icosphere, mixture, ray, with_every_preset};
-use crate::tree::triangle_block::BlockNames;
-use crate::build::collapse::Packed;
-use crate::tree::node::{Node, tag};
 use crate::io::bytes::check_structure;
+use crate::tree::node::{Node, tag};
+use crate::tree::packed::Packed;
+use crate::tree::triangle_block::BlockNames;
 use crate::{Accel, BuildError, Geometry, GeometryKind, LoadError, Query, RefitError, TriangleMesh};
 
 const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);

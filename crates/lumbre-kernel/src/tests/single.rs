@@ -6,13 +6,11 @@ use lumbre_geometry::{PlacedShape, Plane, Ray};
 use lumbre_math::{DVec3, Transform};
 
 use super::scenes::{self, Random};
-use crate::simd::Level;
 use crate::batch;
 use crate::batch::packet::{self, PACKET};
+use crate::simd::Level;
 use crate::trace::Outcome;
-use crate::{
-    Accel, BuildOptions, Faces, Geometry, GeometryKind, Hit, Preset, Query, TriangleMesh,
-};
+use crate::{Accel, BuildOptions, Faces, Geometry, GeometryKind, Hit, Preset, Query, TriangleMesh};
 
 /// A grid of hills, with a sheet twice in the same place, needles and some triangles seen on edge.
 fn mesh(random: &mut Random, origin: DVec3, size: f64) -> TriangleMesh {

@@ -9,11 +9,12 @@ use lumbre_math::DVec3;
 
 use super::{Outcome, Winner};
 use crate::Accel;
-use crate::tree::triangle_block::{Blocks, TriangleBlock};
-use crate::tree::summary::SingleStart;
 use crate::simd::{self, Axes, Lanes};
+use crate::trace::start::SingleStart;
+use crate::trace::watertight::{self, Inside, Meeting, Passage, Shear};
+use crate::tree::BLOCK;
 use crate::tree::node::Node;
-use crate::trace::watertight::{self, BLOCK, Inside, Meeting, Passage, Shear};
+use crate::tree::triangle_block::{Blocks, TriangleBlock};
 
 /// The closest hit so far, as far as single precision knows it: a triangle by its place in the tree, or what is none, and the interval
 /// of heights along the ray that holds the crossing.

@@ -16,15 +16,16 @@ use super::leaves::CloudRay;
 use super::stack::{ClosestHit, Goal, Stack};
 use super::visitors::{Any, Closest};
 use super::{Context, all_crossings, first_crossing, is_sound, meets_front};
-use crate::tree::triangle_block::{Blocks, TriangleBlock};
-use crate::build::collapse::Entry;
-use crate::tree::summary::{Holds, Sizes};
-use crate::tree::bounding_block::HullRay;
-use crate::simd::{self, Lanes, Level, MetHulls, Task, Vector};
-use crate::tree::node::{BoxRay, Progress, tag};
-use crate::build::open_instances::Start;
 use crate::query::Query;
-use crate::trace::watertight::{self, BLOCK, BlockRay, HeightRange, Passage, Shear};
+use crate::simd::{self, Lanes, Level, MetHulls, Task};
+use crate::trace::watertight::{self, BlockRay, HeightRange, Passage, Shear};
+use crate::tree::BLOCK;
+use crate::tree::bounding_block::HullRay;
+use crate::tree::node::{BoxRay, Progress, tag};
+use crate::tree::packed::Entry;
+use crate::tree::packed::Start;
+use crate::tree::summary::{Holds, Sizes};
+use crate::tree::triangle_block::{Blocks, TriangleBlock};
 use crate::{Accel, GeometryKind, Hit};
 
 /// Which crossings of one primitive a visitor wants.
@@ -146,7 +147,8 @@ fn traverse_from(
 ) {
     let context = &mut context.clone();
     let mut edge_hits = Vec::new();
-    let traversal = Traversal { accel, from, context, ray, visitor: &mut *visitor, edge_hits: &mut edge_hits };
+    let traversal =
+        Traversal { accel, from, context, ray, visitor: &mut *visitor, edge_hits: &mut edge_hits };
     let is_over = level.run(traversal);
     if !is_over && !edge_hits.is_empty() {
         edges::visit_borders(level, accel, context, ray, &edge_hits, visitor);
@@ -425,7 +427,8 @@ impl<'a, L: Lanes> Frame<'a, L> {
                     (Passage::Outside, _) => {}
                     (Passage::Inside, inside) => {
                         let t = inside.t(&shear);
-                        let is_wanted = self.range[0] <= t && t <= self.range[1] && self.wanted != Wanted::None;
+                        let is_wanted =
+                            self.range[0] <= t && t <= self.range[1] && self.wanted != Wanted::None;
                         if !is_wanted || !watertight::is_in_range(&self.ray, t) {
                             continue;
                         }
@@ -511,7 +514,8 @@ impl<'a, L: Lanes> Frame<'a, L> {
             let (geometry, primitive) = (entry.geometry, entry.primitive());
             let meeting = edges::intersect_precise(self.accel, &self.ray, geometry, primitive);
             if !matches!(meeting, watertight::Meeting::Miss) {
-                let corners = self.accel.precise_corners(geometry, primitive).map(|corner: DVec3| corner.to_array());
+                let corners =
+                    self.accel.precise_corners(geometry, primitive).map(|corner: DVec3| corner.to_array());
                 let triangle = edges::Triangle { corners, ids: (geometry, primitive), accel: self.accel };
                 if triangle.visit(meeting, &self.ray, context, visitor, edge_hits) {
                     return true;
@@ -569,7 +573,16 @@ pub(crate) fn visit_primitive(
         let order = order as u32;
         // Also keeps out a NaN.
         ray.contains(root.t)
-            && visitor.visit(&Crossing { root, geometry, primitive, order, is_front: None, ray, accel, context })
+            && visitor.visit(&Crossing {
+                root,
+                geometry,
+                primitive,
+                order,
+                is_front: None,
+                ray,
+                accel,
+                context,
+            })
     };
     match wanted {
         Wanted::None => false,

@@ -42,11 +42,12 @@ use super::decide::Decider;
 use super::leaves::nearest_of;
 use super::stack::{AnyHit, ClosestHit, Goal, Stack};
 use super::{LaneHits, Outcome};
-use crate::tree::triangle_block::TriangleBlock;
-use crate::tree::summary::SingleStart;
 use crate::simd::{self, Asked, Axes, Eight, Lanes, Level, Question, Vector, Wide};
+use crate::trace::start::SingleStart;
+use crate::trace::watertight;
+use crate::tree::BLOCK;
 use crate::tree::node::tag;
-use crate::trace::watertight::{self, BLOCK};
+use crate::tree::triangle_block::TriangleBlock;
 use crate::{Accel, Hit, Hit32, Ray32};
 
 /// A ray in single precision among triangles.
@@ -340,14 +341,20 @@ impl F32Ray {
 
     /// How the line of the ray passes the triangles of a block, and a bit for each that it may pass through. `IS_ALONE` as in [`Lanes::narrow_corners`].
     #[inline(always)]
-    pub(crate) fn lines<L: Lanes, const IS_ALONE: bool>(&self, block: &TriangleBlock) -> (u32, Lines<L::Eight>) {
+    pub(crate) fn lines<L: Lanes, const IS_ALONE: bool>(
+        &self,
+        block: &TriangleBlock,
+    ) -> (u32, Lines<L::Eight>) {
         let (mask, lines) = Lines::of(L::narrow_corners::<IS_ALONE>(block, simd::opaque(self)));
         (mask & block.taken(), lines)
     }
 
     /// The same of two rays, each among the triangles of its block: those of the first, and those of the second.
     #[inline(always)]
-    pub(crate) fn lines_by_two<L: Lanes>(rays: [&Self; 2], blocks: [&TriangleBlock; 2]) -> (u32, Lines<L::Wide>) {
+    pub(crate) fn lines_by_two<L: Lanes>(
+        rays: [&Self; 2],
+        blocks: [&TriangleBlock; 2],
+    ) -> (u32, Lines<L::Wide>) {
         let (mask, lines) = Lines::of(L::narrow_corners_by_two(blocks, rays));
         (mask & (blocks[0].taken() | blocks[1].taken() << BLOCK), lines)
     }
@@ -483,7 +490,9 @@ impl F32Queries {
     /// `None` for a tree of anything else.
     pub(crate) fn new(level: Level, start: Option<&SingleStart>) -> Option<Self> {
         let start = start?;
-        start.only_triangles.then(|| Self { closest: level.asked::<ClosestHit>(), any: level.asked::<AnyHit>() })
+        start
+            .only_triangles
+            .then(|| Self { closest: level.asked::<ClosestHit>(), any: level.asked::<AnyHit>() })
     }
 }
 

@@ -10,13 +10,13 @@ use super::exact;
 use super::leaves::CloudRay;
 use super::stack::{AnyHit, ClosestHit, Goal, Stack};
 use super::{Context, ContextRef, Outcome, Stop, Winner};
-use crate::tree::summary::SingleStart;
-use crate::tree::bounding_block::HullRay;
-use crate::simd::{self, Asked, Lanes, Level, Question, Task};
-use crate::tree::node::Slabs;
 use crate::query::{Query, TreeQuery};
+use crate::simd::{self, Asked, Lanes, Level, Question, Task};
+use crate::trace::start::SingleStart;
 use crate::trace::watertight::{self, BlockRay};
-use crate::build::open_instances::Start;
+use crate::tree::bounding_block::HullRay;
+use crate::tree::node::Slabs;
+use crate::tree::packed::Start;
 use crate::{Accel, GeometryKind, Hit};
 
 /// A ray in the leaves of a tree. `GENERAL`: of anything, not of triangles alone; `FILTERED`: with a query that leaves something out.
@@ -243,7 +243,9 @@ impl FilteredGoal for ClosestHit {
         ray: &Ray,
         query: Option<&Query>,
     ) -> Found {
-        let Some(hit) = exact::closest_from(level, accel, from, context, ray, query) else { return Found::NOTHING };
+        let Some(hit) = exact::closest_from(level, accel, from, context, ray, query) else {
+            return Found::NOTHING;
+        };
         let winner = Winner { root: hit.root, geometry: IN_INSTANCE, primitive: 0 };
         // The hit is whole already, wherever it is.
         let nested = Some(Box::new(hit));
@@ -336,7 +338,9 @@ pub(crate) struct Traversal<'a, 'r, G, const GENERAL: bool, const FILTERED: bool
     pub(super) goal: PhantomData<G>,
 }
 
-impl<G: FilteredGoal, const GENERAL: bool, const FILTERED: bool> Task for Traversal<'_, '_, G, GENERAL, FILTERED> {
+impl<G: FilteredGoal, const GENERAL: bool, const FILTERED: bool> Task
+    for Traversal<'_, '_, G, GENERAL, FILTERED>
+{
     type Output = Outcome<G::Found>;
 
     #[inline(always)]
@@ -356,7 +360,7 @@ impl<G: FilteredGoal, const GENERAL: bool, const FILTERED: bool> Traversal<'_, '
         let mut cursor = NodeCursor::<L>::new(&accel.tree.nodes, slabs);
         let mut stack = Stack::new();
         let mut next = cursor.descend::<G>(root, &mut stack);
-        if next.is_none() && !(GENERAL && !accel.infinite.is_empty()) {
+        if next.is_none() && (!GENERAL || accel.infinite.is_empty()) {
             // Many rays come to no leaf, and need nothing else.
             return Outcome::Certain(G::nothing());
         }
@@ -381,7 +385,15 @@ impl<'a, 'r, G: FilteredGoal, const GENERAL: bool> Traversal<'a, 'r, G, GENERAL,
     /// Of a whole tree that stands in no instance, with everything in it.
     #[inline(always)]
     pub(crate) fn whole(accel: &'a Accel, start: &'a SingleStart, ray: &'r Ray) -> Self {
-        Self { accel, start, root: start.root, ray, query: None, context: ContextRef::OUTSIDE, goal: PhantomData }
+        Self {
+            accel,
+            start,
+            root: start.root,
+            ray,
+            query: None,
+            context: ContextRef::OUTSIDE,
+            goal: PhantomData,
+        }
     }
 }
 

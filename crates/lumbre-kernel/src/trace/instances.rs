@@ -11,12 +11,12 @@ use lumbre_geometry::Ray;
 use super::decide::{heights, largest_component};
 use super::filtered::{FilteredGoal, FilteredRay, Found, IN_INSTANCE, InInstance, Traversal};
 use super::{ContextRef, Outcome, Stop, Winner};
-use crate::build::collapse::Entry;
-use crate::tree::summary::SingleStart;
-use crate::simd::{Lanes, Level};
-use crate::tree::node::Slabs;
-use crate::build::open_instances::Start;
 use crate::query::{Query, TreeQuery};
+use crate::simd::{Lanes, Level};
+use crate::trace::start::SingleStart;
+use crate::tree::node::Slabs;
+use crate::tree::packed::Entry;
+use crate::tree::packed::Start;
 use crate::{Accel, GeometryKind, Hit, Instance};
 
 /// An instance, or a part of one.

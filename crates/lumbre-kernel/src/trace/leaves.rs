@@ -10,14 +10,15 @@ use super::edges;
 use super::filtered::{FilteredGoal, FilteredRay};
 use super::stack::Goal;
 use super::{Outcome, Stop, Winner, all_crossings, first_crossing, is_crossed, meets_front};
-use crate::tree::triangle_block::TriangleBlock;
-use crate::build::collapse::Entry;
-use crate::tree::bounding_block::HullRay;
-use crate::simd::{self, Crossings, Lanes, Level, MetHulls, Task, Vector};
-use crate::tree::node::{Slabs, tag};
 use crate::query::TreeQuery;
+use crate::simd::{self, Crossings, Lanes, Level, MetHulls, Task};
+use crate::trace::watertight::Meeting;
+use crate::tree::BLOCK;
+use crate::tree::bounding_block::HullRay;
+use crate::tree::node::{Slabs, tag};
+use crate::tree::packed::Entry;
 use crate::tree::sphere_block::SphereRay;
-use crate::trace::watertight::{BLOCK, Meeting};
+use crate::tree::triangle_block::TriangleBlock;
 use crate::{Accel, GeometryKind};
 
 impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL, FILTERED> {
@@ -48,7 +49,11 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
 
     /// Tests what has no bounds, and stands beside the tree.
     #[inline(always)]
-    pub(crate) fn test_infinite<G: FilteredGoal, L: Lanes>(&mut self, ray: &Ray, slabs: &mut Slabs) -> Option<Stop> {
+    pub(crate) fn test_infinite<G: FilteredGoal, L: Lanes>(
+        &mut self,
+        ray: &Ray,
+        slabs: &mut Slabs,
+    ) -> Option<Stop> {
         let accel = self.accel();
         for entry in &*accel.infinite {
             let stop = match accel.geometries[entry.geometry as usize].kind {
@@ -328,7 +333,9 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
         let accel = self.accel();
         let places = tag::blocks(leaf);
         let range = [ray.t_min, if G::IS_ANY { ray.t_max } else { self.best.limit(ray) }];
-        for (ids, block) in accel.tree.sphere_names[places.clone()].iter().zip(&accel.tree.sphere_blocks[places]) {
+        for (ids, block) in
+            accel.tree.sphere_names[places.clone()].iter().zip(&accel.tree.sphere_blocks[places])
+        {
             let cloud = CloudRay::turn(&mut self.cloud, accel, ray, ids.geometry);
             let origin = cloud.origin;
             let (mut mask, certain) = match cloud.within(range) {
@@ -425,7 +432,12 @@ pub(crate) struct CloudRay {
 impl CloudRay {
     /// Turns the ray to a cloud.
     #[inline(always)]
-    pub(crate) fn turn<'s>(slot: &'s mut Option<Self>, accel: &Accel, ray: &Ray, geometry: u32) -> &'s mut Self {
+    pub(crate) fn turn<'s>(
+        slot: &'s mut Option<Self>,
+        accel: &Accel,
+        ray: &Ray,
+        geometry: u32,
+    ) -> &'s mut Self {
         // Where all clouds have one origin, ids need not be read from memory.
         let is_turned =
             slot.as_ref().is_some_and(|cloud| accel.holds.has_one_cloud_origin || cloud.geometry == geometry);

@@ -13,9 +13,6 @@ use lumbre_math::{DVec2, DVec3};
 
 use crate::simd::{Axes, Row, WIDE};
 
-/// Triangles in a block.
-pub(crate) const BLOCK: usize = 8;
-
 /// The shear that turns a ray's direction into the last axis: once a ray.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Shear {

@@ -5,9 +5,9 @@ use lumbre_geometry::{Hull, Ray};
 use lumbre_math::{DMat3, DVec3};
 use rayon::prelude::*;
 
-use crate::build::collapse::Entry;
+use crate::tree::BLOCK;
 use crate::tree::node::{Units, round_up};
-use crate::trace::watertight::BLOCK;
+use crate::tree::packed::Entry;
 use crate::{Geometry, GeometryKind};
 
 /// Up to eight hulls (see [`Hull`]), each by its centre, relative to the tree's origin, and the map from there to its cube.

@@ -5,7 +5,7 @@ use lumbre_geometry::{Ray, Root, Roots, Sphere, Surface, sphere_crossings};
 use lumbre_math::DVec3;
 
 use crate::SphereCloud;
-use crate::trace::watertight::BLOCK;
+use crate::tree::BLOCK;
 
 /// Up to eight spheres of one cloud. Unused lanes are NaN, which no ray hits.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]

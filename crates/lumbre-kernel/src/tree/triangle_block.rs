@@ -19,12 +19,12 @@ use bytemuck::{Pod, Zeroable};
 use lumbre_math::Vec3;
 use rayon::prelude::*;
 
-use crate::build::binary::Name;
+use crate::geometry::has_area;
 use crate::simd::{self, Corners, Lanes, Level, Task};
-use crate::tree::node::{Node, tag};
-use crate::build::input::has_area;
-use crate::trace::watertight::BLOCK;
+use crate::tree::BLOCK;
+use crate::tree::Name;
 use crate::tree::node::out_of_tree;
+use crate::tree::node::{Node, tag};
 use crate::{BuildError, Geometry, GeometryKind, TriangleMesh};
 
 /// What the triangles of a block are called.

@@ -1,0 +1,98 @@
+//! What rays need to start in single precision.
+
+use super::f32_ray::Precise;
+use super::watertight::LEAST_SIZE;
+use lumbre_math::DVec3;
+
+use crate::tree::node::{LARGEST_NEAR, SMALLEST_NEAR, TINY_NEAR, Units, round_up};
+use crate::tree::summary::Holds;
+
+/// Instances within one another are traversed in single precision no deeper: each takes a few kilobytes of the thread's stack.
+const DEEPEST: u32 = 8;
+
+/// What a ray from nearby needs to start in single precision, in a tree where the corners of all triangles in single precision are
+/// relative to one origin.
+#[derive(Clone, Debug)]
+pub(crate) struct SingleStart {
+    /// Of the tree.
+    pub(crate) root: u32,
+    /// Whether it holds nothing but triangles in single precision.
+    pub(crate) only_triangles: bool,
+    /// What the tree's boxes are relative to, and a zero.
+    pub(crate) tree_origin: [f64; 4],
+    /// What the corners are relative to, and a zero.
+    pub(crate) mesh_origin: [f64; 4],
+    /// The latter in single precision, if nothing is lost by that: numbers in single precision then differ from it by the same, to the
+    /// bit, in either precision.
+    pub(crate) single_mesh_origin: Option<[f32; 4]>,
+    /// Tree units per unit of space.
+    pub(crate) scale: f64,
+    /// How far from zero a ray may start on each axis, in tree units.
+    pub(crate) farthest: [f32; 4],
+    /// By how much planes are moved, and by how much more for each unit of the ray's start.
+    pub(crate) margin: f32,
+    pub(crate) margin_per_distance: f32,
+    /// What the tree's boxes are relative to as seen from where the corners are, in tree units, and a zero.
+    pub(crate) shift: [f32; 4],
+    /// By how much planes are moved for rays in single precision: see `narrow`.
+    pub(crate) narrow_margin: f32,
+    /// The scale, and its inverse.
+    pub(crate) units_per_space: f32,
+    pub(crate) space_per_unit: f32,
+    /// Where weights are precise enough.
+    pub(crate) precise: Precise,
+    /// That of [`BlockRay`](crate::trace::watertight::BlockRay) for every ray from nearby.
+    pub(crate) least_size: f32,
+    /// The bounds on the largest component of a direction, the upper one four times, to be compared with four at once; and that below which
+    /// one is replaced.
+    pub(crate) shortest: f32,
+    pub(crate) longest: [f32; 4],
+    pub(crate) tiny: f32,
+}
+
+impl SingleStart {
+    /// `None` where the tree holds instances too deep within one another or meshes with different origins, or is so small, so large or so
+    /// far from its origin that single precision would overflow, underflow or tell nothing.
+    pub(crate) fn new(holds: &Holds, units: &Units, root: Option<u32>) -> Option<Self> {
+        let two_to = |exponent: i32| 2.0f64.powi(exponent);
+        // Without a triangle, any place will do.
+        let has_triangles = holds.first_origin.is_finite() && holds.sizes.largest_corner > 0.0;
+        let (mesh_origin, largest_corner) = if has_triangles {
+            (holds.first_origin, f64::from(holds.sizes.largest_corner))
+        } else {
+            (units.origin, 1.0 / units.scale)
+        };
+        let shift = (units.origin - mesh_origin).abs().max_element();
+        let reach = units.near / units.scale + shift + largest_corner;
+        let is_fit = holds.nesting <= DEEPEST
+            && holds.has_one_origin
+            && units.near > 0.0
+            && (two_to(-40)..=two_to(40)).contains(&units.scale)
+            && largest_corner > two_to(-39)
+            && reach < two_to(38);
+        let space_per_unit = (1.0 / units.scale) as f32;
+        let padded = |v: DVec3, last: f64| [v.x, v.y, v.z, last];
+        root.filter(|_| is_fit).map(|root| Self {
+            root,
+            only_triangles: holds.only_triangles,
+            tree_origin: padded(units.origin, 0.0),
+            mesh_origin: padded(mesh_origin, 0.0),
+            single_mesh_origin: Some(mesh_origin.as_vec3())
+                .filter(|single| single.as_dvec3() == mesh_origin)
+                .map(|single| single.extend(0.0).to_array()),
+            scale: units.scale,
+            farthest: [units.near as f32, units.near as f32, units.near as f32, f32::INFINITY],
+            margin: units.single_margin(),
+            margin_per_distance: Units::SINGLE_MARGIN_PER_DISTANCE,
+            shift: ((units.origin - mesh_origin) * units.scale).extend(0.0).as_vec4().to_array(),
+            narrow_margin: units.narrow_margin(shift * units.scale),
+            units_per_space: units.scale as f32,
+            space_per_unit,
+            precise: Precise::new(space_per_unit, holds.sizes.longest_side),
+            least_size: round_up(reach * f64::from(LEAST_SIZE)),
+            shortest: (SMALLEST_NEAR / units.scale) as f32,
+            longest: [(LARGEST_NEAR / units.scale) as f32; 4],
+            tiny: (TINY_NEAR / units.scale) as f32,
+        })
+    }
+}
