@@ -44,10 +44,10 @@ pub enum Profile {
     Release,
 }
 
-/// Builds the program of one of our packages and runs it where the user stands, so that its paths mean what they say. Where it fails it has
-/// said why, and this program ends as it did.
-pub fn run_ours(package: &str, profile: Profile, arguments: &[String]) -> Result<()> {
-    let program = build(package, package, profile)?;
+/// Builds a program of the package `lumbre-dev` and runs it in the user's folder, so that relative paths mean what they say. Where it
+/// fails it has said why, and this program ends as it did.
+pub fn run_ours(name: &str, profile: Profile, arguments: &[String]) -> Result<()> {
+    let program = build("lumbre-dev", name, profile)?;
     let status = Command::new(&program)
         .args(arguments)
         .status()
@@ -63,7 +63,7 @@ pub fn release_program() -> Result<PathBuf> {
 /// Builds the program of this name in one of our packages and says where it lies.
 fn build(package: &str, name: &str, profile: Profile) -> Result<PathBuf> {
     let target = root().join(std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into()));
-    let build = ["build", "--package", package];
+    let build = ["build", "--package", package, "--bin", name];
     let folder = match profile {
         Profile::Dev => {
             run("cargo", &build)?;

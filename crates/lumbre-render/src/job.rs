@@ -4,10 +4,10 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-use lumbre_film::{Extras, FeatureSample, Filter, Sample, Tile};
+use crate::film::{Extras, FeatureSample, Filter, Sample, Tile};
+use crate::transport::{Feature, Features, Integrator, RayCounts, Sampler, Sight, integrator, see};
 use lumbre_math::DVec2;
 use lumbre_scene::{Scene, View};
-use lumbre_transport::{Feature, Features, Integrator, RayCounts, Sampler, Sight, integrator, see};
 use rayon::prelude::*;
 
 use crate::rendered::{coverage_picture, feature_picture, noise, picture};

@@ -1,14 +1,18 @@
 //! Pixels over threads, passes over time.
 //!
+//! [`transport`] computes the radiance along a ray, [`film`] makes pixels of samples; neither knows the other, nor of threads.
+//!
 //! A picture is a function of the scene, the options and the seed: never of the number of threads or of the order in
 //! which tiles happen to be done. [`render`] is the verb.
 
 mod cancel;
 mod error;
+pub mod film;
 mod job;
 mod options;
 mod progress;
 mod rendered;
+pub mod transport;
 
 pub use cancel::CancelToken;
 pub use error::RenderError;
@@ -17,5 +21,5 @@ pub use options::{RenderOptions, Stop};
 pub use progress::{NoProgress, Progress, Snapshot, State};
 pub use rendered::{DroppedSample, Rendered, Stats};
 
-pub use lumbre_film::PixelBounds;
-pub use lumbre_transport::{Feature, Integrator, RayCounts};
+pub use crate::film::PixelBounds;
+pub use crate::transport::{Feature, Integrator, RayCounts};

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use lumbre_film::{Exposure, Filter, FilterShape, PixelBounds};
+use crate::film::{Exposure, Filter, FilterShape, PixelBounds};
 use lumbre_math::DVec2;
 use lumbre_scene::{FilterDesc, IntegratorDesc, SamplerDesc, Scene};
 

@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use lumbre_film::{FeatureSums, Pixel, PixelBounds, Tile};
+use crate::film::{FeatureSums, Pixel, PixelBounds, Tile};
+use crate::transport::{Feature, RayCounts};
 use lumbre_image::{Image, Rgb};
-use lumbre_transport::{Feature, RayCounts};
 
 /// What [`crate::render`] returns: all that was asked for, or what there was when it was stopped.
 #[derive(Clone, Debug, PartialEq)]

@@ -10,6 +10,7 @@ use common::*;
 use lumbre_geometry::{Cuboid, Sphere, Torus};
 use lumbre_image::{Image, Rgb};
 use lumbre_math::{DVec3, Transform, Vec2, Vec3};
+use lumbre_render::transport::{Draw, Path, Sight};
 use lumbre_render::{
     CancelToken, Feature, Integrator, NoProgress, PixelBounds, Progress, RayCounts, RenderError,
     RenderOptions, Snapshot, State, render, render_with,
@@ -19,7 +20,6 @@ use lumbre_scene::{
     ShapeDesc, View,
 };
 use lumbre_shading::{Material, MaterialKind, Roughness, Spectrum};
-use lumbre_transport::{Draw, Path, Sight};
 
 /// A bit of everything, `offset` away from where it usually is.
 fn still_life(offset: DVec3) -> SceneDesc {
@@ -173,7 +173,7 @@ fn samples_that_are_no_numbers_are_dropped_counted_and_named() {
     assert_eq!(rendered.stats.first_dropped.len(), 16);
     assert!(rendered.image.pixels().iter().all(|&c| c == Rgb::splat(0.25)));
     let first = rendered.stats.first_dropped[0];
-    let sampler = lumbre_transport::Sampler::new(&options.sampler);
+    let sampler = lumbre_render::transport::Sampler::new(&options.sampler);
     assert!(sampler.draw(first.x, first.y, first.sample).lobe(7) < 1.0 / 97.0);
 }
 

@@ -12,9 +12,9 @@ use lumbre_geometry::{
 };
 use lumbre_image::{Image, Rgb};
 use lumbre_math::{DAffine3, DMat3, DVec2, DVec3, Transform, Vec3, warp64};
+use lumbre_render::transport::{Path, Strategy};
 use lumbre_render::{CancelToken, NoProgress, render_with};
 use lumbre_scene::{EnvironmentDesc, EnvironmentMapping, GeometryDesc, LightDesc, Scene, SceneDesc};
-use lumbre_transport::{Path, Strategy};
 
 /// Where the floor is looked at, and its normal: no axis of anything.
 const PLACE: DVec3 = DVec3::new(3.0, -7.0, 11.0);

@@ -10,12 +10,12 @@ use common::*;
 use lumbre_geometry::{Cuboid, Shape, Sphere, Torus};
 use lumbre_image::Rgb;
 use lumbre_math::{DVec3, Vec3};
+use lumbre_render::transport::{Path, Strategy};
 use lumbre_render::{CancelToken, NoProgress, render_with};
 use lumbre_scene::{GeometryDesc, MeshDesc, Scene, SceneDesc};
 use lumbre_shading::{
     FloatTexture, Material, MaterialKind, PrincipledParams, Roughness, SpectrumTexture, VolumeParams,
 };
-use lumbre_transport::{Path, Strategy};
 
 const CENTER: DVec3 = DVec3::new(3.0, -7.0, 11.0);
 

@@ -9,11 +9,11 @@ use common::*;
 use lumbre_geometry::{Cuboid, Disk, Sphere};
 use lumbre_image::Rgb;
 use lumbre_math::{DVec3, Transform};
+use lumbre_render::transport::{Path, Whitted};
 use lumbre_render::{CancelToken, NoProgress, RenderOptions, render_with};
 use lumbre_scene::{IntegratorKind, LightDesc, Scene, SceneDesc};
 use lumbre_shading::dielectric::ThinDielectric;
 use lumbre_shading::{Material, MaterialKind, Roughness, SpectrumTexture, Texture};
-use lumbre_transport::{Path, Whitted};
 
 const PLACE: DVec3 = DVec3::new(3.0, -7.0, 11.0);
 

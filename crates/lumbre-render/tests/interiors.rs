@@ -8,10 +8,10 @@ use common::*;
 use lumbre_geometry::{Cuboid, Sphere};
 use lumbre_image::Rgb;
 use lumbre_math::{DVec3, Transform};
+use lumbre_render::transport::{Integrator, Path, Whitted};
 use lumbre_render::{CancelToken, NoProgress, render_with};
 use lumbre_scene::{Camera, CameraKind, LightDesc, Scene, SceneDesc};
 use lumbre_shading::{FloatTexture, Material, MaterialKind, PrincipledParams, VolumeParams};
-use lumbre_transport::{Integrator, Path, Whitted};
 
 const CENTER: DVec3 = DVec3::new(3.0, -7.0, 11.0);
 /// What a white light has left after [`DISTANCE`].

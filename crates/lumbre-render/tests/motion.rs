@@ -8,12 +8,12 @@ use common::*;
 use lumbre_geometry::{Disk, Sphere};
 use lumbre_image::{Image, Rgb};
 use lumbre_math::{AnimatedTransform, DAffine3, DMat3, DVec3, Transform, Vec2, Vec3};
+use lumbre_render::transport::{Path, Strategy};
 use lumbre_render::{CancelToken, NoProgress, render_with};
 use lumbre_scene::{
     Camera, CameraKind, GeometryDesc, InstanceDesc, LightDesc, MeshMoment, MeshMotion, ObjectDesc, ObjectId,
     Scene, SceneDesc, ShapeDesc,
 };
-use lumbre_transport::{Path, Strategy};
 
 fn motion(keys: &[(f64, Transform)]) -> AnimatedTransform {
     AnimatedTransform::new(keys.to_vec()).unwrap()

@@ -9,12 +9,12 @@ use common::*;
 use lumbre_geometry::{Cuboid, Disk, Sphere};
 use lumbre_image::{Image, Rgb};
 use lumbre_math::{DAffine3, DMat3, DVec3, Transform};
+use lumbre_render::transport::{Integrator, Path, Strategy, Whitted};
 use lumbre_render::{CancelToken, NoProgress, RenderOptions, render_with};
 use lumbre_scene::{EnvironmentDesc, IntegratorKind, LightDesc, Scene, SceneDesc};
 use lumbre_shading::{
     FloatTexture, Material, MaterialKind, PrincipledParams, Roughness, SpectrumTexture, VolumeParams,
 };
-use lumbre_transport::{Integrator, Path, Strategy, Whitted};
 
 /// Where the floor is looked at, and its normal: no axis of anything.
 const PLACE: DVec3 = DVec3::new(3.0, -7.0, 11.0);

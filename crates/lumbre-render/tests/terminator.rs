@@ -9,11 +9,11 @@ use common::*;
 use lumbre_geometry::{Ray, Sphere};
 use lumbre_image::{Image, Rgb};
 use lumbre_math::{DVec3, Vec3};
+use lumbre_render::transport::{Integrator, Path, Whitted};
 use lumbre_render::{CancelToken, NoProgress, render_with};
 use lumbre_scene::{
     Footprint, GeometryDesc, IntegratorDesc, IntegratorKind, LightDesc, MeshDesc, Scene, SceneDesc,
 };
-use lumbre_transport::{Integrator, Path, Whitted};
 
 const CENTER: DVec3 = DVec3::new(2.0, -1.0, 0.5);
 const RADIUS: f64 = 1.5;

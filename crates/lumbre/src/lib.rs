@@ -40,7 +40,7 @@
 //! # Ok::<(), lumbre::Error>(())
 //! ```
 //!
-//! The floors below are here too, under their own names: [`math`], [`image`], [`geometry`], [`kernel`], [`shading`],
+//! The layers below are here too, under their own names: [`math`], [`image`], [`geometry`], [`kernel`], [`shading`],
 //! [`formats`] and [`description`].
 
 mod backdrop;

@@ -523,12 +523,11 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<
         sink: &mut impl Sink<G::Found>,
     ) {
         let triangle = L::Wide::load(&self.triangle.0);
-        let mut on_triangles = 0;
+        let (mut on_triangles, mut on_others) = (0, 0);
         if !G::IS_ANY && state.is_among_triangles {
             on_triangles = !triangle.with_bits(NONE) & !state.uncertain & state.chosen;
-        }
-        if GENERAL {
-            on_triangles &= !triangle.with_bits(OTHER);
+            on_others = if GENERAL { on_triangles & triangle.with_bits(OTHER) } else { 0 };
+            on_triangles &= !on_others;
         }
         let met = if on_triangles != 0 { self.intersect_all::<L>(decider, on_triangles) } else { Met::NONE };
         let mut rest = state.chosen;
@@ -544,11 +543,11 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<
                     Some(winner) => Outcome::Certain(G::closest(winner)),
                     None => Outcome::Uncertain,
                 }
+            } else if on_others >> i & 1 != 0 {
+                let other = self.others[i].as_mut().expect("it has a hit");
+                G::end::<L, GENERAL, false>(other, &rays[i])
             } else {
-                match self.others.get_mut(i) {
-                    Some(Some(other)) if GENERAL => G::end::<L, GENERAL, false>(other, &rays[i]),
-                    _ => Outcome::Certain(G::nothing()),
-                }
+                Outcome::Certain(G::nothing())
             };
             sink.put(first + i, outcome);
         }

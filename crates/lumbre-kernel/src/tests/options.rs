@@ -34,7 +34,7 @@ fn counts(accel: &Accel, ray: &Ray, hit: &Hit, options: &Query) -> bool {
     let place = |hit: &Hit| (hit.route.clone(), hit.geometry, hit.primitive);
     is_face
         && options.exclude.is_none_or(|excluded| place(excluded) != place(hit))
-        && masks(accel, hit).iter().all(|mask| mask & options.mask != 0)
+        && masks(accel, hit).iter().all(|mask| options.mask == u32::MAX || mask & options.mask != 0)
 }
 
 fn with_random_masks(accel: Accel, random: &mut Random) -> Accel {

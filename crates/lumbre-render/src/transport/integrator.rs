@@ -6,7 +6,7 @@ use std::ops::AddAssign;
 use lumbre_scene::{CameraRay, IntegratorDesc, IntegratorKind, Interaction, Scene, View};
 use lumbre_shading::Spectrum;
 
-use crate::{AmbientOcclusion, Draw, Feature, FeatureIntegrator, Path, Whitted};
+use crate::transport::{AmbientOcclusion, Draw, Feature, FeatureIntegrator, Path, Whitted};
 
 /// An estimator of the radiance that arrives along a ray. It is called once a path.
 pub trait Integrator: Debug + Send + Sync {

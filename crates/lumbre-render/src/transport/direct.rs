@@ -7,9 +7,9 @@ use lumbre_math::{DVec3, Vec2, Vec3};
 use lumbre_scene::{Interaction, LightSample, Scene};
 use lumbre_shading::{Bsdf, LocalDir, Material, Scatter, ShadingFrame, Spectrum};
 
-use crate::RayCounts;
-use crate::interior::Interiors;
-use crate::through::{goes_straight_on, straight_on};
+use crate::transport::RayCounts;
+use crate::transport::interior::Interiors;
+use crate::transport::through::{goes_straight_on, straight_on};
 
 /// A surface as seen along a path, ready to scatter.
 ///

@@ -2,7 +2,7 @@
 
 use lumbre_image::Rgb;
 
-use crate::{FeatureSample, FeatureSums, Pixel, PixelBounds, Tint};
+use crate::film::{FeatureSample, FeatureSums, Pixel, PixelBounds, Tint};
 
 /// How radiance becomes the colour of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]

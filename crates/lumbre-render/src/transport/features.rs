@@ -4,7 +4,7 @@ use lumbre_math::{Vec2, Vec3};
 use lumbre_scene::{Scene, View};
 use lumbre_shading::Spectrum;
 
-use crate::{Draw, Integrator, RayCounts, Sight};
+use crate::transport::{Draw, Integrator, RayCounts, Sight};
 
 /// One of the features.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

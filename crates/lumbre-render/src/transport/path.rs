@@ -5,9 +5,9 @@ use lumbre_scene::{Interaction, Scene, View};
 use lumbre_shading::medium::{Flight, sample_henyey_greenstein};
 use lumbre_shading::{Scatter, Spectrum};
 
-use crate::direct::{Vertex, power_heuristic};
-use crate::interior::Interiors;
-use crate::{Draw, Integrator, RayCounts, Sight};
+use crate::transport::direct::{Vertex, power_heuristic};
+use crate::transport::interior::Interiors;
+use crate::transport::{Draw, Integrator, RayCounts, Sight};
 
 /// Kajiya's path tracing: at each surface one sample of a light and one of the BSDF, combined by the power heuristic,
 /// and Russian roulette by throughput from the second bounce on.

@@ -5,10 +5,10 @@ use lumbre_scene::{Footprint, Interaction, Light, LightId, LightSample, Scene, V
 use lumbre_shading::{Scatter, Spectrum};
 use smallvec::SmallVec;
 
-use crate::direct::Vertex;
-use crate::interior::Interiors;
-use crate::path::ray_length;
-use crate::{Draw, Integrator, RayCounts, Sight};
+use crate::transport::direct::Vertex;
+use crate::transport::interior::Interiors;
+use crate::transport::path::ray_length;
+use crate::transport::{Draw, Integrator, RayCounts, Sight};
 
 /// Follows every mirror image and every refraction, and gives each surface on the way direct light from every light.
 ///

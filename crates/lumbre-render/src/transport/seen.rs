@@ -6,9 +6,9 @@ use lumbre_math::{DVec3, Frame, warp64};
 use lumbre_scene::{GroundPlane, Interaction, LightSample, Scene, View};
 use lumbre_shading::{Scatter, Spectrum};
 
-use crate::interior::Interiors;
-use crate::through::{goes_straight_on, light_through, straight_on};
-use crate::{Draw, Integrator, RayCounts, Sight};
+use crate::transport::interior::Interiors;
+use crate::transport::through::{goes_straight_on, light_through, straight_on};
+use crate::transport::{Draw, Integrator, RayCounts, Sight};
 
 /// Samples of each light that each sample of a shadow takes: few rays, where a whole path would be many.
 const SAMPLES: u32 = 2;

@@ -4,10 +4,10 @@ use lumbre_geometry::Ray;
 use lumbre_scene::{Footprint, LightSample, Scene};
 use lumbre_shading::{Scatter, Spectrum};
 
-use crate::direct::Vertex;
-use crate::interior::Interiors;
-use crate::path::ray_length;
-use crate::{Draw, RayCounts};
+use crate::transport::direct::Vertex;
+use crate::transport::interior::Interiors;
+use crate::transport::path::ray_length;
+use crate::transport::{Draw, RayCounts};
 
 /// Surfaces at most that light goes through or is reflected by inside a solid.
 const MOST_SURFACES: u32 = 16;

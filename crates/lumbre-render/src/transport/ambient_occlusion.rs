@@ -4,7 +4,7 @@ use lumbre_math::warp;
 use lumbre_scene::{Scene, View};
 use lumbre_shading::{ShadingFrame, Spectrum};
 
-use crate::{Draw, Integrator, RayCounts, Sight};
+use crate::transport::{Draw, Integrator, RayCounts, Sight};
 
 /// The share of the sky over a surface that is open, weighed by the cosine: white where nothing is near.
 #[derive(Clone, Copy, Debug, PartialEq)]
