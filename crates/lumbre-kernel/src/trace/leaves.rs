@@ -2,6 +2,8 @@
 //!
 //! The main line is [`FilteredRay::test_leaf`]; where a ray meets a triangle is [`FilteredRay::closest_triangle`].
 
+use std::marker::PhantomData;
+
 use lumbre_geometry::{Ray, Root};
 use lumbre_math::DVec3;
 
@@ -33,11 +35,16 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
         if !GENERAL || tag::of(leaf) == tag::TRIANGLES {
             return self.test_triangles::<G, L>(leaf, ray, slabs);
         }
+        if tag::of(leaf) == tag::SHAPES {
+            return self.test_shapes::<G, L>(leaf, ray, slabs);
+        }
         // Opaque, so that nothing is computed of the ray before it comes to such a leaf.
         let ray = simd::opaque(ray);
         match tag::of(leaf) {
-            tag::SHAPES => self.test_shapes::<G, L>(leaf, ray, slabs),
-            tag::SPHERES => self.test_spheres::<G, L>(leaf, ray, slabs),
+            tag::SPHERES => {
+                let goal = PhantomData::<G>;
+                L::level().run(TestSpheres { filtered: self, leaf, ray, slabs, goal })
+            }
             tag::PRECISE => self.test_precise::<G>(leaf, ray, slabs),
             tag::INSTANCE => {
                 let entry = &self.accel().tree.entries[tag::place(leaf)];
@@ -398,6 +405,26 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
             }
         }
         None
+    }
+}
+
+/// [`FilteredRay::test_spheres`] out of line: it is long, and shares no registers with other leaves.
+struct TestSpheres<'s, 'a, 'd, G, const GENERAL: bool, const FILTERED: bool> {
+    filtered: &'s mut FilteredRay<'a, 'd, GENERAL, FILTERED>,
+    leaf: u32,
+    ray: &'s Ray,
+    slabs: &'s mut Slabs,
+    goal: PhantomData<G>,
+}
+
+impl<G: Goal, const GENERAL: bool, const FILTERED: bool> Task
+    for TestSpheres<'_, '_, '_, G, GENERAL, FILTERED>
+{
+    type Output = Option<Stop>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Option<Stop> {
+        self.filtered.test_spheres::<G, L>(self.leaf, self.ray, self.slabs)
     }
 }
 
