@@ -105,7 +105,7 @@ fn the_layers_of_mathematics_and_light_open_no_files() {
 
 /// Folders of a crate, the lowest first: a folder may use those before it only. What is not named here may use all.
 const FOLDERS: &[(&str, &[&str])] = &[
-    ("crates/lumbre-kernel/src", &["simd", "tree", "build", "trace", "batch", "point", "io"]),
+    ("crates/lumbre-kernel/src", &["simd", "tree", "intersect", "build", "trace", "batch", "point", "io"]),
     ("crates/lumbre-render/src", &["film", "transport"]),
 ];
 

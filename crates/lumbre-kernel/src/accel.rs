@@ -10,14 +10,14 @@ use lumbre_geometry::{Aabb, Ray, Surface};
 use lumbre_math::{DVec3, Transform};
 
 use crate::build::{input, rebuild, refit};
+use crate::intersect::Level;
+use crate::intersect::single_start::SingleStart;
 use crate::io::{bytes, mapped};
 use crate::point::winding::{self, Moments};
 use crate::point::{closest_point, inside};
-use crate::simd::Level;
 use crate::trace::f32_ray::{self, F32Queries};
 use crate::trace::filtered::{self, Queries};
 use crate::trace::stack::{AnyHit, ClosestHit};
-use crate::trace::start::SingleStart;
 use crate::trace::visitors::{Count, NextHits};
 use crate::trace::{ContextRef, Outcome, exact};
 use crate::tree::bounding_block::Hulls;

@@ -2,10 +2,10 @@
 
 use lumbre_geometry::Ray;
 
+use crate::intersect::watertight::{Shear, intersect};
 use crate::trace::edges::{Triangle, intersect_precise, visit_borders_of_all};
 use crate::trace::exact::{Visitor, visit_primitive};
 use crate::trace::visitors::{Closest, NextHits};
-use crate::trace::watertight::{Shear, intersect};
 use crate::trace::{Context, is_sound};
 use crate::tree::sphere_block::has_radius;
 use crate::{Accel, GeometryKind, Hit};

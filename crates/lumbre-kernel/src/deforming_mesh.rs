@@ -4,7 +4,7 @@ use lumbre_geometry::{Aabb, Ray, Root, Roots, Surface};
 use lumbre_math::{DVec3, Vec3};
 
 use crate::geometry::has_area;
-use crate::trace::watertight::{Meeting, Shear, intersect};
+use crate::intersect::watertight::{Meeting, Shear, intersect};
 use crate::{BuildError, CustomGeometry, TriangleMesh, surface};
 
 /// Triangles by index, each of whose vertices goes straight from where it is at one moment to where it is at the next.

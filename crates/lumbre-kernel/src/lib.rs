@@ -6,6 +6,7 @@ mod build;
 mod deforming_mesh;
 mod geometry;
 mod hit;
+mod intersect;
 mod io;
 mod point;
 mod precise_mesh;

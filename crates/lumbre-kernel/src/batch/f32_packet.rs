@@ -8,13 +8,17 @@
 use std::marker::PhantomData;
 
 use super::Sink;
-use super::packet::{ALL, Bundle, Cull, CullBounds, Effort, PACKET, Signs, SlabRows, Start, State};
-use crate::simd::{self, Axes, Corners, Lanes, Row, Vector, Wide};
+use super::packet::{ALL, Bundle, Cull, CullBounds, Effort, PACKET, Signs, Start, State};
+use crate::intersect::box_ray::SlabRows;
+use crate::intersect::f32_ray::{F32Ray, within};
+use crate::intersect::watertight::{BEYOND, beyond};
+use crate::intersect::{Axes, Lanes};
+use crate::simd::{self, Row, Vector, Wide};
 use crate::trace::Outcome;
 use crate::trace::decide::Decider;
-use crate::trace::f32_ray::{F32Ray, SOME_HIT, within};
+use crate::trace::f32_ray::SOME_HIT;
 use crate::trace::stack::Goal;
-use crate::trace::watertight::{BEYOND, beyond};
+use crate::tree::Corners;
 use crate::tree::node::Units;
 use crate::tree::triangle_block::TriangleBlock;
 use crate::{Hit32, Ray32};

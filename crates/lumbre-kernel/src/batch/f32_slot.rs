@@ -3,14 +3,16 @@
 use std::marker::PhantomData;
 
 use super::interleaved::{PassedLanes, RaySlot};
-use crate::simd::{Eight, Lanes, Vector};
+use crate::intersect::Lanes;
+use crate::intersect::box_ray::Slabs;
+use crate::intersect::f32_ray::F32Ray;
+use crate::intersect::watertight;
+use crate::simd::{Eight, Vector};
 use crate::trace::decide::Decider;
-use crate::trace::f32_ray::{F32Ray, Nearest, Pass, SOME_HIT};
+use crate::trace::f32_ray::{Nearest, Pass, SOME_HIT};
 use crate::trace::stack::Goal;
-use crate::trace::watertight;
 use crate::trace::{LaneHits, Outcome};
 use crate::tree::BLOCK;
-use crate::tree::node::Slabs;
 use crate::tree::triangle_block::TriangleBlock;
 use crate::{Hit32, Ray32};
 

@@ -6,17 +6,20 @@ use lumbre_geometry::Ray;
 use lumbre_math::DVec2;
 
 use super::Sink;
-use super::packet::{ALL, Bundle, Cull, CullBounds, Effort, PACKET, Signs, SlabRows, Start, State, record};
-use crate::simd::{self, Axes, Corners, Lanes, Level, Row, Task, Vector, Wide};
-use crate::trace::decide::{Candidate, Decider, heights, largest_component};
-use crate::trace::filtered::{FilteredGoal, FilteredRay};
-use crate::trace::start::SingleStart;
-use crate::trace::watertight::{
+use super::packet::{ALL, Bundle, Cull, CullBounds, Effort, PACKET, Signs, Start, State, record};
+use crate::intersect::box_ray::SlabRows;
+use crate::intersect::box_ray::Slabs;
+use crate::intersect::single_start::SingleStart;
+use crate::intersect::watertight::{
     self, BEYOND, EDGE_ERROR, ERRORS_OF_EDGES, ERRORS_OF_EXTENT, FAR, HEIGHT_ERROR, Meeting, Met, Pairs,
     ROUNDINGS, SIZE_ERROR, TINY, beyond,
 };
+use crate::intersect::{Axes, Lanes, Level, Task};
+use crate::simd::{self, Row, Vector, Wide};
+use crate::trace::decide::{Candidate, Decider, heights, largest_component};
+use crate::trace::filtered::{FilteredGoal, FilteredRay};
 use crate::trace::{ContextRef, Outcome, Winner};
-use crate::tree::node::Slabs;
+use crate::tree::Corners;
 use crate::tree::triangle_block::TriangleBlock;
 
 /// The rays of a packet.

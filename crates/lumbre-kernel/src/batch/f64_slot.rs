@@ -3,13 +3,14 @@
 use lumbre_geometry::Ray;
 
 use super::interleaved::{PassedLanes, RaySlot};
-use crate::simd::{self, Axes, Crossings, Eight, Lanes, Level, Task, Vector};
+use crate::intersect::box_ray::Slabs;
+use crate::intersect::watertight::{BlockRay, HeightRange, Meeting};
+use crate::intersect::{Axes, Crossings, Lanes, Level, Task};
+use crate::simd::{self, Eight, Vector};
 use crate::trace::decide::{Candidate, Decider, heights, largest_component};
 use crate::trace::filtered::{FilteredGoal, FilteredRay};
-use crate::trace::watertight::{BlockRay, HeightRange, Meeting};
 use crate::trace::{ContextRef, LaneHits, Outcome, Stop, Winner};
 use crate::tree::BLOCK;
-use crate::tree::node::Slabs;
 use crate::tree::triangle_block::TriangleBlock;
 
 /// A ray in the leaves of a tree.

@@ -7,12 +7,15 @@
 use bytemuck::Zeroable;
 
 use super::Sink;
-use crate::simd::{self, Lanes, Slots, Vector, WIDE, Wide};
+use crate::intersect::STACK;
+use crate::intersect::box_ray::Slabs;
+use crate::intersect::{self, Lanes, Slots};
+use crate::simd::{self, Vector, WIDE, Wide};
 use crate::trace::decide::Decider;
-use crate::trace::stack::{Goal, STACK};
+use crate::trace::stack::Goal;
 use crate::trace::{LaneHits, Outcome, Stop};
 use crate::tree::BLOCK;
-use crate::tree::node::{Node, Slabs, WIDTH, tag};
+use crate::tree::node::{Node, WIDTH, tag};
 use crate::tree::triangle_block::{Blocks, TriangleBlock};
 
 /// A ray in a slot, in either precision.
@@ -336,7 +339,7 @@ impl<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Lanes> Interleaved<'a, 'd, 'r, R, L> 
             let reference = self.references.of(slot);
             let node = &self.nodes[*reference as usize];
             let slabs = simd::opaque(&self.slots[slot].slabs);
-            let (mask, enter) = simd::meet_boxes::<L::Wide>(node, slabs);
+            let (mask, enter) = intersect::meet_boxes::<L::Wide>(node, slabs);
             let stack = &mut self.stacks[slot];
             *reference = R::Goal::push_and_pop::<L>(node, mask, enter, stack);
             too_deep |= bit(stack.len() > STACK - WIDTH, slot);
@@ -353,12 +356,12 @@ impl<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Lanes> Interleaved<'a, 'd, 'r, R, L> 
             let reference = self.references.of(slot);
             let node = &nodes[*reference as usize];
             let slabs = simd::opaque(&self.slots[slot].slabs);
-            let (mask, enter) = simd::meet_boxes::<L::Wide>(node, slabs);
+            let (mask, enter) = intersect::meet_boxes::<L::Wide>(node, slabs);
             self.masks[slot] = mask;
             *self.parents.of(slot) = *reference;
             self.enters[at % SLOTS] = enter;
             // Anything, where there is not just one.
-            *reference = simd::only_child(node, mask);
+            *reference = intersect::only_child(node, mask);
             none |= bit(mask == 0, slot);
             many |= bit(mask & mask.wrapping_sub(1) != 0, slot);
         }

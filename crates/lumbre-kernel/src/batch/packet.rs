@@ -25,12 +25,16 @@
 //! and s the errors are no smaller than those of every ray.
 
 use super::Sink;
-use crate::simd::{self, Axes, Corners, CornersRoom, Eight, Lanes, Row, Sides, Vector, WIDE, Wide};
+use crate::intersect::box_ray::{END_FACTOR, LITTLE, START_FACTOR};
+use crate::intersect::box_ray::{Frustum, SlabRows};
+use crate::intersect::watertight::TINY;
+use crate::intersect::{self, Axes, CornersRoom, Lanes, Sides};
+use crate::simd::{self, Eight, Vector, WIDE, Wide};
 use crate::trace::Stop;
 use crate::trace::decide::Decider;
 use crate::trace::stack::{Goal, Stack};
-use crate::trace::watertight::TINY;
-use crate::tree::node::{END_FACTOR, LITTLE, Node, START_FACTOR, tag};
+use crate::tree::Corners;
+use crate::tree::node::{Node, tag};
 use crate::tree::triangle_block::TriangleBlock;
 
 /// Rays in a packet.
@@ -175,51 +179,6 @@ pub(super) struct Start<W> {
     pub(super) has_one_origin: bool,
 }
 
-/// What holds all the rays among boxes: see above.
-pub(crate) struct Frustum {
-    pub(crate) center: [f32; 3],
-    pub(crate) least_inverse: [f32; 3],
-    pub(crate) most_inverse: [f32; 3],
-    /// What is taken from where they enter, and added to where they leave.
-    pub(crate) width: [f32; 3],
-    pub(crate) s_min: f32,
-    pub(crate) s_max: f32,
-    pub(crate) sides: &'static Sides,
-}
-
-/// The rays among boxes, each as [`Slabs`](crate::tree::node::Slabs).
-pub(crate) struct SlabRows {
-    pub(crate) inverse: [Row<f32>; 3],
-    pub(crate) near_offset: [Row<f32>; 3],
-    pub(crate) far_offset: [Row<f32>; 3],
-    pub(crate) s_min: Row<f32>,
-    /// Where each ends.
-    pub(crate) s_max: Row<f32>,
-}
-
-impl SlabRows {
-    const NONE: Self = {
-        let row = Row::of(0.0);
-        Self { inverse: [row; 3], near_offset: [row; 3], far_offset: [row; 3], s_min: row, s_max: row }
-    };
-
-    /// The offsets on an axis of rays that start there, where planes are moved by a margin and by more for each unit of distance.
-    #[inline(always)]
-    pub(super) fn set_axis<W: Wide>(
-        &mut self,
-        axis: usize,
-        from: W,
-        inverse: W,
-        [least, per_distance]: [f32; 2],
-    ) {
-        let distance = from.abs();
-        let margin = inverse.abs() * distance.times_plus(W::splat(per_distance), W::splat(least));
-        inverse.store(&mut self.inverse[axis]);
-        from.times_from(inverse, W::splat(0.0) - margin).store(&mut self.near_offset[axis]);
-        from.times_from(inverse, margin).store(&mut self.far_offset[axis]);
-    }
-}
-
 /// The children of a node whose boxes rays that are alive may hit, where they enter each at the earliest, and the work in nodes. With
 /// rows for `each` ray, only children that one of them hits, and, if `is_ordered`, where the first of them does.
 #[inline(always)]
@@ -230,10 +189,11 @@ fn test_children<W: Wide>(
     alive: u32,
     is_ordered: bool,
 ) -> (u32, W, u32) {
-    let (mask, enters) = simd::meet_frustum::<W>(node, frustum);
+    let (mask, enters) = intersect::meet_frustum::<W>(node, frustum);
     let Some(each) = each else { return (mask, enters, 1) };
     let work = 1 + mask.count_ones() / CHILDREN_AS_A_NODE;
-    let (mask, enters) = simd::meet_each::<W>(node, each, frustum.sides, (mask, enters), alive, is_ordered);
+    let (mask, enters) =
+        intersect::meet_each::<W>(node, each, frustum.sides, (mask, enters), alive, is_ordered);
     (mask, enters, work)
 }
 
@@ -500,7 +460,7 @@ impl<'a, 'd, B: Bundle<'a, 'd>> Packet<'a, 'd, B> {
                         |room| B::Goal::push_children::<L>(node, mask, keys, room),
                     );
                 } else if mask != 0 {
-                    reference = simd::only_child(node, mask);
+                    reference = intersect::only_child(node, mask);
                 } else {
                     match self.pop(&mut stack) {
                         Some(next) => reference = next,

@@ -8,7 +8,7 @@ use super::packet::{PACKET, Packet};
 use super::{
     AnySink, ClosestSink, F32AnySink, F32ClosestSink, F64Bundle, Plan, Sink, batch_f32, batch_f64, batched,
 };
-use crate::simd::{Lanes, Level, Task};
+use crate::intersect::{Lanes, Level, Task};
 use crate::trace::Outcome;
 use crate::trace::decide::Decider;
 use crate::trace::filtered::Found;

@@ -19,7 +19,7 @@ use crate::build::reinsert::reinsert;
 use crate::build::sah::{BestSplit, Binning, Bins, Centers, Fill, FindCenters, Part, Split};
 use crate::build::small::{Decide, FEW, Few, group_of};
 use crate::build::treelet;
-use crate::simd::Level;
+use crate::intersect::Level;
 use crate::tree::Name;
 
 /// Levels that may be split by SAH; then come at most 32 more, each halving.

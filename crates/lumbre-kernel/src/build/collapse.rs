@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use crate::build::binary::{Binary, BinaryNode, Fork};
 use crate::build::occlusion_order;
 use crate::build::primitive::{Bounds, Kind, Primitive, Traits};
-use crate::simd::Level;
+use crate::intersect::Level;
 use crate::tree::BLOCK;
 use crate::tree::Name;
 use crate::tree::node::{Node, Units, WIDTH, tag};

@@ -14,7 +14,8 @@
 
 use rayon::prelude::*;
 
-use crate::simd::{CornersRoom, Eight, Lanes, Level, Task, Vector, Wide};
+use crate::intersect::{CornersRoom, Lanes, Level, Task};
+use crate::simd::{Eight, Vector, Wide};
 use crate::tree::node::{Node, Units, WIDTH, tag};
 use crate::tree::triangle_block::{Blocks, TriangleBlock};
 

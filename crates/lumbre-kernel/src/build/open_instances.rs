@@ -21,7 +21,7 @@ use rustc_hash::FxHashMap;
 
 use crate::build::outline::{EightSizes, Outline, Placing, box_in_space};
 use crate::build::primitive::{Bounds, ONE, Primitive};
-use crate::simd::{Lanes, Level, Task};
+use crate::intersect::{Lanes, Level, Task};
 use crate::tree::node::{Units, tag};
 use crate::tree::packed::Entry;
 use crate::tree::packed::Start;

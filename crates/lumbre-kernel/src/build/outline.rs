@@ -3,7 +3,8 @@
 use lumbre_geometry::Aabb;
 use lumbre_math::{AnimatedTransform, DMat3, DVec3, Transform};
 
-use crate::simd::{Lanes, Level, Row, Task, WIDE, Wide};
+use crate::intersect::{Lanes, Level, Task};
+use crate::simd::{Row, WIDE, Wide};
 use crate::tree::node::{Node, Units, tag};
 use crate::{Accel, Placement};
 

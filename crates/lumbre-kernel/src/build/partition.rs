@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::build::primitive::{Bounds, Primitive};
 use crate::build::sah::{PartPiece, Split};
-use crate::simd::Level;
+use crate::intersect::Level;
 
 /// Primitives that are parted at a time: with room for as many, they fit into a cache of a core.
 const PIECE: usize = 2048;

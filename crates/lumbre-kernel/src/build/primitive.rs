@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use lumbre_geometry::Aabb;
 
-use crate::simd::Lanes;
+use crate::intersect::Lanes;
 use crate::tree::node::{Node, Units, round_up};
 
 /// The kind of a primitive. A leaf holds one kind, triangles of one mesh, and spheres of one cloud.

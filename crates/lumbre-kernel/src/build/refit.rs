@@ -11,7 +11,7 @@ use crate::build::input::{Boxer, Parts, take_apart, units_of};
 use crate::build::open_instances::{self, Families};
 use crate::build::primitive::Bounds;
 use crate::geometry::has_area;
-use crate::simd::Portable;
+use crate::intersect::Portable;
 use crate::tree::node::{Node, Units, tag};
 use crate::tree::packed::Entry;
 use crate::tree::packed::Start;

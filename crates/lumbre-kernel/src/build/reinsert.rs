@@ -8,7 +8,8 @@ use rayon::prelude::*;
 
 use crate::build::binary::{Binary, BinaryNode};
 use crate::build::primitive::Bounds;
-use crate::simd::{self, Lanes, Level, Task};
+use crate::intersect::{Lanes, Level, Task};
+use crate::simd;
 
 /// How often places are sought at most.
 const ROUNDS: usize = 8;

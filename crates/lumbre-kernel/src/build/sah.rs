@@ -5,7 +5,7 @@
 //! range, within the side's box; only where bins show that this is much too wide, it is measured.
 
 use crate::build::primitive::{Bounds, Primitive, Traits};
-use crate::simd::{Lanes, Task};
+use crate::intersect::{Lanes, Task};
 use crate::tree::BLOCK;
 
 /// Bins on an axis: a power of two.

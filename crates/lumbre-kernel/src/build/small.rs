@@ -1,7 +1,7 @@
 //! The last splits: of sixteen primitives or fewer, every split along every axis is tried.
 
 use crate::build::primitive::{Bounds, Kind, Primitive, Traits};
-use crate::simd::{Lanes, Task};
+use crate::intersect::{Lanes, Task};
 use crate::tree::BLOCK;
 use crate::tree::node::WIDTH;
 

@@ -157,7 +157,7 @@ mod tests {
     use crate::build::boxes::Boxes;
     use crate::build::collapse::choose;
     use crate::build::primitive::{Kind, Traits};
-    use crate::simd::Level;
+    use crate::intersect::Level;
     use crate::tests::scenes::Random;
     use crate::tree::Name;
 

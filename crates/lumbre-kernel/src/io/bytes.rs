@@ -21,7 +21,7 @@ use crate::accel::Accel;
 use crate::build::input::{empty_over, take_apart};
 use crate::build::open_instances::is_part;
 use crate::build::refit::{self, RefitError};
-use crate::simd::Level;
+use crate::intersect::Level;
 use crate::tree::node::{Node, WIDTH, tag};
 use crate::tree::packed::{Entry, Packed};
 use crate::tree::sphere_block::SphereBlock;

@@ -10,7 +10,7 @@ use super::scenes::{Random, build, cloud, icosphere, mixture, precise, ray, shap
 use super::single::check_packet;
 use crate::batch;
 use crate::batch::packet::{self, PACKET};
-use crate::simd::Level;
+use crate::intersect::Level;
 use crate::trace::Outcome;
 use crate::{Accel, Faces, GeometryKind, Hit, Instance, Query, TriangleMesh, brute};
 

@@ -11,9 +11,9 @@ use lumbre_geometry::{PlacedShape, Ray, Sphere};
 use lumbre_math::{DVec3, Transform, Vec3};
 
 use super::scenes::{Random, soup};
-use crate::simd::{Level, corners_at, equals_before_at, meet_triangles_at, told_at, truncated_at};
-use crate::trace::f32_ray::F32Ray;
-use crate::trace::watertight::{BlockRay, Meeting, Shear, intersect};
+use crate::intersect::f32_ray::F32Ray;
+use crate::intersect::watertight::{BlockRay, Meeting, Shear, intersect};
+use crate::intersect::{Level, corners_at, equals_before_at, meet_triangles_at, told_at, truncated_at};
 use crate::tree::BLOCK;
 use crate::tree::triangle_block::{self, BlockNames, Blocks, Line, TriangleBlock, Vertices};
 use crate::{Accel, BuildOptions, Geometry, GeometryKind, Preset, TriangleMesh};

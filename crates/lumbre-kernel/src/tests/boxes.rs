@@ -8,9 +8,11 @@ use lumbre_math::{DVec3, Transform, Vec3};
 use super::scenes::Random;
 use crate::Ray32;
 use crate::build::primitive::Bounds;
-use crate::simd::{LANE_BITS, Level, meet_boxes_at, meet_each_at, read_at, start_placed_at, start_single_at};
-use crate::trace::start::SingleStart;
-use crate::tree::node::{BoxRay, Node, Slabs, Units, WIDTH};
+use crate::intersect::box_ray::{BoxRay, Slabs};
+use crate::intersect::single_start::SingleStart;
+use crate::intersect::{Level, meet_boxes_at, meet_each_at, read_at, start_placed_at, start_single_at};
+use crate::simd::LANE_BITS;
+use crate::tree::node::{Node, Units, WIDTH};
 use crate::tree::summary::{Holds, Sizes};
 
 fn units(bounds: &Aabb) -> Units {

@@ -12,9 +12,10 @@ use super::scenes::{
 };
 use crate::batch;
 use crate::batch::packet::PACKET;
-use crate::simd::{Eight, Lanes, Level, Portable, Vector, start_narrow_by_four_at};
-use crate::trace::f32_ray::Precise;
-use crate::trace::start::SingleStart;
+use crate::intersect::f32_ray::Precise;
+use crate::intersect::single_start::SingleStart;
+use crate::intersect::{Lanes, Level, Portable, start_narrow_by_four_at};
+use crate::simd::{Eight, Vector};
 use crate::tree::node::Node;
 use crate::tree::triangle_block::Line;
 use crate::{Accel, BuildOptions, Geometry, GeometryKind, Hit, Hit32, Instance, Preset, Ray32, TriangleMesh};

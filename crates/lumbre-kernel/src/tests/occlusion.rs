@@ -6,7 +6,7 @@ use lumbre_math::DVec3;
 
 use super::refit::moved;
 use super::scenes::{Random, build, icosphere, mesh, mixture, options, room, soup, with_every_preset};
-use crate::simd::Level;
+use crate::intersect::Level;
 use crate::tree::node::{Node, tag};
 use crate::{Accel, GeometryKind, TriangleMesh, build::occlusion_order};
 

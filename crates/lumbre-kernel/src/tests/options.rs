@@ -6,7 +6,7 @@ use lumbre_geometry::Ray;
 use lumbre_math::{DVec3, Transform, Vec3};
 
 use super::scenes::{Random, balls, build, cube, icosphere, mixture, ray, shape, soup, with_every_preset};
-use crate::simd::Level;
+use crate::intersect::Level;
 use crate::{Accel, Faces, GeometryKind, Hit, Instance, Query, TriangleMesh, brute};
 
 const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);

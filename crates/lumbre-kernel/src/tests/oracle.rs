@@ -9,7 +9,7 @@ use lumbre_geometry::Ray;
 use lumbre_math::{DVec3, Transform};
 
 use super::scenes::{Random, balls, build, cube, icosphere, mixture, ray, soup, with_every_preset};
-use crate::simd::Level;
+use crate::intersect::Level;
 use crate::{Accel, GeometryKind, Hit, Instance, Query, TriangleMesh, brute};
 
 fn every(level: Level, accel: &Accel, ray: &Ray) -> Vec<Hit> {

@@ -4,8 +4,9 @@ use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
 
 use super::scenes::Random;
-use crate::simd::{Lanes, Level, Row, Task, WIDE};
-use crate::trace::watertight::{self, Met, Pairs, Passage, Shear};
+use crate::intersect::watertight::{self, Met, Pairs, Passage, Shear};
+use crate::intersect::{Lanes, Level, Task};
+use crate::simd::{Row, WIDE};
 
 struct Meeting<'a>(&'a Pairs<'a>);
 

@@ -2,7 +2,7 @@
 
 use lumbre_geometry::Ray;
 
-use crate::simd::Level;
+use crate::intersect::Level;
 use crate::trace::filtered::{self, Found};
 use crate::trace::stack::{AnyHit, ClosestHit};
 use crate::trace::{ContextRef, Outcome, exact};

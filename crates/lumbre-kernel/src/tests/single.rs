@@ -8,7 +8,7 @@ use lumbre_math::{DVec3, Transform};
 use super::scenes::{self, Random};
 use crate::batch;
 use crate::batch::packet::{self, PACKET};
-use crate::simd::Level;
+use crate::intersect::Level;
 use crate::trace::Outcome;
 use crate::{Accel, BuildOptions, Faces, Geometry, GeometryKind, Hit, Preset, Query, TriangleMesh};
 

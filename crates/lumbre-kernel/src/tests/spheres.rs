@@ -9,7 +9,7 @@ use lumbre_math::{DVec3, Transform};
 
 use super::oracle::{check, check_batches, check_many};
 use super::scenes::{Random, build, cloud, ray, with_every_preset};
-use crate::simd::{Level, meet_spheres_at};
+use crate::intersect::{Level, meet_spheres_at};
 use crate::trace::Outcome;
 use crate::tree::BLOCK;
 use crate::tree::sphere_block::{SphereBlock, SphereRay, has_radius};

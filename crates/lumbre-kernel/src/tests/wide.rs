@@ -1,7 +1,8 @@
 //! What eight and sixteen numbers give together, beside each alone.
 
 use super::scenes::Random;
-use crate::simd::{Eight, Lanes, Level, Row, Task, Vector, WIDE, Wide};
+use crate::intersect::{Lanes, Level, Task};
+use crate::simd::{Eight, Row, Vector, WIDE, Wide};
 
 /// What is looked at of sixteen rows, and of numbers in double precision.
 struct Together<'a> {

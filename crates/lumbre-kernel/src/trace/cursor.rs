@@ -3,8 +3,10 @@
 use std::marker::PhantomData;
 
 use super::stack::{Goal, Stack};
-use crate::simd::{self, Lanes};
-use crate::tree::node::{Node, Slabs, out_of_tree, tag};
+use crate::intersect::box_ray::Slabs;
+use crate::intersect::{self, Lanes};
+use crate::simd;
+use crate::tree::node::{Node, out_of_tree, tag};
 
 /// A ray among the bounding boxes of a tree.
 pub(crate) struct NodeCursor<'a, L> {
@@ -24,14 +26,14 @@ impl<'a, L: Lanes> NodeCursor<'a, L> {
     pub(crate) fn descend<G: Goal>(&self, mut reference: u32, stack: &mut Stack<G::Entry>) -> Option<u32> {
         while tag::is_inner(reference) {
             let Some(node) = self.nodes.get(reference as usize) else { out_of_tree() };
-            let (mask, enter) = simd::meet_boxes::<L::Wide>(node, simd::opaque(&self.slabs));
+            let (mask, enter) = intersect::meet_boxes::<L::Wide>(node, simd::opaque(&self.slabs));
             reference = if mask & mask.wrapping_sub(1) != 0 || G::IS_ANY && mask != 0 {
                 stack.put(
                     #[inline(always)]
                     |room| G::push_children::<L>(node, mask, enter, room),
                 )
             } else if mask != 0 {
-                simd::only_child(node, mask)
+                intersect::only_child(node, mask)
             } else {
                 self.pop::<G>(stack)?
             };

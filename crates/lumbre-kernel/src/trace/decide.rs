@@ -9,9 +9,10 @@ use lumbre_math::DVec3;
 
 use super::{Outcome, Winner};
 use crate::Accel;
-use crate::simd::{self, Axes, Lanes};
-use crate::trace::start::SingleStart;
-use crate::trace::watertight::{self, Inside, Meeting, Passage, Shear};
+use crate::intersect::single_start::SingleStart;
+use crate::intersect::watertight::{self, Inside, Meeting, Passage, Shear};
+use crate::intersect::{Axes, Lanes};
+use crate::simd;
 use crate::tree::BLOCK;
 use crate::tree::node::Node;
 use crate::tree::triangle_block::{Blocks, TriangleBlock};

@@ -13,9 +13,9 @@ use lumbre_geometry::{Ray, Root};
 use super::Context;
 use super::exact::{self, Crossing, Visitor};
 use crate::Accel;
+use crate::intersect::Level;
+use crate::intersect::watertight::{self, Feature, Meeting, Shear};
 use crate::precise_mesh::has_area;
-use crate::simd::Level;
-use crate::trace::watertight::{self, Feature, Meeting, Shear};
 
 /// A triangle whose edges or corners a ray hits exactly.
 #[derive(Clone, Debug)]

@@ -16,12 +16,13 @@ use super::leaves::CloudRay;
 use super::stack::{ClosestHit, Goal, Stack};
 use super::visitors::{Any, Closest};
 use super::{Context, all_crossings, first_crossing, is_sound, meets_front};
+use crate::intersect::box_ray::{BoxRay, Progress};
+use crate::intersect::watertight::{self, BlockRay, HeightRange, Passage, Shear};
+use crate::intersect::{self, Lanes, Level, MetHulls, Task};
 use crate::query::Query;
-use crate::simd::{self, Lanes, Level, MetHulls, Task};
-use crate::trace::watertight::{self, BlockRay, HeightRange, Passage, Shear};
 use crate::tree::BLOCK;
 use crate::tree::bounding_block::HullRay;
-use crate::tree::node::{BoxRay, Progress, tag};
+use crate::tree::node::tag;
 use crate::tree::packed::Entry;
 use crate::tree::packed::Start;
 use crate::tree::summary::{Holds, Sizes};
@@ -461,7 +462,7 @@ impl<'a, L: Lanes> Frame<'a, L> {
         for (ids, block) in tree.sphere_names[places.clone()].iter().zip(&tree.sphere_blocks[places]) {
             let cloud = CloudRay::turn(&mut self.cloud, self.accel, &self.ray, ids.geometry);
             let mut mask = match cloud.within(self.range) {
-                Some(ray) => simd::meet_spheres::<L>(block, ray).0,
+                Some(ray) => intersect::meet_spheres::<L>(block, ray).0,
                 None => ids.lanes(),
             };
             while mask != 0 {
@@ -486,7 +487,7 @@ impl<'a, L: Lanes> Frame<'a, L> {
         let hulls = *self.hulls.get_or_insert_with(|| HullRay::new(&accel.units, &self.ray, length));
         let range = HeightRange::new((self.range[0] * length) as f32, (self.range[1] * length) as f32);
         while let Some((block, goes_on)) = accel.hulls.block(first) {
-            let MetHulls { mut mask, .. } = simd::meet_hulls::<L, false>(block, &hulls, &range);
+            let MetHulls { mut mask, .. } = intersect::meet_hulls::<L, false>(block, &hulls, &range);
             while mask != 0 {
                 let entry = &accel.tree.entries[first + mask.trailing_zeros() as usize];
                 mask &= mask - 1;

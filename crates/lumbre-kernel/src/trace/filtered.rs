@@ -10,12 +10,13 @@ use super::exact;
 use super::leaves::CloudRay;
 use super::stack::{AnyHit, ClosestHit, Goal, Stack};
 use super::{Context, ContextRef, Outcome, Stop, Winner};
+use crate::intersect::box_ray::Slabs;
+use crate::intersect::single_start::SingleStart;
+use crate::intersect::watertight::{self, BlockRay};
+use crate::intersect::{Asked, Lanes, Level, Question, Task};
 use crate::query::{Query, TreeQuery};
-use crate::simd::{self, Asked, Lanes, Level, Question, Task};
-use crate::trace::start::SingleStart;
-use crate::trace::watertight::{self, BlockRay};
+use crate::simd;
 use crate::tree::bounding_block::HullRay;
-use crate::tree::node::Slabs;
 use crate::tree::packed::Start;
 use crate::{Accel, GeometryKind, Hit};
 

@@ -12,12 +12,14 @@ use super::edges;
 use super::filtered::{FilteredGoal, FilteredRay};
 use super::stack::Goal;
 use super::{Outcome, Stop, Winner, all_crossings, first_crossing, is_crossed, meets_front};
+use crate::intersect::box_ray::Slabs;
+use crate::intersect::watertight::Meeting;
+use crate::intersect::{self, Crossings, Lanes, Level, MetHulls, Task};
 use crate::query::TreeQuery;
-use crate::simd::{self, Crossings, Lanes, Level, MetHulls, Task};
-use crate::trace::watertight::Meeting;
+use crate::simd;
 use crate::tree::BLOCK;
 use crate::tree::bounding_block::HullRay;
-use crate::tree::node::{Slabs, tag};
+use crate::tree::node::tag;
 use crate::tree::packed::Entry;
 use crate::tree::sphere_block::SphereRay;
 use crate::tree::triangle_block::TriangleBlock;
@@ -235,9 +237,9 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
             let entries = &accel.tree.entries[first..];
             let range = &self.blocks.range;
             let MetHulls { mut mask, sure, near } = if G::IS_ANY && !FILTERED {
-                simd::meet_hulls::<L, true>(block, simd::opaque(&hulls), range)
+                intersect::meet_hulls::<L, true>(block, simd::opaque(&hulls), range)
             } else {
-                simd::meet_hulls::<L, false>(block, simd::opaque(&hulls), range)
+                intersect::meet_hulls::<L, false>(block, simd::opaque(&hulls), range)
             };
             if G::IS_ANY && !FILTERED && sure != 0 {
                 return Some(Stop::Hit);
@@ -346,7 +348,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
             let cloud = CloudRay::turn(&mut self.cloud, accel, ray, ids.geometry);
             let origin = cloud.origin;
             let (mut mask, certain) = match cloud.within(range) {
-                Some(spheres) => simd::meet_spheres::<L>(block, spheres),
+                Some(spheres) => intersect::meet_spheres::<L>(block, spheres),
                 None => (ids.lanes(), 0),
             };
             if G::IS_ANY && !FILTERED && certain != 0 {
@@ -432,7 +434,7 @@ impl<G: Goal, const GENERAL: bool, const FILTERED: bool> Task
 struct Comparison<'s, 'a> {
     decider: &'s super::decide::Decider<'a>,
     ray: &'s Ray,
-    axes: &'static simd::Axes,
+    axes: &'static intersect::Axes,
     triangle: (u32, u32),
     best: (&'s Candidate, Option<Winner>),
 }

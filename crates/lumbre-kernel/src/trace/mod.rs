@@ -14,9 +14,7 @@ pub(crate) mod filtered;
 mod instances;
 mod leaves;
 pub(crate) mod stack;
-pub(crate) mod start;
 pub(crate) mod visitors;
-pub(crate) mod watertight;
 
 use bytemuck::Zeroable;
 use lumbre_geometry::{Ray, Root, Roots};

@@ -1,16 +1,9 @@
 //! The stack of a traversal, and the two goals that decide in which order it is filled: the closest hit and any hit.
 
-use crate::simd::{self, LANE_BITS, Lanes, Room, Slots};
+use crate::intersect::{self, Lanes, Room, STACK, Slots};
+use crate::simd::LANE_BITS;
+use crate::simd::vector::stack_entry;
 use crate::tree::node::{Node, WIDTH};
-
-/// Entries in the array. Few in tests, so that spilling is tested.
-pub(crate) const STACK: usize = if cfg!(test) { 3 * WIDTH } else { 256 };
-
-/// The key of a distance in the upper half, a reference in the lower: entries order by distance.
-#[inline(always)]
-pub(crate) fn stack_entry(key: i32, reference: u32) -> i64 {
-    (i64::from(key) << 32) | i64::from(reference)
-}
 
 /// What a traversal looks for, which decides the order of a node's children.
 pub(crate) trait Goal {
@@ -54,12 +47,12 @@ impl Goal for ClosestHit {
 
     #[inline(always)]
     fn push_children<L: Lanes>(node: &Node, mask: u32, enter: L::Wide, room: Room<i64>) -> u32 {
-        simd::push_by_distance(node, mask, enter, room)
+        intersect::push_by_distance(node, mask, enter, room)
     }
 
     #[inline(always)]
     fn push_and_pop<L: Lanes>(node: &Node, mask: u32, enter: L::Wide, slots: &mut Slots<i64>) -> u32 {
-        simd::put_and_take_by_distance(node, mask, enter, slots)
+        intersect::put_and_take_by_distance(node, mask, enter, slots)
     }
 }
 
@@ -87,12 +80,12 @@ impl Goal for AnyHit {
 
     #[inline(always)]
     fn push_children<L: Lanes>(node: &Node, mask: u32, _: L::Wide, room: Room<u32>) -> u32 {
-        simd::push_as_built::<L::Wide>(node, mask, room)
+        intersect::push_as_built::<L::Wide>(node, mask, room)
     }
 
     #[inline(always)]
     fn push_and_pop<L: Lanes>(node: &Node, mask: u32, _: L::Wide, slots: &mut Slots<u32>) -> u32 {
-        simd::put_and_take_as_built::<L::Wide>(node, mask, slots)
+        intersect::put_and_take_as_built::<L::Wide>(node, mask, slots)
     }
 }
 

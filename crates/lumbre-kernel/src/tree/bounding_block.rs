@@ -183,7 +183,7 @@ fn leaves(entries: &[Entry]) -> impl Iterator<Item = (&[Entry], usize)> {
 /// # Why none is lost
 ///
 /// Places on the ray are o + h e: o is its origin, e its direction by its largest component, which then is of size 1, and h a height
-/// as in [`HeightRange`](crate::trace::watertight::HeightRange), t times that component. Of a hull let W be the largest coordinate of w =
+/// as in [`HeightRange`](crate::intersect::watertight::HeightRange), t times that component. Of a hull let W be the largest coordinate of w =
 /// o - center, S the largest of a point of it, N the largest of the sums of the sizes in a row of the map M to its cube, and
 /// u = 2⁻²⁴. At a hit, |h| ≤ W + S, for it is as far from o on the axis of that component.
 ///

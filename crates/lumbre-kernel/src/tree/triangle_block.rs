@@ -20,8 +20,10 @@ use lumbre_math::Vec3;
 use rayon::prelude::*;
 
 use crate::geometry::has_area;
-use crate::simd::{self, Corners, Lanes, Level, Task};
+use crate::intersect::{Lanes, Level, Task};
+use crate::simd;
 use crate::tree::BLOCK;
+use crate::tree::Corners;
 use crate::tree::Name;
 use crate::tree::node::out_of_tree;
 use crate::tree::node::{Node, tag};

@@ -1,7 +1,8 @@
 //! A ray against eight bounding volumes of shapes.
 
-use super::{Eight, Lanes, Row, Vector, WIDE, Wide};
-use crate::trace::watertight::HeightRange;
+use super::Lanes;
+use crate::intersect::watertight::HeightRange;
+use crate::simd::{Eight, Row, Vector, WIDE, Wide};
 use crate::tree::BLOCK;
 use crate::tree::bounding_block::{
     HullBlock, HullRay, LEAST_COMPONENT, LEAST_TOLERANCE, LEAST_TUBE_ERROR, TOLERANCE_PER_MARGIN,

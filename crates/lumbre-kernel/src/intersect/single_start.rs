@@ -41,7 +41,7 @@ pub(crate) struct SingleStart {
     pub(crate) space_per_unit: f32,
     /// Where weights are precise enough.
     pub(crate) precise: Precise,
-    /// That of [`BlockRay`](crate::trace::watertight::BlockRay) for every ray from nearby.
+    /// That of [`BlockRay`](crate::intersect::watertight::BlockRay) for every ray from nearby.
     pub(crate) least_size: f32,
     /// The bounds on the largest component of a direction, the upper one four times, to be compared with four at once; and that below which
     /// one is replaced.

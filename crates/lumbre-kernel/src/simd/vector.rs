@@ -6,10 +6,15 @@ use std::ops::{Add, Index, Mul, Sub};
 use bytemuck::Zeroable;
 
 use super::opaque_number;
-use crate::trace::stack::stack_entry;
 
 /// Those that are sixteen.
 pub(crate) const WIDE: usize = 16;
+
+/// The key of a distance in the upper half, a reference in the lower: entries order by distance.
+#[inline(always)]
+pub(crate) fn stack_entry(key: i32, reference: u32) -> i64 {
+    (i64::from(key) << 32) | i64::from(reference)
+}
 
 /// An array that can be loaded at once.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -170,7 +175,7 @@ impl LastEight {
 
     #[cfg(target_arch = "x86_64")]
     #[inline(always)]
-    pub(in crate::simd) fn mask(self) -> u16 {
+    pub(crate) fn mask(self) -> u16 {
         self.0 as u16
     }
 }
@@ -504,18 +509,18 @@ mod x86 {
     use super::{AFTER_MIDDLE, BEFORE_MIDDLE, Eight, LANE_BITS, LastEight, Row, Vector, WIDE, Wide};
     use crate::simd::opaque_number;
 
-    /// Only where `simd::x86::X86<true>` is: the instructions are there.
+    /// Only where `intersect::x86::X86<true>` is: the instructions are there.
     #[derive(Clone, Copy)]
     pub(crate) struct Avx512(__m512);
 
     // SAFETY: sixteen zeros are sixteen numbers.
     unsafe impl Zeroable for Avx512 {}
 
-    /// Only where `simd::x86::X86<false>` is, alike.
+    /// Only where `intersect::x86::X86<false>` is, alike.
     #[derive(Clone, Copy, Zeroable)]
     pub(crate) struct Avx2([__m256; 2]);
 
-    /// Only where `simd::x86::X86<AVX512>` is.
+    /// Only where `intersect::x86::X86<AVX512>` is.
     #[derive(Clone, Copy, Zeroable)]
     pub(crate) struct Eight256<const AVX512: bool>(__m256);
 
@@ -1088,23 +1093,23 @@ mod x86 {
 
     impl Avx512 {
         /// # Safety
-        /// There must be what `simd::x86::X86<true>` has.
+        /// There must be what `intersect::x86::X86<true>` has.
         #[inline(always)]
-        pub(in crate::simd) unsafe fn new(sixteen: __m512) -> Self {
+        pub(crate) unsafe fn new(sixteen: __m512) -> Self {
             Self(sixteen)
         }
     }
 
     impl<const AVX512: bool> Eight256<AVX512> {
         /// # Safety
-        /// There must be what `simd::x86::X86<AVX512>` has.
+        /// There must be what `intersect::x86::X86<AVX512>` has.
         #[inline(always)]
-        pub(in crate::simd) unsafe fn new(eight: __m256) -> Self {
+        pub(crate) unsafe fn new(eight: __m256) -> Self {
             Self(eight)
         }
 
         #[inline(always)]
-        pub(in crate::simd) fn raw(self) -> __m256 {
+        pub(crate) fn raw(self) -> __m256 {
             self.0
         }
     }

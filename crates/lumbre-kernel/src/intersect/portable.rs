@@ -4,17 +4,20 @@ use bytemuck::Zeroable;
 use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
 
-use super::wide::{Portable8, Portable16};
-use super::{Axes, Corners, CornersRoom, Crossings, Eight, Lanes, Level, Row, Set, Sides, Vector, WIDE};
+use super::{Axes, CornersRoom, Crossings, Lanes, Level, Set, Sides};
 use crate::Ray32;
-use crate::trace::f32_ray::F32Ray;
-use crate::trace::start::SingleStart;
-use crate::trace::watertight::{
+use crate::intersect::box_ray::{BoxRay, END_FACTOR, LITTLE, START_FACTOR, Slabs};
+use crate::intersect::f32_ray::F32Ray;
+use crate::intersect::single_start::SingleStart;
+use crate::intersect::watertight::{
     BlockRay, EDGE_ERROR, ERRORS_OF_EDGES, ERRORS_OF_EXTENT, HEIGHT_ERROR, HeightRange, Inside, Passage,
     SIZE_ERROR, Shear, TINY, passage,
 };
+use crate::simd::vector::{Portable8, Portable16};
+use crate::simd::{Eight, Row, Vector, WIDE};
 use crate::tree::BLOCK;
-use crate::tree::node::{BoxRay, END_FACTOR, LITTLE, START_FACTOR, Slabs, Units};
+use crate::tree::Corners;
+use crate::tree::node::Units;
 use crate::tree::triangle_block::TriangleBlock;
 
 pub(crate) struct Portable;

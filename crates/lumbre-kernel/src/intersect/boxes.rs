@@ -3,10 +3,12 @@
 use std::hint::select_unpredictable;
 use std::mem::MaybeUninit;
 
-use super::{Room, Sides, Slots, WIDE, Wide};
-use crate::batch::packet::{Frustum, SlabRows};
-use crate::trace::stack::stack_entry;
-use crate::tree::node::{Node, Slabs, WIDTH};
+use super::{Room, Sides, Slots};
+use crate::intersect::box_ray::Slabs;
+use crate::intersect::box_ray::{Frustum, SlabRows};
+use crate::simd::vector::stack_entry;
+use crate::simd::{WIDE, Wide};
+use crate::tree::node::{Node, WIDTH};
 
 const _: () = assert!(WIDTH == WIDE);
 

@@ -7,20 +7,18 @@ use bytemuck::Zeroable;
 use lumbre_geometry::Ray;
 use lumbre_math::{DAffine3, DVec3, Transform};
 
-use super::{
-    Axes, Corners, CornersRoom, Crossings, Lanes, LastEight, Level, Question, Row, Set, Sides, Task, Vector,
-    WIDE, Wide, wide,
-};
-use crate::trace::f32_ray::F32Ray;
-use crate::trace::start::SingleStart;
-use crate::trace::watertight::{
+use super::{Axes, CornersRoom, Crossings, Lanes, Level, Question, Set, Sides, Task};
+use crate::intersect::box_ray::{BoxRay, END_FACTOR, LITTLE, START_FACTOR, Slabs};
+use crate::intersect::f32_ray::F32Ray;
+use crate::intersect::single_start::SingleStart;
+use crate::intersect::watertight::{
     BlockRay, EDGE_ERROR, ERRORS_OF_EDGES, ERRORS_OF_EXTENT, FAR, HEIGHT_ERROR, HeightRange, Inside, Passage,
     ROUNDINGS, SIZE_ERROR, Shear, TINY,
 };
+use crate::simd::{self, LastEight, Row, Vector, WIDE, Wide, vector};
 use crate::tree::BLOCK;
-use crate::tree::node::{
-    BoxRay, END_FACTOR, LARGEST_NEAR, LITTLE, SMALLEST_NEAR, START_FACTOR, Slabs, TINY_NEAR, Units,
-};
+use crate::tree::Corners;
+use crate::tree::node::{LARGEST_NEAR, SMALLEST_NEAR, TINY_NEAR, Units};
 use crate::tree::triangle_block::{FIRST_UNSHARED, MOST_SHARED, QUAD, TriangleBlock, USUAL, far_of_last};
 use crate::{Accel, Ray32};
 
@@ -214,15 +212,15 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
         let rows = if !IS_ALONE {
             &by_room
         } else if room > MOST_SHARED {
-            super::opaque(&rows_by_room[3])
+            simd::opaque(&rows_by_room[3])
         } else if room == USUAL[0] {
-            super::opaque(&rows_by_room[0])
+            simd::opaque(&rows_by_room[0])
         } else if room == USUAL[1] {
-            super::opaque(&rows_by_room[1])
+            simd::opaque(&rows_by_room[1])
         } else if room <= MOST_SHARED {
-            super::opaque(&rows_by_room[2])
+            simd::opaque(&rows_by_room[2])
         } else {
-            super::opaque(&rows_by_room[3])
+            simd::opaque(&rows_by_room[3])
         };
         if room > MOST_SHARED {
             let a = Self::sheared_eight::<_, false>(block, ray, rows, FIRST_UNSHARED);
@@ -233,7 +231,7 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
         // SAFETY: see `X86`.
         let mut corners = [[unsafe { _mm256_setzero_ps() }; 3]; 3];
         if AVX512 {
-            let vertices = Self::sheared_sixteen(block, super::opaque(ray), *rows);
+            let vertices = Self::sheared_sixteen(block, simd::opaque(ray), *rows);
             for (corner, &places) in block.corners().iter().enumerate() {
                 let places = Self::places(places);
                 for axis in 0..3 {
@@ -263,8 +261,8 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
 
     /// The corners as numbers.
     #[inline(always)]
-    fn eights([[a, b, c], [d, e, f], [g, h, i]]: [[__m256; 3]; 3]) -> [[wide::Eight256<AVX512>; 3]; 3] {
-        let of = wide::Eight256::<AVX512>::new;
+    fn eights([[a, b, c], [d, e, f], [g, h, i]]: [[__m256; 3]; 3]) -> [[vector::Eight256<AVX512>; 3]; 3] {
+        let of = vector::Eight256::<AVX512>::new;
         // SAFETY: see `X86`.
         unsafe { [[of(a), of(b), of(c)], [of(d), of(e), of(f)], [of(g), of(h), of(i)]] }
     }
@@ -273,7 +271,7 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
     #[inline(always)]
     fn corners_of_each<S: Shears, W>(blocks: [&TriangleBlock; 2], rays: [&S; 2]) -> [[W; 3]; 3]
     where
-        W: Wide<Half = wide::Eight256<AVX512>>,
+        W: Wide<Half = vector::Eight256<AVX512>>,
     {
         let first = Self::eights(Self::sheared_corners::<_, false>(blocks[0], rays[0]));
         let second = Self::eights(Self::sheared_corners::<_, false>(blocks[1], rays[1]));
@@ -899,8 +897,8 @@ impl<W: Wide> Edges<W> {
     #[inline(always)]
     fn of_two(first: &Edges<W::Half>, second: &Edges<W::Half>) -> Self {
         Self {
-            values: super::three_of_two(&first.values, &second.values),
-            heights: super::three_of_two(&first.heights, &second.heights),
+            values: simd::three_of_two(&first.values, &second.values),
+            heights: simd::three_of_two(&first.heights, &second.heights),
             within: W::of_two(first.within, second.within),
             minus_error: W::of_two(first.minus_error, second.minus_error),
             height_error: W::of_two(first.height_error, second.height_error),
@@ -911,12 +909,12 @@ impl<W: Wide> Edges<W> {
 impl<const LEAKS: bool> X86<true, LEAKS> {
     /// The corners of two blocks that share vertices.
     #[inline(always)]
-    fn shared_by_two<S: Shears>(blocks: [&TriangleBlock; 2], rays: [&S; 2]) -> [[wide::Avx512; 3]; 3] {
+    fn shared_by_two<S: Shears>(blocks: [&TriangleBlock; 2], rays: [&S; 2]) -> [[vector::Avx512; 3]; 3] {
         let [first, second] = blocks;
-        let a = Self::sheared_sixteen(first, super::opaque(rays[0]), Self::rows_of(first, rays[0]));
-        let b = Self::sheared_sixteen(second, super::opaque(rays[1]), Self::rows_of(second, rays[1]));
+        let a = Self::sheared_sixteen(first, simd::opaque(rays[0]), Self::rows_of(first, rays[0]));
+        let b = Self::sheared_sixteen(second, simd::opaque(rays[1]), Self::rows_of(second, rays[1]));
         let last = LastEight::new().mask();
-        let mut corners = [[wide::Avx512::zeroed(); 3]; 3];
+        let mut corners = [[vector::Avx512::zeroed(); 3]; 3];
         // SAFETY: see `X86`.
         unsafe {
             let shifts = _mm512_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28, 0, 4, 8, 12, 16, 20, 24, 28);
@@ -928,9 +926,9 @@ impl<const LEAKS: bool> X86<true, LEAKS> {
                 let both = _mm512_mask_set1_epi32(_mm512_set1_epi32(of_a as i32), last, of_b as i32);
                 let both = _mm512_srlv_epi32(both, shifts);
                 let both = _mm512_ternarylogic_epi32::<OR_AND>(of_second, both, places);
-                corners[0][corner] = wide::Avx512::new(_mm512_permutex2var_ps(a[0], both, b[0]));
-                corners[1][corner] = wide::Avx512::new(_mm512_permutex2var_ps(a[1], both, b[1]));
-                corners[2][corner] = wide::Avx512::new(_mm512_permutex2var_ps(a[2], both, b[2]));
+                corners[0][corner] = vector::Avx512::new(_mm512_permutex2var_ps(a[0], both, b[0]));
+                corners[1][corner] = vector::Avx512::new(_mm512_permutex2var_ps(a[1], both, b[1]));
+                corners[2][corner] = vector::Avx512::new(_mm512_permutex2var_ps(a[2], both, b[2]));
             }
         }
         corners
@@ -942,19 +940,19 @@ impl<const LEAKS: bool> X86<true, LEAKS> {
         blocks: [&TriangleBlock; 2],
         rays: [&S; 2],
         rests: [&[f32; 4]; 2],
-    ) -> [[wide::Avx512; 3]; 3] {
-        let splat = wide::Avx512::splat_two;
+    ) -> [[vector::Avx512; 3]; 3] {
+        let splat = vector::Avx512::splat_two;
         let last = LastEight::new();
-        let [a, b] = [super::opaque(rays[0]), super::opaque(rays[1])];
+        let [a, b] = [simd::opaque(rays[0]), simd::opaque(rays[1])];
         let ([ax, ay, az, _], [bx, by, bz, _]) = (*a.origin(), *b.origin());
         let origin = [splat(ax, bx, last), splat(ay, by, last), splat(az, bz, last)];
         let rest = [splat(rests[0][0], rests[1][0], last), splat(rests[0][1], rests[1][1], last)];
         let shear = [splat(a.shear()[0], b.shear()[0], last), splat(a.shear()[1], b.shear()[1], last)];
         let [rows_a, rows_b] = [Self::rows_of(blocks[0], a), Self::rows_of(blocks[1], b)];
         let [first, second] = [blocks[0].coordinates().as_ptr(), blocks[1].coordinates().as_ptr()];
-        let mut corners = [[wide::Avx512::zeroed(); 3]; 3];
+        let mut corners = [[vector::Avx512::zeroed(); 3]; 3];
         for (corner, sheared) in corners.iter_mut().enumerate() {
-            let mut arms = [wide::Avx512::zeroed(); 3];
+            let mut arms = [vector::Avx512::zeroed(); 3];
             for (axis, arm) in arms.iter_mut().enumerate() {
                 let (of_a, of_b) = (rows_a[axis] as usize, rows_b[axis] as usize);
                 let own = FIRST_UNSHARED + BLOCK * corner;
@@ -962,7 +960,7 @@ impl<const LEAKS: bool> X86<true, LEAKS> {
                 let vertices = unsafe {
                     let low = _mm256_loadu_ps(first.add(of_a + own));
                     let high = _mm256_loadu_ps(second.add(of_b + own));
-                    wide::Avx512::new(_mm512_insertf32x8::<1>(_mm512_castps256_ps512(low), high))
+                    vector::Avx512::new(_mm512_insertf32x8::<1>(_mm512_castps256_ps512(low), high))
                 };
                 *arm = origin[axis] - vertices;
             }
@@ -976,14 +974,14 @@ impl<const LEAKS: bool> X86<true, LEAKS> {
 
 /// Which sixteen numbers go with which level, and what is different with them.
 pub(crate) trait HasWide<const AVX512: bool> {
-    type Wide: Wide<Half = wide::Eight256<AVX512>>;
+    type Wide: Wide<Half = vector::Eight256<AVX512>>;
 
     /// [`X86::sheared_corners`] of two blocks, each by its ray: those of the first, and those of the second.
     fn corners_by_two<S: Shears>(blocks: [&TriangleBlock; 2], rays: [&S; 2]) -> [[Self::Wide; 3]; 3];
 }
 
 impl<const LEAKS: bool> HasWide<true> for X86<true, LEAKS> {
-    type Wide = wide::Avx512;
+    type Wide = vector::Avx512;
 
     #[inline(always)]
     fn corners_by_two<S: Shears>(blocks: [&TriangleBlock; 2], rays: [&S; 2]) -> [[Self::Wide; 3]; 3] {
@@ -1003,7 +1001,7 @@ impl<const LEAKS: bool> HasWide<true> for X86<true, LEAKS> {
 }
 
 impl<const LEAKS: bool> HasWide<false> for X86<false, LEAKS> {
-    type Wide = wide::Avx2;
+    type Wide = vector::Avx2;
 
     #[inline(always)]
     fn corners_by_two<S: Shears>(blocks: [&TriangleBlock; 2], rays: [&S; 2]) -> [[Self::Wide; 3]; 3] {
@@ -1015,7 +1013,7 @@ impl<const AVX512: bool, const LEAKS: bool> Lanes for X86<AVX512, LEAKS>
 where
     Self: HasWide<AVX512>,
 {
-    type Eight = wide::Eight256<AVX512>;
+    type Eight = vector::Eight256<AVX512>;
     type Edges = Edges<Self::Eight>;
     type EdgesByTwo = Edges<Self::Wide>;
     type Wide = <Self as HasWide<AVX512>>::Wide;
@@ -1287,7 +1285,7 @@ where
     fn narrow_corners<const IS_ALONE: bool>(
         block: &TriangleBlock,
         ray: &F32Ray,
-    ) -> [[wide::Eight256<AVX512>; 3]; 3] {
+    ) -> [[vector::Eight256<AVX512>; 3]; 3] {
         Self::eights(Self::sheared_corners::<_, IS_ALONE>(block, ray))
     }
 
@@ -1532,7 +1530,7 @@ where
     }
 
     #[inline(always)]
-    fn place_crossings(edges: &Self::Edges, ray: &BlockRay) -> Crossings<wide::Eight256<AVX512>> {
+    fn place_crossings(edges: &Self::Edges, ray: &BlockRay) -> Crossings<vector::Eight256<AVX512>> {
         // SAFETY: see `X86`.
         unsafe {
             let ([u, v, w], [a, b, c]) = (edges.values, edges.heights);
@@ -1556,7 +1554,7 @@ where
                     [at, _mm256_set1_ps(range.last)],
                 );
                 let in_range = in_range & Self::compare::<_CMP_GT_OQ>(weight, _mm256_setzero_ps());
-                let at = wide::Eight256::new(at);
+                let at = vector::Eight256::new(at);
                 return Crossings { in_range, sure: in_range, from: at, to: at };
             }
             let low = _mm256_min_ps(_mm256_min_ps(z[0], z[1]), z[2]);
@@ -1584,7 +1582,7 @@ where
                 [to, _mm256_mul_ps(weight, _mm256_set1_ps(range.surely_last))],
             );
             let (from, to) = (_mm256_mul_ps(from, inverse), _mm256_mul_ps(to, inverse));
-            let (from, to) = (wide::Eight256::new(from), wide::Eight256::new(to));
+            let (from, to) = (vector::Eight256::new(from), vector::Eight256::new(to));
             Crossings { in_range, sure: inside & surely_in_range, from, to }
         }
     }

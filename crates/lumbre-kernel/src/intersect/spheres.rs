@@ -1,6 +1,7 @@
 //! A ray against eight spheres: see [`SphereRay`].
 
-use super::{Eight, Lanes, Vector};
+use super::Lanes;
+use crate::simd::{Eight, Vector};
 use crate::tree::sphere_block::{SphereBlock, SphereRay};
 
 /// A bit for each sphere of a block that the ray may hit within its range, among them all that it does; and for each that it certainly

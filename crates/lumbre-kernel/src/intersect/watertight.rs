@@ -11,7 +11,8 @@
 use lumbre_geometry::{Ray, Root};
 use lumbre_math::{DVec2, DVec3};
 
-use crate::simd::{Axes, Row, WIDE};
+use crate::intersect::Axes;
+use crate::simd::{Row, WIDE};
 
 /// The shear that turns a ray's direction into the last axis: once a ray.
 #[derive(Clone, Copy, Debug)]
