@@ -27,6 +27,7 @@ mod occlusion;
 mod opening;
 mod options;
 mod outline;
+mod pack;
 mod packet;
 mod parting;
 mod precise;

@@ -94,6 +94,13 @@ pub(crate) mod tag {
     }
 }
 
+/// Ends a search whose reference is not of its tree. The reference is not told: it would have to be kept for every step.
+#[cold]
+#[inline(never)]
+pub(crate) fn out_of_tree() -> ! {
+    panic!("a reference leads out of its tree")
+}
+
 /// Children of a node.
 pub(crate) const WIDTH: usize = 16;
 

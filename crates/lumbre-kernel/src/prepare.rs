@@ -93,7 +93,7 @@ fn build_here(geometries: Vec<Geometry>, preset: Preset) -> Result<Accel, BuildE
         let layout = lay_out(&traits, &tree, &names, &instances)?;
         drop((tree, instances));
         drop(primitives);
-        layout.pack(level, &units, &geometries, names)?
+        layout.pack(level, &units, &geometries, names)
     };
     let holds = Holds::new(&geometries, parts.sizes);
     let single = SingleStart::new(&holds, &units, tree.root);

@@ -548,7 +548,7 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
         let mut place = leaf & tag::PLACE;
         loop {
             let block = self.exact.triangles.block(place);
-            let (mask, edges) = L::meet_triangles::<true>(block, lanes::opaque(&self.blocks));
+            let (mask, edges) = L::meet_triangles(block, lanes::opaque(&self.blocks));
             if mask != 0 {
                 let crossings = L::place_crossings(&edges, &self.blocks);
                 let mask = self.select::<L>(block, mask, &edges, &crossings);
@@ -753,7 +753,7 @@ impl<'a, const MIXED: bool, S: Selection> SingleRay<'a, MIXED, S> {
         let mut place = leaf & tag::PLACE;
         loop {
             let block = self.exact.triangles.block(place);
-            let (mask, edges) = L::meet_triangles::<true>(block, lanes::opaque(&self.blocks));
+            let (mask, edges) = L::meet_triangles(block, lanes::opaque(&self.blocks));
             if mask != 0 {
                 let crossings = L::place_crossings(&edges, &self.blocks);
                 let mask = self.select::<L>(block, mask, &edges, &crossings);

@@ -15,13 +15,13 @@ use crate::Accel;
 use crate::fleet::{Crossing, Doubled, Flyer, LeafBlocks, Passing};
 use crate::holds::SingleStart;
 use crate::lanes::{self, Eight, Lanes, Question, SphereCrossings, SpherePass, Task};
-use crate::node::{Slabs, tag};
+use crate::node::{Slabs, out_of_tree, tag};
 use crate::single::{Exact, Goal, Outcome, Winner};
 use crate::spheres::{SphereBlock, SphereRay};
 use crate::stack::Stack;
 use crate::traverse::What;
 use crate::triangles::{self, BLOCK};
-use crate::way::{Way, out_of_tree};
+use crate::way::Way;
 
 /// A ray among the spheres of a tree, and the nearest that it has met. Among boxes it takes a cache line, and here the next.
 #[derive(Clone, Copy)]

@@ -608,7 +608,7 @@ fn meet_blocks<'a, R: Borrow<Ray>, L: Lanes, S: Search<'a>>(
         following = block.next(number);
         let Some(mesh) = &frame.mesh else { unreachable!("the ray was turned to it") };
         let mut mask = if let Some(blocks) = &mesh.blocks {
-            let (mask, edges) = L::meet_triangles::<true>(block, blocks);
+            let (mask, edges) = L::meet_triangles(block, blocks);
             if mask == 0 {
                 continue;
             }

@@ -3,7 +3,7 @@
 use std::marker::PhantomData;
 
 use crate::lanes::{self, Lanes};
-use crate::node::{Node, Slabs, tag};
+use crate::node::{Node, Slabs, out_of_tree, tag};
 use crate::stack::{Order, Stack};
 
 /// A ray among the boxes of a tree.
@@ -77,11 +77,4 @@ impl<'a, L: Lanes> Way<'a, L> {
         }
         Some(reference)
     }
-}
-
-/// What no reference in a tree leads to. The place is not told: it would have to be kept at hand for every step.
-#[cold]
-#[inline(never)]
-pub(crate) fn out_of_tree() -> ! {
-    panic!("a reference leads out of its tree")
 }
