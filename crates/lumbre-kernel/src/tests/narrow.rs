@@ -688,7 +688,7 @@ fn no_ray_from_within_leaks_at_a_corner_or_an_edge() {
                 assert_eq!(accel.single.as_ref().map(|start| start.contents), Some(Contents::Triangles));
                 let mut triangle = 0;
                 let mut rays = Vec::new();
-                for i in 0..1608 {
+                for i in 0..2152 {
                     // By turns sixteen neighbours and sixteen from anywhere.
                     let are_alike = (i / PACKET).is_multiple_of(2);
                     triangle = if are_alike && !i.is_multiple_of(PACKET) {

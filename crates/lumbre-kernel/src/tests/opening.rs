@@ -165,7 +165,7 @@ fn parts_of_trees_with_instances_in_them_are_found_as_by_a_loop() {
 fn long_triangles_beside_short_ones_are_found_in_opened_instances_as_by_a_loop() {
     with_every_preset(|| {
         let mut random = Random(303);
-        let mut mesh = bar(3);
+        let mut mesh = bar(24);
         mesh.indices.extend(bar(300).indices.iter().map(|t| t.map(|i| i + mesh.positions.len() as u32)));
         mesh.positions.extend(bar(300).positions.iter().map(|&p| p * Vec3::new(1.0, 0.9, 0.8)));
         let inner = Arc::new(build(vec![GeometryKind::Mesh(Arc::new(mesh))]));

@@ -96,7 +96,7 @@ fn they_do_so_in_placed_trees_that_single_precision_searches() {
     let mut random = Random(65);
     let zero = DVec3::ZERO;
     // A long one is opened.
-    let mut needle = icosphere(3, zero, 1.0);
+    let mut needle = icosphere(4, zero, 1.0);
     needle.positions.iter_mut().for_each(|p| *p *= Vec3::new(3.0, 0.2, 0.3));
     let meshes = [(icosphere(2, zero, 1.1), 0.8), (soup(&mut random, 120, zero, 1.5), 1.2), (needle, 0.1)];
     let trees = meshes.map(|(mesh, radius)| {
