@@ -119,7 +119,7 @@ pub enum BuildError {
         element: usize,
     },
     /// More primitives than a tree can name (2^29 - 1), or so many small leaves of triangles or of spheres that they fill
-    /// more than 2^26 blocks of eight, or 8 GiB.
+    /// more than 2^26 blocks of eight.
     TooMany,
 }
 
@@ -134,7 +134,7 @@ impl fmt::Display for BuildError {
             }
             Self::TooMany => write!(
                 f,
-                "too many primitives for one tree: at most {}, and {} blocks or 8 GiB of triangles",
+                "too many primitives for one tree: at most {}, in {} blocks of eight triangles or spheres",
                 input::MOST_PRIMITIVES,
                 tag::BLOCK_PLACES
             ),

@@ -75,9 +75,9 @@ impl<'a, 'd, G: Goal, L: Lanes> RaySlot<'a, 'd, L> for F32Slot<'a, 'd, G> {
             let (unclear, passes) = lines.pass(mask, precise);
             return (PassedLanes { mask: mask & !unclear, unclear }, passes);
         }
-        let (first, of_first) = slots[0].ray.lines::<L, false>(blocks[0]);
+        let (first, of_first) = slots[0].ray.lines::<L>(blocks[0]);
         let (first_unclear, of_first) = of_first.pass(first, precise);
-        let (second, of_second) = slots[1].ray.lines::<L, false>(blocks[1]);
+        let (second, of_second) = slots[1].ray.lines::<L>(blocks[1]);
         let (second_unclear, of_second) = of_second.pass(second, precise);
         let unclear = first_unclear | second_unclear << BLOCK;
         let mask = (first | second << BLOCK) & !unclear;

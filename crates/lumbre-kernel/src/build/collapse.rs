@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use crate::build::binary::{Binary, BinaryNode, Fork};
 use crate::build::occlusion_order;
+use crate::build::pack::{self, Filled, LaneOrder};
 use crate::build::primitive::{Bounds, Kind, Primitive, Traits};
 use crate::intersect::Level;
 use crate::tree::BLOCK;
@@ -18,58 +19,35 @@ use crate::tree::node::{Node, Units, WIDTH, tag};
 use crate::tree::packed::{Entry, Packed};
 use crate::tree::sphere_block::SphereBlock;
 use crate::tree::storage::Store;
-use crate::tree::triangle_block::{self, BlockNames, Blocks, Filled, LaneOrder, Vertices};
+use crate::tree::triangle_block::{BlockNames, Blocks};
 use crate::{BuildError, Geometry, GeometryKind, SphereCloud};
 
 impl Packed {
     /// Puts the triangles of a packed tree where its geometries, which stood elsewhere before, have them now. Where there may be none
-    /// without an area, it is not asked. What fails leaves everything as it was.
-    ///
-    /// # Errors
-    /// [`BuildError::TooMany`] when there is more than references can name.
+    /// without an area, it is not asked.
     pub(crate) fn move_triangles(
         &mut self,
         level: Level,
         geometries: &[Geometry],
         before: &[Geometry],
         may_lack_area: bool,
-    ) -> Result<(), BuildError> {
-        let are_same = triangle_block::name_same_vertices(before, geometries);
-        if are_same && self.put_triangles(level, geometries, may_lack_area) {
-            return Ok(());
+    ) {
+        if pack::name_same_vertices(before, geometries)
+            && pack::move_triangles(level, geometries, &self.names, may_lack_area, self.blocks.to_mut())
+        {
+            return;
         }
         let followers = self.blocks().followers(self.names.len());
         let old = std::mem::take(&mut self.blocks);
         let number_of = |leaf| Blocks::new(&old).numbers(leaf).map_or(0, |numbers| numbers.start);
-        let packed = self.pack(level, geometries, &followers, may_lack_area, number_of);
-        if packed.is_err() {
-            self.blocks = old;
-            if are_same {
-                // Some may have moved.
-                self.put_triangles(level, before, true);
-            }
-        }
-        packed
-    }
-
-    /// See [`triangle_block::move_triangles`].
-    fn put_triangles(&mut self, level: Level, geometries: &[Geometry], may_lack_area: bool) -> bool {
-        triangle_block::move_triangles(level, geometries, &self.names, may_lack_area, self.blocks.to_mut())
+        self.pack(level, geometries, &followers, may_lack_area, number_of);
     }
 
     /// Packs the triangles, as the names and the nodes say, whose references number blocks. Without an area they are left out;
     /// where there may be none, it is not asked.
-    ///
-    /// # Errors
-    /// [`BuildError::TooMany`] when there is more than references can name.
-    pub(crate) fn pack_triangles(
-        &mut self,
-        level: Level,
-        geometries: &[Geometry],
-        may_lack_area: bool,
-    ) -> Result<(), BuildError> {
-        let followers = triangle_block::followers_of(&self.nodes, self.root, self.names.len());
-        self.pack(level, geometries, &followers, may_lack_area, |leaf| tag::blocks(leaf).start)
+    pub(crate) fn pack_triangles(&mut self, level: Level, geometries: &[Geometry], may_lack_area: bool) {
+        let followers = pack::followers_of(&self.nodes, self.root, self.names.len());
+        self.pack(level, geometries, &followers, may_lack_area, |leaf| tag::blocks(leaf).start);
     }
 
     /// Packs triangles behind each block of which so many follow, and turns the references in nodes to them. `number_of` tells the
@@ -81,16 +59,15 @@ impl Packed {
         followers: &[u8],
         may_lack_area: bool,
         number_of: impl Fn(u32) -> usize + Sync,
-    ) -> Result<(), BuildError> {
-        // Among other things, rays meet so few triangles that they gain nothing by more room for them.
-        let are_alone = self.entries.is_empty() && self.sphere_blocks.is_empty();
-        let vertices = if are_alone { Vertices::of_fastest(self.names.len()) } else { Vertices::Shared };
+    ) {
+        // In a mixed tree, rays meet too few triangles to gain anything by larger blocks.
+        let is_mixed = !self.entries.is_empty() || !self.sphere_blocks.is_empty();
+        let may_share = is_mixed || pack::is_worth_sharing(self.names.len());
         let Filled { lines, places, orders } =
-            triangle_block::pack(level, vertices, geometries, &self.names, followers, may_lack_area)?;
-        triangle_block::refer(self.nodes.to_mut(), &mut self.root, &places, number_of);
+            pack::pack(level, may_share, geometries, &self.names, followers, may_lack_area);
+        pack::refer(self.nodes.to_mut(), &mut self.root, &places, number_of);
         self.blocks = lines.into();
         self.put_in_order(&orders);
-        Ok(())
     }
 
     /// Moves names to where triangles were packed.
@@ -512,20 +489,17 @@ pub(crate) fn lay_out(
 impl Layout {
     /// Fills the blocks, and sorts the children of nodes by what is in them. Blocks are most of the tree: nothing of its making but names
     /// is to be left by now, and these are given back before.
-    ///
-    /// # Errors
-    /// [`BuildError::TooMany`] when there is more than references can name.
     pub(crate) fn pack(
         self,
         level: Level,
         units: &Units,
         geometries: &[Geometry],
         names: Vec<Name>,
-    ) -> Result<Packed, BuildError> {
+    ) -> Packed {
         let Self { nodes, entries, spans, sphere_spans, root } = self;
         let named = |spans: Vec<Span>| -> Vec<BlockNames> {
             let name = |span: &Span| BlockNames::of(&names[span.first as usize..][..span.count as usize]);
-            spans.par_iter().with_min_len(triangle_block::share_of(spans.len())).map(name).collect()
+            spans.par_iter().with_min_len(pack::share_of(spans.len())).map(name).collect()
         };
         let (block_names, sphere_names) = (named(spans), named(sphere_spans));
         drop(names);
@@ -540,10 +514,10 @@ impl Layout {
             sphere_names: sphere_names.into(),
             root: Some(root),
         };
-        packed.pack_triangles(level, geometries, false)?;
+        packed.pack_triangles(level, geometries, false);
         let Packed { nodes, blocks, .. } = &mut packed;
         occlusion_order::sort_children(level, units, nodes.to_mut(), Blocks::new(blocks));
-        Ok(packed)
+        packed
     }
 }
 

@@ -94,7 +94,7 @@ fn build_here(geometries: Vec<Geometry>, preset: Preset) -> Result<Accel, BuildE
         let layout = lay_out(&traits, &tree, &names, &instances)?;
         drop((tree, instances));
         drop(primitives);
-        layout.pack(level, &units, &geometries, names)?
+        layout.pack(level, &units, &geometries, names)
     };
     let (sizes, bounds, infinite) = (parts.sizes, parts.bounds, parts.infinite);
     Ok(Accel::assemble(

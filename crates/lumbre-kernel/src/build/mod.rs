@@ -12,6 +12,7 @@ mod morton;
 pub(crate) mod occlusion_order;
 pub(crate) mod open_instances;
 mod outline;
+pub(crate) mod pack;
 mod partition;
 pub(crate) mod primitive;
 pub(crate) mod rebuild;

@@ -88,13 +88,11 @@ pub(crate) fn refit(accel: &mut Accel, geometries: Vec<Geometry>) -> Result<f64,
     check_infinite(accel, &parts)?;
     let built_cost = accel.built_cost.unwrap_or_else(|| cost(&accel.tree.nodes));
     let old = std::mem::replace(&mut accel.geometries, geometries);
-    let places = check_places(accel, &parts).and_then(|places| {
-        let (level, geometries) = (accel.level, &accel.geometries);
-        accel.tree.move_triangles(level, geometries, &old, parts.has_flat).map_err(RefitError::Unsound)?;
-        Ok(places)
-    });
-    match places {
-        Ok(places) => fit(accel, parts, places),
+    match check_places(accel, &parts) {
+        Ok(places) => {
+            accel.tree.move_triangles(accel.level, &accel.geometries, &old, parts.has_flat);
+            fit(accel, parts, places);
+        }
         Err(error) => {
             accel.geometries = old;
             return Err(error);

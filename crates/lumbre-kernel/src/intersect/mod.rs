@@ -41,7 +41,7 @@ use crate::simd::{Eight, Row, WIDE, Wide, three_of_two};
 #[cfg(test)]
 use crate::tree::node::Node;
 use crate::tree::node::{Units, WIDTH};
-use crate::tree::triangle_block::{ROOMS, TriangleBlock, far_of_last};
+use crate::tree::triangle_block::{TriangleBlock, shared_row, unshared_row};
 use crate::tree::{BLOCK, Corners};
 
 pub(crate) use asked::{Asked, Question};
@@ -129,15 +129,14 @@ pub(crate) trait Lanes {
     }
 
     /// The corners of the triangles of a block in the ray's sheared space, `[x, y or z][corner]`, all with the sign turned; what lanes
-    /// without a triangle have means nothing. No product is fused with a sum: it is the same on every machine. `IS_ALONE` says that the
-    /// ray waits for it, so that to foresee how the block is made is worth a branch.
-    fn narrow_corners<const IS_ALONE: bool>(block: &TriangleBlock, ray: &F32Ray) -> [[Self::Eight; 3]; 3];
+    /// without a triangle have means nothing. No product is fused with a sum: it is the same on every machine.
+    fn narrow_corners(block: &TriangleBlock, ray: &F32Ray) -> [[Self::Eight; 3]; 3];
 
     /// The same of two blocks, each by its ray: those of the first, and those of the second.
     #[inline(always)]
     fn narrow_corners_by_two(blocks: [&TriangleBlock; 2], rays: [&F32Ray; 2]) -> [[Self::Wide; 3]; 3] {
-        let first = Self::narrow_corners::<false>(blocks[0], rays[0]);
-        let second = Self::narrow_corners::<false>(blocks[1], rays[1]);
+        let first = Self::narrow_corners(blocks[0], rays[0]);
+        let second = Self::narrow_corners(blocks[1], rays[1]);
         corners_of_two(&first, &second)
     }
 
@@ -148,8 +147,8 @@ pub(crate) trait Lanes {
     fn columns(rays: &[Ray; WIDE], columns: &mut [Row<f64>; 8]);
 
     /// A bit for each triangle that the line of the ray may meet, among them all that it does, and what [`Lanes::place_crossings`]
-    /// wants to know: see [`BlockRay`]. `IS_ALONE` as in [`Lanes::narrow_corners`].
-    fn meet_triangles<const IS_ALONE: bool>(block: &TriangleBlock, ray: &BlockRay) -> (u32, Self::Edges);
+    /// wants to know: see [`BlockRay`].
+    fn meet_triangles(block: &TriangleBlock, ray: &BlockRay) -> (u32, Self::Edges);
 
     /// The same of two blocks, each by its ray: those of the first, and those of the second.
     fn meet_triangles_by_two(blocks: [&TriangleBlock; 2], rays: [&BlockRay; 2]) -> (u32, Self::EdgesByTwo);
@@ -275,8 +274,9 @@ impl Sides {
 pub(crate) struct Axes {
     // Each below three; the fourth only fills up.
     order: [u32; 4],
-    // Where the coordinates along each begin in blocks of each room; and, in each of them, `far_of_last`.
-    rows_by_room: [[u32; 4]; ROOMS.len()],
+    // The words where their rows begin in a block that shares its vertices, and in one that does not.
+    shared_rows: [u32; 3],
+    unshared_rows: [u32; 3],
     // The halves of each.
     halves: [u32; 8],
 }
@@ -290,15 +290,9 @@ impl Axes {
             halves[half] = 2 * order[half / 2] + half as u32 % 2;
             half += 1;
         }
-        let mut rows_by_room = [[0; 4]; ROOMS.len()];
-        let mut i = 0;
-        while i < ROOMS.len() {
-            let room = ROOMS[i] as u32;
-            let far = far_of_last(ROOMS[i]) as u32;
-            rows_by_room[i] = [order[0] * room, order[1] * room, order[2] * room, far];
-            i += 1;
-        }
-        Self { order, halves, rows_by_room }
+        let shared_rows = [shared_row(x) as u32, shared_row(y) as u32, shared_row(z) as u32];
+        let unshared_rows = [unshared_row(x) as u32, unshared_row(y) as u32, unshared_row(z) as u32];
+        Self { order, shared_rows, unshared_rows, halves }
     }
 }
 
@@ -373,21 +367,21 @@ impl Axes {
         [at(self.order[0]), at(self.order[1]), at(self.order[2])]
     }
 
-    /// Where the coordinates of a block's vertices along each begin: no further than at twice 31, of 96.
+    /// The words where their rows begin in a block: each has all vertices that [`TriangleBlock::vertices_at`] names.
     #[inline(always)]
     fn rows(&self, block: &TriangleBlock) -> [usize; 3] {
-        let (room, order) = (block.room(), &self.order);
-        [order[0] as usize * room, order[1] as usize * room, order[2] as usize * room]
+        let [x, y, z] = if block.is_unshared() { self.unshared_rows } else { self.shared_rows };
+        [x as usize, y as usize, z as usize]
     }
 
     /// The corners in one lane of a block, each in this order.
     #[inline(always)]
     pub(crate) fn gather(&self, block: &TriangleBlock, lane: usize) -> [[f32; 3]; 3] {
-        let coordinates = block.coordinates();
+        let words = block.words();
         let [x, y, z] = self.rows(block);
         block.vertices_at(lane).map(|vertex| {
-            // SAFETY: see `rows`; a vertex is below 32.
-            let at = |row: usize| unsafe { *coordinates.get_unchecked(row + vertex) };
+            // SAFETY: see `rows`.
+            let at = |row: usize| unsafe { *words.get_unchecked(row + vertex) };
             [at(x), at(y), at(z)]
         })
     }
@@ -779,7 +773,7 @@ pub(crate) fn meet_triangles_at(
         type Output = (u32, u32, [[f32; 2]; BLOCK]);
         #[inline(always)]
         fn run<L: Lanes>(self) -> Self::Output {
-            let (mask, edges) = L::meet_triangles::<true>(self.0, self.1);
+            let (mask, edges) = L::meet_triangles(self.0, self.1);
             let crossings = L::place_crossings(&edges, self.1);
             let between = std::array::from_fn(|lane| <[f32; 2]>::from(crossings.between(lane)));
             (mask & crossings.in_range, mask & crossings.sure, between)
@@ -851,8 +845,8 @@ pub(crate) fn told_at(
             };
             let alone = |which: usize| {
                 let (block, ray) = (blocks[which], rays[which]);
-                let corners = L::narrow_corners::<false>(block, narrow[which]);
-                Told::of::<L>((block, ray), L::meet_triangles::<false>(block, ray), corners)
+                let corners = L::narrow_corners(block, narrow[which]);
+                Told::of::<L>((block, ray), L::meet_triangles(block, ray), corners)
             };
             [[together(0), together(1)], [alone(0), alone(1)]]
         }

@@ -18,7 +18,7 @@ use crate::simd::{Eight, Row, Vector, WIDE};
 use crate::tree::BLOCK;
 use crate::tree::Corners;
 use crate::tree::node::Units;
-use crate::tree::triangle_block::TriangleBlock;
+use crate::tree::triangle_block::{TriangleBlock, shared_row};
 
 pub(crate) struct Portable;
 
@@ -166,7 +166,7 @@ impl Lanes for Portable {
     }
 
     #[inline]
-    fn narrow_corners<const IS_ALONE: bool>(block: &TriangleBlock, ray: &F32Ray) -> [[Self::Eight; 3]; 3] {
+    fn narrow_corners(block: &TriangleBlock, ray: &F32Ray) -> [[Self::Eight; 3]; 3] {
         let splat = Self::Eight::splat;
         let [kx, ky, kz] = ray.axes.order();
         let mut room = CornersRoom::new();
@@ -207,7 +207,7 @@ impl Lanes for Portable {
     }
 
     #[inline]
-    fn meet_triangles<const IS_ALONE: bool>(block: &TriangleBlock, ray: &BlockRay) -> (u32, Edges) {
+    fn meet_triangles(block: &TriangleBlock, ray: &BlockRay) -> (u32, Edges) {
         let mut x = [[0.0; BLOCK]; 3];
         let mut y = [[0.0; BLOCK]; 3];
         let mut z = [[0.0; BLOCK]; 3];
@@ -262,11 +262,12 @@ impl Lanes for Portable {
             return block.own_corners();
         }
         let CornersRoom(corners) = room;
-        let rows = block.coordinates();
-        for (axis, corners) in corners.iter_mut().enumerate() {
-            for (corner, lanes) in corners.iter_mut().enumerate() {
-                *lanes =
-                    std::array::from_fn(|lane| rows[axis * block.room() + block.vertex_at(corner, lane)]);
+        for lane in 0..BLOCK {
+            let vertices = block.vertices_at(lane);
+            for (axis, corners) in corners.iter_mut().enumerate() {
+                for (lanes, vertex) in corners.iter_mut().zip(vertices) {
+                    lanes[lane] = block.words()[shared_row(axis) + vertex];
+                }
             }
         }
         corners
@@ -274,8 +275,8 @@ impl Lanes for Portable {
 
     #[inline]
     fn meet_triangles_by_two(blocks: [&TriangleBlock; 2], rays: [&BlockRay; 2]) -> (u32, [Edges; 2]) {
-        let (first, of_first) = Self::meet_triangles::<false>(blocks[0], rays[0]);
-        let (second, of_second) = Self::meet_triangles::<false>(blocks[1], rays[1]);
+        let (first, of_first) = Self::meet_triangles(blocks[0], rays[0]);
+        let (second, of_second) = Self::meet_triangles(blocks[1], rays[1]);
         (first | second << BLOCK, [of_first, of_second])
     }
 

@@ -19,7 +19,7 @@ use crate::simd::{self, LastEight, Row, Vector, WIDE, Wide, vector};
 use crate::tree::BLOCK;
 use crate::tree::Corners;
 use crate::tree::node::{LARGEST_NEAR, SMALLEST_NEAR, TINY_NEAR, Units};
-use crate::tree::triangle_block::{FIRST_UNSHARED, MOST_SHARED, QUAD, TriangleBlock, USUAL, far_of_last};
+use crate::tree::triangle_block::{SHARED_NUMBERS, TriangleBlock, shared_row};
 use crate::{Accel, Ray32};
 
 /// Tasks at a level: see [`Home`](super::Home).
@@ -146,30 +146,29 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
     /// The corners of the triangle in a lane, `[axis][corner]` by the order of the axes; the last of four means nothing.
     #[inline(always)]
     fn corners_in(block: &TriangleBlock, lane: usize, axes: &Axes) -> [__m128; 3] {
-        let coordinates = block.coordinates().as_ptr();
+        let words = block.words().as_ptr();
         let [x, y, z] = axes.rows(block);
-        // SAFETY: see `X86`. A row begins at 62 at most, and no more of it than 32 are looked at: in an array of 96. The load is of
-        // four u32.
+        // SAFETY: see `X86` and `Axes::rows`. The load is of four u32.
         unsafe {
             if AVX512 && !block.is_unshared() {
                 let corners = _mm_loadu_si128(block.corners_and_more().as_ptr().cast());
                 let vertices = _mm_srl_epi32(corners, _mm_cvtsi32_si128(4 * (lane % BLOCK) as i32));
                 return [
-                    Self::three_of(coordinates.add(x), vertices),
-                    Self::three_of(coordinates.add(y), vertices),
-                    Self::three_of(coordinates.add(z), vertices),
+                    Self::three_of(words.add(x), vertices),
+                    Self::three_of(words.add(y), vertices),
+                    Self::three_of(words.add(z), vertices),
                 ];
             }
             let vertices = block.vertices_at(lane);
             [
-                Self::component(coordinates.add(x), vertices),
-                Self::component(coordinates.add(y), vertices),
-                Self::component(coordinates.add(z), vertices),
+                Self::component(words.add(x), vertices),
+                Self::component(words.add(y), vertices),
+                Self::component(words.add(z), vertices),
             ]
         }
     }
 
-    /// Eight numbers of sixteen, each by its place in the same half of `near`, or of `far` from eight on: see [`far_of_last`].
+    /// Eight numbers of sixteen, each by its place in the same half of `near`, or of `far` from eight on: see [`crate::blocks`].
     #[inline(always)]
     fn of_two(near: __m256, far: __m256, places: __m256i) -> __m256 {
         // SAFETY: see `X86`.
@@ -178,16 +177,6 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
             let (near, far) = (_mm256_permutevar_ps(near, places), _mm256_permutevar_ps(far, places));
             _mm256_blendv_ps(near, far, is_far)
         }
-    }
-
-    /// The numbers of a row that are far off: four for the first half, and four for the other, which begin at `far_of_last`.
-    ///
-    /// # Safety
-    /// There are as many.
-    #[inline(always)]
-    unsafe fn far(row: *const f32, far_of_last: usize) -> __m256 {
-        // SAFETY: see `X86`, and above.
-        unsafe { _mm256_loadu2_m128(row.add(far_of_last), row.add(2 * QUAD)) }
     }
 
     /// The places of eight vertices, of four bits each: of more bits, what is above means nothing.
@@ -203,35 +192,18 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
     /// The corners of the triangles of a block in the ray's sheared space, `[x, y or z][corner]`, all with the sign turned, which
     /// their products do not have: so one operand can come from memory. What lanes without a triangle have means nothing.
     #[inline(always)]
-    fn sheared_corners<S: Shears, const IS_ALONE: bool>(block: &TriangleBlock, ray: &S) -> [[__m256; 3]; 3] {
-        // Alone, a ray does not wait for a block to say where its rows are, as long as that is foreseen: hence the branches, which the
-        // compiler must not take out. Among others it may wait.
-        let room = block.room();
-        let rows_by_room = &ray.axes().rows_by_room;
-        let by_room = Self::rows_of(block, ray);
-        let rows = if !IS_ALONE {
-            &by_room
-        } else if room > MOST_SHARED {
-            simd::opaque(&rows_by_room[3])
-        } else if room == USUAL[0] {
-            simd::opaque(&rows_by_room[0])
-        } else if room == USUAL[1] {
-            simd::opaque(&rows_by_room[1])
-        } else if room <= MOST_SHARED {
-            simd::opaque(&rows_by_room[2])
-        } else {
-            simd::opaque(&rows_by_room[3])
-        };
-        if room > MOST_SHARED {
-            let a = Self::sheared_eight::<_, false>(block, ray, rows, FIRST_UNSHARED);
-            let b = Self::sheared_eight::<_, false>(block, ray, rows, FIRST_UNSHARED + BLOCK);
-            let c = Self::sheared_eight::<_, false>(block, ray, rows, FIRST_UNSHARED + 2 * BLOCK);
+    fn sheared_corners<S: Shears>(block: &TriangleBlock, ray: &S) -> [[__m256; 3]; 3] {
+        let axes = ray.axes();
+        if block.is_unshared() {
+            let a = Self::sheared_eight(block, ray, &axes.unshared_rows, 0);
+            let b = Self::sheared_eight(block, ray, &axes.unshared_rows, BLOCK);
+            let c = Self::sheared_eight(block, ray, &axes.unshared_rows, 2 * BLOCK);
             return [[a[0], b[0], c[0]], [a[1], b[1], c[1]], [a[2], b[2], c[2]]];
         }
         // SAFETY: see `X86`.
         let mut corners = [[unsafe { _mm256_setzero_ps() }; 3]; 3];
         if AVX512 {
-            let vertices = Self::sheared_sixteen(block, simd::opaque(ray), *rows);
+            let vertices = Self::sheared_sixteen(block, simd::opaque(ray));
             for (corner, &places) in block.corners().iter().enumerate() {
                 let places = Self::places(places);
                 for axis in 0..3 {
@@ -239,8 +211,8 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
                 }
             }
         } else {
-            let near = Self::sheared_eight::<_, false>(block, ray, rows, 0);
-            let far = Self::sheared_eight::<_, true>(block, ray, rows, 0);
+            let near = Self::sheared_eight(block, ray, &axes.shared_rows, 0);
+            let far = Self::sheared_eight(block, ray, &axes.shared_rows, BLOCK);
             for (corner, &places) in block.corners().iter().enumerate() {
                 let places = Self::places(places);
                 for axis in 0..3 {
@@ -249,14 +221,6 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
             }
         }
         corners
-    }
-
-    /// Where the rows of a block begin, in the order of the ray's axes, and `far_of_last` in each of them.
-    #[inline(always)]
-    fn rows_of<S: Shears>(block: &TriangleBlock, ray: &S) -> [u32; 4] {
-        let (room, order) = (block.room(), &ray.axes().order);
-        let far = far_of_last(room) as u32;
-        [order[0] * room as u32, order[1] * room as u32, order[2] * room as u32, far]
     }
 
     /// The corners as numbers.
@@ -273,26 +237,23 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
     where
         W: Wide<Half = vector::Eight256<AVX512>>,
     {
-        let first = Self::eights(Self::sheared_corners::<_, false>(blocks[0], rays[0]));
-        let second = Self::eights(Self::sheared_corners::<_, false>(blocks[1], rays[1]));
+        let first = Self::eights(Self::sheared_corners(blocks[0], rays[0]));
+        let second = Self::eights(Self::sheared_corners(blocks[1], rays[1]));
         super::corners_of_two(&first, &second)
     }
 
-    /// Eight vertices from the `first` of these rows on, or those that `IS_FAR`: see [`X86::far`].
+    /// Eight vertices of these rows from the `first` on.
     #[inline(always)]
-    fn sheared_eight<S: Shears, const IS_FAR: bool>(
+    fn sheared_eight<S: Shears>(
         block: &TriangleBlock,
         ray: &S,
-        &[kx, ky, kz, far]: &[u32; 4],
+        &[kx, ky, kz]: &[u32; 3],
         first: usize,
     ) -> [__m256; 3] {
-        let rows = block.coordinates();
-        // SAFETY: see `X86`. Rows begin at 62 at most, and no more of them than 27 are looked at, in an array of 96.
+        let words = block.words().as_ptr();
+        // SAFETY: see `X86`. Of rows of a block that shares its vertices the first sixteen are read, of others the first twenty-four.
         unsafe {
-            let load = |row: u32| {
-                let row = rows.as_ptr().add(row as usize);
-                if IS_FAR { Self::far(row, far as usize) } else { _mm256_loadu_ps(row.add(first)) }
-            };
+            let load = |row: u32| _mm256_loadu_ps(words.add(row as usize + first));
             let (origin, shear) = (ray.origin(), ray.shear());
             let (shear_x, shear_y) = (_mm256_set1_ps(shear[0]), _mm256_set1_ps(shear[1]));
             let z = _mm256_sub_ps(_mm256_set1_ps(origin[2]), load(kz));
@@ -312,13 +273,14 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
         }
     }
 
-    /// Sixteen vertices. For AVX-512 alone.
+    /// The vertices that a block shares. For AVX-512 alone.
     #[inline(always)]
-    fn sheared_sixteen<S: Shears>(block: &TriangleBlock, ray: &S, [kx, ky, kz, _]: [u32; 4]) -> [__m512; 3] {
-        let rows = block.coordinates();
+    fn sheared_sixteen<S: Shears>(block: &TriangleBlock, ray: &S) -> [__m512; 3] {
+        let words = block.words().as_ptr();
+        let [kx, ky, kz] = ray.axes().shared_rows;
         // SAFETY: as there.
         unsafe {
-            let load = |at: u32| _mm512_loadu_ps(rows.as_ptr().add(at as usize));
+            let load = |row: u32| _mm512_loadu_ps(words.add(row as usize));
             let (origin, shear) = (ray.origin(), ray.shear());
             let (shear_x, shear_y) = (_mm512_set1_ps(shear[0]), _mm512_set1_ps(shear[1]));
             let z = _mm512_sub_ps(_mm512_set1_ps(origin[2]), load(kz));
@@ -911,16 +873,16 @@ impl<const LEAKS: bool> X86<true, LEAKS> {
     #[inline(always)]
     fn shared_by_two<S: Shears>(blocks: [&TriangleBlock; 2], rays: [&S; 2]) -> [[vector::Avx512; 3]; 3] {
         let [first, second] = blocks;
-        let a = Self::sheared_sixteen(first, simd::opaque(rays[0]), Self::rows_of(first, rays[0]));
-        let b = Self::sheared_sixteen(second, simd::opaque(rays[1]), Self::rows_of(second, rays[1]));
+        let a = Self::sheared_sixteen(first, simd::opaque(rays[0]));
+        let b = Self::sheared_sixteen(second, simd::opaque(rays[1]));
         let last = LastEight::new().mask();
         let mut corners = [[vector::Avx512::zeroed(); 3]; 3];
         // SAFETY: see `X86`.
         unsafe {
             let shifts = _mm512_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28, 0, 4, 8, 12, 16, 20, 24, 28);
-            let places = _mm512_set1_epi32(MOST_SHARED as i32 - 1);
+            let places = _mm512_set1_epi32(SHARED_NUMBERS as i32 - 1);
             // Of thirty-two numbers, the last sixteen.
-            let of_second = _mm512_maskz_set1_epi32(0xff00, MOST_SHARED as i32);
+            let of_second = _mm512_maskz_set1_epi32(0xff00, SHARED_NUMBERS as i32);
             const OR_AND: i32 = 0b1111_1000;
             for (corner, (&of_a, &of_b)) in first.corners().iter().zip(second.corners()).enumerate() {
                 let both = _mm512_mask_set1_epi32(_mm512_set1_epi32(of_a as i32), last, of_b as i32);
@@ -948,15 +910,15 @@ impl<const LEAKS: bool> X86<true, LEAKS> {
         let origin = [splat(ax, bx, last), splat(ay, by, last), splat(az, bz, last)];
         let rest = [splat(rests[0][0], rests[1][0], last), splat(rests[0][1], rests[1][1], last)];
         let shear = [splat(a.shear()[0], b.shear()[0], last), splat(a.shear()[1], b.shear()[1], last)];
-        let [rows_a, rows_b] = [Self::rows_of(blocks[0], a), Self::rows_of(blocks[1], b)];
-        let [first, second] = [blocks[0].coordinates().as_ptr(), blocks[1].coordinates().as_ptr()];
+        let (rows_a, rows_b) = (&a.axes().unshared_rows, &b.axes().unshared_rows);
+        let [first, second] = [blocks[0].words().as_ptr(), blocks[1].words().as_ptr()];
         let mut corners = [[vector::Avx512::zeroed(); 3]; 3];
         for (corner, sheared) in corners.iter_mut().enumerate() {
             let mut arms = [vector::Avx512::zeroed(); 3];
             for (axis, arm) in arms.iter_mut().enumerate() {
                 let (of_a, of_b) = (rows_a[axis] as usize, rows_b[axis] as usize);
-                let own = FIRST_UNSHARED + BLOCK * corner;
-                // SAFETY: see `X86`. Rows begin at 62 at most, and no more of them than 27 are looked at, in arrays of 96.
+                let own = BLOCK * corner;
+                // SAFETY: see `X86`. The first twenty-four of such rows are read.
                 let vertices = unsafe {
                     let low = _mm256_loadu_ps(first.add(of_a + own));
                     let high = _mm256_loadu_ps(second.add(of_b + own));
@@ -1282,11 +1244,8 @@ where
     }
 
     #[inline(always)]
-    fn narrow_corners<const IS_ALONE: bool>(
-        block: &TriangleBlock,
-        ray: &F32Ray,
-    ) -> [[vector::Eight256<AVX512>; 3]; 3] {
-        Self::eights(Self::sheared_corners::<_, IS_ALONE>(block, ray))
+    fn narrow_corners(block: &TriangleBlock, ray: &F32Ray) -> [[vector::Eight256<AVX512>; 3]; 3] {
+        Self::eights(Self::sheared_corners(block, ray))
     }
 
     #[inline(always)]
@@ -1431,8 +1390,8 @@ where
     }
 
     #[inline(always)]
-    fn meet_triangles<const IS_ALONE: bool>(block: &TriangleBlock, ray: &BlockRay) -> (u32, Self::Edges) {
-        let corners = Self::eights(Self::sheared_corners::<_, IS_ALONE>(block, ray));
+    fn meet_triangles(block: &TriangleBlock, ray: &BlockRay) -> (u32, Self::Edges) {
+        let corners = Self::eights(Self::sheared_corners(block, ray));
         let (mask, edges) = Edges::of::<LEAKS>(corners, Self::Eight::splat(ray.least_size));
         (mask & block.taken(), edges)
     }
@@ -1440,8 +1399,8 @@ where
     #[inline(always)]
     fn meet_triangles_by_two(blocks: [&TriangleBlock; 2], rays: [&BlockRay; 2]) -> (u32, Self::EdgesByTwo) {
         if !AVX512 {
-            let (first, of_first) = Self::meet_triangles::<false>(blocks[0], rays[0]);
-            let (second, of_second) = Self::meet_triangles::<false>(blocks[1], rays[1]);
+            let (first, of_first) = Self::meet_triangles(blocks[0], rays[0]);
+            let (second, of_second) = Self::meet_triangles(blocks[1], rays[1]);
             return (first | second << BLOCK, Edges::of_two(&of_first, &of_second));
         }
         let least_size = Self::Wide::splat_two(rays[0].least_size, rays[1].least_size, LastEight::new());
@@ -1506,21 +1465,19 @@ where
             return block.own_corners();
         }
         let CornersRoom(corners) = room;
-        let coordinates = block.coordinates().as_ptr();
-        let room = block.room();
-        let far = far_of_last(room);
-        // No `map`: it does not take on the instruction set of who calls it.
+        let words = block.words().as_ptr();
+        // No `map`: it does not take on the instruction set of its caller.
         let [a, b, c] = *block.corners();
         let places = [Self::places(a), Self::places(b), Self::places(c)];
-        // SAFETY: see `X86`. A row begins at 62 at most, in an array of 96: behind that are 32 more, and no more are looked at.
+        // SAFETY: see `X86`. The first sixteen of a row are read.
         unsafe {
             for (axis, corners) in corners.iter_mut().enumerate() {
-                let row = coordinates.add(axis * room);
+                let row = words.add(shared_row(axis));
                 for (corner, &places) in corners.iter_mut().zip(&places) {
                     let found = if AVX512 {
                         Self::of_sixteen(_mm512_loadu_ps(row), places)
                     } else {
-                        Self::of_two(_mm256_loadu_ps(row), Self::far(row, far), places)
+                        Self::of_two(_mm256_loadu_ps(row), _mm256_loadu_ps(row.add(BLOCK)), places)
                     };
                     _mm256_storeu_ps(corner.as_mut_ptr(), found);
                 }

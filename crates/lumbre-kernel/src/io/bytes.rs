@@ -268,7 +268,7 @@ pub(crate) fn from_bytes(bytes: &[u8], geometries: Vec<Geometry>) -> Result<Acce
     let parts = take_apart(&geometries).map_err(unsound)?;
     check_structure(&tree, &geometries, |leaf| Some(tag::blocks(leaf)))?;
     check_names(&tree, &geometries)?;
-    tree.pack_triangles(Level::best(), &geometries, parts.has_flat).map_err(unsound)?;
+    tree.pack_triangles(Level::best(), &geometries, parts.has_flat);
     tree.sphere_blocks = vec![SphereBlock::EMPTY; tree.sphere_names.len()].into();
 
     let mut accel = empty_over(geometries);

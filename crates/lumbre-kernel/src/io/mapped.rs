@@ -40,7 +40,7 @@ use crate::{Accel, Geometry, GeometryKind, LoadError, RefitError};
 
 const MAGIC: [u8; 8] = *b"LumbMap\0";
 /// Changes with the format, and with the layout of what is in it.
-const VERSION: u32 = 8;
+const VERSION: u32 = 9;
 const BYTE_ORDER: u32 = 0x0102_0304;
 const NONE: u32 = u32::MAX;
 const HEADER: usize = 256;

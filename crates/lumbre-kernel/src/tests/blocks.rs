@@ -11,11 +11,12 @@ use lumbre_geometry::{PlacedShape, Ray, Sphere};
 use lumbre_math::{DVec3, Transform, Vec3};
 
 use super::scenes::{Random, soup};
+use crate::build::pack;
 use crate::intersect::f32_ray::F32Ray;
 use crate::intersect::watertight::{BlockRay, Meeting, Shear, intersect};
 use crate::intersect::{Level, corners_at, equals_before_at, meet_triangles_at, told_at, truncated_at};
 use crate::tree::BLOCK;
-use crate::tree::triangle_block::{self, BlockNames, Blocks, Line, TriangleBlock, Vertices};
+use crate::tree::triangle_block::{BlockNames, Blocks, Line, TriangleBlock};
 use crate::{Accel, BuildOptions, Geometry, GeometryKind, Preset, TriangleMesh};
 
 struct Tally {
@@ -45,9 +46,7 @@ fn block(random: &mut Random, shares: f64, center: DVec3, spread: f64, size: f64
     }
     let names: Vec<_> = (0..mesh.indices.len() as u32).map(|triangle| [0, triangle]).collect();
     let geometry = Geometry { id: 0, kind: GeometryKind::Mesh(Arc::new(mesh)) };
-    triangle_block::pack(Level::best(), Vertices::Shared, &[geometry], &[BlockNames::of(&names)], &[0], true)
-        .unwrap()
-        .lines
+    pack::pack(Level::best(), true, &[geometry], &[BlockNames::of(&names)], &[0], true).lines
 }
 
 /// One ray at one block at every level.
@@ -215,10 +214,8 @@ fn a_ray_that_leaves_a_wall_is_seen_to_leave_it() {
         let wall = TriangleMesh { origin: DVec3::ZERO, positions, indices: vec![[0, 1, 2], [0, 2, 3]] };
         let geometry = Geometry { id: 0, kind: GeometryKind::Mesh(Arc::new(wall)) };
         let names = [BlockNames::of(&[[0, 0], [0, 1]])];
-        let units = triangle_block::pack(Level::best(), Vertices::Shared, &[geometry], &names, &[0], true)
-            .unwrap()
-            .lines;
-        let block = Blocks::new(&units).at(0).unwrap();
+        let lines = pack::pack(Level::best(), true, &[geometry], &names, &[0], true).lines;
+        let block = Blocks::new(&lines).at(0).unwrap();
         for _ in 0..50 {
             let at = center + random.between(-1.0, 1.0) * right + random.between(-1.0, 1.0) * up;
             // By the cosine: a ball that touches the wall.
@@ -302,7 +299,7 @@ fn numbers_lose_what_stands_behind_the_point_at_every_level() {
 #[test]
 fn a_block_has_the_corners_of_its_triangles_however_many_they_share() {
     let mut random = Random(81);
-    let mut rooms = BTreeSet::new();
+    let mut kinds = BTreeSet::new();
     for own in [0.0, 0.15, 0.4, 1.0] {
         let geometry = grid(&mut random, own);
         let GeometryKind::Mesh(mesh) = geometry.kind.clone() else { unreachable!() };
@@ -314,7 +311,7 @@ fn a_block_has_the_corners_of_its_triangles_however_many_they_share() {
             let block = blocks.at(place).unwrap();
             assert_eq!(block.number() as usize, number);
             assert_eq!(block.taken().count_ones() as usize, names.primitives().count());
-            rooms.insert(block.room());
+            kinds.insert(block.is_unshared());
             for (lane, primitive) in names.primitives().enumerate() {
                 let corners = mesh.indices[primitive as usize].map(|v| mesh.positions[v as usize].to_array());
                 assert_eq!(block.triangle(lane), corners);
@@ -326,11 +323,11 @@ fn a_block_has_the_corners_of_its_triangles_however_many_they_share() {
             }
         }
     }
-    assert_eq!(rooms.into_iter().collect::<Vec<_>>(), [10, 12, 16, 24]);
+    assert_eq!(kinds.into_iter().collect::<Vec<_>>(), [false, true]);
 }
 
 #[test]
-fn triangles_stand_so_that_either_half_finds_its_vertices_in_little_room() {
+fn triangles_are_put_in_an_order_in_which_they_share_their_vertices() {
     // A strip of eight, in any order, has ten vertices: six of either half, two of which are those of both.
     let mut random = Random(87);
     let positions = (0..10).map(|i| Vec3::new(i as f32, (i % 2) as f32, 0.0)).collect();
@@ -345,11 +342,9 @@ fn triangles_stand_so_that_either_half_finds_its_vertices_in_little_room() {
             let names: Vec<_> = triangles.iter().map(|&triangle| [0, triangle]).collect();
             let names = [BlockNames::of(&names)];
             let geometries = [Geometry { id: 0, kind: GeometryKind::Mesh(Arc::clone(&mesh)) }];
-            let filled =
-                triangle_block::pack(Level::best(), Vertices::Shared, &geometries, &names, &[0], true)
-                    .unwrap();
+            let filled = pack::pack(Level::best(), true, &geometries, &names, &[0], true);
             let block = Blocks::new(&filled.lines).at(0).unwrap();
-            assert_eq!(block.room(), 10, "{triangles:?}");
+            assert!(!block.is_unshared(), "{triangles:?}");
             let mut names = names;
             filled.orders[0].put(&mut names[0]);
             assert!(Blocks::new(&filled.lines).places(&names).is_some());
@@ -361,9 +356,7 @@ fn triangles_stand_so_that_either_half_finds_its_vertices_in_little_room() {
                 assert_eq!(block.triangle(lane), corners);
             }
             // What stands in that order stays in it.
-            let again =
-                triangle_block::pack(Level::best(), Vertices::Shared, &geometries, &names, &[0], true)
-                    .unwrap();
+            let again = pack::pack(Level::best(), true, &geometries, &names, &[0], true);
             assert_eq!(again.lines, filled.lines);
         }
     }
@@ -478,7 +471,7 @@ fn triangles_that_come_apart_are_packed_again() {
         let mut units = first.clone();
         let mut put = |geometry: &Geometry| {
             let geometries = std::slice::from_ref(geometry);
-            triangle_block::move_triangles(accel.level, geometries, &accel.tree.names, true, &mut units)
+            pack::move_triangles(accel.level, geometries, &accel.tree.names, true, &mut units)
         };
         assert!(!put(&apart));
         assert!(put(&together));
@@ -504,19 +497,21 @@ fn blocks_that_are_not_such_as_are_packed_are_told() {
     assert!(is_sound(&bytes));
     assert!(!is_sound(&bytes[..bytes.len() - 64]));
     assert!(!is_sound(&[&bytes[..], &[0; 64]].concat()));
-    // Of heads: the number, the room, how many follow, a vertex of the other half of lanes, and corners beyond the room.
+    // In heads: the number, the layout, how many follow, and vertices of the other half of lanes, before the row and behind it.
     for place in places {
-        let at = 16 * place as usize;
-        if bytes[at + 5] > 12 {
+        let at = 64 * place as usize;
+        if accel.tree.blocks().block(place).is_unshared() {
             continue;
         }
         for (byte, value) in [
             (0, bytes[at] ^ 1),
-            (5, bytes[at + 5] + 1),
-            (5, 31),
+            (5, 1),
+            (5, 2),
             (6, 255),
             (8, bytes[at + 8] & 0xf0 | 4),
-            (9, bytes[at + 9] | 15),
+            (8, bytes[at + 8] & 0xf0),
+            (11, bytes[at + 11] & 0xf0 | 8),
+            (11, bytes[at + 11] | 15),
         ] {
             let mut other = bytes.clone();
             other[at + byte] = value;
@@ -535,11 +530,11 @@ fn refitted_triangles_may_share_other_vertices() {
         let fresh = Accel::build(vec![then.clone()], &BuildOptions::default()).unwrap();
         accel.refit(vec![then.clone()]).unwrap();
         assert!(accel.tree.blocks().places(&accel.tree.names).is_some());
-        let rooms = |accel: &Accel| {
+        let unshared = |accel: &Accel| {
             let places = accel.tree.blocks().places(&accel.tree.names).unwrap();
-            places.iter().map(|&place| accel.tree.blocks().block(place).room()).max()
+            places.iter().filter(|&&place| accel.tree.blocks().block(place).is_unshared()).count()
         };
-        assert_eq!(rooms(&accel), rooms(&fresh));
+        assert_eq!(unshared(&accel) > 0, unshared(&fresh) > 0);
         for _ in 0..500 {
             let target = DVec3::new(random.between(0.0, 24.0), random.between(0.0, 24.0), 2.0);
             let ray = Ray::new(target + 30.0 * DVec3::Z, random.vector() - 2.0 * DVec3::Z);

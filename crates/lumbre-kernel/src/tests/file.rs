@@ -109,8 +109,8 @@ fn what_is_wrong_with_a_file_is_said() {
     longer.extend([0; 64]);
     assert!(matches!(with(&longer), LoadError::WrongLength { .. }));
     let mut later = bytes.clone();
-    later[8] = 9;
-    assert_eq!(with(&later), LoadError::OtherVersion { found: 9, expected: 8 });
+    later[8] = 10;
+    assert_eq!(with(&later), LoadError::OtherVersion { found: 10, expected: 9 });
     for place in (12..bytes.len()).step_by(61) {
         let mut damaged = bytes.clone();
         damaged[place] ^= 0x10;

@@ -409,7 +409,7 @@ impl<'a, L: Lanes> Frame<'a, L> {
             following = block.next(place);
             let mut mask = match &blocks {
                 Some(ray) => {
-                    let (mask, edges) = L::meet_triangles::<true>(block, ray);
+                    let (mask, edges) = L::meet_triangles(block, ray);
                     if mask == 0 {
                         continue;
                     }

@@ -280,13 +280,10 @@ impl F32Ray {
         self.shear[3] = t_max;
     }
 
-    /// How the line of the ray passes the triangles of a block, and a bit for each that it may pass through. `IS_ALONE` as in [`Lanes::narrow_corners`].
+    /// How the line of the ray passes the triangles of a block, and a bit for each that it may pass through.
     #[inline(always)]
-    pub(crate) fn lines<L: Lanes, const IS_ALONE: bool>(
-        &self,
-        block: &TriangleBlock,
-    ) -> (u32, Lines<L::Eight>) {
-        let (mask, lines) = Lines::of(L::narrow_corners::<IS_ALONE>(block, simd::opaque(self)));
+    pub(crate) fn lines<L: Lanes>(&self, block: &TriangleBlock) -> (u32, Lines<L::Eight>) {
+        let (mask, lines) = Lines::of(L::narrow_corners(block, simd::opaque(self)));
         (mask & block.taken(), lines)
     }
 
@@ -312,7 +309,7 @@ impl F32Ray {
     /// Which triangles of a block the ray meets; `None` where its line passes through none.
     #[inline(always)]
     fn pass<L: Lanes>(&self, precise: &Precise, block: &TriangleBlock) -> Option<Passed<L::Eight>> {
-        let (mask, lines) = self.lines::<L, true>(block);
+        let (mask, lines) = self.lines::<L>(block);
         if mask == 0 {
             return None;
         }

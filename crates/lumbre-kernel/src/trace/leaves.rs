@@ -88,7 +88,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
         let mut place = leaf & tag::PLACE;
         loop {
             let block = self.decider.block(place);
-            let (mask, edges) = L::meet_triangles::<true>(block, simd::opaque(&self.blocks));
+            let (mask, edges) = L::meet_triangles(block, simd::opaque(&self.blocks));
             if mask != 0 {
                 let crossings = L::place_crossings(&edges, &self.blocks);
                 let stop = if G::IS_ANY {

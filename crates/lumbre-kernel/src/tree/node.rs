@@ -103,6 +103,13 @@ pub(crate) mod tag {
     }
 }
 
+/// Ends a search whose reference is not of its tree. The reference is not told: it would have to be kept for every step.
+#[cold]
+#[inline(never)]
+pub(crate) fn out_of_tree() -> ! {
+    panic!("a reference leads out of its tree")
+}
+
 /// Children of a node.
 pub(crate) const WIDTH: usize = 16;
 
@@ -220,11 +227,4 @@ pub(crate) fn slop(condition: f64, reach: f64) -> f64 {
 #[inline(always)]
 pub(crate) fn round_up(x: f64) -> f32 {
     (x as f32).next_up()
-}
-
-/// The panic for a reference that no tree has. The place is not told: it would have to be kept at hand for every step.
-#[cold]
-#[inline(never)]
-pub(crate) fn out_of_tree() -> ! {
-    panic!("a reference leads out of its tree")
 }
