@@ -55,16 +55,4 @@ impl Level {
             Set::Avx512 => Q::ask_avx512,
         })
     }
-
-    /// The same as it may leak; `None` without AVX2.
-    #[cfg(feature = "measure")]
-    pub(crate) fn asked_leaking<Q: Question>(self) -> Option<Asked<Q::Answer, Q::Ray>> {
-        match self.0 {
-            Set::Portable => None,
-            #[cfg(target_arch = "x86_64")]
-            Set::Avx2 => Some(Asked(Q::ask_leaking_avx2)),
-            #[cfg(target_arch = "x86_64")]
-            Set::Avx512 => Some(Asked(Q::ask_leaking_avx512)),
-        }
-    }
 }

@@ -56,34 +56,13 @@ pub(super) trait AskOnX86: Question {
     unsafe fn ask_avx512(accel: &Accel, ray: &Self::Ray) -> Self::Answer {
         Self::ask::<X86<true>>(accel, ray)
     }
-
-    /// The same as it may leak: see `X86`.
-    ///
-    /// # Safety
-    /// The machine has these features.
-    #[cfg(feature = "measure")]
-    #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
-    unsafe fn ask_leaking_avx2(accel: &Accel, ray: &Self::Ray) -> Self::Answer {
-        Self::ask::<X86<false, true>>(accel, ray)
-    }
-
-    /// # Safety
-    /// The machine has these features.
-    #[cfg(feature = "measure")]
-    #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512cd,avx512dq,avx512vl")]
-    unsafe fn ask_leaking_avx512(accel: &Accel, ray: &Self::Ray) -> Self::Answer {
-        Self::ask::<X86<true, true>>(accel, ray)
-    }
 }
 
 impl<Q: Question> AskOnX86 for Q {}
 
 /// Of the two levels: only what is named after AVX-512 above instantiates `X86<true>`, and only what is named after AVX2 `X86<false>`.
 /// That is why the instructions below are there.
-///
-/// `LEAKS` is there to be measured beside: triangles are met as single precision has it, and boxes without a margin, so that hits may
-/// be lost at edges and the answers are rounded.
-pub(crate) struct X86<const AVX512: bool, const LEAKS: bool = false>;
+pub(crate) struct X86<const AVX512: bool>;
 
 // The numbers of a ray stand in a row: origin, direction, range.
 const _: () = assert!(size_of::<Ray32>() == 32 && offset_of!(Ray32, direction) == 16);
@@ -91,7 +70,7 @@ const _: () =
     assert!(offset_of!(Ray, direction) == 24 && offset_of!(Ray, t_min) == 48 && offset_of!(Ray, t_max) == 56);
 const _: () = assert!(size_of::<Ray>() == 72 && offset_of!(Ray, time) == 64);
 
-impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
+impl<const AVX512: bool> X86<AVX512> {
     /// A bit for each lane in which the comparison is true.
     #[inline(always)]
     fn compare<const HOW: i32>(a: __m256, b: __m256) -> u32 {
@@ -259,9 +238,6 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
             let z = _mm256_sub_ps(_mm256_set1_ps(origin[2]), load(kz));
             let across = _mm256_sub_ps(_mm256_set1_ps(origin[0]), load(kx));
             let up = _mm256_sub_ps(_mm256_set1_ps(origin[1]), load(ky));
-            if LEAKS {
-                return [_mm256_fnmadd_ps(shear_x, z, across), _mm256_fnmadd_ps(shear_y, z, up), z];
-            }
             let Some(rest) = ray.rest() else {
                 // No fused multiply-add: the same on every machine.
                 let x = _mm256_sub_ps(across, _mm256_mul_ps(shear_x, z));
@@ -286,9 +262,6 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
             let z = _mm512_sub_ps(_mm512_set1_ps(origin[2]), load(kz));
             let across = _mm512_sub_ps(_mm512_set1_ps(origin[0]), load(kx));
             let up = _mm512_sub_ps(_mm512_set1_ps(origin[1]), load(ky));
-            if LEAKS {
-                return [_mm512_fnmadd_ps(shear_x, z, across), _mm512_fnmadd_ps(shear_y, z, up), z];
-            }
             let Some(rest) = ray.rest() else {
                 // No fused multiply-add: the same on every machine.
                 let x = _mm512_sub_ps(across, _mm512_mul_ps(shear_x, z));
@@ -297,49 +270,6 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
             let x = _mm512_fnmadd_ps(shear_x, z, _mm512_add_ps(across, _mm512_set1_ps(rest[0])));
             let y = _mm512_fnmadd_ps(shear_y, z, _mm512_add_ps(up, _mm512_set1_ps(rest[1])));
             [x, y, z]
-        }
-    }
-
-    /// [`Lanes::shear`] in single precision.
-    #[inline(always)]
-    fn rounded_shear(ray: &Ray, axes: &'static Axes, mesh_origin: &[f64; 4]) -> (Shear, [f64; 3]) {
-        // SAFETY: see `X86`. The loads are of the first eight numbers of a ray, see below, and of arrays of four.
-        unsafe {
-            let order = _mm_loadu_si128(axes.order.as_ptr().cast());
-            let origin = _mm256_loadu_pd(Self::numbers(ray));
-            let origin = _mm256_cvtpd_ps(_mm256_sub_pd(origin, _mm256_loadu_pd(mesh_origin.as_ptr())));
-            let origin = Self::array(_mm_permutevar_ps(origin, order));
-            let direction = _mm_permutevar_ps(Self::single_direction(ray), order);
-            let last = _mm_shuffle_ps::<0b10_10_10_10>(direction, direction);
-            let shear = Self::array(_mm_div_ps(direction, last));
-            let shear = Shear {
-                axes,
-                x: shear[0].into(),
-                y: shear[1].into(),
-                direction_z: _mm_cvtss_f32(last).into(),
-            };
-            (shear, [origin[0].into(), origin[1].into(), origin[2].into()])
-        }
-    }
-
-    /// The inside of [`Lanes::pass`] in single precision.
-    #[inline(always)]
-    fn rounded_inside(block: &TriangleBlock, lane: usize, shear: &Shear, origin: &[f64; 3]) -> Inside {
-        let [across, up, z] = Self::corners_in(block, lane, shear.axes);
-        // SAFETY: see `X86`.
-        unsafe {
-            let z = _mm_sub_ps(z, _mm_set1_ps(origin[2] as f32));
-            let across = _mm_sub_ps(across, _mm_set1_ps(origin[0] as f32));
-            let up = _mm_sub_ps(up, _mm_set1_ps(origin[1] as f32));
-            let x = _mm_fnmadd_ps(_mm_set1_ps(shear.x as f32), z, across);
-            let y = _mm_fnmadd_ps(_mm_set1_ps(shear.y as f32), z, up);
-            // c, a, b and b, c, a.
-            let (px, py) = (_mm_permute_ps::<0b11_01_00_10>(x), _mm_permute_ps::<0b11_01_00_10>(y));
-            let (qx, qy) = (_mm_permute_ps::<0b11_00_10_01>(x), _mm_permute_ps::<0b11_00_10_01>(y));
-            let edges = _mm_fmsub_ps(px, qy, _mm_mul_ps(py, qx));
-            let [u, v, w, _] = Self::array(edges);
-            let [a, b, c, _] = Self::array(_mm_mul_ps(edges, z));
-            Inside { height: (a + b + c).into(), det: (u + v + w).into(), v: v.into(), w: w.into() }
         }
     }
 
@@ -444,14 +374,6 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
         }
     }
 
-    /// The direction in single precision; the last of four means nothing.
-    #[inline(always)]
-    fn single_direction(ray: &Ray) -> __m128 {
-        let (_, direction, _) = Self::parts(Self::halves(ray));
-        // SAFETY: see `X86`.
-        unsafe { _mm256_cvtpd_ps(direction) }
-    }
-
     /// [`Lanes::start_single`] of a ray by its numbers: the ends of the range are the first two; the last of the others mean nothing.
     #[inline(always)]
     fn slabs(start: &SingleStart, origin: __m256d, direction: __m128, range: __m128) -> Option<Slabs> {
@@ -481,11 +403,7 @@ impl<const AVX512: bool, const LEAKS: bool> X86<AVX512, LEAKS> {
             let size = _mm_div_ps(_mm_set1_ps(start.space_per_unit), size);
             let inverse = _mm_or_ps(size, _mm_and_ps(direction, sign));
             let per_distance = _mm_set1_ps(start.margin_per_distance);
-            let margin = if LEAKS {
-                _mm_setzero_ps()
-            } else {
-                _mm_mul_ps(size, _mm_fmadd_ps(distance, per_distance, _mm_set1_ps(start.margin)))
-            };
+            let margin = _mm_mul_ps(size, _mm_fmadd_ps(distance, per_distance, _mm_set1_ps(start.margin)));
             let ends = _mm_fmadd_ps(
                 range,
                 _mm_setr_ps(START_FACTOR, END_FACTOR, 0.0, 0.0),
@@ -820,16 +738,11 @@ impl<V: Vector> Edges<V> {
     /// Of corners in the sheared spaces of the rays, which have these [`least_size`](BlockRay::least_size)s, and a bit for each triangle that is
     /// perhaps met.
     #[inline(always)]
-    fn of<const LEAKS: bool>([x, y, z]: [[V; 3]; 3], least_size: V) -> (u32, Self) {
+    fn of([x, y, z]: [[V; 3]; 3], least_size: V) -> (u32, Self) {
         let u = x[2].times_minus(y[1], y[2] * x[1]);
         let v = x[0].times_minus(y[2], y[0] * x[2]);
         let w = x[1].times_minus(y[0], y[1] * x[0]);
         let within = u.min(v).min(w).max(u.max(v).max(w).turned_by(V::splat(-0.0)));
-        if LEAKS {
-            let (minus_error, height_error) = (V::splat(0.0), V::splat(0.0));
-            let edges = Self { values: [u, v, w], heights: z, within, minus_error, height_error };
-            return (minus_error.at_most(within), edges);
-        }
         let across = x[0].larger(y[0]).max(x[1].larger(y[1])).max(x[2].larger(y[2]));
         let along = z[0].larger(z[1]).larger(z[2]);
         let size = across + along + least_size;
@@ -868,7 +781,7 @@ impl<W: Wide> Edges<W> {
     }
 }
 
-impl<const LEAKS: bool> X86<true, LEAKS> {
+impl X86<true> {
     /// The corners of two blocks that share vertices.
     #[inline(always)]
     fn shared_by_two<S: Shears>(blocks: [&TriangleBlock; 2], rays: [&S; 2]) -> [[vector::Avx512; 3]; 3] {
@@ -942,7 +855,7 @@ pub(crate) trait HasWide<const AVX512: bool> {
     fn corners_by_two<S: Shears>(blocks: [&TriangleBlock; 2], rays: [&S; 2]) -> [[Self::Wide; 3]; 3];
 }
 
-impl<const LEAKS: bool> HasWide<true> for X86<true, LEAKS> {
+impl HasWide<true> for X86<true> {
     type Wide = vector::Avx512;
 
     #[inline(always)]
@@ -952,8 +865,7 @@ impl<const LEAKS: bool> HasWide<true> for X86<true, LEAKS> {
             return Self::shared_by_two(blocks, rays);
         }
         // Where there are no rests, there is so little to do that it pays no more to put both side by side first.
-        if !LEAKS
-            && first & second
+        if first & second
             && let (Some(a), Some(b)) = (rays[0].rest(), rays[1].rest())
         {
             return Self::unshared_by_two(blocks, rays, [a, b]);
@@ -962,7 +874,7 @@ impl<const LEAKS: bool> HasWide<true> for X86<true, LEAKS> {
     }
 }
 
-impl<const LEAKS: bool> HasWide<false> for X86<false, LEAKS> {
+impl HasWide<false> for X86<false> {
     type Wide = vector::Avx2;
 
     #[inline(always)]
@@ -971,7 +883,7 @@ impl<const LEAKS: bool> HasWide<false> for X86<false, LEAKS> {
     }
 }
 
-impl<const AVX512: bool, const LEAKS: bool> Lanes for X86<AVX512, LEAKS>
+impl<const AVX512: bool> Lanes for X86<AVX512>
 where
     Self: HasWide<AVX512>,
 {
@@ -1295,11 +1207,7 @@ where
             let (direction, range) = (_mm256_cvtpd_ps(direction), _mm_cvtpd_ps(range));
             let exact = _mm256_sub_pd(origin, _mm256_loadu_pd(start.mesh_origin.as_ptr()));
             let origin = _mm256_cvtpd_ps(exact);
-            let rest = if LEAKS {
-                _mm_setzero_ps()
-            } else {
-                _mm256_cvtpd_ps(_mm256_sub_pd(exact, _mm256_cvtps_pd(origin)))
-            };
+            let rest = _mm256_cvtpd_ps(_mm256_sub_pd(exact, _mm256_cvtps_pd(origin)));
             let range = _mm_movelh_ps(range, range);
 
             let sign = _mm_set1_ps(-0.0);
@@ -1392,7 +1300,7 @@ where
     #[inline(always)]
     fn meet_triangles(block: &TriangleBlock, ray: &BlockRay) -> (u32, Self::Edges) {
         let corners = Self::eights(Self::sheared_corners(block, ray));
-        let (mask, edges) = Edges::of::<LEAKS>(corners, Self::Eight::splat(ray.least_size));
+        let (mask, edges) = Edges::of(corners, Self::Eight::splat(ray.least_size));
         (mask & block.taken(), edges)
     }
 
@@ -1404,7 +1312,7 @@ where
             return (first | second << BLOCK, Edges::of_two(&of_first, &of_second));
         }
         let least_size = Self::Wide::splat_two(rays[0].least_size, rays[1].least_size, LastEight::new());
-        let (mask, edges) = Edges::of::<LEAKS>(Self::corners_by_two(blocks, rays), least_size);
+        let (mask, edges) = Edges::of(Self::corners_by_two(blocks, rays), least_size);
         (mask & (blocks[0].taken() | blocks[1].taken() << BLOCK), edges)
     }
 
@@ -1498,22 +1406,12 @@ where
             let weight = _mm256_andnot_ps(sign, det);
             let of_a_and_b = _mm256_fmadd_ps(v, z[1], _mm256_mul_ps(u, z[0]));
             let of_c = _mm256_mul_ps(w, z[2]);
-            let of_c = if LEAKS { of_c } else { _mm256_fmadd_ps(det, _mm256_set1_ps(ray.rest[2]), of_c) };
+            let of_c = _mm256_fmadd_ps(det, _mm256_set1_ps(ray.rest[2]), of_c);
             let height = _mm256_add_ps(of_a_and_b, of_c);
             let turn = _mm256_xor_ps(_mm256_set1_ps(ray.turn), _mm256_and_ps(det, sign));
             let ahead = _mm256_xor_ps(height, turn);
             let inverse = _mm256_div_ps(_mm256_set1_ps(1.0), weight);
             let range = &ray.range;
-            if LEAKS {
-                let at = _mm256_mul_ps(ahead, inverse);
-                let in_range = Self::both::<_CMP_GE_OQ, _CMP_LE_OQ>(
-                    [at, _mm256_set1_ps(range.first)],
-                    [at, _mm256_set1_ps(range.last)],
-                );
-                let in_range = in_range & Self::compare::<_CMP_GT_OQ>(weight, _mm256_setzero_ps());
-                let at = vector::Eight256::new(at);
-                return Crossings { in_range, sure: in_range, from: at, to: at };
-            }
             let low = _mm256_min_ps(_mm256_min_ps(z[0], z[1]), z[2]);
             let high = _mm256_max_ps(_mm256_max_ps(z[0], z[1]), z[2]);
             let along_edges = _mm256_fmadd_ps(
@@ -1546,9 +1444,6 @@ where
 
     #[inline(always)]
     fn shear(ray: &Ray, axes: &'static Axes, mesh_origin: &[f64; 4]) -> (Shear, [f64; 3]) {
-        if LEAKS {
-            return Self::rounded_shear(ray, axes, mesh_origin);
-        }
         let (origin, direction, _) = Self::parts(Self::halves(ray));
         // SAFETY: see `X86`. The loads are of arrays of four and eight.
         unsafe {
@@ -1573,9 +1468,6 @@ where
 
     #[inline(always)]
     fn pass(block: &TriangleBlock, lane: usize, shear: &Shear, origin: &[f64; 3]) -> (Passage, Inside) {
-        if LEAKS {
-            return (Passage::Inside, Self::rounded_inside(block, lane, shear, origin));
-        }
         // The corners in the first three lanes, and the very operations of the portable one.
         let [across, up, z] = Self::corners_in(block, lane, shear.axes);
         // SAFETY: see `X86`.
