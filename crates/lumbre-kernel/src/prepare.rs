@@ -15,7 +15,7 @@ use crate::holds::{Holds, SingleStart, Sizes};
 use crate::hulls::Hulls;
 use crate::lanes::{Lanes, Level, Task};
 use crate::narrow::NarrowQuestions;
-use crate::node::Units;
+use crate::node::{Units, tag};
 use crate::outline::Outline;
 use crate::primitive::{Bounds, Kind, Primitive, Traits};
 use crate::single::Questions;
@@ -25,8 +25,8 @@ use crate::{
     opening, precise,
 };
 
-/// References have 29 bits of place.
-pub(crate) const MOST_PRIMITIVES: usize = (1 << 29) - 1;
+/// Leaf entries and nodes are to have a place in a reference.
+pub(crate) const MOST_PRIMITIVES: usize = tag::PLACE as usize;
 
 /// See [`Accel::build`].
 pub(crate) fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result<Accel, BuildError> {
