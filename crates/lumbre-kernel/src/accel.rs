@@ -118,8 +118,8 @@ pub enum BuildError {
         /// The vertex, sphere or primitive.
         element: usize,
     },
-    /// More primitives than a tree can name (2^29 - 1), or so many small leaves of triangles or of spheres that they fill
-    /// more than 2^26 blocks of eight.
+    /// More primitives than a tree can name (2^28 - 1), or so many small leaves of triangles or of spheres that they fill
+    /// more than 2^25 blocks of eight.
     TooMany,
 }
 
@@ -151,7 +151,7 @@ impl Accel {
     /// which may take as long as a small tree; one that joined the pool by `use_current_thread` begins at once.
     ///
     /// # Errors
-    /// [`BuildError`] when a mesh names vertices that it lacks, a coordinate or a radius is not finite, or there are 2^29 primitives
+    /// [`BuildError`] when a mesh names vertices that it lacks, a coordinate or a radius is not finite, or there are 2^28 primitives
     /// or more.
     pub fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result<Self, BuildError> {
         input::build(geometries, options)

@@ -533,7 +533,7 @@ impl Layout {
     pub(crate) fn over_leaves(self, names: &[Name], leaf_of: impl Fn(u32) -> u32) -> Relaid {
         let Self { mut nodes, entries, sphere_spans, mut root, .. } = self;
         let stands_for = |reference: &mut u32| {
-            if *reference != Node::ABSENT && *reference >> tag::SHIFT == tag::SPHERES {
+            if *reference != Node::ABSENT && tag::of(*reference) == tag::SPHERES {
                 let span = sphere_spans[tag::blocks(*reference).start];
                 *reference = leaf_of(names[span.first as usize][0]);
             }

@@ -19,15 +19,15 @@ use crate::geometry::has_area;
 use crate::intersect::{Lanes, Level, Task};
 use crate::precise_mesh;
 use crate::tree::BLOCK;
-use crate::tree::node::Units;
+use crate::tree::node::{Units, tag};
 use crate::tree::packed::{Entry, Packed};
 use crate::tree::summary::Sizes;
 use crate::{
     Accel, BuildError, BuildOptions, Geometry, GeometryKind, Placement, PreciseMesh, Preset, TriangleMesh,
 };
 
-/// References have 29 bits of place.
-pub(crate) const MOST_PRIMITIVES: usize = (1 << 29) - 1;
+/// Leaf entries and nodes are to have a place in a reference.
+pub(crate) const MOST_PRIMITIVES: usize = tag::PLACE as usize;
 
 /// See [`Accel::build`].
 pub(crate) fn build(geometries: Vec<Geometry>, options: &BuildOptions) -> Result<Accel, BuildError> {

@@ -54,7 +54,7 @@ impl Sorter<'_> {
         }
         let (node, mut rest) = nodes.split_first_mut()?;
         let mut inner: Vec<(usize, usize)> = (0..WIDTH)
-            .filter(|&lane| node.children[lane] >> tag::SHIFT == tag::INNER)
+            .filter(|&lane| tag::is_inner(node.children[lane]))
             .map(|lane| (node.children[lane] as usize, lane))
             .collect();
         inner.sort_unstable();
@@ -82,7 +82,7 @@ impl Sorter<'_> {
         let (mut stops, mut costs) = ([0.0; WIDTH], [1.0; WIDTH]);
         let mut len = 0;
         for (lane, &child) in node.children.iter().enumerate() {
-            let odds = match child >> tag::SHIFT {
+            let odds = match tag::of(child) {
                 tag::INNER => inner[lane]?,
                 tag::TRIANGLES => {
                     let (mut triangles, mut cost) = (0.0, 0.0);
@@ -138,7 +138,7 @@ impl Task for SortFew<'_> {
             let node = &mut nodes[at];
             let mut inner = [None; WIDTH];
             for (odds_of, &child) in inner.iter_mut().zip(&node.children) {
-                if child >> tag::SHIFT == tag::INNER {
+                if tag::is_inner(child) {
                     *odds_of = odds[(child as usize - place) % FEW];
                 }
             }

@@ -54,7 +54,7 @@ impl Family {
         // What became empty by a refit is met by no ray.
         let (mut children, mut boxes): (Vec<_>, Vec<_>) =
             children.filter(|child| !child.1.is_empty()).unzip();
-        if children.iter().any(|child| child >> tag::SHIFT != tag::INNER) {
+        if children.iter().any(|&child| !tag::is_inner(child)) {
             (children, boxes) = Default::default();
         }
         let boxes = EightSizes::of(&boxes);
@@ -98,7 +98,7 @@ impl Families {
     /// together are all of the tree.
     fn boxes_of(&mut self, instance: &Instance, whole: &Aabb, nodes: &[u32]) -> Option<Vec<Aabb>> {
         let Instance { accel, world_from_object } = instance;
-        accel.tree.root.filter(|root| root >> tag::SHIFT == tag::INNER)?;
+        accel.tree.root.filter(|&root| tag::is_inner(root))?;
         let mut places: Vec<(u32, usize)> = nodes.iter().copied().zip(0..).collect();
         places.sort_unstable();
         let mut boxes = vec![None; nodes.len()];
@@ -149,9 +149,7 @@ pub(crate) fn open(primitives: &mut Vec<Primitive>, geometries: &[Geometry], uni
     let mut known = Families::default();
     let of = |primitive: &Primitive| still(&geometries[primitive.first() as usize]);
     let family = |primitive: &Primitive| match of(primitive) {
-        Some((Instance { accel, .. }, _))
-            if accel.tree.root.is_some_and(|root| root >> tag::SHIFT == tag::INNER) =>
-        {
+        Some((Instance { accel, .. }, _)) if accel.tree.root.is_some_and(tag::is_inner) => {
             known.learn(accel, 0)
         }
         _ => NO_FAMILY,

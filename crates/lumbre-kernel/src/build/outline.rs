@@ -51,9 +51,7 @@ impl Outline {
 
     /// Of what is below a node, by one box more than this at most, or by those of its children where they are more; of a leaf, by none.
     pub(crate) fn below(inner: &Accel, reference: u32, count: usize) -> Self {
-        let node = |reference: u32| {
-            (reference >> tag::SHIFT == tag::INNER).then(|| &inner.tree.nodes[reference as usize])
-        };
+        let node = |reference: u32| tag::is_inner(reference).then(|| &inner.tree.nodes[reference as usize]);
         let Some(root) = node(reference) else { return Self::of_box(Aabb::EMPTY) };
         let children = |node: &Node| -> Vec<(Aabb, u32)> {
             (0..node.len())

@@ -474,7 +474,7 @@ pub(crate) fn refer(
     number_of: impl Fn(u32) -> usize + Sync,
 ) {
     let refer = |reference: &mut u32| {
-        if *reference >> tag::SHIFT == tag::TRIANGLES {
+        if tag::of(*reference) == tag::TRIANGLES {
             *reference = tag::reference(tag::TRIANGLES, places[number_of(*reference)]);
         }
     };
@@ -489,7 +489,7 @@ pub(crate) fn refer(
 pub(crate) fn followers_of(nodes: &[Node], root: Option<u32>, blocks: usize) -> Vec<u8> {
     let mut followers = vec![0; blocks];
     let children = nodes.iter().flat_map(|node| &node.children[..node.len()]);
-    for &reference in children.chain(&root).filter(|&&reference| reference >> tag::SHIFT == tag::TRIANGLES) {
+    for &reference in children.chain(&root).filter(|&&reference| tag::of(reference) == tag::TRIANGLES) {
         for (behind, followers) in followers[tag::blocks(reference)].iter_mut().rev().enumerate() {
             *followers = behind as u8;
         }

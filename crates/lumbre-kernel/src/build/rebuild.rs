@@ -43,7 +43,7 @@ pub(crate) fn rebuild_partially(accel: &mut Accel, options: &BuildOptions) -> f6
 /// A tree of the leaves of another; `None` where there is nothing to put together, or more than a tree can name.
 fn over_leaves(accel: &Accel, preset: Preset) -> Option<Relaid> {
     let Accel { geometries, tree, .. } = accel;
-    tree.root.filter(|root| root >> tag::SHIFT == tag::INNER)?;
+    tree.root.filter(|&root| tag::is_inner(root))?;
     let mut primitives = entries_of(accel)?;
     // Every leaf is as a geometry of its own, behind the others, with one sphere in it.
     let mut traits: Vec<Traits> = geometries.iter().map(input::traits_of).collect();
@@ -51,7 +51,7 @@ fn over_leaves(accel: &Accel, preset: Preset) -> Option<Relaid> {
     let mut leaves = Vec::new();
     for node in &*tree.nodes {
         for (lane, &child) in node.children[..node.len()].iter().enumerate() {
-            let blocks = match child >> tag::SHIFT {
+            let blocks = match tag::of(child) {
                 tag::TRIANGLES => tree.numbers(child).len(),
                 tag::SPHERES => tag::blocks(child).len(),
                 _ => continue,

@@ -159,9 +159,9 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts, places: Places) {
     nodes.par_iter_mut().zip(&mut node_boxes).with_min_len(64).for_each(|(node, whole)| {
         for lane in 0..node.len() {
             let child = node.children[lane];
-            let first = (child & tag::PLACE) as usize;
+            let first = tag::place(child);
             let mut around = Bounds::EMPTY;
-            match child >> tag::SHIFT {
+            match tag::of(child) {
                 tag::INNER => continue,
                 tag::TRIANGLES => {
                     for block in blocks.leaf(child) {
@@ -191,8 +191,8 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts, places: Places) {
         let node = &mut nodes[place];
         for lane in 0..node.len() {
             let child = node.children[lane];
-            if child >> tag::SHIFT == tag::INNER {
-                let around = node_boxes[(child & tag::PLACE) as usize];
+            if tag::is_inner(child) {
+                let around = node_boxes[tag::place(child)];
                 around.put(node, lane);
                 node_boxes[place].grow(&around);
             }

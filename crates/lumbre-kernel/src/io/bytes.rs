@@ -30,7 +30,7 @@ use crate::{BuildError, Geometry, GeometryKind};
 
 const MAGIC: [u8; 8] = *b"LumbTree";
 /// Changes with the format, and with what the numbers mean.
-const VERSION: u32 = 7;
+const VERSION: u32 = 8;
 const NONE: u32 = u32::MAX;
 
 /// Why bytes are no tree over these geometries.
@@ -126,7 +126,7 @@ pub(crate) fn to_bytes(accel: &Accel) -> Vec<u8> {
     put(accel.masks.len() as u32);
     // References to triangles number blocks: where these begin is found again.
     let numbered = |reference: u32| {
-        if reference >> tag::SHIFT == tag::TRIANGLES {
+        if tag::of(reference) == tag::TRIANGLES {
             let numbers = tree.numbers(reference);
             tag::triangles(numbers.start as u32, numbers.len() as u32)
         } else {
@@ -299,8 +299,8 @@ pub(crate) fn check_structure(
             let taken = taken.get_mut(place)?;
             (!std::mem::replace(taken, true)).then_some(())
         };
-        let place = (reference & tag::PLACE) as usize;
-        match reference >> tag::SHIFT {
+        let place = tag::place(reference);
+        match tag::of(reference) {
             tag::INNER => {
                 let is_behind = parent.map_or(place == 0, |parent| place > parent);
                 if is_behind { once(&mut nodes, place) } else { None }

@@ -388,7 +388,7 @@ fn over_mapped(file: Arc<Mmap>, geometries: Vec<Geometry>) -> Result<Accel, Load
     })?;
     check_structure(&tree, &geometries, |leaf| {
         let numbers = tree.blocks().numbers(leaf)?;
-        (places.get(numbers.start) == Some(&(leaf & tag::PLACE))).then_some(numbers)
+        (places.get(numbers.start) == Some(&(tag::place(leaf) as u32))).then_some(numbers)
     })?;
     check_names(&tree, &geometries)?;
     let masks: Store<u32> = array(&file, &header, 6)?;

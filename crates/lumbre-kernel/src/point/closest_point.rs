@@ -90,7 +90,7 @@ pub(crate) fn closest_point(
         }
         let frame = &frames[next.frame as usize];
         match next.what {
-            Waiting::Reference(reference) if reference >> tag::SHIFT == tag::INNER => {
+            Waiting::Reference(reference) if tag::is_inner(reference) => {
                 let node = &frame.accel.tree.nodes[reference as usize];
                 for lane in 0..node.len() {
                     let distance = frame.distance_to_box(node, lane).max(next.distance);
@@ -100,7 +100,7 @@ pub(crate) fn closest_point(
                     }
                 }
             }
-            Waiting::Reference(reference) if reference >> tag::SHIFT == tag::TRIANGLES => {
+            Waiting::Reference(reference) if tag::of(reference) == tag::TRIANGLES => {
                 for names in &frame.accel.tree.names[frame.accel.tree.numbers(reference)] {
                     if let GeometryKind::Mesh(mesh) = &frame.accel.geometries[names.geometry as usize].kind {
                         for &primitive in names.primitives.iter().filter(|&&primitive| primitive != u32::MAX)
@@ -110,7 +110,7 @@ pub(crate) fn closest_point(
                     }
                 }
             }
-            Waiting::Reference(reference) if reference >> tag::SHIFT == tag::SPHERES => {
+            Waiting::Reference(reference) if tag::of(reference) == tag::SPHERES => {
                 for names in &frame.accel.tree.sphere_names[tag::blocks(reference)] {
                     for &primitive in names.primitives.iter().filter(|&&primitive| primitive != u32::MAX) {
                         search.meet(frame, names.geometry, primitive, next.distance);
@@ -118,7 +118,7 @@ pub(crate) fn closest_point(
                 }
             }
             Waiting::Reference(reference) => {
-                let first = (reference & tag::PLACE) as usize;
+                let first = tag::place(reference);
                 for entry in &frame.accel.tree.entries[first..] {
                     let what = Waiting::Primitive(entry.geometry, entry.primitive());
                     pending.push(Pending { distance: next.distance, frame: next.frame, what });

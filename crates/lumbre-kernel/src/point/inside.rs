@@ -77,7 +77,7 @@ fn solids_around(accel: &Accel, point: DVec3, time: f64) -> usize {
         let (local, slop) = ((point - units.origin) * units.scale, 4.0 * units.slop_of(point));
         stack.extend(accel.tree.root.map(|root| start.below(root)));
         while let Some(reference) = stack.pop() {
-            match reference >> tag::SHIFT {
+            match tag::of(reference) {
                 tag::INNER => {
                     let node = &accel.tree.nodes[reference as usize];
                     for lane in 0..node.len() {
@@ -99,7 +99,7 @@ fn solids_around(accel: &Accel, point: DVec3, time: f64) -> usize {
                     }
                 }
                 _ => {
-                    for entry in &accel.tree.entries[(reference & tag::PLACE) as usize..] {
+                    for entry in &accel.tree.entries[tag::place(reference)..] {
                         meet(entry.geometry, entry.primitive());
                         if entry.is_last() {
                             break;

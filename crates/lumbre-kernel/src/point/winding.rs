@@ -125,7 +125,7 @@ fn precise_corners(mesh: &PreciseMesh, point: DVec3, triangle: u32) -> Option<[D
 
 /// Calls for every triangle in double precision of a leaf, relative to a point.
 fn for_each_precise(accel: &Accel, reference: u32, point: DVec3, mut f: impl FnMut([DVec3; 3])) {
-    for entry in &accel.tree.entries[(reference & tag::PLACE) as usize..] {
+    for entry in &accel.tree.entries[tag::place(reference)..] {
         if let GeometryKind::PreciseMesh(mesh) = &accel.geometries[entry.geometry as usize].kind
             && let Some(corners) = precise_corners(mesh, point, entry.primitive())
         {
@@ -285,8 +285,8 @@ impl Moments {
         for (place, node) in tree.nodes.iter().enumerate().rev() {
             parts.clear();
             for &child in &node.children[..node.len()] {
-                match child >> tag::SHIFT {
-                    tag::INNER => parts.push(nodes[(child & tag::PLACE) as usize]),
+                match tag::of(child) {
+                    tag::INNER => parts.push(nodes[tag::place(child)]),
                     tag::TRIANGLES => parts.extend_from_slice(&blocks[tree.numbers(child)]),
                     tag::PRECISE => for_each_precise(accel, child, accel.units.origin, |corners| {
                         parts.push(Moment::of_triangle(corners));
@@ -311,7 +311,7 @@ impl Moments {
         let mut sum = 0.0;
         let mut stack: Vec<u32> = accel.tree.root.into_iter().collect();
         while let Some(reference) = stack.pop() {
-            match reference >> tag::SHIFT {
+            match tag::of(reference) {
                 tag::INNER => {
                     let moment = &self.nodes[reference as usize];
                     let far = far * moment.radius;

@@ -197,7 +197,7 @@ fn depth(accel: &Accel) -> usize {
     let mut pending = vec![(accel.tree.root.unwrap(), 1)];
     while let Some((reference, depth)) = pending.pop() {
         deepest = deepest.max(depth);
-        if reference >> tag::SHIFT == tag::INNER {
+        if tag::is_inner(reference) {
             let node = &accel.tree.nodes[reference as usize];
             pending.extend(node.children[..node.len()].iter().map(|&child| (child, depth + 1)));
         }
@@ -258,7 +258,7 @@ fn boxes_hold_their_children_and_every_primitive_has_one_place() {
     for node in &accel.tree.nodes {
         for lane in 0..node.len() {
             let child = node.children[lane];
-            if child >> tag::SHIFT != tag::INNER {
+            if !tag::is_inner(child) {
                 continue;
             }
             let child = &accel.tree.nodes[child as usize];
@@ -278,11 +278,11 @@ fn any_hit_asks_what_is_packed_first_and_instances_last() {
     let accel = mixture(&mut random, DVec3::new(2.0, 3.0, -4.0), 3.0, 1, false);
     // The first tag that is met below a reference, by the way of a search for any hit.
     let rank = |mut reference: u32| {
-        while reference >> tag::SHIFT == tag::INNER {
+        while tag::is_inner(reference) {
             let node = &accel.tree.nodes[reference as usize];
             reference = node.children[node.len() - 1];
         }
-        match reference >> tag::SHIFT {
+        match tag::of(reference) {
             tag::INSTANCE => 0,
             tag::TRIANGLES | tag::SPHERES => 2,
             _ => 1,
@@ -339,4 +339,23 @@ fn instances_are_bounded_by_what_is_in_them() {
     let ball = |p: &Vec3| outer.bounds().contains(map.point(p.as_dvec3()));
     let GeometryKind::Mesh(mesh) = &inner.geometries[0].kind else { panic!("a mesh") };
     assert!(mesh.positions.iter().all(ball));
+}
+
+#[test]
+fn references_keep_their_kind_and_their_place() {
+    for kind in 0..16 {
+        for place in [0, 5, tag::PLACE - 1, tag::PLACE] {
+            let reference = tag::reference(kind, place);
+            assert_eq!((tag::of(reference), tag::place(reference)), (kind, place as usize));
+            assert_eq!(tag::is_inner(reference), kind == tag::INNER);
+        }
+    }
+    let last = tag::BLOCK_PLACES - 1;
+    for (count, blocks) in [(1, last as usize..last as usize + 1), (8, last as usize..last as usize + 8)] {
+        for (leaf, kind) in
+            [(tag::triangles(last, count), tag::TRIANGLES), (tag::spheres(last, count), tag::SPHERES)]
+        {
+            assert_eq!((tag::of(leaf), tag::blocks(leaf)), (kind, blocks.clone()));
+        }
+    }
 }

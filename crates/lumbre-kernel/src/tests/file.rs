@@ -158,7 +158,7 @@ fn hostile_files_are_refused_or_harmless() {
             let place = 4 * word..4 * word + 4;
             let other = random.below(bytes.len() / 4);
             let number = match random.below(5) {
-                0 => [0, 1, 2, 8, 9, u32::MAX, 1 << 29, 1 << 31, tag::reference(tag::PRECISE, 3)]
+                0 => [0, 1, 2, 8, 9, u32::MAX, 1 << 28, 1 << 31, tag::reference(tag::PRECISE, 3)]
                     [random.below(9)],
                 1 => u32::from_le_bytes(bytes[4 * other..][..4].try_into().unwrap()),
                 2 => [f32::NAN, f32::INFINITY, -f32::MAX, 0.5][random.below(4)].to_bits(),

@@ -42,7 +42,7 @@ fn check_order(accel: &Accel, reference: u32, checked: &mut usize) -> Option<Odd
         let [from, to] = corners(node, lane);
         (low, high) = (low.min(from), high.max(to));
         let area = half_area(from, to);
-        let odds = match child >> tag::SHIFT {
+        let odds = match tag::of(child) {
             tag::INNER => check_order(accel, child, checked),
             tag::TRIANGLES => {
                 let (mut triangles, mut cost, mut unsure) = (0.0, 0.0, 0.0);
@@ -140,7 +140,7 @@ fn a_wall_is_asked_before_a_larger_bush() {
         let accel = build(vec![GeometryKind::Mesh(Arc::new(mesh.clone()))]);
         let root = &accel.tree.nodes[accel.tree.root.unwrap() as usize];
         let last = root.children[root.len() - 1];
-        assert_eq!(last >> tag::SHIFT, tag::TRIANGLES);
+        assert_eq!(tag::of(last), tag::TRIANGLES);
         let names = &accel.tree.names[accel.tree.numbers(last).start];
         assert!(names.primitives().any(|primitive| primitive >= count - 2), "{names:?}");
         let areas: Vec<f64> = (0..root.len())

@@ -36,38 +36,41 @@
 use bytemuck::{Pod, Zeroable};
 use lumbre_math::DVec3;
 
-/// What a reference to a child names: three bits of tag, 29 bits of place.
+/// References to children: four bits for the kind, and 28 for the place.
 pub(crate) mod tag {
-    pub(crate) const SHIFT: u32 = 29;
+    /// Where the kind begins.
+    pub(crate) const SHIFT: u32 = 28;
+    /// The bits of the place.
     pub(crate) const PLACE: u32 = (1 << SHIFT) - 1;
+
     /// A node.
     pub(crate) const INNER: u32 = 0;
-    /// Some triangle blocks in a row: see [`triangles`].
+    /// Triangle blocks in a row: see [`triangles`].
     pub(crate) const TRIANGLES: u32 = 1;
-    /// The first of some leaf entries that are shapes.
+    /// Leaf entries in a row that are shapes.
     pub(crate) const SHAPES: u32 = 2;
     /// One leaf entry that is an instance.
     pub(crate) const INSTANCE: u32 = 3;
-    /// The first of some leaf entries that are primitives of custom geometry.
+    /// Leaf entries in a row that are primitives of custom geometry.
     pub(crate) const CUSTOM: u32 = 4;
-    /// Some blocks of spheres in a row: see [`spheres`].
+    /// Sphere blocks in a row: see [`spheres`].
     pub(crate) const SPHERES: u32 = 5;
-    /// The first of some leaf entries that are triangles in double precision.
+    /// Leaf entries in a row that are triangles in double precision.
     pub(crate) const PRECISE: u32 = 6;
-    /// Not a child: the mark on the stack where an instance was entered.
-    pub(crate) const RETURN: u32 = 7;
+    /// No child, but the mark on the stack where an instance was entered.
+    pub(crate) const RETURN: u32 = 15;
 
     pub(crate) const fn reference(tag: u32, place: u32) -> u32 {
         tag << SHIFT | place
     }
 
-    /// The tag of a reference.
+    /// The kind of what a reference names.
     #[inline(always)]
     pub(crate) const fn of(reference: u32) -> u32 {
         reference >> SHIFT
     }
 
-    /// The place of a reference.
+    /// Where it stands.
     #[inline(always)]
     pub(crate) const fn place(reference: u32) -> usize {
         (reference & PLACE) as usize
@@ -85,7 +88,8 @@ pub(crate) mod tag {
     pub(crate) const BLOCK_PLACES: u32 = 1 << (SHIFT - COUNT_BITS);
     const COUNT_BITS: u32 = 3;
 
-    /// A leaf of triangles: 26 bits for its first block, three for how many there are, 1 to 8.
+    /// A leaf of triangles: 25 bits for its first block, three for how many there are, 1 to 8. In a packed tree, the place is the
+    /// line where the first block begins.
     pub(crate) const fn triangles(first: u32, count: u32) -> u32 {
         reference(TRIANGLES, first << COUNT_BITS | (count - 1))
     }
@@ -98,7 +102,7 @@ pub(crate) mod tag {
     /// The blocks of a leaf of triangles or of spheres.
     #[inline(always)]
     pub(crate) const fn blocks(reference: u32) -> std::ops::Range<usize> {
-        let first = ((reference & PLACE) >> COUNT_BITS) as usize;
+        let first = place(reference) >> COUNT_BITS;
         first..first + (reference & (MOST_BLOCKS - 1)) as usize + 1
     }
 }

@@ -100,13 +100,13 @@ impl Start {
 
     #[inline(always)]
     pub(crate) fn is_nothing(self) -> bool {
-        self.0 >> tag::SHIFT >= Self::AS_NOTHING
+        tag::of(self.0) >= Self::AS_NOTHING
     }
 
     /// What is entered of a tree with this root.
     #[inline(always)]
     pub(crate) fn below(self, root: u32) -> u32 {
-        if self == Self::WHOLE || self.0 >> tag::SHIFT != tag::INNER { root } else { self.0 }
+        if self == Self::WHOLE || !tag::is_inner(self.0) { root } else { self.0 }
     }
 
     pub(crate) fn node(self) -> u32 {

@@ -283,14 +283,14 @@ impl<'a> Blocks<'a> {
 
     /// The numbers of the blocks of a leaf.
     pub(crate) fn numbers(self, leaf: u32) -> Option<std::ops::Range<usize>> {
-        let head = self.at(leaf & tag::PLACE)?.head;
+        let head = self.at(tag::place(leaf) as u32)?.head;
         let first = head.number as usize;
         Some(first..first + usize::from(head.followers) + 1)
     }
 
     /// The blocks of a leaf.
     pub(crate) fn leaf(self, leaf: u32) -> impl Iterator<Item = &'a TriangleBlock> {
-        let mut place = Some(leaf & tag::PLACE);
+        let mut place = Some(tag::place(leaf) as u32);
         std::iter::from_fn(move || {
             let block = self.at(place?)?;
             place = block.next(place?);
