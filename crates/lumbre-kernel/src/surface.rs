@@ -4,14 +4,15 @@ use lumbre_geometry::{Ray, Surface};
 use lumbre_math::quadratic::dop;
 use lumbre_math::rounding::{UNIT_ROUNDOFF, gamma};
 use lumbre_math::{DMat3, DVec2, DVec3, Transform, Vec3};
+use smallvec::SmallVec;
 
 use crate::tree::sphere_block::ExactSphere;
 use crate::{Accel, GeometryKind, Hit, Instance};
 
 /// The instances along a hit's route, outermost first, and the tree within the last.
-fn along<'a>(accel: &'a Accel, hit: &Hit) -> (Vec<&'a Instance>, &'a Accel) {
+fn along<'a>(accel: &'a Accel, hit: &Hit) -> (SmallVec<[&'a Instance; 4]>, &'a Accel) {
     let mut inner = accel;
-    let mut instances = Vec::with_capacity(hit.route.len());
+    let mut instances = SmallVec::with_capacity(hit.route.len());
     for &position in &hit.route {
         let GeometryKind::Instance(instance) = &inner.geometries[position as usize].kind else {
             panic!("a hit of another tree");

@@ -119,7 +119,12 @@ impl Light {
             (Self::Shape(light), Some((surface, _))) => light.pdf(ray, surface),
             (Self::Mesh(light), Some((surface, triangle))) => light.pdf(ray, surface, triangle),
             (Self::Placed(light), Some(surface)) => light.pdf(ray, surface),
-            _ => 0.0,
+            (Self::Uniform(_) | Self::Environment(_), Some(_))
+            | (Self::Shape(_) | Self::Mesh(_) | Self::Placed(_), None)
+            | (
+                Self::Point(_) | Self::Spot(_) | Self::Goniometric(_) | Self::Distant(_) | Self::Moving(_),
+                _,
+            ) => 0.0,
         }
     }
 
@@ -128,7 +133,14 @@ impl Light {
         match self {
             Self::Uniform(light) => light.radiance,
             Self::Environment(light) => light.radiance(direction),
-            _ => Spectrum::BLACK,
+            Self::Point(_)
+            | Self::Spot(_)
+            | Self::Goniometric(_)
+            | Self::Distant(_)
+            | Self::Shape(_)
+            | Self::Mesh(_)
+            | Self::Placed(_)
+            | Self::Moving(_) => Spectrum::BLACK,
         }
     }
 

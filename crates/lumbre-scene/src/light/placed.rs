@@ -24,7 +24,14 @@ impl PlacedLight {
         match &*self.light {
             Light::Shape(light) => light.power,
             Light::Mesh(light) => light.power,
-            _ => 0.0,
+            Light::Point(_)
+            | Light::Spot(_)
+            | Light::Goniometric(_)
+            | Light::Distant(_)
+            | Light::Uniform(_)
+            | Light::Environment(_)
+            | Light::Placed(_)
+            | Light::Moving(_) => unreachable!("only shapes and meshes are placed"),
         }
     }
 
