@@ -34,7 +34,7 @@ pub(crate) struct SingleStart {
     pub(crate) margin_per_distance: f32,
     /// What the tree's boxes are relative to as seen from where the corners are, in tree units, and a zero.
     pub(crate) shift: [f32; 4],
-    /// By how much planes are moved for rays in single precision: see `narrow`.
+    /// By how much planes are moved for rays in single precision: see `trace::f32_ray`.
     pub(crate) narrow_margin: f32,
     /// The scale, and its inverse.
     pub(crate) units_per_space: f32,

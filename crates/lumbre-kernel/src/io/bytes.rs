@@ -3,7 +3,7 @@
 //! What is written down is how the tree is put together: which nodes are in which, and which primitives in which leaf, some
 //! six bytes a triangle. Boxes and packed corners are not; they are computed again from the geometries when the bytes are
 //! read, in a fraction of the time of a build. So bytes that come from elsewhere cannot make a tree that answers wrongly: they
-//! are refused, or they say how to arrange what is there. To map a tree into memory as it is, see `file`.
+//! are refused, or they say how to arrange what is there. To map a tree into memory as it is, see `mapped`.
 //!
 //! All numbers are u32, the least byte first. The file: eight bytes of magic; the version; how many geometries, nodes, blocks,
 //! blocks of spheres, entries and masks there are; the reference to the root, or 2³² - 1; for each geometry its kind and how many

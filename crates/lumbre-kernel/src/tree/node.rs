@@ -204,7 +204,7 @@ impl Units {
     pub(crate) const SINGLE_MARGIN_PER_DISTANCE: f32 = (8.0 * ROUNDOFF) as f32;
 
     /// Of rays in single precision, where zero is so far from the mesh's origin on each axis, in tree units: by how much planes are
-    /// moved, and by how much more for each unit of the ray's start. See `narrow`.
+    /// moved, and by how much more for each unit of the ray's start. See `trace::f32_ray`.
     pub(crate) fn narrow_margin(&self, shift: f64) -> f32 {
         round_up(f64::from(self.single_margin()) + ROUNDOFF * (56.0 + 2.0 * shift))
     }
