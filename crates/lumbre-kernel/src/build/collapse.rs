@@ -384,7 +384,7 @@ struct Gathered<'a> {
 enum ChildOrder {
     /// By rank, and of one rank the largest last: where any hit will do, it is asked first, for it is the likeliest to have one.
     BySize,
-    /// Whichever: they are only counted, or sorted later, as those are below which there is nothing but triangles (see [`occlusion`]).
+    /// Whichever: they are only counted, or sorted later, as those are below which there is nothing but triangles (see `occlusion_order`).
     Any,
 }
 

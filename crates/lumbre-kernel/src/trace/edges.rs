@@ -1,6 +1,6 @@
 //! Rays exactly through edges and vertices.
 //!
-//! Inside a mesh the rule for zeros (see [`triangles`]) gives each such crossing one owner, but at the border of an open mesh it may give
+//! Inside a mesh the rule for zeros (see [`watertight`]) gives each such crossing one owner, but at the border of an open mesh it may give
 //! it none: the ray, moved by its ε, passes the mesh by. A triangle is closed, so such a crossing counts all the same, once. Which
 //! edges are borders is seen from the triangles that the ray hits at that place, so that no mesh needs a table of its
 //! neighbours; corners are compared by position, so that a mesh whose corners are split for their normals or texture

@@ -1,7 +1,7 @@
 //! Rays in single precision, in trees of nothing but triangles: for those to whom speed counts more than the last digits.
 //!
 //! The test is that of S. Woop, C. Benthin, I. Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013, and simpler than the one
-//! in double precision (see [`triangles`](crate::intersect::watertight)): triangles are closed, so that a ray through an edge meets all that have it,
+//! in double precision (see [`watertight`](crate::intersect::watertight)): triangles are closed, so that a ray through an edge meets all that have it,
 //! which makes no difference to the nearest hit and to whether there is one. Where that would be imprecise, products are computed exactly.
 //! Nothing depends on the instruction set: no product is fused with a sum.
 //!

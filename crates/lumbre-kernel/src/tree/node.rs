@@ -45,7 +45,7 @@ pub(crate) mod tag {
 
     /// A node.
     pub(crate) const INNER: u32 = 0;
-    /// Triangle blocks in a row: see [`triangles`].
+    /// Triangle blocks in a row: see `triangle_block`.
     pub(crate) const TRIANGLES: u32 = 1;
     /// Leaf entries in a row that are shapes.
     pub(crate) const SHAPES: u32 = 2;
@@ -53,7 +53,7 @@ pub(crate) mod tag {
     pub(crate) const INSTANCE: u32 = 3;
     /// Leaf entries in a row that are primitives of custom geometry.
     pub(crate) const CUSTOM: u32 = 4;
-    /// Sphere blocks in a row: see [`spheres`].
+    /// Sphere blocks in a row: see `sphere_block`.
     pub(crate) const SPHERES: u32 = 5;
     /// Leaf entries in a row that are triangles in double precision.
     pub(crate) const PRECISE: u32 = 6;
@@ -124,7 +124,7 @@ pub(crate) struct Node {
     /// Lower and upper x, y and z planes of the boxes: `planes[2 * axis + side]`.
     pub(crate) planes: [[f32; WIDTH]; 6],
     /// Tagged references, in the first lanes; [`Node::ABSENT`] in the others. The last are asked first where any hit will do: they are the
-    /// likeliest to have one for what they cost, or the largest; see [`occlusion`](crate::build::occlusion_order).
+    /// likeliest to have one for what they cost, or the largest; see [`occlusion_order`](crate::build::occlusion_order).
     pub(crate) children: [u32; WIDTH],
 }
 
