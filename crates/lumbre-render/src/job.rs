@@ -4,13 +4,13 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-use crate::film::{Extras, FeatureSample, Filter, Sample, Tile};
-use crate::transport::{Feature, Features, Integrator, RayCounts, Sampler, Sight, integrator, see};
 use lumbre_math::DVec2;
 use lumbre_scene::{Scene, View};
 use rayon::prelude::*;
 
+use crate::film::{Extras, FeatureSample, Filter, Sample, Tile};
 use crate::rendered::{coverage_picture, feature_picture, noise, picture};
+use crate::transport::{Feature, Features, Integrator, RayCounts, Sampler, Sight, integrator, see};
 use crate::{
     CancelToken, DroppedSample, Progress, RenderError, RenderOptions, Rendered, Snapshot, State, Stats,
 };

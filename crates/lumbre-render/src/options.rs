@@ -2,11 +2,11 @@
 
 use std::time::Duration;
 
-use crate::film::{Exposure, Filter, FilterShape, PixelBounds};
 use lumbre_math::DVec2;
 use lumbre_scene::{FilterDesc, IntegratorDesc, SamplerDesc, Scene};
 
 use crate::RenderError;
+use crate::film::{Exposure, Filter, FilterShape, PixelBounds};
 
 /// Everything about a picture that is not in the scene. [`RenderOptions::of`] has what the scene's description says.
 #[derive(Clone, Debug, PartialEq)]

@@ -41,12 +41,14 @@ impl GroundPlane {
                 Light::Point(_) | Light::Spot(_) | Light::Goniometric(_) | Light::Moving(_) => {
                     local.push(light.clone());
                 }
-                // The others are the same at all times.
-                _ => open += light.irradiance(desc.point, 0.0, normal).unwrap_or(Spectrum::BLACK),
+                // These are the same at all times.
+                Light::Distant(_) | Light::Uniform(_) | Light::Environment(_) => {
+                    open += light.irradiance(desc.point, 0.0, normal).unwrap_or(Spectrum::BLACK);
+                }
+                Light::Shape(_) | Light::Mesh(_) | Light::Placed(_) => {}
             }
         }
-        let is_surface = |light: &Light| matches!(light, Light::Shape(_) | Light::Mesh(_) | Light::Placed(_));
-        let ids = (0..).zip(lights).filter(|(_, light)| !is_surface(light)).map(|(id, _)| LightId(id));
+        let ids = (0..).zip(lights).filter(|(_, light)| !light.is_surface()).map(|(id, _)| LightId(id));
         Self { normal, point: desc.point, catcher: desc.catcher, open, local, lights: ids.collect() }
     }
 

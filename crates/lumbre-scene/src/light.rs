@@ -121,10 +121,8 @@ impl Light {
             (Self::Placed(light), Some(surface)) => light.pdf(ray, surface),
             (Self::Uniform(_) | Self::Environment(_), Some(_))
             | (Self::Shape(_) | Self::Mesh(_) | Self::Placed(_), None)
-            | (
-                Self::Point(_) | Self::Spot(_) | Self::Goniometric(_) | Self::Distant(_) | Self::Moving(_),
-                _,
-            ) => 0.0,
+            | (Self::Point(_) | Self::Spot(_) | Self::Goniometric(_), _)
+            | (Self::Distant(_) | Self::Moving(_), _) => 0.0,
         }
     }
 
@@ -133,14 +131,10 @@ impl Light {
         match self {
             Self::Uniform(light) => light.radiance,
             Self::Environment(light) => light.radiance(direction),
-            Self::Point(_)
-            | Self::Spot(_)
-            | Self::Goniometric(_)
-            | Self::Distant(_)
-            | Self::Shape(_)
-            | Self::Mesh(_)
-            | Self::Placed(_)
-            | Self::Moving(_) => Spectrum::BLACK,
+            Self::Point(_) | Self::Spot(_) | Self::Goniometric(_) | Self::Distant(_) | Self::Moving(_) => {
+                Spectrum::BLACK
+            }
+            Self::Shape(_) | Self::Mesh(_) | Self::Placed(_) => Spectrum::BLACK,
         }
     }
 
@@ -164,15 +158,35 @@ impl Light {
 
     /// Whether rays that leave the scene meet it.
     pub fn is_infinite(&self) -> bool {
-        matches!(self, Self::Uniform(_) | Self::Environment(_))
+        match self {
+            Self::Uniform(_) | Self::Environment(_) => true,
+            Self::Point(_) | Self::Spot(_) | Self::Goniometric(_) | Self::Distant(_) | Self::Moving(_) => {
+                false
+            }
+            Self::Shape(_) | Self::Mesh(_) | Self::Placed(_) => false,
+        }
     }
 
     /// Whether its light comes from one direction alone at each place.
     pub fn is_delta(&self) -> bool {
-        matches!(
-            self,
-            Self::Point(_) | Self::Spot(_) | Self::Goniometric(_) | Self::Distant(_) | Self::Moving(_)
-        )
+        match self {
+            Self::Point(_) | Self::Spot(_) | Self::Goniometric(_) | Self::Distant(_) | Self::Moving(_) => {
+                true
+            }
+            Self::Uniform(_) | Self::Environment(_) => false,
+            Self::Shape(_) | Self::Mesh(_) | Self::Placed(_) => false,
+        }
+    }
+
+    /// Whether it is a surface, which rays meet.
+    pub(crate) fn is_surface(&self) -> bool {
+        match self {
+            Self::Shape(_) | Self::Mesh(_) | Self::Placed(_) => true,
+            Self::Point(_) | Self::Spot(_) | Self::Goniometric(_) | Self::Distant(_) | Self::Moving(_) => {
+                false
+            }
+            Self::Uniform(_) | Self::Environment(_) => false,
+        }
     }
 
     /// An estimate of the power that it sends into a scene of this radius, by which it is chosen.
@@ -189,7 +203,7 @@ impl Light {
             Self::Environment(light) => PI * disk * light.mean(),
             Self::Shape(light) => light.power,
             Self::Mesh(light) => light.power,
-            Self::Placed(light) => light.power(),
+            Self::Placed(light) => light.power(scene_radius),
             Self::Moving(light) => light.light.power(scene_radius),
         }
     }

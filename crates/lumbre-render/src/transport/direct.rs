@@ -25,7 +25,7 @@ use crate::transport::through::{goes_straight_on, straight_on};
 /// the smooth surface turns away from the light, not at the edge of a face. J. Hanika ("Hacking the Shadow Terminator",
 /// 2021) starts all rays there; here those that leave a face upwards start on it, for they need no help, and nothing that stands
 /// on it comes to hover.
-pub(crate) struct Vertex<'a, 's> {
+pub(super) struct Vertex<'a, 's> {
     pub met: &'a Interaction<'s>,
     pub bsdf: Bsdf,
     pub material: &'s Material,
@@ -39,7 +39,7 @@ pub(crate) struct Vertex<'a, 's> {
 }
 
 /// A direction in which a path goes on.
-pub(crate) struct Bounce {
+pub(super) struct Bounce {
     /// Unit.
     pub direction: DVec3,
     /// f · |cos θ| / pdf.
@@ -271,7 +271,7 @@ fn mirrored(w: Vec3, normal: Vec3) -> Vec3 {
 }
 
 /// The power heuristic (Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997) for two ways.
-pub(crate) fn power_heuristic(this: f32, other: f32) -> f32 {
+pub(super) fn power_heuristic(this: f32, other: f32) -> f32 {
     if this.is_infinite() {
         return 1.0;
     }

@@ -11,7 +11,7 @@ use smallvec::SmallVec;
 /// index of refraction counts against that of the solid around it. Where solids overlap without one holding the other,
 /// the one that was entered last counts.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Interiors<'s> {
+pub(super) struct Interiors<'s> {
     around: SmallVec<[&'s Material; 2]>,
 }
 

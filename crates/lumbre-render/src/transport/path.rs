@@ -1,9 +1,10 @@
 //! Path tracing with next-event estimation and multiple importance sampling.
 
 use lumbre_geometry::Ray;
+use lumbre_math::DVec3;
 use lumbre_scene::{Interaction, Scene, View};
 use lumbre_shading::medium::{Flight, sample_henyey_greenstein};
-use lumbre_shading::{Scatter, Spectrum};
+use lumbre_shading::{HomogeneousMedium, Scatter, Spectrum};
 
 use crate::transport::direct::{Vertex, power_heuristic};
 use crate::transport::interior::Interiors;
@@ -95,123 +96,217 @@ impl Integrator for Path {
         draw: &Draw,
         rays: &mut RayCounts,
     ) -> Spectrum {
-        let mut radiance = Spectrum::BLACK;
-        let mut throughput = Spectrum::WHITE;
-        // What refraction did to the throughput alone: it comes back when the path leaves again.
-        let mut eta_scale = 1.0;
-        let mut chosen = Chosen::Only;
-        let mut has_scattered = false;
-        let (mut ray, mut met): (Ray, _) = (sight.ray.ray, sight.met);
-        // Where the last vertex sampled lights from.
-        let mut lit_from = ray.origin;
-        let mut depth = 0;
-        let mut interiors = Interiors::default();
-        let (mut flights, mut collisions) = (0, 0);
-        loop {
-            let Some(here) = &met else {
-                for (arriving, pdf) in scene.escaped(&ray) {
-                    radiance += throughput * arriving * self.weight_of_found(chosen, pdf);
-                }
-                return radiance;
+        let mut walk = Walk::new(self, scene, sight.ray.ray, draw, rays);
+        let mut met = sight.met;
+        while let Some(here) = &met {
+            walk.interiors.arrive(here, here.resolved());
+            let next = match walk.cross_medium(here) {
+                Crossing::Through => walk.scatter_at_surface(here),
+                Crossing::Scattered(ray) => Some(ray),
+                Crossing::Ended => None,
             };
-            interiors.arrive(here, here.resolved());
-            let way = ray_length(&ray, here);
-            match interiors.medium() {
-                None => throughput *= interiors.transmittance(way),
-                Some(medium) => match medium.fly(throughput, way, draw.flight(flights)) {
-                    Flight::Through(weight) => {
-                        throughput *= weight;
-                        flights += 1;
-                    }
-                    Flight::Collision { distance, weight } => {
-                        throughput *= weight;
-                        let likely = (throughput * eta_scale).max_component();
-                        if collisions >= MOST_COLLISIONS || likely <= 0.0 {
-                            return radiance;
-                        }
-                        if likely < 1.0 && collisions >= SURE_COLLISIONS {
-                            if draw.survives_collision(flights) >= likely {
-                                return radiance;
-                            }
-                            throughput *= 1.0 / likely;
-                        }
-                        let u = draw.scattered(flights);
-                        let along = ray.direction.as_vec3();
-                        let (along, _) = sample_henyey_greenstein(along, medium.asymmetry, u);
-                        let start = ray.origin + distance * ray.direction;
-                        ray = Ray::new(start, along.as_dvec3().normalize()).at_time(ray.time);
-                        // Lights are behind a surface that bends what comes from them: paths find them.
-                        chosen = Chosen::Only;
-                        has_scattered = true;
-                        flights += 1;
-                        collisions += 1;
-                        rays.bounce += 1;
-                        let footprint = here.footprint();
-                        met = scene.closest(&ray).map(|hit| scene.interaction(&ray, &hit, &footprint));
-                        continue;
-                    }
-                },
-            }
-            let emitted = here.emitted();
-            if !emitted.is_black() {
-                let pdf = if chosen == Chosen::Only { 0.0 } else { scene.light_pdf(lit_from, here) };
-                radiance += throughput * emitted * self.weight_of_found(chosen, pdf);
-            }
-            if depth == self.max_depth {
-                return radiance;
-            }
-            let Some(mut vertex) = Vertex::new(scene, here, &interiors) else { return radiance };
-            if self.regularize && has_scattered {
-                vertex.bsdf = vertex.bsdf.regularized();
-            }
-
-            lit_from = here.lit_from();
-            if !vertex.bsdf.is_delta() {
-                let light =
-                    scene.sample_light(lit_from, ray.time, draw.light_choice(depth), draw.light_point(depth));
-                if let Some(light) = light {
-                    let weigh = |light_pdf, bsdf_pdf| self.weight_of_sampled(light_pdf, bsdf_pdf);
-                    radiance +=
-                        throughput * vertex.scattered(&light, &interiors, self.regularize, weigh, rays);
-                }
-            }
-
-            let Some(bounce) = vertex.sample(draw.lobe(depth), draw.direction(depth)) else {
-                return radiance;
-            };
-            throughput *= bounce.weight;
-            if throughput.is_black() {
-                return radiance;
-            }
-            chosen = match bounce.scatter {
-                Scatter::Delta => Chosen::Only,
-                Scatter::Density(pdf) => Chosen::Density(pdf),
-            };
-            has_scattered |= bounce.scatter != Scatter::Delta;
-            if bounce.transmitted {
-                eta_scale *= bounce.eta * bounce.eta;
-                interiors.cross(vertex.material, here.front);
-            }
-            depth += 1;
-
-            let likely = (throughput * eta_scale).max_component();
-            if depth > self.sure_bounces && likely < 1.0 {
-                if draw.survival(depth) >= likely {
-                    return radiance;
-                }
-                throughput *= 1.0 / likely;
-            }
-
-            ray = vertex.leave(&bounce);
-            lit_from = vertex.risen_towards(bounce.direction).unwrap_or(lit_from);
-            let footprint = here.footprint();
-            rays.bounce += 1;
-            met = scene.closest(&ray).map(|hit| scene.interaction(&ray, &hit, &footprint));
+            let Some(ray) = next else { return walk.radiance };
+            met = walk.follow(ray, here);
         }
+        walk.add_escaped();
+        walk.radiance
+    }
+}
+
+/// A path on its way, and the light that it has found.
+struct Walk<'s, 'w> {
+    path: &'w Path,
+    scene: &'s Scene,
+    draw: &'w Draw,
+    rays: &'w mut RayCounts,
+    radiance: Spectrum,
+    throughput: Spectrum,
+    /// What refraction did to the throughput alone: it comes back when the path leaves again.
+    eta_scale: f32,
+    chosen: Chosen,
+    has_scattered: bool,
+    ray: Ray,
+    /// Where the last vertex sampled lights from.
+    lit_from: DVec3,
+    /// Bounces off surfaces.
+    depth: u32,
+    interiors: Interiors<'s>,
+    /// Media crossed or scattered in: each takes random numbers of its own.
+    flights: u32,
+    collisions: u32,
+}
+
+/// How a path comes through the medium before a surface.
+enum Crossing {
+    /// It reaches the surface.
+    Through,
+    /// It goes on along this ray, from a collision.
+    Scattered(Ray),
+    /// It ends at a collision.
+    Ended,
+}
+
+impl<'s, 'w> Walk<'s, 'w> {
+    fn new(path: &'w Path, scene: &'s Scene, ray: Ray, draw: &'w Draw, rays: &'w mut RayCounts) -> Self {
+        Self {
+            path,
+            scene,
+            draw,
+            rays,
+            radiance: Spectrum::BLACK,
+            throughput: Spectrum::WHITE,
+            eta_scale: 1.0,
+            chosen: Chosen::Only,
+            has_scattered: false,
+            ray,
+            lit_from: ray.origin,
+            depth: 0,
+            interiors: Interiors::default(),
+            flights: 0,
+            collisions: 0,
+        }
+    }
+
+    /// Goes on along a ray, to what it meets.
+    fn follow(&mut self, ray: Ray, from: &Interaction<'s>) -> Option<Interaction<'s>> {
+        self.ray = ray;
+        self.rays.bounce += 1;
+        let footprint = from.footprint();
+        self.scene.closest(&ray).map(|hit| self.scene.interaction(&ray, &hit, &footprint))
+    }
+
+    /// Adds the light at infinity that a ray found which left the scene.
+    fn add_escaped(&mut self) {
+        for (arriving, pdf) in self.scene.escaped(&self.ray) {
+            self.radiance += self.throughput * arriving * self.path.weight_of_found(self.chosen, pdf);
+        }
+    }
+
+    /// Adds the light of the surface that was found.
+    fn add_emitted(&mut self, here: &Interaction<'s>) {
+        let emitted = here.emitted();
+        if !emitted.is_black() {
+            let pdf =
+                if self.chosen == Chosen::Only { 0.0 } else { self.scene.light_pdf(self.lit_from, here) };
+            self.radiance += self.throughput * emitted * self.path.weight_of_found(self.chosen, pdf);
+        }
+    }
+
+    /// Adds one sample of the lights.
+    fn add_sampled_light(&mut self, vertex: &Vertex<'_, 's>) {
+        let (draw, depth) = (self.draw, self.depth);
+        let light = self.scene.sample_light(
+            self.lit_from,
+            self.ray.time,
+            draw.light_choice(depth),
+            draw.light_point(depth),
+        );
+        if let Some(light) = light {
+            let path = self.path;
+            let weigh = |light_pdf, bsdf_pdf| path.weight_of_sampled(light_pdf, bsdf_pdf);
+            self.radiance += self.throughput
+                * vertex.scattered(&light, &self.interiors, path.regularize, weigh, self.rays);
+        }
+    }
+
+    /// Goes through the medium before a surface, or scatters in it.
+    fn cross_medium(&mut self, here: &Interaction<'s>) -> Crossing {
+        let way = ray_length(&self.ray, here);
+        let Some(medium) = self.interiors.medium() else {
+            self.throughput *= self.interiors.transmittance(way);
+            return Crossing::Through;
+        };
+        match medium.fly(self.throughput, way, self.draw.flight(self.flights)) {
+            Flight::Through(weight) => {
+                self.throughput *= weight;
+                self.flights += 1;
+                Crossing::Through
+            }
+            Flight::Collision { distance, weight } => {
+                self.throughput *= weight;
+                match self.collide(&medium, distance) {
+                    Some(ray) => Crossing::Scattered(ray),
+                    None => Crossing::Ended,
+                }
+            }
+        }
+    }
+
+    /// The ray that leaves a collision in a medium; `None` where the path ends.
+    fn collide(&mut self, medium: &HomogeneousMedium, distance: f64) -> Option<Ray> {
+        let likely = (self.throughput * self.eta_scale).max_component();
+        if self.collisions >= MOST_COLLISIONS || likely <= 0.0 {
+            return None;
+        }
+        if likely < 1.0 && self.collisions >= SURE_COLLISIONS {
+            if self.draw.survives_collision(self.flights) >= likely {
+                return None;
+            }
+            self.throughput *= 1.0 / likely;
+        }
+        let along = self.ray.direction.as_vec3();
+        let u = self.draw.scattered(self.flights);
+        let (along, _) = sample_henyey_greenstein(along, medium.asymmetry, u);
+        let start = self.ray.origin + distance * self.ray.direction;
+        // Lights are behind a surface that bends what comes from them: paths find them.
+        self.chosen = Chosen::Only;
+        self.has_scattered = true;
+        self.flights += 1;
+        self.collisions += 1;
+        Some(Ray::new(start, along.as_dvec3().normalize()).at_time(self.ray.time))
+    }
+
+    /// Gathers the light of a surface and at it, and gives the ray that leaves it; `None` where the path ends.
+    fn scatter_at_surface(&mut self, here: &Interaction<'s>) -> Option<Ray> {
+        self.add_emitted(here);
+        if self.depth == self.path.max_depth {
+            return None;
+        }
+        let mut vertex = Vertex::new(self.scene, here, &self.interiors)?;
+        if self.path.regularize && self.has_scattered {
+            vertex.bsdf = vertex.bsdf.regularized();
+        }
+        self.lit_from = here.lit_from();
+        if !vertex.bsdf.is_delta() {
+            self.add_sampled_light(&vertex);
+        }
+
+        let bounce = vertex.sample(self.draw.lobe(self.depth), self.draw.direction(self.depth))?;
+        self.throughput *= bounce.weight;
+        if self.throughput.is_black() {
+            return None;
+        }
+        self.chosen = match bounce.scatter {
+            Scatter::Delta => Chosen::Only,
+            Scatter::Density(pdf) => Chosen::Density(pdf),
+        };
+        self.has_scattered |= bounce.scatter != Scatter::Delta;
+        if bounce.transmitted {
+            self.eta_scale *= bounce.eta * bounce.eta;
+            self.interiors.cross(vertex.material, here.front);
+        }
+        self.depth += 1;
+        if !self.survives() {
+            return None;
+        }
+        self.lit_from = vertex.risen_towards(bounce.direction).unwrap_or(self.lit_from);
+        Some(vertex.leave(&bounce))
+    }
+
+    /// Russian roulette after a bounce.
+    fn survives(&mut self) -> bool {
+        let likely = (self.throughput * self.eta_scale).max_component();
+        if self.depth > self.path.sure_bounces && likely < 1.0 {
+            if self.draw.survival(self.depth) >= likely {
+                return false;
+            }
+            self.throughput *= 1.0 / likely;
+        }
+        true
     }
 }
 
 /// The way from a ray's origin to what it met; its direction is unit.
-pub(crate) fn ray_length(ray: &Ray, here: &Interaction) -> f64 {
+pub(super) fn ray_length(ray: &Ray, here: &Interaction) -> f64 {
     (here.surface.point - ray.origin).length()
 }

@@ -22,7 +22,7 @@ const INDEX_ERROR: f32 = 1e-4;
 /// rough, and reflected inside solids, but not by their outer sides. Black where the ray meets nothing, or what is not clear.
 ///
 /// What solids scatter inside is not followed. The draw's vertices from `first` on choose the way.
-pub(crate) fn light_through(
+pub(super) fn light_through(
     scene: &Scene,
     mut ray: Ray,
     draw: &Draw,
@@ -72,7 +72,7 @@ pub(crate) fn light_through(
 
 /// Whether a light's sample is to be followed through panes by [`straight_on`], where paths find all other light behind them: that of
 /// points and in one direction, which no path finds by chance, so that nothing counts twice.
-pub(crate) fn goes_straight_on(scene: &Scene, sample: &LightSample) -> bool {
+pub(super) fn goes_straight_on(scene: &Scene, sample: &LightSample) -> bool {
     sample.scatter == Scatter::Delta && scene.lets_light_straight_on()
 }
 
@@ -83,7 +83,7 @@ pub(crate) fn goes_straight_on(scene: &Scene, sample: &LightSample) -> bool {
 /// Only for light that is not also found by rays which go through the pane themselves, or it would count twice: of paths, see
 /// [`goes_straight_on`]. What bends or spreads light stands in its way here: what is rough is lit itself, and paths find it; what
 /// is smooth and bends light would have to send a path to such a light by chance, and never does.
-pub(crate) fn straight_on<'s>(
+pub(super) fn straight_on<'s>(
     scene: &'s Scene,
     shadow_ray: Ray,
     sample: &LightSample,

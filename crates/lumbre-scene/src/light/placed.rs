@@ -20,19 +20,8 @@ impl PlacedLight {
         Self { light: Box::new(light), placement }
     }
 
-    pub(crate) fn power(&self) -> f64 {
-        match &*self.light {
-            Light::Shape(light) => light.power,
-            Light::Mesh(light) => light.power,
-            Light::Point(_)
-            | Light::Spot(_)
-            | Light::Goniometric(_)
-            | Light::Distant(_)
-            | Light::Uniform(_)
-            | Light::Environment(_)
-            | Light::Placed(_)
-            | Light::Moving(_) => unreachable!("only shapes and meshes are placed"),
-        }
+    pub(super) fn power(&self, scene_radius: f64) -> f64 {
+        self.light.power(scene_radius)
     }
 
     pub(super) fn sample(
