@@ -8,10 +8,14 @@ use lumbre_formats::gltf::{GltfOptions, read_gltf};
 use lumbre_formats::{Budget, Diagnostics, Limits, Strictness};
 
 fuzz_target!(|bytes: &[u8]| {
-    let limits = Limits { memory: 64 << 20, elements: 1_000_000, ..Limits::default() };
+    let mut limits = Limits::default();
+    limits.memory = 64 << 20;
+    limits.elements = 1_000_000;
     for (strictness, frame) in [(Strictness::Normal, None), (Strictness::Lenient, Some(0.7))] {
         let mut diagnostics = Diagnostics::with_strictness(strictness);
-        let options = GltfOptions { frame, shutter: 0.1, ..GltfOptions::default() };
+        let mut options = GltfOptions::default();
+        options.frame = frame;
+        options.shutter = 0.1;
         let budget = Budget::new(limits);
         // A folder that is not there: nothing outside the bytes is to be read.
         let nowhere = Path::new("/nonexistent");

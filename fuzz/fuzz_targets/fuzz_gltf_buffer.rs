@@ -39,7 +39,9 @@ fuzz_target!(|bytes: &[u8]| {
         "nodes":[{{"mesh":0}}]}}"#
     );
     let glb = glb::of_chunks(&json, data);
-    let limits = Limits { memory: 64 << 20, elements: 1_000_000, ..Limits::default() };
+    let mut limits = Limits::default();
+    limits.memory = 64 << 20;
+    limits.elements = 1_000_000;
     let mut diagnostics = Diagnostics::with_strictness(Strictness::Lenient);
     let (budget, options) = (Budget::new(limits), GltfOptions::default());
     let nowhere = Path::new("/nonexistent");

@@ -6,7 +6,9 @@ use lumbre_formats::ies::read_ies;
 use lumbre_formats::{Budget, Limits};
 
 fuzz_target!(|bytes: &[u8]| {
-    let limits = Limits { memory: 64 << 20, elements: 1_000_000, ..Limits::default() };
+    let mut limits = Limits::default();
+    limits.memory = 64 << 20;
+    limits.elements = 1_000_000;
     match read_ies(bytes, &"fuzz.ies".into(), &Budget::new(limits)) {
         Ok(profile) => {
             for direction in DIRECTIONS {

@@ -10,7 +10,8 @@ const ENDINGS: [&str; 9] = ["png", "jpg", "exr", "hdr", "pfm", "tga", "bmp", "qo
 fuzz_target!(|bytes: &[u8]| {
     let [choice, bytes @ ..] = bytes else { return };
     let name = format!("fuzz.{}", ENDINGS[usize::from(*choice) % ENDINGS.len()]).into();
-    let limits = Limits { memory: 64 << 20, ..Limits::default() };
+    let mut limits = Limits::default();
+    limits.memory = 64 << 20;
     let mut diagnostics = Diagnostics::new();
     if let Ok(file) = read_image(bytes, &name, &Budget::new(limits), &mut diagnostics) {
         let _ = file.to_image(&Budget::new(limits));

@@ -6,7 +6,9 @@ use lumbre_formats::obj::read_obj;
 use lumbre_formats::{Budget, Diagnostics, Limits, Strictness};
 
 fuzz_target!(|bytes: &[u8]| {
-    let limits = Limits { memory: 64 << 20, elements: 1_000_000, ..Limits::default() };
+    let mut limits = Limits::default();
+    limits.memory = 64 << 20;
+    limits.elements = 1_000_000;
     for strictness in [Strictness::Normal, Strictness::Lenient] {
         let mut diagnostics = Diagnostics::with_strictness(strictness);
         let read = read_obj(bytes, &"fuzz.obj".into(), &Budget::new(limits), &mut diagnostics);

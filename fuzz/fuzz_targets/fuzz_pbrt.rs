@@ -5,7 +5,10 @@ use libfuzzer_sys::fuzz_target;
 use lumbre_formats::{Budget, Diagnostics, Limits, Strictness, pbrt};
 
 fuzz_target!(|bytes: &[u8]| {
-    let limits = Limits { memory: 64 << 20, elements: 100_000, files: 100, ..Limits::default() };
+    let mut limits = Limits::default();
+    limits.memory = 64 << 20;
+    limits.elements = 100_000;
+    limits.files = 100;
     for strictness in [Strictness::Normal, Strictness::Lenient] {
         let mut diagnostics = Diagnostics::with_strictness(strictness);
         let scene = pbrt::read_bytes("fuzz.pbrt", bytes, None, &Budget::new(limits), &mut diagnostics);

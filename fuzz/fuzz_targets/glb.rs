@@ -28,7 +28,8 @@ pub fn of_chunks(json: &str, binary: &[u8]) -> Vec<u8> {
 #[allow(dead_code, reason = "one target has limits of its own")]
 pub fn read(json: &str, binary: &[u8]) -> Result<SceneDesc, FormatError> {
     let glb = of_chunks(json, binary);
-    let limits = Limits { memory: (64 << 20) + 32 * glb.len() as u64, ..Limits::default() };
+    let mut limits = Limits::default();
+    limits.memory = (64 << 20) + 32 * glb.len() as u64;
     let budget = Budget::new(limits);
     let (name, nowhere, options) = ("fuzz.glb".into(), Path::new("/nowhere"), GltfOptions::default());
     let scene = read_gltf(&glb, &name, nowhere, &options, &budget, &mut Diagnostics::new());

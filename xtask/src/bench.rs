@@ -12,7 +12,7 @@ use crate::PassedOn;
 
 /// What can be measured.
 #[derive(Subcommand)]
-pub enum Bench {
+pub(crate) enum Bench {
     /// Rays a second, build speed and memory of the kernel, beside Embree 4 where EMBREE_LIB names its shared library, and
     /// beside the crates obvhs and bvh. All options are passed through: `kernel --help`.
     #[command(disable_help_flag = true)]
@@ -33,7 +33,7 @@ pub enum Bench {
 
 impl Bench {
     /// Measures and prints a table.
-    pub fn run(self) -> Result<()> {
+    pub(crate) fn run(self) -> Result<()> {
         match self {
             Self::Kernel(passed) => run_ours("lumbre-bench", Profile::Release, &passed.arguments),
             Self::Field { pov, runs, threads } => field(pov.as_deref(), runs, threads),

@@ -41,7 +41,7 @@ fn mirrored(reflectance: &str, mirror: f64) -> String {
 }
 
 /// The scene.
-pub fn scene() -> String {
+pub(crate) fn scene() -> String {
     let mut random = Random(7);
     let mut out = String::from(HEAD);
     let mut number = 0;

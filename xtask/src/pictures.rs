@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail};
 use xtask::command::{release_program, root, run};
 
 /// Renders every scene under `scenes/` whose path contains `filter` to a PNG beside it.
-pub fn render_all(filter: Option<&str>) -> Result<()> {
+pub(crate) fn render_all(filter: Option<&str>) -> Result<()> {
     let program = release_program()?;
     let program = program.to_string_lossy();
     let mut scenes = Vec::new();

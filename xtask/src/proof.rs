@@ -6,7 +6,7 @@ use xtask::command::run_with;
 
 /// What can be proved by numbers.
 #[derive(Clone, Copy, ValueEnum)]
-pub enum Claim {
+pub(crate) enum Claim {
     /// No ray passes between the triangles of closed meshes.
     Leaks,
     /// Trees answer as a loop over everything does.
@@ -14,7 +14,7 @@ pub enum Claim {
 }
 
 /// Runs the ignored test of a claim, optimised.
-pub fn run_proof(claim: Claim, rays: Option<u64>, seed: u64) -> Result<()> {
+pub(crate) fn run_proof(claim: Claim, rays: Option<u64>, seed: u64) -> Result<()> {
     let (test, usual) = match claim {
         Claim::Leaks => ("proof_that_no_aimed_ray_leaks", 1_000_000_000),
         Claim::Loop => ("proof_that_trees_answer_as_a_loop", 10_000_000),
@@ -26,7 +26,7 @@ pub fn run_proof(claim: Claim, rays: Option<u64>, seed: u64) -> Result<()> {
 }
 
 /// A little of everything in an interpreter that sees undefined behaviour.
-pub fn miri() -> Result<()> {
+pub(crate) fn miri() -> Result<()> {
     let arguments =
         ["+nightly", "miri", "test", "--package", "lumbre-kernel", "--lib", "--", "tests::small", "stack::"];
     // The queues below rayon turn integers into pointers, and keep the rules of tree borrows but not those of stacked ones.
@@ -36,7 +36,7 @@ pub fn miri() -> Result<()> {
 }
 
 /// Everything with every access to memory checked; optimised code stays as it is, SIMD included.
-pub fn asan() -> Result<()> {
+pub(crate) fn asan() -> Result<()> {
     let target =
         if cfg!(target_arch = "aarch64") { "aarch64-unknown-linux-gnu" } else { "x86_64-unknown-linux-gnu" };
     let arguments = [

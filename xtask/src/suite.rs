@@ -7,7 +7,7 @@ use xtask::command::{self, root, run_with, succeeds};
 const CARGO_DENY: &str = "0.20.2";
 
 /// Runs it all, cheapest first, and stops at the first failure.
-pub fn run() -> Result<()> {
+pub(crate) fn run() -> Result<()> {
     for component in ["rustfmt", "clippy"] {
         let subcommand = if component == "rustfmt" { "fmt" } else { component };
         if !succeeds("cargo", &[subcommand, "--version"]) {

@@ -14,7 +14,7 @@ use crate::failure::{Failure, print};
   lumbre diff out.png golden.png --metric flip --fail-above 0.02 -o heat.png
 
 Prints the difference alone, so that scripts can read it. Exit status 1 when it is above --fail-above.")]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// A picture: .exr, .png, .hdr, .pfm, .jpg and others.
     a: PathBuf,
     /// The picture to compare it with; relmse and flip take it as the reference.
@@ -40,7 +40,7 @@ fn limit(text: &str) -> Result<f64, String> {
 }
 
 /// Runs the command.
-pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let read = |path: &PathBuf| lumbre::read_image(path).map_err(Failure::from);
     let (a, b) = (read(&arguments.a)?, read(&arguments.b)?);
     let Some(comparison) = compare(&a, &b, arguments.metric) else {

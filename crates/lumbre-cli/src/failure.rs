@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 /// Why a command ended without doing what was asked.
 #[derive(Debug)]
-pub enum Failure {
+pub(crate) enum Failure {
     /// A comparison was beyond its limit (1).
     Different,
     /// The command line asks for something that there is not (2).
@@ -23,12 +23,12 @@ pub enum Failure {
 
 impl Failure {
     /// A file says something wrong.
-    pub fn input(message: impl Into<String>) -> Self {
+    pub(crate) fn input(message: impl Into<String>) -> Self {
         Self::Input(message.into())
     }
 
     /// The status for the shell.
-    pub fn exit_code(&self) -> ExitCode {
+    pub(crate) fn exit_code(&self) -> ExitCode {
         ExitCode::from(match self {
             Self::Different => 1,
             Self::Usage(_) => 2,
@@ -40,7 +40,7 @@ impl Failure {
     }
 
     /// Whether there is something left to say.
-    pub fn is_silent(&self) -> bool {
+    pub(crate) fn is_silent(&self) -> bool {
         matches!(self, Self::Interrupted(_) | Self::Different)
     }
 }
@@ -61,7 +61,7 @@ impl fmt::Display for Failure {
 ///
 /// # Errors
 /// [`Failure::Io`] when it cannot be written.
-pub fn print(text: &str) -> Result<(), Failure> {
+pub(crate) fn print(text: &str) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(Failure::Io(format!("standard output: {e}"))),

@@ -16,7 +16,7 @@ use crate::reading::{ReadingArguments, print_warnings};
   lumbre info model.ply --json | python3 -m json.tool
 
 Exit status 3 when the scene would not load.")]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// The scene.
     #[arg(required = true)]
     scene: Vec<PathBuf>,
@@ -28,7 +28,7 @@ pub struct Arguments {
 }
 
 /// Runs the command.
-pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let (scene, diagnostics) = arguments.reading.open(&arguments.scene)?;
     let info = scene.info();
     if arguments.json {

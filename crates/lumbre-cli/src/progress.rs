@@ -12,7 +12,7 @@ use crate::units::spoken;
 
 /// How to show progress.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Style {
+pub(crate) enum Style {
     /// A bar on a terminal, else lines.
     Auto,
     /// A bar.
@@ -26,7 +26,7 @@ pub enum Style {
 }
 
 /// Progress on standard error.
-pub enum Display {
+pub(crate) enum Display {
     /// A bar.
     Bar(ProgressBar),
     /// Lines, with when the last one was written.
@@ -45,7 +45,7 @@ const INTERVAL: Duration = Duration::from_secs(2);
 
 impl Display {
     /// Shows nothing yet.
-    pub fn new(style: Style) -> Self {
+    pub(crate) fn new(style: Style) -> Self {
         match style {
             Style::None => Self::None,
             Style::Auto if std::io::stderr().is_terminal() => Self::bar(),
@@ -64,7 +64,7 @@ impl Display {
     }
 
     /// Clears a bar.
-    pub fn finish(&self) {
+    pub(crate) fn finish(&self) {
         if let Self::Bar(bar) = self {
             bar.finish_and_clear();
         }

@@ -11,7 +11,7 @@ use crate::units;
 
 /// How scene files are read.
 #[derive(Args)]
-pub struct ReadingArguments {
+pub(crate) struct ReadingArguments {
     /// Warnings are errors.
     #[arg(long, conflicts_with = "lenient")]
     strict: bool,
@@ -68,7 +68,7 @@ fn rate(text: &str) -> Result<f64, String> {
 
 /// Frames from a first to a last one, both included.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Frames(pub std::ops::RangeInclusive<u32>);
+pub(crate) struct Frames(pub std::ops::RangeInclusive<u32>);
 
 /// The most frames of one run, and the largest number of one.
 const MOST_FRAMES: u32 = 1_000_000;
@@ -87,23 +87,22 @@ impl std::str::FromStr for Frames {
 
 impl ReadingArguments {
     fn limits(&self) -> Limits {
-        let default = Limits::default();
-        Limits {
-            memory: self.max_memory.unwrap_or(default.memory),
-            elements: self.max_elements.unwrap_or(default.elements),
-            nesting: self.max_nesting.unwrap_or(default.nesting),
-            files: self.max_files.unwrap_or(default.files),
-            expansion: self.max_expansion.unwrap_or(default.expansion),
-        }
+        let mut limits = Limits::default();
+        limits.memory = self.max_memory.unwrap_or(limits.memory);
+        limits.elements = self.max_elements.unwrap_or(limits.elements);
+        limits.nesting = self.max_nesting.unwrap_or(limits.nesting);
+        limits.files = self.max_files.unwrap_or(limits.files);
+        limits.expansion = self.max_expansion.unwrap_or(limits.expansion);
+        limits
     }
 
     /// Whether warnings are errors.
-    pub fn is_strict(&self) -> bool {
+    pub(crate) fn is_strict(&self) -> bool {
         self.strict
     }
 
     /// What warnings and breaches are.
-    pub fn strictness(&self) -> Strictness {
+    pub(crate) fn strictness(&self) -> Strictness {
         match (self.strict, self.lenient) {
             (true, _) => Strictness::Strict,
             (_, true) => Strictness::Lenient,
@@ -115,7 +114,7 @@ impl ReadingArguments {
     ///
     /// # Errors
     /// [`Failure`] by what went wrong.
-    pub fn open(&self, paths: &[PathBuf]) -> Result<(Scene, Diagnostics), Failure> {
+    pub(crate) fn open(&self, paths: &[PathBuf]) -> Result<(Scene, Diagnostics), Failure> {
         let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
         lumbre::open_with(&paths, &self.options(self.frame)?).map_err(Failure::from)
     }
@@ -124,7 +123,7 @@ impl ReadingArguments {
     ///
     /// # Errors
     /// As [`ReadingArguments::open`].
-    pub fn describe(&self, paths: &[PathBuf]) -> Result<(SceneDesc, Diagnostics), Failure> {
+    pub(crate) fn describe(&self, paths: &[PathBuf]) -> Result<(SceneDesc, Diagnostics), Failure> {
         self.describe_at(paths, self.frame)
     }
 
@@ -132,7 +131,7 @@ impl ReadingArguments {
     ///
     /// # Errors
     /// As [`ReadingArguments::open`].
-    pub fn describe_frame(
+    pub(crate) fn describe_frame(
         &self,
         paths: &[PathBuf],
         number: u32,
@@ -156,19 +155,19 @@ impl ReadingArguments {
                 "--animation needs the time of a picture (expected --frame or --frames, too)".to_owned(),
             ));
         }
-        Ok(lumbre::ReadOptions {
-            limits: self.limits(),
-            strictness: self.strictness(),
-            frame,
-            shutter: self.shutter.unwrap_or(0.0) / self.fps,
-            animation: self.animation.clone(),
-            variant: self.variant.clone(),
-        })
+        let mut options = lumbre::ReadOptions::default();
+        options.limits = self.limits();
+        options.strictness = self.strictness();
+        options.frame = frame;
+        options.shutter = self.shutter.unwrap_or(0.0) / self.fps;
+        options.animation = self.animation.clone();
+        options.variant = self.variant.clone();
+        Ok(options)
     }
 }
 
 /// Prints warnings to standard error, and their number where many were left out.
-pub fn print_warnings(diagnostics: &Diagnostics) {
+pub(crate) fn print_warnings(diagnostics: &Diagnostics) {
     for line in diagnostics.lines() {
         say!("{line}");
     }

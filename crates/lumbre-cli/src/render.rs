@@ -46,7 +46,7 @@ Animations of a glTF, at a time in seconds, or frame by frame with motion blur:
   lumbre render dancer.glb --frames 0..47 --fps 24 --shutter 0.5 -o frame.####.png
 
 Ctrl-C stops and saves what is there; a second one stops at once and saves nothing.")]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// The scene: .pbrt, .gltf, .glb, .obj, .ply or .stl, also packed by gzip (but glTF). Several .pbrt files are read one after another.
     #[arg(required = true)]
     scene: Vec<PathBuf>,
@@ -143,7 +143,7 @@ fn feature(name: &str) -> Result<Feature, String> {
 }
 
 /// Runs the command.
-pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     // An impossible name is found before the scene is read, an impossible folder before it is rendered.
     arguments.staging.check(arguments.output.as_deref())?;
     arguments.check_frames(arguments.output.as_deref())?;
@@ -168,7 +168,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
                 say!("frame {number} ({} of {})", number - first + 1, last - first + 1);
             }
             let frame = Some((frame, &mut held));
-            picture(arguments, &stage, desc, &mut diagnostics, frame, &mut exposure, start, &cancel)?;
+            let context = Context { arguments, stage: &stage, start, cancel: &cancel };
+            picture(context, desc, &mut diagnostics, frame, &mut exposure)?;
             if cancel.is_cancelled() {
                 break;
             }
@@ -177,7 +178,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         let (desc, mut diagnostics) = arguments.reading.describe(&arguments.scene)?;
         match arguments.staging.turntable() {
             None => {
-                picture(arguments, &stage, desc, &mut diagnostics, None, &mut exposure, start, &cancel)?;
+                let context = Context { arguments, stage: &stage, start, cancel: &cancel };
+                picture(context, desc, &mut diagnostics, None, &mut exposure)?;
             }
             Some(frames) => {
                 for turn in 0..frames {
@@ -187,7 +189,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
                     // Each turn has a camera of its own.
                     let frame = Some((frame, &mut Held::default()));
                     let desc = desc.clone();
-                    picture(arguments, &stage, desc, &mut diagnostics, frame, &mut exposure, start, &cancel)?;
+                    let context = Context { arguments, stage: &stage, start, cancel: &cancel };
+                    picture(context, desc, &mut diagnostics, frame, &mut exposure)?;
                     if cancel.is_cancelled() {
                         break;
                     }
@@ -249,26 +252,34 @@ struct Frame {
     is_first: bool,
 }
 
+/// What a picture is rendered with.
+#[derive(Clone, Copy)]
+struct Context<'a> {
+    arguments: &'a Arguments,
+    stage: &'a Stage,
+    /// When its reading began.
+    start: Instant,
+    cancel: &'a CancelToken,
+}
+
 /// Renders and saves one picture, the only one or a frame of several.
 fn picture(
-    arguments: &Arguments,
-    stage: &Stage,
+    context: Context<'_>,
     mut desc: SceneDesc,
     diagnostics: &mut Diagnostics,
     frame: Option<(Frame, &mut Held)>,
     exposure: &mut Option<f32>,
-    start: Instant,
-    cancel: &CancelToken,
 ) -> Result<(), Failure> {
+    let Context { arguments, stage, start, cancel } = context;
     let is_first = frame.as_ref().is_none_or(|(frame, _)| frame.is_first);
     let is_frame = frame.is_some();
     let number = frame.as_ref().map(|(frame, _)| frame.number);
     let is_of_light = arguments.integrator.unwrap_or(desc.integrator.kind).needs_light();
-    let stage = match is_of_light || arguments.staging.wants_ground() {
-        true => stage.clone(),
+    let mut stage = stage.clone();
+    if !is_of_light && !arguments.staging.wants_ground() {
         // Pictures of normals and the like are of the model alone.
-        false => Stage { ground: Ground::None, ..stage.clone() },
-    };
+        stage.ground = Ground::None;
+    }
     let staged = stage.set(&mut desc);
     if let Some((_, held)) = frame {
         held.hold(&staged, &mut desc);
@@ -335,7 +346,8 @@ fn picture(
     let save_start = Instant::now();
     let is_shown = is_of_light && staged.light != StageLight::Own;
     let tone_map = arguments.tonemap.unwrap_or(if is_shown { ToneMap::Neutral } else { ToneMap::None });
-    let save = SaveOptions { tone_map, exposure, ..SaveOptions::default() };
+    let mut save = SaveOptions::default();
+    (save.tone_map, save.exposure) = (tone_map, exposure);
     let picture = match behind {
         Behind::Backdrop(backdrop) => picture.before(backdrop),
         Behind::Lights | Behind::Nothing => picture,

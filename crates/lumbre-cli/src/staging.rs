@@ -13,7 +13,7 @@ use crate::failure::Failure;
 /// How a model is shown.
 #[derive(Args)]
 #[command(next_help_heading = "Showing a model")]
-pub struct StagingArguments {
+pub(crate) struct StagingArguments {
     /// What the model stands on: none, shadow (ground of which only the shadow is seen) or plane (matte grey). By default a
     /// shadow where both camera and light are automatic.
     #[arg(long, value_name = "WHAT", value_parser = ground)]
@@ -101,7 +101,7 @@ fn colour(code: u32) -> Rgb {
 }
 
 /// What is behind a picture.
-pub enum Behind {
+pub(crate) enum Behind {
     /// The lights at infinity.
     Lights,
     /// Nothing: the picture has coverage.
@@ -112,7 +112,7 @@ pub enum Behind {
 
 impl Behind {
     /// Whether the picture is rendered without what is behind it.
-    pub fn is_transparent(&self) -> bool {
+    pub(crate) fn is_transparent(&self) -> bool {
         !matches!(self, Self::Lights)
     }
 }
@@ -122,7 +122,7 @@ impl StagingArguments {
     ///
     /// # Errors
     /// [`Failure::Usage`].
-    pub fn check(&self, output: Option<&Path>) -> Result<(), Failure> {
+    pub(crate) fn check(&self, output: Option<&Path>) -> Result<(), Failure> {
         let Some(output) = output else { return Ok(()) };
         let name = output.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
         let has_number = name.contains('#');
@@ -143,7 +143,7 @@ impl StagingArguments {
     }
 
     /// How many pictures there are from around the model.
-    pub fn turntable(&self) -> Option<u32> {
+    pub(crate) fn turntable(&self) -> Option<u32> {
         self.turntable
     }
 
@@ -151,7 +151,7 @@ impl StagingArguments {
     ///
     /// # Errors
     /// What cannot be read, and [`Failure::Usage`] for a picture that is no environment.
-    pub fn stage(&self, size: Option<(u32, u32)>) -> Result<Stage, Failure> {
+    pub(crate) fn stage(&self, size: Option<(u32, u32)>) -> Result<Stage, Failure> {
         let surroundings = match &self.env {
             None => Surroundings::Automatic,
             Some(path) if path.as_os_str() == "none" => Surroundings::Own,
@@ -159,7 +159,10 @@ impl StagingArguments {
             Some(path) => Surroundings::Map(environment(path)?),
         };
         let ground = self.ground.unwrap_or_default();
-        Ok(Stage { fit: self.fit, size, turns: None, surroundings, ground })
+        let mut stage = Stage::default();
+        (stage.fit, stage.size) = (self.fit, size);
+        (stage.surroundings, stage.ground) = (surroundings, ground);
+        Ok(stage)
     }
 
     /// What is behind a picture of a staged description. Pictures that are not of light (normals and the like) have nothing
@@ -167,7 +170,7 @@ impl StagingArguments {
     ///
     /// # Errors
     /// What cannot be read.
-    pub fn behind(&self, staged: &Staged, is_of_light: bool) -> Result<Behind, Failure> {
+    pub(crate) fn behind(&self, staged: &Staged, is_of_light: bool) -> Result<Behind, Failure> {
         Ok(match &self.background {
             None if is_of_light && staged.light == StageLight::Studio => Behind::Backdrop(Backdrop::studio()),
             None | Some(Background::Lights) => Behind::Lights,
@@ -181,7 +184,7 @@ impl StagingArguments {
     }
 
     /// Whether ground is asked for.
-    pub fn wants_ground(&self) -> bool {
+    pub(crate) fn wants_ground(&self) -> bool {
         matches!(self.ground, Some(Ground::Shadow | Ground::Plane))
     }
 }
@@ -205,7 +208,7 @@ fn opaque(image: Image) -> Image {
 }
 
 /// The name of a frame: the number in place of the last run of `#`, with as many digits at least.
-pub fn frame_name(pattern: &Path, number: u32) -> PathBuf {
+pub(crate) fn frame_name(pattern: &Path, number: u32) -> PathBuf {
     let name = pattern.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let Some(last) = name.rfind('#') else { return pattern.to_owned() };
     let first = name[..=last]
@@ -216,7 +219,7 @@ pub fn frame_name(pattern: &Path, number: u32) -> PathBuf {
 }
 
 /// Whether a camera at this place looks at the ground from below, which hides everything from it.
-pub fn is_below(ground: &GroundPlane, place: lumbre::DVec3) -> bool {
+pub(crate) fn is_below(ground: &GroundPlane, place: lumbre::DVec3) -> bool {
     (place - ground.point).dot(ground.normal) < 0.0
 }
 

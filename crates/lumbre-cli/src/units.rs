@@ -6,7 +6,7 @@ use std::time::Duration;
 ///
 /// # Errors
 /// What was expected.
-pub fn size(text: &str) -> Result<(u32, u32), String> {
+pub(crate) fn size(text: &str) -> Result<(u32, u32), String> {
     let wrong =
         || format!("found \"{text}\"; expected WIDTHxHEIGHT in pixels, each from 1 to 65536, as 640x480");
     let (width, height) = text.split_once(['x', 'X']).ok_or_else(wrong)?;
@@ -16,7 +16,7 @@ pub fn size(text: &str) -> Result<(u32, u32), String> {
 
 /// `x0,y0,x1,y1` in pixels, or in fractions of the picture when a number has a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Crop {
+pub(crate) enum Crop {
     /// Left, top, right, bottom in pixels, right and bottom excluded.
     Pixels([u32; 4]),
     /// The same in [0, 1].
@@ -27,7 +27,7 @@ pub enum Crop {
 ///
 /// # Errors
 /// What was expected.
-pub fn crop(text: &str) -> Result<Crop, String> {
+pub(crate) fn crop(text: &str) -> Result<Crop, String> {
     let wrong = || {
         format!(
             "found \"{text}\"; expected x0,y0,x1,y1 with x0 < x1 and y0 < y1, in pixels (10,20,110,95) or in fractions (0.25,0.25,0.5,0.5)"
@@ -55,7 +55,7 @@ pub fn crop(text: &str) -> Result<Crop, String> {
 ///
 /// # Errors
 /// What was expected.
-pub fn duration(text: &str) -> Result<Duration, String> {
+pub(crate) fn duration(text: &str) -> Result<Duration, String> {
     let wrong = || format!("found \"{text}\"; expected a time such as 90s, 2m, 1h30m or 500ms");
     let mut rest = text.trim();
     let mut seconds = 0.0;
@@ -82,7 +82,7 @@ pub fn duration(text: &str) -> Result<Duration, String> {
 ///
 /// # Errors
 /// What was expected.
-pub fn bytes(text: &str) -> Result<u64, String> {
+pub(crate) fn bytes(text: &str) -> Result<u64, String> {
     let wrong = || format!("found \"{text}\"; expected a size such as 8G, 512M or 100k");
     let lower = text.trim().to_ascii_lowercase();
     let lower = lower.trim_end_matches('b').trim_end_matches('i');
@@ -98,7 +98,7 @@ pub fn bytes(text: &str) -> Result<u64, String> {
 }
 
 /// A duration as people say it.
-pub fn spoken(duration: Duration) -> String {
+pub(crate) fn spoken(duration: Duration) -> String {
     let seconds = duration.as_secs();
     match seconds {
         0..=9 => format!("{:.1} s", duration.as_secs_f64()),

@@ -1,5 +1,7 @@
 //! Broken inputs that only show through the program: what it says, and the status that it ends with.
 
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
 use std::fs;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};

@@ -1,5 +1,7 @@
 //! The reference vectors, through the program: a scene file in, CSV out, to the last bits of double precision.
 
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
 use std::fmt::Write as _;
 use std::path::Path;
 use std::process::Command;

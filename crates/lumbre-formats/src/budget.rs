@@ -10,6 +10,7 @@ use thiserror::Error;
 
 /// How much may be read, each limit with the flag that raises it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Limits {
     /// Bytes held at one time by everything that was read (`--max-memory`).
     pub memory: u64,
@@ -42,6 +43,7 @@ impl Default for Limits {
 
 /// Which limit was met.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum LimitKind {
     /// [`Limits::memory`].
     Memory,

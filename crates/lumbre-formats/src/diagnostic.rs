@@ -239,6 +239,7 @@ impl Display for Diagnostic {
 ///
 /// Displayed without `error: ` in front, as errors are; [`FormatError::to_diagnostic`] has the whole line.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum FormatError {
     /// The input is wrong.
     #[error("{}", .0.body())]

@@ -13,6 +13,7 @@ use crate::{Budget, Diagnostic, Diagnostics, FormatError, Limits, Place, Strictn
 
 /// How a scene is read.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct ReadOptions {
     /// What to do about input that is not as it should be.
     pub strictness: Strictness,

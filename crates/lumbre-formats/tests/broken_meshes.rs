@@ -1,7 +1,12 @@
 //! What is said about broken meshes and images: each file with its whole message.
 
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
+mod common;
+
 use std::sync::Arc;
 
+use common::changed;
 use lumbre_formats::image::{ImageFormat, WriteOptions, encode_image, read_image};
 use lumbre_formats::obj::{read_mtl, read_obj};
 use lumbre_formats::ply::read_ply;
@@ -11,7 +16,10 @@ use lumbre_image::{Image, Rgb};
 
 fn read(name: &str, bytes: &[u8]) -> Result<(), FormatError> {
     let file: Arc<str> = name.into();
-    let budget = Budget::new(Limits { memory: 4 << 20, elements: 100_000, ..Limits::default() });
+    let budget = Budget::new(changed(Limits::default(), |it| {
+        it.memory = 4 << 20;
+        it.elements = 100_000;
+    }));
     let mut said = Diagnostics::new();
     match name.rsplit('.').next().unwrap() {
         "ply" => read_ply(bytes, &file, &budget, &mut said).map(drop),

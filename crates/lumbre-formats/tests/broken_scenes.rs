@@ -1,9 +1,14 @@
 //! Scenes that are wrong: each is refused at its place, none makes the reader stop in another way.
 
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
+mod common;
+
 use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use common::changed;
 use lumbre_formats::{Budget, Diagnostics, Limits, ReadOptions, open_scene, pbrt};
 use lumbre_scene::SceneDesc;
 
@@ -444,7 +449,10 @@ fn mutated_scenes_are_read_or_refused() {
     ];
     let mut numbers = Numbers(0x9E37_79B9_7F4A_7C15);
     let (mut good, mut bad) = (0, 0);
-    let limits = Limits { memory: 64 << 20, elements: 100_000, ..Limits::default() };
+    let limits = changed(Limits::default(), |it| {
+        it.memory = 64 << 20;
+        it.elements = 100_000;
+    });
     for _ in 0..4000 {
         let mut text = SCENES[numbers.below(SCENES.len())].as_bytes().to_vec();
         for _ in 0..=numbers.below(4) {
@@ -487,7 +495,7 @@ fn deep_nesting_is_refused_with_the_flag_that_allows_it() {
         found,
         "error: s.pbrt:1:3852: AttributeBegin: needs 257 levels of nesting, limit 256; raise it with --max-nesting"
     );
-    let limits = Limits { nesting: 2_000_000, ..Limits::default() };
+    let limits = changed(Limits::default(), |it| it.nesting = 2_000_000);
     let deep = format!("WorldBegin {}{}", "AttributeBegin ".repeat(100_000), "AttributeEnd ".repeat(100_000));
     assert!(read_within(deep.as_bytes(), limits).0.is_ok());
     assert!(quickly(&format!("WorldBegin {}", "[".repeat(1_000_000))).contains("no directive before this"));
@@ -515,7 +523,7 @@ fn what_doubles_with_each_line_is_stopped() {
     assert_eq!(quickly(&textures), "error: s.pbrt:12:1: a texture is made of more than 4096 others");
     assert!(quickly(&chain).ends_with("textures stand in each other more than 64 deep"));
     assert!(quickly(&mixed).ends_with("mixtures stand in each other more than 64 deep"));
-    let limits = Limits { elements: 100_000, ..Limits::default() };
+    let limits = changed(Limits::default(), |it| it.elements = 100_000);
     let refused = read_within(solids.as_bytes(), limits).0.unwrap_err();
     assert!(refused.contains("operands of a csg") && refused.contains("--max-elements"), "{refused}");
 }
@@ -567,8 +575,8 @@ fn includes_that_fan_out_stop_at_the_limit_of_files() {
         fs::write(dir.path().join(format!("{i}.pbrt")), text).unwrap();
     }
     fs::write(dir.path().join("40.pbrt"), "").unwrap();
-    let limits = Limits { files: 300, ..Limits::default() };
-    let options = ReadOptions { limits, ..ReadOptions::default() };
+    let limits = changed(Limits::default(), |it| it.files = 300);
+    let options = changed(ReadOptions::default(), |it| it.limits = limits);
     let error = open_scene(&dir.path().join("0.pbrt"), &options).unwrap_err().to_string();
     assert!(error.contains("--max-files"), "{error}");
 }

@@ -1,12 +1,14 @@
 //! Damaged files of every kind end in an answer or an error: never in a panic, and never in more memory than
 //! 64 MiB and 32 times the input. The damage is the same on every run.
 
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
 mod common;
 
 use std::io::Cursor;
 use std::sync::Arc;
 
-use common::Random;
+use common::{Random, changed};
 use lumbre_formats::image::{
     ExrCompression, ExrPrecision, ImageFormat, PngDepth, WriteOptions, encode_image, read_image, read_layers,
 };
@@ -83,7 +85,13 @@ fn images() -> Vec<(&'static str, Vec<u8>)> {
     let write = |format, options: WriteOptions| encode_image(&image, format, &options).unwrap();
     let plain = WriteOptions::default();
     let exr = |exr_compression, exr_precision| {
-        write(ImageFormat::Exr, WriteOptions { exr_compression, exr_precision, ..plain })
+        write(
+            ImageFormat::Exr,
+            changed(plain, |it| {
+                it.exr_compression = exr_compression;
+                it.exr_precision = exr_precision;
+            }),
+        )
     };
     let by_image = |format| {
         let rgb = image::RgbImage::from_fn(17, 9, |x, y| image::Rgb([x as u8, y as u8, 90]));
@@ -93,7 +101,7 @@ fn images() -> Vec<(&'static str, Vec<u8>)> {
     };
     vec![
         ("8.png", write(ImageFormat::Png, plain)),
-        ("16.png", write(ImageFormat::Png, WriteOptions { png_depth: PngDepth::Sixteen, ..plain })),
+        ("16.png", write(ImageFormat::Png, changed(plain, |it| it.png_depth = PngDepth::Sixteen))),
         ("a.jpg", write(ImageFormat::Jpeg, plain)),
         ("a.hdr", write(ImageFormat::Hdr, plain)),
         ("a.pfm", write(ImageFormat::Pfm, plain)),
@@ -126,7 +134,7 @@ fn meshes() -> Vec<(&'static str, Vec<u8>)> {
 /// Reads a file by its name, under the limit that is promised; whether it could be read.
 fn read(name: &str, bytes: &[u8], strictness: Strictness) -> bool {
     let limit = (64 << 20) + 32 * bytes.len() as u64;
-    let budget = Budget::new(Limits { memory: limit, ..Limits::default() });
+    let budget = Budget::new(changed(Limits::default(), |it| it.memory = limit));
     let mut said = Diagnostics::with_strictness(strictness);
     let file: Arc<str> = name.into();
     let done = if name.ends_with(".gz") {

@@ -1,11 +1,13 @@
 //! glTF: what small models made here become, and what is said of broken ones.
 
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
 mod common;
 
 use std::path::Path;
 use std::sync::Arc;
 
-use common::Random;
+use common::{Random, changed};
 use lumbre_formats::gltf::{GltfOptions, read_gltf};
 use lumbre_formats::{Budget, Diagnostics, FormatError, Limits, Strictness};
 use lumbre_geometry::Shape;
@@ -532,7 +534,7 @@ fn animated() -> (Parts, String) {
 
 fn at_time(frame: Option<f64>) -> SceneDesc {
     let (parts, rest) = animated();
-    let options = GltfOptions { frame, ..GltfOptions::default() };
+    let options = changed(GltfOptions::default(), |it| it.frame = frame);
     read_with(&glb(&parts.json(&rest), &parts.binary), &options, &mut Diagnostics::new()).unwrap()
 }
 
@@ -560,7 +562,10 @@ fn skins_and_morph_targets_stand_at_their_time() {
 #[test]
 fn skins_and_morph_targets_are_seen_moving() {
     let (parts, rest) = animated();
-    let options = GltfOptions { frame: Some(2.5), shutter: 2.0, ..GltfOptions::default() };
+    let options = changed(GltfOptions::default(), |it| {
+        it.frame = Some(2.5);
+        it.shutter = 2.0;
+    });
     let mut diagnostics = Diagnostics::new();
     let scene = read_with(&glb(&parts.json(&rest), &parts.binary), &options, &mut diagnostics).unwrap();
     assert_eq!(diagnostics.lines(), [""; 0]);
@@ -575,7 +580,10 @@ fn skins_and_morph_targets_are_seen_moving() {
     assert!(motion.moments[0] != motion.moments[8]);
     assert!(Scene::build(scene).unwrap().moves());
     // Nothing moves before the first keyframe.
-    let options = GltfOptions { frame: Some(0.4), shutter: 1.0, ..GltfOptions::default() };
+    let options = changed(GltfOptions::default(), |it| {
+        it.frame = Some(0.4);
+        it.shutter = 1.0;
+    });
     let bytes = glb(&parts.json(&rest), &parts.binary);
     let still = read_with(&bytes, &options, &mut Diagnostics::new()).unwrap();
     assert_eq!(mesh(&still.shapes[0]).motion, None);
@@ -610,7 +618,10 @@ fn nodes_and_cameras_that_animations_move_are_seen_moving() {
     let bytes = glb(&parts.json(&rest), &parts.binary);
     let read = |frame, shutter| {
         let mut diagnostics = Diagnostics::new();
-        let options = GltfOptions { frame, shutter, ..GltfOptions::default() };
+        let options = changed(GltfOptions::default(), |it| {
+            it.frame = frame;
+            it.shutter = shutter;
+        });
         let scene = read_with(&bytes, &options, &mut diagnostics).unwrap();
         assert_eq!(diagnostics.lines(), [""; 0]);
         scene
@@ -741,7 +752,7 @@ fn animations_by_pointers_change_what_they_name() {
     for (frame, strength, place, green) in
         [(None, 1.0, DVec3::ONE, 1.0), (Some(1.5), 3.0, DVec3::new(2.0, 1.0, 0.5), 0.75)]
     {
-        let options = GltfOptions { frame, ..GltfOptions::default() };
+        let options = changed(GltfOptions::default(), |it| it.frame = frame);
         let mut diagnostics = Diagnostics::new();
         let scene =
             read_with(&glb(&parts.json(&rest(&all)), &parts.binary), &options, &mut diagnostics).unwrap();
@@ -756,7 +767,10 @@ fn animations_by_pointers_change_what_they_name() {
     }
     // While the shutter is open nodes move; what else changes is said to stand, if it really does.
     for (middle, shutter, still) in [(2.0, 0.5, 3), (0.4, 0.5, 0)] {
-        let options = GltfOptions { frame: Some(middle), shutter, ..GltfOptions::default() };
+        let options = changed(GltfOptions::default(), |it| {
+            it.frame = Some(middle);
+            it.shutter = shutter;
+        });
         let mut diagnostics = Diagnostics::new();
         let scene =
             read_with(&glb(&parts.json(&rest(&all)), &parts.binary), &options, &mut diagnostics).unwrap();
@@ -777,7 +791,7 @@ fn animations_by_pointers_change_what_they_name() {
         ("/materials/1/alphaCutoff", "/pointer: animation of what is not there was left out"),
         ("/nodes/2/scale/0", "/pointer: animation of what is not there was left out"),
     ] {
-        let options = GltfOptions { frame: Some(1.5), ..GltfOptions::default() };
+        let options = changed(GltfOptions::default(), |it| it.frame = Some(1.5));
         let mut diagnostics = Diagnostics::new();
         let odd = glb(&parts.json(&rest(&[channel(1, pointer)])), &parts.binary);
         read_with(&odd, &options, &mut diagnostics).unwrap();
@@ -817,7 +831,11 @@ fn one_of_several_animations_is_chosen_and_those_that_disagree_do_not_mix() {
     let bytes = glb(&parts.json(&rest), &parts.binary);
     let at = |animation: Option<&str>, shutter: f64, diagnostics: &mut Diagnostics| {
         let animation = animation.map(Into::into);
-        let options = GltfOptions { frame: Some(2.0), shutter, animation, ..GltfOptions::default() };
+        let options = changed(GltfOptions::default(), |it| {
+            it.frame = Some(2.0);
+            it.shutter = shutter;
+            it.animation = animation;
+        });
         let scene = read_with(&bytes, &options, diagnostics)?;
         let place = |light: &LightDesc| match light {
             LightDesc::Point { from, .. } => from.x,
@@ -869,7 +887,10 @@ fn nodes_move_by_pointers_as_they_do_by_names() {
     let (parts, rest) = animated();
     let mut moving = 0;
     for (frame, shutter) in [(None, 0.0), (Some(1.5), 0.0), (Some(2.5), 2.0), (Some(2.0), 0.5)] {
-        let options = GltfOptions { frame, shutter, ..GltfOptions::default() };
+        let options = changed(GltfOptions::default(), |it| {
+            it.frame = frame;
+            it.shutter = shutter;
+        });
         let [named, pointed] = [rest.clone(), by_pointers(&rest)].map(|rest| {
             let mut diagnostics = Diagnostics::new();
             let scene =
@@ -912,7 +933,10 @@ fn single_weights_and_those_of_meshes_are_animated_by_pointers() {
     // Where the first vertex of a mesh is at 1.5 s, 2 s and 2.5 s.
     let seen = |pointers: &[(usize, &str)], node: usize, shutter: f64| {
         let bytes = glb(&parts.json(&rest(pointers)), &parts.binary);
-        let options = GltfOptions { frame: Some(2.0), shutter, ..GltfOptions::default() };
+        let options = changed(GltfOptions::default(), |it| {
+            it.frame = Some(2.0);
+            it.shutter = shutter;
+        });
         let mut diagnostics = Diagnostics::new();
         let scene = read_with(&bytes, &options, &mut diagnostics).unwrap();
         let mesh = mesh(&scene.shapes[node]);
@@ -990,7 +1014,10 @@ fn lights_that_animations_move_are_seen_moving() {
     let bytes = glb(&parts.json(&rest), &parts.binary);
     let read = |shutter| {
         let mut diagnostics = Diagnostics::new();
-        let options = GltfOptions { frame: Some(2.0), shutter, ..GltfOptions::default() };
+        let options = changed(GltfOptions::default(), |it| {
+            it.frame = Some(2.0);
+            it.shutter = shutter;
+        });
         let scene = read_with(&bytes, &options, &mut diagnostics).unwrap();
         assert_eq!(diagnostics.lines(), [""; 0]);
         Scene::build(scene).unwrap()
@@ -1416,11 +1443,11 @@ fn variants_are_worn_by_name() {
     );
     let file = glb(&parts.json(&rest), &parts.binary);
     for (variant, material) in [(None, "plain"), (Some("red"), "r"), (Some("blue"), "b")] {
-        let options = GltfOptions { variant: variant.map(str::to_owned), ..GltfOptions::default() };
+        let options = changed(GltfOptions::default(), |it| it.variant = variant.map(str::to_owned));
         let scene = read_with(&file, &options, &mut Diagnostics::new()).unwrap();
         assert_eq!(scene.materials[0].name.as_deref(), Some(material));
     }
-    let options = GltfOptions { variant: Some("bleu".to_owned()), ..GltfOptions::default() };
+    let options = changed(GltfOptions::default(), |it| it.variant = Some("bleu".to_owned()));
     let error = read_with(&file, &options, &mut Diagnostics::new()).unwrap_err().to_string();
     assert_eq!(
         error,
@@ -1710,7 +1737,10 @@ fn damaged_files_never_panic_and_cost_little() {
         }
         let strictness = [Strictness::Normal, Strictness::Lenient][round % 2];
         let (frame, shutter) = ([None, Some(1.7)][round / 2 % 2], [0.0, 0.4][round / 4 % 2]);
-        let options = GltfOptions { frame, shutter, ..GltfOptions::default() };
+        let options = changed(GltfOptions::default(), |it| {
+            it.frame = frame;
+            it.shutter = shutter;
+        });
         let budget = Budget::new(Limits::default());
         let mut diagnostics = Diagnostics::with_strictness(strictness);
         let read =

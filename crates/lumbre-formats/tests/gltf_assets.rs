@@ -1,5 +1,7 @@
 //! glTF files that others made, where there are some.
 
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
 mod common;
 
 use std::path::Path;

@@ -1,10 +1,12 @@
 //! Image files come back as they were written, and as others wrote them.
 
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
 mod common;
 
 use std::sync::Arc;
 
-use common::{Random, files_below, shared};
+use common::{Random, changed, files_below, shared};
 use lumbre_formats::image::{
     ExrCompression, ExrPrecision, ImageFormat, PngDepth, WriteOptions, encode_image, encode_layers,
     open_image, read_image, read_layers, write_image,
@@ -58,7 +60,7 @@ fn worst(a: &Image, b: &Image) -> f32 {
 #[test]
 fn png_comes_back_to_half_a_step_of_its_curve() {
     for (depth, steps) in [(PngDepth::Eight, 255.0), (PngDepth::Sixteen, 65535.0)] {
-        let options = WriteOptions { png_depth: depth, ..WriteOptions::default() };
+        let options = changed(WriteOptions::default(), |it| it.png_depth = depth);
         let image = picture(23, 11);
         let bytes = encode_image(&image, ImageFormat::Png, &options).unwrap();
         let read = back(&bytes, "a.png");
@@ -75,7 +77,7 @@ fn png_comes_back_to_half_a_step_of_its_curve() {
 #[test]
 fn png_keeps_coverage_apart_from_colour() {
     let image = covered(9, 5);
-    let options = WriteOptions { png_depth: PngDepth::Sixteen, ..WriteOptions::default() };
+    let options = changed(WriteOptions::default(), |it| it.png_depth = PngDepth::Sixteen);
     let bytes = encode_image(&image, ImageFormat::Png, &options).unwrap();
     let read = back(&bytes, "a.png");
     assert!(worst(&image, &read) < 1e-4);
@@ -86,11 +88,10 @@ fn png_keeps_coverage_apart_from_colour() {
 fn exr_comes_back_exactly_in_every_packing() {
     for compression in [ExrCompression::None, ExrCompression::Rle, ExrCompression::Zip, ExrCompression::Piz] {
         for precision in [ExrPrecision::Half, ExrPrecision::Float] {
-            let options = WriteOptions {
-                exr_compression: compression,
-                exr_precision: precision,
-                ..WriteOptions::default()
-            };
+            let options = changed(WriteOptions::default(), |it| {
+                it.exr_compression = compression;
+                it.exr_precision = precision;
+            });
             let image = covered(37, 35);
             let image = image.map(|c| c * 300.0);
             let read = back(&encode_image(&image, ImageFormat::Exr, &options).unwrap(), "a.exr");
@@ -121,11 +122,10 @@ fn exr_keeps_layers_and_the_digits_that_they_need() {
 #[test]
 fn exr_parts_lie_where_they_belong() {
     let part = picture(8, 6);
-    let options = WriteOptions {
-        exr_window: Some((5, 2, 20, 10)),
-        exr_precision: ExrPrecision::Float,
-        ..WriteOptions::default()
-    };
+    let options = changed(WriteOptions::default(), |it| {
+        it.exr_window = Some((5, 2, 20, 10));
+        it.exr_precision = ExrPrecision::Float;
+    });
     let bytes = encode_image(&part, ImageFormat::Exr, &options).unwrap();
     let whole = back(&bytes, "a.exr");
     assert_eq!(whole, part.placed(5, 2, 20, 10));
@@ -165,7 +165,10 @@ fn bytes_stay_bytes_and_scenes_may_say_what_they_mean() {
 #[test]
 fn display_formats_are_tone_mapped_and_others_are_not() {
     let image = Image::filled(4, 3, Rgb::new(2.0, 1.0, 0.5));
-    let options = WriteOptions { tone_map: ToneMap::Neutral, exposure: 1.0, ..WriteOptions::default() };
+    let options = changed(WriteOptions::default(), |it| {
+        it.tone_map = ToneMap::Neutral;
+        it.exposure = 1.0;
+    });
     let png = back(&encode_image(&image, ImageFormat::Png, &options).unwrap(), "a.png");
     let expected = ToneMap::Neutral.apply(Rgb::new(4.0, 2.0, 1.0));
     assert!((png.pixel(3, 2) - expected).map(f32::abs).max_component() < 0.01);

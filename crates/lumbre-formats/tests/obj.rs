@@ -1,5 +1,7 @@
 //! OBJ and MTL files: everything that faces, names and materials can say.
 
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
 mod common;
 
 use std::sync::Arc;

@@ -4,7 +4,7 @@ mod common;
 
 use std::sync::Arc;
 
-use common::shared;
+use common::{changed, shared};
 use lumbre_formats::ply::read_ply;
 use lumbre_formats::{Budget, Diagnostics, FormatError, Input, Limits, ReadOptions, Strictness, open_scene};
 use lumbre_scene::MeshDesc;
@@ -245,7 +245,7 @@ fn a_count_bomb_costs_nothing() {
                         &format!("{element} {}", if element == "vertex" { "1" } else { count }),
                     )
                     .replace("element vertex 1\nproperty uchar a\n", "");
-                let budget = Budget::new(Limits { memory: 1 << 20, ..Limits::default() });
+                let budget = Budget::new(changed(Limits::default(), |it| it.memory = 1 << 20));
                 let mut bytes = text.clone().into_bytes();
                 bytes.extend(b"1 2 3 4 5 6 7 8 9 ");
                 let error = read_ply(&bytes, &name(), &budget, &mut Diagnostics::new()).unwrap_err();

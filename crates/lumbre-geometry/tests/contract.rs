@@ -1,5 +1,7 @@
 //! What every shape promises. To put a shape under contract, add a line to `subjects`.
 
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
 use std::f64::consts::{PI, TAU};
 
 use lumbre_geometry::{

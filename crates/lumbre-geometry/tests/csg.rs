@@ -1,5 +1,7 @@
 //! Constructive solid geometry against the membership of points.
 
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
 use std::sync::Arc;
 
 use lumbre_geometry::{

@@ -1,5 +1,7 @@
 //! The nearest point of every shape: it is on the surface, as far away as it says, and no other point is nearer.
 
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
 use lumbre_geometry::{
     Aabb, BilinearPatch, Capsule, Cone, Csg, Cuboid, Cylinder, Disk, Hyperboloid, NearestPoint,
     NoNearestPoint, Paraboloid, PlacedShape, Plane, Quadric, Shape, ShapeError, Sphere, Torus, Triangle,

@@ -1,5 +1,7 @@
 //! Tori against answers in twice the precision.
 
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
 use lumbre_geometry::{Ray, Roots, Torus};
 use lumbre_math::random::RandomStream;
 use lumbre_math::roots::roots_between;

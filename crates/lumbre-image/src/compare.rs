@@ -5,6 +5,7 @@ use crate::{Image, Rgb};
 
 /// A measure of the difference of two images.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Metric {
     /// The root of the mean squared difference of the channels.
     Rmse,

@@ -6,6 +6,7 @@ use crate::Rgb;
 
 /// How the colour channels of stored numbers in `[0, 1]` stand for light. Coverage is always linear.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Encoding {
     /// In proportion to light.
     Linear,

@@ -4,6 +4,7 @@ use crate::{Encoded, Rgb};
 
 /// How unbounded light is brought within what a display shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum ToneMap {
     /// Cut off at 1.
     #[default]

@@ -1,4 +1,6 @@
 #![doc = include_str!("../README.md")]
+#![allow(unreachable_pub, unsafe_op_in_unsafe_fn, missing_debug_implementations)]
+#![allow(clippy::unwrap_used, clippy::too_many_arguments)]
 
 mod accel;
 mod batch;

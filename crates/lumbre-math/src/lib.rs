@@ -4,7 +4,7 @@
 //! ```
 //! use lumbre_math::{DVec3, Transform};
 //!
-//! # fn main() -> Result<(), lumbre_math::SingularTransform> {
+//! # fn main() -> Result<(), lumbre_math::SingularTransformError> {
 //! let world_from_part = Transform::translate(DVec3::new(5.0, 0.0, 0.0)) * Transform::rotate(DVec3::Z, 90.0)?;
 //! assert_eq!(world_from_part.point(DVec3::X), DVec3::new(5.0, 1.0, 0.0));
 //! assert_eq!(world_from_part.vector(DVec3::X), DVec3::Y);
@@ -20,6 +20,12 @@
 //! otherwise, and exact at the right angles; a positive rotation about z turns x towards y, about x y towards z, about
 //! y z towards x, whatever the hand in which the axes are drawn. The parameter `t` of a ray is in units of its direction
 //! as given. Row vectors and other hands enter at the boundary: see [`matrix`].
+//!
+//! # glam in the public interface
+//!
+//! Vectors, matrices and quaternions are those of glam 0.34, which is re-exported as [`glam`] so that a program need not name
+//! the version: `use lumbre_math::glam`. A change to another minor version of glam (0.35) is a breaking change of this crate
+//! and of all that build on it, and raises their minor versions too; a patch of glam is not.
 //!
 //! Nothing here does input or output or keeps a state, and nothing panics on any number.
 //!
@@ -88,4 +94,4 @@ pub mod warp64;
 
 pub use animated::{AnimatedTransform, AnimationError};
 pub use frame::{Frame, orthonormal_basis, orthonormal_basis_f32};
-pub use transform::{SingularTransform, Transform};
+pub use transform::{SingularTransformError, Transform};

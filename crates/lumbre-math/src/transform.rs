@@ -27,15 +27,15 @@ pub struct Transform {
 /// The matrix has no usable inverse: its determinant is zero up to rounding, or an entry is not finite, or it is not
 /// affine (its last row is not 0 0 0 1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SingularTransform;
+pub struct SingularTransformError;
 
-impl std::fmt::Display for SingularTransform {
+impl std::fmt::Display for SingularTransformError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str("the transform is not an invertible affine map")
     }
 }
 
-impl std::error::Error for SingularTransform {}
+impl std::error::Error for SingularTransformError {}
 
 impl Default for Transform {
     fn default() -> Self {
@@ -50,12 +50,12 @@ impl Transform {
     /// A general affine map, given with columns as images of the axes.
     ///
     /// # Errors
-    /// [`SingularTransform`] when |det L| ≤ 16 u Π|row of L|, when an entry is not finite, or when the last row is not
+    /// [`SingularTransformError`] when |det L| ≤ 16 u Π|row of L|, when an entry is not finite, or when the last row is not
     /// a non-zero multiple of 0 0 0 1 (such a multiple is divided out: homogeneous points are the same up to a factor).
-    pub fn from_matrix(matrix: DMat4) -> Result<Self, SingularTransform> {
+    pub fn from_matrix(matrix: DMat4) -> Result<Self, SingularTransformError> {
         let last = matrix.row(3);
         if !matrix.is_finite() || last.truncate() != DVec3::ZERO || last.w == 0.0 {
-            return Err(SingularTransform);
+            return Err(SingularTransformError);
         }
         let matrix = if last.w == 1.0 {
             matrix
@@ -68,12 +68,12 @@ impl Transform {
     /// A general affine map.
     ///
     /// # Errors
-    /// [`SingularTransform`] as for [`Transform::from_matrix`].
-    pub fn from_affine(forward: DAffine3) -> Result<Self, SingularTransform> {
-        let linear = inverse_linear(&forward.matrix3).ok_or(SingularTransform)?;
+    /// [`SingularTransformError`] as for [`Transform::from_matrix`].
+    pub fn from_affine(forward: DAffine3) -> Result<Self, SingularTransformError> {
+        let linear = inverse_linear(&forward.matrix3).ok_or(SingularTransformError)?;
         let inverse = DAffine3 { matrix3: linear, translation: -(linear * forward.translation) };
         let finite = forward.is_finite() && inverse.is_finite();
-        if finite { Ok(Self { forward, inverse }) } else { Err(SingularTransform) }
+        if finite { Ok(Self { forward, inverse }) } else { Err(SingularTransformError) }
     }
 
     /// A map with what is known to be its inverse.
@@ -94,15 +94,15 @@ impl Transform {
     /// First scales, then rotates, then moves: the nodes of glTF. The quaternion needs no unit length.
     ///
     /// # Errors
-    /// [`SingularTransform`] when a factor or the quaternion is zero, or anything is not finite.
+    /// [`SingularTransformError`] when a factor or the quaternion is zero, or anything is not finite.
     pub fn from_scale_rotation_translation(
         factors: DVec3,
         rotation: DQuat,
         offset: DVec3,
-    ) -> Result<Self, SingularTransform> {
+    ) -> Result<Self, SingularTransformError> {
         let turn = quaternion::to_matrix(rotation);
         if !turn.is_finite() || !offset.is_finite() {
-            return Err(SingularTransform);
+            return Err(SingularTransformError);
         }
         let turn =
             Self { forward: DAffine3::from_mat3(turn), inverse: DAffine3::from_mat3(turn.transpose()) };
@@ -113,20 +113,20 @@ impl Transform {
     /// upwards: gluLookAt.
     ///
     /// # Errors
-    /// [`SingularTransform`] when the eye is at the target, or `up` is parallel to the view.
-    pub fn look_at_right(eye: DVec3, target: DVec3, up: DVec3) -> Result<Self, SingularTransform> {
+    /// [`SingularTransformError`] when the eye is at the target, or `up` is parallel to the view.
+    pub fn look_at_right(eye: DVec3, target: DVec3, up: DVec3) -> Result<Self, SingularTransformError> {
         let view = View::look_at(eye, target, up, Handedness::Right);
-        view.map(|view| view.camera_from_world()).ok_or(SingularTransform)
+        view.map(|view| view.camera_from_world()).ok_or(SingularTransformError)
     }
 
     /// The map from world to the coordinates of a camera at `eye` that looks at `target` along +z, x to the right and y
     /// upwards in a left-handed world: the LookAt of pbrt and RenderMan.
     ///
     /// # Errors
-    /// [`SingularTransform`] when the eye is at the target, or `up` is parallel to the view.
-    pub fn look_at_left(eye: DVec3, target: DVec3, up: DVec3) -> Result<Self, SingularTransform> {
+    /// [`SingularTransformError`] when the eye is at the target, or `up` is parallel to the view.
+    pub fn look_at_left(eye: DVec3, target: DVec3, up: DVec3) -> Result<Self, SingularTransformError> {
         let view = View::look_at(eye, target, up, Handedness::Left);
-        view.map(|view| view.camera_from_world()).ok_or(SingularTransform)
+        view.map(|view| view.camera_from_world()).ok_or(SingularTransformError)
     }
 
     /// Moves points by `offset`; leaves directions alone.
@@ -137,21 +137,28 @@ impl Transform {
     /// Scales each axis by its factor; a negative factor mirrors.
     ///
     /// # Errors
-    /// [`SingularTransform`] when a factor is zero or not finite, or its reciprocal overflows.
-    pub fn scale(factors: DVec3) -> Result<Self, SingularTransform> {
+    /// [`SingularTransformError`] when a factor is zero or not finite, or its reciprocal overflows.
+    pub fn scale(factors: DVec3) -> Result<Self, SingularTransformError> {
         let inverse = factors.recip();
         if factors.is_finite() && inverse.is_finite() {
             Ok(Self { forward: DAffine3::from_scale(factors), inverse: DAffine3::from_scale(inverse) })
         } else {
-            Err(SingularTransform)
+            Err(SingularTransformError)
         }
     }
 
     /// The shear `x' = x + xy·y + xz·z`, `y' = y + yx·x + yz·z`, `z' = z + zx·x + zy·y`.
     ///
     /// # Errors
-    /// [`SingularTransform`] when the six factors make a singular matrix.
-    pub fn shear(xy: f64, xz: f64, yx: f64, yz: f64, zx: f64, zy: f64) -> Result<Self, SingularTransform> {
+    /// [`SingularTransformError`] when the six factors make a singular matrix.
+    pub fn shear(
+        xy: f64,
+        xz: f64,
+        yx: f64,
+        yz: f64,
+        zx: f64,
+        zy: f64,
+    ) -> Result<Self, SingularTransformError> {
         Self::from_affine(DAffine3::from_mat3(matrix::shear3(xy, xz, yx, yz, zx, zy)))
     }
 
@@ -160,9 +167,9 @@ impl Transform {
     /// Multiples of 90° give exact zeros and ones about the coordinate axes.
     ///
     /// # Errors
-    /// [`SingularTransform`] when the axis is zero or anything is not finite.
-    pub fn rotate(axis: DVec3, degrees: f64) -> Result<Self, SingularTransform> {
-        let linear = matrix::axis_angle(axis, degrees).ok_or(SingularTransform)?;
+    /// [`SingularTransformError`] when the axis is zero or anything is not finite.
+    pub fn rotate(axis: DVec3, degrees: f64) -> Result<Self, SingularTransformError> {
+        let linear = matrix::axis_angle(axis, degrees).ok_or(SingularTransformError)?;
         Ok(Self { forward: DAffine3::from_mat3(linear), inverse: DAffine3::from_mat3(linear.transpose()) })
     }
 

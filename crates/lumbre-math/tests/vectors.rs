@@ -2,6 +2,8 @@
 //!
 //! Each test says how many records it must see, so that a missing family fails.
 
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
 use glam::{DMat3, DMat4, DQuat, DVec2, DVec3, DVec4};
 use lumbre_math::quaternion::{self, Euler};
 use lumbre_math::view::{Handedness, View};

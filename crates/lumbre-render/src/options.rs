@@ -3,13 +3,17 @@
 use std::time::Duration;
 
 use lumbre_math::DVec2;
-use lumbre_scene::{FilterDesc, IntegratorDesc, SamplerDesc, Scene};
+use lumbre_scene::{FilmDesc, FilterDesc, IntegratorDesc, SamplerDesc, Scene};
 
 use crate::RenderError;
 use crate::film::{Exposure, Filter, FilterShape, PixelBounds};
 
-/// Everything about a picture that is not in the scene. [`RenderOptions::of`] has what the scene's description says.
+/// Everything about a picture that is not in the scene.
+///
+/// [`RenderOptions::of`] has what the scene's own description says; [`RenderOptions::default`] asks no scene: 1280 by 720 pixels of
+/// 64 samples, path traced.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct RenderOptions {
     /// Pixels across.
     pub width: u32,
@@ -40,6 +44,7 @@ pub struct RenderOptions {
 
 /// When a render has done enough: at whichever comes first.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Stop {
     /// At this many samples a pixel.
     pub spp: u32,
@@ -58,6 +63,34 @@ const DEFAULT_SIZE: (u32, u32) = (1280, 720);
 const MAX_SIDE: u32 = 65_536;
 const MAX_PIXELS: u64 = 1 << 30;
 
+impl Stop {
+    /// At this many samples a pixel.
+    pub fn at(spp: u32) -> Self {
+        Self { spp, time: None, noise: None }
+    }
+}
+
+impl Default for RenderOptions {
+    fn default() -> Self {
+        let (width, height) = DEFAULT_SIZE;
+        let film = FilmDesc::default();
+        Self {
+            width,
+            height,
+            crop: None,
+            camera: 0,
+            integrator: IntegratorDesc::default(),
+            sampler: SamplerDesc::default(),
+            filter: FilterDesc::default(),
+            exposure: Exposure { factor: film.exposure, max_component: film.max_component },
+            transparent: false,
+            stop: Stop::at(DEFAULT_SPP),
+            features: false,
+            threads: 0,
+        }
+    }
+}
+
 impl RenderOptions {
     /// What the description of the scene asks for; 1280 by 720 pixels of 64 samples where it does not say.
     pub fn of(scene: &Scene) -> Self {
@@ -66,16 +99,12 @@ impl RenderOptions {
         let mut options = Self {
             width,
             height,
-            crop: None,
-            camera: 0,
             integrator: scene.integrator(),
             sampler: scene.sampler(),
             filter: scene.filter(),
             exposure: Exposure { factor: film.exposure, max_component: film.max_component },
-            transparent: false,
-            stop: Stop { spp: scene.sampler().spp.unwrap_or(DEFAULT_SPP), time: None, noise: None },
-            features: false,
-            threads: 0,
+            stop: Stop::at(scene.sampler().spp.unwrap_or(DEFAULT_SPP)),
+            ..Self::default()
         };
         let window = film.crop_window.map(|window| options.pixels_of(window));
         let bounds = film.pixel_bounds.map(|[x0, x1, y0, y1]| PixelBounds { x0, y0, x1, y1 });

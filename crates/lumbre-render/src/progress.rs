@@ -21,6 +21,7 @@ impl Progress for NoProgress {}
 
 /// How far a render is.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct State {
     /// Samples taken, over all pixels.
     pub samples: u64,

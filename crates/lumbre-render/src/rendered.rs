@@ -8,6 +8,7 @@ use lumbre_image::{Image, Rgb};
 
 /// What [`crate::render`] returns: all that was asked for, or what there was when it was stopped.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Rendered {
     /// The pixels of [`Rendered::bounds`]; black where no sample was taken. With coverage, by which its colours are
     /// multiplied, if the options ask for a transparent picture.
@@ -25,6 +26,7 @@ pub struct Rendered {
 
 /// What a render took.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Stats {
     /// Samples that every pixel has.
     pub spp: u32,

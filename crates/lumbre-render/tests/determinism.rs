@@ -1,5 +1,7 @@
 //! A picture is a function of the scene, the options and the seed.
 
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
 mod common;
 
 use std::sync::Mutex;
@@ -87,7 +89,13 @@ fn bytes(image: &Image) -> Vec<u32> {
 fn any_number_of_threads_gives_the_same_bytes() {
     let scene = Scene::build(still_life(DVec3::ZERO)).unwrap();
     let with = |threads, features| {
-        picture(&scene, &RenderOptions { threads, features, ..options(&scene, 75, 50, 7) })
+        picture(
+            &scene,
+            &changed(options(&scene, 75, 50, 7), |it| {
+                it.threads = threads;
+                it.features = features;
+            }),
+        )
     };
     let one = with(1, true);
     assert!(one.stats.rays.bounce > 10_000 && one.stats.rays.shadow > 5_000, "{:?}", one.stats.rays);
@@ -108,7 +116,7 @@ fn every_pixel_depends_on_its_own_samples_alone() {
     let whole = options(&scene, 61, 47, 5);
     let full = picture(&scene, &whole).image;
     let crop = PixelBounds { x0: 13, y0: 7, x1: 52, y1: 40 };
-    let part = picture(&scene, &RenderOptions { crop: Some(crop), ..whole });
+    let part = picture(&scene, &changed(whole, |it| it.crop = Some(crop)));
     assert_eq!(part.bounds, crop);
     for (x, y) in crop.pixels() {
         assert_eq!(part.image.pixel(x - crop.x0, y - crop.y0), full.pixel(x, y), "({x}, {y})");
@@ -233,7 +241,7 @@ fn time_and_noise_end_a_render() {
 #[test]
 fn features_are_what_they_are_called() {
     let scene = Scene::build(still_life(DVec3::new(50.0, 20.0, -10.0))).unwrap();
-    let rendered = picture(&scene, &RenderOptions { features: true, ..options(&scene, 90, 60, 4) });
+    let rendered = picture(&scene, &changed(options(&scene, 90, 60, 4), |it| it.features = true));
     let get = |wanted| &rendered.features.iter().find(|(f, _)| *f == wanted).unwrap().1;
     // The middle of the picture is on the torus or the ground before it; the lower edge is ground.
     let (x, y) = (45, 58);
@@ -255,18 +263,15 @@ fn options_that_make_no_picture_are_refused() {
     let refused =
         |options: RenderOptions| render(&scene, &options, &NoProgress, &CancelToken::new()).unwrap_err();
     let base = options(&scene, 40, 30, 1);
-    assert_eq!(
-        refused(RenderOptions { width: 0, ..base.clone() }),
-        RenderError::Size { width: 0, height: 30 }
-    );
+    assert_eq!(refused(changed(base.clone(), |it| it.width = 0)), RenderError::Size { width: 0, height: 30 });
     let crop = Some(PixelBounds { x0: 40, y0: 0, x1: 50, y1: 9 });
-    assert_eq!(refused(RenderOptions { crop, ..base.clone() }), RenderError::EmptyCrop);
+    assert_eq!(refused(changed(base.clone(), |it| it.crop = crop)), RenderError::EmptyCrop);
     assert_eq!(
-        refused(RenderOptions { camera: 3, ..base.clone() }),
+        refused(changed(base.clone(), |it| it.camera = 3)),
         RenderError::NoSuchCamera { index: 3, count: 1 }
     );
     let filter = FilterDesc::Box { radius: Vec2::ZERO };
-    assert_eq!(refused(RenderOptions { filter, ..base }), RenderError::Filter);
+    assert_eq!(refused(changed(base, |it| it.filter = filter)), RenderError::Filter);
 }
 
 #[test]

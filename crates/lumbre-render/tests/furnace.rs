@@ -1,6 +1,8 @@
 //! White furnaces: in a closed room that emits as much as it absorbs, and around whatever conserves energy, everything
 //! is equally bright. Sizes are not 1 and places not 0, so that missing squares and offsets show.
 
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
 mod common;
 
 use std::sync::Arc;

@@ -1,14 +1,15 @@
 //! What a camera sees of the ground, against closed forms.
 
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
 mod common;
 
 use std::sync::Arc;
 
-use common::{add, add_material, diffuse, empty, exact, options, picture};
+use common::{add, add_material, changed, diffuse, empty, exact, options, picture};
 use lumbre_geometry::{Disk, Sphere};
 use lumbre_image::{Image, Rgb};
 use lumbre_math::{DAffine3, DMat3, DVec3, Transform};
-use lumbre_render::RenderOptions;
 use lumbre_scene::{
     Camera, CameraKind, EnvironmentDesc, GeometryDesc, GroundDesc, LightDesc, Scene, SceneDesc, WithoutLight,
 };
@@ -58,7 +59,7 @@ fn sky(radiance: Rgb) -> LightDesc {
 
 fn look(desc: SceneDesc, transparent: bool) -> (Rgb, f32) {
     let scene = Scene::build(desc).unwrap();
-    let rendered = picture(&scene, &RenderOptions { transparent, ..options(&scene, 12, 10, 256) });
+    let rendered = picture(&scene, &changed(options(&scene, 12, 10, 256), |it| it.transparent = transparent));
     let alpha = rendered.image.alpha().map_or(1.0, |a| a.iter().sum::<f32>() / a.len() as f32);
     (rendered.image.mean(), alpha)
 }
@@ -171,7 +172,7 @@ fn glass_that_bends_light_takes_as_much_as_geometric_optics_says() {
 /// The coverage of each colour, and that of the picture.
 fn coverage_by_colour(desc: SceneDesc) -> (Option<Rgb>, f32) {
     let scene = Scene::build(desc).unwrap();
-    let rendered = picture(&scene, &RenderOptions { transparent: true, ..options(&scene, 12, 10, 256) });
+    let rendered = picture(&scene, &changed(options(&scene, 12, 10, 256), |it| it.transparent = true));
     let alpha = rendered.image.alpha().unwrap();
     (rendered.coverage.map(|coverage| coverage.mean()), alpha.iter().sum::<f32>() / alpha.len() as f32)
 }
@@ -228,7 +229,7 @@ fn ground_in_the_open_is_not_seen_at_all() {
     let mut desc = hovering(vec![light], true);
     desc.shapes.clear();
     let scene = Scene::build(desc).unwrap();
-    let rendered = picture(&scene, &RenderOptions { transparent: true, ..options(&scene, 8, 6, 4) });
+    let rendered = picture(&scene, &changed(options(&scene, 8, 6, 4), |it| it.transparent = true));
     assert!(rendered.image.alpha().unwrap().iter().all(|&a| a == 0.0));
     assert!(rendered.image.pixels().iter().all(|&c| c == Rgb::BLACK));
 }

@@ -1,5 +1,7 @@
 //! What each integrator shows, where it can be said in closed form.
 
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
 mod common;
 
 use std::f64::consts::PI;
@@ -10,7 +12,7 @@ use lumbre_geometry::{Cuboid, Disk, Sphere};
 use lumbre_image::Rgb;
 use lumbre_math::{DVec3, Transform};
 use lumbre_render::transport::{Path, Whitted};
-use lumbre_render::{CancelToken, NoProgress, RenderOptions, render_with};
+use lumbre_render::{CancelToken, NoProgress, render_with};
 use lumbre_scene::{IntegratorKind, LightDesc, Scene, SceneDesc};
 use lumbre_shading::dielectric::ThinDielectric;
 use lumbre_shading::{Material, MaterialKind, Roughness, SpectrumTexture, Texture};
@@ -151,7 +153,7 @@ fn depth_counts_bounces() {
     for depth in 0..5 {
         let mut integrator = base.integrator;
         integrator.max_depth = depth;
-        let image = picture(&scene, &RenderOptions { integrator, ..base.clone() }).image;
+        let image = picture(&scene, &changed(base.clone(), |it| it.integrator = integrator)).image;
         assert_close(mean(&image)[0], 1.0 - 0.5_f64.powi(depth as i32 + 1), 5e-3, &format!("depth {depth}"));
     }
 }

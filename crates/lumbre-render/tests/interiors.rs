@@ -1,5 +1,7 @@
 //! What solids take from light that goes through them, against closed forms.
 
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
 mod common;
 
 use std::sync::Arc;

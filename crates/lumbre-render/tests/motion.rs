@@ -1,5 +1,7 @@
 //! Pictures of what moves while the shutter is open, against closed forms, and against the same standing still.
 
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
 mod common;
 
 use std::sync::Arc;
@@ -267,7 +269,7 @@ fn moving_pictures_are_the_same_from_any_number_of_threads() {
     desc.filter = lumbre_scene::FilterDesc::Gaussian { radius: Vec2::splat(1.5), sigma: 0.5 };
     let scene = Scene::build(desc).unwrap();
     let image = |threads| {
-        let options = lumbre_render::RenderOptions { threads, ..options(&scene, 53, 37, 6) };
+        let options = changed(options(&scene, 53, 37, 6), |it| it.threads = threads);
         picture(&scene, &options).image
     };
     let one = image(1);

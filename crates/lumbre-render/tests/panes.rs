@@ -1,5 +1,7 @@
 //! Light of points, spots and suns that goes straight on through panes, against closed forms.
 
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
 mod common;
 
 use std::f64::consts::PI;
@@ -10,7 +12,7 @@ use lumbre_geometry::{Cuboid, Disk, Sphere};
 use lumbre_image::{Image, Rgb};
 use lumbre_math::{DAffine3, DMat3, DVec3, Transform};
 use lumbre_render::transport::{Integrator, Path, Strategy, Whitted};
-use lumbre_render::{CancelToken, NoProgress, RenderOptions, render_with};
+use lumbre_render::{CancelToken, NoProgress, render_with};
 use lumbre_scene::{EnvironmentDesc, IntegratorKind, LightDesc, Scene, SceneDesc};
 use lumbre_shading::{
     FloatTexture, Material, MaterialKind, PrincipledParams, Roughness, SpectrumTexture, VolumeParams,
@@ -331,7 +333,8 @@ fn pictures_through_panes_do_not_depend_on_the_number_of_threads() {
     {
         desc.integrator.kind = kind;
         let scene = Scene::build(desc.clone()).unwrap();
-        let by = |threads| picture(&scene, &RenderOptions { threads, ..options(&scene, 40, 30, 4) }).image;
+        let by =
+            |threads| picture(&scene, &changed(options(&scene, 40, 30, 4), |it| it.threads = threads)).image;
         let one = by(1);
         assert!(mean(&one)[0] > 0.0);
         assert_eq!(one, by(3));

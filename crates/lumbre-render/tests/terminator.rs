@@ -1,5 +1,7 @@
 //! Where shadows end on coarse meshes that stand for smooth surfaces.
 
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
 mod common;
 
 use std::f64::consts::PI;

@@ -354,7 +354,7 @@ impl Builder {
     }
 
     /// What a shape is made of, without its form and its light.
-    pub fn entry(&self, desc: &ShapeDesc) -> Result<SurfaceEntry, BuildError> {
+    pub(crate) fn entry(&self, desc: &ShapeDesc) -> Result<SurfaceEntry, BuildError> {
         let material = match desc.material {
             None => None,
             Some(id) => {
@@ -380,7 +380,7 @@ impl Builder {
     }
 
     /// The area light of a shape, unless there is nothing for it to shine from.
-    pub fn wanted_light(&mut self, desc: &ShapeDesc, entry: &SurfaceEntry) -> Option<AreaLightDesc> {
+    pub(crate) fn wanted_light(&mut self, desc: &ShapeDesc, entry: &SurfaceEntry) -> Option<AreaLightDesc> {
         let light = desc.area_light.clone()?;
         if !entry.is_visible() {
             self.warnings.push(BuildWarning::LightOnInterface { shape: desc.index });

@@ -24,7 +24,7 @@ pub(crate) struct CsgForm {
 
 impl CsgForm {
     /// Whose surface a root lies on.
-    pub fn leaf(&self, root: &lumbre_geometry::Root) -> Option<(&SurfaceEntry, LeafPart)> {
+    pub(crate) fn leaf(&self, root: &lumbre_geometry::Root) -> Option<(&SurfaceEntry, LeafPart)> {
         let part = self.csg.leaf_of(root)?;
         Some((self.leaves.get(part.leaf)?, part))
     }

@@ -48,7 +48,7 @@ impl Used {
 }
 
 impl<'d> Extent<'d> {
-    pub fn new(desc: &'d SceneDesc) -> Self {
+    pub(crate) fn new(desc: &'d SceneDesc) -> Self {
         // Objects that hold each other make no scene; that is said when it is built.
         let order = inside_out(&desc.objects).unwrap_or_default();
         let mut outlines = vec![Vec::new(); desc.objects.len()];
@@ -59,7 +59,7 @@ impl<'d> Extent<'d> {
         Self { desc, outlines, used }
     }
 
-    pub fn each_point(&self, visit: &mut dyn FnMut(DVec3)) {
+    pub(crate) fn each_point(&self, visit: &mut dyn FnMut(DVec3)) {
         self.desc.shapes.iter().for_each(|shape| each_point_of(shape, &self.used, visit));
         for instance in &self.desc.instances {
             let outline = self.outlines.get(instance.object.0 as usize).map_or(&[][..], Vec::as_slice);
@@ -69,7 +69,7 @@ impl<'d> Extent<'d> {
         }
     }
 
-    pub fn bounds(&self) -> Aabb {
+    pub(crate) fn bounds(&self) -> Aabb {
         let mut bounds = Aabb::EMPTY;
         self.each_point(&mut |p| bounds = bounds.union(Aabb { min: p, max: p }));
         bounds

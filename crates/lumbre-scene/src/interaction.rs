@@ -2,7 +2,7 @@
 
 use lumbre_geometry::{Ray, Surface};
 use lumbre_math::{DVec3, Vec2};
-use lumbre_shading::{Bsdf, LocalSurface, Material, Parts, ShadingFrame, Spectrum, TextureContext};
+use lumbre_shading::{Bsdf, LocalSurface, Material, ShadingFrame, Spectrum, TextureContext};
 
 use crate::light::{LightId, LightSample};
 use crate::{Emission, Footprint, Scene};
@@ -62,9 +62,9 @@ impl<'s> Interaction<'s> {
 
     /// Every material of a mixture that applies here, with its share. A mixture whose own share is less than `least` is not
     /// taken apart (see [`Material::parts`]).
-    pub fn parts(&self, least: f32) -> Parts<'s> {
+    pub fn parts(&self, least: f32) -> impl Iterator<Item = (f32, &'s Material)> {
         let wo = self.towards_origin.as_vec3();
-        self.material.map_or_else(Parts::new, |material| material.parts(&self.at, wo, least))
+        self.material.into_iter().flat_map(move |material| material.parts(&self.at, wo, least))
     }
 
     /// The shading frame and how the surface scatters; `None` for an interface.

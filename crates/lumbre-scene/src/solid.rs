@@ -34,7 +34,7 @@ pub(crate) enum SolidError {
 
 impl MeshSolid {
     /// The solid inside a mesh. Vertices at the same place are one.
-    pub fn new(mesh: Arc<TriangleMesh>) -> Result<Self, SolidError> {
+    pub(crate) fn new(mesh: Arc<TriangleMesh>) -> Result<Self, SolidError> {
         if mesh.indices.is_empty() {
             return Err(SolidError::Empty);
         }

@@ -14,6 +14,7 @@ use crate::{
 
 /// How a description is made ready to be shown. What it has of its own stays, unless something here says otherwise.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Stage {
     /// Whether to frame everything though the description has cameras; they are left out then.
     pub fit: bool,
@@ -31,6 +32,7 @@ pub struct Stage {
 
 /// Light from all around a model.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub enum Surroundings {
     /// The studio, where the description says so ([`SceneDesc::without_light`]).
     #[default]
@@ -46,6 +48,7 @@ pub enum Surroundings {
 
 /// What a model stands on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Ground {
     /// A shadow where the camera and the light from all around are none of the description's own; else nothing.
     #[default]
@@ -71,6 +74,7 @@ impl Ground {
 
 /// What a [`Stage`] did to a description.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Staged {
     /// Whether the camera is the automatic one.
     pub framed: bool,
@@ -84,6 +88,7 @@ pub struct Staged {
 
 /// Where the light of a staged description comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum StageLight {
     /// The description's own lights, if it has any.
     Own,

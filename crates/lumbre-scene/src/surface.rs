@@ -143,12 +143,12 @@ fn patch_blend(uv: DVec2) -> Blend<4> {
 
 impl SurfaceEntry {
     /// Whether rays of light see it: an interface only parts media.
-    pub fn is_visible(&self) -> bool {
+    pub(crate) fn is_visible(&self) -> bool {
         self.material.is_some()
     }
 
     /// Whether it gives off light.
-    pub fn shines(&self) -> bool {
+    pub(crate) fn shines(&self) -> bool {
         match &self.form {
             Form::Csg(csg) => csg.leaves.iter().any(Self::shines),
             _ => self.emission.is_some(),
@@ -157,7 +157,7 @@ impl SurfaceEntry {
 
     /// What it gives off, with 1 where it faces as its geometry does and -1 where the other way, if that is the same all
     /// over it: without textures, without cut-outs, and without normals at vertices that might turn a face.
-    pub fn plain_emission(&self) -> Option<(&Emission, f64)> {
+    pub(crate) fn plain_emission(&self) -> Option<(&Emission, f64)> {
         let is_plain = match &self.form {
             Form::Exact | Form::Coloured(_) => true,
             Form::Mesh(mesh) => mesh.normals().is_none(),
@@ -169,7 +169,7 @@ impl SurfaceEntry {
     }
 
     /// Whether any part of it looks up textures.
-    pub fn looks_up_anywhere(&self) -> bool {
+    pub(crate) fn looks_up_anywhere(&self) -> bool {
         match &self.form {
             Form::Csg(csg) => self.looks_up || csg.leaves.iter().any(Self::looks_up_anywhere),
             _ => self.looks_up,
@@ -177,12 +177,12 @@ impl SurfaceEntry {
     }
 
     /// Whether a camera looks through its back.
-    pub fn is_one_sided(&self) -> bool {
+    pub(crate) fn is_one_sided(&self) -> bool {
         self.material.as_ref().is_some_and(|material| material.one_sided)
     }
 
     /// Whether a camera looks through the back of any part of it.
-    pub fn is_one_sided_anywhere(&self) -> bool {
+    pub(crate) fn is_one_sided_anywhere(&self) -> bool {
         match &self.form {
             Form::Csg(csg) => csg.leaves.iter().any(Self::is_one_sided_anywhere),
             _ => self.is_one_sided(),
@@ -190,7 +190,7 @@ impl SurfaceEntry {
     }
 
     /// Whether light may go through the material of any part of it.
-    pub fn lets_light_through(&self) -> bool {
+    pub(crate) fn lets_light_through(&self) -> bool {
         match &self.form {
             Form::Csg(csg) => csg.leaves.iter().any(Self::lets_light_through),
             _ => self.material.as_ref().is_some_and(|material| material.lets_light_through()),
@@ -198,7 +198,7 @@ impl SurfaceEntry {
     }
 
     /// Whether light may go straight on through the material of any part of it.
-    pub fn lets_light_straight_on(&self) -> bool {
+    pub(crate) fn lets_light_straight_on(&self) -> bool {
         match &self.form {
             Form::Csg(csg) => csg.leaves.iter().any(Self::lets_light_straight_on),
             _ => self.material.as_ref().is_some_and(|material| material.lets_light_straight_on()),
@@ -206,7 +206,7 @@ impl SurfaceEntry {
     }
 
     /// Whether light may pass through some of it.
-    pub fn has_holes(&self) -> bool {
+    pub(crate) fn has_holes(&self) -> bool {
         match &self.form {
             Form::Csg(csg) => csg.leaves.iter().any(Self::has_holes),
             _ => self.alpha.is_some() || !self.is_visible(),
@@ -215,7 +215,7 @@ impl SurfaceEntry {
 
     /// Dresses a bare surface of the tree at a time. `local` are the coordinates of the face that it lies on, `placement` leads
     /// from the space of the mesh to that of `surface`.
-    pub fn dress(
+    pub(crate) fn dress(
         &self,
         surface: &Surface,
         primitive: u32,
@@ -257,7 +257,7 @@ impl SurfaceEntry {
     /// J. Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, 2021: the planes through the vertices, across
     /// their normals, blended as the normals are, as far as they lie above the point. Over a triangle of a sphere that is
     /// about twice the height of the sphere, so that rays which the sphere would let go clear the triangles beside it.
-    pub fn rise(
+    pub(crate) fn rise(
         &self,
         bare: &Surface,
         primitive: u32,
@@ -291,7 +291,7 @@ impl SurfaceEntry {
 
 impl Dressed {
     /// Where textures are looked up, with derivatives of u and v over a pixel.
-    pub fn context(&self, dpdx: Vec3, dpdy: Vec3, duv_dx: Vec2, duv_dy: Vec2) -> TextureContext {
+    pub(crate) fn context(&self, dpdx: Vec3, dpdy: Vec3, duv_dx: Vec2, duv_dy: Vec2) -> TextureContext {
         // From derivatives by u and v to derivatives over a pixel.
         let further = self.vertex.further.map(|place| FurtherUv {
             duv_dx: place.duv_dx * duv_dx.x + place.duv_dy * duv_dx.y,
@@ -311,7 +311,7 @@ impl Dressed {
     }
 
     /// Where textures are looked up, without a footprint.
-    pub fn bare_context(&self) -> TextureContext {
+    pub(crate) fn bare_context(&self) -> TextureContext {
         TextureContext {
             normal: self.surface.normal.as_vec3(),
             ..self.context(Vec3::ZERO, Vec3::ZERO, Vec2::ZERO, Vec2::ZERO)
@@ -319,7 +319,7 @@ impl Dressed {
     }
 
     /// Turns the inside out.
-    pub fn turn(&mut self) {
+    pub(crate) fn turn(&mut self) {
         self.surface.normal = -self.surface.normal;
         self.surface.dndu = -self.surface.dndu;
         self.surface.dndv = -self.surface.dndv;
@@ -347,7 +347,7 @@ fn plain(surface: &Surface) -> Dressed {
 }
 
 impl ColourRamp {
-    pub fn new(coloured: &ColouredShape, tree_from_object: &Transform) -> Self {
+    pub(crate) fn new(coloured: &ColouredShape, tree_from_object: &Transform) -> Self {
         let [from, to] = coloured.ends;
         let way = to - from;
         let slope = way / way.length_squared();
@@ -375,7 +375,7 @@ impl ColourRamp {
 
 impl MeshDress {
     /// Normals at the vertices.
-    pub fn normals(&self) -> Option<&[Vec3]> {
+    pub(crate) fn normals(&self) -> Option<&[Vec3]> {
         self.turned.normals.as_deref().or(self.rest.normals.as_deref())
     }
 

@@ -1,5 +1,7 @@
 //! What a scene answers about the surfaces in it.
 
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
 use std::sync::Arc;
 
 use lumbre_geometry::{

@@ -41,19 +41,19 @@ pub(crate) struct Between(usize, f32);
 
 impl Between {
     /// The place of `x` in [0, 1] between `nodes` in equal steps.
-    pub fn new(x: f32, nodes: usize) -> Self {
+    pub(crate) fn new(x: f32, nodes: usize) -> Self {
         let place = crate::unit(x) * (nodes - 1) as f32;
         let first = (place as usize).min(nodes - 2);
         Self(first, place - first as f32)
     }
 
     /// The place a share of the way from a node to the next.
-    pub fn at(first: usize, share: f32) -> Self {
+    pub(crate) fn at(first: usize, share: f32) -> Self {
         Self(first, share)
     }
 
     /// Catmull and Rom's cubic; beyond the ends the table goes straight on. (Linear, white metal reflected up to 1.003.)
-    pub fn weights(self) -> [f32; 4] {
+    pub(crate) fn weights(self) -> [f32; 4] {
         let t = self.1;
         [
             -0.5 * t * (1.0 - t) * (1.0 - t),
@@ -64,7 +64,7 @@ impl Between {
     }
 
     /// The weights of the nodes about the place, and the first of these nodes.
-    pub fn nodes(self, nodes: usize) -> (usize, [f32; 4]) {
+    pub(crate) fn nodes(self, nodes: usize) -> (usize, [f32; 4]) {
         let Self(first, _) = self;
         let [a, b, c, d] = self.weights();
         if first == 0 {
@@ -77,7 +77,7 @@ impl Between {
         (first - 1, [a, b, c, d])
     }
 
-    pub fn interpolate(self, nodes: usize, mut f: impl FnMut(usize) -> f32) -> f32 {
+    pub(crate) fn interpolate(self, nodes: usize, mut f: impl FnMut(usize) -> f32) -> f32 {
         let (first, weights) = self.nodes(nodes);
         weights.into_iter().enumerate().map(|(i, w)| w * f(first + i)).sum()
     }
@@ -120,23 +120,23 @@ impl Albedo {
     }
 
     /// What facets that reflect everything reflect at the first bounce.
-    pub fn mirror(&self, cos: f32, alpha: f32) -> f32 {
+    pub(crate) fn mirror(&self, cos: f32, alpha: f32) -> f32 {
         self.at(MIRROR, by_alpha(alpha), by_cosine(cos)).clamp(0.0, 1.0)
     }
 
     /// The mean of [`Albedo::mirror`].
-    pub fn mirror_mean(&self, alpha: f32) -> f32 {
+    pub(crate) fn mirror_mean(&self, alpha: f32) -> f32 {
         self.mean_at(MIRROR, by_alpha(alpha))
     }
 
     /// What the face of a dielectric of index 1 to [`MAX_ETA`] reflects, seen from outside.
-    pub fn face(&self, cos: f32, alpha: f32, eta: f32) -> f32 {
+    pub(crate) fn face(&self, cos: f32, alpha: f32, eta: f32) -> f32 {
         let (alpha, cos) = (by_alpha(alpha), by_cosine(cos));
         by_index(eta).interpolate(INDICES, |e| self.at(FACES + e, alpha, cos)).clamp(0.0, 1.0)
     }
 
     /// The mean of [`Albedo::face`].
-    pub fn face_mean(&self, alpha: f32, eta: f32) -> f32 {
+    pub(crate) fn face_mean(&self, alpha: f32, eta: f32) -> f32 {
         let alpha = by_alpha(alpha);
         by_index(eta).interpolate(INDICES, |e| self.mean_at(FACES + e, alpha))
     }
@@ -148,21 +148,21 @@ impl Albedo {
     }
 
     /// The power that a border between dielectrics of index `eta` (inside over outside) reflects and lets through.
-    pub fn glass(&self, cos: f32, alpha: f32, eta: f32, inside: bool) -> f32 {
+    pub(crate) fn glass(&self, cos: f32, alpha: f32, eta: f32, inside: bool) -> f32 {
         let (alpha, cos) = (by_alpha(alpha), by_cosine(cos));
         let (page, eta) = Self::glass_pages(eta, inside);
         by_index(eta).interpolate(INDICES, |e| self.at(page + e, alpha, cos)).clamp(0.0, 1.0)
     }
 
     /// The mean of [`Albedo::glass`].
-    pub fn glass_mean(&self, alpha: f32, eta: f32, inside: bool) -> f32 {
+    pub(crate) fn glass_mean(&self, alpha: f32, eta: f32, inside: bool) -> f32 {
         let alpha = by_alpha(alpha);
         let (page, eta) = Self::glass_pages(eta, inside);
         by_index(eta).interpolate(INDICES, |e| self.mean_at(page + e, alpha))
     }
 
     /// What white fibres reflect, by their roughness (α is its square); may be more than 1.
-    pub fn sheen(&self, cos: f32, roughness: f32) -> f32 {
+    pub(crate) fn sheen(&self, cos: f32, roughness: f32) -> f32 {
         self.at(SHEEN, by_alpha(roughness * roughness), by_cosine(cos)).max(0.0)
     }
 }

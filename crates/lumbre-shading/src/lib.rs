@@ -26,12 +26,11 @@ pub mod thin_film;
 
 pub use bsdf::{Bsdf, BsdfSample, Scatter};
 pub use frame::{LocalDir, ShadingFrame};
-pub use material::{LocalSurface, Material, MaterialKind, Metal, Parts, Roughness};
+pub use material::{LocalSurface, Material, MaterialKind, Metal, Roughness};
 pub use medium::HomogeneousMedium;
 pub use mipmap::{AxisWrap, ImageFilter, MipMap, MipMapOptions, Wrap};
 pub use principled_params::{Convention, PrincipledParams, VolumeParams};
 pub use spectrum::{NamedSpectrum, SpectrumValue};
-pub use specular::Specular;
 pub use texture::{
     FURTHER_SETS, FloatTexture, FurtherUv, ImageTexture, Mapping2d, SpectrumTexture, Texture, TextureContext,
     TexturePoint, TextureValue, UvSet, VertexData,

@@ -195,7 +195,7 @@ impl MaterialKind {
 }
 
 /// Materials with their shares of a mixture.
-pub type Parts<'m> = SmallVec<[(f32, &'m Material); 2]>;
+type Parts<'m> = SmallVec<[(f32, &'m Material); 2]>;
 
 /// The local shape of the surface that bump and normal maps turn.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -323,7 +323,12 @@ impl Material {
     /// What a mixture is made of at a place, each material with its share; one that is no mixture is all of it. A
     /// mixture whose own share is less than `least` is not taken apart: the one material stands for it that
     /// [`Material::resolve`] chooses. Shares sum to 1, and there are at most as many as mixtures and shares above `least`.
-    pub fn parts(&self, at: &TextureContext, wo: Vec3, least: f32) -> Parts<'_> {
+    pub fn parts<'m>(
+        &'m self,
+        at: &TextureContext,
+        wo: Vec3,
+        least: f32,
+    ) -> impl Iterator<Item = (f32, &'m Self)> + use<'m> {
         let mut parts = Parts::new();
         let mut rest: Parts = smallvec![(1.0, self)];
         while let Some((share, material)) = rest.pop() {
@@ -342,7 +347,7 @@ impl Material {
                 rest.push((share, first));
             }
         }
-        parts
+        parts.into_iter()
     }
 
     /// The frame to shade in: bump and normal maps applied. A normal map goes before a displacement. The frame stays on

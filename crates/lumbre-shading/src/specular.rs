@@ -7,12 +7,16 @@ use crate::dielectric::Ways;
 use crate::{Bsdf, BsdfSample, LocalDir, Spectrum};
 
 /// Delta parts: a reflection and a transmission at most.
-pub type Specular = SmallVec<[BsdfSample; 2]>;
+pub(crate) type Specular = SmallVec<[BsdfSample; 2]>;
 
 impl Bsdf {
     /// Every delta part, with the weight that it has by itself: together with [`Bsdf::eval`] they are the whole BSDF. The
     /// mean of [`Bsdf::sample`] over its delta samples is the same.
-    pub fn specular(&self, wo: LocalDir) -> Specular {
+    pub fn specular(&self, wo: LocalDir) -> impl ExactSizeIterator<Item = BsdfSample> + use<> {
+        self.delta_parts(wo).into_iter()
+    }
+
+    fn delta_parts(&self, wo: LocalDir) -> Specular {
         let nowhere = Vec2::ZERO;
         match self {
             Self::Diffuse(_) | Self::DiffuseTransmission(_) => Specular::new(),
@@ -41,7 +45,7 @@ impl Bsdf {
     /// and of the sky is found by following [`Bsdf::sample`], which chooses these parts too: by this factor, it would count twice.
     pub fn straight_on(&self, wo: LocalDir) -> Spectrum {
         let straight = |part: &BsdfSample| part.transmitted && part.eta == 1.0;
-        self.specular(wo).into_iter().filter(straight).map(|part| part.weight).sum()
+        self.specular(wo).filter(straight).map(|part| part.weight).sum()
     }
 }
 
@@ -94,7 +98,7 @@ mod tests {
         for (bsdf, parts) in bsdfs {
             for height in [0.4, -0.9] {
                 let wo = LocalDir(Vec3::new(0.6, -0.2, height).normalize());
-                let specular = bsdf.specular(wo);
+                let specular = bsdf.delta_parts(wo);
                 assert_eq!(specular.len(), parts, "{bsdf:?} from {height}");
                 let mut sums = [Spectrum::BLACK; 2];
                 for i in 0..LOBES {
@@ -152,7 +156,7 @@ mod tests {
     #[test]
     fn glass_beyond_the_critical_angle_is_a_mirror_alone() {
         let glass = Bsdf::Dielectric(Dielectric { eta: 1.5, facets: Microfacets::new(0.0, 0.0) });
-        let parts = glass.specular(LocalDir(Vec3::new(0.9, 0.1, -0.3).normalize()));
+        let parts = glass.delta_parts(LocalDir(Vec3::new(0.9, 0.1, -0.3).normalize()));
         assert_eq!(parts.len(), 1);
         assert!(!parts[0].transmitted && (parts[0].weight.max_component() - 1.0).abs() < 1e-6);
     }

@@ -42,7 +42,7 @@ fn by_alpha(alpha: f32) -> Between {
 
 impl Stretched {
     /// Where neither α is larger the facets are as good as a mirror's, and the steps of this table too wide at grazing angles.
-    pub const LEAST: f32 = 0.004;
+    pub(crate) const LEAST: f32 = 0.004;
 
     fn from_bytes(bytes: &[u8]) -> Self {
         assert_eq!(bytes.len(), 2 * PAIRS * PAGE);
@@ -61,7 +61,7 @@ impl Stretched {
     }
 
     /// The share that facets of these α reflect of the light from a direction in their frame (either side).
-    pub fn mirror(&self, alpha: Vec2, w: Vec3) -> f32 {
+    pub(crate) fn mirror(&self, alpha: Vec2, w: Vec3) -> f32 {
         let around = Around::new(w.y.abs().atan2(w.x.abs()) * (2.0 * FRAC_1_PI));
         let cosines = Between::new(crate::unit(w.z.abs()).sqrt(), COSINES);
         let (cos_start, cos_weights) = cosines.nodes(COSINES);
@@ -85,7 +85,7 @@ impl Stretched {
     }
 
     /// The mean of [`Stretched::mirror`] by the cosine law.
-    pub fn mean(&self, alpha: Vec2) -> f32 {
+    pub(crate) fn mean(&self, alpha: Vec2) -> f32 {
         interpolated(alpha, |x, y| self.means[if x < y { pair(y, x) } else { pair(x, y) }])
     }
 }

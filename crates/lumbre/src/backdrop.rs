@@ -5,6 +5,7 @@ use lumbre_render::PixelBounds;
 
 /// What stands behind a transparent picture. Its colours are as a display shows them: tone mapping does not touch them.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Backdrop {
     /// One colour: linear, in [0, 1].
     Colour(Rgb),

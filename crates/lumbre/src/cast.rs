@@ -4,6 +4,7 @@ use lumbre_math::{DVec2, DVec3};
 
 /// What a ray hit, in world space and double precision.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct CastHit {
     /// Where, in units of the ray's direction.
     pub t: f64,

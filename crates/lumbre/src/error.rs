@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 
 use lumbre_formats::FormatError;
+use lumbre_render::RenderError;
+use lumbre_scene::BuildError;
 use thiserror::Error;
 
 /// Why a scene cannot be opened, rendered or saved.
@@ -14,7 +16,7 @@ pub enum Error {
     Format(#[from] FormatError),
     /// What was described makes no scene.
     #[error(transparent)]
-    Build(#[from] lumbre_scene::BuildError),
+    Build(#[from] BuildError),
     /// A file cannot be written.
     #[error("{}: {source}", .path.display())]
     Write {
@@ -23,7 +25,10 @@ pub enum Error {
         /// What the system said.
         source: std::io::Error,
     },
-    /// The options ask for something that there is not.
+    /// The options of a render make no picture.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    /// The options of saving ask for something that there is not.
     #[error("{0}")]
     Options(String),
 }
@@ -48,7 +53,30 @@ impl Error {
             Self::Format(FormatError::Io { .. }) | Self::Write { .. } => ErrorKind::Io,
             Self::Format(FormatError::Limit { .. }) => ErrorKind::Limit,
             Self::Format(_) | Self::Build(_) => ErrorKind::Input,
-            Self::Options(_) => ErrorKind::Options,
+            Self::Render(_) | Self::Options(_) => ErrorKind::Options,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::error::Error as _;
+    use std::path::Path;
+
+    use super::*;
+
+    #[test]
+    fn an_error_keeps_what_caused_it() {
+        let missing = Path::new("no such folder/scene.pbrt");
+        let error = crate::open(missing).unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::Io);
+        let source = error.source().expect("what the system said");
+        assert_eq!(source.downcast_ref().map(std::io::Error::kind), Some(std::io::ErrorKind::NotFound));
+
+        let scene = crate::SceneBuilder::new().build().unwrap();
+        let mut options = scene.options();
+        options.width = 0;
+        let error = scene.render(&options).unwrap_err();
+        assert!(matches!(error, Error::Render(RenderError::Size { width: 0, .. })), "{error:?}");
     }
 }

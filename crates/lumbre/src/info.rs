@@ -11,6 +11,7 @@ use lumbre_scene::{
 /// What is in a scene. Counts are of what the file describes: a shape inside an object counts once, however often the
 /// object is placed.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct SceneInfo {
     /// Shapes by type.
     pub shapes: BTreeMap<String, u64>,

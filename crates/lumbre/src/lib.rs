@@ -31,9 +31,12 @@
 //! for frame in 0..36 {
 //!     let mut desc = model.clone();
 //!     let turns = Some(f64::from(frame) / 36.0);
-//!     Stage { turns, ground: Ground::Shadow, ..Stage::default() }.set(&mut desc);
+//!     let mut stage = Stage::default();
+//!     (stage.turns, stage.ground) = (turns, Ground::Shadow);
+//!     stage.set(&mut desc);
 //!     let scene = Scene::from_description(desc)?;
-//!     let options = lumbre::RenderOptions { transparent: true, ..scene.options() };
+//!     let mut options = scene.options();
+//!     options.transparent = true;
 //!     let paper = Backdrop::Colour(lumbre::image::Rgb::WHITE);
 //!     scene.render(&options)?.before(paper).save(format!("frame.{frame:04}.png"))?;
 //! }
@@ -70,9 +73,14 @@ pub use lumbre_formats::ReadOptions;
 pub use lumbre_geometry::Ray;
 pub use lumbre_math::{DVec2, DVec3, Transform};
 pub use lumbre_render::{
-    CancelToken, Feature, NoProgress, PixelBounds, Progress, RayCounts, RenderOptions, Snapshot, State,
-    Stats, Stop,
+    CancelToken, Feature, NoProgress, PixelBounds, Progress, RayCounts, RenderError, RenderOptions, Snapshot,
+    State, Stats, Stop,
 };
 pub use lumbre_scene::{EnvironmentDesc, Ground, SceneDesc, Stage, StageLight, Staged, Surroundings};
 pub use picture::Picture;
 pub use scene::{Scene, describe, open, open_with};
+
+/// Compiles the examples of the project's README.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+struct ProjectReadme;

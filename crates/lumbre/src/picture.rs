@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use lumbre_formats::image::{ImageFormat, WriteOptions, write_image, write_layers};
+use lumbre_formats::image::{ImageFormat, write_image, write_layers};
 use lumbre_image::{Image, Layer, Layers, ToneMap};
 use lumbre_render::{Feature, PixelBounds, Rendered, Stats};
 
@@ -62,7 +62,8 @@ impl Picture {
         let PixelBounds { x0, y0, .. } = self.bounds();
         let part = (self.image().width(), self.image().height()) != self.whole;
         let window = part.then_some((x0 as i32, y0 as i32, self.whole.0, self.whole.1));
-        let mut options = WriteOptions { exr_window: window, ..*options };
+        let mut options = *options;
+        options.exr_window = window;
         let is_for_displays =
             matches!(ImageFormat::from_path(path), Some(ImageFormat::Png | ImageFormat::Jpeg));
         let coverage = self.rendered.coverage.as_ref();
@@ -70,7 +71,7 @@ impl Picture {
             if !is_for_displays {
                 return backdrop.under_light(self.image(), coverage, self.bounds(), self.whole);
             }
-            let WriteOptions { tone_map, exposure, .. } = options;
+            let (tone_map, exposure) = (options.tone_map, options.exposure);
             (options.tone_map, options.exposure) = (ToneMap::None, 0.0);
             backdrop.under_shown(self.image(), coverage, self.bounds(), self.whole, tone_map, exposure)
         });
@@ -86,7 +87,7 @@ impl Picture {
             let image = self
                 .feature(*feature)
                 .ok_or_else(|| Error::Options(format!("the {} layer was not rendered", feature.name())))?;
-            for (channel, letter) in channels(*feature).iter().enumerate() {
+            for (channel, letter) in feature.channels().iter().enumerate() {
                 let layer = Layer {
                     name: format!("{}.{letter}", feature.name()),
                     samples: image.channel(channel).collect(),
@@ -97,15 +98,5 @@ impl Picture {
             }
         }
         Ok(write_layers(path, &all, &options)?)
-    }
-}
-
-/// The names of a feature's channels.
-fn channels(feature: Feature) -> &'static [&'static str] {
-    match feature {
-        Feature::Albedo => &["R", "G", "B"],
-        Feature::Normal => &["X", "Y", "Z"],
-        Feature::Depth => &["Z"],
-        Feature::Uv => &["U", "V"],
     }
 }

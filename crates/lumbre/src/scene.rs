@@ -130,7 +130,7 @@ impl Scene {
     /// A picture.
     ///
     /// # Errors
-    /// [`Error::Options`] when the options make no picture.
+    /// [`Error::Render`] when the options make no picture.
     pub fn render(&self, options: &RenderOptions) -> Result<Picture, Error> {
         self.render_with(options, &NoProgress, &CancelToken::new())
     }
@@ -145,8 +145,7 @@ impl Scene {
         progress: &dyn Progress,
         cancel: &CancelToken,
     ) -> Result<Picture, Error> {
-        let rendered =
-            render(&self.resolved, options, progress, cancel).map_err(|e| Error::Options(e.to_string()))?;
+        let rendered = render(&self.resolved, options, progress, cancel)?;
         Ok(Picture { rendered, whole: (options.width, options.height), backdrop: None })
     }
 
@@ -161,15 +160,10 @@ impl Scene {
         const SPP: u32 = 16;
         let longer = f64::from(options.width.max(options.height).max(1));
         let side = |pixels: u32| (f64::from(pixels) * SIDE / longer).ceil().max(1.0) as u32;
-        let small = RenderOptions {
-            width: side(options.width),
-            height: side(options.height),
-            crop: None,
-            transparent: true,
-            stop: Stop { spp: SPP, time: None, noise: None },
-            features: true,
-            ..options.clone()
-        };
+        let mut small = options.clone();
+        (small.width, small.height, small.crop) = (side(options.width), side(options.height), None);
+        (small.transparent, small.features) = (true, true);
+        small.stop = Stop::at(SPP);
         let picture = self.render(&small)?;
         let image = picture.image();
         let (Some(albedo), Some(coverage)) = (picture.feature(Feature::Albedo), image.alpha()) else {

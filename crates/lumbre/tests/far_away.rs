@@ -1,5 +1,7 @@
 //! A scene far from the origin is the same picture as at the origin, up to the rounding of where its parts stand.
 
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
 use lumbre::Scene;
 use lumbre::formats::{Budget, Diagnostics, Limits, pbrt};
 use lumbre::image::Image;

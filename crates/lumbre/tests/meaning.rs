@@ -1,6 +1,8 @@
 //! What the words of a scene file mean for the picture: lights in their units, images the right way up, surfaces the right
 //! way round. Each scene is rendered, and each pixel compared with a closed form.
 
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
 use std::f64::consts::PI;
 use std::path::Path;
 

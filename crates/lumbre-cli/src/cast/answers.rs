@@ -9,7 +9,7 @@ use super::npy;
 
 /// One line of the answer: a ray, and what it hit.
 #[derive(Clone, Debug)]
-pub struct Answer {
+pub(super) struct Answer {
     /// 0-based position of the ray.
     pub ray: u64,
     /// What it hit, or nothing.
@@ -18,7 +18,7 @@ pub struct Answer {
 
 /// The forms that answers can take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Form {
+pub(super) enum Form {
     /// Comma-separated text with a header.
     Csv,
     /// One array of records.
@@ -91,7 +91,7 @@ const COLUMNS: &[Column] = &[
 ///
 /// # Errors
 /// Those of the writer.
-pub fn write(out: &mut dyn Write, form: Form, answers: &[Answer]) -> io::Result<()> {
+pub(super) fn write(out: &mut dyn Write, form: Form, answers: &[Answer]) -> io::Result<()> {
     match form {
         Form::Csv => csv(out, answers),
         Form::Npy => {
@@ -152,7 +152,7 @@ fn csv(out: &mut dyn Write, answers: &[Answer]) -> io::Result<()> {
 ///
 /// # Errors
 /// Those of the writer.
-pub fn write_counts(out: &mut dyn Write, form: Form, name: &str, counts: &[u64]) -> io::Result<()> {
+pub(super) fn write_counts(out: &mut dyn Write, form: Form, name: &str, counts: &[u64]) -> io::Result<()> {
     let bytes: Vec<u8> = counts.iter().flat_map(|count| count.to_le_bytes()).collect();
     match form {
         Form::Csv => {

@@ -29,7 +29,7 @@ use crate::reading::{ReadingArguments, print_warnings};
 Rays: CSV with a header among ox,oy,oz,dx,dy,dz,tmin,tmax (tmin and tmax may be left out: 0 and inf), or a .npy array (N,6) or (N,8) of f4 or f8.
 t is in units of the given direction, which need not have length 1.
 Answers: ray,hit,t,px,py,pz,nx,ny,nz,u,v,front,shape,prim,instance (closest, all); ray,hit (any); ray,count (count).")]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// The scene.
     scene: PathBuf,
     /// The rays, CSV or .npy; - is standard input.
@@ -64,7 +64,7 @@ enum Query {
 }
 
 /// Runs the command.
-pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let form = match arguments.output.as_deref().map(Path::extension) {
         None => Form::Csv,
         Some(Some(extension)) if extension == "csv" => Form::Csv,

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 /// A two-dimensional array of numbers, row by row.
 #[derive(Debug, PartialEq)]
-pub struct Array {
+pub(super) struct Array {
     /// Rows.
     pub rows: usize,
     /// Columns.
@@ -17,7 +17,7 @@ pub struct Array {
 ///
 /// # Errors
 /// A message that says what was found and what is accepted.
-pub fn read(bytes: &[u8]) -> Result<Array, String> {
+pub(super) fn read(bytes: &[u8]) -> Result<Array, String> {
     let version =
         bytes.strip_prefix(b"\x93NUMPY").ok_or("not a .npy file (its first bytes are not \\x93NUMPY)")?;
     let (header_len, start) = match version {
@@ -83,7 +83,7 @@ fn entry<'a>(header: &'a str, key: &str) -> Option<&'a str> {
 ///
 /// # Errors
 /// Those of the writer.
-pub fn write(mut out: impl Write, descr: &str, shape: &[usize], bytes: &[u8]) -> io::Result<()> {
+pub(super) fn write(mut out: impl Write, descr: &str, shape: &[usize], bytes: &[u8]) -> io::Result<()> {
     let sizes: String = shape.iter().map(|size| format!("{size}, ")).collect();
     let mut header =
         format!("{{'descr': {descr}, 'fortran_order': False, 'shape': ({}), }}", sizes.trim_end());

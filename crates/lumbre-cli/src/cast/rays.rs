@@ -11,7 +11,7 @@ const COLUMNS: [&str; 8] = ["ox", "oy", "oz", "dx", "dy", "dz", "tmin", "tmax"];
 ///
 /// # Errors
 /// [`Failure::Input`] with the line and column of what is wrong.
-pub fn read(name: &str, bytes: &[u8]) -> Result<Vec<Ray>, Failure> {
+pub(super) fn read(name: &str, bytes: &[u8]) -> Result<Vec<Ray>, Failure> {
     if bytes.starts_with(b"\x93NUMPY") {
         return from_array(&npy::read(bytes).map_err(|what| Failure::input(format!("{name}: {what}")))?)
             .map_err(|what| Failure::input(format!("{name}: {what}")));

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// A point in the time of a thread, or of all threads of the program.
-pub struct Start {
+pub(crate) struct Start {
     wall: Instant,
     /// Of every thread by its entry in `/proc`; none where nobody says.
     ran: HashMap<PathBuf, f64>,
@@ -36,26 +36,26 @@ fn program_ran() -> HashMap<PathBuf, f64> {
 
 impl Start {
     /// Of the calling thread.
-    pub fn of_thread() -> Self {
+    pub(crate) fn of_thread() -> Self {
         let ran = thread_ran();
         Self { wall: Instant::now(), ran }
     }
 
     /// Of all threads together. One that ends before it is read is none of the work's.
-    pub fn of_program() -> Self {
+    pub(crate) fn of_program() -> Self {
         let ran = program_ran();
         Self { wall: Instant::now(), ran }
     }
 
     /// The seconds that the calling thread ran since [`Start::of_thread`].
-    pub fn thread_seconds(&self) -> f64 {
+    pub(crate) fn thread_seconds(&self) -> f64 {
         self.seconds(thread_ran)
     }
 
     /// The seconds that the work of so many threads took since [`Start::of_program`]: of one thread, what all ran together, but no
     /// more than the clock says, for threads that are done may wait busily for a while; of more, what the clock says, for one
     /// may wait for another.
-    pub fn program_seconds(&self, threads: usize) -> f64 {
+    pub(crate) fn program_seconds(&self, threads: usize) -> f64 {
         let wall = self.wall.elapsed().as_secs_f64();
         if threads == 1 { self.seconds(program_ran).min(wall) } else { wall }
     }

@@ -155,7 +155,7 @@ impl<S: Search> Pass for Searching<'_, S> {
 }
 
 /// The crate `obvhs`: compressed nodes of eight, its medium preset.
-pub struct Obvhs;
+pub(crate) struct Obvhs;
 
 struct ObvhsTree<P> {
     tree: CwBvh,
@@ -223,7 +223,7 @@ impl Program for Obvhs {
 }
 
 /// The crate `bvh`: two children a node, visited in its own order, with boxes beyond the nearest hit left out.
-pub struct BinaryBvh;
+pub(crate) struct BinaryBvh;
 
 struct BvhTree<P> {
     tree: Bvh<f32, 3>,

@@ -221,7 +221,7 @@ functions! {
 
 /// How a scene is built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Setting {
+pub(crate) enum Setting {
     /// Embree's default: medium quality, no flags.
     Default,
     /// High quality: spatial splits.
@@ -252,7 +252,7 @@ impl Setting {
 }
 
 /// The library, with one setting.
-pub struct Embree {
+pub(crate) struct Embree {
     api: Arc<Api>,
     version: String,
     setting: Setting,
@@ -263,7 +263,7 @@ impl Embree {
     ///
     /// # Errors
     /// When it cannot be loaded or is not of version 4.
-    pub fn load(path: &OsStr, settings: &[Setting]) -> Result<Vec<Self>> {
+    pub(crate) fn load(path: &OsStr, settings: &[Setting]) -> Result<Vec<Self>> {
         let api = Arc::new(Api::load(path)?);
         let device = Device::new(&api, 1)?;
         // SAFETY: the device is live.

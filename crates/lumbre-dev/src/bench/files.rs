@@ -11,7 +11,7 @@ use lumbre_scene::GeometryDesc;
 use crate::scene::Scene;
 
 /// The meshes under `shared/data/meshes` beside the repository or a worktree of it; none where there is no such folder.
-pub fn found() -> Vec<PathBuf> {
+pub(crate) fn found() -> Vec<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let folders = ["../shared/data/meshes", "../../shared/data/meshes"].map(|folder| root.join(folder));
     let Some(folder) = folders.iter().find(|folder| folder.is_dir()) else { return Vec::new() };
@@ -32,7 +32,7 @@ pub fn found() -> Vec<PathBuf> {
 }
 
 /// What the table calls the scene of a file.
-pub fn name(path: &Path) -> String {
+pub(crate) fn name(path: &Path) -> String {
     path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned())
 }
 
@@ -40,7 +40,7 @@ pub fn name(path: &Path) -> String {
 ///
 /// # Errors
 /// What the reader says, and when there are no triangles in it.
-pub fn read(path: &Path) -> Result<Scene> {
+pub(crate) fn read(path: &Path) -> Result<Scene> {
     let (scene, _) = open_scene(path, &ReadOptions::default()).map_err(|e| anyhow!("{e}"))?;
     let mut whole = TriangleMesh { origin: DVec3::ZERO, ..TriangleMesh::default() };
     for shape in &scene.shapes {

@@ -12,20 +12,20 @@ use crate::rays::Ray32;
 const CHUNK: usize = 4_096;
 
 /// The rays of a work, cut for threads, in the form of one program.
-pub struct Job<'a> {
+pub(crate) struct Job<'a> {
     passes: Vec<Mutex<Box<dyn Pass + 'a>>>,
     rays: usize,
 }
 
 impl<'a> Job<'a> {
     /// Hands the rays to a program.
-    pub fn new(tree: &'a dyn Tree, query: Query, rays: &[Ray32]) -> Self {
+    pub(crate) fn new(tree: &'a dyn Tree, query: Query, rays: &[Ray32]) -> Self {
         let passes = rays.chunks(CHUNK).map(|chunk| Mutex::new(tree.prepare(query, chunk))).collect();
         Self { passes, rays: rays.len() }
     }
 
     /// Traces every ray once on so many threads; answers the seconds that a thread ran, in the mean.
-    pub fn run(&mut self, threads: usize) -> f64 {
+    pub(crate) fn run(&mut self, threads: usize) -> f64 {
         for pass in &mut self.passes {
             pass.get_mut().expect("no pass panics").reset();
         }
@@ -48,19 +48,19 @@ impl<'a> Job<'a> {
     }
 
     /// What the last run found for each ray.
-    pub fn answers(&self) -> Vec<Option<f64>> {
+    pub(crate) fn answers(&self) -> Vec<Option<f64>> {
         self.passes.iter().flat_map(|pass| pass.lock().expect("no pass panics").answers()).collect()
     }
 
     /// Millions of rays a second.
-    pub fn speed(&self, seconds: f64) -> f64 {
+    pub(crate) fn speed(&self, seconds: f64) -> f64 {
         self.rays as f64 / seconds / 1e6
     }
 }
 
 /// Runs tasks one after another, in turn forwards and backwards, at least `least` rounds, and then until the time is up, at
 /// most fifteen; past the deadline one round is enough. Answers the seconds of every task in every round.
-pub fn alternate<E>(
+pub(crate) fn alternate<E>(
     tasks: usize,
     least: usize,
     time: Duration,
@@ -86,7 +86,7 @@ pub fn alternate<E>(
 
 /// The ratio of two measurements that were repeated side by side.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ratio {
+pub(crate) struct Ratio {
     /// The median of the ratios.
     pub median: f64,
     /// Half the distance between the first and the third quartile.
@@ -95,7 +95,7 @@ pub struct Ratio {
 
 impl Ratio {
     /// Of `b` to `a`, round by round: more than 1 where `a` was smaller.
-    pub fn of(pairs: impl IntoIterator<Item = (f64, f64)>) -> Self {
+    pub(crate) fn of(pairs: impl IntoIterator<Item = (f64, f64)>) -> Self {
         let mut ratios: Vec<_> = pairs.into_iter().map(|(a, b)| b / a).collect();
         ratios.sort_by(f64::total_cmp);
         Self {
@@ -106,7 +106,7 @@ impl Ratio {
 }
 
 /// The middle one.
-pub fn median(values: impl IntoIterator<Item = f64>) -> f64 {
+pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> f64 {
     let mut values: Vec<_> = values.into_iter().collect();
     values.sort_by(f64::total_cmp);
     quantile(&values, 0.5)
@@ -122,7 +122,7 @@ fn quantile(sorted: &[f64], share: f64) -> f64 {
 }
 
 /// The geometric mean; NaN of an empty list.
-pub fn geometric_mean(values: &[f64]) -> f64 {
+pub(crate) fn geometric_mean(values: &[f64]) -> f64 {
     (values.iter().map(|value| value.ln()).sum::<f64>() / values.len() as f64).exp()
 }
 

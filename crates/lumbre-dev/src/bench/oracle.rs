@@ -10,7 +10,7 @@ use crate::scene::Scene;
 
 /// What is certain about a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Truth {
+pub(crate) struct Truth {
     /// Where it hits for certain, away from every edge.
     certain: Option<f64>,
     /// Where it hits, or passes an edge so near that rounding in double precision may decide.
@@ -24,7 +24,7 @@ const EDGE: f64 = 1e-12;
 const APART: f64 = 1e-5;
 
 /// The truth about a ray. The exact shapes answer for themselves.
-pub fn truth(scene: &Scene, ray: &Ray) -> Truth {
+pub(crate) fn truth(scene: &Scene, ray: &Ray) -> Truth {
     let mut truth = Truth { certain: None, possible: None };
     for mesh in &scene.meshes {
         truth.of_mesh(mesh, ray);
@@ -71,7 +71,7 @@ impl Truth {
     }
 
     /// Whether an answer agrees. `length` is the length of the ray's direction, `extent` the size of the scene.
-    pub fn agrees(&self, query: Query, answer: Option<f64>, length: f64, extent: f64) -> bool {
+    pub(crate) fn agrees(&self, query: Query, answer: Option<f64>, length: f64, extent: f64) -> bool {
         match (query, answer) {
             (_, None) => self.certain.is_none(),
             (Query::Any, Some(_)) => self.possible.is_some(),
@@ -100,7 +100,7 @@ fn sphere_root(&[x, y, z, radius]: &[f32; 4], ray: &Ray) -> Option<f64> {
 }
 
 /// A ray and what is true of it.
-pub struct Sample {
+pub(crate) struct Sample {
     /// Which ray of the list.
     pub index: usize,
     /// What is true.
@@ -109,7 +109,7 @@ pub struct Sample {
 
 /// The truth about some of the rays, evenly spread over the list, as many as `tests` tests of primitives allow, at most
 /// 1,000.
-pub fn sample(scene: &Scene, rays: &[Ray], tests: usize) -> Vec<Sample> {
+pub(crate) fn sample(scene: &Scene, rays: &[Ray], tests: usize) -> Vec<Sample> {
     let placed: usize = scene.placements.iter().map(|p| scene.placed_meshes[p.mesh].indices.len()).sum();
     let primitives = scene.primitive_count() + placed;
     let count = (tests / primitives.max(1)).clamp(2, 1_000).min(rays.len());
@@ -123,7 +123,7 @@ pub fn sample(scene: &Scene, rays: &[Ray], tests: usize) -> Vec<Sample> {
 }
 
 /// On how many rays two programs differ: one hits and the other does not, or they hit far apart.
-pub fn differences(
+pub(crate) fn differences(
     query: Query,
     rays: &[Ray],
     one: &[Option<f64>],

@@ -17,7 +17,7 @@ use crate::scene::Scene;
 
 /// Lumbre.
 #[derive(Clone, Copy, Debug)]
-pub struct Lumbre {
+pub(crate) struct Lumbre {
     /// How its trees are built.
     pub preset: Preset,
     /// How it is asked.
@@ -30,7 +30,7 @@ pub struct Lumbre {
 
 /// The precision of rays and answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Precision {
+pub(crate) enum Precision {
     /// As the rays are made, and as other programs have it.
     Single,
     /// The same rays in double precision.
@@ -39,7 +39,7 @@ pub enum Precision {
 
 /// How a tree is asked: the same answers in every way. In single precision, in the first three.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Asked {
+pub(crate) enum Asked {
     /// One ray at a time.
     Each,
     /// By batches of [`BATCH`] rays: those that are alike together, and the others in flight.
@@ -62,7 +62,7 @@ pub enum Asked {
 
 impl Asked {
     /// All but the first: what else costs what.
-    pub const OTHERS: [Self; 8] = [
+    pub(crate) const OTHERS: [Self; 8] = [
         Self::ByBatches,
         Self::Fresh,
         Self::Plainly,
@@ -145,7 +145,7 @@ impl Program for Lumbre {
 }
 
 /// The kernel's tree of a scene.
-pub fn build(scene: &Scene, preset: Preset) -> Result<Accel> {
+pub(crate) fn build(scene: &Scene, preset: Preset) -> Result<Accel> {
     build_list(scene, list(scene, false, false), preset, false)
 }
 

@@ -4,7 +4,7 @@ use crate::rays::Ray32;
 
 /// What is asked of a ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Query {
+pub(crate) enum Query {
     /// The nearest hit.
     Closest,
     /// Whether there is one.
@@ -13,10 +13,10 @@ pub enum Query {
 
 impl Query {
     /// Both.
-    pub const ALL: [Self; 2] = [Self::Closest, Self::Any];
+    pub(crate) const ALL: [Self; 2] = [Self::Closest, Self::Any];
 
     /// Its name in tables and files.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Closest => "closest",
             Self::Any => "any",
@@ -25,13 +25,13 @@ impl Query {
 }
 
 /// A tree over a scene, ready for rays.
-pub trait Tree: Send + Sync {
+pub(crate) trait Tree: Send + Sync {
     /// Takes some rays in, in its own form.
     fn prepare<'a>(&'a self, query: Query, rays: &[Ray32]) -> Box<dyn Pass + 'a>;
 }
 
 /// Rays in the form that a program takes, and room for its answers. Only [`Pass::run`] is timed.
-pub trait Pass: Send {
+pub(crate) trait Pass: Send {
     /// Makes it ready to run, again.
     fn reset(&mut self);
     /// Traces every ray.
@@ -42,7 +42,7 @@ pub trait Pass: Send {
 
 /// Bytes that a build allocated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Bytes {
+pub(crate) struct Bytes {
     /// That stay with the tree.
     pub kept: usize,
     /// That were held at once at most.
@@ -50,7 +50,7 @@ pub struct Bytes {
 }
 
 /// A program that takes part.
-pub trait Program: Sync {
+pub(crate) trait Program: Sync {
     /// Its name and version, and how it is set.
     fn name(&self) -> String;
 
@@ -73,7 +73,7 @@ pub trait Program: Sync {
 }
 
 /// What a build gives.
-pub struct Built<'a> {
+pub(crate) struct Built<'a> {
     /// The tree.
     pub tree: Box<dyn Tree + 'a>,
     /// How long it took.

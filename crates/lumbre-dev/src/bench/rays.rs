@@ -10,7 +10,7 @@ use crate::scene::Scene;
 
 /// A ray in single precision. Directions are unit but those of shadow rays, which end at `t` = 1 on the lamp.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ray32 {
+pub(crate) struct Ray32 {
     /// Where it starts.
     pub origin: [f32; 3],
     /// Where it goes.
@@ -21,13 +21,13 @@ pub struct Ray32 {
 
 impl Ray32 {
     /// The same ray in double precision.
-    pub fn to_f64(self) -> Ray {
+    pub(crate) fn to_f64(self) -> Ray {
         let wide = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
         Ray::new(wide(self.origin), wide(self.direction)).with_range(0.0, f64::from(self.t_max))
     }
 
     /// The same ray as the kernel takes it.
-    pub fn to_ours(self) -> lumbre_kernel::Ray32 {
+    pub(crate) fn to_ours(self) -> lumbre_kernel::Ray32 {
         lumbre_kernel::Ray32::new(self.origin.into(), self.direction.into()).with_range(0.0, self.t_max)
     }
 
@@ -39,7 +39,7 @@ impl Ray32 {
 
 /// Where rays come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Work {
+pub(crate) enum Work {
     /// A pinhole camera, by scanlines.
     Primary,
     /// From where primary rays hit, by the cosine.
@@ -56,11 +56,11 @@ pub enum Work {
 
 impl Work {
     /// All of them.
-    pub const ALL: [Self; 6] =
+    pub(crate) const ALL: [Self; 6] =
         [Self::Primary, Self::Bounce1, Self::Bounce3, Self::Shadow, Self::ShortOcclusion, Self::Random];
 
     /// Its name in tables and files.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Primary => "primary",
             Self::Bounce1 => "bounce 1",
@@ -74,7 +74,7 @@ impl Work {
 
 /// The size of the picture that primary rays make; both divide by four, for packets are squares of four by four.
 #[derive(Clone, Copy, Debug)]
-pub struct PictureSize {
+pub(crate) struct PictureSize {
     /// Columns.
     pub width: usize,
     /// Rows.
@@ -83,19 +83,19 @@ pub struct PictureSize {
 
 impl PictureSize {
     /// Twice as wide as high, with about `count` pixels.
-    pub fn of_about(count: usize) -> Self {
+    pub(crate) fn of_about(count: usize) -> Self {
         let height = ((count as f64 / 2.0).sqrt() / 4.0).round().max(1.0) as usize * 4;
         Self { width: 2 * height, height }
     }
 
     /// How many pixels.
-    pub fn count(self) -> usize {
+    pub(crate) fn count(self) -> usize {
         self.width * self.height
     }
 }
 
 /// Rays, and another order of them.
-pub struct Rays {
+pub(crate) struct Rays {
     /// By the scanlines' pixels that they belong to, where they do.
     pub list: Vec<Ray32>,
     /// Their positions in the list, by squares of four by four pixels; where they belong to none, as in the list.
@@ -103,7 +103,7 @@ pub struct Rays {
 }
 
 /// The rays of one kind of work, about as many as the picture has pixels. `accel` is asked where rays hit.
-pub fn make(work: Work, scene: &Scene, accel: &Accel, size: PictureSize) -> Rays {
+pub(crate) fn make(work: Work, scene: &Scene, accel: &Accel, size: PictureSize) -> Rays {
     match work {
         Work::Primary => Rays {
             list: (0..size.count()).map(|pixel| camera_ray(scene, size, pixel, [0.5; 2])).collect(),

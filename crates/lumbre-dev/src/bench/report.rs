@@ -10,7 +10,7 @@ use crate::measure::{Ratio, geometric_mean};
 
 /// A figure of Lumbre's beside a peer's.
 #[derive(Clone, Debug)]
-pub struct Row {
+pub(crate) struct Row {
     /// The scene.
     pub scene: String,
     /// What was measured, such as `closest primary` or `build`.
@@ -28,7 +28,7 @@ pub struct Row {
 
 /// How the answers of a program on a scene compare.
 #[derive(Clone, Debug)]
-pub struct Mismatches {
+pub(crate) struct Mismatches {
     /// The scene.
     pub scene: String,
     /// The program.
@@ -45,7 +45,7 @@ pub struct Mismatches {
 
 /// Everything that was measured.
 #[derive(Default)]
-pub struct Report {
+pub(crate) struct Report {
     /// Speeds and sizes.
     pub rows: Vec<Row>,
     /// Right and wrong.
@@ -54,7 +54,7 @@ pub struct Report {
 
 impl Report {
     /// The geometric means of the ratios to every peer, of the rows whose work begins with each of some words.
-    pub fn means(&self) -> Vec<(String, &'static str, f64, f64, usize)> {
+    pub(crate) fn means(&self) -> Vec<(String, &'static str, f64, f64, usize)> {
         let mut peers: Vec<&String> = Vec::new();
         for (name, _, _) in self.rows.iter().filter_map(|row| row.peer.as_ref()) {
             if !peers.contains(&name) {
@@ -82,7 +82,7 @@ impl Report {
     }
 
     /// Prints the means.
-    pub fn print_means(&self) {
+    pub(crate) fn print_means(&self) {
         println!("\nRatios to each peer (more than 1: Lumbre is faster, or smaller)");
         println!("{:<28} {:<10} {:>8} {:>8} {:>5}", "peer", "of", "mean", "least", "rows");
         for (peer, group, mean, least, rows) in self.means() {
@@ -91,7 +91,7 @@ impl Report {
     }
 
     /// The same as JSON.
-    pub fn to_json(&self) -> Value {
+    pub(crate) fn to_json(&self) -> Value {
         let row = |row: &Row| {
             let (name, figure, ratio, spread) = match &row.peer {
                 Some((name, figure, ratio)) => {
@@ -124,14 +124,14 @@ impl Report {
     ///
     /// # Errors
     /// When the file cannot be written.
-    pub fn write(&self, path: &Path) -> Result<()> {
+    pub(crate) fn write(&self, path: &Path) -> Result<()> {
         let text = serde_json::to_string_pretty(&self.to_json())?;
         std::fs::write(path, text + "\n").with_context(|| format!("cannot write {}", path.display()))
     }
 }
 
 /// The processor and how many threads it runs.
-pub fn machine() -> String {
+pub(crate) fn machine() -> String {
     let processor = std::fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| {
         let line = text.lines().find(|line| line.starts_with("model name"))?;
         Some(line.split_once(':')?.1.trim().to_owned())
@@ -142,7 +142,7 @@ pub fn machine() -> String {
 }
 
 /// The day, in UTC.
-pub fn today() -> String {
+pub(crate) fn today() -> String {
     let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs());
     date_of((seconds / 86_400) as i64)
 }

@@ -11,7 +11,7 @@ static HEAP: PeakAlloc = PeakAlloc;
 
 /// Runs what asks for builds on a thread that is one of so many, as with Embree: it takes part in the work, and waits for none to wake
 /// up before that begins. So it is the same for every program, whose code and data then are where it last ran.
-pub fn asking<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> Result<T> {
+pub(crate) fn asking<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> Result<T> {
     if rayon::current_thread_index().is_some() && rayon::current_num_threads() == threads {
         return Ok(work());
     }
@@ -28,7 +28,7 @@ pub fn asking<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> Resul
 }
 
 /// Runs a build on so many threads, with the seconds and the bytes that it took.
-pub fn measure<T: Send>(threads: usize, build: impl FnOnce() -> T + Send) -> Result<(T, f64, Bytes)> {
+pub(crate) fn measure<T: Send>(threads: usize, build: impl FnOnce() -> T + Send) -> Result<(T, f64, Bytes)> {
     asking(threads, || measure_here(threads, build))
 }
 

@@ -7,7 +7,7 @@ use lumbre_kernel::{SphereCloud, TriangleMesh};
 use lumbre_math::{DAffine3, DMat3, DVec3, Transform};
 
 /// A scene as plain data. Every program makes its own tree of it.
-pub struct Scene {
+pub(crate) struct Scene {
     /// What the table calls it.
     pub name: String,
     /// Meshes that stand in the world as they are. Their origins are zero.
@@ -28,7 +28,7 @@ pub struct Scene {
 
 /// A copy of a mesh.
 #[derive(Clone, Copy)]
-pub struct Placement {
+pub(crate) struct Placement {
     /// Position in [`Scene::placed_meshes`].
     pub mesh: usize,
     /// Where it stands: three columns and the translation, in single precision because that is what all can take.
@@ -40,7 +40,7 @@ impl Placement {
     ///
     /// # Panics
     /// When it is not invertible; the scenes of this crate make no such placement.
-    pub fn transform(&self) -> Transform {
+    pub(crate) fn transform(&self) -> Transform {
         let [x, y, z, offset] = self.world_from_object.map(|column| DVec3::from_array(column.map(f64::from)));
         let affine = DAffine3 { matrix3: DMat3::from_cols(x, y, z), translation: offset };
         Transform::from_affine(affine).expect("placements are invertible")
@@ -49,7 +49,7 @@ impl Placement {
 
 /// A pinhole camera with y up.
 #[derive(Clone, Copy)]
-pub struct Camera {
+pub(crate) struct Camera {
     /// Where it stands.
     pub eye: DVec3,
     /// What is in the middle of its picture.
@@ -60,7 +60,7 @@ pub struct Camera {
 
 impl Scene {
     /// A scene without anything in it.
-    pub fn empty(name: impl Into<String>, camera: Camera, lamp: (DVec3, f64)) -> Self {
+    pub(crate) fn empty(name: impl Into<String>, camera: Camera, lamp: (DVec3, f64)) -> Self {
         Self {
             name: name.into(),
             meshes: Vec::new(),
@@ -74,7 +74,7 @@ impl Scene {
     }
 
     /// A mesh alone, seen from outside, lit from above.
-    pub fn of_mesh(name: impl Into<String>, mesh: TriangleMesh) -> Self {
+    pub(crate) fn of_mesh(name: impl Into<String>, mesh: TriangleMesh) -> Self {
         let (low, high) = mesh_bounds(&mesh);
         let (center, size) = (0.5 * (low + high), (high - low).max_element());
         let camera =
@@ -84,12 +84,12 @@ impl Scene {
     }
 
     /// How many spheres there are.
-    pub fn sphere_count(&self) -> usize {
+    pub(crate) fn sphere_count(&self) -> usize {
         self.spheres.spheres.len()
     }
 
     /// How many primitives a tree is built of: each mesh counts once, each placement as one.
-    pub fn primitive_count(&self) -> usize {
+    pub(crate) fn primitive_count(&self) -> usize {
         let triangles = |meshes: &[Arc<TriangleMesh>]| meshes.iter().map(|m| m.indices.len()).sum::<usize>();
         triangles(&self.meshes)
             + triangles(&self.placed_meshes)
@@ -99,7 +99,7 @@ impl Scene {
     }
 
     /// What it consists of, in words.
-    pub fn contents(&self) -> String {
+    pub(crate) fn contents(&self) -> String {
         let triangles: usize = self.meshes.iter().map(|mesh| mesh.indices.len()).sum();
         let placed: usize = self.placed_meshes.iter().map(|mesh| mesh.indices.len()).sum();
         let parts = [
@@ -115,18 +115,18 @@ impl Scene {
     }
 
     /// Whether it consists of triangles alone.
-    pub fn is_triangles_only(&self) -> bool {
+    pub(crate) fn is_triangles_only(&self) -> bool {
         self.spheres.spheres.is_empty() && self.shapes.is_empty() && self.placements.is_empty()
     }
 
     /// Whether it consists of spheres alone.
-    pub fn is_spheres_only(&self) -> bool {
+    pub(crate) fn is_spheres_only(&self) -> bool {
         self.meshes.is_empty() && self.shapes.is_empty() && self.placements.is_empty()
     }
 }
 
 /// The corners of the smallest box around a mesh.
-pub fn mesh_bounds(mesh: &TriangleMesh) -> (DVec3, DVec3) {
+pub(crate) fn mesh_bounds(mesh: &TriangleMesh) -> (DVec3, DVec3) {
     mesh.positions
         .iter()
         .map(|p| p.as_dvec3())

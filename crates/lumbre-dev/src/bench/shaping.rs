@@ -6,33 +6,33 @@ use lumbre_math::{DVec3, Vec3};
 
 /// A mesh that grows.
 #[derive(Default)]
-pub struct Shaper {
+pub(crate) struct Shaper {
     positions: Vec<Vec3>,
     indices: Vec<[u32; 3]>,
 }
 
 impl Shaper {
     /// What was put together.
-    pub fn finish(self) -> TriangleMesh {
+    pub(crate) fn finish(self) -> TriangleMesh {
         TriangleMesh { origin: DVec3::ZERO, positions: self.positions, indices: self.indices }
     }
 
     /// Two triangles.
-    pub fn quad(&mut self, corners: [DVec3; 4]) {
+    pub(crate) fn quad(&mut self, corners: [DVec3; 4]) {
         let first = self.positions.len() as u32;
         self.positions.extend(corners.map(|p| p.as_vec3()));
         self.indices.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
     }
 
     /// One triangle.
-    pub fn triangle(&mut self, corners: [DVec3; 3]) {
+    pub(crate) fn triangle(&mut self, corners: [DVec3; 3]) {
         let first = self.positions.len() as u32;
         self.positions.extend(corners.map(|p| p.as_vec3()));
         self.indices.push([first, first + 1, first + 2]);
     }
 
     /// A box of twelve triangles, turned about y by `yaw` radians.
-    pub fn cuboid(&mut self, center: DVec3, half: DVec3, yaw: f64) {
+    pub(crate) fn cuboid(&mut self, center: DVec3, half: DVec3, yaw: f64) {
         let first = self.positions.len() as u32;
         let (sin, cos) = yaw.sin_cos();
         for corner in 0..8 {
@@ -47,7 +47,7 @@ impl Shaper {
     }
 
     /// `rows` by `columns` quadrilaterals over the points `at(row, column)`, `0..=rows` and `0..=columns`.
-    pub fn grid(&mut self, rows: u32, columns: u32, at: impl Fn(u32, u32) -> DVec3) {
+    pub(crate) fn grid(&mut self, rows: u32, columns: u32, at: impl Fn(u32, u32) -> DVec3) {
         let first = self.positions.len() as u32;
         let wide = columns + 1;
         for row in 0..=rows {
@@ -63,7 +63,13 @@ impl Shaper {
     }
 
     /// A surface of revolution about the vertical through `center`: `profile(s)` is (radius, height), s in [0, 1].
-    pub fn lathe(&mut self, center: DVec3, around: u32, along: u32, profile: impl Fn(f64) -> (f64, f64)) {
+    pub(crate) fn lathe(
+        &mut self,
+        center: DVec3,
+        around: u32,
+        along: u32,
+        profile: impl Fn(f64) -> (f64, f64),
+    ) {
         self.grid(along, around, |row, column| {
             let (radius, height) = profile(f64::from(row) / f64::from(along));
             // The seam closes to the bit.
@@ -74,7 +80,7 @@ impl Shaper {
 
     /// A tube of varying radius about a curve: `curve(s)` is (middle, radius), s in [0, 1]. Its cross sections lie across
     /// the x and y of the curve's plane, so the curve should stay near a plane of constant z.
-    pub fn tube(&mut self, around: u32, along: u32, curve: impl Fn(f64) -> (DVec3, f64)) {
+    pub(crate) fn tube(&mut self, around: u32, along: u32, curve: impl Fn(f64) -> (DVec3, f64)) {
         self.grid(along, around, |row, column| {
             let s = f64::from(row) / f64::from(along);
             let (middle, radius) = curve(s);
@@ -86,7 +92,7 @@ impl Shaper {
     }
 
     /// A sphere by parallels and meridians.
-    pub fn ball(&mut self, center: DVec3, radius: f64, around: u32) {
+    pub(crate) fn ball(&mut self, center: DVec3, radius: f64, around: u32) {
         self.lathe(center, around, around / 2, |s| {
             let polar = std::f64::consts::PI * s;
             (radius * polar.sin(), -radius * polar.cos())
@@ -95,12 +101,12 @@ impl Shaper {
 }
 
 /// A number between two.
-pub fn between(random: &mut RandomStream, low: f64, high: f64) -> f64 {
+pub(crate) fn between(random: &mut RandomStream, low: f64, high: f64) -> f64 {
     low + (high - low) * random.next_f64()
 }
 
 /// A direction, all as likely.
-pub fn direction(random: &mut RandomStream) -> DVec3 {
+pub(crate) fn direction(random: &mut RandomStream) -> DVec3 {
     let z = between(random, -1.0, 1.0);
     let azimuth = std::f64::consts::TAU * random.next_f64();
     let across = (1.0 - z * z).sqrt();

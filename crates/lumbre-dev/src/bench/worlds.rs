@@ -11,7 +11,7 @@ use crate::scene::{Camera, Placement, Scene};
 use crate::shaping::{Shaper, between, direction};
 
 /// A scene yet to be made.
-pub struct Recipe {
+pub(crate) struct Recipe {
     /// Its name.
     pub name: &'static str,
     /// Whether it is small enough to be measured in a hurry.
@@ -21,13 +21,13 @@ pub struct Recipe {
 
 impl Recipe {
     /// Makes it.
-    pub fn make(&self) -> Scene {
+    pub(crate) fn make(&self) -> Scene {
         (self.make)(self.name)
     }
 }
 
 /// Every scene that needs no file.
-pub const RECIPES: &[Recipe] = &[
+pub(crate) const RECIPES: &[Recipe] = &[
     Recipe { name: "scan-1k", is_quick: true, make: |name| scan(name, 9) },
     Recipe { name: "scan-100k", is_quick: true, make: |name| scan(name, 91) },
     Recipe { name: "scan-1m", is_quick: false, make: |name| scan(name, 289) },

@@ -19,7 +19,7 @@ const NOISE_LIMIT: f64 = 1.1;
 
 /// What is compared.
 #[derive(Args)]
-pub struct Agree {
+pub(crate) struct Agree {
     /// The reference picture: it gives the size.
     #[arg(long)]
     reference: PathBuf,
@@ -35,7 +35,7 @@ pub struct Agree {
 }
 
 /// Renders and compares.
-pub fn run_comparison(what: &Agree) -> Result<()> {
+pub(crate) fn run_comparison(what: &Agree) -> Result<()> {
     ensure!(
         what.spp >= PARTS && what.reference_spp > 0,
         "at least {PARTS} samples a pixel, and a reference of some"

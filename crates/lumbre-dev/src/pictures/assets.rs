@@ -9,7 +9,7 @@ use lumbre::image::{Image, Rgb};
 use xtask::command::root;
 
 /// Writes every generated file under scenes/.
-pub fn write() -> Result<()> {
+pub(crate) fn write() -> Result<()> {
     let folder = root().join("scenes").join("mesh").join("parts");
     fs::create_dir_all(&folder)?;
     fs::write(folder.join("vase.ply"), vase()?)?;

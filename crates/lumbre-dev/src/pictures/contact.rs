@@ -16,7 +16,7 @@ const ENDINGS: [&str; 2] = ["glb", "gltf"];
 
 /// Renders every model below `folder`, by default the sample models of glTF where they lie beside the workspace, and joins
 /// the pictures to one PNG.
-pub fn sheet(folder: Option<&Path>, output: Option<&Path>, columns: u32, spp: u32) -> Result<()> {
+pub(crate) fn sheet(folder: Option<&Path>, output: Option<&Path>, columns: u32, spp: u32) -> Result<()> {
     let folder = folder.map_or_else(shared_models, |folder| Ok(folder.to_owned()))?;
     let output = output.map_or_else(|| root().join("docs").join("gltf-models.png"), Path::to_owned);
     let mut models = Vec::new();

@@ -21,7 +21,7 @@ pub(super) enum Component {
 }
 
 impl Component {
-    pub fn read(value: Value<'_>) -> Read<Self> {
+    pub(super) fn read(value: Value<'_>) -> Read<Self> {
         Ok(match value.whole(0)? {
             5120 => Self::I8,
             5121 => Self::U8,
@@ -37,7 +37,7 @@ impl Component {
         })
     }
 
-    pub fn bytes(self) -> usize {
+    pub(super) fn bytes(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
             Self::I16 | Self::U16 => 2,
@@ -45,7 +45,7 @@ impl Component {
         }
     }
 
-    pub fn name(self) -> &'static str {
+    pub(super) fn name(self) -> &'static str {
         match self {
             Self::I8 => "signed bytes",
             Self::U8 => "unsigned bytes",
@@ -80,7 +80,7 @@ impl Element {
         ("MAT4", Self::Mat4),
     ];
 
-    pub fn read(value: Value<'_>) -> Read<Self> {
+    pub(super) fn read(value: Value<'_>) -> Read<Self> {
         let text = value.string()?;
         let known = Self::NAMES.iter().find(|(name, _)| *name == text).map(|&(_, element)| element);
         known.ok_or_else(|| {
@@ -89,7 +89,7 @@ impl Element {
         })
     }
 
-    pub fn name(self) -> &'static str {
+    pub(super) fn name(self) -> &'static str {
         Self::NAMES[self as usize].0
     }
 
@@ -107,7 +107,7 @@ impl Element {
     }
 
     /// How many numbers there are in all.
-    pub fn numbers(self) -> usize {
+    pub(super) fn numbers(self) -> usize {
         let (columns, rows) = self.columns();
         columns * rows
     }
@@ -199,13 +199,13 @@ pub(super) fn is_known(value: Value<'_>) -> Read<bool> {
 
 impl<'a> Accessor<'a> {
     /// The accessor that `value` names.
-    pub fn named(file: &'a File<'_>, value: Value<'_>) -> Read<Self> {
+    pub(super) fn named(file: &'a File<'_>, value: Value<'_>) -> Read<Self> {
         let index = value.index(file.list(List::Accessors).len(), "an accessor")?;
         Self::at(file, index)
     }
 
     /// The accessor at a position.
-    pub fn at(file: &'a File<'_>, index: usize) -> Read<Self> {
+    pub(super) fn at(file: &'a File<'_>, index: usize) -> Read<Self> {
         let value = file.list(List::Accessors)[index];
         let component = Component::read(value.need("componentType")?)?;
         let element = Element::read(value.need("type")?)?;
@@ -296,12 +296,17 @@ impl<'a> Accessor<'a> {
     }
 
     /// What it has, in words.
-    pub fn said(&self) -> String {
+    pub(super) fn said(&self) -> String {
         format!("{} of {}", self.element.name(), self.component.name())
     }
 
     /// An error unless it has elements of one of these kinds.
-    pub fn expect(&self, culprit: Value<'_>, elements: &[Element], components: &[Component]) -> Read<()> {
+    pub(super) fn expect(
+        &self,
+        culprit: Value<'_>,
+        elements: &[Element],
+        components: &[Component],
+    ) -> Read<()> {
         if elements.contains(&self.element) && components.contains(&self.component) {
             return Ok(());
         }
@@ -312,7 +317,7 @@ impl<'a> Accessor<'a> {
     }
 
     /// All elements as numbers, made into what is wanted. `N` numbers are read of each: an element has at least so many.
-    pub fn floats<const N: usize, T: Send>(
+    pub(super) fn floats<const N: usize, T: Send>(
         &self,
         file: &File<'_>,
         make: impl Fn([f32; N]) -> T + Sync,
@@ -337,7 +342,7 @@ impl<'a> Accessor<'a> {
     }
 
     /// All elements as whole numbers; numbers of other types are an error of whoever did not look.
-    pub fn wholes<const N: usize>(&self, file: &File<'_>) -> Read<Vec<[u32; N]>> {
+    pub(super) fn wholes<const N: usize>(&self, file: &File<'_>) -> Read<Vec<[u32; N]>> {
         debug_assert!(N <= self.element.numbers());
         match self.component {
             Component::U8 => self.decoded(file, |[b]| u32::from(b), |n| n),
@@ -353,7 +358,7 @@ impl<'a> Accessor<'a> {
     }
 
     /// The least and the largest of its numbers, as it says them itself; `None` where it does not, or not as many as there are.
-    pub fn bounds<const N: usize>(&self) -> Read<Option<[[f64; N]; 2]>> {
+    pub(super) fn bounds<const N: usize>(&self) -> Read<Option<[[f64; N]; 2]>> {
         let [Some(low), Some(high)] = [self.value.get("min")?, self.value.get("max")?] else {
             return Ok(None);
         };
@@ -371,7 +376,7 @@ impl<'a> Accessor<'a> {
     }
 
     /// The same numbers by threes, as long as there are three; `None` where they do not simply stand in a row.
-    pub fn by_threes(&self) -> Option<Self> {
+    pub(super) fn by_threes(&self) -> Option<Self> {
         let size = self.component.bytes();
         let count = self.count / 3;
         let Some(Strided { bytes: Some(bytes), stride }) = self.data else { return None };

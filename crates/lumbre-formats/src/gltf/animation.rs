@@ -53,7 +53,7 @@ impl Weights {
     }
 
     /// The weights, where `still` are those without animations.
-    pub fn over(&self, still: Option<Vec<f64>>) -> Option<Vec<f64>> {
+    pub(super) fn over(&self, still: Option<Vec<f64>>) -> Option<Vec<f64>> {
         let weights = self.all.clone().or(still);
         let Some((&last, _)) = self.single.last_key_value() else { return weights };
         let mut weights = weights.unwrap_or_default();
@@ -65,7 +65,7 @@ impl Weights {
 
 impl Moved {
     /// Whether it moves the node, and not only the weights of its morph targets.
-    pub fn places(&self) -> bool {
+    pub(super) fn places(&self) -> bool {
         self.translation.is_some() || self.rotation.is_some() || self.scale.is_some()
     }
 }
@@ -124,7 +124,7 @@ pub(super) struct Playing<'a> {
 impl<'a> Playing<'a> {
     /// Checks all animations, and chooses those that play: the one that is asked for, or else every one that moves nothing of
     /// what one before it moves. Without a time none does, and nothing is looked at.
-    pub fn read(file: &'a File<'a>, options: &GltfOptions) -> Read<Self> {
+    pub(super) fn read(file: &'a File<'a>, options: &GltfOptions) -> Read<Self> {
         let mut playing = Self { file, channels: vec![] };
         if options.frame.is_none() {
             return Ok(playing);
@@ -164,7 +164,7 @@ impl<'a> Playing<'a> {
     }
 
     /// What they do at a time in seconds to nodes and meshes.
-    pub fn at(&self, time: f64) -> Read<Played> {
+    pub(super) fn at(&self, time: f64) -> Read<Played> {
         let mut played = Played::default();
         for channel in &self.channels {
             if !matches!(channel.target, Target::Pointer(_)) {
@@ -175,7 +175,7 @@ impl<'a> Playing<'a> {
     }
 
     /// What they do at a time to anything else, by pointers.
-    pub fn changes(&self, time: f64) -> Read<Changes> {
+    pub(super) fn changes(&self, time: f64) -> Read<Changes> {
         let mut changes = Changes::default();
         for channel in &self.channels {
             if let Target::Pointer(pointer) = &channel.target {
@@ -186,7 +186,7 @@ impl<'a> Playing<'a> {
     }
 
     /// Warns of what they change by pointers between these times: it is as it is halfway.
-    pub fn warn_of_changes(&self, times: &[f64]) -> Read<()> {
+    pub(super) fn warn_of_changes(&self, times: &[f64]) -> Read<()> {
         for channel in &self.channels {
             let Target::Pointer(pointer) = &channel.target else { continue };
             let values: Vec<Vec<f64>> =
@@ -202,7 +202,7 @@ impl<'a> Playing<'a> {
     }
 
     /// Whether nothing plays.
-    pub fn is_empty(&self) -> bool {
+    pub(super) fn is_empty(&self) -> bool {
         self.channels.is_empty()
     }
 }

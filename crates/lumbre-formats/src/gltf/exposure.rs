@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use lumbre_math::{AnimatedTransform, DAffine3, DMat4, SingularTransform, Transform};
+use lumbre_math::{AnimatedTransform, DAffine3, DMat4, SingularTransformError, Transform};
 
 use super::animation::Playing;
 use super::file::{File, List};
@@ -38,7 +38,7 @@ struct Moment<'f> {
 }
 
 impl<'f> Exposure<'f> {
-    pub fn read(file: &'f File<'f>, playing: &Playing<'_>, options: &GltfOptions) -> Read<Self> {
+    pub(super) fn read(file: &'f File<'f>, playing: &Playing<'_>, options: &GltfOptions) -> Read<Self> {
         let mut moments = vec![];
         if let Some(middle) = options.frame
             && options.shutter > 0.0
@@ -63,13 +63,13 @@ impl<'f> Exposure<'f> {
     }
 
     /// Whether a node moves.
-    pub fn moves(&mut self, node: usize) -> Read<bool> {
+    pub(super) fn moves(&mut self, node: usize) -> Read<bool> {
         let worlds = self.worlds(node)?;
         Ok(worlds.iter().any(|(_, world)| *world != worlds[0].1))
     }
 
     /// How a mesh stands at each moment at which it is looked at while it changes its form; none where it does not.
-    pub fn poses(&mut self, node: usize, skin: Option<usize>) -> Read<Vec<OwnPose>> {
+    pub(super) fn poses(&mut self, node: usize, skin: Option<usize>) -> Read<Vec<OwnPose>> {
         if !self.deforms(node, skin)? {
             return Ok(vec![]);
         }
@@ -87,7 +87,7 @@ impl<'f> Exposure<'f> {
     }
 
     /// Whether the mesh of a node changes its form: by its morph targets, or by the joints of its skin.
-    pub fn deforms(&mut self, node: usize, skin: Option<usize>) -> Read<bool> {
+    pub(super) fn deforms(&mut self, node: usize, skin: Option<usize>) -> Read<bool> {
         if let Some((first, others)) = self.moments.split_first() {
             let first = first.graph.weights(node)?;
             for moment in others {
@@ -107,17 +107,17 @@ impl<'f> Exposure<'f> {
     }
 
     /// The motion of what stands at `place` when the node stands in the world somewhere; `None` where nothing moves.
-    pub fn motion(
+    pub(super) fn motion(
         &mut self,
         node: usize,
-        place: impl Fn(&DAffine3) -> Result<Transform, SingularTransform>,
+        place: impl Fn(&DAffine3) -> Result<Transform, SingularTransformError>,
     ) -> Read<Option<Arc<AnimatedTransform>>> {
         if !self.moves(node)? {
             return Ok(None);
         }
         let worlds = self.worlds(node)?;
         let keys: Result<Vec<_>, _> = worlds.iter().map(|(time, world)| Ok((*time, place(world)?))).collect();
-        let motion = keys.map_err(|error: SingularTransform| error.to_string());
+        let motion = keys.map_err(|error: SingularTransformError| error.to_string());
         let motion = motion.and_then(|keys| simplest(keys).map_err(|error| error.to_string()));
         match motion {
             Ok(motion) => Ok(Some(Arc::new(motion))),

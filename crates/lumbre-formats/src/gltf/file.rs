@@ -112,7 +112,7 @@ pub(super) struct View<'a> {
 
 impl<'a> File<'a> {
     /// Nothing is looked at yet: that is what [`File::load`] does.
-    pub fn new(
+    pub(super) fn new(
         root: Value<'a>,
         name: &Arc<str>,
         folder: &'a Path,
@@ -134,7 +134,7 @@ impl<'a> File<'a> {
     }
 
     /// What was said about the file.
-    pub fn into_diagnostics(self) -> Diagnostics {
+    pub(super) fn into_diagnostics(self) -> Diagnostics {
         self.diagnostics.into_inner()
     }
 
@@ -164,23 +164,28 @@ impl<'a> File<'a> {
     }
 
     /// The values of a list.
-    pub fn list(&self, list: List) -> &[Value<'a>] {
+    pub(super) fn list(&self, list: List) -> &[Value<'a>] {
         &self.lists[list as usize]
     }
 
     /// The element of a list that `value` names by its position, with the position.
-    pub fn at(&self, list: List, value: Value<'_>) -> Read<(usize, Value<'a>)> {
+    pub(super) fn at(&self, list: List, value: Value<'_>) -> Read<(usize, Value<'a>)> {
         let index = value.index(self.list(list).len(), list.names().2)?;
         Ok((index, self.list(list)[index]))
     }
 
     /// The element of a list that a member of `value` names, where it has that member.
-    pub fn named(&self, list: List, value: Value<'_>, member: &str) -> Read<Option<(usize, Value<'a>)>> {
+    pub(super) fn named(
+        &self,
+        list: List,
+        value: Value<'_>,
+        member: &str,
+    ) -> Read<Option<(usize, Value<'a>)>> {
         value.get(member)?.map(|index| self.at(list, index)).transpose()
     }
 
     /// Whether the file says that it uses an extension.
-    pub fn uses(&self, extension: &str) -> Read<bool> {
+    pub(super) fn uses(&self, extension: &str) -> Read<bool> {
         let Some(list) = self.root.get("extensionsUsed")? else { return Ok(false) };
         for name in list.array()? {
             if name.string()? == extension {
@@ -191,27 +196,27 @@ impl<'a> File<'a> {
     }
 
     /// Whether what cannot be used should be dropped with a warning.
-    pub fn is_lenient(&self) -> bool {
+    pub(super) fn is_lenient(&self) -> bool {
         self.diagnostics.borrow().is_lenient()
     }
 
     /// Adds a warning of this kind.
-    pub fn warn(&self, value: Value<'_>, message: &str) {
+    pub(super) fn warn(&self, value: Value<'_>, message: &str) {
         value.warn(&mut self.diagnostics.borrow_mut(), message);
     }
 
     /// Adds a warning.
-    pub fn push(&self, warning: Diagnostic) {
+    pub(super) fn push(&self, warning: Diagnostic) {
         self.diagnostics.borrow_mut().push(warning);
     }
 
     /// The collector, for readers of other formats.
-    pub fn with_diagnostics<T>(&self, f: impl FnOnce(&mut Diagnostics) -> T) -> T {
+    pub(super) fn with_diagnostics<T>(&self, f: impl FnOnce(&mut Diagnostics) -> T) -> T {
         f(&mut self.diagnostics.borrow_mut())
     }
 
     /// Something that glTF forbids though its meaning is plain: an error, or a warning when lenient.
-    pub fn breach(&self, wrong: Diagnostic) -> Read<()> {
+    pub(super) fn breach(&self, wrong: Diagnostic) -> Read<()> {
         if !self.is_lenient() {
             return Err(wrong.into());
         }
@@ -220,7 +225,7 @@ impl<'a> File<'a> {
     }
 
     /// Finds the lists and loads every buffer. `binary` is the one inside a GLB.
-    pub fn load(&mut self, binary: Option<&'a [u8]>, is_glb: bool) -> Read<()> {
+    pub(super) fn load(&mut self, binary: Option<&'a [u8]>, is_glb: bool) -> Read<()> {
         self.find_lists()?;
         for (index, &value) in self.lists[List::Buffers as usize].iter().enumerate() {
             let bytes = self.buffer(index, value, binary, is_glb)?;
@@ -291,7 +296,7 @@ impl<'a> File<'a> {
 
     /// The bytes behind a URI, with a name for messages. Data in the URI itself must be of one of the media types, unless
     /// there are none to choose from.
-    pub fn data(&self, uri: Value<'_>, media_types: &[&str]) -> Read<(Arc<str>, Vec<u8>)> {
+    pub(super) fn data(&self, uri: Value<'_>, media_types: &[&str]) -> Read<(Arc<str>, Vec<u8>)> {
         let text = uri.string()?;
         match target(&text) {
             Target::Data(DataUri { media_type, is_base64, data }) => {
@@ -342,12 +347,12 @@ impl<'a> File<'a> {
     }
 
     /// The bytes of all buffers together.
-    pub fn buffer_bytes(&self) -> u64 {
+    pub(super) fn buffer_bytes(&self) -> u64 {
         self.buffer_bytes
     }
 
     /// The bytes of a buffer that `value` names as a buffer view does, where they start, and how many there are.
-    pub fn buffer_slice(&self, value: Value<'_>) -> Read<(Option<&[u8]>, u64, u64)> {
+    pub(super) fn buffer_slice(&self, value: Value<'_>) -> Read<(Option<&[u8]>, u64, u64)> {
         let (index, buffer) = self.at(List::Buffers, value.need("buffer")?)?;
         let offset_value = value.get("byteOffset")?;
         let offset = offset_value.map_or(Ok(0), |v| v.whole(0))?;
@@ -367,18 +372,18 @@ impl<'a> File<'a> {
     }
 
     /// The buffer view that `value` names.
-    pub fn view(&self, value: Value<'_>) -> Read<(usize, View<'_>)> {
+    pub(super) fn view(&self, value: Value<'_>) -> Read<(usize, View<'_>)> {
         let (index, view) = self.at(List::BufferViews, value)?;
         Ok((index, self.view_at(index, view)?))
     }
 
     /// The elements of an accessor that was compressed with its primitive, tightly packed.
-    pub fn filled(&self, accessor: usize) -> Option<&[u8]> {
+    pub(super) fn filled(&self, accessor: usize) -> Option<&[u8]> {
         self.filled.get(&accessor).map(Vec::as_slice)
     }
 
     /// A buffer view.
-    pub fn view_at(&self, index: usize, value: Value<'_>) -> Read<View<'_>> {
+    pub(super) fn view_at(&self, index: usize, value: Value<'_>) -> Read<View<'_>> {
         let stride = match value.get("byteStride")? {
             None => None,
             Some(value) => {
@@ -417,7 +422,7 @@ impl<'a> File<'a> {
     }
 
     /// A place for messages about the file as a whole.
-    pub fn whole(&self) -> Place {
+    pub(super) fn whole(&self) -> Place {
         Place::whole(self.name.clone())
     }
 }

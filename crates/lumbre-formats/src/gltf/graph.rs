@@ -17,7 +17,7 @@ pub(super) struct Graph<'a> {
 
 impl<'a> Graph<'a> {
     /// Looks at every node. `played` is what animations do to some of them.
-    pub fn read(file: &'a File<'a>, played: Played) -> Read<Self> {
+    pub(super) fn read(file: &'a File<'a>, played: Played) -> Read<Self> {
         let nodes = file.list(List::Nodes);
         let mut parents: Vec<Option<u32>> = file.budget.vec(nodes.len() as u64, "nodes")?;
         parents.resize(nodes.len(), None);
@@ -86,22 +86,22 @@ impl<'a> Graph<'a> {
     }
 
     /// The nodes that hang on no other.
-    pub fn roots(&self) -> impl Iterator<Item = usize> + '_ {
+    pub(super) fn roots(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.parents.len()).filter(|&node| self.parents[node].is_none())
     }
 
     /// Whether a node hangs on another.
-    pub fn is_child(&self, node: usize) -> bool {
+    pub(super) fn is_child(&self, node: usize) -> bool {
         self.parents[node].is_some()
     }
 
     /// What an animation does to a node.
-    pub fn moved(&self, node: usize) -> Option<&Moved> {
+    pub(super) fn moved(&self, node: usize) -> Option<&Moved> {
         self.played.nodes.get(&node)
     }
 
     /// The weights of morph targets that a node's mesh has, as animations leave them; none where nothing says them.
-    pub fn weights(&self, node: usize) -> Read<Option<Vec<f64>>> {
+    pub(super) fn weights(&self, node: usize) -> Read<Option<Vec<f64>>> {
         let value = self.file.list(List::Nodes)[node];
         let still = |value: Value<'_>| -> Read<Option<Vec<f64>>> {
             value.get("weights")?.map(|list| list.array()?.map(Value::number).collect()).transpose()
@@ -118,12 +118,12 @@ impl<'a> Graph<'a> {
     }
 
     /// From a node's own space to its parent's.
-    pub fn local(&self, node: usize) -> Read<DAffine3> {
+    pub(super) fn local(&self, node: usize) -> Read<DAffine3> {
         local(self.file, self.file.list(List::Nodes)[node], self.moved(node))
     }
 
     /// From the spaces of nodes to the world. What is found on the way is kept in `known`.
-    pub fn world(&self, node: usize, known: &mut HashMap<usize, DAffine3>) -> Read<DAffine3> {
+    pub(super) fn world(&self, node: usize, known: &mut HashMap<usize, DAffine3>) -> Read<DAffine3> {
         let mut path = vec![];
         let mut here = Some(node);
         let mut world = DAffine3::IDENTITY;
@@ -143,7 +143,11 @@ impl<'a> Graph<'a> {
     }
 
     /// Visits all nodes below `roots`, parents first, with where they stand.
-    pub fn walk(&self, roots: &[usize], mut visit: impl FnMut(usize, &DAffine3) -> Read<()>) -> Read<()> {
+    pub(super) fn walk(
+        &self,
+        roots: &[usize],
+        mut visit: impl FnMut(usize, &DAffine3) -> Read<()>,
+    ) -> Read<()> {
         let mut waiting: Vec<(usize, DAffine3)> = vec![];
         for &root in roots {
             waiting.push((root, DAffine3::IDENTITY));

@@ -19,12 +19,12 @@ pub(super) struct Profiles<'f> {
 }
 
 impl<'f> Profiles<'f> {
-    pub fn new(file: &'f File<'f>) -> Self {
+    pub(super) fn new(file: &'f File<'f>) -> Self {
         Self { file, images: HashMap::new() }
     }
 
     /// Checks a profile without reading it.
-    pub fn check(file: &File<'_>, value: Value<'_>) -> Read<()> {
+    pub(super) fn check(file: &File<'_>, value: Value<'_>) -> Read<()> {
         match (value.get("uri")?, value.get("bufferView")?) {
             (Some(uri), None) => drop(uri.string()?),
             (None, Some(view)) => {
@@ -48,7 +48,7 @@ impl<'f> Profiles<'f> {
     }
 
     /// Which profile a node has, and the factor on it.
-    pub fn instance(file: &File<'_>, extension: Value<'_>) -> Read<(usize, Rgb)> {
+    pub(super) fn instance(file: &File<'_>, extension: Value<'_>) -> Read<(usize, Rgb)> {
         let (index, _) = file.at(List::Profiles, extension.need("light")?)?;
         let multiplier = extension.number_or("multiplier", 1.0, 0.0..=f64::INFINITY)?;
         let [r, g, b] = extension.numbers_or("color", [1.0; 3], 0.0..=1.0)?;
@@ -56,7 +56,7 @@ impl<'f> Profiles<'f> {
     }
 
     /// The light of a node, whose place and turn `world` is: aimed along its -z.
-    pub fn light(&mut self, extension: Value<'_>, world: &DAffine3) -> Read<LightDesc> {
+    pub(super) fn light(&mut self, extension: Value<'_>, world: &DAffine3) -> Read<LightDesc> {
         let (index, intensity) = Self::instance(self.file, extension)?;
         let world_from_light = Transform::from_affine(*world)
             .map_err(|_| FormatError::from(extension.wrong("light at a place that is not finite")))?;

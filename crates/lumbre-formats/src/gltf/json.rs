@@ -39,7 +39,7 @@ pub(super) struct Value<'a> {
 
 impl<'t> Json<'t> {
     /// Reads a text. `within` is where it starts in its file, when the file is not this text alone.
-    pub fn read(text: &'t str, name: &Arc<str>, within: Option<u64>, budget: &Budget) -> Read<Self> {
+    pub(super) fn read(text: &'t str, name: &Arc<str>, within: Option<u64>, budget: &Budget) -> Read<Self> {
         let mut parser = Parser { text: text.as_bytes(), at: 0, name, within, budget };
         if text.len() >= u32::MAX as usize {
             return Err(parser.wrong("JSON text too long").expected("less than 4 GiB").into());
@@ -49,7 +49,7 @@ impl<'t> Json<'t> {
     }
 
     /// The whole.
-    pub fn root(&self) -> Value<'_> {
+    pub(super) fn root(&self) -> Value<'_> {
         Value { json: self, at: 0 }
     }
 }
@@ -295,12 +295,12 @@ impl<'a> Value<'a> {
     }
 
     /// The text that it is a part of.
-    pub fn text(self) -> &'a str {
+    pub(super) fn text(self) -> &'a str {
         self.json.text
     }
 
     /// Where it stands in the text.
-    pub fn range(self) -> std::ops::Range<usize> {
+    pub(super) fn range(self) -> std::ops::Range<usize> {
         let bytes = self.json.text.as_bytes();
         // Down to the last value that has none inside it, and out again over the brackets.
         let (mut last, mut depth) = (self, 0);
@@ -368,7 +368,7 @@ impl<'a> Value<'a> {
     }
 
     /// The JSON pointer; this walks down from the root, for errors.
-    pub fn pointer(self) -> String {
+    pub(super) fn pointer(self) -> String {
         let mut pointer = String::new();
         let mut here = self.json.root();
         'down: while here.at != self.at {
@@ -403,7 +403,7 @@ impl<'a> Value<'a> {
     }
 
     /// Where it is, with its pointer.
-    pub fn place(self) -> Place {
+    pub(super) fn place(self) -> Place {
         let json = self.json;
         match json.within {
             Some(start) => Place::binary(json.name.clone(), start + self.start() as u64, self.pointer()),
@@ -413,17 +413,17 @@ impl<'a> Value<'a> {
     }
 
     /// Something wrong with it.
-    pub fn wrong(self, message: impl Into<String>) -> Diagnostic {
+    pub(super) fn wrong(self, message: impl Into<String>) -> Diagnostic {
         Diagnostic::error(message).at(self.place())
     }
 
     /// An error: it is not what was expected.
-    pub fn unexpected(self, message: &str, expected: &str) -> FormatError {
+    pub(super) fn unexpected(self, message: &str, expected: &str) -> FormatError {
         self.wrong(message).found(self.said()).expected(expected).into()
     }
 
     /// A warning of something that was not used.
-    pub fn warn(self, diagnostics: &mut Diagnostics, message: &str) {
+    pub(super) fn warn(self, diagnostics: &mut Diagnostics, message: &str) {
         diagnostics.warn(message, |warning| warning.at(self.place()));
     }
 
@@ -445,12 +445,12 @@ impl<'a> Value<'a> {
     }
 
     /// That it is an object.
-    pub fn object(self) -> Read<Self> {
+    pub(super) fn object(self) -> Read<Self> {
         if self.first_byte() == b'{' { Ok(self) } else { Err(self.unexpected("wrong type", "an object")) }
     }
 
     /// The names and values of an object, or the values of an array; nothing for what has none inside.
-    pub fn inside(self) -> impl Iterator<Item = Inside<'a>> {
+    pub(super) fn inside(self) -> impl Iterator<Item = Inside<'a>> {
         let is_object = self.first_byte() == b'{';
         let mut values = self.values();
         std::iter::from_fn(move || {
@@ -463,13 +463,13 @@ impl<'a> Value<'a> {
     }
 
     /// The members of an object: names and values.
-    pub fn members(self) -> Read<impl Iterator<Item = (Cow<'a, str>, Self)>> {
+    pub(super) fn members(self) -> Read<impl Iterator<Item = (Cow<'a, str>, Self)>> {
         self.object()?;
         Ok(self.pairs().map(|(key, value)| (key.unescaped(), value)))
     }
 
     /// The member of an object of this name.
-    pub fn get(self, name: &str) -> Read<Option<Self>> {
+    pub(super) fn get(self, name: &str) -> Read<Option<Self>> {
         self.object()?;
         let mut found: Option<Self> = None;
         for (key, value) in self.pairs() {
@@ -486,12 +486,12 @@ impl<'a> Value<'a> {
     }
 
     /// The member of an object of this name, which must be there.
-    pub fn need(self, name: &str) -> Read<Self> {
+    pub(super) fn need(self, name: &str) -> Read<Self> {
         self.get(name)?.ok_or_else(|| self.wrong(format!("{} is missing", quoted(name))).into())
     }
 
     /// The elements of an array.
-    pub fn array(self) -> Read<impl Iterator<Item = Self>> {
+    pub(super) fn array(self) -> Read<impl Iterator<Item = Self>> {
         if self.first_byte() == b'[' {
             Ok(self.values())
         } else {
@@ -500,7 +500,7 @@ impl<'a> Value<'a> {
     }
 
     /// The numbers of an array of so many.
-    pub fn numbers<const N: usize>(self) -> Read<[f64; N]> {
+    pub(super) fn numbers<const N: usize>(self) -> Read<[f64; N]> {
         let expected = || self.unexpected("wrong type", &format!("an array of {N} numbers"));
         let mut values = self.array().map_err(|_| expected())?;
         let mut numbers = [0.0; N];
@@ -511,7 +511,7 @@ impl<'a> Value<'a> {
     }
 
     /// A finite number.
-    pub fn number(self) -> Read<f64> {
+    pub(super) fn number(self) -> Read<f64> {
         let number = match self.first_byte() {
             b'-' | b'0'..=b'9' => self.scalar().parse::<f64>().ok(),
             _ => return Err(self.unexpected("wrong type", "a number")),
@@ -520,7 +520,7 @@ impl<'a> Value<'a> {
     }
 
     /// A whole number of at least `least` and below 2⁵³.
-    pub fn whole(self, least: u64) -> Read<u64> {
+    pub(super) fn whole(self, least: u64) -> Read<u64> {
         const MOST: f64 = (1_u64 << 53) as f64;
         let number = self.number()?;
         if number.fract() == 0.0 && least as f64 <= number && number < MOST {
@@ -531,7 +531,7 @@ impl<'a> Value<'a> {
     }
 
     /// The position of something in a list of `count` things, which `what` names.
-    pub fn index(self, count: usize, what: &str) -> Read<usize> {
+    pub(super) fn index(self, count: usize, what: &str) -> Read<usize> {
         let index = self.whole(0)?;
         match usize::try_from(index) {
             Ok(index) if index < count => Ok(index),
@@ -546,7 +546,7 @@ impl<'a> Value<'a> {
     }
 
     /// A truth value.
-    pub fn bool(self) -> Read<bool> {
+    pub(super) fn bool(self) -> Read<bool> {
         match self.first_byte() {
             b't' => Ok(true),
             b'f' => Ok(false),
@@ -555,7 +555,7 @@ impl<'a> Value<'a> {
     }
 
     /// A string.
-    pub fn string(self) -> Read<Cow<'a, str>> {
+    pub(super) fn string(self) -> Read<Cow<'a, str>> {
         if self.first_byte() == b'"' {
             Ok(self.unescaped())
         } else {
@@ -564,7 +564,12 @@ impl<'a> Value<'a> {
     }
 
     /// A number within a range, or `default` where the object has none of this name.
-    pub fn number_or(self, name: &str, default: f64, range: std::ops::RangeInclusive<f64>) -> Read<f64> {
+    pub(super) fn number_or(
+        self,
+        name: &str,
+        default: f64,
+        range: std::ops::RangeInclusive<f64>,
+    ) -> Read<f64> {
         let Some(value) = self.get(name)? else { return Ok(default) };
         let number = value.number()?;
         if range.contains(&number) {
@@ -579,7 +584,7 @@ impl<'a> Value<'a> {
     }
 
     /// Numbers within a range, or `default` where the object has none of this name.
-    pub fn numbers_or<const N: usize>(
+    pub(super) fn numbers_or<const N: usize>(
         self,
         name: &str,
         default: [f64; N],
@@ -596,17 +601,17 @@ impl<'a> Value<'a> {
     }
 
     /// A truth value, or `default`.
-    pub fn bool_or(self, name: &str, default: bool) -> Read<bool> {
+    pub(super) fn bool_or(self, name: &str, default: bool) -> Read<bool> {
         self.get(name)?.map_or(Ok(default), Self::bool)
     }
 
     /// A string, where there is one.
-    pub fn string_at(self, name: &str) -> Read<Option<Cow<'a, str>>> {
+    pub(super) fn string_at(self, name: &str) -> Read<Option<Cow<'a, str>>> {
         self.get(name)?.map(Self::string).transpose()
     }
 
     /// The extension of this name.
-    pub fn extension(self, name: &str) -> Read<Option<Self>> {
+    pub(super) fn extension(self, name: &str) -> Read<Option<Self>> {
         let Some(extensions) = self.get("extensions")? else { return Ok(None) };
         let extension = extensions.get(name)?;
         extension.map(Self::object).transpose()

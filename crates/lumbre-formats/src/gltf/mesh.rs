@@ -41,7 +41,7 @@ impl Mode {
     }
 
     /// Whether it makes a surface.
-    pub fn is_surface(self) -> bool {
+    pub(super) fn is_surface(self) -> bool {
         matches!(self, Self::Triangles | Self::TriangleStrip | Self::TriangleFan)
     }
 
@@ -265,7 +265,7 @@ impl<'a> Attributes<'a> {
 
 impl<'a> Primitive<'a> {
     /// A primitive, all of which is there and fits together.
-    pub fn read(file: &'a File<'_>, value: Value<'a>, variant: Option<usize>) -> Read<Self> {
+    pub(super) fn read(file: &'a File<'_>, value: Value<'a>, variant: Option<usize>) -> Read<Self> {
         let mode = Mode::read(value)?;
         let attributes_value = value.need("attributes")?;
         let attributes = Attributes::read(file, attributes_value, false)?;
@@ -337,7 +337,7 @@ impl<'a> Primitive<'a> {
     }
 
     /// Everything that it reads, and whether as indices.
-    pub fn accessors(&self) -> impl Iterator<Item = (&Accessor<'a>, bool)> {
+    pub(super) fn accessors(&self) -> impl Iterator<Item = (&Accessor<'a>, bool)> {
         let vertices = std::iter::once(&self.attributes).chain(&self.targets).flat_map(|a| {
             let sets = [&a.uvs, &a.joints, &a.weights].into_iter().flatten();
             [&a.position, &a.normal, &a.tangent, &a.colour].into_iter().chain(sets).flatten()
@@ -700,7 +700,7 @@ pub(super) fn compact(vertices: &mut Vertices, triangles: &mut [[u32; 3]]) {
 
 impl Vertices {
     /// A shape between two vertices, with their colours if they have any.
-    pub fn coloured(&self, shape: Shape, ends: [u32; 2]) -> GeometryDesc {
+    pub(super) fn coloured(&self, shape: Shape, ends: [u32; 2]) -> GeometryDesc {
         let Some(colours) = &self.colours else { return GeometryDesc::Exact(shape) };
         let ends = ends.map(|i| i as usize);
         GeometryDesc::Coloured(Box::new(ColouredShape {
@@ -712,7 +712,7 @@ impl Vertices {
     }
 
     /// Makes these its vertices: each by its present position.
-    pub fn pick(&mut self, old: &[u32]) {
+    pub(super) fn pick(&mut self, old: &[u32]) {
         fn pick<T: Copy>(old: &[u32], list: &mut Vec<T>) {
             *list = old.iter().map(|&i| list[i as usize]).collect();
         }

@@ -44,6 +44,7 @@ use crate::input::{Input, text};
 
 /// What to take out of a glTF.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct GltfOptions {
     /// The time in seconds at which animations stand; `None` leaves them alone.
     pub frame: Option<f64>,

@@ -59,7 +59,7 @@ struct Change {
 
 impl Changes {
     /// Sets numbers: a list, or one by itself. False, and nothing changes, when they are set already or a part of what is.
-    pub fn set(&mut self, pointer: &str, numbers: &[f64], is_list: bool) -> bool {
+    pub(super) fn set(&mut self, pointer: &str, numbers: &[f64], is_list: bool) -> bool {
         // In the precision that they were stored in: a factor between two of 1 is 1.
         let texts: Vec<String> = numbers.iter().map(|n| format!("{}", *n as f32)).collect();
         let text = if is_list { format!("[{}]", texts.join(",")) } else { texts.concat() };
@@ -78,7 +78,7 @@ impl Changes {
     }
 
     /// Whether nothing was set.
-    pub fn is_empty(&self) -> bool {
+    pub(super) fn is_empty(&self) -> bool {
         self.top.inside.is_empty()
     }
 
@@ -86,7 +86,7 @@ impl Changes {
     ///
     /// # Errors
     /// Where members stand twice.
-    pub fn apply(&self, root: Value<'_>) -> Read<String> {
+    pub(super) fn apply(&self, root: Value<'_>) -> Read<String> {
         // Ranges of the text and what goes there instead.
         let mut edits: Vec<(std::ops::Range<usize>, String)> = vec![];
         let mut open = vec![(&self.top, root)];

@@ -47,13 +47,18 @@ pub(super) struct Materials<'f> {
 }
 
 impl<'f> Materials<'f> {
-    pub fn new(file: &'f File<'f>) -> Self {
+    pub(super) fn new(file: &'f File<'f>) -> Self {
         Self { file, textures: Textures::new(file), made: RefCell::default(), list: RefCell::default() }
     }
 
     /// The material at a position in the file, or glTF's default, for a mesh with or without colours at its vertices. Points and
     /// lines without colours, which are no surface, have a default of their own: [`INK`].
-    pub fn dressing(&self, index: Option<usize>, has_colours: bool, is_surface: bool) -> Read<Arc<Dressing>> {
+    pub(super) fn dressing(
+        &self,
+        index: Option<usize>,
+        has_colours: bool,
+        is_surface: bool,
+    ) -> Read<Arc<Dressing>> {
         let is_inked = index.is_none() && !is_surface && !has_colours;
         let key = (index, has_colours, is_inked);
         if let Some(made) = self.made.borrow().get(&key) {
@@ -104,7 +109,7 @@ impl<'f> Materials<'f> {
     }
 
     /// All materials that were asked for.
-    pub fn into_list(self) -> Vec<NamedMaterial> {
+    pub(super) fn into_list(self) -> Vec<NamedMaterial> {
         self.list.into_inner()
     }
 }

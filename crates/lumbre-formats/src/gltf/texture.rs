@@ -54,7 +54,7 @@ pub(super) struct UvSets {
 
 impl UvSets {
     /// Which of the mesh's sets has the file's; `None` for one that it does not have.
-    pub fn find(&self, set: usize) -> Option<UvSet> {
+    pub(super) fn find(&self, set: usize) -> Option<UvSet> {
         if set == self.first {
             return Some(UvSet::First);
         }
@@ -64,19 +64,19 @@ impl UvSets {
 }
 
 impl<'f> Textures<'f> {
-    pub fn new(file: &'f File<'f>) -> Self {
+    pub(super) fn new(file: &'f File<'f>) -> Self {
         Self { file, images: RefCell::default(), maps: RefCell::default() }
     }
 
     /// Checks the texture and what it names, without decoding anything.
-    pub fn check(file: &File<'_>, value: Value<'_>) -> Read<()> {
+    pub(super) fn check(file: &File<'_>, value: Value<'_>) -> Read<()> {
         source(file, value)?;
         sampler(file, value)?;
         Ok(())
     }
 
     /// Checks an image without decoding it.
-    pub fn check_image(file: &File<'_>, value: Value<'_>) -> Read<()> {
+    pub(super) fn check_image(file: &File<'_>, value: Value<'_>) -> Read<()> {
         let mime = value.string_at("mimeType")?;
         match (value.get("uri")?, value.get("bufferView")?) {
             (Some(uri), None) => drop(uri.string()?),
@@ -95,12 +95,12 @@ impl<'f> Textures<'f> {
     }
 
     /// A colour by its texture; `None` without an image.
-    pub fn colour(&self, texture: TextureRef, sets: UvSets) -> Read<Option<Arc<SpectrumTexture>>> {
+    pub(super) fn colour(&self, texture: TextureRef, sets: UvSets) -> Read<Option<Arc<SpectrumTexture>>> {
         Ok(self.look_up(texture, sets, Use::Colour)?.map(|image| Arc::new(Texture::Image(image))))
     }
 
     /// One channel of a texture (3 is coverage); `None` where it has no coverage.
-    pub fn channel(
+    pub(super) fn channel(
         &self,
         texture: TextureRef,
         channel: usize,
@@ -110,17 +110,22 @@ impl<'f> Textures<'f> {
     }
 
     /// Directions in red and green, and what goes with them in blue, as they are stored.
-    pub fn directions(&self, texture: TextureRef, sets: UvSets) -> Read<Option<Arc<SpectrumTexture>>> {
+    pub(super) fn directions(&self, texture: TextureRef, sets: UvSets) -> Read<Option<Arc<SpectrumTexture>>> {
         Ok(self.look_up(texture, sets, Use::Directions)?.map(|image| Arc::new(Texture::Image(image))))
     }
 
     /// A normal map.
-    pub fn normals(&self, texture: TextureRef, scale: f32, sets: UvSets) -> Read<Option<ImageTexture>> {
+    pub(super) fn normals(
+        &self,
+        texture: TextureRef,
+        scale: f32,
+        sets: UvSets,
+    ) -> Read<Option<ImageTexture>> {
         self.look_up(texture, sets, Use::Normal(scale.to_bits()))
     }
 
     /// The colours of a texture, without saying where they lie.
-    pub fn colour_map(&self, texture: usize) -> Read<Option<Arc<MipMap>>> {
+    pub(super) fn colour_map(&self, texture: usize) -> Read<Option<Arc<MipMap>>> {
         self.map(texture, Use::Colour)
     }
 

@@ -22,6 +22,7 @@ pub use write::{
 
 /// A kind of image file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum ImageFormat {
     /// Portable Network Graphics.
     Png,

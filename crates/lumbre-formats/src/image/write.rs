@@ -11,6 +11,7 @@ use crate::diagnostic::{Diagnostic, FormatError, Place, quoted};
 
 /// How an image is written.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct WriteOptions {
     /// How light is brought within what a display shows, in PNG and JPEG.
     pub tone_map: ToneMap,
@@ -64,6 +65,7 @@ pub enum ExrPrecision {
 
 /// How EXR is packed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ExrCompression {
     /// Not at all.
     None,

@@ -28,15 +28,15 @@ pub(super) struct Word<'a> {
 }
 
 impl<'a> Source<'a> {
-    pub fn place(&self, at: usize) -> Place {
+    pub(super) fn place(&self, at: usize) -> Place {
         Place::of_offset(self.name.clone(), self.bytes, at)
     }
 
-    pub fn wrong(&self, word: Word<'_>, message: impl Into<String>) -> Diagnostic {
+    pub(super) fn wrong(&self, word: Word<'_>, message: impl Into<String>) -> Diagnostic {
         Diagnostic::error(message).at(self.place(word.start)).found(quoted_bytes(word.bytes))
     }
 
-    pub fn lines(self) -> impl Iterator<Item = Line<'a>> {
+    pub(super) fn lines(self) -> impl Iterator<Item = Line<'a>> {
         // A file of an old Mac has only CR.
         let end = if self.bytes.contains(&b'\n') || !self.bytes.contains(&b'\r') { b'\n' } else { b'\r' };
         let mut at = if self.bytes.starts_with(b"\xEF\xBB\xBF") { 3 } else { 0 };
@@ -59,7 +59,7 @@ impl<'a> Source<'a> {
     }
 
     /// A number that is finite or not, as the caller minds.
-    pub fn number(&self, word: Word<'_>) -> Result<f32, FormatError> {
+    pub(super) fn number(&self, word: Word<'_>) -> Result<f32, FormatError> {
         let parsed = std::str::from_utf8(word.bytes).ok().and_then(|text| text.parse().ok());
         parsed.ok_or_else(|| self.wrong(word, "not a number").into())
     }
@@ -70,7 +70,7 @@ fn is_blank(byte: u8) -> bool {
 }
 
 impl<'a> Line<'a> {
-    pub fn words(self) -> Words<'a> {
+    pub(super) fn words(self) -> Words<'a> {
         Words { line: self, at: 0 }
     }
 }
@@ -96,7 +96,7 @@ impl<'a> Words<'a> {
     }
 
     /// All that is left of the line, as a name: without blanks around it and without a comment that a blank parts from it.
-    pub fn rest(mut self) -> (usize, Cow<'a, str>) {
+    pub(super) fn rest(mut self) -> (usize, Cow<'a, str>) {
         self.skip_blanks();
         let bytes = &self.line.bytes[self.at..];
         let comment = (0..bytes.len()).find(|&i| bytes[i] == b'#' && (i == 0 || is_blank(bytes[i - 1])));

@@ -8,7 +8,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use lumbre_image::ColourSpace;
-use lumbre_math::{DAffine3, DMat3, DMat4, DVec3, SingularTransform, Transform};
+use lumbre_math::{DAffine3, DMat3, DMat4, DVec3, SingularTransformError, Transform};
 
 use super::colour::rgb_from_xyz;
 use super::convert::Converter;
@@ -632,7 +632,7 @@ impl<'b, 'd> Parser<'b, 'd> {
     fn transform(
         &mut self,
         spot: Spot,
-        by: std::result::Result<Transform, SingularTransform>,
+        by: std::result::Result<Transform, SingularTransformError>,
         directive: &str,
     ) -> Result<()> {
         let by = by.map_err(|_| singular(spot, directive))?;

@@ -54,18 +54,18 @@ pub(super) struct Bounce {
 
 impl<'a, 's> Vertex<'a, 's> {
     /// `None` where nothing scatters.
-    pub fn new(scene: &'s Scene, met: &'a Interaction<'s>, interiors: &Interiors<'s>) -> Option<Self> {
+    pub(super) fn new(scene: &'s Scene, met: &'a Interaction<'s>, interiors: &Interiors<'s>) -> Option<Self> {
         Self::of(scene, met, met.resolved()?, interiors)
     }
 
     /// One vertex for each material of a mixture, with its share: see [`Interaction::parts`].
-    pub fn parts(
+    pub(super) fn parts(
         scene: &'s Scene,
         met: &'a Interaction<'s>,
         least: f32,
         interiors: &'a Interiors<'s>,
     ) -> impl Iterator<Item = (f32, Self)> {
-        let parts = met.parts(least).into_iter();
+        let parts = met.parts(least);
         parts.filter_map(move |(share, material)| Some((share, Self::of(scene, met, material, interiors)?)))
     }
 
@@ -127,17 +127,17 @@ impl<'a, 's> Vertex<'a, 's> {
     }
 
     /// f · |cos θ| towards a unit direction of the world.
-    pub fn eval(&self, wi: DVec3) -> Spectrum {
+    pub(super) fn eval(&self, wi: DVec3) -> Spectrum {
         self.unfolded(wi.as_vec3()).map(|wi| self.bsdf.eval(self.wo, wi)).sum()
     }
 
     /// The density with which [`Vertex::sample`] chooses a unit direction of the world, delta parts left out.
-    pub fn pdf(&self, wi: DVec3) -> f32 {
+    pub(super) fn pdf(&self, wi: DVec3) -> f32 {
         self.unfolded(wi.as_vec3()).map(|wi| self.bsdf.pdf(self.wo, wi)).sum()
     }
 
     /// Chooses a direction to go on in.
-    pub fn sample(&self, lobe: f32, u: Vec2) -> Option<Bounce> {
+    pub(super) fn sample(&self, lobe: f32, u: Vec2) -> Option<Bounce> {
         let sample = self.bsdf.sample(self.wo, lobe, u)?;
         let mut bounce = self.bounce(&sample);
         if let (Scatter::Density(_), Some(_)) = (sample.scatter, self.geometric) {
@@ -151,8 +151,8 @@ impl<'a, 's> Vertex<'a, 's> {
     }
 
     /// Its mirrors and its glass: every delta part.
-    pub fn specular(&self) -> impl Iterator<Item = Bounce> {
-        self.bsdf.specular(self.wo).into_iter().map(|sample| self.bounce(&sample))
+    pub(super) fn specular(&self) -> impl Iterator<Item = Bounce> {
+        self.bsdf.specular(self.wo).map(|sample| self.bounce(&sample))
     }
 
     fn bounce(&self, sample: &lumbre_shading::BsdfSample) -> Bounce {
@@ -174,7 +174,7 @@ impl<'a, 's> Vertex<'a, 's> {
 
     /// What the vertex scatters of a light's sample towards the path, weighed against the other way to find the same
     /// light: the density with which the BSDF would have chosen it.
-    pub fn scattered(
+    pub(super) fn scattered(
         &self,
         sample: &LightSample,
         interiors: &Interiors<'s>,
@@ -204,12 +204,12 @@ impl<'a, 's> Vertex<'a, 's> {
     }
 
     /// What of the light that comes from straight behind goes straight on: see [`Bsdf::straight_on`].
-    pub fn straight_on(&self) -> Spectrum {
+    pub(super) fn straight_on(&self) -> Spectrum {
         self.bsdf.straight_on(self.wo)
     }
 
     /// Where rays along a unit direction start, if that is off the face.
-    pub fn risen_towards(&self, direction: DVec3) -> Option<DVec3> {
+    pub(super) fn risen_towards(&self, direction: DVec3) -> Option<DVec3> {
         if self.stays(direction.as_vec3()) { self.risen() } else { None }
     }
 
@@ -218,17 +218,17 @@ impl<'a, 's> Vertex<'a, 's> {
     }
 
     /// The ray that goes on.
-    pub fn leave(&self, bounce: &Bounce) -> Ray {
+    pub(super) fn leave(&self, bounce: &Bounce) -> Ray {
         self.met.leave_from(self.start(bounce.direction), bounce.direction)
     }
 
     /// See [`Interaction::shadow_ray`].
-    pub fn shadow_ray(&self, sample: &LightSample) -> Ray {
+    pub(super) fn shadow_ray(&self, sample: &LightSample) -> Ray {
         self.met.shadow_ray_from(self.start(sample.towards), sample)
     }
 
     /// What the solids around leave of a light's sample that nothing stands in the way of.
-    pub fn passes(&self, sample: &LightSample, interiors: &Interiors<'s>) -> Spectrum {
+    pub(super) fn passes(&self, sample: &LightSample, interiors: &Interiors<'s>) -> Spectrum {
         // Light from infinitely far away was not inside anything.
         let Some(end) = sample.end else { return Spectrum::WHITE };
         let crosses = self.crosses(sample);
@@ -240,7 +240,7 @@ impl<'a, 's> Vertex<'a, 's> {
     }
 
     /// What all that stands in the way of a light's sample leaves of it: see [`straight_on`].
-    pub fn passes_straight_on(
+    pub(super) fn passes_straight_on(
         &self,
         sample: &LightSample,
         interiors: &Interiors<'s>,

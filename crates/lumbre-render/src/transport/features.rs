@@ -8,6 +8,7 @@ use crate::transport::{Draw, Integrator, RayCounts, Sight};
 
 /// One of the features.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Feature {
     /// Reflectance.
     Albedo,
@@ -30,6 +31,16 @@ impl Feature {
             Self::Normal => "normal",
             Self::Depth => "depth",
             Self::Uv => "uv",
+        }
+    }
+
+    /// The names of its channels in file layers, after its own: `albedo.R`.
+    pub fn channels(self) -> &'static [&'static str] {
+        match self {
+            Self::Albedo => &["R", "G", "B"],
+            Self::Normal => &["X", "Y", "Z"],
+            Self::Depth => &["Z"],
+            Self::Uv => &["U", "V"],
         }
     }
 
