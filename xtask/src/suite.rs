@@ -19,7 +19,26 @@ pub(crate) fn run() -> Result<()> {
     command::run("cargo", &["test", "--workspace", "--all-targets"])?;
     command::run("cargo", &["test", "--workspace", "--doc"])?;
     run_with("cargo", &["doc", "--workspace", "--no-deps"], &[("RUSTDOCFLAGS", "--deny warnings")])?;
+    oldest_compiler()?;
+    package()?;
     deny()
+}
+
+/// The declared minimum Rust version compiles everything, where that toolchain is installed. Clippy's `incompatible_msrv` finds what
+/// is newer in the standard library without it.
+fn oldest_compiler() -> Result<()> {
+    let version = env!("CARGO_PKG_RUST_VERSION");
+    if succeeds("rustup", &["run", version, "cargo", "--version"]) {
+        return command::run("rustup", &["run", version, "cargo", "check", "--workspace", "--all-targets"]);
+    }
+    eprintln!("\nRust {version} is left out: rustup toolchain install {version} --profile minimal");
+    Ok(())
+}
+
+/// Every crate that is published makes a package. The packages are not compiled, which would take as long as all the tests.
+fn package() -> Result<()> {
+    let arguments = ["package", "--workspace", "--exclude", "xtask", "--exclude", "lumbre-dev"];
+    command::run("cargo", &[&arguments[..], &["--no-verify", "--allow-dirty", "--quiet"]].concat())
 }
 
 /// Licences, sources and bans of every dependency.

@@ -1,4 +1,4 @@
-//! Scene, mesh and image files, read and written.
+#![doc = include_str!("../README.md")]
 //!
 //! Every reader is handed a [`Budget`], which it asks before any allocation whose size the input chose, and a
 //! [`Diagnostics`], where it puts its warnings. Its errors are [`FormatError`]s with a place.

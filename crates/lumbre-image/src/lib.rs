@@ -1,4 +1,4 @@
-//! Colours and rectangles of colours. No files here: reading and writing them is another layer's work.
+#![doc = include_str!("../README.md")]
 
 mod bitmap;
 mod colour_space;

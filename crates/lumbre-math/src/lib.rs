@@ -1,17 +1,4 @@
-//! The mathematics under Lumbre: vectors, matrices, transforms, frames, quaternions, projections, warps, distributions,
-//! random numbers and polynomial roots, over [`glam`] wherever glam has it.
-//!
-//! ```
-//! use lumbre_math::{DVec3, Transform};
-//!
-//! # fn main() -> Result<(), lumbre_math::SingularTransformError> {
-//! let world_from_part = Transform::translate(DVec3::new(5.0, 0.0, 0.0)) * Transform::rotate(DVec3::Z, 90.0)?;
-//! assert_eq!(world_from_part.point(DVec3::X), DVec3::new(5.0, 1.0, 0.0));
-//! assert_eq!(world_from_part.vector(DVec3::X), DVec3::Y);
-//! assert_eq!(world_from_part.inverse_point(DVec3::new(5.0, 1.0, 0.0)), DVec3::X);
-//! # Ok(())
-//! # }
-//! ```
+#![doc = include_str!("../README.md")]
 //!
 //! # Conventions
 //!

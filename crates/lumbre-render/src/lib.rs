@@ -1,9 +1,7 @@
-//! Pixels over threads, passes over time.
+#![doc = include_str!("../README.md")]
 //!
-//! [`transport`] computes the radiance along a ray, [`film`] makes pixels of samples; neither knows the other, nor of threads.
-//!
-//! A picture is a function of the scene, the options and the seed: never of the number of threads or of the order in
-//! which tiles happen to be done. [`render`] is the verb.
+//! [`transport`] computes the radiance along a ray, [`film`] makes pixels of samples; neither knows the other, nor of threads. [`render`]
+//! is the verb.
 
 mod cancel;
 mod error;

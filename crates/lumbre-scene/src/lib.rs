@@ -1,5 +1,4 @@
-//! What is there: first described ([`SceneDesc`], plain data that any reader can make), then resolved for rendering
-//! ([`Scene`]).
+#![doc = include_str!("../README.md")]
 
 mod build;
 mod camera;

@@ -1,4 +1,4 @@
-//! Materials, textures and BSDFs.
+#![doc = include_str!("../README.md")]
 //!
 //! A [`Material`] is a function of place that yields a [`Bsdf`]; a [`Bsdf`] is a function of two directions. Colour is
 //! carried on the lanes of [`Spectrum`].

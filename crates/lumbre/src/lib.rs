@@ -1,26 +1,4 @@
-//! Lumbre: an exact, fast, reproducible ray tracer.
-//!
-//! Open a scene, cast rays, render:
-//!
-//! ```no_run
-//! let scene = lumbre::open("scene.pbrt")?;
-//! let hit = scene.closest(&lumbre::Ray::new(lumbre::DVec3::new(0.0, -5.0, 1.0), lumbre::DVec3::Y));
-//! println!("{hit:?}");
-//! scene.render(&scene.options())?.save("picture.png")?;
-//! # Ok::<(), lumbre::Error>(())
-//! ```
-//!
-//! Or describe one:
-//!
-//! ```
-//! use lumbre::{DVec3, Ray, SceneBuilder, ShapeBuilder, geometry::Sphere};
-//!
-//! let ball = Sphere::new(DVec3::new(0.0, 0.0, 2.0), 1.5)?;
-//! let scene = SceneBuilder::new().shape(ShapeBuilder::exact(ball)).build()?;
-//! let hit = scene.closest(&Ray::new(DVec3::new(0.0, -9.0, 2.0), DVec3::Y)).expect("the ball is hit");
-//! assert_eq!(hit.t, 7.5);
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
+#![doc = include_str!("../README.md")]
 //!
 //! A model in a studio of its own, on white paper, from all sides:
 //!
