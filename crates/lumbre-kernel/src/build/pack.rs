@@ -157,17 +157,16 @@ impl PackShare<'_> {
         for (((number, plan), names), &followers) in (first..).zip(plans).zip(names).zip(followers) {
             let own = lines.split_off_mut(..lines_of(plan.is_unshared)).expect("there are as many lines");
             let mesh = mesh(geometries, names.geometry);
-            let is_unshared = plan.is_unshared.into();
-            let mut head =
-                Head { number, taken: 0, is_unshared, followers, padding: 0, corners: plan.corners };
+            let Plan { corners, is_unshared, order } = *plan;
+            let mut head = Head { number, taken: 0, is_unshared, followers: followers.into(), corners };
             let words = bytemuck::cast_slice_mut(own);
             for lane in 0..names.primitives().count() {
-                let primitive = names.primitives[plan.order.lane_before(lane)];
+                let primitive = names.primitives[order.lane_before(lane)];
                 let corners = mesh.indices[primitive as usize].map(|vertex| mesh.positions[vertex as usize]);
-                head.taken |= u8::from(!may_lack_area || has_area(&corners)) << lane;
+                head.taken |= u32::from(!may_lack_area || has_area(&corners)) << lane;
                 put_corners(words, &head, lane, &corners);
             }
-            *head_mut(own) = head;
+            head.put(words);
         }
     }
 }
@@ -224,16 +223,15 @@ impl Task for MoveShare<'_> {
                 }
             }
             let mesh = mesh(geometries, names.geometry);
-            let mut head = *head_mut(lines);
-            let is_unshared = head.is_unshared != 0;
-            let own = lines.split_off_mut(..lines_of(is_unshared)).expect("there are as many lines");
-            let words: &mut [f32] = bytemuck::cast_slice_mut(own);
+            let mut head = Head::of(bytemuck::cast_slice(lines));
+            let own = lines.split_off_mut(..lines_of(head.is_unshared)).expect("there are as many lines");
+            let words: &mut [u32] = bytemuck::cast_slice_mut(own);
             let mut triangles = [[Vec3::ZERO; 3]; BLOCK];
             let mut len = 0;
             head.taken = 0;
             for (lane, primitive) in names.primitives().enumerate() {
                 let corners = mesh.indices[primitive as usize].map(|vertex| mesh.positions[vertex as usize]);
-                head.taken |= u8::from(!may_lack_area || has_area(&corners)) << lane;
+                head.taken |= u32::from(!may_lack_area || has_area(&corners)) << lane;
                 put_corners(words, &head, lane, &corners);
                 triangles[lane] = corners;
                 len += 1;
@@ -242,31 +240,24 @@ impl Task for MoveShare<'_> {
                 for (corner, position) in corners.iter().enumerate() {
                     let vertex = vertex_at(&head, corner, lane);
                     for axis in 0..3 {
-                        let stands = words[row(is_unshared, axis) + vertex];
-                        do_fit &= stands.to_bits() == position[axis].to_bits();
+                        let stands = words[row(head.is_unshared, axis) + vertex];
+                        do_fit &= stands == position[axis].to_bits();
                     }
                 }
             }
-            *head_mut(own) = head;
+            head.put(words);
         }
         do_fit
     }
 }
 
-/// The head of the first of these blocks.
-#[inline(always)]
-fn head_mut(lines: &mut [Line]) -> &mut Head {
-    let (head, _) = bytemuck::bytes_of_mut(&mut lines[0]).split_at_mut(size_of::<Head>());
-    bytemuck::from_bytes_mut(head)
-}
-
 /// Writes the corners of a triangle into a block with this head.
 #[inline(always)]
-fn put_corners(words: &mut [f32], head: &Head, lane: usize, corners: &[Vec3; 3]) {
+fn put_corners(words: &mut [u32], head: &Head, lane: usize, corners: &[Vec3; 3]) {
     for (corner, position) in corners.iter().enumerate() {
         let vertex = vertex_at(head, corner, lane);
         for axis in 0..3 {
-            words[row(head.is_unshared != 0, axis) + vertex] = position[axis];
+            words[row(head.is_unshared, axis) + vertex] = position[axis].to_bits();
         }
     }
 }

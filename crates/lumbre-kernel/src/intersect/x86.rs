@@ -127,10 +127,11 @@ impl<const AVX512: bool> X86<AVX512> {
     fn corners_in(block: &TriangleBlock, lane: usize, axes: &Axes) -> [__m128; 3] {
         let words = block.words().as_ptr();
         let [x, y, z] = axes.rows(block);
-        // SAFETY: see `X86` and `Axes::rows`. The load is of four u32.
+        // SAFETY: see `X86` and `Axes::rows`.
         unsafe {
             if AVX512 && !block.is_unshared() {
-                let corners = _mm_loadu_si128(block.corners_and_more().as_ptr().cast());
+                let [a, b, c] = block.corners();
+                let corners = _mm_setr_epi32(a as i32, b as i32, c as i32, 0);
                 let vertices = _mm_srl_epi32(corners, _mm_cvtsi32_si128(4 * (lane % BLOCK) as i32));
                 return [
                     Self::three_of(words.add(x), vertices),
@@ -147,7 +148,8 @@ impl<const AVX512: bool> X86<AVX512> {
         }
     }
 
-    /// Eight numbers of sixteen, each by its place in the same half of `near`, or of `far` from eight on: see [`crate::blocks`].
+    /// Eight numbers of sixteen, each by its place in the same half of `near`, or of `far` from eight on: see
+    /// [`triangle_block`](crate::tree::triangle_block).
     #[inline(always)]
     fn of_two(near: __m256, far: __m256, places: __m256i) -> __m256 {
         // SAFETY: see `X86`.
@@ -797,7 +799,7 @@ impl X86<true> {
             // Of thirty-two numbers, the last sixteen.
             let of_second = _mm512_maskz_set1_epi32(0xff00, SHARED_NUMBERS as i32);
             const OR_AND: i32 = 0b1111_1000;
-            for (corner, (&of_a, &of_b)) in first.corners().iter().zip(second.corners()).enumerate() {
+            for (corner, (&of_a, of_b)) in first.corners().iter().zip(second.corners()).enumerate() {
                 let both = _mm512_mask_set1_epi32(_mm512_set1_epi32(of_a as i32), last, of_b as i32);
                 let both = _mm512_srlv_epi32(both, shifts);
                 let both = _mm512_ternarylogic_epi32::<OR_AND>(of_second, both, places);
@@ -1375,7 +1377,7 @@ where
         let CornersRoom(corners) = room;
         let words = block.words().as_ptr();
         // No `map`: it does not take on the instruction set of its caller.
-        let [a, b, c] = *block.corners();
+        let [a, b, c] = block.corners();
         let places = [Self::places(a), Self::places(b), Self::places(c)];
         // SAFETY: see `X86`. The first sixteen of a row are read.
         unsafe {

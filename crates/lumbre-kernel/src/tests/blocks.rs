@@ -504,14 +504,15 @@ fn blocks_that_are_not_such_as_are_packed_are_told() {
             continue;
         }
         for (byte, value) in [
-            (0, bytes[at] ^ 1),
-            (5, 1),
-            (5, 2),
-            (6, 255),
-            (8, bytes[at + 8] & 0xf0 | 4),
-            (8, bytes[at + 8] & 0xf0),
-            (11, bytes[at + 11] & 0xf0 | 8),
-            (11, bytes[at + 11] | 15),
+            (60, bytes[at + 60] ^ 1),
+            (1, 1),
+            (1, 2),
+            (2, 255),
+            (3, 0),
+            (64, bytes[at + 64] & 0xf0 | 4),
+            (64, bytes[at + 64] & 0xf0),
+            (67, bytes[at + 67] & 0xf0 | 8),
+            (67, bytes[at + 67] | 15),
         ] {
             let mut other = bytes.clone();
             other[at + byte] = value;

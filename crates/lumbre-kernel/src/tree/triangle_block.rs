@@ -4,17 +4,17 @@
 //! the first block of a leaf begins; its other blocks follow. Primitive ids stand in an array of their own, because only the winner
 //! of a search needs them.
 //!
-//! A block that shares its vertices has seven for its first four triangles and seven for its last four, in rows of x, y and z. AVX2
-//! cannot look up across the middle of a 256-bit vector quickly, so a row is read as sixteen numbers of which either half of the
-//! lanes finds its own in the same half of two vectors:
+//! Where vertices are shared, a line holds x, the next y and the third z: fourteen numbers between two words of the block's head.
+//! The first four triangles have seven of the vertices and the last four the other seven. AVX2 cannot look up across the middle of a
+//! 256-bit vector quickly, so a line is read as two vectors, and either half of the lanes finds its own in the same half of both:
 //!
-//! | | near | far |
+//! | | first vector | second vector |
 //! |---|---|---|
 //! | first four triangles | 1 to 3 | 8 to 11 |
 //! | last four triangles | 4 to 7 | 12 to 14 |
 //!
-//! Numbers 0 and 15 belong to what stands before and behind the row. Four neighbouring triangles have six vertices as a rule. Which
-//! four come first is chosen so that neither half needs more than seven; where that is not possible, nothing is shared.
+//! Four neighbouring triangles have six vertices as a rule. Which four come first is chosen so that neither half needs more than
+//! seven; where that is not possible, nothing is shared.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -65,30 +65,64 @@ impl BlockNames {
 #[repr(C, align(64))]
 pub(crate) struct Line([u32; 16]);
 
-/// What stands before the vertices of a block.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
-#[repr(C)]
+/// What a block says of its triangles, in words between their coordinates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Head {
     /// How many blocks there are before this one: the index of its names.
     pub(crate) number: u32,
     /// A bit for each lane that has a triangle.
-    pub(crate) taken: u8,
-    /// 1 where each corner has a vertex of its own, otherwise 0.
-    pub(crate) is_unshared: u8,
+    pub(crate) taken: u32,
+    /// Whether each corner has a vertex of its own.
+    pub(crate) is_unshared: bool,
     /// How many blocks of the same leaf follow.
-    pub(crate) followers: u8,
-    pub(crate) padding: u8,
+    pub(crate) followers: u32,
     /// The vertex of each corner, four bits for each lane. An empty lane has the first vertex of its half; an unshared block has zeros.
     pub(crate) corners: [u32; 3],
 }
 
-impl Head {
-    /// Where the corners begin, in words.
-    const CORNERS: usize = 2;
-    const WORDS: usize = size_of::<Self>() / size_of::<u32>();
+/// Set in words of the head that are read among coordinates: as an `f32` they are never subnormal, which would be slow.
+const NORMAL: u32 = 1 << 30;
+/// The word of the flags: lanes that have a triangle, whether vertices are unshared, and how many blocks follow.
+const FLAGS: usize = 0;
+const UNSHARED_AT: u32 = BLOCK as u32;
+const FOLLOWERS_AT: u32 = 16;
+/// The words of the corners, where vertices are shared.
+const CORNERS: [usize; 3] = [LINE_WORDS, 2 * LINE_WORDS - 1, 2 * LINE_WORDS];
+
+/// The word of the number.
+#[inline(always)]
+const fn number_at(is_unshared: bool) -> usize {
+    if is_unshared { FLAGS + 1 } else { LINE_WORDS - 1 }
 }
 
-const _: () = assert!(std::mem::offset_of!(Head, corners) == 4 * Head::CORNERS);
+impl Head {
+    /// The head of the block that begins with these words.
+    #[inline(always)]
+    pub(crate) fn of(words: &[u32]) -> Self {
+        let flags = words[FLAGS];
+        let is_unshared = flags >> UNSHARED_AT & 1 != 0;
+        Self {
+            number: words[number_at(is_unshared)] & !NORMAL,
+            taken: flags & ((1 << BLOCK) - 1),
+            is_unshared,
+            followers: flags >> FOLLOWERS_AT & (tag::MOST_BLOCKS - 1),
+            corners: if is_unshared { [0; 3] } else { CORNERS.map(|at| words[at]) },
+        }
+    }
+
+    /// Writes it into the block that begins with these words.
+    #[inline(always)]
+    pub(crate) fn put(&self, words: &mut [u32]) {
+        let Self { number, taken, is_unshared, followers, corners } = *self;
+        words[FLAGS] = taken | u32::from(is_unshared) << UNSHARED_AT | followers << FOLLOWERS_AT | NORMAL;
+        words[number_at(is_unshared)] = number | NORMAL;
+        if !is_unshared {
+            for (at, corner) in CORNERS.into_iter().zip(corners) {
+                words[at] = corner;
+            }
+        }
+    }
+}
 
 /// Half of a block's lanes, and as many numbers as 128 bits hold.
 pub(crate) const QUAD: usize = BLOCK / 2;
@@ -102,9 +136,9 @@ const LINE_WORDS: usize = size_of::<Line>() / size_of::<u32>();
 /// Words of the longer block.
 pub(crate) const BLOCK_WORDS: usize = UNSHARED_LINES * LINE_WORDS;
 
-/// The word where an axis's row begins in a block that shares its vertices: the sixteen numbers of one row overlap those of the next.
+/// The word where an axis's row begins in a block that shares its vertices: a cache line, of which 1 to 14 are vertices.
 pub(crate) const fn shared_row(axis: usize) -> usize {
-    Head::WORDS - 1 + 2 * MOST_IN_HALF * axis
+    LINE_WORDS * axis
 }
 
 /// The word where an axis's row begins in a block that does not: eight aligned numbers for each corner.
@@ -112,37 +146,36 @@ pub(crate) const fn unshared_row(axis: usize) -> usize {
     BLOCK + 3 * BLOCK * axis
 }
 
-const _: () = assert!(shared_row(2) + SHARED_NUMBERS == SHARED_LINES * LINE_WORDS);
-const _: () = assert!(unshared_row(0) >= Head::WORDS && unshared_row(3) == BLOCK_WORDS);
+const _: () = assert!(SHARED_NUMBERS == LINE_WORDS && shared_row(3) == SHARED_LINES * LINE_WORDS);
+const _: () = assert!(unshared_row(0) > number_at(true) && unshared_row(3) == BLOCK_WORDS);
+const _: () = assert!(tag::BLOCK_PLACES + tag::MOST_BLOCKS < NORMAL);
 // Lines are numbered by `u32`, and by the place of a reference.
 const _: () =
     assert!((tag::BLOCK_PLACES + tag::MOST_BLOCKS) as usize * UNSHARED_LINES <= tag::PLACE as usize);
 
-/// Up to eight triangles of one mesh. Where vertices are shared, the last lines belong to the next block.
+/// Up to eight triangles of one mesh: its head, and coordinates relative to the mesh's origin. Where vertices are shared, the last
+/// lines belong to the next block.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(64))]
-pub(crate) struct TriangleBlock {
-    head: Head,
-    /// Coordinates relative to the mesh's origin.
-    coordinates: [f32; BLOCK_WORDS - Head::WORDS],
-}
-
-const _: () = assert!(size_of::<TriangleBlock>() == size_of::<[Line; UNSHARED_LINES]>());
+pub(crate) struct TriangleBlock([u32; BLOCK_WORDS]);
 
 /// The vertex of a corner in a lane, as its number in a row.
 #[inline(always)]
 pub(crate) fn vertex_at(head: &Head, corner: usize, lane: usize) -> usize {
-    if head.is_unshared != 0 {
-        return BLOCK * corner + lane;
-    }
-    (head.corners[corner] >> (4 * lane)) as usize % SHARED_NUMBERS
+    if head.is_unshared { BLOCK * corner + lane } else { shared_vertex(head.corners[corner], lane) }
+}
+
+/// The vertex in a lane, of four bits for each.
+#[inline(always)]
+fn shared_vertex(corners: u32, lane: usize) -> usize {
+    (corners >> (4 * lane)) as usize % SHARED_NUMBERS
 }
 
 /// The number of a vertex of one half of a block that shares them, counted from 0 there.
 #[inline(always)]
 pub(crate) fn shared_number(half: usize, index: u32) -> u32 {
     let number = [1, QUAD as u32][half] + index;
-    // Behind the near ones of this half stand those of the other.
+    // Behind those in the first vector stand those of the other half.
     let is_far = number >= (QUAD * (half + 1)) as u32;
     number + QUAD as u32 * u32::from(is_far)
 }
@@ -166,32 +199,32 @@ impl TriangleBlock {
     /// The index of its names.
     #[inline(always)]
     pub(crate) fn number(&self) -> u32 {
-        self.head.number
+        self.0[number_at(self.is_unshared())] & !NORMAL
     }
 
     /// A bit for each lane that has a triangle.
     #[inline(always)]
     pub(crate) fn taken(&self) -> u32 {
-        self.head.taken.into()
+        self.0[FLAGS] & ((1 << BLOCK) - 1)
     }
 
     /// Whether each corner has a vertex of its own.
     #[inline(always)]
     pub(crate) fn is_unshared(&self) -> bool {
-        self.head.is_unshared != 0
+        self.0[FLAGS] >> UNSHARED_AT & 1 != 0
+    }
+
+    /// How many blocks of the same leaf follow.
+    #[inline(always)]
+    fn followers(&self) -> u32 {
+        self.0[FLAGS] >> FOLLOWERS_AT & (tag::MOST_BLOCKS - 1)
     }
 
     /// The vertex of each corner, four bits for each lane, where vertices are shared.
     #[inline(always)]
-    pub(crate) fn corners(&self) -> &[u32; 3] {
-        &self.head.corners
-    }
-
-    /// The same with the word behind them, so that four can be loaded at once.
-    #[inline(always)]
-    pub(crate) fn corners_and_more(&self) -> &[u32; 4] {
-        let words: &[u32; BLOCK_WORDS] = bytemuck::cast_ref(self);
-        words[Head::CORNERS..].first_chunk().expect("four")
+    pub(crate) fn corners(&self) -> [u32; 3] {
+        // No `map`: it would not take on the instruction set of its caller.
+        [self.0[CORNERS[0]], self.0[CORNERS[1]], self.0[CORNERS[2]]]
     }
 
     /// The whole block as numbers: see [`shared_row`] and [`unshared_row`].
@@ -203,9 +236,12 @@ impl TriangleBlock {
     /// The vertices of the corners in a lane, as their numbers in a row: below 16, or below 24 where they are not shared.
     #[inline(always)]
     pub(crate) fn vertices_at(&self, lane: usize) -> [usize; 3] {
-        // No closure: it would not take on the instruction set of its caller.
-        let (head, lane) = (&self.head, lane % BLOCK);
-        [vertex_at(head, 0, lane), vertex_at(head, 1, lane), vertex_at(head, 2, lane)]
+        let lane = lane % BLOCK;
+        if self.is_unshared() {
+            return [lane, BLOCK + lane, 2 * BLOCK + lane];
+        }
+        let [a, b, c] = self.corners();
+        [shared_vertex(a, lane), shared_vertex(b, lane), shared_vertex(c, lane)]
     }
 
     /// The corners of the triangle in a lane.
@@ -236,7 +272,7 @@ impl TriangleBlock {
     /// Whether it is the last of its leaf.
     #[inline(always)]
     pub(crate) fn is_last(&self) -> bool {
-        self.head.followers == 0
+        self.followers() == 0
     }
 
     /// Where the block behind it begins, if this one begins at `place`.
@@ -283,9 +319,9 @@ impl<'a> Blocks<'a> {
 
     /// The numbers of the blocks of a leaf.
     pub(crate) fn numbers(self, leaf: u32) -> Option<std::ops::Range<usize>> {
-        let head = self.at(tag::place(leaf) as u32)?.head;
-        let first = head.number as usize;
-        Some(first..first + usize::from(head.followers) + 1)
+        let block = self.at(tag::place(leaf) as u32)?;
+        let first = block.number() as usize;
+        Some(first..first + block.followers() as usize + 1)
     }
 
     /// The blocks of a leaf.
@@ -305,7 +341,7 @@ impl<'a> Blocks<'a> {
         while followers.len() < count
             && let Some(block) = self.at(place)
         {
-            followers.push(block.head.followers);
+            followers.push(block.followers() as u8);
             place = block.place_behind(place);
         }
         followers
@@ -317,15 +353,16 @@ impl<'a> Blocks<'a> {
         let (mut place, mut followers) = (0, 0);
         for (number, names) in names.iter().enumerate() {
             let block = self.at(place)?;
-            let head = &block.head;
+            let head = Head::of(&block.0);
+            let mut same = *block;
+            head.put(&mut same.0);
             let named = names.primitives.iter().enumerate();
-            let named = named.fold(0, |lanes, (lane, &name)| lanes | u8::from(name != u32::MAX) << lane);
+            let named = named.fold(0, |lanes, (lane, &name)| lanes | u32::from(name != u32::MAX) << lane);
             let are_there = |lane: usize| block.vertices_at(lane).iter().all(|&v| is_within_reach(lane, v));
-            let is_sound = head.number as usize == number
+            let is_sound = same.0 == block.0
+                && head.number as usize == number
                 && head.taken & !named == 0
-                && head.is_unshared <= 1
-                && (block.is_unshared() || (0..BLOCK).all(are_there))
-                && usize::from(head.followers) < tag::MOST_BLOCKS as usize
+                && (head.is_unshared || (0..BLOCK).all(are_there))
                 && (followers == 0 || head.followers == followers - 1);
             if !is_sound {
                 return None;
