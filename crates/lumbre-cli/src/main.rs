@@ -20,6 +20,7 @@ mod info;
 mod progress;
 mod reading;
 mod render;
+mod signals;
 mod staging;
 mod units;
 

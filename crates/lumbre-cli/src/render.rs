@@ -2,8 +2,6 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::Args;
@@ -20,6 +18,7 @@ use serde_json::json;
 use crate::failure::Failure;
 use crate::progress::{Display, Style};
 use crate::reading::{Frames, ReadingArguments, print_warnings};
+use crate::signals::Signals;
 use crate::staging::{self, Behind, StagingArguments};
 use crate::units::{self, Crop, spoken};
 
@@ -466,37 +465,6 @@ fn camera(scene: &Scene, wanted: &str) -> Result<usize, Failure> {
             .collect();
         Failure::Usage(format!("--camera: there is no \"{wanted}\" (expected one of: {})", known.join(", ")))
     })
-}
-
-/// SIGINT and SIGTERM: the first asks the render to end, a second interrupt ends the program.
-struct Signals {
-    last: Arc<AtomicUsize>,
-}
-
-impl Signals {
-    fn listen(cancel: &CancelToken) -> std::io::Result<Self> {
-        let last = Arc::new(AtomicUsize::new(0));
-        let again = Arc::new(AtomicBool::new(false));
-        for (signal, status) in [(signal_hook::consts::SIGINT, 130), (signal_hook::consts::SIGTERM, 143)] {
-            signal_hook::flag::register_conditional_shutdown(signal, status, again.clone())?;
-            signal_hook::flag::register(signal, again.clone())?;
-            signal_hook::flag::register_usize(signal, last.clone(), status as usize)?;
-        }
-        let (seen, cancel) = (last.clone(), cancel.clone());
-        // A signal handler may do next to nothing, so a thread passes the word on.
-        std::thread::spawn(move || {
-            while seen.load(Ordering::Relaxed) == 0 {
-                std::thread::sleep(Duration::from_millis(20));
-            }
-            cancel.cancel();
-        });
-        Ok(Self { last })
-    }
-
-    /// The exit status of the signal that came, if one did.
-    fn received(&self) -> Option<u8> {
-        u8::try_from(self.last.load(Ordering::Relaxed)).ok().filter(|status| *status != 0)
-    }
 }
 
 fn report_dropped(picture: &Picture) {

@@ -1,7 +1,7 @@
 //! Writing a file so that its path holds the old complete file or the new complete file, and never a part of one.
 
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -109,35 +109,67 @@ pub fn atomic_write_on<D: Disk>(
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<(), FormatError> {
     let refuse = |e| FormatError::io(path, CANNOT_WRITE, e);
-    let (real, permissions) = match target_of(path).map_err(refuse)? {
-        Target::File { path, permissions } => (path, permissions),
-        Target::Stream => {
-            let mut stream = OpenOptions::new().write(true).open(path).map_err(refuse)?;
-            return write(&mut stream).map_err(refuse);
-        }
-    };
-    let part = part_of(&real);
-    let mut file = disk.create(&part).map_err(refuse)?;
+    match target_of(path).map_err(refuse)? {
+        Target::File { path: real, permissions } => replace(disk, &real, permissions, |file| {
+            let mut buffered = BufWriter::with_capacity(256 << 10, file);
+            write(&mut buffered)?;
+            buffered.flush()?;
+            // A writer that failed must not be flushed once more as it is dropped.
+            drop(buffered.into_parts());
+            Ok(())
+        }),
+        Target::Stream => OpenOptions::new().write(true).open(path).and_then(|mut stream| write(&mut stream)),
+    }
+    .map_err(refuse)
+}
+
+/// [`atomic_write`] for formats that go back to what they wrote. What a pipe or a device is sent is made in a temporary
+/// file first.
+///
+/// # Errors
+/// As [`atomic_write`].
+pub fn atomic_write_seek(
+    path: &Path,
+    write: impl FnOnce(&mut File) -> io::Result<()>,
+) -> Result<(), FormatError> {
+    let refuse = |e| FormatError::io(path, CANNOT_WRITE, e);
+    match target_of(path).map_err(refuse)? {
+        Target::File { path: real, permissions } => replace(&RealDisk, &real, permissions, write),
+        Target::Stream => OpenOptions::new().write(true).open(path).and_then(|mut stream| {
+            let mut file = tempfile::tempfile()?;
+            write(&mut file)?;
+            file.rewind()?;
+            io::copy(&mut file, &mut stream).map(drop)
+        }),
+    }
+    .map_err(refuse)
+}
+
+/// Writes a file beside `real`, which then takes its place.
+fn replace<D: Disk>(
+    disk: &D,
+    real: &Path,
+    permissions: Option<fs::Permissions>,
+    write: impl FnOnce(&mut D::File) -> io::Result<()>,
+) -> io::Result<()> {
+    let part = part_of(real);
+    let mut file = disk.create(&part)?;
     let written = (|| {
-        let mut buffered = BufWriter::with_capacity(256 << 10, &mut file);
-        write(&mut buffered)?;
-        buffered.flush()?;
-        // A writer that failed must not be flushed once more as it is dropped.
-        drop(buffered.into_parts());
+        write(&mut file)?;
         disk.sync(&mut file)?;
         if let Some(permissions) = permissions {
             // A file system without permissions is none the worse for it.
             let _ = fs::set_permissions(&part, permissions);
         }
-        disk.rename(&part, &real)
+        disk.rename(&part, real)
     })();
     drop(file);
     if let Err(e) = written {
         // The error that matters is the first one.
         let _ = disk.remove(&part);
-        return Err(refuse(e));
+        return Err(e);
     }
-    disk.sync_folder(folder_of(&real)).map_err(refuse)
+    disk.sync_folder(folder_of(real))
 }
 
 enum Target {
@@ -368,6 +400,27 @@ mod tests {
     }
 
     #[test]
+    fn a_writer_may_go_back_and_leaves_the_old_file_when_it_fails() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.npy");
+        let count_last = |file: &mut File| {
+            file.write_all(b"count: ?")?;
+            file.seek(io::SeekFrom::Start(7))?;
+            file.write_all(b"5")
+        };
+        atomic_write_seek(&path, count_last).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"count: 5");
+        atomic_write_seek(&path, |file| {
+            file.write_all(b"half of")?;
+            Err(io::Error::other("no more"))
+        })
+        .unwrap_err();
+        assert_eq!(fs::read(&path).unwrap(), b"count: 5");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+        assert!(atomic_write_seek(folder.path(), count_last).is_err());
+    }
+
+    #[test]
     fn folders_and_missing_folders_are_refused_before_and_while_writing() {
         let folder = tempfile::tempdir().unwrap();
         let places = [folder.path().to_owned(), folder.path().join("absent/a.png"), "..".into()];
@@ -399,6 +452,7 @@ mod tests {
         assert_eq!(fs::metadata(&file).unwrap().permissions().mode() & 0o777, 0o640);
 
         atomic_write(Path::new("/dev/null"), |w| w.write_all(b"gone")).unwrap();
+        atomic_write_seek(Path::new("/dev/null"), |file| file.write_all(b"gone")).unwrap();
         assert!(fs::metadata("/dev/null").unwrap().file_type().is_char_device());
     }
 }

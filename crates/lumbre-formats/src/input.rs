@@ -31,25 +31,10 @@ impl<'b> Input<'b> {
     pub fn open(path: &Path, budget: &'b Budget) -> Result<Self, FormatError> {
         let name: Arc<str> = path.display().to_string().into();
         budget.file(&name)?;
-        let refuse = |action, source| FormatError::io(path, action, source);
-        let not_regular = |kind: std::fs::FileType| {
-            let what = if kind.is_dir() { "it is a folder" } else { "it is not a regular file" };
-            refuse("cannot read", io::Error::new(io::ErrorKind::InvalidInput, what))
-        };
-        // Looked at before it is opened, as opening a pipe would wait for its writer; and after, as it may have been
-        // exchanged in between.
-        let before = std::fs::metadata(path).map_err(|e| refuse("cannot open", e))?;
-        if !before.is_file() {
-            return Err(not_regular(before.file_type()));
-        }
-        let file = File::open(path).map_err(|e| refuse("cannot open", e))?;
-        let meta = file.metadata().map_err(|e| refuse("cannot open", e))?;
-        if !meta.is_file() {
-            return Err(not_regular(meta.file_type()));
-        }
+        let (file, size) = open_regular(path)?;
         let mut bytes = Vec::new();
         let mut hold = budget.hold(0, &name)?;
-        read_within(file, meta.len(), &mut bytes, &mut hold, &name, |_| Ok(()))
+        read_within(file, size, &mut bytes, &mut hold, &name, |_| Ok(()))
             .map_err(|e| e.into_format_error(path, &name))?;
         let input = Self { name, bytes, hold };
         if input.bytes.starts_with(&[0x1F, 0x8B]) { input.unpacked(path, budget) } else { Ok(input) }
@@ -79,15 +64,7 @@ impl<'b> Input<'b> {
         read_within(MultiGzDecoder::new(&self.bytes[..]), 0, &mut bytes, &mut hold, &self.name, within)
             .map_err(|e| match e {
                 ReadError::Limit(limit) => FormatError::from(limit),
-                ReadError::Io(source) => match source.kind() {
-                    io::ErrorKind::InvalidInput
-                    | io::ErrorKind::InvalidData
-                    | io::ErrorKind::UnexpectedEof => Diagnostic::error("damaged gzip data")
-                        .at(Place::whole(self.name.clone()))
-                        .found(source)
-                        .into(),
-                    _ => FormatError::io(path, "cannot unpack", source),
-                },
+                ReadError::Io(source) => unpacking_error(path, &self.name, source),
             })?;
         Ok(Self { name: self.name, bytes, hold })
     }
@@ -117,6 +94,37 @@ impl Deref for Input<'_> {
 
     fn deref(&self) -> &[u8] {
         &self.bytes
+    }
+}
+
+/// Opens a regular file, and answers its size too.
+pub(crate) fn open_regular(path: &Path) -> Result<(File, u64), FormatError> {
+    let refuse = |action, source| FormatError::io(path, action, source);
+    let not_regular = |kind: std::fs::FileType| {
+        let what = if kind.is_dir() { "it is a folder" } else { "it is not a regular file" };
+        refuse("cannot read", io::Error::new(io::ErrorKind::InvalidInput, what))
+    };
+    // Looked at before it is opened, as opening a pipe would wait for its writer; and after, as it may have been
+    // exchanged in between.
+    let before = std::fs::metadata(path).map_err(|e| refuse("cannot open", e))?;
+    if !before.is_file() {
+        return Err(not_regular(before.file_type()));
+    }
+    let file = File::open(path).map_err(|e| refuse("cannot open", e))?;
+    let meta = file.metadata().map_err(|e| refuse("cannot open", e))?;
+    if !meta.is_file() {
+        return Err(not_regular(meta.file_type()));
+    }
+    Ok((file, meta.len()))
+}
+
+/// What unpacking gzip data said, as an error of the input where its bytes are at fault.
+pub(crate) fn unpacking_error(path: &Path, name: &Arc<str>, source: io::Error) -> FormatError {
+    match source.kind() {
+        io::ErrorKind::InvalidInput | io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof => {
+            Diagnostic::error("damaged gzip data").at(Place::whole(name.clone())).found(source).into()
+        }
+        _ => FormatError::io(path, "cannot unpack", source),
     }
 }
 

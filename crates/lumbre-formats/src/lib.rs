@@ -11,6 +11,7 @@ pub mod gltf;
 pub mod ies;
 pub mod image;
 pub mod input;
+pub mod input_stream;
 pub mod obj;
 pub mod open;
 #[allow(unreachable_pub, reason = "its modules are being split")]
@@ -19,8 +20,9 @@ pub mod ply;
 mod polygon;
 pub mod stl;
 
-pub use atomic::{atomic_write, probe_writable};
+pub use atomic::{atomic_write, atomic_write_seek, probe_writable};
 pub use budget::{Budget, BudgetVec, Hold, LimitError, LimitKind, Limits};
 pub use diagnostic::{Diagnostic, Diagnostics, FormatError, Place, Position, Severity, Strictness};
 pub use input::Input;
+pub use input_stream::InputStream;
 pub use open::{ReadOptions, open_scene, open_scenes};

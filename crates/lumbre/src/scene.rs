@@ -98,6 +98,21 @@ impl Scene {
         self.resolved.accel().any(ray)
     }
 
+    /// [`Scene::closest`] for every ray, with the same answers. It works on the calling thread, and is soonest done with thousands
+    /// of rays at a time: see [`lumbre_kernel::Accel::closest_batch`].
+    pub fn closest_batch(&self, rays: &[Ray]) -> Vec<Option<CastHit>> {
+        let mut hits = vec![None; rays.len()];
+        self.resolved.accel().closest_batch(rays, &mut hits);
+        rays.iter().zip(hits).map(|(ray, hit)| hit.map(|hit| self.cast_hit(ray, &hit))).collect()
+    }
+
+    /// [`Scene::any`] for every ray, with the same answers: see [`Scene::closest_batch`].
+    pub fn any_batch(&self, rays: &[Ray]) -> Vec<bool> {
+        let mut hits = vec![false; rays.len()];
+        self.resolved.accel().any_batch(rays, &mut hits);
+        hits
+    }
+
     /// Every hit in the ray's range, by t, until `visit` breaks.
     pub fn all(&self, ray: &Ray, mut visit: impl FnMut(CastHit) -> ControlFlow<()>) {
         self.resolved.accel().all(ray, |hit| visit(self.cast_hit(ray, hit)));

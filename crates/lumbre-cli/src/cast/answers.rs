@@ -1,20 +1,9 @@
-//! What rays hit, written as CSV, .npy or .npz.
+//! What rays hit, as the bytes of CSV, .npy or .npz.
 
-use std::io::{self, Cursor, Write};
+use std::fmt;
+use std::io::Write;
 
 use lumbre::CastHit;
-use zip::write::SimpleFileOptions;
-
-use super::npy;
-
-/// One line of the answer: a ray, and what it hit.
-#[derive(Clone, Debug)]
-pub(super) struct Answer {
-    /// 0-based position of the ray.
-    pub ray: u64,
-    /// What it hit, or nothing.
-    pub hit: Option<CastHit>,
-}
 
 /// The forms that answers can take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,11 +16,113 @@ pub(super) enum Form {
     Npz,
 }
 
+/// What there is a line of for each answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Table {
+    /// A ray and what it hit, or nothing.
+    Hits,
+    /// A ray and a number of this name.
+    Numbers(&'static str),
+}
+
+impl Table {
+    /// The first line of CSV.
+    pub(super) fn header(self) -> String {
+        match self {
+            Self::Hits => COLUMNS.iter().map(|column| column.name).collect::<Vec<_>>().join(","),
+            Self::Numbers(name) => format!("ray,{name}"),
+        }
+    }
+
+    /// The NumPy type of an answer.
+    pub(super) fn descr(self) -> String {
+        match self {
+            Self::Hits => {
+                let fields: Vec<String> =
+                    COLUMNS.iter().map(|c| format!("('{}', '{}')", c.name, c.kind)).collect();
+                format!("[{}]", fields.join(", "))
+            }
+            Self::Numbers(_) => "'<u8'".to_owned(),
+        }
+    }
+
+    /// The arrays of a .npz: names and NumPy types.
+    pub(super) fn arrays(self) -> Vec<(&'static str, String)> {
+        match self {
+            Self::Hits => COLUMNS.iter().map(|c| (c.name, format!("'{}'", c.kind))).collect(),
+            Self::Numbers(name) => vec![(name, self.descr())],
+        }
+    }
+}
+
+/// The bytes of some answers in a row.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Block {
+    form: Form,
+    /// How many answers there are.
+    pub answers: u64,
+    /// Lines, records, or the values of each array of a .npz.
+    pub parts: Vec<Vec<u8>>,
+}
+
+impl Block {
+    /// No answers.
+    pub(super) fn new(form: Form, table: Table) -> Self {
+        let parts = if form == Form::Npz { table.arrays().len() } else { 1 };
+        Self { form, answers: 0, parts: vec![Vec::new(); parts] }
+    }
+
+    /// Adds what a ray hit, or nothing.
+    pub(super) fn push_hit(&mut self, ray: u64, hit: Option<&CastHit>) {
+        self.answers += 1;
+        match self.form {
+            Form::Csv => push_line(&mut self.parts[0], ray, hit),
+            Form::Npy => COLUMNS.iter().for_each(|column| (column.bytes)(ray, hit, &mut self.parts[0])),
+            Form::Npz => {
+                COLUMNS.iter().zip(&mut self.parts).for_each(|(column, part)| (column.bytes)(ray, hit, part));
+            }
+        }
+    }
+
+    /// Adds a number of a ray.
+    pub(super) fn push_number(&mut self, ray: u64, number: u64) {
+        self.answers += 1;
+        let out = &mut self.parts[0];
+        if self.form == Form::Csv {
+            push_text(out, format_args!("{ray},{number}\n"));
+        } else {
+            out.extend(number.to_le_bytes());
+        }
+    }
+}
+
+/// Writing to memory cannot fail.
+fn push_text(out: &mut Vec<u8>, text: fmt::Arguments) {
+    let _ = out.write_fmt(text);
+}
+
+fn push_line(out: &mut Vec<u8>, ray: u64, hit: Option<&CastHit>) {
+    let Some(hit) = hit else {
+        return push_text(out, format_args!("{ray},0,,,,,,,,,,,,,\n"));
+    };
+    push_text(out, format_args!("{ray},1"));
+    let (p, n, uv) = (hit.point, hit.normal, hit.uv);
+    // Debug prints the shortest decimal that reads back to the same bits.
+    for number in [hit.t, p.x, p.y, p.z, n.x, n.y, n.z, uv.x, uv.y] {
+        push_text(out, format_args!(",{number:?}"));
+    }
+    push_text(out, format_args!(",{},{},{},", u8::from(hit.front), hit.shape, hit.primitive));
+    if let Some(instance) = hit.instance {
+        push_text(out, format_args!("{instance}"));
+    }
+    out.push(b'\n');
+}
+
 /// A column of the answers: its name, its NumPy type, and its little-endian bytes for one answer.
 struct Column {
     name: &'static str,
     kind: &'static str,
-    bytes: fn(&Answer, &mut Vec<u8>),
+    bytes: fn(u64, Option<&CastHit>, &mut Vec<u8>),
 }
 
 macro_rules! number {
@@ -39,9 +130,9 @@ macro_rules! number {
         Column {
             name: $name,
             kind: "<f8",
-            bytes: |answer, out| {
+            bytes: |_, hit, out| {
                 let value: fn(&CastHit) -> f64 = $value;
-                out.extend(answer.hit.as_ref().map_or(f64::NAN, value).to_le_bytes());
+                out.extend(hit.map_or(f64::NAN, value).to_le_bytes());
             },
         }
     };
@@ -52,9 +143,9 @@ macro_rules! index {
         Column {
             name: $name,
             kind: "<i8",
-            bytes: |answer, out| {
+            bytes: |_, hit, out| {
                 let value: fn(&CastHit) -> Option<u32> = $value;
-                out.extend(answer.hit.as_ref().and_then(value).map_or(-1, i64::from).to_le_bytes());
+                out.extend(hit.and_then(value).map_or(-1, i64::from).to_le_bytes());
             },
         }
     };
@@ -62,12 +153,12 @@ macro_rules! index {
 
 /// What .npy and .npz hold: a miss has `hit` false, t = inf, NaN coordinates and -1 for names.
 const COLUMNS: &[Column] = &[
-    Column { name: "ray", kind: "<u8", bytes: |answer, out| out.extend(answer.ray.to_le_bytes()) },
-    Column { name: "hit", kind: "|b1", bytes: |answer, out| out.push(u8::from(answer.hit.is_some())) },
+    Column { name: "ray", kind: "<u8", bytes: |ray, _, out| out.extend(ray.to_le_bytes()) },
+    Column { name: "hit", kind: "|b1", bytes: |_, hit, out| out.push(u8::from(hit.is_some())) },
     Column {
         name: "t",
         kind: "<f8",
-        bytes: |answer, out| out.extend(answer.hit.as_ref().map_or(f64::INFINITY, |hit| hit.t).to_le_bytes()),
+        bytes: |_, hit, out| out.extend(hit.map_or(f64::INFINITY, |hit| hit.t).to_le_bytes()),
     },
     number!("px", |hit| hit.point.x),
     number!("py", |hit| hit.point.y),
@@ -80,94 +171,9 @@ const COLUMNS: &[Column] = &[
     Column {
         name: "front",
         kind: "|b1",
-        bytes: |answer, out| out.push(u8::from(answer.hit.as_ref().is_some_and(|hit| hit.front))),
+        bytes: |_, hit, out| out.push(u8::from(hit.is_some_and(|hit| hit.front))),
     },
     index!("shape", |hit| Some(hit.shape)),
     index!("prim", |hit| Some(hit.primitive)),
     index!("instance", |hit| hit.instance),
 ];
-
-/// Writes answers.
-///
-/// # Errors
-/// Those of the writer.
-pub(super) fn write(out: &mut dyn Write, form: Form, answers: &[Answer]) -> io::Result<()> {
-    match form {
-        Form::Csv => csv(out, answers),
-        Form::Npy => {
-            let fields: Vec<String> =
-                COLUMNS.iter().map(|c| format!("('{}', '{}')", c.name, c.kind)).collect();
-            let mut bytes = Vec::new();
-            for answer in answers {
-                COLUMNS.iter().for_each(|column| (column.bytes)(answer, &mut bytes));
-            }
-            npy::write(out, &format!("[{}]", fields.join(", ")), &[answers.len()], &bytes)
-        }
-        Form::Npz => {
-            let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
-            let options = SimpleFileOptions::default()
-                .compression_method(zip::CompressionMethod::Stored)
-                .last_modified_time(zip::DateTime::default());
-            for column in COLUMNS {
-                let mut bytes = Vec::new();
-                answers.iter().for_each(|answer| (column.bytes)(answer, &mut bytes));
-                archive.start_file(format!("{}.npy", column.name), options)?;
-                npy::write(&mut archive, &format!("'{}'", column.kind), &[answers.len()], &bytes)?;
-            }
-            out.write_all(archive.finish()?.get_ref())
-        }
-    }
-}
-
-fn csv(out: &mut dyn Write, answers: &[Answer]) -> io::Result<()> {
-    writeln!(out, "ray,hit,t,px,py,pz,nx,ny,nz,u,v,front,shape,prim,instance")?;
-    for Answer { ray, hit } in answers {
-        let Some(hit) = hit else {
-            writeln!(out, "{ray},0{}", ",".repeat(13))?;
-            continue;
-        };
-        // Debug prints the shortest decimal that reads back to the same bits.
-        let numbers = [
-            hit.t,
-            hit.point.x,
-            hit.point.y,
-            hit.point.z,
-            hit.normal.x,
-            hit.normal.y,
-            hit.normal.z,
-            hit.uv.x,
-            hit.uv.y,
-        ];
-        write!(out, "{ray},1")?;
-        for number in numbers {
-            write!(out, ",{number:?}")?;
-        }
-        let instance = hit.instance.map_or(String::new(), |i| i.to_string());
-        writeln!(out, ",{},{},{},{instance}", u8::from(hit.front), hit.shape, hit.primitive)?;
-    }
-    Ok(())
-}
-
-/// Writes the number of hits, or whether there is one, for each ray.
-///
-/// # Errors
-/// Those of the writer.
-pub(super) fn write_counts(out: &mut dyn Write, form: Form, name: &str, counts: &[u64]) -> io::Result<()> {
-    let bytes: Vec<u8> = counts.iter().flat_map(|count| count.to_le_bytes()).collect();
-    match form {
-        Form::Csv => {
-            writeln!(out, "ray,{name}")?;
-            counts.iter().enumerate().try_for_each(|(ray, count)| writeln!(out, "{ray},{count}"))
-        }
-        Form::Npy => npy::write(out, "'<u8'", &[counts.len()], &bytes),
-        Form::Npz => {
-            let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
-            let options = SimpleFileOptions::default()
-                .compression_method(zip::CompressionMethod::Stored)
-                .last_modified_time(zip::DateTime::default());
-            archive.start_file(format!("{name}.npy"), options)?;
-            npy::write(&mut archive, "'<u8'", &[counts.len()], &bytes)?;
-            out.write_all(archive.finish()?.get_ref())
-        }
-    }
-}

@@ -1,22 +1,34 @@
 //! `lumbre cast`: what rays hit.
 
-use std::io::Write;
+use std::io::{self, ErrorKind, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use lumbre::formats::{Budget, Input, Limits, atomic_write};
-use lumbre::{Ray, Scene};
-use rayon::prelude::*;
+use lumbre::formats::{atomic_write, atomic_write_seek};
+use lumbre::{CancelToken, Ray, Scene};
+use rayon::ThreadPool;
 
 mod answers;
+mod array;
+mod bytes;
+mod csv;
 mod npy;
+mod output;
+mod pipeline;
+mod progress;
 mod rays;
+#[cfg(test)]
+mod tests;
 
-use answers::{Answer, Form};
+use answers::{Block, Form, Table};
+use output::Output;
+use progress::Progress;
+use rays::RayReader;
 
 use crate::failure::Failure;
 use crate::reading::{ReadingArguments, print_warnings};
+use crate::signals::Signals;
 
 /// Casts rays into a scene, in double precision.
 #[derive(Args)]
@@ -74,7 +86,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             return Err(Failure::Usage("-o: expected a name that ends in .csv, .npy or .npz".to_owned()));
         }
     };
-    let rays = read_rays(&arguments.rays)?;
+    if [&arguments.scene, &arguments.rays].iter().all(|path| path.as_path() == Path::new("-")) {
+        return Err(Failure::Usage("the scene and --rays cannot both be standard input".to_owned()));
+    }
+    let rays = RayReader::open(&arguments.rays)?;
     let (scene, diagnostics) = arguments.reading.open(std::slice::from_ref(&arguments.scene))?;
     if !arguments.quiet {
         print_warnings(&diagnostics);
@@ -83,70 +98,155 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         .num_threads(arguments.threads.map_or(0, usize::from))
         .build()
         .map_err(|e| Failure::Limit(format!("cannot start threads: {e}")))?;
-    let answers = pool.install(|| answer(&scene, arguments.query, &rays));
+    let progress = Progress::new(arguments.quiet);
+    let query = arguments.query;
+    let cast =
+        Cast { scene: &scene, query, form, pool: &pool, progress: &progress, at_a_time: query.at_a_time() };
+    let done = match &arguments.output {
+        Some(path) => cast.to_file(rays, path),
+        None => cast.to_standard_output(rays),
+    };
+    progress.finish();
+    done
+}
 
-    let mut bytes = Vec::new();
-    answers.write(&mut bytes, form).map_err(|e| Failure::Io(e.to_string()))?;
-    match &arguments.output {
-        Some(path) => atomic_write(path, |file| file.write_all(&bytes))
-            .map_err(|e| Failure::from(lumbre::Error::from(e))),
-        None => match std::io::stdout().lock().write_all(&bytes) {
+impl Query {
+    /// What there is a line of for each answer.
+    fn table(self) -> Table {
+        match self {
+            Self::Closest | Self::All => Table::Hits,
+            Self::Any => Table::Numbers("hit"),
+            Self::Count => Table::Numbers("count"),
+        }
+    }
+
+    /// How many rays to work on at a time: enough for batches, and few where each may have many answers.
+    fn at_a_time(self) -> usize {
+        match self {
+            Self::Closest | Self::Any => 4096,
+            Self::Count => 1024,
+            Self::All => 256,
+        }
+    }
+}
+
+/// What is asked, and how.
+struct Cast<'a> {
+    scene: &'a Scene,
+    query: Query,
+    form: Form,
+    pool: &'a ThreadPool,
+    progress: &'a Progress,
+    /// How many rays a thread works on at a time, which changes no byte of the answers.
+    at_a_time: usize,
+}
+
+impl Cast<'_> {
+    fn to_standard_output(&self, rays: RayReader) -> Result<(), Failure> {
+        let mut failure = None;
+        let mut out = io::stdout().lock();
+        let written = Output::csv(&mut out, self.query.table())
+            .and_then(|output| self.write(rays, output, || Ok(()), &mut failure));
+        match (failure, written) {
+            (Some(failure), _) => Err(failure),
             // Whoever reads may stop reading: `lumbre cast … | head`.
-            Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
+            (None, Err(e)) if e.kind() != ErrorKind::BrokenPipe => {
                 Err(Failure::Io(format!("standard output: {e}")))
             }
-            _ => Ok(()),
-        },
+            (None, _) => Ok(()),
+        }
+    }
+
+    fn to_file(&self, rays: RayReader, path: &Path) -> Result<(), Failure> {
+        // An interrupted run must not leave its temporary file.
+        let signals = Signals::listen(&CancelToken::new())
+            .map_err(|e| Failure::Io(format!("cannot listen for signals: {e}")))?;
+        let check = || signals.received().map_or(Ok(()), |status| Err(Failure::Interrupted(status)));
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let table = self.query.table();
+        let mut failure = None;
+        let written = match self.form {
+            Form::Csv => atomic_write(path, |out: &mut dyn Write| {
+                self.write(rays, Output::csv(out, table)?, check, &mut failure)
+            }),
+            form => atomic_write_seek(path, |file| {
+                self.write(rays, Output::in_file(file, form, table, folder)?, check, &mut failure)
+            }),
+        };
+        match failure {
+            Some(failure) => Err(failure),
+            None => written.map_err(|e| lumbre::Error::from(e).into()),
+        }
+    }
+
+    /// Answers all rays. What is no error of writing is left in `failure`.
+    fn write(
+        &self,
+        mut rays: RayReader,
+        mut output: Output,
+        check: impl Fn() -> Result<(), Failure>,
+        failure: &mut Option<Failure>,
+    ) -> io::Result<()> {
+        let decoder = rays.decoder();
+        let next = || {
+            check()?;
+            let piece = rays.next(self.at_a_time)?;
+            if let Some(piece) = &piece {
+                self.progress.show(piece.first_ray, rays.fraction());
+            }
+            Ok(piece)
+        };
+        let work = |piece: rays::Piece| Ok(self.answer(piece.first_ray, &decoder.rays(&piece)?));
+        let done = pipeline::in_order(self.pool, next, work, |block| Ok(output.append(&block)?));
+        match done.and_then(|()| Ok(check()?)) {
+            Ok(()) => output.finish(),
+            Err(Stop::Writing(e)) => Err(e),
+            Err(Stop::Failure(e)) => {
+                *failure = Some(e);
+                Err(io::Error::other("stopped"))
+            }
+        }
+    }
+
+    fn answer(&self, first: u64, rays: &[Ray]) -> Block {
+        let mut block = Block::new(self.form, self.query.table());
+        match self.query {
+            Query::Closest => {
+                let hits = self.scene.closest_batch(rays);
+                (first..).zip(&hits).for_each(|(ray, hit)| block.push_hit(ray, hit.as_ref()));
+            }
+            Query::Any => {
+                let hits = self.scene.any_batch(rays);
+                (first..).zip(hits).for_each(|(ray, hit)| block.push_number(ray, u64::from(hit)));
+            }
+            Query::All => (first..).zip(rays).for_each(|(i, ray)| {
+                self.scene.all(ray, |hit| {
+                    block.push_hit(i, Some(&hit));
+                    ControlFlow::Continue(())
+                });
+            }),
+            Query::Count => {
+                (first..).zip(rays).for_each(|(i, ray)| block.push_number(i, self.scene.count(ray) as u64))
+            }
+        }
+        block
     }
 }
 
-fn read_rays(path: &Path) -> Result<Vec<Ray>, Failure> {
-    let budget = Budget::new(Limits::default());
-    let input = if path == Path::new("-") {
-        Input::from_reader("standard input", std::io::stdin(), &budget)
-    } else {
-        Input::open(path, &budget)
-    };
-    let input = input.map_err(|e| Failure::from(lumbre::Error::from(e)))?;
-    rays::read(input.name(), &input)
+/// Why not all rays were answered.
+enum Stop {
+    Writing(io::Error),
+    Failure(Failure),
 }
 
-/// The answers of a query, in the order of the rays.
-enum Answers {
-    Hits(Vec<Answer>),
-    Numbers(&'static str, Vec<u64>),
-}
-
-impl Answers {
-    fn write(&self, out: &mut Vec<u8>, form: Form) -> std::io::Result<()> {
-        match self {
-            Self::Hits(answers) => answers::write(out, form, answers),
-            Self::Numbers(name, numbers) => answers::write_counts(out, form, name, numbers),
-        }
+impl From<io::Error> for Stop {
+    fn from(error: io::Error) -> Self {
+        Self::Writing(error)
     }
 }
 
-fn answer(scene: &Scene, query: Query, rays: &[Ray]) -> Answers {
-    let numbered = || rays.par_iter().enumerate().map(|(i, ray)| (i as u64, ray));
-    match query {
-        Query::Closest => {
-            Answers::Hits(numbered().map(|(i, ray)| Answer { ray: i, hit: scene.closest(ray) }).collect())
-        }
-        Query::Any => Answers::Numbers("hit", numbered().map(|(_, ray)| u64::from(scene.any(ray))).collect()),
-        Query::All => Answers::Hits(
-            numbered()
-                .flat_map_iter(|(i, ray)| {
-                    let mut found = Vec::new();
-                    scene.all(ray, |hit| {
-                        found.push(Answer { ray: i, hit: Some(hit) });
-                        ControlFlow::Continue(())
-                    });
-                    found
-                })
-                .collect(),
-        ),
-        Query::Count => {
-            Answers::Numbers("count", numbered().map(|(_, ray)| scene.count(ray) as u64).collect())
-        }
+impl From<Failure> for Stop {
+    fn from(failure: Failure) -> Self {
+        Self::Failure(failure)
     }
 }

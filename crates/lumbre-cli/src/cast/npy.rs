@@ -1,74 +1,171 @@
 //! Arrays in NumPy's .npy format, version 1.0 to 3.0, as far as lists of rays and answers need them.
 
-use std::io::{self, Write};
+use lumbre::{DVec3, Ray};
 
-/// A two-dimensional array of numbers, row by row.
-#[derive(Debug, PartialEq)]
-pub(super) struct Array {
+use crate::failure::Failure;
+
+/// What the header of an array of shape (N, M) of f4 or f8 says.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Header {
     /// Rows.
-    pub rows: usize,
+    pub rows: u64,
     /// Columns.
-    pub columns: usize,
-    /// Values, in double precision whatever the file had.
-    pub values: Vec<f64>,
+    pub columns: u64,
+    /// Whether the whole first column stands before the second.
+    pub columns_first: bool,
+    /// The bytes before the data.
+    pub length: u64,
+    number: Number,
+    shape: String,
 }
 
-/// Reads an array of shape (N, M) of f4 or f8, in either byte order and either storage order.
-///
-/// # Errors
-/// A message that says what was found and what is accepted.
-pub(super) fn read(bytes: &[u8]) -> Result<Array, String> {
-    let version =
-        bytes.strip_prefix(b"\x93NUMPY").ok_or("not a .npy file (its first bytes are not \\x93NUMPY)")?;
-    let (header_len, start) = match version {
-        [1, _, a, b, ..] => (usize::from(u16::from_le_bytes([*a, *b])), 10),
-        [2 | 3, _, a, b, c, d, ..] => (u32::from_le_bytes([*a, *b, *c, *d]) as usize, 12),
-        _ => return Err("unknown .npy version (expected 1.0, 2.0 or 3.0)".into()),
-    };
-    let header =
-        bytes.get(start..).and_then(|rest| rest.get(..header_len)).ok_or("the .npy header is cut off")?;
-    let header = std::str::from_utf8(header).map_err(|_| "the .npy header is not text")?;
-    let data = &bytes[start + header_len..];
+/// How a number is stored.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Number {
+    size: usize,
+    is_big_endian: bool,
+}
 
-    let element = entry(header, "descr").ok_or("the .npy header has no 'descr'")?.trim_matches(['\'', '"']);
-    let (size, big_endian) = match element {
-        "<f4" => (4, false),
-        "<f8" => (8, false),
-        ">f4" => (4, true),
-        ">f8" => (8, true),
-        _ => return Err(format!("element type {element} (expected f4 or f8)")),
-    };
-    let columns_first = entry(header, "fortran_order") == Some("True");
-    let shape = entry(header, "shape").ok_or("the .npy header has no 'shape'")?;
-    let sizes: Vec<usize> = shape
-        .trim_matches(['(', ')'])
-        .split(',')
-        .map(str::trim)
-        .filter(|size| !size.is_empty())
-        .map(|size| size.parse().map_err(|_| format!("shape {shape} (expected (N, M))")))
-        .collect::<Result<_, _>>()?;
-    let &[rows, columns] = &sizes[..] else {
-        return Err(format!("shape {shape} (expected two dimensions)"));
-    };
-    let count = rows.checked_mul(columns).filter(|n| n.checked_mul(size) == Some(data.len()));
-    let Some(count) = count else {
-        return Err(format!("{} bytes of data for shape {shape} of {element}", data.len()));
-    };
+/// Why there is no header.
+#[derive(Debug)]
+pub(super) enum HeaderError {
+    /// The bytes cannot be read.
+    Read(Failure),
+    /// They say something wrong: what was found and what is accepted.
+    Wrong(String),
+}
 
-    let value = |i: usize| {
-        let mut raw = [0; 8];
-        raw[..size].copy_from_slice(&data[i * size..(i + 1) * size]);
-        if big_endian {
-            raw[..size].reverse();
+impl From<Failure> for HeaderError {
+    fn from(failure: Failure) -> Self {
+        Self::Read(failure)
+    }
+}
+
+impl From<String> for HeaderError {
+    fn from(what: String) -> Self {
+        Self::Wrong(what)
+    }
+}
+
+impl From<&str> for HeaderError {
+    fn from(what: &str) -> Self {
+        Self::Wrong(what.to_owned())
+    }
+}
+
+/// How every .npy file starts.
+pub(super) const MAGIC: &[u8] = b"\x93NUMPY";
+/// The longest header that is read. NumPy itself takes no more than 10,000 bytes.
+const LONGEST: usize = 1 << 20;
+
+impl Header {
+    /// Reads a header by `read`, which gives the next bytes, as many as it is asked for unless they end.
+    ///
+    /// # Errors
+    /// [`HeaderError`].
+    pub(super) fn read(mut read: impl FnMut(usize) -> Result<Vec<u8>, Failure>) -> Result<Self, HeaderError> {
+        if read(MAGIC.len())? != MAGIC {
+            return Err("not a .npy file (its first bytes are not \\x93NUMPY)".into());
         }
-        if size == 8 {
-            f64::from_le_bytes(raw)
-        } else {
-            f64::from(f32::from_le_bytes([raw[0], raw[1], raw[2], raw[3]]))
+        let version = read(2)?;
+        let length = match version[..] {
+            [1, _] => read(2)?.try_into().map(u16::from_le_bytes).map(usize::from).ok(),
+            [2 | 3, _] => read(4)?.try_into().map(u32::from_le_bytes).map(|n| n as usize).ok(),
+            _ => None,
+        };
+        let length = length.ok_or("unknown .npy version (expected 1.0, 2.0 or 3.0)")?;
+        let text = read(length.min(LONGEST))?;
+        if text.len() < length.min(LONGEST) {
+            return Err("the .npy header is cut off".into());
         }
-    };
-    let values = (0..count).map(|i| value(if columns_first { i % columns * rows + i / columns } else { i }));
-    Ok(Array { rows, columns, values: values.collect() })
+        if LONGEST < length {
+            return Err(format!("a .npy header of {length} bytes (expected at most {LONGEST})").into());
+        }
+        let text = std::str::from_utf8(&text).map_err(|_| "the .npy header is not text")?;
+        let start = if version[0] == 1 { 10 } else { 12 };
+        Ok(Self { length: (start + length) as u64, ..Self::parse(text)? })
+    }
+
+    fn parse(header: &str) -> Result<Self, String> {
+        let element =
+            entry(header, "descr").ok_or("the .npy header has no 'descr'")?.trim_matches(['\'', '"']);
+        let (size, is_big_endian) = match element {
+            "<f4" => (4, false),
+            "<f8" => (8, false),
+            ">f4" => (4, true),
+            ">f8" => (8, true),
+            _ => return Err(format!("element type {element} (expected f4 or f8)")),
+        };
+        let shape = entry(header, "shape").ok_or("the .npy header has no 'shape'")?;
+        let sizes: Vec<u64> = shape
+            .trim_matches(['(', ')'])
+            .split(',')
+            .map(str::trim)
+            .filter(|size| !size.is_empty())
+            .map(|size| size.parse().map_err(|_| format!("shape {shape} (expected (N, M))")))
+            .collect::<Result<_, _>>()?;
+        let &[rows, columns] = &sizes[..] else {
+            return Err(format!("shape {shape} (expected two dimensions)"));
+        };
+        Ok(Self {
+            rows,
+            columns,
+            columns_first: entry(header, "fortran_order") == Some("True"),
+            length: 0,
+            number: Number { size, is_big_endian },
+            shape: format!("{shape} of {element}"),
+        })
+    }
+
+    /// The bytes of a number.
+    pub(super) fn number_size(&self) -> u64 {
+        self.number.size as u64
+    }
+
+    /// The bytes of a row.
+    pub(super) fn row_size(&self) -> u64 {
+        self.columns.saturating_mul(self.number_size())
+    }
+
+    /// Checks that there are as many bytes of data as the shape asks for.
+    ///
+    /// # Errors
+    /// What was found.
+    pub(super) fn check_size(&self, data: u64) -> Result<(), String> {
+        match self.rows.checked_mul(self.row_size()) {
+            Some(size) if size == data => Ok(()),
+            _ => Err(format!("{data} bytes of data for shape {}", self.shape)),
+        }
+    }
+
+    /// The rays of some rows. Where columns come first, those of all these rows do.
+    pub(super) fn rays(&self, bytes: &[u8]) -> Vec<Ray> {
+        match self.number {
+            Number { size: 4, is_big_endian: false } => {
+                self.rays_of(bytes, |b| f64::from(f32::from_le_bytes(b)))
+            }
+            Number { size: 4, is_big_endian: true } => {
+                self.rays_of(bytes, |b| f64::from(f32::from_be_bytes(b)))
+            }
+            Number { is_big_endian: false, .. } => self.rays_of(bytes, f64::from_le_bytes),
+            Number { is_big_endian: true, .. } => self.rays_of(bytes, f64::from_be_bytes),
+        }
+    }
+
+    fn rays_of<const SIZE: usize>(&self, bytes: &[u8], number: impl Fn([u8; SIZE]) -> f64) -> Vec<Ray> {
+        let (numbers, _) = bytes.as_chunks::<SIZE>();
+        let columns = self.columns as usize;
+        let rows = numbers.len() / columns;
+        let ray = |row: usize| {
+            let value = |i: usize| {
+                number(numbers[if self.columns_first { i * rows + row } else { row * columns + i }])
+            };
+            let vector = |i: usize| DVec3::new(value(i), value(i + 1), value(i + 2));
+            let ray = Ray::new(vector(0), vector(3));
+            if columns == 8 { ray.with_range(value(6), value(7)) } else { ray }
+        };
+        (0..rows).map(ray).collect()
+    }
 }
 
 /// The text of a value in the header's Python dictionary.
@@ -79,77 +176,80 @@ fn entry<'a>(header: &'a str, key: &str) -> Option<&'a str> {
     Some(value[..end].trim())
 }
 
-/// Writes an array of the given shape, elements already as little-endian bytes of the NumPy type `descr`.
-///
-/// # Errors
-/// Those of the writer.
-pub(super) fn write(mut out: impl Write, descr: &str, shape: &[usize], bytes: &[u8]) -> io::Result<()> {
-    let sizes: String = shape.iter().map(|size| format!("{size}, ")).collect();
-    let mut header =
-        format!("{{'descr': {descr}, 'fortran_order': False, 'shape': ({}), }}", sizes.trim_end());
+/// The header of a list of `rows` elements of the NumPy type `descr`. For the types of answers it has the same length
+/// whatever the number of rows.
+pub(super) fn header(descr: &str, rows: u64) -> Vec<u8> {
+    let mut text = format!("{{'descr': {descr}, 'fortran_order': False, 'shape': ({rows},), }}");
     // The format wants data to begin at a multiple of 64, and the header to end in a line feed.
-    let padding = 63 - (10 + header.len()) % 64;
-    header.extend(std::iter::repeat_n(' ', padding));
-    header.push('\n');
-    let length = u16::try_from(header.len()).map_err(|_| io::Error::other("the .npy header is too long"))?;
-    out.write_all(b"\x93NUMPY\x01\x00")?;
-    out.write_all(&length.to_le_bytes())?;
-    out.write_all(header.as_bytes())?;
-    out.write_all(bytes)
+    let padding = 63 - (10 + text.len()) % 64;
+    text.extend(std::iter::repeat_n(' ', padding));
+    text.push('\n');
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((text.len() as u16).to_le_bytes());
+    bytes.extend(text.bytes());
+    bytes
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    #[test]
-    fn an_array_that_was_written_reads_back() {
-        let values = [1.5, -2.25, 1e-300, 4.0, 5.0, 6.0];
-        let bytes: Vec<u8> = values.iter().flat_map(|v: &f64| v.to_le_bytes()).collect();
-        let mut file = Vec::new();
-        write(&mut file, "'<f8'", &[2, 3], &bytes).unwrap();
-        assert_eq!((file.len() - 48) % 64, 0);
-        assert_eq!(read(&file).unwrap(), Array { rows: 2, columns: 3, values: values.to_vec() });
+    fn read(mut bytes: &[u8]) -> Result<Header, HeaderError> {
+        Header::read(|count| {
+            let (now, rest) = bytes.split_at(count.min(bytes.len()));
+            bytes = rest;
+            Ok(now.to_vec())
+        })
+    }
+
+    fn file(header: &str) -> Vec<u8> {
+        let length = (header.len() as u16).to_le_bytes();
+        [b"\x93NUMPY\x01\x00".as_slice(), &length, header.as_bytes()].concat()
     }
 
     #[test]
     fn other_orders_and_precisions_mean_the_same() {
-        let file = |descr: &str, fortran: &str, data: Vec<u8>| {
-            let header = format!("{{'descr': '{descr}', 'fortran_order': {fortran}, 'shape': (2, 3), }}\n");
-            let length = (header.len() as u16).to_le_bytes();
-            [b"\x93NUMPY\x01\x00".as_slice(), &length, header.as_bytes(), &data].concat()
+        let rays = |descr: &str, fortran: &str, data: Vec<u8>| {
+            let text = format!("{{'descr': '{descr}', 'fortran_order': {fortran}, 'shape': (2, 6), }}\n");
+            let header = read(&file(&text)).unwrap();
+            assert_eq!(header.length, 10 + text.len() as u64);
+            header.check_size(data.len() as u64).unwrap();
+            header.rays(&data)
         };
-        let rows = vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
-        let big: Vec<u8> = rows.iter().flat_map(|v: &f64| v.to_be_bytes()).collect();
-        assert_eq!(read(&file(">f8", "False", big)).unwrap().values, rows);
-        let by_columns: Vec<u8> =
-            [1f32, 4.0, 2.0, 5.0, 3.0, 6.0].iter().flat_map(|v| v.to_le_bytes()).collect();
-        assert_eq!(read(&file("<f4", "True", by_columns)).unwrap().values, rows);
+        let rows: Vec<f64> = (1..=12).map(f64::from).collect();
+        let by_columns: Vec<f64> = (0..12).map(|i| rows[i % 2 * 6 + i / 2]).collect();
+        let expected = [
+            Ray::new(DVec3::new(1.0, 2.0, 3.0), DVec3::new(4.0, 5.0, 6.0)),
+            Ray::new(DVec3::new(7.0, 8.0, 9.0), DVec3::new(10.0, 11.0, 12.0)),
+        ];
+        for (fortran, numbers) in [("False", rows), ("True", by_columns)] {
+            let of = |bytes: fn(f64) -> Vec<u8>| numbers.iter().flat_map(|v| bytes(*v)).collect::<Vec<u8>>();
+            assert_eq!(rays("<f8", fortran, of(|v| v.to_le_bytes().into())), expected);
+            assert_eq!(rays(">f8", fortran, of(|v| v.to_be_bytes().into())), expected);
+            assert_eq!(rays("<f4", fortran, of(|v| (v as f32).to_le_bytes().into())), expected);
+            assert_eq!(rays(">f4", fortran, of(|v| (v as f32).to_be_bytes().into())), expected);
+        }
     }
 
     #[test]
     fn broken_arrays_are_refused_in_words() {
-        let file = |header: &str| {
-            let length = (header.len() as u16).to_le_bytes();
-            [b"\x93NUMPY\x01\x00".as_slice(), &length, header.as_bytes()].concat()
-        };
         for (bytes, expected) in [
             (b"PK".to_vec(), "not a .npy file"),
+            (b"\x93NUMPY\x01".to_vec(), "unknown .npy version"),
+            (b"\x93NUMPY\x09\x00\x10\x00".to_vec(), "unknown .npy version"),
             (b"\x93NUMPY\x01\x00\xff\xff{".to_vec(), "cut off"),
             (file("{'descr': '<i8', 'fortran_order': False, 'shape': (1, 6), }"), "element type <i8"),
             (file("{'descr': '<f8', 'fortran_order': False, 'shape': (6,), }"), "two dimensions"),
-            (
-                file("{'descr': '<f8', 'fortran_order': False, 'shape': (9999999999999, 6), }"),
-                "0 bytes of data",
-            ),
-            (
-                file("{'descr': '<f8', 'fortran_order': False, 'shape': (4611686018427387904, 6), }"),
-                "0 bytes",
-            ),
             (file("{'fortran_order': False}"), "no 'descr'"),
+            ([&b"\x93NUMPY\x02\x00\x00\x00\x20\x00"[..], &[b' '; 3 << 20]].concat(), "2097152 bytes"),
         ] {
-            let message = read(&bytes).unwrap_err();
+            let Err(HeaderError::Wrong(message)) = read(&bytes) else { panic!("{expected}") };
             assert!(message.contains(expected), "{message}");
+        }
+        for rows in ["9999999999999", "4611686018427387904"] {
+            let text = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({rows}, 6), }}");
+            let message = read(&file(&text)).unwrap().check_size(0).unwrap_err();
+            assert_eq!(message, format!("0 bytes of data for shape ({rows}, 6) of <f8"));
         }
     }
 }

@@ -1,137 +1,221 @@
-//! Lists of rays, read from CSV or .npy.
+//! Lists of rays, read piece by piece from CSV or .npy.
 
-use lumbre::{DVec3, Ray};
+use std::path::Path;
 
+use lumbre::Ray;
+
+use super::array::ArrayReader;
+use super::bytes::Bytes;
+use super::csv::{self, TextReader};
 use super::npy;
 use crate::failure::Failure;
 
-const COLUMNS: [&str; 8] = ["ox", "oy", "oz", "dx", "dy", "dz", "tmin", "tmax"];
+/// The numbers of a ray, by name.
+pub(super) const COLUMNS: [&str; 8] = ["ox", "oy", "oz", "dx", "dy", "dz", "tmin", "tmax"];
 
-/// Reads rays from the bytes of a file; `name` is for messages.
-///
-/// # Errors
-/// [`Failure::Input`] with the line and column of what is wrong.
-pub(super) fn read(name: &str, bytes: &[u8]) -> Result<Vec<Ray>, Failure> {
-    if bytes.starts_with(b"\x93NUMPY") {
-        return from_array(&npy::read(bytes).map_err(|what| Failure::input(format!("{name}: {what}")))?)
-            .map_err(|what| Failure::input(format!("{name}: {what}")));
-    }
-    let text = std::str::from_utf8(bytes).map_err(|e| {
-        let line = bytes[..e.valid_up_to()].iter().filter(|b| **b == b'\n').count() + 1;
-        Failure::input(format!("{name}:{line}: not text (expected CSV in UTF-8, or a .npy array)"))
-    })?;
-    from_csv(text.strip_prefix('\u{feff}').unwrap_or(text))
-        .map_err(|(line, column, what)| Failure::input(format!("{name}:{line}:{column}: {what}")))
+/// Some rays in a row, as the input has them.
+pub(super) struct Piece {
+    /// 0-based position of the first ray.
+    pub first_ray: u64,
+    /// The bytes of whole rows or lines.
+    pub bytes: Vec<u8>,
+    /// The line, from 1, that text begins with.
+    pub line: u64,
 }
 
-fn from_array(array: &npy::Array) -> Result<Vec<Ray>, String> {
-    if array.columns != 6 && array.columns != 8 {
-        return Err(format!("{} columns (expected 6 or 8: {})", array.columns, COLUMNS.join(", ")));
-    }
-    let ray = |row: &[f64]| {
-        let vector = |i: usize| DVec3::new(row[i], row[i + 1], row[i + 2]);
-        let ray = Ray::new(vector(0), vector(3));
-        if row.len() == 8 { ray.with_range(row[6], row[7]) } else { ray }
-    };
-    Ok(array.values.chunks_exact(array.columns).map(ray).collect())
+/// Reads a list of rays from beginning to end.
+pub(super) enum RayReader {
+    /// As an array.
+    Array(ArrayReader),
+    /// As text.
+    Text(TextReader),
 }
 
-/// What is wrong with the text: line and column from 1, and words.
-type CsvError = (usize, usize, String);
+impl RayReader {
+    /// Opens a list of rays; `-` is standard input.
+    ///
+    /// # Errors
+    /// [`Failure`] when it cannot be read or what it begins with is wrong.
+    pub(super) fn open(path: &Path) -> Result<Self, Failure> {
+        Self::new(Bytes::open(path)?)
+    }
 
-fn from_csv(text: &str) -> Result<Vec<Ray>, CsvError> {
-    let mut lines =
-        text.lines().enumerate().map(|(i, line)| (i + 1, line)).filter(|(_, line)| !line.trim().is_empty());
-    let Some((header_line, header)) = lines.next() else {
-        return Err((1, 1, format!("no rays (expected a header among {})", COLUMNS.join(","))));
-    };
-    let mut place = [None; 8];
-    for (i, (column, name)) in fields(header).enumerate() {
-        let Some(known) = COLUMNS.iter().position(|known| *known == name) else {
-            let expected = COLUMNS.join(",");
-            return Err((header_line, column, format!("unknown column \"{name}\" (expected {expected})")));
-        };
-        if place[known].replace(i).is_some() {
-            return Err((header_line, column, format!("column \"{name}\" stands twice")));
+    /// Reads what the bytes begin with.
+    ///
+    /// # Errors
+    /// As [`RayReader::open`].
+    pub(super) fn new(bytes: Bytes) -> Result<Self, Failure> {
+        let (bytes, is_array) = bytes.starts_with(npy::MAGIC)?;
+        if is_array {
+            ArrayReader::new(bytes).map(Self::Array)
+        } else {
+            TextReader::new(bytes).map(Self::Text)
         }
     }
-    if let Some(missing) = (0..6).find(|i| place[*i].is_none()) {
-        return Err((header_line, 1, format!("no column \"{}\"", COLUMNS[missing])));
-    }
-    let width = place.iter().flatten().count();
 
-    let mut rays = Vec::new();
-    for (number, line) in lines {
-        let mut values = [0.0; 8];
-        let mut count = 0;
-        for (column, field) in fields(line) {
-            if count == width {
-                return Err((number, column, format!("more than the {width} values of the header")));
-            }
-            values[count] = field
-                .parse::<f64>()
-                .map_err(|_| (number, column, format!("expected a number, found \"{field}\"")))?;
-            count += 1;
+    /// The next rays, `most` of them where there are as many; `None` at the end.
+    ///
+    /// # Errors
+    /// [`Failure`] when they cannot be read, or there are less than was announced.
+    pub(super) fn next(&mut self, most: usize) -> Result<Option<Piece>, Failure> {
+        match self {
+            Self::Array(reader) => reader.next(most),
+            Self::Text(reader) => reader.next(most),
         }
-        if count < width {
-            return Err((number, line.len() + 1, format!("{count} values (expected {width})")));
-        }
-        let value = |column: usize, default: f64| place[column].map_or(default, |i| values[i]);
-        rays.push(
-            Ray::new(
-                DVec3::new(value(0, 0.0), value(1, 0.0), value(2, 0.0)),
-                DVec3::new(value(3, 0.0), value(4, 0.0), value(5, 0.0)),
-            )
-            .with_range(value(6, 0.0), value(7, f64::INFINITY)),
-        );
     }
-    Ok(rays)
+
+    /// What turns pieces into rays, on any thread.
+    pub(super) fn decoder(&self) -> Decoder {
+        match self {
+            Self::Array(reader) => Decoder::Array(reader.header().clone()),
+            Self::Text(reader) => Decoder::Text(reader.name().to_owned(), reader.header().clone()),
+        }
+    }
+
+    /// The share that was read, in [0, 1], where that is known.
+    pub(super) fn fraction(&self) -> Option<f64> {
+        match self {
+            Self::Array(reader) => reader.fraction(),
+            Self::Text(reader) => reader.fraction(),
+        }
+    }
 }
 
-/// The fields of a line with the column, from 1, where each begins.
-fn fields(line: &str) -> impl Iterator<Item = (usize, &str)> {
-    let mut column = 1;
-    line.split(',').map(move |field| {
-        let start = column + field.chars().take_while(|c| c.is_whitespace()).count();
-        column += field.chars().count() + 1;
-        (start, field.trim())
-    })
+/// Turns pieces into rays.
+pub(super) enum Decoder {
+    /// Of an array.
+    Array(npy::Header),
+    /// Of text, with its name for messages.
+    Text(String, csv::Header),
+}
+
+impl Decoder {
+    /// The rays of a piece.
+    ///
+    /// # Errors
+    /// [`Failure::Input`] with the line and column of what is wrong.
+    pub(super) fn rays(&self, piece: &Piece) -> Result<Vec<Ray>, Failure> {
+        match self {
+            Self::Array(header) => Ok(header.rays(&piece.bytes)),
+            Self::Text(name, header) => csv::rays(name, header, piece),
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::io::{Cursor, Read};
+
+    use lumbre::DVec3;
+
     use super::*;
+
+    /// A reader that gives a few bytes at a time, as a pipe may.
+    struct Pipe(Cursor<Vec<u8>>);
+
+    impl Read for Pipe {
+        fn read(&mut self, out: &mut [u8]) -> std::io::Result<usize> {
+            let most = out.len().min(3);
+            self.0.read(&mut out[..most])
+        }
+    }
+
+    fn read(name: &str, bytes: &[u8], most: usize) -> Result<Vec<Ray>, String> {
+        let bytes = Bytes::from_reader(name, Pipe(Cursor::new(bytes.to_vec())));
+        let all = || -> Result<Vec<Ray>, Failure> {
+            let mut reader = RayReader::new(bytes)?;
+            let decoder = reader.decoder();
+            let mut rays = Vec::new();
+            while let Some(piece) = reader.next(most)? {
+                assert_eq!(piece.first_ray, rays.len() as u64);
+                rays.extend(decoder.rays(&piece)?);
+            }
+            Ok(rays)
+        };
+        all().map_err(|e| e.to_string())
+    }
+
+    const SIZES: [usize; 4] = [1, 2, 3, 100];
 
     #[test]
     fn columns_may_stand_in_any_order_and_ranges_are_optional() {
-        let rays =
-            read("rays.csv", b"dx, dy,dz,ox,oy,oz,tmax\r\n0,0,1, 2,3,-4.5,inf\r\n\r\n1,2,3,4,5,6,7e1\r\n")
-                .unwrap();
-        assert_eq!(
-            rays,
-            [
-                Ray::new(DVec3::new(2.0, 3.0, -4.5), DVec3::new(0.0, 0.0, 1.0)),
-                Ray::new(DVec3::new(4.0, 5.0, 6.0), DVec3::new(1.0, 2.0, 3.0)).with_range(0.0, 70.0),
-            ]
-        );
+        let text =
+            b"\xEF\xBB\xBF\n dx, dy,dz,ox,oy,oz,tmax\r\n0,0,1, 2,3,-4.5,inf\r\n\r\n1,2,3,4,5,6,7e1\r\n \n";
+        for most in SIZES {
+            assert_eq!(
+                read("rays.csv", text, most).unwrap(),
+                [
+                    Ray::new(DVec3::new(2.0, 3.0, -4.5), DVec3::new(0.0, 0.0, 1.0)),
+                    Ray::new(DVec3::new(4.0, 5.0, 6.0), DVec3::new(1.0, 2.0, 3.0)).with_range(0.0, 70.0),
+                ]
+            );
+        }
     }
 
     #[test]
     fn what_is_wrong_is_said_with_its_place() {
+        let long = format!("ox,oy,oz,dx,dy,dz\n1,2{}", " ".repeat(1 << 17));
         for (text, expected) in [
             ("", "rays.csv:1:1: no rays"),
             ("ox,oy,oz,dx,dy\n", "rays.csv:1:1: no column \"dz\""),
             ("ox,oy,oz,dx,dy,dz,time\n", "rays.csv:1:19: unknown column \"time\""),
-            ("ox,oy,oz,dx,dy,dz,ox\n", "rays.csv:1:19: column \"ox\" stands twice"),
+            ("\n\nox,oy,oz,dx,dy,dz,ox\n", "rays.csv:3:19: column \"ox\" stands twice"),
             (
-                "ox,oy,oz,dx,dy,dz\n1,2,3,4,5,6\n1,2,3, four,5,6\n",
-                "rays.csv:3:8: expected a number, found \"four\"",
+                "ox,oy,oz,dx,dy,dz\n1,2,3,4,5,6\n\n1,2,3, four,5,6\n",
+                "rays.csv:4:8: expected a number, found \"four\"",
             ),
             ("ox,oy,oz,dx,dy,dz\n1,2,3\n", "rays.csv:2:6: 3 values (expected 6)"),
             ("ox,oy,oz,dx,dy,dz\n1,2,3,4,5,6,7\n", "rays.csv:2:13: more than the 6 values"),
+            (&long, "rays.csv:2:65537: a line of more than 65536 bytes"),
         ] {
-            let message = read("rays.csv", text.as_bytes()).unwrap_err().to_string();
-            assert!(message.contains(expected), "{message}");
+            for most in SIZES {
+                let message = read("rays.csv", text.as_bytes(), most).unwrap_err();
+                assert!(message.contains(expected), "{message}");
+            }
+        }
+        let latin1 = read("rays.csv", b"ox,oy,oz,dx,dy,dz\n1,2,3,4,5,6\n1,2,\xEF,4,5,6", 7).unwrap_err();
+        assert_eq!(latin1, "rays.csv:3: not text (expected CSV in UTF-8, or a .npy array)");
+    }
+
+    fn array(order: &str, rows: &str, data: &[f64]) -> Vec<u8> {
+        let header = format!("{{'descr': '>f8', 'fortran_order': {order}, 'shape': ({rows}, 8), }}\n");
+        let mut file = [npy::MAGIC, b"\x01\x00", &(header.len() as u16).to_le_bytes()].concat();
+        file.extend(header.bytes());
+        file.extend(data.iter().flat_map(|v| v.to_be_bytes()));
+        file
+    }
+
+    #[test]
+    fn arrays_in_both_orders_give_the_same_rays_in_pieces_of_any_size() {
+        let by_rows: Vec<f64> = (0..56).map(f64::from).collect();
+        let by_columns: Vec<f64> = (0..56).map(|i| f64::from(i % 7 * 8 + i / 7)).collect();
+        let expected: Vec<Ray> = (0..7)
+            .map(|i| f64::from(8 * i))
+            .map(|x| {
+                Ray::new(DVec3::new(x, x + 1.0, x + 2.0), DVec3::new(x + 3.0, x + 4.0, x + 5.0))
+                    .with_range(x + 6.0, x + 7.0)
+            })
+            .collect();
+        for most in SIZES {
+            assert_eq!(read("r.npy", &array("False", "7", &by_rows), most).unwrap(), expected);
+            assert_eq!(read("r.npy", &array("True", "7", &by_columns), most).unwrap(), expected);
+            assert_eq!(read("r.npy", &array("False", "0", &[]), most).unwrap(), []);
+            assert_eq!(read("r.npy", &array("True", "0", &[]), most).unwrap(), []);
+        }
+    }
+
+    #[test]
+    fn arrays_with_too_little_or_too_much_data_are_refused() {
+        let data: Vec<f64> = (0..57).map(f64::from).collect();
+        for order in ["False", "True"] {
+            for most in SIZES {
+                for (rows, count, found) in [("7", 57, 456), ("7", 55, 440), ("7", 0, 0), ("0", 1, 8)] {
+                    let message = read("r.npy", &array(order, rows, &data[..count]), most).unwrap_err();
+                    assert_eq!(message, format!("r.npy: {found} bytes of data for shape ({rows}, 8) of >f8"));
+                }
+                let huge = read("r.npy", &array(order, "4611686018427387904", &data), most).unwrap_err();
+                assert!(huge.contains("456 bytes of data"), "{huge}");
+            }
         }
     }
 }

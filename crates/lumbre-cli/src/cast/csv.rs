@@ -1,0 +1,197 @@
+//! Rays as comma-separated text.
+
+use lumbre::{DVec3, Ray};
+
+use super::bytes::Bytes;
+use super::rays::{COLUMNS, Piece};
+use crate::failure::Failure;
+
+/// Reads the lines of a text.
+pub(super) struct TextReader {
+    bytes: Bytes,
+    header: Header,
+    /// Rays that were read.
+    rays: u64,
+    /// Lines that were read.
+    lines: u64,
+    /// What is wrong behind the last piece: what is wrong in it comes first.
+    failure: Option<Failure>,
+}
+
+/// The longest line, so that one without an end does not fill memory.
+const LONGEST: usize = 1 << 16;
+/// What a piece of text may hold a ray, on the whole.
+const BYTES_A_RAY: usize = 1 << 10;
+
+impl TextReader {
+    /// Reads the header.
+    ///
+    /// # Errors
+    /// [`Failure`] when it is wrong.
+    pub(super) fn new(bytes: Bytes) -> Result<Self, Failure> {
+        let mut this = Self { bytes, header: Header::default(), rays: 0, lines: 0, failure: None };
+        let mut line = Vec::new();
+        while let Some(text) = this.read_line(&mut line)? {
+            let text = text.strip_prefix('\u{feff}').filter(|_| this.lines == 1).unwrap_or(text);
+            if !text.trim().is_empty() {
+                this.header = Header::parse(text).map_err(|wrong| place(this.name(), this.lines, wrong))?;
+                return Ok(this);
+            }
+            line.clear();
+        }
+        let what = format!("no rays (expected a header among {})", COLUMNS.join(","));
+        Err(place(this.name(), 1, (1, what)))
+    }
+
+    /// The name for messages.
+    pub(super) fn name(&self) -> &str {
+        self.bytes.name()
+    }
+
+    /// What the lines hold.
+    pub(super) fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// The share that was read, in [0, 1].
+    pub(super) fn fraction(&self) -> Option<f64> {
+        self.bytes.fraction()
+    }
+
+    /// The next lines.
+    ///
+    /// # Errors
+    /// [`Failure`] when they cannot be read or are not text.
+    pub(super) fn next(&mut self, most: usize) -> Result<Option<Piece>, Failure> {
+        let (first_ray, line) = (self.rays, self.lines + 1);
+        let mut bytes = Vec::new();
+        let mut count = 0;
+        while self.failure.is_none() && count < most && bytes.len() < most * BYTES_A_RAY {
+            let end = bytes.len();
+            match self.read_line(&mut bytes) {
+                Ok(Some(line)) => count += usize::from(!line.trim().is_empty()),
+                Ok(None) => break,
+                Err(failure) => {
+                    bytes.truncate(end);
+                    self.failure = Some(failure);
+                }
+            }
+        }
+        if bytes.is_empty() {
+            return self.failure.take().map_or(Ok(None), Err);
+        }
+        self.rays += count as u64;
+        Ok(Some(Piece { first_ray, bytes, line }))
+    }
+
+    /// Appends a line to `text` and answers it, with its end.
+    fn read_line<'t>(&mut self, text: &'t mut Vec<u8>) -> Result<Option<&'t str>, Failure> {
+        let start = text.len();
+        // One more, so that the longest line shows its end.
+        if self.bytes.read_line(LONGEST + 1, text)? == 0 {
+            return Ok(None);
+        }
+        self.lines += 1;
+        let line = &text[start..];
+        match std::str::from_utf8(line) {
+            // The end of a piece may cut a letter.
+            Err(e) if e.error_len().is_some() || line.len() <= LONGEST => {
+                let what = "not text (expected CSV in UTF-8, or a .npy array)";
+                Err(Failure::input(format!("{}:{}: {what}", self.name(), self.lines)))
+            }
+            Ok(line) if line.len() <= LONGEST || line.ends_with('\n') => Ok(Some(line)),
+            _ => {
+                let what = format!("a line of more than {LONGEST} bytes (expected up to 8 numbers)");
+                Err(place(self.name(), self.lines, (LONGEST + 1, what)))
+            }
+        }
+    }
+}
+
+/// The rays of some lines.
+///
+/// # Errors
+/// [`Failure::Input`] with the line and column of what is wrong.
+pub(super) fn rays(name: &str, header: &Header, piece: &Piece) -> Result<Vec<Ray>, Failure> {
+    let text = std::str::from_utf8(&piece.bytes).map_err(|e| Failure::input(format!("{name}: {e}")))?;
+    (piece.line..)
+        .zip(text.lines())
+        .filter(|(_, line)| !line.trim().is_empty())
+        .map(|(number, line)| header.ray(line).map_err(|wrong| place(name, number, wrong)))
+        .collect()
+}
+
+/// What is wrong with a line: the column, from 1, and words.
+type Wrong = (usize, String);
+
+fn place(name: &str, line: u64, (column, what): Wrong) -> Failure {
+    Failure::input(format!("{name}:{line}:{column}: {what}"))
+}
+
+/// The numbers of a ray that the lines hold, by the header.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Header {
+    /// Where in a line each of [`COLUMNS`] stands.
+    place: [Option<usize>; 8],
+    width: usize,
+}
+
+impl Header {
+    /// Reads the header.
+    ///
+    /// # Errors
+    /// Unknown, repeated and missing columns.
+    fn parse(line: &str) -> Result<Self, Wrong> {
+        let mut place = [None; 8];
+        for (i, (column, name)) in fields(line).enumerate() {
+            let Some(known) = COLUMNS.iter().position(|known| *known == name) else {
+                let expected = COLUMNS.join(",");
+                return Err((column, format!("unknown column \"{name}\" (expected {expected})")));
+            };
+            if place[known].replace(i).is_some() {
+                return Err((column, format!("column \"{name}\" stands twice")));
+            }
+        }
+        if let Some(missing) = (0..6).find(|i| place[*i].is_none()) {
+            return Err((1, format!("no column \"{}\"", COLUMNS[missing])));
+        }
+        Ok(Self { place, width: place.iter().flatten().count() })
+    }
+
+    /// Reads a ray.
+    ///
+    /// # Errors
+    /// What is no number, and too many or too few of them.
+    fn ray(&self, line: &str) -> Result<Ray, Wrong> {
+        let mut values = [0.0; 8];
+        let mut count = 0;
+        for field in line.split(',') {
+            // The column is counted only for who needs it.
+            let column = || fields(line).nth(count).map_or(1, |(column, _)| column);
+            if count == self.width {
+                return Err((column(), format!("more than the {} values of the header", self.width)));
+            }
+            let field = field.trim();
+            values[count] = field
+                .parse::<f64>()
+                .map_err(|_| (column(), format!("expected a number, found \"{field}\"")))?;
+            count += 1;
+        }
+        if count < self.width {
+            return Err((line.len() + 1, format!("{count} values (expected {})", self.width)));
+        }
+        let value = |column: usize, default: f64| self.place[column].map_or(default, |i| values[i]);
+        let vector = |i: usize| DVec3::new(value(i, 0.0), value(i + 1, 0.0), value(i + 2, 0.0));
+        Ok(Ray::new(vector(0), vector(3)).with_range(value(6, 0.0), value(7, f64::INFINITY)))
+    }
+}
+
+/// The fields of a line with the column, from 1, where each begins.
+fn fields(line: &str) -> impl Iterator<Item = (usize, &str)> {
+    let mut column = 1;
+    line.split(',').map(move |field| {
+        let start = column + field.chars().take_while(|c| c.is_whitespace()).count();
+        column += field.chars().count() + 1;
+        (start, field.trim())
+    })
+}
