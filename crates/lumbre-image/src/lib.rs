@@ -1,4 +1,4 @@
-//! Colours and rectangles of colours. No files here: reading and writing them is another floor's work.
+//! Colours and rectangles of colours. Reading and writing files is the task of another crate.
 
 mod bitmap;
 mod colour_space;
