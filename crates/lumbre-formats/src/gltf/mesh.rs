@@ -103,6 +103,30 @@ impl Attribute {
             },
         })
     }
+
+    /// The elements and components that the specification allows; `None` for an application's own attribute.
+    fn formats(self, is_target: bool, quantized: bool) -> Option<(&'static [Element], &'static [Component])> {
+        use Component::{F32, I8, I16, U8, U16};
+        use Element::{Vec2, Vec3, Vec4};
+        let formats: (&[Element], &[Component]) = match (self, is_target, quantized) {
+            (Self::Own, ..) => return None,
+            (Self::Position, _, false) => (&[Vec3], &[F32]),
+            (Self::Position, _, true) => (&[Vec3], &[F32, I8, U8, I16, U16]),
+            (Self::Normal, _, false) => (&[Vec3], &[F32]),
+            (Self::Normal, _, true) => (&[Vec3], &[F32, I8, I16]),
+            (Self::Tangent, false, false) => (&[Vec4], &[F32]),
+            (Self::Tangent, false, true) => (&[Vec4], &[F32, I8, I16]),
+            (Self::Tangent, true, false) => (&[Vec3], &[F32]),
+            (Self::Tangent, true, true) => (&[Vec3], &[F32, I8, I16]),
+            (Self::TexCoord(_), false, false) => (&[Vec2], &[F32, U8, U16]),
+            (Self::TexCoord(_), ..) => (&[Vec2], &[F32, I8, U8, I16, U16]),
+            (Self::Colour(_), false, _) => (&[Vec3, Vec4], &[F32, U8, U16]),
+            (Self::Colour(_), true, _) => (&[Vec3, Vec4], &[F32, I8, U8, I16, U16]),
+            (Self::Joints(_), ..) => (&[Vec4], &[U8, U16]),
+            (Self::Weights(_), ..) => (&[Vec4], &[F32, U8, U16]),
+        };
+        Some(formats)
+    }
 }
 
 /// The attributes of vertices, or what a morph target adds to them.
@@ -131,6 +155,27 @@ pub(super) struct Primitive<'a> {
 /// Sets of attributes beyond this one are of no use to anyone.
 const MOST_SETS: usize = 16;
 
+/// Checks the alignment and the strides of a vertex attribute. `views` are the buffer views of the ones before.
+fn check_layout(
+    file: &File<'_>,
+    index: Value<'_>,
+    accessor: &Accessor<'_>,
+    views: &mut Vec<(usize, usize)>,
+) -> Read<()> {
+    if let Some((view, has_stride)) = accessor.view {
+        // Attributes may also be one and the same accessor.
+        if views.iter().any(|&(other, by)| other == view && by != accessor.index) && !has_stride {
+            file.breach(index.wrong("attributes share a buffer view that says no stride"))?;
+        }
+        views.push((view, accessor.index));
+        if !accessor.start.is_multiple_of(4) || (!accessor.stride.is_multiple_of(4) && accessor.count > 1) {
+            let found = format!("byte {}, {} bytes apart", accessor.start, accessor.stride);
+            file.breach(index.wrong("attribute out of step").found(found).expected("multiples of 4"))?;
+        }
+    }
+    Ok(())
+}
+
 impl<'a> Attributes<'a> {
     fn read(file: &'a File<'_>, value: Value<'a>, is_target: bool) -> Read<Self> {
         let quantized = file.uses("KHR_mesh_quantization")?;
@@ -151,46 +196,14 @@ impl<'a> Attributes<'a> {
                 continue;
             };
             let accessor = Accessor::named(file, index)?;
-            use Component::{F32, I8, I16, U8, U16};
-            use Element::{Vec2, Vec3, Vec4};
-            let (elements, components): (&[Element], &[Component]) = match (attribute, is_target, quantized) {
-                (Attribute::Own, ..) => {
-                    if accessor.component == Component::U32 {
-                        file.breach(index.wrong("attribute of unsigned integers"))?;
-                    }
-                    continue;
+            let Some((elements, components)) = attribute.formats(is_target, quantized) else {
+                if accessor.component == Component::U32 {
+                    file.breach(index.wrong("attribute of unsigned integers"))?;
                 }
-                (Attribute::Position, _, false) => (&[Vec3], &[F32]),
-                (Attribute::Position, _, true) => (&[Vec3], &[F32, I8, U8, I16, U16]),
-                (Attribute::Normal, _, false) => (&[Vec3], &[F32]),
-                (Attribute::Normal, _, true) => (&[Vec3], &[F32, I8, I16]),
-                (Attribute::Tangent, false, false) => (&[Vec4], &[F32]),
-                (Attribute::Tangent, false, true) => (&[Vec4], &[F32, I8, I16]),
-                (Attribute::Tangent, true, false) => (&[Vec3], &[F32]),
-                (Attribute::Tangent, true, true) => (&[Vec3], &[F32, I8, I16]),
-                (Attribute::TexCoord(_), false, false) => (&[Vec2], &[F32, U8, U16]),
-                (Attribute::TexCoord(_), ..) => (&[Vec2], &[F32, I8, U8, I16, U16]),
-                (Attribute::Colour(_), false, _) => (&[Vec3, Vec4], &[F32, U8, U16]),
-                (Attribute::Colour(_), true, _) => (&[Vec3, Vec4], &[F32, I8, U8, I16, U16]),
-                (Attribute::Joints(_), ..) => (&[Vec4], &[U8, U16]),
-                (Attribute::Weights(_), ..) => (&[Vec4], &[F32, U8, U16]),
+                continue;
             };
             accessor.expect(index, elements, components)?;
-            if let Some((view, has_stride)) = accessor.view {
-                // Attributes may also be one and the same accessor.
-                if views.iter().any(|&(other, by)| other == view && by != accessor.index) && !has_stride {
-                    file.breach(index.wrong("attributes share a buffer view that says no stride"))?;
-                }
-                views.push((view, accessor.index));
-                if !accessor.start.is_multiple_of(4)
-                    || (!accessor.stride.is_multiple_of(4) && accessor.count > 1)
-                {
-                    let found = format!("byte {}, {} bytes apart", accessor.start, accessor.stride);
-                    file.breach(
-                        index.wrong("attribute out of step").found(found).expected("multiples of 4"),
-                    )?;
-                }
-            }
+            check_layout(file, index, &accessor, &mut views)?;
             match &count {
                 Some((count, first)) if *count != accessor.count => {
                     let wrong = index
@@ -235,8 +248,14 @@ impl<'a> Attributes<'a> {
                 Attribute::Own => {}
             }
         }
+        attributes.check_sets(file, value, is_target)?;
+        Ok(attributes)
+    }
+
+    /// Checks that sets are numbered without gaps, and that joints and weights match.
+    fn check_sets(&self, file: &File<'_>, value: Value<'_>, is_target: bool) -> Read<()> {
         let sets: [(&str, &[Option<Accessor<'_>>]); 3] =
-            [("TEXCOORD", &attributes.uvs), ("JOINTS", &attributes.joints), ("WEIGHTS", &attributes.weights)];
+            [("TEXCOORD", &self.uvs), ("JOINTS", &self.joints), ("WEIGHTS", &self.weights)];
         for (name, sets) in sets {
             if let Some(missing) = sets.iter().position(Option::is_none)
                 && !is_target
@@ -246,15 +265,11 @@ impl<'a> Attributes<'a> {
                 )?;
             }
         }
-        if attributes.joints.len() != attributes.weights.len() {
+        if self.joints.len() != self.weights.len() {
             let wrong = value.wrong("as many sets of joints as of weights are needed");
-            file.breach(wrong.found(format!(
-                "{} and {}",
-                attributes.joints.len(),
-                attributes.weights.len()
-            )))?;
+            file.breach(wrong.found(format!("{} and {}", self.joints.len(), self.weights.len())))?;
         }
-        Ok(attributes)
+        Ok(())
     }
 
     /// How many vertices there are.

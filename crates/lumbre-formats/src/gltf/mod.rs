@@ -10,6 +10,7 @@
 
 mod accessor;
 mod animation;
+mod check;
 mod container;
 #[cfg(feature = "draco")]
 mod draco;

@@ -65,8 +65,33 @@ impl Converter<'_, '_> {
         Ok(())
     }
 
-    /// A material, and how many mixtures stand in each other in it.
+    /// A material, and its depth of nested mixtures.
     fn build_material(&mut self, ty: &str, params: &Params) -> Result<(Material, usize)> {
+        let Some((kind, depth)) = self.material_kind(ty, params)? else {
+            return Ok((Material::default_diffuse(), 1));
+        };
+        // Names that pbrt-v4 gives to the shape and the medium, and `MakeNamedMaterial` to the type.
+        params.ignore(&["type"]);
+        let mut material = Material::new(kind);
+        if !matches!(material.kind, MaterialKind::Mix { .. } | MaterialKind::Interface) {
+            material.displacement = self.float_texture(params, "displacement")?;
+            if params.has("bumpmap") {
+                self.upgraded(params.spot_of("bumpmap"));
+                material.displacement = self.float_texture(params, "bumpmap")?;
+            }
+            if let Some(filename) = params.string("normalmap")?.map(str::to_owned) {
+                let at = params.spot_of("normalmap");
+                let image =
+                    self.mip_map(&filename, at, Some(Encoding::Linear), Wrap::Repeat, ImageFilter::Bilinear)?;
+                let mapping = Mapping2d::Uv { scale: Vec2::ONE, delta: Vec2::ZERO };
+                material.normal_map = Some(ImageTexture { mapping, image, scale: 1.0, invert: false });
+            }
+        }
+        Ok((material, depth))
+    }
+
+    /// The kind of a material, and its depth of nested mixtures; `None` for an unknown one, after a warning.
+    fn material_kind(&mut self, ty: &str, params: &Params) -> Result<Option<(MaterialKind, usize)>> {
         let spot = params.spot;
         let mut depth = 1;
         let kind = match ty {
@@ -123,24 +148,7 @@ impl Converter<'_, '_> {
                 MaterialKind::Interface
             }
             "principled" => self.principled(params)?,
-            "hair" | "measured" | "subsurface" | "openpbr" => {
-                let kind = match ty {
-                    "openpbr" => {
-                        let reflectance =
-                            self.spectrum_texture(params, "base_color", SpectrumUse::Reflectance)?;
-                        match reflectance {
-                            Some(known) => MaterialKind::Diffuse { reflectance: known.texture },
-                            None => self.diffuse(params)?,
-                        }
-                    }
-                    _ => self.diffuse(params)?,
-                };
-                params.ignore_all();
-                let message =
-                    format!("material {} is not rendered yet: a diffuse one takes its place", quoted(ty));
-                self.note(spot, message);
-                kind
-            }
+            "hair" | "measured" | "subsurface" | "openpbr" => self.replaced_material(ty, params)?,
             _ => match self.old_material(ty, params)? {
                 Some(kind) => {
                     self.upgraded(spot);
@@ -149,28 +157,27 @@ impl Converter<'_, '_> {
                 None => {
                     params.ignore_all();
                     self.unknown(spot, "material", ty, &KNOWN, "a diffuse one takes its place");
-                    return Ok((Material::default_diffuse(), 1));
+                    return Ok(None);
                 }
             },
         };
-        // Names that pbrt-v4 gives to the shape and the medium, and `MakeNamedMaterial` to the type.
-        params.ignore(&["type"]);
-        let mut material = Material::new(kind);
-        if !matches!(material.kind, MaterialKind::Mix { .. } | MaterialKind::Interface) {
-            material.displacement = self.float_texture(params, "displacement")?;
-            if params.has("bumpmap") {
-                self.upgraded(params.spot_of("bumpmap"));
-                material.displacement = self.float_texture(params, "bumpmap")?;
-            }
-            if let Some(filename) = params.string("normalmap")?.map(str::to_owned) {
-                let at = params.spot_of("normalmap");
-                let image =
-                    self.mip_map(&filename, at, Some(Encoding::Linear), Wrap::Repeat, ImageFilter::Bilinear)?;
-                let mapping = Mapping2d::Uv { scale: Vec2::ONE, delta: Vec2::ZERO };
-                material.normal_map = Some(ImageTexture { mapping, image, scale: 1.0, invert: false });
-            }
-        }
-        Ok((material, depth))
+        Ok(Some((kind, depth)))
+    }
+
+    /// The diffuse material that replaces one that is not rendered yet, with a warning.
+    fn replaced_material(&mut self, ty: &str, params: &Params) -> Result<MaterialKind> {
+        let base_color = match ty {
+            "openpbr" => self.spectrum_texture(params, "base_color", SpectrumUse::Reflectance)?,
+            _ => None,
+        };
+        let kind = match base_color {
+            Some(known) => MaterialKind::Diffuse { reflectance: known.texture },
+            None => self.diffuse(params)?,
+        };
+        params.ignore_all();
+        let message = format!("material {} is not rendered yet: a diffuse one takes its place", quoted(ty));
+        self.note(params.spot, message);
+        Ok(kind)
     }
 
     // Parts.

@@ -3,15 +3,13 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use lumbre_geometry::{
-    Aabb, Capsule, Cone, Cuboid, Cylinder, Disk, Hyperboloid, Paraboloid, Plane, Quadric, Shape, ShapeError,
-    Sphere, Torus, Triangle,
-};
-use lumbre_math::{DVec3, Transform, Vec2, Vec3};
+use lumbre_geometry::{Aabb, ShapeError};
+use lumbre_math::{Transform, Vec2, Vec3};
 use lumbre_scene::{CsgDesc, CsgOperation, GeometryDesc, MeshDesc, ShapeDesc};
 use lumbre_shading::Texture;
 
 use super::convert::{Converter, MeshFile, file_fault};
+use super::exact_shapes::exact_shape;
 use super::params::{Params, Type};
 use super::source::{AtSpot, Result, Spot};
 use super::state::State;
@@ -145,130 +143,38 @@ impl Converter<'_, '_> {
         Ok(Some(light.desc.clone()))
     }
 
-    /// The form of a shape; `None` for one that is left out, which has been said.
+    /// The form of a shape; `None` for one that is left out with a warning.
     fn form(&mut self, ty: &str, params: &Params) -> Result<Option<Form>> {
-        let point = |name, default| params.triple(name, Type::Point3, default);
-        let exact = match ty {
-            "sphere" => {
-                let radius = params.float("radius", 1.0)?;
-                let sphere = Sphere::new(point("center", DVec3::ZERO)?, radius);
-                let zmin = params.float_or_infinite("zmin", -radius)?;
-                let zmax = params.float_or_infinite("zmax", radius)?;
-                let phimax = params.float("phimax", 360.0)?;
-                let is_whole = zmin <= -radius && radius <= zmax && phimax == 360.0;
-                let part = |s: Sphere| if is_whole { Ok(s) } else { s.partial(zmin, zmax, phimax) };
-                sphere.and_then(part).map(Shape::from)
-            }
-            "plane" => {
-                let normal = params.triple("normal", Type::Normal, DVec3::Z)?;
-                Plane::new(point("point", DVec3::ZERO)?, normal).map(Shape::from)
-            }
-            "disk" => {
-                let normal = params.triple("normal", Type::Normal, DVec3::Z)?;
-                let height = params.float("height", 0.0)?;
-                let up = if height == 0.0 { DVec3::ZERO } else { height * normal.normalize_or_zero() };
-                let center = point("center", DVec3::ZERO)? + up;
-                let (radius, inner) = (params.float("radius", 1.0)?, params.float("innerradius", 0.0)?);
-                let disk = Disk::new(center, normal, radius, inner);
-                let phimax = params.float("phimax", 360.0)?;
-                disk.and_then(|d| d.partial(phimax)).map(Shape::from)
-            }
-            "triangle" => {
-                let corner = |name| -> Result<DVec3> {
-                    let given = params.triple_opt(name, Type::Point3)?;
-                    given.ok_or_else(|| params.spot.error(format!("a triangle has no \"point3 {name}\"")))
-                };
-                Triangle::new(corner("p0")?, corner("p1")?, corner("p2")?).map(Shape::from)
-            }
-            "box" => Cuboid::new(point("p0", DVec3::NEG_ONE)?, point("p1", DVec3::ONE)?).map(Shape::from),
-            "cylinder" => {
-                let radius = params.float("radius", 1.0)?;
-                let caps = params.boolean("caps", false)?;
-                let cylinder = match ends(params)? {
-                    Some((p0, p1)) => Cylinder::new(p0, p1, radius, caps),
-                    None => {
-                        let zmin = params.float_or_infinite("zmin", -1.0)?;
-                        let zmax = params.float_or_infinite("zmax", 1.0)?;
-                        Cylinder::along_z(radius, zmin, zmax, caps)
-                    }
-                };
-                let phimax = params.float("phimax", 360.0)?;
-                cylinder.and_then(|c| c.partial(phimax)).map(Shape::from)
-            }
-            "capsule" => {
-                let (p0, p1) = (point("p0", DVec3::ZERO)?, point("p1", DVec3::Z)?);
-                Capsule::new(p0, p1, params.float("radius", 0.5)?).map(Shape::from)
-            }
-            "cone" => {
-                let caps = params.boolean("caps", false)?;
-                let cone = if params.has("apex") || params.has("axis") || params.has("angle") {
-                    let Some(angle) = params.float_opt("angle")? else {
-                        return Err(params
-                            .spot
-                            .error("a cone with an apex or an axis has no \"float angle\""));
-                    };
-                    let axis = params.triple("axis", Type::Vector3, DVec3::Z)?;
-                    let height = params.float_or_infinite("height", f64::INFINITY)?;
-                    Cone::nappe(point("apex", DVec3::ZERO)?, axis, angle, height, caps)
-                } else {
-                    let (radius, top) = (params.float("radius", 1.0)?, params.float("topradius", 0.0)?);
-                    let (p0, p1) = match ends(params)? {
-                        Some(ends) => ends,
-                        None => (DVec3::ZERO, DVec3::new(0.0, 0.0, params.float("height", 1.0)?)),
-                    };
-                    Cone::new(p0, p1, radius, top, caps)
-                };
-                let phimax = params.float("phimax", 360.0)?;
-                cone.and_then(|c| c.partial(phimax)).map(Shape::from)
-            }
-            "torus" => {
-                let axis = params.triple("axis", Type::Vector3, DVec3::Z)?;
-                let (major, minor) = (params.float("majorradius", 1.0)?, params.float("minorradius", 0.25)?);
-                Torus::new(point("center", DVec3::ZERO)?, axis, major, minor).map(Shape::from)
-            }
-            "paraboloid" => {
-                let radius = params.float("radius", 1.0)?;
-                let (zmin, zmax) = (params.float("zmin", 0.0)?, params.float("zmax", 1.0)?);
-                Paraboloid::new(radius, zmin, zmax, params.float("phimax", 360.0)?).map(Shape::from)
-            }
-            "hyperboloid" => {
-                let (p1, p2) = (point("p1", DVec3::ZERO)?, point("p2", DVec3::ONE)?);
-                Hyperboloid::new(p1, p2, params.float("phimax", 360.0)?).map(Shape::from)
-            }
-            "quadric" => {
-                let Some(param) = params.typed("coefficients", &[Type::Float])? else {
-                    return Err(params.spot.error("a quadric has no \"float coefficients\""));
-                };
-                let clip = ends(params)?.map(|(p0, p1)| Aabb::around([p0, p1]));
-                Quadric::new(param.exactly::<10>()?, clip).map(Shape::from)
-            }
-            "csg" => return self.csg(params).map(Some),
-            "trianglemesh" => return Ok(self.triangle_mesh(params)?.map(Form::from)),
-            "bilinearmesh" => return Ok(self.bilinear_mesh(params)?.map(Form::from)),
-            "plymesh" => return self.ply_mesh(params).map(|g| Some(g.into())),
-            "loopsubdiv" => return self.loop_subdivision(params).map(|g| Some(g.into())),
+        if let Some(made) = exact_shape(ty, params)? {
+            return match made {
+                Ok(shape) => Ok(Some(GeometryDesc::Exact(shape).into())),
+                Err(ShapeError::OutOfRange { parameter, found, expected }) => {
+                    params.out_of_range(parameter, found, expected)
+                }
+                Err(ShapeError::Degenerate(why)) => Err(params.spot.error(why)),
+                Err(other) => Err(params.spot.error(format!("this shape cannot be made: {other:?}"))),
+            };
+        }
+        match ty {
+            "csg" => self.csg(params).map(Some),
+            "trianglemesh" => Ok(self.triangle_mesh(params)?.map(Form::from)),
+            "bilinearmesh" => Ok(self.bilinear_mesh(params)?.map(Form::from)),
+            "plymesh" => self.ply_mesh(params).map(|g| Some(g.into())),
+            "loopsubdiv" => self.loop_subdivision(params).map(|g| Some(g.into())),
             "curve" => {
                 self.note(params.spot, "shape \"curve\" is not rendered yet: it is left out");
-                return Ok(None);
+                Ok(None)
             }
             "heightfield" | "nurbs" => {
                 self.upgraded(params.spot);
                 let message = format!("shape {} of pbrt-v3 is not rendered: it is left out", quoted(ty));
                 self.note(params.spot, message);
-                return Ok(None);
+                Ok(None)
             }
             _ => {
                 self.unknown(params.spot, "shape", ty, KNOWN, "it is left out");
-                return Ok(None);
+                Ok(None)
             }
-        };
-        match exact {
-            Ok(shape) => Ok(Some(GeometryDesc::Exact(shape).into())),
-            Err(ShapeError::OutOfRange { parameter, found, expected }) => {
-                params.out_of_range(parameter, found, expected)
-            }
-            Err(ShapeError::Degenerate(why)) => Err(params.spot.error(why)),
-            Err(other) => Err(params.spot.error(format!("this shape cannot be made: {other:?}"))),
         }
     }
 
@@ -591,18 +497,6 @@ impl Converter<'_, '_> {
         // Pointers stand for placeholders as long as these live.
         self.mesh_files = files;
         Ok(meshes)
-    }
-}
-
-/// The two corners or ends, both or none.
-fn ends(params: &Params) -> Result<Option<(DVec3, DVec3)>> {
-    let p0 = params.triple_opt("p0", Type::Point3)?;
-    let p1 = params.triple_opt("p1", Type::Point3)?;
-    match (p0, p1) {
-        (Some(p0), Some(p1)) => Ok(Some((p0, p1))),
-        (None, None) => Ok(None),
-        (Some(_), None) => Err(params.spot_of("p0").error("p0 without p1")),
-        (None, Some(_)) => Err(params.spot_of("p1").error("p1 without p0")),
     }
 }
 

@@ -109,6 +109,23 @@ pub(super) fn single(params: &Params, name: &'static str, default: f32) -> Resul
     params.out_of_range(name, value, "a number of single precision")
 }
 
+/// The kinds of texture.
+const KNOWN_KINDS: [&str; 13] = [
+    "constant",
+    "scale",
+    "mix",
+    "directionmix",
+    "bilerp",
+    "imagemap",
+    "checkerboard",
+    "dots",
+    "fbm",
+    "wrinkled",
+    "windy",
+    "marble",
+    "ptex",
+];
+
 impl Converter<'_, '_> {
     // Spectra.
 
@@ -365,44 +382,33 @@ impl Converter<'_, '_> {
             }
             "imagemap" => self.image_texture(&params, texture_from_world)?,
             "dots" | "fbm" | "wrinkled" | "windy" | "marble" | "ptex" => {
-                // About the mean of each; dots cover less than half of the surface.
-                let mean = match ty {
-                    "dots" => self.part::<T>(&params, "outside", 0.0)?,
-                    "wrinkled" => Known::constant(T::grey(0.4)),
-                    "marble" => Known::constant(T::grey(0.8)),
-                    "ptex" => Known::constant(T::grey(0.5)),
-                    _ => Known::constant(T::grey(0.0)),
-                };
-                params.ignore_all();
-                let message =
-                    format!("texture {} is not rendered yet: a constant takes its place", quoted(ty));
-                self.note(spot, message);
-                mean
+                self.replaced_texture::<T>(ty, &params)?
             }
             _ => {
-                let known = [
-                    "constant",
-                    "scale",
-                    "mix",
-                    "directionmix",
-                    "bilerp",
-                    "imagemap",
-                    "checkerboard",
-                    "dots",
-                    "fbm",
-                    "wrinkled",
-                    "windy",
-                    "marble",
-                    "ptex",
-                ];
                 params.ignore_all();
-                self.unknown(spot, "texture", ty, &known, "the constant 0.5 takes its place");
+                self.unknown(spot, "texture", ty, &KNOWN_KINDS, "the constant 0.5 takes its place");
                 Known::constant(T::grey(0.5))
             }
         };
         self.done(&params);
         T::table(self).insert(name.to_owned(), known);
         Ok(())
+    }
+
+    /// The constant that replaces a texture that is not rendered yet, with a warning.
+    fn replaced_texture<T: SceneValue>(&mut self, ty: &str, params: &Params) -> Result<Known<T>> {
+        // About the mean of each; dots cover less than half of the surface.
+        let mean = match ty {
+            "dots" => self.part::<T>(params, "outside", 0.0)?,
+            "wrinkled" => Known::constant(T::grey(0.4)),
+            "marble" => Known::constant(T::grey(0.8)),
+            "ptex" => Known::constant(T::grey(0.5)),
+            _ => Known::constant(T::grey(0.0)),
+        };
+        params.ignore_all();
+        let message = format!("texture {} is not rendered yet: a constant takes its place", quoted(ty));
+        self.note(params.spot, message);
+        Ok(mean)
     }
 
     /// A part of a texture: a value or another texture.

@@ -1,0 +1,589 @@
+//! PLY meshes (G. Turk, "The PLY polygon file format", 1994): text or binary of either byte order.
+
+mod header;
+mod values;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use lumbre_image::{Rgb, srgb_to_linear};
+use lumbre_math::{Transform, Vec2, Vec3};
+use lumbre_scene::{GeometryDesc, MaterialId, MeshDesc, NamedMaterial, SceneDesc, ShapeDesc, UpAxis};
+use lumbre_shading::{Material, MaterialKind, SpectrumTexture};
+
+use crate::budget::{Budget, BudgetVec};
+use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, nearest_name, quoted};
+use crate::input::{Input, refuse_wide};
+use crate::polygon;
+use header::{Element, Encoding, Header, Number, Property};
+use values::{Binary, Fault, Source, Text};
+
+/// Reads a mesh from the bytes of a PLY file.
+///
+/// Of vertices: `x y z`, normals `nx ny nz`, texture coordinates (`u v`, `s t`, `texture_u texture_v`,
+/// `texture_s texture_t`) and colours (`red green blue`, whole numbers on the sRGB curve, others as light). Of faces:
+/// `vertex_indices` (or `vertex_index`) and `face_indices`. Of `tristrips`: `vertex_indices`, where -1 begins a new strip.
+/// Other elements and properties are passed over. Convex quadrilaterals stay; other polygons become triangles.
+///
+/// # Errors
+/// [`FormatError::Input`] with the line and column, or the byte and the element's path such as `/vertex/3/x`;
+/// [`FormatError::Limit`]. When lenient, faces that cannot be used are dropped with a warning instead.
+pub fn read_ply(
+    bytes: &[u8],
+    name: &Arc<str>,
+    budget: &Budget,
+    diagnostics: &mut Diagnostics,
+) -> Result<MeshDesc, FormatError> {
+    refuse_wide(bytes, name)?;
+    let header = Header::read(bytes, name)?;
+    let body = header.end;
+    let mut mesh = Mesh::new(name, bytes, header.encoding, budget, diagnostics);
+    match header.encoding {
+        Encoding::Text => mesh.read(&header, Text { bytes, at: body }),
+        Encoding::Little => mesh.read(&header, Binary::<false> { bytes, at: body }),
+        Encoding::Big => mesh.read(&header, Binary::<true> { bytes, at: body }),
+    }
+    .map_err(|e| e.or_at(|| Place::whole(name.clone())))?;
+    mesh.finish()
+}
+
+/// Reads the PLY file `path` as a scene of one shape, of the default material.
+///
+/// # Errors
+/// As [`Input::open`] and [`read_ply`].
+pub fn open_ply(
+    path: &Path,
+    budget: &Budget,
+    diagnostics: &mut Diagnostics,
+) -> Result<SceneDesc, FormatError> {
+    let input = Input::open(path, budget)?;
+    let mesh = read_ply(&input, input.name(), budget, diagnostics)?;
+    Ok(scene_of_meshes([mesh], UpAxis::Y))
+}
+
+/// Meshes as shapes of the default material, or of the colours of their vertices, in their own space.
+pub(crate) fn scene_of_meshes(meshes: impl IntoIterator<Item = MeshDesc>, up: UpAxis) -> SceneDesc {
+    let mut scene = SceneDesc { up, ..SceneDesc::default() };
+    // Without and with colours.
+    let mut made: [Option<MaterialId>; 2] = [None; 2];
+    for (index, mesh) in (0..).zip(meshes) {
+        let has_colours = mesh.colours.is_some();
+        let material = *made[usize::from(has_colours)].get_or_insert_with(|| {
+            scene.materials.push(unsaid_material(has_colours));
+            MaterialId(scene.materials.len() as u32 - 1)
+        });
+        scene.shapes.push(ShapeDesc {
+            index,
+            geometry: GeometryDesc::Mesh(Arc::new(mesh)),
+            world_from_object: Transform::IDENTITY,
+            reverse_orientation: false,
+            material: Some(material),
+            area_light: None,
+            alpha: None,
+        });
+    }
+    scene
+}
+
+/// The material of a mesh of which a file does not say it: the colours of its vertices, where it has them, else grey.
+pub(crate) fn unsaid_material(has_colours: bool) -> NamedMaterial {
+    let material = match has_colours {
+        true => Material::new(MaterialKind::Diffuse { reflectance: Arc::new(SpectrumTexture::Vertices) }),
+        false => Material::default_diffuse(),
+    };
+    NamedMaterial { name: None, material: Arc::new(material) }
+}
+/// What a property of a vertex is for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Slot {
+    Position(usize),
+    Normal(usize),
+    Uv(usize),
+    Colour(usize),
+    Unused,
+}
+
+impl Slot {
+    fn of(name: &str) -> Self {
+        match name {
+            "x" => Self::Position(0),
+            "y" => Self::Position(1),
+            "z" => Self::Position(2),
+            "nx" => Self::Normal(0),
+            "ny" => Self::Normal(1),
+            "nz" => Self::Normal(2),
+            "u" | "s" | "texture_u" | "texture_s" => Self::Uv(0),
+            "v" | "t" | "texture_v" | "texture_t" => Self::Uv(1),
+            "red" | "r" | "diffuse_red" => Self::Colour(0),
+            "green" | "g" | "diffuse_green" => Self::Colour(1),
+            "blue" | "b" | "diffuse_blue" => Self::Colour(2),
+            _ => Self::Unused,
+        }
+    }
+}
+
+struct Mesh<'a> {
+    name: &'a Arc<str>,
+    bytes: &'a [u8],
+    encoding: Encoding,
+    budget: &'a Budget,
+    diagnostics: &'a mut Diagnostics,
+    positions: Vec<Vec3>,
+    normals: Option<Vec<Vec3>>,
+    uvs: Option<Vec<Vec2>>,
+    colours: Option<Vec<Rgb>>,
+    /// When lenient, vertices that are not finite.
+    unusable: Vec<u32>,
+    triangles: BudgetVec<'a, [u32; 3]>,
+    quads: BudgetVec<'a, [u32; 4]>,
+    triangle_numbers: BudgetVec<'a, u32>,
+    quad_numbers: BudgetVec<'a, u32>,
+    has_numbers: bool,
+}
+
+impl<'a> Mesh<'a> {
+    fn new(
+        name: &'a Arc<str>,
+        bytes: &'a [u8],
+        encoding: Encoding,
+        budget: &'a Budget,
+        diagnostics: &'a mut Diagnostics,
+    ) -> Self {
+        Self {
+            name,
+            bytes,
+            encoding,
+            budget,
+            diagnostics,
+            positions: vec![],
+            normals: None,
+            uvs: None,
+            colours: None,
+            unusable: vec![],
+            triangles: BudgetVec::new(budget, "triangles"),
+            quads: BudgetVec::new(budget, "quads"),
+            triangle_numbers: BudgetVec::new(budget, "face numbers"),
+            quad_numbers: BudgetVec::new(budget, "face numbers"),
+            has_numbers: false,
+        }
+    }
+
+    fn place(&self, at: usize, element: &str, index: u64, property: &str) -> Place {
+        self.encoding.place(self.name, self.bytes, at, element, index, property)
+    }
+
+    /// A fault in a property of element number `index`. Text places do not say which element it was.
+    fn wrong(&self, fault: Fault, element: &Element, index: u64, property: &str) -> Diagnostic {
+        let within = match self.encoding {
+            Encoding::Text => format!("{} in {} {index}, property {property}", fault.message, element.name),
+            _ => fault.message.to_owned(),
+        };
+        Diagnostic::error(within).at(self.place(fault.at, &element.name, index, property)).found(fault.found)
+    }
+
+    fn read<S: Source>(&mut self, header: &Header, mut source: S) -> Result<(), FormatError> {
+        if !header.elements.iter().any(|e| e.name == "vertex") {
+            let wrong = Diagnostic::error("PLY file without vertices").at(Place::whole(self.name.clone()));
+            let names = header.elements.iter().map(|e| e.name.as_str());
+            let near = nearest_name("vertex", names).map(|n| format!("element {}", quoted(n)));
+            return Err(Diagnostic { found: near, ..wrong.expected("an element \"vertex\"") }.into());
+        }
+        let mut later = vec![];
+        let mut has_vertices = false;
+        for element in &header.elements {
+            let least = element.least_bytes(self.encoding);
+            if least == 0 {
+                // Without properties it takes no bytes, however many there are.
+                continue;
+            }
+            // The last number of a text needs no space after it.
+            let last = u64::from(self.encoding == Encoding::Text);
+            let most = (source.left() as u64 + last) / least;
+            if element.count > most {
+                let wrong =
+                    Diagnostic::error(format!("more elements {} than the file holds", quoted(&element.name)));
+                let wrong = wrong.at(element.place.clone()).found(element.count);
+                return Err(wrong.expected(format!("at most {most}")).into());
+            }
+            self.budget
+                .elements(element.count, "PLY elements")
+                .map_err(|e| FormatError::from(e).or_at(|| element.place.clone()))?;
+            match element.name.as_str() {
+                "vertex" => {
+                    self.vertices(element, &mut source)?;
+                    has_vertices = true;
+                }
+                "face" | "tristrips" => {
+                    if has_vertices {
+                        self.faces(element, &mut source)?;
+                    } else {
+                        later.push((element, source));
+                        self.skip(element, &mut source)?;
+                    }
+                }
+                _ => self.skip(element, &mut source)?,
+            }
+        }
+        for (element, mut source) in later {
+            self.faces(element, &mut source)?;
+        }
+        let rest = &self.bytes[source.at()..];
+        if rest.iter().any(|b| !b.is_ascii_whitespace() && *b != 0) {
+            let said = Diagnostic::warning("PLY file goes on after its last element");
+            self.diagnostics
+                .push(said.at(self.place(source.at(), "", 0, "")).found(format!("{} bytes", rest.len())));
+        }
+        Ok(())
+    }
+
+    fn skip<S: Source>(&mut self, element: &Element, source: &mut S) -> Result<(), FormatError> {
+        if !element.has_lists() && self.encoding != Encoding::Text {
+            let bytes = element.least_bytes(self.encoding) * element.count;
+            return source.skip(Number::U8, bytes).map_err(|f| self.wrong(*f, element, 0, "").into());
+        }
+        for index in 0..element.count {
+            for property in &element.properties {
+                let skipped = match property.list {
+                    None => source.skip(property.number, 1),
+                    Some(length) => source
+                        .length(length, property.number)
+                        .and_then(|length| source.skip(property.number, length as u64)),
+                };
+                skipped.map_err(|f| self.wrong(*f, element, index, &property.name))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn vertices<S: Source>(&mut self, element: &Element, source: &mut S) -> Result<(), FormatError> {
+        let mut slots: Vec<Slot> = vec![];
+        for property in &element.properties {
+            let slot = if property.list.is_some() { Slot::Unused } else { Slot::of(&property.name) };
+            // The first of each counts: some files have both u v and s t.
+            slots.push(if slots.contains(&slot) { Slot::Unused } else { slot });
+        }
+        let has = |slot| slots.contains(&slot);
+        for (c, name) in ["x", "y", "z"].into_iter().enumerate() {
+            if !has(Slot::Position(c)) {
+                let wrong = Diagnostic::error(format!("vertices without a property \"{name}\""));
+                return Err(wrong.at(element.place.clone()).into());
+            }
+        }
+        let has_normals = (0..3).all(|c| has(Slot::Normal(c)));
+        let has_uvs = (0..2).all(|c| has(Slot::Uv(c)));
+        let has_colours = (0..3).all(|c| has(Slot::Colour(c)));
+        if u32::try_from(element.count).is_err() {
+            let wrong = Diagnostic::error("more vertices than a mesh can have").at(element.place.clone());
+            return Err(wrong.found(element.count).expected(format!("at most {}", u32::MAX)).into());
+        }
+        let count = element.count;
+        let mut positions = self.budget.vec(count, "vertices")?;
+        let mut normals = self.budget.vec(if has_normals { count } else { 0 }, "normals")?;
+        let mut uvs = self.budget.vec(if has_uvs { count } else { 0 }, "texture coordinates")?;
+        let mut colours = self.budget.vec(if has_colours { count } else { 0 }, "colours")?;
+        for index in 0..count {
+            let (mut p, mut n, mut uv, mut colour) = ([0f32; 3], [0f32; 3], [0f32; 2], [0f32; 3]);
+            let start = source.at();
+            for (property, slot) in element.properties.iter().zip(&slots) {
+                let fault = |f: Box<Fault>| FormatError::from(self.wrong(*f, element, index, &property.name));
+                if let Some(length) = property.list {
+                    let length = source.length(length, property.number).map_err(fault)?;
+                    source.skip(property.number, length as u64).map_err(fault)?;
+                    continue;
+                }
+                let value = source.number(property.number).map_err(fault)?;
+                match *slot {
+                    Slot::Position(c) => p[c] = value as f32,
+                    Slot::Normal(c) => n[c] = value as f32,
+                    Slot::Uv(c) => uv[c] = value as f32,
+                    Slot::Colour(c) if property.number.is_float() => colour[c] = value as f32,
+                    Slot::Colour(c) => colour[c] = srgb_to_linear((value / property.number.one()) as f32),
+                    Slot::Unused => {}
+                }
+            }
+            let mut position = Vec3::from(p);
+            if !position.is_finite() {
+                position = self.unusable_vertex(element, index, start, position)?;
+            }
+            positions.push(position);
+            if has_normals {
+                normals.push(self.finite_or_zero(
+                    Vec3::from(n),
+                    Vec3::is_finite,
+                    "normal",
+                    element,
+                    index,
+                    start,
+                ));
+            }
+            if has_uvs {
+                let what = "texture coordinate that is not finite, taken for 0";
+                uvs.push(self.finite_or_zero(Vec2::from(uv), Vec2::is_finite, what, element, index, start));
+            }
+            if has_colours {
+                colours.push(self.finite_or_zero(
+                    Rgb::from(colour),
+                    Rgb::is_finite,
+                    "colour",
+                    element,
+                    index,
+                    start,
+                ));
+            }
+        }
+        self.positions = positions;
+        self.normals = has_normals.then_some(normals);
+        self.uvs = has_uvs.then_some(uvs);
+        self.colours = has_colours.then_some(colours);
+        Ok(())
+    }
+
+    /// An error, or when lenient the origin in its place: no face will use it.
+    #[cold]
+    fn unusable_vertex(
+        &mut self,
+        element: &Element,
+        index: u64,
+        at: usize,
+        p: Vec3,
+    ) -> Result<Vec3, FormatError> {
+        let axis = (0..3).find(|&c| !p[c].is_finite()).unwrap_or(0);
+        let found = format!("({}, {}, {})", p.x, p.y, p.z);
+        let at = self.encoding.start(self.bytes, at);
+        let place = self.place(at, &element.name, index, ["x", "y", "z"][axis]);
+        let wrong = Diagnostic::error(format!("vertex {index} is not finite")).at(place).found(found);
+        if !self.diagnostics.is_lenient() {
+            return Err(wrong.into());
+        }
+        self.unusable.push(index as u32);
+        Ok(Vec3::ZERO)
+    }
+
+    #[inline]
+    fn finite_or_zero<T: Copy + Default>(
+        &mut self,
+        value: T,
+        is_finite: impl FnOnce(T) -> bool,
+        what: &str,
+        element: &Element,
+        index: u64,
+        at: usize,
+    ) -> T {
+        if is_finite(value) {
+            return value;
+        }
+        let place = self.place(self.encoding.start(self.bytes, at), &element.name, index, "");
+        self.diagnostics
+            .push(Diagnostic::warning(format!("a {what} is not finite, and taken for 0")).at(place));
+        T::default()
+    }
+
+    fn faces<S: Source>(&mut self, element: &Element, source: &mut S) -> Result<(), FormatError> {
+        let is_strips = element.name == "tristrips";
+        let is_corners =
+            |p: &Property| p.list.is_some() && matches!(p.name.as_str(), "vertex_indices" | "vertex_index");
+        let Some(corners_at) = element.properties.iter().position(is_corners) else {
+            let names = element.properties.iter().map(|p| p.name.as_str());
+            let near = nearest_name("vertex_indices", names).map(|n| format!("property {}", quoted(n)));
+            let wrong = Diagnostic::error("faces without a list of vertices").at(element.place.clone());
+            let wrong = wrong.expected("property list uchar int vertex_indices");
+            return Err(Diagnostic { found: near, ..wrong }.into());
+        };
+        let numbers_at = element.properties.iter().position(|p| {
+            p.list.is_none()
+                && !p.number.is_float()
+                && matches!(p.name.as_str(), "face_indices" | "face_index")
+        });
+        self.has_numbers = numbers_at.is_some() && !is_strips;
+        self.unusable.sort_unstable();
+        if !is_strips {
+            self.triangles.reserve(element.count as usize)?;
+            self.triangle_numbers.reserve(if self.has_numbers { element.count as usize } else { 0 })?;
+        }
+        let mut corners: BudgetVec<'_, i64> = BudgetVec::new(self.budget, "corners of a face");
+        let mut filled;
+        for index in 0..element.count {
+            let start = source.at();
+            let mut number = 0u32;
+            filled = 0;
+            for (i, property) in element.properties.iter().enumerate() {
+                let fault = |f: Box<Fault>| FormatError::from(self.wrong(*f, element, index, &property.name));
+                match property.list {
+                    Some(length) if i == corners_at => {
+                        let length = source.length(length, property.number).map_err(fault)?;
+                        while corners.len() < length {
+                            corners.push(0)?;
+                        }
+                        for corner in &mut corners[..length] {
+                            let value = source.number(property.number).map_err(fault)?;
+                            // The cast holds what is out of range at the ends of i64, which is out of range still.
+                            *corner = if value.fract() == 0.0 { value as i64 } else { i64::MIN };
+                        }
+                        filled = length;
+                    }
+                    Some(length) => {
+                        let length = source.length(length, property.number).map_err(fault)?;
+                        source.skip(property.number, length as u64).map_err(fault)?;
+                    }
+                    None => {
+                        let value = source.number(property.number).map_err(fault)?;
+                        if Some(i) == numbers_at {
+                            // Signed numbers keep their bits.
+                            number = value as i64 as u32;
+                        }
+                    }
+                }
+            }
+            if is_strips {
+                self.strip(&corners[..filled], element, index, start)?;
+            } else {
+                self.face(&corners[..filled], number, element, index, start)?;
+            }
+        }
+        Ok(())
+    }
+
+    #[inline]
+    fn face(
+        &mut self,
+        corners: &[i64],
+        number: u32,
+        element: &Element,
+        index: u64,
+        at: usize,
+    ) -> Result<(), FormatError> {
+        let count = self.positions.len() as i64;
+        if let Some(position) = corners.iter().position(|&c| c < 0 || count <= c) {
+            return self.unusable_face(corners[position], element, index, at);
+        }
+        if !self.unusable.is_empty()
+            && corners.iter().any(|&c| self.unusable.binary_search(&(c as u32)).is_ok())
+        {
+            self.drop_face("face with a vertex that is not finite, dropped", element, index, at);
+            return Ok(());
+        }
+        match *corners {
+            [a, b, c] => self.triangle([a as u32, b as u32, c as u32], number)?,
+            [] | [_] | [_, _] => {
+                self.drop_face("face with fewer than three corners, dropped", element, index, at);
+            }
+            [a, b, c, d] if polygon::is_convex(&[a, b, c, d].map(|i| self.positions[i as usize])) => {
+                self.quads.push([a, b, c, d].map(|i| i as u32))?;
+                if self.has_numbers {
+                    self.quad_numbers.push(number)?;
+                }
+            }
+            _ => {
+                // Where its corners stand, and the cutting of them.
+                let _while_cut = self.budget.hold(corners.len() as u64 * 160, "corners of a face")?;
+                let places: Vec<Vec3> = corners.iter().map(|&c| self.positions[c as usize]).collect();
+                let Some(triangles) = polygon::triangulate(&places) else {
+                    let at = self.encoding.start(self.bytes, at);
+                    let place = self.place(at, &element.name, index, "vertex_indices");
+                    let wrong = Diagnostic::error("face too large and winding to be cut into triangles")
+                        .at(place)
+                        .found(format!("{} corners", corners.len()));
+                    return Err(wrong.into());
+                };
+                for t in triangles {
+                    self.triangle(t.map(|i| corners[i] as u32), number)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    #[inline]
+    fn triangle(&mut self, corners: [u32; 3], number: u32) -> Result<(), FormatError> {
+        self.triangles.push(corners)?;
+        if self.has_numbers {
+            self.triangle_numbers.push(number)?;
+        }
+        Ok(())
+    }
+
+    fn strip(
+        &mut self,
+        corners: &[i64],
+        element: &Element,
+        index: u64,
+        at: usize,
+    ) -> Result<(), FormatError> {
+        for strip in corners.split(|&c| c == -1) {
+            for (i, corners) in strip.windows(3).enumerate() {
+                let [a, b, c] = [corners[0], corners[1], corners[2]];
+                // Every other triangle of a strip goes the other way round; those that only turn it have no area.
+                if a != b && b != c && a != c {
+                    let corners = if i % 2 == 0 { [a, b, c] } else { [b, a, c] };
+                    self.face(&corners, 0, element, index, at)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    #[cold]
+    fn unusable_face(
+        &mut self,
+        corner: i64,
+        element: &Element,
+        index: u64,
+        at: usize,
+    ) -> Result<(), FormatError> {
+        if self.diagnostics.is_lenient() {
+            self.drop_face("face with a vertex that is not there, dropped", element, index, at);
+            return Ok(());
+        }
+        let place = self.place(self.encoding.start(self.bytes, at), &element.name, index, "vertex_indices");
+        let count = self.positions.len();
+        let expected = if count == 0 {
+            "no face, as there are no vertices".to_owned()
+        } else {
+            format!("0 to {}", count - 1)
+        };
+        let wrong = Diagnostic::error(format!("face {index} has a vertex that is not there")).at(place);
+        let found =
+            if corner == i64::MIN { "a number that is not whole".to_owned() } else { corner.to_string() };
+        Err(wrong.found(found).expected(expected).into())
+    }
+
+    #[cold]
+    fn drop_face(&mut self, what: &str, element: &Element, index: u64, at: usize) {
+        let (encoding, name, bytes) = (self.encoding, self.name, self.bytes);
+        self.diagnostics.warn(what, |said| {
+            let start = encoding.start(bytes, at);
+            let place = encoding.place(name, bytes, start, &element.name, index, "vertex_indices");
+            said.at(place).found(format!("{} {index}", element.name))
+        });
+    }
+
+    fn finish(self) -> Result<MeshDesc, FormatError> {
+        if self.triangles.is_empty() && self.quads.is_empty() {
+            let said = Diagnostic::warning("PLY mesh without faces").at(Place::whole(self.name.clone()));
+            self.diagnostics.push(said.found(format!("{} vertices", self.positions.len())));
+        }
+        let face_indices = if self.has_numbers && self.triangle_numbers.len() == self.triangles.len() {
+            let mut numbers = self.triangle_numbers;
+            numbers.reserve(self.quad_numbers.len())?;
+            for &number in self.quad_numbers.iter() {
+                numbers.push(number)?;
+            }
+            Some(numbers.into_vec())
+        } else {
+            None
+        };
+        Ok(MeshDesc {
+            positions: self.positions,
+            triangles: self.triangles.into_vec(),
+            quads: self.quads.into_vec(),
+            normals: self.normals,
+            uvs: self.uvs,
+            tangents: None,
+            further_uvs: Default::default(),
+            colours: self.colours,
+            coverages: None,
+            face_indices,
+            motion: None,
+        })
+    }
+}
