@@ -1,5 +1,5 @@
-//! What is there: first described ([`SceneDesc`], plain data that any reader can make), then resolved for rendering
-//! ([`Scene`]).
+//! Scenes: first a description ([`SceneDesc`], plain data that any reader can make), then resolved for
+//! rendering ([`Scene`]).
 
 mod build;
 mod camera;

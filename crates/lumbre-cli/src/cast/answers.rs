@@ -1,4 +1,4 @@
-//! What rays hit, written as CSV, .npy or .npz.
+//! Query results as CSV, .npy or .npz.
 
 use std::io::{self, Cursor, Write};
 
@@ -7,27 +7,27 @@ use zip::write::SimpleFileOptions;
 
 use super::npy;
 
-/// One line of the answer: a ray, and what it hit.
+/// A row of the results: a ray and its hit.
 #[derive(Clone, Debug)]
 pub struct Answer {
-    /// 0-based position of the ray.
+    /// The 0-based index of the ray.
     pub ray: u64,
-    /// What it hit, or nothing.
+    /// The hit, if any.
     pub hit: Option<CastHit>,
 }
 
-/// The forms that answers can take.
+/// The output formats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
-    /// Comma-separated text with a header.
+    /// Comma-separated values with a header.
     Csv,
     /// One array of records.
     Npy,
-    /// One array a column.
+    /// One array per column.
     Npz,
 }
 
-/// A column of the answers: its name, its NumPy type, and its little-endian bytes for one answer.
+/// A column of the results: its name, its NumPy type, and its little-endian bytes for one row.
 struct Column {
     name: &'static str,
     kind: &'static str,
@@ -60,7 +60,7 @@ macro_rules! index {
     };
 }
 
-/// What .npy and .npz hold: a miss has `hit` false, t = inf, NaN coordinates and -1 for names.
+/// The columns of .npy and .npz: a miss has `hit` false, t = inf, NaN coordinates and -1 for indices.
 const COLUMNS: &[Column] = &[
     Column { name: "ray", kind: "<u8", bytes: |answer, out| out.extend(answer.ray.to_le_bytes()) },
     Column { name: "hit", kind: "|b1", bytes: |answer, out| out.push(u8::from(answer.hit.is_some())) },
@@ -87,9 +87,8 @@ const COLUMNS: &[Column] = &[
     index!("instance", |hit| hit.instance),
 ];
 
-/// Writes answers.
+/// Writes results.
 ///
-/// # Errors
 /// Those of the writer.
 pub fn write(out: &mut dyn Write, form: Form, answers: &[Answer]) -> io::Result<()> {
     match form {
@@ -148,9 +147,8 @@ fn csv(out: &mut dyn Write, answers: &[Answer]) -> io::Result<()> {
     Ok(())
 }
 
-/// Writes the number of hits, or whether there is one, for each ray.
+/// Writes the number of hits, or whether there is any, for each ray.
 ///
-/// # Errors
 /// Those of the writer.
 pub fn write_counts(out: &mut dyn Write, form: Form, name: &str, counts: &[u64]) -> io::Result<()> {
     let bytes: Vec<u8> = counts.iter().flat_map(|count| count.to_le_bytes()).collect();

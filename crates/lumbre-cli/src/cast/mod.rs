@@ -1,4 +1,4 @@
-//! `lumbre cast`: what rays hit.
+//! `lumbre cast`: ray queries.
 
 use std::io::Write;
 use std::ops::ControlFlow;
@@ -46,7 +46,7 @@ pub struct Arguments {
     threads: Option<u16>,
     #[command(flatten)]
     reading: ReadingArguments,
-    /// No warnings.
+    /// Print no warnings.
     #[arg(short, long)]
     quiet: bool,
 }
@@ -91,7 +91,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         Some(path) => atomic_write(path, |file| file.write_all(&bytes))
             .map_err(|e| Failure::from(lumbre::Error::from(e))),
         None => match std::io::stdout().lock().write_all(&bytes) {
-            // Whoever reads may stop reading: `lumbre cast … | head`.
+            // The reader may close the pipe: `lumbre cast … | head`.
             Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
                 Err(Failure::Io(format!("standard output: {e}")))
             }
@@ -111,7 +111,7 @@ fn read_rays(path: &Path) -> Result<Vec<Ray>, Failure> {
     rays::read(input.name(), &input)
 }
 
-/// The answers of a query, in the order of the rays.
+/// The results of a query, in the order of the rays.
 enum Answers {
     Hits(Vec<Answer>),
     Numbers(&'static str, Vec<u64>),

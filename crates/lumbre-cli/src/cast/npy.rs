@@ -1,4 +1,4 @@
-//! Arrays in NumPy's .npy format, version 1.0 to 3.0, as far as lists of rays and answers need them.
+//! NumPy's .npy format, version 1.0 to 3.0, as needed for lists of rays and results.
 
 use std::io::{self, Write};
 
@@ -9,14 +9,13 @@ pub struct Array {
     pub rows: usize,
     /// Columns.
     pub columns: usize,
-    /// Values, in double precision whatever the file had.
+    /// Values, converted to double precision.
     pub values: Vec<f64>,
 }
 
 /// Reads an array of shape (N, M) of f4 or f8, in either byte order and either storage order.
 ///
-/// # Errors
-/// A message that says what was found and what is accepted.
+/// A message with what was found and what is accepted.
 pub fn read(bytes: &[u8]) -> Result<Array, String> {
     let version =
         bytes.strip_prefix(b"\x93NUMPY").ok_or("not a .npy file (its first bytes are not \\x93NUMPY)")?;
@@ -87,7 +86,7 @@ pub fn write(mut out: impl Write, descr: &str, shape: &[usize], bytes: &[u8]) ->
     let sizes: String = shape.iter().map(|size| format!("{size}, ")).collect();
     let mut header =
         format!("{{'descr': {descr}, 'fortran_order': False, 'shape': ({}), }}", sizes.trim_end());
-    // The format wants data to begin at a multiple of 64, and the header to end in a line feed.
+    // The data must begin at a multiple of 64, and the header must end in a line feed.
     let padding = 63 - (10 + header.len()) % 64;
     header.extend(std::iter::repeat_n(' ', padding));
     header.push('\n');

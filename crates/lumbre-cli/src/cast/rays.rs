@@ -9,8 +9,7 @@ const COLUMNS: [&str; 8] = ["ox", "oy", "oz", "dx", "dy", "dz", "tmin", "tmax"];
 
 /// Reads rays from the bytes of a file; `name` is for messages.
 ///
-/// # Errors
-/// [`Failure::Input`] with the line and column of what is wrong.
+/// [`Failure::Input`] with the line and column.
 pub fn read(name: &str, bytes: &[u8]) -> Result<Vec<Ray>, Failure> {
     if bytes.starts_with(b"\x93NUMPY") {
         return from_array(&npy::read(bytes).map_err(|what| Failure::input(format!("{name}: {what}")))?)
@@ -36,7 +35,7 @@ fn from_array(array: &npy::Array) -> Result<Vec<Ray>, String> {
     Ok(array.values.chunks_exact(array.columns).map(ray).collect())
 }
 
-/// What is wrong with the text: line and column from 1, and words.
+/// An error in the text: line and column from 1, and a message.
 type CsvError = (usize, usize, String);
 
 fn from_csv(text: &str) -> Result<Vec<Ray>, CsvError> {
@@ -88,7 +87,7 @@ fn from_csv(text: &str) -> Result<Vec<Ray>, CsvError> {
     Ok(rays)
 }
 
-/// The fields of a line with the column, from 1, where each begins.
+/// The fields of a line, each with its column, from 1.
 fn fields(line: &str) -> impl Iterator<Item = (usize, &str)> {
     let mut column = 1;
     line.split(',').map(move |field| {

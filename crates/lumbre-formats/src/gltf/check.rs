@@ -1,4 +1,4 @@
-//! Checks of everything that a scene may leave unused, so that a file is right or wrong as a whole.
+//! Validation of everything in a file, used or not.
 
 use std::collections::HashMap;
 
@@ -16,7 +16,7 @@ use super::scene;
 use super::texture::Textures;
 use crate::diagnostic::quoted;
 
-/// Checks everything that the scene may not come to use, so that a file is right or wrong as a whole.
+/// Checks also what the scene may leave unused, so that a file is valid or invalid as a whole.
 pub(super) fn check(file: &File<'_>, graph: &Graph<'_>) -> Read<()> {
     for (index, &view) in file.list(List::BufferViews).iter().enumerate() {
         file.view_at(index, view)?;
@@ -37,7 +37,7 @@ pub(super) fn check(file: &File<'_>, graph: &Graph<'_>) -> Read<()> {
     let mut used_as: HashMap<usize, bool> = HashMap::new();
     let mut materials = vec![];
     for &material in file.list(List::Materials) {
-        // As many sets of texture coordinates as its textures need.
+        // The number of uv sets that its textures need.
         let read = GltfMaterial::read(file, material)?;
         materials.push(read.textures().map(|t| t.uv_set + 1).max().unwrap_or(0));
     }

@@ -1,4 +1,4 @@
-//! Materials, those of pbrt-v3 upgraded.
+//! Materials, with those of pbrt-v3 upgraded.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ use super::textures::{SpectrumUse, single};
 use crate::Diagnostic;
 use crate::diagnostic::quoted;
 
-/// The materials of pbrt-v4 that have a name there.
+/// The material types of pbrt-v4.
 const KNOWN: [&str; 13] = [
     "diffuse",
     "coateddiffuse",
@@ -35,7 +35,7 @@ const KNOWN: [&str; 13] = [
     "principled",
 ];
 
-/// Mixtures may stand in each other so deep.
+/// The maximal depth of nested mixtures.
 const MAX_MIX_DEPTH: usize = 64;
 
 impl Converter<'_, '_> {
@@ -190,7 +190,7 @@ impl Converter<'_, '_> {
         Ok(MaterialKind::Diffuse { reflectance: self.reflectance(params, "reflectance", 0.5)? })
     }
 
-    /// The roughness group; `names` are of both axes, of u and of v.
+    /// The roughness parameters; `names` are those of both axes, of u and of v.
     fn roughness(&mut self, params: &Params, names: [&'static str; 3], default: f32) -> Result<Roughness> {
         let both = self.float_texture_or(params, names[0], default)?;
         let u = self.float_texture(params, names[1])?.unwrap_or_else(|| both.clone());
@@ -318,7 +318,7 @@ impl Converter<'_, '_> {
 
     // pbrt-v3.
 
-    /// pbrt-v3's weight of the first material, as a colour: the weight of the second as a number.
+    /// pbrt-v3's weight of the first material, a colour, as the weight of the second, a number.
     fn old_amount(&mut self, params: &Params) -> Result<FloatArc> {
         let types = [Type::Float, Type::Rgb, Type::Spectrum, Type::Texture];
         let Some(param) = params.typed("amount", &types)? else { return Ok(number(0.5)) };
@@ -342,10 +342,10 @@ impl Converter<'_, '_> {
         })
     }
 
-    /// A material of pbrt-v3 by one of pbrt-v4; `None` when there is none of this name.
+    /// A material of pbrt-v3 as one of pbrt-v4; `None` for an unknown name.
     fn old_material(&mut self, ty: &str, params: &Params) -> Result<Option<MaterialKind>> {
         let spot = params.spot;
-        // What no material of pbrt-v4 has a place for.
+        // Parameters without an equivalent in pbrt-v4.
         let dropped = |converter: &mut Self, names: &[&'static str]| {
             for name in names.iter().filter(|name| params.has(name)) {
                 params.ignore(&[name]);
@@ -390,7 +390,7 @@ impl Converter<'_, '_> {
                 let mut share = |name| -> Result<Spectrum> {
                     let known = self.spectrum_texture(params, name, SpectrumUse::Reflectance)?;
                     Ok(known.map_or(Some(Spectrum::splat(0.5)), |known| known.value()).unwrap_or_else(|| {
-                        // A texture of it has no place here.
+                        // A texture of it has no equivalent.
                         Spectrum::splat(0.5)
                     }))
                 };
@@ -430,7 +430,7 @@ impl Converter<'_, '_> {
     }
 }
 
-/// The names of the roughness group.
+/// The names of the roughness parameters.
 const ROUGHNESS: [&str; 3] = ["roughness", "uroughness", "vroughness"];
 
 fn number(v: f32) -> FloatArc {

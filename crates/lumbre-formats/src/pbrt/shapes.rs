@@ -1,4 +1,4 @@
-//! Shapes: exact ones in double precision, meshes, and combinations of solids.
+//! Shapes: exact ones, meshes, and CSG.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -40,13 +40,13 @@ const KNOWN: &[&str] = &[
     "curve",
 ];
 
-/// Solids may be combined so deep.
+/// The maximal nesting depth of CSG.
 const MAX_CSG_DEPTH: usize = 64;
 
-/// A solid may be combined of so many; a ray asks each of them.
+/// The maximal number of leaves of a CSG; every ray tests each of them.
 const MAX_CSG_LEAVES: u64 = 1 << 16;
 
-/// A form, with what a CSG comes to: its leaves and its depth.
+/// A geometry, with the number of leaves and the depth of a CSG.
 struct Form {
     geometry: GeometryDesc,
     leaves: u64,
@@ -103,7 +103,7 @@ impl Converter<'_, '_> {
         Ok(())
     }
 
-    /// The light of the state, where this shape can give it.
+    /// The current area light, if this shape can emit.
     fn area_light_of(
         &mut self,
         geometry: &GeometryDesc,
@@ -143,7 +143,7 @@ impl Converter<'_, '_> {
         Ok(Some(light.desc.clone()))
     }
 
-    /// The form of a shape; `None` for one that is left out with a warning.
+    /// The geometry of a shape; `None` for one that is ignored with a warning.
     fn form(&mut self, ty: &str, params: &Params) -> Result<Option<Form>> {
         if let Some(made) = exact_shape(ty, params)? {
             return match made {
@@ -178,7 +178,7 @@ impl Converter<'_, '_> {
         }
     }
 
-    // Combinations of solids.
+    // CSG.
 
     fn csg(&mut self, params: &Params) -> Result<Form> {
         let operations = [
@@ -237,7 +237,7 @@ impl Converter<'_, '_> {
             if leaves > MAX_CSG_LEAVES {
                 return Err(at.error(format!("more than {MAX_CSG_LEAVES} solids are combined into one")));
             }
-            // Each operand is written out: objects in objects in a csg may come to very many.
+            // Operands are expanded: nested objects in a csg may become very many.
             self.budget.elements(slot.leaves, "operands of a csg").at(at)?;
             let bytes = slot.leaves.saturating_mul(size_of::<ShapeDesc>() as u64);
             self.budget.bytes(bytes, "operands of a csg").at(at)?;
@@ -265,7 +265,7 @@ impl Converter<'_, '_> {
         Ok(positions)
     }
 
-    /// The indices, `N` a face, checked; faces that cannot be used are dropped where the reader is lenient.
+    /// The indices, `N` per face, checked; unusable faces are dropped where the reader is lenient.
     fn faces<const N: usize>(
         &mut self,
         params: &Params,
@@ -343,7 +343,7 @@ impl Converter<'_, '_> {
         if let Some(tangents) = &mesh.tangents {
             same("S", tangents.len())?;
         }
-        // pbrt-v3 has `float uv` and `float st` too.
+        // pbrt-v3 also has `float uv` and `float st`.
         let uv = ["uv", "st"].into_iter().find(|name| params.has(name));
         if let Some(name) = uv {
             let Some(param) = params.typed(name, &[Type::Point2, Type::Float])? else { return Ok(()) };
@@ -367,7 +367,7 @@ impl Converter<'_, '_> {
                 let expected = format!("{faces}, as many as faces");
                 return Err(spot.wrong(wrong.found(indices.len()).expected(expected)));
             }
-            // The bits of the number: what it means is the writer's business.
+            // The bits of the number, whose meaning is the writer's.
             mesh.face_indices = Some(kept.iter().map(|&i| indices[i] as u32).collect());
         }
         let numbers =
@@ -421,7 +421,7 @@ impl Converter<'_, '_> {
         let levels = params.count("nlevels", 3, 0)?;
         let levels = params.count("levels", levels, 0)?;
         params.ignore(&["scheme"]);
-        // Each level has four times the faces: this stops the tenth level of a big mesh before it is made.
+        // Each level has four times the faces: checked before they are made.
         let at = params.spot_of("levels");
         let growth = 4u64.checked_pow(levels).unwrap_or(u64::MAX);
         let last = growth.saturating_mul(faces.len() as u64);
@@ -436,7 +436,7 @@ impl Converter<'_, '_> {
         Ok(GeometryDesc::Mesh(Arc::new(mesh)))
     }
 
-    /// A mesh from a file, which is read at the end, with the others.
+    /// A mesh from a file, which is read at the end with the others.
     fn ply_mesh(&mut self, params: &Params) -> Result<GeometryDesc> {
         let Some(filename) = params.string("filename")?.map(str::to_owned) else {
             return Err(params.spot.error("a plymesh has no \"string filename\""));
@@ -455,14 +455,14 @@ impl Converter<'_, '_> {
         Ok(GeometryDesc::Mesh(self.mesh_files[file].placeholder.clone()))
     }
 
-    /// Reads the mesh files, several at a time; answers each under its placeholder.
+    /// Reads the mesh files in parallel; returns each by its placeholder.
     pub fn read_meshes(&mut self) -> Result<HashMap<*const MeshDesc, Arc<MeshDesc>>> {
         let files = std::mem::take(&mut self.mesh_files);
         let strictness = self.diagnostics.strictness();
         let budget = self.budget;
         let next = std::sync::atomic::AtomicUsize::new(0);
         let threads = std::thread::available_parallelism().map_or(1, |n| n.get()).min(files.len());
-        // Each file keeps what was said of it, so that warnings come in the order of the scene.
+        // Diagnostics are kept per file, so that warnings are in the order of the scene.
         let read = |file: &MeshFile| {
             let mut diagnostics = Diagnostics::with_strictness(strictness);
             let mesh = Input::open(&file.path, budget)
@@ -488,13 +488,13 @@ impl Converter<'_, '_> {
         });
         let mut meshes = HashMap::new();
         for (file, result) in files.iter().zip(results) {
-            // A worker that died has left no answer: the file is read again here.
+            // A worker that died has no result: the file is read again here.
             let (mesh, diagnostics) = result.unwrap_or_else(|| read(file));
             self.diagnostics.append(diagnostics);
             let mesh = mesh.map_err(|e| file_fault(file.spot, e))?;
             meshes.insert(Arc::as_ptr(&file.placeholder), Arc::new(mesh));
         }
-        // Pointers stand for placeholders as long as these live.
+        // Pointers identify placeholders as long as these live.
         self.mesh_files = files;
         Ok(meshes)
     }
@@ -511,15 +511,15 @@ fn triples(params: &Params, name: &'static str, ty: Type) -> Result<Option<Vec<V
     list.map(Some).ok_or_else(|| param.refuse("numbers of single precision"))
 }
 
-/// Whether each edge of a mesh is shared by exactly two faces that run along it in opposite directions, where vertices at
-/// the same place count as one.
+/// Whether each edge of a mesh is shared by exactly two faces in opposite directions, with vertices at the same
+/// position merged.
 pub(super) fn is_closed(mesh: &MeshDesc) -> bool {
     let mut places = HashMap::new();
     let vertex: Vec<u32> = mesh
         .positions
         .iter()
         .map(|p| {
-            // Adding 0 makes one zero of two.
+            // Adding 0 turns -0 into 0.
             let key = (*p + Vec3::ZERO).to_array().map(f32::to_bits);
             let next = places.len() as u32;
             *places.entry(key).or_insert(next)
@@ -532,7 +532,7 @@ pub(super) fn is_closed(mesh: &MeshDesc) -> bool {
         for (i, &a) in face.iter().enumerate() {
             let (a, b) = (vertex[a as usize], vertex[face[(i + 1) % face.len()] as usize]);
             if a == b {
-                // An edge without a length borders nothing.
+                // An edge of length 0 is ignored.
                 continue;
             }
             any = true;

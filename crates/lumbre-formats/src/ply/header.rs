@@ -27,7 +27,7 @@ impl Encoding {
         }
     }
 
-    /// In a text, where the first word after `at` starts.
+    /// In a text, the start of the first word after `at`.
     pub(super) fn start(self, bytes: &[u8], at: usize) -> usize {
         match self {
             Self::Text => at + bytes[at..].iter().take_while(|b| b.is_ascii_whitespace()).count(),
@@ -82,7 +82,7 @@ impl Number {
         matches!(self, Self::F32 | Self::F64)
     }
 
-    /// What the largest number stands for where numbers stand for parts of 1.
+    /// The integer that represents 1 in normalised colours.
     pub(super) fn one(self) -> f64 {
         match self {
             Self::I8 => 127.0,
@@ -109,12 +109,12 @@ pub(super) struct Element {
     pub(super) name: String,
     pub(super) count: u64,
     pub(super) properties: Vec<Property>,
-    /// Where the header says the count.
+    /// The place of the count in the header.
     pub(super) place: Place,
 }
 
 impl Element {
-    /// Bytes of one where it has no lists, and at least so many where it has.
+    /// The size of an element in bytes; with lists, a lower bound.
     pub(super) fn least_bytes(&self, encoding: Encoding) -> u64 {
         match encoding {
             // A digit and a space for each.
@@ -131,7 +131,7 @@ impl Element {
 pub(super) struct Header {
     pub(super) encoding: Encoding,
     pub(super) elements: Vec<Element>,
-    /// Where the data begin.
+    /// The offset of the data.
     pub(super) end: usize,
 }
 

@@ -21,13 +21,13 @@ use values::{Binary, Fault, Source, Text};
 /// Reads a mesh from the bytes of a PLY file.
 ///
 /// Of vertices: `x y z`, normals `nx ny nz`, texture coordinates (`u v`, `s t`, `texture_u texture_v`,
-/// `texture_s texture_t`) and colours (`red green blue`, whole numbers on the sRGB curve, others as light). Of faces:
-/// `vertex_indices` (or `vertex_index`) and `face_indices`. Of `tristrips`: `vertex_indices`, where -1 begins a new strip.
-/// Other elements and properties are passed over. Convex quadrilaterals stay; other polygons become triangles.
+/// `texture_s texture_t`) and colours (`red green blue`, integers in sRGB, others linear). Of faces:
+/// `vertex_indices` (or `vertex_index`) and `face_indices`. Of `tristrips`: `vertex_indices`, where -1 begins a
+/// new strip. Other elements and properties are ignored. Convex quadrilaterals are kept; other polygons are
+/// triangulated.
 ///
-/// # Errors
 /// [`FormatError::Input`] with the line and column, or the byte and the element's path such as `/vertex/3/x`;
-/// [`FormatError::Limit`]. When lenient, faces that cannot be used are dropped with a warning instead.
+/// [`FormatError::Limit`]. When lenient, unusable faces are dropped with a warning instead.
 pub fn read_ply(
     bytes: &[u8],
     name: &Arc<str>,
@@ -47,10 +47,9 @@ pub fn read_ply(
     mesh.finish()
 }
 
-/// Reads the PLY file `path` as a scene of one shape, of the default material.
+/// Reads the PLY file `path` as a scene of one shape with the default material.
 ///
-/// # Errors
-/// As [`Input::open`] and [`read_ply`].
+/// As for [`Input::open`] and [`read_ply`].
 pub fn open_ply(
     path: &Path,
     budget: &Budget,
@@ -61,7 +60,7 @@ pub fn open_ply(
     Ok(scene_of_meshes([mesh], UpAxis::Y))
 }
 
-/// Meshes as shapes of the default material, or of the colours of their vertices, in their own space.
+/// Meshes as shapes with the default material, or with their vertex colours, in their own space.
 pub(crate) fn scene_of_meshes(meshes: impl IntoIterator<Item = MeshDesc>, up: UpAxis) -> SceneDesc {
     let mut scene = SceneDesc { up, ..SceneDesc::default() };
     // Without and with colours.
@@ -85,7 +84,7 @@ pub(crate) fn scene_of_meshes(meshes: impl IntoIterator<Item = MeshDesc>, up: Up
     scene
 }
 
-/// The material of a mesh of which a file does not say it: the colours of its vertices, where it has them, else grey.
+/// The material of a mesh whose file has none: its vertex colours, if any, else grey.
 pub(crate) fn unsaid_material(has_colours: bool) -> NamedMaterial {
     let material = match has_colours {
         true => Material::new(MaterialKind::Diffuse { reflectance: Arc::new(SpectrumTexture::Vertices) }),
@@ -93,7 +92,7 @@ pub(crate) fn unsaid_material(has_colours: bool) -> NamedMaterial {
     };
     NamedMaterial { name: None, material: Arc::new(material) }
 }
-/// What a property of a vertex is for.
+/// The use of a vertex property.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Slot {
     Position(usize),
@@ -172,7 +171,7 @@ impl<'a> Mesh<'a> {
         self.encoding.place(self.name, self.bytes, at, element, index, property)
     }
 
-    /// A fault in a property of element number `index`. Text places do not say which element it was.
+    /// A fault in a property of element number `index`. Places in a text do not include the element.
     fn wrong(&self, fault: Fault, element: &Element, index: u64, property: &str) -> Diagnostic {
         let within = match self.encoding {
             Encoding::Text => format!("{} in {} {index}, property {property}", fault.message, element.name),
@@ -193,7 +192,7 @@ impl<'a> Mesh<'a> {
         for element in &header.elements {
             let least = element.least_bytes(self.encoding);
             if least == 0 {
-                // Without properties it takes no bytes, however many there are.
+                // Without properties it takes no bytes, at any count.
                 continue;
             }
             // The last number of a text needs no space after it.
@@ -416,7 +415,7 @@ impl<'a> Mesh<'a> {
                         }
                         for corner in &mut corners[..length] {
                             let value = source.number(property.number).map_err(fault)?;
-                            // The cast holds what is out of range at the ends of i64, which is out of range still.
+                            // The cast saturates numbers that are out of range; they stay out of range.
                             *corner = if value.fract() == 0.0 { value as i64 } else { i64::MIN };
                         }
                         filled = length;
@@ -474,7 +473,7 @@ impl<'a> Mesh<'a> {
                 }
             }
             _ => {
-                // Where its corners stand, and the cutting of them.
+                // The positions of its corners, and the triangulation.
                 let _while_cut = self.budget.hold(corners.len() as u64 * 160, "corners of a face")?;
                 let places: Vec<Vec3> = corners.iter().map(|&c| self.positions[c as usize]).collect();
                 let Some(triangles) = polygon::triangulate(&places) else {
@@ -512,7 +511,7 @@ impl<'a> Mesh<'a> {
         for strip in corners.split(|&c| c == -1) {
             for (i, corners) in strip.windows(3).enumerate() {
                 let [a, b, c] = [corners[0], corners[1], corners[2]];
-                // Every other triangle of a strip goes the other way round; those that only turn it have no area.
+                // Every other triangle of a strip is reversed; degenerate ones have no area.
                 if a != b && b != c && a != c {
                     let corners = if i % 2 == 0 { [a, b, c] } else { [b, a, c] };
                     self.face(&corners, 0, element, index, at)?;

@@ -3,7 +3,7 @@
 use super::header::Number;
 use crate::diagnostic::quoted_bytes;
 
-/// What went wrong at a byte; the reader knows in which element.
+/// An error at a byte; the caller adds the element.
 #[derive(Debug)]
 pub(super) struct Fault {
     pub(super) at: usize,
@@ -13,16 +13,16 @@ pub(super) struct Fault {
 
 pub(super) type Read<T> = Result<T, Box<Fault>>;
 
-/// The numbers of the body, one after the other.
+/// A reader of the body's numbers.
 pub(super) trait Source: Copy {
     fn at(&self) -> usize;
     fn left(&self) -> usize;
-    /// The next number. Whole numbers are exact.
+    /// The next number. Integers are exact.
     fn number(&mut self, number: Number) -> Read<f64>;
-    /// Passes over so many numbers.
+    /// Skips numbers.
     fn skip(&mut self, number: Number, count: u64) -> Read<()>;
 
-    /// A list's length, which the rest of the file can hold.
+    /// A list's length, checked against the rest of the file.
     fn length(&mut self, number: Number, item: Number) -> Read<usize>;
 }
 
@@ -61,7 +61,7 @@ impl Source for Text<'_> {
     fn number(&mut self, number: Number) -> Read<f64> {
         let word = self.word()?;
         let parsed = std::str::from_utf8(word).ok().and_then(|w| w.parse::<f64>().ok());
-        // Whole numbers may be written as 3.0, which some programs do.
+        // Integers may be written as 3.0, as some programs do.
         let parsed = parsed.filter(|v| number.is_float() || v.fract() == 0.0);
         parsed.ok_or_else(|| {
             let message = if number.is_float() { "not a number" } else { "not a whole number" };

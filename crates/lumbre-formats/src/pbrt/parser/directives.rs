@@ -1,4 +1,4 @@
-//! The directives: which there are, where each may appear, and what each does.
+//! The directives: their names, where each may appear, and their meaning.
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -26,7 +26,7 @@ enum Where {
     Anywhere,
 }
 
-/// Reads the arguments of a directive, and carries it out.
+/// Reads the arguments of a directive, and executes it.
 type Handler<'b, 'd> = fn(&mut Parser<'b, 'd>, Spot) -> Result<()>;
 
 impl<'b, 'd> Parser<'b, 'd> {
@@ -64,7 +64,7 @@ impl<'b, 'd> Parser<'b, 'd> {
         ("Sampler", Options, Self::sampler),
         ("Scale", Anywhere, Self::scale),
         ("Shape", World, Self::shape),
-        // pbrt-v3; it stood before WorldBegin there, too.
+        // pbrt-v3; before WorldBegin there, too.
         ("SurfaceIntegrator", Options, Self::surface_integrator),
         ("Texture", World, Self::texture),
         ("Transform", Anywhere, Self::set_transform),
@@ -98,7 +98,7 @@ impl<'b, 'd> Parser<'b, 'd> {
         handler(self, spot)
     }
 
-    /// Leaves out what follows an unknown directive.
+    /// Skips the arguments of an unknown directive.
     fn skip_arguments(&mut self) -> Result<()> {
         while let Some(token) = self.peek()? {
             let raw = self.frames.last().expect("a file is being read").lexer.raw(token);
@@ -114,7 +114,7 @@ impl<'b, 'd> Parser<'b, 'd> {
     }
 }
 
-// What a file says before WorldBegin, and of its reading.
+// The settings before WorldBegin.
 impl Parser<'_, '_> {
     fn option(&mut self, _spot: Spot) -> Result<()> {
         let (name, at) = self.string("Option", "a name in quotes")?;
@@ -124,7 +124,7 @@ impl Parser<'_, '_> {
             TokenKind::Bare => self.bare(token).into(),
             _ => return self.unexpected(token, "wrong value of Option", "a word, a number or a string"),
         };
-        // pbrt writes the bare name; a type before it does no harm.
+        // pbrt writes the bare name; a type before it is harmless.
         let name = name.split_ascii_whitespace().last().unwrap_or("").to_owned();
         self.converter.option(&name, at, &value)
     }
@@ -192,7 +192,7 @@ impl Parser<'_, '_> {
     }
 }
 
-// What is in the world.
+// The contents of the world.
 impl Parser<'_, '_> {
     fn reverse_orientation(&mut self, _spot: Spot) -> Result<()> {
         self.state.reverse_orientation = !self.state.reverse_orientation;
@@ -248,7 +248,7 @@ impl Parser<'_, '_> {
         Ok(())
     }
 
-    /// Says that a light which is no shape does not move, where it should.
+    /// Warns that a light other than a shape does not move.
     fn light_stays(&mut self, spot: Spot) {
         if self.state.ctm[0] != self.state.ctm[1] {
             let message = "the motion of this light is left out: it stays where it starts";

@@ -21,14 +21,14 @@ use crate::{Diagnostic, FormatError, Input};
 /// A file that is being read.
 struct Frame<'b> {
     lexer: Lexer<Input<'b>>,
-    // Its one true path, by which a cycle is known; `None` for what is not a file.
+    // Its canonical path, to detect cycles; `None` if it is not a file.
     canonical: Option<PathBuf>,
-    // The state and the scopes to come back to, for `Import`.
+    // The state and the scopes to restore after an `Import`.
     import: Option<Box<(State, usize)>>,
     is_top: bool,
 }
 
-/// Reads the scene language and hands each entity to the [`Converter`].
+/// Parses the scene language and passes each entity to the [`Converter`].
 pub(in crate::pbrt) struct Parser<'b, 'd> {
     frames: Vec<Frame<'b>>,
     peeked: Option<Token>,
@@ -53,7 +53,7 @@ impl<'b, 'd> Parser<'b, 'd> {
         }
     }
 
-    /// Reads one more top-level input to its end.
+    /// Reads another top-level input to its end.
     pub fn read(&mut self, input: Input<'b>, canonical: Option<PathBuf>) -> Result<()> {
         let file = self.converter.files.add(input.name().clone(), None);
         let lexer = Lexer::new(input, file)?;
@@ -76,7 +76,7 @@ impl<'b, 'd> Parser<'b, 'd> {
         }
     }
 
-    /// After the last input: what is open is an error, and what was put off is done.
+    /// After the last input: checks for open scopes, and completes deferred work.
     pub fn finish(&mut self) -> Result<()> {
         if let Some(scope) = self.scopes.pop() {
             return Err(scope.spot.error(format!("{} without its {}", scope.kind.begin(), scope.kind.end())));
@@ -120,7 +120,7 @@ impl<'b, 'd> Parser<'b, 'd> {
         Ok(())
     }
 
-    /// Ends the file that is being read; answers whether it was a top-level one.
+    /// Ends the current file; returns whether it was a top-level one.
     fn leave_file(&mut self) -> Result<bool> {
         let Some(frame) = self.frames.pop() else { return Ok(true) };
         if let Some((state, depth)) = frame.import.map(|import| *import) {
@@ -134,7 +134,8 @@ impl<'b, 'd> Parser<'b, 'd> {
     }
 }
 
-/// The path of the file `name` that a scene in `directory` asks for: there if there is one, else the name as given.
+/// The path of the file `name` of a scene in `directory`: relative to it if it exists there, else the name as
+/// given.
 pub(in crate::pbrt) fn resolve(directory: &Path, name: &str) -> PathBuf {
     let beside = directory.join(name);
     if beside.exists() { beside } else { PathBuf::from(name) }

@@ -14,7 +14,7 @@ use crate::Diagnostic;
 use crate::diagnostic::quoted;
 
 impl Parser<'_, '_> {
-    /// The parameter list that follows.
+    /// Reads a parameter list.
     pub(super) fn params(&mut self) -> Result<Vec<Param>> {
         let mut params = vec![];
         while let Some(token) = self.peek()? {
@@ -27,7 +27,7 @@ impl Parser<'_, '_> {
         Ok(params)
     }
 
-    /// A type in quotes, then a parameter list.
+    /// Reads a type in quotes and a parameter list.
     pub(super) fn entity(
         &mut self,
         directive: &str,
@@ -109,7 +109,7 @@ impl Parser<'_, '_> {
         }
     }
 
-    /// Adds the value that `token` is; answers whether it is one.
+    /// Appends the value of `token`; returns whether it is valid.
     fn value(&mut self, token: Token, values: &mut Values) -> Result<bool> {
         let lexer = &mut self.frames.last_mut().expect("a file is being read").lexer;
         match (values, token.kind) {
@@ -132,7 +132,7 @@ impl Parser<'_, '_> {
                 b"false" => v.push(false),
                 _ => return Ok(false),
             },
-            // As pbrt-v3 writes them.
+            // As in pbrt-v3.
             (Values::Bools(v), TokenKind::String) => {
                 match &*lexer.string(token)? {
                     "true" => v.push(true),

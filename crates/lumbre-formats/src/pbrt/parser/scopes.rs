@@ -91,7 +91,7 @@ impl Parser<'_, '_> {
                 spot.error(format!("{} in an imported file closes what its importer opened", kind.end()))
             );
         }
-        // pbrt-v3's saves the transform alone; pbrt-v4 takes it for AttributeBegin.
+        // pbrt-v3's saves only the transform; pbrt-v4 treats it as AttributeBegin.
         if kind == ScopeKind::Transform && self.converter.is_upgraded() {
             self.state.ctm = scope.saved.ctm;
             self.state.active = scope.saved.active;

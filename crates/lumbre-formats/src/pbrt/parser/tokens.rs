@@ -1,4 +1,4 @@
-//! The token stream, over included files, and the arguments of directives.
+//! The token stream over included files, and the arguments of directives.
 
 use super::super::lexer::{Token, TokenKind, parse_number};
 use super::super::source::{Result, Spot};
@@ -10,7 +10,7 @@ impl<'b> Parser<'b, '_> {
         self.frames.last_mut().expect("a file is being read")
     }
 
-    /// The next token; an included file that ends goes on in the one that included it, as its text stood there.
+    /// The next token; at the end of an included file it continues with the including one.
     pub(super) fn next(&mut self) -> Result<Option<Token>> {
         if let Some(token) = self.peeked.take() {
             return Ok(Some(token));
@@ -42,7 +42,7 @@ impl<'b> Parser<'b, '_> {
         String::from_utf8_lossy(self.top().lexer.raw(token)).into_owned()
     }
 
-    /// The next token, which must be there.
+    /// The next token, which must exist.
     pub(super) fn expect(&mut self, what: &str) -> Result<Token> {
         match self.next()? {
             Some(token) => Ok(token),
@@ -69,7 +69,7 @@ impl<'b> Parser<'b, '_> {
         Ok((text.into_owned(), spot))
     }
 
-    /// `N` numbers, in brackets or not.
+    /// `N` numbers, optionally in brackets.
     pub(super) fn numbers<const N: usize>(&mut self, directive: &str) -> Result<[f64; N]> {
         let what = format!("wrong argument of {directive}");
         let plural = if N == 1 { "number" } else { "numbers" };

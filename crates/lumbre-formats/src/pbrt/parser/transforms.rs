@@ -34,7 +34,7 @@ impl Parser<'_, '_> {
         if eye == target {
             return Err(spot.error("LookAt from a point to itself: eye and target are equal"));
         }
-        // Scaled first, so that no square overflows or vanishes.
+        // Scaled first, so that no square over- or underflows.
         let unit = |v: DVec3| (v / v.abs().max_element()).normalize();
         let forward = unit(target - eye);
         if up == DVec3::ZERO {
@@ -126,7 +126,7 @@ impl Parser<'_, '_> {
                 continue;
             }
             let new = *ctm * by;
-            // A chain of scales, each of them fine, may pass the range of numbers.
+            // A chain of valid scales may leave the range of numbers.
             let regular = |t: &DAffine3| t.is_finite() && t.matrix3 != DMat3::ZERO;
             if !regular(new.affine()) || !regular(new.inverse_affine()) {
                 return Err(singular(spot, directive));
