@@ -1,4 +1,4 @@
-//! `lumbre diff`: how different two pictures are.
+//! `lumbre diff`: the difference of two pictures.
 
 use std::path::PathBuf;
 
@@ -61,7 +61,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         lumbre::write_image(path, &heat, &lumbre::SaveOptions::default()).map_err(Failure::from)?;
     }
     match arguments.fail_above {
-        // A difference that is not a number is above every limit.
+        // A NaN is above every limit.
         Some(limit) if difference.is_nan() || difference > limit => {
             say!("{difference} is above {limit}");
             Err(Failure::Different)

@@ -1,33 +1,33 @@
-//! How the program fails: what it says, and the status that it ends with.
+//! Failures: messages and exit statuses.
 
 use std::fmt;
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 
-/// Why a command ended without doing what was asked.
+/// Why a command failed.
 #[derive(Debug)]
 pub(crate) enum Failure {
-    /// A comparison was beyond its limit (1).
+    /// A comparison exceeded its limit (1).
     Different,
-    /// The command line asks for something that there is not (2).
+    /// The command line is invalid (2).
     Usage(String),
-    /// A file says something wrong (3).
+    /// A file is invalid (3).
     Input(String),
     /// A file cannot be read or written (4).
     Io(String),
-    /// A limit was reached (5).
+    /// A limit was exceeded (5).
     Limit(String),
-    /// A signal stopped the work (130 or 143, as given).
+    /// A signal interrupted the work (130 or 143, as given).
     Interrupted(u8),
 }
 
 impl Failure {
-    /// A file says something wrong.
+    /// A file is invalid.
     pub(crate) fn input(message: impl Into<String>) -> Self {
         Self::Input(message.into())
     }
 
-    /// The status for the shell.
+    /// The exit status.
     pub(crate) fn exit_code(&self) -> ExitCode {
         ExitCode::from(match self {
             Self::Different => 1,
@@ -39,7 +39,7 @@ impl Failure {
         })
     }
 
-    /// Whether there is something left to say.
+    /// Whether the message has already been printed.
     pub(crate) fn is_silent(&self) -> bool {
         matches!(self, Self::Interrupted(_) | Self::Different)
     }
@@ -57,9 +57,8 @@ impl fmt::Display for Failure {
     }
 }
 
-/// Puts text on standard output. Whoever reads it may stop reading: `lumbre info … | head -1`.
+/// Prints text to standard output. The reader may close the pipe: `lumbre info … | head -1`.
 ///
-/// # Errors
 /// [`Failure::Io`] when it cannot be written.
 pub(crate) fn print(text: &str) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();

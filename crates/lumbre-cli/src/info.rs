@@ -1,4 +1,4 @@
-//! `lumbre info`: what is in a scene.
+//! `lumbre info`: the contents of a scene.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ use serde_json::json;
 use crate::failure::{Failure, print};
 use crate::reading::{ReadingArguments, print_warnings};
 
-/// Says what is in a scene, and what of it would not be rendered.
+/// Prints what is in a scene, and what of it would not be rendered.
 #[derive(Args)]
 #[command(after_help = "Examples:
   lumbre info scene.pbrt

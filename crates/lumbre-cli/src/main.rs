@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-/// A line on standard error, if anyone is there to read it.
+/// Prints a line to standard error, ignoring errors.
 macro_rules! say {
     ($($what:tt)*) => {{
         use std::io::Write as _;

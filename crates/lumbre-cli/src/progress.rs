@@ -1,4 +1,4 @@
-//! Showing how far a render is.
+//! Progress display.
 
 use std::io::IsTerminal;
 use std::sync::Mutex;
@@ -29,22 +29,22 @@ pub(crate) enum Style {
 pub(crate) enum Display {
     /// A bar.
     Bar(ProgressBar),
-    /// Lines, with when the last one was written.
+    /// Lines, with the time of the last one.
     Lines {
         /// Whether they are JSON.
         json: bool,
-        /// When the last one was written.
+        /// The time of the last one.
         last: Mutex<Option<Instant>>,
     },
     /// Nothing.
     None,
 }
 
-/// Time between two lines.
+/// The interval between lines.
 const INTERVAL: Duration = Duration::from_secs(2);
 
 impl Display {
-    /// Shows nothing yet.
+    /// A display that shows nothing yet.
     pub(crate) fn new(style: Style) -> Self {
         match style {
             Style::None => Self::None,

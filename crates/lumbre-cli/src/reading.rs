@@ -1,4 +1,4 @@
-//! Opening a scene as the command line asks, and saying what was found on the way.
+//! Opening a scene as the command line specifies, and printing warnings.
 
 use std::path::{Path, PathBuf};
 
@@ -15,24 +15,24 @@ pub(crate) struct ReadingArguments {
     /// Warnings are errors.
     #[arg(long, conflicts_with = "lenient")]
     strict: bool,
-    /// Drop what is broken (faces with impossible vertices, say) with a warning instead of an error.
+    /// Drop broken parts (such as faces with missing vertices) with a warning instead of an error.
     #[arg(long)]
     lenient: bool,
-    /// The time in seconds at which the animations of a glTF stand.
+    /// The time in seconds at which the animations of a glTF are evaluated.
     #[arg(long, value_name = "T", value_parser = seconds)]
     frame: Option<f64>,
-    /// How long the shutter is open about the time of a frame of a glTF, as a share of the time from one frame to the next (see
-    /// --fps): 0 for a moment, as by default, 0.5 as in most films. What animations move meanwhile is blurred.
+    /// How long the shutter is open about the time of a glTF's frame, as a fraction of the frame interval (see --fps): 0,
+    /// the default, is an instant; 0.5 is usual in film. Animated objects get motion blur.
     #[arg(long, value_name = "S", value_parser = shutter)]
     shutter: Option<f64>,
-    /// Frames a second, for --frames and --shutter.
+    /// Frames per second, for --frames and --shutter.
     #[arg(long, value_name = "N", default_value_t = 24.0, value_parser = rate)]
     fps: f64,
-    /// The one animation of a glTF to play, by its name or its position from 0. Without, all play at once but for those that
-    /// move something which one before them moves.
+    /// The animation of a glTF to play, by its name or its index from 0. By default all play at once, except those that
+    /// conflict with an earlier one.
     #[arg(long, value_name = "NAME|INDEX")]
     animation: Option<String>,
-    /// The material variant of a glTF to wear.
+    /// The material variant of a glTF.
     #[arg(long, value_name = "NAME")]
     variant: Option<String>,
     /// Bytes that reading may hold at a time.
@@ -47,7 +47,7 @@ pub(crate) struct ReadingArguments {
     /// Files that may be opened.
     #[arg(long, value_name = "N", hide_short_help = true)]
     max_files: Option<u64>,
-    /// Bytes that a compressed byte may become.
+    /// Bytes that a compressed byte may expand to.
     #[arg(long, value_name = "N", hide_short_help = true)]
     max_expansion: Option<u64>,
 }
@@ -70,7 +70,7 @@ fn rate(text: &str) -> Result<f64, String> {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Frames(pub std::ops::RangeInclusive<u32>);
 
-/// The most frames of one run, and the largest number of one.
+/// The maximal number of frames in a run, and the largest frame number.
 const MOST_FRAMES: u32 = 1_000_000;
 
 impl std::str::FromStr for Frames {
@@ -101,7 +101,7 @@ impl ReadingArguments {
         self.strict
     }
 
-    /// What warnings and breaches are.
+    /// How to treat invalid input.
     pub(crate) fn strictness(&self) -> Strictness {
         match (self.strict, self.lenient) {
             (true, _) => Strictness::Strict,
@@ -112,8 +112,7 @@ impl ReadingArguments {
 
     /// Reads one or more files as one scene.
     ///
-    /// # Errors
-    /// [`Failure`] by what went wrong.
+    /// [`Failure`] by kind of error.
     pub(crate) fn open(&self, paths: &[PathBuf]) -> Result<(Scene, Diagnostics), Failure> {
         let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
         lumbre::open_with(&paths, &self.options(self.frame)?).map_err(Failure::from)
@@ -121,16 +120,14 @@ impl ReadingArguments {
 
     /// Reads one or more files as one description.
     ///
-    /// # Errors
-    /// As [`ReadingArguments::open`].
+    /// As for [`ReadingArguments::open`].
     pub(crate) fn describe(&self, paths: &[PathBuf]) -> Result<(SceneDesc, Diagnostics), Failure> {
         self.describe_at(paths, self.frame)
     }
 
-    /// The same, as it is in the frame of this number.
+    /// [`Self::describe`] at the frame of this number.
     ///
-    /// # Errors
-    /// As [`ReadingArguments::open`].
+    /// As for [`ReadingArguments::open`].
     pub(crate) fn describe_frame(
         &self,
         paths: &[PathBuf],
@@ -166,7 +163,7 @@ impl ReadingArguments {
     }
 }
 
-/// Prints warnings to standard error, and their number where many were left out.
+/// Prints warnings to standard error, and the number omitted.
 pub(crate) fn print_warnings(diagnostics: &Diagnostics) {
     for line in diagnostics.lines() {
         say!("{line}");

@@ -1,4 +1,4 @@
-//! `lumbre render`: a picture of a scene.
+//! `lumbre render`: renders a picture of a scene.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -52,7 +52,7 @@ pub(crate) struct Arguments {
     /// The picture: .exr, .png, .hdr, .pfm or .jpg. By default the scene's own film name, else the scene's name with .png.
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
-    /// Samples a pixel.
+    /// Samples per pixel.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     spp: Option<u32>,
     /// Stop after this time, as 90s, 2m or 1h30m.
@@ -61,7 +61,7 @@ pub(crate) struct Arguments {
     /// Stop when the noise is estimated to be below this share of the luminance.
     #[arg(long, value_name = "R", value_parser = noise)]
     noise: Option<f64>,
-    /// Pixels across and down.
+    /// Width and height in pixels.
     #[arg(long, value_name = "WxH", value_parser = units::size)]
     size: Option<(u32, u32)>,
     /// Frames of an animation from A to B, both included, as -o frame.####.png: frame n is that of the time n / --fps.
@@ -76,7 +76,7 @@ pub(crate) struct Arguments {
     /// path, whitted, ambientocclusion, normals, depth, albedo or uv.
     #[arg(long, value_name = "NAME", value_parser = integrator)]
     integrator: Option<IntegratorKind>,
-    /// Bounces at most.
+    /// The maximal number of bounces.
     #[arg(long, value_name = "N")]
     max_depth: Option<u32>,
     /// Seed of the random numbers.
@@ -85,27 +85,27 @@ pub(crate) struct Arguments {
     /// Threads; all cores by default. The picture does not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
-    /// Stops brighter, for .png and .jpg. By default 0, unless a glTF's own lights would make its picture white or black: then
-    /// the light is measured.
+    /// Exposure in stops, for .png and .jpg. By default 0, unless a glTF's own lights would make its picture white or
+    /// black: then it is measured.
     #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = exposure)]
     exposure: Option<f32>,
-    /// How light is brought within what a display shows, for .png and .jpg: none, agx, aces or neutral. By default neutral where
-    /// the light is the studio's or --env's, else none.
+    /// Tone mapping, for .png and .jpg: none, agx, aces or neutral. By default neutral with the light of the studio or
+    /// --env, else none.
     #[arg(long, value_name = "NAME", value_parser = tone_map)]
     tonemap: Option<ToneMap>,
-    /// Feature layers in an .exr: albedo, normal, depth, uv.
+    /// AOVs as layers of an .exr: albedo, normal, depth, uv.
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = feature)]
     aov: Vec<Feature>,
-    /// Write what the render took, as JSON.
+    /// Write statistics of the render, as JSON.
     #[arg(long, value_name = "FILE.json")]
     stats: Option<PathBuf>,
     /// How to show progress.
     #[arg(long, value_enum, value_name = "STYLE", default_value_t = Style::Auto)]
     progress: Style,
-    /// Say more.
+    /// Print more.
     #[arg(short, long)]
     verbose: bool,
-    /// Say nothing but errors.
+    /// Print errors only.
     #[arg(short, long, conflicts_with = "verbose")]
     quiet: bool,
     #[command(flatten)]
@@ -143,7 +143,7 @@ fn feature(name: &str) -> Result<Feature, String> {
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    // An impossible name is found before the scene is read, an impossible folder before it is rendered.
+    // Invalid names are reported before the scene is read, invalid folders before it is rendered.
     arguments.staging.check(arguments.output.as_deref())?;
     arguments.check_frames(arguments.output.as_deref())?;
     if let Some(output) = &arguments.output {
@@ -154,7 +154,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let cancel = CancelToken::new();
     let signals =
         Signals::listen(&cancel).map_err(|e| Failure::Io(format!("cannot listen for signals: {e}")))?;
-    // That of the first picture is that of all.
+    // The first picture's exposure is used for all.
     let mut exposure = arguments.exposure;
     if let Some(Frames(frames)) = &arguments.frames {
         let (first, last) = (*frames.start(), *frames.end());
@@ -185,7 +185,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
                     stage.turns = Some(f64::from(turn) / f64::from(frames));
                     let start = Instant::now();
                     let frame = Frame { number: turn + 1, is_first: turn == 0 };
-                    // Each turn has a camera of its own.
+                    // Each rotation has its own camera.
                     let frame = Some((frame, &mut Held::default()));
                     let desc = desc.clone();
                     let context = Context { arguments, stage: &stage, start, cancel: &cancel };
@@ -204,7 +204,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 impl Arguments {
-    /// Refuses frames of what is no animation, and a name for them that is the same for all.
+    /// Rejects frames without an animation, and an output name that is the same for all frames.
     fn check_frames(&self, output: Option<&Path>) -> Result<(), Failure> {
         let is_gltf = |path: &PathBuf| {
             let ending = path.extension().map(|e| e.to_ascii_lowercase()).unwrap_or_default();
@@ -226,7 +226,7 @@ impl Arguments {
     }
 }
 
-/// What the stage set in the first frame: camera and ground stay where they are in all others.
+/// What the stage set in the first frame: camera and ground are the same in all others.
 #[derive(Default)]
 struct Held {
     cameras: Option<Vec<Camera>>,
@@ -261,7 +261,7 @@ struct Context<'a> {
     cancel: &'a CancelToken,
 }
 
-/// Renders and saves one picture, the only one or a frame of several.
+/// Renders and saves one picture, the only one or one of several frames.
 fn picture(
     context: Context<'_>,
     mut desc: SceneDesc,
@@ -276,7 +276,7 @@ fn picture(
     let is_of_light = arguments.integrator.unwrap_or(desc.integrator.kind).needs_light();
     let mut stage = stage.clone();
     if !is_of_light && !arguments.staging.wants_ground() {
-        // Pictures of normals and the like are of the model alone.
+        // Pictures of normals and the like show the model alone.
         stage.ground = Ground::None;
     }
     let staged = stage.set(&mut desc);
@@ -348,7 +348,7 @@ fn picture(
     let mut save = SaveOptions::default();
     (save.tone_map, save.exposure) = (tone_map, exposure);
     let picture = match behind {
-        Behind::Backdrop(backdrop) => picture.before(backdrop),
+        Behind::Background(background) => picture.over(background),
         Behind::Lights | Behind::Nothing => picture,
     };
     picture.save_with(&output, &save, &arguments.aov)?;
@@ -374,12 +374,13 @@ fn picture(
     Ok(())
 }
 
-/// Whether exposure counts in a picture of this name.
+/// Whether exposure applies to the format of this name.
 fn is_for_displays(path: &Path) -> bool {
     matches!(ImageFormat::from_path(path), Some(ImageFormat::Png | ImageFormat::Jpeg))
 }
 
-/// The stops that bring white to 1, in tenths, where it is more than one stop too bright or three too dark; else none.
+/// The stops that bring white to 1, in tenths, if it is more than one stop too bright or three too dark; else
+/// 0.
 fn measured_exposure(white_level: Option<f32>) -> f32 {
     match white_level {
         Some(level) if !(0.125..=2.0).contains(&level) => {
@@ -389,7 +390,7 @@ fn measured_exposure(white_level: Option<f32>) -> f32 {
     }
 }
 
-/// Whether the program can write what the path's extension names.
+/// Checks that the program can write the format of the path's extension.
 fn check_format(path: &Path, layers: bool) -> Result<(), Failure> {
     let format = ImageFormat::from_path(path).filter(|format| format.is_writable());
     match format {
@@ -404,7 +405,7 @@ fn check_format(path: &Path, layers: bool) -> Result<(), Failure> {
     }
 }
 
-/// The scene's own name for its picture, else the scene's with .png.
+/// The scene's own output name, else the scene's name with .png.
 fn default_output(scene: &Scene, path: &Path, numbered: bool) -> PathBuf {
     let own = scene.resolved().film().filename.as_deref().map(PathBuf::from);
     let number = if numbered { ".####" } else { "" };
@@ -439,7 +440,7 @@ fn options(arguments: &Arguments, scene: &Scene) -> Result<RenderOptions, Failur
     let open_ended = arguments.time.is_some() || arguments.noise.is_some();
     options.stop.spp = match arguments.spp {
         Some(spp) => spp,
-        // Whoever names a time or a quality wants all that it buys.
+        // With a time or a noise level, samples are not limited.
         None if open_ended => u32::MAX,
         None => options.stop.spp,
     };
@@ -508,7 +509,7 @@ fn statistics(
     })
 }
 
-/// The most memory that the process has held; `None` where the system does not say.
+/// The peak memory of the process; `None` if the system does not report it.
 fn peak_memory() -> Option<u64> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

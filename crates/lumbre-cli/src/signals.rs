@@ -25,7 +25,7 @@ impl Signals {
             signal_hook::flag::register_usize(signal, last.clone(), status as usize)?;
         }
         let (seen, cancel) = (last.clone(), cancel.clone());
-        // A signal handler may do next to nothing, so a thread passes the word on.
+        // A signal handler may do almost nothing, so a thread forwards the signal.
         std::thread::spawn(move || {
             while seen.load(Ordering::Relaxed) == 0 {
                 std::thread::sleep(Duration::from_millis(20));
@@ -35,7 +35,7 @@ impl Signals {
         Ok(Self { last })
     }
 
-    /// The exit status of the signal that came, if one did.
+    /// The exit status of the received signal, if any.
     pub(crate) fn received(&self) -> Option<u8> {
         u8::try_from(self.last.load(Ordering::Relaxed)).ok().filter(|status| *status != 0)
     }

@@ -1,4 +1,4 @@
-//! What stands around a model: ground, light, background, and the camera that goes around it.
+//! Staging options: ground, light, background, and turntable.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -6,7 +6,7 @@ use std::sync::Arc;
 use clap::Args;
 use lumbre::description::{GroundPlane, StageLight};
 use lumbre::image::{Image, Rgb, srgb_to_linear};
-use lumbre::{Backdrop, EnvironmentDesc, Ground, Stage, Staged, Surroundings};
+use lumbre::{Background, EnvironmentDesc, Ground, Stage, Staged, Surroundings};
 
 use crate::failure::Failure;
 
@@ -25,19 +25,19 @@ pub(crate) struct StagingArguments {
     /// What is behind everything: env (the light from there), studio (grey paper), transparent, a colour (white, "#e8e0d8") or
     /// an image file. By default studio where the light is automatic, else env.
     #[arg(long, value_name = "WHAT", value_parser = background)]
-    background: Option<Background>,
-    /// Frame the whole model though the file has a camera.
+    background: Option<BackgroundArgument>,
+    /// Frame the whole model even if the file has a camera.
     #[arg(long, conflicts_with = "camera")]
     fit: bool,
-    /// So many pictures from all around the model, as -o frame.####.png.
+    /// Render N pictures from all around the model, as -o frame.####.png.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000),
           conflicts_with_all = ["camera", "stats"])]
     turntable: Option<u32>,
 }
 
-/// What `--background` names.
+/// The values of `--background`.
 #[derive(Clone, Debug, PartialEq)]
-enum Background {
+enum BackgroundArgument {
     Lights,
     Transparent,
     Studio,
@@ -64,16 +64,16 @@ fn ground(name: &str) -> Result<Ground, String> {
     Ground::from_name(name).ok_or_else(|| "expected none, shadow, plane or auto".to_owned())
 }
 
-fn background(text: &str) -> Result<Background, String> {
+fn background(text: &str) -> Result<BackgroundArgument, String> {
     let lower = text.to_ascii_lowercase();
     match &*lower {
-        "env" => return Ok(Background::Lights),
-        "transparent" | "none" => return Ok(Background::Transparent),
-        "studio" => return Ok(Background::Studio),
+        "env" => return Ok(BackgroundArgument::Lights),
+        "transparent" | "none" => return Ok(BackgroundArgument::Transparent),
+        "studio" => return Ok(BackgroundArgument::Studio),
         _ => {}
     }
     if let Some((_, code)) = COLOURS.iter().find(|(name, _)| *name == lower) {
-        return Ok(Background::Colour(colour(*code)));
+        return Ok(BackgroundArgument::Colour(colour(*code)));
     }
     if let Some(digits) = lower.strip_prefix('#') {
         let wide = match digits.len() {
@@ -81,12 +81,12 @@ fn background(text: &str) -> Result<Background, String> {
             _ => digits.to_owned(),
         };
         let code = u32::from_str_radix(&wide, 16).ok().filter(|_| wide.len() == 6 && !wide.starts_with('+'));
-        return code.map(|code| Background::Colour(colour(code))).ok_or_else(|| {
+        return code.map(|code| BackgroundArgument::Colour(colour(code))).ok_or_else(|| {
             "expected a colour of three or six hexadecimal digits, as #fa0 or #e8e0d8".to_owned()
         });
     }
     if Path::new(text).extension().is_some() || text.contains(std::path::MAIN_SEPARATOR) {
-        return Ok(Background::File(text.into()));
+        return Ok(BackgroundArgument::File(text.into()));
     }
     let names: Vec<&str> = COLOURS.iter().map(|(name, _)| *name).collect();
     Err(format!(
@@ -100,27 +100,26 @@ fn colour(code: u32) -> Rgb {
     Rgb::new(channel(16), channel(8), channel(0))
 }
 
-/// What is behind a picture.
+/// The background of a picture.
 pub(crate) enum Behind {
-    /// The lights at infinity.
+    /// The infinite lights.
     Lights,
-    /// Nothing: the picture has coverage.
+    /// Transparent: the picture has alpha.
     Nothing,
-    /// This.
-    Backdrop(Backdrop),
+    /// This background.
+    Background(Background),
 }
 
 impl Behind {
-    /// Whether the picture is rendered without what is behind it.
+    /// Whether the picture is rendered without its background.
     pub(crate) fn is_transparent(&self) -> bool {
         !matches!(self, Self::Lights)
     }
 }
 
 impl StagingArguments {
-    /// Refuses what makes no sense for pictures of this name.
+    /// Rejects combinations that are invalid for this output name.
     ///
-    /// # Errors
     /// [`Failure::Usage`].
     pub(crate) fn check(&self, output: Option<&Path>) -> Result<(), Failure> {
         let Some(output) = output else { return Ok(()) };
@@ -133,7 +132,7 @@ impl StagingArguments {
             )));
         }
         let ending = output.extension().map(|e| e.to_ascii_lowercase()).unwrap_or_default();
-        if self.background == Some(Background::Transparent) && ending != "png" && ending != "exr" {
+        if self.background == Some(BackgroundArgument::Transparent) && ending != "png" && ending != "exr" {
             return Err(Failure::Usage(format!(
                 "{}: --background transparent needs a picture that holds coverage (expected .png or .exr)",
                 output.display()
@@ -142,15 +141,14 @@ impl StagingArguments {
         Ok(())
     }
 
-    /// How many pictures there are from around the model.
+    /// The number of pictures of a turntable.
     pub(crate) fn turntable(&self) -> Option<u32> {
         self.turntable
     }
 
-    /// The stage of a picture of this size, if one is asked for, after so many turns.
+    /// The stage of a picture of this size after a rotation.
     ///
-    /// # Errors
-    /// What cannot be read, and [`Failure::Usage`] for a picture that is no environment.
+    /// Unreadable files, and [`Failure::Usage`] for an image that is not an environment map.
     pub(crate) fn stage(&self, size: Option<(u32, u32)>) -> Result<Stage, Failure> {
         let surroundings = match &self.env {
             None => Surroundings::Automatic,
@@ -165,25 +163,26 @@ impl StagingArguments {
         Ok(stage)
     }
 
-    /// What is behind a picture of a staged description. Pictures that are not of light (normals and the like) have nothing
-    /// behind them unless it is asked for.
+    /// The background of a picture of a staged description. Pictures other than of light (normals and the like)
+    /// have none by default.
     ///
-    /// # Errors
-    /// What cannot be read.
+    /// Unreadable files.
     pub(crate) fn behind(&self, staged: &Staged, is_of_light: bool) -> Result<Behind, Failure> {
         Ok(match &self.background {
-            None if is_of_light && staged.light == StageLight::Studio => Behind::Backdrop(Backdrop::studio()),
-            None | Some(Background::Lights) => Behind::Lights,
-            Some(Background::Transparent) => Behind::Nothing,
-            Some(Background::Studio) => Behind::Backdrop(Backdrop::studio()),
-            Some(Background::Colour(colour)) => Behind::Backdrop(Backdrop::Colour(*colour)),
-            Some(Background::File(path)) => {
-                Behind::Backdrop(Backdrop::Picture(opaque(lumbre::read_image(path)?)))
+            None if is_of_light && staged.light == StageLight::Studio => {
+                Behind::Background(Background::studio())
+            }
+            None | Some(BackgroundArgument::Lights) => Behind::Lights,
+            Some(BackgroundArgument::Transparent) => Behind::Nothing,
+            Some(BackgroundArgument::Studio) => Behind::Background(Background::studio()),
+            Some(BackgroundArgument::Colour(colour)) => Behind::Background(Background::Colour(*colour)),
+            Some(BackgroundArgument::File(path)) => {
+                Behind::Background(Background::Picture(opaque(lumbre::read_image(path)?)))
             }
         })
     }
 
-    /// Whether ground is asked for.
+    /// Whether ground is requested.
     pub(crate) fn wants_ground(&self) -> bool {
         matches!(self.ground, Some(Ground::Shadow | Ground::Plane))
     }
@@ -202,12 +201,12 @@ fn environment(path: &Path) -> Result<EnvironmentDesc, Failure> {
     })
 }
 
-/// An image without its coverage: over black.
+/// An image over black, without alpha.
 fn opaque(image: Image) -> Image {
     Image::from_pixels(image.width(), image.height(), image.pixels().to_vec()).unwrap_or(image)
 }
 
-/// The name of a frame: the number in place of the last run of `#`, with as many digits at least.
+/// The name of a frame: the number replaces the last run of `#`, padded to its length.
 pub(crate) fn frame_name(pattern: &Path, number: u32) -> PathBuf {
     let name = pattern.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let Some(last) = name.rfind('#') else { return pattern.to_owned() };
@@ -218,7 +217,7 @@ pub(crate) fn frame_name(pattern: &Path, number: u32) -> PathBuf {
     pattern.with_file_name(format!("{}{number:0digits$}{}", &name[..first], &name[last + 1..]))
 }
 
-/// Whether a camera at this place looks at the ground from below, which hides everything from it.
+/// Whether a camera at this position is below the ground, which hides everything from it.
 pub(crate) fn is_below(ground: &GroundPlane, place: lumbre::DVec3) -> bool {
     (place - ground.point).dot(ground.normal) < 0.0
 }
@@ -229,11 +228,11 @@ mod tests {
 
     #[test]
     fn backgrounds_are_understood() {
-        assert_eq!(background("env"), Ok(Background::Lights));
-        assert_eq!(background("Transparent"), Ok(Background::Transparent));
-        assert_eq!(background("#fff"), Ok(Background::Colour(Rgb::WHITE)));
-        assert_eq!(background("#FF0000"), Ok(Background::Colour(Rgb::new(1.0, 0.0, 0.0))));
-        assert_eq!(background("sky.png"), Ok(Background::File("sky.png".into())));
+        assert_eq!(background("env"), Ok(BackgroundArgument::Lights));
+        assert_eq!(background("Transparent"), Ok(BackgroundArgument::Transparent));
+        assert_eq!(background("#fff"), Ok(BackgroundArgument::Colour(Rgb::WHITE)));
+        assert_eq!(background("#FF0000"), Ok(BackgroundArgument::Colour(Rgb::new(1.0, 0.0, 0.0))));
+        assert_eq!(background("sky.png"), Ok(BackgroundArgument::File("sky.png".into())));
         for text in ["", "#", "#ff", "#12345", "#+12345", "#ggg", "wite"] {
             assert!(background(text).is_err(), "{text}");
         }

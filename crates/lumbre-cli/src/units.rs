@@ -97,7 +97,7 @@ pub(crate) fn bytes(text: &str) -> Result<u64, String> {
     if value > 0.0 && value.is_finite() { Ok((value * factor as f64) as u64) } else { Err(wrong()) }
 }
 
-/// A duration as people say it.
+/// A duration in words.
 pub(crate) fn spoken(duration: Duration) -> String {
     let seconds = duration.as_secs();
     match seconds {

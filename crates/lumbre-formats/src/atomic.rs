@@ -1,4 +1,4 @@
-//! Writing a file so that its path holds the old complete file or the new complete file, and never a part of one.
+//! Atomic writes: a path holds the old complete file or the new complete file, never a part of one.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Seek, Write};
@@ -7,15 +7,14 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use crate::diagnostic::FormatError;
 
-/// Writes the file `path` by what `write` writes: into a temporary file in the same folder, which is brought to disk and
-/// then takes the path's place.
+/// Writes the file `path` through `write`: into a temporary file in the same folder, which is synced to disk
+/// and then renamed over `path`.
 ///
-/// The permissions of a file that is replaced stay, and a symbolic link goes on pointing at the file that it names. A
-/// pipe or a device is written to directly, as there is no file to keep.
+/// A replaced file keeps its permissions, and a symbolic link keeps pointing at the file that it names. A pipe
+/// or a device is written to directly.
 ///
-/// # Errors
-/// [`FormatError::Io`]; the path holds what it held then, unless all that failed was to bring the folder's entry to
-/// disk. A process that is killed may leave a file `.NAME.….part` beside it.
+/// [`FormatError::Io`]; the path then holds what it held before, unless only syncing the folder failed. A
+/// process that is killed may leave a file `.NAME.….part` beside it.
 pub fn atomic_write(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -23,10 +22,9 @@ pub fn atomic_write(
     atomic_write_on(&RealDisk, path, write)
 }
 
-/// Checks that [`atomic_write`] could write `path`, by making its temporary file and removing it. For before a long
-/// render.
+/// Checks that [`atomic_write`] could write `path`, by creating its temporary file and removing it. Call it
+/// before a long render.
 ///
-/// # Errors
 /// [`FormatError::Io`] when it could not.
 pub fn probe_writable(path: &Path) -> Result<(), FormatError> {
     let target = target_of(path).map_err(|e| FormatError::io(path, CANNOT_WRITE, e))?;
@@ -39,28 +37,24 @@ pub fn probe_writable(path: &Path) -> Result<(), FormatError> {
 
 const CANNOT_WRITE: &str = "cannot write";
 
-/// The calls that [`atomic_write`] makes, so that a test can make any of them fail.
+/// The file system calls of [`atomic_write`], so that a test can make any of them fail.
 pub trait Disk {
     /// A file open for writing.
     type File: Write;
-    /// Makes a file that was not there.
+    /// Creates a file that does not exist.
     ///
-    /// # Errors
     /// As the system's.
     fn create(&self, path: &Path) -> io::Result<Self::File>;
-    /// Brings a file's bytes to disk.
+    /// Syncs a file to disk.
     ///
-    /// # Errors
     /// As the system's.
     fn sync(&self, file: &mut Self::File) -> io::Result<()>;
-    /// Lets `from` take the place of `to`, in one step.
+    /// Renames `from` to `to`, replacing it in one step.
     ///
-    /// # Errors
     /// As the system's.
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()>;
-    /// Brings a folder's entries to disk.
+    /// Syncs a folder's entries to disk.
     ///
-    /// # Errors
     /// As the system's.
     fn sync_folder(&self, folder: &Path) -> io::Result<()>;
     /// Removes a file.
@@ -70,7 +64,7 @@ pub trait Disk {
     fn remove(&self, path: &Path) -> io::Result<()>;
 }
 
-/// The system's own.
+/// The real file system.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RealDisk;
 
@@ -90,7 +84,7 @@ impl Disk for RealDisk {
     }
 
     fn sync_folder(&self, folder: &Path) -> io::Result<()> {
-        // Elsewhere folders cannot be opened, and renaming is journalled.
+        // Elsewhere folders cannot be opened, and renames are journalled.
         if cfg!(unix) { File::open(folder)?.sync_all() } else { Ok(()) }
     }
 
@@ -99,10 +93,9 @@ impl Disk for RealDisk {
     }
 }
 
-/// [`atomic_write`] by the calls of another [`Disk`].
+/// [`atomic_write`] on another [`Disk`].
 ///
-/// # Errors
-/// As [`atomic_write`].
+/// As for [`atomic_write`].
 pub fn atomic_write_on<D: Disk>(
     disk: &D,
     path: &Path,
@@ -114,7 +107,7 @@ pub fn atomic_write_on<D: Disk>(
             let mut buffered = BufWriter::with_capacity(256 << 10, file);
             write(&mut buffered)?;
             buffered.flush()?;
-            // A writer that failed must not be flushed once more as it is dropped.
+            // A failed writer must not be flushed again when it is dropped.
             drop(buffered.into_parts());
             Ok(())
         }),
@@ -158,14 +151,14 @@ fn replace<D: Disk>(
         write(&mut file)?;
         disk.sync(&mut file)?;
         if let Some(permissions) = permissions {
-            // A file system without permissions is none the worse for it.
+            // A file system without permissions is fine.
             let _ = fs::set_permissions(&part, permissions);
         }
         disk.rename(&part, real)
     })();
     drop(file);
     if let Err(e) = written {
-        // The error that matters is the first one.
+        // The first error is the one to report.
         let _ = disk.remove(&part);
         return Err(e);
     }
@@ -191,7 +184,7 @@ fn target_of(path: &Path) -> io::Result<Target> {
         }
         Ok(_) => Ok(Target::Stream),
         Err(e) if e.kind() == io::ErrorKind::NotFound => {
-            // A link that points at nothing yet: the file goes where it points.
+            // A dangling link: create the file that it points to.
             let real = fs::read_link(path).map_or(path.to_owned(), |to| folder_of(path).join(to));
             Ok(Target::File { path: real, permissions: None })
         }
@@ -208,7 +201,7 @@ fn part_of(path: &Path) -> PathBuf {
     static COUNT: AtomicU32 = AtomicU32::new(0);
     let count = COUNT.fetch_add(1, Ordering::Relaxed);
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    // Long names are cut so that the whole stays within what file systems allow.
+    // Truncated, so that the whole stays within the limits of file systems.
     let name: String = name.chars().take(40).collect();
     folder_of(path).join(format!(".{name}.{}-{count}.part", std::process::id()))
 }

@@ -1,18 +1,17 @@
-//! What reading may cost: one [`Budget`] is handed to every reader and asked before any allocation whose size
-//! the input chose.
+//! Resource limits: every reader consults a [`Budget`] before any allocation whose size the input chose.
 //!
-//! Every limit names the program flag that raises it, and so does the error that it causes.
+//! Every limit names the program flag that raises it, and so does its error.
 
 use std::mem::size_of;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use thiserror::Error;
 
-/// How much may be read, each limit with the flag that raises it.
+/// The limits on reading, each with the flag that raises it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Limits {
-    /// Bytes held at one time by everything that was read (`--max-memory`).
+    /// Bytes held at one time by everything read (`--max-memory`).
     pub memory: u64,
     /// Vertices, faces, shapes, parameters and the like over the whole run (`--max-elements`).
     pub elements: u64,
@@ -20,16 +19,16 @@ pub struct Limits {
     pub nesting: u32,
     /// Files opened over the whole run, includes and textures counted each time (`--max-files`).
     pub files: u64,
-    /// Bytes that one compressed byte may become once a stream has given [`Limits::FREE_EXPANSION`] bytes
+    /// The expansion ratio of compressed data, beyond the first [`Limits::FREE_EXPANSION`] bytes of a stream
     /// (`--max-expansion`).
     pub expansion: u64,
 }
 
 impl Limits {
-    /// A compressed stream may grow to this many bytes whatever its ratio.
+    /// A compressed stream may expand to this many bytes at any ratio.
     pub const FREE_EXPANSION: u64 = 64 << 20;
 
-    /// No limit but what an allocation can ask for.
+    /// No limits except those of the allocator.
     pub const UNLIMITED: Self =
         Self { memory: u64::MAX, elements: u64::MAX, nesting: 10_000, files: u64::MAX, expansion: u64::MAX };
 }
@@ -41,7 +40,7 @@ impl Default for Limits {
     }
 }
 
-/// Which limit was met.
+/// Which limit was exceeded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum LimitKind {
@@ -86,15 +85,15 @@ impl LimitKind {
 pub struct LimitError {
     /// What was being read.
     pub what: String,
-    /// Which limit.
+    /// The limit.
     pub kind: LimitKind,
-    /// What all that was read so far and this would come to.
+    /// The total that would have been needed.
     pub needed: u64,
-    /// What is allowed.
+    /// The total that is allowed.
     pub limit: u64,
 }
 
-/// The running account of what reading has cost. Threads may share it.
+/// The running total of resources used by reading. Threads may share it.
 #[derive(Debug, Default)]
 pub struct Budget {
     limits: Limits,
@@ -105,19 +104,18 @@ pub struct Budget {
 }
 
 impl Budget {
-    /// An account with nothing spent.
+    /// A budget with nothing spent.
     pub fn new(limits: Limits) -> Self {
         Self { limits, ..Self::default() }
     }
 
-    /// The limits it keeps.
+    /// Its limits.
     pub fn limits(&self) -> &Limits {
         &self.limits
     }
 
-    /// Charges `bytes` that stay with what is read; [`Budget::release`] gives them back.
+    /// Charges `bytes` that are kept; [`Budget::release`] returns them.
     ///
-    /// # Errors
     /// When more than [`Limits::memory`] would be held; nothing is charged then.
     pub fn bytes(&self, bytes: u64, what: &str) -> Result<(), LimitError> {
         let held = spend(&self.memory, bytes, self.limits.memory, LimitKind::Memory, what)?;
@@ -125,26 +123,24 @@ impl Budget {
         Ok(())
     }
 
-    /// Gives back `bytes` that [`Budget::bytes`] charged.
+    /// Returns `bytes` charged by [`Budget::bytes`].
     pub fn release(&self, bytes: u64) {
         let _ = self
             .memory
             .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |held| Some(held.saturating_sub(bytes)));
     }
 
-    /// Charges `bytes` for as long as the answer lives.
+    /// Charges `bytes` for as long as the result lives.
     ///
-    /// # Errors
-    /// As [`Budget::bytes`].
+    /// As for [`Budget::bytes`].
     pub fn hold(&self, bytes: u64, what: &str) -> Result<Hold<'_>, LimitError> {
         self.bytes(bytes, what)?;
         Ok(Hold { budget: self, bytes })
     }
 
-    /// Charges for `count` values of `T` that stay, and answers `count` as a length that memory can have.
+    /// Charges for `count` values of `T` that are kept, and returns `count` as a `usize`.
     ///
-    /// # Errors
-    /// As [`Budget::bytes`].
+    /// As for [`Budget::bytes`].
     pub fn array<T>(&self, count: u64, what: &str) -> Result<usize, LimitError> {
         self.bytes(count.saturating_mul(size_of::<T>() as u64), what)?;
         usize::try_from(count).map_err(|_| LimitError {
@@ -155,12 +151,11 @@ impl Budget {
         })
     }
 
-    /// An empty vector with room for `count` values, charged as [`Budget::array`] does.
+    /// An empty vector with capacity for `count` values, charged like [`Budget::array`].
     ///
-    /// The caller has first made sure that the input can hold `count` values: room that nothing fills is waste.
+    /// The caller has checked that the input can contain `count` values.
     ///
-    /// # Errors
-    /// As [`Budget::bytes`], and when the allocator refuses.
+    /// As for [`Budget::bytes`], and when the allocator refuses.
     pub fn vec<T>(&self, count: u64, what: &str) -> Result<Vec<T>, LimitError> {
         let len = self.array::<T>(count, what)?;
         let mut vec = Vec::new();
@@ -188,9 +183,8 @@ impl Budget {
         spend(&self.files, 1, self.limits.files, LimitKind::Files, name).map(drop)
     }
 
-    /// Checks that `depth` levels may stand in each other. Readers keep their own depth, as each is on its own path.
+    /// Checks a nesting of `depth` levels. Readers count their own depth.
     ///
-    /// # Errors
     /// When `depth` is more than [`Limits::nesting`].
     pub fn nesting(&self, depth: usize, what: &str) -> Result<(), LimitError> {
         if depth <= self.limits.nesting as usize {
@@ -204,10 +198,9 @@ impl Budget {
         })
     }
 
-    /// Checks that `packed` compressed bytes may have become `unpacked` bytes.
+    /// Checks that `packed` compressed bytes may expand to `unpacked` bytes.
     ///
-    /// # Errors
-    /// When there are more than [`Limits::FREE_EXPANSION`] and more than [`Limits::expansion`] for each.
+    /// When there are more than [`Limits::FREE_EXPANSION`] and the ratio is more than [`Limits::expansion`].
     pub fn expansion(&self, packed: u64, unpacked: u64, what: &str) -> Result<(), LimitError> {
         if unpacked <= Limits::FREE_EXPANSION.max(packed.saturating_mul(self.limits.expansion)) {
             return Ok(());
@@ -220,12 +213,12 @@ impl Budget {
         })
     }
 
-    /// Bytes charged and not given back.
+    /// Bytes charged and not returned.
     pub fn memory_held(&self) -> u64 {
         self.memory.load(Ordering::Relaxed)
     }
 
-    /// The most bytes that were charged at one time.
+    /// The largest number of bytes charged at one time.
     pub fn memory_peak(&self) -> u64 {
         self.peak.load(Ordering::Relaxed)
     }
@@ -246,15 +239,14 @@ pub struct Hold<'a> {
 impl Hold<'_> {
     /// Charges `bytes` more.
     ///
-    /// # Errors
-    /// As [`Budget::bytes`].
+    /// As for [`Budget::bytes`].
     pub fn grow(&mut self, bytes: u64, what: &str) -> Result<(), LimitError> {
         self.budget.bytes(bytes, what)?;
         self.bytes += bytes;
         Ok(())
     }
 
-    /// Leaves the bytes charged: what they pay for stays.
+    /// Leaves the bytes charged, for data that is kept.
     pub fn keep(mut self) {
         self.bytes = 0;
     }
@@ -266,8 +258,8 @@ impl Drop for Hold<'_> {
     }
 }
 
-/// A vector that asks the [`Budget`] before it grows. What it was charged stays charged with [`BudgetVec::into_vec`], and is
-/// given back when it is dropped.
+/// A vector that charges the [`Budget`] before it grows. The charge persists after [`BudgetVec::into_vec`], and
+/// is returned when the vector is dropped.
 #[derive(Debug)]
 pub struct BudgetVec<'b, T> {
     vec: Vec<T>,
@@ -276,15 +268,14 @@ pub struct BudgetVec<'b, T> {
 }
 
 impl<'b, T> BudgetVec<'b, T> {
-    /// An empty one; `what` names its values in errors.
+    /// An empty vector; `what` names its values in errors.
     pub fn new(budget: &'b Budget, what: &'static str) -> Self {
         Self { vec: Vec::new(), hold: Hold { budget, bytes: 0 }, what }
     }
 
-    /// Makes room for `count` more values, which the caller knows that the input can hold.
+    /// Reserves capacity for `count` more values, which the caller knows the input can contain.
     ///
-    /// # Errors
-    /// As [`Budget::bytes`], and when the allocator refuses.
+    /// As for [`Budget::bytes`], and when the allocator refuses.
     pub fn reserve(&mut self, count: usize) -> Result<(), LimitError> {
         if count <= self.vec.capacity() - self.vec.len() {
             return Ok(());
@@ -294,8 +285,7 @@ impl<'b, T> BudgetVec<'b, T> {
 
     /// Adds a value.
     ///
-    /// # Errors
-    /// As [`BudgetVec::reserve`].
+    /// As for [`BudgetVec::reserve`].
     #[inline]
     pub fn push(&mut self, value: T) -> Result<(), LimitError> {
         if self.vec.len() == self.vec.capacity() {
@@ -305,7 +295,7 @@ impl<'b, T> BudgetVec<'b, T> {
         Ok(())
     }
 
-    /// Room for `count` more, charged first. The old room is charged until it is gone.
+    /// Capacity for `count` more, charged first. The old buffer stays charged until it is freed.
     #[cold]
     fn grow(&mut self, count: usize) -> Result<(), LimitError> {
         let size = size_of::<T>() as u64;
@@ -323,7 +313,7 @@ impl<'b, T> BudgetVec<'b, T> {
         })
     }
 
-    /// The values, without the room that they do not need.
+    /// The values, with the spare capacity freed.
     pub fn into_vec(mut self) -> Vec<T> {
         self.vec.shrink_to_fit();
         let kept = (self.vec.capacity() * size_of::<T>()) as u64;
@@ -347,7 +337,7 @@ impl<T> std::ops::DerefMut for BudgetVec<'_, T> {
     }
 }
 
-/// Adds `amount` to `account` unless that passes `limit`, and answers the new sum.
+/// Adds `amount` to `account` unless that exceeds `limit`, and returns the new sum.
 fn spend(
     account: &AtomicU64,
     amount: u64,

@@ -1,4 +1,4 @@
-//! Running code of others that may panic on malicious input, so that it is an error like any other.
+//! Turns panics of third-party decoders on malicious input into errors.
 
 use std::cell::Cell;
 use std::panic::{self, AssertUnwindSafe};
@@ -7,14 +7,14 @@ use std::sync::Once;
 use crate::diagnostic::{Diagnostic, FormatError, Place, quoted};
 
 thread_local! {
-    /// Whether a panic on this thread is about to be turned into an error.
+    /// Whether a panic on this thread will be turned into an error.
     static CONTAINED: Cell<bool> = const { Cell::new(false) };
 }
 
-/// What `decode` answers, or an error when it panics.
+/// The result of `decode`, or an error when it panics.
 ///
-/// The first call puts a panic hook in front of the process's own: it keeps quiet about these panics, and hands all
-/// others on. What `decode` was working on must not be used after a panic, so it should own it.
+/// The first call installs a panic hook in front of the process's own: it silences these panics, and passes all
+/// others on. `decode` should own its data, which must not be used after a panic.
 pub(crate) fn contained<T>(
     what: &str,
     place: &Place,

@@ -1,4 +1,4 @@
-//! What is wrong with an input, and where: places, diagnostics, their collector and the error of every reader.
+//! Places, diagnostics, their collector, and the error type of every reader.
 
 use std::collections::HashMap;
 use std::fmt::{self, Display, Formatter, Write as _};
@@ -13,18 +13,18 @@ use crate::budget::LimitError;
 /// A place in an input file.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Place {
-    /// The file as the user named it.
+    /// The file's name as the user gave it.
     pub file: Arc<str>,
-    /// Where in it.
+    /// The position in the file.
     pub position: Position,
 }
 
-/// Where in a file.
+/// A position in a file.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Position {
-    /// The file as a whole.
+    /// The whole file.
     Whole,
-    /// In a text, both counted from 1; the column in characters.
+    /// In a text; line and column are counted from 1, the column in characters.
     Text {
         /// The line.
         line: u64,
@@ -65,8 +65,8 @@ impl Place {
         Self { file: file.into(), position: Position::Binary { offset, path: path.into() } }
     }
 
-    /// The same line and column of a text, with the path of the element that stands there; other places, and with an empty
-    /// path, as they are.
+    /// The same line and column of a text, with the path of the element there; other places, and an empty path,
+    /// change nothing.
     #[must_use]
     pub fn with_path(self, path: String) -> Self {
         match self.position {
@@ -77,9 +77,9 @@ impl Place {
         }
     }
 
-    /// The place of byte `offset` in `text`, by line and column.
+    /// The line and column of byte `offset` in `text`.
     ///
-    /// Lines end with LF, CRLF or a lone CR. This walks the text: it is for errors.
+    /// Lines end with LF, CRLF or a lone CR. Linear in `offset`: for errors.
     pub fn of_offset(file: impl Into<Arc<str>>, text: &[u8], offset: usize) -> Self {
         let before = &text[..offset.min(text.len())];
         let mut line = 1;
@@ -110,10 +110,10 @@ impl Display for Place {
     }
 }
 
-/// How bad it is.
+/// The severity of a diagnostic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Severity {
-    /// The input can be used, though something in it was not.
+    /// The input can be used, though part of it was ignored.
     Warning,
     /// The input cannot be used.
     Error,
@@ -128,35 +128,35 @@ impl Display for Severity {
     }
 }
 
-/// One thing that is wrong with an input.
+/// A problem of an input.
 ///
-/// Displayed as `error: FILE:LINE:COL: what (found X; expected Y)`, followed by a line for each file that included
-/// this one.
+/// Displayed as `error: FILE:LINE:COL: what (found X; expected Y)`, followed by a line for each file that
+/// included this one.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Diagnostic {
-    /// How bad it is.
+    /// The severity.
     pub severity: Severity,
-    /// Where it is, if it has a place.
+    /// The place, if known.
     pub place: Option<Place>,
     /// What is wrong.
     pub message: String,
-    /// What stood there.
+    /// What was found.
     pub found: Option<String>,
     /// What would have been accepted.
     pub expected: Option<String>,
-    /// The right name that is nearest to a wrong one.
+    /// The nearest valid name to a wrong one.
     pub suggestion: Option<String>,
     /// The places of the includes that led to the file, innermost first.
     pub included_from: Vec<Place>,
 }
 
 impl Diagnostic {
-    /// Something without which the input cannot be used.
+    /// A problem that makes the input unusable.
     pub fn error(message: impl Into<String>) -> Self {
         Self::new(Severity::Error, message.into())
     }
 
-    /// Something that was not used.
+    /// A part of the input that was not used.
     pub fn warning(message: impl Into<String>) -> Self {
         Self::new(Severity::Warning, message.into())
     }
@@ -173,38 +173,38 @@ impl Diagnostic {
         }
     }
 
-    /// The same, at a place.
+    /// Adds the place.
     #[must_use]
     pub fn at(self, place: Place) -> Self {
         Self { place: Some(place), ..self }
     }
 
-    /// The same, with what stood there. Text from the input should have gone through [`quoted`].
+    /// Adds what was found. Text from the input should have gone through [`quoted`].
     #[must_use]
     pub fn found(self, found: impl Display) -> Self {
         Self { found: Some(found.to_string()), ..self }
     }
 
-    /// The same, with what would have been accepted.
+    /// Adds what would have been accepted.
     #[must_use]
     pub fn expected(self, expected: impl Display) -> Self {
         Self { expected: Some(expected.to_string()), ..self }
     }
 
-    /// The same, with the nearest of the `known` names to `name`, where one is near.
+    /// Adds the nearest of the `known` names to `name`, if any is near.
     #[must_use]
     pub fn suggest<'a>(self, name: &str, known: impl IntoIterator<Item = &'a str>) -> Self {
         Self { suggestion: nearest_name(name, known).map(str::to_owned), ..self }
     }
 
-    /// The same, with the include that led here; call it from the innermost include outwards.
+    /// Adds the include that led here; call it from the innermost include outwards.
     #[must_use]
     pub fn included_from(mut self, place: Place) -> Self {
         self.included_from.push(place);
         self
     }
 
-    /// The text without its `error: ` or `warning: `.
+    /// The text without `error: ` or `warning: `.
     pub fn body(&self) -> String {
         let mut text = String::new();
         if let Some(place) = &self.place {
@@ -235,31 +235,31 @@ impl Display for Diagnostic {
     }
 }
 
-/// Why an input could not be read or an output not be written.
+/// Why an input could not be read or an output could not be written.
 ///
-/// Displayed without `error: ` in front, as errors are; [`FormatError::to_diagnostic`] has the whole line.
+/// Displayed without `error: ` in front; [`FormatError::to_diagnostic`] has the whole line.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum FormatError {
-    /// The input is wrong.
+    /// The input is invalid.
     #[error("{}", .0.body())]
     Input(Box<Diagnostic>),
-    /// The system refused.
+    /// The operating system refused.
     #[error("{}: {action}: {source}", .path.display())]
     Io {
         /// The file.
         path: PathBuf,
-        /// What was being done, such as `cannot open`.
+        /// The attempted action, such as `cannot open`.
         action: &'static str,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
-    /// The input asks for more than is allowed.
+    /// The input exceeds a limit.
     #[error("{}{source}", place_prefix(.place))]
     Limit {
-        /// Where, if it has a place.
+        /// The place, if known.
         place: Option<Place>,
-        /// Which limit, and the flag that raises it.
+        /// The limit, and the flag that raises it.
         source: LimitError,
     },
 }
@@ -269,12 +269,12 @@ fn place_prefix(place: &Option<Place>) -> String {
 }
 
 impl FormatError {
-    /// The system refused to do `action` with the file `path`.
+    /// The error of the system for `action` on the file `path`.
     pub fn io(path: &Path, action: &'static str, source: io::Error) -> Self {
         Self::Io { path: path.to_owned(), action, source }
     }
 
-    /// The same as a diagnostic, whose text starts with `error: `.
+    /// As a diagnostic, whose text starts with `error: `.
     pub fn to_diagnostic(&self) -> Diagnostic {
         match self {
             Self::Input(diagnostic) => (**diagnostic).clone(),
@@ -287,7 +287,7 @@ impl FormatError {
         }
     }
 
-    /// The same, in a file that the one at `place` includes or names; call it from the innermost include outwards.
+    /// Adds the place that includes or names the file; call it from the innermost include outwards.
     #[must_use]
     pub fn included_from(mut self, place: Place) -> Self {
         match &mut self {
@@ -298,7 +298,7 @@ impl FormatError {
         self
     }
 
-    /// The same at a place, unless it has one.
+    /// Adds a place, unless it has one.
     #[must_use]
     pub fn or_at(mut self, at: impl FnOnce() -> Place) -> Self {
         match &mut self {
@@ -323,65 +323,65 @@ impl From<LimitError> for FormatError {
     }
 }
 
-/// What to do about input that is not as it should be.
+/// How to treat invalid input.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Strictness {
-    /// Drop what cannot be used, such as a face with a vertex at NaN, with a warning (`--lenient`).
+    /// Drop what cannot be used, such as a face with a NaN vertex, with a warning (`--lenient`).
     Lenient,
     /// Errors are errors, and warnings are warnings.
     #[default]
     Normal,
-    /// Warnings are errors too (`--strict`).
+    /// Warnings are errors, too (`--strict`).
     Strict,
 }
 
-/// Collects diagnostics: everything is counted, and the first few of each kind are kept.
+/// Collects diagnostics: all are counted, and the first few of each kind are kept.
 ///
-/// Two are of a kind when they have the same severity and message, whatever their places and what was found.
+/// Diagnostics of the same severity and message are of one kind, whatever their places and findings.
 #[derive(Clone, Debug, Default)]
 pub struct Diagnostics {
     strictness: Strictness,
     kept: Vec<Diagnostic>,
-    /// How many of each kind, by message: warnings, then errors.
+    /// The counts of each kind, by message: warnings, then errors.
     kinds: [HashMap<String, u64>; 2],
     warnings: u64,
     errors: u64,
 }
 
 impl Diagnostics {
-    /// So many of one kind are kept.
+    /// The number of diagnostics kept of one kind.
     pub const KEPT_OF_A_KIND: u64 = 8;
-    /// So many are kept in all.
+    /// The number of diagnostics kept in all.
     pub const KEPT_IN_ALL: usize = 1000;
 
-    /// Nothing collected yet, and [`Strictness::Normal`].
+    /// An empty collection with [`Strictness::Normal`].
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Nothing collected yet.
+    /// An empty collection.
     pub fn with_strictness(strictness: Strictness) -> Self {
         Self { strictness, ..Self::default() }
     }
 
-    /// What to do about input that is not as it should be.
+    /// How to treat invalid input.
     pub fn strictness(&self) -> Strictness {
         self.strictness
     }
 
-    /// Whether what cannot be used should be dropped with a warning.
+    /// Whether unusable parts are dropped with a warning.
     pub fn is_lenient(&self) -> bool {
         self.strictness == Strictness::Lenient
     }
 
-    /// Adds one.
+    /// Adds a diagnostic.
     pub fn push(&mut self, diagnostic: Diagnostic) {
         let severity = diagnostic.severity;
         let message = diagnostic.message.clone();
         self.push_with(severity, &message, || diagnostic);
     }
 
-    /// Adds a warning of this kind, which `make` makes only when it is kept: finding a place can take long.
+    /// Adds a warning of this kind. `make` is called only if it is kept: finding a place can be slow.
     pub fn warn(&mut self, message: &str, make: impl FnOnce(Diagnostic) -> Diagnostic) {
         self.push_with(Severity::Warning, message, || make(Diagnostic::warning(message)));
     }
@@ -409,8 +409,8 @@ impl Diagnostics {
         }
     }
 
-    /// Adds all that another one collected, after those of this one. Readers in parallel collect apart and are
-    /// joined in a fixed order.
+    /// Appends the diagnostics of another collection. Parallel readers collect separately and are joined in a
+    /// fixed order.
     pub fn append(&mut self, other: Self) {
         let (warnings, errors) = (self.warnings + other.warnings, self.errors + other.errors);
         let mut pushed: [HashMap<String, u64>; 2] = Default::default();
@@ -432,27 +432,27 @@ impl Diagnostics {
         (self.warnings, self.errors) = (warnings, errors);
     }
 
-    /// Those kept, in the order in which they came.
+    /// The diagnostics kept, in order.
     pub fn kept(&self) -> &[Diagnostic] {
         &self.kept
     }
 
-    /// How many warnings there were, kept or not.
+    /// The number of warnings, kept or not.
     pub fn warnings(&self) -> u64 {
         self.warnings
     }
 
-    /// How many errors there were, kept or not.
+    /// The number of errors, kept or not.
     pub fn errors(&self) -> u64 {
         self.errors
     }
 
-    /// How many had this severity and message, kept or not.
+    /// The number of diagnostics of this severity and message, kept or not.
     pub fn count(&self, severity: Severity, message: &str) -> u64 {
         self.kinds[severity as usize].get(message).copied().unwrap_or(0)
     }
 
-    /// Every line to print: those kept, and for each kind that came more often how many more there were.
+    /// The lines to print: those kept, and for each kind with more the number omitted.
     pub fn lines(&self) -> Vec<String> {
         let mut lines: Vec<String> = self.kept.iter().map(Diagnostic::to_string).collect();
         for (severity, kinds) in [Severity::Warning, Severity::Error].into_iter().zip(&self.kinds) {
@@ -470,10 +470,9 @@ impl Diagnostics {
         lines
     }
 
-    /// The first error, or under [`Strictness::Strict`] the first of any.
+    /// The first error, or under [`Strictness::Strict`] the first diagnostic.
     ///
-    /// # Errors
-    /// That one.
+    /// That diagnostic.
     pub fn check(&self) -> Result<(), FormatError> {
         let strict = self.strictness == Strictness::Strict;
         let first = self.kept.iter().find(|d| strict || d.severity == Severity::Error);
@@ -481,7 +480,8 @@ impl Diagnostics {
     }
 }
 
-/// Text from an input, fit for a message: in double quotes, without control characters, and cut after 60 characters.
+/// Text from an input, made safe for a message: in double quotes, without control characters, truncated after
+/// 60 characters.
 pub fn quoted(text: &str) -> String {
     let mut out = String::from("\"");
     for (i, c) in text.chars().enumerate() {
@@ -491,7 +491,7 @@ pub fn quoted(text: &str) -> String {
         }
         match c {
             '"' | '\\' => out.extend(['\\', c]),
-            // Controls could drive the terminal, and bidirectional marks could disguise the message.
+            // Control characters could drive the terminal, and bidirectional marks could disguise the message.
             c if c.is_control()
                 || matches!(c, '\u{200E}' | '\u{200F}' | '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{2069}') =>
             {
@@ -504,7 +504,7 @@ pub fn quoted(text: &str) -> String {
     out
 }
 
-/// A number from an input, fit for a message: very large and very small ones by their power of ten.
+/// A number from an input for a message; very large and very small ones in scientific notation.
 pub fn number(value: f64) -> String {
     let size = value.abs();
     if size.is_finite() && size != 0.0 && !(1e-5..1e10).contains(&size) {
@@ -519,10 +519,10 @@ pub fn quoted_bytes(bytes: &[u8]) -> String {
     quoted(&String::from_utf8_lossy(&bytes[..bytes.len().min(256)]))
 }
 
-/// The nearest of `known` to `name`, if it is near: at most a third of the longer name's letters are wrong, where a
-/// letter too many, too few or changed and two neighbours exchanged count one each (the optimal string alignment
-/// distance of F. J. Damerau, "A technique for computer detection and correction of spelling errors", CACM 1964).
-/// Upper and lower case are the same. The first one wins a tie.
+/// The nearest of `known` to `name`, if at most a third of the longer name's letters are wrong. Insertions,
+/// deletions, substitutions and transpositions count one each (the optimal string alignment distance of F. J.
+/// Damerau, "A technique for computer detection and correction of spelling errors", CACM 1964). Case is
+/// ignored. The first one wins a tie.
 pub fn nearest_name<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let letters = |s: &str| s.chars().take(LONGEST + 1).flat_map(char::to_lowercase).collect::<Vec<_>>();
     let wrong = letters(name);
@@ -533,7 +533,7 @@ pub fn nearest_name<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) ->
     for candidate in known {
         let right = letters(candidate);
         let allowed = (wrong.len().max(right.len()) / 3).max(1);
-        // Each letter too many is a mistake: most candidates need no more than their length.
+        // The difference in length is a lower bound that excludes most candidates.
         let at_least = wrong.len().abs_diff(right.len());
         let at_most = best.map_or(allowed, |(least, _)| allowed.min(least - 1));
         if at_least > at_most || right.len() > LONGEST {
@@ -550,10 +550,10 @@ pub fn nearest_name<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) ->
     best.map(|(_, name)| name)
 }
 
-/// Longer names than this are compared with none.
+/// Longer names are not compared.
 const LONGEST: usize = 64;
 
-/// Of words of at most [`LONGEST`] letters.
+/// For words of at most [`LONGEST`] letters.
 fn edit_distance(a: &[char], b: &[char]) -> usize {
     let mut before_last;
     let mut last = [0; LONGEST + 1];

@@ -1,7 +1,7 @@
-//! How luminaires shine by direction, as photometers measure it: IES LM-63 files of 1986 to 2019 (`.ies`).
+//! Measured light distributions of luminaires: IES LM-63 files of 1986 to 2019 (`.ies`).
 //!
-//! ANSI/IES LM-63-19, "IES Standard File Format for the Electronic Transfer of Photometric Data and Related Information",
-//! 2019. What lamps and housings are like is not of interest here; tilted lamps (`TILT=`) are taken as they were measured.
+//! ANSI/IES LM-63-19, "IES Standard File Format for the Electronic Transfer of Photometric Data and Related
+//! Information", 2019. Data on lamps and housings are ignored; tilted lamps (`TILT=`) are used as measured.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -12,35 +12,35 @@ use lumbre_math::{DVec2, DVec3, warp64};
 use crate::budget::Budget;
 use crate::diagnostic::{Diagnostic, FormatError, Place, quoted};
 
-/// Candelas by direction.
+/// Luminous intensity in candelas, by direction.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Profile {
     photometry: Photometry,
-    /// Degrees, in order, two or more; one alone where there is no other.
+    /// Degrees, ascending; at least two, or a single one if there is no other.
     vertical: Vec<f64>,
     horizontal: Vec<f64>,
     /// For each horizontal angle all vertical ones.
     candela: Vec<f32>,
 }
 
-/// How the angles of a [`Profile`] name directions. The light is aimed where both are 0.
+/// The convention of the angles of a [`Profile`]. The light is aimed where both are 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Photometry {
     /// Vertical angles from the aim to its opposite, horizontal ones around it.
     C,
-    /// Vertical angles around an axis across the aim, horizontal ones towards it.
+    /// Vertical angles around an axis perpendicular to the aim, horizontal ones towards it.
     B,
     /// Horizontal angles around the upright, vertical ones towards it.
     A,
 }
 
-/// Pixels of the picture that [`Profile::image`] makes: half a degree each.
+/// The width of [`Profile::image`]: half a degree per pixel.
 const WIDTH: u32 = 720;
 const HEIGHT: u32 = 360;
 
 impl Profile {
-    /// The candelas towards a unit direction, in a space in which the light is aimed along -z, the horizontal angle 0 of
-    /// photometry C lies towards x, and 90 degrees towards y.
+    /// The candelas towards a unit direction, in a space in which the light is aimed along -z, and the
+    /// horizontal angles 0 and 90° of photometry C are along x and y.
     pub fn candela(&self, direction: DVec3) -> f64 {
         let d = direction;
         let (vertical, horizontal) = match self.photometry {
@@ -49,7 +49,7 @@ impl Profile {
                 let around = d.y.atan2(d.x);
                 (from_aim, if around < 0.0 { around + TAU } else { around })
             }
-            // Seen from the light, these horizontal angles run clockwise.
+            // Seen from the light, these horizontal angles are clockwise.
             Photometry::B => (d.x.atan2(0.0 - d.z), (-d.y).clamp(-1.0, 1.0).asin()),
             Photometry::A => (d.x.clamp(-1.0, 1.0).asin(), (0.0 - d.y).atan2(0.0 - d.z)),
         };
@@ -64,7 +64,7 @@ impl Profile {
         between(column) + across * (between(column + 1) - between(column))
     }
 
-    /// A horizontal angle where the table has it: lights of some symmetry are measured on one side alone.
+    /// A horizontal angle folded into the table's range by symmetry.
     fn folded(&self, degrees: f64) -> f64 {
         let (first, last) = (self.horizontal[0], self.horizontal[self.horizontal.len() - 1]);
         match self.photometry {
@@ -80,7 +80,7 @@ impl Profile {
                     degrees
                 }
             }
-            // About the plane through 90 and 270 degrees.
+            // Symmetric about the plane through 90 and 270 degrees.
             Photometry::C if first == 90.0 && last <= 270.0 => {
                 if !(90.0..=270.0).contains(&degrees) {
                     (540.0 - degrees).rem_euclid(360.0)
@@ -94,7 +94,7 @@ impl Profile {
         }
     }
 
-    /// The candelas as a latitude–longitude picture in the same space, half a degree a pixel, z up.
+    /// The candelas as a latitude-longitude image in the same space, half a degree a pixel, z up.
     pub fn image(&self) -> Image {
         let pixels = (0..WIDTH * HEIGHT).map(|i| {
             let (x, y) = (f64::from(i % WIDTH) + 0.5, f64::from(i / WIDTH) + 0.5);
@@ -116,12 +116,12 @@ impl Profile {
     }
 }
 
-/// Between which two of some angles another one lies, and how far along; `None` beyond them.
+/// The interval of `angles` that contains `at`, and the fraction; `None` outside.
 fn place(angles: &[f64], at: f64) -> Option<(usize, f64)> {
     if angles.len() == 1 {
         return Some((0, 0.0));
     }
-    // What is rounded may lie a little outside.
+    // Rounding may be slightly outside.
     let (first, last) = (angles[0], angles[angles.len() - 1]);
     if at < first - 1e-9 || at > last + 1e-9 {
         return None;
@@ -170,7 +170,7 @@ pub fn read_ies(bytes: &[u8], name: &Arc<str>, budget: &Budget) -> Result<Profil
     let ballast = words.number()?;
     let with_lamp = words.number()?;
     let _watts = words.number()?;
-    // A number takes two bytes at least.
+    // A number takes at least two bytes.
     let all = (rows as u64).saturating_mul(columns as u64);
     if all.saturating_add((rows + columns) as u64) > bytes.len() as u64 {
         let wrong = words.wrong_at(kind_at, "more angles than the file has numbers");
@@ -179,7 +179,7 @@ pub fn read_ies(bytes: &[u8], name: &Arc<str>, budget: &Budget) -> Result<Profil
     budget.bytes(4 * all + 8 * (rows + columns) as u64, "light profile")?;
     let vertical = words.angles(rows)?;
     let horizontal = words.angles(columns)?;
-    // Before 1995 the second of these was for the future, and 0 by some.
+    // Before 1995 the second was reserved, and some wrote 0.
     let factor = multiplier * ballast * if with_lamp > 0.0 { with_lamp } else { 1.0 };
     let mut candela = Vec::with_capacity(all as usize);
     for _ in 0..all {
@@ -195,7 +195,7 @@ pub fn read_ies(bytes: &[u8], name: &Arc<str>, budget: &Budget) -> Result<Profil
     Ok(Profile { photometry, vertical, horizontal, candela })
 }
 
-/// Numbers, one after another, between spaces, commas and the ends of lines.
+/// A reader of numbers between spaces, commas and line ends.
 struct Words<'b> {
     bytes: &'b [u8],
     at: usize,
@@ -207,7 +207,7 @@ impl<'b> Words<'b> {
         Diagnostic::error(message).at(Place::of_offset(self.name.clone(), self.bytes, at))
     }
 
-    /// Goes past the lines of keywords; whether factors for tilted lamps follow.
+    /// Skips the keyword lines; returns whether factors for tilted lamps follow.
     fn skip_keywords(&mut self) -> Result<bool, FormatError> {
         loop {
             let rest = &self.bytes[self.at..];
@@ -224,7 +224,7 @@ impl<'b> Words<'b> {
         }
     }
 
-    /// Where the next word starts.
+    /// The start of the next word.
     fn next_at(&mut self) -> usize {
         while self.bytes.get(self.at).is_some_and(|b| b.is_ascii_whitespace() || *b == b',') {
             self.at += 1;

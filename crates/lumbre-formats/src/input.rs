@@ -1,4 +1,4 @@
-//! Opening inputs: regular files only, unpacked when they are gzip, and never more than the budget allows.
+//! Opening inputs: regular files only, decompressed if they are gzip, within the budget.
 
 use std::borrow::Cow;
 use std::fs::File;
@@ -12,7 +12,7 @@ use flate2::bufread::MultiGzDecoder;
 use crate::budget::{Budget, Hold};
 use crate::diagnostic::{Diagnostic, FormatError, Place};
 
-/// The bytes of a file, charged to the budget for as long as they live.
+/// The bytes of a file, charged to the budget as long as they live.
 #[derive(Debug)]
 pub struct Input<'b> {
     name: Arc<str>,
@@ -21,12 +21,11 @@ pub struct Input<'b> {
 }
 
 impl<'b> Input<'b> {
-    /// Reads the file `path`, taken as it is: no variable, `~` or `%2e` in it is expanded. A file that starts as gzip
-    /// does is unpacked.
+    /// Reads the file `path`, verbatim: no variable, `~` or `%2e` in it is expanded. A gzip file is
+    /// decompressed.
     ///
-    /// # Errors
-    /// [`FormatError::Io`] when the system refuses or `path` is not a regular file (a folder, a pipe, a device),
-    /// [`FormatError::Limit`] when there is more than the budget allows, and [`FormatError::Input`] when gzip data
+    /// [`FormatError::Io`] when the system refuses or `path` is not a regular file (a folder, a pipe, a
+    /// device), [`FormatError::Limit`] when the budget is exceeded, and [`FormatError::Input`] when gzip data
     /// is damaged.
     pub fn open(path: &Path, budget: &'b Budget) -> Result<Self, FormatError> {
         let name: Arc<str> = path.display().to_string().into();
@@ -40,10 +39,9 @@ impl<'b> Input<'b> {
         if input.bytes.starts_with(&[0x1F, 0x8B]) { input.unpacked(path, budget) } else { Ok(input) }
     }
 
-    /// Bytes that come from elsewhere, such as standard input, under a name for messages.
+    /// Bytes from elsewhere, such as standard input, with a name for messages.
     ///
-    /// # Errors
-    /// As [`Input::open`].
+    /// As for [`Input::open`].
     pub fn from_reader(name: &str, reader: impl Read, budget: &'b Budget) -> Result<Self, FormatError> {
         let name: Arc<str> = name.into();
         let path = Path::new(&*name);
@@ -69,20 +67,19 @@ impl<'b> Input<'b> {
         Ok(Self { name: self.name, bytes, hold })
     }
 
-    /// The name for messages: the path as it was given.
+    /// The name for messages: the path as given.
     pub fn name(&self) -> &Arc<str> {
         &self.name
     }
 
     /// The bytes as text, without a byte order mark.
     ///
-    /// # Errors
-    /// As [`text`].
+    /// As for [`text`].
     pub fn text(&self) -> Result<&str, FormatError> {
         text(&self.bytes, &self.name)
     }
 
-    /// The bytes themselves, which the budget goes on being charged for.
+    /// The bytes, which stay charged to the budget.
     pub fn into_bytes(self) -> Vec<u8> {
         self.hold.keep();
         self.bytes
@@ -104,8 +101,8 @@ pub(crate) fn open_regular(path: &Path) -> Result<(File, u64), FormatError> {
         let what = if kind.is_dir() { "it is a folder" } else { "it is not a regular file" };
         refuse("cannot read", io::Error::new(io::ErrorKind::InvalidInput, what))
     };
-    // Looked at before it is opened, as opening a pipe would wait for its writer; and after, as it may have been
-    // exchanged in between.
+    // Checked before opening, as opening a pipe would block; and again after, as it may have been replaced
+    // in between.
     let before = std::fs::metadata(path).map_err(|e| refuse("cannot open", e))?;
     if !before.is_file() {
         return Err(not_regular(before.file_type()));
@@ -144,10 +141,9 @@ pub fn text<'a>(bytes: &'a [u8], name: &Arc<str>) -> Result<&'a str, FormatError
     })
 }
 
-/// Refuses text whose letters are wider than a byte.
+/// Rejects UTF-16 and UTF-32.
 ///
-/// # Errors
-/// When `bytes` are UTF-16 or UTF-32 by their byte order mark.
+/// When `bytes` begin with the byte order mark of either.
 pub fn refuse_wide(bytes: &[u8], name: &Arc<str>) -> Result<(), FormatError> {
     let foreign = if bytes.starts_with(&[0xFF, 0xFE, 0, 0]) || bytes.starts_with(&[0, 0, 0xFE, 0xFF]) {
         Some("UTF-32")
@@ -163,8 +159,8 @@ pub fn refuse_wide(bytes: &[u8], name: &Arc<str>) -> Result<(), FormatError> {
     Ok(())
 }
 
-/// `bytes` as text whatever they are: bytes that are not UTF-8 become U+FFFD. For formats of a time before UTF-8,
-/// where such bytes stand in names and comments.
+/// `bytes` as text, with invalid UTF-8 replaced by U+FFFD: for formats older than UTF-8, where such bytes occur
+/// in names and comments.
 pub fn lossy_text(bytes: &[u8]) -> Cow<'_, str> {
     String::from_utf8_lossy(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes))
 }
@@ -189,7 +185,7 @@ impl From<crate::budget::LimitError> for ReadError {
     }
 }
 
-/// Reads to the end, charging for room before it is made. The room grows by half, never by what a header says.
+/// Reads to the end, charging capacity before it is allocated. It grows by half, never by what a header claims.
 fn read_within(
     mut reader: impl Read,
     expected: u64,
@@ -203,7 +199,8 @@ fn read_within(
     let mut room = 0;
     loop {
         if bytes.len() == room {
-            // One more than expected, so that the end shows without growing again. Files of a system folder say 0.
+            // One more than expected, so that the end is detected without growing. Files of system folders have
+            // size 0.
             let first = usize::try_from(expected).unwrap_or(usize::MAX).saturating_add(1).max(LEAST);
             let more = if room == 0 { first } else { (room / 2).max(LEAST) };
             hold.grow(more as u64, name)?;
@@ -216,7 +213,7 @@ fn read_within(
             bytes.try_reserve_exact(more).map_err(refused)?;
             room += more;
         }
-        // Into room that was not cleared, which is what takes longest of a file that the system has at hand.
+        // Into uninitialised capacity: clearing it would take longer than reading a cached file.
         let step = (room - bytes.len()).min(STEP);
         let read = (&mut reader).take(step as u64).read_to_end(bytes).map_err(ReadError::Io)?;
         if read < step {

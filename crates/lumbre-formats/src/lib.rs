@@ -1,7 +1,7 @@
 #![doc = include_str!("../README.md")]
 //!
-//! Every reader is handed a [`Budget`], which it asks before any allocation whose size the input chose, and a
-//! [`Diagnostics`], where it puts its warnings. Its errors are [`FormatError`]s with a place.
+//! Every reader takes a [`Budget`], which it consults before any allocation whose size the input chose, and a
+//! [`Diagnostics`], which collects its warnings. Its errors are [`FormatError`]s with a place.
 
 pub mod atomic;
 pub mod budget;

@@ -1,4 +1,4 @@
-//! Opening any scene by the ending of its name.
+//! Opening any scene by its file extension.
 
 use std::path::Path;
 
@@ -11,25 +11,25 @@ use crate::ply::open_ply;
 use crate::stl::open_stl;
 use crate::{Budget, Diagnostic, Diagnostics, FormatError, Limits, Place, Strictness, pbrt};
 
-/// How a scene is read.
+/// Options of reading a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct ReadOptions {
-    /// What to do about input that is not as it should be.
+    /// How to treat invalid input.
     pub strictness: Strictness,
-    /// How much may be read.
+    /// The resource limits.
     pub limits: Limits,
-    /// The time in seconds at which animations stand; `None` leaves them alone.
+    /// The time in seconds at which animations are evaluated; `None` ignores them.
     pub frame: Option<f64>,
-    /// How long the shutter is open about `frame`, in seconds: see [`GltfOptions::shutter`].
+    /// The exposure in seconds, centred on `frame`: see [`GltfOptions::shutter`].
     pub shutter: f64,
-    /// The one animation of a glTF to play: see [`GltfOptions::animation`].
+    /// The animation of a glTF to play: see [`GltfOptions::animation`].
     pub animation: Option<String>,
-    /// The material variant of a glTF to wear.
+    /// The material variant of a glTF.
     pub variant: Option<String>,
 }
 
-/// The kinds of scene file that are read, by the ending of their name.
+/// The supported scene formats, by file extension.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum SceneFormat {
     Pbrt,
@@ -39,11 +39,11 @@ enum SceneFormat {
     Gltf,
 }
 
-/// The endings of [`open_scene`].
+/// The extensions of [`open_scene`].
 const ENDINGS: &str = ".pbrt, .pbrt.gz, .gltf, .glb, .obj, .ply, .ply.gz, .stl, .stl.gz";
 
 impl SceneFormat {
-    /// The kind of the file `path`, by its ending in any case.
+    /// The format of the file `path`, by its extension in any case.
     fn from_path(path: &Path) -> Option<Self> {
         let name = path.file_name()?.to_str()?.to_ascii_lowercase();
         let name = name.strip_suffix(".gz").unwrap_or(&name);
@@ -58,22 +58,20 @@ impl SceneFormat {
     }
 }
 
-/// Reads the scene or the mesh in the file `path`: `.pbrt`, `.ply` and `.stl`, with `.gz` behind or without, `.gltf`, `.glb`
-/// and `.obj`.
-/// `-` is a scene in the language of pbrt from standard input.
+/// Reads the scene or the mesh in the file `path`: `.pbrt`, `.ply` and `.stl`, each also with `.gz`, `.gltf`,
+/// `.glb` and `.obj`. `-` is a scene in the pbrt language from standard input.
 ///
-/// Answers the description with all that was said about the file on the way: its warnings, and how many of each there were.
+/// Returns the description and the diagnostics: the warnings, and their counts.
 ///
-/// # Errors
 /// [`FormatError`], with the place in the file.
 pub fn open_scene(path: &Path, options: &ReadOptions) -> Result<(SceneDesc, Diagnostics), FormatError> {
     open_scenes(&[path], options)
 }
 
-/// Reads several scene files in the language of pbrt, one after another as if they were one; or one file of any kind.
+/// Reads several scene files in the pbrt language, one after another as if they were one; or one file of any
+/// format.
 ///
-/// # Errors
-/// As [`open_scene`], and when there are several files of which one is of another kind, or no file at all.
+/// As for [`open_scene`], and when there are several files of which one has another format, or no file at all.
 pub fn open_scenes(
     paths: &[impl AsRef<Path>],
     options: &ReadOptions,
@@ -112,7 +110,7 @@ fn format_of(path: &Path) -> Result<SceneFormat, FormatError> {
     }
 }
 
-/// A file of a kind that is read alone.
+/// A file of a format that is read alone.
 fn read_one(
     path: &Path,
     format: SceneFormat,

@@ -1,22 +1,24 @@
-//! Polygons become triangles.
+//! Triangulation of polygons.
 
 use lumbre_math::{DVec2, DVec3, Vec3};
 
-/// A polygon is given up after so many tests of a corner against a triangle, less than a second's worth.
+/// The number of point-in-triangle tests after which a polygon is given up, less than a second's worth.
 const MOST_TESTS: u64 = 100_000_000;
 
-/// Whether the corners, which need not lie in one plane, turn one way all along as seen along their mean normal.
+/// Whether the corners, which need not be coplanar, turn the same way throughout as seen along their mean
+/// normal.
 pub(crate) fn is_convex(corners: &[Vec3]) -> bool {
     let flat = flattened(corners);
     turns_one_way(&flat)
 }
 
-/// `corners.len() - 2` triangles, by positions in `corners`, that go round as the polygon does; `None` when it is so large
-/// and winding that they take more than a moment to find: it needs tens of thousands of corners for that.
+/// `corners.len() - 2` triangles, by indices into `corners`, with the polygon's orientation; `None` when a
+/// polygon of tens of thousands of corners is so winding that it takes too long.
 ///
-/// Convex polygons become a fan about their first corner. Others lose one ear after the other (G. H. Meisters,
-/// "Polygons have ears", American Mathematical Monthly, 1975). A polygon that crosses itself has no right answer: its
-/// least bad corner is cut when there is no ear, so that the number of triangles stays.
+/// Convex polygons become a fan about their first corner. Others are triangulated by ear clipping (G. H.
+/// Meisters, "Polygons have ears", American Mathematical Monthly, 1975). A self-intersecting polygon has no
+/// right answer: when there is no ear, its least bad corner is clipped, so that the number of triangles is the
+/// same.
 pub(crate) fn triangulate(corners: &[Vec3]) -> Option<Vec<[usize; 3]>> {
     let count = corners.len();
     if count < 3 {
@@ -29,11 +31,11 @@ pub(crate) fn triangulate(corners: &[Vec3]) -> Option<Vec<[usize; 3]>> {
     cut_ears(&flat)
 }
 
-/// The corners as seen against their mean normal, so that they go round counter-clockwise; by leaving out one
-/// coordinate, so that they stay exact.
+/// The corners projected against their mean normal, counter-clockwise; a coordinate is dropped, so that the
+/// others stay exact.
 fn flattened(corners: &[Vec3]) -> Vec<DVec2> {
-    // M. Newell's normal, as in I. Sutherland and others, "A characterization of ten hidden-surface algorithms", 1974,
-    // about the first corner so that distance from the origin does not drown it.
+    // M. Newell's normal, as in I. Sutherland and others, "A characterization of ten hidden-surface
+    // algorithms", 1974, relative to the first corner to avoid cancellation far from the origin.
     let origin = corners[0].as_dvec3();
     let mut normal = DVec3::ZERO;
     for (i, a) in corners.iter().enumerate() {
@@ -61,19 +63,19 @@ fn area(a: DVec2, b: DVec2, c: DVec2) -> f64 {
     (b - a).perp_dot(c - a)
 }
 
-/// No right turn, and only once around: every fan triangle is then on the inside.
+/// No right turn, and a total turn of 360°: every fan triangle is then inside.
 fn turns_one_way(flat: &[DVec2]) -> bool {
     let count = flat.len();
     let left = (0..count).all(|i| area(flat[i], flat[(i + 1) % count], flat[(i + 2) % count]) >= 0.0);
     left && (1..count - 1).all(|i| area(flat[0], flat[i], flat[i + 1]) >= 0.0)
 }
 
-/// The corners that turn right, by where they are: a square grid over the polygon, of about as many cells as corners.
+/// The reflex corners in a square grid over the polygon, of about as many cells as corners.
 struct Reflex {
     least: DVec2,
     cells_per_length: DVec2,
     side: usize,
-    /// Corners by cell; those that turn right no longer are still there.
+    /// Corners by cell, including those that are no longer reflex.
     cells: Vec<Vec<u32>>,
     is_reflex: Vec<bool>,
 }
@@ -94,14 +96,14 @@ impl Reflex {
         grid
     }
 
-    /// The cast holds what is outside at the border, and NaN at 0.
+    /// The cast saturates outside the grid, and maps NaN to 0.
     fn cell(&self, p: DVec2) -> [usize; 2] {
         let at = (p - self.least) * self.cells_per_length;
         [at.x, at.y].map(|c| (c as usize).min(self.side - 1))
     }
 
-    /// Whether a corner that turns right lies in the triangle, its sides included. A corner at the same place as one of
-    /// the triangle's does not stand in the way of it.
+    /// Whether a reflex corner is in the closed triangle. A corner at the position of one of the triangle's
+    /// does not count.
     fn any_in(&self, flat: &[DVec2], [a, b, c]: [DVec2; 3], tests: &mut u64) -> bool {
         let low = self.cell(a.min(b).min(c));
         let high = self.cell(a.max(b).max(c));
@@ -132,7 +134,7 @@ fn cut_ears(flat: &[DVec2]) -> Option<Vec<[usize; 3]>> {
     let mut next: Vec<usize> = (0..count).map(|i| (i + 1) % count).collect();
     let mut before: Vec<usize> = (0..count).map(|i| (i + count - 1) % count).collect();
     let turn = |before: &[usize], next: &[usize], i: usize| area(flat[before[i]], flat[i], flat[next[i]]);
-    // Only a corner that turns right can lie in an ear. Corners never begin to turn right by a cut.
+    // Only a reflex corner can be in an ear. Clipping never makes a corner reflex.
     let mut reflex = Reflex::new(flat, (0..count).map(|i| turn(&before, &next, i) <= 0.0).collect());
     let mut triangles = Vec::with_capacity(count - 2);
     let mut at = 0;
@@ -145,7 +147,7 @@ fn cut_ears(flat: &[DVec2]) -> Option<Vec<[usize; 3]>> {
         let [a, b, c] = corners;
         let bulge = area(a, b, c);
         let is_ear = bulge > 0.0 && !reflex.any_in(flat, corners, &mut tests);
-        // A corner that returns to where its neighbour is takes no area with it.
+        // A corner that returns to its neighbour's position encloses no area.
         let is_flat = bulge == 0.0 && (a == b || b == c || a == c);
         if least_bad.is_none_or(|(most, _)| bulge > most) {
             least_bad = Some((bulge, at));
@@ -177,7 +179,7 @@ fn cut_ears(flat: &[DVec2]) -> Option<Vec<[usize; 3]>> {
         if tests > MOST_TESTS {
             return None;
         }
-        // Going on past the cut keeps long polygons from becoming one fan of slivers.
+        // Continuing past the cut avoids a fan of slivers in long polygons.
         at = next[c];
     }
     triangles.push([before[at], at, next[at]]);

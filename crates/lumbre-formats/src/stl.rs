@@ -1,5 +1,5 @@
-//! STL meshes, text and binary (3D Systems, "Stereolithography interface specification", 1989), with the colours that
-//! programs have put into the attribute bytes since.
+//! STL meshes, text and binary (3D Systems, "Stereolithography interface specification", 1989), with the
+//! colours that later programs store in the attribute bytes.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -19,14 +19,13 @@ use crate::ply::scene_of_meshes;
 pub struct StlSolid {
     /// Its name; empty where it has none.
     pub name: String,
-    /// Its facets. Corners at exactly the same place (and of the same colour) are one vertex.
+    /// Its facets. Corners at exactly the same position (and of the same colour) are one vertex.
     pub mesh: MeshDesc,
 }
 
-/// Reads the STL file `path` as a scene, each solid a shape of the default material; z is up.
+/// Reads the STL file `path` as a scene, each solid a shape with the default material; z is up.
 ///
-/// # Errors
-/// As [`Input::open`] and [`read_stl`].
+/// As for [`Input::open`] and [`read_stl`].
 pub fn open_stl(
     path: &Path,
     budget: &Budget,
@@ -37,16 +36,15 @@ pub fn open_stl(
     Ok(scene_of_meshes(solids.into_iter().map(|solid| solid.mesh), UpAxis::Z))
 }
 
-/// Reads the solids from the bytes of an STL file: one when it is binary, any number when it is text.
+/// Reads the solids from the bytes of an STL file: one if it is binary, any number if it is text.
 ///
-/// A file whose size is right for its count of facets is binary, even when it starts with `solid`. The facets' corners
-/// say which way they face; a normal that says otherwise is warned about. Colours are read as VisCAM and SolidView write
-/// them (bit 15 set), or as Materialise Magics does (`COLOR=` in the header, bit 15 clear).
+/// A file whose size matches its count of facets is binary, even if it starts with `solid`. The facets' corners
+/// determine their orientation; a contradicting normal gives a warning. Colours are read as VisCAM and
+/// SolidView write them (bit 15 set), or as Materialise Magics does (`COLOR=` in the header, bit 15 clear).
 ///
-/// # Errors
-/// [`FormatError::Input`] with the line and column, or the byte and path such as `/facet/3`; [`FormatError::Limit`]. When
-/// lenient, facets that are not finite are dropped with a warning instead, and a wrong count is only warned about; as are,
-/// always, bytes after the last facet that make no other.
+/// [`FormatError::Input`] with the line and column, or the byte and path such as `/facet/3`;
+/// [`FormatError::Limit`]. When lenient, facets that are not finite are dropped with a warning instead, and a
+/// wrong count gives a warning; as do, always, bytes after the last facet that are too few for another.
 pub fn read_stl(
     bytes: &[u8],
     name: &Arc<str>,
@@ -59,7 +57,8 @@ pub fn read_stl(
     let is_binary_by_size = count.is_some_and(|n| 84 + 50 * u64::from(n) == bytes.len() as u64);
     let text = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes).trim_ascii_start();
     let says_solid = text.get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
-    // A binary file of the wrong size may start with `solid` too; numbers have zero bytes, and text has none.
+    // A binary file of the wrong size may start with `solid` too; its numbers contain zero bytes, text does
+    // not.
     let is_text = !is_binary_by_size && says_solid && !bytes[..bytes.len().min(1024)].contains(&0);
     let solids = if is_text {
         Text { bytes, at: 0, name, budget, diagnostics }.read()
@@ -89,7 +88,7 @@ fn binary(
             .at(place(80, "/count".into()));
         let wrong = wrong.found(format!("{count} facets in {} bytes", bytes.len()));
         let wrong = wrong.expected(format!("{} bytes, or {held} facets", 84 + 50 * u64::from(count)));
-        // Less than a facet at the end is no facet: editors leave a line break there.
+        // A partial facet at the end is ignored: editors append a line break.
         if held != count as usize && !diagnostics.is_lenient() {
             return Err(wrong.into());
         }
@@ -130,12 +129,13 @@ fn binary(
     Ok(StlSolid { name: title, mesh: mesh.finish()? })
 }
 
-/// A byte on the sRGB curve as light.
+/// A byte in sRGB as linear light.
 fn byte(b: u8) -> f32 {
     srgb_to_linear(f32::from(b) / 255.0)
 }
 
-/// The colour of a facet by its attribute; grey where it has none. `of_all` is there in files of Materialise Magics.
+/// The colour of a facet from its attribute; grey if it has none. `of_all` is set in files of Materialise
+/// Magics.
 fn colour(attribute: u16, of_all: Option<Rgb>) -> Rgb {
     let five = |shift: u16| srgb_to_linear(f32::from(attribute >> shift & 31) / 31.0);
     let is_marked = attribute & 0x8000 != 0;
@@ -175,7 +175,7 @@ fn check_normal(
     }
 }
 
-/// A mesh whose equal corners become one vertex.
+/// A mesh whose equal corners are merged.
 struct Welded<'b> {
     budget: &'b Budget,
     positions: BudgetVec<'b, Vec3>,
@@ -202,13 +202,13 @@ impl<'b> Welded<'b> {
     fn facet(&mut self, corners: [Vec3; 3], colour: Rgb) -> Result<(), FormatError> {
         let mut triangle = [0; 3];
         for (corner, p) in triangle.iter_mut().zip(corners) {
-            // Adding zero makes one zero of the two.
+            // Adding 0 turns -0 into 0.
             let p = p + Vec3::ZERO;
             let colour_bits = if self.has_colours { colour.to_array().map(f32::to_bits) } else { [0; 3] };
             let [x, y, z] = p.to_array().map(f32::to_bits);
             let [r, g, b] = colour_bits;
             if self.known.len() == self.known.capacity() {
-                // What it is about to grow to: twice as many, each with its key, number and mark.
+                // The size after the next growth: twice as many, each with its key, number and mark.
                 let bytes = (self.known.capacity().max(3) as u64 * 2 + 8) * 29;
                 self.budget.bytes(bytes, "vertices")?;
                 self.budget.release(self.known_charged);
@@ -264,7 +264,7 @@ impl<'a> Text<'a> {
         Some((at, &self.bytes[at..at + length]))
     }
 
-    /// The next word, which must be one of these; which one.
+    /// The next word, which must be one of these; returns its index.
     fn expect(&mut self, words: &[&str]) -> Result<usize, FormatError> {
         let expected = words.join(" or ");
         let Some((at, word)) = self.word() else {

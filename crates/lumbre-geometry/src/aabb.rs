@@ -1,4 +1,4 @@
-//! Axis-aligned boxes that bound things.
+//! Axis-aligned bounding boxes.
 
 use lumbre_math::DVec3;
 
@@ -12,7 +12,7 @@ pub struct Aabb {
 }
 
 impl Aabb {
-    /// The box that holds nothing and grows to whatever joins it.
+    /// The empty box, the identity of `union`.
     pub const EMPTY: Self = Self { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
 
     /// The smallest box around some points.
@@ -28,27 +28,27 @@ impl Aabb {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
-    /// Whether it holds no point.
+    /// Whether it contains no point.
     pub fn is_empty(&self) -> bool {
         !self.min.cmple(self.max).all()
     }
 
-    /// Whether it holds `p`.
+    /// Whether it contains `p`, faces included.
     pub fn contains(&self, p: DVec3) -> bool {
         self.min.cmple(p).all() && p.cmple(self.max).all()
     }
 
-    /// The middle.
+    /// The centre.
     pub fn center(&self) -> DVec3 {
         0.5 * self.min + 0.5 * self.max
     }
 
-    /// Edge lengths.
+    /// The edge lengths.
     pub fn size(&self) -> DVec3 {
         self.max - self.min
     }
 
-    /// Half the surface area, the measure that a SAH build wants; 0 when empty.
+    /// Half the surface area, the cost measure of the SAH; 0 when empty.
     pub fn half_area(&self) -> f64 {
         if self.is_empty() {
             return 0.0;

@@ -1,4 +1,4 @@
-//! Bodies about an axis whose radius changes linearly along it: what cylinders and cones share.
+//! Solids of revolution whose radius is linear along the axis: the common part of cylinders and cones.
 
 use std::f64::consts::TAU;
 
@@ -7,16 +7,15 @@ use lumbre_math::rounding::gamma;
 use lumbre_math::{DMat3, DVec2, DVec3, Transform, orthonormal_basis};
 
 use crate::nearest::{Meridian, under_similarity};
+use crate::shape::{sampled_by_area, two_crossings};
 use crate::support::{arc_support, azimuth, bounds_from_support, cross_size, dot_size};
-use crate::{
-    Aabb, DirectionSample, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, Surface, SurfaceSample,
-    density, measure,
-};
+use crate::{Aabb, Hull, NearestPoint, NoNearestPoint, Ray, Root, Surface, SurfaceSample, density, measure};
 
-/// The points at distance ρ(z) = r1 + k z from an axis, z being the distance along it, between two planes across it.
+/// The points at distance ρ(z) = r1 + k z from an axis, where z is the distance along it, between two planes
+/// perpendicular to it.
 ///
-/// With caps it is a convex solid, and its crossings are the ends of one interval: that of the lateral surface cut by that
-/// of the two planes. No computed point is tested against a rim, so that there is no crack along it.
+/// With caps it is a convex solid, and its crossings are the ends of one interval: the lateral surface's
+/// intersected with the slab's. No computed point is tested against a rim, so there is no crack along it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Axial {
     /// The points of the axis at z = 0 and z = length; both the same when the length is infinite.
@@ -29,10 +28,10 @@ pub(crate) struct Axial {
     pub(crate) r2: f64,
     /// (r2 − r1) / length.
     pub(crate) k: f64,
-    /// Whether the planes through p1 and p2 cut the body. They need not where it ends in an apex.
+    /// Whether the planes through p1 and p2 cut the body; false at an apex.
     pub(crate) cut1: bool,
     pub(crate) cut2: bool,
-    /// Whether disks close the body where it is cut.
+    /// Whether disks close the body at the cuts.
     pub(crate) caps: bool,
     pub(crate) phi_max: f64,
 }
@@ -41,7 +40,7 @@ pub(crate) const LATERAL: u32 = 0;
 pub(crate) const CAP1: u32 = 1;
 pub(crate) const CAP2: u32 = 2;
 
-/// Where a line is in a convex set: from the first to the second `t`, each with the part that bounds it there.
+/// The interval of a line inside a convex set: its two ends in order of `t`, each with the part that bounds it.
 pub(crate) type Span = [(f64, u32); 2];
 
 impl Axial {
@@ -61,10 +60,10 @@ impl Axial {
         if part == CAP1 { (self.p1, self.r1) } else { (self.p2, self.r2) }
     }
 
-    /// Where the line is within the lateral surface (of one nappe), cut nowhere.
+    /// The interval of the line within the lateral surface of one nappe, without cuts.
     ///
-    /// F(t) = |B + tA|² − (e + g t)² with A = D×V, B = W×V. Its discriminant is taken at the point of the line next to p1
-    /// and as a difference of two lengths, which keeps its digits where a thin cone is far away.
+    /// F(t) = |B + tA|² − (e + g t)² with A = D×V, B = W×V. The discriminant is computed at the point of the
+    /// line nearest to p1 and as a difference of two lengths, so it stays accurate for a thin cone far away.
     #[inline]
     pub(crate) fn lateral_span(&self, ray: &Ray) -> Option<Span> {
         let (w, d) = (ray.origin - self.p1, ray.direction);
@@ -82,8 +81,8 @@ impl Axial {
             let m = self.axis.dot(across.cross(near_offset));
             (near_e * across - g * near_offset).length_squared() - m * m
         };
-        // On a cone all three coefficients cancel for a ray from far along a generator. One step of Newton's method on F
-        // itself, at the point found, gives the digits back; next to a double root it is not to be trusted.
+        // On a cone all three coefficients cancel for a distant ray along a generator. A Newton step on F
+        // itself restores the digits, except near a double root.
         let refined = |t: f64, limit: f64| {
             if self.k == 0.0 || t.is_infinite() {
                 return t;
@@ -116,14 +115,14 @@ impl Axial {
         } else if g == 0.0 {
             (c <= 0.0).then_some(whole)?
         } else {
-            // Along a generator: the line is in the body from the apex on, and in an open surface it meets nothing.
+            // Along a generator: the line is inside from the apex on, and misses an open surface.
             let apex = (self.caps && c <= 0.0).then_some(-e / g)?;
             if g > 0.0 { (apex, whole.1) } else { (whole.0, apex) }
         };
         Some([(low, LATERAL), (high, LATERAL)])
     }
 
-    /// Where the line is between the planes that cut the body.
+    /// The interval of the line between the cutting planes.
     #[inline]
     pub(crate) fn slab_span(&self, ray: &Ray) -> Option<Span> {
         let along = ray.direction.dot(self.axis);
@@ -178,7 +177,7 @@ impl Axial {
         }
     }
 
-    /// Whether the point at `t` lies within the sweep.
+    /// Whether the point at `t` is within the sweep.
     fn keeps(&self, ray: &Ray, t: f64, part: u32) -> bool {
         let (_, arm) = self.arm(ray, t, part);
         self.phi(arm) <= self.phi_max
@@ -189,7 +188,7 @@ impl Axial {
         azimuth(arm.dot(e2), arm.dot(e1))
     }
 
-    /// The height over p1 of the point at `t`, and its arm from the axis.
+    /// The height above p1 of the point at `t`, and its offset from the axis.
     pub(crate) fn arm(&self, ray: &Ray, t: f64, part: u32) -> (f64, DVec3) {
         let base = if part == CAP2 { self.p2 } else { self.p1 };
         let w = (ray.origin - base) + t * ray.direction;
@@ -197,17 +196,7 @@ impl Axial {
         (z, w - z * self.axis)
     }
 
-    /// The first crossing in the ray's range.
-    #[inline]
-    pub(crate) fn closest(&self, ray: &Ray) -> Option<Root> {
-        let [near, far] = self.crossings(ray);
-        near.or(far)
-    }
-
-    /// Every crossing in the ray's range, appended in ascending order.
-    pub(crate) fn roots(&self, ray: &Ray, out: &mut Roots) {
-        out.extend(self.crossings(ray).into_iter().flatten());
-    }
+    two_crossings!(pub(crate));
 
     /// The surface at a crossing.
     pub(crate) fn surface(&self, ray: &Ray, root: &Root) -> Surface {
@@ -243,7 +232,7 @@ impl Axial {
         let w = z * self.axis + rho * outward;
         let point = self.p1 + w;
         let rise = if self.is_bounded() { self.length } else { 1.0 };
-        // The arm and the radius are each known up to the rounding of the products that make them.
+        // The offset and the radius have the rounding error of the products that they come from.
         let error = gamma(10)
             * (cross_size(w, self.axis) + rho + (self.r1 + self.k.abs() * dot_size(w, self.axis)) / slant);
         let is_apex = rho == 0.0;
@@ -281,7 +270,7 @@ impl Axial {
         }
     }
 
-    /// The box under a transform, tight for every sweep; `None` when infinite.
+    /// The bounding box under a transform, tight for every sweep; `None` when infinite.
     pub(crate) fn bounds(&self, world_from_object: &Transform) -> Option<Aabb> {
         if !self.is_bounded() {
             return None;
@@ -305,7 +294,7 @@ impl Axial {
         Some(bounds_from_support(world_from_object, magnitude, support))
     }
 
-    /// The whole body, with caps.
+    /// The whole solid, with caps.
     pub(crate) fn hull(&self) -> Option<Hull> {
         if !self.is_bounded() {
             return None;
@@ -319,7 +308,7 @@ impl Axial {
         Some(Hull::new(0.5 * (self.p1 + self.p2), axes, profile, self.is_solid()))
     }
 
-    /// The areas of the lateral surface and the two caps, 0 for a cap that is not there.
+    /// The areas of the lateral surface and the two caps; 0 for a missing cap.
     fn part_areas(&self) -> [f64; 3] {
         let cap = |part| {
             let radius = self.cap(part).1;
@@ -334,7 +323,7 @@ impl Axial {
         if self.is_bounded() { self.part_areas().iter().sum() } else { f64::INFINITY }
     }
 
-    /// The area after a transform: one quadrature over the azimuth, since along the axis the integrand is linear.
+    /// The area after a transform: a quadrature over the azimuth, since the integrand is linear along the axis.
     pub(crate) fn area_under(&self, world_from_object: &Transform) -> f64 {
         if !self.is_bounded() {
             return f64::INFINITY;
@@ -349,12 +338,12 @@ impl Axial {
         0.5 * (self.r1 + self.r2) * self.length * side + (cap1 + cap2) * (stretch * self.axis).length()
     }
 
-    /// Whether it is all around and closed wherever it is cut.
+    /// Whether the sweep is complete and every cut is capped.
     pub(crate) fn is_solid(&self) -> bool {
         self.is_whole() && (self.caps || !(self.cut1 || self.cut2))
     }
 
-    /// Whether the closed solid holds `p`.
+    /// Whether the closed solid contains `p`.
     pub(crate) fn contains(&self, p: DVec3) -> bool {
         let w = p - self.p1;
         let radius = self.r1 + self.k * w.dot(self.axis);
@@ -364,7 +353,7 @@ impl Axial {
             && w.cross(self.axis).length() <= radius
     }
 
-    /// The nearest point to `p` under a map that keeps angles.
+    /// The nearest point to `p` under a similarity.
     pub(crate) fn closest_point(
         &self,
         world_from_object: &Transform,
@@ -377,7 +366,7 @@ impl Axial {
             let meridian = Meridian::new(local, self.phi_max);
             let outward = meridian.outward.x * e1 + meridian.outward.y * e2;
             let u = (meridian.phi / self.phi_max).min(1.0);
-            // The side is a segment, or a ray or line: p1 and p2 are then at the one end, if there is any.
+            // The profile is a segment, ray or line. Of a ray, p1 and p2 are both its end.
             let has_low_end = self.cut1 || self.k > 0.0 || self.is_bounded();
             let has_high_end = self.is_bounded() || self.cut2;
             let low = if has_low_end { 0.0 } else { f64::NEG_INFINITY };
@@ -407,7 +396,7 @@ impl Axial {
         })
     }
 
-    /// A point uniform by area: a part, then a point of it; `None` when infinite.
+    /// A point uniform by area: first a part, then a point of it; `None` when infinite.
     pub(crate) fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
         if !self.is_bounded() {
             return None;
@@ -417,7 +406,7 @@ impl Axial {
         let v = if part == LATERAL {
             let (r1, r2) = (self.r1, self.r2);
             let rho = ((1.0 - left) * r1 * r1 + left * r2 * r2).sqrt();
-            // From the apex on, the fraction is √ξ; the general form has 0/0 there.
+            // From the apex on, the fraction is √ξ, where the general form is 0/0.
             if rho + r1 > 0.0 { (left * (r1 + r2) / (rho + r1)).min(1.0) } else { 0.0 }
         } else {
             left.sqrt()
@@ -426,23 +415,14 @@ impl Axial {
         Some(SurfaceSample { surface, pdf: 1.0 / self.area() })
     }
 
-    /// A point uniform by area, as seen from `from`; `None` when it is seen edge-on, or the body is infinite.
-    pub(crate) fn sample_direction(&self, from: DVec3, u: DVec2) -> Option<DirectionSample> {
-        density::seen_from(from, self.sample_area(u)?)
-    }
-
-    /// The density of [`Axial::sample_direction`]; 0 when infinite.
-    pub(crate) fn pdf_direction(&self, ray: &Ray, surface: &Surface) -> f64 {
-        let area = self.area();
-        if area.is_finite() { density::pdf_seen_from(ray, surface, 1.0 / area) } else { 0.0 }
-    }
+    sampled_by_area!(pub(crate));
 }
 
-/// Gives a shape that wraps an [`Axial`] in its field `body` the methods of a shape.
+/// The methods of a shape that wraps an [`Axial`] in its field `body`.
 macro_rules! axial_shape {
     ($shape:ident, $name:literal) => {
         impl $shape {
-            /// The part with azimuth up to `phimax` degrees, of the caps too.
+            /// The part with azimuth up to `phimax` degrees, caps included.
             ///
             /// # Errors
             /// [`ShapeError`] when `phimax` is not in (0, 360].
@@ -466,22 +446,22 @@ macro_rules! axial_shape {
                 self.body.surface(ray, root)
             }
 
-            /// The surface at `uv` of a part: 0 lateral, 1 and 2 the caps, `None` where there is no such cap.
+            /// The surface at `uv` of a part: 0 lateral, 1 and 2 the caps; `None` for a missing cap.
             pub fn surface_at(&self, part: u32, uv: DVec2) -> Option<Surface> {
                 self.body.surface_at(part, uv)
             }
 
-            /// The box under a transform, tight for every sweep; `None` when infinite.
+            /// The bounding box under a transform, tight for every sweep; `None` when infinite.
             pub fn bounds(&self, world_from_object: &Transform) -> Option<Aabb> {
                 self.body.bounds(world_from_object)
             }
 
-            /// The whole body, with caps; `None` when infinite.
+            /// A bounding volume: the whole solid, with caps; `None` when infinite.
             pub fn hull(&self) -> Option<Hull> {
                 self.body.hull()
             }
 
-            /// The area, caps included; infinite when it is.
+            /// The area, caps included; may be infinite.
             pub fn area(&self) -> f64 {
                 self.body.area()
             }
@@ -491,17 +471,17 @@ macro_rules! axial_shape {
                 self.body.area_under(world_from_object)
             }
 
-            /// Whether it is all around, and closed wherever it is cut.
+            /// Whether the sweep is complete and every cut is capped.
             pub fn is_solid(&self) -> bool {
                 self.body.is_solid()
             }
 
-            /// Whether the closed solid holds `p`; false when open.
+            /// Whether the closed solid contains `p`; false when open.
             pub fn contains(&self, p: DVec3) -> bool {
                 self.body.contains(p)
             }
 
-            /// The nearest point to `p` under a map that keeps angles.
+            /// The nearest point to `p` under a similarity.
             ///
             /// # Errors
             /// [`NoNearestPoint::Map`] for other maps.

@@ -1,4 +1,4 @@
-//! Capsules: segments swept by a ball.
+//! Capsules: a segment swept by a ball.
 
 use std::f64::consts::{PI, TAU};
 
@@ -7,31 +7,31 @@ use lumbre_math::{DMat3, DVec2, DVec3, Transform, orthonormal_basis};
 
 use crate::axial::{Axial, CAP1, CAP2, LATERAL, Span};
 use crate::nearest::under_similarity;
-use crate::shape::check;
+use crate::shape::{check, sampled_by_area, two_crossings};
 use crate::support::bounds_from_support;
-use crate::{
-    Aabb, DirectionSample, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
-    SurfaceSample,
-};
-use crate::{density, measure, sphere};
+use crate::{Aabb, Hull, NearestPoint, NoNearestPoint, Ray, Root, ShapeError, Surface, SurfaceSample};
+use crate::{measure, sphere};
 
-/// The points at distance `radius` from the segment between `p0` and `p1`: half a sphere about each end, and the side of a
-/// cylinder between them. A convex solid; where the ends are the same point, a sphere with its poles along z.
+/// The points at distance `radius` from the segment between `p0` and `p1`: a hemisphere about each end, and the
+/// side of a cylinder between them. It is a convex solid; when the ends coincide, a sphere with its poles along
+/// z.
 ///
-/// With V the unit vector from `p0` to `p1`, L the length of the segment and φ the azimuth about V, `u` is φ / 2π, and `v`
-/// runs from 0 at the pole beyond `p0` to 1 at the pole beyond `p1` by the length of the meridian, πr + L. The point and
-/// both its derivatives are continuous where the parts meet. Part 0 is the side, 1 the half about `p0`, 2 that about `p1`.
+/// With V the unit vector from `p0` to `p1`, L the length of the segment and φ the azimuth about V, `u` is φ /
+/// 2π, and `v` runs along the meridian, of length πr + L, from 0 at the pole beyond `p0` to 1 at the pole
+/// beyond `p1`. The point and both its derivatives are continuous across the seams. Part 0 is the side, 1 the
+/// hemisphere about `p0`, 2 that about `p1`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Capsule {
-    // The cylinder with disks at both ends that the capsule has within, of k = 0; its length may be 0.
+    // The capped cylinder inside the capsule (k = 0); its length may be 0.
     tube: Axial,
 }
 
 impl Capsule {
-    /// The capsule about the segment from `p0` to `p1`, which may be the same point.
+    /// The capsule about the segment from `p0` to `p1`, which may coincide.
     ///
     /// # Errors
-    /// [`ShapeError`] unless the ends and their distance are finite, and the radius is finite and greater than 0.
+    /// [`ShapeError`] unless the ends and their distance are finite, and the radius is finite and greater than
+    /// 0.
     pub fn new(p0: DVec3, p1: DVec3, radius: f64) -> Result<Self, ShapeError> {
         let (p0, p1) = (check::finite("p0", p0)?, check::finite("p1", p1)?);
         let radius = check::positive("radius", radius)?;
@@ -69,17 +69,18 @@ impl Capsule {
         PI * self.radius() + self.tube.length
     }
 
-    /// The end that a cap is about, and the unit vector from there to its pole.
+    /// The centre of a cap, and the unit vector from there to its pole.
     fn cap(&self, part: u32) -> (DVec3, DVec3) {
         if part == CAP1 { (self.tube.p1, -self.tube.axis) } else { (self.tube.p2, self.tube.axis) }
     }
 
-    /// Where the line is in the capsule: the hull of where it is in the cylinder and in the two balls.
+    /// The interval of the line inside the capsule: the convex hull of its intervals inside the cylinder and
+    /// the two balls.
     ///
-    /// Both balls are in the cylinder without ends, so a line that misses that misses all, and a ball matters only where
-    /// the line is in that cylinder beyond the ball's end. No computed point is tested against a seam, so that there is no
-    /// crack along it; and where rounding takes a ball away from a line that passes through the disk at its end, the disk
-    /// stands in for it.
+    /// The balls lie inside the infinite cylinder, so a line that misses it misses everything, and a ball
+    /// matters only where the line passes beyond that end of the cylinder. No computed point is tested against
+    /// a seam, so there is no crack along it. If rounding makes a line miss a ball although it passes through
+    /// the disk at its end, the disk is used.
     #[inline]
     fn span(&self, ray: &Ray) -> Option<Span> {
         let [side_near, side_far] = self.tube.lateral_span(ray)?;
@@ -88,7 +89,7 @@ impl Capsule {
             Some([(near, part), (far, part)])
         };
         let Some([slab_near, slab_far]) = self.tube.slab_span(ray) else {
-            // Across the axis, beyond one of the ends.
+            // Perpendicular to the axis, beyond one of the ends.
             let is_before = (ray.origin - self.tube.p1).dot(self.tube.axis) < 0.0;
             return ball(if is_before { CAP1 } else { CAP2 });
         };
@@ -124,17 +125,7 @@ impl Capsule {
         if near.0 == far.0 { [root(near, 2), None] } else { [root(near, 1), root(far, 1)] }
     }
 
-    /// The first crossing in the ray's range.
-    #[inline]
-    pub fn closest(&self, ray: &Ray) -> Option<Root> {
-        let [near, far] = self.crossings(ray);
-        near.or(far)
-    }
-
-    /// Every crossing in the ray's range, appended in ascending order.
-    pub fn roots(&self, ray: &Ray, out: &mut Roots) {
-        out.extend(self.crossings(ray).into_iter().flatten());
-    }
+    two_crossings!(pub);
 
     /// The surface at a crossing.
     pub fn surface(&self, ray: &Ray, root: &Root) -> Surface {
@@ -148,8 +139,8 @@ impl Capsule {
         }
     }
 
-    /// The surface at `uv` of a part: 0 the side, 1 and 2 the caps. A `v` past the part's seam continues the part, as if
-    /// the cylinder were longer or the cap more than half a sphere.
+    /// The surface at `uv` of a part: 0 the side, 1 and 2 the caps. A `v` past the seam continues the part, as
+    /// if the cylinder were longer or the cap more than a hemisphere.
     pub fn surface_at(&self, part: u32, uv: DVec2) -> Option<Surface> {
         let (e1, e2) = orthonormal_basis(self.tube.axis);
         let (sin, cos) = (uv.x * TAU).sin_cos();
@@ -173,15 +164,15 @@ impl Capsule {
         Surface { uv: DVec2::new(u, v), dpdv, ..self.tube.on_side(z, outward, u) }
     }
 
-    /// The surface of a cap at a point of its sphere, relative to the centre. With the polar angle θ from the pole,
-    /// v = rθ / (πr + L) on the first cap, and 1 less that on the second.
+    /// The surface of a cap at a point `w` of its sphere, relative to the centre. With the polar angle θ from
+    /// the pole, v = rθ / (πr + L) on the first cap, and 1 minus that on the second.
     fn on_cap(&self, part: u32, w: DVec3, u: f64) -> Surface {
         let (center, to_pole) = self.cap(part);
         let (axis, radius) = (self.tube.axis, self.radius());
         let normal = w / w.length();
         let rho = axis.cross(w).length();
         let around = {
-            // At a pole every meridian will do; next to one the cross product has lost digits.
+            // At a pole any meridian will do; near one the cross product has lost digits.
             let rough = if rho > 0.0 { axis.cross(w) / rho } else { orthonormal_basis(axis).1 };
             (rough - normal.dot(rough) * normal).normalize()
         };
@@ -201,7 +192,7 @@ impl Capsule {
         }
     }
 
-    /// The box under a transform, from the support function max(d·p0, d·p1) + r|d|.
+    /// The bounding box under a transform, from the support function max(d·p0, d·p1) + r|d|.
     pub fn bounds(&self, world_from_object: &Transform) -> Option<Aabb> {
         let [p0, p1] = self.ends();
         let support = |d: DVec3| d.dot(p0).max(d.dot(p1)) + self.radius() * d.length();
@@ -209,7 +200,7 @@ impl Capsule {
         Some(bounds_from_support(world_from_object, magnitude, support))
     }
 
-    /// The cylinder around it.
+    /// A bounding volume: the circumscribed cylinder.
     pub fn hull(&self) -> Option<Hull> {
         let [p0, p1] = self.ends();
         let (e1, e2) = orthonormal_basis(self.tube.axis);
@@ -218,13 +209,13 @@ impl Capsule {
         Some(Hull::new(0.5 * (p0 + p1), axes, Hull::CYLINDER, false))
     }
 
-    /// The area, 2πr (L + 2r): by Archimedes, that of the cylinder around it.
+    /// The area, 2πr (L + 2r): that of the circumscribed cylinder, by Archimedes.
     pub fn area(&self) -> f64 {
         TAU * self.radius() * (self.tube.length + 2.0 * self.radius())
     }
 
-    /// The area after a transform: an ellipsoid's for the caps, whose normals are those of a whole sphere, and a
-    /// quadrature over the azimuth for the side.
+    /// The area after a transform: an ellipsoid's for the caps, whose normals are those of a whole sphere, and
+    /// a quadrature over the azimuth for the side.
     pub fn area_under(&self, world_from_object: &Transform) -> f64 {
         let stretch = measure::area_stretch(world_from_object);
         let (e1, e2) = orthonormal_basis(self.tube.axis);
@@ -236,12 +227,12 @@ impl Capsule {
         self.radius() * self.tube.length * around + caps
     }
 
-    /// It is.
+    /// Always true.
     pub fn is_solid(&self) -> bool {
         true
     }
 
-    /// Whether `p` is no further than the radius from the segment.
+    /// Whether `p` is within `radius` of the segment.
     pub fn contains(&self, p: DVec3) -> bool {
         let [p0, p1] = self.ends();
         let z = (p - p0).dot(self.tube.axis);
@@ -255,7 +246,7 @@ impl Capsule {
         (p - nearest).length() <= self.radius()
     }
 
-    /// The nearest point to `p` under a map that keeps angles.
+    /// The nearest point to `p` under a similarity.
     ///
     /// # Errors
     /// [`NoNearestPoint::Map`] for other maps.
@@ -320,15 +311,7 @@ impl Capsule {
         Some(SurfaceSample { surface, pdf: 1.0 / self.area() })
     }
 
-    /// A point uniform by area, as seen from `from`; `None` when it is seen edge-on.
-    pub fn sample_direction(&self, from: DVec3, u: DVec2) -> Option<DirectionSample> {
-        density::seen_from(from, self.sample_area(u)?)
-    }
-
-    /// The density of [`Capsule::sample_direction`].
-    pub fn pdf_direction(&self, ray: &Ray, surface: &Surface) -> f64 {
-        density::pdf_seen_from(ray, surface, 1.0 / self.area())
-    }
+    sampled_by_area!(pub);
 }
 
 #[cfg(test)]
@@ -336,6 +319,7 @@ mod tests {
     use lumbre_math::random::RandomStream;
 
     use super::*;
+    use crate::Roots;
     use crate::{Cylinder, Sphere};
 
     fn line(origin: DVec3, direction: DVec3) -> Ray {

@@ -1,4 +1,4 @@
-//! Cones: pointed or cut off, open, capped, infinite.
+//! Cones: pointed or truncated, open or capped, finite or infinite.
 
 use std::f64::consts::TAU;
 
@@ -12,22 +12,24 @@ use crate::{
     SurfaceSample,
 };
 
-/// The points whose distance from an axis changes linearly along it.
+/// The points whose distance from an axis is linear along it.
 ///
-/// `u` is the azimuth over `phimax` and `v` the fraction along the axis, or the distance from the apex where the cone has
-/// no end. On the caps `v` is the fraction of the radius. With caps and all around it is a convex solid. The normal at an
-/// apex points along the axis, outward. A ray along a generator of an open cone meets nothing.
+/// `u` is the azimuth over `phimax`, and `v` the fraction along the axis, or the distance from the apex when
+/// the cone is infinite. On the caps `v` is the fraction of the radius. A complete cone with caps is a convex
+/// solid. The normal at an apex points outward along the axis. A ray along a generator of an open cone misses
+/// it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cone {
     body: Axial,
 }
 
 impl Cone {
-    /// The frustum with radius `r0` at `p0` and `r1` at `p1`, one of which may be 0, with disks at its ends (of radius
-    /// other than 0) if `caps`.
+    /// The frustum with radius `r0` at `p0` and `r1` at `p1`, one of which may be 0, with disks at its ends of
+    /// non-zero radius if `caps`.
     ///
     /// # Errors
-    /// [`ShapeError`] unless the ends are finite and differ and the radii are finite, not negative, and not both 0.
+    /// [`ShapeError`] unless the ends are finite and differ and the radii are finite, not negative, and not
+    /// both 0.
     pub fn new(p0: DVec3, p1: DVec3, r0: f64, r1: f64, caps: bool) -> Result<Self, ShapeError> {
         let (p1, p2, r1, r2) = (check::finite("p0", p0)?, check::finite("p1", p1)?, r0, r1);
         let expected = "a finite number, 0 or greater";
@@ -46,7 +48,7 @@ impl Cone {
         Ok(Self { body: Axial { p1, p2, axis, length, r1, r2, k, cut1, cut2, caps, phi_max: TAU } })
     }
 
-    /// The pointed cone that opens from `apex` along `axis` (of any length but zero), up to `height` along it, which may be
+    /// The pointed cone that opens from `apex` along `axis` (of any non-zero length), up to `height` along it, which may be
     /// infinite. The angle between the axis and the side is `half_angle` in degrees, between 0 and 90.
     ///
     /// # Errors
@@ -64,7 +66,7 @@ impl Cone {
         let is_sharp = 0.0 < half_angle && half_angle < 90.0;
         let half_angle = check::within("angle", half_angle, is_sharp, "degrees between 0 and 90")?;
         let height = check::within("height", height, height > 0.0, "greater than 0, or inf")?;
-        // From the half-angle of 45° on, by that of the complement: exact at 45°, accurate at both ends.
+        // From a half-angle of 45° on, via the complement: exact at 45°, accurate at both ends.
         let acute_tan = |degrees: f64| {
             let (sin, cos) = sin_cos_degrees(2.0 * degrees);
             sin / (1.0 + cos)

@@ -1,21 +1,20 @@
-//! Boxes along the axes.
+//! Axis-aligned boxes.
 
 use lumbre_math::rounding::gamma;
 use lumbre_math::{DVec2, DVec3, Transform};
 
 use crate::nearest::{on_triangle, similarity_factor, under_similarity};
-use crate::shape::check;
+use crate::shape::{check, sampled_by_area, two_crossings};
 use crate::support::bounds_from_support;
 use crate::{
-    Aabb, DirectionSample, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
-    SurfaceSample, density, measure,
+    Aabb, Hull, NearestPoint, NoNearestPoint, Ray, Root, ShapeError, Surface, SurfaceSample, density, measure,
 };
 
-/// The box between two corners, "box" in the scene language. A solid, closed: a ray that slides in a face enters and
-/// leaves through the faces at its ends.
+/// The box between two corners, "box" in the scene language. A closed solid: a ray along a face enters and
+/// leaves it through the faces at its ends.
 ///
-/// Parts 0 to 5 are the faces −x, +x, −y, +y, −z, +z. On the faces of axis i, `u` is the fraction along axis i+1 and `v`
-/// along axis i+2, cyclically.
+/// Parts 0 to 5 are the faces −x, +x, −y, +y, −z, +z. On the faces of axis i, `u` is the fraction along axis
+/// i+1 and `v` along axis i+2, cyclically.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cuboid {
     low: DVec3,
@@ -23,10 +22,10 @@ pub struct Cuboid {
 }
 
 impl Cuboid {
-    /// The box between any two opposite corners, possibly flat along one axis.
+    /// The box between two opposite corners, possibly flat along one axis.
     ///
     /// # Errors
-    /// [`ShapeError`] unless the corners are finite and differ along two axes at least.
+    /// [`ShapeError`] unless the corners are finite and differ along at least two axes.
     pub fn new(p0: DVec3, p1: DVec3) -> Result<Self, ShapeError> {
         let (p0, p1) = (check::finite("p0", p0)?, check::finite("p1", p1)?);
         let (low, high) = (p0.min(p1), p0.max(p1));
@@ -42,10 +41,10 @@ impl Cuboid {
         [self.low, self.high]
     }
 
-    /// Where the line enters and leaves the closed box, and through which faces.
+    /// The points where the line enters and leaves the closed box, with their faces.
     ///
-    /// T. L. Kay, J. T. Kajiya, "Ray tracing complex scenes", SIGGRAPH 1986. The division, rather than a reciprocal, keeps
-    /// a ray in a face's plane from multiplying zero by infinity.
+    /// T. L. Kay, J. T. Kajiya, "Ray tracing complex scenes", SIGGRAPH 1986. The code divides instead of
+    /// multiplying by a reciprocal, so a ray in the plane of a face does not multiply zero by infinity.
     #[inline]
     fn span(&self, ray: &Ray) -> Option<[(f64, u32); 2]> {
         let (to_low, to_high) = (self.low - ray.origin, self.high - ray.origin);
@@ -57,7 +56,7 @@ impl Cuboid {
             return None;
         }
         if is_across.any() {
-            // Between two faces that it runs along the ray is bounded by the others alone.
+            // Parallel to two faces and between them, the ray is bounded by the others alone.
             let is_between = to_low.cmple(DVec3::ZERO) & to_high.cmpge(DVec3::ZERO);
             if !(is_between | !is_across).all() {
                 return None;
@@ -69,7 +68,7 @@ impl Cuboid {
         let last = |a: (f64, u32), b: (f64, u32)| if b.0 > a.0 { b } else { a };
         let near = last(last((enter.x, 0), (enter.y, 2)), (enter.z, 4));
         let far = first(first((leave.x, 1), (leave.y, 3)), (leave.z, 5));
-        // Down an axis the high face comes first.
+        // Along a negative direction the high face comes first.
         let turned = |(t, face): (f64, u32)| (t, face ^ u32::from(d[face as usize / 2] < 0.0));
         (near.0 <= far.0).then(|| [turned(near), turned(far)])
     }
@@ -85,17 +84,7 @@ impl Cuboid {
         if near.0 == far.0 { [root(near, 2), None] } else { [root(near, 1), root(far, 1)] }
     }
 
-    /// The first crossing in the ray's range.
-    #[inline]
-    pub fn closest(&self, ray: &Ray) -> Option<Root> {
-        let [near, far] = self.crossings(ray);
-        near.or(far)
-    }
-
-    /// Every crossing in the ray's range, appended in ascending order.
-    pub fn roots(&self, ray: &Ray, out: &mut Roots) {
-        out.extend(self.crossings(ray).into_iter().flatten());
-    }
+    two_crossings!(pub);
 
     /// The surface at a crossing.
     pub fn surface(&self, ray: &Ray, root: &Root) -> Surface {
@@ -115,7 +104,7 @@ impl Cuboid {
         Some(Surface { uv, ..self.surface_on(part, p) })
     }
 
-    /// The surface at the point of a face next to `p`.
+    /// The surface at the point of a face nearest to `p`.
     fn surface_on(&self, part: u32, p: DVec3) -> Surface {
         let axis = part as usize / 2;
         let is_high = part % 2 == 1;
@@ -137,7 +126,7 @@ impl Cuboid {
         }
     }
 
-    /// The box around it under a transform.
+    /// The bounding box under a transform.
     ///
     /// J. Arvo, "Transforming axis-aligned bounding boxes", Graphics Gems, 1990.
     pub fn bounds(&self, world_from_object: &Transform) -> Option<Aabb> {
@@ -146,13 +135,14 @@ impl Cuboid {
         Some(bounds_from_support(world_from_object, magnitude, support))
     }
 
-    /// Itself.
+    /// A bounding volume: the box itself.
     pub fn hull(&self) -> Option<Hull> {
         let hull = Hull::of_box(&Aabb { min: self.low, max: self.high })?;
         Some(Hull { is_solid: !hull.is_flat, ..hull })
     }
 
-    /// The areas of the faces across x, y and z, with their normals stretched by `stretch`; one face of each pair.
+    /// The areas of the faces perpendicular to x, y and z, one of each pair, with normals stretched by
+    /// `stretch`.
     fn face_areas(&self, stretch: impl Fn(DVec3) -> f64) -> [f64; 3] {
         let s = self.high - self.low;
         [s.y * s.z * stretch(DVec3::X), s.z * s.x * stretch(DVec3::Y), s.x * s.y * stretch(DVec3::Z)]
@@ -169,20 +159,20 @@ impl Cuboid {
         2.0 * self.face_areas(|n| (stretch * n).length()).iter().sum::<f64>()
     }
 
-    /// It is.
+    /// Always true.
     pub fn is_solid(&self) -> bool {
         true
     }
 
-    /// Whether the closed box holds `p`.
+    /// Whether the closed box contains `p`.
     pub fn contains(&self, p: DVec3) -> bool {
         self.low.cmple(p).all() && p.cmple(self.high).all()
     }
 
-    /// The nearest point to `p` under a map.
+    /// The nearest point to `p` under any map.
     ///
     /// # Errors
-    /// [`NoNearestPoint::Map`] never.
+    /// None.
     pub fn closest_point(
         &self,
         world_from_object: &Transform,
@@ -204,7 +194,7 @@ impl Cuboid {
         }
         under_similarity(world_from_object, p, |p| {
             let mut point = p.clamp(self.low, self.high);
-            // The face: from within, the nearest; from without, that over which it is farthest.
+            // The face: from inside the nearest, from outside the one that `p` is farthest in front of.
             let depths = [p - self.low, self.high - p];
             let depth = |part: usize| depths[part % 2][part / 2];
             let part = (1..6).fold(0, |best, part| if depth(part) < depth(best) { part } else { best });
@@ -224,7 +214,7 @@ impl Cuboid {
         "box"
     }
 
-    /// A point uniform by area: a face, then a point of it.
+    /// A point uniform by area: first a face, then a point of it.
     pub fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
         let areas = self.face_areas(|_| 1.0);
         let area = 2.0 * areas.iter().sum::<f64>();
@@ -234,13 +224,5 @@ impl Cuboid {
         Some(SurfaceSample { surface, pdf: 1.0 / area })
     }
 
-    /// A point uniform by area, as seen from `from`; `None` when it is seen edge-on.
-    pub fn sample_direction(&self, from: DVec3, u: DVec2) -> Option<DirectionSample> {
-        density::seen_from(from, self.sample_area(u)?)
-    }
-
-    /// The density of [`Cuboid::sample_direction`].
-    pub fn pdf_direction(&self, ray: &Ray, surface: &Surface) -> f64 {
-        density::pdf_seen_from(ray, surface, 1.0 / self.area())
-    }
+    sampled_by_area!(pub);
 }

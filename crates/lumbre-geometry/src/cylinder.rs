@@ -1,4 +1,4 @@
-//! Cylinders: open, capped, infinite.
+//! Cylinders: open or capped, finite or infinite.
 
 use std::f64::consts::TAU;
 
@@ -11,11 +11,12 @@ use crate::{
     SurfaceSample,
 };
 
-/// The points at distance `radius` from an axis, between two planes across it or without end.
+/// The points at distance `radius` from an axis, between two planes perpendicular to it or without end.
 ///
-/// `u` is the azimuth over `phimax` (about z from x towards y for [`Cylinder::along_z`]) and `v` the fraction along the
-/// axis, or the distance along it where the cylinder has no end. On the caps `v` is the fraction of the radius. With caps
-/// and all around it is a convex solid; a ray along the axis of one without end meets nothing.
+/// `u` is the azimuth over `phimax` (about z from x towards y for [`Cylinder::along_z`]), and `v` the fraction
+/// along the axis, or the distance along it when the cylinder is infinite. On the caps `v` is the fraction of
+/// the radius. A complete cylinder with caps is a convex solid. A ray along the axis misses an infinite
+/// cylinder.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cylinder {
     body: Axial,
@@ -62,10 +63,10 @@ impl Cylinder {
         Ok(Self { body: Axial { caps, ..body } })
     }
 
-    /// The cylinder without ends about the line through `point` along `axis`, of any length but zero.
+    /// The infinite cylinder about the line through `point` along `axis`, of any non-zero length.
     ///
     /// # Errors
-    /// [`ShapeError`] unless all is finite, the axis is not zero and the radius greater than 0.
+    /// [`ShapeError`] unless everything is finite, the axis is not zero and the radius is greater than 0.
     pub fn infinite(point: DVec3, axis: DVec3, radius: f64) -> Result<Self, ShapeError> {
         let point = check::finite("point", point)?;
         let axis = check::direction("axis", axis)?;

@@ -1,18 +1,18 @@
-//! Densities per unit area and per unit solid angle, from one to the other.
+//! Conversion between densities per unit area and per unit solid angle.
 
 use lumbre_math::DVec3;
 
 use crate::{DirectionSample, Ray, Surface, SurfaceSample};
 
-/// A point chosen by area, as a direction from `from`; `None` when it is seen edge-on or lies at `from`.
+/// A sample by area as a sample of directions from `from`; `None` when it is seen edge-on or lies at `from`.
 pub(crate) fn seen_from(from: DVec3, sample: SurfaceSample) -> Option<DirectionSample> {
     let to_point = sample.surface.point - from;
     let pdf = per_solid_angle(sample.pdf, to_point, &sample.surface);
     (pdf > 0.0 && pdf.is_finite()).then_some(DirectionSample { surface: sample.surface, pdf })
 }
 
-/// The density per unit solid angle at `ray.origin` of choosing `surface` by a density of `pdf_area` per unit area; 0
-/// when it is seen edge-on.
+/// The density per unit solid angle at `ray.origin` of a point sampled with a density of `pdf_area` per unit
+/// area; 0 when it is seen edge-on.
 pub(crate) fn pdf_seen_from(ray: &Ray, surface: &Surface, pdf_area: f64) -> f64 {
     let pdf = per_solid_angle(pdf_area, surface.point - ray.origin, surface);
     if pdf.is_finite() { pdf } else { 0.0 }
@@ -25,7 +25,8 @@ fn per_solid_angle(pdf_area: f64, to_point: DVec3, surface: &Surface) -> f64 {
     pdf_area * distance_squared / projected
 }
 
-/// One of some shares, chosen in proportion by `u` in [0, 1), and what is left of `u`, again uniform in [0, 1).
+/// An index chosen in proportion to `shares` by `u` in [0, 1), and the remainder of `u`, again uniform in [0,
+/// 1).
 pub(crate) fn choose(shares: &[f64], u: f64) -> (usize, f64) {
     let mut left = u * shares.iter().sum::<f64>();
     let mut last = 0;

@@ -6,21 +6,20 @@ use lumbre_math::rounding::gamma;
 use lumbre_math::{DVec2, DVec3, Transform, orthonormal_basis};
 
 use crate::nearest::{Meridian, under_similarity};
-use crate::shape::check;
+use crate::shape::{check, open_surface, sampled_by_area};
 use crate::support::{arc_support, azimuth, bounds_from_support, dot_size};
 use crate::{
-    Aabb, DirectionSample, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
-    SurfaceSample, density, measure,
+    Aabb, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface, SurfaceSample, measure,
 };
 
 /// The points of a plane between two distances from a centre, both included.
 ///
-/// As in pbrt, `u` is the azimuth over `phimax` and `v` falls from 1 at the inner radius to 0 at the rim. A ray in the
-/// plane does not meet it.
+/// As in pbrt, `u` is the azimuth over `phimax` and `v` falls from 1 at the inner radius to 0 at the rim. A ray
+/// in the plane misses it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Disk {
     center: DVec3,
-    // As given but for a power of two, so that small whole numbers stay exact; its length is of the order of 1.
+    // The given normal times a power of two, so that small integers stay exact; of the order of 1 in length.
     normal: DVec3,
     // 0 <= inner_radius < radius.
     radius: f64,
@@ -29,10 +28,11 @@ pub struct Disk {
 }
 
 impl Disk {
-    /// The disk about `center` across `normal` (of any length but zero), with a hole of `inner_radius` unless that is 0.
+    /// The disk about `center` perpendicular to `normal` (of any non-zero length), with a hole of
+    /// `inner_radius` unless that is 0.
     ///
     /// # Errors
-    /// [`ShapeError`] unless all is finite, the normal is not zero, and 0 ≤ inner radius < radius.
+    /// [`ShapeError`] unless everything is finite, the normal is not zero, and 0 ≤ inner radius < radius.
     pub fn new(center: DVec3, normal: DVec3, radius: f64, inner_radius: f64) -> Result<Self, ShapeError> {
         let center = check::finite("center", center)?;
         let normal = check::scaled_direction("normal", normal)?;
@@ -56,7 +56,7 @@ impl Disk {
         self.normal.normalize()
     }
 
-    /// The point at `t`, relative to the centre, in the disk's plane.
+    /// The point at `t` in the disk's plane, relative to the centre.
     fn arm(&self, ray: &Ray, t: f64) -> DVec3 {
         let w = (ray.origin - self.center) + t * ray.direction;
         w - (w.dot(self.normal) / self.normal.length_squared()) * self.normal
@@ -109,7 +109,7 @@ impl Disk {
     fn surface_on(&self, w: DVec3, uv: DVec2) -> Surface {
         let normal = self.normal();
         let rho = w.length();
-        // At the centre every direction will do.
+        // At the centre any direction will do.
         let outward = if rho > 0.0 { w / rho } else { orthonormal_basis(normal).0 };
         let point = self.center + w;
         Surface {
@@ -125,7 +125,7 @@ impl Disk {
         }
     }
 
-    /// The box under a transform; tight for sectors too.
+    /// The bounding box under a transform, tight for sectors too.
     pub fn bounds(&self, world_from_object: &Transform) -> Option<Aabb> {
         let normal = self.normal();
         let (e1, e2) = orthonormal_basis(normal);
@@ -133,7 +133,7 @@ impl Disk {
             let reach = if self.phi_max >= TAU {
                 self.radius * d.cross(normal).length()
             } else {
-                // On a ray from the centre the extreme is at one of its ends.
+                // On a radius the extreme is at one of its ends.
                 let unit = arc_support(d.dot(e1), d.dot(e2), 0.0, self.phi_max);
                 (self.radius * unit).max(self.inner_radius * unit)
             };
@@ -143,7 +143,7 @@ impl Disk {
         Some(bounds_from_support(world_from_object, magnitude, support))
     }
 
-    /// The whole disk, without its hole.
+    /// A bounding volume: the whole disk, without its hole.
     pub fn hull(&self) -> Option<Hull> {
         let (e1, e2) = orthonormal_basis(self.normal());
         Hull::flat(self.center, self.radius * e1, self.radius * e2, Hull::BALL)
@@ -159,17 +159,9 @@ impl Disk {
         self.area() * (measure::area_stretch(world_from_object) * self.normal()).length()
     }
 
-    /// It is not.
-    pub fn is_solid(&self) -> bool {
-        false
-    }
+    open_surface!();
 
-    /// It holds no volume.
-    pub fn contains(&self, _p: DVec3) -> bool {
-        false
-    }
-
-    /// The nearest point to `p` under a map that keeps angles.
+    /// The nearest point to `p` under a similarity.
     ///
     /// # Errors
     /// [`NoNearestPoint::Map`] for other maps.
@@ -209,13 +201,5 @@ impl Disk {
         Some(SurfaceSample { surface, pdf: 1.0 / self.area() })
     }
 
-    /// A point uniform by area, as seen from `from`; `None` when it is seen edge-on.
-    pub fn sample_direction(&self, from: DVec3, u: DVec2) -> Option<DirectionSample> {
-        density::seen_from(from, self.sample_area(u)?)
-    }
-
-    /// The density of [`Disk::sample_direction`].
-    pub fn pdf_direction(&self, ray: &Ray, surface: &Surface) -> f64 {
-        density::pdf_seen_from(ray, surface, 1.0 / self.area())
-    }
+    sampled_by_area!(pub);
 }

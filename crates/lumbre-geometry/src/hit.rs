@@ -1,20 +1,20 @@
-//! What a search finds, and what is computed once for the winner.
+//! Crossings, and the surface at a hit.
 
 use lumbre_math::{DVec2, DVec3};
 use smallvec::SmallVec;
 
-/// A crossing of a surface by a ray: the little that a search keeps.
+/// A crossing of a ray with a surface: as little as a search needs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Root {
-    /// Where, in units of the ray's direction.
+    /// The ray parameter, in units of the direction's length.
     pub t: f64,
-    /// Which part of the shape: 0 for the surface or the lateral surface; 1 and 2 for the caps at the first and second
-    /// end; 0 to 5 for a box's faces -x, +x, -y, +y, -z, +z. For CSG, see `Csg`.
+    /// The part of the shape: 0 for the only or the lateral surface; 1 and 2 for the caps at the first and
+    /// second end; 0 to 5 for a box's faces -x, +x, -y, +y, -z, +z. For CSG, see `Csg`.
     pub part: u32,
-    /// How often: 2 where a ray touches without crossing, as the multiplicity of a polynomial's root.
+    /// The multiplicity as a root of a polynomial: 2 where a ray touches without crossing.
     pub multiplicity: u8,
-    /// Surface coordinates that the search had to find anyway: barycentrics (b1, b2) of a triangle, (u, v) of a
-    /// bilinear patch; zero for others, which compute theirs for the winner only.
+    /// Surface coordinates that the search computes anyway: barycentrics (b1, b2) of a triangle, (u, v) of a
+    /// bilinear patch. Zero for other shapes, which compute theirs for the closest hit only.
     pub local: DVec2,
 }
 
@@ -32,11 +32,12 @@ pub type Roots = SmallVec<[Root; 4]>;
 /// The surface at a hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surface {
-    /// The point, re-projected onto the surface: its error does not grow with the distance to the ray's origin.
+    /// The point, re-projected onto the surface, so that its error does not grow with the distance to the ray's
+    /// origin.
     pub point: DVec3,
     /// A bound on the absolute error of each component of `point`.
     pub point_error: DVec3,
-    /// The geometric normal: unit, outward for closed shapes, not turned towards the ray.
+    /// The geometric normal: unit, outward for closed shapes, not flipped towards the ray.
     pub normal: DVec3,
     /// Surface parameters, each in [0, 1] on bounded shapes.
     pub uv: DVec2,
@@ -51,15 +52,15 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// An origin for a ray that leaves along `direction`: on that side of the surface, past the error of `point`, so that
-    /// the ray does not meet the surface where it starts.
+    /// The origin for a ray that leaves along `direction`: moved to that side of the surface by the error of
+    /// `point`, so that the ray does not hit the surface where it starts.
     ///
     /// M. Pharr, W. Jakob, G. Humphreys, "Physically Based Rendering", 3rd edition, 2016, section 3.9.
     pub fn offset_origin(&self, direction: DVec3) -> DVec3 {
         let distance = self.normal.abs().dot(self.point_error);
         let side = if self.normal.dot(direction) < 0.0 { -self.normal } else { self.normal };
         let moved = self.point + distance * side;
-        // Away from the surface, whatever the last addition rounded off.
+        // Round away from the surface.
         let outward = |axis: usize| match side[axis] {
             s if s > 0.0 => moved[axis].next_up(),
             s if s < 0.0 => moved[axis].next_down(),
@@ -69,20 +70,20 @@ impl Surface {
     }
 }
 
-/// A point chosen on a surface.
+/// A point sampled on a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceSample {
-    /// Where it is, with its normal and parameters.
+    /// The point, with its normal and parameters.
     pub surface: Surface,
-    /// The density of the choice, per unit area.
+    /// The probability density per unit area.
     pub pdf: f64,
 }
 
-/// A point chosen on a surface as seen from somewhere.
+/// A point sampled on a surface as seen from another point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DirectionSample {
-    /// Where it is, with its normal and parameters.
+    /// The point, with its normal and parameters.
     pub surface: Surface,
-    /// The density of the choice, per unit solid angle at the place that it is seen from.
+    /// The probability density per unit solid angle at the other point.
     pub pdf: f64,
 }

@@ -1,29 +1,29 @@
-//! Simple bodies around shapes, for searches that ask first whether a ray comes near.
+//! Bounding volumes for quick rejection of rays.
 
 use lumbre_math::{DMat3, DVec3, Transform};
 
 use crate::Aabb;
 
-/// A body that holds a shape: where a line misses it, it misses the shape.
+/// A bounding volume of a shape: a line that misses it misses the shape.
 ///
-/// Its points are `center + axes * q`, for the `q` in the cube from -1 to 1 on each axis with x² + y² + c z² + d z + e ≤ 0 for
-/// `profile` = [c, d, e]: with the right numbers a ball, a cylinder, a cone, a paraboloid, or the whole cube; and of a ring, they
-/// also are those of its tube.
+/// Its points are `center + axes * q`, for `q` in the cube [-1, 1]³ with x² + y² + c z² + d z + e ≤ 0 for
+/// `profile` = [c, d, e]. This makes a ball, a cylinder, a cone, a paraboloid, or the whole cube. The points of
+/// a ring torus also satisfy the equation of its tube.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hull {
-    /// Where `q` is 0.
+    /// The point where `q` is 0.
     pub center: DVec3,
-    /// From the centre to where x, y and z are 1. Nothing in it is 0, even where the body is flat.
+    /// The vectors from the centre to where x, y and z are 1. All are non-zero, even of a flat volume.
     pub axes: DMat3,
-    /// Whether the body has no extent along y: then it is the points with y = 0.
+    /// Whether the volume has no extent along y: then it is the points with y = 0.
     pub is_flat: bool,
-    /// c, d and e: none beyond 2 in size, but for an `e` of -8 where all of the cube is in the body.
+    /// c, d and e, each at most 2 in magnitude; but `e` is -8 where the volume is the whole cube.
     pub profile: [f64; 3],
-    /// Of a ring, the radius r of its tube by its largest radius, less than a half; else 0. Of its points, whose ρ is √(x² + y²),
-    /// (ρ - (1 - r))² + r² z² is r², and what encloses them is less.
+    /// Of a ring torus, the radius r of its tube over its largest radius, less than 1/2; else 0. With ρ = √(x²
+    /// + y²), its points satisfy (ρ - (1 - r))² + r² z² = r², and the points inside are less.
     pub tube: f64,
-    /// Whether the shape is the border of all of the body, and this is not flat: then every line that passes through its inside
-    /// crosses the shape where it enters it and where it leaves it. A ring is solid.
+    /// Whether the shape is the whole boundary of the volume, which is not flat: then every line through its
+    /// interior crosses the shape where it enters and where it leaves. True for a ring torus.
     pub is_solid: bool,
 }
 
@@ -32,20 +32,20 @@ impl Hull {
     pub(crate) const BALL: [f64; 3] = [1.0, 0.0, -1.0];
     pub(crate) const CYLINDER: [f64; 3] = [0.0, 0.0, -1.0];
 
-    /// A body that is not flat, and no ring.
+    /// A volume that is neither flat nor a ring.
     pub(crate) fn new(center: DVec3, axes: DMat3, profile: [f64; 3], is_solid: bool) -> Self {
         Self { center, axes, is_flat: false, profile, tube: 0.0, is_solid }
     }
 
-    /// A flat body in the plane through `center` along `x` and `z`, which are neither 0 nor parallel. `None` where these are too
-    /// short or too long for a product to tell.
+    /// A flat volume in the plane through `center` along `x` and `z`, which are neither 0 nor parallel. `None`
+    /// where their product over- or underflows.
     pub(crate) fn flat(center: DVec3, x: DVec3, z: DVec3, profile: [f64; 3]) -> Option<Self> {
         let normal = z.cross(x).try_normalize()?;
         let axes = DMat3::from_cols(x, normal * x.length().max(z.length()), z);
         Some(Self { center, axes, is_flat: true, profile, tube: 0.0, is_solid: false })
     }
 
-    /// A box. `None` where it is less than a rectangle.
+    /// A box; `None` where it is less than a rectangle.
     pub(crate) fn of_box(bounds: &Aabb) -> Option<Self> {
         let (center, half) = (bounds.center(), 0.5 * bounds.size());
         let flat = (0..3).filter(|&axis| half[axis] == 0.0).collect::<Vec<_>>();
@@ -57,13 +57,13 @@ impl Hull {
         }
     }
 
-    /// The same under a map.
+    /// The volume under a map.
     #[must_use]
     pub fn under(&self, map: &Transform) -> Self {
         Self { center: map.point(self.center), axes: map.linear() * self.axes, ..*self }
     }
 
-    /// Whether the body holds a point that is given by its `q`, give or take `margin`.
+    /// Whether the volume contains the point at `q`, within `margin`.
     pub fn holds(&self, q: DVec3, margin: f64) -> bool {
         let [c, d, e] = self.profile;
         let height = if self.is_flat { 0.0 } else { 1.0 };

@@ -1,4 +1,4 @@
-//! Hyperboloids of one sheet, by turning a segment.
+//! Hyperboloids of one sheet: a segment revolved about an axis.
 
 use std::f64::consts::TAU;
 
@@ -9,18 +9,17 @@ use lumbre_math::{DMat3, DVec2, DVec3, Transform};
 
 use crate::line::{Implicit, NearLine};
 use crate::nearest::{Meridian, under_similarity};
-use crate::shape::check;
+use crate::shape::{check, open_surface, sampled_by_area};
 use crate::support::{arc_support, azimuth, bounds_from_support};
 use crate::{
-    Aabb, DirectionSample, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
-    SurfaceSample, density, measure,
+    Aabb, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface, SurfaceSample, measure,
 };
 
-/// What the segment from `p1` to `p2` sweeps when it turns about the z axis.
+/// The surface that the segment from `p1` to `p2` sweeps about the z axis.
 ///
-/// As in pbrt-v3: `u` is the angle turned over `phimax`, `v` runs along the segment from `p1` to `p2`, and the normal is
-/// that of ∂p/∂u × ∂p/∂v: away from the axis when `p2` is the higher end, towards it when `p1` is. Cylinders and cones are
-/// among them; two ends at one height make a disk instead, which is a shape of its own.
+/// As in pbrt-v3: `u` is the angle of rotation over `phimax`, `v` runs along the segment from `p1` to `p2`, and
+/// the normal is along ∂p/∂u × ∂p/∂v: away from the axis when `p2` is the higher end, towards it when `p1` is.
+/// Cylinders and cones are special cases. Ends at the same height are refused: that is a disk.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hyperboloid {
     p1: DVec3,
@@ -34,11 +33,11 @@ pub struct Hyperboloid {
 }
 
 impl Hyperboloid {
-    /// The surface swept by the segment from `p1` to `p2` turning by `phimax` degrees, x towards y.
+    /// The surface swept by the segment from `p1` to `p2` through `phimax` degrees, x towards y.
     ///
     /// # Errors
-    /// [`ShapeError`] unless the ends are finite, at different heights, not both on the axis, and `phimax` is in (0, 360];
-    /// and when the fourth powers of its lengths are beyond all numbers.
+    /// [`ShapeError`] unless the ends are finite, at different heights, not both on the axis, and `phimax` is
+    /// in (0, 360]; and when the fourth powers of its lengths over- or underflow.
     pub fn new(p1: DVec3, p2: DVec3, phimax: f64) -> Result<Self, ShapeError> {
         let p1 = check::finite("p1", p1)?;
         let p2 = check::finite("p2", p2)?;
@@ -63,7 +62,7 @@ impl Hyperboloid {
         Ok(hyperboloid)
     }
 
-    /// The segment's point at `v`, before it turns.
+    /// The segment's point at `v`, before rotation.
     fn segment(&self, v: f64) -> DVec3 {
         self.p1 + v * self.along
     }
@@ -72,11 +71,11 @@ impl Hyperboloid {
         (z - self.p1.z) / self.along.z
     }
 
-    /// Cosine and sine of how far the segment has turned when it passes through `p`.
+    /// The cosine and sine of the rotation that takes the segment through `p`.
     fn turn(&self, p: DVec3) -> DVec2 {
         let q = self.segment(self.v_of(p.z));
         let turn = DVec2::new(p.x * q.x + p.y * q.y, p.y * q.x - p.x * q.y);
-        // Where the segment meets the axis, every angle is as good.
+        // Where the segment meets the axis, any angle will do.
         turn.try_normalize().unwrap_or(DVec2::X)
     }
 
@@ -132,11 +131,11 @@ impl Hyperboloid {
         self.surface_on(near + self.implicit(near).to_surface())
     }
 
-    /// The nearest point of the circle, or the part of one, that the segment's point at `v` sweeps.
+    /// The nearest point of the arc that the segment's point at `v` sweeps.
     fn nearest_at(&self, p: DVec3, v: f64) -> NearestPoint {
         let q = self.segment(v);
         let start = azimuth(q.y, q.x);
-        // The frame that has turned to where the sweep begins.
+        // In the frame rotated to the beginning of the sweep.
         let flat = DVec2::from_angle(-start).rotate(p.truncate());
         let meridian = Meridian::new(flat.extend(p.z), self.phi_max);
         let r = q.truncate().length();
@@ -170,7 +169,7 @@ impl Hyperboloid {
         let size = p.abs() + self.p1.abs() + self.along.abs();
         Surface {
             point: p,
-            // The next ray's crossing is found to the rounding of the whole surface.
+            // The next ray's crossing has an error relative to the whole surface.
             point_error: DVec3::splat(gamma(16) * size.max_element() + implicit.uncertainty()),
             normal: side * implicit.normal(),
             uv: DVec2::new((azimuth(turn.y, turn.x) / self.phi_max).min(1.0), self.v_of(p.z).clamp(0.0, 1.0)),
@@ -181,7 +180,7 @@ impl Hyperboloid {
         }
     }
 
-    /// The box under a transform, tight: at every angle the segment has its extreme point at an end.
+    /// The tight bounding box under a transform: at every angle the segment's extreme point is an end.
     pub fn bounds(&self, world_from_object: &Transform) -> Option<Aabb> {
         let ends = [self.p1, self.p1 + self.along];
         let support = |d: DVec3| {
@@ -196,7 +195,7 @@ impl Hyperboloid {
         Some(bounds_from_support(world_from_object, DVec3::new(radius, radius, height), support))
     }
 
-    /// What it surrounds, between its rims.
+    /// A bounding volume: the solid between its rims.
     pub fn hull(&self) -> Option<Hull> {
         let p2 = self.p1 + self.along;
         let radius = self.p1.truncate().length().max(p2.truncate().length());
@@ -212,7 +211,7 @@ impl Hyperboloid {
         Some(Hull::new(center, axes, profile, false))
     }
 
-    /// The area element is √(square v² + 2 linear v + constant) dφ dv: the three coefficients.
+    /// The coefficients of the area element √(square v² + 2 linear v + constant) dφ dv.
     fn element(&self) -> (f64, f64, f64) {
         let climb = self.along.z * self.along.z;
         (
@@ -222,12 +221,12 @@ impl Hyperboloid {
         )
     }
 
-    /// The integral of the area element from the segment's start to `v`, per radian, and its slope.
+    /// The integral of the area element from the segment's start to `v`, per radian, and its derivative.
     fn swept(&self, v: f64) -> (f64, f64) {
         let (square, linear, constant) = self.element();
         let element = |v: f64| ((square * v + 2.0 * linear) * v + constant).max(0.0).sqrt();
         if square <= 1e-4 * constant {
-            // Nearly a cylinder: the closed form would subtract large numbers, and quadrature is as good as exact.
+            // Nearly a cylinder: the closed form would cancel, and quadrature is accurate.
             return (measure::integrate(0.0, v, element), element(v));
         }
         let offset = linear / square;
@@ -267,17 +266,9 @@ impl Hyperboloid {
         piece((0.0, split)) + piece((split, 1.0))
     }
 
-    /// Never: it has no lids.
-    pub fn is_solid(&self) -> bool {
-        false
-    }
+    open_surface!();
 
-    /// Nothing.
-    pub fn contains(&self, _p: DVec3) -> bool {
-        false
-    }
-
-    /// The nearest point to `p` under a map that keeps angles.
+    /// The nearest point to `p` under a similarity.
     ///
     /// # Errors
     /// [`NoNearestPoint::Map`] for other maps.
@@ -290,8 +281,9 @@ impl Hyperboloid {
             let mut best = self.nearest_at(p, 0.0);
             let mut take = |v: f64| best = best.or_nearer(self.nearest_at(p, v));
             take(1.0);
-            // Where the slope of the squared distance along the segment vanishes when it has turned towards the point: with
-            // r² = start + 2 middle v + end v² and the point at (x, z), (middle + end v)(1 - x/r) + (z of v - z) dz/dv = 0.
+            // Zeros of the derivative of the squared distance along the segment, rotated towards the point:
+            // with r² = start + 2 middle v + end v² and the point at (x, z), (middle + end v)(1 - x/r) + (z of
+            // v - z) dz/dv = 0.
             let x = p.truncate().length();
             let rise = self.along.z;
             let line = [self.middle + rise * (self.p1.z - p.z), self.end + rise * rise];
@@ -308,7 +300,7 @@ impl Hyperboloid {
             let on_axis = [-line[0] / line[1], -self.middle / self.end];
             for v in roots_between(&slope, 0.0, 1.0).iter().copied().chain(on_axis) {
                 let mut v = v;
-                // Steps of Newton's method, since the polynomial has few digits next to the axis.
+                // Newton steps, since the polynomial is inaccurate near the axis.
                 for _ in 0..3 {
                     let r = (radius[0] + v * (radius[1] + v * radius[2])).sqrt();
                     let half_spread = self.middle + self.end * v;
@@ -326,7 +318,7 @@ impl Hyperboloid {
                 }
             }
             if self.phi_max < TAU {
-                // The segment where it begins and ends to turn.
+                // The segment at both ends of the sweep.
                 for phi in [0.0, self.phi_max] {
                     let turn = DVec2::from_angle(phi);
                     let start = turn.rotate(self.p1.truncate()).extend(self.p1.z);
@@ -359,13 +351,5 @@ impl Hyperboloid {
         Some(SurfaceSample { surface, pdf: 1.0 / (self.phi_max * total) })
     }
 
-    /// A point uniform by area, as seen from `from`.
-    pub fn sample_direction(&self, from: DVec3, u: DVec2) -> Option<DirectionSample> {
-        density::seen_from(from, self.sample_area(u)?)
-    }
-
-    /// The density of [`Hyperboloid::sample_direction`].
-    pub fn pdf_direction(&self, ray: &Ray, surface: &Surface) -> f64 {
-        density::pdf_seen_from(ray, surface, 1.0 / self.area())
-    }
+    sampled_by_area!(pub);
 }

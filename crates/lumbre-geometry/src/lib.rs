@@ -71,7 +71,7 @@ shape::shapes! {
     paraboloid::Paraboloid in Paraboloid,
     /// A hyperboloid of revolution.
     hyperboloid::Hyperboloid in Box<Hyperboloid>,
-    /// A general quadric, in a box if it is to be bounded.
+    /// A general quadric, bounded by a clipping box if it is open.
     quadric::Quadric in Box<Quadric>,
     /// Unions, intersections and differences of solids.
     csg::Csg in Box<Csg>,

@@ -1,13 +1,13 @@
-//! Lines moved near the shape that they are tested against, and what surfaces given by an equation share.
+//! A ray's line relative to a nearby origin, and implicit surfaces.
 
 use lumbre_math::DVec3;
 use lumbre_math::rounding::gamma;
 
 use crate::{Ray, Root};
 
-/// A ray's line, from where it is nearest to a place: the points `p + s d`, at t = shift + s.
+/// A ray's line with its origin moved to the point nearest to `place`: the points `p + s d`, at t = shift + s.
 ///
-/// Coefficients formed here are as small as the shape, however far away the ray began, so that a discriminant keeps its
+/// Coefficients computed from it do not grow with the distance of the ray's origin, so a discriminant keeps its
 /// digits.
 pub(crate) struct NearLine {
     pub(crate) p: DVec3,
@@ -57,39 +57,41 @@ impl NearLine {
     }
 }
 
-/// Normals of the surface F = 0 at a point, from F's derivatives there.
+/// An implicit function F at a point: its value and derivatives.
 pub(crate) struct Implicit {
     pub(crate) value: f64,
     pub(crate) gradient: DVec3,
-    /// The sum of the sizes of F's terms, of which `value` is what is left.
+    /// The sum of the absolute values of F's terms, which bounds the rounding error of `value`.
     pub(crate) terms: f64,
 }
 
 impl Implicit {
-    /// The way to the surface: one step of Newton's, which squares an error that is rounding already.
+    /// The step to the surface: one of Newton's method, whose remaining error is the square of a rounding
+    /// error.
     pub(crate) fn to_surface(&self) -> DVec3 {
         let step = -self.value / self.gradient.length_squared() * self.gradient;
         if step.is_finite() { step } else { DVec3::ZERO }
     }
 
-    /// How far off the surface a point can be for which F came out as 0.
+    /// A bound on the distance from the surface of a point where F evaluates to 0.
     pub(crate) fn uncertainty(&self) -> f64 {
         let distance = gamma(12) * self.terms / self.gradient.length();
-        // At a singular point the surface is known to half the digits only, in units of nothing; say nothing then.
+        // At a singular point there is no useful bound.
         if distance.is_finite() { distance } else { 0.0 }
     }
 
-    /// The derivative of the unit normal gradient/|gradient| along a tangent, given the Hessian's product with it.
+    /// The derivative of the unit normal gradient/|gradient| along a tangent, given the Hessian's product with
+    /// the tangent.
     pub(crate) fn turning(&self, hessian_times_tangent: DVec3) -> DVec3 {
         let length = self.gradient.length();
         let normal = self.gradient / length;
         let across = (hessian_times_tangent - normal * normal.dot(hessian_times_tangent)) / length;
-        // Once more: where the normal hardly turns, what is left is rounding.
+        // Orthogonalised twice: where the derivative is small, the first result is mostly rounding error.
         let turned = across - normal * normal.dot(across);
         if turned.is_finite() { turned } else { DVec3::ZERO }
     }
 
-    /// The unit normal; z where there is none.
+    /// The unit normal; z where the gradient is zero.
     pub(crate) fn normal(&self) -> DVec3 {
         self.gradient.try_normalize().unwrap_or(DVec3::Z)
     }

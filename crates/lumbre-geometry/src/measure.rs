@@ -1,9 +1,9 @@
-//! Areas that have no elementary closed form: quadrature, and Carlson's symmetric integrals.
+//! Areas without an elementary closed form: quadrature, and Carlson's symmetric integrals.
 
 use lumbre_math::{DMat3, DVec3, Transform};
 
-/// How much a linear map stretches area elements: with the cofactor matrix C = det(L) L⁻ᵀ, an area element with normal
-/// `n` grows by |C n|.
+/// How a linear map stretches area elements: with the cofactor matrix C = det(L) L⁻ᵀ, an area element with
+/// normal `n` grows by |C n|.
 pub(crate) fn area_stretch(world_from_object: &Transform) -> DMat3 {
     let l = world_from_object.linear();
     DMat3::from_cols(l.y_axis.cross(l.z_axis), l.z_axis.cross(l.x_axis), l.x_axis.cross(l.y_axis))
@@ -20,8 +20,8 @@ pub(crate) fn similarity_factor(world_from_object: &Transform) -> Option<f64> {
     similar.then(|| ((x + y + z) / 3.0).sqrt())
 }
 
-/// The integral of `f` from `a` to `b` to about twelve digits: 16-point Gauss–Legendre on panels that double in number
-/// until the result settles.
+/// The integral of `f` from `a` to `b` to about twelve digits: 16-point Gauss–Legendre, doubling the number of
+/// panels until the result converges.
 pub(crate) fn integrate(a: f64, b: f64, f: impl Fn(f64) -> f64) -> f64 {
     let rule = gauss_legendre();
     let on_panels = |panels: u32| {
@@ -55,7 +55,7 @@ pub(crate) fn integrate_2d(x: (f64, f64), y: (f64, f64), f: impl Fn(f64, f64) ->
     settle(on_panels, 64)
 }
 
-/// Doubles the panels until two results agree, or there are `most`.
+/// Doubles the number of panels until two results agree, up to `most`.
 fn settle(on_panels: impl Fn(u32) -> f64, most: u32) -> f64 {
     let mut panels = 2;
     let mut previous = on_panels(1);
@@ -101,7 +101,8 @@ pub(crate) fn ellipsoid_area(radius: f64, world_from_object: &Transform) -> f64 
     4.0 * std::f64::consts::PI * radius * radius * scale * carlson_rg(x, y, z)
 }
 
-/// The eigenvalues of a symmetric matrix by cyclic Jacobi rotations; negative ones, which only rounding makes here, as 0.
+/// The eigenvalues of a symmetric matrix by cyclic Jacobi rotations; negative ones, which are rounding errors
+/// here, become 0.
 fn symmetric_eigenvalues(m: DMat3) -> [f64; 3] {
     let mut a = m.to_cols_array_2d();
     for _ in 0..12 {
@@ -129,7 +130,7 @@ fn symmetric_eigenvalues(m: DMat3) -> [f64; 3] {
 fn carlson_rg(x: f64, y: f64, z: f64) -> f64 {
     let mut sorted = [x, y, z];
     sorted.sort_by(f64::total_cmp);
-    // With z between the others no term below is negative, and nothing cancels.
+    // With z between the others no term is negative, and nothing cancels.
     let [x, z, y] = sorted;
     if z == 0.0 {
         return 0.5 * y.sqrt();
@@ -142,7 +143,7 @@ fn carlson_rg(x: f64, y: f64, z: f64) -> f64 {
 fn carlson_rf_rd(x: f64, y: f64, z: f64) -> (f64, f64) {
     let (mut x, mut y, mut z) = (x, y, z);
     let (mut sum, mut factor) = (0.0, 1.0);
-    // Each turn brings the arguments four times closer; 30 turns bring any two doubles together far enough.
+    // Each iteration brings the arguments four times closer; 30 suffice for any two doubles.
     for _ in 0..60 {
         let mean = (x + y + z) / 3.0;
         let spread = (x - mean).abs().max((y - mean).abs()).max((z - mean).abs());

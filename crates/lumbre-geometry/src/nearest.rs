@@ -1,4 +1,4 @@
-//! The point of a surface that is nearest to a given one: what the shapes' methods share.
+//! Nearest points: the common part of the shapes' methods.
 
 use std::f64::consts::TAU;
 
@@ -6,34 +6,33 @@ use lumbre_math::{DMat3, DVec2, DVec3, Transform};
 
 use crate::support::azimuth;
 
-/// The point of a surface that is nearest to a given one.
+/// The point of a surface that is nearest to a given point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NearestPoint {
-    /// Where it is, in world space.
+    /// The point, in world space.
     pub point: DVec3,
-    /// How far it is away, never negative.
+    /// The distance to the given point, never negative.
     pub distance: f64,
     /// The part of the shape that it lies on: see [`crate::Root::part`].
     pub part: u32,
-    /// Surface parameters, as [`crate::Surface::uv`] has them; the weights (b1, b2) of a triangle.
+    /// Surface parameters, as in [`crate::Surface::uv`]; the weights (b1, b2) of a triangle.
     pub uv: DVec2,
 }
 
-/// Why a shape has no answer to give.
+/// Why there is no nearest point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum NoNearestPoint {
-    /// The point that was asked for is not finite.
+    /// The given point is not finite.
     NotFinite,
-    /// The shape is curved, it stands under a map that does not keep angles (up to 1e-13), and there is no method for its
+    /// The shape is curved, its map is not a similarity (to within 1e-13), and there is no method for its
     /// image.
     Map,
     /// A quadric that is not closed.
     OpenQuadric,
-    /// Geometry of a stranger's that offers no nearest points.
+    /// User geometry that does not implement nearest points.
     NotOffered,
-    /// A solid composed of others, of which the nearest leaf's nearest point is not on the result, or not clearly; or one
-    /// with strangers' solids.
+    /// CSG whose nearest leaf point is not on the result, or not beyond doubt; or that has user-defined solids.
     Csg,
 }
 
@@ -54,13 +53,13 @@ impl std::error::Error for NoNearestPoint {}
 pub(crate) type Nearest = Result<NearestPoint, NoNearestPoint>;
 
 impl NearestPoint {
-    /// The nearer of the two; the first where they are as near.
+    /// The nearer of the two; the first when they are equally near.
     pub(crate) fn or_nearer(self, other: Self) -> Self {
         if other.distance < self.distance { other } else { self }
     }
 }
 
-/// The answer of a method for shapes as they are made, under a map that keeps angles.
+/// Applies a method for object space under a similarity.
 pub(crate) fn under_similarity(
     world_from_object: &Transform,
     p: DVec3,
@@ -75,7 +74,8 @@ pub(crate) fn under_similarity(
     Ok(NearestPoint { point, distance: factor * found.distance, ..found })
 }
 
-/// By how much a map that keeps angles scales lengths, up to the rounding of a few products of maps; `None` for other maps.
+/// The factor by which a similarity scales lengths, allowing for the rounding of a product of a few maps;
+/// `None` for other maps.
 pub fn similarity_factor(world_from_object: &Transform) -> Option<f64> {
     let l = world_from_object.linear();
     let (x, y, z) = (l.x_axis.length_squared(), l.y_axis.length_squared(), l.z_axis.length_squared());
@@ -85,18 +85,18 @@ pub fn similarity_factor(world_from_object: &Transform) -> Option<f64> {
     is_similar.then(|| ((x + y + z) / 3.0).sqrt())
 }
 
-/// The weights (b1, b2) of the point of a triangle that is nearest to the origin, and that point.
+/// The weights (b1, b2) of the point of a triangle nearest to the origin, and that point.
 ///
-/// After C. Ericson, "Real-Time Collision Detection", 2004, section 5.1.5, but for one thing: the foot of the perpendicular
-/// and the nearest points of the three sides are all candidates, so that a sliver, in whose plane the weights have few
-/// digits, is still answered as exactly as its sides are.
+/// After C. Ericson, "Real-Time Collision Detection", 2004, section 5.1.5. Unlike there, the foot of the
+/// perpendicular and the nearest points of all three sides are candidates, so the result is accurate for
+/// slivers, too.
 #[inline]
 pub fn nearest_on_triangle(a: DVec3, b: DVec3, c: DVec3) -> (DVec2, DVec3) {
     let (ab, ac, bc) = (b - a, c - a, c - b);
     let on_side = |start: DVec3, side: DVec3| {
         let size = side.length_squared();
         let t = if size > 0.0 { (-start.dot(side) / size).clamp(0.0, 1.0) } else { 0.0 };
-        // From the nearer end, so that the end itself is met exactly.
+        // From the nearer end, so that the end itself is exact.
         let point = if t <= 0.5 { start + t * side } else { (start + side) - (1.0 - t) * side };
         (t, point, point.length_squared())
     };
@@ -124,32 +124,33 @@ pub fn nearest_on_triangle(a: DVec3, b: DVec3, c: DVec3) -> (DVec2, DVec3) {
     (best.0, best.1)
 }
 
-/// The nearest point of a triangle anywhere.
+/// The nearest point of any triangle.
 pub(crate) fn on_triangle(p: DVec3, [a, b, c]: [DVec3; 3], part: u32) -> NearestPoint {
     let (uv, offset) = nearest_on_triangle(a - p, b - p, c - p);
     NearestPoint { point: p + offset, distance: offset.length(), part, uv }
 }
 
-/// The half-plane about an axis in which a surface of revolution is nearest to a point, and the point as seen in it.
+/// The half-plane about an axis in which a surface of revolution is nearest to a point, and the point's
+/// coordinates in it.
 ///
-/// At any distance r ≥ 0 from the axis, the squared distance falls as the cosine of the angle between the azimuths grows: so
-/// the nearest azimuth is the point's own or, where the sweep does not hold that, the nearer end of the sweep, whatever the
-/// profile.
+/// At any distance r ≥ 0 from the axis, the squared distance decreases with the cosine of the angle between the
+/// azimuths. So for any profile the nearest azimuth is the point's own or, outside the sweep, the nearer end of
+/// the sweep.
 pub(crate) struct Meridian {
-    /// The half-plane's direction, across the axis.
+    /// The unit direction of the half-plane, perpendicular to the axis.
     pub(crate) outward: DVec2,
     /// The azimuth, from 0 to the end of the sweep.
     pub(crate) phi: f64,
-    /// The point: from the axis along `outward`, which may be negative.
+    /// The point's coordinate along `outward`; may be negative.
     pub(crate) x: f64,
-    /// The same along the axis.
+    /// The point's coordinate along the axis.
     pub(crate) z: f64,
     /// The point's distance from the half-plane.
     pub(crate) aside: f64,
 }
 
 impl Meridian {
-    /// Of a point in the frame of the axis.
+    /// For a point in the frame of the axis.
     pub(crate) fn new(p: DVec3, phi_max: f64) -> Self {
         let rho = p.x.hypot(p.y);
         let phi = azimuth(p.y, p.x);
@@ -164,19 +165,19 @@ impl Meridian {
         Self { outward, phi, x: flat.dot(outward), z: p.z, aside: flat.perp_dot(outward) }
     }
 
-    /// How far the point is from that at (r, z) of the half-plane.
+    /// The distance of the point from (r, z) in the half-plane.
     pub(crate) fn distance(&self, r: f64, z: f64) -> f64 {
         DVec3::new(r - self.x, z - self.z, self.aside).length()
     }
 }
 
-/// The point of the sphere about the origin of `radius` whose image under the linear map is nearest to `d`, for a map of
-/// three axes that are not in a plane.
+/// The point of the sphere of `radius` about the origin whose image under an invertible linear map is nearest
+/// to `d`.
 ///
-/// The map's singular values are the semi-axes of the image (found by rotating its columns until they are perpendicular: M.
-/// R. Hestenes, "Inversion of matrices by biorthogonalization and related results", 1958), and the nearest point of an
-/// ellipsoid is the one root of a monotone function: D. Eberly, "Distance from a point to an ellipse, an ellipsoid, or a
-/// hyperellipsoid", 2013.
+/// The map's singular values are the semi-axes of the image, by one-sided Jacobi rotations (M. R. Hestenes,
+/// "Inversion of matrices by biorthogonalization and related results", 1958). The nearest point of an ellipsoid
+/// is the one root of a monotone function (D. Eberly, "Distance from a point to an ellipse, an ellipsoid, or a
+/// hyperellipsoid", 2013).
 pub(crate) fn nearest_on_ellipsoid(map: DMat3, radius: f64, d: DVec3) -> DVec3 {
     let mut image = [map.x_axis * radius, map.y_axis * radius, map.z_axis * radius];
     let mut turn = [DVec3::X, DVec3::Y, DVec3::Z];
@@ -205,19 +206,19 @@ pub(crate) fn nearest_on_ellipsoid(map: DMat3, radius: f64, d: DVec3) -> DVec3 {
     let axes = order.map(|i| image[i].length());
     let place = order.map(|i| d.dot(image[i]) / image[i].length());
     let found = on_centred_ellipsoid(axes, place.map(f64::abs));
-    // Back to the sphere, and onto it.
+    // Back to the sphere, and projected onto it.
     let on_sphere =
         (0..3).fold(DVec3::ZERO, |sum, i| sum + (found[i] / axes[i]).copysign(place[i]) * turn[order[i]]);
     on_sphere * (radius / on_sphere.length())
 }
 
-/// The point nearest to `y` (no coordinate negative) of the ellipsoid with these semi-axes, the largest first.
+/// The point nearest to `y` (no negative coordinate) of the ellipsoid with these semi-axes, the largest first.
 fn on_centred_ellipsoid(axes: [f64; 3], y: [f64; 3]) -> [f64; 3] {
     let mut found = [0.0; 3];
     for last in (0..3).rev() {
         let smallest = axes[last];
         if y[last] > 0.0 {
-            // The point is e_i² y_i / (e_i² + s) with one s > -e²; q = (e² + s)/e² keeps its digits next to 0.
+            // The point is e_i² y_i / (e_i² + s) for one s > -e²; q = (e² + s)/e² stays accurate near 0.
             let ratio = |i: usize| (axes[i] / smallest) * (axes[i] / smallest);
             let more = |i: usize| ((axes[i] - smallest) / smallest) * ((axes[i] + smallest) / smallest);
             let z = |i: usize| y[i] / axes[i];
@@ -237,7 +238,7 @@ fn on_centred_ellipsoid(axes: [f64; 3], y: [f64; 3]) -> [f64; 3] {
             }
             return found;
         }
-        // In a plane of symmetry: the nearest points are a pair beside it, or in it.
+        // In a plane of symmetry: the nearest points are a symmetric pair, or one in the plane.
         let share = |i: usize| axes[i] * y[i] / ((axes[i] - smallest) * (axes[i] + smallest));
         let is_deep = (0..last).all(|i| axes[i] * y[i] < (axes[i] - smallest) * (axes[i] + smallest));
         let rest = 1.0 - (0..last).map(|i| share(i) * share(i)).sum::<f64>();

@@ -9,17 +9,16 @@ use lumbre_math::{DMat3, DVec2, DVec3, Transform};
 
 use crate::line::{Implicit, NearLine};
 use crate::nearest::{Meridian, under_similarity};
-use crate::shape::check;
+use crate::shape::{check, open_surface, sampled_by_area};
 use crate::support::{arc_support, azimuth, bounds_from_support};
 use crate::{
-    Aabb, DirectionSample, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
-    SurfaceSample, density, measure,
+    Aabb, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface, SurfaceSample, measure,
 };
 
-/// The surface `z = zmax (x² + y²)/radius²` between two heights: the bowl, open upwards, whose rim at `zmax` has the given
-/// radius.
+/// The surface `z = zmax (x² + y²)/radius²` between two heights: a bowl, open upwards, with the given radius at
+/// `zmax`.
 ///
-/// As in pbrt-v3: `u` is the azimuth over `phimax`, `v` the height as a fraction of the way from `zmin` to `zmax`, and the
+/// As in pbrt-v3: `u` is the azimuth over `phimax`, `v` the height as a fraction from `zmin` to `zmax`, and the
 /// normal points out of the bowl, downwards at its bottom.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Paraboloid {
@@ -31,12 +30,12 @@ pub struct Paraboloid {
 }
 
 impl Paraboloid {
-    /// The bowl with a rim of `radius` at the greater of the two heights, down to the lesser, with azimuth up to `phimax`
-    /// degrees.
+    /// The bowl with a rim of `radius` at the greater of the two heights, down to the lesser, with azimuth up
+    /// to `phimax` degrees.
     ///
     /// # Errors
-    /// [`ShapeError`] unless the heights are finite, different, and the greater one above 0, `radius` is greater than 0 and
-    /// `phimax` in (0, 360].
+    /// [`ShapeError`] unless the heights are finite, different, and the greater one above 0, `radius` is
+    /// greater than 0 and `phimax` in (0, 360].
     pub fn new(radius: f64, zmin: f64, zmax: f64, phimax: f64) -> Result<Self, ShapeError> {
         let radius = check::positive("radius", radius)?;
         let zmin = check::within("zmin", zmin, zmin.is_finite(), "a finite number")?;
@@ -55,7 +54,7 @@ impl Paraboloid {
         Ok(paraboloid)
     }
 
-    /// Where the surface begins: it has nothing below 0.
+    /// The lowest height of the surface, at least 0.
     fn bottom(&self) -> f64 {
         self.z_min.max(0.0)
     }
@@ -110,7 +109,7 @@ impl Paraboloid {
         self.surface_on(near + self.implicit(near).to_surface())
     }
 
-    /// The surface at `uv`; `None` below z = 0, where there is none.
+    /// The surface at `uv`; `None` below z = 0.
     pub fn surface_at(&self, part: u32, uv: DVec2) -> Option<Surface> {
         let z = self.z_min + uv.y * (self.z_max - self.z_min);
         if part != 0 || z < 0.0 {
@@ -124,7 +123,7 @@ impl Paraboloid {
         let implicit = self.implicit(p);
         let height = self.z_max - self.z_min;
         let phi = azimuth(p.y, p.x);
-        // At the bottom every meridian will do, and none has a finite derivative by height: take one close by.
+        // At the bottom any meridian will do, but none has a finite derivative by height: use a point nearby.
         let floor = 1e-10 * self.radius_at(self.z_max);
         let rho = p.x.hypot(p.y);
         let round = if rho > floor { DVec2::new(p.x, p.y) } else { floor * DVec2::from_angle(phi) };
@@ -135,7 +134,7 @@ impl Paraboloid {
             |dp: DVec3| implicit.turning(DVec3::new(2.0 * self.bend * dp.x, 2.0 * self.bend * dp.y, 0.0));
         Surface {
             point: p,
-            // The next ray's crossing is found to the rounding of the whole bowl.
+            // The next ray's crossing has an error relative to the whole bowl.
             point_error: DVec3::splat(
                 gamma(16) * self.z_max.max(self.radius_at(self.z_max)) + implicit.uncertainty(),
             ),
@@ -148,7 +147,7 @@ impl Paraboloid {
         }
     }
 
-    /// The box under a transform, tight.
+    /// The tight bounding box under a transform.
     pub fn bounds(&self, world_from_object: &Transform) -> Option<Aabb> {
         let (inner, outer) = (self.radius_at(self.bottom()), self.radius_at(self.z_max));
         let support = |d: DVec3| {
@@ -162,7 +161,7 @@ impl Paraboloid {
         Some(bounds_from_support(world_from_object, DVec3::new(outer, outer, self.z_max), support))
     }
 
-    /// The bowl, filled.
+    /// A bounding volume: the filled bowl.
     pub fn hull(&self) -> Option<Hull> {
         let (low, high) = (self.bottom(), self.z_max);
         let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
@@ -172,13 +171,14 @@ impl Paraboloid {
         Some(Hull::new(DVec3::new(0.0, 0.0, middle), axes, profile, false))
     }
 
-    /// The slopes of the surface's normal cone at the two ends, √(1 + 4 bend z): what areas are made of.
+    /// √(1 + 4 bend z) at the two ends, from which areas are computed.
     fn slants(&self) -> (f64, f64) {
         let slant = |z: f64| (1.0 + 4.0 * self.bend * z).sqrt();
         (slant(self.bottom()), slant(self.z_max))
     }
 
-    /// The area: phimax (B³ - A³)/(12 bend²) with the slants A and B, arranged so that a flat bowl loses no digits.
+    /// The area: phimax (B³ - A³)/(12 bend²) with the slants A and B, arranged so that a flat bowl does not
+    /// cancel.
     pub fn area(&self) -> f64 {
         let (a, b) = self.slants();
         let height = self.z_max - self.bottom();
@@ -195,17 +195,9 @@ impl Paraboloid {
         })
     }
 
-    /// Never: it has no lid.
-    pub fn is_solid(&self) -> bool {
-        false
-    }
+    open_surface!();
 
-    /// Nothing.
-    pub fn contains(&self, _p: DVec3) -> bool {
-        false
-    }
-
-    /// The nearest point to `p` under a map that keeps angles.
+    /// The nearest point to `p` under a similarity.
     ///
     /// # Errors
     /// [`NoNearestPoint::Map`] for other maps.
@@ -217,7 +209,7 @@ impl Paraboloid {
         under_similarity(world_from_object, p, |p| {
             let meridian = Meridian::new(p, self.phi_max);
             let (inner, rim) = (self.radius_at(self.bottom()), self.radius_at(self.z_max));
-            // Where the slope of the squared distance vanishes along the parabola, in units of the rim's radius.
+            // Zeros of the derivative of the squared distance along the parabola, in units of the rim's radius.
             let square = self.bend * rim * self.bend * rim;
             let slope = [-meridian.x / rim, 1.0 - 2.0 * self.bend * meridian.z, 0.0, 2.0 * square];
             let inside = roots_between(&slope, inner / rim, 1.0);
@@ -241,20 +233,12 @@ impl Paraboloid {
     pub fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
         let (a, b) = self.slants();
         let c = (a * a * a + u.y * (b * b * b - a * a * a)).cbrt();
-        // z - bottom = (c² - a²)/(4 bend), without the differences.
+        // z - bottom = (c² - a²)/(4 bend), without cancellation.
         let shares = (a * a + a * b + b * b) * (c + a) / ((a + b) * (c * c + c * a + a * a));
         let z = (self.bottom() + u.y * (self.z_max - self.bottom()) * shares).min(self.z_max);
         let round = self.radius_at(z) * DVec2::from_angle(self.phi_max * u.x);
         Some(SurfaceSample { surface: self.surface_on(round.extend(z)), pdf: 1.0 / self.area() })
     }
 
-    /// A point uniform by area, as seen from `from`.
-    pub fn sample_direction(&self, from: DVec3, u: DVec2) -> Option<DirectionSample> {
-        density::seen_from(from, self.sample_area(u)?)
-    }
-
-    /// The density of [`Paraboloid::sample_direction`].
-    pub fn pdf_direction(&self, ray: &Ray, surface: &Surface) -> f64 {
-        density::pdf_seen_from(ray, surface, 1.0 / self.area())
-    }
+    sampled_by_area!(pub);
 }

@@ -8,18 +8,18 @@ use lumbre_math::rounding::gamma;
 use lumbre_math::{DVec2, DVec3, Transform};
 use smallvec::SmallVec;
 
-use crate::shape::check;
+use crate::shape::{check, open_surface, two_crossings};
 use crate::support::bounds_from_support;
 use crate::triangle::solid_angle_of;
 use crate::{
-    Aabb, DirectionSample, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
-    SurfaceSample, density, measure,
+    Aabb, DirectionSample, Hull, NearestPoint, NoNearestPoint, Ray, Root, ShapeError, Surface, SurfaceSample,
+    density, measure,
 };
 
-/// The surface (1−u)(1−v) p00 + u(1−v) p10 + (1−u)v p01 + uv p11 with u and v in [0, 1]: doubly ruled, and flat when the
-/// corners are. It faces along ∂p/∂u × ∂p/∂v.
+/// The surface (1−u)(1−v) p00 + u(1−v) p10 + (1−u)v p01 + uv p11 with u and v in [0, 1]: doubly ruled, and flat
+/// when the corners are coplanar. The normal is along ∂p/∂u × ∂p/∂v.
 ///
-/// Its `root.local` and its `uv` are (u, v). A ray along one of its lines does not meet it.
+/// Its `root.local` and its `uv` are (u, v). A ray along one of its rulings misses it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BilinearPatch {
     p00: DVec3,
@@ -29,18 +29,18 @@ pub struct BilinearPatch {
     is_rectangle: bool,
 }
 
-/// Solid angles outside this range are sampled by area: small ones lose their digits in the sum of four angles, and right
-/// over the rectangle it has no depth.
+/// Solid angles outside this range are sampled by area: small ones cancel in the sum of four angles, and
+/// directly over the rectangle the depth is 0.
 const SPHERICAL_SAMPLING: std::ops::Range<f64> = 1e-4..TAU - 1e-6;
 
-/// The least height over the plane, in sizes of the rectangle, for sampling by solid angle.
+/// The least height over the plane, relative to the rectangle's size, for sampling by solid angle.
 const CLEARANCE: f64 = 1e-7;
 
 impl BilinearPatch {
     /// The patch with four corners, of which two may coincide.
     ///
     /// # Errors
-    /// [`ShapeError`] unless the corners are finite and do not all lie on a line.
+    /// [`ShapeError`] unless the corners are finite and not collinear.
     pub fn new(p00: DVec3, p10: DVec3, p01: DVec3, p11: DVec3) -> Result<Self, ShapeError> {
         let (p00, p10) = (check::finite("p00", p00)?, check::finite("p10", p10)?);
         let (p01, p11) = (check::finite("p01", p01)?, check::finite("p11", p11)?);
@@ -77,8 +77,8 @@ impl BilinearPatch {
 
     /// Both crossings, in order.
     ///
-    /// A. Reshetov, "Cool patches: a geometric approach to ray/bilinear patch intersections", Ray Tracing Gems, 2019: the
-    /// lines of constant u that the ray meets are the roots of a quadratic, and on each of them the rest is linear.
+    /// A. Reshetov, "Cool patches: a geometric approach to ray/bilinear patch intersections", Ray Tracing Gems,
+    /// 2019: the rulings of constant u that the ray intersects are roots of a quadratic; the rest is linear.
     #[inline]
     fn crossings(&self, ray: &Ray) -> [Option<Root>; 2] {
         let d = ray.direction;
@@ -117,8 +117,8 @@ impl BilinearPatch {
         }
     }
 
-    /// One step of Newton's method on p(u, v) = O + tD. The lines of constant u are ill-placed to say where a ray crosses
-    /// that runs almost along one; this makes the error as small as the angle with the surface lets it be.
+    /// A Newton step on p(u, v) = O + tD. A ruling of constant u almost parallel to the ray determines the
+    /// crossing poorly; afterwards the error is limited by the angle with the surface alone.
     #[inline]
     fn refined(&self, ray: &Ray, t: f64, u: f64, v: f64) -> (f64, DVec2) {
         let [q00, q10, q01, q11] = self.corners().map(|p| p - ray.origin);
@@ -131,7 +131,7 @@ impl BilinearPatch {
         let in_plane = residual - dt * ray.direction;
         let size = cross.length_squared();
         let (du, dv) = (-in_plane.cross(dpdv).dot(cross) / size, -dpdu.cross(in_plane).dot(cross) / size);
-        // Where the ray (almost) touches, a step may lead anywhere.
+        // Where the ray almost touches, a step may go anywhere.
         if du.abs() + dv.abs() < 1e-6 && dt.is_finite() {
             (t + dt, DVec2::new(u + du, v + dv).clamp(DVec2::ZERO, DVec2::ONE))
         } else {
@@ -139,17 +139,7 @@ impl BilinearPatch {
         }
     }
 
-    /// The first crossing in the ray's range.
-    #[inline]
-    pub fn closest(&self, ray: &Ray) -> Option<Root> {
-        let [near, far] = self.crossings(ray);
-        near.or(far)
-    }
-
-    /// Every crossing in the ray's range, appended in ascending order.
-    pub fn roots(&self, ray: &Ray, out: &mut Roots) {
-        out.extend(self.crossings(ray).into_iter().flatten());
-    }
+    two_crossings!(pub);
 
     /// The surface at a crossing.
     pub fn surface(&self, _ray: &Ray, root: &Root) -> Surface {
@@ -168,12 +158,12 @@ impl BilinearPatch {
         let (dpdu, dpdv) = (self.dpdu(v), self.dpdv(u));
         let mut cross = dpdu.cross(dpdv);
         if cross == DVec3::ZERO {
-            // Two corners in one: the limit from the middle of the patch.
+            // Coincident corners: use the limit from the middle of the patch.
             let inside = |x: f64| x + 1e-8 * (0.5 - x);
             cross = self.dpdu(inside(v)).cross(self.dpdv(inside(u)));
         }
         let normal = (cross / cross.abs().max_element()).normalize();
-        // The equations of Weingarten, with ∂²p/∂u∂v the only second derivative that is not 0.
+        // The Weingarten equations, with ∂²p/∂u∂v the only non-zero second derivative.
         let twist = normal.dot(self.p11 - self.p01 - self.p10 + self.p00);
         let (e, f, g) = (dpdu.length_squared(), dpdu.dot(dpdv), dpdv.length_squared());
         let bend = twist / (e * g - f * f);
@@ -190,7 +180,8 @@ impl BilinearPatch {
         }
     }
 
-    /// The box under a transform: that of the corners, since every point is a mean of them.
+    /// The bounding box under a transform: that of the corners, since every point is a convex combination of
+    /// them.
     pub fn bounds(&self, world_from_object: &Transform) -> Option<Aabb> {
         let corners = self.corners();
         let magnitude = corners.map(DVec3::abs).into_iter().fold(DVec3::ZERO, DVec3::max);
@@ -198,7 +189,7 @@ impl BilinearPatch {
         Some(bounds_from_support(world_from_object, magnitude, support))
     }
 
-    /// A box around it.
+    /// A bounding volume: a box.
     pub fn hull(&self) -> Option<Hull> {
         Hull::of_box(&self.bounds(&Transform::IDENTITY)?)
     }
@@ -213,20 +204,12 @@ impl BilinearPatch {
         measure::patch_area(world_from_object, |u, v| self.dpdu(v).cross(self.dpdv(u)))
     }
 
-    /// It is not.
-    pub fn is_solid(&self) -> bool {
-        false
-    }
+    open_surface!();
 
-    /// It holds no volume.
-    pub fn contains(&self, _p: DVec3) -> bool {
-        false
-    }
-
-    /// The nearest point to `p` under a map.
+    /// The nearest point to `p` under any map.
     ///
     /// # Errors
-    /// [`NoNearestPoint::Map`] never.
+    /// None.
     pub fn closest_point(
         &self,
         world_from_object: &Transform,
@@ -242,7 +225,7 @@ impl BilinearPatch {
                 best = (uv, point);
             }
         };
-        // The sides, and the line of constant u through every place where the slope along both parameters vanishes.
+        // The sides, and the ruling of constant u through every stationary point of the distance.
         let along = |start: DVec3, end: DVec3| {
             let side = end - start;
             let t = -start.dot(side) / side.length_squared();
@@ -257,7 +240,7 @@ impl BilinearPatch {
             take(DVec2::new(u, v));
             take(DVec2::new(along((1.0 - v) * q00 + v * q01, (1.0 - v) * q10 + v * q11), v));
         }
-        // A few steps along each parameter in turn give back the digits that the polynomial lost.
+        // A few steps along each parameter in turn restore the accuracy that the polynomial lost.
         for _ in 0..4 {
             let v = best.0.y;
             let u = along((1.0 - v) * q00 + v * q01, (1.0 - v) * q10 + v * q11);
@@ -277,10 +260,10 @@ impl BilinearPatch {
         "bilinear"
     }
 
-    /// A point with a density that is uniform by area when the corners lie in a plane and follow each other around a convex
-    /// quadrilateral, and nearly so otherwise; `pdf` is exact.
+    /// A sampled point with its exact density `pdf`: uniform by area when the patch is a planar convex
+    /// quadrilateral, and nearly so otherwise.
     ///
-    /// (u, v) are chosen in proportion to the area elements at the corners, interpolated bilinearly.
+    /// (u, v) are sampled from the bilinear interpolation of the area elements at the corners.
     pub fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
         let w = self.corner_crosses().map(DVec3::length);
         let v = sample_linear(u.y, w[0] + w[1], w[2] + w[3]);
@@ -299,7 +282,7 @@ impl BilinearPatch {
         here / mean / self.dpdu(v).cross(self.dpdv(u)).length()
     }
 
-    /// The solid angle of a rectangle that is sampled by it, seen from `from`.
+    /// The solid angle seen from `from` of a rectangle that is sampled by solid angle; `None` otherwise.
     fn sampled_solid_angle(&self, from: DVec3) -> Option<f64> {
         if !self.is_rectangle {
             return None;
@@ -314,16 +297,16 @@ impl BilinearPatch {
         (is_clear && SPHERICAL_SAMPLING.contains(&solid_angle)).then_some(solid_angle)
     }
 
-    /// A point as seen from `from`: uniform by solid angle for a rectangle that looks neither tiny nor fills half the sky,
-    /// else as in [`BilinearPatch::sample_area`]; `None` when it is seen edge-on.
+    /// A point as seen from `from`: uniform by solid angle for a rectangle whose solid angle is neither tiny
+    /// nor almost a hemisphere, else as in [`BilinearPatch::sample_area`]; `None` when it is seen edge-on.
     ///
-    /// C. Ureña, M. Fajardo, A. King, "An area-preserving parametrization for spherical rectangles", Eurographics Symposium
-    /// on Rendering, 2013.
+    /// C. Ureña, M. Fajardo, A. King, "An area-preserving parametrization for spherical rectangles",
+    /// Eurographics Symposium on Rendering, 2013.
     pub fn sample_direction(&self, from: DVec3, u: DVec2) -> Option<DirectionSample> {
         let Some(solid_angle) = self.sampled_solid_angle(from) else {
             return density::seen_from(from, self.sample_area(u)?);
         };
-        // In a frame on the sides, the rectangle spans x0..x1, y0..y1 at depth z0 below the eye.
+        // In a frame along its sides, the rectangle spans x0..x1, y0..y1 at depth z0 below the viewpoint.
         let (ex, ey) = (self.p10 - self.p00, self.p01 - self.p00);
         let (width, height) = (ex.length(), ey.length());
         let (x, y) = (ex / width, ey / height);
@@ -332,8 +315,9 @@ impl BilinearPatch {
         let (x1, y1) = (x0 + width, y0 + height);
         let z0 = -corner.dot(x.cross(y)).abs();
 
-        // The z components of the outward normals of the planes through the eye and the sides y0, x1, y1, x0; the rest of
-        // neighbouring ones is orthogonal, so that their product alone gives the angle between the planes.
+        // The z components of the outward normals of the planes through the viewpoint and the sides y0, x1, y1,
+        // x0. The other components of neighbours are orthogonal, so the products of these give the angles
+        // between the planes.
         let [n0, n1, n2, n3] = [-y0, x1, y1, -x0].map(|s| s / s.hypot(z0));
         let angle = |a: f64, b: f64| (-a * b).acos();
         let k = TAU - angle(n2, n3) - angle(n3, n0);
@@ -360,13 +344,13 @@ impl BilinearPatch {
     }
 }
 
-/// A number in [0, 1] with a density that goes linearly from `a` at 0 to `b` at 1, both ≥ 0 and not both 0.
+/// A number in [0, 1] with a density linear from `a` at 0 to `b` at 1, both ≥ 0 and not both 0.
 fn sample_linear(u: f64, a: f64, b: f64) -> f64 {
     (u * (a + b) / (a + ((1.0 - u) * a * a + u * b * b).sqrt())).clamp(0.0, 1.0)
 }
-/// The `u` in [0, 1] of a patch's lines of constant u, whole lines and not just their parts in the patch, on which the point
-/// nearest to the origin is at a standstill: with a(u) + v b(u) on the line and v = -a·b/b·b nearest, the slope along u
-/// vanishes, which times (b·b)² is a quintic.
+/// The `u` in [0, 1] of the rulings whose nearest point to the origin is stationary. With a(u) + v b(u) on the
+/// ruling, extended to a whole line, and v = -a·b/b·b its nearest point, the derivative by u times (b·b)² is a
+/// quintic.
 fn stationary(q00: DVec3, q10: DVec3, q01: DVec3, q11: DVec3) -> RealRoots<6> {
     // Each a polynomial in u.
     let (a, b) = ([q00, q10 - q00], [q01 - q00, (q11 - q10) - (q01 - q00)]);
@@ -374,7 +358,7 @@ fn stationary(q00: DVec3, q10: DVec3, q01: DVec3, q11: DVec3) -> RealRoots<6> {
         let mut sum = [0.0; 6];
         for (i, x) in x.iter().enumerate() {
             for (j, y) in y.iter().enumerate() {
-                // Degrees beyond the fifth have coefficients that are not there.
+                // The coefficients beyond degree five cancel.
                 if let Some(place) = sum.get_mut(i + j) {
                     *place += x * y;
                 }

@@ -1,4 +1,4 @@
-//! A shape and where it stands.
+//! A shape with its placement.
 
 use lumbre_math::rounding::gamma;
 use lumbre_math::{DMat3, DVec2, DVec3, Transform};
@@ -8,27 +8,27 @@ use crate::{
     SurfaceSample, measure,
 };
 
-/// An exact shape under any invertible affine map. The ray goes to the shape, not the shape to the ray, and `t` stays.
+/// An exact shape under any invertible affine map. The ray is taken into object space; `t` is preserved.
 #[derive(Clone, Debug)]
 pub struct PlacedShape {
     shape: Shape,
-    // Without one, the shape stands in the world as it is, and no ray is moved for it.
+    // `None` for the identity: then rays are not transformed.
     world_from_object: Option<Box<Transform>>,
 }
 
 impl PlacedShape {
-    /// `shape`, placed.
+    /// `shape` under `world_from_object`.
     pub fn new(shape: Shape, world_from_object: Transform) -> Self {
         let world_from_object = (!world_from_object.is_identity()).then(|| Box::new(world_from_object));
         Self { shape, world_from_object }
     }
 
-    /// The shape in its own space.
+    /// The shape in object space.
     pub fn shape(&self) -> &Shape {
         &self.shape
     }
 
-    /// Where it stands.
+    /// The placement.
     pub fn world_from_object(&self) -> Transform {
         self.world_from_object.as_deref().copied().unwrap_or_default()
     }
@@ -59,7 +59,8 @@ impl PlacedShape {
 
     /// The surface, in world space, where `root` was found along `ray`.
     ///
-    /// `point_error` covers the rounding of the way to world space and of the way back that the next ray takes.
+    /// `point_error` includes the rounding of the transform to world space and of the next ray's transform
+    /// back.
     pub fn surface(&self, ray: &Ray, root: &Root) -> Surface {
         match &self.world_from_object {
             None => self.shape.surface(ray, root),
@@ -70,15 +71,15 @@ impl PlacedShape {
     /// The point of the surface that is nearest to `p`, both in world space: see [`Shape::closest_point`].
     ///
     /// # Errors
-    /// [`NoNearestPoint`] where there is no method for the shape, or not under its map.
+    /// [`NoNearestPoint`] where there is no method for the shape, or none under its map.
     pub fn closest_point(&self, p: DVec3) -> Result<NearestPoint, NoNearestPoint> {
         self.shape.closest_point(&self.world_from_object(), p)
     }
 
-    /// The same when the shape is placed under `outer` in turn.
+    /// The nearest point when the shape is placed under `outer` in addition.
     ///
     /// # Errors
-    /// As [`PlacedShape::closest_point`].
+    /// As for [`PlacedShape::closest_point`].
     pub fn closest_point_under(&self, outer: &Transform, p: DVec3) -> Result<NearestPoint, NoNearestPoint> {
         match &self.world_from_object {
             None => self.shape.closest_point(outer, p),
@@ -91,7 +92,7 @@ impl PlacedShape {
         self.shape.bounds(&self.world_from_object())
     }
 
-    /// A body around it, in world space: see [`Shape::hull`].
+    /// A bounding volume in world space: see [`Shape::hull`].
     pub fn hull(&self) -> Option<Hull> {
         let hull = self.shape.hull()?;
         Some(self.world_from_object.as_deref().map_or(hull, |map| hull.under(map)))
@@ -110,9 +111,8 @@ impl PlacedShape {
 
     /// A point on the surface; `None` for infinite shapes.
     ///
-    /// Its density `pdf` is per unit of world-space area. It is uniform under similarities (rotations, moves, mirrors and
-    /// uniform scales); under other maps the choice is uniform in object space, and `pdf` says exactly how dense it is in
-    /// the world.
+    /// `pdf` is per unit of world-space area. The density is uniform under similarities; under other maps it is
+    /// uniform in object space, and `pdf` is exact.
     pub fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
         let sample = self.shape.sample_area(u)?;
         let Some(m) = &self.world_from_object else {
@@ -122,8 +122,8 @@ impl PlacedShape {
         Some(SurfaceSample { surface: into_world(m, &sample.surface), pdf })
     }
 
-    /// A point as seen from `from` in world space, by solid angle where there is a method, else by area; `None` where the
-    /// point chosen is seen edge-on, and for infinite shapes.
+    /// A point as seen from `from` in world space, by solid angle where the shape has a method, else by area;
+    /// `None` where the point is seen edge-on, and for infinite shapes.
     pub fn sample_direction(&self, from: DVec3, u: DVec2) -> Option<DirectionSample> {
         let Some(m) = &self.world_from_object else {
             return self.shape.sample_direction(from, u);
@@ -134,8 +134,8 @@ impl PlacedShape {
         pdf.is_finite().then(|| DirectionSample { surface: into_world(m, &sample.surface), pdf })
     }
 
-    /// The density, per unit solid angle at `ray.origin`, with which [`PlacedShape::sample_direction`] chooses the
-    /// point `surface` (in world space) on the ray; 0 for points that it never chooses.
+    /// The density, per unit solid angle at `ray.origin`, with which [`PlacedShape::sample_direction`] samples
+    /// the point `surface` (in world space) on the ray; 0 for points that it never samples.
     pub fn pdf_direction(&self, ray: &Ray, surface: &Surface) -> f64 {
         let Some(m) = &self.world_from_object else {
             return self.shape.pdf_direction(ray, surface);
@@ -153,7 +153,7 @@ impl PlacedShape {
     }
 }
 
-/// A surface in object space, as it is in the world.
+/// Transforms a surface from object space to world space.
 pub(crate) fn into_world(m: &Transform, surface: &Surface) -> Surface {
     let linear = m.linear();
     let size = DMat3::from_cols(linear.x_axis.abs(), linear.y_axis.abs(), linear.z_axis.abs());
@@ -168,7 +168,7 @@ pub(crate) fn into_world(m: &Transform, surface: &Surface) -> Surface {
     let scaled_normal = m.normal(surface.normal);
     let length = scaled_normal.length();
     let normal = scaled_normal / length;
-    // The derivative of a vector divided by its length.
+    // The derivative of a normalised vector.
     let turned = |dn: DVec3| {
         let moved = m.normal(dn) / length;
         moved - normal * normal.dot(moved)
@@ -185,8 +185,8 @@ pub(crate) fn into_world(m: &Transform, surface: &Surface) -> Surface {
     }
 }
 
-/// Solid angle in object space over solid angle in the world, about a direction `d` in object space: |L d|³ / |det L| for
-/// a unit `d`.
+/// The ratio of solid angle in object space to solid angle in world space, about a direction `d` in object
+/// space: |L d|³ / |det L| for a unit `d`.
 fn solid_angle_shrink(m: &Transform, d: DVec3) -> f64 {
     let stretch = m.vector(d).length() / d.length();
     stretch * stretch * stretch / m.determinant().abs()

@@ -3,25 +3,22 @@
 use lumbre_math::rounding::gamma;
 use lumbre_math::{DVec2, DVec3, Transform, orthonormal_basis};
 
-use crate::shape::check;
+use crate::shape::{check, unsampled};
 use crate::support::dot_size;
-use crate::{
-    Aabb, DirectionSample, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
-    SurfaceSample,
-};
+use crate::{Aabb, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface};
 
-/// The plane through a point, facing along its normal; as a solid, the half-space below it.
+/// The plane through a point; as a solid, the half-space below it, opposite to the normal.
 ///
-/// `uv` are lengths along the two axes that complete the normal to a frame. A ray in the plane does not meet it.
+/// `uv` are lengths along the two axes that complete the normal to a frame. A ray in the plane misses it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
     point: DVec3,
-    // As given but for a power of two, so that small whole numbers stay exact; its length is of the order of 1.
+    // The given normal times a power of two, so that small integers stay exact; of the order of 1 in length.
     normal: DVec3,
 }
 
 impl Plane {
-    /// The plane through `point` across `normal`, of any length but zero.
+    /// The plane through `point` perpendicular to `normal`, of any non-zero length.
     ///
     /// # Errors
     /// [`ShapeError`] unless both are finite and the normal is not zero.
@@ -39,7 +36,7 @@ impl Plane {
     #[inline]
     pub fn closest(&self, ray: &Ray) -> Option<Root> {
         let along = ray.direction.dot(self.normal);
-        // No threshold: next to zero `t` grows beyond the ray's range by itself.
+        // No threshold is needed: near zero, `t` leaves the ray's range by itself.
         if along == 0.0 {
             return None;
         }
@@ -82,27 +79,19 @@ impl Plane {
         }
     }
 
-    /// It has none.
+    /// `None`: it is infinite.
     pub fn bounds(&self, _world_from_object: &Transform) -> Option<Aabb> {
         None
     }
 
-    /// None: it is infinite.
+    /// `None`: it is infinite.
     pub fn hull(&self) -> Option<Hull> {
         None
     }
 
-    /// Infinite.
-    pub fn area(&self) -> f64 {
-        f64::INFINITY
-    }
+    unsampled!();
 
-    /// Infinite.
-    pub fn area_under(&self, _world_from_object: &Transform) -> f64 {
-        f64::INFINITY
-    }
-
-    /// It bounds the half-space below it.
+    /// Always true: it bounds the half-space below it.
     pub fn is_solid(&self) -> bool {
         true
     }
@@ -112,10 +101,10 @@ impl Plane {
         (p - self.point).dot(self.normal) <= 0.0
     }
 
-    /// The nearest point to `p` under a map.
+    /// The nearest point to `p` under any map.
     ///
     /// # Errors
-    /// [`NoNearestPoint::Map`] never.
+    /// None.
     pub fn closest_point(
         &self,
         world_from_object: &Transform,
@@ -135,20 +124,5 @@ impl Plane {
     /// "plane".
     pub fn name(&self) -> &'static str {
         "plane"
-    }
-
-    /// None: there is no uniform choice from an infinite area.
-    pub fn sample_area(&self, _u: DVec2) -> Option<SurfaceSample> {
-        None
-    }
-
-    /// None, as for [`Plane::sample_area`].
-    pub fn sample_direction(&self, _from: DVec3, _u: DVec2) -> Option<DirectionSample> {
-        None
-    }
-
-    /// 0: no point is ever chosen.
-    pub fn pdf_direction(&self, _ray: &Ray, _surface: &Surface) -> f64 {
-        0.0
     }
 }

@@ -18,16 +18,17 @@ use crate::{
     ShapeError, Sphere, Surface, SurfaceSample, density, measure,
 };
 
-/// The points where `A x² + B y² + C z² + D xy + E xz + F yz + G x + H y + I z + J` is 0, all of them or those in a box.
+/// The points where `A x² + B y² + C z² + D xy + E xz + F yz + G x + H y + I z + J` is 0, optionally clipped by
+/// a box.
 ///
-/// A closed quadric, an ellipsoid that no box cuts, is a solid with outward normals: it is bounded, can be sampled and can
-/// be an operand of CSG. It is parametrised as the unit sphere is, of which it is the image under the lower-triangular map
-/// of its Cholesky factor.
+/// A closed quadric, which is an unclipped ellipsoid, is a solid with outward normals: it is bounded, can be
+/// sampled and can be an operand of CSG. It is the image of the unit sphere under the lower-triangular map of
+/// its Cholesky factor, and is parametrised like the sphere.
 ///
-/// Every other quadric is a surface whose normal is the gradient: it points to where the polynomial is positive. A box
-/// clips the surface and leaves it open; without a box it is infinite, and cannot be a light. It is parametrised like a
-/// box, by projection along the axis that its normal is nearest to: axis k of the three, counted cyclically, gives u along
-/// axis k + 1 and v along axis k + 2, as fractions of the clipping box, or as plain coordinates where there is none.
+/// Every other quadric is a surface whose normal is along the gradient. A box clips the surface and leaves it
+/// open; without a box it is infinite, and cannot be a light. It is parametrised by projection along the axis k
+/// nearest to its normal: u along axis k + 1 and v along axis k + 2, cyclically, as fractions of the clipping
+/// box, or as coordinates where there is none.
 #[derive(Clone, Debug)]
 pub struct Quadric {
     // p·matrix p + linear·p + constant; the largest coefficient is between 1 and 2.
@@ -35,20 +36,20 @@ pub struct Quadric {
     linear: DVec3,
     constant: f64,
     clip: Option<Aabb>,
-    // Where rays are moved close to.
+    // The point near which lines are expressed: see `NearLine`.
     place: DVec3,
-    // The unit sphere's image that it is, when it is closed.
+    // The placed unit sphere, of a closed quadric.
     ellipsoid: Option<PlacedShape>,
-    // Of a clipped one, once somebody has asked.
+    // The area of a clipped quadric, computed on first use.
     clipped_area: OnceLock<f64>,
 }
 
 impl Quadric {
-    /// The quadric of ten coefficients A to J, within `clip` if that is given.
+    /// The quadric of ten coefficients A to J, clipped to `clip` if given.
     ///
     /// # Errors
-    /// [`ShapeError`] unless all numbers are finite, one of A to I is not 0, the quadric has more than one real point (as
-    /// far as a definite quadratic form tells) and the box has a volume.
+    /// [`ShapeError`] unless all numbers are finite, one of A to I is not 0, the quadric has more than one real
+    /// point (as far as a definite quadratic form tells) and the box has a volume.
     pub fn new(coefficients: [f64; 10], clip: Option<Aabb>) -> Result<Self, ShapeError> {
         if let Some(&found) = coefficients.iter().find(|x| !x.is_finite()) {
             return Err(ShapeError::OutOfRange {
@@ -67,7 +68,7 @@ impl Quadric {
                 return Err(ShapeError::Degenerate("the quadric's clipping box holds nothing"));
             }
         }
-        // By a power of two, so that no digit changes and no product overflows.
+        // A power of two, so that no digit changes and no product overflows.
         let largest = coefficients.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
         let scale = (-largest.log2().floor()).clamp(-1000.0, 1000.0).exp2();
         let [a, b, c, d, e, f, g, h, i, j] = coefficients.map(|x| x * scale);
@@ -103,14 +104,14 @@ impl Quadric {
         Ok(quadric)
     }
 
-    /// The point about which it is symmetric, if there is just one.
+    /// The centre of symmetry, if it is unique.
     fn center(&self) -> Option<DVec3> {
         let map = Transform::from_affine(DAffine3::from_mat3(self.matrix)).ok()?;
         let center = map.inverse_vector(-0.5 * self.linear);
         center.is_finite().then_some(center)
     }
 
-    /// The map from the unit sphere, when the quadratic form is definite; its signs are then turned so that inside is
+    /// The map from the unit sphere, when the quadratic form is definite; flips the signs so that the inside is
     /// negative.
     fn closed_form(&mut self, center: Option<DVec3>) -> Result<Option<Transform>, ShapeError> {
         let Some(center) = center else {
@@ -145,7 +146,7 @@ impl Quadric {
         Ok(linear.ok().map(|map| Transform::translate(center) * map.inverse()))
     }
 
-    /// The box that clips it.
+    /// The clipping box.
     pub fn clip(&self) -> Option<Aabb> {
         self.clip
     }
@@ -203,7 +204,7 @@ impl Quadric {
         self.surface_on(near + self.implicit(near).to_surface())
     }
 
-    /// `None`: the projections overlap, and a point cannot be told from its `uv`. Closed quadrics are run forwards.
+    /// `None`: the projections overlap, so `uv` does not determine a point. A closed quadric has one.
     pub fn surface_at(&self, part: u32, uv: DVec2) -> Option<Surface> {
         let ellipsoid = self.ellipsoid.as_ref()?;
         let on_sphere = ellipsoid.shape().surface_at(part, uv)?;
@@ -235,7 +236,7 @@ impl Quadric {
         let bend = |dp: DVec3| implicit.turning(2.0 * (self.matrix * dp));
         Surface {
             point: p,
-            // The next ray's crossing is found to the rounding of the whole box.
+            // The next ray's crossing has an error relative to the whole box.
             point_error: gamma(8) * (p.abs() + self.place.abs())
                 + DVec3::splat(gamma(16) * extent + implicit.uncertainty()),
             normal,
@@ -247,7 +248,8 @@ impl Quadric {
         }
     }
 
-    /// The box under a transform: tight for a closed quadric, that of the clipping box for a clipped one.
+    /// The bounding box under a transform: tight for a closed quadric, that of the clipping box for a clipped
+    /// one.
     pub fn bounds(&self, world_from_object: &Transform) -> Option<Aabb> {
         if let Some(ellipsoid) = &self.ellipsoid {
             let placed = *world_from_object * ellipsoid.world_from_object();
@@ -258,7 +260,7 @@ impl Quadric {
         Some(bounds_from_support(world_from_object, clip.min.abs().max(clip.max.abs()), support))
     }
 
-    /// An ellipsoid, or the box that cuts it off.
+    /// A bounding volume: the ellipsoid or the clipping box.
     pub fn hull(&self) -> Option<Hull> {
         match &self.ellipsoid {
             Some(ellipsoid) => ellipsoid.hull().map(|hull| Hull { is_solid: false, ..hull }),
@@ -266,7 +268,8 @@ impl Quadric {
         }
     }
 
-    /// The area of a closed or clipped quadric; infinite for others. A clipped one's is known to about five digits.
+    /// The area of a closed or clipped quadric; infinite for others. A clipped one's is accurate to about five
+    /// digits.
     pub fn area(&self) -> f64 {
         match (&self.ellipsoid, self.clip) {
             (Some(ellipsoid), _) => ellipsoid.area(),
@@ -290,7 +293,8 @@ impl Quadric {
         }
     }
 
-    /// The nearer or farther of the two points above a point `p` of the box, on a line through it along axis `k`.
+    /// The nearer or farther of the two points of the surface on the line through `p`, a point of the box,
+    /// along axis `k`.
     fn above(&self, clip: &Aabb, k: usize, mut p: DVec3, is_far: bool) -> Option<DVec3> {
         p[k] = clip.center()[k];
         let line = NearLine { p, d: DVec3::AXES[k], shift: 0.0 };
@@ -301,9 +305,9 @@ impl Quadric {
 
     /// The integral of a function of the normal n over the clipped surface.
     ///
-    /// Of the surface as seen along the three axes, each point counts with the share n_k²: together all of it. An area
-    /// element seen along axis k is |n_k| times as large, so that |n_k| is left to be integrated, which is smooth, and
-    /// vanishes where the surface turns its edge.
+    /// The surface is projected along all three axes, each point weighted by n_k², which sum to 1. A projected
+    /// area element is |n_k| times the element, so the integrand has a factor |n_k|, which is smooth and
+    /// vanishes at the silhouette.
     fn sum_over(&self, clip: &Aabb, f: impl Fn(DVec3) -> f64) -> f64 {
         let rule = measure::gauss_legendre();
         let row = |k: usize, x: f64| {
@@ -314,7 +318,7 @@ impl Quadric {
             for ends in self.breaks(clip, k, j, p).windows(2) {
                 let (middle, half) = (0.5 * (ends[0] + ends[1]), 0.5 * (ends[1] - ends[0]));
                 for (y, weight) in rule {
-                    // At its ends the surface may turn vertical like a root, which the sine smooths.
+                    // At its ends the surface may become vertical like a square root, which the sine smooths.
                     let (sin, cos) = (PI * (y - 0.5)).sin_cos();
                     p[j] = middle + half * sin;
                     for q in [false, true].into_iter().filter_map(|far| self.above(clip, k, p, far)) {
@@ -325,7 +329,7 @@ impl Quadric {
             }
             sum
         };
-        // How many pieces a row has, and how many points stand above the middle of each.
+        // The number of pieces of a row, and the number of points above the middle of each.
         let structure = |k: usize, x: f64| {
             let (i, j) = ((k + 1) % 3, (k + 2) % 3);
             let mut p = clip.min;
@@ -345,9 +349,10 @@ impl Quadric {
                     .map(|&(x, weight)| weight * (to - from) * row(k, from + x * (to - from)))
                     .sum::<f64>()
             };
-            // Rows begin and end to meet the surface with a jump: halve the strips that have not settled.
+            // Rows jump where they begin or end to intersect the surface: halve the strips that have not
+            // converged.
             let mut strips = vec![(clip.min[i], clip.max[i], rows(clip.min[i], clip.max[i]), 0)];
-            // A bound on the work that absurd coefficients can make.
+            // Bounds the work for absurd coefficients.
             let mut budget = 256;
             while let Some((from, to, coarse, depth)) = strips.pop() {
                 budget -= 1;
@@ -367,14 +372,15 @@ impl Quadric {
         total
     }
 
-    /// Where, along axis `j` from `p` on, the points above the row along axis `k` appear and disappear; and the row's ends.
+    /// The places along axis `j` from `p` where the points above the row along axis `k` appear and disappear;
+    /// and the row's ends.
     fn breaks(&self, clip: &Aabb, k: usize, j: usize, p: DVec3) -> SmallVec<[f64; 8]> {
         let along_j = |height: f64| {
             let mut at = p;
             (at[j], at[k]) = (0.0, height);
             self.crossings(&NearLine { p: at, d: DVec3::AXES[j], shift: 0.0 })
         };
-        // Where the two points above meet: their discriminant is a quadratic along the row.
+        // The two points above coincide where their discriminant, a quadratic along the row, vanishes.
         let meeting = {
             let mut at = p;
             (at[j], at[k]) = (0.0, 0.0);
@@ -396,7 +402,7 @@ impl Quadric {
         breaks
     }
 
-    /// The density of choosing a point of the clipped surface, from the normal there.
+    /// The density of sampling a point of the clipped surface, given the normal there.
     fn clipped_pdf(clip: &Aabb, normal: DVec3) -> f64 {
         normal.abs().element_sum() / (2.0 * clip.half_area())
     }
@@ -406,7 +412,7 @@ impl Quadric {
         self.ellipsoid.is_some()
     }
 
-    /// Whether a closed quadric holds `p`.
+    /// Whether `p` is inside a closed quadric.
     pub fn contains(&self, p: DVec3) -> bool {
         self.is_solid() && self.implicit(p).value <= 0.0
     }
@@ -431,9 +437,10 @@ impl Quadric {
 
     /// A point on a closed or clipped quadric, with its exact density; `None` for others.
     ///
-    /// A closed one is sampled as the sphere that it is the image of. A clipped one is looked at along a random axis, from a
-    /// random point of the box's face: its density is proportional to |n_x| + |n_y| + |n_z|, uniform up to a factor of
-    /// √3. Where nothing is seen there the answer is `None`, which counts as a sample of nothing.
+    /// A closed quadric is sampled as the image of its sphere. A clipped one is sampled along a random axis
+    /// from a random point of the box's face: the density is proportional to |n_x| + |n_y| + |n_z|, uniform up
+    /// to a factor of √3. Where that line misses the surface the result is `None`, a sample that counts as
+    /// zero.
     pub fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
         let clip = match (&self.ellipsoid, self.clip) {
             (Some(ellipsoid), _) => return ellipsoid.sample_area(u),
@@ -460,8 +467,8 @@ impl Quadric {
         None
     }
 
-    /// A point on a closed quadric by the solid angle of its sphere, on a clipped one as by [`Quadric::sample_area`];
-    /// `None` for others.
+    /// A point on a closed quadric by the solid angle of its sphere, on a clipped one as in
+    /// [`Quadric::sample_area`]; `None` for others.
     pub fn sample_direction(&self, from: DVec3, u: DVec2) -> Option<DirectionSample> {
         match &self.ellipsoid {
             Some(ellipsoid) => ellipsoid.sample_direction(from, u),

@@ -1,23 +1,23 @@
-//! A ray, and the range of it that counts.
+//! A ray with its parameter range.
 
 use lumbre_math::{DVec3, Transform};
 
 /// The points `origin + t * direction` with `t_min <= t <= t_max`.
 ///
-/// The direction need not be unit, and `t` is in units of its length; its length may be anything whose square is a number,
-/// from about 1e-150 to 1e150. A NaN anywhere, or a direction of zero, makes every query a miss.
+/// The direction need not be unit, and `t` is in units of its length, from about 1e-150 to 1e150 (its square
+/// must be finite). A NaN anywhere, or a direction of zero, makes every query a miss.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Ray {
-    /// Where `t` is 0.
+    /// The point at `t` = 0.
     pub origin: DVec3,
-    /// Where `t` grows to; any length but zero.
+    /// The direction, of any non-zero length.
     pub direction: DVec3,
-    /// The smallest `t` that counts, itself included.
+    /// The least `t`, inclusive.
     pub t_min: f64,
-    /// The largest `t` that counts, itself included; may be infinite.
+    /// The greatest `t`, inclusive; may be infinite.
     pub t_max: f64,
-    /// When it looks, in the unit of the keys of what moves; of no consequence to what stands still.
+    /// The time, in the units of animation keys; static geometry ignores it.
     pub time: f64,
 }
 
@@ -45,12 +45,12 @@ impl Ray {
         self.origin + t * self.direction
     }
 
-    /// Whether `t` lies in the range; a NaN does not.
+    /// Whether `t` lies in the range; false for a NaN.
     pub fn contains(&self, t: f64) -> bool {
         self.t_min <= t && t <= self.t_max
     }
 
-    /// The same ray in the object's space. Every `t` keeps its meaning, because the direction is not renormalised.
+    /// The ray in object space. The direction is not renormalised, so `t` is preserved.
     #[must_use]
     #[inline]
     pub fn into_object(&self, world_from_object: &Transform) -> Self {

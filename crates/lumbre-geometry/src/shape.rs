@@ -1,13 +1,13 @@
-//! What every shape can do, and why a shape cannot be made. The list of shapes itself is in `lib.rs`.
+//! The interface of every shape, and the errors of constructors. The list of shapes is in `lib.rs`.
 
-/// Makes the enum from a list of `module::Type in Stored`: re-exports each type, makes it a variant of its own name, and
-/// hands every method to the variant's method of the same name. To add a shape, write its file with these methods and add
-/// one line to the list; stored `in Box<Type>` a large shape is kept out of line.
+/// Makes the enum from a list of `module::Type in Stored`: re-exports each type, makes it a variant of the same
+/// name, and forwards every method to the variant's. To add a shape, write its file with these methods and add
+/// one line to the list; `in Box<Type>` keeps a large shape out of line.
 macro_rules! shapes {
     ($($(#[$doc:meta])* $module:ident::$shape:ident in $stored:ty,)+) => {
         $(pub use $module::$shape;)+
 
-        /// An exact shape in its own space.
+        /// An exact shape in object space.
         #[derive(Clone, Debug)]
         pub enum Shape {
             $($(#[$doc])* $shape($stored),)+
@@ -26,7 +26,7 @@ macro_rules! shapes {
                 match self { $(Self::$shape(shape) => shape.closest(ray),)+ }
             }
 
-            /// Whether anything is crossed in the ray's range.
+            /// Whether there is any crossing in the ray's range.
             pub fn any(&self, ray: &Ray) -> bool {
                 self.closest(ray).is_some()
             }
@@ -41,8 +41,8 @@ macro_rules! shapes {
                 match self { $(Self::$shape(shape) => shape.surface(ray, root),)+ }
             }
 
-            /// The surface at `uv` of a part (see [`Root::part`]); `None` for a part that the shape does not have, and for
-            /// shapes without a parametrisation that can be run forwards.
+            /// The surface at `uv` of a part (see [`Root::part`]); `None` for a part that the shape does not
+            /// have, and for shapes whose `uv` does not determine a point.
             pub fn surface_at(&self, part: u32, uv: DVec2) -> Option<Surface> {
                 match self { $(Self::$shape(shape) => shape.surface_at(part, uv),)+ }
             }
@@ -52,8 +52,8 @@ macro_rules! shapes {
                 match self { $(Self::$shape(shape) => shape.bounds(world_from_object),)+ }
             }
 
-            /// A body around the shape that a line is soon tried against; `None` for infinite shapes, and for those so small
-            /// or so thin that numbers fail.
+            /// A bounding volume for quick rejection; `None` for infinite shapes, and for those so small or
+            /// thin that it underflows.
             pub fn hull(&self) -> Option<Hull> {
                 match self { $(Self::$shape(shape) => shape.hull(),)+ }
             }
@@ -73,19 +73,20 @@ macro_rules! shapes {
                 match self { $(Self::$shape(shape) => shape.is_solid(),)+ }
             }
 
-            /// Whether the closed solid holds `p`; false for shapes that are not solid.
+            /// Whether the closed solid contains `p`; false for shapes that are not solid.
             pub fn contains(&self, p: DVec3) -> bool {
                 match self { $(Self::$shape(shape) => shape.contains(p),)+ }
             }
 
-            /// The point of the surface, under `world_from_object`, that is nearest to `p`; of several, always the same.
+            /// The point of the surface, under `world_from_object`, that is nearest to `p`; deterministic when
+            /// there are several.
             ///
-            /// Triangles, boxes, planes, bilinear patches and whole spheres and ellipsoids have a method under every map,
-            /// the other shapes under those that keep angles; general quadrics have none. What is answered is the nearest
-            /// point of all, up to rounding.
+            /// Triangles, boxes, planes, bilinear patches and whole spheres and ellipsoids have a method under
+            /// every map, the other shapes under similarities; general quadrics have none. The result is the
+            /// nearest point up to rounding.
             ///
             /// # Errors
-            /// [`NoNearestPoint`] where there is no method: never a point that is not the nearest.
+            /// [`NoNearestPoint`] where there is no method; the result is never merely approximate.
             pub fn closest_point(
                 &self,
                 world_from_object: &Transform,
@@ -107,14 +108,14 @@ macro_rules! shapes {
                 match self { $(Self::$shape(shape) => shape.sample_area(u),)+ }
             }
 
-            /// A point as seen from `from`, by solid angle where the shape has a method, else by area; `None` where the
-            /// point chosen is seen edge-on, and for infinite shapes.
+            /// A point as seen from `from`, by solid angle where the shape has a method, else by area; `None`
+            /// where the point is seen edge-on, and for infinite shapes.
             pub fn sample_direction(&self, from: DVec3, u: DVec2) -> Option<DirectionSample> {
                 match self { $(Self::$shape(shape) => shape.sample_direction(from, u),)+ }
             }
 
-            /// The density, per unit solid angle at `ray.origin`, with which [`Shape::sample_direction`] chooses the point
-            /// `surface` on the ray; 0 for points that it never chooses.
+            /// The density, per unit solid angle at `ray.origin`, with which [`Shape::sample_direction`]
+            /// samples the point `surface` on the ray; 0 for points that it never samples.
             pub fn pdf_direction(&self, ray: &Ray, surface: &Surface) -> f64 {
                 match self { $(Self::$shape(shape) => shape.pdf_direction(ray, surface),)+ }
             }
@@ -123,20 +124,109 @@ macro_rules! shapes {
 }
 pub(crate) use shapes;
 
-/// Why a shape cannot be made.
+/// `closest` and `roots` of a shape that a line crosses at most twice, from its `crossings`.
+macro_rules! two_crossings {
+    ($visibility:vis) => {
+        /// The first crossing in the ray's range.
+        #[inline]
+        $visibility fn closest(&self, ray: &crate::Ray) -> Option<crate::Root> {
+            let [near, far] = self.crossings(ray);
+            near.or(far)
+        }
+
+        /// Every crossing in the ray's range, appended in ascending order.
+        $visibility fn roots(&self, ray: &crate::Ray, out: &mut crate::Roots) {
+            out.extend(self.crossings(ray).into_iter().flatten());
+        }
+    };
+}
+pub(crate) use two_crossings;
+
+/// `is_solid` and `contains` of a surface that encloses nothing.
+macro_rules! open_surface {
+    () => {
+        /// False: the surface encloses nothing.
+        pub fn is_solid(&self) -> bool {
+            false
+        }
+
+        /// False: the surface encloses nothing.
+        pub fn contains(&self, _p: lumbre_math::DVec3) -> bool {
+            false
+        }
+    };
+}
+pub(crate) use open_surface;
+
+/// `sample_direction` and its density for a shape that is sampled uniformly by area, from its `sample_area` and `area`.
+macro_rules! sampled_by_area {
+    ($visibility:vis) => {
+        /// A point uniform by area, as seen from `from`; `None` when it is seen edge-on.
+        $visibility fn sample_direction(
+            &self,
+            from: lumbre_math::DVec3,
+            u: lumbre_math::DVec2,
+        ) -> Option<crate::DirectionSample> {
+            crate::density::seen_from(from, self.sample_area(u)?)
+        }
+
+        /// The density of `sample_direction`, per unit solid angle.
+        $visibility fn pdf_direction(&self, ray: &crate::Ray, surface: &crate::Surface) -> f64 {
+            crate::density::pdf_seen_from(ray, surface, 1.0 / self.area())
+        }
+    };
+}
+pub(crate) use sampled_by_area;
+
+/// Area and sampling of a shape that is infinite, or whose area has no closed form.
+macro_rules! unsampled {
+    () => {
+        /// Infinite.
+        pub fn area(&self) -> f64 {
+            f64::INFINITY
+        }
+
+        /// Infinite.
+        pub fn area_under(&self, _world_from_object: &lumbre_math::Transform) -> f64 {
+            f64::INFINITY
+        }
+
+        /// `None`: nothing is sampled.
+        pub fn sample_area(&self, _u: lumbre_math::DVec2) -> Option<crate::SurfaceSample> {
+            None
+        }
+
+        /// `None`: nothing is sampled.
+        pub fn sample_direction(
+            &self,
+            _from: lumbre_math::DVec3,
+            _u: lumbre_math::DVec2,
+        ) -> Option<crate::DirectionSample> {
+            None
+        }
+
+        /// 0: nothing is sampled.
+        pub fn pdf_direction(&self, _ray: &crate::Ray, _surface: &crate::Surface) -> f64 {
+            0.0
+        }
+    };
+}
+pub(crate) use unsampled;
+
+/// Why a shape's parameters are refused.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ShapeError {
-    /// A parameter is not finite, or out of its range: its name, what was given, and what is accepted.
+    /// A parameter is not finite, or out of range.
     OutOfRange {
         /// The parameter's name, as in the scene language.
         parameter: &'static str,
-        /// What was given.
+        /// The given value.
         found: f64,
-        /// What is accepted.
+        /// The accepted range, in words.
         expected: &'static str,
     },
-    /// The parameters together make nothing: why.
+    /// The parameters together are degenerate: why.
     Degenerate(&'static str),
 }
 
@@ -158,12 +248,12 @@ pub(crate) mod check {
     use super::ShapeError;
     use lumbre_math::DVec3;
 
-    /// A length that is finite and greater than zero.
+    /// A finite length greater than zero.
     pub(crate) fn positive(parameter: &'static str, found: f64) -> Result<f64, ShapeError> {
         within(parameter, found, found > 0.0 && found.is_finite(), "a finite number greater than 0")
     }
 
-    /// A point without NaN and infinities.
+    /// A point without NaNs and infinities.
     pub(crate) fn finite(parameter: &'static str, found: DVec3) -> Result<DVec3, ShapeError> {
         match found.to_array().into_iter().find(|x| !x.is_finite()) {
             None => Ok(found),
@@ -171,7 +261,7 @@ pub(crate) mod check {
         }
     }
 
-    /// A direction of any length but zero, as a unit vector.
+    /// A direction of any non-zero length, as a unit vector.
     pub(crate) fn direction(parameter: &'static str, found: DVec3) -> Result<DVec3, ShapeError> {
         let found = finite(parameter, found)?;
         let largest = found.abs().max_element();
@@ -179,16 +269,16 @@ pub(crate) mod check {
             let expected = "a direction of a length other than 0";
             return Err(ShapeError::OutOfRange { parameter, found: 0.0, expected });
         }
-        // Scaled first, so that no length of direction over- or underflows.
+        // Scaled first, so that no length over- or underflows.
         let scaled = found / largest;
         Ok(scaled / scaled.length())
     }
 
-    /// A direction of any length but zero, times the power of two that brings it next to length 1.
+    /// A direction of any non-zero length, times the power of two that brings its length near 1.
     pub(crate) fn scaled_direction(parameter: &'static str, found: DVec3) -> Result<DVec3, ShapeError> {
         direction(parameter, found)?;
         let exponent = found.abs().max_element().log2().floor();
-        // In two steps, since 2^1074 overflows where its square root does not.
+        // In two steps, since 2^1074 overflows and its square root does not.
         let half = (-0.5 * exponent).floor();
         Ok(found * half.exp2() * (-exponent - half).exp2())
     }

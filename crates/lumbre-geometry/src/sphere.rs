@@ -1,4 +1,4 @@
-//! Spheres, and the parts of them between two heights and two meridians.
+//! Spheres, and parts of them between two heights and two meridians.
 
 use std::f64::consts::{PI, TAU};
 
@@ -16,8 +16,9 @@ use crate::{
 
 /// The points at distance `radius` from `center`.
 ///
-/// Parametrised as pbrt does it: `u` is the azimuth about z from x towards y over `phimax`, and `v` is the polar angle,
-/// 0 at the low end and 1 at the high end. A clipped sphere is a surface with an edge, and a ray can meet its inside.
+/// Parametrised as in pbrt: `u` is the azimuth about z from x towards y over `phimax`, and `v` is the polar
+/// angle, 0 at the low end and 1 at the high end. A clipped sphere is an open surface, so a ray can hit its
+/// inside.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sphere {
     center: DVec3,
@@ -45,7 +46,7 @@ impl Sphere {
 
     /// The part with `zmin <= z <= zmax`, measured from the centre, and azimuth up to `phimax` degrees.
     ///
-    /// Heights outside the sphere mean its poles, and come in either order, as in pbrt.
+    /// Heights are clamped to the poles, and come in either order, as in pbrt.
     ///
     /// # Errors
     /// [`ShapeError`] when nothing is left, a height is NaN, or `phimax` is not in (0, 360].
@@ -77,9 +78,9 @@ impl Sphere {
         self.z_min <= -self.radius && self.z_max >= self.radius && self.phi_max >= TAU
     }
 
-    /// Whether a point of the whole sphere, relative to the centre, belongs to this part of it.
+    /// Whether a point of the whole sphere, relative to the centre, belongs to this part.
     fn keeps(&self, w: DVec3) -> bool {
-        // A pole's height may come out a little inside the pole.
+        // A pole's computed height may lie slightly inside the pole.
         (self.z_min <= -self.radius || self.z_min <= w.z)
             && (self.z_max >= self.radius || w.z <= self.z_max)
             && (self.phi_max >= TAU || azimuth(w.y, w.x) <= self.phi_max)
@@ -96,7 +97,7 @@ impl Sphere {
         w * (self.radius / w.length())
     }
 
-    /// The point of the whole sphere below `w`, both relative to the centre.
+    /// The point of the whole sphere in the direction of `w`, both relative to the centre.
     fn radial(&self, w: DVec3) -> DVec3 {
         let largest = w.abs().max_element();
         if largest == 0.0 {
@@ -155,7 +156,7 @@ impl Sphere {
         let rho = w.x.hypot(w.y);
         let phi = azimuth(w.y, w.x);
         let v_range = self.theta_max - self.theta_min;
-        // At a pole every meridian will do; u is 0 there, and the parallel is as good as a point.
+        // At a pole any meridian will do; u is 0 there, on a parallel so small that it is a point.
         let (x, y) = if rho > 0.0 { (w.x, w.y) } else { (1e-10 * self.radius, 0.0) };
         let hypotenuse = x.hypot(y);
         let dpdu = self.phi_max * DVec3::new(-y, x, 0.0);
@@ -176,7 +177,7 @@ impl Sphere {
         }
     }
 
-    /// The box under a transform; tight for parts of a sphere too.
+    /// The bounding box under a transform, tight for parts of a sphere too.
     pub fn bounds(&self, world_from_object: &Transform) -> Option<Aabb> {
         let support = |d: DVec3| {
             let from_center = {
@@ -184,8 +185,8 @@ impl Sphere {
                 if self.is_whole() || self.keeps(d * (self.radius / length)) {
                     self.radius * length
                 } else {
-                    // The whole sphere has its extreme point elsewhere, so this part has it on its edge: two parallels
-                    // and two meridians.
+                    // The whole sphere's extreme point is not on this part, so the extreme is on its edge: two
+                    // parallels and two meridians.
                     let parallel = |theta: f64| {
                         let (sin, cos) = theta.sin_cos();
                         self.radius * (sin * arc_support(d.x, d.y, 0.0, self.phi_max) + cos * d.z)
@@ -204,13 +205,13 @@ impl Sphere {
         Some(bounds_from_support(world_from_object, magnitude, support))
     }
 
-    /// A ball, or the layer of one between two heights.
+    /// A bounding volume: the ball, or its layer between two heights.
     pub fn hull(&self) -> Option<Hull> {
         if self.is_whole() {
             let axes = DMat3::from_diagonal(DVec3::splat(self.radius));
             return Some(Hull::new(self.center, axes, Hull::BALL, true));
         }
-        // By the radius, z = middle + half * (z of the hull).
+        // Relative to the radius, z = middle + half * (z of the hull).
         let (middle, half) =
             (0.5 * (self.z_min + self.z_max) / self.radius, 0.5 * (self.z_max - self.z_min) / self.radius);
         let center = self.center + self.radius * middle * DVec3::Z;
@@ -219,12 +220,12 @@ impl Sphere {
         Some(Hull::new(center, axes, profile, false))
     }
 
-    /// The area: by Archimedes, that of the cylinder around it.
+    /// The area: that of the circumscribed cylinder, by Archimedes.
     pub fn area(&self) -> f64 {
         self.phi_max * self.radius * (self.z_max - self.z_min)
     }
 
-    /// The area after a transform: an ellipsoid's by elliptic integrals, a part of one by quadrature.
+    /// The area after a transform: an ellipsoid's by elliptic integrals, a part's by quadrature.
     pub fn area_under(&self, world_from_object: &Transform) -> f64 {
         if self.is_whole() {
             return measure::ellipsoid_area(self.radius, world_from_object);
@@ -237,17 +238,17 @@ impl Sphere {
         })
     }
 
-    /// Whether it is whole.
+    /// Whether it is a whole sphere.
     pub fn is_solid(&self) -> bool {
         self.is_whole()
     }
 
-    /// Whether the ball holds `p`.
+    /// Whether the ball contains `p`; false for parts of a sphere.
     pub fn contains(&self, p: DVec3) -> bool {
         self.is_whole() && (p - self.center).length() <= self.radius
     }
 
-    /// The nearest point to `p` under a map: of a part of a sphere, one that keeps angles.
+    /// The nearest point to `p` under any map; of a part of a sphere, under a similarity.
     ///
     /// # Errors
     /// [`NoNearestPoint::Map`] for a part of a sphere under another map.
@@ -315,11 +316,11 @@ impl Sphere {
         Some(SurfaceSample { surface, pdf: 1.0 / self.area() })
     }
 
-    /// A point uniform by solid angle: in the cone that the sphere fills, or all around for a place inside. Parts of a
-    /// sphere are sampled by area.
+    /// A point uniform by solid angle: in the cone that the sphere subtends, or over all directions from
+    /// inside. Parts of a sphere are sampled by area.
     ///
-    /// In the cone it is the point of the near side, found from the angles and not by intersecting a ray that may miss;
-    /// the small differences 1 − cos are computed as such, so that no distance is too far.
+    /// The point on the near side is computed from the angles, not by intersecting a ray that may miss; the
+    /// differences 1 − cos are computed without cancellation, so no distance is too large.
     pub fn sample_direction(&self, from: DVec3, u: DVec2) -> Option<DirectionSample> {
         if !self.is_whole() {
             return density::seen_from(from, self.sample_area(u)?);
@@ -339,7 +340,7 @@ impl Sphere {
         let versine = u.x * versine_max;
         let sin_squared = versine * (2.0 - versine);
         let ratio = sin_squared / (sin_max * sin_max);
-        // The angle at the centre, between the direction to `from` and the arm to the point.
+        // The angle at the centre between the directions to `from` and to the point.
         let cos_alpha = (sin_squared / sin_max + (1.0 - versine) * (1.0 - ratio).max(0.0).sqrt()).min(1.0);
         let sin_alpha = {
             // sin α = sin θ (distance cos θ - sqrt(radius² - distance² sin² θ)) / radius, without cancellation.
@@ -354,7 +355,7 @@ impl Sphere {
         Some(DirectionSample { surface, pdf: 1.0 / (TAU * versine_max) })
     }
 
-    /// The sine of the cone's half-angle and one minus its cosine, from a place outside at `distance` from the centre.
+    /// The sine of the cone's half-angle and one minus its cosine, from outside at `distance` from the centre.
     fn cone(&self, distance: f64) -> (f64, f64) {
         let sin = self.radius / distance;
         let cos = ((distance - self.radius) * (distance + self.radius)).sqrt() / distance;
@@ -378,10 +379,11 @@ impl Sphere {
     }
 }
 
-/// Both crossings of the whole sphere of this centre and radius by a ray's line, in order, whatever the ray's range: the bits
-/// that [`Sphere::closest`] and [`Sphere::roots`] choose from. They are equal where the line touches; `None` where it passes by.
+/// Both crossings of a ray's line with a whole sphere, in order, whatever the ray's range: the same bits that
+/// [`Sphere::closest`] and [`Sphere::roots`] choose from. They are equal where the line touches; `None` where
+/// it misses.
 ///
-/// For those who keep many spheres as bare numbers.
+/// For spheres stored as bare numbers.
 #[inline(always)]
 pub fn sphere_crossings(center: DVec3, radius: f64, ray: &Ray) -> Option<(f64, f64)> {
     crossings(center, radius, ray)
@@ -390,7 +392,7 @@ pub fn sphere_crossings(center: DVec3, radius: f64, ray: &Ray) -> Option<(f64, f
 /// Both crossings of a whole sphere, in order.
 ///
 /// The discriminant is that of E. Haines, J. Günther, T. Akenine-Möller, "Precision improvements for ray/sphere
-/// intersection", Ray Tracing Gems, 2019: the textbook's loses all digits for a small sphere far away.
+/// intersection", Ray Tracing Gems, 2019: the textbook's loses all digits for a small distant sphere.
 #[inline(always)]
 pub(crate) fn crossings(center: DVec3, radius: f64, ray: &Ray) -> Option<(f64, f64)> {
     let w = ray.origin - center;

@@ -1,4 +1,4 @@
-//! What the shapes share: bounds from support functions, azimuths, arcs, and error bounds.
+//! Helpers of the shapes: bounds from support functions, azimuths, arcs, and error bounds.
 
 use std::f64::consts::TAU;
 
@@ -7,9 +7,9 @@ use lumbre_math::{DVec3, Transform};
 
 use crate::Aabb;
 
-/// The box of a body under a transform, from its support function h(d) = max d·x over the body in object space.
+/// The bounding box of a set under a transform, from its support function h(d) = max d·x in object space.
 ///
-/// `magnitude` bounds |x| of every point of the body, component by component, and sets how far the box is rounded
+/// `magnitude` bounds |x| of every point, component by component, and determines how far the box is rounded
 /// outward: the error of h, which may cancel, is proportional to it.
 pub(crate) fn bounds_from_support(
     world_from_object: &Transform,
@@ -41,16 +41,16 @@ pub(crate) fn arc_support(a: f64, b: f64, from: f64, to: f64) -> f64 {
 /// The azimuth of (x, y), from 0 to 2π.
 pub(crate) fn azimuth(y: f64, x: f64) -> f64 {
     let phi = y.atan2(x);
-    // A tiny negative angle plus 2π rounds to 2π; -0.0 is no less than 0.
+    // A tiny negative angle plus 2π rounds to 2π; -0.0 is not less than 0.
     if phi < 0.0 { phi + TAU } else { phi }
 }
 
-/// What rounding can do to `d·x`, in units of the relative error of one operation.
+/// The rounding error of `d·x`, in units of the relative error of one operation.
 pub(crate) fn dot_size(d: DVec3, x: DVec3) -> f64 {
     d.abs().dot(x.abs())
 }
 
-/// What rounding can do to the length of `a × b`, in units of the relative error of one operation.
+/// The rounding error of the length of `a × b`, in units of the relative error of one operation.
 pub(crate) fn cross_size(a: DVec3, b: DVec3) -> f64 {
     let (a, b) = (a.abs(), b.abs());
     DVec3::new(a.y * b.z + a.z * b.y, a.z * b.x + a.x * b.z, a.x * b.y + a.y * b.x).length()

@@ -1,4 +1,4 @@
-//! Triangles: two tests for a ray, one of them watertight, and one exact shape.
+//! Triangles: two intersection tests, one of them watertight, and the exact shape.
 
 use std::f64::consts::{PI, TAU};
 
@@ -7,32 +7,33 @@ use lumbre_math::rounding::gamma;
 use lumbre_math::{DVec2, DVec3, Transform};
 
 use crate::nearest::on_triangle;
-use crate::shape::check;
+use crate::shape::{check, open_surface};
 use crate::support::bounds_from_support;
 use crate::{
     Aabb, DirectionSample, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
     SurfaceSample, density, measure,
 };
 
-/// Where a line meets a triangle.
+/// The intersection of a line with a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TriangleHit {
-    /// Where, in units of the ray's direction; the tests leave it to the caller whether that is in range.
+    /// The ray parameter; the caller checks the range.
     pub t: f64,
     /// The weight of the second vertex.
     pub b1: f64,
     /// The weight of the third vertex.
     pub b2: f64,
-    /// A positive multiple of −D·((p1−p0)×(p2−p0)). Positive when the ray meets the front, the face whose vertices run
-    /// counter-clockwise as seen from the ray's origin; a caller that culls back faces drops the negative ones. Never 0.
+    /// A positive multiple of −D·((p1−p0)×(p2−p0)). Positive when the ray hits the front face, whose vertices
+    /// are counter-clockwise as seen from the ray's origin; to cull back faces, drop the negative ones. Never
+    /// 0.
     pub determinant: f64,
 }
 
-/// The test of T. Möller, B. Trumbore, "Fast, minimum storage ray/triangle intersection", Journal of Graphics Tools,
-/// 1997, which solves O + tD = (1−b1−b2) p0 + b1 p1 + b2 p2 by Cramer's rule.
+/// The test of T. Möller, B. Trumbore, "Fast, minimum storage ray/triangle intersection", Journal of Graphics
+/// Tools, 1997, which solves O + tD = (1−b1−b2) p0 + b1 p1 + b2 p2 by Cramer's rule.
 ///
-/// Fast, but not watertight: rounding in the barycentrics is not the same for two triangles that share a side, and a ray
-/// at the side may miss both.
+/// It is fast, but not watertight: the barycentrics of two triangles with a common edge round differently, and
+/// a ray at the edge may miss both.
 #[inline]
 pub fn moller_trumbore(
     origin: DVec3,
@@ -53,8 +54,8 @@ pub fn moller_trumbore(
     inside.then(|| TriangleHit { t: s2.dot(edge2) * inverse, b1, b2, determinant })
 }
 
-/// A ray made ready for [`WatertightRay::hit`]: an axis that it mostly follows, and the shear that makes it follow that
-/// axis exactly. Made once a ray, for any number of triangles.
+/// The per-ray data of [`WatertightRay::hit`]: the dominant axis of the direction, and the shear that aligns
+/// the ray with it.
 #[derive(Clone, Copy, Debug)]
 pub struct WatertightRay {
     origin: DVec3,
@@ -62,7 +63,7 @@ pub struct WatertightRay {
     shear: DVec3,
 }
 
-/// A cyclic order of the axes that ends with the one of the ray's largest component, mirrored when the ray goes down it.
+/// A cyclic order of the axes that ends with the dominant one, reversed when the direction is negative there.
 #[derive(Clone, Copy, Debug)]
 enum Order {
     Yzx,
@@ -88,7 +89,7 @@ impl Order {
 }
 
 impl WatertightRay {
-    /// The shear of a ray. A direction of zero, or a NaN, makes a ray that hits nothing.
+    /// The shear of a ray. A ray with a direction of zero, or with a NaN, hits nothing.
     #[inline]
     pub fn new(origin: DVec3, direction: DVec3) -> Self {
         let size = direction.abs();
@@ -104,18 +105,18 @@ impl WatertightRay {
         Self { origin, order, shear: DVec3::new(along.x / along.z, along.y / along.z, 1.0 / along.z) }
     }
 
-    /// The test of S. Woop, C. Benthin, I. Wald, "Watertight ray/triangle intersection", Journal of Computer Graphics
-    /// Techniques, 2013.
+    /// The test of S. Woop, C. Benthin, I. Wald, "Watertight ray/triangle intersection", Journal of Computer
+    /// Graphics Techniques, 2013.
     ///
-    /// The line goes through a side on the same hand for both triangles that share it, so that it cannot slip between:
-    /// the edge functions of a shared side are the same two rounded products subtracted in the opposite order. Their
-    /// sign is right unless the products round to the same number; then they are taken again with their rounding
-    /// errors, which settles the sign. Nothing here may be contracted into a fused multiply-add.
+    /// The line passes a common edge on the same side of both triangles, so it cannot slip between them: their
+    /// edge functions are the same two rounded products, subtracted in opposite order. The sign is right unless
+    /// the products round to the same number; then it is decided by their rounding errors. Nothing here may be
+    /// contracted into a fused multiply-add.
     ///
-    /// Vertices in single precision may be given as they are, promoted.
+    /// Vertices in single precision may be passed promoted.
     #[inline]
     pub fn hit(&self, p0: DVec3, p1: DVec3, p2: DVec3) -> Option<TriangleHit> {
-        // One branch, which all triangles of a ray take alike, is cheaper than nine look-ups.
+        // One branch, the same for all triangles of a ray, is cheaper than nine look-ups.
         match self.order {
             Order::Yzx => self.hit_in(Order::Yzx, p0, p1, p2),
             Order::Zyx => self.hit_in(Order::Zyx, p0, p1, p2),
@@ -137,7 +138,8 @@ impl WatertightRay {
         if (u == 0.0) | (v == 0.0) | (w == 0.0) {
             (u, v, w) = (dop(cx, by, cy, bx), dop(ax, cy, ay, cx), dop(bx, ay, by, ax));
         }
-        // Without short cuts: which of the three decides cannot be foretold, and a wrong guess costs more than they do.
+        // No short-circuit: the branches are unpredictable, and a misprediction costs more than the
+        // comparisons.
         if ((u < 0.0) | (v < 0.0) | (w < 0.0)) & ((u > 0.0) | (v > 0.0) | (w > 0.0)) {
             return None;
         }
@@ -151,13 +153,12 @@ impl WatertightRay {
     }
 }
 
-/// The triangle p0, p1, p2 with its sides, facing where its vertices run counter-clockwise.
+/// The triangle p0, p1, p2, edges included; its front is where the vertices are counter-clockwise.
 ///
-/// Its `root.local` and its `uv` are the weights (b1, b2) of p1 and p2. One of no area is never hit.
+/// Its `root.local` and its `uv` are the weights (b1, b2) of p1 and p2. A triangle without area is never hit.
 ///
-/// It uses [`WatertightRay`] and not [`moller_trumbore`]: of 20,000 rays in double precision aimed at the sides and corners
-/// of a closed mesh, 837 slipped through the latter and none through the former (`tests/triangles.rs`), for about twice the
-/// time (`examples/shape_speed.rs`).
+/// It uses [`WatertightRay`] rather than [`moller_trumbore`], through whose edges some rays leak
+/// (`tests/triangles.rs`), at about twice the time (`examples/shape_speed.rs`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Triangle {
     p0: DVec3,
@@ -167,15 +168,15 @@ pub struct Triangle {
     is_flat: bool,
 }
 
-/// Solid angles outside this range are sampled by area: in small ones the sine and cosine of the spherical excess lose
-/// their digits, and right over the triangle the corners make a great circle.
+/// Solid angles outside this range are sampled by area: small ones lose the digits of the spherical excess, and
+/// directly over the triangle the corners lie on a great circle.
 const SPHERICAL_SAMPLING: std::ops::Range<f64> = 1e-5..TAU - 1e-5;
 
-/// The least height over the plane, in sizes of the triangle, for sampling by solid angle.
+/// The least height over the plane, relative to the triangle's size, for sampling by solid angle.
 const CLEARANCE: f64 = 1e-7;
 
 impl Triangle {
-    /// A triangle, possibly of no area.
+    /// A triangle, possibly without area.
     ///
     /// # Errors
     /// [`ShapeError`] unless all coordinates are finite.
@@ -196,7 +197,7 @@ impl Triangle {
         DVec3::new(dop(a.y, b.z, a.z, b.y), dop(a.z, b.x, a.x, b.z), dop(a.x, b.y, a.y, b.x))
     }
 
-    /// The first crossing in the ray's range: the watertight test, so that triangles placed side by side have no gap.
+    /// The first crossing in the ray's range, by the watertight test: adjacent triangles have no gap.
     #[inline]
     pub fn closest(&self, ray: &Ray) -> Option<Root> {
         let hit = WatertightRay::new(ray.origin, ray.direction).hit(self.p0, self.p1, self.p2)?;
@@ -236,18 +237,18 @@ impl Triangle {
         }
     }
 
-    /// The box under a transform: that of the three corners.
+    /// The bounding box under a transform: that of the three corners.
     pub fn bounds(&self, world_from_object: &Transform) -> Option<Aabb> {
         let magnitude = self.p0.abs().max(self.p1.abs()).max(self.p2.abs());
         let support = |d: DVec3| d.dot(self.p0).max(d.dot(self.p1)).max(d.dot(self.p2));
         Some(bounds_from_support(world_from_object, magnitude, support))
     }
 
-    /// Itself: where a plane cuts a cone along its axis.
+    /// A bounding volume: the triangle itself, as a plane section of a cone through its axis.
     pub fn hull(&self) -> Option<Hull> {
         let [p0, p1, p2] = self.corners();
         let (base, foot) = (0.5 * (p1 - p0), 0.5 * (p0 + p1));
-        // As wide as high, the radius of the cone is (1 - z) / 2.
+        // Scaled to a square, the radius of the cone is (1 - z) / 2.
         Hull::flat(0.5 * (foot + p2), base, 0.5 * (p2 - foot), [-0.25, 0.5, -0.25])
     }
 
@@ -261,20 +262,12 @@ impl Triangle {
         0.5 * (measure::area_stretch(world_from_object) * self.cross()).length()
     }
 
-    /// It is not.
-    pub fn is_solid(&self) -> bool {
-        false
-    }
+    open_surface!();
 
-    /// It holds no volume.
-    pub fn contains(&self, _p: DVec3) -> bool {
-        false
-    }
-
-    /// The nearest point to `p` under a map.
+    /// The nearest point to `p` under any map.
     ///
     /// # Errors
-    /// [`NoNearestPoint::Map`] never.
+    /// None.
     pub fn closest_point(
         &self,
         world_from_object: &Transform,
@@ -289,7 +282,7 @@ impl Triangle {
         "triangle"
     }
 
-    /// A point uniform by area; `None` for a triangle of no area.
+    /// A point uniform by area; `None` for a triangle without area.
     ///
     /// E. Heitz, "A low-distortion map between triangle and square", 2019.
     pub fn sample_area(&self, u: DVec2) -> Option<SurfaceSample> {
@@ -302,7 +295,7 @@ impl Triangle {
         pdf.is_finite().then(|| SurfaceSample { surface: self.surface_on(uv), pdf })
     }
 
-    /// The solid angle that the triangle fills as seen from `from`.
+    /// The solid angle that the triangle subtends at `from`.
     ///
     /// A. van Oosterom, J. Strackee, "The solid angle of a plane triangle", IEEE Transactions on Biomedical
     /// Engineering, 1983.
@@ -310,7 +303,7 @@ impl Triangle {
         solid_angle_of(self.p0 - from, self.p1 - from, self.p2 - from)
     }
 
-    /// The solid angle, if it is to be sampled by it.
+    /// The solid angle, if the triangle is sampled by it.
     fn sampled_solid_angle(&self, from: DVec3) -> Option<f64> {
         let cross = self.cross();
         let height = (self.p0 - from).dot(cross).abs() / cross.length();
@@ -319,7 +312,7 @@ impl Triangle {
         (is_clear && SPHERICAL_SAMPLING.contains(&solid_angle)).then_some(solid_angle)
     }
 
-    /// A point uniform by solid angle, or by area where the triangle looks tiny or fills half the sky.
+    /// A point uniform by solid angle, or by area where the solid angle is tiny or almost a hemisphere.
     ///
     /// J. Arvo, "Stratified sampling of spherical triangles", SIGGRAPH 1995.
     pub fn sample_direction(&self, from: DVec3, u: DVec2) -> Option<DirectionSample> {
@@ -333,7 +326,7 @@ impl Triangle {
         let (sin_alpha, cos_alpha) = alpha.sin_cos();
         let cos_c = a.dot(b);
 
-        // A smaller triangle with the same corner A, whose area is the share u.x of the whole.
+        // A smaller triangle with the same corner A, whose area is the fraction u.x of the whole.
         let (sin_phi, cos_phi) = (PI + u.x * solid_angle - alpha).sin_cos();
         let k1 = cos_phi + cos_alpha;
         let k2 = sin_phi - sin_alpha * cos_c;
@@ -347,7 +340,7 @@ impl Triangle {
         let sin_theta = (versine * (2.0 - versine)).max(0.0).sqrt();
         let direction = (1.0 - versine) * b + sin_theta * (moved_c - moved_c.dot(b) * b).normalize();
 
-        // Where it meets the plane, without the test for the sides: rounding may put it a little outside.
+        // Its intersection with the plane, without the edge tests: rounding may put it slightly outside.
         let (edge1, edge2) = (self.p1 - self.p0, self.p2 - self.p0);
         let s = from - self.p0;
         let s1 = direction.cross(edge2);
@@ -370,9 +363,9 @@ impl Triangle {
     }
 }
 
-/// The solid angle of a triangle, its corners given relative to the eye.
+/// The solid angle of a triangle, its corners given relative to the viewpoint.
 ///
-/// The mixed product is taken over the sides, so that a small triangle far away does not cancel.
+/// The triple product is computed from the edges, so that a small distant triangle does not cancel.
 pub(crate) fn solid_angle_of(a: DVec3, b: DVec3, c: DVec3) -> f64 {
     let (la, lb, lc) = (a.length(), b.length(), c.length());
     let volume = a.dot((b - a).cross(c - a)).abs();
@@ -380,7 +373,7 @@ pub(crate) fn solid_angle_of(a: DVec3, b: DVec3, c: DVec3) -> f64 {
     2.0 * volume.atan2(denominator)
 }
 
-/// The angle between two unit vectors, exact for small angles and for those near π too.
+/// The angle between two unit vectors, accurate near 0 and near π.
 ///
 /// W. Kahan, "How futile are mindless assessments of roundoff in floating-point computation?", 2006.
 fn angle_between(a: DVec3, b: DVec3) -> f64 {

@@ -1,23 +1,23 @@
-//! A picture as its file has it: one to four channels in the file's own number format.
+//! A picture as stored in a file: one to four channels in the file's own number format.
 
 use crate::half::half_to_f32;
 use crate::{Encoding, Image, Rgb};
 
-/// The numbers of a [`Bitmap`], channels innermost, row by row from the top left.
+/// The values of a [`Bitmap`], channels innermost, row by row from the top left.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PixelData {
-    /// Bytes that stand for `[0, 1]`.
+    /// Bytes that represent `[0, 1]`.
     U8(Vec<u8>),
-    /// 16 bits that stand for `[0, 1]`.
+    /// 16-bit integers that represent `[0, 1]`.
     U16(Vec<u16>),
-    /// Half-precision numbers as their bits.
+    /// Half-precision numbers, as their bits.
     F16(Vec<u16>),
     /// Single-precision numbers.
     F32(Vec<f32>),
 }
 
 impl PixelData {
-    /// How many numbers there are.
+    /// The number of values.
     pub fn len(&self) -> usize {
         match self {
             Self::U8(v) => v.len(),
@@ -26,12 +26,12 @@ impl PixelData {
         }
     }
 
-    /// Whether there are none.
+    /// Whether there are no values.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Bytes that one number takes.
+    /// Bytes per value.
     pub fn bytes_each(&self) -> usize {
         match self {
             Self::U8(_) => 1,
@@ -41,21 +41,21 @@ impl PixelData {
     }
 }
 
-/// What the channels of a [`Bitmap`] are.
+/// The meaning of the channels of a [`Bitmap`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Channels {
     /// Grey.
     Y,
-    /// Grey and coverage.
+    /// Grey and alpha.
     Ya,
     /// Red, green, blue.
     Rgb,
-    /// Red, green, blue, coverage.
+    /// Red, green, blue, alpha.
     Rgba,
 }
 
 impl Channels {
-    /// How many there are.
+    /// The number of channels.
     pub const fn count(self) -> usize {
         match self {
             Self::Y => 1,
@@ -65,7 +65,7 @@ impl Channels {
         }
     }
 
-    /// Those that are so many, from 1 to 4.
+    /// The channels for a count from 1 to 4.
     pub const fn from_count(count: usize) -> Option<Self> {
         match count {
             1 => Some(Self::Y),
@@ -76,7 +76,7 @@ impl Channels {
         }
     }
 
-    /// Which one is coverage.
+    /// The index of the alpha channel.
     pub const fn alpha(self) -> Option<usize> {
         match self {
             Self::Y | Self::Rgb => None,
@@ -86,10 +86,10 @@ impl Channels {
     }
 }
 
-/// A picture as its file has it, so that a texture of bytes takes bytes.
+/// A picture as stored in a file; a texture of bytes takes bytes.
 ///
-/// Colours are on the file's primaries (Rec. 709 unless something says otherwise). Those of whole numbers are not
-/// multiplied by coverage, as in PNG, TGA and QOI; floating ones are, as in EXR.
+/// Colours are on the file's primaries (Rec. 709 unless stated otherwise). Integer colours are not
+/// premultiplied by alpha, as in PNG, TGA and QOI; floating-point ones are, as in EXR.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bitmap {
     // `data.len() == width * height * channels.count()`, and neither side is 0.
@@ -101,7 +101,7 @@ pub struct Bitmap {
 }
 
 impl Bitmap {
-    /// A picture from its numbers; `None` unless there are `width * height * channels` of them and at least one.
+    /// A picture from its values; `None` unless there are `width * height * channels` of them and at least one.
     pub fn new(
         width: u32,
         height: u32,
@@ -114,43 +114,43 @@ impl Bitmap {
         fits.then_some(Self { width, height, channels, data, encoding })
     }
 
-    /// Pixels across, at least 1.
+    /// Width in pixels, at least 1.
     pub fn width(&self) -> u32 {
         self.width
     }
 
-    /// Pixels down, at least 1.
+    /// Height in pixels, at least 1.
     pub fn height(&self) -> u32 {
         self.height
     }
 
-    /// What the channels are.
+    /// The meaning of the channels.
     pub fn channels(&self) -> Channels {
         self.channels
     }
 
-    /// The stored numbers.
+    /// The stored values.
     pub fn data(&self) -> &PixelData {
         &self.data
     }
 
-    /// How the colour channels stand for light.
+    /// The transfer function of the colour channels.
     pub fn encoding(&self) -> Encoding {
         self.encoding
     }
 
-    /// The same numbers taken to stand for light in another way, as a scene may say of a texture.
+    /// The same values with another transfer function, as a scene may declare for a texture.
     #[must_use]
     pub fn with_encoding(self, encoding: Encoding) -> Self {
         Self { encoding, ..self }
     }
 
-    /// Bytes of memory that the numbers take.
+    /// Bytes of memory of the values.
     pub fn bytes(&self) -> usize {
         self.data.len() * self.data.bytes_each()
     }
 
-    /// Channel `c` of the pixel `x` from the left and `y` from the top, as light (coverage as it is).
+    /// Channel `c` of the pixel `x` from the left and `y` from the top, as linear light (alpha as it is).
     ///
     /// # Panics
     /// When it lies outside the picture.
@@ -165,7 +165,7 @@ impl Bitmap {
         }
     }
 
-    /// Channel `c` of the pixel `x` from the left and `y` from the top, as it is stored: whole numbers as parts of 1.
+    /// Channel `c` of the pixel `x` from the left and `y` from the top, as stored: integers as fractions of 1.
     ///
     /// # Panics
     /// When it lies outside the picture.
@@ -179,7 +179,7 @@ impl Bitmap {
         }
     }
 
-    /// The light of the pixel `x` from the left and `y` from the top, grey in all three channels.
+    /// The linear colour of the pixel `x` from the left and `y` from the top; grey in all three channels.
     ///
     /// # Panics
     /// When it lies outside the picture.
@@ -192,7 +192,7 @@ impl Bitmap {
         }
     }
 
-    /// The coverage of the pixel `x` from the left and `y` from the top; 1 when the picture has none.
+    /// The alpha of the pixel `x` from the left and `y` from the top; 1 when the picture has none.
     ///
     /// # Panics
     /// When it lies outside the picture.
@@ -200,12 +200,12 @@ impl Bitmap {
         self.channels.alpha().map_or(1.0, |c| self.texel(x, y, c))
     }
 
-    /// Whether the colours are multiplied by coverage.
+    /// Whether the colours are premultiplied by alpha.
     pub fn is_premultiplied(&self) -> bool {
         matches!(self.data, PixelData::F16(_) | PixelData::F32(_))
     }
 
-    /// The picture as light, multiplied by coverage where it has it.
+    /// The picture as linear light, premultiplied where it has alpha.
     pub fn to_image(&self) -> Image {
         let places = || (0..self.height).flat_map(|y| (0..self.width).map(move |x| (x, y)));
         let multiply = self.channels.alpha().is_some() && !self.is_premultiplied();

@@ -1,10 +1,10 @@
-//! The colours that three numbers stand for: primaries, white points and the matrices between them.
+//! Colour spaces: primaries, white points and the matrices between them.
 
 use glam::{DMat3, DVec3};
 
 use crate::Rgb;
 
-/// What red, green, blue and white are, each by its chromaticity (CIE 1931 x and y).
+/// The chromaticities of red, green, blue and white (CIE 1931 x and y).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ColourSpace {
     /// Red.
@@ -13,7 +13,7 @@ pub struct ColourSpace {
     pub green: [f64; 2],
     /// Blue.
     pub blue: [f64; 2],
-    /// Equal parts of the three.
+    /// The colour of equal parts of the three.
     pub white: [f64; 2],
 }
 
@@ -40,7 +40,7 @@ impl ColourSpace {
     /// The names that [`ColourSpace::from_name`] knows.
     pub const NAMES: [&'static str; 4] = ["srgb", "dci-p3", "rec2020", "aces2065-1"];
 
-    /// The space that a scene names, in any case.
+    /// The space of a name in a scene file, in any case.
     pub fn from_name(name: &str) -> Option<Self> {
         match name.to_ascii_lowercase().as_str() {
             "srgb" | "rec709" => Some(Self::REC709),
@@ -51,11 +51,11 @@ impl ColourSpace {
         }
     }
 
-    /// Takes a linear colour of this space to CIE XYZ, where white has Y = 1.
+    /// The matrix from linear colours of this space to CIE XYZ, where white has Y = 1.
     ///
-    /// `None` when the primaries lie on one line or white has no y, as a file may say.
+    /// `None` when the primaries are collinear or white has no y, as a file may state.
     pub fn to_xyz(&self) -> Option<DMat3> {
-        // The columns are the primaries as far as their chromaticity says; white says how much of each there is.
+        // The columns are the primaries' chromaticities, scaled so that they sum to white.
         let direction = |[x, y]: [f64; 2]| DVec3::new(x, y, 1.0 - x - y);
         let primaries = DMat3::from_cols(direction(self.red), direction(self.green), direction(self.blue));
         let white = direction(self.white) / self.white[1];
@@ -64,16 +64,17 @@ impl ColourSpace {
         invertible(matrix)
     }
 
-    /// Takes a linear colour of this space to the same light (the same XYZ) in `other`.
+    /// The matrix from linear colours of this space to the same light (the same XYZ) in `other`.
     ///
-    /// White stays white only between spaces with the same white. `None` as for [`ColourSpace::to_xyz`].
+    /// White stays white only between spaces with the same white point. `None` as for [`ColourSpace::to_xyz`].
     pub fn to(&self, other: &Self) -> Option<DMat3> {
         Some(other.to_xyz()?.inverse() * self.to_xyz()?)
     }
 
-    /// Takes a linear colour of this space to the one that looks the same in `other`: white becomes white.
+    /// The matrix from linear colours of this space to those of the same appearance in `other`: white becomes
+    /// white.
     ///
-    /// Right for reflectances and pictures. By the linear Bradford transform (K. M. Lam, "Metamerism and colour
+    /// For reflectances and pictures. By the linear Bradford transform (K. M. Lam, "Metamerism and colour
     /// constancy", PhD thesis, University of Bradford, 1985; matrix as in the ICC specification, annex E).
     /// `None` as for [`ColourSpace::to_xyz`].
     pub fn adapted_to(&self, other: &Self) -> Option<DMat3> {
@@ -90,7 +91,7 @@ impl ColourSpace {
         invertible(to.inverse() * cones.inverse() * DMat3::from_diagonal(ratio) * cones * from)
     }
 
-    /// The colour that looks the same on the primaries of [`Rgb`]; unchanged from a space that has no matrix.
+    /// The colour of the same appearance on the primaries of [`Rgb`]; unchanged from a space without a matrix.
     pub fn to_rec709(&self, [r, g, b]: [f64; 3]) -> Rgb {
         let matrix = match *self == Self::REC709 {
             true => DMat3::IDENTITY,

@@ -1,31 +1,32 @@
-//! How far two images are from each other.
+//! Metrics of the difference of two images.
 
 use crate::flip::flip;
 use crate::{Image, Rgb};
 
-/// A measure of the difference of two images.
+/// A metric of the difference of two images.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Metric {
     /// The root of the mean squared difference of the channels.
     Rmse,
-    /// The mean of squared differences relative to the squared reference: `(a - b)² / (b² + 0.01)`, so that dark and bright
-    /// parts count alike (F. Rousselle and others, "Adaptive sampling and reconstruction using greedy error minimization",
-    /// SIGGRAPH Asia 2011; the 0.01 is ours).
+    /// The mean of squared differences relative to the squared reference: `(a - b)² / (b² + 0.01)`, so that
+    /// dark and bright parts count equally (F. Rousselle and others, "Adaptive sampling and reconstruction
+    /// using greedy error minimization", SIGGRAPH Asia 2011; the 0.01 is ours).
     RelMse,
     /// The mean absolute difference of the channels.
     Mae,
     /// The largest absolute difference of any channel.
     Max,
-    /// The mean of FLIP, from 0 to 1: what a viewer would see who flips between the two. See [`crate::flip()`].
+    /// The mean of FLIP, from 0 to 1: the difference that a viewer perceives who alternates between the two.
+    /// See [`crate::flip()`].
     Flip,
 }
 
 impl Metric {
-    /// Their names, in the order of the enum.
+    /// The names, in the order of the enum.
     pub const NAMES: [&'static str; 5] = ["rmse", "relmse", "mae", "max", "flip"];
 
-    /// The one of that name.
+    /// The metric of a name.
     pub fn from_name(name: &str) -> Option<Self> {
         match name {
             "rmse" => Some(Self::Rmse),
@@ -41,33 +42,33 @@ impl Metric {
 /// The difference of two images.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Comparison {
-    /// By the metric; infinite when one has a number that is not finite and the other has another one there.
+    /// The value of the metric; infinite where a number is not finite and the other image's is different.
     pub value: f64,
-    /// Each pixel's part in it, 0 where they are equal, row by row from the top left: the error of FLIP, the largest error
-    /// of the channels otherwise, relative and squared for [`Metric::RelMse`].
+    /// Each pixel's contribution, 0 where they are equal, row by row from the top left: the error of FLIP;
+    /// otherwise the largest error of the channels, relative and squared for [`Metric::RelMse`].
     pub map: Vec<f32>,
     width: u32,
     height: u32,
 }
 
 impl Comparison {
-    /// The map in false colours: black where there is no error, through violet, red and orange to pale yellow at `full`
-    /// and above.
+    /// The map in false colours: black where there is no error, through violet, red and orange to pale yellow
+    /// at `full` and above.
     pub fn heat(&self, full: f32) -> Image {
         let colours =
             self.map.iter().map(|&error| heat(if full > 0.0 { error / full } else { error })).collect();
         Image::from_pixels(self.width, self.height, colours).expect("one error a pixel")
     }
 
-    /// The map in false colours from 0 to its largest error; to 1 for FLIP, as its maps are shown.
+    /// The map in false colours from 0 to its largest error; to 1 for FLIP, as is usual.
     pub fn heat_map(&self, metric: Metric) -> Image {
         let largest = self.map.iter().copied().filter(|e| e.is_finite()).fold(0.0, f32::max);
         self.heat(if metric == Metric::Flip { 1.0 } else { largest })
     }
 }
 
-/// Compares an image with a reference of the same size by the light of their colours; coverage plays no part. `None` when
-/// their sizes differ, or they have no pixels.
+/// Compares the colours of an image with a reference of the same size; alpha is ignored. `None` when their
+/// sizes differ, or they have no pixels.
 pub fn compare(image: &Image, reference: &Image, metric: Metric) -> Option<Comparison> {
     let same_size = (image.width(), image.height()) == (reference.width(), reference.height());
     if !same_size || image.pixels().is_empty() {
@@ -118,9 +119,10 @@ fn difference(a: f32, b: f32) -> f32 {
     if d.is_nan() { f32::INFINITY } else { d }
 }
 
-/// A colour for a number from 0 to 1: lightness rises evenly, hue turns from blue-violet through red to yellow.
+/// A colour for a number from 0 to 1: lightness rises evenly, hue runs from blue-violet through red to yellow.
 ///
-/// Made in Oklab (B. Ottosson, "A perceptual color space for image processing", 2020), so that equal steps look equal.
+/// Computed in Oklab (B. Ottosson, "A perceptual color space for image processing", 2020), so that equal steps
+/// look equal.
 fn heat(t: f32) -> Rgb {
     let t = if t.is_nan() { 1.0 } else { t.clamp(0.0, 1.0) };
     let lightness = 0.97 * t;

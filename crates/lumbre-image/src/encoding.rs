@@ -1,23 +1,23 @@
-//! How stored numbers stand for light: the transfer functions.
+//! Transfer functions between stored numbers and light.
 
 use std::sync::LazyLock;
 
 use crate::Rgb;
 
-/// How the colour channels of stored numbers in `[0, 1]` stand for light. Coverage is always linear.
+/// The transfer function of stored numbers in `[0, 1]`. Alpha is always linear.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Encoding {
-    /// In proportion to light.
+    /// Proportional to light.
     Linear,
     /// IEC 61966-2-1, the curve of sRGB.
     Srgb,
-    /// The stored number to this power is light.
+    /// Light is the stored number to this power.
     Gamma(f32),
 }
 
 impl Encoding {
-    /// The encoding that a scene names: `linear`, `sRGB` or `gamma G` with `G > 0`, in any case.
+    /// The encoding of a name in a scene file: `linear`, `sRGB` or `gamma G` with `G > 0`, in any case.
     pub fn from_name(name: &str) -> Option<Self> {
         let mut words = name.split_ascii_whitespace();
         let first = words.next()?;
@@ -30,7 +30,7 @@ impl Encoding {
         }
     }
 
-    /// Light from a stored number. Numbers outside `[0, 1]` go on along the curve, and below zero its mirror.
+    /// Light from a stored number. The curve extends above 1, and below 0 by its mirror image.
     pub fn decode(self, stored: f32) -> f32 {
         match self {
             Self::Linear => stored,
@@ -62,18 +62,18 @@ impl Encoding {
     }
 }
 
-/// The light of each stored byte of sRGB.
+/// The light of each byte of sRGB.
 static SRGB_BYTES: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|byte| srgb_to_linear_f64(byte as f64 / 255.0) as f32));
 
-/// Where the two pieces of the sRGB curve meet, as stored; the standard rounds it so.
+/// The junction of the two pieces of the sRGB curve, as stored; the standard rounds it so.
 const SRGB_STORED_JOIN: f64 = 0.04045;
-/// The same, as light.
+/// The junction, as light.
 const SRGB_LIGHT_JOIN: f64 = 0.0031308;
 
-/// Light from a number on the sRGB curve, after IEC 61966-2-1:1999, section 5.2, worked in double precision.
+/// Light from a number on the sRGB curve, after IEC 61966-2-1:1999, section 5.2, computed in double precision.
 ///
-/// Numbers above 1 go on along the curve; those below 0 follow its mirror, as the standard's amendment 1 extends it.
+/// The curve extends above 1, and below 0 by its mirror image, as in the standard's amendment 1.
 pub fn srgb_to_linear(stored: f32) -> f32 {
     srgb_to_linear_f64(f64::from(stored)) as f32
 }
@@ -91,9 +91,9 @@ pub fn linear_to_srgb(light: f32) -> f32 {
     (stored as f32).copysign(light)
 }
 
-/// A colour made ready to be stored or shown: on a display's curve, each channel in `[0, 1]`.
+/// A colour encoded for storage or display: on a display's curve, each channel in `[0, 1]`.
 ///
-/// A type of its own so that it cannot be taken for light.
+/// A type of its own so that it cannot be confused with light.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Encoded {
     // Each in [0, 1]: `new` clamps, and makes NaN 0.
@@ -101,7 +101,7 @@ pub struct Encoded {
 }
 
 impl Encoded {
-    /// Channels on some display's curve, held within `[0, 1]`; NaN becomes 0.
+    /// Channels on a display's curve, clamped to `[0, 1]`; NaN becomes 0.
     pub fn new(r: f32, g: f32, b: f32) -> Self {
         Self { channels: [r, g, b].map(|c| if c.is_nan() { 0.0 } else { c.clamp(0.0, 1.0) }) }
     }
@@ -111,7 +111,7 @@ impl Encoded {
         Self::new(linear_to_srgb(light.r), linear_to_srgb(light.g), linear_to_srgb(light.b))
     }
 
-    /// The light that an sRGB display would make of it.
+    /// The light that an sRGB display emits for it.
     pub fn to_linear(self) -> Rgb {
         let [r, g, b] = self.channels.map(srgb_to_linear);
         Rgb::new(r, g, b)
@@ -122,24 +122,24 @@ impl Encoded {
         self.channels
     }
 
-    /// The nearest bytes, halves up.
+    /// The nearest bytes, halves rounded up.
     pub fn to_u8(self) -> [u8; 3] {
         self.channels.map(unit_to_u8)
     }
 
-    /// The nearest 16 bits, halves up.
+    /// The nearest 16-bit integers, halves rounded up.
     pub fn to_u16(self) -> [u16; 3] {
         self.channels.map(unit_to_u16)
     }
 }
 
-/// The byte nearest to `255 * v`, halves up; `v` is held within `[0, 1]`, and NaN becomes 0.
+/// The byte nearest to `255 * v`, halves rounded up; `v` is clamped to `[0, 1]`, and NaN becomes 0.
 pub fn unit_to_u8(v: f32) -> u8 {
-    // In f64, as 255 * v + 0.5 rounded to f32 can reach the next whole number from below. The cast saturates.
+    // In f64, since 255 * v + 0.5 rounded to f32 can reach the next integer. The cast saturates.
     (f64::from(v) * 255.0 + 0.5) as u8
 }
 
-/// The 16 bits nearest to `65535 * v`, halves up; `v` is held within `[0, 1]`, and NaN becomes 0.
+/// The 16-bit integer nearest to `65535 * v`, halves rounded up; `v` is clamped to `[0, 1]`, and NaN becomes 0.
 pub fn unit_to_u16(v: f32) -> u16 {
     (f64::from(v) * 65535.0 + 0.5) as u16
 }

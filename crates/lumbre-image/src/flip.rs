@@ -1,23 +1,23 @@
-//! FLIP: what a viewer sees who flips between two pictures.
+//! FLIP: the difference that a viewer perceives who alternates between two images.
 //!
-//! P. Andersson, J. Nilsson, T. Akenine-Möller and others, "FLIP: A difference evaluator for alternating images", HPG 2020;
-//! for light beyond a display, P. Andersson and others, "Visualizing errors in rendered high dynamic range images",
-//! Eurographics 2021 (short papers). Written from the papers.
+//! P. Andersson, J. Nilsson, T. Akenine-Möller and others, "FLIP: A difference evaluator for alternating
+//! images", HPG 2020; for high dynamic range, P. Andersson and others, "Visualizing errors in rendered high
+//! dynamic range images", Eurographics 2021 (short papers). Written from the papers.
 
 use glam::{DMat3, DVec3, Vec3};
 
 use crate::{ColourSpace, Image, Rgb};
 
-/// Pixels for each degree of vision: a 0.7 m wide monitor of 3840 pixels seen from 0.7 m, as in the paper.
+/// Pixels per degree of visual angle: a 0.7 m wide monitor of 3840 pixels seen from 0.7 m, as in the paper.
 const PIXELS_PER_DEGREE: f32 = 0.7 * 3840.0 / 0.7 * std::f32::consts::PI / 180.0;
 
-/// The error of each pixel of `image` against `reference`, from 0 to 1, row by row from the top left; `None` when their
-/// sizes differ or they have no pixels.
+/// The error of each pixel of `image` against `reference`, from 0 to 1, row by row from the top left; `None`
+/// when their sizes differ or they have no pixels.
 ///
-/// When no channel of the reference is above 1 both are taken as what an sRGB display shows, cut off at 1. Else the error is
-/// the largest over a range of exposures, from where the brightest of the reference is just not cut off to where its
-/// median is as bright as that, each shown through a fitted ACES curve (K. Narkowicz, 2015). Numbers that are not finite
-/// count as 0, or as the largest error where only one image has them.
+/// When no channel of the reference is above 1, both are clamped to 1 and shown on an sRGB display. Otherwise
+/// the error is the largest over a range of exposures, from the one where the brightest pixel of the reference
+/// just saturates to the one where its median does, each shown through a fitted ACES curve (K. Narkowicz,
+/// 2015). Numbers that are not finite count as 0, or as the largest error where only one image has them.
 pub fn flip(image: &Image, reference: &Image) -> Option<Vec<f32>> {
     let same_size = (image.width(), image.height()) == (reference.width(), reference.height());
     if !same_size || image.pixels().is_empty() {
@@ -51,7 +51,7 @@ fn finite(c: Rgb) -> Rgb {
     if c.is_finite() { c } else { Rgb::BLACK }
 }
 
-/// Narkowicz's fit, as a display shows it.
+/// The image through Narkowicz's curve.
 fn shown(image: &Image, stops: f32) -> Vec<Rgb> {
     let fit = |v: f32| {
         let v = 0.6 * v.clamp(0.0, 1e6);
@@ -62,7 +62,7 @@ fn shown(image: &Image, stops: f32) -> Vec<Rgb> {
 
 /// The first and the last exposure in stops: at the first the brightest, at the last the median, is shown as 0.85.
 fn exposures(reference: &Image) -> (f32, f32) {
-    // The light v (before the factor 0.6) that the curve shows as 0.85.
+    // The light v (before the factor 0.6) that the curve maps to 0.85.
     let (a, b, c) = (2.51 - 0.85 * 2.43, 0.03 - 0.85 * 0.59, -0.85 * 0.14);
     let bright: f32 = (-b + f32::sqrt(b * b - 4.0 * a * c)) / (2.0 * a) / 0.6;
     let mut light: Vec<f32> = reference.pixels().iter().map(|c| finite(*c).luminance().max(1e-6)).collect();
@@ -71,7 +71,7 @@ fn exposures(reference: &Image) -> (f32, f32) {
     ((bright / most).log2(), (bright / median).log2())
 }
 
-/// For two pictures of light in [0, 1].
+/// FLIP of two images in [0, 1].
 fn flip_shown(image: &[Rgb], reference: &[Rgb], width: u32) -> Vec<f32> {
     let space = Spaces::new();
     let width = width as usize;
@@ -101,7 +101,7 @@ impl Spaces {
         DVec3::new(116.0 * v.y - 16.0, 500.0 * (v.x - v.y), 200.0 * (v.y - v.z)).as_vec3()
     }
 
-    /// CIELAB with chroma that fades with lightness, as the Hunt effect has it.
+    /// CIELAB with the Hunt effect: chroma scaled by lightness.
     fn lab(&self, opponent: Vec3) -> Vec3 {
         let v = opponent.as_dvec3();
         let y = (v.x + 16.0) / 116.0;
@@ -123,7 +123,7 @@ fn hyab(a: Vec3, b: Vec3) -> f32 {
     d.x.abs() + d.y.hypot(d.z)
 }
 
-/// What the eye makes of the colours, from 0 to 1.
+/// The perceived difference of colours, from 0 to 1.
 fn colour_errors(space: &Spaces, a: &[Vec3], b: &[Vec3], width: usize) -> Vec<f32> {
     const POWER: f32 = 0.7;
     let of = |r, g, b| space.lab(space.opponent(Rgb::new(r, g, b)));
@@ -146,13 +146,13 @@ fn colour_errors(space: &Spaces, a: &[Vec3], b: &[Vec3], width: usize) -> Vec<f3
         .collect()
 }
 
-/// What is left of each opponent channel at this distance: the contrast sensitivity of the eye as sums of Gaussians
+/// Filters each opponent channel by the contrast sensitivity of the eye at this distance, as sums of Gaussians
 /// (G. M. Johnson and M. D. Fairchild, "A top down description of S-CIELAB and CIEDE2000", 2003).
 fn contrast_filtered(image: &[Vec3], width: usize) -> Vec<Vec3> {
     // By channel: weights a and spreads b of a * sqrt(pi / b) * exp(-pi^2 x^2 / b), x in degrees.
     const GAUSSIANS: [&[[f32; 2]]; 3] = [&[[1.0, 0.0047]], &[[1.0, 0.0053]], &[[34.1, 0.04], [13.5, 0.025]]];
     const PI: f32 = std::f32::consts::PI;
-    // All channels are cut where the widest has three standard deviations.
+    // All channels are truncated at three standard deviations of the widest.
     let radius = (3.0 * (0.04 / (2.0 * PI * PI)).sqrt() * PIXELS_PER_DEGREE).ceil() as i32;
     let mut out = vec![Vec3::ZERO; image.len()];
     for (channel, gaussians) in GAUSSIANS.into_iter().enumerate() {
@@ -178,7 +178,7 @@ fn contrast_filtered(image: &[Vec3], width: usize) -> Vec<Vec3> {
 
 /// The difference of edges and points, from 0 to 1.
 fn feature_errors(a: &[Vec3], b: &[Vec3], width: usize) -> Vec<f32> {
-    /// Degrees that a feature is wide.
+    /// The width of a feature in degrees.
     const WIDTH: f32 = 0.082;
     const POWER: f32 = 0.5;
     let deviation = 0.5 * WIDTH * PIXELS_PER_DEGREE;
@@ -211,7 +211,7 @@ fn balanced(kernel: Vec<f32>) -> Vec<f32> {
     kernel.into_iter().map(|k| if k > 0.0 { k / positive } else { k / negative }).collect()
 }
 
-/// The plane through one kernel along rows and another along columns; beyond the borders it goes on as there.
+/// Filters a plane by one kernel along rows and another along columns; borders are extended.
 fn filtered(plane: &[f32], width: usize, along_x: &[f32], along_y: &[f32]) -> Vec<f32> {
     let height = plane.len() / width;
     let convolve = |at: usize, length: usize, kernel: &[f32], value: &dyn Fn(usize) -> f32| {

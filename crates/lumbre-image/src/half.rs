@@ -1,13 +1,13 @@
 //! Half-precision numbers (IEEE 754 binary16) as their 16 bits.
 
-/// The number that 16 bits stand for, exactly.
+/// The exact value of 16 bits.
 pub fn half_to_f32(bits: u16) -> f32 {
     let sign = u32::from(bits & 0x8000) << 16;
     let exponent = u32::from(bits >> 10) & 0x1F;
     let fraction = u32::from(bits & 0x3FF);
     match (exponent, fraction) {
         (0, _) => {
-            // A subnormal counts steps of 2^-24, which f32 holds exactly.
+            // A subnormal is a multiple of 2^-24, exact in f32.
             let magnitude = fraction as f32 * 2f32.powi(-24);
             f32::from_bits(magnitude.to_bits() | sign)
         }
@@ -16,7 +16,7 @@ pub fn half_to_f32(bits: u16) -> f32 {
     }
 }
 
-/// The nearest half to a number, ties to even; too large becomes infinite, and NaN stays NaN.
+/// The nearest half, ties to even; overflow gives infinity, and NaN stays NaN.
 pub fn f32_to_half(v: f32) -> u16 {
     let bits = v.to_bits();
     let sign = (bits >> 16) as u16 & 0x8000;
@@ -24,7 +24,7 @@ pub fn f32_to_half(v: f32) -> u16 {
     if magnitude > 0x7F80_0000 {
         return sign | 0x7E00;
     }
-    // 65520 is half way between the largest half and the next step: it and all above round to infinity.
+    // 65520 is half-way between the largest half and the next step: it and everything above round to infinity.
     if magnitude >= 0x477F_F000 {
         return sign | 0x7C00;
     }
@@ -33,7 +33,7 @@ pub fn f32_to_half(v: f32) -> u16 {
         let rounded = f32::from_bits(magnitude) + 0.5;
         return sign | (rounded.to_bits() - 0.5f32.to_bits()) as u16;
     }
-    // Rebias the exponent, and round the 13 bits that go: a carry into the exponent is right.
+    // Rebias the exponent, and round off 13 bits; a carry into the exponent is right.
     let odd = magnitude >> 13 & 1;
     let rounded = magnitude - (112 << 23) + 0xFFF + odd;
     sign | (rounded >> 13) as u16

@@ -2,11 +2,11 @@
 
 use crate::Rgb;
 
-/// A rectangle of linear colours with optional coverage, row by row from the top left. Where there is coverage, colours
-/// are multiplied by it.
+/// A rectangle of linear colours with optional alpha, row by row from the top left. With alpha, the colours are
+/// premultiplied.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {
-    // `pixels.len() == width * height`, and so for `alpha` where it is there.
+    // `pixels.len() == width * height`, and likewise for `alpha`.
     width: u32,
     height: u32,
     pixels: Vec<Rgb>,
@@ -29,17 +29,17 @@ impl Image {
         })
     }
 
-    /// The same image with coverage in `[0, 1]`, one value a pixel; `None` unless there are as many as pixels.
+    /// The image with alpha in `[0, 1]`, one value a pixel; `None` unless there are as many as pixels.
     pub fn with_alpha(self, alpha: Vec<f32>) -> Option<Self> {
         (alpha.len() == self.pixels.len()).then_some(Self { alpha: Some(alpha), ..self })
     }
 
-    /// Pixels across.
+    /// Width in pixels.
     pub fn width(&self) -> u32 {
         self.width
     }
 
-    /// Pixels down.
+    /// Height in pixels.
     pub fn height(&self) -> u32 {
         self.height
     }
@@ -54,7 +54,7 @@ impl Image {
         &mut self.pixels
     }
 
-    /// Coverage, row by row from the top left, where the image has it.
+    /// Alpha, row by row from the top left, if the image has it.
     pub fn alpha(&self) -> Option<&[f32]> {
         self.alpha.as_deref()
     }
@@ -81,7 +81,7 @@ impl Image {
         self.pixels.iter().map(move |pixel| pixel[channel])
     }
 
-    /// Each pixel through `f`, with the same coverage.
+    /// Maps each pixel by `f`; alpha is unchanged.
     #[must_use]
     pub fn map(mut self, f: impl FnMut(Rgb) -> Rgb) -> Self {
         let mut f = f;
@@ -102,7 +102,7 @@ impl Image {
         Rgb::new(r, g, b)
     }
 
-    /// The part of the image within `window`, which is cut where it passes the image; `None` when nothing is left.
+    /// The part of the image within `window`, clipped to the image; `None` when it is empty.
     pub fn crop(&self, window: Window) -> Option<Self> {
         let whole = Window { x: 0, y: 0, width: self.width, height: self.height };
         let part = window.intersection(whole)?;
@@ -121,8 +121,8 @@ impl Image {
         self.gathered(self.width, self.height, |x, y| (self.width - 1 - x, y))
     }
 
-    /// The image as it lies in a larger one: this image's top left pixel is at `(x, y)` of a black and
-    /// uncovered canvas of `width` by `height`, and what passes the canvas is cut.
+    /// The image on a larger canvas: its top left pixel is at `(x, y)` of a black, transparent canvas of
+    /// `width` by `height`; the rest is clipped.
     #[must_use]
     pub fn placed(&self, x: i32, y: i32, width: u32, height: u32) -> Self {
         let mut canvas = Self::filled(width, height, Rgb::BLACK);
@@ -142,8 +142,8 @@ impl Image {
         canvas
     }
 
-    /// The image at another size, each pixel the mean over the area that it covers: exact for whole factors, and the
-    /// mean of the image stays. `None` when either image would have no pixels.
+    /// The image resized by a box filter: exact for integer factors, and the mean of the image is preserved.
+    /// `None` when either image would have no pixels.
     pub fn resized(&self, width: u32, height: u32) -> Option<Self> {
         if self.pixels.is_empty() || width == 0 || height == 0 {
             return None;
@@ -174,7 +174,7 @@ impl Image {
         Some(Self { width, height, pixels, alpha: self.alpha.as_ref().map(|_| coverage) })
     }
 
-    /// The image of `width` by `height` whose pixels come from `from`, which must stay inside this one.
+    /// An image of `width` by `height` whose pixels are read at `from(x, y)`, which must be inside this one.
     fn gathered(&self, width: u32, height: u32, from: impl Fn(u32, u32) -> (u32, u32)) -> Self {
         let places = || (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
         let index = |(x, y)| {
@@ -190,7 +190,7 @@ impl Image {
     }
 }
 
-/// A rectangle of pixels somewhere on the plane.
+/// A rectangle of pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Window {
     /// Its leftmost column.
@@ -204,7 +204,7 @@ pub struct Window {
 }
 
 impl Window {
-    /// What both have; `None` when that is nothing.
+    /// The intersection; `None` when it is empty.
     pub fn intersection(self, other: Self) -> Option<Self> {
         let axis = |a: i32, a_len: u32, b: i32, b_len: u32| {
             let start = a.max(b);
@@ -217,12 +217,12 @@ impl Window {
     }
 }
 
-/// For each of `to` equal parts of a line of `from` pixels, the pixels that it covers with their shares.
+/// For each of `to` equal parts of a line of `from` pixels, the pixels that it covers and their weights.
 fn spans(from: u32, to: u32) -> Vec<Vec<(usize, f64)>> {
     let step = f64::from(from) / f64::from(to);
     (0..to)
         .map(|i| {
-            // The products are exact for whole factors, so that neighbours share no sliver.
+            // The products are exact for integer factors, so neighbours overlap in no sliver.
             let (start, end) = (f64::from(i) * step, f64::from(i + 1) * step);
             let last = (end.ceil() as usize).min(from as usize);
             (start as usize..last)

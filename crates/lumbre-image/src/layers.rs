@@ -1,4 +1,4 @@
-//! Named channels over one rectangle of pixels: a picture with its AOVs.
+//! Named channels over one rectangle of pixels: an image with its AOVs.
 
 use crate::{Image, Rgb};
 
@@ -9,7 +9,7 @@ pub struct Layer {
     pub name: String,
     /// One value a pixel, row by row from the top left.
     pub samples: Vec<f32>,
-    /// Whether the values need more digits than a half has, as depths and ids do.
+    /// Whether half precision is insufficient, as for depths and ids.
     pub full_precision: bool,
 }
 
@@ -38,7 +38,7 @@ impl Layers {
     /// Adds a channel.
     ///
     /// # Errors
-    /// The layer itself, when its name is taken or it has not one sample a pixel.
+    /// The layer itself, when its name is taken or its number of samples is wrong.
     pub fn push(&mut self, layer: Layer) -> Result<(), Layer> {
         let expected = self.width as usize * self.height as usize;
         if layer.samples.len() != expected || self.get(&layer.name).is_some() {
@@ -51,7 +51,7 @@ impl Layers {
     /// Adds the channels of an image as `group.R` and so on, or `R` and so on when `group` is empty.
     ///
     /// # Errors
-    /// The layer that cannot be added, as for [`Layers::push`]; those before it were.
+    /// The layer that cannot be added, as for [`Layers::push`]; those before it have been added.
     pub fn push_image(&mut self, group: &str, image: &Image) -> Result<(), Layer> {
         let channel = |name, samples| Layer { name: grouped(group, name), samples, full_precision: false };
         for (c, name) in ["R", "G", "B"].into_iter().enumerate() {
@@ -63,12 +63,12 @@ impl Layers {
         }
     }
 
-    /// Pixels across.
+    /// Width in pixels.
     pub fn width(&self) -> u32 {
         self.width
     }
 
-    /// Pixels down.
+    /// Height in pixels.
     pub fn height(&self) -> u32 {
         self.height
     }

@@ -7,7 +7,7 @@ use bytemuck::{Pod, Zeroable};
 
 /// A linear colour on the Rec. 709 primaries with a D65 white, unbounded.
 ///
-/// These are also the lanes on which light transport carries radiance and reflectance.
+/// Light transport carries radiance and reflectance in these channels, too.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Rgb {
@@ -20,7 +20,7 @@ pub struct Rgb {
 }
 
 impl Rgb {
-    /// No light.
+    /// Zero in every channel.
     pub const BLACK: Self = Self::splat(0.0);
     /// One in every channel.
     pub const WHITE: Self = Self::splat(1.0);
@@ -65,19 +65,19 @@ impl Rgb {
         self.r.is_finite() && self.g.is_finite() && self.b.is_finite()
     }
 
-    /// Each channel through `f`.
+    /// Maps each channel by `f`.
     #[must_use]
     pub fn map(self, mut f: impl FnMut(f32) -> f32) -> Self {
         Self::new(f(self.r), f(self.g), f(self.b))
     }
 
-    /// Each pair of channels through `f`.
+    /// Combines the channels pairwise by `f`.
     #[must_use]
     pub fn zip(self, other: Self, mut f: impl FnMut(f32, f32) -> f32) -> Self {
         Self::new(f(self.r, other.r), f(self.g, other.g), f(self.b, other.b))
     }
 
-    /// Each channel held within `[low, high]`.
+    /// Clamps each channel to `[low, high]`.
     #[must_use]
     pub fn clamp(self, low: f32, high: f32) -> Self {
         self.map(|c| c.clamp(low, high))

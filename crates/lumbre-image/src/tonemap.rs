@@ -1,27 +1,27 @@
-//! From scene light to what a display can show.
+//! Tone mapping: from scene light to displayable colours.
 
 use crate::{Encoded, Rgb};
 
-/// How unbounded light is brought within what a display shows.
+/// A tone mapping operator.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum ToneMap {
-    /// Cut off at 1.
+    /// Clamped at 1.
     #[default]
     None,
-    /// AgX: a sigmoid on logarithms of light, on primaries drawn inwards so that bright colours fade to white.
+    /// AgX: a sigmoid of the logarithm of light, on inset primaries so that bright colours fade to white.
     AgX,
     /// A fit to the reference rendering of ACES for a standard display.
     Aces,
-    /// Colours below 0.8 stay, highlights are rolled off.
+    /// Colours below 0.8 are unchanged; highlights are compressed.
     Neutral,
 }
 
 impl ToneMap {
-    /// Their names, in the order of the enum.
+    /// The names, in the order of the enum.
     pub const NAMES: [&'static str; 4] = ["none", "agx", "aces", "neutral"];
 
-    /// The one of that name.
+    /// The operator of a name.
     pub fn from_name(name: &str) -> Option<Self> {
         match name {
             "none" => Some(Self::None),
@@ -32,7 +32,7 @@ impl ToneMap {
         }
     }
 
-    /// The light in `[0, 1]` that a display should give for `light`. Below 0 and NaN count as 0.
+    /// The displayed light in `[0, 1]` for `light`. Negative numbers and NaN count as 0.
     pub fn apply(self, light: Rgb) -> Rgb {
         let light = light.map(|c| if c.is_nan() { 0.0 } else { c.clamp(0.0, f32::MAX) });
         let shown = match self {
@@ -44,7 +44,7 @@ impl ToneMap {
         shown.clamp(0.0, 1.0)
     }
 
-    /// `light`, `exposure` stops brighter, mapped and put on the sRGB curve.
+    /// `light`, brightened by `exposure` stops, tone mapped and encoded as sRGB.
     pub fn encode(self, light: Rgb, exposure: f32) -> Encoded {
         Encoded::srgb(self.apply(light * exposure.exp2()))
     }
@@ -55,8 +55,8 @@ fn mul(rows: [[f32; 3]; 3], c: Rgb) -> Rgb {
     Rgb::new(r, g, b)
 }
 
-/// T. Sobotka, "AgX", 2022; the matrix and the range in stops as in B. Wrensch, "Minimal AgX implementation", 2023. The
-/// curve here is the sigmoid itself rather than a polynomial fitted to it.
+/// T. Sobotka, "AgX", 2022; the matrix and the range in stops as in B. Wrensch, "Minimal AgX implementation",
+/// 2023. The curve is the sigmoid itself rather than a polynomial fitted to it.
 fn agx(light: Rgb) -> Rgb {
     const INSET: [[f32; 3]; 3] = [
         [0.842_479_06, 0.078_433_6, 0.079_223_745],
@@ -76,12 +76,12 @@ fn agx(light: Rgb) -> Rgb {
         let stops = c.max(1e-10).log2().clamp(STOPS[0], STOPS[1]);
         agx_sigmoid((stops - STOPS[0]) / (STOPS[1] - STOPS[0]))
     });
-    // The curve makes numbers for a display of exponent 2.2; light again for the sRGB curve.
+    // The curve is for a display of exponent 2.2: back to light for the sRGB curve.
     mul(OUTSET, stretched).map(|c| c.max(0.0).powf(2.2))
 }
 
-/// From (0, 0) to (1, 1) with slope 2 at the pivot, which is middle grey: each side of it is a scaled
-/// `t / (1 + t^p)^(1/p)`, whose scale follows from where it ends.
+/// From (0, 0) to (1, 1) with slope 2 at the pivot, which is middle grey: each side of it is a scaled `t / (1 +
+/// t^p)^(1/p)`, whose scale follows from its end.
 fn agx_sigmoid(x: f32) -> f32 {
     const PIVOT: [f32; 2] = [10.0 / 16.5, 0.5];
     const SLOPE: f32 = 2.0;
@@ -112,7 +112,7 @@ fn aces(light: Rgb) -> Rgb {
 
 /// Khronos Group, "PBR Neutral tone mapper" specification, 2024.
 fn neutral(light: Rgb) -> Rgb {
-    /// Fresnel reflectance at normal incidence of the usual dielectric, which base colours do not include.
+    /// Fresnel reflectance at normal incidence of a common dielectric, which base colours do not include.
     const F90: f32 = 0.04;
     const START: f32 = 0.8 - F90;
     const DESATURATION: f32 = 0.15;

@@ -1,4 +1,4 @@
-//! Invertible affine maps that change with time.
+//! Invertible affine maps that change over time.
 
 use glam::{DAffine3, DMat3, DVec3};
 
@@ -6,41 +6,41 @@ use crate::quaternion;
 use crate::transform::{Transform, inverse_linear};
 use crate::vector;
 
-/// An affine map at some moments, and between them by parts: translations and stretches go straight from one to the next,
-/// rotations turn evenly about one axis, the shorter way round.
+/// An affine map keyed at several times and interpolated by parts: translation and stretch linearly, rotation
+/// at constant speed about one axis, by the shorter arc.
 ///
-/// Before the first moment the map is as then, after the last as there. After M. Pharr, W. Jakob, G. Humphreys, "Physically
-/// Based Rendering", 4th edition, 2023, "Animating Transformations" (polar decomposition: K. Shoemake, T. Duff, "Matrix
-/// Animation and Polar Decomposition", Graphics Interface 1992). It differs in that there may be more than two moments, and
-/// that mirrors may move: they are a rotation after a stretch by negative factors.
+/// Before the first key and after the last the map is constant. After M. Pharr, W. Jakob, G. Humphreys,
+/// "Physically Based Rendering", 4th edition, 2023, "Animating Transformations" (polar decomposition: K.
+/// Shoemake, T. Duff, "Matrix Animation and Polar Decomposition", Graphics Interface 1992). Unlike there, there
+/// may be more than two keys, and mirrors may move: they are a rotation after a stretch by negative factors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AnimatedTransform {
-    // One at least, by time.
+    // At least one, by ascending time.
     keys: Vec<(f64, Transform)>,
     // One between each key and the next.
     segments: Vec<Segment>,
     condition: f64,
 }
 
-/// Why maps at moments are no animation.
+/// Why keys make no animation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum AnimationError {
-    /// There is no moment at all.
+    /// There are no keys.
     Empty,
     /// A time is not finite, or not later than the one before.
     Times {
-        /// Position of the moment.
+        /// The index of the key.
         key: usize,
     },
-    /// The map is a mirror and the one before is not, or the other way round: on the way, everything would be flat.
+    /// The map is a mirror and the one before is not, or the other way round: in between, it would be singular.
     Mirrored {
-        /// Position of the moment.
+        /// The index of the key.
         key: usize,
     },
-    /// The map stretches one direction more than a hundred million times as much as another.
+    /// The map's condition number is above 1e8.
     Degenerate {
-        /// Position of the moment.
+        /// The index of the key.
         key: usize,
     },
 }
@@ -58,10 +58,10 @@ impl std::fmt::Display for AnimationError {
 
 impl std::error::Error for AnimationError {}
 
-/// How much more a map may stretch one direction than another.
+/// The largest condition number of a map.
 const MOST_CONDITION: f64 = 1e8;
 
-/// A linear map as a stretch and then a turn. The stretch is symmetric, of one sign.
+/// A linear map as a stretch followed by a rotation. The stretch is symmetric and definite.
 #[derive(Clone, Copy)]
 struct Polar {
     turn: DMat3,
@@ -70,8 +70,8 @@ struct Polar {
 }
 
 impl Polar {
-    /// By Newton's iteration (N. Higham, "Computing the Polar Decomposition", SIAM J. Sci. Stat. Comput. 7(4), 1986). `None`
-    /// where the map is almost flat.
+    /// By Newton's iteration (N. Higham, "Computing the Polar Decomposition", SIAM J. Sci. Stat. Comput. 7(4),
+    /// 1986). `None` where the map is almost singular.
     fn new(linear: &DMat3, is_mirror: bool) -> Option<Self> {
         let size = linear.to_cols_array().into_iter().fold(0.0, |most: f64, x| most.max(x.abs()));
         let mut turn = *linear * (1.0 / size);
@@ -88,7 +88,7 @@ impl Polar {
         if is_mirror {
             (turn, stretch) = (-1.0 * turn, -1.0 * stretch);
         }
-        // The longest axis is no longer than the norm of Frobenius.
+        // The Frobenius norm bounds the spectral norm.
         let condition = frobenius(&stretch) * frobenius(&inverse_linear(&stretch)?);
         (turn.is_finite() && condition <= MOST_CONDITION).then_some(Self { turn, stretch, condition })
     }
@@ -98,7 +98,7 @@ fn frobenius(m: &DMat3) -> f64 {
     m.to_cols_array().into_iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// The way from one key to the next.
+/// The interpolation from one key to the next.
 #[derive(Clone, Debug, PartialEq)]
 struct Segment {
     start: f64,
@@ -109,7 +109,7 @@ struct Segment {
     angle: f64,
     stretch: DMat3,
     stretch_change: DMat3,
-    /// Where the stretch does not change.
+    /// The inverse of a constant stretch.
     unstretch: Option<DMat3>,
     translation: DVec3,
     translation_change: DVec3,
@@ -121,7 +121,7 @@ impl Segment {
         let turn = if turn.w < 0.0 { -turn } else { turn };
         let sine = vector::length(turn.xyz());
         let axis = vector::unit(turn.xyz()).unwrap_or(DVec3::Z);
-        // What rounds in the decomposition is no turn and no change.
+        // Rounding errors of the decomposition are no rotation and no change.
         let angle = if sine < 1e-14 { 0.0 } else { 2.0 * sine.atan2(turn.w) };
         let change = to.stretch - from.stretch;
         let is_rigid = frobenius(&change) <= 1e-14 * frobenius(&from.stretch);
@@ -139,14 +139,14 @@ impl Segment {
         }
     }
 
-    /// The map at a part of the way.
+    /// The map at a fraction of the segment.
     fn at(&self, part: f64) -> Transform {
-        // The formula of Rodrigues.
+        // Rodrigues' formula.
         let cross = vector::cross_matrix(self.axis);
         let (sin, cos) = (part * self.angle).sin_cos();
         let turn = self.turn * (DMat3::IDENTITY + sin * cross + (1.0 - cos) * (cross * cross));
         let stretch = self.stretch + part * self.stretch_change;
-        // A stretch between two of one sign is no flatter than both.
+        // A stretch between two definite ones of the same sign is no flatter than both.
         let unstretch =
             self.unstretch.or_else(|| inverse_linear(&stretch)).unwrap_or_else(|| stretch.inverse());
         let translation = self.translation + part * self.translation_change;
@@ -157,12 +157,12 @@ impl Segment {
         )
     }
 
-    /// A bound on the second derivative by the part of the way, of a point of a box with this centre and these halves of
-    /// its size.
+    /// A bound on the second derivative, by the fraction of the segment, of any point of a box with this centre
+    /// and half-size.
     ///
-    /// The point is τ(s) + R E(s) S(s) p, where τ and S are linear in s and E = exp(s θ K), |K| = 1: its second derivative is
-    /// R (θ² K² E S p + 2 θ K E S' p), no longer than θ² |S p| + 2 θ |S' p|; and |S(s) p| is no longer than the longer of
-    /// |S(0) p| and |S(1) p|.
+    /// The point is τ(s) + R E(s) S(s) p, where τ and S are linear in s and E = exp(s θ K), |K| = 1. Its second
+    /// derivative is R (θ² K² E S p + 2 θ K E S' p), at most θ² |S p| + 2 θ |S' p|; and |S(s) p| is at most
+    /// max(|S(0) p|, |S(1) p|).
     fn curvature(&self, center: DVec3, half: DVec3) -> f64 {
         let reach = |m: &DMat3| (*m * center).length() + (m.abs() * half).length();
         let stretched = reach(&self.stretch).max(reach(&(self.stretch + self.stretch_change)));
@@ -171,10 +171,11 @@ impl Segment {
 }
 
 impl AnimatedTransform {
-    /// The map that has these values at these times.
+    /// The map with these keys.
     ///
     /// # Errors
-    /// [`AnimationError`] when there are none, times do not ascend, or two neighbours have nothing invertible between them.
+    /// [`AnimationError`] when there are no keys, times do not ascend, or two neighbours have no invertible
+    /// interpolation.
     pub fn new(keys: Vec<(f64, Transform)>) -> Result<Self, AnimationError> {
         if keys.is_empty() {
             return Err(AnimationError::Empty);
@@ -199,17 +200,17 @@ impl AnimatedTransform {
         Ok(Self { segments: segments.collect(), keys, condition })
     }
 
-    /// Times with the maps at them, in ascending order; at least one.
+    /// The keys, times with maps, in ascending order; at least one.
     pub fn keys(&self) -> &[(f64, Transform)] {
         &self.keys
     }
 
-    /// Whether the map is the same at all times.
+    /// Whether the map is constant.
     pub fn is_still(&self) -> bool {
         self.keys.iter().all(|(_, map)| *map == self.keys[0].1)
     }
 
-    /// How much more the map stretches one direction than another, at most, about.
+    /// An approximate bound on the condition number over all times.
     pub fn condition(&self) -> f64 {
         self.condition
     }
@@ -225,11 +226,12 @@ impl AnimatedTransform {
         segment.at((time - segment.start) / segment.duration)
     }
 
-    /// The maps at which to look at a box, with this centre and these halves of its size, to see where it goes: a list for
-    /// each way between two keys, and with it how far from the line between two neighbours of the list any point of the box
-    /// comes while it goes from one to the other. That is no more than `tolerance` unless it takes more than 64 steps.
+    /// The maps at which to look at a box, with this centre and half-size, to bound its motion: a list for each
+    /// segment, with a bound on the distance of any point of the box from the chord between its places at two
+    /// consecutive maps. The bound is at most `tolerance` unless that takes more than 64 steps.
     ///
-    /// A curve leaves its chord by no more than an eighth of its largest second derivative by the part of the chord.
+    /// A curve deviates from its chord by at most an eighth of its largest second derivative by the fraction of
+    /// the chord.
     pub fn steps(
         &self,
         center: DVec3,
@@ -247,7 +249,7 @@ impl AnimatedTransform {
     /// The map followed by another.
     ///
     /// # Errors
-    /// [`AnimationError`] when what comes out has nothing invertible between two moments.
+    /// [`AnimationError`] when two keys of the result have no invertible interpolation.
     pub fn then(&self, outer: &Transform) -> Result<Self, AnimationError> {
         Self::new(self.keys.iter().map(|&(time, map)| (time, *outer * map)).collect())
     }

@@ -1,7 +1,7 @@
-//! Random choice in proportion to given weights: of a point of a line or a picture, or of one thing among many.
+//! Sampling in proportion to weights: a point of a line or an image, or one of many items.
 //!
-//! Weights that are not positive (zero, negative, not a number) or not finite count as zero, and what has weight zero
-//! is never chosen. Where nothing has weight there is nothing to choose from, and the constructors return `None`.
+//! Weights that are not positive (zero, negative, NaN) or not finite count as zero, and an item of weight zero
+//! is never chosen. Without any positive weight the constructors return `None`.
 //!
 //! ```
 //! use lumbre_math::distribution::{AliasTable, PiecewiseConstant1D};
@@ -20,16 +20,17 @@ use glam::DVec2;
 /// The largest number below 1.
 const BELOW_ONE: f64 = 1.0 - f64::EPSILON / 2.0;
 
-/// Cumulative sums are whole numbers out of this total: differences of them are exact probabilities, so that what
-/// `sample` does and what `pdf` says agree to the last bit, in half the memory of doubles.
+/// Cumulative sums are integers out of this total: their differences are exact probabilities, so `sample` and
+/// `pdf` agree to the last bit, in half the memory of doubles.
 const TOTAL: u32 = u32::MAX;
 
 fn weight(raw: f64) -> f64 {
     if 0.0 < raw && raw < f64::INFINITY { raw } else { 0.0 }
 }
 
-/// Fills `starts[i]` with the share of [`TOTAL`] of the weights before `i`, at least 1 for each weight that is not
-/// zero. Returns the sum of the weights divided by the largest, and the largest; both 0 when all are.
+/// Fills `starts[i]` with the share of [`TOTAL`] of the weights before `i`, at least 1 for each positive
+/// weight. Returns the sum of the weights divided by the largest, and the largest; both 0 when there is no
+/// positive weight.
 fn accumulate(starts: &mut [u32], weight_at: impl Fn(usize) -> f64) -> (f64, f64) {
     let largest = (0..starts.len()).map(&weight_at).fold(0.0, f64::max);
     if largest == 0.0 {
@@ -51,7 +52,7 @@ fn accumulate(starts: &mut [u32], weight_at: impl Fn(usize) -> f64) -> (f64, f64
         let positive = u32::from(weight_at(i) > 0.0);
         ahead -= positive;
         let share = (before / sum * f64::from(TOTAL)).round() as u32;
-        // Room for this one and for those ahead; the last one that counts ends at the total itself.
+        // Leaves room for this weight and the ones after it; the last positive one ends at the total itself.
         start = if ahead == 0 { TOTAL } else { share.clamp(start + positive, TOTAL - ahead) };
         if positive == 0 {
             start = *slot;
@@ -60,9 +61,9 @@ fn accumulate(starts: &mut [u32], weight_at: impl Fn(usize) -> f64) -> (f64, f64
     (sum, largest)
 }
 
-/// The cell in which `u` falls, and how far into it.
+/// The cell of `u`, and the offset in it.
 fn find(starts: &[u32], u: f64) -> (usize, f64) {
-    // At most TOTAL - 1 after the cut, hence inside a cell that is not empty.
+    // Truncated to at most TOTAL - 1, hence inside a cell that is not empty.
     let x = u.clamp(0.0, BELOW_ONE) * f64::from(TOTAL);
     let x = x.min(f64::from(TOTAL).next_down());
     let cell = starts.partition_point(|&start| f64::from(start) <= x) - 1;
@@ -78,7 +79,7 @@ fn width(starts: &[u32], cell: usize) -> u32 {
 /// A density over `[0, 1)` that is constant on each of `n` cells of equal length.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PiecewiseConstant1D {
-    // Never empty. starts[0] = 0, ascending, at most TOTAL; a cell of weight zero starts where it ends.
+    // Never empty. starts[0] = 0, ascending, at most TOTAL; a cell of weight zero is empty.
     starts: Vec<u32>,
     mean: f64,
 }
@@ -100,18 +101,20 @@ impl PiecewiseConstant1D {
         self.starts.len()
     }
 
-    /// The mean of the weights: the integral over `[0, 1)` of the function they are the values of.
+    /// The mean of the weights: the integral over `[0, 1)` of the piecewise constant function.
     pub fn mean(&self) -> f64 {
         self.mean
     }
 
-    /// The point of `[0, 1)` for a uniform `u` of `[0, 1)`, and the density there, which is never zero. Time O(log n).
+    /// Maps a uniform `u` of `[0, 1)` to a point of `[0, 1)` and the density there, which is never zero. Time
+    /// O(log n).
     pub fn sample(&self, u: f64) -> (f64, f64) {
         let (cell, offset) = find(&self.starts, u);
         (position(cell, offset, self.cells()), self.cell_pdf(cell))
     }
 
-    /// The cell for a uniform `u` of `[0, 1)`, the rest of `u` as a new uniform number, and the density in the cell.
+    /// The cell for a uniform `u` of `[0, 1)`, the remainder of `u` as a new uniform number, and the density in
+    /// the cell.
     pub fn sample_cell(&self, u: f64) -> (usize, f64, f64) {
         let (cell, offset) = find(&self.starts, u);
         (cell, offset, self.cell_pdf(cell))
@@ -122,17 +125,17 @@ impl PiecewiseConstant1D {
         if (0.0..1.0).contains(&x) { self.cell_pdf(cell_at(x, self.cells())) } else { 0.0 }
     }
 
-    /// The density in a cell; 0 for a cell that there is not.
+    /// The density in a cell; 0 for an index out of range.
     pub fn cell_pdf(&self, cell: usize) -> f64 {
         self.cell_probability(cell) * self.cells() as f64
     }
 
-    /// The probability of a cell; 0 for a cell that there is not.
+    /// The probability of a cell; 0 for an index out of range.
     pub fn cell_probability(&self, cell: usize) -> f64 {
         if cell < self.cells() { f64::from(width(&self.starts, cell)) / f64::from(TOTAL) } else { 0.0 }
     }
 
-    /// The `u` that [`PiecewiseConstant1D::sample`] takes to `x`: the probability of everything before `x`.
+    /// The inverse of [`PiecewiseConstant1D::sample`]: the probability of everything before `x`.
     pub fn invert(&self, x: f64) -> f64 {
         let x = x.clamp(0.0, BELOW_ONE);
         let cell = cell_at(x, self.cells());
@@ -140,14 +143,13 @@ impl PiecewiseConstant1D {
     }
 }
 
-/// A density over the unit square that is constant on each of `columns` × `rows` cells: the lights of a picture.
+/// A density over the unit square that is constant on each of `columns` × `rows` cells, for environment maps.
 ///
-/// It keeps four bytes for each cell and does not keep the weights: 32 MiB for 4096 × 2048.
+/// It takes four bytes a cell and does not keep the weights.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PiecewiseConstant2D {
     columns: usize,
-    // One run of `columns` starts for each row; those of a row of weight zero are all zero and never looked at by
-    // `sample`, as the marginal gives the row no probability.
+    // `columns` starts for each row. Those of a row of weight zero are all zero; the marginal never chooses it.
     rows: Vec<u32>,
     marginal: PiecewiseConstant1D,
 }
@@ -162,8 +164,9 @@ impl PiecewiseConstant2D {
         Self::from_fn(columns, weights.len() / columns, |x, y| weights[y * columns + x])
     }
 
-    /// The density proportional to `weight_at(column, row)`, which is asked several times for each cell and must
-    /// answer alike. `None` when no weight is positive, or when there are more than 2³² - 2 columns or rows.
+    /// The density proportional to `weight_at(column, row)`, which is called several times for each cell and
+    /// must be deterministic. `None` when no weight is positive, or when there are more than 2³² - 2 columns or
+    /// rows.
     pub fn from_fn(columns: usize, rows: usize, weight_at: impl Fn(usize, usize) -> f32) -> Option<Self> {
         if columns == 0 || columns.max(rows) >= TOTAL as usize {
             return None;
@@ -186,12 +189,12 @@ impl PiecewiseConstant2D {
         (self.columns, self.marginal.cells())
     }
 
-    /// The mean of the weights: the integral over the unit square of the function they are the values of.
+    /// The mean of the weights: the integral over the unit square of the piecewise constant function.
     pub fn mean(&self) -> f64 {
         self.marginal.mean()
     }
 
-    /// The point of `[0, 1)²` for a uniform `u` of `[0, 1)²`, and the density there, which is never zero. x runs
+    /// Maps a uniform `u` of `[0, 1)²` to a point of `[0, 1)²` and the density there, which is never zero. x is
     /// along the columns and y along the rows. Time O(log columns + log rows).
     pub fn sample(&self, u: DVec2) -> (DVec2, f64) {
         let (y, down) = find(&self.marginal.starts, u.y);
@@ -207,7 +210,7 @@ impl PiecewiseConstant2D {
         if inside { self.cell_pdf(cell_at(p.x, columns), cell_at(p.y, rows)) } else { 0.0 }
     }
 
-    /// The density in the cell of a column and a row; 0 for a cell that there is not.
+    /// The density in the cell of a column and a row; 0 out of range.
     pub fn cell_pdf(&self, column: usize, row: usize) -> f64 {
         let (columns, rows) = self.size();
         if column >= columns || row >= rows {
@@ -217,7 +220,7 @@ impl PiecewiseConstant2D {
         along * columns as f64 * self.marginal.cell_pdf(row)
     }
 
-    /// The `u` that [`PiecewiseConstant2D::sample`] takes to `p`.
+    /// The inverse of [`PiecewiseConstant2D::sample`].
     pub fn invert(&self, p: DVec2) -> DVec2 {
         let (columns, rows) = self.size();
         let x = p.x.clamp(0.0, BELOW_ONE);
@@ -237,10 +240,10 @@ fn cell_at(x: f64, cells: usize) -> usize {
     ((x * cells as f64) as usize).min(cells - 1)
 }
 
-/// The point of `[0, 1)` at `offset` into `cell`, kept where [`cell_at`] finds the same cell again.
+/// The point of `[0, 1)` at `offset` into `cell`, adjusted so that [`cell_at`] returns the same cell.
 fn position(cell: usize, offset: f64, cells: usize) -> f64 {
     let mut x = ((cell as f64 + offset) / cells as f64).min(BELOW_ONE);
-    // Division and product round: a step or two of one unit in the last place.
+    // The division and the product round: at most a step or two of one ulp.
     while cell_at(x, cells) > cell {
         x = x.next_down();
     }
@@ -255,22 +258,22 @@ fn invert_in(starts: &[u32], cell: usize, offset: f64) -> f64 {
     (before / f64::from(TOTAL)).min(BELOW_ONE)
 }
 
-/// One thing chosen by an [`AliasTable`].
+/// An item chosen by an [`AliasTable`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Choice {
-    /// Which.
+    /// The index of the item.
     pub index: usize,
     /// Its probability, which is never zero.
     pub probability: f64,
-    /// What is left of the random number, again uniform in `[0, 1)` and independent of the choice.
+    /// The remainder of the random number, again uniform in `[0, 1)` and independent of the choice.
     pub rest: f64,
 }
 
-/// A choice among `n` things with given weights, in constant time.
+/// A weighted choice among `n` items in constant time.
 ///
-/// Source: Walker, "An Efficient Method for Generating Discrete Random Variables with General Distributions", ACM TOMS
-/// 3(3), 1977; built as in Vose, "A Linear Algorithm for Generating Random Numbers with a Given Distribution", IEEE
-/// Trans. Software Eng. 17(9), 1991.
+/// Source: Walker, "An Efficient Method for Generating Discrete Random Variables with General Distributions",
+/// ACM TOMS 3(3), 1977; built as in Vose, "A Linear Algorithm for Generating Random Numbers with a Given
+/// Distribution", IEEE Trans. Software Eng. 17(9), 1991.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AliasTable {
     // Never empty.
@@ -280,7 +283,7 @@ pub struct AliasTable {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Bin {
     probability: f64,
-    // The share of this bin that is its own; the rest goes to the alias. Weight zero keeps nothing.
+    // The fraction of this bin that is its own item's; the rest is the alias's. 0 for weight zero.
     own: f64,
     alias: u32,
 }
@@ -317,17 +320,17 @@ impl AliasTable {
                 small.push(rich);
             }
         }
-        // What is left over is 1 up to rounding, as `own` has been from the start; or it is a weight of zero that
-        // rounding left without a giver, whose alias is the heaviest.
+        // The remaining bins are full up to rounding, as `own` is initially; or they have weight zero and no
+        // donor because of rounding, and their alias is the heaviest item.
         Some(Self { bins })
     }
 
-    /// The number of things, those of weight zero included.
+    /// The number of items, those of weight zero included.
     pub fn count(&self) -> usize {
         self.bins.len()
     }
 
-    /// The thing for a uniform `u` of `[0, 1)`.
+    /// The item for a uniform `u` of `[0, 1)`.
     pub fn sample(&self, u: f64) -> Choice {
         let scaled = u.clamp(0.0, BELOW_ONE) * self.count() as f64;
         let slot = (scaled as usize).min(self.count() - 1);
@@ -341,7 +344,7 @@ impl AliasTable {
         Choice { index, probability: self.bins[index].probability, rest: rest.min(BELOW_ONE) }
     }
 
-    /// The probability of a thing; 0 for one that there is not.
+    /// The probability of an item; 0 for an index out of range.
     pub fn probability(&self, index: usize) -> f64 {
         self.bins.get(index).map_or(0.0, |bin| bin.probability)
     }

@@ -1,4 +1,4 @@
-//! Orthonormal frames: three perpendicular unit directions, in which a direction has coordinates.
+//! Orthonormal frames.
 
 use glam::{DMat3, DVec3, Vec3};
 
@@ -6,10 +6,10 @@ use crate::vector::unit;
 
 /// Two unit vectors that complete the unit vector `n` to a right-handed frame, `e1 × e2 = n`.
 ///
-/// Continuous but for the plane `n.z = 0`, without a singular direction; for `n = z` it gives `x, y`, for `n = y` it
-/// gives `x, -z`. It is the azimuth reference of every shape with an axis. `n.z = -0.0` counts as negative.
-/// Source: Duff, Burgess, Christensen, Hery, Kensler, Liani, Villemin, "Building an Orthonormal Basis, Revisited",
-/// JCGT 6(1), 2017.
+/// Continuous except across the plane `n.z = 0`, without a singular direction; for `n = z` the result is `x,
+/// y`, for `n = y` it is `x, -z`. It is the azimuth reference of every shape with an axis. `n.z = -0.0` counts
+/// as negative. Source: Duff, Burgess, Christensen, Hery, Kensler, Liani, Villemin, "Building an Orthonormal
+/// Basis, Revisited", JCGT 6(1), 2017.
 pub fn orthonormal_basis(n: DVec3) -> (DVec3, DVec3) {
     let sign = 1.0_f64.copysign(n.z);
     let a = -1.0 / (sign + n.z);
@@ -47,7 +47,7 @@ impl Default for Frame {
 }
 
 impl Frame {
-    /// The coordinate axes themselves.
+    /// The coordinate axes.
     pub const IDENTITY: Self = Self { x: DVec3::X, y: DVec3::Y, z: DVec3::Z };
 
     /// The frame of [`orthonormal_basis`] whose third axis is the unit vector `z`.
@@ -56,13 +56,13 @@ impl Frame {
         Self { x, y, z }
     }
 
-    /// The frame whose third axis points along `a` and whose second axis is as near to `b` as it can be, `y·b > 0`.
+    /// The frame whose third axis is along `a` and whose second axis is as near to `b` as possible, `y·b > 0`.
     /// Neither needs to be unit. `None` when they are parallel up to rounding, or one is zero or not finite.
     pub fn from_two(a: DVec3, b: DVec3) -> Option<Self> {
         let z = unit(a)?;
         let b = unit(b)?;
         let across = b.cross(z);
-        // |b × w|² ≤ 2⁻⁴⁰ |b|²: the direction of the product would be mostly rounding.
+        // |b × w|² ≤ 2⁻⁴⁰ |b|²: the direction of the product would be mostly rounding error.
         if across.length_squared() <= f64::powi(2.0, -40) {
             return None;
         }
@@ -70,8 +70,8 @@ impl Frame {
         Some(Self { x, y: z.cross(x), z })
     }
 
-    /// [`Frame::from_two`], or the frame of [`orthonormal_basis`] where `b` gives no second direction.
-    /// `None` only when `a` is zero or not finite.
+    /// [`Frame::from_two`], or the frame of [`orthonormal_basis`] where `b` is parallel to `a`. `None` only
+    /// when `a` is zero or not finite.
     pub fn from_two_or_any(a: DVec3, b: DVec3) -> Option<Self> {
         match Self::from_two(a, b) {
             Some(frame) => Some(frame),
@@ -79,12 +79,12 @@ impl Frame {
         }
     }
 
-    /// The coordinates of `v` in this frame.
+    /// World to local coordinates.
     pub fn to_local(&self, v: DVec3) -> DVec3 {
         DVec3::new(self.x.dot(v), self.y.dot(v), self.z.dot(v))
     }
 
-    /// The vector whose coordinates in this frame are `local`.
+    /// Local to world coordinates.
     pub fn to_world(&self, local: DVec3) -> DVec3 {
         self.x * local.x + self.y * local.y + self.z * local.z
     }

@@ -1,8 +1,8 @@
-//! Elementary matrices in two and three dimensions, and the two ways of writing them.
+//! Elementary matrices in two and three dimensions, and the row and column conventions.
 //!
-//! We write vectors as columns: `p' = M p`, a product reads right to left, the translation stands in the last column.
-//! Many texts write rows: `p' = p M`, a product reads left to right, the translation stands in the last row. The one is
-//! the transpose of the other, `(A B)ᵀ = Bᵀ Aᵀ`:
+//! Lumbre writes vectors as columns: `p' = M p`, a product reads right to left, the translation is in the last
+//! column. Many texts write rows: `p' = p M`, a product reads left to right, the translation is in the last
+//! row. One is the transpose of the other, `(A B)ᵀ = Bᵀ Aᵀ`:
 //!
 //! | columns | rows |
 //! |---|---|
@@ -10,13 +10,13 @@
 //! | `T R S`: scale, rotate, translate | `Sᵀ Rᵀ Tᵀ` |
 //! | [`rotation_z`]`(a)`, x towards y | its transpose, which equals `rotation_z(-a)` |
 //!
-//! Hence a text that multiplies row vectors by the rotation matrices printed here rotates the other way. Numbers listed
-//! row by row become a matrix by [`rows3`] and [`rows4`]; glam itself lists columns. Matrices of a program that
-//! multiplies row vectors enter by [`from_row_convention`] and leave by [`to_row_convention`].
+//! Hence a text that multiplies row vectors by these rotation matrices rotates the other way. Numbers listed
+//! row by row become a matrix by [`rows3`] and [`rows4`]; glam itself lists columns. Convert matrices for row
+//! vectors by [`from_row_convention`] and [`to_row_convention`].
 //!
 //! Rectangular matrices are arrays of rows; see [`product`] and [`transpose`]. For square ones use glam's `*`,
-//! `transpose`, `determinant`; for the inverse of an affine one [`Transform`](crate::Transform), which refuses singular
-//! ones.
+//! `transpose`, `determinant`; for the inverse of an affine one [`Transform`](crate::Transform), which refuses
+//! singular ones.
 
 use glam::{DMat2, DMat3, DMat4, DVec2, DVec3, DVec4};
 
@@ -31,7 +31,7 @@ pub fn product<const R: usize, const K: usize, const C: usize>(
     std::array::from_fn(|i| std::array::from_fn(|j| (0..K).map(|k| a[i][k] * b[k][j]).sum()))
 }
 
-/// The matrix mirrored about its diagonal: `transpose[j][i] = a[i][j]`.
+/// The transpose: `transpose[j][i] = a[i][j]`.
 pub fn transpose<const R: usize, const C: usize>(a: &[[f64; C]; R]) -> [[f64; R]; C] {
     std::array::from_fn(|j| std::array::from_fn(|i| a[i][j]))
 }
@@ -56,18 +56,19 @@ pub fn to_rows4(matrix: &DMat4) -> [f64; 16] {
     matrix.transpose().to_cols_array()
 }
 
-/// The matrix for column vectors that does what `m` does to row vectors, `p' = p m`.
+/// The matrix for column vectors equivalent to `m` for row vectors, `p' = p m`.
 pub fn from_row_convention(m: DMat4) -> DMat4 {
     m.transpose()
 }
 
-/// The matrix for row vectors that does what `m` does to column vectors, `p' = m p`.
+/// The matrix for row vectors equivalent to `m` for column vectors, `p' = m p`.
 pub fn to_row_convention(m: DMat4) -> DMat4 {
     m.transpose()
 }
 
-/// The standard chain for row vectors, scale, then x, y, z, then translate, with each rotation matrix printed as for
-/// columns. It rotates by the opposite angles; kept for scenes that were written with it. As a matrix for row vectors.
+/// The standard chain for row vectors, scale, then x, y, z, then translate, with the rotation matrices of
+/// column vectors. It rotates by the opposite angles; for scenes that were written with it. As a matrix for row
+/// vectors.
 pub fn row_chain_with_column_rotations(scale: DVec3, degrees: DVec3, offset: DVec3) -> DMat4 {
     to_row_convention(standard_chain(scale, -degrees, offset))
 }
@@ -88,32 +89,32 @@ pub fn affine4(linear: DMat3, offset: DVec3) -> DMat4 {
     )
 }
 
-/// The homogeneous coordinates of a point, w = 1: translations move it.
+/// The homogeneous coordinates of a point, w = 1.
 pub fn homogeneous_point(p: DVec3) -> DVec4 {
     p.extend(1.0)
 }
 
-/// The homogeneous coordinates of a direction, w = 0: translations leave it alone.
+/// The homogeneous coordinates of a direction, w = 0.
 pub fn homogeneous_direction(v: DVec3) -> DVec4 {
     v.extend(0.0)
 }
 
-/// The point of homogeneous coordinates, which any factor but zero leaves the same; `None` when w = 0, a direction.
+/// The point of homogeneous coordinates, which are defined up to a factor; `None` when w = 0, a direction.
 pub fn point_of_homogeneous(h: DVec4) -> Option<DVec3> {
     (h.w != 0.0).then(|| h.truncate() / h.w)
 }
 
-/// Scales the axes of the plane by their factors. The inverse has the reciprocals; a factor of zero has none.
+/// Scales the axes of the plane. The inverse has the reciprocals; a factor of zero has none.
 pub fn scale2(factors: DVec2) -> DMat2 {
     DMat2::from_diagonal(factors)
 }
 
-/// `x' = x + xy·y`, `y' = y + yx·x`. With one of the two zero the inverse has the other negated.
+/// `x' = x + xy·y`, `y' = y + yx·x`. If one of the two is zero, the inverse has the other negated.
 pub fn shear2(xy: f64, yx: f64) -> DMat2 {
     DMat2::from_cols(DVec2::new(1.0, yx), DVec2::new(xy, 1.0))
 }
 
-/// Turns the plane by an angle, x towards y; exact at multiples of 90°. Turns of the plane commute.
+/// Rotates the plane by an angle, x towards y; exact at multiples of 90°.
 pub fn rotation2(degrees: f64) -> DMat2 {
     let (sin, cos) = sin_cos_degrees(degrees);
     DMat2::from_cols(DVec2::new(cos, sin), DVec2::new(-sin, cos))
@@ -124,7 +125,7 @@ pub fn mirror2_about_y() -> DMat2 {
     DMat2::from_diagonal(DVec2::new(-1.0, 1.0))
 }
 
-/// Scales the axes by their factors. The inverse has the reciprocals; a factor of zero has none.
+/// Scales the axes. The inverse has the reciprocals; a factor of zero has none.
 pub fn scale3(factors: DVec3) -> DMat3 {
     DMat3::from_diagonal(factors)
 }
@@ -152,15 +153,15 @@ pub fn rotation_z(degrees: f64) -> DMat3 {
     DMat3::from_cols(DVec3::new(cos, sin, 0.0), DVec3::new(-sin, cos, 0.0), DVec3::Z)
 }
 
-/// Rotates about `axis`, of any length but zero, x towards y when it is z (Rodrigues' formula). Exact at multiples of
-/// 90° about the coordinate axes. `None` when the axis is zero or anything is not finite.
+/// Rotates about `axis`, of any non-zero length, x towards y when it is z (Rodrigues' formula). Exact at
+/// multiples of 90° about the coordinate axes. `None` when the axis is zero or anything is not finite.
 pub fn axis_angle(axis: DVec3, degrees: f64) -> Option<DMat3> {
     let a = unit(axis)?;
     if !degrees.is_finite() {
         return None;
     }
     let (sin, cos) = sin_cos_degrees(degrees);
-    // 1 - cos θ without cancellation for small angles; at 90° the formula would be a rounding off 1.
+    // 1 - cos θ without cancellation for small angles; at 90° the formula would have a rounding error.
     let half_sin = sin_cos_degrees(0.5 * degrees).0;
     let versine = if cos == 0.0 { 1.0 } else { 2.0 * half_sin * half_sin };
     let (x, y, z) = (a.x, a.y, a.z);
@@ -173,7 +174,8 @@ pub fn axis_angle(axis: DVec3, degrees: f64) -> Option<DMat3> {
     ))
 }
 
-/// `v` turned by `degrees` about `axis`, by its parts along and across the axis. `None` as for [`axis_angle`].
+/// `v` rotated by `degrees` about `axis`, from its parts parallel and perpendicular to the axis. `None` as for
+/// [`axis_angle`].
 pub fn rotate_vector(axis: DVec3, degrees: f64, v: DVec3) -> Option<DVec3> {
     let a = unit(axis)?;
     let (sin, cos) = sin_cos_degrees(degrees);
@@ -182,10 +184,10 @@ pub fn rotate_vector(axis: DVec3, degrees: f64, v: DVec3) -> Option<DVec3> {
     turned.is_finite().then_some(turned)
 }
 
-/// The matrix of normals `L⁻ᵀ` up to a positive factor, as the signed cofactors of `linear`: outward normals stay
-/// outward, also under mirrors. Normalise what it gives. For a singular matrix it gives zero or a limit.
+/// The matrix of normals `L⁻ᵀ` up to a positive factor, as the signed cofactors of `linear`: outward normals
+/// stay outward, even under mirrors. The result is not normalised. For a singular matrix it is zero or a limit.
 ///
-/// Only the 3×3 block counts: a normal knows nothing of translations.
+/// Only the 3×3 block matters: normals ignore translations.
 pub fn normal_matrix(linear: &DMat3) -> DMat3 {
     let [a, b, c] = [linear.x_axis, linear.y_axis, linear.z_axis];
     let cofactors = DMat3::from_cols(cross(b, c), cross(c, a), cross(a, b));
@@ -193,16 +195,15 @@ pub fn normal_matrix(linear: &DMat3) -> DMat3 {
     if dot(a, cofactors.x_axis) < 0.0 { -cofactors } else { cofactors }
 }
 
-/// `n` carried along with the surface that `linear` moves, with length 1; `None` when it has no direction left.
+/// The image of the normal `n` of a surface under `linear`, with length 1; `None` when it has no direction.
 pub fn transform_normal(linear: &DMat3, n: DVec3) -> Option<DVec3> {
     unit(normal_matrix(linear) * n)
 }
 
-/// The `x` with `m x = b`, by Cramer's rule: each component is the determinant of `m` with that column replaced by `b`,
-/// over that of `m`. `None` when the quotient is not finite, as for a singular matrix.
+/// The `x` with `m x = b`, by Cramer's rule: each component is the determinant of `m` with that column replaced
+/// by `b`, over that of `m`. `None` when the quotient is not finite, as for a singular matrix.
 ///
-/// In three dimensions it needs no more work than elimination, and with determinants to full precision it loses no
-/// digits; in many dimensions it is hopeless.
+/// In three dimensions it costs no more than elimination, and with accurate determinants it loses no digits.
 pub fn solve(m: &DMat3, b: DVec3) -> Option<DVec3> {
     let [c0, c1, c2] = [m.x_axis, m.y_axis, m.z_axis];
     let determinants =
@@ -211,15 +212,15 @@ pub fn solve(m: &DMat3, b: DVec3) -> Option<DVec3> {
     x.is_finite().then_some(x)
 }
 
-/// A matrix for the world seen in a mirror, z to -z: turns right-handed coordinates into left-handed ones and back.
+/// The mirror z to -z: turns right-handed coordinates into left-handed ones and back.
 ///
-/// Points and directions take `Σ p`, normals `Σ n`, maps `Σ M Σ` (see [`change_handedness`]): rotations about x and y
-/// turn the other way, those about z the same. Triangles swap two vertices if their front is to stay in front.
+/// Points and directions become `Σ p`, normals `Σ n`, maps `Σ M Σ` (see [`change_handedness`]): rotations about
+/// x and y reverse, those about z do not. Triangles must swap two vertices to keep their front.
 pub fn mirror_z() -> DMat3 {
     DMat3::from_diagonal(DVec3::new(1.0, 1.0, -1.0))
 }
 
-/// The map that does among mirrored coordinates (z to -z) what `m` does among the plain ones: `Σ M Σ`.
+/// The map `m` expressed in mirrored coordinates (z to -z): `Σ M Σ`.
 pub fn change_handedness(m: DMat4) -> DMat4 {
     let sigma = DMat4::from_mat3(mirror_z());
     sigma * m * sigma

@@ -5,26 +5,27 @@ use glam::DVec3;
 use crate::quadratic::dop;
 use crate::vector::{cross, dot};
 
-/// The mirrored direction `D - 2 (D·N) N / |N|²`, as long as `direction`. The side and the length of the normal do not
+/// The mirrored direction `D - 2 (D·N) N / |N|²`, as long as `direction`. The normal's side and length do not
 /// matter.
 pub fn reflect(direction: DVec3, normal: DVec3) -> DVec3 {
     direction - (2.0 * dot(direction, normal) / normal.length_squared()) * normal
 }
 
-/// The normal turned to the side that `direction` comes from: `N` when `N·D ≤ 0`, otherwise `-N`.
+/// The normal flipped to the side that `direction` comes from: `N` when `N·D ≤ 0`, otherwise `-N`.
 pub fn facing(normal: DVec3, direction: DVec3) -> DVec3 {
     if normal.dot(direction) > 0.0 { -normal } else { normal }
 }
 
-/// The unit direction in which a ray goes on behind a smooth boundary; `None` for total reflection.
+/// The unit direction of the refracted ray; `None` for total internal reflection.
 ///
-/// `eta` is the index of refraction where the ray comes from, over that where it goes. Neither vector needs to be unit,
-/// and the side of the normal does not matter. Snell's law: the sine of the angle to the normal grows by `eta`.
+/// `eta` is the index of refraction on the incident side over that on the other. Neither vector needs to be
+/// unit, and the side of the normal does not matter. Snell's law: the sine of the angle to the normal grows by
+/// `eta`.
 pub fn refract(direction: DVec3, normal: DVec3, eta: f64) -> Option<DVec3> {
     let n = facing(normal, direction);
     let (dd, nn) = (direction.length_squared(), n.length_squared());
-    // 1 - η² sin² θ, times |D|² |N|², with the sine from the cross product: at the critical angle it is zero, not the
-    // root of a rounding error.
+    // 1 - η² sin² θ, times |D|² |N|², with the sine from the cross product, so that it is exactly zero at the
+    // critical angle.
     let rest = dop(dd, nn, eta * eta, cross(direction, n).length_squared());
     if rest.is_nan() || rest < 0.0 {
         return None;

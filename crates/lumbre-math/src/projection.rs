@@ -1,16 +1,16 @@
-//! The matrices that take what a camera sees to a picture: orthographic and perspective.
+//! Projection matrices: orthographic and perspective.
 //!
 //! They act on homogeneous coordinates in the space of a right-handed camera that looks along -z; see
-//! [`project`]. A ray tracer does not need them to make rays ([`View`](crate::view::View) does that), but to say where
-//! a point of the scene lands.
+//! [`project`]. They tell where a point of the scene appears in the picture; rays are made by
+//! [`View`](crate::view::View).
 
 use glam::{DMat4, DVec3, DVec4};
 
 use crate::matrix::{homogeneous_point, point_of_homogeneous, rows4};
 use crate::transform::sin_cos_degrees;
 
-/// The box `[left, right] × [bottom, top] × [-far, -near]` to the cube [-1, 1]³: `near` and `far` are distances along
-/// -z, and -z is turned to +z. `left > right` and so on mirror. `None` when two sides coincide.
+/// The box `[left, right] × [bottom, top] × [-far, -near]` to the cube [-1, 1]³: `near` and `far` are distances
+/// along -z, and -z becomes +z. `left > right` and so on mirror. `None` when two sides coincide.
 pub fn orthographic(left: f64, right: f64, bottom: f64, top: f64, near: f64, far: f64) -> Option<DMat4> {
     let (width, height, depth) = (right - left, top - bottom, far - near);
     let matrix = rows4([
@@ -34,8 +34,9 @@ pub fn orthographic(left: f64, right: f64, bottom: f64, top: f64, near: f64, far
     matrix.is_finite().then_some(matrix)
 }
 
-/// The pyramid with full vertical opening `fovy` in degrees, `aspect` = width over height, between the distances `near`
-/// and `far`, to the cube [-1, 1]³: z = -near goes to -1 and z = -far to 1, after division by w = -z.
+/// The pyramid with full vertical field of view `fovy` in degrees, `aspect` = width over height, between the
+/// distances `near` and `far`, to the cube [-1, 1]³: after division by w = -z, z = -near maps to -1 and z =
+/// -far to 1.
 ///
 /// `None` unless 0 < near < far, 0 < fovy < 180 and 0 < aspect, all finite.
 pub fn perspective(fovy: f64, aspect: f64, near: f64, far: f64) -> Option<DMat4> {

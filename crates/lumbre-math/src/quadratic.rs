@@ -1,17 +1,18 @@
-//! The quadratic equation without cancellation.
+//! Quadratic equations without cancellation.
 
-/// `a * b - c * d` with a relative error of at most 2⁻⁵², however nearly the products cancel; its sign is always right.
+/// `a * b - c * d` with a relative error of at most 2⁻⁵², however nearly the products cancel; its sign is
+/// always right.
 ///
-/// The rounding errors of both products, which are exact numbers, are added to the difference of the rounded products: the
-/// method of Cornea, Harrison and Tang, whose bound is that of C.-P. Jeannerod, "A radix-independent error analysis of the
-/// Cornea–Harrison–Tang method", ACM Transactions on Mathematical Software, 2016. Kahan's better known form is a little
-/// cheaper, but needs a fused multiply-add; this returns the same bits with one and without.
+/// The exact rounding errors of both products are added to the difference of the rounded products: the method
+/// of Cornea, Harrison and Tang, with the bound of C.-P. Jeannerod, "A radix-independent error analysis of the
+/// Cornea–Harrison–Tang method", ACM Transactions on Mathematical Software, 2016. Kahan's better known form is
+/// slightly cheaper, but needs a fused multiply-add; this one returns the same bits with and without.
 #[inline]
 pub fn dop(a: f64, b: f64, c: f64, d: f64) -> f64 {
     let (ab, ab_error) = two_product(a, b);
     let (cd, cd_error) = two_product(c, d);
     let refined = (ab - cd) + (ab_error - cd_error);
-    // Splitting overflows a little before the product does.
+    // Splitting overflows slightly before the product does.
     if refined.is_finite() { refined } else { a * b - c * d }
 }
 
@@ -43,20 +44,21 @@ fn split(a: f64) -> (f64, f64) {
     (high, a - high)
 }
 
-/// The roots of `a t² + 2 h t + c = 0` in ascending order, given `delta = h² - a c` in a form free of cancellation.
+/// The roots of `a t² + 2 h t + c = 0` in ascending order, given `delta = h² - a c` in a form free of
+/// cancellation.
 ///
-/// `None` when `delta` is negative or anything is NaN, or when `a` and `h` are both zero. As `a` goes to zero one root
-/// goes to ±∞ and the other to `-c / 2h`, without a special case. A double root comes twice.
+/// `None` when `delta` is negative or anything is NaN, or when `a` and `h` are both zero. As `a` goes to zero
+/// one root goes to ±∞ and the other to `-c / 2h`, without a special case. A double root comes twice.
 ///
-/// The only subtraction of nearly equal numbers is inside `delta`, which each caller knows how to avoid: see W. H. Press
-/// et al., "Numerical Recipes", section 5.6.
+/// The only subtraction of nearly equal numbers is inside `delta`, which callers compute accurately: see W. H.
+/// Press et al., "Numerical Recipes", section 5.6.
 #[inline(always)]
 pub fn quadratic(a: f64, h: f64, c: f64, delta: f64) -> Option<(f64, f64)> {
     if delta.is_nan() || delta < 0.0 {
         return None;
     }
     if delta == 0.0 {
-        // The mean of the roots is both of them; c, which may carry rounding errors of its own, is not asked.
+        // Both roots are their mean; c, which may carry rounding errors, is not used.
         let double = -h / a;
         return double.is_finite().then_some((double, double));
     }

@@ -1,8 +1,9 @@
-//! Quaternions as rotations, of any length but zero, and Euler angles that stay right at the poles.
+//! Quaternions of any non-zero length as rotations, and Euler angles that are accurate at the poles.
 //!
-//! The type is glam's [`DQuat`], which lists `x, y, z, w`; most texts list the real part first, as [`from_wxyz`] does.
-//! glam has the sum `p + q`, the product `p * q` ("first q"), `q.conjugate()`, `q.length()` and the interpolation
-//! `p.slerp(q, s)`. Its `inverse`, `q * v` and `from_quat` want unit quaternions; those here do not.
+//! The type is glam's [`DQuat`], which lists `x, y, z, w`; most texts list the real part first, as
+//! [`from_wxyz`] does. glam has the sum `p + q`, the product `p * q` ("first q"), `q.conjugate()`, `q.length()`
+//! and the interpolation `p.slerp(q, s)`. Its `inverse`, `q * v` and `from_quat` require unit quaternions; the
+//! functions here do not.
 
 use glam::{DMat3, DQuat, DVec3};
 
@@ -30,13 +31,13 @@ pub fn inverse(q: DQuat) -> Option<DQuat> {
 /// `None` when the axis is zero or anything is not finite.
 pub fn from_axis_angle(axis: DVec3, degrees: f64) -> Option<DQuat> {
     let a = unit(axis)?;
-    // Two turns, 720°, bring a quaternion back; one turn gives -1.
+    // A quaternion has a period of 720°; 360° gives -1.
     let (sin, cos) = sin_cos_degrees(0.5 * degrees);
     let q = DQuat::from_xyzw(a.x * sin, a.y * sin, a.z * sin, cos);
     q.is_finite().then_some(q)
 }
 
-/// `v` turned by `q`: `q v q⁻¹`, for `q` of any length but zero. `q` and `-q` turn alike.
+/// `v` rotated by `q`: `q v q⁻¹`, for `q` of any non-zero length. `q` and `-q` are the same rotation.
 pub fn rotate(q: DQuat, v: DVec3) -> DVec3 {
     let r = q.xyz();
     let across = 2.0 * r.cross(v) / q.length_squared();
@@ -83,23 +84,23 @@ pub fn from_matrix(m: &DMat3) -> DQuat {
     from_wxyz(parts.map(|part| part / (2.0 * square.sqrt()))).normalize()
 }
 
-/// A rotation as three turns, in degrees: bank about x first, then attitude about z, then heading about y,
-/// `R = Ry(heading) Rz(attitude) Rx(bank)`.
+/// A rotation as three angles, in degrees: bank about x first, then attitude about z, then heading about y, `R
+/// = Ry(heading) Rz(attitude) Rx(bank)`.
 ///
-/// At the poles, attitude ±90°, heading and bank turn about the same axis and only their sum (north, +90°) or
-/// difference (south) exists; next to them the single angles are uncertain by about 1e-16 / cos(attitude).
+/// At the poles, attitude ±90°, heading and bank rotate about the same axis and only their sum (north, +90°) or
+/// difference (south) is determined; near them the single angles are uncertain by about 1e-16 / cos(attitude).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Euler {
-    /// The turn about y, in degrees.
+    /// The rotation about y, in degrees.
     pub heading: f64,
-    /// The turn about z, in degrees.
+    /// The rotation about z, in degrees.
     pub attitude: f64,
-    /// The turn about x, in degrees.
+    /// The rotation about x, in degrees.
     pub bank: f64,
 }
 
 impl Euler {
-    /// The unit quaternion of these turns.
+    /// The unit quaternion of this rotation.
     pub fn to_quaternion(self) -> DQuat {
         let (s1, c1) = sin_cos_degrees(0.5 * self.heading);
         let (s2, c2) = sin_cos_degrees(0.5 * self.attitude);
@@ -112,11 +113,12 @@ impl Euler {
         ])
     }
 
-    /// The turns of a quaternion of any length but zero: heading and bank in (-180°, 180°], attitude in [-90°, 90°]; at
-    /// a pole the bank is 0.
+    /// The angles of a quaternion of any non-zero length: heading and bank in (-180°, 180°], attitude in [-90°,
+    /// 90°]; at a pole the bank is 0.
     ///
-    /// By sums and differences of the parts, which keeps all digits at the poles: Bernardes, Viollet, "Quaternion to
-    /// Euler Angles Conversion: A Direct, General and Computationally Efficient Method", PLoS ONE 17(11), 2022.
+    /// Computed from sums and differences of the parts, which is accurate at the poles: Bernardes, Viollet,
+    /// "Quaternion to Euler Angles Conversion: A Direct, General and Computationally Efficient Method", PLoS
+    /// ONE 17(11), 2022.
     pub fn from_quaternion(q: DQuat) -> Self {
         let [a, b, c, d] = to_wxyz(q);
         let (sum, difference) = ((a + d).hypot(b + c), (a - d).hypot(c - b));

@@ -1,7 +1,7 @@
-//! Random numbers that are pure functions of what they are for: (seed, pixel, sample index, dimension).
+//! Counter-based random numbers: pure functions of (seed, pixel, sample index, dimension).
 //!
-//! Nothing is drawn in turn, so that a number does not depend on the thread, the order of the tiles, or on whether the
-//! picture was interrupted.
+//! There is no sequence, so a number does not depend on the thread, the order of the tiles, or whether the
+//! rendering was interrupted.
 //!
 //! ```
 //! use lumbre_math::random::PixelRandom;
@@ -19,8 +19,9 @@ const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// A bijection of the 64-bit words in which every bit of the result depends on every bit of `x`.
 ///
-/// The finaliser "Mix13" of Stafford, "Better Bit Mixing: Improving on MurmurHash3's 64-bit Finalizer", 2011, as used
-/// in Steele, Lea, Flood, "Fast Splittable Pseudorandom Number Generators", OOPSLA 2014. It maps 0 to 0.
+/// The finaliser "Mix13" of Stafford, "Better Bit Mixing: Improving on MurmurHash3's 64-bit Finalizer", 2011,
+/// as used in Steele, Lea, Flood, "Fast Splittable Pseudorandom Number Generators", OOPSLA 2014. It maps 0 to
+/// 0.
 #[inline]
 pub const fn mix(x: u64) -> u64 {
     let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -28,30 +29,30 @@ pub const fn mix(x: u64) -> u64 {
     x ^ (x >> 31)
 }
 
-/// A word that depends on both words and on their order: the way to build a key out of parts.
+/// Hashes two words, in order; builds a key from parts.
 #[inline]
 pub const fn combine(key: u64, word: u64) -> u64 {
     mix(mix(key.wrapping_add(GOLDEN)).wrapping_add(word.wrapping_mul(GOLDEN)).wrapping_add(1))
 }
 
-/// A word that depends on all of `words`, on their order and on their number.
+/// Hashes words: the result depends on all of them, their order and their number.
 pub fn hash_words(words: &[u64]) -> u64 {
     words.iter().fold(mix(words.len() as u64), |key, &word| combine(key, word))
 }
 
-/// A word that depends on the bit patterns of the numbers, with `-0.0` the same as `0.0`, as they compare equal.
+/// Hashes the bit patterns of numbers, with `-0.0` as `0.0`, since they compare equal.
 pub fn hash_f64s(numbers: &[f64]) -> u64 {
     // Adding +0.0 turns -0.0 into 0.0 and changes no other number.
     numbers.iter().fold(mix(numbers.len() as u64), |key, &number| combine(key, (number + 0.0).to_bits()))
 }
 
-/// A word that depends on the bit patterns of the numbers, with `-0.0` the same as `0.0`.
+/// Hashes the bit patterns of numbers, with `-0.0` as `0.0`.
 pub fn hash_f32s(numbers: &[f32]) -> u64 {
     let key = mix(!(numbers.len() as u64));
     numbers.iter().fold(key, |key, &number| combine(key, u64::from((number + 0.0).to_bits())))
 }
 
-/// [`hash_f64s`] of the components: the key of a stochastic decision that is to be the same wherever it is asked for.
+/// [`hash_f64s`] of the components: the key of a stochastic decision that must not vary between calls.
 pub fn hash_dvec3(v: DVec3) -> u64 {
     hash_f64s(&v.to_array())
 }
@@ -61,13 +62,13 @@ pub fn hash_vec3(v: Vec3) -> u64 {
     hash_f32s(&v.to_array())
 }
 
-/// The multiple of 2⁻²⁴ in `[0, 1)` made of the top bits of `word`. It never rounds up to 1.
+/// The multiple of 2⁻²⁴ in `[0, 1)` from the top bits of `word`. It never rounds up to 1.
 #[inline]
 pub fn uniform_f32(word: u64) -> f32 {
     (word >> 40) as f32 * (1.0 / (1_u32 << 24) as f32)
 }
 
-/// The multiple of 2⁻⁵³ in `[0, 1)` made of the top bits of `word`. It never rounds up to 1.
+/// The multiple of 2⁻⁵³ in `[0, 1)` from the top bits of `word`. It never rounds up to 1.
 #[inline]
 pub fn uniform_f64(word: u64) -> f64 {
     (word >> 11) as f64 * (1.0 / (1_u64 << 53) as f64)
@@ -86,7 +87,7 @@ impl PixelRandom {
         Self { key: combine(seed, x as u64 | (y as u64) << 32) }
     }
 
-    /// A word that belongs to this pixel alone.
+    /// The key of this pixel.
     #[inline]
     pub const fn key(self) -> u64 {
         self.key
@@ -99,14 +100,14 @@ impl PixelRandom {
     }
 }
 
-/// The random numbers of one sample of one pixel, one for each dimension.
+/// The random numbers of one sample of a pixel, one for each dimension.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SampleRandom {
     key: u64,
 }
 
 impl SampleRandom {
-    /// A word that belongs to this sample alone.
+    /// The key of this sample.
     #[inline]
     pub const fn key(self) -> u64 {
         self.key
@@ -131,8 +132,8 @@ impl SampleRandom {
     }
 }
 
-/// A sequence of random numbers grown from a key, for decisions whose number is not known beforehand (rejection,
-/// random walks). Start one from a key that says what it is for.
+/// A sequence of random numbers from a key, for an unknown number of decisions (rejection, random walks).
+/// Derive the key from the purpose.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RandomStream {
     state: u64,
@@ -142,7 +143,7 @@ impl RandomStream {
     /// The sequence of `key`.
     #[inline]
     pub const fn new(key: u64) -> Self {
-        // Mixed, for keys a multiple of the step apart would otherwise give the same sequence, shifted.
+        // Mixed, since keys a multiple of the step apart would give shifted copies of one sequence.
         Self { state: combine(key, 0) }
     }
 
@@ -165,7 +166,7 @@ impl RandomStream {
         uniform_f64(self.next_u64())
     }
 
-    /// The next whole number, uniform in `0..count` up to a bias of `count`/2⁶⁴; 0 for a count of 0.
+    /// The next integer, uniform in `0..count` up to a bias of `count`/2⁶⁴; 0 for a count of 0.
     #[inline]
     pub fn next_below(&mut self, count: usize) -> usize {
         ((u128::from(self.next_u64()) * count as u128) >> 64) as usize

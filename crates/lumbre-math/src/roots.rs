@@ -1,10 +1,11 @@
 //! Real roots of polynomials in an interval, by monotone pieces.
 //!
-//! The real roots of p' cut the interval into pieces on which p is monotone; a piece holds a root exactly when the signs
-//! at its ends differ, and a Newton iteration that falls back to bisection finds it. Applied from degree 2 upwards this
-//! always converges, finds every crossing, and never a complex root: C. Yuksel, "High-performance polynomial root
-//! finding for graphics", Proceedings of the ACM on Computer Graphics and Interactive Techniques, 2022. Unlike there,
-//! the recursion starts from the closed form of the quadratic, and a piece's end where p vanishes is itself a root.
+//! The real roots of p' cut the interval into pieces on which p is monotone. A piece has a root exactly when
+//! the signs at its ends differ; Newton's method with a fallback to bisection finds it. Applied from degree 2
+//! upwards this always converges, finds every crossing, and never a complex root: C. Yuksel, "High-performance
+//! polynomial root finding for graphics", Proceedings of the ACM on Computer Graphics and Interactive
+//! Techniques, 2022. Unlike there, the recursion starts from the closed form of the quadratic, and a piece's
+//! end where p vanishes is itself a root.
 
 use std::ops::Deref;
 
@@ -13,7 +14,7 @@ use crate::quadratic::{dop, quadratic};
 /// Real roots in ascending order, at most `N` of them; a slice of `f64`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RealRoots<const N: usize> {
-    // Only the first `count` are roots.
+    // Only the first `count` are valid.
     roots: [f64; N],
     count: usize,
 }
@@ -40,13 +41,12 @@ impl<const N: usize> Deref for RealRoots<N> {
 
 /// The distinct real roots in `[low, high]` of `c[0] + c[1] x + … + c[N-1] x^(N-1)`, in ascending order.
 ///
-/// A root of odd multiplicity is always found. One of even multiplicity is found where the polynomial evaluates to
-/// exactly zero at the computed root of its derivative; otherwise it comes out as two close roots or as none. Leading
-/// zeros are welcome. An infinite end stands for Cauchy's bound on the roots. Empty when the interval is empty, when
-/// anything is NaN, and for the zero polynomial.
+/// A root of odd multiplicity is always found. One of even multiplicity is found where the polynomial evaluates
+/// to exactly zero at the computed root of its derivative; otherwise it comes out as two close roots or as
+/// none. Leading coefficients may be zero. An infinite end stands for Cauchy's bound on the roots. Empty when
+/// the interval is empty, when anything is NaN, and for the zero polynomial.
 ///
-/// Nothing is allocated. From quartics to octics it takes 0.72 to 0.84 of the time of the crate polycool 0.4; on cubics with
-/// three real roots, where that crate deflates, 2.3 times as long: `examples/roots_speed.rs`.
+/// Nothing is allocated. `examples/roots_speed.rs` compares its speed with other crates.
 pub fn roots_between<const N: usize>(c: &[f64; N], low: f64, high: f64) -> RealRoots<N> {
     let Some((low, high)) = finite_interval(c, low, high) else {
         return RealRoots::NONE;
@@ -96,10 +96,8 @@ pub fn roots_between<const N: usize>(c: &[f64; N], low: f64, high: f64) -> RealR
     roots
 }
 
-/// The distinct real roots in `[low, high]` of the quartic `c[0] + c[1] x + … + c[4] x⁴`, in ascending order: as
-/// [`roots_between`], with the split points from the closed form of the cubic.
-///
-/// 0.80 to 0.85 of the time of polycool's quartic: `examples/roots_speed.rs`.
+/// The distinct real roots in `[low, high]` of the quartic `c[0] + c[1] x + … + c[4] x⁴`, in ascending order:
+/// as [`roots_between`], but with the split points from the closed form of the cubic.
 pub fn quartic_roots_between(c: &[f64; 5], low: f64, high: f64) -> RealRoots<5> {
     let Some((low, high)) = finite_interval(c, low, high) else {
         return RealRoots::NONE;
@@ -111,8 +109,8 @@ pub fn quartic_roots_between(c: &[f64; 5], low: f64, high: f64) -> RealRoots<5> 
     }
 }
 
-/// The roots in `[low, high]` of a cubic, by its depressed form; `None` when its leading coefficient is so small that
-/// the shift would lose the digits.
+/// The roots in `[low, high]` of a cubic, by its depressed form; `None` when its leading coefficient is so
+/// small that the shift would lose the digits.
 fn cubic_roots_between<const N: usize>(c: &[f64], low: f64, high: f64) -> Option<RealRoots<N>> {
     let (b, d, e) = (c[2] / c[3], c[1] / c[3], c[0] / c[3]);
     let third = b / 3.0;
@@ -122,7 +120,7 @@ fn cubic_roots_between<const N: usize>(c: &[f64], low: f64, high: f64) -> Option
     }
     let mut roots = RealRoots::NONE;
     for &shifted in depressed_cubic_roots(d - b * third, (2.0 * third * third - d) * third + e).iter() {
-        // One step undoes the rounding of the shift.
+        // A Newton step removes the rounding error of the shift.
         let x = shifted - third;
         let (value, slope) = (((x + b) * x + d) * x + e, (3.0 * x + 2.0 * b) * x + d);
         let polished = x - value / slope;
@@ -141,7 +139,7 @@ pub fn depressed_cubic_roots(a: f64, b: f64) -> RealRoots<3> {
         DepressedCubic::ThreeRoots(three) => {
             let left = three.left();
             let (middle, right) = three.others(left);
-            // One more step of Newton's each, which goes astray only where a root is double already.
+            // A final Newton step, which fails only where a root is double anyway.
             let polish = |x: f64| {
                 let polished = x - ((x * x + a) * x + b) / (3.0 * x * x + a);
                 if (polished - x).abs() <= 1e-7 * three.e { polished } else { x }
@@ -151,9 +149,9 @@ pub fn depressed_cubic_roots(a: f64, b: f64) -> RealRoots<3> {
     }
 }
 
-/// `x³ + a x + b` on the way to its real roots, for those who may not need them all, nor to the last digits.
+/// The real roots of `x³ + a x + b`, computed on demand and to about ten digits.
 ///
-/// Viète's trigonometric form, with a polynomial and a step of Newton's in place of the cosines.
+/// Viète's trigonometric form, with a polynomial and a Newton step in place of the cosines.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum DepressedCubic {
     /// The only real root.
@@ -171,7 +169,7 @@ pub struct ThreeRoots {
 }
 
 impl DepressedCubic {
-    /// Tells how many roots there are, and finds the root if there is one.
+    /// Determines the number of roots, and the root if there is only one.
     #[inline]
     pub fn new(a: f64, b: f64) -> Self {
         let e = (-a / 3.0).max(0.0).sqrt();
@@ -181,13 +179,13 @@ impl DepressedCubic {
 }
 
 impl ThreeRoots {
-    /// The least, to about ten digits.
+    /// The least root, to about ten digits.
     #[inline]
     pub fn left(&self) -> f64 {
         -self.e * Self::outer(self.h)
     }
 
-    /// The middle and the greatest one, given the least, to about ten digits.
+    /// The middle and the greatest root, given the least, to about ten digits.
     #[inline]
     pub fn others(&self, left: f64) -> (f64, f64) {
         let right = Self::outer(-self.h);
@@ -202,19 +200,20 @@ impl ThreeRoots {
     /// 2 cos(acos(h)/3), the root of x³ - 3x - 2h from 1 to 2, to about 1e-10.
     #[inline]
     fn outer(h: f64) -> f64 {
-        // (x - 1)/c is smooth in c = cos(acos(h)/2): a polynomial through its values, to 6e-6 and exact at both ends.
+        // (x - 1)/c is smooth in c = cos(acos(h)/2): a polynomial through its values, to 6e-6 and exact at both
+        // ends.
         let c = (0.5 * (1.0 + h)).sqrt();
         let high = 0.105_781_913 + c * (-0.058_513_870 + c * (0.026_063_998 - c * 0.005_843_958));
         let x = 1.0 + c * (1.154_700_538 + c * (-0.222_188_622 + c * high));
-        // At the double root, x = 1, there is nothing left to improve.
+        // At the double root, x = 1, there is nothing to improve.
         if c < 1e-6 { x } else { x - ((x * x - 3.0) * x - 2.0 * h) / (3.0 * (x - 1.0) * (x + 1.0)) }
     }
 }
 
-/// The real root of `x³ + a x + b` when there is one.
+/// The real root of `x³ + a x + b` when there is only one.
 ///
-/// With the sign of b taken out, x³ + a x = |b| has it on the right of every turning point, where the cubic is convex:
-/// Newton's method descends to it from any point beyond.
+/// With the sign of b factored out, the root of x³ + a x = |b| is to the right of every turning point, where
+/// the cubic is convex: Newton's method descends to it from any point beyond.
 #[inline]
 fn only_root(a: f64, b: f64) -> f64 {
     let goal = b.abs();
@@ -227,7 +226,7 @@ fn only_root(a: f64, b: f64) -> f64 {
         if next.is_nan() || next >= x {
             break;
         }
-        // Quadratic convergence: one more step would be lost in rounding.
+        // Convergence is quadratic: one more step would be below rounding.
         let done = x - next <= 1e-8 * x;
         x = next;
         if done {
@@ -237,18 +236,18 @@ fn only_root(a: f64, b: f64) -> f64 {
     -x.copysign(b)
 }
 
-/// The root of a function that is monotone between `low` and `high` and has different signs there: Newton's method from
-/// `guess`, by bisection whenever a step would leave the bracket or shrinks too slowly.
+/// The root of a function that is monotone between `low` and `high` and has different signs there: Newton's
+/// method from `guess`, with bisection whenever a step would leave the bracket or shrinks too slowly.
 ///
-/// `at` returns value and slope; `rising` says which sign stands at `high`. The answer lies in `[low, high]` for any
-/// function.
+/// `at` returns value and slope; `rising` is whether the function is positive at `high`. The result lies in
+/// `[low, high]` for any function.
 #[inline]
 pub fn bracketed_root(low: f64, high: f64, guess: f64, rising: bool, at: impl Fn(f64) -> (f64, f64)) -> f64 {
     let (mut low, mut high) = (low, high);
     let scale = low.abs().max(high.abs());
     let mut x = if low < guess && guess < high { guess } else { 0.5 * (low + high) };
     let mut previous = high - low;
-    // The last step, if it was one of Newton's.
+    // The last step, if it was a Newton step.
     let mut newtons = 0.0;
     for _ in 0..200 {
         let (value, slope) = at(x);
@@ -262,8 +261,8 @@ pub fn bracketed_root(low: f64, high: f64, guess: f64, rising: bool, at: impl Fn
         }
         let newton = x - value / slope;
         let step = (newton - x).abs();
-        // Newton's steps shrink quadratically: this predicts the next one. They end in rounding noise; bisecting then
-        // would only walk back.
+        // Newton's steps shrink quadratically, so this predicts the next one. They end in rounding noise, where
+        // bisection would only lose accuracy.
         let negligible = step * step * step <= 0.25 * f64::EPSILON * x.abs() * newtons * newtons;
         let done = negligible && step <= 0.1 * newtons;
         if done || step <= f64::EPSILON * x.abs() || (step <= 1e-13 * scale && step >= 0.25 * previous) {
@@ -295,7 +294,8 @@ fn roots_from_splits<const N: usize>(p: &[f64], low: f64, high: f64, splits: &Re
             roots.push(right);
         } else if at_left != 0.0 && (at_left > 0.0) != (at_right > 0.0) {
             let rising = at_right > 0.0;
-            // The secant's root is at least as good a guess as the middle, except at the foot of a steep wall.
+            // The root of the secant is at least as good a guess as the middle, except at the foot of a steep
+            // flank.
             let secant = left - at_left * (right - left) / (at_right - at_left);
             let middle = 0.5 * (left + right);
             let guess = 0.5 * (middle + secant);
@@ -306,7 +306,7 @@ fn roots_from_splits<const N: usize>(p: &[f64], low: f64, high: f64, splits: &Re
     roots
 }
 
-/// `low` and `high` within Cauchy's bound; `None` when nothing is in between or anything is NaN.
+/// `low` and `high` clamped to Cauchy's bound; `None` when the interval is empty or anything is NaN.
 fn finite_interval(c: &[f64], low: f64, high: f64) -> Option<(f64, f64)> {
     if !c.iter().all(|x| x.is_finite()) || low.is_nan() || high.is_nan() || low > high {
         return None;

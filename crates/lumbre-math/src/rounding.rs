@@ -1,4 +1,4 @@
-//! Bounds on rounding errors, and the step off a surface that they ask for.
+//! Bounds on rounding errors, and ray origins offset by them.
 
 use glam::DVec3;
 
@@ -32,14 +32,15 @@ pub fn next_down_by(x: f64, steps: u32) -> f64 {
     (0..steps).fold(x, |x, _| x.next_down())
 }
 
-/// Where a ray towards `direction` starts when it leaves a surface at `point`: on the side of the unit normal to which
-/// it goes, beyond every place where the true surface can be, so that it does not find the surface it leaves.
+/// The origin of a ray that leaves a surface at `point` towards `direction`: offset along the unit normal to
+/// the side of `direction`, beyond any place where the true surface can be, so that the ray does not hit the
+/// surface it leaves.
 ///
-/// `error` bounds, axis by axis, how far `point` is from the surface. A ray that goes along the surface, perpendicular
-/// to the normal, starts on the side of the normal. Source: Pharr, Jakob, Humphreys, "Physically Based Rendering", 4th
-/// edition, 2023, section 6.8.6.
+/// `error` bounds, axis by axis, the distance of `point` from the surface. A `direction` perpendicular to the
+/// normal counts as on the side of the normal. Source: Pharr, Jakob, Humphreys, "Physically Based Rendering",
+/// 4th edition, 2023, section 6.8.6.
 pub fn offset_point(point: DVec3, error: DVec3, normal: DVec3, direction: DVec3) -> DVec3 {
-    // The box of errors reaches this far along the normal.
+    // The extent of the error box along the normal.
     let reach = normal.abs().dot(error.abs());
     let offset = if direction.dot(normal) < 0.0 { -reach * normal } else { reach * normal };
     let away = |moved: f64, by: f64| {

@@ -1,8 +1,8 @@
-//! Owen-scrambled Sobol points: random numbers that fill their range more evenly than chance does.
+//! Owen-scrambled Sobol points: more even than independent random numbers.
 //!
-//! [`OwenSobol`] gives each pixel points of its own; [`ZOrderSobol`] deals out one set of points to all pixels, so that
-//! the error left in the picture is spread like blue noise. Both are functions of (seed, pixel, sample index,
-//! dimension), without a limit on the dimensions: a dimension is a label, and each gets a shuffle of its own.
+//! [`OwenSobol`] gives each pixel points of its own; [`ZOrderSobol`] distributes one set of points over all
+//! pixels, so that the error of the image is like blue noise. Both are functions of (seed, pixel, sample index,
+//! dimension), without a limit on the dimensions: a dimension is a label with its own shuffle.
 //!
 //! ```
 //! use lumbre_math::random::PixelRandom;
@@ -23,7 +23,7 @@ use glam::Vec2;
 
 use crate::random::{combine, mix};
 
-/// How many dimensions of the plain sequence there are.
+/// The number of dimensions of the plain sequence.
 pub const DIMENSIONS: usize = 10;
 
 /// For each dimension but the first: degree and inner coefficients of a primitive polynomial modulo 2, and the first
@@ -41,7 +41,8 @@ const JOE_KUO: [(usize, u32, [u32; 5]); DIMENSIONS - 1] = [
     (5, 7, [1, 1, 7, 11, 19]),
 ];
 
-/// `DIRECTIONS[d][j]`: what bit `j` of the index contributes to dimension `d`, the first binary place in the top bit.
+/// `DIRECTIONS[d][j]`: the contribution of bit `j` of the index to dimension `d`, the first binary place in the
+/// top bit.
 const DIRECTIONS: [[u32; 32]; DIMENSIONS] = {
     let mut table = [[0; 32]; DIMENSIONS];
     let mut j = 0;
@@ -92,7 +93,7 @@ pub fn sobol(index: u32, dimension: usize) -> u32 {
 /// The first two dimensions of the plain Sobol sequence for an index of 64 bits, as 64 binary places.
 ///
 /// The first is the radical inverse. The matrix of the second is Pascal's triangle modulo 2, a tensor power of
-/// `[[1, 1], [0, 1]]`, so that one exclusive-or for each factor stands for the loop over the bits.
+/// `[[1, 1], [0, 1]]`, so one exclusive-or for each factor replaces the loop over the bits.
 #[inline]
 pub const fn sobol_2d(index: u64) -> (u64, u64) {
     let x = index.reverse_bits();
@@ -124,24 +125,25 @@ const fn reversed_scramble(x: u32, seed: u32) -> u32 {
     x ^ x.wrapping_mul(0x53a2_2864)
 }
 
-/// The number in `[0, 1)` with these binary places, cut after the 24th.
+/// The number in `[0, 1)` with these binary places, truncated after the 24th.
 #[inline]
 fn fraction(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / (1_u32 << 24) as f32)
 }
 
-/// Sobol points with an Owen scramble and an order of their own for each pixel and dimension.
+/// Sobol points, Owen-scrambled and shuffled independently for each pixel and dimension.
 ///
-/// For a given pixel and dimension, the 2ᵐ samples of every aligned block of indices are a (0, m, 2)-net: each of the
-/// boxes of area 2⁻ᵐ with sides of whole powers of two holds exactly one. Different dimensions are independent of each
-/// other ("padding", by shuffled indices, as in Burley, JCGT 2020), except those taken together by [`OwenSobol::get`].
+/// For a given pixel and dimension, the 2ᵐ samples of every aligned block of indices are a (0, m, 2)-net: each
+/// of the boxes of area 2⁻ᵐ with sides of powers of two contains exactly one. Different dimensions are
+/// independent ("padding", by shuffled indices, as in Burley, JCGT 2020), except those of one call of
+/// [`OwenSobol::get`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OwenSobol {
     seed: u64,
 }
 
 impl OwenSobol {
-    /// The points of a seed.
+    /// The points for a seed.
     pub const fn new(seed: u64) -> Self {
         Self { seed: combine(seed, 0x50b0_1000) }
     }
@@ -162,8 +164,8 @@ impl OwenSobol {
     #[inline]
     pub const fn bits_1d(&self, pixel: u64, index: u32, dimension: u32) -> u32 {
         let key = self.key(pixel, dimension);
-        // The radical inverse of the shuffled index is the shuffled index before its last reversal, and the scramble
-        // begins by reversing it again.
+        // The radical inverse of the shuffled index is the shuffled index before its last reversal, which the
+        // scramble would undo.
         let shuffled = owen_scramble(index, key as u32);
         reversed_scramble(shuffled, (key >> 32) as u32).reverse_bits()
     }
@@ -187,8 +189,8 @@ impl OwenSobol {
         ]
     }
 
-    /// A point of the unit cube of `N` ≤ [`DIMENSIONS`] dimensions, even in all of them taken together. It takes one
-    /// dimension label, not `N`.
+    /// A point of the unit cube of `N` ≤ [`DIMENSIONS`] dimensions, well distributed in all of them jointly. It
+    /// takes one dimension label, not `N`.
     pub fn get<const N: usize>(&self, pixel: u64, index: u32, dimension: u32) -> [f32; N] {
         const { assert!(N <= DIMENSIONS) };
         let key = self.key(pixel, dimension);
@@ -205,24 +207,24 @@ impl OwenSobol {
     }
 }
 
-/// One Sobol sequence dealt out to all pixels along a shuffled z-order curve, so that the samples of neighbouring
-/// pixels complete each other and the error of the picture is mostly of high frequency.
+/// One Sobol sequence distributed over all pixels along a shuffled z-order curve, so that the samples of
+/// neighbouring pixels complement each other and the error of the image is mostly of high frequency.
 ///
-/// Within a pixel it is as even as [`OwenSobol`], and so it is within each aligned block of 2ᵏ×2ᵏ pixels. The number
-/// of samples per pixel must be known beforehand: asked for more, it starts an independent sequence after that many.
-/// Source: Ahmed, Wonka, "Screen-Space Blue-Noise Diffusion of Monte Carlo Sampling Error via Hierarchical Ordering of
+/// Within a pixel it is as even as [`OwenSobol`], and so it is within each aligned block of 2ᵏ×2ᵏ pixels. The
+/// number of samples per pixel must be known in advance: beyond it, an independent sequence starts. Source:
+/// Ahmed, Wonka, "Screen-Space Blue-Noise Diffusion of Monte Carlo Sampling Error via Hierarchical Ordering of
 /// Pixels", ACM TOG 39(6) (SIGGRAPH Asia), 2020.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ZOrderSobol {
     seed: u64,
-    // log2_side ≤ 20 and log2_samples ≤ 24, so that the index of a sample of the picture has at most 64 bits.
+    // log2_side ≤ 20 and log2_samples ≤ 24, so that a sample's index in the image has at most 64 bits.
     log2_side: u32,
     log2_samples: u32,
 }
 
 impl ZOrderSobol {
-    /// The points of a seed, for a picture of `width` × `height` pixels. The number of samples per pixel is rounded up
-    /// to a power of two.
+    /// The points for a seed and an image of `width` × `height` pixels. The number of samples per pixel is
+    /// rounded up to a power of two.
     pub fn new(seed: u64, width: u32, height: u32, samples_per_pixel: u32) -> Self {
         let log2_ceil = |n: u32| 32 - n.saturating_sub(1).leading_zeros();
         Self {
@@ -241,7 +243,7 @@ impl ZOrderSobol {
     pub fn get_2d(&self, x: u32, y: u32, index: u32, dimension: u32) -> Vec2 {
         let side = (1_u64 << self.log2_side) - 1;
         let samples = (1_u64 << self.log2_samples) - 1;
-        // What the curve has no room for (more samples, pixels outside) selects another sequence altogether.
+        // Samples and pixels beyond the curve's capacity select another sequence.
         let beyond = (u64::from(index) >> self.log2_samples) << 40
             ^ (u64::from(x) >> self.log2_side) << 20
             ^ (u64::from(y) >> self.log2_side);
@@ -256,17 +258,17 @@ impl ZOrderSobol {
         )
     }
 
-    /// Permutes each base-4 digit by a hash of the digits above it; a lone last bit likewise.
+    /// Permutes each base-4 digit, and a single last bit, by a hash of the digits above it.
     fn shuffle(&self, ordered: u64, key: u64) -> u64 {
         let digits = self.log2_side + self.log2_samples / 2;
         let odd = self.log2_samples % 2;
-        // A node of the tree of digits has a hash of its own: the digits above it, after a 1 that marks how many.
+        // The key of a node of the digit tree: the digits above it, preceded by a 1 that marks their number.
         let hash = |node: u64| mix(key.wrapping_add(node.wrapping_mul(0x9e37_79b9_7f4a_7c15)));
         let mut shuffled = 0;
         for digit in (0..digits).rev() {
             let shift = 2 * digit + odd;
             let value = (ordered >> shift) & 3;
-            // In two steps, for the topmost digit can stand at bit 62.
+            // In two steps, since the topmost digit may be at bit 62.
             let above = (ordered >> shift) >> 2;
             let bits = hash(1 << (2 * (digits - 1 - digit)) | above);
             let permutation = PERMUTATIONS[(((bits >> 32) * 24) >> 32) as usize];
@@ -280,12 +282,12 @@ impl ZOrderSobol {
     }
 }
 
-/// The permutations of four things.
+/// The permutations of four elements.
 const PERMUTATIONS: [[u8; 4]; 24] = {
     let mut table = [[0; 4]; 24];
     let mut row = 0;
     while row < 24 {
-        // Factorial digits of the row: insert each thing at its place among those before it.
+        // Factorial digits of the row: insert each element at its place among those before it.
         let places = [0, row % 2, (row / 2) % 3, row / 6];
         let mut things = 0;
         while things < 4 {

@@ -12,11 +12,11 @@ use crate::rounding::gamma;
 use crate::vector::{cross, dot, mixed_product};
 use crate::view::{Handedness, View};
 
-/// An invertible affine map from one space to another, named by the caller as `world_from_object`, with its inverse.
+/// An invertible affine map from one space to another with its inverse; name it like `world_from_object`.
 ///
-/// Products read right to left: `world_from_object * object_from_part`. The elementary constructors know their inverse
-/// exactly, and a product multiplies the inverses in reverse order, so that a chain of elementary maps never inverts a
-/// matrix numerically.
+/// Products read right to left: `world_from_object * object_from_part`. The elementary constructors know their
+/// inverse exactly, and a product multiplies the inverses in reverse order, so a chain of elementary maps never
+/// inverts a matrix numerically.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Transform {
     // `inverse` is the inverse of `forward`, up to rounding.
@@ -24,8 +24,8 @@ pub struct Transform {
     inverse: DAffine3,
 }
 
-/// The matrix has no usable inverse: its determinant is zero up to rounding, or an entry is not finite, or it is not
-/// affine (its last row is not 0 0 0 1).
+/// The matrix has no usable inverse: its determinant is zero up to rounding, an entry is not finite, or it is
+/// not affine (its last row is not 0 0 0 1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SingularTransformError;
 
@@ -44,14 +44,15 @@ impl Default for Transform {
 }
 
 impl Transform {
-    /// The map that changes nothing.
+    /// The identity.
     pub const IDENTITY: Self = Self { forward: DAffine3::IDENTITY, inverse: DAffine3::IDENTITY };
 
-    /// A general affine map, given with columns as images of the axes.
+    /// A general affine map; the columns are the images of the axes.
     ///
     /// # Errors
-    /// [`SingularTransformError`] when |det L| ≤ 16 u Π|row of L|, when an entry is not finite, or when the last row is not
-    /// a non-zero multiple of 0 0 0 1 (such a multiple is divided out: homogeneous points are the same up to a factor).
+    /// [`SingularTransformError`] when |det L| ≤ 16 u Π|row of L|, when an entry is not finite, or when the last row
+    /// is not a non-zero multiple of 0 0 0 1 (such a multiple is divided out: homogeneous points are equal up
+    /// to a factor).
     pub fn from_matrix(matrix: DMat4) -> Result<Self, SingularTransformError> {
         let last = matrix.row(3);
         if !matrix.is_finite() || last.truncate() != DVec3::ZERO || last.w == 0.0 {
@@ -76,13 +77,13 @@ impl Transform {
         if finite { Ok(Self { forward, inverse }) } else { Err(SingularTransformError) }
     }
 
-    /// A map with what is known to be its inverse.
+    /// A map with its known inverse.
     pub(crate) fn from_parts(forward: DAffine3, inverse: DAffine3) -> Self {
         Self { forward, inverse }
     }
 
-    /// The map that takes the coordinate axes to the axes of `frame`, and the origin to `origin`: local coordinates to
-    /// those of the world.
+    /// The map that takes the coordinate axes to the axes of `frame`, and the origin to `origin`: local to
+    /// world coordinates.
     pub fn from_frame(origin: DVec3, frame: &Frame) -> Self {
         let linear = frame.matrix();
         Self {
@@ -91,7 +92,7 @@ impl Transform {
         }
     }
 
-    /// First scales, then rotates, then moves: the nodes of glTF. The quaternion needs no unit length.
+    /// Scales first, then rotates, then translates, as glTF nodes do. The quaternion need not be unit.
     ///
     /// # Errors
     /// [`SingularTransformError`] when a factor or the quaternion is zero, or anything is not finite.
@@ -129,7 +130,7 @@ impl Transform {
         view.map(|view| view.camera_from_world()).ok_or(SingularTransformError)
     }
 
-    /// Moves points by `offset`; leaves directions alone.
+    /// Translates points by `offset`; directions are unchanged.
     pub fn translate(offset: DVec3) -> Self {
         Self { forward: DAffine3::from_translation(offset), inverse: DAffine3::from_translation(-offset) }
     }
@@ -162,7 +163,7 @@ impl Transform {
         Self::from_affine(DAffine3::from_mat3(matrix::shear3(xy, xz, yx, yz, zx, zy)))
     }
 
-    /// A rotation by `degrees` about `axis` (any length but zero), x towards y about z.
+    /// A rotation by `degrees` about `axis` (of any non-zero length), x towards y about z.
     ///
     /// Multiples of 90° give exact zeros and ones about the coordinate axes.
     ///
@@ -173,12 +174,12 @@ impl Transform {
         Ok(Self { forward: DAffine3::from_mat3(linear), inverse: DAffine3::from_mat3(linear.transpose()) })
     }
 
-    /// The map itself, as glam's affine type.
+    /// The map as glam's affine type.
     pub fn affine(&self) -> &DAffine3 {
         &self.forward
     }
 
-    /// The inverse map, as glam's affine type.
+    /// The inverse as glam's affine type.
     pub fn inverse_affine(&self) -> &DAffine3 {
         &self.inverse
     }
@@ -188,7 +189,7 @@ impl Transform {
         self.forward.matrix3
     }
 
-    /// The map back.
+    /// The inverse map.
     #[must_use]
     pub fn inverse(&self) -> Self {
         Self { forward: self.inverse, inverse: self.forward }
@@ -199,7 +200,7 @@ impl Transform {
         self.forward.transform_point3(p)
     }
 
-    /// The image of a direction (w = 0); its length changes with it.
+    /// The image of a direction (w = 0); its length may change.
     pub fn vector(&self, v: DVec3) -> DVec3 {
         self.forward.transform_vector3(v)
     }
@@ -209,24 +210,24 @@ impl Transform {
         self.inverse.matrix3.transpose() * n
     }
 
-    /// How far, axis by axis, [`Transform::point`] of `p` can be from the image of the true point, when `p` itself is
-    /// off by up to `error` on each axis.
+    /// A bound, axis by axis, on the error of [`Transform::point`] of `p`, when `p` itself has an error of up
+    /// to `error` on each axis.
     pub fn point_error(&self, p: DVec3, error: DVec3) -> DVec3 {
         error_bound(&self.forward, p, error)
     }
 
-    /// How far, axis by axis, [`Transform::inverse_point`] of `p` can be from the true point whose image it is, when
-    /// `p` itself is off by up to `error` on each axis; the inverse is taken as exact.
+    /// A bound, axis by axis, on the error of [`Transform::inverse_point`] of `p`, when `p` itself has an error
+    /// of up to `error` on each axis; the inverse is taken as exact.
     pub fn inverse_point_error(&self, p: DVec3, error: DVec3) -> DVec3 {
         error_bound(&self.inverse, p, error)
     }
 
-    /// The factor by which the map stretches a small area with the unit normal `n`: `|det L| |L⁻ᵀ n|`.
+    /// The factor by which the map stretches an area element with the unit normal `n`: `|det L| |L⁻ᵀ n|`.
     pub fn area_factor(&self, n: DVec3) -> f64 {
         self.determinant().abs() * self.normal(n).length()
     }
 
-    /// The same map among coordinates mirrored by z to -z, as between right-handed and left-handed axes.
+    /// The same map in coordinates mirrored by z to -z, as between right-handed and left-handed axes.
     #[must_use]
     pub fn change_handedness(&self) -> Self {
         let mirror = |map: &DAffine3| DAffine3::from_mat4(matrix::change_handedness(DMat4::from(*map)));
@@ -256,14 +257,14 @@ impl Transform {
         mixed_product(linear.x_axis, linear.y_axis, linear.z_axis)
     }
 
-    /// Whether the map turns a right-handed frame into a left-handed one.
+    /// Whether the map changes handedness.
     pub fn is_mirror(&self) -> bool {
-        // Scaled, so that the sign survives where the determinant itself underflows.
+        // Scaled, so that the sign is right where the determinant itself underflows.
         let (rows, _) = scaled_rows(&self.forward.matrix3);
         mixed_product(rows[0], rows[1], rows[2]) < 0.0
     }
 
-    /// Whether the map changes nothing at all.
+    /// Whether the map is the identity.
     pub fn is_identity(&self) -> bool {
         self.forward == DAffine3::IDENTITY
     }
@@ -278,10 +279,10 @@ impl Mul for Transform {
     }
 }
 
-/// The rows of a matrix, each times a power of two that brings its largest entry near 1, and these powers.
+/// The rows of a matrix, each scaled by a power of two so that its largest entry is near 1, and these powers.
 fn scaled_rows(linear: &DMat3) -> ([DVec3; 3], DVec3) {
     let power = |row: DVec3| {
-        // The bits of the exponent; off by a few for subnormal numbers, which does no harm.
+        // The exponent; slightly off for subnormal numbers, which is harmless.
         let exponent = (row.abs().max_element().to_bits() >> 52) as i64 - 1023;
         f64::from_bits(((1023 - exponent.clamp(-1000, 1000)) as u64) << 52)
     };
@@ -290,7 +291,7 @@ fn scaled_rows(linear: &DMat3) -> ([DVec3; 3], DVec3) {
     ([rows[0] * powers.x, rows[1] * powers.y, rows[2] * powers.z], powers)
 }
 
-/// The inverse by cofactors, each right to a few units in the last place; `None` when |det L| ≤ 16 u Π|row of L|.
+/// The inverse by cofactors, each accurate to a few ulps; `None` when |det L| ≤ 16 u Π|row of L|.
 pub(crate) fn inverse_linear(linear: &DMat3) -> Option<DMat3> {
     if !linear.is_finite() {
         return None;
@@ -306,7 +307,7 @@ pub(crate) fn inverse_linear(linear: &DMat3) -> Option<DMat3> {
     Some(DMat3::from_cols(column(0), column(1), column(2)))
 }
 
-/// Each coordinate of an image is a sum of three products and a fourth term, hence has four roundings at most.
+/// Each coordinate of an image is a sum of three products and a fourth term: four roundings at most.
 fn error_bound(map: &DAffine3, p: DVec3, error: DVec3) -> DVec3 {
     let linear = map.matrix3.abs();
     let bound = (1.0 + gamma(4)) * (linear * error) + gamma(4) * (linear * p.abs() + map.translation.abs());
@@ -314,7 +315,8 @@ fn error_bound(map: &DAffine3, p: DVec3, error: DVec3) -> DVec3 {
     bound * (1.0 + gamma(8))
 }
 
-/// Sine and cosine of an angle in degrees, exact at every multiple of 90 and as good as can be at those of 30 and 45.
+/// The sine and cosine of an angle in degrees, exact at every multiple of 90 and best possible at those of 30
+/// and 45.
 pub fn sin_cos_degrees(degrees: f64) -> (f64, f64) {
     let reduced = degrees % 360.0;
     let quarter = (reduced / 90.0).round();

@@ -1,14 +1,14 @@
-//! Products, angles and projections of vectors, where the plain formula loses digits.
+//! Accurate products, angles and projections of vectors.
 //!
-//! glam has the plain ones: `a.dot(b)`, `a.cross(b)`, `a.length()`.
+//! glam has the plain formulas: `a.dot(b)`, `a.cross(b)`, `a.length()`.
 
 use glam::{DMat3, DVec3};
 
 use crate::quadratic::{dop, two_product};
 
-/// The cross product with each component right to two units in the last place, also for nearly parallel vectors.
+/// The cross product with each component accurate to two ulps, even for nearly parallel vectors.
 ///
-/// glam's own is faster, and enough where the vectors are far from parallel.
+/// glam's own is faster, and sufficient where the vectors are far from parallel.
 pub fn cross(a: DVec3, b: DVec3) -> DVec3 {
     DVec3::new(dop(a.y, b.z, a.z, b.y), dop(a.z, b.x, a.x, b.z), dop(a.x, b.y, a.y, b.x))
 }
@@ -33,8 +33,8 @@ fn two_sum(a: f64, b: f64) -> (f64, f64) {
     (sum, (a - (sum - b_part)) + (b - b_part))
 }
 
-/// The mixed product `a · (b × c)`: the determinant of the matrix with these columns (or rows), the volume of their
-/// parallelepiped. It keeps its value when the three move on in a circle, and changes sign when two are swapped.
+/// The triple product `a · (b × c)`: the determinant of the matrix with these columns (or rows), the volume of
+/// their parallelepiped. Invariant under cyclic permutation; changes sign when two are swapped.
 pub fn mixed_product(a: DVec3, b: DVec3, c: DVec3) -> f64 {
     dot(a, cross(b, c))
 }
@@ -49,7 +49,7 @@ pub fn length(a: DVec3) -> f64 {
     a.x.hypot(a.y).hypot(a.z)
 }
 
-/// `a` with length 1; `None` for zero and for what is not finite. Vectors of any length keep their digits.
+/// `a` with length 1; `None` for zero and for what is not finite. Accurate for any length.
 pub fn unit(a: DVec3) -> Option<DVec3> {
     let scaled = a / a.abs().max_element();
     let unit = scaled / scaled.length();
@@ -58,28 +58,28 @@ pub fn unit(a: DVec3) -> Option<DVec3> {
 
 /// The angle between two vectors in radians, in `[0, π]`; 0 when one is zero.
 ///
-/// From both the sine and the cosine: the arc cosine of the dot product alone is blind to angles under 1e-8.
+/// From both the sine and the cosine: the arc cosine of the dot product alone cannot resolve angles under 1e-8.
 pub fn angle(a: DVec3, b: DVec3) -> f64 {
     length(cross(a, b)).atan2(dot(a, b))
 }
 
-/// The signed length of `b` along `a`: negative when the angle is obtuse. Not finite for `a` zero.
+/// The signed length of `b` along `a`: negative when the angle is obtuse. Not finite if `a` is zero.
 pub fn projected_length(a: DVec3, b: DVec3) -> f64 {
     dot(a, b) / length(a)
 }
 
-/// The part of `b` that is parallel to `a`. Not finite for `a` zero.
+/// The part of `b` that is parallel to `a`. Not finite if `a` is zero.
 pub fn project(a: DVec3, b: DVec3) -> DVec3 {
     (dot(a, b) / a.length_squared()) * a
 }
 
-/// The part of `b` that is perpendicular to `a`. Not finite for `a` zero.
+/// The part of `b` that is perpendicular to `a`. Not finite if `a` is zero.
 pub fn reject(a: DVec3, b: DVec3) -> DVec3 {
     // a × (b × a) / |a|²: no difference of nearly equal vectors when b is nearly parallel to a.
     cross(a, cross(b, a)) / a.length_squared()
 }
 
-/// A vector perpendicular to `a`, at least `√⅔` times as long; zero only for `a` zero.
+/// A vector perpendicular to `a`, at least `√⅔` times as long; zero only if `a` is zero.
 pub fn perpendicular(a: DVec3) -> DVec3 {
     let size = a.abs();
     // The product with the axis of the smallest component, which is far from parallel.

@@ -1,11 +1,11 @@
-//! Where an observer stands and looks: the look-at frame of either hand, and the rays through its picture.
+//! Look-at frames of either handedness, and the rays of a camera.
 
 use glam::{DVec2, DVec3};
 
 use crate::frame::Frame;
 use crate::transform::{Transform, sin_cos_degrees};
 
-/// How the axes of a camera are drawn: x right, y up, and z towards the observer or away.
+/// The handedness of camera axes: x right, y up, and z towards the viewer or away.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Handedness {
     /// z points at the observer; the camera looks along -z. As in OpenGL and glTF.
@@ -16,19 +16,19 @@ pub enum Handedness {
     Left,
 }
 
-/// An observer: the place of the eye and the frame of the camera.
+/// A viewpoint with a camera frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
-    /// The origin of the camera.
+    /// The position of the camera.
     pub eye: DVec3,
-    /// x to the right of the picture, y up, z as the handedness says.
+    /// x to the right of the picture, y up, z according to the handedness.
     pub frame: Frame,
-    /// Which way z points.
+    /// The direction of z.
     pub handedness: Handedness,
 }
 
 impl View {
-    /// The view from `eye` to `target` with `up` as near to upwards as it can be. `None` when the eye is at the target,
+    /// The view from `eye` to `target` with `up` as upright as possible. `None` when the eye is at the target,
     /// when `up` is parallel to the view, or when something is not finite.
     pub fn look_at(eye: DVec3, target: DVec3, up: DVec3, handedness: Handedness) -> Option<Self> {
         let z = match handedness {
@@ -39,7 +39,7 @@ impl View {
         eye.is_finite().then_some(Self { eye, frame, handedness })
     }
 
-    /// The unit direction of the view.
+    /// The unit direction of view.
     pub fn forward(&self) -> DVec3 {
         match self.handedness {
             Handedness::Right => -self.frame.z,
@@ -47,7 +47,7 @@ impl View {
         }
     }
 
-    /// The map from world to camera coordinates: first moves the eye to the origin, then turns.
+    /// The map from world to camera coordinates: translates the eye to the origin, then rotates.
     pub fn camera_from_world(&self) -> Transform {
         Transform::from_frame(self.eye, &self.frame).inverse()
     }
@@ -55,17 +55,16 @@ impl View {
     /// The direction from the eye through a point of the picture, with depth 1: the parameter of the ray is the
     /// distance along the view.
     ///
-    /// `fovy` is the full vertical opening in degrees; `film` is in pixels from the upper left corner, the centre of
-    /// pixel (0, 0) at (½, ½).
+    /// `fovy` is the full vertical field of view in degrees; `film` is in pixels from the upper left corner,
+    /// the centre of pixel (0, 0) at (½, ½).
     pub fn perspective_direction(&self, fovy: f64, size: DVec2, film: DVec2) -> DVec3 {
         let (sin, cos) = sin_cos_degrees(0.5 * fovy);
         let slope = (sin / cos) * DVec2::new(size.x / size.y, 1.0) * centred(size, film);
         self.forward() + slope.x * self.frame.x + slope.y * self.frame.y
     }
 
-    /// The direction from the eye through a point of a picture on a cylinder about the upwards axis, unrolled: across
-    /// the picture the view turns by `degrees`, to the right and evenly; along it, depth 1 rises by the height that
-    /// makes pixels square.
+    /// The direction from the eye through a point of a cylindrical picture, unrolled: across the picture the
+    /// view turns evenly by `degrees` to the right; upwards, the slope grows so that pixels are square.
     pub fn cylindrical_direction(&self, degrees: f64, size: DVec2, film: DVec2) -> DVec3 {
         let place = centred(size, film);
         let (sin, cos) = sin_cos_degrees(0.5 * degrees * place.x);
@@ -73,8 +72,9 @@ impl View {
         cos * self.forward() + sin * self.frame.x + height * self.frame.y
     }
 
-    /// The origin of the ray, parallel to [`View::forward`], through a point of the picture in parallel projection.
-    /// `half` is half the width and half the height of the picture in the world; `size` and `film` are in pixels.
+    /// The origin of the ray, parallel to [`View::forward`], through a point of the picture in orthographic
+    /// projection. `half` is half the width and height of the picture in the world; `size` and `film` are in
+    /// pixels.
     pub fn orthographic_origin(&self, half: DVec2, size: DVec2, film: DVec2) -> DVec3 {
         let place = half * centred(size, film);
         self.eye + place.x * self.frame.x + place.y * self.frame.y

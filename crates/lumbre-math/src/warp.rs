@@ -34,10 +34,11 @@ macro_rules! warps {
 
         use glam::{$v2, $v3};
 
-        /// The point of the unit disk for a point of the unit square, of equal areas and little distortion: squares
-        /// about the middle become circles.
+        /// Maps the unit square to the unit disk, preserving area with little distortion: squares about the
+        /// middle become circles.
         ///
-        /// Source: Shirley, Chiu, "A Low Distortion Map Between Disk and Square", Journal of Graphics Tools 2(3), 1997.
+        /// Source: Shirley, Chiu, "A Low Distortion Map Between Disk and Square", Journal of Graphics Tools
+        /// 2(3), 1997.
         pub fn square_to_disk(u: $v2) -> $v2 {
             let p = 2.0 * u - $v2::ONE;
             if p == $v2::ZERO {
@@ -53,7 +54,7 @@ macro_rules! warps {
             }
         }
 
-        /// The point of the square that [`square_to_disk`] takes to `p`.
+        /// The inverse of [`square_to_disk`].
         pub fn disk_to_square(p: $v2) -> $v2 {
             let radius = p.length();
             let square = if p.x.abs() > p.y.abs() {
@@ -73,13 +74,14 @@ macro_rules! warps {
             FRAC_1_PI
         }
 
-        /// A direction of the upper hemisphere with a density proportional to its cosine: the disk, projected up.
+        /// A direction of the upper hemisphere with a density proportional to its cosine: the disk, projected
+        /// up.
         pub fn square_to_cosine_hemisphere(u: $v2) -> $v3 {
             let p = square_to_disk(u);
             p.extend((1.0 - p.length_squared()).max(0.0).sqrt())
         }
 
-        /// The point of the square that [`square_to_cosine_hemisphere`] takes to the unit vector `w`, `w.z ≥ 0`.
+        /// The inverse of [`square_to_cosine_hemisphere`], for a unit vector with `w.z ≥ 0`.
         pub fn cosine_hemisphere_to_square(w: $v3) -> $v2 {
             disk_to_square(w.truncate())
         }
@@ -89,14 +91,14 @@ macro_rules! warps {
             cos_theta.max(0.0) * FRAC_1_PI
         }
 
-        /// A direction of the upper hemisphere, all alike: the disk, lifted by Lambert's equal-area map.
+        /// A uniform direction of the upper hemisphere: the disk under Lambert's equal-area map.
         pub fn square_to_hemisphere(u: $v2) -> $v3 {
             let p = square_to_disk(u);
             let square = p.length_squared().min(1.0);
             (p * (2.0 - square).sqrt()).extend(1.0 - square)
         }
 
-        /// The point of the square that [`square_to_hemisphere`] takes to the unit vector `w`, `w.z ≥ 0`.
+        /// The inverse of [`square_to_hemisphere`], for a unit vector with `w.z ≥ 0`.
         pub fn hemisphere_to_square(w: $v3) -> $v2 {
             disk_to_square(w.truncate() / (1.0 + w.z).sqrt())
         }
@@ -106,15 +108,16 @@ macro_rules! warps {
             1.0 / TAU
         }
 
-        /// A direction, all alike. `u.x` gives the height (0 is the pole +z), `u.y` the turn about z from x to y.
+        /// A uniform direction of the sphere. `u.x` gives the height (0 is the pole +z), `u.y` the azimuth from
+        /// x to y.
         pub fn square_to_sphere(u: $v2) -> $v3 {
             let (sin, cos) = (TAU * u.y).sin_cos();
-            // √(1 - z²) without cancellation next to the poles.
+            // √(1 - z²) without cancellation near the poles.
             let radius = 2.0 * (u.x * (1.0 - u.x)).max(0.0).sqrt();
             $v3::new(radius * cos, radius * sin, 1.0 - 2.0 * u.x)
         }
 
-        /// The point of the square that [`square_to_sphere`] takes to the unit vector `w`.
+        /// The inverse of [`square_to_sphere`].
         pub fn sphere_to_square(w: $v3) -> $v2 {
             let height = if w.z > 0.0 { 0.5 * one_minus_z(w) } else { 0.5 * (1.0 - w.z) };
             $v2::new(height.min(1.0), turn(w))
@@ -125,8 +128,8 @@ macro_rules! warps {
             1.0 / (2.0 * TAU)
         }
 
-        /// A direction of the cone about z, all alike. The cone is given by `1 - cos θ` of its half-angle θ, in
-        /// `(0, 2]`: for a narrow one compute that as `sin² θ / (1 + cos θ)`, as the cosine itself would lose it.
+        /// A uniform direction of the cone about z. The cone is given by `1 - cos θ` of its half-angle θ, in
+        /// `(0, 2]`; for a narrow cone compute that as `sin² θ / (1 + cos θ)`, to avoid cancellation.
         pub fn square_to_cone(u: $v2, one_minus_cos_max: $scalar) -> $v3 {
             let p = square_to_disk(u);
             let square = p.length_squared().min(1.0);
@@ -134,7 +137,7 @@ macro_rules! warps {
             (p * (one_minus_cos_max * (2.0 - lowered)).max(0.0).sqrt()).extend(1.0 - lowered)
         }
 
-        /// The point of the square that [`square_to_cone`] takes to the unit vector `w` of the cone.
+        /// The inverse of [`square_to_cone`], for a unit vector in the cone.
         pub fn cone_to_square(w: $v3, one_minus_cos_max: $scalar) -> $v2 {
             let lowered = if w.z > 0.0 { one_minus_z(w) } else { 1.0 - w.z };
             let radius = (lowered / one_minus_cos_max).sqrt();
@@ -147,7 +150,7 @@ macro_rules! warps {
             1.0 / (TAU * one_minus_cos_max)
         }
 
-        /// Barycentric coordinates of a point of a triangle, all alike, of little distortion and continuous.
+        /// Barycentric coordinates of a uniform point of a triangle, continuous and of little distortion.
         ///
         /// Source: Heitz, "A Low-Distortion Map Between Triangle and Square", 2019.
         pub fn square_to_triangle(u: $v2) -> $v3 {
@@ -161,13 +164,13 @@ macro_rules! warps {
             $v3::new((1.0 - b.x - b.y).max(0.0), b.x, b.y)
         }
 
-        /// The point of the square that [`square_to_triangle`] takes to these barycentric coordinates.
+        /// The inverse of [`square_to_triangle`].
         pub fn triangle_to_square(b: $v3) -> $v2 {
             if b.z > b.y { $v2::new(2.0 * b.y, b.y + b.z) } else { $v2::new(b.y + b.z, 2.0 * b.z) }
         }
 
-        /// Barycentric coordinates of a point of a triangle, all alike, by the square root; it squeezes the square into
-        /// one corner.
+        /// Barycentric coordinates of a uniform point of a triangle, by the square root; it squeezes the square
+        /// into one corner.
         ///
         /// Source: Turk, "Generating Random Points in Triangles", Graphics Gems, 1990.
         pub fn square_to_triangle_turk(u: $v2) -> $v3 {
@@ -175,19 +178,19 @@ macro_rules! warps {
             $v3::new(1.0 - root, root * (1.0 - u.y), root * u.y)
         }
 
-        /// The direction for a point of the unit square, of equal areas: the inner square |x|+|y| ≤ 1 (of the square
-        /// scaled to [-1, 1]²) is the upper hemisphere, its corners the axes ±x, ±y; the four outer triangles fold
-        /// under it and meet at -z. Continuous across the edges of the square by [`equal_area_wrap`].
+        /// Maps the unit square to the sphere, preserving area: the inner square |x|+|y| ≤ 1 (of the square
+        /// scaled to [-1, 1]²) is the upper hemisphere, its corners the axes ±x, ±y; the four outer triangles
+        /// fold under it and meet at -z. It is continuous across the edges of the square by
+        /// [`equal_area_wrap`].
         ///
-        /// It decides where the pixels of an octahedral environment picture lie.
-        /// Source: Clarberg, "Fast Equal-Area Mapping of the (Hemi)Sphere using SIMD", Journal of Graphics Tools 13(3),
-        /// 2008.
+        /// This is the mapping of octahedral environment maps. Source: Clarberg, "Fast Equal-Area Mapping of
+        /// the (Hemi)Sphere using SIMD", Journal of Graphics Tools 13(3), 2008.
         pub fn equal_area_square_to_sphere(u: $v2) -> $v3 {
             let p = 2.0 * u - $v2::ONE;
             let (x, y) = (p.x.abs(), p.y.abs());
-            // Positive on the upper hemisphere; the distance from the nearer pole is what it lacks to 1.
+            // Positive on the upper hemisphere; 1 minus its magnitude is the distance from the nearer pole.
             let signed = 1.0 - (x + y);
-            // Above, `x + y` itself: `1 - (1 - (x + y))` would round once more next to the pole.
+            // Above, `x + y` itself: `1 - (1 - (x + y))` would round once more near the pole.
             let radius = if signed >= 0.0 { x + y } else { (1.0 - x) + (1.0 - y) };
             if radius == 0.0 {
                 return $v3::new(0.0, 0.0, (1.0 as $scalar).copysign(signed));
@@ -203,22 +206,22 @@ macro_rules! warps {
             )
         }
 
-        /// The point of the square that [`equal_area_square_to_sphere`] takes to the unit vector `w`.
+        /// The inverse of [`equal_area_square_to_sphere`].
         pub fn equal_area_sphere_to_square(w: $v3) -> $v2 {
             let a = w.abs();
-            // √(1 - |z|) without cancellation next to the poles.
+            // √(1 - |z|) without cancellation near the poles.
             let radius = one_minus_z(a).max(0.0).sqrt().min(1.0);
-            // The turn within a quadrant, in [0, 1]; atan2(0, 0) is 0.
+            // The azimuth within a quadrant, in [0, 1]; atan2(0, 0) is 0.
             let y = radius * (a.y.atan2(a.x) / FRAC_PI_2);
             let x = radius - y;
-            // `is_sign_negative`, for the horizon belongs to both and either side gives the same point there.
+            // By `is_sign_negative`: the horizon belongs to both halves, and either gives the same point there.
             let (x, y) = if w.z.is_sign_negative() { (1.0 - y, 1.0 - x) } else { (x, y) };
             let p = $v2::new(x.copysign(w.x), y.copysign(w.y));
             0.5 * (p + $v2::ONE)
         }
 
-        /// The point of the unit square that a point up to one square outside it stands for, for filtering across the
-        /// edges of an equal-area picture: each edge meets itself, mirrored about its middle.
+        /// Wraps a point up to one square outside the unit square, for filtering across the edges of an
+        /// equal-area map: each edge meets itself, mirrored about its middle.
         pub fn equal_area_wrap(u: $v2) -> $v2 {
             let mut p = u;
             if p.x < 0.0 {
@@ -241,13 +244,13 @@ macro_rules! warps {
             $v3::new(sin_theta * cos_phi, sin_theta * sin_phi, cos_theta)
         }
 
-        /// The point of the square that [`latlong_to_sphere`] takes to the unit vector `w`.
+        /// The inverse of [`latlong_to_sphere`].
         pub fn sphere_to_latlong(w: $v3) -> $v2 {
             $v2::new(turn(w), w.truncate().length().atan2(w.z) * FRAC_1_PI)
         }
 
-        /// The density of [`latlong_to_sphere`] per solid angle, at a direction with this sine of its angle from z.
-        /// It is infinite at the poles.
+        /// The density of [`latlong_to_sphere`] per solid angle, at a direction with this sine of its angle
+        /// from z. Infinite at the poles.
         pub fn latlong_pdf(sin_theta: $scalar) -> $scalar {
             1.0 / (TAU * PI * sin_theta)
         }

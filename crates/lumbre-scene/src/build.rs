@@ -20,14 +20,14 @@ use crate::{
     stage, studio,
 };
 
-/// How deep objects may hold objects.
+/// The maximal depth of nested objects.
 const MAX_NESTING: usize = 64;
 
 impl Scene {
-    /// Resolves a description: one tree over everything, lights ready to be sampled. A description without cameras gets
-    /// one that sees all of it, one without any light what [`SceneDesc::without_light`] says.
+    /// Resolves a description: one tree of everything, and lights ready for sampling. A description without
+    /// cameras gets one that frames everything, one without any light what [`SceneDesc::without_light`]
+    /// specifies.
     ///
-    /// # Errors
     /// [`BuildError`], naming the shape, camera or light at fault.
     pub fn build(mut desc: SceneDesc) -> Result<Self, BuildError> {
         if stage::wants_studio(&desc) {
@@ -116,20 +116,20 @@ impl Scene {
     }
 }
 
-/// Where the shapes of a tree stand, as far as their light is concerned.
+/// The placement of a tree's shapes, as far as their light is concerned.
 #[derive(Clone, Debug)]
 enum Standing {
     /// In the world itself.
     World,
-    /// In an object that stands in the world once, here.
+    /// In an object that is placed once in the world, here.
     Once(Placement),
-    /// In an object that stands anywhere else, or in many places.
+    /// In an object with several placements, or one inside another object.
     Anywhere,
 }
 
 impl Standing {
-    /// By how much areas grow from the tree to the world: exactly where it is stretched alike in all directions, else in
-    /// the mean, about; where it moves, at the first key.
+    /// The factor of areas from the tree to the world: exact for similarities, else an approximate mean; for a
+    /// moving object, at the first key.
     fn area_factor(&self) -> f64 {
         let Self::Once(placement) = self else { return 1.0 };
         let first = extent::places(placement)[0];
@@ -137,7 +137,7 @@ impl Standing {
     }
 }
 
-/// What grows while trees are built.
+/// The state of building trees.
 #[derive(Default)]
 pub(crate) struct Builder {
     pub materials: Vec<Arc<Material>>,
@@ -147,7 +147,7 @@ pub(crate) struct Builder {
 }
 
 impl Builder {
-    /// The trees of all objects, those inside others first. `in_world` are all that stand in the world.
+    /// The trees of all objects, nested ones first. `in_world` are the instances in the world.
     fn objects(
         &mut self,
         objects: Vec<ObjectDesc>,
@@ -179,7 +179,7 @@ impl Builder {
         Ok(trees.into_iter().flatten().collect())
     }
 
-    /// The tree of the world, whose instances name any of the objects.
+    /// The tree of the world, whose instances refer to the objects.
     fn tree(
         &mut self,
         shapes: Vec<ShapeDesc>,
@@ -309,8 +309,8 @@ impl Builder {
     ) -> Result<(), BuildError> {
         let shape = entry.shape;
         let baked = mesh::bake(shape, desc, placement, origin, order)?;
-        let dress = baked.dress;
-        let mesh = dress.mesh.clone();
+        let attributes = baked.attributes;
+        let mesh = attributes.mesh.clone();
         let corner = |i: u32| mesh.origin + mesh.positions[i as usize].as_dvec3();
         let patches = baked.patches.iter().map(|corners| {
             let [p00, p10, p01, p11] = corners.map(corner);
@@ -320,7 +320,7 @@ impl Builder {
         });
         let patches = patches.collect::<Result<Vec<_>, _>>()?;
 
-        // The entry of the triangles comes first, if there are any; its light knows the area of all of them.
+        // The entry of the triangles comes first, if there are any; its light has the area of all of them.
         let first = self.entries.len() as u32;
         let light = area_light.as_ref().and_then(|_| MeshLight::new(first, &mesh));
         let emission = area_light.map(|light_desc| {
@@ -330,9 +330,9 @@ impl Builder {
             })
         });
         if !mesh.indices.is_empty() {
-            let form = Form::Mesh(dress.clone());
+            let form = Form::Mesh(attributes.clone());
             let entry = SurfaceEntry { emission: emission.clone(), form, ..entry.clone() };
-            match &dress.moving {
+            match &attributes.moving {
                 None => {
                     let id = self.push(entry, geometries, GeometryKind::Mesh(mesh.clone()))?;
                     self.mesh_light(id, light, standing);
@@ -345,7 +345,7 @@ impl Builder {
         }
         let triangle_count = mesh.indices.len() as u32;
         for ((i, placed), &corners) in (0..).zip(patches).zip(&baked.patches) {
-            let form = Form::Patch { dress: dress.clone(), corners, primitive: triangle_count + i };
+            let form = Form::Patch { attributes: attributes.clone(), corners, primitive: triangle_count + i };
             let entry = SurfaceEntry { emission: emission.clone(), form, ..entry.clone() };
             let id = self.push(entry, geometries, GeometryKind::Shape(placed.clone()))?;
             self.shape_light(id, placed, standing);
@@ -353,7 +353,7 @@ impl Builder {
         Ok(())
     }
 
-    /// What a shape is made of, without its form and its light.
+    /// The material and properties of a shape, without its geometry and its light.
     pub(crate) fn entry(&self, desc: &ShapeDesc) -> Result<SurfaceEntry, BuildError> {
         let material = match desc.material {
             None => None,
@@ -379,7 +379,7 @@ impl Builder {
         })
     }
 
-    /// The area light of a shape, unless there is nothing for it to shine from.
+    /// The area light of a shape, unless it has no surface that could emit.
     pub(crate) fn wanted_light(&mut self, desc: &ShapeDesc, entry: &SurfaceEntry) -> Option<AreaLightDesc> {
         let light = desc.area_light.clone()?;
         if !entry.is_visible() {
@@ -440,7 +440,7 @@ impl Builder {
             LightDesc::Moving { light, world_from_light } => {
                 let before = self.lights.len();
                 self.light(position, *light)?;
-                // One that gives no light was left out.
+                // A light that does not emit was dropped.
                 let Some(light) = self.lights.drain(before..).next() else { return Ok(()) };
                 let moving = MovingLight::new(light, world_from_light);
                 Light::Moving(moving.ok_or(wrong("it is infinite and moves, or its motion stretches it"))?)
@@ -500,7 +500,7 @@ impl Builder {
     }
 }
 
-/// An area light's emission, its power turned into radiance.
+/// The emission of an area light, with its power converted to radiance.
 pub(crate) fn emission(desc: AreaLightDesc, area: impl FnOnce() -> f64) -> Emission {
     let AreaLightDesc { radiance, image, by_vertices, two_sided, power } = desc;
     let mut emission = Emission { radiance, image, by_vertices, two_sided };
@@ -514,7 +514,7 @@ pub(crate) fn emission(desc: AreaLightDesc, area: impl FnOnce() -> f64) -> Emiss
     emission
 }
 
-/// The order in which objects are built so that what is inside another is there before it.
+/// An order of building objects in which nested ones come first.
 pub(crate) fn inside_out(objects: &[ObjectDesc]) -> Result<Vec<usize>, BuildError> {
     #[derive(Clone, Copy, PartialEq)]
     enum Mark {
@@ -525,7 +525,7 @@ pub(crate) fn inside_out(objects: &[ObjectDesc]) -> Result<Vec<usize>, BuildErro
     let mut marks = vec![Mark::New; objects.len()];
     let mut order = Vec::with_capacity(objects.len());
     for start in 0..objects.len() {
-        // The objects being looked into, and how far each is.
+        // The objects being visited, with the position in each.
         let mut open = vec![(start, 0)];
         if marks[start] != Mark::New {
             continue;
@@ -567,8 +567,9 @@ pub(crate) fn inside_out(objects: &[ObjectDesc]) -> Result<Vec<usize>, BuildErro
     Ok(order)
 }
 
-/// A place near all meshes and exact shapes, about which single precision is fine enough: the origin itself where that is near, else a
-/// multiple of a power of two, so that a scene moved as a whole keeps its vertices to within their own rounding.
+/// An origin near all meshes and exact shapes, relative to which single precision suffices: zero where that is
+/// near enough, else a multiple of a power of two, so that translating a whole scene changes its vertices by no
+/// more than their rounding.
 fn origin(shapes: &[ShapeDesc], instances: &[InstanceDesc], accels: &[Arc<Accel>]) -> DVec3 {
     let mut bounds = Aabb::EMPTY;
     for shape in shapes {
@@ -590,13 +591,13 @@ fn origin(shapes: &[ShapeDesc], instances: &[InstanceDesc], accels: &[Arc<Accel>
     near(&bounds)
 }
 
-/// The box around a mesh, moved.
+/// The bounding box of a mesh under a transform.
 pub(crate) fn mesh_bounds(mesh: &MeshDesc, placement: &Transform) -> Aabb {
     let corners = mesh.positions.iter().filter(|p| p.is_finite());
     moved(&Aabb::around(corners.map(|p| p.as_dvec3())), placement)
 }
 
-/// The origin for what fills a box: see [`origin`].
+/// The origin for a bounding box: see [`origin`].
 pub(crate) fn near(bounds: &Aabb) -> DVec3 {
     let size = bounds.size().max_element();
     if bounds.is_empty() || !size.is_finite() || size <= 0.0 {
@@ -610,7 +611,7 @@ fn finite_or_zero(p: DVec3) -> DVec3 {
     if p.is_finite() { p } else { DVec3::ZERO }
 }
 
-/// The box around a moved box.
+/// The bounding box of a box under a transform.
 pub(crate) fn moved(bounds: &Aabb, placement: &Transform) -> Aabb {
     if bounds.is_empty() {
         return *bounds;

@@ -9,7 +9,7 @@ use lumbre_math::{AnimatedTransform, DVec2, DVec3, Transform};
 
 use crate::Footprint;
 
-/// How the sphere of directions fills the picture of a spherical camera.
+/// The mapping of directions to the picture of a spherical camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SphericalMapping {
     /// Equal areas (Clarberg 2008).
@@ -24,49 +24,49 @@ pub enum SphericalMapping {
 pub enum CameraKind {
     /// A pinhole or a thin lens.
     Perspective {
-        /// Full angle in degrees along the shorter side of the picture.
+        /// Full field of view in degrees along the shorter side of the picture.
         fov: f64,
         /// 0 for a pinhole.
         lens_radius: f64,
-        /// Distance of the plane in focus along z.
+        /// Distance of the focal plane along z.
         focal_distance: f64,
     },
-    /// Parallel rays.
+    /// An orthographic camera.
     Orthographic {
         /// 0 for no lens.
         lens_radius: f64,
-        /// Distance of the plane in focus along z.
+        /// Distance of the focal plane along z.
         focal_distance: f64,
     },
     /// All directions at once.
     Spherical {
-        /// Where each direction falls.
+        /// The mapping of directions.
         mapping: SphericalMapping,
     },
 }
 
-/// Where the picture is taken from.
+/// A camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Camera {
-    /// Its name, where the file gives one.
+    /// Its name, if the file gives one.
     pub name: Option<String>,
     /// Its kind.
     pub kind: CameraKind,
-    /// Where it stands; where it moves, its place when the shutter opens.
+    /// Its placement; if it moves, the one when the shutter opens.
     pub world_from_camera: Transform,
-    /// How it moves while the shutter is open, if it does.
+    /// Its motion while the shutter is open, if it moves.
     pub motion: Option<Arc<AnimatedTransform>>,
-    /// Width over height of the picture, where it is not that of its pixels.
+    /// The aspect ratio, width over height, if it is not that of the pixels.
     pub frame_aspect: Option<f64>,
-    /// Window on the screen (x min, x max, y min, y max), where it is not the default: [-1, 1] along the shorter side.
+    /// The screen window (x min, x max, y min, y max); default [-1, 1] along the shorter side.
     pub screen_window: Option<[f64; 4]>,
-    /// When the shutter opens, in the unit in which everything moves.
+    /// The time when the shutter opens, in the units of animation keys.
     pub shutter_open: f64,
-    /// When it closes; not before it opens.
+    /// The time when it closes; not before it opens.
     pub shutter_close: f64,
 }
 
-/// A ray from the camera, and how far apart its neighbours are.
+/// A camera ray with its footprint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CameraRay {
     /// The ray; its direction is unit.
@@ -75,9 +75,10 @@ pub struct CameraRay {
     pub footprint: Footprint,
 }
 
-/// A camera before a picture of a certain size: it knows the ray of every point of the film.
+/// A camera with a picture size, which gives the ray for every point of the film.
 ///
-/// Points of the film are in pixels, (0, 0) at the upper left corner of the upper left pixel, whose middle is (½, ½).
+/// Points of the film are in pixels: (0, 0) is the upper left corner of the upper left pixel, whose centre is
+/// (½, ½).
 #[derive(Clone, Debug)]
 pub struct View {
     kind: CameraKind,
@@ -85,14 +86,14 @@ pub struct View {
     motion: Option<Arc<AnimatedTransform>>,
     shutter_open: f64,
     shutter_close: f64,
-    // Where (0, 0) of the film lies on the screen, and how far a pixel goes there. For a perspective camera the screen
-    // stands at z = 1, for a spherical one it is the unit square.
+    // The screen position of the film's (0, 0), and the size of a pixel on the screen. The screen of a
+    // perspective camera is at z = 1, that of a spherical one is the unit square.
     corner: DVec2,
     step: DVec2,
 }
 
 impl View {
-    /// `camera` before a picture of `width` × `height` pixels, both at least 1.
+    /// `camera` with a picture of `width` × `height` pixels, both at least 1.
     pub fn new(camera: &Camera, width: u32, height: u32) -> Self {
         let pixels = DVec2::new(f64::from(width.max(1)), f64::from(height.max(1)));
         let aspect = camera.frame_aspect.unwrap_or(pixels.x / pixels.y);
@@ -117,7 +118,7 @@ impl View {
         }
     }
 
-    /// The time at which this part of the exposure is over: 0 when the shutter opens, 1 when it closes.
+    /// The time at a fraction of the exposure: 0 is when the shutter opens, 1 when it closes.
     pub fn time(&self, part: f64) -> f64 {
         self.shutter_open + part * (self.shutter_close - self.shutter_open)
     }
@@ -127,8 +128,8 @@ impl View {
         self.motion.is_some()
     }
 
-    /// The ray through a point of the film and a point of the lens (two uniform numbers) at a time, with the rays through
-    /// the points `spacing` pixels to the right and below as its footprint.
+    /// The ray at a time through a point of the film and a point of the lens (two uniform numbers). Its
+    /// footprint is given by the rays `spacing` pixels to the right and below.
     pub fn ray(&self, film: DVec2, lens: DVec2, time: f64, spacing: f64) -> CameraRay {
         let placement = self.placement(time);
         let line = |film| self.line(&placement, film, lens);
@@ -141,7 +142,8 @@ impl View {
         }
     }
 
-    /// How far a point of the world is along the camera's axis at a time; for a spherical camera, from its place.
+    /// The depth of a world-space point along the camera's axis at a time; for a spherical camera, the
+    /// distance.
     pub fn depth(&self, point: DVec3, time: f64) -> f64 {
         let placement = self.placement(time);
         let local = placement.inverse_point(point);
@@ -158,7 +160,7 @@ impl View {
         }
     }
 
-    /// Origin and unit direction in the world.
+    /// The world-space origin and unit direction.
     fn line(&self, placement: &Transform, film: DVec2, lens: DVec2) -> (DVec3, DVec3) {
         let on_screen = self.corner + self.step * film;
         let (origin, direction) = match self.kind {
@@ -183,8 +185,8 @@ impl View {
     }
 }
 
-/// The line from a point of the lens to where the line through the middle of the lens meets the plane in focus.
-/// `towards.z` is 1.
+/// The line from a point of the lens to the intersection of the line through the lens's centre with the focal
+/// plane. `towards.z` is 1.
 fn through_lens(
     center: DVec3,
     towards: DVec3,

@@ -1,4 +1,4 @@
-//! Combinations of solids, each surface with its own material.
+//! CSG whose surfaces keep their own materials.
 
 use std::sync::Arc;
 
@@ -11,10 +11,10 @@ use crate::solid::MeshSolid;
 use crate::surface::{ColourRamp, Form, SurfaceEntry};
 use crate::{BuildError, CsgDesc, CsgOperation, GeometryDesc, ShapeDesc, mesh};
 
-/// How deep combinations may hold combinations: as deep as geometry nests them.
+/// The maximal nesting depth, that of the geometry.
 const MAX_NESTING: usize = 60;
 
-/// A CSG, and the surface of each of its leaves.
+/// A CSG with the surface entry of each leaf.
 #[derive(Clone, Debug)]
 pub(crate) struct CsgForm {
     pub csg: Csg,
@@ -23,17 +23,16 @@ pub(crate) struct CsgForm {
 }
 
 impl CsgForm {
-    /// Whose surface a root lies on.
+    /// The leaf that a root lies on.
     pub(crate) fn leaf(&self, root: &lumbre_geometry::Root) -> Option<(&SurfaceEntry, LeafPart)> {
         let part = self.csg.leaf_of(root)?;
         Some((self.leaves.get(part.leaf)?, part))
     }
 }
 
-/// Resolves a combination in the space of its tree. What the materials of its parts are, `builder` knows.
+/// Resolves a CSG in the space of its tree. `builder` provides the materials.
 ///
-/// # Errors
-/// [`BuildError::Csg`], naming the part at fault, and what [`crate::mesh::bake`] finds wrong with a mesh.
+/// [`BuildError::Csg`], naming the part at fault, and the errors of [`crate::mesh::bake`].
 pub(crate) fn build(
     builder: &mut Builder,
     shape: u32,
@@ -84,7 +83,7 @@ fn combine(
     combined.map_err(|e| wrong(e.to_string()))
 }
 
-/// One shape of an operand. Its surfaces join `leaves` in the order in which geometry counts them.
+/// One shape of an operand. Its surfaces are appended to `leaves` in the geometry's order.
 fn solid(
     builder: &mut Builder,
     desc: ShapeDesc,
@@ -121,8 +120,8 @@ fn solid(
             if !baked.patches.is_empty() {
                 return Err(wrong("a mesh in a csg must have flat faces".to_owned()));
             }
-            let solid = MeshSolid::new(baked.dress.mesh.clone()).map_err(|e| wrong(e.to_string()))?;
-            leaves.push(SurfaceEntry { form: Form::Mesh(baked.dress), ..entry });
+            let solid = MeshSolid::new(baked.attributes.mesh.clone()).map_err(|e| wrong(e.to_string()))?;
+            leaves.push(SurfaceEntry { form: Form::Mesh(baked.attributes), ..entry });
             Csg::solid(Arc::new(solid)).map_err(|e| wrong(e.to_string()))
         }
         GeometryDesc::BilinearMesh(_) => Err(wrong("a bilinear mesh is no solid".to_owned())),
@@ -133,7 +132,7 @@ fn solid(
     }
 }
 
-/// The exact shape that a form is, for the tree.
+/// The exact shape of a CSG, for the tree.
 pub(crate) fn shape_of(form: &CsgForm) -> PlacedShape {
     PlacedShape::new(Shape::from(form.csg.clone()), Transform::IDENTITY)
 }

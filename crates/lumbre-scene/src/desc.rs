@@ -1,4 +1,4 @@
-//! A scene as a reader describes it: plain data, no files, nothing resolved.
+//! Scene descriptions: plain data from a reader, without files, not resolved.
 
 use std::sync::Arc;
 
@@ -10,10 +10,10 @@ use lumbre_shading::{FURTHER_SETS, FloatTexture, Material, MipMap};
 
 use crate::{Camera, MaterialId, ObjectId};
 
-/// Everything that a scene file says.
+/// A scene description.
 #[derive(Clone, Debug, Default)]
 pub struct SceneDesc {
-    /// Cameras, the one to use first; none asks for an automatic one.
+    /// Cameras, the default first; if empty, an automatic one is used.
     pub cameras: Vec<Camera>,
     /// The picture's size, crop and exposure.
     pub film: FilmDesc,
@@ -23,51 +23,51 @@ pub struct SceneDesc {
     pub sampler: SamplerDesc,
     /// The integrator.
     pub integrator: IntegratorDesc,
-    /// Materials; shapes name them by position.
+    /// Materials; shapes refer to them by index.
     pub materials: Vec<NamedMaterial>,
-    /// Shapes that stand in the world, in the order of the file.
+    /// Shapes in the world, in the order of the file.
     pub shapes: Vec<ShapeDesc>,
-    /// Objects to be instanced.
+    /// Objects for instancing.
     pub objects: Vec<ObjectDesc>,
-    /// Objects placed in the world.
+    /// Instances in the world.
     pub instances: Vec<InstanceDesc>,
-    /// Lights that are not shapes.
+    /// Lights other than shapes.
     pub lights: Vec<LightDesc>,
-    /// What to do where there is no light at all, neither here nor on a shape.
+    /// The light to use if there is none at all, neither here nor on a shape.
     pub without_light: WithoutLight,
-    /// The axis that the automatic camera and the automatic light take for up.
+    /// The up axis of the automatic camera and light.
     pub up: UpAxis,
-    /// What everything stands on.
+    /// The ground plane.
     pub ground: Option<GroundDesc>,
 }
 
-/// An infinite matte plane, which nothing stands below.
+/// An infinite matte plane below everything.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GroundDesc {
     /// A point of it.
     pub point: DVec3,
-    /// Up from it, of any length but zero.
+    /// The upward normal, of any non-zero length.
     pub normal: DVec3,
-    /// What it reflects of the light that falls on it.
+    /// The reflectance.
     pub reflectance: Rgb,
-    /// Whether a camera sees of it only the shadow that falls on it, over what is behind.
+    /// Whether it is a shadow catcher: only the shadow on it is visible, over the background.
     pub catcher: bool,
 }
 
-/// What a description without any light at all is lit by.
+/// The light of a description without lights.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum WithoutLight {
-    /// A studio's light: a mesh alone is worth a picture.
+    /// Studio light, for a model alone.
     #[default]
     Studio,
-    /// A studio's light unless there are lights that are no surfaces, and a camera too: what glows in a model is seldom
-    /// meant to light it, and what has no camera is no scene.
+    /// Studio light unless there are both a camera and lights other than surfaces: emissive parts of a model
+    /// are seldom meant to light it, and a file without a camera is no complete scene.
     StudioUnlessStaged,
-    /// Nothing: whoever wrote a whole scene meant it, and it is black.
+    /// None: a complete scene without light is black.
     Dark,
 }
 
-/// Which axis points up.
+/// The up axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum UpAxis {
     /// y, as in most meshes and in glTF.
@@ -77,218 +77,218 @@ pub enum UpAxis {
     Z,
 }
 
-/// A material under its name.
+/// A material with its name.
 #[derive(Clone, Debug)]
 pub struct NamedMaterial {
-    /// Its name, where the file gives one.
+    /// The name, if the file gives one.
     pub name: Option<String>,
     /// The material.
     pub material: Arc<Material>,
 }
 
-/// A shape and what it is made of.
+/// A shape with its material.
 #[derive(Clone, Debug)]
 pub struct ShapeDesc {
-    /// Its 0-based position among all shapes of its file, by which answers name it.
+    /// Its 0-based index among all shapes of its file, which identifies it in results.
     pub index: u32,
-    /// Its form.
+    /// Its geometry.
     pub geometry: GeometryDesc,
-    /// Where it stands.
+    /// Its placement.
     pub world_from_object: Transform,
-    /// Whether the outside is the inside.
+    /// Whether inside and outside are swapped.
     pub reverse_orientation: bool,
-    /// What it is made of; `None` for an interface, which is no surface at all.
+    /// The material; `None` for an interface, which does not scatter.
     pub material: Option<MaterialId>,
-    /// The light it gives.
+    /// The light it emits.
     pub area_light: Option<AreaLightDesc>,
-    /// Coverage in [0, 1]; `None` is opaque.
+    /// Alpha in [0, 1]; `None` is opaque.
     pub alpha: Option<Arc<FloatTexture>>,
 }
 
-/// The forms of a shape.
+/// The geometry of a shape.
 #[derive(Clone, Debug)]
 pub enum GeometryDesc {
     /// One exact shape.
     Exact(Shape),
-    /// One exact shape with colours.
+    /// An exact shape with colours.
     Coloured(Box<ColouredShape>),
     /// Triangles and quads.
     Mesh(Arc<MeshDesc>),
     /// Bilinear patches (p00, p10, p01, p11 each) with shared vertices.
     BilinearMesh(Arc<MeshDesc>),
-    /// A combination of solids, each surface keeping its own material.
+    /// CSG of solids, each surface with its own material.
     Csg(CsgDesc),
 }
 
-/// An exact shape with colours like those of a mesh's vertices, which run evenly from one place to another: a line between
-/// two vertices with some thickness.
+/// An exact shape with vertex colours interpolated between two points, such as a thick line between two
+/// vertices.
 #[derive(Clone, Debug)]
 pub struct ColouredShape {
-    /// Its form.
+    /// The shape.
     pub shape: Shape,
-    /// The two places, in the space of the shape. Where they are the same, the first colour is that of the whole shape.
+    /// The two points, in the space of the shape. If they coincide, the whole shape has the first colour.
     pub ends: [DVec3; 2],
-    /// Linear colours there, and beyond.
+    /// Linear colours at the points, constant beyond.
     pub colours: [Rgb; 2],
-    /// Coverages, which go with the colours.
+    /// Alphas at the points.
     pub coverages: [f32; 2],
 }
 
-/// A combination of solids.
+/// Constructive solid geometry.
 #[derive(Clone, Debug)]
 pub struct CsgDesc {
-    /// What is done with them.
+    /// The operation.
     pub operation: CsgOperation,
-    /// Two or more; each is the union of its shapes (whose transforms are relative to the CSG's own space).
+    /// Two or more operands; each is the union of its shapes, with transforms relative to the CSG's own space.
     pub operands: Vec<Vec<ShapeDesc>>,
 }
 
 /// The operations on solids.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CsgOperation {
-    /// What any holds.
+    /// The points in any operand.
     Union,
-    /// What all hold.
+    /// The points in all operands.
     Intersection,
-    /// What the first holds and no other does.
+    /// The points in the first operand and in no other.
     Difference,
 }
 
-/// A mesh as files have it. Every list that is there is as long as `positions`, unless it says otherwise.
+/// A mesh as in a file. Every list has the length of `positions`, unless stated otherwise.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshDesc {
     /// Vertices.
     pub positions: Vec<Vec3>,
     /// Triangles, counter-clockwise from the front.
     pub triangles: Vec<[u32; 3]>,
-    /// Quads, counter-clockwise from the front. (A bilinear mesh has its patches here, in its own order.)
+    /// Quads, counter-clockwise from the front. (For a bilinear mesh, patches in their own order.)
     pub quads: Vec<[u32; 4]>,
     /// Shading normals.
     pub normals: Option<Vec<Vec3>>,
     /// Texture coordinates.
     pub uvs: Option<Vec<Vec2>>,
-    /// Tangents, with the side on which the bitangent of normal maps lies: 1 for that of normal × tangent, -1 for the other,
-    /// as the mesh stands here (a mirror turns it over); 0 for that of normal × tangent come what may.
+    /// Tangents, with the side of the bitangent of normal maps: 1 for normal × tangent, -1 for its opposite, in
+    /// the mesh's own space (a mirror flips it); 0 for normal × tangent even under a mirror.
     pub tangents: Option<Vec<Vec4>>,
-    /// Further sets of texture coordinates: the second, the third and the fourth.
+    /// The second, third and fourth uv set.
     pub further_uvs: [Option<Vec<Vec2>>; FURTHER_SETS],
     /// Linear colours.
     pub colours: Option<Vec<Rgb>>,
-    /// Coverages, which go with the colours.
+    /// Alphas.
     pub coverages: Option<Vec<f32>>,
     /// A number for each face: triangles first, then quads.
     pub face_indices: Option<Vec<u32>>,
-    /// How it changes its form, if it does; what is above is then how it is at some time, for whoever looks at one. Its quads
-    /// are halved, flat or not, and its tangents stay what they are.
+    /// Its deformation, if any; the vertices above are then those at some time. Its quads are split into
+    /// triangles, flat or not, and its tangents do not change.
     pub motion: Option<MeshMotion>,
 }
 
-/// The vertices of a mesh while it changes its form: each goes straight from one moment to the next.
+/// The vertices of a deforming mesh, interpolated linearly between keys.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshMotion {
-    /// The time of the first moment; before, the mesh is as then.
+    /// The time of the first key; the mesh is constant before.
     pub start: f64,
-    /// The time of the last one, more than `start`; the others are evenly spaced between.
+    /// The time of the last key, later than `start`; the others are evenly spaced.
     pub end: f64,
-    /// Two or more.
+    /// Two or more keys.
     pub moments: Vec<MeshMoment>,
 }
 
-/// The vertices of a mesh at one moment, as many as in the mesh.
+/// The vertices of a mesh at one key, as many as in the mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshMoment {
-    /// Where they are.
+    /// The positions.
     pub positions: Vec<Vec3>,
-    /// Their normals, where the mesh has some; in all moments, or in none.
+    /// The normals, if the mesh has them; in all keys, or in none.
     pub normals: Option<Vec<Vec3>>,
 }
 
-/// Shapes to be placed many times.
+/// Shapes for instancing.
 #[derive(Clone, Debug, Default)]
 pub struct ObjectDesc {
     /// Its name.
     pub name: String,
     /// Its shapes, in its own space.
     pub shapes: Vec<ShapeDesc>,
-    /// Other objects inside it, in its own space. No object holds itself at any depth.
+    /// Nested instances, in its own space. No object contains itself at any depth.
     pub instances: Vec<InstanceDesc>,
 }
 
-/// An object, placed. What moves is an instance: a single shape too stands in an object of its own then.
+/// A placed object. Everything that moves is an instance, if need be of a single shape.
 #[derive(Clone, Debug)]
 pub struct InstanceDesc {
-    /// Which.
+    /// The object.
     pub object: ObjectId,
-    /// Where, at which time.
+    /// The placement, which may be animated.
     pub world_from_object: Placement,
 }
 
-/// The light that a shape gives off. Photometric units are already resolved but for `power`.
+/// The emission of a shape. Photometric units are already resolved, except for `power`.
 #[derive(Clone, Debug)]
 pub struct AreaLightDesc {
     /// Radiance.
     pub radiance: Rgb,
-    /// A factor on the radiance, over the surface's uv.
+    /// A factor on the radiance, over uv.
     pub image: Option<Arc<MipMap>>,
-    /// Whether the colours of a mesh's vertices are a factor too.
+    /// Whether vertex colours are a factor, too.
     pub by_vertices: bool,
-    /// Whether the back shines too.
+    /// Whether the back emits, too.
     pub two_sided: bool,
-    /// Total power in lumens; when there, `radiance` gives only the colour (luminance 1).
+    /// Total power in lumens; if given, `radiance` is only the colour (luminance 1).
     pub power: Option<f32>,
 }
 
-/// Lights that are not shapes. All in world space, photometric units resolved.
+/// Lights other than shapes, in world space, with photometric units resolved.
 #[derive(Clone, Debug)]
 pub enum LightDesc {
-    /// The same in all directions from a point.
+    /// A point light.
     Point {
-        /// Where.
+        /// The position.
         from: DVec3,
         /// Radiant intensity.
         intensity: Rgb,
     },
-    /// A cone from a point.
+    /// A spot light.
     Spot {
-        /// Where; the cone opens along +z of this space.
+        /// The placement; the cone opens along +z.
         world_from_light: Transform,
         /// Radiant intensity along the axis.
         intensity: Rgb,
-        /// Half-angle in degrees beyond which there is nothing.
+        /// Half-angle of the cone in degrees.
         cone_angle: f32,
-        /// Degrees inside it over which it fades (smoothstep).
+        /// The width of the falloff inside it in degrees (smoothstep).
         cone_delta_angle: f32,
     },
-    /// From a point, by direction as a picture says.
+    /// A point light with an image of intensity by direction.
     Goniometric {
-        /// Where; the picture is in this space, z its pole. It is not stretched.
+        /// The placement; z is the pole of the image. Scale is ignored.
         world_from_light: Transform,
-        /// A factor on the picture.
+        /// A factor on the image.
         intensity: Rgb,
         /// Radiant intensity by direction.
         image: EnvironmentDesc,
     },
-    /// Parallel light.
+    /// A directional light.
     Distant {
         /// Unit vector towards the light.
         towards: DVec3,
-        /// Irradiance on a surface that faces it.
+        /// Irradiance on a perpendicular surface.
         irradiance: Rgb,
     },
-    /// Light from all around.
+    /// An environment light.
     Infinite {
-        /// Where its poles are: z of this space is up.
+        /// The placement: z is up.
         world_from_light: Transform,
         /// Radiance, or a factor on the image.
         radiance: Rgb,
-        /// Radiance by direction, where it varies.
+        /// Radiance by direction; `None` for uniform.
         image: Option<EnvironmentDesc>,
     },
-    /// One of the above, though not an infinite one, that moves.
+    /// A moving light other than an infinite one.
     Moving {
-        /// The light, in a space of its own.
+        /// The light, in its own space.
         light: Box<LightDesc>,
-        /// Where that space is: by rotations, mirrors and translations alone, as a light cannot be stretched.
+        /// The placement, by rotations, mirrors and translations only, since lights do not scale.
         world_from_light: Arc<AnimatedTransform>,
     },
 }
@@ -298,35 +298,35 @@ pub enum LightDesc {
 pub struct EnvironmentDesc {
     /// Its pixels.
     pub image: Arc<lumbre_image::Image>,
-    /// How directions fall on it.
+    /// The mapping of directions to it.
     pub mapping: EnvironmentMapping,
 }
 
-/// How an environment map covers the sphere.
+/// The mapping of an environment map to the sphere.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EnvironmentMapping {
     /// Square, equal areas, octahedral, z up (Clarberg 2008), as pbrt-v4.
     EqualArea,
-    /// Twice as wide as high, z up, the middle of the picture towards +x, three quarters of its width towards +y.
+    /// Twice as wide as high, z up, the centre towards +x, three quarters of the width towards +y.
     LatitudeLongitude,
 }
 
-/// The picture.
+/// The film settings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FilmDesc {
-    /// The name to save under, where the file gives one.
+    /// The output name, if the file gives one.
     pub filename: Option<String>,
-    /// Pixels across; `None` leaves the choice to the program.
+    /// Width in pixels; `None` leaves the choice to the program.
     pub width: Option<u32>,
-    /// Pixels down.
+    /// Height in pixels.
     pub height: Option<u32>,
     /// Pixels to render: x0, x1, y0, y1 (upper ends excluded).
     pub pixel_bounds: Option<[u32; 4]>,
-    /// Part of the picture to render in [0, 1]: x0, x1, y0, y1.
+    /// The part of the picture to render in [0, 1]: x0, x1, y0, y1.
     pub crop_window: Option<[f64; 4]>,
     /// Factor from radiance to pixel values: shutter time × ISO / 100.
     pub exposure: f32,
-    /// Largest component of one sample; infinite by default.
+    /// The largest component of one sample; infinite by default.
     pub max_component: f32,
 }
 
@@ -354,7 +354,7 @@ pub enum FilterDesc {
         /// Standard deviation.
         sigma: f32,
     },
-    /// All alike.
+    /// A box filter.
     Box {
         /// Half-widths.
         radius: Vec2,
@@ -375,7 +375,7 @@ pub enum FilterDesc {
         /// Lobes of the window.
         tau: f32,
     },
-    /// A tent.
+    /// A tent filter.
     Triangle {
         /// Half-widths.
         radius: Vec2,
@@ -388,12 +388,12 @@ impl Default for FilterDesc {
     }
 }
 
-/// The sampler.
+/// The sampler settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SamplerDesc {
-    /// Which numbers.
+    /// The kind.
     pub kind: SamplerKind,
-    /// Samples a pixel; `None` leaves the choice to the program.
+    /// Samples per pixel; `None` leaves the choice to the program.
     pub spp: Option<u32>,
     /// The seed.
     pub seed: u64,
@@ -418,9 +418,9 @@ pub enum SamplerKind {
 /// The integrator with its parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IntegratorDesc {
-    /// Which.
+    /// The kind.
     pub kind: IntegratorKind,
-    /// Bounces at most.
+    /// The maximal number of bounces.
     pub max_depth: u32,
 }
 
@@ -440,25 +440,25 @@ pub enum IntegratorKind {
     },
     /// Whitted 1980: direct light, perfect reflection and refraction.
     Whitted {
-        /// Points on each light that has a surface, at least 1.
+        /// Samples on each area light, at least 1.
         light_samples: u32,
-        /// Whether lights at infinity light surfaces, and are not seen as a background alone.
+        /// Whether infinite lights illuminate surfaces, beyond being visible as background.
         sky: bool,
     },
     /// Ambient occlusion.
     AmbientOcclusion {
-        /// By the cosine, or uniformly.
+        /// Cosine-weighted or uniform.
         cosine: bool,
-        /// How far to look.
+        /// The maximal distance of occluders.
         max_distance: f64,
     },
     /// The shading normal, (n + 1) / 2.
     Normals,
-    /// Distance along the camera's axis.
+    /// Depth along the camera's axis.
     Depth,
     /// Reflectance.
     Albedo,
-    /// Surface parameters.
+    /// uv.
     Uv,
 }
 
@@ -471,7 +471,7 @@ impl IntegratorKind {
         }
     }
 
-    /// The integrator of a name in the scene language, with its default parameters.
+    /// The integrator of a name in the scene language, with default parameters.
     pub fn from_name(name: &str) -> Option<Self> {
         match name {
             "path" => Some(Self::Path { regularize: false }),

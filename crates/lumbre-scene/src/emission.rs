@@ -1,25 +1,25 @@
-//! Light that a surface gives off.
+//! Emission of surfaces.
 
 use std::sync::Arc;
 
 use lumbre_math::Vec2;
 use lumbre_shading::{MipMap, Spectrum};
 
-/// The radiance that leaves a surface, in every direction alike.
+/// The emitted radiance, equal in all directions.
 #[derive(Clone, Debug)]
 pub struct Emission {
     /// Radiance, or a factor on the image.
     pub radiance: Spectrum,
-    /// A factor over the surface's uv.
+    /// A factor over uv.
     pub image: Option<Arc<MipMap>>,
-    /// Whether the colours of a mesh's vertices are a factor too.
+    /// Whether vertex colours are a factor, too.
     pub by_vertices: bool,
-    /// Whether the back shines too.
+    /// Whether the back emits, too.
     pub two_sided: bool,
 }
 
 impl Emission {
-    /// The radiance that leaves the front or the back at `uv`, where the vertices of a mesh have this colour.
+    /// The emitted radiance of the front or the back at `uv`, for a vertex colour.
     pub fn at(&self, front: bool, uv: Vec2, vertices: Spectrum) -> Spectrum {
         if !front && !self.two_sided {
             return Spectrum::BLACK;
@@ -31,7 +31,7 @@ impl Emission {
         }
     }
 
-    /// The mean radiance over the unit square of uv, from a grid of points; vertices count as white.
+    /// The mean radiance over uv, from a grid of points; vertex colours count as white.
     pub fn mean(&self) -> Spectrum {
         const SIDE: u32 = 32;
         if self.image.is_none() {
@@ -42,7 +42,7 @@ impl Emission {
         points.map(|uv| self.at(true, uv, Spectrum::WHITE)).sum::<Spectrum>() / (SIDE * SIDE) as f32
     }
 
-    /// How many sides shine.
+    /// The number of emissive sides.
     pub fn sides(&self) -> f32 {
         if self.two_sided { 2.0 } else { 1.0 }
     }

@@ -1,4 +1,4 @@
-//! Why a description cannot become a scene.
+//! Errors of building a scene from a description.
 
 use lumbre_geometry::ShapeError;
 
@@ -6,118 +6,118 @@ use lumbre_geometry::ShapeError;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BuildError {
-    /// A shape cannot be made.
+    /// A shape is invalid.
     #[error("shape {shape}: {source}")]
     Shape {
-        /// Which.
+        /// The shape.
         shape: u32,
-        /// Why.
+        /// The reason.
         source: ShapeError,
     },
-    /// A shape names a material that is not there.
+    /// A shape refers to a missing material.
     #[error("shape {shape} names material {material}, but there are {count}")]
     NoSuchMaterial {
-        /// Which shape.
+        /// The shape.
         shape: u32,
-        /// What it names.
+        /// The material index.
         material: u32,
-        /// How many materials there are.
+        /// The number of materials.
         count: usize,
     },
-    /// An instance names an object that is not there.
+    /// An instance refers to a missing object.
     #[error("an instance names object {object}, but there are {count}")]
     NoSuchObject {
-        /// What it names.
+        /// The object index.
         object: u32,
-        /// How many objects there are.
+        /// The number of objects.
         count: usize,
     },
-    /// An object holds itself at some depth.
+    /// An object contains itself at some depth.
     #[error("object \"{name}\" holds itself")]
     ObjectCycle {
         /// The object's name.
         name: String,
     },
-    /// Objects hold objects to too great a depth.
+    /// Objects are nested too deeply.
     #[error("object \"{name}\" holds objects to a depth of more than {limit}")]
     NestedTooDeeply {
         /// The object's name.
         name: String,
-        /// The greatest depth.
+        /// The maximal depth.
         limit: usize,
     },
-    /// A triangle or quad names a vertex that its mesh does not have.
+    /// A triangle or quad refers to a missing vertex.
     #[error("shape {shape}: face {face} names vertex {vertex}, but there are {count}")]
     NoSuchVertex {
-        /// Which shape.
+        /// The shape.
         shape: u32,
-        /// Which face, triangles first.
+        /// The face, triangles first.
         face: usize,
-        /// What it names.
+        /// The vertex index.
         vertex: u32,
-        /// How many vertices there are.
+        /// The number of vertices.
         count: usize,
     },
-    /// A list of a mesh has another length than its vertices.
+    /// A list of a mesh has the wrong length.
     #[error("shape {shape}: {found} {list} for {expected} vertices")]
     ListLength {
-        /// Which shape.
+        /// The shape.
         shape: u32,
-        /// Which list.
+        /// The list.
         list: &'static str,
-        /// How long it is.
+        /// Its length.
         found: usize,
-        /// How long it should be.
+        /// The required length.
         expected: usize,
     },
     /// A coordinate is not finite, or too large for single precision.
     #[error("shape {shape}: vertex {vertex} is not finite or too far away")]
     NotFinite {
-        /// Which shape.
+        /// The shape.
         shape: u32,
-        /// Which vertex.
+        /// The vertex.
         vertex: usize,
     },
-    /// A shape without bounds cannot be a light.
+    /// An unbounded shape cannot be a light.
     #[error("shape {shape}: an infinite {name} cannot carry an area light")]
     InfiniteLight {
-        /// Which shape.
+        /// The shape.
         shape: u32,
-        /// Its form.
+        /// The kind of shape.
         name: &'static str,
     },
-    /// A CSG cannot be made.
+    /// A CSG is invalid.
     #[error("shape {shape}: {reason}")]
     Csg {
-        /// Which shape.
+        /// The shape.
         shape: u32,
-        /// Why.
+        /// The reason.
         reason: String,
     },
-    /// A camera has a parameter out of its range.
+    /// A camera has a parameter out of range.
     #[error("camera {camera}: {parameter} is {found}, expected {expected}")]
     Camera {
-        /// Its position among the cameras.
+        /// The index of the camera.
         camera: usize,
-        /// Which parameter.
+        /// The parameter.
         parameter: &'static str,
-        /// What it is.
+        /// Its value.
         found: f64,
-        /// What is accepted.
+        /// The accepted range.
         expected: &'static str,
     },
-    /// A light has a parameter out of its range.
+    /// A light has a parameter out of range.
     #[error("light {light}: {reason}")]
     Light {
-        /// Its position among the lights.
+        /// The index of the light.
         light: usize,
-        /// Why.
+        /// The reason.
         reason: &'static str,
     },
     /// The tree cannot be built.
     #[error("{0}")]
     Tree(#[from] lumbre_kernel::BuildError),
-    /// More surfaces than can be named (2^32 - 1).
+    /// More than 2^32 - 1 surfaces.
     #[error("more than 4294967295 surfaces in one scene")]
     TooMany,
 }

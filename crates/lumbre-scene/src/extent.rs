@@ -1,4 +1,4 @@
-//! The points that a description spans, before anything is built of it.
+//! The points spanned by a description, before anything is built.
 
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -12,12 +12,12 @@ use lumbre_math::{DVec3, Transform};
 use crate::build::inside_out;
 use crate::{GeometryDesc, MeshDesc, ObjectDesc, SceneDesc, ShapeDesc};
 
-/// Directions in which an object is asked for its farthest point: what lies between two of them is missed by less than a
-/// hundredth of its size.
+/// Directions of an object's support points; what lies between them is missed by less than a hundredth of its
+/// size.
 const DIRECTIONS: usize = 300;
 
-/// Points whose hull is that of everything finite in a description: vertices of meshes that faces use, corners of the boxes
-/// around exact shapes, and for objects their farthest points in some hundreds of directions.
+/// Points with the same convex hull as everything finite in a description: used vertices of meshes, corners of
+/// the bounding boxes of exact shapes, and the support points of objects.
 pub(crate) struct Extent<'d> {
     desc: &'d SceneDesc,
     /// For each object.
@@ -25,8 +25,7 @@ pub(crate) struct Extent<'d> {
     used: Used,
 }
 
-/// Which vertices the faces of a mesh use, for meshes of which that is not all: files share one list of vertices among
-/// meshes.
+/// The vertices used by a mesh's faces, if not all are: files may share one list of vertices among meshes.
 #[derive(Default)]
 struct Used(RefCell<HashMap<*const MeshDesc, Option<Rc<Vec<bool>>>>>);
 
@@ -49,7 +48,7 @@ impl Used {
 
 impl<'d> Extent<'d> {
     pub(crate) fn new(desc: &'d SceneDesc) -> Self {
-        // Objects that hold each other make no scene; that is said when it is built.
+        // A cycle of objects is reported when the scene is built.
         let order = inside_out(&desc.objects).unwrap_or_default();
         let mut outlines = vec![Vec::new(); desc.objects.len()];
         let used = Used::default();
@@ -76,7 +75,7 @@ impl<'d> Extent<'d> {
     }
 }
 
-/// Where an instance stands; of what moves, where it is at each key.
+/// The transforms of an instance; of a moving one, at each key.
 pub(crate) fn places(placement: &Placement) -> Vec<Transform> {
     match placement {
         Placement::Still(map) => vec![*map],
@@ -112,7 +111,7 @@ fn directions() -> impl Iterator<Item = DVec3> {
 }
 
 fn each_point_of(shape: &ShapeDesc, used: &Used, visit: &mut dyn FnMut(DVec3)) {
-    // Combinations hold shapes, which may be combinations.
+    // Operands may be CSG themselves.
     let mut open: Vec<(&ShapeDesc, Transform)> = vec![(shape, Transform::IDENTITY)];
     while let Some((shape, outer)) = open.pop() {
         let placement = outer * shape.world_from_object;
@@ -135,7 +134,7 @@ fn each_point_of(shape: &ShapeDesc, used: &Used, visit: &mut dyn FnMut(DVec3)) {
     }
 }
 
-/// Every finite vertex that a face uses.
+/// Every finite vertex used by a face.
 fn each_vertex(mesh: &Arc<MeshDesc>, used: &Used, visit: &mut dyn FnMut(DVec3)) {
     let used = used.of(mesh);
     for (i, p) in mesh.positions.iter().enumerate() {

@@ -1,14 +1,14 @@
-//! How large a spot a ray covers, so that textures are looked up without aliasing.
+//! Ray footprints, for filtering textures.
 
 use lumbre_math::{DVec3, Vec2, Vec3};
 
-/// How a ray spreads.
+/// The spread of a ray.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Footprint {
-    /// Unknown: textures are looked up at a point.
+    /// Unknown: textures are not filtered.
     #[default]
     Point,
-    /// The rays through the neighbouring points of the film (Igehy, "Tracing Ray Differentials", SIGGRAPH 1999).
+    /// The rays through neighbouring points of the film (Igehy, "Tracing Ray Differentials", SIGGRAPH 1999).
     Neighbours {
         /// Origin of the ray to the right.
         x_origin: DVec3,
@@ -35,13 +35,13 @@ pub(crate) struct Spot {
     pub dpdy: Vec3,
     pub duv_dx: Vec2,
     pub duv_dy: Vec2,
-    /// Width across the ray, and its growth with distance, for the rays that leave.
+    /// The width across the ray, and its growth with distance, for the rays that leave.
     pub width: f64,
     pub spread: f64,
 }
 
 impl Footprint {
-    /// The sides of the spot, and its width and spread; `None` where nothing is known of it.
+    /// The sides of the footprint, and its width and spread; `None` if unknown.
     #[inline]
     fn sides(
         &self,
@@ -57,7 +57,7 @@ impl Footprint {
                     origin + towards * (normal.dot(point - origin) / normal.dot(towards)) - point
                 };
                 let (dpdx, dpdy) = (meet(x_origin, x_direction), meet(y_origin, y_direction));
-                // Across the ray the spot is not stretched by a grazing angle.
+                // The width across the ray is not stretched at grazing angles.
                 let across = |d: DVec3| (d - direction * d.dot(direction)).length();
                 let width = 0.5 * (across(dpdx) + across(dpdy));
                 (dpdx, dpdy, width, if distance > 0.0 { width / distance } else { 0.0 })
@@ -73,7 +73,7 @@ impl Footprint {
         (dpdx.is_finite() && dpdy.is_finite() && width.is_finite()).then_some((dpdx, dpdy, width, spread))
     }
 
-    /// The spot where no texture is looked up: only what the rays that leave need, its width and spread.
+    /// The footprint for untextured surfaces: only the width and spread for the rays that leave.
     #[inline]
     pub(crate) fn across(&self, point: DVec3, normal: DVec3, direction: DVec3, distance: f64) -> Spot {
         if let Self::Cone { width, spread } = *self {
@@ -88,8 +88,8 @@ impl Footprint {
             .map_or_else(Spot::default, |(_, _, width, spread)| Spot { width, spread, ..Spot::default() })
     }
 
-    /// The spot at `point` at a distance along the unit `direction`, on the plane with this normal, in the surface's
-    /// parameters.
+    /// The footprint at `point` at a distance along the unit `direction`, on the plane with this normal, in
+    /// surface parameters.
     pub(crate) fn on_plane(
         &self,
         point: DVec3,
@@ -102,7 +102,7 @@ impl Footprint {
         let Some((dpdx, dpdy, width, spread)) = self.sides(point, normal, direction, distance) else {
             return Spot::default();
         };
-        // Least squares for the change of (u, v) that moves the point by each.
+        // Least squares for the change of (u, v) that corresponds to each offset.
         let (uu, uv, vv) = (dpdu.dot(dpdu), dpdu.dot(dpdv), dpdv.dot(dpdv));
         let inverse = 1.0 / (uu * vv - uv * uv);
         let parameters = |d: DVec3| {

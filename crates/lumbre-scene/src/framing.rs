@@ -1,22 +1,22 @@
-//! The automatic camera: a three-quarter view that holds everything, and fills the picture with it.
+//! The automatic camera: a three-quarter view that frames everything.
 
 use lumbre_geometry::Aabb;
 use lumbre_math::{DAffine3, DMat3, DVec2, DVec3, Transform};
 
 use crate::{Camera, CameraKind, UpAxis};
 
-/// Full angle along the shorter side of the picture, degrees: a lens of 45 mm before film of 36 by 24 mm.
+/// Full field of view along the shorter side of the picture, in degrees: a 45 mm lens on 36 by 24 mm film.
 const FOV: f64 = 30.0;
-/// The share of the picture that the model fills along the tighter of its sides.
+/// The fraction of the picture filled by the model along its tighter side.
 const FILL: f64 = 0.84;
-/// Towards the camera: so much to the right, up, and to the front.
+/// The direction to the camera: to the right, up, and to the front.
 const TOWARDS_CAMERA: DVec3 = DVec3::new(0.58, 0.40, 1.0);
-/// Heights at which the outline of a turning model is kept.
+/// The number of heights in the outline of a turning model.
 const HEIGHTS: usize = 64;
-/// Corners of the polygon around the circle that a point makes as it turns.
+/// Corners of the polygon around the circle of a turning point.
 const AROUND: usize = 48;
 
-/// To the right, up, and to the front of a world with this axis up, which has been turned about that axis.
+/// The right, up and front axes of a world with this up axis, rotated about it by `turns`.
 pub(crate) fn axes(up: UpAxis, turns: f64) -> [DVec3; 3] {
     let [right, upward, front] = match up {
         UpAxis::Y => [DVec3::X, DVec3::Y, DVec3::Z],
@@ -26,18 +26,18 @@ pub(crate) fn axes(up: UpAxis, turns: f64) -> [DVec3; 3] {
     [cos * right - sin * front, upward, cos * front + sin * right]
 }
 
-/// A way to visit points.
+/// A visitor of points.
 pub(crate) type Points<'p> = dyn Fn(&mut dyn FnMut(DVec3)) + 'p;
 
-/// A view of `points` from the front, the right and above, that fills a picture of this aspect (width over height) with
-/// them; of the box of side 2 about the origin when there are none.
+/// A view of `points` from the front, the right and above that fills a picture of this aspect ratio (width over
+/// height); of the cube [-1, 1]³ if there are none.
 pub(crate) fn still(points: &Points, up: UpAxis, aspect: f64) -> Camera {
     let eye = Eye::new(up, 0.0, aspect);
     eye.camera(points)
 }
 
-/// As [`still`], after so many turns about the middle of `points`; all turns see them from the same distance, and hold
-/// whatever any of them sees.
+/// As [`still`], after rotating by `turns` about the centre of `points`; all rotations share one distance, from
+/// which each is in view.
 pub(crate) fn turned(points: &Points, up: UpAxis, aspect: f64, turns: f64) -> Camera {
     let eye = Eye::new(up, turns, aspect);
     let [_, upward, _] = axes(up, turns);
@@ -47,7 +47,7 @@ pub(crate) fn turned(points: &Points, up: UpAxis, aspect: f64, turns: f64) -> Ca
     }
     let center = bounds.center();
     let (low, high) = ((bounds.min - center).dot(upward), (bounds.max - center).dot(upward));
-    // At each height the widest circle, and how low and how high there are points at all.
+    // The largest circle at each height, and the lowest and the highest point.
     let mut outline = [(f64::INFINITY, f64::NEG_INFINITY, 0.0_f64); HEIGHTS];
     points(&mut |p| {
         let p = p - center;
@@ -58,7 +58,7 @@ pub(crate) fn turned(points: &Points, up: UpAxis, aspect: f64, turns: f64) -> Ca
     });
     let circles = |visit: &mut dyn FnMut(DVec3)| {
         let [right, _, front] = axes(up, turns);
-        // Around the circle, not within it.
+        // A circumscribed polygon.
         let reach = 1.0 / (std::f64::consts::PI / AROUND as f64).cos();
         for &(low, high, radius) in outline.iter().filter(|(low, high, _)| low <= high) {
             for i in 0..AROUND {
@@ -78,12 +78,12 @@ fn bounds(points: &Points) -> Aabb {
     bounds
 }
 
-/// Where a camera looks, before it is known where it stands.
+/// A camera's orientation, before its position is known.
 struct Eye {
     x: DVec3,
     y: DVec3,
     forward: DVec3,
-    /// Slopes of the sides of the pyramid to be filled.
+    /// The slopes of the sides of the viewing pyramid to be filled.
     slopes: DVec2,
 }
 
@@ -92,7 +92,7 @@ impl Eye {
         let [right, upward, front] = axes(up, turns);
         let towards = TOWARDS_CAMERA.x * right + TOWARDS_CAMERA.y * upward + TOWARDS_CAMERA.z * front;
         let forward = -towards.normalize();
-        // The worlds of meshes are right-handed.
+        // Meshes are right-handed.
         let x = forward.cross(upward).normalize();
         let slope = FILL * (0.5 * FOV.to_radians()).tan();
         let aspect = if aspect > 0.0 && aspect.is_finite() { aspect } else { 1.0 };
@@ -101,10 +101,10 @@ impl Eye {
         Self { x, y: x.cross(forward), forward, slopes }
     }
 
-    /// How far the camera at a place relative to `center` has to move so that points reach as far to its right as to its
-    /// left, and as far up as down; nearly.
+    /// The approximate displacement of a camera that centres the points in its view, horizontally and
+    /// vertically.
     fn off_middle(&self, points: &Points, center: DVec3, middle: DVec2, depth: f64) -> DVec2 {
-        // The greatest slopes to the right, left, top and bottom, and how far away.
+        // The greatest slopes to the right, left, top and bottom, and the depths.
         let mut most = [(f64::NEG_INFINITY, 1.0); 4];
         points(&mut |p| {
             let p = p - center;
@@ -121,12 +121,12 @@ impl Eye {
         if off.is_finite() { off } else { DVec2::ZERO }
     }
 
-    /// The nearest camera that holds all points, with as much room to their left as to their right, and above as below.
+    /// The nearest camera that sees all points, centred horizontally and vertically.
     ///
-    /// A point (x, y, z) is left of the right side of a pyramid of slope s whose tip is at (a, b, c) when
-    /// x − s z ≤ a − s c, and right of the left side when −x − s z ≤ −a − s c. The greatest left-hand sides over all
-    /// points, R and L, give a = (R − L) / 2 and c ≤ −(R + L) / 2 s. Along the looser of the two
-    /// directions, that is the middle from farther off; from there it is searched for.
+    /// A point (x, y, z) is left of the right side of a pyramid of slope s with its tip at (a, b, c) when x − s
+    /// z ≤ a − s c, and right of the left side when −x − s z ≤ −a − s c. With R and L the greatest left-hand
+    /// sides over all points, a = (R − L) / 2 and c ≤ −(R + L) / 2 s. In the looser of the two directions the
+    /// camera is farther away than that, so the centre is found by iteration from there.
     fn camera(&self, points: &Points) -> Camera {
         let bounds = bounds(points);
         let is_usable = !bounds.is_empty() && bounds.min.is_finite() && bounds.max.is_finite();
@@ -147,7 +147,7 @@ impl Eye {
         }
         let [right, left, top, bottom] = most;
         let depth = (-(right + left) / (2.0 * self.slopes.x)).min(-(top + bottom) / (2.0 * self.slopes.y));
-        // A single point is seen from some way off.
+        // A single point is viewed from some distance.
         let depth = if depth < 0.0 { depth } else { -1.0 };
         let mut middle = 0.5 * DVec2::new(right - left, top - bottom);
         for _ in 0..4 {

@@ -1,4 +1,4 @@
-//! The plane that everything stands on.
+//! The ground plane.
 
 use std::sync::Arc;
 
@@ -11,23 +11,23 @@ use crate::{
     BuildError, GeometryDesc, GroundDesc, Interaction, MaterialId, NamedMaterial, SceneDesc, ShapeDesc,
 };
 
-/// The position that the ground has among the shapes of its file, where no shape of a file is.
+/// The shape index of the ground, which no shape of a file has.
 pub(crate) const SHAPE: u32 = u32::MAX;
 
 /// The ground of a scene.
 #[derive(Clone, Debug)]
 pub struct GroundPlane {
-    /// Unit, up from it.
+    /// The upward unit normal.
     pub normal: DVec3,
     /// A point of it.
     pub point: DVec3,
-    /// Whether a camera sees only the shadow on it.
+    /// Whether it is a shadow catcher.
     pub catcher: bool,
-    /// Its irradiance in the open by lights at infinity, the same everywhere.
+    /// Its unoccluded irradiance from infinite lights, equal everywhere.
     open: Spectrum,
-    /// Lights whose part in that changes from place to place or with time, and are no surfaces.
+    /// Lights other than surfaces whose contribution varies with position or time.
     local: Vec<Light>,
-    /// All lights that are no surfaces.
+    /// All lights other than surfaces.
     lights: Vec<LightId>,
 }
 
@@ -41,7 +41,7 @@ impl GroundPlane {
                 Light::Point(_) | Light::Spot(_) | Light::Goniometric(_) | Light::Moving(_) => {
                     local.push(light.clone());
                 }
-                // These are the same at all times.
+                // These are constant over time.
                 Light::Distant(_) | Light::Uniform(_) | Light::Environment(_) => {
                     open += light.irradiance(desc.point, 0.0, normal).unwrap_or(Spectrum::BLACK);
                 }
@@ -52,17 +52,17 @@ impl GroundPlane {
         Self { normal, point: desc.point, catcher: desc.catcher, open, local, lights: ids.collect() }
     }
 
-    /// Whether a place is on the ground.
+    /// Whether an interaction is on the ground.
     pub fn holds(&self, met: &Interaction) -> bool {
         met.shape == SHAPE
     }
 
-    /// The lights that count for [`GroundPlane::open_irradiance`].
+    /// The lights that contribute to [`GroundPlane::open_irradiance`].
     pub fn lights(&self) -> &[LightId] {
         &self.lights
     }
 
-    /// The irradiance at a point of it and at a time if nothing else were there, of all lights that are no surfaces.
+    /// The unoccluded irradiance at a point and a time from all lights other than surfaces.
     pub fn open_irradiance(&self, at: DVec3, time: f64) -> Spectrum {
         let local = self.local.iter().filter_map(|light| light.irradiance(at, time, self.normal));
         local.fold(self.open, |sum, irradiance| sum + irradiance)

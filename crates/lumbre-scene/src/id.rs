@@ -1,9 +1,9 @@
-//! Names for things in tables.
+//! Indices into tables.
 
 /// A material of a [`crate::SceneDesc`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct MaterialId(pub u32);
 
-/// An object of a [`crate::SceneDesc`], made to be instanced.
+/// An object of a [`crate::SceneDesc`], for instancing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ObjectId(pub u32);

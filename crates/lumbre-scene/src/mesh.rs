@@ -1,4 +1,4 @@
-//! Meshes made ready for the tree: in single precision about an origin near them, their quads split where they are flat.
+//! Meshes baked for the tree: in single precision relative to a nearby origin, with flat quads split.
 
 use std::mem::take;
 use std::sync::Arc;
@@ -6,17 +6,17 @@ use std::sync::Arc;
 use lumbre_kernel::{DeformingMesh, TriangleMesh};
 use lumbre_math::{DVec3, Transform, Vec3};
 
-use crate::surface::{Deforming, MeshDress, Turned};
+use crate::surface::{Deforming, MeshAttributes, Turned};
 use crate::{BuildError, MeshDesc, MeshMotion};
 
 /// A mesh in the space of a tree.
 pub(crate) struct BakedMesh {
-    pub dress: Arc<MeshDress>,
-    /// Quads that are not flat, their corners in the order p00, p10, p01, p11.
+    pub attributes: Arc<MeshAttributes>,
+    /// Quads that are not flat, with their corners in the order p00, p10, p01, p11.
     pub patches: Vec<[u32; 4]>,
 }
 
-/// Which corners a face of four has.
+/// The order of a quad's corners.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum QuadOrder {
     /// Counter-clockwise.
@@ -25,10 +25,9 @@ pub(crate) enum QuadOrder {
     Patch,
 }
 
-/// Moves a mesh into the space of its tree.
+/// Transforms a mesh into the space of its tree.
 ///
-/// # Errors
-/// Lists of the wrong length, faces that name vertices that are not there, and vertices that are not finite.
+/// Lists of the wrong length, faces with missing vertices, and vertices that are not finite.
 pub(crate) fn bake(
     shape: u32,
     desc: Arc<MeshDesc>,
@@ -37,8 +36,7 @@ pub(crate) fn bake(
     order: QuadOrder,
 ) -> Result<BakedMesh, BuildError> {
     check(shape, &desc)?;
-    // A description that others hold too keeps what is its own, and shares what no transform changes; one that no one
-    // else holds gives up its lists.
+    // A shared description is copied only where the transform changes it; an unshared one gives up its lists.
     let mut shared = desc;
     let (mut positions, mut triangles, quads) = match Arc::get_mut(&mut shared) {
         Some(own) => (take(&mut own.positions), take(&mut own.triangles), take(&mut own.quads)),
@@ -74,7 +72,7 @@ pub(crate) fn bake(
         }
     }
 
-    // The front face travels with the object: behind a mirror its vertices run the other way.
+    // The front face follows the object: behind a mirror its vertices are in reverse order.
     let swapped = tree_from_object.is_mirror();
     let first_half = triangles.len() as u32;
     let mut patches = Vec::new();
@@ -95,11 +93,11 @@ pub(crate) fn bake(
     }
     let mesh = Arc::new(TriangleMesh { origin, positions, indices: triangles });
     let moving = motion.map(|motion| deforming(shape, motion, tree_from_object, &mesh)).transpose()?;
-    let dress = Arc::new(MeshDress { mesh, swapped, first_half, turned, moving, rest: shared });
-    Ok(BakedMesh { dress, patches })
+    let attributes = Arc::new(MeshAttributes { mesh, swapped, first_half, turned, moving, rest: shared });
+    Ok(BakedMesh { attributes, patches })
 }
 
-/// The vertices at all moments, in the space of the tree that `mesh` is baked into.
+/// The vertices at all keys, in the space of the tree of `mesh`.
 fn deforming(
     shape: u32,
     motion: MeshMotion,
@@ -164,10 +162,11 @@ fn check(shape: u32, desc: &MeshDesc) -> Result<(), BuildError> {
     }
 }
 
-/// How much rounding to single precision can move a corner, as a share of the largest coordinate.
+/// The rounding error of a corner in single precision, relative to the largest coordinate.
 const ROUNDING: f64 = 4.0 / (1_u64 << 23) as f64;
 
-/// Whether the corners (counter-clockwise) make a parallelogram, up to rounding: then two triangles are the patch.
+/// Whether the corners (counter-clockwise) form a parallelogram up to rounding: then two triangles equal the
+/// patch.
 fn is_parallelogram(corners: [Vec3; 4]) -> bool {
     let [a, b, c, d] = corners.map(Vec3::as_dvec3);
     let gap = ((a - b) + (c - d)).abs().max_element();
@@ -182,7 +181,7 @@ fn is_flat_and_convex(corners: [Vec3; 4]) -> bool {
     let length = normal.length();
     let longest = (c - a).length().max((d - b).length());
     if length.is_nan() || length <= 0.0 {
-        // No area, or a patch folded onto itself: as triangles it is what is left of it.
+        // Without area, or folded: triangles represent what remains.
         return true;
     }
     let height = normal.dot(b - a).abs() / length;
@@ -214,19 +213,19 @@ mod tests {
         let flat =
             bake(7, quad(Vec3::new(2.0, 7.0, 4.0)), &Transform::IDENTITY, DVec3::ZERO, QuadOrder::Around)
                 .unwrap();
-        assert_eq!((flat.dress.mesh.indices.len(), flat.patches.len()), (2, 0));
+        assert_eq!((flat.attributes.mesh.indices.len(), flat.patches.len()), (2, 0));
         let trapezium =
             bake(7, quad(Vec3::new(3.0, 7.0, 4.0)), &Transform::IDENTITY, DVec3::ZERO, QuadOrder::Around)
                 .unwrap();
-        assert_eq!((trapezium.dress.mesh.indices.len(), trapezium.patches.len()), (2, 0));
+        assert_eq!((trapezium.attributes.mesh.indices.len(), trapezium.patches.len()), (2, 0));
         let bent =
             bake(7, quad(Vec3::new(2.0, 7.0, 4.5)), &Transform::IDENTITY, DVec3::ZERO, QuadOrder::Around)
                 .unwrap();
-        assert_eq!((bent.dress.mesh.indices.len(), bent.patches), (0, vec![[0, 1, 3, 2]]));
+        assert_eq!((bent.attributes.mesh.indices.len(), bent.patches), (0, vec![[0, 1, 3, 2]]));
         let dented =
             bake(7, quad(Vec3::new(4.5, 4.0, 4.0)), &Transform::IDENTITY, DVec3::ZERO, QuadOrder::Around)
                 .unwrap();
-        assert_eq!((dented.dress.mesh.indices.len(), dented.patches.len()), (0, 1));
+        assert_eq!((dented.attributes.mesh.indices.len(), dented.patches.len()), (0, 1));
     }
 
     #[test]
@@ -239,8 +238,8 @@ mod tests {
             })
         };
         let front = |baked: &BakedMesh| {
-            let [a, b, c] =
-                baked.dress.mesh.indices[0].map(|i| baked.dress.mesh.positions[i as usize].as_dvec3());
+            let [a, b, c] = baked.attributes.mesh.indices[0]
+                .map(|i| baked.attributes.mesh.positions[i as usize].as_dvec3());
             (b - a).cross(c - a).normalize()
         };
         let plain = bake(0, desc(), &Transform::IDENTITY, DVec3::ZERO, QuadOrder::Around).unwrap();
@@ -261,13 +260,13 @@ mod tests {
             |place: &Transform| bake(3, desc.clone(), place, DVec3::ZERO, QuadOrder::Around).unwrap();
         let turn = Transform::rotate(DVec3::X, 90.0).unwrap();
         let (here, there) = (bake_at(&Transform::IDENTITY), bake_at(&turn));
-        assert!(Arc::ptr_eq(&here.dress.rest, &there.dress.rest));
-        assert_eq!(here.dress.normals().unwrap()[2], Vec3::Z);
-        assert!((there.dress.normals().unwrap()[2] - Vec3::NEG_Y).length() < 1e-6);
+        assert!(Arc::ptr_eq(&here.attributes.rest, &there.attributes.rest));
+        assert_eq!(here.attributes.normals().unwrap()[2], Vec3::Z);
+        assert!((there.attributes.normals().unwrap()[2] - Vec3::NEG_Y).length() < 1e-6);
         assert_eq!(desc.positions.len(), 4);
         // The last one that holds it needs no copy.
         let own = bake(3, desc, &turn, DVec3::ZERO, QuadOrder::Around).unwrap();
-        assert!(own.dress.rest.uvs.is_some() && own.dress.mesh.positions.len() == 4);
+        assert!(own.attributes.rest.uvs.is_some() && own.attributes.mesh.positions.len() == 4);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! What there is, resolved for rendering, and the questions that light transport asks.
+//! Scenes resolved for rendering, with the queries of light transport.
 
 use std::sync::Arc;
 
@@ -12,16 +12,16 @@ use lumbre_shading::{FloatTexture, Scatter, Spectrum};
 use crate::footprint::Spot;
 use crate::interaction::offset;
 use crate::light::{Light, LightId, LightSample};
-use crate::surface::{Dressed, Form, SurfaceEntry};
+use crate::surface::{Form, ShadingGeometry, SurfaceEntry};
 use crate::{Camera, FilmDesc, FilterDesc, Footprint, GroundPlane, IntegratorDesc, Interaction, SamplerDesc};
 
-/// A scene, ready to be rendered from any number of threads. Nothing changes it.
+/// An immutable scene, which any number of threads can render.
 #[derive(Debug)]
 pub struct Scene {
     pub(crate) accel: Arc<Accel>,
     pub(crate) entries: Vec<SurfaceEntry>,
     pub(crate) lights: Vec<Light>,
-    // By power; `None` where there is no light.
+    // By power; `None` without lights.
     pub(crate) light_choice: Option<AliasTable>,
     pub(crate) infinite: Vec<LightId>,
     pub(crate) cameras: Vec<Camera>,
@@ -32,100 +32,101 @@ pub struct Scene {
     pub(crate) bounds: Aabb,
     pub(crate) ground: Option<GroundPlane>,
     pub(crate) warnings: Vec<BuildWarning>,
-    // Whether rays of light must ask every hit if it counts: something is cut out, or is an interface.
+    // Whether shadow rays must check every hit: there are cut-outs or interfaces.
     pub(crate) has_holes: bool,
-    /// Whether anything is made of glass, or of what else light goes through.
+    /// Whether any material transmits light.
     pub(crate) lets_light_through: bool,
-    /// Whether light may go straight on through anything.
+    /// Whether any material transmits light straight on.
     pub(crate) lets_light_straight_on: bool,
-    // Whether a camera looks through the back of something.
+    // Whether any material is one-sided.
     pub(crate) has_one_sided: bool,
     pub(crate) has_instances: bool,
     pub(crate) moves: bool,
-    // Whether any surface looks up a texture, so that rays have to know how wide they are.
+    // Whether any material has textures, so that rays need footprints.
     pub(crate) looks_up: bool,
 }
 
-/// Where the cosine between shading and geometric normal is less, the surface stands for a smooth one.
+/// Below this cosine between shading and geometric normal, the mesh stands for a smooth surface.
 const SMOOTH: f32 = 1.0 - 1e-6;
 
-/// Something in a description that was left out of the scene, or is slower or noisier than it could be.
+/// A part of a description that was dropped, or makes rendering slower or noisier.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BuildWarning {
-    /// The area light of an interface is dropped, for an interface is no surface.
+    /// The area light of an interface is dropped, since an interface is no surface.
     #[error("shape {shape}: an area light on an interface gives no light")]
     LightOnInterface {
-        /// Which shape.
+        /// The shape.
         shape: u32,
     },
-    /// Light in an object that does not stand in the world just once, on a CSG, or on a mesh that changes its form, is found only by rays that happen to hit it.
+    /// An emissive shape that cannot be sampled, as part of an object with several placements, of a CSG, or of
+    /// a deforming mesh: its light is found only by rays that hit it.
     #[error(
         "shape {shape}: its light is found by chance only, for it is in one of many instances, a CSG, or a mesh that changes its form (slow to converge)"
     )]
     UnsampledLight {
-        /// Which shape.
+        /// The shape.
         shape: u32,
     },
-    /// A shape has no area, and was left out.
+    /// A shape has no area, and is dropped.
     #[error("shape {shape}: without area, nothing can be seen of it")]
     Empty {
-        /// Which shape.
+        /// The shape.
         shape: u32,
     },
-    /// There is no light at all: what does not look at light alone is black.
+    /// There is no light: pictures of light are black.
     #[error("the scene has no light: its picture is black")]
     NoLight,
-    /// An environment that is black or not finite gives no light.
+    /// An environment map that is black or not finite is dropped.
     #[error("light {light}: its picture is black or not finite, it gives no light")]
     DarkEnvironment {
-        /// Its position among the lights.
+        /// The index of the light.
         light: usize,
     },
 }
 
 impl Scene {
-    /// The tree, for queries that are not about light. The id of a hit leads to [`Scene::shape_index`].
+    /// The tree, for queries unrelated to light. [`Scene::shape_index`] gives the shape of a hit.
     pub fn accel(&self) -> &Accel {
         &self.accel
     }
 
-    /// Cameras, the one to use first. There is always one.
+    /// The cameras, the default first; at least one.
     pub fn cameras(&self) -> &[Camera] {
         &self.cameras
     }
 
-    /// What the description says of the film.
+    /// The film settings of the description.
     pub fn film(&self) -> &FilmDesc {
         &self.film
     }
 
-    /// What the description says of the pixel filter.
+    /// The pixel filter of the description.
     pub fn filter(&self) -> FilterDesc {
         self.filter
     }
 
-    /// What the description says of the sampler.
+    /// The sampler settings of the description.
     pub fn sampler(&self) -> SamplerDesc {
         self.sampler
     }
 
-    /// What the description says of the integrator.
+    /// The integrator settings of the description.
     pub fn integrator(&self) -> IntegratorDesc {
         self.integrator
     }
 
-    /// Whether anything in it moves, cameras apart.
+    /// Whether anything moves, other than cameras.
     pub fn moves(&self) -> bool {
         self.moves
     }
 
-    /// A box around everything finite; empty where there is nothing.
+    /// The bounding box of everything finite; may be empty.
     pub fn bounds(&self) -> Aabb {
         self.bounds
     }
 
-    /// What everything stands on, where there is such a thing.
+    /// The ground plane, if any.
     pub fn ground(&self) -> Option<&GroundPlane> {
         self.ground.as_ref()
     }
@@ -135,33 +136,33 @@ impl Scene {
         &self.lights
     }
 
-    /// What was left out or will be slow.
+    /// Dropped parts, and causes of slow rendering.
     pub fn warnings(&self) -> &[BuildWarning] {
         &self.warnings
     }
 
-    /// The position in its file of the shape that was hit.
+    /// The index in its file of the shape that was hit.
     pub fn shape_index(&self, hit: &Hit) -> u32 {
         self.leaf(hit).0.shape
     }
 
-    /// Whether anything is made of what light goes through: glass, panes, leaves. Cut-outs do not count.
+    /// Whether any material transmits light: glass, panes, leaves. Cut-outs do not count.
     pub fn lets_light_through(&self) -> bool {
         self.lets_light_through
     }
 
-    /// Whether light may go straight on through anything ([`lumbre_shading::Bsdf::straight_on`]): smooth panes without
-    /// thickness, mostly.
+    /// Whether any material transmits light straight on ([`lumbre_shading::Bsdf::straight_on`]), such as a thin
+    /// smooth pane.
     pub fn lets_light_straight_on(&self) -> bool {
         self.lets_light_straight_on
     }
 
-    /// Whether light may go straight on through what was hit.
+    /// Whether the hit surface may transmit light straight on.
     pub fn is_pane(&self, hit: &Hit) -> bool {
         self.leaf(hit).0.lets_light_straight_on()
     }
 
-    /// The nearest hit that light sees: cut-outs and interfaces let it pass.
+    /// The closest hit, skipping cut-outs and interfaces.
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
         if self.has_holes {
             let is_solid = |hit: &Hit| self.is_solid(ray, hit);
@@ -171,7 +172,8 @@ impl Scene {
         }
     }
 
-    /// The nearest hit that a camera sees: as [`Scene::closest`], but for the backs of what is one-sided.
+    /// The closest hit visible to a camera: as [`Scene::closest`], also skipping the backs of one-sided
+    /// materials.
     pub fn closest_seen(&self, ray: &Ray) -> Option<Hit> {
         if self.has_one_sided {
             let is_seen = |hit: &Hit| !self.is_back_of_one_sided(ray, hit) && self.is_solid(ray, hit);
@@ -181,7 +183,7 @@ impl Scene {
         }
     }
 
-    /// Whether something stands in the way of light.
+    /// Whether a shadow ray is occluded.
     pub fn is_occluded(&self, ray: &Ray) -> bool {
         if self.has_holes {
             let is_solid = |hit: &Hit| self.is_solid(ray, hit);
@@ -191,11 +193,11 @@ impl Scene {
         }
     }
 
-    /// What there is at a hit.
+    /// The interaction at a hit.
     pub fn interaction(&self, ray: &Ray, hit: &Hit, footprint: &Footprint) -> Interaction<'_> {
         let (entry, part, turned) = self.leaf(hit);
-        let bare = self.accel.surface(ray, hit);
-        let dressed = self.dressed(entry, &bare, ray, hit, part, turned);
+        let geometric = self.accel.surface(ray, hit);
+        let shaded = self.shading_geometry(entry, &geometric, ray, hit, part, turned);
         let primitive = match entry.form {
             Form::Patch { primitive, .. } => primitive,
             Form::Mesh(_) => part,
@@ -203,8 +205,8 @@ impl Scene {
         };
         let length = ray.direction.length();
         let direction = ray.direction / length;
-        let front = dressed.surface.normal.dot(direction) < 0.0;
-        let surface = dressed.surface;
+        let front = shaded.surface.normal.dot(direction) < 0.0;
+        let surface = shaded.surface;
         let spot = if entry.looks_up {
             let (dpdu, dpdv) = (surface.dpdu, surface.dpdv);
             footprint.on_plane(surface.point, surface.normal, dpdu, dpdv, direction, hit.root.t * length)
@@ -213,23 +215,31 @@ impl Scene {
         } else {
             Spot::default()
         };
-        let before = offset(surface.point, surface.point_error, surface.normal, -direction);
-        let is_smooth = dressed.shading.normal.dot(dressed.shading.geometric) < SMOOTH;
-        let rise = is_smooth.then(|| {
+        let incident_origin = offset(surface.point, surface.point_error, surface.normal, -direction);
+        let is_smooth = shaded.shading.normal.dot(shaded.shading.geometric) < SMOOTH;
+        let terminator_offset = is_smooth.then(|| {
             let placement = self.placement(ray, hit);
-            let rise = entry.rise(&bare, part, hit.root.local, placement.as_ref(), ray.time, -direction)?;
-            // Else it is lost in the error of the point.
-            (rise.dot(surface.normal).abs() > (before - surface.point).length()).then_some(rise)
+            let terminator_offset = entry.terminator_offset(
+                &geometric,
+                part,
+                hit.root.local,
+                placement.as_ref(),
+                ray.time,
+                -direction,
+            )?;
+            // A smaller offset is within the error of the point.
+            (terminator_offset.dot(surface.normal).abs() > (incident_origin - surface.point).length())
+                .then_some(terminator_offset)
         });
         let light = entry.light;
-        let bare = light.map(|_| {
+        let geometric = light.map(|_| {
             let is_placed = !hit.instances.is_empty();
-            Box::new(if is_placed { self.accel.surface_in_object(ray, hit) } else { bare })
+            Box::new(if is_placed { self.accel.surface_in_object(ray, hit) } else { geometric })
         });
         Interaction {
-            at: dressed.context(spot.dpdx, spot.dpdy, spot.duv_dx, spot.duv_dy),
+            at: shaded.context(spot.dpdx, spot.dpdy, spot.duv_dx, spot.duv_dy),
             surface,
-            shading: dressed.shading,
+            shading: shaded.shading,
             towards_origin: -direction,
             front,
             material: entry.material.as_deref(),
@@ -237,17 +247,17 @@ impl Scene {
             light,
             shape: entry.shape,
             primitive,
-            bare,
+            geometric,
             time: ray.time,
-            before,
-            rise: rise.flatten(),
+            incident_origin,
+            terminator_offset: terminator_offset.flatten(),
             width: spot.width,
             spread: spot.spread,
         }
     }
 
-    /// Light that arrives at `from` at a time, from a light chosen by `choose`, in a direction chosen by `u`. Its density, or
-    /// its radiance where it has none, counts the choice.
+    /// A light sample for `from` at a time: a light chosen by `choose`, and a direction by `u`. Its density, or
+    /// the radiance of a delta light, includes the probability of the light.
     pub fn sample_light(&self, from: DVec3, time: f64, choose: f64, u: DVec2) -> Option<LightSample> {
         let choice = self.light_choice.as_ref()?.sample(choose);
         let mut sample = self.lights[choice.index].sample(&self.entries, from, time, u)?;
@@ -258,28 +268,28 @@ impl Scene {
         Some(sample)
     }
 
-    /// A light chosen by its power, with the probability of the choice; `None` where there is no light.
+    /// A light chosen by power, with its probability; `None` without lights.
     pub fn choose_light(&self, choose: f64) -> Option<(LightId, f64)> {
         let choice = self.light_choice.as_ref()?.sample(choose);
         Some((LightId(choice.index as u32), choice.probability))
     }
 
-    /// Light that arrives at `from` at a time from one light, in a direction chosen by `u`.
+    /// A sample of one light for `from` at a time, in a direction chosen by `u`.
     pub fn sample_one_light(&self, light: LightId, from: DVec3, time: f64, u: DVec2) -> Option<LightSample> {
         self.lights[light.0 as usize].sample(&self.entries, from, time, u)
     }
 
-    /// The density per unit solid angle with which [`Scene::sample_light`] chooses at `from` what a ray from there hit; 0
-    /// where it never does.
+    /// The density per unit solid angle with which [`Scene::sample_light`] samples `hit` from `from`; 0 if it
+    /// never does.
     pub fn light_pdf(&self, from: DVec3, hit: &Interaction) -> f32 {
-        let (Some(light), Some(bare)) = (hit.light, &hit.bare) else { return 0.0 };
-        let surface = Some((&**bare, hit.primitive));
+        let (Some(light), Some(geometric)) = (hit.light, &hit.geometric) else { return 0.0 };
+        let surface = Some((&**geometric, hit.primitive));
         let ray = Ray::new(from, -hit.towards_origin).at_time(hit.time);
         (self.light_probability(light) * self.lights[light.0 as usize].pdf(&ray, surface)) as f32
     }
 
-    /// What arrives along the unit direction of a ray that leaves the scene: for each light at infinity its radiance, and
-    /// the density with which [`Scene::sample_light`] chooses the direction for it.
+    /// The radiance of each infinite light along a ray that leaves the scene, with the density with which
+    /// [`Scene::sample_light`] samples that direction.
     pub fn escaped<'s>(&'s self, ray: &'s Ray) -> impl Iterator<Item = (Spectrum, f32)> + 's {
         self.infinite.iter().map(move |&id| {
             let light = &self.lights[id.0 as usize];
@@ -288,7 +298,7 @@ impl Scene {
         })
     }
 
-    /// What arrives along the unit direction of a ray that leaves the scene, from each light at infinity.
+    /// The radiance of each infinite light along a ray that leaves the scene.
     pub fn background<'s>(&'s self, ray: &'s Ray) -> impl Iterator<Item = Spectrum> + 's {
         self.infinite.iter().map(move |&id| self.lights[id.0 as usize].escaped(ray.direction))
     }
@@ -297,8 +307,8 @@ impl Scene {
         self.light_choice.as_ref().map_or(0.0, |choice| choice.probability(light.0 as usize))
     }
 
-    /// The surface that was hit, that of a leaf for a CSG; which primitive of it; and whether it was turned inside out
-    /// because the leaf was taken away.
+    /// The surface entry of a hit, that of a leaf for a CSG; the primitive; and whether it is flipped because
+    /// the leaf is subtracted.
     fn leaf(&self, hit: &Hit) -> (&SurfaceEntry, u32, bool) {
         let entry = &self.entries[hit.id as usize];
         match &entry.form {
@@ -310,41 +320,49 @@ impl Scene {
         }
     }
 
-    /// The map from the innermost instance of a hit; `None` in the world itself.
+    /// The transform of the innermost instance of a hit; `None` in the world itself.
     fn placement(&self, ray: &Ray, hit: &Hit) -> Option<Transform> {
         (self.has_instances && !hit.instances.is_empty()).then(|| self.accel.world_from_object(ray, hit))
     }
 
-    fn dressed(
+    fn shading_geometry(
         &self,
         entry: &SurfaceEntry,
-        bare: &Surface,
+        geometric: &Surface,
         ray: &Ray,
         hit: &Hit,
         primitive: u32,
         turned: bool,
-    ) -> Dressed {
+    ) -> ShadingGeometry {
         let placement = self.placement(ray, hit);
         if !turned {
-            return entry.dress(bare, primitive, hit.root.local, placement.as_ref(), ray.time);
+            return entry.shading_geometry(
+                geometric,
+                primitive,
+                hit.root.local,
+                placement.as_ref(),
+                ray.time,
+            );
         }
-        let outward = Surface { normal: -bare.normal, dndu: -bare.dndu, dndv: -bare.dndv, ..*bare };
-        let mut dressed = entry.dress(&outward, primitive, hit.root.local, placement.as_ref(), ray.time);
-        dressed.turn();
-        dressed
+        let outward =
+            Surface { normal: -geometric.normal, dndu: -geometric.dndu, dndv: -geometric.dndv, ..*geometric };
+        let mut shaded =
+            entry.shading_geometry(&outward, primitive, hit.root.local, placement.as_ref(), ray.time);
+        shaded.turn();
+        shaded
     }
 
     fn is_back_of_one_sided(&self, ray: &Ray, hit: &Hit) -> bool {
         let (entry, _, turned) = self.leaf(hit);
         entry.is_one_sided() && {
-            // The way its faces run decides, not the normals of vertices.
+            // By the orientation of its faces, not by vertex normals.
             let along = self.accel.surface(ray, hit).normal.dot(ray.direction) > 0.0;
             along != (turned != entry.reverse)
         }
     }
 
-    /// Whether a hit stops light. Where coverage is partial, a hash of the ray and of the place decides: the same
-    /// wherever it is asked.
+    /// Whether a hit blocks light. Partial alpha is decided by a hash of the ray and the position, so the
+    /// result is deterministic.
     fn is_solid(&self, ray: &Ray, hit: &Hit) -> bool {
         let (entry, part, turned) = self.leaf(hit);
         if !entry.is_visible() {
@@ -354,9 +372,9 @@ impl Scene {
         let coverage = match **alpha {
             FloatTexture::Constant(coverage) => coverage,
             _ => {
-                let bare = self.accel.surface(ray, hit);
-                let dressed = self.dressed(entry, &bare, ray, hit, part, turned);
-                alpha.evaluate(&dressed.bare_context())
+                let geometric = self.accel.surface(ray, hit);
+                let shaded = self.shading_geometry(entry, &geometric, ray, hit, part, turned);
+                alpha.evaluate(&shaded.point_context())
             }
         };
         if coverage >= 1.0 {

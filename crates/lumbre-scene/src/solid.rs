@@ -1,4 +1,4 @@
-//! Closed meshes as solids, for combinations.
+//! Closed meshes as solids for CSG.
 
 use std::collections::HashMap;
 use std::ops::ControlFlow;
@@ -15,16 +15,16 @@ pub(crate) struct MeshSolid {
     accel: Accel,
 }
 
-/// Why a mesh is no solid.
+/// Why a mesh is not a solid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub(crate) enum SolidError {
-    /// An edge that as many triangles do not run up as down.
+    /// An edge with unequal numbers of triangles in its two directions.
     #[error("the mesh is not closed: triangle {triangle} has an edge without a neighbour")]
     Open {
-        /// One of the triangles on it.
+        /// A triangle with the edge.
         triangle: usize,
     },
-    /// There is nothing in it.
+    /// It is empty.
     #[error("the mesh has no triangles")]
     Empty,
     /// The tree cannot be built.
@@ -33,7 +33,7 @@ pub(crate) enum SolidError {
 }
 
 impl MeshSolid {
-    /// The solid inside a mesh. Vertices at the same place are one.
+    /// The solid inside a mesh. Vertices at the same position are merged.
     pub(crate) fn new(mesh: Arc<TriangleMesh>) -> Result<Self, SolidError> {
         if mesh.indices.is_empty() {
             return Err(SolidError::Empty);
@@ -52,9 +52,9 @@ impl MeshSolid {
     }
 }
 
-/// A triangle with an edge along which another number of triangles runs than against it.
+/// A triangle with an edge whose numbers of triangles in its two directions differ.
 fn open_edge(mesh: &TriangleMesh) -> Option<usize> {
-    // Adding 0 makes the two zeros one.
+    // Adding 0 turns -0 into 0.
     let key = |p: Vec3| (p + Vec3::ZERO).to_array().map(f32::to_bits);
     let mut places = HashMap::new();
     let places: Vec<u32> = (mesh.positions.iter())
@@ -73,7 +73,7 @@ fn open_edge(mesh: &TriangleMesh) -> Option<usize> {
             }
         }
     }
-    // The least, so that the answer does not depend on the order of the map.
+    // The least, so that the result does not depend on the order of the map.
     balance.into_values().filter(|&(sum, _)| sum != 0).map(|(_, triangle)| triangle).min()
 }
 
@@ -91,7 +91,8 @@ impl Solid for MeshSolid {
         let bounds = self.accel.bounds();
         let apart = bounds.center() - ray.origin;
         let speed = ray.direction.length();
-        // Where the line is nearest to the middle of the mesh, and as far from there as it can be inside.
+        // The nearest point of the line to the mesh's centre, and the half-length of the line inside the
+        // bounding sphere.
         let nearest = apart.dot(ray.direction) / (speed * speed);
         let reach = (bounds.size().length() + 1e-12 * apart.length()) / speed;
         let line = ray.with_range(nearest - reach, nearest + reach);
@@ -124,8 +125,8 @@ impl Solid for MeshSolid {
     }
 }
 
-/// Takes out what a line along a face or through a silhouette counted on one side only, so that as many enter as leave.
-/// Crossings are in ascending order.
+/// Removes unpaired crossings of lines along a face or through a silhouette, so that entries and exits are
+/// equal in number. Crossings are in ascending order.
 fn balance(crossings: &mut Crossings, first: usize) {
     let mut depth = 0_usize;
     let mut kept = first;

@@ -1,4 +1,4 @@
-//! What stands around a model that is to be shown: a view of it, light, and the ground under it.
+//! Staging of a model: a camera, light, and the ground.
 
 use std::sync::Arc;
 
@@ -12,102 +12,103 @@ use crate::{
     WithoutLight, studio,
 };
 
-/// How a description is made ready to be shown. What it has of its own stays, unless something here says otherwise.
+/// How a description is staged. What it has itself is kept, unless stated otherwise here.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Stage {
-    /// Whether to frame everything though the description has cameras; they are left out then.
+    /// Whether to replace the description's cameras by one that frames everything.
     pub fit: bool,
-    /// Pixels across and down of the picture, whose shape the automatic view fills; by default the description's own, or
-    /// 1200 by 900.
+    /// The picture's width and height in pixels, which the automatic view fills; by default the description's
+    /// own, or 1200 by 900.
     pub size: Option<(u32, u32)>,
-    /// How many turns, as a share of one, the automatic camera has made about the model; all turns hold what any of them
-    /// sees. The studio goes with it, as if the model were turning before both. `None` for a view of its own.
+    /// The rotation of the automatic camera about the model, as a fraction of a turn; the model stays in view
+    /// for all rotations. The studio rotates with the camera, as if the model turned in front of both. `None`
+    /// for the still view.
     pub turns: Option<f64>,
-    /// Light from all around.
+    /// The environment light.
     pub surroundings: Surroundings,
-    /// What the model stands on.
+    /// The ground plane.
     pub ground: Ground,
 }
 
-/// Light from all around a model.
+/// The environment light of a model.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub enum Surroundings {
-    /// The studio, where the description says so ([`SceneDesc::without_light`]).
+    /// Studio light, if the description asks for it ([`SceneDesc::without_light`]).
     #[default]
     Automatic,
-    /// What the description has.
+    /// The description's own.
     Own,
-    /// The studio, besides the description's lights that are not infinitely far away all around.
+    /// Studio light in place of the description's infinite lights.
     Studio,
-    /// A picture, in place of what the description has. The middle of a latitude–longitude picture lies behind the model as
-    /// the automatic camera sees it before it turns.
+    /// An image in place of the description's infinite lights. The centre of a latitude-longitude image is
+    /// behind the model as seen from the unrotated automatic camera.
     Map(EnvironmentDesc),
 }
 
-/// What a model stands on.
+/// The ground under a model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Ground {
-    /// A shadow where the camera and the light from all around are none of the description's own; else nothing.
+    /// A shadow catcher if both camera and environment light are automatic; else nothing.
     #[default]
     Automatic,
     /// Nothing.
     None,
-    /// Ground of which the camera sees the shadow alone.
+    /// A shadow catcher.
     Shadow,
     /// A matte grey plane.
     Plane,
 }
 
 impl Ground {
-    /// Their names, in the order of the enum.
+    /// The names, in the order of the enum.
     pub const NAMES: [&'static str; 4] = ["auto", "none", "shadow", "plane"];
 
-    /// The one of that name.
+    /// The ground of a name.
     pub fn from_name(name: &str) -> Option<Self> {
         const ALL: [Ground; 4] = [Ground::Automatic, Ground::None, Ground::Shadow, Ground::Plane];
         Self::NAMES.iter().position(|known| *known == name).map(|i| ALL[i])
     }
 }
 
-/// What a [`Stage`] did to a description.
+/// What a [`Stage`] changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Staged {
-    /// Whether the camera is the automatic one.
+    /// Whether the camera is automatic.
     pub framed: bool,
-    /// Where the light comes from.
+    /// The source of light.
     pub light: StageLight,
     /// Whether there is ground.
     pub grounded: bool,
-    /// Whether the description has lights in candelas or lux but does not say how they are to be exposed, as glTF.
+    /// Whether the description has lights in candelas or lux but no exposure, as in glTF.
     pub photometric: bool,
 }
 
-/// Where the light of a staged description comes from.
+/// The source of light of a staged description.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum StageLight {
-    /// The description's own lights, if it has any.
+    /// The description's own lights, if any.
     Own,
-    /// The studio, with what else the description has.
+    /// Studio light, and the rest of the description's.
     Studio,
-    /// [`Surroundings::Map`], with what else the description has.
+    /// [`Surroundings::Map`], and the rest of the description's lights.
     Map,
 }
 
-/// Reflectance of the ground. As much as a floor of light wood or concrete.
+/// The reflectance of the ground: as light wood or concrete.
 const GROUND: f32 = 0.5;
-/// How far the ground lies below the lowest point, as a share of the model's size, so that what is flat and lies on it is
-/// seen.
+/// The distance of the ground below the lowest point, relative to the model's size, so that flat things on it
+/// are visible.
 const GAP: f64 = 1e-4;
-/// Pixels of a picture of which neither the description nor its camera says the size.
+/// The size of a picture if neither the description nor its camera specifies one.
 const SIZE: (u32, u32) = (1200, 900);
 
 impl EnvironmentDesc {
-    /// The map that an image is by its shape: square, or twice as wide as high; `None` for others.
+    /// The mapping of an image by its aspect ratio: square, or twice as wide as high; `None` for others.
     pub fn of_image(image: Arc<Image>) -> Option<Self> {
         let (width, height) = (image.width(), image.height());
         let mapping = if width == height {
@@ -122,7 +123,7 @@ impl EnvironmentDesc {
 }
 
 impl Stage {
-    /// Adds to a description what it lacks to be shown.
+    /// Adds to a description what it lacks.
     pub fn set(&self, desc: &mut SceneDesc) -> Staged {
         let is_model = desc.without_light != WithoutLight::Dark;
         let framed = desc.cameras.is_empty() || self.fit || self.turns.is_some();
@@ -146,7 +147,7 @@ impl Stage {
         if light == StageLight::Studio {
             desc.lights.push(studio::light(desc.up, turns));
         }
-        // Nothing is added when it is built.
+        // Nothing more is added when it is built.
         desc.without_light = WithoutLight::Dark;
 
         let extent = Extent::new(desc);
@@ -179,7 +180,7 @@ impl Stage {
     }
 }
 
-/// A picture all around, the middle of a latitude–longitude one to the back.
+/// An environment map, with the centre of a latitude-longitude image at the back.
 fn around(up: UpAxis, map: &EnvironmentDesc) -> LightDesc {
     let [right, upward, front] = axes(up, 0.0);
     // x to the back, z up.
@@ -191,7 +192,7 @@ fn around(up: UpAxis, map: &EnvironmentDesc) -> LightDesc {
     }
 }
 
-/// Whether a description has so little light of its own that a studio is to light it.
+/// Whether a description has so little light of its own that it needs studio light.
 pub(crate) fn wants_studio(desc: &SceneDesc) -> bool {
     match desc.without_light {
         WithoutLight::Dark => false,
@@ -200,7 +201,7 @@ pub(crate) fn wants_studio(desc: &SceneDesc) -> bool {
     }
 }
 
-/// Whether any shape gives light.
+/// Whether any shape emits light.
 fn shines(desc: &SceneDesc) -> bool {
     let in_objects = desc.objects.iter().flat_map(|object| &object.shapes);
     let mut open: Vec<&ShapeDesc> = desc.shapes.iter().chain(in_objects).collect();
@@ -215,7 +216,7 @@ fn shines(desc: &SceneDesc) -> bool {
     false
 }
 
-/// The plane under everything; `None` where there is nothing.
+/// The plane under everything; `None` if there is nothing.
 fn ground(extent: &Extent, desc: &SceneDesc, catcher: bool) -> Option<GroundDesc> {
     let bounds = extent.bounds();
     if bounds.is_empty() || !bounds.min.is_finite() || !bounds.max.is_finite() {

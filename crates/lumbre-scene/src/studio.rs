@@ -1,4 +1,4 @@
-//! The automatic light: a photographer's studio, as a picture of radiance all around.
+//! Studio light, as an environment map.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -11,21 +11,22 @@ use crate::{EnvironmentDesc, EnvironmentMapping, LightDesc, UpAxis};
 
 const WIDTH: u32 = 512;
 const HEIGHT: u32 = 256;
-/// The radiance of a white level surface in the open. What faces the key is brighter still, and what faces the camera darker.
+/// The radiance of a white horizontal surface in the open. What faces the key light is brighter, what faces the
+/// camera darker.
 const LEVEL: f64 = 1.0;
 
 /// A soft rectangular lamp.
 struct Softbox {
-    /// Towards its middle: to the right, up, to the front.
+    /// The direction of its centre: right, up, front.
     towards: DVec3,
-    /// Slopes of its half width and half height.
+    /// The slopes of its half-width and half-height.
     half: DVec2,
-    /// The share of those over which it fades at its edges.
+    /// The fraction of those over which its edges fade.
     edge: f64,
     radiance: f64,
 }
 
-/// A key from the upper left, a broad fill from the right, two rims from behind, and a lamp overhead.
+/// A key light from the upper left, a broad fill from the right, two rim lights from behind, and one overhead.
 const LAMPS: [Softbox; 5] = [
     Softbox {
         towards: DVec3::new(-0.95, 0.85, 0.6),
@@ -57,20 +58,20 @@ impl Softbox {
     }
 }
 
-/// The walls without the lamps: a little brighter towards the ceiling.
+/// The walls without the lamps: slightly brighter towards the ceiling.
 fn walls(direction: DVec3) -> f64 {
     let height = 0.5 + 0.5 * direction.y;
     0.20 + 0.34 * height * height
 }
 
-/// The light of the studio after so many turns about the vertical.
+/// The studio light, rotated about the vertical.
 pub(crate) fn light(up: UpAxis, turns: f64) -> LightDesc {
     let mut level = 0.0;
     let mut pixels = Vec::with_capacity((WIDTH * HEIGHT) as usize);
     for i in 0..WIDTH * HEIGHT {
         let (x, y) = (f64::from(i % WIDTH) + 0.5, f64::from(i / WIDTH) + 0.5);
         let uv = DVec2::new(x / f64::from(WIDTH) + 0.5, y / f64::from(HEIGHT));
-        // In the light's own space z is up, x is to the right, and y to the back.
+        // In light space z is up, x to the right, and y to the back.
         let towards = warp64::latlong_to_sphere(uv);
         let direction = DVec3::new(towards.x, towards.z, -towards.y);
         let radiance = walls(direction) + LAMPS.iter().map(|lamp| lamp.at(direction)).sum::<f64>();

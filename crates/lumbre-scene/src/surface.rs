@@ -1,4 +1,4 @@
-//! What the scene knows of a geometry of the tree: what it is made of, and how its vertices dress it.
+//! The surface data of the tree's geometries: materials and vertex attributes.
 
 use std::sync::Arc;
 
@@ -11,93 +11,93 @@ use crate::csg::CsgForm;
 use crate::light::LightId;
 use crate::{ColouredShape, Emission, MeshDesc};
 
-/// What stands behind one id of the tree.
+/// The surface data for one id of the tree.
 #[derive(Clone, Debug)]
 pub(crate) struct SurfaceEntry {
     /// [`crate::ShapeDesc::index`].
     pub shape: u32,
-    /// `None` for an interface, which rays of light do not see.
+    /// `None` for an interface, which shadow rays ignore.
     pub material: Option<Arc<Material>>,
     pub emission: Option<Emission>,
-    /// The light that samples it; `None` where its light is only found by rays that hit it.
+    /// The light that samples it; `None` if only rays that hit it find its light.
     pub light: Option<LightId>,
     pub alpha: Option<Arc<FloatTexture>>,
     pub reverse: bool,
-    /// Whether the material looks up textures, and needs to know how wide a spot a ray covers.
+    /// Whether the material has textures, and needs footprints.
     pub looks_up: bool,
     pub form: Form,
 }
 
-/// What dresses the bare surface that the tree knows.
+/// The vertex attributes of a geometry.
 #[derive(Clone, Debug)]
 pub(crate) enum Form {
-    /// Nothing: the surface is as geometry has it.
+    /// None: the surface is geometric.
     Exact,
-    /// Colours alone.
+    /// Colours only.
     Coloured(Box<ColourRamp>),
     /// A triangle mesh.
-    Mesh(Arc<MeshDress>),
-    /// The patch of a mesh that is a quad which is not flat.
-    Patch { dress: Arc<MeshDress>, corners: [u32; 4], primitive: u32 },
-    /// A CSG: the surface of each leaf.
+    Mesh(Arc<MeshAttributes>),
+    /// A patch of a mesh, from a quad that is not flat.
+    Patch { attributes: Arc<MeshAttributes>, corners: [u32; 4], primitive: u32 },
+    /// A CSG: the surface data of each leaf.
     Csg(Arc<CsgForm>),
 }
 
-/// A colour that runs from one place to another, in the space of a tree.
+/// A colour interpolated between two points, in the space of a tree.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ColourRamp {
     start: DVec3,
-    /// By how much more of the way is done a step farther.
+    /// The gradient of the interpolation parameter.
     slope: DVec3,
     colours: [Spectrum; 2],
     coverages: [f32; 2],
 }
 
-/// What a mesh has at its vertices, in the space of the tree that it stands in.
+/// The vertex attributes of a mesh, in the space of its tree.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct MeshDress {
+pub(crate) struct MeshAttributes {
     pub mesh: Arc<TriangleMesh>,
-    /// Whether each face runs the other way than in the file, because the mesh was baked through a mirror.
+    /// Whether faces are reversed from the file, because the mesh was baked through a mirror.
     pub swapped: bool,
-    /// From this triangle on, two triangles are halves of a quad.
+    /// From this triangle on, pairs of triangles are halves of a quad.
     pub first_half: u32,
-    /// What a transform turned; else it is in `rest`.
+    /// Attributes changed by the transform; the others are in `rest`.
     pub turned: Turned,
-    /// Where it changes its form.
+    /// Its deformation, if any.
     pub moving: Option<Deforming>,
-    /// The description, which others may share, without what has moved into the mesh.
+    /// The description, which may be shared, without what has been moved into the mesh.
     pub rest: Arc<MeshDesc>,
 }
 
-/// A mesh that changes its form, in the space of its tree.
+/// A deforming mesh, in the space of its tree.
 #[derive(Clone, Debug)]
 pub(crate) struct Deforming {
     pub mesh: Arc<DeformingMesh>,
-    /// Normals at the vertices, moment by moment.
+    /// Vertex normals, by key.
     pub normals: Option<Vec<Vec<Vec3>>>,
 }
 
-/// Directions at vertices, turned into the space of a tree.
+/// Vertex directions, transformed into the space of a tree.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Turned {
     pub normals: Option<Vec<Vec3>>,
     pub tangents: Option<Vec<Vec4>>,
 }
 
-/// A surface with what its vertices say of it.
+/// A surface with its interpolated vertex attributes.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Dressed {
-    /// The surface, its normal turned to the outside, its uv and derivatives those that textures see.
+pub(crate) struct ShadingGeometry {
+    /// The surface, its normal pointing outside, with the uv and derivatives of textures.
     pub surface: Surface,
     pub shading: LocalSurface,
-    /// What vertices say besides; its derivatives are not by pixels, but by u and v.
+    /// Further vertex data, with derivatives by u and v instead of pixels.
     pub vertex: VertexData,
 }
 
-/// A value at three or four corners of a face, as a function of the face's own coordinates.
+/// Interpolation over the three or four corners of a face, as a function of the face's own coordinates.
 struct Blend<const N: usize> {
     weights: [f64; N],
-    /// Derivatives of the weights by the two coordinates of the face.
+    /// The derivatives of the weights by the face's two coordinates.
     along: [[f64; N]; 2],
 }
 
@@ -122,7 +122,7 @@ fn weighted<const N: usize>(weights: &[f64; N], corners: &[DVec3; N]) -> DVec3 {
     sum
 }
 
-/// What a list has at some corners. (`map` on an array is not inlined here, and showed in profiles.)
+/// A list's values at some corners. (`map` on an array is not inlined here.)
 #[inline]
 fn at<T: Copy, const N: usize>(list: &[T], corners: [u32; N]) -> [T; N] {
     std::array::from_fn(|i| list[corners[i] as usize])
@@ -142,12 +142,12 @@ fn patch_blend(uv: DVec2) -> Blend<4> {
 }
 
 impl SurfaceEntry {
-    /// Whether rays of light see it: an interface only parts media.
+    /// Whether shadow rays see it: an interface only separates media.
     pub(crate) fn is_visible(&self) -> bool {
         self.material.is_some()
     }
 
-    /// Whether it gives off light.
+    /// Whether it emits light.
     pub(crate) fn shines(&self) -> bool {
         match &self.form {
             Form::Csg(csg) => csg.leaves.iter().any(Self::shines),
@@ -155,8 +155,8 @@ impl SurfaceEntry {
         }
     }
 
-    /// What it gives off, with 1 where it faces as its geometry does and -1 where the other way, if that is the same all
-    /// over it: without textures, without cut-outs, and without normals at vertices that might turn a face.
+    /// Its emission, with 1 if it faces as its geometry does or -1 if flipped, provided that this is uniform:
+    /// without textures, cut-outs, and vertex normals that might flip a face.
     pub(crate) fn plain_emission(&self) -> Option<(&Emission, f64)> {
         let is_plain = match &self.form {
             Form::Exact | Form::Coloured(_) => true,
@@ -168,7 +168,7 @@ impl SurfaceEntry {
             .then_some((emission, if self.reverse { -1.0 } else { 1.0 }))
     }
 
-    /// Whether any part of it looks up textures.
+    /// Whether any part of it has textures.
     pub(crate) fn looks_up_anywhere(&self) -> bool {
         match &self.form {
             Form::Csg(csg) => self.looks_up || csg.leaves.iter().any(Self::looks_up_anywhere),
@@ -181,7 +181,7 @@ impl SurfaceEntry {
         self.material.as_ref().is_some_and(|material| material.one_sided)
     }
 
-    /// Whether a camera looks through the back of any part of it.
+    /// Whether any part of it is one-sided.
     pub(crate) fn is_one_sided_anywhere(&self) -> bool {
         match &self.form {
             Form::Csg(csg) => csg.leaves.iter().any(Self::is_one_sided_anywhere),
@@ -189,7 +189,7 @@ impl SurfaceEntry {
         }
     }
 
-    /// Whether light may go through the material of any part of it.
+    /// Whether any part of it transmits light.
     pub(crate) fn lets_light_through(&self) -> bool {
         match &self.form {
             Form::Csg(csg) => csg.leaves.iter().any(Self::lets_light_through),
@@ -197,7 +197,7 @@ impl SurfaceEntry {
         }
     }
 
-    /// Whether light may go straight on through the material of any part of it.
+    /// Whether any part of it transmits light straight on.
     pub(crate) fn lets_light_straight_on(&self) -> bool {
         match &self.form {
             Form::Csg(csg) => csg.leaves.iter().any(Self::lets_light_straight_on),
@@ -205,7 +205,7 @@ impl SurfaceEntry {
         }
     }
 
-    /// Whether light may pass through some of it.
+    /// Whether any part of it may be passed by light.
     pub(crate) fn has_holes(&self) -> bool {
         match &self.form {
             Form::Csg(csg) => csg.leaves.iter().any(Self::has_holes),
@@ -213,53 +213,56 @@ impl SurfaceEntry {
         }
     }
 
-    /// Dresses a bare surface of the tree at a time. `local` are the coordinates of the face that it lies on, `placement` leads
-    /// from the space of the mesh to that of `surface`.
-    pub(crate) fn dress(
+    /// Adds the vertex attributes to a geometric surface of the tree at a time. `local` are the coordinates in
+    /// its face; `placement` maps the space of the mesh to that of `surface`.
+    pub(crate) fn shading_geometry(
         &self,
         surface: &Surface,
         primitive: u32,
         local: DVec2,
         placement: Option<&Transform>,
         time: f64,
-    ) -> Dressed {
-        let mut dressed = match &self.form {
+    ) -> ShadingGeometry {
+        let mut shaded = match &self.form {
             Form::Exact | Form::Csg(_) => plain(surface),
-            Form::Coloured(ramp) => Dressed { vertex: ramp.at(surface.point, placement), ..plain(surface) },
+            Form::Coloured(ramp) => {
+                ShadingGeometry { vertex: ramp.at(surface.point, placement), ..plain(surface) }
+            }
             Form::Mesh(mesh) => {
                 let corners = mesh.mesh.indices[primitive as usize];
                 let uvs = match &mesh.rest.uvs {
                     Some(uvs) => at(uvs, corners),
                     None => mesh.default_uvs(primitive),
                 };
-                mesh.dress(surface, corners, uvs, &triangle_blend(local), placement, time)
+                mesh.shading_geometry(surface, corners, uvs, &triangle_blend(local), placement, time)
             }
-            Form::Patch { dress, corners, .. } => {
-                let uvs = match &dress.rest.uvs {
+            Form::Patch { attributes, corners, .. } => {
+                let uvs = match &attributes.rest.uvs {
                     Some(uvs) => at(uvs, *corners),
-                    None if dress.swapped => [Vec2::ZERO, Vec2::Y, Vec2::X, Vec2::ONE],
+                    None if attributes.swapped => [Vec2::ZERO, Vec2::Y, Vec2::X, Vec2::ONE],
                     None => [Vec2::ZERO, Vec2::X, Vec2::Y, Vec2::ONE],
                 };
-                dress.dress(surface, *corners, uvs, &patch_blend(local), placement, time)
+                attributes.shading_geometry(surface, *corners, uvs, &patch_blend(local), placement, time)
             }
         };
         if self.reverse {
-            dressed.turn();
+            shaded.turn();
         }
-        dressed
+        shaded
     }
 }
 
 impl SurfaceEntry {
-    /// How far the smooth surface that the normals of a triangle's vertices tell of stands off the triangle, on the side that
-    /// `towards` leaves on; `None` where it does not.
+    /// The offset from a triangle to the smooth surface implied by its vertex normals, on the side of
+    /// `towards`; `None` if that is not above the triangle.
     ///
-    /// J. Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, 2021: the planes through the vertices, across
-    /// their normals, blended as the normals are, as far as they lie above the point. Over a triangle of a sphere that is
-    /// about twice the height of the sphere, so that rays which the sphere would let go clear the triangles beside it.
-    pub(crate) fn rise(
+    /// J. Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, 2021: the tangent planes of the
+    /// vertices, interpolated as the normals are, as far as they lie above the point. On a triangle of a sphere
+    /// that is about twice the height of the sphere, so rays that the sphere does not occlude clear the
+    /// adjacent triangles.
+    pub(crate) fn terminator_offset(
         &self,
-        bare: &Surface,
+        geometric: &Surface,
         primitive: u32,
         local: DVec2,
         placement: Option<&Transform>,
@@ -271,26 +274,26 @@ impl SurfaceEntry {
         let Blend { weights, .. } = triangle_blend(local);
         let unit = |n: DVec3| placement.map_or(n, |map| map.normal(n)).normalize_or_zero();
         let normals = normals.map(unit);
-        let above = if bare.normal.dot(towards) < 0.0 { -bare.normal } else { bare.normal };
+        let above = if geometric.normal.dot(towards) < 0.0 { -geometric.normal } else { geometric.normal };
         let side = if weighted(&weights, &normals).dot(above) < 0.0 { -1.0 } else { 1.0 };
         // From the first corner, and from the others.
-        let from_first = local.x * bare.dpdu + local.y * bare.dpdv;
-        let ways = [from_first, from_first - bare.dpdu, from_first - bare.dpdv];
-        let mut rise = DVec3::ZERO;
+        let from_first = local.x * geometric.dpdu + local.y * geometric.dpdv;
+        let ways = [from_first, from_first - geometric.dpdu, from_first - geometric.dpdv];
+        let mut terminator_offset = DVec3::ZERO;
         for ((weight, normal), way) in weights.into_iter().zip(normals).zip(ways) {
             let normal = side * normal;
-            // A vertex that looks away says nothing of a surface on this side.
+            // A vertex that faces away does not describe a surface on this side.
             if normal.dot(above) <= 0.0 {
                 return None;
             }
-            rise -= weight * way.dot(normal).min(0.0) * normal;
+            terminator_offset -= weight * way.dot(normal).min(0.0) * normal;
         }
-        (rise.dot(above) > 0.0 && rise.is_finite()).then_some(rise)
+        (terminator_offset.dot(above) > 0.0 && terminator_offset.is_finite()).then_some(terminator_offset)
     }
 }
 
-impl Dressed {
-    /// Where textures are looked up, with derivatives of u and v over a pixel.
+impl ShadingGeometry {
+    /// The context of texture lookups, with derivatives of u and v over a pixel.
     pub(crate) fn context(&self, dpdx: Vec3, dpdy: Vec3, duv_dx: Vec2, duv_dy: Vec2) -> TextureContext {
         // From derivatives by u and v to derivatives over a pixel.
         let further = self.vertex.further.map(|place| FurtherUv {
@@ -310,15 +313,15 @@ impl Dressed {
         }
     }
 
-    /// Where textures are looked up, without a footprint.
-    pub(crate) fn bare_context(&self) -> TextureContext {
+    /// The context of texture lookups without a footprint.
+    pub(crate) fn point_context(&self) -> TextureContext {
         TextureContext {
             normal: self.surface.normal.as_vec3(),
             ..self.context(Vec3::ZERO, Vec3::ZERO, Vec2::ZERO, Vec2::ZERO)
         }
     }
 
-    /// Turns the inside out.
+    /// Flips the surface.
     pub(crate) fn turn(&mut self) {
         self.surface.normal = -self.surface.normal;
         self.surface.dndu = -self.surface.dndu;
@@ -330,8 +333,8 @@ impl Dressed {
     }
 }
 
-fn plain(surface: &Surface) -> Dressed {
-    Dressed {
+fn plain(surface: &Surface) -> ShadingGeometry {
+    ShadingGeometry {
         surface: *surface,
         shading: LocalSurface {
             normal: surface.normal.as_vec3(),
@@ -353,14 +356,14 @@ impl ColourRamp {
         let slope = way / way.length_squared();
         Self {
             start: tree_from_object.point(from),
-            // What is even in one space is so in another.
+            // A linear function stays linear under an affine map.
             slope: if slope.is_finite() { tree_from_object.normal(slope) } else { DVec3::ZERO },
             colours: coloured.colours,
             coverages: coloured.coverages,
         }
     }
 
-    /// The colour at a place, which `placement` leads to from the space of the tree.
+    /// The colour at a point; `placement` maps the space of the tree to that of the point.
     fn at(&self, place: DVec3, placement: Option<&Transform>) -> VertexData {
         let place = placement.map_or(place, |map| map.inverse_point(place));
         let part = self.slope.dot(place - self.start).clamp(0.0, 1.0) as f32;
@@ -373,13 +376,13 @@ impl ColourRamp {
     }
 }
 
-impl MeshDress {
-    /// Normals at the vertices.
+impl MeshAttributes {
+    /// Vertex normals.
     pub(crate) fn normals(&self) -> Option<&[Vec3]> {
         self.turned.normals.as_deref().or(self.rest.normals.as_deref())
     }
 
-    /// Normals at some vertices at a time.
+    /// The normals of some vertices at a time.
     #[inline]
     fn corner_normals<const N: usize>(&self, corners: [u32; N], time: f64) -> Option<[DVec3; N]> {
         let Some(moving) = &self.moving else {
@@ -392,12 +395,12 @@ impl MeshDress {
         Some(std::array::from_fn(|i| here[i].as_dvec3().lerp(next[i].as_dvec3(), part)))
     }
 
-    /// Tangents at the vertices, with the sides of the bitangents.
+    /// Vertex tangents, with the sides of the bitangents.
     fn tangents(&self) -> Option<&[Vec4]> {
         self.turned.tangents.as_deref().or(self.rest.tangents.as_deref())
     }
 
-    /// pbrt's parameters for triangles without any: (0, 0), (1, 0), (1, 1), and those of a quad for its halves.
+    /// pbrt's default uv of triangles: (0, 0), (1, 0), (1, 1); for halves of a quad, those of the quad.
     fn default_uvs(&self, triangle: u32) -> [Vec2; 3] {
         let second_half = triangle >= self.first_half && (triangle - self.first_half) % 2 == 1;
         let [a, b, c] =
@@ -405,33 +408,34 @@ impl MeshDress {
         if self.swapped { [a, c, b] } else { [a, b, c] }
     }
 
-    fn dress<const N: usize>(
+    /// Interpolates the vertex attributes over a geometric surface.
+    fn shading_geometry<const N: usize>(
         &self,
-        bare: &Surface,
+        geometric: &Surface,
         corners: [u32; N],
         uvs: [Vec2; N],
         blend: &Blend<N>,
         placement: Option<&Transform>,
         time: f64,
-    ) -> Dressed {
-        let mut dressed = self.shape(bare, corners, uvs, blend, placement, time);
+    ) -> ShadingGeometry {
+        let mut shaded = self.shape(geometric, corners, uvs, blend, placement, time);
         if let Some(colours) = &self.rest.colours {
             let colour = blend.value(corners.map(|i| {
                 let Spectrum { r, g, b } = colours[i as usize];
                 Vec3::new(r, g, b).as_dvec3()
             }));
-            dressed.vertex.colour = Spectrum::new(colour.x as f32, colour.y as f32, colour.z as f32);
+            shaded.vertex.colour = Spectrum::new(colour.x as f32, colour.y as f32, colour.z as f32);
         }
         if let Some(coverages) = &self.rest.coverages {
             let coverages = corners.map(|i| DVec3::splat(f64::from(coverages[i as usize])));
-            dressed.vertex.coverage = blend.value(coverages).x as f32;
+            shaded.vertex.coverage = blend.value(coverages).x as f32;
         }
-        for (list, place) in self.rest.further_uvs.iter().zip(&mut dressed.vertex.further) {
+        for (list, place) in self.rest.further_uvs.iter().zip(&mut shaded.vertex.further) {
             let Some(list) = list else { continue };
             let flat = |uv: Vec2| uv.as_dvec2().extend(0.0);
             let further = corners.map(|i| flat(list[i as usize]));
             place.uv = blend.value(further).truncate().as_vec2();
-            // From derivatives by the coordinates of the face to derivatives by uv.
+            // From derivatives by face coordinates to derivatives by uv.
             let [by_a, by_b] = blend.slopes(uvs.map(flat));
             let [further_a, further_b] = blend.slopes(further);
             let determinant = by_a.x * by_b.y - by_a.y * by_b.x;
@@ -441,24 +445,24 @@ impl MeshDress {
                 (place.duv_dx, place.duv_dy) = (by_u, by_v);
             }
         }
-        dressed
+        shaded
     }
 
     fn shape<const N: usize>(
         &self,
-        bare: &Surface,
+        geometric: &Surface,
         corners: [u32; N],
         uvs: [Vec2; N],
         blend: &Blend<N>,
         placement: Option<&Transform>,
         time: f64,
-    ) -> Dressed {
-        let mut surface = *bare;
+    ) -> ShadingGeometry {
+        let mut surface = *geometric;
         let uvs = std::array::from_fn(|i| DVec3::new(f64::from(uvs[i].x), f64::from(uvs[i].y), 0.0));
         let uv = blend.value(uvs);
         surface.uv = DVec2::new(uv.x, uv.y);
 
-        // From derivatives by the coordinates of the face to derivatives by uv.
+        // From derivatives by face coordinates to derivatives by uv.
         let [by_a, by_b] = blend.slopes(uvs);
         let determinant = by_a.x * by_b.y - by_a.y * by_b.x;
         let by_uv = |along_a: DVec3, along_b: DVec3| {
@@ -466,38 +470,38 @@ impl MeshDress {
             let along_v = (along_b * by_a.x - along_a * by_b.x) / determinant;
             (along_u, along_v)
         };
-        let (dpdu, dpdv) = by_uv(bare.dpdu, bare.dpdv);
+        let (dpdu, dpdv) = by_uv(geometric.dpdu, geometric.dpdv);
         let has_parameters = determinant != 0.0
             && dpdu.is_finite()
             && dpdv.is_finite()
             && dpdu.cross(dpdv).length_squared() > 0.0;
         (surface.dpdu, surface.dpdv) =
-            if has_parameters { (dpdu, dpdv) } else { bare.normal.any_orthonormal_pair() };
+            if has_parameters { (dpdu, dpdv) } else { geometric.normal.any_orthonormal_pair() };
         (surface.dndu, surface.dndv) =
-            if has_parameters { by_uv(bare.dndu, bare.dndv) } else { (DVec3::ZERO, DVec3::ZERO) };
+            if has_parameters { by_uv(geometric.dndu, geometric.dndv) } else { (DVec3::ZERO, DVec3::ZERO) };
 
         let Some(normals) = self.corner_normals(corners, time) else {
-            let mut dressed = plain(&surface);
-            self.align(&mut dressed, corners, blend, placement);
-            return dressed;
+            let mut shaded = plain(&surface);
+            self.align(&mut shaded, corners, blend, placement);
+            return shaded;
         };
         let moved = |n: DVec3| placement.map_or(n, |m| m.normal(n));
         let sum = moved(blend.value(normals));
         let length = sum.length();
         if length.is_nan() || length <= 0.0 {
-            let mut dressed = plain(&surface);
-            self.align(&mut dressed, corners, blend, placement);
-            return dressed;
+            let mut shaded = plain(&surface);
+            self.align(&mut shaded, corners, blend, placement);
+            return shaded;
         }
         let normal = sum / length;
-        // The vertices say which side is out (pbrt does so, and meshes whose faces run the wrong way are many).
+        // Vertex normals determine the outside, as in pbrt: reversed faces are common in meshes.
         if surface.normal.dot(normal) < 0.0 {
             surface.normal = -surface.normal;
             surface.dndu = -surface.dndu;
             surface.dndv = -surface.dndv;
         }
-        let mut dressed = plain(&surface);
-        dressed.shading.normal = normal.as_vec3();
+        let mut shaded = plain(&surface);
+        shaded.shading.normal = normal.as_vec3();
         let turned = |dn: DVec3| {
             let dn = moved(dn) / length;
             dn - normal * normal.dot(dn)
@@ -505,16 +509,17 @@ impl MeshDress {
         let [by_a, by_b] = blend.slopes(normals);
         let (dndu, dndv) =
             if has_parameters { by_uv(turned(by_a), turned(by_b)) } else { (DVec3::ZERO, DVec3::ZERO) };
-        dressed.shading.dndu = dndu.as_vec3();
-        dressed.shading.dndv = dndv.as_vec3();
-        self.align(&mut dressed, corners, blend, placement);
-        dressed
+        shaded.shading.dndu = dndu.as_vec3();
+        shaded.shading.dndv = dndv.as_vec3();
+        self.align(&mut shaded, corners, blend, placement);
+        shaded
     }
 
-    /// Lays ∂p/∂u of the shading surface along the tangents, where the mesh has them, and the bitangent on its side.
+    /// Aligns ∂p/∂u of the shading surface with the tangents, if there are any, and puts the bitangent on its
+    /// side.
     fn align<const N: usize>(
         &self,
-        dressed: &mut Dressed,
+        shaded: &mut ShadingGeometry,
         corners: [u32; N],
         blend: &Blend<N>,
         placement: Option<&Transform>,
@@ -524,13 +529,13 @@ impl MeshDress {
         let side: f32 = tangents.iter().map(|t| t.w).sum();
         let mirrored = placement.is_some_and(Transform::is_mirror);
         if side != 0.0 && (side < 0.0) != mirrored {
-            dressed.shading.handedness = -1.0;
+            shaded.shading.handedness = -1.0;
         }
         let tangent = blend.value(std::array::from_fn(|i| tangents[i].truncate().as_dvec3()));
         let tangent = placement.map_or(tangent, |m| m.vector(tangent)).as_vec3();
-        let n = dressed.shading.normal;
+        let n = shaded.shading.normal;
         if let Some(unit) = (tangent - n * n.dot(tangent)).try_normalize() {
-            dressed.shading.dpdu = unit * dressed.shading.dpdu.length();
+            shaded.shading.dpdu = unit * shaded.shading.dpdu.length();
         }
     }
 }

@@ -1,19 +1,19 @@
-//! Tables of how much rough surfaces reflect of the light from one direction, and in the mean over all.
+//! Tables of directional albedos of rough surfaces, and of their means.
 
 use std::sync::LazyLock;
 
-/// Nodes of the cosine, at the squares of equal steps from 0 to 1: there is most to resolve at grazing angles.
+/// Nodes of the cosine, at the squares of equal steps from 0 to 1: dense at grazing angles.
 const COSINES: usize = 32;
 /// Nodes of the square root of α, in equal steps from 0 to 1.
 const ROUGHNESSES: usize = 24;
-/// Nodes of (η − 1)/(η + 1), at [`MAX_ROOT`] times the squares of equal steps from 0 to 1: next to an index of 1 reflection
-/// changes most at grazing angles.
+/// Nodes of (η − 1)/(η + 1), at [`MAX_ROOT`] times the squares of equal steps from 0 to 1: dense near an index
+/// of 1, where reflection varies most at grazing angles.
 const INDICES: usize = 24;
 /// (η − 1)/(η + 1) at the largest index of refraction in the tables, [`MAX_ETA`].
 const MAX_ROOT: f32 = 0.6;
 /// The largest index of refraction in the tables; larger ones count as this.
 pub(crate) const MAX_ETA: f32 = 4.0;
-/// Values are stored as whole numbers up to 65535; sheen reflects up to so much before it is held to 1.
+/// Values are stored as integers up to 65535 and scaled by this for sheen, whose albedo may exceed 1.
 const MOST_SHEEN: f32 = 8.0;
 
 const PAGE: usize = COSINES * ROUGHNESSES;
@@ -24,35 +24,36 @@ const OUTSIDE: usize = FACES + INDICES;
 const INSIDE: usize = OUTSIDE + INDICES;
 const PAGES: usize = INSIDE + INDICES;
 
-/// All tables; `albedo.bin` is made by the ignored test of this file, which says how each value is defined.
+/// All tables. `albedo.bin` is written by the ignored test of this file, which defines each value.
 pub(crate) static ALBEDO: LazyLock<Albedo> =
     LazyLock::new(|| Albedo::from_bytes(include_bytes!("albedo.bin")));
 
-/// Directional albedos, cubic between nodes, and their means by the cosine law.
+/// Directional albedos, interpolated cubically, and their cosine-weighted means.
 pub(crate) struct Albedo {
     values: Vec<f32>,
     /// For each row of cosines.
     means: Vec<f32>,
 }
 
-/// A place between two nodes.
+/// A position between two nodes.
 #[derive(Clone, Copy)]
 pub(crate) struct Between(usize, f32);
 
 impl Between {
-    /// The place of `x` in [0, 1] between `nodes` in equal steps.
+    /// The position of `x` in [0, 1] between `nodes` in equal steps.
     pub(crate) fn new(x: f32, nodes: usize) -> Self {
         let place = crate::unit(x) * (nodes - 1) as f32;
         let first = (place as usize).min(nodes - 2);
         Self(first, place - first as f32)
     }
 
-    /// The place a share of the way from a node to the next.
+    /// The position at a fraction between a node and the next.
     pub(crate) fn at(first: usize, share: f32) -> Self {
         Self(first, share)
     }
 
-    /// Catmull and Rom's cubic; beyond the ends the table goes straight on. (Linear, white metal reflected up to 1.003.)
+    /// Catmull–Rom weights; beyond the ends the table is extended linearly. Linear interpolation would not
+    /// conserve energy.
     pub(crate) fn weights(self) -> [f32; 4] {
         let t = self.1;
         [
@@ -63,12 +64,12 @@ impl Between {
         ]
     }
 
-    /// The weights of the nodes about the place, and the first of these nodes.
+    /// The first of the nodes around the position, and their weights.
     pub(crate) fn nodes(self, nodes: usize) -> (usize, [f32; 4]) {
         let Self(first, _) = self;
         let [a, b, c, d] = self.weights();
         if first == 0 {
-            // The node before the first is 2 p0 − p1.
+            // The node before the first is extrapolated to 2 p0 − p1.
             return (0, [b + 2.0 * a, c - a, d, 0.0]);
         }
         if first + 2 == nodes {
@@ -119,7 +120,7 @@ impl Albedo {
         alpha.interpolate(ROUGHNESSES, |a| self.means[page * ROUGHNESSES + a])
     }
 
-    /// What facets that reflect everything reflect at the first bounce.
+    /// The single-scattering albedo of perfectly reflecting facets.
     pub(crate) fn mirror(&self, cos: f32, alpha: f32) -> f32 {
         self.at(MIRROR, by_alpha(alpha), by_cosine(cos)).clamp(0.0, 1.0)
     }
@@ -129,7 +130,7 @@ impl Albedo {
         self.mean_at(MIRROR, by_alpha(alpha))
     }
 
-    /// What the face of a dielectric of index 1 to [`MAX_ETA`] reflects, seen from outside.
+    /// The albedo of the outside of a dielectric of index 1 to [`MAX_ETA`].
     pub(crate) fn face(&self, cos: f32, alpha: f32, eta: f32) -> f32 {
         let (alpha, cos) = (by_alpha(alpha), by_cosine(cos));
         by_index(eta).interpolate(INDICES, |e| self.at(FACES + e, alpha, cos)).clamp(0.0, 1.0)
@@ -141,13 +142,13 @@ impl Albedo {
         by_index(eta).interpolate(INDICES, |e| self.mean_at(FACES + e, alpha))
     }
 
-    /// The page of a border of glass, seen from one side: from the denser side it is the inside.
+    /// The page of a rough dielectric interface, seen from one side: from the denser side it is the inside.
     fn glass_pages(eta: f32, inside: bool) -> (usize, f32) {
         let denser = eta >= 1.0;
         (if denser == inside { INSIDE } else { OUTSIDE }, if denser { eta } else { 1.0 / eta })
     }
 
-    /// The power that a border between dielectrics of index `eta` (inside over outside) reflects and lets through.
+    /// The reflected and transmitted power of a dielectric interface of index `eta` (inside over outside).
     pub(crate) fn glass(&self, cos: f32, alpha: f32, eta: f32, inside: bool) -> f32 {
         let (alpha, cos) = (by_alpha(alpha), by_cosine(cos));
         let (page, eta) = Self::glass_pages(eta, inside);
@@ -161,13 +162,13 @@ impl Albedo {
         by_index(eta).interpolate(INDICES, |e| self.mean_at(page + e, alpha))
     }
 
-    /// What white fibres reflect, by their roughness (α is its square); may be more than 1.
+    /// The albedo of white sheen, by roughness (α is its square); may be more than 1.
     pub(crate) fn sheen(&self, cos: f32, roughness: f32) -> f32 {
         self.at(SHEEN, by_alpha(roughness * roughness), by_cosine(cos)).max(0.0)
     }
 }
 
-/// ∫ 2 μ f(μ) dμ for each node, of what is cubic between them.
+/// ∫ 2 μ f(μ) dμ for each node of the cubic interpolation.
 pub(crate) fn mean_weights<const N: usize>() -> [f32; N] {
     let steps = 4096;
     let mut sum = [0.0; N];

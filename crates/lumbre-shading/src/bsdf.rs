@@ -9,35 +9,35 @@ use crate::diffuse::{Diffuse, DiffuseTransmission};
 use crate::principled::Principled;
 use crate::{LocalDir, Spectrum};
 
-/// How a direction was chosen.
+/// How a direction was sampled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Scatter {
     /// With this density per unit solid angle.
     Density(f32),
-    /// As the only direction possible: a mirror has no density, and nothing can ask it for one.
+    /// As the only possible direction, such as a mirror's: it has no density.
     Delta,
 }
 
-/// A direction that a BSDF chose.
+/// A direction sampled from a BSDF.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BsdfSample {
-    /// Where light would come from.
+    /// The direction of incidence.
     pub wi: LocalDir,
     /// f · |cos θi| / pdf, ready to multiply a path's throughput.
     pub weight: Spectrum,
-    /// How it was chosen.
+    /// How it was sampled.
     pub scatter: Scatter,
-    /// Whether it crosses the surface.
+    /// Whether it is on the other side of the surface.
     pub transmitted: bool,
-    /// η of the side it enters over that of the side it leaves, 1 where it reflects (or crosses without bending).
+    /// η of the side of `wi` over that of the side of `wo`; 1 for a reflection or an unbent transmission.
     pub eta: f32,
 }
 
-/// How a surface scatters at one point. Both directions leave the surface.
+/// How a surface scatters at one point. Both directions point away from the surface.
 ///
-/// Which conserve energy: [`Diffuse`] of reflectance 1, [`DiffuseTransmission`] whose shares sum to 1, a smooth
-/// [`Dielectric`] (counting η²), [`ThinDielectric`], and a smooth [`Conductor`] of reflectance 1. Rough metal and glass
-/// count single scattering between facets only, and lose some; [`Principled`] gives it back.
+/// Energy is conserved by [`Diffuse`] of reflectance 1, [`DiffuseTransmission`] whose shares sum to 1, a smooth
+/// [`Dielectric`] (counting η²), [`ThinDielectric`], and a smooth [`Conductor`] of reflectance 1. Rough metal
+/// and glass have single scattering only and lose energy; [`Principled`] compensates for it.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Bsdf {
     /// Lambert.
@@ -54,12 +54,12 @@ pub enum Bsdf {
     CoatedDiffuse(CoatedDiffuse),
     /// Metal under varnish.
     CoatedConductor(CoatedConductor),
-    /// Layers of all these; boxed, for all others are a quarter of its size, and copied often.
+    /// All the layers; boxed, since the others are a quarter of its size and are copied often.
     Principled(Box<Principled>),
 }
 
 impl Bsdf {
-    /// f(wo, wi) · |cos θi|; zero for delta parts. Radiance flows from `wi` to `wo`.
+    /// f(wo, wi) · |cos θi|, without delta parts. Radiance flows from `wi` to `wo`.
     pub fn eval(&self, wo: LocalDir, wi: LocalDir) -> Spectrum {
         match self {
             Self::Diffuse(bsdf) => bsdf.eval(wo, wi),
@@ -73,8 +73,8 @@ impl Bsdf {
         }
     }
 
-    /// The density per unit solid angle with which [`Bsdf::sample`] chooses `wi`, delta parts left out. Its integral is
-    /// less than 1 by the probability of a delta part, and by that of `None`.
+    /// The density per unit solid angle with which [`Bsdf::sample`] samples `wi`, without delta parts. Its
+    /// integral is 1 minus the probabilities of delta parts and of `None`.
     pub fn pdf(&self, wo: LocalDir, wi: LocalDir) -> f32 {
         match self {
             Self::Diffuse(bsdf) => bsdf.pdf(wo, wi),
@@ -88,7 +88,7 @@ impl Bsdf {
         }
     }
 
-    /// Chooses `wi` from three uniform numbers: `lobe` decides between parts, `u` the direction. `None` absorbs.
+    /// Samples `wi` from three uniform numbers: `lobe` selects a part, `u` the direction. `None` is absorption.
     pub fn sample(&self, wo: LocalDir, lobe: f32, u: Vec2) -> Option<BsdfSample> {
         match self {
             Self::Diffuse(bsdf) => bsdf.sample(wo, u),
@@ -102,7 +102,7 @@ impl Bsdf {
         }
     }
 
-    /// Whether it has nothing but delta parts, so that sampling lights is of no use.
+    /// Whether all parts are deltas, so that light sampling is useless.
     pub fn is_delta(&self) -> bool {
         match self {
             Self::Diffuse(_) | Self::DiffuseTransmission(_) | Self::CoatedDiffuse(_) => false,
@@ -114,7 +114,7 @@ impl Bsdf {
         }
     }
 
-    /// An estimate of its hemispherical albedo for the feature image of the same name: exact for diffuse surfaces, the
+    /// An estimate of the hemispherical albedo for the AOV of that name: exact for diffuse surfaces, the
     /// reflectance at normal incidence for metals, 1 for glass.
     pub fn albedo(&self) -> Spectrum {
         match self {
@@ -128,8 +128,8 @@ impl Bsdf {
         }
     }
 
-    /// The same surface where what lies outside of it is not vacuum but has an index of refraction of its own: a solid
-    /// inside another. Only [`Principled`] solids know their index against vacuum; others stay as they are.
+    /// The surface inside another solid, whose index of refraction is `outside`. Only [`Principled`] solids
+    /// know their index against vacuum; others are returned unchanged.
     #[must_use]
     pub fn immersed(self, outside: f32) -> Self {
         match self {
@@ -138,9 +138,9 @@ impl Bsdf {
         }
     }
 
-    /// The same, with its mirrors and the parts that are nearly so made rough: less noise and fewer sharp details, for
-    /// the parts of a path that no one sees directly. Each α below 0.3 becomes twice as large, at least 0.1 and at most
-    /// 0.3. A thin pane stays as it is: light goes straight through it.
+    /// The surface with mirrors and sharp lobes made rougher, for parts of a path that are not seen directly:
+    /// less noise, fewer sharp details. Each α below 0.3 is doubled and clamped to [0.1, 0.3]. A thin pane is
+    /// returned unchanged, since light passes straight through it.
     #[must_use]
     pub fn regularized(self) -> Self {
         let metal = |bsdf: Conductor| Conductor { facets: bsdf.facets.regularized(), ..bsdf };

@@ -1,4 +1,4 @@
-//! Paint or metal under varnish: layers between which light walks at random.
+//! Paint or metal under varnish: layered surfaces evaluated by random walks.
 
 use std::f32::consts::FRAC_1_PI;
 
@@ -14,16 +14,17 @@ use crate::{BsdfSample, LocalDir, Scatter, Spectrum, fresnel};
 
 /// A dielectric coat with a scattering or absorbing medium below it.
 ///
-/// The light that enters it is found by a random walk between its face and the base whose random numbers are a hash of
-/// the two directions: asking twice gives the same answer, and the mean over directions is right. The walk is that of
-/// Guo, Hašan, Zhao, "Position-Free Monte Carlo Simulation for Arbitrary Layered BSDFs", SIGGRAPH Asia 2018, with the
-/// parameters of pbrt-v4: extinction 1 per unit of thickness, also where nothing scatters; roulette from the fifth bounce.
+/// Transport below the interface is estimated by a random walk whose random numbers are a hash of the two
+/// directions: the result is deterministic, and right in the mean over directions. The walk is that of Guo,
+/// Hašan, Zhao, "Position-Free Monte Carlo Simulation for Arbitrary Layered BSDFs", SIGGRAPH Asia 2018, with
+/// the parameters of pbrt-v4: extinction 1 per unit of thickness, even where nothing scatters; Russian roulette
+/// from the fifth bounce.
 ///
-/// We differ in how directions are chosen: not by a walk, but off one of a few lobes of known density. So weights,
-/// densities and values agree exactly, and each weight is that of an estimate with multiple bounces in one.
+/// Unlike there, directions are sampled not by a walk but from a few lobes of known density, so weights,
+/// densities and values agree exactly, and a weight includes multiple bounces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coat {
-    /// The outer face: inside over outside.
+    /// The outer interface, inside over outside.
     pub face: Dielectric,
     /// In mean free paths, ≥ 0.
     pub thickness: f32,
@@ -31,31 +32,31 @@ pub struct Coat {
     pub g: f32,
     /// Single-scattering albedo of the medium, in [0, 1].
     pub albedo: Spectrum,
-    /// Bounces of a walk at most.
+    /// The maximal number of bounces of a walk.
     pub max_depth: u32,
-    /// Walks an evaluation.
+    /// Walks per evaluation.
     pub samples: u32,
 }
 
 /// A diffuse base under a coat; the same from both sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CoatedDiffuse {
-    /// The paint.
+    /// The base.
     pub base: Diffuse,
-    /// The varnish.
+    /// The coat.
     pub coat: Coat,
 }
 
 /// A metal under a coat; the same from both sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CoatedConductor {
-    /// The metal, its index of refraction relative to the coat's.
+    /// The base, with its index of refraction relative to the coat's.
     pub base: Conductor,
-    /// The varnish.
+    /// The coat.
     pub coat: Coat,
 }
 
-/// What lies under a coat; all directions above it.
+/// The base under a coat; all directions are above it.
 trait Base {
     /// f · |cos θi|.
     fn eval(&self, wo: LocalDir, wi: LocalDir) -> Spectrum;
@@ -101,13 +102,13 @@ impl Base for Conductor {
 }
 
 impl CoatedDiffuse {
-    /// f · |cos θi|, without the mirror image in a smooth coat.
+    /// f · |cos θi|, without the mirror reflection of a smooth coat.
     pub fn eval(&self, wo: LocalDir, wi: LocalDir) -> Spectrum {
         let Some((wo, wi)) = from_above(wo, wi) else { return Spectrum::BLACK };
         self.coat.eval(&self.base, wo, wi)
     }
 
-    /// The probability of a direction off the coat.
+    /// The probability of sampling the coat.
     fn coat_probability(&self, wo: LocalDir) -> f32 {
         if self.coat.face.eta == 1.0 {
             return 0.0;
@@ -115,18 +116,18 @@ impl CoatedDiffuse {
         let coat = fresnel::dielectric(wo.abs_cos_theta(), self.coat.face.eta);
         let below = self.base.reflectance.max_component().max(0.5 * self.coat.albedo.max_component());
         let below = (1.0 - coat) * below;
-        // A rough coat is seen from its base at any angle: neither part may starve.
+        // A rough coat transmits at any angle, so neither part may have a tiny probability.
         (coat / (coat + below).max(1e-6)).clamp(0.1, 0.9)
     }
 
-    /// The density of [`CoatedDiffuse::sample`] but for its delta part.
+    /// The density of [`CoatedDiffuse::sample`] without its delta part.
     pub fn pdf(&self, wo: LocalDir, wi: LocalDir) -> f32 {
         let Some((wo, wi)) = from_above(wo, wi) else { return 0.0 };
         let coat = self.coat_probability(wo);
         coat * self.coat.face.pdf_of(wo, wi, Ways::Reflection) + (1.0 - coat) * FRAC_1_PI * wi.abs_cos_theta()
     }
 
-    /// A direction off the coat or by the cosine law.
+    /// A direction sampled from the coat or by the cosine.
     pub fn sample(&self, wo: LocalDir, lobe: f32, u: Vec2) -> Option<BsdfSample> {
         let below = wo.cos_theta() < 0.0;
         let wo = if below { -wo } else { wo };
@@ -142,12 +143,13 @@ impl CoatedDiffuse {
         finish(sample.wi, self.pdf(wo, sample.wi), self.eval(wo, sample.wi), below)
     }
 
-    /// The mirror image in a smooth coat.
+    /// The mirror reflection of a smooth coat.
     pub(crate) fn specular(&self, wo: LocalDir) -> Option<BsdfSample> {
         self.coat.mirror_image(wo)
     }
 
-    /// A rough estimate of its albedo: the coat's reflectance at normal incidence, and the base's for the rest.
+    /// A rough estimate of its albedo, from the coat's reflectance at normal incidence and the base's for the
+    /// rest.
     pub fn albedo_estimate(&self) -> Spectrum {
         let coat = fresnel::dielectric(1.0, self.coat.face.eta);
         Spectrum::splat(coat) + self.base.reflectance * (1.0 - coat)
@@ -156,11 +158,11 @@ impl CoatedDiffuse {
 
 /// The probabilities of the lobes of a coated metal. They sum to 1.
 struct Lobes {
-    /// The coat's own reflection: of the whole of both layers where both are smooth.
+    /// The coat's reflection; if both layers are smooth, that of the whole.
     coat: f32,
-    /// Once off the metal and out again.
+    /// One reflection from the metal through the coat.
     metal: f32,
-    // The rest: the cosine law, for what the medium scatters and what bounces more often.
+    // The rest is cosine-weighted, for scattering in the medium and multiple bounces.
 }
 
 impl CoatedConductor {
@@ -173,7 +175,7 @@ impl CoatedConductor {
         self.coat.face.is_delta() && self.base.facets.is_smooth()
     }
 
-    /// f · |cos θi|, without mirror images.
+    /// f · |cos θi|, without mirror reflections.
     pub fn eval(&self, wo: LocalDir, wi: LocalDir) -> Spectrum {
         if self.is_delta() {
             return Spectrum::BLACK;
@@ -194,8 +196,8 @@ impl CoatedConductor {
         Lobes { coat: coat * (1.0 - rest), metal: (1.0 - coat) * (1.0 - rest) }
     }
 
-    /// The metal as it looks through a rough coat: a lobe of about the right width about the mirror direction. Refraction
-    /// widens what the metal's facets turn, and each crossing of the coat turns by (η − 1) times the slope of its facets.
+    /// The metal as seen through a rough coat: a lobe of approximately the right width. Refraction widens the
+    /// metal's lobe, and each crossing of the coat deflects by (η − 1) times the slope of its facets.
     fn seen_through(&self) -> Conductor {
         let eta = self.coat.face.eta;
         let (metal, coat) = (self.base.facets.alpha(), self.coat.face.facets.alpha());
@@ -215,7 +217,7 @@ impl CoatedConductor {
         self.base.pdf(-o, -i) * wi.abs_cos_theta() / (eta * eta * i.abs_cos_theta())
     }
 
-    /// A direction of the metal's lobe.
+    /// A direction sampled from the metal's lobe.
     fn sample_metal(&self, wo: LocalDir, u: Vec2) -> Option<LocalDir> {
         if !self.coat.face.is_delta() {
             return Some(self.seen_through().sample(wo, u)?.wi);
@@ -225,7 +227,7 @@ impl CoatedConductor {
         refract(-up, Vec3::Z, 1.0 / eta)
     }
 
-    /// The density of [`CoatedConductor::sample`] but for its delta part.
+    /// The density of [`CoatedConductor::sample`] without its delta part.
     pub fn pdf(&self, wo: LocalDir, wi: LocalDir) -> f32 {
         let Some((wo, wi)) = from_above(wo, wi) else { return 0.0 };
         let Lobes { coat, metal } = self.lobes(wo);
@@ -234,7 +236,7 @@ impl CoatedConductor {
         coat * self.coat.face.pdf_of(wo, wi, Ways::Reflection) + metal + rest
     }
 
-    /// A direction off the coat, off the metal or by the cosine law.
+    /// A direction sampled from the coat, from the metal or by the cosine.
     pub fn sample(&self, wo: LocalDir, lobe: f32, u: Vec2) -> Option<BsdfSample> {
         let below = wo.cos_theta() < 0.0;
         let wo = if below { -wo } else { wo };
@@ -270,7 +272,7 @@ impl CoatedConductor {
         finish(wi, self.pdf(wo, wi), self.eval(wo, wi), below)
     }
 
-    /// The mirror image in the smooth layers.
+    /// The mirror reflection of the smooth layers.
     pub(crate) fn specular(&self, wo: LocalDir) -> Option<BsdfSample> {
         if !self.both_smooth() {
             return self.coat.mirror_image(wo);
@@ -283,8 +285,8 @@ impl CoatedConductor {
         Some(BsdfSample { wi: wo.mirrored(), weight, scatter: Scatter::Delta, transmitted: false, eta: 1.0 })
     }
 
-    /// What two smooth layers reflect, all bounces in the one direction summed: those of the coat and of the metal, up to
-    /// the depth of a walk.
+    /// The reflectance of two smooth layers, with all bounces between coat and metal summed up to the maximal
+    /// depth.
     fn mirror(&self, wo: LocalDir) -> Spectrum {
         let outside = fresnel::dielectric(wo.abs_cos_theta(), self.coat.face.eta);
         let Some(inside) = refract(wo, Vec3::Z, self.coat.face.eta) else { return Spectrum::splat(outside) };
@@ -293,7 +295,7 @@ impl CoatedConductor {
         let there_and_back = (-2.0 * self.coat.thickness / cos).exp();
         let off_metal = self.base.fresnel(cos) * there_and_back;
         let (mut term, mut sum) = (off_metal * ((1.0 - outside) * (1.0 - back)), Spectrum::splat(outside));
-        // Every second bounce is one off the metal; the terms shrink by `back` each, or are not there at all.
+        // Every second bounce is one off the metal. The terms decrease geometrically by `back`.
         for _ in 0..self.coat.max_depth.div_ceil(2).min(64) {
             sum += term;
             term = term * off_metal * back;
@@ -301,7 +303,7 @@ impl CoatedConductor {
         sum
     }
 
-    /// A rough estimate of its albedo: both layers at normal incidence.
+    /// A rough estimate of its albedo, from both layers at normal incidence.
     pub fn albedo_estimate(&self) -> Spectrum {
         let through = 1.0 - fresnel::dielectric(1.0, self.coat.face.eta);
         Spectrum::splat(1.0 - through) + self.base.fresnel(1.0) * (through * through)
@@ -316,12 +318,12 @@ fn from_above(wo: LocalDir, wi: LocalDir) -> Option<(LocalDir, LocalDir)> {
     (wo.cos_theta() < 0.0 && wi.cos_theta() < 0.0).then_some((-wo, -wi))
 }
 
-/// A sample made above, where it belongs.
+/// A sample computed above, moved to its side.
 fn turn(sample: BsdfSample, below: bool) -> BsdfSample {
     if below { BsdfSample { wi: -sample.wi, ..sample } } else { sample }
 }
 
-/// A sample of known density and value, made above.
+/// A sample of known density and value, computed above.
 fn finish(wi: LocalDir, pdf: f32, value: Spectrum, below: bool) -> Option<BsdfSample> {
     let possible = pdf > 0.0 && pdf.is_finite();
     let sample = possible.then(|| BsdfSample {
@@ -339,7 +341,7 @@ impl Coat {
         self.albedo.max_component() > 0.0
     }
 
-    /// The mirror image in the face, where it is smooth.
+    /// The mirror reflection of a smooth interface.
     fn mirror_image(&self, wo: LocalDir) -> Option<BsdfSample> {
         if !self.face.is_delta() || self.face.eta == 1.0 {
             return None;
@@ -349,12 +351,12 @@ impl Coat {
         Some(turn(self.face.sample_of(above, 0.0, Vec2::ZERO, Ways::Reflection)?, below))
     }
 
-    /// The share that crosses a height of the medium along `w`.
+    /// The transmittance of a layer of the medium of this height along `w`.
     fn transmittance(height: f32, w: LocalDir) -> f32 {
         (-height / w.abs_cos_theta()).exp()
     }
 
-    /// f · |cos θi| of the coat over a base, both directions above, without mirror images.
+    /// f · |cos θi| of the coat over a base, both directions above, without mirror reflections.
     fn eval<B: Base>(&self, base: &B, wo: LocalDir, wi: LocalDir) -> Spectrum {
         let mut random = RandomStream::new(combine(hash_vec3(wo.vec()), hash_vec3(wi.vec())));
         let samples = self.samples.max(1);
@@ -365,38 +367,22 @@ impl Coat {
         sum / samples as f32 + Spectrum::splat(self.face.eval(wo, wi))
     }
 
-    /// One estimate of what enters the coat and leaves it again, times |cos θi|.
+    /// One estimate of the light that enters the coat and leaves it again, times |cos θi|.
     fn walk<B: Base>(&self, base: &B, wo: LocalDir, wi: LocalDir, random: &mut RandomStream) -> Spectrum {
         let mut pair = || Vec2::new(random.next_f32(), random.next_f32());
         let Some(entry) = self.face.sample_of(wo, 0.0, pair(), Ways::Transmission) else {
             return Spectrum::BLACK;
         };
-        // The way out, from its end: light that comes from `wi`, once it is below the face.
-        let Some(exit) = self.face.sample_of(wi, 0.0, pair(), Ways::Transmission) else {
+        let Some(exit) = Exit::new(self, base, wi, pair()) else {
             return Spectrum::BLACK;
         };
-        let exit_density = density(&exit);
-        let rough = exit_density.is_some();
-        // Seen from its end the way carries importance, which does not gather in the denser medium.
-        let exit_weight = exit.weight * (exit.eta * exit.eta * wi.abs_cos_theta() / exit.wi.abs_cos_theta());
-
-        // A mirror below joins what is scattered down to the end as well as what is scattered up: without it, a smooth face
-        // would let out nothing of that, and a rough one would seldom.
-        let mirror = if base.is_delta() { base.sample(-exit.wi, Vec2::ZERO) } else { None };
-        let mirror = mirror.map_or(Spectrum::BLACK, |mirror| mirror.weight);
-        let by_mirror = rough && base.is_delta();
-        // The way down that the mirror turns into the way out, and what is left of it from face to face.
-        let way_down = exit.wi.mirrored();
-        let from_face = exit_weight * mirror * Self::transmittance(2.0 * self.thickness, exit.wi);
-
         let mut sum = Spectrum::BLACK;
-        if by_mirror && self.max_depth > 0 {
-            let share = balance(exit_density, self.face.pdf_of(wo, way_down, Ways::Transmission));
-            sum += from_face * (self.face.eval(wo, way_down) * share);
+        if exit.by_mirror && self.max_depth > 0 {
+            sum += exit.from_face * exit.face_to_mirror(wo, Ways::Transmission);
         }
         let mut throughput = entry.weight;
         let mut w = entry.wi;
-        // The density with which `w` was chosen where it last had a choice: a mirror leaves it as it is.
+        // The density with which `w` was last sampled; a mirror reflection preserves it.
         let mut chosen = density(&entry);
         let mut height = self.thickness;
         for depth in 0..self.max_depth {
@@ -409,26 +395,14 @@ impl Coat {
             }
             let down = w.cos_theta() < 0.0;
             if self.scatters() {
-                // Free flight to the next collision: 1 - u is in (0, 1].
-                let flight = -(1.0 - random.next_f32()).ln() * w.abs_cos_theta();
-                let next = if down { height - flight } else { height + flight };
+                // The distance to the next collision: 1 - u is in (0, 1].
+                let free_path = -(1.0 - random.next_f32()).ln() * w.abs_cos_theta();
+                let next = if down { height - free_path } else { height + free_path };
                 if 0.0 < next && next < self.thickness {
                     height = next;
                     throughput *= self.albedo;
                     let to_face = self.thickness - height;
-                    let direct = henyey_greenstein(w.vec().dot(-exit.wi.vec()), self.g);
-                    let share = balance(exit_density, direct);
-                    let mut out = Spectrum::splat(direct * share * Self::transmittance(to_face, exit.wi));
-                    if base.is_delta() {
-                        let turned = henyey_greenstein(w.vec().dot(way_down.vec()), self.g);
-                        let share = balance(exit_density, turned);
-                        let way = Self::transmittance(height + self.thickness, exit.wi);
-                        out += mirror * (turned * share * way);
-                        if !rough {
-                            out *= self.bounces(mirror, exit.wi);
-                        }
-                    }
-                    sum += throughput * exit_weight * out;
+                    sum += throughput * exit.weight * exit.scattered_in_medium(w, height);
                     let u = Vec2::new(random.next_f32(), random.next_f32());
                     let (scattered, pdf) = sample_henyey_greenstein(w.vec(), self.g, u);
                     let scattered = LocalDir(scattered);
@@ -436,7 +410,7 @@ impl Coat {
                         break;
                     }
                     (w, chosen) = (scattered, Some(pdf));
-                    if rough && w.cos_theta() > 0.0 {
+                    if exit.density.is_some() && w.cos_theta() > 0.0 {
                         let left = self.leave(w, wi, chosen) * Self::transmittance(to_face, w);
                         sum += throughput * left;
                     }
@@ -448,9 +422,8 @@ impl Coat {
             let u = Vec2::new(random.next_f32(), random.next_f32());
             if !down {
                 height = self.thickness;
-                if by_mirror {
-                    let share = balance(exit_density, self.face.pdf_of(-w, way_down, Ways::Reflection));
-                    sum += throughput * from_face * (self.face.eval(-w, way_down) * share);
+                if exit.by_mirror {
+                    sum += throughput * exit.from_face * exit.face_to_mirror(-w, Ways::Reflection);
                 }
                 let Some(back) = self.face.sample_of(-w, 0.0, u, Ways::Reflection) else { break };
                 throughput *= back.weight;
@@ -459,10 +432,10 @@ impl Coat {
             }
             height = 0.0;
             if !base.is_delta() {
-                let share = balance(exit_density, base.pdf(-w, -exit.wi));
+                let share = balance(exit.density, base.pdf(-w, -exit.wi));
                 let reflected = base.eval(-w, -exit.wi);
                 sum += throughput
-                    * exit_weight
+                    * exit.weight
                     * reflected
                     * (share * Self::transmittance(self.thickness, exit.wi));
             }
@@ -470,7 +443,7 @@ impl Coat {
             throughput *= up.weight;
             w = up.wi;
             chosen = if base.is_delta() { chosen } else { density(&up) };
-            if rough {
+            if exit.density.is_some() {
                 let left = self.leave(w, wi, chosen) * Self::transmittance(self.thickness, w);
                 sum += throughput * left;
             }
@@ -478,18 +451,86 @@ impl Coat {
         sum
     }
 
-    /// The bounces between a mirror below and a smooth face that a way out along `exit` may have had, summed.
+    /// The sum of the bounces between a mirror base and a smooth interface before the exit along `exit`.
     fn bounces(&self, mirror: Spectrum, exit: LocalDir) -> Spectrum {
         let face = fresnel::dielectric(-exit.abs_cos_theta(), self.face.eta);
         let again = mirror * (face * Self::transmittance(2.0 * self.thickness, exit));
         again.map(|again| 1.0 / (1.0 - again.min(0.999_999)))
     }
 
-    /// What a walk that goes up along `w`, chosen with density `chosen`, sends out of a rough face to `wi`, weighted against
-    /// having been found from `wi`.
+    /// The contribution of a walk that leaves through a rough interface to `wi`, going up along `w` with
+    /// density `chosen`; weighted against the exit sampled from `wi`.
     fn leave(&self, w: LocalDir, wi: LocalDir, chosen: Option<f32>) -> f32 {
         let found = if chosen.is_some() { self.face.pdf_of(wi, -w, Ways::Transmission) } else { 0.0 };
         self.face.eval(-w, wi) * balance(chosen, found)
+    }
+}
+
+/// The end of a walk: the direction below the interface that refracts to `wi`, and how it is reached.
+struct Exit<'a> {
+    coat: &'a Coat,
+    /// Inside the coat; light leaves against it.
+    wi: LocalDir,
+    weight: Spectrum,
+    /// `None` for a smooth interface.
+    density: Option<f32>,
+    /// The reflectance of a mirror base towards the exit; black for other bases.
+    mirror: Spectrum,
+    mirror_base: bool,
+    /// Whether a mirror base connects a rough interface to the exit.
+    by_mirror: bool,
+    /// The downward direction that a mirror base reflects into the exit.
+    way_down: LocalDir,
+    /// The weight along `way_down` from the interface, by the mirror, to the exit.
+    from_face: Spectrum,
+}
+
+impl<'a> Exit<'a> {
+    fn new<B: Base>(coat: &'a Coat, base: &B, wi: LocalDir, u: Vec2) -> Option<Self> {
+        let exit = coat.face.sample_of(wi, 0.0, u, Ways::Transmission)?;
+        let density = density(&exit);
+        // Traced backwards, the exit carries importance, which is not scaled by η².
+        let weight = exit.weight * (exit.eta * exit.eta * wi.abs_cos_theta() / exit.wi.abs_cos_theta());
+        // A mirror base connects light scattered downwards to the exit, too: a smooth interface would transmit
+        // none of it otherwise, and a rough one rarely.
+        let mirror = if base.is_delta() { base.sample(-exit.wi, Vec2::ZERO) } else { None };
+        let mirror = mirror.map_or(Spectrum::BLACK, |mirror| mirror.weight);
+        Some(Self {
+            coat,
+            wi: exit.wi,
+            weight,
+            density,
+            mirror,
+            mirror_base: base.is_delta(),
+            by_mirror: density.is_some() && base.is_delta(),
+            way_down: exit.wi.mirrored(),
+            from_face: weight * mirror * Coat::transmittance(2.0 * coat.thickness, exit.wi),
+        })
+    }
+
+    /// The weighted scattering at the interface from `v` into the way down.
+    fn face_to_mirror(&self, v: LocalDir, ways: Ways) -> f32 {
+        let face = &self.coat.face;
+        let share = balance(self.density, face.pdf_of(v, self.way_down, ways));
+        face.eval(v, self.way_down) * share
+    }
+
+    /// The weighted scattering at a collision from `w` into the exit, directly or by a mirror base.
+    fn scattered_in_medium(&self, w: LocalDir, height: f32) -> Spectrum {
+        let (coat, wi) = (self.coat, self.wi);
+        let direct = henyey_greenstein(w.vec().dot(-wi.vec()), coat.g);
+        let share = balance(self.density, direct);
+        let mut out = Spectrum::splat(direct * share * Coat::transmittance(coat.thickness - height, wi));
+        if self.mirror_base {
+            let turned = henyey_greenstein(w.vec().dot(self.way_down.vec()), coat.g);
+            let share = balance(self.density, turned);
+            let way = Coat::transmittance(height + coat.thickness, wi);
+            out += self.mirror * (turned * share * way);
+            if self.density.is_none() {
+                out *= coat.bounces(self.mirror, wi);
+            }
+        }
+        out
     }
 }
 
@@ -501,8 +542,8 @@ fn density(sample: &BsdfSample) -> Option<f32> {
     }
 }
 
-/// The power heuristic: the weight of a direction of density `own` that another way finds with `other`. 1 for what only
-/// one way finds.
+/// The power heuristic for a direction of density `own` that another strategy samples with `other`; 1 if only
+/// one can sample it.
 fn balance(own: Option<f32>, other: f32) -> f32 {
     let Some(own) = own else { return 1.0 };
     let ratio = other / own;

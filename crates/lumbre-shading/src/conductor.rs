@@ -1,11 +1,11 @@
-//! Metals: a mirror, or many microscopic ones.
+//! Metals, smooth or rough.
 
 use lumbre_math::{Vec2, Vec3};
 
 use crate::microfacet::Microfacets;
 use crate::{BsdfSample, LocalDir, Scatter, Spectrum, fresnel};
 
-/// A metal by its complex index of refraction. Smooth, it is a delta; rough, it counts single scattering only, so that
+/// A metal by its complex index of refraction. Smooth, it is a delta; rough, it has single scattering only, so
 /// it loses energy as α grows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Conductor {
@@ -18,17 +18,17 @@ pub struct Conductor {
 }
 
 impl Conductor {
-    /// The metal that reflects the share `reflectance` in [0, 1] at normal incidence.
+    /// The metal with the reflectance `reflectance`, in [0, 1], at normal incidence.
     pub fn from_reflectance(reflectance: Spectrum, facets: Microfacets) -> Self {
         Self { eta: Spectrum::WHITE, k: reflectance.map(fresnel::k_from_reflectance), facets }
     }
 
-    /// The share reflected when the facet's normal makes this cosine.
+    /// The reflectance at this cosine of incidence.
     pub fn fresnel(&self, cos: f32) -> Spectrum {
         fresnel::conductor(cos.abs(), self.eta, self.k)
     }
 
-    /// The normal of the facets that reflect one into the other, turned up.
+    /// The normal of the facets that reflect one direction into the other, pointing up.
     fn half(&self, wo: LocalDir, wi: LocalDir) -> Option<Vec3> {
         if self.facets.is_smooth() || !wo.same_hemisphere(wi) {
             return None;
@@ -50,7 +50,7 @@ impl Conductor {
         0.25 * self.facets.density(m) * self.facets.visible_per_cosine(wo.vec())
     }
 
-    /// A reflection in a facet that `wo` sees.
+    /// A reflection in a visible facet.
     pub fn sample(&self, wo: LocalDir, u: Vec2) -> Option<BsdfSample> {
         if wo.cos_theta() == 0.0 || wo.cos_theta().is_nan() {
             return None;
@@ -81,7 +81,7 @@ impl Conductor {
     }
 }
 
-/// The mirror image of `w` about the unit normal `m`.
+/// `w` mirrored about the unit normal `m`.
 pub(crate) fn reflect(w: LocalDir, m: Vec3) -> LocalDir {
     LocalDir((2.0 * w.vec().dot(m) * m - w.vec()).normalize())
 }

@@ -1,4 +1,4 @@
-//! Glass: part comes back, part goes through and bends.
+//! Glass: reflection and refraction.
 
 use lumbre_math::{Vec2, Vec3};
 
@@ -7,28 +7,28 @@ use crate::microfacet::Microfacets;
 use crate::specular::Specular;
 use crate::{BsdfSample, LocalDir, Scatter, Spectrum, fresnel};
 
-/// A border between two dielectrics; the shading normal points to the outside.
+/// An interface between two dielectrics; the shading normal points outside.
 ///
-/// It carries radiance, which is denser by η² in the denser medium: what crosses is divided by the square of the index
-/// entered over the index left (on the way of the path, from `wo` to `wi`). But for this factor it is reciprocal. Smooth,
-/// it conserves energy; rough, it counts single scattering only and loses some.
+/// It scatters radiance, which is scaled by η²: transmission is divided by the square of the index of the side
+/// of `wi` over that of the side of `wo`. Apart from that it is reciprocal. Smooth, it conserves energy; rough,
+/// it has single scattering only and loses some.
 ///
 /// Walter, Marschner, Li, Torrance, "Microfacet Models for Refraction through Rough Surfaces", EGSR 2007.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dielectric {
-    /// Index of the inside over that of the outside, positive.
+    /// Index of refraction, inside over outside; positive.
     pub eta: f32,
     /// Its roughness.
     pub facets: Microfacets,
 }
 
-/// A facet that takes `wo` to `wi`.
+/// A facet that scatters `wo` to `wi`.
 pub(crate) struct Facet {
-    /// Its normal, turned up.
+    /// Its normal, pointing up.
     pub normal: Vec3,
     /// Index of the side of `wi` over that of the side of `wo`.
     pub eta: f32,
-    /// The share it reflects.
+    /// Its Fresnel reflectance.
     pub fresnel: f32,
     /// |dm/dwi|.
     pub jacobian: f32,
@@ -36,7 +36,7 @@ pub(crate) struct Facet {
     pub transmits: bool,
 }
 
-/// Which of the two ways of a border to consider.
+/// The modes of scattering to consider.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Ways {
     Both,
@@ -45,7 +45,7 @@ pub(crate) enum Ways {
 }
 
 impl Dielectric {
-    /// Whether it is a delta: smooth, or no border at all.
+    /// Whether it is a delta: smooth, or with equal indices.
     pub fn is_delta(&self) -> bool {
         self.facets.is_smooth() || self.eta == 1.0
     }
@@ -55,7 +55,7 @@ impl Dielectric {
         if w.cos_theta() > 0.0 { self.eta } else { 1.0 / self.eta }
     }
 
-    /// The facet between two directions; `None` where there is none, as in a delta.
+    /// The facet between two directions; `None` where there is none, as for a delta.
     pub(crate) fn facet(&self, wo: LocalDir, wi: LocalDir) -> Option<Facet> {
         let (cos_o, cos_i) = (wo.cos_theta(), wi.cos_theta());
         let sides = cos_o * cos_i;
@@ -67,7 +67,7 @@ impl Dielectric {
         let normal = (wo.vec() + eta * wi.vec()).try_normalize()?;
         let normal = if normal.z < 0.0 { -normal } else { normal };
         let (dot_o, dot_i) = (wo.vec().dot(normal), wi.vec().dot(normal));
-        // A facet is seen from the side of the surface that it is turned to.
+        // A facet is visible only from the side of the surface that it faces.
         if dot_o * cos_o <= 0.0 || dot_i * cos_i <= 0.0 {
             return None;
         }
@@ -87,7 +87,7 @@ impl Dielectric {
         share * self.eval_facet(&facet, wo, wi)
     }
 
-    /// f · |cos θi| of a facet that does not share light between its two ways.
+    /// f · |cos θi| of a facet that only reflects or only refracts.
     pub(crate) fn eval_facet(&self, facet: &Facet, wo: LocalDir, wi: LocalDir) -> f32 {
         let facets = self.facets.density(facet.normal)
             * self.facets.both_visible_per_cosines(wo.vec(), wi.vec())
@@ -112,12 +112,12 @@ impl Dielectric {
         probability * self.facets.visible_density(wo.vec(), facet.normal) * facet.jacobian
     }
 
-    /// A reflection or a refraction, by their shares.
+    /// A reflection or a refraction, in proportion to their power.
     pub fn sample(&self, wo: LocalDir, lobe: f32, u: Vec2) -> Option<BsdfSample> {
         self.sample_of(wo, lobe, u, Ways::Both)
     }
 
-    /// [`Dielectric::sample`] with only some of its ways open; the weight is then that of the open ones.
+    /// [`Dielectric::sample`] restricted to some modes; the weight is for those.
     pub(crate) fn sample_of(&self, wo: LocalDir, lobe: f32, u: Vec2, ways: Ways) -> Option<BsdfSample> {
         if wo.cos_theta() == 0.0 || wo.cos_theta().is_nan() {
             return None;
@@ -176,8 +176,8 @@ impl Dielectric {
     }
 }
 
-/// `w` refracted into the other side of a facet of normal `m`, `eta` being the index of that side over that of the side
-/// of `w`. `None` beyond the critical angle.
+/// `w` refracted through a facet of normal `m`, where `eta` is the index of the other side over that of the
+/// side of `w`. `None` beyond the critical angle.
 pub(crate) fn refract(w: LocalDir, m: Vec3, eta: f32) -> Option<LocalDir> {
     let m = if w.vec().dot(m) < 0.0 { -m } else { m };
     let cos_i = w.vec().dot(m);
@@ -189,8 +189,8 @@ pub(crate) fn refract(w: LocalDir, m: Vec3, eta: f32) -> Option<LocalDir> {
     Some(LocalDir(((cos_i / eta - cos_t) * m - w.vec() / eta).normalize()))
 }
 
-/// A pane of glass so thin that what crosses it is not moved aside: a delta, with all the reflections between its two
-/// faces summed. It conserves energy.
+/// A pane of glass so thin that transmission is not displaced: a delta, with all reflections between its faces
+/// summed. Conserves energy.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ThinDielectric {
     /// Index of the pane over that of its surroundings, positive.
@@ -198,13 +198,13 @@ pub struct ThinDielectric {
 }
 
 impl ThinDielectric {
-    /// The share reflected: R + T² R + T² R³ + … = 2R / (1 + R) with T = 1 − R.
+    /// The reflectance R + T² R + T² R³ + … = 2R / (1 + R) with T = 1 − R.
     pub fn reflected(&self, cos: f32) -> f32 {
         let once = fresnel::dielectric(cos.abs(), self.eta);
         2.0 * once / (1.0 + once)
     }
 
-    /// The reflection and the way straight on, with the share of each.
+    /// The reflection and the transmission, each with its power.
     pub(crate) fn specular(&self, wo: LocalDir) -> Specular {
         if wo.cos_theta() == 0.0 || wo.cos_theta().is_nan() {
             return Specular::new();
@@ -223,7 +223,7 @@ impl ThinDielectric {
             .collect()
     }
 
-    /// A reflection, or the way straight on.
+    /// A reflection, or transmission straight on.
     pub fn sample(&self, wo: LocalDir, lobe: f32) -> Option<BsdfSample> {
         if wo.cos_theta() == 0.0 || wo.cos_theta().is_nan() {
             return None;

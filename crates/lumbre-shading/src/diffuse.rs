@@ -1,4 +1,4 @@
-//! Lambert's surfaces: light leaves in all directions alike.
+//! Lambertian surfaces.
 
 use std::f32::consts::FRAC_1_PI;
 
@@ -7,10 +7,10 @@ use lumbre_math::{Vec2, Vec3};
 
 use crate::{BsdfSample, LocalDir, Scatter, Spectrum};
 
-/// Reflects in all directions alike, on the side where the light is. Conserves energy at a reflectance of 1.
+/// Lambertian reflection. Conserves energy at a reflectance of 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Diffuse {
-    /// The share reflected, in [0, 1].
+    /// In [0, 1].
     pub reflectance: Spectrum,
 }
 
@@ -29,7 +29,7 @@ impl Diffuse {
         if wo.same_hemisphere(wi) { FRAC_1_PI * wi.abs_cos_theta() } else { 0.0 }
     }
 
-    /// A direction by the cosine law.
+    /// A cosine-weighted direction.
     pub fn sample(&self, wo: LocalDir, u: Vec2) -> Option<BsdfSample> {
         let wi = cosine_direction(u, wo.cos_theta())?;
         Some(BsdfSample {
@@ -42,13 +42,13 @@ impl Diffuse {
     }
 }
 
-/// Lambert on both sides: a share comes back, a share goes through. Conserves energy where the two sum to 1; it is up to
-/// the scene that they do not sum to more.
+/// Lambertian reflection and transmission. Conserves energy where the two sum to 1; the scene must not let them
+/// sum to more.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DiffuseTransmission {
-    /// The share reflected, in [0, 1].
+    /// In [0, 1].
     pub reflectance: Spectrum,
-    /// The share transmitted, in [0, 1].
+    /// In [0, 1].
     pub transmittance: Spectrum,
 }
 
@@ -86,7 +86,7 @@ impl DiffuseTransmission {
         probability * FRAC_1_PI * wi.abs_cos_theta()
     }
 
-    /// A direction by the cosine law on either side.
+    /// A cosine-weighted direction on either side.
     pub fn sample(&self, wo: LocalDir, lobe: f32, u: Vec2) -> Option<BsdfSample> {
         let reflection = self.reflection_probability();
         let transmitted = lobe >= reflection;
@@ -103,12 +103,12 @@ impl DiffuseTransmission {
     }
 }
 
-/// A direction with density cos θ / π on the side of the sign of `side`; `None` when that is neither.
+/// A direction with density cos θ / π on the side of the sign of `side`; `None` when that is zero.
 pub(crate) fn cosine_direction(u: Vec2, side: f32) -> Option<LocalDir> {
     if side == 0.0 || side.is_nan() {
         return None;
     }
     let up = square_to_cosine_hemisphere(u);
-    // 2⁻¹³ at the least: never in the surface, where no side is left. (Four in a hundred million go there.)
+    // At least 2⁻¹³, since a direction in the surface has no side.
     Some(LocalDir(Vec3::new(up.x, up.y, up.z.max(1.2e-4).copysign(side))))
 }

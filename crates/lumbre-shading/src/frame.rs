@@ -2,8 +2,8 @@
 
 use lumbre_math::{Vec3, frame::orthonormal_basis_f32};
 
-/// A unit direction in a shading frame, whose z axis is the shading normal. Only a [`ShadingFrame`] and the samplers of
-/// this crate make one.
+/// A unit direction in a shading frame, whose z axis is the shading normal. Only [`ShadingFrame`] and the
+/// samplers of this crate construct it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LocalDir(pub(crate) Vec3);
 
@@ -28,7 +28,7 @@ impl LocalDir {
         self.0.z * other.0.z > 0.0
     }
 
-    /// The direction that a mirror in the surface gives.
+    /// The mirror reflection in the surface.
     pub(crate) fn mirrored(self) -> Self {
         Self(Vec3::new(-self.0.x, -self.0.y, self.0.z))
     }
@@ -44,7 +44,7 @@ impl std::ops::Neg for LocalDir {
 /// A right-handed orthonormal frame about a shading normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShadingFrame {
-    /// x: along ∂p/∂u where there is one.
+    /// x: along ∂p/∂u if that is defined.
     pub s: Vec3,
     /// y: n × s.
     pub t: Vec3,
@@ -53,15 +53,16 @@ pub struct ShadingFrame {
 }
 
 impl ShadingFrame {
-    /// A frame about unit `n` with `s` as near to `tangent` as it can be; any `s` where the tangent says nothing
-    /// (zero, along the normal, or not finite).
+    /// A frame about the unit vector `n` with `s` as near to `tangent` as possible; `s` is arbitrary if the
+    /// tangent is zero, parallel to the normal, or not finite.
     pub fn new(n: Vec3, tangent: Vec3) -> Self {
-        // Scaled first: the derivative of a position may be of any size.
+        // Scaled first, since a derivative of position can have any magnitude.
         let tangent = tangent / tangent.abs().max_element();
         let across = tangent - n * n.dot(tangent);
-        // Below a sine of 2⁻¹⁰ the direction that is left is mostly rounding.
+        // Below a sine of 2⁻¹⁰ the remaining direction is mostly rounding error.
         if across.length_squared() > 1e-6 * tangent.length_squared() && across.is_finite() {
-            // Once more: the first subtraction leaves rounding along n, too little to change the length.
+            // Orthogonalised again: the first subtraction leaves a rounding error along n, too small to change
+            // the length.
             let s = across.normalize();
             let s = s - n * n.dot(s);
             return Self { s, t: n.cross(s), n };
@@ -70,12 +71,12 @@ impl ShadingFrame {
         Self { s, t, n }
     }
 
-    /// A unit direction of the world, in the frame.
+    /// World to local direction.
     pub fn to_local(&self, world: Vec3) -> LocalDir {
         LocalDir(Vec3::new(self.s.dot(world), self.t.dot(world), self.n.dot(world)))
     }
 
-    /// A direction of the frame, in the world.
+    /// Local to world direction.
     pub fn to_world(&self, local: LocalDir) -> Vec3 {
         self.s * local.0.x + self.t * local.0.y + self.n * local.0.z
     }

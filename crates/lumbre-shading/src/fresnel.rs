@@ -1,10 +1,10 @@
-//! How much of the light an interface reflects.
+//! Fresnel reflectance.
 
 use crate::Spectrum;
 
-/// The share of unpolarised light that a smooth border between dielectrics reflects.
+/// The reflectance of a smooth dielectric interface for unpolarised light.
 ///
-/// `cos_i` is the cosine of the incident angle, negative from the inside; `eta` is the index of the inside over that of
+/// `cos_i` is the cosine of incidence, negative from the inside; `eta` is the index of the inside over that of
 /// the outside, positive. 1 beyond the critical angle and at grazing incidence.
 pub fn dielectric(cos_i: f32, eta: f32) -> f32 {
     let (cos_i, eta) = if cos_i < 0.0 { (-cos_i, 1.0 / eta) } else { (cos_i, eta) };
@@ -19,13 +19,14 @@ pub fn dielectric(cos_i: f32, eta: f32) -> f32 {
     0.5 * (parallel * parallel + perpendicular * perpendicular)
 }
 
-/// The share that a metal of index `eta + i k` (over that of its surroundings) reflects of one wavelength, `cos_i` ≥ 0.
+/// The reflectance of a metal of index `eta + i k` (over that of its surroundings) at one wavelength, `cos_i` ≥
+/// 0.
 ///
-/// An infinite `k` reflects everything. Source: the Fresnel equations with a complex index, in the real form of Born and
-/// Wolf, "Principles of Optics", 7th ed., 1999, section 14.2.
+/// An infinite `k` reflects everything. Source: the Fresnel equations with a complex index, in the real form of
+/// Born and Wolf, "Principles of Optics", 7th ed., 1999, section 14.2.
 pub fn conductor_channel(cos_i: f32, eta: f32, k: f32) -> f32 {
-    // Beyond this the reflectance differs from 1 by less than 4·10⁻⁴ anywhere but at grazing angles, and k⁴ nears
-    // the end of the range.
+    // Beyond this the reflectance is within 4·10⁻⁴ of 1 except at grazing angles, and k⁴ approaches the end of
+    // the range.
     if k > 1e4 {
         return 1.0;
     }
@@ -38,7 +39,7 @@ pub fn conductor_channel(cos_i: f32, eta: f32, k: f32) -> f32 {
     let a = (0.5 * (a2_plus_b2 + t0)).max(0.0).sqrt();
     let (t1, t2) = (a2_plus_b2 + cos2, 2.0 * a * cos_i);
     let (t3, t4) = (cos2 * a2_plus_b2 + sin2 * sin2, t2 * sin2);
-    // Both are 0/0 where nothing distinguishes the metal from its surroundings, at a grazing angle.
+    // Both are 0/0 where metal and surroundings are equal, at a grazing angle.
     if t1 + t2 <= 0.0 || t3 + t4 <= 0.0 {
         return if k > 0.0 || eta != 1.0 { 1.0 } else { 0.0 };
     }
@@ -47,12 +48,12 @@ pub fn conductor_channel(cos_i: f32, eta: f32, k: f32) -> f32 {
     (0.5 * (perpendicular + parallel)).clamp(0.0, 1.0)
 }
 
-/// [`conductor_channel`] for each lane.
+/// [`conductor_channel`] for each channel.
 pub fn conductor(cos_i: f32, eta: Spectrum, k: Spectrum) -> Spectrum {
     eta.zip(k, |eta, k| conductor_channel(cos_i, eta, k))
 }
 
-/// The `k` that, beside an `eta` of 1, reflects the share `r` in [0, 1] at normal incidence; infinite for 1.
+/// The `k` that, with an `eta` of 1, gives the reflectance `r` in [0, 1] at normal incidence; infinite for 1.
 pub fn k_from_reflectance(r: f32) -> f32 {
     let r = crate::unit(r);
     2.0 * (r / (1.0 - r)).sqrt()

@@ -1,7 +1,7 @@
 #![doc = include_str!("../README.md")]
 //!
-//! A [`Material`] is a function of place that yields a [`Bsdf`]; a [`Bsdf`] is a function of two directions. Colour is
-//! carried on the lanes of [`Spectrum`].
+//! A [`Material`] is a function of position that yields a [`Bsdf`]; a [`Bsdf`] is a function of two directions.
+//! Colours are [`Spectrum`] values.
 
 mod albedo;
 mod bsdf;
@@ -36,10 +36,10 @@ pub use texture::{
     TexturePoint, TextureValue, UvSet, VertexData,
 };
 
-/// Values on the lanes that light transport carries: linear Rec. 709 today.
+/// The channels of light transport: linear Rec. 709 at present.
 pub type Spectrum = lumbre_image::Rgb;
 
-/// The number held within [0, 1]; 0 for what is not one.
+/// The number clamped to [0, 1]; 0 for NaN.
 fn unit(c: f32) -> f32 {
     if c > 0.0 { c.min(1.0) } else { 0.0 }
 }

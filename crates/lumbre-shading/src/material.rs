@@ -27,8 +27,8 @@ pub struct Roughness {
     pub remap: bool,
 }
 
-/// A metal under a coat: by its index of refraction, or by its reflectance at normal incidence. Both are meant against
-/// vacuum; under the coat, the index over that of the coat counts.
+/// The metal under a coat, by its index of refraction or by its reflectance at normal incidence. Both are given
+/// against vacuum; under the coat, the index is divided by the coat's.
 #[derive(Clone, Debug)]
 pub enum Metal {
     /// By its index of refraction.
@@ -51,16 +51,16 @@ impl Metal {
     }
 }
 
-/// How a surface looks, as a function of place.
+/// The appearance of a surface, as a function of position.
 #[derive(Clone, Debug)]
 pub struct Material {
-    /// Its kind with its parameters.
+    /// The kind, with its parameters.
     pub kind: MaterialKind,
-    /// Bump: a displacement whose slope turns the shading normal.
+    /// Bump map: a displacement whose slope tilts the shading normal.
     pub displacement: Option<Arc<FloatTexture>>,
     /// A tangent-space normal map.
     pub normal_map: Option<ImageTexture>,
-    /// Whether a camera looks through its back. Light does not: what stands behind it lies in its shadow.
+    /// Whether camera rays pass through its back. Light does not: it still casts shadows.
     pub one_sided: bool,
 }
 
@@ -90,54 +90,54 @@ pub enum MaterialKind {
     },
     /// Glass.
     Dielectric {
-        /// Inside over outside.
+        /// Index of refraction, inside over outside.
         eta: f32,
         /// Roughness.
         roughness: Roughness,
     },
     /// A pane of glass without thickness.
     ThinDielectric {
-        /// Of the pane over its surroundings.
+        /// Index of refraction of the pane over that of its surroundings.
         eta: f32,
     },
     /// A diffuse base under a rough dielectric coat with a medium between.
     CoatedDiffuse {
-        /// Of the base.
+        /// Reflectance of the base.
         reflectance: Arc<SpectrumTexture>,
-        /// Of the coat.
+        /// Roughness of the coat.
         roughness: Roughness,
-        /// Of the coat.
+        /// Thickness of the coat, in mean free paths.
         thickness: Arc<FloatTexture>,
-        /// Of the coat.
+        /// Index of refraction of the coat.
         eta: f32,
         /// Henyey–Greenstein asymmetry of the medium.
         g: Arc<FloatTexture>,
         /// Single-scattering albedo of the medium.
         albedo: Arc<SpectrumTexture>,
-        /// Bounces of the random walk.
+        /// Maximal number of bounces of the random walk.
         max_depth: u32,
-        /// Random walks an evaluation.
+        /// Random walks per evaluation.
         samples: u32,
     },
     /// A metal under a rough dielectric coat with a medium between.
     CoatedConductor {
         /// The base.
         metal: Metal,
-        /// Of the base.
+        /// Roughness of the base.
         roughness: Roughness,
-        /// Of the coat.
+        /// Roughness of the coat.
         interface_roughness: Roughness,
-        /// Of the coat.
+        /// Thickness of the coat, in mean free paths.
         thickness: Arc<FloatTexture>,
-        /// Of the coat.
+        /// Index of refraction of the coat.
         interface_eta: f32,
         /// Henyey–Greenstein asymmetry of the medium.
         g: Arc<FloatTexture>,
         /// Single-scattering albedo of the medium.
         albedo: Arc<SpectrumTexture>,
-        /// Bounces of the random walk.
+        /// Maximal number of bounces of the random walk.
         max_depth: u32,
-        /// Random walks an evaluation.
+        /// Random walks per evaluation.
         samples: u32,
     },
     /// Lambert on both sides.
@@ -149,16 +149,16 @@ pub enum MaterialKind {
         /// A factor on both.
         scale: f32,
     },
-    /// Layers of metal, plastic, glass, cloth and lacquer: all that glTF says.
+    /// Layers of metal, plastic, glass, cloth and lacquer: all that glTF can express.
     Principled(Box<PrincipledParams>),
-    /// One of two, chosen at random by place and direction.
+    /// One of two, chosen at random by position and direction.
     Mix {
-        /// At amount 0 and 1.
+        /// The materials at amount 0 and 1.
         materials: [Arc<Material>; 2],
-        /// How much of the second.
+        /// The share of the second.
         amount: Arc<FloatTexture>,
     },
-    /// No surface at all: a border between media.
+    /// No scattering: an interface between media.
     Interface,
 }
 
@@ -177,7 +177,7 @@ impl MaterialKind {
         "interface",
     ];
 
-    /// Its name in the scene language.
+    /// The name in the scene language.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Diffuse { .. } => "diffuse",
@@ -194,10 +194,10 @@ impl MaterialKind {
     }
 }
 
-/// Materials with their shares of a mixture.
+/// The materials of a mixture, with their shares.
 type Parts<'m> = SmallVec<[(f32, &'m Material); 2]>;
 
-/// The local shape of the surface that bump and normal maps turn.
+/// The local surface that bump and normal maps tilt.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LocalSurface {
     /// Shading normal, unit, on the geometric normal's side.
@@ -210,22 +210,21 @@ pub struct LocalSurface {
     pub dndu: Vec3,
     /// ∂n/∂v.
     pub dndv: Vec3,
-    /// The normal of the surface as it is, unit.
+    /// The geometric normal, unit.
     pub geometric: Vec3,
-    /// Which side of the tangent the bitangent of normal maps is on: 1 for normal × tangent, -1 where the texture lies
-    /// mirrored.
+    /// The side of the bitangent of normal maps: 1 for normal × tangent, -1 where the texture is mirrored.
     pub handedness: f32,
 }
 
 impl Material {
-    /// A material of a kind, without bumps.
+    /// A material of a kind, without bump or normal map.
     pub fn new(kind: MaterialKind) -> Self {
         Self { kind, displacement: None, normal_map: None, one_sided: false }
     }
 
-    /// Follows mixtures to the one material that applies at a place: the choice is a hash of the place and `wo` (unit,
-    /// world space), so that asking again gives the same answer. An amount of 0 or less is always the first, of 1 or more
-    /// always the second.
+    /// Resolves mixtures to the one material that applies at a position. The choice is a hash of the position
+    /// and `wo` (unit, world space), so it is deterministic. An amount of 0 or less always gives the first, of
+    /// 1 or more always the second.
     pub fn resolve(&self, at: &TextureContext, wo: Vec3) -> &Self {
         let mut material = self;
         let mut key = None;
@@ -236,7 +235,7 @@ impl Material {
             } else if amount >= 1.0 {
                 true
             } else {
-                // One step further for each level, or nested mixtures would all choose alike.
+                // Rehashed for each level, or nested mixtures would be correlated.
                 let k = key.map_or_else(|| combine(hash_dvec3(at.point), hash_vec3(wo)), |k| combine(k, 1));
                 key = Some(k);
                 uniform_f32(k) < amount
@@ -246,12 +245,12 @@ impl Material {
         material
     }
 
-    /// Whether it is known to be the same everywhere, so that it needs no footprint; kinds with many parameters are taken
-    /// for textured.
+    /// Whether it is known to be uniform, so that it needs no footprint; kinds with many parameters count as
+    /// textured.
     pub fn is_uniform(&self) -> bool {
         let smooth = |roughness: &Roughness| roughness.u.is_constant() && roughness.v.is_constant();
         let mut rest: SmallVec<[&Self; 4]> = smallvec![self];
-        // Mixtures may share materials: as many steps as most have, and no more.
+        // Mixtures may share materials, so the number of steps is bounded.
         for _ in 0..64 {
             let Some(material) = rest.pop() else { return true };
             let is_uniform = match &material.kind {
@@ -282,7 +281,7 @@ impl Material {
         false
     }
 
-    /// Whether light gets through it to the other side, or may: of a mixture, through any part of it.
+    /// Whether light may pass to the other side; of a mixture, through any part.
     pub fn lets_light_through(&self) -> bool {
         self.has_part(|kind| match kind {
             MaterialKind::Dielectric { .. }
@@ -293,7 +292,7 @@ impl Material {
         })
     }
 
-    /// Whether [`Bsdf::straight_on`] may be anything but black anywhere on it: of a mixture, on any part of it.
+    /// Whether [`Bsdf::straight_on`] may be other than black anywhere on it; of a mixture, on any part.
     pub fn lets_light_straight_on(&self) -> bool {
         self.has_part(|kind| match kind {
             MaterialKind::ThinDielectric { .. } => true,
@@ -303,10 +302,11 @@ impl Material {
         })
     }
 
-    /// Whether it, or a part of the mixture that it is, is of some kind; perhaps so where a mixture has very many parts.
+    /// Whether it, or a part of the mixture, is of some kind; true when in doubt, for mixtures of very many
+    /// parts.
     fn has_part(&self, is: impl Fn(&MaterialKind) -> bool) -> bool {
         let mut rest: SmallVec<[&Self; 4]> = smallvec![self];
-        // Mixtures may share materials: as many steps as most have, and no more.
+        // Mixtures may share materials, so the number of steps is bounded.
         for _ in 0..64 {
             let Some(material) = rest.pop() else { return false };
             match &material.kind {
@@ -320,9 +320,10 @@ impl Material {
         true
     }
 
-    /// What a mixture is made of at a place, each material with its share; one that is no mixture is all of it. A
-    /// mixture whose own share is less than `least` is not taken apart: the one material stands for it that
-    /// [`Material::resolve`] chooses. Shares sum to 1, and there are at most as many as mixtures and shares above `least`.
+    /// The parts of a mixture at a position, each material with its share; a simple material is its only part.
+    /// A mixture whose own share is less than `least` is not split but represented by the material that
+    /// [`Material::resolve`] chooses. Shares sum to 1, and the number of parts is at most the number of
+    /// mixtures and of shares above `least`.
     pub fn parts<'m>(
         &'m self,
         at: &TextureContext,
@@ -350,8 +351,9 @@ impl Material {
         parts.into_iter()
     }
 
-    /// The frame to shade in: bump and normal maps applied. A normal map goes before a displacement. The frame stays on
-    /// the side of the surface's normal, and the surface's own is taken where a map gives nothing finite.
+    /// The shading frame after bump and normal maps. A normal map takes precedence over a displacement. The
+    /// frame stays on the side of the surface's normal; the surface's own is used where a map gives nothing
+    /// finite.
     pub fn frame(&self, at: &TextureContext, surface: &LocalSurface) -> ShadingFrame {
         let plain = || ShadingFrame::new(surface.normal, surface.dpdu);
         if let Some(map) = &self.normal_map {
@@ -368,12 +370,12 @@ impl Material {
         plain()
     }
 
-    /// The frame to shade in towards `towards` (unit, world space), and how the surface scatters there: [`Material::frame`]
-    /// and [`Material::bsdf`], with a clear coat in its place. (It follows its own normal map, or the surface below the
-    /// bumps of the base where it has none.)
+    /// The shading frame towards `towards` (unit, world space) and the BSDF: [`Material::frame`] and
+    /// [`Material::bsdf`], with a clear coat oriented by its own normal map or, without one, by the surface
+    /// without the base's bump map.
     ///
-    /// Where a normal is turned away from the side of the surface that is seen, it comes back as far as it takes to see
-    /// it: the silhouettes of coarse meshes with smooth normals, and steep bumps, would be black otherwise.
+    /// A normal that faces away from the visible side of the surface is turned back just far enough: otherwise
+    /// the silhouettes of coarse meshes with smooth normals, and steep bumps, would be black.
     pub fn shading(
         &self,
         at: &TextureContext,
@@ -395,7 +397,7 @@ impl Material {
                 let map = params.clearcoat_normal.as_ref();
                 let normal = seen(map.map_or(surface.normal, |map| mapped(map, at, surface).n));
                 let local = frame.to_local(normal).vec();
-                // A coat cannot be met from below.
+                // The coat is not visible from below.
                 if 0.0 < local.z && frame.n != normal {
                     bsdf.coat.normal = local.normalize();
                 }
@@ -404,11 +406,11 @@ impl Material {
         Some((frame, bsdf))
     }
 
-    /// What a solid body of this material takes from light inside it: the coefficient σ of Beer's and Lambert's law, per
-    /// unit of length of the world, so that exp(−σ d) of the light is left after a distance d. `None` where light inside
-    /// loses nothing, or cannot get inside. The normal points out of the body.
+    /// The absorption of a solid of this material, the coefficient σ of the Beer–Lambert law, per unit of
+    /// world-space length: exp(−σ d) of the light remains after a distance d. `None` where nothing is absorbed,
+    /// or light cannot get inside. The normal points out of the solid.
     ///
-    /// This is the data; it is whoever follows a path through the body that knows how long the way inside was.
+    /// The caller tracks the distance travelled inside.
     pub fn interior_attenuation(&self) -> Option<Spectrum> {
         match &self.kind {
             MaterialKind::Principled(params) => params.interior_attenuation(),
@@ -416,8 +418,8 @@ impl Material {
         }
     }
 
-    /// The inside of a solid body of this material, where it scatters light; `None` where it is clear. Its extinction is
-    /// that of [`Material::interior_attenuation`].
+    /// The medium inside a solid of this material, if it scatters light; else `None`. Its extinction is that of
+    /// [`Material::interior_attenuation`].
     pub fn interior_medium(&self) -> Option<HomogeneousMedium> {
         match &self.kind {
             MaterialKind::Principled(params) => params.interior_medium(),
@@ -425,14 +427,14 @@ impl Material {
         }
     }
 
-    /// Whether it encloses a body that light goes through: [`Material::interior_attenuation`] and
-    /// [`Material::interior_index`] are of that.
+    /// Whether it encloses a solid that light passes through, with [`Material::interior_attenuation`] and
+    /// [`Material::interior_index`].
     pub fn is_solid(&self) -> bool {
         self.interior_index().is_some()
     }
 
-    /// The index of refraction inside a solid body of this material, against vacuum; `None` where light cannot get
-    /// inside, and for the kinds whose index is a ratio that already counts what is outside.
+    /// The index of refraction inside a solid of this material, against vacuum; `None` where light cannot get
+    /// inside, and for the kinds whose index is relative to the outside.
     pub fn interior_index(&self) -> Option<f32> {
         match &self.kind {
             MaterialKind::Principled(params) => params.interior_index(),
@@ -440,10 +442,10 @@ impl Material {
         }
     }
 
-    /// How the surface scatters here; `None` for [`MaterialKind::Interface`]. Mixtures must be resolved first: one that is
-    /// not scatters as `None` too.
+    /// The BSDF at a position; `None` for [`MaterialKind::Interface`]. Mixtures must be resolved first; an
+    /// unresolved one gives `None` too.
     ///
-    /// Albedos are held within [0, 1], and an index of refraction that is not a positive number counts as 1.
+    /// Albedos are clamped to [0, 1], and an index of refraction that is not a positive number counts as 1.
     pub fn bsdf(&self, at: &TextureContext) -> Option<Bsdf> {
         let bsdf = match &self.kind {
             MaterialKind::Diffuse { reflectance } => {
@@ -493,7 +495,7 @@ impl Material {
                 let interface_eta = index(*interface_eta);
                 let base = metal.conductor(at, roughness.facets(at));
                 Bsdf::CoatedConductor(CoatedConductor {
-                    // Both parts of the index were given against vacuum.
+                    // The index was given against vacuum.
                     base: Conductor { eta: base.eta / interface_eta, k: base.k / interface_eta, ..base },
                     coat: Coat {
                         face: Dielectric { eta: interface_eta, facets: interface_roughness.facets(at) },
@@ -526,18 +528,18 @@ impl Material {
 }
 
 impl Roughness {
-    /// A surface as smooth as a mirror.
+    /// A mirror-smooth surface.
     pub fn smooth() -> Self {
         Self::isotropic(0.0, false)
     }
 
-    /// The same roughness both ways.
+    /// The same roughness in both directions.
     pub fn isotropic(roughness: f32, remap: bool) -> Self {
         let texture = Arc::new(FloatTexture::Constant(roughness));
         Self { u: Arc::clone(&texture), v: texture, remap }
     }
 
-    /// The facets at a place.
+    /// The microfacets at a position.
     fn facets(&self, at: &TextureContext) -> Microfacets {
         let alpha = |texture: &FloatTexture| {
             let roughness = texture.evaluate(at).max(0.0);
@@ -563,7 +565,7 @@ fn by_reflectance(reflectance: &SpectrumTexture, at: &TextureContext, facets: Mi
     Conductor::from_reflectance(albedo(reflectance.evaluate(at)), facets)
 }
 
-/// The frame that a normal map gives.
+/// The frame of a normal map.
 fn mapped(map: &ImageTexture, at: &TextureContext, surface: &LocalSurface) -> ShadingFrame {
     let texel: Spectrum = map.evaluate(at);
     let local = Vec3::new(2.0 * texel.r - 1.0, 2.0 * texel.g - 1.0, 2.0 * texel.b - 1.0);
@@ -573,25 +575,25 @@ fn mapped(map: &ImageTexture, at: &TextureContext, surface: &LocalSurface) -> Sh
     turned(normal, surface.dpdu, surface).unwrap_or(frame)
 }
 
-/// Each lane within [0, 1]; 0 for what is not a number.
+/// Each channel clamped to [0, 1]; 0 for NaN.
 pub(crate) fn albedo(colour: Spectrum) -> Spectrum {
     colour.map(crate::unit)
 }
 
-/// An asymmetry within the open interval (-1, 1), where the phase function has values; 0 for what is not a number.
+/// An asymmetry clamped to the open interval (-1, 1), where the phase function is defined; 0 for NaN.
 fn asymmetry(g: f32) -> f32 {
     if g.is_nan() { 0.0 } else { g.clamp(-0.999, 0.999) }
 }
 
-/// An index of refraction that is one.
+/// A valid index of refraction.
 fn index(eta: f32) -> f32 {
     if eta > 0.0 && eta.is_finite() { eta } else { 1.0 }
 }
 
-/// The least cosine under which a shading normal is seen.
+/// The smallest cosine between a shading normal and the viewing direction.
 const LEAST_SEEN: f32 = 1e-3;
 
-/// A shading normal, turned no farther than it takes to be on the side of `towards` that the geometric normal is on.
+/// A shading normal, turned just far enough to be on the side of `towards` that the geometric normal is on.
 fn facing(normal: Vec3, geometric: Vec3, towards: Vec3) -> Vec3 {
     let cos = normal.dot(towards);
     let missing = if geometric.dot(towards) < 0.0 { LEAST_SEEN + cos } else { LEAST_SEEN - cos };
@@ -602,20 +604,20 @@ fn facing(normal: Vec3, geometric: Vec3, towards: Vec3) -> Vec3 {
     (normal + missing * side).try_normalize().unwrap_or(geometric)
 }
 
-/// The frame about a turned normal of any length.
+/// The frame about a tilted normal of any length.
 fn turned(normal: Vec3, dpdu: Vec3, surface: &LocalSurface) -> Option<ShadingFrame> {
     let normal = (normal / normal.abs().max_element()).try_normalize()?;
     let normal = if normal.dot(surface.normal) < 0.0 { -normal } else { normal };
     Some(ShadingFrame::new(normal, dpdu))
 }
 
-/// The derivatives of the displaced surface, by differences over half a pixel.
+/// The derivatives of the displaced surface, by finite differences over half a pixel.
 ///
 /// Blinn, "Simulation of Wrinkled Surfaces", SIGGRAPH 1978.
 fn bumped(displacement: &FloatTexture, at: &TextureContext, surface: &LocalSurface) -> (Vec3, Vec3) {
     let here = displacement.evaluate(at);
     let derivative = |step: f32, axis: Vec2, dp: Vec3, dn: Vec3| {
-        // Where the pixel's size on the surface is not known.
+        // The fallback where the pixel footprint is unknown.
         let step = if step > 0.0 && step.is_finite() { step } else { 0.0005 };
         let shifted = TextureContext {
             point: at.point + (step * dp).as_dvec3(),

@@ -1,4 +1,4 @@
-//! The inside of solids that scatter light.
+//! Homogeneous scattering media inside solids.
 
 use std::f32::consts::PI;
 
@@ -7,36 +7,37 @@ use lumbre_math::{Vec2, Vec3};
 
 use crate::Spectrum;
 
-/// The same everywhere: what light meets on its way through a solid body.
+/// A homogeneous medium.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HomogeneousMedium {
-    /// Collisions per unit of length, σ_t; exp(−σ_t d) of light goes a distance d without one.
+    /// The extinction coefficient σ_t per unit of length: exp(−σ_t d) of the light travels a distance d without
+    /// collision.
     pub extinction: Spectrum,
-    /// The share of light that a collision scatters, in [0, 1]; it takes the rest.
+    /// The single-scattering albedo, in [0, 1].
     pub albedo: Spectrum,
-    /// Henyey–Greenstein asymmetry, in (−1, 1): below 0 light is mostly thrown back, above 0 it mostly goes on.
+    /// Henyey–Greenstein asymmetry, in (−1, 1): negative for backward, positive for forward scattering.
     pub asymmetry: f32,
 }
 
-/// How light crosses a part of a medium.
+/// A distance sample: how light crosses a part of a medium.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Flight {
-    /// To the end, with this factor on what it carries.
+    /// It reaches the end, with this factor on its throughput.
     Through(Spectrum),
-    /// To a collision that scatters.
+    /// It scatters at a collision.
     Collision {
-        /// How far it came.
+        /// The distance travelled.
         distance: f64,
-        /// The factor on what it carries.
+        /// The factor on its throughput.
         weight: Spectrum,
     },
 }
 
 impl HomogeneousMedium {
-    /// Chooses how light that carries `carried` crosses a `distance`. `u` chooses a lane of the spectrum and the
-    /// collision; the density counts every lane that might have chosen it.
+    /// Samples the distance that light of throughput `carried` travels within `distance`. `u` selects a channel
+    /// and the collision; the density is the balance over all channels.
     ///
-    /// (A. Wilkie and others, "Hero Wavelength Spectral Sampling", EGSR 2014, with lanes for wavelengths.)
+    /// (A. Wilkie and others, "Hero Wavelength Spectral Sampling", EGSR 2014, with channels for wavelengths.)
     pub fn fly(&self, carried: Spectrum, distance: f64, u: [f64; 2]) -> Flight {
         let sigma = self.extinction.to_array().map(f64::from);
         let carried = carried.to_array().map(|c| f64::from(c.max(0.0)));
@@ -45,25 +46,25 @@ impl HomogeneousMedium {
             return Flight::Through(Spectrum::BLACK);
         }
         let shares = carried.map(|c| c / sum);
-        let mut lane = 0;
+        let mut channel = 0;
         let mut rest = u[0];
-        while lane < 2 && rest >= shares[lane] {
-            rest -= shares[lane];
-            lane += 1;
+        while channel < 2 && rest >= shares[channel] {
+            rest -= shares[channel];
+            channel += 1;
         }
-        // 1 - u is in (0, 1]; a lane without collisions flies to infinity.
-        let flight = -(1.0 - u[1]).ln() / sigma[lane];
-        let end = if flight < distance { flight } else { distance };
+        // 1 - u is in (0, 1]; a channel without collisions gives infinity.
+        let free_path = -(1.0 - u[1]).ln() / sigma[channel];
+        let end = if free_path < distance { free_path } else { distance };
         let left = sigma.map(|sigma| (-sigma * end).exp());
-        if flight < distance {
+        if free_path < distance {
             let density: f64 = (0..3).map(|i| shares[i] * sigma[i] * left[i]).sum();
             let albedo = self.albedo.to_array();
             let [r, g, b] =
                 std::array::from_fn(|i| (f64::from(albedo[i]) * sigma[i] * left[i] / density) as f32);
-            Flight::Collision { distance: flight, weight: Spectrum::new(r, g, b) }
+            Flight::Collision { distance: free_path, weight: Spectrum::new(r, g, b) }
         } else {
             let probability: f64 = (0..3).map(|i| shares[i] * left[i]).sum();
-            // So dense that nothing comes this far but by rounding.
+            // So dense that only rounding gets this far.
             if probability <= 0.0 {
                 return Flight::Through(Spectrum::BLACK);
             }
@@ -73,7 +74,7 @@ impl HomogeneousMedium {
     }
 }
 
-/// The density per solid angle of scattering by the angle with this cosine: 1 goes straight on.
+/// The phase function per solid angle at the cosine of the scattering angle: 1 is straight on.
 ///
 /// L. Henyey, J. Greenstein, "Diffuse Radiation in the Galaxy", Astrophysical Journal 93, 1941.
 pub fn henyey_greenstein(cos: f32, g: f32) -> f32 {
@@ -81,7 +82,7 @@ pub fn henyey_greenstein(cos: f32, g: f32) -> f32 {
     (1.0 - g * g) / (4.0 * PI * d * d.sqrt())
 }
 
-/// A unit direction about unit `forward` by [`henyey_greenstein`], with its density.
+/// A unit direction sampled about the unit vector `forward` by [`henyey_greenstein`], with its density.
 pub fn sample_henyey_greenstein(forward: Vec3, g: f32, u: Vec2) -> (Vec3, f32) {
     let cos = if g.abs() < 1e-3 {
         1.0 - 2.0 * u.x
@@ -96,10 +97,10 @@ pub fn sample_henyey_greenstein(forward: Vec3, g: f32, u: Vec2) -> (Vec3, f32) {
     (w, henyey_greenstein(cos, g))
 }
 
-/// The share that one collision scatters, from the colour that a deep body of such a medium shows after many.
+/// The single-scattering albedo for the multiple-scattering colour of a deep medium.
 ///
-/// C. Kulla, A. Conty, "Revisiting Physically Based Shading at Imageworks", SIGGRAPH course notes, 2017, with the asymmetry
-/// of the medium (similarity theory).
+/// C. Kulla, A. Conty, "Revisiting Physically Based Shading at Imageworks", SIGGRAPH course notes, 2017, with
+/// the asymmetry of the medium (similarity theory).
 pub fn albedo_of_many_collisions(color: f32, g: f32) -> f32 {
     let c = crate::unit(color);
     let s = 4.097_12 + 4.208_63 * c - (9.592_17 + 41.680_8 * c + 17.712_6 * c * c).sqrt();
@@ -129,11 +130,11 @@ mod tests {
                 Flight::Through(weight) => {
                     (0..3).for_each(|i| through[i] += f64::from(weight.to_array()[i]));
                 }
-                Flight::Collision { distance: flight, weight } => {
-                    assert!(flight < distance);
+                Flight::Collision { distance: free_path, weight } => {
+                    assert!(free_path < distance);
                     for i in 0..3 {
                         scattered[i] += f64::from(weight.to_array()[i]);
-                        way[i] += flight * f64::from(weight.to_array()[i]);
+                        way[i] += free_path * f64::from(weight.to_array()[i]);
                     }
                 }
             }

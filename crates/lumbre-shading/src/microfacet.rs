@@ -1,19 +1,21 @@
-//! The distribution of microscopic mirrors after Trowbridge and Reitz (GGX).
+//! The microfacet distribution of Trowbridge and Reitz (GGX).
 
 use std::f32::consts::PI;
 
 use lumbre_math::{Vec2, Vec3};
 
-/// An anisotropic Trowbridge–Reitz distribution of microfacet normals, with Smith's height-correlated shadowing.
+/// An anisotropic Trowbridge–Reitz distribution of microfacet normals, with Smith's height-correlated
+/// shadowing.
 ///
-/// Sources: Walter, Marschner, Li, Torrance, "Microfacet Models for Refraction through Rough Surfaces", EGSR 2007;
-/// Heitz, "Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs", JCGT 3(2), 2014; sampling by
-/// Dupuy and Benyoub, "Sampling Visible GGX Normals with Spherical Caps", Computer Graphics Forum 42(8), 2023.
+/// Sources: Walter, Marschner, Li, Torrance, "Microfacet Models for Refraction through Rough Surfaces", EGSR
+/// 2007; Heitz, "Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs", JCGT 3(2), 2014;
+/// sampling by Dupuy and Benyoub, "Sampling Visible GGX Normals with Spherical Caps", Computer Graphics Forum
+/// 42(8), 2023.
 ///
-/// Only single scattering between facets is counted: rough surfaces lose the energy of light that bounces twice.
+/// Single scattering only: rough surfaces lose the energy of light that bounces twice.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Microfacets {
-    // Both zero for a surface that is as good as smooth; otherwise both positive.
+    // Both zero for a surface that counts as smooth; otherwise both positive.
     alpha: Vec2,
 }
 
@@ -21,21 +23,21 @@ impl Microfacets {
     /// Below this largest α a surface counts as smooth.
     pub const SMOOTH_BELOW: f32 = 1e-3;
 
-    /// A distribution by its two α ≥ 0, along x and y of the shading frame. What is not a number counts as zero.
+    /// A distribution by its two α ≥ 0, along x and y of the shading frame. NaN counts as zero.
     pub fn new(alpha_x: f32, alpha_y: f32) -> Self {
         let alpha = Vec2::new(alpha_x.max(0.0), alpha_y.max(0.0)).min(Vec2::splat(1e4));
         let smooth = alpha.max_element() < Self::SMOOTH_BELOW;
-        // The smaller one of a very anisotropic pair is kept where the arithmetic below stays finite.
+        // The smaller α of a very anisotropic pair is clamped to where the arithmetic below stays finite.
         Self { alpha: if smooth { Vec2::ZERO } else { alpha.max(Vec2::splat(1e-4)) } }
     }
 
     /// A mirror.
     pub const SMOOTH: Self = Self { alpha: Vec2::ZERO };
 
-    /// As rough as it gets: α = 1.
+    /// The roughest: α = 1.
     pub const ROUGH: Self = Self { alpha: Vec2::ONE };
 
-    /// Whether the surface is as good as smooth. The other methods are meant for those that are not.
+    /// Whether the surface counts as smooth; if so, the other methods are meaningless.
     pub fn is_smooth(&self) -> bool {
         self.alpha == Vec2::ZERO
     }
@@ -45,55 +47,56 @@ impl Microfacets {
         self.alpha
     }
 
-    /// A rougher surface: each α below 0.3 doubled, then held within 0.1 and 0.3.
+    /// A rougher distribution: each α below 0.3 is doubled and clamped to [0.1, 0.3].
     #[must_use]
     pub fn regularized(&self) -> Self {
         let rougher = |alpha: f32| if alpha < 0.3 { (2.0 * alpha).clamp(0.1, 0.3) } else { alpha };
         Self { alpha: Vec2::new(rougher(self.alpha.x), rougher(self.alpha.y)) }
     }
 
-    /// The density D of facets with the unit normal `m` (either sign), per unit of solid angle and area of surface:
-    /// ∫ D(m) cos θ dm = 1 over the hemisphere.
+    /// The density D of facets with the unit normal `m` (of either sign), per unit of solid angle and surface
+    /// area: ∫ D(m) cos θ dm = 1 over the hemisphere.
     pub fn density(&self, m: Vec3) -> f32 {
         let h = Vec3::new(m.x / self.alpha.x, m.y / self.alpha.y, m.z);
         let h2 = h.length_squared();
         1.0 / (PI * self.alpha.x * self.alpha.y * h2 * h2)
     }
 
-    /// |(α ∘ w.xy, w.z)|: Smith's auxiliary function is Λ(w) = (stretch(w) / |w.z| − 1) / 2. Written with it, nothing
-    /// divides by a cosine, and grazing directions need no special care.
+    /// |(α ∘ w.xy, w.z)|: Smith's auxiliary function is Λ(w) = (stretch(w) / |w.z| − 1) / 2. In terms of it nothing divides by a cosine, and grazing directions need no special case.
     fn stretch(&self, w: Vec3) -> f32 {
         Vec3::new(self.alpha.x * w.x, self.alpha.y * w.y, w.z).length()
     }
 
-    /// G₁(w) / |cos θ|: the share of facets that `w` sees, per projected area of surface.
+    /// G₁(w) / |cos θ|: the fraction of facets visible from `w`, per projected surface area.
     pub fn visible_per_cosine(&self, w: Vec3) -> f32 {
         2.0 / (w.z.abs() + self.stretch(w))
     }
 
-    /// G₂(wo, wi) / (|cos θo| |cos θi|): the share of facets that both see; the sides of the surface may differ.
+    /// G₂(wo, wi) / (|cos θo| |cos θi|): the fraction of facets visible from both; the directions may be on
+    /// different sides.
     pub fn both_visible_per_cosines(&self, wo: Vec3, wi: Vec3) -> f32 {
         2.0 / (self.stretch(wo) * wi.z.abs() + self.stretch(wi) * wo.z.abs())
     }
 
-    /// G₂ / G₁(wo): of the facets that `wo` sees, the share that `wi` sees too.
+    /// G₂ / G₁(wo): the fraction of the facets visible from `wo` that are visible from `wi`, too.
     pub fn also_visible(&self, wo: Vec3, wi: Vec3) -> f32 {
         self.both_visible_per_cosines(wo, wi) * wi.z.abs() / self.visible_per_cosine(wo)
     }
 
-    /// The density per solid angle of facet normals as `w` sees them: that of [`Microfacets::sample_visible`].
+    /// The density per solid angle of visible normals from `w`: that of [`Microfacets::sample_visible`].
     pub fn visible_density(&self, w: Vec3, m: Vec3) -> f32 {
         self.visible_per_cosine(w) * self.density(m) * w.dot(m).abs()
     }
 
-    /// Chooses a facet normal among those that `w` sees, on its side of the surface turned up (z ≥ 0).
+    /// A facet normal sampled among those visible from `w`, pointing up (z ≥ 0) on its side of the surface.
     pub fn sample_visible(&self, w: Vec3, u: Vec2) -> Vec3 {
         let up = if w.z < 0.0 { -w } else { w };
-        // Where the facets are those of a unit hemisphere, reflections of `view` fill a spherical cap evenly.
+        // With facets stretched to those of a unit hemisphere, reflections of `view` are uniform on a spherical
+        // cap.
         let view = Vec3::new(up.x * self.alpha.x, up.y * self.alpha.y, up.z).normalize();
         let below_pole = u.y * (1.0 + view.z);
         let z = 1.0 - below_pole;
-        // 1 − z² without its cancellation near the pole.
+        // 1 − z² without cancellation near the pole.
         let sin = (below_pole * (1.0 + z)).max(0.0).sqrt();
         let (sin_phi, cos_phi) = (2.0 * PI * u.x).sin_cos();
         let half = Vec3::new(sin * cos_phi, sin * sin_phi, z) + view;

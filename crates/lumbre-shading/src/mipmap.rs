@@ -1,4 +1,4 @@
-//! Filtered image lookups.
+//! MIP maps: filtered image lookups.
 
 use std::sync::Arc;
 
@@ -7,36 +7,36 @@ use lumbre_math::Vec2;
 
 use crate::Spectrum;
 
-/// What lies beyond an image's edge.
+/// How an image continues beyond its edges.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Wrap {
-    /// The image again.
+    /// Repeats.
     #[default]
     Repeat,
-    /// Its last texel.
+    /// Repeats the last texel.
     Clamp,
-    /// Nothing.
+    /// Zero.
     Black,
-    /// The image is an equal-area octahedral sphere, and its edge goes on where the sphere does.
+    /// As an equal-area octahedral map of the sphere.
     OctahedralSphere,
-    /// Across and up, each in its own way.
+    /// Separately for each axis.
     Axes([AxisWrap; 2]),
 }
 
-/// What lies beyond two opposite edges of an image.
+/// How an image continues beyond two opposite edges.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum AxisWrap {
-    /// The image again.
+    /// Repeats.
     #[default]
     Repeat,
-    /// Its last texel.
+    /// Repeats the last texel.
     Clamp,
-    /// The image again, every other time mirrored.
+    /// Repeats, mirrored every other time.
     Mirror,
 }
 
 impl AxisWrap {
-    /// `s` brought near the image.
+    /// `s` reduced to the vicinity of the image.
     fn within_reach(self, s: f32) -> f32 {
         match self {
             Self::Repeat => s - s.floor(),
@@ -45,7 +45,7 @@ impl AxisWrap {
         }
     }
 
-    /// The texel of an image of this size.
+    /// The texel index within an image of this size.
     fn texel(self, i: i64, size: i64) -> i64 {
         match self {
             Self::Repeat => i.rem_euclid(size),
@@ -58,40 +58,40 @@ impl AxisWrap {
     }
 }
 
-/// How texels become a value.
+/// The texture filter.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum ImageFilter {
     /// The nearest texel.
     Point,
-    /// Between four texels.
+    /// Bilinear between four texels.
     #[default]
     Bilinear,
-    /// Between four texels of two levels.
+    /// Trilinear: bilinear in two levels.
     Trilinear,
-    /// Elliptically weighted (Heckbert 1989), with this largest ratio of the axes; more than 64 counts as 64.
+    /// Elliptically weighted average (Heckbert 1989), with this maximal anisotropy, at most 64.
     Ewa(f32),
 }
 
-/// How to look up an image.
+/// Options of image lookups.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MipMapOptions {
-    /// What lies beyond its edge.
+    /// How the image continues beyond its edges.
     pub wrap: Wrap,
-    /// How texels become a value.
+    /// The texture filter.
     pub filter: ImageFilter,
 }
 
-/// A pyramid of ever smaller images, each half as large as the one before and in the same number format.
+/// A pyramid of images, each half as large as the one before and in the same number format.
 #[derive(Debug)]
 pub struct MipMap {
-    // The finest first, the last of one texel.
+    // The finest first, the last of a single texel.
     levels: Vec<Arc<Bitmap>>,
-    // Whether any texel has a coverage other than 1.
+    // Whether any texel has an alpha other than 1.
     has_coverage: bool,
     options: MipMapOptions,
 }
 
-/// The value about a texel, and how much of it is colour.
+/// A texel value: a colour or a number.
 trait Texel: Copy + std::ops::Add<Output = Self> + std::ops::Mul<f32, Output = Self> {
     const ZERO: Self;
     fn fetch(map: &MipMap, level: usize, x: u32, y: u32) -> Self;
@@ -115,8 +115,8 @@ impl Texel for f32 {
 }
 
 impl MipMap {
-    /// The pyramid over an image. The finest level is the image itself; the coarser ones are its means over areas, and
-    /// take a third of its memory again.
+    /// The pyramid of an image. The finest level is the image itself; the coarser ones are area averages, which
+    /// take another third of its memory.
     pub fn new(bitmap: Arc<Bitmap>, options: MipMapOptions) -> Self {
         let has_coverage = bitmap.channels().alpha().is_some_and(|c| {
             (0..bitmap.height()).any(|y| (0..bitmap.width()).any(|x| bitmap.stored(x, y, c) != 1.0))
@@ -133,7 +133,7 @@ impl MipMap {
         &self.levels[0]
     }
 
-    /// How many levels there are, at least 1.
+    /// The number of levels, at least 1.
     pub fn level_count(&self) -> usize {
         self.levels.len()
     }
@@ -143,23 +143,23 @@ impl MipMap {
         self.levels.get(level).map(|level| &**level)
     }
 
-    /// How it is looked up.
+    /// The lookup options.
     pub fn options(&self) -> MipMapOptions {
         self.options
     }
 
-    /// Bytes of memory that all levels take.
+    /// Bytes of memory of all levels.
     pub fn bytes(&self) -> usize {
         self.levels.iter().map(|level| level.bytes()).sum()
     }
 
-    /// The colour about `st`, with (0, 0) at the lower left, over a footprint of the two derivatives; grey for an image
-    /// without colour. Coverage plays no part. A footprint of zero gives the finest level.
+    /// The filtered colour at `st`, with (0, 0) at the lower left, over the footprint of the two derivatives;
+    /// grey for an image without colour. Alpha is ignored. A footprint of zero gives the finest level.
     pub fn lookup(&self, st: Vec2, dst_dx: Vec2, dst_dy: Vec2) -> Spectrum {
         self.filtered(st, dst_dx, dst_dy)
     }
 
-    /// The same as one number: the coverage, where the image has a coverage that is not 1 everywhere (a leaf's outline);
+    /// The filtered value as one number: alpha where the image has any alpha other than 1 (a leaf's outline);
     /// else its grey, or the mean of its colour channels.
     pub fn lookup_float(&self, st: Vec2, dst_dx: Vec2, dst_dy: Vec2) -> f32 {
         self.filtered(st, dst_dx, dst_dy)
@@ -174,7 +174,7 @@ impl MipMap {
         if let ImageFilter::Ewa(max_ratio) = self.options.filter {
             return self.elliptic(st, major, minor, max_ratio);
         }
-        // Twice the largest derivative: a texel as wide as the footprint is half its filter's width.
+        // Twice the largest derivative: a texel as wide as the footprint is half the filter's width.
         let width = 2.0 * major.abs().max(minor.abs()).max_element();
         let last = self.levels.len() - 1;
         let level = last as f32 + width.max(1e-8).log2();
@@ -205,7 +205,7 @@ impl MipMap {
         if short == 0.0 {
             return self.bilinear(0, st);
         }
-        // Too thin an ellipse is made wider: more blurred, but bounded in cost.
+        // A very thin ellipse is widened: blurrier, but of bounded cost.
         let widen = (long / (short * max_ratio)).max(1.0);
         let (minor, short) = (minor * widen, short * widen);
         let last = self.levels.len() - 1;
@@ -225,7 +225,7 @@ impl MipMap {
         let size = Vec2::new(self.levels[level].width() as f32, self.levels[level].height() as f32);
         let (s, t) = self.to_texels(level, st);
         let (major, minor) = (major * size, minor * size);
-        // A s² + B s t + C t² < 1, one texel wider than the footprint so that it is never without texels.
+        // A s² + B s t + C t² < 1, one texel wider than the footprint so that it is never empty.
         let a = major.y * major.y + minor.y * minor.y + 1.0;
         let b = -2.0 * (major.x * major.y + minor.x * minor.y);
         let c = major.x * major.x + minor.x * minor.x + 1.0;
@@ -258,25 +258,26 @@ impl MipMap {
         row(y0) * (1.0 - dy) + row(y0 + 1) * dy
     }
 
-    /// `st` brought near the image, where texels can be told apart: by whole images where it repeats.
+    /// `st` reduced to the vicinity of the image, where texels can be distinguished: by whole periods where it
+    /// repeats.
     fn within_reach(&self, st: Vec2) -> Vec2 {
         match self.options.wrap {
             _ if !st.is_finite() => Vec2::ZERO,
             Wrap::Repeat => st - st.floor(),
             Wrap::Clamp | Wrap::Black => st.clamp(Vec2::splat(-4.0), Vec2::splat(5.0)),
             Wrap::OctahedralSphere => st.clamp(Vec2::ZERO, Vec2::ONE),
-            // `st` counts rows downwards here; the mirrored image is its own mirror image.
+            // `st` counts rows downwards here; mirroring is symmetric.
             Wrap::Axes([s, t]) => Vec2::new(s.within_reach(st.x), t.within_reach(st.y)),
         }
     }
 
-    /// The place in texels of a level, whole numbers at their centres, (0, 0) the upper left one.
+    /// The position in texels of a level, integers at their centres, (0, 0) the upper left one.
     fn to_texels(&self, level: usize, st: Vec2) -> (f32, f32) {
         let level = &self.levels[level];
         (st.x * level.width() as f32 - 0.5, st.y * level.height() as f32 - 0.5)
     }
 
-    /// The texel at a place that may lie beyond the edge.
+    /// The texel at a position that may be beyond the edge.
     fn texel<T: Texel>(&self, level: usize, x: i64, y: i64) -> T {
         let (width, height) = (i64::from(self.levels[level].width()), i64::from(self.levels[level].height()));
         let (x, y) = if (0..width).contains(&x) && (0..height).contains(&y) {
@@ -294,7 +295,7 @@ impl MipMap {
     }
 }
 
-/// The texel of an equal-area octahedral image that lies where one up to an image beyond its edge would: each edge meets
+/// The texel of an equal-area octahedral image for a position up to one image beyond its edge: each edge meets
 /// itself, mirrored about its middle.
 fn octahedral(x: i64, y: i64, width: i64, height: i64) -> (i64, i64) {
     let (mut x, mut y) = (x.clamp(-width, 2 * width - 1), y.clamp(-height, 2 * height - 1));
@@ -337,7 +338,7 @@ fn half_size(image: &Bitmap) -> Option<Bitmap> {
     Bitmap::new(new_width, new_height, channels, data, image.encoding())
 }
 
-/// Light in the number format and encoding of an image.
+/// Encodes light in the number format and encoding of an image.
 fn encode(light: &[f32], channels: Channels, like: &Bitmap) -> PixelData {
     let stored = light.iter().enumerate().map(|(i, &v)| {
         let is_alpha = channels.alpha() == Some(i % channels.count());
@@ -351,7 +352,7 @@ fn encode(light: &[f32], channels: Channels, like: &Bitmap) -> PixelData {
     }
 }
 
-/// Which of `from` texels in a row each of `to` ≤ `from` ≤ 2 `to` covers, with its share: three at most.
+/// For each of `to` texels, the at most three of `from` ≤ 2 `to` texels that it covers, with their weights.
 fn coverages(from: u32, to: u32) -> Vec<[(u32, f32); 3]> {
     let size = f64::from(from) / f64::from(to);
     (0..to)

@@ -1,4 +1,4 @@
-//! One layered surface for all that the parameters of glTF and of the principled materials can say.
+//! One layered surface for all parameters of glTF and of the principled materials.
 
 use std::f32::consts::FRAC_1_PI;
 
@@ -15,30 +15,31 @@ use crate::stretched::{STRETCHED, Stretched};
 use crate::thin_film::ThinFilm;
 use crate::{BsdfSample, LocalDir, Scatter, Spectrum, fresnel};
 
-/// A surface of layers: a clear coat over fibres over a base. The base is a mixture, by area, of metal, of a dielectric
-/// that is opaque and of one that lets light through; all three share one roughness.
+/// A layered surface: a clear coat over fibres over a base. The base is a mixture, by area, of metal, an opaque
+/// dielectric and a clear dielectric; all three share one roughness.
 ///
-/// - Metal reflects by Schlick's approximation between its colour and white, as glTF 2.0 (Khronos, 2021, appendix B) says.
-/// - The opaque dielectric reflects by the exact Fresnel equations, and what it does not reflect reaches a Lambertian
-///   inside, which sends it back or on through. The inside is as bright as what the surface keeps from it leaves, counted
-///   from both ends: Kelemen, Szirmay-Kalos, "A Microfacet Based Coupled Specular-Matte BRDF Model with Importance
-///   Sampling", Eurographics 2001. White on white, nothing is lost.
-/// - The clear dielectric refracts ([`Body::Solid`]) or lets light straight on ([`Body::Thin`]).
-/// - What bounces more than once between the facets of metal and clear dielectrics is given back in the manner of Kulla,
-///   Conty, "Revisiting Physically Based Shading at Imageworks", SIGGRAPH course 2017. White metal loses nothing.
-/// - Fibres take from what lies under them the larger of what they reflect along either direction, as glTF's
-///   KHR_materials_sheen does: that is reciprocal, makes no light, and loses the little that they throw back down.
-/// - A coat takes what it reflects towards the viewer, as glTF's KHR_materials_clearcoat does: white under a coat stays white.
+/// - Metal: Schlick's approximation between its colour and white, as in glTF 2.0 (Khronos, 2021, appendix B).
+/// - The opaque dielectric: the exact Fresnel equations; what is not reflected reaches a Lambertian base, which
+///   reflects or transmits it. The base is scaled by the albedo left over by the interface in both directions:
+///   Kelemen, Szirmay-Kalos, "A Microfacet Based Coupled Specular-Matte BRDF Model with Importance Sampling",
+///   Eurographics 2001. White on white conserves energy.
+/// - The clear dielectric refracts ([`Body::Solid`]) or transmits straight on ([`Body::Thin`]).
+/// - Multiple scattering between the facets of metal and clear dielectrics is compensated after Kulla, Conty,
+///   "Revisiting Physically Based Shading at Imageworks", SIGGRAPH course 2017. White metal conserves energy.
+/// - Fibres attenuate the layers below by the larger of their albedos along the two directions, as in glTF's
+///   KHR_materials_sheen: reciprocal, at most energy-conserving, and without light scattered back down.
+/// - The coat attenuates by its reflectance towards the viewer, as in glTF's KHR_materials_clearcoat: white
+///   under a coat stays white.
 ///
-/// It is reciprocal (radiance in a solid body counted by η²) except under a coat. Opaque and thin
-/// surfaces look the same from both sides; a solid one has its fibres and coat on the outside only.
+/// It is reciprocal (radiance in a solid scaled by η²) except under a coat. Opaque and thin surfaces look the
+/// same from both sides; a solid has its fibres and coat on the outside only.
 ///
-/// Stretched facets have a table of what they reflect; what a dielectric's reflect and let through is that of isotropic facets
-/// as rough as they are in the plane of each direction. Stretched facets of a clear solid lose what bounces more than once
-/// beyond what those of the smaller roughness do.
+/// Anisotropic facets have a table of their reflection; reflection and transmission of a dielectric use
+/// isotropic facets as rough as the anisotropic ones in the plane of each direction. Anisotropic facets of a
+/// clear solid lose the multiple scattering in excess of that of the smaller roughness.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Principled {
-    /// Reflectance of the metal at normal incidence, and of the inside of the opaque dielectric.
+    /// Reflectance of the metal at normal incidence, and of the Lambertian base of the opaque dielectric.
     pub base: Spectrum,
     /// The share of metal, in [0, 1].
     pub metallic: f32,
@@ -52,33 +53,33 @@ pub struct Principled {
     pub f0: Spectrum,
     /// What the dielectrics reflect at grazing incidence, in [0, 1].
     pub f90: f32,
-    /// Of the dielectric, the share that is clear.
+    /// The clear share of the dielectric.
     pub transmission: f32,
-    /// A factor on what the clear dielectric lets through.
+    /// A factor on transmission through the clear dielectric.
     pub transmission_color: Spectrum,
-    /// What the clear dielectric is.
+    /// Whether the clear dielectric is thin or solid.
     pub body: Body,
-    /// Of the light inside the opaque dielectric, the share that may leave on the other side.
+    /// The share of the Lambertian light of the opaque dielectric that is transmitted.
     pub diffuse_transmission: f32,
     /// A factor on that.
     pub diffuse_transmission_color: Spectrum,
-    /// A film on the base.
+    /// A thin film on the base.
     pub film: ThinFilm,
-    /// Fibres on that.
+    /// Fibres above the film.
     pub sheen: Sheen,
     /// The topmost layer.
     pub coat: Clearcoat,
 }
 
-/// What lies behind a clear surface.
+/// The interior behind a clear surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Body {
-    /// A pane without thickness: light is spread by its roughness, not bent, and the bounces between its two faces are
-    /// summed.
+    /// A thin pane: transmission is spread by roughness, not refracted, and the bounces between the two faces
+    /// are summed.
     Thin,
     /// A solid; the normal points out of it.
     Solid {
-        /// Half of the difference of η between blue and red; 0 where all lanes bend alike.
+        /// Half of the difference of η between blue and red; 0 without dispersion.
         spread: f32,
     },
 }
@@ -98,20 +99,20 @@ impl Clearcoat {
     /// The index of refraction of the lacquer.
     pub const ETA: f32 = 1.5;
 
-    /// None at all.
+    /// No coat.
     pub const NONE: Self = Self { weight: 0.0, alpha: 0.0, normal: Vec3::Z };
 
     fn face(&self) -> Dielectric {
         Dielectric { eta: Self::ETA, facets: Microfacets::new(self.alpha, self.alpha) }
     }
 
-    /// The turn about an axis in the surface that takes the coat's normal to z, or back.
+    /// The rotation in a plane through the normal that takes the coat's normal to z, or its inverse.
     fn turned(&self, w: Vec3, back: bool) -> Vec3 {
         let n = self.normal;
         if n == Vec3::Z {
             return w;
         }
-        // A half turn about the bisector of the two, then one about z: their product leaves the axis in place.
+        // A half-turn about the bisector, then one about z: their product fixes the axis.
         let bisector = n + Vec3::Z;
         let half_turn = |w: Vec3| bisector * (2.0 * bisector.dot(w) / bisector.length_squared()) - w;
         let about_z = |w: Vec3| Vec3::new(-w.x, -w.y, w.z);
@@ -122,7 +123,7 @@ impl Clearcoat {
         LocalDir(self.turned(w.0, false))
     }
 
-    /// The share of light that it keeps from what lies under it, along one direction.
+    /// The attenuation of the layers below along one direction.
     fn share(&self, w: LocalDir) -> f32 {
         if self.weight == 0.0 {
             return 0.0;
@@ -131,8 +132,8 @@ impl Clearcoat {
         self.weight * ALBEDO.face(cos, self.alpha, Self::ETA)
     }
 
-    /// The directions of the coat's own that come to be `wi`, each with `wo`, as it sees them from above: where the coat
-    /// leans, some that it reflects to lie below the surface, and are mirrored back up.
+    /// The directions in the coat's frame that map to `wi`, each with `wo`, as seen from above: where the coat
+    /// is tilted, some of its reflections are below the surface and are mirrored back up.
     fn between(&self, wo: LocalDir, wi: LocalDir) -> impl Iterator<Item = (LocalDir, LocalDir)> {
         let o = self.local(wo);
         let is_met = wo.same_hemisphere(wi) && wo.same_hemisphere(o);
@@ -145,18 +146,19 @@ impl Clearcoat {
     }
 }
 
-/// The probabilities with which a direction is chosen; they sum to 1.
+/// The probabilities of the lobes; they sum to 1.
 #[derive(Clone, Copy)]
 struct Lobes {
     coat: f32,
     facets: f32,
-    /// By the cosine law on the side of `wo`.
+    /// Cosine-weighted, on the side of `wo`.
     near: f32,
-    /// By the cosine law on the other side.
+    /// Cosine-weighted, on the other side.
     far: f32,
 }
 
-/// What a facet does with light: the rest is lost, or goes on to the inside of the opaque dielectric.
+/// The power reflected and transmitted by a facet; the rest is lost, or reaches the base of the opaque
+/// dielectric.
 struct Shares {
     reflects: Spectrum,
     transmits: Spectrum,
@@ -190,7 +192,7 @@ impl Principled {
         coat: Clearcoat::NONE,
     };
 
-    /// f · |cos θi|, without mirror images.
+    /// f · |cos θi|, without delta parts.
     pub fn eval(&self, wo: LocalDir, wi: LocalDir) -> Spectrum {
         if !sided(wo) || !sided(wi) {
             return Spectrum::BLACK;
@@ -213,7 +215,7 @@ impl Principled {
         sum
     }
 
-    /// The density of [`Principled::sample`] but for its delta parts.
+    /// The density of [`Principled::sample`] without its delta parts.
     pub fn pdf(&self, wo: LocalDir, wi: LocalDir) -> f32 {
         if !sided(wo) || !sided(wi) {
             return 0.0;
@@ -232,7 +234,7 @@ impl Principled {
         pdf
     }
 
-    /// A direction off the coat, off or through the facets, or by the cosine law.
+    /// A direction sampled from the coat, by reflection or refraction at the facets, or by the cosine.
     pub fn sample(&self, wo: LocalDir, lobe: f32, u: Vec2) -> Option<BsdfSample> {
         if !sided(wo) {
             return None;
@@ -272,7 +274,7 @@ impl Principled {
             }
             sample.wi
         } else {
-            // What rounding leaves beyond the last lobe is no lobe of probability zero.
+            // A remainder by rounding beyond the last lobe must not select a lobe of probability zero.
             let far = lobes.far > 0.0 && (lobes.near == 0.0 || lobe >= 1.0 - lobes.far);
             if lobes.near + lobes.far == 0.0 {
                 return None;
@@ -289,8 +291,8 @@ impl Principled {
         Some(BsdfSample { wi, weight, scatter: Scatter::Density(pdf), transmitted, eta })
     }
 
-    /// Every delta part with the weight that it has by itself: what [`Principled::sample`] gives it times how often it is
-    /// chosen. (Rough facets that bend nothing let light straight through; they count by the facet of u = 0.)
+    /// Every delta part with its own weight: the one that [`Principled::sample`] gives times the probability of
+    /// choosing it. Rough facets without refraction transmit straight on; they count by the facet of u = 0.
     pub(crate) fn specular(&self, wo: LocalDir) -> Specular {
         let lobes = self.lobes(wo);
         let reflection = self.shares(self.to_facets(wo).cos_theta()).reflection_probability();
@@ -310,7 +312,7 @@ impl Principled {
             .collect()
     }
 
-    /// Whether it has nothing but delta parts.
+    /// Whether all parts are deltas.
     pub fn is_delta(&self) -> bool {
         let dielectric = 1.0 - self.metallic;
         self.facets.is_smooth()
@@ -333,7 +335,7 @@ impl Principled {
         base * (1.0 - coat) + Spectrum::splat(coat)
     }
 
-    /// The same solid inside another of this index; see [`crate::Bsdf::immersed`].
+    /// The solid inside another of this index; see [`crate::Bsdf::immersed`].
     #[must_use]
     pub fn immersed(self, outside: f32) -> Self {
         let eta = self.eta / outside;
@@ -347,7 +349,7 @@ impl Principled {
         Self { eta, f0: (self.f0 * share).map(crate::unit), body, ..self }
     }
 
-    /// The same with its sharp parts made rough, as [`crate::Bsdf::regularized`].
+    /// Regularised as in [`crate::Bsdf::regularized`].
     #[must_use]
     pub fn regularized(self) -> Self {
         let alpha = self.coat.face().facets.regularized().alpha().x;
@@ -360,12 +362,12 @@ impl Principled {
         self.coat.weight > 0.0 || !self.sheen.is_none()
     }
 
-    /// Whether light bends as it goes through.
+    /// Whether transmission refracts.
     fn is_solid(&self) -> bool {
         self.transmission > 0.0 && matches!(self.body, Body::Solid { .. })
     }
 
-    /// Whether the layers lie on the side of a direction.
+    /// Whether the layers are on the side of a direction.
     fn covered(&self, w: LocalDir) -> bool {
         w.cos_theta() > 0.0 || !self.is_solid()
     }
@@ -375,7 +377,7 @@ impl Principled {
         if self.sheen.is_none() { 1.0 } else { one(wo).min(one(wi)) }
     }
 
-    /// By what it reflects towards `wo`, or where that is inside a solid, towards `wi`.
+    /// The transmission of the coat towards `wo`, or where that is inside a solid, towards `wi`.
     fn passes_coat(&self, wo: LocalDir, wi: LocalDir) -> f32 {
         if self.coat.weight == 0.0 {
             1.0
@@ -390,12 +392,12 @@ impl Principled {
 
     // Fresnel terms.
 
-    /// The index that the opaque dielectric reflects by: it has no inside to be seen from.
+    /// The relative index of the opaque dielectric, which is never seen from inside.
     fn opaque_eta(&self) -> f32 {
         self.eta.max(1.0 / self.eta).min(MAX_ETA)
     }
 
-    /// Index of the other side over that of the side of `w`, for light that goes through.
+    /// Index of the other side over that of the side of `w`, for transmission.
     fn eta_across(&self, w: LocalDir) -> f32 {
         if !self.is_solid() {
             1.0
@@ -406,7 +408,7 @@ impl Principled {
         }
     }
 
-    /// What the metal reflects under a cosine.
+    /// The reflectance of the metal at a cosine.
     fn metal(&self, cos: f32) -> Spectrum {
         let bare = self.base.lerp(Spectrum::WHITE, schlick(cos));
         if self.film.weight == 0.0 {
@@ -415,8 +417,8 @@ impl Principled {
         bare.lerp(self.film.reflectance(cos, self.base), self.film.weight)
     }
 
-    /// What the dielectrics reflect under a cosine, negative from the inside: between `f0` and `f90` as the exact Fresnel
-    /// equations of an index go between theirs.
+    /// The reflectance of the dielectrics at a cosine, negative from the inside: interpolated between `f0` and
+    /// `f90` as the exact Fresnel equations vary.
     fn dielectric(&self, cos: f32, eta: f32) -> Spectrum {
         let exact = fresnel::dielectric(cos, eta);
         if cos < 0.0 && exact == 1.0 {
@@ -429,14 +431,14 @@ impl Principled {
             return bare;
         }
         let outside = if cos < 0.0 { (1.0 - (1.0 - cos * cos) * eta * eta).max(0.0).sqrt() } else { cos };
-        // Never more than the inside below counts on.
+        // Never more than the Lambertian base assumes.
         let most = between(self.film.most(self.f0));
         let film = self.film.reflectance(outside, self.f0).zip(most, f32::min);
         bare.lerp(film, self.film.weight)
     }
 
-    /// What the opaque dielectric keeps from its inside, where facets reflect `mirror` of all that they meet and `face` of
-    /// it by the exact equations.
+    /// The albedo that the opaque dielectric withholds from its base, where perfect facets reflect `mirror` and
+    /// dielectric ones `face`.
     fn kept(&self, mirror: f32, face: f32) -> Spectrum {
         let eta = self.opaque_eta();
         let head_on = fresnel::dielectric(1.0, eta);
@@ -451,7 +453,7 @@ impl Principled {
         kept.map(crate::unit)
     }
 
-    /// The indices of the lanes of a solid, and how many there are: one where all bend alike.
+    /// The indices of the channels of a solid, and how many differ: one without dispersion.
     fn lanes(&self) -> ([f32; 3], usize) {
         let spread = match self.body {
             Body::Solid { spread } => spread,
@@ -463,7 +465,7 @@ impl Principled {
         ([self.eta - spread, self.eta, self.eta + spread].map(|eta| eta.max(1.001)), 3)
     }
 
-    /// What a facet does with light that meets it under a cosine, negative from below.
+    /// Reflection and transmission of a facet at a cosine, negative from below.
     fn shares(&self, cos: f32) -> Shares {
         let dielectric = 1.0 - self.metallic;
         let clear = dielectric * self.transmission;
@@ -478,7 +480,7 @@ impl Principled {
             return Shares { reflects, transmits: Spectrum::BLACK };
         }
         let clear_reflects = match (self.body, self.lanes()) {
-            // R + T² R + T² R³ + … as in a thin pane of glass.
+            // R + T² R + T² R³ + … as for a thin pane of glass.
             (Body::Thin, _) => self.dielectric(cos.abs(), self.opaque_eta()).map(|r| 2.0 * r / (1.0 + r)),
             (Body::Solid { .. }, ([eta, ..], 1)) => self.dielectric(cos, eta),
             (Body::Solid { .. }, ([r, g, b], _)) => {
@@ -490,9 +492,9 @@ impl Principled {
         Shares { reflects, transmits }
     }
 
-    // The cosine law: the inside of the opaque dielectric, and what bounces more than once between facets.
+    // Cosine-weighted parts: the Lambertian base, and multiple scattering between facets.
 
-    /// The isotropic α that the tables are asked for.
+    /// The isotropic α for lookups in the tables.
     fn mean_alpha(&self) -> f32 {
         let alpha = self.facets.alpha();
         (alpha.x * alpha.y).sqrt().min(1.0)
@@ -503,7 +505,7 @@ impl Principled {
         alpha.x != alpha.y && alpha.max_element() > Stretched::LEAST
     }
 
-    /// What facets that reflect everything reflect at the first bounce; `alpha` is [`Self::mean_alpha`].
+    /// The single-scattering albedo of perfect facets; `alpha` is [`Self::mean_alpha`].
     fn mirror(&self, w: LocalDir, alpha: f32) -> f32 {
         if !self.is_stretched() {
             return ALBEDO.mirror(w.abs_cos_theta(), alpha);
@@ -511,7 +513,7 @@ impl Principled {
         STRETCHED.mirror(self.facets.alpha(), self.to_facets(w).vec())
     }
 
-    /// The roughness along a direction: that of isotropic facets which look most alike from there.
+    /// The roughness in a direction: that of the most similar isotropic facets.
     fn alpha_towards(&self, w: LocalDir) -> f32 {
         let across = self.to_facets(w).vec().truncate();
         let length = across.length();
@@ -538,7 +540,7 @@ impl Principled {
         if self.is_stretched() { STRETCHED.mean(self.facets.alpha()) } else { ALBEDO.mirror_mean(alpha) }
     }
 
-    /// f · |cos θi| of all that is sampled by the cosine law, but for the fibres.
+    /// f · |cos θi| of all that is sampled by the cosine, without the fibres.
     fn cosine_part(&self, wo: LocalDir, wi: LocalDir) -> Spectrum {
         let reflects = wo.same_hemisphere(wi);
         let alpha = self.mean_alpha();
@@ -565,7 +567,7 @@ impl Principled {
             let mean = self.mirror_mean(alpha);
             let white =
                 given_back(Spectrum::splat(mirror(wo)), Spectrum::splat(mirror(wi)), Spectrum::splat(mean));
-            // Each further bounce takes its share: F² E / (1 − F (1 − E)) of the first one's loss.
+            // The series of further bounces: F² E / (1 − F (1 − E)) of the first one's loss.
             let f = if self.film.weight == 0.0 {
                 (self.base * 20.0 + Spectrum::WHITE) / 21.0
             } else {
@@ -581,7 +583,7 @@ impl Principled {
         sum * wi.abs_cos_theta()
     }
 
-    /// The factor on diffuse light that goes through: radiance is denser inside a solid.
+    /// The factor of η² on diffuse transmission into or out of a solid.
     fn spread_across(&self, wo: LocalDir) -> f32 {
         if !self.is_solid() {
             return 1.0;
@@ -591,8 +593,8 @@ impl Principled {
         if wo.cos_theta() > 0.0 { dense / eta2 } else { dense }
     }
 
-    /// How much of what bounces more than once between clear facets is given back: tables know the facets of plain glass,
-    /// of which those with less reflection lose at least this part.
+    /// The share of multiple scattering between clear facets that is compensated: the tables are for plain
+    /// glass, and facets with less reflection lose at least this share.
     fn plainness(&self) -> f32 {
         let head_on = fresnel::dielectric(1.0, self.eta);
         let (least, most) = (self.f0.min_component(), self.f0.max_component());
@@ -601,7 +603,7 @@ impl Principled {
         tint.min(1.0) * self.f90 * (1.0 - self.film.weight) * f32::from(in_tables)
     }
 
-    /// f of the light that bounces more than once between clear facets.
+    /// f of multiple scattering between clear facets.
     fn clear_further_bounces(&self, wo: LocalDir, wi: LocalDir, alpha: f32) -> Spectrum {
         let reflects = wo.same_hemisphere(wi);
         let tint = if reflects { Spectrum::WHITE } else { self.transmission_color };
@@ -617,12 +619,13 @@ impl Principled {
         if (eta - 1.0).abs() < Self::NO_BORDER {
             return Spectrum::BLACK;
         }
-        // Stretched ones lose at least what the smoother of their two roughnesses does.
+        // Anisotropic facets lose at least as much as the smoother of their two roughnesses.
         let alpha = if self.is_stretched() { self.facets.alpha().min_element() } else { alpha };
         let loss =
             |w: LocalDir| (1.0 - ALBEDO.glass(w.abs_cos_theta(), alpha, eta, w.cos_theta() < 0.0)).max(0.0);
         let mean = |inside| (1.0 - ALBEDO.glass_mean(alpha, eta, inside)).max(0.0);
-        // Of what either side loses, so much leaves on each that the way back is as likely: by the losses times η².
+        // The losses of both sides are distributed over both so that the result is reciprocal: by the losses
+        // times η².
         let both = (mean(false) + eta * eta * mean(true)).max(1e-6);
         let denser = if wo.cos_theta() > 0.0 { 1.0 } else { eta * eta };
         tint * (self.plainness() * loss(wo) * loss(wi) * denser / both * FRAC_1_PI)
@@ -630,7 +633,7 @@ impl Principled {
 
     // Facets.
 
-    /// Below this difference of η from 1 there is no border to bend light.
+    /// Below this difference of η from 1 there is no refraction.
     pub(crate) const NO_BORDER: f32 = 1e-3;
 
     fn to_facets(self, w: LocalDir) -> LocalDir {
@@ -643,8 +646,8 @@ impl Principled {
         LocalDir(Vec3::new(c * w.0.x - s * w.0.y, s * w.0.x + c * w.0.y, w.0.z))
     }
 
-    /// Each way through the surface from `wo` to `wi` (in the frame of the facets): a lane, or `None` for all, the border
-    /// whose facets are meant, and `wi` as that border sees it.
+    /// The modes of scattering from `wo` to `wi` (in the frame of the facets): a channel, or `None` for all,
+    /// the interface, and `wi` as seen by it.
     fn ways(
         &self,
         wo: LocalDir,
@@ -665,7 +668,7 @@ impl Principled {
         let through = !reflects && !thin;
         (0..count).filter_map(move |lane| {
             if !through {
-                // Any index will do for a reflection, but 1.
+                // For a reflection, any index other than 1 will do.
                 let wi = if reflects { wi } else { flipped(wi) };
                 return Some((None, Dielectric { eta: 1.5, facets }, wi));
             }
@@ -768,7 +771,7 @@ impl Principled {
             + fibres;
         let far = inside * self.diffuse_transmission_color.max_component() * self.diffuse_transmission
             + further * 0.5 * clear;
-        // A part that is there at all, however faint from here, may not starve.
+        // No existing part may have a tiny probability, however faint from here.
         let total = coat + facets + under * (near + far);
         let least = |share: f32, there: bool| if there { share.max(0.05 * total).max(1e-4) } else { 0.0 };
         let rough = !self.facets.is_smooth();
@@ -783,26 +786,26 @@ impl Principled {
     }
 }
 
-/// A direction that facets chose.
+/// A direction sampled from the facets.
 struct FacetSample {
     wi: LocalDir,
     /// The weight of a delta.
     delta: Option<Spectrum>,
-    /// η of the side that it enters over that of the side it leaves, where it goes through.
+    /// η of the other side over that of this side, for transmission.
     eta: Option<f32>,
 }
 
-/// Whether a direction is on a side of the surface.
+/// Whether a direction is on a side of the surface, not in it.
 fn sided(w: LocalDir) -> bool {
     w.abs_cos_theta() > 0.0
 }
 
-/// The direction on the other side of the surface.
+/// The direction mirrored to the other side of the surface.
 fn flipped(w: LocalDir) -> LocalDir {
     LocalDir(Vec3::new(w.0.x, w.0.y, -w.0.z))
 }
 
-/// The colour with all lanes but one dark.
+/// The colour with all channels but one set to zero.
 fn only(color: Spectrum, lane: Option<usize>) -> Spectrum {
     match lane {
         None => color,
@@ -817,13 +820,13 @@ fn schlick(cos: f32) -> f32 {
     (1.0 - crate::unit(cos)).powi(5)
 }
 
-/// How far the exact Fresnel term of an index has come from normal to grazing incidence, where it is 1.
+/// The exact Fresnel term as a fraction between normal incidence and grazing incidence, where it is 1.
 fn grazing_share(exact: f32, eta: f32) -> f32 {
     let head_on = fresnel::dielectric(1.0, eta);
     (exact - head_on) / (1.0 - head_on)
 }
 
-/// f of a white Lambertian that gives back, both ways, what was not kept: its albedo is 1 − kept(wo).
+/// f of a white Lambertian with albedo 1 − kept(wo), reciprocal.
 fn given_back(kept_o: Spectrum, kept_i: Spectrum, kept_mean: Spectrum) -> Spectrum {
     let rest = |kept: Spectrum| Spectrum::WHITE - kept;
     let mean = rest(kept_mean).map(|rest| rest.max(1e-6));

@@ -12,29 +12,30 @@ use crate::sheen::Sheen;
 use crate::thin_film::{ThinFilm, index_of};
 use crate::{FloatTexture, ImageTexture, Spectrum, SpectrumTexture, Texture, TextureContext, fresnel};
 
-/// Whose meaning parameters have where the two families differ.
+/// Which convention parameters follow where the two families differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Convention {
-    /// glTF 2.0: anisotropy widens α along the tangent from roughness² up to 1; what is transmitted is multiplied by the
-    /// base colour each time that it crosses the surface.
+    /// glTF 2.0: anisotropy widens α along the tangent from roughness² up to 1; transmission is multiplied by
+    /// the base colour at each crossing of the surface.
     Gltf,
-    /// Burley, "Physically Based Shading at Disney", SIGGRAPH course 2012, and its extension of 2015, as in Mitsuba 3's
-    /// `principled`: anisotropy a makes α = roughness² / s and roughness² · s with s = √(1 − 0.9 a); what is transmitted
-    /// by a solid is multiplied by the root of the base colour, so that the whole colour is seen through both sides.
+    /// Burley, "Physically Based Shading at Disney", SIGGRAPH course 2012, and its extension of 2015, as in
+    /// Mitsuba 3's `principled`: anisotropy a makes α = roughness² / s and roughness² · s with s = √(1 − 0.9
+    /// a); transmission into a solid is multiplied by the square root of the base colour, so that two crossings
+    /// give the whole colour.
     Burley,
 }
 
-/// The inside of a solid body (KHR_materials_volume).
+/// The interior of a solid (KHR_materials_volume).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VolumeParams {
-    /// What is left of white light after [`VolumeParams::attenuation_distance`], in [0, 1]. Default white.
+    /// The colour of white light after [`VolumeParams::attenuation_distance`], in [0, 1]. Default white.
     pub attenuation_color: Spectrum,
-    /// In units of the world, > 0. Default infinite: nothing is lost.
+    /// In world-space units, > 0. Default infinite: no attenuation.
     pub attenuation_distance: f32,
-    /// The colour that a deep body shows of the light which it scatters, in [0, 1] (`multiscatterColor`). Default black: what
-    /// is lost is absorbed.
+    /// The multiple-scattering colour of a deep solid, in [0, 1] (`multiscatterColor`). Default black:
+    /// absorption only.
     pub scatter_color: Spectrum,
-    /// Henyey–Greenstein asymmetry of that scattering, in (−1, 1) (`scatterAnisotropy`). Default 0.
+    /// Henyey–Greenstein asymmetry of the scattering, in (−1, 1) (`scatterAnisotropy`). Default 0.
     pub scatter_anisotropy: f32,
 }
 
@@ -49,65 +50,65 @@ impl Default for VolumeParams {
     }
 }
 
-/// Parameters of [`Principled`] as functions of place. Names, ranges and defaults are those of the core of glTF 2.0 and of
-/// its extensions (Khronos, 2021 to 2024), given in brackets; values outside a range are held within it. Make one by
-/// `PrincipledParams { …, ..PrincipledParams::default() }`.
+/// Parameters of [`Principled`] as functions of position. Names, ranges and defaults are those of core glTF 2.0
+/// and of its extensions (Khronos, 2021 to 2024), given in brackets; values are clamped to their ranges.
+/// Construct one by `PrincipledParams { …, ..PrincipledParams::default() }`.
 #[derive(Clone, Debug)]
 pub struct PrincipledParams {
-    /// Whose meaning. Default glTF's.
+    /// The convention. Default glTF's.
     pub convention: Convention,
-    /// Colour of the metal, and of the inside of the dielectric. In [0, 1]; default white.
+    /// Colour of the metal, and of the base of the dielectric. In [0, 1]; default white.
     pub base_color: Arc<SpectrumTexture>,
     /// From 0, a dielectric, to 1, a metal. Default 1, as in glTF.
     pub metallic: Arc<FloatTexture>,
     /// In [0, 1]; α of the facets is its square. Default 1.
     pub roughness: Arc<FloatTexture>,
-    /// How much longer than wide reflections are, in [0, 1] (KHR_materials_anisotropy). Default 0.
+    /// Anisotropy of the reflection, in [0, 1] (KHR_materials_anisotropy). Default 0.
     pub anisotropy: Arc<FloatTexture>,
-    /// Turns the direction of that stretch from the tangent towards the bitangent, in radians. Default 0.
+    /// Rotation of the direction of anisotropy from the tangent towards the bitangent, in radians. Default 0.
     pub anisotropy_rotation: f32,
-    /// glTF's anisotropy texture: red and green are the direction of the stretch from [-1, 1] mapped to [0, 1], turned by
-    /// the rotation, and blue is a factor on the strength. Default none.
+    /// glTF's anisotropy texture: red and green are the direction from [-1, 1] mapped to [0, 1], rotated by the
+    /// rotation, and blue is a factor on the strength. Default none.
     pub anisotropy_texture: Option<Arc<SpectrumTexture>>,
-    /// Index of refraction of the dielectric (KHR_materials_ior). Positive; default 1.5. 0 says that normal incidence
-    /// reflects the specular colour itself, whatever the index.
+    /// Index of refraction of the dielectric (KHR_materials_ior). Positive; default 1.5. 0 makes the
+    /// reflectance at normal incidence the specular colour itself.
     pub ior: f32,
-    /// A factor on all that the dielectric's surface reflects, in [0, 1] (KHR_materials_specular). Default 1.
+    /// A factor on all reflection of the dielectric's interface, in [0, 1] (KHR_materials_specular). Default 1.
     pub specular: Arc<FloatTexture>,
-    /// A factor on what it reflects at normal incidence, ≥ 0; the product stays within 1. Default white.
+    /// A factor on its reflectance at normal incidence, ≥ 0; the product is clamped to 1. Default white.
     pub specular_color: Arc<SpectrumTexture>,
-    /// How much of the base colour's hue that factor takes, in [0, 1] (Burley's). Default 0.
+    /// The share of the base colour's hue in that factor, in [0, 1] (Burley's). Default 0.
     pub specular_tint: Arc<FloatTexture>,
-    /// The share of the dielectric that is clear, in [0, 1] (KHR_materials_transmission). Default 0.
+    /// The clear share of the dielectric, in [0, 1] (KHR_materials_transmission). Default 0.
     pub transmission: Arc<FloatTexture>,
     /// 20 over the Abbe number of the clear solid (KHR_materials_dispersion), ≥ 0. Default 0: no dispersion.
     pub dispersion: f32,
-    /// What lies behind the clear surface (KHR_materials_volume); `None`, the default, is a pane without thickness, as
+    /// The interior behind the clear surface (KHR_materials_volume); `None`, the default, is a thin pane, as
     /// glTF's `thicknessFactor` of 0.
     pub volume: Option<VolumeParams>,
-    /// The share of the dielectric's inner light that leaves on the other side, in [0, 1]
+    /// The share of the dielectric's Lambertian light that is transmitted, in [0, 1]
     /// (KHR_materials_diffuse_transmission). Default 0.
     pub diffuse_transmission: Arc<FloatTexture>,
-    /// A factor on that light, in [0, 1]. Default white.
+    /// A factor on that, in [0, 1]. Default white.
     pub diffuse_transmission_color: Arc<SpectrumTexture>,
-    /// How much of the surface a clear coat of index 1.5 covers, in [0, 1] (KHR_materials_clearcoat). Default 0.
+    /// The share covered by a clear coat of index 1.5, in [0, 1] (KHR_materials_clearcoat). Default 0.
     pub clearcoat: Arc<FloatTexture>,
-    /// Its roughness, in [0, 1]; α is the square. Default 0.
+    /// The coat's roughness, in [0, 1]; α is the square. Default 0.
     pub clearcoat_roughness: Arc<FloatTexture>,
-    /// Its normals in tangent space; without, it lies on the surface as it is below the bumps of the base. Default none.
+    /// The coat's tangent-space normal map. Default none: the surface without the base's bump map.
     pub clearcoat_normal: Option<ImageTexture>,
     /// Strength and colour of fibres on the base, in [0, 1] (KHR_materials_sheen). Default black: none.
     pub sheen_color: Arc<SpectrumTexture>,
-    /// How much of the base colour's hue that takes, in [0, 1] (Burley's). Default 0.
+    /// The share of the base colour's hue in that, in [0, 1] (Burley's). Default 0.
     pub sheen_tint: Arc<FloatTexture>,
-    /// Roughness of the fibres, in [0, 1], held at [`Sheen::MIN_ROUGHNESS`] or more. Default 0.
+    /// Roughness of the fibres, in [0, 1], at least [`Sheen::MIN_ROUGHNESS`]. Default 0.
     pub sheen_roughness: Arc<FloatTexture>,
-    /// How much of the base a thin film covers, in [0, 1] (KHR_materials_iridescence). Default 0.
+    /// The share covered by a thin film, in [0, 1] (KHR_materials_iridescence). Default 0.
     pub iridescence: Arc<FloatTexture>,
     /// Index of refraction of the film, ≥ 1. Default 1.3.
     pub iridescence_ior: f32,
-    /// Thickness of the film in nanometres, ≥ 0. Default 400. (glTF's texture goes between a minimum at 0 and a maximum
-    /// at 1: a [`Texture::Mix`] of the two.)
+    /// Thickness of the film in nanometres, ≥ 0. Default 400. (glTF's texture interpolates between a minimum
+    /// and a maximum: a [`Texture::Mix`] of the two.)
     pub iridescence_thickness: Arc<FloatTexture>,
 }
 
@@ -146,9 +147,9 @@ impl Default for PrincipledParams {
 }
 
 impl PrincipledParams {
-    /// From the older way of glTF to say a surface (KHR_materials_pbrSpecularGlossiness): a dielectric with this diffuse
-    /// colour inside, that reflects `specular` at normal incidence and is as rough as 1 − `glossiness`. No guess at a
-    /// metal is needed: a surface that reflects much has little inside.
+    /// From glTF's older specular-glossiness model (KHR_materials_pbrSpecularGlossiness): a dielectric with
+    /// this diffuse colour, reflectance `specular` at normal incidence and roughness 1 − `glossiness`. Metals
+    /// need no detection: they have little diffuse colour.
     pub fn from_specular_glossiness(
         diffuse: Arc<SpectrumTexture>,
         specular: Arc<SpectrumTexture>,
@@ -165,18 +166,19 @@ impl PrincipledParams {
         }
     }
 
-    /// The index of refraction whose reflectance at normal incidence is 0.08 times Burley's `specular` in [0, 1].
+    /// The index of refraction with a reflectance at normal incidence of 0.08 times Burley's `specular` in [0,
+    /// 1].
     pub fn ior_from_specular(specular: f32) -> f32 {
         index_of(0.08 * crate::unit(specular))
     }
 
-    /// The roughness of a coat whose α is that of Burley's `clearcoat_gloss` in [0, 1]: from 0.1 down to 0.001.
+    /// The roughness of a coat for Burley's `clearcoat_gloss` in [0, 1]: α from 0.1 down to 0.001.
     pub fn roughness_from_gloss(gloss: f32) -> f32 {
         let gloss = crate::unit(gloss);
         (0.1 * (1.0 - gloss) + 0.001 * gloss).sqrt()
     }
 
-    /// Whether it is the same everywhere.
+    /// Whether it is uniform.
     pub(crate) fn is_uniform(&self) -> bool {
         let colors =
             [&self.base_color, &self.specular_color, &self.diffuse_transmission_color, &self.sheen_color];
@@ -207,13 +209,13 @@ impl PrincipledParams {
             .then(|| if self.ior > 0.0 && self.ior.is_finite() { self.ior } else { 1.5 })
     }
 
-    /// Whether light gets through anywhere.
+    /// Whether light is transmitted anywhere.
     pub fn lets_light_through(&self) -> bool {
         let opens = |texture: &FloatTexture| !matches!(texture, Texture::Constant(v) if *v <= 0.0);
         opens(&self.transmission) || opens(&self.diffuse_transmission)
     }
 
-    /// Whether any light may go straight on; see [`crate::Material::lets_light_straight_on`].
+    /// Whether any light may be transmitted straight on; see [`crate::Material::lets_light_straight_on`].
     pub(crate) fn lets_light_straight_on(&self) -> bool {
         let is_constantly =
             |texture: &FloatTexture, is: fn(f32) -> bool| matches!(texture, Texture::Constant(v) if is(*v));
@@ -222,13 +224,13 @@ impl PrincipledParams {
         }
         match self.interior_index() {
             Some(index) => (index - 1.0).abs() < Principled::NO_BORDER,
-            // Anisotropy makes it only rougher.
+            // Anisotropy only makes it rougher.
             None => !is_constantly(&self.roughness, |v| !Microfacets::new(v * v, v * v).is_smooth()),
         }
     }
 
-    /// σ of Beer's and Lambert's law inside, per unit of length; see [`crate::Material::interior_attenuation`]. A lane
-    /// of which nothing is left counts as a millionth.
+    /// σ of the Beer–Lambert law inside, per unit of length; see [`crate::Material::interior_attenuation`]. A
+    /// channel of 0 counts as a millionth.
     pub fn interior_attenuation(&self) -> Option<Spectrum> {
         self.interior_index()?;
         let volume = self.volume?;
@@ -237,7 +239,7 @@ impl PrincipledParams {
         (sigma.is_finite() && !sigma.is_black()).then_some(sigma)
     }
 
-    /// The inside, where it scatters light; see [`crate::Material::interior_medium`].
+    /// The medium inside, if it scatters light; see [`crate::Material::interior_medium`].
     pub fn interior_medium(&self) -> Option<HomogeneousMedium> {
         let extinction = self.interior_attenuation()?;
         let volume = self.volume.filter(|volume| !volume.scatter_color.is_black())?;
@@ -247,7 +249,8 @@ impl PrincipledParams {
         Some(HomogeneousMedium { extinction, albedo, asymmetry })
     }
 
-    /// The surface at a place. Its coat follows the shading normal until [`crate::Material::shading`] turns it.
+    /// The BSDF at a position. Its coat is along the shading normal until [`crate::Material::shading`] orients
+    /// it.
     pub fn bsdf(&self, at: &TextureContext) -> Principled {
         let share = |texture: &FloatTexture| crate::unit(texture.evaluate(at));
         let base = albedo(self.base_color.evaluate(at));
@@ -305,7 +308,7 @@ impl PrincipledParams {
         }
     }
 
-    /// The facets of the base, and the direction along which they are stretched.
+    /// The facets of the base, and their direction of anisotropy.
     fn facets(&self, at: &TextureContext) -> (Microfacets, Vec2) {
         let roughness = crate::unit(self.roughness.evaluate(at));
         let alpha = roughness * roughness;
@@ -332,7 +335,7 @@ impl PrincipledParams {
     }
 }
 
-/// White, with so much of the hue of a colour: that colour over its luminance.
+/// White, tinted by `amount` of a colour's hue: that colour over its luminance.
 fn hue(color: Spectrum, amount: f32) -> Spectrum {
     let luminance = color.luminance();
     if amount == 0.0 || luminance <= 0.0 {

@@ -1,4 +1,4 @@
-//! The soft gleam of cloth: fibres that stand up and scatter backwards and at grazing angles.
+//! Sheen of cloth: upright fibres that scatter backwards and at grazing angles.
 
 use std::f32::consts::FRAC_1_PI;
 
@@ -8,38 +8,38 @@ use crate::{LocalDir, Spectrum};
 /// A layer of fibres over a surface, the same from both sides.
 ///
 /// The distribution of Estevez, Kulla, "Production Friendly Microfacet Sheen BRDF", SIGGRAPH course notes 2017
-/// ("Charlie"), with the visibility of Neubelt, Pettineo, "Crafting a Next-Gen Material Pipeline for The Order: 1886",
-/// SIGGRAPH course notes 2013, as glTF's KHR_materials_sheen names both. We differ in that a lobe which would reflect more
-/// than it receives (smooth fibres at grazing angles) is divided by what it reflects, from whichever end that is more.
+/// ("Charlie"), with the visibility of Neubelt, Pettineo, "Crafting a Next-Gen Material Pipeline for The Order:
+/// 1886", SIGGRAPH course notes 2013, both as named by glTF's KHR_materials_sheen. Unlike there, a lobe of
+/// albedo above 1 (smooth fibres at grazing angles) is divided by its albedo, the larger of the two directions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sheen {
-    /// The strength in each lane, in [0, 1]; black is no sheen.
+    /// The strength in each channel, in [0, 1]; black is no sheen.
     pub color: Spectrum,
     // Within [MIN_ROUGHNESS, 1].
     roughness: f32,
 }
 
 impl Sheen {
-    /// Below this roughness the lobe is narrower than the table of what it reflects resolves.
+    /// Below this roughness the lobe is narrower than the albedo table resolves.
     pub const MIN_ROUGHNESS: f32 = 0.1;
 
-    /// A layer by its colour and its roughness, which is held within [[`Sheen::MIN_ROUGHNESS`], 1]; the exponent of the
-    /// distribution is the reciprocal of the roughness squared.
+    /// A layer by its colour and its roughness, clamped to [[`Sheen::MIN_ROUGHNESS`], 1]; the exponent of the
+    /// distribution is 1 / roughness².
     pub fn new(color: Spectrum, roughness: f32) -> Self {
-        // What is not a number is as smooth as can be.
+        // NaN counts as the smallest roughness.
         let roughness = crate::unit(roughness).max(Self::MIN_ROUGHNESS);
         Self { color: color.map(crate::unit), roughness }
     }
 
-    /// None at all.
+    /// No sheen.
     pub const NONE: Self = Self { color: Spectrum::BLACK, roughness: 1.0 };
 
-    /// Its roughness.
+    /// The roughness.
     pub fn roughness(&self) -> f32 {
         self.roughness
     }
 
-    /// Whether there is any.
+    /// Whether there is no sheen.
     pub fn is_none(&self) -> bool {
         self.color.is_black()
     }
@@ -54,12 +54,12 @@ impl Sheen {
         self.color * (unbounded(self.roughness, wo, wi) / most)
     }
 
-    /// The share of light that a white layer keeps from what lies under it, along one direction.
+    /// The albedo of a white layer along one direction, by which the layers below are attenuated.
     pub fn share(&self, w: LocalDir) -> f32 {
         ALBEDO.sheen(w.abs_cos_theta(), self.roughness).min(1.0)
     }
 
-    /// The share that passes on to what lies under it, along one direction.
+    /// The transmittance to the layers below along one direction.
     pub fn passes(&self, w: LocalDir) -> f32 {
         if self.is_none() { 1.0 } else { 1.0 - self.color.max_component() * self.share(w) }
     }

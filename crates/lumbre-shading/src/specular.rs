@@ -1,4 +1,4 @@
-//! What a BSDF does as a mirror or as smooth glass: the few directions that a ray tracer can follow one by one.
+//! The delta parts of BSDFs: the few directions that a Whitted ray tracer follows one by one.
 
 use lumbre_math::Vec2;
 use smallvec::SmallVec;
@@ -6,12 +6,12 @@ use smallvec::SmallVec;
 use crate::dielectric::Ways;
 use crate::{Bsdf, BsdfSample, LocalDir, Spectrum};
 
-/// Delta parts: a reflection and a transmission at most.
+/// Delta parts: at most a reflection and a transmission.
 pub(crate) type Specular = SmallVec<[BsdfSample; 2]>;
 
 impl Bsdf {
-    /// Every delta part, with the weight that it has by itself: together with [`Bsdf::eval`] they are the whole BSDF. The
-    /// mean of [`Bsdf::sample`] over its delta samples is the same.
+    /// Every delta part with its own weight: together with [`Bsdf::eval`] they are the whole BSDF. Equal to the
+    /// mean of [`Bsdf::sample`] over its delta samples.
     pub fn specular(&self, wo: LocalDir) -> impl ExactSizeIterator<Item = BsdfSample> + use<> {
         self.delta_parts(wo).into_iter()
     }
@@ -36,13 +36,13 @@ impl Bsdf {
         }
     }
 
-    /// What of the light that comes from straight behind goes straight on, along `wo`: the weight of those delta parts that
-    /// cross the surface without bending. They are what is clear of a smooth pane without thickness, and what a border lets
-    /// through that has the same index on both sides. Black for all else, rough panes and glass that refracts among it.
+    /// The weight of unbent delta transmission along `wo`: through a smooth pane without thickness, or an
+    /// interface between equal indices. Black for everything else, such as rough panes and refracting glass.
     ///
-    /// Since the direction stays, the way to a light beyond is known without a search, and its light arrives by this factor,
-    /// exactly. That matters for lights from a point or in one direction, which no ray hits by chance. The light of surfaces
-    /// and of the sky is found by following [`Bsdf::sample`], which chooses these parts too: by this factor, it would count twice.
+    /// Since the direction is unchanged, the way to a light beyond is known, and its light is attenuated by
+    /// exactly this factor. Only for point and directional lights, which no ray can hit: the light of surfaces
+    /// and of the environment is found by [`Bsdf::sample`], which samples these parts, too, and would count
+    /// twice.
     pub fn straight_on(&self, wo: LocalDir) -> Spectrum {
         let straight = |part: &BsdfSample| part.transmitted && part.eta == 1.0;
         self.specular(wo).filter(straight).map(|part| part.weight).sum()

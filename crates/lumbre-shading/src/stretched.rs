@@ -1,4 +1,4 @@
-//! A table of how much facets that are stretched reflect at the first bounce, by direction, and in the mean.
+//! A table of single-scattering albedos of anisotropic facets, by direction, and of their means.
 
 use std::f32::consts::FRAC_1_PI;
 use std::sync::LazyLock;
@@ -9,8 +9,8 @@ use crate::albedo::Between;
 
 /// Nodes of the cosine, at the squares of equal steps from 0 to 1.
 const COSINES: usize = 24;
-/// Nodes of the azimuth from the first axis to the second, closest at both: at equal steps of s, where 3 s² − 2 s³ is the share
-/// of the quarter turn.
+/// Nodes of the azimuth from the first axis to the second, dense near both: at equal steps of s, where 3 s² − 2
+/// s³ is the fraction of the quarter turn.
 const AZIMUTHS: usize = 9;
 /// Nodes of the cube root of each α, in equal steps from 0 to 1.
 const ROUGHNESSES: usize = 16;
@@ -20,18 +20,18 @@ const PAGE: usize = AZIMUTHS * ROW;
 /// Pairs of roughnesses, the first at least as large as the second.
 const PAIRS: usize = ROUGHNESSES * (ROUGHNESSES + 1) / 2;
 
-/// The table; `stretched.bin` is made by the ignored test of this file.
+/// The table. `stretched.bin` is written by the ignored test of this file.
 pub(crate) static STRETCHED: LazyLock<Stretched> =
     LazyLock::new(|| Stretched::from_bytes(include_bytes!("stretched.bin")));
 
-/// What white facets with two α reflect, cubic between nodes.
+/// The albedo of white facets with two α, interpolated cubically.
 pub(crate) struct Stretched {
     values: Vec<f32>,
     /// For each pair.
     means: Vec<f32>,
 }
 
-/// The position of a pair, its larger one first.
+/// The index of a pair, its larger one first.
 fn pair(x: usize, y: usize) -> usize {
     x * (x + 1) / 2 + y
 }
@@ -41,7 +41,7 @@ fn by_alpha(alpha: f32) -> Between {
 }
 
 impl Stretched {
-    /// Where neither α is larger the facets are as good as a mirror's, and the steps of this table too wide at grazing angles.
+    /// If neither α is larger, the facets count as a mirror; this table is too coarse there at grazing angles.
     pub(crate) const LEAST: f32 = 0.004;
 
     fn from_bytes(bytes: &[u8]) -> Self {
@@ -60,7 +60,7 @@ impl Stretched {
         Self { values, means }
     }
 
-    /// The share that facets of these α reflect of the light from a direction in their frame (either side).
+    /// The albedo of facets of these α for a direction in their frame (on either side).
     pub(crate) fn mirror(&self, alpha: Vec2, w: Vec3) -> f32 {
         let around = Around::new(w.y.abs().atan2(w.x.abs()) * (2.0 * FRAC_1_PI));
         let cosines = Between::new(crate::unit(w.z.abs()).sqrt(), COSINES);
@@ -84,29 +84,29 @@ impl Stretched {
         interpolated(alpha, page).clamp(0.0, 1.0)
     }
 
-    /// The mean of [`Stretched::mirror`] by the cosine law.
+    /// The cosine-weighted mean of [`Stretched::mirror`].
     pub(crate) fn mean(&self, alpha: Vec2) -> f32 {
         interpolated(alpha, |x, y| self.means[if x < y { pair(y, x) } else { pair(x, y) }])
     }
 }
 
-/// Between nodes of the azimuth.
+/// A position between nodes of the azimuth.
 struct Around {
     nodes: [usize; 4],
     weights: [f32; 4],
 }
 
 impl Around {
-    /// By the share of the quarter turn.
+    /// By the fraction of the quarter turn.
     fn new(share: f32) -> Self {
         Self::at(0.5 - ((1.0 - 2.0 * crate::unit(share)).asin() / 3.0).sin())
     }
 
-    /// By its place in equal steps.
+    /// By the position in equal steps.
     fn at(s: f32) -> Self {
         let place = crate::unit(s) * (AZIMUTHS - 1) as f32;
         let first = (place as usize).min(AZIMUTHS - 2);
-        // Beyond its ends the quarter goes on as its mirror image.
+        // The quarter is extended by its mirror image.
         let last = 2 * (AZIMUTHS - 1);
         let nodes = [0, 1, 2, 3].map(|i| {
             let node = (first + i + last - 1) % last;
@@ -116,7 +116,7 @@ impl Around {
     }
 }
 
-/// What each node of the azimuth counts for in the mean.
+/// The weight of each node of the azimuth in the mean.
 fn azimuth_weights() -> [f32; AZIMUTHS] {
     let steps = 4096;
     let mut sum = [0.0; AZIMUTHS];
@@ -130,7 +130,7 @@ fn azimuth_weights() -> [f32; AZIMUTHS] {
     sum.map(|weight| weight as f32)
 }
 
-/// Between nodes of both roughnesses.
+/// Interpolates between nodes of both roughnesses.
 fn interpolated(alpha: Vec2, value: impl Fn(usize, usize) -> f32) -> f32 {
     by_alpha(alpha.x)
         .interpolate(ROUGHNESSES, |x| by_alpha(alpha.y).interpolate(ROUGHNESSES, |y| value(x, y)))

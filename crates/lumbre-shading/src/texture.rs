@@ -1,4 +1,4 @@
-//! Values that vary over a surface.
+//! Textures: values that vary over a surface.
 
 use std::f64::consts::{PI, TAU};
 use std::ops::{Add, Mul};
@@ -25,28 +25,28 @@ pub struct TextureContext {
     pub duv_dx: Vec2,
     /// (∂u/∂y, ∂v/∂y).
     pub duv_dy: Vec2,
-    /// What the vertices of a mesh say besides.
+    /// Further vertex data of a mesh.
     pub vertex: VertexData,
 }
 
-/// What the vertices of a mesh may say of a place besides its surface parameters.
+/// Vertex data of a mesh other than position, normal and first uv.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VertexData {
-    /// Their colour, white where they have none.
+    /// The vertex colour; default white.
     pub colour: Spectrum,
-    /// Their coverage, 1 where they have none.
+    /// The vertex alpha; default 1.
     pub coverage: f32,
-    /// Parameters besides the first: the second set, the third and the fourth, zero where they have none.
+    /// The second, third and fourth uv set; default zero.
     pub further: [FurtherUv; FURTHER_SETS],
 }
 
-/// How many sets of parameters a surface may have besides the first.
+/// The number of uv sets besides the first.
 pub const FURTHER_SETS: usize = 3;
 
-/// A place by another set of parameters than the first.
+/// A position in another uv set than the first.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FurtherUv {
-    /// The parameters.
+    /// The uv coordinates.
     pub uv: Vec2,
     /// Their derivatives over one pixel to the right.
     pub duv_dx: Vec2,
@@ -55,17 +55,17 @@ pub struct FurtherUv {
 }
 
 impl FurtherUv {
-    /// Where there are none.
+    /// The default.
     pub const ZERO: Self = Self { uv: Vec2::ZERO, duv_dx: Vec2::ZERO, duv_dy: Vec2::ZERO };
 }
 
 impl VertexData {
-    /// Of a surface whose vertices say nothing.
+    /// The default vertex data.
     pub const NONE: Self =
         Self { colour: Spectrum::WHITE, coverage: 1.0, further: [FurtherUv::ZERO; FURTHER_SETS] };
 }
 
-/// Which of a mesh's sets of parameters.
+/// A uv set of a mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum UvSet {
     /// The first, which every surface has.
@@ -80,7 +80,7 @@ pub enum UvSet {
 }
 
 impl UvSet {
-    /// Those of [`VertexData::further`], in their order.
+    /// The sets of [`VertexData::further`], in their order.
     pub const FURTHER: [Self; FURTHER_SETS] = [Self::Second, Self::Third, Self::Fourth];
 
     fn further(self, vertex: &VertexData) -> Option<&FurtherUv> {
@@ -93,10 +93,10 @@ impl UvSet {
     }
 }
 
-/// From a surface to the plane of an image.
+/// A mapping from a surface to the plane of an image.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Mapping2d {
-    /// (u, v) scaled, then moved.
+    /// (u, v) scaled, then translated.
     Uv {
         /// Factors.
         scale: Vec2,
@@ -105,11 +105,11 @@ pub enum Mapping2d {
     },
     /// (u, v) of any set under an affine map.
     Affine {
-        /// Which parameters.
+        /// The uv set.
         set: UvSet,
-        /// Where (1, 0) and (0, 1) go.
+        /// The images of (1, 0) and (0, 1).
         axes: [Vec2; 2],
-        /// Where (0, 0) goes.
+        /// The image of (0, 0).
         origin: Vec2,
     },
     /// Angles about the origin of texture space.
@@ -136,13 +136,14 @@ pub enum Mapping2d {
 }
 
 impl Mapping2d {
-    /// The surface's own parameters, unchanged.
+    /// (u, v) unchanged.
     pub const IDENTITY: Self = Self::Uv { scale: Vec2::ONE, delta: Vec2::ZERO };
 
-    /// The place on the plane, with its derivatives over one pixel.
+    /// The position on the plane, with its derivatives over one pixel.
     ///
-    /// Spherical: s = θ / π from the north pole (+z), t = φ / 2π in [0, 1) from x towards y. Cylindrical: s = (π + φ) / 2π
-    /// with φ in (-π, π], t = z. On the axis of either the derivatives, which are infinite there, count as zero.
+    /// Spherical: s = θ / π from the north pole (+z), t = φ / 2π in [0, 1) from x towards y. Cylindrical: s =
+    /// (π + φ) / 2π with φ in (-π, π], t = z. On the axis of either the derivatives are infinite and count as
+    /// zero.
     pub fn map(&self, at: &TextureContext) -> TexturePoint {
         match self {
             Self::Uv { scale, delta } => TexturePoint {
@@ -184,7 +185,7 @@ impl Mapping2d {
     }
 }
 
-/// A place on the plane of a texture.
+/// A position on the plane of a texture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TexturePoint {
     /// (s, t).
@@ -224,16 +225,16 @@ pub trait TextureValue:
     + Mul<Output = Self>
     + 'static
 {
-    /// The value of an image about a place.
+    /// The filtered value of an image at a position.
     fn from_image(image: &MipMap, at: &TexturePoint) -> Self;
 
-    /// What the vertices of a mesh say: their colour, or their coverage.
+    /// The colour or alpha of vertex data.
     fn from_vertices(vertex: &VertexData) -> Self;
 
     /// One minus the value.
     fn complement(self) -> Self;
 
-    /// The value, with zero for what is negative or not a number.
+    /// The value, with negative numbers and NaN replaced by zero.
     fn clamp_negative(self) -> Self;
 }
 
@@ -273,7 +274,7 @@ impl TextureValue for Spectrum {
     }
 }
 
-/// An image over a surface. Its value is `scale * texel`, or `1 - scale * texel` when inverted.
+/// An image on a surface. Its value is `scale * texel`, or `1 - scale * texel` when inverted.
 #[derive(Clone, Debug)]
 pub struct ImageTexture {
     /// From the surface to the image.
@@ -282,22 +283,22 @@ pub struct ImageTexture {
     pub image: Arc<MipMap>,
     /// A factor.
     pub scale: f32,
-    /// Whether to take one minus the value.
+    /// Whether to invert the value.
     pub invert: bool,
 }
 
 impl ImageTexture {
-    /// The value at a place, never negative.
+    /// The value at a position, never negative.
     pub fn evaluate<T: TextureValue>(&self, at: &TextureContext) -> T {
         let value = T::from_image(&self.image, &self.mapping.map(at)) * self.scale;
         if self.invert { value.complement() } else { value }.clamp_negative()
     }
 }
 
-/// The closed set of textures. Trees are shallow: whoever makes one bounds its depth by [`Texture::MAX_DEPTH`].
+/// The closed set of textures. Constructors of trees bound their depth by [`Texture::MAX_DEPTH`].
 #[derive(Clone, Debug)]
 pub enum Texture<T: TextureValue> {
-    /// The same everywhere.
+    /// A uniform value.
     Constant(T),
     /// A product.
     Scale {
@@ -306,31 +307,31 @@ pub enum Texture<T: TextureValue> {
         /// Its factor.
         scale: Arc<Texture<f32>>,
     },
-    /// A product of two alike, lane by lane.
+    /// A product of two textures, channel by channel.
     Product([Arc<Texture<T>>; 2]),
-    /// One value below an edge, another from it on.
+    /// A step function.
     Step {
-        /// What is compared.
+        /// The input.
         input: Arc<Texture<f32>>,
-        /// With what.
+        /// The threshold.
         edge: f32,
-        /// Below the edge, and from it on.
+        /// The values below the threshold, and from it on.
         values: [T; 2],
     },
-    /// What the vertices of a mesh say: their colour, or their coverage.
+    /// The colour or alpha of vertex data.
     Vertices,
-    /// Between two values.
+    /// Linear interpolation.
     Mix {
-        /// At amount 0 and 1.
+        /// The textures at amount 0 and 1.
         textures: [Arc<Texture<T>>; 2],
-        /// How much of the second.
+        /// The share of the second.
         amount: Arc<Texture<f32>>,
     },
-    /// Between two values by |n · direction|, the first where that is 1.
+    /// Interpolation by |n · direction|, the first where that is 1.
     DirectionMix {
         /// The two values.
         textures: [Arc<Texture<T>>; 2],
-        /// A direction of world space.
+        /// A direction in world space.
         direction: Vec3,
     },
     /// Bilinear between the corners of the unit square, in the order v00, v01, v10, v11 (second digit: t).
@@ -340,14 +341,14 @@ pub enum Texture<T: TextureValue> {
         /// Values at the corners.
         corners: [T; 4],
     },
-    /// Squares of two textures, in two dimensions.
+    /// A checkerboard of two textures in two dimensions.
     Checkerboard2d {
         /// From the surface to the plane.
         mapping: Mapping2d,
         /// The textures; the first at (0, 0).
         textures: [Arc<Texture<T>>; 2],
     },
-    /// Cubes of two textures.
+    /// A checkerboard of two textures in three dimensions.
     Checkerboard3d {
         /// Texture space from world.
         texture_from_world: Transform,
@@ -364,15 +365,15 @@ pub type FloatTexture = Texture<f32>;
 pub type SpectrumTexture = Texture<Spectrum>;
 
 impl<T: TextureValue> Texture<T> {
-    /// How deep a tree of textures may be.
+    /// The maximal depth of a tree of textures.
     pub const MAX_DEPTH: usize = 64;
 
-    /// Whether it is the same everywhere by its kind alone.
+    /// Whether it is uniform by its kind alone.
     pub fn is_constant(&self) -> bool {
         matches!(self, Self::Constant(_))
     }
 
-    /// The value at a place. What has no weight is not evaluated.
+    /// The value at a position. A texture of zero weight is not evaluated.
     #[inline]
     pub fn evaluate(&self, at: &TextureContext) -> T {
         match self {
@@ -417,8 +418,8 @@ fn blend<T: TextureValue>(textures: &[Arc<Texture<T>>; 2], amount: f32, at: &Tex
     }
 }
 
-/// The wave that is 1 on [0, 1), -1 on [1, 2) and so on, under a tent of half-width `radius`: the second difference of
-/// its second integral, over the square of the radius.
+/// The square wave that is 1 on [0, 1), -1 on [1, 2) and so on, filtered by a tent of half-width `radius`: the
+/// second difference of its second integral, over the square of the radius.
 ///
 /// Quilez, "Filtering the Checkerboard Pattern", 2017.
 fn filtered_square_wave(x: f64, radius: f64) -> f64 {
@@ -427,7 +428,7 @@ fn filtered_square_wave(x: f64, radius: f64) -> f64 {
         return 0.0;
     }
     let crosses_an_edge = (x - radius).floor() != (x + radius).floor();
-    // Below this the second difference is mostly rounding, and no picture shows it.
+    // Below this the second difference is mostly rounding error, and the filter is invisible.
     if !crosses_an_edge || radius < 1e-6 {
         return if x < 1.0 { 1.0 } else { -1.0 };
     }

@@ -1,17 +1,18 @@
-//! The colours of thin films: soap, oil on water, heated steel.
+//! Thin-film interference: soap, oil on water, heated steel.
 
 use std::f32::consts::PI;
 
 use crate::{Spectrum, fresnel};
 
-/// A film over a surface, so thin that what its two faces reflect interferes.
+/// A thin film on a surface, whose two reflections interfere.
 ///
-/// Belcour, Barla, "A Practical Extension to Microfacet Theory for the Modeling of Varying Iridescence", SIGGRAPH 2017:
-/// the spectrum is integrated against the eye's sensitivity in Fourier space, where two orders of interference suffice. As
-/// in glTF's KHR_materials_iridescence polarisation is left out; we differ from that by exact Fresnel terms at both faces.
+/// Belcour, Barla, "A Practical Extension to Microfacet Theory for the Modeling of Varying Iridescence",
+/// SIGGRAPH 2017: the spectrum is integrated against the eye's sensitivity in Fourier space, where two orders
+/// of interference suffice. As in glTF's KHR_materials_iridescence polarisation is ignored; unlike there, both
+/// faces use the exact Fresnel terms.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ThinFilm {
-    /// How much of the surface it covers, in [0, 1].
+    /// The share of the surface covered, in [0, 1].
     pub weight: f32,
     /// Index of refraction, at least 1.
     pub eta: f32,
@@ -20,17 +21,17 @@ pub struct ThinFilm {
 }
 
 impl ThinFilm {
-    /// None at all.
+    /// No film.
     pub const NONE: Self = Self { weight: 0.0, eta: 1.3, thickness: 0.0 };
 
-    /// The film vanishes as its thickness falls below 30 nm, where the method has no sense any more.
+    /// The film fades out below a thickness of 30 nm, where the method does not apply.
     fn eta_of_thickness(&self) -> f32 {
         let t = (self.thickness / 30.0).clamp(0.0, 1.0);
         1.0 + (self.eta.max(1.0) - 1.0) * t * t * (3.0 - 2.0 * t)
     }
 
-    /// The share reflected at an angle (by its cosine, outside) where the bare surface reflects `f0` head-on; each lane in
-    /// [0, 1].
+    /// The reflectance at a cosine (outside) where the bare surface has the reflectance `f0` at normal
+    /// incidence; each channel in [0, 1].
     pub fn reflectance(&self, cos: f32, f0: Spectrum) -> Spectrum {
         let eta = self.eta_of_thickness();
         let cos = cos.clamp(0.0, 1.0);
@@ -41,7 +42,8 @@ impl ThinFilm {
         let lane = |f0: f32, row: [f32; 3]| {
             let base = index_of(f0);
             let inner = fresnel::dielectric(cos_inside, base / eta);
-            // Half a wave is lost at the denser side of each face: once from inside the film outwards, never the other way.
+            // Reflection inside the denser medium shifts the phase by half a wave: at the outer face always,
+            // at the base where the film is the denser.
             let shift = if base < eta { 2.0 * PI } else { PI };
             let both = outer * inner;
             let series = passes * passes * inner / (1.0 - both).max(1e-6);
@@ -62,7 +64,7 @@ impl ThinFilm {
         )
     }
 
-    /// The most that it can reflect head-on of any wavelength: both faces in step.
+    /// The maximal reflectance at normal incidence over all wavelengths: both faces in phase.
     pub fn most(&self, f0: Spectrum) -> Spectrum {
         let eta = self.eta_of_thickness();
         let outer = fresnel::dielectric(1.0, eta).sqrt();
@@ -73,7 +75,7 @@ impl ThinFilm {
     }
 }
 
-/// The index of the dielectric that reflects the share `f0` head-on.
+/// The index of the dielectric with the reflectance `f0` at normal incidence.
 pub(crate) fn index_of(f0: f32) -> f32 {
     let root = f0.clamp(0.0, 0.9999).sqrt();
     (1.0 + root) / (1.0 - root)
@@ -83,8 +85,9 @@ pub(crate) fn index_of(f0: f32) -> f32 {
 const REC709_FROM_XYZ: [[f32; 3]; 3] =
     [[2.688_95, -1.275_71, -0.413_24], [-1.022_15, 1.978_32, 0.043_83], [0.061_21, -0.224_49, 1.163_28]];
 
-/// The Fourier transform of the eye's sensitivity (X, Y, Z) at an optical path difference in metres, shifted in phase: sums
-/// of Gaussians in the wave number, with the constants that Belcour and Barla fitted, scaled to 1 for no difference.
+/// The Fourier transform of the eye's sensitivity (X, Y, Z) at an optical path difference in metres, with a
+/// phase shift: sums of Gaussians in the wave number, with the constants fitted by Belcour and Barla,
+/// normalised to 1 for no difference.
 fn sensitivity(path: f32, shift: f32) -> [f32; 3] {
     const AMPLITUDES: [f32; 4] = [5.4856e-13, 4.4201e-13, 5.2481e-13, 9.7470e-14];
     const PLACES: [f32; 4] = [1.6810e6, 1.7953e6, 2.2084e6, 2.2399e6];

@@ -1,4 +1,4 @@
-//! Describing a scene in Rust.
+//! Building a scene in Rust.
 
 use std::sync::Arc;
 
@@ -13,14 +13,14 @@ use lumbre_shading::Material;
 
 use crate::{Error, Scene};
 
-/// Gathers a scene piece by piece. What is left out is chosen for the scene: a camera that sees all of it, a studio's
-/// light, a grey material.
+/// Builds a scene piece by piece. Defaults are an automatic camera that frames everything, studio light, and a
+/// grey material.
 #[derive(Clone, Debug, Default)]
 pub struct SceneBuilder {
     desc: SceneDesc,
 }
 
-/// A shape with what it is made of, before it joins a scene.
+/// A shape with its material, before it is added to a scene.
 #[derive(Clone, Debug)]
 pub struct ShapeBuilder {
     geometry: GeometryDesc,
@@ -40,24 +40,24 @@ impl ShapeBuilder {
         Self::new(GeometryDesc::Mesh(Arc::new(mesh)))
     }
 
-    /// A shape of any form, where its own space puts it, grey.
+    /// A shape of any geometry, in its own space, grey.
     pub fn new(geometry: GeometryDesc) -> Self {
         Self { geometry, world_from_object: Transform::IDENTITY, material: None, light: None }
     }
 
-    /// Places it.
+    /// Sets the transform.
     #[must_use]
     pub fn at(self, world_from_object: Transform) -> Self {
         Self { world_from_object, ..self }
     }
 
-    /// Makes it of something.
+    /// Sets the material.
     #[must_use]
     pub fn material(self, material: Material) -> Self {
         Self { material: Some(material), ..self }
     }
 
-    /// Makes its outer side shine with a radiance.
+    /// Makes its front emit a radiance.
     #[must_use]
     pub fn shining(self, radiance: Rgb) -> Self {
         let light =
@@ -91,14 +91,14 @@ impl SceneBuilder {
         self
     }
 
-    /// Adds a light that is not a shape.
+    /// Adds a light other than a shape.
     #[must_use]
     pub fn light(mut self, light: LightDesc) -> Self {
         self.desc.lights.push(light);
         self
     }
 
-    /// Adds a camera; the first is the one to use.
+    /// Adds a camera; the first is the default.
     #[must_use]
     pub fn camera(mut self, camera: Camera) -> Self {
         self.desc.cameras.push(camera);
@@ -126,14 +126,13 @@ impl SceneBuilder {
         self
     }
 
-    /// The description so far.
+    /// The current description.
     pub fn description(&self) -> &SceneDesc {
         &self.desc
     }
 
-    /// Resolves it.
+    /// Builds the scene.
     ///
-    /// # Errors
     /// [`Error::Build`].
     pub fn build(self) -> Result<Scene, Error> {
         Scene::from_description(self.desc)

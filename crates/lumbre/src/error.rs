@@ -1,4 +1,4 @@
-//! What can go wrong in the façade.
+//! Errors of this crate.
 
 use std::path::PathBuf;
 
@@ -11,10 +11,10 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A file says something wrong, cannot be read, or is beyond a limit.
+    /// A file is invalid, cannot be read, or exceeds a limit.
     #[error(transparent)]
     Format(#[from] FormatError),
-    /// What was described makes no scene.
+    /// The description is invalid.
     #[error(transparent)]
     Build(#[from] BuildError),
     /// A file cannot be written.
@@ -22,32 +22,32 @@ pub enum Error {
     Write {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// The options of a render make no picture.
+    /// The render options are invalid.
     #[error(transparent)]
     Render(#[from] RenderError),
-    /// The options of saving ask for something that there is not.
+    /// The options for saving are invalid.
     #[error("{0}")]
     Options(String),
 }
 
-/// The kinds of error, as a program's exit status tells them apart.
+/// The kinds of error, as the program's exit status distinguishes them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ErrorKind {
-    /// A file says something wrong.
+    /// A file is invalid.
     Input,
     /// A file cannot be read or written.
     Io,
-    /// A limit was reached.
+    /// A limit was exceeded.
     Limit,
-    /// The options are wrong.
+    /// The options are invalid.
     Options,
 }
 
 impl Error {
-    /// Which kind it is.
+    /// The kind of error.
     pub fn kind(&self) -> ErrorKind {
         match self {
             Self::Format(FormatError::Io { .. }) | Self::Write { .. } => ErrorKind::Io,

@@ -8,7 +8,7 @@ use lumbre_image::Image;
 
 use crate::Error;
 
-/// How images are written.
+/// Options of writing images.
 pub type SaveOptions = WriteOptions;
 
 /// Reads an image file: EXR, PNG, HDR, PFM, JPEG, TGA, BMP or QOI.
@@ -21,10 +21,8 @@ pub fn read_image(path: &Path) -> Result<Image, Error> {
     Ok(file.to_image(&budget)?)
 }
 
-/// Writes an image in the format that the path's extension names. The path holds the old file or the whole new one, never
-/// a part.
+/// Writes an image atomically, in the format of the path's extension.
 ///
-/// # Errors
 /// [`Error::Format`].
 pub fn write_image(path: &Path, image: &Image, options: &SaveOptions) -> Result<(), Error> {
     Ok(lumbre_formats::image::write_image(path, image, options)?)

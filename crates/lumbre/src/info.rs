@@ -1,4 +1,4 @@
-//! What is in a scene, in numbers.
+//! Statistics of a scene.
 
 use std::collections::{BTreeMap, HashSet};
 use std::mem::size_of_val;
@@ -8,8 +8,8 @@ use lumbre_scene::{
     AreaLightDesc, CameraKind, GeometryDesc, LightDesc, MaterialId, MeshDesc, SceneDesc, ShapeDesc,
 };
 
-/// What is in a scene. Counts are of what the file describes: a shape inside an object counts once, however often the
-/// object is placed.
+/// Statistics of a scene. They count what the file describes: a shape inside an object counts once, however
+/// often the object is instanced.
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
 pub struct SceneInfo {
@@ -17,22 +17,22 @@ pub struct SceneInfo {
     pub shapes: BTreeMap<String, u64>,
     /// Materials by type.
     pub materials: BTreeMap<String, u64>,
-    /// Lights by type; shapes that shine are `area`.
+    /// Lights by type; emissive shapes are `area`.
     pub lights: BTreeMap<String, u64>,
     /// Triangles of all meshes, a quad counting as two.
     pub triangles: u64,
-    /// Objects placed, at any level.
+    /// Instances, at any level.
     pub instances: u64,
-    /// Cameras, by name where they have one, else by type.
+    /// Cameras, by name if they have one, else by type.
     pub cameras: Vec<String>,
-    /// A box around everything finite, instances included.
+    /// The bounding box of everything finite, instances included.
     pub bounds: Option<Aabb>,
-    /// Bytes that the description holds, and the trees over it.
+    /// Bytes of memory of the description and the trees.
     pub memory_bytes: u64,
 }
 
 impl SceneInfo {
-    /// Counts what a description holds; bounds and trees are known only once it is built.
+    /// Counts the contents of a description; bounds and trees are known only after building.
     pub(crate) fn of(desc: &SceneDesc) -> Self {
         let mut info = Self::default();
         let objects = || desc.objects.iter().flat_map(|object| &object.shapes);
@@ -44,7 +44,7 @@ impl SceneInfo {
         let used: HashSet<MaterialId> =
             desc.shapes.iter().chain(objects()).filter_map(|s| s.material).collect();
         for (i, material) in desc.materials.iter().enumerate() {
-            // Readers keep their default at hand, whether or not a shape wears it.
+            // Readers always add their default material, used or not.
             if material.name.is_none() && !used.contains(&MaterialId(i as u32)) {
                 continue;
             }
@@ -105,7 +105,7 @@ fn mesh_bytes(mesh: &MeshDesc) -> u64 {
     bytes as u64
 }
 
-/// The name of a light in the scene language; of one that moves, that of what it is.
+/// The name of a light in the scene language; for a moving one, that of the light itself.
 fn light_name(light: &LightDesc) -> &'static str {
     match light {
         LightDesc::Point { .. } => "point",

@@ -3,7 +3,7 @@
 //! A model in a studio of its own, on white paper, from all sides:
 //!
 //! ```no_run
-//! use lumbre::{Backdrop, Ground, ReadOptions, Scene, Stage};
+//! use lumbre::{Background, Ground, ReadOptions, Scene, Stage};
 //!
 //! let (model, _) = lumbre::describe(&["model.glb".as_ref()], &ReadOptions::default())?;
 //! for frame in 0..36 {
@@ -15,8 +15,8 @@
 //!     let scene = Scene::from_description(desc)?;
 //!     let mut options = scene.options();
 //!     options.transparent = true;
-//!     let paper = Backdrop::Colour(lumbre::image::Rgb::WHITE);
-//!     scene.render(&options)?.before(paper).save(format!("frame.{frame:04}.png"))?;
+//!     let paper = Background::Colour(lumbre::image::Rgb::WHITE);
+//!     scene.render(&options)?.over(paper).save(format!("frame.{frame:04}.png"))?;
 //! }
 //! # Ok::<(), lumbre::Error>(())
 //! ```
@@ -24,7 +24,7 @@
 //! The layers below are here too, under their own names: [`math`], [`image`], [`geometry`], [`kernel`], [`shading`],
 //! [`formats`] and [`description`].
 
-mod backdrop;
+mod background;
 mod builder;
 mod cast;
 mod error;
@@ -41,7 +41,7 @@ pub use lumbre_math as math;
 pub use lumbre_scene as description;
 pub use lumbre_shading as shading;
 
-pub use backdrop::Backdrop;
+pub use background::Background;
 pub use builder::{SceneBuilder, ShapeBuilder};
 pub use cast::CastHit;
 pub use error::{Error, ErrorKind};

@@ -1,4 +1,4 @@
-//! A picture that was rendered.
+//! Rendered pictures.
 
 use std::path::Path;
 
@@ -6,58 +6,57 @@ use lumbre_formats::image::{ImageFormat, write_image, write_layers};
 use lumbre_image::{Image, Layer, Layers, ToneMap};
 use lumbre_render::{Feature, PixelBounds, Rendered, Stats};
 
-use crate::{Backdrop, Error, SaveOptions};
+use crate::{Background, Error, SaveOptions};
 
-/// A picture that was rendered, with what it took.
+/// A rendered picture, with statistics.
 #[derive(Clone, Debug)]
 pub struct Picture {
     pub(crate) rendered: Rendered,
     pub(crate) whole: (u32, u32),
-    pub(crate) backdrop: Option<Backdrop>,
+    pub(crate) background: Option<Background>,
 }
 
 impl Picture {
-    /// Its pixels, linear.
+    /// The pixels, in linear light.
     pub fn image(&self) -> &Image {
         &self.rendered.image
     }
 
-    /// The picture, to be saved before a backdrop. It shows where the picture is transparent
-    /// ([`crate::RenderOptions::transparent`]), in the very colours that it has in formats for displays, and as light in the
+    /// Puts the picture over a background, for saving. It shows where the picture is transparent
+    /// ([`crate::RenderOptions::transparent`]): with its exact colours in display formats, and as light in the
     /// others.
     #[must_use]
-    pub fn before(self, backdrop: Backdrop) -> Self {
-        Self { backdrop: Some(backdrop), ..self }
+    pub fn over(self, background: Background) -> Self {
+        Self { background: Some(background), ..self }
     }
 
-    /// A feature image, if it was asked for.
+    /// An AOV, if it was rendered.
     pub fn feature(&self, feature: Feature) -> Option<&Image> {
         self.rendered.features.iter().find(|(kind, _)| *kind == feature).map(|(_, image)| image)
     }
 
-    /// Which pixels of the whole picture it has.
+    /// The rendered part of the whole picture.
     pub fn bounds(&self) -> PixelBounds {
         self.rendered.bounds
     }
 
-    /// What it took.
+    /// The rendering statistics.
     pub fn stats(&self) -> &Stats {
         &self.rendered.stats
     }
 
-    /// Saves it, by the path's extension: .exr, .png, .hdr, .pfm or .jpg.
+    /// Saves the picture in the format of the path's extension: .exr, .png, .hdr, .pfm or .jpg.
     ///
-    /// # Errors
     /// [`Error::Format`].
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), Error> {
         self.save_with(path.as_ref(), &SaveOptions::default(), &[])
     }
 
-    /// Saves it with options, and with feature images as layers of an .exr file: `albedo.R`, `normal.X`, `depth.Z`,
-    /// `uv.U` and so on.
+    /// Saves the picture with options, and with AOVs as layers of an .exr file: `albedo.R`, `normal.X`,
+    /// `depth.Z`, `uv.U` and so on.
     ///
-    /// # Errors
-    /// [`Error::Format`]; [`Error::Options`] when layers are asked of another format, or were not rendered.
+    /// [`Error::Format`]; [`Error::Options`] when layers are requested for another format, or were not
+    /// rendered.
     pub fn save_with(&self, path: &Path, options: &SaveOptions, layers: &[Feature]) -> Result<(), Error> {
         let PixelBounds { x0, y0, .. } = self.bounds();
         let part = (self.image().width(), self.image().height()) != self.whole;
@@ -67,13 +66,13 @@ impl Picture {
         let is_for_displays =
             matches!(ImageFormat::from_path(path), Some(ImageFormat::Png | ImageFormat::Jpeg));
         let coverage = self.rendered.coverage.as_ref();
-        let laid_over = self.backdrop.as_ref().map(|backdrop| {
+        let laid_over = self.background.as_ref().map(|background| {
             if !is_for_displays {
-                return backdrop.under_light(self.image(), coverage, self.bounds(), self.whole);
+                return background.under_light(self.image(), coverage, self.bounds(), self.whole);
             }
             let (tone_map, exposure) = (options.tone_map, options.exposure);
             (options.tone_map, options.exposure) = (ToneMap::None, 0.0);
-            backdrop.under_shown(self.image(), coverage, self.bounds(), self.whole, tone_map, exposure)
+            background.under_shown(self.image(), coverage, self.bounds(), self.whole, tone_map, exposure)
         });
         let image = laid_over.as_ref().unwrap_or(self.image());
         if layers.is_empty() {

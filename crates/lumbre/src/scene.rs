@@ -1,4 +1,4 @@
-//! A scene that was opened or built: rays into it, pictures of it.
+//! Scenes: opening, ray queries and rendering.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -12,7 +12,7 @@ use lumbre_scene::{BuildWarning, Footprint, SceneDesc};
 
 use crate::{CastHit, Error, Picture, SceneInfo};
 
-/// A scene, ready for rays and pictures from any number of threads.
+/// A scene, ready for ray queries and rendering on any number of threads.
 #[derive(Debug)]
 pub struct Scene {
     resolved: lumbre_scene::Scene,
@@ -20,40 +20,37 @@ pub struct Scene {
     build_time: Duration,
 }
 
-/// What reflects less says little of the light on it.
+/// Darker surfaces tell little about the light on them.
 const LEAST_ALBEDO: f32 = 0.02;
 
-/// Opens a scene file: .pbrt (also .gz), .gltf, .glb, .obj, .ply or .stl. Warnings are dropped; [`open_with`] returns them.
+/// Opens a scene file: .pbrt (also .gz), .gltf, .glb, .obj, .ply or .stl. Warnings are dropped; [`open_with`]
+/// returns them.
 ///
-/// # Errors
-/// [`Error::Format`] with the place of what is wrong, and [`Error::Build`].
+/// [`Error::Format`] with the place, and [`Error::Build`].
 pub fn open(path: impl AsRef<Path>) -> Result<Scene, Error> {
     Ok(open_with(&[path.as_ref()], &ReadOptions::default())?.0)
 }
 
-/// Opens one or more files as one scene, read one after another, and returns what there was to say about them.
+/// Opens one or more files as one scene, read one after another, and returns the diagnostics.
 ///
-/// # Errors
-/// As [`open`]; with [`lumbre_formats::Strictness::Strict`], warnings too.
+/// As for [`open`]; with [`lumbre_formats::Strictness::Strict`], warnings too.
 pub fn open_with(paths: &[&Path], options: &ReadOptions) -> Result<(Scene, Diagnostics), Error> {
     let (desc, mut diagnostics) = describe(paths, options)?;
     let scene = Scene::of_file(desc, paths.first().copied().unwrap_or(Path::new("")), &mut diagnostics)?;
     Ok((scene, diagnostics))
 }
 
-/// Reads one or more files as one description, which can be changed before it is resolved (as a [`crate::Stage`] does, or by
-/// hand), and returns what there was to say about them.
+/// Reads one or more files as one description, which can be changed before it is built (by a [`crate::Stage`]
+/// or otherwise), and returns the diagnostics.
 ///
-/// # Errors
-/// [`Error::Format`] with the place of what is wrong; with [`lumbre_formats::Strictness::Strict`], for warnings too.
+/// [`Error::Format`] with the place; with [`lumbre_formats::Strictness::Strict`], for warnings too.
 pub fn describe(paths: &[&Path], options: &ReadOptions) -> Result<(SceneDesc, Diagnostics), Error> {
     Ok(open_scenes(paths, options)?)
 }
 
 impl Scene {
-    /// Resolves a description.
+    /// Builds a scene from a description.
     ///
-    /// # Errors
     /// [`Error::Build`], naming the shape, camera or light at fault.
     pub fn from_description(desc: SceneDesc) -> Result<Self, Error> {
         let mut info = SceneInfo::of(&desc);
@@ -66,12 +63,11 @@ impl Scene {
         Ok(Self { resolved, info, build_time })
     }
 
-    /// Resolves what was read from a file; what is wrong with the whole of it is said of the file.
+    /// Builds a scene read from a file; problems of the whole scene are reported for the file.
     ///
-    /// # Errors
-    /// [`Error::Format`]; where diagnostics are strict, for warnings too.
+    /// [`Error::Format`]; with strict diagnostics, for warnings too.
     pub fn of_file(desc: SceneDesc, path: &Path, diagnostics: &mut Diagnostics) -> Result<Self, Error> {
-        // What only the whole shows has no line; it has a file.
+        // Problems of the whole scene have a file but no line.
         let file = || Place::whole(path.display().to_string());
         let scene = match Self::from_description(desc) {
             Err(Error::Build(wrong)) => {
@@ -79,7 +75,7 @@ impl Scene {
             }
             scene => scene?,
         };
-        // Rays see in the dark: that there is no light concerns pictures alone ([`Scene::is_dark`]).
+        // Ray queries need no light: it concerns only pictures ([`Scene::is_dark`]).
         let of_any_use = |warning: &&BuildWarning| **warning != BuildWarning::NoLight;
         for warning in scene.resolved.warnings().iter().filter(of_any_use) {
             diagnostics.push(Diagnostic::warning(warning.to_string()).at(file()));
@@ -88,12 +84,12 @@ impl Scene {
         Ok(scene)
     }
 
-    /// The nearest hit in the ray's range.
+    /// The closest hit in the ray's range.
     pub fn closest(&self, ray: &Ray) -> Option<CastHit> {
         self.resolved.accel().closest(ray).map(|hit| self.cast_hit(ray, &hit))
     }
 
-    /// Whether the ray's range holds a hit.
+    /// Whether there is any hit in the ray's range.
     pub fn any(&self, ray: &Ray) -> bool {
         self.resolved.accel().any(ray)
     }
@@ -113,12 +109,12 @@ impl Scene {
         hits
     }
 
-    /// Every hit in the ray's range, by t, until `visit` breaks.
+    /// Every hit in the ray's range, in ascending order of t, until `visit` breaks.
     pub fn all(&self, ray: &Ray, mut visit: impl FnMut(CastHit) -> ControlFlow<()>) {
         self.resolved.accel().all(ray, |hit| visit(self.cast_hit(ray, hit)));
     }
 
-    /// How many hits the ray's range holds.
+    /// The number of hits in the ray's range.
     pub fn count(&self, ray: &Ray) -> usize {
         self.resolved.accel().count(ray)
     }
@@ -137,23 +133,21 @@ impl Scene {
         }
     }
 
-    /// What the scene itself asks a picture of it to be.
+    /// The scene's own render options.
     pub fn options(&self) -> RenderOptions {
         RenderOptions::of(&self.resolved)
     }
 
-    /// A picture.
+    /// Renders a picture.
     ///
-    /// # Errors
-    /// [`Error::Render`] when the options make no picture.
+    /// [`Error::Render`] when the options are invalid.
     pub fn render(&self, options: &RenderOptions) -> Result<Picture, Error> {
         self.render_with(options, &NoProgress, &CancelToken::new())
     }
 
-    /// A picture, with someone watching; `cancel` ends it with what is there.
+    /// Renders a picture with progress reports; `cancel` ends it early with what has been rendered.
     ///
-    /// # Errors
-    /// As [`Scene::render`].
+    /// As for [`Scene::render`].
     pub fn render_with(
         &self,
         options: &RenderOptions,
@@ -161,15 +155,14 @@ impl Scene {
         cancel: &CancelToken,
     ) -> Result<Picture, Error> {
         let rendered = render(&self.resolved, options, progress, cancel)?;
-        Ok(Picture { rendered, whole: (options.width, options.height), backdrop: None })
+        Ok(Picture { rendered, whole: (options.width, options.height), background: None })
     }
 
-    /// How bright a picture shows what is white and well lit, as an exposure meter in the light would find it: the luminance
-    /// of what is seen over its reflectance, of which a fifth is brighter. `None` where nothing is seen. It is found from a
-    /// small picture of its own, so that it is the same for every size, part and number of samples.
+    /// The pixel value of white, well-lit surfaces, as an exposure meter would measure it: the luminance over
+    /// the reflectance of what is visible, at the 80th percentile. `None` if nothing is visible. It is measured
+    /// in a small picture of its own, so it does not depend on size, crop and number of samples.
     ///
-    /// # Errors
-    /// As [`Scene::render`].
+    /// As for [`Scene::render`].
     pub fn white_level(&self, options: &RenderOptions) -> Result<Option<f32>, Error> {
         const SIDE: f64 = 64.0;
         const SPP: u32 = 16;
@@ -198,22 +191,22 @@ impl Scene {
         Ok(levels.get(levels.len() * 4 / 5).copied())
     }
 
-    /// What is in the scene, in numbers.
+    /// Statistics of the scene.
     pub fn info(&self) -> &SceneInfo {
         &self.info
     }
 
-    /// Whether nothing in it gives light, so that pictures by light are black.
+    /// Whether nothing emits light, so that pictures of light are black.
     pub fn is_dark(&self) -> bool {
         self.resolved.warnings().contains(&BuildWarning::NoLight)
     }
 
-    /// How long it took to build the trees and the lights.
+    /// The time taken to build the trees and the lights.
     pub fn build_time(&self) -> Duration {
         self.build_time
     }
 
-    /// The scene as light transport sees it.
+    /// The scene resolved for light transport.
     pub fn resolved(&self) -> &lumbre_scene::Scene {
         &self.resolved
     }

@@ -1,4 +1,4 @@
-//! Accessors: numbers out of buffers, whatever their types, strides and gaps.
+//! Accessors: numbers from buffers of any type, stride and sparsity.
 
 use rayon::prelude::*;
 
@@ -6,10 +6,10 @@ use super::file::{File, List, View};
 use super::json::{Read, Value};
 use crate::diagnostic::{Diagnostic, FormatError, quoted};
 
-/// From how many elements on it pays that another thread takes some of them.
+/// The number of elements from which decoding is worth splitting over threads.
 pub(super) const SHARE: usize = 1 << 15;
 
-/// The types of numbers.
+/// The component types.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Component {
     I8,
@@ -57,7 +57,7 @@ impl Component {
     }
 }
 
-/// How many numbers an element has, and how they lie.
+/// The element types.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Element {
     Scalar,
@@ -93,7 +93,7 @@ impl Element {
         Self::NAMES[self as usize].0
     }
 
-    /// Columns, and numbers in each.
+    /// The number of columns, and of numbers in each.
     fn columns(self) -> (usize, usize) {
         match self {
             Self::Scalar => (1, 1),
@@ -106,38 +106,38 @@ impl Element {
         }
     }
 
-    /// How many numbers there are in all.
+    /// The number of components.
     pub(super) fn numbers(self) -> usize {
         let (columns, rows) = self.columns();
         columns * rows
     }
 }
 
-/// An accessor whose every byte is known to be there.
+/// An accessor whose bytes are known to exist.
 #[derive(Clone, Copy)]
 pub(super) struct Accessor<'a> {
     /// The accessor itself, for messages.
     pub value: Value<'a>,
-    /// Its position in the file's list.
+    /// Its index in the file's list.
     pub index: usize,
     /// The type of its numbers.
     pub component: Component,
     /// The numbers of one element.
     pub element: Element,
-    /// Whether whole numbers stand for parts of 1.
+    /// Whether integers represent fractions of 1.
     pub normalized: bool,
     /// How many elements it has, at least 1.
     pub count: usize,
     /// The elements; `None` where all are zero.
     data: Option<Strided<'a>>,
     sparse: Option<Sparse<'a>>,
-    /// Whether it says its least and its largest values.
+    /// Whether it has minimum and maximum.
     pub has_bounds: bool,
-    /// The view it looks through, and whether that has a stride.
+    /// Its buffer view, and whether that has a stride.
     pub view: Option<(usize, bool)>,
-    /// Where elements start in the buffer, for alignment.
+    /// The offset of the elements in the buffer, for alignment.
     pub start: u64,
-    /// Bytes from one element to the next.
+    /// The stride in bytes.
     pub stride: usize,
 }
 
@@ -157,7 +157,7 @@ struct Sparse<'a> {
     values: Option<&'a [u8]>,
 }
 
-/// A range of `count` elements of `size` bytes, `stride` apart, from `offset` on, of which a view has all bytes.
+/// A range of `count` elements of `size` bytes at a stride of `stride` from `offset`, checked against the view.
 fn strided<'a>(
     culprit: Value<'_>,
     view: &View<'a>,
@@ -188,7 +188,7 @@ fn without_data(value: Value<'_>) -> FormatError {
     value.wrong("the buffer of what is needed here has no data").into()
 }
 
-/// Whether an accessor is of a kind that is known; those of others may stand unused.
+/// Whether an accessor is of a known kind; unknown ones may stay unused.
 pub(super) fn is_known(value: Value<'_>) -> Read<bool> {
     let component = value.need("componentType")?;
     let element = value.need("type")?;
@@ -204,7 +204,7 @@ impl<'a> Accessor<'a> {
         Self::at(file, index)
     }
 
-    /// The accessor at a position.
+    /// The accessor at an index.
     pub(super) fn at(file: &'a File<'_>, index: usize) -> Read<Self> {
         let value = file.list(List::Accessors)[index];
         let component = Component::read(value.need("componentType")?)?;
@@ -232,7 +232,7 @@ impl<'a> Accessor<'a> {
         } else {
             rows * component.bytes()
         };
-        // The last column needs no padding behind it.
+        // The last column is not padded.
         let size = columns * column;
         let least = size - column + rows * component.bytes();
 
@@ -280,7 +280,7 @@ impl<'a> Accessor<'a> {
             if let Some(culprit) = offset_value {
                 file.breach(culprit.wrong("byteOffset without a buffer view"))?;
             }
-            // All zeros, but for what is sparse: nothing in the file pays for so many.
+            // All zeros, except for sparse values, so the file's size does not bound the count.
             let most = 65_536_u64.saturating_add(file.buffer_bytes());
             if count > most {
                 let wrong = count_value.wrong("accessor without data has too many elements").found(count);
@@ -295,12 +295,12 @@ impl<'a> Accessor<'a> {
         Ok(at)
     }
 
-    /// What it has, in words.
+    /// Its type, in words.
     pub(super) fn said(&self) -> String {
         format!("{} of {}", self.element.name(), self.component.name())
     }
 
-    /// An error unless it has elements of one of these kinds.
+    /// Checks that its element and component types are among these.
     pub(super) fn expect(
         &self,
         culprit: Value<'_>,
@@ -316,7 +316,7 @@ impl<'a> Accessor<'a> {
         Err(wrong.expected(format!("{} of {}", elements.join(" or "), components.join(" or "))).into())
     }
 
-    /// All elements as numbers, made into what is wanted. `N` numbers are read of each: an element has at least so many.
+    /// All elements as numbers, mapped. `N` numbers of each are read; an element has at least as many.
     pub(super) fn floats<const N: usize, T: Send>(
         &self,
         file: &File<'_>,
@@ -341,7 +341,7 @@ impl<'a> Accessor<'a> {
         }
     }
 
-    /// All elements as whole numbers; numbers of other types are an error of whoever did not look.
+    /// All elements as integers. The caller has checked the component type.
     pub(super) fn wholes<const N: usize>(&self, file: &File<'_>) -> Read<Vec<[u32; N]>> {
         debug_assert!(N <= self.element.numbers());
         match self.component {
@@ -357,7 +357,7 @@ impl<'a> Accessor<'a> {
         }
     }
 
-    /// The least and the largest of its numbers, as it says them itself; `None` where it does not, or not as many as there are.
+    /// Its declared minimum and maximum; `None` where it has none, or of another size.
     pub(super) fn bounds<const N: usize>(&self) -> Read<Option<[[f64; N]; 2]>> {
         let [Some(low), Some(high)] = [self.value.get("min")?, self.value.get("max")?] else {
             return Ok(None);
@@ -375,7 +375,7 @@ impl<'a> Accessor<'a> {
         Ok(Some([low.numbers::<N>()?.map(|x| x / unit), high.numbers::<N>()?.map(|x| x / unit)]))
     }
 
-    /// The same numbers by threes, as long as there are three; `None` where they do not simply stand in a row.
+    /// The numbers regrouped by threes, as many as there are complete; `None` where they are not contiguous.
     pub(super) fn by_threes(&self) -> Option<Self> {
         let size = self.component.bytes();
         let count = self.count / 3;
@@ -398,7 +398,7 @@ impl<'a> Accessor<'a> {
         debug_assert_eq!(S, self.component.bytes());
         let (columns, rows) = self.element.columns();
         let column = if columns > 1 { (rows * S).next_multiple_of(4) } else { rows * S };
-        // Of one column, all numbers stand in a row.
+        // In a single column all numbers are contiguous.
         let in_a_row = |bytes: &[u8]| {
             let (numbers, _) = bytes.as_chunks::<S>();
             numbers.first_chunk::<N>().map(|numbers| make(numbers.map(&decode)))
@@ -464,7 +464,7 @@ impl<'a> Sparse<'a> {
         Ok(Self { value, count: count as usize, component, indices, values })
     }
 
-    /// Hands over each index below `count` with its position in the list.
+    /// Calls `f` with each index below `count` and its position in the list.
     fn each_index(&self, count: usize, mut f: impl FnMut(usize, usize)) -> Read<()> {
         let size = self.component.bytes();
         let mut before = None;

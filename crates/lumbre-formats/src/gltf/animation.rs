@@ -1,4 +1,4 @@
-//! Animations: where they take nodes at one time, and what else they change.
+//! Animations: node transforms at a time, and other animated values.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -11,14 +11,14 @@ use super::json::{Read, Value};
 use super::pointer::{self, Changes};
 use crate::diagnostic::{Diagnostic, quoted};
 
-/// What animations do at one time to nodes, and to the meshes of nodes without weights of their own.
+/// The effect of animations at a time on nodes, and on meshes whose nodes have no weights.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Played {
     pub nodes: HashMap<usize, Moved>,
     pub meshes: HashMap<usize, Weights>,
 }
 
-/// What animations do to a node at one time.
+/// The effect of animations on a node at a time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Moved {
     pub translation: Option<DVec3>,
@@ -27,17 +27,17 @@ pub(super) struct Moved {
     pub weights: Weights,
 }
 
-/// What animations do to the weights of morph targets at one time.
+/// The effect of animations on the weights of morph targets at a time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Weights {
-    /// All of them.
+    /// All weights.
     pub all: Option<Vec<f64>>,
-    /// Single ones.
+    /// Single weights.
     pub single: BTreeMap<usize, f64>,
 }
 
 impl Weights {
-    /// Sets a value as [`Path::Weights`] and [`Path::Weight`] name it; false where one is set already.
+    /// Sets a value named by [`Path::Weights`] or [`Path::Weight`]; false if it is already set.
     fn set(&mut self, path: Path, value: Vec<f64>) -> bool {
         let is_free = self.all.is_none()
             && match path {
@@ -52,7 +52,7 @@ impl Weights {
         is_free
     }
 
-    /// The weights, where `still` are those without animations.
+    /// The animated weights, where `still` are those without animation.
     pub(super) fn over(&self, still: Option<Vec<f64>>) -> Option<Vec<f64>> {
         let weights = self.all.clone().or(still);
         let Some((&last, _)) = self.single.last_key_value() else { return weights };
@@ -64,7 +64,7 @@ impl Weights {
 }
 
 impl Moved {
-    /// Whether it moves the node, and not only the weights of its morph targets.
+    /// Whether it moves the node itself, not only its morph targets.
     pub(super) fn places(&self) -> bool {
         self.translation.is_some() || self.rotation.is_some() || self.scale.is_some()
     }
@@ -77,22 +77,22 @@ enum Path {
     Scale,
     /// All weights of morph targets.
     Weights,
-    /// That of one.
+    /// One weight.
     Weight(usize),
-    /// Anything else: so many numbers, and whether they are a list even if there is one.
+    /// Other values: their number, and whether they are written as a list even if there is one.
     Numbers {
         width: usize,
         is_list: bool,
     },
 }
 
-/// What a channel moves.
+/// The target of a channel.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 enum Target {
     Node(usize),
-    /// The weights that it gives to nodes without any.
+    /// The default weights of a mesh.
     Mesh(usize),
-    /// What only the text of the file has.
+    /// A value that only exists in the JSON.
     Pointer(String),
 }
 
@@ -111,19 +111,19 @@ struct Channel<'a> {
     interpolation: Interpolation,
     input: Accessor<'a>,
     output: Accessor<'a>,
-    /// Elements of the output that make one value.
+    /// Elements of the output per value.
     width: usize,
 }
 
-/// The animations that play, all at once.
+/// The animations that play simultaneously.
 pub(super) struct Playing<'a> {
     file: &'a File<'a>,
     channels: Vec<Channel<'a>>,
 }
 
 impl<'a> Playing<'a> {
-    /// Checks all animations, and chooses those that play: the one that is asked for, or else every one that moves nothing of
-    /// what one before it moves. Without a time none does, and nothing is looked at.
+    /// Checks all animations, and selects those that play: the requested one, or else every one that does not
+    /// conflict with an earlier one. Without a time none plays, and nothing is checked.
     pub(super) fn read(file: &'a File<'a>, options: &GltfOptions) -> Read<Self> {
         let mut playing = Self { file, channels: vec![] };
         if options.frame.is_none() {
@@ -163,7 +163,7 @@ impl<'a> Playing<'a> {
         Ok(playing)
     }
 
-    /// What they do at a time in seconds to nodes and meshes.
+    /// Their effect on nodes and meshes at a time in seconds.
     pub(super) fn at(&self, time: f64) -> Read<Played> {
         let mut played = Played::default();
         for channel in &self.channels {
@@ -174,7 +174,7 @@ impl<'a> Playing<'a> {
         Ok(played)
     }
 
-    /// What they do at a time to anything else, by pointers.
+    /// Their effect on anything else at a time, by pointers.
     pub(super) fn changes(&self, time: f64) -> Read<Changes> {
         let mut changes = Changes::default();
         for channel in &self.channels {
@@ -185,7 +185,7 @@ impl<'a> Playing<'a> {
         Ok(changes)
     }
 
-    /// Warns of what they change by pointers between these times: it is as it is halfway.
+    /// Warns of values changed by pointers between these times: they are fixed at the middle.
     pub(super) fn warn_of_changes(&self, times: &[f64]) -> Read<()> {
         for channel in &self.channels {
             let Target::Pointer(pointer) = &channel.target else { continue };
@@ -208,7 +208,7 @@ impl<'a> Playing<'a> {
 }
 
 impl Played {
-    /// Sets a value; false where it is set already.
+    /// Sets a value; false if it is already set.
     fn set(&mut self, target: &Target, path: Path, v: Vec<f64>) -> bool {
         let node = match *target {
             Target::Mesh(mesh) => return self.meshes.entry(mesh).or_default().set(path, v),
@@ -226,14 +226,14 @@ impl Played {
     }
 }
 
-/// Fills what is empty; false where it is full.
+/// Sets an empty place; false if it is occupied.
 fn set<T>(place: &mut Option<T>, value: T) -> bool {
     let is_free = place.is_none();
     place.get_or_insert(value);
     is_free
 }
 
-/// The animation of a name, or else of a number.
+/// The index of the animation with a name, or else a number.
 fn position(file: &File<'_>, wanted: &str) -> Read<usize> {
     let mut names = vec![];
     for (position, value) in file.list(List::Animations).iter().enumerate() {
@@ -306,7 +306,7 @@ fn channels<'a>(file: &'a File<'_>, animation: Value<'a>) -> Read<Vec<Channel<'a
         output.expect(output_value, elements, components)?;
         let aim = match pointed {
             Some(aim) => aim,
-            // Without a node, it may be for an extension.
+            // Without a node, it may belong to an extension.
             None => match file.named(List::Nodes, target, "node")? {
                 Some((node, _)) => Target::Node(node),
                 None => continue,
@@ -351,7 +351,7 @@ fn interpolation(sampler: Value<'_>) -> Read<Interpolation> {
     })
 }
 
-/// The part of a node or of a mesh that a pointer names, where that is what other animations move too.
+/// The target of a pointer that addresses the same values as other channels.
 fn pointed(file: &File<'_>, pointer: &str) -> Option<(Target, Path)> {
     let steps: Vec<&str> = pointer.strip_prefix('/')?.split('/').collect();
     let position = |list: List, step: &str| step.parse().ok().filter(|&i: &usize| i < file.list(list).len());
@@ -371,7 +371,7 @@ fn pointed(file: &File<'_>, pointer: &str) -> Option<(Target, Path)> {
     Some((target, path))
 }
 
-/// A channel that says by a pointer what it changes; none where that is nothing that is played.
+/// The channel of a pointer; `None` if it is not played.
 fn by_pointer<'a>(
     file: &'a File<'_>,
     value: Value<'a>,
@@ -393,7 +393,7 @@ fn by_pointer<'a>(
         let wrong = wrong.found(format!("{} elements", output.count));
         return Err(wrong.expected(format!("a multiple of {keyframes}")).into());
     }
-    // Elements of one keyframe: several of one number each are a list.
+    // Elements per keyframe: several of one number each are a list.
     let width = output.count / keyframes;
     let is_matrix = matches!(output.element, Element::Mat2 | Element::Mat3 | Element::Mat4);
     let is_list = output.element == Element::Scalar && (width > 1 || pointer.ends_with("/weights"));
@@ -409,19 +409,19 @@ fn by_pointer<'a>(
     Ok(Some(Channel { value, target: Target::Pointer(pointer), path, interpolation, input, output, width }))
 }
 
-/// How many morph targets the mesh of a node has.
+/// The number of morph targets of a node's mesh.
 pub(super) fn targets(file: &File<'_>, node: Value<'_>) -> Read<usize> {
     file.named(List::Meshes, node, "mesh")?.map_or(Ok(0), |(_, mesh)| targets_of(mesh))
 }
 
-/// How many morph targets a mesh has.
+/// The number of morph targets of a mesh.
 fn targets_of(mesh: Value<'_>) -> Read<usize> {
     let Some(primitive) = mesh.need("primitives")?.array()?.next() else { return Ok(0) };
     primitive.get("targets")?.map_or(Ok(0), |targets| Ok(targets.array()?.count()))
 }
 
 impl Channel<'_> {
-    /// How many numbers make one value.
+    /// The number of components of a value.
     fn numbers(&self) -> usize {
         match self.path {
             Path::Translation | Path::Scale => 3,
@@ -431,12 +431,12 @@ impl Channel<'_> {
         }
     }
 
-    /// Whether they are written as a list.
+    /// Whether it is written as a list.
     fn is_list(&self) -> bool {
         self.numbers() > 1 || matches!(self.path, Path::Numbers { is_list: true, .. })
     }
 
-    /// The value at a time: before the first and after the last keyframe, that of the keyframe.
+    /// The value at a time; constant before the first and after the last keyframe.
     fn sample(&self, file: &File<'_>, time: f64) -> Read<Vec<f64>> {
         let times: Vec<f32> = self.input.floats(file, |[t]: [f32; 1]| t)?;
         if let Some(i) =
@@ -473,7 +473,7 @@ impl Channel<'_> {
             values[block * numbers..(block + 1) * numbers].iter().map(|&v| f64::from(v)).collect()
         };
         let is_cubic = self.interpolation == Interpolation::CubicSpline;
-        // A keyframe of a spline has the tangent before it, the value, and the tangent after it.
+        // A keyframe of a spline has an in-tangent, a value and an out-tangent.
         let key = |k: usize| get(if is_cubic { 3 * k + 1 } else { k });
         let after = times.partition_point(|&t| f64::from(t) <= time);
         if after == 0 {
@@ -503,7 +503,8 @@ impl Channel<'_> {
         if self.path != Path::Rotation {
             return Ok(blend(&[(1.0 - t, &from), (t, &to)]));
         }
-        // Along the shorter way around the sphere (Shoemake, "Animating rotation with quaternion curves", SIGGRAPH 1985).
+        // Spherical interpolation along the shorter arc (Shoemake, "Animating rotation with quaternion curves",
+        // SIGGRAPH 1985).
         let cosine: f64 = (0..4).map(|i| from[i] * to[i]).sum();
         let sign = if cosine < 0.0 { -1.0 } else { 1.0 };
         let angle = cosine.abs().min(1.0).acos();

@@ -10,7 +10,7 @@ use crate::diagnostic::{Diagnostic, Diagnostics, Place, quoted_bytes};
 pub(super) struct Glb<'a> {
     /// The bytes of the JSON.
     pub json: &'a [u8],
-    /// Where they start.
+    /// Their offset.
     pub json_start: u64,
     /// The bytes of the first buffer, with up to three bytes of padding.
     pub binary: Option<&'a [u8]>,
@@ -20,10 +20,9 @@ pub(super) const MAGIC: &[u8; 4] = b"glTF";
 const JSON: [u8; 4] = *b"JSON";
 const BINARY: [u8; 4] = *b"BIN\0";
 
-/// Parts a GLB file.
+/// Splits a GLB file into its parts.
 ///
-/// # Errors
-/// With the byte at which the container is not as it should be.
+/// With the byte at which the container is invalid.
 pub(super) fn read<'a>(bytes: &'a [u8], name: &Arc<str>, diagnostics: &mut Diagnostics) -> Read<Glb<'a>> {
     let place = |at: usize| Place::binary(name.clone(), at as u64, "");
     let wrong = |at: usize, message: &str| Diagnostic::error(message).at(place(at));

@@ -12,11 +12,11 @@ use super::json::{Read, Value};
 use crate::contained::contained;
 use crate::diagnostic::quoted;
 
-/// The elements of the accessors that compressed primitives fill, by the positions of the accessors: tightly packed, as they
-/// would lie in a buffer view of their own.
+/// The elements of the accessors that compressed primitives fill, by accessor index: tightly packed, as in a
+/// buffer view of their own.
 pub(super) fn filled(file: &File<'_>) -> Read<HashMap<usize, Vec<u8>>> {
     let mut filled: HashMap<usize, Vec<u8>> = HashMap::new();
-    // Which view filled an accessor, as which attribute: primitives may share both.
+    // The view and attribute that filled each accessor: primitives may share both.
     let mut sources: HashMap<usize, (usize, u64)> = HashMap::new();
     for &mesh in file.list(List::Meshes) {
         for primitive in mesh.need("primitives")?.array()? {
@@ -28,7 +28,7 @@ pub(super) fn filled(file: &File<'_>) -> Read<HashMap<usize, Vec<u8>>> {
     Ok(filled)
 }
 
-/// The attribute number that stands for the indices.
+/// The attribute number used for the indices.
 const INDICES: u64 = u64::MAX;
 
 fn unpack(
@@ -50,7 +50,7 @@ fn unpack(
         })?;
         (index, bytes)
     };
-    // What is wanted: accessors, with the attributes of the stream.
+    // The required accessors, with the attributes of the stream.
     let mut wanted = vec![];
     let own = primitive.need("attributes")?;
     for (name, id) in extension.need("attributes")?.members()? {
@@ -94,9 +94,9 @@ fn unpack(
         wanted.iter().map(|(layout, ..)| layout.bytes()).fold(indices.bytes(), u64::saturating_add);
     let packed = bytes.len() as u64;
     super::check_expansion(file, extension, packed, unpacked)?;
-    // Corners, and the tables over them, while it is decoded.
+    // Corners, and the tables for them, during decoding.
     let hold = file.budget.hold(unpacked.saturating_mul(4), "compressed primitive")?;
-    // Streams hold numbers of up to 64 bits, and attributes that no one asks for.
+    // Streams have numbers of up to 64 bits, and attributes that are not needed.
     let limits = DecodeLimits::default()
         .with_max_faces(indices.count / 3)
         .with_max_points(indices.count)
@@ -151,7 +151,7 @@ fn unpack(
     Ok(())
 }
 
-/// What an accessor says of its elements.
+/// The element layout of an accessor.
 struct Layout {
     accessor: usize,
     component: Component,
@@ -175,7 +175,7 @@ impl Layout {
     }
 }
 
-/// One number of one vertex.
+/// One component of one vertex.
 fn number(attribute: &PointAttribute, point: u32, i: usize) -> Option<f64> {
     let value = attribute.mapped_index(PointIndex(point)).0 as usize;
     let width = attribute.data_type().byte_length();
@@ -197,7 +197,7 @@ fn number(attribute: &PointAttribute, point: u32, i: usize) -> Option<f64> {
     })
 }
 
-/// Adds a number of a type. What does not fit is cut off, as casts do.
+/// Appends a number of a component type. Numbers out of range saturate, as in casts.
 fn put(bytes: &mut Vec<u8>, number: f64, component: Component) {
     match component {
         Component::I8 => bytes.extend((number as i8).to_le_bytes()),

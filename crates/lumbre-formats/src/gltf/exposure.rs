@@ -1,4 +1,4 @@
-//! What nodes do while the shutter is open.
+//! The motion of nodes during the exposure.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -11,21 +11,21 @@ use super::graph::Graph;
 use super::json::Read;
 use super::{GltfOptions, scene};
 
-/// Ways from one moment to the next while the shutter is open: between two, a node turns by less than half a turn, or it is
-/// taken to turn the other way.
+/// The number of segments of the exposure. Within one, a node must rotate by less than half a turn, or it would
+/// interpolate the other way.
 const STEPS: usize = 16;
 
-/// The same for vertices, which go straight from one moment to the next.
+/// The same for vertices, which move linearly within a segment.
 const MESH_STEPS: usize = 8;
 
-/// The nodes at some moments, from when the shutter opens, at time 0, to when it closes, at time 1.
+/// The nodes at several times, from 0, when the shutter opens, to 1, when it closes.
 pub(super) struct Exposure<'f> {
     file: &'f File<'f>,
-    /// None for an exposure of no time.
+    /// Empty for an exposure without duration.
     moments: Vec<Moment<'f>>,
 }
 
-/// How a mesh stands at one moment: see [`super::mesh::Pose`].
+/// A mesh at one time: see [`super::mesh::Pose`].
 pub(super) struct OwnPose {
     pub weights: Vec<f64>,
     pub joints: Option<Vec<DMat4>>,
@@ -56,7 +56,7 @@ impl<'f> Exposure<'f> {
         Ok(Self { file, moments })
     }
 
-    /// Where a node stands at each moment.
+    /// The transform of a node at each time.
     fn worlds(&mut self, node: usize) -> Read<Vec<(f64, DAffine3)>> {
         let world = |moment: &mut Moment<'_>| Ok((moment.time, moment.graph.world(node, &mut moment.known)?));
         self.moments.iter_mut().map(world).collect()
@@ -68,7 +68,7 @@ impl<'f> Exposure<'f> {
         Ok(worlds.iter().any(|(_, world)| *world != worlds[0].1))
     }
 
-    /// How a mesh stands at each moment at which it is looked at while it changes its form; none where it does not.
+    /// The mesh at each sampled time while it deforms; empty if it does not.
     pub(super) fn poses(&mut self, node: usize, skin: Option<usize>) -> Read<Vec<OwnPose>> {
         if !self.deforms(node, skin)? {
             return Ok(vec![]);
@@ -86,7 +86,7 @@ impl<'f> Exposure<'f> {
         moments.map(pose).collect()
     }
 
-    /// Whether the mesh of a node changes its form: by its morph targets, or by the joints of its skin.
+    /// Whether the mesh of a node deforms: by its morph targets, or by its skin's joints.
     pub(super) fn deforms(&mut self, node: usize, skin: Option<usize>) -> Read<bool> {
         if let Some((first, others)) = self.moments.split_first() {
             let first = first.graph.weights(node)?;
@@ -106,7 +106,8 @@ impl<'f> Exposure<'f> {
         Ok(false)
     }
 
-    /// The motion of what stands at `place` when the node stands in the world somewhere; `None` where nothing moves.
+    /// The motion of something at `place` in a node's space, relative to the node's transform; `None` if
+    /// nothing moves.
     pub(super) fn motion(
         &mut self,
         node: usize,
@@ -130,7 +131,7 @@ impl<'f> Exposure<'f> {
     }
 }
 
-/// The motion through all keys; through the first and the last alone where that passes the others.
+/// The motion through all keys, or through the first and the last if those pass through the others.
 fn simplest(keys: Vec<(f64, Transform)>) -> Result<AnimatedTransform, lumbre_math::AnimationError> {
     let largest = |map: DAffine3| map.to_cols_array().into_iter().fold(0.0, |most: f64, x| most.max(x.abs()));
     let size = keys.iter().fold(0.0, |most: f64, (_, map)| most.max(largest(*map.affine())));

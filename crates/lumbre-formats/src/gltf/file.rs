@@ -1,4 +1,4 @@
-//! A glTF with its lists and its buffers at hand.
+//! A glTF file with its lists and buffers.
 
 use std::borrow::Cow;
 use std::cell::RefCell;
@@ -12,7 +12,7 @@ use crate::budget::{Budget, BudgetVec};
 use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, Severity, quoted};
 use crate::input::Input;
 
-/// The top-level lists, and those that extensions keep there.
+/// The top-level lists, and those of extensions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum List {
     Accessors,
@@ -53,7 +53,7 @@ impl List {
         Self::Variants,
     ];
 
-    /// The extension that has it, if one does, its name, and what one of it is called.
+    /// Its extension, if any, its name, and the noun for one element.
     fn names(self) -> (Option<&'static str>, &'static str, &'static str) {
         match self {
             Self::Accessors => (None, "accessors", "an accessor"),
@@ -76,42 +76,42 @@ impl List {
     }
 }
 
-/// A glTF that is being read.
+/// A glTF file that is being read.
 pub(super) struct File<'a> {
-    /// The whole.
+    /// The root object.
     pub root: Value<'a>,
     /// The name for messages.
     pub name: Arc<str>,
-    /// Where the files that it names are.
+    /// The folder of files that it names.
     pub folder: &'a Path,
-    /// What it may cost.
+    /// The budget.
     pub budget: &'a Budget,
     diagnostics: RefCell<Diagnostics>,
     lists: [Vec<Value<'a>>; List::ALL.len()],
     buffers: Vec<Option<Cow<'a, [u8]>>>,
-    /// Bytes of buffer views that were compressed.
+    /// The bytes of decompressed buffer views.
     unpacked: Vec<Option<Vec<u8>>>,
-    /// Elements of accessors that were compressed with their primitives.
+    /// The elements of accessors whose primitives were compressed.
     filled: HashMap<usize, Vec<u8>>,
-    /// Bytes of all buffers together.
+    /// The total size of all buffers.
     buffer_bytes: u64,
 }
 
 /// The bytes of a buffer view.
 #[derive(Clone, Copy)]
 pub(super) struct View<'a> {
-    /// The bytes; `None` where the buffer has none, because something else is to fill it.
+    /// The bytes; `None` where the buffer has none, because an extension provides them.
     pub bytes: Option<&'a [u8]>,
-    /// How many bytes there are, or would be.
+    /// The number of bytes.
     pub length: u64,
-    /// Bytes from one element to the next, where the view says.
+    /// The stride, if specified.
     pub stride: Option<usize>,
-    /// Where the bytes start in their buffer.
+    /// The offset in the buffer.
     pub offset: u64,
 }
 
 impl<'a> File<'a> {
-    /// Nothing is looked at yet: that is what [`File::load`] does.
+    /// A file that is not loaded yet: see [`File::load`].
     pub(super) fn new(
         root: Value<'a>,
         name: &Arc<str>,
@@ -133,7 +133,7 @@ impl<'a> File<'a> {
         }
     }
 
-    /// What was said about the file.
+    /// The collected diagnostics.
     pub(super) fn into_diagnostics(self) -> Diagnostics {
         self.diagnostics.into_inner()
     }
@@ -168,13 +168,13 @@ impl<'a> File<'a> {
         &self.lists[list as usize]
     }
 
-    /// The element of a list that `value` names by its position, with the position.
+    /// The element of a list that `value` indexes, with the index.
     pub(super) fn at(&self, list: List, value: Value<'_>) -> Read<(usize, Value<'a>)> {
         let index = value.index(self.list(list).len(), list.names().2)?;
         Ok((index, self.list(list)[index]))
     }
 
-    /// The element of a list that a member of `value` names, where it has that member.
+    /// The element of a list that a member of `value` indexes, if it has that member.
     pub(super) fn named(
         &self,
         list: List,
@@ -184,7 +184,7 @@ impl<'a> File<'a> {
         value.get(member)?.map(|index| self.at(list, index)).transpose()
     }
 
-    /// Whether the file says that it uses an extension.
+    /// Whether the file declares that it uses an extension.
     pub(super) fn uses(&self, extension: &str) -> Read<bool> {
         let Some(list) = self.root.get("extensionsUsed")? else { return Ok(false) };
         for name in list.array()? {
@@ -195,7 +195,7 @@ impl<'a> File<'a> {
         Ok(false)
     }
 
-    /// Whether what cannot be used should be dropped with a warning.
+    /// Whether unusable parts are dropped with a warning.
     pub(super) fn is_lenient(&self) -> bool {
         self.diagnostics.borrow().is_lenient()
     }
@@ -215,7 +215,7 @@ impl<'a> File<'a> {
         f(&mut self.diagnostics.borrow_mut())
     }
 
-    /// Something that glTF forbids though its meaning is plain: an error, or a warning when lenient.
+    /// A violation of glTF whose meaning is still clear: an error, or a warning when lenient.
     pub(super) fn breach(&self, wrong: Diagnostic) -> Read<()> {
         if !self.is_lenient() {
             return Err(wrong.into());
@@ -224,7 +224,7 @@ impl<'a> File<'a> {
         Ok(())
     }
 
-    /// Finds the lists and loads every buffer. `binary` is the one inside a GLB.
+    /// Finds the lists and loads every buffer. `binary` is the GLB's own buffer.
     pub(super) fn load(&mut self, binary: Option<&'a [u8]>, is_glb: bool) -> Read<()> {
         self.find_lists()?;
         for (index, &value) in self.lists[List::Buffers as usize].iter().enumerate() {
@@ -258,7 +258,7 @@ impl<'a> File<'a> {
         let bytes: Cow<'a, [u8]> = match value.get("uri")? {
             None if index == 0 && binary.is_some() => Cow::Borrowed(binary.unwrap_or_default()),
             None => {
-                // Another program is to fill it, or it stands in for one that extensions unpack.
+                // Filled by another program, or a fallback for one that an extension decompresses.
                 if index == 0 && is_glb && value.get("extensions")?.is_none() {
                     let wrong = value.wrong("buffer without data").expected("a binary chunk in the GLB file");
                     return Err(wrong.into());
@@ -294,8 +294,8 @@ impl<'a> File<'a> {
         Ok(Some(bytes))
     }
 
-    /// The bytes behind a URI, with a name for messages. Data in the URI itself must be of one of the media types, unless
-    /// there are none to choose from.
+    /// The bytes behind a URI, with a name for messages. Data URIs must have one of the media types, if any are
+    /// given.
     pub(super) fn data(&self, uri: Value<'_>, media_types: &[&str]) -> Read<(Arc<str>, Vec<u8>)> {
         let text = uri.string()?;
         match target(&text) {
@@ -346,12 +346,12 @@ impl<'a> File<'a> {
         }
     }
 
-    /// The bytes of all buffers together.
+    /// The total size of all buffers.
     pub(super) fn buffer_bytes(&self) -> u64 {
         self.buffer_bytes
     }
 
-    /// The bytes of a buffer that `value` names as a buffer view does, where they start, and how many there are.
+    /// The bytes of a buffer slice described like a buffer view, its offset and its length.
     pub(super) fn buffer_slice(&self, value: Value<'_>) -> Read<(Option<&[u8]>, u64, u64)> {
         let (index, buffer) = self.at(List::Buffers, value.need("buffer")?)?;
         let offset_value = value.get("byteOffset")?;
@@ -366,18 +366,18 @@ impl<'a> File<'a> {
             let found = format!("{length} bytes from byte {offset}");
             return Err(wrong.found(found).expected(format!("at most {size} bytes in all")).into());
         }
-        // A buffer that was loaded has as many bytes as it says.
+        // A loaded buffer has its declared length.
         let bytes = self.buffers.get(index).and_then(Option::as_ref);
         Ok((bytes.and_then(|bytes| bytes.get(offset as usize..(offset + length) as usize)), offset, length))
     }
 
-    /// The buffer view that `value` names.
+    /// The buffer view that `value` indexes.
     pub(super) fn view(&self, value: Value<'_>) -> Read<(usize, View<'_>)> {
         let (index, view) = self.at(List::BufferViews, value)?;
         Ok((index, self.view_at(index, view)?))
     }
 
-    /// The elements of an accessor that was compressed with its primitive, tightly packed.
+    /// The elements of an accessor whose primitive was compressed, tightly packed.
     pub(super) fn filled(&self, accessor: usize) -> Option<&[u8]> {
         self.filled.get(&accessor).map(Vec::as_slice)
     }
@@ -421,7 +421,7 @@ impl<'a> File<'a> {
         Ok(View { bytes, length, stride, offset })
     }
 
-    /// A place for messages about the file as a whole.
+    /// A place for messages about the whole file.
     pub(super) fn whole(&self) -> Place {
         Place::whole(self.name.clone())
     }

@@ -1,4 +1,4 @@
-//! The nodes: who hangs on whom, and where each stands.
+//! The node hierarchy and its transforms.
 
 use std::collections::HashMap;
 
@@ -8,7 +8,7 @@ use super::animation::{Moved, Played, Weights};
 use super::file::{File, List};
 use super::json::{Read, Value};
 
-/// The trees of nodes, known to be trees.
+/// The node hierarchy, known to be a forest.
 pub(super) struct Graph<'a> {
     file: &'a File<'a>,
     parents: Vec<Option<u32>>,
@@ -16,7 +16,7 @@ pub(super) struct Graph<'a> {
 }
 
 impl<'a> Graph<'a> {
-    /// Looks at every node. `played` is what animations do to some of them.
+    /// Reads all nodes. `played` is the effect of animations.
     pub(super) fn read(file: &'a File<'a>, played: Played) -> Read<Self> {
         let nodes = file.list(List::Nodes);
         let mut parents: Vec<Option<u32>> = file.budget.vec(nodes.len() as u64, "nodes")?;
@@ -44,9 +44,9 @@ impl<'a> Graph<'a> {
         Ok(graph)
     }
 
-    /// With one parent each, only a ring of nodes has no root.
+    /// With one parent each, only a cycle has no root.
     fn refuse_cycles(&self) -> Read<()> {
-        // For each node, in which walk it was met; 0 is none.
+        // For each node, the walk that visited it; 0 is none.
         let mut met = vec![0_u32; self.parents.len()];
         for start in 0..self.parents.len() {
             let walk = start as u32 + 1;
@@ -85,22 +85,22 @@ impl<'a> Graph<'a> {
         Ok(())
     }
 
-    /// The nodes that hang on no other.
+    /// The nodes without a parent.
     pub(super) fn roots(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.parents.len()).filter(|&node| self.parents[node].is_none())
     }
 
-    /// Whether a node hangs on another.
+    /// Whether a node has a parent.
     pub(super) fn is_child(&self, node: usize) -> bool {
         self.parents[node].is_some()
     }
 
-    /// What an animation does to a node.
+    /// The effect of animations on a node.
     pub(super) fn moved(&self, node: usize) -> Option<&Moved> {
         self.played.nodes.get(&node)
     }
 
-    /// The weights of morph targets that a node's mesh has, as animations leave them; none where nothing says them.
+    /// The weights of morph targets of a node's mesh, animations included; `None` if there are none.
     pub(super) fn weights(&self, node: usize) -> Read<Option<Vec<f64>>> {
         let value = self.file.list(List::Nodes)[node];
         let still = |value: Value<'_>| -> Read<Option<Vec<f64>>> {
@@ -117,12 +117,12 @@ impl<'a> Graph<'a> {
         Ok(over(self.moved(node).map(|moved| &moved.weights), still(value)?.or(of_mesh)))
     }
 
-    /// From a node's own space to its parent's.
+    /// The transform from node to parent space.
     pub(super) fn local(&self, node: usize) -> Read<DAffine3> {
         local(self.file, self.file.list(List::Nodes)[node], self.moved(node))
     }
 
-    /// From the spaces of nodes to the world. What is found on the way is kept in `known`.
+    /// The transform from node to world space. Ancestors' transforms are cached in `known`.
     pub(super) fn world(&self, node: usize, known: &mut HashMap<usize, DAffine3>) -> Read<DAffine3> {
         let mut path = vec![];
         let mut here = Some(node);
@@ -142,7 +142,7 @@ impl<'a> Graph<'a> {
         Ok(world)
     }
 
-    /// Visits all nodes below `roots`, parents first, with where they stand.
+    /// Visits all nodes below `roots`, parents first, with their world transforms.
     pub(super) fn walk(
         &self,
         roots: &[usize],
@@ -160,7 +160,7 @@ impl<'a> Graph<'a> {
                     for child in children.array()? {
                         waiting.push((self.file.at(List::Nodes, child)?.0, world));
                     }
-                    // The first child is to come next.
+                    // The first child comes next.
                     waiting[first..].reverse();
                 }
             }
@@ -169,7 +169,7 @@ impl<'a> Graph<'a> {
     }
 }
 
-/// From a node's own space to its parent's.
+/// The transform from node to parent space.
 fn local(file: &File<'_>, node: Value<'_>, moved: Option<&Moved>) -> Read<DAffine3> {
     let any = f64::NEG_INFINITY..=f64::INFINITY;
     let parts = ["translation", "rotation", "scale"];

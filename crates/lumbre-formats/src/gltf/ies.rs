@@ -12,7 +12,7 @@ use super::json::{Read, Value};
 use crate::FormatError;
 use crate::ies::read_ies;
 
-/// The profiles of a file, each read when it is first asked for.
+/// The profiles of a file, read on first use.
 pub(super) struct Profiles<'f> {
     file: &'f File<'f>,
     images: HashMap<usize, Arc<Image>>,
@@ -47,7 +47,7 @@ impl<'f> Profiles<'f> {
         Ok(())
     }
 
-    /// Which profile a node has, and the factor on it.
+    /// The profile of a node, and the factor on it.
     pub(super) fn instance(file: &File<'_>, extension: Value<'_>) -> Read<(usize, Rgb)> {
         let (index, _) = file.at(List::Profiles, extension.need("light")?)?;
         let multiplier = extension.number_or("multiplier", 1.0, 0.0..=f64::INFINITY)?;
@@ -55,7 +55,7 @@ impl<'f> Profiles<'f> {
         Ok((index, Rgb::new(r as f32, g as f32, b as f32) * multiplier as f32))
     }
 
-    /// The light of a node, whose place and turn `world` is: aimed along its -z.
+    /// The light of a node with the transform `world`, aimed along its -z.
     pub(super) fn light(&mut self, extension: Value<'_>, world: &DAffine3) -> Read<LightDesc> {
         let (index, intensity) = Self::instance(self.file, extension)?;
         let world_from_light = Transform::from_affine(*world)

@@ -1,4 +1,5 @@
-//! JSON (RFC 8259) as a table of places in its text: nothing is copied, and every value knows its pointer (RFC 6901).
+//! JSON (RFC 8259) as a table of positions in its text: nothing is copied, and every value knows its pointer
+//! (RFC 6901).
 
 use std::borrow::Cow;
 use std::fmt::Write as _;
@@ -9,25 +10,25 @@ use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, quoted, quo
 
 pub(super) type Read<T> = Result<T, FormatError>;
 
-/// A value or a key: where it starts in the text, and which entry of the table comes after all that is inside it.
-/// A member of an object has two entries, the key's and then the value's.
+/// A value or a key: its start in the text, and the table entry after everything inside it. A member of an
+/// object has two entries, the key's and then the value's.
 #[derive(Clone, Copy, Debug)]
 struct Entry {
     start: u32,
     next: u32,
 }
 
-/// A text that was read.
+/// A parsed text.
 #[derive(Debug)]
 pub(super) struct Json<'t> {
     name: Arc<str>,
     text: &'t str,
     entries: Vec<Entry>,
-    /// Where the text starts in its file, when the file is not this text alone.
+    /// The offset of the text in its file, if it is not the whole file.
     within: Option<u64>,
 }
 
-/// A value inside another one, with its name if it has one.
+/// A nested value, with its name in an object.
 pub(super) type Inside<'a> = (Option<Cow<'a, str>>, Value<'a>);
 
 /// A value in a text.
@@ -38,7 +39,7 @@ pub(super) struct Value<'a> {
 }
 
 impl<'t> Json<'t> {
-    /// Reads a text. `within` is where it starts in its file, when the file is not this text alone.
+    /// Parses a text. `within` is its offset in its file, if it is not the whole file.
     pub(super) fn read(text: &'t str, name: &Arc<str>, within: Option<u64>, budget: &Budget) -> Read<Self> {
         let mut parser = Parser { text: text.as_bytes(), at: 0, name, within, budget };
         if text.len() >= u32::MAX as usize {
@@ -48,7 +49,7 @@ impl<'t> Json<'t> {
         Ok(Self { name: name.clone(), text, entries, within })
     }
 
-    /// The whole.
+    /// The root value.
     pub(super) fn root(&self) -> Value<'_> {
         Value { json: self, at: 0 }
     }
@@ -70,12 +71,12 @@ impl Parser<'_> {
         }
     }
 
-    /// What is wrong where the parser stands.
+    /// An error at the parser's position.
     fn wrong(&self, message: &str) -> Diagnostic {
         let rest = &self.text[self.at.min(self.text.len())..];
         let found = match rest.first() {
             None => "the end of the text".to_owned(),
-            // A whole character, so that it can be shown.
+            // A whole character, so that it can be displayed.
             Some(_) => {
                 let rest = String::from_utf8_lossy(&rest[..rest.len().min(4)]).into_owned();
                 quoted(rest.get(..rest.chars().next().map_or(0, char::len_utf8)).unwrap_or(""))
@@ -97,7 +98,7 @@ impl Parser<'_> {
     fn document(&mut self) -> Read<Vec<Entry>> {
         let budget = self.budget;
         let mut entries = BudgetVec::new(budget, "JSON values");
-        // Containers that are open, as positions in the table.
+        // The open containers, as table indices.
         let mut open: BudgetVec<'_, u32> = BudgetVec::new(budget, "JSON nesting");
         let mut depth = 0;
         'value: loop {
@@ -148,7 +149,7 @@ impl Parser<'_> {
                     entries.push(entry)?;
                 }
             }
-            // After a value: the ends of what is open, until something goes on.
+            // After a value: close containers until a comma follows.
             loop {
                 self.skip_space();
                 if depth == 0 {
@@ -294,15 +295,15 @@ impl<'a> Value<'a> {
         Self { json: self.json, at }
     }
 
-    /// The text that it is a part of.
+    /// The text that contains it.
     pub(super) fn text(self) -> &'a str {
         self.json.text
     }
 
-    /// Where it stands in the text.
+    /// Its range in the text.
     pub(super) fn range(self) -> std::ops::Range<usize> {
         let bytes = self.json.text.as_bytes();
-        // Down to the last value that has none inside it, and out again over the brackets.
+        // Down to the last nested value, and out again past the closing brackets.
         let (mut last, mut depth) = (self, 0);
         while let b'{' | b'[' = last.first_byte() {
             depth += 1;
@@ -343,14 +344,14 @@ impl<'a> Value<'a> {
         }
     }
 
-    /// A number or a word, as it stands.
+    /// A number or a keyword, verbatim.
     fn scalar(self) -> &'a str {
         let rest = &self.json.text[self.start()..];
         let ends = |b: u8| matches!(b, b',' | b']' | b'}' | b' ' | b'\t' | b'\n' | b'\r');
         &rest[..rest.bytes().position(ends).unwrap_or(rest.len())]
     }
 
-    /// A string between its quotes, its escapes as they stand.
+    /// The contents of a string, with escapes.
     fn raw_string(self) -> &'a str {
         let rest = &self.json.text[self.start() + 1..];
         let mut escaped = false;
@@ -367,7 +368,7 @@ impl<'a> Value<'a> {
         if raw.contains('\\') { Cow::Owned(unescape(raw)) } else { Cow::Borrowed(raw) }
     }
 
-    /// The JSON pointer; this walks down from the root, for errors.
+    /// The JSON pointer; walks down from the root, for errors.
     pub(super) fn pointer(self) -> String {
         let mut pointer = String::new();
         let mut here = self.json.root();
@@ -402,7 +403,7 @@ impl<'a> Value<'a> {
         pointer
     }
 
-    /// Where it is, with its pointer.
+    /// The place, with the JSON pointer.
     pub(super) fn place(self) -> Place {
         let json = self.json;
         match json.within {
@@ -412,17 +413,17 @@ impl<'a> Value<'a> {
         }
     }
 
-    /// Something wrong with it.
+    /// An error at this value.
     pub(super) fn wrong(self, message: impl Into<String>) -> Diagnostic {
         Diagnostic::error(message).at(self.place())
     }
 
-    /// An error: it is not what was expected.
+    /// An error: it is not as expected.
     pub(super) fn unexpected(self, message: &str, expected: &str) -> FormatError {
         self.wrong(message).found(self.said()).expected(expected).into()
     }
 
-    /// A warning of something that was not used.
+    /// A warning at this value.
     pub(super) fn warn(self, diagnostics: &mut Diagnostics, message: &str) {
         diagnostics.warn(message, |warning| warning.at(self.place()));
     }
@@ -444,12 +445,12 @@ impl<'a> Value<'a> {
         std::iter::from_fn(move || Some((values.next()?, values.next()?)))
     }
 
-    /// That it is an object.
+    /// Itself, if it is an object.
     pub(super) fn object(self) -> Read<Self> {
         if self.first_byte() == b'{' { Ok(self) } else { Err(self.unexpected("wrong type", "an object")) }
     }
 
-    /// The names and values of an object, or the values of an array; nothing for what has none inside.
+    /// The members of an object, or the elements of an array; empty for others.
     pub(super) fn inside(self) -> impl Iterator<Item = Inside<'a>> {
         let is_object = self.first_byte() == b'{';
         let mut values = self.values();
@@ -468,7 +469,7 @@ impl<'a> Value<'a> {
         Ok(self.pairs().map(|(key, value)| (key.unescaped(), value)))
     }
 
-    /// The member of an object of this name.
+    /// The member of an object with this name.
     pub(super) fn get(self, name: &str) -> Read<Option<Self>> {
         self.object()?;
         let mut found: Option<Self> = None;
@@ -485,7 +486,7 @@ impl<'a> Value<'a> {
         Ok(found)
     }
 
-    /// The member of an object of this name, which must be there.
+    /// The required member of an object with this name.
     pub(super) fn need(self, name: &str) -> Read<Self> {
         self.get(name)?.ok_or_else(|| self.wrong(format!("{} is missing", quoted(name))).into())
     }
@@ -499,7 +500,7 @@ impl<'a> Value<'a> {
         }
     }
 
-    /// The numbers of an array of so many.
+    /// The numbers of an array of this length.
     pub(super) fn numbers<const N: usize>(self) -> Read<[f64; N]> {
         let expected = || self.unexpected("wrong type", &format!("an array of {N} numbers"));
         let mut values = self.array().map_err(|_| expected())?;
@@ -519,7 +520,7 @@ impl<'a> Value<'a> {
         number.filter(|n| n.is_finite()).ok_or_else(|| self.unexpected("number too large", "a finite number"))
     }
 
-    /// A whole number of at least `least` and below 2⁵³.
+    /// An integer of at least `least` and below 2⁵³.
     pub(super) fn whole(self, least: u64) -> Read<u64> {
         const MOST: f64 = (1_u64 << 53) as f64;
         let number = self.number()?;
@@ -530,7 +531,7 @@ impl<'a> Value<'a> {
         Err(self.unexpected("wrong number", &expected))
     }
 
-    /// The position of something in a list of `count` things, which `what` names.
+    /// An index into a list of `count` elements; `what` names one.
     pub(super) fn index(self, count: usize, what: &str) -> Read<usize> {
         let index = self.whole(0)?;
         match usize::try_from(index) {
@@ -545,7 +546,7 @@ impl<'a> Value<'a> {
         }
     }
 
-    /// A truth value.
+    /// A Boolean.
     pub(super) fn bool(self) -> Read<bool> {
         match self.first_byte() {
             b't' => Ok(true),
@@ -563,7 +564,7 @@ impl<'a> Value<'a> {
         }
     }
 
-    /// A number within a range, or `default` where the object has none of this name.
+    /// A number in a range, or `default` if the object has no such member.
     pub(super) fn number_or(
         self,
         name: &str,
@@ -583,7 +584,7 @@ impl<'a> Value<'a> {
         Err(value.unexpected("number out of range", &expected))
     }
 
-    /// Numbers within a range, or `default` where the object has none of this name.
+    /// Numbers in a range, or `default` if the object has no such member.
     pub(super) fn numbers_or<const N: usize>(
         self,
         name: &str,
@@ -600,17 +601,17 @@ impl<'a> Value<'a> {
         Err(wrong.expected(expected).into())
     }
 
-    /// A truth value, or `default`.
+    /// A Boolean, or `default`.
     pub(super) fn bool_or(self, name: &str, default: bool) -> Read<bool> {
         self.get(name)?.map_or(Ok(default), Self::bool)
     }
 
-    /// A string, where there is one.
+    /// A string, if present.
     pub(super) fn string_at(self, name: &str) -> Read<Option<Cow<'a, str>>> {
         self.get(name)?.map(Self::string).transpose()
     }
 
-    /// The extension of this name.
+    /// The extension with this name.
     pub(super) fn extension(self, name: &str) -> Read<Option<Self>> {
         let Some(extensions) = self.get("extensions")? else { return Ok(None) };
         let extension = extensions.get(name)?;
@@ -618,7 +619,7 @@ impl<'a> Value<'a> {
     }
 }
 
-/// Escapes resolved; half of a surrogate pair becomes U+FFFD.
+/// Escapes resolved; unpaired surrogates become U+FFFD.
 fn unescape(raw: &str) -> String {
     let mut text = String::with_capacity(raw.len());
     let mut rest = raw.chars();

@@ -11,30 +11,31 @@ use crate::FormatError;
 use crate::contained::contained;
 use crate::diagnostic::{Diagnostic, Place};
 
-/// How a KTX 2.0 file starts.
+/// The first bytes of a KTX 2.0 file.
 pub(super) const MAGIC: &[u8] = b"\xABKTX 20\xBB\r\n\x1A\n";
 
-/// The bytes of the header, and of what it says of the first level.
+/// The size of the header, with the description of the first level.
 const HEADER: usize = 104;
 const ZSTANDARD: u32 = 2;
 const BASIS_LZ: u32 = 1;
 
-/// What the header says.
+/// The header's data.
 struct Header {
     width: u32,
     height: u32,
     scheme: u32,
-    /// Length of the first level, as it lies in the file and unpacked.
+    /// The length of the first level, compressed and uncompressed.
     packed: u64,
     unpacked: u64,
 }
 
-/// The first level of a texture. `value` is the image in the glTF, and `name` what messages about its bytes start with.
+/// The first level of a texture. `value` is the image in the glTF, and `name` the prefix of messages about its
+/// bytes.
 pub(super) fn read(file: &File<'_>, value: Value<'_>, bytes: &[u8], name: &Arc<str>) -> Read<Bitmap> {
     let header = header(bytes, name)?;
     let blocks = u64::from(header.width.div_ceil(4)) * u64::from(header.height.div_ceil(4));
     let pixels = 4 * 16 * blocks;
-    // Blocks of 16 bytes each, unless they are coded by codebooks.
+    // Blocks of 16 bytes each, unless they use codebooks.
     if header.scheme != BASIS_LZ && header.unpacked != 16 * blocks {
         let wrong = wrong(name, 96, "first level of another size than its blocks").found(header.unpacked);
         return Err(wrong.expected(16 * blocks).into());
@@ -66,7 +67,7 @@ fn wrong(name: &Arc<str>, at: u64, message: &str) -> Diagnostic {
     Diagnostic::error(message).at(Place::binary(name.clone(), at, ""))
 }
 
-/// Checks what decoding relies on.
+/// Checks what the decoder relies on.
 fn header(bytes: &[u8], name: &Arc<str>) -> Read<Header> {
     if bytes.len() < HEADER {
         let wrong = wrong(name, bytes.len() as u64, "KTX 2.0 texture that ends in its header");

@@ -1,4 +1,4 @@
-//! Materials as a glTF has them: every parameter of the core and of the extensions, nothing interpreted.
+//! glTF materials: every parameter of the core and of the extensions, uninterpreted.
 
 use lumbre_image::Rgb;
 use lumbre_math::Vec2;
@@ -7,59 +7,59 @@ use super::file::{File, List};
 use super::json::{Read, Value};
 use crate::diagnostic::{Diagnostic, quoted};
 
-/// A texture of a material: which, and how it lies on the surface.
+/// A reference to a texture, with its mapping.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TextureRef {
-    /// The texture, by its position in the file.
+    /// The index of the texture in the file.
     pub texture: usize,
-    /// The set of texture coordinates.
+    /// The uv set.
     pub uv_set: usize,
-    /// From those to the texture's own: first scaled, then turned, then moved (`KHR_texture_transform`).
+    /// The transform from the set to the texture's coordinates (`KHR_texture_transform`).
     pub transform: UvTransform,
 }
 
-/// A map of texture coordinates (`KHR_texture_transform`): `offset + rotate(rotation) * (scale * uv)`, where v counts
-/// downwards from the upper edge of the image.
+/// A transform of texture coordinates (`KHR_texture_transform`): `offset + rotate(rotation) * (scale * uv)`,
+/// where v counts downwards from the upper edge of the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UvTransform {
-    /// Added last, in images.
+    /// Added last, in units of the image.
     pub offset: Vec2,
-    /// Radians, counter-clockwise about the origin as the image is seen.
+    /// In radians, counter-clockwise about the origin as the image is seen.
     pub rotation: f32,
     /// Factors, applied first.
     pub scale: Vec2,
 }
 
 impl UvTransform {
-    /// The map that changes nothing.
+    /// The identity.
     pub const IDENTITY: Self = Self { offset: Vec2::ZERO, rotation: 0.0, scale: Vec2::ONE };
 
-    /// Where (1, 0), (0, 1) go, as vectors, and where (0, 0) goes.
+    /// The images of the vectors (1, 0) and (0, 1), and of the origin.
     pub fn axes(&self) -> ([Vec2; 2], Vec2) {
         let (sin, cos) = self.rotation.sin_cos();
         ([Vec2::new(cos, -sin) * self.scale.x, Vec2::new(sin, cos) * self.scale.y], self.offset)
     }
 }
 
-/// What coverage does.
+/// How alpha is interpreted.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum AlphaMode {
-    /// Nothing.
+    /// Ignored.
     #[default]
     Opaque,
-    /// There is a surface where coverage is at least `cutoff`.
+    /// Visible where alpha is at least `cutoff`.
     Mask {
-        /// The edge.
+        /// The threshold.
         cutoff: f32,
     },
-    /// The surface covers so much of what is behind it.
+    /// Blended over the background.
     Blend,
 }
 
-/// A coat (`KHR_materials_clearcoat`).
+/// A clear coat (`KHR_materials_clearcoat`).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Clearcoat {
-    /// How much of it there is, in [0, 1]; the factor of the red of its texture.
+    /// Its share, in [0, 1]; multiplied by the red of its texture.
     pub factor: f32,
     /// A factor, red.
     pub texture: Option<TextureRef>,
@@ -67,13 +67,13 @@ pub struct Clearcoat {
     pub roughness: f32,
     /// A factor, green.
     pub roughness_texture: Option<TextureRef>,
-    /// Its own normals; without, those of the geometry.
+    /// Its own normal map; without one, the geometry's normals.
     pub normal_texture: Option<TextureRef>,
     /// Factor on x and y of those normals.
     pub normal_scale: f32,
 }
 
-/// Fibres on the surface (`KHR_materials_sheen`).
+/// Sheen (`KHR_materials_sheen`).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sheen {
     /// Linear colour of the reflection in [0, 1]; black is none.
@@ -82,14 +82,14 @@ pub struct Sheen {
     pub colour_texture: Option<TextureRef>,
     /// In [0, 1]; α is the square.
     pub roughness: f32,
-    /// A factor, in the texture's coverage.
+    /// A factor, in the texture's alpha.
     pub roughness_texture: Option<TextureRef>,
 }
 
 /// A thin film (`KHR_materials_iridescence`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Iridescence {
-    /// How much of it there is, in [0, 1].
+    /// Its share, in [0, 1].
     pub factor: f32,
     /// A factor, red.
     pub texture: Option<TextureRef>,
@@ -99,7 +99,7 @@ pub struct Iridescence {
     pub thickness_minimum: f32,
     /// Thickness in nanometres where it is 1, and without a texture.
     pub thickness_maximum: f32,
-    /// Between the two, green.
+    /// Interpolates between the two, green.
     pub thickness_texture: Option<TextureRef>,
 }
 
@@ -116,21 +116,21 @@ impl Default for Iridescence {
     }
 }
 
-/// Stretched reflections (`KHR_materials_anisotropy`).
+/// Anisotropic reflections (`KHR_materials_anisotropy`).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Anisotropy {
-    /// In [0, 1]; the roughness along its direction goes from that of the material to 1 with the square of it.
+    /// In [0, 1]; the roughness along its direction rises from the material's to 1 with its square.
     pub strength: f32,
     /// Radians from the tangent, counter-clockwise.
     pub rotation: f32,
-    /// Red and green: a direction in [-1, 1]², turned by `rotation`; blue: a factor on the strength.
+    /// Red and green: a direction in [-1, 1]², rotated by `rotation`; blue: a factor on the strength.
     pub texture: Option<TextureRef>,
 }
 
-/// The inside of a closed surface (`KHR_materials_volume`).
+/// The interior of a closed surface (`KHR_materials_volume`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Volume {
-    /// Thickness beneath the surface in the mesh's own space; 0 is a thin wall without an inside.
+    /// Thickness beneath the surface in mesh space; 0 is a thin wall without an interior.
     pub thickness: f32,
     /// A factor, green.
     pub thickness_texture: Option<TextureRef>,
@@ -138,7 +138,7 @@ pub struct Volume {
     pub attenuation_distance: f32,
     /// Linear colour in [0, 1].
     pub attenuation_colour: Rgb,
-    /// Linear colour of what the inside scatters after many bounces, in [0, 1] (`KHR_materials_volume_scatter`).
+    /// Linear multiple-scattering colour of the interior, in [0, 1] (`KHR_materials_volume_scatter`).
     pub multiscatter_colour: Rgb,
     /// Henyey–Greenstein asymmetry of that scattering, in (-1, 1).
     pub scatter_anisotropy: f32,
@@ -157,14 +157,14 @@ impl Default for Volume {
     }
 }
 
-/// Light that passes and is spread (`KHR_materials_diffuse_transmission`).
+/// Diffuse transmission (`KHR_materials_diffuse_transmission`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DiffuseTransmission {
-    /// The share of diffuse light that passes, in [0, 1].
+    /// The share of diffuse light that is transmitted, in [0, 1].
     pub factor: f32,
-    /// A factor, in the texture's coverage.
+    /// A factor, in the texture's alpha.
     pub texture: Option<TextureRef>,
-    /// Linear colour of what passes.
+    /// Linear colour of the transmission.
     pub colour: Rgb,
     /// A factor, sRGB.
     pub colour_texture: Option<TextureRef>,
@@ -176,28 +176,28 @@ impl Default for DiffuseTransmission {
     }
 }
 
-/// The other way to say a surface (`KHR_materials_pbrSpecularGlossiness`), which takes the place of metalness and
-/// roughness; its diffuse colour is then the base colour of the material.
+/// The specular-glossiness model (`KHR_materials_pbrSpecularGlossiness`), which replaces metalness and
+/// roughness; its diffuse colour is then the material's base colour.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpecularGlossiness {
     /// Linear reflectance at normal incidence.
     pub specular: Rgb,
     /// 1 minus the roughness.
     pub glossiness: f32,
-    /// Factors: sRGB colour on `specular`, coverage on `glossiness`.
+    /// Factors: sRGB colour on `specular`, alpha on `glossiness`.
     pub texture: Option<TextureRef>,
 }
 
-/// A material, by glTF 2.0 and its extensions. Colours are linear, factors are on the textures.
+/// A glTF 2.0 material with its extensions. Colours are linear; factors multiply the textures.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GltfMaterial {
     /// Its name.
     pub name: Option<String>,
-    /// Diffuse albedo of what is no metal, reflectance at normal incidence of metals.
+    /// Diffuse albedo of dielectrics, reflectance at normal incidence of metals.
     pub base_colour: Rgb,
-    /// Coverage, by `alpha_mode`.
+    /// Alpha, by `alpha_mode`.
     pub base_alpha: f32,
-    /// A factor on both: sRGB colour, and coverage.
+    /// A factor on both: sRGB colour, and alpha.
     pub base_colour_texture: Option<TextureRef>,
     /// From 0, a dielectric, to 1, a metal.
     pub metallic: f32,
@@ -205,9 +205,9 @@ pub struct GltfMaterial {
     pub roughness: f32,
     /// Factors: green on `roughness`, blue on `metallic`.
     pub metallic_roughness_texture: Option<TextureRef>,
-    /// The other way to say all this.
+    /// The alternative to metalness and roughness.
     pub specular_glossiness: Option<SpecularGlossiness>,
-    /// Normals in tangent space.
+    /// Tangent-space normal map.
     pub normal_texture: Option<TextureRef>,
     /// Factor on x and y of those normals.
     pub normal_scale: f32,
@@ -215,39 +215,39 @@ pub struct GltfMaterial {
     pub emissive: Rgb,
     /// A factor, sRGB.
     pub emissive_texture: Option<TextureRef>,
-    /// What coverage does.
+    /// How alpha is interpreted.
     pub alpha_mode: AlphaMode,
-    /// Whether the back is to be seen too.
+    /// Whether the back is visible.
     pub double_sided: bool,
-    /// Whether the base colour is shown as it is, whatever the light (`KHR_materials_unlit`).
+    /// Whether the base colour is shown regardless of lighting (`KHR_materials_unlit`).
     pub unlit: bool,
-    /// Index of refraction (`KHR_materials_ior`); 0 asks for a reflectance of 1 at every angle.
+    /// Index of refraction (`KHR_materials_ior`); 0 means a reflectance of 1 at every angle.
     pub ior: f32,
     /// Strength of the dielectric reflection in [0, 1] (`KHR_materials_specular`).
     pub specular: f32,
-    /// A factor, in the texture's coverage.
+    /// A factor, in the texture's alpha.
     pub specular_texture: Option<TextureRef>,
     /// Colour of the dielectric reflection at normal incidence, 0 or more.
     pub specular_colour: Rgb,
     /// A factor, sRGB.
     pub specular_colour_texture: Option<TextureRef>,
-    /// The share of light that passes through instead of being diffused (`KHR_materials_transmission`).
+    /// The share of light that is transmitted instead of diffused (`KHR_materials_transmission`).
     pub transmission: f32,
     /// A factor, red.
     pub transmission_texture: Option<TextureRef>,
     /// 20 over the Abbe number (`KHR_materials_dispersion`); 0 is none.
     pub dispersion: f32,
-    /// The inside.
+    /// The interior.
     pub volume: Volume,
-    /// A coat.
+    /// The clear coat.
     pub clearcoat: Clearcoat,
-    /// Fibres.
+    /// Sheen.
     pub sheen: Sheen,
     /// A thin film.
     pub iridescence: Iridescence,
-    /// Stretched reflections.
+    /// Anisotropic reflections.
     pub anisotropy: Anisotropy,
-    /// Light that passes and is spread.
+    /// Diffuse transmission.
     pub diffuse_transmission: DiffuseTransmission,
 }
 
@@ -306,7 +306,7 @@ impl GltfMaterial {
         }
         (m.normal_texture, m.normal_scale) = normal_map(file, value, "normalTexture")?;
         if let Some(occlusion) = value.get("occlusionTexture")? {
-            // Light that does not reach a place is what a renderer finds out by itself.
+            // Occlusion is what a renderer computes.
             texture_ref(file, occlusion)?;
             occlusion.number_or("strength", 1.0, UNIT)?;
         }
@@ -422,7 +422,7 @@ impl GltfMaterial {
         Ok(())
     }
 
-    /// Every texture that it has.
+    /// Every texture reference.
     pub fn textures(&self) -> impl Iterator<Item = TextureRef> {
         [
             self.base_colour_texture,

@@ -1,4 +1,4 @@
-//! Meshes: the primitives of a file, and triangles, points and segments out of them.
+//! Meshes: primitives, and their triangles, points and segments.
 
 use std::collections::HashMap;
 
@@ -13,7 +13,7 @@ use super::file::{File, List};
 use super::json::{Read, Value};
 use crate::diagnostic::quoted;
 
-/// How vertices make shapes.
+/// The topology of a primitive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Mode {
     Points,
@@ -45,7 +45,7 @@ impl Mode {
         matches!(self, Self::Triangles | Self::TriangleStrip | Self::TriangleFan)
     }
 
-    /// How many of `count` vertices make whole shapes.
+    /// The number of `count` vertices that make complete shapes.
     fn whole(self, count: usize) -> usize {
         match self {
             Self::Points => count,
@@ -69,7 +69,7 @@ impl Mode {
     }
 }
 
-/// One of the attributes that are read, with its set.
+/// A known attribute, with its set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Attribute {
     Position,
@@ -79,7 +79,7 @@ enum Attribute {
     Colour(usize),
     Joints(usize),
     Weights(usize),
-    /// Of an application, by the underscore before its name.
+    /// An application's own, with a leading underscore.
     Own,
 }
 
@@ -103,6 +103,30 @@ impl Attribute {
             },
         })
     }
+
+    /// The elements and components that the specification allows; `None` for an application's own attribute.
+    fn formats(self, is_target: bool, quantized: bool) -> Option<(&'static [Element], &'static [Component])> {
+        use Component::{F32, I8, I16, U8, U16};
+        use Element::{Vec2, Vec3, Vec4};
+        let formats: (&[Element], &[Component]) = match (self, is_target, quantized) {
+            (Self::Own, ..) => return None,
+            (Self::Position, _, false) => (&[Vec3], &[F32]),
+            (Self::Position, _, true) => (&[Vec3], &[F32, I8, U8, I16, U16]),
+            (Self::Normal, _, false) => (&[Vec3], &[F32]),
+            (Self::Normal, _, true) => (&[Vec3], &[F32, I8, I16]),
+            (Self::Tangent, false, false) => (&[Vec4], &[F32]),
+            (Self::Tangent, false, true) => (&[Vec4], &[F32, I8, I16]),
+            (Self::Tangent, true, false) => (&[Vec3], &[F32]),
+            (Self::Tangent, true, true) => (&[Vec3], &[F32, I8, I16]),
+            (Self::TexCoord(_), false, false) => (&[Vec2], &[F32, U8, U16]),
+            (Self::TexCoord(_), ..) => (&[Vec2], &[F32, I8, U8, I16, U16]),
+            (Self::Colour(_), false, _) => (&[Vec3, Vec4], &[F32, U8, U16]),
+            (Self::Colour(_), true, _) => (&[Vec3, Vec4], &[F32, I8, U8, I16, U16]),
+            (Self::Joints(_), ..) => (&[Vec4], &[U8, U16]),
+            (Self::Weights(_), ..) => (&[Vec4], &[F32, U8, U16]),
+        };
+        Some(formats)
+    }
 }
 
 /// The attributes of vertices, or what a morph target adds to them.
@@ -117,7 +141,7 @@ pub(super) struct Attributes<'a> {
     pub weights: Vec<Option<Accessor<'a>>>,
 }
 
-/// A part of a mesh with one material.
+/// A primitive: a part of a mesh with one material.
 #[derive(Clone)]
 pub(super) struct Primitive<'a> {
     pub value: Value<'a>,
@@ -128,15 +152,36 @@ pub(super) struct Primitive<'a> {
     pub material: Option<usize>,
 }
 
-/// Sets of attributes beyond this one are of no use to anyone.
+/// Attribute sets from this one on are ignored.
 const MOST_SETS: usize = 16;
+
+/// Checks the alignment and the strides of a vertex attribute. `views` are the buffer views of the ones before.
+fn check_layout(
+    file: &File<'_>,
+    index: Value<'_>,
+    accessor: &Accessor<'_>,
+    views: &mut Vec<(usize, usize)>,
+) -> Read<()> {
+    if let Some((view, has_stride)) = accessor.view {
+        // Two attributes may also share an accessor.
+        if views.iter().any(|&(other, by)| other == view && by != accessor.index) && !has_stride {
+            file.breach(index.wrong("attributes share a buffer view that says no stride"))?;
+        }
+        views.push((view, accessor.index));
+        if !accessor.start.is_multiple_of(4) || (!accessor.stride.is_multiple_of(4) && accessor.count > 1) {
+            let found = format!("byte {}, {} bytes apart", accessor.start, accessor.stride);
+            file.breach(index.wrong("attribute out of step").found(found).expected("multiples of 4"))?;
+        }
+    }
+    Ok(())
+}
 
 impl<'a> Attributes<'a> {
     fn read(file: &'a File<'_>, value: Value<'a>, is_target: bool) -> Read<Self> {
         let quantized = file.uses("KHR_mesh_quantization")?;
         let mut attributes = Self::default();
         let mut count: Option<(usize, String)> = None;
-        // Views that more than one attribute looks through must say their stride.
+        // Views shared by several attributes must specify a stride.
         let mut views: Vec<(usize, usize)> = vec![];
         for (name, index) in value.members()? {
             let Some(attribute) = Attribute::read(&name) else {
@@ -151,46 +196,14 @@ impl<'a> Attributes<'a> {
                 continue;
             };
             let accessor = Accessor::named(file, index)?;
-            use Component::{F32, I8, I16, U8, U16};
-            use Element::{Vec2, Vec3, Vec4};
-            let (elements, components): (&[Element], &[Component]) = match (attribute, is_target, quantized) {
-                (Attribute::Own, ..) => {
-                    if accessor.component == Component::U32 {
-                        file.breach(index.wrong("attribute of unsigned integers"))?;
-                    }
-                    continue;
+            let Some((elements, components)) = attribute.formats(is_target, quantized) else {
+                if accessor.component == Component::U32 {
+                    file.breach(index.wrong("attribute of unsigned integers"))?;
                 }
-                (Attribute::Position, _, false) => (&[Vec3], &[F32]),
-                (Attribute::Position, _, true) => (&[Vec3], &[F32, I8, U8, I16, U16]),
-                (Attribute::Normal, _, false) => (&[Vec3], &[F32]),
-                (Attribute::Normal, _, true) => (&[Vec3], &[F32, I8, I16]),
-                (Attribute::Tangent, false, false) => (&[Vec4], &[F32]),
-                (Attribute::Tangent, false, true) => (&[Vec4], &[F32, I8, I16]),
-                (Attribute::Tangent, true, false) => (&[Vec3], &[F32]),
-                (Attribute::Tangent, true, true) => (&[Vec3], &[F32, I8, I16]),
-                (Attribute::TexCoord(_), false, false) => (&[Vec2], &[F32, U8, U16]),
-                (Attribute::TexCoord(_), ..) => (&[Vec2], &[F32, I8, U8, I16, U16]),
-                (Attribute::Colour(_), false, _) => (&[Vec3, Vec4], &[F32, U8, U16]),
-                (Attribute::Colour(_), true, _) => (&[Vec3, Vec4], &[F32, I8, U8, I16, U16]),
-                (Attribute::Joints(_), ..) => (&[Vec4], &[U8, U16]),
-                (Attribute::Weights(_), ..) => (&[Vec4], &[F32, U8, U16]),
+                continue;
             };
             accessor.expect(index, elements, components)?;
-            if let Some((view, has_stride)) = accessor.view {
-                // Attributes may also be one and the same accessor.
-                if views.iter().any(|&(other, by)| other == view && by != accessor.index) && !has_stride {
-                    file.breach(index.wrong("attributes share a buffer view that says no stride"))?;
-                }
-                views.push((view, accessor.index));
-                if !accessor.start.is_multiple_of(4)
-                    || (!accessor.stride.is_multiple_of(4) && accessor.count > 1)
-                {
-                    let found = format!("byte {}, {} bytes apart", accessor.start, accessor.stride);
-                    file.breach(
-                        index.wrong("attribute out of step").found(found).expected("multiples of 4"),
-                    )?;
-                }
-            }
+            check_layout(file, index, &accessor, &mut views)?;
             match &count {
                 Some((count, first)) if *count != accessor.count => {
                     let wrong = index
@@ -235,8 +248,14 @@ impl<'a> Attributes<'a> {
                 Attribute::Own => {}
             }
         }
+        attributes.check_sets(file, value, is_target)?;
+        Ok(attributes)
+    }
+
+    /// Checks that sets are numbered without gaps, and that joints and weights match.
+    fn check_sets(&self, file: &File<'_>, value: Value<'_>, is_target: bool) -> Read<()> {
         let sets: [(&str, &[Option<Accessor<'_>>]); 3] =
-            [("TEXCOORD", &attributes.uvs), ("JOINTS", &attributes.joints), ("WEIGHTS", &attributes.weights)];
+            [("TEXCOORD", &self.uvs), ("JOINTS", &self.joints), ("WEIGHTS", &self.weights)];
         for (name, sets) in sets {
             if let Some(missing) = sets.iter().position(Option::is_none)
                 && !is_target
@@ -246,25 +265,21 @@ impl<'a> Attributes<'a> {
                 )?;
             }
         }
-        if attributes.joints.len() != attributes.weights.len() {
+        if self.joints.len() != self.weights.len() {
             let wrong = value.wrong("as many sets of joints as of weights are needed");
-            file.breach(wrong.found(format!(
-                "{} and {}",
-                attributes.joints.len(),
-                attributes.weights.len()
-            )))?;
+            file.breach(wrong.found(format!("{} and {}", self.joints.len(), self.weights.len())))?;
         }
-        Ok(attributes)
+        Ok(())
     }
 
-    /// How many vertices there are.
+    /// The number of vertices.
     fn count(&self) -> Option<usize> {
         self.position.as_ref().map(|p| p.count)
     }
 }
 
 impl<'a> Primitive<'a> {
-    /// A primitive, all of which is there and fits together.
+    /// A primitive that is complete and consistent.
     pub(super) fn read(file: &'a File<'_>, value: Value<'a>, variant: Option<usize>) -> Read<Self> {
         let mode = Mode::read(value)?;
         let attributes_value = value.need("attributes")?;
@@ -336,7 +351,7 @@ impl<'a> Primitive<'a> {
         Ok(Self { value, mode, attributes, targets, indices, material })
     }
 
-    /// Everything that it reads, and whether as indices.
+    /// Every accessor, and whether it is used for indices.
     pub(super) fn accessors(&self) -> impl Iterator<Item = (&Accessor<'a>, bool)> {
         let vertices = std::iter::once(&self.attributes).chain(&self.targets).flat_map(|a| {
             let sets = [&a.uvs, &a.joints, &a.weights].into_iter().flatten();
@@ -362,12 +377,12 @@ impl<'a> Primitive<'a> {
     }
 }
 
-/// How a mesh stands at one moment.
+/// A mesh at one time.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Pose<'p> {
-    /// How much of each morph target; those that are missing are 0.
+    /// The weights of morph targets; missing ones are 0.
     pub weights: &'p [f64],
-    /// Where each joint takes the vertices; none leaves them where they are.
+    /// The matrices of joints; `None` without a skin.
     pub joints: Option<&'p [DMat4]>,
 }
 
@@ -376,16 +391,16 @@ pub(super) struct Pose<'p> {
 pub(super) struct Vertices {
     pub positions: Vec<Vec3>,
     pub normals: Option<Vec<Vec3>>,
-    /// With the side of the bitangent, as [`lumbre_scene::MeshDesc::tangents`].
+    /// With the sign of the bitangent, as [`lumbre_scene::MeshDesc::tangents`].
     pub tangents: Option<Vec<Vec4>>,
     pub uvs: Vec<Option<Vec<Vec2>>>,
-    /// Linear colours and coverages.
+    /// Linear colours and alphas.
     pub colours: Option<Vec<(Rgb, f32)>>,
-    /// Where they are while they move, if they do.
+    /// Their positions at other times, if they move.
     pub moments: Vec<MeshMoment>,
 }
 
-/// Reads the vertices of a primitive in a pose. Only the sets of texture coordinates for which `wants` says so are read.
+/// Reads the vertices of a primitive in a pose. Only the uv sets for which `wants` is true are read.
 pub(super) fn vertices(
     file: &File<'_>,
     primitive: &Primitive<'_>,
@@ -421,7 +436,7 @@ fn colours(file: &File<'_>, accessor: &Accessor<'_>) -> Read<Vec<(Rgb, f32)>> {
     }
 }
 
-/// Gives back what numbers were charged that are no longer needed.
+/// Returns the charge for numbers that are no longer needed.
 fn release<T>(file: &File<'_>, numbers: Vec<T>) {
     file.budget.release((numbers.len() * size_of::<T>()) as u64);
 }
@@ -474,7 +489,7 @@ fn morph(file: &File<'_>, primitive: &Primitive<'_>, weights: &[f64], vertices: 
     Ok(())
 }
 
-/// Moves vertices with their joints.
+/// Skins vertices.
 fn bend(file: &File<'_>, primitive: &Primitive<'_>, joints: &[DMat4], vertices: &mut Vertices) -> Read<()> {
     let count = vertices.positions.len();
     let mut sets = vec![];
@@ -483,7 +498,7 @@ fn bend(file: &File<'_>, primitive: &Primitive<'_>, joints: &[DMat4], vertices: 
             let read = indices.wholes::<4>(file)?;
             let wrong = read.iter().position(|four| four.iter().any(|&j| j as usize >= joints.len()));
             let weights = weights.floats(file, |w: [f32; 4]| w)?;
-            // A joint without weight may be any.
+            // A joint of weight zero may be any.
             let used =
                 |i: usize| (0..4).find(|&k| weights[i][k] != 0.0 && read[i][k] as usize >= joints.len());
             if let Some((i, k)) = wrong.and_then(|from| (from..count).find_map(|i| Some((i, used(i)?)))) {
@@ -531,24 +546,24 @@ fn bend(file: &File<'_>, primitive: &Primitive<'_>, joints: &[DMat4], vertices: 
     Ok(())
 }
 
-/// The matrix that takes normals along, whether or not `m` has an inverse; mirrored like `m` itself where it mirrors.
+/// The matrix of normals, for singular `m` too; mirrors if `m` does.
 pub(super) fn cofactors(m: &DMat3) -> DMat3 {
     let [x, y, z] = [m.x_axis, m.y_axis, m.z_axis];
     let sign = if m.determinant() < 0.0 { -1.0 } else { 1.0 };
     DMat3::from_cols(sign * y.cross(z), sign * z.cross(x), sign * x.cross(y))
 }
 
-/// What the vertices of a primitive make, by their positions in the list of vertices.
+/// The shapes of a primitive, by vertex indices.
 #[derive(Clone, Debug)]
 pub(super) enum Assembly {
     Points(Vec<u32>),
-    /// Segments, and whether the next one goes on where this one ends.
+    /// Segments, and whether the next one continues from this one's end.
     Segments(Vec<([u32; 2], bool)>),
     Triangles(Vec<[u32; 3]>),
 }
 
-/// Puts shapes together from a primitive's vertices. Shapes that are not there, or whose vertices are not finite, are an
-/// error; when lenient they are dropped with a warning.
+/// Assembles shapes from a primitive's vertices. Missing indices and vertices that are not finite are an error;
+/// when lenient, such shapes are dropped with a warning.
 pub(super) fn assemble(file: &File<'_>, primitive: &Primitive<'_>, positions: &[Vec3]) -> Read<Assembly> {
     if let Some(triangles) = listed_triangles(file, primitive, positions)? {
         return Ok(Assembly::Triangles(triangles));
@@ -560,7 +575,7 @@ pub(super) fn assemble(file: &File<'_>, primitive: &Primitive<'_>, positions: &[
     let count = listed.as_ref().map_or(positions.len(), |(_, indices)| indices.len());
     let count = primitive.mode.whole(count);
     let vertex = |i: usize| listed.as_ref().map_or(i as u32, |(_, indices)| indices[i][0]);
-    // As a rule every vertex is of use, which is soon seen of all at once.
+    // Usually every vertex is valid, which is quickly checked for all at once.
     let is_there = |&[i]: &[u32; 1]| (i as usize) < positions.len();
     let all_are_there =
         listed.as_ref().is_none_or(|(_, indices)| indices.par_iter().with_min_len(SHARE).all(is_there));
@@ -661,8 +676,7 @@ pub(super) fn assemble(file: &File<'_>, primitive: &Primitive<'_>, positions: &[
     Ok(assembly)
 }
 
-/// The triangles of a primitive whose indices list them one after another, where there is nothing wrong with any of
-/// them.
+/// The triangles of a primitive whose indices list them one after another, if all of them are valid.
 fn listed_triangles(
     file: &File<'_>,
     primitive: &Primitive<'_>,
@@ -681,7 +695,7 @@ fn listed_triangles(
     Ok(None)
 }
 
-/// Leaves out the vertices that no triangle uses, where these are many: exporters let parts of a mesh share one long list.
+/// Removes unused vertices if there are many: exporters let parts of a mesh share one long list.
 pub(super) fn compact(vertices: &mut Vertices, triangles: &mut [[u32; 3]]) {
     let count = vertices.positions.len();
     if triangles.len() * 3 >= count / 2 {
@@ -711,7 +725,7 @@ impl Vertices {
         }))
     }
 
-    /// Makes these its vertices: each by its present position.
+    /// Selects vertices by their old indices.
     pub(super) fn pick(&mut self, old: &[u32]) {
         fn pick<T: Copy>(old: &[u32], list: &mut Vec<T>) {
             *list = old.iter().map(|&i| list[i as usize]).collect();
@@ -738,7 +752,7 @@ impl Vertices {
     }
 }
 
-/// The length of the diagonal of the box around points.
+/// The diagonal of the bounding box of points.
 pub(super) fn diagonal(points: impl Iterator<Item = Vec3>) -> f64 {
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for p in points.filter(|p| p.is_finite()) {

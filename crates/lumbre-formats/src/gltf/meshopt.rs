@@ -5,10 +5,10 @@ use super::file::File;
 use super::json::{Read, Value};
 use crate::diagnostic::{Diagnostic, quoted};
 
-/// What can be wrong with compressed data.
+/// The message for invalid compressed data.
 type Decoded<T> = Result<T, &'static str>;
 
-/// The bytes of a buffer view, where it is compressed.
+/// The bytes of a compressed buffer view; `None` for others.
 pub(super) fn unpacked(file: &File<'_>, view: Value<'_>) -> Read<Option<Vec<u8>>> {
     let (value, generation) =
         match (view.extension("EXT_meshopt_compression")?, view.extension("KHR_meshopt_compression")?) {
@@ -28,7 +28,7 @@ pub(super) fn unpacked(file: &File<'_>, view: Value<'_>) -> Read<Option<Vec<u8>>
     let filter = value.string_at("filter")?.unwrap_or("NONE".into());
     let (packed, _, length) = file.buffer_slice(value)?;
 
-    // What so many bytes can become at most: nothing is allocated for more.
+    // The largest possible expansion: nothing is allocated for more.
     let (fits_stride, expected, most) = match &*mode {
         "ATTRIBUTES" => (
             stride.is_multiple_of(4) && stride <= 256,
@@ -104,8 +104,8 @@ enum Generation {
 }
 
 impl Generation {
-    /// The most bytes that one compressed byte can become: 256 elements without differences of 4 bytes take 4 bytes, or
-    /// with the control bytes of `Khr` 1.
+    /// The maximal expansion of one compressed byte: 256 elements of 4 bytes without differences take 4 bytes,
+    /// or 1 with the control bytes of `Khr`.
     fn most_bytes_of_one(self) -> u64 {
         match self {
             Self::Ext => 64,
@@ -120,7 +120,7 @@ fn put(bytes: &mut Vec<u8>, index: u32, stride: usize) {
 
 const SHORT: &str = "too few bytes";
 
-/// Bytes taken one after another.
+/// A reader of bytes.
 struct Bytes<'b> {
     rest: &'b [u8],
 }
@@ -136,7 +136,7 @@ impl<'b> Bytes<'b> {
         Ok(self.take(1)?[0])
     }
 
-    /// Seven bits a byte, the lowest first.
+    /// Seven bits per byte, the lowest first.
     fn variable(&mut self) -> Decoded<u32> {
         let mut value = 0;
         for i in 0..5 {
@@ -155,7 +155,8 @@ fn unzigzag(value: u32) -> u32 {
     (value >> 1) ^ (value & 1).wrapping_neg()
 }
 
-/// Mode 0: for blocks of elements, byte by byte of the element, differences in groups of 16 of so many bits each.
+/// Mode 0: blocks of elements, byte by byte of the element, as differences in groups of 16 of a fixed number of
+/// bits each.
 fn attributes(
     packed: &[u8],
     count: usize,
@@ -168,7 +169,7 @@ fn attributes(
         Some(0xA1) if generation == Generation::Khr => true,
         _ => return Err("a header that is not that of attributes"),
     };
-    // The element before the first, and how each four bytes of it differ from those of the next, are the last thing.
+    // The element before the first, and the difference mode of each four bytes, are at the end.
     let channels = if is_second { stride / 4 } else { 0 };
     let tail = (stride + channels).max(if is_second { 24 } else { 32 });
     let mut data = Bytes { rest: packed.get(1..packed.len().saturating_sub(tail)).ok_or(SHORT)? };
@@ -225,11 +226,11 @@ fn attributes(
 /// How four bytes of an element differ from those of the one before.
 #[derive(Clone, Copy, Debug)]
 enum Difference {
-    /// Each byte by itself.
+    /// Byte by byte.
     Bytes,
-    /// Two numbers of two bytes each.
+    /// As two 16-bit integers.
     Shorts,
-    /// By the bits that are not the same, rotated to the left by so many.
+    /// By the exclusive-or of the bits, rotated left by this much.
     Bits(u32),
 }
 
@@ -265,7 +266,8 @@ impl Difference {
     }
 }
 
-/// Sixteen numbers of 0, 1, 2, 4 or 8 bits; the largest of 1, 2 and 4 bits says that a byte behind them has the number.
+/// Sixteen numbers of 0, 1, 2, 4 or 8 bits; the largest of 1, 2 and 4 bits marks a number in a byte that
+/// follows.
 fn group_of_16(data: &mut Bytes<'_>, bits: usize, values: &mut [u8; 16]) -> Decoded<()> {
     if bits == 0 {
         *values = [0; 16];
@@ -279,7 +281,7 @@ fn group_of_16(data: &mut Bytes<'_>, bits: usize, values: &mut [u8; 16]) -> Deco
     let sentinel = (1 << bits) - 1;
     for (i, value) in values.iter_mut().enumerate() {
         let byte = packed[i * bits / 8];
-        // The first is in the highest bits, or of single bits in the lowest.
+        // The first is in the highest bits; of single bits, in the lowest.
         let shift = if bits == 1 { i % 8 } else { 8 - bits - i * bits % 8 };
         let number = byte >> shift & sentinel;
         *value = if number == sentinel { data.byte()? } else { number };
@@ -299,13 +301,13 @@ impl<T: Copy> Recent<T> {
         self.next = self.next.wrapping_add(1);
     }
 
-    /// 1 is the last one.
+    /// 1 is the most recent.
     fn back(&self, steps: usize) -> T {
         self.entries[self.next.wrapping_sub(steps) & 15]
     }
 }
 
-/// Mode 1: triangles by an edge and a vertex that were there before, or by new vertices.
+/// Mode 1: triangles by a recent edge and a recent vertex, or by new vertices.
 fn triangles(packed: &[u8], count: usize, mut put: impl FnMut(u32)) -> Decoded<()> {
     let (&header, rest) = packed.split_first().ok_or(SHORT)?;
     if header != 0xE1 {
@@ -346,7 +348,7 @@ fn triangles(packed: &[u8], count: usize, mut put: impl FnMut(u32)) -> Decoded<(
                 next = 0;
             }
             let (high, low) = (usize::from(pair >> 4), usize::from(pair & 15));
-            // Where each of the two others comes from; 15 is in the data, though not by the table.
+            // The sources of the other two vertices; 15 is in the data, although not in the table.
             let mut a = if explicit { 0 } else { fresh(&mut next) };
             let mut b = if high == 0 { fresh(&mut next) } else { vertices.back(high) };
             let mut c = if low == 0 { fresh(&mut next) } else { vertices.back(low) };
@@ -399,7 +401,7 @@ fn indices(packed: &[u8], count: usize, mut put: impl FnMut(u32)) -> Decoded<()>
     if data.rest.is_empty() { Ok(()) } else { Err("too many bytes") }
 }
 
-/// Unit vectors from x and y on the octahedron, where z says how large 1 is.
+/// Unit vectors from x and y on the octahedron, where z is the scale of 1.
 ///
 /// Cigolle and others, "A Survey of Efficient Representations for Independent Unit Vectors", JCGT 2014.
 fn octahedral(bytes: &mut [u8], stride: usize) {
@@ -427,7 +429,8 @@ fn octahedral(bytes: &mut [u8], stride: usize) {
     }
 }
 
-/// Unit quaternions without their largest component, which the two lowest bits of the fourth number name.
+/// Unit quaternions without their largest component, whose index is in the two lowest bits of the fourth
+/// number.
 fn quaternions(bytes: &mut [u8]) {
     for element in bytes.chunks_exact_mut(8) {
         let at = |i: usize| i16::from_le_bytes([element[2 * i], element[2 * i + 1]]);
@@ -446,7 +449,7 @@ fn rounded(v: f32) -> i16 {
     (v + if v >= 0.0 { 0.5 } else { -0.5 }) as i16
 }
 
-/// Floats from 24 bits of a whole number and 8 of an exponent.
+/// Floats from a 24-bit integer and an 8-bit exponent.
 fn exponential(bytes: &mut [u8]) {
     for element in bytes.chunks_exact_mut(4) {
         let bits = i32::from_le_bytes([element[0], element[1], element[2], element[3]]);
@@ -455,8 +458,9 @@ fn exponential(bytes: &mut [u8]) {
     }
 }
 
-/// Colours from brightness, orange against blue, and green against purple (H. S. Malvar, G. J. Sullivan, "YCoCg-R: A Color
-/// Space with RGB Reversibility and Low Dynamic Range", 2003), of as many bits as the fourth number says.
+/// Colours from luma, orange against blue, and green against purple (H. S. Malvar, G. J. Sullivan, "YCoCg-R: A
+/// Color Space with RGB Reversibility and Low Dynamic Range", 2003), with the number of bits in the fourth
+/// number.
 fn colours(bytes: &mut [u8], stride: usize) {
     for element in bytes.chunks_exact_mut(stride) {
         let raw = |i: usize| match stride {
@@ -468,7 +472,7 @@ fn colours(bytes: &mut [u8], stride: usize) {
             _ => i32::from(raw(i) as i16),
         };
         let coverage = i32::from(raw(3));
-        // All bits up to the highest; a fourth number of 0 is not valid and makes black.
+        // All bits up to the highest; a fourth number of 0 is invalid and makes black.
         let scale = if coverage == 0 { 1 } else { (2 << coverage.ilog2()) - 1 };
         let (y, co, cg) = (i32::from(raw(0)), signed(1), signed(2));
         let a = coverage & (scale >> 1);

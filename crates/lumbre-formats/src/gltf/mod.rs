@@ -1,15 +1,15 @@
 //! glTF 2.0 (Khronos, 2021), as JSON and as GLB, with its extensions.
 //!
-//! Everything in a file is checked, used or not: it is right or wrong as a whole. What glTF forbids though its meaning is
-//! plain is an error, and when lenient a warning. Errors name the place by its JSON pointer.
+//! Everything in a file is validated, used or not. A violation of glTF whose meaning is clear is an error, and
+//! a warning when lenient. Errors name the place by its JSON pointer.
 //!
-//! Light is photometric all through: radiance in nits, so that `emissiveFactor`, candelas and lux fit together at a
-//! factor of 1. Points and lines, which have no size, become spheres and cylinders whose radius is 0.4 % and 0.2 % of the
-//! diagonal of the box around the whole model, and less where there are very many; without a material and colours
-//! they are blue.
+//! Light is photometric: radiance is in nits, so that `emissiveFactor`, candelas and lux agree without a
+//! factor. Points and lines become spheres and cylinders with a radius of 0.4 % and 0.2 % of the diagonal of
+//! the model's bounding box, and less if there are very many; without a material and colours they are blue.
 
 mod accessor;
 mod animation;
+mod check;
 mod container;
 #[cfg(feature = "draco")]
 mod draco;
@@ -42,23 +42,22 @@ use crate::budget::Budget;
 use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, nearest_name, quoted};
 use crate::input::{Input, text};
 
-/// What to take out of a glTF.
+/// Options of reading a glTF.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct GltfOptions {
-    /// The time in seconds at which animations stand; `None` leaves them alone.
+    /// The time in seconds at which animations are evaluated; `None` ignores them.
     pub frame: Option<f64>,
-    /// The one animation to play, by its name or its position in the file. `None` plays all at once but for those that move
-    /// something which one before them moves.
+    /// The animation to play, by its name or its index. `None` plays all simultaneously, except those that
+    /// conflict with an earlier one.
     pub animation: Option<String>,
-    /// How long the shutter is open, in seconds, half of it before `frame` and half after; 0 for a moment. What animations
-    /// move by nodes meanwhile is seen moving.
+    /// The exposure in seconds, centred on `frame`; 0 for an instant. Animated nodes get motion blur.
     pub shutter: f64,
-    /// The material variant to wear (`KHR_materials_variants`).
+    /// The material variant (`KHR_materials_variants`).
     pub variant: Option<String>,
 }
 
-/// The extensions that are read.
+/// The supported extensions.
 const SUPPORTED: &[&str] = &[
     "EXT_lights_ies",
     "EXT_mesh_gpu_instancing",
@@ -90,10 +89,9 @@ const SUPPORTED: &[&str] = &[
     "KHR_texture_transform",
 ];
 
-/// Reads the glTF or GLB file `path`; other files that it names are looked for from its folder.
+/// Reads the glTF or GLB file `path`; other files are found relative to its folder.
 ///
-/// # Errors
-/// As [`Input::open`] and [`read_gltf`].
+/// As for [`Input::open`] and [`read_gltf`].
 pub fn open_gltf(
     path: &Path,
     options: &GltfOptions,
@@ -105,11 +103,10 @@ pub fn open_gltf(
     read_gltf(&input, input.name(), folder, options, budget, diagnostics)
 }
 
-/// Reads a glTF or a GLB from the bytes of its file. Other files that it names are looked for from `folder`.
+/// Reads a glTF or a GLB from the bytes of its file. Other files are found relative to `folder`.
 ///
-/// # Errors
-/// [`FormatError::Input`] with the JSON pointer where the file is wrong or needs an extension that is not known,
-/// [`FormatError::Limit`], and [`FormatError::Io`] for files that it names.
+/// [`FormatError::Input`] with the JSON pointer where the file is invalid or requires an unknown extension,
+/// [`FormatError::Limit`], and [`FormatError::Io`] for other files.
 pub fn read_gltf(
     bytes: &[u8],
     name: &Arc<str>,
@@ -171,7 +168,7 @@ fn read(
     scene
 }
 
-/// The text with the numbers that animations by pointers change, as they stand at a time; none where there are none.
+/// The JSON with the values that animations change by pointers at a time; `None` if there are none.
 #[expect(clippy::too_many_arguments, reason = "what the file is, and what is asked of it")]
 fn animated(
     json: &Json<'_>,
@@ -183,7 +180,7 @@ fn animated(
     binary: Option<&[u8]>,
     is_glb: bool,
 ) -> Read<Option<String>> {
-    // What is loaded for this is dropped again, and what is wrong is said when the whole is read.
+    // This load is temporary, and errors are reported when the whole is read.
     let own = Budget::new(*budget.limits());
     let root = json.root().object()?;
     let mut file = File::new(root, name, folder, &own, Diagnostics::default());
@@ -197,7 +194,7 @@ fn animated(
     Ok(Some(text))
 }
 
-/// That the file is of a version that is read: 2, whatever comes behind the point, unless it needs more.
+/// Checks that the file's version is supported: 2, with any minor version unless it requires more.
 fn version(root: Value<'_>) -> Read<()> {
     let asset = root.need("asset")?;
     let needed = asset.get("minVersion")?;
@@ -213,7 +210,7 @@ fn version(root: Value<'_>) -> Read<()> {
     Ok(())
 }
 
-/// Refuses what needs extensions that are not known, and warns of others.
+/// Rejects unknown required extensions, and warns of other unknown ones.
 fn extensions(file: &File<'_>, root: Value<'_>) -> Read<()> {
     let mut required = vec![];
     if let Some(list) = root.get("extensionsRequired")? {
@@ -252,7 +249,7 @@ fn extensions(file: &File<'_>, root: Value<'_>) -> Read<()> {
     places(file, root)
 }
 
-/// Where the objects of extensions may stand: pointers with `*` for positions.
+/// The objects in which extensions may appear: pointers with `*` for indices.
 const PLACES: &[(&str, &[&str])] = &[
     ("EXT_lights_ies", &["", "/nodes/*"]),
     ("EXT_mesh_gpu_instancing", &["/nodes/*"]),
@@ -268,10 +265,10 @@ const PLACES: &[(&str, &[&str])] = &[
     ("KHR_materials_", &["/materials/*"]),
 ];
 
-/// Checks that the objects of the extensions that are known stand where they belong: elsewhere they would say nothing.
+/// Checks that known extensions appear where they belong: elsewhere they would have no effect.
 fn places(file: &File<'_>, root: Value<'_>) -> Read<()> {
     let mut path = String::new();
-    // What is being looked through, with the length of its path.
+    // The containers being searched, with the length of their paths.
     let mut open: Vec<(usize, Box<dyn Iterator<Item = Inside<'_>> + '_>)> =
         vec![(0, Box::new(root.inside()))];
     while let Some((length, items)) = open.last_mut() {
@@ -311,10 +308,10 @@ fn place(file: &File<'_>, path: &str, extension: &str, object: Value<'_>) -> Rea
     Ok(())
 }
 
-/// What compressed data may become whatever their ratio: a few bytes can stand for millions of vertices.
+/// Compressed data may expand to this size at any ratio: a few bytes can represent millions of vertices.
 const FREE_EXPANSION: u64 = 8 << 20;
 
-/// Refuses compressed data that would become too much.
+/// Rejects compressed data of too large an expansion.
 fn check_expansion(file: &File<'_>, value: Value<'_>, packed: u64, unpacked: u64) -> Read<()> {
     let limit = file.budget.limits().expansion;
     if unpacked <= FREE_EXPANSION.max(packed.saturating_mul(limit)) {

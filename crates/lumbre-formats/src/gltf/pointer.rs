@@ -1,23 +1,24 @@
-//! Numbers anywhere in a glTF that animations change (`KHR_animation_pointer`, Khronos, 2025): the text with them as they
-//! stand at one time. Whatever reads the text afterwards need not know.
+//! Numbers anywhere in a glTF that animations change (`KHR_animation_pointer`, Khronos, 2025): the JSON is
+//! edited to the values at one time, before it is interpreted.
 
 use std::collections::BTreeMap;
 
 use super::json::{Read, Value};
 
-/// Members of the top level below which numbers may be animated.
+/// Top-level members that may contain animated numbers.
 const ROOTS: [&str; 5] = ["cameras", "extensions", "materials", "meshes", "nodes"];
-/// More steps than any number of glTF has above it.
+/// An upper bound on the depth of any number in glTF.
 const DEEPEST: usize = 10;
 
-/// Whether an animation of what this pointer names is played: a number, or a list of them, that glTF lets change.
+/// Whether an animation of this pointer's value is played: a number, or a list of numbers, that glTF lets
+/// change.
 pub(super) fn is_played(pointer: &str) -> bool {
     let Some(path) = pointer.strip_prefix('/') else { return false };
     let steps: Vec<&str> = path.split('/').collect();
     steps.len() >= 3 && steps.len() <= DEEPEST && ROOTS.contains(&steps[0]) && !steps.contains(&"")
 }
 
-/// Whether there is a place for the numbers that a pointer names: they are there, or an object to which they can be added.
+/// Whether the value of a pointer exists, or its object does, to which it can be added.
 pub(super) fn has_place(root: Value<'_>, pointer: &str) -> Read<bool> {
     let mut here = root;
     for step in pointer.split('/').skip(1) {
@@ -29,7 +30,7 @@ pub(super) fn has_place(root: Value<'_>, pointer: &str) -> Read<bool> {
     Ok(true)
 }
 
-/// What a step leads to: a member of an object, or an element of a list.
+/// The value that a step leads to: a member of an object, or an element of a list.
 fn inside<'a>(value: Value<'a>, step: &str) -> Read<Option<Value<'a>>> {
     if value.object().is_ok() {
         return value.get(step);
@@ -40,12 +41,12 @@ fn inside<'a>(value: Value<'a>, step: &str) -> Read<Option<Value<'a>>> {
     })
 }
 
-/// A step as it is meant.
+/// A step with escapes resolved.
 fn unescaped(step: &str) -> String {
     step.replace("~1", "/").replace("~0", "~")
 }
 
-/// Numbers by the pointers that they are to stand at, which have passed [`is_played`].
+/// Values by pointers, which have passed [`is_played`].
 #[derive(Debug, Default)]
 pub(super) struct Changes {
     top: Change,
@@ -58,9 +59,10 @@ struct Change {
 }
 
 impl Changes {
-    /// Sets numbers: a list, or one by itself. False, and nothing changes, when they are set already or a part of what is.
+    /// Sets a list of numbers, or a single one. False, and nothing changes, if they or a part of them are
+    /// already set.
     pub(super) fn set(&mut self, pointer: &str, numbers: &[f64], is_list: bool) -> bool {
-        // In the precision that they were stored in: a factor between two of 1 is 1.
+        // In the precision that they were stored in, so that a factor between two of 1 is 1.
         let texts: Vec<String> = numbers.iter().map(|n| format!("{}", *n as f32)).collect();
         let text = if is_list { format!("[{}]", texts.join(",")) } else { texts.concat() };
         let mut here = &mut self.top;
@@ -77,17 +79,16 @@ impl Changes {
         true
     }
 
-    /// Whether nothing was set.
+    /// Whether nothing is set.
     pub(super) fn is_empty(&self) -> bool {
         self.top.inside.is_empty()
     }
 
-    /// The text that `root` is the whole of, with the changes.
+    /// The text of `root` with the changes.
     ///
-    /// # Errors
-    /// Where members stand twice.
+    /// When a member occurs twice.
     pub(super) fn apply(&self, root: Value<'_>) -> Read<String> {
-        // Ranges of the text and what goes there instead.
+        // Ranges of the text, with their replacements.
         let mut edits: Vec<(std::ops::Range<usize>, String)> = vec![];
         let mut open = vec![(&self.top, root)];
         while let Some((change, value)) = open.pop() {
@@ -127,7 +128,7 @@ impl Changes {
 }
 
 impl Change {
-    /// What is new altogether. Pointers are short, and so this is not deep.
+    /// A new value. Pointers are short, so the recursion is shallow.
     fn written(&self) -> String {
         if let Some(text) = &self.text {
             return text.clone();
@@ -138,7 +139,7 @@ impl Change {
     }
 }
 
-/// A string of JSON.
+/// A JSON string.
 fn quoted(text: &str) -> String {
     let mut out = String::from('"');
     for c in text.chars() {

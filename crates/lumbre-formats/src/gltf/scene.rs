@@ -1,4 +1,4 @@
-//! From the nodes of a glTF to a scene: shapes where they stand, meshes of several nodes as objects.
+//! From the nodes of a glTF to a scene: placed shapes, with meshes of several nodes as instanced objects.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -12,34 +12,34 @@ use lumbre_scene::{
     MeshMotion, ObjectDesc, ObjectId, Placement, SceneDesc, ShapeDesc, WithoutLight,
 };
 
-use super::accessor::{self, Accessor, Component, Element};
+use super::accessor::{Accessor, Component, Element};
 use super::animation::Playing;
+use super::check::check;
 use super::exposure::Exposure;
 use super::file::{File, List};
 use super::graph::Graph;
 use super::ies::Profiles;
 use super::json::{Read, Value};
-use super::material::GltfMaterial;
 use super::mesh::{self, Assembly, Pose, Primitive, Vertices};
 use super::shade::{Dressing, Materials};
-use super::texture::{Textures, UvSets};
+use super::texture::UvSets;
 use super::{GltfOptions, animation, tangents};
 use crate::diagnostic::{Diagnostic, quoted};
 
-/// Radius of points, and of lines, as a share of the diagonal of the box around the whole model; and no more than this share
-/// of it over the root of how many there are, so that clouds stay clouds.
+/// The radius of points and of lines, relative to the diagonal of the model's bounding box; and the maximal
+/// radius, relative to the diagonal over the square root of their number, so that clouds stay clouds.
 const POINT_RADIUS: f64 = 0.004;
 const LINE_RADIUS: f64 = 0.002;
 const MOST_RADIUS_OF_MANY: f64 = 0.5;
 
-/// Bounces at most: a ray goes in and out of every piece of glass that it meets.
+/// The maximal path length: every piece of glass takes two bounces.
 const MAX_DEPTH: u32 = 16;
 
-/// Shapes that shine are not put into objects, unless there are more copies than this: light from inside an object is only
-/// found by chance.
+/// Emissive shapes are not instanced, unless there are more copies than this: lights inside objects are not
+/// sampled.
 const MOST_COPIES_OF_LIGHTS: usize = 64;
 
-/// Reads everything that a glTF says.
+/// Reads the whole glTF.
 pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
     let variant = variant(file, options)?;
     let playing = Playing::read(file, options)?;
@@ -88,7 +88,7 @@ pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
             Some(extension) => instances(file, extension)?,
             None => vec![DAffine3::IDENTITY],
         };
-        // A skin says where its vertices are.
+        // A skin determines where its vertices are.
         let is_bent = skin.is_some() && value.extension("EXT_mesh_gpu_instancing")?.is_none();
         let stands = |copy: &DAffine3| if is_bent { DAffine3::IDENTITY } else { *world * *copy };
         let worlds: Vec<DAffine3> = copies.iter().map(stands).collect();
@@ -136,13 +136,13 @@ fn carried(light: LightDesc, motion: Option<Arc<AnimatedTransform>>) -> LightDes
     }
 }
 
-/// A mesh in a pose: what several nodes may share.
+/// A mesh in a pose, which several nodes may share.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 struct Key {
     mesh: usize,
-    /// Bits of the weights of its morph targets, none where all are 0.
+    /// The bits of the weights of its morph targets; empty where all are 0.
     weights: Vec<u64>,
-    /// The node of a mesh with a skin or a form that changes, which it shares with no other.
+    /// The node, for a mesh that is skinned or deforms and so cannot be shared.
     owner: Option<usize>,
 }
 
@@ -151,7 +151,7 @@ struct Placed {
     node: usize,
     skin: Option<usize>,
     worlds: Vec<DAffine3>,
-    /// How each of these moves; none where nothing does.
+    /// The motion of each of these; empty if nothing moves.
     motions: Vec<Option<Arc<AnimatedTransform>>>,
 }
 
@@ -161,8 +161,8 @@ impl Placed {
     }
 }
 
-/// The length of the diagonal of the box around all that is placed, as accessors say where their vertices are, before skins and
-/// morph targets; 0 where they say nothing.
+/// The diagonal of the bounding box of everything placed, from the bounds of accessors, before skins and morph
+/// targets; 0 without bounds.
 fn size(file: &File<'_>, places: &[Placed]) -> Read<f64> {
     let mut of_meshes: HashMap<usize, Vec<[DVec3; 2]>> = HashMap::new();
     let mut corners = vec![];
@@ -186,7 +186,7 @@ fn size(file: &File<'_>, places: &[Placed]) -> Read<f64> {
                 [center - reach, center + reach]
             });
             corners.extend(ends.flatten());
-            // Two say as much as many.
+            // Two corners suffice.
             if corners.len() > 2 {
                 let start = corners.iter().copied().fold(DVec3::INFINITY, DVec3::min);
                 let end = corners.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
@@ -200,7 +200,7 @@ fn size(file: &File<'_>, places: &[Placed]) -> Read<f64> {
     })
 }
 
-/// The variant that is asked for, by its position.
+/// The requested variant, by its index.
 fn variant(file: &File<'_>, options: &GltfOptions) -> Read<Option<usize>> {
     let Some(wanted) = &options.variant else { return Ok(None) };
     let mut names = vec![];
@@ -217,7 +217,7 @@ fn variant(file: &File<'_>, options: &GltfOptions) -> Read<Option<usize>> {
     Err(wrong.expected(expected).suggest(wanted, names.iter().map(String::as_str)).into())
 }
 
-/// The nodes at the top of the scene to show.
+/// The root nodes of the scene to show.
 fn roots(file: &File<'_>, graph: &Graph<'_>) -> Read<Vec<usize>> {
     let scenes = file.list(List::Scenes);
     let scene = match file.named(List::Scenes, file.root, "scene")? {
@@ -234,188 +234,8 @@ pub(super) fn weights(graph: &Graph<'_>, node: usize) -> Read<Vec<f64>> {
     Ok(graph.weights(node)?.filter(|weights| weights.iter().any(|&w| w != 0.0)).unwrap_or_default())
 }
 
-/// Checks everything that the scene may not come to use, so that a file is right or wrong as a whole.
-fn check(file: &File<'_>, graph: &Graph<'_>) -> Read<()> {
-    for (index, &view) in file.list(List::BufferViews).iter().enumerate() {
-        file.view_at(index, view)?;
-    }
-    for (index, &value) in file.list(List::Accessors).iter().enumerate() {
-        if accessor::is_known(value)? {
-            Accessor::at(file, index)?;
-        } else {
-            file.warn(value, "accessor of an unknown kind was left out");
-        }
-    }
-    for &image in file.list(List::Images) {
-        Textures::check_image(file, image)?;
-    }
-    for &texture in file.list(List::Textures) {
-        Textures::check(file, texture)?;
-    }
-    let mut used_as: HashMap<usize, bool> = HashMap::new();
-    let mut materials = vec![];
-    for &material in file.list(List::Materials) {
-        // As many sets of texture coordinates as its textures need.
-        let read = GltfMaterial::read(file, material)?;
-        materials.push(read.textures().map(|t| t.uv_set + 1).max().unwrap_or(0));
-    }
-    for &mesh in file.list(List::Meshes) {
-        check_mesh(file, mesh, &materials, &mut used_as)?;
-    }
-    for &camera in file.list(List::Cameras) {
-        self::camera(camera, camera, &DAffine3::IDENTITY)?;
-    }
-    for &light in file.list(List::Lights) {
-        self::light(file, light, &DAffine3::IDENTITY)?;
-    }
-    for &profile in file.list(List::Profiles) {
-        Profiles::check(file, profile)?;
-    }
-    for &skin in file.list(List::Skins) {
-        check_skin(file, skin)?;
-    }
-    for (index, &node) in file.list(List::Nodes).iter().enumerate() {
-        check_node(file, graph, index, node)?;
-    }
-    file.named(List::Scenes, file.root, "scene")?;
-    for &scene in file.list(List::Scenes) {
-        let Some(nodes) = scene.get("nodes")? else { continue };
-        let mut met = std::collections::HashSet::new();
-        for name in nodes.array()? {
-            let (node, _) = file.at(List::Nodes, name)?;
-            if graph.is_child(node) {
-                file.breach(name.wrong("scene with a node that hangs on another").found(node))?;
-            }
-            if !met.insert(node) {
-                return Err(name.wrong("scene with the same node twice").found(node).into());
-            }
-        }
-        if met.is_empty() {
-            file.breach(nodes.wrong("empty list").expected("one node or more, or no list"))?;
-        }
-    }
-    Ok(())
-}
-
-fn check_mesh(
-    file: &File<'_>,
-    mesh: Value<'_>,
-    materials: &[usize],
-    used_as: &mut HashMap<usize, bool>,
-) -> Read<()> {
-    let primitives = mesh.need("primitives")?;
-    let mut targets: Option<usize> = None;
-    let mut count = 0;
-    for value in primitives.array()? {
-        count += 1;
-        let primitive = Primitive::read(file, value, None)?;
-        let wanted = primitive.material.map_or(0, |material| materials[material]);
-        let found = primitive.attributes.uvs.len();
-        if found < wanted {
-            let wrong = value.wrong("texture coordinates that the material needs are missing");
-            file.breach(wrong.found(format!("{found} sets")).expected(format!("{wanted} sets")))?;
-        }
-        if *targets.get_or_insert(primitive.targets.len()) != primitive.targets.len() {
-            let wrong = value.wrong("primitives with different numbers of morph targets");
-            file.breach(wrong.found(primitive.targets.len()).expected(targets.unwrap_or(0)))?;
-        }
-        for (accessor, as_indices) in primitive.accessors() {
-            let Some((view, _)) = accessor.view else { continue };
-            let before = used_as.entry(view).or_insert(as_indices);
-            let said = match file.list(List::BufferViews)[view].get("target")? {
-                Some(target) => Some(target.whole(0)? == 34963),
-                None => None,
-            };
-            if *before != as_indices || said.is_some_and(|said| said != as_indices) {
-                file.breach(
-                    accessor.value.wrong("buffer view for indices and for vertices at once").found(view),
-                )?;
-            }
-        }
-    }
-    if count == 0 {
-        file.breach(primitives.wrong("empty list").expected("one primitive or more"))?;
-    }
-    if let Some(weights) = mesh.get("weights")? {
-        check_weights(file, weights, targets.unwrap_or(0))?;
-    }
-    Ok(())
-}
-
-fn check_weights(file: &File<'_>, weights: Value<'_>, targets: usize) -> Read<()> {
-    let mut count = 0;
-    for weight in weights.array()? {
-        weight.number()?;
-        count += 1;
-    }
-    if count != targets {
-        let wrong = weights.wrong("as many weights as morph targets are needed").found(count);
-        file.breach(wrong.expected(targets))?;
-    }
-    Ok(())
-}
-
-fn check_skin(file: &File<'_>, skin: Value<'_>) -> Read<()> {
-    let list = skin.need("joints")?;
-    let mut joints = 0;
-    for joint in list.array()? {
-        file.at(List::Nodes, joint)?;
-        joints += 1;
-    }
-    if joints == 0 {
-        file.breach(list.wrong("empty list").expected("one joint or more"))?;
-    }
-    file.named(List::Nodes, skin, "skeleton")?;
-    if let Some(name) = skin.get("inverseBindMatrices")? {
-        let matrices = Accessor::named(file, name)?;
-        matrices.expect(name, &[Element::Mat4], &[Component::F32])?;
-        if matrices.count < joints {
-            let wrong = name.wrong("skin with too few matrices").found(matrices.count);
-            return Err(wrong.expected(format!("{joints}, one for each joint")).into());
-        }
-    }
-    Ok(())
-}
-
-fn check_node(file: &File<'_>, graph: &Graph<'_>, index: usize, node: Value<'_>) -> Read<()> {
-    graph.local(index)?;
-    let mesh = file.named(List::Meshes, node, "mesh")?;
-    file.named(List::Cameras, node, "camera")?;
-    let skin = file.named(List::Skins, node, "skin")?;
-    if let Some(extension) = node.extension("KHR_lights_punctual")? {
-        file.at(List::Lights, extension.need("light")?)?;
-    }
-    if let Some(extension) = node.extension("EXT_lights_ies")? {
-        Profiles::instance(file, extension)?;
-    }
-    let Some((_, mesh)) = mesh else {
-        for name in ["skin", "weights"] {
-            if let Some(value) = node.get(name)? {
-                file.breach(value.wrong(format!("node with {} and without a mesh", quoted(name))))?;
-            }
-        }
-        return Ok(());
-    };
-    if let Some(weights) = node.get("weights")? {
-        check_weights(file, weights, animation::targets(file, node)?)?;
-    }
-    let mut skinned = 0;
-    let mut primitives = 0;
-    for primitive in mesh.need("primitives")?.array()? {
-        primitives += 1;
-        skinned += usize::from(primitive.need("attributes")?.get("JOINTS_0")?.is_some());
-    }
-    if skin.is_some() && skinned < primitives {
-        file.breach(node.need("skin")?.wrong("skin on a mesh without joints"))?;
-    }
-    if skin.is_none() && skinned > 0 {
-        file.warn(node, "mesh with joints on a node without a skin stands as it is");
-    }
-    Ok(())
-}
-
-/// Where the copies of a node's mesh stand in the space of the node (`EXT_mesh_gpu_instancing`).
-fn instances(file: &File<'_>, extension: Value<'_>) -> Read<Vec<DAffine3>> {
+/// The transforms of the copies of a node's mesh, in node space (`EXT_mesh_gpu_instancing`).
+pub(super) fn instances(file: &File<'_>, extension: Value<'_>) -> Read<Vec<DAffine3>> {
     let attributes = extension.need("attributes")?;
     let mut count: Option<usize> = None;
     let mut parts: [Option<Accessor<'_>>; 3] = [None; 3];
@@ -467,19 +287,19 @@ fn instances(file: &File<'_>, extension: Value<'_>) -> Read<Vec<DAffine3>> {
     Ok(worlds)
 }
 
-/// What grows while meshes are placed.
+/// The state of placing meshes.
 struct Builder<'f> {
     file: &'f File<'f>,
     graph: &'f Graph<'f>,
     variant: Option<usize>,
     materials: Materials<'f>,
-    /// Where joints stand.
+    /// The transforms of joints.
     known: HashMap<usize, DAffine3>,
     exposure: Exposure<'f>,
-    /// Meshes that stand in more than one place: their objects, and the parts that shine.
+    /// Meshes with several placements: their objects, and their emissive parts.
     objects: HashMap<Key, (Option<ObjectId>, Vec<ShapeDesc>)>,
     next_shape: u32,
-    /// That of the whole model: see [`size`].
+    /// The size of the whole model: see [`size`].
     size: f64,
 }
 
@@ -546,7 +366,7 @@ impl Builder<'_> {
         index
     }
 
-    /// Puts shapes into the world.
+    /// Places shapes in the world.
     fn stand(
         &mut self,
         scene: &mut SceneDesc,
@@ -562,7 +382,7 @@ impl Builder<'_> {
                 scene.shapes.extend(shapes.into_iter().map(|shape| ShapeDesc { world_from_object, ..shape }));
             }
             Err(_) => {
-                // Flattened, it may still be seen; squeezed into a line or a point it is nothing.
+                // A flattened mesh may still be visible; one collapsed to a line or a point is not.
                 let node = self.file.list(List::Nodes)[place.node];
                 self.file.warn(node, "what a node without an inverse holds is flattened or left out");
                 scene.shapes.extend(shapes.into_iter().filter_map(|shape| flattened(shape, world)));
@@ -571,7 +391,7 @@ impl Builder<'_> {
         Ok(())
     }
 
-    /// The shapes of a mesh in its own space, or in the world if it has a skin.
+    /// The shapes of a mesh in mesh space, or in the world if it is skinned.
     fn shapes(&mut self, place: &Placed) -> Read<Vec<ShapeDesc>> {
         let file = self.file;
         let joints = place.skin.map(|skin| joints(file, self.graph, &mut self.known, skin)).transpose()?;
@@ -628,7 +448,7 @@ impl Builder<'_> {
                     }
                 }
                 thin => {
-                    // In the space of the mesh, as large as in the world.
+                    // In mesh space, for a constant size in the world.
                     let scale =
                         place.worlds.first().map_or(1.0, |world| world.matrix3.determinant().abs().cbrt());
                     let each =
@@ -644,7 +464,7 @@ impl Builder<'_> {
     }
 }
 
-/// Where the joints of a skin take the vertices of a mesh.
+/// The skinning matrices of a mesh.
 pub(super) fn joints(
     file: &File<'_>,
     graph: &Graph<'_>,
@@ -672,7 +492,7 @@ pub(super) fn joints(
     Ok(joints)
 }
 
-/// Puts shapes that move into the world: in an object of their own.
+/// Places moving shapes in the world, in an object of their own.
 fn move_about(scene: &mut SceneDesc, shapes: Vec<ShapeDesc>, motion: Arc<AnimatedTransform>) {
     if shapes.is_empty() {
         return;
@@ -682,7 +502,7 @@ fn move_about(scene: &mut SceneDesc, shapes: Vec<ShapeDesc>, motion: Arc<Animate
     scene.instances.push(InstanceDesc { object, world_from_object: Placement::Moving(motion) });
 }
 
-/// A mesh as scenes have it; `None` without triangles.
+/// The mesh of a scene; `None` without triangles.
 fn mesh_of(mut vertices: Vertices, triangles: Vec<[u32; 3]>, dressing: &Dressing) -> Option<MeshDesc> {
     if triangles.is_empty() {
         return None;
@@ -711,7 +531,7 @@ fn mesh_of(mut vertices: Vertices, triangles: Vec<[u32; 3]>, dressing: &Dressing
             (Some(list.into_iter().map(|(colour, _)| colour).collect::<Vec<Rgb>>()), coverages)
         }
     };
-    // Tangents without normals have nothing to stand on.
+    // Tangents without normals are meaningless.
     let tangents = vertices.normals.is_some().then_some(vertices.tangents).flatten();
     Some(MeshDesc {
         positions: vertices.positions,
@@ -732,8 +552,8 @@ fn mesh_of(mut vertices: Vertices, triangles: Vec<[u32; 3]>, dressing: &Dressing
     })
 }
 
-/// Points as spheres; lines as capped cylinders, with spheres where one goes on as the next; each with the two vertices that it
-/// lies between. `size` is that of the whole model, which the primitive itself stands for where there is none.
+/// Points as spheres; lines as capped cylinders, with spheres where one continues as the next; each with its
+/// two vertices. `size` is that of the whole model, or 0 to use the primitive's own.
 fn thin_shapes(positions: &[Vec3], assembly: &Assembly, size: f64) -> Vec<(Shape, [u32; 2])> {
     let at = |i: u32| positions[i as usize].as_dvec3();
     let is_size = |size: &f64| *size > 0.0 && size.is_finite();
@@ -750,7 +570,7 @@ fn thin_shapes(positions: &[Vec3], assembly: &Assembly, size: f64) -> Vec<(Shape
             let radius = radius(LINE_RADIUS, segments.len());
             let mut shapes = vec![];
             for &([a, b], goes_on) in segments {
-                // A segment without length is no line.
+                // A segment of length zero is dropped.
                 shapes.extend(Cylinder::new(at(a), at(b), radius, true).ok().map(|s| (s.into(), [a, b])));
                 if goes_on {
                     shapes.extend(Sphere::new(at(b), radius).ok().map(|s| (s.into(), [b, b])));
@@ -762,7 +582,7 @@ fn thin_shapes(positions: &[Vec3], assembly: &Assembly, size: f64) -> Vec<(Shape
     }
 }
 
-/// A mesh moved by a map without an inverse; `None` where nothing is left to see.
+/// A mesh under a singular map; `None` where nothing remains visible.
 fn flattened(shape: ShapeDesc, world: &DAffine3) -> Option<ShapeDesc> {
     let GeometryDesc::Mesh(mesh) = &shape.geometry else { return None };
     let has_area = mesh::cofactors(&world.matrix3).to_cols_array().iter().any(|&n| n != 0.0);
@@ -773,7 +593,7 @@ fn flattened(shape: ShapeDesc, world: &DAffine3) -> Option<ShapeDesc> {
     for p in &mut mesh.positions {
         *p = world.transform_point3(p.as_dvec3()).as_vec3();
     }
-    // All normals come to lie across the plane, whichever way they looked.
+    // All normals are perpendicular to the plane.
     (mesh.normals, mesh.tangents) = (None, None);
     Some(ShapeDesc {
         geometry: GeometryDesc::Mesh(Arc::new(mesh)),
@@ -782,7 +602,7 @@ fn flattened(shape: ShapeDesc, world: &DAffine3) -> Option<ShapeDesc> {
     })
 }
 
-/// The rotation and the place of something whose size does not follow its node's.
+/// The rotation and translation of something that is not scaled with its node.
 fn rigid(world: &DAffine3) -> DAffine3 {
     let [x, y, z] = [world.matrix3.x_axis, world.matrix3.y_axis, world.matrix3.z_axis];
     let z = z.try_normalize().unwrap_or(DVec3::Z);
@@ -794,8 +614,8 @@ fn rigid(world: &DAffine3) -> DAffine3 {
     DAffine3 { matrix3: DMat3::from_cols(right, y, z), translation: world.translation }
 }
 
-/// A camera. Those of glTF look along -z, with x to the right and y up.
-fn camera(camera: Value<'_>, node: Value<'_>, world: &DAffine3) -> Read<Camera> {
+/// A camera. In glTF it looks along -z, with x to the right and y up.
+pub(super) fn camera(camera: Value<'_>, node: Value<'_>, world: &DAffine3) -> Read<Camera> {
     let name = match camera.string_at("name")? {
         Some(name) => Some(name),
         None => node.string_at("name")?,
@@ -813,7 +633,7 @@ fn camera(camera: Value<'_>, node: Value<'_>, world: &DAffine3) -> Read<Camera> 
             let fov = lens.number_or("yfov", 1.0, 1e-6..=most)?;
             let aspect =
                 lens.get("aspectRatio")?.map(|_| lens.number_or("aspectRatio", 1.0, above)).transpose()?;
-            // Ours is along the shorter side.
+            // Our field of view is that of the shorter side.
             let slope = (0.5 * fov).tan() * aspect.unwrap_or(1.0).min(1.0);
             let fov = (2.0 * slope.atan()).to_degrees();
             (CameraKind::Perspective { fov, lens_radius: 0.0, focal_distance: 1.0 }, None)
@@ -854,7 +674,7 @@ fn camera(camera: Value<'_>, node: Value<'_>, world: &DAffine3) -> Read<Camera> 
     })
 }
 
-/// Width over height of the picture that a camera asks for.
+/// The aspect ratio, width over height, that a camera specifies.
 fn aspect(camera: Value<'_>) -> Read<Option<f64>> {
     if let Some(lens) = camera.get("perspective")? {
         return lens.get("aspectRatio")?.map(Value::number).transpose();
@@ -864,16 +684,16 @@ fn aspect(camera: Value<'_>) -> Read<Option<f64>> {
     Ok(Some(aspect.abs()))
 }
 
-/// About as many pixels as 1280 × 720, of this shape.
+/// About as many pixels as 1280 × 720, with this aspect ratio.
 fn size_of_picture(aspect: f64) -> (Option<u32>, Option<u32>) {
     let aspect = aspect.clamp(0.05, 20.0);
     let height = (1280.0 * 720.0 / aspect).sqrt();
     (Some((height * aspect).round() as u32), Some(height.round() as u32))
 }
 
-/// A light (`KHR_lights_punctual`): a candela is a unit of radiant intensity, a lux one of irradiance, and so a nit one of
-/// radiance, which is that of `emissiveFactor`. They shine along -z. `None` for a kind that is not known.
-fn light(file: &File<'_>, light: Value<'_>, world: &DAffine3) -> Read<Option<LightDesc>> {
+/// A light (`KHR_lights_punctual`), aimed along -z: candelas for radiant intensity and lux for irradiance agree
+/// with nits for radiance, the unit of `emissiveFactor`. `None` for an unknown kind.
+pub(super) fn light(file: &File<'_>, light: Value<'_>, world: &DAffine3) -> Read<Option<LightDesc>> {
     let unit = 0.0..=1.0;
     let positive = 0.0..=f64::INFINITY;
     let [r, g, b] = light.numbers_or("color", [1.0; 3], unit)?;

@@ -1,4 +1,4 @@
-//! From the materials of a glTF to ours. What ours cannot say is left out, and a warning lists it.
+//! From glTF materials to ours. Unsupported parameters are ignored and listed in a warning.
 
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -17,28 +17,28 @@ use super::json::Read;
 use super::material::{AlphaMode, GltfMaterial, TextureRef};
 use super::texture::{Textures, UvSets, ours};
 
-/// All that a material gives to a shape.
+/// Everything that a material contributes to a shape.
 #[derive(Clone, Debug)]
 pub(super) struct Dressing {
-    /// What it is made of.
+    /// The material.
     pub material: MaterialId,
-    /// How much of it covers what is behind.
+    /// The alpha.
     pub alpha: Option<Arc<FloatTexture>>,
-    /// The light that it gives.
+    /// The emission.
     pub area_light: Option<AreaLightDesc>,
-    /// The texture coordinates that it wants; `None` when it has no textures.
+    /// The uv sets that it uses; `None` without textures.
     pub sets: Option<UvSets>,
-    /// The set by which it wants tangents, if it wants any.
+    /// The uv set for tangents, if it needs tangents.
     pub tangents: Option<usize>,
 }
 
-/// Its position in the file, whether vertices have colours, and whether it is [`INK`].
+/// The index in the file, whether vertices have colours, and whether it is [`INK`].
 type MaterialKey = (Option<usize>, bool, bool);
 
-/// The colour of points and lines that have no material and no colours: glTF's white would not be seen on paper, nor black in the dark.
+/// The colour of points and lines without material and colours: visible on white and on black.
 const INK: Rgb = Rgb::new(0.02, 0.08, 0.3);
 
-/// The materials of a file, each made when it is first asked for.
+/// The materials of a file, converted on first use.
 pub(super) struct Materials<'f> {
     file: &'f File<'f>,
     textures: Textures<'f>,
@@ -51,8 +51,8 @@ impl<'f> Materials<'f> {
         Self { file, textures: Textures::new(file), made: RefCell::default(), list: RefCell::default() }
     }
 
-    /// The material at a position in the file, or glTF's default, for a mesh with or without colours at its vertices. Points and
-    /// lines without colours, which are no surface, have a default of their own: [`INK`].
+    /// The material at an index in the file, or glTF's default, for a mesh with or without vertex colours.
+    /// Points and lines without colours have a default of their own: [`INK`].
     pub(super) fn dressing(
         &self,
         index: Option<usize>,
@@ -86,7 +86,7 @@ impl<'f> Materials<'f> {
         Ok(dressing)
     }
 
-    /// Which texture coordinates a material wants.
+    /// The uv sets that a material uses.
     fn sets(&self, parameters: &GltfMaterial, index: Option<usize>) -> Option<UvSets> {
         let (light, texture) = shining(parameters);
         let of_light = texture.filter(|_| !light.is_black());
@@ -108,13 +108,13 @@ impl<'f> Materials<'f> {
         Some(UvSets { first, further, baked })
     }
 
-    /// All materials that were asked for.
+    /// All materials that were used.
     pub(super) fn into_list(self) -> Vec<NamedMaterial> {
         self.list.into_inner()
     }
 }
 
-/// The set of texture coordinates that tangents go by.
+/// The uv set for tangents.
 fn tangent_set(m: &GltfMaterial) -> Option<usize> {
     let maps = m.normal_texture.or(m.clearcoat.normal_texture);
     let stretched = m.anisotropy.strength > 0.0;
@@ -122,7 +122,7 @@ fn tangent_set(m: &GltfMaterial) -> Option<usize> {
     set.or(stretched.then_some(0)).filter(|_| !m.unlit)
 }
 
-/// The light that a material gives, and the texture that is a factor on it.
+/// The emission of a material, and the texture that multiplies it.
 fn shining(parameters: &GltfMaterial) -> (Rgb, Option<TextureRef>) {
     if parameters.unlit {
         (parameters.base_colour, parameters.base_colour_texture)
@@ -131,7 +131,7 @@ fn shining(parameters: &GltfMaterial) -> (Rgb, Option<TextureRef>) {
     }
 }
 
-/// One material on its way from glTF's parameters to ours.
+/// The conversion of one material.
 struct Seam<'s, 'f> {
     materials: &'s Materials<'f>,
     parameters: &'s GltfMaterial,
@@ -144,18 +144,18 @@ impl<'f> Seam<'_, 'f> {
         &self.materials.textures
     }
 
-    /// Whether light gets through it: what is seen through its front is its back.
+    /// Whether light is transmitted: then the back is visible through the front.
     fn is_clear(&self) -> bool {
         self.parameters.transmission > 0.0 || self.parameters.diffuse_transmission.factor > 0.0
     }
 
-    /// A colour with the texture that is a factor on it.
+    /// A colour multiplied by a texture.
     fn colour(&self, factor: Rgb, texture: Option<TextureRef>) -> Read<Arc<SpectrumTexture>> {
         let image = texture.map(|t| self.textures().colour(t, self.sets)).transpose()?.flatten();
         Ok(product(factor, Rgb::WHITE, image))
     }
 
-    /// A number with the channel of a texture that is a factor on it.
+    /// A number multiplied by a channel of a texture.
     fn number(&self, factor: f32, texture: Option<TextureRef>, channel: usize) -> Read<Arc<FloatTexture>> {
         let image = texture.map(|t| self.textures().channel(t, channel, self.sets)).transpose()?.flatten();
         Ok(product(factor, 1.0, image))
@@ -253,9 +253,9 @@ impl<'f> Seam<'_, 'f> {
             return Ok(None);
         }
         let image = texture.map(|t| self.textures().colour_map(t.texture)).transpose()?.flatten();
-        // Unlit surfaces are drawings, which are to be seen from both sides.
+        // Unlit surfaces are drawings, visible from both sides.
         let two_sided = self.parameters.double_sided || self.parameters.unlit;
-        // glTF's vertex colours are a factor on the base colour, which is what an unlit surface shows.
+        // Vertex colours multiply the base colour, which an unlit surface shows.
         let by_vertices = self.has_colours && self.parameters.unlit;
         Ok(Some(AreaLightDesc { radiance, image, by_vertices, two_sided, power: None }))
     }
@@ -280,7 +280,7 @@ impl<'f> Seam<'_, 'f> {
     }
 }
 
-/// A factor on an image, of which `one` changes nothing.
+/// A factor on an image; `one` changes nothing.
 fn product<T: lumbre_shading::TextureValue + PartialEq>(
     factor: T,
     one: T,

@@ -1,4 +1,4 @@
-//! Tangents for meshes that bring none, those that normal maps are made for.
+//! Tangents for meshes without them, as normal maps expect.
 
 use std::collections::HashMap;
 
@@ -8,13 +8,13 @@ use super::file::File;
 use super::json::Read;
 use super::mesh::Vertices;
 
-/// Gives vertices their tangents by one of their sets of texture coordinates; a vertex where several meet is split.
-/// Without normals each triangle gets its own vertices with its own normal. Without those coordinates nothing happens.
+/// Computes the tangents of vertices from one of their uv sets; a vertex with several is split. Without normals
+/// each triangle gets its own vertices with a flat normal. Without the uv set nothing happens.
 ///
-/// M. Mikkelsen, "Simulation of Wrinkled Surfaces Revisited", master's thesis, University of Copenhagen, 2008 ("MikkTSpace"), as
-/// glTF asks for: triangles around a vertex that hang together by edges and whose texture lies the same way round share a
-/// tangent, the mean of their ∂p/∂u by angle. We differ in that vertices are what the file says they are or equal in
-/// every bit, and in the order of sums.
+/// M. Mikkelsen, "Simulation of Wrinkled Surfaces Revisited", master's thesis, University of Copenhagen, 2008
+/// ("MikkTSpace"), as glTF requires: triangles around a vertex that are connected by edges and whose uv
+/// orientation agrees share a tangent, the mean of their ∂p/∂u weighted by angle. Differences: vertices are
+/// shared only if the file shares them or they are bitwise equal, and sums are in another order.
 pub(super) fn make(
     file: &File<'_>,
     vertices: &mut Vertices,
@@ -23,7 +23,7 @@ pub(super) fn make(
 ) -> Read<()> {
     let Some(Some(_)) = vertices.uvs.get(set) else { return Ok(()) };
     let corners = triangles.len() * 3;
-    // Each corner's tangent, and what finds its neighbours.
+    // The tangent of each corner, and the data to find its neighbours.
     let scratch = (corners * (size_of::<Vec4>() + 3 * size_of::<(u64, u64)>())) as u64;
     file.budget.bytes(scratch, "tangents")?;
     if vertices.normals.is_none() {
@@ -39,7 +39,7 @@ pub(super) fn make(
         vertices.normals = Some(normals);
     }
     let (Some(normals), Some(Some(uvs))) = (&vertices.normals, vertices.uvs.get(set)) else { return Ok(()) };
-    // Ours count v upwards.
+    // Our v counts upwards.
     let uvs: Vec<Vec2> = uvs.iter().map(|uv| Vec2::new(uv.x, 1.0 - uv.y)).collect();
     let tangents = of_corners(&vertices.positions, normals, &uvs, triangles);
     split(file, vertices, triangles, &tangents)?;
@@ -47,7 +47,7 @@ pub(super) fn make(
     Ok(())
 }
 
-/// Charges for a list of vertices that grows to so many.
+/// Charges for a list of vertices that grows to this length.
 fn grow(file: &File<'_>, vertices: &Vertices, count: usize) -> Read<()> {
     let sets = vertices.uvs.iter().flatten().count() as u64;
     let each = 3 * 12 + 4 + sets * 8 + if vertices.colours.is_some() { 16 } else { 0 };
@@ -55,7 +55,7 @@ fn grow(file: &File<'_>, vertices: &Vertices, count: usize) -> Read<()> {
     Ok(())
 }
 
-/// Gives every vertex its corners' tangent, and each further tangent of a vertex a copy of it.
+/// Gives every vertex the tangent of its corners, copying the vertex for each further tangent.
 fn split(
     file: &File<'_>,
     vertices: &mut Vertices,
@@ -89,19 +89,19 @@ fn split(
     Ok(())
 }
 
-/// A triangle with its texture's directions.
+/// A triangle with the directions of its uv.
 struct Face {
-    /// Its corners, equal vertices by one number.
+    /// Its corners, with equal vertices merged.
     corners: [u32; 3],
     /// ∂p/∂u, unit.
     along_u: Vec3,
-    /// Whether u, v and the normal are a right-handed frame; `None` where the texture has no area.
+    /// Whether u, v and the normal are right-handed; `None` where the uv area is 0.
     keeps_order: Option<bool>,
-    /// The triangles behind its edges: from corner k to the next.
+    /// The triangles across its edges: from corner k to the next.
     neighbours: [Option<u32>; 3],
 }
 
-/// The tangent at each corner of each triangle, and the side that the bitangent is on; zero where there is none.
+/// The tangent at each corner of each triangle, with the sign of the bitangent; zero where there is none.
 fn of_corners(positions: &[Vec3], normals: &[Vec3], uvs: &[Vec2], triangles: &[[u32; 3]]) -> Vec<Vec4> {
     let uv = |i: u32| if uvs[i as usize].is_finite() { uvs[i as usize] } else { Vec2::ZERO };
     let position = |i: u32| positions[i as usize];
@@ -132,7 +132,7 @@ fn of_corners(positions: &[Vec3], normals: &[Vec3], uvs: &[Vec2], triangles: &[[
             if done[3 * first + k] {
                 continue;
             }
-            // All triangles about this vertex that are reached over edges that end in it.
+            // All triangles around this vertex that are reached across its edges.
             let vertex = faces[first].corners[k];
             group.clear();
             group.push((first, k));
@@ -145,7 +145,7 @@ fn of_corners(positions: &[Vec3], normals: &[Vec3], uvs: &[Vec2], triangles: &[[
                     let other = other as usize;
                     let place = faces[other].corners.iter().position(|&corner| corner == vertex);
                     let Some(place) = place.filter(|place| !done[3 * other + place]) else { continue };
-                    // What says nothing goes with whoever comes first.
+                    // A triangle without uv orientation joins the first group.
                     if faces[other].keeps_order.is_none_or(|its| its == order) {
                         done[3 * other + place] = true;
                         group.push((other, place));
@@ -174,7 +174,7 @@ fn of_corners(positions: &[Vec3], normals: &[Vec3], uvs: &[Vec2], triangles: &[[
     tangents
 }
 
-/// For each vertex the first that is equal to it.
+/// For each vertex the first one equal to it.
 fn welded(positions: &[Vec3], normals: &[Vec3], uvs: &[Vec2]) -> Vec<u32> {
     // Negative zero is zero.
     let bits = |c: f32| (c + 0.0).to_bits();
@@ -187,8 +187,8 @@ fn welded(positions: &[Vec3], normals: &[Vec3], uvs: &[Vec2]) -> Vec<u32> {
         .collect()
 }
 
-/// Finds who lies behind each edge: a triangle that has it the other way round. Where more than two share an edge, they pair
-/// up in their order.
+/// Finds the triangle across each edge: one that has the edge in the opposite direction. Where more than two
+/// share an edge, they pair up in order.
 fn join(faces: &mut [Face]) {
     let mut open: HashMap<[u32; 2], Vec<(u32, usize)>> = HashMap::new();
     for i in 0..faces.len() {

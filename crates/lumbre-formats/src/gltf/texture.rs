@@ -1,4 +1,4 @@
-//! Textures: images decoded once, and what materials look up in them.
+//! Textures: images decoded once, and lookups of materials in them.
 
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -19,41 +19,42 @@ use super::uri::{Target, target};
 use crate::diagnostic::{Diagnostic, quoted};
 use crate::image::read_image;
 
-/// What is looked up in an image.
+/// The use of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum Use {
-    /// Its colours, on the sRGB curve.
+    /// Colours, in sRGB.
     Colour,
-    /// One channel, as it is stored: 0 to 2 colours, 3 coverage.
+    /// One stored channel: 0 to 2 colours, 3 alpha.
     Channel(usize),
-    /// Three numbers, as they are stored.
+    /// Three stored numbers.
     Directions,
-    /// Normals whose x and y have a factor (its bits).
+    /// Normals, with a factor (as bits) on x and y.
     Normal(u32),
 }
 
-/// A texture and what is looked up in it.
+/// A texture and its use.
 type MapKey = (usize, Use);
 
-/// The textures of a file, each decoded when it is first asked for.
+/// The textures of a file, each decoded on first use.
 pub(super) struct Textures<'f> {
     file: &'f File<'f>,
     images: RefCell<HashMap<usize, Option<Arc<Bitmap>>>>,
     maps: RefCell<HashMap<MapKey, Option<Arc<MipMap>>>>,
 }
 
-/// How a mesh's sets of texture coordinates come to lie: which sets of the file they are. The v of glTF counts downwards
-/// and ours upwards, so meshes get 1 - v.
+/// The uv sets of a mesh, as sets of the file. glTF's v counts downwards and ours upwards, so meshes have 1 -
+/// v.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub(super) struct UvSets {
     pub first: usize,
     pub further: [Option<usize>; FURTHER_SETS],
-    /// What is done to the first set in the mesh itself: light looks up its image there without any map.
+    /// The transform applied to the first set in the mesh itself: area lights look up their image there without
+    /// a mapping.
     pub baked: Affine2,
 }
 
 impl UvSets {
-    /// Which of the mesh's sets has the file's; `None` for one that it does not have.
+    /// The mesh's set for a set of the file; `None` if it does not have it.
     pub(super) fn find(&self, set: usize) -> Option<UvSet> {
         if set == self.first {
             return Some(UvSet::First);
@@ -68,7 +69,7 @@ impl<'f> Textures<'f> {
         Self { file, images: RefCell::default(), maps: RefCell::default() }
     }
 
-    /// Checks the texture and what it names, without decoding anything.
+    /// Checks a texture and its image, without decoding.
     pub(super) fn check(file: &File<'_>, value: Value<'_>) -> Read<()> {
         source(file, value)?;
         sampler(file, value)?;
@@ -94,12 +95,12 @@ impl<'f> Textures<'f> {
         Ok(())
     }
 
-    /// A colour by its texture; `None` without an image.
+    /// A colour from a texture; `None` without an image.
     pub(super) fn colour(&self, texture: TextureRef, sets: UvSets) -> Read<Option<Arc<SpectrumTexture>>> {
         Ok(self.look_up(texture, sets, Use::Colour)?.map(|image| Arc::new(Texture::Image(image))))
     }
 
-    /// One channel of a texture (3 is coverage); `None` where it has no coverage.
+    /// One channel of a texture (3 is alpha); `None` where it has no alpha.
     pub(super) fn channel(
         &self,
         texture: TextureRef,
@@ -109,7 +110,7 @@ impl<'f> Textures<'f> {
         Ok(self.look_up(texture, sets, Use::Channel(channel))?.map(|image| Arc::new(Texture::Image(image))))
     }
 
-    /// Directions in red and green, and what goes with them in blue, as they are stored.
+    /// Stored directions in red and green, with blue.
     pub(super) fn directions(&self, texture: TextureRef, sets: UvSets) -> Read<Option<Arc<SpectrumTexture>>> {
         Ok(self.look_up(texture, sets, Use::Directions)?.map(|image| Arc::new(Texture::Image(image))))
     }
@@ -124,7 +125,7 @@ impl<'f> Textures<'f> {
         self.look_up(texture, sets, Use::Normal(scale.to_bits()))
     }
 
-    /// The colours of a texture, without saying where they lie.
+    /// The colours of a texture, without a mapping.
     pub(super) fn colour_map(&self, texture: usize) -> Read<Option<Arc<MipMap>>> {
         self.map(texture, Use::Colour)
     }
@@ -178,7 +179,7 @@ impl<'f> Textures<'f> {
         Ok(map)
     }
 
-    /// An image, decoded; `None` for one that cannot be had, where that was forgiven.
+    /// A decoded image; `None` for one that cannot be read, after a warning.
     fn image(&self, index: usize) -> Read<Option<Arc<Bitmap>>> {
         if let Some(image) = self.images.borrow().get(&index) {
             return Ok(image.clone());
@@ -223,8 +224,8 @@ fn decoded(file: &File<'_>, value: Value<'_>) -> Read<Bitmap> {
     read(bytes, &name)
 }
 
-/// Warns of an image that is of another kind than it is said to be, by its media type or by that of its data URI. What its first
-/// bytes say counts, as the specification asks.
+/// Warns of an image whose bytes are of another kind than its media type or data URI declares. The bytes take
+/// precedence, as the specification requires.
 fn check_media_type(file: &File<'_>, image: Value<'_>, bytes: &[u8]) -> Read<()> {
     let kinds: [(&str, bool); 4] = [
         ("image/png", bytes.starts_with(b"\x89PNG")),
@@ -250,7 +251,7 @@ fn check_media_type(file: &File<'_>, image: Value<'_>, bytes: &[u8]) -> Read<()>
     Ok(())
 }
 
-/// The image of a texture: that of an extension first.
+/// The image of a texture; an extension's takes precedence.
 fn source(file: &File<'_>, value: Value<'_>) -> Read<Option<usize>> {
     let mut chosen = None;
     for name in ["EXT_texture_webp", "KHR_texture_basisu"] {
@@ -296,15 +297,15 @@ fn sampler(file: &File<'_>, texture: Value<'_>) -> Read<MipMapOptions> {
     Ok(options)
 }
 
-/// The map of a texture between coordinates whose v counts upwards, as it does in our meshes and images: turned over
-/// before it and after it.
+/// The uv transform of a texture for coordinates whose v counts upwards, as in our meshes and images: flipped
+/// before and after.
 pub(super) fn ours(texture: TextureRef) -> Affine2 {
     let ([u, v], offset) = texture.transform.axes();
     let turn = Affine2 { matrix2: Mat2::from_diagonal(Vec2::new(1.0, -1.0)), translation: Vec2::Y };
     turn * Affine2 { matrix2: Mat2::from_cols(u, v), translation: offset } * turn
 }
 
-/// The numbers of one use, out of an image.
+/// The values for a use of an image.
 fn derived(image: &Bitmap, how: Use) -> Bitmap {
     let (width, height) = (image.width(), image.height());
     let places = || (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));

@@ -1,17 +1,17 @@
-//! Where buffers and images are: data URIs and the names of files.
+//! URIs of buffers and images: data URIs and file names.
 
 use std::path::PathBuf;
 
-/// What a URI leads to.
+/// The target of a URI.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Target<'a> {
     /// Data in the URI itself.
     Data(DataUri<'a>),
     /// A file, relative to the one that names it.
     File(PathBuf),
-    /// Something with this scheme, which is not read.
+    /// An unsupported scheme.
     Scheme(&'a str),
-    /// Data that begin wrongly.
+    /// A malformed data URI.
     Malformed,
 }
 
@@ -20,13 +20,13 @@ pub(super) enum Target<'a> {
 pub(super) struct DataUri<'a> {
     /// The media type without its parameters.
     pub media_type: &'a str,
-    /// Whether the data are in base64, or else percent-encoded.
+    /// Base64 or else percent-encoded.
     pub is_base64: bool,
     /// The encoded data.
     pub data: &'a str,
 }
 
-/// Looks at a URI. Names of files are percent-decoded once, and never expanded in any other way.
+/// Parses a URI. File names are percent-decoded once, and not expanded otherwise.
 pub(super) fn target(uri: &str) -> Target<'_> {
     if let Some(rest) = strip_prefix_ignoring_case(uri, "data:") {
         let Some((head, data)) = rest.split_once(',') else { return Target::Malformed };
@@ -60,7 +60,7 @@ fn strip_prefix_ignoring_case<'a>(text: &'a str, prefix: &str) -> Option<&'a str
     head.eq_ignore_ascii_case(prefix).then(|| &text[prefix.len()..])
 }
 
-/// `%41` as `A`; what does not decode to UTF-8 stays as it stands.
+/// `%41` as `A`; text that does not decode to UTF-8 is left unchanged.
 pub(super) fn percent_decoded(text: &str) -> String {
     let bytes = percent_decoded_bytes(text);
     String::from_utf8(bytes).unwrap_or_else(|_| text.to_owned())
@@ -87,7 +87,7 @@ pub(super) fn percent_decoded_bytes(text: &str) -> Vec<u8> {
     decoded
 }
 
-/// The bytes behind base64 (RFC 4648), with or without padding; or the place of the first character that is wrong.
+/// Decodes base64 (RFC 4648), with or without padding; or returns the position of the first wrong character.
 pub(super) fn base64_decoded(text: &str) -> Result<Vec<u8>, usize> {
     let digits = text.trim_end_matches('=');
     let mut decoded = Vec::with_capacity(digits.len() / 4 * 3 + 2);

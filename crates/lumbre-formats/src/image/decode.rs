@@ -1,4 +1,4 @@
-//! PNG, JPEG, TGA, BMP, QOI and WebP, by the decoders of the `image` crate behind our checks.
+//! PNG, JPEG, TGA, BMP, QOI and WebP, by the `image` crate after checks of ours.
 
 use std::io::Cursor;
 use std::sync::Arc;
@@ -23,7 +23,7 @@ pub(super) fn read(
 ) -> Result<ImageFile, FormatError> {
     let place = Place::whole(name.clone());
     if format == ImageFormat::Jpeg && !bytes.windows(2).any(|pair| pair == [0xFF, 0xD9]) {
-        // Its decoder fills what is missing with grey and says nothing.
+        // Its decoder silently fills missing data with grey.
         diagnostics.push(
             Diagnostic::warning("JPEG image without an end: its last rows may be missing").at(place.clone()),
         );
@@ -31,7 +31,7 @@ pub(super) fn read(
     if let (ImageFormat::Png, Some(&[a, b, c, d, e, f, g, h])) =
         (format, bytes.get(16..).and_then(<[u8]>::first_chunk))
     {
-        // Its decoder makes room for a row before it can be asked.
+        // Its decoder allocates a row before limits can be set.
         let (width, height) = (u32::from_be_bytes([a, b, c, d]), u32::from_be_bytes([e, f, g, h]));
         check_size(format, width, height, bytes, &place)?;
     }
@@ -39,7 +39,7 @@ pub(super) fn read(
         let source = Cursor::new(bytes);
         let fault = |e| fault(format, &place, budget, e);
         match format {
-            // Its chunks may ask for memory before there is a decoder to set limits on.
+            // Its chunks may allocate memory before limits can be set on a decoder.
             ImageFormat::Png => decode(
                 format,
                 PngDecoder::with_limits(source, limits(budget)).map_err(fault)?,
@@ -77,7 +77,7 @@ fn decode(
     let channels = Channels::from_count(usize::from(colour.channel_count())).expect("one to four");
     let count = pixels * channels.count() as u64;
     let fault = |e| fault(format, place, budget, e);
-    // A progressive JPEG keeps all its coefficients, two bytes each, beside the pixels.
+    // A progressive JPEG keeps all its coefficients, two bytes each, in addition to the pixels.
     let scratch = if format == ImageFormat::Jpeg { count * 2 } else { 0 };
     let _scratch = budget.hold(scratch, "decoding an image")?;
     let data = match colour {
@@ -102,8 +102,8 @@ fn decode(
     Ok(ImageFile::new(format, bitmap))
 }
 
-/// How many pixels there are. So many at most can come from one byte: a larger header is damage or malice, and not worth
-/// its memory.
+/// The number of pixels, checked against the maximal expansion of the format: a larger header is damaged or
+/// malicious.
 fn check_size(
     format: ImageFormat,
     width: u32,
@@ -115,7 +115,7 @@ fn check_size(
         ImageFormat::Png => 1032 * 8,
         ImageFormat::Jpeg => 1024,
         ImageFormat::Tga | ImageFormat::Bmp => 128,
-        // One colour all over takes next to nothing.
+        // A uniform image takes almost no space.
         ImageFormat::WebP => 1 << 17,
         _ => 62,
     };

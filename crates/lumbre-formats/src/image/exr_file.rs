@@ -1,4 +1,4 @@
-//! OpenEXR, by the `exr` crate behind our checks.
+//! OpenEXR, by the `exr` crate after checks of ours.
 
 use std::io::Cursor;
 use std::sync::Arc;
@@ -133,8 +133,7 @@ pub(super) fn read_layers(bytes: &[u8], name: &Arc<str>, budget: &Budget) -> Res
     Ok(layers)
 }
 
-/// The headers, once they are known to ask for no more than the file can hold and the budget allows; with the charge for
-/// what decoding takes.
+/// The headers, checked against the file's size and the budget; with the charge for decoding.
 fn checked_headers<'b>(
     bytes: &[u8],
     place: &Place,
@@ -168,7 +167,7 @@ fn checked_headers<'b>(
         }
         chunks = chunks.saturating_add(header.chunk_count as u64);
     }
-    // Each chunk has at least its place in the table, its own place and its size.
+    // Each chunk has at least its table entry, its position and its size.
     if chunks.saturating_mul(16) > bytes.len() as u64 {
         let found = format!("{chunks} chunks in {} bytes", bytes.len());
         return Err(refuse("damaged EXR image", found, "16 bytes or more for each"));
@@ -177,8 +176,8 @@ fn checked_headers<'b>(
     Ok((meta.headers.to_vec(), hold))
 }
 
-/// Which channels are the colours: plain ones first, then those of the first group that has them, then a single one.
-/// With what to say when they are not plain.
+/// The channels of the colours: plain names first, then those of the first complete group, then a single one.
+/// With a warning if they are not plain.
 fn choose(names: &[String]) -> Option<(Vec<usize>, Option<String>)> {
     let find = |name: &str| names.iter().position(|n| n == name);
     let of_group = |prefix: &str| {
@@ -208,7 +207,7 @@ fn choose(names: &[String]) -> Option<(Vec<usize>, Option<String>)> {
 fn colour_space(c: Chromaticities) -> ColourSpace {
     let xy = |v: Vec2<f32>| [f64::from(v.0), f64::from(v.1)];
     let said = ColourSpace { red: xy(c.red), green: xy(c.green), blue: xy(c.blue), white: xy(c.white) };
-    // Single precision must not make another space of the usual one.
+    // Rounding to single precision must not make a different colour space.
     let near = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).abs() < 1e-4 && (a[1] - b[1]).abs() < 1e-4;
     let usual = ColourSpace::REC709;
     let same = near(said.red, usual.red)

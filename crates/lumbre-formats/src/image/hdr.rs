@@ -17,7 +17,8 @@ pub(super) fn read(
     let mut reader = Reader { bytes, at: 0, name };
     let (width, height, flip_x, flip_y) = reader.header(diagnostics)?;
     let pixels = u64::from(width) * u64::from(height);
-    // A run of 127 takes two bytes, and old runs can be longer: this is a bound for the former, generous to the latter.
+    // A run of 127 takes two bytes, and old runs can be longer: an upper bound for the former, generous to the
+    // latter.
     if pixels > (1 << 16) + 256 * bytes.len() as u64 {
         let found = format!("{width} by {height} pixels in {} bytes", bytes.len());
         return Err(reader.fault("HDR image of an impossible size").found(found).into());
@@ -37,7 +38,7 @@ pub(super) fn read(
     Ok(ImageFile::new(ImageFormat::Hdr, bitmap.expect("counted above")))
 }
 
-/// The light of shared-exponent bytes, as other renderers read them: Ward's own decoder adds half a step.
+/// The light of shared-exponent bytes, as in other renderers; Ward's own decoder adds half a step.
 fn light([r, g, b, e]: [u8; 4]) -> Rgb {
     if e == 0 {
         return Rgb::BLACK;
@@ -49,14 +50,14 @@ fn light([r, g, b, e]: [u8; 4]) -> Rgb {
 /// 255 steps of the largest exponent.
 const BRIGHTEST: f32 = 255.0 * 2.0 * (1u128 << 118) as f32;
 
-/// The nearest shared-exponent bytes; negative light and NaN become 0, and what is too bright the brightest.
+/// The nearest shared-exponent bytes; negative light and NaN become 0, and too bright light the maximum.
 fn shared_exponent(c: Rgb) -> [u8; 4] {
     let c = c.map(|c| if c.is_nan() { 0.0 } else { c.clamp(0.0, BRIGHTEST) });
     let peak = c.max_component();
     if peak < 1e-38 {
         return [0; 4];
     }
-    // The exponent for which the peak is in [128, 256) once rounded.
+    // The exponent for which the rounded peak is in [128, 256).
     let mut exponent = peak.log2().floor() as i32 + 1;
     let scaled = |exponent: i32| c.map(|c| (f64::from(c) * f64::from(8 - exponent).exp2()).round() as f32);
     while scaled(exponent).max_component() > 255.0 {
@@ -78,7 +79,7 @@ pub(super) fn encode(image: &Image) -> Vec<u8> {
         .into_bytes();
     for row in image.pixels().chunks(width.max(1)) {
         let row: Vec<[u8; 4]> = row.iter().map(|&c| shared_exponent(c)).collect();
-        // Runs are for widths that fit 15 bits, and the mark must not look like a pixel.
+        // Run-length encoding is for widths of 15 bits, whose marker must not look like a pixel.
         if !(8..32768).contains(&width) {
             out.extend(row.as_flattened());
             continue;
@@ -137,7 +138,7 @@ impl<'a> Reader<'a> {
         Ok(line.strip_suffix(b"\r").unwrap_or(line))
     }
 
-    /// The width and the height, and whether columns and rows are stored last first.
+    /// The width and the height, and whether columns and rows are reversed.
     fn header(&mut self, diagnostics: &mut Diagnostics) -> Result<(u32, u32, bool, bool), FormatError> {
         self.line()?;
         loop {
@@ -222,7 +223,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Whole pixels, where 1 1 1 n repeats the last one n times, and the next such 256 n times, and so on.
+    /// Whole pixels, where 1 1 1 n repeats the last one n times, the next such 256 n times, and so on.
     fn old_row(&mut self, row: &mut [[u8; 4]], y: u32) -> Result<(), FormatError> {
         let mut x = 0;
         let mut shift = 0;

@@ -45,7 +45,7 @@ pub enum ImageFormat {
 }
 
 impl ImageFormat {
-    /// What the ending of a file's name says, in any case.
+    /// The format of a file name's extension, in any case.
     pub fn from_path(path: &Path) -> Option<Self> {
         match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
             "png" => Some(Self::Png),
@@ -61,7 +61,7 @@ impl ImageFormat {
         }
     }
 
-    /// What a file's first bytes say. A TGA file has no such mark, but may have one at its end.
+    /// The format of a file's first bytes. TGA has no signature there, but may have one at its end.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         let marks: [(&[u8], Self); 10] = [
             (b"\x89PNG\r\n\x1A\n", Self::Png),
@@ -102,7 +102,7 @@ impl ImageFormat {
         matches!(self, Self::Png | Self::Jpeg | Self::Exr | Self::Hdr | Self::Pfm)
     }
 
-    /// Whether it holds light without bounds rather than numbers for a display.
+    /// Whether it stores unbounded light rather than display values.
     pub const fn is_high_range(self) -> bool {
         matches!(self, Self::Exr | Self::Hdr | Self::Pfm)
     }
@@ -111,15 +111,15 @@ impl ImageFormat {
 /// An image file as it was read.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImageFile {
-    /// What kind of file it was.
+    /// The format of the file.
     pub format: ImageFormat,
-    /// The pixels that the file has.
+    /// The stored pixels.
     pub bitmap: Bitmap,
-    /// The primaries that its colours are on.
+    /// The primaries of its colours.
     pub colour_space: ColourSpace,
-    /// Where those pixels lie on the picture's plane (the data window of EXR).
+    /// The position of those pixels on the image plane (EXR's data window).
     pub data_window: Window,
-    /// The picture's own rectangle on that plane (the display window of EXR).
+    /// The extent of the image on that plane (EXR's display window).
     pub display_window: Window,
 }
 
@@ -135,11 +135,10 @@ impl ImageFile {
         }
     }
 
-    /// The picture as light on the primaries of Rec. 709, over its display window: black and uncovered where the file has
-    /// no pixels.
+    /// The image as light on the primaries of Rec. 709, over its display window: black and transparent where
+    /// the file has no pixels.
     ///
-    /// # Errors
-    /// [`FormatError::Limit`] when the budget does not allow so many pixels.
+    /// [`FormatError::Limit`] when the budget does not allow this many pixels.
     pub fn to_image(&self, budget: &Budget) -> Result<Image, FormatError> {
         let (data, display) = (self.data_window, self.display_window);
         let pixels = |w: Window| u64::from(w.width) * u64::from(w.height);
@@ -168,8 +167,7 @@ impl ImageFile {
 
 /// Reads the image file `path`.
 ///
-/// # Errors
-/// As [`Input::open`] and [`read_image`].
+/// As for [`Input::open`] and [`read_image`].
 pub fn open_image(
     path: &Path,
     budget: &Budget,
@@ -179,11 +177,10 @@ pub fn open_image(
     read_image(&input, input.name(), budget, diagnostics)
 }
 
-/// Reads an image from the bytes of its file, whose kind its bytes tell, or else the ending of `name`. The pixels stay
-/// charged to the budget.
+/// Reads an image from the bytes of its file, in the format of its bytes, or else of the extension of `name`.
+/// The pixels stay charged to the budget.
 ///
-/// # Errors
-/// [`FormatError::Input`] when the bytes are not an image of a kind that is read or are damaged, and
+/// [`FormatError::Input`] when the bytes are not an image of a supported format or are damaged, and
 /// [`FormatError::Limit`] when it has more pixels than the budget allows.
 pub fn read_image(
     bytes: &[u8],
@@ -201,10 +198,11 @@ pub fn read_image(
     .map_err(|e| e.or_at(place))
 }
 
-/// Reads every channel of an image file: of an EXR file with several parts, each part's channels after its name.
+/// Reads every channel of an image file; channels of an EXR file with several parts have the part's name as a
+/// prefix.
 ///
-/// # Errors
-/// As [`read_image`], and [`FormatError::Input`] when two channels have one name or parts have different sizes.
+/// As for [`read_image`], and [`FormatError::Input`] when two channels have the same name or parts have
+/// different sizes.
 pub fn read_layers(
     bytes: &[u8],
     name: &Arc<str>,
@@ -226,7 +224,7 @@ fn format_of(bytes: &[u8], name: &Arc<str>) -> Result<ImageFormat, FormatError> 
     if by_name == Some(ImageFormat::Tga) {
         return Ok(ImageFormat::Tga);
     }
-    // Kinds that are not read, by their names.
+    // Unsupported formats, for the error message.
     let others: [(&[u8], &str); 7] = [
         (b"GIF8", "a GIF image"),
         (b"II*\0", "a TIFF image"),

@@ -36,7 +36,7 @@ pub(super) fn read(bytes: &[u8], name: &Arc<str>, budget: &Budget) -> Result<Ima
     let (_, text, wrong) = word("scale");
     let scale = text.parse::<f32>().ok().filter(|s| s.is_finite() && *s != 0.0);
     let scale = scale.ok_or_else(|| FormatError::from(wrong.expected("a number that is not 0")))?;
-    // One space ends the header; in files that went through a text mode there are two bytes.
+    // One space ends the header, or two bytes in files that passed through a text mode.
     let samples = u64::from(width) * u64::from(height) * channels.count() as u64;
     let start = at + 1;
     let found = bytes.len().saturating_sub(start) as u64;

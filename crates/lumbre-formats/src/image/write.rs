@@ -1,4 +1,4 @@
-//! Writing images: tone-mapped numbers for a display into PNG and JPEG, light as it is into EXR, HDR and PFM.
+//! Writing images: tone-mapped into PNG and JPEG, linear light into EXR, HDR and PFM.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -9,29 +9,29 @@ use super::{ImageFormat, exr_file, hdr, pfm};
 use crate::atomic::atomic_write;
 use crate::diagnostic::{Diagnostic, FormatError, Place, quoted};
 
-/// How an image is written.
+/// Options of writing an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct WriteOptions {
-    /// How light is brought within what a display shows, in PNG and JPEG.
+    /// The tone mapping operator, for PNG and JPEG.
     pub tone_map: ToneMap,
-    /// Stops brighter before that.
+    /// The exposure in stops before tone mapping.
     pub exposure: f32,
-    /// Bits of a PNG's channel.
+    /// The bit depth of PNG.
     pub png_depth: PngDepth,
-    /// From 1 to 100.
+    /// JPEG quality, from 1 to 100.
     pub jpeg_quality: u8,
-    /// The numbers of EXR's colour channels.
+    /// The precision of EXR's colour channels.
     pub exr_precision: ExrPrecision,
-    /// How EXR is packed, always without loss.
+    /// The compression of EXR, always lossless.
     pub exr_compression: ExrCompression,
-    /// When the image is a part of a larger picture: where its top left pixel lies in it (x, y) and the picture's width and
-    /// height. Written to EXR as data and display window; other formats have only the part.
+    /// If the image is a crop of a larger one: the position of its top left pixel (x, y) and the larger one's
+    /// width and height. Written to EXR as data and display window; other formats have only the crop.
     pub exr_window: Option<(i32, i32, u32, u32)>,
 }
 
 impl Default for WriteOptions {
-    /// No tone mapping, no exposure, 8 bits, quality 95, halves, ZIP, a picture of its own.
+    /// No tone mapping, no exposure, 8 bits, quality 95, half precision, ZIP, not a crop.
     fn default() -> Self {
         Self {
             tone_map: ToneMap::None,
@@ -45,16 +45,16 @@ impl Default for WriteOptions {
     }
 }
 
-/// Bits of a PNG's channel.
+/// The bit depth of PNG.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PngDepth {
-    /// 8.
+    /// 8 bits.
     Eight,
-    /// 16.
+    /// 16 bits.
     Sixteen,
 }
 
-/// The numbers of EXR's colour channels. Channels that ask for full precision have it always.
+/// The precision of EXR's colour channels. Channels that require full precision always have it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExrPrecision {
     /// Half precision: 11 bits, up to 65504.
@@ -63,35 +63,34 @@ pub enum ExrPrecision {
     Float,
 }
 
-/// How EXR is packed.
+/// The compression of EXR.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ExrCompression {
-    /// Not at all.
+    /// None.
     None,
-    /// By runs: fast.
+    /// Run-length encoding: fast.
     Rle,
-    /// By deflate, 16 rows at a time.
+    /// Deflate, 16 rows at a time.
     Zip,
-    /// By wavelets: best for noise.
+    /// Wavelets: best for noise.
     Piz,
 }
 
-/// Writes an image to `path`, in the format that its ending says, so that the path never holds a part of it.
+/// Writes an image to `path` atomically, in the format of its extension.
 ///
-/// Colours are taken to be multiplied by coverage, as renders are.
+/// Colours are premultiplied by alpha, as renders are.
 ///
-/// # Errors
-/// [`FormatError::Input`] when no format that can be written has this ending, and [`FormatError::Io`].
+/// [`FormatError::Input`] when no writable format has this extension, and [`FormatError::Io`].
 pub fn write_image(path: &Path, image: &Image, options: &WriteOptions) -> Result<(), FormatError> {
     let format = writable_format(path)?;
     write_bytes(path, encode_image(image, format, options))
 }
 
-/// Writes named channels to `path`: all of them into EXR, only the colours `R`, `G`, `B` and `A` into other formats.
+/// Writes named channels to `path`: all of them into EXR, only the colours `R`, `G`, `B` and `A` into other
+/// formats.
 ///
-/// # Errors
-/// As [`write_image`], and [`FormatError::Input`] when there are no colours for a format that has only them.
+/// As for [`write_image`], and [`FormatError::Input`] when a format that stores only colours gets none.
 pub fn write_layers(path: &Path, layers: &Layers, options: &WriteOptions) -> Result<(), FormatError> {
     let format = writable_format(path)?;
     if format == ImageFormat::Exr {
@@ -106,8 +105,7 @@ pub fn write_layers(path: &Path, layers: &Layers, options: &WriteOptions) -> Res
 
 /// The bytes of an image file.
 ///
-/// # Errors
-/// When the format cannot be written ([`ImageFormat::is_writable`]), or cannot hold an image of this size.
+/// When the format is not writable ([`ImageFormat::is_writable`]), or cannot store an image of this size.
 pub fn encode_image(image: &Image, format: ImageFormat, options: &WriteOptions) -> io::Result<Vec<u8>> {
     if image.width() == 0 || image.height() == 0 {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "an image without pixels"));
@@ -126,8 +124,7 @@ pub fn encode_image(image: &Image, format: ImageFormat, options: &WriteOptions) 
 
 /// The bytes of an EXR file with these channels.
 ///
-/// # Errors
-/// When there are none, or one has a name that EXR cannot hold.
+/// When there are none, or one has a name that EXR cannot store.
 pub fn encode_layers(layers: &Layers, options: &WriteOptions) -> io::Result<Vec<u8>> {
     if layers.iter().len() == 0 || layers.width() == 0 || layers.height() == 0 {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "an image without pixels"));
@@ -150,7 +147,7 @@ fn write_bytes(path: &Path, encoded: io::Result<Vec<u8>>) -> Result<(), FormatEr
     atomic_write(path, |out: &mut dyn Write| out.write_all(&bytes))
 }
 
-/// Every pixel as a display gets it, with its coverage. PNG wants colours that are not multiplied by it.
+/// The displayed colour and alpha of every pixel. PNG is not premultiplied.
 fn shown<'a>(image: &'a Image, options: &'a WriteOptions) -> impl Iterator<Item = ([f32; 3], f32)> + 'a {
     image.pixels().iter().enumerate().map(|(i, &light)| {
         let alpha = image.alpha().map_or(1.0, |alpha| alpha[i]);
@@ -192,7 +189,7 @@ fn encode_jpeg(image: &Image, options: &WriteOptions) -> io::Result<Vec<u8>> {
             "JPEG images have at most 65535 pixels a side",
         ));
     };
-    // There is no coverage: light multiplied by it is the picture over black.
+    // Without alpha, premultiplied light is the image over black.
     let encode = |&light: &Rgb| options.tone_map.encode(light, options.exposure).to_u8();
     let data: Vec<u8> = image.pixels().iter().flat_map(encode).collect();
     let mut out = Vec::new();

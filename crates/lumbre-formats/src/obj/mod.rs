@@ -1,5 +1,5 @@
-//! Wavefront OBJ meshes with MTL materials (Wavefront Technologies, "Advanced Visualizer manual", appendices B1 and the MTL
-//! file format, version 4.2, 1995; colours of vertices and physical keys as programs since have it).
+//! Wavefront OBJ meshes with MTL materials (Wavefront Technologies, "Advanced Visualizer manual", appendices B1
+//! and the MTL file format, version 4.2, 1995; vertex colours and PBR keys as later programs write them).
 
 mod mtl;
 mod scene;
@@ -22,34 +22,32 @@ use words::{Source, Word, Words};
 pub use mtl::{MtlMaterial, MtlTexture, read_mtl};
 pub use scene::open_obj;
 
-/// What an OBJ file holds.
+/// The contents of an OBJ file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ObjFile {
-    /// Its meshes, in the order of their first faces.
+    /// The meshes, in the order of their first faces.
     pub meshes: Vec<ObjMesh>,
-    /// The material files that it names, where it names them.
+    /// The material libraries that it names, each with its place.
     pub libraries: Vec<(String, Place)>,
 }
 
-/// The faces of an OBJ file that have a name, a material and a set of attributes in common.
+/// The faces of an OBJ file with the same name, material and set of attributes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObjMesh {
-    /// The object (`o`) or, in a file without objects, the group (`g`); empty where there is none.
+    /// The object (`o`) or, in a file without objects, the group (`g`); may be empty.
     pub name: String,
-    /// The material (`usemtl`), with where it was first used for this mesh.
+    /// The material (`usemtl`), with the place of its first use for this mesh.
     pub material: Option<(String, Place)>,
-    /// Triangles only. Corners that differ in texture coordinate or normal are vertices of their own.
+    /// Triangles only. Corners with different texture coordinate or normal are separate vertices.
     pub mesh: MeshDesc,
 }
 
-/// Reads meshes from the bytes of an OBJ file. Material files are named and not opened: see [`open_obj`].
+/// Reads meshes from the bytes of an OBJ file. Material libraries are named, not opened: see [`open_obj`].
 ///
-/// Colours of vertices (`v x y z r g b`) are taken as light. Lines, points, curves and surfaces are passed over with a
-/// warning.
+/// Vertex colours (`v x y z r g b`) are linear. Lines, points, curves and surfaces are ignored with a warning.
 ///
-/// # Errors
-/// [`FormatError::Input`] with line and column; [`FormatError::Limit`]. When lenient, faces that cannot be used are dropped
-/// with a warning instead.
+/// [`FormatError::Input`] with line and column; [`FormatError::Limit`]. When lenient, unusable faces are
+/// dropped with a warning instead.
 pub fn read_obj(
     bytes: &[u8],
     name: &Arc<str>,
@@ -68,12 +66,12 @@ pub fn read_obj(
     reader.finish().map_err(|e| e.or_at(|| Place::whole(name.clone())))
 }
 
-/// A corner of a face: position, texture coordinate, normal; `NONE` where it has none.
+/// A corner of a face: position, texture coordinate, normal; `NONE` if absent.
 type Corner = [u32; 3];
 
 const NONE: u32 = u32::MAX;
 
-/// What a mesh's faces have in common; names by their numbers.
+/// What the faces of a mesh have in common; names by index.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 struct Key {
     object: u32,
@@ -85,12 +83,12 @@ struct Key {
 
 struct Part<'a> {
     key: Key,
-    /// Where its material was named.
+    /// The place of its material's name.
     material_at: usize,
     triangles: BudgetVec<'a, [Corner; 3]>,
 }
 
-/// A face to be read when all is there, with the state that it stands in.
+/// A face to be read at the end, with its state.
 #[derive(Clone)]
 struct Later<'a> {
     keyword: Word<'a>,
@@ -111,28 +109,28 @@ struct Reader<'a> {
     normals: BudgetVec<'a, Vec3>,
     /// When lenient, positions that are not finite.
     unusable: Vec<u32>,
-    /// Every name that was given, 0 for none.
+    /// Every name, 0 for none.
     names: Vec<String>,
     numbers: HashMap<String, u32>,
-    /// The state that the next face has.
+    /// The state for the next face.
     state: Key,
     material_at: usize,
     has_objects: bool,
     is_smooth: bool,
-    /// Whether it was said that this is not applied.
+    /// Whether the warning about smoothing groups has been given.
     said_smooth: bool,
     parts: Vec<Part<'a>>,
     part_of: HashMap<Key, usize>,
     /// The part of the last face.
     current: Option<usize>,
     libraries: Vec<(String, Place)>,
-    /// Faces that name what comes after them.
+    /// Faces with forward references.
     later: BudgetVec<'a, Later<'a>>,
-    /// Whether all is read, and the counts from which those count backwards.
+    /// Set when everything is read: the counts to which negative indices of those faces are relative.
     at_end: Option<[usize; 3]>,
-    /// Whether faces name texture coordinates, and normals, of which there are none.
+    /// Whether faces refer to missing texture coordinates, and normals.
     missing: [Cell<bool>; 2],
-    /// The corners of one face, kept for their room.
+    /// The corners of one face, kept for their capacity.
     face: Vec<Corner>,
     places: Vec<Vec3>,
 }
@@ -231,7 +229,7 @@ impl<'a> Reader<'a> {
                 self.pass_over(keyword, "free-form curves and surfaces are not supported, passed over");
                 Ok(())
             }
-            // How other programs would show it.
+            // Display hints for other programs.
             b"mg" | b"bevel" | b"c_interp" | b"d_interp" | b"lod" | b"usemap" | b"maplib" | b"shadow_obj"
             | b"trace_obj" | b"mm_color" | b"vw" => Ok(()),
             _ => {
@@ -258,7 +256,7 @@ impl<'a> Reader<'a> {
         wrong.at(self.source.place(keyword.start)).found(count).expected(expected)
     }
 
-    /// The first numbers of a line, how many there are, and the first word for messages.
+    /// The first numbers of a line, their count, and the first word for messages.
     #[inline]
     fn numbers<const N: usize>(
         &self,
@@ -308,7 +306,7 @@ impl<'a> Reader<'a> {
             position = Vec3::ZERO;
         }
         if let Some(colour) = colour {
-            // Those before it are white.
+            // Earlier ones are white.
             while self.colours.len() < self.positions.len() {
                 self.colours.push(Rgb::WHITE)?;
             }
@@ -392,7 +390,7 @@ impl<'a> Reader<'a> {
         if let [a, b, c] = self.face[..] {
             return Ok(part.triangles.push([a, b, c])?);
         }
-        // Where its corners stand, and the cutting of them.
+        // The positions of its corners, and the triangulation.
         let _while_cut = self.budget.hold(self.face.len() as u64 * 160, "corners of a face")?;
         self.places.clear();
         self.places.extend(self.face.iter().map(|c| self.positions[c[0] as usize]));
@@ -454,7 +452,7 @@ impl<'a> Reader<'a> {
     #[inline]
     fn index(&self, digits: Word<'a>, slot: usize, corner: Word<'a>) -> Result<u32, Unusable> {
         let count = self.counts()[slot];
-        // Most are a few digits.
+        // Most have a few digits.
         let plain = digits.bytes.len() < 10
             && !digits.bytes.is_empty()
             && digits.bytes.iter().all(u8::is_ascii_digit);
@@ -484,14 +482,14 @@ impl<'a> Reader<'a> {
             return Err(Unusable::Later);
         }
         if slot > 0 && count == 0 && index > 0 {
-            // All of them are missing: the surface is whole without.
+            // All of them are missing: the surface is complete without them.
             self.missing[slot - 1].set(true);
             return Ok(NONE);
         }
         self.absent(digits, what, count)
     }
 
-    /// How many positions, texture coordinates and normals there are.
+    /// The numbers of positions, texture coordinates and normals.
     #[inline]
     fn counts(&self) -> [usize; 3] {
         [self.positions.len(), self.uvs.len(), self.normals.len()]
@@ -539,7 +537,7 @@ impl<'a> Reader<'a> {
                 Diagnostic::warning("OBJ file without faces").at(Place::whole(self.source.name.clone()));
             self.diagnostics.push(said.found(found));
         }
-        // Which vertex of the mesh in hand was last made from each position.
+        // The vertex of the current mesh last made from each position.
         let count = self.positions.len() as u64;
         let _scratch = self.budget.hold(count * 4, "vertices")?;
         let mut newest = vec![0u32; self.positions.len()];
@@ -556,9 +554,9 @@ impl<'a> Reader<'a> {
         Ok(ObjFile { meshes, libraries: self.libraries })
     }
 
-    /// Makes a vertex of each corner that differs.
+    /// Makes a vertex for each distinct corner.
     fn mesh(&self, corners: &[[Corner; 3]], key: Key, newest: &mut [u32]) -> Result<MeshDesc, FormatError> {
-        /// Vertices of one position are a chain; one that is too long goes on in a table.
+        /// Vertices of one position form a chain; a long one continues in a table.
         const LONGEST_CHAIN: usize = 16;
         let mut vertices: BudgetVec<'_, Corner> = BudgetVec::new(self.budget, "vertices");
         let mut older: BudgetVec<'_, u32> = BudgetVec::new(self.budget, "vertices");
@@ -566,11 +564,11 @@ impl<'a> Reader<'a> {
         let mut triangles = BudgetVec::new(self.budget, "triangles");
         triangles.reserve(corners.len())?;
         let mut vertex_of = |mut corner: Corner| -> Result<u32, FormatError> {
-            // What only some corners of a face have counts for nothing.
+            // An attribute of only some corners of a face is ignored.
             corner[1] = if key.has_uvs { corner[1] } else { NONE };
             corner[2] = if key.has_normals { corner[2] } else { NONE };
             let position = corner[0] as usize;
-            // An entry of another mesh points at a vertex of another position, or at none.
+            // An entry from another mesh points at a vertex of another position, or at none.
             let is_ours = vertices.get(newest[position] as usize).is_some_and(|v| v[0] == corner[0]);
             let mut length = 0;
             let mut next = if is_ours { newest[position] } else { NONE };
@@ -627,11 +625,11 @@ const WRONG_UV: &str = "texture coordinate that is not finite, taken for 0";
 const WRONG_NORMAL: &str = "normal that is not finite, taken for 0";
 const WRONG_COLOUR: &str = "colour that is not finite, taken for 0";
 
-/// Why a face cannot be used: the file is wrong, or the face is to be dropped, or to be read when all is there.
+/// Why a face cannot be used: the file is invalid, or the face is to be dropped, or to be read at the end.
 enum Unusable {
     No(FormatError),
     Drop(&'static str),
-    /// It names what is not there yet.
+    /// It refers to elements that are not read yet.
     Later,
 }
 

@@ -8,12 +8,12 @@ use super::words::{Source, Word, Words};
 use crate::budget::Budget;
 use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place};
 
-/// A material as an MTL file has it; what it does not say is `None`.
+/// A material of an MTL file; unspecified values are `None`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MtlMaterial {
     /// Its name.
     pub name: String,
-    /// `illum`: how it was to be lit, from 0 to 10.
+    /// `illum`: the illumination model, from 0 to 10.
     pub illumination: Option<u32>,
     /// `Kd`.
     pub diffuse: Option<Rgb>,
@@ -25,7 +25,7 @@ pub struct MtlMaterial {
     pub shininess: Option<f32>,
     /// `Ni`: the index of refraction.
     pub refraction: Option<f32>,
-    /// `d`, or 1 less `Tr`: coverage.
+    /// `d`, or 1 - `Tr`: opacity.
     pub opacity: Option<f32>,
     /// `Pr`, in `[0, 1]`.
     pub roughness: Option<f32>,
@@ -33,13 +33,13 @@ pub struct MtlMaterial {
     pub metallic: Option<f32>,
     /// `Ps`: sheen, in `[0, 1]`.
     pub sheen: Option<f32>,
-    /// `Pc`: how much of it is coated, in `[0, 1]`.
+    /// `Pc`: the share of the clear coat, in `[0, 1]`.
     pub clearcoat: Option<f32>,
     /// `Pcr`: roughness of the coat, in `[0, 1]`.
     pub clearcoat_roughness: Option<f32>,
-    /// `aniso`: how stretched reflections are, in `[0, 1]`.
+    /// `aniso`: anisotropy, in `[0, 1]`.
     pub anisotropy: Option<f32>,
-    /// `anisor`: how far that is turned from the tangent, in turns.
+    /// `anisor`: its rotation from the tangent, in turns.
     pub anisotropy_rotation: Option<f32>,
     /// `map_Kd`.
     pub diffuse_map: Option<MtlTexture>,
@@ -59,12 +59,12 @@ pub struct MtlMaterial {
     pub normal_map: Option<MtlTexture>,
 }
 
-/// A texture as an MTL file names it.
+/// A texture reference of an MTL file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MtlTexture {
     /// The file, relative to the MTL file.
     pub file: String,
-    /// Where it is named.
+    /// The place of the reference.
     pub place: Place,
     /// `-s`: a factor on texture coordinates.
     pub scale: [f32; 2],
@@ -74,15 +74,15 @@ pub struct MtlTexture {
     pub bump_multiplier: f32,
     /// `-mm`: base and gain; the value is base + gain times the image's.
     pub range: [f32; 2],
-    /// `-clamp on`: nothing beyond the image's edges but its last pixels.
+    /// `-clamp on`: the last pixels repeat beyond the image's edges.
     pub clamp: bool,
 }
 
 /// Reads materials from the bytes of an MTL file.
 ///
-/// Keys without a meaning here (`Ka` and others) are passed over, those that would change the look with a warning.
+/// Keys without a meaning here (`Ka` and others) are ignored, those that would change the appearance with a
+/// warning.
 ///
-/// # Errors
 /// [`FormatError::Input`] with line and column; [`FormatError::Limit`].
 pub fn read_mtl(
     bytes: &[u8],
@@ -180,7 +180,7 @@ impl<'a> Reader<'a, '_> {
                     self.warn(keyword, "filter of light that passes a material is not used");
                 }
             }
-            // They change nothing in a picture by light alone.
+            // They have no effect in physically based rendering.
             "ka" | "map_ka" | "sharpness" | "map_aat" => {}
             "map_ks" | "map_ns" | "km" | "decal" | "refl" | "map_refl" => {
                 let said = format!("{} of a material is not used", String::from_utf8_lossy(keyword.bytes));
@@ -244,7 +244,7 @@ impl<'a> Reader<'a, '_> {
         }
     }
 
-    /// Options, then a file name that may have blanks.
+    /// Options, then a file name that may contain spaces.
     fn texture(
         &mut self,
         keyword: Word<'a>,
@@ -287,7 +287,7 @@ impl<'a> Reader<'a, '_> {
                     self.warn(word, &format!("option {option} of a texture is not used"));
                 }
                 _ if texture.file.is_empty() => {
-                    // Up to an option, which some programs write behind the name.
+                    // Up to an option, which some programs write after the name.
                     let (at, whole) = before.rest();
                     let mut behind = words.clone();
                     let mut end = None;
@@ -322,7 +322,7 @@ impl<'a> Reader<'a, '_> {
         Ok(numbers)
     }
 
-    /// One to three numbers; those that are not there are `rest`.
+    /// One to three numbers; missing ones are `rest`.
     fn vector(&self, words: &mut Words<'a>, option: Word<'a>, rest: f32) -> Result<[f32; 3], FormatError> {
         let [first] = self.exactly(words, option)?;
         let mut numbers = [first, rest, rest];
@@ -330,7 +330,7 @@ impl<'a> Reader<'a, '_> {
             let mut ahead = words.clone();
             let parsed = ahead.next().and_then(|word| self.finite(word).ok());
             let Some(parsed) = parsed else { break };
-            // The name of the file may begin like a number, and is the last word.
+            // The file name may begin like a number, and is the last word.
             if ahead.clone().next().is_none() {
                 break;
             }

@@ -21,15 +21,14 @@ use crate::ply::unsaid_material;
 
 /// Reads the OBJ file `path` with its materials and textures, each mesh a shape; y is up.
 ///
-/// A material with any of the PBR keys (`Pr`, `Pm`, `Ps`, `Pc`, `aniso` and their maps) is the principled one, clear when
-/// `illum` is 6 or 7. Of the others, those with `illum` 6 or 7 become glass, those with nothing but specular colour a
-/// metal, those with specular colour and `illum` 2 or more a coated diffuse one, else a diffuse one. `Pr` is
-/// the square root of the microfacet roughness, for which `Ns` stands otherwise (α² = 2 / (Ns + 2), as B. Walter and
-/// others, "Microfacet models for refraction", EGSR 2007). `Ke` shines to both sides. Files and textures that are not there
-/// are warned about.
+/// A material with any of the PBR keys (`Pr`, `Pm`, `Ps`, `Pc`, `aniso` and their maps) becomes the principled
+/// one, clear when `illum` is 6 or 7. Of the others, those with `illum` 6 or 7 become glass, those with
+/// specular colour only a metal, those with specular colour and `illum` 2 or more a coated diffuse one, and the
+/// rest diffuse. `Pr` is the square root of the microfacet α; without it, `Ns` determines α (α² = 2 / (Ns + 2),
+/// as in B. Walter and others, "Microfacet models for refraction", EGSR 2007). `Ke` emits on both sides.
+/// Missing files and textures give warnings.
 ///
-/// # Errors
-/// As [`Input::open`], [`read_obj`] and [`read_mtl`]; of textures only limits.
+/// As for [`Input::open`], [`read_obj`] and [`read_mtl`]; for textures only limits.
 pub fn open_obj(
     path: &Path,
     budget: &Budget,
@@ -44,7 +43,7 @@ pub fn open_obj(
     let mut names: HashMap<String, usize> = HashMap::new();
     for (library, place) in &obj.libraries {
         for (folder, material) in builder.library(folder, library, place)? {
-            // The first definition of a name counts, as for the library that is named first.
+            // The first definition of a name counts, as does the first library.
             if names.contains_key(&material.name) {
                 continue;
             }
@@ -57,7 +56,7 @@ pub fn open_obj(
         let material = finished.material.clone();
         scene.materials.push(NamedMaterial { name: Some(finished.name.clone()), material });
     }
-    // Of meshes without colours at their vertices, and of those with them.
+    // For meshes without vertex colours, and with them.
     let mut unsaid = [None; 2];
     for (index, mesh) in obj.meshes.into_iter().enumerate() {
         let named = mesh.material.as_ref().and_then(|(name, place)| {
@@ -102,12 +101,14 @@ struct Finished {
 struct Builder<'a> {
     budget: &'a Budget,
     diagnostics: &'a mut Diagnostics,
-    /// Those opened so far, by file, whether they hold numbers rather than colours, and whether they are clamped.
+    /// The opened images, by file, whether they store numbers rather than colours, and whether they are
+    /// clamped.
     images: HashMap<(PathBuf, bool, bool), Option<Arc<MipMap>>>,
 }
 
 impl Builder<'_> {
-    /// The materials of the files that `mtllib` names, each with its folder: one name with blanks, or several names.
+    /// The materials of the files that `mtllib` names, each with its folder: one name with spaces, or several
+    /// names.
     fn library(
         &mut self,
         folder: &Path,
@@ -145,7 +146,7 @@ impl Builder<'_> {
         let specular = m.specular.unwrap_or(Rgb::BLACK);
         let illumination = m.illumination.unwrap_or(2);
         let reflectance = match &m.diffuse_map {
-            // Some programs leave black where an image decides.
+            // Some programs write black where an image decides.
             Some(map) if diffuse.is_black() => self.colours(folder, map, Rgb::WHITE)?,
             Some(map) => self.colours(folder, map, diffuse)?,
             None => Arc::new(Texture::Constant(diffuse.clamp(0.0, 1.0))),
@@ -207,7 +208,7 @@ impl Builder<'_> {
         Ok(Finished { name: m.name.clone(), material: Arc::new(material), light, alpha })
     }
 
-    /// What the PBR keys say. A map takes the place of its number, as is usual for these keys.
+    /// The PBR keys. A map replaces its number, as is usual for these keys.
     fn principled(
         &mut self,
         folder: &Path,
@@ -237,7 +238,7 @@ impl Builder<'_> {
         })
     }
 
-    /// A map of numbers, or a number where there is none that can be read.
+    /// A map of numbers, or a number if it cannot be read.
     fn numbers(
         &mut self,
         folder: &Path,
@@ -267,7 +268,7 @@ impl Builder<'_> {
         Ok(Arc::new(Texture::Product([image, Arc::new(Texture::Constant(factor))])))
     }
 
-    /// A texture by its image; `None`, with a warning, when that cannot be read.
+    /// A texture; `None`, with a warning, when it cannot be read.
     fn image(
         &mut self,
         folder: &Path,
@@ -310,7 +311,7 @@ impl Builder<'_> {
                 return Ok(None);
             }
         };
-        // The pyramid takes a third more.
+        // The pyramid takes another third.
         self.budget.bytes(file.bitmap.bytes() as u64 / 3, "texture")?;
         let bitmap = if holds_numbers { file.bitmap.with_encoding(Encoding::Linear) } else { file.bitmap };
         let wrap = if map.clamp { Wrap::Clamp } else { Wrap::Repeat };
@@ -326,7 +327,7 @@ fn is_principled(m: &MtlMaterial) -> bool {
         || [&m.roughness_map, &m.metallic_map, &m.sheen_map].iter().any(|map| map.is_some())
 }
 
-/// α by the exponent of the highlight.
+/// α from the exponent of the highlight.
 fn shininess_alpha(m: &MtlMaterial) -> f32 {
     m.shininess.map_or(0.0, |shininess| (2.0 / (shininess.max(0.0) + 2.0)).sqrt())
 }
@@ -339,7 +340,7 @@ fn constant(value: f32) -> Arc<FloatTexture> {
     Arc::new(Texture::Constant(value))
 }
 
-/// The file of a name, where `\` may part folders as in files of Windows.
+/// The file of a name, where `\` may separate folders, as on Windows.
 fn existing(folder: &Path, name: &str) -> PathBuf {
     let path = folder.join(name);
     if !path.exists() && name.contains('\\') { folder.join(name.replace('\\', "/")) } else { path }

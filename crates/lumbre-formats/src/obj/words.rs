@@ -5,22 +5,22 @@ use std::sync::Arc;
 
 use crate::diagnostic::{Diagnostic, FormatError, Place, quoted_bytes};
 
-/// A text file of lines of words. `\` at the end of a line joins the next one to it, and `#` at the start of a word
-/// begins a comment.
+/// A text file of lines of words. `\` at the end of a line continues it on the next, and `#` at the start of a
+/// word begins a comment.
 #[derive(Clone, Copy)]
 pub(super) struct Source<'a> {
     pub name: &'a Arc<str>,
     pub bytes: &'a [u8],
 }
 
-/// A line: where it starts and its bytes, without its end.
+/// A line: its offset and its bytes, without the line end.
 #[derive(Clone, Copy)]
 pub(super) struct Line<'a> {
     pub start: usize,
     bytes: &'a [u8],
 }
 
-/// A word: where it starts and its bytes.
+/// A word: its offset and its bytes.
 #[derive(Clone, Copy)]
 pub(super) struct Word<'a> {
     pub start: usize,
@@ -37,7 +37,7 @@ impl<'a> Source<'a> {
     }
 
     pub(super) fn lines(self) -> impl Iterator<Item = Line<'a>> {
-        // A file of an old Mac has only CR.
+        // Files of old Macs have CR only.
         let end = if self.bytes.contains(&b'\n') || !self.bytes.contains(&b'\r') { b'\n' } else { b'\r' };
         let mut at = if self.bytes.starts_with(b"\xEF\xBB\xBF") { 3 } else { 0 };
         std::iter::from_fn(move || {
@@ -58,7 +58,7 @@ impl<'a> Source<'a> {
         })
     }
 
-    /// A number that is finite or not, as the caller minds.
+    /// A number, finite or not.
     pub(super) fn number(&self, word: Word<'_>) -> Result<f32, FormatError> {
         let parsed = std::str::from_utf8(word.bytes).ok().and_then(|text| text.parse().ok());
         parsed.ok_or_else(|| self.wrong(word, "not a number").into())
@@ -82,7 +82,7 @@ pub(super) struct Words<'a> {
 }
 
 impl<'a> Words<'a> {
-    /// Whether a `\` that joins two lines stands at `i`.
+    /// Whether a `\` at `i` joins two lines.
     fn joins(&self, i: usize) -> bool {
         let rest = &self.line.bytes[i..];
         rest.starts_with(b"\\\n") || rest.starts_with(b"\\\r")
@@ -95,7 +95,7 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// All that is left of the line, as a name: without blanks around it and without a comment that a blank parts from it.
+    /// The rest of the line as a name: trimmed, and without a comment that follows a space.
     pub(super) fn rest(mut self) -> (usize, Cow<'a, str>) {
         self.skip_blanks();
         let bytes = &self.line.bytes[self.at..];

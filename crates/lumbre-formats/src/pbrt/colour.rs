@@ -1,10 +1,10 @@
-//! What `rgb` values of a colour space are in linear Rec. 709.
+//! Conversion of `rgb` values of a colour space to linear Rec. 709.
 
 use lumbre_image::{ColourSpace, Rgb};
 use lumbre_math::{DMat3, DVec3};
 
-/// Light: the same stimulus, without adaptation, so that the white of ACES stays warmer than D65. What lies outside the
-/// primaries of Rec. 709 is clipped.
+/// Light: the same stimulus, without adaptation, so that the white of ACES stays warmer than D65. Colours
+/// outside the gamut of Rec. 709 are clipped.
 pub(super) fn light(space: &ColourSpace, rgb: [f64; 3]) -> Rgb {
     if *space == ColourSpace::REC709 {
         return Rgb::new(rgb[0] as f32, rgb[1] as f32, rgb[2] as f32);
@@ -14,12 +14,12 @@ pub(super) fn light(space: &ColourSpace, rgb: [f64; 3]) -> Rgb {
     Rgb::new(c.x as f32, c.y as f32, c.z as f32).map(|c| c.max(0.0))
 }
 
-/// A reflectance or another factor on light: 1 in every channel stays so.
+/// A reflectance or another factor on light: 1 in every channel is preserved.
 pub(super) fn factor(space: &ColourSpace, rgb: [f64; 3]) -> Rgb {
     space.to_rec709(rgb).map(|c| c.max(0.0))
 }
 
-/// CIE XYZ to linear Rec. 709, as pbrt-v3 takes its `xyz` parameters.
+/// CIE XYZ to linear Rec. 709, for pbrt-v3's `xyz` parameters.
 pub(super) fn rgb_from_xyz(xyz: [f64; 3]) -> [f64; 3] {
     let from_rgb = ColourSpace::REC709.to_xyz().unwrap_or(DMat3::IDENTITY);
     (from_rgb.inverse() * DVec3::from_array(xyz)).to_array()

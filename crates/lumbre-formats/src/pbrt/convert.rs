@@ -1,4 +1,4 @@
-//! From the entities of a scene file to a [`SceneDesc`]: the tables of what has a name, and what is put off to the end.
+//! From the entities of a scene file to a [`SceneDesc`]: the tables of named entities, and deferred work.
 
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -18,16 +18,16 @@ use super::source::{Fault, Files, Result, Spot};
 use crate::diagnostic::quoted;
 use crate::{Budget, Diagnostic, Diagnostics, FormatError};
 
-/// Turns entities into the description of the scene.
+/// Converts entities to the description of the scene.
 pub(super) struct Converter<'b, 'd> {
     pub budget: &'b Budget,
     pub diagnostics: &'d mut Diagnostics,
     pub files: Files,
-    /// Where relative file names start; `None` where there are no files to be had.
+    /// The folder of relative file names; `None` if no other files may be read.
     pub directory: Option<PathBuf>,
     pub scene: SceneDesc,
     pub shape_count: u32,
-    /// Each with the place of its first use while it is not defined.
+    /// Each with the place of its first use as long as it is undefined.
     pub materials: Vec<MaterialSlot>,
     pub material_names: HashMap<String, MaterialId>,
     pub objects: Vec<ObjectSlot>,
@@ -38,62 +38,62 @@ pub(super) struct Converter<'b, 'd> {
     pub media: HashMap<String, ()>,
     pub media_used: Vec<(String, Spot)>,
     pub images: HashMap<ImageKey, Arc<MipMap>>,
-    /// Mesh files that are to be read, and by path which they are.
+    /// Mesh files to be read at the end, and their indices by path.
     pub mesh_files: Vec<MeshFile>,
     pub mesh_paths: HashMap<PathBuf, usize>,
-    /// Lights on shapes whose material is not known yet to be a surface.
+    /// Emissive shapes whose material is not yet known to be a surface.
     pub lights_to_check: Vec<(MaterialId, Spot)>,
-    /// CSG shapes, whose mesh operands can only be looked at when they are read.
+    /// Meshes in CSG shapes, which can be checked only after they are read.
     pub meshes_to_close: Vec<(Arc<MeshDesc>, Spot)>,
     pub sampler_seed: Option<u64>,
-    /// When the two current transforms hold.
+    /// The times of the two current transforms.
     pub transform_times: [f64; 2],
     pub exposure: Exposure,
     upgraded: Option<Spot>,
 }
 
-/// A material, by its place in the table.
+/// A material, by its index in the table.
 pub(super) struct MaterialSlot {
     pub name: Option<String>,
     pub material: Option<Arc<Material>>,
     pub first_use: Spot,
-    /// How many mixtures stand in each other here.
+    /// Its depth of nested mixtures.
     pub depth: usize,
 }
 
-/// An object, by its place in the table.
+/// An object, by its index in the table.
 pub(super) struct ObjectSlot {
     pub object: Option<ObjectDesc>,
     pub name: String,
     pub first_use: Spot,
-    /// How many shapes it comes to once every CSG in it is written out, and how deep they nest.
+    /// The number of its shapes with every CSG expanded, and their nesting depth.
     pub leaves: u64,
     pub depth: usize,
 }
 
-/// A mesh file that is to be read: shapes hold `placeholder` until it is.
+/// A mesh file to be read at the end: shapes hold `placeholder` until then.
 pub(super) struct MeshFile {
     pub path: PathBuf,
     pub spot: Spot,
     pub placeholder: Arc<MeshDesc>,
 }
 
-/// What decides the exposure, which camera and film share.
+/// The exposure settings, which camera and film share.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Exposure {
     pub shutter: f64,
     pub iso: f64,
-    /// The factor that pbrt-v3 writes as `scale` of its film.
+    /// The factor `scale` of pbrt-v3's film.
     pub scale: f64,
 }
 
-/// A texture with what bounds the work of its evaluation.
+/// A texture with bounds on the work of its evaluation.
 #[derive(Clone, Debug)]
 pub(super) struct Known<T: TextureValue> {
     pub texture: Arc<Texture<T>>,
-    /// How many textures stand in each other.
+    /// The depth of nested textures.
     pub depth: usize,
-    /// How many one evaluation may come to, shared ones counted each time.
+    /// The number of evaluations, with shared textures counted each time.
     pub leaves: u64,
 }
 
@@ -102,7 +102,7 @@ impl<T: TextureValue> Known<T> {
         Self { texture: Arc::new(Texture::Constant(value)), depth: 1, leaves: 1 }
     }
 
-    /// The value, where it is the same everywhere.
+    /// The value, if it is uniform.
     pub fn value(&self) -> Option<T> {
         match *self.texture {
             Texture::Constant(value) => Some(value),
@@ -111,7 +111,7 @@ impl<T: TextureValue> Known<T> {
     }
 }
 
-/// The most evaluations that one texture may come to.
+/// The maximal number of evaluations of one texture.
 pub(super) const MAX_TEXTURE_LEAVES: u64 = 4096;
 
 pub(super) type FloatArc = Arc<FloatTexture>;
@@ -119,7 +119,7 @@ pub(super) type SpectrumArc = Arc<SpectrumTexture>;
 
 impl<'b, 'd> Converter<'b, 'd> {
     pub fn new(budget: &'b Budget, diagnostics: &'d mut Diagnostics, directory: Option<PathBuf>) -> Self {
-        // What the language says where the scene does not.
+        // The language's defaults.
         let film = FilmDesc { width: Some(1280), height: Some(720), ..FilmDesc::default() };
         let sampler = SamplerDesc { spp: Some(16), ..SamplerDesc::default() };
         Self {
@@ -150,17 +150,17 @@ impl<'b, 'd> Converter<'b, 'd> {
         }
     }
 
-    /// Says something about the input that does not stop the reading.
+    /// Adds a diagnostic that does not stop the reading.
     pub fn warn(&mut self, spot: Spot, diagnostic: Diagnostic) {
         self.diagnostics.push(self.files.locate(spot, diagnostic));
     }
 
-    /// Says that something is left out or replaced.
+    /// Warns that something is ignored or replaced.
     pub fn note(&mut self, spot: Spot, message: impl Into<String>) {
         self.warn(spot, Diagnostic::warning(message));
     }
 
-    /// Says that a type is not known, with the nearest one that is.
+    /// Warns of an unknown type, with the nearest known one.
     pub fn unknown(&mut self, spot: Spot, noun: &str, ty: &str, known: &[&str], instead: &str) {
         let message = format!("unknown {noun} {}: {instead}", quoted(ty));
         let files = &self.files;
@@ -168,14 +168,14 @@ impl<'b, 'd> Converter<'b, 'd> {
             .warn(&message, |unknown| files.locate(spot, unknown.suggest(ty, known.iter().copied())));
     }
 
-    /// Says which parameters were given in vain.
+    /// Warns of unused parameters.
     pub fn done(&mut self, params: &Params) {
         for (spot, warning) in params.unused() {
             self.warn(spot, warning);
         }
     }
 
-    /// Remembers that something of pbrt-v3 was met; said once.
+    /// Notes a use of pbrt-v3 syntax; reported once.
     pub fn upgraded(&mut self, spot: Spot) {
         if self.upgraded.is_none() {
             self.upgraded = Some(spot);
@@ -187,7 +187,7 @@ impl<'b, 'd> Converter<'b, 'd> {
         self.upgraded.is_some()
     }
 
-    /// The path of a file that the scene asks for.
+    /// The path of a file that the scene names.
     pub fn resolve(&self, name: &str, at: Spot) -> Result<PathBuf> {
         match &self.directory {
             Some(directory) => Ok(parser::resolve(directory, name)),
@@ -198,7 +198,7 @@ impl<'b, 'd> Converter<'b, 'd> {
         }
     }
 
-    // Materials and objects by name; uses may stand before definitions.
+    // Materials and objects by name; uses may precede definitions.
 
     pub fn add_material(
         &mut self,
@@ -212,7 +212,7 @@ impl<'b, 'd> Converter<'b, 'd> {
         id
     }
 
-    /// The material that shapes have before the first `Material`.
+    /// The material of shapes before the first `Material`.
     pub fn default_material(&mut self) -> MaterialId {
         let nowhere = Spot { file: 0, line: 1, column: 1 };
         self.add_material(None, Some(Material::default_diffuse()), 1, nowhere)
@@ -269,7 +269,7 @@ impl<'b, 'd> Converter<'b, 'd> {
         Ok(())
     }
 
-    /// The motion between the two current transforms, where they differ.
+    /// The motion between the two current transforms, if they differ.
     pub fn motion(&mut self, spot: Spot, ctm: &[Transform; 2], what: &str) -> Option<Arc<AnimatedTransform>> {
         if ctm[0] == ctm[1] {
             return None;
@@ -285,7 +285,7 @@ impl<'b, 'd> Converter<'b, 'd> {
         }
     }
 
-    /// Puts a shape that moves into the object that is open, else into the world: in an object of its own.
+    /// Adds a moving shape to the open object, or else to the world, in an object of its own.
     pub fn push_moving(
         &mut self,
         shape: ShapeDesc,
@@ -309,7 +309,7 @@ impl<'b, 'd> Converter<'b, 'd> {
         }
     }
 
-    /// Puts a shape into the object that is open, else into the world. `leaves` and `depth` are those of a CSG.
+    /// Adds a shape to the open object, or else to the world. `leaves` and `depth` are those of a CSG.
     pub fn push_shape(&mut self, shape: ShapeDesc, leaves: u64, depth: usize) {
         match self.open_object {
             None => self.scene.shapes.push(shape),
@@ -342,9 +342,9 @@ impl<'b, 'd> Converter<'b, 'd> {
         }
     }
 
-    // The end.
+    // The end of the scene.
 
-    /// Checks what was put off: names, mesh files, lights on interfaces; and puts the tables into the scene.
+    /// Completes deferred work: names, mesh files, lights on interfaces; and moves the tables into the scene.
     pub fn finish(&mut self) -> Result<()> {
         self.check_names()?;
         let meshes = self.read_meshes()?;
@@ -423,7 +423,7 @@ impl<'b, 'd> Converter<'b, 'd> {
     }
 }
 
-/// An error about a file that the scene asks for, at the place that asks.
+/// An error about a file that the scene names, at the place that names it.
 pub(super) fn file_fault(at: Spot, error: FormatError) -> Fault {
     match error {
         FormatError::Io { path, action, source } => {

@@ -1,4 +1,4 @@
-//! Pictures that a scene asks for, each read once.
+//! Images that a scene names, each read once.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -10,16 +10,16 @@ use super::convert::{Converter, file_fault};
 use super::source::{AtSpot, Result, Spot};
 use crate::image::{ImageFile, open_image};
 
-/// What tells one looked-up picture from another: its path, and how it is read and looked up.
+/// The key of an image with its lookup: its path, and how it is decoded and filtered.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(super) struct ImageKey {
     path: PathBuf,
-    // The encoding and the options as text, as their numbers have no hash.
+    // The encoding and the options as text, as their floats have no hash.
     how: String,
 }
 
 impl Converter<'_, '_> {
-    /// The picture of this name; `encoding` replaces what the file says.
+    /// The image of this name; `encoding` overrides the file's.
     pub fn mip_map(
         &mut self,
         name: &str,
@@ -34,7 +34,7 @@ impl Converter<'_, '_> {
         if let Some(image) = self.images.get(&key) {
             return Ok(image.clone());
         }
-        // The same pixels under other options are shared.
+        // The same pixels with other options are shared.
         let same = self.images.iter().find(|(other, _)| other.path == path);
         let bitmap = match same.map(|(_, image)| image.bitmap().clone()) {
             Some(bitmap) if encoding.is_none_or(|e| e == bitmap.encoding()) => bitmap,
@@ -46,14 +46,14 @@ impl Converter<'_, '_> {
                 })
             }
         };
-        // The smaller levels take a third again.
+        // The smaller levels take another third.
         self.budget.bytes(bitmap.bytes() as u64 / 3, name).at(at)?;
         let image = Arc::new(MipMap::new(bitmap, options));
         self.images.insert(key, image.clone());
         Ok(image)
     }
 
-    /// The picture of this name as its file has it.
+    /// The image of this name as stored in its file.
     pub fn image_file(&mut self, name: &str, at: Spot) -> Result<ImageFile> {
         let path = self.resolve(name, at)?;
         open_image(&path, self.budget, self.diagnostics).map_err(|e| file_fault(at, e))

@@ -1,4 +1,4 @@
-//! From the bytes of a scene to its tokens, each with an exact place.
+//! The lexer: from bytes to tokens, each with an exact place.
 
 use std::borrow::Cow;
 use std::ops::Deref;
@@ -7,7 +7,7 @@ use super::source::{Result, Spot};
 use crate::Diagnostic;
 use crate::diagnostic::{quoted, quoted_bytes};
 
-/// What a token is.
+/// The kind of a token.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum TokenKind {
     /// Text in double quotes.
@@ -20,7 +20,7 @@ pub(super) enum TokenKind {
     Bare,
 }
 
-/// A token: which bytes of its file it is (a string with its quotes).
+/// A token: its range of bytes in the file (a string with its quotes).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Token {
     pub kind: TokenKind,
@@ -37,8 +37,8 @@ pub(super) struct Lexer<B> {
     bytes: B,
     file: u32,
     at: usize,
-    // The last place that was asked for: places are found by walking on from it, so that asking for each in turn walks
-    // over the file once.
+    // The last position whose place was computed: the next one continues from it, so that places in order take
+    // one pass over the file.
     walked: Walked,
 }
 
@@ -50,7 +50,6 @@ struct Walked {
 }
 
 impl<B: Deref<Target = [u8]>> Lexer<B> {
-    /// # Errors
     /// When the byte order mark is that of UTF-16 or UTF-32.
     pub fn new(bytes: B, file: u32) -> Result<Self> {
         let all = &*bytes;
@@ -72,8 +71,7 @@ impl<B: Deref<Target = [u8]>> Lexer<B> {
 
     /// The next token, or `None` at the end.
     ///
-    /// # Errors
-    /// When a string does not end on its line, or a control character stands between tokens.
+    /// When a string does not end on its line, or a control character is between tokens.
     pub fn next(&mut self) -> Result<Option<Token>> {
         let bytes = &*self.bytes;
         let mut start = self.at;
@@ -126,17 +124,17 @@ impl<B: Deref<Target = [u8]>> Lexer<B> {
         Ok(Some(Token { kind, start, end }))
     }
 
-    /// Where a token starts. Cheap when asked for tokens in their order.
+    /// The place of a token. Cheap for tokens in order.
     pub fn spot(&mut self, token: Token) -> Spot {
         self.spot_at(token.start)
     }
 
-    /// Where the file ends.
+    /// The place of the end of the file.
     pub fn end_spot(&mut self) -> Spot {
         self.spot_at(self.bytes.len())
     }
 
-    /// The bytes of a token as they stand in the file.
+    /// The bytes of a token, verbatim.
     pub fn raw(&self, token: Token) -> &[u8] {
         &self.bytes[token.start..token.end]
     }
@@ -155,14 +153,13 @@ impl<B: Deref<Target = [u8]>> Lexer<B> {
         }
     }
 
-    /// What a string token says, escapes resolved.
+    /// The contents of a string token, escapes resolved.
     ///
-    /// # Errors
-    /// When it is not UTF-8, or has an escape that there is not.
+    /// When it is not UTF-8, or has an unknown escape.
     pub fn string(&mut self, token: Token) -> Result<Cow<'_, str>> {
         debug_assert_eq!(token.kind, TokenKind::String);
         let (start, end) = (token.start + 1, token.end - 1);
-        // Looked up again below, as a borrow that leaves in one arm would last for the whole function.
+        // Computed again below, since a borrow returned from one arm would last for the whole function.
         let wrong = unescape(&self.bytes[start..end]).err();
         if let Some(wrong) = wrong {
             return Err(self.spot_at(token.start).wrong(*wrong));
@@ -194,7 +191,7 @@ impl<B: Deref<Target = [u8]>> Lexer<B> {
     }
 }
 
-/// What stands between the quotes of a string, escapes resolved.
+/// The contents of a string between its quotes, escapes resolved.
 fn unescape(raw: &[u8]) -> std::result::Result<Cow<'_, str>, Box<Diagnostic>> {
     let Ok(text) = std::str::from_utf8(raw) else {
         return Err(Box::new(Diagnostic::error("string is not UTF-8").found(quoted_bytes(raw))));
@@ -226,9 +223,9 @@ fn unescape(raw: &[u8]) -> std::result::Result<Cow<'_, str>, Box<Diagnostic>> {
     Ok(Cow::Owned(out))
 }
 
-/// A number: decimal, hexadecimal (`0x1.8p3`) or `inf` with a sign. `None` for anything else, `nan` among it.
+/// A number: decimal, hexadecimal (`0x1.8p3`) or `inf` with a sign. `None` for anything else, including `nan`.
 ///
-/// A decimal number beyond the range of f64 comes back infinite.
+/// A decimal number beyond the range of f64 is infinite.
 pub(super) fn parse_number(word: &[u8]) -> Option<f64> {
     let (negative, digits) = match word {
         [b'-', rest @ ..] => (true, rest),
@@ -244,7 +241,7 @@ pub(super) fn parse_number(word: &[u8]) -> Option<f64> {
     Some(if negative { -magnitude } else { magnitude })
 }
 
-/// Whether a word says `inf` itself, rather than a number that is too big.
+/// Whether a word is `inf` itself, rather than a number that is too large.
 pub(super) fn says_infinity(word: &[u8]) -> bool {
     word.iter().any(|b| b.eq_ignore_ascii_case(&b'i'))
 }
@@ -258,7 +255,8 @@ fn parse_hex(text: &[u8]) -> Option<f64> {
             (&text[..p], exponent.clamp(-20_000, 20_000))
         }
     };
-    // 60 bits are kept and the rest is or-ed into the last of them, so that the one rounding below is right.
+    // 60 bits are kept and the rest is or-ed into the last of them, so that the single rounding below is
+    // correct.
     let (mut mantissa, mut shift, mut any, mut point) = (0u64, 0i64, false, false);
     for &byte in digits {
         if byte == b'.' && !point {
@@ -279,7 +277,8 @@ fn parse_hex(text: &[u8]) -> Option<f64> {
         return None;
     }
     let exponent = (shift + i64::from(exponent)).clamp(-3000, 3000) as i32;
-    // In steps, so that no power of two on the way overflows; only the last step can round below the normal range.
+    // In steps, so that no intermediate power of two overflows; only the last step can round below the normal
+    // range.
     let mut value = mantissa as f64;
     let mut left = exponent;
     while left != 0 {

@@ -160,8 +160,8 @@ impl Converter<'_, '_> {
             }
             scale *= (lux / found) as f32;
         }
-        // The edge of a latitude-longitude map is towards +x, as tools that convert maps for pbrt have it; in our
-        // description it is the middle.
+        // The edge of a latitude-longitude map is towards +x, as converters for pbrt write it; in our
+        // description that is the middle.
         let world_from_light = match mapping {
             EnvironmentMapping::EqualArea => world_from_light,
             EnvironmentMapping::LatitudeLongitude => world_from_light * half_turn(),
@@ -170,7 +170,7 @@ impl Converter<'_, '_> {
         Ok(LightDesc::Infinite { world_from_light, radiance: scale, image })
     }
 
-    /// From a point, by direction as an image says, of whose channels the mean counts. Its y and z are exchanged.
+    /// A point light whose intensity by direction is the mean of an image's channels. Its y and z are swapped.
     fn goniometric(&mut self, params: &Params, state: &State) -> Result<LightDesc> {
         let ctm = state.ctm[0];
         let intensity = self.emission(params, "I", state)? * self.light_scale(params)?;
@@ -216,7 +216,7 @@ impl Converter<'_, '_> {
         Ok(LightDesc::Goniometric { world_from_light: turned, intensity: intensity * factor as f32, image })
     }
 
-    /// The light of the next shapes.
+    /// The area light of the following shapes.
     pub fn area_light(&mut self, ty: &str, params: Params, state: &State) -> Result<Option<AreaLight>> {
         let spot = params.spot;
         match ty {
@@ -260,12 +260,12 @@ impl Converter<'_, '_> {
     }
 }
 
-/// The factor that a total power in lumens asks for, where a factor of 1 gives `around` lumens.
+/// The factor for a total power in lumens, where a factor of 1 gives `around` lumens.
 fn power(params: &Params, around: f64) -> Result<f32> {
     Ok(positive(params, "power")?.map_or(1.0, |lumens| lumens / around) as f32)
 }
 
-/// A photometric quantity, which counts when it is more than 0.
+/// A photometric quantity, which is used if it is more than 0.
 fn positive(params: &Params, name: &'static str) -> Result<Option<f64>> {
     let value = f64::from(single(params, name, -1.0)?);
     Ok((value > 0.0).then_some(value))
@@ -275,7 +275,7 @@ fn unit(v: DVec3) -> DVec3 {
     (v / v.abs().max_element()).normalize()
 }
 
-/// A rotation that takes +z along `v`.
+/// A rotation of +z to `v`.
 fn frame_along(v: DVec3) -> Option<Transform> {
     let z = unit(v);
     let x = unit(z.any_orthogonal_vector());
@@ -283,7 +283,7 @@ fn frame_along(v: DVec3) -> Option<Transform> {
     axes.is_finite().then(|| Transform::from_affine(DAffine3::from_mat3(axes)).ok()).flatten()
 }
 
-/// y and z exchanged, which is a mirror.
+/// y and z swapped, which is a mirror.
 fn exchanged() -> Transform {
     let axes = DMat3::from_cols(DVec3::X, DVec3::Z, DVec3::Y);
     Transform::from_affine(DAffine3::from_mat3(axes)).unwrap_or_default()
@@ -294,7 +294,7 @@ fn half_turn() -> Transform {
     Transform::rotate(DVec3::Z, 180.0).unwrap_or_default()
 }
 
-/// How an image covers the sphere, by its shape.
+/// The mapping of an image to the sphere, by its aspect ratio.
 fn environment_mapping(image: &Image, filename: &str, at: Spot) -> Result<EnvironmentMapping> {
     let (width, height) = (image.width(), image.height());
     if width == height {
@@ -308,7 +308,7 @@ fn environment_mapping(image: &Image, filename: &str, at: Spot) -> Result<Enviro
     Err(at.wrong(wrong.expected("a square (equal area) or twice as wide as high")))
 }
 
-/// The integral of a picture over all directions.
+/// The integral of an image over all directions.
 fn flux(image: &Image, mapping: EnvironmentMapping) -> f64 {
     let (width, height) = (f64::from(image.width()), f64::from(image.height()));
     let cosine = |y: u32| (PI * f64::from(y) / height).cos();
@@ -322,13 +322,13 @@ fn flux(image: &Image, mapping: EnvironmentMapping) -> f64 {
     (0..image.height()).map(row).sum()
 }
 
-/// Illuminance, in units of the picture, of a horizontal surface under the upper half of an environment.
+/// Illuminance, in units of the image, of a horizontal surface under the upper half of an environment.
 fn upper_illuminance(image: &Image, mapping: EnvironmentMapping) -> f64 {
     let (width, height) = (f64::from(image.width()), f64::from(image.height()));
     let mut sum = 0.0;
     for y in 0..image.height() {
         let v = (f64::from(y) + 0.5) / height;
-        // The part of a row of latitudes that lies above the horizon, by its projection.
+        // The projected part of a row of latitudes above the horizon.
         let edge = |y: u32| (PI * f64::from(y) / height).min(0.5 * PI).sin().powi(2);
         let row = PI * (edge(y + 1) - edge(y)) / width;
         for x in 0..image.width() {

@@ -1,4 +1,4 @@
-//! Materials, those of pbrt-v3 upgraded.
+//! Materials, with those of pbrt-v3 upgraded.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ use super::textures::{SpectrumUse, single};
 use crate::Diagnostic;
 use crate::diagnostic::quoted;
 
-/// The materials of pbrt-v4 that have a name there.
+/// The material types of pbrt-v4.
 const KNOWN: [&str; 13] = [
     "diffuse",
     "coateddiffuse",
@@ -35,7 +35,7 @@ const KNOWN: [&str; 13] = [
     "principled",
 ];
 
-/// Mixtures may stand in each other so deep.
+/// The maximal depth of nested mixtures.
 const MAX_MIX_DEPTH: usize = 64;
 
 impl Converter<'_, '_> {
@@ -65,8 +65,33 @@ impl Converter<'_, '_> {
         Ok(())
     }
 
-    /// A material, and how many mixtures stand in each other in it.
+    /// A material, and its depth of nested mixtures.
     fn build_material(&mut self, ty: &str, params: &Params) -> Result<(Material, usize)> {
+        let Some((kind, depth)) = self.material_kind(ty, params)? else {
+            return Ok((Material::default_diffuse(), 1));
+        };
+        // Names that pbrt-v4 gives to the shape and the medium, and `MakeNamedMaterial` to the type.
+        params.ignore(&["type"]);
+        let mut material = Material::new(kind);
+        if !matches!(material.kind, MaterialKind::Mix { .. } | MaterialKind::Interface) {
+            material.displacement = self.float_texture(params, "displacement")?;
+            if params.has("bumpmap") {
+                self.upgraded(params.spot_of("bumpmap"));
+                material.displacement = self.float_texture(params, "bumpmap")?;
+            }
+            if let Some(filename) = params.string("normalmap")?.map(str::to_owned) {
+                let at = params.spot_of("normalmap");
+                let image =
+                    self.mip_map(&filename, at, Some(Encoding::Linear), Wrap::Repeat, ImageFilter::Bilinear)?;
+                let mapping = Mapping2d::Uv { scale: Vec2::ONE, delta: Vec2::ZERO };
+                material.normal_map = Some(ImageTexture { mapping, image, scale: 1.0, invert: false });
+            }
+        }
+        Ok((material, depth))
+    }
+
+    /// The kind of a material, and its depth of nested mixtures; `None` for an unknown one, after a warning.
+    fn material_kind(&mut self, ty: &str, params: &Params) -> Result<Option<(MaterialKind, usize)>> {
         let spot = params.spot;
         let mut depth = 1;
         let kind = match ty {
@@ -123,24 +148,7 @@ impl Converter<'_, '_> {
                 MaterialKind::Interface
             }
             "principled" => self.principled(params)?,
-            "hair" | "measured" | "subsurface" | "openpbr" => {
-                let kind = match ty {
-                    "openpbr" => {
-                        let reflectance =
-                            self.spectrum_texture(params, "base_color", SpectrumUse::Reflectance)?;
-                        match reflectance {
-                            Some(known) => MaterialKind::Diffuse { reflectance: known.texture },
-                            None => self.diffuse(params)?,
-                        }
-                    }
-                    _ => self.diffuse(params)?,
-                };
-                params.ignore_all();
-                let message =
-                    format!("material {} is not rendered yet: a diffuse one takes its place", quoted(ty));
-                self.note(spot, message);
-                kind
-            }
+            "hair" | "measured" | "subsurface" | "openpbr" => self.replaced_material(ty, params)?,
             _ => match self.old_material(ty, params)? {
                 Some(kind) => {
                     self.upgraded(spot);
@@ -149,28 +157,27 @@ impl Converter<'_, '_> {
                 None => {
                     params.ignore_all();
                     self.unknown(spot, "material", ty, &KNOWN, "a diffuse one takes its place");
-                    return Ok((Material::default_diffuse(), 1));
+                    return Ok(None);
                 }
             },
         };
-        // Names that pbrt-v4 gives to the shape and the medium, and `MakeNamedMaterial` to the type.
-        params.ignore(&["type"]);
-        let mut material = Material::new(kind);
-        if !matches!(material.kind, MaterialKind::Mix { .. } | MaterialKind::Interface) {
-            material.displacement = self.float_texture(params, "displacement")?;
-            if params.has("bumpmap") {
-                self.upgraded(params.spot_of("bumpmap"));
-                material.displacement = self.float_texture(params, "bumpmap")?;
-            }
-            if let Some(filename) = params.string("normalmap")?.map(str::to_owned) {
-                let at = params.spot_of("normalmap");
-                let image =
-                    self.mip_map(&filename, at, Some(Encoding::Linear), Wrap::Repeat, ImageFilter::Bilinear)?;
-                let mapping = Mapping2d::Uv { scale: Vec2::ONE, delta: Vec2::ZERO };
-                material.normal_map = Some(ImageTexture { mapping, image, scale: 1.0, invert: false });
-            }
-        }
-        Ok((material, depth))
+        Ok(Some((kind, depth)))
+    }
+
+    /// The diffuse material that replaces one that is not rendered yet, with a warning.
+    fn replaced_material(&mut self, ty: &str, params: &Params) -> Result<MaterialKind> {
+        let base_color = match ty {
+            "openpbr" => self.spectrum_texture(params, "base_color", SpectrumUse::Reflectance)?,
+            _ => None,
+        };
+        let kind = match base_color {
+            Some(known) => MaterialKind::Diffuse { reflectance: known.texture },
+            None => self.diffuse(params)?,
+        };
+        params.ignore_all();
+        let message = format!("material {} is not rendered yet: a diffuse one takes its place", quoted(ty));
+        self.note(params.spot, message);
+        Ok(kind)
     }
 
     // Parts.
@@ -183,7 +190,7 @@ impl Converter<'_, '_> {
         Ok(MaterialKind::Diffuse { reflectance: self.reflectance(params, "reflectance", 0.5)? })
     }
 
-    /// The roughness group; `names` are of both axes, of u and of v.
+    /// The roughness parameters; `names` are those of both axes, of u and of v.
     fn roughness(&mut self, params: &Params, names: [&'static str; 3], default: f32) -> Result<Roughness> {
         let both = self.float_texture_or(params, names[0], default)?;
         let u = self.float_texture(params, names[1])?.unwrap_or_else(|| both.clone());
@@ -311,7 +318,7 @@ impl Converter<'_, '_> {
 
     // pbrt-v3.
 
-    /// pbrt-v3's weight of the first material, as a colour: the weight of the second as a number.
+    /// pbrt-v3's weight of the first material, a colour, as the weight of the second, a number.
     fn old_amount(&mut self, params: &Params) -> Result<FloatArc> {
         let types = [Type::Float, Type::Rgb, Type::Spectrum, Type::Texture];
         let Some(param) = params.typed("amount", &types)? else { return Ok(number(0.5)) };
@@ -335,10 +342,10 @@ impl Converter<'_, '_> {
         })
     }
 
-    /// A material of pbrt-v3 by one of pbrt-v4; `None` when there is none of this name.
+    /// A material of pbrt-v3 as one of pbrt-v4; `None` for an unknown name.
     fn old_material(&mut self, ty: &str, params: &Params) -> Result<Option<MaterialKind>> {
         let spot = params.spot;
-        // What no material of pbrt-v4 has a place for.
+        // Parameters without an equivalent in pbrt-v4.
         let dropped = |converter: &mut Self, names: &[&'static str]| {
             for name in names.iter().filter(|name| params.has(name)) {
                 params.ignore(&[name]);
@@ -383,7 +390,7 @@ impl Converter<'_, '_> {
                 let mut share = |name| -> Result<Spectrum> {
                     let known = self.spectrum_texture(params, name, SpectrumUse::Reflectance)?;
                     Ok(known.map_or(Some(Spectrum::splat(0.5)), |known| known.value()).unwrap_or_else(|| {
-                        // A texture of it has no place here.
+                        // A texture of it has no equivalent.
                         Spectrum::splat(0.5)
                     }))
                 };
@@ -423,7 +430,7 @@ impl Converter<'_, '_> {
     }
 }
 
-/// The names of the roughness group.
+/// The names of the roughness parameters.
 const ROUGHNESS: [&str; 3] = ["roughness", "uroughness", "vroughness"];
 
 fn number(v: f32) -> FloatArc {

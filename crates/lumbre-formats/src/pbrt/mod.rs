@@ -1,17 +1,18 @@
 //! Scenes in the language of pbrt-v4, with Lumbre's additions to it.
 //!
-//! Everything that the grammar has is read. What is not rendered yet is left out or replaced by what is nearest, with a
-//! warning at its place. Scenes of pbrt-v3 are upgraded while they are read, with one line that says so.
+//! The whole grammar is read. Features that are not rendered yet are ignored or replaced by the nearest one,
+//! with a warning at the place. Scenes of pbrt-v3 are upgraded while they are read, with a one-line notice.
 //!
-//! Lumbre is kinder than pbrt in this: parameters and types that it does not know are warnings, numbers of a directive may
-//! stand in brackets, integers are taken for floats, latitude-longitude environment maps are taken beside equal-area ones,
-//! and reflectances above 1 are held to 1. `strict` makes each warning an error.
+//! Lumbre is more lenient than pbrt: unknown parameters and types are warnings, numbers of a directive may be
+//! in brackets, integers are accepted as floats, latitude-longitude environment maps are accepted beside
+//! equal-area ones, and reflectances above 1 are clamped to 1. `strict` makes each warning an error.
 //!
-//! [`ShapeDesc::index`](lumbre_scene::ShapeDesc::index) counts the `Shape` directives in the order in which they are read,
-//! those inside objects, in included files and those left out among them.
+//! [`ShapeDesc::index`](lumbre_scene::ShapeDesc::index) counts the `Shape` directives in the order in which
+//! they are read, including those in objects, in included files and ignored ones.
 
 mod colour;
 mod convert;
+mod exact_shapes;
 mod images;
 mod lexer;
 mod lights;
@@ -64,12 +65,11 @@ pub fn read_files(
     })
 }
 
-/// Reads a scene from bytes that come from elsewhere, such as standard input, under a name for messages.
+/// Reads a scene from bytes, such as standard input, with a name for messages.
 ///
-/// Relative names of other files start at `directory`; without one, no other file is read, and a scene that asks for one is
-/// in error.
+/// Relative names of other files start at `directory`; without one, no other file is read, and a scene that
+/// names one is an error.
 ///
-/// # Errors
 /// What is wrong, with its place; see the [module](self).
 pub fn read_bytes(
     name: &str,

@@ -1,4 +1,4 @@
-//! Parameter lists: what was given, what was asked for, and what is left over.
+//! Parameter lists: the given parameters, their lookup, and the unused ones.
 
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
@@ -10,7 +10,7 @@ use super::source::{Result, Spot};
 use crate::Diagnostic;
 use crate::diagnostic::{number, quoted};
 
-/// The types of the scene language.
+/// The types of parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Type {
     Bool,
@@ -29,7 +29,7 @@ pub(super) enum Type {
 }
 
 impl Type {
-    /// The types under their names, those of pbrt-v3 that went away last.
+    /// The types by name; obsolete ones of pbrt-v3 last.
     const NAMES: [(&'static str, Self); 17] = [
         ("bool", Self::Bool),
         ("float", Self::Float),
@@ -49,7 +49,7 @@ impl Type {
         ("color", Self::Rgb),
         ("xyz", Self::Rgb),
     ];
-    /// How many of the names are of pbrt-v4.
+    /// The number of names of pbrt-v4.
     const CURRENT: usize = 13;
 
     /// The type of this name, and whether the name is one of pbrt-v3 only.
@@ -66,7 +66,7 @@ impl Type {
         Self::NAMES[self as usize].0
     }
 
-    /// What its values are in the file.
+    /// The form of its values in a file.
     pub fn wants(self) -> Wants {
         match self {
             Self::Bool => Wants::Bools,
@@ -78,7 +78,7 @@ impl Type {
     }
 }
 
-/// What values a type takes.
+/// The form of values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Wants {
     Bools,
@@ -92,7 +92,7 @@ pub(super) enum Wants {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Values {
     Bools(Vec<bool>),
-    /// Not NaN; infinite only where the file says `inf`.
+    /// Not NaN; infinite only where the file has `inf`.
     Numbers(Vec<f64>),
     Integers(Vec<i32>),
     Strings(Vec<String>),
@@ -108,7 +108,7 @@ impl Values {
         }
     }
 
-    /// What they are, for a message.
+    /// A description for messages.
     pub fn shown(&self) -> String {
         match self {
             Self::Bools(v) if v.len() == 1 => format!("bool {}", v[0]),
@@ -123,7 +123,7 @@ impl Values {
     }
 }
 
-/// One parameter as given.
+/// A parameter as given.
 #[derive(Clone, Debug)]
 pub(super) struct Param {
     pub ty: Type,
@@ -141,7 +141,7 @@ impl Param {
         self.spot.wrong(Diagnostic::error(message).found(found).expected(expected))
     }
 
-    /// An error at this parameter, with what was given.
+    /// An error at this parameter, with its values.
     pub fn refuse(&self, expected: &str) -> super::source::Fault {
         self.wrong(self.values.shown(), expected)
     }
@@ -189,7 +189,7 @@ impl Param {
         }
     }
 
-    /// The one string that it must have.
+    /// Its only string.
     pub fn one_string(&self) -> Result<&str> {
         match self.strings()? {
             [one] => Ok(one),
@@ -197,7 +197,7 @@ impl Param {
         }
     }
 
-    /// The one number that it must have, infinite or not.
+    /// Its only number, infinite or not.
     fn one_number(&self) -> Result<f64> {
         match &self.values {
             Values::Numbers(v) if v.len() == 1 => Ok(v[0]),
@@ -206,7 +206,7 @@ impl Param {
         }
     }
 
-    /// The `N` finite numbers that it must have.
+    /// Its `N` finite numbers.
     pub fn exactly<const N: usize>(&self) -> Result<[f64; N]> {
         let numbers = self.numbers()?;
         numbers.try_into().map_err(|_| self.wrong(self.values.shown(), &format!("{N} numbers")))
@@ -216,13 +216,13 @@ impl Param {
 /// Defaults that `Attribute` set for one kind of entity, one of each name.
 pub(super) type Defaults = Rc<Vec<Rc<Param>>>;
 
-/// The parameters of one entity. Each question marks what answers it as used and remembers the name, so that what was
-/// given in vain is found with the nearest right name.
+/// The parameters of one entity. Each lookup marks the parameter as used and records the name, so that unused
+/// ones are reported with the nearest known name.
 #[derive(Debug)]
 pub(super) struct Params {
-    /// What they belong to, such as `shape "sphere"`.
+    /// The entity, such as `shape "sphere"`.
     pub owner: String,
-    /// Where that stands.
+    /// Its place.
     pub spot: Spot,
     pub own: Vec<Param>,
     pub defaults: Defaults,
@@ -234,7 +234,7 @@ impl Params {
         Self { owner, spot, own, defaults, asked: RefCell::default() }
     }
 
-    /// The parameter of this name that counts: the last one given, else the default of the scope.
+    /// The effective parameter of this name: the last one given, else the default of the scope.
     pub fn find(&self, name: &'static str) -> Option<&Param> {
         self.asked.borrow_mut().push(name);
         let mut found = None;
@@ -250,7 +250,7 @@ impl Params {
         self.find(name).map(|p| p.of_type(types)).transpose()
     }
 
-    /// Whether there is one of this name, without a use of it.
+    /// Whether there is one of this name; does not mark it as used.
     pub fn has(&self, name: &str) -> bool {
         self.own.iter().any(|p| *p.name == *name) || self.defaults.iter().any(|p| *p.name == *name)
     }
@@ -260,14 +260,14 @@ impl Params {
         self.own.iter().rev().find(|p| *p.name == *name).map_or(self.spot, |p| p.spot)
     }
 
-    /// Names that are known but change nothing.
+    /// Marks known names without effect as used.
     pub fn ignore(&self, names: &[&'static str]) {
         for name in names {
             self.find(name);
         }
     }
 
-    /// Marks all as used, for an entity that is left out as a whole.
+    /// Marks all as used, for an entity that is ignored as a whole.
     pub fn ignore_all(&self) {
         self.own.iter().for_each(|p| p.used.set(true));
     }
@@ -289,7 +289,7 @@ impl Params {
         param.map_or(Ok(default), Param::one_number)
     }
 
-    /// A number that f32 can hold, greater than `above`.
+    /// A number in the range of f32, greater than `above`.
     pub fn float_above(&self, name: &'static str, default: f64, above: f64) -> Result<f64> {
         let value = self.float(name, default)?;
         if above < value && value <= f64::from(f32::MAX) {
@@ -342,7 +342,7 @@ impl Params {
         self.typed(name, &[Type::String])?.map(Param::one_string).transpose()
     }
 
-    /// One of some words.
+    /// One of several keywords.
     pub fn choice<T: Copy>(
         &self,
         name: &'static str,
@@ -381,7 +381,7 @@ impl Params {
         }
     }
 
-    /// The parameters that nothing asked for, each as a warning.
+    /// Warnings for unused parameters.
     pub fn unused(&self) -> Vec<(Spot, Diagnostic)> {
         let asked = self.asked.borrow();
         let left = self.own.iter().filter(|p| !p.used.get());

@@ -11,7 +11,7 @@ use super::source::Result;
 use super::textures::{SpectrumUse, single};
 use crate::diagnostic::quoted;
 
-/// What the parameters are called.
+/// The names of the parameters.
 struct Names {
     base_color: &'static str,
     anisotropic: &'static str,
@@ -44,11 +44,11 @@ const OLD: Names = Names {
     diffuse_transmission: "difftrans",
 };
 
-/// Burley's coat is one of index 1.5 over a quarter of the surface.
+/// Burley's coat has an index of 1.5 and covers a quarter of the surface.
 const CLEARCOAT_SHARE: f32 = 0.25;
 
 impl Converter<'_, '_> {
-    /// Material `principled`, by the names that Mitsuba 3 gives to its parameters.
+    /// Material `principled`, with Mitsuba 3's parameter names.
     pub fn principled(&mut self, params: &Params) -> Result<MaterialKind> {
         let mut principled = self.burley(params, &NEW, 0.5)?;
         if params.has("eta") && params.has("specular") {
@@ -60,7 +60,7 @@ impl Converter<'_, '_> {
         } else {
             self.index_of_refraction(params, "eta", 1.5)?
         };
-        // What is Lumbre's own.
+        // Lumbre's additions.
         if params.has("clearcoat_roughness") {
             principled.clearcoat_roughness = self.float_texture_or(params, "clearcoat_roughness", 0.0)?;
         }
@@ -81,7 +81,7 @@ impl Converter<'_, '_> {
                 return params.out_of_range("attenuation_distance", found, "more than 0");
             }
         }
-        // Which changes no picture in the mean.
+        // No effect on the mean image.
         params.ignore(&[
             "main_specular_sampling_rate",
             "diffuse_reflectance_sampling_rate",
@@ -103,7 +103,7 @@ impl Converter<'_, '_> {
         Ok(MaterialKind::Principled(Box::new(principled)))
     }
 
-    /// What both have.
+    /// The common parameters.
     fn burley(&mut self, params: &Params, names: &Names, roughness: f32) -> Result<PrincipledParams> {
         let clearcoat = self.float_texture_or(params, "clearcoat", 0.0)?;
         let gloss =
@@ -124,7 +124,7 @@ impl Converter<'_, '_> {
             specular_tint: self.float_texture_or(params, names.specular_tint, 0.0)?,
             transmission: self.float_texture_or(params, names.transmission, 0.0)?,
             volume: (!thin).then(VolumeParams::default),
-            // Burley counts from 0, all reflected, to 2, all transmitted.
+            // Burley's range is from 0, all reflected, to 2, all transmitted.
             diffuse_transmission: scaled(through, 0.5),
             diffuse_transmission_color: base_color.clone(),
             base_color,

@@ -138,7 +138,7 @@ impl Converter<'_, '_> {
             None => None,
             Some(param) => {
                 let [x0, x1, y0, y1] = param.exactly::<4>()?.map(|v| v.clamp(0.0, 1.0));
-                // pbrt takes either end first.
+                // pbrt accepts either order.
                 let window = [x0.min(x1), x0.max(x1), y0.min(y1), y0.max(y1)];
                 if window[0] == window[1] || window[2] == window[3] {
                     return Err(param.refuse("x0 x1 y0 y1 in [0, 1] of a window with an area"));
@@ -147,7 +147,7 @@ impl Converter<'_, '_> {
             }
         };
         self.exposure.iso = params.float_above("iso", 100.0, 0.0)?;
-        // pbrt-v3: a factor on the picture, and the largest luminance of a sample.
+        // pbrt-v3: a factor on the image, and the largest luminance of a sample.
         self.exposure.scale = params.float_above("scale", 1.0, 0.0)?;
         params.ignore(&["maxsampleluminance"]);
         for old in ["scale", "maxsampleluminance"] {
@@ -166,7 +166,7 @@ impl Converter<'_, '_> {
         if max_component <= 0.0 {
             return params.out_of_range("maxcomponentvalue", max_component, "more than 0");
         }
-        // The diagonal is for the realistic camera alone, and files are as precise as their format.
+        // The diagonal is for the realistic camera only, and the format determines the precision.
         params.ignore(&["diagonal", "savefp16"]);
         if space != ColourSpace::REC709 {
             self.note(spot, "a film in another colour space is not made yet: the picture is in that of sRGB");
@@ -224,7 +224,7 @@ impl Converter<'_, '_> {
         }
         let seed = params.integer("seed", 0)?;
         self.done(&params);
-        // The bits of the number, so that -1 is a seed too.
+        // The bits of the number, so that -1 is a valid seed.
         self.scene.sampler = SamplerDesc { kind, spp: Some(spp), seed: u64::from(seed as u32) };
         Ok(())
     }
@@ -238,7 +238,7 @@ impl Converter<'_, '_> {
         };
         let filter = match ty {
             "gaussian" => {
-                // pbrt-v3 writes exp(-alpha x²).
+                // pbrt-v3 has exp(-alpha x²).
                 let sigma = match params.float_opt("alpha")? {
                     Some(alpha) if alpha > 0.0 => (0.5 / alpha).sqrt(),
                     Some(alpha) => return params.out_of_range("alpha", alpha, "more than 0"),
@@ -331,7 +331,7 @@ impl Converter<'_, '_> {
             }
         };
         let max_depth = params.count("maxdepth", 5, 0)?;
-        // They change how fast the picture gets there, and not the picture.
+        // They affect the speed of convergence, not the image.
         params.ignore(&["lightsampler", "samplelights", "samplebsdf"]);
         for old in ["lightsamplestrategy", "rrthreshold", "strategy"] {
             if params.has(old) {
@@ -345,7 +345,7 @@ impl Converter<'_, '_> {
     }
 
     pub fn accelerator(&mut self, ty: &str, params: Params) -> Result<()> {
-        // Lumbre builds its own tree, and every tree gives the same picture.
+        // Lumbre builds its own tree, which does not affect the image.
         params.ignore_all();
         let known = ["bvh", "kdtree"];
         if !known.contains(&ty) {
@@ -366,7 +366,7 @@ impl Converter<'_, '_> {
                     return Err(at.wrong(wrong.expected("an integer")));
                 }
             },
-            // They change nothing here: there is no pass on a GPU, and no precision to win from another space.
+            // No effect: there is no GPU pass, and nothing to gain from another space.
             "wavefront" | "rendercoordsys" | "displacementedgescale" => {}
             "pixelstats" | "msereferenceimage" | "msereferenceout" => {
                 self.note(at, format!("the option {} is left out: it is not of the picture", quoted(name)));
@@ -402,7 +402,7 @@ impl Converter<'_, '_> {
         Ok(())
     }
 
-    /// What needs more than one directive: exposure, the seed, and the camera of a scene without one.
+    /// Settings that depend on several directives: exposure, the seed, and a default camera.
     pub fn finish_settings(&mut self) -> Result<()> {
         let exposure = self.exposure.shutter * self.exposure.iso / 100.0 * self.exposure.scale;
         self.scene.film.exposure = exposure as f32;
@@ -425,7 +425,7 @@ impl Converter<'_, '_> {
     }
 }
 
-/// The value under the name that pbrt-v3 gave it, else the default.
+/// The value under its pbrt-v3 name, else the default.
 fn params_v3(params: &Params, name: &'static str, default: f64) -> Result<f64> {
     if params.has(name) { params.float_above(name, default, 0.0) } else { Ok(default) }
 }

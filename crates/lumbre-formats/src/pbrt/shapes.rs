@@ -1,17 +1,15 @@
-//! Shapes: exact ones in double precision, meshes, and combinations of solids.
+//! Shapes: exact ones, meshes, and CSG.
 
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use lumbre_geometry::{
-    Aabb, Capsule, Cone, Cuboid, Cylinder, Disk, Hyperboloid, Paraboloid, Plane, Quadric, Shape, ShapeError,
-    Sphere, Torus, Triangle,
-};
-use lumbre_math::{DVec3, Transform, Vec2, Vec3};
+use lumbre_geometry::{Aabb, ShapeError};
+use lumbre_math::{Transform, Vec2, Vec3};
 use lumbre_scene::{CsgDesc, CsgOperation, GeometryDesc, MeshDesc, ShapeDesc};
 use lumbre_shading::Texture;
 
 use super::convert::{Converter, MeshFile, file_fault};
+use super::exact_shapes::exact_shape;
 use super::params::{Params, Type};
 use super::source::{AtSpot, Result, Spot};
 use super::state::State;
@@ -42,13 +40,13 @@ const KNOWN: &[&str] = &[
     "curve",
 ];
 
-/// Solids may be combined so deep.
+/// The maximal nesting depth of CSG.
 const MAX_CSG_DEPTH: usize = 64;
 
-/// A solid may be combined of so many; a ray asks each of them.
+/// The maximal number of leaves of a CSG; every ray tests each of them.
 const MAX_CSG_LEAVES: u64 = 1 << 16;
 
-/// A form, with what a CSG comes to: its leaves and its depth.
+/// A geometry, with the number of leaves and the depth of a CSG.
 struct Form {
     geometry: GeometryDesc,
     leaves: u64,
@@ -105,7 +103,7 @@ impl Converter<'_, '_> {
         Ok(())
     }
 
-    /// The light of the state, where this shape can give it.
+    /// The current area light, if this shape can emit.
     fn area_light_of(
         &mut self,
         geometry: &GeometryDesc,
@@ -145,134 +143,42 @@ impl Converter<'_, '_> {
         Ok(Some(light.desc.clone()))
     }
 
-    /// The form of a shape; `None` for one that is left out, which has been said.
+    /// The geometry of a shape; `None` for one that is ignored with a warning.
     fn form(&mut self, ty: &str, params: &Params) -> Result<Option<Form>> {
-        let point = |name, default| params.triple(name, Type::Point3, default);
-        let exact = match ty {
-            "sphere" => {
-                let radius = params.float("radius", 1.0)?;
-                let sphere = Sphere::new(point("center", DVec3::ZERO)?, radius);
-                let zmin = params.float_or_infinite("zmin", -radius)?;
-                let zmax = params.float_or_infinite("zmax", radius)?;
-                let phimax = params.float("phimax", 360.0)?;
-                let is_whole = zmin <= -radius && radius <= zmax && phimax == 360.0;
-                let part = |s: Sphere| if is_whole { Ok(s) } else { s.partial(zmin, zmax, phimax) };
-                sphere.and_then(part).map(Shape::from)
-            }
-            "plane" => {
-                let normal = params.triple("normal", Type::Normal, DVec3::Z)?;
-                Plane::new(point("point", DVec3::ZERO)?, normal).map(Shape::from)
-            }
-            "disk" => {
-                let normal = params.triple("normal", Type::Normal, DVec3::Z)?;
-                let height = params.float("height", 0.0)?;
-                let up = if height == 0.0 { DVec3::ZERO } else { height * normal.normalize_or_zero() };
-                let center = point("center", DVec3::ZERO)? + up;
-                let (radius, inner) = (params.float("radius", 1.0)?, params.float("innerradius", 0.0)?);
-                let disk = Disk::new(center, normal, radius, inner);
-                let phimax = params.float("phimax", 360.0)?;
-                disk.and_then(|d| d.partial(phimax)).map(Shape::from)
-            }
-            "triangle" => {
-                let corner = |name| -> Result<DVec3> {
-                    let given = params.triple_opt(name, Type::Point3)?;
-                    given.ok_or_else(|| params.spot.error(format!("a triangle has no \"point3 {name}\"")))
-                };
-                Triangle::new(corner("p0")?, corner("p1")?, corner("p2")?).map(Shape::from)
-            }
-            "box" => Cuboid::new(point("p0", DVec3::NEG_ONE)?, point("p1", DVec3::ONE)?).map(Shape::from),
-            "cylinder" => {
-                let radius = params.float("radius", 1.0)?;
-                let caps = params.boolean("caps", false)?;
-                let cylinder = match ends(params)? {
-                    Some((p0, p1)) => Cylinder::new(p0, p1, radius, caps),
-                    None => {
-                        let zmin = params.float_or_infinite("zmin", -1.0)?;
-                        let zmax = params.float_or_infinite("zmax", 1.0)?;
-                        Cylinder::along_z(radius, zmin, zmax, caps)
-                    }
-                };
-                let phimax = params.float("phimax", 360.0)?;
-                cylinder.and_then(|c| c.partial(phimax)).map(Shape::from)
-            }
-            "capsule" => {
-                let (p0, p1) = (point("p0", DVec3::ZERO)?, point("p1", DVec3::Z)?);
-                Capsule::new(p0, p1, params.float("radius", 0.5)?).map(Shape::from)
-            }
-            "cone" => {
-                let caps = params.boolean("caps", false)?;
-                let cone = if params.has("apex") || params.has("axis") || params.has("angle") {
-                    let Some(angle) = params.float_opt("angle")? else {
-                        return Err(params
-                            .spot
-                            .error("a cone with an apex or an axis has no \"float angle\""));
-                    };
-                    let axis = params.triple("axis", Type::Vector3, DVec3::Z)?;
-                    let height = params.float_or_infinite("height", f64::INFINITY)?;
-                    Cone::nappe(point("apex", DVec3::ZERO)?, axis, angle, height, caps)
-                } else {
-                    let (radius, top) = (params.float("radius", 1.0)?, params.float("topradius", 0.0)?);
-                    let (p0, p1) = match ends(params)? {
-                        Some(ends) => ends,
-                        None => (DVec3::ZERO, DVec3::new(0.0, 0.0, params.float("height", 1.0)?)),
-                    };
-                    Cone::new(p0, p1, radius, top, caps)
-                };
-                let phimax = params.float("phimax", 360.0)?;
-                cone.and_then(|c| c.partial(phimax)).map(Shape::from)
-            }
-            "torus" => {
-                let axis = params.triple("axis", Type::Vector3, DVec3::Z)?;
-                let (major, minor) = (params.float("majorradius", 1.0)?, params.float("minorradius", 0.25)?);
-                Torus::new(point("center", DVec3::ZERO)?, axis, major, minor).map(Shape::from)
-            }
-            "paraboloid" => {
-                let radius = params.float("radius", 1.0)?;
-                let (zmin, zmax) = (params.float("zmin", 0.0)?, params.float("zmax", 1.0)?);
-                Paraboloid::new(radius, zmin, zmax, params.float("phimax", 360.0)?).map(Shape::from)
-            }
-            "hyperboloid" => {
-                let (p1, p2) = (point("p1", DVec3::ZERO)?, point("p2", DVec3::ONE)?);
-                Hyperboloid::new(p1, p2, params.float("phimax", 360.0)?).map(Shape::from)
-            }
-            "quadric" => {
-                let Some(param) = params.typed("coefficients", &[Type::Float])? else {
-                    return Err(params.spot.error("a quadric has no \"float coefficients\""));
-                };
-                let clip = ends(params)?.map(|(p0, p1)| Aabb::around([p0, p1]));
-                Quadric::new(param.exactly::<10>()?, clip).map(Shape::from)
-            }
-            "csg" => return self.csg(params).map(Some),
-            "trianglemesh" => return Ok(self.triangle_mesh(params)?.map(Form::from)),
-            "bilinearmesh" => return Ok(self.bilinear_mesh(params)?.map(Form::from)),
-            "plymesh" => return self.ply_mesh(params).map(|g| Some(g.into())),
-            "loopsubdiv" => return self.loop_subdivision(params).map(|g| Some(g.into())),
+        if let Some(made) = exact_shape(ty, params)? {
+            return match made {
+                Ok(shape) => Ok(Some(GeometryDesc::Exact(shape).into())),
+                Err(ShapeError::OutOfRange { parameter, found, expected }) => {
+                    params.out_of_range(parameter, found, expected)
+                }
+                Err(ShapeError::Degenerate(why)) => Err(params.spot.error(why)),
+                Err(other) => Err(params.spot.error(format!("this shape cannot be made: {other:?}"))),
+            };
+        }
+        match ty {
+            "csg" => self.csg(params).map(Some),
+            "trianglemesh" => Ok(self.triangle_mesh(params)?.map(Form::from)),
+            "bilinearmesh" => Ok(self.bilinear_mesh(params)?.map(Form::from)),
+            "plymesh" => self.ply_mesh(params).map(|g| Some(g.into())),
+            "loopsubdiv" => self.loop_subdivision(params).map(|g| Some(g.into())),
             "curve" => {
                 self.note(params.spot, "shape \"curve\" is not rendered yet: it is left out");
-                return Ok(None);
+                Ok(None)
             }
             "heightfield" | "nurbs" => {
                 self.upgraded(params.spot);
                 let message = format!("shape {} of pbrt-v3 is not rendered: it is left out", quoted(ty));
                 self.note(params.spot, message);
-                return Ok(None);
+                Ok(None)
             }
             _ => {
                 self.unknown(params.spot, "shape", ty, KNOWN, "it is left out");
-                return Ok(None);
+                Ok(None)
             }
-        };
-        match exact {
-            Ok(shape) => Ok(Some(GeometryDesc::Exact(shape).into())),
-            Err(ShapeError::OutOfRange { parameter, found, expected }) => {
-                params.out_of_range(parameter, found, expected)
-            }
-            Err(ShapeError::Degenerate(why)) => Err(params.spot.error(why)),
-            Err(other) => Err(params.spot.error(format!("this shape cannot be made: {other:?}"))),
         }
     }
 
-    // Combinations of solids.
+    // CSG.
 
     fn csg(&mut self, params: &Params) -> Result<Form> {
         let operations = [
@@ -331,7 +237,7 @@ impl Converter<'_, '_> {
             if leaves > MAX_CSG_LEAVES {
                 return Err(at.error(format!("more than {MAX_CSG_LEAVES} solids are combined into one")));
             }
-            // Each operand is written out: objects in objects in a csg may come to very many.
+            // Operands are expanded: nested objects in a csg may become very many.
             self.budget.elements(slot.leaves, "operands of a csg").at(at)?;
             let bytes = slot.leaves.saturating_mul(size_of::<ShapeDesc>() as u64);
             self.budget.bytes(bytes, "operands of a csg").at(at)?;
@@ -359,7 +265,7 @@ impl Converter<'_, '_> {
         Ok(positions)
     }
 
-    /// The indices, `N` a face, checked; faces that cannot be used are dropped where the reader is lenient.
+    /// The indices, `N` per face, checked; unusable faces are dropped where the reader is lenient.
     fn faces<const N: usize>(
         &mut self,
         params: &Params,
@@ -437,7 +343,7 @@ impl Converter<'_, '_> {
         if let Some(tangents) = &mesh.tangents {
             same("S", tangents.len())?;
         }
-        // pbrt-v3 has `float uv` and `float st` too.
+        // pbrt-v3 also has `float uv` and `float st`.
         let uv = ["uv", "st"].into_iter().find(|name| params.has(name));
         if let Some(name) = uv {
             let Some(param) = params.typed(name, &[Type::Point2, Type::Float])? else { return Ok(()) };
@@ -461,7 +367,7 @@ impl Converter<'_, '_> {
                 let expected = format!("{faces}, as many as faces");
                 return Err(spot.wrong(wrong.found(indices.len()).expected(expected)));
             }
-            // The bits of the number: what it means is the writer's business.
+            // The bits of the number, whose meaning is the writer's.
             mesh.face_indices = Some(kept.iter().map(|&i| indices[i] as u32).collect());
         }
         let numbers =
@@ -515,7 +421,7 @@ impl Converter<'_, '_> {
         let levels = params.count("nlevels", 3, 0)?;
         let levels = params.count("levels", levels, 0)?;
         params.ignore(&["scheme"]);
-        // Each level has four times the faces: this stops the tenth level of a big mesh before it is made.
+        // Each level has four times the faces: checked before they are made.
         let at = params.spot_of("levels");
         let growth = 4u64.checked_pow(levels).unwrap_or(u64::MAX);
         let last = growth.saturating_mul(faces.len() as u64);
@@ -530,7 +436,7 @@ impl Converter<'_, '_> {
         Ok(GeometryDesc::Mesh(Arc::new(mesh)))
     }
 
-    /// A mesh from a file, which is read at the end, with the others.
+    /// A mesh from a file, which is read at the end with the others.
     fn ply_mesh(&mut self, params: &Params) -> Result<GeometryDesc> {
         let Some(filename) = params.string("filename")?.map(str::to_owned) else {
             return Err(params.spot.error("a plymesh has no \"string filename\""));
@@ -549,14 +455,14 @@ impl Converter<'_, '_> {
         Ok(GeometryDesc::Mesh(self.mesh_files[file].placeholder.clone()))
     }
 
-    /// Reads the mesh files, several at a time; answers each under its placeholder.
+    /// Reads the mesh files in parallel; returns each by its placeholder.
     pub fn read_meshes(&mut self) -> Result<HashMap<*const MeshDesc, Arc<MeshDesc>>> {
         let files = std::mem::take(&mut self.mesh_files);
         let strictness = self.diagnostics.strictness();
         let budget = self.budget;
         let next = std::sync::atomic::AtomicUsize::new(0);
         let threads = std::thread::available_parallelism().map_or(1, |n| n.get()).min(files.len());
-        // Each file keeps what was said of it, so that warnings come in the order of the scene.
+        // Diagnostics are kept per file, so that warnings are in the order of the scene.
         let read = |file: &MeshFile| {
             let mut diagnostics = Diagnostics::with_strictness(strictness);
             let mesh = Input::open(&file.path, budget)
@@ -582,27 +488,15 @@ impl Converter<'_, '_> {
         });
         let mut meshes = HashMap::new();
         for (file, result) in files.iter().zip(results) {
-            // A worker that died has left no answer: the file is read again here.
+            // A worker that died has no result: the file is read again here.
             let (mesh, diagnostics) = result.unwrap_or_else(|| read(file));
             self.diagnostics.append(diagnostics);
             let mesh = mesh.map_err(|e| file_fault(file.spot, e))?;
             meshes.insert(Arc::as_ptr(&file.placeholder), Arc::new(mesh));
         }
-        // Pointers stand for placeholders as long as these live.
+        // Pointers identify placeholders as long as these live.
         self.mesh_files = files;
         Ok(meshes)
-    }
-}
-
-/// The two corners or ends, both or none.
-fn ends(params: &Params) -> Result<Option<(DVec3, DVec3)>> {
-    let p0 = params.triple_opt("p0", Type::Point3)?;
-    let p1 = params.triple_opt("p1", Type::Point3)?;
-    match (p0, p1) {
-        (Some(p0), Some(p1)) => Ok(Some((p0, p1))),
-        (None, None) => Ok(None),
-        (Some(_), None) => Err(params.spot_of("p0").error("p0 without p1")),
-        (None, Some(_)) => Err(params.spot_of("p1").error("p1 without p0")),
     }
 }
 
@@ -617,15 +511,15 @@ fn triples(params: &Params, name: &'static str, ty: Type) -> Result<Option<Vec<V
     list.map(Some).ok_or_else(|| param.refuse("numbers of single precision"))
 }
 
-/// Whether each edge of a mesh is shared by exactly two faces that run along it in opposite directions, where vertices at
-/// the same place count as one.
+/// Whether each edge of a mesh is shared by exactly two faces in opposite directions, with vertices at the same
+/// position merged.
 pub(super) fn is_closed(mesh: &MeshDesc) -> bool {
     let mut places = HashMap::new();
     let vertex: Vec<u32> = mesh
         .positions
         .iter()
         .map(|p| {
-            // Adding 0 makes one zero of two.
+            // Adding 0 turns -0 into 0.
             let key = (*p + Vec3::ZERO).to_array().map(f32::to_bits);
             let next = places.len() as u32;
             *places.entry(key).or_insert(next)
@@ -638,7 +532,7 @@ pub(super) fn is_closed(mesh: &MeshDesc) -> bool {
         for (i, &a) in face.iter().enumerate() {
             let (a, b) = (vertex[a as usize], vertex[face[(i + 1) % face.len()] as usize]);
             if a == b {
-                // An edge without a length borders nothing.
+                // An edge of length 0 is ignored.
                 continue;
             }
             any = true;

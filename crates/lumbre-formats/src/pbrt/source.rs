@@ -1,4 +1,4 @@
-//! Where words of a scene stand: files, the includes that led to them, and faults with their place.
+//! Places in scene files: files, the includes that led to them, and errors with their place.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ pub(super) struct Spot {
     pub column: u32,
 }
 
-/// The files read so far, with the place that asked for each.
+/// The files read so far, with the place that included each.
 #[derive(Debug, Default)]
 pub(super) struct Files {
     list: Vec<(Arc<str>, Option<Spot>)>,
@@ -47,11 +47,11 @@ impl Files {
 /// Why reading stops.
 #[derive(Debug)]
 pub(super) enum Fault {
-    /// The scene is wrong here.
+    /// The scene is invalid here.
     Input(Spot, Box<Diagnostic>),
-    /// A limit is met here.
+    /// A limit is exceeded here.
     Limit(Spot, LimitError),
-    /// Another reader has already said what and where.
+    /// Another reader has already reported what and where.
     Other(Box<FormatError>),
 }
 
@@ -79,13 +79,13 @@ impl Spot {
         Fault::Input(self, Box::new(diagnostic))
     }
 
-    /// An error here that is only a message.
+    /// An error here with only a message.
     pub fn error(self, message: impl Into<String>) -> Fault {
         self.wrong(Diagnostic::error(message))
     }
 }
 
-/// Puts a limit at its place.
+/// Adds the place to the error of a limit.
 pub(super) trait AtSpot<T> {
     fn at(self, spot: Spot) -> Result<T>;
 }

@@ -1,4 +1,4 @@
-//! What directives change: the graphics state, and the scopes that save it.
+//! The graphics state, and the scopes that save it.
 
 use std::sync::Arc;
 
@@ -29,7 +29,7 @@ impl EntityKind {
     ];
 }
 
-/// The light that the next shapes give.
+/// The area light of the following shapes.
 #[derive(Clone, Debug)]
 pub(super) struct AreaLight {
     pub desc: AreaLightDesc,
@@ -41,14 +41,14 @@ pub(super) struct AreaLight {
 pub(super) struct State {
     /// The current transforms at the start and at the end of the motion.
     pub ctm: [Transform; 2],
-    /// Which of the two the next transform changes.
+    /// Which of the two transforms are active.
     pub active: [bool; 2],
     pub reverse_orientation: bool,
     pub space: ColourSpace,
     /// `None` for an interface.
     pub material: Option<MaterialId>,
     pub area_light: Option<Arc<AreaLight>>,
-    /// Defaults of `Attribute`, by [`EntityKind`].
+    /// Defaults from `Attribute`, by [`EntityKind`].
     pub defaults: [Defaults; 5],
 }
 
@@ -71,7 +71,7 @@ impl State {
     }
 }
 
-/// What opened a scope.
+/// The directive that opened a scope.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ScopeKind {
     Attribute,
@@ -97,7 +97,7 @@ impl ScopeKind {
     }
 }
 
-/// A scope that is open, and the state that comes back at its end.
+/// An open scope, with the state to restore.
 #[derive(Debug)]
 pub(super) struct Scope {
     pub kind: ScopeKind,

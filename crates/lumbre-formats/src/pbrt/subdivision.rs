@@ -10,10 +10,10 @@ use std::f64::consts::{PI, TAU};
 use lumbre_math::{DVec3, Vec3};
 use lumbre_scene::MeshDesc;
 
-/// Subdivides `faces` over `positions` so many times and moves the vertices to the limit.
+/// Subdivides `faces` over `positions` `levels` times and moves the vertices to the limit.
 ///
-/// # Errors
-/// When more than two faces share an edge, two neighbours disagree about the front, or faces meet in a vertex alone.
+/// When more than two faces share an edge, two neighbours have opposite orientations, or faces meet in a vertex
+/// alone.
 pub(super) fn subdivide(positions: &[Vec3], faces: &[[u32; 3]], levels: u32) -> Result<MeshDesc, String> {
     let mut points: Vec<DVec3> = positions.iter().map(|p| p.as_dvec3()).collect();
     let mut faces = faces.to_vec();
@@ -33,7 +33,7 @@ pub(super) fn subdivide(positions: &[Vec3], faces: &[[u32; 3]], levels: u32) -> 
     })
 }
 
-/// The neighbours of a vertex, counter-clockwise; at a border from one end of it to the other.
+/// The neighbours of a vertex, counter-clockwise; at a boundary from one end to the other.
 #[derive(Clone, Debug, Default)]
 struct Ring {
     neighbours: Vec<u32>,
@@ -41,7 +41,7 @@ struct Ring {
 }
 
 fn rings(vertices: usize, faces: &[[u32; 3]]) -> Result<Vec<Ring>, String> {
-    // In a face (v, a, b) the ring about v goes from a to b.
+    // In a face (v, a, b) the ring around v goes from a to b.
     let mut steps: Vec<Vec<(u32, u32)>> = vec![vec![]; vertices];
     for face in faces {
         for i in 0..3 {
@@ -64,7 +64,7 @@ fn rings(vertices: usize, faces: &[[u32; 3]]) -> Result<Vec<Ring>, String> {
             }
         }
         let Some(&(first, _)) = steps.first() else { return Ok(Ring::default()) };
-        // The start of an open ring is the one neighbour that none comes before.
+        // An open ring starts at the one neighbour without a predecessor.
         let start = steps.iter().map(|(a, _)| *a).find(|a| !has_before.contains_key(a));
         let mut neighbours = vec![start.unwrap_or(first)];
         while let Some(&b) = neighbours.last().and_then(|a| next.get(a)) {
@@ -86,7 +86,7 @@ fn rings(vertices: usize, faces: &[[u32; 3]]) -> Result<Vec<Ring>, String> {
     steps.into_iter().enumerate().map(ring).collect()
 }
 
-/// An edge: the vertex that becomes its middle, and the corners of the one or two faces beside it.
+/// An edge: the vertex at its middle, and the opposite corners of its one or two faces.
 struct Edge {
     middle: u32,
     across: [Option<u32>; 2],
@@ -103,7 +103,7 @@ fn beta(valence: usize) -> f64 {
 
 fn refine(points: &[DVec3], faces: &[[u32; 3]]) -> Result<(Vec<DVec3>, Vec<[u32; 3]>), String> {
     let rings = rings(points.len(), faces)?;
-    // Old vertices keep their numbers.
+    // Old vertices keep their indices.
     let mut new: Vec<DVec3> = points
         .iter()
         .zip(&rings)
@@ -118,7 +118,7 @@ fn refine(points: &[DVec3], faces: &[[u32; 3]]) -> Result<(Vec<DVec3>, Vec<[u32;
             }
         })
         .collect();
-    // The vertex of each edge, in the order of the faces, with the corners across it.
+    // The vertex of each edge, in the order of the faces, with the opposite corners.
     let mut across: HashMap<(u32, u32), Edge> = HashMap::with_capacity(faces.len() * 3 / 2);
     let mut edges = vec![];
     for face in faces {
@@ -176,7 +176,7 @@ fn limit_normal(p: DVec3, ring: &Ring, points: &[DVec3]) -> DVec3 {
             (s + cos * at(i), t + sin * at(i))
         })
     } else {
-        // Along the border, and across it into the surface.
+        // Along the boundary, and across it into the surface.
         let along = at(0) - at(n - 1);
         let inward = match n {
             2 => at(0) + at(1) - 2.0 * p,

@@ -17,10 +17,10 @@ use super::source::{Result, Spot};
 use crate::diagnostic::quoted;
 use crate::{Diagnostic, Input};
 
-/// What a spectrum is for, which decides what `rgb` means and what it may be.
+/// The use of a spectrum, which determines the meaning and the range of `rgb`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum SpectrumUse {
-    /// A share of light, at most 1.
+    /// A reflectance, at most 1.
     Reflectance,
     /// Any factor or coefficient.
     Coefficient,
@@ -34,9 +34,9 @@ const SPECTRAL: [Type; 3] = [Type::Rgb, Type::Blackbody, Type::Spectrum];
 /// The two kinds of texture value.
 pub(super) trait SceneValue: TextureValue {
     const NAME: &'static str;
-    /// What stands for a texture that cannot be rendered.
+    /// The value that replaces a texture that cannot be rendered.
     fn grey(v: f32) -> Self;
-    /// The number that it is, where it is the same on all lanes.
+    /// The number, if it is equal on all channels.
     fn as_number(self) -> Option<f32>;
     fn table<'a>(converter: &'a mut Converter<'_, '_>) -> &'a mut HashMap<String, Known<Self>>;
     fn get(
@@ -100,7 +100,7 @@ impl SceneValue for Spectrum {
     }
 }
 
-/// A number of single precision.
+/// A number in single precision.
 pub(super) fn single(params: &Params, name: &'static str, default: f32) -> Result<f32> {
     let value = params.float(name, f64::from(default))?;
     if value.abs() <= f64::from(f32::MAX) {
@@ -109,10 +109,27 @@ pub(super) fn single(params: &Params, name: &'static str, default: f32) -> Resul
     params.out_of_range(name, value, "a number of single precision")
 }
 
+/// The kinds of texture.
+const KNOWN_KINDS: [&str; 13] = [
+    "constant",
+    "scale",
+    "mix",
+    "directionmix",
+    "bilerp",
+    "imagemap",
+    "checkerboard",
+    "dots",
+    "fbm",
+    "wrinkled",
+    "windy",
+    "marble",
+    "ptex",
+];
+
 impl Converter<'_, '_> {
     // Spectra.
 
-    /// The spectrum that a parameter says, and the factor that pbrt-v3 may write after a temperature.
+    /// The spectrum of a parameter, and the factor that pbrt-v3 may write after a temperature.
     fn spectrum(&mut self, param: &Param, usage: SpectrumUse) -> Result<(SpectrumValue, f32)> {
         match (param.ty, &param.values) {
             (Type::Rgb, _) => {
@@ -194,7 +211,7 @@ impl Converter<'_, '_> {
         Ok(SpectrumValue::Sampled(pairs))
     }
 
-    /// A spectrum by wavelength or as a colour, which is no texture.
+    /// A spectrum by wavelength or as a colour, but not a texture.
     pub fn spectrum_value(
         &mut self,
         params: &Params,
@@ -205,7 +222,7 @@ impl Converter<'_, '_> {
         Ok(Some(self.spectrum(param, usage)?.0))
     }
 
-    /// The colour of light as photometry wants it: `rgb` times the colour space's white, whose luminance is 1; any other
+    /// A photometric colour of light: `rgb` times the colour space's white, whose luminance is 1; any other
     /// spectrum with luminance 1.
     pub fn light_colour(&mut self, params: &Params, name: &'static str) -> Result<Option<Spectrum>> {
         let Some(param) = params.typed(name, &SPECTRAL)? else { return Ok(None) };
@@ -236,7 +253,7 @@ impl Converter<'_, '_> {
         Ok(Some(Known::constant(colour)))
     }
 
-    /// The same with a grey default.
+    /// [`Self::spectrum_texture`] with a grey default.
     pub fn spectrum_texture_or(
         &mut self,
         params: &Params,
@@ -262,7 +279,7 @@ impl Converter<'_, '_> {
         Ok(self.float_texture(params, name)?.unwrap_or_else(|| Arc::new(Texture::Constant(default))))
     }
 
-    /// The texture that a parameter names.
+    /// The texture named by a parameter.
     fn texture_named<T: SceneValue>(&mut self, param: &Param) -> Result<Known<T>> {
         let name = param.one_string()?;
         if let Some(known) = T::table(self).get(name) {
@@ -365,38 +382,11 @@ impl Converter<'_, '_> {
             }
             "imagemap" => self.image_texture(&params, texture_from_world)?,
             "dots" | "fbm" | "wrinkled" | "windy" | "marble" | "ptex" => {
-                // About the mean of each; dots cover less than half of the surface.
-                let mean = match ty {
-                    "dots" => self.part::<T>(&params, "outside", 0.0)?,
-                    "wrinkled" => Known::constant(T::grey(0.4)),
-                    "marble" => Known::constant(T::grey(0.8)),
-                    "ptex" => Known::constant(T::grey(0.5)),
-                    _ => Known::constant(T::grey(0.0)),
-                };
-                params.ignore_all();
-                let message =
-                    format!("texture {} is not rendered yet: a constant takes its place", quoted(ty));
-                self.note(spot, message);
-                mean
+                self.replaced_texture::<T>(ty, &params)?
             }
             _ => {
-                let known = [
-                    "constant",
-                    "scale",
-                    "mix",
-                    "directionmix",
-                    "bilerp",
-                    "imagemap",
-                    "checkerboard",
-                    "dots",
-                    "fbm",
-                    "wrinkled",
-                    "windy",
-                    "marble",
-                    "ptex",
-                ];
                 params.ignore_all();
-                self.unknown(spot, "texture", ty, &known, "the constant 0.5 takes its place");
+                self.unknown(spot, "texture", ty, &KNOWN_KINDS, "the constant 0.5 takes its place");
                 Known::constant(T::grey(0.5))
             }
         };
@@ -405,7 +395,23 @@ impl Converter<'_, '_> {
         Ok(())
     }
 
-    /// A part of a texture: a value or another texture.
+    /// The constant that replaces a texture that is not rendered yet, with a warning.
+    fn replaced_texture<T: SceneValue>(&mut self, ty: &str, params: &Params) -> Result<Known<T>> {
+        // About the mean of each; dots cover less than half of the surface.
+        let mean = match ty {
+            "dots" => self.part::<T>(params, "outside", 0.0)?,
+            "wrinkled" => Known::constant(T::grey(0.4)),
+            "marble" => Known::constant(T::grey(0.8)),
+            "ptex" => Known::constant(T::grey(0.5)),
+            _ => Known::constant(T::grey(0.0)),
+        };
+        params.ignore_all();
+        let message = format!("texture {} is not rendered yet: a constant takes its place", quoted(ty));
+        self.note(params.spot, message);
+        Ok(mean)
+    }
+
+    /// An operand of a texture: a value or another texture.
     fn part<T: SceneValue>(&mut self, params: &Params, name: &'static str, default: f32) -> Result<Known<T>> {
         Ok(T::get(self, params, name)?.unwrap_or_else(|| Known::constant(T::grey(default))))
     }
@@ -413,7 +419,7 @@ impl Converter<'_, '_> {
     fn scale_texture<T: SceneValue>(&mut self, params: &Params) -> Result<Known<T>> {
         let old = params.has("tex1") || params.has("tex2");
         let (value, factor) = if old {
-            // pbrt-v3: a product of two of a kind. One of them must become a number.
+            // pbrt-v3: a product of two of a kind. One of them must be a number.
             self.upgraded(params.spot);
             let (a, b) = (self.part::<T>(params, "tex1", 1.0)?, self.part::<T>(params, "tex2", 1.0)?);
             let grey = |known: &Known<T>| known.value().and_then(T::as_number);
@@ -481,7 +487,7 @@ impl Converter<'_, '_> {
     }
 }
 
-/// The encoding that a texture names for its image.
+/// The encoding of a texture's image.
 pub(super) fn encoding(params: &Params) -> Result<Option<Encoding>> {
     let Some(name) = params.string("encoding")? else { return Ok(None) };
     match Encoding::from_name(name) {
@@ -493,7 +499,7 @@ pub(super) fn encoding(params: &Params) -> Result<Option<Encoding>> {
     }
 }
 
-/// From the surface to the plane of a texture.
+/// The mapping from the surface to the plane of a texture.
 fn mapping(params: &Params, texture_from_world: Transform) -> Result<Mapping2d> {
     #[derive(Clone, Copy)]
     enum Kind {
@@ -529,7 +535,7 @@ fn size<T: TextureValue>(known: &Known<T>) -> (usize, u64) {
     (known.depth, known.leaves)
 }
 
-/// A texture of parts, unless they are too deep or too many for one evaluation.
+/// A composite texture, checked against the limits on depth and evaluations.
 fn whole<T: TextureValue>(texture: Texture<T>, parts: &[(usize, u64)], spot: Spot) -> Result<Known<T>> {
     let depth = 1 + parts.iter().map(|(depth, _)| *depth).max().unwrap_or(0);
     let leaves = parts.iter().fold(1u64, |sum, (_, leaves)| sum.saturating_add(*leaves));
@@ -559,7 +565,7 @@ fn pairs(numbers: &[f64]) -> std::result::Result<Vec<(f64, f64)>, &'static str> 
     Ok(pairs)
 }
 
-/// Vectors of a mesh or a light that single precision can hold.
+/// A vector of a mesh or a light in the range of single precision.
 pub(super) fn vec3(numbers: &[f64]) -> Option<Vec3> {
     let v = Vec3::new(numbers[0] as f32, numbers[1] as f32, numbers[2] as f32);
     v.is_finite().then_some(v)

@@ -1,4 +1,4 @@
-//! Light from one exact shape.
+//! Area lights of one exact shape.
 
 use lumbre_geometry::{PlacedShape, Ray, Surface};
 use lumbre_math::{DVec2, DVec3};
@@ -7,10 +7,10 @@ use lumbre_shading::{FloatTexture, Scatter, Spectrum};
 use super::{LightPoint, LightSample};
 use crate::surface::SurfaceEntry;
 
-/// A bounded exact shape that shines.
+/// A bounded, emissive exact shape.
 #[derive(Clone, Debug)]
 pub struct ShapeLight {
-    /// Which surface of the scene it is.
+    /// Its surface entry in the scene.
     pub(crate) entry: u32,
     pub(crate) shape: PlacedShape,
     pub(crate) power: f64,
@@ -19,7 +19,7 @@ pub struct ShapeLight {
 impl ShapeLight {
     pub(super) fn sample(&self, entry: &SurfaceEntry, from: DVec3, u: DVec2) -> Option<LightSample> {
         let sample = self.shape.sample_direction(from, u)?;
-        // The coordinates of a face are its uv until its vertices say otherwise.
+        // The coordinates of a face are its uv, unless vertices override them.
         arriving(entry, &sample.surface, 0, sample.surface.uv, from, sample.pdf)
     }
 
@@ -28,40 +28,40 @@ impl ShapeLight {
     }
 }
 
-/// The light that arrives at `from` from a point of a surface.
+/// The light arriving at `from` from a point of a surface.
 pub(super) fn arriving(
     entry: &SurfaceEntry,
-    bare: &Surface,
+    geometric: &Surface,
     primitive: u32,
     local: DVec2,
     from: DVec3,
     pdf: f64,
 ) -> Option<LightSample> {
-    let dressed = entry.dress(bare, primitive, local, None, 0.0);
-    let towards = (dressed.surface.point - from).try_normalize()?;
-    let front = dressed.surface.normal.dot(towards) < 0.0;
+    let shaded = entry.shading_geometry(geometric, primitive, local, None, 0.0);
+    let towards = (shaded.surface.point - from).try_normalize()?;
+    let front = shaded.surface.normal.dot(towards) < 0.0;
     let emission = entry.emission.as_ref()?;
-    let uv = dressed.surface.uv.as_vec2();
-    let mut radiance = emission.at(front, uv, dressed.vertex.colour);
+    let uv = shaded.surface.uv.as_vec2();
+    let mut radiance = emission.at(front, uv, shaded.vertex.colour);
     let mut scatter = Scatter::Density(pdf as f32);
     if let Some(alpha) = &entry.alpha {
         if matches!(**alpha, FloatTexture::Constant(0.0)) {
-            // Cut out altogether it still shines, but no ray finds it.
+            // A cut-out still emits, but no ray hits it.
             radiance *= (1.0 / pdf) as f32;
             scatter = Scatter::Delta;
         } else {
-            radiance *= alpha.evaluate(&dressed.bare_context()).clamp(0.0, 1.0);
+            radiance *= alpha.evaluate(&shaded.point_context()).clamp(0.0, 1.0);
         }
     }
     (pdf > 0.0 && !radiance.is_black()).then(|| LightSample {
         towards,
-        end: Some(LightPoint::on(&dressed.surface)),
+        end: Some(LightPoint::on(&shaded.surface)),
         radiance,
         scatter,
     })
 }
 
-/// The power of a surface of some area that emits this in the mean.
+/// The power of a surface from its mean emission and its area.
 pub(crate) fn power(mean: Spectrum, sides: f32, area: f64) -> f64 {
     std::f64::consts::PI * area * f64::from(sides * mean.average())
 }

@@ -1,4 +1,4 @@
-//! Lights that no ray can hit: they shine from a point or from one direction.
+//! Delta lights: point, spot and directional lights, which no ray can hit.
 
 use lumbre_math::{DAffine3, DMat3, DVec3, Transform};
 use lumbre_shading::{Scatter, Spectrum};
@@ -7,10 +7,10 @@ use super::environment::Panorama;
 use super::{LightPoint, LightSample};
 use crate::EnvironmentDesc;
 
-/// The same in all directions from a point.
+/// A point light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointLight {
-    /// Where.
+    /// The position.
     pub from: DVec3,
     /// Radiant intensity.
     pub intensity: Spectrum,
@@ -22,23 +22,23 @@ impl PointLight {
     }
 }
 
-/// A cone from a point, with a smooth edge.
+/// A spot light with a smooth edge.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpotLight {
-    /// Where.
+    /// The position.
     pub from: DVec3,
-    /// Unit, along the cone.
+    /// The unit axis of the cone.
     pub axis: DVec3,
     /// Radiant intensity along the axis.
     pub intensity: Spectrum,
-    /// The cosine of the angle at which it begins to fade.
+    /// The cosine of the angle where the falloff begins.
     pub cos_start: f64,
-    /// The cosine of the angle beyond which there is nothing.
+    /// The cosine of the angle where the falloff ends.
     pub cos_end: f64,
 }
 
 impl SpotLight {
-    /// A spot along +z of a space.
+    /// A spot light along +z of a space.
     pub fn new(
         world_from_light: &Transform,
         intensity: Spectrum,
@@ -62,7 +62,7 @@ impl SpotLight {
         (share > 0.0).then(|| from_point(self.from, at, self.intensity * share as f32))?
     }
 
-    /// The share of the intensity at an angle with this cosine.
+    /// The falloff at an angle with this cosine.
     pub fn falloff(&self, cosine: f64) -> f64 {
         if self.cos_start <= self.cos_end {
             return if cosine >= self.cos_end { 1.0 } else { 0.0 };
@@ -73,30 +73,30 @@ impl SpotLight {
 
     /// The integral of the falloff over all directions.
     pub(super) fn solid_angle(&self) -> f64 {
-        // The smooth step is ½ in the mean.
+        // The mean of the smoothstep is ½.
         std::f64::consts::TAU * ((1.0 - self.cos_start) + 0.5 * (self.cos_start - self.cos_end))
     }
 }
 
-/// From a point, by direction as a picture says.
+/// A point light with an image of intensity by direction.
 #[derive(Clone, Debug)]
 pub struct GoniometricLight {
-    /// Where.
+    /// The position.
     pub from: DVec3,
     // Radiant intensity.
     by_direction: Panorama,
-    // The mean over all directions of the mean of the channels.
+    // The mean over all directions and channels.
     mean: f64,
 }
 
 impl GoniometricLight {
-    /// `None` for a picture that is black, empty or not finite.
+    /// `None` for an image that is black, empty or not finite.
     pub(crate) fn new(
         world_from_light: &Transform,
         intensity: Spectrum,
         image: EnvironmentDesc,
     ) -> Option<Self> {
-        // Directions are those of the space without its scale.
+        // Scale is removed from the space of directions.
         let axes = world_from_light.linear();
         let rotation = DMat3::from_cols(
             axes.x_axis.try_normalize()?,
@@ -119,12 +119,12 @@ impl GoniometricLight {
     }
 }
 
-/// Parallel light.
+/// A directional light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DistantLight {
-    /// Unit, towards the light.
+    /// The unit direction to the light.
     pub towards: DVec3,
-    /// Irradiance on a surface that faces it.
+    /// Irradiance on a perpendicular surface.
     pub irradiance: Spectrum,
 }
 

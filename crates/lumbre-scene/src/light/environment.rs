@@ -1,4 +1,4 @@
-//! Light from infinitely far away, from all around.
+//! Environment lights.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use lumbre_shading::{Scatter, Spectrum};
 use super::LightSample;
 use crate::EnvironmentMapping;
 
-/// The same radiance from everywhere.
+/// Uniform radiance from all directions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UniformLight {
     /// The radiance.
@@ -33,7 +33,7 @@ impl UniformLight {
     }
 }
 
-/// A picture by direction, interpolated between its pixels.
+/// An image over the sphere, interpolated bilinearly.
 #[derive(Clone, Debug)]
 pub(super) struct Panorama {
     image: Arc<Image>,
@@ -43,7 +43,7 @@ pub(super) struct Panorama {
 }
 
 impl Panorama {
-    /// `None` for a picture that is empty or not finite.
+    /// `None` for an image that is empty or not finite.
     pub(super) fn new(
         image: Arc<Image>,
         mapping: EnvironmentMapping,
@@ -55,12 +55,12 @@ impl Panorama {
         is_usable.then_some(Self { image, mapping, world_from_light, scale })
     }
 
-    /// The value of the unit `direction` of the world.
+    /// The value in the unit world-space `direction`.
     pub(super) fn radiance(&self, direction: DVec3) -> Spectrum {
         self.scale * self.lookup(self.square(self.to_light(direction)))
     }
 
-    /// The solid angle of a pixel of a row, in any unit.
+    /// The solid angle of a pixel of a row, in arbitrary units.
     fn solid_angle(&self, row: u32) -> f64 {
         match self.mapping {
             EnvironmentMapping::EqualArea => 1.0,
@@ -71,7 +71,7 @@ impl Panorama {
         }
     }
 
-    /// The mean over the sphere of the mean of the channels; `None` where all is black.
+    /// The mean over the sphere and over the channels; `None` if it is 0.
     pub(super) fn mean(&self) -> Option<f64> {
         let (mut sum, mut whole) = (0.0, 0.0);
         for (row, pixels) in (0..).zip(self.image.pixels().chunks(self.image.width() as usize)) {
@@ -87,7 +87,7 @@ impl Panorama {
         self.world_from_light.inverse_vector(direction).normalize()
     }
 
-    /// The irradiance of a surface that faces the unit `normal`: a sum over all pixels.
+    /// The irradiance on a surface with the unit `normal`: a sum over all pixels.
     fn irradiance(&self, normal: DVec3) -> Spectrum {
         let (width, height) = (self.image.width(), self.image.height());
         let cell = 1.0 / (f64::from(width) * f64::from(height));
@@ -110,7 +110,7 @@ impl Panorama {
         self.scale * Spectrum::from(sum.map(|c| c as f32))
     }
 
-    /// The unit direction of the light's space that falls on a point of the unit square.
+    /// The unit direction in light space of a point of the unit square.
     fn direction(&self, uv: DVec2) -> DVec3 {
         match self.mapping {
             EnvironmentMapping::EqualArea => warp64::equal_area_square_to_sphere(uv),
@@ -118,7 +118,7 @@ impl Panorama {
         }
     }
 
-    /// Where a unit direction of the light's space falls in the unit square, (0, 0) at the upper left of the picture.
+    /// The point of the unit square of a unit direction in light space; (0, 0) is the upper left of the image.
     fn square(&self, local: DVec3) -> DVec2 {
         match self.mapping {
             EnvironmentMapping::EqualArea => warp64::equal_area_sphere_to_square(local),
@@ -129,18 +129,18 @@ impl Panorama {
         }
     }
 
-    /// Area of the square over solid angle in the world.
+    /// The ratio of area in the square to world-space solid angle.
     fn density_of_map(&self, local: DVec3) -> f64 {
         let in_light = match self.mapping {
             EnvironmentMapping::EqualArea => 1.0 / (4.0 * PI),
             EnvironmentMapping::LatitudeLongitude => 1.0 / (TAU * PI * local.truncate().length()),
         };
-        // A solid angle under a linear map; exactly 1 for a rotation, up to rounding.
+        // A solid angle under a linear map; 1 up to rounding for a rotation.
         let stretch = self.world_from_light.vector(local).length();
         in_light * (stretch * stretch * stretch / self.world_from_light.determinant().abs())
     }
 
-    /// Between the four pixels about a point of the unit square.
+    /// Bilinear interpolation at a point of the unit square.
     fn lookup(&self, uv: DVec2) -> Spectrum {
         let size = DVec2::new(f64::from(self.image.width()), f64::from(self.image.height()));
         let at = uv * size - 0.5;
@@ -154,19 +154,19 @@ impl Panorama {
     }
 }
 
-/// A picture of radiance all around, interpolated between its pixels, and chosen by its brightness.
+/// An environment map, interpolated bilinearly and sampled by brightness.
 #[derive(Clone, Debug)]
 pub struct Environment {
     picture: Panorama,
-    // One cell a pixel: the mean over the pixel of what the interpolation gives there, times its solid angle. It is
-    // nowhere zero where the interpolation is not.
+    // One cell per pixel: the mean of the interpolated image over the pixel, times its solid angle. It is
+    // positive wherever the interpolated image is.
     by_brightness: PiecewiseConstant2D,
-    // The mean over the sphere of the mean of the channels.
+    // The mean over the sphere and over the channels.
     mean: f64,
 }
 
 impl Environment {
-    /// `None` for a picture that is black, empty or not finite.
+    /// `None` for an image that is black, empty or not finite.
     pub(crate) fn new(
         image: Arc<Image>,
         mapping: EnvironmentMapping,
@@ -176,7 +176,8 @@ impl Environment {
         let picture = Panorama::new(image, mapping, world_from_light, scale)?;
         let image = &picture.image;
         let (width, height) = (image.width() as usize, image.height() as usize);
-        // The mean of a linear interpolation over a pixel: 1/8, 6/8, 1/8 of it and its neighbours, both ways.
+        // The mean of the linear interpolation over a pixel: 1/8, 6/8, 1/8 of it and its neighbours, along both
+        // axes.
         let brightness = |x: i64, y: i64| f64::from(texel(image, mapping, x, y).average());
         let smooth = |x: i64, y: i64| {
             let row = |y| 0.125 * (brightness(x - 1, y) + brightness(x + 1, y)) + 0.75 * brightness(x, y);
@@ -202,12 +203,12 @@ impl Environment {
         self.mean
     }
 
-    /// The radiance from the unit `direction` of the world.
+    /// The radiance from the unit world-space `direction`.
     pub fn radiance(&self, direction: DVec3) -> Spectrum {
         self.picture.radiance(direction)
     }
 
-    /// The irradiance of a surface that faces the unit `normal`: a sum over all pixels.
+    /// The irradiance on a surface with the unit `normal`: a sum over all pixels.
     pub fn irradiance(&self, normal: DVec3) -> Spectrum {
         self.picture.irradiance(normal)
     }
@@ -231,7 +232,7 @@ impl Environment {
     }
 }
 
-/// The pixel, or the one that it stands for when it lies beyond an edge. Negative light is none.
+/// The pixel, wrapped if it is beyond an edge. Negative light counts as 0.
 fn texel(image: &Image, mapping: EnvironmentMapping, x: i64, y: i64) -> Spectrum {
     let (width, height) = (i64::from(image.width()), i64::from(image.height()));
     let (x, y) = match mapping {
@@ -246,7 +247,7 @@ fn texel(image: &Image, mapping: EnvironmentMapping, x: i64, y: i64) -> Spectrum
             }
             (x.clamp(0, width - 1), y.clamp(0, height - 1))
         }
-        // Beyond a pole lies the other side.
+        // Beyond a pole is the opposite side.
         EnvironmentMapping::LatitudeLongitude => {
             let beyond = y < 0 || y >= height;
             let y = if y < 0 {

@@ -1,4 +1,4 @@
-//! Light from a triangle mesh: a triangle is chosen by its area, then a direction towards it.
+//! Area lights of triangle meshes: a triangle is sampled by area, then a direction to it.
 
 use lumbre_geometry::{DirectionSample, Ray, Surface, Triangle};
 use lumbre_kernel::TriangleMesh;
@@ -10,7 +10,7 @@ use super::{LightPoint, LightSample, area};
 use crate::Emission;
 use crate::surface::SurfaceEntry;
 
-/// Triangles that shine.
+/// Emissive triangles.
 #[derive(Clone, Debug)]
 pub struct MeshLight {
     pub(crate) entry: u32,
@@ -19,7 +19,8 @@ pub struct MeshLight {
     pub(crate) facets: Vec<Facet>,
 }
 
-/// A triangle of the mesh, in the space of its tree, with what its samples share; without a shape it has no area.
+/// A triangle of the mesh, in the space of its tree, with data shared by its samples; without a shape it has no
+/// area.
 #[derive(Clone, Debug)]
 pub(crate) struct Facet {
     shape: Option<Triangle>,
@@ -28,18 +29,17 @@ pub(crate) struct Facet {
     normal: DVec3,
     area: f64,
     center: DVec3,
-    // From the centre to the farthest corner, squared.
+    // The squared distance from the centre to the farthest corner.
     reach_squared: f64,
-    // A bound on the error of each coordinate of a point of it.
+    // A bound on the error of each coordinate of its points.
     error: DVec3,
 }
 
-/// From so many reaches away a triangle looks so flat and small that points uniform by area are as good as directions
-/// uniform by solid angle, and they cost a third.
+/// From this many radii away, sampling by area is as good as by solid angle, and faster.
 const FAR: f64 = 4.0;
 
 impl MeshLight {
-    /// `None` where no triangle has an area. Returns the total area too.
+    /// `None` if no triangle has an area. Also returns the total area.
     pub(crate) fn new(entry: u32, mesh: &TriangleMesh) -> Option<(Self, f64)> {
         let facets: Vec<Facet> = mesh.indices.iter().map(|&corners| Facet::new(mesh, corners)).collect();
         let areas: Vec<f64> = facets.iter().map(|facet| facet.area).collect();
@@ -88,7 +88,7 @@ impl Facet {
         let area = shape.as_ref().map_or(0.0, Triangle::area);
         let center = (a + b + c) / 3.0;
         let reach_squared = [a, b, c].map(|p| (p - center).length_squared()).into_iter().fold(0.0, f64::max);
-        // As of a point of a triangle: nine roundings of its terms, which sum to no more than the largest corner.
+        // Nine roundings of terms whose sum is at most the largest corner, as for a point of a triangle.
         let error = 9.0 * f64::EPSILON * a.abs().max(b.abs()).max(c.abs());
         let normal = shape.as_ref().map_or(DVec3::Z, |shape| {
             shape.surface_at(0, DVec2::splat(1.0 / 3.0)).map_or(DVec3::Z, |surface| surface.normal)
@@ -101,8 +101,7 @@ impl Facet {
         (from - self.center).length_squared() > FAR * FAR * self.reach_squared
     }
 
-    /// The light from a point uniform by area. Where it shines is known from the normal alone, `outward` times that of
-    /// the triangle.
+    /// A point uniform by area. The emissive side is determined by the normal, `outward` times the triangle's.
     #[inline]
     fn sample_by_area(
         &self,
@@ -131,8 +130,8 @@ impl Facet {
     }
 }
 
-/// The density per unit solid angle of points uniform over an area: distance² / (|cos θ| area). `None` where they are
-/// seen edge-on.
+/// The density per unit solid angle of uniform sampling by area: distance² / (|cos θ| area). `None` when seen
+/// edge-on.
 #[inline]
 fn per_solid_angle(area: f64, arm: DVec3, normal: DVec3) -> Option<f64> {
     let squared = arm.length_squared();

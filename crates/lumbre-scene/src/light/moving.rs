@@ -1,4 +1,4 @@
-//! A light without a surface that something carries about: sampled where it is at the time of the ray.
+//! Moving lights without a surface, sampled at the time of the ray.
 
 use std::sync::Arc;
 
@@ -8,20 +8,20 @@ use lumbre_shading::Spectrum;
 use super::{Light, LightSample};
 use crate::surface::SurfaceEntry;
 
-/// A light in a space of its own, and the rigid motion of that space.
+/// A light in its own space, and the rigid motion of that space.
 #[derive(Clone, Debug)]
 pub struct MovingLight {
-    /// From a point or in one direction.
+    /// A point, spot, goniometric or directional light.
     pub(super) light: Box<Light>,
-    // Of rotations, mirrors and translations.
+    // Rotations, mirrors and translations only.
     motion: Arc<AnimatedTransform>,
 }
 
-/// How far columns of a rigid motion may be from unit length and from right angles.
+/// The tolerance of unit lengths and right angles of a rigid motion's columns.
 const RIGID: f64 = 1e-6;
 
 impl MovingLight {
-    /// `None` for a light that is a surface or infinite, and for a motion that stretches.
+    /// `None` for an area light or an infinite one, and for a motion that stretches.
     pub(crate) fn new(light: Light, motion: Arc<AnimatedTransform>) -> Option<Self> {
         let is_rigid = |m: DMat3| (m.transpose() * m).abs_diff_eq(DMat3::IDENTITY, RIGID);
         let is_sound = light.is_delta() && motion.keys().iter().all(|(_, map)| is_rigid(map.linear()));
@@ -40,7 +40,7 @@ impl MovingLight {
         sample.towards = map.vector(sample.towards).try_normalize()?;
         if let Some(end) = &mut sample.end {
             end.point = map.point(end.point);
-            // Seen from the place itself, which the way there and back may have moved by its rounding.
+            // As seen from the point itself: the transform there and back may have rounded it.
             sample.towards = (end.point - from).try_normalize()?;
         }
         Some(sample)

@@ -1,4 +1,4 @@
-//! Light from a shape in an object that is placed once: sampled where it is at the time of the ray.
+//! Area lights of an object with one placement, sampled at the time of the ray.
 
 use lumbre_geometry::{Ray, Surface};
 use lumbre_kernel::Placement;
@@ -8,7 +8,7 @@ use lumbre_shading::Scatter;
 use super::{Light, LightPoint, LightSample};
 use crate::surface::SurfaceEntry;
 
-/// A light in the space of an object, and where that object is.
+/// A light in the space of an object, and the object's placement.
 #[derive(Clone, Debug)]
 pub struct PlacedLight {
     light: Box<Light>,
@@ -58,8 +58,8 @@ impl PlacedLight {
     }
 }
 
-/// By how much a solid angle about a unit direction of the world grows on its way into the object: |det L⁻¹| / |L⁻¹ d|³, for the
-/// cone over a small area |d|² dω at distance |d| keeps its volume up to the determinant.
+/// The factor by which a solid angle about a unit world-space direction grows in object space: |det L⁻¹| / |L⁻¹
+/// d|³, since the volume of the cone over a small area |d|² dω at distance |d| scales with the determinant.
 fn growth(map: &Transform, direction: DVec3) -> f64 {
     1.0 / (map.determinant().abs() * map.inverse_vector(direction).length().powi(3))
 }

@@ -1,7 +1,7 @@
-//! Spectra, and what becomes of them on the lanes of light transport.
+//! Spectra, and their conversion to the channels of light transport.
 //!
-//! Light is carried as linear Rec. 709. A spectrum that a scene gives by wavelength is weighed once, when the scene is
-//! read, by what the CIE 1931 standard observer sees of it between 360 and 830 nm.
+//! Light is carried as linear Rec. 709. A spectrum given by wavelength is converted once, when the scene is
+//! read, with the CIE 1931 standard observer between 360 and 830 nm.
 
 mod fluorescent;
 mod named;
@@ -14,21 +14,22 @@ use observer::{FIRST_NM, LAST_NM, MATCHING, STEP_NM};
 
 use crate::Spectrum;
 
-/// A spectrum as a scene gives it.
+/// A spectrum as given in a scene file.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SpectrumValue {
     /// A colour, already linear Rec. 709.
     Rgb(Spectrum),
-    /// A black body by its temperature in kelvin, its greatest value scaled to 1.
+    /// A black body by its temperature in kelvin, normalised to a maximum of 1.
     Blackbody(f64),
-    /// Values by wavelength in nm, ascending; linear between them, and constant beyond the first and last. None is 0.
+    /// Values by ascending wavelength in nm; interpolated linearly, and constant beyond the first and last.
+    /// Empty counts as 0.
     Sampled(Vec<(f64, f64)>),
-    /// A built-in one.
+    /// A built-in spectrum.
     Named(NamedSpectrum),
 }
 
 impl SpectrumValue {
-    /// Its value at a wavelength in nm; for a colour, `None`.
+    /// The value at a wavelength in nm; `None` for a colour.
     pub fn at(&self, nm: f64) -> Option<f64> {
         match self {
             Self::Rgb(_) => None,
@@ -38,20 +39,20 @@ impl SpectrumValue {
         }
     }
 
-    /// The colour of a surface that reflects this share by wavelength: as seen under D65, so that a constant gives equal
-    /// channels. Within [0, 1]; what no surface on these primaries can be is clipped.
+    /// The colour of a surface of this spectral reflectance under D65, so that a constant gives equal channels.
+    /// Clipped to [0, 1].
     pub fn reflectance_rgb(&self) -> Spectrum {
         self.weighed().map(crate::unit)
     }
 
-    /// A coefficient (of refraction, absorption or scattering) for each lane: the mean over the wavelengths that the lane
-    /// stands for. Not negative.
+    /// A coefficient (of refraction, absorption or scattering) for each channel: the mean over the channel's
+    /// wavelengths. Not negative.
     pub fn unbounded_rgb(&self) -> Spectrum {
         self.weighed().map(|c| c.max(0.0))
     }
 
-    /// The colour of a light. A colour is itself; a spectrum has its luminance (CIE Y) normalised to 1, as photometric
-    /// units ask, with colours outside the gamut clipped at no loss of luminance. Black stays black.
+    /// The colour of a light. A colour is unchanged; a spectrum is normalised to a luminance (CIE Y) of 1, for
+    /// photometric units, with colours outside the gamut clipped at constant luminance. Black stays black.
     pub fn illuminant_rgb(&self) -> Spectrum {
         if let Self::Rgb(colour) = self {
             return *colour;
@@ -66,8 +67,8 @@ impl SpectrumValue {
         spectrum(rgb.map(|c| c / luminance))
     }
 
-    /// An index of refraction for a material that bends all light alike: its value at 587.6 nm (the helium d line, where
-    /// catalogues give n_d). For a colour the mean of its channels.
+    /// The index of refraction for a material without dispersion: the value at 587.6 nm (the helium d line, n_d
+    /// in catalogues). For a colour the mean of its channels.
     pub fn index_of_refraction(&self) -> f32 {
         match self {
             Self::Rgb(colour) => colour.average(),
@@ -75,7 +76,7 @@ impl SpectrumValue {
         }
     }
 
-    /// The mean of each lane under D65.
+    /// The mean of each channel under D65.
     fn weighed(&self) -> Spectrum {
         match self {
             Self::Rgb(colour) => *colour,
@@ -84,12 +85,12 @@ impl SpectrumValue {
     }
 }
 
-/// The index of refraction of a metal, (η, k), on the lanes of light transport.
+/// The index of refraction of a metal, (η, k), in the channels of light transport.
 ///
-/// Colour by wavelength is lost on three lanes, but what a metal reflects head on need not be: η is the mean over each
-/// lane's wavelengths, and k is then solved for so that the lane reflects at normal incidence exactly the colour of the
-/// metal's reflectance by wavelength, ((η − 1)² + k²) / ((η + 1)² + k²), under D65. Where no k can (η alone reflects more)
-/// k is 0 and η gives way. When either is a colour, both are taken lane by lane.
+/// Three channels cannot hold the spectrum, but can preserve the reflectance at normal incidence: η is the mean
+/// over each channel's wavelengths, and k is solved for so that the channel's reflectance
+/// ((η − 1)² + k²) / ((η + 1)² + k²) is that of the spectrum under D65. Where no k can (η alone reflects more), k is 0 and η is
+/// adjusted. When either is a colour, both are taken channel by channel.
 pub fn conductor_rgb(eta: &SpectrumValue, k: &SpectrumValue) -> (Spectrum, Spectrum) {
     if matches!(eta, SpectrumValue::Rgb(_)) || matches!(k, SpectrumValue::Rgb(_)) {
         return (eta.unbounded_rgb(), k.unbounded_rgb());
@@ -114,13 +115,13 @@ pub fn conductor_rgb(eta: &SpectrumValue, k: &SpectrumValue) -> (Spectrum, Spect
     (mean.zip(reflected, |eta, r| solve(eta, r).0), mean.zip(reflected, |eta, r| solve(eta, r).1))
 }
 
-/// The spectral radiance of a black body over its greatest value, at a wavelength in nm. 0 for temperatures that are not
-/// positive.
+/// The spectral radiance of a black body relative to its maximum, at a wavelength in nm. 0 for temperatures
+/// that are not positive.
 fn blackbody(nm: f64, kelvin: f64) -> f64 {
     if !(kelvin > 0.0 && kelvin.is_finite()) {
         return 0.0;
     }
-    // hc/k in nm K, with the constants of the SI of 2019; the greatest value is where x = hc/(λkT) is this.
+    // hc/k in nm K, with the constants of the SI of 2019; the maximum is at this value of x = hc/(λkT).
     const SECOND: f64 = 1.438_776_877e7;
     const X_PEAK: f64 = 4.965_114_231_744_276;
     let shape = |x: f64| x.powi(5) / x.exp_m1();
@@ -159,7 +160,7 @@ fn observe(mut value: impl FnMut(f64) -> f64) -> [f64; 3] {
     xyz
 }
 
-/// The mean of a spectrum over what each lane sees of D65.
+/// The mean of a spectrum over each channel's response to D65.
 fn weigh(mut value: impl FnMut(f64) -> f64) -> Spectrum {
     static WHITE: LazyLock<[f64; 3]> = LazyLock::new(|| rec709_from_xyz(observe(named::d65)));
     let rgb = rec709_from_xyz(observe(|nm| value(nm) * named::d65(nm)));

@@ -12,10 +12,10 @@
 
 use super::{fluorescent, interpolate};
 
-/// A built-in spectrum. Beyond the wavelengths that its source has it is constant; a fluorescent lamp is dark there.
+/// A built-in spectrum. Beyond the wavelengths of its source it is constant; a fluorescent lamp is zero there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NamedSpectrum {
-    // Into `TABLE`.
+    // The index in `TABLE`.
     index: usize,
 }
 
@@ -49,14 +49,14 @@ impl NamedSpectrum {
                 (2.956_362 + resonance - 0.010_623_87 * l2 - 0.000_020_496_8 * l2 * l2).sqrt()
             }
             Source::Rutile => {
-                // Sampled no nearer to the resonance than the measurements go.
+                // No nearer to the resonance than the measurements.
                 let l2 = micrometres2(nm.max(430.0));
                 (5.913 + 0.2441 / (l2 - 0.0803)).sqrt()
             }
             Source::Eta(metal) => by_table(metal, nm, |row| row.1),
             Source::K(metal) => by_table(metal, nm, |row| row.2),
             Source::Zero => 0.0,
-            // The constant of 1931, with which illuminant A is defined.
+            // The constant of 1931, which defines illuminant A.
             Source::IlluminantA => {
                 let shape = |nm: f64| nm.powi(-5) / (1.435e7 / (2848.0 * nm)).exp_m1();
                 100.0 * shape(nm) / shape(560.0)
@@ -107,7 +107,7 @@ fn daylight(nm: f64, m1: f64, m2: f64) -> f64 {
     value(DAYLIGHT[i]) * (1.0 - t) + value(DAYLIGHT[i + 1]) * t
 }
 
-/// Linear between the entries, and nothing beyond them.
+/// Linear between the entries, and zero beyond them.
 fn lamp(nm: f64, number: usize) -> f64 {
     let powers = &fluorescent::LAMPS[number - 1];
     let place = (nm - fluorescent::FIRST_NM) / fluorescent::STEP_NM;
@@ -141,7 +141,7 @@ const TABLE: &[(&str, Source)] = &[
         [0.971247817, 0.216901417, 0.904651666], [0.00472301995, 0.0153575612, 168.68133])),
     ("glass-LASF9", Source::Sellmeier(
         [2.00029547, 0.298926886, 1.80691843], [0.0121426017, 0.0538736236, 156.530829])),
-    // The scene language's F5, F10 and F11 have always held the data of SF5, SF10 and SF11.
+    // The scene language's F5, F10 and F11 have the data of SF5, SF10 and SF11, for historical reasons.
     ("glass-F5", SF5),
     ("glass-F10", SF10),
     ("glass-F11", SF11),

@@ -1,27 +1,27 @@
-//! What a picture with coverage is laid over.
+//! Backgrounds for pictures with alpha.
 
 use lumbre_image::{Encoded, Image, Rgb, ToneMap};
 use lumbre_render::PixelBounds;
 
-/// What stands behind a transparent picture. Its colours are as a display shows them: tone mapping does not touch them.
+/// The background of a transparent picture. Its colours are display colours: tone mapping does not change them.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
-pub enum Backdrop {
+pub enum Background {
     /// One colour: linear, in [0, 1].
     Colour(Rgb),
-    /// From the first at the top to the second at the bottom, evenly to the eye.
+    /// A vertical gradient from the first at the top to the second at the bottom, perceptually even.
     Gradient([Encoded; 2]),
-    /// A picture, linear, scaled to cover the whole and cut at what is too long.
+    /// A linear picture, scaled to cover the whole and cropped.
     Picture(Image),
 }
 
-impl Backdrop {
-    /// A studio's paper: light grey, a little lighter below.
+impl Background {
+    /// Studio paper: light grey, slightly lighter at the bottom.
     pub fn studio() -> Self {
         Self::Gradient([Encoded::srgb(Rgb::splat(0.60)), Encoded::srgb(Rgb::splat(0.86))])
     }
 
-    /// The backdrop in the pixels of a part of a picture of this size.
+    /// The background's pixels for a part of a picture of this size.
     fn pixels(&self, bounds: PixelBounds, whole: (u32, u32)) -> impl Iterator<Item = Rgb> + '_ {
         let (width, height) = (f64::from(whole.0.max(1)), f64::from(whole.1.max(1)));
         bounds.pixels().map(move |(x, y)| {
@@ -35,7 +35,7 @@ impl Backdrop {
                 }
                 Self::Picture(image) => {
                     let (w, h) = (f64::from(image.width()), f64::from(image.height()));
-                    // Pixels of the image to a pixel of the picture, both ways alike.
+                    // Image pixels per picture pixel, equal along both axes.
                     let scale = (w / width).min(h / height);
                     bilinear(image, 0.5 * w + (x - 0.5) * width * scale, 0.5 * h + (y - 0.5) * height * scale)
                 }
@@ -43,8 +43,8 @@ impl Backdrop {
         })
     }
 
-    /// A picture laid over the backdrop as a display shows it: its light tone-mapped, the backdrop's colours as they are. Of
-    /// these is left what `coverage`, or without it the image's own, does not cover.
+    /// A picture over the background as displayed: the picture tone-mapped, the background unchanged. The
+    /// background shows where `coverage`, or else the image's own alpha, is below 1.
     pub(crate) fn under_shown(
         &self,
         image: &Image,
@@ -60,7 +60,7 @@ impl Backdrop {
         })
     }
 
-    /// A picture laid over the backdrop, all of it taken for light.
+    /// A picture over the background, in linear light.
     pub(crate) fn under_light(
         &self,
         image: &Image,
@@ -121,13 +121,13 @@ mod tests {
     fn colours_are_shown_as_asked_and_light_is_tone_mapped() {
         let colour = Rgb::new(0.9, 0.8, 0.7);
         let shown =
-            Backdrop::Colour(colour).under_shown(&picture(), None, WHOLE, (6, 4), ToneMap::Neutral, -1.0);
+            Background::Colour(colour).under_shown(&picture(), None, WHOLE, (6, 4), ToneMap::Neutral, -1.0);
         let front = ToneMap::Neutral.apply(Rgb::new(1.0, 0.25, 0.125));
         for (i, expected) in [colour, (front + colour) * 0.5, front].into_iter().enumerate() {
             let found = shown.pixels()[6 + i];
             assert!((found - expected).map(f32::abs).max_component() < 1e-6, "{i}: {found:?} {expected:?}");
         }
-        let light = Backdrop::Colour(colour).under_light(&picture(), None, WHOLE, (6, 4));
+        let light = Background::Colour(colour).under_light(&picture(), None, WHOLE, (6, 4));
         assert_eq!(light.pixels()[2], Rgb::new(2.0, 0.5, 0.25));
         assert!(light.alpha().is_none());
     }
@@ -138,22 +138,23 @@ mod tests {
         let image = Image::filled(6, 4, Rgb::BLACK).with_alpha(vec![0.5; 24]).unwrap();
         let coverage = Image::filled(6, 4, Rgb::new(0.25, 0.5, 0.75));
         let expected = Rgb::new(0.75 * 0.9, 0.5 * 0.8, 0.25 * 0.7);
-        let backdrop = Backdrop::Colour(behind);
-        let light = backdrop.under_light(&image, Some(&coverage), WHOLE, (6, 4));
-        let shown = backdrop.under_shown(&image, Some(&coverage), WHOLE, (6, 4), ToneMap::Neutral, 1.0);
+        let background = Background::Colour(behind);
+        let light = background.under_light(&image, Some(&coverage), WHOLE, (6, 4));
+        let shown = background.under_shown(&image, Some(&coverage), WHOLE, (6, 4), ToneMap::Neutral, 1.0);
         for found in [light.pixels()[7], shown.pixels()[7]] {
             assert!((found - expected).map(f32::abs).max_component() < 1e-6, "{found:?} {expected:?}");
         }
     }
 
     #[test]
-    fn a_part_of_a_picture_has_its_part_of_the_backdrop() {
+    fn a_part_of_a_picture_has_its_part_of_the_background() {
         let ramp: Vec<Rgb> = (0..80).map(|i| Rgb::splat((i % 10) as f32)).collect();
-        let backdrops = [Backdrop::studio(), Backdrop::Picture(Image::from_pixels(10, 8, ramp).unwrap())];
+        let backgrounds =
+            [Background::studio(), Background::Picture(Image::from_pixels(10, 8, ramp).unwrap())];
         let part = PixelBounds { x0: 2, y0: 1, x1: 5, y1: 3 };
-        for backdrop in backdrops {
-            let whole: Vec<Rgb> = backdrop.pixels(WHOLE, (6, 4)).collect();
-            let found: Vec<Rgb> = backdrop.pixels(part, (6, 4)).collect();
+        for background in backgrounds {
+            let whole: Vec<Rgb> = background.pixels(WHOLE, (6, 4)).collect();
+            let found: Vec<Rgb> = background.pixels(part, (6, 4)).collect();
             let expected: Vec<Rgb> = part.pixels().map(|(x, y)| whole[(y * 6 + x) as usize]).collect();
             assert_eq!(found, expected);
             assert_ne!(whole[0], whole[23]);
@@ -164,8 +165,8 @@ mod tests {
     fn a_picture_covers_the_whole_and_keeps_its_shape() {
         // Twice as long as the picture wants: the outer quarters are cut.
         let ramp: Vec<Rgb> = (0..24 * 8).map(|i| Rgb::splat((i % 24) as f32 + 0.5)).collect();
-        let backdrop = Backdrop::Picture(Image::from_pixels(24, 8, ramp).unwrap());
-        let row: Vec<f32> = backdrop.pixels(WHOLE, (6, 4)).take(6).map(|c| c.r).collect();
+        let background = Background::Picture(Image::from_pixels(24, 8, ramp).unwrap());
+        let row: Vec<f32> = background.pixels(WHOLE, (6, 4)).take(6).map(|c| c.r).collect();
         assert_eq!(row, [7.0, 9.0, 11.0, 13.0, 15.0, 17.0]);
     }
 }

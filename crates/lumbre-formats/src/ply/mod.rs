@@ -1,5 +1,8 @@
 //! PLY meshes (G. Turk, "The PLY polygon file format", 1994): text or binary of either byte order.
 
+mod header;
+mod values;
+
 use std::path::Path;
 use std::sync::Arc;
 
@@ -9,20 +12,22 @@ use lumbre_scene::{GeometryDesc, MaterialId, MeshDesc, NamedMaterial, SceneDesc,
 use lumbre_shading::{Material, MaterialKind, SpectrumTexture};
 
 use crate::budget::{Budget, BudgetVec};
-use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, nearest_name, quoted, quoted_bytes};
+use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, nearest_name, quoted};
 use crate::input::{Input, refuse_wide};
 use crate::polygon;
+use header::{Element, Encoding, Header, Number, Property};
+use values::{Binary, Fault, Source, Text};
 
 /// Reads a mesh from the bytes of a PLY file.
 ///
 /// Of vertices: `x y z`, normals `nx ny nz`, texture coordinates (`u v`, `s t`, `texture_u texture_v`,
-/// `texture_s texture_t`) and colours (`red green blue`, whole numbers on the sRGB curve, others as light). Of faces:
-/// `vertex_indices` (or `vertex_index`) and `face_indices`. Of `tristrips`: `vertex_indices`, where -1 begins a new strip.
-/// Other elements and properties are passed over. Convex quadrilaterals stay; other polygons become triangles.
+/// `texture_s texture_t`) and colours (`red green blue`, integers in sRGB, others linear). Of faces:
+/// `vertex_indices` (or `vertex_index`) and `face_indices`. Of `tristrips`: `vertex_indices`, where -1 begins a
+/// new strip. Other elements and properties are ignored. Convex quadrilaterals are kept; other polygons are
+/// triangulated.
 ///
-/// # Errors
 /// [`FormatError::Input`] with the line and column, or the byte and the element's path such as `/vertex/3/x`;
-/// [`FormatError::Limit`]. When lenient, faces that cannot be used are dropped with a warning instead.
+/// [`FormatError::Limit`]. When lenient, unusable faces are dropped with a warning instead.
 pub fn read_ply(
     bytes: &[u8],
     name: &Arc<str>,
@@ -42,10 +47,9 @@ pub fn read_ply(
     mesh.finish()
 }
 
-/// Reads the PLY file `path` as a scene of one shape, of the default material.
+/// Reads the PLY file `path` as a scene of one shape with the default material.
 ///
-/// # Errors
-/// As [`Input::open`] and [`read_ply`].
+/// As for [`Input::open`] and [`read_ply`].
 pub fn open_ply(
     path: &Path,
     budget: &Budget,
@@ -56,7 +60,7 @@ pub fn open_ply(
     Ok(scene_of_meshes([mesh], UpAxis::Y))
 }
 
-/// Meshes as shapes of the default material, or of the colours of their vertices, in their own space.
+/// Meshes as shapes with the default material, or with their vertex colours, in their own space.
 pub(crate) fn scene_of_meshes(meshes: impl IntoIterator<Item = MeshDesc>, up: UpAxis) -> SceneDesc {
     let mut scene = SceneDesc { up, ..SceneDesc::default() };
     // Without and with colours.
@@ -80,7 +84,7 @@ pub(crate) fn scene_of_meshes(meshes: impl IntoIterator<Item = MeshDesc>, up: Up
     scene
 }
 
-/// The material of a mesh of which a file does not say it: the colours of its vertices, where it has them, else grey.
+/// The material of a mesh whose file has none: its vertex colours, if any, else grey.
 pub(crate) fn unsaid_material(has_colours: bool) -> NamedMaterial {
     let material = match has_colours {
         true => Material::new(MaterialKind::Diffuse { reflectance: Arc::new(SpectrumTexture::Vertices) }),
@@ -88,394 +92,7 @@ pub(crate) fn unsaid_material(has_colours: bool) -> NamedMaterial {
     };
     NamedMaterial { name: None, material: Arc::new(material) }
 }
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Encoding {
-    Text,
-    Little,
-    Big,
-}
-
-impl Encoding {
-    fn place(
-        self,
-        name: &Arc<str>,
-        bytes: &[u8],
-        at: usize,
-        element: &str,
-        index: u64,
-        property: &str,
-    ) -> Place {
-        match self {
-            Self::Text => Place::of_offset(name.clone(), bytes, at),
-            _ => Place::binary(name.clone(), at as u64, format!("/{element}/{index}/{property}")),
-        }
-    }
-
-    /// In a text, where the first word after `at` starts.
-    fn start(self, bytes: &[u8], at: usize) -> usize {
-        match self {
-            Self::Text => at + bytes[at..].iter().take_while(|b| b.is_ascii_whitespace()).count(),
-            _ => at,
-        }
-    }
-}
-
-/// The types of numbers.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Number {
-    I8,
-    U8,
-    I16,
-    U16,
-    I32,
-    U32,
-    F32,
-    F64,
-}
-
-impl Number {
-    const NAMES: [(&'static str, Self); 16] = [
-        ("char", Self::I8),
-        ("uchar", Self::U8),
-        ("short", Self::I16),
-        ("ushort", Self::U16),
-        ("int", Self::I32),
-        ("uint", Self::U32),
-        ("float", Self::F32),
-        ("double", Self::F64),
-        ("int8", Self::I8),
-        ("uint8", Self::U8),
-        ("int16", Self::I16),
-        ("uint16", Self::U16),
-        ("int32", Self::I32),
-        ("uint32", Self::U32),
-        ("float32", Self::F32),
-        ("float64", Self::F64),
-    ];
-
-    fn bytes(self) -> usize {
-        match self {
-            Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 => 2,
-            Self::I32 | Self::U32 | Self::F32 => 4,
-            Self::F64 => 8,
-        }
-    }
-
-    fn is_float(self) -> bool {
-        matches!(self, Self::F32 | Self::F64)
-    }
-
-    /// What the largest number stands for where numbers stand for parts of 1.
-    fn one(self) -> f64 {
-        match self {
-            Self::I8 => 127.0,
-            Self::U8 => 255.0,
-            Self::I16 => 32767.0,
-            Self::U16 => 65535.0,
-            Self::I32 => 2_147_483_647.0,
-            Self::U32 => 4_294_967_295.0,
-            Self::F32 | Self::F64 => 1.0,
-        }
-    }
-}
-
-#[derive(Clone, Debug)]
-struct Property {
-    name: String,
-    /// The type of a list's length.
-    list: Option<Number>,
-    number: Number,
-}
-
-#[derive(Clone, Debug)]
-struct Element {
-    name: String,
-    count: u64,
-    properties: Vec<Property>,
-    /// Where the header says the count.
-    place: Place,
-}
-
-impl Element {
-    /// Bytes of one where it has no lists, and at least so many where it has.
-    fn least_bytes(&self, encoding: Encoding) -> u64 {
-        match encoding {
-            // A digit and a space for each.
-            Encoding::Text => 2 * self.properties.len() as u64,
-            _ => self.properties.iter().map(|p| p.list.unwrap_or(p.number).bytes() as u64).sum(),
-        }
-    }
-
-    fn has_lists(&self) -> bool {
-        self.properties.iter().any(|p| p.list.is_some())
-    }
-}
-
-struct Header {
-    encoding: Encoding,
-    elements: Vec<Element>,
-    /// Where the data begin.
-    end: usize,
-}
-
-impl Header {
-    fn read(bytes: &[u8], name: &Arc<str>) -> Result<Self, FormatError> {
-        const LONGEST: usize = 1 << 20;
-        let place = |at: usize| Place::of_offset(name.clone(), bytes, at);
-        let mut encoding = None;
-        let mut elements: Vec<Element> = vec![];
-        let mut at = 0;
-        let mut first = true;
-        loop {
-            let start = at;
-            let rest = &bytes[start..bytes.len().min(LONGEST)];
-            let Some(length) = rest.iter().position(|&b| b == b'\n' || b == b'\r') else {
-                let message = if first { "not a PLY file" } else { "PLY header without end_header" };
-                let wrong = Diagnostic::error(message).at(place(start)).found(quoted_bytes(rest));
-                return Err(wrong.expected(if first { "a line \"ply\"" } else { "a line" }).into());
-            };
-            let crlf = rest[length] == b'\r' && rest.get(length + 1) == Some(&b'\n');
-            at = start + length + if crlf { 2 } else { 1 };
-            let line = String::from_utf8_lossy(&rest[..length]);
-            let words: Vec<&str> = line.split_ascii_whitespace().collect();
-            // The column of a word, for errors.
-            let of =
-                |word: &str| place(start + (word.as_ptr() as usize).saturating_sub(line.as_ptr() as usize));
-            let wrong = |word: &str, what: &str| Diagnostic::error(what).at(of(word)).found(quoted(word));
-            let whole = |what: &str| Diagnostic::error(what).at(place(start)).found(quoted(line.trim()));
-            if first {
-                if words[..] != ["ply"] {
-                    return Err(whole("not a PLY file").expected("a line \"ply\"").into());
-                }
-                first = false;
-                continue;
-            }
-            match words[..] {
-                [] | ["comment" | "obj_info", ..] => {}
-                ["format", kind, version] => {
-                    encoding = Some(match kind {
-                        "ascii" => Encoding::Text,
-                        "binary_little_endian" => Encoding::Little,
-                        "binary_big_endian" => Encoding::Big,
-                        _ => {
-                            let known = "ascii, binary_little_endian or binary_big_endian";
-                            return Err(wrong(kind, "unknown PLY format").expected(known).into());
-                        }
-                    });
-                    if version != "1.0" {
-                        return Err(wrong(version, "unknown PLY version").expected("1.0").into());
-                    }
-                }
-                ["element", element, count] => {
-                    let parsed = count.parse::<u64>();
-                    let Ok(parsed) = parsed else {
-                        return Err(wrong(count, "wrong count of elements")
-                            .expected("a whole number")
-                            .into());
-                    };
-                    if elements.iter().any(|e| e.name == element) {
-                        return Err(wrong(element, "second element of this name").into());
-                    }
-                    let place = of(count);
-                    elements.push(Element {
-                        name: element.to_owned(),
-                        count: parsed,
-                        properties: vec![],
-                        place,
-                    });
-                }
-                ["property", ref definition @ ..] => {
-                    let number = |word: &str| {
-                        let known = Number::NAMES.iter().find(|(n, _)| *n == word).map(|&(_, number)| number);
-                        known.ok_or_else(|| {
-                            let names = Number::NAMES.iter().map(|(n, _)| *n);
-                            FormatError::from(wrong(word, "unknown type of number").suggest(word, names))
-                        })
-                    };
-                    let (list, kind, property) = match *definition {
-                        ["list", length, kind, property] => (Some(number(length)?), number(kind)?, property),
-                        [kind, property] => (None, number(kind)?, property),
-                        _ => return Err(whole("wrong property").expected("property TYPE NAME").into()),
-                    };
-                    let Some(element) = elements.last_mut() else {
-                        return Err(whole("property before any element").into());
-                    };
-                    if list.is_some_and(Number::is_float) {
-                        let expected = "a type of whole numbers";
-                        return Err(wrong(definition[1], "a list's length is not whole")
-                            .expected(expected)
-                            .into());
-                    }
-                    element.properties.push(Property { name: property.to_owned(), list, number: kind });
-                }
-                ["end_header"] => break,
-                [keyword, ..] => {
-                    let known = ["format", "element", "property", "comment", "obj_info", "end_header"];
-                    return Err(wrong(keyword, "unknown line in PLY header").suggest(keyword, known).into());
-                }
-            }
-        }
-        let encoding =
-            encoding.ok_or_else(|| Diagnostic::error("PLY header without a format line").at(place(0)))?;
-        Ok(Self { encoding, elements, end: at })
-    }
-}
-
-/// What went wrong at a byte; the reader knows in which element.
-#[derive(Debug)]
-struct Fault {
-    at: usize,
-    message: &'static str,
-    found: String,
-}
-
-type Read<T> = Result<T, Box<Fault>>;
-
-/// The numbers of the body, one after the other.
-trait Source: Copy {
-    fn at(&self) -> usize;
-    fn left(&self) -> usize;
-    /// The next number. Whole numbers are exact.
-    fn number(&mut self, number: Number) -> Read<f64>;
-    /// Passes over so many numbers.
-    fn skip(&mut self, number: Number, count: u64) -> Read<()>;
-
-    /// A list's length, which the rest of the file can hold.
-    fn length(&mut self, number: Number, item: Number) -> Read<usize>;
-}
-
-#[derive(Clone, Copy)]
-struct Text<'a> {
-    bytes: &'a [u8],
-    at: usize,
-}
-
-impl<'a> Text<'a> {
-    fn word(&mut self) -> Read<&'a [u8]> {
-        let blank = |b: &u8| matches!(b, b' ' | b'\t' | b'\n' | b'\r' | 0x0B | 0x0C);
-        let rest = &self.bytes[self.at..];
-        let start = rest.iter().position(|b| !blank(b)).unwrap_or(rest.len());
-        let rest = &rest[start..];
-        let length = rest.iter().position(blank).unwrap_or(rest.len());
-        self.at += start;
-        if length == 0 {
-            return Err(Box::new(Fault { at: self.at, message: "file ends early", found: "its end".into() }));
-        }
-        self.at += length;
-        Ok(&rest[..length])
-    }
-}
-
-impl Source for Text<'_> {
-    fn at(&self) -> usize {
-        self.at
-    }
-
-    fn left(&self) -> usize {
-        self.bytes.len() - self.at
-    }
-
-    #[inline]
-    fn number(&mut self, number: Number) -> Read<f64> {
-        let word = self.word()?;
-        let parsed = std::str::from_utf8(word).ok().and_then(|w| w.parse::<f64>().ok());
-        // Whole numbers may be written as 3.0, which some programs do.
-        let parsed = parsed.filter(|v| number.is_float() || v.fract() == 0.0);
-        parsed.ok_or_else(|| {
-            let message = if number.is_float() { "not a number" } else { "not a whole number" };
-            Box::new(Fault { at: self.at - word.len(), message, found: quoted_bytes(word) })
-        })
-    }
-
-    fn skip(&mut self, _: Number, count: u64) -> Read<()> {
-        (0..count).try_for_each(|_| self.word().map(drop))
-    }
-
-    fn length(&mut self, number: Number, _: Number) -> Read<usize> {
-        let start = *self;
-        let length = self.number(number)?;
-        checked_length(length, self.left() / 2 + 1).ok_or_else(|| {
-            let mut start = start;
-            let word = start.word().unwrap_or_default();
-            Box::new(Fault { at: start.at - word.len(), message: WRONG_LENGTH, found: quoted_bytes(word) })
-        })
-    }
-}
-
-const WRONG_LENGTH: &str = "a list's length is negative or more than the file holds";
-
-fn checked_length(length: f64, most: usize) -> Option<usize> {
-    (0.0 <= length && length <= most as f64).then_some(length as usize)
-}
-
-#[derive(Clone, Copy)]
-struct Binary<'a, const BIG: bool> {
-    bytes: &'a [u8],
-    at: usize,
-}
-
-impl<const BIG: bool> Binary<'_, BIG> {
-    #[inline]
-    fn take<const N: usize>(&mut self) -> Read<[u8; N]> {
-        let Some(&taken) = self.bytes[self.at..].first_chunk::<N>() else {
-            let (at, found) = (self.bytes.len(), format!("{} bytes", self.left()));
-            return Err(Box::new(Fault { at, message: "file ends early", found }));
-        };
-        self.at += N;
-        Ok(taken)
-    }
-}
-
-impl<const BIG: bool> Source for Binary<'_, BIG> {
-    fn at(&self) -> usize {
-        self.at
-    }
-
-    fn left(&self) -> usize {
-        self.bytes.len() - self.at
-    }
-
-    #[inline]
-    fn number(&mut self, number: Number) -> Read<f64> {
-        macro_rules! take {
-            ($T:ty) => {{
-                let bytes = self.take()?;
-                f64::from(if BIG { <$T>::from_be_bytes(bytes) } else { <$T>::from_le_bytes(bytes) })
-            }};
-        }
-        Ok(match number {
-            Number::I8 => take!(i8),
-            Number::U8 => take!(u8),
-            Number::I16 => take!(i16),
-            Number::U16 => take!(u16),
-            Number::I32 => take!(i32),
-            Number::U32 => take!(u32),
-            Number::F32 => take!(f32),
-            Number::F64 => take!(f64),
-        })
-    }
-
-    fn skip(&mut self, number: Number, count: u64) -> Read<()> {
-        let bytes = count.saturating_mul(number.bytes() as u64);
-        if bytes > self.left() as u64 {
-            let (at, found) = (self.bytes.len(), format!("{} bytes", self.left()));
-            return Err(Box::new(Fault { at, message: "file ends early", found }));
-        }
-        self.at += bytes as usize;
-        Ok(())
-    }
-
-    fn length(&mut self, number: Number, item: Number) -> Read<usize> {
-        let at = self.at;
-        let length = self.number(number)?;
-        checked_length(length, self.left() / item.bytes())
-            .ok_or_else(|| Box::new(Fault { at, message: WRONG_LENGTH, found: length.to_string() }))
-    }
-}
-
-/// What a property of a vertex is for.
+/// The use of a vertex property.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Slot {
     Position(usize),
@@ -554,7 +171,7 @@ impl<'a> Mesh<'a> {
         self.encoding.place(self.name, self.bytes, at, element, index, property)
     }
 
-    /// A fault in a property of element number `index`. Text places do not say which element it was.
+    /// A fault in a property of element number `index`. Places in a text do not include the element.
     fn wrong(&self, fault: Fault, element: &Element, index: u64, property: &str) -> Diagnostic {
         let within = match self.encoding {
             Encoding::Text => format!("{} in {} {index}, property {property}", fault.message, element.name),
@@ -575,7 +192,7 @@ impl<'a> Mesh<'a> {
         for element in &header.elements {
             let least = element.least_bytes(self.encoding);
             if least == 0 {
-                // Without properties it takes no bytes, however many there are.
+                // Without properties it takes no bytes, at any count.
                 continue;
             }
             // The last number of a text needs no space after it.
@@ -798,7 +415,7 @@ impl<'a> Mesh<'a> {
                         }
                         for corner in &mut corners[..length] {
                             let value = source.number(property.number).map_err(fault)?;
-                            // The cast holds what is out of range at the ends of i64, which is out of range still.
+                            // The cast saturates numbers that are out of range; they stay out of range.
                             *corner = if value.fract() == 0.0 { value as i64 } else { i64::MIN };
                         }
                         filled = length;
@@ -856,7 +473,7 @@ impl<'a> Mesh<'a> {
                 }
             }
             _ => {
-                // Where its corners stand, and the cutting of them.
+                // The positions of its corners, and the triangulation.
                 let _while_cut = self.budget.hold(corners.len() as u64 * 160, "corners of a face")?;
                 let places: Vec<Vec3> = corners.iter().map(|&c| self.positions[c as usize]).collect();
                 let Some(triangles) = polygon::triangulate(&places) else {
@@ -894,7 +511,7 @@ impl<'a> Mesh<'a> {
         for strip in corners.split(|&c| c == -1) {
             for (i, corners) in strip.windows(3).enumerate() {
                 let [a, b, c] = [corners[0], corners[1], corners[2]];
-                // Every other triangle of a strip goes the other way round; those that only turn it have no area.
+                // Every other triangle of a strip is reversed; degenerate ones have no area.
                 if a != b && b != c && a != c {
                     let corners = if i % 2 == 0 { [a, b, c] } else { [b, a, c] };
                     self.face(&corners, 0, element, index, at)?;

@@ -1,0 +1,142 @@
+//! The grammar: files and includes, directives and where they may appear, parameter lists.
+
+mod directives;
+mod parameters;
+mod scopes;
+mod tokens;
+mod transforms;
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use lumbre_math::Transform;
+
+use super::convert::Converter;
+use super::lexer::{Lexer, Token, TokenKind};
+use super::source::{AtSpot, Fault, Result, Spot};
+use super::state::{Scope, State};
+use crate::diagnostic::quoted;
+use crate::{Diagnostic, FormatError, Input};
+
+/// A file that is being read.
+struct Frame<'b> {
+    lexer: Lexer<Input<'b>>,
+    // Its canonical path, to detect cycles; `None` if it is not a file.
+    canonical: Option<PathBuf>,
+    // The state and the scopes to restore after an `Import`.
+    import: Option<Box<(State, usize)>>,
+    is_top: bool,
+}
+
+/// Parses the scene language and passes each entity to the [`Converter`].
+pub(in crate::pbrt) struct Parser<'b, 'd> {
+    frames: Vec<Frame<'b>>,
+    peeked: Option<Token>,
+    in_world: bool,
+    state: State,
+    scopes: Vec<Scope>,
+    coordinate_systems: HashMap<String, [Transform; 2]>,
+    pub converter: Converter<'b, 'd>,
+}
+
+impl<'b, 'd> Parser<'b, 'd> {
+    pub fn new(mut converter: Converter<'b, 'd>) -> Self {
+        let state = State::new(converter.default_material());
+        Self {
+            frames: vec![],
+            peeked: None,
+            in_world: false,
+            state,
+            scopes: vec![],
+            coordinate_systems: HashMap::new(),
+            converter,
+        }
+    }
+
+    /// Reads another top-level input to its end.
+    pub fn read(&mut self, input: Input<'b>, canonical: Option<PathBuf>) -> Result<()> {
+        let file = self.converter.files.add(input.name().clone(), None);
+        let lexer = Lexer::new(input, file)?;
+        self.frames.push(Frame { lexer, canonical, import: None, is_top: true });
+        loop {
+            let Some(token) = self.next()? else {
+                if self.leave_file()? {
+                    return Ok(());
+                }
+                continue;
+            };
+            let spot = self.spot(token);
+            if token.kind == TokenKind::Bare {
+                let name = self.bare(token);
+                self.directive(&name, spot)?;
+            } else {
+                let wrong = Diagnostic::error("no directive before this").found(self.shown(token));
+                return Err(spot.wrong(wrong.expected("a directive such as Shape")));
+            }
+        }
+    }
+
+    /// After the last input: checks for open scopes, and completes deferred work.
+    pub fn finish(&mut self) -> Result<()> {
+        if let Some(scope) = self.scopes.pop() {
+            return Err(scope.spot.error(format!("{} without its {}", scope.kind.begin(), scope.kind.end())));
+        }
+        if !self.in_world {
+            let spot = Spot { file: 0, line: 1, column: 1 };
+            return Err(spot.error("the scene has no WorldBegin"));
+        }
+        self.converter.finish()
+    }
+
+    fn include(&mut self, spot: Spot) -> Result<()> {
+        self.include_file("Include", spot)
+    }
+
+    fn import(&mut self, spot: Spot) -> Result<()> {
+        self.include_file("Import", spot)
+    }
+
+    fn include_file(&mut self, directive: &str, spot: Spot) -> Result<()> {
+        let (name, at) = self.string(directive, "a file name in quotes")?;
+        let path = self.converter.resolve(&name, at)?;
+        let canonical = path.canonicalize().ok();
+        let cycle = self.frames.iter().any(|f| f.canonical.is_some() && f.canonical == canonical);
+        if cycle {
+            return Err(at.wrong(Diagnostic::error("a file includes itself").found(quoted(&name))));
+        }
+        self.converter.budget.nesting(self.frames.len() + 1, directive).at(at)?;
+        let input = Input::open(&path, self.converter.budget).map_err(|e| match e {
+            FormatError::Io { action, source, path } => {
+                let message = format!("{action} {}: {source}", quoted(&path.display().to_string()));
+                at.error(message)
+            }
+            FormatError::Limit { source, .. } => Fault::Limit(at, source),
+            other => other.into(),
+        })?;
+        let file = self.converter.files.add(input.name().clone(), Some(spot));
+        let lexer = Lexer::new(input, file)?;
+        let import = (directive == "Import").then(|| Box::new((self.state.clone(), self.scopes.len())));
+        self.frames.push(Frame { lexer, canonical, import, is_top: false });
+        Ok(())
+    }
+
+    /// Ends the current file; returns whether it was a top-level one.
+    fn leave_file(&mut self) -> Result<bool> {
+        let Some(frame) = self.frames.pop() else { return Ok(true) };
+        if let Some((state, depth)) = frame.import.map(|import| *import) {
+            if let Some(scope) = self.scopes.get(depth) {
+                let message = format!("{} without its {}", scope.kind.begin(), scope.kind.end());
+                return Err(scope.spot.error(message));
+            }
+            self.state = state;
+        }
+        Ok(frame.is_top)
+    }
+}
+
+/// The path of the file `name` of a scene in `directory`: relative to it if it exists there, else the name as
+/// given.
+pub(in crate::pbrt) fn resolve(directory: &Path, name: &str) -> PathBuf {
+    let beside = directory.join(name);
+    if beside.exists() { beside } else { PathBuf::from(name) }
+}

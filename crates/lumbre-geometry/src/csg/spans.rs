@@ -1,0 +1,258 @@
+//! Span arithmetic: merges the crossings of all leaves along a line into those of the result.
+
+use lumbre_math::DVec3;
+use smallvec::{SmallVec, smallvec};
+
+use super::leaf::shape_contains;
+use super::tree::NodeKind;
+use super::{Crossings, Csg, Leaf};
+use crate::{Aabb, Ray, Root, Roots};
+
+/// A crossing of one leaf.
+#[derive(Clone, Copy)]
+struct Event {
+    root: Root,
+    leaf: u32,
+    enters: bool,
+}
+
+type Events = SmallVec<[Event; 16]>;
+
+/// Crossings closer than this, relative to the coordinates involved, count as one.
+const COINCIDENT: f64 = 256.0 * f64::EPSILON;
+
+impl Csg {
+    /// Calls `emit` with every crossing of the result in the ray's range, in order, until it returns false.
+    pub(super) fn sweep(&self, ray: &Ray, mut emit: impl FnMut(Root) -> bool) {
+        let mut membership = Membership::new(self);
+        let mut events = Events::new();
+        if self.gather(ray, &mut membership, &mut events).is_none() {
+            return;
+        }
+        let (origin, direction) = (ray.origin.abs().max_element(), ray.direction.abs().max_element());
+        let mut rest = &events[..];
+        while let Some(first) = rest.first() {
+            let t = first.root.t;
+            if t > ray.t_max {
+                return;
+            }
+            let reach = t + COINCIDENT * (origin / direction + t.abs());
+            let together = 1 + rest[1..].iter().take_while(|event| event.root.t <= reach).count();
+            let (group, later) = rest.split_at(together);
+            rest = later;
+            if let Some(root) = membership.cross_group(group)
+                && ray.contains(root.t)
+                && !emit(root)
+            {
+                return;
+            }
+        }
+    }
+
+    /// Collects the crossings of all relevant leaves, in order; `None` when the result is empty within the
+    /// ray's range.
+    ///
+    /// A leaf whose box the ray misses is empty along the whole range, and so is every intersection that
+    /// contains it.
+    fn gather(&self, ray: &Ray, membership: &mut Membership, events: &mut Events) -> Option<()> {
+        let inverse = ray.direction.recip();
+        let mut i = 0;
+        while let Some(node) = self.nodes.get(i) {
+            let is_empty = match (node.bounds, node.kind) {
+                (Some(bounds), _) if !overlaps(&bounds, ray, inverse) => true,
+                (_, NodeKind::Leaf(leaf)) => !self.leaf_crossings(leaf, ray, membership, events),
+                _ => false,
+            };
+            i = if is_empty {
+                self.after_empty(i)?
+            } else if matches!(node.kind, NodeKind::Leaf(_)) {
+                node.end as usize
+            } else {
+                i + 1
+            };
+        }
+        events.sort_by(|a: &Event, b: &Event| a.root.t.total_cmp(&b.root.t).then(a.leaf.cmp(&b.leaf)));
+        Some(())
+    }
+
+    /// The node to continue with when node `i` is empty along the ray; `None` when then the whole result is.
+    fn after_empty(&self, mut i: usize) -> Option<usize> {
+        loop {
+            let node = &self.nodes[i];
+            let parent = node.parent? as usize;
+            let decides = match self.nodes[parent].kind {
+                NodeKind::Intersection => true,
+                NodeKind::Difference => !node.is_subtracted,
+                _ => false,
+            };
+            if !decides {
+                return Some(node.end as usize);
+            }
+            i = parent;
+        }
+    }
+
+    /// Appends the crossings of a leaf; false when the whole line is outside of it.
+    fn leaf_crossings(&self, leaf: u32, ray: &Ray, membership: &mut Membership, events: &mut Events) -> bool {
+        let first_part = self.first_part[leaf as usize];
+        let flipped = self.leaf_nodes[leaf as usize].1;
+        let encode = |root: &Root| Root {
+            part: first_part.saturating_add(root.part) << 1 | u32::from(flipped),
+            multiplicity: 1,
+            ..*root
+        };
+        let line = ray.with_range(f64::NEG_INFINITY, f64::INFINITY);
+        let before = events.len();
+        match &self.leaves[leaf as usize] {
+            Leaf::Shape(shape) => {
+                let mut roots = Roots::new();
+                shape.roots(&line, &mut roots);
+                // A touch is not a crossing.
+                let crosses = |root: &&Root| root.multiplicity % 2 == 1 && root.t.is_finite();
+                let mut inside = self.is_unbounded(leaf)
+                    && match roots.iter().find(crosses) {
+                        Some(first) => shape.surface(&line, first).normal.dot(line.direction) > 0.0,
+                        None => shape_contains(shape, line.origin),
+                    };
+                if inside {
+                    membership.cross(leaf, true);
+                }
+                let started_inside = inside;
+                for root in roots.iter().filter(crosses) {
+                    inside = !inside;
+                    events.push(Event { root: encode(root), leaf, enters: inside });
+                }
+                let is_odd = inside && !self.is_unbounded(leaf);
+                if is_odd {
+                    // Rounding turned a touch into a crossing. It is one of the last two, which coincide.
+                    events.pop();
+                }
+                started_inside || events.len() > before
+            }
+            Leaf::Solid { solid, world_from_object } => {
+                let mut crossings = Crossings::new();
+                let line = world_from_object.as_ref().map_or(line, |m| line.into_object(m));
+                solid.crossings(&line, &mut crossings);
+                let finite = crossings.iter().filter(|c| c.root.t.is_finite());
+                events.extend(finite.map(|c| Event { root: encode(&c.root), leaf, enters: c.enters }));
+                events.len() > before
+            }
+        }
+    }
+}
+
+/// Whether the ray's range overlaps a box; true when in doubt.
+#[inline]
+fn overlaps(bounds: &Aabb, ray: &Ray, inverse: DVec3) -> bool {
+    let (mut near, mut far) = (ray.t_min, ray.t_max);
+    for axis in 0..3 {
+        let a = (bounds.min[axis] - ray.origin[axis]) * inverse[axis];
+        let b = (bounds.max[axis] - ray.origin[axis]) * inverse[axis];
+        if a.is_nan() || b.is_nan() {
+            // Parallel to the face, and in its plane.
+            continue;
+        }
+        // A bound on the rounding error of the two operations.
+        let slack = 4.0 * f64::EPSILON * a.abs().max(b.abs());
+        let slack = if slack.is_finite() { slack } else { 0.0 };
+        near = near.max(a.min(b) - slack);
+        far = far.min(a.max(b) + slack);
+    }
+    near <= far
+}
+
+/// The leaves and nodes that contain the current point of the line.
+pub(super) struct Membership<'a> {
+    csg: &'a Csg,
+    // For each leaf, how many more times it has been entered than left.
+    nesting: SmallVec<[i32; 16]>,
+    // For each node, how many of its operands count towards it.
+    counts: SmallVec<[u32; 32]>,
+}
+
+impl<'a> Membership<'a> {
+    pub(super) fn new(csg: &'a Csg) -> Self {
+        Self {
+            csg,
+            nesting: smallvec![0; csg.leaves.len()],
+            counts: csg.nodes.iter().map(|node| node.initial).collect(),
+        }
+    }
+
+    pub(super) fn contains(&self, node: usize) -> bool {
+        self.counts[node] >= self.csg.nodes[node].needed
+    }
+
+    /// Enters or leaves a leaf, and updates its ancestors as far as they change.
+    pub(super) fn cross(&mut self, leaf: u32, enters: bool) {
+        let nesting = &mut self.nesting[leaf as usize];
+        let was_inside = *nesting > 0;
+        *nesting += if enters { 1 } else { -1 };
+        let mut is_inside = *nesting > 0;
+        if was_inside == is_inside {
+            return;
+        }
+        let mut i = self.csg.leaf_nodes[leaf as usize].0 as usize;
+        self.counts[i] = u32::from(is_inside);
+        while let Some(parent) = self.csg.nodes[i].parent {
+            let parent = parent as usize;
+            let counts_for = is_inside != self.csg.nodes[i].is_subtracted;
+            let was_inside = self.contains(parent);
+            if counts_for {
+                self.counts[parent] += 1;
+            } else {
+                self.counts[parent] -= 1;
+            }
+            is_inside = self.contains(parent);
+            if is_inside == was_inside {
+                return;
+            }
+            i = parent;
+        }
+    }
+
+    /// Passes a group of coincident crossings; returns a root when the result begins or ends there.
+    fn cross_group(&mut self, group: &[Event]) -> Option<Root> {
+        let was_inside = self.contains(0);
+        // The surface belongs to a crossing that is sufficient by itself, or else to one that is necessary.
+        let mut decisive = None;
+        if group.len() > 1 {
+            decisive = self.decisive(group, was_inside);
+        }
+        for event in group {
+            self.cross(event.leaf, event.enters);
+        }
+        let is_inside = self.contains(0);
+        if is_inside == was_inside {
+            return None;
+        }
+        if decisive.is_none() && group.len() > 1 {
+            // Undoing a crossing is passing it backwards.
+            let backwards: SmallVec<[Event; 8]> =
+                group.iter().map(|event| Event { enters: !event.enters, ..*event }).collect();
+            decisive = self.decisive(&backwards, is_inside);
+        }
+        let agrees =
+            |event: &&Event| (event.enters != self.csg.leaf_nodes[event.leaf as usize].1) == is_inside;
+        let chosen = match decisive {
+            Some(i) => group.get(i),
+            None => group.iter().filter(agrees).min_by_key(|event| event.leaf),
+        };
+        chosen.or(group.first()).map(|event| event.root)
+    }
+
+    /// The crossing of the first leaf among those that by themselves change whether the point is inside the
+    /// result.
+    fn decisive(&mut self, group: &[Event], was_inside: bool) -> Option<usize> {
+        let mut found: Option<usize> = None;
+        for (i, event) in group.iter().enumerate() {
+            self.cross(event.leaf, event.enters);
+            let decides = self.contains(0) != was_inside;
+            self.cross(event.leaf, !event.enters);
+            if decides && found.is_none_or(|best| event.leaf < group[best].leaf) {
+                found = Some(i);
+            }
+        }
+        found
+    }
+}

@@ -1,0 +1,92 @@
+//! A ray's line in the frame of the torus, clipped to its bounds.
+
+use lumbre_math::DVec3;
+
+use super::Torus;
+use crate::Ray;
+
+/// A ray's line in the torus's frame: the points `p + s u` with a unit `u` perpendicular to `p`, at t = (shift
+/// + s) / speed.
+pub(super) struct Line {
+    pub(super) p: DVec3,
+    pub(super) u: DVec3,
+    pub(super) shift: f64,
+    pub(super) speed: f64,
+    // All crossings lie strictly between these, and both ends are outside.
+    pub(super) low: f64,
+    pub(super) high: f64,
+}
+
+impl Line {
+    pub(super) fn t(&self, s: f64) -> f64 {
+        (self.shift + s) / self.speed
+    }
+}
+
+/// The relative margin of the bounds: the ends of the clipped line are outside in spite of rounding.
+const MARGIN: f64 = 1e-9;
+
+impl Torus {
+    /// The line, with s = 0 at the point nearest to the centre: there the quartic has no cubic term, and its
+    /// coefficients do not depend on the distance of the ray's origin. `None` when the line misses the bounds.
+    #[inline]
+    pub(super) fn line(&self, ray: &Ray) -> Option<Line> {
+        let (w, d) = (ray.origin - self.center, ray.direction);
+        let dd = d.length_squared();
+        let speed = dd.sqrt();
+        let unit = d / speed;
+        let first = -w.dot(unit);
+        let near = w + first * unit;
+        let reach = (self.major + self.minor) * (1.0 + MARGIN);
+        let within_sphere = near.length_squared() <= reach * reach;
+        // False for a direction of zero and for NaNs.
+        if !within_sphere || !dd.is_finite() {
+            return None;
+        }
+        let second = -near.dot(unit);
+        let (p, u) = (self.framed(near + second * unit), self.framed(unit));
+        let (low, high) = self.span(p, u, reach)?;
+        let shift = first + second;
+        let overlaps = shift + high >= ray.t_min * speed && shift + low <= ray.t_max * speed;
+        overlaps.then_some(Line { p, u, shift, speed, low, high })
+    }
+
+    /// The part of the line inside the flat cylinder around the torus; `None` when it is empty, or only in the
+    /// hole.
+    #[inline]
+    fn span(&self, p: DVec3, u: DVec3, reach: f64) -> Option<(f64, f64)> {
+        let flat = self.minor * (1.0 + MARGIN);
+        let (mut low, mut high) = (-2.0 * reach, 2.0 * reach);
+        if u.z == 0.0 {
+            if p.z.abs() > flat {
+                return None;
+            }
+        } else {
+            let inverse = 1.0 / u.z;
+            let (middle, half) = (-p.z * inverse, flat * inverse.abs());
+            (low, high) = (low.max(middle - half), high.min(middle + half));
+        }
+        let a = u.x * u.x + u.y * u.y;
+        let h = p.x * u.x + p.y * u.y;
+        let c = p.x * p.x + p.y * p.y - reach * reach;
+        let delta = h * h - a * c;
+        if delta < 0.0 {
+            return None;
+        }
+        if a > 1e-30 {
+            let inverse = 1.0 / a;
+            let (middle, half) = (-h * inverse, delta.sqrt() * inverse);
+            (low, high) = (low.max(middle - half), high.min(middle + half));
+        } else if c > 0.0 {
+            return None;
+        }
+        if low > high {
+            return None;
+        }
+        // The distance from the axis is convex along the line, so it is greatest at an end.
+        let hole = (self.major - self.minor) * (1.0 - MARGIN);
+        let rho_squared = |s: f64| (p.x + s * u.x).powi(2) + (p.y + s * u.y).powi(2);
+        let in_hole = hole > 0.0 && rho_squared(low).max(rho_squared(high)) < hole * hole;
+        (!in_hole).then_some((low, high))
+    }
+}
