@@ -59,6 +59,7 @@ impl fmt::Display for Failure {
 
 /// Prints text to standard output. The reader may close the pipe: `lumbre info … | head -1`.
 ///
+/// # Errors
 /// [`Failure::Io`] when it cannot be written.
 pub(crate) fn print(text: &str) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();

@@ -112,6 +112,7 @@ impl ReadingArguments {
 
     /// Reads one or more files as one scene.
     ///
+    /// # Errors
     /// [`Failure`] by kind of error.
     pub(crate) fn open(&self, paths: &[PathBuf]) -> Result<(Scene, Diagnostics), Failure> {
         let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
@@ -120,6 +121,7 @@ impl ReadingArguments {
 
     /// Reads one or more files as one description.
     ///
+    /// # Errors
     /// As for [`ReadingArguments::open`].
     pub(crate) fn describe(&self, paths: &[PathBuf]) -> Result<(SceneDesc, Diagnostics), Failure> {
         self.describe_at(paths, self.frame)
@@ -127,6 +129,7 @@ impl ReadingArguments {
 
     /// [`Self::describe`] at the frame of this number.
     ///
+    /// # Errors
     /// As for [`ReadingArguments::open`].
     pub(crate) fn describe_frame(
         &self,

@@ -120,6 +120,7 @@ impl Behind {
 impl StagingArguments {
     /// Rejects combinations that are invalid for this output name.
     ///
+    /// # Errors
     /// [`Failure::Usage`].
     pub(crate) fn check(&self, output: Option<&Path>) -> Result<(), Failure> {
         let Some(output) = output else { return Ok(()) };
@@ -148,6 +149,7 @@ impl StagingArguments {
 
     /// The stage of a picture of this size after a rotation.
     ///
+    /// # Errors
     /// Unreadable files, and [`Failure::Usage`] for an image that is not an environment map.
     pub(crate) fn stage(&self, size: Option<(u32, u32)>) -> Result<Stage, Failure> {
         let surroundings = match &self.env {
@@ -166,6 +168,7 @@ impl StagingArguments {
     /// The background of a picture of a staged description. Pictures other than of light (normals and the like)
     /// have none by default.
     ///
+    /// # Errors
     /// Unreadable files.
     pub(crate) fn behind(&self, staged: &Staged, is_of_light: bool) -> Result<Behind, Failure> {
         Ok(match &self.background {

@@ -13,6 +13,7 @@ use crate::diagnostic::FormatError;
 /// A replaced file keeps its permissions, and a symbolic link keeps pointing at the file that it names. A pipe
 /// or a device is written to directly.
 ///
+/// # Errors
 /// [`FormatError::Io`]; the path then holds what it held before, unless only syncing the folder failed. A
 /// process that is killed may leave a file `.NAME.….part` beside it.
 pub fn atomic_write(
@@ -25,6 +26,7 @@ pub fn atomic_write(
 /// Checks that [`atomic_write`] could write `path`, by creating its temporary file and removing it. Call it
 /// before a long render.
 ///
+/// # Errors
 /// [`FormatError::Io`] when it could not.
 pub fn probe_writable(path: &Path) -> Result<(), FormatError> {
     let target = target_of(path).map_err(|e| FormatError::io(path, CANNOT_WRITE, e))?;
@@ -43,18 +45,22 @@ pub trait Disk {
     type File: Write;
     /// Creates a file that does not exist.
     ///
+    /// # Errors
     /// As the system's.
     fn create(&self, path: &Path) -> io::Result<Self::File>;
     /// Syncs a file to disk.
     ///
+    /// # Errors
     /// As the system's.
     fn sync(&self, file: &mut Self::File) -> io::Result<()>;
     /// Renames `from` to `to`, replacing it in one step.
     ///
+    /// # Errors
     /// As the system's.
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()>;
     /// Syncs a folder's entries to disk.
     ///
+    /// # Errors
     /// As the system's.
     fn sync_folder(&self, folder: &Path) -> io::Result<()>;
     /// Removes a file.
@@ -95,6 +101,7 @@ impl Disk for RealDisk {
 
 /// [`atomic_write`] on another [`Disk`].
 ///
+/// # Errors
 /// As for [`atomic_write`].
 pub fn atomic_write_on<D: Disk>(
     disk: &D,

@@ -116,6 +116,7 @@ impl Budget {
 
     /// Charges `bytes` that are kept; [`Budget::release`] returns them.
     ///
+    /// # Errors
     /// When more than [`Limits::memory`] would be held; nothing is charged then.
     pub fn bytes(&self, bytes: u64, what: &str) -> Result<(), LimitError> {
         let held = spend(&self.memory, bytes, self.limits.memory, LimitKind::Memory, what)?;
@@ -132,6 +133,7 @@ impl Budget {
 
     /// Charges `bytes` for as long as the result lives.
     ///
+    /// # Errors
     /// As for [`Budget::bytes`].
     pub fn hold(&self, bytes: u64, what: &str) -> Result<Hold<'_>, LimitError> {
         self.bytes(bytes, what)?;
@@ -140,6 +142,7 @@ impl Budget {
 
     /// Charges for `count` values of `T` that are kept, and returns `count` as a `usize`.
     ///
+    /// # Errors
     /// As for [`Budget::bytes`].
     pub fn array<T>(&self, count: u64, what: &str) -> Result<usize, LimitError> {
         self.bytes(count.saturating_mul(size_of::<T>() as u64), what)?;
@@ -155,6 +158,7 @@ impl Budget {
     ///
     /// The caller has checked that the input can contain `count` values.
     ///
+    /// # Errors
     /// As for [`Budget::bytes`], and when the allocator refuses.
     pub fn vec<T>(&self, count: u64, what: &str) -> Result<Vec<T>, LimitError> {
         let len = self.array::<T>(count, what)?;
@@ -185,6 +189,7 @@ impl Budget {
 
     /// Checks a nesting of `depth` levels. Readers count their own depth.
     ///
+    /// # Errors
     /// When `depth` is more than [`Limits::nesting`].
     pub fn nesting(&self, depth: usize, what: &str) -> Result<(), LimitError> {
         if depth <= self.limits.nesting as usize {
@@ -200,6 +205,7 @@ impl Budget {
 
     /// Checks that `packed` compressed bytes may expand to `unpacked` bytes.
     ///
+    /// # Errors
     /// When there are more than [`Limits::FREE_EXPANSION`] and the ratio is more than [`Limits::expansion`].
     pub fn expansion(&self, packed: u64, unpacked: u64, what: &str) -> Result<(), LimitError> {
         if unpacked <= Limits::FREE_EXPANSION.max(packed.saturating_mul(self.limits.expansion)) {
@@ -239,6 +245,7 @@ pub struct Hold<'a> {
 impl Hold<'_> {
     /// Charges `bytes` more.
     ///
+    /// # Errors
     /// As for [`Budget::bytes`].
     pub fn grow(&mut self, bytes: u64, what: &str) -> Result<(), LimitError> {
         self.budget.bytes(bytes, what)?;
@@ -275,6 +282,7 @@ impl<'b, T> BudgetVec<'b, T> {
 
     /// Reserves capacity for `count` more values, which the caller knows the input can contain.
     ///
+    /// # Errors
     /// As for [`Budget::bytes`], and when the allocator refuses.
     pub fn reserve(&mut self, count: usize) -> Result<(), LimitError> {
         if count <= self.vec.capacity() - self.vec.len() {
@@ -285,6 +293,7 @@ impl<'b, T> BudgetVec<'b, T> {
 
     /// Adds a value.
     ///
+    /// # Errors
     /// As for [`BudgetVec::reserve`].
     #[inline]
     pub fn push(&mut self, value: T) -> Result<(), LimitError> {

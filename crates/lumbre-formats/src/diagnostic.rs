@@ -472,6 +472,7 @@ impl Diagnostics {
 
     /// The first error, or under [`Strictness::Strict`] the first diagnostic.
     ///
+    /// # Errors
     /// That diagnostic.
     pub fn check(&self) -> Result<(), FormatError> {
         let strict = self.strictness == Strictness::Strict;

@@ -24,6 +24,7 @@ impl<'b> Input<'b> {
     /// Reads the file `path`, verbatim: no variable, `~` or `%2e` in it is expanded. A gzip file is
     /// decompressed.
     ///
+    /// # Errors
     /// [`FormatError::Io`] when the system refuses or `path` is not a regular file (a folder, a pipe, a
     /// device), [`FormatError::Limit`] when the budget is exceeded, and [`FormatError::Input`] when gzip data
     /// is damaged.
@@ -41,6 +42,7 @@ impl<'b> Input<'b> {
 
     /// Bytes from elsewhere, such as standard input, with a name for messages.
     ///
+    /// # Errors
     /// As for [`Input::open`].
     pub fn from_reader(name: &str, reader: impl Read, budget: &'b Budget) -> Result<Self, FormatError> {
         let name: Arc<str> = name.into();
@@ -74,6 +76,7 @@ impl<'b> Input<'b> {
 
     /// The bytes as text, without a byte order mark.
     ///
+    /// # Errors
     /// As for [`text`].
     pub fn text(&self) -> Result<&str, FormatError> {
         text(&self.bytes, &self.name)
@@ -143,6 +146,7 @@ pub fn text<'a>(bytes: &'a [u8], name: &Arc<str>) -> Result<&'a str, FormatError
 
 /// Rejects UTF-16 and UTF-32.
 ///
+/// # Errors
 /// When `bytes` begin with the byte order mark of either.
 pub fn refuse_wide(bytes: &[u8], name: &Arc<str>) -> Result<(), FormatError> {
     let foreign = if bytes.starts_with(&[0xFF, 0xFE, 0, 0]) || bytes.starts_with(&[0, 0, 0xFE, 0xFF]) {

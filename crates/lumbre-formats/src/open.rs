@@ -63,6 +63,7 @@ impl SceneFormat {
 ///
 /// Returns the description and the diagnostics: the warnings, and their counts.
 ///
+/// # Errors
 /// [`FormatError`], with the place in the file.
 pub fn open_scene(path: &Path, options: &ReadOptions) -> Result<(SceneDesc, Diagnostics), FormatError> {
     open_scenes(&[path], options)
@@ -71,6 +72,7 @@ pub fn open_scene(path: &Path, options: &ReadOptions) -> Result<(SceneDesc, Diag
 /// Reads several scene files in the pbrt language, one after another as if they were one; or one file of any
 /// format.
 ///
+/// # Errors
 /// As for [`open_scene`], and when there are several files of which one has another format, or no file at all.
 pub fn open_scenes(
     paths: &[impl AsRef<Path>],

@@ -25,6 +25,7 @@ pub struct StlSolid {
 
 /// Reads the STL file `path` as a scene, each solid a shape with the default material; z is up.
 ///
+/// # Errors
 /// As for [`Input::open`] and [`read_stl`].
 pub fn open_stl(
     path: &Path,
@@ -42,6 +43,7 @@ pub fn open_stl(
 /// determine their orientation; a contradicting normal gives a warning. Colours are read as VisCAM and
 /// SolidView write them (bit 15 set), or as Materialise Magics does (`COLOR=` in the header, bit 15 clear).
 ///
+/// # Errors
 /// [`FormatError::Input`] with the line and column, or the byte and path such as `/facet/3`;
 /// [`FormatError::Limit`]. When lenient, facets that are not finite are dropped with a warning instead, and a
 /// wrong count gives a warning; as do, always, bytes after the last facet that are too few for another.

@@ -28,6 +28,7 @@ impl Scene {
     /// cameras gets one that frames everything, one without any light what [`SceneDesc::without_light`]
     /// specifies.
     ///
+    /// # Errors
     /// [`BuildError`], naming the shape, camera or light at fault.
     pub fn build(mut desc: SceneDesc) -> Result<Self, BuildError> {
         if stage::wants_studio(&desc) {

@@ -32,6 +32,7 @@ impl CsgForm {
 
 /// Resolves a CSG in the space of its tree. `builder` provides the materials.
 ///
+/// # Errors
 /// [`BuildError::Csg`], naming the part at fault, and the errors of [`crate::mesh::bake`].
 pub(crate) fn build(
     builder: &mut Builder,

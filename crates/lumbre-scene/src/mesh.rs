@@ -27,6 +27,7 @@ pub(crate) enum QuadOrder {
 
 /// Transforms a mesh into the space of its tree.
 ///
+/// # Errors
 /// Lists of the wrong length, faces with missing vertices, and vertices that are not finite.
 pub(crate) fn bake(
     shape: u32,

@@ -133,6 +133,7 @@ impl SceneBuilder {
 
     /// Builds the scene.
     ///
+    /// # Errors
     /// [`Error::Build`].
     pub fn build(self) -> Result<Scene, Error> {
         Scene::from_description(self.desc)

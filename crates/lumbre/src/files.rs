@@ -23,6 +23,7 @@ pub fn read_image(path: &Path) -> Result<Image, Error> {
 
 /// Writes an image atomically, in the format of the path's extension.
 ///
+/// # Errors
 /// [`Error::Format`].
 pub fn write_image(path: &Path, image: &Image, options: &SaveOptions) -> Result<(), Error> {
     Ok(lumbre_formats::image::write_image(path, image, options)?)

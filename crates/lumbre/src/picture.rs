@@ -47,6 +47,7 @@ impl Picture {
 
     /// Saves the picture in the format of the path's extension: .exr, .png, .hdr, .pfm or .jpg.
     ///
+    /// # Errors
     /// [`Error::Format`].
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), Error> {
         self.save_with(path.as_ref(), &SaveOptions::default(), &[])
@@ -55,6 +56,7 @@ impl Picture {
     /// Saves the picture with options, and with AOVs as layers of an .exr file: `albedo.R`, `normal.X`,
     /// `depth.Z`, `uv.U` and so on.
     ///
+    /// # Errors
     /// [`Error::Format`]; [`Error::Options`] when layers are requested for another format, or were not
     /// rendered.
     pub fn save_with(&self, path: &Path, options: &SaveOptions, layers: &[Feature]) -> Result<(), Error> {

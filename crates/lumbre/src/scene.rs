@@ -26,6 +26,7 @@ const LEAST_ALBEDO: f32 = 0.02;
 /// Opens a scene file: .pbrt (also .gz), .gltf, .glb, .obj, .ply or .stl. Warnings are dropped; [`open_with`]
 /// returns them.
 ///
+/// # Errors
 /// [`Error::Format`] with the place, and [`Error::Build`].
 pub fn open(path: impl AsRef<Path>) -> Result<Scene, Error> {
     Ok(open_with(&[path.as_ref()], &ReadOptions::default())?.0)
@@ -33,6 +34,7 @@ pub fn open(path: impl AsRef<Path>) -> Result<Scene, Error> {
 
 /// Opens one or more files as one scene, read one after another, and returns the diagnostics.
 ///
+/// # Errors
 /// As for [`open`]; with [`lumbre_formats::Strictness::Strict`], warnings too.
 pub fn open_with(paths: &[&Path], options: &ReadOptions) -> Result<(Scene, Diagnostics), Error> {
     let (desc, mut diagnostics) = describe(paths, options)?;
@@ -43,6 +45,7 @@ pub fn open_with(paths: &[&Path], options: &ReadOptions) -> Result<(Scene, Diagn
 /// Reads one or more files as one description, which can be changed before it is built (by a [`crate::Stage`]
 /// or otherwise), and returns the diagnostics.
 ///
+/// # Errors
 /// [`Error::Format`] with the place; with [`lumbre_formats::Strictness::Strict`], for warnings too.
 pub fn describe(paths: &[&Path], options: &ReadOptions) -> Result<(SceneDesc, Diagnostics), Error> {
     Ok(open_scenes(paths, options)?)
@@ -51,6 +54,7 @@ pub fn describe(paths: &[&Path], options: &ReadOptions) -> Result<(SceneDesc, Di
 impl Scene {
     /// Builds a scene from a description.
     ///
+    /// # Errors
     /// [`Error::Build`], naming the shape, camera or light at fault.
     pub fn from_description(desc: SceneDesc) -> Result<Self, Error> {
         let mut info = SceneInfo::of(&desc);
@@ -65,6 +69,7 @@ impl Scene {
 
     /// Builds a scene read from a file; problems of the whole scene are reported for the file.
     ///
+    /// # Errors
     /// [`Error::Format`]; with strict diagnostics, for warnings too.
     pub fn of_file(desc: SceneDesc, path: &Path, diagnostics: &mut Diagnostics) -> Result<Self, Error> {
         // Problems of the whole scene have a file but no line.
@@ -140,6 +145,7 @@ impl Scene {
 
     /// Renders a picture.
     ///
+    /// # Errors
     /// [`Error::Render`] when the options are invalid.
     pub fn render(&self, options: &RenderOptions) -> Result<Picture, Error> {
         self.render_with(options, &NoProgress, &CancelToken::new())
@@ -147,6 +153,7 @@ impl Scene {
 
     /// Renders a picture with progress reports; `cancel` ends it early with what has been rendered.
     ///
+    /// # Errors
     /// As for [`Scene::render`].
     pub fn render_with(
         &self,
@@ -162,6 +169,7 @@ impl Scene {
     /// the reflectance of what is visible, at the 80th percentile. `None` if nothing is visible. It is measured
     /// in a small picture of its own, so it does not depend on size, crop and number of samples.
     ///
+    /// # Errors
     /// As for [`Scene::render`].
     pub fn white_level(&self, options: &RenderOptions) -> Result<Option<f32>, Error> {
         const SIDE: f64 = 64.0;

@@ -22,6 +22,7 @@ const BINARY: [u8; 4] = *b"BIN\0";
 
 /// Splits a GLB file into its parts.
 ///
+/// # Errors
 /// With the byte at which the container is invalid.
 pub(super) fn read<'a>(bytes: &'a [u8], name: &Arc<str>, diagnostics: &mut Diagnostics) -> Read<Glb<'a>> {
     let place = |at: usize| Place::binary(name.clone(), at as u64, "");

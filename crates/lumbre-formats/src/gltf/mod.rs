@@ -91,6 +91,7 @@ const SUPPORTED: &[&str] = &[
 
 /// Reads the glTF or GLB file `path`; other files are found relative to its folder.
 ///
+/// # Errors
 /// As for [`Input::open`] and [`read_gltf`].
 pub fn open_gltf(
     path: &Path,
@@ -105,6 +106,7 @@ pub fn open_gltf(
 
 /// Reads a glTF or a GLB from the bytes of its file. Other files are found relative to `folder`.
 ///
+/// # Errors
 /// [`FormatError::Input`] with the JSON pointer where the file is invalid or requires an unknown extension,
 /// [`FormatError::Limit`], and [`FormatError::Io`] for other files.
 pub fn read_gltf(

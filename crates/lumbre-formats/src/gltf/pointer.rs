@@ -86,6 +86,7 @@ impl Changes {
 
     /// The text of `root` with the changes.
     ///
+    /// # Errors
     /// When a member occurs twice.
     pub(super) fn apply(&self, root: Value<'_>) -> Read<String> {
         // Ranges of the text, with their replacements.

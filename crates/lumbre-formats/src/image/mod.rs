@@ -138,6 +138,7 @@ impl ImageFile {
     /// The image as light on the primaries of Rec. 709, over its display window: black and transparent where
     /// the file has no pixels.
     ///
+    /// # Errors
     /// [`FormatError::Limit`] when the budget does not allow this many pixels.
     pub fn to_image(&self, budget: &Budget) -> Result<Image, FormatError> {
         let (data, display) = (self.data_window, self.display_window);
@@ -167,6 +168,7 @@ impl ImageFile {
 
 /// Reads the image file `path`.
 ///
+/// # Errors
 /// As for [`Input::open`] and [`read_image`].
 pub fn open_image(
     path: &Path,
@@ -180,6 +182,7 @@ pub fn open_image(
 /// Reads an image from the bytes of its file, in the format of its bytes, or else of the extension of `name`.
 /// The pixels stay charged to the budget.
 ///
+/// # Errors
 /// [`FormatError::Input`] when the bytes are not an image of a supported format or are damaged, and
 /// [`FormatError::Limit`] when it has more pixels than the budget allows.
 pub fn read_image(
@@ -201,6 +204,7 @@ pub fn read_image(
 /// Reads every channel of an image file; channels of an EXR file with several parts have the part's name as a
 /// prefix.
 ///
+/// # Errors
 /// As for [`read_image`], and [`FormatError::Input`] when two channels have the same name or parts have
 /// different sizes.
 pub fn read_layers(

@@ -81,6 +81,7 @@ pub enum ExrCompression {
 ///
 /// Colours are premultiplied by alpha, as renders are.
 ///
+/// # Errors
 /// [`FormatError::Input`] when no writable format has this extension, and [`FormatError::Io`].
 pub fn write_image(path: &Path, image: &Image, options: &WriteOptions) -> Result<(), FormatError> {
     let format = writable_format(path)?;
@@ -90,6 +91,7 @@ pub fn write_image(path: &Path, image: &Image, options: &WriteOptions) -> Result
 /// Writes named channels to `path`: all of them into EXR, only the colours `R`, `G`, `B` and `A` into other
 /// formats.
 ///
+/// # Errors
 /// As for [`write_image`], and [`FormatError::Input`] when a format that stores only colours gets none.
 pub fn write_layers(path: &Path, layers: &Layers, options: &WriteOptions) -> Result<(), FormatError> {
     let format = writable_format(path)?;
@@ -105,6 +107,7 @@ pub fn write_layers(path: &Path, layers: &Layers, options: &WriteOptions) -> Res
 
 /// The bytes of an image file.
 ///
+/// # Errors
 /// When the format is not writable ([`ImageFormat::is_writable`]), or cannot store an image of this size.
 pub fn encode_image(image: &Image, format: ImageFormat, options: &WriteOptions) -> io::Result<Vec<u8>> {
     if image.width() == 0 || image.height() == 0 {
@@ -124,6 +127,7 @@ pub fn encode_image(image: &Image, format: ImageFormat, options: &WriteOptions) 
 
 /// The bytes of an EXR file with these channels.
 ///
+/// # Errors
 /// When there are none, or one has a name that EXR cannot store.
 pub fn encode_layers(layers: &Layers, options: &WriteOptions) -> io::Result<Vec<u8>> {
     if layers.iter().len() == 0 || layers.width() == 0 || layers.height() == 0 {

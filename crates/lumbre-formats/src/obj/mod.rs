@@ -46,6 +46,7 @@ pub struct ObjMesh {
 ///
 /// Vertex colours (`v x y z r g b`) are linear. Lines, points, curves and surfaces are ignored with a warning.
 ///
+/// # Errors
 /// [`FormatError::Input`] with line and column; [`FormatError::Limit`]. When lenient, unusable faces are
 /// dropped with a warning instead.
 pub fn read_obj(

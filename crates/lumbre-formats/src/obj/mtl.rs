@@ -83,6 +83,7 @@ pub struct MtlTexture {
 /// Keys without a meaning here (`Ka` and others) are ignored, those that would change the appearance with a
 /// warning.
 ///
+/// # Errors
 /// [`FormatError::Input`] with line and column; [`FormatError::Limit`].
 pub fn read_mtl(
     bytes: &[u8],

@@ -28,6 +28,7 @@ use crate::ply::unsaid_material;
 /// as in B. Walter and others, "Microfacet models for refraction", EGSR 2007). `Ke` emits on both sides.
 /// Missing files and textures give warnings.
 ///
+/// # Errors
 /// As for [`Input::open`], [`read_obj`] and [`read_mtl`]; for textures only limits.
 pub fn open_obj(
     path: &Path,

@@ -71,6 +71,7 @@ impl<B: Deref<Target = [u8]>> Lexer<B> {
 
     /// The next token, or `None` at the end.
     ///
+    /// # Errors
     /// When a string does not end on its line, or a control character is between tokens.
     pub fn next(&mut self) -> Result<Option<Token>> {
         let bytes = &*self.bytes;
@@ -155,6 +156,7 @@ impl<B: Deref<Target = [u8]>> Lexer<B> {
 
     /// The contents of a string token, escapes resolved.
     ///
+    /// # Errors
     /// When it is not UTF-8, or has an unknown escape.
     pub fn string(&mut self, token: Token) -> Result<Cow<'_, str>> {
         debug_assert_eq!(token.kind, TokenKind::String);

@@ -70,6 +70,7 @@ pub fn read_files(
 /// Relative names of other files start at `directory`; without one, no other file is read, and a scene that
 /// names one is an error.
 ///
+/// # Errors
 /// What is wrong, with its place; see the [module](self).
 pub fn read_bytes(
     name: &str,

@@ -12,6 +12,7 @@ use lumbre_scene::MeshDesc;
 
 /// Subdivides `faces` over `positions` `levels` times and moves the vertices to the limit.
 ///
+/// # Errors
 /// When more than two faces share an edge, two neighbours have opposite orientations, or faces meet in a vertex
 /// alone.
 pub(super) fn subdivide(positions: &[Vec3], faces: &[[u32; 3]], levels: u32) -> Result<MeshDesc, String> {

@@ -26,6 +26,7 @@ use values::{Binary, Fault, Source, Text};
 /// new strip. Other elements and properties are ignored. Convex quadrilaterals are kept; other polygons are
 /// triangulated.
 ///
+/// # Errors
 /// [`FormatError::Input`] with the line and column, or the byte and the element's path such as `/vertex/3/x`;
 /// [`FormatError::Limit`]. When lenient, unusable faces are dropped with a warning instead.
 pub fn read_ply(
@@ -49,6 +50,7 @@ pub fn read_ply(
 
 /// Reads the PLY file `path` as a scene of one shape with the default material.
 ///
+/// # Errors
 /// As for [`Input::open`] and [`read_ply`].
 pub fn open_ply(
     path: &Path,
