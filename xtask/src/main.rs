@@ -7,6 +7,7 @@ use clap::{Args, Parser, Subcommand};
 use xtask::command::{self, Profile};
 
 mod bench;
+mod check;
 mod field;
 mod pictures;
 mod proof;
@@ -23,7 +24,18 @@ struct Arguments {
 enum Task {
     /// Everything that must hold before a change lands: format, lint, unit, contract and doc tests, docs, licences.
     /// Installs what it needs.
-    Test,
+    Test {
+        /// Also what takes hours, and is due before a release: the longest tests, the proofs, Miri, the address sanitizer, and every
+        /// package compiled by itself. The nightly toolchain is needed for some, which are named where it is missing.
+        #[arg(long)]
+        all: bool,
+    },
+    /// What is worth knowing between two edits: format, lints, and the tests of the packages with changes that are not committed.
+    Check {
+        /// Also the packages that changed since this revision.
+        #[arg(long, value_name = "REVISION")]
+        since: Option<String>,
+    },
     /// Renders every scene under scenes/ to the picture beside it.
     Scenes {
         /// Only scenes whose path contains this.
@@ -80,7 +92,9 @@ impl PassedOn {
 
 fn main() -> Result<()> {
     match Arguments::parse().task {
-        Task::Test => suite::run(),
+        Task::Test { all: false } => suite::run(),
+        Task::Test { all: true } => suite::run_all(),
+        Task::Check { since } => check::run(since.as_deref()),
         Task::Scenes { filter } => pictures::render_all(filter.as_deref()),
         Task::Assets(passed) => passed.hand_to_pictures("assets"),
         Task::Contact(passed) => passed.hand_to_pictures("contact"),

@@ -3,6 +3,8 @@
 use anyhow::Result;
 use xtask::command::{self, root, run_with, succeeds};
 
+use crate::proof;
+
 /// The version of cargo-deny that the gate was written for.
 const CARGO_DENY: &str = "0.20.2";
 
@@ -22,6 +24,26 @@ pub(crate) fn run() -> Result<()> {
     oldest_compiler()?;
     package()?;
     deny()
+}
+
+/// What every change must pass, and what only a release has the time for.
+pub(crate) fn run_all() -> Result<()> {
+    run()?;
+    // Ignored tests that check nothing: some write the tables that are compiled in, some print measurements.
+    let skipped = ["make_the_table", "measure_reading", "errors_and_times_of_fast_sums"];
+    let skips = skipped.iter().flat_map(|name| ["--skip", name]);
+    let ignored = ["test", "--workspace", "--release", "--", "--ignored"].into_iter().chain(skips);
+    command::run("cargo", &ignored.collect::<Vec<_>>())?;
+    command::run("cargo", &["publish", "--workspace", "--dry-run"])?;
+    if succeeds("cargo", &["+nightly", "miri", "--version"]) {
+        proof::miri()?;
+        proof::asan()
+    } else {
+        eprintln!(
+            "\nMiri and the address sanitizer are left out: rustup toolchain install nightly --component miri,rust-src"
+        );
+        Ok(())
+    }
 }
 
 /// The declared minimum Rust version compiles everything, where that toolchain is installed. Clippy's `incompatible_msrv` finds what

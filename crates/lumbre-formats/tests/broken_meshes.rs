@@ -2,11 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
-mod common;
-
 use std::sync::Arc;
 
-use common::changed;
+use crate::common::changed;
 use lumbre_formats::image::{ImageFormat, WriteOptions, encode_image, read_image};
 use lumbre_formats::obj::{read_mtl, read_obj};
 use lumbre_formats::ply::read_ply;

@@ -2,13 +2,11 @@
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
-mod common;
-
 use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use common::changed;
+use crate::common::changed;
 use lumbre_formats::{Budget, Diagnostics, Limits, ReadOptions, open_scene, pbrt};
 use lumbre_scene::SceneDesc;
 

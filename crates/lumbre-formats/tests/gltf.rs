@@ -2,12 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
-mod common;
-
 use std::path::Path;
 use std::sync::Arc;
 
-use common::{Random, changed};
+use crate::common::{Random, changed};
 use lumbre_formats::gltf::{GltfOptions, read_gltf};
 use lumbre_formats::{Budget, Diagnostics, FormatError, Limits, Strictness};
 use lumbre_geometry::Shape;

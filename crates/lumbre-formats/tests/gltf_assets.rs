@@ -2,12 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
-mod common;
-
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use common::{files_below, shared};
+use crate::common::{files_below, shared};
 use lumbre_formats::gltf::{GltfOptions, open_gltf};
 use lumbre_formats::{Budget, Diagnostics};
 use lumbre_scene::{Scene, SceneDesc};

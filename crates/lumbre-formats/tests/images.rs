@@ -2,11 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
-mod common;
-
 use std::sync::Arc;
 
-use common::{Random, changed, files_below, shared};
+use crate::common::{Random, changed, files_below, shared};
 use lumbre_formats::image::{
     ExrCompression, ExrPrecision, ImageFormat, PngDepth, WriteOptions, encode_image, encode_layers,
     open_image, read_image, read_layers, write_image,

@@ -2,11 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
-mod common;
-
 use std::sync::Arc;
 
-use common::{files_below, shared};
+use crate::common::{files_below, shared};
 use lumbre_formats::obj::{ObjFile, open_obj, read_mtl, read_obj};
 use lumbre_formats::{Budget, Diagnostics, FormatError, Input, Strictness};
 use lumbre_image::Rgb;

@@ -1,10 +1,8 @@
 //! PLY files in every encoding, with every type, and as others wrote them.
 
-mod common;
-
 use std::sync::Arc;
 
-use common::{changed, shared};
+use crate::common::{changed, shared};
 use lumbre_formats::ply::read_ply;
 use lumbre_formats::{Budget, Diagnostics, FormatError, Input, Limits, ReadOptions, Strictness, open_scene};
 use lumbre_scene::MeshDesc;

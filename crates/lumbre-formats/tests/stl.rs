@@ -1,10 +1,8 @@
 //! STL files, text and binary, in every dialect of colours.
 
-mod common;
-
 use std::sync::Arc;
 
-use common::{files_below, shared};
+use crate::common::{files_below, shared};
 use lumbre_formats::stl::{StlSolid, open_stl, read_stl};
 use lumbre_formats::{Budget, Diagnostics, FormatError, Strictness};
 use lumbre_image::{Rgb, srgb_to_linear};

@@ -2,13 +2,11 @@
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
-mod common;
-
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 
-use common::*;
+use crate::common::*;
 use lumbre_geometry::{Cuboid, Sphere, Torus};
 use lumbre_image::{Image, Rgb};
 use lumbre_math::{DVec3, Transform, Vec2, Vec3};

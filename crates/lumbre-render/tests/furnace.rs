@@ -3,12 +3,10 @@
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
-mod common;
-
 use std::sync::Arc;
 use std::thread;
 
-use common::*;
+use crate::common::*;
 use lumbre_geometry::{Cuboid, Shape, Sphere, Torus};
 use lumbre_image::Rgb;
 use lumbre_math::{DVec3, Vec3};

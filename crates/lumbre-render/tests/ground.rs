@@ -2,11 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
-mod common;
-
 use std::sync::Arc;
 
-use common::{add, add_material, changed, diffuse, empty, exact, options, picture};
+use crate::common::{add, add_material, changed, diffuse, empty, exact, options, picture};
 use lumbre_geometry::{Disk, Sphere};
 use lumbre_image::{Image, Rgb};
 use lumbre_math::{DAffine3, DMat3, DVec3, Transform};

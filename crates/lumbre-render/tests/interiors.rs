@@ -2,11 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
-mod common;
-
 use std::sync::Arc;
 
-use common::*;
+use crate::common::*;
 use lumbre_geometry::{Cuboid, Sphere};
 use lumbre_image::Rgb;
 use lumbre_math::{DVec3, Transform};

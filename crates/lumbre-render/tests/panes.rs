@@ -2,12 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
-mod common;
-
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use common::*;
+use crate::common::*;
 use lumbre_geometry::{Cuboid, Disk, Sphere};
 use lumbre_image::{Image, Rgb};
 use lumbre_math::{DAffine3, DMat3, DVec3, Transform};

@@ -1,0 +1,12 @@
+//! Tests of the readers through their interface, in one binary, which links once.
+
+mod broken_meshes;
+mod broken_scenes;
+mod common;
+mod gltf;
+mod gltf_assets;
+mod images;
+mod obj;
+mod pbrt_grammar;
+mod ply;
+mod stl;

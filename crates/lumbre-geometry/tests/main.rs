@@ -1,0 +1,12 @@
+//! Tests of the shapes through their interface, in one binary, which links once.
+
+mod contract;
+mod conventions;
+mod csg;
+mod extremes;
+mod nearest;
+mod precision;
+mod solid_angle;
+mod tori;
+mod triangles;
+mod vectors;

@@ -1,0 +1,12 @@
+//! Pictures against closed forms and against themselves, in one binary, which links once.
+
+mod common;
+mod determinism;
+mod direct_light;
+mod furnace;
+mod ground;
+mod integrators;
+mod interiors;
+mod motion;
+mod panes;
+mod terminator;
