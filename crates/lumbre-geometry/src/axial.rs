@@ -9,7 +9,9 @@ use lumbre_math::{DMat3, DVec2, DVec3, Transform, orthonormal_basis};
 use crate::nearest::{Meridian, under_similarity};
 use crate::shape::{sampled_by_area, two_crossings};
 use crate::support::{arc_support, azimuth, bounds_from_support, cross_size, dot_size};
-use crate::{Aabb, Hull, NearestPoint, NoNearestPoint, Ray, Root, Surface, SurfaceSample, density, measure};
+use crate::{
+    Aabb, BoundingVolume, NearestPoint, NoNearestPoint, Ray, Root, Surface, SurfaceSample, density, measure,
+};
 
 /// The points at distance ρ(z) = r1 + k z from an axis, where z is the distance along it, between two planes
 /// perpendicular to it.
@@ -295,7 +297,7 @@ impl Axial {
     }
 
     /// The whole solid, with caps.
-    pub(crate) fn hull(&self) -> Option<Hull> {
+    pub(crate) fn bounding_volume(&self) -> Option<BoundingVolume> {
         if !self.is_bounded() {
             return None;
         }
@@ -305,7 +307,7 @@ impl Axial {
         // The radius is middle + half z.
         let (middle, half) = (0.5 * (self.r1 + self.r2) / radius, 0.5 * (self.r2 - self.r1) / radius);
         let profile = [-half * half, -2.0 * middle * half, -middle * middle];
-        Some(Hull::new(0.5 * (self.p1 + self.p2), axes, profile, self.is_solid()))
+        Some(BoundingVolume::new(0.5 * (self.p1 + self.p2), axes, profile, self.is_solid()))
     }
 
     /// The areas of the lateral surface and the two caps; 0 for a missing cap.
@@ -457,8 +459,8 @@ macro_rules! axial_shape {
             }
 
             /// A bounding volume: the whole solid, with caps; `None` when infinite.
-            pub fn hull(&self) -> Option<Hull> {
-                self.body.hull()
+            pub fn bounding_volume(&self) -> Option<BoundingVolume> {
+                self.body.bounding_volume()
             }
 
             /// The area, caps included; may be infinite.

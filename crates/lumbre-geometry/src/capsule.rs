@@ -9,7 +9,9 @@ use crate::axial::{Axial, CAP1, CAP2, LATERAL, Span};
 use crate::nearest::under_similarity;
 use crate::shape::{check, sampled_by_area, two_crossings};
 use crate::support::bounds_from_support;
-use crate::{Aabb, Hull, NearestPoint, NoNearestPoint, Ray, Root, ShapeError, Surface, SurfaceSample};
+use crate::{
+    Aabb, BoundingVolume, NearestPoint, NoNearestPoint, Ray, Root, ShapeError, Surface, SurfaceSample,
+};
 use crate::{measure, sphere};
 
 /// The points at distance `radius` from the segment between `p0` and `p1`: a hemisphere about each end, and the
@@ -201,12 +203,12 @@ impl Capsule {
     }
 
     /// A bounding volume: the circumscribed cylinder.
-    pub fn hull(&self) -> Option<Hull> {
+    pub fn bounding_volume(&self) -> Option<BoundingVolume> {
         let [p0, p1] = self.ends();
         let (e1, e2) = orthonormal_basis(self.tube.axis);
         let half = 0.5 * self.tube.length + self.radius();
         let axes = DMat3::from_cols(self.radius() * e1, self.radius() * e2, half * self.tube.axis);
-        Some(Hull::new(0.5 * (p0 + p1), axes, Hull::CYLINDER, false))
+        Some(BoundingVolume::new(0.5 * (p0 + p1), axes, BoundingVolume::CYLINDER, false))
     }
 
     /// The area, 2πr (L + 2r): that of the circumscribed cylinder, by Archimedes.

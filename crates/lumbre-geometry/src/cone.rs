@@ -8,8 +8,8 @@ use lumbre_math::{DVec2, DVec3, Transform};
 use crate::axial::{Axial, axial_shape};
 use crate::shape::check;
 use crate::{
-    Aabb, DirectionSample, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
-    SurfaceSample,
+    Aabb, BoundingVolume, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError,
+    Surface, SurfaceSample,
 };
 
 /// The points whose distance from an axis is linear along it.

@@ -7,7 +7,8 @@ use crate::nearest::{on_triangle, similarity_factor, under_similarity};
 use crate::shape::{check, sampled_by_area, two_crossings};
 use crate::support::bounds_from_support;
 use crate::{
-    Aabb, Hull, NearestPoint, NoNearestPoint, Ray, Root, ShapeError, Surface, SurfaceSample, density, measure,
+    Aabb, BoundingVolume, NearestPoint, NoNearestPoint, Ray, Root, ShapeError, Surface, SurfaceSample,
+    density, measure,
 };
 
 /// The box between two corners, "box" in the scene language. A closed solid: a ray along a face enters and
@@ -136,9 +137,9 @@ impl Cuboid {
     }
 
     /// A bounding volume: the box itself.
-    pub fn hull(&self) -> Option<Hull> {
-        let hull = Hull::of_box(&Aabb { min: self.low, max: self.high })?;
-        Some(Hull { is_solid: !hull.is_flat, ..hull })
+    pub fn bounding_volume(&self) -> Option<BoundingVolume> {
+        let bounding_volume = BoundingVolume::of_box(&Aabb { min: self.low, max: self.high })?;
+        Some(BoundingVolume { is_solid: !bounding_volume.is_flat, ..bounding_volume })
     }
 
     /// The areas of the faces perpendicular to x, y and z, one of each pair, with normals stretched by

@@ -7,8 +7,8 @@ use lumbre_math::{DVec2, DVec3, Transform};
 use crate::axial::{Axial, axial_shape};
 use crate::shape::check;
 use crate::{
-    Aabb, DirectionSample, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
-    SurfaceSample,
+    Aabb, BoundingVolume, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError,
+    Surface, SurfaceSample,
 };
 
 /// The points at distance `radius` from an axis, between two planes perpendicular to it or without end.

@@ -9,7 +9,8 @@ use crate::nearest::{Meridian, under_similarity};
 use crate::shape::{check, open_surface, sampled_by_area};
 use crate::support::{arc_support, azimuth, bounds_from_support, dot_size};
 use crate::{
-    Aabb, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface, SurfaceSample, measure,
+    Aabb, BoundingVolume, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface, SurfaceSample,
+    measure,
 };
 
 /// The points of a plane between two distances from a centre, both included.
@@ -144,9 +145,9 @@ impl Disk {
     }
 
     /// A bounding volume: the whole disk, without its hole.
-    pub fn hull(&self) -> Option<Hull> {
+    pub fn bounding_volume(&self) -> Option<BoundingVolume> {
         let (e1, e2) = orthonormal_basis(self.normal());
-        Hull::flat(self.center, self.radius * e1, self.radius * e2, Hull::BALL)
+        BoundingVolume::flat(self.center, self.radius * e1, self.radius * e2, BoundingVolume::BALL)
     }
 
     /// The area, of one side.

@@ -12,7 +12,8 @@ use crate::nearest::{Meridian, under_similarity};
 use crate::shape::{check, open_surface, sampled_by_area};
 use crate::support::{arc_support, azimuth, bounds_from_support};
 use crate::{
-    Aabb, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface, SurfaceSample, measure,
+    Aabb, BoundingVolume, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface, SurfaceSample,
+    measure,
 };
 
 /// The surface that the segment from `p1` to `p2` sweeps about the z axis.
@@ -196,7 +197,7 @@ impl Hyperboloid {
     }
 
     /// A bounding volume: the solid between its rims.
-    pub fn hull(&self) -> Option<Hull> {
+    pub fn bounding_volume(&self) -> Option<BoundingVolume> {
         let p2 = self.p1 + self.along;
         let radius = self.p1.truncate().length().max(p2.truncate().length());
         let axes = DMat3::from_diagonal(DVec3::new(radius, radius, 0.5 * self.along.z));
@@ -208,7 +209,7 @@ impl Hyperboloid {
             -(self.middle + 0.5 * self.end) / square,
             -(self.start + self.middle + 0.25 * self.end) / square,
         ];
-        Some(Hull::new(center, axes, profile, false))
+        Some(BoundingVolume::new(center, axes, profile, false))
     }
 
     /// The coefficients of the area element √(square v² + 2 linear v + constant) dφ dv.

@@ -5,9 +5,9 @@
 
 mod aabb;
 mod axial;
+mod bounding_volume;
 mod density;
 mod hit;
-mod hull;
 mod line;
 mod measure;
 mod nearest;
@@ -19,9 +19,9 @@ mod support;
 use lumbre_math::{DVec2, DVec3, Transform};
 
 pub use aabb::Aabb;
+pub use bounding_volume::BoundingVolume;
 pub use csg::{Crossing, Crossings, Leaf, LeafPart, Solid};
 pub use hit::{DirectionSample, Root, Roots, Surface, SurfaceSample};
-pub use hull::Hull;
 pub use nearest::{NearestPoint, NoNearestPoint, nearest_on_triangle, similarity_factor};
 pub use placed::PlacedShape;
 pub use ray::Ray;

@@ -12,7 +12,8 @@ use crate::nearest::{Meridian, under_similarity};
 use crate::shape::{check, open_surface, sampled_by_area};
 use crate::support::{arc_support, azimuth, bounds_from_support};
 use crate::{
-    Aabb, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface, SurfaceSample, measure,
+    Aabb, BoundingVolume, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface, SurfaceSample,
+    measure,
 };
 
 /// The surface `z = zmax (x² + y²)/radius²` between two heights: a bowl, open upwards, with the given radius at
@@ -162,13 +163,13 @@ impl Paraboloid {
     }
 
     /// A bounding volume: the filled bowl.
-    pub fn hull(&self) -> Option<Hull> {
+    pub fn bounding_volume(&self) -> Option<BoundingVolume> {
         let (low, high) = (self.bottom(), self.z_max);
         let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
         let radius = self.radius_at(high);
         let axes = DMat3::from_diagonal(DVec3::new(radius, radius, half));
         let profile = [0.0, -half / high, -middle / high];
-        Some(Hull::new(DVec3::new(0.0, 0.0, middle), axes, profile, false))
+        Some(BoundingVolume::new(DVec3::new(0.0, 0.0, middle), axes, profile, false))
     }
 
     /// √(1 + 4 bend z) at the two ends, from which areas are computed.

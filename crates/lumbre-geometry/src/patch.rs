@@ -12,8 +12,8 @@ use crate::shape::{check, open_surface, two_crossings};
 use crate::support::bounds_from_support;
 use crate::triangle::solid_angle_of;
 use crate::{
-    Aabb, DirectionSample, Hull, NearestPoint, NoNearestPoint, Ray, Root, ShapeError, Surface, SurfaceSample,
-    density, measure,
+    Aabb, BoundingVolume, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, ShapeError, Surface,
+    SurfaceSample, density, measure,
 };
 
 /// The surface (1−u)(1−v) p00 + u(1−v) p10 + (1−u)v p01 + uv p11 with u and v in [0, 1]: doubly ruled, and flat
@@ -190,8 +190,8 @@ impl BilinearPatch {
     }
 
     /// A bounding volume: a box.
-    pub fn hull(&self) -> Option<Hull> {
-        Hull::of_box(&self.bounds(&Transform::IDENTITY)?)
+    pub fn bounding_volume(&self) -> Option<BoundingVolume> {
+        BoundingVolume::of_box(&self.bounds(&Transform::IDENTITY)?)
     }
 
     /// The area, of one side, by quadrature.

@@ -4,7 +4,7 @@ use lumbre_math::rounding::gamma;
 use lumbre_math::{DMat3, DVec2, DVec3, Transform};
 
 use crate::{
-    Aabb, DirectionSample, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, Shape, Surface,
+    Aabb, BoundingVolume, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, Shape, Surface,
     SurfaceSample, measure,
 };
 
@@ -92,10 +92,10 @@ impl PlacedShape {
         self.shape.bounds(&self.world_from_object())
     }
 
-    /// A bounding volume in world space: see [`Shape::hull`].
-    pub fn hull(&self) -> Option<Hull> {
-        let hull = self.shape.hull()?;
-        Some(self.world_from_object.as_deref().map_or(hull, |map| hull.under(map)))
+    /// A bounding volume in world space: see [`Shape::bounding_volume`].
+    pub fn bounding_volume(&self) -> Option<BoundingVolume> {
+        let bounding_volume = self.shape.bounding_volume()?;
+        Some(self.world_from_object.as_deref().map_or(bounding_volume, |map| bounding_volume.under(map)))
     }
 
     /// Area in world space; infinite for infinite shapes.

@@ -5,7 +5,7 @@ use lumbre_math::{DVec2, DVec3, Transform, orthonormal_basis};
 
 use crate::shape::{check, unsampled};
 use crate::support::dot_size;
-use crate::{Aabb, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface};
+use crate::{Aabb, BoundingVolume, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface};
 
 /// The plane through a point; as a solid, the half-space below it, opposite to the normal.
 ///
@@ -85,7 +85,7 @@ impl Plane {
     }
 
     /// `None`: it is infinite.
-    pub fn hull(&self) -> Option<Hull> {
+    pub fn bounding_volume(&self) -> Option<BoundingVolume> {
         None
     }
 

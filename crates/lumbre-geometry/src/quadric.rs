@@ -14,8 +14,8 @@ use crate::placed::into_world;
 use crate::shape::check;
 use crate::support::bounds_from_support;
 use crate::{
-    Aabb, DirectionSample, Hull, NearestPoint, NoNearestPoint, PlacedShape, Ray, Root, Roots, Shape,
-    ShapeError, Sphere, Surface, SurfaceSample, density, measure,
+    Aabb, BoundingVolume, DirectionSample, NearestPoint, NoNearestPoint, PlacedShape, Ray, Root, Roots,
+    Shape, ShapeError, Sphere, Surface, SurfaceSample, density, measure,
 };
 
 /// The points where `A x² + B y² + C z² + D xy + E xz + F yz + G x + H y + I z + J` is 0, optionally clipped by
@@ -261,10 +261,12 @@ impl Quadric {
     }
 
     /// A bounding volume: the ellipsoid or the clipping box.
-    pub fn hull(&self) -> Option<Hull> {
+    pub fn bounding_volume(&self) -> Option<BoundingVolume> {
         match &self.ellipsoid {
-            Some(ellipsoid) => ellipsoid.hull().map(|hull| Hull { is_solid: false, ..hull }),
-            None => Hull::of_box(&self.clip?),
+            Some(ellipsoid) => ellipsoid
+                .bounding_volume()
+                .map(|bounding_volume| BoundingVolume { is_solid: false, ..bounding_volume }),
+            None => BoundingVolume::of_box(&self.clip?),
         }
     }
 

@@ -54,8 +54,8 @@ macro_rules! shapes {
 
             /// A bounding volume for quick rejection; `None` for infinite shapes, and for those so small or
             /// thin that it underflows.
-            pub fn hull(&self) -> Option<Hull> {
-                match self { $(Self::$shape(shape) => shape.hull(),)+ }
+            pub fn bounding_volume(&self) -> Option<BoundingVolume> {
+                match self { $(Self::$shape(shape) => shape.bounding_volume(),)+ }
             }
 
             /// Area before any transform; infinite for infinite shapes.

@@ -10,8 +10,8 @@ use crate::nearest::{Meridian, nearest_on_ellipsoid, similarity_factor, under_si
 use crate::shape::check;
 use crate::support::{arc_support, azimuth, bounds_from_support};
 use crate::{
-    Aabb, DirectionSample, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
-    SurfaceSample, density, measure,
+    Aabb, BoundingVolume, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError,
+    Surface, SurfaceSample, density, measure,
 };
 
 /// The points at distance `radius` from `center`.
@@ -206,18 +206,18 @@ impl Sphere {
     }
 
     /// A bounding volume: the ball, or its layer between two heights.
-    pub fn hull(&self) -> Option<Hull> {
+    pub fn bounding_volume(&self) -> Option<BoundingVolume> {
         if self.is_whole() {
             let axes = DMat3::from_diagonal(DVec3::splat(self.radius));
-            return Some(Hull::new(self.center, axes, Hull::BALL, true));
+            return Some(BoundingVolume::new(self.center, axes, BoundingVolume::BALL, true));
         }
-        // Relative to the radius, z = middle + half * (z of the hull).
+        // Relative to the radius, z = middle + half * (z of the bounding volume).
         let (middle, half) =
             (0.5 * (self.z_min + self.z_max) / self.radius, 0.5 * (self.z_max - self.z_min) / self.radius);
         let center = self.center + self.radius * middle * DVec3::Z;
         let axes = DMat3::from_diagonal(self.radius * DVec3::new(1.0, 1.0, half));
         let profile = [half * half, 2.0 * middle * half, middle * middle - 1.0];
-        Some(Hull::new(center, axes, profile, false))
+        Some(BoundingVolume::new(center, axes, profile, false))
     }
 
     /// The area: that of the circumscribed cylinder, by Archimedes.

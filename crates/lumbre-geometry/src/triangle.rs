@@ -10,8 +10,8 @@ use crate::nearest::on_triangle;
 use crate::shape::{check, open_surface};
 use crate::support::bounds_from_support;
 use crate::{
-    Aabb, DirectionSample, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface,
-    SurfaceSample, density, measure,
+    Aabb, BoundingVolume, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError,
+    Surface, SurfaceSample, density, measure,
 };
 
 /// The intersection of a line with a triangle.
@@ -245,11 +245,11 @@ impl Triangle {
     }
 
     /// A bounding volume: the triangle itself, as a plane section of a cone through its axis.
-    pub fn hull(&self) -> Option<Hull> {
+    pub fn bounding_volume(&self) -> Option<BoundingVolume> {
         let [p0, p1, p2] = self.corners();
         let (base, foot) = (0.5 * (p1 - p0), 0.5 * (p0 + p1));
         // Scaled to a square, the radius of the cone is (1 - z) / 2.
-        Hull::flat(0.5 * (foot + p2), base, 0.5 * (p2 - foot), [-0.25, 0.5, -0.25])
+        BoundingVolume::flat(0.5 * (foot + p2), base, 0.5 * (p2 - foot), [-0.25, 0.5, -0.25])
     }
 
     /// Half the length of the cross product.

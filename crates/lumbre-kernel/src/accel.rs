@@ -10,8 +10,8 @@ use lumbre_geometry::{Aabb, Ray, Surface};
 use lumbre_math::{DVec3, Transform};
 
 use crate::build::{input, rebuild, refit};
-use crate::intersect::Level;
-use crate::intersect::single_start::SingleStart;
+use crate::intersect::Isa;
+use crate::intersect::filter_start::FilterStart;
 use crate::io::{bytes, mapped};
 use crate::point::winding::{self, Moments};
 use crate::point::{closest_point, inside};
@@ -20,11 +20,11 @@ use crate::trace::filtered::{self, Queries};
 use crate::trace::stack::{AnyHit, ClosestHit};
 use crate::trace::visitors::{Count, NextHits};
 use crate::trace::{ContextRef, Outcome, exact};
-use crate::tree::bounding_block::Hulls;
-use crate::tree::node::{Units, tag};
+use crate::tree::bounding_block::BoundingVolumes;
+use crate::tree::node::{TreeSpace, tag};
 use crate::tree::packed::{Entry, Packed};
-use crate::tree::summary::Holds;
 use crate::tree::summary::Sizes;
+use crate::tree::summary::Summary;
 use crate::{
     ClosestPoint, Geometry, GeometryKind, Hit, Hit32, LoadError, MapError, NoClosestPoint, NoWindingNumber,
     Query, Ray32, RefitError, SphereCloud, batch, surface,
@@ -37,21 +37,21 @@ use crate::{
 #[derive(Debug)]
 pub struct Accel {
     pub(crate) geometries: Vec<Geometry>,
-    pub(crate) units: Units,
+    pub(crate) tree_space: TreeSpace,
     pub(crate) tree: Packed,
     // Kept out of the tree, and asked by every ray.
     pub(crate) infinite: Vec<Entry>,
     pub(crate) bounds: Aabb,
     pub(crate) primitives: usize,
-    pub(crate) level: Level,
-    pub(crate) holds: Holds,
+    pub(crate) isa: Isa,
+    pub(crate) summary: Summary,
     /// Where single precision can traverse the tree.
-    pub(crate) single: Option<SingleStart>,
+    pub(crate) single: Option<FilterStart>,
     pub(crate) queries: Queries,
     /// Those of rays in single precision, where these are not asked in double.
     pub(crate) f32_queries: Option<F32Queries>,
     /// What is asked of shapes first.
-    pub(crate) hulls: Hulls,
+    pub(crate) bounding_volumes: BoundingVolumes,
     /// What a ray cost after the build, once that was asked for.
     pub(crate) built_cost: Option<f64>,
     // One for each geometry, or none.
@@ -62,7 +62,7 @@ pub struct Accel {
 
 /// What a build, or a file, makes.
 pub(crate) struct AccelParts {
-    pub(crate) units: Units,
+    pub(crate) tree_space: TreeSpace,
     pub(crate) tree: Packed,
     pub(crate) sizes: Sizes,
     pub(crate) bounds: Aabb,
@@ -84,7 +84,7 @@ pub enum Preset {
     /// others, "Fast BVH Construction on GPUs", 2009), and only the ends of the tree are chosen by the surface area
     /// heuristic.
     Fast,
-    /// Binned by the surface area heuristic at every level (I. Wald, "On fast Construction of SAH-based Bounding Volume
+    /// Binned by the surface area heuristic at every instruction set (I. Wald, "On fast Construction of SAH-based Bounding Volume
     /// Hierarchies", 2007). Among the upper nodes of meshes, subtrees are put elsewhere where that makes the tree much better, as in
     /// `Best`. Instances whose parts have much smaller boxes than the whole are entered part by part (after C. Benthin
     /// and others, "Improved Two-Level BVHs using Partial Re-Braiding", 2017): at most eight parts for each on average, and 64.
@@ -195,22 +195,22 @@ impl Accel {
     }
 
     /// Puts a tree together of what a build, or a file, makes.
-    pub(crate) fn assemble(level: Level, geometries: Vec<Geometry>, parts: AccelParts) -> Self {
-        let AccelParts { units, tree, sizes, bounds, infinite, primitives } = parts;
-        let holds = Holds::new(&geometries, sizes);
-        let single = SingleStart::new(&holds, &units, tree.root);
+    pub(crate) fn assemble(isa: Isa, geometries: Vec<Geometry>, parts: AccelParts) -> Self {
+        let AccelParts { tree_space, tree, sizes, bounds, infinite, primitives } = parts;
+        let summary = Summary::new(&geometries, sizes);
+        let single = FilterStart::new(&summary, &tree_space, tree.root);
         Self {
-            hulls: Hulls::new(&geometries, &tree.entries, &units),
-            queries: Queries::new(level, single.as_ref()),
-            f32_queries: F32Queries::new(level, single.as_ref()),
+            bounding_volumes: BoundingVolumes::new(&geometries, &tree.entries, &tree_space),
+            queries: Queries::new(isa, single.as_ref()),
+            f32_queries: F32Queries::new(isa, single.as_ref()),
             single,
-            units,
-            holds,
+            tree_space,
+            summary,
             tree,
             infinite,
             bounds,
             primitives,
-            level,
+            isa,
             built_cost: None,
             masks: Vec::new(),
             moments: OnceLock::new(),
@@ -225,10 +225,10 @@ impl Accel {
 
     /// Makes anew what traversals keep of the tree, which has changed.
     pub(crate) fn follow_tree(&mut self) {
-        self.single = SingleStart::new(&self.holds, &self.units, self.tree.root);
-        self.queries = Queries::new(self.level, self.single.as_ref());
-        self.f32_queries = F32Queries::new(self.level, self.single.as_ref());
-        self.hulls = Hulls::new(&self.geometries, &self.tree.entries, &self.units);
+        self.single = FilterStart::new(&self.summary, &self.tree_space, self.tree.root);
+        self.queries = Queries::new(self.isa, self.single.as_ref());
+        self.f32_queries = F32Queries::new(self.isa, self.single.as_ref());
+        self.bounding_volumes = BoundingVolumes::new(&self.geometries, &self.tree.entries, &self.tree_space);
         self.moments = OnceLock::new();
     }
 
@@ -293,39 +293,39 @@ impl Accel {
     /// [`Accel::closest`] among what a query takes into account. Of a shape, each crossing counts by itself.
     #[inline]
     pub fn closest_with(&self, ray: &Ray, query: &Query) -> Option<Hit> {
-        if query.takes_all(self) { self.closest(ray) } else { self.closest_with_at(self.level, ray, query) }
+        if query.takes_all(self) { self.closest(ray) } else { self.closest_with_at(self.isa, ray, query) }
     }
 
     /// [`Accel::any`] among what a query takes into account.
     #[inline]
     pub fn any_with(&self, ray: &Ray, query: &Query) -> bool {
-        if query.takes_all(self) { self.any(ray) } else { self.any_with_at(self.level, ray, query) }
+        if query.takes_all(self) { self.any(ray) } else { self.any_with_at(self.isa, ray, query) }
     }
 
-    pub(crate) fn closest_with_at(&self, level: Level, ray: &Ray, query: &Query) -> Option<Hit> {
-        match filtered::with_query::<ClosestHit>(level, self, ray, query) {
+    pub(crate) fn closest_with_at(&self, isa: Isa, ray: &Ray, query: &Query) -> Option<Hit> {
+        match filtered::with_query::<ClosestHit>(isa, self, ray, query) {
             Outcome::Certain(found) => found.into_hit(self, ContextRef::OUTSIDE),
-            Outcome::Uncertain => exact::closest(level, self, ray, Some(query)),
+            Outcome::Uncertain => exact::closest(isa, self, ray, Some(query)),
         }
     }
 
-    pub(crate) fn any_with_at(&self, level: Level, ray: &Ray, query: &Query) -> bool {
-        match filtered::with_query::<AnyHit>(level, self, ray, query) {
+    pub(crate) fn any_with_at(&self, isa: Isa, ray: &Ray, query: &Query) -> bool {
+        match filtered::with_query::<AnyHit>(isa, self, ray, query) {
             Outcome::Certain(is_hit) => is_hit,
-            Outcome::Uncertain => exact::any(level, self, ray, Some(query)),
+            Outcome::Uncertain => exact::any(isa, self, ray, Some(query)),
         }
     }
 
     /// [`Accel::closest`] by double precision alone: the same answer to the bit, slower. To be measured beside it.
     #[doc(hidden)]
     pub fn closest_exact(&self, ray: &Ray) -> Option<Hit> {
-        exact::closest(self.level, self, ray, None)
+        exact::closest(self.isa, self, ray, None)
     }
 
     /// [`Accel::any`] by double precision alone. To be measured beside it.
     #[doc(hidden)]
     pub fn any_exact(&self, ray: &Ray) -> bool {
-        exact::any(self.level, self, ray, None)
+        exact::any(self.isa, self, ray, None)
     }
 
     /// Every hit in the ray's range in ascending order of `t` (ties by path, geometry, primitive), until `visit` breaks.
@@ -333,15 +333,15 @@ impl Accel {
     /// Hits are found 32, 128, 512 and so on at a time, so that an early end costs little and memory is at most
     /// proportional to the hits visited.
     pub fn all(&self, ray: &Ray, visit: impl FnMut(&Hit) -> ControlFlow<()>) {
-        self.all_at(self.level, ray, visit);
+        self.all_at(self.isa, ray, visit);
     }
 
-    pub(crate) fn all_at(&self, level: Level, ray: &Ray, mut visit: impl FnMut(&Hit) -> ControlFlow<()>) {
+    pub(crate) fn all_at(&self, isa: Isa, ray: &Ray, mut visit: impl FnMut(&Hit) -> ControlFlow<()>) {
         let mut size = 32;
         let mut last = None;
         loop {
             let mut visitor = NextHits::new(ray, size, last.as_ref());
-            exact::traverse(level, self, ray, &mut visitor);
+            exact::traverse(isa, self, ray, &mut visitor);
             let (mut hits, may_go_on) = visitor.into_hits();
             if hits.iter().any(|ranked| visit(&ranked.hit).is_break()) || !may_go_on {
                 return;
@@ -353,12 +353,12 @@ impl Accel {
 
     /// How many hits the ray's range holds.
     pub fn count(&self, ray: &Ray) -> usize {
-        self.count_at(self.level, ray)
+        self.count_at(self.isa, ray)
     }
 
-    pub(crate) fn count_at(&self, level: Level, ray: &Ray) -> usize {
+    pub(crate) fn count_at(&self, isa: Isa, ray: &Ray) -> usize {
         let mut visitor = Count::new(ray);
-        exact::traverse(level, self, ray, &mut visitor);
+        exact::traverse(isa, self, ray, &mut visitor);
         visitor.hits
     }
 
@@ -412,7 +412,7 @@ impl Accel {
     /// When `rays` and `hits` differ in length.
     pub fn closest_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
         assert_eq!(rays.len(), hits.len(), "a slot for the hit of every ray");
-        batch::closest(self.level, self, rays, hits);
+        batch::closest(self.isa, self, rays, hits);
     }
 
     /// [`Accel::any`] for every ray: see [`Accel::closest_batch`].
@@ -421,7 +421,7 @@ impl Accel {
     /// When `rays` and `hits` differ in length.
     pub fn any_batch(&self, rays: &[Ray], hits: &mut [bool]) {
         assert_eq!(rays.len(), hits.len(), "a slot for the answer of every ray");
-        batch::any(self.level, self, rays, hits);
+        batch::any(self.isa, self, rays, hits);
     }
 
     /// [`Accel::closest_f32`] for every ray: see [`Accel::closest_batch`].
@@ -430,7 +430,7 @@ impl Accel {
     /// When `rays` and `hits` differ in length.
     pub fn closest_batch_f32(&self, rays: &[Ray32], hits: &mut [Option<Hit32>]) {
         assert_eq!(rays.len(), hits.len(), "a slot for the hit of every ray");
-        batch::closest_f32(self.level, self, rays, hits);
+        batch::closest_f32(self.isa, self, rays, hits);
     }
 
     /// [`Accel::any_f32`] for every ray: see [`Accel::closest_batch`].
@@ -439,7 +439,7 @@ impl Accel {
     /// When `rays` and `hits` differ in length.
     pub fn any_batch_f32(&self, rays: &[Ray32], hits: &mut [bool]) {
         assert_eq!(rays.len(), hits.len(), "a slot for the answer of every ray");
-        batch::any_f32(self.level, self, rays, hits);
+        batch::any_f32(self.isa, self, rays, hits);
     }
 
     /// The tree with a mask for each of its geometries, by position, for [`Query::mask`]; without, all bits are set.
@@ -454,13 +454,13 @@ impl Accel {
     }
 
     /// The queries at an instruction set.
-    pub(crate) fn queries_at(&self, level: Level) -> Queries {
-        if level == self.level { self.queries } else { Queries::new(level, self.single.as_ref()) }
+    pub(crate) fn queries_at(&self, isa: Isa) -> Queries {
+        if isa == self.isa { self.queries } else { Queries::new(isa, self.single.as_ref()) }
     }
 
     /// The same in single precision; `None` where they are asked in double.
-    pub(crate) fn f32_queries_at(&self, level: Level) -> Option<F32Queries> {
-        if level == self.level { self.f32_queries } else { F32Queries::new(level, self.single.as_ref()) }
+    pub(crate) fn f32_queries_at(&self, isa: Isa) -> Option<F32Queries> {
+        if isa == self.isa { self.f32_queries } else { F32Queries::new(isa, self.single.as_ref()) }
     }
 
     /// The nearest point of all surfaces within `max_distance` (itself included; infinite for anywhere), or `None` where there
@@ -590,7 +590,7 @@ impl Accel {
             + self.tree.entries.own_bytes()
             + self.tree.sphere_blocks.own_bytes()
             + self.tree.sphere_names.own_bytes()
-            + self.hulls.memory_bytes()
+            + self.bounding_volumes.memory_bytes()
             + bytes(&self.infinite)
             + bytes(&self.masks)
             + self.moments.get().map_or(0, Moments::memory_bytes)

@@ -31,7 +31,7 @@ pub enum GeometryKind {
     PreciseMesh(Arc<PreciseMesh>),
     /// A whole tree, placed.
     Instance(Instance),
-    /// A stranger's geometry.
+    /// A user's geometry.
     Custom(Arc<dyn CustomGeometry>),
 }
 

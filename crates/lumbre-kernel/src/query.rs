@@ -77,7 +77,7 @@ impl<'q> Query<'q> {
     /// Whether it certainly takes everything of a tree and of its instances.
     #[inline(always)]
     pub(crate) fn takes_all(&self, accel: &Accel) -> bool {
-        let has_masks = !accel.masks.is_empty() || accel.holds.masks_within;
+        let has_masks = !accel.masks.is_empty() || accel.summary.masks_within;
         (!has_masks || self.mask == u32::MAX)
             && self.exclude.is_none()
             && self.faces == Faces::Both

@@ -8,7 +8,7 @@ use lumbre_math::{DVec2, DVec3, Transform};
 
 use crate::placed::into_world;
 use crate::shape::unsampled;
-use crate::{Aabb, Hull, NearestPoint, NoNearestPoint, Ray, Root, Roots, Surface};
+use crate::{Aabb, BoundingVolume, NearestPoint, NoNearestPoint, Ray, Root, Roots, Surface};
 
 pub use leaf::{Crossing, Crossings, Leaf, LeafPart, Solid};
 use spans::Membership;
@@ -103,8 +103,8 @@ impl Csg {
     }
 
     /// A bounding volume: the box.
-    pub fn hull(&self) -> Option<Hull> {
-        Hull::of_box(&self.bounds(&Transform::IDENTITY)?)
+    pub fn bounding_volume(&self) -> Option<BoundingVolume> {
+        BoundingVolume::of_box(&self.bounds(&Transform::IDENTITY)?)
     }
 
     /// Always.

@@ -9,7 +9,7 @@ use lumbre_math::{DMat3, DVec2, DVec3, Transform};
 use super::Torus;
 use crate::shape::sampled_by_area;
 use crate::support::{azimuth, bounds_from_support};
-use crate::{Aabb, Hull, Ray, Root, Surface, SurfaceSample, measure};
+use crate::{Aabb, BoundingVolume, Ray, Root, Surface, SurfaceSample, measure};
 
 impl Torus {
     /// The surface at a crossing.
@@ -74,7 +74,7 @@ impl Torus {
     }
 
     /// A bounding solid of revolution, and the tube of a ring.
-    pub fn hull(&self) -> Option<Hull> {
+    pub fn bounding_volume(&self) -> Option<BoundingVolume> {
         let (major, minor) = (self.major, self.minor);
         let reach = major + minor;
         let axes = DMat3::from_cols(reach * self.e1, reach * self.e2, minor * self.axis);
@@ -84,8 +84,8 @@ impl Torus {
         let s = std::f64::consts::FRAC_1_SQRT_2;
         let constant = big * big + small * small + 3.0 * s * big * small;
         let slope = small * small + 2.0 * s * big * small;
-        let hull = Hull::new(self.center, axes, [slope, 0.0, -constant], self.is_ring());
-        Some(Hull { tube: if self.is_ring() { small } else { 0.0 }, ..hull })
+        let bounding_volume = BoundingVolume::new(self.center, axes, [slope, 0.0, -constant], self.is_ring());
+        Some(BoundingVolume { tube: if self.is_ring() { small } else { 0.0 }, ..bounding_volume })
     }
 
     /// The angle ϑ at which the tube meets the axis: beyond it, up to π, lies the inner sheet; π for a ring.

@@ -12,14 +12,14 @@ use super::packet::{ALL, Bundle, Cull, CullBounds, Effort, PACKET, Signs, Start,
 use crate::intersect::box_ray::SlabRows;
 use crate::intersect::f32_ray::{F32Ray, within};
 use crate::intersect::watertight::{BEYOND, beyond};
-use crate::intersect::{Axes, Lanes};
-use crate::simd::{self, Row, Vector, Wide};
+use crate::intersect::{Axes, Simd};
+use crate::simd::{self, F32x16, Row, Vector};
 use crate::trace::Outcome;
 use crate::trace::decide::Decider;
 use crate::trace::f32_ray::SOME_HIT;
 use crate::trace::stack::Goal;
 use crate::tree::Corners;
-use crate::tree::node::Units;
+use crate::tree::node::TreeSpace;
 use crate::tree::triangle_block::TriangleBlock;
 use crate::{Hit32, Ray32};
 
@@ -138,16 +138,19 @@ impl<'a, 'd, G: Goal> Bundle<'a, 'd> for F32Bundle<'a, 'd, G> {
     }
 
     #[inline(always)]
-    fn load<L: Lanes>(&mut self, rays: &[Ray32; PACKET]) {
-        L::narrow_rows(rays, &mut self.rows);
+    fn load<L: Simd>(&mut self, rays: &[Ray32; PACKET]) {
+        L::f32_rows(rays, &mut self.rows);
     }
 
     #[inline(always)]
-    fn alike<L: Lanes>(&self, one: u32) -> (u32, Signs) {
-        let zero = L::Wide::splat(0.0);
-        let plus = L::Wide::splat(1.0);
-        let (x, y, z) =
-            (L::Wide::load(&self.rows[4].0), L::Wide::load(&self.rows[5].0), L::Wide::load(&self.rows[6].0));
+    fn alike<L: Simd>(&self, one: u32) -> (u32, Signs) {
+        let zero = L::F32x16::splat(0.0);
+        let plus = L::F32x16::splat(1.0);
+        let (x, y, z) = (
+            L::F32x16::load(&self.rows[4].0),
+            L::F32x16::load(&self.rows[5].0),
+            L::F32x16::load(&self.rows[6].0),
+        );
         let negative =
             [plus.turned_by(x).below(zero), plus.turned_by(y).below(zero), plus.turned_by(z).below(zero)];
         let (x, y, z) = (x.abs(), y.abs(), z.abs());
@@ -157,29 +160,30 @@ impl<'a, 'd, G: Goal> Bundle<'a, 'd> for F32Bundle<'a, 'd, G> {
     }
 
     #[inline(always)]
-    fn fill_up<L: Lanes>(&mut self, mask: u32) {
+    fn fill_up<L: Simd>(&mut self, mask: u32) {
         let one = mask.trailing_zeros() as usize % PACKET;
         for row in &mut self.rows {
-            let (own, all) = (L::Wide::splat(row.0[one]), L::Wide::load(&row.0));
-            L::Wide::select(mask, all, own).store(row);
+            let (own, all) = (L::F32x16::splat(row.0[one]), L::F32x16::load(&row.0));
+            L::F32x16::select(mask, all, own).store(row);
         }
     }
 
     #[inline(always)]
-    fn start<L: Lanes>(&mut self, decider: &Decider, slabs: &mut SlabRows) -> Option<Start<L::Wide>> {
-        let (rows, start, splat) = (&mut self.rows, decider.start, L::Wide::splat);
+    fn start<L: Simd>(&mut self, decider: &Decider, slabs: &mut SlabRows) -> Option<Start<L::F32x16>> {
+        let (rows, start, splat) = (&mut self.rows, decider.start, L::F32x16::splat);
         let zero = splat(0.0);
-        let (t_min, t_max) = (L::Wide::load(&rows[3].0), L::Wide::load(&rows[7].0));
+        let (t_min, t_max) = (L::F32x16::load(&rows[3].0), L::F32x16::load(&rows[7].0));
         // As of a single ray: minus zero is negative.
         let is_before = splat(1.0).turned_by(t_min).below(zero);
         let mut fits = zero.at_most(t_min) & t_min.at_most(t_max) & !is_before;
         let (mut is_long, mut is_near) = (0, true);
-        let (x, y, z) = (L::Wide::load(&rows[0].0), L::Wide::load(&rows[1].0), L::Wide::load(&rows[2].0));
+        let (x, y, z) =
+            (L::F32x16::load(&rows[0].0), L::F32x16::load(&rows[1].0), L::F32x16::load(&rows[2].0));
         let has_one_origin = x.are_equal() & y.are_equal() & z.are_equal();
         self.has_one_origin = has_one_origin;
         let (mut inverse, mut center, mut off) = ([zero; 3], [0.0; 3], [0.0; 3]);
         for axis in 0..3 {
-            let direction = L::Wide::load(&rows[4 + axis].0);
+            let direction = L::F32x16::load(&rows[4 + axis].0);
             let length = direction.abs();
             fits &= length.at_most(splat(start.longest[axis]));
             is_long |= splat(start.shortest).at_most(length);
@@ -192,12 +196,12 @@ impl<'a, 'd, G: Goal> Bundle<'a, 'd> for F32Bundle<'a, 'd, G> {
                 center[axis] = local * start.units_per_space - start.shift[axis];
                 is_near &= center[axis].abs() <= start.farthest[axis];
             } else {
-                let local = L::Wide::load(&rows[axis].0).rounded_less(start.mesh_origin[axis]);
+                let local = L::F32x16::load(&rows[axis].0).rounded_less(start.mesh_origin[axis]);
                 local.store(&mut rows[axis]);
                 let from = local * splat(start.units_per_space) - splat(start.shift[axis]);
                 let middle = from.middle();
                 fits &= from.abs().at_most(splat(start.farthest[axis]));
-                let margins = [start.narrow_margin, Units::NARROW_MARGIN_PER_DISTANCE];
+                let margins = [start.f32_margin, TreeSpace::F32_MARGIN_PER_DISTANCE];
                 slabs.set_axis(axis, from, inverse[axis], margins);
                 off[axis] = (from - middle).abs().most();
                 center[axis] = middle.first();
@@ -209,33 +213,33 @@ impl<'a, 'd, G: Goal> Bundle<'a, 'd> for F32Bundle<'a, 'd, G> {
             center,
             off,
             // That of a single ray, and twice that of its arithmetic among boxes.
-            margin_per_distance: Units::NARROW_MARGIN_PER_DISTANCE + 2.0 * start.margin_per_distance,
-            margin: start.narrow_margin + 2.0 * start.margin,
+            margin_per_distance: TreeSpace::F32_MARGIN_PER_DISTANCE + 2.0 * start.margin_per_distance,
+            margin: start.f32_margin + 2.0 * start.margin,
             has_one_origin,
         })
     }
 
     #[inline(always)]
-    fn start_triangles<L: Lanes>(
+    fn start_triangles<L: Simd>(
         &mut self,
         decider: &Decider,
         axes: &'static Axes,
         slabs: &SlabRows,
         cull: &mut Cull,
     ) {
-        let (splat, order) = (L::Wide::splat, axes.order());
-        let inverse = L::Wide::load(&slabs.inverse[order[2]].0) * splat(decider.start.units_per_space);
+        let (splat, order) = (L::F32x16::splat, axes.order());
+        let inverse = L::F32x16::load(&slabs.inverse[order[2]].0) * splat(decider.start.units_per_space);
         (splat(0.0) - inverse).store(&mut self.minus_inverse);
         let mut off = [splat(0.0); 3];
         for (place, &axis) in order.iter().enumerate() {
-            let origin = L::Wide::load(&self.rows[axis].0);
+            let origin = L::F32x16::load(&self.rows[axis].0);
             origin.store(&mut self.origin[place]);
             let middle = if self.has_one_origin { origin } else { origin.middle() };
             off[place] = origin - middle;
             cull.middle[place] = middle.first();
         }
         for place in 0..2 {
-            let shear = L::Wide::load(&self.rows[4 + order[place]].0) * inverse;
+            let shear = L::F32x16::load(&self.rows[4 + order[place]].0) * inverse;
             let middle = shear.middle();
             shear.store(&mut self.shear[place]);
             cull.middle_shear[place] = middle.first();
@@ -249,7 +253,7 @@ impl<'a, 'd, G: Goal> Bundle<'a, 'd> for F32Bundle<'a, 'd, G> {
     }
 
     #[inline(always)]
-    fn test_triangle<L: Lanes>(
+    fn test_triangle<L: Simd>(
         &mut self,
         state: &mut State,
         _: &Cull,
@@ -259,7 +263,7 @@ impl<'a, 'd, G: Goal> Bundle<'a, 'd> for F32Bundle<'a, 'd, G> {
         _: &[Ray32; PACKET],
     ) {
         let own = simd::opaque(self);
-        let (load, splat) = (L::Wide::load, L::Wide::splat);
+        let (load, splat) = (L::F32x16::load, L::F32x16::splat);
         let [kx, ky, kz] = own.axes.order();
         let (ox, oy, oz) = (load(&own.origin[0].0), load(&own.origin[1].0), load(&own.origin[2].0));
         let (sx, sy) = (load(&own.shear[0].0), load(&own.shear[1].0));
@@ -287,7 +291,7 @@ impl<'a, 'd, G: Goal> Bundle<'a, 'd> for F32Bundle<'a, 'd, G> {
         let t = height.over(det) * load(&own.minus_inverse.0);
         let t_max = load(&own.t_max.0);
         let in_range = mask & precise & load(&own.t_min.0).at_most(t) & t.at_most(t_max);
-        let unclear = mask & !precise;
+        let uncertain = mask & !precise;
         if G::IS_ANY {
             state.stop_at_hits(in_range);
         } else if in_range != 0 {
@@ -298,24 +302,24 @@ impl<'a, 'd, G: Goal> Bundle<'a, 'd> for F32Bundle<'a, 'd, G> {
             }
             let closer = closer & in_range;
             let own = splat(f32::from_bits(place << 3 | lane as u32));
-            L::Wide::select(closer, own, triangle).store(&mut self.triangle);
+            L::F32x16::select(closer, own, triangle).store(&mut self.triangle);
             for (row, weight) in self.weights.iter_mut().zip([v, w, det]) {
-                L::Wide::select(closer, weight, load(&row.0)).store(row);
+                L::F32x16::select(closer, weight, load(&row.0)).store(row);
             }
-            let t_max = L::Wide::select(closer, t, t_max);
+            let t_max = L::F32x16::select(closer, t, t_max);
             t_max.store(&mut self.t_max);
             let end = t * splat(BEYOND) + splat(f32::MIN_POSITIVE);
-            let s_max = L::Wide::select(closer, end, load(&state.slabs.s_max.0));
+            let s_max = L::F32x16::select(closer, end, load(&state.slabs.s_max.0));
             s_max.store(&mut state.slabs.s_max);
             state.frustum.s_max = s_max.most();
         }
-        if unclear != 0 {
-            self.decide(state, unclear, block, place, lane as u32);
+        if uncertain != 0 {
+            self.decide(state, uncertain, block, place, lane as u32);
         }
     }
 
     #[inline(always)]
-    fn put<L: Lanes>(
+    fn put<L: Simd>(
         &mut self,
         decider: &Decider,
         state: &State,
@@ -326,7 +330,7 @@ impl<'a, 'd, G: Goal> Bundle<'a, 'd> for F32Bundle<'a, 'd, G> {
         if G::IS_ANY {
             return put_chosen(state.chosen, first, |i| (state.met >> i & 1 != 0).then_some(SOME_HIT), sink);
         }
-        let load = L::Wide::load;
+        let load = L::F32x16::load;
         let triangle = load(&self.triangle.0);
         let hits = if state.is_among_triangles { state.chosen & !triangle.with_bits(NONE) } else { 0 };
         let row = Row::of(0.0);
@@ -336,7 +340,7 @@ impl<'a, 'd, G: Goal> Bundle<'a, 'd> for F32Bundle<'a, 'd, G> {
             for (local, weight) in local.iter_mut().zip(&self.weights) {
                 load(&weight.0).over(det).store(local);
             }
-            let mut ids = [L::Wide::splat(0.0); 3];
+            let mut ids = [L::F32x16::splat(0.0); 3];
             let mut rest = hits;
             while rest != 0 {
                 // Many may have hit the same.
@@ -346,7 +350,7 @@ impl<'a, 'd, G: Goal> Bundle<'a, 'd> for F32Bundle<'a, 'd, G> {
                 let (geometry, primitive) = decider.ids(own >> 3, own & 7);
                 let id = decider.accel().geometries[geometry as usize].id;
                 for (row, own) in ids.iter_mut().zip([id, primitive, geometry]) {
-                    *row = L::Wide::select(with_this, L::Wide::splat(f32::from_bits(own)), *row);
+                    *row = L::F32x16::select(with_this, L::F32x16::splat(f32::from_bits(own)), *row);
                 }
             }
             ids[0].store(&mut id);

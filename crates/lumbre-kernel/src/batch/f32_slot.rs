@@ -3,11 +3,11 @@
 use std::marker::PhantomData;
 
 use super::interleaved::{PassedLanes, RaySlot};
-use crate::intersect::Lanes;
+use crate::intersect::Simd;
 use crate::intersect::box_ray::Slabs;
 use crate::intersect::f32_ray::F32Ray;
 use crate::intersect::watertight;
-use crate::simd::{Eight, Vector};
+use crate::simd::{F32x8, Vector};
 use crate::trace::decide::Decider;
 use crate::trace::f32_ray::{Nearest, Pass, SOME_HIT};
 use crate::trace::stack::Goal;
@@ -24,16 +24,16 @@ pub(super) struct F32Slot<'a, 'd, G> {
     goal: PhantomData<(G, &'d Decider<'a>)>,
 }
 
-impl<'a, 'd, G: Goal, L: Lanes> RaySlot<'a, 'd, L> for F32Slot<'a, 'd, G> {
+impl<'a, 'd, G: Goal, L: Simd> RaySlot<'a, 'd, L> for F32Slot<'a, 'd, G> {
     type Goal = G;
     type Ray = Ray32;
     type Answer = Option<Hit32>;
     const GENERAL: bool = false;
     const STARTS_BY_FOUR: bool = L::STARTS_BY_FOUR;
-    type Pass = Pass<L::Eight>;
-    type Passes = Pass<L::Wide>;
+    type Pass = Pass<L::F32x8>;
+    type Passes = Pass<L::F32x16>;
     /// `t`.
-    type At = L::Eight;
+    type At = L::F32x8;
 
     #[inline(always)]
     fn new(_: &'d Decider<'a>) -> Self {
@@ -42,8 +42,8 @@ impl<'a, 'd, G: Goal, L: Lanes> RaySlot<'a, 'd, L> for F32Slot<'a, 'd, G> {
 
     #[inline(always)]
     fn start(&mut self, decider: &'d Decider<'a>, ray: &Ray32) -> Option<Slabs> {
-        let slabs = L::start_narrow(decider.start, ray)?;
-        self.ray = L::start_narrow_blocks(decider.start, ray, &slabs);
+        let slabs = L::start_f32(decider.start, ray)?;
+        self.ray = L::start_f32_blocks(decider.start, ray, &slabs);
         self.nearest = Nearest::NONE;
         Some(slabs)
     }
@@ -60,7 +60,7 @@ impl<'a, 'd, G: Goal, L: Lanes> RaySlot<'a, 'd, L> for F32Slot<'a, 'd, G> {
         }
         let starts =
             [(a_slabs, &mut a.ray), (b_slabs, &mut b.ray), (c_slabs, &mut c.ray), (d_slabs, &mut d.ray)];
-        L::start_narrow_by_four(decider.start, rays, starts)
+        L::start_f32_by_four(decider.start, rays, starts)
     }
 
     #[inline(always)]
@@ -68,36 +68,36 @@ impl<'a, 'd, G: Goal, L: Lanes> RaySlot<'a, 'd, L> for F32Slot<'a, 'd, G> {
         decider: &Decider,
         slots: [&Self; 2],
         blocks: [&TriangleBlock; 2],
-    ) -> (PassedLanes, Pass<L::Wide>) {
+    ) -> (PassedLanes, Pass<L::F32x16>) {
         let precise = &decider.start.precise;
-        if L::MEETS_BY_TWO {
+        if L::INTERSECTS_BY_TWO {
             let (mask, lines) = F32Ray::lines_by_two::<L>([&slots[0].ray, &slots[1].ray], blocks);
-            let (unclear, passes) = lines.pass(mask, precise);
-            return (PassedLanes { mask: mask & !unclear, unclear }, passes);
+            let (uncertain, passes) = lines.pass(mask, precise);
+            return (PassedLanes { mask: mask & !uncertain, uncertain }, passes);
         }
         let (first, of_first) = slots[0].ray.lines::<L>(blocks[0]);
         let (first_unclear, of_first) = of_first.pass(first, precise);
         let (second, of_second) = slots[1].ray.lines::<L>(blocks[1]);
         let (second_unclear, of_second) = of_second.pass(second, precise);
-        let unclear = first_unclear | second_unclear << BLOCK;
-        let mask = (first | second << BLOCK) & !unclear;
-        (PassedLanes { mask, unclear }, Pass::of_two(&of_first, &of_second))
+        let uncertain = first_unclear | second_unclear << BLOCK;
+        let mask = (first | second << BLOCK) & !uncertain;
+        (PassedLanes { mask, uncertain }, Pass::of_two(&of_first, &of_second))
     }
 
     #[inline(always)]
-    fn one_of(passes: &Pass<L::Wide>, which: usize) -> Pass<L::Eight> {
+    fn one_of(passes: &Pass<L::F32x16>, which: usize) -> Pass<L::F32x8> {
         passes.half(which)
     }
 
     #[inline(always)]
-    fn intersect(&self, mask: u32, pass: &Pass<L::Eight>) -> LaneHits<L::Eight> {
+    fn intersect(&self, mask: u32, pass: &Pass<L::F32x8>) -> LaneHits<L::F32x8> {
         let (met, at) = self.ray.cross(mask, pass);
-        LaneHits { met, unclear: 0, at }
+        LaneHits { met, uncertain: 0, at }
     }
 
     #[inline(always)]
-    fn hits_any(&self, decider: &Decider, _: &Ray32, block: u32, unclear: u32) -> Outcome<bool> {
-        Outcome::Certain(self.ray.meets_exactly(decider.block(block), unclear))
+    fn hits_any(&self, decider: &Decider, _: &Ray32, block: u32, uncertain: u32) -> Outcome<bool> {
+        Outcome::Certain(self.ray.meets_exactly(decider.block(block), uncertain))
     }
 
     #[inline(always)]
@@ -106,12 +106,12 @@ impl<'a, 'd, G: Goal, L: Lanes> RaySlot<'a, 'd, L> for F32Slot<'a, 'd, G> {
         decider: &Decider,
         _: &Ray32,
         block: u32,
-        hits: &LaneHits<L::Eight>,
-        pass: &Pass<L::Eight>,
+        hits: &LaneHits<L::F32x8>,
+        pass: &Pass<L::F32x8>,
         slabs: &mut Slabs,
     ) -> bool {
         let t = hits.at.least_of(hits.met);
-        let which = hits.at.at_most(L::Eight::splat(t)) & hits.met;
+        let which = hits.at.at_most(L::F32x8::splat(t)) & hits.met;
         let lane = which.trailing_zeros() as usize % BLOCK;
         if self.nearest.take_nearest(decider, &mut self.ray, block, hits, pass, (lane, t)) {
             slabs.end_at(watertight::beyond(self.ray.t_max()));

@@ -9,13 +9,13 @@ use super::Sink;
 use super::packet::{ALL, Bundle, Cull, CullBounds, Effort, PACKET, Signs, Start, State, record};
 use crate::intersect::box_ray::SlabRows;
 use crate::intersect::box_ray::Slabs;
-use crate::intersect::single_start::SingleStart;
+use crate::intersect::filter_start::FilterStart;
 use crate::intersect::watertight::{
     self, BEYOND, EDGE_ERROR, ERRORS_OF_EDGES, ERRORS_OF_EXTENT, FAR, HEIGHT_ERROR, Meeting, Met, Pairs,
     ROUNDINGS, SIZE_ERROR, TINY, beyond,
 };
-use crate::intersect::{Axes, Lanes, Level, Task};
-use crate::simd::{self, Row, Vector, Wide};
+use crate::intersect::{Axes, Dispatch, Isa, Simd};
+use crate::simd::{self, F32x16, Row, Vector};
 use crate::trace::decide::{Candidate, Decider, heights, largest_component};
 use crate::trace::filtered::{FilteredGoal, FilteredRay};
 use crate::trace::{ContextRef, Outcome, Winner};
@@ -55,7 +55,7 @@ const OTHER: u32 = u32::MAX - 1;
 
 /// What a direction is to planes, as for a single ray.
 #[inline(always)]
-fn inverse_of<W: Wide>(start: &SingleStart, direction: W) -> W {
+fn inverse_of<W: F32x16>(start: &FilterStart, direction: W) -> W {
     let size = W::splat(start.space_per_unit).over(direction.abs().max(W::splat(start.tiny)));
     size.turned_by(direction)
 }
@@ -97,7 +97,7 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> F64Bundle<'a, 'd, G, GENERAL>
     fn decide_closest(
         &mut self,
         state: &mut State,
-        level: Level,
+        isa: Isa,
         mut mask: u32,
         (place, lane): (u32, u32),
         rays: &[Ray; PACKET],
@@ -107,7 +107,7 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> F64Bundle<'a, 'd, G, GENERAL>
             mask &= mask - 1;
             let (decider, ray, axes) = (self.decider, &rays[i], self.axes);
             let (best, exact) = (self.best(i), self.exact(i));
-            match level.run(Comparison { decider, ray, axes, triangle: (place, lane), best, exact }) {
+            match isa.run(Comparison { decider, ray, axes, triangle: (place, lane), best, exact }) {
                 Outcome::Certain(None) => {}
                 Outcome::Certain(Some(t)) => {
                     self.keep(state, i, heights(t, largest_component(ray)), place << 3 | lane);
@@ -147,7 +147,7 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> F64Bundle<'a, 'd, G, GENERAL>
 
     /// Tests a leaf of anything but triangles, or what has no bounds, with those that go on, by the code of single rays.
     #[inline(always)]
-    fn test_others<L: Lanes>(&mut self, state: &mut State, leaf: Option<u32>, rays: &[Ray; PACKET]) {
+    fn test_others<L: Simd>(&mut self, state: &mut State, leaf: Option<u32>, rays: &[Ray; PACKET]) {
         if !self.others_started {
             self.start_others::<L>(state, rays);
         }
@@ -174,11 +174,11 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> F64Bundle<'a, 'd, G, GENERAL>
 
     /// Starts those that go on among leaves of anything.
     #[inline(always)]
-    fn start_others<L: Lanes>(&mut self, state: &mut State, rays: &[Ray; PACKET]) {
+    fn start_others<L: Simd>(&mut self, state: &mut State, rays: &[Ray; PACKET]) {
         let (decider, alive) = (self.decider, state.alive);
         self.others.clear();
         for (i, ray) in rays.iter().enumerate() {
-            let slabs = if alive >> i & 1 != 0 { L::start_single(decider.start, ray) } else { None };
+            let slabs = if alive >> i & 1 != 0 { L::start_filter(decider.start, ray) } else { None };
             self.others.push(slabs.map(|slabs| {
                 let blocks = L::start_blocks(decider.start, ray, &slabs);
                 FilteredRay::new(decider, blocks, None, ContextRef::OUTSIDE)
@@ -201,11 +201,11 @@ struct Comparison<'s, 'a> {
     exact: Option<Winner>,
 }
 
-impl Task for Comparison<'_, '_> {
+impl Dispatch for Comparison<'_, '_> {
     type Output = Outcome<Option<f64>>;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> Self::Output {
+    fn run<L: Simd>(self) -> Self::Output {
         let Self { decider, ray, axes, triangle, best, exact } = self;
         decider.compare::<L>(ray, axes, triangle, (&best, exact))
     }
@@ -219,11 +219,11 @@ struct TestOthers<'s, 'a, 'd, G, const GENERAL: bool> {
     rays: &'s [Ray; PACKET],
 }
 
-impl<G: FilteredGoal, const GENERAL: bool> Task for TestOthers<'_, '_, '_, G, GENERAL> {
+impl<G: FilteredGoal, const GENERAL: bool> Dispatch for TestOthers<'_, '_, '_, G, GENERAL> {
     type Output = ();
 
     #[inline(always)]
-    fn run<L: Lanes>(self) {
+    fn run<L: Simd>(self) {
         self.bundle.test_others::<L>(self.state, self.leaf, self.rays);
     }
 }
@@ -275,18 +275,18 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<
     }
 
     #[inline(always)]
-    fn load<L: Lanes>(&mut self, rays: &[Ray; PACKET]) {
+    fn load<L: Simd>(&mut self, rays: &[Ray; PACKET]) {
         L::columns(rays, &mut self.columns);
     }
 
     #[inline(always)]
-    fn alike<L: Lanes>(&self, one: u32) -> (u32, Signs) {
-        let zero = L::Wide::splat(0.0);
+    fn alike<L: Simd>(&self, one: u32) -> (u32, Signs) {
+        let zero = L::F32x16::splat(0.0);
         let (mut length, mut negative) = ([zero; 3], [0; 3]);
         for axis in 0..3 {
-            let direction = L::Wide::rounded(&self.columns[3 + axis]);
+            let direction = L::F32x16::rounded(&self.columns[3 + axis]);
             length[axis] = direction.abs();
-            negative[axis] = L::Wide::splat(1.0).turned_by(direction).below(zero);
+            negative[axis] = L::F32x16::splat(1.0).turned_by(direction).below(zero);
         }
         // For each pair, where the first is longer and where the second is: rounding keeps their order, or makes them equal.
         let [x, y, z] = length;
@@ -301,7 +301,7 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<
     }
 
     #[inline(always)]
-    fn fill_up<L: Lanes>(&mut self, mask: u32) {
+    fn fill_up<L: Simd>(&mut self, mask: u32) {
         let one = mask.trailing_zeros() as usize % PACKET;
         for Row(column) in &mut self.columns {
             let own = column[one];
@@ -312,18 +312,18 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<
     }
 
     #[inline(always)]
-    fn start<L: Lanes>(&mut self, decider: &Decider, slabs: &mut SlabRows) -> Option<Start<L::Wide>> {
-        let (columns, start, splat) = (&self.columns, decider.start, L::Wide::splat);
-        let has_one_origin = L::Wide::are_same(&columns[0])
-            && L::Wide::are_same(&columns[1])
-            && L::Wide::are_same(&columns[2]);
+    fn start<L: Simd>(&mut self, decider: &Decider, slabs: &mut SlabRows) -> Option<Start<L::F32x16>> {
+        let (columns, start, splat) = (&self.columns, decider.start, L::F32x16::splat);
+        let has_one_origin = L::F32x16::are_same(&columns[0])
+            && L::F32x16::are_same(&columns[1])
+            && L::F32x16::are_same(&columns[2]);
         let zero = splat(0.0);
-        let (t_min, t_max) = (L::Wide::rounded(&columns[6]), L::Wide::rounded(&columns[7]));
+        let (t_min, t_max) = (L::F32x16::rounded(&columns[6]), L::F32x16::rounded(&columns[7]));
         let mut fits = zero.at_most(t_min) & t_min.at_most(t_max);
         let (mut is_long, mut is_near) = (0, true);
         let (mut inverse, mut center, mut off) = ([zero; 3], [0.0; 3], [0.0; 3]);
         for axis in 0..3 {
-            let direction = L::Wide::rounded(&columns[3 + axis]);
+            let direction = L::F32x16::rounded(&columns[3 + axis]);
             fits &= direction.abs().at_most(splat(start.longest[axis]));
             is_long |= splat(start.shortest).at_most(direction.abs());
             inverse[axis] = inverse_of(start, direction);
@@ -332,7 +332,7 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<
                 center[axis] = ((columns[axis].0[0] - origin) * scale) as f32;
                 is_near &= center[axis].abs() <= start.farthest[axis];
             } else {
-                let from = L::Wide::rounded_from(&columns[axis], origin, scale);
+                let from = L::F32x16::rounded_from(&columns[axis], origin, scale);
                 let middle = from.middle();
                 fits &= from.abs().at_most(splat(start.farthest[axis]));
                 slabs.set_axis(axis, from, inverse[axis], [start.margin, start.margin_per_distance]);
@@ -352,21 +352,21 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<
     }
 
     #[inline(always)]
-    fn start_triangles<L: Lanes>(
+    fn start_triangles<L: Simd>(
         &mut self,
         decider: &Decider,
         axes: &'static Axes,
         _: &SlabRows,
         cull: &mut Cull,
     ) {
-        let (start, splat) = (decider.start, L::Wide::splat);
+        let (start, splat) = (decider.start, L::F32x16::splat);
         let zero = splat(0.0);
         let order = axes.order();
         let columns = &self.columns;
-        let has_one_origin = L::Wide::are_same(&columns[0])
-            && L::Wide::are_same(&columns[1])
-            && L::Wide::are_same(&columns[2]);
-        let last = L::Wide::rounded(&columns[3 + order[2]]);
+        let has_one_origin = L::F32x16::are_same(&columns[0])
+            && L::F32x16::are_same(&columns[1])
+            && L::F32x16::are_same(&columns[2]);
+        let last = L::F32x16::rounded(&columns[3 + order[2]]);
         let inverse = inverse_of(start, last) * splat(start.units_per_space);
         inverse.abs().store(&mut self.s_per_height);
         self.turn = if columns[3 + order[2]].0[0].is_sign_negative() { 0.0 } else { -0.0 };
@@ -381,7 +381,7 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<
                 splat(origin).store(&mut self.origin[place]);
                 (cull.middle[place], cull.apart[place]) = (origin, more.abs());
             } else {
-                let (origin, more) = L::Wide::parted_from(&columns[axis], mesh_origin);
+                let (origin, more) = L::F32x16::parted_from(&columns[axis], mesh_origin);
                 let middle = origin.middle();
                 (rest[place], off[place]) = (more, origin - middle);
                 origin.store(&mut self.origin[place]);
@@ -390,7 +390,7 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<
         }
         rest[2].store(&mut self.rest[2]);
         for place in 0..2 {
-            let shear = L::Wide::rounded(&columns[3 + order[place]]) * inverse;
+            let shear = L::F32x16::rounded(&columns[3 + order[place]]) * inverse;
             let sheared = rest[2].times_from(shear, rest[place]);
             let middle = shear.middle();
             shear.store(&mut self.shear[place]);
@@ -405,7 +405,7 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<
             };
         }
         cull.apart[2] = if has_one_origin { 0.0 } else { off[2].abs().most() };
-        let (t_min, t_max) = (L::Wide::rounded(&columns[6]), L::Wide::rounded(&columns[7]));
+        let (t_min, t_max) = (L::F32x16::rounded(&columns[6]), L::F32x16::rounded(&columns[7]));
         let (far, roundings) = (splat(FAR), splat(ROUNDINGS));
         let heights = [(t_min * last.abs()).min(far), (t_max * last.abs()).min(far)];
         let errors = [heights[0] * roundings, heights[1] * roundings];
@@ -421,7 +421,7 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<
     }
 
     #[inline(always)]
-    fn test_triangle<L: Lanes>(
+    fn test_triangle<L: Simd>(
         &mut self,
         state: &mut State,
         _: &Cull,
@@ -431,13 +431,13 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<
         rays: &[Ray; PACKET],
     ) {
         let own = simd::opaque(self);
-        let (load, splat) = (L::Wide::load, L::Wide::splat);
+        let (load, splat) = (L::F32x16::load, L::F32x16::splat);
         let [kx, ky, kz] = own.axes.order();
         let (ox, oy, oz) = (load(&own.origin[0].0), load(&own.origin[1].0), load(&own.origin[2].0));
         let (rx, ry) = (load(&own.rest[0].0), load(&own.rest[1].0));
         let (sx, sy) = (load(&own.shear[0].0), load(&own.shear[1].0));
         let at = |axis: usize, corner: usize| splat(corners[axis][corner][lane]);
-        // As `Lanes::meet_triangles`, with the signs turned.
+        // As `Simd::intersect_triangles`, with the signs turned.
         let (az, bz, cz) = (oz - at(kz, 0), oz - at(kz, 1), oz - at(kz, 2));
         let ax = sx.times_from(az, ox - at(kx, 0) + rx);
         let bx = sx.times_from(bz, ox - at(kx, 1) + rx);
@@ -490,34 +490,34 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<
         let doubtful = in_range & !closer & !best_to.below(from);
         if closer != 0 {
             let triangle = splat(f32::from_bits(place << 3 | lane as u32));
-            L::Wide::select(closer, from, best_from).store(&mut self.from);
-            let to = L::Wide::select(closer, to, best_to);
+            L::F32x16::select(closer, from, best_from).store(&mut self.from);
+            let to = L::F32x16::select(closer, to, best_to);
             to.store(&mut self.to);
-            L::Wide::select(closer, triangle, load(&self.triangle.0)).store(&mut self.triangle);
-            L::Wide::select(closer, to, load(&self.last.0)).store(&mut self.last);
+            L::F32x16::select(closer, triangle, load(&self.triangle.0)).store(&mut self.triangle);
+            L::F32x16::select(closer, to, load(&self.last.0)).store(&mut self.last);
             let s = to * load(&self.s_per_height.0);
             let end = s.times_plus(splat(BEYOND), splat(f32::MIN_POSITIVE));
-            let s_max = L::Wide::select(closer, end, load(&state.slabs.s_max.0));
+            let s_max = L::F32x16::select(closer, end, load(&state.slabs.s_max.0));
             s_max.store(&mut state.slabs.s_max);
             state.frustum.s_max = s_max.most();
         }
         if doubtful != 0 {
-            self.decide_closest(state, L::level(), doubtful, (place, lane as u32), rays);
+            self.decide_closest(state, L::isa(), doubtful, (place, lane as u32), rays);
         }
     }
 
     #[inline(always)]
-    fn test_infinite<L: Lanes>(&mut self, state: &mut State, rays: &[Ray; PACKET]) {
-        L::level().run(TestOthers { bundle: self, state, leaf: None, rays });
+    fn test_infinite<L: Simd>(&mut self, state: &mut State, rays: &[Ray; PACKET]) {
+        L::isa().run(TestOthers { bundle: self, state, leaf: None, rays });
     }
 
     #[inline(always)]
-    fn test_leaf<L: Lanes>(&mut self, state: &mut State, leaf: u32, rays: &[Ray; PACKET]) {
-        L::level().run(TestOthers { bundle: self, state, leaf: Some(leaf), rays });
+    fn test_leaf<L: Simd>(&mut self, state: &mut State, leaf: u32, rays: &[Ray; PACKET]) {
+        L::isa().run(TestOthers { bundle: self, state, leaf: Some(leaf), rays });
     }
 
     #[inline(always)]
-    fn put<L: Lanes>(
+    fn put<L: Simd>(
         &mut self,
         decider: &Decider,
         state: &State,
@@ -525,7 +525,7 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<
         first: usize,
         sink: &mut impl Sink<G::Found>,
     ) {
-        let triangle = L::Wide::load(&self.triangle.0);
+        let triangle = L::F32x16::load(&self.triangle.0);
         let (mut on_triangles, mut on_others) = (0, 0);
         if !G::IS_ANY && state.is_among_triangles {
             on_triangles = !triangle.with_bits(NONE) & !state.uncertain & state.chosen;
@@ -560,8 +560,8 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> Bundle<'a, 'd> for F64Bundle<
 impl<G: FilteredGoal, const GENERAL: bool> F64Bundle<'_, '_, G, GENERAL> {
     /// Intersects the triangles of these closest hits in double precision, all at once.
     #[inline(always)]
-    fn intersect_all<L: Lanes>(&self, decider: &Decider, hits: u32) -> Met {
-        let (axes, triangle) = (self.axes, L::Wide::load(&self.triangle.0));
+    fn intersect_all<L: Simd>(&self, decider: &Decider, hits: u32) -> Met {
+        let (axes, triangle) = (self.axes, L::F32x16::load(&self.triangle.0));
         // Many may have hit the same.
         let mut corners = [[Row::of(0.0); 3]; 3];
         let mut rest = hits;
@@ -572,7 +572,8 @@ impl<G: FilteredGoal, const GENERAL: bool> F64Bundle<'_, '_, G, GENERAL> {
             let these = axes.gather(decider.block(one >> 3), (one & 7) as usize);
             for (rows, corner) in corners.iter_mut().zip(these) {
                 for (row, coordinate) in rows.iter_mut().zip(corner) {
-                    L::Wide::select(with_this, L::Wide::splat(coordinate), L::Wide::load(&row.0)).store(row);
+                    L::F32x16::select(with_this, L::F32x16::splat(coordinate), L::F32x16::load(&row.0))
+                        .store(row);
                 }
             }
         }
@@ -590,7 +591,7 @@ impl<G: FilteredGoal, const GENERAL: bool> F64Bundle<'_, '_, G, GENERAL> {
 
     /// The closest hit of one, on a triangle; `None` should double precision deny it.
     #[inline(always)]
-    fn winner<L: Lanes>(&self, decider: &Decider, met: &Met, i: usize, ray: &Ray) -> Option<Winner> {
+    fn winner<L: Simd>(&self, decider: &Decider, met: &Met, i: usize, ray: &Ray) -> Option<Winner> {
         let (best, t) = (self.best(i), met.t.0[i]);
         if t.is_nan() {
             // Uncertain: by itself, and exactly.

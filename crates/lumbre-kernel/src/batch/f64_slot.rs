@@ -5,8 +5,8 @@ use lumbre_geometry::Ray;
 use super::interleaved::{PassedLanes, RaySlot};
 use crate::intersect::box_ray::Slabs;
 use crate::intersect::watertight::{BlockRay, HeightRange, Meeting};
-use crate::intersect::{Axes, Crossings, Lanes, Level, Task};
-use crate::simd::{self, Eight, Vector};
+use crate::intersect::{Axes, Crossings, Dispatch, Isa, Simd};
+use crate::simd::{self, F32x8, Vector};
 use crate::trace::decide::{Candidate, Decider, heights, largest_component};
 use crate::trace::filtered::{FilteredGoal, FilteredRay};
 use crate::trace::{ContextRef, LaneHits, Outcome, Stop, Winner};
@@ -33,14 +33,14 @@ impl<'a, 'd, G: FilteredGoal, const GENERAL: bool> F64Slot<'a, 'd, G, GENERAL> {
     #[inline(never)]
     fn compare_all(
         &self,
-        level: Level,
+        isa: Isa,
         ray: &Ray,
         block: u32,
         hits: &LaneHits<[[f32; BLOCK]; 2]>,
     ) -> Outcome<Option<Candidate>> {
         let (best, exact) = (self.ray.best, self.ray.exact());
         let (decider, axes) = (self.ray.decider(), self.ray.blocks.axes);
-        level.run(ComparisonOfAll { decider, ray, axes, best, exact, block, hits })
+        isa.run(ComparisonOfAll { decider, ray, axes, best, exact, block, hits })
     }
 }
 
@@ -55,15 +55,15 @@ struct ComparisonOfAll<'s, 'a> {
     hits: &'s LaneHits<[[f32; BLOCK]; 2]>,
 }
 
-impl Task for ComparisonOfAll<'_, '_> {
+impl Dispatch for ComparisonOfAll<'_, '_> {
     type Output = Outcome<Option<Candidate>>;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> Self::Output {
+    fn run<L: Simd>(self) -> Self::Output {
         let Self { decider, ray, axes, best, exact, block, hits } = self;
-        let &LaneHits { met, unclear, at: [ref froms, ref tos] } = hits;
+        let &LaneHits { met, uncertain, at: [ref froms, ref tos] } = hits;
         let mut closer = None;
-        let mut rest = met | unclear;
+        let mut rest = met | uncertain;
         while rest != 0 {
             let lane = rest.trailing_zeros();
             rest &= rest - 1;
@@ -94,7 +94,7 @@ impl Task for ComparisonOfAll<'_, '_> {
 #[cold]
 #[inline(never)]
 fn hits_any(
-    level: Level,
+    isa: Isa,
     decider: &Decider,
     ray: &Ray,
     axes: &'static Axes,
@@ -102,11 +102,11 @@ fn hits_any(
     mask: u32,
 ) -> Outcome<bool> {
     struct HitsAny<'s, 'a>(&'s Decider<'a>, &'s Ray, &'static Axes, u32, u32);
-    impl Task for HitsAny<'_, '_> {
+    impl Dispatch for HitsAny<'_, '_> {
         type Output = Outcome<bool>;
 
         #[inline(always)]
-        fn run<L: Lanes>(self) -> Outcome<bool> {
+        fn run<L: Simd>(self) -> Outcome<bool> {
             let Self(decider, ray, axes, place, mut rest) = self;
             while rest != 0 {
                 let lane = rest.trailing_zeros();
@@ -123,10 +123,10 @@ fn hits_any(
             Outcome::Certain(false)
         }
     }
-    level.run(HitsAny(decider, ray, axes, block, mask))
+    isa.run(HitsAny(decider, ray, axes, block, mask))
 }
 
-impl<'a, 'd, G: FilteredGoal, L: Lanes, const GENERAL: bool> RaySlot<'a, 'd, L>
+impl<'a, 'd, G: FilteredGoal, L: Simd, const GENERAL: bool> RaySlot<'a, 'd, L>
     for F64Slot<'a, 'd, G, GENERAL>
 {
     type Goal = G;
@@ -136,7 +136,7 @@ impl<'a, 'd, G: FilteredGoal, L: Lanes, const GENERAL: bool> RaySlot<'a, 'd, L>
     type Pass = L::Edges;
     type Passes = L::EdgesByTwo;
     /// The interval of heights that holds the crossing.
-    type At = [L::Eight; 2];
+    type At = [L::F32x8; 2];
 
     #[inline(always)]
     fn new(decider: &'d Decider<'a>) -> Self {
@@ -154,7 +154,7 @@ impl<'a, 'd, G: FilteredGoal, L: Lanes, const GENERAL: bool> RaySlot<'a, 'd, L>
 
     #[inline(always)]
     fn start(&mut self, decider: &'d Decider<'a>, ray: &Ray) -> Option<Slabs> {
-        let slabs = L::start_single(decider.start, ray)?;
+        let slabs = L::start_filter(decider.start, ray)?;
         let blocks = L::start_blocks(decider.start, ray, &slabs);
         if GENERAL {
             *self = Self::with(decider, blocks);
@@ -170,8 +170,9 @@ impl<'a, 'd, G: FilteredGoal, L: Lanes, const GENERAL: bool> RaySlot<'a, 'd, L>
         slots: [&Self; 2],
         blocks: [&TriangleBlock; 2],
     ) -> (PassedLanes, L::EdgesByTwo) {
-        let (mask, edges) = L::meet_triangles_by_two(blocks, [&slots[0].ray.blocks, &slots[1].ray.blocks]);
-        (PassedLanes { mask, unclear: 0 }, edges)
+        let (mask, edges) =
+            L::intersect_triangles_by_two(blocks, [&slots[0].ray.blocks, &slots[1].ray.blocks]);
+        (PassedLanes { mask, uncertain: 0 }, edges)
     }
 
     #[inline(always)]
@@ -180,15 +181,15 @@ impl<'a, 'd, G: FilteredGoal, L: Lanes, const GENERAL: bool> RaySlot<'a, 'd, L>
     }
 
     #[inline(always)]
-    fn intersect(&self, mask: u32, edges: &L::Edges) -> LaneHits<[L::Eight; 2]> {
+    fn intersect(&self, mask: u32, edges: &L::Edges) -> LaneHits<[L::F32x8; 2]> {
         let Crossings { in_range, sure, from, to } =
             L::place_crossings(edges, simd::opaque(&self.ray.blocks));
-        LaneHits { met: mask & sure, unclear: mask & in_range & !sure, at: [from, to] }
+        LaneHits { met: mask & sure, uncertain: mask & in_range & !sure, at: [from, to] }
     }
 
     #[inline(always)]
-    fn hits_any(&self, decider: &Decider, ray: &Ray, block: u32, unclear: u32) -> Outcome<bool> {
-        hits_any(L::level(), decider, ray, self.ray.blocks.axes, block, unclear)
+    fn hits_any(&self, decider: &Decider, ray: &Ray, block: u32, uncertain: u32) -> Outcome<bool> {
+        hits_any(L::isa(), decider, ray, self.ray.blocks.axes, block, uncertain)
     }
 
     #[inline(always)]
@@ -197,21 +198,21 @@ impl<'a, 'd, G: FilteredGoal, L: Lanes, const GENERAL: bool> RaySlot<'a, 'd, L>
         _: &Decider,
         ray: &Ray,
         block: u32,
-        hits: &LaneHits<[L::Eight; 2]>,
+        hits: &LaneHits<[L::F32x8; 2]>,
         _: &L::Edges,
         slabs: &mut Slabs,
     ) -> bool {
-        let &LaneHits { met, unclear, at: [from, to] } = hits;
+        let &LaneHits { met, uncertain, at: [from, to] } = hits;
         let nearest = to.least_of(met);
-        let which = from.at_most(L::Eight::splat(nearest)) & met;
+        let which = from.at_most(L::F32x8::splat(nearest)) & met;
         let is_alone = which & which.wrapping_sub(1) == 0;
-        if unclear == 0 && is_alone && nearest < self.ray.best.from {
+        if uncertain == 0 && is_alone && nearest < self.ray.best.from {
             let lane = which.trailing_zeros();
             self.ray.keep(Candidate { block, lane, from: from.lane(lane as usize), to: nearest }, slabs);
             return true;
         }
-        let hits = LaneHits { met, unclear, at: [from.to_array(), to.to_array()] };
-        match self.compare_all(L::level(), ray, block, &hits) {
+        let hits = LaneHits { met, uncertain, at: [from.to_array(), to.to_array()] };
+        match self.compare_all(L::isa(), ray, block, &hits) {
             Outcome::Certain(Some(closer)) => self.ray.keep(closer, slabs),
             Outcome::Certain(None) => {}
             Outcome::Uncertain => return false,

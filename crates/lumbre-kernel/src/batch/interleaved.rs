@@ -9,8 +9,8 @@ use bytemuck::Zeroable;
 use super::Sink;
 use crate::intersect::STACK;
 use crate::intersect::box_ray::Slabs;
-use crate::intersect::{self, Lanes, Slots};
-use crate::simd::{self, Vector, WIDE, Wide};
+use crate::intersect::{self, Simd, Slots};
+use crate::simd::{self, F32x16, Vector, WIDE};
 use crate::trace::decide::Decider;
 use crate::trace::stack::Goal;
 use crate::trace::{LaneHits, Outcome, Stop};
@@ -19,7 +19,7 @@ use crate::tree::node::{Node, WIDTH, tag};
 use crate::tree::triangle_block::{Blocks, TriangleBlock};
 
 /// A ray in a slot, in either precision.
-pub(super) trait RaySlot<'a, 'd, L: Lanes>: Sized {
+pub(super) trait RaySlot<'a, 'd, L: Simd>: Sized {
     type Goal: Goal;
     type Ray;
     type Answer;
@@ -64,7 +64,7 @@ pub(super) trait RaySlot<'a, 'd, L: Lanes>: Sized {
     /// Which triangles in the mask it hits, and where.
     fn intersect(&self, mask: u32, pass: &Self::Pass) -> LaneHits<Self::At>;
     /// Whether it hits any of these, which are to be decided exactly.
-    fn hits_any(&self, decider: &Decider, ray: &Self::Ray, block: u32, unclear: u32) -> Outcome<bool>;
+    fn hits_any(&self, decider: &Decider, ray: &Self::Ray, block: u32, uncertain: u32) -> Outcome<bool>;
     /// Takes the closest hit in a block, if it is closer than the best; false where that is uncertain.
     fn take_nearest(
         &mut self,
@@ -94,7 +94,7 @@ pub(super) struct PassedLanes {
     /// Those that the rays may hit.
     pub(super) mask: u32,
     /// Those that are to be decided exactly.
-    pub(super) unclear: u32,
+    pub(super) uncertain: u32,
 }
 
 /// A bit for each in a word.
@@ -196,7 +196,7 @@ impl References {
     }
 
     #[inline(always)]
-    fn stations<W: Wide, const GENERAL: bool>(&self) -> Stations {
+    fn stations<W: F32x16, const GENERAL: bool>(&self) -> Stations {
         /// The last reference of each kind, in the order of signed integers.
         const LAST_NODE: i32 = tag::reference(tag::INNER, tag::PLACE) as i32;
         const LAST_TRIANGLES: i32 = tag::reference(tag::TRIANGLES, tag::PLACE) as i32;
@@ -225,7 +225,7 @@ impl References {
 }
 
 /// All rays in slots, and what one loop hands on to another.
-struct Interleaved<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Lanes> {
+struct Interleaved<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Simd> {
     decider: &'d Decider<'a>,
     nodes: &'a [Node],
     blocks: Blocks<'a>,
@@ -238,14 +238,14 @@ struct Interleaved<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Lanes> {
     /// Which children of its node, or triangles of its block, each may hit.
     masks: [u32; SLOTS],
     /// Where each enters the bounding boxes of the children.
-    enters: [L::Wide; SLOTS],
+    enters: [L::F32x16; SLOTS],
     passes: [R::Passes; SLOTS / 2],
     hits: [LaneHits<R::At>; SLOTS],
     /// Which triangles are to be decided exactly.
-    unclear: [u32; SLOTS],
+    uncertain: [u32; SLOTS],
 }
 
-impl<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Lanes> Interleaved<'a, 'd, 'r, R, L> {
+impl<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Simd> Interleaved<'a, 'd, 'r, R, L> {
     #[inline(always)]
     fn new(decider: &'d Decider<'a>, rays: &'r [R::Ray]) -> Self {
         Self {
@@ -261,10 +261,10 @@ impl<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Lanes> Interleaved<'a, 'd, 'r, R, L> 
             references: References([DONE; SLOTS]),
             parents: References([DONE; SLOTS]),
             masks: [0; SLOTS],
-            enters: [L::Wide::splat(0.0); SLOTS],
+            enters: [L::F32x16::splat(0.0); SLOTS],
             passes: [R::Passes::zeroed(); SLOTS / 2],
             hits: [LaneHits::zeroed(); SLOTS],
-            unclear: [0; SLOTS],
+            uncertain: [0; SLOTS],
         }
     }
 
@@ -339,7 +339,7 @@ impl<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Lanes> Interleaved<'a, 'd, 'r, R, L> 
             let reference = self.references.of(slot);
             let node = &self.nodes[*reference as usize];
             let slabs = simd::opaque(&self.slots[slot].slabs);
-            let (mask, enter) = intersect::meet_boxes::<L::Wide>(node, slabs);
+            let (mask, enter) = intersect::intersect_boxes::<L::F32x16>(node, slabs);
             let stack = &mut self.stacks[slot];
             *reference = R::Goal::push_and_pop::<L>(node, mask, enter, stack);
             too_deep |= bit(stack.len() > STACK - WIDTH, slot);
@@ -356,7 +356,7 @@ impl<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Lanes> Interleaved<'a, 'd, 'r, R, L> 
             let reference = self.references.of(slot);
             let node = &nodes[*reference as usize];
             let slabs = simd::opaque(&self.slots[slot].slabs);
-            let (mask, enter) = intersect::meet_boxes::<L::Wide>(node, slabs);
+            let (mask, enter) = intersect::intersect_boxes::<L::F32x16>(node, slabs);
             self.masks[slot] = mask;
             *self.parents.of(slot) = *reference;
             self.enters[at % SLOTS] = enter;
@@ -387,40 +387,40 @@ impl<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Lanes> Interleaved<'a, 'd, 'r, R, L> 
             let rays = [&self.slots[first].ray, &self.slots[second].ray];
             let (both, passes) = R::pass_by_two(self.decider, rays, [one, other]);
             self.passes[at % (SLOTS / 2)] = passes;
-            let halves = |mask: u32| (mask & L::Eight::ALL, mask >> BLOCK);
+            let halves = |mask: u32| (mask & L::F32x8::ALL, mask >> BLOCK);
             let of_both = |(of_first, of_second)| bit(of_first != 0, first) | bit(of_second != 0, second);
             (self.masks[first], self.masks[second]) = halves(both.mask);
-            (self.unclear[first], self.unclear[second]) = halves(both.unclear);
-            passing |= of_both(halves(both.mask | both.unclear));
+            (self.uncertain[first], self.uncertain[second]) = halves(both.uncertain);
+            passing |= of_both(halves(both.mask | both.uncertain));
             last |= bit(one.is_last(), first) | bit(other.is_last(), second);
         }
-        let (mut met, mut unclear) = (0, 0);
+        let (mut met, mut undecided) = (0, 0);
         for slot in Bits(passing) {
             let rank = rank(at_leaves, slot);
             let pass = R::one_of(&self.passes[rank / 2], rank % 2);
             let mut hits = self.slots[slot].ray.intersect(self.masks[slot], &pass);
             met |= bit(hits.met != 0, slot);
-            hits.unclear |= self.unclear[slot];
-            unclear |= bit(hits.unclear != 0, slot);
+            hits.uncertain |= self.uncertain[slot];
+            undecided |= bit(hits.uncertain != 0, slot);
             if R::Goal::IS_ANY {
-                self.unclear[slot] = hits.unclear;
+                self.uncertain[slot] = hits.uncertain;
             } else {
                 self.hits[rank] = hits;
             }
         }
         let mut uncertain = 0;
         if R::Goal::IS_ANY {
-            for slot in Bits(unclear & !met) {
+            for slot in Bits(undecided & !met) {
                 let place = *self.references.of(slot) & tag::PLACE;
                 let (own, ray) = (&self.slots[slot], self.ray(slot));
-                match own.ray.hits_any(self.decider, ray, place, self.unclear[slot]) {
+                match own.ray.hits_any(self.decider, ray, place, self.uncertain[slot]) {
                     Outcome::Certain(is_hit) => met |= bit(is_hit, slot),
                     Outcome::Uncertain => uncertain |= bit(true, slot),
                 }
             }
             self.stop_at_hits(met);
         } else {
-            for slot in Bits(met | unclear) {
+            for slot in Bits(met | undecided) {
                 let place = *self.references.of(slot) & tag::PLACE;
                 let ray = self.ray(slot);
                 let own = &mut self.slots[slot];
@@ -506,9 +506,9 @@ impl<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Lanes> Interleaved<'a, 'd, 'r, R, L> 
     #[inline(always)]
     fn stations(&self) -> Stations {
         if R::GENERAL {
-            self.references.stations::<L::Wide, true>()
+            self.references.stations::<L::F32x16, true>()
         } else {
-            self.references.stations::<L::Wide, false>()
+            self.references.stations::<L::F32x16, false>()
         }
     }
 
@@ -528,7 +528,7 @@ impl<'a, 'd, 'r, R: RaySlot<'a, 'd, L>, L: Lanes> Interleaved<'a, 'd, 'r, R, L> 
 
 /// Traverses the tree with those of the rays that have these positions; with `prefetches`, a ray prefetches what it reads next.
 #[inline(always)]
-pub(super) fn traverse<'a, 'd, R: RaySlot<'a, 'd, L>, L: Lanes>(
+pub(super) fn traverse<'a, 'd, R: RaySlot<'a, 'd, L>, L: Simd>(
     decider: &'d Decider<'a>,
     prefetches: bool,
     rays: &[R::Ray],
@@ -568,7 +568,7 @@ pub(super) fn traverse<'a, 'd, R: RaySlot<'a, 'd, L>, L: Lanes>(
 
 /// Starts rays that wait in free slots: the slots that were taken.
 #[inline(always)]
-fn start_others<'a, 'd, R: RaySlot<'a, 'd, L>, L: Lanes>(
+fn start_others<'a, 'd, R: RaySlot<'a, 'd, L>, L: Simd>(
     all: &mut Interleaved<'a, 'd, '_, R, L>,
     mut free: u64,
     waiting: &mut std::slice::Iter<usize>,

@@ -23,8 +23,8 @@ use self::f64_packet::F64Bundle;
 use self::f64_slot::F64Slot;
 use self::interleaved::RaySlot;
 use self::packet::{Bundle, PACKET, Packet};
-use crate::intersect::single_start::SingleStart;
-use crate::intersect::{Lanes, Level, Task};
+use crate::intersect::filter_start::FilterStart;
+use crate::intersect::{Dispatch, Isa, Simd};
 use crate::simd;
 use crate::trace::decide::Decider;
 use crate::trace::f32_ray::{self, F32Queries};
@@ -49,26 +49,26 @@ const AHEAD: usize = 3;
 const WIDENED: usize = 1024;
 
 /// [`Accel::closest`] for every ray.
-pub(crate) fn closest(level: Level, accel: &Accel, rays: &[Ray], hits: &mut [Option<Hit>]) {
-    let sink = &mut ClosestSink { accel, level, rays, hits };
-    if !batch_f64::<ClosestHit, _>(level, accel, rays, sink, Plan::of(accel)) {
-        let closest = accel.queries_at(level).closest;
+pub(crate) fn closest(isa: Isa, accel: &Accel, rays: &[Ray], hits: &mut [Option<Hit>]) {
+    let sink = &mut ClosestSink { accel, isa, rays, hits };
+    if !batch_f64::<ClosestHit, _>(isa, accel, rays, sink, Plan::of(accel)) {
+        let closest = accel.queries_at(isa).closest;
         hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = closest.ask(accel, ray));
     }
 }
 
 /// [`Accel::any`] for every ray.
-pub(crate) fn any(level: Level, accel: &Accel, rays: &[Ray], hits: &mut [bool]) {
-    let sink = &mut AnySink { accel, level, rays, hits };
-    if !batch_f64::<AnyHit, _>(level, accel, rays, sink, Plan::of(accel)) {
-        let any = accel.queries_at(level).any;
+pub(crate) fn any(isa: Isa, accel: &Accel, rays: &[Ray], hits: &mut [bool]) {
+    let sink = &mut AnySink { accel, isa, rays, hits };
+    if !batch_f64::<AnyHit, _>(isa, accel, rays, sink, Plan::of(accel)) {
+        let any = accel.queries_at(isa).any;
         hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = any.ask(accel, ray));
     }
 }
 
 /// [`Accel::closest_f32`] for every ray.
-pub(crate) fn closest_f32(level: Level, accel: &Accel, rays: &[Ray32], hits: &mut [Option<Hit32>]) {
-    match accel.f32_queries_at(level) {
+pub(crate) fn closest_f32(isa: Isa, accel: &Accel, rays: &[Ray32], hits: &mut [Option<Hit32>]) {
+    match accel.f32_queries_at(isa) {
         None => {
             let mut widened = Vec::with_capacity(rays.len().min(WIDENED));
             let mut found = vec![None; rays.len().min(WIDENED)];
@@ -76,7 +76,7 @@ pub(crate) fn closest_f32(level: Level, accel: &Accel, rays: &[Ray32], hits: &mu
                 widened.clear();
                 widened.extend(rays.iter().map(|ray| ray.to_f64()));
                 let found = &mut found[..rays.len()];
-                closest(level, accel, &widened, found);
+                closest(isa, accel, &widened, found);
                 for (hit, found) in hits.iter_mut().zip(found) {
                     *hit = found.as_ref().map(f32_ray::rounded);
                 }
@@ -84,7 +84,7 @@ pub(crate) fn closest_f32(level: Level, accel: &Accel, rays: &[Ray32], hits: &mu
         }
         Some(queries) => {
             let sink = &mut F32ClosestSink { accel, queries, rays, hits };
-            if !batch_f32::<ClosestHit, _>(level, accel, rays, sink, Plan::of(accel)) {
+            if !batch_f32::<ClosestHit, _>(isa, accel, rays, sink, Plan::of(accel)) {
                 hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = queries.closest.ask(accel, ray));
             }
         }
@@ -92,19 +92,19 @@ pub(crate) fn closest_f32(level: Level, accel: &Accel, rays: &[Ray32], hits: &mu
 }
 
 /// [`Accel::any_f32`] for every ray.
-pub(crate) fn any_f32(level: Level, accel: &Accel, rays: &[Ray32], hits: &mut [bool]) {
-    match accel.f32_queries_at(level) {
+pub(crate) fn any_f32(isa: Isa, accel: &Accel, rays: &[Ray32], hits: &mut [bool]) {
+    match accel.f32_queries_at(isa) {
         None => {
             let mut widened = Vec::with_capacity(rays.len().min(WIDENED));
             for (rays, hits) in rays.chunks(WIDENED).zip(hits.chunks_mut(WIDENED)) {
                 widened.clear();
                 widened.extend(rays.iter().map(|ray| ray.to_f64()));
-                any(level, accel, &widened, hits);
+                any(isa, accel, &widened, hits);
             }
         }
         Some(queries) => {
             let sink = &mut F32AnySink { accel, queries, rays, hits };
-            if !batch_f32::<AnyHit, _>(level, accel, rays, sink, Plan::of(accel)) {
+            if !batch_f32::<AnyHit, _>(isa, accel, rays, sink, Plan::of(accel)) {
                 hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = queries.any.ask(accel, ray));
             }
         }
@@ -112,38 +112,38 @@ pub(crate) fn any_f32(level: Level, accel: &Accel, rays: &[Ray32], hits: &mut [b
 }
 
 /// Whether a tree is traversed by batches: one of triangles, among others, on a machine with vectors.
-fn batched(level: Level, accel: &Accel) -> Option<&SingleStart> {
+fn batched(isa: Isa, accel: &Accel) -> Option<&FilterStart> {
     let has_triangles = !accel.tree.blocks.is_empty();
-    accel.single.as_ref().filter(|_| has_triangles && level.has_vectors())
+    accel.single.as_ref().filter(|_| has_triangles && isa.has_vectors())
 }
 
 /// False where the tree is not traversed by batches.
 fn batch_f64<G: FilteredGoal, S: Sink<G::Found>>(
-    level: Level,
+    isa: Isa,
     accel: &Accel,
     rays: &[Ray],
     sink: &mut S,
     plan: Plan,
 ) -> bool {
-    let Some(start) = batched(level, accel) else { return false };
+    let Some(start) = batched(isa, accel) else { return false };
     if start.only_triangles {
-        level.run_with_vectors(Batch::<F64<G, false>, S> { accel, start, rays, sink, plan });
+        isa.run_with_vectors(Batch::<F64<G, false>, S> { accel, start, rays, sink, plan });
     } else {
-        level.run_with_vectors(Batch::<F64<G, true>, S> { accel, start, rays, sink, plan });
+        isa.run_with_vectors(Batch::<F64<G, true>, S> { accel, start, rays, sink, plan });
     }
     true
 }
 
 /// The same in a tree of triangles.
 fn batch_f32<G: Goal, S: Sink<Option<Hit32>>>(
-    level: Level,
+    isa: Isa,
     accel: &Accel,
     rays: &[Ray32],
     sink: &mut S,
     plan: Plan,
 ) -> bool {
-    let Some(start) = batched(level, accel) else { return false };
-    level.run_with_vectors(Batch::<F32<G>, S> { accel, start, rays, sink, plan });
+    let Some(start) = batched(isa, accel) else { return false };
+    isa.run_with_vectors(Batch::<F32<G>, S> { accel, start, rays, sink, plan });
     true
 }
 
@@ -168,7 +168,7 @@ pub(crate) trait Sink<A> {
 /// See [`closest`].
 struct ClosestSink<'a> {
     accel: &'a Accel,
-    level: Level,
+    isa: Isa,
     rays: &'a [Ray],
     hits: &'a mut [Option<Hit>],
 }
@@ -185,7 +185,7 @@ impl Sink<Found> for ClosestSink<'_> {
                 winner.put(self.accel, slot)
             }
             Outcome::Certain(found) => *slot = found.into_hit(self.accel, ContextRef::OUTSIDE),
-            Outcome::Uncertain => *slot = exact::closest(self.level, self.accel, &self.rays[position], None),
+            Outcome::Uncertain => *slot = exact::closest(self.isa, self.accel, &self.rays[position], None),
         }
     }
 
@@ -198,7 +198,7 @@ impl Sink<Found> for ClosestSink<'_> {
 /// See [`any`].
 struct AnySink<'a> {
     accel: &'a Accel,
-    level: Level,
+    isa: Isa,
     rays: &'a [Ray],
     hits: &'a mut [bool],
 }
@@ -210,7 +210,7 @@ impl Sink<bool> for AnySink<'_> {
         shims::count(&outcome);
         self.hits[position] = match outcome {
             Outcome::Certain(is_hit) => is_hit,
-            Outcome::Uncertain => exact::any(self.level, self.accel, &self.rays[position], None),
+            Outcome::Uncertain => exact::any(self.isa, self.accel, &self.rays[position], None),
         };
     }
 }
@@ -296,14 +296,14 @@ trait Precision {
     type Bundle<'a, 'd>: Bundle<'a, 'd, Ray = Self::Ray, Answer = Self::Answer>
     where
         'a: 'd;
-    type Slot<'a, 'd, L: Lanes>: RaySlot<'a, 'd, L, Ray = Self::Ray, Answer = Self::Answer>
+    type Slot<'a, 'd, L: Simd>: RaySlot<'a, 'd, L, Ray = Self::Ray, Answer = Self::Answer>
     where
         'a: 'd;
     /// Whether the rays of packets are prefetched.
     const PREFETCHES_RAYS: bool;
 
     /// Traverses the tree with one ray.
-    fn traverse_alone<L: Lanes>(decider: &Decider, ray: &Self::Ray) -> Outcome<Self::Answer>;
+    fn traverse_alone<L: Simd>(decider: &Decider, ray: &Self::Ray) -> Outcome<Self::Answer>;
 }
 
 /// Double precision; `GENERAL` in trees of anything among triangles.
@@ -317,7 +317,7 @@ impl<G: FilteredGoal, const GENERAL: bool> Precision for F64<G, GENERAL> {
         = F64Bundle<'a, 'd, G, GENERAL>
     where
         'a: 'd;
-    type Slot<'a, 'd, L: Lanes>
+    type Slot<'a, 'd, L: Simd>
         = F64Slot<'a, 'd, G, GENERAL>
     where
         'a: 'd;
@@ -325,7 +325,7 @@ impl<G: FilteredGoal, const GENERAL: bool> Precision for F64<G, GENERAL> {
     const PREFETCHES_RAYS: bool = !G::IS_ANY;
 
     #[inline(always)]
-    fn traverse_alone<L: Lanes>(decider: &Decider, ray: &Ray) -> Outcome<G::Found> {
+    fn traverse_alone<L: Simd>(decider: &Decider, ray: &Ray) -> Outcome<G::Found> {
         Traversal::<G, GENERAL, false>::whole(decider.accel(), decider.start, ray).run::<L>()
     }
 }
@@ -341,14 +341,14 @@ impl<G: Goal> Precision for F32<G> {
         = F32Bundle<'a, 'd, G>
     where
         'a: 'd;
-    type Slot<'a, 'd, L: Lanes>
+    type Slot<'a, 'd, L: Simd>
         = F32Slot<'a, 'd, G>
     where
         'a: 'd;
     const PREFETCHES_RAYS: bool = true;
 
     #[inline(always)]
-    fn traverse_alone<L: Lanes>(decider: &Decider, ray: &Ray32) -> Outcome<Option<Hit32>> {
+    fn traverse_alone<L: Simd>(decider: &Decider, ray: &Ray32) -> Outcome<Option<Hit32>> {
         f32_ray::traverse::<G, L>(decider, ray)
     }
 }
@@ -404,17 +404,17 @@ impl<'r, R> RaysAhead<'r, R> {
 /// Rays through a tree: packets first, and the others interleaved, or one after another where they are few.
 struct Batch<'a, 'r, P: Precision, S> {
     accel: &'a Accel,
-    start: &'a SingleStart,
+    start: &'a FilterStart,
     rays: &'r [P::Ray],
     sink: &'r mut S,
     plan: Plan,
 }
 
-impl<P: Precision, S: Sink<P::Answer>> Task for Batch<'_, '_, P, S> {
+impl<P: Precision, S: Sink<P::Answer>> Dispatch for Batch<'_, '_, P, S> {
     type Output = ();
 
     #[inline(always)]
-    fn run<L: Lanes>(self) {
+    fn run<L: Simd>(self) {
         let Self { accel, start, rays, sink, plan } = self;
         let decider = &Decider::new(accel, start);
         let mut packet = Packet::<P::Bundle<'_, '_>>::new(decider);

@@ -28,8 +28,8 @@ use super::Sink;
 use crate::intersect::box_ray::{END_FACTOR, LITTLE, START_FACTOR};
 use crate::intersect::box_ray::{Frustum, SlabRows};
 use crate::intersect::watertight::TINY;
-use crate::intersect::{self, Axes, CornersRoom, Lanes, Sides};
-use crate::simd::{self, Eight, Vector, WIDE, Wide};
+use crate::intersect::{self, Axes, CornersRoom, Sides, Simd};
+use crate::simd::{self, F32x8, F32x16, Vector, WIDE};
 use crate::trace::Stop;
 use crate::trace::decide::Decider;
 use crate::trace::stack::{Goal, Stack};
@@ -85,19 +85,19 @@ pub(super) trait Bundle<'a, 'd>: Sized {
     fn effort(has_one_origin: bool) -> Effort;
 
     /// Takes the rays in.
-    fn load<L: Lanes>(&mut self, rays: &[Self::Ray; PACKET]);
+    fn load<L: Simd>(&mut self, rays: &[Self::Ray; PACKET]);
 
     /// Which rays go the way of one, with its signs and its largest axis; and these.
-    fn alike<L: Lanes>(&self, one: u32) -> (u32, Signs);
+    fn alike<L: Simd>(&self, one: u32) -> (u32, Signs);
 
     /// Makes those that are not in the mask like one that is.
-    fn fill_up<L: Lanes>(&mut self, mask: u32);
+    fn fill_up<L: Simd>(&mut self, mask: u32);
 
     /// Starts among bounding boxes; `None` where one of the rays is not sound, or starts too far away for single precision.
-    fn start<L: Lanes>(&mut self, decider: &Decider, slabs: &mut SlabRows) -> Option<Start<L::Wide>>;
+    fn start<L: Simd>(&mut self, decider: &Decider, slabs: &mut SlabRows) -> Option<Start<L::F32x16>>;
 
     /// Starts among triangles.
-    fn start_triangles<L: Lanes>(
+    fn start_triangles<L: Simd>(
         &mut self,
         decider: &Decider,
         axes: &'static Axes,
@@ -106,7 +106,7 @@ pub(super) trait Bundle<'a, 'd>: Sized {
     );
 
     /// Tests a triangle against the rays.
-    fn test_triangle<L: Lanes>(
+    fn test_triangle<L: Simd>(
         &mut self,
         state: &mut State,
         cull: &Cull,
@@ -118,14 +118,14 @@ pub(super) trait Bundle<'a, 'd>: Sized {
 
     /// Tests what has no bounds, ray by ray.
     #[inline(always)]
-    fn test_infinite<L: Lanes>(&mut self, _state: &mut State, _rays: &[Self::Ray; PACKET]) {}
+    fn test_infinite<L: Simd>(&mut self, _state: &mut State, _rays: &[Self::Ray; PACKET]) {}
 
     /// Tests a leaf of anything but triangles, ray by ray.
     #[inline(always)]
-    fn test_leaf<L: Lanes>(&mut self, _state: &mut State, _leaf: u32, _rays: &[Self::Ray; PACKET]) {}
+    fn test_leaf<L: Simd>(&mut self, _state: &mut State, _leaf: u32, _rays: &[Self::Ray; PACKET]) {}
 
     /// Hands out the answers of the rays in `state.chosen`.
-    fn put<L: Lanes>(
+    fn put<L: Simd>(
         &mut self,
         decider: &Decider,
         state: &State,
@@ -182,18 +182,18 @@ pub(super) struct Start<W> {
 /// The children of a node whose boxes rays that are alive may hit, where they enter each at the earliest, and the work in nodes. With
 /// rows for `each` ray, only children that one of them hits, and, if `is_ordered`, where the first of them does.
 #[inline(always)]
-fn test_children<W: Wide>(
+fn test_children<W: F32x16>(
     node: &Node,
     frustum: &Frustum,
     each: Option<&SlabRows>,
     alive: u32,
     is_ordered: bool,
 ) -> (u32, W, u32) {
-    let (mask, enters) = intersect::meet_frustum::<W>(node, frustum);
+    let (mask, enters) = intersect::intersect_frustum::<W>(node, frustum);
     let Some(each) = each else { return (mask, enters, 1) };
     let work = 1 + mask.count_ones() / CHILDREN_AS_A_NODE;
     let (mask, enters) =
-        intersect::meet_each::<W>(node, each, frustum.sides, (mask, enters), alive, is_ordered);
+        intersect::intersect_each::<W>(node, each, frustum.sides, (mask, enters), alive, is_ordered);
     (mask, enters, work)
 }
 
@@ -220,7 +220,7 @@ pub(super) struct CullBounds {
 impl Cull {
     /// Which triangles of a block are left; lanes without one mean nothing.
     #[inline(always)]
-    fn bounds<E: Eight>(&self, corners: &Corners, needs_bounds: bool) -> CullBounds {
+    fn bounds<E: F32x8>(&self, corners: &Corners, needs_bounds: bool) -> CullBounds {
         let own = simd::opaque(self);
         let [kx, ky, kz] = own.axes.order();
         let [ox, oy, oz] = own.middle.map(E::splat);
@@ -361,7 +361,7 @@ impl<'a, 'd, B: Bundle<'a, 'd>> Packet<'a, 'd, B> {
 
     /// Traverses the tree with rays, the first of which has this position. Those with other signs than the first go together, too.
     #[inline(always)]
-    pub(super) fn traverse<L: Lanes>(
+    pub(super) fn traverse<L: Simd>(
         &mut self,
         rays: &[B::Ray; PACKET],
         first: usize,
@@ -396,7 +396,7 @@ impl<'a, 'd, B: Bundle<'a, 'd>> Packet<'a, 'd, B> {
 
     /// Starts among boxes with those that are chosen; false where they are few or too far apart, or single precision cannot tell.
     #[inline(always)]
-    fn start<L: Lanes>(&mut self, Signs { signs, axes }: Signs) -> bool {
+    fn start<L: Simd>(&mut self, Signs { signs, axes }: Signs) -> bool {
         let Self { decider, state, cull, bundle, has_one_origin } = self;
         if state.chosen.count_ones() < LEAST {
             return false;
@@ -405,14 +405,14 @@ impl<'a, 'd, B: Bundle<'a, 'd>> Packet<'a, 'd, B> {
             bundle.fill_up::<L>(state.chosen);
         }
         let Some(start) = bundle.start::<L>(decider, &mut state.slabs) else { return false };
-        let (splat, [t_min, t_max]) = (L::Wide::splat, start.range);
+        let (splat, [t_min, t_max]) = (L::F32x16::splat, start.range);
         let s_max = t_max.times_plus(splat(END_FACTOR), splat(LITTLE as f32));
-        L::Wide::select(state.chosen, s_max, splat(-1.0)).store(&mut state.slabs.s_max);
+        L::F32x16::select(state.chosen, s_max, splat(-1.0)).store(&mut state.slabs.s_max);
         (t_min * splat(START_FACTOR)).store(&mut state.slabs.s_min);
         let [x, y, z] = start.inverse;
         let zero = splat(0.0);
         let minus_s_min = t_min * splat(-START_FACTOR);
-        let most = L::Wide::most_of_eight([x, y, z, s_max, zero - x, zero - y, zero - z, minus_s_min]);
+        let most = L::F32x16::most_of_eight([x, y, z, s_max, zero - x, zero - y, zero - z, minus_s_min]);
         let mut is_near = true;
         for axis in 0..3 {
             let (most_inverse, minus_least, off) = (most[axis], most[4 + axis], start.off[axis]);
@@ -433,7 +433,7 @@ impl<'a, 'd, B: Bundle<'a, 'd>> Packet<'a, 'd, B> {
 
     /// Traverses the tree; false where it gave up.
     #[inline(always)]
-    fn run<L: Lanes>(&mut self, most_work: u32, rays: &[B::Ray; PACKET]) -> bool {
+    fn run<L: Simd>(&mut self, most_work: u32, rays: &[B::Ray; PACKET]) -> bool {
         let nodes = self.decider.nodes();
         let mut stack: Stack<<B::Goal as Goal>::Entry> = Stack::new();
         let mut reference = self.decider.start.root;
@@ -452,7 +452,7 @@ impl<'a, 'd, B: Bundle<'a, 'd>> Packet<'a, 'd, B> {
                 let each = if self.has_one_origin { None } else { Some(simd::opaque(&state.slabs)) };
                 let frustum = simd::opaque(&state.frustum);
                 let (mask, keys, work) =
-                    test_children::<L::Wide>(node, frustum, each, state.alive, !B::Goal::IS_ANY);
+                    test_children::<L::F32x16>(node, frustum, each, state.alive, !B::Goal::IS_ANY);
                 state.work += work;
                 if mask & mask.wrapping_sub(1) != 0 {
                     reference = stack.put(
@@ -492,7 +492,7 @@ impl<'a, 'd, B: Bundle<'a, 'd>> Packet<'a, 'd, B> {
 
     /// Starts among triangles; false where directions are too far apart.
     #[inline(always)]
-    fn start_triangles<L: Lanes>(&mut self) -> bool {
+    fn start_triangles<L: Simd>(&mut self) -> bool {
         let Self { decider, state, cull, bundle, .. } = self;
         bundle.start_triangles::<L>(decider, cull.axes, &state.slabs, cull);
         state.is_among_triangles = true;
@@ -501,14 +501,14 @@ impl<'a, 'd, B: Bundle<'a, 'd>> Packet<'a, 'd, B> {
 
     /// Tests a leaf of triangles.
     #[inline(always)]
-    fn test_triangles<L: Lanes>(&mut self, leaf: u32, rays: &[B::Ray; PACKET]) {
+    fn test_triangles<L: Simd>(&mut self, leaf: u32, rays: &[B::Ray; PACKET]) {
         let mut following = Some(leaf & tag::PLACE);
         let mut room = CornersRoom::new();
         while let Some(place) = following {
             let block = self.decider.block(place);
             following = block.next(place);
             let corners = L::corners(block, &mut room);
-            let bounds = self.cull.bounds::<L::Eight>(corners, B::NEEDS_BOUNDS);
+            let bounds = self.cull.bounds::<L::F32x8>(corners, B::NEEDS_BOUNDS);
             let mut rest = bounds.mask & block.taken();
             self.state.work += 2 + 2 * rest.count_ones();
             while rest != 0 {

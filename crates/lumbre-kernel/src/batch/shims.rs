@@ -8,7 +8,7 @@ use super::packet::{PACKET, Packet};
 use super::{
     AnySink, ClosestSink, F32AnySink, F32ClosestSink, F64Bundle, Plan, Sink, batch_f32, batch_f64, batched,
 };
-use crate::intersect::{Lanes, Level, Task};
+use crate::intersect::{Dispatch, Isa, Simd};
 use crate::trace::Outcome;
 use crate::trace::decide::Decider;
 use crate::trace::filtered::Found;
@@ -30,16 +30,10 @@ pub(super) fn count<A>(outcome: &Outcome<A>) {
 }
 
 /// Closest hits by a plan, each answered once; how many the exact traversal had to find.
-pub(crate) fn closest(
-    level: Level,
-    accel: &Accel,
-    rays: &[Ray],
-    hits: &mut [Option<Hit>],
-    plan: Plan,
-) -> usize {
+pub(crate) fn closest(isa: Isa, accel: &Accel, rays: &[Ray], hits: &mut [Option<Hit>], plan: Plan) -> usize {
     ANSWERED.set([0; 2]);
-    if !batch_f64::<ClosestHit, _>(level, accel, rays, &mut ClosestSink { accel, level, rays, hits }, plan) {
-        super::closest(level, accel, rays, hits);
+    if !batch_f64::<ClosestHit, _>(isa, accel, rays, &mut ClosestSink { accel, isa, rays, hits }, plan) {
+        super::closest(isa, accel, rays, hits);
         return 0;
     }
     let [all, exactly] = ANSWERED.get();
@@ -48,10 +42,10 @@ pub(crate) fn closest(
 }
 
 /// The same of any hits.
-pub(crate) fn any(level: Level, accel: &Accel, rays: &[Ray], hits: &mut [bool], plan: Plan) -> usize {
+pub(crate) fn any(isa: Isa, accel: &Accel, rays: &[Ray], hits: &mut [bool], plan: Plan) -> usize {
     ANSWERED.set([0; 2]);
-    if !batch_f64::<AnyHit, _>(level, accel, rays, &mut AnySink { accel, level, rays, hits }, plan) {
-        super::any(level, accel, rays, hits);
+    if !batch_f64::<AnyHit, _>(isa, accel, rays, &mut AnySink { accel, isa, rays, hits }, plan) {
+        super::any(isa, accel, rays, hits);
         return 0;
     }
     let [all, exactly] = ANSWERED.get();
@@ -60,46 +54,40 @@ pub(crate) fn any(level: Level, accel: &Accel, rays: &[Ray], hits: &mut [bool], 
 }
 
 /// Closest and any hits in single precision by a plan that interleaves rays soon.
-pub(crate) fn f32(
-    level: Level,
-    accel: &Accel,
-    rays: &[Ray32],
-    hits: &mut [Option<Hit32>],
-    are_hit: &mut [bool],
-) {
+pub(crate) fn f32(isa: Isa, accel: &Accel, rays: &[Ray32], hits: &mut [Option<Hit32>], are_hit: &mut [bool]) {
     let plan = Plan::MIDDLE;
-    let Some(queries) = accel.f32_queries_at(level).filter(|_| batched(level, accel).is_some()) else {
-        super::closest_f32(level, accel, rays, hits);
-        super::any_f32(level, accel, rays, are_hit);
+    let Some(queries) = accel.f32_queries_at(isa).filter(|_| batched(isa, accel).is_some()) else {
+        super::closest_f32(isa, accel, rays, hits);
+        super::any_f32(isa, accel, rays, are_hit);
         return;
     };
-    batch_f32::<ClosestHit, _>(level, accel, rays, &mut F32ClosestSink { accel, queries, rays, hits }, plan);
-    batch_f32::<AnyHit, _>(level, accel, rays, &mut F32AnySink { accel, queries, rays, hits: are_hit }, plan);
+    batch_f32::<ClosestHit, _>(isa, accel, rays, &mut F32ClosestSink { accel, queries, rays, hits }, plan);
+    batch_f32::<AnyHit, _>(isa, accel, rays, &mut F32AnySink { accel, queries, rays, hits: are_hit }, plan);
 }
 
 /// Those of some rays that a packet answers; none without vectors.
-pub(crate) fn answered_by_packet(level: Level, accel: &Accel, rays: &[Ray; PACKET]) -> u32 {
+pub(crate) fn answered_by_packet(isa: Isa, accel: &Accel, rays: &[Ray; PACKET]) -> u32 {
     struct Traversing<'a, const GENERAL: bool>(Decider<'a>, &'a [Ray; PACKET]);
     struct Nowhere;
     impl Sink<Found> for Nowhere {
         fn put(&mut self, _: usize, _: Outcome<Found>) {}
     }
-    impl<const GENERAL: bool> Task for Traversing<'_, GENERAL> {
+    impl<const GENERAL: bool> Dispatch for Traversing<'_, GENERAL> {
         type Output = u32;
         #[inline(always)]
-        fn run<L: Lanes>(self) -> u32 {
+        fn run<L: Simd>(self) -> u32 {
             let mut packet = Packet::<F64Bundle<ClosestHit, GENERAL>>::new(&self.0);
             packet.traverse::<L>(self.1, 0, &mut Nowhere).answered
         }
     }
-    if !level.has_vectors() {
+    if !isa.has_vectors() {
         return 0;
     }
     let start = accel.single.as_ref().expect("single precision traverses it");
     let decider = Decider::new(accel, start);
     if start.only_triangles {
-        level.run_with_vectors(Traversing::<false>(decider, rays))
+        isa.run_with_vectors(Traversing::<false>(decider, rays))
     } else {
-        level.run_with_vectors(Traversing::<true>(decider, rays))
+        isa.run_with_vectors(Traversing::<true>(decider, rays))
     }
 }

@@ -19,7 +19,7 @@ use crate::build::reinsert::reinsert;
 use crate::build::sah::{BestSplit, Binning, Bins, Centers, Fill, FindCenters, Part, Split};
 use crate::build::small::{Decide, FEW, Few, group_of};
 use crate::build::treelet;
-use crate::intersect::Level;
+use crate::intersect::Isa;
 use crate::tree::Name;
 
 /// Levels that may be split by SAH; then come at most 32 more, each halving.
@@ -157,7 +157,7 @@ pub(crate) struct Grown<'p> {
 /// where there are many of them the other half is given back. Of others, there are more nodes than primitives as a rule: these
 /// are given back here, before the tree is laid out, but for instances.
 pub(crate) fn binary_tree<'p>(
-    level: Level,
+    isa: Isa,
     preset: Preset,
     mut others: Vec<Primitive>,
     packed: &'p mut Boxes,
@@ -168,7 +168,7 @@ pub(crate) fn binary_tree<'p>(
     let shared = if shared > 1 { shared + 1 } else { 0 };
     let all = others.len() + packed.len();
     let alone = if all <= PARALLEL { PARALLEL } else { (all / 8).clamp(LEAST_ALONE, PARALLEL) };
-    let builder = &Builder { level, traits, shared, alone };
+    let builder = &Builder { isa, traits, shared, alone };
     let counts = sort_by_rank(&mut others, traits);
     let first_packed = others.len();
     let mut names: Vec<Name> = vec![[0; 2]; first_packed];
@@ -349,7 +349,7 @@ impl<'a> Range<'a> {
 }
 
 struct Builder<'a> {
-    level: Level,
+    isa: Isa,
     traits: &'a [Traits],
     /// Levels of the tree whose nodes threads share. What comes out does not depend on it.
     shared: u32,
@@ -519,7 +519,7 @@ impl Builder<'_> {
             let (left, right) = primitives.split_at_mut(middle);
             return ([left, right], [None; 2]);
         };
-        part(self.level, primitives, &split, depth < self.shared);
+        part(self.isa, primitives, &split, depth < self.shared);
         let (left, right) = primitives.split_at_mut(split.left);
         let binnings = [split.next(0, left.len()), split.next(1, right.len())];
         ([left, right], binnings.map(Some))
@@ -621,7 +621,7 @@ impl Builder<'_> {
         depth: u32,
     ) -> Option<Split> {
         self.fill::<COSTS>(primitives, binning, bins, depth);
-        self.level.run(BestSplit::<COSTS> { bins, binning })
+        self.isa.run(BestSplit::<COSTS> { bins, binning })
     }
 
     /// The split of a node; `None` where it is to be split by order.
@@ -661,7 +661,7 @@ impl Builder<'_> {
 
     fn centers(&self, primitives: &[Primitive]) -> Centers {
         if primitives.len() <= CHUNK {
-            return self.level.run(FindCenters { primitives });
+            return self.isa.run(FindCenters { primitives });
         }
         let (left, right) = primitives.split_at(primitives.len() / 2);
         let (mut centers, others) = rayon::join(|| self.centers(left), || self.centers(right));
@@ -678,7 +678,7 @@ impl Builder<'_> {
     ) {
         if depth >= self.shared || primitives.len() <= CHUNK {
             let traits = self.traits;
-            self.level.run(Fill::<COSTS> { primitives, binning, bins, traits });
+            self.isa.run(Fill::<COSTS> { primitives, binning, bins, traits });
             return;
         }
         let (left, right) = primitives.split_at(primitives.len() / 2);
@@ -702,7 +702,7 @@ impl Builder<'_> {
         let ([left, right], splits) = match &split {
             Some(split) => {
                 let (left, right) = range.there.split_at_mut(split.left);
-                self.level.run(Part { primitives: &*range.here, split, sides: [left, right] });
+                self.isa.run(Part { primitives: &*range.here, split, sides: [left, right] });
                 let cut = range.moved(split.left);
                 let splits = [0, 1].map(|side| {
                     let primitives = &*cut[side].here;
@@ -729,7 +729,7 @@ impl Builder<'_> {
     fn few<const COSTS: bool>(&self, range: Range, work: &mut Tools) -> Bounds {
         let traits = self.traits;
         let place = work.nodes.len();
-        match self.level.run(Decide::<COSTS> { primitives: range.here, traits }) {
+        match self.isa.run(Decide::<COSTS> { primitives: range.here, traits }) {
             Few::Leaf => {
                 let mut bounds = Bounds::EMPTY;
                 for (name, primitive) in range.names.iter_mut().zip(&*range.here) {

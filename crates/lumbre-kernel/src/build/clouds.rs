@@ -5,7 +5,7 @@ use lumbre_math::DVec3;
 use rayon::prelude::*;
 
 use crate::build::primitive::{Bounds, Primitive};
-use crate::tree::node::Units;
+use crate::tree::node::TreeSpace;
 use crate::tree::sphere_block::{ExactSphere, has_radius};
 use crate::{BuildError, SphereCloud};
 
@@ -81,7 +81,12 @@ impl CloudSurvey {
     }
 
     /// Writes down the boxes of the spheres that have a radius.
-    pub(crate) fn put_boxes(&self, cloud: &SphereCloud, units: &Units, mut places: &mut [Primitive]) {
+    pub(crate) fn put_boxes(
+        &self,
+        cloud: &SphereCloud,
+        tree_space: &TreeSpace,
+        mut places: &mut [Primitive],
+    ) {
         let chunks: Vec<(usize, &mut [Primitive])> = self
             .chunks
             .iter()
@@ -96,7 +101,7 @@ impl CloudSurvey {
             let there = spheres.filter(|(_, sphere)| has_radius(sphere));
             for (place, (i, _)) in places.iter_mut().zip(there) {
                 let primitive = (first + i) as u32;
-                *place = box_of(cloud, primitive, units).with_names(self.geometry, primitive);
+                *place = box_of(cloud, primitive, tree_space).with_names(self.geometry, primitive);
             }
         });
     }
@@ -104,7 +109,7 @@ impl CloudSurvey {
 
 /// The box around a sphere, in tree units, without names.
 #[inline(always)]
-pub(crate) fn box_of(cloud: &SphereCloud, primitive: u32, units: &Units) -> Bounds {
+pub(crate) fn box_of(cloud: &SphereCloud, primitive: u32, tree_space: &TreeSpace) -> Bounds {
     let ExactSphere { center, radius } = ExactSphere::of(cloud, primitive);
-    Bounds::near(units, &Aabb { min: center - radius, max: center + radius }, 0, 0)
+    Bounds::near(tree_space, &Aabb { min: center - radius, max: center + radius }, 0, 0)
 }

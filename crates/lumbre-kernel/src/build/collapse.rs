@@ -12,10 +12,10 @@ use crate::build::binary::{Binary, BinaryNode, Fork};
 use crate::build::occlusion_order;
 use crate::build::pack::{self, Filled, LaneOrder};
 use crate::build::primitive::{Bounds, Kind, Primitive, Traits};
-use crate::intersect::Level;
+use crate::intersect::Isa;
 use crate::tree::BLOCK;
 use crate::tree::Name;
-use crate::tree::node::{Node, Units, WIDTH, tag};
+use crate::tree::node::{Node, TreeSpace, WIDTH, tag};
 use crate::tree::packed::{Entry, Packed};
 use crate::tree::sphere_block::SphereBlock;
 use crate::tree::storage::Store;
@@ -27,34 +27,34 @@ impl Packed {
     /// without an area, it is not asked.
     pub(crate) fn move_triangles(
         &mut self,
-        level: Level,
+        isa: Isa,
         geometries: &[Geometry],
         before: &[Geometry],
         may_lack_area: bool,
     ) {
         if pack::name_same_vertices(before, geometries)
-            && pack::move_triangles(level, geometries, &self.names, may_lack_area, self.blocks.to_mut())
+            && pack::move_triangles(isa, geometries, &self.names, may_lack_area, self.blocks.to_mut())
         {
             return;
         }
         let followers = self.blocks().followers(self.names.len());
         let old = std::mem::take(&mut self.blocks);
         let number_of = |leaf| Blocks::new(&old).numbers(leaf).map_or(0, |numbers| numbers.start);
-        self.pack(level, geometries, &followers, may_lack_area, number_of);
+        self.pack(isa, geometries, &followers, may_lack_area, number_of);
     }
 
     /// Packs the triangles, as the names and the nodes say, whose references number blocks. Without an area they are left out;
     /// where there may be none, it is not asked.
-    pub(crate) fn pack_triangles(&mut self, level: Level, geometries: &[Geometry], may_lack_area: bool) {
+    pub(crate) fn pack_triangles(&mut self, isa: Isa, geometries: &[Geometry], may_lack_area: bool) {
         let followers = pack::followers_of(&self.nodes, self.root, self.names.len());
-        self.pack(level, geometries, &followers, may_lack_area, |leaf| tag::blocks(leaf).start);
+        self.pack(isa, geometries, &followers, may_lack_area, |leaf| tag::blocks(leaf).start);
     }
 
     /// Packs triangles behind each block of which so many follow, and turns the references in nodes to them. `number_of` tells the
     /// number of a leaf's first block.
     fn pack(
         &mut self,
-        level: Level,
+        isa: Isa,
         geometries: &[Geometry],
         followers: &[u8],
         may_lack_area: bool,
@@ -64,7 +64,7 @@ impl Packed {
         let is_mixed = !self.entries.is_empty() || !self.sphere_blocks.is_empty();
         let may_share = is_mixed || pack::is_worth_sharing(self.names.len());
         let Filled { lines, places, orders } =
-            pack::pack(level, may_share, geometries, &self.names, followers, may_lack_area);
+            pack::pack(isa, may_share, geometries, &self.names, followers, may_lack_area);
         pack::refer(self.nodes.to_mut(), &mut self.root, &places, number_of);
         self.blocks = lines.into();
         self.put_in_order(&orders);
@@ -491,8 +491,8 @@ impl Layout {
     /// is to be left by now, and these are given back before.
     pub(crate) fn pack(
         self,
-        level: Level,
-        units: &Units,
+        isa: Isa,
+        tree_space: &TreeSpace,
         geometries: &[Geometry],
         names: Vec<Name>,
     ) -> Packed {
@@ -514,9 +514,9 @@ impl Layout {
             sphere_names: sphere_names.into(),
             root: Some(root),
         };
-        packed.pack_triangles(level, geometries, false);
+        packed.pack_triangles(isa, geometries, false);
         let Packed { nodes, blocks, .. } = &mut packed;
-        occlusion_order::sort_children(level, units, nodes.to_mut(), Blocks::new(blocks));
+        occlusion_order::sort_children(isa, tree_space, nodes.to_mut(), Blocks::new(blocks));
         packed
     }
 }

@@ -16,10 +16,10 @@ use crate::build::open_instances;
 use crate::build::outline::Outline;
 use crate::build::primitive::{Bounds, Kind, Primitive, Traits};
 use crate::geometry::has_area;
-use crate::intersect::{Lanes, Level, Task};
+use crate::intersect::{Dispatch, Isa, Simd};
 use crate::precise_mesh;
 use crate::tree::BLOCK;
-use crate::tree::node::{Units, tag};
+use crate::tree::node::{TreeSpace, tag};
 use crate::tree::packed::{Entry, Packed};
 use crate::tree::summary::Sizes;
 use crate::{
@@ -60,17 +60,17 @@ fn size_of_geometry(geometry: &Geometry) -> usize {
 /// The same on the calling thread and those of its pool.
 fn build_here(geometries: Vec<Geometry>, preset: Preset) -> Result<Accel, BuildError> {
     let mut parts = take_apart(&geometries)?;
-    let units = units_of(&geometries, &parts);
+    let tree_space = units_of(&geometries, &parts);
     let traits: Vec<Traits> = geometries.iter().map(traits_of).collect();
-    let level = Level::best();
+    let isa = Isa::best();
 
     let count = parts.count();
     let room = parts.room();
-    let near = |part: &Boxed| Bounds::near(&units, &part.bounds, part.geometry, part.primitive);
+    let near = |part: &Boxed| Bounds::near(&tree_space, &part.bounds, part.geometry, part.primitive);
     let mut others: Vec<Primitive> =
         std::mem::take(&mut parts.boxed).par_iter().with_min_len(1024).map(near).collect();
     if preset != Preset::Fast {
-        open_instances::open(&mut others, &geometries, &units, room);
+        open_instances::open(&mut others, &geometries, &tree_space, room);
     }
     let packed = parts.triangles + parts.spheres;
     let tree = if others.len() + packed == 0 {
@@ -81,40 +81,40 @@ fn build_here(geometries: Vec<Geometry>, preset: Preset) -> Result<Accel, BuildE
         for survey in &parts.surveys {
             if let GeometryKind::Mesh(mesh) = &geometries[survey.geometry as usize].kind {
                 let own = rest.split_off_mut(..survey.triangles).expect("they were counted");
-                box_triangles(mesh, survey, &units, own);
+                box_triangles(mesh, survey, &tree_space, own);
             }
         }
         for survey in &parts.clouds {
             if let GeometryKind::Spheres(cloud) = &geometries[survey.geometry as usize].kind {
                 let own = rest.split_off_mut(..survey.spheres).expect("they were counted");
-                survey.put_boxes(cloud, &units, own);
+                survey.put_boxes(cloud, &tree_space, own);
             }
         }
-        let Grown { tree, names, instances } = binary_tree(level, preset, others, &mut primitives, &traits);
+        let Grown { tree, names, instances } = binary_tree(isa, preset, others, &mut primitives, &traits);
         let layout = lay_out(&traits, &tree, &names, &instances)?;
         drop((tree, instances));
         drop(primitives);
-        layout.pack(level, &units, &geometries, names)
+        layout.pack(isa, &tree_space, &geometries, names)
     };
     let (sizes, bounds, infinite) = (parts.sizes, parts.bounds, parts.infinite);
     Ok(Accel::assemble(
-        level,
+        isa,
         geometries,
-        AccelParts { units, tree, sizes, bounds, infinite, primitives: count },
+        AccelParts { tree_space, tree, sizes, bounds, infinite, primitives: count },
     ))
 }
 
 /// A tree in which nothing stands yet.
 pub(crate) fn empty_over(geometries: Vec<Geometry>) -> Accel {
     let parts = AccelParts {
-        units: Units::new(DVec3::ZERO, 1.0, 0.0, 1.0),
+        tree_space: TreeSpace::new(DVec3::ZERO, 1.0, 0.0, 1.0),
         tree: Packed::default(),
         sizes: Sizes::default(),
         bounds: Aabb::EMPTY,
         infinite: Vec::new(),
         primitives: 0,
     };
-    Accel::assemble(Level::best(), geometries, parts)
+    Accel::assemble(Isa::best(), geometries, parts)
 }
 
 /// What geometries consist of, triangles apart.
@@ -326,9 +326,9 @@ fn survey_mesh(position: usize, mesh: &TriangleMesh) -> Result<(Survey, Aabb, Si
         let element = mesh.positions.iter().position(|p| !p.is_finite()).unwrap_or_default();
         return Err(BuildError::NotFinite { geometry: position, element });
     }
-    let level = Level::best();
+    let isa = Isa::best();
     let survey_chunk = |(chunk, triangles): (usize, &[[u32; 3]])| {
-        level.run(SurveyChunk { mesh, triangles }).map_err(|place| {
+        isa.run(SurveyChunk { mesh, triangles }).map_err(|place| {
             let triangle = chunk * CHUNK + place;
             BuildError::VertexOutOfRange { geometry: position, triangle }
         })
@@ -361,11 +361,11 @@ struct SurveyChunk<'a> {
     triangles: &'a [[u32; 3]],
 }
 
-impl Task for SurveyChunk<'_> {
+impl Dispatch for SurveyChunk<'_> {
     type Output = Result<(MeshBox, f32, u32), usize>;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> Self::Output {
+    fn run<L: Simd>(self) -> Self::Output {
         let Self { mesh, triangles } = self;
         let (mut bounds, mut sides, mut count) = (MeshBox::EMPTY, [0.0f32; 4], 0);
         for (place, triangle) in triangles.iter().enumerate() {
@@ -442,30 +442,30 @@ pub(crate) struct Boxer {
 }
 
 impl Boxer {
-    pub(crate) fn new(mesh: &TriangleMesh, units: &Units) -> Self {
+    pub(crate) fn new(mesh: &TriangleMesh, tree_space: &TreeSpace) -> Self {
         // Where the mesh is moved by a number that single precision has, one subtraction is rounded once, as in double
         // precision; and the scale is a power of two.
-        let shift = units.origin - mesh.origin;
+        let shift = tree_space.origin - mesh.origin;
         let shift_single = shift.as_vec3();
         let is_single = shift_single.as_dvec3() == shift
-            && (1e-37..1e38).contains(&units.scale)
+            && (1e-37..1e38).contains(&tree_space.scale)
             && shift_single.abs().max_element() < 1e37;
         Self {
             shift: [shift.x, shift.y, shift.z, 0.0, -shift.x, -shift.y, -shift.z, 0.0],
-            scale: units.scale,
+            scale: tree_space.scale,
             shift_single: MeshBox::at(shift_single).0,
             is_single,
         }
     }
 
     #[inline(always)]
-    pub(crate) fn around<L: Lanes>(&self, corners: &[Vec3; 3], first: u32, second: u32) -> Bounds {
+    pub(crate) fn around<L: Simd>(&self, corners: &[Vec3; 3], first: u32, second: u32) -> Bounds {
         self.of_box::<L>(&MeshBox::around(corners)).with_names(first, second)
     }
 
     /// The box around all of these: the same as around their boxes.
     #[inline(always)]
-    pub(crate) fn around_all<L: Lanes>(&self, triangles: impl Iterator<Item = [[f32; 3]; 3]>) -> Bounds {
+    pub(crate) fn around_all<L: Simd>(&self, triangles: impl Iterator<Item = [[f32; 3]; 3]>) -> Bounds {
         let (mut around, mut is_any) = (MeshBox::EMPTY, false);
         for corners in triangles {
             around.grow(&MeshBox::around(&corners.map(Vec3::from_array)));
@@ -475,7 +475,7 @@ impl Boxer {
     }
 
     #[inline(always)]
-    fn of_box<L: Lanes>(&self, MeshBox(around): &MeshBox) -> Bounds {
+    fn of_box<L: Simd>(&self, MeshBox(around): &MeshBox) -> Bounds {
         let mut numbers = [0.0; 8];
         if self.is_single {
             let scale = self.scale as f32;
@@ -492,16 +492,16 @@ impl Boxer {
 }
 
 /// Writes down the boxes of the triangles that have an area.
-fn box_triangles(mesh: &TriangleMesh, survey: &Survey, units: &Units, mut places: &mut [Primitive]) {
+fn box_triangles(mesh: &TriangleMesh, survey: &Survey, tree_space: &TreeSpace, mut places: &mut [Primitive]) {
     let chunks: Vec<(usize, &mut [Primitive])> = survey
         .chunks
         .iter()
         .enumerate()
         .map(|(chunk, &count)| (chunk, places.split_off_mut(..count as usize).expect("they were counted")))
         .collect();
-    let (boxer, level) = (&Boxer::new(mesh, units), Level::best());
+    let (boxer, isa) = (&Boxer::new(mesh, tree_space), Isa::best());
     chunks.into_par_iter().with_min_len(least_chunks(mesh)).for_each(|(chunk, places)| {
-        level.run(BoxChunk { mesh, boxer, geometry: survey.geometry, first: chunk * CHUNK, places });
+        isa.run(BoxChunk { mesh, boxer, geometry: survey.geometry, first: chunk * CHUNK, places });
     });
 }
 
@@ -514,11 +514,11 @@ struct BoxChunk<'a> {
     places: &'a mut [Primitive],
 }
 
-impl Task for BoxChunk<'_> {
+impl Dispatch for BoxChunk<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<L: Lanes>(self) {
+    fn run<L: Simd>(self) {
         let Self { mesh, boxer, geometry, first, places } = self;
         let rest = &mesh.indices[first..];
         let triangles = &rest[..rest.len().min(CHUNK)];
@@ -537,7 +537,7 @@ impl Task for BoxChunk<'_> {
 }
 
 /// The units that make the tree's boxes about 1 in size.
-pub(crate) fn units_of(geometries: &[Geometry], parts: &Parts) -> Units {
+pub(crate) fn units_of(geometries: &[Geometry], parts: &Parts) -> TreeSpace {
     let bounds = if parts.tree_bounds.is_empty() {
         Aabb { min: DVec3::ZERO, max: DVec3::ZERO }
     } else {
@@ -556,7 +556,7 @@ pub(crate) fn units_of(geometries: &[Geometry], parts: &Parts) -> Units {
     let condition = |geometry: &Geometry| match &geometry.kind {
         GeometryKind::Shape(shape) => condition_of(&shape.world_from_object()),
         GeometryKind::Instance(instance) => {
-            let inner = instance.accel.units.condition;
+            let inner = instance.accel.tree_space.condition;
             let outer = match &instance.world_from_object {
                 Placement::Still(map) => condition_of(map),
                 Placement::Moving(motion) => motion.condition(),
@@ -566,7 +566,7 @@ pub(crate) fn units_of(geometries: &[Geometry], parts: &Parts) -> Units {
         _ => 1.0,
     };
     let condition = geometries.par_iter().with_min_len(1024).map(condition).reduce(|| 1.0, f64::max);
-    Units::new(origin, scale, (half * scale).length(), condition)
+    TreeSpace::new(origin, scale, (half * scale).length(), condition)
 }
 
 /// About the middle of the box: where that is near enough, what is as far from the first mesh's origin as a single precision

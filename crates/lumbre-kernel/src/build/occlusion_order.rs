@@ -14,9 +14,9 @@
 
 use rayon::prelude::*;
 
-use crate::intersect::{CornersRoom, Lanes, Level, Task};
-use crate::simd::{Eight, Vector, Wide};
-use crate::tree::node::{Node, Units, WIDTH, tag};
+use crate::intersect::{CornersRoom, Dispatch, Isa, Simd};
+use crate::simd::{F32x8, F32x16, Vector};
+use crate::tree::node::{Node, TreeSpace, WIDTH, tag};
 use crate::tree::triangle_block::{Blocks, TriangleBlock};
 
 /// What is to be expected of a ray that meets a box.
@@ -33,13 +33,13 @@ const FEW: usize = if cfg!(test) { 8 } else { 256 };
 
 /// Sorts the children of every node below which there is nothing but triangles. Nodes stand depth first: behind each all those below it,
 /// and then others.
-pub(crate) fn sort_children(level: Level, units: &Units, nodes: &mut [Node], blocks: Blocks) {
-    Sorter { level, blocks, scale: units.scale as f32 }.sort(nodes, 0);
+pub(crate) fn sort_children(isa: Isa, tree_space: &TreeSpace, nodes: &mut [Node], blocks: Blocks) {
+    Sorter { isa, blocks, scale: tree_space.scale as f32 }.sort(nodes, 0);
 }
 
 #[derive(Clone, Copy)]
 struct Sorter<'a> {
-    level: Level,
+    isa: Isa,
     blocks: Blocks<'a>,
     /// Tree units per unit of the meshes.
     scale: f32,
@@ -50,7 +50,7 @@ impl Sorter<'_> {
     /// where that is known.
     fn sort(&self, nodes: &mut [Node], place: usize) -> Option<Odds> {
         if nodes.len() <= FEW {
-            return self.level.run(SortFew { sorter: *self, nodes, place });
+            return self.isa.run(SortFew { sorter: *self, nodes, place });
         }
         let (node, mut rest) = nodes.split_first_mut()?;
         let mut inner: Vec<(usize, usize)> = (0..WIDTH)
@@ -67,12 +67,12 @@ impl Sorter<'_> {
             below.into_par_iter().map(|(lane, first, nodes)| (lane, self.sort(nodes, first))).collect();
         let mut odds = [None; WIDTH];
         found.into_iter().for_each(|(lane, found)| odds[lane] = found);
-        self.level.run(SortOne { sorter: *self, node, odds })
+        self.isa.run(SortOne { sorter: *self, node, odds })
     }
 
     /// Sorts the children of a node, where this is what is to be expected of those that are nodes.
     #[inline(always)]
-    fn sort_one<L: Lanes>(
+    fn sort_one<L: Simd>(
         &self,
         node: &mut Node,
         inner: &[Option<Odds>; WIDTH],
@@ -100,7 +100,7 @@ impl Sorter<'_> {
             len += 1;
         }
         // From the last to the first: by falling odds for their cost.
-        let keys = L::Wide::load(&stops).over(L::Wide::load(&costs)).lanes_in_bits();
+        let keys = L::F32x16::load(&stops).over(L::F32x16::load(&costs)).lanes_in_bits();
         let by_lane = keys.bits();
         let mut order = [0; WIDTH];
         for (lane, &key) in by_lane[..len].iter().enumerate() {
@@ -126,11 +126,11 @@ struct SortFew<'a> {
     place: usize,
 }
 
-impl Task for SortFew<'_> {
+impl Dispatch for SortFew<'_> {
     type Output = Option<Odds>;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> Option<Odds> {
+    fn run<L: Simd>(self) -> Option<Odds> {
         let Self { sorter, nodes, place } = self;
         let mut room = CornersRoom::new();
         let mut odds = [None; FEW];
@@ -155,11 +155,11 @@ struct SortOne<'a> {
     odds: [Option<Odds>; WIDTH],
 }
 
-impl Task for SortOne<'_> {
+impl Dispatch for SortOne<'_> {
     type Output = Option<Odds>;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> Option<Odds> {
+    fn run<L: Simd>(self) -> Option<Odds> {
         self.sorter.sort_one::<L>(self.node, &self.odds, &mut CornersRoom::new())
     }
 }
@@ -187,12 +187,12 @@ struct Areas {
 
 impl Areas {
     #[inline(always)]
-    fn of<L: Lanes>(node: &Node) -> Self {
-        let zero = L::Wide::splat(0.0);
+    fn of<L: Simd>(node: &Node) -> Self {
+        let zero = L::F32x16::splat(0.0);
         let (mut sizes, mut all) = ([zero; 3], [0.0_f32; 3]);
         for axis in 0..3 {
-            let low = L::Wide::load(&node.planes[2 * axis]);
-            let high = L::Wide::load(&node.planes[2 * axis + 1]);
+            let low = L::F32x16::load(&node.planes[2 * axis]);
+            let high = L::F32x16::load(&node.planes[2 * axis + 1]);
             sizes[axis] = (high - low).max(zero);
             all[axis] = (high.most() + (zero - low).most()).max(0.0);
         }
@@ -205,14 +205,14 @@ impl Areas {
 
 /// The area of the triangles of a block, in tree units.
 #[inline(always)]
-fn area_of<L: Lanes>(block: &TriangleBlock, scale: f32, room: &mut CornersRoom) -> f32 {
+fn area_of<L: Simd>(block: &TriangleBlock, scale: f32, room: &mut CornersRoom) -> f32 {
     let corners = L::corners(block, room);
-    let scale = L::Eight::splat(scale);
+    let scale = L::F32x8::splat(scale);
     let (mut a, mut b) = ([scale; 3], [scale; 3]);
     for (axis, [first, second, third]) in corners.iter().enumerate() {
-        let first = L::Eight::load(first);
-        a[axis] = (L::Eight::load(second) - first) * scale;
-        b[axis] = (L::Eight::load(third) - first) * scale;
+        let first = L::F32x8::load(first);
+        a[axis] = (L::F32x8::load(second) - first) * scale;
+        b[axis] = (L::F32x8::load(third) - first) * scale;
     }
     let ([ax, ay, az], [bx, by, bz]) = (a, b);
     let (x, y, z) = (ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx);

@@ -21,8 +21,8 @@ use rustc_hash::FxHashMap;
 
 use crate::build::outline::{EightSizes, Outline, Placing, box_in_space};
 use crate::build::primitive::{Bounds, ONE, Primitive};
-use crate::intersect::{Lanes, Level, Task};
-use crate::tree::node::{Units, tag};
+use crate::intersect::{Dispatch, Isa, Simd};
+use crate::tree::node::{TreeSpace, tag};
 use crate::tree::packed::Entry;
 use crate::tree::packed::Start;
 use crate::{Accel, Geometry, GeometryKind, Instance, Placement};
@@ -50,7 +50,7 @@ impl Family {
     fn of(inner: &Accel, reference: u32) -> Self {
         let node = &inner.tree.nodes[reference as usize];
         let lanes = 0..node.len();
-        let children = lanes.map(|lane| (node.children[lane], box_in_space(&inner.units, node, lane)));
+        let children = lanes.map(|lane| (node.children[lane], box_in_space(&inner.tree_space, node, lane)));
         // What became empty by a refit is met by no ray.
         let (mut children, mut boxes): (Vec<_>, Vec<_>) =
             children.filter(|child| !child.1.is_empty()).unzip();
@@ -145,7 +145,12 @@ const CHUNK: usize = 256;
 
 /// Opens the instances among some primitives where that pays, into no more than `room` parts more than there are primitives. The
 /// second name of a part is the node where it begins.
-pub(crate) fn open(primitives: &mut Vec<Primitive>, geometries: &[Geometry], units: &Units, room: usize) {
+pub(crate) fn open(
+    primitives: &mut Vec<Primitive>,
+    geometries: &[Geometry],
+    tree_space: &TreeSpace,
+    room: usize,
+) {
     let mut known = Families::default();
     let of = |primitive: &Primitive| still(&geometries[primitive.first() as usize]);
     let family = |primitive: &Primitive| match of(primitive) {
@@ -167,7 +172,15 @@ pub(crate) fn open(primitives: &mut Vec<Primitive>, geometries: &[Geometry], uni
         let parts = primitives[first..].par_chunks_mut(CHUNK).zip(families.par_chunks(CHUNK));
         parts.zip(gains.par_chunks_mut(CHUNK)).for_each(|((parts, families), gains)| {
             let are_whole = first == 0;
-            Level::best().run(Weigh { parts, families, gains, known: &known, geometries, units, are_whole });
+            Isa::best().run(Weigh {
+                parts,
+                families,
+                gains,
+                known: &known,
+                geometries,
+                tree_space,
+                are_whole,
+            });
         });
         let positive = gains.iter().enumerate().filter(|(_, gain)| **gain > 0.0);
         // The largest first, and of equals the first.
@@ -209,19 +222,19 @@ struct Weigh<'a> {
     gains: &'a mut [f32],
     known: &'a Families,
     geometries: &'a [Geometry],
-    units: &'a Units,
+    tree_space: &'a TreeSpace,
     /// Whether they are no parts but whole, with boxes of their own.
     are_whole: bool,
 }
 
-impl Task for Weigh<'_> {
+impl Dispatch for Weigh<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<L: Lanes>(self) {
-        let Self { parts, families, gains, known, geometries, units, are_whole } = self;
+    fn run<L: Simd>(self) {
+        let Self { parts, families, gains, known, geometries, tree_space, are_whole } = self;
         // From areas in space to those of primitives.
-        let scale = (units.scale * ONE).powi(2);
+        let scale = (tree_space.scale * ONE).powi(2);
         for ((part, &family), gain) in parts.iter_mut().zip(families).zip(gains) {
             if family == NO_FAMILY {
                 continue;
@@ -229,7 +242,7 @@ impl Task for Weigh<'_> {
             let Some((_, map)) = still(&geometries[part.first() as usize]) else { continue };
             let (family, placing) = (known.get(family), Placing::of(map));
             if !are_whole && let Some(around) = family.outline.around::<L>(&placing) {
-                *part = part.common(&Bounds::near(units, &around, part.first(), part.second()));
+                *part = part.common(&Bounds::near(tree_space, &around, part.first(), part.second()));
             }
             if !family.boxes.is_empty() {
                 let count = family.children.len();

@@ -3,9 +3,9 @@
 use lumbre_geometry::Aabb;
 use lumbre_math::{AnimatedTransform, DMat3, DVec3, Transform};
 
-use crate::intersect::{Lanes, Level, Task};
-use crate::simd::{Row, WIDE, Wide};
-use crate::tree::node::{Node, Units, tag};
+use crate::intersect::{Dispatch, Isa, Simd};
+use crate::simd::{F32x16, Row, WIDE};
+use crate::tree::node::{Node, TreeSpace, tag};
 use crate::{Accel, Placement};
 
 /// Boxes of an outline, about.
@@ -55,7 +55,7 @@ impl Outline {
         let Some(root) = node(reference) else { return Self::of_box(Aabb::EMPTY) };
         let children = |node: &Node| -> Vec<(Aabb, u32)> {
             (0..node.len())
-                .map(|lane| (box_in_space(&inner.units, node, lane), node.children[lane]))
+                .map(|lane| (box_in_space(&inner.tree_space, node, lane), node.children[lane]))
                 .collect()
         };
         let mut open = children(root);
@@ -92,7 +92,7 @@ impl Outline {
     /// A box around it at all times, whatever is the box around the whole tree; `None` where nothing is known but that.
     pub(crate) fn part_at(&self, placement: &Placement) -> Option<Aabb> {
         match placement {
-            Placement::Still(map) => Level::best().run(Around { outline: self, placing: &Placing::of(map) }),
+            Placement::Still(map) => Isa::best().run(Around { outline: self, placing: &Placing::of(map) }),
             Placement::Moving(motion) => (!self.boxes.is_empty()).then(|| self.swept(motion)),
         }
     }
@@ -107,7 +107,7 @@ impl Outline {
 
     fn placed(&self, map: &Transform) -> Aabb {
         let (whole, placing) = (placed_bounds(&self.whole, map), Placing::of(map));
-        match Level::best().run(Around { outline: self, placing: &placing }) {
+        match Isa::best().run(Around { outline: self, placing: &placing }) {
             // Each bounds it, so that their common part does.
             Some(parts) => Aabb { min: parts.min.max(whole.min), max: parts.max.min(whole.max) },
             None => whole,
@@ -116,7 +116,7 @@ impl Outline {
 
     /// The box around the images of its boxes; `None` where there are none.
     #[inline(always)]
-    pub(crate) fn around<L: Lanes>(&self, placing: &Placing) -> Option<Aabb> {
+    pub(crate) fn around<L: Simd>(&self, placing: &Placing) -> Option<Aabb> {
         if self.boxes.is_empty() {
             return None;
         }
@@ -127,7 +127,7 @@ impl Outline {
             let row = [placing.linear.x_axis[axis], placing.linear.y_axis[axis], placing.linear.z_axis[axis]];
             let largest =
                 row.iter().fold(f64::MIN_POSITIVE, |largest: f64, number| largest.max(number.abs()));
-            let [low, high] = images::<L::Wide>(&self.boxes, row.map(|number| (number / largest) as f32));
+            let [low, high] = images::<L::F32x16>(&self.boxes, row.map(|number| (number / largest) as f32));
             let size = largest * self.unit;
             min[axis] += (f64::from(low) - IMAGE_ERROR) * size;
             max[axis] += (f64::from(high) + IMAGE_ERROR) * size;
@@ -237,11 +237,11 @@ struct Around<'a> {
     placing: &'a Placing,
 }
 
-impl Task for Around<'_> {
+impl Dispatch for Around<'_> {
     type Output = Option<Aabb>;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> Option<Aabb> {
+    fn run<L: Simd>(self) -> Option<Aabb> {
         self.outline.around::<L>(self.placing)
     }
 }
@@ -272,7 +272,7 @@ impl SixteenBoxes {
 /// Where the images of boxes begin and end on an axis, for that row of a map. In the same operations on every instruction set, so
 /// that trees are the same.
 #[inline(always)]
-fn images<W: Wide>(boxes: &[SixteenBoxes], row: [f32; 3]) -> [f32; 2] {
+fn images<W: F32x16>(boxes: &[SixteenBoxes], row: [f32; 3]) -> [f32; 2] {
     let [x, y, z] = [W::splat(row[0]), W::splat(row[1]), W::splat(row[2])];
     // The highest places, and the highest of their negatives.
     let (mut high, mut low) = (W::splat(f32::NEG_INFINITY), W::splat(f32::NEG_INFINITY));
@@ -288,10 +288,10 @@ fn images<W: Wide>(boxes: &[SixteenBoxes], row: [f32; 3]) -> [f32; 2] {
 }
 
 /// A node's box, back from tree units.
-pub(crate) fn box_in_space(units: &Units, node: &Node, lane: usize) -> Aabb {
+pub(crate) fn box_in_space(tree_space: &TreeSpace, node: &Node, lane: usize) -> Aabb {
     let plane = |side: usize| {
         let planes = [0, 2, 4].map(|axis| f64::from(node.planes[axis + side][lane]));
-        DVec3::from_array(planes) / units.scale + units.origin
+        DVec3::from_array(planes) / tree_space.scale + tree_space.origin
     };
     // Rounded once more than the planes were.
     Aabb { min: plane(0), max: plane(1) }.outward(2)

@@ -4,7 +4,7 @@ use lumbre_math::Vec3;
 use rayon::prelude::*;
 
 use crate::geometry::has_area;
-use crate::intersect::{Lanes, Level, Task};
+use crate::intersect::{Dispatch, Isa, Simd};
 use crate::simd;
 use crate::tree::BLOCK;
 use crate::tree::node::{Node, tag};
@@ -76,7 +76,7 @@ pub(crate) fn is_worth_sharing(blocks: usize) -> bool {
 /// Packs the triangles with these names; each block is followed by so many of its leaf. Leaves out those without an area, and does
 /// not ask where there may be none.
 pub(crate) fn pack(
-    level: Level,
+    isa: Isa,
     may_share: bool,
     geometries: &[Geometry],
     names: &[BlockNames],
@@ -87,7 +87,7 @@ pub(crate) fn pack(
     let mut plans = vec![Plan::UNSHARED; names.len()];
     if may_share {
         plans.par_chunks_mut(share).zip(names.par_chunks(share)).for_each(|(plans, names)| {
-            level.run(MakePlans { geometries, names, plans });
+            isa.run(MakePlans { geometries, names, plans });
         });
     }
     let mut places = Vec::with_capacity(names.len());
@@ -125,11 +125,11 @@ struct MakePlans<'a> {
     plans: &'a mut [Plan],
 }
 
-impl Task for MakePlans<'_> {
+impl Dispatch for MakePlans<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<L: Lanes>(self) {
+    fn run<L: Simd>(self) {
         for (plan, names) in self.plans.iter_mut().zip(self.names) {
             let mesh = mesh(self.geometries, names.geometry);
             *plan = Halves::of::<L>(mesh, names).plan();
@@ -174,7 +174,7 @@ impl PackShare<'_> {
 /// Moves the triangles of blocks that [`pack`] made to where their vertices are now. False where triangles come apart that shared a
 /// vertex: some blocks are changed then, and all are to be packed again. Leaves out triangles without an area, as `pack` does.
 pub(crate) fn move_triangles(
-    level: Level,
+    isa: Isa,
     geometries: &[Geometry],
     names: &[BlockNames],
     may_lack_area: bool,
@@ -188,7 +188,7 @@ pub(crate) fn move_triangles(
         let lines = lines.split_off_mut(..len as usize).expect("their heads are there");
         shares.push(MoveShare { geometries, names, may_lack_area, lines });
     }
-    shares.into_par_iter().all(|share| level.run(share))
+    shares.into_par_iter().all(|share| isa.run(share))
 }
 
 /// Some of the triangles that [`move_triangles`] moves.
@@ -199,11 +199,11 @@ struct MoveShare<'a> {
     lines: &'a mut [Line],
 }
 
-impl Task for MoveShare<'_> {
+impl Dispatch for MoveShare<'_> {
     type Output = bool;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> bool {
+    fn run<L: Simd>(self) -> bool {
         let Self { geometries, names: all, may_lack_area, mut lines } = self;
         let mut do_fit = true;
         for (place, names) in all.iter().enumerate() {
@@ -330,7 +330,7 @@ impl Halves {
     /// Of the triangles with these names. Compares every corner with all before it, almost without branches; where too few share a
     /// vertex by name, compares their positions.
     #[inline(always)]
-    fn of<L: Lanes>(mesh: &TriangleMesh, names: &BlockNames) -> Self {
+    fn of<L: Simd>(mesh: &TriangleMesh, names: &BlockNames) -> Self {
         let mut all = [0; 3 * BLOCK];
         let (triangles, _) = all.as_chunks_mut::<3>();
         let mut len = 0;

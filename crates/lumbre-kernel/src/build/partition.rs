@@ -7,17 +7,17 @@ use rayon::prelude::*;
 
 use crate::build::primitive::{Bounds, Primitive};
 use crate::build::sah::{PartPiece, Split};
-use crate::intersect::Level;
+use crate::intersect::Isa;
 
 /// Primitives that are parted at a time: with room for as many, they fit into a cache of a core.
 const PIECE: usize = 2048;
 
 /// Brings the primitives left of a split before those right of it. `is_shared` says whether other threads may help.
-pub(crate) fn part(level: Level, primitives: &mut [Primitive], split: &Split, is_shared: bool) {
+pub(crate) fn part(isa: Isa, primitives: &mut [Primitive], split: &Split, is_shared: bool) {
     let count = primitives.len();
     let room = || vec![Bounds::EMPTY; PIECE.min(count)];
     let part = |there: &mut Vec<Primitive>, primitives: &mut [Primitive]| {
-        level.run(PartPiece { primitives, split, there })
+        isa.run(PartPiece { primitives, split, there })
     };
     let lefts: Vec<usize> = if is_shared {
         primitives.par_chunks_mut(PIECE).with_min_len(4).map_init(room, part).collect()
@@ -88,7 +88,7 @@ mod tests {
 
     #[test]
     fn what_is_left_of_a_split_comes_first_from_any_number_of_threads() {
-        let level = Level::best();
+        let isa = Isa::best();
         for (count, skew) in
             [(3, 1), (PIECE, 2), (3 * PIECE + 17, 1), (11 * PIECE - 5, 5), (40 * PIECE + 1, 3)]
         {
@@ -99,14 +99,14 @@ mod tests {
                 Bounds::new(low, low.map(|x| x + 0.001), 0, i as u32)
             };
             let primitives: Vec<Primitive> = (0..count).map(boxed).collect();
-            let centers = level.run(FindCenters { primitives: &primitives });
+            let centers = isa.run(FindCenters { primitives: &primitives });
             let binning = Binning::new(&centers, count);
             let mut bins = Bins::EMPTY;
-            level.run(Fill::<false> { primitives: &primitives, binning, bins: &mut bins, traits: &[] });
-            let split = level.run(BestSplit::<false> { bins: &bins, binning }).unwrap();
+            isa.run(Fill::<false> { primitives: &primitives, binning, bins: &mut bins, traits: &[] });
+            let split = isa.run(BestSplit::<false> { bins: &bins, binning }).unwrap();
             let [mut alone, mut shared] = [primitives.clone(), primitives];
-            part(level, &mut alone, &split, false);
-            part(level, &mut shared, &split, true);
+            part(isa, &mut alone, &split, false);
+            part(isa, &mut shared, &split, true);
             let names = |list: &[Primitive]| list.iter().map(Bounds::second).collect::<Vec<_>>();
             assert_eq!(names(&alone), names(&shared));
             assert!(0 < split.left && split.left < count);

@@ -3,8 +3,8 @@
 use bytemuck::{Pod, Zeroable};
 use lumbre_geometry::Aabb;
 
-use crate::intersect::Lanes;
-use crate::tree::node::{Node, Units, round_up};
+use crate::intersect::Simd;
+use crate::tree::node::{Node, TreeSpace, round_up};
 
 /// The kind of a primitive. A leaf holds one kind, triangles of one mesh, and spheres of one cloud.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -88,7 +88,7 @@ impl Bounds {
 
     /// From the lower corner and the upper one negated, in tree units; there are no names behind them yet.
     #[inline(always)]
-    pub(crate) fn of_lanes<L: Lanes>(mut numbers: [f32; 8]) -> Self {
+    pub(crate) fn of_lanes<L: Simd>(mut numbers: [f32; 8]) -> Self {
         for number in &mut numbers {
             *number *= ONE as f32;
         }
@@ -103,9 +103,9 @@ impl Bounds {
 
     /// The nearest one to a box in space.
     #[inline]
-    pub(crate) fn near(units: &Units, bounds: &Aabb, first: u32, second: u32) -> Self {
-        let low = (bounds.min - units.origin) * units.scale;
-        let high = (bounds.max - units.origin) * units.scale;
+    pub(crate) fn near(tree_space: &TreeSpace, bounds: &Aabb, first: u32, second: u32) -> Self {
+        let low = (bounds.min - tree_space.origin) * tree_space.scale;
+        let high = (bounds.max - tree_space.origin) * tree_space.scale;
         Self::new(low.as_vec3().to_array(), high.as_vec3().to_array(), first, second)
     }
 

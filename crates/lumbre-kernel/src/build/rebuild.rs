@@ -32,7 +32,7 @@ pub(crate) fn rebuild_partially(accel: &mut Accel, options: &BuildOptions) -> f6
         && new_cost < best
     {
         best = new_cost;
-        occlusion_order::sort_children(accel.level, &accel.units, &mut nodes, accel.tree.blocks());
+        occlusion_order::sort_children(accel.isa, &accel.tree_space, &mut nodes, accel.tree.blocks());
         let tree = &mut accel.tree;
         (tree.nodes, tree.entries, tree.root) = (nodes.into(), entries.into(), Some(root));
         accel.follow_tree();
@@ -64,7 +64,7 @@ fn over_leaves(accel: &Accel, preset: Preset) -> Option<Relaid> {
         }
     }
     let nothing = &mut Boxes::empty(0);
-    let Grown { tree, names, instances } = binary_tree(accel.level, preset, primitives, nothing, &traits);
+    let Grown { tree, names, instances } = binary_tree(accel.isa, preset, primitives, nothing, &traits);
     let layout = lay_out(&traits, &tree, &names, &instances).ok()?;
     Some(layout.over_leaves(&names, |geometry| leaves[geometry as usize - first]))
 }
@@ -78,7 +78,7 @@ fn entries_of(accel: &Accel) -> Option<Vec<Primitive>> {
     let parts = take_apart(&accel.geometries).ok()?;
     let Places { boxes, .. } = check_places(accel, &parts).ok()?;
     let around = |(entry, bounds): (&Entry, Option<Aabb>)| {
-        let bounds = bounds.map_or(Bounds::EMPTY, |bounds| Bounds::near(&accel.units, &bounds, 0, 0));
+        let bounds = bounds.map_or(Bounds::EMPTY, |bounds| Bounds::near(&accel.tree_space, &bounds, 0, 0));
         bounds.with_names(entry.geometry, entry.primitive())
     };
     Some(entries.iter().zip(boxes).map(around).collect())

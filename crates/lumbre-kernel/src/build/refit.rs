@@ -12,11 +12,11 @@ use crate::build::open_instances::{self, Families};
 use crate::build::primitive::Bounds;
 use crate::geometry::has_area;
 use crate::intersect::Portable;
-use crate::tree::node::{Node, Units, tag};
+use crate::tree::node::{Node, TreeSpace, tag};
 use crate::tree::packed::Entry;
 use crate::tree::packed::Start;
 use crate::tree::sphere_block::{SphereBlock, has_radius};
-use crate::tree::summary::Holds;
+use crate::tree::summary::Summary;
 use crate::tree::triangle_block::{BlockNames, Blocks};
 use crate::{Accel, BuildError, Geometry, GeometryKind, SphereCloud};
 
@@ -90,7 +90,7 @@ pub(crate) fn refit(accel: &mut Accel, geometries: Vec<Geometry>) -> Result<f64,
     let old = std::mem::replace(&mut accel.geometries, geometries);
     match check_places(accel, &parts) {
         Ok(places) => {
-            accel.tree.move_triangles(accel.level, &accel.geometries, &old, parts.has_flat);
+            accel.tree.move_triangles(accel.isa, &accel.geometries, &old, parts.has_flat);
             fit(accel, parts, places);
         }
         Err(error) => {
@@ -123,9 +123,9 @@ pub(crate) fn check_places(accel: &Accel, parts: &Parts) -> Result<Places, Refit
 pub(crate) fn fit(accel: &mut Accel, parts: Parts, places: Places) {
     let Places { boxes, starts } = places;
     let geometries = &accel.geometries;
-    let units = units_of(geometries, &parts);
+    let tree_space = units_of(geometries, &parts);
     let boxer = |geometry: &Geometry| match &geometry.kind {
-        GeometryKind::Mesh(mesh) => Some(Boxer::new(mesh, &units)),
+        GeometryKind::Mesh(mesh) => Some(Boxer::new(mesh, &tree_space)),
         _ => None,
     };
     let boxers: Vec<Option<Boxer>> = geometries.iter().map(boxer).collect();
@@ -143,13 +143,13 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts, places: Places) {
         .zip(tree.sphere_names.par_iter())
         .with_min_len(256)
         .map(|(block, names)| match &geometries[names.geometry as usize].kind {
-            GeometryKind::Spheres(cloud) => fill_sphere_block(block, names, cloud, &units),
+            GeometryKind::Spheres(cloud) => fill_sphere_block(block, names, cloud, &tree_space),
             _ => Bounds::EMPTY,
         })
         .collect();
     let entry_boxes: Vec<Bounds> = boxes
         .iter()
-        .map(|boxed| boxed.map_or(Bounds::EMPTY, |bounds| Bounds::near(&units, &bounds, 0, 0)))
+        .map(|boxed| boxed.map_or(Bounds::EMPTY, |bounds| Bounds::near(&tree_space, &bounds, 0, 0)))
         .collect();
 
     // What is in leaves, then what is above: children stand behind their parents.
@@ -199,10 +199,10 @@ pub(crate) fn fit(accel: &mut Accel, parts: Parts, places: Places) {
         }
     }
 
-    accel.holds = Holds::new(geometries, parts.sizes);
+    accel.summary = Summary::new(geometries, parts.sizes);
     accel.primitives = parts.count();
     accel.infinite = parts.infinite;
-    accel.units = units;
+    accel.tree_space = tree_space;
     accel.bounds = parts.bounds;
     accel.follow_tree();
 }
@@ -342,7 +342,7 @@ fn fill_sphere_block(
     block: &mut SphereBlock,
     names: &BlockNames,
     cloud: &SphereCloud,
-    units: &Units,
+    tree_space: &TreeSpace,
 ) -> Bounds {
     let mut around = Bounds::EMPTY;
     for (lane, &primitive) in names.primitives.iter().enumerate() {
@@ -351,7 +351,7 @@ fn fill_sphere_block(
         }
         let sphere = cloud.spheres[primitive as usize];
         if has_radius(&sphere) {
-            around.grow(&box_of(cloud, primitive, units));
+            around.grow(&box_of(cloud, primitive, tree_space));
             block.put(lane, sphere);
         } else {
             block.put(lane, [f32::NAN; 4]);

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use crate::build::binary::{Binary, BinaryNode};
 use crate::build::primitive::Bounds;
-use crate::intersect::{Lanes, Level, Task};
+use crate::intersect::{Dispatch, Isa, Simd};
 use crate::simd;
 
 /// How often places are sought at most.
@@ -75,11 +75,11 @@ struct Seek<'a> {
     stack: &'a mut Vec<(f32, u32)>,
 }
 
-impl Task for Seek<'_> {
+impl Dispatch for Seek<'_> {
     type Output = Option<Move>;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> Option<Move> {
+    fn run<L: Simd>(self) -> Option<Move> {
         self.tree.best_move(self.from, self.stack)
     }
 }
@@ -175,8 +175,8 @@ impl Tree {
             candidates.select_nth_unstable_by(count, by_area);
             candidates.truncate(count);
         }
-        let level = Level::best();
-        let seek = |stack: &mut Vec<(f32, u32)>, &from: &u32| level.run(Seek { tree: self, from, stack });
+        let isa = Isa::best();
+        let seek = |stack: &mut Vec<(f32, u32)>, &from: &u32| isa.run(Seek { tree: self, from, stack });
         let mut moves: Vec<Move> =
             candidates.par_iter().with_min_len(64).map_init(Vec::new, seek).flatten().collect();
         moves.par_sort_unstable_by(|a, b| b.gain.total_cmp(&a.gain).then(a.from.cmp(&b.from)));

@@ -5,7 +5,7 @@
 //! range, within the side's box; only where bins show that this is much too wide, it is measured.
 
 use crate::build::primitive::{Bounds, Primitive, Traits};
-use crate::intersect::{Lanes, Task};
+use crate::intersect::{Dispatch, Simd};
 use crate::tree::BLOCK;
 
 /// Bins on an axis: a power of two.
@@ -251,11 +251,11 @@ pub(crate) struct BestSplit<'a, const COSTS: bool> {
     pub(crate) binning: Binning,
 }
 
-impl<const COSTS: bool> Task for BestSplit<'_, COSTS> {
+impl<const COSTS: bool> Dispatch for BestSplit<'_, COSTS> {
     type Output = Option<Split>;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> Option<Split> {
+    fn run<L: Simd>(self) -> Option<Split> {
         let Self { bins: Bins { tallies: [bins, ..] }, binning } = self;
         let last = binning.bins;
         let mut best = (f32::INFINITY, 0, 0);
@@ -318,11 +318,11 @@ pub(crate) struct FindCenters<'a> {
     pub(crate) primitives: &'a [Primitive],
 }
 
-impl Task for FindCenters<'_> {
+impl Dispatch for FindCenters<'_> {
     type Output = Centers;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> Centers {
+    fn run<L: Simd>(self) -> Centers {
         let mut centers = Centers::EMPTY;
         for primitive in self.primitives {
             let center2 = primitive.center2();
@@ -340,11 +340,11 @@ pub(crate) struct Fill<'a, const COSTS: bool> {
     pub(crate) traits: &'a [Traits],
 }
 
-impl<const COSTS: bool> Task for Fill<'_, COSTS> {
+impl<const COSTS: bool> Dispatch for Fill<'_, COSTS> {
     type Output = ();
 
     #[inline(always)]
-    fn run<L: Lanes>(self) {
+    fn run<L: Simd>(self) {
         let Self { primitives, binning, bins, traits } = self;
         if primitives.len() >= TWO_ROWS_FROM {
             bins.fill::<2, COSTS>(primitives, binning, traits);
@@ -361,11 +361,11 @@ pub(crate) struct Part<'a> {
     pub(crate) sides: [&'a mut [Primitive]; 2],
 }
 
-impl Task for Part<'_> {
+impl Dispatch for Part<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<L: Lanes>(self) {
+    fn run<L: Simd>(self) {
         let Self { primitives, split, sides: [left, right] } = self;
         let (axis, bin, binning) = (split.axis, split.bin, split.binning);
         let mut sides = Sides { left, right, places: [0; 2] };
@@ -408,11 +408,11 @@ pub(crate) struct PartPiece<'a> {
     pub(crate) there: &'a mut [Primitive],
 }
 
-impl Task for PartPiece<'_> {
+impl Dispatch for PartPiece<'_> {
     type Output = usize;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> usize {
+    fn run<L: Simd>(self) -> usize {
         let Self { primitives, split, there } = self;
         let (mut left, mut right) = (0, 0);
         for place in 0..primitives.len() {

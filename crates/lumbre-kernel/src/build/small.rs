@@ -1,7 +1,7 @@
 //! The last splits: of sixteen primitives or fewer, every split along every axis is tried.
 
 use crate::build::primitive::{Bounds, Kind, Primitive, Traits};
-use crate::intersect::{Lanes, Task};
+use crate::intersect::{Dispatch, Simd};
 use crate::tree::BLOCK;
 use crate::tree::node::WIDTH;
 
@@ -43,11 +43,11 @@ pub(crate) struct Decide<'a, const COSTS: bool> {
     pub(crate) traits: &'a [Traits],
 }
 
-impl<const COSTS: bool> Task for Decide<'_, COSTS> {
+impl<const COSTS: bool> Dispatch for Decide<'_, COSTS> {
     type Output = Few;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> Few {
+    fn run<L: Simd>(self) -> Few {
         let Self { primitives, traits } = self;
         let count = primitives.len();
         let could_be_leaf = is_uniform::<COSTS>(primitives, traits);

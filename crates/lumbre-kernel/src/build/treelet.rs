@@ -157,7 +157,7 @@ mod tests {
     use crate::build::boxes::Boxes;
     use crate::build::collapse::choose;
     use crate::build::primitive::{Kind, Traits};
-    use crate::intersect::Level;
+    use crate::intersect::Isa;
     use crate::tests::scenes::Random;
     use crate::tree::Name;
 
@@ -187,7 +187,7 @@ mod tests {
 
     fn grow<'p>(preset: Preset, boxes: &'p mut Boxes) -> Grown<'p> {
         let traits = [Traits { kind: Kind::Triangle, cost: 4, most: 8 }];
-        binary_tree(Level::best(), preset, Vec::new(), boxes, &traits)
+        binary_tree(Isa::best(), preset, Vec::new(), boxes, &traits)
     }
 
     /// Lists the nodes of a tree, left before right, and tells of every leaf; sees that boxes hold those below them.

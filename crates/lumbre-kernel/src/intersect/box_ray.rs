@@ -3,9 +3,9 @@
 use lumbre_geometry::Ray;
 
 use super::Sides;
-use crate::simd::{Row, Wide};
+use crate::simd::{F32x16, Row};
 use crate::tree::node::{
-    LARGEST_NEAR, LARGEST_PLANE, ROUNDOFF, SMALLEST_NEAR, TINY_DIRECTION, TINY_NEAR, Units, slop,
+    LARGEST_NEAR, LARGEST_PLANE, ROUNDOFF, SMALLEST_NEAR, TINY_DIRECTION, TINY_NEAR, TreeSpace, slop,
 };
 
 /// What moves the ends of a rounded range outwards, together with a little at the far one.
@@ -82,17 +82,18 @@ impl BoxRay {
     /// Makes it the ray from `t_min` to `t_max` for a tree in these units, if that is one from nearby, which it answers; also
     /// checks that the ray is sound.
     #[inline(always)]
-    pub(crate) fn start_nearby(&mut self, units: &Units, ray: &Ray, t_min: f64, t_max: f64) -> bool {
-        let start = ((ray.origin - units.origin) * units.scale).to_array();
-        let direction = (ray.direction * units.scale).to_array();
+    pub(crate) fn start_nearby(&mut self, tree_space: &TreeSpace, ray: &Ray, t_min: f64, t_max: f64) -> bool {
+        let start = ((ray.origin - tree_space.origin) * tree_space.scale).to_array();
+        let direction = (ray.direction * tree_space.scale).to_array();
         // Every comparison with a NaN is false.
-        let fits = |axis: usize| start[axis].abs() <= units.near && direction[axis].abs() <= LARGEST_NEAR;
+        let fits =
+            |axis: usize| start[axis].abs() <= tree_space.near && direction[axis].abs() <= LARGEST_NEAR;
         let is_long = |axis: usize| direction[axis].abs() >= SMALLEST_NEAR;
         let is_near = fits(0) && fits(1) && fits(2) && (is_long(0) || is_long(1) || is_long(2));
         if !(is_near && 0.0 <= t_min && t_min <= t_max) {
             return false;
         }
-        self.set_slabs(start, direction, TINY_NEAR, units.margin_per_distance, units.near_margin);
+        self.set_slabs(start, direction, TINY_NEAR, tree_space.margin_per_distance, tree_space.near_margin);
         self.set_range_nearby(t_min, t_max);
         true
     }
@@ -109,7 +110,13 @@ impl BoxRay {
     /// altogether. The ray is finite, and its direction is not zero.
     #[cold]
     #[inline(never)]
-    pub(crate) fn start_anywhere(&mut self, units: &Units, ray: &Ray, t_min: f64, t_max: f64) -> bool {
+    pub(crate) fn start_anywhere(
+        &mut self,
+        tree_space: &TreeSpace,
+        ray: &Ray,
+        t_min: f64,
+        t_max: f64,
+    ) -> bool {
         // Powers of two near the limits of the exponent go in two steps.
         let largest = ray.direction.abs().max_element();
         let step = if largest < f64::from_bits(100 << 52) {
@@ -122,13 +129,13 @@ impl BoxRay {
         let exponent = (largest * step).to_bits() >> 52;
         let normaliser = f64::from_bits((2046 - exponent) << 52);
         let direction = ray.direction * step * normaliser;
-        let s_per_t = units.scale / step / normaliser;
+        let s_per_t = tree_space.scale / step / normaliser;
 
-        let start = (ray.origin - units.origin) * units.scale;
+        let start = (ray.origin - tree_space.origin) * tree_space.scale;
         let to_middle = -start.dot(direction) / direction.length_squared();
         let middle = start + to_middle * direction;
-        let reach = (ray.origin.abs() + units.origin.abs()).max_element() * units.scale + 1.0;
-        let slop = slop(units.condition, reach);
+        let reach = (ray.origin.abs() + tree_space.origin.abs()).max_element() * tree_space.scale + 1.0;
+        let slop = slop(tree_space.condition, reach);
 
         let distance_squared = middle.length_squared();
         let fits = s_per_t.is_normal() && slop < 1e6 && distance_squared.is_finite();
@@ -136,7 +143,7 @@ impl BoxRay {
             *self = Self::passing_all();
             return true;
         }
-        let reach = 1.001 * units.radius + 4.0 * slop;
+        let reach = 1.001 * tree_space.radius + 4.0 * slop;
         if distance_squared > reach * reach {
             return false;
         }
@@ -241,7 +248,7 @@ impl SlabRows {
 
     /// The offsets on an axis of rays that start there, where planes are moved by a margin and by more for each unit of distance.
     #[inline(always)]
-    pub(crate) fn set_axis<W: Wide>(
+    pub(crate) fn set_axis<W: F32x16>(
         &mut self,
         axis: usize,
         from: W,

@@ -7,7 +7,7 @@ use super::{Room, Sides, Slots};
 use crate::intersect::box_ray::Slabs;
 use crate::intersect::box_ray::{Frustum, SlabRows};
 use crate::simd::vector::stack_entry;
-use crate::simd::{WIDE, Wide};
+use crate::simd::{F32x16, WIDE};
 use crate::tree::node::{Node, WIDTH};
 
 const _: () = assert!(WIDTH == WIDE);
@@ -23,7 +23,7 @@ fn near_and_far<'a>(node: &'a Node, sides: &Sides, axis: usize) -> (&'a [f32; WI
 
 /// One bit for each child whose box the ray meets, and where it enters.
 #[inline(always)]
-pub(crate) fn meet_boxes<W: Wide>(node: &Node, ray: &Slabs) -> (u32, W) {
+pub(crate) fn intersect_boxes<W: F32x16>(node: &Node, ray: &Slabs) -> (u32, W) {
     let (near_x, far_x) = near_and_far(node, ray.sides, 0);
     let (near_y, far_y) = near_and_far(node, ray.sides, 1);
     let (near_z, far_z) = near_and_far(node, ray.sides, 2);
@@ -43,7 +43,7 @@ pub(crate) fn meet_boxes<W: Wide>(node: &Node, ray: &Slabs) -> (u32, W) {
 
 /// The same of rays together: among them all that one of them meets, and no later than it enters.
 #[inline(always)]
-pub(crate) fn meet_frustum<W: Wide>(node: &Node, frustum: &Frustum) -> (u32, W) {
+pub(crate) fn intersect_frustum<W: F32x16>(node: &Node, frustum: &Frustum) -> (u32, W) {
     let mut enter = W::splat(frustum.s_min);
     let mut leave = W::splat(frustum.s_max);
     for axis in 0..3 {
@@ -63,7 +63,7 @@ pub(crate) fn meet_frustum<W: Wide>(node: &Node, frustum: &Frustum) -> (u32, W) 
 /// Of the children in the mask, those whose boxes any of the rays that are alive meets; and, if `is_ordered`, where the first of them
 /// enters each.
 #[inline(always)]
-pub(crate) fn meet_each<W: Wide>(
+pub(crate) fn intersect_each<W: F32x16>(
     node: &Node,
     rays: &SlabRows,
     sides: &Sides,
@@ -91,7 +91,7 @@ pub(crate) fn meet_each<W: Wide>(
         let leave_x = x.times_plus(W::splat(far_x[child]), last_x);
         let leave_y = y.times_plus(W::splat(far_y[child]), last_y);
         let leave_z = z.times_plus(W::splat(far_z[child]), last_z);
-        // As for one ray: see `meet_boxes`.
+        // As for one ray: see `intersect_boxes`.
         let enter = enter_x.later(enter_y).later(enter_z.later(s_min));
         let leave = leave_x.earlier(leave_y).earlier(leave_z.earlier(s_max));
         let those = enter.no_later(leave) & alive;
@@ -113,7 +113,7 @@ pub(crate) fn only_child(node: &Node, mask: u32) -> u32 {
 /// Puts the children in `mask`, two or more, onto the stack, the nearest last, but for the nearest, which it answers: by where the
 /// ray enters them.
 #[inline(always)]
-pub(crate) fn push_by_distance<W: Wide>(node: &Node, mask: u32, enter: W, room: Room<i64>) -> u32 {
+pub(crate) fn push_by_distance<W: F32x16>(node: &Node, mask: u32, enter: W, room: Room<i64>) -> u32 {
     let but_one = mask & mask.wrapping_sub(1);
     let but_two = but_one & but_one.wrapping_sub(1);
     let but_three = but_two & but_two.wrapping_sub(1);
@@ -149,7 +149,7 @@ pub(crate) fn push_by_distance<W: Wide>(node: &Node, mask: u32, enter: W, room: 
 
 /// The same of any two or more.
 #[inline(always)]
-fn push_many<W: Wide>(node: &Node, mask: u32, enter: W, room: Room<i64>) -> u32 {
+fn push_many<W: F32x16>(node: &Node, mask: u32, enter: W, room: Room<i64>) -> u32 {
     put_in_order(node, mask, enter, room.window);
     let count = mask.count_ones() as usize - 1;
     // SAFETY: as many were written, and one more.
@@ -162,7 +162,7 @@ fn push_many<W: Wide>(node: &Node, mask: u32, enter: W, room: Room<i64>) -> u32 
 
 /// Puts the children in `mask` there, the nearest last.
 #[inline(always)]
-fn put_in_order<W: Wide>(node: &Node, mask: u32, enter: W, window: &mut [MaybeUninit<i64>; WIDTH]) {
+fn put_in_order<W: F32x16>(node: &Node, mask: u32, enter: W, window: &mut [MaybeUninit<i64>; WIDTH]) {
     let keys = enter.lanes_in_bits();
     let by_lane = keys.bits();
     // Where each goes is how many are farther: no two have one key, so that the first places are all written.
@@ -177,7 +177,7 @@ fn put_in_order<W: Wide>(node: &Node, mask: u32, enter: W, window: &mut [MaybeUn
 
 /// The same as [`push_by_distance`], hardly with a branch where there are instructions for it: only where there are more than four.
 #[inline(always)]
-pub(crate) fn put_and_take_by_distance<W: Wide>(
+pub(crate) fn put_and_take_by_distance<W: F32x16>(
     node: &Node,
     mask: u32,
     enter: W,
@@ -201,7 +201,7 @@ pub(crate) fn put_and_take_by_distance<W: Wide>(
 /// Puts the children in `mask`, one or more, onto the stack in the order in which they stand in the node, but for the last, which it
 /// answers.
 #[inline(always)]
-pub(crate) fn push_as_built<W: Wide>(node: &Node, mask: u32, room: Room<u32>) -> u32 {
+pub(crate) fn push_as_built<W: F32x16>(node: &Node, mask: u32, room: Room<u32>) -> u32 {
     W::put_chosen(mask, &node.children, room.window);
     // SAFETY: as many were written, and one more.
     unsafe { room.add(mask.count_ones() as usize - 1) };
@@ -211,7 +211,7 @@ pub(crate) fn push_as_built<W: Wide>(node: &Node, mask: u32, room: Room<u32>) ->
 /// Puts the children in `mask`, if there are any, onto the stack in the order in which they stand in the node, and takes what then is
 /// the last there: without a branch.
 #[inline(always)]
-pub(crate) fn put_and_take_as_built<W: Wide>(node: &Node, mask: u32, slots: &mut Slots<u32>) -> u32 {
+pub(crate) fn put_and_take_as_built<W: F32x16>(node: &Node, mask: u32, slots: &mut Slots<u32>) -> u32 {
     let Some(last) = slots.len.checked_sub(1) else { return Node::ABSENT };
     let child = &node.children[(mask.leading_zeros() ^ 31) as usize % WIDTH];
     // SAFETY: it is one of the first `len`, which are initialised.

@@ -1,19 +1,19 @@
 //! Rays against what a tree is made of: boxes, blocks of triangles, spheres and bounding volumes, for each instruction set. With
 //! [`simd`](crate::simd), the fence around all `unsafe` but the call that maps a file: above it, a traversal is written once, over
-//! [`Lanes`].
+//! [`Simd`].
 //!
-//! [`Level::run`] chooses the instruction set once a search, and [`Level::asked`] for all searches. The code between is generic and
+//! [`Isa::run`] chooses the instruction set once a search, and [`Isa::dispatched`] for all searches. The code between is generic and
 //! `#[inline(always)]` without a target feature of its own, so that it takes on the features of the root that it is inlined into.
 
 #![allow(unsafe_code)]
 
-mod asked;
+mod bounding_volumes;
 pub(crate) mod box_ray;
 mod boxes;
+mod dispatched;
 pub(crate) mod f32_ray;
-mod hulls;
+pub(crate) mod filter_start;
 mod portable;
-pub(crate) mod single_start;
 mod spheres;
 pub(crate) mod watertight;
 #[cfg(target_arch = "x86_64")]
@@ -33,71 +33,71 @@ use crate::Ray32;
 use crate::intersect::box_ray::SlabRows;
 use crate::intersect::box_ray::{BoxRay, Slabs};
 use crate::intersect::f32_ray::F32Ray;
-use crate::intersect::single_start::SingleStart;
-use crate::intersect::watertight::{BlockRay, Inside, Passage, Shear};
+use crate::intersect::filter_start::FilterStart;
+use crate::intersect::watertight::{BlockRay, EdgeTest, Inside, Shear};
 #[cfg(test)]
 use crate::simd::Vector;
-use crate::simd::{Eight, Row, WIDE, Wide, three_of_two};
+use crate::simd::{F32x8, F32x16, Row, WIDE, three_of_two};
 #[cfg(test)]
 use crate::tree::node::Node;
-use crate::tree::node::{Units, WIDTH};
+use crate::tree::node::{TreeSpace, WIDTH};
 use crate::tree::triangle_block::{TriangleBlock, shared_row, unshared_row};
 use crate::tree::{BLOCK, Corners};
 
-pub(crate) use asked::{Asked, Question};
+#[cfg(test)]
+pub(crate) use bounding_volumes::intersect_bounding_volumes_at;
+pub(crate) use bounding_volumes::{BoundingHits, intersect_bounding_volumes};
 pub(crate) use boxes::{
-    meet_boxes, meet_each, meet_frustum, only_child, push_as_built, push_by_distance, put_and_take_as_built,
-    put_and_take_by_distance,
+    intersect_boxes, intersect_each, intersect_frustum, only_child, push_as_built, push_by_distance,
+    put_and_take_as_built, put_and_take_by_distance,
 };
-#[cfg(test)]
-pub(crate) use hulls::meet_hulls_at;
-pub(crate) use hulls::{MetHulls, meet_hulls};
+pub(crate) use dispatched::{DispatchedQuery, RayQuery};
 pub(crate) use portable::Portable;
-pub(crate) use spheres::meet_spheres;
+pub(crate) use spheres::intersect_spheres;
 #[cfg(test)]
-pub(crate) use spheres::meet_spheres_at;
+pub(crate) use spheres::intersect_spheres_at;
 
 /// What a search does many at a time: boxes by sixteen, and triangles by eight.
-pub(crate) trait Lanes {
+pub(crate) trait Simd {
     /// Eight numbers.
-    type Eight: Eight;
+    type F32x8: F32x8;
     /// How a line passes the edges of eight triangles.
     type Edges: Copy + Zeroable;
     /// The same of two lines, each with its block.
     type EdgesByTwo: Copy + Zeroable;
     /// Sixteen numbers, alike.
-    type Wide: Wide<Half = Self::Eight>;
+    type F32x16: F32x16<Half = Self::F32x8>;
     /// Whether two rays, each at a block of its own, are better met together than one after the other.
-    const MEETS_BY_TWO: bool = false;
+    const INTERSECTS_BY_TWO: bool = false;
     /// Whether rays in single precision are better started by four than one after the other.
     const STARTS_BY_FOUR: bool = false;
     /// Whether rays go on together for a while where that no longer pays, for what they have done: see `packet`.
     const GOES_ON_TOGETHER: bool = true;
 
     /// The instruction set that these are of.
-    fn level() -> Level;
+    fn isa() -> Isa;
 
     /// Makes `boxes` the ray from `t_min` to `t_max` for a tree in these units, if it is one from nearby, which it answers;
     /// also checks that it is sound.
-    fn start_nearby(units: &Units, ray: &Ray, t_min: f64, t_max: f64, boxes: &mut BoxRay) -> bool;
+    fn start_nearby(tree_space: &TreeSpace, ray: &Ray, t_min: f64, t_max: f64, boxes: &mut BoxRay) -> bool;
 
     /// The ray for boxes in single precision; `None` where it does not come from nearby, or is not sound.
-    fn start_single(start: &SingleStart, ray: &Ray) -> Option<Slabs>;
+    fn start_filter(start: &FilterStart, ray: &Ray) -> Option<Slabs>;
 
     /// The ray in the space of what a map places, with another range, and for boxes there: see [`Ray::into_object`].
     #[inline(always)]
     fn start_placed(
-        start: &SingleStart,
+        start: &FilterStart,
         map: &Transform,
         ray: &Ray,
         [t_min, t_max]: [f64; 2],
     ) -> (Ray, Option<Slabs>) {
         let ray = ray.into_object(map).with_range(t_min, t_max);
-        (ray, Self::start_single(start, &ray))
+        (ray, Self::start_filter(start, &ray))
     }
 
     /// The same ray for triangles, and from heights along it to places in the range of boxes.
-    fn start_blocks(start: &SingleStart, ray: &Ray, slabs: &Slabs) -> (BlockRay, f32);
+    fn start_blocks(start: &FilterStart, ray: &Ray, slabs: &Slabs) -> (BlockRay, f32);
 
     /// A ray as it can be read in wide pieces at once, though it may have been written number by number just now: what is read so would
     /// wait until that is out of sight, and with it the rays one for another.
@@ -108,50 +108,53 @@ pub(crate) trait Lanes {
 
     /// The same in single precision.
     #[inline(always)]
-    fn read_narrow(ray: &Ray32) -> Ray32 {
+    fn read_f32(ray: &Ray32) -> Ray32 {
         *ray
     }
 
     /// The ray in single precision for boxes; `None` where it does not come from nearby, or is not sound.
-    fn start_narrow(start: &SingleStart, ray: &Ray32) -> Option<Slabs>;
+    fn start_f32(start: &FilterStart, ray: &Ray32) -> Option<Slabs>;
 
     /// The same ray for triangles.
-    fn start_narrow_blocks(start: &SingleStart, ray: &Ray32, slabs: &Slabs) -> F32Ray;
+    fn start_f32_blocks(start: &FilterStart, ray: &Ray32, slabs: &Slabs) -> F32Ray;
 
     /// Both of four rays, and a bit for each that comes from nearby and is sound; what is made of the others means nothing.
     #[inline(always)]
-    fn start_narrow_by_four(
-        start: &SingleStart,
+    fn start_f32_by_four(
+        start: &FilterStart,
         rays: [&Ray32; 4],
         places: [(&mut Slabs, &mut F32Ray); 4],
     ) -> u32 {
-        start_narrow_one_by_one::<Self>(start, rays, places)
+        start_f32_one_by_one::<Self>(start, rays, places)
     }
 
     /// The corners of the triangles of a block in the ray's sheared space, `[x, y or z][corner]`, all with the sign turned; what lanes
     /// without a triangle have means nothing. No product is fused with a sum: it is the same on every machine.
-    fn narrow_corners(block: &TriangleBlock, ray: &F32Ray) -> [[Self::Eight; 3]; 3];
+    fn f32_corners(block: &TriangleBlock, ray: &F32Ray) -> [[Self::F32x8; 3]; 3];
 
     /// The same of two blocks, each by its ray: those of the first, and those of the second.
     #[inline(always)]
-    fn narrow_corners_by_two(blocks: [&TriangleBlock; 2], rays: [&F32Ray; 2]) -> [[Self::Wide; 3]; 3] {
-        let first = Self::narrow_corners(blocks[0], rays[0]);
-        let second = Self::narrow_corners(blocks[1], rays[1]);
+    fn f32_corners_by_two(blocks: [&TriangleBlock; 2], rays: [&F32Ray; 2]) -> [[Self::F32x16; 3]; 3] {
+        let first = Self::f32_corners(blocks[0], rays[0]);
+        let second = Self::f32_corners(blocks[1], rays[1]);
         corners_of_two(&first, &second)
     }
 
     /// The numbers of rays in single precision, side by side: origin, start, direction, end.
-    fn narrow_rows(rays: &[Ray32; WIDE], rows: &mut [Row<f32>; 8]);
+    fn f32_rows(rays: &[Ray32; WIDE], rows: &mut [Row<f32>; 8]);
 
     /// The numbers of rays, side by side: origin, direction and range.
     fn columns(rays: &[Ray; WIDE], columns: &mut [Row<f64>; 8]);
 
-    /// A bit for each triangle that the line of the ray may meet, among them all that it does, and what [`Lanes::place_crossings`]
+    /// A bit for each triangle that the line of the ray may meet, among them all that it does, and what [`Simd::place_crossings`]
     /// wants to know: see [`BlockRay`].
-    fn meet_triangles(block: &TriangleBlock, ray: &BlockRay) -> (u32, Self::Edges);
+    fn intersect_triangles(block: &TriangleBlock, ray: &BlockRay) -> (u32, Self::Edges);
 
     /// The same of two blocks, each by its ray: those of the first, and those of the second.
-    fn meet_triangles_by_two(blocks: [&TriangleBlock; 2], rays: [&BlockRay; 2]) -> (u32, Self::EdgesByTwo);
+    fn intersect_triangles_by_two(
+        blocks: [&TriangleBlock; 2],
+        rays: [&BlockRay; 2],
+    ) -> (u32, Self::EdgesByTwo);
 
     /// Of one of the two: `which` is 0 or 1.
     fn edges_of(both: &Self::EdgesByTwo, which: usize) -> Self::Edges;
@@ -166,34 +169,34 @@ pub(crate) trait Lanes {
     fn corners<'a>(block: &'a TriangleBlock, room: &'a mut CornersRoom) -> &'a Corners;
 
     /// Where along the ray that is.
-    fn place_crossings(edges: &Self::Edges, ray: &BlockRay) -> Crossings<Self::Eight>;
+    fn place_crossings(edges: &Self::Edges, ray: &BlockRay) -> Crossings<Self::F32x8>;
 
     /// [`Shear::new`] and [`Shear::local_origin`] of a ray that has these axes, for a mesh.
     fn shear(ray: &Ray, axes: &'static Axes, mesh_origin: &[f64; 4]) -> (Shear, [f64; 3]);
 
     /// How a ray passes the triangle in a lane, in double precision, and what its crossing inside is made of. `origin` has the order
     /// of the shear's axes.
-    fn pass(block: &TriangleBlock, lane: usize, shear: &Shear, origin: &[f64; 3]) -> (Passage, Inside);
+    fn pass(block: &TriangleBlock, lane: usize, shear: &Shear, origin: &[f64; 3]) -> (EdgeTest, Inside);
 }
 
 /// The corners of the triangles of a block, and those of another.
 #[inline(always)]
-fn corners_of_two<W: Wide>(first: &[[W::Half; 3]; 3], second: &[[W::Half; 3]; 3]) -> [[W; 3]; 3] {
+fn corners_of_two<W: F32x16>(first: &[[W::Half; 3]; 3], second: &[[W::Half; 3]; 3]) -> [[W; 3]; 3] {
     let [x, y, z] = first;
     [three_of_two(x, &second[0]), three_of_two(y, &second[1]), three_of_two(z, &second[2])]
 }
 
-/// [`Lanes::start_narrow_by_four`], one ray after the other.
+/// [`Simd::start_f32_by_four`], one ray after the other.
 #[inline(always)]
-fn start_narrow_one_by_one<L: Lanes + ?Sized>(
-    start: &SingleStart,
+fn start_f32_one_by_one<L: Simd + ?Sized>(
+    start: &FilterStart,
     rays: [&Ray32; 4],
     places: [(&mut Slabs, &mut F32Ray); 4],
 ) -> u32 {
     let mut fit = 0;
-    for (i, (ray, (slabs, narrow))) in rays.into_iter().zip(places).enumerate() {
-        if let Some(started) = L::start_narrow(start, ray) {
-            *narrow = L::start_narrow_blocks(start, ray, &started);
+    for (i, (ray, (slabs, f32_ray))) in rays.into_iter().zip(places).enumerate() {
+        if let Some(started) = L::start_f32(start, ray) {
+            *f32_ray = L::start_f32_blocks(start, ray, &started);
             *slabs = started;
             fit |= 1 << i;
         }
@@ -224,7 +227,7 @@ pub(crate) struct Crossings<E> {
     pub(crate) to: E,
 }
 
-impl<E: Eight> Crossings<E> {
+impl<E: F32x8> Crossings<E> {
     /// The heights between which the crossing in a lane lies.
     #[inline(always)]
     pub(crate) fn between(&self, lane: usize) -> (f32, f32) {
@@ -479,32 +482,31 @@ impl<E> Room<'_, E> {
     }
 }
 
-/// Work to be done with whichever lanes the machine has.
-pub(crate) trait Task {
-    /// What it gives.
+/// Work that is compiled for every instruction set and dispatched to one.
+pub(crate) trait Dispatch {
+    /// Its result.
     type Output;
     /// Does it. To be `#[inline(always)]`, with everything that it calls in its inner loop.
-    fn run<L: Lanes>(self) -> Self::Output;
+    fn run<L: Simd>(self) -> Self::Output;
 }
 
-/// Where a task is compiled: beside the type whose methods these are, which is its own or one that is named.
+/// The type beside which dispatched work is compiled.
 ///
-/// To the compiler, a generic method stands where the type stands whose method it is, and what stands in one module is one piece of work. So
-/// the searches of different modules are compiled at the same time. As functions of this module, those with vectors were one piece: more
-/// than half of all that there is to compile, by one core, however many there are.
-trait Home {
+/// The compiler puts a generic method into the codegen unit of the type whose method it is. As methods of types in different modules, the
+/// traversals are compiled in parallel; as functions of this module they would all be one unit.
+trait CompilationUnit {
     // Out of the way of the others.
     #[inline(never)]
-    fn run_portable<T: Task>(task: T) -> T::Output {
+    fn run_portable<T: Dispatch>(task: T) -> T::Output {
         task.run::<Portable>()
     }
 }
 
-impl<H> Home for H {}
+impl<H> CompilationUnit for H {}
 
 /// An instruction set that this machine has: there is no other way to one than asking it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Level(Set);
+pub(crate) struct Isa(Set);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Set {
@@ -515,10 +517,10 @@ enum Set {
     Avx512,
 }
 
-impl Level {
+impl Isa {
     /// The best that this machine has.
     pub(crate) fn best() -> Self {
-        static BEST: OnceLock<Level> = OnceLock::new();
+        static BEST: OnceLock<Isa> = OnceLock::new();
         *BEST.get_or_init(|| Self::all().pop().expect("one at least"))
     }
 
@@ -555,7 +557,7 @@ impl Level {
 
     /// Runs a task that is only compiled for instruction sets with vectors.
     #[inline(always)]
-    pub(crate) fn run_with_vectors<T: Task>(self, task: T) -> T::Output {
+    pub(crate) fn run_with_vectors<T: Dispatch>(self, task: T) -> T::Output {
         match self.0 {
             Set::Portable => unreachable!("who calls it asks `has_vectors`"),
             #[cfg(target_arch = "x86_64")]
@@ -569,13 +571,13 @@ impl Level {
 
     /// Runs the task with these lanes.
     #[inline(always)]
-    pub(crate) fn run<T: Task>(self, task: T) -> T::Output {
+    pub(crate) fn run<T: Dispatch>(self, task: T) -> T::Output {
         self.run_beside::<T, T>(task)
     }
 
-    /// The same, compiled beside this type: see [`Home`].
+    /// The same, compiled beside this type: see [`CompilationUnit`].
     #[inline(always)]
-    pub(crate) fn run_beside<H, T: Task>(self, task: T) -> T::Output {
+    pub(crate) fn run_beside<H, T: Dispatch>(self, task: T) -> T::Output {
         match self.0 {
             Set::Portable => H::run_portable(task),
             #[cfg(target_arch = "x86_64")]
@@ -588,106 +590,102 @@ impl Level {
     }
 }
 
-/// What [`Lanes::start_single`] and [`Lanes::start_blocks`] give at a level, for tests.
+/// What [`Simd::start_filter`] and [`Simd::start_blocks`] give at an instruction set, for tests.
 #[cfg(test)]
-pub(crate) fn start_single_at(
-    level: Level,
-    start: &SingleStart,
-    ray: &Ray,
-) -> Option<(Slabs, BlockRay, f32)> {
-    struct Starting<'a>(&'a SingleStart, &'a Ray);
-    impl Task for Starting<'_> {
+pub(crate) fn start_filter_at(isa: Isa, start: &FilterStart, ray: &Ray) -> Option<(Slabs, BlockRay, f32)> {
+    struct Starting<'a>(&'a FilterStart, &'a Ray);
+    impl Dispatch for Starting<'_> {
         type Output = Option<(Slabs, BlockRay, f32)>;
         #[inline(always)]
-        fn run<L: Lanes>(self) -> Self::Output {
-            let slabs = L::start_single(self.0, self.1)?;
+        fn run<L: Simd>(self) -> Self::Output {
+            let slabs = L::start_filter(self.0, self.1)?;
             let (blocks, place_per_height) = L::start_blocks(self.0, self.1, &slabs);
             Some((slabs, blocks, place_per_height))
         }
     }
-    level.run(Starting(start, ray))
+    isa.run(Starting(start, ray))
 }
 
-/// What [`Lanes::read`] and [`Lanes::read_narrow`] give at a level, for tests.
+/// What [`Simd::read`] and [`Simd::read_f32`] give at an instruction set, for tests.
 #[cfg(test)]
-pub(crate) fn read_at(level: Level, ray: &Ray, narrow: &Ray32) -> (Ray, Ray32) {
+pub(crate) fn read_at(isa: Isa, ray: &Ray, f32_ray: &Ray32) -> (Ray, Ray32) {
     struct Reading<'a>(&'a Ray, &'a Ray32);
-    impl Task for Reading<'_> {
+    impl Dispatch for Reading<'_> {
         type Output = (Ray, Ray32);
         #[inline(always)]
-        fn run<L: Lanes>(self) -> Self::Output {
-            (L::read(self.0), L::read_narrow(self.1))
+        fn run<L: Simd>(self) -> Self::Output {
+            (L::read(self.0), L::read_f32(self.1))
         }
     }
-    level.run(Reading(ray, narrow))
+    isa.run(Reading(ray, f32_ray))
 }
 
-/// What [`Lanes::start_narrow_by_four`] gives at a level, and what it gives one by one, for tests.
+/// What [`Simd::start_f32_by_four`] gives at an instruction set, and what it gives one by one, for tests.
 #[cfg(test)]
-pub(crate) fn start_narrow_by_four_at(
-    level: Level,
-    start: &SingleStart,
+pub(crate) fn start_f32_by_four_at(
+    isa: Isa,
+    start: &FilterStart,
     rays: [&Ray32; 4],
 ) -> [[Option<(Slabs, F32Ray)>; 4]; 2] {
-    struct Starting<'a>(&'a SingleStart, [&'a Ray32; 4]);
-    impl Task for Starting<'_> {
+    struct Starting<'a>(&'a FilterStart, [&'a Ray32; 4]);
+    impl Dispatch for Starting<'_> {
         type Output = [[Option<(Slabs, F32Ray)>; 4]; 2];
         #[inline(always)]
-        fn run<L: Lanes>(self) -> Self::Output {
+        fn run<L: Simd>(self) -> Self::Output {
             let Self(start, rays) = self;
             [true, false].map(|is_together| {
                 let mut starts = [(Slabs::ZERO, F32Ray::of_none()); 4];
                 let [a, b, c, d] = &mut starts;
-                let places = [a, b, c, d].map(|(slabs, narrow)| (slabs, narrow));
+                let places = [a, b, c, d].map(|(slabs, f32_ray)| (slabs, f32_ray));
                 let fit = if is_together {
-                    L::start_narrow_by_four(start, rays, places)
+                    L::start_f32_by_four(start, rays, places)
                 } else {
-                    start_narrow_one_by_one::<L>(start, rays, places)
+                    start_f32_one_by_one::<L>(start, rays, places)
                 };
                 std::array::from_fn(|i| (fit >> i & 1 != 0).then_some(starts[i]))
             })
         }
     }
-    level.run(Starting(start, rays))
+    isa.run(Starting(start, rays))
 }
 
-/// What [`Lanes::start_placed`] gives at a level, for tests.
+/// What [`Simd::start_placed`] gives at an instruction set, for tests.
 #[cfg(test)]
 pub(crate) fn start_placed_at(
-    level: Level,
-    start: &SingleStart,
+    isa: Isa,
+    start: &FilterStart,
     map: &Transform,
     ray: &Ray,
     range: [f64; 2],
 ) -> (Ray, Option<Slabs>) {
-    struct Starting<'a>(&'a SingleStart, &'a Transform, &'a Ray, [f64; 2]);
-    impl Task for Starting<'_> {
+    struct Starting<'a>(&'a FilterStart, &'a Transform, &'a Ray, [f64; 2]);
+    impl Dispatch for Starting<'_> {
         type Output = (Ray, Option<Slabs>);
         #[inline(always)]
-        fn run<L: Lanes>(self) -> Self::Output {
+        fn run<L: Simd>(self) -> Self::Output {
             L::start_placed(self.0, self.1, self.2, self.3)
         }
     }
-    level.run(Starting(start, map, ray, range))
+    isa.run(Starting(start, map, ray, range))
 }
 
-/// What [`Lanes::meet_boxes`] gives at a level, and where the ray enters each box, for tests.
+/// What [`Simd::intersect_boxes`] gives at an instruction set, and where the ray enters each box, for tests.
 #[cfg(test)]
-pub(crate) fn meet_boxes_at(level: Level, node: &Node, ray: &Slabs) -> (u32, [i32; WIDTH]) {
+pub(crate) fn intersect_boxes_at(isa: Isa, node: &Node, ray: &Slabs) -> (u32, [i32; WIDTH]) {
     struct Boxes<'a>(&'a Node, &'a Slabs);
-    impl Task for Boxes<'_> {
+    impl Dispatch for Boxes<'_> {
         type Output = (u32, [i32; WIDTH]);
         #[inline(always)]
-        fn run<L: Lanes>(self) -> Self::Output {
+        fn run<L: Simd>(self) -> Self::Output {
             // A child's reference is its lane here. The nearest, which never stands on the stack, has no key.
             let mut node = *self.0;
             node.children = std::array::from_fn(|lane| lane as u32);
-            let (mask, enter) = meet_boxes::<L::Wide>(&node, self.1);
+            let (mask, enter) = intersect_boxes::<L::F32x16>(&node, self.1);
             let mut by_lane = [i32::MAX; WIDTH];
             // On what was there before: as they stand in the node.
             let mut slots = Slots::new();
             slots.push(99);
-            let mut taken = vec![put_and_take_as_built::<L::Wide>(&node, mask, &mut slots)];
+            let mut taken = vec![put_and_take_as_built::<L::F32x16>(&node, mask, &mut slots)];
             taken.extend(std::iter::from_fn(|| slots.pop()));
             let met = (0..WIDTH as u32).filter(|lane| mask >> lane & 1 != 0);
             assert_eq!(taken, std::iter::once(99).chain(met).rev().collect::<Vec<_>>());
@@ -713,28 +711,28 @@ pub(crate) fn meet_boxes_at(level: Level, node: &Node, ray: &Slabs) -> (u32, [i3
             (mask, by_lane)
         }
     }
-    level.run(Boxes(node, ray))
+    isa.run(Boxes(node, ray))
 }
 
 /// A mask of children, and where they are entered.
 #[cfg(test)]
 type Entered = (u32, [f32; WIDTH]);
 
-/// What [`meet_each`] gives of some children at a level for those of the rays that are alive, and what [`meet_boxes`] gives for each
+/// What [`intersect_each`] gives of some children at an instruction set for those of the rays that are alive, and what [`intersect_boxes`] gives for each
 /// of them: a mask, and where children are entered; for tests. All have the sides of the first.
 #[cfg(test)]
-pub(crate) fn meet_each_at(
-    level: Level,
+pub(crate) fn intersect_each_at(
+    isa: Isa,
     node: &Node,
     rays: &[Slabs; WIDE],
     alive: u32,
     children: u32,
 ) -> (Entered, [Entered; WIDE]) {
     struct Each<'a>(&'a Node, &'a [Slabs; WIDE], u32, u32);
-    impl Task for Each<'_> {
+    impl Dispatch for Each<'_> {
         type Output = (Entered, [Entered; WIDE]);
         #[inline(always)]
-        fn run<L: Lanes>(self) -> Self::Output {
+        fn run<L: Simd>(self) -> Self::Output {
             let Self(node, rays, alive, children) = self;
             let row = |number: &dyn Fn(&Slabs) -> f32| Row(std::array::from_fn(|i| number(&rays[i])));
             let rows = SlabRows {
@@ -745,41 +743,41 @@ pub(crate) fn meet_each_at(
                 s_max: row(&Slabs::s_max),
             };
             let mut enters = Row::of(0.0);
-            let boxes = (children, L::Wide::splat(-1.0));
-            let (met, enter) = meet_each::<L::Wide>(node, &rows, rays[0].sides, boxes, alive, true);
+            let boxes = (children, L::F32x16::splat(-1.0));
+            let (met, enter) = intersect_each::<L::F32x16>(node, &rows, rays[0].sides, boxes, alive, true);
             enter.store(&mut enters);
             let alone = std::array::from_fn(|i| {
                 let mut enters = Row::of(0.0);
-                let (met, enter) = meet_boxes::<L::Wide>(node, &rays[i]);
+                let (met, enter) = intersect_boxes::<L::F32x16>(node, &rays[i]);
                 enter.store(&mut enters);
                 (met, enters.0)
             });
             ((met, enters.0), alone)
         }
     }
-    level.run(Each(node, rays, alive, children))
+    isa.run(Each(node, rays, alive, children))
 }
 
-/// The triangles of a block that the ray may meet in its range and those that it certainly does, at a level, with the heights
+/// The triangles of a block that the ray may meet in its range and those that it certainly does, at an instruction set, with the heights
 /// between which each is met, for tests.
 #[cfg(test)]
-pub(crate) fn meet_triangles_at(
-    level: Level,
+pub(crate) fn intersect_triangles_at(
+    isa: Isa,
     block: &TriangleBlock,
     ray: &BlockRay,
 ) -> (u32, u32, [[f32; 2]; BLOCK]) {
     struct Triangles<'a>(&'a TriangleBlock, &'a BlockRay);
-    impl Task for Triangles<'_> {
+    impl Dispatch for Triangles<'_> {
         type Output = (u32, u32, [[f32; 2]; BLOCK]);
         #[inline(always)]
-        fn run<L: Lanes>(self) -> Self::Output {
-            let (mask, edges) = L::meet_triangles(self.0, self.1);
+        fn run<L: Simd>(self) -> Self::Output {
+            let (mask, edges) = L::intersect_triangles(self.0, self.1);
             let crossings = L::place_crossings(&edges, self.1);
             let between = std::array::from_fn(|lane| <[f32; 2]>::from(crossings.between(lane)));
             (mask & crossings.in_range, mask & crossings.sure, between)
         }
     }
-    level.run(Triangles(block, ray))
+    isa.run(Triangles(block, ray))
 }
 
 /// What a ray is told of a block, bit by bit, of lanes with a triangle: which it may meet, those in its range, those that it surely meets,
@@ -795,10 +793,10 @@ pub(crate) struct Told {
 #[cfg(test)]
 impl Told {
     #[inline(always)]
-    fn of<L: Lanes>(
+    fn of<L: Simd>(
         (block, ray): (&TriangleBlock, &BlockRay),
         (mask, edges): (u32, L::Edges),
-        corners: [[L::Eight; 3]; 3],
+        corners: [[L::F32x8; 3]; 3],
     ) -> Self {
         let taken = block.taken();
         let crossings = L::place_crossings(&edges, ray);
@@ -820,78 +818,78 @@ impl Told {
     }
 }
 
-/// What two rays are told of two blocks at a level, each of its own: by both together, and by each alone; for tests.
+/// What two rays are told of two blocks at an instruction set, each of its own: by both together, and by each alone; for tests.
 #[cfg(test)]
 pub(crate) fn told_at(
-    level: Level,
+    isa: Isa,
     blocks: [&TriangleBlock; 2],
     rays: [&BlockRay; 2],
-    narrow: [&F32Ray; 2],
+    f32_ray: [&F32Ray; 2],
 ) -> [[Told; 2]; 2] {
     struct Telling<'a>([&'a TriangleBlock; 2], [&'a BlockRay; 2], [&'a F32Ray; 2]);
-    impl Task for Telling<'_> {
+    impl Dispatch for Telling<'_> {
         type Output = [[Told; 2]; 2];
         #[inline(always)]
-        fn run<L: Lanes>(self) -> Self::Output {
-            let Self(blocks, rays, narrow) = self;
-            let (mask, edges) = L::meet_triangles_by_two(blocks, rays);
-            let [x, y, z] = L::narrow_corners_by_two(blocks, narrow);
+        fn run<L: Simd>(self) -> Self::Output {
+            let Self(blocks, rays, f32_ray) = self;
+            let (mask, edges) = L::intersect_triangles_by_two(blocks, rays);
+            let [x, y, z] = L::f32_corners_by_two(blocks, f32_ray);
             let one =
-                |row: &[L::Wide; 3], which| [row[0].half(which), row[1].half(which), row[2].half(which)];
+                |row: &[L::F32x16; 3], which| [row[0].half(which), row[1].half(which), row[2].half(which)];
             let together = |which: usize| {
-                let of_one = (mask >> (BLOCK * which) & L::Eight::ALL, L::edges_of(&edges, which));
+                let of_one = (mask >> (BLOCK * which) & L::F32x8::ALL, L::edges_of(&edges, which));
                 let corners = [one(&x, which), one(&y, which), one(&z, which)];
                 Told::of::<L>((blocks[which], rays[which]), of_one, corners)
             };
             let alone = |which: usize| {
                 let (block, ray) = (blocks[which], rays[which]);
-                let corners = L::narrow_corners(block, narrow[which]);
-                Told::of::<L>((block, ray), L::meet_triangles(block, ray), corners)
+                let corners = L::f32_corners(block, f32_ray[which]);
+                Told::of::<L>((block, ray), L::intersect_triangles(block, ray), corners)
             };
             [[together(0), together(1)], [alone(0), alone(1)]]
         }
     }
-    level.run(Telling(blocks, rays, narrow))
+    isa.run(Telling(blocks, rays, f32_ray))
 }
 
-/// [`Lanes::corners`] at a level, for tests.
+/// [`Simd::corners`] at an instruction set, for tests.
 #[cfg(test)]
-pub(crate) fn corners_at(level: Level, block: &TriangleBlock) -> Corners {
+pub(crate) fn corners_at(isa: Isa, block: &TriangleBlock) -> Corners {
     struct Taking<'a>(&'a TriangleBlock);
-    impl Task for Taking<'_> {
+    impl Dispatch for Taking<'_> {
         type Output = Corners;
         #[inline(always)]
-        fn run<L: Lanes>(self) -> Self::Output {
+        fn run<L: Simd>(self) -> Self::Output {
             *L::corners(self.0, &mut CornersRoom::new())
         }
     }
-    level.run(Taking(block))
+    isa.run(Taking(block))
 }
 
-/// [`Lanes::equals_before`] at a level, for tests.
+/// [`Simd::equals_before`] at an instruction set, for tests.
 #[cfg(test)]
-pub(crate) fn equals_before_at(level: Level, list: &[u32; 3 * BLOCK]) -> [u32; 3 * BLOCK] {
+pub(crate) fn equals_before_at(isa: Isa, list: &[u32; 3 * BLOCK]) -> [u32; 3 * BLOCK] {
     struct Comparing<'a>(&'a [u32; 3 * BLOCK]);
-    impl Task for Comparing<'_> {
+    impl Dispatch for Comparing<'_> {
         type Output = [u32; 3 * BLOCK];
         #[inline(always)]
-        fn run<L: Lanes>(self) -> Self::Output {
+        fn run<L: Simd>(self) -> Self::Output {
             L::equals_before(self.0)
         }
     }
-    level.run(Comparing(list))
+    isa.run(Comparing(list))
 }
 
-/// [`Lanes::truncated`] at a level, for tests.
+/// [`Simd::truncated`] at an instruction set, for tests.
 #[cfg(test)]
-pub(crate) fn truncated_at(level: Level, numbers: &[f32; BLOCK]) -> [i32; BLOCK] {
+pub(crate) fn truncated_at(isa: Isa, numbers: &[f32; BLOCK]) -> [i32; BLOCK] {
     struct Truncating<'a>(&'a [f32; BLOCK]);
-    impl Task for Truncating<'_> {
+    impl Dispatch for Truncating<'_> {
         type Output = [i32; BLOCK];
         #[inline(always)]
-        fn run<L: Lanes>(self) -> Self::Output {
+        fn run<L: Simd>(self) -> Self::Output {
             L::truncated(self.0)
         }
     }
-    level.run(Truncating(numbers))
+    isa.run(Truncating(numbers))
 }

@@ -4,20 +4,20 @@ use bytemuck::Zeroable;
 use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
 
-use super::{Axes, CornersRoom, Crossings, Lanes, Level, Set, Sides};
+use super::{Axes, CornersRoom, Crossings, Isa, Set, Sides, Simd};
 use crate::Ray32;
 use crate::intersect::box_ray::{BoxRay, END_FACTOR, LITTLE, START_FACTOR, Slabs};
 use crate::intersect::f32_ray::F32Ray;
-use crate::intersect::single_start::SingleStart;
+use crate::intersect::filter_start::FilterStart;
 use crate::intersect::watertight::{
-    BlockRay, EDGE_ERROR, ERRORS_OF_EDGES, ERRORS_OF_EXTENT, HEIGHT_ERROR, HeightRange, Inside, Passage,
-    SIZE_ERROR, Shear, TINY, passage,
+    BlockRay, EDGE_ERROR, ERRORS_OF_EDGES, ERRORS_OF_EXTENT, EdgeTest, HEIGHT_ERROR, HeightRange, Inside,
+    SIZE_ERROR, Shear, TINY, edge_test,
 };
 use crate::simd::vector::{Portable8, Portable16};
-use crate::simd::{Eight, Row, Vector, WIDE};
+use crate::simd::{F32x8, Row, Vector, WIDE};
 use crate::tree::BLOCK;
 use crate::tree::Corners;
-use crate::tree::node::Units;
+use crate::tree::node::TreeSpace;
 use crate::tree::triangle_block::{TriangleBlock, shared_row};
 
 pub(crate) struct Portable;
@@ -48,30 +48,30 @@ fn single_direction(ray: &Ray) -> [f32; 4] {
 
 /// Where a ray starts relative to the mesh, rounded once.
 #[inline(always)]
-fn local(start: &SingleStart, ray: &Ray32) -> [f32; 4] {
+fn local(start: &FilterStart, ray: &Ray32) -> [f32; 4] {
     let [x, y, z] = [0, 1, 2].map(|axis| (f64::from(ray.origin[axis]) - start.mesh_origin[axis]) as f32);
     [x, y, z, 0.0]
 }
 
 // There is no instruction set to be taken on: these are ordinary functions, and the compiler chooses where they go.
-impl Lanes for Portable {
-    type Eight = Portable8;
+impl Simd for Portable {
+    type F32x8 = Portable8;
     type Edges = Edges;
     type EdgesByTwo = [Edges; 2];
-    type Wide = Portable16;
+    type F32x16 = Portable16;
 
     #[inline]
-    fn level() -> Level {
-        Level(Set::Portable)
+    fn isa() -> Isa {
+        Isa(Set::Portable)
     }
 
     #[inline]
-    fn start_nearby(units: &Units, ray: &Ray, t_min: f64, t_max: f64, boxes: &mut BoxRay) -> bool {
-        boxes.start_nearby(units, ray, t_min, t_max)
+    fn start_nearby(tree_space: &TreeSpace, ray: &Ray, t_min: f64, t_max: f64, boxes: &mut BoxRay) -> bool {
+        boxes.start_nearby(tree_space, ray, t_min, t_max)
     }
 
     #[inline]
-    fn start_single(start: &SingleStart, ray: &Ray) -> Option<Slabs> {
+    fn start_filter(start: &FilterStart, ray: &Ray) -> Option<Slabs> {
         let (t_min, t_max) = (ray.t_min as f32, ray.t_max as f32);
         // Every comparison with a NaN is false.
         let (mut fits, mut is_long) = (0.0 <= t_min && t_min <= t_max, false);
@@ -100,7 +100,7 @@ impl Lanes for Portable {
     }
 
     #[inline]
-    fn start_blocks(start: &SingleStart, ray: &Ray, slabs: &Slabs) -> (BlockRay, f32) {
+    fn start_blocks(start: &FilterStart, ray: &Ray, slabs: &Slabs) -> (BlockRay, f32) {
         let (mut origin, mut rest) = ([0.0; 4], [0.0; 4]);
         for axis in 0..3 {
             let exact = ray.origin[axis] - start.mesh_origin[axis];
@@ -126,7 +126,7 @@ impl Lanes for Portable {
     }
 
     #[inline]
-    fn start_narrow(start: &SingleStart, ray: &Ray32) -> Option<Slabs> {
+    fn start_f32(start: &FilterStart, ray: &Ray32) -> Option<Slabs> {
         let (t_min, t_max) = (ray.t_min, ray.t_max);
         // Every comparison with a NaN is false.
         let (mut fits, mut is_long) = (0.0 <= t_min && t_min <= t_max && t_min.is_sign_positive(), false);
@@ -138,7 +138,7 @@ impl Lanes for Portable {
             fits &= from.abs() <= start.farthest[axis] && d.abs() <= start.longest[axis];
             is_long |= d.abs() >= start.shortest;
             let inverse = start.space_per_unit / greater(d.abs(), start.tiny);
-            let margin = inverse * (from.abs() * Units::NARROW_MARGIN_PER_DISTANCE + start.narrow_margin);
+            let margin = inverse * (from.abs() * TreeSpace::F32_MARGIN_PER_DISTANCE + start.f32_margin);
             let inverse = inverse.copysign(d);
             slabs.inverse[axis] = inverse;
             slabs.near_offset[axis] = -from * inverse - margin;
@@ -155,7 +155,7 @@ impl Lanes for Portable {
     }
 
     #[inline]
-    fn start_narrow_blocks(start: &SingleStart, ray: &Ray32, slabs: &Slabs) -> F32Ray {
+    fn start_f32_blocks(start: &FilterStart, ray: &Ray32, slabs: &Slabs) -> F32Ray {
         let axes = Axes::new(&ray.direction.as_dvec3());
         let inverse = axes.permute_single(&slabs.inverse)[2] * start.units_per_space;
         let [x, y, z] = ray.direction.to_array();
@@ -166,17 +166,17 @@ impl Lanes for Portable {
     }
 
     #[inline]
-    fn narrow_corners(block: &TriangleBlock, ray: &F32Ray) -> [[Self::Eight; 3]; 3] {
-        let splat = Self::Eight::splat;
+    fn f32_corners(block: &TriangleBlock, ray: &F32Ray) -> [[Self::F32x8; 3]; 3] {
+        let splat = Self::F32x8::splat;
         let [kx, ky, kz] = ray.axes.order();
         let mut room = CornersRoom::new();
         let corners = Self::corners(block, &mut room);
         let mut sheared = [[splat(0.0); 3]; 3];
         for corner in 0..3 {
             // All three with the sign turned, which their products do not have.
-            let z = splat(ray.origin[2]) - Self::Eight::load(&corners[kz][corner]);
-            let across = splat(ray.origin[0]) - Self::Eight::load(&corners[kx][corner]);
-            let up = splat(ray.origin[1]) - Self::Eight::load(&corners[ky][corner]);
+            let z = splat(ray.origin[2]) - Self::F32x8::load(&corners[kz][corner]);
+            let across = splat(ray.origin[0]) - Self::F32x8::load(&corners[kx][corner]);
+            let up = splat(ray.origin[1]) - Self::F32x8::load(&corners[ky][corner]);
             sheared[0][corner] = across - splat(ray.shear[0]) * z;
             sheared[1][corner] = up - splat(ray.shear[1]) * z;
             sheared[2][corner] = z;
@@ -185,7 +185,7 @@ impl Lanes for Portable {
     }
 
     #[inline]
-    fn narrow_rows(rays: &[Ray32; WIDE], rows: &mut [Row<f32>; 8]) {
+    fn f32_rows(rays: &[Ray32; WIDE], rows: &mut [Row<f32>; 8]) {
         for (i, ray) in rays.iter().enumerate() {
             for axis in 0..3 {
                 rows[axis].0[i] = ray.origin[axis];
@@ -207,7 +207,7 @@ impl Lanes for Portable {
     }
 
     #[inline]
-    fn meet_triangles(block: &TriangleBlock, ray: &BlockRay) -> (u32, Edges) {
+    fn intersect_triangles(block: &TriangleBlock, ray: &BlockRay) -> (u32, Edges) {
         let mut x = [[0.0; BLOCK]; 3];
         let mut y = [[0.0; BLOCK]; 3];
         let mut z = [[0.0; BLOCK]; 3];
@@ -274,9 +274,9 @@ impl Lanes for Portable {
     }
 
     #[inline]
-    fn meet_triangles_by_two(blocks: [&TriangleBlock; 2], rays: [&BlockRay; 2]) -> (u32, [Edges; 2]) {
-        let (first, of_first) = Self::meet_triangles(blocks[0], rays[0]);
-        let (second, of_second) = Self::meet_triangles(blocks[1], rays[1]);
+    fn intersect_triangles_by_two(blocks: [&TriangleBlock; 2], rays: [&BlockRay; 2]) -> (u32, [Edges; 2]) {
+        let (first, of_first) = Self::intersect_triangles(blocks[0], rays[0]);
+        let (second, of_second) = Self::intersect_triangles(blocks[1], rays[1]);
         (first | second << BLOCK, [of_first, of_second])
     }
 
@@ -323,7 +323,7 @@ impl Lanes for Portable {
     }
 
     #[inline]
-    fn pass(block: &TriangleBlock, lane: usize, shear: &Shear, origin: &[f64; 3]) -> (Passage, Inside) {
-        passage(shear, origin, &shear.axes.gather(block, lane))
+    fn pass(block: &TriangleBlock, lane: usize, shear: &Shear, origin: &[f64; 3]) -> (EdgeTest, Inside) {
+        edge_test(shear, origin, &shear.axes.gather(block, lane))
     }
 }

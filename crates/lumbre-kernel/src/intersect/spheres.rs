@@ -1,14 +1,14 @@
 //! A ray against eight spheres: see [`SphereRay`].
 
-use super::Lanes;
-use crate::simd::{Eight, Vector};
+use super::Simd;
+use crate::simd::{F32x8, Vector};
 use crate::tree::sphere_block::{SphereBlock, SphereRay};
 
 /// A bit for each sphere of a block that the ray may hit within its range, among them all that it does; and for each that it certainly
 /// hits. Unused lanes are NaN, and no comparison with a NaN holds.
 #[inline(always)]
-pub(crate) fn meet_spheres<L: Lanes>(block: &SphereBlock, ray: &SphereRay) -> (u32, u32) {
-    let (load, splat) = (L::Eight::load, L::Eight::splat);
+pub(crate) fn intersect_spheres<L: Simd>(block: &SphereBlock, ray: &SphereRay) -> (u32, u32) {
+    let (load, splat) = (L::F32x8::load, L::F32x8::splat);
     let zero = splat(0.0);
     let [ex, ey, ez] = [splat(ray.direction[0]), splat(ray.direction[1]), splat(ray.direction[2])];
     let x = load(&block.centers[0]) - splat(ray.origin[0]);
@@ -37,16 +37,16 @@ pub(crate) fn meet_spheres<L: Lanes>(block: &SphereBlock, ray: &SphereRay) -> (u
     (in_range, certain)
 }
 
-/// [`meet_spheres`] at an instruction set, for tests.
+/// [`intersect_spheres`] at an instruction set, for tests.
 #[cfg(test)]
-pub(crate) fn meet_spheres_at(level: super::Level, block: &SphereBlock, ray: &SphereRay) -> (u32, u32) {
+pub(crate) fn intersect_spheres_at(isa: super::Isa, block: &SphereBlock, ray: &SphereRay) -> (u32, u32) {
     struct Spheres<'a>(&'a SphereBlock, &'a SphereRay);
-    impl super::Task for Spheres<'_> {
+    impl super::Dispatch for Spheres<'_> {
         type Output = (u32, u32);
         #[inline(always)]
-        fn run<L: Lanes>(self) -> (u32, u32) {
-            meet_spheres::<L>(self.0, self.1)
+        fn run<L: Simd>(self) -> (u32, u32) {
+            intersect_spheres::<L>(self.0, self.1)
         }
     }
-    level.run(Spheres(block, ray))
+    isa.run(Spheres(block, ray))
 }

@@ -282,13 +282,13 @@ pub(crate) enum Meeting {
 
 /// How a ray passes a triangle, its range aside.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Passage {
+pub(crate) enum EdgeTest {
     /// Beside it.
     Outside,
     /// Through it, away from its edges.
     Inside,
     /// So near to an edge, or so flat, that [`intersect`] has to look closer.
-    Unclear,
+    Uncertain,
 }
 
 /// What the crossing of a triangle is made of.
@@ -354,22 +354,22 @@ pub(crate) fn is_in_range(ray: &Ray, t: f64) -> bool {
 
 /// How the ray passes a triangle. Corners and origin are relative to the mesh, and have the order of the shear's axes.
 #[inline(always)]
-pub(crate) fn passage(shear: &Shear, origin: &[f64; 3], corners: &[[f32; 3]; 3]) -> (Passage, Inside) {
-    passage_of(shear.corners(origin, corners))
+pub(crate) fn edge_test(shear: &Shear, origin: &[f64; 3], corners: &[[f32; 3]; 3]) -> (EdgeTest, Inside) {
+    edge_test_of(shear.corners(origin, corners))
 }
 
 #[inline(always)]
-fn passage_of(corners: [Corner; 3]) -> (Passage, Inside) {
+fn edge_test_of(corners: [Corner; 3]) -> (EdgeTest, Inside) {
     let weights = weigh(corners);
     if !weights.are_of_inside() {
         let [u, v, w] = weights.edges;
         let is_weakly_inside = (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
-        return (if is_weakly_inside { Passage::Unclear } else { Passage::Outside }, Inside::NONE);
+        return (if is_weakly_inside { EdgeTest::Uncertain } else { EdgeTest::Outside }, Inside::NONE);
     }
     if weights.cancel() {
-        return (Passage::Unclear, Inside::NONE);
+        return (EdgeTest::Uncertain, Inside::NONE);
     }
-    (Passage::Inside, weights.inside)
+    (EdgeTest::Inside, weights.inside)
 }
 
 /// How a line passes the edges of a triangle.
@@ -422,7 +422,7 @@ pub(crate) struct Pairs<'a> {
 
 /// Where sixteen rays meet triangles.
 pub(crate) struct Met {
-    /// No number where [`Passage::Inside`] is not how the ray passes.
+    /// No number where [`EdgeTest::Inside`] is not how the ray passes.
     pub(crate) t: Row<f64>,
     pub(crate) local: [Row<f64>; 2],
 }
@@ -432,7 +432,7 @@ impl Met {
 }
 
 impl Pairs<'_> {
-    /// Where each ray meets its triangle: [`passage`] of every pair, by the same operations side by side.
+    /// Where each ray meets its triangle: [`edge_test`] of every pair, by the same operations side by side.
     #[inline(always)]
     pub(crate) fn meet(&self) -> Met {
         let mut met = Met::NONE;
@@ -465,10 +465,10 @@ impl Pairs<'_> {
 /// How the ray meets a triangle. Corners and origin are relative to the mesh, and have the order of the shear's axes.
 #[inline(never)]
 pub(crate) fn intersect(ray: &Ray, shear: Shear, origin: [f64; 3], corners: [[f32; 3]; 3]) -> Meeting {
-    match passage(&shear, &origin, &corners) {
-        (Passage::Outside, _) => Meeting::Miss,
-        (Passage::Inside, inside) => inside.meeting(ray, &shear),
-        (Passage::Unclear, _) => meet_unclear(ray, &shear, shear.corners(&origin, &corners)),
+    match edge_test(&shear, &origin, &corners) {
+        (EdgeTest::Outside, _) => Meeting::Miss,
+        (EdgeTest::Inside, inside) => inside.meeting(ray, &shear),
+        (EdgeTest::Uncertain, _) => intersect_uncertain(ray, &shear, shear.corners(&origin, &corners)),
     }
 }
 
@@ -480,16 +480,16 @@ pub(crate) fn intersect_precise(ray: &Ray, shear: Shear, corners: &[DVec3; 3]) -
         let height = corner[2] - z;
         Corner { x: (corner[0] - x) - shear.x * height, y: (corner[1] - y) - shear.y * height, z: height }
     });
-    match passage_of(corners) {
-        (Passage::Outside, _) => Meeting::Miss,
-        (Passage::Inside, inside) => inside.meeting(ray, &shear),
-        (Passage::Unclear, _) => meet_unclear(ray, &shear, corners),
+    match edge_test_of(corners) {
+        (EdgeTest::Outside, _) => Meeting::Miss,
+        (EdgeTest::Inside, inside) => inside.meeting(ray, &shear),
+        (EdgeTest::Uncertain, _) => intersect_uncertain(ray, &shear, corners),
     }
 }
 
 /// A triangle some of whose edge functions may have come out as zero, the others with one sign: now their rounding errors
 /// decide. Or one that is seen on edge.
-fn meet_unclear(ray: &Ray, shear: &Shear, corners: [Corner; 3]) -> Meeting {
+fn intersect_uncertain(ray: &Ray, shear: &Shear, corners: [Corner; 3]) -> Meeting {
     let [a, b, c] = corners;
     let [u, v, w] = [settled_edge(c, b), settled_edge(a, c), settled_edge(b, a)];
     let is_inside = (u > 0.0 && v > 0.0 && w > 0.0) || (u < 0.0 && v < 0.0 && w < 0.0);

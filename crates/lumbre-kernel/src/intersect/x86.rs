@@ -7,42 +7,42 @@ use bytemuck::Zeroable;
 use lumbre_geometry::Ray;
 use lumbre_math::{DAffine3, DVec3, Transform};
 
-use super::{Axes, CornersRoom, Crossings, Lanes, Level, Question, Set, Sides, Task};
+use super::{Axes, CornersRoom, Crossings, Dispatch, Isa, RayQuery, Set, Sides, Simd};
 use crate::intersect::box_ray::{BoxRay, END_FACTOR, LITTLE, START_FACTOR, Slabs};
 use crate::intersect::f32_ray::F32Ray;
-use crate::intersect::single_start::SingleStart;
+use crate::intersect::filter_start::FilterStart;
 use crate::intersect::watertight::{
-    BlockRay, EDGE_ERROR, ERRORS_OF_EDGES, ERRORS_OF_EXTENT, FAR, HEIGHT_ERROR, HeightRange, Inside, Passage,
-    ROUNDINGS, SIZE_ERROR, Shear, TINY,
+    BlockRay, EDGE_ERROR, ERRORS_OF_EDGES, ERRORS_OF_EXTENT, EdgeTest, FAR, HEIGHT_ERROR, HeightRange,
+    Inside, ROUNDINGS, SIZE_ERROR, Shear, TINY,
 };
-use crate::simd::{self, LastEight, Row, Vector, WIDE, Wide, vector};
+use crate::simd::{self, F32x16, LastEight, Row, Vector, WIDE, vector};
 use crate::tree::BLOCK;
 use crate::tree::Corners;
-use crate::tree::node::{LARGEST_NEAR, SMALLEST_NEAR, TINY_NEAR, Units};
+use crate::tree::node::{LARGEST_NEAR, SMALLEST_NEAR, TINY_NEAR, TreeSpace};
 use crate::tree::triangle_block::{SHARED_NUMBERS, TriangleBlock, shared_row};
 use crate::{Accel, Ray32};
 
-/// Tasks at a level: see [`Home`](super::Home).
+/// Dispatched work with x86 vectors: see [`CompilationUnit`](super::CompilationUnit).
 pub(super) trait OnX86 {
     /// # Safety
     /// The machine has these features.
     #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
-    unsafe fn run_avx2<T: Task>(task: T) -> T::Output {
+    unsafe fn run_avx2<T: Dispatch>(task: T) -> T::Output {
         task.run::<X86<false>>()
     }
 
     /// # Safety
     /// The machine has these features.
     #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512cd,avx512dq,avx512vl")]
-    unsafe fn run_avx512<T: Task>(task: T) -> T::Output {
+    unsafe fn run_avx512<T: Dispatch>(task: T) -> T::Output {
         task.run::<X86<true>>()
     }
 }
 
 impl<H> OnX86 for H {}
 
-/// Questions at a level, each at home where it stands.
-pub(super) trait AskOnX86: Question {
+/// Ray queries with x86 vectors.
+pub(super) trait AskOnX86: RayQuery {
     /// # Safety
     /// The machine has these features.
     #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
@@ -58,7 +58,7 @@ pub(super) trait AskOnX86: Question {
     }
 }
 
-impl<Q: Question> AskOnX86 for Q {}
+impl<Q: RayQuery> AskOnX86 for Q {}
 
 /// Of the two levels: only what is named after AVX-512 above instantiates `X86<true>`, and only what is named after AVX2 `X86<false>`.
 /// That is why the instructions below are there.
@@ -216,7 +216,7 @@ impl<const AVX512: bool> X86<AVX512> {
     #[inline(always)]
     fn corners_of_each<S: Shears, W>(blocks: [&TriangleBlock; 2], rays: [&S; 2]) -> [[W; 3]; 3]
     where
-        W: Wide<Half = vector::Eight256<AVX512>>,
+        W: F32x16<Half = vector::Eight256<AVX512>>,
     {
         let first = Self::eights(Self::sheared_corners(blocks[0], rays[0]));
         let second = Self::eights(Self::sheared_corners(blocks[1], rays[1]));
@@ -376,9 +376,9 @@ impl<const AVX512: bool> X86<AVX512> {
         }
     }
 
-    /// [`Lanes::start_single`] of a ray by its numbers: the ends of the range are the first two; the last of the others mean nothing.
+    /// [`Simd::start_filter`] of a ray by its numbers: the ends of the range are the first two; the last of the others mean nothing.
     #[inline(always)]
-    fn slabs(start: &SingleStart, origin: __m256d, direction: __m128, range: __m128) -> Option<Slabs> {
+    fn slabs(start: &FilterStart, origin: __m256d, direction: __m128, range: __m128) -> Option<Slabs> {
         // As the portable one, three axes at a time.
         // SAFETY: see `X86`. The loads are of arrays of four.
         unsafe {
@@ -478,7 +478,7 @@ impl<const AVX512: bool> X86<AVX512> {
 
     /// The axes for a direction in single precision.
     #[inline(always)]
-    fn narrow_axes(direction: __m128) -> &'static Axes {
+    fn f32_axes(direction: __m128) -> &'static Axes {
         // SAFETY: see `X86`.
         unsafe {
             let size = _mm_andnot_ps(_mm_set1_ps(-0.0), direction);
@@ -493,15 +493,15 @@ impl<const AVX512: bool> X86<AVX512> {
 
     /// The numbers of a ray in single precision, eight in all: see above.
     #[inline(always)]
-    fn narrow_start(ray: &Ray32) -> *const f32 {
+    fn f32_start(ray: &Ray32) -> *const f32 {
         let ray: *const Ray32 = ray;
         ray.cast()
     }
 
     /// Origin and start, direction and end.
     #[inline(always)]
-    fn narrow_numbers(ray: &Ray32) -> (__m128, __m128) {
-        let numbers = Self::narrow_start(ray);
+    fn f32_numbers(ray: &Ray32) -> (__m128, __m128) {
+        let numbers = Self::f32_start(ray);
         // SAFETY: see `X86`. A ray is eight f32 in this order.
         unsafe { (_mm_loadu_ps(numbers), _mm_loadu_ps(numbers.add(4))) }
     }
@@ -544,20 +544,20 @@ impl<const AVX512: bool> X86<AVX512> {
         four
     }
 
-    /// [`Lanes::start_narrow_by_four`] of two.
+    /// [`Simd::start_f32_by_four`] of two.
     #[inline(always)]
-    fn start_narrow_by_two(
-        start: &SingleStart,
+    fn start_f32_by_two(
+        start: &FilterStart,
         rays: [&Ray32; 2],
         places: [(&mut Slabs, &mut F32Ray); 2],
     ) -> u32 {
         /// The last of each four.
         const LAST: i32 = 0x88;
-        // As `start_narrow` and `start_narrow_blocks`, four numbers of the second ray behind those of the first.
+        // As `start_f32` and `start_f32_blocks`, four numbers of the second ray behind those of the first.
         // SAFETY: see `X86`. The loads are of arrays of four.
         unsafe {
             let ((first_origin, first_direction), (second_origin, second_direction)) =
-                (Self::narrow_numbers(rays[0]), Self::narrow_numbers(rays[1]));
+                (Self::f32_numbers(rays[0]), Self::f32_numbers(rays[1]));
             let origin = _mm256_set_m128(second_origin, first_origin);
             let direction = _mm256_set_m128(second_direction, first_direction);
             let local = if let Some(mesh_origin) = &start.single_mesh_origin {
@@ -581,8 +581,8 @@ impl<const AVX512: bool> X86<AVX512> {
             let tiny_or_more = _mm256_max_ps(length, _mm256_set1_ps(start.tiny));
             let size = _mm256_div_ps(_mm256_set1_ps(start.space_per_unit), tiny_or_more);
             let inverse = _mm256_or_ps(size, _mm256_and_ps(direction, sign));
-            let per_distance = _mm256_set1_ps(Units::NARROW_MARGIN_PER_DISTANCE);
-            let margin = _mm256_fmadd_ps(distance, per_distance, _mm256_set1_ps(start.narrow_margin));
+            let per_distance = _mm256_set1_ps(TreeSpace::F32_MARGIN_PER_DISTANCE);
+            let margin = _mm256_fmadd_ps(distance, per_distance, _mm256_set1_ps(start.f32_margin));
             let margin = _mm256_mul_ps(size, margin);
             let first = _mm256_mul_ps(origin, _mm256_set1_ps(START_FACTOR));
             let last = _mm256_mul_ps(direction, _mm256_set1_ps(END_FACTOR));
@@ -607,15 +607,15 @@ impl<const AVX512: bool> X86<AVX512> {
             let (shear, local, minus_inverse) =
                 (Self::by_two(shear), Self::by_two(local), Self::by_two(minus_inverse));
             let mut fit = 0;
-            for (i, (slabs, narrow)) in places.into_iter().enumerate() {
+            for (i, (slabs, f32_ray)) in places.into_iter().enumerate() {
                 slabs.inverse = inverse[i];
                 slabs.near_offset = near[i];
                 slabs.far_offset = far[i];
                 slabs.sides = Sides::new(signs >> (4 * i));
-                narrow.axes = axes[i];
-                narrow.origin = local[i];
-                narrow.shear = shear[i];
-                narrow.minus_inverse = minus_inverse[i][0];
+                f32_ray.axes = axes[i];
+                f32_ray.origin = local[i];
+                f32_ray.shear = shear[i];
+                f32_ray.minus_inverse = minus_inverse[i][0];
                 let is_fit = fits >> (4 * i) & 0b1111 == 0b1111 && is_long >> (4 * i) & 0b111 != 0;
                 fit |= u32::from(is_fit) << i;
             }
@@ -641,7 +641,7 @@ impl<const AVX512: bool> X86<AVX512> {
 
     /// Three coordinates relative to the mesh, rounded once; the fourth number stays what it is.
     #[inline(always)]
-    fn local(start: &SingleStart, origin: __m128) -> __m128 {
+    fn local(start: &FilterStart, origin: __m128) -> __m128 {
         // SAFETY: see `X86`. The loads are of arrays of four.
         unsafe {
             if let Some(mesh_origin) = &start.single_mesh_origin {
@@ -756,7 +756,7 @@ impl<V: Vector> Edges<V> {
     }
 }
 
-impl<W: Wide> Edges<W> {
+impl<W: F32x16> Edges<W> {
     /// Those of one of the two lines: `which` is 0 or 1.
     #[inline(always)]
     fn half(&self, which: usize) -> Edges<W::Half> {
@@ -851,17 +851,17 @@ impl X86<true> {
 
 /// Which sixteen numbers go with which level, and what is different with them.
 pub(crate) trait HasWide<const AVX512: bool> {
-    type Wide: Wide<Half = vector::Eight256<AVX512>>;
+    type F32x16: F32x16<Half = vector::Eight256<AVX512>>;
 
     /// [`X86::sheared_corners`] of two blocks, each by its ray: those of the first, and those of the second.
-    fn corners_by_two<S: Shears>(blocks: [&TriangleBlock; 2], rays: [&S; 2]) -> [[Self::Wide; 3]; 3];
+    fn corners_by_two<S: Shears>(blocks: [&TriangleBlock; 2], rays: [&S; 2]) -> [[Self::F32x16; 3]; 3];
 }
 
 impl HasWide<true> for X86<true> {
-    type Wide = vector::Avx512;
+    type F32x16 = vector::Avx512;
 
     #[inline(always)]
-    fn corners_by_two<S: Shears>(blocks: [&TriangleBlock; 2], rays: [&S; 2]) -> [[Self::Wide; 3]; 3] {
+    fn corners_by_two<S: Shears>(blocks: [&TriangleBlock; 2], rays: [&S; 2]) -> [[Self::F32x16; 3]; 3] {
         let [first, second] = [blocks[0].is_unshared(), blocks[1].is_unshared()];
         if !(first | second) {
             return Self::shared_by_two(blocks, rays);
@@ -877,49 +877,49 @@ impl HasWide<true> for X86<true> {
 }
 
 impl HasWide<false> for X86<false> {
-    type Wide = vector::Avx2;
+    type F32x16 = vector::Avx2;
 
     #[inline(always)]
-    fn corners_by_two<S: Shears>(blocks: [&TriangleBlock; 2], rays: [&S; 2]) -> [[Self::Wide; 3]; 3] {
+    fn corners_by_two<S: Shears>(blocks: [&TriangleBlock; 2], rays: [&S; 2]) -> [[Self::F32x16; 3]; 3] {
         Self::corners_of_each(blocks, rays)
     }
 }
 
-impl<const AVX512: bool> Lanes for X86<AVX512>
+impl<const AVX512: bool> Simd for X86<AVX512>
 where
     Self: HasWide<AVX512>,
 {
-    type Eight = vector::Eight256<AVX512>;
-    type Edges = Edges<Self::Eight>;
-    type EdgesByTwo = Edges<Self::Wide>;
-    type Wide = <Self as HasWide<AVX512>>::Wide;
-    const MEETS_BY_TWO: bool = AVX512;
+    type F32x8 = vector::Eight256<AVX512>;
+    type Edges = Edges<Self::F32x8>;
+    type EdgesByTwo = Edges<Self::F32x16>;
+    type F32x16 = <Self as HasWide<AVX512>>::F32x16;
+    const INTERSECTS_BY_TWO: bool = AVX512;
     const STARTS_BY_FOUR: bool = true;
     // Packets take twice the instructions then, and a ray alone hardly more.
     const GOES_ON_TOGETHER: bool = AVX512;
 
     #[inline(always)]
-    fn level() -> Level {
-        Level(if AVX512 { Set::Avx512 } else { Set::Avx2 })
+    fn isa() -> Isa {
+        Isa(if AVX512 { Set::Avx512 } else { Set::Avx2 })
     }
 
     #[inline(always)]
-    fn start_nearby(units: &Units, ray: &Ray, t_min: f64, t_max: f64, boxes: &mut BoxRay) -> bool {
+    fn start_nearby(tree_space: &TreeSpace, ray: &Ray, t_min: f64, t_max: f64, boxes: &mut BoxRay) -> bool {
         // As the portable one, three axes at a time.
         // SAFETY: see `X86`. The loads are of three f64 in arrays of three, and of four in arrays of four; the stores of
         // four f32 into arrays of four.
         unsafe {
             let origin = Self::three(&ray.origin);
             let direction = Self::three(&ray.direction);
-            let scale = _mm256_set1_pd(units.scale);
-            let tree_origin = _mm256_loadu_pd(units.padded_origin.as_ptr());
+            let scale = _mm256_set1_pd(tree_space.scale);
+            let tree_origin = _mm256_loadu_pd(tree_space.padded_origin.as_ptr());
             let start = _mm256_mul_pd(_mm256_sub_pd(origin, tree_origin), scale);
             let direction = _mm256_mul_pd(direction, scale);
             let sign = _mm256_set1_pd(-0.0);
             let distance = _mm256_andnot_pd(sign, start);
             let size = _mm256_andnot_pd(sign, direction);
             let fits = _mm256_and_pd(
-                _mm256_cmp_pd::<_CMP_LE_OQ>(distance, _mm256_set1_pd(units.near)),
+                _mm256_cmp_pd::<_CMP_LE_OQ>(distance, _mm256_set1_pd(tree_space.near)),
                 _mm256_cmp_pd::<_CMP_LE_OQ>(size, _mm256_set1_pd(LARGEST_NEAR)),
             );
             let is_long = _mm256_cmp_pd::<_CMP_GE_OQ>(size, _mm256_set1_pd(SMALLEST_NEAR));
@@ -932,10 +932,10 @@ where
             // Always of 1 over something: the sign is put on again afterwards.
             let size = _mm256_div_pd(_mm256_set1_pd(1.0), size);
             let inverse = _mm256_or_pd(size, signs);
-            let per_distance = _mm256_set1_pd(units.margin_per_distance);
+            let per_distance = _mm256_set1_pd(tree_space.margin_per_distance);
             let margin = _mm256_mul_pd(
                 size,
-                _mm256_fmadd_pd(distance, per_distance, _mm256_set1_pd(units.near_margin)),
+                _mm256_fmadd_pd(distance, per_distance, _mm256_set1_pd(tree_space.near_margin)),
             );
             let near = _mm256_fnmsub_pd(start, inverse, margin);
             let far = _mm256_fnmadd_pd(start, inverse, margin);
@@ -950,7 +950,7 @@ where
     }
 
     #[inline(always)]
-    fn start_single(start: &SingleStart, ray: &Ray) -> Option<Slabs> {
+    fn start_filter(start: &FilterStart, ray: &Ray) -> Option<Slabs> {
         let (origin, direction, range) = Self::parts(Self::halves(ray));
         // SAFETY: see `X86`.
         let (direction, range) = unsafe { (_mm256_cvtpd_ps(direction), _mm_cvtpd_ps(range)) };
@@ -971,8 +971,8 @@ where
     }
 
     #[inline(always)]
-    fn read_narrow(ray: &Ray32) -> Ray32 {
-        let from = Self::narrow_start(ray);
+    fn read_f32(ray: &Ray32) -> Ray32 {
+        let from = Self::f32_start(ray);
         let mut own = MaybeUninit::<Ray32>::uninit();
         let to: *mut f32 = own.as_mut_ptr().cast();
         // SAFETY: as there. A ray is eight f32, which are all read, and written.
@@ -985,11 +985,11 @@ where
     }
 
     #[inline(always)]
-    fn start_narrow(start: &SingleStart, ray: &Ray32) -> Option<Slabs> {
+    fn start_f32(start: &FilterStart, ray: &Ray32) -> Option<Slabs> {
         // As the portable one, three axes at a time.
         // SAFETY: see `X86`. The loads are of arrays of four.
         unsafe {
-            let (origin, direction) = Self::narrow_numbers(ray);
+            let (origin, direction) = Self::f32_numbers(ray);
             // Fused or not: units are powers of two.
             let from = _mm_fmsub_ps(
                 Self::local(start, origin),
@@ -1021,9 +1021,9 @@ where
             let size = _mm_max_ps(length, _mm_set1_ps(start.tiny));
             let size = _mm_div_ps(_mm_set1_ps(start.space_per_unit), size);
             let inverse = _mm_or_ps(size, _mm_and_ps(direction, sign));
-            let per_distance = _mm_set1_ps(Units::NARROW_MARGIN_PER_DISTANCE);
+            let per_distance = _mm_set1_ps(TreeSpace::F32_MARGIN_PER_DISTANCE);
             let margin =
-                _mm_mul_ps(size, _mm_fmadd_ps(distance, per_distance, _mm_set1_ps(start.narrow_margin)));
+                _mm_mul_ps(size, _mm_fmadd_ps(distance, per_distance, _mm_set1_ps(start.f32_margin)));
             let (near, far) = (_mm_fnmsub_ps(from, inverse, margin), _mm_fnmadd_ps(from, inverse, margin));
             // Of the fourth numbers. Not fused.
             let first = _mm_mul_ps(origin, _mm_set1_ps(START_FACTOR));
@@ -1039,12 +1039,12 @@ where
     }
 
     #[inline(always)]
-    fn start_narrow_blocks(start: &SingleStart, ray: &Ray32, slabs: &Slabs) -> F32Ray {
+    fn start_f32_blocks(start: &FilterStart, ray: &Ray32, slabs: &Slabs) -> F32Ray {
         // SAFETY: see `X86`. The loads are of arrays of four.
         unsafe {
-            let (origin, direction) = Self::narrow_numbers(ray);
+            let (origin, direction) = Self::f32_numbers(ray);
             let local = Self::local(start, origin);
-            let axes = Self::narrow_axes(direction);
+            let axes = Self::f32_axes(direction);
             let order = _mm_loadu_si128(axes.order.as_ptr().cast());
             let last = _mm_shuffle_epi32::<0b10_10_10_10>(order);
             let inverse = _mm_permutevar_ps(_mm_loadu_ps(slabs.inverse.as_ptr()), last);
@@ -1062,24 +1062,23 @@ where
     }
 
     #[inline(always)]
-    fn start_narrow_by_four(
-        start: &SingleStart,
+    fn start_f32_by_four(
+        start: &FilterStart,
         rays: [&Ray32; 4],
         places: [(&mut Slabs, &mut F32Ray); 4],
     ) -> u32 {
         if !AVX512 {
             let ([a, b, c, d], [for_a, for_b, for_c, for_d]) = (rays, places);
-            let first = Self::start_narrow_by_two(start, [a, b], [for_a, for_b]);
-            return first | Self::start_narrow_by_two(start, [c, d], [for_c, for_d]) << 2;
+            let first = Self::start_f32_by_two(start, [a, b], [for_a, for_b]);
+            return first | Self::start_f32_by_two(start, [c, d], [for_c, for_d]) << 2;
         }
         /// The last of each four.
         const LAST: u16 = 0x8888;
-        // As `start_narrow` and `start_narrow_blocks`, four numbers of each ray behind those of the one before.
+        // As `start_f32` and `start_f32_blocks`, four numbers of each ray behind those of the one before.
         // SAFETY: see `X86`. Rays are eight f32 each, and the other loads are of arrays of four.
         unsafe {
             let [a, b, c, d] = rays;
-            let numbers =
-                [Self::narrow_start(a), Self::narrow_start(b), Self::narrow_start(c), Self::narrow_start(d)];
+            let numbers = [Self::f32_start(a), Self::f32_start(b), Self::f32_start(c), Self::f32_start(d)];
             let (origin, direction) = (Self::fours(numbers, 0), Self::fours(numbers, 4));
             let local = if let Some(mesh_origin) = &start.single_mesh_origin {
                 _mm512_sub_ps(origin, Self::four_times(mesh_origin))
@@ -1104,8 +1103,8 @@ where
             let size = _mm512_div_ps(_mm512_set1_ps(start.space_per_unit), tiny_or_more);
             let sign = _mm512_set1_ps(-0.0);
             let inverse = _mm512_or_ps(size, _mm512_and_ps(direction, sign));
-            let per_distance = _mm512_set1_ps(Units::NARROW_MARGIN_PER_DISTANCE);
-            let margin = _mm512_fmadd_ps(distance, per_distance, _mm512_set1_ps(start.narrow_margin));
+            let per_distance = _mm512_set1_ps(TreeSpace::F32_MARGIN_PER_DISTANCE);
+            let margin = _mm512_fmadd_ps(distance, per_distance, _mm512_set1_ps(start.f32_margin));
             let margin = _mm512_mul_ps(size, margin);
             let first = _mm512_mul_ps(origin, _mm512_set1_ps(START_FACTOR));
             let last = _mm512_mul_ps(direction, _mm512_set1_ps(END_FACTOR));
@@ -1141,15 +1140,15 @@ where
                 (Self::by_four(shear), Self::by_four(local), Self::by_four(minus_inverse));
             let (fits, is_long) = (u32::from(fits), u32::from(is_long));
             let mut fit = 0;
-            for (i, (slabs, narrow)) in places.into_iter().enumerate() {
+            for (i, (slabs, f32_ray)) in places.into_iter().enumerate() {
                 slabs.inverse = inverse[i];
                 slabs.near_offset = near[i];
                 slabs.far_offset = far[i];
                 slabs.sides = Sides::new(signs >> (4 * i));
-                narrow.axes = axes[i];
-                narrow.origin = local[i];
-                narrow.shear = shear[i];
-                narrow.minus_inverse = minus_inverse[i][0];
+                f32_ray.axes = axes[i];
+                f32_ray.origin = local[i];
+                f32_ray.shear = shear[i];
+                f32_ray.minus_inverse = minus_inverse[i][0];
                 let is_fit = fits >> (4 * i) & 0b1111 == 0b1111 && is_long >> (4 * i) & 0b111 != 0;
                 fit |= u32::from(is_fit) << i;
             }
@@ -1158,18 +1157,18 @@ where
     }
 
     #[inline(always)]
-    fn narrow_corners(block: &TriangleBlock, ray: &F32Ray) -> [[vector::Eight256<AVX512>; 3]; 3] {
+    fn f32_corners(block: &TriangleBlock, ray: &F32Ray) -> [[vector::Eight256<AVX512>; 3]; 3] {
         Self::eights(Self::sheared_corners(block, ray))
     }
 
     #[inline(always)]
-    fn narrow_corners_by_two(blocks: [&TriangleBlock; 2], rays: [&F32Ray; 2]) -> [[Self::Wide; 3]; 3] {
+    fn f32_corners_by_two(blocks: [&TriangleBlock; 2], rays: [&F32Ray; 2]) -> [[Self::F32x16; 3]; 3] {
         Self::corners_by_two(blocks, rays)
     }
 
     #[inline(always)]
     fn start_placed(
-        start: &SingleStart,
+        start: &FilterStart,
         map: &Transform,
         ray: &Ray,
         [t_min, t_max]: [f64; 2],
@@ -1200,7 +1199,7 @@ where
     }
 
     #[inline(always)]
-    fn start_blocks(start: &SingleStart, ray: &Ray, slabs: &Slabs) -> (BlockRay, f32) {
+    fn start_blocks(start: &FilterStart, ray: &Ray, slabs: &Slabs) -> (BlockRay, f32) {
         // As the portable one, three axes at a time.
         // SAFETY: see `X86`. The loads are of arrays of four.
         unsafe {
@@ -1242,7 +1241,7 @@ where
     }
 
     #[inline(always)]
-    fn narrow_rows(rays: &[Ray32; WIDE], rows: &mut [Row<f32>; 8]) {
+    fn f32_rows(rays: &[Ray32; WIDE], rows: &mut [Row<f32>; 8]) {
         let (first, last) = rays.split_at(8);
         let (Ok(first), Ok(last)) = (first.try_into(), last.try_into()) else {
             unreachable!("sixteen are twice eight")
@@ -1300,20 +1299,23 @@ where
     }
 
     #[inline(always)]
-    fn meet_triangles(block: &TriangleBlock, ray: &BlockRay) -> (u32, Self::Edges) {
+    fn intersect_triangles(block: &TriangleBlock, ray: &BlockRay) -> (u32, Self::Edges) {
         let corners = Self::eights(Self::sheared_corners(block, ray));
-        let (mask, edges) = Edges::of(corners, Self::Eight::splat(ray.least_size));
+        let (mask, edges) = Edges::of(corners, Self::F32x8::splat(ray.least_size));
         (mask & block.taken(), edges)
     }
 
     #[inline(always)]
-    fn meet_triangles_by_two(blocks: [&TriangleBlock; 2], rays: [&BlockRay; 2]) -> (u32, Self::EdgesByTwo) {
+    fn intersect_triangles_by_two(
+        blocks: [&TriangleBlock; 2],
+        rays: [&BlockRay; 2],
+    ) -> (u32, Self::EdgesByTwo) {
         if !AVX512 {
-            let (first, of_first) = Self::meet_triangles(blocks[0], rays[0]);
-            let (second, of_second) = Self::meet_triangles(blocks[1], rays[1]);
+            let (first, of_first) = Self::intersect_triangles(blocks[0], rays[0]);
+            let (second, of_second) = Self::intersect_triangles(blocks[1], rays[1]);
             return (first | second << BLOCK, Edges::of_two(&of_first, &of_second));
         }
-        let least_size = Self::Wide::splat_two(rays[0].least_size, rays[1].least_size, LastEight::new());
+        let least_size = Self::F32x16::splat_two(rays[0].least_size, rays[1].least_size, LastEight::new());
         let (mask, edges) = Edges::of(Self::corners_by_two(blocks, rays), least_size);
         (mask & (blocks[0].taken() | blocks[1].taken() << BLOCK), edges)
     }
@@ -1469,7 +1471,7 @@ where
     }
 
     #[inline(always)]
-    fn pass(block: &TriangleBlock, lane: usize, shear: &Shear, origin: &[f64; 3]) -> (Passage, Inside) {
+    fn pass(block: &TriangleBlock, lane: usize, shear: &Shear, origin: &[f64; 3]) -> (EdgeTest, Inside) {
         // The corners in the first three lanes, and the very operations of the portable one.
         let [across, up, z] = Self::corners_in(block, lane, shear.axes);
         // SAFETY: see `X86`.
@@ -1493,8 +1495,8 @@ where
             let is_positive = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_GT_OQ>(edges, zero)) & 7;
             if is_positive != 7 && is_negative != 7 {
                 let is_zero = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_EQ_OQ>(edges, zero)) & 7;
-                let is_unclear = is_zero | is_positive == 7 || is_zero | is_negative == 7;
-                return (if is_unclear { Passage::Unclear } else { Passage::Outside }, Inside::NONE);
+                let is_uncertain = is_zero | is_positive == 7 || is_zero | is_negative == 7;
+                return (if is_uncertain { EdgeTest::Uncertain } else { EdgeTest::Outside }, Inside::NONE);
             }
             let (u, w) = (_mm256_castpd256_pd128(edges), _mm256_extractf128_pd::<1>(edges));
             let v = _mm_unpackhi_pd(u, u);
@@ -1506,7 +1508,7 @@ where
             let size = _mm256_andnot_pd(sign, _mm256_broadcastsd_pd(det));
             let least = _mm256_mul_pd(_mm256_andnot_pd(sign, product), _mm256_set1_pd(1.0 / 64.0));
             if _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(size, least)) & 7 != 0 {
-                return (Passage::Unclear, Inside::NONE);
+                return (EdgeTest::Uncertain, Inside::NONE);
             }
             let inside = Inside {
                 height: _mm_cvtsd_f64(height),
@@ -1514,7 +1516,7 @@ where
                 v: _mm_cvtsd_f64(v),
                 w: _mm_cvtsd_f64(w),
             };
-            (Passage::Inside, inside)
+            (EdgeTest::Inside, inside)
         }
     }
 }

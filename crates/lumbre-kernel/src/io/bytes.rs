@@ -21,7 +21,7 @@ use crate::accel::Accel;
 use crate::build::input::{empty_over, take_apart};
 use crate::build::open_instances::is_part;
 use crate::build::refit::{self, RefitError};
-use crate::intersect::Level;
+use crate::intersect::Isa;
 use crate::tree::node::{Node, WIDTH, tag};
 use crate::tree::packed::{Entry, Packed};
 use crate::tree::sphere_block::SphereBlock;
@@ -268,7 +268,7 @@ pub(crate) fn from_bytes(bytes: &[u8], geometries: Vec<Geometry>) -> Result<Acce
     let parts = take_apart(&geometries).map_err(unsound)?;
     check_structure(&tree, &geometries, |leaf| Some(tag::blocks(leaf)))?;
     check_names(&tree, &geometries)?;
-    tree.pack_triangles(Level::best(), &geometries, parts.has_flat);
+    tree.pack_triangles(Isa::best(), &geometries, parts.has_flat);
     tree.sphere_blocks = vec![SphereBlock::EMPTY; tree.sphere_names.len()].into();
 
     let mut accel = empty_over(geometries);

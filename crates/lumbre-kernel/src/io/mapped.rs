@@ -28,7 +28,7 @@ use memmap2::Mmap;
 use crate::accel::AccelParts;
 use crate::build::input::{Parts, take_apart, units_of};
 use crate::build::refit::{Places, check_places};
-use crate::intersect::Level;
+use crate::intersect::Isa;
 use crate::io::bytes::{check_names, check_structure, signature};
 use crate::tree::node::{Node, WIDTH, tag};
 use crate::tree::packed::Start;
@@ -392,10 +392,10 @@ fn over_mapped(file: Arc<Mmap>, geometries: Vec<Geometry>) -> Result<Accel, Load
     })?;
     check_names(&tree, &geometries)?;
     let masks: Store<u32> = array(&file, &header, 6)?;
-    let units = units_of(&geometries, &parts);
+    let tree_space = units_of(&geometries, &parts);
     let (sizes, bounds, primitives) = (parts.sizes, parts.bounds, parts.count());
-    let accel_parts = AccelParts { units, tree, sizes, bounds, infinite: Vec::new(), primitives };
-    let accel = Accel::assemble(Level::best(), geometries, accel_parts).with_masks_unchecked(masks.to_vec());
+    let accel_parts = AccelParts { tree_space, tree, sizes, bounds, infinite: Vec::new(), primitives };
+    let accel = Accel::assemble(Isa::best(), geometries, accel_parts).with_masks_unchecked(masks.to_vec());
     let places = check_places(&accel, &parts).map_err(LoadError::OtherGeometries)?;
     let is_as_saved =
         |&(place, start): &(usize, Start)| accel.tree.entries[place].primitive() == start.word();

@@ -105,7 +105,7 @@ pub(crate) fn closest_point(
                     if let GeometryKind::Mesh(mesh) = &frame.accel.geometries[names.geometry as usize].kind {
                         for &primitive in names.primitives.iter().filter(|&&primitive| primitive != u32::MAX)
                         {
-                            search.meet_triangle(frame, mesh, names.geometry, primitive);
+                            search.intersect_triangle(frame, mesh, names.geometry, primitive);
                         }
                     }
                 }
@@ -225,15 +225,15 @@ impl<'a> Frame<'a> {
     }
 
     fn new(accel: &'a Accel, map: Transform, local: DVec3, time: f64, context: Context) -> Self {
-        let units = &accel.units;
-        let in_units = (local - units.origin) * units.scale;
+        let tree_space = &accel.tree_space;
+        let in_units = (local - tree_space.origin) * tree_space.scale;
         // The largest singular value of the inverse is no more than the root of the sum of squares.
         let stretch = similarity_factor(&map).map_or_else(
             || map.inverse_affine().matrix3.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt(),
             |factor| 1.0 / factor,
         );
         let shrink = (1.0 - 1e-9) / stretch;
-        let slop = 4.0 * units.slop_of(local);
+        let slop = 4.0 * tree_space.slop_of(local);
         Self { accel, map, is_identity: map.is_identity(), shrink, local, time, context, in_units, slop }
     }
 
@@ -245,7 +245,7 @@ impl<'a> Frame<'a> {
             low.max(high).max(0.0)
         };
         let distance = DVec3::new(gap(0), gap(1), gap(2)).length() * (1.0 - 1e-12) - self.slop;
-        let distance = distance / self.accel.units.scale * self.shrink;
+        let distance = distance / self.accel.tree_space.scale * self.shrink;
         // Also where it is no number.
         if distance > 0.0 { distance } else { 0.0 }
     }
@@ -313,7 +313,7 @@ impl Search {
     }
 
     /// A triangle of a mesh, moved to the outermost space; those without area do not count.
-    pub(crate) fn meet_triangle(
+    pub(crate) fn intersect_triangle(
         &mut self,
         frame: &Frame,
         mesh: &TriangleMesh,
@@ -325,11 +325,11 @@ impl Search {
             return;
         }
         let from_point = mesh.origin - frame.local;
-        self.meet_corners(frame, corners.map(|p| from_point + p.as_dvec3()), geometry, primitive);
+        self.intersect_corners(frame, corners.map(|p| from_point + p.as_dvec3()), geometry, primitive);
     }
 
     /// A triangle whose corners are given relative to the point, in the tree's space.
-    fn meet_corners(&mut self, frame: &Frame, corners: [DVec3; 3], geometry: u32, primitive: u32) {
+    fn intersect_corners(&mut self, frame: &Frame, corners: [DVec3; 3], geometry: u32, primitive: u32) {
         let [a, b, c] =
             if frame.is_identity { corners } else { corners.map(|corner| frame.map.vector(corner)) };
         let (uv, offset) = nearest_on_triangle(a, b, c);
@@ -363,7 +363,7 @@ impl Search {
             GeometryKind::PreciseMesh(mesh) => {
                 let corners = mesh.corners(primitive);
                 if precise_mesh::has_area(&corners) {
-                    self.meet_corners(frame, corners.map(|p| p - frame.local), geometry, primitive);
+                    self.intersect_corners(frame, corners.map(|p| p - frame.local), geometry, primitive);
                 }
                 return;
             }

@@ -26,7 +26,7 @@ pub(crate) fn is_inside(accel: &Accel, point: DVec3, time: f64) -> bool {
     let in_solids = solids_around(accel, point, time) % 2 == 1;
     let is_odd = |direction: &&DVec3| {
         let mut crossings = Parity { odd: false };
-        exact::traverse(accel.level, accel, &Ray::new(point, **direction).at_time(time), &mut crossings);
+        exact::traverse(accel.isa, accel, &Ray::new(point, **direction).at_time(time), &mut crossings);
         crossings.odd
     };
     let odd = if has_surfaces(accel) { DIRECTIONS.iter().filter(is_odd).count() } else { 0 };
@@ -73,8 +73,8 @@ fn solids_around(accel: &Accel, point: DVec3, time: f64) -> usize {
             GeometryKind::Mesh(_) | GeometryKind::PreciseMesh(_) | GeometryKind::Custom(_) => {}
         };
         accel.infinite.iter().for_each(|entry| meet(entry.geometry, entry.primitive()));
-        let units = &accel.units;
-        let (local, slop) = ((point - units.origin) * units.scale, 4.0 * units.slop_of(point));
+        let tree_space = &accel.tree_space;
+        let (local, slop) = ((point - tree_space.origin) * tree_space.scale, 4.0 * tree_space.slop_of(point));
         stack.extend(accel.tree.root.map(|root| start.below(root)));
         while let Some(reference) = stack.pop() {
             match tag::of(reference) {

@@ -269,7 +269,7 @@ impl Moments {
             let GeometryKind::Mesh(mesh) = &accel.geometries[names.geometry as usize].kind else {
                 return Moment::NOTHING;
             };
-            let from_origin = mesh.origin - accel.units.origin;
+            let from_origin = mesh.origin - accel.tree_space.origin;
             let triangles = triangles_of(names, mesh, from_origin);
             let mut parts = [Moment::NOTHING; WIDTH];
             let mut count = 0;
@@ -288,7 +288,7 @@ impl Moments {
                 match tag::of(child) {
                     tag::INNER => parts.push(nodes[tag::place(child)]),
                     tag::TRIANGLES => parts.extend_from_slice(&blocks[tree.numbers(child)]),
-                    tag::PRECISE => for_each_precise(accel, child, accel.units.origin, |corners| {
+                    tag::PRECISE => for_each_precise(accel, child, accel.tree_space.origin, |corners| {
                         parts.push(Moment::of_triangle(corners));
                     }),
                     _ => {}
@@ -307,7 +307,7 @@ impl Moments {
 
     /// The winding number of all meshes of a tree.
     fn around(&self, accel: &Accel, point: DVec3, far: f64) -> f64 {
-        let local = point - accel.units.origin;
+        let local = point - accel.tree_space.origin;
         let mut sum = 0.0;
         let mut stack: Vec<u32> = accel.tree.root.into_iter().collect();
         while let Some(reference) = stack.pop() {
@@ -356,7 +356,7 @@ fn reach(node: &Node, accel: &Accel, center: DVec3) -> f64 {
     let mut farthest: f64 = 0.0;
     for lane in 0..node.len() {
         let arm = |axis: usize| {
-            let plane = |side: usize| f64::from(node.planes[2 * axis + side][lane]) / accel.units.scale;
+            let plane = |side: usize| f64::from(node.planes[2 * axis + side][lane]) / accel.tree_space.scale;
             (plane(0) - center[axis]).abs().max((plane(1) - center[axis]).abs())
         };
         farthest = farthest.max(DVec3::new(arm(0), arm(1), arm(2)).length());

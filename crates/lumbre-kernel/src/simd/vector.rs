@@ -1,4 +1,4 @@
-//! Eight or sixteen numbers at once: those of as many boxes, rays, triangles or hulls.
+//! Eight or sixteen numbers at once: those of as many boxes, rays, triangles or bounding volumes.
 
 use std::mem::MaybeUninit;
 use std::ops::{Add, Index, Mul, Sub};
@@ -62,7 +62,7 @@ pub(crate) trait Vector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Ou
 }
 
 /// Eight.
-pub(crate) trait Eight: Vector<Array = [f32; 8]> + Zeroable {
+pub(crate) trait F32x8: Vector<Array = [f32; 8]> + Zeroable {
     fn load(eight: &[f32; 8]) -> Self;
     /// The least of those in the mask, of which none is a NaN; infinity where there are none.
     fn least_of(self, mask: u32) -> f32;
@@ -71,9 +71,9 @@ pub(crate) trait Eight: Vector<Array = [f32; 8]> + Zeroable {
 }
 
 /// Sixteen.
-pub(crate) trait Wide: Vector<Array = [f32; WIDE]> + Zeroable {
+pub(crate) trait F32x16: Vector<Array = [f32; WIDE]> + Zeroable {
     /// Eight of them.
-    type Half: Eight;
+    type Half: F32x8;
     /// Eight, and eight others.
     fn of_two(first: Self::Half, second: Self::Half) -> Self;
     /// Eight times the one, and eight times the other.
@@ -299,7 +299,7 @@ impl<const N: usize> Vector for PortableVector<N> {
     }
 }
 
-impl Eight for Portable8 {
+impl F32x8 for Portable8 {
     #[inline(always)]
     fn load(eight: &[f32; 8]) -> Self {
         Self(*eight)
@@ -320,7 +320,7 @@ impl Eight for Portable8 {
     }
 }
 
-impl Wide for Portable16 {
+impl F32x16 for Portable16 {
     type Half = Portable8;
 
     #[inline(always)]
@@ -506,7 +506,7 @@ mod x86 {
 
     use bytemuck::Zeroable;
 
-    use super::{AFTER_MIDDLE, BEFORE_MIDDLE, Eight, LANE_BITS, LastEight, Row, Vector, WIDE, Wide};
+    use super::{AFTER_MIDDLE, BEFORE_MIDDLE, F32x8, F32x16, LANE_BITS, LastEight, Row, Vector, WIDE};
     use crate::simd::opaque_number;
 
     /// Only where `intersect::x86::X86<true>` is: the instructions are there.
@@ -628,7 +628,7 @@ mod x86 {
         }
     }
 
-    impl Wide for Avx512 {
+    impl F32x16 for Avx512 {
         type Half = Eight256<true>;
 
         #[inline(always)]
@@ -1114,7 +1114,7 @@ mod x86 {
         }
     }
 
-    impl<const AVX512: bool> Eight for Eight256<AVX512> {
+    impl<const AVX512: bool> F32x8 for Eight256<AVX512> {
         #[inline(always)]
         fn load(eight: &[f32; 8]) -> Self {
             // SAFETY: see the type. The load is of eight f32.
@@ -1196,7 +1196,7 @@ mod x86 {
         }
     }
 
-    impl Wide for Avx2 {
+    impl F32x16 for Avx2 {
         type Half = Eight256<false>;
 
         #[inline(always)]

@@ -10,7 +10,7 @@ use super::scenes::{Random, build, cloud, icosphere, mixture, precise, ray, shap
 use super::single::check_packet;
 use crate::batch;
 use crate::batch::packet::{self, PACKET};
-use crate::intersect::Level;
+use crate::intersect::Isa;
 use crate::trace::Outcome;
 use crate::{Accel, Faces, GeometryKind, Hit, Instance, Query, TriangleMesh, brute};
 
@@ -105,25 +105,25 @@ fn free_ray(random: &mut Random) -> Ray {
     Ray::new(from, to - from).at_time(random.unit())
 }
 
-/// Both questions at every level beside the plain search, alone and in batches; of how many rays single precision could tell.
+/// Both questions at every instruction set beside the plain search, alone and in batches; of how many rays single precision could tell.
 fn check(accel: &Accel, rays: &[Ray]) -> usize {
     let mut told = 0;
-    for level in Level::all() {
+    for isa in Isa::all() {
         let mut hits = vec![None; rays.len()];
-        accel.closest_batch_at(level, rays, &mut hits);
+        accel.closest_batch_at(isa, rays, &mut hits);
         let mut are_hit = vec![false; rays.len()];
-        accel.any_batch_at(level, rays, &mut are_hit);
+        accel.any_batch_at(isa, rays, &mut are_hit);
         told = 0;
         for ((ray, hit), is_hit) in rays.iter().zip(&hits).zip(&are_hit) {
-            let plain = accel.closest_exact_at(level, ray);
+            let plain = accel.closest_exact_at(isa, ray);
             let bits = |hit: &Option<Hit>| hit.as_ref().map(|hit| hit.root.t.to_bits());
-            assert_eq!(*hit, plain, "{level:?} {ray:?}");
-            assert_eq!(bits(hit), bits(&plain), "{level:?} {ray:?}");
-            assert_eq!(*is_hit, plain.is_some(), "{level:?} {ray:?}");
-            assert_eq!(accel.closest_at(level, ray), plain, "{level:?} {ray:?}");
-            assert_eq!(accel.any_at(level, ray), plain.is_some(), "{level:?} {ray:?}");
-            let single = accel.filtered_at(level, ray);
-            assert!(single == Outcome::Uncertain || single == Outcome::Certain(plain), "{level:?} {ray:?}");
+            assert_eq!(*hit, plain, "{isa:?} {ray:?}");
+            assert_eq!(bits(hit), bits(&plain), "{isa:?} {ray:?}");
+            assert_eq!(*is_hit, plain.is_some(), "{isa:?} {ray:?}");
+            assert_eq!(accel.closest_at(isa, ray), plain, "{isa:?} {ray:?}");
+            assert_eq!(accel.any_at(isa, ray), plain.is_some(), "{isa:?} {ray:?}");
+            let single = accel.filtered_at(isa, ray);
+            assert!(single == Outcome::Uncertain || single == Outcome::Certain(plain), "{isa:?} {ray:?}");
             told += usize::from(single != Outcome::Uncertain);
         }
     }
@@ -163,18 +163,18 @@ fn options_leave_the_same_bits_among_anything() {
         let faces = [Faces::Both, Faces::Front, Faces::Back][random.below(3)];
         let exclude = exclude.as_ref().filter(|_| random.unit() < 0.5);
         let options = Query { mask: 1 << random.below(3), exclude, faces, filter: None };
-        for level in Level::all() {
-            let plain = accel.closest_with_exact_at(level, &ray, &options);
+        for isa in Isa::all() {
+            let plain = accel.closest_with_exact_at(isa, &ray, &options);
             let bits = |hit: &Option<Hit>| hit.as_ref().map(|hit| hit.root.t.to_bits());
-            let found = accel.closest_with_at(level, &ray, &options);
-            assert_eq!(found, plain, "{level:?} {ray:?} {options:?}");
-            assert_eq!(bits(&found), bits(&plain), "{level:?} {ray:?} {options:?}");
+            let found = accel.closest_with_at(isa, &ray, &options);
+            assert_eq!(found, plain, "{isa:?} {ray:?} {options:?}");
+            assert_eq!(bits(&found), bits(&plain), "{isa:?} {ray:?} {options:?}");
             assert_eq!(
-                accel.any_with_at(level, &ray, &options),
+                accel.any_with_at(isa, &ray, &options),
                 plain.is_some(),
-                "{level:?} {ray:?} {options:?}"
+                "{isa:?} {ray:?} {options:?}"
             );
-            let single = accel.filtered_closest_at(level, &ray, &options);
+            let single = accel.filtered_closest_at(isa, &ray, &options);
             free += u32::from(is_free);
             told += u32::from(is_free && single != Outcome::Uncertain);
             hits += u32::from(plain.is_some());
@@ -258,7 +258,7 @@ fn rays_that_go_together_through_instances_are_answered_as_each_alone() {
                     Ray::new(from, direction).with_range(1e-3, t_max).at_time(random.unit())
                 });
                 check_packet(&accel, &rays);
-                let answered = batch::shims::answered_by_packet(accel.level, &accel, &rays);
+                let answered = batch::shims::answered_by_packet(accel.isa, &accel, &rays);
                 together += answered.count_ones();
                 let is_within = |ray: &&Ray| accel.closest(ray).is_some_and(|hit| !hit.route.is_empty());
                 if answered == packet::ALL {

@@ -14,7 +14,7 @@ use super::scenes::{Random, soup};
 use crate::build::pack;
 use crate::intersect::f32_ray::F32Ray;
 use crate::intersect::watertight::{BlockRay, Meeting, Shear, intersect};
-use crate::intersect::{Level, corners_at, equals_before_at, meet_triangles_at, told_at, truncated_at};
+use crate::intersect::{Isa, corners_at, equals_before_at, intersect_triangles_at, told_at, truncated_at};
 use crate::tree::BLOCK;
 use crate::tree::triangle_block::{BlockNames, Blocks, Line, TriangleBlock};
 use crate::{Accel, BuildOptions, Geometry, GeometryKind, Preset, TriangleMesh};
@@ -46,25 +46,25 @@ fn block(random: &mut Random, shares: f64, center: DVec3, spread: f64, size: f64
     }
     let names: Vec<_> = (0..mesh.indices.len() as u32).map(|triangle| [0, triangle]).collect();
     let geometry = Geometry { id: 0, kind: GeometryKind::Mesh(Arc::new(mesh)) };
-    pack::pack(Level::best(), true, &[geometry], &[BlockNames::of(&names)], &[0], true).lines
+    pack::pack(Isa::best(), true, &[geometry], &[BlockNames::of(&names)], &[0], true).lines
 }
 
-/// One ray at one block at every level.
+/// One ray at one block at every instruction set.
 fn check(block: &TriangleBlock, ray: &Ray, mesh_origin: DVec3, tally: &mut Tally) {
     let shear = Shear::new(&ray.direction);
     let origin = shear.local_origin(&ray.origin, &mesh_origin);
     let largest =
         (0..BLOCK).flat_map(|lane| block.triangle(lane)).flatten().fold(0.0f32, |most, x| most.max(x.abs()));
     let blocks = BlockRay::new(&shear, &origin, largest, ray.t_min, ray.t_max);
-    for level in Level::all() {
+    for isa in Isa::all() {
         let (mask, sure, between) = blocks
             .as_ref()
             .map_or((block.taken(), 0, [[f32::NEG_INFINITY, f32::INFINITY]; BLOCK]), |blocks| {
-                meet_triangles_at(level, block, blocks)
+                intersect_triangles_at(isa, block, blocks)
             });
         for (lane, [from, to]) in between.into_iter().enumerate() {
             if block.taken() >> lane & 1 == 0 {
-                assert_eq!((mask | sure) >> lane & 1, 0, "{level:?} meets an empty lane of {block:?}");
+                assert_eq!((mask | sure) >> lane & 1, 0, "{isa:?} meets an empty lane of {block:?}");
                 continue;
             }
             let meeting = intersect(ray, shear, origin, shear.axes.gather(block, lane));
@@ -77,16 +77,13 @@ fn check(block: &TriangleBlock, ray: &Ray, mesh_origin: DVec3, tally: &mut Tally
                 let height = root.t * shear.direction_z.abs();
                 assert!(
                     !(height < f64::from(from) || height > f64::from(to)),
-                    "{level:?} places lane {lane} wrongly along {ray:?} of {block:?}: {height} from {from} to {to}"
+                    "{isa:?} places lane {lane} wrongly along {ray:?} of {block:?}: {height} from {from} to {to}"
                 );
             }
-            assert!(
-                !is_hit || mask >> lane & 1 != 0,
-                "{level:?} loses lane {lane} along {ray:?} of {block:?}"
-            );
+            assert!(!is_hit || mask >> lane & 1 != 0, "{isa:?} loses lane {lane} along {ray:?} of {block:?}");
             assert!(
                 is_hit || sure >> lane & 1 == 0,
-                "{level:?} invents lane {lane} along {ray:?} of {block:?}"
+                "{isa:?} invents lane {lane} along {ray:?} of {block:?}"
             );
             tally.hits += u32::from(is_hit);
         }
@@ -102,8 +99,8 @@ fn bombard(seed: u64, shares: &[f64], center: DVec3, spread: f64, size: f64, dis
     let mut random = Random(seed);
     let mut tally = Tally { hits: 0, kept: 0, sure: 0 };
     for round in 0..BLOCKS {
-        let units = block(&mut random, shares[round % shares.len()], center, spread, size);
-        let block = Blocks::new(&units).at(0).unwrap();
+        let tree_space = block(&mut random, shares[round % shares.len()], center, spread, size);
+        let block = Blocks::new(&tree_space).at(0).unwrap();
         for _ in 0..12 {
             let lane = random.below(BLOCK - 1);
             let corners = block.triangle(lane).map(|corner| Vec3::from_array(corner).as_dvec3());
@@ -160,29 +157,29 @@ fn what_two_rays_are_told_of_two_blocks_together_is_what_each_is_told_alone() {
     let mut sharing = [0; 3];
     for _ in 0..600 {
         // Such as share many of their corners, and such as do not.
-        let units = [(); 2].map(|()| {
+        let tree_space = [(); 2].map(|()| {
             let shares = [0.0, 0.0, 0.9][random.below(3)];
             block(&mut random, shares, DVec3::ZERO, 1.0, 0.5)
         });
-        let blocks = [&units[0], &units[1]].map(|units| Blocks::new(units).at(0).unwrap());
+        let blocks =
+            [&tree_space[0], &tree_space[1]].map(|tree_space| Blocks::new(tree_space).at(0).unwrap());
         sharing[blocks.iter().filter(|block| !block.is_unshared()).count()] += 1;
         let rays = [(); 2].map(|()| {
             let (origin, direction) = (3.0 * random.vector(), random.vector());
             let shear = Shear::new(&direction);
             let local = shear.local_origin(&origin, &DVec3::ZERO);
-            let narrow = F32Ray {
+            let f32_ray = F32Ray {
                 axes: shear.axes,
                 origin: [local[0] as f32, local[1] as f32, local[2] as f32, 0.0],
                 shear: [shear.x as f32, shear.y as f32, 0.0, f32::INFINITY],
                 minus_inverse: -1.0,
             };
             let t_max = random.between(0.5, 6.0);
-            (BlockRay::new(&shear, &local, 3.0, 0.0, t_max).unwrap(), narrow)
+            (BlockRay::new(&shear, &local, 3.0, 0.0, t_max).unwrap(), f32_ray)
         });
-        for level in Level::all() {
-            let [together, alone] =
-                told_at(level, blocks, [&rays[0].0, &rays[1].0], [&rays[0].1, &rays[1].1]);
-            assert_eq!(together, alone, "{level:?}");
+        for isa in Isa::all() {
+            let [together, alone] = told_at(isa, blocks, [&rays[0].0, &rays[1].0], [&rays[0].1, &rays[1].1]);
+            assert_eq!(together, alone, "{isa:?}");
         }
     }
     assert!(sharing.iter().all(|&pairs| pairs > 50), "{sharing:?}");
@@ -203,7 +200,7 @@ fn the_test_of_a_block_is_sharp() {
 fn a_ray_that_leaves_a_wall_is_seen_to_leave_it() {
     // As rays do that bounce: moved off the surface by a hundred-thousandth of the room. Of one in six, double precision has to say so.
     let mut random = Random(80);
-    let (mut asked, mut rays) = (0, 0);
+    let (mut dispatched, mut rays) = (0, 0);
     for _ in 0..200 {
         let center = 5.0 * random.vector();
         let normal = random.vector().normalize();
@@ -214,7 +211,7 @@ fn a_ray_that_leaves_a_wall_is_seen_to_leave_it() {
         let wall = TriangleMesh { origin: DVec3::ZERO, positions, indices: vec![[0, 1, 2], [0, 2, 3]] };
         let geometry = Geometry { id: 0, kind: GeometryKind::Mesh(Arc::new(wall)) };
         let names = [BlockNames::of(&[[0, 0], [0, 1]])];
-        let lines = pack::pack(Level::best(), true, &[geometry], &names, &[0], true).lines;
+        let lines = pack::pack(Isa::best(), true, &[geometry], &names, &[0], true).lines;
         let block = Blocks::new(&lines).at(0).unwrap();
         for _ in 0..50 {
             let at = center + random.between(-1.0, 1.0) * right + random.between(-1.0, 1.0) * up;
@@ -224,12 +221,12 @@ fn a_ray_that_leaves_a_wall_is_seen_to_leave_it() {
             let shear = Shear::new(&ray.direction);
             let blocks =
                 BlockRay::new(&shear, &shear.local_origin(&ray.origin, &DVec3::ZERO), 12.0, 0.0, 1e9);
-            let (mask, sure, _) = meet_triangles_at(Level::best(), block, &blocks.unwrap());
+            let (mask, sure, _) = intersect_triangles_at(Isa::best(), block, &blocks.unwrap());
             assert_eq!(sure, 0);
-            (asked, rays) = (asked + u32::from(mask != 0), rays + 1);
+            (dispatched, rays) = (dispatched + u32::from(mask != 0), rays + 1);
         }
     }
-    assert!(asked < rays / 4, "{asked} of {rays}");
+    assert!(dispatched < rays / 4, "{dispatched} of {rays}");
 }
 
 /// Blocks of a grid, some of whose triangles have vertices of their own: a share of them.
@@ -273,8 +270,8 @@ fn corners_are_compared_with_all_before_them_at_every_level() {
                     expected[at] |= u32::from(list[before] == list[at]) << before;
                 }
             }
-            for level in Level::all() {
-                assert_eq!(equals_before_at(level, &list), expected, "{level:?}: {list:?}");
+            for isa in Isa::all() {
+                assert_eq!(equals_before_at(isa, &list), expected, "{isa:?}: {list:?}");
             }
         }
     }
@@ -290,8 +287,8 @@ fn numbers_lose_what_stands_behind_the_point_at_every_level() {
     );
     for numbers in lists {
         let expected = numbers.map(|number| f64::from(number).trunc() as i32);
-        for level in Level::all() {
-            assert_eq!(truncated_at(level, &numbers), expected, "{level:?}: {numbers:?}");
+        for isa in Isa::all() {
+            assert_eq!(truncated_at(isa, &numbers), expected, "{isa:?}: {numbers:?}");
         }
     }
 }
@@ -315,10 +312,10 @@ fn a_block_has_the_corners_of_its_triangles_however_many_they_share() {
             for (lane, primitive) in names.primitives().enumerate() {
                 let corners = mesh.indices[primitive as usize].map(|v| mesh.positions[v as usize].to_array());
                 assert_eq!(block.triangle(lane), corners);
-                for level in Level::all() {
-                    let side_by_side = corners_at(level, block);
+                for isa in Isa::all() {
+                    let side_by_side = corners_at(isa, block);
                     let corner = |corner: usize| [0, 1, 2].map(|axis| side_by_side[axis][corner][lane]);
-                    assert_eq!([corner(0), corner(1), corner(2)], corners, "{level:?}");
+                    assert_eq!([corner(0), corner(1), corner(2)], corners, "{isa:?}");
                 }
             }
         }
@@ -342,7 +339,7 @@ fn triangles_are_put_in_an_order_in_which_they_share_their_vertices() {
             let names: Vec<_> = triangles.iter().map(|&triangle| [0, triangle]).collect();
             let names = [BlockNames::of(&names)];
             let geometries = [Geometry { id: 0, kind: GeometryKind::Mesh(Arc::clone(&mesh)) }];
-            let filled = pack::pack(Level::best(), true, &geometries, &names, &[0], true);
+            let filled = pack::pack(Isa::best(), true, &geometries, &names, &[0], true);
             let block = Blocks::new(&filled.lines).at(0).unwrap();
             assert!(!block.is_unshared(), "{triangles:?}");
             let mut names = names;
@@ -356,7 +353,7 @@ fn triangles_are_put_in_an_order_in_which_they_share_their_vertices() {
                 assert_eq!(block.triangle(lane), corners);
             }
             // What stands in that order stays in it.
-            let again = pack::pack(Level::best(), true, &geometries, &names, &[0], true);
+            let again = pack::pack(Isa::best(), true, &geometries, &names, &[0], true);
             assert_eq!(again.lines, filled.lines);
         }
     }
@@ -468,14 +465,14 @@ fn triangles_that_come_apart_are_packed_again() {
     for apart in [one, all] {
         let mut accel = Accel::build(vec![together.clone()], &BuildOptions::default()).unwrap();
         let first = accel.tree.blocks.to_vec();
-        let mut units = first.clone();
+        let mut tree_space = first.clone();
         let mut put = |geometry: &Geometry| {
             let geometries = std::slice::from_ref(geometry);
-            pack::move_triangles(accel.level, geometries, &accel.tree.names, true, &mut units)
+            pack::move_triangles(accel.isa, geometries, &accel.tree.names, true, &mut tree_space)
         };
         assert!(!put(&apart));
         assert!(put(&together));
-        assert_eq!(units, first);
+        assert_eq!(tree_space, first);
 
         accel.refit(vec![apart.clone()]).unwrap();
         let again = Accel::from_bytes(&accel.to_bytes(), vec![apart.clone()]).unwrap();

@@ -16,12 +16,12 @@ use crate::{
 
 /// Custom geometry of which nothing is ever met, and that writes down which threads ask for its boxes.
 #[derive(Debug)]
-struct Asked {
+struct DispatchedQuery {
     count: u32,
     by: Mutex<BTreeSet<String>>,
 }
 
-impl CustomGeometry for Asked {
+impl CustomGeometry for DispatchedQuery {
     fn primitive_count(&self) -> u32 {
         self.count
     }
@@ -47,10 +47,10 @@ impl CustomGeometry for Asked {
 fn what_is_little_is_built_by_the_thread_that_asks_and_more_by_the_pool() {
     let own = BTreeSet::from([format!("{:?}", std::thread::current().id())]);
     for (count, is_own) in [(100, true), (4096, true), (4097, false)] {
-        let asked = Arc::new(Asked { count, by: Mutex::default() });
-        let accel = try_build(vec![GeometryKind::Custom(asked.clone())]).unwrap();
+        let dispatched = Arc::new(DispatchedQuery { count, by: Mutex::default() });
+        let accel = try_build(vec![GeometryKind::Custom(dispatched.clone())]).unwrap();
         assert_eq!(accel.primitive_count(), count as usize);
-        assert_eq!(*asked.by.lock().unwrap() == own, is_own, "{count}");
+        assert_eq!(*dispatched.by.lock().unwrap() == own, is_own, "{count}");
     }
 }
 
@@ -299,8 +299,8 @@ fn a_million_million_leaves_fit_by_nesting() {
     // 40 levels of two: 2^40 cubes in a row along x, in kilobytes.
     let mut tree = Arc::new(build(vec![GeometryKind::Mesh(Arc::new(cube()))]));
     let mut bytes = tree.memory_bytes();
-    for level in 0..40 {
-        let step = DVec3::new(4.0 * 2f64.powi(level), 0.0, 0.0);
+    for isa in 0..40 {
+        let step = DVec3::new(4.0 * 2f64.powi(isa), 0.0, 0.0);
         let place = |offset| {
             let world_from_object = Transform::translate(offset).into();
             GeometryKind::Instance(Instance { accel: Arc::clone(&tree), world_from_object })

@@ -3,14 +3,14 @@
 mod anything;
 mod blocks;
 mod borders;
+mod bounding_volumes;
 mod boxes;
 mod build;
 mod deforming;
+mod f32_ray;
 mod file;
-mod hulls;
 mod inside;
 mod motion;
-mod narrow;
 mod nearest;
 mod needles;
 mod occlusion;

@@ -26,7 +26,7 @@ fn by_loop(accel: &Accel, point: DVec3, max_distance: f64) -> (Option<ClosestPoi
             match &standing.kind {
                 GeometryKind::Mesh(mesh) => {
                     for primitive in 0..mesh.indices.len() as u32 {
-                        search.meet_triangle(frame, mesh, geometry, primitive);
+                        search.intersect_triangle(frame, mesh, geometry, primitive);
                     }
                 }
                 GeometryKind::Instance(instance) => {
@@ -84,7 +84,7 @@ fn similar(random: &mut Random, center: DVec3, spread: f64) -> Transform {
         * Transform::scale(DVec3::new(mirror * size, size, size)).unwrap()
 }
 
-/// Meshes, shapes where they have a method, balls of a stranger's, instances of all that and of meshes under any map.
+/// Meshes, shapes where they have a method, balls of a user's, instances of all that and of meshes under any map.
 fn answerable(random: &mut Random, center: DVec3, extent: f64, depth: u32) -> Accel {
     let mut kinds = vec![GeometryKind::Mesh(Arc::new(soup(random, 90, center, extent)))];
     let spheres = cloud(random, 12, center, center, extent);
@@ -150,7 +150,7 @@ fn a_tree_finds_the_nearest_point_that_a_loop_finds() {
 #[test]
 fn without_an_answer_of_everything_there_may_be_one_all_the_same() {
     let mut random = Random(4);
-    // Shapes under maps that do not keep angles, and a floor of a stranger's.
+    // Shapes under maps that do not keep angles, and a floor of a user's.
     let accel = mixture(&mut random, CENTER, 3.0, 1, true);
     let (mut answered, mut refused) = (0, 0);
     for _ in 0..600 {
@@ -218,8 +218,8 @@ fn an_infinite_plane_is_near_wherever_it_is() {
 #[test]
 fn two_to_the_fortieth_cubes_have_a_nearest_one() {
     let mut accel = Arc::new(build(vec![GeometryKind::Mesh(Arc::new(cube()))]));
-    for level in 0..40 {
-        let apart = 4.0 * 2f64.powi(level);
+    for isa in 0..40 {
+        let apart = 4.0 * 2f64.powi(isa);
         let place = |offset: DVec3| {
             GeometryKind::Instance(Instance {
                 accel: Arc::clone(&accel),

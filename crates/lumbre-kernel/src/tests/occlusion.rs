@@ -6,7 +6,7 @@ use lumbre_math::DVec3;
 
 use super::refit::moved;
 use super::scenes::{Random, build, icosphere, mesh, mixture, options, room, soup, with_every_preset};
-use crate::intersect::Level;
+use crate::intersect::Isa;
 use crate::tree::node::{Node, tag};
 use crate::{Accel, GeometryKind, TriangleMesh, build::occlusion_order};
 
@@ -51,7 +51,7 @@ fn check_order(accel: &Accel, reference: u32, checked: &mut usize) -> Option<Odd
                     for lane in (0..8).filter(|lane| block.taken() >> lane & 1 != 0) {
                         let [a, b, c] =
                             block.triangle(lane).map(|corner| DVec3::from_array(corner.map(f64::from)));
-                        let (b, c) = ((b - a) * accel.units.scale, (c - a) * accel.units.scale);
+                        let (b, c) = ((b - a) * accel.tree_space.scale, (c - a) * accel.tree_space.scale);
                         triangles += 0.5 * b.cross(c).length();
                         unsure += 1e-6 * b.length() * c.length();
                     }
@@ -170,11 +170,11 @@ fn the_order_is_the_same_by_every_instruction_set() {
                 reversed
             })
             .collect();
-        let sorted: Vec<String> = Level::all()
+        let sorted: Vec<String> = Isa::all()
             .into_iter()
-            .map(|level| {
+            .map(|isa| {
                 let mut nodes = reversed.clone();
-                occlusion_order::sort_children(level, &accel.units, &mut nodes, accel.tree.blocks());
+                occlusion_order::sort_children(isa, &accel.tree_space, &mut nodes, accel.tree.blocks());
                 format!("{nodes:?}")
             })
             .collect();

@@ -6,7 +6,7 @@ use lumbre_geometry::Ray;
 use lumbre_math::{DVec3, Transform, Vec3};
 
 use super::scenes::{Random, balls, build, cube, icosphere, mixture, ray, shape, soup, with_every_preset};
-use crate::intersect::Level;
+use crate::intersect::Isa;
 use crate::{Accel, Faces, GeometryKind, Hit, Instance, Query, TriangleMesh, brute};
 
 const CENTER: DVec3 = DVec3::new(1.5, -2.25, 4.0);
@@ -131,13 +131,9 @@ fn check(accel: &Accel, random: &mut Random) {
             filter: None,
         };
         let expected = all.iter().find(|hit| counts(accel, &ray, hit, &options)).cloned();
-        for level in Level::all() {
-            assert_eq!(
-                accel.closest_with_at(level, &ray, &options),
-                expected,
-                "{level:?} {ray:?} {options:?}"
-            );
-            assert_eq!(accel.any_with_at(level, &ray, &options), expected.is_some(), "{level:?} {ray:?}");
+        for isa in Isa::all() {
+            assert_eq!(accel.closest_with_at(isa, &ray, &options), expected, "{isa:?} {ray:?} {options:?}");
+            assert_eq!(accel.any_with_at(isa, &ray, &options), expected.is_some(), "{isa:?} {ray:?}");
         }
         hits += usize::from(expected.is_some());
         fewer += usize::from(expected.as_ref() != all.first());

@@ -9,12 +9,12 @@ use lumbre_geometry::Ray;
 use lumbre_math::{DVec3, Transform};
 
 use super::scenes::{Random, balls, build, cube, icosphere, mixture, ray, soup, with_every_preset};
-use crate::intersect::Level;
+use crate::intersect::Isa;
 use crate::{Accel, GeometryKind, Hit, Instance, Query, TriangleMesh, brute};
 
-fn every(level: Level, accel: &Accel, ray: &Ray) -> Vec<Hit> {
+fn every(isa: Isa, accel: &Accel, ray: &Ray) -> Vec<Hit> {
     let mut hits = Vec::new();
-    accel.all_at(level, ray, |hit| {
+    accel.all_at(isa, ray, |hit| {
         hits.push(hit.clone());
         ControlFlow::Continue(())
     });
@@ -26,23 +26,23 @@ pub(crate) fn check(accel: &Accel, ray: &Ray) -> usize {
     let expected = brute::every(accel, ray);
     let closest = brute::closest(accel, ray);
     assert_eq!(closest, expected.first().cloned(), "{ray:?}");
-    for level in Level::all() {
-        let found = accel.closest_at(level, ray);
-        assert_eq!(found, closest, "{level:?} {ray:?}");
-        assert_eq!(t_bits(&found), t_bits(&closest), "{level:?} {ray:?}");
-        assert_eq!(accel.any_at(level, ray), closest.is_some(), "{level:?} {ray:?}");
-        assert_eq!(every(level, accel, ray), expected, "{level:?} {ray:?}");
-        assert_eq!(accel.count_at(level, ray), expected.len(), "{level:?} {ray:?}");
+    for isa in Isa::all() {
+        let found = accel.closest_at(isa, ray);
+        assert_eq!(found, closest, "{isa:?} {ray:?}");
+        assert_eq!(t_bits(&found), t_bits(&closest), "{isa:?} {ray:?}");
+        assert_eq!(accel.any_at(isa, ray), closest.is_some(), "{isa:?} {ray:?}");
+        assert_eq!(every(isa, accel, ray), expected, "{isa:?} {ray:?}");
+        assert_eq!(accel.count_at(isa, ray), expected.len(), "{isa:?} {ray:?}");
     }
 
     let accept = |hit: &Hit| !(hit.id / 7 + hit.primitive + hit.instances.len() as u32).is_multiple_of(3);
     let filtered = expected.iter().find(|hit| accept(hit)).cloned();
-    for level in Level::all() {
+    for isa in Isa::all() {
         let query = Query::new().filter(&accept);
-        let found = accel.closest_with_at(level, ray, &query);
-        assert_eq!(found, filtered, "{level:?} {ray:?}");
-        assert_eq!(t_bits(&found), t_bits(&filtered), "{level:?} {ray:?}");
-        assert_eq!(accel.any_with_at(level, ray, &query), filtered.is_some(), "{level:?} {ray:?}");
+        let found = accel.closest_with_at(isa, ray, &query);
+        assert_eq!(found, filtered, "{isa:?} {ray:?}");
+        assert_eq!(t_bits(&found), t_bits(&filtered), "{isa:?} {ray:?}");
+        assert_eq!(accel.any_with_at(isa, ray, &query), filtered.is_some(), "{isa:?} {ray:?}");
     }
     expected.len()
 }
@@ -56,21 +56,21 @@ pub(crate) fn check_many(accel: &Accel, random: &mut Random, center: DVec3, exte
     assert!(hits > rays / 4, "only {hits} hits of {rays} rays");
 }
 
-/// The same in batches of many sizes, at every level; returns how many were hit.
+/// The same in batches of many sizes, at every instruction set; returns how many were hit.
 pub(crate) fn check_batches(accel: &Accel, rays: &[Ray]) -> usize {
     let expected: Vec<_> = rays.iter().map(|ray| accel.closest(ray)).collect();
-    for level in Level::all() {
+    for isa in Isa::all() {
         for size in [1, 3, 7, 64, rays.len()] {
             for (rays, expected) in rays.chunks(size).zip(expected.chunks(size)) {
                 // What stood there before does not matter.
                 let mut hits = vec![expected.iter().flatten().next().cloned(); rays.len()];
-                accel.closest_batch_at(level, rays, &mut hits);
-                assert_eq!(hits, expected, "{level:?}");
+                accel.closest_batch_at(isa, rays, &mut hits);
+                assert_eq!(hits, expected, "{isa:?}");
                 let bits = |hit: &Option<Hit>| hit.as_ref().map(|hit| hit.root.t.to_bits());
                 assert!(hits.iter().map(bits).eq(expected.iter().map(bits)));
                 let mut is_hit = vec![true; rays.len()];
-                accel.any_batch_at(level, rays, &mut is_hit);
-                assert!(is_hit.iter().copied().eq(expected.iter().map(Option::is_some)), "{level:?}");
+                accel.any_batch_at(isa, rays, &mut is_hit);
+                assert!(is_hit.iter().copied().eq(expected.iter().map(Option::is_some)), "{isa:?}");
             }
         }
     }
@@ -195,7 +195,7 @@ fn soup_in_and_beside_instances(random: &mut Random) -> Accel {
 fn a_filter_is_asked_once_about_each_crossing() {
     let mut random = Random(75);
     let accel = soup_in_and_beside_instances(&mut random);
-    let mut asked = 0;
+    let mut dispatched = 0;
     for _ in 0..3000 {
         let ray = ray(&mut random, CENTER, 3.0);
         let all = brute::every(&accel, &ray);
@@ -211,7 +211,7 @@ fn a_filter_is_asked_once_about_each_crossing() {
         assert!(!accel.any_with(&ray, &query));
         let count = seen.take().len();
         assert_eq!(count, all.len());
-        asked += count;
+        dispatched += count;
         let mut first = Vec::new();
         accel.all(&ray, |hit| {
             first.push(hit.clone());
@@ -219,7 +219,7 @@ fn a_filter_is_asked_once_about_each_crossing() {
         });
         assert_eq!(first, all[..all.len().min(3)]);
     }
-    assert!(asked > 3000, "{asked}");
+    assert!(dispatched > 3000, "{dispatched}");
 }
 
 #[test]
@@ -314,7 +314,7 @@ fn ties_go_to_the_first_in_the_lists() {
     let ray = Ray::new(DVec3::new(1.25, 0.5, -7.0), DVec3::new(0.01, 0.02, 1.0));
     check(&accel, &ray);
     let places: Vec<_> =
-        every(Level::best(), &accel, &ray).iter().map(|hit| (hit.route.to_vec(), hit.geometry)).collect();
+        every(Isa::best(), &accel, &ray).iter().map(|hit| (hit.route.to_vec(), hit.geometry)).collect();
     let expected = [(vec![], 1), (vec![], 2), (vec![0], 0), (vec![0], 1), (vec![3], 0), (vec![3], 1)];
     assert_eq!(places[..6], expected);
     assert_eq!(places[6..], expected);
@@ -325,7 +325,7 @@ fn ties_go_to_the_first_in_the_lists() {
 fn both_ends_of_the_range_count() {
     let accel = build(vec![GeometryKind::Mesh(Arc::new(cube()))]);
     let ray = Ray::new(DVec3::new(1.25, 0.5, -7.0), DVec3::new(0.0, 0.0, 2.0));
-    let ts: Vec<f64> = every(Level::best(), &accel, &ray).iter().map(|hit| hit.root.t).collect();
+    let ts: Vec<f64> = every(Isa::best(), &accel, &ray).iter().map(|hit| hit.root.t).collect();
     assert_eq!(ts, [5.0, 6.25]);
     assert_eq!(accel.count(&ray.with_range(5.0, 6.25)), 2);
     assert_eq!(accel.count(&ray.with_range(5.0f64.next_up(), 6.25)), 1);
@@ -388,7 +388,7 @@ fn rays_of_absurd_size_are_answered_as_by_the_loop() {
 fn all_stops_where_told() {
     let accel = build(vec![GeometryKind::Mesh(Arc::new(soup(&mut Random(8), 250_000, CENTER, 3.0)))]);
     let ray = Ray::new(CENTER + DVec3::new(0.3, -9.0, 0.2), DVec3::new(0.01, 1.0, -0.02));
-    let hits = every(Level::best(), &accel, &ray);
+    let hits = every(Isa::best(), &accel, &ray);
     assert!(hits.len() > 300, "{}", hits.len());
     assert_eq!(hits, brute::every(&accel, &ray));
     for stop in [1, 31, 32, 33, 160, 161, hits.len()] {

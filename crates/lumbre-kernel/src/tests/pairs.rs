@@ -4,17 +4,17 @@ use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
 
 use super::scenes::Random;
-use crate::intersect::watertight::{self, Met, Pairs, Passage, Shear};
-use crate::intersect::{Lanes, Level, Task};
+use crate::intersect::watertight::{self, EdgeTest, Met, Pairs, Shear};
+use crate::intersect::{Dispatch, Isa, Simd};
 use crate::simd::{Row, WIDE};
 
 struct Meeting<'a>(&'a Pairs<'a>);
 
-impl Task for Meeting<'_> {
+impl Dispatch for Meeting<'_> {
     type Output = Met;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> Met {
+    fn run<L: Simd>(self) -> Met {
         self.0.meet()
     }
 }
@@ -50,7 +50,7 @@ fn lane(random: &mut Random) -> (DVec3, [f64; 3], [[f32; 3]; 3]) {
 #[test]
 fn sixteen_pairs_meet_as_each_alone() {
     let mut random = Random(171);
-    let (mut inside, mut outside, mut unclear) = (0, 0, 0);
+    let (mut inside, mut outside, mut uncertain) = (0, 0, 0);
     for _ in 0..if cfg!(miri) { 20 } else { 3_000 } {
         let (mut from, mut along) = ([Row::of(0.0); 3], [Row::of(0.0); 3]);
         let mut rows_of_corners = [[Row::of(0.0); 3]; 3];
@@ -70,33 +70,36 @@ fn sixteen_pairs_meet_as_each_alone() {
             direction: along.each_ref(),
             corners: &rows_of_corners,
         };
-        for level in Level::all() {
-            let met = level.run(Meeting(&pairs));
+        for isa in Isa::all() {
+            let met = isa.run(Meeting(&pairs));
             for (i, (direction, origin, corners)) in lanes.iter().enumerate() {
                 // Its third axis is the largest and not negative, so that the order stays.
                 let shear = Shear::new(direction);
-                let (passage, crossing) = watertight::passage(&shear, origin, corners);
+                let (edge_test, crossing) = watertight::edge_test(&shear, origin, corners);
                 let met = (met.t.0[i], met.local[0].0[i], met.local[1].0[i]);
-                match passage {
-                    Passage::Inside => {
+                match edge_test {
+                    EdgeTest::Inside => {
                         let (t, local) = (crossing.t(&shear), crossing.local());
                         let expected = (t, local.x, local.y);
-                        assert_eq!(bits(met), bits(expected), "{level:?}");
+                        assert_eq!(bits(met), bits(expected), "{isa:?}");
                         inside += 1;
                     }
-                    Passage::Outside => {
-                        assert!(met.0.is_nan(), "{level:?}");
+                    EdgeTest::Outside => {
+                        assert!(met.0.is_nan(), "{isa:?}");
                         outside += 1;
                     }
-                    Passage::Unclear => {
-                        assert!(met.0.is_nan(), "{level:?}");
-                        unclear += 1;
+                    EdgeTest::Uncertain => {
+                        assert!(met.0.is_nan(), "{isa:?}");
+                        uncertain += 1;
                     }
                 }
             }
         }
     }
-    assert!(cfg!(miri) || inside > 5_000 && outside > 5_000 && unclear > 500, "{inside} {outside} {unclear}");
+    assert!(
+        cfg!(miri) || inside > 5_000 && outside > 5_000 && uncertain > 500,
+        "{inside} {outside} {uncertain}"
+    );
 }
 
 fn bits((t, u, v): (f64, f64, f64)) -> [u64; 3] {
@@ -105,11 +108,11 @@ fn bits((t, u, v): (f64, f64, f64)) -> [u64; 3] {
 
 struct Columns<'a>(&'a [Ray; WIDE]);
 
-impl Task for Columns<'_> {
+impl Dispatch for Columns<'_> {
     type Output = [Row<f64>; 8];
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> [Row<f64>; 8] {
+    fn run<L: Simd>(self) -> [Row<f64>; 8] {
         let mut columns = [Row::of(f64::NAN); 8];
         L::columns(self.0, &mut columns);
         columns
@@ -125,7 +128,7 @@ fn the_numbers_of_rays_stand_side_by_side_at_every_level() {
     });
     let expected: [Row<f64>; 8] =
         std::array::from_fn(|column| Row(std::array::from_fn(|i| number(i, column))));
-    for level in Level::all() {
-        assert_eq!(level.run(Columns(&rays)), expected, "{level:?}");
+    for isa in Isa::all() {
+        assert_eq!(isa.run(Columns(&rays)), expected, "{isa:?}");
     }
 }

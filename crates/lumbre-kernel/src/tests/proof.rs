@@ -134,8 +134,10 @@ fn no_ray_leaks_in_twenty_million_aimed_at_edges_and_vertices() {
 }
 
 fn asked_for(name: &str, otherwise: u64) -> u64 {
-    let asked = std::env::var(name).ok();
-    asked.map_or(otherwise, |asked| asked.parse().unwrap_or_else(|_| panic!("{name} is a whole number")))
+    let dispatched = std::env::var(name).ok();
+    dispatched.map_or(otherwise, |dispatched| {
+        dispatched.parse().unwrap_or_else(|_| panic!("{name} is a whole number"))
+    })
 }
 
 /// What the random numbers start from: far apart even where the seeds asked for are neighbours.

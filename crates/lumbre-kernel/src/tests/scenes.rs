@@ -225,7 +225,7 @@ pub(crate) fn precise(mesh: &TriangleMesh) -> PreciseMesh {
     PreciseMesh { positions, indices: mesh.indices.clone() }
 }
 
-/// Spheres as a stranger would bring them; the last primitive is the infinite slab |y - floor| ≤ 0.125 where asked.
+/// Spheres as a user would bring them; the last primitive is the infinite slab |y - floor| ≤ 0.125 where asked.
 #[derive(Debug)]
 pub(crate) struct Balls {
     pub(crate) balls: Vec<(DVec3, f64)>,

@@ -8,7 +8,7 @@ use lumbre_math::{DVec3, Transform};
 use super::scenes::{self, Random};
 use crate::batch;
 use crate::batch::packet::{self, PACKET};
-use crate::intersect::Level;
+use crate::intersect::Isa;
 use crate::trace::Outcome;
 use crate::{Accel, BuildOptions, Faces, Geometry, GeometryKind, Hit, Preset, Query, TriangleMesh};
 
@@ -97,26 +97,26 @@ fn alike(random: &mut Random, mesh: &TriangleMesh, size: f64) -> [Ray; PACKET] {
 
 /// Every search of a tree beside the plain one, which answers with the same bits.
 fn check(accel: &Accel, rays: &[Ray], least: u32) {
-    for level in Level::all() {
+    for isa in Isa::all() {
         // For closest and any hits: rays that the exact traversal has to answer.
         let (mut unsettled, mut hits) = ([0; 2], 0);
         let mut expected = Vec::with_capacity(rays.len());
         let mut in_batch = vec![None; rays.len()];
-        accel.closest_batch_at(level, rays, &mut in_batch);
+        accel.closest_batch_at(isa, rays, &mut in_batch);
         let mut any_in_batch = vec![false; rays.len()];
-        accel.any_batch_at(level, rays, &mut any_in_batch);
+        accel.any_batch_at(isa, rays, &mut any_in_batch);
         for ((ray, in_batch), any_in_batch) in rays.iter().zip(&in_batch).zip(&any_in_batch) {
-            let plain = accel.closest_exact_at(level, ray);
-            assert_eq!(accel.closest_at(level, ray), plain, "{level:?} {ray:?}");
-            assert_eq!(*in_batch, plain, "{level:?} {ray:?}");
-            assert_eq!(accel.any_at(level, ray), plain.is_some(), "{level:?} {ray:?}");
-            assert_eq!(*any_in_batch, plain.is_some(), "{level:?} {ray:?}");
-            match accel.filtered_at(level, ray) {
-                Outcome::Certain(answer) => assert_eq!(answer, plain, "{level:?} {ray:?}"),
+            let plain = accel.closest_exact_at(isa, ray);
+            assert_eq!(accel.closest_at(isa, ray), plain, "{isa:?} {ray:?}");
+            assert_eq!(*in_batch, plain, "{isa:?} {ray:?}");
+            assert_eq!(accel.any_at(isa, ray), plain.is_some(), "{isa:?} {ray:?}");
+            assert_eq!(*any_in_batch, plain.is_some(), "{isa:?} {ray:?}");
+            match accel.filtered_at(isa, ray) {
+                Outcome::Certain(answer) => assert_eq!(answer, plain, "{isa:?} {ray:?}"),
                 Outcome::Uncertain => unsettled[0] += 1,
             }
-            match accel.filtered_any_at(level, ray) {
-                Outcome::Certain(answer) => assert_eq!(answer, plain.is_some(), "{level:?} {ray:?}"),
+            match accel.filtered_any_at(isa, ray) {
+                Outcome::Certain(answer) => assert_eq!(answer, plain.is_some(), "{isa:?} {ray:?}"),
                 Outcome::Uncertain => unsettled[1] += 1,
             }
             hits += u32::from(plain.is_some());
@@ -125,7 +125,7 @@ fn check(accel: &Accel, rays: &[Ray], least: u32) {
         assert!(hits > least && rays.len() - unsettled[0] > least as usize, "{hits} hits, {unsettled:?}");
         // No tree of the tests is as large as those in which rays prefetch, and coherent rays would be packets.
         for plan in batch::shims::INTERLEAVED {
-            let interleaved = check_interleaved(accel, level, rays, &expected, plan);
+            let interleaved = check_interleaved(accel, isa, rays, &expected, plan);
             // Of an interleaved ray, the stack may be too short.
             for (interleaved, alone) in interleaved.into_iter().zip(unsettled) {
                 assert!(interleaved <= alone + rays.len() / 2, "{interleaved} and {alone}");
@@ -137,7 +137,7 @@ fn check(accel: &Accel, rays: &[Ray], least: u32) {
 /// Every interleaved ray has its answer; returns how many closest and any hits the exact traversal had to find.
 pub(super) fn check_interleaved(
     accel: &Accel,
-    level: Level,
+    isa: Isa,
     rays: &[Ray],
     expected: &[Option<Hit>],
     plan: batch::Plan,
@@ -146,12 +146,12 @@ pub(super) fn check_interleaved(
     // What is wrong for each, so that none is left out.
     let mut hits: Vec<_> =
         expected.iter().map(|hit| if hit.is_some() { None } else { other.cloned() }).collect();
-    let closest = batch::shims::closest(level, accel, rays, &mut hits, plan);
+    let closest = batch::shims::closest(isa, accel, rays, &mut hits, plan);
     let mut is_hit: Vec<_> = expected.iter().map(Option::is_none).collect();
-    let any = batch::shims::any(level, accel, rays, &mut is_hit, plan);
+    let any = batch::shims::any(isa, accel, rays, &mut is_hit, plan);
     for (((ray, hit), is_hit), expected) in rays.iter().zip(&hits).zip(is_hit).zip(expected) {
-        assert_eq!(hit, expected, "{level:?} {plan:?} {ray:?}");
-        assert_eq!(is_hit, expected.is_some(), "{level:?} {plan:?} {ray:?}");
+        assert_eq!(hit, expected, "{isa:?} {plan:?} {ray:?}");
+        assert_eq!(is_hit, expected.is_some(), "{isa:?} {plan:?} {ray:?}");
     }
     [closest, any]
 }
@@ -185,9 +185,9 @@ fn rays_that_go_together_are_answered_as_each_alone() {
             let list = kinds.zip(5..).map(|(kind, id)| Geometry { id, kind }).collect();
             let accel = Accel::build(list, &BuildOptions { preset }).unwrap();
             let packets: Vec<_> = (0..800).map(|i| alike(&mut random, &meshes[i % 2], size)).collect();
-            let together = |packet: &&_| batch::shims::answered_by_packet(accel.level, &accel, packet) != 0;
+            let together = |packet: &&_| batch::shims::answered_by_packet(accel.isa, &accel, packet) != 0;
             let count = packets.iter().filter(together).count();
-            assert!(count > 60 || !accel.level.has_vectors(), "{count}");
+            assert!(count > 60 || !accel.isa.has_vectors(), "{count}");
             check(&accel, packets.as_flattened(), 1_500);
             // In a long batch, those that do not gain by it are seldom tried.
             packets.iter().for_each(|packet| check_packet(&accel, packet));
@@ -199,15 +199,15 @@ fn rays_that_go_together_are_answered_as_each_alone() {
 pub(super) fn check_packet(accel: &Accel, rays: &[Ray; PACKET]) {
     let mut others = *rays;
     others.reverse();
-    for level in Level::all() {
+    for isa in Isa::all() {
         let (mut hits, mut met) = ([const { None }; PACKET], [false; PACKET]);
         // Over what stands there already.
-        accel.closest_batch_at(level, &others, &mut hits);
-        accel.closest_batch_at(level, rays, &mut hits);
-        accel.any_batch_at(level, rays, &mut met);
+        accel.closest_batch_at(isa, &others, &mut hits);
+        accel.closest_batch_at(isa, rays, &mut hits);
+        accel.any_batch_at(isa, rays, &mut met);
         for ((ray, hit), met) in rays.iter().zip(&hits).zip(met) {
-            assert_eq!(*hit, accel.closest_exact_at(level, ray), "{level:?} {ray:?}");
-            assert_eq!(met, hit.is_some(), "{level:?} {ray:?}");
+            assert_eq!(*hit, accel.closest_exact_at(isa, ray), "{isa:?} {ray:?}");
+            assert_eq!(met, hit.is_some(), "{isa:?} {ray:?}");
         }
     }
 }
@@ -233,14 +233,14 @@ fn rays_that_are_not_sound_do_not_go_together() {
         Ray { t_min: 2.0, t_max: 1.0, ..sound },
         Ray { origin: DVec3::new(0.1, 3e9, 0.2), ..sound },
     ];
-    for level in Level::all().into_iter().filter(|level| level.has_vectors()) {
-        assert_eq!(batch::shims::answered_by_packet(level, &accel, &packet), packet::ALL);
+    for isa in Isa::all().into_iter().filter(|isa| isa.has_vectors()) {
+        assert_eq!(batch::shims::answered_by_packet(isa, &accel, &packet), packet::ALL);
         for (number, other) in others.iter().enumerate() {
             for place in 0..PACKET {
                 let mut packet = packet;
                 packet[place] = *other;
-                let answered = batch::shims::answered_by_packet(level, &accel, &packet);
-                assert_eq!(answered >> place & 1, 0, "{level:?} {number} {place}");
+                let answered = batch::shims::answered_by_packet(isa, &accel, &packet);
+                assert_eq!(answered >> place & 1, 0, "{isa:?} {number} {place}");
                 check_packet(&accel, &packet);
             }
         }
@@ -262,13 +262,13 @@ fn rays_of_several_octants_go_together_by_octants() {
             let across = if lane < 8 { 0.02 } else { -0.02 } + 0.01 * random.unit();
             Ray::new(eye, forward + across * side + DVec3::splat(1e-3) * DVec3::new(1.0, 1.2, 1.4))
         });
-        for level in Level::all().into_iter().filter(|level| level.has_vectors()) {
-            let answered = batch::shims::answered_by_packet(level, &accel, &rays);
+        for isa in Isa::all().into_iter().filter(|isa| isa.has_vectors()) {
+            let answered = batch::shims::answered_by_packet(isa, &accel, &rays);
             seen[i % 3] += u32::from(answered == packet::ALL);
         }
         check_packet(&accel, &rays);
     }
-    let least = if Level::best().has_vectors() { 40 } else { 0 };
+    let least = if Isa::best().has_vectors() { 40 } else { 0 };
     assert!(seen.iter().all(|&seen| seen >= least), "{seen:?}");
 }
 
@@ -353,7 +353,7 @@ fn single_precision_settles_nearly_all_rays_that_nobody_aims() {
     let mut unsettled = 0;
     for _ in 0..20_000 {
         let ray = Ray::new(2.0 * random.vector(), random.vector());
-        let outcome = accel.filtered_at(accel.level, &ray);
+        let outcome = accel.filtered_at(accel.isa, &ray);
         unsettled += u32::from(outcome == Outcome::Uncertain);
     }
     assert!(unsettled < 20, "{unsettled}");
@@ -365,14 +365,14 @@ fn bits(hit: &Option<Hit>) -> Option<[u64; 3]> {
 
 /// Both searches with options beside the plain ones, which answer with the same bits; the nearest hit, and whether the first
 /// search was settled.
-fn check_with(level: Level, accel: &Accel, ray: &Ray, options: &Query) -> (Option<Hit>, bool) {
-    let plain = accel.closest_with_exact_at(level, ray, options);
-    let found = accel.closest_with_at(level, ray, options);
-    assert_eq!(found, plain, "{level:?} {ray:?} {options:?}");
-    assert_eq!(bits(&found), bits(&plain), "{level:?} {ray:?} {options:?}");
-    assert_eq!(accel.any_with_exact_at(level, ray, options), plain.is_some());
-    assert_eq!(accel.any_with_at(level, ray, options), plain.is_some(), "{level:?} {ray:?} {options:?}");
-    let outcome = accel.filtered_closest_at(level, ray, options);
+fn check_with(isa: Isa, accel: &Accel, ray: &Ray, options: &Query) -> (Option<Hit>, bool) {
+    let plain = accel.closest_with_exact_at(isa, ray, options);
+    let found = accel.closest_with_at(isa, ray, options);
+    assert_eq!(found, plain, "{isa:?} {ray:?} {options:?}");
+    assert_eq!(bits(&found), bits(&plain), "{isa:?} {ray:?} {options:?}");
+    assert_eq!(accel.any_with_exact_at(isa, ray, options), plain.is_some());
+    assert_eq!(accel.any_with_at(isa, ray, options), plain.is_some(), "{isa:?} {ray:?} {options:?}");
+    let outcome = accel.filtered_closest_at(isa, ray, options);
     (plain, outcome != Outcome::Uncertain)
 }
 
@@ -380,22 +380,22 @@ fn check_with(level: Level, accel: &Accel, ray: &Ray, options: &Query) -> (Optio
 fn check_options(accel: Accel, random: &mut Random, rays: &[Ray], least: u32) {
     let masks = accel.geometries.iter().map(|_| random.bits() as u32 & 0b111).collect();
     let accel = accel.with_masks(masks);
-    for level in Level::all() {
-        let (mut settled, mut hits, mut others) = (0, 0, 0);
+    for isa in Isa::all() {
+        let (mut certain, mut hits, mut others) = (0, 0, 0);
         for ray in rays {
-            let nearest = accel.closest_exact_at(level, ray);
+            let nearest = accel.closest_exact_at(isa, ray);
             let options = Query {
                 mask: [u32::MAX, 0b001, 0b110][random.below(3)],
                 exclude: if random.unit() < 0.5 { nearest.as_ref() } else { None },
                 faces: [Faces::Both, Faces::Front, Faces::Back][random.below(3)],
                 filter: None,
             };
-            let (hit, is_settled) = check_with(level, &accel, ray, &options);
-            settled += u32::from(is_settled);
+            let (hit, is_certain) = check_with(isa, &accel, ray, &options);
+            certain += u32::from(is_certain);
             hits += u32::from(hit.is_some());
             others += u32::from(hit.is_some() && hit != nearest);
         }
-        assert!(settled > least && hits > least && others > least / 3, "{settled} {hits} {others}");
+        assert!(certain > least && hits > least && others > least / 3, "{certain} {hits} {others}");
     }
 }
 
@@ -448,20 +448,20 @@ fn a_ray_that_leaves_out_where_it_starts_goes_on_with_the_same_bits() {
         ];
         meshes.iter_mut().for_each(|mesh| mesh.origin = center);
         let accel = scenes::build(meshes.map(|mesh| GeometryKind::Mesh(mesh.into())).to_vec());
-        let (mut bounces, mut settled, mut blocked) = (0, 0, 0);
+        let (mut bounces, mut certain, mut blocked) = (0, 0, 0);
         for _ in 0..250 {
             let mut ray = Ray::new(center + 2.2 * random.vector(), random.vector());
             let mut last = None;
             for bounce in 0..12 {
                 let faces = [Faces::Both, Faces::Front, Faces::Back][bounce % 3];
                 let options = Query { exclude: last.as_ref(), ..Query::new() };
-                for level in Level::all() {
-                    check_with(level, &accel, &ray, &Query { faces, ..options });
+                for isa in Isa::all() {
+                    check_with(isa, &accel, &ray, &Query { faces, ..options });
                     // Back to where it came from, and no further.
-                    check_with(level, &accel, &ray.with_range(0.0, 1.0), &options);
+                    check_with(isa, &accel, &ray.with_range(0.0, 1.0), &options);
                 }
-                let (hit, is_settled) = check_with(Level::best(), &accel, &ray, &options);
-                settled += u32::from(is_settled);
+                let (hit, is_certain) = check_with(Isa::best(), &accel, &ray, &options);
+                certain += u32::from(is_certain);
                 blocked += u32::from(accel.any_with(&ray.with_range(0.0, 1.0), &options));
                 let Some(hit) = hit else { break };
                 bounces += 1;
@@ -472,7 +472,7 @@ fn a_ray_that_leaves_out_where_it_starts_goes_on_with_the_same_bits() {
                 last = Some(hit);
             }
         }
-        assert!(bounces > 2_000 && settled > 1_900, "{bounces} {settled}");
+        assert!(bounces > 2_000 && certain > 1_900, "{bounces} {certain}");
         assert!(blocked > 300, "{blocked}");
     });
 }
@@ -498,14 +498,14 @@ fn culling_at_edges_and_corners_keeps_its_bits() {
                     for direction in [axis, -axis, random.vector()] {
                         let ray = Ray::new(target - 4.0 * direction, direction);
                         let exclude = accel.closest(&ray);
-                        for level in Level::all() {
+                        for isa in Isa::all() {
                             for (faces, count) in [(Faces::Front, &mut fronts), (Faces::Back, &mut backs)] {
                                 let options = Query { faces, ..Query::new() };
-                                let (hit, is_settled) = check_with(level, &accel, &ray, &options);
+                                let (hit, is_certain) = check_with(isa, &accel, &ray, &options);
                                 *count += u32::from(hit.is_some());
-                                unsettled += u32::from(!is_settled);
+                                unsettled += u32::from(!is_certain);
                                 let options = Query { exclude: exclude.as_ref(), ..options };
-                                check_with(level, &accel, &ray, &options);
+                                check_with(isa, &accel, &ray, &options);
                             }
                         }
                     }

@@ -9,7 +9,7 @@ use lumbre_math::{DVec3, Transform};
 
 use super::oracle::{check, check_batches, check_many};
 use super::scenes::{Random, build, cloud, ray, with_every_preset};
-use crate::intersect::{Level, meet_spheres_at};
+use crate::intersect::{Isa, intersect_spheres_at};
 use crate::trace::Outcome;
 use crate::tree::BLOCK;
 use crate::tree::sphere_block::{SphereBlock, SphereRay, has_radius};
@@ -112,22 +112,22 @@ fn single_precision_answers_with_the_bits_of_double_precision_among_spheres() {
         rays[70].direction = DVec3::ZERO;
         rays[71].origin += 1e3 * extent;
         let expected: Vec<Option<Hit>> =
-            rays.iter().map(|ray| accel.closest_exact_at(Level::best(), ray)).collect();
+            rays.iter().map(|ray| accel.closest_exact_at(Isa::best(), ray)).collect();
         assert!(expected.iter().flatten().count() > 2_000);
-        for level in Level::all() {
+        for isa in Isa::all() {
             let mut uncertain = 0;
             for (ray, hit) in rays.iter().zip(&expected) {
-                match accel.filtered_at(level, ray) {
-                    Outcome::Certain(found) => assert_eq!(found, *hit, "{level:?} {ray:?}"),
+                match accel.filtered_at(isa, ray) {
+                    Outcome::Certain(found) => assert_eq!(found, *hit, "{isa:?} {ray:?}"),
                     Outcome::Uncertain => uncertain += 1,
                 }
-                match accel.filtered_any_at(level, ray) {
-                    Outcome::Certain(is_hit) => assert_eq!(is_hit, hit.is_some(), "{level:?} {ray:?}"),
+                match accel.filtered_any_at(isa, ray) {
+                    Outcome::Certain(is_hit) => assert_eq!(is_hit, hit.is_some(), "{isa:?} {ray:?}"),
                     Outcome::Uncertain => uncertain += 1,
                 }
             }
             // One that is nothing and one from afar, twice each; and hardly another.
-            assert!((4..12).contains(&uncertain), "{level:?}: {uncertain}");
+            assert!((4..12).contains(&uncertain), "{isa:?}: {uncertain}");
         }
         for (ray, hit) in rays.iter().zip(&expected) {
             assert_eq!(accel.closest(ray), *hit);
@@ -271,10 +271,10 @@ fn a_cloud_holds_points_as_balls_do() {
     let mut inside = 0;
     for _ in 0..1_000 {
         let p = CENTER + 3.0 * random.vector();
-        let holds = |&[x, y, z, radius]: &[f32; 4]| {
+        let summary = |&[x, y, z, radius]: &[f32; 4]| {
             (p - CENTER - DVec3::new(x.into(), y.into(), z.into())).length() < radius.into()
         };
-        let around = cloud.spheres.iter().filter(|sphere| holds(sphere)).count();
+        let around = cloud.spheres.iter().filter(|sphere| summary(sphere)).count();
         assert_eq!(accel.is_inside(p), around % 2 == 1, "{p}");
         assert_eq!(placed.is_inside(map.point(p)), around % 2 == 1, "{p}");
         assert_eq!(accel.winding_number(p), Ok(around as f64), "{p}");
@@ -303,20 +303,20 @@ struct Tally {
     sure: u32,
 }
 
-/// One ray at one block at every level.
+/// One ray at one block at every instruction set.
 fn compare(block: &SphereBlock, ray: &Ray, origin: DVec3, tally: &mut Tally) {
     let largest = |list: &[f32]| list.iter().fold(0.0f32, |most, x| most.max(x.abs()));
     let reach = f64::from(largest(block.centers.as_flattened())) + f64::from(largest(&block.radii));
     let Some((mut spheres, length)) = SphereRay::new(ray, &origin, reach) else { return };
     spheres.set_range(length, ray.t_min, ray.t_max);
-    for level in Level::all() {
-        let (mask, sure) = meet_spheres_at(level, block, &spheres);
+    for isa in Isa::all() {
+        let (mask, sure) = intersect_spheres_at(isa, block, &spheres);
         for lane in 0..BLOCK {
             let root = block.sphere(lane, &origin).closest(ray);
             let is_hit = root.is_some();
             let is_in = |mask: u32| mask >> lane & 1 != 0;
-            assert!(!is_hit || is_in(mask), "{level:?} loses lane {lane} along {ray:?} of {block:?}");
-            assert!(is_hit || !is_in(sure), "{level:?} invents lane {lane} along {ray:?} of {block:?}");
+            assert!(!is_hit || is_in(mask), "{isa:?} loses lane {lane} along {ray:?} of {block:?}");
+            assert!(is_hit || !is_in(sure), "{isa:?} invents lane {lane} along {ray:?} of {block:?}");
             tally.hits += u32::from(is_hit);
         }
         tally.kept += mask.count_ones();

@@ -1,8 +1,8 @@
 //! What eight and sixteen numbers give together, beside each alone.
 
 use super::scenes::Random;
-use crate::intersect::{Lanes, Level, Task};
-use crate::simd::{Eight, Row, Vector, WIDE, Wide};
+use crate::intersect::{Dispatch, Isa, Simd};
+use crate::simd::{F32x8, F32x16, Row, Vector, WIDE};
 
 /// What is looked at of sixteen rows, and of numbers in double precision.
 struct Together<'a> {
@@ -23,31 +23,31 @@ struct Given {
     parted: [Row<f32>; 2],
 }
 
-fn stored<W: Wide>(wide: W) -> Row<f32> {
+fn stored<W: F32x16>(wide: W) -> Row<f32> {
     let mut row = Row::of(0.0);
     wide.store(&mut row);
     row
 }
 
-impl Task for Together<'_> {
+impl Dispatch for Together<'_> {
     type Output = Given;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> Given {
+    fn run<L: Simd>(self) -> Given {
         let Self { rows, exact, place, scale } = self;
-        let first = L::Wide::load(&rows[0].0);
+        let first = L::F32x16::load(&rows[0].0);
         let mut wide = [first; 8];
         for (wide, row) in wide.iter_mut().zip(rows) {
-            *wide = L::Wide::load(&row.0);
+            *wide = L::F32x16::load(&row.0);
         }
-        let (rounded, rest) = L::Wide::parted_from(exact, place);
+        let (rounded, rest) = L::F32x16::parted_from(exact, place);
         Given {
-            most: L::Wide::most_of_eight(wide),
+            most: L::F32x16::most_of_eight(wide),
             middle: stored(first.middle()),
             first: first.first(),
             with_bits: first.with_bits(rows[0].0[3].to_bits()),
-            are_same: L::Wide::are_same(exact),
-            rounded: stored(L::Wide::rounded_from(exact, place, scale)),
+            are_same: L::F32x16::are_same(exact),
+            rounded: stored(L::F32x16::rounded_from(exact, place, scale)),
             parted: [stored(rounded), stored(rest)],
         }
     }
@@ -82,20 +82,20 @@ fn sixteen_numbers_give_together_what_each_gives_alone() {
         let with_bits =
             (0..WIDE).filter(|&i| rows[0].0[i].to_bits() == rows[0].0[3].to_bits()).map(|i| 1 << i).sum();
         let most = rows.each_ref().map(|row| row.0.iter().copied().fold(f32::NEG_INFINITY, f32::max));
-        for level in Level::all() {
-            let given = level.run(Together { rows: &rows, exact: &exact, place, scale });
+        for isa in Isa::all() {
+            let given = isa.run(Together { rows: &rows, exact: &exact, place, scale });
             // What a NaN comes to is not said.
             let from = if round % 2 == 0 { 1 } else { 0 };
-            assert_eq!(given.most[from..], most[from..8], "{level:?}");
-            assert_eq!(given.with_bits, with_bits, "{level:?}");
-            assert_eq!(given.first.to_bits(), rows[0].0[0].to_bits(), "{level:?}");
-            assert_eq!(given.middle.0.map(f32::to_bits), [middle.to_bits(); WIDE], "{level:?}");
-            assert_eq!(given.are_same, is_one && differs.is_none(), "{level:?}");
+            assert_eq!(given.most[from..], most[from..8], "{isa:?}");
+            assert_eq!(given.with_bits, with_bits, "{isa:?}");
+            assert_eq!(given.first.to_bits(), rows[0].0[0].to_bits(), "{isa:?}");
+            assert_eq!(given.middle.0.map(f32::to_bits), [middle.to_bits(); WIDE], "{isa:?}");
+            assert_eq!(given.are_same, is_one && differs.is_none(), "{isa:?}");
             let bits = |row: [f32; WIDE]| row.map(|x| if x.is_nan() { None } else { Some(x.to_bits()) });
             let scaled = exact.0.map(|x| ((x - place) * scale) as f32);
-            assert_eq!(bits(given.rounded.0), bits(scaled), "{level:?}");
-            assert_eq!(bits(given.parted[0].0), bits(rounded), "{level:?}");
-            assert_eq!(bits(given.parted[1].0), bits(rest), "{level:?}");
+            assert_eq!(bits(given.rounded.0), bits(scaled), "{isa:?}");
+            assert_eq!(bits(given.parted[0].0), bits(rounded), "{isa:?}");
+            assert_eq!(bits(given.parted[1].0), bits(rest), "{isa:?}");
         }
     }
 }
@@ -129,14 +129,14 @@ fn arithmetic<V: Vector>(a: V, b: V, c: V) -> Results {
 /// The same of eight and of sixteen.
 struct Arithmetic([[f32; WIDE]; 3]);
 
-impl Task for Arithmetic {
+impl Dispatch for Arithmetic {
     type Output = [Results; 2];
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> [Results; 2] {
+    fn run<L: Simd>(self) -> [Results; 2] {
         let [a, b, c] = &self.0;
-        let eight = |row: &[f32; WIDE]| L::Eight::load(row.first_chunk().expect("sixteen"));
-        let wide = |row: &[f32; WIDE]| L::Wide::load(row);
+        let eight = |row: &[f32; WIDE]| L::F32x8::load(row.first_chunk().expect("sixteen"));
+        let wide = |row: &[f32; WIDE]| L::F32x16::load(row);
         [arithmetic(eight(a), eight(b), eight(c)), arithmetic(wide(a), wide(b), wide(c))]
     }
 }
@@ -155,17 +155,17 @@ fn arithmetic_gives_in_every_lane_what_it_gives_alone() {
             [[a + b, a - b, a * b], products, [a / 4.0, a.abs(), a.min(b)], [a.max(b), a.abs(), turned]]
                 .concat()
         };
-        for level in Level::all() {
-            for (results, masks) in level.run(Arithmetic([a, b, c])) {
+        for isa in Isa::all() {
+            for (results, masks) in isa.run(Arithmetic([a, b, c])) {
                 let count = results[0].len();
                 assert!(count == 8 || count == WIDE);
                 for i in 0..count {
                     let given: Vec<f32> = results.iter().map(|result| result[i]).collect();
-                    assert_eq!(given, alone(i), "{level:?}");
-                    assert_eq!(masks[0] >> i & 1 == 1, a[i] <= b[i], "{level:?}");
-                    assert_eq!(masks[1] >> i & 1 == 1, a[i] < b[i], "{level:?}");
+                    assert_eq!(given, alone(i), "{isa:?}");
+                    assert_eq!(masks[0] >> i & 1 == 1, a[i] <= b[i], "{isa:?}");
+                    assert_eq!(masks[1] >> i & 1 == 1, a[i] < b[i], "{isa:?}");
                 }
-                assert_eq!((masks[0] | masks[1]) >> count, 0, "{level:?}");
+                assert_eq!((masks[0] | masks[1]) >> count, 0, "{isa:?}");
             }
         }
     }

@@ -4,7 +4,7 @@ use std::marker::PhantomData;
 
 use super::stack::{Goal, Stack};
 use crate::intersect::box_ray::Slabs;
-use crate::intersect::{self, Lanes};
+use crate::intersect::{self, Simd};
 use crate::simd;
 use crate::tree::node::{Node, out_of_tree, tag};
 
@@ -15,7 +15,7 @@ pub(crate) struct NodeCursor<'a, L> {
     lanes: PhantomData<L>,
 }
 
-impl<'a, L: Lanes> NodeCursor<'a, L> {
+impl<'a, L: Simd> NodeCursor<'a, L> {
     #[inline(always)]
     pub(crate) fn new(nodes: &'a [Node], slabs: Slabs) -> Self {
         Self { nodes, slabs, lanes: PhantomData }
@@ -26,7 +26,7 @@ impl<'a, L: Lanes> NodeCursor<'a, L> {
     pub(crate) fn descend<G: Goal>(&self, mut reference: u32, stack: &mut Stack<G::Entry>) -> Option<u32> {
         while tag::is_inner(reference) {
             let Some(node) = self.nodes.get(reference as usize) else { out_of_tree() };
-            let (mask, enter) = intersect::meet_boxes::<L::Wide>(node, simd::opaque(&self.slabs));
+            let (mask, enter) = intersect::intersect_boxes::<L::F32x16>(node, simd::opaque(&self.slabs));
             reference = if mask & mask.wrapping_sub(1) != 0 || G::IS_ANY && mask != 0 {
                 stack.put(
                     #[inline(always)]

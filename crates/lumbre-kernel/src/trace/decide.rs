@@ -9,9 +9,9 @@ use lumbre_math::DVec3;
 
 use super::{Outcome, Winner};
 use crate::Accel;
-use crate::intersect::single_start::SingleStart;
-use crate::intersect::watertight::{self, Inside, Meeting, Passage, Shear};
-use crate::intersect::{Axes, Lanes};
+use crate::intersect::filter_start::FilterStart;
+use crate::intersect::watertight::{self, EdgeTest, Inside, Meeting, Shear};
+use crate::intersect::{Axes, Simd};
 use crate::simd;
 use crate::tree::BLOCK;
 use crate::tree::node::Node;
@@ -79,14 +79,14 @@ pub(crate) fn largest_component(ray: &Ray) -> f64 {
 #[derive(Clone, Copy)]
 pub(crate) struct Decider<'a> {
     accel: &'a Accel,
-    pub(crate) start: &'a SingleStart,
+    pub(crate) start: &'a FilterStart,
     // Those of the tree, which may be mapped from a file.
     blocks: Blocks<'a>,
 }
 
 impl<'a> Decider<'a> {
     #[inline(always)]
-    pub(crate) fn new(accel: &'a Accel, start: &'a SingleStart) -> Self {
+    pub(crate) fn new(accel: &'a Accel, start: &'a FilterStart) -> Self {
         Self { accel, start, blocks: accel.tree.blocks() }
     }
 
@@ -124,7 +124,7 @@ impl<'a> Decider<'a> {
 
     /// Whether the ray certainly misses a triangle, or hits it out of its range; a quick reject.
     #[inline(always)]
-    pub(crate) fn misses<L: Lanes>(
+    pub(crate) fn misses<L: Simd>(
         &self,
         ray: &Ray,
         axes: &'static Axes,
@@ -134,15 +134,15 @@ impl<'a> Decider<'a> {
         let ray = simd::opaque(ray);
         let (shear, origin) = L::shear(ray, axes, &self.start.mesh_origin);
         match L::pass(block, lane as usize, &shear, &origin) {
-            (Passage::Outside, _) => true,
-            (Passage::Inside, inside) => !watertight::is_in_range(ray, inside.t(&shear)),
-            (Passage::Unclear, _) => false,
+            (EdgeTest::Outside, _) => true,
+            (EdgeTest::Inside, inside) => !watertight::is_in_range(ray, inside.t(&shear)),
+            (EdgeTest::Uncertain, _) => false,
         }
     }
 
     /// Where a triangle is hit, if it is and is closer than the best, which is `exact` if there is that.
     #[inline(always)]
-    pub(crate) fn compare<L: Lanes>(
+    pub(crate) fn compare<L: Simd>(
         &self,
         ray: &Ray,
         axes: &'static Axes,
@@ -152,9 +152,9 @@ impl<'a> Decider<'a> {
         let closely = || self.compare_closely(ray, (block, lane), (best, exact));
         let (shear, origin) = L::shear(ray, axes, &self.start.mesh_origin);
         let inside = match self.pass::<L>(&shear, &origin, block, lane) {
-            (Passage::Inside, inside) => inside,
-            (Passage::Outside, _) => return Outcome::Certain(None),
-            (Passage::Unclear, _) => return closely(),
+            (EdgeTest::Inside, inside) => inside,
+            (EdgeTest::Outside, _) => return Outcome::Certain(None),
+            (EdgeTest::Uncertain, _) => return closely(),
         };
         let t = inside.t(&shear);
         if !watertight::is_in_range(ray, t) {
@@ -163,7 +163,7 @@ impl<'a> Decider<'a> {
         let is_closer = if let Some(exact) = exact {
             exact.comes_after(t, self.ids(block, lane))
         } else if best.is_some() {
-            let (Passage::Inside, inside) = self.pass::<L>(&shear, &origin, best.block, best.lane) else {
+            let (EdgeTest::Inside, inside) = self.pass::<L>(&shear, &origin, best.block, best.lane) else {
                 return closely();
             };
             let nearest = inside.t(&shear);
@@ -241,7 +241,7 @@ impl<'a> Decider<'a> {
     }
 
     #[inline(always)]
-    fn pass<L: Lanes>(&self, shear: &Shear, origin: &[f64; 3], block: u32, lane: u32) -> (Passage, Inside) {
+    fn pass<L: Simd>(&self, shear: &Shear, origin: &[f64; 3], block: u32, lane: u32) -> (EdgeTest, Inside) {
         L::pass(self.block(block), lane as usize, shear, origin)
     }
 
@@ -257,7 +257,7 @@ impl<'a> Decider<'a> {
 
     /// The crossing of a triangle in the ray's range, if there is one, and whether it meets the front.
     #[inline(always)]
-    pub(crate) fn crossing<L: Lanes>(
+    pub(crate) fn crossing<L: Simd>(
         &self,
         ray: &Ray,
         axes: &'static Axes,
@@ -267,12 +267,12 @@ impl<'a> Decider<'a> {
         let (shear, origin) = L::shear(ray, axes, &self.start.mesh_origin);
         let corners = self.block(block);
         let found = match L::pass(corners, lane as usize, &shear, &origin) {
-            (Passage::Outside, _) => None,
-            (Passage::Inside, inside) => {
+            (EdgeTest::Outside, _) => None,
+            (EdgeTest::Inside, inside) => {
                 let t = inside.t(&shear);
                 watertight::is_in_range(ray, t).then(|| (inside.root(t), inside.det > 0.0))
             }
-            (Passage::Unclear, _) => match self.intersect(ray, block, lane) {
+            (EdgeTest::Uncertain, _) => match self.intersect(ray, block, lane) {
                 Meeting::Miss => None,
                 Meeting::Hit { root, is_front } => Some((root, is_front)),
                 Meeting::Touch { .. } => return Outcome::Uncertain,
@@ -284,7 +284,7 @@ impl<'a> Decider<'a> {
 
     /// The closest hit in double precision: `exact` if there is that, else the triangle.
     #[inline(always)]
-    pub(crate) fn closest<L: Lanes>(
+    pub(crate) fn closest<L: Simd>(
         &self,
         ray: &Ray,
         axes: &'static Axes,
@@ -301,7 +301,7 @@ impl<'a> Decider<'a> {
 
     /// The crossing of a triangle that is hit; `None` should double precision deny that.
     #[inline(always)]
-    pub(crate) fn winner<L: Lanes>(
+    pub(crate) fn winner<L: Simd>(
         &self,
         ray: &Ray,
         axes: &'static Axes,
@@ -309,8 +309,8 @@ impl<'a> Decider<'a> {
     ) -> Option<Winner> {
         let (shear, origin) = L::shear(simd::opaque(ray), axes, &self.start.mesh_origin);
         let corners = self.block(block);
-        let (passage, inside) = L::pass(corners, lane as usize, &shear, &origin);
-        let (t, local) = if passage == Passage::Inside {
+        let (edge_test, inside) = L::pass(corners, lane as usize, &shear, &origin);
+        let (t, local) = if edge_test == EdgeTest::Inside {
             (inside.t(&shear), inside.local())
         } else {
             match self.intersect(ray, block, lane) {

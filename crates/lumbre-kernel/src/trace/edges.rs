@@ -13,7 +13,7 @@ use lumbre_geometry::{Ray, Root};
 use super::Context;
 use super::exact::{self, Crossing, Visitor};
 use crate::Accel;
-use crate::intersect::Level;
+use crate::intersect::Isa;
 use crate::intersect::watertight::{self, Feature, Meeting, Shear};
 use crate::precise_mesh::has_area;
 
@@ -167,7 +167,7 @@ fn at_borders(hits: &[EdgeHit]) -> Vec<usize> {
 #[cold]
 #[inline(never)]
 pub(crate) fn visit_borders(
-    level: Level,
+    isa: Isa,
     accel: &Accel,
     context: &mut Context,
     ray: &Ray,
@@ -183,7 +183,7 @@ pub(crate) fn visit_borders(
         return;
     }
     // Some of the neighbours may lie beyond what was traversed.
-    let all = exact::all_edge_hits(level, accel, context, ray);
+    let all = exact::all_edge_hits(isa, accel, context, ray);
     for i in at_borders(&all) {
         if matters(&all[i], visitor.range()) && visitor.visit(&all[i].crossing(ray)) {
             return;

@@ -17,15 +17,15 @@ use super::stack::{ClosestHit, Goal, Stack};
 use super::visitors::{Any, Closest};
 use super::{Context, all_crossings, first_crossing, is_sound, meets_front};
 use crate::intersect::box_ray::{BoxRay, Progress};
-use crate::intersect::watertight::{self, BlockRay, HeightRange, Passage, Shear};
-use crate::intersect::{self, Lanes, Level, MetHulls, Task};
+use crate::intersect::watertight::{self, BlockRay, EdgeTest, HeightRange, Shear};
+use crate::intersect::{self, BoundingHits, Dispatch, Isa, Simd};
 use crate::query::Query;
 use crate::tree::BLOCK;
-use crate::tree::bounding_block::HullRay;
+use crate::tree::bounding_block::BoundingVolumeRay;
 use crate::tree::node::tag;
 use crate::tree::packed::Entry;
 use crate::tree::packed::Start;
-use crate::tree::summary::{Holds, Sizes};
+use crate::tree::summary::{Sizes, Summary};
 use crate::tree::triangle_block::{Blocks, TriangleBlock};
 use crate::{Accel, GeometryKind, Hit};
 
@@ -94,19 +94,19 @@ impl Crossing<'_> {
 
 /// The closest hit.
 #[inline(never)]
-pub(crate) fn closest(level: Level, accel: &Accel, ray: &Ray, query: Option<&Query>) -> Option<Hit> {
-    closest_from(level, accel, Start::WHOLE, &Context::default(), ray, query)
+pub(crate) fn closest(isa: Isa, accel: &Accel, ray: &Ray, query: Option<&Query>) -> Option<Hit> {
+    closest_from(isa, accel, Start::WHOLE, &Context::default(), ray, query)
 }
 
 /// Whether anything is hit.
 #[inline(never)]
-pub(crate) fn any(level: Level, accel: &Accel, ray: &Ray, query: Option<&Query>) -> bool {
-    any_from(level, accel, Start::WHOLE, &Context::default(), ray, query)
+pub(crate) fn any(isa: Isa, accel: &Accel, ray: &Ray, query: Option<&Query>) -> bool {
+    any_from(isa, accel, Start::WHOLE, &Context::default(), ray, query)
 }
 
 /// The closest hit in a part of a tree that stands there.
 pub(crate) fn closest_from(
-    level: Level,
+    isa: Isa,
     accel: &Accel,
     from: Start,
     context: &Context,
@@ -114,13 +114,13 @@ pub(crate) fn closest_from(
     query: Option<&Query>,
 ) -> Option<Hit> {
     let mut closest = Closest::new(ray, query);
-    traverse_from(level, accel, from, context, ray, &mut closest);
+    traverse_from(isa, accel, from, context, ray, &mut closest);
     closest.into_hit()
 }
 
 /// Whether anything is hit in a part of a tree that stands there.
 pub(crate) fn any_from(
-    level: Level,
+    isa: Isa,
     accel: &Accel,
     from: Start,
     context: &Context,
@@ -128,18 +128,18 @@ pub(crate) fn any_from(
     query: Option<&Query>,
 ) -> bool {
     let mut any = Any::new(ray, query);
-    traverse_from(level, accel, from, context, ray, &mut any);
+    traverse_from(isa, accel, from, context, ray, &mut any);
     any.is_hit
 }
 
 /// Shows a visitor the crossings of a ray.
-pub(crate) fn traverse(level: Level, accel: &Accel, ray: &Ray, visitor: &mut dyn Visitor) {
-    traverse_from(level, accel, Start::WHOLE, &Context::default(), ray, visitor);
+pub(crate) fn traverse(isa: Isa, accel: &Accel, ray: &Ray, visitor: &mut dyn Visitor) {
+    traverse_from(isa, accel, Start::WHOLE, &Context::default(), ray, visitor);
 }
 
 /// The same in a part of a tree that stands there. Of edge hits, it may show those of the whole tree.
 fn traverse_from(
-    level: Level,
+    isa: Isa,
     accel: &Accel,
     from: Start,
     context: &Context,
@@ -150,15 +150,15 @@ fn traverse_from(
     let mut edge_hits = Vec::new();
     let traversal =
         Traversal { accel, from, context, ray, visitor: &mut *visitor, edge_hits: &mut edge_hits };
-    let is_over = level.run(traversal);
+    let is_over = isa.run(traversal);
     if !is_over && !edge_hits.is_empty() {
-        edges::visit_borders(level, accel, context, ray, &edge_hits, visitor);
+        edges::visit_borders(isa, accel, context, ray, &edge_hits, visitor);
     }
 }
 
 /// The edge hits of the whole line, within a tree that stands there.
 pub(crate) fn all_edge_hits<'a>(
-    level: Level,
+    isa: Isa,
     accel: &'a Accel,
     context: &mut Context,
     ray: &Ray,
@@ -178,7 +178,7 @@ pub(crate) fn all_edge_hits<'a>(
     }
     let line = ray.with_range(f64::NEG_INFINITY, f64::INFINITY);
     let mut edge_hits = Vec::new();
-    level.run(Traversal {
+    isa.run(Traversal {
         accel,
         from: Start::WHOLE,
         context,
@@ -201,12 +201,12 @@ struct Traversal<'a, 't> {
     edge_hits: &'t mut Vec<EdgeHit<'a>>,
 }
 
-impl Task for Traversal<'_, '_> {
+impl Dispatch for Traversal<'_, '_> {
     /// Whether the visitor ended it.
     type Output = bool;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> bool {
+    fn run<L: Simd>(self) -> bool {
         let Self { accel, from, context, ray, visitor, edge_hits } = self;
         if !is_sound(ray) {
             return false;
@@ -269,7 +269,7 @@ struct Frame<'a, L> {
     /// For the mesh, the cloud of spheres and the shapes that the ray came to last.
     mesh: Option<MeshRay>,
     cloud: Option<CloudRay>,
-    hulls: Option<HullRay>,
+    bounding_volumes: Option<BoundingVolumeRay>,
 }
 
 /// The ray for the triangles of one mesh, or of some with one origin.
@@ -282,14 +282,14 @@ struct MeshRay {
     blocks: Option<BlockRay>,
 }
 
-impl<'a, L: Lanes> Frame<'a, L> {
+impl<'a, L: Simd> Frame<'a, L> {
     #[inline(always)]
     fn new(accel: &'a Accel, ray: Ray, visitor: &dyn Visitor) -> Self {
         let range @ [t_min, t_max] = visitor.range();
         let mut boxes = BoxRay::passing_all();
         let meets_tree = accel.tree.root.is_some()
-            && (L::start_nearby(&accel.units, &ray, t_min, t_max, &mut boxes)
-                || is_sound(&ray) && boxes.start_anywhere(&accel.units, &ray, t_min, t_max));
+            && (L::start_nearby(&accel.tree_space, &ray, t_min, t_max, &mut boxes)
+                || is_sound(&ray) && boxes.start_anywhere(&accel.tree_space, &ray, t_min, t_max));
         Self {
             accel,
             cursor: NodeCursor::new(&accel.tree.nodes, boxes.slabs),
@@ -301,7 +301,7 @@ impl<'a, L: Lanes> Frame<'a, L> {
             range,
             mesh: None,
             cloud: None,
-            hulls: None,
+            bounding_volumes: None,
         }
     }
 
@@ -375,8 +375,8 @@ impl<'a, L: Lanes> Frame<'a, L> {
     /// Turns to the mesh of a block: to the first that the ray comes to, and to each where meshes have different origins.
     #[inline(always)]
     fn turn_to(&mut self, block: &TriangleBlock) -> MeshRay {
-        let &Holds { has_one_origin, first_origin, sizes: Sizes { largest_corner, .. }, .. } =
-            &self.accel.holds;
+        let &Summary { has_one_origin, first_origin, sizes: Sizes { largest_corner, .. }, .. } =
+            &self.accel.summary;
         if has_one_origin && let Some(mesh) = self.mesh {
             return mesh;
         }
@@ -409,7 +409,7 @@ impl<'a, L: Lanes> Frame<'a, L> {
             following = block.next(place);
             let mut mask = match &blocks {
                 Some(ray) => {
-                    let (mask, edges) = L::meet_triangles(block, ray);
+                    let (mask, edges) = L::intersect_triangles(block, ray);
                     if mask == 0 {
                         continue;
                     }
@@ -425,8 +425,8 @@ impl<'a, L: Lanes> Frame<'a, L> {
                     (ids.geometry, ids.primitives[lane])
                 };
                 match L::pass(block, lane, &shear, &origin) {
-                    (Passage::Outside, _) => {}
-                    (Passage::Inside, inside) => {
+                    (EdgeTest::Outside, _) => {}
+                    (EdgeTest::Inside, inside) => {
                         let t = inside.t(&shear);
                         let is_wanted =
                             self.range[0] <= t && t <= self.range[1] && self.wanted != Wanted::None;
@@ -439,7 +439,7 @@ impl<'a, L: Lanes> Frame<'a, L> {
                             return true;
                         }
                     }
-                    (Passage::Unclear, _) => {
+                    (EdgeTest::Uncertain, _) => {
                         let corners = shear.axes.gather(block, lane);
                         let meeting = watertight::intersect(&self.ray, shear, origin, corners);
                         let corners = block.triangle(lane).map(|corner| corner.map(f64::from));
@@ -462,7 +462,7 @@ impl<'a, L: Lanes> Frame<'a, L> {
         for (ids, block) in tree.sphere_names[places.clone()].iter().zip(&tree.sphere_blocks[places]) {
             let cloud = CloudRay::turn(&mut self.cloud, self.accel, &self.ray, ids.geometry);
             let mut mask = match cloud.within(self.range) {
-                Some(ray) => intersect::meet_spheres::<L>(block, ray).0,
+                Some(ray) => intersect::intersect_spheres::<L>(block, ray).0,
                 None => ids.lanes(),
             };
             while mask != 0 {
@@ -480,14 +480,17 @@ impl<'a, L: Lanes> Frame<'a, L> {
     #[inline(always)]
     fn test_shapes(&mut self, mut first: usize, context: &Context, visitor: &mut dyn Visitor) -> bool {
         let accel = self.accel;
-        if !self.progress.is_nearby() || accel.hulls.block(first).is_none() {
+        if !self.progress.is_nearby() || accel.bounding_volumes.block(first).is_none() {
             return self.test_entries(first, context, visitor);
         }
         let length = largest_component(&self.ray);
-        let hulls = *self.hulls.get_or_insert_with(|| HullRay::new(&accel.units, &self.ray, length));
+        let bounding_volumes = *self
+            .bounding_volumes
+            .get_or_insert_with(|| BoundingVolumeRay::new(&accel.tree_space, &self.ray, length));
         let range = HeightRange::new((self.range[0] * length) as f32, (self.range[1] * length) as f32);
-        while let Some((block, goes_on)) = accel.hulls.block(first) {
-            let MetHulls { mut mask, .. } = intersect::meet_hulls::<L, false>(block, &hulls, &range);
+        while let Some((block, goes_on)) = accel.bounding_volumes.block(first) {
+            let BoundingHits { mut mask, .. } =
+                intersect::intersect_bounding_volumes::<L, false>(block, &bounding_volumes, &range);
             while mask != 0 {
                 let entry = &accel.tree.entries[first + mask.trailing_zeros() as usize];
                 mask &= mask - 1;

@@ -29,7 +29,7 @@
 //!
 //! So the hit lies within u(8.2 + 6.1h) + 24.2u + 7uh of the triangle on each axis, where h ≤ 1.01 + |o|: below
 //! u(47 + 14|o|). And as planes are relative to the tree's origin, which the ray knows rounded, by a little more than u times its
-//! distance from the mesh's: `Units::narrow_margin` has room for all of it beside what is said in [`node`](crate::tree::node). `t` itself is
+//! distance from the mesh's: `TreeSpace::f32_margin` has room for all of it beside what is said in [`node`](crate::tree::node). `t` itself is
 //! off by three roundings, which the ends of the range among boxes have room for, too.
 //!
 //! So no box is passed by with a hit in it that is as near as the nearest: the answer is that of a loop over all triangles, whatever
@@ -43,10 +43,10 @@ use super::leaves::nearest_of;
 use super::stack::{AnyHit, ClosestHit, Goal, Stack};
 use super::{LaneHits, Outcome};
 use crate::intersect::f32_ray::{F32Ray, Precise, within};
-use crate::intersect::single_start::SingleStart;
+use crate::intersect::filter_start::FilterStart;
 use crate::intersect::watertight;
-use crate::intersect::{Asked, Axes, Lanes, Level, Question};
-use crate::simd::{self, Eight, Vector, Wide};
+use crate::intersect::{Axes, DispatchedQuery, Isa, RayQuery, Simd};
+use crate::simd::{self, F32x8, F32x16, Vector};
 use crate::tree::BLOCK;
 use crate::tree::node::tag;
 use crate::tree::triangle_block::TriangleBlock;
@@ -77,8 +77,8 @@ impl<E: Vector> Lines<E> {
         let Self { products: [bc, ca, ab], edges: [u, v, w], within, heights: z } = self;
         let det = u + v + w;
         let largest = bc.larger(ca).larger(ab);
-        let unclear = mask & !precise.of(mask, largest, within, det, z);
-        (unclear, Pass { height: u * z[0] + v * z[1] + w * z[2], weights: [v, w, det] })
+        let uncertain = mask & !precise.of(mask, largest, within, det, z);
+        (uncertain, Pass { height: u * z[0] + v * z[1] + w * z[2], weights: [v, w, det] })
     }
 }
 
@@ -94,7 +94,7 @@ pub(crate) struct Pass<E> {
 /// How a line passes the triangles of a block, and which of these its ray meets.
 type Passed<E> = (LaneHits<E>, Pass<E>);
 
-impl<E: Eight> Pass<E> {
+impl<E: F32x8> Pass<E> {
     /// The weights of one.
     #[inline(always)]
     fn weights_of(&self, lane: usize) -> [f32; 3] {
@@ -110,7 +110,7 @@ impl<E: Eight> Pass<E> {
     }
 }
 
-impl<W: Wide> Pass<W> {
+impl<W: F32x16> Pass<W> {
     /// That of one of the two: `which` is 0 or 1.
     #[inline(always)]
     pub(crate) fn half(&self, which: usize) -> Pass<W::Half> {
@@ -160,7 +160,7 @@ impl Nearest {
 
     /// Takes what is nearer of what a ray meets in a block, and ends the ray there; whether there was anything.
     #[inline(always)]
-    fn take<E: Eight>(
+    fn take<E: F32x8>(
         &mut self,
         decider: &Decider,
         ray: &mut F32Ray,
@@ -168,8 +168,8 @@ impl Nearest {
         crossing: &LaneHits<E>,
         pass: &Pass<E>,
     ) -> bool {
-        let &LaneHits { met, unclear, at } = crossing;
-        if met | unclear == 0 {
+        let &LaneHits { met, uncertain, at } = crossing;
+        if met | uncertain == 0 {
             return false;
         }
         let t = at.to_array();
@@ -179,7 +179,7 @@ impl Nearest {
 
     /// The same where it is known in which lane the ray meets the nearest, if it does meet any, and at which `t`.
     #[inline(always)]
-    pub(crate) fn take_nearest<E: Eight>(
+    pub(crate) fn take_nearest<E: F32x8>(
         &mut self,
         decider: &Decider,
         ray: &mut F32Ray,
@@ -188,15 +188,15 @@ impl Nearest {
         pass: &Pass<E>,
         (lane, t): (usize, f32),
     ) -> bool {
-        let &LaneHits { met, unclear, at } = crossing;
+        let &LaneHits { met, uncertain, at } = crossing;
         let others = at.at_most(E::splat(t)) & met & !(1 << lane);
-        if unclear | others == 0 && t < ray.t_max() {
+        if uncertain | others == 0 && t < ray.t_max() {
             *self = Self::new(place, lane as u32, pass.weights_of(lane));
             ray.end_at(t);
             return true;
         }
         let at = at.to_array();
-        self.take_closely(decider, ray, place, &LaneHits { met, unclear, at }, &pass.all_weights())
+        self.take_closely(decider, ray, place, &LaneHits { met, uncertain, at }, &pass.all_weights())
     }
 
     /// The same where a triangle has to be looked at closer, or two are met at the same place, of whatever block.
@@ -210,13 +210,13 @@ impl Nearest {
         crossing: &LaneHits<[f32; BLOCK]>,
         weights: &[[f32; BLOCK]; 3],
     ) -> bool {
-        let &LaneHits { met, unclear, ref at } = crossing;
+        let &LaneHits { met, uncertain, ref at } = crossing;
         let mut is_nearer = false;
-        let mut rest = met | unclear;
+        let mut rest = met | uncertain;
         while rest != 0 {
             let lane = rest.trailing_zeros();
             rest &= rest - 1;
-            let (t, weights) = if unclear >> lane & 1 == 0 {
+            let (t, weights) = if uncertain >> lane & 1 == 0 {
                 let lane = lane as usize % BLOCK;
                 (at[lane], weights.map(|weights| weights[lane]))
             } else {
@@ -282,24 +282,24 @@ impl F32Ray {
 
     /// How the line of the ray passes the triangles of a block, and a bit for each that it may pass through.
     #[inline(always)]
-    pub(crate) fn lines<L: Lanes>(&self, block: &TriangleBlock) -> (u32, Lines<L::Eight>) {
-        let (mask, lines) = Lines::of(L::narrow_corners(block, simd::opaque(self)));
+    pub(crate) fn lines<L: Simd>(&self, block: &TriangleBlock) -> (u32, Lines<L::F32x8>) {
+        let (mask, lines) = Lines::of(L::f32_corners(block, simd::opaque(self)));
         (mask & block.taken(), lines)
     }
 
     /// The same of two rays, each among the triangles of its block: those of the first, and those of the second.
     #[inline(always)]
-    pub(crate) fn lines_by_two<L: Lanes>(
+    pub(crate) fn lines_by_two<L: Simd>(
         rays: [&Self; 2],
         blocks: [&TriangleBlock; 2],
-    ) -> (u32, Lines<L::Wide>) {
-        let (mask, lines) = Lines::of(L::narrow_corners_by_two(blocks, rays));
+    ) -> (u32, Lines<L::F32x16>) {
+        let (mask, lines) = Lines::of(L::f32_corners_by_two(blocks, rays));
         (mask & (blocks[0].taken() | blocks[1].taken() << BLOCK), lines)
     }
 
     /// Where the ray meets the triangles of a block that its line passes so, and which of those in the mask it does meet.
     #[inline(always)]
-    pub(crate) fn cross<E: Eight>(&self, mask: u32, pass: &Pass<E>) -> (u32, E) {
+    pub(crate) fn cross<E: F32x8>(&self, mask: u32, pass: &Pass<E>) -> (u32, E) {
         // Read again: most lines pass through few blocks.
         let ray = simd::opaque(self);
         let t = pass.height.over(pass.weights[2]) * E::splat(ray.minus_inverse);
@@ -308,14 +308,14 @@ impl F32Ray {
 
     /// Which triangles of a block the ray meets; `None` where its line passes through none.
     #[inline(always)]
-    fn pass<L: Lanes>(&self, precise: &Precise, block: &TriangleBlock) -> Option<Passed<L::Eight>> {
+    fn pass<L: Simd>(&self, precise: &Precise, block: &TriangleBlock) -> Option<Passed<L::F32x8>> {
         let (mask, lines) = self.lines::<L>(block);
         if mask == 0 {
             return None;
         }
-        let (unclear, pass) = lines.pass(mask, precise);
-        let (met, at) = self.cross(mask & !unclear, &pass);
-        Some((LaneHits { met, unclear, at }, pass))
+        let (uncertain, pass) = lines.pass(mask, precise);
+        let (met, at) = self.cross(mask & !uncertain, &pass);
+        Some((LaneHits { met, uncertain, at }, pass))
     }
 
     /// Where the ray meets a triangle, by exact products; the weights of the second and third corner, and the sum of all.
@@ -342,10 +342,10 @@ impl F32Ray {
 
     /// Whether the ray meets any triangle of a block.
     #[inline(always)]
-    fn meets_any<L: Lanes>(&self, precise: &Precise, block: &TriangleBlock) -> bool {
+    fn meets_any<L: Simd>(&self, precise: &Precise, block: &TriangleBlock) -> bool {
         match self.pass::<L>(precise, block) {
-            Some((LaneHits { met, unclear, .. }, _)) => {
-                met != 0 || unclear != 0 && self.meets_exactly(block, unclear)
+            Some((LaneHits { met, uncertain, .. }, _)) => {
+                met != 0 || uncertain != 0 && self.meets_exactly(block, uncertain)
             }
             None => false,
         }
@@ -368,13 +368,13 @@ impl F32Ray {
 
 /// Traverses a tree of triangles. Where any hit will do, there is no more to know of it.
 #[inline(always)]
-pub(crate) fn traverse<G: Goal, L: Lanes>(decider: &Decider, ray: &Ray32) -> Outcome<Option<Hit32>> {
+pub(crate) fn traverse<G: Goal, L: Simd>(decider: &Decider, ray: &Ray32) -> Outcome<Option<Hit32>> {
     let start = decider.start;
-    let Some(slabs) = L::start_narrow(start, ray) else { return Outcome::Uncertain };
+    let Some(slabs) = L::start_f32(start, ray) else { return Outcome::Uncertain };
     let mut cursor = NodeCursor::<L>::new(decider.nodes(), slabs);
     let mut stack = Stack::new();
     let Some(mut leaf) = cursor.descend::<G>(start.root, &mut stack) else { return Outcome::Certain(None) };
-    let mut ray = L::start_narrow_blocks(start, simd::opaque(ray), &cursor.slabs);
+    let mut ray = L::start_f32_blocks(start, simd::opaque(ray), &cursor.slabs);
     let mut nearest = Nearest::NONE;
     loop {
         let mut place = leaf & tag::PLACE;
@@ -420,42 +420,42 @@ pub(crate) fn rounded(hit: &Hit) -> Hit32 {
 /// [`Accel::closest_f32`] and [`Accel::any_f32`] in trees of triangles, by function pointers for the instruction set.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct F32Queries {
-    pub(crate) closest: Asked<Option<Hit32>, Ray32>,
-    pub(crate) any: Asked<bool, Ray32>,
+    pub(crate) closest: DispatchedQuery<Option<Hit32>, Ray32>,
+    pub(crate) any: DispatchedQuery<bool, Ray32>,
 }
 
 impl F32Queries {
     /// `None` for a tree of anything else.
-    pub(crate) fn new(level: Level, start: Option<&SingleStart>) -> Option<Self> {
+    pub(crate) fn new(isa: Isa, start: Option<&FilterStart>) -> Option<Self> {
         let start = start?;
         start
             .only_triangles
-            .then(|| Self { closest: level.asked::<ClosestHit>(), any: level.asked::<AnyHit>() })
+            .then(|| Self { closest: isa.dispatched::<ClosestHit>(), any: isa.dispatched::<AnyHit>() })
     }
 }
 
-impl Question for ClosestHit {
+impl RayQuery for ClosestHit {
     type Ray = Ray32;
     type Answer = Option<Hit32>;
 
     #[inline(always)]
-    fn ask<L: Lanes>(accel: &Accel, ray: &Ray32) -> Option<Hit32> {
+    fn ask<L: Simd>(accel: &Accel, ray: &Ray32) -> Option<Hit32> {
         let Some(start) = &accel.single else { return accel.closest_widened(ray) };
-        match traverse::<Self, L>(&Decider::new(accel, start), &L::read_narrow(ray)) {
+        match traverse::<Self, L>(&Decider::new(accel, start), &L::read_f32(ray)) {
             Outcome::Certain(hit) => hit,
             Outcome::Uncertain => accel.closest_widened(ray),
         }
     }
 }
 
-impl Question for AnyHit {
+impl RayQuery for AnyHit {
     type Ray = Ray32;
     type Answer = bool;
 
     #[inline(always)]
-    fn ask<L: Lanes>(accel: &Accel, ray: &Ray32) -> bool {
+    fn ask<L: Simd>(accel: &Accel, ray: &Ray32) -> bool {
         let Some(start) = &accel.single else { return accel.any_widened(ray) };
-        match traverse::<Self, L>(&Decider::new(accel, start), &L::read_narrow(ray)) {
+        match traverse::<Self, L>(&Decider::new(accel, start), &L::read_f32(ray)) {
             Outcome::Certain(hit) => hit.is_some(),
             Outcome::Uncertain => accel.any_widened(ray),
         }

@@ -11,12 +11,12 @@ use super::leaves::CloudRay;
 use super::stack::{AnyHit, ClosestHit, Goal, Stack};
 use super::{Context, ContextRef, Outcome, Stop, Winner};
 use crate::intersect::box_ray::Slabs;
-use crate::intersect::single_start::SingleStart;
+use crate::intersect::filter_start::FilterStart;
 use crate::intersect::watertight::{self, BlockRay};
-use crate::intersect::{Asked, Lanes, Level, Question, Task};
+use crate::intersect::{Dispatch, DispatchedQuery, Isa, RayQuery, Simd};
 use crate::query::{Query, TreeQuery};
 use crate::simd;
-use crate::tree::bounding_block::HullRay;
+use crate::tree::bounding_block::BoundingVolumeRay;
 use crate::tree::packed::Start;
 use crate::{Accel, GeometryKind, Hit};
 
@@ -36,7 +36,7 @@ pub(crate) struct FilteredRay<'a, 'd, const GENERAL: bool, const FILTERED: bool>
     /// Where the tree stands.
     pub(super) context: ContextRef<'d>,
     /// For shapes, once the ray has come to some.
-    pub(super) hulls: Option<HullRay>,
+    pub(super) bounding_volumes: Option<BoundingVolumeRay>,
     /// For the cloud of spheres that the ray came to last.
     pub(super) cloud: Option<CloudRay>,
     /// The closest hit, where that is in an instance: `exact` has the geometry [`IN_INSTANCE`] then.
@@ -71,7 +71,7 @@ impl InInstance {
 }
 
 impl<'a, 'd, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, 'd, GENERAL, FILTERED> {
-    /// With a ray for triangles: see [`Lanes::start_blocks`].
+    /// With a ray for triangles: see [`Simd::start_blocks`].
     #[inline(always)]
     pub(crate) fn new(
         decider: &'d Decider<'a>,
@@ -88,7 +88,7 @@ impl<'a, 'd, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, 'd, GENE
             exact: None,
             query,
             context,
-            hulls: None,
+            bounding_volumes: None,
             cloud: None,
             in_instance: None,
         }
@@ -130,7 +130,7 @@ impl<'a, 'd, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, 'd, GENE
 
     /// The closest hit in double precision.
     #[inline(always)]
-    pub(crate) fn closest<L: Lanes>(&mut self, ray: &Ray) -> Outcome<Found> {
+    pub(crate) fn closest<L: Simd>(&mut self, ray: &Ray) -> Outcome<Found> {
         match self.decider.closest::<L>(ray, self.blocks.axes, (&self.best, self.exact())) {
             Outcome::Certain(winner) => {
                 let is_inside = GENERAL && winner.is_some_and(|winner| winner.geometry == IN_INSTANCE);
@@ -182,14 +182,14 @@ pub(crate) trait FilteredGoal: Goal {
     fn closest(winner: Winner) -> Self::Found;
 
     /// Where all leaves on the way were tested.
-    fn end<L: Lanes, const GENERAL: bool, const FILTERED: bool>(
+    fn end<L: Simd, const GENERAL: bool, const FILTERED: bool>(
         filtered: &mut FilteredRay<GENERAL, FILTERED>,
         ray: &Ray,
     ) -> Outcome<Self::Found>;
 
     /// By the exact traversal, in a part of a tree that stands there.
     fn exactly(
-        level: Level,
+        isa: Isa,
         accel: &Accel,
         from: Start,
         context: &Context,
@@ -229,7 +229,7 @@ impl FilteredGoal for ClosestHit {
     }
 
     #[inline(always)]
-    fn end<L: Lanes, const GENERAL: bool, const FILTERED: bool>(
+    fn end<L: Simd, const GENERAL: bool, const FILTERED: bool>(
         filtered: &mut FilteredRay<GENERAL, FILTERED>,
         ray: &Ray,
     ) -> Outcome<Found> {
@@ -237,14 +237,14 @@ impl FilteredGoal for ClosestHit {
     }
 
     fn exactly(
-        level: Level,
+        isa: Isa,
         accel: &Accel,
         from: Start,
         context: &Context,
         ray: &Ray,
         query: Option<&Query>,
     ) -> Found {
-        let Some(hit) = exact::closest_from(level, accel, from, context, ray, query) else {
+        let Some(hit) = exact::closest_from(isa, accel, from, context, ray, query) else {
             return Found::NOTHING;
         };
         let winner = Winner { root: hit.root, geometry: IN_INSTANCE, primitive: 0 };
@@ -292,7 +292,7 @@ impl FilteredGoal for AnyHit {
     }
 
     #[inline(always)]
-    fn end<L: Lanes, const GENERAL: bool, const FILTERED: bool>(
+    fn end<L: Simd, const GENERAL: bool, const FILTERED: bool>(
         _: &mut FilteredRay<GENERAL, FILTERED>,
         _: &Ray,
     ) -> Outcome<bool> {
@@ -300,14 +300,14 @@ impl FilteredGoal for AnyHit {
     }
 
     fn exactly(
-        level: Level,
+        isa: Isa,
         accel: &Accel,
         from: Start,
         context: &Context,
         ray: &Ray,
         query: Option<&Query>,
     ) -> bool {
-        exact::any_from(level, accel, from, context, ray, query)
+        exact::any_from(isa, accel, from, context, ray, query)
     }
 
     fn in_context(is_hit: bool, _: &Accel, _: ContextRef) -> bool {
@@ -329,7 +329,7 @@ impl FilteredGoal for AnyHit {
 /// A traversal with one ray.
 pub(crate) struct Traversal<'a, 'r, G, const GENERAL: bool, const FILTERED: bool> {
     pub(super) accel: &'a Accel,
-    pub(super) start: &'a SingleStart,
+    pub(super) start: &'a FilterStart,
     /// The subtree to traverse.
     pub(super) root: u32,
     pub(super) ray: &'r Ray,
@@ -339,14 +339,14 @@ pub(crate) struct Traversal<'a, 'r, G, const GENERAL: bool, const FILTERED: bool
     pub(super) goal: PhantomData<G>,
 }
 
-impl<G: FilteredGoal, const GENERAL: bool, const FILTERED: bool> Task
+impl<G: FilteredGoal, const GENERAL: bool, const FILTERED: bool> Dispatch
     for Traversal<'_, '_, G, GENERAL, FILTERED>
 {
     type Output = Outcome<G::Found>;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> Self::Output {
-        match L::start_single(self.start, self.ray) {
+    fn run<L: Simd>(self) -> Self::Output {
+        match L::start_filter(self.start, self.ray) {
             Some(slabs) => self.run_from::<L>(slabs),
             None => Outcome::Uncertain,
         }
@@ -356,7 +356,7 @@ impl<G: FilteredGoal, const GENERAL: bool, const FILTERED: bool> Task
 impl<G: FilteredGoal, const GENERAL: bool, const FILTERED: bool> Traversal<'_, '_, G, GENERAL, FILTERED> {
     /// Traverses the tree with a ray that has started among its bounding boxes.
     #[inline(always)]
-    pub(super) fn run_from<L: Lanes>(self, slabs: Slabs) -> Outcome<G::Found> {
+    pub(super) fn run_from<L: Simd>(self, slabs: Slabs) -> Outcome<G::Found> {
         let Self { accel, start, root, ray, query, context, .. } = self;
         let mut cursor = NodeCursor::<L>::new(&accel.tree.nodes, slabs);
         let mut stack = Stack::new();
@@ -385,7 +385,7 @@ impl<G: FilteredGoal, const GENERAL: bool, const FILTERED: bool> Traversal<'_, '
 impl<'a, 'r, G: FilteredGoal, const GENERAL: bool> Traversal<'a, 'r, G, GENERAL, false> {
     /// Of a whole tree that stands in no instance, with everything in it.
     #[inline(always)]
-    pub(crate) fn whole(accel: &'a Accel, start: &'a SingleStart, ray: &'r Ray) -> Self {
+    pub(crate) fn whole(accel: &'a Accel, start: &'a FilterStart, ray: &'r Ray) -> Self {
         Self {
             accel,
             start,
@@ -408,7 +408,7 @@ fn stop_early<G: FilteredGoal>(stop: Stop) -> Outcome<G::Found> {
 
 /// The traversal with a query that leaves something out.
 pub(crate) fn with_query<G: FilteredGoal>(
-    level: Level,
+    isa: Isa,
     accel: &Accel,
     ray: &Ray,
     query: &Query,
@@ -417,45 +417,45 @@ pub(crate) fn with_query<G: FilteredGoal>(
     let (root, context) = (start.root, ContextRef::OUTSIDE);
     let query = Some(&TreeQuery::new(query, accel, context));
     if start.only_triangles {
-        level.run(Traversal::<G, false, true> { accel, start, root, ray, query, context, goal: PhantomData })
+        isa.run(Traversal::<G, false, true> { accel, start, root, ray, query, context, goal: PhantomData })
     } else {
-        level.run(Traversal::<G, true, true> { accel, start, root, ray, query, context, goal: PhantomData })
+        isa.run(Traversal::<G, true, true> { accel, start, root, ray, query, context, goal: PhantomData })
     }
 }
 
 /// The same without a query, for tests.
 #[cfg(test)]
-pub(crate) fn without_query<G: FilteredGoal>(level: Level, accel: &Accel, ray: &Ray) -> Outcome<G::Found> {
+pub(crate) fn without_query<G: FilteredGoal>(isa: Isa, accel: &Accel, ray: &Ray) -> Outcome<G::Found> {
     let Some(start) = &accel.single else { return Outcome::Uncertain };
     if start.only_triangles {
-        level.run(Traversal::<G, false, false>::whole(accel, start, ray))
+        isa.run(Traversal::<G, false, false>::whole(accel, start, ray))
     } else {
-        level.run(Traversal::<G, true, false>::whole(accel, start, ray))
+        isa.run(Traversal::<G, true, false>::whole(accel, start, ray))
     }
 }
 
 /// [`Accel::closest`] and [`Accel::any`], by function pointers for the tree and the instruction set.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Queries {
-    pub(crate) closest: Asked<Option<Hit>>,
-    pub(crate) any: Asked<bool>,
+    pub(crate) closest: DispatchedQuery<Option<Hit>>,
+    pub(crate) any: DispatchedQuery<bool>,
 }
 
 impl Queries {
     /// For a tree that has this start.
-    pub(crate) fn new(level: Level, start: Option<&SingleStart>) -> Self {
+    pub(crate) fn new(isa: Isa, start: Option<&FilterStart>) -> Self {
         match start.map(|start| start.only_triangles) {
             Some(true) => Self {
-                closest: level.asked::<FilteredQuery<ClosestHit, false>>(),
-                any: level.asked::<FilteredQuery<AnyHit, false>>(),
+                closest: isa.dispatched::<FilteredQuery<ClosestHit, false>>(),
+                any: isa.dispatched::<FilteredQuery<AnyHit, false>>(),
             },
             Some(false) => Self {
-                closest: level.asked::<FilteredQuery<ClosestHit, true>>(),
-                any: level.asked::<FilteredQuery<AnyHit, true>>(),
+                closest: isa.dispatched::<FilteredQuery<ClosestHit, true>>(),
+                any: isa.dispatched::<FilteredQuery<AnyHit, true>>(),
             },
             None => Self {
-                closest: level.asked::<ExactQuery<ClosestHit>>(),
-                any: level.asked::<ExactQuery<AnyHit>>(),
+                closest: isa.dispatched::<ExactQuery<ClosestHit>>(),
+                any: isa.dispatched::<ExactQuery<AnyHit>>(),
             },
         }
     }
@@ -464,12 +464,12 @@ impl Queries {
 struct FilteredQuery<G, const GENERAL: bool>(PhantomData<G>);
 struct ExactQuery<G>(PhantomData<G>);
 
-impl<const GENERAL: bool> Question for FilteredQuery<ClosestHit, GENERAL> {
+impl<const GENERAL: bool> RayQuery for FilteredQuery<ClosestHit, GENERAL> {
     type Ray = Ray;
     type Answer = Option<Hit>;
 
     #[inline(always)]
-    fn ask<L: Lanes>(accel: &Accel, ray: &Ray) -> Option<Hit> {
+    fn ask<L: Simd>(accel: &Accel, ray: &Ray) -> Option<Hit> {
         if let Some(start) = &accel.single {
             let ray = &L::read(ray);
             let traversal = Traversal::<ClosestHit, GENERAL, false>::whole(accel, start, ray);
@@ -477,16 +477,16 @@ impl<const GENERAL: bool> Question for FilteredQuery<ClosestHit, GENERAL> {
                 return found.into_hit(accel, ContextRef::OUTSIDE);
             }
         }
-        exact::closest(L::level(), accel, ray, None)
+        exact::closest(L::isa(), accel, ray, None)
     }
 }
 
-impl<const GENERAL: bool> Question for FilteredQuery<AnyHit, GENERAL> {
+impl<const GENERAL: bool> RayQuery for FilteredQuery<AnyHit, GENERAL> {
     type Ray = Ray;
     type Answer = bool;
 
     #[inline(always)]
-    fn ask<L: Lanes>(accel: &Accel, ray: &Ray) -> bool {
+    fn ask<L: Simd>(accel: &Accel, ray: &Ray) -> bool {
         if let Some(start) = &accel.single {
             let ray = &L::read(ray);
             let traversal = Traversal::<AnyHit, GENERAL, false>::whole(accel, start, ray);
@@ -494,26 +494,26 @@ impl<const GENERAL: bool> Question for FilteredQuery<AnyHit, GENERAL> {
                 return found;
             }
         }
-        exact::any(L::level(), accel, ray, None)
+        exact::any(L::isa(), accel, ray, None)
     }
 }
 
-impl Question for ExactQuery<ClosestHit> {
+impl RayQuery for ExactQuery<ClosestHit> {
     type Ray = Ray;
     type Answer = Option<Hit>;
 
     #[inline(always)]
-    fn ask<L: Lanes>(accel: &Accel, ray: &Ray) -> Option<Hit> {
-        exact::closest(L::level(), accel, ray, None)
+    fn ask<L: Simd>(accel: &Accel, ray: &Ray) -> Option<Hit> {
+        exact::closest(L::isa(), accel, ray, None)
     }
 }
 
-impl Question for ExactQuery<AnyHit> {
+impl RayQuery for ExactQuery<AnyHit> {
     type Ray = Ray;
     type Answer = bool;
 
     #[inline(always)]
-    fn ask<L: Lanes>(accel: &Accel, ray: &Ray) -> bool {
-        exact::any(L::level(), accel, ray, None)
+    fn ask<L: Simd>(accel: &Accel, ray: &Ray) -> bool {
+        exact::any(L::isa(), accel, ray, None)
     }
 }

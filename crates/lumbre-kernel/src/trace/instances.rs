@@ -1,7 +1,7 @@
 //! A ray at an instance: the same traversal in the tree that it places.
 //!
 //! A tree of triangles is traversed at once, by the instruction set of the traversal around it; any other by a call, no deeper than
-//! [`SingleStart`](crate::tree::summary::SingleStart) allows. What is hit there comes back in double precision, as the crossing of a shape does.
+//! [`FilterStart`](crate::intersect::filter_start::FilterStart) allows. What is hit there comes back in double precision, as the crossing of a shape does.
 
 use std::cmp::Ordering;
 use std::marker::PhantomData;
@@ -12,8 +12,8 @@ use super::decide::{heights, largest_component};
 use super::filtered::{FilteredGoal, FilteredRay, Found, IN_INSTANCE, InInstance, Traversal};
 use super::{ContextRef, Outcome, Stop, Winner};
 use crate::intersect::box_ray::Slabs;
-use crate::intersect::single_start::SingleStart;
-use crate::intersect::{Lanes, Level};
+use crate::intersect::filter_start::FilterStart;
+use crate::intersect::{Isa, Simd};
 use crate::query::{Query, TreeQuery};
 use crate::tree::packed::Entry;
 use crate::tree::packed::Start;
@@ -43,7 +43,7 @@ impl<'a> Placed<'a> {
 impl<const GENERAL: bool, const FILTERED: bool> FilteredRay<'_, '_, GENERAL, FILTERED> {
     /// Tests an instance.
     #[inline(always)]
-    pub(super) fn test_instance<G: FilteredGoal, L: Lanes>(
+    pub(super) fn test_instance<G: FilteredGoal, L: Simd>(
         &mut self,
         entry: &Entry,
         ray: &Ray,
@@ -63,9 +63,7 @@ impl<const GENERAL: bool, const FILTERED: bool> FilteredRay<'_, '_, GENERAL, FIL
         }
         let found = match outcome {
             Outcome::Certain(found) => found,
-            Outcome::Uncertain => {
-                test_any_tree::<G, FILTERED>(L::level(), &placed, ray, range, query, context)
-            }
+            Outcome::Uncertain => test_any_tree::<G, FILTERED>(L::isa(), &placed, ray, range, query, context),
         };
         G::test_found(self, found, placed.geometry, ray, slabs)
     }
@@ -117,8 +115,8 @@ impl<const GENERAL: bool, const FILTERED: bool> FilteredRay<'_, '_, GENERAL, FIL
 
 /// Traverses a placed tree of triangles, with the instruction set of the traversal around it.
 #[inline(always)]
-fn test_triangles<G: FilteredGoal, L: Lanes, const FILTERED: bool>(
-    start: &SingleStart,
+fn test_triangles<G: FilteredGoal, L: Simd, const FILTERED: bool>(
+    start: &FilterStart,
     placed: &Placed,
     ray: &Ray,
     range: [f64; 2],
@@ -139,7 +137,7 @@ fn test_triangles<G: FilteredGoal, L: Lanes, const FILTERED: bool>(
 /// Traverses any placed tree; where single precision cannot tell, exactly.
 #[inline(never)]
 fn test_any_tree<G: FilteredGoal, const FILTERED: bool>(
-    level: Level,
+    isa: Isa,
     placed: &Placed,
     ray: &Ray,
     [t_min, t_max]: [f64; 2],
@@ -155,11 +153,11 @@ fn test_any_tree<G: FilteredGoal, const FILTERED: bool>(
         let query = query.as_ref();
         let traversal =
             Traversal::<G, true, FILTERED> { accel, start, root, ray, query, context, goal: PhantomData };
-        if let Outcome::Certain(found) = level.run(traversal) {
+        if let Outcome::Certain(found) = isa.run(traversal) {
             return G::in_context(found, accel, ContextRef::of(written));
         }
     }
-    G::exactly(level, accel, placed.from, written, ray, query)
+    G::exactly(isa, accel, placed.from, written, ray, query)
 }
 
 /// Whether a hit comes before another in an instance.

@@ -14,11 +14,11 @@ use super::stack::Goal;
 use super::{Outcome, Stop, Winner, all_crossings, first_crossing, is_crossed, meets_front};
 use crate::intersect::box_ray::Slabs;
 use crate::intersect::watertight::Meeting;
-use crate::intersect::{self, Crossings, Lanes, Level, MetHulls, Task};
+use crate::intersect::{self, BoundingHits, Crossings, Dispatch, Isa, Simd};
 use crate::query::TreeQuery;
 use crate::simd;
 use crate::tree::BLOCK;
-use crate::tree::bounding_block::HullRay;
+use crate::tree::bounding_block::BoundingVolumeRay;
 use crate::tree::node::tag;
 use crate::tree::packed::Entry;
 use crate::tree::sphere_block::SphereRay;
@@ -28,7 +28,7 @@ use crate::{Accel, GeometryKind};
 impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL, FILTERED> {
     /// Tests a leaf.
     #[inline(always)]
-    pub(crate) fn test_leaf<G: FilteredGoal, L: Lanes>(
+    pub(crate) fn test_leaf<G: FilteredGoal, L: Simd>(
         &mut self,
         leaf: u32,
         ray: &Ray,
@@ -45,7 +45,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
         match tag::of(leaf) {
             tag::SPHERES => {
                 let goal = PhantomData::<G>;
-                L::level().run(TestSpheres { filtered: self, leaf, ray, slabs, goal })
+                L::isa().run(TestSpheres { filtered: self, leaf, ray, slabs, goal })
             }
             tag::PRECISE => self.test_precise::<G>(leaf, ray, slabs),
             tag::INSTANCE => {
@@ -58,7 +58,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
 
     /// Tests what has no bounds, and stands beside the tree.
     #[inline(always)]
-    pub(crate) fn test_infinite<G: FilteredGoal, L: Lanes>(
+    pub(crate) fn test_infinite<G: FilteredGoal, L: Simd>(
         &mut self,
         ray: &Ray,
         slabs: &mut Slabs,
@@ -83,12 +83,12 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
 
     /// Tests a leaf of triangles, eight at a time.
     #[inline(always)]
-    fn test_triangles<G: Goal, L: Lanes>(&mut self, leaf: u32, ray: &Ray, slabs: &mut Slabs) -> Option<Stop> {
+    fn test_triangles<G: Goal, L: Simd>(&mut self, leaf: u32, ray: &Ray, slabs: &mut Slabs) -> Option<Stop> {
         // One block at least, and mostly no more.
         let mut place = leaf & tag::PLACE;
         loop {
             let block = self.decider.block(place);
-            let (mask, edges) = L::meet_triangles(block, simd::opaque(&self.blocks));
+            let (mask, edges) = L::intersect_triangles(block, simd::opaque(&self.blocks));
             if mask != 0 {
                 let crossings = L::place_crossings(&edges, &self.blocks);
                 let stop = if G::IS_ANY {
@@ -109,11 +109,11 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
 
     /// Takes the closest of the triangles of a block whose lines the ray may pass.
     #[inline(always)]
-    fn closest_triangle<L: Lanes>(
+    fn closest_triangle<L: Simd>(
         &mut self,
         (place, block): (u32, &TriangleBlock),
         mask: u32,
-        crossings: &Crossings<L::Eight>,
+        crossings: &Crossings<L::F32x8>,
         ray: &Ray,
         slabs: &mut Slabs,
     ) -> Option<Stop> {
@@ -144,7 +144,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
                 // Farther, which a NaN is not; or missed.
                 continue;
             } else {
-                match self.compare(L::level(), ray, place, lane) {
+                match self.compare(L::isa(), ray, place, lane) {
                     Outcome::Certain(Some(closer)) => self.keep(closer, slabs),
                     Outcome::Certain(None) => {}
                     Outcome::Uncertain => return Some(Stop::Uncertain),
@@ -156,11 +156,11 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
 
     /// Whether any of the triangles of a block is hit.
     #[inline(always)]
-    fn any_triangle<L: Lanes>(
+    fn any_triangle<L: Simd>(
         &self,
         (place, block): (u32, &TriangleBlock),
         mask: u32,
-        crossings: &Crossings<L::Eight>,
+        crossings: &Crossings<L::F32x8>,
         ray: &Ray,
     ) -> Option<Stop> {
         if !FILTERED && mask & crossings.sure != 0 {
@@ -191,7 +191,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
 
     /// The crossing of a triangle, if it is the closest that the query takes.
     #[inline(always)]
-    fn query_triangle<L: Lanes>(&self, (place, lane): (u32, u32), ray: &Ray) -> Outcome<Option<Winner>> {
+    fn query_triangle<L: Simd>(&self, (place, lane): (u32, u32), ray: &Ray) -> Outcome<Option<Winner>> {
         let (geometry, primitive) = self.decider.ids(place, lane);
         let Some(query) = self.query.filter(|query| query.has_primitive(geometry, primitive)) else {
             return Outcome::Certain(None);
@@ -211,9 +211,9 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
     // Out of line, and so out of the way of the loop around it.
     #[cold]
     #[inline(never)]
-    fn compare(&self, level: Level, ray: &Ray, block: u32, lane: u32) -> Outcome<Option<Candidate>> {
+    fn compare(&self, isa: Isa, ray: &Ray, block: u32, lane: u32) -> Outcome<Option<Candidate>> {
         let (decider, axes, best) = (self.decider, self.blocks.axes, (&self.best, self.exact()));
-        match level.run(Comparison { decider, ray, axes, triangle: (block, lane), best }) {
+        match isa.run(Comparison { decider, ray, axes, triangle: (block, lane), best }) {
             Outcome::Certain(Some(t)) => {
                 let (from, to) = heights(t, largest_component(ray));
                 Outcome::Certain(Some(Candidate { block, lane, from, to }))
@@ -225,21 +225,29 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
 
     /// Tests a leaf of shapes: those whose bounding volumes are hit, the nearest first.
     #[inline(always)]
-    fn test_shapes<G: Goal, L: Lanes>(&mut self, leaf: u32, ray: &Ray, slabs: &mut Slabs) -> Option<Stop> {
+    fn test_shapes<G: Goal, L: Simd>(&mut self, leaf: u32, ray: &Ray, slabs: &mut Slabs) -> Option<Stop> {
         let accel = self.accel();
-        let make = || HullRay::new(&accel.units, ray, largest_component(ray));
-        let hulls = *self.hulls.get_or_insert_with(make);
+        let make = || BoundingVolumeRay::new(&accel.tree_space, ray, largest_component(ray));
+        let bounding_volumes = *self.bounding_volumes.get_or_insert_with(make);
         let mut first = tag::place(leaf);
         loop {
-            let Some((block, goes_on)) = accel.hulls.block(first) else {
+            let Some((block, goes_on)) = accel.bounding_volumes.block(first) else {
                 return self.test_entries::<G>(leaf, ray, slabs);
             };
             let entries = &accel.tree.entries[first..];
             let range = &self.blocks.range;
-            let MetHulls { mut mask, sure, near } = if G::IS_ANY && !FILTERED {
-                intersect::meet_hulls::<L, true>(block, simd::opaque(&hulls), range)
+            let BoundingHits { mut mask, sure, near } = if G::IS_ANY && !FILTERED {
+                intersect::intersect_bounding_volumes::<L, true>(
+                    block,
+                    simd::opaque(&bounding_volumes),
+                    range,
+                )
             } else {
-                intersect::meet_hulls::<L, false>(block, simd::opaque(&hulls), range)
+                intersect::intersect_bounding_volumes::<L, false>(
+                    block,
+                    simd::opaque(&bounding_volumes),
+                    range,
+                )
             };
             if G::IS_ANY && !FILTERED && sure != 0 {
                 return Some(Stop::Hit);
@@ -338,7 +346,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
 
     /// Tests a leaf of spheres of clouds, eight at a time.
     #[inline(always)]
-    fn test_spheres<G: Goal, L: Lanes>(&mut self, leaf: u32, ray: &Ray, slabs: &mut Slabs) -> Option<Stop> {
+    fn test_spheres<G: Goal, L: Simd>(&mut self, leaf: u32, ray: &Ray, slabs: &mut Slabs) -> Option<Stop> {
         let accel = self.accel();
         let places = tag::blocks(leaf);
         let range = [ray.t_min, if G::IS_ANY { ray.t_max } else { self.best.limit(ray) }];
@@ -348,7 +356,7 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
             let cloud = CloudRay::turn(&mut self.cloud, accel, ray, ids.geometry);
             let origin = cloud.origin;
             let (mut mask, certain) = match cloud.within(range) {
-                Some(spheres) => intersect::meet_spheres::<L>(block, spheres),
+                Some(spheres) => intersect::intersect_spheres::<L>(block, spheres),
                 None => (ids.lanes(), 0),
             };
             if G::IS_ANY && !FILTERED && certain != 0 {
@@ -419,13 +427,13 @@ struct TestSpheres<'s, 'a, 'd, G, const GENERAL: bool, const FILTERED: bool> {
     goal: PhantomData<G>,
 }
 
-impl<G: Goal, const GENERAL: bool, const FILTERED: bool> Task
+impl<G: Goal, const GENERAL: bool, const FILTERED: bool> Dispatch
     for TestSpheres<'_, '_, '_, G, GENERAL, FILTERED>
 {
     type Output = Option<Stop>;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> Option<Stop> {
+    fn run<L: Simd>(self) -> Option<Stop> {
         self.filtered.test_spheres::<G, L>(self.leaf, self.ray, self.slabs)
     }
 }
@@ -439,11 +447,11 @@ struct Comparison<'s, 'a> {
     best: (&'s Candidate, Option<Winner>),
 }
 
-impl Task for Comparison<'_, '_> {
+impl Dispatch for Comparison<'_, '_> {
     type Output = Outcome<Option<f64>>;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> Self::Output {
+    fn run<L: Simd>(self) -> Self::Output {
         let Self { decider, ray, axes, triangle, best } = self;
         decider.compare::<L>(ray, axes, triangle, best)
     }
@@ -468,11 +476,12 @@ impl CloudRay {
         geometry: u32,
     ) -> &'s mut Self {
         // Where all clouds have one origin, ids need not be read from memory.
-        let is_turned =
-            slot.as_ref().is_some_and(|cloud| accel.holds.has_one_cloud_origin || cloud.geometry == geometry);
+        let is_turned = slot
+            .as_ref()
+            .is_some_and(|cloud| accel.summary.has_one_cloud_origin || cloud.geometry == geometry);
         if !is_turned {
             let origin = accel.cloud(geometry).origin;
-            let spheres = SphereRay::new(ray, &origin, accel.holds.sizes.sphere_reach);
+            let spheres = SphereRay::new(ray, &origin, accel.summary.sizes.sphere_reach);
             *slot = Some(Self { geometry, origin, spheres });
         }
         slot.as_mut().expect("it was turned")

@@ -46,7 +46,7 @@ pub(crate) struct LaneHits<T> {
     /// A bit for each that it certainly hits.
     pub(crate) met: u32,
     /// A bit for each that has to be decided exactly.
-    pub(crate) unclear: u32,
+    pub(crate) uncertain: u32,
     /// Where it hits each; anything for triangles in neither mask.
     pub(crate) at: T,
 }

@@ -1,6 +1,6 @@
 //! The stack of a traversal, and the two goals that decide in which order it is filled: the closest hit and any hit.
 
-use crate::intersect::{self, Lanes, Room, STACK, Slots};
+use crate::intersect::{self, Room, STACK, Simd, Slots};
 use crate::simd::LANE_BITS;
 use crate::simd::vector::stack_entry;
 use crate::tree::node::{Node, WIDTH};
@@ -18,9 +18,10 @@ pub(crate) trait Goal {
     /// Whether its bounding box lies beyond the end of the ray.
     fn is_beyond(entry: Self::Entry, s_max: f32) -> bool;
     /// Pushes the children in `mask` (two or more; for any hit one or more) but for the first to be visited, which is returned.
-    fn push_children<L: Lanes>(node: &Node, mask: u32, enter: L::Wide, room: Room<Self::Entry>) -> u32;
+    fn push_children<L: Simd>(node: &Node, mask: u32, enter: L::F32x16, room: Room<Self::Entry>) -> u32;
     /// The same with hardly a branch: pushes all, then pops one. For any hit `mask` may be empty.
-    fn push_and_pop<L: Lanes>(node: &Node, mask: u32, enter: L::Wide, slots: &mut Slots<Self::Entry>) -> u32;
+    fn push_and_pop<L: Simd>(node: &Node, mask: u32, enter: L::F32x16, slots: &mut Slots<Self::Entry>)
+    -> u32;
 }
 
 /// The closest hit: nearer children first.
@@ -46,12 +47,12 @@ impl Goal for ClosestHit {
     }
 
     #[inline(always)]
-    fn push_children<L: Lanes>(node: &Node, mask: u32, enter: L::Wide, room: Room<i64>) -> u32 {
+    fn push_children<L: Simd>(node: &Node, mask: u32, enter: L::F32x16, room: Room<i64>) -> u32 {
         intersect::push_by_distance(node, mask, enter, room)
     }
 
     #[inline(always)]
-    fn push_and_pop<L: Lanes>(node: &Node, mask: u32, enter: L::Wide, slots: &mut Slots<i64>) -> u32 {
+    fn push_and_pop<L: Simd>(node: &Node, mask: u32, enter: L::F32x16, slots: &mut Slots<i64>) -> u32 {
         intersect::put_and_take_by_distance(node, mask, enter, slots)
     }
 }
@@ -79,13 +80,13 @@ impl Goal for AnyHit {
     }
 
     #[inline(always)]
-    fn push_children<L: Lanes>(node: &Node, mask: u32, _: L::Wide, room: Room<u32>) -> u32 {
-        intersect::push_as_built::<L::Wide>(node, mask, room)
+    fn push_children<L: Simd>(node: &Node, mask: u32, _: L::F32x16, room: Room<u32>) -> u32 {
+        intersect::push_as_built::<L::F32x16>(node, mask, room)
     }
 
     #[inline(always)]
-    fn push_and_pop<L: Lanes>(node: &Node, mask: u32, _: L::Wide, slots: &mut Slots<u32>) -> u32 {
-        intersect::put_and_take_as_built::<L::Wide>(node, mask, slots)
+    fn push_and_pop<L: Simd>(node: &Node, mask: u32, _: L::F32x16, slots: &mut Slots<u32>) -> u32 {
+        intersect::put_and_take_as_built::<L::F32x16>(node, mask, slots)
     }
 }
 

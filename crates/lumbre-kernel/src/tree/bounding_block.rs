@@ -1,21 +1,21 @@
 //! Shapes by eight: a first test in single precision of the bodies around them, which loses none.
 
 use bytemuck::{Pod, Zeroable};
-use lumbre_geometry::{Hull, Ray};
+use lumbre_geometry::{BoundingVolume, Ray};
 use lumbre_math::{DMat3, DVec3};
 use rayon::prelude::*;
 
 use crate::tree::BLOCK;
-use crate::tree::node::{Units, round_up};
+use crate::tree::node::{TreeSpace, round_up};
 use crate::tree::packed::Entry;
 use crate::{Geometry, GeometryKind};
 
-/// Up to eight hulls (see [`Hull`]), each by its centre, relative to the tree's origin, and the map from there to its cube.
+/// Up to eight bounding volumes (see [`BoundingVolume`]), each by its centre, relative to the tree's origin, and the map from there to its cube.
 ///
 /// A lane whose numbers are NaN passes every test; one whose body has a height of -∞ none: it is unused.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(32))]
-pub(crate) struct HullBlock {
+pub(crate) struct BoundingBlock {
     pub(crate) centers: [[f32; BLOCK]; 3],
     /// `rows[axis][column][lane]`.
     pub(crate) rows: [[[f32; BLOCK]; 3]; 3],
@@ -26,23 +26,23 @@ pub(crate) struct HullBlock {
     /// Of rings, the radius of the tube; of other solids -1, else 0.
     pub(crate) tubes: [f32; BLOCK],
     /// By how much cube coordinates may be wrong for each unit of distance from the centre, 64uN, and apart from that: see
-    /// [`HullRay`].
+    /// [`BoundingVolumeRay`].
     pub(crate) margins: [f32; BLOCK],
     pub(crate) least_margins: [f32; BLOCK],
 }
 
-const _: () = assert!(size_of::<HullBlock>() == 608);
+const _: () = assert!(size_of::<BoundingBlock>() == 608);
 
 /// u.
 const ROUNDOFF: f64 = 1.0 / (1u64 << 24) as f64;
-/// A hull that is smaller, by the size of the tree, tells nothing.
+/// A bounding volume that is smaller, by the size of the tree, tells nothing.
 const LARGEST_NORM: f64 = (1u64 << 18) as f64;
 /// By how much a map and its inverse together may stretch.
 const LARGEST_CONDITION: f64 = (1u64 << 16) as f64;
 
-/// What a block needs to know of a hull.
+/// What a block needs to know of a bounding volume.
 struct Mapped {
-    hull: Hull,
+    bounding_volume: BoundingVolume,
     /// Relative to the tree's origin.
     center: DVec3,
     /// From space to the cube.
@@ -55,22 +55,28 @@ struct Mapped {
 
 impl Mapped {
     /// `None` where single precision tells nothing.
-    fn new(hull: Hull, units: &Units) -> Option<Self> {
-        let back = hull.axes.inverse();
+    fn new(bounding_volume: BoundingVolume, tree_space: &TreeSpace) -> Option<Self> {
+        let back = bounding_volume.axes.inverse();
         let largest_row = |m: &DMat3| (0..3).map(|axis| m.row(axis).abs().element_sum()).fold(0.0, f64::max);
-        let (norm, size) = (largest_row(&back), largest_row(&hull.axes));
-        let center = hull.center - units.origin;
+        let (norm, size) = (largest_row(&back), largest_row(&bounding_volume.axes));
+        let center = bounding_volume.center - tree_space.origin;
         // Every comparison with a NaN is false.
         let is_fit = norm > 0.0
-            && norm <= LARGEST_NORM * units.scale
+            && norm <= LARGEST_NORM * tree_space.scale
             && norm * size <= LARGEST_CONDITION
-            && center.abs().max_element() * units.scale <= 2.0;
-        is_fit.then_some(Self { hull, center, rows: [0, 1, 2].map(|axis| back.row(axis)), norm, size })
+            && center.abs().max_element() * tree_space.scale <= 2.0;
+        is_fit.then_some(Self {
+            bounding_volume,
+            center,
+            rows: [0, 1, 2].map(|axis| back.row(axis)),
+            norm,
+            size,
+        })
     }
 }
 
-impl HullBlock {
-    /// A block without hulls.
+impl BoundingBlock {
+    /// A block without bounding volumes.
     pub(crate) const EMPTY: Self = Self {
         centers: [[0.0; BLOCK]; 3],
         rows: [[[0.0; BLOCK]; 3]; 3],
@@ -81,37 +87,48 @@ impl HullBlock {
         least_margins: [1.0; BLOCK],
     };
 
-    /// Puts the hull of a shape into a lane; without one, or where single precision tells nothing of it, what passes always.
-    pub(crate) fn put(&mut self, lane: usize, hull: Option<Hull>, units: &Units) {
-        let Some(mapped) = hull.and_then(|hull| Mapped::new(hull, units)) else {
+    /// Puts the bounding volume of a shape into a lane; without one, or where single precision tells nothing of it, what passes always.
+    pub(crate) fn put(
+        &mut self,
+        lane: usize,
+        bounding_volume: Option<BoundingVolume>,
+        tree_space: &TreeSpace,
+    ) {
+        let Some(mapped) =
+            bounding_volume.and_then(|bounding_volume| Mapped::new(bounding_volume, tree_space))
+        else {
             self.rows.iter_mut().flatten().for_each(|lanes| lanes[lane] = f32::NAN);
             (self.heights[lane], self.tubes[lane]) = (f32::NAN, 0.0);
             return;
         };
-        let Mapped { hull, center, rows, norm, size } = mapped;
+        let Mapped { bounding_volume, center, rows, norm, size } = mapped;
         for axis in 0..3 {
             self.centers[axis][lane] = center[axis] as f32;
             for (lanes, number) in self.rows[axis].iter_mut().zip(rows[axis].to_array()) {
                 lanes[lane] = number as f32;
             }
         }
-        self.heights[lane] = if hull.is_flat { 0.0 } else { 1.0 };
-        for (lanes, number) in self.profiles.iter_mut().zip(hull.profile) {
+        self.heights[lane] = if bounding_volume.is_flat { 0.0 } else { 1.0 };
+        for (lanes, number) in self.profiles.iter_mut().zip(bounding_volume.profile) {
             lanes[lane] = number as f32;
         }
-        self.tubes[lane] = if hull.is_solid && hull.tube == 0.0 { -1.0 } else { hull.tube as f32 };
+        self.tubes[lane] = if bounding_volume.is_solid && bounding_volume.tube == 0.0 {
+            -1.0
+        } else {
+            bounding_volume.tube as f32
+        };
         let per_distance = 64.0 * ROUNDOFF * norm;
         // The centre was rounded.
-        let moved = ROUNDOFF * center.abs().max_element() + units.nearby_slop() / units.scale;
+        let moved = ROUNDOFF * center.abs().max_element() + tree_space.nearby_slop() / tree_space.scale;
         self.margins[lane] = round_up(per_distance);
         self.least_margins[lane] = round_up(per_distance * size + norm * moved + 16.0 * ROUNDOFF);
     }
 }
 
-/// The hulls of the shapes in a tree's leaves.
+/// The bounding volumes of the shapes in a tree's leaves.
 #[derive(Debug, Default)]
-pub(crate) struct Hulls {
-    blocks: Vec<HullBlock>,
+pub(crate) struct BoundingVolumes {
+    blocks: Vec<BoundingBlock>,
     /// For each entry of the tree, the block that it is in, and the top bit if that is not the last of its leaf; of what is no
     /// shape, any number.
     of_entry: Vec<u32>,
@@ -119,17 +136,17 @@ pub(crate) struct Hulls {
 
 const GOES_ON: u32 = 1 << 31;
 
-impl Hulls {
+impl BoundingVolumes {
     /// Of the entries of a tree; none where single precision would tell nothing.
-    pub(crate) fn new(geometries: &[Geometry], entries: &[Entry], units: &Units) -> Self {
-        let hull = |entry: &Entry| match &geometries[entry.geometry as usize].kind {
-            GeometryKind::Shape(shape) => shape.hull(),
+    pub(crate) fn new(geometries: &[Geometry], entries: &[Entry], tree_space: &TreeSpace) -> Self {
+        let bounding_volume = |entry: &Entry| match &geometries[entry.geometry as usize].kind {
+            GeometryKind::Shape(shape) => shape.bounding_volume(),
             _ => None,
         };
         let is_shape =
             |entry: &Entry| matches!(geometries[entry.geometry as usize].kind, GeometryKind::Shape(_));
         let two_to = |exponent: i32| 2.0f64.powi(exponent);
-        let is_fit = units.near > 0.0 && (two_to(-40)..=two_to(40)).contains(&units.scale);
+        let is_fit = tree_space.near > 0.0 && (two_to(-40)..=two_to(40)).contains(&tree_space.scale);
         if !is_fit || !entries.iter().any(is_shape) {
             return Self::default();
         }
@@ -146,9 +163,9 @@ impl Hulls {
             }
         }
         let block = |span: &std::ops::Range<usize>| {
-            let mut block = HullBlock::EMPTY;
+            let mut block = BoundingBlock::EMPTY;
             for (lane, entry) in entries[span.clone()].iter().enumerate() {
-                block.put(lane, hull(entry), units);
+                block.put(lane, bounding_volume(entry), tree_space);
             }
             block
         };
@@ -156,16 +173,16 @@ impl Hulls {
     }
 
     /// The block of the entry at a place and of up to seven that follow it in its leaf, and whether more follow these; `None`
-    /// where there are no hulls.
+    /// where there are no bounding volumes.
     #[inline(always)]
-    pub(crate) fn block(&self, entry: usize) -> Option<(&HullBlock, bool)> {
+    pub(crate) fn block(&self, entry: usize) -> Option<(&BoundingBlock, bool)> {
         let place = *self.of_entry.get(entry)?;
         Some((self.blocks.get((place & !GOES_ON) as usize)?, place & GOES_ON != 0))
     }
 
     /// Bytes of memory.
     pub(crate) fn memory_bytes(&self) -> usize {
-        self.blocks.capacity() * size_of::<HullBlock>() + self.of_entry.capacity() * size_of::<u32>()
+        self.blocks.capacity() * size_of::<BoundingBlock>() + self.of_entry.capacity() * size_of::<u32>()
     }
 }
 
@@ -178,12 +195,12 @@ fn leaves(entries: &[Entry]) -> impl Iterator<Item = (&[Entry], usize)> {
     })
 }
 
-/// A ray in single precision, for a first test of eight hulls that loses no shape.
+/// A ray in single precision, for a first test of eight bounding volumes that loses no shape.
 ///
 /// # Why none is lost
 ///
 /// Places on the ray are o + h e: o is its origin, e its direction by its largest component, which then is of size 1, and h a height
-/// as in [`HeightRange`](crate::intersect::watertight::HeightRange), t times that component. Of a hull let W be the largest coordinate of w =
+/// as in [`HeightRange`](crate::intersect::watertight::HeightRange), t times that component. Of a bounding volume let W be the largest coordinate of w =
 /// o - center, S the largest of a point of it, N the largest of the sums of the sizes in a row of the map M to its cube, and
 /// u = 2⁻²⁴. At a hit, |h| ≤ W + S, for it is as far from o on the axis of that component.
 ///
@@ -191,10 +208,10 @@ fn leaves(entries: &[Entry]) -> impl Iterator<Item = (&[Entry], usize)> {
 /// apart, and p by that times N, by u N W for the rounding of M, and by 5u N W for its sums: 8.1u N W. For the same reasons d is wrong
 /// by 7u N; the least size that is kept up, 2⁻⁴⁰ N, is small beside it. So the point of a hit is wrong by less than 15.1u N (W + S). The
 /// centre is rounded, and the hit, as double precision finds it, is by `slop` beside the line or the shape: this is the `moved` by
-/// which the hull seems to have been moved. Let the margin be m = 64u N (W + S) + N `moved` + 16u.
+/// which the bounding volume seems to have been moved. Let the margin be m = 64u N (W + S) + N `moved` + 16u.
 ///
 /// *Slabs.* The planes of the cube, moved outwards by m, are met at near = -(a + w) / |d| and far = (w - a) / |d|, with the sign of
-/// d taken off p for a, and w = 1 + m (or m along y where the hull is flat). Their roundings are worth less than 3u|h d| + 2u (|a| + w)
+/// d taken off p for a, and w = 1 + m (or m along y where the bounding volume is flat). Their roundings are worth less than 3u|h d| + 2u (|a| + w)
 /// ≤ 7u N (W + S) + 4u on the axis, for which m has room: near ≤ h ≤ far at every hit.
 ///
 /// *Profile.* What is left of the line, between heights among which h is, is again p' + k d' with |k| ≤ 1: p' in its middle, and
@@ -216,10 +233,10 @@ fn leaves(entries: &[Entry]) -> impl Iterator<Item = (&[Entry], usize)> {
 /// height surely is; one that is outside by as much is outside: also for double precision, which is wrong by far less. The ends of
 /// the range, 6u of themselves too far out here, are less than 12u N (W + S) off in the cube, for which m has room as well.
 ///
-/// A hull that is smaller than 2⁻¹⁸ of the tree, or whose map stretches too much for single precision, is not tried: it passes.
+/// A bounding volume that is smaller than 2⁻¹⁸ of the tree, or whose map stretches too much for single precision, is not tried: it passes.
 /// Else 2⁻⁴² ≤ N ≤ 2⁵⁸ and W ≤ 2⁴⁶, by the bounds on what is searched in single precision, and nothing over- or underflows.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct HullRay {
+pub(crate) struct BoundingVolumeRay {
     /// Relative to the tree's.
     pub(crate) origin: [f32; 3],
     /// What rounding took from it.
@@ -236,11 +253,11 @@ pub(crate) const LEAST_TUBE_ERROR: f32 = 1.0 / (1 << 16) as f32;
 /// No component of a direction in the cube is taken to be less, by 64uN.
 pub(crate) const LEAST_COMPONENT: f32 = 1.0 / (1u64 << 22) as f32;
 
-impl HullRay {
+impl BoundingVolumeRay {
     /// For a ray from nearby, whose direction's largest component has the size `length`.
     #[inline(always)]
-    pub(crate) fn new(units: &Units, ray: &Ray, length: f64) -> Self {
-        let exact = ray.origin - units.origin;
+    pub(crate) fn new(tree_space: &TreeSpace, ray: &Ray, length: f64) -> Self {
+        let exact = ray.origin - tree_space.origin;
         let origin = exact.as_vec3();
         let rest = (exact - origin.as_dvec3()).as_vec3();
         let direction = (ray.direction * (1.0 / length)).as_vec3();

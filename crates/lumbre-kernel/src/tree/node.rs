@@ -149,7 +149,7 @@ impl Node {
 
 /// The units in which a tree's boxes are kept.
 #[derive(Clone, Debug)]
-pub(crate) struct Units {
+pub(crate) struct TreeSpace {
     /// What is at zero.
     pub(crate) origin: DVec3,
     /// Tree units per unit of space; a power of two.
@@ -167,7 +167,7 @@ pub(crate) struct Units {
     pub(crate) margin_per_distance: f64,
 }
 
-impl Units {
+impl TreeSpace {
     pub(crate) fn new(origin: DVec3, scale: f64, radius: f64, condition: f64) -> Self {
         let reach = 2.0 * origin.abs().max_element() * scale + NEAR + 1.0;
         let slop = slop(condition, reach);
@@ -185,7 +185,7 @@ impl Units {
     }
 }
 
-impl Units {
+impl TreeSpace {
     /// By how much a box and what is in it may be apart, in tree units, as seen from a point in space.
     pub(crate) fn slop_of(&self, point: DVec3) -> f64 {
         slop(self.condition, (point.abs() + self.origin.abs()).max_element() * self.scale + 1.0)
@@ -205,11 +205,11 @@ impl Units {
 
     /// Of rays in single precision, where zero is so far from the mesh's origin on each axis, in tree units: by how much planes are
     /// moved, and by how much more for each unit of the ray's start. See `trace::f32_ray`.
-    pub(crate) fn narrow_margin(&self, shift: f64) -> f32 {
+    pub(crate) fn f32_margin(&self, shift: f64) -> f32 {
         round_up(f64::from(self.single_margin()) + ROUNDOFF * (56.0 + 2.0 * shift))
     }
 
-    pub(crate) const NARROW_MARGIN_PER_DISTANCE: f32 = (24.0 * ROUNDOFF) as f32;
+    pub(crate) const F32_MARGIN_PER_DISTANCE: f32 = (24.0 * ROUNDOFF) as f32;
 }
 
 const NEAR: f64 = 16.0;

@@ -6,7 +6,7 @@ use crate::{Geometry, GeometryKind, Instance};
 
 /// What is known of all the geometries of a tree.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Holds {
+pub(crate) struct Summary {
     /// Whether it holds nothing but triangles.
     pub(crate) only_triangles: bool,
     /// How many instances are around what is innermost.
@@ -23,7 +23,7 @@ pub(crate) struct Holds {
     pub(crate) masks_within: bool,
 }
 
-impl Holds {
+impl Summary {
     pub(crate) fn new(geometries: &[Geometry], sizes: Sizes) -> Self {
         let mut origins = geometries.iter().filter_map(|geometry| match &geometry.kind {
             GeometryKind::Mesh(mesh) => Some(mesh.origin),
@@ -36,7 +36,7 @@ impl Holds {
         });
         let first_cloud_origin = cloud_origins.next();
         let nesting_of = |geometry: &Geometry| match &geometry.kind {
-            GeometryKind::Instance(Instance { accel, .. }) => accel.holds.nesting.saturating_add(1),
+            GeometryKind::Instance(Instance { accel, .. }) => accel.summary.nesting.saturating_add(1),
             _ => 0,
         };
         Self {
@@ -48,7 +48,7 @@ impl Holds {
             sizes,
             masks_within: geometries.iter().any(|geometry| match &geometry.kind {
                 GeometryKind::Instance(Instance { accel, .. }) => {
-                    !accel.masks.is_empty() || accel.holds.masks_within
+                    !accel.masks.is_empty() || accel.summary.masks_within
                 }
                 _ => false,
             }),

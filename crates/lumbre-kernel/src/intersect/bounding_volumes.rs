@@ -1,17 +1,17 @@
 //! A ray against eight bounding volumes of shapes.
 
-use super::Lanes;
+use super::Simd;
 use crate::intersect::watertight::HeightRange;
-use crate::simd::{Eight, Row, Vector, WIDE, Wide};
+use crate::simd::{F32x8, F32x16, Row, Vector, WIDE};
 use crate::tree::BLOCK;
 use crate::tree::bounding_block::{
-    HullBlock, HullRay, LEAST_COMPONENT, LEAST_TOLERANCE, LEAST_TUBE_ERROR, TOLERANCE_PER_MARGIN,
-    TUBE_ERROR_PER_MARGIN,
+    BoundingBlock, BoundingVolumeRay, LEAST_COMPONENT, LEAST_TOLERANCE, LEAST_TUBE_ERROR,
+    TOLERANCE_PER_MARGIN, TUBE_ERROR_PER_MARGIN,
 };
 
-/// What came of eight hulls.
+/// What came of eight bounding volumes.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct MetHulls {
+pub(crate) struct BoundingHits {
     /// A bit for each that the ray may meet within the range: among them all whose shapes it does.
     pub(crate) mask: u32,
     /// A bit for each whose shape it certainly does meet, where that was asked.
@@ -20,7 +20,7 @@ pub(crate) struct MetHulls {
     pub(crate) near: [f32; BLOCK],
 }
 
-impl MetHulls {
+impl BoundingHits {
     pub(crate) const NONE: Self = Self { mask: 0, sure: 0, near: [0.0; BLOCK] };
 }
 
@@ -41,7 +41,7 @@ struct Passages<V> {
 
 /// Lines between the planes of cubes.
 #[inline(always)]
-fn pass<V: Eight>(block: &HullBlock, ray: &HullRay, range: &HeightRange) -> Passages<V> {
+fn pass<V: F32x8>(block: &BoundingBlock, ray: &BoundingVolumeRay, range: &HeightRange) -> Passages<V> {
     let (zero, one) = (V::splat(0.0), V::splat(1.0));
     let (load, splat) = (V::load, V::splat);
     let w = [
@@ -74,7 +74,7 @@ fn pass<V: Eight>(block: &HullBlock, ray: &HullRay, range: &HeightRange) -> Pass
     Passages { p, d, margin, enters, leaves, from, to, missed: to.below(from) }
 }
 
-/// What lines have in hulls: `p + k d` for k from -1 to 1, at the heights `middle + k reach`.
+/// What lines have in bounding volumes: `p + k d` for k from -1 to 1, at the heights `middle + k reach`.
 struct Chords<V> {
     p: [V; 3],
     d: [V; 3],
@@ -90,10 +90,10 @@ struct Chords<V> {
     outside: u32,
 }
 
-/// Lines in hulls, between the planes of whose cubes they pass; with `SURE`, also what is certain: see [`HullRay`].
+/// Lines in bounding volumes, between the planes of whose cubes they pass; with `SURE`, also what is certain: see [`BoundingVolumeRay`].
 #[inline(always)]
-fn look_into<V: Eight, const SURE: bool>(
-    block: &HullBlock,
+fn look_into<V: F32x8, const SURE: bool>(
+    block: &BoundingBlock,
     range: &HeightRange,
     passages: &Passages<V>,
 ) -> Chords<V> {
@@ -174,7 +174,7 @@ struct Chord {
 impl Chord {
     /// Looks at a tube of this radius; `start` and `end` are between which the line surely is in its range.
     #[inline(always)]
-    fn meet_tube<W: Wide>(&self, tube: f32, [start, end]: [f32; 2]) -> SeenTube {
+    fn intersect_tube<W: F32x16>(&self, tube: f32, [start, end]: [f32; 2]) -> SeenTube {
         let Self { p: [px, py, pz], d: [dx, dy, dz], .. } = *self;
         let error = TUBE_ERROR_PER_MARGIN * self.margin + LEAST_TUBE_ERROR;
         // In the space of x, y and r z.
@@ -197,10 +197,14 @@ impl Chord {
     }
 }
 
-impl<V: Eight> Chords<V> {
+impl<V: F32x8> Chords<V> {
     /// Looks closer at those that pass tubes: a bit for each that may be met, among them all that are, and for each that certainly is.
     #[inline(always)]
-    fn meet_tubes<W: Wide, const SURE: bool>(&self, block: &HullBlock, range: &HeightRange) -> (u32, u32) {
+    fn intersect_tubes<W: F32x16, const SURE: bool>(
+        &self,
+        block: &BoundingBlock,
+        range: &HeightRange,
+    ) -> (u32, u32) {
         let (mut mask, mut sure) = (self.mask, self.sure);
         let tubes = &block.tubes;
         let mut rings = V::splat(0.0).below(V::load(tubes)) & mask;
@@ -222,7 +226,7 @@ impl<V: Eight> Chords<V> {
                 reach: reach[i],
                 margin: margin[i],
             };
-            let seen = chord.meet_tube::<W>(tubes[i], sure_range);
+            let seen = chord.intersect_tube::<W>(tubes[i], sure_range);
             mask &= !(u32::from(seen.misses) << i);
             let is_outside = seen.is_outside || self.outside >> i & 1 == 1;
             if SURE && seen.is_inside && is_outside {
@@ -233,43 +237,43 @@ impl<V: Eight> Chords<V> {
     }
 }
 
-/// Tries a ray against the hulls of a block; with `SURE`, also what is certain: see [`HullRay`].
+/// Tries a ray against the bounding volumes of a block; with `SURE`, also what is certain: see [`BoundingVolumeRay`].
 #[inline(always)]
-pub(crate) fn meet_hulls<L: Lanes, const SURE: bool>(
-    block: &HullBlock,
-    ray: &HullRay,
+pub(crate) fn intersect_bounding_volumes<L: Simd, const SURE: bool>(
+    block: &BoundingBlock,
+    ray: &BoundingVolumeRay,
     range: &HeightRange,
-) -> MetHulls {
-    let passages = pass::<L::Eight>(block, ray, range);
-    if passages.missed == <L::Eight as Vector>::ALL {
-        return MetHulls::NONE;
+) -> BoundingHits {
+    let passages = pass::<L::F32x8>(block, ray, range);
+    if passages.missed == <L::F32x8 as Vector>::ALL {
+        return BoundingHits::NONE;
     }
-    let chords = look_into::<L::Eight, SURE>(block, range, &passages);
+    let chords = look_into::<L::F32x8, SURE>(block, range, &passages);
     if chords.mask == 0 {
-        return MetHulls::NONE;
+        return BoundingHits::NONE;
     }
-    let (mask, sure) = chords.meet_tubes::<L::Wide, SURE>(block, range);
-    MetHulls { mask, sure, near: chords.from.to_array() }
+    let (mask, sure) = chords.intersect_tubes::<L::F32x16, SURE>(block, range);
+    BoundingHits { mask, sure, near: chords.from.to_array() }
 }
 
-/// What [`meet_hulls`] gives at a level, for tests.
+/// What [`intersect_bounding_volumes`] gives at an instruction set, for tests.
 #[cfg(test)]
-pub(crate) fn meet_hulls_at(
-    level: super::Level,
-    block: &HullBlock,
-    ray: &HullRay,
+pub(crate) fn intersect_bounding_volumes_at(
+    isa: super::Isa,
+    block: &BoundingBlock,
+    ray: &BoundingVolumeRay,
     range: &HeightRange,
-) -> MetHulls {
-    struct Hulls<'a>(&'a HullBlock, &'a HullRay, &'a HeightRange);
-    impl super::Task for Hulls<'_> {
-        type Output = MetHulls;
+) -> BoundingHits {
+    struct BoundingVolumes<'a>(&'a BoundingBlock, &'a BoundingVolumeRay, &'a HeightRange);
+    impl super::Dispatch for BoundingVolumes<'_> {
+        type Output = BoundingHits;
         #[inline(always)]
-        fn run<L: Lanes>(self) -> Self::Output {
-            let met = meet_hulls::<L, true>(self.0, self.1, self.2);
-            let same = meet_hulls::<L, false>(self.0, self.1, self.2);
+        fn run<L: Simd>(self) -> Self::Output {
+            let met = intersect_bounding_volumes::<L, true>(self.0, self.1, self.2);
+            let same = intersect_bounding_volumes::<L, false>(self.0, self.1, self.2);
             assert_eq!((same.mask, same.sure), (met.mask, 0));
             met
         }
     }
-    level.run(Hulls(block, ray, range))
+    isa.run(BoundingVolumes(block, ray, range))
 }

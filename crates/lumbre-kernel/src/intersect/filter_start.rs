@@ -4,8 +4,8 @@ use super::f32_ray::Precise;
 use super::watertight::LEAST_SIZE;
 use lumbre_math::DVec3;
 
-use crate::tree::node::{LARGEST_NEAR, SMALLEST_NEAR, TINY_NEAR, Units, round_up};
-use crate::tree::summary::Holds;
+use crate::tree::node::{LARGEST_NEAR, SMALLEST_NEAR, TINY_NEAR, TreeSpace, round_up};
+use crate::tree::summary::Summary;
 
 /// Instances within one another are traversed in single precision no deeper: each takes a few kilobytes of the thread's stack.
 const DEEPEST: u32 = 8;
@@ -13,7 +13,7 @@ const DEEPEST: u32 = 8;
 /// What a ray from nearby needs to start in single precision, in a tree where the corners of all triangles in single precision are
 /// relative to one origin.
 #[derive(Clone, Debug)]
-pub(crate) struct SingleStart {
+pub(crate) struct FilterStart {
     /// Of the tree.
     pub(crate) root: u32,
     /// Whether it holds nothing but triangles in single precision.
@@ -35,7 +35,7 @@ pub(crate) struct SingleStart {
     /// What the tree's boxes are relative to as seen from where the corners are, in tree units, and a zero.
     pub(crate) shift: [f32; 4],
     /// By how much planes are moved for rays in single precision: see `trace::f32_ray`.
-    pub(crate) narrow_margin: f32,
+    pub(crate) f32_margin: f32,
     /// The scale, and its inverse.
     pub(crate) units_per_space: f32,
     pub(crate) space_per_unit: f32,
@@ -50,49 +50,49 @@ pub(crate) struct SingleStart {
     pub(crate) tiny: f32,
 }
 
-impl SingleStart {
+impl FilterStart {
     /// `None` where the tree holds instances too deep within one another or meshes with different origins, or is so small, so large or so
     /// far from its origin that single precision would overflow, underflow or tell nothing.
-    pub(crate) fn new(holds: &Holds, units: &Units, root: Option<u32>) -> Option<Self> {
+    pub(crate) fn new(summary: &Summary, tree_space: &TreeSpace, root: Option<u32>) -> Option<Self> {
         let two_to = |exponent: i32| 2.0f64.powi(exponent);
         // Without a triangle, any place will do.
-        let has_triangles = holds.first_origin.is_finite() && holds.sizes.largest_corner > 0.0;
+        let has_triangles = summary.first_origin.is_finite() && summary.sizes.largest_corner > 0.0;
         let (mesh_origin, largest_corner) = if has_triangles {
-            (holds.first_origin, f64::from(holds.sizes.largest_corner))
+            (summary.first_origin, f64::from(summary.sizes.largest_corner))
         } else {
-            (units.origin, 1.0 / units.scale)
+            (tree_space.origin, 1.0 / tree_space.scale)
         };
-        let shift = (units.origin - mesh_origin).abs().max_element();
-        let reach = units.near / units.scale + shift + largest_corner;
-        let is_fit = holds.nesting <= DEEPEST
-            && holds.has_one_origin
-            && units.near > 0.0
-            && (two_to(-40)..=two_to(40)).contains(&units.scale)
+        let shift = (tree_space.origin - mesh_origin).abs().max_element();
+        let reach = tree_space.near / tree_space.scale + shift + largest_corner;
+        let is_fit = summary.nesting <= DEEPEST
+            && summary.has_one_origin
+            && tree_space.near > 0.0
+            && (two_to(-40)..=two_to(40)).contains(&tree_space.scale)
             && largest_corner > two_to(-39)
             && reach < two_to(38);
-        let space_per_unit = (1.0 / units.scale) as f32;
+        let space_per_unit = (1.0 / tree_space.scale) as f32;
         let padded = |v: DVec3, last: f64| [v.x, v.y, v.z, last];
         root.filter(|_| is_fit).map(|root| Self {
             root,
-            only_triangles: holds.only_triangles,
-            tree_origin: padded(units.origin, 0.0),
+            only_triangles: summary.only_triangles,
+            tree_origin: padded(tree_space.origin, 0.0),
             mesh_origin: padded(mesh_origin, 0.0),
             single_mesh_origin: Some(mesh_origin.as_vec3())
                 .filter(|single| single.as_dvec3() == mesh_origin)
                 .map(|single| single.extend(0.0).to_array()),
-            scale: units.scale,
-            farthest: [units.near as f32, units.near as f32, units.near as f32, f32::INFINITY],
-            margin: units.single_margin(),
-            margin_per_distance: Units::SINGLE_MARGIN_PER_DISTANCE,
-            shift: ((units.origin - mesh_origin) * units.scale).extend(0.0).as_vec4().to_array(),
-            narrow_margin: units.narrow_margin(shift * units.scale),
-            units_per_space: units.scale as f32,
+            scale: tree_space.scale,
+            farthest: [tree_space.near as f32, tree_space.near as f32, tree_space.near as f32, f32::INFINITY],
+            margin: tree_space.single_margin(),
+            margin_per_distance: TreeSpace::SINGLE_MARGIN_PER_DISTANCE,
+            shift: ((tree_space.origin - mesh_origin) * tree_space.scale).extend(0.0).as_vec4().to_array(),
+            f32_margin: tree_space.f32_margin(shift * tree_space.scale),
+            units_per_space: tree_space.scale as f32,
             space_per_unit,
-            precise: Precise::new(space_per_unit, holds.sizes.longest_side),
+            precise: Precise::new(space_per_unit, summary.sizes.longest_side),
             least_size: round_up(reach * f64::from(LEAST_SIZE)),
-            shortest: (SMALLEST_NEAR / units.scale) as f32,
-            longest: [(LARGEST_NEAR / units.scale) as f32; 4],
-            tiny: (TINY_NEAR / units.scale) as f32,
+            shortest: (SMALLEST_NEAR / tree_space.scale) as f32,
+            longest: [(LARGEST_NEAR / tree_space.scale) as f32; 4],
+            tiny: (TINY_NEAR / tree_space.scale) as f32,
         })
     }
 }

@@ -13,9 +13,9 @@ use super::scenes::{
 use crate::batch;
 use crate::batch::packet::PACKET;
 use crate::intersect::f32_ray::Precise;
-use crate::intersect::single_start::SingleStart;
-use crate::intersect::{Lanes, Level, Portable, start_narrow_by_four_at};
-use crate::simd::{Eight, Vector};
+use crate::intersect::filter_start::FilterStart;
+use crate::intersect::{Isa, Portable, Simd, start_f32_by_four_at};
+use crate::simd::{F32x8, Vector};
 use crate::tree::node::Node;
 use crate::tree::triangle_block::Line;
 use crate::{Accel, BuildOptions, Geometry, GeometryKind, Hit, Hit32, Instance, Preset, Ray32, TriangleMesh};
@@ -36,7 +36,7 @@ struct PlainRay {
 
 impl PlainRay {
     /// `None` where it does not come from nearby, or is not sound.
-    fn new(start: &SingleStart, ray: &Ray32) -> Option<Self> {
+    fn new(start: &FilterStart, ray: &Ray32) -> Option<Self> {
         let local = [0, 1, 2].map(|axis| (f64::from(ray.origin[axis]) - start.mesh_origin[axis]) as f32);
         let direction = ray.direction.to_array();
         let is_near = (0..3).all(|axis| {
@@ -107,10 +107,10 @@ fn has_one_sign(edges: [f64; 3]) -> bool {
 }
 
 /// What a tree of nothing but meshes answers, by a loop over all triangles where the ray comes from nearby; and whether it does.
-fn plainly(accel: &Accel, ray: &Ray32) -> (Option<Hit32>, bool) {
+fn by_reference(accel: &Accel, ray: &Ray32) -> (Option<Hit32>, bool) {
     let start = accel.single.as_ref().expect("made for this");
     assert!(start.only_triangles);
-    let Some(plain) = PlainRay::new(start, ray) else { return (widely(accel, ray), false) };
+    let Some(plain) = PlainRay::new(start, ray) else { return (widened(accel, ray), false) };
     let mut nearest: Option<Hit32> = None;
     for (geometry, Geometry { id, kind }) in accel.geometries.iter().enumerate() {
         let GeometryKind::Mesh(mesh) = kind else { unreachable!("nothing but meshes") };
@@ -133,7 +133,7 @@ fn plainly(accel: &Accel, ray: &Ray32) -> (Option<Hit32>, bool) {
 }
 
 /// What double precision answers, rounded.
-fn widely(accel: &Accel, ray: &Ray32) -> Option<Hit32> {
+fn widened(accel: &Accel, ray: &Ray32) -> Option<Hit32> {
     let Hit { root, id, primitive, geometry, instances, .. } = accel.closest(&ray.to_f64())?;
     let instance = if instances.is_empty() { Hit32::NO_INSTANCE } else { instances[0] };
     let local = root.local.as_vec2().to_array();
@@ -152,30 +152,30 @@ fn bits(hit: &Option<Hit32>) -> Bits {
 const STALE: Hit32 =
     Hit32 { t: 0.125, local: [0.5, 0.25], id: 99, primitive: 98, geometry: 97, instance: 96 };
 
-/// Every ray alone, and in batches of these sizes, at every level; answers how many hit.
+/// Every ray alone, and in batches of these sizes, at every instruction set; answers how many hit.
 #[track_caller]
 fn check(accel: &Accel, rays: &[Ray32], expected: &[Option<Hit32>], sizes: &[usize]) -> usize {
     assert_eq!(rays.len(), expected.len());
-    for level in Level::all() {
+    for isa in Isa::all() {
         for (ray, expected) in rays.iter().zip(expected) {
-            let found = accel.closest_f32_at(level, ray);
-            assert_eq!(bits(&found), bits(expected), "{level:?} {ray:?}: {found:?}, not {expected:?}");
-            assert_eq!(accel.any_f32_at(level, ray), expected.is_some(), "{level:?} {ray:?}");
+            let found = accel.closest_f32_at(isa, ray);
+            assert_eq!(bits(&found), bits(expected), "{isa:?} {ray:?}: {found:?}, not {expected:?}");
+            assert_eq!(accel.any_f32_at(isa, ray), expected.is_some(), "{isa:?} {ray:?}");
         }
     }
     check_batches(accel, rays, expected, sizes)
 }
 
 /// What a batch meets, and whether; also where those that do not go together do not fly as a rule.
-fn in_batch(accel: &Accel, level: Level, rays: &[Ray32], flies: bool) -> (Vec<Option<Hit32>>, Vec<bool>) {
+fn in_batch(accel: &Accel, isa: Isa, rays: &[Ray32], flies: bool) -> (Vec<Option<Hit32>>, Vec<bool>) {
     let mut hits = vec![Some(STALE); rays.len()];
     // What would be wrong everywhere.
     let mut met: Vec<bool> = rays.iter().map(|ray| !accel.any_f32(ray)).collect();
     if flies {
-        batch::shims::f32(level, accel, rays, &mut hits, &mut met);
+        batch::shims::f32(isa, accel, rays, &mut hits, &mut met);
     } else {
-        accel.closest_batch_f32_at(level, rays, &mut hits);
-        accel.any_batch_f32_at(level, rays, &mut met);
+        accel.closest_batch_f32_at(isa, rays, &mut hits);
+        accel.any_batch_f32_at(isa, rays, &mut met);
     }
     (hits, met)
 }
@@ -183,18 +183,18 @@ fn in_batch(accel: &Accel, level: Level, rays: &[Ray32], flies: bool) -> (Vec<Op
 /// The same in batches alone.
 #[track_caller]
 fn check_batches(accel: &Accel, rays: &[Ray32], expected: &[Option<Hit32>], sizes: &[usize]) -> usize {
-    for level in Level::all() {
+    for isa in Isa::all() {
         for &size in sizes {
             for (rays, expected) in rays.chunks(size).zip(expected.chunks(size)) {
                 for flies in [false, true] {
-                    let (hits, met) = in_batch(accel, level, rays, flies);
+                    let (hits, met) = in_batch(accel, isa, rays, flies);
                     for (((ray, expected), hit), met) in rays.iter().zip(expected).zip(&hits).zip(met) {
                         assert_eq!(
                             bits(hit),
                             bits(expected),
-                            "{level:?} {size} {flies} {ray:?}: {hit:?}, not {expected:?}"
+                            "{isa:?} {size} {flies} {ray:?}: {hit:?}, not {expected:?}"
                         );
-                        assert_eq!(met, expected.is_some(), "{level:?} {size} {flies} {ray:?}");
+                        assert_eq!(met, expected.is_some(), "{isa:?} {size} {flies} {ray:?}");
                     }
                 }
             }
@@ -360,14 +360,14 @@ fn the_tree_answers_as_the_plain_loop_in_single_precision_does() {
             let tree = build(kinds(&meshes));
             // Again, where ranges begin and end with a hit, and just before and behind.
             for ray in rays.clone().into_iter().step_by(2) {
-                let (Some(Hit32 { t, .. }), true) = plainly(&tree, &ray) else { continue };
+                let (Some(Hit32 { t, .. }), true) = by_reference(&tree, &ray) else { continue };
                 let t = t.abs();
                 rays.push(ray.with_range(t, t));
                 rays.push(ray.with_range(t.next_up(), f32::INFINITY));
                 rays.push(ray.with_range(0.0, t.next_down().max(0.0)));
             }
             let (expected, from_nearby): (Vec<_>, Vec<_>) =
-                rays.iter().map(|ray| plainly(&tree, ray)).unzip();
+                rays.iter().map(|ray| by_reference(&tree, ray)).unzip();
             let near = from_nearby.iter().filter(|&&is_near| is_near).count();
             assert!(near > rays.len() * 3 / 4, "{name}, {size}: {near} of {} are from nearby", rays.len());
             with_every_preset(|| {
@@ -463,9 +463,9 @@ fn four_rays_start_together_as_each_does_alone() {
             rays.extend(odd);
             for _ in 0..100 {
                 let four = [(); 4].map(|()| &rays[random.below(rays.len())]);
-                for level in Level::all() {
-                    let [together, one_by_one] = start_narrow_by_four_at(level, start, four);
-                    assert_eq!(format!("{together:?}"), format!("{one_by_one:?}"), "{level:?} {four:?}");
+                for isa in Isa::all() {
+                    let [together, one_by_one] = start_f32_by_four_at(isa, start, four);
+                    assert_eq!(format!("{together:?}"), format!("{one_by_one:?}"), "{isa:?} {four:?}");
                     started += together.iter().flatten().count();
                     refused += together.iter().filter(|one| one.is_none()).count();
                 }
@@ -531,9 +531,9 @@ fn odd_rays_among_rays_that_go_together_are_answered_as_alone() {
 fn batches_without_rays_or_without_triangles_end() {
     let ray = Ray32::new(CENTER.as_vec3(), Vec3::new(0.3, 0.4, 0.5));
     for accel in [build(vec![]), build(kinds(&[cube()])), mixture(&mut Random(7), CENTER, 3.0, 1, true)] {
-        for level in Level::all() {
-            accel.closest_batch_f32_at(level, &[], &mut []);
-            accel.any_batch_f32_at(level, &[], &mut []);
+        for isa in Isa::all() {
+            accel.closest_batch_f32_at(isa, &[], &mut []);
+            accel.any_batch_f32_at(isa, &[], &mut []);
         }
         let rays = [ray; 33];
         check(
@@ -601,7 +601,7 @@ fn in_a_tree_that_caches_do_not_hold_batches_answer_as_single_rays_do() {
     let hits = check(&accel, &rays, &expected, &[1, 5, 33, 1001, rays.len()]);
     assert!(hits > rays.len() / 3, "{hits} of {}", rays.len());
     for (ray, expected) in rays.iter().zip(&expected).step_by(200) {
-        assert_eq!(bits(&plainly(&accel, ray).0), bits(expected), "{ray:?}");
+        assert_eq!(bits(&by_reference(&accel, ray).0), bits(expected), "{ray:?}");
     }
 }
 
@@ -613,8 +613,8 @@ fn fans() -> TriangleMesh {
     outline.extend((0..150).map(|i| [1.03, 0.61 + i as f32 * step]));
     outline.push([-0.8, 1.1]);
     let n = outline.len() as u32;
-    let level = |y: f32| outline.iter().map(move |&[x, z]| Vec3::new(x, y, z));
-    let positions = level(-1.0).chain(level(0.7)).collect();
+    let isa = |y: f32| outline.iter().map(move |&[x, z]| Vec3::new(x, y, z));
+    let positions = isa(-1.0).chain(isa(0.7)).collect();
     let mut indices = Vec::new();
     for i in 1..n - 1 {
         indices.extend([[0, i, i + 1], [n, n + i + 1, n + i]]);
@@ -705,17 +705,16 @@ fn no_ray_from_within_leaks_at_a_corner_or_an_edge() {
                     };
                     rays.push(Ray32::new(origin, direction));
                 }
-                for level in Level::all() {
+                for isa in Isa::all() {
                     for ray in &rays {
-                        let is_leak =
-                            accel.closest_f32_at(level, ray).is_none() || !accel.any_f32_at(level, ray);
-                        assert!(!is_leak, "{name}, place {number}, {level:?}: a leak along {ray:?}");
+                        let is_leak = accel.closest_f32_at(isa, ray).is_none() || !accel.any_f32_at(isa, ray);
+                        assert!(!is_leak, "{name}, place {number}, {isa:?}: a leak along {ray:?}");
                     }
                     for rays in [&rays[..], &rays[16..32], &rays[64..81]] {
                         for flies in [false, true] {
-                            let (hits, met) = in_batch(&accel, level, rays, flies);
+                            let (hits, met) = in_batch(&accel, isa, rays, flies);
                             let leak = hits.iter().zip(met).position(|(hit, met)| hit.is_none() || !met);
-                            let about = format!("{name}, place {number}, {level:?}, {flies}");
+                            let about = format!("{name}, place {number}, {isa:?}, {flies}");
                             assert_eq!(leak, None, "{about}: a leak along {rays:?}");
                         }
                     }
@@ -814,7 +813,7 @@ fn trees_of_more_than_meshes_answer_as_double_precision_does_rounded() {
                 (CENTER + 9.0 * DVec3::Z).as_vec3(),
                 Vec3::new(0.01, 0.02, -1.0),
             )));
-            let expected: Vec<_> = rays.iter().map(|ray| widely(accel, ray)).collect();
+            let expected: Vec<_> = rays.iter().map(|ray| widened(accel, ray)).collect();
             let hits = check(accel, &rays, &expected, &[1, PACKET, 37, rays.len()]);
             assert!(hits > rays.len() / 8, "{number}: {hits} of {}", rays.len());
             let instances = expected.iter().flatten().filter(|hit| hit.instance != Hit32::NO_INSTANCE);
@@ -901,8 +900,8 @@ fn a_ray_from_afar_is_answered_in_double_precision() {
             )
         })
         .collect();
-    let expected: Vec<_> = rays.iter().map(|ray| widely(&accel, ray)).collect();
-    assert!(rays.iter().all(|ray| !plainly(&accel, ray).1));
+    let expected: Vec<_> = rays.iter().map(|ray| widened(&accel, ray)).collect();
+    assert!(rays.iter().all(|ray| !by_reference(&accel, ray).1));
     let hits = check(&accel, &rays, &expected, &[16, 500]);
     assert!(hits > 300, "{hits}");
 }
@@ -946,7 +945,7 @@ fn a_tree_that_was_moved_answers_as_one_that_is_built_anew() {
 
 #[test]
 fn numbers_in_single_precision_differ_by_the_same_in_either_precision() {
-    // What `SingleStart::single_mesh_origin` relies on.
+    // What `FilterStart::single_mesh_origin` relies on.
     let mut random = Random(131);
     let mut inexact = 0;
     for _ in 0..if cfg!(miri) { 1_000 } else { 1_000_000 } {
@@ -970,7 +969,7 @@ fn numbers_in_single_precision_differ_by_the_same_in_either_precision() {
 
 #[test]
 fn what_is_precise_at_once_is_precise_by_its_extent() {
-    type Numbers = <Portable as Lanes>::Eight;
+    type Numbers = <Portable as Simd>::F32x8;
     let mut random = Random(143);
     let (mut precise, mut others, rounds) = (0, 0, if cfg!(miri) { 200 } else { 50_000 });
     for _ in 0..rounds {
@@ -1023,9 +1022,9 @@ fn the_longest_side_of_all_triangles_is_known() {
         meshes.iter().enumerate().map(mesh).collect()
     };
     let mut accel = Accel::build(geometries(&meshes), &BuildOptions::default()).unwrap();
-    assert_eq!(accel.holds.sizes.longest_side, longest(&meshes));
+    assert_eq!(accel.summary.sizes.longest_side, longest(&meshes));
     let again = Accel::from_bytes(&accel.to_bytes(), geometries(&meshes)).unwrap();
-    assert_eq!(again.holds.sizes.longest_side, longest(&meshes));
+    assert_eq!(again.summary.sizes.longest_side, longest(&meshes));
     accel.refit(geometries(&small)).unwrap();
-    assert_eq!(accel.holds.sizes.longest_side, longest(&small));
+    assert_eq!(accel.summary.sizes.longest_side, longest(&small));
 }

@@ -10,7 +10,7 @@ use crate::Aabb;
 /// `profile` = [c, d, e]. This makes a ball, a cylinder, a cone, a paraboloid, or the whole cube. The points of
 /// a ring torus also satisfy the equation of its tube.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hull {
+pub struct BoundingVolume {
     /// The point where `q` is 0.
     pub center: DVec3,
     /// The vectors from the centre to where x, y and z are 1. All are non-zero, even of a flat volume.
@@ -27,7 +27,7 @@ pub struct Hull {
     pub is_solid: bool,
 }
 
-impl Hull {
+impl BoundingVolume {
     const BOX: [f64; 3] = [0.0, 0.0, -8.0];
     pub(crate) const BALL: [f64; 3] = [1.0, 0.0, -1.0];
     pub(crate) const CYLINDER: [f64; 3] = [0.0, 0.0, -1.0];
@@ -134,12 +134,15 @@ mod tests {
                 let map = Transform::translate(point(&mut random))
                     * Transform::rotate(point(&mut random), 360.0 * random.next_f64()).unwrap()
                     * Transform::scale(point(&mut random) + 1.2).unwrap();
-                let hull = shape.hull().unwrap_or_else(|| panic!("no hull of {shape:?}")).under(&map);
-                let back = hull.axes.inverse();
+                let bounding_volume = shape
+                    .bounding_volume()
+                    .unwrap_or_else(|| panic!("no bounding volume of {shape:?}"))
+                    .under(&map);
+                let back = bounding_volume.axes.inverse();
                 assert!(back.is_finite(), "{shape:?}");
                 let check = |p: DVec3| {
-                    let q = back * (map.point(p) - hull.center);
-                    assert!(hull.holds(q, 1e-9), "{shape:?} at {p}, which is {q}");
+                    let q = back * (map.point(p) - bounding_volume.center);
+                    assert!(bounding_volume.holds(q, 1e-9), "{shape:?} at {p}, which is {q}");
                 };
                 for _ in 0..20 {
                     let u = DVec2::new(random.next_f64(), random.next_f64());
@@ -167,15 +170,16 @@ mod tests {
         let (mut inside, mut solid) = (0, 0);
         for _ in 0..60 {
             for shape in shapes(&mut random) {
-                let hull = shape.hull().unwrap();
-                assert!(shape.is_solid() || !hull.is_solid, "{shape:?}");
+                let bounding_volume = shape.bounding_volume().unwrap();
+                assert!(shape.is_solid() || !bounding_volume.is_solid, "{shape:?}");
                 for _ in 0..40 {
                     let q = 1.1 * point(&mut random);
-                    let is_near_the_border = hull.holds(q, 1e-9) != hull.holds(q, -1e-9);
-                    if hull.is_solid && !is_near_the_border {
-                        let is_inside = hull.holds(q, 0.0);
+                    let is_near_the_border =
+                        bounding_volume.holds(q, 1e-9) != bounding_volume.holds(q, -1e-9);
+                    if bounding_volume.is_solid && !is_near_the_border {
+                        let is_inside = bounding_volume.holds(q, 0.0);
                         assert_eq!(
-                            shape.contains(hull.center + hull.axes * q),
+                            shape.contains(bounding_volume.center + bounding_volume.axes * q),
                             is_inside,
                             "{shape:?} at {q}"
                         );
@@ -192,6 +196,6 @@ mod tests {
     fn what_is_infinite_has_no_hull() {
         let plane = Plane::new(DVec3::ZERO, DVec3::Y).unwrap();
         let pipe = Cylinder::infinite(DVec3::ZERO, DVec3::Z, 1.5).unwrap();
-        assert_eq!((Shape::from(plane).hull(), Shape::from(pipe).hull()), (None, None));
+        assert_eq!((Shape::from(plane).bounding_volume(), Shape::from(pipe).bounding_volume()), (None, None));
     }
 }

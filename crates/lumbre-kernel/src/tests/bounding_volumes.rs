@@ -16,11 +16,11 @@ use super::single::check_packet;
 use crate::batch;
 use crate::batch::packet::PACKET;
 use crate::intersect::watertight::HeightRange;
-use crate::intersect::{Level, meet_hulls_at};
+use crate::intersect::{Isa, intersect_bounding_volumes_at};
 use crate::trace::decide::heights;
 use crate::tree::BLOCK;
-use crate::tree::bounding_block::{HullBlock, HullRay, Hulls};
-use crate::tree::node::Units;
+use crate::tree::bounding_block::{BoundingBlock, BoundingVolumeRay, BoundingVolumes};
+use crate::tree::node::TreeSpace;
 use crate::tree::packed::Entry;
 use crate::{Geometry, GeometryKind};
 
@@ -57,9 +57,9 @@ fn shape(random: &mut Random, center: DVec3, size: f64) -> PlacedShape {
 }
 
 /// Units of a tree that reaches so far from its origin.
-fn units(origin: DVec3, reach: f64) -> Units {
+fn tree_space(origin: DVec3, reach: f64) -> TreeSpace {
     let scale = (-reach.log2().ceil()).exp2();
-    Units::new(origin, scale, reach * scale * 1.8, 100.0)
+    TreeSpace::new(origin, scale, reach * scale * 1.8, 100.0)
 }
 
 /// A point on a shape, if it is one with points at hand, and the normal there.
@@ -98,10 +98,10 @@ fn ray(random: &mut Random, shape: &PlacedShape, center: DVec3, size: f64) -> Ra
     }
 }
 
-fn block_of(shapes: &[PlacedShape], units: &Units) -> HullBlock {
-    let mut block = HullBlock::EMPTY;
+fn block_of(shapes: &[PlacedShape], tree_space: &TreeSpace) -> BoundingBlock {
+    let mut block = BoundingBlock::EMPTY;
     for (lane, shape) in shapes.iter().enumerate() {
-        block.put(lane, shape.hull(), units);
+        block.put(lane, shape.bounding_volume(), tree_space);
     }
     block
 }
@@ -113,31 +113,31 @@ fn no_shape_that_is_met_is_lost_and_none_is_certain_that_is_not() {
         let origin = size * offset * DVec3::new(1.0, -0.7, 0.4);
         // As the only ones in their tree, and tiny ones in a large tree.
         for reach in [1.5, 40.0, 3000.0] {
-            let units = units(origin, reach * size);
+            let tree_space = tree_space(origin, reach * size);
             let (mut hits, mut misses, mut sure, mut spared) = (0, 0, 0, 0);
             for _ in 0..150 {
                 let center = origin + 0.9 * (reach - 1.4) * size * random.vector();
                 let shapes: Vec<PlacedShape> =
                     (0..1 + random.below(BLOCK)).map(|_| shape(&mut random, center, size)).collect();
-                let block = block_of(&shapes, &units);
+                let block = block_of(&shapes, &tree_space);
                 for _ in 0..40 {
                     let aim = random.below(shapes.len());
                     let ray = ray(&mut random, &shapes[aim], center, size);
                     let length = ray.direction.abs().max_element();
-                    let hulls = HullRay::new(&units, &ray, length);
+                    let bounding_volumes = BoundingVolumeRay::new(&tree_space, &ray, length);
                     let range = HeightRange::new((ray.t_min * length) as f32, (ray.t_max * length) as f32);
-                    for level in Level::all() {
-                        let met = meet_hulls_at(level, &block, &hulls, &range);
-                        assert_eq!(met.mask >> shapes.len(), 0, "{level:?}: of lanes that are not there");
+                    for isa in Isa::all() {
+                        let met = intersect_bounding_volumes_at(isa, &block, &bounding_volumes, &range);
+                        assert_eq!(met.mask >> shapes.len(), 0, "{isa:?}: of lanes that are not there");
                         for (lane, shape) in shapes.iter().enumerate() {
                             let (is_met, is_sure) = (met.mask >> lane & 1 == 1, met.sure >> lane & 1 == 1);
                             if let Some(root) = shape.closest(&ray) {
-                                assert!(is_met, "{level:?}: {shape:?} along {ray:?}");
+                                assert!(is_met, "{isa:?}: {shape:?} along {ray:?}");
                                 let (from, to) = heights(root.t, length);
                                 assert!(met.near[lane] <= to, "{from}: {shape:?} along {ray:?}");
                                 hits += 1;
                             } else {
-                                assert!(!is_sure, "{level:?}: {shape:?} along {ray:?}");
+                                assert!(!is_sure, "{isa:?}: {shape:?} along {ray:?}");
                                 misses += 1;
                                 spared += u32::from(!is_met);
                             }
@@ -156,7 +156,7 @@ fn no_shape_that_is_met_is_lost_and_none_is_certain_that_is_not() {
 
 #[test]
 fn what_single_precision_cannot_tell_is_never_left_out() {
-    let units = units(DVec3::ZERO, 2.0);
+    let tree_space = tree_space(DVec3::ZERO, 2.0);
     let tiny = Transform::scale(DVec3::splat(1e-9)).unwrap();
     let thin = Transform::scale(DVec3::new(1.0, 1e-9, 1.0)).unwrap();
     let ball = || Shape::from(Sphere::new(DVec3::ZERO, 1.0).unwrap());
@@ -168,12 +168,17 @@ fn what_single_precision_cannot_tell_is_never_left_out() {
         PlacedShape::new(needle.into(), Transform::IDENTITY),
         PlacedShape::new(flat.into(), Transform::IDENTITY),
     ];
-    let block = block_of(&shapes, &units);
+    let block = block_of(&shapes, &tree_space);
     let ray = Ray::new(DVec3::new(5.0, 6.0, 7.0), DVec3::new(1.0, 0.2, 0.1));
-    for level in Level::all() {
+    for isa in Isa::all() {
         let range = HeightRange::new(0.0, f32::INFINITY);
-        let met = meet_hulls_at(level, &block, &HullRay::new(&units, &ray, 1.0), &range);
-        assert_eq!((met.mask, met.sure), (0b1111, 0), "{level:?}");
+        let met = intersect_bounding_volumes_at(
+            isa,
+            &block,
+            &BoundingVolumeRay::new(&tree_space, &ray, 1.0),
+            &range,
+        );
+        assert_eq!((met.mask, met.sure), (0b1111, 0), "{isa:?}");
         assert!(met.near[..4].iter().all(|near| near.is_nan() || *near <= 0.0), "{:?}", met.near);
     }
 }
@@ -195,12 +200,12 @@ fn a_leaf_of_any_length_has_its_blocks_in_a_row() {
             entries.push(Entry::new(entries.len() as u32, 0, i + 1 == length));
         }
     }
-    let units = units(DVec3::ZERO, 3.0);
-    let hulls = Hulls::new(&geometries, &entries, &units);
+    let tree_space = tree_space(DVec3::ZERO, 3.0);
+    let bounding_volumes = BoundingVolumes::new(&geometries, &entries, &tree_space);
     let mut first = 0;
     for length in lengths {
         for start in (0..length).step_by(BLOCK) {
-            let (block, goes_on) = hulls.block(first + start).unwrap();
+            let (block, goes_on) = bounding_volumes.block(first + start).unwrap();
             assert_eq!(goes_on, start + BLOCK < length);
             for lane in 0..BLOCK {
                 let is_there = start + lane < length;
@@ -210,18 +215,18 @@ fn a_leaf_of_any_length_has_its_blocks_in_a_row() {
                     "{start} and {lane} of {length}"
                 );
                 if is_there {
-                    let mut alone = HullBlock::EMPTY;
+                    let mut alone = BoundingBlock::EMPTY;
                     let GeometryKind::Shape(shape) = &geometries[first + start + lane].kind else {
                         unreachable!()
                     };
-                    alone.put(0, shape.hull(), &units);
+                    alone.put(0, shape.bounding_volume(), &tree_space);
                     assert_eq!(alone.centers.map(|lanes| lanes[0]), block.centers.map(|lanes| lanes[lane]));
                 }
             }
         }
         first += length;
     }
-    assert!(hulls.block(first).is_none());
+    assert!(bounding_volumes.block(first).is_none());
 }
 
 #[test]
@@ -286,7 +291,7 @@ fn rays_that_go_together_among_shapes_are_answered_as_each_alone() {
             for i in 0..if cfg!(miri) { 2 } else { 400 } {
                 let rays = alike(&mut random, &shapes[i % shapes.len()], center, size);
                 check_packet(&accel, &rays);
-                let answered = batch::shims::answered_by_packet(accel.level, &accel, &rays);
+                let answered = batch::shims::answered_by_packet(accel.isa, &accel, &rays);
                 together += answered.count_ones();
                 apart += answered.count_zeros() - (32 - PACKET as u32);
             }
