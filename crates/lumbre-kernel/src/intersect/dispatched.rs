@@ -45,7 +45,7 @@ impl<A, R> fmt::Debug for DispatchedQuery<A, R> {
 }
 
 impl Isa {
-    /// A question with these lanes: chosen now, and not once more for every ray.
+    /// A query for this instruction set, chosen now and not once more for every ray.
     pub(crate) fn dispatched<Q: RayQuery>(self) -> DispatchedQuery<Q::Answer, Q::Ray> {
         DispatchedQuery(match self.0 {
             Set::Portable => Q::ask::<portable::Portable>,
