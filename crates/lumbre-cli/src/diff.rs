@@ -6,6 +6,7 @@ use clap::Args;
 use lumbre::image::{Metric, compare};
 
 use crate::failure::{Failure, print};
+use crate::overwrite::refuse_inputs;
 
 /// Compares two pictures of the same size.
 #[derive(Args)]
@@ -41,6 +42,9 @@ fn limit(text: &str) -> Result<f64, String> {
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    if let Some(output) = &arguments.output {
+        refuse_inputs(output, [arguments.a.as_path(), &arguments.b])?;
+    }
     let read = |path: &PathBuf| lumbre::read_image(path).map_err(Failure::from);
     let (a, b) = (read(&arguments.a)?, read(&arguments.b)?);
     let Some(comparison) = compare(&a, &b, arguments.metric) else {

@@ -17,6 +17,7 @@ mod cast;
 mod diff;
 mod failure;
 mod info;
+mod overwrite;
 mod progress;
 mod reading;
 mod render;

@@ -16,6 +16,7 @@ use lumbre::{
 use serde_json::json;
 
 use crate::failure::Failure;
+use crate::overwrite::refuse_inputs;
 use crate::progress::{Display, Style};
 use crate::reading::{Frames, ReadingArguments, print_warnings};
 use crate::signals::Signals;
@@ -296,6 +297,7 @@ fn picture(
     arguments.staging.check(Some(&output))?;
     let output = number.map_or(output.clone(), |number| staging::frame_name(&output, number));
     for path in std::iter::once(&output).chain(&arguments.stats) {
+        refuse_inputs(path, arguments.scene.iter().map(PathBuf::as_path).chain(arguments.staging.inputs()))?;
         probe_writable(path).map_err(|e| Failure::from(lumbre::Error::from(e)))?;
     }
     let mut options = options(arguments, &scene)?;

@@ -185,6 +185,15 @@ impl StagingArguments {
         })
     }
 
+    /// The files that the stage is made of.
+    pub(crate) fn inputs(&self) -> impl Iterator<Item = &Path> {
+        let background = match &self.background {
+            Some(BackgroundArgument::File(path)) => Some(path.as_path()),
+            _ => None,
+        };
+        self.env.as_deref().into_iter().chain(background)
+    }
+
     /// Whether ground is requested.
     pub(crate) fn wants_ground(&self) -> bool {
         matches!(self.ground, Some(Ground::Shadow | Ground::Plane))

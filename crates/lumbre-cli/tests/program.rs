@@ -258,6 +258,32 @@ fn wrong_usage_ends_with_two() {
 }
 
 #[test]
+fn no_input_is_overwritten() {
+    let desk = Desk::new();
+    desk.write("scene.pbrt", SPHERE);
+    desk.write("rays.csv", "ox,oy,oz,dx,dy,dz\n1,2,-5,0,0,2\n");
+    let grey = lumbre::image::Image::filled(16, 8, lumbre::image::Rgb::new(0.1, 0.2, 0.3));
+    for name in ["a.png", "b.png"] {
+        lumbre::write_image(&desk.path(name), &grey, &lumbre::SaveOptions::default()).unwrap();
+    }
+    let before = |name: &str| fs::read(desk.path(name)).unwrap();
+    for (input, arguments) in [
+        ("rays.csv", &["cast", "scene.pbrt", "--rays", "rays.csv", "-o", "./rays.csv"][..]),
+        ("a.png", &["diff", "a.png", "b.png", "-o", "a.png"]),
+        ("b.png", &["diff", "a.png", "b.png", "-o", "b.png"]),
+        ("scene.pbrt", &["render", "scene.pbrt", "--spp", "1", "-o", "x.png", "--stats", "scene.pbrt"]),
+        ("a.png", &["render", "scene.pbrt", "--spp", "1", "-o", "a.png", "--background", "a.png"]),
+        ("b.png", &["render", "scene.pbrt", "--spp", "1", "-o", "b.png", "--env", "b.png"]),
+    ] {
+        let bytes = before(input);
+        let out = desk.lumbre(arguments);
+        assert_eq!(code(&out), 2, "{arguments:?}: {}", stderr(&out));
+        assert!(stderr(&out).contains("would be overwritten"), "{}", stderr(&out));
+        assert_eq!(before(input), bytes, "{arguments:?}");
+    }
+}
+
+#[test]
 fn info_counts_what_is_there() {
     let desk = Desk::new();
     desk.write(

@@ -27,6 +27,7 @@ use progress::Progress;
 use rays::RayReader;
 
 use crate::failure::Failure;
+use crate::overwrite::refuse_inputs;
 use crate::reading::{ReadingArguments, print_warnings};
 use crate::signals::Signals;
 
@@ -88,6 +89,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     if [&arguments.scene, &arguments.rays].iter().all(|path| path.as_path() == Path::new("-")) {
         return Err(Failure::Usage("the scene and --rays cannot both be standard input".to_owned()));
+    }
+    if let Some(output) = &arguments.output {
+        refuse_inputs(output, [arguments.scene.as_path(), &arguments.rays])?;
     }
     let rays = RayReader::open(&arguments.rays)?;
     let (scene, diagnostics) = arguments.reading.open(std::slice::from_ref(&arguments.scene))?;
