@@ -150,18 +150,8 @@ impl<R: Read> Read for Count<R> {
 
 #[cfg(test)]
 mod tests {
-    use std::io::Write;
-
-    use flate2::Compression;
-    use flate2::write::GzEncoder;
-
     use super::*;
-
-    fn gzip(bytes: &[u8]) -> Vec<u8> {
-        let mut packer = GzEncoder::new(Vec::new(), Compression::best());
-        packer.write_all(bytes).unwrap();
-        packer.finish().unwrap()
-    }
+    use crate::input::tests::gzip;
 
     fn read(mut stream: InputStream) -> Result<Vec<u8>, FormatError> {
         let mut bytes = Vec::new();

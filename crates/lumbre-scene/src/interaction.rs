@@ -114,7 +114,7 @@ impl<'s> Interaction<'s> {
 
     /// The origin of light sampling: off the surface on the incident side, so that an emissive surface is
     /// certain of its side.
-    pub fn lit_from(&self) -> DVec3 {
+    pub fn shadow_origin(&self) -> DVec3 {
         self.incident_origin
     }
 

@@ -21,7 +21,7 @@ pub struct HomogeneousMedium {
 
 /// A distance sample: how light crosses a part of a medium.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Flight {
+pub enum DistanceSample {
     /// It reaches the end, with this factor on its throughput.
     Through(Spectrum),
     /// It scatters at a collision.
@@ -38,12 +38,12 @@ impl HomogeneousMedium {
     /// and the collision; the density is the balance over all channels.
     ///
     /// (A. Wilkie and others, "Hero Wavelength Spectral Sampling", EGSR 2014, with channels for wavelengths.)
-    pub fn fly(&self, carried: Spectrum, distance: f64, u: [f64; 2]) -> Flight {
+    pub fn sample_distance(&self, carried: Spectrum, distance: f64, u: [f64; 2]) -> DistanceSample {
         let sigma = self.extinction.to_array().map(f64::from);
         let carried = carried.to_array().map(|c| f64::from(c.max(0.0)));
         let sum: f64 = carried.iter().sum();
         if sum.is_nan() || sum <= 0.0 {
-            return Flight::Through(Spectrum::BLACK);
+            return DistanceSample::Through(Spectrum::BLACK);
         }
         let shares = carried.map(|c| c / sum);
         let mut channel = 0;
@@ -61,15 +61,15 @@ impl HomogeneousMedium {
             let albedo = self.albedo.to_array();
             let [r, g, b] =
                 std::array::from_fn(|i| (f64::from(albedo[i]) * sigma[i] * left[i] / density) as f32);
-            Flight::Collision { distance: free_path, weight: Spectrum::new(r, g, b) }
+            DistanceSample::Collision { distance: free_path, weight: Spectrum::new(r, g, b) }
         } else {
             let probability: f64 = (0..3).map(|i| shares[i] * left[i]).sum();
             // So dense that only rounding gets this far.
             if probability <= 0.0 {
-                return Flight::Through(Spectrum::BLACK);
+                return DistanceSample::Through(Spectrum::BLACK);
             }
             let [r, g, b] = left.map(|left| (left / probability) as f32);
-            Flight::Through(Spectrum::new(r, g, b))
+            DistanceSample::Through(Spectrum::new(r, g, b))
         }
     }
 }
@@ -126,11 +126,11 @@ mod tests {
         let (mut through, mut scattered, mut way) = ([0.0; 3], [0.0; 3], [0.0; 3]);
         let count = 400_000;
         for _ in 0..count {
-            match medium.fly(carried, distance, [random.next_f64(), random.next_f64()]) {
-                Flight::Through(weight) => {
+            match medium.sample_distance(carried, distance, [random.next_f64(), random.next_f64()]) {
+                DistanceSample::Through(weight) => {
                     (0..3).for_each(|i| through[i] += f64::from(weight.to_array()[i]));
                 }
-                Flight::Collision { distance: free_path, weight } => {
+                DistanceSample::Collision { distance: free_path, weight } => {
                     assert!(free_path < distance);
                     for i in 0..3 {
                         scattered[i] += f64::from(weight.to_array()[i]);
@@ -157,11 +157,14 @@ mod tests {
             albedo: Spectrum::WHITE,
             asymmetry: 0.0,
         };
-        assert_eq!(medium.fly(Spectrum::BLACK, 2.0, [0.5; 2]), Flight::Through(Spectrum::BLACK));
+        assert_eq!(
+            medium.sample_distance(Spectrum::BLACK, 2.0, [0.5; 2]),
+            DistanceSample::Through(Spectrum::BLACK)
+        );
         for u in [[0.0, 0.0], [0.3, 0.0], [0.3, 0.999_999], [0.99, 0.999_999]] {
-            match medium.fly(Spectrum::new(0.5, 0.25, 0.25), 2.0, u) {
-                Flight::Through(weight) => assert!(weight.is_finite(), "{u:?}: {weight:?}"),
-                Flight::Collision { weight, .. } => assert!(weight.is_finite(), "{u:?}: {weight:?}"),
+            match medium.sample_distance(Spectrum::new(0.5, 0.25, 0.25), 2.0, u) {
+                DistanceSample::Through(weight) => assert!(weight.is_finite(), "{u:?}: {weight:?}"),
+                DistanceSample::Collision { weight, .. } => assert!(weight.is_finite(), "{u:?}: {weight:?}"),
             }
         }
     }

@@ -3,7 +3,7 @@
 use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
 use lumbre_scene::{Interaction, Scene, View};
-use lumbre_shading::medium::{Flight, sample_henyey_greenstein};
+use lumbre_shading::medium::{DistanceSample, sample_henyey_greenstein};
 use lumbre_shading::{HomogeneousMedium, Scatter, Spectrum};
 
 use crate::transport::direct::{Vertex, power_heuristic};
@@ -127,12 +127,12 @@ struct Walk<'s, 'w> {
     has_scattered: bool,
     ray: Ray,
     /// Where the last vertex sampled lights from.
-    lit_from: DVec3,
+    shadow_origin: DVec3,
     /// Bounces off surfaces.
     depth: u32,
     interiors: Interiors<'s>,
     /// Media crossed or scattered in: each takes random numbers of its own.
-    flights: u32,
+    distance_samples: u32,
     collisions: u32,
 }
 
@@ -159,10 +159,10 @@ impl<'s, 'w> Walk<'s, 'w> {
             chosen: Chosen::Only,
             has_scattered: false,
             ray,
-            lit_from: ray.origin,
+            shadow_origin: ray.origin,
             depth: 0,
             interiors: Interiors::default(),
-            flights: 0,
+            distance_samples: 0,
             collisions: 0,
         }
     }
@@ -186,8 +186,11 @@ impl<'s, 'w> Walk<'s, 'w> {
     fn add_emitted(&mut self, here: &Interaction<'s>) {
         let emitted = here.emitted();
         if !emitted.is_black() {
-            let pdf =
-                if self.chosen == Chosen::Only { 0.0 } else { self.scene.light_pdf(self.lit_from, here) };
+            let pdf = if self.chosen == Chosen::Only {
+                0.0
+            } else {
+                self.scene.light_pdf(self.shadow_origin, here)
+            };
             self.radiance += self.throughput * emitted * self.path.weight_of_found(self.chosen, pdf);
         }
     }
@@ -196,7 +199,7 @@ impl<'s, 'w> Walk<'s, 'w> {
     fn add_sampled_light(&mut self, vertex: &Vertex<'_, 's>) {
         let (draw, depth) = (self.draw, self.depth);
         let light = self.scene.sample_light(
-            self.lit_from,
+            self.shadow_origin,
             self.ray.time,
             draw.light_choice(depth),
             draw.light_point(depth),
@@ -216,13 +219,13 @@ impl<'s, 'w> Walk<'s, 'w> {
             self.throughput *= self.interiors.transmittance(way);
             return Crossing::Through;
         };
-        match medium.fly(self.throughput, way, self.draw.flight(self.flights)) {
-            Flight::Through(weight) => {
+        match medium.sample_distance(self.throughput, way, self.draw.distance(self.distance_samples)) {
+            DistanceSample::Through(weight) => {
                 self.throughput *= weight;
-                self.flights += 1;
+                self.distance_samples += 1;
                 Crossing::Through
             }
-            Flight::Collision { distance, weight } => {
+            DistanceSample::Collision { distance, weight } => {
                 self.throughput *= weight;
                 match self.collide(&medium, distance) {
                     Some(ray) => Crossing::Scattered(ray),
@@ -239,19 +242,19 @@ impl<'s, 'w> Walk<'s, 'w> {
             return None;
         }
         if likely < 1.0 && self.collisions >= SURE_COLLISIONS {
-            if self.draw.survives_collision(self.flights) >= likely {
+            if self.draw.survives_collision(self.distance_samples) >= likely {
                 return None;
             }
             self.throughput *= 1.0 / likely;
         }
         let along = self.ray.direction.as_vec3();
-        let u = self.draw.scattered(self.flights);
+        let u = self.draw.scattered(self.distance_samples);
         let (along, _) = sample_henyey_greenstein(along, medium.asymmetry, u);
         let start = self.ray.origin + distance * self.ray.direction;
         // Lights are behind a surface that bends what comes from them: paths find them.
         self.chosen = Chosen::Only;
         self.has_scattered = true;
-        self.flights += 1;
+        self.distance_samples += 1;
         self.collisions += 1;
         Some(Ray::new(start, along.as_dvec3().normalize()).at_time(self.ray.time))
     }
@@ -266,7 +269,7 @@ impl<'s, 'w> Walk<'s, 'w> {
         if self.path.regularize && self.has_scattered {
             vertex.bsdf = vertex.bsdf.regularized();
         }
-        self.lit_from = here.lit_from();
+        self.shadow_origin = here.shadow_origin();
         if !vertex.bsdf.is_delta() {
             self.add_sampled_light(&vertex);
         }
@@ -289,7 +292,7 @@ impl<'s, 'w> Walk<'s, 'w> {
         if !self.survives() {
             return None;
         }
-        self.lit_from = vertex.risen_towards(bounce.direction).unwrap_or(self.lit_from);
+        self.shadow_origin = vertex.risen_towards(bounce.direction).unwrap_or(self.shadow_origin);
         Some(vertex.leave(&bounce))
     }
 

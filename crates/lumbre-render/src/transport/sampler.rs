@@ -36,8 +36,8 @@ const DIRECTION: u32 = 3;
 const SURVIVAL: u32 = 4;
 /// Labels of integrators that ask every light of a vertex for a point.
 const EVERY_LIGHT: u32 = 1 << 24;
-/// Labels of flights through media.
-const EVERY_FLIGHT: u32 = 1 << 27;
+/// Labels of distance samples in media.
+const EVERY_DISTANCE_SAMPLE: u32 = 1 << 27;
 /// When a ray looks. Away from the others, so that these are what they are without it.
 const TIME: u32 = 1 << 30;
 /// Labels of integrators that follow several rays from a vertex.
@@ -146,20 +146,20 @@ impl Draw {
         single(self.one(label(vertex, SURVIVAL)))
     }
 
-    /// A flight through a medium: which lane of the spectrum, and how far.
-    pub fn flight(&self, flight: u32) -> [f64; 2] {
-        [self.one(inside(flight, 0)), self.one(inside(flight, 1))]
+    /// A distance sample in a medium: which channel of the spectrum, and how far.
+    pub fn distance(&self, sample: u32) -> [f64; 2] {
+        [self.one(inside(sample, 0)), self.one(inside(sample, 1))]
     }
 
-    /// Which direction after the collision that a flight ended with.
-    pub fn scattered(&self, flight: u32) -> Vec2 {
-        let u = self.two(inside(flight, 2));
+    /// The direction after the collision of a distance sample.
+    pub fn scattered(&self, sample: u32) -> Vec2 {
+        let u = self.two(inside(sample, 2));
         Vec2::new(single(u.x), single(u.y))
     }
 
     /// Whether the path goes on after that collision.
-    pub fn survives_collision(&self, flight: u32) -> f32 {
-        single(self.one(inside(flight, 3)))
+    pub fn survives_collision(&self, sample: u32) -> f32 {
+        single(self.one(inside(sample, 3)))
     }
 
     #[inline]
@@ -185,8 +185,8 @@ impl Draw {
     }
 }
 
-fn inside(flight: u32, what: u32) -> u32 {
-    EVERY_FLIGHT.wrapping_add(flight.wrapping_mul(4)).wrapping_add(what)
+fn inside(sample: u32, what: u32) -> u32 {
+    EVERY_DISTANCE_SAMPLE.wrapping_add(sample.wrapping_mul(4)).wrapping_add(what)
 }
 
 fn label(vertex: u32, what: u32) -> u32 {

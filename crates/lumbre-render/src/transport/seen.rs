@@ -71,7 +71,7 @@ fn blocked(
     draw: &Draw,
     rays: &mut RayCounts,
 ) -> Spectrum {
-    let from = at.lit_from();
+    let from = at.shadow_origin();
     let mut lost = Spectrum::BLACK;
     let lights = ground.lights();
     // Every light, where there are few.
@@ -143,7 +143,8 @@ fn passed(
         light * (cosine / (by_lights + by_cosine)) as f32
     };
     for i in 0..SAMPLES {
-        let sample = scene.sample_light(at.lit_from(), at.time, draw.light_choice(i), draw.light_point(i));
+        let sample =
+            scene.sample_light(at.shadow_origin(), at.time, draw.light_choice(i), draw.light_point(i));
         if let Some(LightSample { scatter: Scatter::Density(_), end: None, towards, .. }) = sample {
             irradiance += along(towards, 1 + 2 * i, rays);
         }

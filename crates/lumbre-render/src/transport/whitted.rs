@@ -102,7 +102,7 @@ impl Whitted {
         draw: &Draw,
         rays: &mut RayCounts,
     ) -> Spectrum {
-        let from = here.lit_from();
+        let from = here.shadow_origin();
         let lights = scene.lights();
         let by_light = |rays: &mut RayCounts, id: LightId, light: &Light, label: u32| {
             if light.is_infinite() && !self.sky {
