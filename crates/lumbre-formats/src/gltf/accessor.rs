@@ -9,6 +9,9 @@ use crate::diagnostic::{Diagnostic, FormatError, quoted};
 /// The number of elements from which decoding is worth splitting over threads.
 pub(super) const SHARE: usize = 1 << 15;
 
+/// What a budget is asked for.
+const ELEMENTS: &str = "elements of accessors";
+
 /// The component types.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Component {
@@ -316,45 +319,73 @@ impl<'a> Accessor<'a> {
         Err(wrong.expected(format!("{} of {}", elements.join(" or "), components.join(" or "))).into())
     }
 
-    /// All elements as numbers, mapped. `N` numbers of each are read; an element has at least as many.
-    pub(super) fn floats<const N: usize, T: Send>(
+    /// The first `N` numbers of every element, which has at least as many.
+    pub(super) fn floats<const N: usize>(&self, file: &File<'_>) -> Read<Vec<[f32; N]>> {
+        let mut elements = self.zeros(file)?;
+        self.read_floats(N, elements.as_flattened_mut())?;
+        Ok(elements)
+    }
+
+    /// The first `N` numbers of every element, as a vector of the same size, so that no other memory is needed.
+    pub(super) fn vectors<const N: usize, T>(
         &self,
         file: &File<'_>,
-        make: impl Fn([f32; N]) -> T + Sync,
+        make: impl Fn([f32; N]) -> T,
     ) -> Read<Vec<T>> {
-        debug_assert!(N <= self.element.numbers());
+        const { assert!(size_of::<T>() == size_of::<[f32; N]>()) }
+        Ok(self.floats(file)?.into_iter().map(make).collect())
+    }
+
+    /// The first `n` numbers of every element, one element after another.
+    pub(super) fn flat_floats(&self, file: &File<'_>, n: usize) -> Read<Vec<f32>> {
+        file.budget.elements(self.count as u64, ELEMENTS)?;
+        let count = self.count.saturating_mul(n);
+        let mut numbers = file.budget.vec(count as u64, ELEMENTS)?;
+        numbers.resize(count, 0.0);
+        self.read_floats(n, &mut numbers)?;
+        Ok(numbers)
+    }
+
+    fn read_floats(&self, n: usize, out: &mut [f32]) -> Read<()> {
         match (self.component, self.normalized) {
-            (Component::F32, _) => self.decoded(file, f32::from_le_bytes, make),
-            (Component::I8, false) => self.decoded(file, |[b]| f32::from(b as i8), make),
-            (Component::I8, true) => self.decoded(file, |[b]| (f32::from(b as i8) / 127.0).max(-1.0), make),
-            (Component::U8, false) => self.decoded(file, |[b]| f32::from(b), make),
-            (Component::U8, true) => self.decoded(file, |[b]| f32::from(b) / 255.0, make),
-            (Component::I16, false) => self.decoded(file, |b| f32::from(i16::from_le_bytes(b)), make),
+            (Component::F32, _) => self.decode(n, out, f32::from_le_bytes),
+            (Component::I8, false) => self.decode(n, out, |[b]| f32::from(b as i8)),
+            (Component::I8, true) => self.decode(n, out, |[b]| (f32::from(b as i8) / 127.0).max(-1.0)),
+            (Component::U8, false) => self.decode(n, out, |[b]| f32::from(b)),
+            (Component::U8, true) => self.decode(n, out, |[b]| f32::from(b) / 255.0),
+            (Component::I16, false) => self.decode(n, out, |b| f32::from(i16::from_le_bytes(b))),
             (Component::I16, true) => {
-                self.decoded(file, |b| (f32::from(i16::from_le_bytes(b)) / 32767.0).max(-1.0), make)
+                self.decode(n, out, |b| (f32::from(i16::from_le_bytes(b)) / 32767.0).max(-1.0))
             }
-            (Component::U16, false) => self.decoded(file, |b| f32::from(u16::from_le_bytes(b)), make),
-            (Component::U16, true) => {
-                self.decoded(file, |b| f32::from(u16::from_le_bytes(b)) / 65535.0, make)
-            }
-            (Component::U32, _) => self.decoded(file, |b| u32::from_le_bytes(b) as f32, make),
+            (Component::U16, false) => self.decode(n, out, |b| f32::from(u16::from_le_bytes(b))),
+            (Component::U16, true) => self.decode(n, out, |b| f32::from(u16::from_le_bytes(b)) / 65535.0),
+            (Component::U32, _) => self.decode(n, out, |b| u32::from_le_bytes(b) as f32),
         }
     }
 
-    /// All elements as integers. The caller has checked the component type.
+    /// The first `N` numbers of every element as integers. The caller has checked the component type.
     pub(super) fn wholes<const N: usize>(&self, file: &File<'_>) -> Read<Vec<[u32; N]>> {
-        debug_assert!(N <= self.element.numbers());
+        let mut elements = self.zeros(file)?;
+        let out = elements.as_flattened_mut();
         match self.component {
-            Component::U8 => self.decoded(file, |[b]| u32::from(b), |n| n),
-            Component::U16 => self.decoded(file, |b| u32::from(u16::from_le_bytes(b)), |n| n),
-            Component::U32 => self.decoded(file, u32::from_le_bytes, |n| n),
-            Component::I8 | Component::I16 | Component::F32 => Err(self
-                .value
-                .wrong("accessor of a wrong type")
-                .found(self.said())
-                .expected("unsigned numbers")
-                .into()),
+            Component::U8 => self.decode(N, out, |[b]| u32::from(b))?,
+            Component::U16 => self.decode(N, out, |b| u32::from(u16::from_le_bytes(b)))?,
+            Component::U32 => self.decode(N, out, u32::from_le_bytes)?,
+            Component::I8 | Component::I16 | Component::F32 => {
+                let wrong = self.value.wrong("accessor of a wrong type").found(self.said());
+                return Err(wrong.expected("unsigned numbers").into());
+            }
         }
+        Ok(elements)
+    }
+
+    /// As many elements as it has, charged to the budget.
+    fn zeros<T: Copy + Default, const N: usize>(&self, file: &File<'_>) -> Read<Vec<[T; N]>> {
+        debug_assert!(N <= self.element.numbers());
+        file.budget.elements(self.count as u64, ELEMENTS)?;
+        let mut elements = file.budget.vec(self.count as u64, ELEMENTS)?;
+        elements.resize(self.count, [T::default(); N]);
+        Ok(elements)
     }
 
     /// Its declared minimum and maximum; `None` where it has none, or of another size.
@@ -388,49 +419,63 @@ impl<'a> Accessor<'a> {
         Some(Self { element: Element::Vec3, count, data, stride: 3 * size, ..*self })
     }
 
-    /// Numbers of `S` bytes.
-    fn decoded<const S: usize, N1: Copy + Default, const N: usize, T: Send>(
+    /// Reads `n` numbers of `S` bytes of every element into `out`, which is zero.
+    fn decode<const S: usize, T: Copy + Default + Send>(
         &self,
-        file: &File<'_>,
-        decode: impl Fn([u8; S]) -> N1 + Sync,
-        make: impl Fn([N1; N]) -> T + Sync,
-    ) -> Read<Vec<T>> {
+        n: usize,
+        out: &mut [T],
+        decode: impl Fn([u8; S]) -> T + Sync,
+    ) -> Read<()> {
         debug_assert_eq!(S, self.component.bytes());
         let (columns, rows) = self.element.columns();
         let column = if columns > 1 { (rows * S).next_multiple_of(4) } else { rows * S };
-        // In a single column all numbers are contiguous.
-        let in_a_row = |bytes: &[u8]| {
+        let in_a_row = |out: &mut [T], bytes: &[u8]| {
             let (numbers, _) = bytes.as_chunks::<S>();
-            numbers.first_chunk::<N>().map(|numbers| make(numbers.map(&decode)))
+            out.iter_mut().zip(numbers).for_each(|(out, number)| *out = decode(*number));
         };
-        let in_columns = |bytes: &[u8]| {
-            make(std::array::from_fn(|i| {
-                let number = bytes.get(i / rows * column + i % rows * S..).and_then(<[u8]>::first_chunk);
-                number.map_or_else(N1::default, |number| decode(*number))
-            }))
-        };
-        let element = |bytes: &[u8]| match columns {
-            1 => in_a_row(bytes).unwrap_or_else(|| in_columns(bytes)),
-            _ => in_columns(bytes),
-        };
-        file.budget.elements(self.count as u64, "elements of accessors")?;
-        let mut elements = file.budget.vec(self.count as u64, "elements of accessors")?;
-        match self.data {
-            None => elements.extend((0..self.count).map(|_| make([N1::default(); N]))),
-            Some(Strided { bytes, stride }) => {
-                let bytes = bytes.ok_or_else(|| without_data(self.value))?;
-                elements.par_extend(bytes.par_chunks(stride).with_min_len(SHARE).map(element));
+        let element = |out: &mut [T], bytes: &[u8]| match columns {
+            1 => in_a_row(out, bytes),
+            _ => {
+                for (i, out) in out.iter_mut().enumerate() {
+                    let at = i / rows * column + i % rows * S;
+                    if let Some(number) = bytes.get(at..).and_then(<[u8]>::first_chunk) {
+                        *out = decode(*number);
+                    }
+                }
             }
+        };
+        if let Some(Strided { bytes, stride }) = self.data {
+            let bytes = bytes.ok_or_else(|| without_data(self.value))?;
+            in_shares(n, out, stride, bytes, &|out, bytes| match columns {
+                1 if stride == n * S => in_a_row(out, bytes),
+                _ => out.chunks_mut(n).zip(bytes.chunks(stride)).for_each(|(out, bytes)| element(out, bytes)),
+            });
         }
         if let Some(sparse) = &self.sparse {
             let value_size = columns * column;
             let values = sparse.values.ok_or_else(|| without_data(sparse.value))?;
             sparse.each_index(self.count, |k, index| {
-                elements[index] = element(&values[k * value_size..]);
+                let out = &mut out[n * index..][..n];
+                out.fill(T::default());
+                element(out, &values[k * value_size..]);
             })?;
         }
-        Ok(elements)
+        Ok(())
     }
+}
+
+/// Splits elements of `n` numbers, and their bytes, over threads. Compiled once for each type of number, and called once for many
+/// elements.
+fn in_shares<T: Send>(
+    n: usize,
+    out: &mut [T],
+    stride: usize,
+    bytes: &[u8],
+    read: &(dyn Fn(&mut [T], &[u8]) + Sync),
+) {
+    out.par_chunks_mut(n * SHARE)
+        .zip(bytes.par_chunks(stride.saturating_mul(SHARE)))
+        .for_each(|(out, bytes)| read(out, bytes));
 }
 
 impl<'a> Sparse<'a> {

@@ -438,7 +438,7 @@ impl Channel<'_> {
 
     /// The value at a time; constant before the first and after the last keyframe.
     fn sample(&self, file: &File<'_>, time: f64) -> Read<Vec<f64>> {
-        let times: Vec<f32> = self.input.floats(file, |[t]: [f32; 1]| t)?;
+        let times = self.input.flat_floats(file, 1)?;
         if let Some(i) =
             (0..times.len()).find(|&i| !times[i].is_finite() || (i > 0 && times[i] <= times[i - 1]))
         {
@@ -447,19 +447,16 @@ impl Channel<'_> {
             return Err(wrong.expected("finite numbers, each more than the one before").into());
         }
         let numbers = self.numbers();
-        let values: Vec<f32> = match self.path {
-            Path::Translation | Path::Scale => {
-                self.output.floats(file, |v: [f32; 3]| v)?.into_iter().flatten().collect()
+        let each = match (self.path, self.output.element) {
+            (Path::Translation | Path::Scale, _) => 3,
+            (Path::Rotation, _) => 4,
+            (Path::Weights | Path::Weight(_), _) => 1,
+            (Path::Numbers { .. }, Element::Vec2 | Element::Vec3 | Element::Vec4) => {
+                self.output.element.numbers()
             }
-            Path::Rotation => self.output.floats(file, |v: [f32; 4]| v)?.into_iter().flatten().collect(),
-            Path::Weights | Path::Weight(_) => self.output.floats(file, |[v]: [f32; 1]| v)?,
-            Path::Numbers { .. } => match self.output.element {
-                Element::Vec2 => self.output.floats(file, |v: [f32; 2]| v)?.into_iter().flatten().collect(),
-                Element::Vec3 => self.output.floats(file, |v: [f32; 3]| v)?.into_iter().flatten().collect(),
-                Element::Vec4 => self.output.floats(file, |v: [f32; 4]| v)?.into_iter().flatten().collect(),
-                _ => self.output.floats(file, |[v]: [f32; 1]| v)?,
-            },
+            (Path::Numbers { .. }, _) => 1,
         };
+        let values = self.output.flat_floats(file, each)?;
         file.budget.release(4 * (times.len() + values.len()) as u64);
         if let Some(i) = values.iter().position(|v| !v.is_finite()) {
             let wrong = self

@@ -409,18 +409,18 @@ pub(super) fn vertices(
 ) -> Read<Vertices> {
     let attributes = &primitive.attributes;
     let Some(position) = &attributes.position else { return Ok(Vertices::default()) };
-    let vec3 = |accessor: &Accessor<'_>| accessor.floats(file, Vec3::from_array);
+    let vec3 = |accessor: &Accessor<'_>| accessor.vectors(file, Vec3::from_array);
     let mut vertices = Vertices {
         positions: vec3(position)?,
         normals: attributes.normal.as_ref().map(vec3).transpose()?,
-        tangents: attributes.tangent.as_ref().map(|t| t.floats(file, Vec4::from_array)).transpose()?,
+        tangents: attributes.tangent.as_ref().map(|t| t.vectors(file, Vec4::from_array)).transpose()?,
         uvs: vec![],
         colours: attributes.colour.as_ref().map(|colour| colours(file, colour)).transpose()?,
         moments: vec![],
     };
     for (set, accessor) in attributes.uvs.iter().enumerate() {
         let accessor = accessor.as_ref().filter(|_| wants(set));
-        vertices.uvs.push(accessor.map(|a| a.floats(file, Vec2::from_array)).transpose()?);
+        vertices.uvs.push(accessor.map(|a| a.vectors(file, Vec2::from_array)).transpose()?);
     }
     morph(file, primitive, pose.weights, &mut vertices)?;
     if let Some(joints) = pose.joints {
@@ -431,8 +431,12 @@ pub(super) fn vertices(
 
 fn colours(file: &File<'_>, accessor: &Accessor<'_>) -> Read<Vec<(Rgb, f32)>> {
     match accessor.element {
-        Element::Vec4 => accessor.floats(file, |[r, g, b, a]| (Rgb::new(r, g, b), a)),
-        _ => accessor.floats(file, |[r, g, b]| (Rgb::new(r, g, b), 1.0)),
+        Element::Vec4 => accessor.vectors(file, |[r, g, b, a]| (Rgb::new(r, g, b), a)),
+        _ => {
+            let colours = accessor.floats(file)?;
+            file.budget.array::<[f32; 1]>(colours.len() as u64, "alphas of colours")?;
+            Ok(colours.into_iter().map(|[r, g, b]| (Rgb::new(r, g, b), 1.0)).collect())
+        }
     }
 }
 
@@ -445,7 +449,7 @@ fn morph(file: &File<'_>, primitive: &Primitive<'_>, weights: &[f64], vertices: 
     for (target, &weight) in primitive.targets.iter().zip(weights).filter(|(_, weight)| **weight != 0.0) {
         let weight = weight as f32;
         let vec3 = |accessor: &Accessor<'_>, to: &mut [Vec3]| -> Read<()> {
-            let added = accessor.floats(file, Vec3::from_array)?;
+            let added = accessor.vectors(file, Vec3::from_array)?;
             to.iter_mut().zip(&added).for_each(|(to, added)| *to += weight * *added);
             release(file, added);
             Ok(())
@@ -457,13 +461,13 @@ fn morph(file: &File<'_>, primitive: &Primitive<'_>, weights: &[f64], vertices: 
             vec3(accessor, normals)?;
         }
         if let (Some(accessor), Some(tangents)) = (&target.tangent, &mut vertices.tangents) {
-            let added = accessor.floats(file, Vec3::from_array)?;
+            let added = accessor.vectors(file, Vec3::from_array)?;
             tangents.iter_mut().zip(&added).for_each(|(to, added)| *to += (weight * *added).extend(0.0));
             release(file, added);
         }
         for (accessor, uvs) in target.uvs.iter().zip(&mut vertices.uvs) {
             if let (Some(accessor), Some(uvs)) = (accessor, uvs) {
-                let added = accessor.floats(file, Vec2::from_array)?;
+                let added = accessor.vectors(file, Vec2::from_array)?;
                 uvs.iter_mut().zip(&added).for_each(|(to, added)| *to += weight * *added);
                 release(file, added);
             }
@@ -497,7 +501,7 @@ fn bend(file: &File<'_>, primitive: &Primitive<'_>, joints: &[DMat4], vertices: 
         if let (Some(indices), Some(weights)) = (indices, weights) {
             let read = indices.wholes::<4>(file)?;
             let wrong = read.iter().position(|four| four.iter().any(|&j| j as usize >= joints.len()));
-            let weights = weights.floats(file, |w: [f32; 4]| w)?;
+            let weights = weights.floats::<4>(file)?;
             // A joint of weight zero may be any.
             let used =
                 |i: usize| (0..4).find(|&k| weights[i][k] != 0.0 && read[i][k] as usize >= joints.len());

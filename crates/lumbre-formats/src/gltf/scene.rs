@@ -265,19 +265,20 @@ pub(super) fn instances(file: &File<'_>, extension: Value<'_>) -> Read<Vec<DAffi
     }
     let count = count.unwrap_or(0);
     let vec3 = |part: Option<Accessor<'_>>, default: Vec3| match part {
-        Some(accessor) => accessor.floats(file, Vec3::from_array),
+        Some(accessor) => accessor.vectors(file, Vec3::from_array),
         None => Ok(vec![default; count]),
     };
     let translations = vec3(parts[0], Vec3::ZERO)?;
     let rotations = match parts[1] {
-        Some(accessor) => accessor.floats(file, |q: [f32; 4]| DQuat::from_array(q.map(f64::from)))?,
-        None => vec![DQuat::IDENTITY; count],
+        Some(accessor) => accessor.floats(file)?,
+        None => vec![[0.0, 0.0, 0.0, 1.0]; count],
     };
     let scales = vec3(parts[2], Vec3::ONE)?;
     let mut worlds = Vec::with_capacity(count);
     for i in 0..count {
-        let length = rotations[i].length();
-        let rotation = if length > 0.0 { rotations[i] * (1.0 / length) } else { DQuat::IDENTITY };
+        let rotation = DQuat::from_array(rotations[i].map(f64::from));
+        let length = rotation.length();
+        let rotation = if length > 0.0 { rotation * (1.0 / length) } else { DQuat::IDENTITY };
         worlds.push(DAffine3::from_scale_rotation_translation(
             scales[i].as_dvec3(),
             rotation,
@@ -473,7 +474,7 @@ pub(super) fn joints(
 ) -> Read<Vec<DMat4>> {
     let value = file.list(List::Skins)[skin];
     let inverse: Option<Vec<[f32; 16]>> = match value.get("inverseBindMatrices")? {
-        Some(name) => Some(Accessor::named(file, name)?.floats(file, |m| m)?),
+        Some(name) => Some(Accessor::named(file, name)?.floats(file)?),
         None => None,
     };
     let mut joints = vec![];
