@@ -34,6 +34,8 @@ pub(crate) fn run_all() -> Result<()> {
     let skips = skipped.iter().flat_map(|name| ["--skip", name]);
     let ignored = ["test", "--workspace", "--release", "--", "--ignored"].into_iter().chain(skips);
     command::run("cargo", &ignored.collect::<Vec<_>>())?;
+    // What `run` does a part of.
+    run_with("cargo", &["test", "--workspace", "--release"], &[("LUMBRE_LONG_TESTS", "1")])?;
     command::run("cargo", &["publish", "--workspace", "--dry-run"])?;
     if succeeds("cargo", &["+nightly", "miri", "--version"]) {
         proof::miri()?;

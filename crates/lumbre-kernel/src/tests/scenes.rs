@@ -57,6 +57,11 @@ thread_local! {
     static PRESET: Cell<Preset> = const { Cell::new(Preset::Balanced) };
 }
 
+/// How often a test repeats what it does: a quarter of `long`, and all of it by `cargo xtask test --all`.
+pub(crate) fn repeats(long: usize) -> usize {
+    if std::env::var_os("LUMBRE_LONG_TESTS").is_some() { long } else { long.div_ceil(4) }
+}
+
 /// Runs a test once with every preset for what it builds.
 pub(crate) fn with_every_preset(mut run: impl FnMut()) {
     for preset in Preset::ALL {
