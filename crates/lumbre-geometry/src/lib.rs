@@ -8,6 +8,7 @@ mod axial;
 mod bounding_volume;
 mod density;
 mod hit;
+mod implicit;
 mod line;
 mod measure;
 mod nearest;
@@ -15,6 +16,7 @@ mod placed;
 mod ray;
 mod shape;
 mod support;
+mod triangle_sides;
 
 use lumbre_math::{DVec2, DVec3, Transform};
 
@@ -22,12 +24,14 @@ pub use aabb::Aabb;
 pub use bounding_volume::BoundingVolume;
 pub use csg::{Crossing, Crossings, Leaf, LeafPart, Solid};
 pub use hit::{DirectionSample, Root, Roots, Surface, SurfaceSample};
+pub use implicit::ImplicitSurface;
 pub use nearest::{NearestPoint, NoNearestPoint, nearest_on_triangle, similarity_factor};
 pub use placed::PlacedShape;
 pub use ray::Ray;
 pub use shape::ShapeError;
 pub use sphere::sphere_crossings;
 pub use triangle::{TriangleHit, WatertightRay, moller_trumbore};
+pub use triangle_sides::plane_and_sides;
 
 // The shapes: the file of each, and its line in the list.
 

@@ -8,6 +8,7 @@ mod build;
 mod deforming_mesh;
 mod geometry;
 mod hit;
+mod implicit;
 mod intersect;
 mod io;
 mod point;

@@ -46,14 +46,15 @@
 //! | normals | [`Transform::normal`], [`matrix::transform_normal`] |
 //! | area under a transform | [`Transform::area_factor`] |
 //! | quaternions: sum, product, conjugate | `+`, `*`, `conjugate()` of glam's [`DQuat`] |
-//! | inverse, rotation of a vector, matrix both ways | [`quaternion::inverse`], [`quaternion::rotate`], [`quaternion::to_matrix`], [`quaternion::from_matrix`] |
+//! | inverse, quotient, rotation of a vector, matrix both ways | [`quaternion::inverse`], [`quaternion::divide`], [`quaternion::rotate`], [`quaternion::to_matrix`], [`quaternion::from_matrix`] |
 //! | Euler angles both ways | [`quaternion::Euler`] |
 //! | look-at of either hand | [`Transform::look_at_right`], [`Transform::look_at_left`], [`view::View`] |
 //! | rays of a camera | [`view::View::perspective_direction`], [`view::View::orthographic_origin`], [`view::View::cylindrical_direction`] |
 //! | projection matrices | [`projection::orthographic`], [`projection::perspective`], [`projection::simple_perspective`] |
 //! | reflection, refraction | [`optics::reflect`], [`optics::refract`], [`optics::facing`] |
 //! | rounding errors, leaving a surface | [`rounding::gamma`], [`Transform::point_error`], [`rounding::offset_point`] |
-//! | roots of polynomials | [`quadratic`], [`roots`] |
+//! | quadratic equations, roots of polynomials | [`quadratic::roots_of`], [`quadratic`], [`roots`] |
+//! | interval arithmetic, with derivatives | [`interval::Interval`], [`interval::Dual`] |
 //! | random numbers | [`random`], evenly spread [`sobol`] |
 //! | random points of disks, spheres, triangles | [`warp`], [`warp64`] |
 //! | random choice by weight | [`distribution`] |
@@ -64,6 +65,7 @@ pub use glam::{DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, DVec4, Vec2, Vec3, V
 pub mod animated;
 pub mod distribution;
 pub mod frame;
+pub mod interval;
 pub mod matrix;
 pub mod optics;
 pub mod projection;

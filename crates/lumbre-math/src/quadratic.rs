@@ -70,6 +70,23 @@ pub fn quadratic(a: f64, h: f64, c: f64, delta: f64) -> Option<(f64, f64)> {
     Some(if first <= second { (first, second) } else { (second, first) })
 }
 
+/// The real roots of `a t² + b t + c = 0` in ascending order, a double root twice; none where there is none, or where all of
+/// `t` are. With `a` zero, the root of the linear equation comes alone.
+///
+/// The discriminant `b² - 4 a c` is computed to all of its digits ([`dop`]), so that nearly equal roots are told apart and the
+/// number of roots is right.
+pub fn roots_of(a: f64, b: f64, c: f64) -> Vec<f64> {
+    if a == 0.0 {
+        let root = -c / b;
+        return root.is_finite().then_some(root).into_iter().collect();
+    }
+    let h = 0.5 * b;
+    match quadratic(a, h, c, dop(h, h, a, c)) {
+        Some((first, second)) => [first, second].into_iter().filter(|root| root.is_finite()).collect(),
+        None => Vec::new(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -105,5 +122,21 @@ mod tests {
         assert_eq!(quadratic(2.0, 0.0, 0.0, 0.0), Some((0.0, 0.0)));
         assert_eq!(quadratic(1.0, 0.0, 3.0, -3.0), None);
         assert_eq!(quadratic(1.0, f64::NAN, 3.0, f64::NAN), None);
+    }
+
+    #[test]
+    fn an_equation_has_the_roots_that_its_coefficients_say() {
+        let roots = roots_of;
+        assert_eq!(roots(2.0, -14.0, 24.0), [3.0, 4.0]);
+        assert_eq!(roots(-3.0, 0.0, 12.0), [-2.0, 2.0]);
+        assert_eq!(roots(4.0, -12.0, 9.0), [1.5, 1.5]);
+        assert_eq!(roots(0.0, -4.0, 10.0), [2.5]);
+        assert_eq!(roots(5.0, 0.0, 0.0), [0.0, 0.0]);
+        assert!(roots(1.0, 2.0, 3.0).is_empty());
+        assert!(roots(0.0, 0.0, 7.0).is_empty() && roots(0.0, 0.0, 0.0).is_empty());
+        assert!(roots(f64::NAN, 1.0, 1.0).is_empty());
+        // Roots that differ in the last digits only.
+        let [first, second] = roots(1.0, -(2.0 + 2f64.powi(-26)), 1.0 + 2f64.powi(-26))[..] else { panic!() };
+        assert_eq!((first, second), (1.0, 1.0 + 2f64.powi(-26)));
     }
 }

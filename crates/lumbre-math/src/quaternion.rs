@@ -27,6 +27,12 @@ pub fn inverse(q: DQuat) -> Option<DQuat> {
     inverse.is_finite().then_some(inverse)
 }
 
+/// The quotient `p q⁻¹`, whose product with `q` is `p`; `None` when it is not finite, as for a `q` of zero.
+pub fn divide(p: DQuat, q: DQuat) -> Option<DQuat> {
+    let quotient = p * inverse(q)?;
+    quotient.is_finite().then_some(quotient)
+}
+
 /// The rotation by `degrees` about `axis`, of any length but zero, x towards y when it is z: `(cos θ/2, a sin θ/2)`.
 /// `None` when the axis is zero or anything is not finite.
 pub fn from_axis_angle(axis: DVec3, degrees: f64) -> Option<DQuat> {
@@ -154,6 +160,19 @@ mod tests {
 
     fn largest(m: DMat3) -> f64 {
         m.to_cols_array().into_iter().fold(0.0, |most, e| most.max(e.abs()))
+    }
+
+    #[test]
+    fn a_quotient_times_its_divisor_is_the_dividend() {
+        let (p, q) = (from_wxyz([2.0, -3.0, 0.5, 7.0]), from_wxyz([0.25, 4.0, -1.5, 2.0]));
+        let quotient = divide(p, q).unwrap();
+        for (found, expected) in to_wxyz(quotient * q).into_iter().zip(to_wxyz(p)) {
+            assert!((found - expected).abs() < 1e-14, "{found} for {expected}");
+        }
+        // (1 + i) / (1 + j) = (1 + i)(1 - j) / 2 = (1 + i - j - k) / 2
+        let quotient = divide(from_wxyz([1.0, 1.0, 0.0, 0.0]), from_wxyz([1.0, 0.0, 1.0, 0.0])).unwrap();
+        assert_eq!(to_wxyz(quotient), [0.5, 0.5, -0.5, -0.5]);
+        assert_eq!(divide(p, from_wxyz([0.0; 4])), None);
     }
 
     #[test]

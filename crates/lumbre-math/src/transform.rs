@@ -270,6 +270,23 @@ impl Transform {
     }
 }
 
+/// The three rows of its matrix that say something, each with its translation last: `[[1, 0, 0, 3], [0, 1, 0, 5], [0, 0, 1, 7]]`.
+/// A precision applies to every number.
+impl std::fmt::Display for Transform {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let DAffine3 { matrix3, translation } = self.forward;
+        for row in 0..3 {
+            f.write_str(if row == 0 { "[[" } else { "], [" })?;
+            for number in matrix3.row(row).to_array() {
+                std::fmt::Display::fmt(&number, f)?;
+                f.write_str(", ")?;
+            }
+            std::fmt::Display::fmt(&translation[row], f)?;
+        }
+        f.write_str("]]")
+    }
+}
+
 impl Mul for Transform {
     type Output = Self;
 
@@ -356,6 +373,17 @@ mod tests {
         let shift = Transform::translate(DVec3::new(5.0, -6.0, 0.125));
         let look = Transform::look_at_left(DVec3::new(1.0, 2.0, 3.0), DVec3::new(4.0, -5.0, 6.0), DVec3::Y);
         vec![turn, stretch, slant, shift, look.unwrap(), shift * turn * slant * stretch, stretch * shift]
+    }
+
+    #[test]
+    fn it_is_shown_by_rows_with_the_translation_last() {
+        let map = Transform::translate(DVec3::new(3.0, 5.5, -7.0))
+            * Transform::scale(DVec3::new(2.0, 3.0, 4.0)).unwrap();
+        assert_eq!(map.to_string(), "[[2, 0, 0, 3], [0, 3, 0, 5.5], [0, 0, 4, -7]]");
+        assert_eq!(
+            format!("{map:.1}"),
+            "[[2.0, 0.0, 0.0, 3.0], [0.0, 3.0, 0.0, 5.5], [0.0, 0.0, 4.0, -7.0]]"
+        );
     }
 
     #[test]

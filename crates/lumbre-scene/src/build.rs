@@ -16,8 +16,8 @@ use crate::mesh::{self, QuadOrder};
 use crate::surface::{ColourRamp, Form, SurfaceEntry};
 use crate::{
     AreaLightDesc, BuildError, BuildWarning, Camera, CameraKind, Emission, GeometryDesc, GroundPlane,
-    InstanceDesc, LightDesc, MeshDesc, ObjectDesc, Scene, SceneDesc, ShapeDesc, csg, extent, framing, ground,
-    stage, studio,
+    InstanceDesc, LightDesc, MeshDesc, ObjectDesc, Scene, SceneDesc, ShapeDesc, csg, custom, extent, framing,
+    ground, stage, studio,
 };
 
 /// The maximal depth of nested objects.
@@ -274,6 +274,18 @@ impl Builder {
                 let placed = csg::shape_of(&form);
                 entry.form = Form::Csg(Arc::new(form));
                 self.push(entry, geometries, GeometryKind::Shape(placed))?;
+            }
+            GeometryDesc::Custom(geometry) => {
+                if let Some(light) = area_light {
+                    if light.power.is_some() {
+                        return Err(BuildError::LightWithoutArea { shape: desc.index });
+                    }
+                    entry.emission = Some(emission(light, || 0.0));
+                    self.warnings.push(BuildWarning::UnsampledLight { shape: desc.index });
+                }
+                entry.form = Form::Custom;
+                let placed = custom::placed(geometry, desc.world_from_object);
+                self.push(entry, geometries, GeometryKind::Custom(placed))?;
             }
         }
         Ok(())
@@ -580,6 +592,7 @@ fn origin(shapes: &[ShapeDesc], instances: &[InstanceDesc], accels: &[Arc<Accel>
             GeometryDesc::Mesh(mesh) | GeometryDesc::BilinearMesh(mesh) => {
                 Some(mesh_bounds(mesh, &shape.world_from_object))
             }
+            GeometryDesc::Custom(geometry) => custom::bounds(&**geometry, &shape.world_from_object),
             GeometryDesc::Csg(_) => None,
         };
         bounds = own.map_or(bounds, |own| bounds.union(own));

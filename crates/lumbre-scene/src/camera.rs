@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use lumbre_geometry::Ray;
 use lumbre_math::warp64::{equal_area_square_to_sphere, equal_area_wrap, square_to_disk};
-use lumbre_math::{AnimatedTransform, DVec2, DVec3, Transform};
+use lumbre_math::{AnimatedTransform, DAffine3, DMat3, DVec2, DVec3, SingularTransformError, Transform};
 
 use crate::Footprint;
 
@@ -64,6 +64,82 @@ pub struct Camera {
     pub shutter_open: f64,
     /// The time when it closes; not before it opens.
     pub shutter_close: f64,
+}
+
+impl Camera {
+    /// A camera of a kind in a place, without a name, still, of the frame of its picture, with the shutter open from time 0 to 1.
+    pub fn new(kind: CameraKind, world_from_camera: Transform) -> Self {
+        Self {
+            name: None,
+            kind,
+            world_from_camera,
+            motion: None,
+            frame_aspect: None,
+            screen_window: None,
+            shutter_open: 0.0,
+            shutter_close: 1.0,
+        }
+    }
+
+    /// A pinhole camera at `eye` that looks at `target`, with `up` upwards in the picture, in a right-handed world: what stands to
+    /// the right is to the right in the picture. `fov` is the full field of view in degrees along the shorter side.
+    ///
+    /// # Errors
+    /// [`SingularTransformError`] where eye and target coincide, the view is along `up`, or something is not finite.
+    pub fn perspective(
+        eye: DVec3,
+        target: DVec3,
+        up: DVec3,
+        fov: f64,
+    ) -> Result<Self, SingularTransformError> {
+        let focal_distance = eye.distance(target);
+        let kind = CameraKind::Perspective { fov, lens_radius: 0.0, focal_distance };
+        Ok(Self::new(kind, Self::looking(eye, target, up)?))
+    }
+
+    /// The same without perspective: the shorter side of the picture is `height` long in the world.
+    ///
+    /// # Errors
+    /// As for [`Camera::perspective`].
+    pub fn orthographic(
+        eye: DVec3,
+        target: DVec3,
+        up: DVec3,
+        height: f64,
+    ) -> Result<Self, SingularTransformError> {
+        let kind = CameraKind::Orthographic { lens_radius: 0.0, focal_distance: eye.distance(target) };
+        // The screen window of unit half height, scaled.
+        let scale = Transform::scale(DVec3::new(0.5 * height, 0.5 * height, 1.0))?;
+        Ok(Self::new(kind, Self::looking(eye, target, up)? * scale))
+    }
+
+    /// All directions at once, by longitude and latitude, with `target` in the middle of the picture.
+    ///
+    /// # Errors
+    /// As for [`Camera::perspective`].
+    pub fn panorama(eye: DVec3, target: DVec3, up: DVec3) -> Result<Self, SingularTransformError> {
+        let kind = CameraKind::Spherical { mapping: SphericalMapping::Equirectangular };
+        // In the middle of the picture is -x, and to the right of it -z.
+        let turn = DAffine3::from_mat3(DMat3::from_cols(-DVec3::Z, DVec3::Y, -DVec3::X));
+        Ok(Self::new(kind, Self::looking(eye, target, up)? * Transform::from_affine(turn)?))
+    }
+
+    /// The same with a thin lens of this radius, sharp at the distance of `target`; a panorama has none.
+    #[must_use]
+    pub fn with_lens(mut self, radius: f64) -> Self {
+        if let CameraKind::Perspective { lens_radius, .. } | CameraKind::Orthographic { lens_radius, .. } =
+            &mut self.kind
+        {
+            *lens_radius = radius;
+        }
+        self
+    }
+
+    /// Camera space is left-handed: in a right-handed world its x axis is mirrored.
+    fn looking(eye: DVec3, target: DVec3, up: DVec3) -> Result<Transform, SingularTransformError> {
+        let mirror = Transform::scale(DVec3::new(-1.0, 1.0, 1.0))?;
+        Ok(Transform::look_at_left(eye, target, up)?.inverse() * mirror)
+    }
 }
 
 /// A camera ray with its footprint.
@@ -223,6 +299,36 @@ mod tests {
     }
 
     const MIDDLE: DVec2 = DVec2::new(0.5, 0.5);
+
+    #[test]
+    fn cameras_by_eye_and_target_show_a_right_handed_world_unmirrored() {
+        let (eye, target, up) = (DVec3::new(3.0, -8.0, 2.0), DVec3::new(3.0, 5.0, 2.0), DVec3::Z);
+        let size = DVec2::new(400.0, 200.0);
+        let cameras = [
+            Camera::perspective(eye, target, up, 40.0).unwrap(),
+            Camera::orthographic(eye, target, up, 6.0).unwrap(),
+            Camera::panorama(eye, target, up).unwrap(),
+        ];
+        for camera in cameras {
+            let view = View::new(&camera, 400, 200);
+            // Where the middle, and what is right of and above it, lead to at the distance of the target.
+            let at = |x: f64, y: f64| {
+                let ray = view.ray(DVec2::new(x, y), DVec2::splat(0.5), 0.0, 1.0).ray;
+                ray.at((target.y - ray.origin.y) / ray.direction.y)
+            };
+            let middle = at(0.5 * size.x, 0.5 * size.y);
+            assert!((middle - target).length() < 1e-9, "{camera:?}: {middle}");
+            // Looking along +y with +z up, +x is to the right.
+            assert!(at(0.5 * size.x + 10.0, 0.5 * size.y).x > target.x + 0.1, "{camera:?}");
+            assert!(at(0.5 * size.x, 0.5 * size.y - 10.0).z > target.z + 0.1, "{camera:?}");
+        }
+        // The shorter side of the orthographic picture is six long.
+        let view = View::new(&Camera::orthographic(eye, target, up, 6.0).unwrap(), 400, 200);
+        let top = view.ray(DVec2::new(200.0, 0.0), DVec2::splat(0.5), 0.0, 1.0).ray.origin;
+        assert!((top - eye - 3.0 * up).length() < 1e-12, "{top}");
+        assert!(Camera::perspective(eye, eye, up, 40.0).is_err());
+        assert!(Camera::perspective(eye, eye + up, up, 40.0).is_err());
+    }
 
     #[test]
     fn the_field_of_view_spans_the_shorter_side() {

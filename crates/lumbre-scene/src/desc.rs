@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use lumbre_geometry::Shape;
 use lumbre_image::Rgb;
-use lumbre_kernel::Placement;
+use lumbre_kernel::{CustomGeometry, Placement};
 use lumbre_math::{AnimatedTransform, DVec3, Transform, Vec2, Vec3, Vec4};
 use lumbre_shading::{FURTHER_SETS, FloatTexture, Material, MipMap};
 
@@ -118,6 +118,8 @@ pub enum GeometryDesc {
     BilinearMesh(Arc<MeshDesc>),
     /// CSG of solids, each surface with its own material.
     Csg(CsgDesc),
+    /// Geometry that a program brings, such as a [`lumbre_geometry::ImplicitSurface`].
+    Custom(Arc<dyn CustomGeometry>),
 }
 
 /// An exact shape with vertex colours interpolated between two points, such as a thick line between two

@@ -86,6 +86,12 @@ pub enum BuildError {
         /// The kind of shape.
         name: &'static str,
     },
+    /// The area of a shape that is to shine by power is not known.
+    #[error("shape {shape}: custom geometry cannot shine by power, for its area is not known")]
+    LightWithoutArea {
+        /// The shape.
+        shape: u32,
+    },
     /// A CSG is invalid.
     #[error("shape {shape}: {reason}")]
     Csg {

@@ -10,7 +10,7 @@ use lumbre_kernel::Placement;
 use lumbre_math::{DVec3, Transform};
 
 use crate::build::inside_out;
-use crate::{GeometryDesc, MeshDesc, ObjectDesc, SceneDesc, ShapeDesc};
+use crate::{GeometryDesc, MeshDesc, ObjectDesc, SceneDesc, ShapeDesc, custom};
 
 /// Directions of an object's support points; what lies between them is missed by less than a hundredth of its
 /// size.
@@ -126,6 +126,10 @@ fn each_point_of(shape: &ShapeDesc, used: &Used, visit: &mut dyn FnMut(DVec3)) {
             }
             GeometryDesc::Mesh(mesh) | GeometryDesc::BilinearMesh(mesh) => {
                 each_vertex(mesh, used, &mut |p| visit(placement.point(p)));
+            }
+            GeometryDesc::Custom(geometry) => {
+                let bounds = custom::bounds(&**geometry, &placement).filter(|bounds| !bounds.is_empty());
+                bounds.iter().flat_map(corners).for_each(&mut *visit);
             }
             GeometryDesc::Csg(csg) => {
                 open.extend(csg.operands.iter().flatten().map(|operand| (operand, placement)));

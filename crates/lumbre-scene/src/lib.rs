@@ -3,6 +3,7 @@
 mod build;
 mod camera;
 mod csg;
+mod custom;
 mod desc;
 mod emission;
 mod error;

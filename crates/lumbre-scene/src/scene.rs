@@ -62,7 +62,7 @@ pub enum BuildWarning {
     /// An emissive shape that cannot be sampled, as part of an object with several placements, of a CSG, or of
     /// a deforming mesh: its light is found only by rays that hit it.
     #[error(
-        "shape {shape}: its light is found by chance only, for it is in one of many instances, a CSG, or a mesh that changes its form (slow to converge)"
+        "shape {shape}: its light is found by chance only, for it is in one of many instances, a CSG, custom geometry, or a mesh that changes its form (slow to converge)"
     )]
     UnsampledLight {
         /// The shape.
@@ -193,6 +193,14 @@ impl Scene {
         }
     }
 
+    /// The [`crate::ShapeDesc::index`] of what has an id in the tree.
+    ///
+    /// # Panics
+    /// When there is no such id.
+    pub fn shape_of(&self, id: u32) -> u32 {
+        self.entries[id as usize].shape
+    }
+
     /// The interaction at a hit.
     pub fn interaction(&self, ray: &Ray, hit: &Hit, footprint: &Footprint) -> Interaction<'_> {
         let (entry, part, turned) = self.leaf(hit);
@@ -200,7 +208,7 @@ impl Scene {
         let shaded = self.shading_geometry(entry, &geometric, ray, hit, part, turned);
         let primitive = match entry.form {
             Form::Patch { primitive, .. } => primitive,
-            Form::Mesh(_) => part,
+            Form::Mesh(_) | Form::Custom => part,
             Form::Exact | Form::Coloured(_) | Form::Csg(_) => 0,
         };
         let length = ray.direction.length();

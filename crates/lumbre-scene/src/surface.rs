@@ -39,6 +39,8 @@ pub(crate) enum Form {
     Mesh(Arc<MeshAttributes>),
     /// A patch of a mesh, from a quad that is not flat.
     Patch { attributes: Arc<MeshAttributes>, corners: [u32; 4], primitive: u32 },
+    /// None, of one of many primitives.
+    Custom,
     /// A CSG: the surface data of each leaf.
     Csg(Arc<CsgForm>),
 }
@@ -159,7 +161,7 @@ impl SurfaceEntry {
     /// without textures, cut-outs, and vertex normals that might flip a face.
     pub(crate) fn plain_emission(&self) -> Option<(&Emission, f64)> {
         let is_plain = match &self.form {
-            Form::Exact | Form::Coloured(_) => true,
+            Form::Exact | Form::Coloured(_) | Form::Custom => true,
             Form::Mesh(mesh) => mesh.normals().is_none(),
             Form::Patch { .. } | Form::Csg(_) => false,
         };
@@ -224,7 +226,7 @@ impl SurfaceEntry {
         time: f64,
     ) -> ShadingGeometry {
         let mut shaded = match &self.form {
-            Form::Exact | Form::Csg(_) => plain(surface),
+            Form::Exact | Form::Custom | Form::Csg(_) => plain(surface),
             Form::Coloured(ramp) => {
                 ShadingGeometry { vertex: ramp.at(surface.point, placement), ..plain(surface) }
             }

@@ -521,9 +521,37 @@ impl Material {
 
     /// The default material: diffuse, 0.5.
     pub fn default_diffuse() -> Self {
-        Self::new(MaterialKind::Diffuse {
-            reflectance: Arc::new(SpectrumTexture::Constant(Spectrum::splat(0.5))),
+        Self::diffuse(Spectrum::splat(0.5))
+    }
+
+    /// A matt surface that reflects this share of each colour, in [0, 1].
+    pub fn diffuse(reflectance: Spectrum) -> Self {
+        Self::new(MaterialKind::Diffuse { reflectance: Arc::new(SpectrumTexture::Constant(reflectance)) })
+    }
+
+    /// A metal by its reflectance at normal incidence, in [0, 1]; `roughness` is α of its facets, 0 for a mirror.
+    pub fn metal(reflectance: Spectrum, roughness: f32) -> Self {
+        Self::new(MaterialKind::ConductorReflectance {
+            reflectance: Arc::new(SpectrumTexture::Constant(reflectance)),
+            roughness: Roughness::isotropic(roughness, false),
         })
+    }
+
+    /// Smooth, clear glass, or water, of an index of refraction over that of what is around it: about 1.5, or 1.33.
+    pub fn glass(eta: f32) -> Self {
+        Self::new(MaterialKind::Dielectric { eta, roughness: Roughness::smooth() })
+    }
+
+    /// What most things are made of, with the parameters of glTF's core: a base colour, from 0 for plastic to 1 for metal, and a
+    /// roughness, all in [0, 1].
+    pub fn principled(base_color: Spectrum, metallic: f32, roughness: f32) -> Self {
+        let number = |x: f32| Arc::new(FloatTexture::Constant(x));
+        Self::new(MaterialKind::Principled(Box::new(PrincipledParams {
+            base_color: Arc::new(SpectrumTexture::Constant(base_color)),
+            metallic: number(metallic),
+            roughness: number(roughness),
+            ..PrincipledParams::default()
+        })))
     }
 }
 

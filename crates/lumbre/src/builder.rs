@@ -4,10 +4,11 @@ use std::sync::Arc;
 
 use lumbre_geometry::Shape;
 use lumbre_image::Rgb;
+use lumbre_kernel::CustomGeometry;
 use lumbre_math::Transform;
 use lumbre_scene::{
-    AreaLightDesc, Camera, FilmDesc, GeometryDesc, IntegratorDesc, LightDesc, MaterialId, MeshDesc,
-    NamedMaterial, SamplerDesc, SceneDesc, ShapeDesc,
+    AreaLightDesc, Camera, FilmDesc, GeometryDesc, InstanceDesc, IntegratorDesc, LightDesc, MaterialId,
+    MeshDesc, NamedMaterial, ObjectDesc, ObjectId, SamplerDesc, SceneDesc, ShapeDesc,
 };
 use lumbre_shading::Material;
 
@@ -33,6 +34,11 @@ impl ShapeBuilder {
     /// An exact shape.
     pub fn exact(shape: impl Into<Shape>) -> Self {
         Self::new(GeometryDesc::Exact(shape.into()))
+    }
+
+    /// An implicit surface `F(x, y, z) = 0`, or other geometry of a program's own.
+    pub fn custom(geometry: impl CustomGeometry + 'static) -> Self {
+        Self::new(GeometryDesc::Custom(Arc::new(geometry)))
     }
 
     /// A mesh.
@@ -75,20 +81,55 @@ impl SceneBuilder {
     /// Adds a shape.
     #[must_use]
     pub fn shape(mut self, shape: ShapeBuilder) -> Self {
+        let shape = self.described(shape);
+        self.desc.shapes.push(shape);
+        self
+    }
+
+    /// Adds shapes that stand together in as many places as there are maps, at the memory of one; none without a map.
+    ///
+    /// ```
+    /// use lumbre::geometry::Sphere;
+    /// use lumbre::{DVec3, Ray, SceneBuilder, ShapeBuilder, Transform};
+    ///
+    /// let ball = ShapeBuilder::exact(Sphere::new(DVec3::ZERO, 0.5)?);
+    /// let places = (0..3).map(|i| Transform::translate(DVec3::new(0.0, 0.0, 2.0 * f64::from(i))));
+    /// let scene = SceneBuilder::new().instances([ball], places).build()?;
+    /// let hit = scene.closest(&Ray::new(DVec3::new(-5.0, 0.0, 4.0), DVec3::X)).expect("the third is there");
+    /// assert_eq!((hit.t, hit.instance), (4.5, Some(2)));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn instances(
+        mut self,
+        shapes: impl IntoIterator<Item = ShapeBuilder>,
+        places: impl IntoIterator<Item = Transform>,
+    ) -> Self {
+        let shapes = shapes.into_iter().map(|shape| self.described(shape)).collect();
+        let object = ObjectId(self.desc.objects.len() as u32);
+        self.desc.objects.push(ObjectDesc { name: String::new(), shapes, instances: Vec::new() });
+        let place = |place: Transform| InstanceDesc { object, world_from_object: place.into() };
+        self.desc.instances.extend(places.into_iter().map(place));
+        self
+    }
+
+    /// The description of a shape, with an index and a material of its own.
+    fn described(&mut self, shape: ShapeBuilder) -> ShapeDesc {
         let ShapeBuilder { geometry, world_from_object, material, light } = shape;
         let id = MaterialId(self.desc.materials.len() as u32);
         let material = Arc::new(material.unwrap_or_else(Material::default_diffuse));
         self.desc.materials.push(NamedMaterial { name: None, material });
-        self.desc.shapes.push(ShapeDesc {
-            index: self.desc.shapes.len() as u32,
+        // Every shape has a material.
+        let index = id.0;
+        ShapeDesc {
+            index,
             geometry,
             world_from_object,
             reverse_orientation: false,
             material: Some(id),
             area_light: light,
             alpha: None,
-        });
-        self
+        }
     }
 
     /// Adds a light other than a shape.

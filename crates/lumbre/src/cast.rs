@@ -1,4 +1,4 @@
-//! Results of ray queries.
+//! Results of ray and point queries.
 
 use lumbre_math::{DVec2, DVec3};
 
@@ -16,6 +16,22 @@ pub struct CastHit {
     pub uv: DVec2,
     /// Whether the ray hit the outside.
     pub front: bool,
+    /// The 0-based index of the shape in its file.
+    pub shape: u32,
+    /// The triangle of a mesh, else 0.
+    pub primitive: u32,
+    /// The 0-based index of the outermost instance, if the shape is in one.
+    pub instance: Option<u32>,
+}
+
+/// The point of all surfaces that is nearest to a given one, in world space and double precision.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct CastPoint {
+    /// How far away it is, never negative.
+    pub distance: f64,
+    /// Where it is.
+    pub point: DVec3,
     /// The 0-based index of the shape in its file.
     pub shape: u32,
     /// The triangle of a mesh, else 0.

@@ -3,11 +3,12 @@
 use std::path::PathBuf;
 
 use lumbre_formats::FormatError;
+use lumbre_kernel::{NoClosestPoint, NoWindingNumber};
 use lumbre_render::RenderError;
 use lumbre_scene::BuildError;
 use thiserror::Error;
 
-/// Why a scene cannot be opened, rendered or saved.
+/// Why a scene cannot be opened, asked, rendered or saved.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -28,6 +29,12 @@ pub enum Error {
     /// The render options are invalid.
     #[error(transparent)]
     Render(#[from] RenderError),
+    /// A shape that may be nearer than all others has no method for nearest points.
+    #[error(transparent)]
+    NoClosestPoint(#[from] NoClosestPoint),
+    /// A shape has no inside.
+    #[error(transparent)]
+    NoWindingNumber(#[from] NoWindingNumber),
     /// The options for saving are invalid.
     #[error("{0}")]
     Options(String),
@@ -52,7 +59,9 @@ impl Error {
         match self {
             Self::Format(FormatError::Io { .. }) | Self::Write { .. } => ErrorKind::Io,
             Self::Format(FormatError::Limit { .. }) => ErrorKind::Limit,
-            Self::Format(_) | Self::Build(_) => ErrorKind::Input,
+            Self::Format(_) | Self::Build(_) | Self::NoClosestPoint(_) | Self::NoWindingNumber(_) => {
+                ErrorKind::Input
+            }
             Self::Render(_) | Self::Options(_) => ErrorKind::Options,
         }
     }

@@ -82,6 +82,7 @@ impl SceneInfo {
                 "bilinearmesh"
             }
             GeometryDesc::Csg(_) => "csg",
+            GeometryDesc::Custom(_) => "custom",
         };
         *self.shapes.entry(name.to_owned()).or_default() += 1;
         if let Some(AreaLightDesc { .. }) = shape.area_light {

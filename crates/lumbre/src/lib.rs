@@ -43,7 +43,7 @@ pub use lumbre_shading as shading;
 
 pub use background::Background;
 pub use builder::{SceneBuilder, ShapeBuilder};
-pub use cast::CastHit;
+pub use cast::{CastHit, CastPoint};
 pub use error::{Error, ErrorKind};
 pub use files::{SaveOptions, read_image, write_image};
 pub use info::SceneInfo;

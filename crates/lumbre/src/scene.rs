@@ -7,10 +7,11 @@ use std::time::{Duration, Instant};
 use lumbre_formats::{Diagnostic, Diagnostics, FormatError, Place, ReadOptions, open_scenes};
 use lumbre_geometry::Ray;
 use lumbre_kernel::Hit;
+use lumbre_math::DVec3;
 use lumbre_render::{CancelToken, Feature, NoProgress, Progress, RenderOptions, Stop, render};
 use lumbre_scene::{BuildWarning, Footprint, SceneDesc};
 
-use crate::{CastHit, Error, Picture, SceneInfo};
+use crate::{CastHit, CastPoint, Error, Picture, SceneInfo};
 
 /// A scene, ready for ray queries and rendering on any number of threads.
 #[derive(Debug)]
@@ -122,6 +123,50 @@ impl Scene {
     /// The number of hits in the ray's range.
     pub fn count(&self, ray: &Ray) -> usize {
         self.resolved.accel().count(ray)
+    }
+
+    /// The nearest point of all surfaces within `max_distance` (which may be infinite); `None` where there is none so near. Its
+    /// distance to triangles and exact shapes is right to the last digits.
+    ///
+    /// ```
+    /// use lumbre::geometry::Sphere;
+    /// use lumbre::{DVec3, SceneBuilder, ShapeBuilder};
+    ///
+    /// let ball = Sphere::new(DVec3::new(0.0, 0.0, 3.0), 2.0)?;
+    /// let scene = SceneBuilder::new().shape(ShapeBuilder::exact(ball)).build()?;
+    /// let nearest = scene.closest_point(DVec3::new(0.0, 0.0, -4.0), f64::INFINITY)?.expect("there is a ball");
+    /// assert_eq!((nearest.distance, nearest.point), (5.0, DVec3::new(0.0, 0.0, 1.0)));
+    /// assert!(scene.is_inside(DVec3::new(0.0, 1.0, 2.0)));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::NoClosestPoint`] where something may be nearer that has no answer: CSG, custom geometry without a method, or some
+    /// shapes under maps that do not keep angles.
+    pub fn closest_point(&self, point: DVec3, max_distance: f64) -> Result<Option<CastPoint>, Error> {
+        let nearest = self.resolved.accel().closest_point(point, max_distance)?;
+        Ok(nearest.map(|nearest| CastPoint {
+            distance: nearest.distance,
+            point: nearest.point,
+            shape: self.resolved.shape_of(nearest.id),
+            primitive: nearest.primitive,
+            instance: nearest.instances.first().copied(),
+        }))
+    }
+
+    /// Whether a point is inside of what stands here, even-odd: where two bodies overlap it is outside again. What is open has no
+    /// inside, and the answer there is some guess, always the same one.
+    pub fn is_inside(&self, point: DVec3) -> bool {
+        self.resolved.accel().is_inside(point)
+    }
+
+    /// How often surfaces wind around a point: 1 within a closed body, 0 without, the sum where bodies overlap, and a number in
+    /// between where a mesh is open. More than 0.5 is a good rule for "inside" where meshes have gaps.
+    ///
+    /// # Errors
+    /// [`Error::NoWindingNumber`] where there are open shapes other than meshes.
+    pub fn winding_number(&self, point: DVec3) -> Result<f64, Error> {
+        Ok(self.resolved.accel().winding_number(point)?)
     }
 
     fn cast_hit(&self, ray: &Ray, hit: &Hit) -> CastHit {

@@ -376,7 +376,10 @@ impl<'b, 'd> Converter<'b, 'd> {
                         }
                     }
                     GeometryDesc::Csg(csg) => lists.extend(csg.operands.iter_mut()),
-                    GeometryDesc::Exact(_) | GeometryDesc::Coloured(_) | GeometryDesc::BilinearMesh(_) => {}
+                    GeometryDesc::Exact(_)
+                    | GeometryDesc::Coloured(_)
+                    | GeometryDesc::BilinearMesh(_)
+                    | GeometryDesc::Custom(_) => {}
                 }
             }
         }

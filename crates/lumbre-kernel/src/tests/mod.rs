@@ -9,6 +9,7 @@ mod build;
 mod deforming;
 mod f32_ray;
 mod file;
+mod implicit;
 mod inside;
 mod motion;
 mod nearest;

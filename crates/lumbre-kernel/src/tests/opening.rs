@@ -394,7 +394,7 @@ fn parts_follow_the_tree_that_they_are_of_and_stand_for_the_whole_of_another() {
         Arc::get_mut(&mut inner).expect("nobody else holds it").refit(geometries).unwrap();
         accel.refit(with_tree(&accel, &inner)).unwrap();
         assert_opened(&accel);
-        check_rays(&accel, &mut random, 150);
+        check_rays(&accel, &mut random, 600);
         // A half of it vanishes, so that there may be no parts any more.
         accel.refit(with_tree(&accel, &Arc::new(build(vec![])))).unwrap();
         let flat = |p: &Vec3| if p.x > 0.0 { Vec3::ZERO } else { *p };
@@ -402,7 +402,7 @@ fn parts_follow_the_tree_that_they_are_of_and_stand_for_the_whole_of_another() {
         let geometries = vec![Geometry { id: 1000, kind: GeometryKind::Mesh(Arc::new(half)) }];
         Arc::get_mut(&mut inner).expect("nobody else holds it").refit(geometries).unwrap();
         accel.refit(with_tree(&accel, &inner)).unwrap();
-        check_rays(&accel, &mut random, 150);
+        check_rays(&accel, &mut random, 600);
     });
 }
 

@@ -54,8 +54,9 @@ fn crowd(places: &[usize]) -> Vec<Geometry> {
 /// Rays at these places meet what is there.
 fn check_crowd(accel: &Accel, random: &mut Random, places: &[usize]) {
     for &number in places {
-        let hits: usize = (0..repeats(50)).map(|_| check(accel, &ray(random, place(number), RADIUS))).sum();
-        assert!(hits > repeats(50) / 5, "{hits}");
+        let count = repeats(100);
+        let hits: usize = (0..count).map(|_| check(accel, &ray(random, place(number), RADIUS))).sum();
+        assert!(hits > count / 10, "{hits} of {count}");
     }
 }
 

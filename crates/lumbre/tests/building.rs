@@ -1,0 +1,155 @@
+//! Scenes made in Rust: what the builder's words mean.
+
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
+use lumbre::description::{Camera, FilmDesc, LightDesc};
+use lumbre::geometry::{Aabb, Cylinder, ImplicitSurface, Sphere};
+use lumbre::image::Rgb;
+use lumbre::shading::Material;
+use lumbre::{DVec3, Error, Ray, Scene, SceneBuilder, ShapeBuilder, Transform};
+
+const CENTER: DVec3 = DVec3::new(2.0, -1.0, 3.5);
+
+fn sky() -> LightDesc {
+    LightDesc::Infinite {
+        world_from_light: Transform::IDENTITY,
+        radiance: Rgb::new(0.75, 0.5, 0.25),
+        image: None,
+    }
+}
+
+fn film(width: u32, height: u32) -> FilmDesc {
+    FilmDesc { width: Some(width), height: Some(height), ..FilmDesc::default() }
+}
+
+/// A ball by its equation.
+fn equation(radius: f64) -> ImplicitSurface {
+    let bounds = Aabb { min: DVec3::splat(-radius), max: DVec3::splat(radius) }.outward(2);
+    ImplicitSurface::new(bounds, move |[x, y, z]| x.square() + y.square() + z.square() - radius * radius)
+        .unwrap()
+}
+
+#[test]
+fn what_stands_to_the_right_is_to_the_right_in_the_picture() {
+    // Looking along +y with z up, as the smallest example does: +x is to the right.
+    let ball = |x: f64, colour: Rgb| {
+        let ball = Sphere::new(DVec3::new(x, 0.0, 0.9), 0.9).unwrap();
+        ShapeBuilder::exact(ball).shining(colour)
+    };
+    let eye = DVec3::new(0.0, -8.0, 3.0);
+    let scene = SceneBuilder::new()
+        .shape(ball(-1.2, Rgb::new(1.0, 0.0, 0.0)))
+        .shape(ball(1.2, Rgb::new(0.0, 0.0, 1.0)))
+        .camera(Camera::perspective(eye, DVec3::new(0.0, 0.0, 0.9), DVec3::Z, 32.0).unwrap())
+        .film(film(64, 40))
+        .build()
+        .unwrap();
+    let mut options = scene.options();
+    options.stop = lumbre::Stop::at(4);
+    let picture = scene.render(&options).unwrap();
+    let (mut left, mut right) = (Rgb::BLACK, Rgb::BLACK);
+    for (i, pixel) in picture.image().pixels().iter().enumerate() {
+        let side = if i % 64 < 32 { &mut left } else { &mut right };
+        *side += *pixel;
+    }
+    assert!(left.r > 20.0 * left.b.max(0.01) && right.b > 20.0 * right.r.max(0.01), "{left:?}, {right:?}");
+}
+
+#[test]
+fn geometry_of_a_program_s_own_is_rendered_as_the_exact_shape_that_it_describes() {
+    let place = Transform::translate(CENTER) * Transform::scale(DVec3::new(1.5, 0.5, 1.0)).unwrap();
+    let scene = |shape: ShapeBuilder| {
+        SceneBuilder::new()
+            .shape(shape.at(place).material(Material::diffuse(Rgb::splat(0.6))))
+            .light(sky())
+            .camera(Camera::perspective(CENTER - 6.0 * DVec3::Y, CENTER, DVec3::Z, 30.0).unwrap())
+            .film(film(24, 16))
+            .build()
+            .unwrap()
+    };
+    let exact = scene(ShapeBuilder::exact(Sphere::new(DVec3::ZERO, 0.75).unwrap()));
+    let custom = scene(ShapeBuilder::custom(equation(0.75)));
+    let image = |scene: &Scene| {
+        let mut options = scene.options();
+        options.stop = lumbre::Stop::at(64);
+        scene.render(&options).unwrap().image().clone()
+    };
+    let (expected, found) = (image(&exact), image(&custom));
+    let mut seen = 0;
+    for (found, expected) in found.pixels().iter().zip(expected.pixels()) {
+        for (found, expected) in [(found.r, expected.r), (found.g, expected.g), (found.b, expected.b)] {
+            assert!((found - expected).abs() < 0.02 * expected.max(0.1), "{found} for {expected}");
+        }
+        seen += usize::from(expected.r < 0.74);
+    }
+    assert!(seen > 50, "the ball covers {seen} pixels");
+    // The same hits, and the framing of an automatic camera knows its box.
+    let ray = Ray::new(CENTER - 6.0 * DVec3::Y, DVec3::Y);
+    assert!((custom.closest(&ray).unwrap().t - 5.625).abs() < 1e-12);
+    assert_eq!(custom.count(&ray), 2);
+    let bounds = custom.info().bounds.unwrap();
+    assert!((bounds.size() - DVec3::new(2.25, 0.75, 1.5)).length() < 1e-6, "{bounds:?}");
+}
+
+#[test]
+fn instances_stand_in_all_of_their_places_and_none_elsewhere() {
+    let places = [DVec3::ZERO, 3.0 * DVec3::X, 6.0 * DVec3::X];
+    let balls = [equation(0.5)].map(ShapeBuilder::custom);
+    let scene = SceneBuilder::new()
+        .shape(ShapeBuilder::exact(Sphere::new(CENTER, 0.25).unwrap()))
+        .instances(balls, places.map(Transform::translate))
+        .build()
+        .unwrap();
+    for (i, place) in places.iter().enumerate() {
+        let hit = scene.closest(&Ray::new(*place - 4.0 * DVec3::Z, DVec3::Z)).unwrap();
+        assert!((hit.t - 3.5).abs() < 1e-12);
+        assert_eq!((hit.instance, hit.shape), (Some(i as u32), 1));
+        assert!(scene.is_inside(*place + 0.4 * DVec3::Y));
+    }
+    assert!(!scene.any(&Ray::new(DVec3::new(1.5, 0.0, -4.0), DVec3::Z)));
+    assert_eq!(scene.closest(&Ray::new(CENTER - DVec3::Z, DVec3::Z)).unwrap().instance, None);
+    assert!(SceneBuilder::new().instances([], [Transform::IDENTITY]).build().is_ok());
+}
+
+#[test]
+fn points_are_asked_for_what_is_nearest_and_whether_they_are_inside() {
+    let scene = SceneBuilder::new()
+        .shape(ShapeBuilder::exact(Sphere::new(CENTER, 2.0).unwrap()))
+        .shape(ShapeBuilder::exact(Sphere::new(CENTER + 10.0 * DVec3::X, 3.0).unwrap()))
+        .build()
+        .unwrap();
+    let nearest = scene.closest_point(CENTER + 5.5 * DVec3::X, f64::INFINITY).unwrap().unwrap();
+    assert_eq!((nearest.distance, nearest.shape), (1.5, 1));
+    assert_eq!(nearest.point, CENTER + 7.0 * DVec3::X);
+    assert_eq!(scene.closest_point(CENTER + 5.5 * DVec3::X, 1.0).unwrap(), None);
+    assert!(scene.is_inside(CENTER + DVec3::Z) && !scene.is_inside(CENTER + 4.0 * DVec3::X));
+    assert_eq!(scene.winding_number(CENTER + 8.0 * DVec3::X).unwrap(), 1.0);
+    assert_eq!(scene.winding_number(CENTER + 4.0 * DVec3::X).unwrap(), 0.0);
+
+    // What has no answer says so.
+    let tube = Cylinder::new(DVec3::ZERO, DVec3::Z, 1.0, false).unwrap();
+    let open = SceneBuilder::new()
+        .shape(ShapeBuilder::exact(tube))
+        .shape(ShapeBuilder::custom(equation(0.25)).at(Transform::translate(CENTER)))
+        .build()
+        .unwrap();
+    assert!(matches!(open.closest_point(CENTER, f64::INFINITY), Err(Error::NoClosestPoint(_))));
+    assert!(matches!(open.winding_number(CENTER), Err(Error::NoWindingNumber(_))));
+    assert!(open.closest_point(0.5 * DVec3::Z, f64::INFINITY).unwrap().is_some_and(|near| near.shape == 0));
+}
+
+#[test]
+fn a_light_of_custom_geometry_shines_and_cannot_shine_by_power() {
+    let builder = SceneBuilder::new()
+        .shape(ShapeBuilder::custom(equation(0.5)).shining(Rgb::splat(2.0)))
+        .camera(Camera::perspective(4.0 * DVec3::X, DVec3::ZERO, DVec3::Z, 5.0).unwrap())
+        .film(film(4, 4));
+    let mut by_power = builder.description().clone();
+    by_power.shapes[0].area_light.as_mut().unwrap().power = Some(5.0);
+    let wrong = Scene::from_description(by_power).unwrap_err();
+    assert!(wrong.to_string().contains("shape 0: custom geometry cannot shine by power"), "{wrong}");
+
+    let scene = builder.build().unwrap();
+    let mean = scene.render(&scene.options()).unwrap().image().mean();
+    assert!((mean.r - 2.0).abs() < 1e-5, "{mean:?}");
+}
