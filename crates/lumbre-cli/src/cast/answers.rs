@@ -1,9 +1,9 @@
-//! What rays hit, as the bytes of CSV, .npy or .npz.
+//! What rays hit, and what is at points, as the bytes of CSV, .npy or .npz.
 
 use std::fmt;
 use std::io::Write;
 
-use lumbre::CastHit;
+use lumbre::{CastHit, CastPoint};
 
 /// The forms that answers can take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,34 +23,42 @@ pub(super) enum Table {
     Hits,
     /// A ray and a number of this name.
     Numbers(&'static str),
+    /// A point and the nearest point of all surfaces, or nothing.
+    Nearest,
+    /// A point and whether it is this.
+    Flags(&'static str),
+    /// A point and a real number of this name.
+    Reals(&'static str),
 }
 
 impl Table {
     /// The first line of CSV.
     pub(super) fn header(self) -> String {
         match self {
-            Self::Hits => COLUMNS.iter().map(|column| column.name).collect::<Vec<_>>().join(","),
+            Self::Hits => names(COLUMNS).join(","),
+            Self::Nearest => names(NEAREST).join(","),
             Self::Numbers(name) => format!("ray,{name}"),
+            Self::Flags(name) | Self::Reals(name) => format!("point,{name}"),
         }
     }
 
     /// The NumPy type of an answer.
     pub(super) fn descr(self) -> String {
         match self {
-            Self::Hits => {
-                let fields: Vec<String> =
-                    COLUMNS.iter().map(|c| format!("('{}', '{}')", c.name, c.kind)).collect();
-                format!("[{}]", fields.join(", "))
-            }
+            Self::Hits => record(COLUMNS),
+            Self::Nearest => record(NEAREST),
             Self::Numbers(_) => "'<u8'".to_owned(),
+            Self::Flags(_) => "'|b1'".to_owned(),
+            Self::Reals(_) => "'<f8'".to_owned(),
         }
     }
 
     /// The arrays of a .npz: names and NumPy types.
     pub(super) fn arrays(self) -> Vec<(&'static str, String)> {
         match self {
-            Self::Hits => COLUMNS.iter().map(|c| (c.name, format!("'{}'", c.kind))).collect(),
-            Self::Numbers(name) => vec![(name, self.descr())],
+            Self::Hits => arrays(COLUMNS),
+            Self::Nearest => arrays(NEAREST),
+            Self::Numbers(name) | Self::Flags(name) | Self::Reals(name) => vec![(name, self.descr())],
         }
     }
 }
@@ -74,13 +82,49 @@ impl Block {
 
     /// Adds what a ray hit, or nothing.
     pub(super) fn push_hit(&mut self, ray: u64, hit: Option<&CastHit>) {
-        self.answers += 1;
         match self.form {
             Form::Csv => push_line(&mut self.parts[0], ray, hit),
-            Form::Npy => COLUMNS.iter().for_each(|column| (column.bytes)(ray, hit, &mut self.parts[0])),
-            Form::Npz => {
-                COLUMNS.iter().zip(&mut self.parts).for_each(|(column, part)| (column.bytes)(ray, hit, part));
-            }
+            Form::Npy | Form::Npz => self.push_record(COLUMNS, ray, hit),
+        }
+        self.answers += 1;
+    }
+
+    /// Adds what is nearest to a point, or nothing.
+    pub(super) fn push_nearest(&mut self, point: u64, nearest: Option<&CastPoint>) {
+        match self.form {
+            Form::Csv => push_nearest_line(&mut self.parts[0], point, nearest),
+            Form::Npy | Form::Npz => self.push_record(NEAREST, point, nearest),
+        }
+        self.answers += 1;
+    }
+
+    /// The values of an answer: one after another, or each into its own array.
+    fn push_record<T>(&mut self, columns: &[Column<T>], number: u64, answer: Option<&T>) {
+        for (i, column) in columns.iter().enumerate() {
+            let part = if self.form == Form::Npz { i } else { 0 };
+            (column.bytes)(number, answer, &mut self.parts[part]);
+        }
+    }
+
+    /// Adds whether something holds of a point.
+    pub(super) fn push_flag(&mut self, point: u64, holds: bool) {
+        self.answers += 1;
+        let out = &mut self.parts[0];
+        if self.form == Form::Csv {
+            push_text(out, format_args!("{point},{}\n", u8::from(holds)));
+        } else {
+            out.push(u8::from(holds));
+        }
+    }
+
+    /// Adds a real number of a point, in CSV so that it reads back to the same bits.
+    pub(super) fn push_real(&mut self, point: u64, number: f64) {
+        self.answers += 1;
+        let out = &mut self.parts[0];
+        if self.form == Form::Csv {
+            push_text(out, format_args!("{point},{number:?}\n"));
+        } else {
+            out.extend(number.to_le_bytes());
         }
     }
 
@@ -118,11 +162,41 @@ fn push_line(out: &mut Vec<u8>, ray: u64, hit: Option<&CastHit>) {
     out.push(b'\n');
 }
 
+fn push_nearest_line(out: &mut Vec<u8>, point: u64, nearest: Option<&CastPoint>) {
+    let Some(nearest) = nearest else {
+        return push_text(out, format_args!("{point},0,,,,,,,\n"));
+    };
+    push_text(out, format_args!("{point},1"));
+    let p = nearest.point;
+    for number in [nearest.distance, p.x, p.y, p.z] {
+        push_text(out, format_args!(",{number:?}"));
+    }
+    push_text(out, format_args!(",{},{},", nearest.shape, nearest.primitive));
+    if let Some(instance) = nearest.instance {
+        push_text(out, format_args!("{instance}"));
+    }
+    out.push(b'\n');
+}
+
 /// A column of the answers: its name, its NumPy type, and its little-endian bytes for one answer.
-struct Column {
+struct Column<T> {
     name: &'static str,
     kind: &'static str,
-    bytes: fn(u64, Option<&CastHit>, &mut Vec<u8>),
+    bytes: fn(u64, Option<&T>, &mut Vec<u8>),
+}
+
+fn names<T>(columns: &[Column<T>]) -> Vec<&'static str> {
+    columns.iter().map(|column| column.name).collect()
+}
+
+/// The NumPy type of a record.
+fn record<T>(columns: &[Column<T>]) -> String {
+    let fields: Vec<String> = columns.iter().map(|c| format!("('{}', '{}')", c.name, c.kind)).collect();
+    format!("[{}]", fields.join(", "))
+}
+
+fn arrays<T>(columns: &[Column<T>]) -> Vec<(&'static str, String)> {
+    columns.iter().map(|c| (c.name, format!("'{}'", c.kind))).collect()
 }
 
 macro_rules! number {
@@ -131,8 +205,7 @@ macro_rules! number {
             name: $name,
             kind: "<f8",
             bytes: |_, hit, out| {
-                let value: fn(&CastHit) -> f64 = $value;
-                out.extend(hit.map_or(f64::NAN, value).to_le_bytes());
+                out.extend(hit.map_or(f64::NAN, $value).to_le_bytes());
             },
         }
     };
@@ -144,15 +217,14 @@ macro_rules! index {
             name: $name,
             kind: "<i8",
             bytes: |_, hit, out| {
-                let value: fn(&CastHit) -> Option<u32> = $value;
-                out.extend(hit.and_then(value).map_or(-1, i64::from).to_le_bytes());
+                out.extend(hit.and_then($value).map_or(-1, i64::from).to_le_bytes());
             },
         }
     };
 }
 
 /// What .npy and .npz hold: a miss has `hit` false, t = inf, NaN coordinates and -1 for names.
-const COLUMNS: &[Column] = &[
+const COLUMNS: &[Column<CastHit>] = &[
     Column { name: "ray", kind: "<u8", bytes: |ray, _, out| out.extend(ray.to_le_bytes()) },
     Column { name: "hit", kind: "|b1", bytes: |_, hit, out| out.push(u8::from(hit.is_some())) },
     Column {
@@ -176,4 +248,23 @@ const COLUMNS: &[Column] = &[
     index!("shape", |hit| Some(hit.shape)),
     index!("prim", |hit| Some(hit.primitive)),
     index!("instance", |hit| hit.instance),
+];
+
+/// The same of points: where there is nothing near, `found` is false and the distance inf.
+const NEAREST: &[Column<CastPoint>] = &[
+    Column { name: "point", kind: "<u8", bytes: |point, _, out| out.extend(point.to_le_bytes()) },
+    Column { name: "found", kind: "|b1", bytes: |_, nearest, out| out.push(u8::from(nearest.is_some())) },
+    Column {
+        name: "distance",
+        kind: "<f8",
+        bytes: |_, nearest, out| {
+            out.extend(nearest.map_or(f64::INFINITY, |nearest| nearest.distance).to_le_bytes());
+        },
+    },
+    number!("px", |nearest| nearest.point.x),
+    number!("py", |nearest| nearest.point.y),
+    number!("pz", |nearest| nearest.point.z),
+    index!("shape", |nearest| Some(nearest.shape)),
+    index!("prim", |nearest| Some(nearest.primitive)),
+    index!("instance", |nearest| nearest.instance),
 ];

@@ -5,13 +5,14 @@ use std::io::{self, Read, Seek, SeekFrom};
 
 use super::bytes::Bytes;
 use super::npy::{Header, HeaderError};
-use super::rays::{COLUMNS, Piece};
+use super::rays::{Piece, Rows};
 use crate::failure::Failure;
 
 /// Reads the rows of an array.
 pub(super) struct ArrayReader {
     bytes: Bytes,
     header: Header,
+    kind: Rows,
     /// Where columns come first: the file that they stand in, and where they begin.
     columns: Option<(File, u64)>,
     /// Rows that were read.
@@ -23,15 +24,18 @@ impl ArrayReader {
     ///
     /// # Errors
     /// [`Failure`] when it is wrong, and when a file has not the size that it asks for.
-    pub(super) fn new(mut bytes: Bytes) -> Result<Self, Failure> {
+    pub(super) fn new(mut bytes: Bytes, kind: Rows) -> Result<Self, Failure> {
         let header = Header::read(|count| bytes.read_up_to(count)).map_err(|e| match e {
             HeaderError::Read(failure) => failure,
             HeaderError::Wrong(what) => Failure::input(format!("{}: {what}", bytes.name())),
         })?;
-        let mut this = Self { bytes, header, columns: None, rows: 0 };
-        if this.header.columns != 6 && this.header.columns != 8 {
-            let found = this.header.columns;
-            return Err(this.wrong(format!("{found} columns (expected 6 or 8: {})", COLUMNS.join(", "))));
+        let mut this = Self { bytes, header, kind, columns: None, rows: 0 };
+        let (least, most) = (kind.needed(), kind.columns().len());
+        let found = this.header.columns;
+        if found != least as u64 && found != most as u64 {
+            let or_more = if most > least { format!(" or {most}") } else { String::new() };
+            let expected = format!("{least}{or_more}: {}", kind.columns().join(", "));
+            return Err(this.wrong(format!("{found} columns (expected {expected})")));
         }
         if let Some(file) = this.bytes.file() {
             let size = file.metadata().map_err(|e| this.bytes.failure(e))?.len();
@@ -41,6 +45,11 @@ impl ArrayReader {
             this.columns = Some(this.columns()?);
         }
         Ok(this)
+    }
+
+    /// What its rows are.
+    pub(super) fn rows(&self) -> Rows {
+        self.kind
     }
 
     /// What the array is.

@@ -1,9 +1,9 @@
-//! Rays as comma-separated text.
+//! Rays and points as comma-separated text.
 
-use lumbre::{DVec3, Ray};
+use lumbre::Ray;
 
 use super::bytes::Bytes;
-use super::rays::{COLUMNS, Piece};
+use super::rays::{Piece, Rows};
 use crate::failure::Failure;
 
 /// Reads the lines of a text.
@@ -28,18 +28,19 @@ impl TextReader {
     ///
     /// # Errors
     /// [`Failure`] when it is wrong.
-    pub(super) fn new(bytes: Bytes) -> Result<Self, Failure> {
+    pub(super) fn new(bytes: Bytes, rows: Rows) -> Result<Self, Failure> {
         let mut this = Self { bytes, header: Header::default(), rays: 0, lines: 0, failure: None };
         let mut line = Vec::new();
         while let Some(text) = this.read_line(&mut line)? {
             let text = text.strip_prefix('\u{feff}').filter(|_| this.lines == 1).unwrap_or(text);
             if !text.trim().is_empty() {
-                this.header = Header::parse(text).map_err(|wrong| place(this.name(), this.lines, wrong))?;
+                this.header =
+                    Header::parse(text, rows).map_err(|wrong| place(this.name(), this.lines, wrong))?;
                 return Ok(this);
             }
             line.clear();
         }
-        let what = format!("no rays (expected a header among {})", COLUMNS.join(","));
+        let what = format!("no {} (expected a header among {})", rows.name(), rows.columns().join(","));
         Err(place(this.name(), 1, (1, what)))
     }
 
@@ -108,7 +109,7 @@ impl TextReader {
     }
 }
 
-/// The rays of some lines.
+/// The rays, or points, of some lines.
 ///
 /// # Errors
 /// [`Failure::Input`] with the line and column of what is wrong.
@@ -131,7 +132,8 @@ fn place(name: &str, line: u64, (column, what): Wrong) -> Failure {
 /// The numbers of a ray that the lines hold, by the header.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Header {
-    /// Where in a line each of [`COLUMNS`] stands.
+    rows: Rows,
+    /// Where in a line each of the columns stands.
     place: [Option<usize>; 8],
     width: usize,
 }
@@ -141,24 +143,25 @@ impl Header {
     ///
     /// # Errors
     /// Unknown, repeated and missing columns.
-    fn parse(line: &str) -> Result<Self, Wrong> {
+    fn parse(line: &str, rows: Rows) -> Result<Self, Wrong> {
+        let columns = rows.columns();
         let mut place = [None; 8];
         for (i, (column, name)) in fields(line).enumerate() {
-            let Some(known) = COLUMNS.iter().position(|known| *known == name) else {
-                let expected = COLUMNS.join(",");
+            let Some(known) = columns.iter().position(|known| *known == name) else {
+                let expected = columns.join(",");
                 return Err((column, format!("unknown column \"{name}\" (expected {expected})")));
             };
             if place[known].replace(i).is_some() {
                 return Err((column, format!("column \"{name}\" stands twice")));
             }
         }
-        if let Some(missing) = (0..6).find(|i| place[*i].is_none()) {
-            return Err((1, format!("no column \"{}\"", COLUMNS[missing])));
+        if let Some(missing) = (0..rows.needed()).find(|i| place[*i].is_none()) {
+            return Err((1, format!("no column \"{}\"", columns[missing])));
         }
-        Ok(Self { place, width: place.iter().flatten().count() })
+        Ok(Self { rows, place, width: place.iter().flatten().count() })
     }
 
-    /// Reads a ray.
+    /// Reads a ray, or a point.
     ///
     /// # Errors
     /// What is no number, and too many or too few of them.
@@ -180,9 +183,10 @@ impl Header {
         if count < self.width {
             return Err((line.len() + 1, format!("{count} values (expected {})", self.width)));
         }
-        let value = |column: usize, default: f64| self.place[column].map_or(default, |i| values[i]);
-        let vector = |i: usize| DVec3::new(value(i, 0.0), value(i + 1, 0.0), value(i + 2, 0.0));
-        Ok(Ray::new(vector(0), vector(3)).with_range(value(6, 0.0), value(7, f64::INFINITY)))
+        // The end of the range is the only number that is not zero where it is left out.
+        let default = |column: usize| if column == 7 { f64::INFINITY } else { 0.0 };
+        let value = |column: usize| self.place[column].map_or(default(column), |i| values[i]);
+        Ok(self.rows.ray(value, true))
     }
 }
 

@@ -24,31 +24,34 @@ mod tests;
 use answers::{Block, Form, Table};
 use output::Output;
 use progress::Progress;
-use rays::RayReader;
+use rays::{RayReader, Rows};
 
 use crate::failure::Failure;
 use crate::overwrite::refuse_inputs;
 use crate::reading::{ReadingArguments, print_warnings};
 use crate::signals::Signals;
 
-/// Casts rays into a scene, in double precision.
+/// Casts rays into a scene, or asks what is at points, in double precision.
 #[derive(Args)]
 #[command(after_help = "Examples:
   lumbre cast scene.pbrt --rays rays.csv
   lumbre cast scene.pbrt --rays rays.npy --query all -o hits.npz
+  lumbre cast part.stl --points points.csv --query distance
   echo 'ox,oy,oz,dx,dy,dz
 0,0,-5,0,0,1' | lumbre cast scene.pbrt --rays -
 
 Rays: CSV with a header among ox,oy,oz,dx,dy,dz,tmin,tmax (tmin and tmax may be left out: 0 and inf), or a .npy array (N,6) or (N,8) of f4 or f8.
 t is in units of the given direction, which need not have length 1.
-Answers: ray,hit,t,px,py,pz,nx,ny,nz,u,v,front,shape,prim,instance (closest, all); ray,hit (any); ray,count (count).")]
+Points, for closest-point, distance, inside and winding: CSV with a header x,y,z, or a .npy array (N,3).
+Answers: ray,hit,t,px,py,pz,nx,ny,nz,u,v,front,shape,prim,instance (closest, all); ray,hit (any); ray,count (count);
+point,found,distance,px,py,pz,shape,prim,instance (closest-point); point,distance; point,inside; point,winding.")]
 pub(crate) struct Arguments {
     /// The scene.
     scene: PathBuf,
-    /// The rays, CSV or .npy; - is standard input.
-    #[arg(long, value_name = "FILE")]
+    /// The rays, or the points, CSV or .npy; - is standard input.
+    #[arg(long, visible_alias = "points", value_name = "FILE")]
     rays: PathBuf,
-    /// What to ask of each ray.
+    /// What to ask of each ray or point.
     #[arg(long, value_enum, default_value_t = Query::Closest)]
     query: Query,
     /// Where to write the answers, by extension .csv, .npy or .npz; standard output as CSV by default.
@@ -74,6 +77,14 @@ enum Query {
     All,
     /// How many hits there are.
     Count,
+    /// Of a point: the nearest point of all surfaces.
+    ClosestPoint,
+    /// Of a point: how far away that is.
+    Distance,
+    /// Of a point: whether it is inside of what stands there.
+    Inside,
+    /// Of a point: how often surfaces wind around it, 1 within a closed body.
+    Winding,
 }
 
 /// Runs the command.
@@ -93,7 +104,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(output) = &arguments.output {
         refuse_inputs(output, [arguments.scene.as_path(), &arguments.rays])?;
     }
-    let rays = RayReader::open(&arguments.rays)?;
+    let rays = RayReader::open(&arguments.rays, arguments.query.rows())?;
     let (scene, diagnostics) = arguments.reading.open(std::slice::from_ref(&arguments.scene))?;
     if !arguments.quiet {
         print_warnings(&diagnostics);
@@ -121,6 +132,18 @@ impl Query {
             Self::Closest | Self::All => Table::Hits,
             Self::Any => Table::Numbers("hit"),
             Self::Count => Table::Numbers("count"),
+            Self::ClosestPoint => Table::Nearest,
+            Self::Distance => Table::Reals("distance"),
+            Self::Inside => Table::Flags("inside"),
+            Self::Winding => Table::Reals("winding"),
+        }
+    }
+
+    /// What it is asked of.
+    fn rows(self) -> Rows {
+        match self {
+            Self::Closest | Self::Any | Self::All | Self::Count => Rows::Rays,
+            Self::ClosestPoint | Self::Distance | Self::Inside | Self::Winding => Rows::Points,
         }
     }
 
@@ -129,7 +152,7 @@ impl Query {
         match self {
             Self::Closest | Self::Any => 4096,
             Self::Count => 1024,
-            Self::All => 256,
+            Self::All | Self::ClosestPoint | Self::Distance | Self::Inside | Self::Winding => 256,
         }
     }
 }
@@ -200,7 +223,7 @@ impl Cast<'_> {
             }
             Ok(piece)
         };
-        let work = |piece: rays::Piece| Ok(self.answer(piece.first_ray, &decoder.rays(&piece)?));
+        let work = |piece: rays::Piece| Ok(self.answer(piece.first_ray, &decoder.rays(&piece)?)?);
         let done = pipeline::in_order(self.pool, next, work, |block| Ok(output.append(&block)?));
         match done.and_then(|()| Ok(check()?)) {
             Ok(()) => output.finish(),
@@ -212,7 +235,9 @@ impl Cast<'_> {
         }
     }
 
-    fn answer(&self, first: u64, rays: &[Ray]) -> Block {
+    /// # Errors
+    /// Where there is no answer for a point.
+    fn answer(&self, first: u64, rays: &[Ray]) -> Result<Block, Failure> {
         let mut block = Block::new(self.form, self.query.table());
         match self.query {
             Query::Closest => {
@@ -232,8 +257,27 @@ impl Cast<'_> {
             Query::Count => {
                 (first..).zip(rays).for_each(|(i, ray)| block.push_number(i, self.scene.count(ray) as u64))
             }
+            Query::ClosestPoint | Query::Distance => {
+                for (i, point) in (first..).zip(rays) {
+                    let nearest = self.scene.closest_point(point.origin, f64::INFINITY)?;
+                    match self.query {
+                        Query::Distance => {
+                            block.push_real(i, nearest.map_or(f64::INFINITY, |nearest| nearest.distance));
+                        }
+                        _ => block.push_nearest(i, nearest.as_ref()),
+                    }
+                }
+            }
+            Query::Inside => (first..)
+                .zip(rays)
+                .for_each(|(i, point)| block.push_flag(i, self.scene.is_inside(point.origin))),
+            Query::Winding => {
+                for (i, point) in (first..).zip(rays) {
+                    block.push_real(i, self.scene.winding_number(point.origin)?);
+                }
+            }
         }
-        block
+        Ok(block)
     }
 }
 

@@ -1,7 +1,8 @@
 //! Arrays in NumPy's .npy format, version 1.0 to 3.0, as far as lists of rays and answers need them.
 
-use lumbre::{DVec3, Ray};
+use lumbre::Ray;
 
+use super::rays::Rows;
 use crate::failure::Failure;
 
 /// What the header of an array of shape (N, M) of f4 or f8 says.
@@ -138,33 +139,36 @@ impl Header {
         }
     }
 
-    /// The rays of some rows. Where columns come first, those of all these rows do.
-    pub(super) fn rays(&self, bytes: &[u8]) -> Vec<Ray> {
+    /// The rays, or points, of some rows. Where columns come first, those of all these rows do.
+    pub(super) fn rays(&self, bytes: &[u8], rows: Rows) -> Vec<Ray> {
         match self.number {
             Number { size: 4, is_big_endian: false } => {
-                self.rays_of(bytes, |b| f64::from(f32::from_le_bytes(b)))
+                self.rays_of(bytes, rows, |b| f64::from(f32::from_le_bytes(b)))
             }
             Number { size: 4, is_big_endian: true } => {
-                self.rays_of(bytes, |b| f64::from(f32::from_be_bytes(b)))
+                self.rays_of(bytes, rows, |b| f64::from(f32::from_be_bytes(b)))
             }
-            Number { is_big_endian: false, .. } => self.rays_of(bytes, f64::from_le_bytes),
-            Number { is_big_endian: true, .. } => self.rays_of(bytes, f64::from_be_bytes),
+            Number { is_big_endian: false, .. } => self.rays_of(bytes, rows, f64::from_le_bytes),
+            Number { is_big_endian: true, .. } => self.rays_of(bytes, rows, f64::from_be_bytes),
         }
     }
 
-    fn rays_of<const SIZE: usize>(&self, bytes: &[u8], number: impl Fn([u8; SIZE]) -> f64) -> Vec<Ray> {
+    fn rays_of<const SIZE: usize>(
+        &self,
+        bytes: &[u8],
+        rows: Rows,
+        number: impl Fn([u8; SIZE]) -> f64,
+    ) -> Vec<Ray> {
         let (numbers, _) = bytes.as_chunks::<SIZE>();
         let columns = self.columns as usize;
-        let rows = numbers.len() / columns;
+        let count = numbers.len() / columns;
         let ray = |row: usize| {
             let value = |i: usize| {
-                number(numbers[if self.columns_first { i * rows + row } else { row * columns + i }])
+                number(numbers[if self.columns_first { i * count + row } else { row * columns + i }])
             };
-            let vector = |i: usize| DVec3::new(value(i), value(i + 1), value(i + 2));
-            let ray = Ray::new(vector(0), vector(3));
-            if columns == 8 { ray.with_range(value(6), value(7)) } else { ray }
+            rows.ray(value, columns > rows.needed())
         };
-        (0..rows).map(ray).collect()
+        (0..count).map(ray).collect()
     }
 }
 
@@ -192,6 +196,8 @@ pub(super) fn header(descr: &str, rows: u64) -> Vec<u8> {
 
 #[cfg(test)]
 mod tests {
+    use lumbre::DVec3;
+
     use super::*;
 
     fn read(mut bytes: &[u8]) -> Result<Header, HeaderError> {
@@ -214,7 +220,7 @@ mod tests {
             let header = read(&file(&text)).unwrap();
             assert_eq!(header.length, 10 + text.len() as u64);
             header.check_size(data.len() as u64).unwrap();
-            header.rays(&data)
+            header.rays(&data, Rows::Rays)
         };
         let rows: Vec<f64> = (1..=12).map(f64::from).collect();
         let by_columns: Vec<f64> = (0..12).map(|i| rows[i % 2 * 6 + i / 2]).collect();

@@ -1,8 +1,8 @@
-//! Lists of rays, read piece by piece from CSV or .npy.
+//! Lists of rays or points, read piece by piece from CSV or .npy.
 
 use std::path::Path;
 
-use lumbre::Ray;
+use lumbre::{DVec3, Ray};
 
 use super::array::ArrayReader;
 use super::bytes::Bytes;
@@ -10,12 +10,56 @@ use super::csv::{self, TextReader};
 use super::npy;
 use crate::failure::Failure;
 
-/// The numbers of a ray, by name.
-pub(super) const COLUMNS: [&str; 8] = ["ox", "oy", "oz", "dx", "dy", "dz", "tmin", "tmax"];
+/// What each row of an input is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Rows {
+    /// A ray.
+    #[default]
+    Rays,
+    /// A point, which is read as the origin of a ray without a direction.
+    Points,
+}
 
-/// Some rays in a row, as the input has them.
+impl Rows {
+    /// The numbers of a row, by name; those behind [`Rows::needed`] may be left out together.
+    pub(super) fn columns(self) -> &'static [&'static str] {
+        match self {
+            Self::Rays => &["ox", "oy", "oz", "dx", "dy", "dz", "tmin", "tmax"],
+            Self::Points => &["x", "y", "z"],
+        }
+    }
+
+    /// How many numbers a row has at least.
+    pub(super) fn needed(self) -> usize {
+        match self {
+            Self::Rays => 6,
+            Self::Points => 3,
+        }
+    }
+
+    /// In words.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Rays => "rays",
+            Self::Points => "points",
+        }
+    }
+
+    /// The ray, or the point, of some numbers in the order of the columns.
+    #[inline]
+    pub(super) fn ray(self, value: impl Fn(usize) -> f64, has_range: bool) -> Ray {
+        let vector = |i: usize| DVec3::new(value(i), value(i + 1), value(i + 2));
+        match self {
+            Self::Points => Ray::new(vector(0), DVec3::ZERO),
+            Self::Rays if has_range => Ray::new(vector(0), vector(3)).with_range(value(6), value(7)),
+            Self::Rays => Ray::new(vector(0), vector(3)),
+        }
+    }
+}
+
+/// Some rows, as the input has them.
 pub(super) struct Piece {
-    /// 0-based position of the first ray.
+    /// 0-based position of the first.
     pub first_ray: u64,
     /// The bytes of whole rows or lines.
     pub bytes: Vec<u8>,
@@ -23,7 +67,7 @@ pub(super) struct Piece {
     pub line: u64,
 }
 
-/// Reads a list of rays from beginning to end.
+/// Reads a list of rays or points from beginning to end.
 pub(super) enum RayReader {
     /// As an array.
     Array(ArrayReader),
@@ -32,24 +76,24 @@ pub(super) enum RayReader {
 }
 
 impl RayReader {
-    /// Opens a list of rays; `-` is standard input.
+    /// Opens a list; `-` is standard input.
     ///
     /// # Errors
     /// [`Failure`] when it cannot be read or what it begins with is wrong.
-    pub(super) fn open(path: &Path) -> Result<Self, Failure> {
-        Self::new(Bytes::open(path)?)
+    pub(super) fn open(path: &Path, rows: Rows) -> Result<Self, Failure> {
+        Self::new(Bytes::open(path)?, rows)
     }
 
     /// Reads what the bytes begin with.
     ///
     /// # Errors
     /// As [`RayReader::open`].
-    pub(super) fn new(bytes: Bytes) -> Result<Self, Failure> {
+    pub(super) fn new(bytes: Bytes, rows: Rows) -> Result<Self, Failure> {
         let (bytes, is_array) = bytes.starts_with(npy::MAGIC)?;
         if is_array {
-            ArrayReader::new(bytes).map(Self::Array)
+            ArrayReader::new(bytes, rows).map(Self::Array)
         } else {
-            TextReader::new(bytes).map(Self::Text)
+            TextReader::new(bytes, rows).map(Self::Text)
         }
     }
 
@@ -67,7 +111,7 @@ impl RayReader {
     /// What turns pieces into rays, on any thread.
     pub(super) fn decoder(&self) -> Decoder {
         match self {
-            Self::Array(reader) => Decoder::Array(reader.header().clone()),
+            Self::Array(reader) => Decoder::Array(reader.header().clone(), reader.rows()),
             Self::Text(reader) => Decoder::Text(reader.name().to_owned(), reader.header().clone()),
         }
     }
@@ -83,8 +127,8 @@ impl RayReader {
 
 /// Turns pieces into rays.
 pub(super) enum Decoder {
-    /// Of an array.
-    Array(npy::Header),
+    /// Of an array, and what its rows are.
+    Array(npy::Header, Rows),
     /// Of text, with its name for messages.
     Text(String, csv::Header),
 }
@@ -96,7 +140,7 @@ impl Decoder {
     /// [`Failure::Input`] with the line and column of what is wrong.
     pub(super) fn rays(&self, piece: &Piece) -> Result<Vec<Ray>, Failure> {
         match self {
-            Self::Array(header) => Ok(header.rays(&piece.bytes)),
+            Self::Array(header, rows) => Ok(header.rays(&piece.bytes, *rows)),
             Self::Text(name, header) => csv::rays(name, header, piece),
         }
     }
@@ -105,8 +149,6 @@ impl Decoder {
 #[cfg(test)]
 mod tests {
     use std::io::{Cursor, Read};
-
-    use lumbre::DVec3;
 
     use super::*;
 
@@ -121,9 +163,13 @@ mod tests {
     }
 
     fn read(name: &str, bytes: &[u8], most: usize) -> Result<Vec<Ray>, String> {
+        read_rows(Rows::Rays, name, bytes, most)
+    }
+
+    fn read_rows(rows: Rows, name: &str, bytes: &[u8], most: usize) -> Result<Vec<Ray>, String> {
         let bytes = Bytes::from_reader(name, Pipe(Cursor::new(bytes.to_vec())));
         let all = || -> Result<Vec<Ray>, Failure> {
-            let mut reader = RayReader::new(bytes)?;
+            let mut reader = RayReader::new(bytes, rows)?;
             let decoder = reader.decoder();
             let mut rays = Vec::new();
             while let Some(piece) = reader.next(most)? {
@@ -149,6 +195,21 @@ mod tests {
                     Ray::new(DVec3::new(4.0, 5.0, 6.0), DVec3::new(1.0, 2.0, 3.0)).with_range(0.0, 70.0),
                 ]
             );
+        }
+    }
+
+    #[test]
+    fn points_have_three_numbers() {
+        for most in SIZES {
+            let points = read_rows(Rows::Points, "p.csv", b"z,x,y\n3,1,2\n-6,4,5e1\n", most).unwrap();
+            let places: Vec<DVec3> = points.iter().map(|point| point.origin).collect();
+            assert_eq!(places, [DVec3::new(1.0, 2.0, 3.0), DVec3::new(4.0, 50.0, -6.0)]);
+            let wrong = read_rows(Rows::Points, "p.csv", b"x,y,z,dx\n", most).unwrap_err();
+            assert_eq!(wrong, "p.csv:1:7: unknown column \"dx\" (expected x,y,z)");
+            let none = read_rows(Rows::Points, "p.csv", b"", most).unwrap_err();
+            assert_eq!(none, "p.csv:1:1: no points (expected a header among x,y,z)");
+            let wide = read_rows(Rows::Points, "p.npy", &array("False", "1", &[0.0; 8]), most).unwrap_err();
+            assert_eq!(wide, "p.npy: 8 columns (expected 3: x, y, z)");
         }
     }
 
