@@ -260,7 +260,7 @@ const CASES: &[(&str, &str)] = &[
     ),
     (
         "WorldBegin ObjectBegin \"a\" Shape \"sphere\" ObjectEnd ObjectBegin \"b\" Shape \"disk\" ObjectEnd\nShape \"csg\" \"string operands\" [\"a\" \"b\"]",
-        "2:13: object \"b\" has a disk that is no solid (expected a closed shape that is whole, such as a sphere or a capped cylinder, a plane, closed mesh or csg)",
+        "2:13: object \"b\" has a disk that is no solid (expected a closed shape that is whole, such as a sphere or a capped cylinder, a plane, an infinite cylinder, cone or quadric, a closed mesh or csg)",
     ),
     (
         "WorldBegin ObjectBegin \"a\" Shape \"sphere\" Shape \"csg\" \"string operands\" [\"a\" \"a\"]",

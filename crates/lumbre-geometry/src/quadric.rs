@@ -26,7 +26,8 @@ use crate::{
 /// its Cholesky factor, and is parametrised like the sphere.
 ///
 /// Every other quadric is a surface whose normal is along the gradient. A box clips the surface and leaves it
-/// open; without a box it is infinite, and cannot be a light. It is parametrised by projection along the axis k
+/// open; without a box it is infinite, cannot be a light, and is the boundary of the solid where the polynomial is negative, which
+/// CSG can use. It is parametrised by projection along the axis k
 /// nearest to its normal: u along axis k + 1 and v along axis k + 2, cyclically, as fractions of the clipping
 /// box, or as coordinates where there is none.
 #[derive(Clone, Debug)]
@@ -409,12 +410,12 @@ impl Quadric {
         normal.abs().element_sum() / (2.0 * clip.half_area())
     }
 
-    /// Whether it is closed.
+    /// Whether it separates an inside from an outside, bounded or not: unless it is clipped.
     pub fn is_solid(&self) -> bool {
-        self.ellipsoid.is_some()
+        self.clip.is_none()
     }
 
-    /// Whether `p` is inside a closed quadric.
+    /// Whether `p` is inside, where the polynomial is not positive; false for a clipped quadric.
     pub fn contains(&self, p: DVec3) -> bool {
         self.is_solid() && self.implicit(p).value <= 0.0
     }

@@ -5,8 +5,8 @@
 use std::sync::Arc;
 
 use lumbre_geometry::{
-    Aabb, Cone, Crossing, Crossings, Csg, Cuboid, Cylinder, Disk, PlacedShape, Plane, Quadric, Ray, Root,
-    Roots, Shape, ShapeError, Solid, Sphere, Surface, Torus,
+    Aabb, Cone, Crossing, Crossings, Csg, Cuboid, Cylinder, Disk, Leaf, LeafPart, PlacedShape, Plane,
+    Quadric, Ray, Root, Roots, Shape, ShapeError, Solid, Sphere, Surface, Torus,
 };
 use lumbre_math::random::RandomStream;
 use lumbre_math::{DVec3, Transform};
@@ -71,7 +71,7 @@ impl Scene {
     /// A solid of about the size of 1 around 0, in general position after `place`.
     fn solid(&mut self) -> Shape {
         let near = 0.25 * self.vector();
-        match self.random.next_below(8) {
+        match self.random.next_below(12) {
             0 => Sphere::new(near, self.between(0.6, 1.2)).unwrap().into(),
             1 => Cuboid::new(near - DVec3::splat(0.7), near + DVec3::new(0.5, 0.9, self.between(0.3, 1.0)))
                 .unwrap()
@@ -88,6 +88,19 @@ impl Scene {
                 // An ellipsoid with mixed terms.
                 let c = [1.5, 2.0, 3.5, 0.5, -0.75, 0.25, 0.5, -0.25, 0.125, -self.between(0.5, 2.0)];
                 Quadric::new(c, None).unwrap().into()
+            }
+            7 => Cylinder::infinite(near, self.vector(), self.between(0.3, 0.9)).unwrap().into(),
+            8..11 => {
+                // A paraboloid, hyperboloids of one sheet and of two, a double cone, a saddle, two planes that cross.
+                let [a, b, c, i, j] = [
+                    [1.0, 1.5, 0.0, -1.0, -0.25],
+                    [1.0, 2.0, -1.5, 0.25, -0.2],
+                    [1.0, 2.0, -1.5, 0.25, 0.2],
+                    [1.0, 2.0, -1.5, 0.0, 0.0],
+                    [1.0, -1.5, 0.0, 1.0, 0.1],
+                    [1.0, -1.5, 0.0, 0.0, 0.0],
+                ][self.random.next_below(6)];
+                Quadric::new([a, b, c, 0.25, 0.0, -0.125, 0.0, 0.0, i, j], None).unwrap().into()
             }
             _ => Plane::new(near, self.vector()).unwrap().into(),
         }
@@ -417,9 +430,81 @@ fn what_encloses_nothing_is_refused_and_so_is_endless_nesting() {
     assert!(matches!(refused, Err(ShapeError::Degenerate(why)) if why.contains("encloses nothing")));
     assert!(Csg::union(vec![]).is_err());
     let mut nested = cuboid(DVec3::ONE, DVec3::new(2.0, 3.0, 4.0));
-    for _ in 1..64 {
+    for _ in 1..Csg::MAX_DEPTH {
         nested = Csg::union(vec![nested]).unwrap();
     }
     assert!(nested.closest(&Ray::new(DVec3::ZERO, DVec3::new(1.5, 2.0, 2.5))).is_some());
     assert!(Csg::union(vec![nested]).is_err());
+}
+
+#[test]
+fn a_bowl_is_cut_from_an_open_paraboloid() {
+    // y ≤ 1 - x² - z², within a cylinder from y = -1 to 1.
+    let bowl: Shape = Quadric::new([1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0], None).unwrap().into();
+    let can: Shape = Cylinder::new(-DVec3::Y, DVec3::Y, 1.0, true).unwrap().into();
+    let leaf = |shape: Shape| Csg::leaf(PlacedShape::new(shape, Transform::IDENTITY)).unwrap();
+    let csg = Csg::intersection(vec![leaf(bowl), leaf(can)]).unwrap();
+    let t = |origin: DVec3, direction: DVec3| {
+        roots(&csg, &Ray::new(origin, direction)).iter().map(|root| root.t).collect::<Vec<_>>()
+    };
+    assert_eq!(t(DVec3::new(0.5, 5.0, 0.0), -DVec3::Y), [4.25, 6.0]);
+    assert_eq!(t(DVec3::new(-10.0, 0.75, 0.0), DVec3::X), [9.5, 10.5]);
+    assert_eq!(t(DVec3::new(-10.0, -0.5, 0.0), DVec3::X), [9.0, 11.0]);
+    assert!(csg.contains(DVec3::new(0.0, 0.9, 0.0)) && !csg.contains(DVec3::new(0.5, 0.9, 0.0)));
+}
+
+#[test]
+fn a_union_of_many_is_as_its_parts_in_any_grouping() {
+    let mut random = RandomStream::new(91);
+    let center = DVec3::new(4.0, -2.0, 1.0);
+    let mut vector = || DVec3::from_array(std::array::from_fn(|_| 2.0 * random.next_f64() - 1.0));
+    let balls: Vec<Shape> =
+        (0..700).map(|_| Sphere::new(center + 3.0 * vector(), 0.3).unwrap().into()).collect();
+    let floor: Shape = Plane::new(center - 2.5 * DVec3::Z, DVec3::Z).unwrap().into();
+    let leaf = |shape: &Shape| Csg::leaf(PlacedShape::new(shape.clone(), Transform::IDENTITY)).unwrap();
+    let solids = || balls.iter().chain([&floor]).map(leaf);
+    let union = Csg::union(solids().collect()).unwrap();
+    let block = Cuboid::new(center - 2.75, center + 2.75).unwrap().into();
+    let holes = Csg::difference([leaf(&block)].into_iter().chain(solids()).collect()).unwrap();
+    // The leaves are in the order of the operands, whatever the grouping.
+    for (csg, before) in [(&union, 0), (&holes, 1)] {
+        for (i, shape) in balls.iter().enumerate() {
+            let Leaf::Shape(placed) = &csg.leaves()[before + i] else { panic!() };
+            assert_eq!(placed.bounds(), shape.bounds(&Transform::IDENTITY));
+        }
+    }
+    let mut crossings = 0;
+    for _ in 0..300 {
+        let from = center + 8.0 * vector();
+        let ray = Ray::new(from, center + 2.5 * vector() - from).with_range(f64::NEG_INFINITY, f64::INFINITY);
+        // The plain way: between neighbouring crossings of all parts, is the middle inside of one?
+        let mut all: Vec<f64> = vec![];
+        for shape in balls.iter().chain([&floor, &block]) {
+            let mut own = Roots::new();
+            shape.roots(&ray, &mut own);
+            all.extend(own.iter().map(|root| root.t));
+        }
+        all.sort_by(f64::total_cmp);
+        let inside = |csg: usize, t: f64| {
+            let p = ray.at(t);
+            let in_one = balls.iter().chain([&floor]).any(|shape| shape.contains(p));
+            if csg == 0 { in_one } else { block.contains(p) && !in_one }
+        };
+        for (number, csg) in [&union, &holes].into_iter().enumerate() {
+            let changes = |i: usize| {
+                let before = all[i] - 0.5 * if i == 0 { 1.0 } else { all[i] - all[i - 1] };
+                let after = all[i] + 0.5 * if i + 1 == all.len() { 1.0 } else { all[i + 1] - all[i] };
+                inside(number, before) != inside(number, after)
+            };
+            let expected: Vec<f64> = (0..all.len()).filter(|&i| changes(i)).map(|i| all[i]).collect();
+            let found = roots(csg, &ray);
+            assert_eq!(found.iter().map(|root| root.t).collect::<Vec<_>>(), expected, "{ray:?}");
+            for root in &found {
+                let LeafPart { leaf, flipped, .. } = csg.leaf_of(root).unwrap();
+                assert_eq!(flipped, number == 1 && leaf > 0);
+            }
+            crossings += found.len();
+        }
+    }
+    assert!(crossings > 3000, "{crossings}");
 }

@@ -11,9 +11,6 @@ use crate::solid::MeshSolid;
 use crate::surface::{ColourRamp, Form, SurfaceEntry};
 use crate::{BuildError, CsgDesc, CsgOperation, GeometryDesc, ShapeDesc, mesh};
 
-/// The maximal nesting depth, that of the geometry.
-const MAX_NESTING: usize = 60;
-
 /// A CSG with the surface entry of each leaf.
 #[derive(Clone, Debug)]
 pub(crate) struct CsgForm {
@@ -57,8 +54,9 @@ fn combine(
     depth: usize,
 ) -> Result<Csg, BuildError> {
     let wrong = |reason: String| BuildError::Csg { shape, reason };
-    if depth > MAX_NESTING {
-        return Err(wrong(format!("csg shapes hold csg shapes to a depth of more than {MAX_NESTING}")));
+    // With its solids, and unions of them as operands.
+    if depth + 2 > Csg::MAX_DEPTH {
+        return Err(wrong(format!("csg shapes hold csg shapes to a depth of more than {}", Csg::MAX_DEPTH)));
     }
     if desc.operands.len() < 2 {
         return Err(wrong(format!("found {} operands, expected two or more", desc.operands.len())));

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use lumbre_geometry::{Aabb, ShapeError};
+use lumbre_geometry::{Aabb, Csg, ShapeError};
 use lumbre_math::{Transform, Vec2, Vec3};
 use lumbre_scene::{CsgDesc, CsgOperation, GeometryDesc, MeshDesc, ShapeDesc};
 use lumbre_shading::Texture;
@@ -39,9 +39,6 @@ const KNOWN: &[&str] = &[
     "loopsubdiv",
     "curve",
 ];
-
-/// The maximal nesting depth of CSG.
-const MAX_CSG_DEPTH: usize = 64;
 
 /// The maximal number of leaves of a CSG; every ray tests each of them.
 const MAX_CSG_LEAVES: u64 = 1 << 16;
@@ -229,7 +226,7 @@ impl Converter<'_, '_> {
                     _ => continue,
                 };
                 let message = format!("object {} has a {not_solid} that is no solid", quoted(name));
-                let expected = "a closed shape that is whole, such as a sphere or a capped cylinder, a plane, closed mesh or csg";
+                let expected = "a closed shape that is whole, such as a sphere or a capped cylinder, a plane, an infinite cylinder, cone or quadric, a closed mesh or csg";
                 return Err(at.wrong(Diagnostic::error(message).expected(expected)));
             }
             leaves = leaves.saturating_add(slot.leaves);
@@ -241,8 +238,10 @@ impl Converter<'_, '_> {
             self.budget.elements(slot.leaves, "operands of a csg").at(at)?;
             let bytes = slot.leaves.saturating_mul(size_of::<ShapeDesc>() as u64);
             self.budget.bytes(bytes, "operands of a csg").at(at)?;
-            if depth > MAX_CSG_DEPTH {
-                return Err(at.error(format!("solids are combined more than {MAX_CSG_DEPTH} deep")));
+            self.budget.nesting(depth, "csg shapes in csg shapes").at(at)?;
+            // Parts of an operand are a union of their own.
+            if 2 * depth > Csg::MAX_DEPTH {
+                return Err(at.error(format!("csg shapes are nested more than {} deep", Csg::MAX_DEPTH / 2)));
             }
             operands.push(object.shapes.clone());
         }

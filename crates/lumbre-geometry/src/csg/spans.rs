@@ -1,10 +1,12 @@
 //! Span arithmetic: merges the crossings of all leaves along a line into those of the result.
 
+use std::collections::HashMap;
+
 use lumbre_math::DVec3;
 use smallvec::{SmallVec, smallvec};
 
 use super::leaf::shape_contains;
-use super::tree::NodeKind;
+use super::tree::{Node, NodeKind};
 use super::{Crossings, Csg, Leaf};
 use crate::{Aabb, Ray, Root, Roots};
 
@@ -165,44 +167,67 @@ fn overlaps(bounds: &Aabb, ray: &Ray, inverse: DVec3) -> bool {
 pub(super) struct Membership<'a> {
     csg: &'a Csg,
     // For each leaf, how many more times it has been entered than left.
-    nesting: SmallVec<[i32; 16]>,
-    // For each node, how many of its operands count towards it.
-    counts: SmallVec<[u32; 32]>,
+    nesting: Numbers<i32>,
+    // For each node, how many of its operands count towards it, less those that do outside of every leaf.
+    counts: Numbers<i32>,
+}
+
+/// A number for each of many things, at first zero: all of them, or those that have changed where a line comes to few of many.
+enum Numbers<T> {
+    All(SmallVec<[T; 32]>),
+    Changed(HashMap<u32, T>),
+}
+
+/// Things up to which a number for each is made for every ray.
+const FEW: usize = 256;
+
+impl<T: Copy + Default> Numbers<T> {
+    fn new(count: usize) -> Self {
+        if count <= FEW { Self::All(smallvec![T::default(); count]) } else { Self::Changed(HashMap::new()) }
+    }
+
+    #[inline]
+    fn get(&self, i: u32) -> T {
+        match self {
+            Self::All(all) => all[i as usize],
+            Self::Changed(changed) => changed.get(&i).copied().unwrap_or_default(),
+        }
+    }
+
+    #[inline]
+    fn set(&mut self, i: u32, number: T) {
+        match self {
+            Self::All(all) => all[i as usize] = number,
+            Self::Changed(changed) => drop(changed.insert(i, number)),
+        }
+    }
 }
 
 impl<'a> Membership<'a> {
     pub(super) fn new(csg: &'a Csg) -> Self {
-        Self {
-            csg,
-            nesting: smallvec![0; csg.leaves.len()],
-            counts: csg.nodes.iter().map(|node| node.initial).collect(),
-        }
+        Self { csg, nesting: Numbers::new(csg.leaves.len()), counts: Numbers::new(csg.nodes.len()) }
     }
 
-    pub(super) fn contains(&self, node: usize) -> bool {
-        self.counts[node] >= self.csg.nodes[node].needed
+    pub(super) fn contains(&self, node: u32) -> bool {
+        let Node { initial, needed, .. } = self.csg.nodes[node as usize];
+        i64::from(initial) + i64::from(self.counts.get(node)) >= i64::from(needed)
     }
 
     /// Enters or leaves a leaf, and updates its ancestors as far as they change.
     pub(super) fn cross(&mut self, leaf: u32, enters: bool) {
-        let nesting = &mut self.nesting[leaf as usize];
-        let was_inside = *nesting > 0;
-        *nesting += if enters { 1 } else { -1 };
-        let mut is_inside = *nesting > 0;
-        if was_inside == is_inside {
+        let before = self.nesting.get(leaf);
+        let now = before + if enters { 1 } else { -1 };
+        self.nesting.set(leaf, now);
+        let mut is_inside = now > 0;
+        if (before > 0) == is_inside {
             return;
         }
-        let mut i = self.csg.leaf_nodes[leaf as usize].0 as usize;
-        self.counts[i] = u32::from(is_inside);
-        while let Some(parent) = self.csg.nodes[i].parent {
-            let parent = parent as usize;
-            let counts_for = is_inside != self.csg.nodes[i].is_subtracted;
+        let mut i = self.csg.leaf_nodes[leaf as usize].0;
+        self.counts.set(i, i32::from(is_inside));
+        while let Node { parent: Some(parent), is_subtracted, .. } = self.csg.nodes[i as usize] {
+            let counts_for = is_inside != is_subtracted;
             let was_inside = self.contains(parent);
-            if counts_for {
-                self.counts[parent] += 1;
-            } else {
-                self.counts[parent] -= 1;
-            }
+            self.counts.set(parent, self.counts.get(parent) + if counts_for { 1 } else { -1 });
             is_inside = self.contains(parent);
             if is_inside == was_inside {
                 return;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use lumbre_math::Transform;
+use lumbre_math::{DVec3, Transform};
 
 use super::{Csg, Leaf, LeafPart, Solid};
 use crate::{Aabb, PlacedShape, Root, Shape, ShapeError};
@@ -30,8 +30,37 @@ pub(super) enum NodeKind {
     Difference,
 }
 
-/// The maximal nesting depth of CSG shapes.
-const MAX_DEPTH: usize = 64;
+/// Operands of a union that are not grouped: a ray looks at the box of each.
+const MOST_TOGETHER: usize = 8;
+
+/// An operand on its way into a tree.
+struct Operand {
+    nodes: Vec<Node>,
+    first_leaf: u32,
+    is_subtracted: bool,
+}
+
+/// Many operands in two halves, by the middles of their boxes along the axis on which these are farthest apart, and a group of those
+/// that are unbounded; `None` for few.
+fn halves(operands: &mut [Operand]) -> Option<[&mut [Operand]; 3]> {
+    if operands.len() <= MOST_TOGETHER {
+        return None;
+    }
+    let bounds = |operand: &Operand| operand.nodes.first().and_then(|node| node.bounds);
+    let middle = |operand: &Operand| bounds(operand).map_or(DVec3::ZERO, |bounds| bounds.center());
+    operands.sort_by_key(|operand| bounds(operand).is_none());
+    let bounded = operands.partition_point(|operand| bounds(operand).is_some());
+    let (bounded, unbounded) = operands.split_at_mut(bounded);
+    let around = Aabb::around(bounded.iter().map(middle));
+    if bounded.len() <= 1 || around.size() == DVec3::ZERO {
+        // They cannot be told apart.
+        return None;
+    }
+    let axis = around.size().max_position();
+    bounded.sort_by(|a, b| middle(a)[axis].total_cmp(&middle(b)[axis]));
+    let (near, far) = bounded.split_at_mut(bounded.len() / 2);
+    Some([near, far, unbounded])
+}
 
 /// No exact shape has more parts than this.
 const SHAPE_PARTS: u32 = 8;
@@ -41,9 +70,12 @@ const TOO_MANY_PARTS: ShapeError =
     ShapeError::Degenerate("the operands of csg have more than 2147483647 parts in all");
 
 impl Csg {
+    /// The maximal nesting depth: a solid by itself counts as one. Descriptions of that depth still fit on a thread's stack.
+    pub const MAX_DEPTH: usize = 1024;
+
     /// A single solid: a shape for which [`Shape::is_solid`] is true, such as a whole sphere, a torus (even-odd
-    /// if it is a spindle), a capped cylinder, or the half-space below a plane; or a CSG shape, whose tree is
-    /// taken over.
+    /// if it is a spindle), a capped cylinder, or one without bounds: the half-space below a plane, an infinite cylinder or cone, a
+    /// quadric without a clipping box; or a CSG shape, whose tree is taken over.
     ///
     /// # Errors
     /// [`ShapeError::Degenerate`] for a shape that is not solid.
@@ -54,7 +86,8 @@ impl Csg {
         if !shape.shape().is_solid() {
             return Err(ShapeError::Degenerate(
                 "an operand of CSG encloses nothing: it must be a closed shape that is whole, such as a sphere or a \
-                 capped cylinder, a plane (for the half-space below it), a closed mesh or another csg",
+                 capped cylinder, a plane (for the half-space below it), an infinite cylinder, cone or quadric, a closed \
+                 mesh or another csg",
             ));
         }
         Ok(Self::single(Leaf::Shape(shape), SHAPE_PARTS))
@@ -95,7 +128,7 @@ impl Csg {
     /// The union: the points in at least one of the operands.
     ///
     /// # Errors
-    /// [`ShapeError::Degenerate`] without operands, when the nesting becomes deeper than 64, or when there are
+    /// [`ShapeError::Degenerate`] without operands, when the nesting becomes deeper than [`Csg::MAX_DEPTH`], or when there are
     /// more than 2^31 - 1 parts in all.
     pub fn union(operands: Vec<Self>) -> Result<Self, ShapeError> {
         Self::combine(NodeKind::Union, operands)
@@ -117,53 +150,80 @@ impl Csg {
         Self::combine(NodeKind::Difference, operands)
     }
 
-    fn combine(kind: NodeKind, operands: Vec<Self>) -> Result<Self, ShapeError> {
+    fn combine(kind: NodeKind, mut operands: Vec<Self>) -> Result<Self, ShapeError> {
         let depth = 1 + operands.iter().map(|operand| operand.depth).max().unwrap_or(0);
         if operands.is_empty() {
             return Err(ShapeError::Degenerate("a csg shape needs at least one operand"));
         }
-        if depth > MAX_DEPTH {
-            return Err(ShapeError::Degenerate("csg shapes are nested deeper than 64"));
+        if depth > Self::MAX_DEPTH {
+            return Err(ShapeError::Degenerate("csg shapes are nested deeper than 1024"));
         }
+        if kind == NodeKind::Difference && operands.len() > MOST_TOGETHER {
+            // What is taken away together is grouped as a union is.
+            let taken = Self::combine(NodeKind::Union, operands.split_off(1))?;
+            operands.push(taken);
+        }
+        let mut csg = Self { nodes: vec![], leaves: vec![], first_part: vec![0], leaf_nodes: vec![], depth };
+        let mut parts = Vec::with_capacity(operands.len());
+        for (i, operand) in operands.into_iter().enumerate() {
+            let (first_leaf, parts_so_far) = (csg.leaves.len() as u32, csg.part_count());
+            if u64::from(parts_so_far) + u64::from(operand.part_count()) > u64::from(MAX_PARTS) {
+                return Err(TOO_MANY_PARTS);
+            }
+            let is_subtracted = kind == NodeKind::Difference && i > 0;
+            csg.leaf_nodes.extend(operand.leaf_nodes.iter().map(|&(node, odd)| (node, odd != is_subtracted)));
+            csg.first_part.extend(operand.first_part[1..].iter().map(|part| parts_so_far + part));
+            csg.leaves.extend(operand.leaves);
+            parts.push(Operand { nodes: operand.nodes, first_leaf, is_subtracted });
+        }
+        csg.push_group(kind, None, &mut parts);
+        csg.update_bounds();
+        Ok(csg)
+    }
+
+    /// Appends a node over some operands. The operands of a large union are grouped by their places, again and again, so that a ray
+    /// comes to few of them; leaves keep their order.
+    fn push_group(&mut self, kind: NodeKind, parent: Option<u32>, operands: &mut [Operand]) {
         let count = operands.len() as u32;
         let (needed, initial) = match kind {
             NodeKind::Union | NodeKind::Leaf(_) => (1, 0),
             NodeKind::Intersection => (count, 0),
             NodeKind::Difference => (count, count - 1),
         };
-        let root = Node { kind, parent: None, end: 0, needed, initial, is_subtracted: false, bounds: None };
-        let mut csg =
-            Self { nodes: vec![root], leaves: vec![], first_part: vec![0], leaf_nodes: vec![], depth };
-        for (i, operand) in operands.into_iter().enumerate() {
-            let (first_node, first_leaf) = (csg.nodes.len() as u32, csg.leaves.len() as u32);
-            let parts_so_far = csg.part_count();
-            let too_many = u64::from(parts_so_far) + u64::from(operand.part_count()) > u64::from(MAX_PARTS);
-            if too_many {
-                return Err(TOO_MANY_PARTS);
+        let place = self.nodes.len();
+        let node = Node { kind, parent, end: 0, needed, initial, is_subtracted: false, bounds: None };
+        self.nodes.push(node);
+        let groups = if kind == NodeKind::Union { halves(operands) } else { None };
+        match groups {
+            Some(groups) => {
+                for group in groups.into_iter().filter(|group| !group.is_empty()) {
+                    self.push_group(kind, Some(place as u32), group);
+                }
             }
-            let is_subtracted = kind == NodeKind::Difference && i > 0;
-            csg.nodes.extend(operand.nodes.into_iter().map(|node| Node {
+            None => {
+                operands.iter_mut().for_each(|operand| self.push_operand(place as u32, operand));
+            }
+        }
+        self.nodes[place].end = self.nodes.len() as u32;
+    }
+
+    fn push_operand(&mut self, parent: u32, operand: &mut Operand) {
+        let (first_node, first_leaf) = (self.nodes.len() as u32, operand.first_leaf);
+        for node in std::mem::take(&mut operand.nodes) {
+            if let NodeKind::Leaf(leaf) = node.kind {
+                self.leaf_nodes[(first_leaf + leaf) as usize].0 += first_node;
+            }
+            self.nodes.push(Node {
                 kind: match node.kind {
                     NodeKind::Leaf(leaf) => NodeKind::Leaf(first_leaf + leaf),
                     other => other,
                 },
-                parent: Some(node.parent.map_or(0, |parent| first_node + parent)),
+                parent: Some(node.parent.map_or(parent, |parent| first_node + parent)),
                 end: first_node + node.end,
-                is_subtracted: if node.parent.is_none() { is_subtracted } else { node.is_subtracted },
+                is_subtracted: if node.parent.is_none() { operand.is_subtracted } else { node.is_subtracted },
                 ..node
-            }));
-            csg.leaf_nodes.extend(
-                operand
-                    .leaf_nodes
-                    .into_iter()
-                    .map(|(node, subtracted)| (first_node + node, subtracted != is_subtracted)),
-            );
-            csg.first_part.extend(operand.first_part[1..].iter().map(|part| parts_so_far + part));
-            csg.leaves.extend(operand.leaves);
+            });
         }
-        csg.nodes[0].end = csg.nodes.len() as u32;
-        csg.update_bounds();
-        Ok(csg)
     }
 
     /// The same solid with `world_from_self` applied to every leaf.
