@@ -27,6 +27,7 @@
 mod background;
 mod builder;
 mod cast;
+pub mod description;
 mod error;
 mod files;
 mod info;
@@ -38,7 +39,6 @@ pub use lumbre_geometry as geometry;
 pub use lumbre_image as image;
 pub use lumbre_kernel as kernel;
 pub use lumbre_math as math;
-pub use lumbre_scene as description;
 pub use lumbre_shading as shading;
 
 pub use background::Background;
