@@ -200,7 +200,7 @@ impl Progress for Impatient {
     }
 
     fn state(&self, state: &State) {
-        assert!(state.samples <= state.total);
+        assert!(state.total.is_some_and(|total| state.samples <= total) && state.share <= 1.0);
     }
 }
 
