@@ -3,4 +3,6 @@
 mod broken_inputs;
 mod cast_streams;
 mod cast_vectors;
+mod files;
 mod program;
+mod stops;
