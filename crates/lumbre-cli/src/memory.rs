@@ -55,7 +55,7 @@ impl Memory {
 }
 
 /// Bytes of address space that the system still grants the process; `None` if it sets no limit, or does not tell.
-fn address_space_left() -> Option<u64> {
+pub(crate) fn address_space_left() -> Option<u64> {
     let limits = fs::read_to_string("/proc/self/limits").ok()?;
     let soft = limits.lines().find_map(|line| line.strip_prefix("Max address space"))?;
     let soft: u64 = soft.split_whitespace().next()?.parse().ok()?;

@@ -21,6 +21,7 @@ use crate::progress::{Display, Style, Watched};
 use crate::reading::{Frames, ReadingArguments, print_warnings};
 use crate::signals::{Deadline, Phase, Signals};
 use crate::staging::{self, Behind, StagingArguments};
+use crate::threads;
 use crate::units::{self, Crop, spoken};
 
 /// Renders a scene to a picture.
@@ -45,18 +46,19 @@ Animations of a glTF, at a time in seconds, or frame by frame with motion blur:
   lumbre render dancer.glb --frame 1.5 --shutter 0.5
   lumbre render dancer.glb --frames 0..47 --fps 24 --shutter 0.5 -o frame.####.png
 
-Ctrl-C stops and saves what is there; a second one stops at once and saves nothing.")]
+Ctrl-C stops and saves what is there, if every pixel has a sample; a second one stops at once and saves nothing.")]
 pub(crate) struct Arguments {
     /// The scene: .pbrt, .gltf, .glb, .obj, .ply or .stl, also packed by gzip (but glTF). Several .pbrt files are read one after another.
     #[arg(required = true)]
     scene: Vec<PathBuf>,
-    /// The picture: .exr, .png, .hdr, .pfm or .jpg. By default the scene's own film name, else the scene's name with .png.
+    /// The picture: .exr, .png, .hdr, .pfm or .jpg. By default the scene's own film name, else the scene's name with .png,
+    /// but never a file that was read or that Lumbre did not write: then STEM.render.png.
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
     /// Samples per pixel.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     spp: Option<u32>,
-    /// Stop after this time, as 90s, 2m or 1h30m.
+    /// Stop after this time, counted from the start (of each frame), as 90s, 2m or 1h30m.
     #[arg(long, value_name = "DUR", value_parser = units::duration)]
     time: Option<Duration>,
     /// Stop when the noise is estimated to be below this share of the luminance.
@@ -436,7 +438,7 @@ fn picture(
     };
     picture.save_with(&output, &save, &arguments.aov)?;
     let save_time = save_start.elapsed();
-    report_stats(&picture);
+    report_stats(arguments, &picture);
     if let Some(path) = &arguments.stats {
         let seconds = json!({
             "load": load_time.as_secs_f64(),
@@ -551,7 +553,7 @@ fn options(arguments: &Arguments, scene: &Scene) -> Result<RenderOptions, Failur
         None if open_ended => u32::MAX,
         None => options.stop.spp,
     };
-    options.threads = arguments.threads.map_or(0, usize::from);
+    options.threads = arguments.threads.map_or_else(rayon::current_num_threads, usize::from);
     options.features = !arguments.aov.is_empty();
     Ok(options)
 }
@@ -575,10 +577,12 @@ fn camera(scene: &Scene, wanted: &str) -> Result<usize, Failure> {
     })
 }
 
-fn report_stats(picture: &Picture) {
+fn report_stats(arguments: &Arguments, picture: &Picture) {
     let stats = picture.stats();
-    if stats.refused_threads > 0 {
-        say!("warning: the system refused {} more threads than {}", stats.refused_threads, stats.threads);
+    let refused = if arguments.threads.is_some() { 0 } else { threads::refused() };
+    let refused = refused.max(stats.refused_threads);
+    if refused > 0 {
+        say!("warning: the system grants {} of {} threads", stats.threads, stats.threads + refused);
     }
     for sample in &stats.first_dropped {
         say!("warning: pixel ({}, {}), sample {}: not finite, dropped", sample.x, sample.y, sample.sample);

@@ -128,15 +128,15 @@ fn a_signal_ends_reading_and_waiting_for_pipes() {
 fn time_that_is_over_in_the_first_pass_leaves_a_coarse_whole_picture_or_the_old_one() {
     let folder = Folder::new();
     // So large that no machine ends a pass in time.
-    room(&folder, (6000, 4000), 60);
+    room(&folder, (3000, 2000), 200);
     let arguments = ["render", "room.pbrt", "-o", "a.png", "--time", "1s", "--progress", "none"];
     let (code, said) = end_of(start(&folder, &arguments));
     if code == 0 {
         assert!(said.contains("the picture has one for"), "{said}");
         let picture = lumbre::read_image(&folder.path("a.png")).unwrap();
         // No band of it is empty.
-        for y in (0..4000).step_by(16) {
-            assert!((0..6000).any(|x| picture.pixel(x, y).max_component() > 0.0), "row {y}");
+        for y in (0..2000).step_by(16) {
+            assert!((0..3000).any(|x| picture.pixel(x, y).max_component() > 0.0), "row {y}");
         }
     } else {
         assert!(code == 5 && said.contains("--time"), "{said}");

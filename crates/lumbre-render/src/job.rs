@@ -22,7 +22,7 @@ const LEAST_FOR_NOISE: u32 = 8;
 const REMEMBERED: usize = 16;
 /// The first pass goes over the picture in squares of so many pixels a side, one sample in each, and then in smaller ones, so that a
 /// render which is stopped in it is a whole picture, if a coarse one.
-const STRIDES: [u32; 5] = [16, 8, 4, 2, 1];
+const STRIDES: [u32; 7] = [256, 64, TILE, 8, 4, 2, 1];
 /// Pixels between two looks at the clock.
 const PIXELS_A_LOOK: usize = 4;
 
@@ -83,15 +83,17 @@ pub fn render_with(
 
     let mut done = 0;
     let mut stride = None;
+    let mut last = None;
     for side in STRIDES {
-        workers.for_each(&mut owners, |owner| job.run_coarsely(owner, side));
+        workers.for_each(&mut owners, |owner| job.run_coarsely(owner, (bounds.x0, bounds.y0), side, last));
+        last = Some(side);
         if owners.iter().any(|owner| owner.next_side > side) {
             break;
         }
         stride = Some(side);
     }
     if let Some(side) = stride.filter(|side| *side > 1) {
-        owners.iter_mut().for_each(|owner| owner.tile.spread(side));
+        spread(&mut owners, bounds.width().div_ceil(TILE) as usize, side);
     }
     let mut quiet_at = None;
     while done < spp && stride == Some(1) {
@@ -161,6 +163,19 @@ pub fn render_with(
     })
 }
 
+/// Gives every pixel that has no sample that of its square of `side` by `side` pixels; the tiles stand in rows of `columns`.
+fn spread(owners: &mut [Owner], columns: usize, side: u32) {
+    if side > TILE {
+        let step = (side / TILE) as usize;
+        let corners: Vec<Tile> = owners.iter().map(|owner| owner.tile.corner()).collect();
+        for (i, owner) in owners.iter_mut().enumerate() {
+            let (column, row) = (i % columns, i / columns);
+            owner.tile.take_corner(&corners[(row - row % step) * columns + (column - column % step)]);
+        }
+    }
+    owners.iter_mut().for_each(|owner| owner.tile.spread(side.min(TILE)));
+}
+
 /// What every tile needs and none changes.
 struct Job<'a> {
     scene: &'a Scene,
@@ -182,7 +197,7 @@ struct Owner {
     tile: Tile,
     /// All samples before this one are in every pixel of the tile.
     next_sample: u32,
-    /// The first pass is done for all squares larger than this.
+    /// The side of the smallest squares that the first pass has done.
     next_side: u32,
     rays: RayCounts,
     dropped: u64,
@@ -207,16 +222,14 @@ impl Job<'_> {
         self.cancel.is_cancelled() || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
     }
 
-    /// Takes the first sample of the first pixel of each square of `side` by `side` pixels of a tile that is in no larger square's
-    /// first pixel.
-    fn run_coarsely(&self, owner: &mut Owner, side: u32) {
-        let bounds = owner.tile.bounds();
+    /// Takes the first sample of the first pixel of each square of `side` by `side` pixels, counted from the corner of the picture,
+    /// that is in the tile, unless it was taken for the squares of the last side.
+    fn run_coarsely(&self, owner: &mut Owner, corner: (u32, u32), side: u32, last: Option<u32>) {
         let starts = |x: u32, y: u32, side: u32| {
-            (x - bounds.x0).is_multiple_of(side) && (y - bounds.y0).is_multiple_of(side)
+            (x - corner.0).is_multiple_of(side) && (y - corner.1).is_multiple_of(side)
         };
-        let is_done = |x, y| side < STRIDES[0] && starts(x, y, 2 * side);
-        let pixels = bounds.pixels().filter(|&(x, y)| starts(x, y, side) && !is_done(x, y));
-        if self.take(owner, pixels, 0) {
+        let is_new = |x, y| starts(x, y, side) && !last.is_some_and(|last| starts(x, y, last));
+        if self.take(owner, owner.tile.bounds().pixels().filter(|&(x, y)| is_new(x, y)), 0) {
             owner.next_side = side;
             owner.next_sample = u32::from(side == 1);
         }

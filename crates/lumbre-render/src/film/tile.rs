@@ -121,6 +121,30 @@ impl Tile {
         true
     }
 
+    /// The first pixel as a tile of its own.
+    pub fn corner(&self) -> Self {
+        let bounds = PixelBounds { x1: self.bounds.x0 + 1, y1: self.bounds.y0 + 1, ..self.bounds };
+        Self {
+            bounds,
+            pixels: self.pixels.first().copied().into_iter().collect(),
+            features: self.features.first().copied().into_iter().collect(),
+            tints: self.tints.first().copied().into_iter().collect(),
+        }
+    }
+
+    /// Gives the first pixel the sums of that of another tile of the same picture, unless it has a sample.
+    pub fn take_corner(&mut self, other: &Self) {
+        if self.pixels.first().is_none_or(|pixel| pixel.samples > 0) {
+            return;
+        }
+        fn copy<T: Copy>(to: &mut [T], from: &[T]) {
+            to.iter_mut().zip(from).take(1).for_each(|(to, from)| *to = *from);
+        }
+        copy(&mut self.pixels, &other.pixels);
+        copy(&mut self.features, &other.features);
+        copy(&mut self.tints, &other.tints);
+    }
+
     /// Gives every pixel that has no sample the sums of the first pixel of its square of `side` by `side` pixels, counted from
     /// the tile's corner.
     pub fn spread(&mut self, side: u32) {
