@@ -10,7 +10,7 @@ use lumbre::image::{Metric, Rgb, compare};
 use crate::failure::{Failure, print};
 use crate::memory::Memory;
 use crate::output::{Inputs, Replaced};
-use crate::signals::{Phase, Signals};
+use crate::signals::Signals;
 use crate::units;
 
 /// Compares two pictures of the same size.
@@ -88,8 +88,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(path) = &arguments.output {
         let heat = comparison.heat_map(arguments.metric);
         let replaced = Replaced::by(path);
-        signals.enter(Phase::of_writing(path));
+        let stream = signals.enter_writing(path)?;
         lumbre::write_image(path, &heat, &lumbre::SaveOptions::default()).map_err(Failure::from)?;
+        drop(stream);
         replaced.say();
     }
     match arguments.fail_above {

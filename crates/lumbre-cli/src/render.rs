@@ -426,7 +426,7 @@ fn picture(
 
     let replaced: Vec<Replaced<'_>> =
         std::iter::once(&output).chain(&arguments.stats).map(|path| Replaced::by(path)).collect();
-    signals.enter(Phase::of_writing(&output));
+    let stream = signals.enter_writing(&output)?;
     let save_start = Instant::now();
     let is_shown = is_of_light && staged.light != StageLight::Own;
     let tone_map = arguments.tonemap.unwrap_or(if is_shown { ToneMap::Neutral } else { ToneMap::None });
@@ -437,6 +437,7 @@ fn picture(
         Behind::Lights | Behind::Nothing => picture,
     };
     picture.save_with(&output, &save, &arguments.aov)?;
+    drop(stream);
     let save_time = save_start.elapsed();
     report_stats(arguments, &picture);
     if let Some(path) = &arguments.stats {
@@ -447,8 +448,10 @@ fn picture(
             "save": save_time.as_secs_f64(),
         });
         let report = statistics(&scene, &picture, seconds, diagnostics.lines());
+        let stream = signals.enter_writing(path)?;
         lumbre::formats::atomic_write(path, |file| writeln!(file, "{report:#}"))
             .map_err(|e| Failure::from(lumbre::Error::from(e)))?;
+        drop(stream);
     }
     if !arguments.quiet {
         replaced.iter().for_each(Replaced::say);

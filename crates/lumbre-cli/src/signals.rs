@@ -1,5 +1,6 @@
 //! Stops from outside, signals and deadlines, honoured wherever the program is.
 
+use std::fs::File;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -18,7 +19,9 @@ pub(crate) enum Phase {
     Preparing(&'static str),
     /// Rendering: it has [`GRACE`] to stop by itself, with what there is.
     Rendering,
-    /// Writing to a pipe or a device, which may take nothing: [`GRACE`], too.
+    /// Opening a pipe since this time, where no one may be to read: [`GRACE`].
+    Opening(Instant),
+    /// Writing to a pipe or a device: [`GRACE`] after a signal.
     Sending,
     /// Writing a whole picture to a file: it has [`SAVING_GRACE`].
     Saving,
@@ -137,13 +140,13 @@ impl Watcher {
                     say!("error: the render takes too long to stop; nothing was saved");
                     end(status);
                 }
-                (Phase::Sending, Some(elapsed)) if elapsed > GRACE => end(status),
+                (Phase::Opening(_) | Phase::Sending, Some(elapsed)) if elapsed > GRACE => end(status),
                 (Phase::Saving, Some(elapsed)) if elapsed > SAVING_GRACE => end(status),
                 (Phase::Saving, Some(elapsed)) if elapsed > GRACE && !has_said => {
                     has_said = true;
                     say!("saving the picture; another signal ends it at once, without");
                 }
-                (_, Some(_)) | (Phase::Saving, None) => {}
+                (_, Some(_)) => {}
                 (phase, None) => {
                     if let Some(deadline) = state.deadline {
                         check(phase, deadline);
@@ -154,10 +157,22 @@ impl Watcher {
     }
 }
 
-impl Phase {
-    /// That of writing a file of this name.
-    pub(crate) fn of_writing(path: &Path) -> Self {
-        if std::fs::metadata(path).is_ok_and(|meta| !meta.is_file()) { Self::Sending } else { Self::Saving }
+impl Signals {
+    /// Enters the phase of writing a file of this name. A pipe or a device is opened, and to be held until it is written: the phase
+    /// begins when someone reads.
+    ///
+    /// # Errors
+    /// [`Failure::Io`] when a pipe or a device cannot be opened.
+    pub(crate) fn enter_writing(&self, path: &Path) -> Result<Option<File>, Failure> {
+        if std::fs::metadata(path).map_or(true, |meta| meta.is_file() || meta.is_dir()) {
+            self.enter(Phase::Saving);
+            return Ok(None);
+        }
+        self.enter(Phase::Opening(Instant::now()));
+        let opened = File::options().write(true).open(path);
+        let stream = opened.map_err(|e| Failure::Io(format!("{}: {e}", path.display())))?;
+        self.enter(Phase::Sending);
+        Ok(Some(stream))
     }
 }
 
@@ -172,7 +187,7 @@ fn check(phase: Phase, deadline: Deadline) {
         Phase::Rendering if over > GRACE => {
             say!("error: --time: {time} are over, and the render takes too long to stop; nothing was saved");
         }
-        Phase::Sending if over > GRACE => {
+        Phase::Opening(since) if over.min(since.elapsed()) > GRACE => {
             say!("error: --time: {time} are over, and no one takes the picture; nothing was saved");
         }
         _ => return,

@@ -109,6 +109,10 @@ pub fn render_with(
             break;
         }
         done += pass;
+        if job.must_stop() {
+            // What follows takes its time for a large picture.
+            break;
+        }
         let tiles = || owners.iter().map(|owner| &owner.tile);
         let reached = noise(tiles());
         progress.pass(&Snapshot {
