@@ -3,10 +3,15 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use lumbre::image::{Metric, compare};
+use lumbre::CancelToken;
+use lumbre::formats::Limits;
+use lumbre::image::{Metric, Rgb, compare};
 
 use crate::failure::{Failure, print};
-use crate::overwrite::refuse_inputs;
+use crate::memory::Memory;
+use crate::output::{Inputs, Replaced};
+use crate::signals::Signals;
+use crate::units;
 
 /// Compares two pictures of the same size.
 #[derive(Args)]
@@ -30,6 +35,9 @@ pub(crate) struct Arguments {
     /// Where to write a picture of the differences.
     #[arg(short, long, value_name = "HEAT.png")]
     output: Option<PathBuf>,
+    /// Bytes that the program may hold at a time.
+    #[arg(long, value_name = "SIZE", value_parser = units::bytes)]
+    max_memory: Option<u64>,
 }
 
 fn metric(name: &str) -> Result<Metric, String> {
@@ -40,13 +48,30 @@ fn limit(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|x: &f64| *x >= 0.0).ok_or_else(|| "expected a number from 0 up".to_owned())
 }
 
+/// Bytes a pixel of the differences and their picture.
+const BYTES: u64 = 32;
+/// Bytes a pixel of what the metric flip needs besides.
+const FLIP_BYTES: u64 = 160;
+
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let signals = Signals::listen(&CancelToken::new())?;
     if let Some(output) = &arguments.output {
-        refuse_inputs(output, [arguments.a.as_path(), &arguments.b])?;
+        Inputs::of([arguments.a.as_path(), &arguments.b]).refuse(output)?;
     }
-    let read = |path: &PathBuf| lumbre::read_image(path).map_err(Failure::from);
+    let memory = Memory::new(arguments.max_memory);
+    let mut limits = Limits::default();
+    limits.memory = memory.for_reading() / 2;
+    let read = |path: &PathBuf| lumbre::read_image_within(path, limits).map_err(Failure::from);
     let (a, b) = (read(&arguments.a)?, read(&arguments.b)?);
+    let pixels = u64::from(a.width()) * u64::from(a.height());
+    let each = if arguments.metric == Metric::Flip { FLIP_BYTES } else { BYTES };
+    let needed = pixels.saturating_mul(each);
+    Memory::new(arguments.max_memory).check(
+        "the comparison",
+        needed,
+        2 * pixels * size_of::<Rgb>() as u64,
+    )?;
     let Some(comparison) = compare(&a, &b, arguments.metric) else {
         return Err(Failure::input(format!(
             "{} is {}x{} and {} is {}x{} (expected pictures of the same size)",
@@ -62,7 +87,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     print(&format!("{difference}\n"))?;
     if let Some(path) = &arguments.output {
         let heat = comparison.heat_map(arguments.metric);
+        let replaced = Replaced::by(path);
+        let stream = signals.enter_writing(path)?;
         lumbre::write_image(path, &heat, &lumbre::SaveOptions::default()).map_err(Failure::from)?;
+        drop(stream);
+        replaced.say();
     }
     match arguments.fail_above {
         // A NaN is above every limit.

@@ -4,10 +4,12 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use clap::Args;
+use lumbre::CancelToken;
 use serde_json::json;
 
 use crate::failure::{Failure, print};
 use crate::reading::{ReadingArguments, print_warnings};
+use crate::signals::Signals;
 
 /// Prints what is in a scene, and what of it would not be rendered.
 #[derive(Args)]
@@ -29,6 +31,7 @@ pub(crate) struct Arguments {
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let _signals = Signals::listen(&CancelToken::new())?;
     let (scene, diagnostics) = arguments.reading.open(&arguments.scene)?;
     let info = scene.info();
     if arguments.json {

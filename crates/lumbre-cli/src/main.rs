@@ -17,12 +17,14 @@ mod cast;
 mod diff;
 mod failure;
 mod info;
-mod overwrite;
+mod memory;
+mod output;
 mod progress;
 mod reading;
 mod render;
 mod signals;
 mod staging;
+mod threads;
 mod units;
 
 /// Renders scenes, casts rays into them, says what is in them, and compares pictures.
@@ -51,6 +53,7 @@ enum Command {
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
+    threads::start();
     let outcome = match arguments.command {
         Command::Render(arguments) => render::run(&arguments),
         Command::Cast(arguments) => cast::run(&arguments),

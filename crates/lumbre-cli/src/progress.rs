@@ -8,6 +8,7 @@ use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use lumbre::{Progress, State};
 
+use crate::signals::{Phase, Signals};
 use crate::units::spoken;
 
 /// How to show progress.
@@ -25,6 +26,28 @@ pub(crate) enum Style {
     None,
 }
 
+/// Progress on standard error, and to those who watch for signals.
+pub(crate) struct Watched<'a> {
+    /// What is shown.
+    pub display: Display,
+    /// Who watches.
+    pub signals: &'a Signals,
+}
+
+impl Progress for Watched<'_> {
+    fn state(&self, state: &State) {
+        self.display.state(state);
+    }
+
+    fn stopped(&self, stride: Option<u32>) {
+        // From here on there is something to save, and nothing that could go on without end.
+        let is_whole = stride == Some(1) || (stride.is_some() && self.signals.received().is_none());
+        if is_whole {
+            self.signals.enter(Phase::Saving);
+        }
+    }
+}
+
 /// Progress on standard error.
 pub(crate) enum Display {
     /// A bar.
@@ -40,6 +63,8 @@ pub(crate) enum Display {
     None,
 }
 
+/// The length of a bar.
+const STEPS: u64 = 1000;
 /// The interval between lines.
 const INTERVAL: Duration = Duration::from_secs(2);
 
@@ -56,7 +81,7 @@ impl Display {
     }
 
     fn bar() -> Self {
-        let bar = ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::stderr());
+        let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::stderr());
         if let Ok(style) = ProgressStyle::with_template("{bar:40} {percent:>3}%  {msg}") {
             bar.set_style(style);
         }
@@ -71,19 +96,18 @@ impl Display {
     }
 }
 
-impl Progress for Display {
+impl Display {
     fn state(&self, state: &State) {
         let left = state.left.map_or_else(String::new, |left| format!(", {} left", spoken(left)));
         match self {
             Self::None => {}
             Self::Bar(bar) => {
-                bar.set_length(state.total);
-                bar.set_position(state.samples);
+                bar.set_position((state.share * STEPS as f64) as u64);
                 bar.set_message(format!("{}{left}", spoken(state.elapsed)));
             }
             Self::Lines { json, last } => {
                 let Ok(mut last) = last.lock() else { return };
-                let due = last.is_none_or(|at| at.elapsed() >= INTERVAL) || state.samples == state.total;
+                let due = last.is_none_or(|at| at.elapsed() >= INTERVAL) || state.share >= 1.0;
                 if !due {
                     return;
                 }
@@ -92,12 +116,13 @@ impl Progress for Display {
                     let line = serde_json::json!({
                         "samples": state.samples,
                         "total": state.total,
+                        "share": state.share,
                         "seconds": state.elapsed.as_secs_f64(),
                         "seconds_left": state.left.map(|left| left.as_secs_f64()),
                     });
                     say!("{line}");
                 } else {
-                    let percent = 100.0 * state.samples as f64 / state.total.max(1) as f64;
+                    let percent = 100.0 * state.share;
                     say!("{percent:5.1} %  {}{left}", spoken(state.elapsed));
                 }
             }

@@ -7,6 +7,7 @@ use lumbre::formats::{Diagnostics, Limits, Strictness};
 use lumbre::{Error, Scene, SceneDesc};
 
 use crate::failure::Failure;
+use crate::memory::Memory;
 use crate::units;
 
 /// How scene files are read.
@@ -35,7 +36,7 @@ pub(crate) struct ReadingArguments {
     /// The material variant of a glTF.
     #[arg(long, value_name = "NAME")]
     variant: Option<String>,
-    /// Bytes that reading may hold at a time.
+    /// Bytes that the program may hold at a time: what reading holds, and scenes and pictures as predicted.
     #[arg(long, value_name = "SIZE", value_parser = units::bytes)]
     max_memory: Option<u64>,
     /// Vertices, faces, shapes and parameters that may be read.
@@ -86,9 +87,15 @@ impl std::str::FromStr for Frames {
 }
 
 impl ReadingArguments {
-    fn limits(&self) -> Limits {
+    /// The memory that is left.
+    pub(crate) fn memory(&self) -> Memory {
+        Memory::new(self.max_memory)
+    }
+
+    /// The limits on reading.
+    pub(crate) fn limits(&self) -> Limits {
         let mut limits = Limits::default();
-        limits.memory = self.max_memory.unwrap_or(limits.memory);
+        limits.memory = self.memory().for_reading();
         limits.elements = self.max_elements.unwrap_or(limits.elements);
         limits.nesting = self.max_nesting.unwrap_or(limits.nesting);
         limits.files = self.max_files.unwrap_or(limits.files);
@@ -115,8 +122,19 @@ impl ReadingArguments {
     /// # Errors
     /// [`Failure`] by kind of error.
     pub(crate) fn open(&self, paths: &[PathBuf]) -> Result<(Scene, Diagnostics), Failure> {
-        let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
-        lumbre::open_with(&paths, &self.options(self.frame)?).map_err(Failure::from)
+        let (desc, mut diagnostics) = self.describe(paths)?;
+        self.check_build(&desc)?;
+        let name = paths.first().map_or(Path::new(""), PathBuf::as_path);
+        let scene = Scene::of_file(desc, name, &mut diagnostics)?;
+        Ok((scene, diagnostics))
+    }
+
+    /// Refuses a description whose scene would not fit into memory.
+    ///
+    /// # Errors
+    /// [`Failure::Limit`] with the prediction.
+    pub(crate) fn check_build(&self, desc: &SceneDesc) -> Result<(), Failure> {
+        self.memory().check("building the scene", lumbre::predicted_build_bytes(desc), 0)
     }
 
     /// Reads one or more files as one description.
@@ -141,7 +159,12 @@ impl ReadingArguments {
 
     fn describe_at(&self, paths: &[PathBuf], time: Option<f64>) -> Result<(SceneDesc, Diagnostics), Failure> {
         let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
-        lumbre::describe(&paths, &self.options(time)?).map_err(Failure::from)
+        // What is read counts against the limit too, so that the remark is that of before.
+        let memory = self.memory();
+        lumbre::describe(&paths, &self.options(time)?).map_err(|error| match Failure::from(error) {
+            Failure::Limit(message) => Failure::Limit(message + memory.remark()),
+            failure => failure,
+        })
     }
 
     fn options(&self, frame: Option<f64>) -> Result<lumbre::ReadOptions, Failure> {

@@ -16,11 +16,12 @@ use lumbre::{
 use serde_json::json;
 
 use crate::failure::Failure;
-use crate::overwrite::refuse_inputs;
-use crate::progress::{Display, Style};
+use crate::output::{self, Inputs, Pictures, Replaced};
+use crate::progress::{Display, Style, Watched};
 use crate::reading::{Frames, ReadingArguments, print_warnings};
-use crate::signals::Signals;
+use crate::signals::{Deadline, Phase, Signals};
 use crate::staging::{self, Behind, StagingArguments};
+use crate::threads;
 use crate::units::{self, Crop, spoken};
 
 /// Renders a scene to a picture.
@@ -45,18 +46,19 @@ Animations of a glTF, at a time in seconds, or frame by frame with motion blur:
   lumbre render dancer.glb --frame 1.5 --shutter 0.5
   lumbre render dancer.glb --frames 0..47 --fps 24 --shutter 0.5 -o frame.####.png
 
-Ctrl-C stops and saves what is there; a second one stops at once and saves nothing.")]
+Ctrl-C stops and saves what is there, if every pixel has a sample; a second one stops at once and saves nothing.")]
 pub(crate) struct Arguments {
     /// The scene: .pbrt, .gltf, .glb, .obj, .ply or .stl, also packed by gzip (but glTF). Several .pbrt files are read one after another.
     #[arg(required = true)]
     scene: Vec<PathBuf>,
-    /// The picture: .exr, .png, .hdr, .pfm or .jpg. By default the scene's own film name, else the scene's name with .png.
+    /// The picture: .exr, .png, .hdr, .pfm or .jpg. By default the scene's own film name, else the scene's name with .png,
+    /// but never a file that was read or that Lumbre did not write: then STEM.render.png.
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
     /// Samples per pixel.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     spp: Option<u32>,
-    /// Stop after this time, as 90s, 2m or 1h30m.
+    /// Stop after this time, counted from the start (of each frame), as 90s, 2m or 1h30m.
     #[arg(long, value_name = "DUR", value_parser = units::duration)]
     time: Option<Duration>,
     /// Stop when the noise is estimated to be below this share of the luminance.
@@ -150,26 +152,42 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(output) = &arguments.output {
         check_format(output, !arguments.aov.is_empty())?;
     }
+    let named = Inputs::of(arguments.inputs());
+    output::refuse_inputs(
+        arguments.output.as_deref(),
+        &arguments.pictures(),
+        arguments.stats.as_deref(),
+        &named,
+    )?;
     let start = Instant::now();
-    let mut stage = arguments.staging.stage(arguments.size)?;
+    if let (Some((width, height)), None) = (arguments.size, &arguments.crop) {
+        // What cannot fit is known before anything is read.
+        let mut asked = RenderOptions::default();
+        (asked.width, asked.height) = (width, height);
+        check_film(arguments, &asked, 0)?;
+    }
     let cancel = CancelToken::new();
-    let signals =
-        Signals::listen(&cancel).map_err(|e| Failure::Io(format!("cannot listen for signals: {e}")))?;
-    // The first picture's exposure is used for all.
-    let mut exposure = arguments.exposure;
+    let signals = Signals::listen(&cancel)?;
+    signals.end_at(arguments.deadline(start));
+    signals.enter(READING);
+    let mut stage = arguments.staging.stage(arguments.size, arguments.reading.limits())?;
+    // The first picture's name and exposure are used for all.
+    let mut from_first = First { pattern: None, exposure: arguments.exposure };
     if let Some(Frames(frames)) = &arguments.frames {
         let (first, last) = (*frames.start(), *frames.end());
         let mut held = Held::default();
         for number in frames.clone() {
             let start = Instant::now();
+            signals.end_at(arguments.deadline(start));
+            signals.enter(READING);
             let (desc, mut diagnostics) = arguments.reading.describe_frame(&arguments.scene, number)?;
             let frame = Frame { number, is_first: number == first };
             if !arguments.quiet {
                 say!("frame {number} ({} of {})", number - first + 1, last - first + 1);
             }
             let frame = Some((frame, &mut held));
-            let context = Context { arguments, stage: &stage, start, cancel: &cancel };
-            picture(context, desc, &mut diagnostics, frame, &mut exposure)?;
+            let context = Context { arguments, stage: &stage, start, cancel: &cancel, signals: &signals };
+            picture(context, desc, &mut diagnostics, frame, &mut from_first)?;
             if cancel.is_cancelled() {
                 break;
             }
@@ -178,19 +196,22 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let (desc, mut diagnostics) = arguments.reading.describe(&arguments.scene)?;
         match arguments.staging.turntable() {
             None => {
-                let context = Context { arguments, stage: &stage, start, cancel: &cancel };
-                picture(context, desc, &mut diagnostics, None, &mut exposure)?;
+                let context = Context { arguments, stage: &stage, start, cancel: &cancel, signals: &signals };
+                picture(context, desc, &mut diagnostics, None, &mut from_first)?;
             }
             Some(frames) => {
                 for turn in 0..frames {
                     stage.turns = Some(f64::from(turn) / f64::from(frames));
-                    let start = Instant::now();
+                    // The first one's time is also that of reading.
+                    let start = if turn == 0 { start } else { Instant::now() };
+                    signals.end_at(arguments.deadline(start));
                     let frame = Frame { number: turn + 1, is_first: turn == 0 };
                     // Each rotation has its own camera.
                     let frame = Some((frame, &mut Held::default()));
                     let desc = desc.clone();
-                    let context = Context { arguments, stage: &stage, start, cancel: &cancel };
-                    picture(context, desc, &mut diagnostics, frame, &mut exposure)?;
+                    let context =
+                        Context { arguments, stage: &stage, start, cancel: &cancel, signals: &signals };
+                    picture(context, desc, &mut diagnostics, frame, &mut from_first)?;
                     if cancel.is_cancelled() {
                         break;
                     }
@@ -204,7 +225,44 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
+/// How long a picture is rendered even if reading took all of its time.
+const LEAST_TIME: Duration = Duration::from_millis(400);
+
+const READING: Phase = Phase::Preparing("reading the scene");
+
 impl Arguments {
+    /// The files that are named on the command line and read.
+    fn inputs(&self) -> impl Iterator<Item = &Path> {
+        self.scene.iter().map(PathBuf::as_path).chain(self.staging.inputs())
+    }
+
+    /// What there will be of pictures.
+    fn pictures(&self) -> Pictures {
+        match (&self.frames, self.staging.turntable()) {
+            (Some(Frames(numbers)), _) => Pictures::Frames(numbers.clone()),
+            (None, Some(count)) => Pictures::Turntable(count),
+            (None, None) => Pictures::One,
+        }
+    }
+
+    /// The end of a picture that was begun at this time.
+    fn deadline(&self, start: Instant) -> Option<Deadline> {
+        self.time.and_then(|time| Some(Deadline { at: start.checked_add(time)?, time }))
+    }
+
+    /// The name of the pictures, or the pattern of their names.
+    fn pattern(&self, scene: &Scene, inputs: &Inputs) -> Result<PathBuf, Failure> {
+        let (pictures, statistics) = (self.pictures(), self.stats.as_deref());
+        if let Some(pattern) = &self.output {
+            output::refuse_inputs(Some(pattern), &pictures, statistics, inputs)?;
+            return Ok(pattern.clone());
+        }
+        let film = scene.resolved().film().filename.as_deref().map(Path::new);
+        let film = film.filter(|name| check_format(name, false).is_ok());
+        output::refuse_inputs(None, &pictures, statistics, inputs)?;
+        output::default_name(film, &self.scene[0], &pictures, statistics, inputs, self.quiet)
+    }
+
     /// Rejects frames without an animation, and an output name that is the same for all frames.
     fn check_frames(&self, output: Option<&Path>) -> Result<(), Failure> {
         let is_gltf = |path: &PathBuf| {
@@ -252,6 +310,13 @@ struct Frame {
     is_first: bool,
 }
 
+/// What all pictures of a run have from the first.
+struct First {
+    /// The name, with `#` for the number of several.
+    pattern: Option<PathBuf>,
+    exposure: Option<f32>,
+}
+
 /// What a picture is rendered with.
 #[derive(Clone, Copy)]
 struct Context<'a> {
@@ -260,6 +325,7 @@ struct Context<'a> {
     /// When its reading began.
     start: Instant,
     cancel: &'a CancelToken,
+    signals: &'a Signals,
 }
 
 /// Renders and saves one picture, the only one or one of several frames.
@@ -268,11 +334,11 @@ fn picture(
     mut desc: SceneDesc,
     diagnostics: &mut Diagnostics,
     frame: Option<(Frame, &mut Held)>,
-    exposure: &mut Option<f32>,
+    first: &mut First,
 ) -> Result<(), Failure> {
-    let Context { arguments, stage, start, cancel } = context;
+    let Context { arguments, stage, start, cancel, signals } = context;
+    signals.enter(Phase::Preparing("building the scene"));
     let is_first = frame.as_ref().is_none_or(|(frame, _)| frame.is_first);
-    let is_frame = frame.is_some();
     let number = frame.as_ref().map(|(frame, _)| frame.number);
     let is_of_light = arguments.integrator.unwrap_or(desc.integrator.kind).needs_light();
     let mut stage = stage.clone();
@@ -284,24 +350,31 @@ fn picture(
     if let Some((_, held)) = frame {
         held.hold(&staged, &mut desc);
     }
-    let behind = arguments.staging.behind(&staged, is_of_light)?;
+    let behind = arguments.staging.behind(&staged, is_of_light, arguments.reading.limits())?;
     let name = &arguments.scene[0];
     let mut of_frames = Diagnostics::with_strictness(arguments.reading.strictness());
+    arguments.reading.check_build(&desc)?;
     let scene = Scene::of_file(desc, name, if is_first { diagnostics } else { &mut of_frames })?;
     let load_time = start.elapsed().saturating_sub(scene.build_time());
     if !arguments.quiet && is_first {
         print_warnings(diagnostics);
     }
-    let output = arguments.output.clone().unwrap_or_else(|| default_output(&scene, name, is_frame));
+    let inputs = diagnostics.files_read().iter().map(PathBuf::as_path).chain(arguments.inputs());
+    let inputs = Inputs::of(inputs);
+    let output = match &first.pattern {
+        Some(pattern) => pattern.clone(),
+        None => first.pattern.insert(arguments.pattern(&scene, &inputs)?).clone(),
+    };
     check_format(&output, !arguments.aov.is_empty())?;
     arguments.staging.check(Some(&output))?;
     let output = number.map_or(output.clone(), |number| staging::frame_name(&output, number));
     for path in std::iter::once(&output).chain(&arguments.stats) {
-        refuse_inputs(path, arguments.scene.iter().map(PathBuf::as_path).chain(arguments.staging.inputs()))?;
+        inputs.refuse(path)?;
         probe_writable(path).map_err(|e| Failure::from(lumbre::Error::from(e)))?;
     }
     let mut options = options(arguments, &scene)?;
     options.transparent = behind.is_transparent();
+    check_film(arguments, &options, scene.info().memory_bytes)?;
     let warn = |what: String| match arguments.reading.is_strict() {
         true => Err(Failure::input(what)),
         false if arguments.quiet || !is_first => Ok(()),
@@ -323,7 +396,7 @@ fn picture(
         warn(format!("{}: the camera is below the ground, which hides everything", name.display()))?;
     }
 
-    let exposure = match *exposure {
+    let exposure = match first.exposure {
         Some(exposure) => exposure,
         None if staged.photometric && is_of_light && is_for_displays(&output) => {
             let stops = measured_exposure(scene.white_level(&options)?);
@@ -332,18 +405,28 @@ fn picture(
                     "exposed by {stops:.1} stops for the file's own lights (--exposure 0 takes them as they are)"
                 );
             }
-            *exposure.insert(stops)
+            *first.exposure.insert(stops)
         }
-        None => *exposure.insert(0.0),
+        None => *first.exposure.insert(0.0),
     };
 
     let style = if arguments.quiet { Style::None } else { arguments.progress };
-    let display = Display::new(style);
+    let progress = Watched { display: Display::new(style), signals };
     let render_start = Instant::now();
-    let picture = scene.render_with(&options, &display, cancel)?;
+    if let Some(deadline) = arguments.deadline(start) {
+        // What reading and building left of it.
+        let left = deadline.at.saturating_duration_since(render_start);
+        options.stop.time = Some(left.max(LEAST_TIME));
+    }
+    signals.enter(Phase::Rendering);
+    let picture = scene.render_with(&options, &progress, cancel)?;
     let render_time = render_start.elapsed();
-    display.finish();
+    progress.display.finish();
+    check_whole(arguments, &picture, &output, signals.received())?;
 
+    let replaced: Vec<Replaced<'_>> =
+        std::iter::once(&output).chain(&arguments.stats).map(|path| Replaced::by(path)).collect();
+    let stream = signals.enter_writing(&output)?;
     let save_start = Instant::now();
     let is_shown = is_of_light && staged.light != StageLight::Own;
     let tone_map = arguments.tonemap.unwrap_or(if is_shown { ToneMap::Neutral } else { ToneMap::None });
@@ -354,11 +437,9 @@ fn picture(
         Behind::Lights | Behind::Nothing => picture,
     };
     picture.save_with(&output, &save, &arguments.aov)?;
+    drop(stream);
     let save_time = save_start.elapsed();
-    report_dropped(&picture);
-    if picture.stats().spp == 0 {
-        say!("warning: the time was over before every pixel had a sample");
-    }
+    report_stats(arguments, &picture);
     if let Some(path) = &arguments.stats {
         let seconds = json!({
             "load": load_time.as_secs_f64(),
@@ -367,13 +448,28 @@ fn picture(
             "save": save_time.as_secs_f64(),
         });
         let report = statistics(&scene, &picture, seconds, diagnostics.lines());
+        let stream = signals.enter_writing(path)?;
         lumbre::formats::atomic_write(path, |file| writeln!(file, "{report:#}"))
             .map_err(|e| Failure::from(lumbre::Error::from(e)))?;
+        drop(stream);
     }
     if !arguments.quiet {
+        replaced.iter().for_each(Replaced::say);
         summary(arguments.verbose, &scene, &picture, &output, render_time);
     }
     Ok(())
+}
+
+/// Refuses a picture that would not fit into memory, while it is rendered or while it is saved.
+fn check_film(arguments: &Arguments, options: &RenderOptions, held: u64) -> Result<(), Failure> {
+    // The picture, one over its background, and what encoders make of it; each layer as numbers and as their encoding.
+    const SAVED: u64 = 100;
+    const LAYERS: u64 = 170;
+    let each = if options.features { SAVED + LAYERS } else { SAVED };
+    let pixels = options.bounds().map_err(lumbre::Error::from)?.area();
+    let rendered = options.memory_bytes().map_err(lumbre::Error::from)?;
+    let what = format!("a picture of {} by {} pixels", options.width, options.height);
+    arguments.reading.memory().check(&what, rendered.max(pixels.saturating_mul(each)), held)
 }
 
 /// Whether exposure applies to the format of this name.
@@ -407,17 +503,31 @@ fn check_format(path: &Path, layers: bool) -> Result<(), Failure> {
     }
 }
 
-/// The scene's own output name, else the scene's name with .png.
-fn default_output(scene: &Scene, path: &Path, numbered: bool) -> PathBuf {
-    let own = scene.resolved().film().filename.as_deref().map(PathBuf::from);
-    let number = if numbered { ".####" } else { "" };
-    own.filter(|name| check_format(name, false).is_ok() && !numbered).unwrap_or_else(|| {
-        let stem = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-        let stem = stem.strip_suffix(".gz").unwrap_or(&stem);
-        let stem = Path::new(stem).file_stem().map_or_else(|| "picture".into(), |s| s.to_os_string());
-        let stem = stem.to_string_lossy();
-        format!("{}{number}.png", if stem == "-" { "picture" } else { &*stem }).into()
-    })
+/// Refuses to save what is no whole picture: where not every pixel has a sample, what there is takes no file's place, and is saved
+/// only when the time was over, if it has every pixel of a coarser one.
+fn check_whole(
+    arguments: &Arguments,
+    picture: &Picture,
+    output: &Path,
+    signal: Option<u8>,
+) -> Result<(), Failure> {
+    if picture.stats().spp > 0 {
+        return Ok(());
+    }
+    if let Some(status) = signal {
+        say!("not every pixel had a sample: nothing was saved");
+        return Err(Failure::Interrupted(status));
+    }
+    let time = arguments.time.map(spoken).unwrap_or_default();
+    let over = format!("--time: {time} were over before every pixel had a sample");
+    match picture.stats().stride {
+        Some(stride) if !output.is_file() => {
+            say!("warning: {over}; the picture has one for {stride} by {stride} pixels");
+            Ok(())
+        }
+        Some(_) => Err(Failure::Limit(format!("{over}; {} is as it was", output.display()))),
+        None => Err(Failure::Limit(format!("{over}; nothing was saved"))),
+    }
 }
 
 fn options(arguments: &Arguments, scene: &Scene) -> Result<RenderOptions, Failure> {
@@ -446,7 +556,7 @@ fn options(arguments: &Arguments, scene: &Scene) -> Result<RenderOptions, Failur
         None if open_ended => u32::MAX,
         None => options.stop.spp,
     };
-    options.threads = arguments.threads.map_or(0, usize::from);
+    options.threads = arguments.threads.map_or_else(rayon::current_num_threads, usize::from);
     options.features = !arguments.aov.is_empty();
     Ok(options)
 }
@@ -470,8 +580,13 @@ fn camera(scene: &Scene, wanted: &str) -> Result<usize, Failure> {
     })
 }
 
-fn report_dropped(picture: &Picture) {
+fn report_stats(arguments: &Arguments, picture: &Picture) {
     let stats = picture.stats();
+    let refused = if arguments.threads.is_some() { 0 } else { threads::refused() };
+    let refused = refused.max(stats.refused_threads);
+    if refused > 0 {
+        say!("warning: the system grants {} of {} threads", stats.threads, stats.threads + refused);
+    }
     for sample in &stats.first_dropped {
         say!("warning: pixel ({}, {}), sample {}: not finite, dropped", sample.x, sample.y, sample.sample);
     }

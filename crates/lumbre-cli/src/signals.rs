@@ -1,42 +1,201 @@
-//! Signals that end the program.
+//! Stops from outside, signals and deadlines, honoured wherever the program is.
 
-use std::sync::Arc;
+use std::fs::File;
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::time::Duration;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 use lumbre::CancelToken;
+use lumbre::formats::abandon_writes;
+use signal_hook::consts::{SIGINT, SIGTERM};
 
-/// SIGINT and SIGTERM: the first asks the work to end, a second interrupt ends the program.
+use crate::failure::Failure;
+
+/// What the program is doing, which says what becomes of a stop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Phase {
+    /// What leaves nothing to save, by what it is: it ends at once.
+    Preparing(&'static str),
+    /// Rendering: it has [`GRACE`] to stop by itself, with what there is.
+    Rendering,
+    /// Opening a pipe since this time, where no one may be to read: [`GRACE`].
+    Opening(Instant),
+    /// Writing to a pipe or a device: [`GRACE`] after a signal.
+    Sending,
+    /// Writing a whole picture to a file: it has [`SAVING_GRACE`].
+    Saving,
+}
+
+/// How much later than its end preparing may be done, for a coarse picture rather than none.
+const PREPARING_GRACE: Duration = Duration::from_secs(1);
+/// How long a render may take to stop.
+const GRACE: Duration = Duration::from_millis(1500);
+/// How long a picture that took its time to render may take to be saved. Who cannot wait sends another signal.
+const SAVING_GRACE: Duration = Duration::from_secs(20);
+/// Between two looks.
+const INTERVAL: Duration = Duration::from_millis(10);
+/// The exit status of a limit.
+const LIMIT: i32 = 5;
+
+/// SIGINT, SIGTERM and a deadline. The first signal asks the work to end, and ends the program where that leaves nothing to save
+/// or takes too long; a second one ends it at once. The temporary files of writes are removed, and no path holds a part of a file.
 pub(crate) struct Signals {
     last: Arc<AtomicUsize>,
+    state: Arc<Mutex<State>>,
+}
+
+struct State {
+    phase: Phase,
+    cancel: CancelToken,
+    deadline: Option<Deadline>,
+}
+
+/// A time by which the work has to end.
+#[derive(Clone, Copy)]
+pub(crate) struct Deadline {
+    /// The time.
+    pub at: Instant,
+    /// How much there was.
+    pub time: Duration,
 }
 
 impl Signals {
-    /// Listens from now on.
+    /// Listens from now on, [`Phase::Preparing`].
     ///
     /// # Errors
-    /// Those of the system.
-    pub(crate) fn listen(cancel: &CancelToken) -> std::io::Result<Self> {
+    /// [`Failure::Io`] where the system does not let it.
+    pub(crate) fn listen(cancel: &CancelToken) -> Result<Self, Failure> {
+        Self::start(cancel).map_err(|e| Failure::Io(format!("cannot listen for signals: {e}")))
+    }
+
+    fn start(cancel: &CancelToken) -> std::io::Result<Self> {
         let last = Arc::new(AtomicUsize::new(0));
-        let again = Arc::new(AtomicBool::new(false));
-        for (signal, status) in [(signal_hook::consts::SIGINT, 130), (signal_hook::consts::SIGTERM, 143)] {
-            signal_hook::flag::register_conditional_shutdown(signal, status, again.clone())?;
-            signal_hook::flag::register(signal, again.clone())?;
-            signal_hook::flag::register_usize(signal, last.clone(), status as usize)?;
-        }
-        let (seen, cancel) = (last.clone(), cancel.clone());
-        // A signal handler may do almost nothing, so a thread forwards the signal.
-        std::thread::spawn(move || {
-            while seen.load(Ordering::Relaxed) == 0 {
-                std::thread::sleep(Duration::from_millis(20));
+        let state = State { phase: Phase::Preparing("starting"), cancel: cancel.clone(), deadline: None };
+        let signals = Self { last: last.clone(), state: Arc::new(Mutex::new(state)) };
+        let came = Arc::new(AtomicBool::new(false));
+        // A signal handler may do almost nothing, so a thread does it.
+        let watcher = Watcher { came: came.clone(), last: last.clone(), state: signals.state.clone() };
+        let watches = std::thread::Builder::new().spawn(move || watcher.watch()).is_ok();
+        for (signal, status) in [(SIGINT, 130), (SIGTERM, 143)] {
+            if !watches {
+                // Without a thread nothing can be removed or saved: the next run removes what is left.
+                let at_once = Arc::new(AtomicBool::new(true));
+                signal_hook::flag::register_conditional_shutdown(signal, status, at_once)?;
             }
-            cancel.cancel();
-        });
-        Ok(Self { last })
+            signal_hook::flag::register_usize(signal, last.clone(), status as usize)?;
+            signal_hook::flag::register(signal, came.clone())?;
+        }
+        Ok(signals)
     }
 
     /// The exit status of the received signal, if any.
     pub(crate) fn received(&self) -> Option<u8> {
         u8::try_from(self.last.load(Ordering::Relaxed)).ok().filter(|status| *status != 0)
     }
+
+    /// Says what the program is doing from now on.
+    pub(crate) fn enter(&self, phase: Phase) {
+        lock(&self.state).phase = phase;
+    }
+
+    /// Ends the work at this time, in place of an earlier deadline.
+    pub(crate) fn end_at(&self, deadline: Option<Deadline>) {
+        lock(&self.state).deadline = deadline;
+    }
+}
+
+fn lock(state: &Mutex<State>) -> MutexGuard<'_, State> {
+    state.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+struct Watcher {
+    came: Arc<AtomicBool>,
+    last: Arc<AtomicUsize>,
+    state: Arc<Mutex<State>>,
+}
+
+impl Watcher {
+    fn watch(&self) {
+        let mut first: Option<Instant> = None;
+        let mut has_said = false;
+        loop {
+            std::thread::sleep(INTERVAL);
+            let came = self.came.swap(false, Ordering::Relaxed);
+            // Held until the end, so that nothing begins meanwhile that is worth saving.
+            let state = lock(&self.state);
+            let status = i32::try_from(self.last.load(Ordering::Relaxed)).unwrap_or(130);
+            match (first, came) {
+                (None, true) => {
+                    first = Some(Instant::now());
+                    state.cancel.cancel();
+                }
+                (Some(_), true) => end(status),
+                _ => {}
+            }
+            let elapsed = first.map(|at| at.elapsed());
+            match (state.phase, elapsed) {
+                (Phase::Preparing(_), Some(_)) => end(status),
+                (Phase::Rendering, Some(elapsed)) if elapsed > GRACE => {
+                    say!("error: the render takes too long to stop; nothing was saved");
+                    end(status);
+                }
+                (Phase::Opening(_) | Phase::Sending, Some(elapsed)) if elapsed > GRACE => end(status),
+                (Phase::Saving, Some(elapsed)) if elapsed > SAVING_GRACE => end(status),
+                (Phase::Saving, Some(elapsed)) if elapsed > GRACE && !has_said => {
+                    has_said = true;
+                    say!("saving the picture; another signal ends it at once, without");
+                }
+                (_, Some(_)) => {}
+                (phase, None) => {
+                    if let Some(deadline) = state.deadline {
+                        check(phase, deadline);
+                    }
+                }
+            }
+        }
+    }
+}
+
+impl Signals {
+    /// Enters the phase of writing a file of this name. A pipe or a device is opened, and to be held until it is written: the phase
+    /// begins when someone reads.
+    ///
+    /// # Errors
+    /// [`Failure::Io`] when a pipe or a device cannot be opened.
+    pub(crate) fn enter_writing(&self, path: &Path) -> Result<Option<File>, Failure> {
+        if std::fs::metadata(path).map_or(true, |meta| meta.is_file() || meta.is_dir()) {
+            self.enter(Phase::Saving);
+            return Ok(None);
+        }
+        self.enter(Phase::Opening(Instant::now()));
+        let opened = File::options().write(true).open(path);
+        let stream = opened.map_err(|e| Failure::Io(format!("{}: {e}", path.display())))?;
+        self.enter(Phase::Sending);
+        Ok(Some(stream))
+    }
+}
+
+/// Ends the program if its time is over.
+fn check(phase: Phase, deadline: Deadline) {
+    let over = Instant::now().saturating_duration_since(deadline.at);
+    let time = crate::units::spoken(deadline.time);
+    match phase {
+        Phase::Preparing(what) if over > PREPARING_GRACE => {
+            say!("error: --time: {time} were over while {what}; nothing was rendered");
+        }
+        Phase::Rendering if over > GRACE => {
+            say!("error: --time: {time} are over, and the render takes too long to stop; nothing was saved");
+        }
+        Phase::Opening(since) if over.min(since.elapsed()) > GRACE => {
+            say!("error: --time: {time} are over, and no one takes the picture; nothing was saved");
+        }
+        _ => return,
+    }
+    end(LIMIT);
+}
+
+fn end(status: i32) -> ! {
+    abandon_writes();
+    signal_hook::low_level::exit(status)
 }

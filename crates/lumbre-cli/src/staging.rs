@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use clap::Args;
 use lumbre::description::{GroundPlane, StageLight};
+use lumbre::formats::Limits;
 use lumbre::image::{Image, Rgb, srgb_to_linear};
 use lumbre::{Background, EnvironmentDesc, Ground, Stage, Staged, Surroundings};
 
@@ -151,12 +152,12 @@ impl StagingArguments {
     ///
     /// # Errors
     /// Unreadable files, and [`Failure::Usage`] for an image that is not an environment map.
-    pub(crate) fn stage(&self, size: Option<(u32, u32)>) -> Result<Stage, Failure> {
+    pub(crate) fn stage(&self, size: Option<(u32, u32)>, limits: Limits) -> Result<Stage, Failure> {
         let surroundings = match &self.env {
             None => Surroundings::Automatic,
             Some(path) if path.as_os_str() == "none" => Surroundings::Own,
             Some(path) if path.as_os_str() == "studio" => Surroundings::Studio,
-            Some(path) => Surroundings::Map(environment(path)?),
+            Some(path) => Surroundings::Map(environment(path, limits)?),
         };
         let ground = self.ground.unwrap_or_default();
         let mut stage = Stage::default();
@@ -170,7 +171,12 @@ impl StagingArguments {
     ///
     /// # Errors
     /// Unreadable files.
-    pub(crate) fn behind(&self, staged: &Staged, is_of_light: bool) -> Result<Behind, Failure> {
+    pub(crate) fn behind(
+        &self,
+        staged: &Staged,
+        is_of_light: bool,
+        limits: Limits,
+    ) -> Result<Behind, Failure> {
         Ok(match &self.background {
             None if is_of_light && staged.light == StageLight::Studio => {
                 Behind::Background(Background::studio())
@@ -180,7 +186,7 @@ impl StagingArguments {
             Some(BackgroundArgument::Studio) => Behind::Background(Background::studio()),
             Some(BackgroundArgument::Colour(colour)) => Behind::Background(Background::Colour(*colour)),
             Some(BackgroundArgument::File(path)) => {
-                Behind::Background(Background::Picture(opaque(lumbre::read_image(path)?)))
+                Behind::Background(Background::Picture(opaque(lumbre::read_image_within(path, limits)?)))
             }
         })
     }
@@ -200,8 +206,8 @@ impl StagingArguments {
     }
 }
 
-fn environment(path: &Path) -> Result<EnvironmentDesc, Failure> {
-    let image = Arc::new(lumbre::read_image(path)?);
+fn environment(path: &Path, limits: Limits) -> Result<EnvironmentDesc, Failure> {
+    let image = Arc::new(lumbre::read_image_within(path, limits)?);
     let found = (image.width(), image.height());
     EnvironmentDesc::of_image(image).ok_or_else(|| {
         Failure::Input(format!(

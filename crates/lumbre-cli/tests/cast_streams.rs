@@ -144,9 +144,9 @@ fn answers_are_the_same_whichever_way_the_rays_came() {
             let name = format!("out.{form}");
             // Something stands there before.
             fs::write(desk.path(&name), "old").unwrap();
-            assert!(good(desk.cast_piped(csv.as_bytes(), &["--query", query, "-o", &name])).is_empty());
+            assert!(good(desk.cast_piped(csv.as_bytes(), &["--query", query, "-o", &name, "-q"])).is_empty());
             let piped = fs::read(desk.path(&name)).unwrap();
-            good(desk.cast(&["--rays", "rays.npy", "--query", query, "-o", &name, "--threads", "1"]));
+            good(desk.cast(&["--rays", "rays.npy", "--query", query, "-o", &name, "--threads", "1", "-q"]));
             assert!(piped == fs::read(desk.path(&name)).unwrap(), "{query} {form}");
             assert!(9001 < piped.len());
         }

@@ -3,4 +3,7 @@
 mod broken_inputs;
 mod cast_streams;
 mod cast_vectors;
+mod files;
+mod limits;
 mod program;
+mod stops;

@@ -4,6 +4,8 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
+use std::time::{Duration, Instant};
 
 use crate::diagnostic::FormatError;
 
@@ -15,7 +17,8 @@ use crate::diagnostic::FormatError;
 ///
 /// # Errors
 /// [`FormatError::Io`]; the path then holds what it held before, unless only syncing the folder failed. A
-/// process that is killed may leave a file `.NAME.….part` beside it.
+/// process that is killed may leave a file `.NAME.….lumbre.part` beside it, which the next write into that folder
+/// removes.
 pub fn atomic_write(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -31,10 +34,48 @@ pub fn atomic_write(
 pub fn probe_writable(path: &Path) -> Result<(), FormatError> {
     let target = target_of(path).map_err(|e| FormatError::io(path, CANNOT_WRITE, e))?;
     let Target::File { path: real, .. } = target else { return Ok(()) };
-    let part = part_of(&real);
-    let made = RealDisk.create(&part).map_err(|e| FormatError::io(path, CANNOT_WRITE, e))?;
-    drop(made);
-    RealDisk.remove(&part).map_err(|e| FormatError::io(path, CANNOT_WRITE, e))
+    replace(&RealDisk, &real, None, |_| Ok(()), |part, _| RealDisk.remove(part))
+        .map_err(|e| FormatError::io(path, CANNOT_WRITE, e))
+}
+
+/// Removes the temporary files of all writes that are under way, and keeps the process from beginning or ending any other:
+/// for one that is about to exit, where a signal or a deadline ends it. Every path holds its old complete file then, or its
+/// new one.
+pub fn abandon_writes() {
+    const PATIENCE: Duration = Duration::from_millis(200);
+    let start = Instant::now();
+    loop {
+        let mut writes = match WRITES.try_lock() {
+            Ok(writes) => writes,
+            Err(TryLockError::Poisoned(writes)) => writes.into_inner(),
+            // Some call to the system takes long.
+            Err(TryLockError::WouldBlock) if start.elapsed() < PATIENCE => {
+                std::thread::sleep(Duration::from_millis(1));
+                continue;
+            }
+            Err(TryLockError::WouldBlock) => return,
+        };
+        for part in writes.parts.drain(..) {
+            let _ = fs::remove_file(part);
+        }
+        // Whoever would create or rename a file waits until the process is gone.
+        std::mem::forget(writes);
+        return;
+    }
+}
+
+/// The writes of this process.
+struct Writes {
+    /// The temporary files that there are.
+    parts: Vec<PathBuf>,
+    /// The folders whose left-over temporary files were removed.
+    swept: Vec<PathBuf>,
+}
+
+static WRITES: Mutex<Writes> = Mutex::new(Writes { parts: Vec::new(), swept: Vec::new() });
+
+fn writes() -> MutexGuard<'static, Writes> {
+    WRITES.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 const CANNOT_WRITE: &str = "cannot write";
@@ -78,7 +119,10 @@ impl Disk for RealDisk {
     type File = File;
 
     fn create(&self, path: &Path) -> io::Result<File> {
-        OpenOptions::new().write(true).create_new(true).open(path)
+        let file = OpenOptions::new().write(true).create_new(true).open(path)?;
+        // As long as it is held no one takes the file for a left-over. A file system without locks is fine.
+        let _ = file.try_lock();
+        Ok(file)
     }
 
     fn sync(&self, file: &mut File) -> io::Result<()> {
@@ -110,14 +154,17 @@ pub fn atomic_write_on<D: Disk>(
 ) -> Result<(), FormatError> {
     let refuse = |e| FormatError::io(path, CANNOT_WRITE, e);
     match target_of(path).map_err(refuse)? {
-        Target::File { path: real, permissions } => replace(disk, &real, permissions, |file| {
-            let mut buffered = BufWriter::with_capacity(256 << 10, file);
-            write(&mut buffered)?;
-            buffered.flush()?;
-            // A failed writer must not be flushed again when it is dropped.
-            drop(buffered.into_parts());
-            Ok(())
-        }),
+        Target::File { path: real, permissions } => {
+            let write = |file: &mut D::File| {
+                let mut buffered = BufWriter::with_capacity(256 << 10, file);
+                write(&mut buffered)?;
+                buffered.flush()?;
+                // A failed writer must not be flushed again when it is dropped.
+                drop(buffered.into_parts());
+                Ok(())
+            };
+            replace(disk, &real, permissions, write, |part, real| disk.rename(part, real))
+        }
         Target::Stream => OpenOptions::new().write(true).open(path).and_then(|mut stream| write(&mut stream)),
     }
     .map_err(refuse)
@@ -134,7 +181,9 @@ pub fn atomic_write_seek(
 ) -> Result<(), FormatError> {
     let refuse = |e| FormatError::io(path, CANNOT_WRITE, e);
     match target_of(path).map_err(refuse)? {
-        Target::File { path: real, permissions } => replace(&RealDisk, &real, permissions, write),
+        Target::File { path: real, permissions } => {
+            replace(&RealDisk, &real, permissions, write, |part, real| RealDisk.rename(part, real))
+        }
         Target::Stream => OpenOptions::new().write(true).open(path).and_then(|mut stream| {
             let mut file = tempfile::tempfile()?;
             write(&mut file)?;
@@ -145,15 +194,26 @@ pub fn atomic_write_seek(
     .map_err(refuse)
 }
 
-/// Writes a file beside `real`, which then takes its place.
+/// Writes a file beside `real`; `end` then puts it in the place of `real`, or removes it.
 fn replace<D: Disk>(
     disk: &D,
     real: &Path,
     permissions: Option<fs::Permissions>,
     write: impl FnOnce(&mut D::File) -> io::Result<()>,
+    end: impl FnOnce(&Path, &Path) -> io::Result<()>,
 ) -> io::Result<()> {
     let part = part_of(real);
-    let mut file = disk.create(&part)?;
+    let mut file = {
+        let mut writes = writes();
+        let folder = folder_of(real);
+        if !writes.swept.iter().any(|swept| swept == folder) {
+            remove_left_over(folder);
+            writes.swept.push(folder.to_owned());
+        }
+        let file = disk.create(&part)?;
+        writes.parts.push(part.clone());
+        file
+    };
     let written = (|| {
         write(&mut file)?;
         disk.sync(&mut file)?;
@@ -161,15 +221,47 @@ fn replace<D: Disk>(
             // A file system without permissions is fine.
             let _ = fs::set_permissions(&part, permissions);
         }
-        disk.rename(&part, real)
+        let mut writes = writes();
+        end(&part, real)?;
+        writes.parts.retain(|other| *other != part);
+        Ok(())
     })();
     drop(file);
     if let Err(e) = written {
         // The first error is the one to report.
         let _ = disk.remove(&part);
+        writes().parts.retain(|other| *other != part);
         return Err(e);
     }
     disk.sync_folder(folder_of(real))
+}
+
+/// Removes the temporary files in `folder` whose processes are gone.
+fn remove_left_over(folder: &Path) {
+    let Ok(entries) = fs::read_dir(folder) else { return };
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        if let Some(owner) = name.to_str().and_then(owner_of)
+            && is_left_over(&entry.path(), owner)
+        {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}
+
+/// Whether the process that wrote this temporary file is gone. It held a lock on it, also one on another machine or in a
+/// container of its own; but just after it was created a file has none yet.
+fn is_left_over(part: &Path, owner: u32) -> bool {
+    const MOMENT: Duration = Duration::from_secs(60);
+    let is_file = fs::symlink_metadata(part).is_ok_and(|meta| meta.is_file());
+    if owner == std::process::id() || !is_file {
+        return false;
+    }
+    let Ok(file) = File::open(part) else { return false };
+    let processes = Path::new("/proc");
+    let is_gone = processes.join("self").exists() && !processes.join(owner.to_string()).exists();
+    let age = file.metadata().and_then(|meta| meta.modified()).map(|at| at.elapsed().unwrap_or_default());
+    file.try_lock().is_ok() && (is_gone || age.is_ok_and(|age| age > MOMENT))
 }
 
 enum Target {
@@ -210,7 +302,18 @@ fn part_of(path: &Path) -> PathBuf {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     // Truncated, so that the whole stays within the limits of file systems.
     let name: String = name.chars().take(40).collect();
-    folder_of(path).join(format!(".{name}.{}-{count}.part", std::process::id()))
+    folder_of(path).join(format!(".{name}.{}-{count}{PART}", std::process::id()))
+}
+
+/// How the names of temporary files end: no other program's do.
+const PART: &str = ".lumbre.part";
+
+/// The process that made the temporary file of this name; `None` for another file.
+fn owner_of(name: &str) -> Option<u32> {
+    let (_, number) = name.strip_prefix('.')?.strip_suffix(PART)?.rsplit_once('.')?;
+    let (process, count) = number.split_once('-')?;
+    count.parse::<u32>().ok()?;
+    process.parse().ok()
 }
 
 #[cfg(test)]

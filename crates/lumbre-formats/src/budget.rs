@@ -3,7 +3,9 @@
 //! Every limit names the program flag that raises it, and so does its error.
 
 use std::mem::size_of;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use thiserror::Error;
 
@@ -101,6 +103,7 @@ pub struct Budget {
     peak: AtomicU64,
     elements: AtomicU64,
     files: AtomicU64,
+    paths: Mutex<Vec<PathBuf>>,
 }
 
 impl Budget {
@@ -185,6 +188,24 @@ impl Budget {
     /// When there would be more than [`Limits::files`].
     pub fn file(&self, name: &str) -> Result<(), LimitError> {
         spend(&self.files, 1, self.limits.files, LimitKind::Files, name).map(drop)
+    }
+
+    /// [`Budget::file`] for the file `path`, which is noted: see [`Budget::paths`].
+    ///
+    /// # Errors
+    /// As for [`Budget::file`].
+    pub fn path(&self, path: &Path) -> Result<(), LimitError> {
+        self.file(&path.to_string_lossy())?;
+        self.paths.lock().unwrap_or_else(PoisonError::into_inner).push(path.to_owned());
+        Ok(())
+    }
+
+    /// The files that were opened, or that were not there to open, each as it was named, once each.
+    pub fn paths(&self) -> Vec<PathBuf> {
+        let mut paths = self.paths.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        paths.sort();
+        paths.dedup();
+        paths
     }
 
     /// Checks a nesting of `depth` levels. Readers count their own depth.

@@ -346,6 +346,7 @@ pub struct Diagnostics {
     kinds: [HashMap<String, u64>; 2],
     warnings: u64,
     errors: u64,
+    files: Vec<PathBuf>,
 }
 
 impl Diagnostics {
@@ -372,6 +373,16 @@ impl Diagnostics {
     /// Whether unusable parts are dropped with a warning.
     pub fn is_lenient(&self) -> bool {
         self.strictness == Strictness::Lenient
+    }
+
+    /// The files that were read for a scene, each as it was named: its own, and those that these name. Also those that were
+    /// missing.
+    pub fn files_read(&self) -> &[PathBuf] {
+        &self.files
+    }
+
+    pub(crate) fn set_files_read(&mut self, files: Vec<PathBuf>) {
+        self.files = files;
     }
 
     /// Adds a diagnostic.

@@ -30,7 +30,7 @@ impl<'b> Input<'b> {
     /// is damaged.
     pub fn open(path: &Path, budget: &'b Budget) -> Result<Self, FormatError> {
         let name: Arc<str> = path.display().to_string().into();
-        budget.file(&name)?;
+        budget.path(path)?;
         let (file, size) = open_regular(path)?;
         let mut bytes = Vec::new();
         let mut hold = budget.hold(0, &name)?;

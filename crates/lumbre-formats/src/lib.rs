@@ -20,7 +20,7 @@ pub mod ply;
 mod polygon;
 pub mod stl;
 
-pub use atomic::{atomic_write, atomic_write_seek, probe_writable};
+pub use atomic::{abandon_writes, atomic_write, atomic_write_seek, probe_writable};
 pub use budget::{Budget, BudgetVec, Hold, LimitError, LimitKind, Limits};
 pub use diagnostic::{Diagnostic, Diagnostics, FormatError, Place, Position, Severity, Strictness};
 pub use input::Input;

@@ -61,7 +61,7 @@ impl SceneFormat {
 /// Reads the scene or the mesh in the file `path`: `.pbrt`, `.ply` and `.stl`, each also with `.gz`, `.gltf`,
 /// `.glb` and `.obj`. `-` is a scene in the pbrt language from standard input.
 ///
-/// Returns the description and the diagnostics: the warnings, and their counts.
+/// Returns the description and the diagnostics: the warnings, their counts, and the files that were read.
 ///
 /// # Errors
 /// [`FormatError`], with the place in the file.
@@ -91,6 +91,7 @@ pub fn open_scenes(
         }
     };
     diagnostics.check()?;
+    diagnostics.set_files_read(budget.paths());
     Ok((scene, diagnostics))
 }
 

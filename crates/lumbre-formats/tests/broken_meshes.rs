@@ -339,7 +339,7 @@ fn every_broken_file_gets_its_message() {
         (
             "a.png",
             png_of_size(0x7FFF_FFFF, 0x7FFF_FFFF),
-            "a.png: PNG image of an impossible size (found 2147483647 by 2147483647 pixels in 103 bytes)",
+            "a.png: PNG image of an impossible size (found 2147483647 by 2147483647 pixels in 130 bytes)",
         ),
         ("a.png", png_of_size(120, 90), "a.png: damaged PNG image (found "),
         ("a.png", encoded(ImageFormat::Png)[..60].to_vec(), "a.png: damaged PNG image (found "),

@@ -26,7 +26,4 @@ pub enum RenderError {
     /// The pixel filter has no width.
     #[error("the pixel filter needs a positive radius, and more than zero inside it")]
     Filter,
-    /// Threads cannot be started.
-    #[error("threads cannot be started: {0}")]
-    Threads(String),
 }

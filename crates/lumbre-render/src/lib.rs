@@ -4,6 +4,7 @@
 //! is the verb.
 
 mod cancel;
+mod clock;
 mod error;
 pub mod film;
 mod job;
@@ -11,6 +12,7 @@ mod options;
 mod progress;
 mod rendered;
 pub mod transport;
+mod workers;
 
 pub use cancel::CancelToken;
 pub use error::RenderError;

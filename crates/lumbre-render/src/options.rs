@@ -2,11 +2,12 @@
 
 use std::time::Duration;
 
+use lumbre_image::Rgb;
 use lumbre_math::DVec2;
 use lumbre_scene::{FilmDesc, FilterDesc, IntegratorDesc, SamplerDesc, Scene};
 
 use crate::RenderError;
-use crate::film::{Exposure, Filter, FilterShape, PixelBounds};
+use crate::film::{Exposure, FeatureSums, Filter, FilterShape, Pixel, PixelBounds, Tint};
 
 /// Everything about a picture that is not in the scene.
 ///
@@ -140,6 +141,22 @@ impl RenderOptions {
         }
         let bounds = self.crop.map_or(whole, |crop| crop.intersection(&whole));
         if bounds.is_empty() { Err(RenderError::EmptyCrop) } else { Ok(bounds) }
+    }
+
+    /// Bytes that a render with these options holds besides the scene: the sums of every pixel, and the pictures made of them.
+    ///
+    /// # Errors
+    /// As for [`RenderOptions::bounds`].
+    pub fn memory_bytes(&self) -> Result<u64, RenderError> {
+        let mut each = size_of::<Pixel>() + size_of::<Rgb>();
+        if self.transparent {
+            // Coverage by colour, and the alpha and the coverage of the picture.
+            each += size_of::<Tint>() + size_of::<f32>() + size_of::<Rgb>();
+        }
+        if self.features {
+            each += size_of::<FeatureSums>() + 4 * size_of::<Rgb>();
+        }
+        Ok(self.bounds()?.area().saturating_mul(each as u64))
     }
 
     pub(crate) fn pixel_filter(&self) -> Result<Filter, RenderError> {

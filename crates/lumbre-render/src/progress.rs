@@ -11,6 +11,10 @@ pub trait Progress: Sync {
 
     /// Told after each pass over the picture, from one thread; the next pass waits for it.
     fn pass(&self, _snapshot: &Snapshot<'_>) {}
+
+    /// Told once, from one thread, when no more samples will be taken and the picture is put together: what
+    /// [`crate::Stats::stride`] will be.
+    fn stopped(&self, _stride: Option<u32>) {}
 }
 
 /// Nobody.
@@ -25,11 +29,14 @@ impl Progress for NoProgress {}
 pub struct State {
     /// Samples taken, over all pixels.
     pub samples: u64,
-    /// Samples wanted, over all pixels.
-    pub total: u64,
+    /// Samples over all pixels at the end: exact where their number ends the render, else estimated from the time or the noise that
+    /// does; `None` as long as nothing is known.
+    pub total: Option<u64>,
+    /// How much of the way to its end the render has gone, in [0, 1], whichever of its limits comes first.
+    pub share: f64,
     /// Since the start.
     pub elapsed: Duration,
-    /// Until the end, if the rest goes as fast; `None` before anything is done.
+    /// Until the end, if the rest goes as fast; `None` before anything is known.
     pub left: Option<Duration>,
 }
 

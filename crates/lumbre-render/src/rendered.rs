@@ -10,7 +10,7 @@ use lumbre_image::{Image, Rgb};
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Rendered {
-    /// The pixels of [`Rendered::bounds`]; black where no sample was taken. With coverage, by which its colours are
+    /// The pixels of [`Rendered::bounds`]; black where no sample was taken (see [`Stats::stride`]). With coverage, by which its colours are
     /// multiplied, if the options ask for a transparent picture.
     pub image: Image,
     /// Coverage by colour, of which that of the image is the mean: where a transparent picture has coloured shadows on its
@@ -30,6 +30,9 @@ pub struct Rendered {
 pub struct Stats {
     /// Samples that every pixel has.
     pub spp: u32,
+    /// The side of squares of pixels of which each has a sample, which all pixels of the square show that have none of their own: 1
+    /// where every pixel has a sample. `None` where there is no whole picture, not even such a coarse one.
+    pub stride: Option<u32>,
     /// Whether someone asked it to stop before it had all samples.
     pub cancelled: bool,
     /// Paths, over all pixels.
@@ -44,6 +47,8 @@ pub struct Stats {
     pub noise: Option<f64>,
     /// Threads.
     pub threads: usize,
+    /// More threads that were asked for, and that the system refused.
+    pub refused_threads: usize,
     /// Time.
     pub elapsed: Duration,
 }

@@ -200,7 +200,7 @@ impl Progress for Impatient {
     }
 
     fn state(&self, state: &State) {
-        assert!(state.samples <= state.total);
+        assert!(state.total.is_some_and(|total| state.samples <= total) && state.share <= 1.0);
     }
 }
 
@@ -316,4 +316,48 @@ fn an_instanced_light_is_as_bright_as_a_plain_one_and_found_by_chance_where_it_i
     assert_eq!(nested.warnings().len(), 1);
     assert_close(light(&instanced), light(&plain), 0.005, "instanced");
     assert_close(light(&nested), light(&plain), 0.02, "nested");
+}
+
+/// White, of which the render is cancelled after so many samples.
+#[derive(Debug)]
+struct Interrupting {
+    cancel: CancelToken,
+    left: AtomicU32,
+}
+
+impl Integrator for Interrupting {
+    fn radiance(&self, _: &Scene, _: &View, _: Sight<'_>, _: &Draw, _: &mut RayCounts) -> Spectrum {
+        if self.left.fetch_sub(1, Ordering::Relaxed) == 1 {
+            self.cancel.cancel();
+        }
+        Spectrum::splat(1.0)
+    }
+}
+
+#[test]
+fn a_render_that_is_stopped_in_its_first_pass_is_a_whole_coarse_picture() {
+    let scene = Scene::build(still_life(DVec3::ZERO)).unwrap();
+    // Some tiles are narrower than others, and none begins at zero.
+    let mut options = options(&scene, 700, 500, 4);
+    options.crop = Some(PixelBounds { x0: 37, y0: 21, x1: 37 + 603, y1: 21 + 290 });
+    options.threads = 1;
+    let squares = |side: u32| 603_u32.div_ceil(side) * 290_u32.div_ceil(side);
+    for (after, stride) in [
+        (2, None),
+        (squares(256), Some(256)),
+        (squares(64) - 1, Some(256)),
+        (squares(64) + 1, Some(64)),
+        (squares(16), Some(16)),
+        (squares(4) + 50, Some(4)),
+        (squares(1) - 1, Some(2)),
+        (squares(1), Some(1)),
+    ] {
+        let cancel = CancelToken::new();
+        let interrupting = Interrupting { cancel: cancel.clone(), left: AtomicU32::new(after) };
+        let part = render_with(&scene, &options, &interrupting, &NoProgress, &cancel).unwrap();
+        assert_eq!((part.stats.stride, part.stats.spp), (stride, u32::from(stride == Some(1))), "{after}");
+        assert_eq!(part.stats.samples, u64::from(after));
+        let dark = part.image.pixels().iter().filter(|pixel| pixel.g < 0.99).count();
+        assert_eq!(dark == 0, stride.is_some(), "{after}: {dark} pixels are dark");
+    }
 }

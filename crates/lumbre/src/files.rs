@@ -16,7 +16,15 @@ pub type SaveOptions = WriteOptions;
 /// # Errors
 /// [`Error::Format`].
 pub fn read_image(path: &Path) -> Result<Image, Error> {
-    let budget = Budget::new(Limits::default());
+    read_image_within(path, Limits::default())
+}
+
+/// [`read_image`] within limits.
+///
+/// # Errors
+/// [`Error::Format`].
+pub fn read_image_within(path: &Path, limits: Limits) -> Result<Image, Error> {
+    let budget = Budget::new(limits);
     let file = open_image(path, &budget, &mut Diagnostics::new())?;
     Ok(file.to_image(&budget)?)
 }

@@ -27,7 +27,7 @@ use progress::Progress;
 use rays::{RayReader, Rows};
 
 use crate::failure::Failure;
-use crate::overwrite::refuse_inputs;
+use crate::output::{Inputs, Replaced};
 use crate::reading::{ReadingArguments, print_warnings};
 use crate::signals::Signals;
 
@@ -101,27 +101,44 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if [&arguments.scene, &arguments.rays].iter().all(|path| path.as_path() == Path::new("-")) {
         return Err(Failure::Usage("the scene and --rays cannot both be standard input".to_owned()));
     }
+    // Some of the answers are of no use: an interrupted run leaves none, nor its temporary file.
+    let _signals = Signals::listen(&CancelToken::new())?;
+    let named = [arguments.scene.as_path(), &arguments.rays];
     if let Some(output) = &arguments.output {
-        refuse_inputs(output, [arguments.scene.as_path(), &arguments.rays])?;
+        Inputs::of(named).refuse(output)?;
     }
     let rays = RayReader::open(&arguments.rays, arguments.query.rows())?;
     let (scene, diagnostics) = arguments.reading.open(std::slice::from_ref(&arguments.scene))?;
+    if let Some(output) = &arguments.output {
+        Inputs::of(diagnostics.files_read().iter().map(PathBuf::as_path)).refuse(output)?;
+    }
     if !arguments.quiet {
         print_warnings(&diagnostics);
     }
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(arguments.threads.map_or(0, usize::from))
-        .build()
-        .map_err(|e| Failure::Limit(format!("cannot start threads: {e}")))?;
+    // Where the system refuses threads, fewer do, or else this one does the work.
+    let wanted = arguments.threads.map_or_else(rayon::current_num_threads, usize::from);
+    let fewer = |&threads: &usize| (threads > 1).then_some(threads / 2);
+    let pool = std::iter::successors(Some(wanted), fewer)
+        .find_map(|threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().ok());
     let progress = Progress::new(arguments.quiet);
     let query = arguments.query;
-    let cast =
-        Cast { scene: &scene, query, form, pool: &pool, progress: &progress, at_a_time: query.at_a_time() };
+    let cast = Cast {
+        scene: &scene,
+        query,
+        form,
+        pool: pool.as_ref(),
+        progress: &progress,
+        at_a_time: query.at_a_time(),
+    };
+    let replaced = arguments.output.as_deref().map(Replaced::by);
     let done = match &arguments.output {
         Some(path) => cast.to_file(rays, path),
         None => cast.to_standard_output(rays),
     };
     progress.finish();
+    if let (Ok(()), Some(replaced), false) = (&done, replaced, arguments.quiet) {
+        replaced.say();
+    }
     done
 }
 
@@ -162,7 +179,7 @@ struct Cast<'a> {
     scene: &'a Scene,
     query: Query,
     form: Form,
-    pool: &'a ThreadPool,
+    pool: Option<&'a ThreadPool>,
     progress: &'a Progress,
     /// How many rays a thread works on at a time, which changes no byte of the answers.
     at_a_time: usize,
@@ -173,7 +190,7 @@ impl Cast<'_> {
         let mut failure = None;
         let mut out = io::stdout().lock();
         let written = Output::csv(&mut out, self.query.table())
-            .and_then(|output| self.write(rays, output, || Ok(()), &mut failure));
+            .and_then(|output| self.write(rays, output, &mut failure));
         match (failure, written) {
             (Some(failure), _) => Err(failure),
             // Whoever reads may stop reading: `lumbre cast … | head`.
@@ -185,19 +202,15 @@ impl Cast<'_> {
     }
 
     fn to_file(&self, rays: RayReader, path: &Path) -> Result<(), Failure> {
-        // An interrupted run must not leave its temporary file.
-        let signals = Signals::listen(&CancelToken::new())
-            .map_err(|e| Failure::Io(format!("cannot listen for signals: {e}")))?;
-        let check = || signals.received().map_or(Ok(()), |status| Err(Failure::Interrupted(status)));
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let table = self.query.table();
         let mut failure = None;
         let written = match self.form {
             Form::Csv => atomic_write(path, |out: &mut dyn Write| {
-                self.write(rays, Output::csv(out, table)?, check, &mut failure)
+                self.write(rays, Output::csv(out, table)?, &mut failure)
             }),
             form => atomic_write_seek(path, |file| {
-                self.write(rays, Output::in_file(file, form, table, folder)?, check, &mut failure)
+                self.write(rays, Output::in_file(file, form, table, folder)?, &mut failure)
             }),
         };
         match failure {
@@ -211,12 +224,10 @@ impl Cast<'_> {
         &self,
         mut rays: RayReader,
         mut output: Output,
-        check: impl Fn() -> Result<(), Failure>,
         failure: &mut Option<Failure>,
     ) -> io::Result<()> {
         let decoder = rays.decoder();
         let next = || {
-            check()?;
             let piece = rays.next(self.at_a_time)?;
             if let Some(piece) = &piece {
                 self.progress.show(piece.first_ray, rays.fraction());
@@ -225,7 +236,7 @@ impl Cast<'_> {
         };
         let work = |piece: rays::Piece| Ok(self.answer(piece.first_ray, &decoder.rays(&piece)?)?);
         let done = pipeline::in_order(self.pool, next, work, |block| Ok(output.append(&block)?));
-        match done.and_then(|()| Ok(check()?)) {
+        match done {
             Ok(()) => output.finish(),
             Err(Stop::Writing(e)) => Err(e),
             Err(Stop::Failure(e)) => {

@@ -6,16 +6,22 @@ use std::sync::mpsc;
 use rayon::ThreadPool;
 
 /// Calls `work` on the threads of `pool` for each item of `next`, and `take` on the calling thread for each answer, in the order
-/// of the items. No more than a few items a thread are held at a time. It ends at the first error, in that order.
+/// of the items; without a pool, all on the calling thread. No more than a few items a thread are held at a time. It ends at the first error, in that order.
 ///
 /// # Errors
 /// The first of any of the three.
 pub(super) fn in_order<Item: Send, Answer: Send, E: Send>(
-    pool: &ThreadPool,
+    pool: Option<&ThreadPool>,
     mut next: impl FnMut() -> Result<Option<Item>, E>,
     work: impl Fn(Item) -> Result<Answer, E> + Sync,
     mut take: impl FnMut(Answer) -> Result<(), E>,
 ) -> Result<(), E> {
+    let Some(pool) = pool else {
+        while let Some(item) = next()? {
+            take(work(item)?)?;
+        }
+        return Ok(());
+    };
     let most = 2 * pool.current_num_threads() + 2;
     let work = &work;
     pool.in_place_scope(|scope| {
@@ -51,12 +57,13 @@ mod tests {
 
     /// Counts to `end`, fails at `bad` in the place that is named, and answers what was taken.
     fn run(threads: usize, bad: (&str, u64)) -> (Result<(), (String, u64)>, Vec<u64>) {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let pool =
+            (threads > 0).then(|| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap());
         let check = |place: &str, i| if bad == (place, i) { Err((place.to_owned(), i)) } else { Ok(i) };
         let mut taken = Vec::new();
         let mut numbers = 0..100;
         let done = in_order(
-            &pool,
+            pool.as_ref(),
             || numbers.next().map(|i| check("next", i)).transpose(),
             |i| {
                 // Those that come first end last.
@@ -74,7 +81,7 @@ mod tests {
 
     #[test]
     fn answers_come_in_order_until_the_first_error() {
-        for threads in [1, 2, 5] {
+        for threads in [0, 1, 2, 5] {
             for place in ["next", "work", "take"] {
                 let (done, taken) = run(threads, (place, 37));
                 assert_eq!(done, Err((place.to_owned(), 37)));

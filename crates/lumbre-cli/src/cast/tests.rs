@@ -61,12 +61,12 @@ fn reader(query: Query, text: String) -> RayReader {
 fn bytes(scene: &Scene, query: Query, form: Form, threads: usize, at_a_time: usize) -> Vec<u8> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     let progress = Progress::new(true);
-    let cast = Cast { scene, query, form, pool: &pool, progress: &progress, at_a_time };
+    let cast = Cast { scene, query, form, pool: Some(&pool), progress: &progress, at_a_time };
     let rays = reader(query, if query.rows() == Rows::Rays { rays() } else { points() });
     let mut file = tempfile::tempfile().unwrap();
     let output = Output::in_file(&mut file, form, query.table(), &std::env::temp_dir()).unwrap();
     let mut failure = None;
-    cast.write(rays, output, || Ok(()), &mut failure).unwrap();
+    cast.write(rays, output, &mut failure).unwrap();
     assert!(failure.is_none());
     let mut bytes = Vec::new();
     file.rewind().unwrap();
@@ -141,7 +141,8 @@ fn no_rays_have_no_answers() {
             let scene = scene(folder.path());
             let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
             let progress = Progress::new(true);
-            let cast = Cast { scene: &scene, query, form, pool: &pool, progress: &progress, at_a_time: 100 };
+            let cast =
+                Cast { scene: &scene, query, form, pool: Some(&pool), progress: &progress, at_a_time: 100 };
             let path = folder.path().join("answers");
             let header = if query.rows() == Rows::Rays { "dx,dy,dz,ox,oy,oz" } else { "z,y,x" };
             let rays = reader(query, format!("{header}\n \n"));

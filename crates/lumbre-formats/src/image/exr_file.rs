@@ -14,7 +14,7 @@ use exr::prelude::{ReadChannels, ReadLayers, WritableImage};
 use lumbre_image::{Bitmap, Channels, ColourSpace, Encoding, Layer, Layers, PixelData, Window, f32_to_half};
 
 use super::write::{ExrCompression, ExrPrecision, WriteOptions};
-use super::{ImageFile, ImageFormat};
+use super::{ImageFile, ImageFormat, origin};
 use crate::budget::{Budget, Hold};
 use crate::contained::contained;
 use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, quoted};
@@ -265,7 +265,7 @@ pub(super) fn encode(layers: &Layers, options: &WriteOptions) -> std::io::Result
         }
     };
     let attributes = LayerAttributes {
-        software_name: Text::new_or_none("Lumbre"),
+        software_name: Text::new_or_none(origin::SOFTWARE),
         layer_position: Vec2(data.x, data.y),
         ..LayerAttributes::default()
     };

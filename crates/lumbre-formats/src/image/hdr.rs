@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use lumbre_image::{Bitmap, Channels, Encoding, Image, PixelData, Rgb};
 
+use super::origin::SOFTWARE;
 use super::{ImageFile, ImageFormat};
 use crate::budget::Budget;
 use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, quoted, quoted_bytes};
@@ -75,8 +76,9 @@ fn shared_exponent(c: Rgb) -> [u8; 4] {
 
 pub(super) fn encode(image: &Image) -> Vec<u8> {
     let (width, height) = (image.width() as usize, image.height() as usize);
-    let mut out = format!("#?RADIANCE\nSOFTWARE=Lumbre\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n")
-        .into_bytes();
+    let mut out =
+        format!("#?RADIANCE\nSOFTWARE={SOFTWARE}\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n")
+            .into_bytes();
     for row in image.pixels().chunks(width.max(1)) {
         let row: Vec<[u8; 4]> = row.iter().map(|&c| shared_exponent(c)).collect();
         // Run-length encoding is for widths of 15 bits, whose marker must not look like a pixel.

@@ -3,6 +3,7 @@
 mod decode;
 mod exr_file;
 mod hdr;
+mod origin;
 mod pfm;
 mod write;
 
@@ -15,6 +16,7 @@ use crate::budget::Budget;
 use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, quoted};
 use crate::input::Input;
 
+pub use origin::is_own_image;
 pub use write::{
     ExrCompression, ExrPrecision, PngDepth, WriteOptions, encode_image, encode_layers, write_image,
     write_layers,

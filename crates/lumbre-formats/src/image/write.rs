@@ -5,7 +5,7 @@ use std::path::Path;
 
 use lumbre_image::{Image, Layers, Rgb, ToneMap, unit_to_u8, unit_to_u16};
 
-use super::{ImageFormat, exr_file, hdr, pfm};
+use super::{ImageFormat, exr_file, hdr, origin, pfm};
 use crate::atomic::atomic_write;
 use crate::diagnostic::{Diagnostic, FormatError, Place, quoted};
 
@@ -167,6 +167,8 @@ fn encode_png(image: &Image, options: &WriteOptions) -> io::Result<Vec<u8>> {
     let mut encoder = png::Encoder::new(&mut out, image.width(), image.height());
     encoder.set_color(if has_alpha { png::ColorType::Rgba } else { png::ColorType::Rgb });
     encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+    let software = origin::SOFTWARE.to_owned();
+    encoder.add_text_chunk("Software".to_owned(), software).map_err(io::Error::other)?;
     let numbers = shown(image, options)
         .flat_map(|([r, g, b], a)| [Some(r), Some(g), Some(b), has_alpha.then_some(a)])
         .flatten();
@@ -199,6 +201,7 @@ fn encode_jpeg(image: &Image, options: &WriteOptions) -> io::Result<Vec<u8>> {
     let mut out = Vec::new();
     let quality = options.jpeg_quality.clamp(1, 100);
     let mut encoder = jpeg_encoder::Encoder::new(&mut out, quality);
+    encoder.add_exif_metadata(origin::EXIF).map_err(io::Error::other)?;
     if quality >= 90 {
         encoder.set_sampling_factor(jpeg_encoder::SamplingFactor::F_1_1);
     }

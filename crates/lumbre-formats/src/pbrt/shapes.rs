@@ -478,7 +478,9 @@ impl Converter<'_, '_> {
                     done.push((i, read(file)));
                 }
             };
-            let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
+            // Where the system refuses threads, fewer do.
+            let start = |_| std::thread::Builder::new().spawn_scoped(scope, work).ok();
+            let workers: Vec<_> = (0..threads).filter_map(start).collect();
             for worker in workers {
                 for (i, result) in worker.join().unwrap_or_default() {
                     results[i] = Some(result);
@@ -487,7 +489,7 @@ impl Converter<'_, '_> {
         });
         let mut meshes = HashMap::new();
         for (file, result) in files.iter().zip(results) {
-            // A worker that died has no result: the file is read again here.
+            // What no worker has read, as there was none or it died, is read here.
             let (mesh, diagnostics) = result.unwrap_or_else(|| read(file));
             self.diagnostics.append(diagnostics);
             let mesh = mesh.map_err(|e| file_fault(file.spot, e))?;

@@ -120,6 +120,51 @@ impl Tile {
         }
         true
     }
+
+    /// The first pixel as a tile of its own.
+    pub fn corner(&self) -> Self {
+        let bounds = PixelBounds { x1: self.bounds.x0 + 1, y1: self.bounds.y0 + 1, ..self.bounds };
+        Self {
+            bounds,
+            pixels: self.pixels.first().copied().into_iter().collect(),
+            features: self.features.first().copied().into_iter().collect(),
+            tints: self.tints.first().copied().into_iter().collect(),
+        }
+    }
+
+    /// Gives the first pixel the sums of that of another tile of the same picture, unless it has a sample.
+    pub fn take_corner(&mut self, other: &Self) {
+        if self.pixels.first().is_none_or(|pixel| pixel.samples > 0) {
+            return;
+        }
+        fn copy<T: Copy>(to: &mut [T], from: &[T]) {
+            to.iter_mut().zip(from).take(1).for_each(|(to, from)| *to = *from);
+        }
+        copy(&mut self.pixels, &other.pixels);
+        copy(&mut self.features, &other.features);
+        copy(&mut self.tints, &other.tints);
+    }
+
+    /// Gives every pixel that has no sample the sums of the first pixel of its square of `side` by `side` pixels, counted from
+    /// the tile's corner.
+    pub fn spread(&mut self, side: u32) {
+        let width = self.bounds.width() as usize;
+        let side = side.max(1) as usize;
+        for at in 0..self.pixels.len() {
+            if self.pixels[at].samples > 0 {
+                continue;
+            }
+            let (x, y) = (at % width, at / width);
+            let from = (y - y % side) * width + (x - x % side);
+            self.pixels[at] = self.pixels[from];
+            if let Some(&tint) = self.tints.get(from) {
+                self.tints[at] = tint;
+            }
+            if let Some(&sums) = self.features.get(from) {
+                self.features[at] = sums;
+            }
+        }
+    }
 }
 
 #[cfg(test)]
@@ -145,6 +190,21 @@ mod tests {
         }
         assert_eq!(tile.pixels()[2 * 4 + 1].coverage(), 0.25);
         assert!(!tile.is_tinted());
+    }
+
+    #[test]
+    fn a_sample_spreads_over_the_pixels_of_its_square_that_have_none() {
+        let mut tile = Tile::new(PixelBounds { x0: 5, y0: 7, x1: 10, y1: 10 }, Extras::default());
+        let sample =
+            |value| Sample { radiance: Rgb::splat(value), coverage: Rgb::WHITE, weight: 1.0, features: None };
+        for (x, y, value) in [(5, 7, 1.0), (7, 7, 2.0), (9, 7, 3.0), (5, 9, 4.0), (6, 8, 9.0)] {
+            assert!(tile.add(x, y, &sample(value), &Exposure::default()));
+        }
+        tile.spread(2);
+        let shown: Vec<f32> = tile.pixels().iter().map(|pixel| pixel.colour().g).collect();
+        let expected =
+            [[1.0, 1.0, 2.0, 2.0, 3.0], [1.0, 9.0, 2.0, 2.0, 3.0], [4.0, 4.0, 0.0, 0.0, 0.0]].concat();
+        assert_eq!(shown, expected);
     }
 
     #[test]

@@ -1,0 +1,117 @@
+//! How far a render is, on its way to whichever of its limits comes first.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+use crate::{Progress, State, Stop};
+
+/// Time between two reports.
+const REPORT_EVERY: Duration = Duration::from_millis(100);
+
+/// Counts samples, and tells of them now and then.
+pub(crate) struct Clock<'a> {
+    start: Instant,
+    pixels: u64,
+    stop: Stop,
+    done: AtomicU64,
+    /// Samples a pixel at which the noise is expected to be low enough, as the bits of an f64; infinite before it is known.
+    quiet_at: AtomicU64,
+    last: Mutex<Instant>,
+    progress: &'a dyn Progress,
+}
+
+impl<'a> Clock<'a> {
+    /// A clock of a render of so many pixels.
+    pub(crate) fn new(start: Instant, pixels: u64, stop: Stop, progress: &'a dyn Progress) -> Self {
+        let never = AtomicU64::new(f64::INFINITY.to_bits());
+        Self {
+            start,
+            pixels,
+            stop,
+            done: AtomicU64::new(0),
+            quiet_at: never,
+            last: Mutex::new(start),
+            progress,
+        }
+    }
+
+    /// Says at how many samples a pixel the noise is expected to be low enough.
+    pub(crate) fn expect_quiet_at(&self, spp: f64) {
+        self.quiet_at.store(spp.to_bits(), Ordering::Relaxed);
+    }
+
+    /// Counts samples.
+    pub(crate) fn add(&self, samples: u64) {
+        let done = self.done.fetch_add(samples, Ordering::Relaxed) + samples;
+        // Whoever finds someone else telling goes on with its work.
+        let Ok(mut last) = self.last.try_lock() else { return };
+        let now = Instant::now();
+        if now.duration_since(*last) < REPORT_EVERY {
+            return;
+        }
+        *last = now;
+        self.progress.state(&self.state(done, now.duration_since(self.start)));
+    }
+
+    fn state(&self, done: u64, elapsed: Duration) -> State {
+        let samples = done as f64;
+        let pixels = self.pixels as f64;
+        let of_noise = samples / (f64::from_bits(self.quiet_at.load(Ordering::Relaxed)) * pixels);
+        let of_spp = samples / (f64::from(self.stop.spp) * pixels);
+        let of_time = self.stop.time.map_or(0.0, |time| elapsed.as_secs_f64() / time.as_secs_f64());
+        // A render without a limit of its own for the number of samples has the largest.
+        let counts = self.stop.spp < u32::MAX || (self.stop.time.is_none() && self.stop.noise.is_none());
+        let share = of_noise.max(of_time).max(if counts { of_spp } else { 0.0 }).clamp(0.0, 1.0);
+        let is_known = share > 0.0;
+        let left = is_known.then(|| elapsed.as_secs_f64() * (1.0 / share - 1.0));
+        let total = match counts && of_spp >= share {
+            true => Some(self.pixels.saturating_mul(u64::from(self.stop.spp))),
+            false => is_known.then(|| ((samples / share) as u64).max(done)),
+        };
+        State {
+            samples: done,
+            total,
+            share,
+            elapsed,
+            left: left.and_then(|left| Duration::try_from_secs_f64(left).ok()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::NoProgress;
+
+    fn state(stop: Stop, quiet_at: Option<f64>, done: u64, elapsed: u64) -> State {
+        let clock = Clock::new(Instant::now(), 200, stop, &NoProgress);
+        quiet_at.into_iter().for_each(|spp| clock.expect_quiet_at(spp));
+        clock.state(done, Duration::from_secs(elapsed))
+    }
+
+    #[test]
+    fn what_is_left_is_that_to_whichever_limit_comes_first() {
+        let (time, noise) = (Some(Duration::from_secs(8)), Some(0.02));
+        let endless = u32::MAX;
+        for (spp, time, noise, quiet_at, expected) in [
+            // 400 samples of 200 pixels after 2 s.
+            (8, None, None, None, (0.25, Some(1600), Some(6))),
+            (endless, time, None, None, (0.25, Some(1600), Some(6))),
+            (8, Some(Duration::from_secs(4)), None, None, (0.5, Some(800), Some(2))),
+            (4, time, None, None, (0.5, Some(800), Some(2))),
+            (endless, None, noise, None, (0.0, None, None)),
+            (endless, None, noise, Some(10.0), (0.2, Some(2000), Some(8))),
+            (endless, time, noise, Some(10.0), (0.25, Some(1600), Some(6))),
+            (endless, time, noise, Some(5.0), (0.4, Some(1000), Some(3))),
+        ] {
+            let state = state(Stop { spp, time, noise }, quiet_at, 400, 2);
+            let (share, total, left) = expected;
+            assert_eq!((state.share, state.total), (share, total), "{state:?}");
+            assert_eq!(state.left.map(|left| left.as_secs()), left, "{state:?}");
+        }
+        // Over time and beyond the expected noise, it is at its end.
+        let late = state(Stop { spp: endless, time, noise }, Some(1.0), 400, 9);
+        assert_eq!((late.share, late.total, late.left), (1.0, Some(400), Some(Duration::ZERO)));
+    }
+}
