@@ -163,6 +163,33 @@ pub fn refuse_wide(bytes: &[u8], name: &Arc<str>) -> Result<(), FormatError> {
     Ok(())
 }
 
+/// The bytes of a text, taken to UTF-8 where its byte order mark is that of UTF-16: for formats that programs of
+/// Windows write. What they take is charged to the budget.
+///
+/// # Errors
+/// When they are UTF-32 by their byte order mark, and as for [`Budget::bytes`].
+pub(crate) fn narrow_text<'a>(
+    bytes: &'a [u8],
+    name: &Arc<str>,
+    budget: &Budget,
+) -> Result<Cow<'a, [u8]>, FormatError> {
+    let unit: fn([u8; 2]) -> u16 = match bytes {
+        [0xFF, 0xFE, 0, 0, ..] | [0, 0, 0xFE, 0xFF, ..] => {
+            refuse_wide(bytes, name)?;
+            return Ok(Cow::Borrowed(bytes));
+        }
+        [0xFF, 0xFE, ..] => u16::from_le_bytes,
+        [0xFE, 0xFF, ..] => u16::from_be_bytes,
+        _ => return Ok(Cow::Borrowed(bytes)),
+    };
+    // A unit takes up to three bytes.
+    budget.bytes(bytes.len() as u64 / 2 * 3, name)?;
+    let units = bytes[2..].as_chunks::<2>().0.iter().map(|&pair| unit(pair));
+    let mut text = String::with_capacity(bytes.len() / 2 * 3);
+    text.extend(char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER)));
+    Ok(Cow::Owned(text.into_bytes()))
+}
+
 /// `bytes` as text, with invalid UTF-8 replaced by U+FFFD: for formats older than UTF-8, where such bytes occur
 /// in names and comments.
 pub fn lossy_text(bytes: &[u8]) -> Cow<'_, str> {

@@ -448,7 +448,7 @@ fn every_material_is_read() {
         r#"Material "diffuse" "rgb reflectance" [.1 .2 .3] Shape "sphere"
            Material "conductor" "spectrum eta" "metal-Ag-eta" "spectrum k" "metal-Ag-k" "float roughness" .3 Shape "sphere"
            Material "conductor" "rgb reflectance" [.9 .8 .7] "float uroughness" .2 "bool remaproughness" false Shape "sphere"
-           Material "dielectric" "spectrum eta" "glass-BK7" Shape "sphere"
+           Material "dielectric" "spectrum eta" [400 1.5168 700 1.5168] Shape "sphere"
            Material "thindielectric" "float eta" 1.4 Shape "sphere"
            Material "coateddiffuse" "rgb reflectance" [.5 .6 .7] "float roughness" .1 "integer maxdepth" 20 "integer nsamples" 3 "float thickness" .02 Shape "sphere"
            Material "diffusetransmission" "rgb transmittance" [.1 .1 .2] "float scale" .5 Shape "sphere"

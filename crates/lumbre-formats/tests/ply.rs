@@ -13,7 +13,7 @@ fn name() -> Arc<str> {
 }
 
 fn read(bytes: &[u8]) -> Result<MeshDesc, FormatError> {
-    read_ply(bytes, &name(), &Budget::default(), &mut Diagnostics::new())
+    read_ply(bytes, &name(), &Budget::default(), &mut Diagnostics::new()).map(|file| file.mesh)
 }
 
 /// Two triangles and a quad over six vertices, in text.
@@ -214,7 +214,7 @@ fn lenient_drops_what_cannot_be_used_and_counts_it() {
     let wrong = read(text.as_bytes()).unwrap_err().to_string();
     assert_eq!(wrong, "m.ply:25:1: vertex 5 is not finite (found (NaN, 3, 3))");
     let mut said = Diagnostics::with_strictness(Strictness::Lenient);
-    let mesh = read_ply(text.as_bytes(), &name(), &Budget::default(), &mut said).unwrap();
+    let mesh = read_ply(text.as_bytes(), &name(), &Budget::default(), &mut said).unwrap().mesh;
     assert_eq!((mesh.triangles.len(), mesh.quads.len()), (1, 0));
     assert_eq!(mesh.face_indices.unwrap(), [70]);
     assert_eq!(
@@ -261,7 +261,7 @@ fn meshes_of_others_are_read() {
         let budget = Budget::default();
         let read = |file: &str| {
             let input = Input::open(&folder.join(file), &budget).unwrap();
-            read_ply(&input, input.name(), &budget, &mut Diagnostics::new()).unwrap()
+            read_ply(&input, input.name(), &budget, &mut Diagnostics::new()).unwrap().mesh
         };
         let text = read("platonic_shelf_ascii.ply");
         assert_eq!(text.positions.len(), 50);
@@ -277,7 +277,7 @@ fn meshes_of_others_are_read() {
         let budget = Budget::default();
         let input = Input::open(&folder.join("bitterli-coffee-flat.ply"), &budget).unwrap();
         let start = std::time::Instant::now();
-        let mesh = read_ply(&input, input.name(), &budget, &mut Diagnostics::new()).unwrap();
+        let mesh = read_ply(&input, input.name(), &budget, &mut Diagnostics::new()).unwrap().mesh;
         let seconds = start.elapsed().as_secs_f64();
         println!("{} bytes in {seconds} s: {:.0} MB/s", input.len(), input.len() as f64 / 1e6 / seconds);
         assert_eq!(mesh.triangles.len(), 235_271);

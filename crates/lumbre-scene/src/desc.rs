@@ -328,6 +328,8 @@ pub struct FilmDesc {
     pub exposure: f32,
     /// The largest component of one sample; infinite by default.
     pub max_component: f32,
+    /// Whether files of light keep single precision; half precision by default.
+    pub single_precision: bool,
 }
 
 impl Default for FilmDesc {
@@ -340,6 +342,7 @@ impl Default for FilmDesc {
             crop_window: None,
             exposure: 1.0,
             max_component: f32::INFINITY,
+            single_precision: false,
         }
     }
 }

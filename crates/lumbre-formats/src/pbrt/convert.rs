@@ -1,9 +1,10 @@
 //! From the entities of a scene file to a [`SceneDesc`]: the tables of named entities, and deferred work.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use lumbre_image::Bitmap;
 use lumbre_math::{AnimatedTransform, Transform};
 use lumbre_scene::{
     FilmDesc, GeometryDesc, InstanceDesc, MaterialId, MeshDesc, NamedMaterial, ObjectDesc, ObjectId,
@@ -12,11 +13,12 @@ use lumbre_scene::{
 use lumbre_shading::{FloatTexture, Material, MipMap, Spectrum, SpectrumTexture, Texture, TextureValue};
 
 use super::images::ImageKey;
-use super::params::Params;
+use super::params::{Param, Params};
 use super::parser;
 use super::source::{Fault, Files, Result, Spot};
 use crate::diagnostic::quoted;
-use crate::{Budget, Diagnostic, Diagnostics, FormatError};
+use crate::origin::placed;
+use crate::{Budget, Diagnostic, Diagnostics, FormatError, Severity};
 
 /// Converts entities to the description of the scene.
 pub(super) struct Converter<'b, 'd> {
@@ -30,6 +32,13 @@ pub(super) struct Converter<'b, 'd> {
     /// Each with the place of its first use as long as it is undefined.
     pub materials: Vec<MaterialSlot>,
     pub material_names: HashMap<String, MaterialId>,
+    /// Materials whose textures are defined after them, with their types.
+    pub materials_later: Vec<(MaterialId, String, Params)>,
+    pub waiting: HashSet<u32>,
+    /// Alphas whose textures are defined after them, by the index of the shape.
+    pub alphas_later: HashMap<u32, Param>,
+    /// Textures by kind and name whose file cannot be read: an error where they are used.
+    pub broken_textures: HashMap<(&'static str, String), (Spot, Diagnostic)>,
     pub objects: Vec<ObjectSlot>,
     pub object_names: HashMap<String, ObjectId>,
     pub open_object: Option<ObjectId>,
@@ -38,6 +47,8 @@ pub(super) struct Converter<'b, 'd> {
     pub media: HashMap<String, ()>,
     pub media_used: Vec<(String, Spot)>,
     pub images: HashMap<ImageKey, Arc<MipMap>>,
+    /// The first pixels of each image file.
+    pub bitmaps: HashMap<PathBuf, Arc<Bitmap>>,
     /// Mesh files to be read at the end, and their indices by path.
     pub mesh_files: Vec<MeshFile>,
     pub mesh_paths: HashMap<PathBuf, usize>,
@@ -131,6 +142,10 @@ impl<'b, 'd> Converter<'b, 'd> {
             shape_count: 0,
             materials: vec![],
             material_names: HashMap::new(),
+            materials_later: vec![],
+            waiting: HashSet::new(),
+            alphas_later: HashMap::new(),
+            broken_textures: HashMap::new(),
             objects: vec![],
             object_names: HashMap::new(),
             open_object: None,
@@ -139,6 +154,7 @@ impl<'b, 'd> Converter<'b, 'd> {
             media: HashMap::new(),
             media_used: vec![],
             images: HashMap::new(),
+            bitmaps: HashMap::new(),
             mesh_files: vec![],
             mesh_paths: HashMap::new(),
             lights_to_check: vec![],
@@ -346,6 +362,18 @@ impl<'b, 'd> Converter<'b, 'd> {
 
     /// Completes deferred work: names, mesh files, lights on interfaces; and moves the tables into the scene.
     pub fn finish(&mut self) -> Result<()> {
+        self.finish_materials()?;
+        let mut broken: Vec<_> = std::mem::take(&mut self.broken_textures).into_values().collect();
+        broken.sort_by_key(|(spot, _)| (spot.file, spot.line, spot.column));
+        for (spot, wrong) in broken {
+            let message = format!("{}: the texture is not used", wrong.message);
+            self.warn(spot, Diagnostic { severity: Severity::Warning, message, ..wrong });
+        }
+        let mut alphas = HashMap::new();
+        for (index, param) in std::mem::take(&mut self.alphas_later) {
+            let alpha: Known<f32> = self.texture_named(&param)?;
+            alphas.insert(index, alpha.texture);
+        }
         self.check_names()?;
         let meshes = self.read_meshes()?;
         let is_interface: Vec<bool> = self
@@ -365,14 +393,18 @@ impl<'b, 'd> Converter<'b, 'd> {
         lists.extend(self.objects.iter_mut().filter_map(|slot| slot.object.as_mut()).map(|o| &mut o.shapes));
         while let Some(shapes) = lists.pop() {
             for shape in shapes {
+                if let Some(alpha) = alphas.get(&shape.index) {
+                    shape.alpha = Some(alpha.clone());
+                }
                 if shape.material.is_some_and(|id| is_interface[id.0 as usize]) {
                     shape.material = None;
                     shape.area_light = None;
                 }
                 match &mut shape.geometry {
                     GeometryDesc::Mesh(mesh) => {
-                        if let Some(read) = meshes.get(&Arc::as_ptr(mesh)) {
+                        if let Some((read, origin)) = meshes.get(&Arc::as_ptr(mesh)) {
                             *mesh = read.clone();
+                            shape.world_from_object = shape.world_from_object * placed(*origin);
                         }
                     }
                     GeometryDesc::Csg(csg) => lists.extend(csg.operands.iter_mut()),
@@ -381,7 +413,7 @@ impl<'b, 'd> Converter<'b, 'd> {
             }
         }
         for (mesh, spot) in std::mem::take(&mut self.meshes_to_close) {
-            let mesh = meshes.get(&Arc::as_ptr(&mesh)).unwrap_or(&mesh);
+            let mesh = meshes.get(&Arc::as_ptr(&mesh)).map_or(&mesh, |(read, _)| read);
             if !super::shapes::is_closed(mesh) {
                 let message = "a csg operand has a mesh that is not closed: it is no solid";
                 return Err(spot.error(message));

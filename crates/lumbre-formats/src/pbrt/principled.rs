@@ -55,10 +55,13 @@ impl Converter<'_, '_> {
             let message = format!("{} excludes {}", quoted("specular"), quoted("eta"));
             return Err(params.spot_of("specular").error(message));
         }
+        let mut dispersion = 0.0;
         principled.ior = if params.has("specular") {
             PrincipledParams::ior_from_specular(single(params, "specular", 0.5)?)
         } else {
-            self.index_of_refraction(params, "eta", 1.5)?
+            let (index, of_spectrum) = self.index_and_dispersion(params, "eta", 1.5)?;
+            dispersion = of_spectrum.max(0.0);
+            index
         };
         // Lumbre's additions.
         if params.has("clearcoat_roughness") {
@@ -66,7 +69,7 @@ impl Converter<'_, '_> {
         }
         principled.anisotropy_rotation = single(params, "anisotropic_rotation", 0.0)?.to_radians();
         principled.sheen_roughness = self.float_texture_or(params, "sheen_roughness", 0.5)?;
-        principled.dispersion = single(params, "dispersion", 0.0)?;
+        principled.dispersion = single(params, "dispersion", dispersion)?;
         principled.iridescence = self.float_texture_or(params, "iridescence", 0.0)?;
         principled.iridescence_ior = single(params, "iridescence_ior", 1.3)?;
         principled.iridescence_thickness = self.float_texture_or(params, "iridescence_thickness", 400.0)?;
@@ -93,7 +96,8 @@ impl Converter<'_, '_> {
     /// pbrt-v3's material `disney`.
     pub fn disney(&mut self, params: &Params) -> Result<MaterialKind> {
         let mut principled = self.burley(params, &OLD, 0.5)?;
-        principled.ior = self.index_of_refraction(params, "eta", 1.5)?;
+        let (ior, dispersion) = self.index_and_dispersion(params, "eta", 1.5)?;
+        (principled.ior, principled.dispersion) = (ior, dispersion.max(0.0));
         if params.has("scatterdistance") {
             params.ignore(&["scatterdistance"]);
             let message =

@@ -4,20 +4,20 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use lumbre_geometry::{Aabb, ShapeError};
-use lumbre_math::{Transform, Vec2, Vec3};
+use lumbre_math::{DVec3, Transform, Vec2, Vec3};
 use lumbre_scene::{CsgDesc, CsgOperation, GeometryDesc, MeshDesc, ShapeDesc};
 use lumbre_shading::Texture;
 
 use super::convert::{Converter, MeshFile, file_fault};
 use super::exact_shapes::exact_shape;
 use super::params::{Params, Type};
-use super::source::{AtSpot, Result, Spot};
+use super::source::{AtSpot, Fault, Result, Spot};
 use super::state::State;
 use super::subdivision;
 use super::textures::vec3;
 use crate::diagnostic::{number, quoted};
-use crate::ply::read_ply;
-use crate::{Diagnostic, Diagnostics, Input};
+use crate::ply::{PlyFile, read_ply};
+use crate::{Diagnostic, Diagnostics, Input, Severity};
 
 const KNOWN: &[&str] = &[
     "sphere",
@@ -65,7 +65,13 @@ impl Converter<'_, '_> {
         let index = self.shape_count;
         self.shape_count = index.checked_add(1).ok_or_else(|| spot.error("more than 2^32 shapes"))?;
         self.budget.elements(1, "shapes").at(spot)?;
-        let alpha = self.float_texture(&params, "alpha")?;
+        let alpha = match params.find("alpha") {
+            Some(param) if self.is_texture_to_come(param) => {
+                self.alphas_later.insert(index, param.clone());
+                None
+            }
+            _ => self.float_texture(&params, "alpha")?,
+        };
         let alpha = alpha.filter(|alpha| !matches!(**alpha, Texture::Constant(v) if v == 1.0));
         let Some(form) = self.form(ty, &params)? else {
             params.ignore_all();
@@ -455,8 +461,8 @@ impl Converter<'_, '_> {
         Ok(GeometryDesc::Mesh(self.mesh_files[file].placeholder.clone()))
     }
 
-    /// Reads the mesh files in parallel; returns each by its placeholder.
-    pub fn read_meshes(&mut self) -> Result<HashMap<*const MeshDesc, Arc<MeshDesc>>> {
+    /// Reads the mesh files in parallel; returns each by its placeholder, with its origin.
+    pub fn read_meshes(&mut self) -> Result<HashMap<*const MeshDesc, (Arc<MeshDesc>, DVec3)>> {
         let files = std::mem::take(&mut self.mesh_files);
         let strictness = self.diagnostics.strictness();
         let budget = self.budget;
@@ -491,8 +497,18 @@ impl Converter<'_, '_> {
             // A worker that died has no result: the file is read again here.
             let (mesh, diagnostics) = result.unwrap_or_else(|| read(file));
             self.diagnostics.append(diagnostics);
-            let mesh = mesh.map_err(|e| file_fault(file.spot, e))?;
-            meshes.insert(Arc::as_ptr(&file.placeholder), Arc::new(mesh));
+            let mesh = match mesh.map_err(|e| file_fault(file.spot, e)) {
+                Ok(mesh) => mesh,
+                Err(Fault::Input(spot, wrong)) if self.diagnostics.is_lenient() => {
+                    self.warn(spot, Diagnostic { severity: Severity::Warning, ..*wrong });
+                    PlyFile::default()
+                }
+                Err(fault) => return Err(fault),
+            };
+            if mesh.mesh.triangles.is_empty() && mesh.mesh.quads.is_empty() {
+                self.note(file.spot, "a plymesh without faces shows nothing");
+            }
+            meshes.insert(Arc::as_ptr(&file.placeholder), (Arc::new(mesh.mesh), mesh.origin));
         }
         // Pointers identify placeholders as long as these live.
         self.mesh_files = files;

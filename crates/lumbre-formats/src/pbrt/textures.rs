@@ -13,9 +13,9 @@ use super::colour;
 use super::convert::{Converter, FloatArc, Known, MAX_TEXTURE_LEAVES, SpectrumArc, file_fault};
 use super::lexer::{Lexer, TokenKind, parse_number};
 use super::params::{Param, Params, Type, Values};
-use super::source::{Result, Spot};
+use super::source::{Fault, Result, Spot};
 use crate::diagnostic::quoted;
-use crate::{Diagnostic, Input};
+use crate::{Diagnostic, FormatError, Input};
 
 /// The use of a spectrum, which determines the meaning and the range of `rgb`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -279,11 +279,27 @@ impl Converter<'_, '_> {
         Ok(self.float_texture(params, name)?.unwrap_or_else(|| Arc::new(Texture::Constant(default))))
     }
 
+    /// Whether a parameter names a texture that is not defined yet.
+    pub fn is_texture_to_come(&self, param: &Param) -> bool {
+        let Values::Strings(names) = &param.values else { return false };
+        param.ty == Type::Texture
+            && names.iter().any(|name| {
+                let is_broken = |kind| self.broken_textures.contains_key(&(kind, name.clone()));
+                !self.float_textures.contains_key(name)
+                    && !self.spectrum_textures.contains_key(name)
+                    && !is_broken(f32::NAME)
+                    && !is_broken(Spectrum::NAME)
+            })
+    }
+
     /// The texture named by a parameter.
-    fn texture_named<T: SceneValue>(&mut self, param: &Param) -> Result<Known<T>> {
+    pub fn texture_named<T: SceneValue>(&mut self, param: &Param) -> Result<Known<T>> {
         let name = param.one_string()?;
         if let Some(known) = T::table(self).get(name) {
             return Ok(known.clone());
+        }
+        if let Some((spot, wrong)) = self.broken_textures.get(&(T::NAME, name.to_owned())) {
+            return Err(spot.wrong(wrong.clone()));
         }
         let in_floats = self.float_textures.contains_key(name);
         let in_spectra = self.spectrum_textures.contains_key(name);
@@ -330,7 +346,8 @@ impl Converter<'_, '_> {
         ctm: Transform,
     ) -> Result<()> {
         let spot = params.spot;
-        if T::table(self).contains_key(name) {
+        let key = (T::NAME, name.to_owned());
+        if T::table(self).contains_key(name) || self.broken_textures.contains_key(&key) {
             return Err(spot.error(format!("{} texture {} is defined twice", T::NAME, quoted(name))));
         }
         let texture_from_world = ctm.inverse();
@@ -380,7 +397,14 @@ impl Converter<'_, '_> {
                     other => return params.out_of_range("dimension", f64::from(other), "2 or 3"),
                 }
             }
-            "imagemap" => self.image_texture(&params, texture_from_world)?,
+            "imagemap" => match self.image_texture(&params, texture_from_world)? {
+                Ok(known) => known,
+                Err((spot, wrong)) => {
+                    self.done(&params);
+                    self.broken_textures.insert(key, (spot, *wrong));
+                    return Ok(());
+                }
+            },
             "dots" | "fbm" | "wrinkled" | "windy" | "marble" | "ptex" => {
                 self.replaced_texture::<T>(ty, &params)?
             }
@@ -443,7 +467,7 @@ impl Converter<'_, '_> {
         &mut self,
         params: &Params,
         texture_from_world: Transform,
-    ) -> Result<Known<T>> {
+    ) -> Result<std::result::Result<Known<T>, (Spot, Box<Diagnostic>)>> {
         let mapping = mapping(params, texture_from_world)?;
         let anisotropy = params.float_above("maxanisotropy", 8.0, 0.0)?;
         let filters = [
@@ -482,9 +506,23 @@ impl Converter<'_, '_> {
         let Some(filename) = params.string("filename")?.map(str::to_owned) else {
             return Err(params.spot.error("an imagemap has no \"string filename\""));
         };
-        let image = self.mip_map(&filename, params.spot_of("filename"), encoding, wrap, filter)?;
-        whole(Texture::Image(ImageTexture { mapping, image, scale, invert }), &[], params.spot)
+        let at = params.spot_of("filename");
+        let image = match self.mip_map(&filename, at, encoding, wrap, filter) {
+            Ok(image) => image,
+            // Only a texture that is used needs its file.
+            Err(Fault::Input(spot, wrong)) => return Ok(Err((spot, wrong))),
+            Err(Fault::Other(error)) if matches!(*error, FormatError::Input(_)) => {
+                return Ok(Err((at, Box::new(unreadable(&filename, &error)))));
+            }
+            Err(fault) => return Err(fault),
+        };
+        whole(Texture::Image(ImageTexture { mapping, image, scale, invert }), &[], params.spot).map(Ok)
     }
+}
+
+/// An image that is not what it should be, for a message at the place that names it.
+pub(super) fn unreadable(name: &str, error: &FormatError) -> Diagnostic {
+    Diagnostic::error(format!("cannot read {}: {error}", quoted(name)))
 }
 
 /// The encoding of a texture's image.
