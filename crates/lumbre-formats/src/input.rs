@@ -1,7 +1,7 @@
 //! Opening inputs: regular files only, decompressed if they are gzip, within the budget.
 
 use std::borrow::Cow;
-use std::fs::File;
+use std::fs::{File, OpenOptions};
 use std::io::{self, Read};
 use std::ops::Deref;
 use std::path::Path;
@@ -110,7 +110,15 @@ pub(crate) fn open_regular(path: &Path) -> Result<(File, u64), FormatError> {
     if !before.is_file() {
         return Err(not_regular(before.file_type()));
     }
-    let file = File::open(path).map_err(|e| refuse("cannot open", e))?;
+    let mut how = OpenOptions::new();
+    how.read(true);
+    // Some files of the system, such as /proc/kmsg, are regular and wait for more all the same.
+    #[cfg(all(target_os = "linux", any(target_arch = "x86_64", target_arch = "aarch64")))]
+    {
+        const O_NONBLOCK: i32 = 0o4000;
+        std::os::unix::fs::OpenOptionsExt::custom_flags(&mut how, O_NONBLOCK);
+    }
+    let file = how.open(path).map_err(|e| refuse("cannot open", e))?;
     let meta = file.metadata().map_err(|e| refuse("cannot open", e))?;
     if !meta.is_file() {
         return Err(not_regular(meta.file_type()));

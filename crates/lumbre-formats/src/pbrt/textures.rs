@@ -109,6 +109,9 @@ pub(super) fn single(params: &Params, name: &'static str, default: f32) -> Resul
     params.out_of_range(name, value, "a number of single precision")
 }
 
+/// Why an image cannot be had, and where it is named.
+type Missing = (Spot, Box<Diagnostic>);
+
 /// The kinds of texture.
 const KNOWN_KINDS: [&str; 13] = [
     "constant",
@@ -467,7 +470,7 @@ impl Converter<'_, '_> {
         &mut self,
         params: &Params,
         texture_from_world: Transform,
-    ) -> Result<std::result::Result<Known<T>, (Spot, Box<Diagnostic>)>> {
+    ) -> Result<std::result::Result<Known<T>, Missing>> {
         let mapping = mapping(params, texture_from_world)?;
         let anisotropy = params.float_above("maxanisotropy", 8.0, 0.0)?;
         let filters = [
