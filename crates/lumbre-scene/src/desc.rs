@@ -234,7 +234,7 @@ pub struct AreaLightDesc {
     pub by_vertices: bool,
     /// Whether the back emits, too.
     pub two_sided: bool,
-    /// Total power in lumens; if given, `radiance` is only the colour (luminance 1).
+    /// Total power in lumens that a `radiance` of 1 stands for, as in pbrt-v4; if given, `radiance` is a factor on it.
     pub power: Option<f32>,
 }
 

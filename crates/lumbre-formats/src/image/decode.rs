@@ -80,7 +80,7 @@ fn decode(
     // A progressive JPEG keeps all its coefficients, two bytes each, in addition to the pixels.
     let scratch = if format == ImageFormat::Jpeg { count * 2 } else { 0 };
     let unpacked = u64::from(colour.bytes_per_pixel()) * pixels;
-    check_expansion(bytes, unpacked + scratch, place, budget)?;
+    check_expansion(bytes, unpacked, place, budget)?;
     let _scratch = budget.hold(scratch, "decoding an image")?;
     let data = match colour {
         ColorType::L8 | ColorType::La8 | ColorType::Rgb8 | ColorType::Rgba8 => {

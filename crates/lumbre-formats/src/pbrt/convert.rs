@@ -1,6 +1,7 @@
 //! From the entities of a scene file to a [`SceneDesc`]: the tables of named entities, and deferred work.
 
 use std::collections::{HashMap, HashSet};
+use std::hash::Hash;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -44,6 +45,9 @@ pub(super) struct Converter<'b, 'd> {
     pub open_object: Option<ObjectId>,
     pub float_textures: HashMap<String, Known<f32>>,
     pub spectrum_textures: HashMap<String, Known<Spectrum>>,
+    /// Constant textures by their bits: most are of a few values.
+    pub constants: HashMap<u32, FloatArc>,
+    pub constant_spectra: HashMap<[u32; 3], SpectrumArc>,
     pub media: HashMap<String, ()>,
     pub media_used: Vec<(String, Spot)>,
     pub images: HashMap<ImageKey, Arc<MipMap>>,
@@ -110,7 +114,12 @@ pub(super) struct Known<T: TextureValue> {
 
 impl<T: TextureValue> Known<T> {
     pub fn constant(value: T) -> Self {
-        Self { texture: Arc::new(Texture::Constant(value)), depth: 1, leaves: 1 }
+        Self::of(Arc::new(Texture::Constant(value)))
+    }
+
+    /// A texture that holds no others.
+    pub fn of(texture: Arc<Texture<T>>) -> Self {
+        Self { texture, depth: 1, leaves: 1 }
     }
 
     /// The value, if it is uniform.
@@ -151,6 +160,8 @@ impl<'b, 'd> Converter<'b, 'd> {
             open_object: None,
             float_textures: HashMap::new(),
             spectrum_textures: HashMap::new(),
+            constants: HashMap::new(),
+            constant_spectra: HashMap::new(),
             media: HashMap::new(),
             media_used: vec![],
             images: HashMap::new(),
@@ -212,6 +223,17 @@ impl<'b, 'd> Converter<'b, 'd> {
                     .error(format!("no file can be read from here, and the scene asks for {}", quoted(name))))
             }
         }
+    }
+
+    /// A constant texture, shared with others of the same value.
+    pub fn number(&mut self, value: f32) -> FloatArc {
+        shared(&mut self.constants, value.to_bits(), || Texture::Constant(value))
+    }
+
+    /// A constant texture of a colour, shared with others of the same.
+    pub fn colour(&mut self, colour: Spectrum) -> SpectrumArc {
+        let bits = colour.to_array().map(f32::to_bits);
+        shared(&mut self.constant_spectra, bits, || Texture::Constant(colour))
     }
 
     // Materials and objects by name; uses may precede definitions.
@@ -453,6 +475,23 @@ impl<'b, 'd> Converter<'b, 'd> {
         }
         Ok(())
     }
+}
+
+/// The texture of a key, made once; beyond some number they are not kept.
+fn shared<K: Hash + Eq, T: TextureValue>(
+    known: &mut HashMap<K, Arc<Texture<T>>>,
+    key: K,
+    make: impl FnOnce() -> Texture<T>,
+) -> Arc<Texture<T>> {
+    const MOST: usize = 1 << 12;
+    if let Some(found) = known.get(&key) {
+        return found.clone();
+    }
+    let made = Arc::new(make());
+    if known.len() < MOST {
+        known.insert(key, made.clone());
+    }
+    made
 }
 
 /// An error about a file that the scene names, at the place that names it.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use lumbre_image::Rgb;
-use lumbre_shading::{Convention, MaterialKind, PrincipledParams, SpectrumTexture, Texture, VolumeParams};
+use lumbre_shading::{Convention, MaterialKind, PrincipledParams, Texture, VolumeParams};
 
 use super::convert::{Converter, FloatArc};
 use super::params::Params;
@@ -113,7 +113,7 @@ impl Converter<'_, '_> {
         let gloss =
             single(params, names.clearcoat_gloss, if names.base_color == "color" { 1.0 } else { 0.0 })?;
         let sheen = self.float_texture_or(params, "sheen", 0.0)?;
-        let white = Arc::new(SpectrumTexture::Constant(Rgb::WHITE));
+        let white = self.colour(Rgb::WHITE);
         let base_color = self.spectrum_texture_or(params, names.base_color, SpectrumUse::Reflectance, 0.5)?;
         let through = self.float_texture_or(params, names.diffuse_transmission, 0.0)?;
         if single(params, "flatness", 0.0)? != 0.0 {
@@ -129,25 +129,25 @@ impl Converter<'_, '_> {
             transmission: self.float_texture_or(params, names.transmission, 0.0)?,
             volume: (!thin).then(VolumeParams::default),
             // Burley's range is from 0, all reflected, to 2, all transmitted.
-            diffuse_transmission: scaled(through, 0.5),
+            diffuse_transmission: self.scaled(through, 0.5),
             diffuse_transmission_color: base_color.clone(),
             base_color,
-            clearcoat: scaled(clearcoat, CLEARCOAT_SHARE),
-            clearcoat_roughness: Arc::new(Texture::Constant(PrincipledParams::roughness_from_gloss(gloss))),
+            clearcoat: self.scaled(clearcoat, CLEARCOAT_SHARE),
+            clearcoat_roughness: self.number(PrincipledParams::roughness_from_gloss(gloss)),
             sheen_color: match *sheen {
-                Texture::Constant(v) => Arc::new(Texture::Constant(Rgb::splat(v))),
+                Texture::Constant(v) => self.colour(Rgb::splat(v)),
                 _ => Arc::new(Texture::Scale { texture: white, scale: sheen }),
             },
             sheen_tint: self.float_texture_or(params, names.sheen_tint, 0.0)?,
-            sheen_roughness: Arc::new(Texture::Constant(0.5)),
+            sheen_roughness: self.number(0.5),
             ..PrincipledParams::default()
         })
     }
-}
 
-fn scaled(texture: FloatArc, factor: f32) -> FloatArc {
-    match *texture {
-        Texture::Constant(v) => Arc::new(Texture::Constant(v * factor)),
-        _ => Arc::new(Texture::Scale { texture, scale: Arc::new(Texture::Constant(factor)) }),
+    fn scaled(&mut self, texture: FloatArc, factor: f32) -> FloatArc {
+        match *texture {
+            Texture::Constant(v) => self.number(v * factor),
+            _ => Arc::new(Texture::Scale { texture, scale: self.number(factor) }),
+        }
     }
 }

@@ -72,7 +72,8 @@ impl SceneValue for f32 {
         if param.ty == Type::Texture {
             return converter.texture_named(param).map(Some);
         }
-        Ok(Some(Known::constant(single(params, name, 0.0)?)))
+        let value = single(params, name, 0.0)?;
+        Ok(Some(Known::of(converter.number(value))))
     }
 }
 
@@ -253,7 +254,7 @@ impl Converter<'_, '_> {
             SpectrumUse::Coefficient => value.unbounded_rgb(),
             SpectrumUse::Light => value.illuminant_rgb(),
         };
-        Ok(Some(Known::constant(colour)))
+        Ok(Some(Known::of(self.colour(colour))))
     }
 
     /// [`Self::spectrum_texture`] with a grey default.
@@ -265,7 +266,7 @@ impl Converter<'_, '_> {
         default: f32,
     ) -> Result<SpectrumArc> {
         let known = self.spectrum_texture(params, name, usage)?;
-        Ok(known.unwrap_or_else(|| Known::constant(Spectrum::splat(default))).texture)
+        Ok(known.map_or_else(|| self.colour(Spectrum::splat(default)), |known| known.texture))
     }
 
     /// A number or a texture of numbers.
@@ -279,7 +280,7 @@ impl Converter<'_, '_> {
         name: &'static str,
         default: f32,
     ) -> Result<FloatArc> {
-        Ok(self.float_texture(params, name)?.unwrap_or_else(|| Arc::new(Texture::Constant(default))))
+        Ok(self.float_texture(params, name)?.unwrap_or_else(|| self.number(default)))
     }
 
     /// Whether a parameter names a texture that is not defined yet.
