@@ -61,11 +61,20 @@ impl<'b> Input<'b> {
         let mut bytes = Vec::new();
         let mut hold = budget.hold(0, &self.name)?;
         let within = |unpacked| budget.expansion(packed, unpacked, &self.name);
-        read_within(MultiGzDecoder::new(&self.bytes[..]), 0, &mut bytes, &mut hold, &self.name, within)
-            .map_err(|e| match e {
-                ReadError::Limit(limit) => FormatError::from(limit),
-                ReadError::Io(source) => unpacking_error(path, &self.name, source),
-            })?;
+        // The size is found first, so that no memory is taken for a bomb, nor for growing.
+        let fits = |unpacked| {
+            within(unpacked)?;
+            // Charged, and given back at once.
+            budget.hold(unpacked, &self.name).map(drop)
+        };
+        let size = counted(MultiGzDecoder::new(&self.bytes[..]), fits).and_then(|size| {
+            let reader = MultiGzDecoder::new(&self.bytes[..]);
+            read_within(reader, size, &mut bytes, &mut hold, &self.name, within)
+        });
+        size.map_err(|e| match e {
+            ReadError::Limit(limit) => FormatError::from(limit),
+            ReadError::Io(source) => unpacking_error(path, &self.name, source),
+        })?;
         Ok(Self { name: self.name, bytes, hold })
     }
 
@@ -221,6 +230,24 @@ impl ReadError {
 impl From<crate::budget::LimitError> for ReadError {
     fn from(limit: crate::budget::LimitError) -> Self {
         Self::Limit(limit)
+    }
+}
+
+/// The number of bytes to the end, each piece checked.
+fn counted(
+    mut reader: impl Read,
+    within: impl Fn(u64) -> Result<(), crate::budget::LimitError>,
+) -> Result<u64, ReadError> {
+    let mut piece = vec![0; 64 << 10];
+    let mut count = 0;
+    loop {
+        match reader.read(&mut piece) {
+            Ok(0) => return Ok(count),
+            Ok(read) => count += read as u64,
+            Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+            Err(e) => return Err(ReadError::Io(e)),
+        }
+        within(count)?;
     }
 }
 

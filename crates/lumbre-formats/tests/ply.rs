@@ -1,5 +1,7 @@
 //! PLY files in every encoding, with every type, and as others wrote them.
 
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
 use std::sync::Arc;
 
 use crate::common::{changed, shared};

@@ -53,6 +53,7 @@ pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
     scene.integrator.max_depth = MAX_DEPTH;
     let mut first_camera = None;
     let mut uses: HashMap<Key, usize> = HashMap::new();
+    let mut copied = 0;
     graph.walk(&roots, |node, world, is_visible| {
         let value = file.list(List::Nodes)[node];
         if let Some((_, camera)) = file.named(List::Cameras, value, "camera")? {
@@ -83,7 +84,13 @@ pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
         let owner = (skin.is_some() || exposure.deforms(node, skin)?).then_some(node);
         let key = Key { mesh, weights: weights.iter().map(|w| w.to_bits()).collect(), owner };
         let copies = match value.extension("EXT_mesh_gpu_instancing")? {
-            Some(extension) => instances(file, extension)?,
+            Some(extension) => {
+                let copies = instances(file, extension)?;
+                // Few bytes that many nodes share make as many copies as their product.
+                copied += (copies.len() * size_of::<InstanceDesc>()) as u64;
+                super::check_expansion(file, extension, file.buffer_bytes(), copied)?;
+                copies
+            }
             None => vec![DAffine3::IDENTITY],
         };
         // A skin determines where its vertices are.

@@ -42,7 +42,7 @@ pub(super) fn read(
             // Its chunks may allocate memory before limits can be set on a decoder.
             ImageFormat::Png => decode(
                 format,
-                PngDecoder::with_limits(source, limits(bytes, budget)).map_err(fault)?,
+                PngDecoder::with_limits(source, profile_limits(bytes, budget)).map_err(fault)?,
                 bytes,
                 &place,
                 budget,
@@ -135,6 +135,14 @@ fn limits(bytes: &[u8], budget: &Budget) -> Limits {
         (bytes.len() as u64).saturating_mul(budget.limits().expansion).max(crate::Limits::FREE_EXPANSION);
     let mut limits = Limits::no_limits();
     limits.max_alloc = Some(budget.memory_left().min(most));
+    limits
+}
+
+/// The limit of what stands before the pixels of an image.
+fn profile_limits(bytes: &[u8], budget: &Budget) -> Limits {
+    const FREE: u64 = 32 << 20;
+    let mut limits = Limits::no_limits();
+    limits.max_alloc = Some(budget.memory_left().min(FREE.max(16 * bytes.len() as u64)));
     limits
 }
 

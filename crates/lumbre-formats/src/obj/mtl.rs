@@ -45,21 +45,21 @@ pub struct MtlMaterial {
     /// `anisor`: its rotation from the tangent, in turns.
     pub anisotropy_rotation: Option<f32>,
     /// `map_Kd`.
-    pub diffuse_map: Option<MtlTexture>,
+    pub diffuse_map: Option<Box<MtlTexture>>,
     /// `map_Ke`.
-    pub emission_map: Option<MtlTexture>,
+    pub emission_map: Option<Box<MtlTexture>>,
     /// `map_d`.
-    pub opacity_map: Option<MtlTexture>,
+    pub opacity_map: Option<Box<MtlTexture>>,
     /// `map_Pr`.
-    pub roughness_map: Option<MtlTexture>,
+    pub roughness_map: Option<Box<MtlTexture>>,
     /// `map_Pm`.
-    pub metallic_map: Option<MtlTexture>,
+    pub metallic_map: Option<Box<MtlTexture>>,
     /// `map_Ps`.
-    pub sheen_map: Option<MtlTexture>,
+    pub sheen_map: Option<Box<MtlTexture>>,
     /// `bump`, `map_Bump` or `disp`: heights.
-    pub bump_map: Option<MtlTexture>,
+    pub bump_map: Option<Box<MtlTexture>>,
     /// `norm`: a normal map.
-    pub normal_map: Option<MtlTexture>,
+    pub normal_map: Option<Box<MtlTexture>>,
 }
 
 /// A texture reference of an MTL file.
@@ -287,7 +287,7 @@ impl<'a> Reader<'a, '_> {
         &mut self,
         keyword: Word<'a>,
         mut words: Words<'a>,
-    ) -> Result<Option<MtlTexture>, FormatError> {
+    ) -> Result<Option<Box<MtlTexture>>, FormatError> {
         let mut texture = MtlTexture {
             file: String::new(),
             place: self.source.place(keyword.start),
@@ -304,7 +304,7 @@ impl<'a> Reader<'a, '_> {
                     self.warn(keyword, "texture without a file");
                     return Ok(None);
                 }
-                return Ok(Some(texture));
+                return Ok(Some(Box::new(texture)));
             };
             match word.bytes {
                 b"-s" => [texture.scale[0], texture.scale[1], _] = self.vector(&mut words, word, 1.0)?,

@@ -44,7 +44,11 @@ pub fn open_obj(
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut builder = Builder { budget, diagnostics, images: HashMap::new() };
     let mut finished: Vec<Finished> = vec![];
-    let mut names: HashMap<String, usize> = HashMap::new();
+    let of_meshes = obj.meshes.iter().filter_map(|mesh| mesh.material.as_ref());
+    let of_thin = obj.thin.iter().filter_map(|thin| thin.material.as_ref());
+    let used: HashSet<&str> = of_meshes.chain(of_thin).map(|(name, _)| name.as_str()).collect();
+    // Those that nothing uses have no number.
+    let mut names: HashMap<String, Option<usize>> = HashMap::new();
     let mut opened: HashSet<PathBuf> = HashSet::new();
     for (library, place) in &obj.libraries {
         for (folder, material) in builder.library(folder, library, place, &mut opened)? {
@@ -52,7 +56,11 @@ pub fn open_obj(
             if names.contains_key(&material.name) {
                 continue;
             }
-            names.insert(material.name.clone(), finished.len());
+            if !used.contains(material.name.as_str()) {
+                names.insert(material.name, None);
+                continue;
+            }
+            names.insert(material.name.clone(), Some(finished.len()));
             finished.push(builder.material(&folder, &material)?);
         }
     }
@@ -65,7 +73,7 @@ pub fn open_obj(
     let mut unsaid = [None; 2];
     let mut find = |material: &Option<(String, Place)>| {
         let (name, place) = material.as_ref()?;
-        let found = names.get(name).copied();
+        let found = names.get(name).copied().flatten();
         if found.is_none() {
             builder.diagnostics.warn("unknown material, taken for grey", |said| {
                 let near = nearest_name(name, names.keys().map(String::as_str));
@@ -280,7 +288,7 @@ impl Builder<'_> {
     fn numbers(
         &mut self,
         folder: &Path,
-        map: &Option<MtlTexture>,
+        map: &Option<Box<MtlTexture>>,
         number: f32,
     ) -> Result<Arc<FloatTexture>, FormatError> {
         let image = match map {

@@ -434,6 +434,15 @@ impl<'b, 'd> Converter<'b, 'd> {
                 }
             }
         }
+        let shapes = std::mem::take(&mut self.scene.shapes);
+        self.scene.shapes = self.shared_out(shapes)?;
+        for i in 0..self.objects.len() {
+            if let Some(object) = &mut self.objects[i].object {
+                let shapes = std::mem::take(&mut object.shapes);
+                let shapes = self.shared_out(shapes)?;
+                self.objects[i].object.as_mut().expect("it was there").shapes = shapes;
+            }
+        }
         for (mesh, spot) in std::mem::take(&mut self.meshes_to_close) {
             let mesh = meshes.get(&Arc::as_ptr(&mesh)).map_or(&mesh, |(read, _)| read);
             if !super::shapes::is_closed(mesh) {
@@ -451,6 +460,45 @@ impl<'b, 'd> Converter<'b, 'd> {
         let objects = std::mem::take(&mut self.objects).into_iter();
         self.scene.objects = objects.map(|slot| slot.object.expect("names are checked")).collect();
         self.finish_settings()
+    }
+
+    /// Shapes in which each face of a mesh that shines by power is a shape with the whole of it, as in pbrt.
+    fn shared_out(&self, shapes: Vec<ShapeDesc>) -> Result<Vec<ShapeDesc>> {
+        let faces = |shape: &ShapeDesc| match &shape.geometry {
+            GeometryDesc::Mesh(mesh) | GeometryDesc::BilinearMesh(mesh) => {
+                mesh.triangles.len() + mesh.quads.len()
+            }
+            _ => 1,
+        };
+        let is_shared = |shape: &ShapeDesc| {
+            shape.area_light.as_ref().is_some_and(|light| light.power.is_some()) && faces(shape) > 1
+        };
+        if !shapes.iter().any(is_shared) {
+            return Ok(shapes);
+        }
+        let mut all = vec![];
+        for shape in shapes {
+            match &shape.geometry {
+                GeometryDesc::Mesh(mesh) if is_shared(&shape) => {
+                    let each = size_of::<ShapeDesc>() + size_of::<MeshDesc>() + 256;
+                    self.budget
+                        .bytes((each * faces(&shape)) as u64, "faces that shine")
+                        .map_err(FormatError::from)?;
+                    let part =
+                        |mesh| ShapeDesc { geometry: GeometryDesc::Mesh(Arc::new(mesh)), ..shape.clone() };
+                    all.extend(super::shapes::single_faces(mesh).map(part));
+                }
+                GeometryDesc::BilinearMesh(mesh) if is_shared(&shape) => {
+                    let part = |mesh| ShapeDesc {
+                        geometry: GeometryDesc::BilinearMesh(Arc::new(mesh)),
+                        ..shape.clone()
+                    };
+                    all.extend(super::shapes::single_faces(mesh).map(part));
+                }
+                _ => all.push(shape),
+            }
+        }
+        Ok(all)
     }
 
     fn check_names(&mut self) -> Result<()> {

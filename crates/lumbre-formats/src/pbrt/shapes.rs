@@ -527,6 +527,30 @@ fn triples(params: &Params, name: &'static str, ty: Type) -> Result<Option<Vec<V
     list.map(Some).ok_or_else(|| param.refuse("numbers of single precision"))
 }
 
+/// Each face of a mesh as a mesh of its own.
+pub(super) fn single_faces(mesh: &MeshDesc) -> impl Iterator<Item = MeshDesc> + '_ {
+    fn pick<T: Copy>(list: &Option<Vec<T>>, corners: &[u32]) -> Option<Vec<T>> {
+        list.as_ref().map(|list| corners.iter().map(|&i| list[i as usize]).collect())
+    }
+    let numbers = mesh.face_indices.as_deref();
+    let triangles = mesh.triangles.iter().map(|face| &face[..]);
+    let faces = triangles.chain(mesh.quads.iter().map(|face| &face[..]));
+    faces.enumerate().map(move |(number, corners)| {
+        let is_triangle = corners.len() == 3;
+        MeshDesc {
+            positions: corners.iter().map(|&i| mesh.positions[i as usize]).collect(),
+            triangles: if is_triangle { vec![[0, 1, 2]] } else { vec![] },
+            quads: if is_triangle { vec![] } else { vec![[0, 1, 2, 3]] },
+            normals: pick(&mesh.normals, corners),
+            uvs: pick(&mesh.uvs, corners),
+            tangents: pick(&mesh.tangents, corners),
+            colours: pick(&mesh.colours, corners),
+            face_indices: numbers.map(|numbers| vec![numbers[number]]),
+            ..MeshDesc::default()
+        }
+    })
+}
+
 /// Whether each edge of a mesh is shared by exactly two faces in opposite directions, with vertices at the same
 /// position merged.
 pub(super) fn is_closed(mesh: &MeshDesc) -> bool {
