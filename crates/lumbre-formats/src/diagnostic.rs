@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::fmt::{self, Display, Formatter, Write as _};
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use thiserror::Error;
 
@@ -81,19 +81,49 @@ impl Place {
     ///
     /// Lines end with LF, CRLF or a lone CR. Linear in `offset`: for errors.
     pub fn of_offset(file: impl Into<Arc<str>>, text: &[u8], offset: usize) -> Self {
-        let before = &text[..offset.min(text.len())];
-        let mut line = 1;
-        let mut start = 0;
-        for (i, &byte) in before.iter().enumerate() {
-            let ends = byte == b'\n' || (byte == b'\r' && text.get(i + 1) != Some(&b'\n'));
-            if ends {
-                line += 1;
-                start = i + 1;
-            }
-        }
-        // UTF-8 continuation bytes belong to the character before them.
-        let column = 1 + before[start..].iter().filter(|&&b| b & 0xC0 != 0x80).count() as u64;
+        let (line, column) = walked(text, 0..offset.min(text.len()), (1, 1));
         Self::text(file, line, column)
+    }
+}
+
+/// The line and column at the end of a range of a text, from those at its start.
+fn walked(text: &[u8], range: std::ops::Range<usize>, (mut line, mut column): (u64, u64)) -> (u64, u64) {
+    for i in range {
+        let byte = text[i];
+        let ends = byte == b'\n' || (byte == b'\r' && text.get(i + 1) != Some(&b'\n'));
+        if ends {
+            (line, column) = (line + 1, 1);
+        } else if byte & 0xC0 != 0x80 {
+            // UTF-8 continuation bytes belong to the character before them.
+            column += 1;
+        }
+    }
+    (line, column)
+}
+
+/// The places of one text, for readers that name many of them: as [`Place::of_offset`], but the time of all
+/// together is that of one pass over the text and a little for each.
+#[derive(Debug, Default)]
+pub(crate) struct TextPlaces {
+    /// The line and column of every byte whose offset is a multiple of [`TextPlaces::STEP`], as far as known.
+    marks: Mutex<Vec<(u64, u64)>>,
+}
+
+impl TextPlaces {
+    const STEP: usize = 1 << 10;
+
+    /// The line and column of byte `offset` in `text`, always the same text.
+    pub(crate) fn place(&self, file: impl Into<Arc<str>>, text: &[u8], offset: usize) -> Place {
+        let offset = offset.min(text.len());
+        let mut marks = self.marks.lock().unwrap_or_else(PoisonError::into_inner);
+        let wanted = offset / Self::STEP;
+        let mut mark = marks.last().copied().unwrap_or((1, 1));
+        for end in marks.len()..=wanted {
+            mark = walked(text, end.saturating_sub(1) * Self::STEP..end * Self::STEP, mark);
+            marks.push(mark);
+        }
+        let (line, column) = walked(text, wanted * Self::STEP..offset, marks[wanted]);
+        Place::text(file, line, column)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Opening inputs: regular files only, decompressed if they are gzip, within the budget.
 
 use std::borrow::Cow;
-use std::fs::File;
+use std::fs::{File, OpenOptions};
 use std::io::{self, Read};
 use std::ops::Deref;
 use std::path::Path;
@@ -61,11 +61,20 @@ impl<'b> Input<'b> {
         let mut bytes = Vec::new();
         let mut hold = budget.hold(0, &self.name)?;
         let within = |unpacked| budget.expansion(packed, unpacked, &self.name);
-        read_within(MultiGzDecoder::new(&self.bytes[..]), 0, &mut bytes, &mut hold, &self.name, within)
-            .map_err(|e| match e {
-                ReadError::Limit(limit) => FormatError::from(limit),
-                ReadError::Io(source) => unpacking_error(path, &self.name, source),
-            })?;
+        // The size is found first, so that no memory is taken for a bomb, nor for growing.
+        let fits = |unpacked| {
+            within(unpacked)?;
+            // Charged, and given back at once.
+            budget.hold(unpacked, &self.name).map(drop)
+        };
+        let size = counted(MultiGzDecoder::new(&self.bytes[..]), fits).and_then(|size| {
+            let reader = MultiGzDecoder::new(&self.bytes[..]);
+            read_within(reader, size, &mut bytes, &mut hold, &self.name, within)
+        });
+        size.map_err(|e| match e {
+            ReadError::Limit(limit) => FormatError::from(limit),
+            ReadError::Io(source) => unpacking_error(path, &self.name, source),
+        })?;
         Ok(Self { name: self.name, bytes, hold })
     }
 
@@ -110,7 +119,15 @@ pub(crate) fn open_regular(path: &Path) -> Result<(File, u64), FormatError> {
     if !before.is_file() {
         return Err(not_regular(before.file_type()));
     }
-    let file = File::open(path).map_err(|e| refuse("cannot open", e))?;
+    let mut how = OpenOptions::new();
+    how.read(true);
+    // Some files of the system, such as /proc/kmsg, are regular and wait for more all the same.
+    #[cfg(all(target_os = "linux", any(target_arch = "x86_64", target_arch = "aarch64")))]
+    {
+        const O_NONBLOCK: i32 = 0o4000;
+        std::os::unix::fs::OpenOptionsExt::custom_flags(&mut how, O_NONBLOCK);
+    }
+    let file = how.open(path).map_err(|e| refuse("cannot open", e))?;
     let meta = file.metadata().map_err(|e| refuse("cannot open", e))?;
     if !meta.is_file() {
         return Err(not_regular(meta.file_type()));
@@ -163,6 +180,33 @@ pub fn refuse_wide(bytes: &[u8], name: &Arc<str>) -> Result<(), FormatError> {
     Ok(())
 }
 
+/// The bytes of a text, taken to UTF-8 where its byte order mark is that of UTF-16: for formats that programs of
+/// Windows write. What they take is charged to the budget.
+///
+/// # Errors
+/// When they are UTF-32 by their byte order mark, and as for [`Budget::bytes`].
+pub(crate) fn narrow_text<'a>(
+    bytes: &'a [u8],
+    name: &Arc<str>,
+    budget: &Budget,
+) -> Result<Cow<'a, [u8]>, FormatError> {
+    let unit: fn([u8; 2]) -> u16 = match bytes {
+        [0xFF, 0xFE, 0, 0, ..] | [0, 0, 0xFE, 0xFF, ..] => {
+            refuse_wide(bytes, name)?;
+            return Ok(Cow::Borrowed(bytes));
+        }
+        [0xFF, 0xFE, ..] => u16::from_le_bytes,
+        [0xFE, 0xFF, ..] => u16::from_be_bytes,
+        _ => return Ok(Cow::Borrowed(bytes)),
+    };
+    // A unit takes up to three bytes.
+    budget.bytes(bytes.len() as u64 / 2 * 3, name)?;
+    let units = bytes[2..].as_chunks::<2>().0.iter().map(|&pair| unit(pair));
+    let mut text = String::with_capacity(bytes.len() / 2 * 3);
+    text.extend(char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER)));
+    Ok(Cow::Owned(text.into_bytes()))
+}
+
 /// `bytes` as text, with invalid UTF-8 replaced by U+FFFD: for formats older than UTF-8, where such bytes occur
 /// in names and comments.
 pub fn lossy_text(bytes: &[u8]) -> Cow<'_, str> {
@@ -186,6 +230,24 @@ impl ReadError {
 impl From<crate::budget::LimitError> for ReadError {
     fn from(limit: crate::budget::LimitError) -> Self {
         Self::Limit(limit)
+    }
+}
+
+/// The number of bytes to the end, each piece checked.
+fn counted(
+    mut reader: impl Read,
+    within: impl Fn(u64) -> Result<(), crate::budget::LimitError>,
+) -> Result<u64, ReadError> {
+    let mut piece = vec![0; 64 << 10];
+    let mut count = 0;
+    loop {
+        match reader.read(&mut piece) {
+            Ok(0) => return Ok(count),
+            Ok(read) => count += read as u64,
+            Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+            Err(e) => return Err(ReadError::Io(e)),
+        }
+        within(count)?;
     }
 }
 

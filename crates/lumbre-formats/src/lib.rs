@@ -14,11 +14,13 @@ pub mod input;
 pub mod input_stream;
 pub mod obj;
 pub mod open;
+mod origin;
 #[allow(unreachable_pub, reason = "its modules are being split")]
 pub mod pbrt;
 pub mod ply;
 mod polygon;
 pub mod stl;
+mod thin;
 
 pub use atomic::{abandon_writes, atomic_write, atomic_write_seek, probe_writable};
 pub use budget::{Budget, BudgetVec, Hold, LimitError, LimitKind, Limits};
@@ -26,3 +28,4 @@ pub use diagnostic::{Diagnostic, Diagnostics, FormatError, Place, Position, Seve
 pub use input::Input;
 pub use input_stream::InputStream;
 pub use open::{ReadOptions, open_scene, open_scenes};
+pub use thin::Thin;

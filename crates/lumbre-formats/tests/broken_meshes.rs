@@ -234,7 +234,7 @@ fn every_broken_file_gets_its_message() {
                 "element vertex 99000\nproperty double x\nproperty double y\nproperty double z\nproperty float nx\nproperty float ny\nproperty float nz\nproperty float u\nproperty float v\nproperty float r\nproperty float g\nproperty float b\n",
                 &"1 2 3 1 2 3 1 2 1 2 3\n".repeat(99_000),
             ),
-            "a.ply: colours: needs 4356000 bytes of memory, limit 4194304; raise it with --max-memory",
+            "a.ply: texture coordinates: needs 4356000 bytes of memory, limit 4194304; raise it with --max-memory",
         ),
         // OBJ and MTL.
         (

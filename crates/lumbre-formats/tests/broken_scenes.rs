@@ -588,7 +588,7 @@ fn files_that_are_not_there_are_errors_where_they_are_asked_for() {
         ("WorldBegin\n Include \".\"", "2:10: cannot read"),
         ("WorldBegin Shape \"plymesh\" \"string filename\" \"gone.ply\"", "1:28: cannot open \"gone.ply\""),
         (
-            "WorldBegin Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"gone.png\"",
+            "WorldBegin Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"gone.png\" Shape \"sphere\" \"texture alpha\" \"t\"",
             "1:43: cannot open \"gone.png\"",
         ),
         (

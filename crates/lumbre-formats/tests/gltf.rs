@@ -55,9 +55,17 @@ fn read(json: &str, binary: &[u8]) -> SceneDesc {
     read_with(&glb(json, binary), &GltfOptions::default(), &mut Diagnostics::new()).unwrap()
 }
 
+/// What is said about a file that is wrong: why it is refused, or what is warned of where it is shown all the same.
+/// Strict reading refuses either.
 fn error(json: &str, binary: &[u8]) -> String {
-    let read = read_with(&glb(json, binary), &GltfOptions::default(), &mut Diagnostics::new());
-    read.map(|_| ()).unwrap_err().to_string()
+    let mut said = Diagnostics::new();
+    let read = read_with(&glb(json, binary), &GltfOptions::default(), &mut said);
+    let mut strict = Diagnostics::with_strictness(Strictness::Strict);
+    let strictly = read_with(&glb(json, binary), &GltfOptions::default(), &mut strict);
+    assert!(strictly.is_err() || strict.check().is_err());
+    let refused = read.err().map(|error| error.to_string());
+    let warned = said.kept().iter().map(|said| said.body());
+    refused.into_iter().chain(warned).collect::<Vec<_>>().join("\n")
 }
 
 fn mesh(shape: &ShapeDesc) -> &MeshDesc {
@@ -1589,7 +1597,7 @@ fn broken_files_are_refused_with_a_pointer_and_a_reason() {
         (r#""buffer":0,"byteOffset":0"#, r#""buffer":0,"byteOffset":18446744073709551615"#, "/bufferViews/0/byteOffset: wrong number"),
         (r#""buffer":0,"byteOffset":0"#, r#""buffer":0,"byteOffset":9007199254740991"#, "/bufferViews/0/byteOffset: buffer view past the end of its buffer"),
         (r#""byteOffset":0,"byteLength":48"#, r#""byteOffset":0,"byteLength":99999"#, "/bufferViews/0/byteLength: buffer view past the end of its buffer (found 99999 bytes from byte 0"),
-        (r#""byteOffset":0,"byteLength":48"#, r#""byteOffset":0,"byteLength":0"#, "/bufferViews/0/byteLength: wrong number (found 0; expected a whole number, 1 or more)"),
+        (r#""byteOffset":0,"byteLength":48"#, r#""byteOffset":0,"byteLength":0"#, "/accessors/0/count: accessor past the end of its buffer view (found 4 elements, which need 48 bytes; expected 0 bytes at most)"),
         (r#""byteOffset":0,"byteLength":48"#, r#""byteOffset":0,"byteLength":48,"byteStride":6"#, "/bufferViews/0/byteStride: wrong stride (found 6"),
         (r#""byteOffset":0,"byteLength":48"#, r#""byteOffset":0,"byteLength":48,"byteStride":8"#, "/accessors/0: stride shorter than an element (found 8; expected 12 or more)"),
         (r#""type":"VEC3","count":4,"min""#, r#""type":"VEC3","count":5,"min""#, "/accessors/0/count: accessor past the end of its buffer view (found 5 elements, which need 60 bytes; expected 48 bytes at most)"),

@@ -9,4 +9,5 @@ mod images;
 mod obj;
 mod pbrt_grammar;
 mod ply;
+mod shown;
 mod stl;

@@ -7,8 +7,10 @@ use std::sync::Arc;
 use crate::common::{files_below, shared};
 use lumbre_formats::obj::{ObjFile, open_obj, read_mtl, read_obj};
 use lumbre_formats::{Budget, Diagnostics, FormatError, Input, Strictness};
+use lumbre_geometry::Shape;
 use lumbre_image::Rgb;
-use lumbre_scene::GeometryDesc;
+use lumbre_math::{DVec3, Transform, Vec3};
+use lumbre_scene::{GeometryDesc, Scene, Stage, StageLight};
 use lumbre_shading::{MaterialKind, Texture};
 
 fn name() -> Arc<str> {
@@ -168,20 +170,15 @@ fn a_long_line_and_many_attributes_of_one_vertex_take_no_more_than_their_time() 
 
 #[test]
 fn what_is_dropped_is_said() {
-    let (file, lines) = said(
-        &format!("{SQUARE}l 1 2\np 1\nf 1 2\nfaces 1 2 3\ncurv 0 1\ns 1\nf 1 2 3\n"),
-        Strictness::Normal,
-    );
+    let (file, lines) =
+        said(&format!("{SQUARE}\n\nf 1 2\nfaces 1 2 3\ncurv 0 1\ns 1\nf 1 2 3\n"), Strictness::Normal);
     assert_eq!(file.meshes[0].mesh.triangles.len(), 1);
     assert_eq!(
         lines,
         [
-            "warning: m.obj:5:1: line is no surface, passed over",
-            "warning: m.obj:6:1: point is no surface, passed over",
             "warning: m.obj:7:1: face with fewer than three corners, dropped",
             "warning: m.obj:8:1: unknown keyword, line passed over (found \"faces\")",
             "warning: m.obj:9:1: free-form curves and surfaces are not supported, passed over",
-            "warning: m.obj:11:1: smoothing groups are not applied: faces without normals are flat",
         ]
     );
 }
@@ -306,4 +303,110 @@ fn files_of_others_are_read_or_refused_with_a_place() {
             assert!(refused.iter().any(|r| r.contains(wrong)), "{wrong} {refused:#?}");
         }
     }
+}
+
+#[test]
+fn faces_of_a_smoothing_group_are_smooth_and_others_flat() {
+    // A roof of two squares that meet at a right angle along x.
+    let roof = "v 0 0 0\nv 2 0 0\nv 2 3 3\nv 0 3 3\nv 0 6 0\nv 2 6 0\n";
+    let normals = |faces: &str| {
+        let file = read(&format!("{roof}{faces}")).unwrap();
+        file.meshes.iter().map(|mesh| mesh.mesh.normals.clone()).collect::<Vec<_>>()
+    };
+    let smooth = normals("s 1\nf 1 2 3 4\nf 4 3 6 5\n").remove(0).unwrap();
+    let ridge = smooth.iter().filter(|n| n.abs_diff_eq(Vec3::Z, 1e-6)).count();
+    assert_eq!((smooth.len(), ridge), (6, 2));
+    let half = std::f32::consts::FRAC_1_SQRT_2;
+    assert!(smooth.iter().any(|n| n.abs_diff_eq(Vec3::new(0.0, -half, half), 1e-6)));
+    // Groups meet in an edge, `off` is flat, and normals of the file count for more.
+    let apart = normals("s 1\nf 1 2 3 4\ns 2\nf 4 3 6 5\n").remove(0).unwrap();
+    assert!(apart.len() == 8 && apart.iter().all(|n| (n.z - half).abs() < 1e-6));
+    assert_eq!(normals("s off\nf 1 2 3 4\n"), [None]);
+    assert_eq!(normals("vn 0 0 1\ns 1\nf 1//1 2//1 3//1\n"), [Some(vec![Vec3::Z; 3])]);
+}
+
+#[test]
+fn points_and_lines_are_spheres_and_cylinders_of_their_material() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("m.obj");
+    std::fs::write(&path, "v 0 0 5\nv 30 0 5\nv 30 40 5\nl 1 2 3\np 2 -1\n").unwrap();
+    let mut said = Diagnostics::new();
+    let scene = open_obj(&path, &Budget::default(), &mut said).unwrap();
+    assert_eq!(said.lines(), [""; 0]);
+    let count = |is: fn(&Shape) -> bool| {
+        scene.shapes.iter().filter(|s| matches!(&s.geometry, GeometryDesc::Exact(shape) if is(shape))).count()
+    };
+    // Two points, and a joint between the two segments.
+    assert_eq!(
+        (count(|s| matches!(s, Shape::Sphere(_))), count(|s| matches!(s, Shape::Cylinder(_)))),
+        (3, 2)
+    );
+    Scene::build(scene).unwrap();
+}
+
+#[test]
+fn a_model_far_from_zero_keeps_the_digits_of_its_file() {
+    let text = "v 500000.25 4649781.5 100.125\nv 500000.26 4649781.5 100.125\nv 500000.25 4649781.53 100.125\nf 1 2 3\n";
+    let file = read(text).unwrap();
+    let at = |i: usize| file.meshes[0].mesh.positions[i].as_dvec3() + file.origin;
+    assert!((at(1) - DVec3::new(500_000.26, 4_649_781.5, 100.125)).abs().max_element() < 1e-8);
+    assert!((at(2) - at(0) - DVec3::new(0.0, 0.03, 0.0)).abs().max_element() < 1e-8);
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("m.obj");
+    std::fs::write(&path, text).unwrap();
+    let scene = open_obj(&path, &Budget::default(), &mut Diagnostics::new()).unwrap();
+    assert_eq!(scene.shapes[0].world_from_object, Transform::translate(file.origin));
+}
+
+#[test]
+fn faces_without_area_are_said_to_show_nothing() {
+    let (_, lines) = said("v 5 6 7\nv 5 6 7\nv 5 6 7\nf 1 2 3\n", Strictness::Normal);
+    assert_eq!(lines, ["warning: m.obj: all faces are without area: nothing of them is seen"]);
+}
+
+#[test]
+fn text_in_sixteen_bits_is_read_by_its_byte_order_mark() {
+    let text = "\u{FEFF}# é\nv 1 2 3\nv 4 2 3\nv 1 5 3\no é\nf 1 2 3\n";
+    for order in [u16::to_le_bytes, u16::to_be_bytes] {
+        let bytes: Vec<u8> = text.encode_utf16().flat_map(order).collect();
+        let file = read_obj(&bytes, &name(), &Budget::default(), &mut Diagnostics::new()).unwrap();
+        assert_eq!((file.meshes[0].name.as_str(), file.meshes[0].mesh.triangles.len()), ("é", 1));
+    }
+}
+
+#[test]
+fn a_transparency_of_one_alone_is_opaque_and_d_decides_between_the_two() {
+    let opacity = |keys: &str| {
+        let mut said = Diagnostics::new();
+        let text = format!("newmtl a\n{keys}\n");
+        let materials = read_mtl(text.as_bytes(), &"m.mtl".into(), &Budget::default(), &mut said).unwrap();
+        (materials[0].opacity, said.lines().join("; "))
+    };
+    let (found, said) = opacity("Tr 1");
+    assert!(
+        found == Some(1.0) && said.contains("Tr of a material makes it invisible, taken for opaque"),
+        "{said}"
+    );
+    assert_eq!(opacity("Tr 0.25"), (Some(0.75), String::new()));
+    assert_eq!(opacity("d 0.5\nTr 0.5"), (Some(0.5), String::new()));
+    assert_eq!(opacity("Tr 0.25\nd 0.75"), (Some(0.75), String::new()));
+    let (found, said) = opacity("d 1\nTr 1");
+    assert!(found == Some(1.0) && said.contains("d and Tr of a material disagree"), "{said}");
+}
+
+#[test]
+fn a_library_is_read_once_and_what_shines_faintly_leaves_the_studio() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("m.obj");
+    let light = |emission: &str| {
+        std::fs::write(dir.path().join("m.mtl"), format!("newmtl m\nKe {emission}\nwrong 1\n")).unwrap();
+        std::fs::write(&path, format!("{}{SQUARE}usemtl m\nf 1 2 3\n", "mtllib m.mtl\n".repeat(5))).unwrap();
+        let mut said = Diagnostics::new();
+        let scene = open_obj(&path, &Budget::default(), &mut said).unwrap();
+        assert_eq!(said.warnings(), 1);
+        let staged = Stage::default().set(&mut scene.clone()).light;
+        (scene.shapes[0].area_light.is_some(), staged)
+    };
+    assert_eq!(light("0 0 0.1"), (true, StageLight::Studio));
+    assert_eq!(light("9 8 7"), (true, StageLight::Own));
 }

@@ -5,7 +5,7 @@ use std::fs;
 use lumbre_formats::{
     Budget, Diagnostics, FormatError, Limits, ReadOptions, Strictness, open_scene, open_scenes, pbrt,
 };
-use lumbre_geometry::Shape;
+use lumbre_geometry::{Ray, Shape};
 use lumbre_image::Rgb;
 use lumbre_math::{DVec3, Transform, Vec2, Vec3};
 use lumbre_scene::*;
@@ -448,7 +448,7 @@ fn every_material_is_read() {
         r#"Material "diffuse" "rgb reflectance" [.1 .2 .3] Shape "sphere"
            Material "conductor" "spectrum eta" "metal-Ag-eta" "spectrum k" "metal-Ag-k" "float roughness" .3 Shape "sphere"
            Material "conductor" "rgb reflectance" [.9 .8 .7] "float uroughness" .2 "bool remaproughness" false Shape "sphere"
-           Material "dielectric" "spectrum eta" "glass-BK7" Shape "sphere"
+           Material "dielectric" "spectrum eta" [400 1.5168 700 1.5168] Shape "sphere"
            Material "thindielectric" "float eta" 1.4 Shape "sphere"
            Material "coateddiffuse" "rgb reflectance" [.5 .6 .7] "float roughness" .1 "integer maxdepth" 20 "integer nsamples" 3 "float thickness" .02 Shape "sphere"
            Material "diffusetransmission" "rgb transmittance" [.1 .1 .2] "float scale" .5 Shape "sphere"
@@ -1111,4 +1111,109 @@ fn transform_begin_of_the_current_version_saves_everything() {
         r#"Material "dielectric" TransformBegin Translate 1 2 3 Material "diffuse" TransformEnd Shape "sphere""#,
     );
     assert!(matches!(kind(&scene, 0), MaterialKind::Dielectric { .. }));
+}
+
+#[test]
+fn textures_may_be_defined_after_the_materials_and_shapes_that_name_them() {
+    let scene = world(
+        r#"Material "diffuse" "texture reflectance" "later" Shape "sphere" "texture alpha" "holes"
+           MakeNamedMaterial "a" "string type" "diffuse" "texture reflectance" "later"
+           MakeNamedMaterial "b" "string type" "mix" "string materials" ["a" "a"]
+           NamedMaterial "b" Shape "disk"
+           Texture "later" "spectrum" "constant" "rgb value" [.2 .4 .6]
+           Texture "holes" "float" "constant" "float value" .25"#,
+    );
+    let MaterialKind::Diffuse { reflectance } = kind(&scene, 0) else { panic!() };
+    assert_eq!(constant(reflectance), Rgb::new(0.2, 0.4, 0.6));
+    assert_eq!(constant(scene.shapes[0].alpha.as_ref().unwrap()), 0.25);
+    let MaterialKind::Mix { materials, .. } = kind(&scene, 1) else { panic!() };
+    assert!(matches!(materials[0].kind, MaterialKind::Diffuse { .. }));
+    for wrong in [
+        r#"Material "diffuse" "texture reflectance" "nowhere" Shape "sphere""#,
+        r#"Shape "sphere" "texture alpha" "nowhere""#,
+    ] {
+        let error = try_read(&format!("WorldBegin\n{wrong}")).0.unwrap_err().to_string();
+        assert!(error.contains("texture \"nowhere\" is not defined"), "{error}");
+    }
+}
+
+#[test]
+fn a_missing_image_matters_where_it_is_used() {
+    let dir = tempfile::tempdir().unwrap();
+    let read = |text: &str, strictness| {
+        let mut said = Diagnostics::with_strictness(strictness);
+        let text = format!("WorldBegin\n{text}");
+        let scene =
+            pbrt::read_bytes("s.pbrt", text.as_bytes(), Some(dir.path()), &Budget::default(), &mut said);
+        (scene, said.lines())
+    };
+    let unused = r#"Texture "u" "spectrum" "imagemap" "string filename" "gone.png" Shape "sphere""#;
+    let (scene, said) = read(unused, Strictness::Normal);
+    assert!(scene.is_ok() && said.len() == 1 && said[0].contains("2:35: cannot open"), "{said:?}");
+    let used = format!("{unused} Material \"diffuse\" \"texture reflectance\" \"u\" Shape \"disk\"");
+    let error = read(&used, Strictness::Normal).0.unwrap_err().to_string();
+    assert!(error.starts_with("s.pbrt:2:35: cannot open"), "{error}");
+    // Lenient reading goes on and names all that is missing.
+    let many = format!(
+        r#"{used} Include "gone.pbrt" Shape "plymesh" "string filename" "gone.ply"
+           LightSource "infinite" "string filename" "gone.exr""#
+    );
+    let (scene, said) = read(&many, Strictness::Lenient);
+    assert!(scene.is_ok());
+    for name in ["gone.png", "gone.pbrt", "gone.ply", "gone.exr"] {
+        assert!(said.iter().any(|line| line.contains(name)), "{name}: {said:?}");
+    }
+}
+
+#[test]
+fn what_a_film_and_old_materials_ask_for_is_kept() {
+    let single = |film: &str| read(&format!("Film \"rgb\" {film}\nWorldBegin")).film.single_precision;
+    assert_eq!(
+        [single(""), single("\"bool savefp16\" true"), single("\"bool savefp16\" false")],
+        [false, false, true]
+    );
+    for old in ["uber", "plastic", "substrate"] {
+        let text = format!("WorldBegin Material \"{old}\" \"float index\" 2.5 Shape \"sphere\"");
+        let (scene, _) = try_read(&text);
+        let MaterialKind::CoatedDiffuse { eta, .. } = *kind(&scene.unwrap(), 0) else { panic!("{old}") };
+        assert_eq!(eta, 2.5, "{old}");
+    }
+}
+
+#[test]
+fn the_dispersion_of_a_glass_is_rendered_or_said_to_be_left_out() {
+    let text = |material: &str| {
+        format!("WorldBegin Material {material} \"spectrum eta\" \"glass-F11\" Shape \"sphere\"")
+    };
+    for material in ["\"dielectric\"", "\"thindielectric\""] {
+        let lines = try_read(&text(material)).1.lines();
+        assert!(lines.len() == 1 && lines[0].contains("dispersion is not rendered yet"), "{lines:?}");
+    }
+    let scene = read(&text("\"principled\" \"float spec_trans\" 1"));
+    // The language's F11 is SF11, whose Abbe number is 25.76 by its catalogue.
+    let found = 20.0 / principled(&scene, 0).dispersion;
+    assert!((found - 25.76).abs() < 0.05, "{found}");
+}
+
+#[test]
+fn the_power_of_an_area_light_keeps_the_factor_of_its_colour() {
+    // As pbrt-v4: L x scale x power / (area x pi x sides), whatever the luminance of L.
+    let scene = world(
+        r#"AreaLightSource "diffuse" "rgb L" [9 8 7] "float scale" 2 "float power" 100 "bool twosided" true
+           Translate 0 0 3 Shape "disk" "float radius" 1.5"#,
+    );
+    // Each face of a mesh is a shape that has the whole power.
+    let roof = world(
+        r#"AreaLightSource "diffuse" "float power" 100
+           Shape "trianglemesh" "integer indices" [0 1 2 0 2 3] "point3 P" [0 0 0 2 0 0 2 3 0 0 9 0] "point2 uv" [0 0 1 0 1 1 0 1]"#,
+    );
+    assert_eq!(roof.shapes.len(), 2);
+    assert_eq!(mesh(&roof.shapes[1]).positions[2].to_array(), [0.0, 9.0, 0.0]);
+    let scene = Scene::build(scene).unwrap();
+    let ray = Ray::new(DVec3::ZERO, DVec3::Z);
+    let seen =
+        scene.closest(&ray).map(|hit| scene.interaction(&ray, &hit, &Footprint::Point).emitted()).unwrap();
+    let factor = (200.0 / (std::f64::consts::PI.powi(2) * 2.25 * 2.0)) as f32;
+    let expected = Rgb::new(9.0, 8.0, 7.0) * factor;
+    assert!((seen - expected).map(f32::abs).max_component() < 1e-4, "{seen:?} {expected:?}");
 }

@@ -1,11 +1,15 @@
 //! PLY files in every encoding, with every type, and as others wrote them.
 
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
 use std::sync::Arc;
 
 use crate::common::{changed, shared};
 use lumbre_formats::ply::read_ply;
 use lumbre_formats::{Budget, Diagnostics, FormatError, Input, Limits, ReadOptions, Strictness, open_scene};
-use lumbre_scene::MeshDesc;
+use lumbre_geometry::Shape;
+use lumbre_math::DVec3;
+use lumbre_scene::{GeometryDesc, MeshDesc, Scene, ShapeDesc};
 use lumbre_shading::{MaterialKind, Texture};
 
 fn name() -> Arc<str> {
@@ -13,7 +17,7 @@ fn name() -> Arc<str> {
 }
 
 fn read(bytes: &[u8]) -> Result<MeshDesc, FormatError> {
-    read_ply(bytes, &name(), &Budget::default(), &mut Diagnostics::new())
+    read_ply(bytes, &name(), &Budget::default(), &mut Diagnostics::new()).map(|file| file.mesh)
 }
 
 /// Two triangles and a quad over six vertices, in text.
@@ -214,7 +218,7 @@ fn lenient_drops_what_cannot_be_used_and_counts_it() {
     let wrong = read(text.as_bytes()).unwrap_err().to_string();
     assert_eq!(wrong, "m.ply:25:1: vertex 5 is not finite (found (NaN, 3, 3))");
     let mut said = Diagnostics::with_strictness(Strictness::Lenient);
-    let mesh = read_ply(text.as_bytes(), &name(), &Budget::default(), &mut said).unwrap();
+    let mesh = read_ply(text.as_bytes(), &name(), &Budget::default(), &mut said).unwrap().mesh;
     assert_eq!((mesh.triangles.len(), mesh.quads.len()), (1, 0));
     assert_eq!(mesh.face_indices.unwrap(), [70]);
     assert_eq!(
@@ -261,7 +265,7 @@ fn meshes_of_others_are_read() {
         let budget = Budget::default();
         let read = |file: &str| {
             let input = Input::open(&folder.join(file), &budget).unwrap();
-            read_ply(&input, input.name(), &budget, &mut Diagnostics::new()).unwrap()
+            read_ply(&input, input.name(), &budget, &mut Diagnostics::new()).unwrap().mesh
         };
         let text = read("platonic_shelf_ascii.ply");
         assert_eq!(text.positions.len(), 50);
@@ -277,7 +281,7 @@ fn meshes_of_others_are_read() {
         let budget = Budget::default();
         let input = Input::open(&folder.join("bitterli-coffee-flat.ply"), &budget).unwrap();
         let start = std::time::Instant::now();
-        let mesh = read_ply(&input, input.name(), &budget, &mut Diagnostics::new()).unwrap();
+        let mesh = read_ply(&input, input.name(), &budget, &mut Diagnostics::new()).unwrap().mesh;
         let seconds = start.elapsed().as_secs_f64();
         println!("{} bytes in {seconds} s: {:.0} MB/s", input.len(), input.len() as f64 / 1e6 / seconds);
         assert_eq!(mesh.triangles.len(), 235_271);
@@ -318,4 +322,79 @@ fn measure_reading() {
             bytes.len() as f64 / 1e6 / seconds
         );
     }
+}
+
+/// The scene of a text, written beside an image of one pixel.
+fn open_text(text: &str) -> (lumbre_scene::SceneDesc, Vec<String>) {
+    let dir = tempfile::tempdir().unwrap();
+    let pixel = image::RgbImage::from_raw(1, 1, vec![255, 0, 0]).unwrap();
+    pixel.save(dir.path().join("a b.png")).unwrap();
+    let path = dir.path().join("m.ply");
+    std::fs::write(&path, text).unwrap();
+    let (scene, said) = open_scene(&path, &ReadOptions::default()).unwrap();
+    (scene, said.lines())
+}
+
+const PLACES: &str = "property double x\nproperty double y\nproperty double z\n";
+
+#[test]
+fn vertices_without_faces_are_points_and_edges_are_lines() {
+    let vertices = "0 0 2\n3 0 2\n3 4 2\n";
+    let (scene, said) =
+        open_text(&format!("ply\nformat ascii 1.0\nelement vertex 3\n{PLACES}end_header\n{vertices}"));
+    assert_eq!((scene.shapes.len(), said.len()), (3, 0));
+    let spheres = scene.shapes.iter().all(|s| matches!(&s.geometry, GeometryDesc::Exact(Shape::Sphere(_))));
+    assert!(spheres);
+    let (scene, said) = open_text(&format!(
+        "ply\nformat ascii 1.0\nelement vertex 3\n{PLACES}element edge 2\nproperty int vertex1\nproperty int vertex2\n\
+         end_header\n{vertices}0 1\n1 2\n"
+    ));
+    let is_line = |s: &ShapeDesc| matches!(&s.geometry, GeometryDesc::Exact(Shape::Cylinder(_)));
+    assert_eq!((scene.shapes.iter().filter(|s| is_line(s)).count(), said.len()), (2, 0));
+    Scene::build(scene).unwrap();
+}
+
+#[test]
+fn doubles_far_from_zero_keep_their_digits() {
+    let far = DVec3::new(500_000.25, 4_649_781.5, 100.125);
+    let places = [far, far + DVec3::new(0.01, 0.0, 0.0), far + DVec3::new(0.0, 0.03, 0.0)];
+    let header = |kind: &str| {
+        format!(
+            "ply\nformat {kind} 1.0\nelement vertex 3\n{PLACES}element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+        )
+    };
+    let mut binary = header("binary_little_endian").into_bytes();
+    let mut text = header("ascii");
+    for p in places {
+        text += &format!("{} {} {}\n", p.x, p.y, p.z);
+        p.to_array().iter().for_each(|v| binary.extend(v.to_le_bytes()));
+    }
+    text += "3 0 1 2\n";
+    binary.push(3);
+    (0..3_i32).for_each(|v| binary.extend(v.to_le_bytes()));
+    for bytes in [text.as_bytes(), &binary] {
+        let file = read_ply(bytes, &name(), &Budget::default(), &mut Diagnostics::new()).unwrap();
+        for (found, p) in file.mesh.positions.iter().zip(places) {
+            assert!((found.as_dvec3() + file.origin - p).abs().max_element() < 1e-8);
+        }
+    }
+    let scene = open_text(&text).0;
+    assert!(scene.shapes[0].world_from_object.point(DVec3::ZERO).x > 499_999.0);
+}
+
+#[test]
+fn the_texture_of_a_comment_is_found_beside_the_file() {
+    let with = |file: &str| {
+        open_text(&format!(
+            "ply\nformat ascii 1.0\ncomment TextureFile {file}\nelement vertex 3\n{PLACES}property float s\n\
+             property float t\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
+             0 0 2 0 0\n3 0 2 1 0\n3 4 2 1 1\n3 0 1 2\n"
+        ))
+    };
+    let (scene, said) = with("a b.png");
+    assert_eq!(said.len(), 0);
+    let MaterialKind::Diffuse { reflectance } = &scene.materials[0].material.kind else { panic!() };
+    assert!(matches!(**reflectance, Texture::Image(_)));
+    let (_, said) = with("gone.png");
+    assert!(said.len() == 1 && said[0].contains("cannot use the texture of a PLY file"), "{said:?}");
 }

@@ -518,8 +518,9 @@ pub(crate) fn emission(desc: AreaLightDesc, area: impl FnOnce() -> f64) -> Emiss
     let AreaLightDesc { radiance, image, by_vertices, two_sided, power } = desc;
     let mut emission = Emission { radiance, image, by_vertices, two_sided };
     if let Some(power) = power {
-        let per_radiance =
-            std::f64::consts::PI * area() * f64::from(emission.sides() * emission.mean().luminance());
+        // L stays a factor, as in pbrt-v4: the power is that of a radiance of 1, or of the image.
+        let of_image = Emission { radiance: lumbre_image::Rgb::WHITE, ..emission.clone() }.mean().luminance();
+        let per_radiance = std::f64::consts::PI * area() * f64::from(emission.sides() * of_image);
         let factor = f64::from(power) / per_radiance;
         emission.radiance =
             if factor.is_finite() { radiance * factor as f32 } else { lumbre_image::Rgb::BLACK };

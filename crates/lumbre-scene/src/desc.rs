@@ -236,7 +236,7 @@ pub struct AreaLightDesc {
     pub by_vertices: bool,
     /// Whether the back emits, too.
     pub two_sided: bool,
-    /// Total power in lumens; if given, `radiance` is only the colour (luminance 1).
+    /// Total power in lumens that a `radiance` of 1 stands for, as in pbrt-v4; if given, `radiance` is a factor on it.
     pub power: Option<f32>,
 }
 
@@ -330,6 +330,8 @@ pub struct FilmDesc {
     pub exposure: f32,
     /// The largest component of one sample; infinite by default.
     pub max_component: f32,
+    /// Whether files of light keep single precision; half precision by default.
+    pub single_precision: bool,
 }
 
 impl Default for FilmDesc {
@@ -342,6 +344,7 @@ impl Default for FilmDesc {
             crop_window: None,
             exposure: 1.0,
             max_component: f32::INFINITY,
+            single_precision: false,
         }
     }
 }

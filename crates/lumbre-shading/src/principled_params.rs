@@ -18,6 +18,9 @@ pub enum Convention {
     /// glTF 2.0: anisotropy widens α along the tangent from roughness² up to 1; transmission is multiplied by
     /// the base colour at each crossing of the surface.
     Gltf,
+    /// glTF's older specular-glossiness model (KHR_materials_pbrSpecularGlossiness): as glTF, and the base colour is
+    /// multiplied by 1 − the greatest channel of the specular colour.
+    SpecularGlossiness,
     /// Burley, "Physically Based Shading at Disney", SIGGRAPH course 2012, and its extension of 2015, as in
     /// Mitsuba 3's `principled`: anisotropy a makes α = roughness² / s and roughness² · s with s = √(1 − 0.9
     /// a); transmission into a solid is multiplied by the square root of the base colour, so that two crossings
@@ -148,8 +151,8 @@ impl Default for PrincipledParams {
 
 impl PrincipledParams {
     /// From glTF's older specular-glossiness model (KHR_materials_pbrSpecularGlossiness): a dielectric with
-    /// this diffuse colour, reflectance `specular` at normal incidence and roughness 1 − `glossiness`. Metals
-    /// need no detection: they have little diffuse colour.
+    /// this diffuse colour, reflectance `specular` at normal incidence and roughness 1 − `glossiness`. The
+    /// diffuse colour is multiplied by 1 − the greatest channel of `specular`, so that metals need no detection.
     pub fn from_specular_glossiness(
         diffuse: Arc<SpectrumTexture>,
         specular: Arc<SpectrumTexture>,
@@ -162,6 +165,7 @@ impl PrincipledParams {
             roughness: Arc::new(Texture::Mix { textures: ends, amount: glossiness }),
             ior: 0.0,
             specular_color: specular,
+            convention: Convention::SpecularGlossiness,
             ..Self::default()
         }
     }
@@ -259,6 +263,10 @@ impl PrincipledParams {
         let f90 = share(&self.specular);
         let tint = hue(base, share(&self.specular_tint));
         let specular_color = self.specular_color.evaluate(at).map(|c| c.max(0.0)) * tint;
+        let base = match self.convention {
+            Convention::SpecularGlossiness => base * (1.0 - crate::unit(specular_color.max_component())),
+            Convention::Gltf | Convention::Burley => base,
+        };
         let (eta, bare) = if self.ior > 0.0 && self.ior.is_finite() {
             (self.ior, fresnel::dielectric(1.0, self.ior))
         } else if transmission > 0.0 {
@@ -325,7 +333,7 @@ impl PrincipledParams {
         }
         let tangent = tangent.normalize_or(Vec2::X);
         let facets = match self.convention {
-            Convention::Gltf => Microfacets::new(alpha + (1.0 - alpha) * strength * strength, alpha),
+            Convention::Gltf | Convention::SpecularGlossiness => Microfacets::new(alpha + (1.0 - alpha) * strength * strength, alpha),
             Convention::Burley => {
                 let aspect = (1.0 - 0.9 * strength).sqrt();
                 Microfacets::new((alpha / aspect).min(1.0), alpha * aspect)

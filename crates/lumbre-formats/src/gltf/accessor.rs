@@ -187,6 +187,7 @@ fn strided<'a>(
     }
 }
 
+/// An error that [`Accessor::needs_data`] forestalls.
 fn without_data(value: Value<'_>) -> FormatError {
     value.wrong("the buffer of what is needed here has no data").into()
 }
@@ -338,6 +339,7 @@ impl<'a> Accessor<'a> {
 
     /// The first `n` numbers of every element, one element after another.
     pub(super) fn flat_floats(&self, file: &File<'_>, n: usize) -> Read<Vec<f32>> {
+        self.needs_data(file)?;
         file.budget.elements(self.count as u64, ELEMENTS)?;
         let count = self.count.saturating_mul(n);
         let mut numbers = file.budget.vec(count as u64, ELEMENTS)?;
@@ -379,9 +381,20 @@ impl<'a> Accessor<'a> {
         Ok(elements)
     }
 
+    /// Checks that its buffers have data.
+    fn needs_data(&self, file: &File<'_>) -> Read<()> {
+        let is_absent = self.data.is_some_and(|data| data.bytes.is_none());
+        let is_sparsely = |sparse: Sparse<'_>| sparse.indices.is_none() || sparse.values.is_none();
+        if is_absent || self.sparse.is_some_and(is_sparsely) {
+            return Err(file.without_data(self.value));
+        }
+        Ok(())
+    }
+
     /// As many elements as it has, charged to the budget.
     fn zeros<T: Copy + Default, const N: usize>(&self, file: &File<'_>) -> Read<Vec<[T; N]>> {
         debug_assert!(N <= self.element.numbers());
+        self.needs_data(file)?;
         file.budget.elements(self.count as u64, ELEMENTS)?;
         let mut elements = file.budget.vec(self.count as u64, ELEMENTS)?;
         elements.resize(self.count, [T::default(); N]);

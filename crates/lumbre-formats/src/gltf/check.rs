@@ -16,39 +16,47 @@ use super::scene;
 use super::texture::Textures;
 use crate::diagnostic::quoted;
 
-/// Checks also what the scene may leave unused, so that a file is valid or invalid as a whole.
+/// Checks also what the scene may leave unused. What is wrong there is a warning: what is needed is read again,
+/// and what is wrong then is an error.
 pub(super) fn check(file: &File<'_>, graph: &Graph<'_>) -> Read<()> {
     for (index, &view) in file.list(List::BufferViews).iter().enumerate() {
-        file.view_at(index, view)?;
+        file.unless_used(file.view_at(index, view).map(drop))?;
     }
     for (index, &value) in file.list(List::Accessors).iter().enumerate() {
-        if accessor::is_known(value)? {
-            Accessor::at(file, index)?;
-        } else {
-            file.warn(value, "accessor of an unknown kind was left out");
-        }
+        file.unless_used(match accessor::is_known(value) {
+            Ok(true) => Accessor::at(file, index).map(drop),
+            Ok(false) => {
+                file.warn(value, "accessor of an unknown kind was left out");
+                Ok(())
+            }
+            Err(wrong) => Err(wrong),
+        })?;
     }
     for &image in file.list(List::Images) {
-        Textures::check_image(file, image)?;
+        file.unless_used(Textures::check_image(file, image))?;
     }
     for &texture in file.list(List::Textures) {
-        Textures::check(file, texture)?;
+        file.unless_used(Textures::check(file, texture))?;
     }
     let mut used_as: HashMap<usize, bool> = HashMap::new();
     let mut materials = vec![];
     for &material in file.list(List::Materials) {
         // The number of uv sets that its textures need.
-        let read = GltfMaterial::read(file, material)?;
-        materials.push(read.textures().map(|t| t.uv_set + 1).max().unwrap_or(0));
+        let mut wanted = 0;
+        let read = GltfMaterial::read(file, material).map(|read| {
+            wanted = read.textures().map(|t| t.uv_set + 1).max().unwrap_or(0);
+        });
+        file.unless_used(read)?;
+        materials.push(wanted);
     }
     for &mesh in file.list(List::Meshes) {
-        check_mesh(file, mesh, &materials, &mut used_as)?;
+        file.unless_used(check_mesh(file, mesh, &materials, &mut used_as))?;
     }
     for &camera in file.list(List::Cameras) {
-        scene::camera(camera, camera, &DAffine3::IDENTITY)?;
+        file.unless_used(scene::camera(camera, camera, &DAffine3::IDENTITY).map(drop))?;
     }
     for &light in file.list(List::Lights) {
-        scene::light(file, light, &DAffine3::IDENTITY)?;
+        file.unless_used(scene::light(file, light, &DAffine3::IDENTITY).map(drop))?;
     }
     for &profile in file.list(List::Profiles) {
         Profiles::check(file, profile)?;

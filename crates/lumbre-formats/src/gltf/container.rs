@@ -60,7 +60,8 @@ pub(super) fn read<'a>(bytes: &'a [u8], name: &Arc<str>, diagnostics: &mut Diagn
         };
         let size = size as usize;
         if !size.is_multiple_of(4) {
-            return Err(wrong(at, "GLB chunk out of step").found(size).expected("a multiple of 4").into());
+            let warning = Diagnostic::warning("GLB chunk of a length that is no multiple of 4").at(place(at));
+            diagnostics.push(warning.found(size));
         }
         let Some(data) = bytes.get(at + 8..).and_then(|rest| rest.get(..size)) else {
             let left = length - at - 8;
@@ -81,8 +82,8 @@ pub(super) fn read<'a>(bytes: &'a [u8], name: &Arc<str>, diagnostics: &mut Diagn
         } else if *kind == JSON || (*kind == BINARY && binary.is_some()) {
             return Err(wrong(at + 4, "second GLB chunk of one kind").found(quoted_bytes(kind)).into());
         } else if *kind == BINARY {
-            let follows_json =
-                json.is_some_and(|(data, start): (&[u8], u64)| start + data.len() as u64 == at as u64);
+            let end = |(data, start): (&[u8], u64)| start + data.len() as u64;
+            let follows_json = json.is_some_and(|json| at as u64 - end(json) < 4);
             if !follows_json {
                 return Err(wrong(at + 4, "GLB binary chunk out of place")
                     .expected("it right after the JSON")
@@ -93,7 +94,16 @@ pub(super) fn read<'a>(bytes: &'a [u8], name: &Arc<str>, diagnostics: &mut Diagn
             let warning = Diagnostic::warning("unknown GLB chunk was left out").at(place(at + 4));
             diagnostics.push(warning.found(quoted_bytes(kind)));
         }
-        at += 8 + size;
+        // A length that was not rounded up may leave out the padding, or only its bytes.
+        let end = at + 8 + size;
+        let padded = end.next_multiple_of(4);
+        let begins_chunk =
+            |at: usize| matches!(bytes.get(at + 4..at + 8), Some(kind) if *kind == BINARY || *kind == JSON);
+        at = if end != padded && !begins_chunk(end) && (begins_chunk(padded) || length <= padded) {
+            padded
+        } else {
+            end
+        };
     }
     let Some((json, json_start)) = json else {
         return Err(wrong(12, "GLB file without JSON").into());

@@ -1,15 +1,15 @@
 //! A glTF file with its lists and buffers.
 
 use std::borrow::Cow;
-use std::cell::RefCell;
-use std::collections::HashMap;
+use std::cell::{Cell, RefCell};
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 use std::sync::Arc;
 
 use super::json::{Read, Value};
 use super::uri::{DataUri, Target, base64_decoded, percent_decoded_bytes, target};
 use crate::budget::{Budget, BudgetVec};
-use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, Severity, quoted};
+use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, Severity, Strictness, quoted};
 use crate::input::Input;
 
 /// The top-level lists, and those of extensions.
@@ -95,6 +95,12 @@ pub(super) struct File<'a> {
     filled: HashMap<usize, Vec<u8>>,
     /// The total size of all buffers.
     buffer_bytes: u64,
+    /// Whether a buffer was not loaded because of its URI; true for one on a network.
+    is_elsewhere: Cell<Option<bool>>,
+    /// The extensions that the file declares to use.
+    used: HashSet<String>,
+    /// The violations that a warning was given of: parts are read several times.
+    said: RefCell<HashSet<(Option<Place>, String)>>,
 }
 
 /// The bytes of a buffer view.
@@ -130,6 +136,9 @@ impl<'a> File<'a> {
             unpacked: vec![],
             filled: HashMap::new(),
             buffer_bytes: 0,
+            is_elsewhere: Cell::new(None),
+            used: HashSet::new(),
+            said: RefCell::default(),
         }
     }
 
@@ -139,6 +148,11 @@ impl<'a> File<'a> {
     }
 
     fn find_lists(&mut self) -> Read<()> {
+        if let Some(list) = self.root.get("extensionsUsed")? {
+            for name in list.array()? {
+                self.used.insert(name.string()?.into_owned());
+            }
+        }
         for list in List::ALL {
             let (extension, key, _) = list.names();
             let holder = match extension {
@@ -185,19 +199,8 @@ impl<'a> File<'a> {
     }
 
     /// Whether the file declares that it uses an extension.
-    pub(super) fn uses(&self, extension: &str) -> Read<bool> {
-        let Some(list) = self.root.get("extensionsUsed")? else { return Ok(false) };
-        for name in list.array()? {
-            if name.string()? == extension {
-                return Ok(true);
-            }
-        }
-        Ok(false)
-    }
-
-    /// Whether unusable parts are dropped with a warning.
-    pub(super) fn is_lenient(&self) -> bool {
-        self.diagnostics.borrow().is_lenient()
+    pub(super) fn uses(&self, extension: &str) -> bool {
+        self.used.contains(extension)
     }
 
     /// Adds a warning of this kind.
@@ -215,13 +218,29 @@ impl<'a> File<'a> {
         f(&mut self.diagnostics.borrow_mut())
     }
 
-    /// A violation of glTF whose meaning is still clear: an error, or a warning when lenient.
+    /// A violation of glTF whose meaning is still clear, which other programs show: a warning, once for each
+    /// place, or an error when strict.
     pub(super) fn breach(&self, wrong: Diagnostic) -> Read<()> {
-        if !self.is_lenient() {
+        /// So many are told apart; the collector keeps fewer.
+        const MOST: usize = 1 << 12;
+        if self.diagnostics.borrow().strictness() == Strictness::Strict {
             return Err(wrong.into());
+        }
+        let mut said = self.said.borrow_mut();
+        if said.len() < MOST && !said.insert((wrong.place.clone(), wrong.message.clone())) {
+            return Ok(());
         }
         self.push(Diagnostic { severity: Severity::Warning, ..wrong });
         Ok(())
+    }
+
+    /// What is wrong with a part that may be unused: a warning. Where it is needed after all, reading it again
+    /// is an error.
+    pub(super) fn unless_used(&self, read: Read<()>) -> Read<()> {
+        match read {
+            Err(FormatError::Input(wrong)) => self.breach(*wrong),
+            other => other,
+        }
     }
 
     /// Finds the lists and loads every buffer. `binary` is the GLB's own buffer.
@@ -254,7 +273,10 @@ impl<'a> File<'a> {
     ) -> Read<Option<Cow<'a, [u8]>>> {
         let length = value.need("byteLength")?;
         let length_value = length;
-        let length = length.whole(1)?;
+        let length = length.whole(0)?;
+        if length == 0 {
+            self.breach(length_value.wrong("buffer without bytes"))?;
+        }
         let bytes: Cow<'a, [u8]> = match value.get("uri")? {
             None if index == 0 && binary.is_some() => Cow::Borrowed(binary.unwrap_or_default()),
             None => {
@@ -266,10 +288,11 @@ impl<'a> File<'a> {
                 return Ok(None);
             }
             Some(uri) => {
-                if let Target::Scheme(scheme) = target(&uri.string()?) {
-                    let warning =
-                        Diagnostic::warning("buffer at another place was not loaded").at(uri.place());
-                    self.push(warning.found(quoted(scheme)).expected("the name of a file, or data"));
+                let text = uri.string()?;
+                if let Target::Scheme(scheme) = target(&text) {
+                    let warning = Diagnostic::warning(elsewhere("buffer", scheme)).at(uri.place());
+                    self.push(warning.found(quoted(&text)).expected("the name of a file, or data"));
+                    self.is_elsewhere.set(Some(is_network(scheme)));
                     return Ok(None);
                 }
                 Cow::Owned(self.data(uri, &["application/octet-stream", "application/gltf-buffer"])?.1)
@@ -340,7 +363,7 @@ impl<'a> File<'a> {
             }
             Target::Malformed => Err(uri.unexpected("wrong data URI", "data:MEDIA/TYPE;base64,DATA")),
             Target::Scheme(scheme) => {
-                let wrong = uri.wrong("unsupported scheme of a URI").found(quoted(scheme));
+                let wrong = uri.wrong(elsewhere("file", scheme)).found(quoted(&text));
                 Err(wrong.expected("the name of a file, or data").into())
             }
         }
@@ -357,8 +380,11 @@ impl<'a> File<'a> {
         let offset_value = value.get("byteOffset")?;
         let offset = offset_value.map_or(Ok(0), |v| v.whole(0))?;
         let length_value = value.need("byteLength")?;
-        let length = length_value.whole(1)?;
-        let size = buffer.need("byteLength")?.whole(1)?;
+        let length = length_value.whole(0)?;
+        if length == 0 {
+            self.breach(length_value.wrong("buffer view without bytes"))?;
+        }
+        let size = buffer.need("byteLength")?.whole(0)?;
         let fits = offset.checked_add(length).is_some_and(|end| end <= size);
         if !fits {
             let culprit = if offset < size { length_value } else { offset_value.unwrap_or(length_value) };
@@ -421,8 +447,31 @@ impl<'a> File<'a> {
         Ok(View { bytes, length, stride, offset })
     }
 
+    /// An error: a buffer is needed that has no data.
+    pub(super) fn without_data(&self, value: Value<'_>) -> FormatError {
+        let message = match self.is_elsewhere.get() {
+            Some(true) => "the data of what is needed here are on a network, from which nothing is fetched",
+            Some(false) | None => "the buffer of what is needed here has no data",
+        };
+        value.wrong(message).into()
+    }
+
     /// A place for messages about the whole file.
     pub(super) fn whole(&self) -> Place {
         Place::whole(self.name.clone())
+    }
+}
+
+/// Whether a scheme is that of a server.
+fn is_network(scheme: &str) -> bool {
+    ["http", "https", "ftp"].iter().any(|known| scheme.eq_ignore_ascii_case(known))
+}
+
+/// Why something behind a URI is not loaded.
+fn elsewhere(what: &str, scheme: &str) -> String {
+    if is_network(scheme) {
+        format!("{what} on a network: nothing is fetched from there")
+    } else {
+        format!("{what} behind a URI of a scheme that is not supported")
     }
 }

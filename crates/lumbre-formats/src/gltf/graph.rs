@@ -142,23 +142,26 @@ impl<'a> Graph<'a> {
         Ok(world)
     }
 
-    /// Visits all nodes below `roots`, parents first, with their world transforms.
+    /// Visits all nodes below `roots`, parents first, with their world transforms, and whether they and all
+    /// above them are visible (`KHR_node_visibility`).
     pub(super) fn walk(
         &self,
         roots: &[usize],
-        mut visit: impl FnMut(usize, &DAffine3) -> Read<()>,
+        mut visit: impl FnMut(usize, &DAffine3, bool) -> Read<()>,
     ) -> Read<()> {
-        let mut waiting: Vec<(usize, DAffine3)> = vec![];
+        let mut waiting: Vec<(usize, DAffine3, bool)> = vec![];
         for &root in roots {
-            waiting.push((root, DAffine3::IDENTITY));
-            while let Some((node, parent)) = waiting.pop() {
+            waiting.push((root, DAffine3::IDENTITY, true));
+            while let Some((node, parent, is_visible)) = waiting.pop() {
                 let world = parent * self.local(node)?;
-                visit(node, &world)?;
                 let value = self.file.list(List::Nodes)[node];
+                let own = value.extension("KHR_node_visibility")?;
+                let is_visible = is_visible && own.map_or(Ok(true), |own| own.bool_or("visible", true))?;
+                visit(node, &world, is_visible)?;
                 if let Some(children) = value.get("children")? {
                     let first = waiting.len();
                     for child in children.array()? {
-                        waiting.push((self.file.at(List::Nodes, child)?.0, world));
+                        waiting.push((self.file.at(List::Nodes, child)?.0, world, is_visible));
                     }
                     // The first child comes next.
                     waiting[first..].reverse();

@@ -3,10 +3,10 @@
 
 use std::borrow::Cow;
 use std::fmt::Write as _;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use crate::budget::{Budget, BudgetVec};
-use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, quoted, quoted_bytes};
+use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, TextPlaces, quoted, quoted_bytes};
 
 pub(super) type Read<T> = Result<T, FormatError>;
 
@@ -26,6 +26,15 @@ pub(super) struct Json<'t> {
     entries: Vec<Entry>,
     /// The offset of the text in its file, if it is not the whole file.
     within: Option<u64>,
+    places: TextPlaces,
+    holders: OnceLock<Vec<Holder>>,
+}
+
+/// What holds a value: the entry of its container, and its number there, or its key's entry.
+#[derive(Clone, Copy, Debug, Default)]
+struct Holder {
+    container: u32,
+    number: u32,
 }
 
 /// A nested value, with its name in an object.
@@ -46,12 +55,40 @@ impl<'t> Json<'t> {
             return Err(parser.wrong("JSON text too long").expected("less than 4 GiB").into());
         }
         let entries = parser.document()?;
-        Ok(Self { name: name.clone(), text, entries, within })
+        Ok(Self {
+            name: name.clone(),
+            text,
+            entries,
+            within,
+            places: TextPlaces::default(),
+            holders: OnceLock::new(),
+        })
     }
 
     /// The root value.
     pub(super) fn root(&self) -> Value<'_> {
         Value { json: self, at: 0 }
+    }
+
+    /// What holds each value and each key, found once, when the first pointer is needed.
+    fn holders(&self) -> &[Holder] {
+        self.holders.get_or_init(|| {
+            let mut holders = vec![Holder::default(); self.entries.len()];
+            for container in 0..self.entries.len() as u32 {
+                let here = Value { json: self, at: container };
+                match here.first_byte() {
+                    b'{' => here.pairs().for_each(|(key, value)| {
+                        let holder = Holder { container, number: key.at };
+                        (holders[key.at as usize], holders[value.at as usize]) = (holder, holder);
+                    }),
+                    b'[' => (0..).zip(here.values()).for_each(|(number, value)| {
+                        holders[value.at as usize] = Holder { container, number };
+                    }),
+                    _ => {}
+                }
+            }
+            holders
+        })
     }
 }
 
@@ -368,37 +405,24 @@ impl<'a> Value<'a> {
         if raw.contains('\\') { Cow::Owned(unescape(raw)) } else { Cow::Borrowed(raw) }
     }
 
-    /// The JSON pointer; walks down from the root, for errors.
+    /// The JSON pointer.
     pub(super) fn pointer(self) -> String {
+        let holders = self.json.holders();
+        let mut path = vec![];
+        let mut here = self.at;
+        while here != 0 {
+            let holder = holders[here as usize];
+            path.push(holder);
+            here = holder.container;
+        }
         let mut pointer = String::new();
-        let mut here = self.json.root();
-        'down: while here.at != self.at {
-            match here.first_byte() {
-                b'{' => {
-                    for (key, value) in here.pairs() {
-                        if self.at < value.next() {
-                            let _ =
-                                write!(pointer, "/{}", key.unescaped().replace('~', "~0").replace('/', "~1"));
-                            if self.at == key.at {
-                                break 'down;
-                            }
-                            here = value;
-                            continue 'down;
-                        }
-                    }
-                }
-                b'[' => {
-                    for (i, value) in here.values().enumerate() {
-                        if self.at < value.next() {
-                            let _ = write!(pointer, "/{i}");
-                            here = value;
-                            continue 'down;
-                        }
-                    }
-                }
-                _ => {}
+        for Holder { container, number } in path.into_iter().rev() {
+            if self.entry(container).first_byte() == b'{' {
+                let key = self.entry(number).unescaped();
+                let _ = write!(pointer, "/{}", key.replace('~', "~0").replace('/', "~1"));
+            } else {
+                let _ = write!(pointer, "/{number}");
             }
-            break;
         }
         pointer
     }
@@ -408,7 +432,9 @@ impl<'a> Value<'a> {
         let json = self.json;
         match json.within {
             Some(start) => Place::binary(json.name.clone(), start + self.start() as u64, self.pointer()),
-            None => Place::of_offset(json.name.clone(), json.text.as_bytes(), self.start())
+            None => json
+                .places
+                .place(json.name.clone(), json.text.as_bytes(), self.start())
                 .with_path(self.pointer()),
         }
     }

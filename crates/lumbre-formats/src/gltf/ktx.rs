@@ -6,10 +6,11 @@ use basisu::{DecodeFlags, TargetFormat, Transcoder};
 use lumbre_image::{Bitmap, Channels, Encoding, PixelData};
 
 use super::file::File;
-use super::json::{Read, Value};
+use super::json::Read;
 use crate::FormatError;
 use crate::contained::contained;
 use crate::diagnostic::{Diagnostic, Place};
+use crate::image::check_expansion;
 
 /// The first bytes of a KTX 2.0 file.
 pub(super) const MAGIC: &[u8] = b"\xABKTX 20\xBB\r\n\x1A\n";
@@ -24,14 +25,15 @@ struct Header {
     width: u32,
     height: u32,
     scheme: u32,
+    /// The offset of the first level.
+    offset: u64,
     /// The length of the first level, compressed and uncompressed.
     packed: u64,
     unpacked: u64,
 }
 
-/// The first level of a texture. `value` is the image in the glTF, and `name` the prefix of messages about its
-/// bytes.
-pub(super) fn read(file: &File<'_>, value: Value<'_>, bytes: &[u8], name: &Arc<str>) -> Read<Bitmap> {
+/// The first level of a texture; `name` is the prefix of messages about its bytes.
+pub(super) fn read(file: &File<'_>, bytes: &[u8], name: &Arc<str>) -> Read<Bitmap> {
     let header = header(bytes, name)?;
     let blocks = u64::from(header.width.div_ceil(4)) * u64::from(header.height.div_ceil(4));
     let pixels = 4 * 16 * blocks;
@@ -40,10 +42,21 @@ pub(super) fn read(file: &File<'_>, value: Value<'_>, bytes: &[u8], name: &Arc<s
         let wrong = wrong(name, 96, "first level of another size than its blocks").found(header.unpacked);
         return Err(wrong.expected(16 * blocks).into());
     }
-    super::check_expansion(file, value, header.packed, pixels)?;
+    let place = Place::whole(name.clone());
+    check_expansion(bytes, pixels, &place, file.budget)?;
+    if header.scheme == ZSTANDARD {
+        let level = &bytes[header.offset as usize..][..header.packed as usize];
+        let most = zstandard_size(level);
+        if most.is_none_or(|[least, _]| least > header.unpacked) {
+            let found =
+                most.map_or("no frame of Zstandard".to_owned(), |[least, _]| format!("{least} bytes"));
+            let wrong = wrong(name, header.offset, "first level of another size than it says").found(found);
+            return Err(wrong.expected(header.unpacked).into());
+        }
+        check_expansion(bytes, most.map_or(0, |[_, most]| most), &place, file.budget)?;
+    }
     file.budget.bytes(pixels, "texture")?;
     let hold = file.budget.hold(pixels, "texture")?;
-    let place = Place::whole(name.clone());
     let (data, has_alpha) = contained("KTX 2.0 texture", &place, || {
         let failed = |error: basisu::Error| {
             let wrong = Diagnostic::error("KTX 2.0 texture that cannot be read").at(place.clone());
@@ -95,5 +108,37 @@ fn header(bytes: &[u8], name: &Arc<str>) -> Read<Header> {
         let wrong = wrong(name, 80, "first level past the end of its texture");
         return Err(wrong.found(format!("{packed} bytes from byte {offset}")).into());
     }
-    Ok(Header { width, height, scheme: word(44), packed, unpacked })
+    Ok(Header { width, height, scheme: word(44), offset, packed, unpacked })
+}
+
+/// The least and the greatest number of bytes that data in Zstandard (RFC 8878) can unpack to, by the headers of
+/// their blocks; `None` where there is no frame.
+fn zstandard_size(data: &[u8]) -> Option<[u64; 2]> {
+    const BLOCK: u64 = 128 << 10;
+    let descriptor = *data.strip_prefix(b"\x28\xB5\x2F\xFD")?.first()?;
+    let is_single = descriptor & 0x20 != 0;
+    let content = [usize::from(is_single), 2, 4, 8][usize::from(descriptor >> 6)];
+    let dictionary = [0, 1, 2, 4][usize::from(descriptor & 3)];
+    let mut at = 5 + usize::from(!is_single) + dictionary;
+    let mut declared = [0; 8];
+    declared[..content].copy_from_slice(data.get(at..at + content)?);
+    let declared = u64::from_le_bytes(declared) + if content == 2 { 256 } else { 0 };
+    at += content;
+    let [mut least, mut most] = [0u64; 2];
+    while let Some(&[a, b, c]) = data.get(at..).and_then(<[u8]>::first_chunk) {
+        let header = u32::from_le_bytes([a, b, c, 0]);
+        let size = u64::from(header >> 3);
+        let (taken, sizes) = match header >> 1 & 3 {
+            0 => (size, [size, size]),
+            1 => (1, [size, size]),
+            _ => (size, [0, BLOCK]),
+        };
+        least += sizes[0];
+        most += sizes[1];
+        at = at.saturating_add(3 + taken as usize);
+        if header & 1 != 0 {
+            break;
+        }
+    }
+    Some([least.max(declared), most.max(declared)])
 }

@@ -178,7 +178,7 @@ fn check_layout(
 
 impl<'a> Attributes<'a> {
     fn read(file: &'a File<'_>, value: Value<'a>, is_target: bool) -> Read<Self> {
-        let quantized = file.uses("KHR_mesh_quantization")?;
+        let quantized = file.uses("KHR_mesh_quantization");
         let mut attributes = Self::default();
         let mut count: Option<(usize, String)> = None;
         // Views shared by several attributes must specify a stride.

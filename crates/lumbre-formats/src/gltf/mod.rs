@@ -30,6 +30,8 @@ mod tangents;
 mod texture;
 mod uri;
 
+use std::borrow::Cow;
+use std::collections::HashSet;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -84,6 +86,7 @@ const SUPPORTED: &[&str] = &[
     "KHR_materials_volume_scatter",
     "KHR_mesh_quantization",
     "KHR_meshopt_compression",
+    "KHR_node_visibility",
     #[cfg(feature = "basisu")]
     "KHR_texture_basisu",
     "KHR_texture_transform",
@@ -214,7 +217,7 @@ fn version(root: Value<'_>) -> Read<()> {
 
 /// Rejects unknown required extensions, and warns of other unknown ones.
 fn extensions(file: &File<'_>, root: Value<'_>) -> Read<()> {
-    let mut required = vec![];
+    let mut required: Vec<(Value<'_>, Cow<'_, str>)> = vec![];
     if let Some(list) = root.get("extensionsRequired")? {
         for value in list.array()? {
             let extension = value.string()?;
@@ -231,7 +234,7 @@ fn extensions(file: &File<'_>, root: Value<'_>) -> Read<()> {
             required.push((value, extension));
         }
     }
-    let mut used = vec![];
+    let mut used = HashSet::new();
     if let Some(list) = root.get("extensionsUsed")? {
         for value in list.array()? {
             let extension = value.string()?;
@@ -240,7 +243,7 @@ fn extensions(file: &File<'_>, root: Value<'_>) -> Read<()> {
                     Diagnostic::warning("extension that is not supported was left out").at(value.place());
                 file.push(warning.found(quoted(&extension)));
             }
-            used.push(extension);
+            used.insert(extension);
         }
     }
     if let Some((value, extension)) = required.iter().find(|(_, extension)| !used.contains(extension)) {
@@ -263,6 +266,7 @@ const PLACES: &[(&str, &[&str])] = &[
     ("KHR_draco_mesh_compression", &["/meshes/*/primitives/*"]),
     ("KHR_lights_punctual", &["", "/nodes/*"]),
     ("KHR_materials_variants", &["", "/meshes/*/primitives/*"]),
+    ("KHR_node_visibility", &["/nodes/*"]),
     ("KHR_texture_transform", &["/materials/*/…Texture"]),
     ("KHR_materials_", &["/materials/*"]),
 ];

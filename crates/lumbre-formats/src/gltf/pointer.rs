@@ -64,7 +64,14 @@ impl Changes {
     pub(super) fn set(&mut self, pointer: &str, numbers: &[f64], is_list: bool) -> bool {
         // In the precision that they were stored in, so that a factor between two of 1 is 1.
         let texts: Vec<String> = numbers.iter().map(|n| format!("{}", *n as f32)).collect();
-        let text = if is_list { format!("[{}]", texts.join(",")) } else { texts.concat() };
+        let is_switch = pointer.ends_with("/KHR_node_visibility/visible");
+        let text = if is_switch {
+            numbers.first().is_some_and(|&n| n != 0.0).to_string()
+        } else if is_list {
+            format!("[{}]", texts.join(","))
+        } else {
+            texts.concat()
+        };
         let mut here = &mut self.top;
         for step in pointer.split('/').skip(1) {
             if here.text.is_some() {

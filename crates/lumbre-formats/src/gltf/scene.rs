@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::sync::Arc;
 
-use lumbre_geometry::{Cylinder, Shape, Sphere};
+use lumbre_geometry::Shape;
 use lumbre_image::Rgb;
 use lumbre_math::{AnimatedTransform, DAffine3, DMat3, DMat4, DQuat, DVec3, Transform, Vec2, Vec3};
 use lumbre_scene::{
@@ -25,12 +25,7 @@ use super::shade::{Dressing, Materials};
 use super::texture::UvSets;
 use super::{GltfOptions, animation, tangents};
 use crate::diagnostic::{Diagnostic, quoted};
-
-/// The radius of points and of lines, relative to the diagonal of the model's bounding box; and the maximal
-/// radius, relative to the diagonal over the square root of their number, so that clouds stay clouds.
-const POINT_RADIUS: f64 = 0.004;
-const LINE_RADIUS: f64 = 0.002;
-const MOST_RADIUS_OF_MANY: f64 = 0.5;
+use crate::thin;
 
 /// The maximal path length: every piece of glass takes two bounces.
 const MAX_DEPTH: u32 = 16;
@@ -58,7 +53,8 @@ pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
     scene.integrator.max_depth = MAX_DEPTH;
     let mut first_camera = None;
     let mut uses: HashMap<Key, usize> = HashMap::new();
-    graph.walk(&roots, |node, world| {
+    let mut copied = 0;
+    graph.walk(&roots, |node, world, is_visible| {
         let value = file.list(List::Nodes)[node];
         if let Some((_, camera)) = file.named(List::Cameras, value, "camera")? {
             first_camera.get_or_insert(camera);
@@ -67,6 +63,9 @@ pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
             let place = |world: &DAffine3| Transform::from_affine(rigid(world)).map(|map| map * forwards);
             camera.motion = exposure.motion(node, place)?;
             scene.cameras.push(camera);
+        }
+        if !is_visible {
+            return Ok(());
         }
         if let Some(extension) = value.extension("KHR_lights_punctual")? {
             let (_, light) = file.at(List::Lights, extension.need("light")?)?;
@@ -85,7 +84,13 @@ pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
         let owner = (skin.is_some() || exposure.deforms(node, skin)?).then_some(node);
         let key = Key { mesh, weights: weights.iter().map(|w| w.to_bits()).collect(), owner };
         let copies = match value.extension("EXT_mesh_gpu_instancing")? {
-            Some(extension) => instances(file, extension)?,
+            Some(extension) => {
+                let copies = instances(file, extension)?;
+                // Few bytes that many nodes share make as many copies as their product.
+                copied += (copies.len() * size_of::<InstanceDesc>()) as u64;
+                super::check_expansion(file, extension, file.buffer_bytes(), copied)?;
+                copies
+            }
             None => vec![DAffine3::IDENTITY],
         };
         // A skin determines where its vertices are.
@@ -414,7 +419,7 @@ impl Builder<'_> {
             let has_tangents =
                 primitive.attributes.tangent.is_some() && primitive.attributes.normal.is_some();
             let by = dressing.tangents.filter(|_| !has_tangents);
-            let wants = |set| sets.is_some_and(|sets| sets.find(set).is_some()) || by == Some(set);
+            let wants = |set| sets.is_some_and(|sets| sets.holds(set)) || by == Some(set);
             let mut vertices = mesh::vertices(file, &primitive, pose, wants)?;
             if primitive.mode.is_surface() {
                 for pose in &poses {
@@ -509,9 +514,10 @@ fn mesh_of(mut vertices: Vertices, triangles: Vec<[u32; 3]>, dressing: &Dressing
         return None;
     }
     let count = vertices.positions.len();
-    let UvSets { first, further, baked } = dressing.sets.unwrap_or_default();
+    let UvSets { first, further, baked, is_first_lost } = dressing.sets.unwrap_or_default();
     let mut coordinates = |set: usize| -> Vec<Vec2> {
-        let list = vertices.uvs.get_mut(set).and_then(Option::take);
+        let list = vertices.uvs.get_mut(set);
+        let list = list.and_then(|list| if is_first_lost { list.clone() } else { list.take() });
         let mut list = list.unwrap_or_else(|| vec![Vec2::ZERO; count]);
         list.iter_mut().for_each(|uv| *uv = Vec2::new(uv.x, 1.0 - uv.y));
         list
@@ -553,32 +559,15 @@ fn mesh_of(mut vertices: Vertices, triangles: Vec<[u32; 3]>, dressing: &Dressing
     })
 }
 
-/// Points as spheres; lines as capped cylinders, with spheres where one continues as the next; each with its
-/// two vertices. `size` is that of the whole model, or 0 to use the primitive's own.
+/// Points and lines as solids, each with its two vertices. `size` is that of the whole model, or 0 to use the primitive's own.
 fn thin_shapes(positions: &[Vec3], assembly: &Assembly, size: f64) -> Vec<(Shape, [u32; 2])> {
     let at = |i: u32| positions[i as usize].as_dvec3();
     let is_size = |size: &f64| *size > 0.0 && size.is_finite();
     let own = || mesh::diagonal(positions.iter().copied());
     let size = Some(size).filter(is_size).or_else(|| Some(own()).filter(is_size)).unwrap_or(1.0);
-    let radius = |share: f64, count: usize| share.min(MOST_RADIUS_OF_MANY / (count as f64).sqrt()) * size;
     match assembly {
-        Assembly::Points(points) => {
-            let radius = radius(POINT_RADIUS, points.len());
-            let sphere = |&i: &u32| Some((Sphere::new(at(i), radius).ok()?.into(), [i, i]));
-            points.iter().filter_map(sphere).collect()
-        }
-        Assembly::Segments(segments) => {
-            let radius = radius(LINE_RADIUS, segments.len());
-            let mut shapes = vec![];
-            for &([a, b], goes_on) in segments {
-                // A segment of length zero is dropped.
-                shapes.extend(Cylinder::new(at(a), at(b), radius, true).ok().map(|s| (s.into(), [a, b])));
-                if goes_on {
-                    shapes.extend(Sphere::new(at(b), radius).ok().map(|s| (s.into(), [b, b])));
-                }
-            }
-            shapes
-        }
+        Assembly::Points(points) => thin::points(at, points, size).collect(),
+        Assembly::Segments(segments) => thin::segments(at, segments, size).collect(),
         Assembly::Triangles(_) => vec![],
     }
 }

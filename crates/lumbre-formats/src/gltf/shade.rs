@@ -16,6 +16,7 @@ use super::file::{File, List};
 use super::json::Read;
 use super::material::{AlphaMode, GltfMaterial, TextureRef};
 use super::texture::{Textures, UvSets, ours};
+use crate::thin::INK;
 
 /// Everything that a material contributes to a shape.
 #[derive(Clone, Debug)]
@@ -34,9 +35,6 @@ pub(super) struct Dressing {
 
 /// The index in the file, whether vertices have colours, and whether it is [`INK`].
 type MaterialKey = (Option<usize>, bool, bool);
-
-/// The colour of points and lines without material and colours: visible on white and on black.
-const INK: Rgb = Rgb::new(0.02, 0.08, 0.3);
 
 /// The materials of a file, converted on first use.
 pub(super) struct Materials<'f> {
@@ -91,8 +89,11 @@ impl<'f> Materials<'f> {
         let (light, texture) = shining(parameters);
         let of_light = texture.filter(|_| !light.is_black());
         let first = of_light.or(parameters.base_colour_texture).or(parameters.textures().next())?.uv_set;
+        let baked = of_light.map_or(Affine2::IDENTITY, ours);
+        // A map that is nearly singular, such as a scale of zero, cannot be undone.
+        let is_first_lost = baked.matrix2.determinant().abs() <= 1e-12;
         let mut others: Vec<usize> =
-            parameters.textures().map(|t| t.uv_set).filter(|&set| set != first).collect();
+            parameters.textures().map(|t| t.uv_set).filter(|&set| set != first || is_first_lost).collect();
         others.sort_unstable();
         others.dedup();
         if others.len() > FURTHER_SETS
@@ -101,11 +102,8 @@ impl<'f> Materials<'f> {
             let message = "textures on a fifth set of texture coordinates were left out";
             self.file.warn(self.file.list(List::Materials)[index], message);
         }
-        let baked = of_light.map_or(Affine2::IDENTITY, ours);
-        let is_invertible = baked.matrix2.determinant().abs() > 1e-12;
-        let baked = if is_invertible { baked } else { Affine2::IDENTITY };
         let further = std::array::from_fn(|i| others.get(i).copied());
-        Some(UvSets { first, further, baked })
+        Some(UvSets { first, further, baked, is_first_lost })
     }
 
     /// All materials that were used.

@@ -51,12 +51,20 @@ pub(super) struct UvSets {
     /// The transform applied to the first set in the mesh itself: area lights look up their image there without
     /// a mapping.
     pub baked: Affine2,
+    /// Whether the set itself is lost by that transform: then textures of materials find it among the further
+    /// ones.
+    pub is_first_lost: bool,
 }
 
 impl UvSets {
+    /// Whether the mesh holds a set of the file, mapped or not.
+    pub(super) fn holds(&self, set: usize) -> bool {
+        set == self.first || self.find(set).is_some()
+    }
+
     /// The mesh's set for a set of the file; `None` if it does not have it.
     pub(super) fn find(&self, set: usize) -> Option<UvSet> {
-        if set == self.first {
+        if set == self.first && !self.is_first_lost {
             return Some(UvSet::First);
         }
         let found = self.further.iter().position(|further| *further == Some(set))?;
@@ -188,9 +196,10 @@ impl<'f> Textures<'f> {
         let value = file.list(List::Images)[index];
         let image = match decoded(file, value) {
             Ok(image) => Some(Arc::new(image)),
-            Err(error) if file.is_lenient() && matches!(error, crate::FormatError::Input(_)) => {
+            // As other programs do, the rest is shown without it.
+            Err(error @ crate::FormatError::Input(_)) => {
                 let warning = Diagnostic::warning("image that cannot be read was left out").at(value.place());
-                file.push(warning.found(quoted(&error.to_string())));
+                file.push(warning.found(error));
                 None
             }
             Err(error) => return Err(error),
@@ -205,7 +214,7 @@ fn decoded(file: &File<'_>, value: Value<'_>) -> Read<Bitmap> {
         check_media_type(file, value, bytes)?;
         #[cfg(feature = "basisu")]
         if bytes.starts_with(super::ktx::MAGIC) {
-            return super::ktx::read(file, value, bytes, name);
+            return super::ktx::read(file, bytes, name);
         }
         let image = file.with_diagnostics(|diagnostics| read_image(bytes, name, file.budget, diagnostics))?;
         Ok(image.bitmap)
@@ -218,9 +227,7 @@ fn decoded(file: &File<'_>, value: Value<'_>) -> Read<Bitmap> {
     }
     let name: Arc<str> = value.place().to_string().into();
     let (_, view) = file.view(value.need("bufferView")?)?;
-    let bytes = view.bytes.ok_or_else(|| {
-        crate::FormatError::from(value.wrong("the buffer of what is needed here has no data"))
-    })?;
+    let bytes = view.bytes.ok_or_else(|| file.without_data(value))?;
     read(bytes, &name)
 }
 

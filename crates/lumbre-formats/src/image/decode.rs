@@ -9,7 +9,7 @@ use image::codecs::{
 use image::{ColorType, ImageDecoder, ImageError, Limits};
 use lumbre_image::{Bitmap, Channels, Encoding, PixelData};
 
-use super::{ImageFile, ImageFormat};
+use super::{ImageFile, ImageFormat, check_expansion};
 use crate::budget::{Budget, LimitError, LimitKind};
 use crate::contained::contained;
 use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, quoted};
@@ -42,7 +42,7 @@ pub(super) fn read(
             // Its chunks may allocate memory before limits can be set on a decoder.
             ImageFormat::Png => decode(
                 format,
-                PngDecoder::with_limits(source, limits(budget)).map_err(fault)?,
+                PngDecoder::with_limits(source, profile_limits(bytes, budget)).map_err(fault)?,
                 bytes,
                 &place,
                 budget,
@@ -79,17 +79,19 @@ fn decode(
     let fault = |e| fault(format, place, budget, e);
     // A progressive JPEG keeps all its coefficients, two bytes each, in addition to the pixels.
     let scratch = if format == ImageFormat::Jpeg { count * 2 } else { 0 };
+    let unpacked = u64::from(colour.bytes_per_pixel()) * pixels;
+    check_expansion(bytes, unpacked, place, budget)?;
     let _scratch = budget.hold(scratch, "decoding an image")?;
     let data = match colour {
         ColorType::L8 | ColorType::La8 | ColorType::Rgb8 | ColorType::Rgba8 => {
             let mut data = vec![0u8; budget.array::<u8>(count, "image")?];
-            decoder.set_limits(limits(budget)).map_err(fault)?;
+            decoder.set_limits(limits(bytes, budget)).map_err(fault)?;
             decoder.read_image(&mut data).map_err(fault)?;
             PixelData::U8(data)
         }
         ColorType::L16 | ColorType::La16 | ColorType::Rgb16 | ColorType::Rgba16 => {
             let mut data = vec![0u16; budget.array::<u16>(count, "image")?];
-            decoder.set_limits(limits(budget)).map_err(fault)?;
+            decoder.set_limits(limits(bytes, budget)).map_err(fault)?;
             decoder.read_image(bytemuck::cast_slice_mut(&mut data)).map_err(fault)?;
             PixelData::U16(data)
         }
@@ -127,9 +129,20 @@ fn check_size(
     Err(wrong.found(format!("{width} by {height} pixels in {} bytes", bytes.len())).into())
 }
 
-fn limits(budget: &Budget) -> Limits {
+/// The limit that holds for whatever else an image of so many bytes unpacks, such as a colour profile.
+fn limits(bytes: &[u8], budget: &Budget) -> Limits {
+    let most =
+        (bytes.len() as u64).saturating_mul(budget.limits().expansion).max(crate::Limits::FREE_EXPANSION);
     let mut limits = Limits::no_limits();
-    limits.max_alloc = Some(budget.memory_left());
+    limits.max_alloc = Some(budget.memory_left().min(most));
+    limits
+}
+
+/// The limit of what stands before the pixels of an image.
+fn profile_limits(bytes: &[u8], budget: &Budget) -> Limits {
+    const FREE: u64 = 32 << 20;
+    let mut limits = Limits::no_limits();
+    limits.max_alloc = Some(budget.memory_left().min(FREE.max(16 * bytes.len() as u64)));
     limits
 }
 

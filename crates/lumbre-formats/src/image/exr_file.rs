@@ -14,7 +14,7 @@ use exr::prelude::{ReadChannels, ReadLayers, WritableImage};
 use lumbre_image::{Bitmap, Channels, ColourSpace, Encoding, Layer, Layers, PixelData, Window, f32_to_half};
 
 use super::write::{ExrCompression, ExrPrecision, WriteOptions};
-use super::{ImageFile, ImageFormat, origin};
+use super::{ImageFile, ImageFormat, check_expansion, origin};
 use crate::budget::{Budget, Hold};
 use crate::contained::contained;
 use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, quoted};
@@ -172,6 +172,7 @@ fn checked_headers<'b>(
         let found = format!("{chunks} chunks in {} bytes", bytes.len());
         return Err(refuse("damaged EXR image", found, "16 bytes or more for each"));
     }
+    check_expansion(bytes, needed, place, budget)?;
     let hold = budget.hold(needed, "decoding an EXR image")?;
     Ok((meta.headers.to_vec(), hold))
 }
@@ -238,7 +239,12 @@ pub(super) fn encode(layers: &Layers, options: &WriteOptions) -> std::io::Result
     let channels = layers
         .iter()
         .map(|layer| {
-            let full = layer.full_precision || options.exr_precision == ExrPrecision::Float;
+            // Nothing finite becomes infinite: a channel that half precision cannot hold has single precision.
+            const GREATEST_HALF: f32 = 65504.0;
+            let is_too_large = |v: &f32| v.is_finite() && v.abs() > GREATEST_HALF;
+            let full = layer.full_precision
+                || options.exr_precision == ExrPrecision::Float
+                || layer.samples.iter().any(is_too_large);
             let samples = if full {
                 FlatSamples::F32(layer.samples.clone())
             } else {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use lumbre_image::{Bitmap, Channels, Encoding, Image, PixelData, Rgb};
 
 use super::origin::SOFTWARE;
-use super::{ImageFile, ImageFormat};
+use super::{ImageFile, ImageFormat, check_expansion};
 use crate::budget::Budget;
 use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, quoted, quoted_bytes};
 
@@ -24,6 +24,7 @@ pub(super) fn read(
         let found = format!("{width} by {height} pixels in {} bytes", bytes.len());
         return Err(reader.fault("HDR image of an impossible size").found(found).into());
     }
+    check_expansion(bytes, pixels * 12, &Place::whole(name.clone()), budget)?;
     let mut data: Vec<f32> = budget.vec(pixels * 3, "image")?;
     data.resize(pixels as usize * 3, 0.0);
     let mut row = vec![[0u8; 4]; width as usize];

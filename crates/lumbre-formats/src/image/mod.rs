@@ -1,4 +1,4 @@
-//! Image files: PNG, JPEG, EXR, HDR, PFM, TGA, BMP, QOI and WebP in; PNG, JPEG, EXR, HDR and PFM out.
+//! Image files: PNG, JPEG, EXR, HDR, PFM, TGA, BMP, QOI and WebP in; PNG, JPEG, QOI, EXR, HDR and PFM out.
 
 mod decode;
 mod exr_file;
@@ -10,7 +10,7 @@ mod write;
 use std::path::Path;
 use std::sync::Arc;
 
-use lumbre_image::{Bitmap, ColourSpace, Image, Layers, Rgb, Window};
+use lumbre_image::{Bitmap, Channels, ColourSpace, Encoding, Image, Layers, PixelData, Rgb, Window};
 
 use crate::budget::Budget;
 use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, quoted};
@@ -40,7 +40,7 @@ pub enum ImageFormat {
     Tga,
     /// Windows bitmap; read only.
     Bmp,
-    /// Quite OK Image; read only.
+    /// Quite OK Image.
     Qoi,
     /// WebP, with losses or without; read only.
     WebP,
@@ -101,7 +101,7 @@ impl ImageFormat {
 
     /// Whether it can be written.
     pub const fn is_writable(self) -> bool {
-        matches!(self, Self::Png | Self::Jpeg | Self::Exr | Self::Hdr | Self::Pfm)
+        matches!(self, Self::Png | Self::Jpeg | Self::Exr | Self::Hdr | Self::Pfm | Self::Qoi)
     }
 
     /// Whether it stores unbounded light rather than display values.
@@ -135,6 +135,13 @@ impl ImageFile {
             data_window: window,
             display_window: window,
         }
+    }
+
+    /// One grey pixel, in place of an image that is missing.
+    pub(crate) fn grey() -> Self {
+        let pixel = PixelData::F32(vec![0.5]);
+        let bitmap = Bitmap::new(1, 1, Channels::Y, pixel, Encoding::Linear);
+        Self::new(ImageFormat::Pfm, bitmap.expect("one number for one pixel"))
     }
 
     /// The image as light on the primaries of Rec. 709, over its display window: black and transparent where
@@ -220,6 +227,19 @@ pub fn read_layers(
     }
     let image = read_image(bytes, name, budget, diagnostics)?.to_image(budget)?;
     Ok(Layers::from_image(&image))
+}
+
+/// Checks the size that an image unpacks to: the rule is the same for all kinds, and an image of one colour of
+/// 4096 by 4096 pixels passes.
+pub(crate) fn check_expansion(
+    bytes: &[u8],
+    unpacked: u64,
+    place: &Place,
+    budget: &Budget,
+) -> Result<(), FormatError> {
+    budget
+        .expansion(bytes.len() as u64, unpacked, "image")
+        .map_err(|source| FormatError::Limit { place: Some(place.clone()), source })
 }
 
 fn format_of(bytes: &[u8], name: &Arc<str>) -> Result<ImageFormat, FormatError> {

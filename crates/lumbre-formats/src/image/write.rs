@@ -1,8 +1,10 @@
-//! Writing images: tone-mapped into PNG and JPEG, linear light into EXR, HDR and PFM.
+//! Writing images: tone-mapped into PNG, JPEG and QOI, linear light into EXR, HDR and PFM.
 
 use std::io::{self, Write};
 use std::path::Path;
 
+use image::codecs::qoi::QoiEncoder;
+use image::{ExtendedColorType, ImageEncoder};
 use lumbre_image::{Image, Layers, Rgb, ToneMap, unit_to_u8, unit_to_u16};
 
 use super::{ImageFormat, exr_file, hdr, origin, pfm};
@@ -57,7 +59,7 @@ pub enum PngDepth {
 /// The precision of EXR's colour channels. Channels that require full precision always have it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExrPrecision {
-    /// Half precision: 11 bits, up to 65504.
+    /// Half precision: 11 bits, up to 65504. A channel with a finite number beyond has single precision.
     Half,
     /// Single precision.
     Float,
@@ -119,7 +121,8 @@ pub fn encode_image(image: &Image, format: ImageFormat, options: &WriteOptions) 
         ImageFormat::Exr => exr_file::encode(&Layers::from_image(image), options),
         ImageFormat::Hdr => Ok(hdr::encode(image)),
         ImageFormat::Pfm => Ok(pfm::encode(image)),
-        ImageFormat::Tga | ImageFormat::Bmp | ImageFormat::Qoi | ImageFormat::WebP => {
+        ImageFormat::Qoi => encode_qoi(image, options),
+        ImageFormat::Tga | ImageFormat::Bmp | ImageFormat::WebP => {
             Err(io::Error::new(io::ErrorKind::Unsupported, format!("{} is not written", format.name())))
         }
     }
@@ -142,7 +145,7 @@ fn writable_format(path: &Path) -> Result<ImageFormat, FormatError> {
         let ending =
             path.extension().map_or_else(|| "no ending".to_owned(), |e| quoted(&e.to_string_lossy()));
         let wrong = Diagnostic::error("unknown format to write").at(Place::whole(path.display().to_string()));
-        wrong.found(ending).expected(".png, .jpg, .exr, .hdr or .pfm").into()
+        wrong.found(ending).expected(".png, .jpg, .qoi, .exr, .hdr or .pfm").into()
     })
 }
 
@@ -185,6 +188,21 @@ fn encode_png(image: &Image, options: &WriteOptions) -> io::Result<Vec<u8>> {
     let mut writer = encoder.write_header().map_err(io::Error::other)?;
     writer.write_image_data(&data).map_err(io::Error::other)?;
     writer.finish().map_err(io::Error::other)?;
+    Ok(out)
+}
+
+/// Like PNG, with 8 bits.
+fn encode_qoi(image: &Image, options: &WriteOptions) -> io::Result<Vec<u8>> {
+    let has_alpha = image.alpha().is_some();
+    let data: Vec<u8> = shown(image, options)
+        .flat_map(|([r, g, b], a)| [Some(r), Some(g), Some(b), has_alpha.then_some(a)])
+        .flatten()
+        .map(unit_to_u8)
+        .collect();
+    let kind = if has_alpha { ExtendedColorType::Rgba8 } else { ExtendedColorType::Rgb8 };
+    let mut out = Vec::new();
+    let encoder = QoiEncoder::new(&mut out);
+    encoder.write_image(&data, image.width(), image.height(), kind).map_err(io::Error::other)?;
     Ok(out)
 }
 

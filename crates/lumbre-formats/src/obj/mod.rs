@@ -6,17 +6,20 @@ mod scene;
 mod words;
 
 use std::cell::Cell;
-use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 use lumbre_image::Rgb;
-use lumbre_math::{Vec2, Vec3};
+use lumbre_math::{DVec3, Vec2, Vec3};
 use lumbre_scene::MeshDesc;
 
 use crate::budget::{Budget, BudgetVec};
-use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place};
-use crate::input::refuse_wide;
+use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, TextPlaces};
+use crate::input::narrow_text;
+use crate::origin::{is_without_area, origin_of, relative};
 use crate::polygon;
+use crate::thin::Thin;
 use words::{Source, Word, Words};
 
 pub use mtl::{MtlMaterial, MtlTexture, read_mtl};
@@ -27,8 +30,23 @@ pub use scene::open_obj;
 pub struct ObjFile {
     /// The meshes, in the order of their first faces.
     pub meshes: Vec<ObjMesh>,
-    /// The material libraries that it names, each with its place.
+    /// Points and lines, by name and material.
+    pub thin: Vec<ObjThin>,
+    /// What all positions are relative to: zero, unless the whole model is far from there.
+    pub origin: DVec3,
+    /// The diagonal of the bounding box of all vertices.
+    pub size: f64,
+    /// The material libraries that it names, each with its first place.
     pub libraries: Vec<(String, Place)>,
+}
+
+/// The points and lines of an OBJ file with the same material.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ObjThin {
+    /// The material (`usemtl`), with the place of its first use here.
+    pub material: Option<(String, Place)>,
+    /// The points and lines themselves.
+    pub thin: Thin,
 }
 
 /// The faces of an OBJ file with the same name, material and set of attributes.
@@ -44,7 +62,8 @@ pub struct ObjMesh {
 
 /// Reads meshes from the bytes of an OBJ file. Material libraries are named, not opened: see [`open_obj`].
 ///
-/// Vertex colours (`v x y z r g b`) are linear. Lines, points, curves and surfaces are ignored with a warning.
+/// Vertex colours (`v x y z r g b`) are linear. Faces of a smoothing group (`s`) without normals get those of
+/// smooth surfaces. Curves and surfaces are ignored with a warning. UTF-16 is read by its byte order mark.
 ///
 /// # Errors
 /// [`FormatError::Input`] with line and column; [`FormatError::Limit`]. When lenient, unusable faces are
@@ -55,8 +74,10 @@ pub fn read_obj(
     budget: &Budget,
     diagnostics: &mut Diagnostics,
 ) -> Result<ObjFile, FormatError> {
-    refuse_wide(bytes, name)?;
-    let source = Source { name, bytes };
+    let decoded = narrow_text(bytes, name, budget)?;
+    let bytes = &*decoded;
+    let places = TextPlaces::default();
+    let source = Source { name, bytes, places: &places };
     let mut reader = Reader::new(source, budget, diagnostics);
     for line in source.lines() {
         let mut words = line.words();
@@ -73,13 +94,15 @@ type Corner = [u32; 3];
 const NONE: u32 = u32::MAX;
 
 /// What the faces of a mesh have in common; names by index.
-#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Default, PartialEq, Eq, Hash)]
 struct Key {
     object: u32,
     group: u32,
     material: u32,
     has_uvs: bool,
     has_normals: bool,
+    /// Whether these normals are made, those of a smoothing group.
+    is_smoothed: bool,
 }
 
 struct Part<'a> {
@@ -87,6 +110,9 @@ struct Part<'a> {
     /// The place of its material's name.
     material_at: usize,
     triangles: BudgetVec<'a, [Corner; 3]>,
+    /// Points, and segments of lines with whether the line goes on; by position.
+    points: BudgetVec<'a, u32>,
+    segments: BudgetVec<'a, ([u32; 2], bool)>,
 }
 
 /// A face to be read at the end, with its state.
@@ -97,13 +123,14 @@ struct Later<'a> {
     state: Key,
     material_at: usize,
     counts: [usize; 3],
+    smoothing: u32,
 }
 
 struct Reader<'a> {
     source: Source<'a>,
     budget: &'a Budget,
     diagnostics: &'a mut Diagnostics,
-    positions: BudgetVec<'a, Vec3>,
+    positions: BudgetVec<'a, DVec3>,
     /// As many as positions once any has a colour.
     colours: BudgetVec<'a, Rgb>,
     uvs: BudgetVec<'a, Vec2>,
@@ -117,14 +144,17 @@ struct Reader<'a> {
     state: Key,
     material_at: usize,
     has_objects: bool,
-    is_smooth: bool,
-    /// Whether the warning about smoothing groups has been given.
-    said_smooth: bool,
+    /// The smoothing group; 0 for none.
+    smoothing: u32,
+    /// The sums of normals of smooth surfaces, and their numbers by group and position.
+    smooth_normals: BudgetVec<'a, DVec3>,
+    smooth_numbers: HashMap<(u32, u32), u32>,
     parts: Vec<Part<'a>>,
     part_of: HashMap<Key, usize>,
     /// The part of the last face.
     current: Option<usize>,
     libraries: Vec<(String, Place)>,
+    library_names: HashSet<String>,
     /// Faces with forward references.
     later: BudgetVec<'a, Later<'a>>,
     /// Set when everything is read: the counts to which negative indices of those faces are relative.
@@ -149,15 +179,17 @@ impl<'a> Reader<'a> {
             unusable: vec![],
             names: vec![String::new()],
             numbers: HashMap::new(),
-            state: Key { object: 0, group: 0, material: 0, has_uvs: false, has_normals: false },
+            state: Key::default(),
             material_at: 0,
             has_objects: false,
-            is_smooth: false,
-            said_smooth: false,
+            smoothing: 0,
+            smooth_normals: BudgetVec::new(budget, "normals"),
+            smooth_numbers: HashMap::new(),
             parts: vec![],
             part_of: HashMap::new(),
             current: None,
             libraries: vec![],
+            library_names: HashSet::new(),
             later: BudgetVec::new(budget, "faces"),
             at_end: None,
             missing: Default::default(),
@@ -175,7 +207,7 @@ impl<'a> Reader<'a> {
                 if count == 0 || count > 3 {
                     return Err(self.wrong_count(keyword, count, "1 to 3").into());
                 }
-                let uv = self.finite_or_zero(Vec2::new(u, v), Vec2::is_finite, word, WRONG_UV);
+                let uv = self.finite_or_zero(Vec2::new(u as f32, v as f32), Vec2::is_finite, word, WRONG_UV);
                 Ok(self.uvs.push(uv)?)
             }
             b"vn" => {
@@ -183,7 +215,7 @@ impl<'a> Reader<'a> {
                 if count != 3 {
                     return Err(self.wrong_count(keyword, count, "3").into());
                 }
-                let n = self.finite_or_zero(Vec3::from(n), Vec3::is_finite, word, WRONG_NORMAL);
+                let n = self.finite_or_zero(DVec3::from(n).as_vec3(), Vec3::is_finite, word, WRONG_NORMAL);
                 Ok(self.normals.push(n)?)
             }
             b"f" | b"fo" => self.face(keyword, words),
@@ -207,24 +239,19 @@ impl<'a> Reader<'a> {
                 self.budget.elements(1, "material files")?;
                 if name.is_empty() {
                     self.diagnostics.warn("mtllib without a name", |said| said.at(self.source.place(at)));
-                } else {
+                } else if self.library_names.insert(name.clone().into_owned()) {
+                    self.budget.bytes(2 * name.len() as u64 + 128, "material files")?;
                     self.libraries.push((name.into_owned(), self.source.place(at)));
                 }
                 Ok(())
             }
             b"s" => {
-                let group = { words }.next();
-                self.is_smooth = group.is_some_and(|w| !matches!(w.bytes, b"off" | b"0"));
+                let group = { words }.next().map_or(&b"off"[..], |word| word.bytes);
+                let number = std::str::from_utf8(group).ok().and_then(|text| text.parse::<u32>().ok());
+                self.smoothing = number.unwrap_or(u32::from(group == b"on"));
                 Ok(())
             }
-            b"l" => {
-                self.pass_over(keyword, "line is no surface, passed over");
-                Ok(())
-            }
-            b"p" => {
-                self.pass_over(keyword, "point is no surface, passed over");
-                Ok(())
-            }
+            b"l" | b"p" => self.thin(keyword, words),
             b"vp" | b"cstype" | b"deg" | b"bmat" | b"step" | b"curv" | b"curv2" | b"surf" | b"parm"
             | b"trim" | b"hole" | b"scrv" | b"sp" | b"end" | b"con" | b"ctech" | b"stech" => {
                 self.pass_over(keyword, "free-form curves and surfaces are not supported, passed over");
@@ -263,7 +290,7 @@ impl<'a> Reader<'a> {
         &self,
         keyword: Word<'a>,
         words: Words<'a>,
-    ) -> Result<([f32; N], usize, Word<'a>), FormatError> {
+    ) -> Result<([f64; N], usize, Word<'a>), FormatError> {
         let mut numbers = [0.0; N];
         let mut count = 0;
         let mut first = keyword;
@@ -285,26 +312,27 @@ impl<'a> Reader<'a> {
         let colour = match count {
             // A weight, which only curves use.
             3 | 4 => None,
-            6 => Some(Rgb::new(a, b, c)),
-            7 => Some(Rgb::new(b, c, d)),
+            6 => Some(Rgb::from([a, b, c].map(|c| c as f32))),
+            7 => Some(Rgb::from([b, c, d].map(|c| c as f32))),
             _ => return Err(self.wrong_count(keyword, count, "3, 4, 6 or 7").into()),
         };
-        let mut position = Vec3::new(x, y, z);
+        let mut position = DVec3::new(x, y, z);
         if self.positions.len() >= NONE as usize {
             return Err(Diagnostic::error("more vertices than a mesh can have")
                 .at(self.source.place(first.start))
                 .into());
         }
-        if !position.is_finite() {
+        if !position.as_vec3().is_finite() {
             let number = self.positions.len() + 1;
             let wrong = Diagnostic::error(format!("vertex {number} is not finite"))
                 .at(self.source.place(first.start));
             if !self.diagnostics.is_lenient() {
+                let [x, y, z] = position.as_vec3().to_array();
                 return Err(wrong.found(format!("({x}, {y}, {z})")).into());
             }
             self.budget.bytes(4, "vertices")?;
             self.unusable.push(self.positions.len() as u32);
-            position = Vec3::ZERO;
+            position = DVec3::NAN;
         }
         if let Some(colour) = colour {
             // Earlier ones are white.
@@ -360,7 +388,9 @@ impl<'a> Reader<'a> {
             Err(Unusable::No(e)) => return Err(e),
             Err(Unusable::Later) => {
                 let (state, material_at, counts) = (self.state, self.material_at, self.counts());
-                return Ok(self.later.push(Later { keyword, words, state, material_at, counts })?);
+                let smoothing = self.smoothing;
+                let later = Later { keyword, words, state, material_at, counts, smoothing };
+                return Ok(self.later.push(later)?);
             }
             Err(Unusable::Drop(what)) => {
                 self.pass_over(keyword, what);
@@ -377,10 +407,10 @@ impl<'a> Reader<'a> {
             return Ok(());
         }
         let has = |slot: usize| self.face.iter().all(|c| c[slot] != NONE);
-        let key = Key { has_uvs: has(1), has_normals: has(2), ..self.state };
-        if self.is_smooth && !key.has_normals && !self.said_smooth {
-            self.said_smooth = true;
-            self.pass_over(keyword, "smoothing groups are not applied: faces without normals are flat");
+        let is_smoothed = self.smoothing != 0 && !has(2);
+        let key = Key { has_uvs: has(1), has_normals: has(2) || is_smoothed, is_smoothed, ..self.state };
+        if is_smoothed {
+            self.number_smooth_normals()?;
         }
         let part = match self.current {
             Some(current) if self.parts[current].key == key => current,
@@ -389,19 +419,85 @@ impl<'a> Reader<'a> {
         self.current = Some(part);
         let part = &mut self.parts[part];
         if let [a, b, c] = self.face[..] {
-            return Ok(part.triangles.push([a, b, c])?);
+            part.triangles.push([a, b, c])?;
+            if is_smoothed {
+                add_normals(&self.positions, &mut self.smooth_normals, [a, b, c]);
+            }
+            return Ok(());
         }
         // The positions of its corners, and the triangulation.
         let _while_cut = self.budget.hold(self.face.len() as u64 * 160, "corners of a face")?;
         self.places.clear();
-        self.places.extend(self.face.iter().map(|c| self.positions[c[0] as usize]));
+        let first = self.positions[self.face[0][0] as usize];
+        self.places.extend(self.face.iter().map(|c| relative(self.positions[c[0] as usize], first)));
         let Some(triangles) = polygon::triangulate(&self.places) else {
             let wrong = Diagnostic::error("face too large and winding to be cut into triangles")
                 .at(self.source.place(keyword.start));
             return Err(wrong.found(format!("{} corners", self.face.len())).into());
         };
         for t in triangles {
-            part.triangles.push(t.map(|i| self.face[i]))?;
+            let corners = t.map(|i| self.face[i]);
+            part.triangles.push(corners)?;
+            if is_smoothed {
+                add_normals(&self.positions, &mut self.smooth_normals, corners);
+            }
+        }
+        Ok(())
+    }
+
+    /// Numbers the normals of a face by its smoothing group and positions.
+    fn number_smooth_normals(&mut self) -> Result<(), FormatError> {
+        for corner in &mut self.face {
+            let next = self.smooth_normals.len() as u32;
+            corner[2] = *match self.smooth_numbers.entry((self.smoothing, corner[0])) {
+                Entry::Occupied(entry) => entry.into_mut(),
+                Entry::Vacant(entry) => {
+                    self.budget.bytes(48, "normals")?;
+                    self.smooth_normals.push(DVec3::ZERO)?;
+                    entry.insert(next)
+                }
+            };
+        }
+        Ok(())
+    }
+
+    /// `p v …`, a point for each vertex, or `l v …`, a line through all of them.
+    fn thin(&mut self, keyword: Word<'a>, words: Words<'a>) -> Result<(), FormatError> {
+        self.face.clear();
+        let mut face = std::mem::take(&mut self.face);
+        let read = self.corners(words.clone(), &mut face);
+        self.face = face;
+        match read {
+            Ok(()) => {}
+            Err(Unusable::No(e)) => return Err(e),
+            Err(Unusable::Later) => {
+                let (state, material_at, counts) = (self.state, self.material_at, self.counts());
+                let smoothing = self.smoothing;
+                let later = Later { keyword, words, state, material_at, counts, smoothing };
+                return Ok(self.later.push(later)?);
+            }
+            Err(Unusable::Drop(_)) => {
+                self.pass_over(keyword, "point or line with a vertex that is not there, dropped");
+                return Ok(());
+            }
+        }
+        let is_unusable = |c: &Corner| self.unusable.binary_search(&c[0]).is_ok();
+        if !self.unusable.is_empty() && self.face.iter().any(is_unusable) {
+            self.pass_over(keyword, "point or line with a vertex that is not finite, dropped");
+            return Ok(());
+        }
+        // Names of objects and groups do not matter to them.
+        let part = self.part(Key { material: self.state.material, ..Key::default() })?;
+        self.current = None;
+        let part = &mut self.parts[part];
+        if keyword.bytes == b"p" {
+            for corner in &self.face {
+                part.points.push(corner[0])?;
+            }
+            return Ok(());
+        }
+        for (i, ends) in self.face.windows(2).enumerate() {
+            part.segments.push(([ends[0][0], ends[1][0]], i + 2 < self.face.len()))?;
         }
         Ok(())
     }
@@ -414,7 +510,9 @@ impl<'a> Reader<'a> {
         self.budget.bytes(size_of::<Part<'_>>() as u64 + size_of::<ObjMesh>() as u64 + 64, "meshes")?;
         let part = self.parts.len();
         let triangles = BudgetVec::new(self.budget, "triangles");
-        self.parts.push(Part { key, material_at: self.material_at, triangles });
+        let points = BudgetVec::new(self.budget, "points");
+        let segments = BudgetVec::new(self.budget, "lines");
+        self.parts.push(Part { key, material_at: self.material_at, triangles, points, segments });
         self.part_of.insert(key, part);
         Ok(part)
     }
@@ -516,7 +614,10 @@ impl<'a> Reader<'a> {
         for face in later.iter() {
             self.at_end = Some(face.counts);
             (self.state, self.material_at) = (face.state, face.material_at);
-            self.face(face.keyword, face.words.clone())
+            self.smoothing = face.smoothing;
+            let is_thin = matches!(face.keyword.bytes, b"p" | b"l");
+            let read = if is_thin { Self::thin } else { Self::face };
+            read(&mut self, face.keyword, face.words.clone())
                 .map_err(|e| e.or_at(|| self.source.place(face.keyword.start)))?;
         }
         for (missing, what) in self.missing.iter().zip(["texture coordinates", "normals"]) {
@@ -534,8 +635,8 @@ impl<'a> Reader<'a> {
         }
         if self.parts.is_empty() {
             let found = format!("{} vertices", self.positions.len());
-            let said =
-                Diagnostic::warning("OBJ file without faces").at(Place::whole(self.source.name.clone()));
+            let said = Diagnostic::warning("OBJ file without faces, points and lines")
+                .at(Place::whole(self.source.name.clone()));
             self.diagnostics.push(said.found(found));
         }
         // The vertex of the current mesh last made from each position.
@@ -543,20 +644,62 @@ impl<'a> Reader<'a> {
         let _scratch = self.budget.hold(count * 4, "vertices")?;
         let mut newest = vec![0u32; self.positions.len()];
         let parts = std::mem::take(&mut self.parts);
-        let meshes = parts.into_iter().map(|part| {
+        let origin = origin_of(&self.positions);
+        let (mut meshes, mut thin) = (vec![], vec![]);
+        for part in parts {
             let key = part.key;
             let object = if self.has_objects { key.object } else { key.group };
             let material = (key.material != 0)
                 .then(|| (self.names[key.material as usize].clone(), self.source.place(part.material_at)));
-            let mesh = self.mesh(&part.triangles, key, &mut newest)?;
-            Ok(ObjMesh { name: self.names[object as usize].clone(), material, mesh })
-        });
-        let meshes = meshes.collect::<Result<_, FormatError>>()?;
-        Ok(ObjFile { meshes, libraries: self.libraries })
+            if !part.triangles.is_empty() {
+                let mesh = self.mesh(&part.triangles, key, origin, &mut newest)?;
+                meshes.push(ObjMesh {
+                    name: self.names[object as usize].clone(),
+                    material: material.clone(),
+                    mesh,
+                });
+            }
+            if !(part.points.is_empty() && part.segments.is_empty()) {
+                thin.push(ObjThin { material, thin: self.points_and_lines(&part, origin)? });
+            }
+        }
+        if !meshes.is_empty() && meshes.iter().all(|mesh| is_without_area(&mesh.mesh)) {
+            let said = Diagnostic::warning("all faces are without area: nothing of them is seen");
+            self.diagnostics.push(said.at(Place::whole(self.source.name.clone())));
+        }
+        let used = self.positions.iter().filter(|p| p.is_finite());
+        let low = used.clone().copied().fold(DVec3::INFINITY, DVec3::min);
+        let high = used.copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+        let size = if low.x <= high.x { (high - low).length() } else { 0.0 };
+        Ok(ObjFile { meshes, thin, origin, size, libraries: self.libraries })
+    }
+
+    fn points_and_lines(&self, part: &Part<'_>, origin: DVec3) -> Result<Thin, FormatError> {
+        let count = (part.points.len() + 2 * part.segments.len()) as u64;
+        let mut positions = self.budget.vec(count, "vertices")?;
+        let colour_count = if self.colours.is_empty() { 0 } else { count };
+        let mut colours = self.budget.vec(colour_count, "colours")?;
+        let mut points = self.budget.vec(part.points.len() as u64, "points")?;
+        let mut segments = self.budget.vec(part.segments.len() as u64, "lines")?;
+        let mut vertex = |position: u32| {
+            positions.push(relative(self.positions[position as usize], origin));
+            colours.extend(self.colours.get(position as usize));
+            positions.len() as u32 - 1
+        };
+        points.extend(part.points.iter().map(|&point| vertex(point)));
+        segments.extend(part.segments.iter().map(|&(ends, goes_on)| (ends.map(&mut vertex), goes_on)));
+        let colours = (!self.colours.is_empty()).then_some(colours);
+        Ok(Thin { positions, colours, points, segments })
     }
 
     /// Makes a vertex for each distinct corner.
-    fn mesh(&self, corners: &[[Corner; 3]], key: Key, newest: &mut [u32]) -> Result<MeshDesc, FormatError> {
+    fn mesh(
+        &self,
+        corners: &[[Corner; 3]],
+        key: Key,
+        origin: DVec3,
+        newest: &mut [u32],
+    ) -> Result<MeshDesc, FormatError> {
         /// Vertices of one position form a chain; a long one continues in a table.
         const LONGEST_CHAIN: usize = 16;
         let mut vertices: BudgetVec<'_, Corner> = BudgetVec::new(self.budget, "vertices");
@@ -601,7 +744,7 @@ impl<'a> Reader<'a> {
         self.budget.release(table.len() as u64 * 48);
         let count = vertices.len() as u64;
         let mut positions = self.budget.vec(count, "vertices")?;
-        positions.extend(vertices.iter().map(|v| self.positions[v[0] as usize]));
+        positions.extend(vertices.iter().map(|v| relative(self.positions[v[0] as usize], origin)));
         let mut mesh = MeshDesc { positions, triangles: triangles.into_vec(), ..MeshDesc::default() };
         if key.has_uvs {
             let mut uvs = self.budget.vec(count, "texture coordinates")?;
@@ -610,7 +753,9 @@ impl<'a> Reader<'a> {
         }
         if key.has_normals {
             let mut normals = self.budget.vec(count, "normals")?;
-            normals.extend(vertices.iter().map(|v| self.normals[v[2] as usize]));
+            let made = |i: u32| self.smooth_normals[i as usize].normalize_or_zero().as_vec3();
+            let normal = |i: u32| if key.is_smoothed { made(i) } else { self.normals[i as usize] };
+            normals.extend(vertices.iter().map(|v| normal(v[2])));
             mesh.normals = Some(normals);
         }
         if !self.colours.is_empty() {
@@ -619,6 +764,18 @@ impl<'a> Reader<'a> {
             mesh.colours = Some(colours);
         }
         Ok(mesh)
+    }
+}
+
+/// Adds the normal of a triangle to those of its corners, weighted by its angles, so that it does not matter how a
+/// face is cut (G. Thürmer and C. Wüthrich, "Computing vertex normals from polygonal facets", Journal of Graphics
+/// Tools, 1998).
+fn add_normals(positions: &[DVec3], normals: &mut [DVec3], corners: [Corner; 3]) {
+    let [a, b, c] = corners.map(|corner| positions[corner[0] as usize]);
+    let Some(normal) = (b - a).cross(c - a).try_normalize() else { return };
+    for (i, corner) in corners.iter().enumerate() {
+        let [here, left, right] = [0, 1, 2].map(|k| [a, b, c][(i + k) % 3]);
+        normals[corner[2] as usize] += (left - here).angle_between(right - here) * normal;
     }
 }
 

@@ -6,7 +6,8 @@ use lumbre_image::Rgb;
 
 use super::words::{Source, Word, Words};
 use crate::budget::Budget;
-use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place};
+use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, TextPlaces};
+use crate::input::narrow_text;
 
 /// A material of an MTL file; unspecified values are `None`.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -25,8 +26,10 @@ pub struct MtlMaterial {
     pub shininess: Option<f32>,
     /// `Ni`: the index of refraction.
     pub refraction: Option<f32>,
-    /// `d`, or 1 - `Tr`: opacity.
+    /// `d`: opacity.
     pub opacity: Option<f32>,
+    /// `Tr`, with its place: 1 - opacity by some programs, opacity by others.
+    pub transparency: Option<(f32, Place)>,
     /// `Pr`, in `[0, 1]`.
     pub roughness: Option<f32>,
     /// `Pm`, in `[0, 1]`.
@@ -42,21 +45,21 @@ pub struct MtlMaterial {
     /// `anisor`: its rotation from the tangent, in turns.
     pub anisotropy_rotation: Option<f32>,
     /// `map_Kd`.
-    pub diffuse_map: Option<MtlTexture>,
+    pub diffuse_map: Option<Box<MtlTexture>>,
     /// `map_Ke`.
-    pub emission_map: Option<MtlTexture>,
+    pub emission_map: Option<Box<MtlTexture>>,
     /// `map_d`.
-    pub opacity_map: Option<MtlTexture>,
+    pub opacity_map: Option<Box<MtlTexture>>,
     /// `map_Pr`.
-    pub roughness_map: Option<MtlTexture>,
+    pub roughness_map: Option<Box<MtlTexture>>,
     /// `map_Pm`.
-    pub metallic_map: Option<MtlTexture>,
+    pub metallic_map: Option<Box<MtlTexture>>,
     /// `map_Ps`.
-    pub sheen_map: Option<MtlTexture>,
+    pub sheen_map: Option<Box<MtlTexture>>,
     /// `bump`, `map_Bump` or `disp`: heights.
-    pub bump_map: Option<MtlTexture>,
+    pub bump_map: Option<Box<MtlTexture>>,
     /// `norm`: a normal map.
-    pub normal_map: Option<MtlTexture>,
+    pub normal_map: Option<Box<MtlTexture>>,
 }
 
 /// A texture reference of an MTL file.
@@ -91,7 +94,10 @@ pub fn read_mtl(
     budget: &Budget,
     diagnostics: &mut Diagnostics,
 ) -> Result<Vec<MtlMaterial>, FormatError> {
-    let source = Source { name, bytes };
+    let decoded = narrow_text(bytes, name, budget)?;
+    let bytes = &*decoded;
+    let places = TextPlaces::default();
+    let source = Source { name, bytes, places: &places };
     let mut materials: Vec<MtlMaterial> = vec![];
     for line in source.lines() {
         let mut words = line.words();
@@ -114,7 +120,36 @@ pub fn read_mtl(
             }
         }
     }
+    for material in &mut materials {
+        material.settle_opacity(diagnostics);
+    }
     Ok(materials)
+}
+
+impl MtlMaterial {
+    /// `Tr` is 1 - opacity, or opacity in MeshLab and others: `d` decides where the file has both. Nothing is
+    /// written to be invisible, so a `Tr` of 1 alone is an opaque material.
+    fn settle_opacity(&mut self, diagnostics: &mut Diagnostics) {
+        let Some((transparency, place)) = &self.transparency else { return };
+        let as_usual = 1.0 - transparency;
+        match self.opacity {
+            Some(opacity) if (opacity - as_usual).abs() <= 1e-3 => {}
+            Some(opacity) => {
+                let same = (opacity - transparency).abs() <= 1e-3;
+                let meant = if same { "Tr is opacity here" } else { "d is taken" };
+                diagnostics.warn("d and Tr of a material disagree", |said| {
+                    said.at(place.clone()).found(format!("{transparency}, and d {opacity}: {meant}"))
+                });
+            }
+            None if *transparency >= 1.0 => {
+                diagnostics.warn("Tr of a material makes it invisible, taken for opaque", |said| {
+                    said.at(place.clone()).found(transparency)
+                });
+                self.opacity = Some(1.0);
+            }
+            None => self.opacity = Some(as_usual),
+        }
+    }
 }
 
 /// The options of a texture.
@@ -159,7 +194,9 @@ impl<'a> Reader<'a, '_> {
                 }
                 m.opacity = Some(self.number(keyword, words)?);
             }
-            "tr" => m.opacity = Some(1.0 - self.number(keyword, words)?),
+            "tr" => {
+                m.transparency = Some((self.number(keyword, words)?, self.source.place(keyword.start)));
+            }
             "pr" => m.roughness = Some(self.number(keyword, words)?),
             "pm" => m.metallic = Some(self.number(keyword, words)?),
             "ps" => m.sheen = Some(self.number(keyword, words)?),
@@ -210,7 +247,7 @@ impl<'a> Reader<'a, '_> {
     }
 
     fn finite(&self, word: Word<'a>) -> Result<f32, FormatError> {
-        let number = self.source.number(word)?;
+        let number = self.source.number(word)? as f32;
         if number.is_finite() { Ok(number) } else { Err(self.source.wrong(word, "not finite").into()) }
     }
 
@@ -250,7 +287,7 @@ impl<'a> Reader<'a, '_> {
         &mut self,
         keyword: Word<'a>,
         mut words: Words<'a>,
-    ) -> Result<Option<MtlTexture>, FormatError> {
+    ) -> Result<Option<Box<MtlTexture>>, FormatError> {
         let mut texture = MtlTexture {
             file: String::new(),
             place: self.source.place(keyword.start),
@@ -267,7 +304,7 @@ impl<'a> Reader<'a, '_> {
                     self.warn(keyword, "texture without a file");
                     return Ok(None);
                 }
-                return Ok(Some(texture));
+                return Ok(Some(Box::new(texture)));
             };
             match word.bytes {
                 b"-s" => [texture.scale[0], texture.scale[1], _] = self.vector(&mut words, word, 1.0)?,

@@ -1,23 +1,26 @@
 //! OBJ files as scenes.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use lumbre_image::{Encoding, Rgb};
-use lumbre_math::{Transform, Vec2};
-use lumbre_scene::{AreaLightDesc, GeometryDesc, MaterialId, NamedMaterial, SceneDesc, ShapeDesc, UpAxis};
+use lumbre_math::Vec2;
+use lumbre_scene::{
+    AreaLightDesc, GeometryDesc, MaterialId, NamedMaterial, SceneDesc, ShapeDesc, UpAxis, WithoutLight,
+};
 use lumbre_shading::{
     FloatTexture, ImageFilter, ImageTexture, Mapping2d, Material, MaterialKind, MipMap, MipMapOptions,
     PrincipledParams, Roughness, Spectrum, SpectrumTexture, Texture, VolumeParams, Wrap,
 };
 
-use super::{MtlMaterial, MtlTexture, read_mtl, read_obj};
+use super::{MtlMaterial, MtlTexture, ObjThin, read_mtl, read_obj};
 use crate::budget::Budget;
 use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, nearest_name, quoted};
 use crate::image::open_image;
 use crate::input::Input;
-use crate::ply::unsaid_material;
+use crate::origin::placed;
+use crate::ply::{push_thin, unsaid_material};
 
 /// Reads the OBJ file `path` with its materials and textures, each mesh a shape; y is up.
 ///
@@ -41,14 +44,23 @@ pub fn open_obj(
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut builder = Builder { budget, diagnostics, images: HashMap::new() };
     let mut finished: Vec<Finished> = vec![];
-    let mut names: HashMap<String, usize> = HashMap::new();
+    let of_meshes = obj.meshes.iter().filter_map(|mesh| mesh.material.as_ref());
+    let of_thin = obj.thin.iter().filter_map(|thin| thin.material.as_ref());
+    let used: HashSet<&str> = of_meshes.chain(of_thin).map(|(name, _)| name.as_str()).collect();
+    // Those that nothing uses have no number.
+    let mut names: HashMap<String, Option<usize>> = HashMap::new();
+    let mut opened: HashSet<PathBuf> = HashSet::new();
     for (library, place) in &obj.libraries {
-        for (folder, material) in builder.library(folder, library, place)? {
+        for (folder, material) in builder.library(folder, library, place, &mut opened)? {
             // The first definition of a name counts, as does the first library.
             if names.contains_key(&material.name) {
                 continue;
             }
-            names.insert(material.name.clone(), finished.len());
+            if !used.contains(material.name.as_str()) {
+                names.insert(material.name, None);
+                continue;
+            }
+            names.insert(material.name.clone(), Some(finished.len()));
             finished.push(builder.material(&folder, &material)?);
         }
     }
@@ -59,18 +71,21 @@ pub fn open_obj(
     }
     // For meshes without vertex colours, and with them.
     let mut unsaid = [None; 2];
-    for (index, mesh) in obj.meshes.into_iter().enumerate() {
-        let named = mesh.material.as_ref().and_then(|(name, place)| {
-            let found = names.get(name).copied();
-            if found.is_none() {
+    let mut find = |material: &Option<(String, Place)>| {
+        let (name, place) = material.as_ref()?;
+        let found = names.get(name).copied().flatten();
+        if found.is_none() {
+            builder.diagnostics.warn("unknown material, taken for grey", |said| {
                 let near = nearest_name(name, names.keys().map(String::as_str));
-                builder.diagnostics.warn("unknown material, taken for grey", |said| {
-                    let said = said.at(place.clone()).found(quoted(name));
-                    Diagnostic { suggestion: near.map(str::to_owned), ..said }
-                });
-            }
-            found
-        });
+                let said = said.at(place.clone()).found(quoted(name));
+                Diagnostic { suggestion: near.map(str::to_owned), ..said }
+            });
+        }
+        found
+    };
+    let world_from_object = placed(obj.origin);
+    for mesh in obj.meshes {
+        let named = find(&mesh.material);
         let id = named.unwrap_or_else(|| {
             let has_colours = mesh.mesh.colours.is_some();
             *unsaid[usize::from(has_colours)].get_or_insert_with(|| {
@@ -80,15 +95,25 @@ pub fn open_obj(
         });
         let finished = named.map(|i| &finished[i]);
         scene.shapes.push(ShapeDesc {
-            index: index as u32,
+            index: scene.shapes.len() as u32,
             geometry: GeometryDesc::Mesh(Arc::new(mesh.mesh)),
-            world_from_object: Transform::IDENTITY,
+            world_from_object,
             reverse_orientation: false,
             material: Some(MaterialId(id as u32)),
             area_light: finished.and_then(|f| f.light.clone()),
             alpha: finished.and_then(|f| f.alpha.clone()),
         });
     }
+    for ObjThin { material, thin } in &obj.thin {
+        let named = find(material);
+        let id = named.map(|id| MaterialId(id as u32));
+        push_thin(&mut scene, thin, obj.size, id, world_from_object, budget)?;
+    }
+    scene.without_light = match finished.iter().any(|finished| finished.lights_the_scene()) {
+        true => WithoutLight::Studio,
+        // The studio stays, beside what shines faintly.
+        false => WithoutLight::StudioUnlessStaged,
+    };
     Ok(scene)
 }
 
@@ -97,6 +122,15 @@ struct Finished {
     material: Arc<Material>,
     light: Option<AreaLightDesc>,
     alpha: Option<Arc<FloatTexture>>,
+}
+
+impl Finished {
+    /// Whether it emits as a lamp does. Much less than white paper in the studio is an accent, such as a display,
+    /// or a little blue that an exporter left behind.
+    fn lights_the_scene(&self) -> bool {
+        const FAINT: f32 = 0.5;
+        self.light.as_ref().is_some_and(|light| light.radiance.max_component() > FAINT)
+    }
 }
 
 struct Builder<'a> {
@@ -115,6 +149,7 @@ impl Builder<'_> {
         folder: &Path,
         names: &str,
         place: &Place,
+        opened: &mut HashSet<PathBuf>,
     ) -> Result<Vec<(PathBuf, MtlMaterial)>, FormatError> {
         let whole = existing(folder, names);
         let paths = if whole.is_file() {
@@ -124,6 +159,10 @@ impl Builder<'_> {
         };
         let mut materials = vec![];
         for path in paths {
+            // Read once, however often it is named.
+            if !opened.insert(path.clone()) {
+                continue;
+            }
             let input = match Input::open(&path, self.budget) {
                 Ok(input) => input,
                 Err(FormatError::Io { source, .. }) => {
@@ -201,7 +240,13 @@ impl Builder<'_> {
             None
         } else {
             let image = match &m.emission_map {
-                Some(map) => self.image(folder, map, false)?.map(|texture| texture.image),
+                Some(map) => {
+                    if map.scale != [1.0; 2] || map.offset != [0.0; 2] {
+                        let said = "-s and -o of a map of emission are not used";
+                        self.diagnostics.warn(said, |said| said.at(map.place.clone()));
+                    }
+                    self.image(folder, map, false)?.map(|texture| texture.image)
+                }
                 None => None,
             };
             Some(AreaLightDesc { radiance, image, by_vertices: false, two_sided: true, power: None })
@@ -243,7 +288,7 @@ impl Builder<'_> {
     fn numbers(
         &mut self,
         folder: &Path,
-        map: &Option<MtlTexture>,
+        map: &Option<Box<MtlTexture>>,
         number: f32,
     ) -> Result<Arc<FloatTexture>, FormatError> {
         let image = match map {

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use crate::diagnostic::{Diagnostic, FormatError, Place, quoted_bytes};
+use crate::diagnostic::{Diagnostic, FormatError, Place, TextPlaces, quoted_bytes};
 
 /// A text file of lines of words. `\` at the end of a line continues it on the next, and `#` at the start of a
 /// word begins a comment.
@@ -11,6 +11,7 @@ use crate::diagnostic::{Diagnostic, FormatError, Place, quoted_bytes};
 pub(super) struct Source<'a> {
     pub name: &'a Arc<str>,
     pub bytes: &'a [u8],
+    pub places: &'a TextPlaces,
 }
 
 /// A line: its offset and its bytes, without the line end.
@@ -29,7 +30,7 @@ pub(super) struct Word<'a> {
 
 impl<'a> Source<'a> {
     pub(super) fn place(&self, at: usize) -> Place {
-        Place::of_offset(self.name.clone(), self.bytes, at)
+        self.places.place(self.name.clone(), self.bytes, at)
     }
 
     pub(super) fn wrong(&self, word: Word<'_>, message: impl Into<String>) -> Diagnostic {
@@ -59,7 +60,7 @@ impl<'a> Source<'a> {
     }
 
     /// A number, finite or not.
-    pub(super) fn number(&self, word: Word<'_>) -> Result<f32, FormatError> {
+    pub(super) fn number(&self, word: Word<'_>) -> Result<f64, FormatError> {
         let parsed = std::str::from_utf8(word.bytes).ok().and_then(|text| text.parse().ok());
         parsed.ok_or_else(|| self.wrong(word, "not a number").into())
     }
@@ -132,8 +133,12 @@ mod tests {
 
     fn words(text: &[u8]) -> Vec<Vec<String>> {
         let name = "w".into();
+        let places = TextPlaces::default();
         let word = |w: Word<'_>| String::from_utf8_lossy(w.bytes).into_owned();
-        Source { name: &name, bytes: text }.lines().map(|l| l.words().map(word).collect()).collect()
+        Source { name: &name, bytes: text, places: &places }
+            .lines()
+            .map(|l| l.words().map(word).collect())
+            .collect()
     }
 
     #[test]
@@ -150,7 +155,8 @@ mod tests {
     fn names_may_have_blanks() {
         let name = "w".into();
         let rest = |text: &[u8]| {
-            let line = Source { name: &name, bytes: text }.lines().next().unwrap();
+            let places = TextPlaces::default();
+            let line = Source { name: &name, bytes: text, places: &places }.lines().next().unwrap();
             let mut words = line.words();
             words.next();
             let (at, rest) = words.rest();

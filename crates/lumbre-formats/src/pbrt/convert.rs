@@ -1,9 +1,11 @@
 //! From the entities of a scene file to a [`SceneDesc`]: the tables of named entities, and deferred work.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
+use std::hash::Hash;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use lumbre_image::Bitmap;
 use lumbre_math::{AnimatedTransform, Transform};
 use lumbre_scene::{
     FilmDesc, GeometryDesc, InstanceDesc, MaterialId, MeshDesc, NamedMaterial, ObjectDesc, ObjectId,
@@ -12,11 +14,12 @@ use lumbre_scene::{
 use lumbre_shading::{FloatTexture, Material, MipMap, Spectrum, SpectrumTexture, Texture, TextureValue};
 
 use super::images::ImageKey;
-use super::params::Params;
+use super::params::{Param, Params};
 use super::parser;
 use super::source::{Fault, Files, Result, Spot};
 use crate::diagnostic::quoted;
-use crate::{Budget, Diagnostic, Diagnostics, FormatError};
+use crate::origin::placed;
+use crate::{Budget, Diagnostic, Diagnostics, FormatError, Severity};
 
 /// Converts entities to the description of the scene.
 pub(super) struct Converter<'b, 'd> {
@@ -30,14 +33,26 @@ pub(super) struct Converter<'b, 'd> {
     /// Each with the place of its first use as long as it is undefined.
     pub materials: Vec<MaterialSlot>,
     pub material_names: HashMap<String, MaterialId>,
+    /// Materials whose textures are defined after them, with their types.
+    pub materials_later: Vec<(MaterialId, String, Params)>,
+    pub waiting: HashSet<u32>,
+    /// Alphas whose textures are defined after them, by the index of the shape.
+    pub alphas_later: HashMap<u32, Param>,
+    /// Textures by kind and name whose file cannot be read: an error where they are used.
+    pub broken_textures: HashMap<(&'static str, String), (Spot, Diagnostic)>,
     pub objects: Vec<ObjectSlot>,
     pub object_names: HashMap<String, ObjectId>,
     pub open_object: Option<ObjectId>,
     pub float_textures: HashMap<String, Known<f32>>,
     pub spectrum_textures: HashMap<String, Known<Spectrum>>,
+    /// Constant textures by their bits: most are of a few values.
+    pub constants: HashMap<u32, FloatArc>,
+    pub constant_spectra: HashMap<[u32; 3], SpectrumArc>,
     pub media: HashMap<String, ()>,
     pub media_used: Vec<(String, Spot)>,
     pub images: HashMap<ImageKey, Arc<MipMap>>,
+    /// The first pixels of each image file.
+    pub bitmaps: HashMap<PathBuf, Arc<Bitmap>>,
     /// Mesh files to be read at the end, and their indices by path.
     pub mesh_files: Vec<MeshFile>,
     pub mesh_paths: HashMap<PathBuf, usize>,
@@ -99,7 +114,12 @@ pub(super) struct Known<T: TextureValue> {
 
 impl<T: TextureValue> Known<T> {
     pub fn constant(value: T) -> Self {
-        Self { texture: Arc::new(Texture::Constant(value)), depth: 1, leaves: 1 }
+        Self::of(Arc::new(Texture::Constant(value)))
+    }
+
+    /// A texture that holds no others.
+    pub fn of(texture: Arc<Texture<T>>) -> Self {
+        Self { texture, depth: 1, leaves: 1 }
     }
 
     /// The value, if it is uniform.
@@ -131,14 +151,21 @@ impl<'b, 'd> Converter<'b, 'd> {
             shape_count: 0,
             materials: vec![],
             material_names: HashMap::new(),
+            materials_later: vec![],
+            waiting: HashSet::new(),
+            alphas_later: HashMap::new(),
+            broken_textures: HashMap::new(),
             objects: vec![],
             object_names: HashMap::new(),
             open_object: None,
             float_textures: HashMap::new(),
             spectrum_textures: HashMap::new(),
+            constants: HashMap::new(),
+            constant_spectra: HashMap::new(),
             media: HashMap::new(),
             media_used: vec![],
             images: HashMap::new(),
+            bitmaps: HashMap::new(),
             mesh_files: vec![],
             mesh_paths: HashMap::new(),
             lights_to_check: vec![],
@@ -196,6 +223,17 @@ impl<'b, 'd> Converter<'b, 'd> {
                     .error(format!("no file can be read from here, and the scene asks for {}", quoted(name))))
             }
         }
+    }
+
+    /// A constant texture, shared with others of the same value.
+    pub fn number(&mut self, value: f32) -> FloatArc {
+        shared(&mut self.constants, value.to_bits(), || Texture::Constant(value))
+    }
+
+    /// A constant texture of a colour, shared with others of the same.
+    pub fn colour(&mut self, colour: Spectrum) -> SpectrumArc {
+        let bits = colour.to_array().map(f32::to_bits);
+        shared(&mut self.constant_spectra, bits, || Texture::Constant(colour))
     }
 
     // Materials and objects by name; uses may precede definitions.
@@ -346,6 +384,18 @@ impl<'b, 'd> Converter<'b, 'd> {
 
     /// Completes deferred work: names, mesh files, lights on interfaces; and moves the tables into the scene.
     pub fn finish(&mut self) -> Result<()> {
+        self.finish_materials()?;
+        let mut broken: Vec<_> = std::mem::take(&mut self.broken_textures).into_values().collect();
+        broken.sort_by_key(|(spot, _)| (spot.file, spot.line, spot.column));
+        for (spot, wrong) in broken {
+            let message = format!("{}: the texture is not used", wrong.message);
+            self.warn(spot, Diagnostic { severity: Severity::Warning, message, ..wrong });
+        }
+        let mut alphas = HashMap::new();
+        for (index, param) in std::mem::take(&mut self.alphas_later) {
+            let alpha: Known<f32> = self.texture_named(&param)?;
+            alphas.insert(index, alpha.texture);
+        }
         self.check_names()?;
         let meshes = self.read_meshes()?;
         let is_interface: Vec<bool> = self
@@ -365,14 +415,18 @@ impl<'b, 'd> Converter<'b, 'd> {
         lists.extend(self.objects.iter_mut().filter_map(|slot| slot.object.as_mut()).map(|o| &mut o.shapes));
         while let Some(shapes) = lists.pop() {
             for shape in shapes {
+                if let Some(alpha) = alphas.get(&shape.index) {
+                    shape.alpha = Some(alpha.clone());
+                }
                 if shape.material.is_some_and(|id| is_interface[id.0 as usize]) {
                     shape.material = None;
                     shape.area_light = None;
                 }
                 match &mut shape.geometry {
                     GeometryDesc::Mesh(mesh) => {
-                        if let Some(read) = meshes.get(&Arc::as_ptr(mesh)) {
+                        if let Some((read, origin)) = meshes.get(&Arc::as_ptr(mesh)) {
                             *mesh = read.clone();
+                            shape.world_from_object = shape.world_from_object * placed(*origin);
                         }
                     }
                     GeometryDesc::Csg(csg) => lists.extend(csg.operands.iter_mut()),
@@ -383,8 +437,17 @@ impl<'b, 'd> Converter<'b, 'd> {
                 }
             }
         }
+        let shapes = std::mem::take(&mut self.scene.shapes);
+        self.scene.shapes = self.shared_out(shapes)?;
+        for i in 0..self.objects.len() {
+            if let Some(object) = &mut self.objects[i].object {
+                let shapes = std::mem::take(&mut object.shapes);
+                let shapes = self.shared_out(shapes)?;
+                self.objects[i].object.as_mut().expect("it was there").shapes = shapes;
+            }
+        }
         for (mesh, spot) in std::mem::take(&mut self.meshes_to_close) {
-            let mesh = meshes.get(&Arc::as_ptr(&mesh)).unwrap_or(&mesh);
+            let mesh = meshes.get(&Arc::as_ptr(&mesh)).map_or(&mesh, |(read, _)| read);
             if !super::shapes::is_closed(mesh) {
                 let message = "a csg operand has a mesh that is not closed: it is no solid";
                 return Err(spot.error(message));
@@ -400,6 +463,45 @@ impl<'b, 'd> Converter<'b, 'd> {
         let objects = std::mem::take(&mut self.objects).into_iter();
         self.scene.objects = objects.map(|slot| slot.object.expect("names are checked")).collect();
         self.finish_settings()
+    }
+
+    /// Shapes in which each face of a mesh that shines by power is a shape with the whole of it, as in pbrt.
+    fn shared_out(&self, shapes: Vec<ShapeDesc>) -> Result<Vec<ShapeDesc>> {
+        let faces = |shape: &ShapeDesc| match &shape.geometry {
+            GeometryDesc::Mesh(mesh) | GeometryDesc::BilinearMesh(mesh) => {
+                mesh.triangles.len() + mesh.quads.len()
+            }
+            _ => 1,
+        };
+        let is_shared = |shape: &ShapeDesc| {
+            shape.area_light.as_ref().is_some_and(|light| light.power.is_some()) && faces(shape) > 1
+        };
+        if !shapes.iter().any(is_shared) {
+            return Ok(shapes);
+        }
+        let mut all = vec![];
+        for shape in shapes {
+            match &shape.geometry {
+                GeometryDesc::Mesh(mesh) if is_shared(&shape) => {
+                    let each = size_of::<ShapeDesc>() + size_of::<MeshDesc>() + 256;
+                    self.budget
+                        .bytes((each * faces(&shape)) as u64, "faces that shine")
+                        .map_err(FormatError::from)?;
+                    let part =
+                        |mesh| ShapeDesc { geometry: GeometryDesc::Mesh(Arc::new(mesh)), ..shape.clone() };
+                    all.extend(super::shapes::single_faces(mesh).map(part));
+                }
+                GeometryDesc::BilinearMesh(mesh) if is_shared(&shape) => {
+                    let part = |mesh| ShapeDesc {
+                        geometry: GeometryDesc::BilinearMesh(Arc::new(mesh)),
+                        ..shape.clone()
+                    };
+                    all.extend(super::shapes::single_faces(mesh).map(part));
+                }
+                _ => all.push(shape),
+            }
+        }
+        Ok(all)
     }
 
     fn check_names(&mut self) -> Result<()> {
@@ -424,6 +526,23 @@ impl<'b, 'd> Converter<'b, 'd> {
         }
         Ok(())
     }
+}
+
+/// The texture of a key, made once; beyond some number they are not kept.
+fn shared<K: Hash + Eq, T: TextureValue>(
+    known: &mut HashMap<K, Arc<Texture<T>>>,
+    key: K,
+    make: impl FnOnce() -> Texture<T>,
+) -> Arc<Texture<T>> {
+    const MOST: usize = 1 << 12;
+    if let Some(found) = known.get(&key) {
+        return found.clone();
+    }
+    let made = Arc::new(make());
+    if known.len() < MOST {
+        known.insert(key, made.clone());
+    }
+    made
 }
 
 /// An error about a file that the scene names, at the place that names it.

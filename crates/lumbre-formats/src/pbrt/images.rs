@@ -8,7 +8,9 @@ use lumbre_shading::{ImageFilter, MipMap, MipMapOptions, Wrap};
 
 use super::convert::{Converter, file_fault};
 use super::source::{AtSpot, Result, Spot};
+use super::textures::unreadable;
 use crate::image::{ImageFile, open_image};
+use crate::{Diagnostic, FormatError};
 
 /// The key of an image with its lookup: its path, and how it is decoded and filtered.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -35,8 +37,7 @@ impl Converter<'_, '_> {
             return Ok(image.clone());
         }
         // The same pixels with other options are shared.
-        let same = self.images.iter().find(|(other, _)| other.path == path);
-        let bitmap = match same.map(|(_, image)| image.bitmap().clone()) {
+        let bitmap = match self.bitmaps.get(&path).cloned() {
             Some(bitmap) if encoding.is_none_or(|e| e == bitmap.encoding()) => bitmap,
             _ => {
                 let bitmap = self.image_file(name, at)?.bitmap;
@@ -48,6 +49,7 @@ impl Converter<'_, '_> {
         };
         // The smaller levels take another third.
         self.budget.bytes(bitmap.bytes() as u64 / 3, name).at(at)?;
+        self.bitmaps.entry(path).or_insert_with(|| bitmap.clone());
         let image = Arc::new(MipMap::new(bitmap, options));
         self.images.insert(key, image.clone());
         Ok(image)
@@ -56,6 +58,16 @@ impl Converter<'_, '_> {
     /// The image of this name as stored in its file.
     pub fn image_file(&mut self, name: &str, at: Spot) -> Result<ImageFile> {
         let path = self.resolve(name, at)?;
-        open_image(&path, self.budget, self.diagnostics).map_err(|e| file_fault(at, e))
+        match open_image(&path, self.budget, self.diagnostics) {
+            Ok(image) => Ok(image),
+            Err(error @ (FormatError::Io { .. } | FormatError::Input(_)))
+                if self.diagnostics.is_lenient() =>
+            {
+                let message = "a grey image takes the place of one that cannot be read";
+                self.warn(at, Diagnostic::warning(message).found(unreadable(name, &error).message));
+                Ok(ImageFile::grey())
+            }
+            Err(error) => Err(file_fault(at, error)),
+        }
     }
 }

@@ -41,6 +41,12 @@ const MAX_MIX_DEPTH: usize = 64;
 impl Converter<'_, '_> {
     /// The current material from here on; `None` for an interface.
     pub fn material(&mut self, ty: &str, params: Params) -> Result<Option<MaterialId>> {
+        if self.must_wait(ty, &params) {
+            let id = self.add_material(None, None, 1, params.spot);
+            self.waiting.insert(id.0);
+            self.materials_later.push((id, ty.to_owned(), params));
+            return Ok(Some(id));
+        }
         let (material, depth) = self.build_material(ty, &params)?;
         self.done(&params);
         if matches!(material.kind, MaterialKind::Interface) {
@@ -57,11 +63,54 @@ impl Converter<'_, '_> {
         let Some(ty) = params.string("type")?.map(str::to_owned) else {
             return Err(params.spot.error(format!("material {} has no \"string type\"", quoted(name))));
         };
+        if self.must_wait(&ty, &params) {
+            if self.is_waiting(id) {
+                return Err(at.error(format!("material {} is defined twice", quoted(name))));
+            }
+            self.waiting.insert(id.0);
+            self.materials_later.push((id, ty, params));
+            return Ok(());
+        }
         let (material, depth) = self.build_material(&ty, &params)?;
         self.done(&params);
         let slot = &mut self.materials[id.0 as usize];
         slot.material = Some(Arc::new(material));
         slot.depth = depth;
+        Ok(())
+    }
+
+    /// Whether a material is made after the whole scene is read: textures may be defined after the materials that
+    /// name them, as in pbrt-v4, which makes textures first.
+    fn must_wait(&self, ty: &str, params: &Params) -> bool {
+        if params.all().any(|param| self.is_texture_to_come(param)) {
+            return true;
+        }
+        let is_waiting = |name: &String| {
+            let id = self.material_names.get(name);
+            id.is_some_and(|id| self.is_waiting(*id))
+        };
+        let of_mix = ["materials", "namedmaterial1", "namedmaterial2"];
+        ty == "mix"
+            && !self.materials_later.is_empty()
+            && params
+                .all()
+                .filter(|param| of_mix.contains(&&*param.name))
+                .any(|param| matches!(&param.values, Values::Strings(names) if names.iter().any(is_waiting)))
+    }
+
+    fn is_waiting(&self, id: MaterialId) -> bool {
+        self.waiting.contains(&id.0)
+    }
+
+    /// Makes the materials that waited.
+    pub fn finish_materials(&mut self) -> Result<()> {
+        for (id, ty, params) in std::mem::take(&mut self.materials_later) {
+            let (material, depth) = self.build_material(&ty, &params)?;
+            self.done(&params);
+            let slot = &mut self.materials[id.0 as usize];
+            slot.material = Some(Arc::new(material));
+            slot.depth = depth;
+        }
         Ok(())
     }
 
@@ -114,7 +163,7 @@ impl Converter<'_, '_> {
             }
             "coateddiffuse" => {
                 let roughness = self.roughness(params, ROUGHNESS, 0.0)?;
-                self.coated_diffuse(params, "reflectance", 0.5, roughness)?
+                self.coated_diffuse(params, ["reflectance", "eta"], 0.5, roughness)?
             }
             "coatedconductor" => {
                 let names = ["conductor.roughness", "conductor.uroughness", "conductor.vroughness"];
@@ -199,18 +248,42 @@ impl Converter<'_, '_> {
     }
 
     /// An index of refraction: a number, or a spectrum's value at the yellow helium line.
-    pub fn index_of_refraction(&mut self, params: &Params, name: &'static str, default: f32) -> Result<f32> {
+    fn index_of_refraction(&mut self, params: &Params, name: &'static str, default: f32) -> Result<f32> {
+        let (index, dispersion) = self.index_and_dispersion(params, name, default)?;
+        if dispersion != 0.0 {
+            let message = "dispersion is not rendered yet: one index takes the place of a spectrum";
+            let found = format!("{index} at 587.6 nm");
+            self.warn(params.spot_of(name), Diagnostic::warning(message).found(found));
+        }
+        Ok(index)
+    }
+
+    /// An index of refraction, and its dispersion: 20 over the Abbe number.
+    pub fn index_and_dispersion(
+        &mut self,
+        params: &Params,
+        name: &'static str,
+        default: f32,
+    ) -> Result<(f32, f32)> {
+        let mut dispersion = 0.0;
         let types = [Type::Float, Type::Integer, Type::Rgb, Type::Blackbody, Type::Spectrum];
         let eta = match params.typed(name, &types)? {
             None => default,
             Some(param) if matches!(param.ty, Type::Float | Type::Integer) => single(params, name, default)?,
             Some(_) => match self.spectrum_value(params, name, SpectrumUse::Coefficient)? {
-                Some(value) => value.index_of_refraction(),
+                Some(value) => {
+                    let index = value.index_of_refraction();
+                    // The F and C lines of hydrogen.
+                    if let (Some(blue), Some(red)) = (value.at(486.1), value.at(656.3)) {
+                        dispersion = (20.0 * (blue - red) / (f64::from(index) - 1.0)) as f32;
+                    }
+                    index
+                }
                 None => default,
             },
         };
         if 0.0 < eta && eta.is_finite() {
-            return Ok(eta);
+            return Ok((eta, if dispersion.is_finite() { dispersion } else { 0.0 }));
         }
         params.out_of_range(name, f64::from(eta), "more than 0")
     }
@@ -257,7 +330,7 @@ impl Converter<'_, '_> {
     fn coated_diffuse(
         &mut self,
         params: &Params,
-        reflectance: &'static str,
+        [reflectance, eta]: [&'static str; 2],
         default: f32,
         roughness: Roughness,
     ) -> Result<MaterialKind> {
@@ -265,7 +338,7 @@ impl Converter<'_, '_> {
             reflectance: self.reflectance(params, reflectance, default)?,
             roughness,
             thickness: self.float_texture_or(params, "thickness", 0.01)?,
-            eta: self.index_of_refraction(params, "eta", 1.5)?,
+            eta: self.index_of_refraction(params, eta, 1.5)?,
             g: self.float_texture_or(params, "g", 0.0)?,
             albedo: self.reflectance(params, "albedo", 0.0)?,
             max_depth: params.count("maxdepth", 10, 1)?,
@@ -360,10 +433,10 @@ impl Converter<'_, '_> {
             }
             "plastic" | "substrate" | "uber" => {
                 dropped(self, &["Ks", "Kr", "Kt", "opacity"]);
-                params.ignore(&["index"]);
                 let kd = if ty == "substrate" { 0.5 } else { 0.25 };
                 let roughness = self.roughness(params, ROUGHNESS, 0.1)?;
-                self.coated_diffuse(params, "Kd", kd, roughness)?
+                let index = if params.has("index") { "index" } else { "eta" };
+                self.coated_diffuse(params, ["Kd", index], kd, roughness)?
             }
             "mirror" => {
                 let roughness = Roughness { u: number(0.0), v: number(0.0), remap: false };

@@ -245,6 +245,11 @@ impl Params {
         found.or_else(|| self.defaults.iter().map(|p| &**p).find(|p| *p.name == *name))
     }
 
+    /// All parameters that are in effect.
+    pub fn all(&self) -> impl Iterator<Item = &Param> {
+        self.own.iter().chain(self.defaults.iter().map(|param| &**param))
+    }
+
     /// The parameter of this name, which must be of one of these types.
     pub fn typed(&self, name: &'static str, types: &[Type]) -> Result<Option<&Param>> {
         self.find(name).map(|p| p.of_type(types)).transpose()

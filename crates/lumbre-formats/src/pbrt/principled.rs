@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use lumbre_image::Rgb;
-use lumbre_shading::{Convention, MaterialKind, PrincipledParams, SpectrumTexture, Texture, VolumeParams};
+use lumbre_shading::{Convention, MaterialKind, PrincipledParams, Texture, VolumeParams};
 
 use super::convert::{Converter, FloatArc};
 use super::params::Params;
@@ -55,10 +55,13 @@ impl Converter<'_, '_> {
             let message = format!("{} excludes {}", quoted("specular"), quoted("eta"));
             return Err(params.spot_of("specular").error(message));
         }
+        let mut dispersion = 0.0;
         principled.ior = if params.has("specular") {
             PrincipledParams::ior_from_specular(single(params, "specular", 0.5)?)
         } else {
-            self.index_of_refraction(params, "eta", 1.5)?
+            let (index, of_spectrum) = self.index_and_dispersion(params, "eta", 1.5)?;
+            dispersion = of_spectrum.max(0.0);
+            index
         };
         // Lumbre's additions.
         if params.has("clearcoat_roughness") {
@@ -66,7 +69,7 @@ impl Converter<'_, '_> {
         }
         principled.anisotropy_rotation = single(params, "anisotropic_rotation", 0.0)?.to_radians();
         principled.sheen_roughness = self.float_texture_or(params, "sheen_roughness", 0.5)?;
-        principled.dispersion = single(params, "dispersion", 0.0)?;
+        principled.dispersion = single(params, "dispersion", dispersion)?;
         principled.iridescence = self.float_texture_or(params, "iridescence", 0.0)?;
         principled.iridescence_ior = single(params, "iridescence_ior", 1.3)?;
         principled.iridescence_thickness = self.float_texture_or(params, "iridescence_thickness", 400.0)?;
@@ -93,7 +96,8 @@ impl Converter<'_, '_> {
     /// pbrt-v3's material `disney`.
     pub fn disney(&mut self, params: &Params) -> Result<MaterialKind> {
         let mut principled = self.burley(params, &OLD, 0.5)?;
-        principled.ior = self.index_of_refraction(params, "eta", 1.5)?;
+        let (ior, dispersion) = self.index_and_dispersion(params, "eta", 1.5)?;
+        (principled.ior, principled.dispersion) = (ior, dispersion.max(0.0));
         if params.has("scatterdistance") {
             params.ignore(&["scatterdistance"]);
             let message =
@@ -109,7 +113,7 @@ impl Converter<'_, '_> {
         let gloss =
             single(params, names.clearcoat_gloss, if names.base_color == "color" { 1.0 } else { 0.0 })?;
         let sheen = self.float_texture_or(params, "sheen", 0.0)?;
-        let white = Arc::new(SpectrumTexture::Constant(Rgb::WHITE));
+        let white = self.colour(Rgb::WHITE);
         let base_color = self.spectrum_texture_or(params, names.base_color, SpectrumUse::Reflectance, 0.5)?;
         let through = self.float_texture_or(params, names.diffuse_transmission, 0.0)?;
         if single(params, "flatness", 0.0)? != 0.0 {
@@ -125,25 +129,25 @@ impl Converter<'_, '_> {
             transmission: self.float_texture_or(params, names.transmission, 0.0)?,
             volume: (!thin).then(VolumeParams::default),
             // Burley's range is from 0, all reflected, to 2, all transmitted.
-            diffuse_transmission: scaled(through, 0.5),
+            diffuse_transmission: self.scaled(through, 0.5),
             diffuse_transmission_color: base_color.clone(),
             base_color,
-            clearcoat: scaled(clearcoat, CLEARCOAT_SHARE),
-            clearcoat_roughness: Arc::new(Texture::Constant(PrincipledParams::roughness_from_gloss(gloss))),
+            clearcoat: self.scaled(clearcoat, CLEARCOAT_SHARE),
+            clearcoat_roughness: self.number(PrincipledParams::roughness_from_gloss(gloss)),
             sheen_color: match *sheen {
-                Texture::Constant(v) => Arc::new(Texture::Constant(Rgb::splat(v))),
+                Texture::Constant(v) => self.colour(Rgb::splat(v)),
                 _ => Arc::new(Texture::Scale { texture: white, scale: sheen }),
             },
             sheen_tint: self.float_texture_or(params, names.sheen_tint, 0.0)?,
-            sheen_roughness: Arc::new(Texture::Constant(0.5)),
+            sheen_roughness: self.number(0.5),
             ..PrincipledParams::default()
         })
     }
-}
 
-fn scaled(texture: FloatArc, factor: f32) -> FloatArc {
-    match *texture {
-        Texture::Constant(v) => Arc::new(Texture::Constant(v * factor)),
-        _ => Arc::new(Texture::Scale { texture, scale: Arc::new(Texture::Constant(factor)) }),
+    fn scaled(&mut self, texture: FloatArc, factor: f32) -> FloatArc {
+        match *texture {
+            Texture::Constant(v) => self.number(v * factor),
+            _ => Arc::new(Texture::Scale { texture, scale: self.number(factor) }),
+        }
     }
 }

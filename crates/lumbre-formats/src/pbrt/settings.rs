@@ -166,8 +166,9 @@ impl Converter<'_, '_> {
         if max_component <= 0.0 {
             return params.out_of_range("maxcomponentvalue", max_component, "more than 0");
         }
-        // The diagonal is for the realistic camera only, and the format determines the precision.
-        params.ignore(&["diagonal", "savefp16"]);
+        // The diagonal is for the realistic camera only.
+        params.ignore(&["diagonal"]);
+        let single_precision = !params.boolean("savefp16", true)?;
         if space != ColourSpace::REC709 {
             self.note(spot, "a film in another colour space is not made yet: the picture is in that of sRGB");
         }
@@ -178,6 +179,7 @@ impl Converter<'_, '_> {
         (film.width, film.height) = (Some(width), Some(height));
         (film.pixel_bounds, film.crop_window) = (pixel_bounds, crop_window);
         film.max_component = max_component as f32;
+        film.single_precision = single_precision;
         Ok(())
     }
 

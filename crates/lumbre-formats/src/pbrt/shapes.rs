@@ -4,20 +4,20 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use lumbre_geometry::{Aabb, Csg, ShapeError};
-use lumbre_math::{Transform, Vec2, Vec3};
+use lumbre_math::{DVec3, Transform, Vec2, Vec3};
 use lumbre_scene::{CsgDesc, CsgOperation, GeometryDesc, MeshDesc, ShapeDesc};
 use lumbre_shading::Texture;
 
 use super::convert::{Converter, MeshFile, file_fault};
 use super::exact_shapes::exact_shape;
 use super::params::{Params, Type};
-use super::source::{AtSpot, Result, Spot};
+use super::source::{AtSpot, Fault, Result, Spot};
 use super::state::State;
 use super::subdivision;
 use super::textures::vec3;
 use crate::diagnostic::{number, quoted};
-use crate::ply::read_ply;
-use crate::{Diagnostic, Diagnostics, Input};
+use crate::ply::{PlyFile, read_ply};
+use crate::{Diagnostic, Diagnostics, Input, Severity};
 
 const KNOWN: &[&str] = &[
     "sphere",
@@ -62,7 +62,13 @@ impl Converter<'_, '_> {
         let index = self.shape_count;
         self.shape_count = index.checked_add(1).ok_or_else(|| spot.error("more than 2^32 shapes"))?;
         self.budget.elements(1, "shapes").at(spot)?;
-        let alpha = self.float_texture(&params, "alpha")?;
+        let alpha = match params.find("alpha") {
+            Some(param) if self.is_texture_to_come(param) => {
+                self.alphas_later.insert(index, param.clone());
+                None
+            }
+            _ => self.float_texture(&params, "alpha")?,
+        };
         let alpha = alpha.filter(|alpha| !matches!(**alpha, Texture::Constant(v) if v == 1.0));
         let Some(form) = self.form(ty, &params)? else {
             params.ignore_all();
@@ -454,8 +460,8 @@ impl Converter<'_, '_> {
         Ok(GeometryDesc::Mesh(self.mesh_files[file].placeholder.clone()))
     }
 
-    /// Reads the mesh files in parallel; returns each by its placeholder.
-    pub fn read_meshes(&mut self) -> Result<HashMap<*const MeshDesc, Arc<MeshDesc>>> {
+    /// Reads the mesh files in parallel; returns each by its placeholder, with its origin.
+    pub fn read_meshes(&mut self) -> Result<HashMap<*const MeshDesc, (Arc<MeshDesc>, DVec3)>> {
         let files = std::mem::take(&mut self.mesh_files);
         let strictness = self.diagnostics.strictness();
         let budget = self.budget;
@@ -492,8 +498,18 @@ impl Converter<'_, '_> {
             // What no worker has read, as there was none or it died, is read here.
             let (mesh, diagnostics) = result.unwrap_or_else(|| read(file));
             self.diagnostics.append(diagnostics);
-            let mesh = mesh.map_err(|e| file_fault(file.spot, e))?;
-            meshes.insert(Arc::as_ptr(&file.placeholder), Arc::new(mesh));
+            let mesh = match mesh.map_err(|e| file_fault(file.spot, e)) {
+                Ok(mesh) => mesh,
+                Err(Fault::Input(spot, wrong)) if self.diagnostics.is_lenient() => {
+                    self.warn(spot, Diagnostic { severity: Severity::Warning, ..*wrong });
+                    PlyFile::default()
+                }
+                Err(fault) => return Err(fault),
+            };
+            if mesh.mesh.triangles.is_empty() && mesh.mesh.quads.is_empty() {
+                self.note(file.spot, "a plymesh without faces shows nothing");
+            }
+            meshes.insert(Arc::as_ptr(&file.placeholder), (Arc::new(mesh.mesh), mesh.origin));
         }
         // Pointers identify placeholders as long as these live.
         self.mesh_files = files;
@@ -510,6 +526,30 @@ fn triples(params: &Params, name: &'static str, ty: Type) -> Result<Option<Vec<V
     }
     let list: Option<Vec<Vec3>> = numbers.chunks_exact(3).map(vec3).collect();
     list.map(Some).ok_or_else(|| param.refuse("numbers of single precision"))
+}
+
+/// Each face of a mesh as a mesh of its own.
+pub(super) fn single_faces(mesh: &MeshDesc) -> impl Iterator<Item = MeshDesc> + '_ {
+    fn pick<T: Copy>(list: &Option<Vec<T>>, corners: &[u32]) -> Option<Vec<T>> {
+        list.as_ref().map(|list| corners.iter().map(|&i| list[i as usize]).collect())
+    }
+    let numbers = mesh.face_indices.as_deref();
+    let triangles = mesh.triangles.iter().map(|face| &face[..]);
+    let faces = triangles.chain(mesh.quads.iter().map(|face| &face[..]));
+    faces.enumerate().map(move |(number, corners)| {
+        let is_triangle = corners.len() == 3;
+        MeshDesc {
+            positions: corners.iter().map(|&i| mesh.positions[i as usize]).collect(),
+            triangles: if is_triangle { vec![[0, 1, 2]] } else { vec![] },
+            quads: if is_triangle { vec![] } else { vec![[0, 1, 2, 3]] },
+            normals: pick(&mesh.normals, corners),
+            uvs: pick(&mesh.uvs, corners),
+            tangents: pick(&mesh.tangents, corners),
+            colours: pick(&mesh.colours, corners),
+            face_indices: numbers.map(|numbers| vec![numbers[number]]),
+            ..MeshDesc::default()
+        }
+    })
 }
 
 /// Whether each edge of a mesh is shared by exactly two faces in opposite directions, with vertices at the same

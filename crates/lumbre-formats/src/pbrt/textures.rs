@@ -13,9 +13,9 @@ use super::colour;
 use super::convert::{Converter, FloatArc, Known, MAX_TEXTURE_LEAVES, SpectrumArc, file_fault};
 use super::lexer::{Lexer, TokenKind, parse_number};
 use super::params::{Param, Params, Type, Values};
-use super::source::{Result, Spot};
+use super::source::{Fault, Result, Spot};
 use crate::diagnostic::quoted;
-use crate::{Diagnostic, Input};
+use crate::{Diagnostic, FormatError, Input};
 
 /// The use of a spectrum, which determines the meaning and the range of `rgb`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,7 +72,8 @@ impl SceneValue for f32 {
         if param.ty == Type::Texture {
             return converter.texture_named(param).map(Some);
         }
-        Ok(Some(Known::constant(single(params, name, 0.0)?)))
+        let value = single(params, name, 0.0)?;
+        Ok(Some(Known::of(converter.number(value))))
     }
 }
 
@@ -108,6 +109,9 @@ pub(super) fn single(params: &Params, name: &'static str, default: f32) -> Resul
     }
     params.out_of_range(name, value, "a number of single precision")
 }
+
+/// Why an image cannot be had, and where it is named.
+type Missing = (Spot, Box<Diagnostic>);
 
 /// The kinds of texture.
 const KNOWN_KINDS: [&str; 13] = [
@@ -250,7 +254,7 @@ impl Converter<'_, '_> {
             SpectrumUse::Coefficient => value.unbounded_rgb(),
             SpectrumUse::Light => value.illuminant_rgb(),
         };
-        Ok(Some(Known::constant(colour)))
+        Ok(Some(Known::of(self.colour(colour))))
     }
 
     /// [`Self::spectrum_texture`] with a grey default.
@@ -262,7 +266,7 @@ impl Converter<'_, '_> {
         default: f32,
     ) -> Result<SpectrumArc> {
         let known = self.spectrum_texture(params, name, usage)?;
-        Ok(known.unwrap_or_else(|| Known::constant(Spectrum::splat(default))).texture)
+        Ok(known.map_or_else(|| self.colour(Spectrum::splat(default)), |known| known.texture))
     }
 
     /// A number or a texture of numbers.
@@ -276,14 +280,30 @@ impl Converter<'_, '_> {
         name: &'static str,
         default: f32,
     ) -> Result<FloatArc> {
-        Ok(self.float_texture(params, name)?.unwrap_or_else(|| Arc::new(Texture::Constant(default))))
+        Ok(self.float_texture(params, name)?.unwrap_or_else(|| self.number(default)))
+    }
+
+    /// Whether a parameter names a texture that is not defined yet.
+    pub fn is_texture_to_come(&self, param: &Param) -> bool {
+        let Values::Strings(names) = &param.values else { return false };
+        param.ty == Type::Texture
+            && names.iter().any(|name| {
+                let is_broken = |kind| self.broken_textures.contains_key(&(kind, name.clone()));
+                !self.float_textures.contains_key(name)
+                    && !self.spectrum_textures.contains_key(name)
+                    && !is_broken(f32::NAME)
+                    && !is_broken(Spectrum::NAME)
+            })
     }
 
     /// The texture named by a parameter.
-    fn texture_named<T: SceneValue>(&mut self, param: &Param) -> Result<Known<T>> {
+    pub fn texture_named<T: SceneValue>(&mut self, param: &Param) -> Result<Known<T>> {
         let name = param.one_string()?;
         if let Some(known) = T::table(self).get(name) {
             return Ok(known.clone());
+        }
+        if let Some((spot, wrong)) = self.broken_textures.get(&(T::NAME, name.to_owned())) {
+            return Err(spot.wrong(wrong.clone()));
         }
         let in_floats = self.float_textures.contains_key(name);
         let in_spectra = self.spectrum_textures.contains_key(name);
@@ -330,7 +350,8 @@ impl Converter<'_, '_> {
         ctm: Transform,
     ) -> Result<()> {
         let spot = params.spot;
-        if T::table(self).contains_key(name) {
+        let key = (T::NAME, name.to_owned());
+        if T::table(self).contains_key(name) || self.broken_textures.contains_key(&key) {
             return Err(spot.error(format!("{} texture {} is defined twice", T::NAME, quoted(name))));
         }
         let texture_from_world = ctm.inverse();
@@ -380,7 +401,14 @@ impl Converter<'_, '_> {
                     other => return params.out_of_range("dimension", f64::from(other), "2 or 3"),
                 }
             }
-            "imagemap" => self.image_texture(&params, texture_from_world)?,
+            "imagemap" => match self.image_texture(&params, texture_from_world)? {
+                Ok(known) => known,
+                Err((spot, wrong)) => {
+                    self.done(&params);
+                    self.broken_textures.insert(key, (spot, *wrong));
+                    return Ok(());
+                }
+            },
             "dots" | "fbm" | "wrinkled" | "windy" | "marble" | "ptex" => {
                 self.replaced_texture::<T>(ty, &params)?
             }
@@ -443,7 +471,7 @@ impl Converter<'_, '_> {
         &mut self,
         params: &Params,
         texture_from_world: Transform,
-    ) -> Result<Known<T>> {
+    ) -> Result<std::result::Result<Known<T>, Missing>> {
         let mapping = mapping(params, texture_from_world)?;
         let anisotropy = params.float_above("maxanisotropy", 8.0, 0.0)?;
         let filters = [
@@ -482,9 +510,23 @@ impl Converter<'_, '_> {
         let Some(filename) = params.string("filename")?.map(str::to_owned) else {
             return Err(params.spot.error("an imagemap has no \"string filename\""));
         };
-        let image = self.mip_map(&filename, params.spot_of("filename"), encoding, wrap, filter)?;
-        whole(Texture::Image(ImageTexture { mapping, image, scale, invert }), &[], params.spot)
+        let at = params.spot_of("filename");
+        let image = match self.mip_map(&filename, at, encoding, wrap, filter) {
+            Ok(image) => image,
+            // Only a texture that is used needs its file.
+            Err(Fault::Input(spot, wrong)) => return Ok(Err((spot, wrong))),
+            Err(Fault::Other(error)) if matches!(*error, FormatError::Input(_)) => {
+                return Ok(Err((at, Box::new(unreadable(&filename, &error)))));
+            }
+            Err(fault) => return Err(fault),
+        };
+        whole(Texture::Image(ImageTexture { mapping, image, scale, invert }), &[], params.spot).map(Ok)
     }
+}
+
+/// An image that is not what it should be, for a message at the place that names it.
+pub(super) fn unreadable(name: &str, error: &FormatError) -> Diagnostic {
+    Diagnostic::error(format!("cannot read {}: {error}", quoted(name)))
 }
 
 /// The encoding of a texture's image.

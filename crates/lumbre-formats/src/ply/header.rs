@@ -1,8 +1,11 @@
 //! The header of a PLY file.
 
+use std::collections::HashSet;
 use std::sync::Arc;
 
-use crate::diagnostic::{Diagnostic, FormatError, Place, quoted, quoted_bytes};
+use crate::diagnostic::{
+    Diagnostic, Diagnostics, FormatError, Place, Severity, TextPlaces, quoted, quoted_bytes,
+};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Encoding {
@@ -131,17 +134,26 @@ impl Element {
 pub(super) struct Header {
     pub(super) encoding: Encoding,
     pub(super) elements: Vec<Element>,
+    /// The image that a comment names.
+    pub(super) texture: Option<String>,
     /// The offset of the data.
     pub(super) end: usize,
 }
 
 impl Header {
-    pub(super) fn read(bytes: &[u8], name: &Arc<str>) -> Result<Self, FormatError> {
+    pub(super) fn read(
+        bytes: &[u8],
+        name: &Arc<str>,
+        diagnostics: &mut Diagnostics,
+    ) -> Result<Self, FormatError> {
         const LONGEST: usize = 1 << 20;
-        let place = |at: usize| Place::of_offset(name.clone(), bytes, at);
+        let places = TextPlaces::default();
+        let place = |at: usize| places.place(name.clone(), bytes, at);
         let mut encoding = None;
+        let mut texture = None;
         let mut elements: Vec<Element> = vec![];
-        let mut at = 0;
+        let mut names: HashSet<String> = HashSet::new();
+        let mut at = if bytes.starts_with(b"\xEF\xBB\xBF") { 3 } else { 0 };
         let mut first = true;
         loop {
             let start = at;
@@ -168,6 +180,11 @@ impl Header {
                 continue;
             }
             match words[..] {
+                // As MeshLab and others write; the name may have spaces.
+                ["comment", "TextureFile", name, ..] if texture.is_none() => {
+                    let at = (name.as_ptr() as usize).saturating_sub(line.as_ptr() as usize);
+                    texture = line.get(at..).map(|name| name.trim_end().to_owned());
+                }
                 [] | ["comment" | "obj_info", ..] => {}
                 ["format", kind, version] => {
                     encoding = Some(match kind {
@@ -190,7 +207,7 @@ impl Header {
                             .expected("a whole number")
                             .into());
                     };
-                    if elements.iter().any(|e| e.name == element) {
+                    if !names.insert(element.to_owned()) {
                         return Err(wrong(element, "second element of this name").into());
                     }
                     let place = of(count);
@@ -228,12 +245,17 @@ impl Header {
                 ["end_header"] => break,
                 [keyword, ..] => {
                     let known = ["format", "element", "property", "comment", "obj_info", "end_header"];
-                    return Err(wrong(keyword, "unknown line in PLY header").suggest(keyword, known).into());
+                    let wrong = wrong(keyword, "unknown line in PLY header").suggest(keyword, known);
+                    if wrong.suggestion.is_some() {
+                        return Err(wrong.into());
+                    }
+                    // A comment without its keyword, as an old exporter of Blender writes.
+                    diagnostics.push(Diagnostic { severity: Severity::Warning, ..wrong });
                 }
             }
         }
         let encoding =
             encoding.ok_or_else(|| Diagnostic::error("PLY header without a format line").at(place(0)))?;
-        Ok(Self { encoding, elements, end: at })
+        Ok(Self { encoding, elements, texture, end: at })
     }
 }

@@ -7,14 +7,20 @@ use std::path::Path;
 use std::sync::Arc;
 
 use lumbre_image::{Rgb, srgb_to_linear};
-use lumbre_math::{Transform, Vec2, Vec3};
+use lumbre_math::{DVec3, Transform, Vec2, Vec3};
 use lumbre_scene::{GeometryDesc, MaterialId, MeshDesc, NamedMaterial, SceneDesc, ShapeDesc, UpAxis};
-use lumbre_shading::{Material, MaterialKind, SpectrumTexture};
+use lumbre_shading::{
+    ImageFilter, ImageTexture, Mapping2d, Material, MaterialKind, MipMap, MipMapOptions, SpectrumTexture,
+    Wrap,
+};
 
 use crate::budget::{Budget, BudgetVec};
 use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, nearest_name, quoted};
+use crate::image::open_image;
 use crate::input::{Input, refuse_wide};
+use crate::origin::{diagonal, is_without_area, origin_of, placed, relative};
 use crate::polygon;
+use crate::thin::{INK, Thin};
 use header::{Element, Encoding, Header, Number, Property};
 use values::{Binary, Fault, Source, Text};
 
@@ -34,9 +40,9 @@ pub fn read_ply(
     name: &Arc<str>,
     budget: &Budget,
     diagnostics: &mut Diagnostics,
-) -> Result<MeshDesc, FormatError> {
+) -> Result<PlyFile, FormatError> {
     refuse_wide(bytes, name)?;
-    let header = Header::read(bytes, name)?;
+    let header = Header::read(bytes, name, diagnostics)?;
     let body = header.end;
     let mut mesh = Mesh::new(name, bytes, header.encoding, budget, diagnostics);
     match header.encoding {
@@ -45,7 +51,22 @@ pub fn read_ply(
         Encoding::Big => mesh.read(&header, Binary::<true> { bytes, at: body }),
     }
     .map_err(|e| e.or_at(|| Place::whole(name.clone())))?;
-    mesh.finish()
+    mesh.finish(header.texture)
+}
+
+/// The contents of a PLY file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PlyFile {
+    /// The mesh.
+    pub mesh: MeshDesc,
+    /// What its positions are relative to: zero, unless all of them are far from there.
+    pub origin: DVec3,
+    /// The vertices of a file without faces and edges, in which they are points.
+    pub points: Vec<u32>,
+    /// The edges, as pairs of vertices.
+    pub edges: Vec<[u32; 2]>,
+    /// The image that a comment `TextureFile` names.
+    pub texture: Option<String>,
 }
 
 /// Reads the PLY file `path` as a scene of one shape with the default material.
@@ -58,8 +79,102 @@ pub fn open_ply(
     diagnostics: &mut Diagnostics,
 ) -> Result<SceneDesc, FormatError> {
     let input = Input::open(path, budget)?;
-    let mesh = read_ply(&input, input.name(), budget, diagnostics)?;
-    Ok(scene_of_meshes([mesh], UpAxis::Y))
+    let PlyFile { mesh, origin, points, edges, texture } =
+        read_ply(&input, input.name(), budget, diagnostics)?;
+    drop(input);
+    let world_from_object = placed(origin);
+    let size = diagonal(&mesh.positions);
+    let segments: Vec<([u32; 2], bool)> = edges.into_iter().map(|ends| (ends, true)).collect();
+    if mesh.triangles.is_empty() && mesh.quads.is_empty() {
+        let mut scene = SceneDesc { up: UpAxis::Y, ..SceneDesc::default() };
+        let thin = Thin { positions: mesh.positions, colours: mesh.colours, points, segments };
+        push_thin(&mut scene, &thin, size, None, world_from_object, budget)?;
+        return Ok(scene);
+    }
+    let thin = (!segments.is_empty()).then(|| Thin {
+        positions: mesh.positions.clone(),
+        colours: mesh.colours.clone(),
+        points,
+        segments,
+    });
+    let has_uvs = mesh.uvs.is_some();
+    let mut scene = scene_of_meshes([mesh], UpAxis::Y);
+    if let Some(thin) = thin {
+        push_thin(&mut scene, &thin, size, None, Transform::IDENTITY, budget)?;
+    }
+    scene.shapes.iter_mut().for_each(|shape| shape.world_from_object = world_from_object);
+    if let Some(file) = texture.filter(|_| has_uvs)
+        && let Some(material) = textured(path, &file, budget, diagnostics)?
+    {
+        scene.materials[0] = NamedMaterial { name: None, material: Arc::new(material) };
+    }
+    Ok(scene)
+}
+
+/// The material of a mesh with a texture, found beside it; `None`, with a warning, when it cannot be read.
+fn textured(
+    path: &Path,
+    file: &str,
+    budget: &Budget,
+    diagnostics: &mut Diagnostics,
+) -> Result<Option<Material>, FormatError> {
+    let image = match open_image(&path.with_file_name(file), budget, diagnostics) {
+        Ok(image) => image,
+        Err(e @ FormatError::Limit { .. }) => return Err(e),
+        Err(e) => {
+            let said = Diagnostic::warning("cannot use the texture of a PLY file");
+            diagnostics.push(said.at(Place::whole(path.display().to_string())).found(e));
+            return Ok(None);
+        }
+    };
+    // The pyramid takes another third.
+    budget.bytes(image.bitmap.bytes() as u64 / 3, "texture")?;
+    let options = MipMapOptions { wrap: Wrap::Repeat, filter: ImageFilter::Trilinear };
+    let image = ImageTexture {
+        mapping: Mapping2d::Uv { scale: Vec2::ONE, delta: Vec2::ZERO },
+        image: Arc::new(MipMap::new(Arc::new(image.bitmap), options)),
+        scale: 1.0,
+        invert: false,
+    };
+    let reflectance = Arc::new(SpectrumTexture::Image(image));
+    Ok(Some(Material::new(MaterialKind::Diffuse { reflectance })))
+}
+
+/// Points and lines as shapes of a material; without one, of their colours, or else dark blue, which is seen on white
+/// and on black.
+pub(crate) fn push_thin(
+    scene: &mut SceneDesc,
+    thin: &Thin,
+    size: f64,
+    material: Option<MaterialId>,
+    world_from_object: Transform,
+    budget: &Budget,
+) -> Result<(), FormatError> {
+    let material = material.unwrap_or_else(|| {
+        let has_colours = thin.colours.is_some();
+        scene.materials.push(match has_colours {
+            true => unsaid_material(true),
+            false => {
+                let reflectance = Arc::new(SpectrumTexture::Constant(INK));
+                let material = Arc::new(Material::new(MaterialKind::Diffuse { reflectance }));
+                NamedMaterial { name: None, material }
+            }
+        });
+        MaterialId(scene.materials.len() as u32 - 1)
+    });
+    for geometry in thin.shapes(size, budget)? {
+        budget.bytes(size_of::<ShapeDesc>() as u64, "points and lines")?;
+        scene.shapes.push(ShapeDesc {
+            index: scene.shapes.len() as u32,
+            geometry,
+            world_from_object,
+            reverse_orientation: false,
+            material: Some(material),
+            area_light: None,
+            alpha: None,
+        });
+    }
+    Ok(())
 }
 
 /// Meshes as shapes with the default material, or with their vertex colours, in their own space.
@@ -130,6 +245,8 @@ struct Mesh<'a> {
     budget: &'a Budget,
     diagnostics: &'a mut Diagnostics,
     positions: Vec<Vec3>,
+    origin: DVec3,
+    edges: BudgetVec<'a, [u32; 2]>,
     normals: Option<Vec<Vec3>>,
     uvs: Option<Vec<Vec2>>,
     colours: Option<Vec<Rgb>>,
@@ -157,6 +274,8 @@ impl<'a> Mesh<'a> {
             budget,
             diagnostics,
             positions: vec![],
+            origin: DVec3::ZERO,
+            edges: BudgetVec::new(budget, "edges"),
             normals: None,
             uvs: None,
             colours: None,
@@ -222,6 +341,9 @@ impl<'a> Mesh<'a> {
                         self.skip(element, &mut source)?;
                     }
                 }
+                "edge" if has_vertices && Self::ends_of(element).is_some() => {
+                    self.read_edges(element, &mut source)?;
+                }
                 _ => self.skip(element, &mut source)?,
             }
         }
@@ -256,6 +378,44 @@ impl<'a> Mesh<'a> {
         Ok(())
     }
 
+    /// The properties of an edge that are its two vertices.
+    fn ends_of(element: &Element) -> Option<[usize; 2]> {
+        let find = |name: &str| {
+            let is_end = |p: &Property| p.list.is_none() && !p.number.is_float() && p.name == name;
+            element.properties.iter().position(is_end)
+        };
+        Some([find("vertex1")?, find("vertex2")?])
+    }
+
+    fn read_edges<S: Source>(&mut self, element: &Element, source: &mut S) -> Result<(), FormatError> {
+        let Some(ends) = Self::ends_of(element) else { return self.skip(element, source) };
+        for index in 0..element.count {
+            let start = source.at();
+            let mut found = [0i64; 2];
+            for (i, property) in element.properties.iter().enumerate() {
+                let fault = |f: Box<Fault>| FormatError::from(self.wrong(*f, element, index, &property.name));
+                if let Some(length) = property.list {
+                    let length = source.length(length, property.number).map_err(fault)?;
+                    source.skip(property.number, length as u64).map_err(fault)?;
+                    continue;
+                }
+                let value = source.number(property.number).map_err(fault)?;
+                if let Some(end) = ends.iter().position(|&end| end == i) {
+                    found[end] = value as i64;
+                }
+            }
+            let count = self.positions.len() as i64;
+            let is_there =
+                |&v: &i64| (0..count).contains(&v) && self.unusable.binary_search(&(v as u32)).is_err();
+            if found.iter().all(is_there) {
+                self.edges.push(found.map(|v| v as u32))?;
+            } else {
+                self.drop_face("edge with a vertex that is not there, dropped", element, index, start);
+            }
+        }
+        Ok(())
+    }
+
     fn vertices<S: Source>(&mut self, element: &Element, source: &mut S) -> Result<(), FormatError> {
         let mut slots: Vec<Slot> = vec![];
         for property in &element.properties {
@@ -278,12 +438,19 @@ impl<'a> Mesh<'a> {
             return Err(wrong.found(element.count).expected(format!("at most {}", u32::MAX)).into());
         }
         let count = element.count;
-        let mut positions = self.budget.vec(count, "vertices")?;
+        // In double precision until their origin is known, unless the file has less.
+        let is_position = |slot: &Slot| matches!(slot, Slot::Position(_));
+        let mut types = element.properties.iter().zip(&slots).filter(|(_, slot)| is_position(slot));
+        let is_single = self.encoding != Encoding::Text && types.all(|(p, _)| p.number != Number::F64);
+        let place_count = if is_single { 0 } else { count };
+        let _while_read = self.budget.hold(place_count * size_of::<DVec3>() as u64, "vertices")?;
+        let mut places: Vec<DVec3> = Vec::with_capacity(place_count as usize);
+        let mut positions = self.budget.vec(if is_single { count } else { 0 }, "vertices")?;
         let mut normals = self.budget.vec(if has_normals { count } else { 0 }, "normals")?;
         let mut uvs = self.budget.vec(if has_uvs { count } else { 0 }, "texture coordinates")?;
         let mut colours = self.budget.vec(if has_colours { count } else { 0 }, "colours")?;
         for index in 0..count {
-            let (mut p, mut n, mut uv, mut colour) = ([0f32; 3], [0f32; 3], [0f32; 2], [0f32; 3]);
+            let (mut p, mut n, mut uv, mut colour) = ([0f64; 3], [0f32; 3], [0f32; 2], [0f32; 3]);
             let start = source.at();
             for (property, slot) in element.properties.iter().zip(&slots) {
                 let fault = |f: Box<Fault>| FormatError::from(self.wrong(*f, element, index, &property.name));
@@ -294,7 +461,7 @@ impl<'a> Mesh<'a> {
                 }
                 let value = source.number(property.number).map_err(fault)?;
                 match *slot {
-                    Slot::Position(c) => p[c] = value as f32,
+                    Slot::Position(c) => p[c] = value,
                     Slot::Normal(c) => n[c] = value as f32,
                     Slot::Uv(c) => uv[c] = value as f32,
                     Slot::Colour(c) if property.number.is_float() => colour[c] = value as f32,
@@ -302,35 +469,45 @@ impl<'a> Mesh<'a> {
                     Slot::Unused => {}
                 }
             }
-            let mut position = Vec3::from(p);
-            if !position.is_finite() {
-                position = self.unusable_vertex(element, index, start, position)?;
+            let mut position = DVec3::from(p);
+            if !position.as_vec3().is_finite() {
+                self.unusable_vertex(element, index, start, position.as_vec3())?;
+                position = DVec3::NAN;
             }
-            positions.push(position);
+            if is_single {
+                positions.push(relative(position, DVec3::ZERO));
+            } else {
+                places.push(position);
+            }
             if has_normals {
                 normals.push(self.finite_or_zero(
                     Vec3::from(n),
                     Vec3::is_finite,
-                    "normal",
+                    "a normal is not finite, and taken for 0",
                     element,
                     index,
                     start,
                 ));
             }
             if has_uvs {
-                let what = "texture coordinate that is not finite, taken for 0";
+                let what = "a texture coordinate is not finite, and taken for 0";
                 uvs.push(self.finite_or_zero(Vec2::from(uv), Vec2::is_finite, what, element, index, start));
             }
             if has_colours {
                 colours.push(self.finite_or_zero(
                     Rgb::from(colour),
                     Rgb::is_finite,
-                    "colour",
+                    "a colour is not finite, and taken for 0",
                     element,
                     index,
                     start,
                 ));
             }
+        }
+        if !is_single {
+            self.origin = origin_of(&places);
+            positions = self.budget.vec(count, "vertices")?;
+            positions.extend(places.iter().map(|p| relative(*p, self.origin)));
         }
         self.positions = positions;
         self.normals = has_normals.then_some(normals);
@@ -339,7 +516,7 @@ impl<'a> Mesh<'a> {
         Ok(())
     }
 
-    /// An error, or when lenient the origin in its place: no face will use it.
+    /// An error; when lenient no face will use it.
     #[cold]
     fn unusable_vertex(
         &mut self,
@@ -347,7 +524,7 @@ impl<'a> Mesh<'a> {
         index: u64,
         at: usize,
         p: Vec3,
-    ) -> Result<Vec3, FormatError> {
+    ) -> Result<(), FormatError> {
         let axis = (0..3).find(|&c| !p[c].is_finite()).unwrap_or(0);
         let found = format!("({}, {}, {})", p.x, p.y, p.z);
         let at = self.encoding.start(self.bytes, at);
@@ -357,7 +534,7 @@ impl<'a> Mesh<'a> {
             return Err(wrong.into());
         }
         self.unusable.push(index as u32);
-        Ok(Vec3::ZERO)
+        Ok(())
     }
 
     #[inline]
@@ -373,9 +550,10 @@ impl<'a> Mesh<'a> {
         if is_finite(value) {
             return value;
         }
-        let place = self.place(self.encoding.start(self.bytes, at), &element.name, index, "");
-        self.diagnostics
-            .push(Diagnostic::warning(format!("a {what} is not finite, and taken for 0")).at(place));
+        let (encoding, name, bytes) = (self.encoding, self.name, self.bytes);
+        self.diagnostics.warn(what, |said| {
+            said.at(encoding.place(name, bytes, encoding.start(bytes, at), &element.name, index, ""))
+        });
         T::default()
     }
 
@@ -558,10 +736,10 @@ impl<'a> Mesh<'a> {
         });
     }
 
-    fn finish(self) -> Result<MeshDesc, FormatError> {
-        if self.triangles.is_empty() && self.quads.is_empty() {
-            let said = Diagnostic::warning("PLY mesh without faces").at(Place::whole(self.name.clone()));
-            self.diagnostics.push(said.found(format!("{} vertices", self.positions.len())));
+    fn finish(self, texture: Option<String>) -> Result<PlyFile, FormatError> {
+        if self.positions.is_empty() {
+            let said = Diagnostic::warning("PLY mesh without vertices").at(Place::whole(self.name.clone()));
+            self.diagnostics.push(said);
         }
         let face_indices = if self.has_numbers && self.triangle_numbers.len() == self.triangles.len() {
             let mut numbers = self.triangle_numbers;
@@ -573,7 +751,7 @@ impl<'a> Mesh<'a> {
         } else {
             None
         };
-        Ok(MeshDesc {
+        let mesh = MeshDesc {
             positions: self.positions,
             triangles: self.triangles.into_vec(),
             quads: self.quads.into_vec(),
@@ -585,6 +763,19 @@ impl<'a> Mesh<'a> {
             coverages: None,
             face_indices,
             motion: None,
-        })
+        };
+        if is_without_area(&mesh) {
+            let said = Diagnostic::warning("all faces are without area: nothing of them is seen");
+            self.diagnostics.push(said.at(Place::whole(self.name.clone())));
+        }
+        let points = if mesh.triangles.is_empty() && mesh.quads.is_empty() && self.edges.is_empty() {
+            let count = mesh.positions.len() as u32;
+            let mut points = self.budget.vec(u64::from(count), "points")?;
+            points.extend((0..count).filter(|i| self.unusable.binary_search(i).is_err()));
+            points
+        } else {
+            vec![]
+        };
+        Ok(PlyFile { mesh, origin: self.origin, points, edges: self.edges.into_vec(), texture })
     }
 }

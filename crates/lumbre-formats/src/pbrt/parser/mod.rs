@@ -105,14 +105,19 @@ impl<'b, 'd> Parser<'b, 'd> {
             return Err(at.wrong(Diagnostic::error("a file includes itself").found(quoted(&name))));
         }
         self.converter.budget.nesting(self.frames.len() + 1, directive).at(at)?;
-        let input = Input::open(&path, self.converter.budget).map_err(|e| match e {
-            FormatError::Io { action, source, path } => {
+        let input = match Input::open(&path, self.converter.budget) {
+            Ok(input) => input,
+            Err(FormatError::Io { action, source, path }) => {
                 let message = format!("{action} {}: {source}", quoted(&path.display().to_string()));
-                at.error(message)
+                if !self.converter.diagnostics.is_lenient() {
+                    return Err(at.error(message));
+                }
+                self.converter.note(at, format!("{message}; the scene goes on without it"));
+                return Ok(());
             }
-            FormatError::Limit { source, .. } => Fault::Limit(at, source),
-            other => other.into(),
-        })?;
+            Err(FormatError::Limit { source, .. }) => return Err(Fault::Limit(at, source)),
+            Err(other) => return Err(other.into()),
+        };
         let file = self.converter.files.add(input.name().clone(), Some(spot));
         let lexer = Lexer::new(input, file)?;
         let import = (directive == "Import").then(|| Box::new((self.state.clone(), self.scopes.len())));

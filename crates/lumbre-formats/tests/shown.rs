@@ -1,0 +1,298 @@
+//! Files that break the rules of their format in a way whose meaning is clear, as exporters write them: what every
+//! viewer shows is shown, with a warning, and refused when strict.
+
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
+use std::path::Path;
+
+use lumbre_formats::gltf::{GltfOptions, read_gltf};
+use lumbre_formats::ply::read_ply;
+use lumbre_formats::{Budget, Diagnostics, Strictness};
+use lumbre_image::Rgb;
+use lumbre_math::{Vec2, Vec3};
+use lumbre_scene::{GeometryDesc, MeshDesc, Scene, SceneDesc};
+use lumbre_shading::{Mapping2d, MaterialKind, TextureContext, UvSet, VertexData};
+
+/// (3, 0, 2), (0, 4, 2), (0, 0, 2) and thrice (0, 0, 1), as base64 with its media type.
+const BUFFER: &str = "data:application/octet-stream;base64,AABAQAAAAAAAAABAAAAAAAAAgEAAAABAAAAAAAAAAAAAAABAAAAAAAAAAAAAAIA/AAAAAAAAAAAAAIA/AAAAAAAAAAAAAIA/";
+
+/// A triangle of a file whose parts can be replaced.
+fn triangle(changes: &[(&str, &str)]) -> String {
+    let mut json = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
+        "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,2],"max":[3,4,2]}],
+        "bufferViews":[{"buffer":0,"byteLength":72}],"buffers":[{"byteLength":72,"uri":"BUFFER"}]}"#
+        .replace("BUFFER", BUFFER);
+    for (from, to) in changes {
+        assert!(json.contains(from), "{from}");
+        json = json.replacen(from, to, 1);
+    }
+    json
+}
+
+fn read(bytes: &[u8], strictness: Strictness) -> (Result<SceneDesc, String>, Diagnostics) {
+    let mut said = Diagnostics::with_strictness(strictness);
+    let options = GltfOptions::default();
+    let scene =
+        read_gltf(bytes, &"m.gltf".into(), Path::new("/nowhere"), &options, &Budget::default(), &mut said);
+    (scene.map_err(|e| e.to_string()), said)
+}
+
+/// The scene of a file that is shown with a warning that says this, and that is refused when strict.
+fn shown(bytes: &[u8], warning: &str) -> SceneDesc {
+    let (scene, said) = read(bytes, Strictness::Normal);
+    let scene = scene.unwrap();
+    assert!(said.lines().iter().any(|line| line.contains(warning)), "{warning}: {:?}", said.lines());
+    let (strictly, said) = read(bytes, Strictness::Strict);
+    assert!(strictly.is_err() || said.check().is_err(), "{warning}");
+    scene
+}
+
+fn mesh(scene: &SceneDesc) -> &MeshDesc {
+    let [shape] = &scene.shapes[..] else { panic!("{} shapes", scene.shapes.len()) };
+    let GeometryDesc::Mesh(mesh) = &shape.geometry else { panic!() };
+    assert_eq!(mesh.positions[0].to_array(), [3.0, 0.0, 2.0]);
+    mesh
+}
+
+#[test]
+fn a_root_of_a_scene_that_hangs_on_another_node_is_shown_where_the_scene_has_it() {
+    let json = triangle(&[
+        (r#""nodes":[0]"#, r#""nodes":[1]"#),
+        (r#""nodes":[{"mesh":0}]"#, r#""nodes":[{"children":[1],"translation":[7,7,7]},{"mesh":0}]"#),
+    ]);
+    mesh(&shown(json.as_bytes(), "scene with a node that hangs on another"));
+}
+
+#[test]
+fn attributes_one_after_another_in_a_view_without_a_stride_are_read() {
+    let json = triangle(&[
+        (r#"{"POSITION":0}"#, r#"{"POSITION":0,"NORMAL":1}"#),
+        (
+            r#""max":[3,4,2]}"#,
+            r#""max":[3,4,2]},{"bufferView":0,"byteOffset":36,"componentType":5126,"count":3,"type":"VEC3"}"#,
+        ),
+    ]);
+    let scene = shown(json.as_bytes(), "attributes share a buffer view that says no stride");
+    assert_eq!(mesh(&scene).normals.as_deref(), Some(&[Vec3::Z; 3][..]));
+}
+
+#[test]
+fn a_second_set_of_texture_coordinates_may_stand_alone() {
+    let json = triangle(&[
+        (r#"{"POSITION":0}"#, r#"{"POSITION":0,"TEXCOORD_1":1}"#),
+        (
+            r#""max":[3,4,2]}"#,
+            r#""max":[3,4,2]},{"bufferView":1,"componentType":5126,"count":3,"type":"VEC2"}"#,
+        ),
+        (r#""byteLength":72}]"#, r#""byteLength":72},{"buffer":0,"byteLength":24}]"#),
+    ]);
+    mesh(&shown(json.as_bytes(), "TEXCOORD_0 is missing"));
+}
+
+#[test]
+fn a_missing_image_leaves_its_material_without_it() {
+    let json = triangle(&[
+        (r#""attributes":{"POSITION":0}"#, r#""material":0,"attributes":{"POSITION":0,"TEXCOORD_0":1}"#),
+        (
+            r#""max":[3,4,2]}"#,
+            r#""max":[3,4,2]},{"bufferView":1,"componentType":5126,"count":3,"type":"VEC2"}"#,
+        ),
+        (
+            r#""byteLength":72}]"#,
+            r#""byteLength":72},{"buffer":0,"byteLength":24}],"images":[{"uri":"gone.png"}],
+            "textures":[{"source":0}],"materials":[{"pbrMetallicRoughness":{"baseColorFactor":[0.5,0.25,1,1],
+            "baseColorTexture":{"index":0}}}]"#,
+        ),
+    ]);
+    let scene = shown(json.as_bytes(), "image that cannot be read was left out");
+    let MaterialKind::Principled(params) = &scene.materials[0].material.kind else { panic!() };
+    assert_eq!(params.base_color.evaluate(&place()), Rgb::new(0.5, 0.25, 1.0));
+}
+
+#[test]
+fn parts_that_nothing_uses_may_be_wrong() {
+    let unused = [
+        (
+            r#""nodes":[{"mesh":0}]"#,
+            r#""cameras":[{"type":"perspective","perspective":{"yfov":4,"znear":0.1}}],"nodes":[{"mesh":0}]"#,
+            "number out of range",
+        ),
+        (
+            r#""byteLength":72}]"#,
+            r#""byteLength":72},{"buffer":0,"byteLength":0}]"#,
+            "buffer view without bytes",
+        ),
+        (
+            r#""max":[3,4,2]}"#,
+            r#""max":[3,4,2]},{"bufferView":5,"componentType":5126,"count":3,"type":"VEC3"}"#,
+            "index of something that is not there",
+        ),
+        (
+            r#""nodes":[{"mesh":0}]"#,
+            r#""materials":[{"alphaMode":"MIX"}],"nodes":[{"mesh":0}]"#,
+            "unknown alpha mode",
+        ),
+    ];
+    for (from, to, warning) in unused {
+        mesh(&shown(triangle(&[(from, to)]).as_bytes(), warning));
+    }
+    // What is used is an error.
+    let used = triangle(&[
+        (r#""nodes":[{"mesh":0}]"#, r#""materials":[{"alphaMode":"MIX"}],"nodes":[{"mesh":0}]"#),
+        (r#""attributes""#, r#""material":0,"attributes""#),
+    ]);
+    assert!(read(used.as_bytes(), Strictness::Normal).0.unwrap_err().contains("unknown alpha mode"));
+}
+
+#[test]
+fn chunks_of_a_glb_may_have_a_length_that_is_no_multiple_of_four() {
+    let mut json = triangle(&[(&format!(r#","uri":"{BUFFER}""#), "")]);
+    while json.len() % 4 != 1 {
+        json.push(' ');
+    }
+    let binary =
+        [3.0_f32, 0.0, 2.0, 0.0, 4.0, 2.0, 0.0, 0.0, 2.0].map(f32::to_le_bytes).as_flattened().repeat(2);
+    // Without padding, and with the padding that the length leaves out.
+    for padding in [0, 3] {
+        let mut file = b"glTF\x02\0\0\0".to_vec();
+        file.extend((12 + 8 + json.len() as u32 + padding + 8 + 72).to_le_bytes());
+        file.extend((json.len() as u32).to_le_bytes());
+        file.extend(b"JSON");
+        file.extend(json.as_bytes());
+        file.extend(&b"   "[..padding as usize]);
+        file.extend(72_u32.to_le_bytes());
+        file.extend(b"BIN\0");
+        file.extend(&binary);
+        mesh(&shown(&file, "GLB chunk of a length that is no multiple of 4"));
+    }
+}
+
+#[test]
+fn nothing_is_fetched_from_a_network_and_that_is_said() {
+    let json = triangle(&[(BUFFER, "https://example.org/a.bin")]);
+    let error = read(json.as_bytes(), Strictness::Normal).0.unwrap_err();
+    assert!(error.contains("on a network, from which nothing is fetched"), "{error}");
+}
+
+#[test]
+fn nodes_that_are_not_visible_hide_what_hangs_on_them() {
+    let with = |visible: &str| {
+        let json = triangle(&[(
+            r#""nodes":[{"mesh":0}]"#,
+            &format!(
+                r#""extensionsUsed":["KHR_node_visibility","KHR_lights_punctual"],
+                "extensions":{{"KHR_lights_punctual":{{"lights":[{{"type":"point"}}]}}}},
+                "nodes":[{{"children":[1,2],"extensions":{{"KHR_node_visibility":{{{visible}}}}}}},{{"mesh":0}},
+                {{"extensions":{{"KHR_lights_punctual":{{"light":0}}}}}}]"#
+            ),
+        )]);
+        let (scene, said) = read(json.as_bytes(), Strictness::Normal);
+        assert_eq!(said.lines(), [""; 0]);
+        let scene = scene.unwrap();
+        (scene.shapes.len(), scene.lights.len())
+    };
+    assert_eq!(with(r#""visible":false"#), (0, 0));
+    assert_eq!(with(r#""visible":true"#), (1, 1));
+    assert_eq!(with(""), (1, 1));
+}
+
+fn place() -> TextureContext {
+    TextureContext {
+        point: lumbre_math::DVec3::ONE,
+        normal: Vec3::Z,
+        uv: Vec2::new(0.3, 0.6),
+        dpdx: Vec3::ZERO,
+        dpdy: Vec3::ZERO,
+        duv_dx: Vec2::ZERO,
+        duv_dy: Vec2::ZERO,
+        vertex: VertexData::NONE,
+    }
+}
+
+#[test]
+fn a_specular_colour_takes_its_share_from_the_diffuse_one() {
+    let with = |specular: &str| {
+        let json = triangle(&[
+            (
+                r#""nodes":[{"mesh":0}]"#,
+                &format!(
+                    r#""extensionsUsed":["KHR_materials_pbrSpecularGlossiness"],
+                "materials":[{{"extensions":{{"KHR_materials_pbrSpecularGlossiness":{{"diffuseFactor":[0.8,0.4,0.2,1],
+                "specularFactor":{specular}}}}}}}],"nodes":[{{"mesh":0}}]"#
+                ),
+            ),
+            (r#""attributes""#, r#""material":0,"attributes""#),
+        ]);
+        let scene = read(json.as_bytes(), Strictness::Normal).0.unwrap();
+        let MaterialKind::Principled(params) = &scene.materials[0].material.kind else { panic!() };
+        params.bsdf(&place()).base
+    };
+    assert_eq!(with("[0.3,1,0.5]"), Rgb::BLACK);
+    assert!((with("[0.25,0.1,0]") - Rgb::new(0.6, 0.3, 0.15)).map(f32::abs).max_component() < 1e-6);
+    assert_eq!(with("[0,0,0]"), Rgb::new(0.8, 0.4, 0.2));
+}
+
+#[test]
+fn a_map_that_makes_one_point_of_everything_shows_one_colour_where_it_shines_too() {
+    // An image of 2 by 1 pixels, red and blue.
+    let image = {
+        let mut bytes = std::io::Cursor::new(vec![]);
+        let pixels = image::RgbImage::from_raw(2, 1, vec![255, 0, 0, 0, 0, 255]).unwrap();
+        pixels.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+        bytes.into_inner().iter().map(|byte| format!("%{byte:02x}")).collect::<String>()
+    };
+    let transform = r#""extensions":{"KHR_texture_transform":{"scale":[0,0],"offset":[0.75,0.5]}}"#;
+    for material in [
+        format!(
+            r#""emissiveFactor":[1,1,1],"emissiveTexture":{{"index":0,{transform}}},
+            "pbrMetallicRoughness":{{"baseColorTexture":{{"index":0}}}}"#
+        ),
+        format!(
+            r#""pbrMetallicRoughness":{{"baseColorTexture":{{"index":0,{transform}}}}},"alphaMode":"BLEND",
+            "extensions":{{"KHR_materials_unlit":{{}}}}"#
+        ),
+    ] {
+        let json = triangle(&[
+            (r#""attributes":{"POSITION":0}"#, r#""material":0,"attributes":{"POSITION":0,"TEXCOORD_0":1}"#),
+            (
+                r#""max":[3,4,2]}"#,
+                r#""max":[3,4,2]},{"bufferView":1,"componentType":5126,"count":3,"type":"VEC2"}"#,
+            ),
+            (
+                r#""byteLength":72}]"#,
+                &format!(
+                    r#""byteLength":72}},{{"buffer":0,"byteLength":24}}],
+                "images":[{{"uri":"data:image/png,{image}"}}],"textures":[{{"source":0}}],"materials":[{{{material}}}]"#
+                ),
+            ),
+        ]);
+        let (scene, said) = read(json.as_bytes(), Strictness::Normal);
+        assert_eq!(said.lines(), [""; 0]);
+        let scene = scene.unwrap();
+        let mesh = mesh(&scene);
+        assert_eq!(mesh.uvs.as_deref(), Some(&[Vec2::new(0.75, 0.5); 3][..]));
+        // The set itself is kept for textures of the material.
+        let raw: Vec<Vec2> = [[3.0, 1.0], [2.0, 1.0], [4.0, -1.0]].map(Vec2::from).to_vec();
+        assert_eq!(mesh.further_uvs[0].as_deref(), Some(&raw[..]));
+        if let MaterialKind::Principled(params) = &scene.materials[0].material.kind {
+            let lumbre_shading::Texture::Image(base) = &*params.base_color else { panic!() };
+            assert!(matches!(base.mapping, Mapping2d::Affine { set: UvSet::Second, .. }));
+        }
+        let light = scene.shapes[0].area_light.clone().unwrap();
+        let colour = light.image.unwrap().lookup(Vec2::new(0.75, 0.5), Vec2::ZERO, Vec2::ZERO);
+        assert!(colour.b > 0.99 && colour.r < 0.01, "{colour:?}");
+        Scene::build(scene).unwrap();
+    }
+}
+
+#[test]
+fn a_line_of_a_ply_header_that_lacks_its_word_comment_is_passed_over() {
+    let text = "ply\nformat ascii 1.0\nWritten by hand, source: none\nelement vertex 3\nproperty float x\nproperty float y\n\
+                property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
+                3 0 2\n0 4 2\n0 0 2\n3 0 1 2\n";
+    let mut said = Diagnostics::new();
+    let file = read_ply(text.as_bytes(), &"m.ply".into(), &Budget::default(), &mut said).unwrap();
+    assert_eq!(file.mesh.triangles, [[0, 1, 2]]);
+    assert_eq!(said.lines(), ["warning: m.ply:3:1: unknown line in PLY header (found \"Written\")"]);
+}
