@@ -6,6 +6,7 @@ use clap::Args;
 use lumbre::image::{Metric, compare};
 
 use crate::failure::{Failure, print};
+use crate::names::one_of;
 use crate::overwrite::refuse_inputs;
 
 /// Compares two pictures of the same size.
@@ -22,7 +23,7 @@ pub(crate) struct Arguments {
     b: PathBuf,
     /// How to measure: rmse (root mean square), relmse (squares relative to the reference's), mae (mean of absolute
     /// values), max (the largest), or flip (what a person notices when the two alternate, 0 to 1).
-    #[arg(long, value_name = "NAME", default_value = "rmse", value_parser = metric)]
+    #[arg(long, value_name = "NAME", default_value = "rmse", value_parser = one_of(&METRICS, Metric::from_name))]
     metric: Metric,
     /// Fail when the difference is above this.
     #[arg(long, value_name = "X", value_parser = limit)]
@@ -32,9 +33,8 @@ pub(crate) struct Arguments {
     output: Option<PathBuf>,
 }
 
-fn metric(name: &str) -> Result<Metric, String> {
-    Metric::from_name(name).ok_or_else(|| "expected rmse, relmse, mae, max or flip".to_owned())
-}
+/// The names of metrics.
+pub(crate) const METRICS: [&str; 5] = ["rmse", "relmse", "mae", "max", "flip"];
 
 fn limit(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|x: &f64| *x >= 0.0).ok_or_else(|| "expected a number from 0 up".to_owned())

@@ -3,15 +3,20 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use lumbre::formats::{Diagnostics, Limits, Strictness};
+use lumbre::formats::{Diagnostics, Limits, SceneFormat, Strictness};
 use lumbre::{Error, Scene, SceneDesc};
 
 use crate::failure::Failure;
+use crate::names::one_of;
 use crate::units;
 
 /// How scene files are read.
 #[derive(Args)]
+#[command(next_help_heading = "Reading")]
 pub(crate) struct ReadingArguments {
+    /// The format of a scene on standard input, or in a file without a known ending, which else is told by its bytes.
+    #[arg(long, value_name = "FORMAT", value_parser = one_of(&SceneFormat::NAMES, SceneFormat::from_name))]
+    input_format: Option<SceneFormat>,
     /// Warnings are errors.
     #[arg(long, conflicts_with = "lenient")]
     strict: bool,
@@ -157,6 +162,7 @@ impl ReadingArguments {
         }
         let mut options = lumbre::ReadOptions::default();
         options.limits = self.limits();
+        options.format = self.input_format;
         options.strictness = self.strictness();
         options.frame = frame;
         options.shutter = self.shutter.unwrap_or(0.0) / self.fps;
@@ -173,8 +179,7 @@ pub(crate) fn print_warnings(diagnostics: &Diagnostics) {
     }
     match diagnostics.warnings() {
         0 => {}
-        1 => say!("1 warning"),
-        n => say!("{n} warnings"),
+        n => say!("{}", units::counted(n, "warning")),
     }
 }
 

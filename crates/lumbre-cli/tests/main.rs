@@ -3,4 +3,5 @@
 mod broken_inputs;
 mod cast_streams;
 mod cast_vectors;
+mod habits;
 mod program;

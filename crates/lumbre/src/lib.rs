@@ -54,7 +54,9 @@ pub use lumbre_render::{
     CancelToken, Feature, NoProgress, PixelBounds, Progress, RayCounts, RenderError, RenderOptions, Snapshot,
     State, Stats, Stop,
 };
-pub use lumbre_scene::{EnvironmentDesc, Ground, SceneDesc, Stage, StageLight, Staged, Surroundings};
+pub use lumbre_scene::{
+    EnvironmentDesc, Ground, SceneDesc, Stage, StageLight, Staged, Surroundings, UpAxis, Viewpoint,
+};
 pub use picture::Picture;
 pub use scene::{Scene, describe, open, open_with};
 

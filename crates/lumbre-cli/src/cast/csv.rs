@@ -1,5 +1,6 @@
 //! Rays as comma-separated text.
 
+use lumbre::formats::diagnostic::quoted;
 use lumbre::{DVec3, Ray};
 
 use super::bytes::Bytes;
@@ -146,10 +147,10 @@ impl Header {
         for (i, (column, name)) in fields(line).enumerate() {
             let Some(known) = COLUMNS.iter().position(|known| *known == name) else {
                 let expected = COLUMNS.join(",");
-                return Err((column, format!("unknown column \"{name}\" (expected {expected})")));
+                return Err((column, format!("unknown column {} (expected {expected})", quoted(name))));
             };
             if place[known].replace(i).is_some() {
-                return Err((column, format!("column \"{name}\" stands twice")));
+                return Err((column, format!("column {} stands twice", quoted(name))));
             }
         }
         if let Some(missing) = (0..6).find(|i| place[*i].is_none()) {
@@ -171,10 +172,10 @@ impl Header {
             if count == self.width {
                 return Err((column(), format!("more than the {} values of the header", self.width)));
             }
-            let field = field.trim();
+            let field = unquoted(field.trim());
             values[count] = field
                 .parse::<f64>()
-                .map_err(|_| (column(), format!("expected a number, found \"{field}\"")))?;
+                .map_err(|_| (column(), format!("expected a number, found {}", quoted(field))))?;
             count += 1;
         }
         if count < self.width {
@@ -192,6 +193,12 @@ fn fields(line: &str) -> impl Iterator<Item = (usize, &str)> {
     line.split(',').map(move |field| {
         let start = column + field.chars().take_while(|c| c.is_whitespace()).count();
         column += field.chars().count() + 1;
-        (start, field.trim())
+        (start, unquoted(field.trim()))
     })
+}
+
+/// A field without the quotes that some programs put around each. No name and no number holds a comma or a quote.
+fn unquoted(field: &str) -> &str {
+    let inner = field.strip_prefix('"').and_then(|field| field.strip_suffix('"'));
+    inner.map_or(field, str::trim)
 }

@@ -56,6 +56,8 @@ impl Converter<'_, '_> {
     /// The image of this name as stored in its file.
     pub fn image_file(&mut self, name: &str, at: Spot) -> Result<ImageFile> {
         let path = self.resolve(name, at)?;
-        open_image(&path, self.budget, self.diagnostics).map_err(|e| file_fault(at, e))
+        let file = open_image(&path, self.budget, self.diagnostics).map_err(|e| file_fault(at, e))?;
+        self.scene.listing.add_texture(name, file.bitmap.width(), file.bitmap.height());
+        Ok(file)
     }
 }

@@ -57,7 +57,15 @@ pub fn open_ply(
     budget: &Budget,
     diagnostics: &mut Diagnostics,
 ) -> Result<SceneDesc, FormatError> {
-    let input = Input::open(path, budget)?;
+    ply_scene(Input::open(path, budget)?, budget, diagnostics)
+}
+
+/// [`open_ply`] of a file that is open.
+pub(crate) fn ply_scene(
+    input: Input<'_>,
+    budget: &Budget,
+    diagnostics: &mut Diagnostics,
+) -> Result<SceneDesc, FormatError> {
     let mesh = read_ply(&input, input.name(), budget, diagnostics)?;
     Ok(scene_of_meshes([mesh], UpAxis::Y))
 }
