@@ -1,10 +1,11 @@
 //! Opening a scene as the command line specifies, and printing warnings.
 
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 use clap::Args;
-use lumbre::formats::{Diagnostics, Limits, SceneFormat, Strictness};
-use lumbre::{Error, Scene, SceneDesc};
+use lumbre::formats::{Budget, Diagnostics, Input, Limits, SceneFormat, Strictness};
+use lumbre::{Error, Scene, SceneDesc, Setting};
 
 use crate::failure::Failure;
 use crate::names::one_of;
@@ -24,36 +25,43 @@ pub(crate) struct ReadingArguments {
     #[arg(long)]
     lenient: bool,
     /// The time in seconds at which the animations of a glTF are evaluated.
-    #[arg(long, value_name = "T", value_parser = seconds)]
+    #[arg(long, value_name = "T", value_parser = seconds, help_heading = "Animation")]
     frame: Option<f64>,
     /// How long the shutter is open about the time of a glTF's frame, as a fraction of the frame interval (see --fps): 0,
     /// the default, is an instant; 0.5 is usual in film. Animated objects get motion blur.
-    #[arg(long, value_name = "S", value_parser = shutter)]
+    #[arg(long, value_name = "S", value_parser = shutter, help_heading = "Animation")]
     shutter: Option<f64>,
     /// Frames per second, for --frames and --shutter.
-    #[arg(long, value_name = "N", default_value_t = 24.0, value_parser = rate)]
+    #[arg(long, value_name = "N", default_value_t = 24.0, value_parser = rate, help_heading = "Animation")]
     fps: f64,
     /// The animation of a glTF to play, by its name or its index from 0. By default all play at once, except those that
     /// conflict with an earlier one.
-    #[arg(long, value_name = "NAME|INDEX")]
+    #[arg(long, value_name = "NAME|INDEX", help_heading = "Animation")]
     animation: Option<String>,
     /// The material variant of a glTF.
     #[arg(long, value_name = "NAME")]
     variant: Option<String>,
+    /// Set a parameter of the scene: material.NAME.PARAM, light.INDEX.PARAM, light.area.scale, camera.PARAM or film.PARAM. A name
+    /// that is not there is answered with those that are.
+    #[arg(short = 'D', long = "define", value_name = "PATH=VALUE", help_heading = "Parameters", value_parser = Setting::from_str)]
+    settings: Vec<Setting>,
+    /// A file of such settings, one a line; # begins a comment line.
+    #[arg(long, value_name = "FILE", help_heading = "Parameters")]
+    overlay: Vec<PathBuf>,
     /// Bytes that reading may hold at a time.
-    #[arg(long, value_name = "SIZE", value_parser = units::bytes)]
+    #[arg(long, value_name = "SIZE", value_parser = units::bytes, help_heading = "Limits")]
     max_memory: Option<u64>,
     /// Vertices, faces, shapes and parameters that may be read.
-    #[arg(long, value_name = "N", hide_short_help = true)]
+    #[arg(long, value_name = "N", hide_short_help = true, help_heading = "Limits")]
     max_elements: Option<u64>,
     /// Levels of includes and blocks.
-    #[arg(long, value_name = "N", hide_short_help = true)]
+    #[arg(long, value_name = "N", hide_short_help = true, help_heading = "Limits")]
     max_nesting: Option<u32>,
     /// Files that may be opened.
-    #[arg(long, value_name = "N", hide_short_help = true)]
+    #[arg(long, value_name = "N", hide_short_help = true, help_heading = "Limits")]
     max_files: Option<u64>,
     /// Bytes that a compressed byte may expand to.
-    #[arg(long, value_name = "N", hide_short_help = true)]
+    #[arg(long, value_name = "N", hide_short_help = true, help_heading = "Limits")]
     max_expansion: Option<u64>,
 }
 
@@ -78,7 +86,7 @@ pub(crate) struct Frames(pub std::ops::RangeInclusive<u32>);
 /// The maximal number of frames in a run, and the largest frame number.
 const MOST_FRAMES: u32 = 1_000_000;
 
-impl std::str::FromStr for Frames {
+impl FromStr for Frames {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -120,8 +128,9 @@ impl ReadingArguments {
     /// # Errors
     /// [`Failure`] by kind of error.
     pub(crate) fn open(&self, paths: &[PathBuf]) -> Result<(Scene, Diagnostics), Failure> {
-        let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
-        lumbre::open_with(&paths, &self.options(self.frame)?).map_err(Failure::from)
+        let (desc, mut diagnostics) = self.describe(paths)?;
+        let name = paths.first().map_or(Path::new(""), PathBuf::as_path);
+        Ok((Scene::of_file(desc, name, &mut diagnostics)?, diagnostics))
     }
 
     /// Reads one or more files as one description.
@@ -146,7 +155,30 @@ impl ReadingArguments {
 
     fn describe_at(&self, paths: &[PathBuf], time: Option<f64>) -> Result<(SceneDesc, Diagnostics), Failure> {
         let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
-        lumbre::describe(&paths, &self.options(time)?).map_err(Failure::from)
+        let (mut desc, diagnostics) = lumbre::describe(&paths, &self.options(time)?)?;
+        for path in &self.overlay {
+            self.overlay(path, &mut desc)?;
+        }
+        for setting in &self.settings {
+            setting.apply(&mut desc).map_err(|wrong| Failure::Usage(format!("-D: {wrong}")))?;
+        }
+        Ok((desc, diagnostics))
+    }
+
+    fn overlay(&self, path: &Path, desc: &mut SceneDesc) -> Result<(), Failure> {
+        let budget = Budget::new(self.limits());
+        let input = Input::open(path, &budget).map_err(Error::from)?;
+        let text = input.text().map_err(Error::from)?;
+        for (number, line) in (1..).zip(text.lines()) {
+            let start = 1 + line.chars().take_while(|c| c.is_whitespace()).count();
+            let line = line.trim();
+            if line.is_empty() || line.starts_with('#') {
+                continue;
+            }
+            let set = Setting::from_str(line).and_then(|setting| setting.apply(desc));
+            set.map_err(|wrong| Failure::input(format!("{}:{number}:{start}: {wrong}", path.display())))?;
+        }
+        Ok(())
     }
 
     fn options(&self, frame: Option<f64>) -> Result<lumbre::ReadOptions, Failure> {

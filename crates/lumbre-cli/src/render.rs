@@ -51,6 +51,10 @@ From elsewhere than the front, the right and above:
   lumbre render part.obj --up z --ortho
   lumbre render scene.pbrt --eye 3,-8,2 --target 0,0,1 --fov 35
 
+With other parameters than those of the file:
+  lumbre render chair.glb -D material.Wood.roughness=0.2 -D material.Wood.base_color=#704020
+  lumbre render scene.pbrt --overlay evening.txt
+
 Animations of a glTF, at a time in seconds, or frame by frame with motion blur:
   lumbre render dancer.glb --frame 1.5 --shutter 0.5
   lumbre render dancer.glb --frames 0..47 --fps 24 --shutter 0.5 -o frame.####.png
@@ -81,13 +85,13 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "WxH", value_parser = units::size)]
     size: Option<(u32, u32)>,
     /// Frames of an animation from A to B, both included, as -o frame.####.png: frame n is that of the time n / --fps.
-    #[arg(long, value_name = "A..B", conflicts_with_all = ["frame", "turntable"])]
+    #[arg(long, value_name = "A..B", conflicts_with_all = ["frame", "turntable"], help_heading = "Animation")]
     frames: Option<Frames>,
     /// Render this part only: pixels, or fractions of the picture.
     #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = units::crop)]
     crop: Option<Crop>,
     /// A camera by name or 0-based position.
-    #[arg(long, value_name = "NAME|INDEX")]
+    #[arg(long, value_name = "NAME|INDEX", help_heading = "View")]
     camera: Option<String>,
     /// What is computed for each pixel: light along paths, or a quantity of what is seen.
     #[arg(long, value_name = "NAME", value_parser = one_of(&INTEGRATORS, IntegratorKind::from_name))]

@@ -29,11 +29,11 @@ pub(crate) struct StagingArguments {
     #[arg(long, value_name = "WHAT", value_parser = background)]
     background: Option<BackgroundArgument>,
     /// Frame the whole model even if the file has a camera.
-    #[arg(long, conflicts_with = "camera")]
+    #[arg(long, conflicts_with = "camera", help_heading = "View")]
     fit: bool,
     /// Render N pictures from all around the model, as -o frame.####.png.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000),
-          conflicts_with_all = ["camera", "stats"])]
+          conflicts_with_all = ["camera", "stats"], help_heading = "View")]
     turntable: Option<u32>,
 }
 

@@ -75,6 +75,7 @@ const OPTIONS: &[(&str, &[&str])] = &[
     ("--fail-above", &["--threshold", "--tolerance", "--max-error", "--fail"]),
     ("--metric", &["--error", "--method"]),
     ("--json", &["--format"]),
+    ("--define", &["--set", "--param", "--parameter", "--override"]),
 ];
 
 /// What cannot be asked for by an option, and what helps instead.

@@ -394,3 +394,69 @@ fn info_names_what_one_can_choose_from() {
         assert_eq!(info["textures"][0]["width"].as_u64(), Some(6));
     }
 }
+
+#[test]
+fn parameters_are_set_in_any_scene_and_wrong_ones_are_answered() {
+    let desk = Desk::new();
+    desk.write("scene.pbrt", SPHERE);
+    desk.write("a.mtl", "newmtl red\nKd 1 0 0\n");
+    desk.write("a.obj", &format!("mtllib a.mtl\nusemtl red\n{OBJ}"));
+    let render = |scene: &str, more: &[&str]| {
+        let common = [scene, "-o", "a.pfm", "--spp", "4", "--size", "48x32", "--integrator", "albedo", "-q"];
+        let out = desk.lumbre(&[&common[..], more].concat());
+        assert_eq!(code(&out), 0, "{more:?}: {}", stderr(&out));
+        image(&desk, "a.pfm").pixel(24, 16).to_array()
+    };
+    assert!(render("a.obj", &[])[0] > 0.9);
+    let green = render("a.obj", &["-D", "material.red.reflectance=0,0.5,0"]);
+    assert!(green[0] < 0.01 && (green[1] - 0.5).abs() < 0.01, "{green:?}");
+    desk.write("overlay.txt", "# paint\n\n  material.red.reflectance = 0,0,0.25\ncamera.fov=1\n");
+    let out = desk.lumbre(&["a.obj", "--overlay", "overlay.txt"]);
+    assert_eq!(code(&out), 3);
+    assert!(stderr(&out).starts_with("error: overlay.txt:4:1: the scene has no camera"), "{}", stderr(&out));
+    desk.write("overlay.txt", "# paint\n  material.red.reflectance = 0,0,0.25\n");
+    // What stands on the command line comes last.
+    assert!((render("a.obj", &["--overlay", "overlay.txt"])[2] - 0.25).abs() < 0.01);
+    let grey = ["--overlay", "overlay.txt", "-D", "material.red.reflectance=0.5"];
+    assert!((render("a.obj", &grey)[0] - 0.5).abs() < 0.01);
+    assert!((render("scene.pbrt", &["-D", "material.1.reflectance=0.125"])[1] - 0.125).abs() < 0.01);
+    for (setting, expected) in [
+        ("material.rd.reflectance=1", "did you mean \"red\"?"),
+        ("material.red.gloss=1", "expected reflectance"),
+        ("red=1", "material.NAME.PARAM=VALUE"),
+    ] {
+        let out = desk.lumbre(&["a.obj", "-D", setting]);
+        assert_eq!(code(&out), 2, "{setting}: {}", stderr(&out));
+        assert!(stderr(&out).contains(expected), "{setting}: {}", stderr(&out));
+    }
+}
+
+#[test]
+fn a_damaged_file_is_told_with_its_byte_and_who_named_it() {
+    let desk = Desk::new();
+    let grey = lumbre::image::Image::filled(6, 4, lumbre::image::Rgb::new(0.1, 0.2, 0.3));
+    lumbre::write_image(&desk.path("wood.png"), &grey, &lumbre::SaveOptions::default()).unwrap();
+    let bytes = fs::read(desk.path("wood.png")).unwrap();
+    fs::write(desk.path("wood.png"), &bytes[..bytes.len() - 20]).unwrap();
+    fs::write(desk.path("m.ply"), PLY.replace("0 3 0", "0 x 0")).unwrap();
+    desk.write(
+        "t.pbrt",
+        "WorldBegin\nTexture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"wood.png\"\n\
+         Material \"diffuse\" \"texture reflectance\" \"t\"\nShape \"sphere\"\n",
+    );
+    desk.write("m.pbrt", "WorldBegin\nInclude \"n.pbrt\"\n");
+    desk.write("n.pbrt", "\n  Shape \"plymesh\" \"string filename\" \"m.ply\"\n");
+    for (scene, file, places) in [
+        ("t.pbrt", "wood.png:byte ", &["included from t.pbrt:2:"][..]),
+        ("m.pbrt", "m.ply:11:3: ", &["included from n.pbrt:2:", "included from m.pbrt:2:"]),
+    ] {
+        let out = desk.lumbre(&["info", scene]);
+        assert_eq!(code(&out), 3, "{}", stderr(&out));
+        let text = stderr(&out);
+        assert!(text.starts_with(&format!("error: {file}")), "{text}");
+        for (line, place) in text.lines().skip(1).zip(places) {
+            assert!(line.trim_start().starts_with(place), "{text}");
+        }
+        assert_eq!(text.lines().count(), 1 + places.len(), "{text}");
+    }
+}

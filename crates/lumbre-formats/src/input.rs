@@ -61,11 +61,14 @@ impl<'b> Input<'b> {
         let mut bytes = Vec::new();
         let mut hold = budget.hold(0, &self.name)?;
         let within = |unpacked| budget.expansion(packed, unpacked, &self.name);
-        read_within(MultiGzDecoder::new(&self.bytes[..]), 0, &mut bytes, &mut hold, &self.name, within)
-            .map_err(|e| match e {
-                ReadError::Limit(limit) => FormatError::from(limit),
-                ReadError::Io(source) => unpacking_error(path, &self.name, source),
-            })?;
+        let mut decoder = MultiGzDecoder::new(&self.bytes[..]);
+        read_within(&mut decoder, 0, &mut bytes, &mut hold, &self.name, within).map_err(|e| match e {
+            ReadError::Limit(limit) => FormatError::from(limit),
+            ReadError::Io(source) => {
+                let at = packed - decoder.get_ref().len() as u64;
+                unpacking_error(path, &self.name, at, source)
+            }
+        })?;
         Ok(Self { name: self.name, bytes, hold })
     }
 
@@ -118,11 +121,12 @@ pub(crate) fn open_regular(path: &Path) -> Result<(File, u64), FormatError> {
     Ok((file, meta.len()))
 }
 
-/// What unpacking gzip data said, as an error of the input where its bytes are at fault.
-pub(crate) fn unpacking_error(path: &Path, name: &Arc<str>, source: io::Error) -> FormatError {
+/// What unpacking gzip data said, as an error of the input where its bytes are at fault. It had read `at` of them.
+pub(crate) fn unpacking_error(path: &Path, name: &Arc<str>, at: u64, source: io::Error) -> FormatError {
     match source.kind() {
         io::ErrorKind::InvalidInput | io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof => {
-            Diagnostic::error("damaged gzip data").at(Place::whole(name.clone())).found(source).into()
+            let place = Place::binary(name.clone(), at, "");
+            Diagnostic::error("damaged gzip data").at(place).found(source).into()
         }
         _ => FormatError::io(path, "cannot unpack", source),
     }
@@ -311,7 +315,10 @@ pub(crate) mod tests {
         let whole = gzip(b"ply\nformat ascii 1.0\n");
         for cut in 2..whole.len() {
             let error = Input::from_reader("m.ply.gz", &whole[..cut], &Budget::default()).unwrap_err();
-            assert!(error.to_string().starts_with("m.ply.gz: damaged gzip data"), "{error}");
+            let said = error.to_string();
+            let at =
+                said.strip_prefix("m.ply.gz:byte ").unwrap().split_once(": damaged gzip data").unwrap().0;
+            assert!(at.parse::<usize>().unwrap() <= cut, "{error}");
         }
     }
 

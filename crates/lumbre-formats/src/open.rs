@@ -1,6 +1,7 @@
 //! Opening any scene, by its file extension or its bytes.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use lumbre_scene::SceneDesc;
 
@@ -159,6 +160,10 @@ impl<'p, 'b> Source<'p, 'b> {
         if let Some(format) = by_name {
             return Ok(Self { path, format, input: None });
         }
+        // Whether or not there is such a file, its name does not say what it is.
+        if !is_standard_input && options.format.is_none() && !path.is_file() {
+            return Err(unknown(path, path.display().to_string().into()));
+        }
         let input = if is_standard_input {
             Input::from_reader("standard input", std::io::stdin().lock(), budget)?
         } else {
@@ -166,17 +171,7 @@ impl<'p, 'b> Source<'p, 'b> {
         };
         match options.format.or_else(|| SceneFormat::from_bytes(&input)) {
             Some(format) => Ok(Self { path, format, input: Some(input) }),
-            None => {
-                let ending = path.extension().map(|e| quoted(&e.to_string_lossy()));
-                let found = match ending {
-                    _ if is_standard_input => "bytes of no known format".to_owned(),
-                    Some(ending) => ending,
-                    None => "no ending".to_owned(),
-                };
-                let wrong = Diagnostic::error("unknown kind of scene file");
-                let wrong = wrong.at(Place::whole(input.name().clone())).found(found);
-                Err(wrong.expected(format!("{ENDINGS}, or --input-format")).into())
-            }
+            None => Err(unknown(path, input.name().clone())),
         }
     }
 
@@ -187,6 +182,16 @@ impl<'p, 'b> Source<'p, 'b> {
     fn open(self, budget: &'b Budget) -> Result<Input<'b>, FormatError> {
         self.input.map_or_else(|| Input::open(self.path, budget), Ok)
     }
+}
+
+fn unknown(path: &Path, name: Arc<str>) -> FormatError {
+    let found = match path.extension() {
+        _ if path.as_os_str() == "-" => "bytes of no known format".to_owned(),
+        Some(ending) => quoted(&ending.to_string_lossy()),
+        None => "no ending".to_owned(),
+    };
+    let wrong = Diagnostic::error("unknown kind of scene file").at(Place::whole(name)).found(found);
+    wrong.expected(format!("{ENDINGS}, or --input-format")).into()
 }
 
 /// Reads files in the pbrt language, or one file of another format.

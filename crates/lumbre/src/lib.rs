@@ -32,6 +32,7 @@ mod files;
 mod info;
 mod picture;
 mod scene;
+mod setting;
 
 pub use lumbre_formats as formats;
 pub use lumbre_geometry as geometry;
@@ -59,6 +60,7 @@ pub use lumbre_scene::{
 };
 pub use picture::Picture;
 pub use scene::{Scene, describe, open, open_with};
+pub use setting::Setting;
 
 /// Compiles the examples of the project's README.
 #[cfg(doctest)]

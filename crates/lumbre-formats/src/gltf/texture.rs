@@ -200,7 +200,7 @@ impl<'f> Textures<'f> {
                 file.push(warning.found(quoted(&error.to_string())));
                 None
             }
-            Err(error) => return Err(error),
+            Err(error) => return Err(error.included_from(value.place())),
         };
         if let Some(image) = &image {
             let (name, width, height) = (image_name(value, index)?, image.width(), image.height());
