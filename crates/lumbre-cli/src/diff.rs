@@ -9,6 +9,7 @@ use lumbre::image::{Metric, Rgb, compare};
 
 use crate::failure::{Failure, print};
 use crate::memory::Memory;
+use crate::names::one_of;
 use crate::output::{Inputs, Replaced};
 use crate::signals::Signals;
 use crate::units;
@@ -27,7 +28,7 @@ pub(crate) struct Arguments {
     b: PathBuf,
     /// How to measure: rmse (root mean square), relmse (squares relative to the reference's), mae (mean of absolute
     /// values), max (the largest), or flip (what a person notices when the two alternate, 0 to 1).
-    #[arg(long, value_name = "NAME", default_value = "rmse", value_parser = metric)]
+    #[arg(long, value_name = "NAME", default_value = "rmse", value_parser = one_of(&METRICS, Metric::from_name))]
     metric: Metric,
     /// Fail when the difference is above this.
     #[arg(long, value_name = "X", value_parser = limit)]
@@ -40,9 +41,8 @@ pub(crate) struct Arguments {
     max_memory: Option<u64>,
 }
 
-fn metric(name: &str) -> Result<Metric, String> {
-    Metric::from_name(name).ok_or_else(|| "expected rmse, relmse, mae, max or flip".to_owned())
-}
+/// The names of metrics.
+pub(crate) const METRICS: [&str; 5] = ["rmse", "relmse", "mae", "max", "flip"];
 
 fn limit(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|x: &f64| *x >= 0.0).ok_or_else(|| "expected a number from 0 up".to_owned())

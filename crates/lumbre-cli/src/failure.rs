@@ -62,8 +62,16 @@ impl fmt::Display for Failure {
 /// # Errors
 /// [`Failure::Io`] when it cannot be written.
 pub(crate) fn print(text: &str) -> Result<(), Failure> {
+    print_bytes(text.as_bytes())
+}
+
+/// [`print`] of bytes.
+///
+/// # Errors
+/// As for [`print`].
+pub(crate) fn print_bytes(bytes: &[u8]) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+    match out.write_all(bytes).and_then(|()| out.flush()) {
         Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(Failure::Io(format!("standard output: {e}"))),
         _ => Ok(()),
     }

@@ -7,6 +7,7 @@ use clap::Args;
 use lumbre::CancelToken;
 use serde_json::json;
 
+use crate::console::escaped;
 use crate::failure::{Failure, print};
 use crate::reading::{ReadingArguments, print_warnings};
 use crate::signals::Signals;
@@ -15,6 +16,7 @@ use crate::signals::Signals;
 #[derive(Args)]
 #[command(after_help = "Examples:
   lumbre info scene.pbrt
+  lumbre info dancer.glb                        which cameras, animations, variants and textures it has
   lumbre info model.ply --json | python3 -m json.tool
 
 Exit status 3 when the scene would not load.")]
@@ -35,6 +37,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let (scene, diagnostics) = arguments.reading.open(&arguments.scene)?;
     let info = scene.info();
     if arguments.json {
+        let animations = info.listing.animations.iter().map(|a| json!({ "name": a.name, "seconds": a.end }));
+        let textures = info.listing.textures.iter();
+        let textures = textures.map(|t| json!({ "name": t.name, "width": t.width, "height": t.height }));
         let bounds = info.bounds.map(|b| json!({ "min": b.min.to_array(), "max": b.max.to_array() }));
         let report = json!({
             "shapes": info.shapes,
@@ -43,6 +48,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             "triangles": info.triangles,
             "instances": info.instances,
             "cameras": info.cameras,
+            "animations": animations.collect::<Vec<_>>(),
+            "variants": info.listing.variants,
+            "textures": textures.collect::<Vec<_>>(),
             "bounds": bounds,
             "memory_bytes": info.memory_bytes,
             "warnings": diagnostics.lines(),
@@ -56,8 +64,22 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let colon = if each.is_empty() { "" } else { ": " };
         line(title, format!("{total}{colon}{}", each.join(", ")))
     };
-    let cameras =
-        if info.cameras.is_empty() { "none: one is made".to_owned() } else { info.cameras.join(", ") };
+    let cameras = match info.cameras.len() {
+        0 => "none: one is made".to_owned(),
+        _ => shortened(info.cameras.iter().map(|name| escaped(name).into_owned())),
+    };
+    let animations = info.listing.animations.iter().enumerate().map(|(i, animation)| {
+        let name = animation.name.as_ref().map_or_else(|| i.to_string(), |name| escaped(name).into_owned());
+        animation.end.map_or_else(|| name.clone(), |end| format!("{name} ({end:.2} s)"))
+    });
+    let variants = info.listing.variants.iter().map(|name| escaped(name).into_owned());
+    let textures = info.listing.textures.iter();
+    let textures = textures.map(|t| format!("{} {}x{}", escaped(&t.name), t.width, t.height));
+    // What most files lack is told only where it is.
+    let listed = |title: &str, names: Vec<String>| match names.len() {
+        0 => String::new(),
+        count => line(title, format!("{count}: {}", shortened(names.into_iter()))),
+    };
     let bounds = info.bounds.map_or("nothing finite".to_owned(), |b| format!("{} to {}", b.min, b.max));
     let report = [
         count("shapes", &info.shapes),
@@ -66,10 +88,25 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         count("materials", &info.materials),
         count("lights", &info.lights),
         line("cameras", cameras),
+        listed("animations", animations.collect()),
+        listed("variants", variants.collect()),
+        listed("textures", textures.collect()),
         line("bounds", bounds),
         line("memory", format!("{:.1} MiB", info.memory_bytes as f64 / f64::from(1 << 20))),
     ];
     print(&report.concat())?;
     print_warnings(&diagnostics);
     Ok(())
+}
+
+/// How many names of a kind are printed: `--json` has all.
+const MOST_NAMES: usize = 20;
+
+fn shortened(names: impl ExactSizeIterator<Item = String>) -> String {
+    let more = names.len().saturating_sub(MOST_NAMES);
+    let mut text = names.take(MOST_NAMES).collect::<Vec<_>>().join(", ");
+    if more > 0 {
+        text += &format!(" and {more} more");
+    }
+    text
 }

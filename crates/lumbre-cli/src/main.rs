@@ -1,23 +1,22 @@
 //! The `lumbre` program: render, cast, info, diff.
 
-use std::io::Write;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
-/// Prints a line to standard error, ignoring errors.
+/// Prints a message to standard error, ignoring errors.
 macro_rules! say {
-    ($($what:tt)*) => {{
-        use std::io::Write as _;
-        let _ = writeln!(std::io::stderr(), $($what)*);
-    }};
+    ($($what:tt)*) => { $crate::console::tell(&format!($($what)*)) };
 }
 
 mod cast;
+mod completions;
+mod console;
 mod diff;
 mod failure;
 mod info;
 mod memory;
+mod names;
 mod output;
 mod progress;
 mod reading;
@@ -25,12 +24,16 @@ mod render;
 mod signals;
 mod staging;
 mod threads;
+mod tips;
 mod units;
+mod verb;
+mod view;
 
 /// Renders scenes, casts rays into them, says what is in them, and compares pictures.
 #[derive(Parser)]
 #[command(name = "lumbre", version, about, max_term_width = 110)]
 #[command(after_help = "Examples:
+  lumbre model.glb                              a picture of a model: without a command, files are rendered
   lumbre render scene.pbrt                      a picture under the scene's own film name
   lumbre render model.obj --size 800x600        a model, framed and lit
   lumbre cast scene.pbrt --rays rays.csv        what each ray hits first
@@ -49,22 +52,30 @@ enum Command {
     Cast(cast::Arguments),
     Info(info::Arguments),
     Diff(diff::Arguments),
+    Completions(completions::CompletionsArguments),
+    Man(completions::ManArguments),
 }
 
 fn main() -> ExitCode {
-    let arguments = Arguments::parse();
+    let words = verb::with_render(std::env::args_os().collect(), &Arguments::command());
+    let arguments: Arguments = match tips::parse(&words) {
+        Ok(arguments) => arguments,
+        Err(status) => return status,
+    };
     threads::start();
     let outcome = match arguments.command {
         Command::Render(arguments) => render::run(&arguments),
         Command::Cast(arguments) => cast::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
         Command::Diff(arguments) => diff::run(&arguments),
+        Command::Completions(arguments) => completions::completions::<Arguments>(&arguments),
+        Command::Man(arguments) => completions::man::<Arguments>(&arguments),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             if !failure.is_silent() {
-                let _ = writeln!(std::io::stderr(), "error: {failure}");
+                say!("error: {failure}");
             }
             failure.exit_code()
         }

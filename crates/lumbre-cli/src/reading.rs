@@ -1,18 +1,24 @@
 //! Opening a scene as the command line specifies, and printing warnings.
 
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 use clap::Args;
-use lumbre::formats::{Diagnostics, Limits, Strictness};
-use lumbre::{Error, Scene, SceneDesc};
+use lumbre::formats::{Budget, Diagnostics, Input, Limits, SceneFormat, Strictness};
+use lumbre::{Error, Scene, SceneDesc, Setting};
 
 use crate::failure::Failure;
 use crate::memory::Memory;
+use crate::names::one_of;
 use crate::units;
 
 /// How scene files are read.
 #[derive(Args)]
+#[command(next_help_heading = "Reading")]
 pub(crate) struct ReadingArguments {
+    /// The format of a scene on standard input, or in a file without a known ending, which else is told by its bytes.
+    #[arg(long, value_name = "FORMAT", value_parser = one_of(&SceneFormat::NAMES, SceneFormat::from_name))]
+    input_format: Option<SceneFormat>,
     /// Warnings are errors.
     #[arg(long, conflicts_with = "lenient")]
     strict: bool,
@@ -20,36 +26,43 @@ pub(crate) struct ReadingArguments {
     #[arg(long)]
     lenient: bool,
     /// The time in seconds at which the animations of a glTF are evaluated.
-    #[arg(long, value_name = "T", value_parser = seconds)]
+    #[arg(long, value_name = "T", value_parser = seconds, help_heading = "Animation")]
     frame: Option<f64>,
     /// How long the shutter is open about the time of a glTF's frame, as a fraction of the frame interval (see --fps): 0,
     /// the default, is an instant; 0.5 is usual in film. Animated objects get motion blur.
-    #[arg(long, value_name = "S", value_parser = shutter)]
+    #[arg(long, value_name = "S", value_parser = shutter, help_heading = "Animation")]
     shutter: Option<f64>,
     /// Frames per second, for --frames and --shutter.
-    #[arg(long, value_name = "N", default_value_t = 24.0, value_parser = rate)]
+    #[arg(long, value_name = "N", default_value_t = 24.0, value_parser = rate, help_heading = "Animation")]
     fps: f64,
     /// The animation of a glTF to play, by its name or its index from 0. By default all play at once, except those that
     /// conflict with an earlier one.
-    #[arg(long, value_name = "NAME|INDEX")]
+    #[arg(long, value_name = "NAME|INDEX", help_heading = "Animation")]
     animation: Option<String>,
     /// The material variant of a glTF.
     #[arg(long, value_name = "NAME")]
     variant: Option<String>,
+    /// Set a parameter of the scene: material.NAME.PARAM, light.INDEX.PARAM, light.area.scale, camera.PARAM or film.PARAM. A name
+    /// that is not there is answered with those that are.
+    #[arg(short = 'D', long = "define", value_name = "PATH=VALUE", help_heading = "Parameters", value_parser = Setting::from_str)]
+    settings: Vec<Setting>,
+    /// A file of such settings, one a line; # begins a comment line.
+    #[arg(long, value_name = "FILE", help_heading = "Parameters")]
+    overlay: Vec<PathBuf>,
     /// Bytes that the program may hold at a time: what reading holds, and scenes and pictures as predicted.
-    #[arg(long, value_name = "SIZE", value_parser = units::bytes)]
+    #[arg(long, value_name = "SIZE", value_parser = units::bytes, help_heading = "Limits")]
     max_memory: Option<u64>,
     /// Vertices, faces, shapes and parameters that may be read.
-    #[arg(long, value_name = "N", hide_short_help = true)]
+    #[arg(long, value_name = "N", hide_short_help = true, help_heading = "Limits")]
     max_elements: Option<u64>,
     /// Levels of includes and blocks.
-    #[arg(long, value_name = "N", hide_short_help = true)]
+    #[arg(long, value_name = "N", hide_short_help = true, help_heading = "Limits")]
     max_nesting: Option<u32>,
     /// Files that may be opened.
-    #[arg(long, value_name = "N", hide_short_help = true)]
+    #[arg(long, value_name = "N", hide_short_help = true, help_heading = "Limits")]
     max_files: Option<u64>,
     /// Bytes that a compressed byte may expand to.
-    #[arg(long, value_name = "N", hide_short_help = true)]
+    #[arg(long, value_name = "N", hide_short_help = true, help_heading = "Limits")]
     max_expansion: Option<u64>,
 }
 
@@ -74,7 +87,7 @@ pub(crate) struct Frames(pub std::ops::RangeInclusive<u32>);
 /// The maximal number of frames in a run, and the largest frame number.
 const MOST_FRAMES: u32 = 1_000_000;
 
-impl std::str::FromStr for Frames {
+impl FromStr for Frames {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -161,10 +174,40 @@ impl ReadingArguments {
         let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
         // What is read counts against the limit too, so that the remark is that of before.
         let memory = self.memory();
-        lumbre::describe(&paths, &self.options(time)?).map_err(|error| match Failure::from(error) {
-            Failure::Limit(message) => Failure::Limit(message + memory.remark()),
-            failure => failure,
-        })
+        let read =
+            lumbre::describe(&paths, &self.options(time)?).map_err(|error| match Failure::from(error) {
+                Failure::Limit(message) => Failure::Limit(message + memory.remark()),
+                failure => failure,
+            });
+        let (mut desc, diagnostics) = read?;
+        for path in &self.overlay {
+            self.overlay(path, &mut desc)?;
+        }
+        for setting in &self.settings {
+            setting.apply(&mut desc).map_err(|wrong| Failure::Usage(format!("-D: {wrong}")))?;
+        }
+        Ok((desc, diagnostics))
+    }
+
+    /// The files of settings, which are read too.
+    pub(crate) fn overlays(&self) -> impl Iterator<Item = &Path> {
+        self.overlay.iter().map(PathBuf::as_path)
+    }
+
+    fn overlay(&self, path: &Path, desc: &mut SceneDesc) -> Result<(), Failure> {
+        let budget = Budget::new(self.limits());
+        let input = Input::open(path, &budget).map_err(Error::from)?;
+        let text = input.text().map_err(Error::from)?;
+        for (number, line) in (1..).zip(text.lines()) {
+            let start = 1 + line.chars().take_while(|c| c.is_whitespace()).count();
+            let line = line.trim();
+            if line.is_empty() || line.starts_with('#') {
+                continue;
+            }
+            let set = Setting::from_str(line).and_then(|setting| setting.apply(desc));
+            set.map_err(|wrong| Failure::input(format!("{}:{number}:{start}: {wrong}", path.display())))?;
+        }
+        Ok(())
     }
 
     fn options(&self, frame: Option<f64>) -> Result<lumbre::ReadOptions, Failure> {
@@ -180,6 +223,7 @@ impl ReadingArguments {
         }
         let mut options = lumbre::ReadOptions::default();
         options.limits = self.limits();
+        options.format = self.input_format;
         options.strictness = self.strictness();
         options.frame = frame;
         options.shutter = self.shutter.unwrap_or(0.0) / self.fps;
@@ -196,8 +240,7 @@ pub(crate) fn print_warnings(diagnostics: &Diagnostics) {
     }
     match diagnostics.warnings() {
         0 => {}
-        1 => say!("1 warning"),
-        n => say!("{n} warnings"),
+        n => say!("{}", units::counted(n, "warning")),
     }
 }
 

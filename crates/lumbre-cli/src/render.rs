@@ -1,6 +1,8 @@
 //! `lumbre render`: renders a picture of a scene.
 
+use std::borrow::Cow;
 use std::fs;
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -15,14 +17,16 @@ use lumbre::{
 };
 use serde_json::json;
 
-use crate::failure::Failure;
+use crate::failure::{Failure, print_bytes};
+use crate::names::one_of;
 use crate::output::{self, Inputs, Pictures, Replaced};
 use crate::progress::{Display, Style, Watched};
 use crate::reading::{Frames, ReadingArguments, print_warnings};
 use crate::signals::{Deadline, Phase, Signals};
 use crate::staging::{self, Behind, StagingArguments};
 use crate::threads;
-use crate::units::{self, Crop, spoken};
+use crate::units::{self, Crop, counted, spoken};
+use crate::view::ViewArguments;
 
 /// Renders a scene to a picture.
 #[derive(Args)]
@@ -32,6 +36,7 @@ use crate::units::{self, Crop, spoken};
   lumbre render model.obj --size 1920x1080 --tonemap agx --exposure 0.5
   lumbre render scene.pbrt -o part.exr --crop 100,50,300,200
   lumbre render scene.pbrt -o all.exr --aov albedo,normal,depth
+  curl https://example.org/fox.glb | lumbre render - -o - | display
 
 A model without camera and light is framed, lit as in a studio, and stands on its shadow:
   lumbre render chair.glb
@@ -42,19 +47,32 @@ A model without camera and light is framed, lit as in a studio, and stands on it
   lumbre render street.gltf --camera \"Bird's eye\"
   lumbre render street.gltf --fit --variant winter
 
+From elsewhere than the front, the right and above:
+  lumbre render chair.glb --azimuth 90 --elevation 15 --zoom 1.5
+  lumbre render part.obj --up z --ortho
+  lumbre render scene.pbrt --eye 3,-8,2 --target 0,0,1 --fov 35
+
+With other parameters than those of the file:
+  lumbre render chair.glb -D material.Wood.roughness=0.2 -D material.Wood.base_color=#704020
+  lumbre render scene.pbrt --overlay evening.txt
+
 Animations of a glTF, at a time in seconds, or frame by frame with motion blur:
   lumbre render dancer.glb --frame 1.5 --shutter 0.5
   lumbre render dancer.glb --frames 0..47 --fps 24 --shutter 0.5 -o frame.####.png
 
 Ctrl-C stops and saves what is there, if every pixel has a sample; a second one stops at once and saves nothing.")]
 pub(crate) struct Arguments {
-    /// The scene: .pbrt, .gltf, .glb, .obj, .ply or .stl, also packed by gzip (but glTF). Several .pbrt files are read one after another.
-    #[arg(required = true)]
+    /// The scene: .pbrt, .gltf, .glb, .obj, .ply or .stl, also packed by gzip; - is standard input. Several .pbrt files are read one
+    /// after another; files of other kinds are put into the same world.
+    #[arg(required = true, value_name = "SCENE")]
     scene: Vec<PathBuf>,
-    /// The picture: .exr, .png, .hdr, .pfm or .jpg. By default the scene's own film name, else the scene's name with .png,
-    /// but never a file that was read or that Lumbre did not write: then STEM.render.png.
+    /// The picture: .exr, .png, .hdr, .pfm or .jpg; - is standard output. By default the scene's own film name, else the scene's
+    /// name with .png, but never a file that was read or that Lumbre did not write: then STEM.render.png.
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
+    /// The format of a picture on standard output: png by default.
+    #[arg(long, value_name = "FORMAT", value_parser = one_of(&WRITTEN, written_format))]
+    output_format: Option<ImageFormat>,
     /// Samples per pixel.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     spp: Option<u32>,
@@ -68,16 +86,16 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "WxH", value_parser = units::size)]
     size: Option<(u32, u32)>,
     /// Frames of an animation from A to B, both included, as -o frame.####.png: frame n is that of the time n / --fps.
-    #[arg(long, value_name = "A..B", conflicts_with_all = ["frame", "turntable"])]
+    #[arg(long, value_name = "A..B", conflicts_with_all = ["frame", "turntable"], help_heading = "Animation")]
     frames: Option<Frames>,
     /// Render this part only: pixels, or fractions of the picture.
     #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = units::crop)]
     crop: Option<Crop>,
     /// A camera by name or 0-based position.
-    #[arg(long, value_name = "NAME|INDEX")]
+    #[arg(long, value_name = "NAME|INDEX", help_heading = "View")]
     camera: Option<String>,
-    /// path, whitted, ambientocclusion, normals, depth, albedo or uv.
-    #[arg(long, value_name = "NAME", value_parser = integrator)]
+    /// What is computed for each pixel: light along paths, or a quantity of what is seen.
+    #[arg(long, value_name = "NAME", value_parser = one_of(&INTEGRATORS, IntegratorKind::from_name))]
     integrator: Option<IntegratorKind>,
     /// The maximal number of bounces.
     #[arg(long, value_name = "N")]
@@ -92,12 +110,11 @@ pub(crate) struct Arguments {
     /// black: then it is measured.
     #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = exposure)]
     exposure: Option<f32>,
-    /// Tone mapping, for .png and .jpg: none, agx, aces or neutral. By default neutral with the light of the studio or
-    /// --env, else none.
-    #[arg(long, value_name = "NAME", value_parser = tone_map)]
+    /// Tone mapping, for .png and .jpg. By default neutral with the light of the studio or --env, else none.
+    #[arg(long, value_name = "NAME", value_parser = one_of(&TONE_MAPS, ToneMap::from_name))]
     tonemap: Option<ToneMap>,
-    /// AOVs as layers of an .exr: albedo, normal, depth, uv.
-    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = feature)]
+    /// AOVs as layers of an .exr, separated by commas.
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = one_of(&FEATURES, Feature::from_name))]
     aov: Vec<Feature>,
     /// Write statistics of the render, as JSON.
     #[arg(long, value_name = "FILE.json")]
@@ -111,6 +128,8 @@ pub(crate) struct Arguments {
     /// Print errors only.
     #[arg(short, long, conflicts_with = "verbose")]
     quiet: bool,
+    #[command(flatten)]
+    view: ViewArguments,
     #[command(flatten)]
     staging: StagingArguments,
     #[command(flatten)]
@@ -131,34 +150,33 @@ fn exposure(text: &str) -> Result<f32, String> {
         .ok_or_else(|| "expected a number from -100 to 100, such as 1.5".to_owned())
 }
 
-fn integrator(name: &str) -> Result<IntegratorKind, String> {
-    IntegratorKind::from_name(name)
-        .ok_or_else(|| "expected path, whitted, ambientocclusion, normals, depth, albedo or uv".to_owned())
+/// The names of integrators.
+pub(crate) const INTEGRATORS: [&str; 7] =
+    ["path", "whitted", "ambientocclusion", "normals", "depth", "albedo", "uv"];
+/// The names of tone mappings.
+pub(crate) const TONE_MAPS: [&str; 4] = ["none", "agx", "aces", "neutral"];
+/// The names of formats that are written.
+const WRITTEN: [&str; 5] = ["png", "exr", "hdr", "pfm", "jpg"];
+
+fn written_format(name: &str) -> Option<ImageFormat> {
+    ImageFormat::from_path(Path::new(&format!("picture.{name}")))
 }
 
-fn tone_map(name: &str) -> Result<ToneMap, String> {
-    ToneMap::from_name(name).ok_or_else(|| "expected none, agx, aces or neutral".to_owned())
-}
-
-fn feature(name: &str) -> Result<Feature, String> {
-    Feature::from_name(name).ok_or_else(|| "expected albedo, normal, depth or uv".to_owned())
-}
+/// The names of AOVs.
+pub(crate) const FEATURES: [&str; 4] = ["albedo", "normal", "depth", "uv"];
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     // Invalid names are reported before the scene is read, invalid folders before it is rendered.
-    arguments.staging.check(arguments.output.as_deref())?;
-    arguments.check_frames(arguments.output.as_deref())?;
-    if let Some(output) = &arguments.output {
+    let named = arguments.output.as_deref().map(|output| arguments.named(output));
+    arguments.staging.check(named.as_deref())?;
+    arguments.check_frames(named.as_deref())?;
+    if let Some(output) = &named {
         check_format(output, !arguments.aov.is_empty())?;
     }
-    let named = Inputs::of(arguments.inputs());
-    output::refuse_inputs(
-        arguments.output.as_deref(),
-        &arguments.pictures(),
-        arguments.stats.as_deref(),
-        &named,
-    )?;
+    arguments.check_standard_output()?;
+    let inputs = Inputs::of(arguments.inputs());
+    output::refuse_inputs(arguments.file(), &arguments.pictures(), arguments.stats.as_deref(), &inputs)?;
     let start = Instant::now();
     if let (Some((width, height)), None) = (arguments.size, &arguments.crop) {
         // What cannot fit is known before anything is read.
@@ -171,6 +189,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     signals.end_at(arguments.deadline(start));
     signals.enter(READING);
     let mut stage = arguments.staging.stage(arguments.size, arguments.reading.limits())?;
+    arguments.view.set(&mut stage)?;
     // The first picture's name and exposure are used for all.
     let mut from_first = First { pattern: None, exposure: arguments.exposure };
     if let Some(Frames(frames)) = &arguments.frames {
@@ -230,10 +249,21 @@ const LEAST_TIME: Duration = Duration::from_millis(400);
 
 const READING: Phase = Phase::Preparing("reading the scene");
 
+/// Whether an output is standard output.
+fn is_standard_output(path: &Path) -> bool {
+    path.as_os_str() == "-"
+}
+
 impl Arguments {
     /// The files that are named on the command line and read.
     fn inputs(&self) -> impl Iterator<Item = &Path> {
-        self.scene.iter().map(PathBuf::as_path).chain(self.staging.inputs())
+        let files = self.scene.iter().map(PathBuf::as_path).chain(self.staging.inputs());
+        files.chain(self.reading.overlays())
+    }
+
+    /// The output, unless it is standard output.
+    fn file(&self) -> Option<&Path> {
+        self.output.as_deref().filter(|output| !is_standard_output(output))
     }
 
     /// What there will be of pictures.
@@ -253,14 +283,36 @@ impl Arguments {
     /// The name of the pictures, or the pattern of their names.
     fn pattern(&self, scene: &Scene, inputs: &Inputs) -> Result<PathBuf, Failure> {
         let (pictures, statistics) = (self.pictures(), self.stats.as_deref());
+        output::refuse_inputs(self.file(), &pictures, statistics, inputs)?;
         if let Some(pattern) = &self.output {
-            output::refuse_inputs(Some(pattern), &pictures, statistics, inputs)?;
             return Ok(pattern.clone());
         }
         let film = scene.resolved().film().filename.as_deref().map(Path::new);
         let film = film.filter(|name| check_format(name, false).is_ok());
-        output::refuse_inputs(None, &pictures, statistics, inputs)?;
         output::default_name(film, &self.scene[0], &pictures, statistics, inputs, self.quiet)
+    }
+
+    /// An output by a name whose ending is its format, also if it is standard output.
+    fn named<'p>(&self, output: &'p Path) -> Cow<'p, Path> {
+        if !is_standard_output(output) {
+            return Cow::Borrowed(output);
+        }
+        let format = self.output_format.unwrap_or(ImageFormat::Png).name().to_ascii_lowercase();
+        Cow::Owned(format!("standard output.{format}").into())
+    }
+
+    /// Refuses to fill a terminal with the bytes of a picture, and a format for what has an ending.
+    fn check_standard_output(&self) -> Result<(), Failure> {
+        let is_asked = self.output.as_deref().is_some_and(is_standard_output);
+        if is_asked && std::io::stdout().is_terminal() {
+            let message = "standard output is a terminal (expected a pipe or a file, as -o - > picture.png)";
+            return Err(Failure::Usage(message.to_owned()));
+        }
+        if self.output_format.is_some() && !is_asked {
+            let message = "--output-format is for standard output (expected -o -; files have the format of their ending)";
+            return Err(Failure::Usage(message.to_owned()));
+        }
+        Ok(())
     }
 
     /// Rejects frames without an animation, and an output name that is the same for all frames.
@@ -365,16 +417,19 @@ fn picture(
         Some(pattern) => pattern.clone(),
         None => first.pattern.insert(arguments.pattern(&scene, &inputs)?).clone(),
     };
-    check_format(&output, !arguments.aov.is_empty())?;
-    arguments.staging.check(Some(&output))?;
-    let output = number.map_or(output.clone(), |number| staging::frame_name(&output, number));
-    for path in std::iter::once(&output).chain(&arguments.stats) {
+    let named = arguments.named(&output);
+    check_format(&named, !arguments.aov.is_empty())?;
+    arguments.staging.check(Some(&named))?;
+    let is_piped = is_standard_output(&output);
+    let output = number.map_or(named.to_path_buf(), |number| staging::frame_name(&output, number));
+    for path in std::iter::once(&output).filter(|_| !is_piped).chain(&arguments.stats) {
         inputs.refuse(path)?;
         probe_writable(path).map_err(|e| Failure::from(lumbre::Error::from(e)))?;
     }
     let mut options = options(arguments, &scene)?;
     options.transparent = behind.is_transparent();
     check_film(arguments, &options, scene.info().memory_bytes)?;
+    arguments.view.check_camera(&scene, options.camera)?;
     let warn = |what: String| match arguments.reading.is_strict() {
         true => Err(Failure::input(what)),
         false if arguments.quiet || !is_first => Ok(()),
@@ -436,7 +491,12 @@ fn picture(
         Behind::Background(background) => picture.over(background),
         Behind::Lights | Behind::Nothing => picture,
     };
-    picture.save_with(&output, &save, &arguments.aov)?;
+    if is_piped {
+        let format = arguments.output_format.unwrap_or(ImageFormat::Png);
+        print_bytes(&picture.encode(format, &save, &arguments.aov)?)?;
+    } else {
+        picture.save_with(&output, &save, &arguments.aov)?;
+    }
     drop(stream);
     let save_time = save_start.elapsed();
     report_stats(arguments, &picture);
@@ -455,7 +515,8 @@ fn picture(
     }
     if !arguments.quiet {
         replaced.iter().for_each(Replaced::say);
-        summary(arguments.verbose, &scene, &picture, &output, render_time);
+        let name = if is_piped { "standard output".into() } else { output.display().to_string() };
+        summary(arguments.verbose, &scene, &picture, &name, render_time);
     }
     Ok(())
 }
@@ -592,7 +653,7 @@ fn report_stats(arguments: &Arguments, picture: &Picture) {
     }
     let unsaid = stats.dropped.saturating_sub(stats.first_dropped.len() as u64);
     if unsaid > 0 {
-        say!("warning: {unsaid} more samples were not finite and dropped");
+        say!("warning: {} more not finite and dropped", counted(unsaid, "sample"));
     }
 }
 
@@ -633,23 +694,22 @@ fn peak_memory() -> Option<u64> {
     line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kib| kib * 1024)
 }
 
-fn summary(verbose: bool, scene: &Scene, picture: &Picture, output: &Path, render_time: Duration) {
+fn summary(verbose: bool, scene: &Scene, picture: &Picture, output: &str, render_time: Duration) {
     let stats = picture.stats();
     let image = picture.image();
     say!(
-        "{}: {}x{}, {} samples a pixel, {}",
-        output.display(),
+        "{output}: {}x{}, {} a pixel, {}",
         image.width(),
         image.height(),
-        stats.spp,
+        counted(u64::from(stats.spp), "sample"),
         spoken(render_time)
     );
     if verbose {
         let rays = stats.rays;
         let total = rays.camera + rays.bounce + rays.shadow;
         say!(
-            "{} threads, {:.2} M paths/s, {:.2} M rays/s ({} camera, {} bounce, {} shadow)",
-            stats.threads,
+            "{}, {:.2} M paths/s, {:.2} M rays/s ({} camera, {} bounce, {} shadow)",
+            counted(stats.threads as u64, "thread"),
             stats.paths_per_second() / 1e6,
             total as f64 / render_time.as_secs_f64().max(1e-9) / 1e6,
             rays.camera,
@@ -657,8 +717,8 @@ fn summary(verbose: bool, scene: &Scene, picture: &Picture, output: &Path, rende
             rays.shadow
         );
         say!(
-            "{} primitives, tree built in {}",
-            scene.resolved().accel().primitive_count(),
+            "{}, tree built in {}",
+            counted(scene.resolved().accel().primitive_count() as u64, "primitive"),
             spoken(scene.build_time())
         );
         if let Some(noise) = stats.noise {

@@ -6,10 +6,12 @@ use std::sync::Arc;
 use clap::Args;
 use lumbre::description::{GroundPlane, StageLight};
 use lumbre::formats::Limits;
+use lumbre::formats::diagnostic::nearest_name;
 use lumbre::image::{Image, Rgb, srgb_to_linear};
 use lumbre::{Background, EnvironmentDesc, Ground, Stage, Staged, Surroundings};
 
 use crate::failure::Failure;
+use crate::names::one_of;
 
 /// How a model is shown.
 #[derive(Args)]
@@ -17,7 +19,7 @@ use crate::failure::Failure;
 pub(crate) struct StagingArguments {
     /// What the model stands on: none, shadow (ground of which only the shadow is seen) or plane (matte grey). By default a
     /// shadow where both camera and light are automatic.
-    #[arg(long, value_name = "WHAT", value_parser = ground)]
+    #[arg(long, value_name = "WHAT", value_parser = one_of(&Ground::NAMES, Ground::from_name))]
     ground: Option<Ground>,
     /// Light from all around: a picture twice as wide as high, or square in pbrt's equal-area mapping (.hdr, .exr, …); studio; or
     /// none besides the file's own. By default studio for what brings no light, and for a glTF without a camera.
@@ -28,11 +30,11 @@ pub(crate) struct StagingArguments {
     #[arg(long, value_name = "WHAT", value_parser = background)]
     background: Option<BackgroundArgument>,
     /// Frame the whole model even if the file has a camera.
-    #[arg(long, conflicts_with = "camera")]
+    #[arg(long, conflicts_with = "camera", help_heading = "View")]
     fit: bool,
     /// Render N pictures from all around the model, as -o frame.####.png.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000),
-          conflicts_with_all = ["camera", "stats"])]
+          conflicts_with_all = ["camera", "stats"], help_heading = "View")]
     turntable: Option<u32>,
 }
 
@@ -61,10 +63,6 @@ const COLOURS: [(&str, u32); 12] = [
     ("navy", 0x00_00_80),
 ];
 
-fn ground(name: &str) -> Result<Ground, String> {
-    Ground::from_name(name).ok_or_else(|| "expected none, shadow, plane or auto".to_owned())
-}
-
 fn background(text: &str) -> Result<BackgroundArgument, String> {
     let lower = text.to_ascii_lowercase();
     match &*lower {
@@ -90,8 +88,10 @@ fn background(text: &str) -> Result<BackgroundArgument, String> {
         return Ok(BackgroundArgument::File(text.into()));
     }
     let names: Vec<&str> = COLOURS.iter().map(|(name, _)| *name).collect();
+    let near = nearest_name(text, names.iter().copied().chain(["env", "studio", "transparent"]));
+    let tip = near.map_or_else(String::new, |near| format!("; did you mean {near}?"));
     Err(format!(
-        "expected env, studio, transparent, a colour ({}, or as #e8e0d8) or an image file",
+        "expected env, studio, transparent, a colour ({}, or as #e8e0d8) or an image file{tip}",
         names.join(", ")
     ))
 }

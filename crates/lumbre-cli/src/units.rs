@@ -97,6 +97,11 @@ pub(crate) fn bytes(text: &str) -> Result<u64, String> {
     if value > 0.0 && value.is_finite() { Ok((value * factor as f64) as u64) } else { Err(wrong()) }
 }
 
+/// A number of things: `1 sample`, `16 samples`.
+pub(crate) fn counted(count: u64, thing: &str) -> String {
+    format!("{count} {thing}{}", if count == 1 { "" } else { "s" })
+}
+
 /// A duration in words.
 pub(crate) fn spoken(duration: Duration) -> String {
     let seconds = duration.as_secs();
@@ -122,6 +127,11 @@ mod tests {
         assert_eq!(duration("2.5"), Ok(Duration::from_millis(2500)));
         assert_eq!(bytes("1.5k"), Ok(1536));
         assert_eq!(bytes("8GiB"), Ok(8 << 30));
+    }
+
+    #[test]
+    fn one_thing_is_not_many() {
+        assert_eq!([0, 1, 2].map(|n| counted(n, "sample")), ["0 samples", "1 sample", "2 samples"]);
     }
 
     #[test]

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 use tempfile::TempDir;
 
-const SPHERE: &str = r#"
+pub(crate) const SPHERE: &str = r#"
 Film "rgb" "integer xresolution" 48 "integer yresolution" 32 "string filename" "sphere.png"
 Sampler "sobol" "integer pixelsamples" 4
 LookAt 0 -8 3  0 0 0  0 0 1
@@ -21,25 +21,25 @@ Material "diffuse" "rgb reflectance" [0.7 0.4 0.2]
 Shape "sphere" "float radius" 1.75 "point3 center" [0.25 0 0.5]
 "#;
 
-struct Desk {
-    folder: TempDir,
+pub(crate) struct Desk {
+    pub(crate) folder: TempDir,
 }
 
 impl Desk {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self { folder: tempfile::tempdir().unwrap() }
     }
 
-    fn path(&self, name: &str) -> PathBuf {
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
-    fn write(&self, name: &str, text: &str) -> PathBuf {
+    pub(crate) fn write(&self, name: &str, text: &str) -> PathBuf {
         fs::write(self.path(name), text).unwrap();
         self.path(name)
     }
 
-    fn lumbre(&self, arguments: &[&str]) -> Output {
+    pub(crate) fn lumbre(&self, arguments: &[&str]) -> Output {
         Command::new(env!("CARGO_BIN_EXE_lumbre"))
             .args(arguments)
             .current_dir(self.folder.path())
@@ -49,22 +49,22 @@ impl Desk {
     }
 }
 
-fn code(output: &Output) -> i32 {
+pub(crate) fn code(output: &Output) -> i32 {
     output.status.code().expect("no signal ended it")
 }
 
-fn stderr(output: &Output) -> String {
+pub(crate) fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-fn stdout(output: &Output) -> String {
+pub(crate) fn stdout(output: &Output) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
 #[test]
 fn every_command_has_help_with_an_example() {
     let desk = Desk::new();
-    for command in ["render", "cast", "info", "diff"] {
+    for command in ["render", "cast", "info", "diff", "completions", "man"] {
         let help = desk.lumbre(&[command, "--help"]);
         assert_eq!(code(&help), 0);
         assert!(stdout(&help).contains(&format!("  lumbre {command} ")), "{command}: {}", stdout(&help));
@@ -442,7 +442,7 @@ fn every_scene_has_the_same_bytes_from_any_number_of_threads() {
 }
 
 /// A pyramid on the plane z = 0, of 5 by 3 at its foot and 4 high.
-const PYRAMID: &str = "solid p
+pub(crate) const PYRAMID: &str = "solid p
 facet normal 0 0 0\nouter loop\nvertex 1 1 0\nvertex 6 1 0\nvertex 3 2 4\nendloop\nendfacet
 facet normal 0 0 0\nouter loop\nvertex 6 1 0\nvertex 6 4 0\nvertex 3 2 4\nendloop\nendfacet
 facet normal 0 0 0\nouter loop\nvertex 6 4 0\nvertex 1 4 0\nvertex 3 2 4\nendloop\nendfacet

@@ -533,17 +533,19 @@ pub fn quoted(text: &str) -> String {
         }
         match c {
             '"' | '\\' => out.extend(['\\', c]),
-            // Control characters could drive the terminal, and bidirectional marks could disguise the message.
-            c if c.is_control()
-                || matches!(c, '\u{200E}' | '\u{200F}' | '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{2069}') =>
-            {
-                out.extend(c.escape_default());
-            }
-            c => out.push(c),
+            c if is_printable(c) => out.push(c),
+            c => out.extend(c.escape_default()),
         }
     }
     out.push('"');
     out
+}
+
+/// Whether a character is harmless in a message: control characters could drive the terminal, and bidirectional
+/// marks could disguise the text.
+pub fn is_printable(c: char) -> bool {
+    !c.is_control()
+        && !matches!(c, '\u{200E}' | '\u{200F}' | '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{2069}')
 }
 
 /// A number from an input for a message; very large and very small ones in scientific notation.

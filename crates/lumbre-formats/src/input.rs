@@ -67,13 +67,15 @@ impl<'b> Input<'b> {
             // Charged, and given back at once.
             budget.hold(unpacked, &self.name).map(drop)
         };
-        let size = counted(MultiGzDecoder::new(&self.bytes[..]), fits).and_then(|size| {
-            let reader = MultiGzDecoder::new(&self.bytes[..]);
-            read_within(reader, size, &mut bytes, &mut hold, &self.name, within)
+        let mut first = MultiGzDecoder::new(&self.bytes[..]);
+        let mut second = MultiGzDecoder::new(&self.bytes[..]);
+        let read = counted(&mut first, fits).map_err(|e| (e, first.get_ref().len())).and_then(|size| {
+            read_within(&mut second, size, &mut bytes, &mut hold, &self.name, within)
+                .map_err(|e| (e, second.get_ref().len()))
         });
-        size.map_err(|e| match e {
+        read.map_err(|(e, left)| match e {
             ReadError::Limit(limit) => FormatError::from(limit),
-            ReadError::Io(source) => unpacking_error(path, &self.name, source),
+            ReadError::Io(source) => unpacking_error(path, &self.name, packed - left as u64, source),
         })?;
         Ok(Self { name: self.name, bytes, hold })
     }
@@ -135,11 +137,12 @@ pub(crate) fn open_regular(path: &Path) -> Result<(File, u64), FormatError> {
     Ok((file, meta.len()))
 }
 
-/// What unpacking gzip data said, as an error of the input where its bytes are at fault.
-pub(crate) fn unpacking_error(path: &Path, name: &Arc<str>, source: io::Error) -> FormatError {
+/// What unpacking gzip data said, as an error of the input where its bytes are at fault. It had read `at` of them.
+pub(crate) fn unpacking_error(path: &Path, name: &Arc<str>, at: u64, source: io::Error) -> FormatError {
     match source.kind() {
         io::ErrorKind::InvalidInput | io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof => {
-            Diagnostic::error("damaged gzip data").at(Place::whole(name.clone())).found(source).into()
+            let place = Place::binary(name.clone(), at, "");
+            Diagnostic::error("damaged gzip data").at(place).found(source).into()
         }
         _ => FormatError::io(path, "cannot unpack", source),
     }
@@ -373,7 +376,10 @@ pub(crate) mod tests {
         let whole = gzip(b"ply\nformat ascii 1.0\n");
         for cut in 2..whole.len() {
             let error = Input::from_reader("m.ply.gz", &whole[..cut], &Budget::default()).unwrap_err();
-            assert!(error.to_string().starts_with("m.ply.gz: damaged gzip data"), "{error}");
+            let said = error.to_string();
+            let at =
+                said.strip_prefix("m.ply.gz:byte ").unwrap().split_once(": damaged gzip data").unwrap().0;
+            assert!(at.parse::<usize>().unwrap() <= cut, "{error}");
         }
     }
 

@@ -27,5 +27,5 @@ pub use budget::{Budget, BudgetVec, Hold, LimitError, LimitKind, Limits};
 pub use diagnostic::{Diagnostic, Diagnostics, FormatError, Place, Position, Severity, Strictness};
 pub use input::Input;
 pub use input_stream::InputStream;
-pub use open::{ReadOptions, open_scene, open_scenes};
+pub use open::{ReadOptions, SceneFormat, open_scene, open_scenes};
 pub use thin::Thin;

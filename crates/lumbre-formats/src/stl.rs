@@ -32,7 +32,15 @@ pub fn open_stl(
     budget: &Budget,
     diagnostics: &mut Diagnostics,
 ) -> Result<SceneDesc, FormatError> {
-    let input = Input::open(path, budget)?;
+    stl_scene(Input::open(path, budget)?, budget, diagnostics)
+}
+
+/// [`open_stl`] of a file that is open.
+pub(crate) fn stl_scene(
+    input: Input<'_>,
+    budget: &Budget,
+    diagnostics: &mut Diagnostics,
+) -> Result<SceneDesc, FormatError> {
     let solids = read_stl(&input, input.name(), budget, diagnostics)?;
     Ok(scene_of_meshes(solids.into_iter().map(|solid| solid.mesh), UpAxis::Z))
 }

@@ -49,6 +49,7 @@ impl Scene {
             without_light: _,
             up,
             ground: _,
+            listing: _,
         } = desc;
         check_cameras(&cameras)?;
         let mut builder = Builder {

@@ -8,7 +8,7 @@ use lumbre_kernel::{CustomGeometry, Placement};
 use lumbre_math::{AnimatedTransform, DVec3, Transform, Vec2, Vec3, Vec4};
 use lumbre_shading::{FURTHER_SETS, FloatTexture, Material, MipMap};
 
-use crate::{Camera, MaterialId, ObjectId};
+use crate::{Camera, Listing, MaterialId, ObjectId};
 
 /// A scene description.
 #[derive(Clone, Debug, Default)]
@@ -39,6 +39,8 @@ pub struct SceneDesc {
     pub up: UpAxis,
     /// The ground plane.
     pub ground: Option<GroundDesc>,
+    /// What its files hold by name.
+    pub listing: Listing,
 }
 
 /// An infinite matte plane below everything.
@@ -68,13 +70,15 @@ pub enum WithoutLight {
 }
 
 /// The up axis.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum UpAxis {
-    /// y, as in most meshes and in glTF.
+    /// y, as in most meshes (OBJ, PLY) and in glTF; the front is towards z.
     #[default]
     Y,
-    /// z, as in most of engineering (STL).
+    /// z, as in most of engineering (STL); the front is towards -y.
     Z,
+    /// Any direction, of any non-zero length; the front is where the shortest turn takes that of y up.
+    Towards(DVec3),
 }
 
 /// A material with its name.

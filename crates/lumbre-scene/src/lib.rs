@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod append;
 mod build;
 mod camera;
 mod csg;
@@ -14,12 +15,14 @@ mod ground;
 mod id;
 mod interaction;
 pub mod light;
+mod listing;
 mod mesh;
 mod scene;
 mod solid;
 mod stage;
 mod studio;
 mod surface;
+mod viewpoint;
 
 pub use camera::{Camera, CameraKind, CameraRay, SphericalMapping, View};
 pub use desc::*;
@@ -30,6 +33,8 @@ pub use ground::GroundPlane;
 pub use id::{MaterialId, ObjectId};
 pub use interaction::{Interaction, offset};
 pub use light::{Light, LightId, LightSample};
+pub use listing::{AnimationListing, Listing, TextureListing};
 pub use lumbre_kernel::Placement;
 pub use scene::{BuildWarning, Scene};
 pub use stage::{Ground, Stage, StageLight, Staged, Surroundings};
+pub use viewpoint::Viewpoint;

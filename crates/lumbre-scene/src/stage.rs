@@ -2,14 +2,15 @@
 
 use std::sync::Arc;
 
+use lumbre_geometry::Aabb;
 use lumbre_image::{Image, Rgb};
-use lumbre_math::{DAffine3, DMat3, Transform};
+use lumbre_math::{DAffine3, DMat3, DVec3, Transform};
 
 use crate::extent::Extent;
 use crate::framing::{self, axes};
 use crate::{
     EnvironmentDesc, EnvironmentMapping, GeometryDesc, GroundDesc, LightDesc, SceneDesc, ShapeDesc, UpAxis,
-    WithoutLight, studio,
+    Viewpoint, WithoutLight, studio,
 };
 
 /// How a description is staged. What it has itself is kept, unless stated otherwise here.
@@ -25,6 +26,11 @@ pub struct Stage {
     /// for all rotations. The studio rotates with the camera, as if the model turned in front of both. `None`
     /// for the still view.
     pub turns: Option<f64>,
+    /// What is asked of the camera. Unless it only changes the lens, it replaces the description's cameras; the
+    /// studio goes around with it.
+    pub view: Viewpoint,
+    /// What is up, if it is not what the description says.
+    pub up: Option<UpAxis>,
     /// The environment light.
     pub surroundings: Surroundings,
     /// The ground plane.
@@ -126,8 +132,14 @@ impl Stage {
     /// Adds to a description what it lacks.
     pub fn set(&self, desc: &mut SceneDesc) -> Staged {
         let is_model = desc.without_light != WithoutLight::Dark;
-        let framed = desc.cameras.is_empty() || self.fit || self.turns.is_some();
-        let turns = self.turns.unwrap_or(0.0);
+        let framed =
+            desc.cameras.is_empty() || self.fit || self.turns.is_some() || self.view.replaces_cameras();
+        desc.up = self.up.unwrap_or(desc.up);
+        let (camera, bounds) = {
+            let extent = Extent::new(desc);
+            (framed.then(|| self.framed(&extent, desc)), extent.bounds())
+        };
+        let turns = camera.as_ref().map_or(0.0, |framed| framed.turns);
         let photometric = desc.without_light == WithoutLight::StudioUnlessStaged
             && desc.lights.iter().any(|light| !matches!(light, LightDesc::Infinite { .. }));
 
@@ -150,7 +162,6 @@ impl Stage {
         // Nothing more is added when it is built.
         desc.without_light = WithoutLight::Dark;
 
-        let extent = Extent::new(desc);
         let is_shown_by_default = is_model && framed && light != StageLight::Own;
         let kind = match self.ground {
             Ground::Automatic if is_shown_by_default => Ground::Shadow,
@@ -158,25 +169,50 @@ impl Stage {
             asked => asked,
         };
         let catcher = kind == Ground::Shadow;
-        let ground = (kind != Ground::None).then(|| ground(&extent, desc, catcher)).flatten();
-        let camera = framed.then(|| {
-            let (width, height) = self.size.or(desc.film.width.zip(desc.film.height)).unwrap_or(SIZE);
-            let aspect = f64::from(width) / f64::from(height.max(1));
-            let points = |visit: &mut dyn FnMut(lumbre_math::DVec3)| extent.each_point(visit);
-            match self.turns {
-                None => framing::still(&points, desc.up, aspect),
-                Some(turns) => framing::turned(&points, desc.up, aspect, turns),
-            }
-        });
+        let ground = (kind != Ground::None).then(|| ground(&bounds, desc, catcher)).flatten();
+        // From below, ground that nobody asked for would hide everything.
+        let is_seen_from_below = |ground: &GroundDesc| {
+            let eye = camera.as_ref().map(|framed| framed.camera.world_from_camera.point(DVec3::ZERO));
+            eye.is_some_and(|eye| (eye - ground.point).dot(ground.normal) < 0.0)
+        };
+        let ground = ground.filter(|ground| self.ground != Ground::Automatic || !is_seen_from_below(ground));
         let grounded = ground.is_some();
         desc.ground = ground.or(desc.ground);
-        if let Some(camera) = camera {
+        let aspect = self.aspect(desc);
+        if !framed {
+            desc.cameras.iter_mut().for_each(|camera| self.view.set_lens(camera, aspect));
+        }
+        if let Some(framing::Framed { camera, .. }) = camera {
             desc.cameras = vec![camera];
             if let ((None, None), None) = ((desc.film.width, desc.film.height), self.size) {
                 (desc.film.width, desc.film.height) = (Some(SIZE.0), Some(SIZE.1));
             }
         }
         Staged { framed, light, grounded, photometric }
+    }
+
+    /// The camera that stands for those of the description, with the shutter of the first and the same side to the left.
+    fn framed(&self, extent: &Extent, desc: &SceneDesc) -> framing::Framed {
+        let points = |visit: &mut dyn FnMut(DVec3)| extent.each_point(visit);
+        let own = desc.cameras.first();
+        let mut framed = framing::Framing {
+            up: desc.up,
+            // Camera space is left-handed: only a mirror takes it to a right-handed world.
+            is_left_handed: own.is_some_and(|own| !own.world_from_camera.is_mirror()),
+            aspect: self.aspect(desc),
+            viewpoint: &self.view,
+            turns: self.turns,
+        }
+        .camera(&points);
+        if let Some(own) = own {
+            (framed.camera.shutter_open, framed.camera.shutter_close) = (own.shutter_open, own.shutter_close);
+        }
+        framed
+    }
+
+    fn aspect(&self, desc: &SceneDesc) -> f64 {
+        let (width, height) = self.size.or(desc.film.width.zip(desc.film.height)).unwrap_or(SIZE);
+        f64::from(width) / f64::from(height.max(1))
     }
 }
 
@@ -217,14 +253,13 @@ fn shines(desc: &SceneDesc) -> bool {
 }
 
 /// The plane under everything; `None` if there is nothing.
-fn ground(extent: &Extent, desc: &SceneDesc, catcher: bool) -> Option<GroundDesc> {
-    let bounds = extent.bounds();
+fn ground(bounds: &Aabb, desc: &SceneDesc, catcher: bool) -> Option<GroundDesc> {
     if bounds.is_empty() || !bounds.min.is_finite() || !bounds.max.is_finite() {
         return None;
     }
     let [_, normal, _] = axes(desc.up, 0.0);
     let center = bounds.center();
-    let half_height = 0.5 * bounds.size().dot(normal);
+    let half_height = 0.5 * bounds.size().dot(normal.abs());
     let drop = half_height + GAP * bounds.size().max_element();
     Some(GroundDesc { point: center - drop * normal, normal, reflectance: Rgb::splat(GROUND), catcher })
 }
@@ -234,7 +269,6 @@ mod tests {
     use super::*;
     use crate::{AreaLightDesc, Camera, CameraKind, MaterialId, NamedMaterial, Scene};
     use lumbre_geometry::{Ray, Sphere};
-    use lumbre_math::DVec3;
     use lumbre_shading::Material;
 
     fn ball() -> SceneDesc {
@@ -379,6 +413,58 @@ mod tests {
         for (a, b) in start.into_iter().zip(later) {
             assert!((a / b - 1.0).abs() < 1e-3, "{a} {b}");
         }
+    }
+
+    #[test]
+    fn an_asked_view_replaces_a_camera_and_a_lens_changes_it() {
+        let staged = |view: Viewpoint| {
+            let mut desc = SceneDesc { cameras: vec![Camera { shutter_close: 0.25, ..camera() }], ..ball() };
+            let framed = Stage { view, ..Stage::default() }.set(&mut desc).framed;
+            (framed, desc.cameras[0].clone())
+        };
+        let lens = Viewpoint { fov: Some(20.0), ..Viewpoint::default() };
+        let (framed, changed) = staged(lens);
+        let narrow = CameraKind::Perspective { fov: 20.0, lens_radius: 0.0, focal_distance: 1.0 };
+        assert_eq!((framed, changed), (false, Camera { kind: narrow, shutter_close: 0.25, ..camera() }));
+        let eye = DVec3::new(-6.0, 2.0, 5.0);
+        let (framed, placed) = staged(Viewpoint { eye: Some(eye), ..Viewpoint::default() });
+        assert!(framed && placed.shutter_close == 0.25);
+        assert!((placed.world_from_camera.point(DVec3::ZERO) - eye).length() < 1e-12);
+        // At the middle of the model.
+        let forward = placed.world_from_camera.vector(DVec3::Z);
+        assert!((forward - (DVec3::new(3.0, 7.0, -4.0) - eye).normalize()).length() < 1e-12);
+        // The file's camera has its right hand where x goes, so the new one has too.
+        assert!(!placed.world_from_camera.is_mirror());
+        assert!(staged(Viewpoint { azimuth: 30.0, ..Viewpoint::default() }).0);
+    }
+
+    #[test]
+    fn the_studio_goes_around_with_the_azimuth_as_with_turns() {
+        let lights = |turns: Option<f64>, azimuth: f64| {
+            let mut desc = ball();
+            let view = Viewpoint { azimuth, ..Viewpoint::default() };
+            Stage { turns, view, ..Stage::default() }.set(&mut desc);
+            let LightDesc::Infinite { world_from_light, .. } = &desc.lights[0] else { panic!() };
+            world_from_light.vector(DVec3::X)
+        };
+        assert!((lights(Some(0.125), 0.0) - lights(None, 45.0)).length() < 1e-12);
+        assert!((lights(None, 0.0) - lights(None, 45.0)).length() > 0.1);
+    }
+
+    #[test]
+    fn another_up_axis_turns_the_ground_and_no_ground_is_added_over_the_camera() {
+        let up = Some(UpAxis::Z);
+        let mut desc = ball();
+        Stage { up, ..Stage::default() }.set(&mut desc);
+        let ground = desc.ground.unwrap();
+        assert_eq!(ground.normal, DVec3::Z);
+        assert!((ground.point.z + 6.5).abs() < 1e-3, "{ground:?}");
+        let view = Viewpoint { elevation: -60.0, ..Viewpoint::default() };
+        let mut desc = ball();
+        let staged = Stage { view: view.clone(), ..Stage::default() }.set(&mut desc);
+        assert!(!staged.grounded && desc.ground.is_none());
+        let staged = Stage { view, ground: Ground::Plane, ..Stage::default() }.set(&mut ball());
+        assert!(staged.grounded);
     }
 
     #[test]

@@ -333,7 +333,9 @@ impl PrincipledParams {
         }
         let tangent = tangent.normalize_or(Vec2::X);
         let facets = match self.convention {
-            Convention::Gltf | Convention::SpecularGlossiness => Microfacets::new(alpha + (1.0 - alpha) * strength * strength, alpha),
+            Convention::Gltf | Convention::SpecularGlossiness => {
+                Microfacets::new(alpha + (1.0 - alpha) * strength * strength, alpha)
+            }
             Convention::Burley => {
                 let aspect = (1.0 - 0.9 * strength).sqrt();
                 Microfacets::new((alpha / aspect).min(1.0), alpha * aspect)

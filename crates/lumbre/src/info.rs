@@ -5,7 +5,7 @@ use std::mem::size_of_val;
 
 use lumbre_geometry::Aabb;
 use lumbre_scene::{
-    AreaLightDesc, CameraKind, GeometryDesc, LightDesc, MaterialId, MeshDesc, SceneDesc, ShapeDesc,
+    AreaLightDesc, CameraKind, GeometryDesc, LightDesc, Listing, MaterialId, MeshDesc, SceneDesc, ShapeDesc,
 };
 
 /// Statistics of a scene. They count what the file describes: a shape inside an object counts once, however
@@ -25,6 +25,8 @@ pub struct SceneInfo {
     pub instances: u64,
     /// Cameras, by name if they have one, else by type.
     pub cameras: Vec<String>,
+    /// Animations, material variants, and images of textures.
+    pub listing: Listing,
     /// The bounding box of everything finite, instances included.
     pub bounds: Option<Aabb>,
     /// Bytes of memory of the description and the trees.
@@ -53,6 +55,7 @@ impl SceneInfo {
         for light in &desc.lights {
             *info.lights.entry(light_name(light).to_owned()).or_default() += 1;
         }
+        info.listing = desc.listing.clone();
         info.cameras = desc
             .cameras
             .iter()

@@ -33,6 +33,7 @@ mod files;
 mod info;
 mod picture;
 mod scene;
+mod setting;
 
 pub use lumbre_formats as formats;
 pub use lumbre_geometry as geometry;
@@ -54,9 +55,12 @@ pub use lumbre_render::{
     CancelToken, Feature, NoProgress, PixelBounds, Progress, RayCounts, RenderError, RenderOptions, Snapshot,
     State, Stats, Stop,
 };
-pub use lumbre_scene::{EnvironmentDesc, Ground, SceneDesc, Stage, StageLight, Staged, Surroundings};
+pub use lumbre_scene::{
+    EnvironmentDesc, Ground, SceneDesc, Stage, StageLight, Staged, Surroundings, UpAxis, Viewpoint,
+};
 pub use picture::Picture;
 pub use scene::{Scene, describe, open, open_with};
+pub use setting::Setting;
 
 /// Compiles the examples of the project's README.
 #[cfg(doctest)]

@@ -1,8 +1,9 @@
 //! Rendered pictures.
 
+use std::borrow::Cow;
 use std::path::Path;
 
-use lumbre_formats::image::{ImageFormat, write_image, write_layers};
+use lumbre_formats::image::{ImageFormat, encode_image, encode_layers, write_image, write_layers};
 use lumbre_image::{Image, Layer, Layers, ToneMap};
 use lumbre_render::{Feature, PixelBounds, Rendered, Stats};
 
@@ -60,31 +61,60 @@ impl Picture {
     /// [`Error::Format`]; [`Error::Options`] when layers are requested for another format, or were not
     /// rendered.
     pub fn save_with(&self, path: &Path, options: &SaveOptions, layers: &[Feature]) -> Result<(), Error> {
+        if !layers.is_empty() && path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("exr")) {
+            return Err(Error::Options(format!("{}: only .exr files hold feature layers", path.display())));
+        }
+        let (image, options) = self.shown(ImageFormat::from_path(path), options);
+        if layers.is_empty() {
+            return Ok(write_image(path, &image, &options)?);
+        }
+        Ok(write_layers(path, &self.layers(&image, layers)?, &options)?)
+    }
+
+    /// The bytes of the file that [`Picture::save_with`] writes.
+    ///
+    /// # Errors
+    /// [`Error::Options`] as for [`Picture::save_with`], and when the format cannot hold the picture.
+    pub fn encode(
+        &self,
+        format: ImageFormat,
+        options: &SaveOptions,
+        layers: &[Feature],
+    ) -> Result<Vec<u8>, Error> {
+        if !layers.is_empty() && format != ImageFormat::Exr {
+            return Err(Error::Options(format!("{} does not hold feature layers", format.name())));
+        }
+        let (image, options) = self.shown(Some(format), options);
+        let encoded = if layers.is_empty() {
+            encode_image(&image, format, &options)
+        } else {
+            encode_layers(&self.layers(&image, layers)?, &options)
+        };
+        encoded.map_err(|e| Error::Options(format!("{}: {e}", format.name())))
+    }
+
+    /// The image over its background, and the options for writing what is left to do to it.
+    fn shown(&self, format: Option<ImageFormat>, options: &SaveOptions) -> (Cow<'_, Image>, SaveOptions) {
         let PixelBounds { x0, y0, .. } = self.bounds();
         let part = (self.image().width(), self.image().height()) != self.whole;
-        let window = part.then_some((x0 as i32, y0 as i32, self.whole.0, self.whole.1));
         let mut options = *options;
-        options.exr_window = window;
-        let is_for_displays =
-            matches!(ImageFormat::from_path(path), Some(ImageFormat::Png | ImageFormat::Jpeg));
+        options.exr_window = part.then_some((x0 as i32, y0 as i32, self.whole.0, self.whole.1));
+        let is_for_displays = matches!(format, Some(ImageFormat::Png | ImageFormat::Jpeg));
         let coverage = self.rendered.coverage.as_ref();
-        let laid_over = self.background.as_ref().map(|background| {
-            if !is_for_displays {
-                return background.under_light(self.image(), coverage, self.bounds(), self.whole);
-            }
+        let Some(background) = &self.background else { return (Cow::Borrowed(self.image()), options) };
+        let image = if is_for_displays {
             let (tone_map, exposure) = (options.tone_map, options.exposure);
             (options.tone_map, options.exposure) = (ToneMap::None, 0.0);
             background.under_shown(self.image(), coverage, self.bounds(), self.whole, tone_map, exposure)
-        });
-        let image = laid_over.as_ref().unwrap_or(self.image());
-        if layers.is_empty() {
-            return Ok(write_image(path, image, &options)?);
-        }
-        if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("exr")) {
-            return Err(Error::Options(format!("{}: only .exr files hold feature layers", path.display())));
-        }
+        } else {
+            background.under_light(self.image(), coverage, self.bounds(), self.whole)
+        };
+        (Cow::Owned(image), options)
+    }
+
+    fn layers(&self, image: &Image, features: &[Feature]) -> Result<Layers, Error> {
         let mut all = Layers::from_image(image);
-        for feature in layers {
+        for feature in features {
             let image = self
                 .feature(*feature)
                 .ok_or_else(|| Error::Options(format!("the {} layer was not rendered", feature.name())))?;
@@ -98,6 +128,6 @@ impl Picture {
                     .map_err(|layer| Error::Options(format!("layer {} stands twice", layer.name)))?;
             }
         }
-        Ok(write_layers(path, &all, &options)?)
+        Ok(all)
     }
 }

@@ -27,7 +27,7 @@ impl ArrayReader {
     pub(super) fn new(mut bytes: Bytes, kind: Rows) -> Result<Self, Failure> {
         let header = Header::read(|count| bytes.read_up_to(count)).map_err(|e| match e {
             HeaderError::Read(failure) => failure,
-            HeaderError::Wrong(what) => Failure::input(format!("{}: {what}", bytes.name())),
+            HeaderError::Wrong(at, what) => Failure::input(format!("{}:byte {at}: {what}", bytes.name())),
         })?;
         let mut this = Self { bytes, header, kind, columns: None, rows: 0 };
         let (least, most) = (kind.needed(), kind.columns().len());

@@ -1,6 +1,7 @@
 //! Rays and points as comma-separated text.
 
 use lumbre::Ray;
+use lumbre::formats::diagnostic::quoted;
 
 use super::bytes::Bytes;
 use super::rays::{Piece, Rows};
@@ -149,10 +150,10 @@ impl Header {
         for (i, (column, name)) in fields(line).enumerate() {
             let Some(known) = columns.iter().position(|known| *known == name) else {
                 let expected = columns.join(",");
-                return Err((column, format!("unknown column \"{name}\" (expected {expected})")));
+                return Err((column, format!("unknown column {} (expected {expected})", quoted(name))));
             };
             if place[known].replace(i).is_some() {
-                return Err((column, format!("column \"{name}\" stands twice")));
+                return Err((column, format!("column {} stands twice", quoted(name))));
             }
         }
         if let Some(missing) = (0..rows.needed()).find(|i| place[*i].is_none()) {
@@ -174,10 +175,10 @@ impl Header {
             if count == self.width {
                 return Err((column(), format!("more than the {} values of the header", self.width)));
             }
-            let field = field.trim();
+            let field = unquoted(field.trim());
             values[count] = field
                 .parse::<f64>()
-                .map_err(|_| (column(), format!("expected a number, found \"{field}\"")))?;
+                .map_err(|_| (column(), format!("expected a number, found {}", quoted(field))))?;
             count += 1;
         }
         if count < self.width {
@@ -196,6 +197,12 @@ fn fields(line: &str) -> impl Iterator<Item = (usize, &str)> {
     line.split(',').map(move |field| {
         let start = column + field.chars().take_while(|c| c.is_whitespace()).count();
         column += field.chars().count() + 1;
-        (start, field.trim())
+        (start, unquoted(field.trim()))
     })
+}
+
+/// A field without the quotes that some programs put around each. No name and no number holds a comma or a quote.
+fn unquoted(field: &str) -> &str {
+    let inner = field.strip_prefix('"').and_then(|field| field.strip_suffix('"'));
+    inner.map_or(field, str::trim)
 }

@@ -60,11 +60,11 @@ pub(crate) struct Arguments {
     /// Threads; all cores by default.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
-    #[command(flatten)]
-    reading: ReadingArguments,
     /// No warnings.
     #[arg(short, long)]
     quiet: bool,
+    #[command(flatten)]
+    reading: ReadingArguments,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

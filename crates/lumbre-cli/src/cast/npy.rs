@@ -32,25 +32,13 @@ struct Number {
 pub(super) enum HeaderError {
     /// The bytes cannot be read.
     Read(Failure),
-    /// They say something wrong: what was found and what is accepted.
-    Wrong(String),
+    /// They say something wrong: the byte where it begins, what was found and what is accepted.
+    Wrong(u64, String),
 }
 
 impl From<Failure> for HeaderError {
     fn from(failure: Failure) -> Self {
         Self::Read(failure)
-    }
-}
-
-impl From<String> for HeaderError {
-    fn from(what: String) -> Self {
-        Self::Wrong(what)
-    }
-}
-
-impl From<&str> for HeaderError {
-    fn from(what: &str) -> Self {
-        Self::Wrong(what.to_owned())
     }
 }
 
@@ -65,8 +53,9 @@ impl Header {
     /// # Errors
     /// [`HeaderError`].
     pub(super) fn read(mut read: impl FnMut(usize) -> Result<Vec<u8>, Failure>) -> Result<Self, HeaderError> {
+        let wrong = |at: usize, what: &str| HeaderError::Wrong(at as u64, what.to_owned());
         if read(MAGIC.len())? != MAGIC {
-            return Err("not a .npy file (its first bytes are not \\x93NUMPY)".into());
+            return Err(wrong(0, "not a .npy file (its first bytes are not \\x93NUMPY)"));
         }
         let version = read(2)?;
         let length = match version[..] {
@@ -74,44 +63,50 @@ impl Header {
             [2 | 3, _] => read(4)?.try_into().map(u32::from_le_bytes).map(|n| n as usize).ok(),
             _ => None,
         };
-        let length = length.ok_or("unknown .npy version (expected 1.0, 2.0 or 3.0)")?;
+        let unknown = "unknown .npy version (expected 1.0, 2.0 or 3.0)";
+        let length = length.ok_or_else(|| wrong(MAGIC.len(), unknown))?;
+        let start = if version[0] == 1 { 10 } else { 12 };
         let text = read(length.min(LONGEST))?;
         if text.len() < length.min(LONGEST) {
-            return Err("the .npy header is cut off".into());
+            return Err(wrong(start + text.len(), "the .npy header is cut off"));
         }
         if LONGEST < length {
-            return Err(format!("a .npy header of {length} bytes (expected at most {LONGEST})").into());
+            let what = format!("a .npy header of {length} bytes (expected at most {LONGEST})");
+            return Err(wrong(MAGIC.len() + 2, &what));
         }
-        let text = std::str::from_utf8(&text).map_err(|_| "the .npy header is not text")?;
-        let start = if version[0] == 1 { 10 } else { 12 };
-        Ok(Self { length: (start + length) as u64, ..Self::parse(text)? })
+        let text = std::str::from_utf8(&text)
+            .map_err(|e| wrong(start + e.valid_up_to(), "the .npy header is not text"))?;
+        let header =
+            Self::parse(text).map_err(|(key, what)| wrong(start + text.find(key).unwrap_or(0), &what))?;
+        Ok(Self { length: (start + length) as u64, ..header })
     }
 
-    fn parse(header: &str) -> Result<Self, String> {
-        let element =
-            entry(header, "descr").ok_or("the .npy header has no 'descr'")?.trim_matches(['\'', '"']);
+    /// Reads the dictionary. What is wrong comes with the key that it belongs to.
+    fn parse(header: &str) -> Result<Self, (&'static str, String)> {
+        let entry = |key| entry(header, key).ok_or_else(|| (key, format!("the .npy header has no '{key}'")));
+        let element = entry("descr")?.trim_matches(['\'', '"']);
         let (size, is_big_endian) = match element {
             "<f4" => (4, false),
             "<f8" => (8, false),
             ">f4" => (4, true),
             ">f8" => (8, true),
-            _ => return Err(format!("element type {element} (expected f4 or f8)")),
+            _ => return Err(("descr", format!("element type {element} (expected f4 or f8)"))),
         };
-        let shape = entry(header, "shape").ok_or("the .npy header has no 'shape'")?;
+        let shape = entry("shape")?;
         let sizes: Vec<u64> = shape
             .trim_matches(['(', ')'])
             .split(',')
             .map(str::trim)
             .filter(|size| !size.is_empty())
-            .map(|size| size.parse().map_err(|_| format!("shape {shape} (expected (N, M))")))
+            .map(|size| size.parse().map_err(|_| ("shape", format!("shape {shape} (expected (N, M))"))))
             .collect::<Result<_, _>>()?;
         let &[rows, columns] = &sizes[..] else {
-            return Err(format!("shape {shape} (expected two dimensions)"));
+            return Err(("shape", format!("shape {shape} (expected two dimensions)")));
         };
         Ok(Self {
             rows,
             columns,
-            columns_first: entry(header, "fortran_order") == Some("True"),
+            columns_first: entry("fortran_order") == Ok("True"),
             length: 0,
             number: Number { size, is_big_endian },
             shape: format!("{shape} of {element}"),
@@ -239,18 +234,18 @@ mod tests {
 
     #[test]
     fn broken_arrays_are_refused_in_words() {
-        for (bytes, expected) in [
-            (b"PK".to_vec(), "not a .npy file"),
-            (b"\x93NUMPY\x01".to_vec(), "unknown .npy version"),
-            (b"\x93NUMPY\x09\x00\x10\x00".to_vec(), "unknown .npy version"),
-            (b"\x93NUMPY\x01\x00\xff\xff{".to_vec(), "cut off"),
-            (file("{'descr': '<i8', 'fortran_order': False, 'shape': (1, 6), }"), "element type <i8"),
-            (file("{'descr': '<f8', 'fortran_order': False, 'shape': (6,), }"), "two dimensions"),
-            (file("{'fortran_order': False}"), "no 'descr'"),
-            ([&b"\x93NUMPY\x02\x00\x00\x00\x20\x00"[..], &[b' '; 3 << 20]].concat(), "2097152 bytes"),
+        for (bytes, at, expected) in [
+            (b"PK".to_vec(), 0, "not a .npy file"),
+            (b"\x93NUMPY\x01".to_vec(), 6, "unknown .npy version"),
+            (b"\x93NUMPY\x09\x00\x10\x00".to_vec(), 6, "unknown .npy version"),
+            (b"\x93NUMPY\x01\x00\xff\xff{".to_vec(), 11, "cut off"),
+            (file("{'descr': '<i8', 'fortran_order': False, 'shape': (1, 6), }"), 12, "element type <i8"),
+            (file("{'descr': '<f8', 'fortran_order': False, 'shape': (6,), }"), 51, "two dimensions"),
+            (file("{'fortran_order': False}"), 10, "no 'descr'"),
+            ([&b"\x93NUMPY\x02\x00\x00\x00\x20\x00"[..], &[b' '; 3 << 20]].concat(), 8, "2097152 bytes"),
         ] {
-            let Err(HeaderError::Wrong(message)) = read(&bytes) else { panic!("{expected}") };
-            assert!(message.contains(expected), "{message}");
+            let Err(HeaderError::Wrong(found, message)) = read(&bytes) else { panic!("{expected}") };
+            assert!(message.contains(expected) && found == at, "{found}: {message}");
         }
         for rows in ["9999999999999", "4611686018427387904"] {
             let text = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({rows}, 6), }}");

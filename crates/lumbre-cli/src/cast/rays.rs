@@ -214,6 +214,17 @@ mod tests {
     }
 
     #[test]
+    fn fields_may_be_quoted() {
+        let text = b"\"ox\", \"oy\",\"oz\" ,dx,\"dy\",\"dz\"\r\n\"2\",3,\" -4.5\",0,0,\"1\"\n";
+        for most in SIZES {
+            let expected = Ray::new(DVec3::new(2.0, 3.0, -4.5), DVec3::new(0.0, 0.0, 1.0));
+            assert_eq!(read("rays.csv", text, most).unwrap(), [expected]);
+        }
+        let half = read("rays.csv", b"\"ox,oy,oz,dx,dy,dz\n", 7).unwrap_err();
+        assert!(half.starts_with("rays.csv:1:1: unknown column \"\\\"ox\""), "{half}");
+    }
+
+    #[test]
     fn what_is_wrong_is_said_with_its_place() {
         let long = format!("ox,oy,oz,dx,dy,dz\n1,2{}", " ".repeat(1 << 17));
         for (text, expected) in [

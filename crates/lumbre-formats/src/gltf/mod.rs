@@ -20,6 +20,7 @@ mod ies;
 mod json;
 #[cfg(feature = "basisu")]
 mod ktx;
+mod listing;
 pub mod material;
 mod mesh;
 mod meshopt;

@@ -23,7 +23,7 @@ use super::json::{Read, Value};
 use super::mesh::{self, Assembly, Pose, Primitive, Vertices};
 use super::shade::{Dressing, Materials};
 use super::texture::UvSets;
-use super::{GltfOptions, animation, tangents};
+use super::{GltfOptions, animation, listing, tangents};
 use crate::diagnostic::{Diagnostic, quoted};
 use crate::thin;
 
@@ -129,7 +129,9 @@ pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
     for place in &places {
         builder.place(&mut scene, place, uses[&place.key])?;
     }
-    scene.materials = builder.materials.into_list();
+    (scene.materials, scene.listing.textures) = builder.materials.into_lists();
+    scene.listing.animations = listing::animations(file)?;
+    scene.listing.variants = listing::variants(file)?;
     Ok(scene)
 }
 
@@ -208,10 +210,7 @@ fn size(file: &File<'_>, places: &[Placed]) -> Read<f64> {
 /// The requested variant, by its index.
 fn variant(file: &File<'_>, options: &GltfOptions) -> Read<Option<usize>> {
     let Some(wanted) = &options.variant else { return Ok(None) };
-    let mut names = vec![];
-    for &value in file.list(List::Variants) {
-        names.push(value.need("name")?.string()?.into_owned());
-    }
+    let names = listing::variants(file)?;
     if let Some(index) = names.iter().position(|name| name == wanted) {
         return Ok(Some(index));
     }

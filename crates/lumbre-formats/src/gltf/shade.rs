@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use lumbre_image::Rgb;
 use lumbre_math::glam::Affine2;
-use lumbre_scene::{AreaLightDesc, MaterialId, NamedMaterial};
+use lumbre_scene::{AreaLightDesc, MaterialId, NamedMaterial, TextureListing};
 use lumbre_shading::{
     FURTHER_SETS, FloatTexture, ImageTexture, Material, MaterialKind, PrincipledParams, SpectrumTexture,
     Texture, VolumeParams,
@@ -107,8 +107,8 @@ impl<'f> Materials<'f> {
     }
 
     /// All materials that were used.
-    pub(super) fn into_list(self) -> Vec<NamedMaterial> {
-        self.list.into_inner()
+    pub(super) fn into_lists(self) -> (Vec<NamedMaterial>, Vec<TextureListing>) {
+        (self.list.into_inner(), self.textures.into_listing())
     }
 }
 

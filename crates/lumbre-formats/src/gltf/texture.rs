@@ -7,6 +7,7 @@ use std::sync::Arc;
 use lumbre_image::{Bitmap, Channels, Encoding, PixelData, unit_to_u16};
 use lumbre_math::glam::{Affine2, Mat2};
 use lumbre_math::{Vec2, Vec3};
+use lumbre_scene::TextureListing;
 use lumbre_shading::{
     AxisWrap, FURTHER_SETS, FloatTexture, ImageFilter, ImageTexture, Mapping2d, MipMap, MipMapOptions,
     SpectrumTexture, Texture, UvSet, Wrap,
@@ -39,6 +40,7 @@ type MapKey = (usize, Use);
 pub(super) struct Textures<'f> {
     file: &'f File<'f>,
     images: RefCell<HashMap<usize, Option<Arc<Bitmap>>>>,
+    listing: RefCell<Vec<TextureListing>>,
     maps: RefCell<HashMap<MapKey, Option<Arc<MipMap>>>>,
 }
 
@@ -74,7 +76,12 @@ impl UvSets {
 
 impl<'f> Textures<'f> {
     pub(super) fn new(file: &'f File<'f>) -> Self {
-        Self { file, images: RefCell::default(), maps: RefCell::default() }
+        Self { file, images: RefCell::default(), listing: RefCell::default(), maps: RefCell::default() }
+    }
+
+    /// The images that were decoded.
+    pub(super) fn into_listing(self) -> Vec<TextureListing> {
+        self.listing.into_inner()
     }
 
     /// Checks a texture and its image, without decoding.
@@ -202,11 +209,25 @@ impl<'f> Textures<'f> {
                 file.push(warning.found(error));
                 None
             }
-            Err(error) => return Err(error),
+            Err(error) => return Err(error.included_from(value.place())),
         };
+        if let Some(image) = &image {
+            let (name, width, height) = (image_name(value, index)?, image.width(), image.height());
+            self.listing.borrow_mut().push(TextureListing { name, width, height });
+        }
         self.images.borrow_mut().insert(index, image.clone());
         Ok(image)
     }
+}
+
+/// The file of an image, or else its name, or else its index.
+fn image_name(value: Value<'_>, index: usize) -> Read<String> {
+    if let Some(uri) = value.string_at("uri")?
+        && !matches!(target(&uri), Target::Data(_))
+    {
+        return Ok(uri.into_owned());
+    }
+    Ok(value.string_at("name")?.map_or_else(|| format!("image {index}"), |name| name.into_owned()))
 }
 
 fn decoded(file: &File<'_>, value: Value<'_>) -> Read<Bitmap> {

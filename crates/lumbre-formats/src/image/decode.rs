@@ -9,6 +9,7 @@ use image::codecs::{
 use image::{ColorType, ImageDecoder, ImageError, Limits};
 use lumbre_image::{Bitmap, Channels, Encoding, PixelData};
 
+use super::damage::first_damage;
 use super::{ImageFile, ImageFormat, check_expansion};
 use crate::budget::{Budget, LimitError, LimitKind};
 use crate::contained::contained;
@@ -37,7 +38,7 @@ pub(super) fn read(
     }
     contained(&format!("{} image", format.name()), &place, || {
         let source = Cursor::new(bytes);
-        let fault = |e| fault(format, &place, budget, e);
+        let fault = |e| fault(format, bytes, &place, budget, e);
         match format {
             // Its chunks may allocate memory before limits can be set on a decoder.
             ImageFormat::Png => decode(
@@ -76,7 +77,7 @@ fn decode(
     let colour = decoder.color_type();
     let channels = Channels::from_count(usize::from(colour.channel_count())).expect("one to four");
     let count = pixels * channels.count() as u64;
-    let fault = |e| fault(format, place, budget, e);
+    let fault = |e| fault(format, bytes, place, budget, e);
     // A progressive JPEG keeps all its coefficients, two bytes each, in addition to the pixels.
     let scratch = if format == ImageFormat::Jpeg { count * 2 } else { 0 };
     let unpacked = u64::from(colour.bytes_per_pixel()) * pixels;
@@ -146,7 +147,13 @@ fn profile_limits(bytes: &[u8], budget: &Budget) -> Limits {
     limits
 }
 
-fn fault(format: ImageFormat, place: &Place, budget: &Budget, error: ImageError) -> FormatError {
+fn fault(
+    format: ImageFormat,
+    bytes: &[u8],
+    place: &Place,
+    budget: &Budget,
+    error: ImageError,
+) -> FormatError {
     let kind = match error {
         ImageError::Unsupported(_) => "unsupported",
         ImageError::Limits(_) => {
@@ -157,6 +164,10 @@ fn fault(format: ImageFormat, place: &Place, budget: &Budget, error: ImageError)
         }
         _ => "damaged",
     };
-    let wrong = Diagnostic::error(format!("{kind} {} image", format.name())).at(place.clone());
+    let at = match first_damage(format, bytes) {
+        Some(at) if kind == "damaged" => Place::binary(place.file.clone(), at, ""),
+        _ => place.clone(),
+    };
+    let wrong = Diagnostic::error(format!("{kind} {} image", format.name())).at(at);
     wrong.found(quoted(&error.to_string())).into()
 }

@@ -1,5 +1,6 @@
 //! OpenEXR, by the `exr` crate after checks of ours.
 
+use std::cell::Cell;
 use std::io::Cursor;
 use std::sync::Arc;
 
@@ -13,6 +14,7 @@ use exr::prelude::{
 use exr::prelude::{ReadChannels, ReadLayers, WritableImage};
 use lumbre_image::{Bitmap, Channels, ColourSpace, Encoding, Layer, Layers, PixelData, Window, f32_to_half};
 
+use super::damage::Tracked;
 use super::write::{ExrCompression, ExrPrecision, WriteOptions};
 use super::{ImageFile, ImageFormat, check_expansion, origin};
 use crate::budget::{Budget, Hold};
@@ -27,6 +29,7 @@ pub(super) fn read(
 ) -> Result<ImageFile, FormatError> {
     let place = Place::whole(name.clone());
     let (headers, _decoded) = checked_headers(bytes, &place, budget)?;
+    let at = Cell::new(0);
     let mut picture = contained("EXR image", &place, || {
         exr::prelude::read()
             .no_deep_data()
@@ -34,8 +37,8 @@ pub(super) fn read(
             .all_channels()
             .first_valid_layer()
             .all_attributes()
-            .from_buffered(Cursor::new(bytes))
-            .map_err(|e| fault(&place, e))
+            .from_buffered(Tracked::new(bytes, &at))
+            .map_err(|e| fault(&place, &at, e))
     })?;
     if headers.len() > 1 {
         let said = Diagnostic::warning("only the first part of an EXR image is used").at(place.clone());
@@ -96,6 +99,7 @@ pub(super) fn read(
 pub(super) fn read_layers(bytes: &[u8], name: &Arc<str>, budget: &Budget) -> Result<Layers, FormatError> {
     let place = Place::whole(name.clone());
     let (_, _decoded) = checked_headers(bytes, &place, budget)?;
+    let at = Cell::new(0);
     let picture = contained("EXR image", &place, || {
         exr::prelude::read()
             .no_deep_data()
@@ -103,8 +107,8 @@ pub(super) fn read_layers(bytes: &[u8], name: &Arc<str>, budget: &Budget) -> Res
             .all_channels()
             .all_layers()
             .all_attributes()
-            .from_buffered(Cursor::new(bytes))
-            .map_err(|e| fault(&place, e))
+            .from_buffered(Tracked::new(bytes, &at))
+            .map_err(|e| fault(&place, &at, e))
     })?;
     let damaged = |what: &str| FormatError::from(Diagnostic::error(what).at(place.clone()));
     let Some(first) = picture.layer_data.first() else { return Err(damaged("EXR image without parts")) };
@@ -144,7 +148,9 @@ fn checked_headers<'b>(
         FormatError::from(Diagnostic { expected: Some(expected.to_owned()), ..wrong })
     };
     let meta = contained("EXR image", place, || {
-        let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|e| fault(place, e))?;
+        let at = Cell::new(0);
+        let meta = MetaData::read_from_buffered(Tracked::new(bytes, &at), false)
+            .map_err(|e| fault(place, &at, e))?;
         Ok(meta)
     })?;
     let mut needed = 0u64;
@@ -225,12 +231,14 @@ fn window(bounds: IntegerBounds) -> Option<Window> {
     Some(Window { x, y, width, height })
 }
 
-fn fault(place: &Place, error: exr::error::Error) -> FormatError {
+/// The error of a decoder that had read so far.
+fn fault(place: &Place, at: &Cell<u64>, error: exr::error::Error) -> FormatError {
     let kind = match error {
         exr::error::Error::NotSupported(_) => "unsupported",
         _ => "damaged",
     };
-    let wrong = Diagnostic::error(format!("{kind} EXR image")).at(place.clone());
+    let place = Place::binary(place.file.clone(), at.get(), "");
+    let wrong = Diagnostic::error(format!("{kind} EXR image")).at(place);
     wrong.found(quoted(&error.to_string())).into()
 }
 

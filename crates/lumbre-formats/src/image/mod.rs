@@ -1,5 +1,6 @@
 //! Image files: PNG, JPEG, EXR, HDR, PFM, TGA, BMP, QOI and WebP in; PNG, JPEG, QOI, EXR, HDR and PFM out.
 
+mod damage;
 mod decode;
 mod exr_file;
 mod hdr;

@@ -23,6 +23,7 @@ use crate::thin::Thin;
 use words::{Source, Word, Words};
 
 pub use mtl::{MtlMaterial, MtlTexture, read_mtl};
+pub(crate) use scene::obj_scene;
 pub use scene::open_obj;
 
 /// The contents of an OBJ file.

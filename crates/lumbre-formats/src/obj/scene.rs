@@ -7,7 +7,8 @@ use std::sync::Arc;
 use lumbre_image::{Encoding, Rgb};
 use lumbre_math::Vec2;
 use lumbre_scene::{
-    AreaLightDesc, GeometryDesc, MaterialId, NamedMaterial, SceneDesc, ShapeDesc, UpAxis, WithoutLight,
+    AreaLightDesc, GeometryDesc, Listing, MaterialId, NamedMaterial, SceneDesc, ShapeDesc, UpAxis,
+    WithoutLight,
 };
 use lumbre_shading::{
     FloatTexture, ImageFilter, ImageTexture, Mapping2d, Material, MaterialKind, MipMap, MipMapOptions,
@@ -38,11 +39,19 @@ pub fn open_obj(
     budget: &Budget,
     diagnostics: &mut Diagnostics,
 ) -> Result<SceneDesc, FormatError> {
-    let input = Input::open(path, budget)?;
+    obj_scene(Input::open(path, budget)?, path.parent().unwrap_or(Path::new("")), budget, diagnostics)
+}
+
+/// [`open_obj`] of a file that is open; others are found relative to `folder`.
+pub(crate) fn obj_scene(
+    input: Input<'_>,
+    folder: &Path,
+    budget: &Budget,
+    diagnostics: &mut Diagnostics,
+) -> Result<SceneDesc, FormatError> {
     let obj = read_obj(&input, input.name(), budget, diagnostics)?;
     drop(input);
-    let folder = path.parent().unwrap_or(Path::new(""));
-    let mut builder = Builder { budget, diagnostics, images: HashMap::new() };
+    let mut builder = Builder { budget, diagnostics, images: HashMap::new(), listing: Listing::default() };
     let mut finished: Vec<Finished> = vec![];
     let of_meshes = obj.meshes.iter().filter_map(|mesh| mesh.material.as_ref());
     let of_thin = obj.thin.iter().filter_map(|thin| thin.material.as_ref());
@@ -64,7 +73,8 @@ pub fn open_obj(
             finished.push(builder.material(&folder, &material)?);
         }
     }
-    let mut scene = SceneDesc { up: UpAxis::Y, ..SceneDesc::default() };
+    let listing = std::mem::take(&mut builder.listing);
+    let mut scene = SceneDesc { up: UpAxis::Y, listing, ..SceneDesc::default() };
     for finished in &finished {
         let material = finished.material.clone();
         scene.materials.push(NamedMaterial { name: Some(finished.name.clone()), material });
@@ -139,6 +149,7 @@ struct Builder<'a> {
     /// The opened images, by file, whether they store numbers rather than colours, and whether they are
     /// clamped.
     images: HashMap<(PathBuf, bool, bool), Option<Arc<MipMap>>>,
+    listing: Listing,
 }
 
 impl Builder<'_> {
@@ -357,6 +368,7 @@ impl Builder<'_> {
                 return Ok(None);
             }
         };
+        self.listing.add_texture(&map.file, file.bitmap.width(), file.bitmap.height());
         // The pyramid takes another third.
         self.budget.bytes(file.bitmap.bytes() as u64 / 3, "texture")?;
         let bitmap = if holds_numbers { file.bitmap.with_encoding(Encoding::Linear) } else { file.bitmap };

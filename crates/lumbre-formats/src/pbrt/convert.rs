@@ -552,6 +552,6 @@ pub(super) fn file_fault(at: Spot, error: FormatError) -> Fault {
             at.error(format!("{action} {}: {source}", quoted(&path.display().to_string())))
         }
         FormatError::Limit { place: None, source } => Fault::Limit(at, source),
-        other => other.into(),
+        other => Fault::Named(at, Box::new(other)),
     }
 }

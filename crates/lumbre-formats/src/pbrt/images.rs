@@ -59,7 +59,10 @@ impl Converter<'_, '_> {
     pub fn image_file(&mut self, name: &str, at: Spot) -> Result<ImageFile> {
         let path = self.resolve(name, at)?;
         match open_image(&path, self.budget, self.diagnostics) {
-            Ok(image) => Ok(image),
+            Ok(image) => {
+                self.scene.listing.add_texture(name, image.bitmap.width(), image.bitmap.height());
+                Ok(image)
+            }
             Err(error @ (FormatError::Io { .. } | FormatError::Input(_)))
                 if self.diagnostics.is_lenient() =>
             {

@@ -47,22 +47,36 @@ pub fn read_files(
     budget: &Budget,
     diagnostics: &mut Diagnostics,
 ) -> std::result::Result<SceneDesc, FormatError> {
-    let directory = paths.first().map(|path| match path.as_ref().parent() {
-        Some(parent) => parent.to_owned(),
-        None => PathBuf::new(),
-    });
-    read(directory, budget, diagnostics, |parser| {
-        for path in paths {
-            let path = path.as_ref();
-            if path.as_os_str() == "-" {
-                let input = Input::from_reader("standard input", std::io::stdin().lock(), budget)?;
-                parser.read(input, None)?;
-            } else {
-                parser.read(Input::open(path, budget)?, path.canonicalize().ok())?;
-            }
+    let folder = paths.first().and_then(|path| path.as_ref().parent()).unwrap_or(Path::new(""));
+    read_sources(paths.iter().map(|path| (path.as_ref(), None)), folder, budget, diagnostics)
+}
+
+/// [`read_files`] of files that may have been opened already, with relative names starting at `folder`.
+pub(crate) fn read_sources<'b, 'p>(
+    sources: impl Iterator<Item = (&'p Path, Option<Input<'b>>)>,
+    folder: &Path,
+    budget: &'b Budget,
+    diagnostics: &mut Diagnostics,
+) -> std::result::Result<SceneDesc, FormatError> {
+    read(Some(folder.to_owned()), budget, diagnostics, |parser| {
+        for (path, input) in sources {
+            let is_standard_input = path.as_os_str() == "-";
+            let input = match input {
+                Some(input) => input,
+                None if is_standard_input => {
+                    Input::from_reader("standard input", std::io::stdin().lock(), budget)?
+                }
+                None => Input::open(path, budget)?,
+            };
+            parser.read(input, path.canonicalize().ok().filter(|_| !is_standard_input))?;
         }
         Ok(())
     })
+}
+
+/// Whether this word begins a directive.
+pub(crate) fn is_directive(word: &str) -> bool {
+    Parser::is_directive(word)
 }
 
 /// Reads a scene from bytes, such as standard input, with a name for messages.

@@ -34,13 +34,12 @@ impl Files {
 
     /// `diagnostic` at `spot`, with the chain of includes that led there.
     pub fn locate(&self, spot: Spot, diagnostic: Diagnostic) -> Diagnostic {
-        let mut located = diagnostic.at(self.place(spot));
-        let mut from = self.list[spot.file as usize].1;
-        while let Some(include) = from {
-            located = located.included_from(self.place(include));
-            from = self.list[include.file as usize].1;
-        }
-        located
+        self.chain(spot).skip(1).fold(diagnostic.at(self.place(spot)), Diagnostic::included_from)
+    }
+
+    /// The place, that of the include that led to it, and so on outwards.
+    fn chain(&self, spot: Spot) -> impl Iterator<Item = Place> {
+        std::iter::successors(Some(spot), |spot| self.list[spot.file as usize].1).map(|spot| self.place(spot))
     }
 }
 
@@ -53,6 +52,8 @@ pub(super) enum Fault {
     Limit(Spot, LimitError),
     /// Another reader has already reported what and where.
     Other(Box<FormatError>),
+    /// As [`Fault::Other`], of a file that is named here.
+    Named(Spot, Box<FormatError>),
 }
 
 pub(super) type Result<T, E = Fault> = std::result::Result<T, E>;
@@ -63,6 +64,7 @@ impl Fault {
             Self::Input(spot, diagnostic) => files.locate(spot, *diagnostic).into(),
             Self::Limit(spot, source) => FormatError::Limit { place: Some(files.place(spot)), source },
             Self::Other(error) => *error,
+            Self::Named(spot, error) => files.chain(spot).fold(*error, FormatError::included_from),
         }
     }
 }

@@ -78,7 +78,17 @@ pub fn open_ply(
     budget: &Budget,
     diagnostics: &mut Diagnostics,
 ) -> Result<SceneDesc, FormatError> {
-    let input = Input::open(path, budget)?;
+    ply_scene(Input::open(path, budget)?, path.parent().unwrap_or(Path::new("")), budget, diagnostics)
+}
+
+/// [`open_ply`] of a file that is open; its texture is found relative to `folder`.
+pub(crate) fn ply_scene(
+    input: Input<'_>,
+    folder: &Path,
+    budget: &Budget,
+    diagnostics: &mut Diagnostics,
+) -> Result<SceneDesc, FormatError> {
+    let name = input.name().to_owned();
     let PlyFile { mesh, origin, points, edges, texture } =
         read_ply(&input, input.name(), budget, diagnostics)?;
     drop(input);
@@ -104,7 +114,7 @@ pub fn open_ply(
     }
     scene.shapes.iter_mut().for_each(|shape| shape.world_from_object = world_from_object);
     if let Some(file) = texture.filter(|_| has_uvs)
-        && let Some(material) = textured(path, &file, budget, diagnostics)?
+        && let Some(material) = textured(&name, &folder.join(&file), budget, diagnostics)?
     {
         scene.materials[0] = NamedMaterial { name: None, material: Arc::new(material) };
     }
@@ -113,17 +123,17 @@ pub fn open_ply(
 
 /// The material of a mesh with a texture, found beside it; `None`, with a warning, when it cannot be read.
 fn textured(
+    ply: &str,
     path: &Path,
-    file: &str,
     budget: &Budget,
     diagnostics: &mut Diagnostics,
 ) -> Result<Option<Material>, FormatError> {
-    let image = match open_image(&path.with_file_name(file), budget, diagnostics) {
+    let image = match open_image(path, budget, diagnostics) {
         Ok(image) => image,
         Err(e @ FormatError::Limit { .. }) => return Err(e),
         Err(e) => {
             let said = Diagnostic::warning("cannot use the texture of a PLY file");
-            diagnostics.push(said.at(Place::whole(path.display().to_string())).found(e));
+            diagnostics.push(said.at(Place::whole(ply.to_owned())).found(e));
             return Ok(None);
         }
     };

@@ -76,6 +76,10 @@ impl<'b, 'd> Parser<'b, 'd> {
         ("WorldEnd", World, Self::world_end),
     ];
 
+    pub(in crate::pbrt) fn is_directive(name: &str) -> bool {
+        Self::DIRECTIVES.iter().any(|(directive, ..)| *directive == name)
+    }
+
     pub(super) fn directive(&mut self, name: &str, spot: Spot) -> Result<()> {
         let Some((_, place, handler)) = Self::DIRECTIVES.iter().find(|(directive, ..)| *directive == name)
         else {

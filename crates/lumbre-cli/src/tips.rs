@@ -1,0 +1,281 @@
+//! Wrong words on the command line: what was meant, by meaning where other programs have the word, else by spelling.
+
+use std::ffi::OsString;
+use std::io::{self, Write};
+use std::process::ExitCode;
+
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{Command, CommandFactory, Error, Parser};
+use lumbre::formats::diagnostic::nearest_name;
+
+use crate::console::{escaped, has_colours};
+
+/// Words of other programs for an option.
+const OPTIONS: &[(&str, &[&str])] = &[
+    (
+        "--spp",
+        &[
+            "--samples",
+            "--samples-per-pixel",
+            "--pixel-samples",
+            "--pixelsamples",
+            "--num-samples",
+            "--quality",
+        ],
+    ),
+    ("--output", &["--out", "--outfile", "--output-file", "--image", "--save"]),
+    ("--output-format", &["--format", "--file-format"]),
+    ("--input-format", &["--input-type", "--type", "--from-format"]),
+    ("--size", &["--resolution", "--res", "--dimensions", "--geometry", "--width", "--height", "-w"]),
+    (
+        "--eye",
+        &[
+            "--camera-position",
+            "--camera-pos",
+            "--camera-origin",
+            "--position",
+            "--look-from",
+            "--lookfrom",
+            "--from",
+        ],
+    ),
+    ("--target", &["--look-at", "--lookat", "--camera-target", "--focal-point", "--camera-focal-point"]),
+    ("--up", &["--up-axis", "--upaxis", "--camera-up", "--view-up", "--camera-view-up"]),
+    ("--fov", &["--field-of-view", "--view-angle", "--camera-view-angle", "--vfov", "--hfov"]),
+    ("--ortho", &["--orthographic", "--orthogonal", "--camera-orthographic", "--parallel", "--projection"]),
+    ("--azimuth", &["--rotate", "--rotation", "--yaw", "--heading", "--phi", "--camera-azimuth-angle"]),
+    ("--elevation", &["--pitch", "--tilt", "--theta", "--altitude", "--camera-elevation-angle"]),
+    ("--zoom", &["--scale", "--magnify", "--camera-zoom-factor"]),
+    ("--fit", &["--fit-all", "--view-all", "--frame-all", "--autocenter", "--viewall"]),
+    ("--turntable", &["--spin", "--orbit", "--animate"]),
+    ("--frame", &["--animation-time", "--at-time"]),
+    ("--animation", &["--anim", "--clip", "--animation-index", "--animation-name"]),
+    ("--threads", &["--nthreads", "--num-threads", "--thread-count", "--jobs", "-j", "--cores", "--cpus"]),
+    (
+        "--max-depth",
+        &["--bounces", "--max-bounces", "--maxdepth", "--depth", "--ray-depth", "--maximum-depth"],
+    ),
+    ("--crop", &["--cropwindow", "--crop-window", "--region", "--pixelbounds", "--border", "--roi"]),
+    ("--time", &["--timeout", "--time-limit", "--max-time"]),
+    ("--noise", &["--noise-level", "--noise-threshold", "--adaptive", "--adaptive-threshold", "--variance"]),
+    ("--tonemap", &["--tone-mapping", "--tone-mapper", "--tonemapper", "--view-transform"]),
+    ("--exposure", &["--ev", "--exposure-compensation", "--brightness"]),
+    ("--env", &["--environment", "--envmap", "--environment-map", "--hdri", "--ibl", "--skybox", "--world"]),
+    ("--background", &["--bg", "--backdrop", "--background-color", "--transparent", "--alpha"]),
+    ("--ground", &["--floor", "--shadow-catcher", "--ground-plane"]),
+    ("--aov", &["--aovs", "--passes", "--layers", "--render-passes"]),
+    ("--stats", &["--statistics", "--report"]),
+    ("--integrator", &["--renderer", "--mode", "--algorithm"]),
+    ("--seed", &["--random-seed", "--rng-seed"]),
+    ("--max-memory", &["--memory", "--mem", "--memory-limit"]),
+    ("--quiet", &["--silent"]),
+    ("--verbose", &["--debug"]),
+    ("--rays", &["--input", "--rays-file"]),
+    ("--query", &["--mode", "--type"]),
+    ("--fail-above", &["--threshold", "--tolerance", "--max-error", "--fail"]),
+    ("--metric", &["--error", "--method"]),
+    ("--json", &["--format"]),
+    ("--define", &["--set", "--param", "--parameter", "--override"]),
+];
+
+/// What cannot be asked for by an option, and what helps instead.
+const HINTS: &[(&[&str], &str)] = &[
+    (
+        &["--denoise", "--denoiser", "--oidn", "--optix"],
+        "there is no denoiser; --noise R renders until less noise is left",
+    ),
+    (&["--gpu", "--device", "--cuda"], "pictures are rendered on the processor's cores (--threads N)"),
+    (&["--interactive", "--gui", "--display"], "pictures are written to files (-o OUT)"),
+];
+
+/// Words of other programs for a command.
+const COMMANDS: &[(&str, &[&str])] = &[
+    ("render", &["view", "show", "draw", "image"]),
+    ("cast", &["trace", "intersect", "raycast", "shoot", "query"]),
+    ("info", &["inspect", "describe", "stat", "stats", "list", "validate"]),
+    ("diff", &["compare", "cmp", "difference", "flip"]),
+    ("completions", &["completion", "complete", "autocomplete"]),
+    ("man", &["manual", "manpage"]),
+];
+
+/// Reads the command line, or says what is wrong with it.
+///
+/// # Errors
+/// The exit status: 0 for help, 2 for wrong usage.
+pub(crate) fn parse<P: Parser + CommandFactory>(arguments: &[OsString]) -> Result<P, ExitCode> {
+    P::try_parse_from(arguments).map_err(|mut error| {
+        // What the user wrote is in the message, where it must not drive the terminal; in a styled message it can no
+        // longer be told from the styles.
+        let harmless: Vec<OsString> = arguments
+            .iter()
+            .map(|argument| escaped(&argument.to_string_lossy()).into_owned().into())
+            .collect();
+        if harmless != arguments
+            && let Err(same) = P::try_parse_from(&harmless)
+        {
+            error = same;
+        }
+        let mut program = P::command();
+        program.build();
+        let command = arguments.get(1).and_then(|name| program.find_subcommand(name)).unwrap_or(&program);
+        give_tip(&mut error, command);
+        show(&error)
+    })
+}
+
+fn show(error: &Error) -> ExitCode {
+    let text = error.render();
+    let write = |out: &mut dyn Write, has_colours: bool| {
+        // The reader may close the pipe: `lumbre help | head -1`.
+        let _ = if has_colours { write!(out, "{}", text.ansi()) } else { write!(out, "{text}") };
+    };
+    if error.use_stderr() {
+        write(&mut io::stderr().lock(), has_colours(&io::stderr()));
+        ExitCode::from(2)
+    } else {
+        write(&mut io::stdout().lock(), has_colours(&io::stdout()));
+        ExitCode::SUCCESS
+    }
+}
+
+/// Replaces the tip of an error by a better one, and drops a misleading one.
+fn give_tip(error: &mut Error, command: &Command) {
+    let text = |kind| match error.get(kind) {
+        Some(ContextValue::String(text)) => Some(text.clone()),
+        _ => None,
+    };
+    match error.kind() {
+        ErrorKind::UnknownArgument => {
+            let Some(wrong) = text(ContextKind::InvalidArg).filter(|wrong| wrong.starts_with('-')) else {
+                return;
+            };
+            error.remove(ContextKind::SuggestedArg);
+            error.remove(ContextKind::Suggested);
+            // The usual one goes by the tip that was dropped.
+            error.insert(ContextKind::Usage, ContextValue::StyledStr(command.clone().render_usage()));
+            match tip(&wrong, command) {
+                Some(Tip::Spelling(option)) => {
+                    error.insert(ContextKind::SuggestedArg, ContextValue::String(option));
+                }
+                Some(Tip::Meaning(option)) => {
+                    let valid = command.get_styles().get_valid();
+                    let text = format!("the option for it is '{valid}{option}{valid:#}'");
+                    error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![text.into()]));
+                }
+                Some(Tip::Hint(hint)) => {
+                    error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![hint.into()]));
+                }
+                None => {}
+            }
+        }
+        ErrorKind::InvalidSubcommand => {
+            let Some(wrong) = text(ContextKind::InvalidSubcommand) else { return };
+            let by_meaning =
+                COMMANDS.iter().find(|(_, words)| words.contains(&&*wrong)).map(|(name, _)| *name);
+            let names = command.get_subcommands().map(Command::get_name);
+            if let Some(name) = by_meaning.or_else(|| nearest_name(&wrong, names)) {
+                let names = ContextValue::Strings(vec![name.to_owned()]);
+                error.insert(ContextKind::SuggestedSubcommand, names);
+            }
+        }
+        _ => {}
+    }
+}
+
+/// What a wrong option is answered with.
+#[derive(Debug, PartialEq)]
+enum Tip {
+    /// The option that it resembles.
+    Spelling(String),
+    /// The option that does what it does elsewhere.
+    Meaning(String),
+    /// What helps instead.
+    Hint(&'static str),
+}
+
+fn tip(wrong: &str, command: &Command) -> Option<Tip> {
+    let options: Vec<String> =
+        command.get_arguments().filter_map(|a| a.get_long()).map(|name| format!("--{name}")).collect();
+    let known_words = || OPTIONS.iter().filter(|(option, _)| options.iter().any(|known| known == option));
+    let meant =
+        |wrong: &str| known_words().find(|(_, words)| words.contains(&wrong)).map(|(option, _)| *option);
+    if let Some(option) = meant(wrong) {
+        return Some(Tip::Meaning(option.to_owned()));
+    }
+    if let Some((_, hint)) = HINTS.iter().find(|(words, _)| words.contains(&wrong)) {
+        return Some(Tip::Hint(hint));
+    }
+    let name = wrong.strip_prefix("--")?;
+    let names = |words: &[String]| {
+        let names = words.iter().filter_map(|word| word.strip_prefix("--"));
+        nearest_name(name, names).map(|name| format!("--{name}"))
+    };
+    if let Some(option) = names(&options) {
+        return Some(Tip::Spelling(option));
+    }
+    let words: Vec<String> =
+        known_words().flat_map(|(_, words)| *words).map(|&word| word.to_owned()).collect();
+    meant(&names(&words)?).map(|option| Tip::Meaning(option.to_owned()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wrong_option_is_answered_by_meaning_before_spelling() {
+        let program = crate::Arguments::command();
+        let tip = |command: &str, wrong: &str| tip(wrong, program.find_subcommand(command).unwrap());
+        let meaning = |option: &str| Some(Tip::Meaning(option.to_owned()));
+        let spelling = |option: &str| Some(Tip::Spelling(option.to_owned()));
+        for (command, wrong, expected) in [
+            ("render", "--samples", meaning("--spp")),
+            ("render", "--samplse", meaning("--spp")),
+            ("render", "--resolution", meaning("--size")),
+            ("render", "--camera-position", meaning("--eye")),
+            ("render", "-j", meaning("--threads")),
+            ("cast", "--input", meaning("--rays")),
+            ("diff", "--threshold", meaning("--fail-above")),
+            ("render", "--sizes", spelling("--size")),
+            ("cast", "--querry", spelling("--query")),
+            ("cast", "--samples", None),
+            ("render", "--frobnicate", None),
+            ("render", "-x", None),
+        ] {
+            assert_eq!(tip(command, wrong), expected, "{command} {wrong}");
+        }
+        assert!(matches!(tip("render", "--denoise"), Some(Tip::Hint(hint)) if hint.contains("--noise")));
+    }
+
+    #[test]
+    fn no_option_is_given_a_tip_for() {
+        for command in crate::Arguments::command().get_subcommands() {
+            let options: Vec<String> = command
+                .get_arguments()
+                .filter_map(|a| a.get_long())
+                .map(|name| format!("--{name}"))
+                .collect();
+            let known = |word: &str| options.iter().any(|option| option == word);
+            for (_, words) in OPTIONS.iter().filter(|(option, _)| known(option)) {
+                assert!(!words.iter().any(|word| known(word)), "{words:?}");
+            }
+            assert!(!HINTS.iter().flat_map(|(words, _)| *words).any(|word| known(word)));
+        }
+    }
+
+    #[test]
+    fn every_tip_is_an_option_of_some_command() {
+        let program = crate::Arguments::command();
+        let is_known = |option: &str| {
+            program
+                .get_subcommands()
+                .any(|c| c.get_arguments().any(|a| a.get_long() == option.strip_prefix("--")))
+        };
+        for (option, _) in OPTIONS {
+            assert!(is_known(option), "{option}");
+        }
+        for (name, _) in COMMANDS {
+            assert!(program.find_subcommand(name).is_some(), "{name}");
+        }
+    }
+}

@@ -1,0 +1,193 @@
+//! Joining descriptions, as of several files.
+
+use crate::{GeometryDesc, InstanceDesc, MaterialId, ObjectId, SceneDesc, ShapeDesc, WithoutLight};
+
+impl SceneDesc {
+    /// Adds all that another description has, in the same world.
+    ///
+    /// The settings of the picture (film, filter, sampler, integrator) stay those of the description that brings the
+    /// first camera, else of the first; so does what is up. Where nothing emits light, it is added as for the first that asks
+    /// for it. Indices of shapes ([`ShapeDesc::index`]) go on after those that are there.
+    pub fn append(&mut self, other: Self) {
+        let Self {
+            cameras,
+            film,
+            filter,
+            sampler,
+            integrator,
+            materials,
+            shapes,
+            objects,
+            instances,
+            lights,
+            without_light,
+            up,
+            ground,
+            listing,
+        } = other;
+        self.listing.append(listing);
+        if self.cameras.is_empty() && !cameras.is_empty() {
+            (self.film, self.filter, self.sampler, self.integrator) = (film, filter, sampler, integrator);
+            self.up = up;
+        }
+        if self.without_light == WithoutLight::Dark {
+            self.without_light = without_light;
+        }
+        self.ground = self.ground.or(ground);
+        let after = After {
+            index: next_index(self),
+            material: self.materials.len() as u32,
+            object: self.objects.len() as u32,
+        };
+        self.cameras.extend(cameras);
+        self.materials.extend(materials);
+        self.lights.extend(lights);
+        self.shapes.extend(shapes.into_iter().map(|shape| after.shape(shape)));
+        self.instances.extend(instances.into_iter().map(|instance| after.instance(instance)));
+        self.objects.extend(objects.into_iter().map(|mut object| {
+            object.shapes = object.shapes.into_iter().map(|shape| after.shape(shape)).collect();
+            object.instances =
+                object.instances.into_iter().map(|instance| after.instance(instance)).collect();
+            object
+        }));
+    }
+}
+
+/// The first index after those of all shapes, operands of CSG included.
+fn next_index(desc: &SceneDesc) -> u32 {
+    let mut next = 0;
+    let in_objects = desc.objects.iter().flat_map(|object| &object.shapes);
+    let mut open: Vec<&ShapeDesc> = desc.shapes.iter().chain(in_objects).collect();
+    while let Some(shape) = open.pop() {
+        next = next.max(shape.index.saturating_add(1));
+        if let GeometryDesc::Csg(csg) = &shape.geometry {
+            open.extend(csg.operands.iter().flatten());
+        }
+    }
+    next
+}
+
+/// What stands before the description that is added.
+struct After {
+    index: u32,
+    material: u32,
+    object: u32,
+}
+
+impl After {
+    fn shape(&self, mut shape: ShapeDesc) -> ShapeDesc {
+        shape.index = shape.index.saturating_add(self.index);
+        shape.material = shape.material.map(|MaterialId(id)| MaterialId(id + self.material));
+        if let GeometryDesc::Csg(csg) = &mut shape.geometry {
+            for operand in &mut csg.operands {
+                *operand = std::mem::take(operand).into_iter().map(|shape| self.shape(shape)).collect();
+            }
+        }
+        shape
+    }
+
+    fn instance(&self, instance: InstanceDesc) -> InstanceDesc {
+        InstanceDesc { object: ObjectId(instance.object.0 + self.object), ..instance }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use lumbre_geometry::Sphere;
+    use lumbre_math::{DVec3, Transform};
+    use lumbre_shading::Material;
+
+    use super::*;
+    use crate::{
+        Camera, CameraKind, CsgDesc, CsgOperation, FilmDesc, NamedMaterial, ObjectDesc, Placement, UpAxis,
+    };
+
+    fn ball(index: u32, material: u32) -> ShapeDesc {
+        ShapeDesc {
+            index,
+            geometry: GeometryDesc::Exact(Sphere::new(DVec3::new(3.0, 7.0, -4.0), 2.5).unwrap().into()),
+            world_from_object: Transform::IDENTITY,
+            reverse_orientation: false,
+            material: Some(MaterialId(material)),
+            area_light: None,
+            alpha: None,
+        }
+    }
+
+    /// A ball, a difference of two, and an object of one with its instance.
+    fn scene(name: &str) -> SceneDesc {
+        let named = |part: &str| NamedMaterial {
+            name: Some(format!("{name} {part}")),
+            material: Arc::new(Material::default_diffuse()),
+        };
+        let csg = CsgDesc {
+            operation: CsgOperation::Difference,
+            operands: vec![vec![ball(1, 0)], vec![ball(2, 1)]],
+        };
+        let instance =
+            InstanceDesc { object: ObjectId(0), world_from_object: Placement::Still(Transform::IDENTITY) };
+        SceneDesc {
+            materials: vec![named("a"), named("b")],
+            shapes: vec![ball(0, 1), ShapeDesc { geometry: GeometryDesc::Csg(csg), ..ball(3, 0) }],
+            objects: vec![ObjectDesc { name: name.into(), shapes: vec![ball(4, 1)], instances: vec![] }],
+            instances: vec![instance],
+            ..SceneDesc::default()
+        }
+    }
+
+    #[test]
+    fn everything_refers_to_its_own_after_joining() {
+        let mut joined = scene("first");
+        joined.append(scene("second"));
+        let material =
+            |shape: &ShapeDesc| joined.materials[shape.material.unwrap().0 as usize].name.clone().unwrap();
+        assert_eq!(joined.shapes.iter().map(|s| s.index).collect::<Vec<_>>(), [0, 3, 5, 8]);
+        assert_eq!(
+            (material(&joined.shapes[0]), material(&joined.shapes[2])),
+            ("first b".into(), "second b".into())
+        );
+        let GeometryDesc::Csg(csg) = &joined.shapes[3].geometry else { panic!() };
+        assert_eq!((csg.operands[0][0].index, material(&csg.operands[0][0])), (6, "second a".into()));
+        let objects: Vec<&str> =
+            joined.instances.iter().map(|i| &*joined.objects[i.object.0 as usize].name).collect();
+        assert_eq!(objects, ["first", "second"]);
+        assert_eq!(material(&joined.objects[1].shapes[0]), "second b");
+    }
+
+    #[test]
+    fn the_picture_is_that_of_the_first_camera() {
+        let staged = || SceneDesc {
+            cameras: vec![Camera {
+                name: None,
+                kind: CameraKind::Perspective { fov: 50.0, lens_radius: 0.0, focal_distance: 1.0 },
+                world_from_camera: Transform::IDENTITY,
+                motion: None,
+                frame_aspect: None,
+                screen_window: None,
+                shutter_open: 0.0,
+                shutter_close: 1.0,
+            }],
+            film: FilmDesc { width: Some(70), height: Some(30), ..FilmDesc::default() },
+            without_light: WithoutLight::Dark,
+            ..SceneDesc::default()
+        };
+        let model = || SceneDesc { up: UpAxis::Z, ..scene("model") };
+        let mut joined = model();
+        joined.append(staged());
+        assert_eq!(
+            (joined.film.width, joined.cameras.len(), joined.without_light),
+            (Some(70), 1, WithoutLight::Studio)
+        );
+        let mut joined = staged();
+        joined.append(model());
+        assert_eq!(
+            (joined.film.width, joined.cameras.len(), joined.without_light),
+            (Some(70), 1, WithoutLight::Studio)
+        );
+        let mut joined = staged();
+        joined.append(staged());
+        assert_eq!((joined.cameras.len(), joined.without_light), (2, WithoutLight::Dark));
+    }
+}

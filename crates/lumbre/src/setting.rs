@@ -1,0 +1,641 @@
+//! Parameters of a description by their names: `material.NAME.PARAM=VALUE`, and those of lights, cameras and the film.
+
+use std::str::FromStr;
+use std::sync::Arc;
+
+use lumbre_formats::diagnostic::{nearest_name, number, quoted};
+use lumbre_image::{Rgb, srgb_to_linear};
+use lumbre_math::DVec3;
+use lumbre_scene::{Camera, CameraKind, GeometryDesc, LightDesc, SceneDesc, ShapeDesc};
+use lumbre_shading::{
+    FloatTexture, Material, MaterialKind, Metal, PrincipledParams, Roughness, SpectrumTexture, Texture,
+};
+
+/// A value for a parameter of a description, whatever format it was read from. Texts are
+///
+/// - `material.NAME.PARAM=VALUE`, where NAME is that of the file or the 0-based index, and a value takes the place of a texture;
+/// - `light.INDEX.PARAM=VALUE` of lights other than shapes, and `light.area.scale=VALUE` of all shapes that emit;
+/// - `camera.NAME.PARAM=VALUE`, or `camera.PARAM=VALUE` of all cameras;
+/// - `film.PARAM=VALUE`.
+///
+/// Values are numbers, colours (one number, three with commas between, or `#rrggbb` in sRGB) or points. A parameter that is not
+/// there is answered with those that are.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Setting {
+    of: Owner,
+    name: String,
+    parameter: String,
+    value: String,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Owner {
+    Material,
+    Light,
+    Camera,
+    Film,
+}
+
+impl FromStr for Setting {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || {
+            format!(
+                "found {}; expected material.NAME.PARAM=VALUE, light.INDEX.PARAM=VALUE, camera.PARAM=VALUE or film.PARAM=VALUE",
+                quoted(text)
+            )
+        };
+        let (path, value) = text.split_once('=').ok_or_else(wrong)?;
+        let (owner, rest) = path.trim().split_once('.').ok_or_else(wrong)?;
+        let (of, is_one) = match owner {
+            "material" => (Owner::Material, false),
+            "light" => (Owner::Light, false),
+            "camera" => (Owner::Camera, true),
+            "film" => (Owner::Film, true),
+            _ => return Err(wrong()),
+        };
+        // Names may hold points, parameters do not.
+        let (name, parameter) = match rest.rsplit_once('.') {
+            Some(parts) => parts,
+            None if is_one => ("", rest),
+            None => return Err(wrong()),
+        };
+        let (parameter, value) = (parameter.trim().to_owned(), value.trim().to_owned());
+        if parameter.is_empty() || value.is_empty() || (of == Owner::Film && !name.is_empty()) {
+            return Err(wrong());
+        }
+        Ok(Self { of, name: name.trim().to_owned(), parameter, value })
+    }
+}
+
+impl Setting {
+    /// Sets the parameter.
+    ///
+    /// # Errors
+    /// Says what is not there, and what is; or what values are accepted.
+    pub fn apply(&self, desc: &mut SceneDesc) -> Result<(), String> {
+        match self.of {
+            Owner::Material => self.set_material(desc),
+            Owner::Light => self.set_light(desc),
+            Owner::Camera => self.set_camera(desc),
+            Owner::Film => {
+                let film = &mut desc.film;
+                let slot = match &*self.parameter {
+                    "exposure" => Slot::Plain(&mut film.exposure, ABOVE_ZERO),
+                    "maxcomponent" => Slot::Plain(&mut film.max_component, ABOVE_ZERO),
+                    _ => return Err(self.unknown("the film", &["exposure", "maxcomponent"])),
+                };
+                self.set(slot)
+            }
+        }
+    }
+
+    fn set_material(&self, desc: &mut SceneDesc) -> Result<(), String> {
+        let named = |i: usize| desc.materials[i].name.as_deref() == Some(&*self.name);
+        let mut found: Vec<usize> = (0..desc.materials.len()).filter(|&i| named(i)).collect();
+        if found.is_empty() {
+            found.extend(self.name.parse().ok().filter(|i: &usize| *i < desc.materials.len()));
+        }
+        if found.is_empty() {
+            let names = desc.materials.iter().enumerate();
+            let names: Vec<String> =
+                names.map(|(i, m)| m.name.clone().unwrap_or_else(|| i.to_string())).collect();
+            return Err(self.missing("material", &names));
+        }
+        for i in found {
+            let old = desc.materials[i].material.clone();
+            let mut new = Material::clone(&old);
+            let owner = format!("material {} ({})", quoted(&self.name), new.kind.name());
+            let known = material_parameters(&new.kind);
+            let slot = material_slot(&mut new.kind, &self.parameter);
+            self.set(slot.ok_or_else(|| self.unknown(&owner, known))?)?;
+            let new = Arc::new(new);
+            for material in &mut desc.materials {
+                replace(&mut material.material, &old, &new);
+            }
+        }
+        Ok(())
+    }
+
+    fn set_light(&self, desc: &mut SceneDesc) -> Result<(), String> {
+        if self.name == "area" {
+            if self.parameter != "scale" {
+                return Err(self.unknown("light area", &["scale"]));
+            }
+            let mut factor = 1.0;
+            self.set(Slot::Plain(&mut factor, FROM_ZERO))?;
+            let in_objects = desc.objects.iter_mut().flat_map(|object| &mut object.shapes);
+            for shape in desc.shapes.iter_mut().chain(in_objects) {
+                scale_emission(shape, factor);
+            }
+            return Ok(());
+        }
+        let index = self.name.parse().ok().filter(|i: &usize| *i < desc.lights.len());
+        let Some(index) = index else {
+            let mut names: Vec<String> = (0..desc.lights.len()).map(|i| i.to_string()).collect();
+            names.push("area".to_owned());
+            return Err(self.missing("light", &names));
+        };
+        let mut light = &mut desc.lights[index];
+        while let LightDesc::Moving { light: inner, .. } = light {
+            light = inner;
+        }
+        let known: &[&str] = match light {
+            LightDesc::Point { .. } => &["from", "intensity", "scale"],
+            LightDesc::Spot { .. } => &["intensity", "coneangle", "conedeltaangle", "scale"],
+            LightDesc::Goniometric { .. } => &["intensity", "scale"],
+            LightDesc::Distant { .. } => &["irradiance", "scale"],
+            LightDesc::Infinite { .. } => &["radiance", "scale"],
+            LightDesc::Moving { .. } => &[],
+        };
+        if self.parameter == "scale" {
+            let mut factor = 1.0;
+            self.set(Slot::Plain(&mut factor, FROM_ZERO))?;
+            match light {
+                LightDesc::Point { intensity: light, .. }
+                | LightDesc::Spot { intensity: light, .. }
+                | LightDesc::Goniometric { intensity: light, .. }
+                | LightDesc::Distant { irradiance: light, .. }
+                | LightDesc::Infinite { radiance: light, .. } => *light = *light * factor,
+                LightDesc::Moving { .. } => {}
+            }
+            return Ok(());
+        }
+        let slot = match (light, &*self.parameter) {
+            (LightDesc::Point { from, .. }, "from") => Slot::Point(from),
+            (
+                LightDesc::Point { intensity, .. }
+                | LightDesc::Spot { intensity, .. }
+                | LightDesc::Goniometric { intensity, .. },
+                "intensity",
+            ) => Slot::Light(intensity),
+            (LightDesc::Spot { cone_angle, .. }, "coneangle") => Slot::Plain(cone_angle, ANGLE),
+            (LightDesc::Spot { cone_delta_angle, .. }, "conedeltaangle") => {
+                Slot::Plain(cone_delta_angle, ANGLE)
+            }
+            (LightDesc::Distant { irradiance, .. }, "irradiance") => Slot::Light(irradiance),
+            (LightDesc::Infinite { radiance, .. }, "radiance") => Slot::Light(radiance),
+            _ => return Err(self.unknown(&format!("light {index}"), known)),
+        };
+        self.set(slot)
+    }
+
+    fn set_camera(&self, desc: &mut SceneDesc) -> Result<(), String> {
+        if desc.cameras.is_empty() {
+            return Err("the scene has no camera of its own (expected --fov and other options of the view)"
+                .to_owned());
+        }
+        let by_name = |camera: &Camera| camera.name.as_deref() == Some(&*self.name);
+        let has_name = desc.cameras.iter().any(by_name);
+        let index = self.name.parse().ok().filter(|_| !has_name);
+        let mut is_found = false;
+        for (i, camera) in desc.cameras.iter_mut().enumerate() {
+            if !(self.name.is_empty() || by_name(camera) || index == Some(i)) {
+                continue;
+            }
+            is_found = true;
+            let (known, kind): (&[&str], &str) = match camera.kind {
+                CameraKind::Perspective { .. } => (&["fov", "lensradius", "focaldistance"], "perspective"),
+                CameraKind::Orthographic { .. } => (&["lensradius", "focaldistance"], "orthographic"),
+                CameraKind::Spherical { .. } => (&[], "spherical"),
+            };
+            let slot = match (&mut camera.kind, &*self.parameter) {
+                (CameraKind::Perspective { fov, .. }, "fov") => Slot::Double(fov, Range(0.001, 179.0)),
+                (
+                    CameraKind::Perspective { lens_radius, .. }
+                    | CameraKind::Orthographic { lens_radius, .. },
+                    "lensradius",
+                ) => Slot::Double(lens_radius, FROM_ZERO),
+                (
+                    CameraKind::Perspective { focal_distance, .. }
+                    | CameraKind::Orthographic { focal_distance, .. },
+                    "focaldistance",
+                ) => Slot::Double(focal_distance, ABOVE_ZERO),
+                _ => return Err(self.unknown(&format!("the {kind} camera"), known)),
+            };
+            self.set(slot)?;
+        }
+        if is_found {
+            return Ok(());
+        }
+        let names = desc.cameras.iter().enumerate();
+        let names: Vec<String> =
+            names.map(|(i, c)| c.name.clone().unwrap_or_else(|| i.to_string())).collect();
+        Err(self.missing("camera", &names))
+    }
+
+    fn missing(&self, noun: &str, names: &[String]) -> String {
+        /// How many names a message holds.
+        const MOST: usize = 20;
+        let mut known: Vec<String> = names.iter().take(MOST).map(|name| quoted(name)).collect();
+        if names.len() > MOST {
+            known.push("…".to_owned());
+        }
+        let tip = nearest_name(&self.name, names.iter().map(String::as_str));
+        let tip = tip.map_or_else(String::new, |near| format!("; did you mean {}?", quoted(near)));
+        format!("there is no {noun} {} (expected {}{tip})", quoted(&self.name), known.join(", "))
+    }
+
+    fn unknown(&self, owner: &str, known: &[&str]) -> String {
+        let expected = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+        let tip = nearest_name(&self.parameter, known.iter().copied());
+        let tip = tip.map_or_else(String::new, |near| format!("; did you mean {near}?"));
+        format!("{owner} has no parameter {} (expected {expected}{tip})", quoted(&self.parameter))
+    }
+
+    fn set(&self, slot: Slot<'_>) -> Result<(), String> {
+        match slot {
+            Slot::Colour(texture) => *texture = Arc::new(Texture::Constant(self.colour(UNIT)?)),
+            Slot::Light(light) => *light = self.colour(FROM_ZERO)?,
+            Slot::Number(texture, range) => {
+                *texture = Arc::new(Texture::Constant(self.number(range)? as f32))
+            }
+            Slot::Roughness(roughness) => {
+                let alpha: Arc<FloatTexture> = Arc::new(Texture::Constant(self.number(FROM_ZERO)? as f32));
+                (roughness.u, roughness.v) = (alpha.clone(), alpha);
+            }
+            Slot::Plain(value, range) => *value = self.number(range)? as f32,
+            Slot::Double(value, range) => *value = self.number(range)?,
+            Slot::Point(point) => {
+                let [x, y, z] = self
+                    .numbers(Range(-1e30, 1e30))
+                    .ok_or_else(|| self.refused("three numbers, such as 1,-2.5,3"))?;
+                *point = DVec3::new(x, y, z);
+            }
+        }
+        Ok(())
+    }
+
+    fn number(&self, range: Range) -> Result<f64, String> {
+        self.numbers(range).map(|[x]| x).ok_or_else(|| self.refused(&range.said()))
+    }
+
+    fn colour(&self, range: Range) -> Result<Rgb, String> {
+        if let Some([r, g, b]) = self.numbers(range) {
+            return Ok(Rgb::new(r as f32, g as f32, b as f32));
+        }
+        if let Some([grey]) = self.numbers(range) {
+            return Ok(Rgb::splat(grey as f32));
+        }
+        let digits =
+            self.value.strip_prefix('#').filter(|digits| digits.len() == 6 && !digits.starts_with('+'));
+        if let Some(code) = digits.and_then(|digits| u32::from_str_radix(digits, 16).ok()) {
+            let channel = |shift: u32| srgb_to_linear((code >> shift & 0xff) as f32 / 255.0);
+            return Ok(Rgb::new(channel(16), channel(8), channel(0)));
+        }
+        Err(self.refused(&format!("{}, three of them or a colour such as #e8e0d8", range.said())))
+    }
+
+    /// So many numbers in the range, if the value is these.
+    fn numbers<const N: usize>(&self, Range(low, high): Range) -> Option<[f64; N]> {
+        let numbers: Vec<f64> =
+            self.value.split(',').map(|part| part.trim().parse().ok()).collect::<Option<_>>()?;
+        numbers.try_into().ok().filter(|numbers: &[f64; N]| numbers.iter().all(|v| low <= *v && *v <= high))
+    }
+
+    fn refused(&self, expected: &str) -> String {
+        format!(
+            "wrong value of {} (found {}; expected {expected})",
+            quoted(&self.parameter),
+            quoted(&self.value)
+        )
+    }
+}
+
+/// From the first to the second, both included.
+#[derive(Clone, Copy)]
+struct Range(f64, f64);
+
+/// What single precision can hold of numbers above 0.
+const ABOVE_ZERO: Range = Range(1e-30, 1e30);
+const FROM_ZERO: Range = Range(0.0, 1e30);
+const UNIT: Range = Range(0.0, 1.0);
+const ANGLE: Range = Range(0.0, 180.0);
+
+impl Range {
+    fn said(self) -> String {
+        match self {
+            Self(low, 1e30) if low > 0.0 => "a number above 0".to_owned(),
+            Self(low, 1e30) => format!("a number from {} up", number(low)),
+            Self(low, high) => format!("a number from {} to {}", number(low), number(high)),
+        }
+    }
+}
+
+/// Where a value goes.
+enum Slot<'a> {
+    /// In [0, 1].
+    Colour(&'a mut Arc<SpectrumTexture>),
+    /// From 0 up.
+    Light(&'a mut Rgb),
+    Number(&'a mut Arc<FloatTexture>, Range),
+    /// Along both directions.
+    Roughness(&'a mut Roughness),
+    Plain(&'a mut f32, Range),
+    Double(&'a mut f64, Range),
+    Point(&'a mut DVec3),
+}
+
+/// The names of the parameters that [`material_slot`] finds: those of the scene language, and of [`PrincipledParams`].
+fn material_parameters(kind: &MaterialKind) -> &'static [&'static str] {
+    match kind {
+        MaterialKind::Diffuse { .. } => &["reflectance"],
+        MaterialKind::Conductor { .. } => &["roughness", "uroughness", "vroughness"],
+        MaterialKind::ConductorReflectance { .. } => {
+            &["reflectance", "roughness", "uroughness", "vroughness"]
+        }
+        MaterialKind::Dielectric { .. } => &["eta", "roughness", "uroughness", "vroughness"],
+        MaterialKind::ThinDielectric { .. } => &["eta"],
+        MaterialKind::CoatedDiffuse { .. } => {
+            &["reflectance", "roughness", "uroughness", "vroughness", "thickness", "eta", "g", "albedo"]
+        }
+        MaterialKind::CoatedConductor { metal: Metal::Reflectance(_), .. } => {
+            &["reflectance", "roughness", "interface_roughness", "interface_eta", "thickness", "g", "albedo"]
+        }
+        MaterialKind::CoatedConductor { .. } => {
+            &["roughness", "interface_roughness", "interface_eta", "thickness", "g", "albedo"]
+        }
+        MaterialKind::DiffuseTransmission { .. } => &["reflectance", "transmittance", "scale"],
+        MaterialKind::Principled(_) => PRINCIPLED,
+        MaterialKind::Mix { .. } => &["amount"],
+        MaterialKind::Interface => &[],
+    }
+}
+
+const PRINCIPLED: &[&str] = &[
+    "base_color",
+    "metallic",
+    "roughness",
+    "anisotropy",
+    "ior",
+    "specular",
+    "transmission",
+    "dispersion",
+    "diffuse_transmission",
+    "diffuse_transmission_color",
+    "clearcoat",
+    "clearcoat_roughness",
+    "sheen_color",
+    "sheen_roughness",
+    "iridescence",
+    "iridescence_ior",
+    "iridescence_thickness",
+];
+
+/// The parameter of a material by its name.
+fn material_slot<'m>(kind: &'m mut MaterialKind, name: &str) -> Option<Slot<'m>> {
+    use MaterialKind as Kind;
+    Some(match (kind, name) {
+        (Kind::Principled(params), name) => return principled_slot(params, name),
+        (
+            Kind::Diffuse { reflectance }
+            | Kind::ConductorReflectance { reflectance, .. }
+            | Kind::CoatedDiffuse { reflectance, .. }
+            | Kind::CoatedConductor { metal: Metal::Reflectance(reflectance), .. }
+            | Kind::DiffuseTransmission { reflectance, .. },
+            "reflectance",
+        ) => Slot::Colour(reflectance),
+        (Kind::DiffuseTransmission { transmittance, .. }, "transmittance") => Slot::Colour(transmittance),
+        (Kind::DiffuseTransmission { scale, .. }, "scale") => Slot::Plain(scale, FROM_ZERO),
+        (Kind::CoatedConductor { interface_roughness, .. }, "interface_roughness") => {
+            Slot::Roughness(interface_roughness)
+        }
+        (
+            Kind::Conductor { roughness, .. }
+            | Kind::ConductorReflectance { roughness, .. }
+            | Kind::Dielectric { roughness, .. }
+            | Kind::CoatedDiffuse { roughness, .. }
+            | Kind::CoatedConductor { roughness, .. },
+            "roughness",
+        ) => Slot::Roughness(roughness),
+        (
+            Kind::Conductor { roughness, .. }
+            | Kind::ConductorReflectance { roughness, .. }
+            | Kind::Dielectric { roughness, .. }
+            | Kind::CoatedDiffuse { roughness, .. },
+            "uroughness",
+        ) => Slot::Number(&mut roughness.u, FROM_ZERO),
+        (
+            Kind::Conductor { roughness, .. }
+            | Kind::ConductorReflectance { roughness, .. }
+            | Kind::Dielectric { roughness, .. }
+            | Kind::CoatedDiffuse { roughness, .. },
+            "vroughness",
+        ) => Slot::Number(&mut roughness.v, FROM_ZERO),
+        (
+            Kind::Dielectric { eta, .. } | Kind::ThinDielectric { eta } | Kind::CoatedDiffuse { eta, .. },
+            "eta",
+        ) => Slot::Plain(eta, Range(0.1, 10.0)),
+        (Kind::CoatedConductor { interface_eta, .. }, "interface_eta") => {
+            Slot::Plain(interface_eta, Range(0.1, 10.0))
+        }
+        (Kind::CoatedDiffuse { thickness, .. } | Kind::CoatedConductor { thickness, .. }, "thickness") => {
+            Slot::Number(thickness, FROM_ZERO)
+        }
+        (Kind::CoatedDiffuse { g, .. } | Kind::CoatedConductor { g, .. }, "g") => {
+            Slot::Number(g, Range(-0.99, 0.99))
+        }
+        (Kind::CoatedDiffuse { albedo, .. } | Kind::CoatedConductor { albedo, .. }, "albedo") => {
+            Slot::Colour(albedo)
+        }
+        (Kind::Mix { amount, .. }, "amount") => Slot::Number(amount, UNIT),
+        _ => return None,
+    })
+}
+
+fn principled_slot<'m>(params: &'m mut PrincipledParams, name: &str) -> Option<Slot<'m>> {
+    Some(match name {
+        "base_color" => Slot::Colour(&mut params.base_color),
+        "metallic" => Slot::Number(&mut params.metallic, UNIT),
+        "roughness" => Slot::Number(&mut params.roughness, UNIT),
+        "anisotropy" | "anisotropic" => Slot::Number(&mut params.anisotropy, UNIT),
+        "ior" | "eta" => Slot::Plain(&mut params.ior, Range(1.0, 10.0)),
+        "specular" => Slot::Number(&mut params.specular, UNIT),
+        "transmission" | "spec_trans" => Slot::Number(&mut params.transmission, UNIT),
+        "dispersion" => Slot::Plain(&mut params.dispersion, Range(0.0, 100.0)),
+        "diffuse_transmission" | "diff_trans" => Slot::Number(&mut params.diffuse_transmission, UNIT),
+        "diffuse_transmission_color" => Slot::Colour(&mut params.diffuse_transmission_color),
+        "clearcoat" => Slot::Number(&mut params.clearcoat, UNIT),
+        "clearcoat_roughness" => Slot::Number(&mut params.clearcoat_roughness, UNIT),
+        "sheen_color" => Slot::Colour(&mut params.sheen_color),
+        "sheen_roughness" => Slot::Number(&mut params.sheen_roughness, UNIT),
+        "iridescence" => Slot::Number(&mut params.iridescence, UNIT),
+        "iridescence_ior" => Slot::Plain(&mut params.iridescence_ior, Range(1.0, 10.0)),
+        "iridescence_thickness" => Slot::Number(&mut params.iridescence_thickness, FROM_ZERO),
+        _ => return None,
+    })
+}
+
+/// Puts a material in the place of another, also in mixtures.
+fn replace(material: &mut Arc<Material>, old: &Arc<Material>, new: &Arc<Material>) {
+    if Arc::ptr_eq(material, old) {
+        *material = new.clone();
+    } else if contains(material, old)
+        && let MaterialKind::Mix { materials, .. } = &mut Arc::make_mut(material).kind
+    {
+        materials.iter_mut().for_each(|part| replace(part, old, new));
+    }
+}
+
+fn contains(material: &Arc<Material>, part: &Arc<Material>) -> bool {
+    match &material.kind {
+        MaterialKind::Mix { materials, .. } => {
+            materials.iter().any(|inner| Arc::ptr_eq(inner, part) || contains(inner, part))
+        }
+        _ => false,
+    }
+}
+
+fn scale_emission(shape: &mut ShapeDesc, factor: f32) {
+    if let Some(light) = &mut shape.area_light {
+        // With a power, the radiance is only the colour.
+        match &mut light.power {
+            Some(power) => *power *= factor,
+            None => light.radiance = light.radiance * factor,
+        }
+    }
+    if let GeometryDesc::Csg(csg) = &mut shape.geometry {
+        csg.operands.iter_mut().flatten().for_each(|operand| scale_emission(operand, factor));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use lumbre_formats::{Budget, Diagnostics, ReadOptions, open_scenes, pbrt};
+    use lumbre_shading::Spectrum;
+
+    use super::*;
+
+    fn scene(world: &str) -> SceneDesc {
+        let text =
+            format!("LookAt 0 -9 2 0 0 0 0 0 1 Camera \"perspective\" \"float fov\" 50 WorldBegin {world}");
+        pbrt::read_bytes("a.pbrt", text.as_bytes(), None, &Budget::default(), &mut Diagnostics::new())
+            .unwrap()
+    }
+
+    fn set(desc: &mut SceneDesc, text: &str) -> Result<(), String> {
+        text.parse::<Setting>()?.apply(desc)
+    }
+
+    fn diffuse(desc: &SceneDesc, name: &str) -> Spectrum {
+        let named = desc.materials.iter().find(|m| m.name.as_deref() == Some(name)).unwrap();
+        match &named.material.kind {
+            MaterialKind::Diffuse { reflectance } => match **reflectance {
+                Texture::Constant(colour) => colour,
+                _ => panic!("a texture"),
+            },
+            _ => panic!("not diffuse"),
+        }
+    }
+
+    #[test]
+    fn a_material_changes_wherever_it_is_used() {
+        let mut desc = scene(
+            "MakeNamedMaterial \"the.wood\" \"string type\" \"diffuse\" \"rgb reflectance\" [.2 .3 .4]
+            MakeNamedMaterial \"tin\" \"string type\" \"conductor\" \"float roughness\" 0.1
+            MakeNamedMaterial \"both\" \"string type\" \"mix\" \"string materials\" [\"the.wood\" \"tin\"]",
+        );
+        set(&mut desc, "material.the.wood.reflectance=0.5,0.25,0.125").unwrap();
+        let expected = Rgb::new(0.5, 0.25, 0.125);
+        assert_eq!(diffuse(&desc, "the.wood"), expected);
+        let both = desc.materials.iter().find(|m| m.name.as_deref() == Some("both")).unwrap();
+        let MaterialKind::Mix { materials, .. } = &both.material.kind else { panic!() };
+        let MaterialKind::Diffuse { reflectance } = &materials[0].kind else { panic!() };
+        assert!(matches!(**reflectance, Texture::Constant(colour) if colour == expected));
+        set(&mut desc, "material.the.wood.reflectance = #ff0000").unwrap();
+        assert_eq!(diffuse(&desc, "the.wood"), Rgb::new(1.0, 0.0, 0.0));
+        set(&mut desc, "material.tin.roughness=0.375").unwrap();
+        let tin = desc.materials.iter().find(|m| m.name.as_deref() == Some("tin")).unwrap();
+        let MaterialKind::Conductor { roughness, .. } = &tin.material.kind else { panic!() };
+        assert!(
+            matches!((&*roughness.u, &*roughness.v), (Texture::Constant(u), Texture::Constant(v)) if *u == 0.375 && *v == 0.375)
+        );
+    }
+
+    #[test]
+    fn what_is_not_there_is_answered_with_what_is() {
+        let mut desc = scene(
+            "MakeNamedMaterial \"wood\" \"string type\" \"diffuse\" LightSource \"point\" Shape \"sphere\"",
+        );
+        for (text, expected) in [
+            ("material.wod.reflectance=1", "did you mean \"wood\"?"),
+            ("material.wood.reflectence=1", "did you mean reflectance?"),
+            ("material.wood.reflectance=2", "a number from 0 to 1"),
+            ("material.wood.reflectance=1,2", "three of them"),
+            ("light.3.intensity=1", "there is no light \"3\" (expected \"0\", \"area\")"),
+            ("light.0.radiance=1", "expected from, intensity, scale"),
+            ("camera.fov=-3", "a number from 0.001 to 179"),
+            ("camera.left.fov=30", "there is no camera \"left\" (expected \"0\")"),
+            ("film.iso=3", "expected exposure, maxcomponent"),
+            ("wood.reflectance=1", "expected material.NAME.PARAM=VALUE"),
+            ("material.reflectance=1", "expected material.NAME.PARAM=VALUE"),
+            ("material.wood.reflectance", "expected material.NAME.PARAM=VALUE"),
+        ] {
+            let said = set(&mut desc, text).unwrap_err();
+            assert!(said.contains(expected), "{text}: {said}");
+        }
+    }
+
+    #[test]
+    fn lights_cameras_and_the_film_are_set() {
+        let mut desc = scene(
+            "LightSource \"point\" \"rgb I\" [1 2 3] AreaLightSource \"diffuse\" \"rgb L\" [2 2 2] Shape \"sphere\"",
+        );
+        set(&mut desc, "light.0.from=1,-2,3").unwrap();
+        set(&mut desc, "light.0.scale=2.5").unwrap();
+        set(&mut desc, "light.area.scale=0.5").unwrap();
+        set(&mut desc, "camera.fov=35").unwrap();
+        set(&mut desc, "camera.0.lensradius=0.25").unwrap();
+        set(&mut desc, "film.exposure=2").unwrap();
+        let LightDesc::Point { from, intensity } = &desc.lights[0] else { panic!() };
+        assert_eq!((*from, *intensity), (DVec3::new(1.0, -2.0, 3.0), Rgb::new(2.5, 5.0, 7.5)));
+        let light = desc.shapes[0].area_light.as_ref().unwrap();
+        assert!(
+            (light.radiance.g
+                / scene("AreaLightSource \"diffuse\" \"rgb L\" [2 2 2] Shape \"sphere\"").shapes[0]
+                    .area_light
+                    .as_ref()
+                    .unwrap()
+                    .radiance
+                    .g
+                - 0.5)
+                .abs()
+                < 1e-6
+        );
+        let CameraKind::Perspective { fov, lens_radius, .. } = desc.cameras[0].kind else { panic!() };
+        assert_eq!((fov, lens_radius, desc.film.exposure), (35.0, 0.25, 2.0));
+    }
+
+    #[test]
+    fn every_listed_parameter_is_one_and_materials_of_any_format_have_them() {
+        let kinds = [
+            "diffuse",
+            "conductor",
+            "dielectric",
+            "thindielectric",
+            "coateddiffuse",
+            "coatedconductor",
+            "diffusetransmission",
+            "principled",
+            "interface",
+        ];
+        for kind in kinds {
+            let desc = scene(&format!("MakeNamedMaterial \"m\" \"string type\" \"{kind}\""));
+            let material = desc.materials.iter().find(|m| m.name.as_deref() == Some("m")).unwrap();
+            let mut kind = material.material.kind.clone();
+            for name in material_parameters(&kind) {
+                assert!(material_slot(&mut kind, name).is_some(), "{name}");
+            }
+        }
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("a.mtl"), "newmtl red\nKd 1 0 0\n").unwrap();
+        let path = folder.path().join("a.obj");
+        std::fs::write(&path, "mtllib a.mtl\nusemtl red\nv 0 0 0\nv 2 0 0\nv 0 3 0\nf 1 2 3\n").unwrap();
+        let (mut desc, _) = open_scenes(&[Path::new(&path)], &ReadOptions::default()).unwrap();
+        set(&mut desc, "material.red.reflectance=0,0.5,0").unwrap();
+        assert_eq!(diffuse(&desc, "red"), Rgb::new(0.0, 0.5, 0.0));
+    }
+}
