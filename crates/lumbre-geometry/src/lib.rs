@@ -13,8 +13,10 @@ mod measure;
 mod nearest;
 mod placed;
 mod ray;
+mod scaled;
 mod shape;
 mod support;
+mod twofold;
 
 use lumbre_math::{DVec2, DVec3, Transform};
 
