@@ -71,11 +71,15 @@ pub(crate) fn start(w: DVec3, d: DVec3, a: f64, h: f64) -> f64 {
 pub(crate) fn is_exact(start: f64, roots: [f64; 2], delta: f64, [a, h, c]: [f64; 3]) -> bool {
     // The bounds are sums of absolute values, which rounding errors hardly ever reach a tenth of.
     const TOLERANCE: f64 = 24.0;
-    let [first, second] = roots.map(f64::abs);
-    let allowed = TOLERANCE * 2.0 * delta.sqrt() * (start.abs() + first.min(second));
-    let error = |s: f64| c + s * (2.0 * h + s * a);
-    // False for a NaN.
-    error(first) <= allowed && error(second) <= allowed
+    let slope = 2.0 * delta.sqrt();
+    roots.into_iter().all(|root| {
+        let (s, t) = (root.abs(), (start + root).abs());
+        // A ray that starts at a crossing has no digits of that one to keep.
+        let size = if t > 1e-6 * start.abs() { t } else { start.abs() };
+        let error = c + s * (2.0 * h + s * a) + 4.0 * s * slope;
+        // False for a NaN.
+        error <= TOLERANCE * slope * size
+    })
 }
 
 /// A quadratic equation along a line, solved in twice the precision.
