@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use lumbre_math::quadratic::quadratic;
-use lumbre_math::rounding::gamma;
+use lumbre_math::rounding::{UNIT_ROUNDOFF, gamma};
 use lumbre_math::{DMat3, DVec2, DVec3, Transform, orthonormal_basis};
 
 use crate::line::{Solution, is_blurred, is_exact, plane_crossing, start};
@@ -107,7 +107,9 @@ impl Axial {
         let e_error = slope * reach + 2.0 * self.r1;
         let a_error = 2.0 * speed * (across + slope * g.abs());
         let h_error = across * reach + offset * speed + g.abs() * e_error + e.abs() * slope * speed;
-        let c_error = 2.0 * (offset * reach + e.abs() * e_error);
+        let c_error = 2.0 * (offset * reach + e.abs() * e_error)
+            // Near the apex nothing is left but errors.
+            + UNIT_ROUNDOFF * (reach * reach + e_error * e_error);
         let delta_error = 2.0 * h.abs() * h_error + a.abs() * c_error + c.abs() * a_error;
         let radius = e - g * (h / a);
         let is_certain = a.abs() > f64::EPSILON * a_error
@@ -305,17 +307,24 @@ impl Axial {
 
     /// The height above p1 of the point at `t`, and its offset from the axis.
     pub(crate) fn arm(&self, ray: &Ray, t: f64, part: u32) -> (f64, DVec3) {
-        let base = if part == CAP2 { self.p2 } else { self.p1 };
+        // Near a pointed end the offset is small beside the way from the other.
+        let from_2 = part == CAP2 || self.r2 == 0.0;
+        let base = if from_2 { self.p2 } else { self.p1 };
+        let lift = if from_2 && part == LATERAL { self.length } else { 0.0 };
+        let split = |w: DVec3| {
+            let z = w.dot(self.axis);
+            let arm = w - z * self.axis;
+            // Twice: where the offset is small, the first is mostly rounding error.
+            (z + lift, arm - arm.dot(self.axis) * self.axis)
+        };
         let w = point(ray.origin, base, t, ray.direction);
-        let z = w.dot(self.axis);
-        let (z, arm) = (z, w - z * self.axis);
+        let (z, arm) = split(w);
         if part != LATERAL || !is_blurred(ray, t, length(arm)) {
             return (z, arm);
         }
         let start = -(ray.origin - base).dot(ray.direction) / ray.direction.length_squared();
-        let w = self.solution(ray, start).point(t, ray.direction).unwrap_or(w);
-        let z = w.dot(self.axis);
-        (z, w - z * self.axis)
+        let sharp = self.solution(ray, start).point(t, ray.direction);
+        sharp.map_or((z, arm), |w| split(w - (base - self.p1)))
     }
 
     two_crossings!(pub(crate));

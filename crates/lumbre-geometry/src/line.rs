@@ -77,8 +77,8 @@ pub(crate) fn is_exact(start: f64, roots: [f64; 2], delta: f64, [a, h, c]: [f64;
         // A ray that starts at a crossing has no digits of that one to keep.
         let size = if t > 1e-6 * start.abs() { t } else { start.abs() };
         let error = c + s * (2.0 * h + s * a) + 4.0 * s * slope;
-        // False for a NaN.
-        error <= TOLERANCE * slope * size
+        // False for a NaN, and for a root at infinity.
+        error < TOLERANCE * slope * size
     })
 }
 

@@ -95,7 +95,9 @@ impl Mul for Bounded {
     #[inline]
     fn mul(self, other: Self) -> Self {
         let value = self.value * other.value;
-        let carried = self.value.abs() * other.error + other.value.abs() * self.error;
+        let carried = self.value.abs() * other.error
+            + other.value.abs() * self.error
+            + UNIT_ROUNDOFF * self.error * other.error;
         Self { value, error: carried + value.abs() }
     }
 }

@@ -400,3 +400,130 @@ fn no_crossing_is_lost_invented_or_off_from_far_away() {
 fn no_crossing_of_a_slender_shape_is_lost_invented_or_off() {
     every_shape_from([0.0, 3.0], [3.0, 9.0], 60, 3);
 }
+
+#[test]
+fn no_crossing_of_a_cone_is_lost_invented_or_off_along_generators_and_through_the_apex() {
+    let mut random = Random(RandomStream::new(4));
+    let mut tally = Tally::default();
+    for i in 0..400 * repeats() {
+        let mut v = |scale: f64| (scale * random.vector()).map(round_to);
+        let (base, apex) = (v(2.0), v(2.0));
+        let radius = round_to(0.3 + v(1.0).x.abs());
+        let subject = axial("cone", base, apex, radius, 0.0);
+        let other = axial("cone", apex, base, 0.0, radius);
+        let generator = {
+            let rim = subject.shape.surface_at(0, DVec2::new(random.between(0.0, 1.0), 0.0)).unwrap();
+            apex - rim.point
+        };
+        let aside = match i % 3 {
+            0 => DVec3::ZERO,
+            1 => 10f64.powf(random.between(-17.0, -3.0)) * random.vector(),
+            _ => random.vector(),
+        };
+        let direction = generator + aside;
+        let origin = apex - random.between(-4.0, 9.0) * direction;
+        for ray in [Ray::new(origin, direction), Ray::new(origin, -direction)] {
+            compare(&subject, &ray, &mut tally);
+            compare(&other, &ray, &mut tally);
+            // Whatever is known of it: nothing is beyond the apex.
+            for caps in [false, true] {
+                let cone = Shape::from(Cone::new(base, apex, radius, 0.0, caps).unwrap());
+                let mut found = Roots::new();
+                cone.roots(&ray.with_range(f64::NEG_INFINITY, f64::INFINITY), &mut found);
+                for root in &found {
+                    let w = minus(ray.origin, apex);
+                    let spine = minus(apex, base);
+                    let above = &dot(&w, &spine) + &(&Exact::from(root.t) * &dot(&exact(ray.direction), &spine));
+                    let size = (apex - base).length() * (ray.origin.length() + (root.t * direction).length());
+                    assert!(above.value() <= 1e-15 * size, "{found:?} {ray:?} {cone:?}");
+                }
+            }
+        }
+    }
+    println!("{tally:?}");
+    assert!(tally.crossings > 300 * repeats(), "{tally:?}");
+}
+
+#[test]
+fn a_ray_along_a_generator_ends_at_the_apex() {
+    let cone = Shape::from(Cone::new(DVec3::ZERO, DVec3::Z, 1.0, 0.0, true).unwrap());
+    let v = DVec3::new;
+    let one = Ray::new(
+        v(2.853220496112134, 0.92689416902127, -2.0),
+        v(-0.9510734987040446, -0.30896472300709, 1.0),
+    );
+    let other = Ray::new(
+        v(-1.1835945223964466, -9.929708153140913, -9.0),
+        v(0.11835945223964466, 0.9929708153140914, 1.0),
+    );
+    for (ray, apex) in [(one, 3.0), (other, 10.0)] {
+        let mut found = Roots::new();
+        cone.roots(&ray, &mut found);
+        assert!(found.iter().all(|root| root.t <= apex), "{found:?}");
+        assert_eq!(cone.closest(&ray.with_range(apex + 0.2, f64::INFINITY)), None);
+    }
+}
+
+#[test]
+fn no_crossing_is_lost_invented_or_off_along_asymptotes_and_axes() {
+    let mut random = Random(RandomStream::new(5));
+    let mut tallies: Vec<(&str, Tally)> = vec![];
+    for _ in 0..20 * repeats() {
+        for (i, subject) in subjects(&mut random, 2.0).into_iter().enumerate() {
+            if tallies.len() <= i {
+                tallies.push((subject.name, Tally::default()));
+            }
+            for k in 0..12 {
+                // Directions in which the equation is nearly linear: the quadratic term's zeros, by bisection.
+                let (e, f) = (random.vector(), random.vector());
+                let square = |s: f64| (subject.equation)(&Ray::new(DVec3::ZERO, e + s * (f - e)))[0].value();
+                let (mut low, mut high) = (0.0, 1.0);
+                let direction = if (square(low) > 0.0) == (square(high) > 0.0) {
+                    // None between: along z, the axis of some.
+                    DVec3::Z + if k % 2 == 0 { DVec3::ZERO } else { 1e-9 * e }
+                } else {
+                    for _ in 0..[20, 40, 60][k % 3] {
+                        let middle = 0.5 * (low + high);
+                        if (square(middle) > 0.0) == (square(low) > 0.0) { low = middle } else { high = middle }
+                    }
+                    e + low * (f - e)
+                };
+                let near = subject.shape.surface_at(0, DVec2::splat(0.4)).map_or(DVec3::ZERO, |s| s.point);
+                let origin = near + 0.3 * subject.size * random.vector() - random.between(1.0, 9.0) * direction;
+                compare(&subject, &Ray::new(origin, direction), &mut tallies[i].1);
+            }
+        }
+    }
+    println!("{tallies:#?}");
+    assert!(tallies.iter().all(|(_, tally)| tally.crossings > 20), "{tallies:?}");
+}
+
+#[test]
+fn a_pipe_is_hit_as_exactly_a_billion_radii_along_it() {
+    let pipe = Shape::from(Quadric::new([1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0], None).unwrap());
+    for z in [1e3, 1e6, 1e9, 1e12] {
+        let mut found = Roots::new();
+        pipe.roots(&Ray::new(DVec3::new(3.0, 0.0, z), DVec3::new(-1.0, 0.0, 1.0)), &mut found);
+        assert_eq!(found.iter().map(|root| root.t).collect::<Vec<_>>(), [2.0, 4.0], "{z}");
+    }
+}
+
+#[test]
+fn a_slender_hyperboloid_is_the_cylinder_that_it_is() {
+    let (low, high) = (DVec3::new(0.001, 0.0, 0.0), DVec3::new(0.001, 0.0, 1000.0));
+    let needle = hyperboloid(low, high);
+    let tube = Shape::from(Cylinder::along_z(0.001, 0.0, 1000.0, false).unwrap());
+    let rays = [
+        (DVec3::new(300.0, 0.0, 10.0), DVec3::new(-1.0, 0.0, 0.5)),
+        (DVec3::new(3.0, 0.0005, 900.0), DVec3::new(-1.0, 0.0, 0.01)),
+        (DVec3::new(300.0, 0.0009, 100.0), DVec3::new(-3.0, 0.000001, 2.0)),
+    ];
+    let mut tally = Tally::default();
+    for (origin, direction) in rays {
+        let ray = Ray::new(origin, direction);
+        compare(&needle, &ray, &mut tally);
+        let (one, other) = (needle.shape.closest(&ray), tube.closest(&ray));
+        assert_eq!(one.map(|root| root.t), other.map(|root| root.t), "{ray:?}");
+    }
+    assert!(tally.crossings == 6, "{tally:?}");
+}
