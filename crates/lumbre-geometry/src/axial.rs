@@ -3,12 +3,15 @@
 use std::f64::consts::TAU;
 
 use lumbre_math::quadratic::quadratic;
-use lumbre_math::rounding::gamma;
+use lumbre_math::rounding::{UNIT_ROUNDOFF, gamma};
 use lumbre_math::{DMat3, DVec2, DVec3, Transform, orthonormal_basis};
 
+use crate::line::{Solution, is_blurred, is_exact, plane_crossing, start};
 use crate::nearest::{Meridian, under_similarity};
 use crate::shape::{sampled_by_area, two_crossings};
-use crate::support::{arc_support, azimuth, bounds_from_support, cross_size, dot_size};
+use crate::sphere::sided;
+use crate::support::{arc_support, azimuth, bounds_from_support, cross_size, dot_size, length, unit};
+use crate::twofold::{Number, Twofold, components, cross, dot, point};
 use crate::{
     Aabb, BoundingVolume, NearestPoint, NoNearestPoint, Ray, Root, Surface, SurfaceSample, density, measure,
 };
@@ -36,6 +39,8 @@ pub(crate) struct Axial {
     /// Whether disks close the body at the cuts.
     pub(crate) caps: bool,
     pub(crate) phi_max: f64,
+    /// Whether the line from p1 to p2 is the axis and the radii there are exact; else `axis` and `k` are.
+    pub(crate) has_ends: bool,
 }
 
 pub(crate) const LATERAL: u32 = 0;
@@ -44,6 +49,21 @@ pub(crate) const CAP2: u32 = 2;
 
 /// The interval of a line inside a convex set: its two ends in order of `t`, each with the part that bounds it.
 pub(crate) type Span = [(f64, u32); 2];
+
+/// What one nappe has of a line that crosses the double cone at two places, or misses it; `radius` is the signed radius at the
+/// middle of the crossings, and `growth` that of the radius along the line.
+#[inline]
+fn nappe(a: f64, pair: Option<(f64, f64)>, growth: f64, radius: f64) -> Option<Span> {
+    let (first, second) = pair?;
+    let (low, high) = if a > 0.0 {
+        (radius >= 0.0).then_some((first, second))?
+    } else if growth > 0.0 {
+        (second, f64::INFINITY)
+    } else {
+        (f64::NEG_INFINITY, first)
+    };
+    Some([(low, LATERAL), (high, LATERAL)])
+}
 
 impl Axial {
     fn is_whole(&self) -> bool {
@@ -64,8 +84,8 @@ impl Axial {
 
     /// The interval of the line within the lateral surface of one nappe, without cuts.
     ///
-    /// F(t) = |B + tA|² − (e + g t)² with A = D×V, B = W×V. The discriminant is computed at the point of the
-    /// line nearest to p1 and as a difference of two lengths, so it stays accurate for a thin cone far away.
+    /// F(t) = |B + tA|² − (e + g t)² with A = D×V, B = W×V. The equation is set up about the middle of the crossings, where
+    /// the discriminant keeps its digits for a thin cone far away; where they do not suffice, in twice the precision.
     #[inline]
     pub(crate) fn lateral_span(&self, ray: &Ray) -> Option<Span> {
         let (w, d) = (ray.origin - self.p1, ray.direction);
@@ -74,41 +94,69 @@ impl Axial {
         let e = self.r1 + self.k * w.dot(self.axis);
         let g = self.k * d.dot(self.axis);
 
-        let (a, h) = (across.length_squared() - g * g, across.dot(offset) - e * g);
-        let c = offset.length_squared() - e * e;
-        let delta = {
-            let near = w - (w.dot(d) / d.length_squared()) * d;
-            let near_offset = near.cross(self.axis);
-            let near_e = self.r1 + self.k * near.dot(self.axis);
-            let m = self.axis.dot(across.cross(near_offset));
-            (near_e * across - g * near_offset).length_squared() - m * m
-        };
-        // On a cone all three coefficients cancel for a distant ray along a generator. A Newton step on F
-        // itself restores the digits, except near a double root.
-        let refined = |t: f64, limit: f64| {
-            if self.k == 0.0 || t.is_infinite() {
-                return t;
+        let a = across.length_squared() - g * g;
+        let start = start(w, d, a, across.dot(offset) - e * g);
+        let (offset, e) = (offset + start * across, e + g * start);
+        let (h, c) = (across.dot(offset) - e * g, offset.length_squared() - e * e);
+        let delta = h * h - a * c;
+
+        // Bounds on the errors, in units of the unit roundoff.
+        let (speed, slope) = (5.0 * d.length(), self.k.abs());
+        let reach = 5.0 * (w.length() + start.abs() * d.length());
+        let (across, offset) = (across.length(), offset.length());
+        let e_error = slope * reach + 2.0 * self.r1;
+        let a_error = 2.0 * speed * (across + slope * g.abs());
+        let h_error = across * reach + offset * speed + g.abs() * e_error + e.abs() * slope * speed;
+        let c_error = 2.0 * (offset * reach + e.abs() * e_error)
+            // Near the apex nothing is left but errors.
+            + UNIT_ROUNDOFF * (reach * reach + e_error * e_error);
+        let delta_error = 2.0 * h.abs() * h_error + a.abs() * c_error + c.abs() * a_error;
+        let radius = e - g * (h / a);
+        let is_certain = a.abs() > f64::EPSILON * a_error
+            && delta.abs() > f64::EPSILON * delta_error
+            && (g == 0.0 || radius.abs() > 8.0 * f64::EPSILON * (e_error + (h / a).abs() * slope * speed));
+        if is_certain {
+            if delta < 0.0 && a > 0.0 {
+                return None;
             }
-            let there = w + t * d;
-            let radius = self.r1 + self.k * there.dot(self.axis);
-            let arm = there.cross(self.axis);
-            let distance = arm.length();
-            let step = (distance - radius) * (distance + radius) / (2.0 * (across.dot(arm) - g * radius));
-            if step.abs() < limit { t - step } else { t }
+            if let Some((first, second)) = quadratic(a, h, c, delta)
+                && is_exact(start, [first, second], delta, [a_error, h_error, c_error])
+            {
+                let pair = Some((start + first, start + second));
+                return self.cut_at_apex(ray, nappe(a, pair, g, radius)?);
+            }
+        }
+        self.exact_lateral_span(ray, start, [a, h, c, e, g])
+    }
+
+    /// As [`Axial::lateral_span`], in twice the precision; `rough` are a, h, c, e and g at `start` for want of that.
+    #[cold]
+    #[inline(never)]
+    fn exact_lateral_span(&self, ray: &Ray, start: f64, rough: [f64; 5]) -> Option<Span> {
+        let solution = self.solution(ray, start);
+        let ([a, h, c, e, g], pair) = if solution.is_finite {
+            let (radius, growth) = (self.radius(solution.place), self.radius_growth(ray));
+            let numbers = [solution.a, solution.h, solution.c, radius, growth].map(|x| x.high);
+            (numbers, solution.crossings)
+        } else {
+            let [a, h, c, ..] = rough;
+            let pair = quadratic(a, h, c, (h * h - a * c).max(0.0));
+            (rough, pair.map(|(first, second)| (start + first, start + second)))
         };
+        if a != 0.0 {
+            let middle = if solution.is_finite {
+                let growth = self.radius_growth(ray);
+                (self.radius(solution.place) - growth * (solution.h / solution.a)).high
+            } else {
+                e - g * (h / a)
+            };
+            return self.cut_at_apex(ray, nappe(a, pair, g, middle)?);
+        }
         let whole = (f64::NEG_INFINITY, f64::INFINITY);
-        let (low, high) = if a > 0.0 {
-            let (first, second) = quadratic(a, h, c, delta)?;
-            let is_on_this_nappe = e - g * (h / a) >= 0.0;
-            let limit = 1e-3 * (second - first);
-            is_on_this_nappe.then(|| (refined(first, limit), refined(second, limit)))?
-        } else if a < 0.0 {
-            let (first, second) = quadratic(a, h, c, delta.max(0.0))?;
-            let limit = 1e-3 * (second - first);
-            if g > 0.0 { (refined(second, limit), whole.1) } else { (whole.0, refined(first, limit)) }
-        } else if h != 0.0 {
-            let t = -c / (2.0 * h);
-            let t = refined(t, 1e-6 * t.abs());
+        let (low, high) = if h != 0.0 {
+            // Parallel to a generator: one crossing is at infinity.
+            let (first, second) = pair?;
+            let t = if first.is_finite() { first } else { second };
             match (h < 0.0, g > 0.0) {
                 (true, true) => (t, whole.1),
                 (false, false) if g < 0.0 => (whole.0, t),
@@ -118,29 +166,96 @@ impl Axial {
             (c <= 0.0).then_some(whole)?
         } else {
             // Along a generator: the line is inside from the apex on, and misses an open surface.
-            let apex = (self.caps && c <= 0.0).then_some(-e / g)?;
+            let apex = (self.caps && c <= 0.0).then_some(solution.start - e / g)?;
             if g > 0.0 { (apex, whole.1) } else { (whole.0, apex) }
         };
-        Some([(low, LATERAL), (high, LATERAL)])
+        self.cut_at_apex(ray, [(low, LATERAL), (high, LATERAL)])
+    }
+
+    /// The part of the interval on the body's side of a pointed end.
+    #[inline]
+    fn cut_at_apex(&self, ray: &Ray, [near, far]: Span) -> Option<Span> {
+        let (apex, is_above) = match (self.r1 == 0.0, self.r2 == 0.0) {
+            (true, _) => (self.p1, true),
+            (_, true) => (self.p2, false),
+            _ => return Some([near, far]),
+        };
+        let (t, along) = plane_crossing(ray, apex, self.axis);
+        if along == 0.0 {
+            return Some([near, far]);
+        }
+        let cut = |end: (f64, u32), low: f64, high: f64| (end.0.max(low).min(high), end.1);
+        let (low, high) =
+            if (along > 0.0) == is_above { (t, f64::INFINITY) } else { (f64::NEG_INFINITY, t) };
+        Some([cut(near, low, high), cut(far, low, high)])
+    }
+
+    /// The axis in twice the precision, of about unit length: between the ends, where there are two.
+    fn spine(&self) -> [Twofold; 3] {
+        if !self.has_ends {
+            return components(self.axis);
+        }
+        let scale = Twofold::from((-self.length.log2().floor()).exp2());
+        std::array::from_fn(|i| Twofold::difference(self.p2[i], self.p1[i]) * scale)
+    }
+
+    /// What the radius grows by along the spine, times the square of its length.
+    fn rise(&self) -> Twofold {
+        if self.has_ends {
+            let scale = Twofold::from((-self.length.log2().floor()).exp2());
+            Twofold::difference(self.r2, self.r1) * scale
+        } else {
+            Twofold::from(self.k) * dot(self.spine(), self.spine())
+        }
+    }
+
+    /// The signed radius at a place relative to p1, times the square of the spine's length.
+    fn radius(&self, p: [Twofold; 3]) -> Twofold {
+        let spine = self.spine();
+        Twofold::from(self.r1) * dot(spine, spine) + self.rise() * dot(p, spine)
+    }
+
+    /// What [`Axial::radius`] grows by with `t`.
+    fn radius_growth(&self, ray: &Ray) -> Twofold {
+        self.rise() * dot(components(ray.direction), self.spine())
+    }
+
+    /// The equation of the lateral surface, in twice the precision: F(t) times the fourth power of the spine's length.
+    fn solution(&self, ray: &Ray, start: f64) -> Solution {
+        let spine = self.spine();
+        let square = dot(spine, spine);
+        Solution::new(ray.origin, self.p1, ray.direction, start, |p, d| {
+            let (across, offset) = (cross(d, spine), cross(p, spine));
+            let (e, g) = (self.radius(p), self.rise() * dot(d, spine));
+            [
+                square * dot(across, across) - g * g,
+                square * dot(across, offset) - e * g,
+                square * dot(offset, offset) - e * e,
+            ]
+        })
     }
 
     /// The interval of the line between the cutting planes.
     #[inline]
     pub(crate) fn slab_span(&self, ray: &Ray) -> Option<Span> {
-        let along = ray.direction.dot(self.axis);
-        let z1 = (ray.origin - self.p1).dot(self.axis);
-        let z2 = (ray.origin - self.p2).dot(self.axis);
         let mut span = [(f64::NEG_INFINITY, CAP1), (f64::INFINITY, CAP2)];
-        if along == 0.0 {
-            let is_between = (!self.cut1 || z1 >= 0.0) && (!self.cut2 || z2 <= 0.0);
-            return is_between.then_some(span);
-        }
-        let (enters_at_1, leaves_at_2) = if along > 0.0 { (0, 1) } else { (1, 0) };
-        if self.cut1 {
-            span[enters_at_1] = (-z1 / along, CAP1);
-        }
-        if self.cut2 {
-            span[leaves_at_2] = (-z2 / along, CAP2);
+        let cuts = [(self.cut1, self.p1, CAP1), (self.cut2, self.p2, CAP2)];
+        for (cut, point, part) in cuts {
+            if !cut {
+                continue;
+            }
+            let (t, along) = plane_crossing(ray, point, self.axis);
+            if along == 0.0 {
+                let z = (ray.origin - point).dot(self.axis);
+                let is_between = if part == CAP1 { z >= 0.0 } else { z <= 0.0 };
+                if !is_between {
+                    return None;
+                }
+            } else if (along > 0.0) == (part == CAP1) {
+                span[0] = (t, part);
+            } else {
+                span[1] = (t, part);
+            }
         }
         Some(span)
     }
@@ -192,10 +307,24 @@ impl Axial {
 
     /// The height above p1 of the point at `t`, and its offset from the axis.
     pub(crate) fn arm(&self, ray: &Ray, t: f64, part: u32) -> (f64, DVec3) {
-        let base = if part == CAP2 { self.p2 } else { self.p1 };
-        let w = (ray.origin - base) + t * ray.direction;
-        let z = w.dot(self.axis);
-        (z, w - z * self.axis)
+        // Near a pointed end the offset is small beside the way from the other.
+        let from_2 = part == CAP2 || self.r2 == 0.0;
+        let base = if from_2 { self.p2 } else { self.p1 };
+        let lift = if from_2 && part == LATERAL { self.length } else { 0.0 };
+        let split = |w: DVec3| {
+            let z = w.dot(self.axis);
+            let arm = w - z * self.axis;
+            // Twice: where the offset is small, the first is mostly rounding error.
+            (z + lift, arm - arm.dot(self.axis) * self.axis)
+        };
+        let w = point(ray.origin, base, t, ray.direction);
+        let (z, arm) = split(w);
+        if part != LATERAL || !is_blurred(ray, t, length(arm)) {
+            return (z, arm);
+        }
+        let start = -(ray.origin - base).dot(ray.direction) / ray.direction.length_squared();
+        let sharp = self.solution(ray, start).point(t, ray.direction);
+        sharp.map_or((z, arm), |w| split(w - (base - self.p1)))
     }
 
     two_crossings!(pub(crate));
@@ -203,13 +332,15 @@ impl Axial {
     /// The surface at a crossing.
     pub(crate) fn surface(&self, ray: &Ray, root: &Root) -> Surface {
         let (z, arm) = self.arm(ray, root.t, root.part);
-        let rho = arm.length();
-        let outward = if rho > 0.0 { arm / rho } else { orthonormal_basis(self.axis).0 };
+        let outward = unit(arm).unwrap_or_else(|| orthonormal_basis(self.axis).0);
         let u = (self.phi(arm) / self.phi_max).min(1.0);
         if root.part == LATERAL {
             let z = if self.is_bounded() { z.clamp(0.0, self.length) } else { z };
-            self.on_side(z, outward, u)
+            let surface = self.on_side(z, outward, u);
+            let ends = self.lateral_span(ray).map(|[near, far]| (near.0, far.0));
+            Surface { normal: sided(surface.normal, ends, ray, root.t), ..surface }
         } else {
+            let rho = length(arm);
             self.on_cap(root.part, rho, outward, u)
         }
     }

@@ -8,7 +8,7 @@ use lumbre_math::{DMat3, DVec2, DVec3, Transform, orthonormal_basis};
 use crate::axial::{Axial, CAP1, CAP2, LATERAL, Span};
 use crate::nearest::under_similarity;
 use crate::shape::{check, sampled_by_area, two_crossings};
-use crate::support::bounds_from_support;
+use crate::support::{bounds_from_support, length, unit};
 use crate::{
     Aabb, BoundingVolume, NearestPoint, NoNearestPoint, Ray, Root, ShapeError, Surface, SurfaceSample,
 };
@@ -52,6 +52,7 @@ impl Capsule {
             cut2: true,
             caps: true,
             phi_max: TAU,
+            has_ends: p0 != p1,
         };
         Ok(Self { tube })
     }
@@ -132,13 +133,16 @@ impl Capsule {
     /// The surface at a crossing.
     pub fn surface(&self, ray: &Ray, root: &Root) -> Surface {
         let u = |arm| (self.tube.phi(arm) / TAU).min(1.0);
-        if root.part == LATERAL {
+        let surface = if root.part == LATERAL {
             let (z, arm) = self.tube.arm(ray, root.t, LATERAL);
-            self.on_side(z.clamp(0.0, self.tube.length), arm / arm.length(), u(arm))
+            let outward = unit(arm).unwrap_or_else(|| orthonormal_basis(self.tube.axis).0);
+            self.on_side(z.clamp(0.0, self.tube.length), outward, u(arm))
         } else {
-            let w = (ray.origin - self.cap(root.part).0) + root.t * ray.direction;
-            self.on_cap(root.part, w * (self.radius() / w.length()), u(w))
-        }
+            let w = sphere::arm(self.cap(root.part).0, self.radius(), ray, root.t);
+            self.on_cap(root.part, w, u(w))
+        };
+        let ends = self.span(ray).map(|[near, far]| (near.0, far.0));
+        Surface { normal: sphere::sided(surface.normal, ends, ray, root.t), ..surface }
     }
 
     /// The surface at `uv` of a part: 0 the side, 1 and 2 the caps. A `v` past the seam continues the part, as
@@ -171,8 +175,8 @@ impl Capsule {
     fn on_cap(&self, part: u32, w: DVec3, u: f64) -> Surface {
         let (center, to_pole) = self.cap(part);
         let (axis, radius) = (self.tube.axis, self.radius());
-        let normal = w / w.length();
-        let rho = axis.cross(w).length();
+        let normal = w / length(w);
+        let rho = length(axis.cross(w));
         let around = {
             // At a pole any meridian will do; near one the cross product has lost digits.
             let rough = if rho > 0.0 { axis.cross(w) / rho } else { orthonormal_basis(axis).1 };

@@ -35,7 +35,7 @@ impl Cylinder {
         }
         let axis = check::direction("p1", p2 - p1)?;
         let length = check::positive("p1", (p2 - p1).length())?;
-        let body = Axial { p1, p2, axis, length, ..infinite(p1, axis, radius) };
+        let body = Axial { p1, p2, axis, length, has_ends: true, ..infinite(p1, axis, radius) };
         Ok(Self { body: Axial { cut1: true, cut2: true, caps, ..body } })
     }
 
@@ -92,6 +92,7 @@ fn infinite(point: DVec3, axis: DVec3, radius: f64) -> Axial {
         cut2: false,
         caps: false,
         phi_max: TAU,
+        has_ends: false,
     }
 }
 

@@ -5,9 +5,11 @@ use std::f64::consts::TAU;
 use lumbre_math::rounding::gamma;
 use lumbre_math::{DVec2, DVec3, Transform, orthonormal_basis};
 
+use crate::line::plane_crossing;
 use crate::nearest::{Meridian, under_similarity};
 use crate::shape::{check, open_surface, sampled_by_area};
 use crate::support::{arc_support, azimuth, bounds_from_support, dot_size};
+use crate::twofold::point;
 use crate::{
     Aabb, BoundingVolume, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface, SurfaceSample,
     measure,
@@ -59,19 +61,15 @@ impl Disk {
 
     /// The point at `t` in the disk's plane, relative to the centre.
     fn arm(&self, ray: &Ray, t: f64) -> DVec3 {
-        let w = (ray.origin - self.center) + t * ray.direction;
+        let w = point(ray.origin, self.center, t, ray.direction);
         w - (w.dot(self.normal) / self.normal.length_squared()) * self.normal
     }
 
     /// The first crossing in the ray's range.
     #[inline]
     pub fn closest(&self, ray: &Ray) -> Option<Root> {
-        let along = ray.direction.dot(self.normal);
-        if along == 0.0 {
-            return None;
-        }
-        let t = (self.center - ray.origin).dot(self.normal) / along;
-        if !(t.is_finite() && ray.contains(t)) {
+        let (t, along) = plane_crossing(ray, self.center, self.normal);
+        if !(along != 0.0 && t.is_finite() && ray.contains(t)) {
             return None;
         }
         let w = self.arm(ray, t);

@@ -2,15 +2,15 @@
 
 use std::f64::consts::TAU;
 
-use lumbre_math::quadratic::{dop, quadratic};
 use lumbre_math::roots::{bracketed_root, roots_between};
 use lumbre_math::rounding::gamma;
 use lumbre_math::{DMat3, DVec2, DVec3, Transform};
 
-use crate::line::{Implicit, NearLine};
+use crate::line::{Implicit, SecondDegree, accepted, crossings, point_at, sided_gradient};
 use crate::nearest::{Meridian, under_similarity};
 use crate::shape::{check, open_surface, sampled_by_area};
-use crate::support::{arc_support, azimuth, bounds_from_support};
+use crate::support::{arc_support, azimuth, bounds_from_support, length};
+use crate::twofold::Number;
 use crate::{
     Aabb, BoundingVolume, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface, SurfaceSample,
     measure,
@@ -24,7 +24,8 @@ use crate::{
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hyperboloid {
     p1: DVec3,
-    // From p1 to p2; its z is not 0.
+    p2: DVec3,
+    // From p1 to p2, rounded; its z is not 0.
     along: DVec3,
     phi_max: f64,
     // The squared radius at v is start + 2 middle v + end v².
@@ -54,7 +55,7 @@ impl Hyperboloid {
             return Err(ShapeError::Degenerate("p1 and p2 of the hyperboloid are both on the axis"));
         }
         let (start, middle, end) = (flat.length_squared(), flat.dot(flat_along), flat_along.length_squared());
-        let hyperboloid = Self { p1, along, phi_max, start, middle, end };
+        let hyperboloid = Self { p1, p2, along, phi_max, start, middle, end };
         let (square, _, constant) = hyperboloid.element();
         let is_measurable = square.is_finite() && constant.is_finite() && square.max(constant).is_normal();
         if !is_measurable {
@@ -86,32 +87,16 @@ impl Hyperboloid {
         (0.0..=1.0).contains(&v) && (self.phi_max >= TAU || azimuth(turn.y, turn.x) <= self.phi_max)
     }
 
-    fn line(&self, ray: &Ray) -> NearLine {
-        NearLine::new(ray, DVec3::new(0.0, 0.0, self.p1.z + 0.5 * self.along.z))
-    }
-
-    fn crossings(&self, line: &NearLine) -> Option<(f64, f64)> {
-        let (p, d) = (line.p, line.d);
-        let v = self.v_of(p.z);
-        let climb = d.z / self.along.z;
-        let swept = self.segment(v).truncate().length();
-        let rho = p.truncate().length();
-        let a = d.x * d.x + d.y * d.y - self.end * climb * climb;
-        let h = p.x * d.x + p.y * d.y - (self.middle + self.end * v) * climb;
-        let c = (rho - swept) * (rho + swept);
-        quadratic(a, h, c, dop(h, h, a, c))
-    }
-
     /// The first crossing in the ray's range.
     pub fn closest(&self, ray: &Ray) -> Option<Root> {
-        let line = self.line(ray);
-        line.accepted(ray, self.crossings(&line), |p| self.keeps(p)).next()
+        let base = self.base();
+        accepted(ray, base, crossings(self, ray), |p| self.keeps(base + p)).next()
     }
 
     /// Every crossing in the ray's range, appended in ascending order.
     pub fn roots(&self, ray: &Ray, out: &mut Roots) {
-        let line = self.line(ray);
-        out.extend(line.accepted(ray, self.crossings(&line), |p| self.keeps(p)));
+        let base = self.base();
+        out.extend(accepted(ray, base, crossings(self, ray), |p| self.keeps(base + p)));
     }
 
     fn implicit(&self, p: DVec3) -> Implicit {
@@ -128,8 +113,12 @@ impl Hyperboloid {
 
     /// The surface at a crossing.
     pub fn surface(&self, ray: &Ray, root: &Root) -> Surface {
-        let near = self.line(ray).at_t(root.t);
-        self.surface_on(near + self.implicit(near).to_surface())
+        let steepness = (self.end / (self.along.z * self.along.z)).max(1.0);
+        let size = |p| 0.5 * length(self.implicit(self.base() + p).gradient) / steepness;
+        let near = self.base() + point_at(self, ray, root.t, size);
+        let surface = self.surface_on(near + self.implicit(near).to_surface());
+        let side = self.along.z.signum();
+        Surface { normal: side * sided_gradient(self, side * surface.normal, ray, root.t), ..surface }
     }
 
     /// The nearest point of the arc that the segment's point at `v` sweeps.
@@ -353,4 +342,32 @@ impl Hyperboloid {
     }
 
     sampled_by_area!(pub);
+}
+
+impl SecondDegree for Hyperboloid {
+    fn base(&self) -> DVec3 {
+        DVec3::new(0.0, 0.0, self.p1.z)
+    }
+
+    fn center(&self) -> DVec3 {
+        DVec3::new(0.0, 0.0, self.p1.z + 0.5 * self.along.z)
+    }
+
+    /// Of (L ρ)² - |L p1 + z A|², where L is the segment's height, A its extent along x and y, and z counts from p1.
+    #[inline]
+    fn along<N: Number>(&self, p: [N; 3], d: [N; 3]) -> [N; 3] {
+        let [ax, ay, rise] = std::array::from_fn(|i| N::difference(self.p2[i], self.p1[i]));
+        let reach = [
+            rise * N::from(self.p1.x) + p[2] * ax,
+            rise * N::from(self.p1.y) + p[2] * ay,
+        ];
+        let growth = [d[2] * ax, d[2] * ay];
+        let flat = |a: &[N], b: &[N]| a[0] * b[0] + a[1] * b[1];
+        let square = rise * rise;
+        [
+            square * flat(&d, &d) - flat(&growth, &growth),
+            square * flat(&p, &d) - flat(&reach, &growth),
+            square * flat(&p, &p) - flat(&reach, &reach),
+        ]
+    }
 }

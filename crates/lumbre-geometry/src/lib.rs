@@ -14,9 +14,11 @@ mod measure;
 mod nearest;
 mod placed;
 mod ray;
+mod scaled;
 mod shape;
 mod support;
 mod triangle_sides;
+mod twofold;
 
 use lumbre_math::{DVec2, DVec3, Transform};
 

@@ -1,60 +1,235 @@
-//! A ray's line relative to a nearby origin, and implicit surfaces.
+//! Where a line crosses a surface of the second degree.
 
 use lumbre_math::DVec3;
+use lumbre_math::quadratic::quadratic;
 use lumbre_math::rounding::gamma;
 
+use crate::support::{length, on_side_of, unit};
+use crate::twofold::{Bounded, Number, Twofold, components, place, point};
 use crate::{Ray, Root};
 
-/// A ray's line with its origin moved to the point nearest to `place`: the points `p + s d`, at t = shift + s.
-///
-/// Coefficients computed from it do not grow with the distance of the ray's origin, so a discriminant keeps its
-/// digits.
-pub(crate) struct NearLine {
-    pub(crate) p: DVec3,
-    pub(crate) d: DVec3,
-    pub(crate) shift: f64,
+/// A surface F = 0 of the second degree.
+pub(crate) trait SecondDegree {
+    /// The point that places are relative to.
+    fn base(&self) -> DVec3;
+
+    /// A point about which the surface is.
+    fn center(&self) -> DVec3;
+
+    /// The coefficients of F(p + s d) = a s² + 2 h s + c, for a point `p` relative to the base.
+    fn along<N: Number>(&self, p: [N; 3], d: [N; 3]) -> [N; 3];
 }
 
-impl NearLine {
-    #[inline]
-    pub(crate) fn new(ray: &Ray, place: DVec3) -> Self {
-        let d = ray.direction;
-        let dd = d.length_squared();
-        let w = ray.origin - place;
-        let first = -w.dot(d) / dd;
-        let near = w + first * d;
-        let second = -near.dot(d) / dd;
-        Self { p: place + (near + second * d), d, shift: first + second }
+/// Both crossings of a ray's line in order, whatever its range: equal where it touches, infinite where there is none;
+/// `None` where it misses.
+///
+/// The equation is set up about the middle of the two crossings, so that it keeps its digits however far away the ray
+/// begins. Doubles with a bound of their error decide most lines, and twice the precision the others: those that nearly
+/// touch, that are nearly parallel to an asymptote or a generator, or whose digits cancel.
+#[inline]
+pub(crate) fn crossings(surface: &impl SecondDegree, ray: &Ray) -> Option<(f64, f64)> {
+    let (w, d) = (ray.origin - surface.base(), ray.direction);
+    let [a, h, _] = surface.along(w.to_array(), d.to_array());
+    let start = start(ray.origin - surface.center(), d, a, h);
+    let moved = start * d;
+    let p = w + moved;
+    let slack = w.abs() + moved.abs() + p.abs();
+    let carried = std::array::from_fn(|i| Bounded { value: p[i], error: slack[i] });
+    let [a, h, c] = surface.along(carried, components(d));
+    let delta = h * h - a * c;
+    if delta.is_certain() {
+        if delta.value < 0.0 {
+            return None;
+        }
+        if let Some((first, second)) = quadratic(a.value, h.value, c.value, delta.value)
+            && is_exact(start, [first, second], delta.value, [a.error, h.error, c.error])
+        {
+            return Some((start + first, start + second));
+        }
     }
-
-    pub(crate) fn at(&self, s: f64) -> DVec3 {
-        self.p + s * self.d
+    let exact = Solution::new(ray.origin, surface.base(), d, start, |p, d| surface.along(p, d));
+    if exact.is_finite {
+        exact.crossings
+    } else {
+        let (first, second) = quadratic(a.value, h.value, c.value, delta.value)?;
+        Some((start + first, start + second))
     }
+}
 
-    pub(crate) fn at_t(&self, t: f64) -> DVec3 {
-        self.at(t - self.shift)
-    }
+/// The parameter to set the equation up at: the middle of the crossings, if that is not much farther from the surface's
+/// centre than the ray's origin, at `w` from there; else the point nearest to the centre.
+#[inline]
+pub(crate) fn start(w: DVec3, d: DVec3, a: f64, h: f64) -> f64 {
+    let (middle, dd) = (-h / a, d.length_squared());
+    // False for a NaN.
+    let is_near = (w + middle * d).length_squared() <= 16.0 * w.length_squared();
+    if is_near { middle } else { -w.dot(d) / dd }
+}
 
-    /// The roots of a quadratic in `s` that lie in the ray's range and whose points `keeps` accepts, in order.
-    #[inline]
-    pub(crate) fn accepted(
-        &self,
-        ray: &Ray,
-        pair: Option<(f64, f64)>,
-        keeps: impl Fn(DVec3) -> bool,
-    ) -> impl Iterator<Item = Root> {
-        let (first, second) = pair.unwrap_or((f64::NAN, f64::NAN));
-        let touches = first == second;
-        let root = |s: f64, multiplicity: u8| {
-            let t = self.shift + s;
-            // An infinite root is one that the quadratic does not have.
-            let counts = t.is_finite() && ray.contains(t) && keeps(self.at(s));
-            counts.then_some(Root { multiplicity, ..Root::at(t) })
+/// Whether the errors of the coefficients, in units of the unit roundoff, leave both crossings their digits.
+#[inline]
+pub(crate) fn is_exact(start: f64, roots: [f64; 2], delta: f64, [a, h, c]: [f64; 3]) -> bool {
+    // The bounds are sums of absolute values, which rounding errors hardly ever reach a tenth of.
+    const TOLERANCE: f64 = 24.0;
+    let slope = 2.0 * delta.sqrt();
+    roots.into_iter().all(|root| {
+        let (s, t) = (root.abs(), (start + root).abs());
+        // A ray that starts at a crossing has no digits of that one to keep.
+        let size = if t > 1e-6 * start.abs() { t } else { start.abs() };
+        let error = c + s * (2.0 * h + s * a) + 4.0 * s * slope;
+        // False for a NaN, and for a root at infinity.
+        error < TOLERANCE * slope * size
+    })
+}
+
+/// A quadratic equation along a line, solved in twice the precision.
+pub(crate) struct Solution {
+    /// Both crossings as values of `t`: see [`crossings`].
+    pub(crate) crossings: Option<(f64, f64)>,
+    /// Where the equation was set up, and the point there relative to the base.
+    pub(crate) start: f64,
+    pub(crate) place: [Twofold; 3],
+    /// The coefficients there.
+    pub(crate) a: Twofold,
+    pub(crate) h: Twofold,
+    pub(crate) c: Twofold,
+    /// False where a product over- or underflowed beyond use: then nothing is known.
+    pub(crate) is_finite: bool,
+}
+
+impl Solution {
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn new(
+        origin: DVec3,
+        base: DVec3,
+        direction: DVec3,
+        start: f64,
+        along: impl Fn([Twofold; 3], [Twofold; 3]) -> [Twofold; 3],
+    ) -> Self {
+        // Only some leading digits, so that small numbers stay exact and a line that touches is seen to.
+        let start = if start.is_finite() { f64::from_bits(start.to_bits() & (!0 << 32)) } else { 0.0 };
+        let place = place(origin, base, start, direction);
+        let [a, h, c] = along(place, components(direction));
+        let delta = h * h - a * c;
+        let is_finite = delta.is_finite();
+        let at = |s: Twofold| (Twofold::from(start) + s).high;
+        let crossings = if !is_finite || delta.high < 0.0 {
+            None
+        } else if delta.high == 0.0 {
+            let double = at((h / a).negated());
+            double.is_finite().then_some((double, double))
+        } else {
+            let root = delta.sqrt();
+            let q = if h.high < 0.0 { root - h } else { (h + root).negated() };
+            let near = at(c / q);
+            // As `a` vanishes, one crossing goes to infinity.
+            let far = q.high / a.high;
+            let far = if far.is_finite() { at(q / a) } else { far };
+            Some(if near <= far { (near, far) } else { (far, near) })
         };
-        let near = root(first, if touches { 2 } else { 1 });
-        let far = if touches { None } else { root(second, 1) };
-        near.into_iter().chain(far)
+        Self { crossings, start, place, a, h, c, is_finite }
     }
+
+    /// The point, relative to the base, of the crossing that `t` is: not rounded on the way, which from far away would put it
+    /// anywhere on the surface.
+    pub(crate) fn point(&self, t: f64, direction: DVec3) -> Option<DVec3> {
+        let (first, second) = self.crossings?;
+        let root = (self.h * self.h - self.a * self.c).sqrt();
+        let q = if self.h.high < 0.0 { root - self.h } else { (self.h + root).negated() };
+        let pair = if root.high == 0.0 { [(self.h / self.a).negated(); 2] } else { [self.c / q, q / self.a] };
+        let [near, far] = if pair[1].high < pair[0].high { [pair[1], pair[0]] } else { pair };
+        let s = if (t - first).abs() <= (second - t).abs() { near } else { far };
+        let at = |i: usize| (self.place[i] + s * Twofold::from(direction[i])).high;
+        let point = DVec3::new(at(0), at(1), at(2));
+        point.is_finite().then_some(point)
+    }
+}
+
+/// The point at a crossing, relative to the base, and on a scale of `size`.
+pub(crate) fn point_at(surface: &impl SecondDegree, ray: &Ray, t: f64, size: impl FnOnce(DVec3) -> f64) -> DVec3 {
+    let (base, d) = (surface.base(), ray.direction);
+    let p = point(ray.origin, base, t, d);
+    if !is_blurred(ray, t, size(p)) {
+        return p;
+    }
+    let start = -(ray.origin - surface.center()).dot(d) / d.length_squared();
+    Solution::new(ray.origin, base, d, start, |p, d| surface.along(p, d)).point(t, d).unwrap_or(p)
+}
+
+/// The unit vector along F's gradient at `t`, on the side of the ray that its crossings say.
+pub(crate) fn sided_gradient(surface: &impl SecondDegree, gradient: DVec3, ray: &Ray, t: f64) -> DVec3 {
+    let Some((first, second)) = crossings(surface, ray) else {
+        return gradient;
+    };
+    let are_two = first < second && (second - first).is_finite();
+    if !are_two {
+        return gradient;
+    }
+    let (w, d) = (ray.origin - surface.base(), ray.direction);
+    let [a, ..] = surface.along(w.to_array(), d.to_array());
+    on_side_of(gradient, d, (t - first < second - t) == (a > 0.0))
+}
+
+/// Whether the rounding of `t` moves the point there by more than a small part of `size`.
+#[inline]
+pub(crate) fn is_blurred(ray: &Ray, t: f64, size: f64) -> bool {
+    // False for a NaN.
+    let is_sharp = f64::EPSILON * t.abs() * length(ray.direction) <= 1e-6 * size;
+    !is_sharp
+}
+
+/// The crossings that lie in the ray's range and whose points, relative to `base`, `keeps` accepts.
+#[inline]
+pub(crate) fn accepted(
+    ray: &Ray,
+    base: DVec3,
+    pair: Option<(f64, f64)>,
+    keeps: impl Fn(DVec3) -> bool,
+) -> impl Iterator<Item = Root> {
+    let (first, second) = pair.unwrap_or((f64::NAN, f64::NAN));
+    let touches = first == second;
+    let root = |t: f64, multiplicity: u8| {
+        // An infinite root is one that the quadratic does not have.
+        let counts =
+            t.is_finite() && ray.contains(t) && keeps(point(ray.origin, base, t, ray.direction));
+        counts.then_some(Root { multiplicity, ..Root::at(t) })
+    };
+    let near = root(first, if touches { 2 } else { 1 });
+    let far = if touches { None } else { root(second, 1) };
+    near.into_iter().chain(far)
+}
+
+/// The parameter where a line crosses the plane through `point` perpendicular to `normal`, and the slope of its way along
+/// the normal, of the right sign: 0 where it is parallel, and the parameter says nothing.
+#[inline]
+pub(crate) fn plane_crossing(ray: &Ray, point: DVec3, normal: DVec3) -> (f64, f64) {
+    let d = ray.direction;
+    let to_point = point - ray.origin;
+    let (along, away) = (d.dot(normal), to_point.dot(normal));
+    let size = normal.abs();
+    // Where much cancels, digits are lost.
+    let keeps_digits = 4.0 * along.abs() >= d.abs().dot(size) && 4.0 * away.abs() >= to_point.abs().dot(size);
+    if keeps_digits && along != 0.0 {
+        (away / along, along)
+    } else {
+        exact_plane_crossing(ray, point, normal)
+    }
+}
+
+#[inline(never)]
+fn exact_plane_crossing(ray: &Ray, point: DVec3, normal: DVec3) -> (f64, f64) {
+    let (mut along, mut away) = (Twofold::ZERO, Twofold::ZERO);
+    for i in 0..3 {
+        along = along + Twofold::product(ray.direction[i], normal[i]);
+        away = away + Twofold::difference(point[i], ray.origin[i]) * Twofold::from(normal[i]);
+    }
+    let t = (away / along).high;
+    if t.is_finite() || along.high == 0.0 {
+        return (t, along.high);
+    }
+    let along = ray.direction.dot(normal);
+    ((point - ray.origin).dot(normal) / along, along)
 }
 
 /// An implicit function F at a point: its value and derivatives.
@@ -69,13 +244,14 @@ impl Implicit {
     /// The step to the surface: one of Newton's method, whose remaining error is the square of a rounding
     /// error.
     pub(crate) fn to_surface(&self) -> DVec3 {
-        let step = -self.value / self.gradient.length_squared() * self.gradient;
+        let length = length(self.gradient);
+        let step = -(self.value / length) * (self.gradient / length);
         if step.is_finite() { step } else { DVec3::ZERO }
     }
 
     /// A bound on the distance from the surface of a point where F evaluates to 0.
     pub(crate) fn uncertainty(&self) -> f64 {
-        let distance = gamma(12) * self.terms / self.gradient.length();
+        let distance = gamma(12) * self.terms / length(self.gradient);
         // At a singular point there is no useful bound.
         if distance.is_finite() { distance } else { 0.0 }
     }
@@ -83,7 +259,7 @@ impl Implicit {
     /// The derivative of the unit normal gradient/|gradient| along a tangent, given the Hessian's product with
     /// the tangent.
     pub(crate) fn turning(&self, hessian_times_tangent: DVec3) -> DVec3 {
-        let length = self.gradient.length();
+        let length = length(self.gradient);
         let normal = self.gradient / length;
         let across = (hessian_times_tangent - normal * normal.dot(hessian_times_tangent)) / length;
         // Orthogonalised twice: where the derivative is small, the first result is mostly rounding error.
@@ -93,6 +269,6 @@ impl Implicit {
 
     /// The unit normal; z where the gradient is zero.
     pub(crate) fn normal(&self) -> DVec3 {
-        self.gradient.try_normalize().unwrap_or(DVec3::Z)
+        unit(self.gradient).unwrap_or(DVec3::Z)
     }
 }

@@ -2,15 +2,15 @@
 
 use std::f64::consts::TAU;
 
-use lumbre_math::quadratic::{dop, quadratic};
 use lumbre_math::roots::roots_between;
 use lumbre_math::rounding::gamma;
 use lumbre_math::{DMat3, DVec2, DVec3, Transform};
 
-use crate::line::{Implicit, NearLine};
+use crate::line::{Implicit, SecondDegree, accepted, crossings, point_at, sided_gradient};
 use crate::nearest::{Meridian, under_similarity};
 use crate::shape::{check, open_surface, sampled_by_area};
-use crate::support::{arc_support, azimuth, bounds_from_support};
+use crate::support::{arc_support, azimuth, bounds_from_support, length};
+use crate::twofold::Number;
 use crate::{
     Aabb, BoundingVolume, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface, SurfaceSample,
     measure,
@@ -23,8 +23,9 @@ use crate::{
 /// normal points out of the bowl, downwards at its bottom.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Paraboloid {
-    // z = bend (x² + y²), bend > 0.
+    // z = bend (x² + y²), bend > 0: z_max / radius², rounded.
     bend: f64,
+    radius: f64,
     z_min: f64,
     z_max: f64,
     phi_max: f64,
@@ -48,7 +49,7 @@ impl Paraboloid {
         if z_min == z_max || !bend.is_normal() {
             return Err(ShapeError::Degenerate("nothing of the paraboloid lies between zmin and zmax"));
         }
-        let paraboloid = Self { bend, z_min, z_max, phi_max };
+        let paraboloid = Self { bend, radius, z_min, z_max, phi_max };
         if !paraboloid.area().is_normal() {
             return Err(ShapeError::Degenerate("the paraboloid is too large or too small to have an area"));
         }
@@ -71,28 +72,14 @@ impl Paraboloid {
             && (self.phi_max >= TAU || azimuth(p.y, p.x) <= self.phi_max)
     }
 
-    fn line(&self, ray: &Ray) -> NearLine {
-        NearLine::new(ray, DVec3::new(0.0, 0.0, 0.5 * (self.bottom() + self.z_max)))
-    }
-
-    fn crossings(&self, line: &NearLine) -> Option<(f64, f64)> {
-        let (p, d) = (line.p, line.d);
-        let a = self.bend * (d.x * d.x + d.y * d.y);
-        let h = self.bend * (p.x * d.x + p.y * d.y) - 0.5 * d.z;
-        let c = self.bend * (p.x * p.x + p.y * p.y) - p.z;
-        quadratic(a, h, c, dop(h, h, a, c))
-    }
-
     /// The first crossing in the ray's range.
     pub fn closest(&self, ray: &Ray) -> Option<Root> {
-        let line = self.line(ray);
-        line.accepted(ray, self.crossings(&line), |p| self.keeps(p)).next()
+        accepted(ray, DVec3::ZERO, crossings(self, ray), |p| self.keeps(p)).next()
     }
 
     /// Every crossing in the ray's range, appended in ascending order.
     pub fn roots(&self, ray: &Ray, out: &mut Roots) {
-        let line = self.line(ray);
-        out.extend(line.accepted(ray, self.crossings(&line), |p| self.keeps(p)));
+        out.extend(accepted(ray, DVec3::ZERO, crossings(self, ray), |p| self.keeps(p)));
     }
 
     fn implicit(&self, p: DVec3) -> Implicit {
@@ -106,8 +93,10 @@ impl Paraboloid {
 
     /// The surface at a crossing.
     pub fn surface(&self, ray: &Ray, root: &Root) -> Surface {
-        let near = self.line(ray).at_t(root.t);
-        self.surface_on(near + self.implicit(near).to_surface())
+        let size = |p| 0.5 * length(self.implicit(p).gradient) / self.bend;
+        let near = point_at(self, ray, root.t, size);
+        let surface = self.surface_on(near + self.implicit(near).to_surface());
+        Surface { normal: sided_gradient(self, surface.normal, ray, root.t), ..surface }
     }
 
     /// The surface at `uv`; `None` below z = 0.
@@ -242,4 +231,23 @@ impl Paraboloid {
     }
 
     sampled_by_area!(pub);
+}
+
+impl SecondDegree for Paraboloid {
+    fn base(&self) -> DVec3 {
+        DVec3::ZERO
+    }
+
+    fn center(&self) -> DVec3 {
+        DVec3::new(0.0, 0.0, 0.5 * (self.bottom() + self.z_max))
+    }
+
+    /// Of z_max (x² + y²) - radius² z, which the given numbers make without rounding.
+    #[inline]
+    fn along<N: Number>(&self, p: [N; 3], d: [N; 3]) -> [N; 3] {
+        let (rim, square) = (N::from(self.z_max), N::from(self.radius) * N::from(self.radius));
+        let flat = |a: [N; 3], b: [N; 3]| rim * (a[0] * b[0] + a[1] * b[1]);
+        let half = N::from(0.5) * square;
+        [flat(d, d), flat(p, d) - half * d[2], flat(p, p) - square * p[2]]
+    }
 }

@@ -3,9 +3,10 @@
 use lumbre_math::rounding::gamma;
 use lumbre_math::{DMat3, DVec2, DVec3, Transform};
 
+use crate::support::length;
 use crate::{
     Aabb, BoundingVolume, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, Shape, Surface,
-    SurfaceSample, measure,
+    SurfaceSample, measure, scaled,
 };
 
 /// An exact shape under any invertible affine map. The ray is taken into object space; `t` is preserved.
@@ -37,22 +38,24 @@ impl PlacedShape {
     pub fn closest(&self, ray: &Ray) -> Option<Root> {
         match &self.world_from_object {
             None => self.shape.closest(ray),
+            // The map could take such a direction beyond the numbers.
+            Some(_) if !ray.has_ordinary_direction() => scaled::closest(ray, |ray, out| self.roots(ray, out)),
             Some(m) => self.shape.closest(&ray.into_object(m)),
         }
     }
 
     /// Whether anything is crossed in the ray's range.
     pub fn any(&self, ray: &Ray) -> bool {
-        match &self.world_from_object {
-            None => self.shape.any(ray),
-            Some(m) => self.shape.any(&ray.into_object(m)),
-        }
+        self.closest(ray).is_some()
     }
 
     /// Every crossing in the ray's range, appended in ascending order.
     pub fn roots(&self, ray: &Ray, out: &mut Roots) {
         match &self.world_from_object {
             None => self.shape.roots(ray, out),
+            Some(_) if !ray.has_ordinary_direction() => {
+                scaled::roots(ray, out, |ray, out| self.roots(ray, out));
+            }
             Some(m) => self.shape.roots(&ray.into_object(m), out),
         }
     }
@@ -64,6 +67,9 @@ impl PlacedShape {
     pub fn surface(&self, ray: &Ray, root: &Root) -> Surface {
         match &self.world_from_object {
             None => self.shape.surface(ray, root),
+            Some(_) if !ray.has_ordinary_direction() => {
+                scaled::surface(ray, root, |ray, root| self.surface(ray, root))
+            }
             Some(m) => into_world(m, &self.shape.surface(&ray.into_object(m), root)),
         }
     }
@@ -140,10 +146,16 @@ impl PlacedShape {
         let Some(m) = &self.world_from_object else {
             return self.shape.pdf_direction(ray, surface);
         };
+        if !ray.has_ordinary_direction() {
+            return scaled::pdf_direction(ray, |ray| self.pdf_direction(ray, surface));
+        }
         let object_ray = ray.into_object(m);
         let object_surface = Surface {
             point: m.inverse_point(surface.point),
-            normal: m.inverse_normal(surface.normal).normalize(),
+            normal: {
+                let normal = m.inverse_normal(surface.normal);
+                normal / length(normal)
+            },
             dpdu: m.inverse_vector(surface.dpdu),
             dpdv: m.inverse_vector(surface.dpdv),
             ..*surface
@@ -175,7 +187,7 @@ pub(crate) fn into_world(m: &Transform, surface: &Surface) -> Surface {
     let point_error = size * object_error + gamma(4) * (size * surface.point.abs() + offset.abs());
 
     let scaled_normal = m.normal(surface.normal);
-    let length = scaled_normal.length();
+    let length = length(scaled_normal);
     let normal = scaled_normal / length;
     // The derivative of a normalised vector.
     let turned = |dn: DVec3| {
@@ -197,6 +209,6 @@ pub(crate) fn into_world(m: &Transform, surface: &Surface) -> Surface {
 /// The ratio of solid angle in object space to solid angle in world space, about a direction `d` in object
 /// space: |L d|³ / |det L| for a unit `d`.
 fn solid_angle_shrink(m: &Transform, d: DVec3) -> f64 {
-    let stretch = m.vector(d).length() / d.length();
+    let stretch = length(m.vector(d)) / length(d);
     stretch * stretch * stretch / m.determinant().abs()
 }

@@ -3,8 +3,10 @@
 use lumbre_math::rounding::gamma;
 use lumbre_math::{DVec2, DVec3, Transform, orthonormal_basis};
 
+use crate::line::plane_crossing;
 use crate::shape::{check, unsampled};
 use crate::support::dot_size;
+use crate::twofold::point;
 use crate::{Aabb, BoundingVolume, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError, Surface};
 
 /// The plane through a point; as a solid, the half-space below it, opposite to the normal.
@@ -35,12 +37,11 @@ impl Plane {
     /// The first crossing in the ray's range.
     #[inline]
     pub fn closest(&self, ray: &Ray) -> Option<Root> {
-        let along = ray.direction.dot(self.normal);
         // No threshold is needed: near zero, `t` leaves the ray's range by itself.
+        let (t, along) = plane_crossing(ray, self.point, self.normal);
         if along == 0.0 {
             return None;
         }
-        let t = (self.point - ray.origin).dot(self.normal) / along;
         (t.is_finite() && ray.contains(t)).then(|| Root::at(t))
     }
 
@@ -52,7 +53,7 @@ impl Plane {
     /// The surface at a crossing.
     pub fn surface(&self, ray: &Ray, root: &Root) -> Surface {
         let n = self.normal();
-        let w = (ray.origin - self.point) + root.t * ray.direction;
+        let w = point(ray.origin, self.point, root.t, ray.direction);
         self.surface_on(w - w.dot(n) * n)
     }
 

@@ -9,10 +9,11 @@ use lumbre_math::{DAffine3, DMat3, DVec2, DVec3, Transform};
 
 use smallvec::SmallVec;
 
-use crate::line::{Implicit, NearLine};
+use crate::line::{Implicit, SecondDegree, accepted, crossings, point_at, sided_gradient};
 use crate::placed::into_world;
 use crate::shape::check;
-use crate::support::bounds_from_support;
+use crate::support::{bounds_from_support, length};
+use crate::twofold::{Number, components, dot};
 use crate::{
     Aabb, BoundingVolume, DirectionSample, NearestPoint, NoNearestPoint, PlacedShape, Ray, Root, Roots,
     Shape, ShapeError, Sphere, Surface, SurfaceSample, density, measure,
@@ -37,7 +38,7 @@ pub struct Quadric {
     linear: DVec3,
     constant: f64,
     clip: Option<Aabb>,
-    // The point near which lines are expressed: see `NearLine`.
+    // A point about which the surface is: see `SecondDegree`.
     place: DVec3,
     // The placed unit sphere, of a closed quadric.
     ellipsoid: Option<PlacedShape>,
@@ -156,22 +157,12 @@ impl Quadric {
         self.clip.is_none_or(|clip| clip.contains(p))
     }
 
-    fn crossings(&self, line: &NearLine) -> Option<(f64, f64)> {
-        let (p, d) = (line.p, line.d);
-        let (mp, md) = (self.matrix * p, self.matrix * d);
-        let a = d.dot(md);
-        let h = d.dot(mp) + 0.5 * self.linear.dot(d);
-        let c = p.dot(mp) + self.linear.dot(p) + self.constant;
-        quadratic(a, h, c, dop(h, h, a, c))
-    }
-
     /// The first crossing in the ray's range.
     pub fn closest(&self, ray: &Ray) -> Option<Root> {
         if let Some(ellipsoid) = &self.ellipsoid {
             return ellipsoid.closest(ray);
         }
-        let line = NearLine::new(ray, self.place);
-        line.accepted(ray, self.crossings(&line), |p| self.keeps(p)).next()
+        accepted(ray, DVec3::ZERO, crossings(self, ray), |p| self.keeps(p)).next()
     }
 
     /// Every crossing in the ray's range, appended in ascending order.
@@ -179,8 +170,7 @@ impl Quadric {
         if let Some(ellipsoid) = &self.ellipsoid {
             return ellipsoid.roots(ray, out);
         }
-        let line = NearLine::new(ray, self.place);
-        out.extend(line.accepted(ray, self.crossings(&line), |p| self.keeps(p)));
+        out.extend(accepted(ray, DVec3::ZERO, crossings(self, ray), |p| self.keeps(p)));
     }
 
     fn implicit(&self, p: DVec3) -> Implicit {
@@ -201,8 +191,11 @@ impl Quadric {
         if let Some(ellipsoid) = &self.ellipsoid {
             return ellipsoid.surface(ray, root);
         }
-        let near = NearLine::new(ray, self.place).at_t(root.t);
-        self.surface_on(near + self.implicit(near).to_surface())
+        let [x, y, z] = [self.matrix.x_axis, self.matrix.y_axis, self.matrix.z_axis].map(DVec3::abs);
+        let bend = 2.0 * x.max(y).max(z).max_element();
+        let near = point_at(self, ray, root.t, |p| length(self.implicit(p).gradient) / bend);
+        let surface = self.surface_on(near + self.implicit(near).to_surface());
+        Surface { normal: sided_gradient(self, surface.normal, ray, root.t), ..surface }
     }
 
     /// `None`: the projections overlap, so `uv` does not determine a point. A closed quadric has one.
@@ -300,8 +293,8 @@ impl Quadric {
     /// along axis `k`.
     fn above(&self, clip: &Aabb, k: usize, mut p: DVec3, is_far: bool) -> Option<DVec3> {
         p[k] = clip.center()[k];
-        let line = NearLine { p, d: DVec3::AXES[k], shift: 0.0 };
-        let (near, far) = self.crossings(&line)?;
+        let line = Ray::new(p, DVec3::AXES[k]);
+        let (near, far) = crossings(self, &line)?;
         let q = line.at(if is_far { far } else { near });
         (clip.min[k] <= q[k] && q[k] <= clip.max[k]).then_some(q)
     }
@@ -381,7 +374,7 @@ impl Quadric {
         let along_j = |height: f64| {
             let mut at = p;
             (at[j], at[k]) = (0.0, height);
-            self.crossings(&NearLine { p: at, d: DVec3::AXES[j], shift: 0.0 })
+            crossings(self, &Ray::new(at, DVec3::AXES[j]))
         };
         // The two points above coincide where their discriminant, a quadratic along the row, vanishes.
         let meeting = {
@@ -488,6 +481,29 @@ impl Quadric {
             }
             (None, None) => 0.0,
         }
+    }
+}
+
+impl SecondDegree for Quadric {
+    fn base(&self) -> DVec3 {
+        DVec3::ZERO
+    }
+
+    fn center(&self) -> DVec3 {
+        self.place
+    }
+
+    #[inline]
+    fn along<N: Number>(&self, p: [N; 3], d: [N; 3]) -> [N; 3] {
+        let [x, y, z] = [self.matrix.x_axis, self.matrix.y_axis, self.matrix.z_axis].map(components::<N>);
+        let image = |v: [N; 3]| [dot(x, v), dot(y, v), dot(z, v)];
+        let half_linear: [N; 3] = components(0.5 * self.linear);
+        let half_gradient: [N; 3] = {
+            let image = image(p);
+            std::array::from_fn(|i| image[i] + half_linear[i])
+        };
+        let c = dot(p, half_gradient) + dot(p, half_linear) + N::from(self.constant);
+        [dot(d, image(d)), dot(d, half_gradient), c]
     }
 }
 

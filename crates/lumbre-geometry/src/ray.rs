@@ -4,8 +4,8 @@ use lumbre_math::{DVec3, Transform};
 
 /// The points `origin + t * direction` with `t_min <= t <= t_max`.
 ///
-/// The direction need not be unit, and `t` is in units of its length, from about 1e-150 to 1e150 (its square
-/// must be finite). A NaN anywhere, or a direction of zero, makes every query a miss.
+/// The direction need not be unit, and `t` is in units of its length, which may be any number: a crossing is found
+/// wherever its `t` is one too. A NaN anywhere, or a direction of zero, makes every query a miss.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Ray {
@@ -48,6 +48,32 @@ impl Ray {
     /// Whether `t` lies in the range; false for a NaN.
     pub fn contains(&self, t: f64) -> bool {
         self.t_min <= t && t <= self.t_max
+    }
+
+    /// Whether products of the direction with itself and with ordinary lengths neither overflow nor vanish.
+    #[inline]
+    pub(crate) fn has_ordinary_direction(&self) -> bool {
+        let largest = self.direction.abs().max_element();
+        1e-40 < largest && largest < 1e40
+    }
+
+    /// The same ray with a direction of about unit length, and the power of two that takes its `t` to the given ray's, in two
+    /// factors that are numbers; `None` for a direction that is none.
+    pub(crate) fn with_direction_scaled(&self) -> Option<(Self, [f64; 2])> {
+        let largest = self.direction.abs().max_element();
+        if !self.direction.is_finite() || largest == 0.0 {
+            return None;
+        }
+        let exponent = largest.log2().floor() as i32;
+        let half = exponent / 2;
+        let [one, other] = [half, exponent - half].map(|e| 2f64.powi(e));
+        let scaled = Self {
+            direction: self.direction / one / other,
+            t_min: self.t_min * one * other,
+            t_max: self.t_max * one * other,
+            ..*self
+        };
+        Some((scaled, [one, other]))
     }
 
     /// The ray in object space. The direction is not renormalised, so `t` is preserved.

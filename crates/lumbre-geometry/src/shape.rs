@@ -23,6 +23,9 @@ macro_rules! shapes {
             /// The first crossing in the ray's range.
             #[inline]
             pub fn closest(&self, ray: &Ray) -> Option<Root> {
+                if !ray.has_ordinary_direction() {
+                    return crate::scaled::closest(ray, |ray, out| self.roots(ray, out));
+                }
                 match self { $(Self::$shape(shape) => shape.closest(ray),)+ }
             }
 
@@ -33,11 +36,17 @@ macro_rules! shapes {
 
             /// Every crossing in the ray's range, appended in ascending order.
             pub fn roots(&self, ray: &Ray, out: &mut Roots) {
+                if !ray.has_ordinary_direction() {
+                    return crate::scaled::roots(ray, out, |ray, out| self.roots(ray, out));
+                }
                 match self { $(Self::$shape(shape) => shape.roots(ray, out),)+ }
             }
 
             /// The surface where `root` was found along `ray`.
             pub fn surface(&self, ray: &Ray, root: &Root) -> Surface {
+                if !ray.has_ordinary_direction() {
+                    return crate::scaled::surface(ray, root, |ray, root| self.surface(ray, root));
+                }
                 match self { $(Self::$shape(shape) => shape.surface(ray, root),)+ }
             }
 
@@ -117,6 +126,9 @@ macro_rules! shapes {
             /// The density, per unit solid angle at `ray.origin`, with which [`Shape::sample_direction`]
             /// samples the point `surface` on the ray; 0 for points that it never samples.
             pub fn pdf_direction(&self, ray: &Ray, surface: &Surface) -> f64 {
+                if !ray.has_ordinary_direction() {
+                    return crate::scaled::pdf_direction(ray, |ray| self.pdf_direction(ray, surface));
+                }
                 match self { $(Self::$shape(shape) => shape.pdf_direction(ray, surface),)+ }
             }
         }

@@ -45,6 +45,51 @@ pub(crate) fn azimuth(y: f64, x: f64) -> f64 {
     if phi < 0.0 { phi + TAU } else { phi }
 }
 
+/// The length, of vectors too whose square is no number or vanishes.
+pub(crate) fn length(v: DVec3) -> f64 {
+    let squared = v.length_squared();
+    if has_digits(squared) {
+        return squared.sqrt();
+    }
+    let largest = v.abs().max_element();
+    if largest > 0.0 && largest.is_finite() { largest * (v / largest).length() } else { largest }
+}
+
+/// The unit vector along `v`, whatever the length; `None` for zero and for what is not finite.
+pub(crate) fn unit(v: DVec3) -> Option<DVec3> {
+    let squared = v.length_squared();
+    if has_digits(squared) {
+        return Some(v * squared.sqrt().recip());
+    }
+    let largest = v.abs().max_element();
+    // False for a NaN.
+    let has_direction = largest > 0.0 && v.is_finite();
+    has_direction.then(|| {
+        let scaled = v / largest;
+        scaled / scaled.length()
+    })
+}
+
+/// The unit normal where a ray enters a solid, or leaves it: mirrored where rounding has put it on the wrong side of a ray
+/// that almost touches.
+pub(crate) fn on_side_of(normal: DVec3, direction: DVec3, enters: bool) -> DVec3 {
+    let along = normal.dot(direction);
+    if (enters && along < 0.0) || (!enters && along > 0.0) {
+        return normal;
+    }
+    let Some(direction) = unit(direction) else {
+        return normal;
+    };
+    let lean = normal.dot(direction).abs().max(4.0 * f64::EPSILON);
+    let side = if enters { -lean } else { lean };
+    unit(normal + (side - normal.dot(direction)) * direction).unwrap_or(side.signum() * direction)
+}
+
+/// Whether a sum of squares has neither overflowed nor lost digits by underflow.
+fn has_digits(squared: f64) -> bool {
+    (1e-280..1e280).contains(&squared)
+}
+
 /// The rounding error of `d·x`, in units of the relative error of one operation.
 pub(crate) fn dot_size(d: DVec3, x: DVec3) -> f64 {
     d.abs().dot(x.abs())

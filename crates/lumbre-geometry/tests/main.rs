@@ -3,6 +3,7 @@
 mod contract;
 mod conventions;
 mod csg;
+mod exactness;
 mod extremes;
 mod nearest;
 mod precision;

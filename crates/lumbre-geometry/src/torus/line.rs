@@ -4,12 +4,14 @@ use lumbre_math::DVec3;
 
 use super::Torus;
 use crate::Ray;
+use crate::twofold::point;
 
-/// A ray's line in the torus's frame: the points `p + s u` with a unit `u` perpendicular to `p`, at t = (shift
+/// A ray's line in the torus's frame: the points `p + s u` with a unit `u` perpendicular to `p`, at t = start + (shift
 /// + s) / speed.
 pub(super) struct Line {
     pub(super) p: DVec3,
     pub(super) u: DVec3,
+    pub(super) start: f64,
     pub(super) shift: f64,
     pub(super) speed: f64,
     // All crossings lie strictly between these, and both ends are outside.
@@ -19,7 +21,7 @@ pub(super) struct Line {
 
 impl Line {
     pub(super) fn t(&self, s: f64) -> f64 {
-        (self.shift + s) / self.speed
+        self.start + (self.shift + s) / self.speed
     }
 }
 
@@ -35,27 +37,29 @@ impl Torus {
         let dd = d.length_squared();
         let speed = dd.sqrt();
         let unit = d / speed;
-        let first = -w.dot(unit);
-        let near = w + first * unit;
+        let start = -w.dot(d) / dd;
         let reach = (self.major + self.minor) * (1.0 + MARGIN);
+        // From far away the rounding of the way would move the line.
+        let is_far = w.length_squared() > 64.0 * reach * reach;
+        let near = if is_far { point(ray.origin, self.center, start, d) } else { w + start * d };
         let within_sphere = near.length_squared() <= reach * reach;
         // False for a direction of zero and for NaNs.
         if !within_sphere || !dd.is_finite() {
             return None;
         }
-        let second = -near.dot(unit);
-        let (p, u) = (self.framed(near + second * unit), self.framed(unit));
+        let shift = -near.dot(unit);
+        let (p, u) = (self.framed(near + shift * unit), self.framed(unit));
         let (low, high) = self.span(p, u, reach)?;
-        let shift = first + second;
-        let overlaps = shift + high >= ray.t_min * speed && shift + low <= ray.t_max * speed;
-        overlaps.then_some(Line { p, u, shift, speed, low, high })
+        let line = Line { p, u, start, shift, speed, low, high };
+        let overlaps = line.t(high) >= ray.t_min && line.t(low) <= ray.t_max;
+        overlaps.then_some(line)
     }
 
     /// The part of the line inside the flat cylinder around the torus; `None` when it is empty, or only in the
     /// hole.
     #[inline]
     fn span(&self, p: DVec3, u: DVec3, reach: f64) -> Option<(f64, f64)> {
-        let flat = self.minor * (1.0 + MARGIN);
+        let flat = self.minor * (1.0 + MARGIN) + 16.0 * f64::EPSILON * reach;
         let (mut low, mut high) = (-2.0 * reach, 2.0 * reach);
         if u.z == 0.0 {
             if p.z.abs() > flat {

@@ -78,6 +78,11 @@ impl Torus {
         self.minor < self.major
     }
 
+    /// Whether the tube is so thin that the quartic's digits do not tell whether a line meets it.
+    fn is_thin(&self) -> bool {
+        self.minor < 1e-4 * self.major
+    }
+
     fn framed(&self, v: DVec3) -> DVec3 {
         if self.upright { v } else { DVec3::new(v.dot(self.e1), v.dot(self.e2), v.dot(self.axis)) }
     }

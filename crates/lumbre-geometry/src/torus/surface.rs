@@ -9,16 +9,13 @@ use lumbre_math::{DMat3, DVec2, DVec3, Transform};
 use super::Torus;
 use crate::shape::sampled_by_area;
 use crate::support::{azimuth, bounds_from_support};
+use crate::twofold::point;
 use crate::{Aabb, BoundingVolume, Ray, Root, Surface, SurfaceSample, measure};
 
 impl Torus {
     /// The surface at a crossing.
     pub fn surface(&self, ray: &Ray, root: &Root) -> Surface {
-        // Relative to the point nearest to the centre, so the error is bounded by the torus's size.
-        let d = ray.direction;
-        let w = ray.origin - self.center;
-        let near_t = -w.dot(d) / d.length_squared();
-        let p = self.framed((w + near_t * d) + (root.t - near_t) * d);
+        let p = self.framed(point(ray.origin, self.center, root.t, ray.direction));
         let rho = p.x.hypot(p.y);
         let outward = if rho > 0.0 { DVec2::new(p.x, p.y) / rho } else { DVec2::X };
         let (outer, inner) = self.factors(rho, p.z);
