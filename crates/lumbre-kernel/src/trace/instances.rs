@@ -3,7 +3,6 @@
 //! A tree of triangles is traversed at once, by the instruction set of the traversal around it; any other by a call, no deeper than
 //! [`FilterStart`](crate::intersect::filter_start::FilterStart) allows. What is hit there comes back in double precision, as the crossing of a shape does.
 
-use std::cmp::Ordering;
 use std::marker::PhantomData;
 
 use lumbre_geometry::Ray;
@@ -17,7 +16,7 @@ use crate::intersect::{Isa, Simd};
 use crate::query::{Query, TreeQuery};
 use crate::tree::packed::Entry;
 use crate::tree::packed::Start;
-use crate::{Accel, GeometryKind, Hit, Instance};
+use crate::{Accel, GeometryKind, Instance};
 
 /// An instance, or a part of one.
 struct Placed<'a> {
@@ -97,18 +96,20 @@ impl<const GENERAL: bool, const FILTERED: bool> FilteredRay<'_, '_, GENERAL, FIL
         None
     }
 
-    /// Whether a hit in an instance is closer than the best, or as close and first by the ids.
+    /// Whether a hit in an instance is closer than the best; of two as close, the exact traversal knows which comes first.
     #[cold]
     #[inline(never)]
     fn is_closer(&self, hit: &InInstance, ray: &Ray) -> Outcome<bool> {
         let exact = self.exact();
         match (&exact, &self.in_instance) {
             (Some(Winner { geometry: IN_INSTANCE, .. }), Some(best)) => {
-                let [hit, best] =
-                    [hit, best].map(|hit| hit.clone().into_hit(self.decider.accel(), self.context));
-                Outcome::Certain(comes_before(&hit, &best))
+                let (t, best_t) = (hit.winner.root.t, best.winner.root.t);
+                if t == best_t { Outcome::Uncertain } else { Outcome::Certain(t < best_t) }
             }
-            _ => self.decider.is_closer(ray, hit.winner.root.t, (IN_INSTANCE, 0), &self.best, exact),
+            _ => {
+                let (t, ids) = (hit.winner.root.t, (IN_INSTANCE, 0));
+                self.decider.is_closer(ray, t, || None, ids, &self.best, exact)
+            }
         }
     }
 }
@@ -158,13 +159,4 @@ fn test_any_tree<G: FilteredGoal, const FILTERED: bool>(
         }
     }
     G::exactly(isa, accel, placed.from, written, ray, query)
-}
-
-/// Whether a hit comes before another in an instance.
-#[cold]
-#[inline(never)]
-fn comes_before(hit: &Hit, other: &Hit) -> bool {
-    let ids = |hit: &Hit| (hit.geometry, hit.primitive);
-    let order = hit.root.t.partial_cmp(&other.root.t).unwrap_or(Ordering::Equal);
-    order.then_with(|| hit.route.cmp(&other.route)).then_with(|| ids(hit).cmp(&ids(other))) == Ordering::Less
 }
