@@ -7,6 +7,7 @@
 use lumbre_geometry::{Ray, Root};
 use lumbre_math::DVec3;
 
+use super::filtered::IN_INSTANCE;
 use super::{Outcome, Winner, edges, meets_front, precedes};
 use crate::intersect::filter_start::FilterStart;
 use crate::intersect::watertight::{self, EdgeTest, Inside, Meeting, Shear};
@@ -67,6 +68,44 @@ pub(crate) fn heights(t: f64, length: f64) -> (f32, f32) {
     let height = (t * length) as f32;
     let error = height.abs() * watertight::ROUNDINGS + f32::MIN_POSITIVE;
     (height - error, height + error)
+}
+
+/// Whether the ray, in the space of a tree, meets the front of what it hits in the instance that the route leads to from there. `None`
+/// where the exact traversal has to tell.
+#[cold]
+#[inline(never)]
+pub(crate) fn enters(
+    mut accel: &Accel,
+    ray: &Ray,
+    route: &[u32],
+    &Winner { ref root, geometry, primitive }: &Winner,
+) -> Option<bool> {
+    let mut ray = *ray;
+    for &position in route {
+        let GeometryKind::Instance(instance) = &accel.geometries[position as usize].kind else { return None };
+        ray = instance.world_from_object.object_ray(&ray);
+        accel = &instance.accel;
+    }
+    let kind = &accel.geometries[geometry as usize].kind;
+    let meeting = match kind {
+        GeometryKind::Shape(_) | GeometryKind::Spheres(_) | GeometryKind::Custom(_) => {
+            return Some(meets_front(kind, primitive, &ray, root));
+        }
+        GeometryKind::PreciseMesh(_) => edges::intersect_precise(accel, &ray, geometry, primitive),
+        GeometryKind::Mesh(mesh) => {
+            let shear = Shear::new(&ray.direction);
+            let origin = shear.local_origin(&ray.origin, &mesh.origin);
+            let corners = mesh.indices[primitive as usize].map(|vertex| {
+                shear.axes.permute(&mesh.positions[vertex as usize].as_dvec3()).map(|x| x as f32)
+            });
+            watertight::intersect(&ray, shear, origin, corners)
+        }
+        GeometryKind::Instance(_) => return None,
+    };
+    match meeting {
+        Meeting::Hit { is_front, .. } => Some(is_front),
+        Meeting::Miss | Meeting::Touch { .. } => None,
+    }
 }
 
 /// The height along a ray per unit of `t`.
@@ -231,24 +270,9 @@ impl<'a> Decider<'a> {
         }
     }
 
-    /// Whether a crossing that is known in double precision meets the front; `None` where the exact traversal has to tell.
-    #[cold]
-    #[inline(never)]
-    fn meets_front(&self, ray: &Ray, &Winner { ref root, geometry, primitive }: &Winner) -> Option<bool> {
-        // Of a hit in an instance no geometry is known here.
-        let kind = &self.accel.geometries.get(geometry as usize)?.kind;
-        match kind {
-            GeometryKind::Shape(_) | GeometryKind::Spheres(_) | GeometryKind::Custom(_) => {
-                Some(meets_front(kind, primitive, ray, root))
-            }
-            GeometryKind::PreciseMesh(_) => {
-                match edges::intersect_precise(self.accel, ray, geometry, primitive) {
-                    Meeting::Hit { is_front, .. } => Some(is_front),
-                    Meeting::Miss | Meeting::Touch { .. } => None,
-                }
-            }
-            GeometryKind::Mesh(_) | GeometryKind::Instance(_) => None,
-        }
+    /// Whether a crossing of something in the tree meets the front, which its parts in instances are not: `None` there.
+    fn meets_front(&self, ray: &Ray, winner: &Winner) -> Option<bool> {
+        if winner.geometry == IN_INSTANCE { None } else { enters(self.accel, ray, &[], winner) }
     }
 
     /// The interval of heights of a crossing that is known in double precision, if it is in range and closer than the best.

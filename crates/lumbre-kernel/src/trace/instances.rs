@@ -7,16 +7,16 @@ use std::marker::PhantomData;
 
 use lumbre_geometry::Ray;
 
-use super::decide::{heights, largest_component};
+use super::decide::{enters, heights, largest_component};
 use super::filtered::{FilteredGoal, FilteredRay, Found, IN_INSTANCE, InInstance, Traversal};
-use super::{ContextRef, Outcome, Stop, Winner};
+use super::{ContextRef, Outcome, Stop, Winner, precedes};
 use crate::intersect::box_ray::Slabs;
 use crate::intersect::filter_start::FilterStart;
 use crate::intersect::{Isa, Simd};
 use crate::query::{Query, TreeQuery};
 use crate::tree::packed::Entry;
 use crate::tree::packed::Start;
-use crate::{Accel, GeometryKind, Instance};
+use crate::{Accel, GeometryKind, Hit, Instance};
 
 /// An instance, or a part of one.
 struct Placed<'a> {
@@ -104,12 +104,47 @@ impl<const GENERAL: bool, const FILTERED: bool> FilteredRay<'_, '_, GENERAL, FIL
         match (&exact, &self.in_instance) {
             (Some(Winner { geometry: IN_INSTANCE, .. }), Some(best)) => {
                 let (t, best_t) = (hit.winner.root.t, best.winner.root.t);
-                if t == best_t { Outcome::Uncertain } else { Outcome::Certain(t < best_t) }
+                if t != best_t {
+                    return Outcome::Certain(t < best_t);
+                }
+                let (Some(enters), Some(best_enters)) = (self.enters(hit, ray), self.enters(best, ray))
+                else {
+                    return Outcome::Uncertain;
+                };
+                let place = |hit: &InInstance| {
+                    let hit = hit.clone().into_hit(self.decider.accel(), self.context);
+                    (hit.route, hit.geometry, hit.primitive)
+                };
+                Outcome::Certain((!enters, place(hit)) < (!best_enters, place(best)))
             }
             _ => {
                 let (t, ids) = (hit.winner.root.t, (IN_INSTANCE, 0));
-                self.decider.is_closer(ray, t, || None, ids, &self.best, exact)
+                self.decider.is_closer(ray, t, || self.enters(hit, ray), ids, &self.best, exact)
             }
+        }
+    }
+
+    /// Whether the ray enters what it hits in an instance.
+    fn enters(&self, hit: &InInstance, ray: &Ray) -> Option<bool> {
+        let Hit { root, geometry, primitive, route, .. } =
+            hit.clone().into_hit(self.decider.accel(), self.context);
+        let around = self.context.to_context().route.len();
+        enters(self.decider.accel(), ray, &route[around..], &Winner { root, geometry, primitive })
+    }
+
+    /// Whether a crossing that is as near as the closest hit, and that is in an instance, comes before it.
+    pub(super) fn precedes_instance(
+        &self,
+        ray: &Ray,
+        is_front: Option<bool>,
+        ids: (u32, u32),
+    ) -> Outcome<bool> {
+        let best = self.in_instance.as_ref().and_then(|best| self.enters(best, ray));
+        match (is_front, best) {
+            (Some(is_front), Some(best)) => {
+                Outcome::Certain(precedes((is_front, ids), (best, (IN_INSTANCE, 0))))
+            }
+            _ => Outcome::Uncertain,
         }
     }
 }

@@ -7,9 +7,9 @@ use std::marker::PhantomData;
 use lumbre_geometry::{PatchCrossings, Ray, Root};
 use lumbre_math::DVec3;
 
-use super::decide::{Candidate, heights, largest_component};
+use super::decide::{Candidate, enters, heights, largest_component};
 use super::edges::{self, Patch};
-use super::filtered::{FilteredGoal, FilteredRay};
+use super::filtered::{FilteredGoal, FilteredRay, IN_INSTANCE};
 use super::stack::Goal;
 use super::{Outcome, Stop, Winner, all_crossings, first_crossing, is_crossed, meets_front};
 use crate::intersect::box_ray::Slabs;
@@ -216,6 +216,18 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
     #[inline(never)]
     fn compare(&self, isa: Isa, ray: &Ray, block: u32, lane: u32) -> Outcome<Option<Candidate>> {
         let (decider, axes, best) = (self.decider, self.blocks.axes, (&self.best, self.exact()));
+        if let Some(t) = self.exact().filter(|best| best.geometry == IN_INSTANCE).map(|best| best.root.t)
+            && let Meeting::Hit { root, is_front } = decider.intersect(ray, block, lane)
+            && root.t == t
+        {
+            let (from, to) = heights(t, largest_component(ray));
+            return match self.precedes_instance(ray, Some(is_front), decider.ids(block, lane)) {
+                Outcome::Certain(is_first) => {
+                    Outcome::Certain(is_first.then_some(Candidate { block, lane, from, to }))
+                }
+                Outcome::Uncertain => Outcome::Uncertain,
+            };
+        }
         match isa.run(Comparison { decider, ray, axes, triangle: (block, lane), best }) {
             Outcome::Certain(Some(t)) => {
                 let (from, to) = heights(t, largest_component(ray));
@@ -336,6 +348,19 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
         ray: &Ray,
         slabs: &mut Slabs,
     ) -> Option<Stop> {
+        if let Some(best) = self.exact().filter(|best| best.geometry == IN_INSTANCE && root.t == best.root.t)
+        {
+            let (geometry, primitive) = ids();
+            let winner = Winner { root, geometry, primitive };
+            return match self.precedes_instance(ray, enters(self.accel(), ray, &[], &winner), ids()) {
+                Outcome::Certain(true) => {
+                    self.keep_exact(winner, heights(best.root.t, largest_component(ray)), slabs);
+                    None
+                }
+                Outcome::Certain(false) => None,
+                Outcome::Uncertain => Some(Stop::Uncertain),
+            };
+        }
         match self.decider.compare_exact(ray, root, &ids, (&self.best, self.exact())) {
             Outcome::Certain(Some(heights)) => {
                 let (geometry, primitive) = ids();
