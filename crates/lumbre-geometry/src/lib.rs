@@ -28,6 +28,7 @@ pub use csg::{Crossing, Crossings, Leaf, LeafPart, Solid};
 pub use hit::{DirectionSample, Root, Roots, Surface, SurfaceSample};
 pub use implicit::ImplicitSurface;
 pub use nearest::{NearestPoint, NoNearestPoint, nearest_on_triangle, similarity_factor};
+pub use patch::{PatchCrossing, PatchCrossings, PatchPlace};
 pub use placed::PlacedShape;
 pub use ray::Ray;
 pub use shape::ShapeError;

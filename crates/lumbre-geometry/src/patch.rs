@@ -8,18 +8,19 @@ use lumbre_math::rounding::gamma;
 use lumbre_math::{DVec2, DVec3, Transform};
 use smallvec::SmallVec;
 
-use crate::shape::{check, open_surface, two_crossings};
+use crate::shape::{check, open_surface};
 use crate::support::bounds_from_support;
-use crate::triangle::solid_angle_of;
+use crate::triangle::{Side, WatertightRay, solid_angle_of};
 use crate::{
-    Aabb, BoundingVolume, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, ShapeError, Surface,
-    SurfaceSample, density, measure,
+    Aabb, BoundingVolume, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError,
+    Surface, SurfaceSample, density, measure,
 };
 
 /// The surface (1−u)(1−v) p00 + u(1−v) p10 + (1−u)v p01 + uv p11 with u and v in [0, 1]: doubly ruled, and flat
 /// when the corners are coplanar. The normal is along ∂p/∂u × ∂p/∂v.
 ///
-/// Its `root.local` and its `uv` are (u, v). A ray along one of its rulings misses it.
+/// Its `root.local` and its `uv` are (u, v). Patches and triangles that share an edge have no gap, see
+/// [`BilinearPatch::line_crossings`]. A ray along one of its rulings crosses it once or not at all.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BilinearPatch {
     p00: DVec3,
@@ -27,6 +28,36 @@ pub struct BilinearPatch {
     p01: DVec3,
     p11: DVec3,
     is_rectangle: bool,
+}
+
+/// Where a line crosses a bilinear patch.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PatchCrossings {
+    /// In ascending order.
+    pub of_line: SmallVec<[PatchCrossing; 2]>,
+    /// Whether the line lies in the patch's plane, or along one of its edges: then no place is told.
+    pub is_edge_on: bool,
+}
+
+/// One crossing of a line with a bilinear patch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PatchCrossing {
+    /// The crossing.
+    pub root: Root,
+    /// Whether the patch owns it. Of the faces that meet at an edge or a corner, exactly one owns a crossing there; at the border
+    /// of a surface it may have no owner.
+    pub is_owned: bool,
+    /// Where on the outline, if it is exactly there.
+    pub place: Option<PatchPlace>,
+}
+
+/// A place on the outline of a bilinear patch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PatchPlace {
+    /// Within the edge from this corner of [`BilinearPatch::outline`] to the next.
+    Edge(usize),
+    /// At this corner.
+    Corner(usize),
 }
 
 /// Solid angles outside this range are sampled by area: small ones cancel in the sum of four angles, and
@@ -75,71 +106,126 @@ impl BilinearPatch {
         [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)].map(|(u, v)| self.dpdu(v).cross(self.dpdv(u)))
     }
 
-    /// Both crossings, in order.
+    /// The corners in the order of the outline: p00, p10, p11, p01.
+    pub fn outline(&self) -> [DVec3; 4] {
+        [self.p00, self.p10, self.p11, self.p01]
+    }
+
+    /// How the line of a ray crosses the patch, whatever the range of the ray.
     ///
-    /// A. Reshetov, "Cool patches: a geometric approach to ray/bilinear patch intersections", Ray Tracing Gems,
-    /// 2019: the rulings of constant u that the ray intersects are roots of a quadratic; the rest is linear.
-    #[inline]
-    fn crossings(&self, ray: &Ray) -> [Option<Root>; 2] {
-        let d = ray.direction;
-        let (q00, q10) = (self.p00 - ray.origin, self.p10 - ray.origin);
-        let (side0, side1) = (self.p01 - self.p00, self.p11 - self.p10);
-        let a = q00.cross(d).dot(side0);
-        let c = (self.p10 - self.p00).cross(self.p01 - self.p11).dot(d);
-        let h = 0.5 * (q10.cross(d).dot(side1) - a - c);
-        // a + 2 h u + c u² = 0.
-        let Some((first, second)) = quadratic(c, h, a, dop(h, h, a, c)) else {
-            return [None, None];
-        };
-        let on_line = |u: f64, multiplicity: u8| {
-            if !(0.0..=1.0).contains(&u) {
-                return None;
-            }
-            let start = (1.0 - u) * q00 + u * q10;
-            let side = (1.0 - u) * side0 + u * side1;
-            let n = d.cross(side);
-            let size = n.length_squared();
-            let turned = n.cross(start);
-            let (t, v) = (turned.dot(side) / size, turned.dot(d) / size);
-            if !(0.0..=1.0).contains(&v) {
-                return None;
-            }
-            let (t, local) =
-                if multiplicity == 1 { self.refined(ray, t, u, v) } else { (t, DVec2::new(u, v)) };
-            (t.is_finite() && ray.contains(t)).then_some(Root { t, part: 0, multiplicity, local })
-        };
-        if first == second {
-            return [on_line(first, 2), None];
+    /// What is inside is decided by the straight edges alone, each as the triangles of a mesh decide about theirs: by the exact
+    /// sign of the edge function of its sheared end points. So a ray passes a common edge on the same side of both faces,
+    /// whichever they are. The number of times that the outline winds around the ray tells whether there is one crossing, or
+    /// none or two; the roots of a quadratic only say where.
+    pub fn line_crossings(&self, ray: &Ray) -> PatchCrossings {
+        let mut crossings = PatchCrossings::default();
+        if !(ray.origin.is_finite() && ray.direction.is_finite()) || ray.direction == DVec3::ZERO {
+            return crossings;
         }
-        match (on_line(first, 1), on_line(second, 1)) {
-            (Some(a), Some(b)) if b.t < a.t => [Some(b), Some(a)],
-            pair => pair.into(),
+        let sheared = WatertightRay::new(ray.origin, ray.direction);
+        let patch = Sheared { corners: self.corners().map(|p| sheared.sheared(p)) };
+        let outline = patch.outline();
+        let sides: [Side; 4] = std::array::from_fn(|i| Side::of(outline[i], outline[(i + 1) % 4]));
+        let mut winding = 0;
+        for (i, side) in sides.into_iter().enumerate() {
+            let [is_above, goes_above] = [i, (i + 1) % 4].map(|corner| outline[corner].y > 0.0);
+            if is_above != goes_above && side.is_positive == goes_above {
+                winding += if goes_above { 1 } else { -1 };
+            }
         }
-    }
-
-    /// A Newton step on p(u, v) = O + tD. A ruling of constant u almost parallel to the ray determines the
-    /// crossing poorly; afterwards the error is limited by the angle with the surface alone.
-    #[inline]
-    fn refined(&self, ray: &Ray, t: f64, u: f64, v: f64) -> (f64, DVec2) {
-        let [q00, q10, q01, q11] = self.corners().map(|p| p - ray.origin);
-        let low = (1.0 - u) * q00 + u * q10;
-        let high = (1.0 - u) * q01 + u * q11;
-        let residual = (1.0 - v) * low + v * high - t * ray.direction;
-        let (dpdu, dpdv) = (self.dpdu(v), self.dpdv(u));
-        let cross = dpdu.cross(dpdv);
-        let dt = cross.dot(residual) / cross.dot(ray.direction);
-        let in_plane = residual - dt * ray.direction;
-        let size = cross.length_squared();
-        let (du, dv) = (-in_plane.cross(dpdv).dot(cross) / size, -dpdu.cross(in_plane).dot(cross) / size);
-        // Where the ray almost touches, a step may go anywhere.
-        if du.abs() + dv.abs() < 1e-6 && dt.is_finite() {
-            (t + dt, DVec2::new(u + du, v + dv).clamp(DVec2::ZERO, DVec2::ONE))
+        for (uv, multiplicity) in patch.inside(winding != 0).into_iter().flatten() {
+            let t = sheared.t(patch.at(uv).z);
+            if t.is_finite() {
+                let root = Root { t, part: 0, multiplicity, local: uv };
+                crossings.of_line.push(PatchCrossing { root, is_owned: true, place: None });
+            }
+        }
+        if sides.iter().any(|side| side.is_exact) {
+            self.find_places(&sheared, &patch, sides, &mut crossings);
+        }
+        if let [first, second] = &mut *crossings.of_line {
+            // Entering comes before leaving.
+            let is_front = |crossing: &PatchCrossing| patch.turn(crossing.root.local) < 0.0;
+            let swaps = second.root.t < first.root.t
+                || second.root.t == first.root.t && is_front(second) && !is_front(first);
+            if swaps {
+                std::mem::swap(first, second);
+            }
         } else {
-            (t, DVec2::new(u, v))
+            crossings.of_line.sort_by(|a, b| a.root.t.total_cmp(&b.root.t));
+        }
+        crossings
+    }
+
+    /// Finds the crossings exactly at edges and corners: those that the patch owns among what is found, and the others.
+    #[cold]
+    fn find_places(
+        &self,
+        sheared: &WatertightRay,
+        patch: &Sheared,
+        sides: [Side; 4],
+        crossings: &mut PatchCrossings,
+    ) {
+        const UV: [DVec2; 4] = [DVec2::ZERO, DVec2::X, DVec2::ONE, DVec2::Y];
+        let (outline, corners) = (patch.outline(), self.outline());
+        let is_met = |corner: usize| outline[corner].x == 0.0 && outline[corner].y == 0.0;
+        let is_along = |edge: usize| {
+            let next = (edge + 1) % 4;
+            is_met(edge) && is_met(next) && corners[edge] != corners[next]
+        };
+        crossings.is_edge_on = sides.iter().all(|side| side.is_exact) || (0..4).any(is_along);
+        if crossings.is_edge_on {
+            return;
+        }
+        let highest = outline.iter().map(|p| p.z).fold(f64::NEG_INFINITY, f64::max);
+        let lowest = outline.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
+        let width = outline.iter().map(|p| (p.x - outline[0].x).abs().max((p.y - outline[0].y).abs()));
+        let close = 1e-6 * width.fold(highest - lowest, f64::max) * sheared.t(1.0).abs();
+        let mut place_at = |place: PatchPlace, uv: DVec2| {
+            let t = sheared.t(patch.at(uv).z);
+            let distance = |crossing: &PatchCrossing| (crossing.root.t - t).abs();
+            let found = crossings
+                .of_line
+                .iter_mut()
+                .filter(|crossing| crossing.place.is_none() && distance(crossing) <= close)
+                .min_by(|a, b| distance(a).total_cmp(&distance(b)));
+            match found {
+                Some(own) => own.place = Some(place),
+                None if t.is_finite() => {
+                    let root = Root { t, part: 0, multiplicity: 1, local: uv };
+                    crossings.of_line.push(PatchCrossing { root, is_owned: false, place: Some(place) });
+                }
+                None => {}
+            }
+        };
+        for edge in 0..4 {
+            let next = (edge + 1) % 4;
+            let [p, q] = [outline[edge], outline[next]];
+            if is_met(edge) {
+                let is_repeated = (0..edge).any(|other| is_met(other) && corners[other] == corners[edge]);
+                if !is_repeated {
+                    place_at(PatchPlace::Corner(edge), UV[edge]);
+                }
+            } else if sides[edge].is_exact && !is_met(next) && p.x * q.x <= 0.0 && p.y * q.y <= 0.0 {
+                let share = if p.x.abs() > p.y.abs() { p.x / (p.x - q.x) } else { p.y / (p.y - q.y) };
+                place_at(PatchPlace::Edge(edge), UV[edge].lerp(UV[next], share));
+            }
         }
     }
 
-    two_crossings!(pub);
+    /// The first crossing in the ray's range. The outline belongs to the patch.
+    #[inline]
+    pub fn closest(&self, ray: &Ray) -> Option<Root> {
+        let crossings = self.line_crossings(ray);
+        crossings.of_line.iter().map(|crossing| crossing.root).find(|root| ray.contains(root.t))
+    }
+
+    /// Every crossing in the ray's range, appended in ascending order.
+    pub fn roots(&self, ray: &Ray, out: &mut Roots) {
+        let crossings = self.line_crossings(ray);
+        let roots = crossings.of_line.iter().map(|crossing| crossing.root);
+        out.extend(roots.filter(|root| ray.contains(root.t)));
+    }
 
     /// The surface at a crossing.
     pub fn surface(&self, _ray: &Ray, root: &Root) -> Surface {
@@ -344,10 +430,125 @@ impl BilinearPatch {
     }
 }
 
+/// A patch in the sheared space of a ray, which is its last axis.
+struct Sheared {
+    /// p00, p10, p01, p11.
+    corners: [DVec3; 4],
+}
+
+/// The z component of a cross product.
+fn turn(a: DVec3, b: DVec3) -> f64 {
+    dop(a.x, b.y, a.y, b.x)
+}
+
+impl Sheared {
+    fn outline(&self) -> [DVec3; 4] {
+        let [p00, p10, p01, p11] = self.corners;
+        [p00, p10, p11, p01]
+    }
+
+    fn at(&self, uv: DVec2) -> DVec3 {
+        let [p00, p10, p01, p11] = self.corners;
+        let (low, high) = ((1.0 - uv.x) * p00 + uv.x * p10, (1.0 - uv.x) * p01 + uv.x * p11);
+        (1.0 - uv.y) * low + uv.y * high
+    }
+
+    fn derivatives(&self, uv: DVec2) -> [DVec3; 2] {
+        let [p00, p10, p01, p11] = self.corners;
+        [(1.0 - uv.y) * (p10 - p00) + uv.y * (p11 - p01), (1.0 - uv.x) * (p01 - p00) + uv.x * (p11 - p10)]
+    }
+
+    /// Negative where the ray meets the front.
+    fn turn(&self, uv: DVec2) -> f64 {
+        let [along_u, along_v] = self.derivatives(uv);
+        turn(along_u, along_v)
+    }
+
+    /// The (u, v) of the crossings with their multiplicity, given whether their number is odd.
+    ///
+    /// A. Reshetov, "Cool patches: a geometric approach to ray/bilinear patch intersections", Ray Tracing Gems,
+    /// 2019: the rulings of constant u that the ray intersects are roots of a quadratic; the rest is linear. Theirs tests u and
+    /// v against 0 and 1, which leaks; here a root that is off by its rounding is moved into the patch.
+    fn inside(&self, is_odd: bool) -> [Option<(DVec2, u8)>; 2] {
+        let [p00, p10, p01, p11] = self.corners;
+        let (a, c) = (turn(p00, p01), turn(p10 - p00, p11 - p01));
+        let h = 0.5 * (turn(p10, p11) - a - c);
+        // a + 2 h u + c u² = 0.
+        let roots = quadratic(c, h, a, dop(h, h, a, c));
+        if let Some((double, second)) = roots
+            && double == second
+            && !is_odd
+        {
+            let uv = self.on_ruling(double);
+            return [(depth(uv) >= 0.0).then_some((uv, 2)), None];
+        }
+        let uvs = roots.map_or([DVec2::NAN; 2], |(first, second)| {
+            [first, second].map(|u| self.refined(self.on_ruling(u)))
+        });
+        let depths = uvs.map(depth);
+        let into = |uv: DVec2| Some((uv.clamp(DVec2::ZERO, DVec2::ONE), 1));
+        if is_odd {
+            let deepest = if depths[0] >= depths[1] { 0 } else { 1 };
+            // A root that is not there, or plainly elsewhere, is that of a patch seen almost edge-on.
+            let uv = if depths[deepest] > -1e-3 { Some(uvs[deepest]) } else { self.on_halves() };
+            return [uv.and_then(into), None];
+        }
+        // Both or neither: the one that is farther from the outline is right.
+        let decisive = if depths[0].abs() >= depths[1].abs() { depths[0] } else { depths[1] };
+        if decisive >= 0.0 { uvs.map(into) } else { [None, None] }
+    }
+
+    /// The point of a ruling that is nearest to the ray.
+    fn on_ruling(&self, u: f64) -> DVec2 {
+        let [p00, p10, p01, p11] = self.corners;
+        let (start, end) = ((1.0 - u) * p00 + u * p10, (1.0 - u) * p01 + u * p11);
+        let side = end - start;
+        let v = -(start.x * side.x + start.y * side.y) / (side.x * side.x + side.y * side.y);
+        DVec2::new(u, v)
+    }
+
+    /// A Newton step. A ruling of constant u almost parallel to the ray determines the crossing poorly; afterwards the error
+    /// is limited by the angle with the surface alone.
+    fn refined(&self, uv: DVec2) -> DVec2 {
+        let (p, [along_u, along_v]) = (self.at(uv), self.derivatives(uv));
+        let area = turn(along_u, along_v);
+        let step = DVec2::new(-turn(p, along_v) / area, -turn(along_u, p) / area);
+        // Where the ray almost touches, a step may go anywhere.
+        if step.x.abs() + step.y.abs() < 1e-6 { uv + step } else { uv }
+    }
+
+    /// The crossing of the two triangles that have the patch's outline.
+    fn on_halves(&self) -> Option<DVec2> {
+        let [p00, p10, p01, p11] = self.corners;
+        let in_half = |a: DVec3, b: DVec3, c: DVec3| {
+            let sides = [Side::of(b, c), Side::of(c, a), Side::of(a, b)].map(|side| side.is_positive);
+            let weights = [turn(b, c), turn(c, a), turn(a, b)];
+            let sum = weights[0] + weights[1] + weights[2];
+            (sides[0] == sides[1] && sides[1] == sides[2])
+                .then(|| DVec2::new(weights[1] / sum, weights[2] / sum))
+        };
+        let uv = match in_half(p00, p10, p11) {
+            Some(w) => DVec2::new(w.x + w.y, w.y),
+            None => in_half(p00, p11, p01).map(|w| DVec2::new(w.x, w.x + w.y))?,
+        };
+        // Anywhere, where they have no area either.
+        Some(if uv.is_finite() { uv } else { DVec2::splat(0.5) })
+    }
+}
+
+/// How far within the unit square, in its units; negative outside, and −∞ for a NaN.
+fn depth(uv: DVec2) -> f64 {
+    if uv.is_nan() {
+        return f64::NEG_INFINITY;
+    }
+    uv.x.min(1.0 - uv.x).min(uv.y).min(1.0 - uv.y)
+}
+
 /// A number in [0, 1] with a density linear from `a` at 0 to `b` at 1, both ≥ 0 and not both 0.
 fn sample_linear(u: f64, a: f64, b: f64) -> f64 {
     (u * (a + b) / (a + ((1.0 - u) * a * a + u * b * b).sqrt())).clamp(0.0, 1.0)
 }
+
 /// The `u` in [0, 1] of the rulings whose nearest point to the origin is stationary. With a(u) + v b(u) on the
 /// ruling, extended to a whole line, and v = -a·b/b·b its nearest point, the derivative by u times (b·b)² is a
 /// quintic.

@@ -34,6 +34,11 @@ impl PlacedShape {
         self.world_from_object.as_deref().copied().unwrap_or_default()
     }
 
+    /// The ray in object space, as every query takes it there.
+    pub fn object_ray(&self, ray: &Ray) -> Ray {
+        self.world_from_object.as_ref().map_or(*ray, |m| ray.into_object(m))
+    }
+
     /// The first crossing in the ray's range.
     pub fn closest(&self, ray: &Ray) -> Option<Root> {
         match &self.world_from_object {

@@ -94,15 +94,29 @@ impl WatertightRay {
     pub fn new(origin: DVec3, direction: DVec3) -> Self {
         let size = direction.abs();
         let pick = |goes_down: bool, up: Order, down: Order| if goes_down { down } else { up };
-        let order = if size.x > size.y && size.x > size.z {
+        let order = if size.x >= size.y && size.x >= size.z {
             pick(direction.x < 0.0, Order::Yzx, Order::Zyx)
-        } else if size.y > size.z {
+        } else if size.y >= size.z {
             pick(direction.y < 0.0, Order::Zxy, Order::Xzy)
         } else {
             pick(direction.z < 0.0, Order::Xyz, Order::Yxz)
         };
         let along = order.apply(direction);
         Self { origin, order, shear: DVec3::new(along.x / along.z, along.y / along.z, 1.0 / along.z) }
+    }
+
+    /// A point in the sheared space of the ray, whose last axis is the ray: rounded from the ray and the point alone, so
+    /// that it is the same for all faces that share it.
+    #[inline]
+    pub(crate) fn sheared(&self, p: DVec3) -> DVec3 {
+        let along = self.order.apply(p - self.origin);
+        DVec3::new(along.x - self.shear.x * along.z, along.y - self.shear.y * along.z, along.z)
+    }
+
+    /// The distance along the ray to a height in its sheared space.
+    #[inline]
+    pub(crate) fn t(&self, height: f64) -> f64 {
+        height * self.shear.z
     }
 
     /// The test of S. Woop, C. Benthin, I. Wald, "Watertight ray/triangle intersection", Journal of Computer
@@ -150,6 +164,32 @@ impl WatertightRay {
         let inverse = determinant.recip();
         let t = self.shear.z * (u * a.z + v * b.z + w * c.z) * inverse;
         Some(TriangleHit { t, b1: v * inverse, b2: w * inverse, determinant })
+    }
+}
+
+/// On which side of an edge between sheared points the ray passes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Side {
+    /// Whether the edge function is positive. Where it is zero, the ray counts as moved by (ε, ε²) in the sheared plane
+    /// ("simulation of simplicity": H. Edelsbrunner, E. Mücke, ACM Transactions on Graphics 9(1), 1990), as it does among the
+    /// triangles of a mesh, so that the faces on both sides of an edge agree whichever way they run along it.
+    pub(crate) is_positive: bool,
+    /// Whether the ray meets the edge's line exactly.
+    pub(crate) is_exact: bool,
+}
+
+impl Side {
+    /// The exact sign of px qy − py qx.
+    #[inline]
+    pub(crate) fn of(p: DVec3, q: DVec3) -> Self {
+        let (first, second) = (p.x * q.y, p.y * q.x);
+        if first != second {
+            return Self { is_positive: first > second, is_exact: false };
+        }
+        // Both products round to the same number: their errors decide.
+        let residue = p.x.mul_add(q.y, -first) - p.y.mul_add(q.x, -first);
+        let moved = [residue, p.y - q.y, q.x - p.x].into_iter().find(|&term| term != 0.0);
+        Self { is_positive: moved.is_some_and(|term| term > 0.0), is_exact: residue == 0.0 }
     }
 }
 

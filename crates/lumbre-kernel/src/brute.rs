@@ -3,7 +3,7 @@
 use lumbre_geometry::Ray;
 
 use crate::intersect::watertight::{Shear, intersect};
-use crate::trace::edges::{Triangle, intersect_precise, visit_borders_of_all};
+use crate::trace::edges::{Patch, Triangle, intersect_precise, visit_borders_of_all};
 use crate::trace::exact::{Visitor, visit_primitive};
 use crate::trace::visitors::{Closest, NextHits};
 use crate::trace::{Context, is_sound};
@@ -67,8 +67,12 @@ fn visit(accel: &Accel, ray: &Ray, visitor: &mut dyn Visitor) {
                     inner.ids.push(geometry.id);
                     pending.push((&instance.accel, instance.world_from_object.object_ray(&ray), inner));
                 }
-                GeometryKind::Shape(_) => {
-                    visit_primitive(accel, &ray, (position, 0), wanted, &context, visitor);
+                kind @ GeometryKind::Shape(_) => {
+                    if let Some(patch) = Patch::of(kind) {
+                        patch.visit((accel, position), &ray, &context, visitor, &mut edge_hits);
+                    } else {
+                        visit_primitive(accel, &ray, (position, 0), wanted, &context, visitor);
+                    }
                 }
                 GeometryKind::Spheres(cloud) => {
                     for primitive in 0..cloud.spheres.len() as u32 {

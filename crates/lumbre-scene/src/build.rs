@@ -325,11 +325,12 @@ impl Builder {
         let baked = mesh::bake(shape, desc, placement, origin, order)?;
         let attributes = baked.attributes;
         let mesh = attributes.mesh.clone();
-        let corner = |i: u32| mesh.origin + mesh.positions[i as usize].as_dvec3();
+        // Relative to the origin of the mesh, so that corners are rounded as those of the triangles beside are: no ray passes between.
+        let place = Transform::translate(mesh.origin);
         let patches = baked.patches.iter().map(|corners| {
-            let [p00, p10, p01, p11] = corners.map(corner);
+            let [p00, p10, p01, p11] = corners.map(|i| mesh.positions[i as usize].as_dvec3());
             BilinearPatch::new(p00, p10, p01, p11)
-                .map(|patch| PlacedShape::new(Shape::from(patch), Transform::IDENTITY))
+                .map(|patch| PlacedShape::new(Shape::from(patch), place))
                 .map_err(|source| BuildError::Shape { shape, source })
         });
         let patches = patches.collect::<Result<Vec<_>, _>>()?;

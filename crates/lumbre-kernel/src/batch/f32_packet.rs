@@ -14,10 +14,10 @@ use crate::intersect::f32_ray::{F32Ray, within};
 use crate::intersect::watertight::{BEYOND, beyond};
 use crate::intersect::{Axes, Simd};
 use crate::simd::{self, F32x16, Row, Vector};
-use crate::trace::Outcome;
 use crate::trace::decide::Decider;
 use crate::trace::f32_ray::SOME_HIT;
 use crate::trace::stack::Goal;
+use crate::trace::{Outcome, precedes};
 use crate::tree::Corners;
 use crate::tree::node::TreeSpace;
 use crate::tree::triangle_block::TriangleBlock;
@@ -48,16 +48,20 @@ pub(super) struct F32Bundle<'a, 'd, G> {
 const NONE: u32 = u32::MAX;
 
 impl<G: Goal> F32Bundle<'_, '_, G> {
-    /// Those of some rays for which a triangle that they hit at the same `t` as the best comes first by its ids.
+    /// Those of some rays for which a triangle that they hit at the same `t` as the best comes before it. `enters` has a bit for each
+    /// ray that enters through it.
     #[cold]
     #[inline(never)]
-    fn first_by_ids(&self, mut mask: u32, place: u32, lane: u32) -> u32 {
+    fn those_before(&self, mut mask: u32, place: u32, lane: u32, enters: u32) -> u32 {
         let mut first = 0;
         while mask != 0 {
             let i = mask.trailing_zeros() as usize % PACKET;
             mask &= mask - 1;
             let best = self.triangle.0[i].to_bits();
-            let is_first = self.decider.ids(place, lane) < self.decider.ids(best >> 3, best & 7);
+            let is_first = precedes(
+                (enters >> i & 1 != 0, self.decider.ids(place, lane)),
+                (self.weights[2].0[i] > 0.0, self.decider.ids(best >> 3, best & 7)),
+            );
             first |= u32::from(is_first) << i;
         }
         first
@@ -87,7 +91,8 @@ impl<G: Goal> F32Bundle<'_, '_, G> {
                 continue;
             }
             let is_first = self.triangle.0[i].to_bits() == NONE || t < self.t_max.0[i];
-            if is_first || self.first_by_ids(1 << i, place, lane) != 0 {
+            let enters = u32::from(weights[2] > 0.0) << i;
+            if is_first || self.those_before(1 << i, place, lane, enters) != 0 {
                 self.triangle.0[i] = f32::from_bits(place << 3 | lane);
                 for (row, weight) in self.weights.iter_mut().zip(weights) {
                     row.0[i] = weight;
@@ -298,7 +303,8 @@ impl<'a, 'd, G: Goal> Bundle<'a, 'd> for F32Bundle<'a, 'd, G> {
             let triangle = load(&self.triangle.0);
             let mut closer = t.below(t_max) | triangle.with_bits(NONE);
             if in_range & !closer != 0 {
-                closer |= self.first_by_ids(in_range & !closer, place, lane as u32);
+                let enters = splat(0.0).below(det);
+                closer |= self.those_before(in_range & !closer, place, lane as u32, enters);
             }
             let closer = closer & in_range;
             let own = splat(f32::from_bits(place << 3 | lane as u32));

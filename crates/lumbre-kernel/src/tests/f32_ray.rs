@@ -65,8 +65,8 @@ impl PlainRay {
         })
     }
 
-    /// Where it meets a triangle, within its range, and the barycentrics.
-    fn meet(&self, corners: [Vec3; 3]) -> Option<(f32, [f32; 2])> {
+    /// Where it meets a triangle, within its range, the barycentrics, and whether it enters there.
+    fn meet(&self, corners: [Vec3; 3]) -> Option<(f32, [f32; 2], bool)> {
         let [a, b, c] = corners.map(|corner| {
             let [x, y, z] = self.order.map(|axis| corner[axis]);
             let height = self.origin[2] - z;
@@ -86,7 +86,7 @@ impl PlainRay {
             (largest + 2f32.powi(-80)) * (extent + self.most / 1024.0) <= det.abs() * self.most;
         // Rounded edge functions of what is small or far may all be zero, wherever it is.
         let is_strict = [u, v, w].iter().all(|&edge| edge > 0.0) || [u, v, w].iter().all(|&edge| edge < 0.0);
-        let (t, local) = if !(is_strict && is_little_cancelled) {
+        let (t, local, enters) = if !(is_strict && is_little_cancelled) {
             let [a, b, c] = [a, b, c].map(|corner| corner.map(f64::from));
             let [u, v, w] = [(c, b), (a, c), (b, a)].map(|(p, q)| p[0] * q[1] - p[1] * q[0]);
             let det = u + v + w;
@@ -94,11 +94,13 @@ impl PlainRay {
                 return None;
             }
             let height = (u * a[2] + v * b[2] + w * c[2]) / det;
-            ((height * f64::from(self.minus_inverse)) as f32, [(v / det) as f32, (w / det) as f32])
+            let t = (height * f64::from(self.minus_inverse)) as f32;
+            (t, [(v / det) as f32, (w / det) as f32], det > 0.0)
         } else {
-            ((u * a[2] + v * b[2] + w * c[2]) / det * self.minus_inverse, [v / det, w / det])
+            let t = (u * a[2] + v * b[2] + w * c[2]) / det * self.minus_inverse;
+            (t, [v / det, w / det], det > 0.0)
         };
-        (self.t_min <= t && t <= self.t_max).then_some((t, local))
+        (self.t_min <= t && t <= self.t_max).then_some((t, local, enters))
     }
 }
 
@@ -111,7 +113,7 @@ fn by_reference(accel: &Accel, ray: &Ray32) -> (Option<Hit32>, bool) {
     let start = accel.single.as_ref().expect("made for this");
     assert!(start.only_triangles);
     let Some(plain) = PlainRay::new(start, ray) else { return (widened(accel, ray), false) };
-    let mut nearest: Option<Hit32> = None;
+    let mut nearest: Option<(Hit32, bool)> = None;
     for (geometry, Geometry { id, kind }) in accel.geometries.iter().enumerate() {
         let GeometryKind::Mesh(mesh) = kind else { unreachable!("nothing but meshes") };
         for (primitive, triangle) in mesh.indices.iter().enumerate() {
@@ -120,16 +122,19 @@ fn by_reference(accel: &Accel, ray: &Ray32) -> (Option<Hit32>, bool) {
             if (b - a).cross(c - a) == DVec3::ZERO {
                 continue;
             }
-            let Some((t, local)) = plain.meet(corners) else { continue };
-            // Of those at the same place, the first.
-            if nearest.is_none_or(|nearest| t < nearest.t) {
+            let Some((t, local, enters)) = plain.meet(corners) else { continue };
+            // Of those at the same place, the first that enters, or else the first.
+            let is_nearer = nearest.is_none_or(|(nearest, nearest_enters)| {
+                t < nearest.t || t == nearest.t && enters && !nearest_enters
+            });
+            if is_nearer {
                 let (geometry, primitive) = (geometry as u32, primitive as u32);
                 let instance = Hit32::NO_INSTANCE;
-                nearest = Some(Hit32 { t, local, id: *id, primitive, geometry, instance });
+                nearest = Some((Hit32 { t, local, id: *id, primitive, geometry, instance }, enters));
             }
         }
     }
-    (nearest, true)
+    (nearest.map(|(hit, _)| hit), true)
 }
 
 /// What double precision answers, rounded.

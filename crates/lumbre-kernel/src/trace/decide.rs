@@ -4,11 +4,11 @@
 //! Double precision is asked about a triangle whose edge or range the ray hardly misses, about which of two hits is nearer where
 //! their intervals overlap, and once a ray about the closest.
 
-use lumbre_geometry::Ray;
+use lumbre_geometry::{Ray, Root};
 use lumbre_math::DVec3;
 
-use super::{Outcome, Winner};
-use crate::Accel;
+use super::filtered::IN_INSTANCE;
+use super::{Outcome, Winner, edges, meets_front, precedes};
 use crate::intersect::filter_start::FilterStart;
 use crate::intersect::watertight::{self, EdgeTest, Inside, Meeting, Shear};
 use crate::intersect::{Axes, Simd};
@@ -16,6 +16,7 @@ use crate::simd;
 use crate::tree::BLOCK;
 use crate::tree::node::Node;
 use crate::tree::triangle_block::{Blocks, TriangleBlock};
+use crate::{Accel, GeometryKind};
 
 /// The closest hit so far, as far as single precision knows it: a triangle by its place in the tree, or what is none, and the interval
 /// of heights along the ray that holds the crossing.
@@ -67,6 +68,44 @@ pub(crate) fn heights(t: f64, length: f64) -> (f32, f32) {
     let height = (t * length) as f32;
     let error = height.abs() * watertight::ROUNDINGS + f32::MIN_POSITIVE;
     (height - error, height + error)
+}
+
+/// Whether the ray, in the space of a tree, meets the front of what it hits in the instance that the route leads to from there. `None`
+/// where the exact traversal has to tell.
+#[cold]
+#[inline(never)]
+pub(crate) fn enters(
+    mut accel: &Accel,
+    ray: &Ray,
+    route: &[u32],
+    &Winner { ref root, geometry, primitive }: &Winner,
+) -> Option<bool> {
+    let mut ray = *ray;
+    for &position in route {
+        let GeometryKind::Instance(instance) = &accel.geometries[position as usize].kind else { return None };
+        ray = instance.world_from_object.object_ray(&ray);
+        accel = &instance.accel;
+    }
+    let kind = &accel.geometries[geometry as usize].kind;
+    let meeting = match kind {
+        GeometryKind::Shape(_) | GeometryKind::Spheres(_) | GeometryKind::Custom(_) => {
+            return Some(meets_front(kind, primitive, &ray, root));
+        }
+        GeometryKind::PreciseMesh(_) => edges::intersect_precise(accel, &ray, geometry, primitive),
+        GeometryKind::Mesh(mesh) => {
+            let shear = Shear::new(&ray.direction);
+            let origin = shear.local_origin(&ray.origin, &mesh.origin);
+            let corners = mesh.indices[primitive as usize].map(|vertex| {
+                shear.axes.permute(&mesh.positions[vertex as usize].as_dvec3()).map(|x| x as f32)
+            });
+            watertight::intersect(&ray, shear, origin, corners)
+        }
+        GeometryKind::Instance(_) => return None,
+    };
+    match meeting {
+        Meeting::Hit { is_front, .. } => Some(is_front),
+        Meeting::Miss | Meeting::Touch { .. } => None,
+    }
 }
 
 /// The height along a ray per unit of `t`.
@@ -161,13 +200,17 @@ impl<'a> Decider<'a> {
             return Outcome::Certain(None);
         }
         let is_closer = if let Some(exact) = exact {
-            exact.comes_after(t, self.ids(block, lane))
+            if t == exact.root.t {
+                return closely();
+            }
+            t < exact.root.t
         } else if best.is_some() {
-            let (EdgeTest::Inside, inside) = self.pass::<L>(&shear, &origin, best.block, best.lane) else {
+            let (EdgeTest::Inside, nearest) = self.pass::<L>(&shear, &origin, best.block, best.lane) else {
                 return closely();
             };
-            let nearest = inside.t(&shear);
-            t < nearest || t == nearest && self.ids(block, lane) < self.ids(best.block, best.lane)
+            let nearest_t = nearest.t(&shear);
+            let ids = (self.ids(block, lane), self.ids(best.block, best.lane));
+            t < nearest_t || t == nearest_t && precedes((inside.det > 0.0, ids.0), (nearest.det > 0.0, ids.1))
         } else {
             true
         };
@@ -182,39 +225,54 @@ impl<'a> Decider<'a> {
         (block, lane): (u32, u32),
         (best, exact): (&Candidate, Option<Winner>),
     ) -> Outcome<Option<f64>> {
-        let t = match self.intersect(ray, block, lane) {
+        let (t, is_front) = match self.intersect(ray, block, lane) {
             Meeting::Miss => return Outcome::Certain(None),
             Meeting::Touch { .. } => return Outcome::Uncertain,
-            Meeting::Hit { root, .. } => root.t,
+            Meeting::Hit { root, is_front } => (root.t, is_front),
         };
-        match self.is_closer(ray, t, self.ids(block, lane), best, exact) {
+        match self.is_closer(ray, t, || Some(is_front), self.ids(block, lane), best, exact) {
             Outcome::Certain(is_closer) => Outcome::Certain(is_closer.then_some(t)),
             Outcome::Uncertain => Outcome::Uncertain,
         }
     }
 
-    /// Whether a crossing at `t` of the primitive with these ids is closer than the best, or as close and first by the ids.
+    /// Whether a crossing at `t` of the primitive with these ids is closer than the best, or as close and comes before; uncertain if
+    /// that depends on faces that are not known.
     pub(crate) fn is_closer(
         &self,
         ray: &Ray,
         t: f64,
+        is_front: impl FnOnce() -> Option<bool>,
         ids: (u32, u32),
         best: &Candidate,
         exact: Option<Winner>,
     ) -> Outcome<bool> {
-        if let Some(exact) = exact {
-            return Outcome::Certain(exact.comes_after(t, ids));
-        }
         let &Candidate { block, lane, .. } = best;
-        if !best.is_some() {
-            return Outcome::Certain(true);
-        }
-        match self.intersect(ray, block, lane) {
-            Meeting::Hit { root, .. } => {
-                Outcome::Certain(t < root.t || t == root.t && ids < self.ids(block, lane))
+        let (best_t, best_is_front, best_ids) = if let Some(exact) = exact {
+            let is_front = if t == exact.root.t { self.meets_front(ray, &exact) } else { None };
+            (exact.root.t, is_front, (exact.geometry, exact.primitive))
+        } else if best.is_some() {
+            match self.intersect(ray, block, lane) {
+                Meeting::Hit { root, is_front } => (root.t, Some(is_front), self.ids(block, lane)),
+                Meeting::Miss | Meeting::Touch { .. } => return Outcome::Uncertain,
             }
-            Meeting::Miss | Meeting::Touch { .. } => Outcome::Uncertain,
+        } else {
+            return Outcome::Certain(true);
+        };
+        if t != best_t {
+            return Outcome::Certain(t < best_t);
         }
+        match (is_front(), best_is_front) {
+            (Some(is_front), Some(best_is_front)) => {
+                Outcome::Certain(precedes((is_front, ids), (best_is_front, best_ids)))
+            }
+            _ => Outcome::Uncertain,
+        }
+    }
+
+    /// Whether a crossing of something in the tree meets the front, which its parts in instances are not: `None` there.
+    fn meets_front(&self, ray: &Ray, winner: &Winner) -> Option<bool> {
+        if winner.geometry == IN_INSTANCE { None } else { enters(self.accel, ray, &[], winner) }
     }
 
     /// The interval of heights of a crossing that is known in double precision, if it is in range and closer than the best.
@@ -222,10 +280,11 @@ impl<'a> Decider<'a> {
     pub(crate) fn compare_exact(
         &self,
         ray: &Ray,
-        t: f64,
-        ids: impl FnOnce() -> (u32, u32),
+        root: Root,
+        ids: impl Fn() -> (u32, u32),
         (best, exact): (&Candidate, Option<Winner>),
     ) -> Outcome<Option<(f32, f32)>> {
+        let t = root.t;
         let heights @ (from, to) = heights(t, largest_component(ray));
         // Also keeps out a NaN.
         if !ray.contains(t) || from > best.to {
@@ -234,7 +293,11 @@ impl<'a> Decider<'a> {
         if to < best.from {
             return Outcome::Certain(Some(heights));
         }
-        match self.is_closer(ray, t, ids(), best, exact) {
+        let is_front = || {
+            let (geometry, primitive) = ids();
+            self.meets_front(ray, &Winner { root, geometry, primitive })
+        };
+        match self.is_closer(ray, t, is_front, ids(), best, exact) {
             Outcome::Certain(is_closer) => Outcome::Certain(is_closer.then_some(heights)),
             Outcome::Uncertain => Outcome::Uncertain,
         }

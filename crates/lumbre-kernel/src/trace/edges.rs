@@ -2,41 +2,153 @@
 //!
 //! Inside a mesh the rule for zeros (see [`watertight`]) gives each such crossing one owner, but at the border of an open mesh it may give
 //! it none: the ray, moved by its ε, passes the mesh by. A triangle is closed, so such a crossing counts all the same, once. Which
-//! edges are borders is seen from the triangles that the ray hits at that place, so that no mesh needs a table of its
+//! edges are borders is seen from the faces that the ray hits at that place, so that no mesh needs a table of its
 //! neighbours; corners are compared by position, so that a mesh whose corners are split for their normals or texture
-//! coordinates stays closed.
+//! coordinates stays closed. A bilinear patch decides about its edges by the same rule, and is one surface with the patches and meshes
+//! beside it.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
-use lumbre_geometry::{Ray, Root};
+use lumbre_geometry::{BilinearPatch, PatchCrossings, PatchPlace, PlacedShape, Ray, Root, Shape};
+use lumbre_math::{DVec3, Transform};
+use smallvec::SmallVec;
 
 use super::Context;
-use super::exact::{self, Crossing, Visitor};
-use crate::Accel;
+use super::exact::{self, Crossing, Visitor, Wanted};
 use crate::intersect::Isa;
 use crate::intersect::watertight::{self, Feature, Meeting, Shear};
 use crate::precise_mesh::has_area;
+use crate::{Accel, GeometryKind};
 
-/// A triangle whose edges or corners a ray hits exactly.
+/// A face, a triangle or a bilinear patch, whose edges or corners a ray hits exactly.
 #[derive(Clone, Debug)]
 pub(crate) struct EdgeHit<'a> {
     /// The crossing; it may lie out of the ray's range.
     root: Root,
-    /// Whether the rule for zeros gives the crossing to this triangle, so that it was visited already.
+    /// Whether the rule for zeros gives the crossing to this face, so that it was visited already.
     is_owned: bool,
-    is_front: bool,
-    feature: Feature,
-    corners: [[f64; 3]; 3],
+    /// `None` for patches, which know it only once asked.
+    is_front: Option<bool>,
+    place: Place,
+    /// The corners in order, in `space`.
+    outline: Outline,
+    /// For patches, and meshes beside them: the map from the space of the corners.
+    space: Space,
     geometry: u32,
     primitive: u32,
+    /// Which of the primitive's crossings.
+    order: u32,
     accel: &'a Accel,
     context: Context,
 }
 
+type Outline = SmallVec<[Position; 4]>;
+
+/// Where on a face's outline.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Place {
+    Edge([Position; 2]),
+    Corner(Position),
+    /// Seen on edge: never hit, but a neighbour of others.
+    EdgeOn,
+}
+
 impl EdgeHit<'_> {
     fn crossing<'c>(&'c self, ray: &'c Ray) -> Crossing<'c> {
-        let &Self { root, is_front, geometry, primitive, accel, ref context, .. } = self;
-        Crossing { root, geometry, primitive, order: 0, is_front: Some(is_front), ray, accel, context }
+        let &Self { root, is_front, geometry, primitive, order, accel, ref context, .. } = self;
+        Crossing { root, first: root, geometry, primitive, order, is_front, ray, accel, context }
+    }
+
+    fn is_patch(&self) -> bool {
+        matches!(self.accel.geometries[self.geometry as usize].kind, GeometryKind::Shape(_))
+    }
+
+    /// The edges by their ends, but those that are points.
+    fn edges(&self) -> impl Iterator<Item = [Position; 2]> {
+        let next = self.outline.iter().cycle().skip(1);
+        self.outline.iter().zip(next).filter(|(a, b)| a != b).map(|(&a, &b)| key(a, b))
+    }
+}
+
+/// A bilinear patch of a tree.
+#[derive(Clone, Copy)]
+pub(crate) struct Patch<'a> {
+    placed: &'a PlacedShape,
+    patch: &'a BilinearPatch,
+}
+
+impl<'a> Patch<'a> {
+    /// `None` for any other geometry.
+    #[inline(always)]
+    pub(crate) fn of(kind: &'a GeometryKind) -> Option<Self> {
+        let GeometryKind::Shape(placed) = kind else { return None };
+        let Shape::BilinearPatch(patch) = placed.shape() else { return None };
+        Some(Self { placed, patch })
+    }
+
+    /// How the line of a ray crosses it.
+    #[inline(never)]
+    pub(crate) fn line_crossings(self, ray: &Ray) -> PatchCrossings {
+        self.patch.line_crossings(&self.placed.object_ray(ray))
+    }
+
+    /// Shows a visitor the crossings that the patch owns, and collects its edge hits. True ends the traversal.
+    pub(crate) fn visit<'e>(
+        self,
+        (accel, geometry): (&'e Accel, u32),
+        ray: &Ray,
+        context: &Context,
+        visitor: &mut dyn Visitor,
+        edge_hits: &mut Vec<EdgeHit<'e>>,
+    ) -> bool {
+        let PatchCrossings { of_line, is_edge_on } = self.line_crossings(ray);
+        let corners = self.patch.outline().map(|corner| position(corner.to_array()));
+        let mut collect = |root: Root, is_owned: bool, place: Place, order: u32| {
+            edge_hits.push(EdgeHit {
+                root,
+                is_owned,
+                is_front: None,
+                place,
+                outline: Outline::from_slice(&corners),
+                space: Space::of(&self.placed.world_from_object()),
+                geometry,
+                primitive: 0,
+                order,
+                accel,
+                context: context.clone(),
+            });
+        };
+        if is_edge_on {
+            collect(Root::at(f64::NAN), false, Place::EdgeOn, 0);
+        }
+        for (order, crossing) in (0..).zip(&of_line) {
+            let place = match crossing.place {
+                None => continue,
+                Some(PatchPlace::Corner(corner)) => Place::Corner(corners[corner]),
+                Some(PatchPlace::Edge(edge)) => Place::Edge(key(corners[edge], corners[(edge + 1) % 4])),
+            };
+            collect(crossing.root, crossing.is_owned, place, order);
+        }
+        if visitor.wanted() == Wanted::None {
+            return false;
+        }
+        let mut first = Root::at(f64::NAN);
+        for (order, crossing) in (0..).zip(&of_line) {
+            let root = crossing.root;
+            if !crossing.is_owned || !ray.contains(root.t) {
+                continue;
+            }
+            if root.t != first.t {
+                first = root;
+            }
+            let is_front = None;
+            let crossing =
+                Crossing { root, first, geometry, primitive: 0, order, is_front, ray, accel, context };
+            if visitor.visit(&crossing) {
+                return true;
+            }
+        }
+        false
     }
 }
 
@@ -63,17 +175,26 @@ impl<'a> Triangle<'a> {
             Meeting::Miss => return false,
             Meeting::Hit { root, is_front } => (root, is_front),
             Meeting::Touch { root, is_owned, feature, is_front } => {
-                let context = context.clone();
+                let corners = corners.map(position);
+                let place = match feature {
+                    Feature::Edge(opposite) => {
+                        Place::Edge(key(corners[(opposite + 1) % 3], corners[(opposite + 2) % 3]))
+                    }
+                    Feature::Vertex(corner) => Place::Corner(corners[corner]),
+                    Feature::EdgeOn => Place::EdgeOn,
+                };
                 edge_hits.push(EdgeHit {
                     root,
                     is_owned,
-                    is_front,
-                    feature,
-                    corners,
+                    is_front: Some(is_front),
+                    place,
+                    outline: Outline::from_slice(&corners),
+                    space: Space::of_mesh(accel, geometry),
                     geometry,
                     primitive,
+                    order: 0,
                     accel,
-                    context,
+                    context: context.clone(),
                 });
                 if !is_owned || !ray.contains(root.t) {
                     return false;
@@ -82,7 +203,8 @@ impl<'a> Triangle<'a> {
             }
         };
         let is_front = Some(is_front);
-        visitor.visit(&Crossing { root, geometry, primitive, order: 0, is_front, ray, accel, context })
+        let (first, order) = (root, 0);
+        visitor.visit(&Crossing { root, first, geometry, primitive, order, is_front, ray, accel, context })
     }
 }
 
@@ -101,9 +223,35 @@ fn position(corner: [f64; 3]) -> Position {
     corner.map(|x| (x + 0.0).to_bits())
 }
 
-/// What is known of an edge from the triangles around a place.
+/// The two ends of an edge, whichever way it is run along.
+fn key(a: Position, b: Position) -> [Position; 2] {
+    if a < b { [a, b] } else { [b, a] }
+}
+
+/// The map from where corners are compared to the space of their tree, by its bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Space([Position; 4]);
+
+impl Space {
+    fn of(map: &Transform) -> Self {
+        let affine = map.affine();
+        let [x, y, z] = affine.matrix3.to_cols_array_2d();
+        Self([x, y, z, affine.translation.to_array()].map(position))
+    }
+
+    fn of_mesh(accel: &Accel, geometry: u32) -> Self {
+        let origin = match &accel.geometries[geometry as usize].kind {
+            GeometryKind::Mesh(mesh) => mesh.origin,
+            _ => DVec3::ZERO,
+        };
+        Self::of(&Transform::translate(origin))
+    }
+}
+
+/// What is known of an edge from the faces around a place.
 struct Shared {
-    third: Position,
+    /// The corners of the first face, sorted.
+    face: Outline,
     is_shared: bool,
 }
 
@@ -117,45 +265,45 @@ struct Fan {
 /// Of the edge hits without an owner, those that count because they lie at a border. `hits` are to be all of the line, or those for
 /// which that makes no difference.
 fn at_borders(hits: &[EdgeHit]) -> Vec<usize> {
-    // Meshes by where they are.
+    // Each mesh is a surface of its own, but the patches in a tree are one, together with the meshes beside them.
+    let with_patches: HashSet<&[u32]> =
+        hits.iter().filter(|hit| hit.is_patch()).map(|hit| hit.context.route.as_slice()).collect();
+    let surface = |i: usize| {
+        let route = hits[i].context.route.as_slice();
+        let is_joined = with_patches.contains(route);
+        (route, is_joined.then_some(hits[i].space), if is_joined { 0 } else { hits[i].geometry })
+    };
+    let ids = |i: usize| (hits[i].geometry, hits[i].primitive, hits[i].order);
     let mut order: Vec<usize> = (0..hits.len()).collect();
-    let mesh = |i: usize| (hits[i].context.route.as_slice(), hits[i].geometry);
-    order.sort_by(|&a, &b| mesh(a).cmp(&mesh(b)).then(hits[a].primitive.cmp(&hits[b].primitive)));
+    order.sort_by(|&a, &b| surface(a).cmp(&surface(b)).then(ids(a).cmp(&ids(b))));
     let mut result = Vec::new();
-    for group in order.chunk_by(|&a, &b| mesh(a) == mesh(b)) {
+    for group in order.chunk_by(|&a, &b| surface(a) == surface(b)) {
         let mut edges: HashMap<[Position; 2], Shared> = HashMap::new();
-        let key = |a: Position, b: Position| if a < b { [a, b] } else { [b, a] };
         for &i in group {
-            let corners = hits[i].corners.map(position);
-            for opposite in 0..3 {
-                let third = corners[opposite];
-                let edge = key(corners[(opposite + 1) % 3], corners[(opposite + 2) % 3]);
-                let shared = edges.entry(edge).or_insert(Shared { third, is_shared: false });
-                shared.is_shared |= shared.third != third;
+            let mut face = hits[i].outline.clone();
+            face.sort_unstable();
+            for edge in hits[i].edges() {
+                let shared =
+                    edges.entry(edge).or_insert_with(|| Shared { face: face.clone(), is_shared: false });
+                shared.is_shared |= shared.face != face;
             }
         }
         let mut fans: HashMap<Position, Fan> = HashMap::new();
         for &i in group {
-            let corners = hits[i].corners.map(position);
-            match hits[i].feature {
-                Feature::Edge(opposite) => {
-                    let edge = key(corners[(opposite + 1) % 3], corners[(opposite + 2) % 3]);
+            match hits[i].place {
+                Place::Edge(edge) => {
                     if !hits[i].is_owned && !edges[&edge].is_shared {
                         result.push(i);
                     }
                 }
-                Feature::Vertex(corner) => {
-                    let around = [corners[(corner + 1) % 3], corners[(corner + 2) % 3]];
-                    let is_open = around.iter().any(|&other| !edges[&key(corners[corner], other)].is_shared);
-                    let fan = fans.entry(corners[corner]).or_insert(Fan {
-                        is_owned: false,
-                        is_open: false,
-                        first: i,
-                    });
+                Place::Corner(corner) => {
+                    let mut around = hits[i].edges().filter(|edge| edge.contains(&corner));
+                    let is_open = around.any(|edge| !edges[&edge].is_shared);
+                    let fan = fans.entry(corner).or_insert(Fan { is_owned: false, is_open: false, first: i });
                     fan.is_owned |= hits[i].is_owned;
                     fan.is_open |= is_open;
                 }
-                Feature::EdgeOn => {}
+                Place::EdgeOn => {}
             }
         }
         result.extend(fans.into_values().filter(|fan| fan.is_open && !fan.is_owned).map(|fan| fan.first));

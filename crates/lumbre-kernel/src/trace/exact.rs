@@ -11,7 +11,7 @@ use lumbre_math::DVec3;
 
 use super::cursor::NodeCursor;
 use super::decide::largest_component;
-use super::edges::{self, EdgeHit};
+use super::edges::{self, EdgeHit, Patch};
 use super::leaves::CloudRay;
 use super::stack::{ClosestHit, Goal, Stack};
 use super::visitors::{Any, Closest};
@@ -60,6 +60,8 @@ pub(crate) trait Visitor {
 /// A crossing of a ray.
 pub(crate) struct Crossing<'c> {
     pub(crate) root: Root,
+    /// The first of the primitive's crossings at this `t`.
+    pub(crate) first: Root,
     pub(crate) geometry: u32,
     pub(crate) primitive: u32,
     /// Which of the primitive's crossings.
@@ -77,6 +79,12 @@ impl Crossing<'_> {
     pub(crate) fn is_front(&self) -> bool {
         let kind = &self.accel.geometries[self.geometry as usize].kind;
         self.is_front.unwrap_or_else(|| meets_front(kind, self.primitive, self.ray, &self.root))
+    }
+
+    /// Whether it comes before those at the same `t` that leave. Crossings of one primitive at the same `t` stay together.
+    pub(crate) fn enters(&self) -> bool {
+        let kind = &self.accel.geometries[self.geometry as usize].kind;
+        self.is_front.unwrap_or_else(|| meets_front(kind, self.primitive, self.ray, &self.first))
     }
 
     pub(crate) fn to_hit(&self) -> Hit {
@@ -222,9 +230,9 @@ impl Dispatch for Traversal<'_, '_> {
             let is_over = match tag::of(leaf) {
                 tag::TRIANGLES => frame.test_triangles(leaf, context, visitor, edge_hits),
                 tag::SPHERES => frame.test_spheres(leaf, context, visitor),
-                tag::SHAPES => frame.test_shapes(first, context, visitor),
+                tag::SHAPES => frame.test_shapes(first, context, visitor, edge_hits),
                 tag::PRECISE => frame.test_precise(first, context, visitor, edge_hits),
-                tag::CUSTOM => frame.test_entries(first, context, visitor),
+                tag::CUSTOM => frame.test_entries(first, context, visitor, edge_hits),
                 tag::INSTANCE => {
                     let entry = frame.accel.instance_entry(first);
                     match frame.inside(entry, visitor) {
@@ -320,7 +328,7 @@ impl<'a, L: Simd> Frame<'a, L> {
             if matches!(self.accel.geometries[entry.geometry as usize].kind, GeometryKind::Instance(_)) {
                 let index = self.accel.tree.entries.len() + i;
                 stack.push(ClosestHit::entry(tag::reference(tag::INSTANCE, index as u32)));
-            } else if self.test_entry(entry, context, visitor) {
+            } else if self.test_primitive(entry.geometry, entry.primitive(), context, visitor) {
                 return true;
             }
         }
@@ -369,7 +377,8 @@ impl<'a, L: Simd> Frame<'a, L> {
         visitor: &mut dyn Visitor,
     ) -> bool {
         let &Self { accel, ref ray, .. } = self;
-        visitor.visit(&Crossing { root, geometry, primitive, order, is_front, ray, accel, context })
+        let first = root;
+        visitor.visit(&Crossing { root, first, geometry, primitive, order, is_front, ray, accel, context })
     }
 
     /// Turns to the mesh of a block: to the first that the ray comes to, and to each where meshes have different origins.
@@ -478,10 +487,16 @@ impl<'a, L: Simd> Frame<'a, L> {
 
     /// Tests a leaf of shapes: those whose bounding volumes are hit.
     #[inline(always)]
-    fn test_shapes(&mut self, mut first: usize, context: &Context, visitor: &mut dyn Visitor) -> bool {
+    fn test_shapes(
+        &mut self,
+        mut first: usize,
+        context: &Context,
+        visitor: &mut dyn Visitor,
+        edge_hits: &mut Vec<EdgeHit<'a>>,
+    ) -> bool {
         let accel = self.accel;
         if !self.progress.is_nearby() || accel.bounding_volumes.block(first).is_none() {
-            return self.test_entries(first, context, visitor);
+            return self.test_entries(first, context, visitor, edge_hits);
         }
         let length = largest_component(&self.ray);
         let bounding_volumes = *self
@@ -494,7 +509,7 @@ impl<'a, L: Simd> Frame<'a, L> {
             while mask != 0 {
                 let entry = &accel.tree.entries[first + mask.trailing_zeros() as usize];
                 mask &= mask - 1;
-                if self.test_entry(entry, context, visitor) {
+                if self.test_entry(entry, context, visitor, edge_hits) {
                     return true;
                 }
             }
@@ -533,9 +548,15 @@ impl<'a, L: Simd> Frame<'a, L> {
     }
 
     /// Tests a leaf of user geometry, or of shapes one by one.
-    fn test_entries(&self, first: usize, context: &Context, visitor: &mut dyn Visitor) -> bool {
+    fn test_entries(
+        &self,
+        first: usize,
+        context: &Context,
+        visitor: &mut dyn Visitor,
+        edge_hits: &mut Vec<EdgeHit<'a>>,
+    ) -> bool {
         for entry in &self.accel.tree.entries[first..] {
-            if self.test_entry(entry, context, visitor) {
+            if self.test_entry(entry, context, visitor, edge_hits) {
                 return true;
             }
             if entry.is_last() {
@@ -547,11 +568,21 @@ impl<'a, L: Simd> Frame<'a, L> {
 
     /// Tests a shape or a primitive of user geometry.
     #[inline(always)]
-    fn test_entry(&self, entry: &Entry, context: &Context, visitor: &mut dyn Visitor) -> bool {
+    fn test_entry(
+        &self,
+        entry: &Entry,
+        context: &Context,
+        visitor: &mut dyn Visitor,
+        edge_hits: &mut Vec<EdgeHit<'a>>,
+    ) -> bool {
+        let (accel, geometry) = (self.accel, entry.geometry);
+        if let Some(patch) = Patch::of(&accel.geometries[geometry as usize].kind) {
+            return patch.visit((accel, geometry), &self.ray, context, visitor, edge_hits);
+        }
         self.test_primitive(entry.geometry, entry.primitive(), context, visitor)
     }
 
-    /// Shows the visitor the crossings of a primitive that is neither a triangle nor an instance.
+    /// Shows the visitor the crossings of a primitive that is no triangle, bilinear patch or instance.
     fn test_primitive(
         &self,
         geometry: u32,
@@ -563,7 +594,7 @@ impl<'a, L: Simd> Frame<'a, L> {
     }
 }
 
-/// Shows a visitor the crossings of a primitive that is neither a triangle nor an instance. True ends the traversal.
+/// Shows a visitor the crossings of a primitive that is no triangle, bilinear patch or instance. True ends the traversal.
 pub(crate) fn visit_primitive(
     accel: &Accel,
     ray: &Ray,
@@ -573,12 +604,17 @@ pub(crate) fn visit_primitive(
     visitor: &mut dyn Visitor,
 ) -> bool {
     let kind = &accel.geometries[geometry as usize].kind;
+    let mut first = Root::at(f64::NAN);
     let mut visit = |root: Root, order: usize| {
         let order = order as u32;
+        if root.t != first.t {
+            first = root;
+        }
         // Also keeps out a NaN.
         ray.contains(root.t)
             && visitor.visit(&Crossing {
                 root,
+                first,
                 geometry,
                 primitive,
                 order,

@@ -41,7 +41,7 @@ use super::cursor::NodeCursor;
 use super::decide::Decider;
 use super::leaves::nearest_of;
 use super::stack::{AnyHit, ClosestHit, Goal, Stack};
-use super::{LaneHits, Outcome};
+use super::{LaneHits, Outcome, precedes};
 use crate::intersect::f32_ray::{F32Ray, Precise, within};
 use crate::intersect::filter_start::FilterStart;
 use crate::intersect::watertight;
@@ -225,7 +225,8 @@ impl Nearest {
                     None => continue,
                 }
             };
-            if t < ray.t_max() || t == ray.t_max() && self.comes_after(decider, place, lane) {
+            if t < ray.t_max() || t == ray.t_max() && self.comes_after(decider, place, lane, weights[2] > 0.0)
+            {
                 *self = Self::new(place, lane, weights);
                 ray.end_at(t);
                 is_nearer = true;
@@ -235,9 +236,12 @@ impl Nearest {
     }
 
     /// Whether a triangle that is met where this is comes before it.
-    fn comes_after(&self, decider: &Decider, block: u32, lane: u32) -> bool {
+    fn comes_after(&self, decider: &Decider, block: u32, lane: u32, enters: bool) -> bool {
         match self.triangle() {
-            Some((own_block, own_lane)) => decider.ids(block, lane) < decider.ids(own_block, own_lane),
+            Some((own_block, own_lane)) => precedes(
+                (enters, decider.ids(block, lane)),
+                (self.weights[2] > 0.0, decider.ids(own_block, own_lane)),
+            ),
             None => true,
         }
     }
@@ -337,7 +341,11 @@ impl F32Ray {
             return None;
         }
         let t = ((u * a[2] + v * b[2] + w * c[2]) / det * f64::from(self.minus_inverse)) as f32;
-        (self.t_min() <= t && t <= self.t_max()).then(|| (t, [(v / det) as f32, (w / det) as f32, 1.0]))
+        (self.t_min() <= t && t <= self.t_max()).then(|| {
+            // The sum of all has its sign, which tells the face.
+            let size = det.abs();
+            (t, [(v / size) as f32, (w / size) as f32, if det > 0.0 { 1.0 } else { -1.0 }])
+        })
     }
 
     /// Whether the ray meets any triangle of a block.

@@ -3,14 +3,13 @@
 //! A tree of triangles is traversed at once, by the instruction set of the traversal around it; any other by a call, no deeper than
 //! [`FilterStart`](crate::intersect::filter_start::FilterStart) allows. What is hit there comes back in double precision, as the crossing of a shape does.
 
-use std::cmp::Ordering;
 use std::marker::PhantomData;
 
 use lumbre_geometry::Ray;
 
-use super::decide::{heights, largest_component};
+use super::decide::{enters, heights, largest_component};
 use super::filtered::{FilteredGoal, FilteredRay, Found, IN_INSTANCE, InInstance, Traversal};
-use super::{ContextRef, Outcome, Stop, Winner};
+use super::{ContextRef, Outcome, Stop, Winner, precedes};
 use crate::intersect::box_ray::Slabs;
 use crate::intersect::filter_start::FilterStart;
 use crate::intersect::{Isa, Simd};
@@ -97,18 +96,55 @@ impl<const GENERAL: bool, const FILTERED: bool> FilteredRay<'_, '_, GENERAL, FIL
         None
     }
 
-    /// Whether a hit in an instance is closer than the best, or as close and first by the ids.
+    /// Whether a hit in an instance is closer than the best; of two as close, the exact traversal knows which comes first.
     #[cold]
     #[inline(never)]
     fn is_closer(&self, hit: &InInstance, ray: &Ray) -> Outcome<bool> {
         let exact = self.exact();
         match (&exact, &self.in_instance) {
             (Some(Winner { geometry: IN_INSTANCE, .. }), Some(best)) => {
-                let [hit, best] =
-                    [hit, best].map(|hit| hit.clone().into_hit(self.decider.accel(), self.context));
-                Outcome::Certain(comes_before(&hit, &best))
+                let (t, best_t) = (hit.winner.root.t, best.winner.root.t);
+                if t != best_t {
+                    return Outcome::Certain(t < best_t);
+                }
+                let (Some(enters), Some(best_enters)) = (self.enters(hit, ray), self.enters(best, ray))
+                else {
+                    return Outcome::Uncertain;
+                };
+                let place = |hit: &InInstance| {
+                    let hit = hit.clone().into_hit(self.decider.accel(), self.context);
+                    (hit.route, hit.geometry, hit.primitive)
+                };
+                Outcome::Certain((!enters, place(hit)) < (!best_enters, place(best)))
             }
-            _ => self.decider.is_closer(ray, hit.winner.root.t, (IN_INSTANCE, 0), &self.best, exact),
+            _ => {
+                let (t, ids) = (hit.winner.root.t, (IN_INSTANCE, 0));
+                self.decider.is_closer(ray, t, || self.enters(hit, ray), ids, &self.best, exact)
+            }
+        }
+    }
+
+    /// Whether the ray enters what it hits in an instance.
+    fn enters(&self, hit: &InInstance, ray: &Ray) -> Option<bool> {
+        let Hit { root, geometry, primitive, route, .. } =
+            hit.clone().into_hit(self.decider.accel(), self.context);
+        let around = self.context.to_context().route.len();
+        enters(self.decider.accel(), ray, &route[around..], &Winner { root, geometry, primitive })
+    }
+
+    /// Whether a crossing that is as near as the closest hit, and that is in an instance, comes before it.
+    pub(super) fn precedes_instance(
+        &self,
+        ray: &Ray,
+        is_front: Option<bool>,
+        ids: (u32, u32),
+    ) -> Outcome<bool> {
+        let best = self.in_instance.as_ref().and_then(|best| self.enters(best, ray));
+        match (is_front, best) {
+            (Some(is_front), Some(best)) => {
+                Outcome::Certain(precedes((is_front, ids), (best, (IN_INSTANCE, 0))))
+            }
+            _ => Outcome::Uncertain,
         }
     }
 }
@@ -158,13 +194,4 @@ fn test_any_tree<G: FilteredGoal, const FILTERED: bool>(
         }
     }
     G::exactly(isa, accel, placed.from, written, ray, query)
-}
-
-/// Whether a hit comes before another in an instance.
-#[cold]
-#[inline(never)]
-fn comes_before(hit: &Hit, other: &Hit) -> bool {
-    let ids = |hit: &Hit| (hit.geometry, hit.primitive);
-    let order = hit.root.t.partial_cmp(&other.root.t).unwrap_or(Ordering::Equal);
-    order.then_with(|| hit.route.cmp(&other.route)).then_with(|| ids(hit).cmp(&ids(other))) == Ordering::Less
 }

@@ -4,12 +4,12 @@
 
 use std::marker::PhantomData;
 
-use lumbre_geometry::{Ray, Root};
+use lumbre_geometry::{PatchCrossings, Ray, Root};
 use lumbre_math::DVec3;
 
-use super::decide::{Candidate, heights, largest_component};
-use super::edges;
-use super::filtered::{FilteredGoal, FilteredRay};
+use super::decide::{Candidate, enters, heights, largest_component};
+use super::edges::{self, Patch};
+use super::filtered::{FilteredGoal, FilteredRay, IN_INSTANCE};
 use super::stack::Goal;
 use super::{Outcome, Stop, Winner, all_crossings, first_crossing, is_crossed, meets_front};
 use crate::intersect::box_ray::Slabs;
@@ -201,8 +201,11 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
             Outcome::Certain(None) => return Outcome::Certain(None),
             Outcome::Uncertain => return Outcome::Uncertain,
         };
-        let is_closest =
-            self.exact().is_none_or(|best| best.comes_after(winner.root.t, (geometry, primitive)));
+        let is_closest = match self.exact() {
+            // Which of two at the same place comes first depends on their faces.
+            Some(best) if winner.root.t == best.root.t => return Outcome::Uncertain,
+            best => best.is_none_or(|best| winner.root.t < best.root.t),
+        };
         let is_taken = is_closest && query.takes_face(is_front) && query.accepts(&winner);
         Outcome::Certain(is_taken.then_some(winner))
     }
@@ -213,6 +216,18 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
     #[inline(never)]
     fn compare(&self, isa: Isa, ray: &Ray, block: u32, lane: u32) -> Outcome<Option<Candidate>> {
         let (decider, axes, best) = (self.decider, self.blocks.axes, (&self.best, self.exact()));
+        if let Some(t) = self.exact().filter(|best| best.geometry == IN_INSTANCE).map(|best| best.root.t)
+            && let Meeting::Hit { root, is_front } = decider.intersect(ray, block, lane)
+            && root.t == t
+        {
+            let (from, to) = heights(t, largest_component(ray));
+            return match self.precedes_instance(ray, Some(is_front), decider.ids(block, lane)) {
+                Outcome::Certain(is_first) => {
+                    Outcome::Certain(is_first.then_some(Candidate { block, lane, from, to }))
+                }
+                Outcome::Uncertain => Outcome::Uncertain,
+            };
+        }
         match isa.run(Comparison { decider, ray, axes, triangle: (block, lane), best }) {
             Outcome::Certain(Some(t)) => {
                 let (from, to) = heights(t, largest_component(ray));
@@ -288,6 +303,9 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
     fn test_entry<G: Goal>(&mut self, entry: &Entry, ray: &Ray, slabs: &mut Slabs) -> Option<Stop> {
         let (geometry, primitive) = (entry.geometry, entry.primitive());
         let kind = &self.accel().geometries[geometry as usize].kind;
+        if let Some(patch) = Patch::of(kind) {
+            return self.test_patch::<G>(patch, geometry, ray, slabs);
+        }
         if FILTERED {
             return self.query_crossings::<G>(kind, (geometry, primitive), ray, slabs);
         }
@@ -295,6 +313,30 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
             return is_crossed(kind, primitive, ray).then_some(Stop::Hit);
         }
         self.test_root(first_crossing(kind, primitive, ray)?, || (geometry, primitive), ray, slabs)
+    }
+
+    /// Tests a bilinear patch.
+    #[inline(never)]
+    fn test_patch<G: Goal>(
+        &mut self,
+        patch: Patch,
+        geometry: u32,
+        ray: &Ray,
+        slabs: &mut Slabs,
+    ) -> Option<Stop> {
+        let PatchCrossings { of_line, is_edge_on } = patch.line_crossings(ray);
+        if is_edge_on || of_line.iter().any(|crossing| crossing.place.is_some()) {
+            return Some(Stop::Uncertain);
+        }
+        if FILTERED {
+            let kind = &self.accel().geometries[geometry as usize].kind;
+            return self.query_crossings::<G>(kind, (geometry, 0), ray, slabs);
+        }
+        let root = of_line.iter().map(|crossing| crossing.root).find(|root| ray.contains(root.t))?;
+        if G::IS_ANY {
+            return Some(Stop::Hit);
+        }
+        self.test_root(root, || (geometry, 0), ray, slabs)
     }
 
     /// Takes a crossing in double precision, if it is the closest.
@@ -306,7 +348,20 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
         ray: &Ray,
         slabs: &mut Slabs,
     ) -> Option<Stop> {
-        match self.decider.compare_exact(ray, root.t, &ids, (&self.best, self.exact())) {
+        if let Some(best) = self.exact().filter(|best| best.geometry == IN_INSTANCE && root.t == best.root.t)
+        {
+            let (geometry, primitive) = ids();
+            let winner = Winner { root, geometry, primitive };
+            return match self.precedes_instance(ray, enters(self.accel(), ray, &[], &winner), ids()) {
+                Outcome::Certain(true) => {
+                    self.keep_exact(winner, heights(best.root.t, largest_component(ray)), slabs);
+                    None
+                }
+                Outcome::Certain(false) => None,
+                Outcome::Uncertain => Some(Stop::Uncertain),
+            };
+        }
+        match self.decider.compare_exact(ray, root, &ids, (&self.best, self.exact())) {
             Outcome::Certain(Some(heights)) => {
                 let (geometry, primitive) = ids();
                 self.keep_exact(Winner { root, geometry, primitive }, heights, slabs);
@@ -329,7 +384,16 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
         let query = self.query.filter(|query| query.has_primitive(geometry, primitive))?;
         for root in all_crossings(kind, primitive, ray) {
             let winner = Winner { root, geometry, primitive };
-            let is_closest = self.exact().is_none_or(|best| best.comes_after(root.t, (geometry, primitive)));
+            let is_closest = match self.exact() {
+                // As above; its own crossings are in order.
+                Some(best) if root.t == best.root.t => {
+                    if (best.geometry, best.primitive) != (geometry, primitive) {
+                        return Some(Stop::Uncertain);
+                    }
+                    false
+                }
+                best => best.is_none_or(|best| root.t < best.root.t),
+            };
             let is_taken = ray.contains(root.t)
                 && is_closest
                 && (query.takes_both_faces() || query.takes_face(meets_front(kind, primitive, ray, &root)))

@@ -51,6 +51,15 @@ pub(crate) struct LaneHits<T> {
     pub(crate) at: T,
 }
 
+/// Of two crossings at the same `t`, whether the first comes before: what enters before what leaves, then by geometry and primitive.
+#[inline(always)]
+pub(crate) fn precedes(
+    (enters, ids): (bool, (u32, u32)),
+    (other_enters, other_ids): (bool, (u32, u32)),
+) -> bool {
+    (!enters, ids) < (!other_enters, other_ids)
+}
+
 /// A crossing in a tree, without what a [`Hit`] says of instances.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Winner {
@@ -60,12 +69,6 @@ pub(crate) struct Winner {
 }
 
 impl Winner {
-    /// Whether a crossing at `t` of the primitive with these ids is nearer, or as near and first by the ids.
-    #[inline(always)]
-    pub(crate) fn comes_after(&self, t: f64, ids: (u32, u32)) -> bool {
-        t < self.root.t || t == self.root.t && ids < (self.geometry, self.primitive)
-    }
-
     /// As a hit outside of instances.
     #[inline(always)]
     pub(crate) fn to_hit(self, accel: &Accel) -> Hit {

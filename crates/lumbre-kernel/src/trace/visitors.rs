@@ -39,13 +39,15 @@ fn wanted_for_one(query: Option<&Query>) -> Wanted {
 /// The closest hit.
 pub(crate) struct Closest<'q> {
     best: Option<Hit>,
+    /// Whether the best enters.
+    enters: bool,
     range: [f64; 2],
     query: Option<&'q Query<'q>>,
 }
 
 impl<'q> Closest<'q> {
     pub(crate) fn new(ray: &Ray, query: Option<&'q Query<'q>>) -> Self {
-        Self { best: None, range: [ray.t_min, ray.t_max], query }
+        Self { best: None, enters: false, range: [ray.t_min, ray.t_max], query }
     }
 
     pub(crate) fn into_hit(self) -> Option<Hit> {
@@ -71,7 +73,8 @@ impl Visitor for Closest<'_> {
         let is_closer = root.t <= self.range[1]
             && match &self.best {
                 Some(best) if root.t == self.range[1] => {
-                    let order = context.route.cmp(&best.route);
+                    let order =
+                        self.enters.cmp(&crossing.enters()).then_with(|| context.route.cmp(&best.route));
                     order.then_with(|| (geometry, primitive).cmp(&(best.geometry, best.primitive)))
                         == Ordering::Less
                 }
@@ -79,6 +82,7 @@ impl Visitor for Closest<'_> {
             };
         if is_closer && takes(self.query, crossing) {
             self.range[1] = root.t;
+            self.enters = crossing.enters();
             self.best = Some(crossing.to_hit());
         }
         false
@@ -156,18 +160,18 @@ pub(crate) struct NextHits<'a> {
 #[derive(Debug)]
 pub(crate) struct Ranked {
     pub(crate) hit: Hit,
+    enters: bool,
     // Which of the primitive's crossings: a shape may be crossed twice at the same t.
     order: u32,
 }
 
 impl Ord for Ranked {
     fn cmp(&self, other: &Self) -> Ordering {
-        by_t(self.hit.root.t, other.hit.root.t).then_with(|| self.hit.route.cmp(&other.hit.route)).then_with(
-            || {
-                let ids = |ranked: &Self| (ranked.hit.geometry, ranked.hit.primitive, ranked.order);
-                ids(self).cmp(&ids(other))
-            },
-        )
+        let ids = |ranked: &Self| (ranked.hit.geometry, ranked.hit.primitive, ranked.order);
+        by_t(self.hit.root.t, other.hit.root.t)
+            .then(other.enters.cmp(&self.enters))
+            .then_with(|| self.hit.route.cmp(&other.hit.route))
+            .then_with(|| ids(self).cmp(&ids(other)))
     }
 }
 
@@ -212,7 +216,7 @@ impl Visitor for NextHits<'_> {
         if t < self.range[0] || self.range[1] < t {
             return false;
         }
-        let ranked = Ranked { hit: crossing.to_hit(), order: crossing.order };
+        let ranked = Ranked { hit: crossing.to_hit(), enters: crossing.enters(), order: crossing.order };
         if self.after.is_some_and(|after| ranked <= *after) {
             return false;
         }
