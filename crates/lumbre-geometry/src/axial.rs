@@ -185,8 +185,7 @@ impl Axial {
             return Some([near, far]);
         }
         let cut = |end: (f64, u32), low: f64, high: f64| (end.0.max(low).min(high), end.1);
-        let (low, high) =
-            if (along > 0.0) == is_above { (t, f64::INFINITY) } else { (f64::NEG_INFINITY, t) };
+        let (low, high) = if (along > 0.0) == is_above { (t, f64::INFINITY) } else { (f64::NEG_INFINITY, t) };
         Some([cut(near, low, high), cut(far, low, high)])
     }
 

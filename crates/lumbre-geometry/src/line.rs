@@ -147,7 +147,12 @@ impl Solution {
 }
 
 /// The point at a crossing, relative to the base, and on a scale of `size`.
-pub(crate) fn point_at(surface: &impl SecondDegree, ray: &Ray, t: f64, size: impl FnOnce(DVec3) -> f64) -> DVec3 {
+pub(crate) fn point_at(
+    surface: &impl SecondDegree,
+    ray: &Ray,
+    t: f64,
+    size: impl FnOnce(DVec3) -> f64,
+) -> DVec3 {
     let (base, d) = (surface.base(), ray.direction);
     let p = point(ray.origin, base, t, d);
     if !is_blurred(ray, t, size(p)) {
@@ -191,8 +196,7 @@ pub(crate) fn accepted(
     let touches = first == second;
     let root = |t: f64, multiplicity: u8| {
         // An infinite root is one that the quadratic does not have.
-        let counts =
-            t.is_finite() && ray.contains(t) && keeps(point(ray.origin, base, t, ray.direction));
+        let counts = t.is_finite() && ray.contains(t) && keeps(point(ray.origin, base, t, ray.direction));
         counts.then_some(Root { multiplicity, ..Root::at(t) })
     };
     let near = root(first, if touches { 2 } else { 1 });

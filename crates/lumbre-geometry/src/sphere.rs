@@ -420,12 +420,7 @@ pub(crate) fn crossings(center: DVec3, radius: f64, ray: &Ray) -> Option<(f64, f
 
 #[cold]
 #[inline(never)]
-fn exact_crossings(
-    center: DVec3,
-    radius: f64,
-    ray: &Ray,
-    [a, h, c, delta]: [f64; 4],
-) -> Option<(f64, f64)> {
+fn exact_crossings(center: DVec3, radius: f64, ray: &Ray, [a, h, c, delta]: [f64; 4]) -> Option<(f64, f64)> {
     let solution = solution(center, radius, ray, -h / a);
     if solution.is_finite { solution.crossings } else { quadratic(a, h, c, delta) }
 }

@@ -182,6 +182,7 @@ impl Sub for Twofold {
     type Output = Self;
 
     #[inline]
+    #[expect(clippy::suspicious_arithmetic_impl, reason = "the negation is exact")]
     fn sub(self, other: Self) -> Self {
         self + other.negated()
     }

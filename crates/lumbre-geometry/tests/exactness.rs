@@ -362,11 +362,7 @@ fn subjects(random: &mut Random, slenderness: f64) -> Vec<Subject> {
         paraboloid(wide, thin),
         hyperboloid(flat * a + below, flat * b - below),
         quadric("pipe", [1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -thin * thin], thin),
-        quadric(
-            "general quadric",
-            [a.x, a.y, a.z, b.x, b.y, b.z, p.x, p.y, p.z, q.x],
-            1.0,
-        ),
+        quadric("general quadric", [a.x, a.y, a.z, b.x, b.y, b.z, p.x, p.y, p.z, q.x], 1.0),
     ]
 }
 
@@ -433,7 +429,8 @@ fn no_crossing_of_a_cone_is_lost_invented_or_off_along_generators_and_through_th
                 for root in &found {
                     let w = minus(ray.origin, apex);
                     let spine = minus(apex, base);
-                    let above = &dot(&w, &spine) + &(&Exact::from(root.t) * &dot(&exact(ray.direction), &spine));
+                    let above =
+                        &dot(&w, &spine) + &(&Exact::from(root.t) * &dot(&exact(ray.direction), &spine));
                     let size = (apex - base).length() * (ray.origin.length() + (root.t * direction).length());
                     assert!(above.value() <= 1e-15 * size, "{found:?} {ray:?} {cone:?}");
                 }
@@ -484,12 +481,17 @@ fn no_crossing_is_lost_invented_or_off_along_asymptotes_and_axes() {
                 } else {
                     for _ in 0..[20, 40, 60][k % 3] {
                         let middle = 0.5 * (low + high);
-                        if (square(middle) > 0.0) == (square(low) > 0.0) { low = middle } else { high = middle }
+                        if (square(middle) > 0.0) == (square(low) > 0.0) {
+                            low = middle
+                        } else {
+                            high = middle
+                        }
                     }
                     e + low * (f - e)
                 };
                 let near = subject.shape.surface_at(0, DVec2::splat(0.4)).map_or(DVec3::ZERO, |s| s.point);
-                let origin = near + 0.3 * subject.size * random.vector() - random.between(1.0, 9.0) * direction;
+                let origin =
+                    near + 0.3 * subject.size * random.vector() - random.between(1.0, 9.0) * direction;
                 compare(&subject, &Ray::new(origin, direction), &mut tallies[i].1);
             }
         }
