@@ -34,8 +34,15 @@ impl Memory {
         if self.is_systems { self.left.saturating_sub(RESERVE) / 4 * 3 } else { self.left }
     }
 
-    /// What to add to the error of a reader that met a limit.
-    pub(crate) fn remark(self) -> &'static str {
+    /// The failure of a reader, with what else there is to know of the limit that it met.
+    pub(crate) fn explain(self, failure: Failure) -> Failure {
+        match failure {
+            Failure::Limit(message) => Failure::Limit(message + self.remark()),
+            failure => failure,
+        }
+    }
+
+    fn remark(self) -> &'static str {
         if self.is_systems { " (but the system grants no more: see ulimit -v)" } else { "" }
     }
 

@@ -159,12 +159,8 @@ impl ReadingArguments {
 
     fn describe_at(&self, paths: &[PathBuf], time: Option<f64>) -> Result<(SceneDesc, Diagnostics), Failure> {
         let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
-        // What is read counts against the limit too, so that the remark is that of before.
         let memory = self.memory();
-        lumbre::describe(&paths, &self.options(time)?).map_err(|error| match Failure::from(error) {
-            Failure::Limit(message) => Failure::Limit(message + memory.remark()),
-            failure => failure,
-        })
+        lumbre::describe(&paths, &self.options(time)?).map_err(|error| memory.explain(error.into()))
     }
 
     fn options(&self, frame: Option<f64>) -> Result<lumbre::ReadOptions, Failure> {
