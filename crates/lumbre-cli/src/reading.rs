@@ -36,7 +36,8 @@ pub(crate) struct ReadingArguments {
     /// The material variant of a glTF.
     #[arg(long, value_name = "NAME")]
     variant: Option<String>,
-    /// Bytes that the program may hold at a time: what reading holds, and scenes and pictures as predicted.
+    /// Bytes that the program may hold at a time: what reading holds (8G by default), and scenes and pictures as predicted (by
+    /// default what is free).
     #[arg(long, value_name = "SIZE", value_parser = units::bytes)]
     max_memory: Option<u64>,
     /// Vertices, faces, shapes and parameters that may be read.
