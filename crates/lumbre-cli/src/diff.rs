@@ -62,7 +62,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let memory = Memory::new(arguments.max_memory);
     let mut limits = Limits::default();
     limits.memory = memory.for_reading() / 2;
-    let read = |path: &PathBuf| lumbre::read_image_within(path, limits).map_err(Failure::from);
+    let read = |path: &PathBuf| {
+        lumbre::read_image_within(path, limits).map_err(|error| memory.explain(error.into()))
+    };
     let (a, b) = (read(&arguments.a)?, read(&arguments.b)?);
     let pixels = u64::from(a.width()) * u64::from(a.height());
     let each = if arguments.metric == Metric::Flip { FLIP_BYTES } else { BYTES };

@@ -49,7 +49,8 @@ pub(crate) struct ReadingArguments {
     /// A file of such settings, one a line; # begins a comment line.
     #[arg(long, value_name = "FILE", help_heading = "Parameters")]
     overlay: Vec<PathBuf>,
-    /// Bytes that the program may hold at a time: what reading holds, and scenes and pictures as predicted.
+    /// Bytes that the program may hold at a time: what reading holds (8G by default), and scenes and pictures as predicted (by
+    /// default what is free).
     #[arg(long, value_name = "SIZE", value_parser = units::bytes, help_heading = "Limits")]
     max_memory: Option<u64>,
     /// Vertices, faces, shapes and parameters that may be read.
@@ -172,14 +173,9 @@ impl ReadingArguments {
 
     fn describe_at(&self, paths: &[PathBuf], time: Option<f64>) -> Result<(SceneDesc, Diagnostics), Failure> {
         let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
-        // What is read counts against the limit too, so that the remark is that of before.
         let memory = self.memory();
-        let read =
-            lumbre::describe(&paths, &self.options(time)?).map_err(|error| match Failure::from(error) {
-                Failure::Limit(message) => Failure::Limit(message + memory.remark()),
-                failure => failure,
-            });
-        let (mut desc, diagnostics) = read?;
+        let read = lumbre::describe(&paths, &self.options(time)?);
+        let (mut desc, diagnostics) = read.map_err(|error| memory.explain(error.into()))?;
         for path in &self.overlay {
             self.overlay(path, &mut desc)?;
         }

@@ -106,6 +106,9 @@ fn a_signal_ends_reading_and_waiting_for_pipes() {
         // Nobody writes, and nobody reads.
         &["cast", "room.pbrt", "--rays", "-", "-o", "hits.csv"][..],
         &["render", "room.pbrt", "-o", "out.png", "--spp", "1", "--progress", "none"],
+        // The scene itself does not come.
+        &["render", "-", "-o", "x.png"],
+        &["info", "-"],
     ] {
         let mut command = folder.command(arguments);
         let mut child = command.stdin(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
@@ -122,6 +125,13 @@ fn a_signal_ends_reading_and_waiting_for_pipes() {
     let time = ["render", "room.pbrt", "-o", "out.png", "--time", "500ms", "--progress", "none"];
     let (code, said) = end_of(start(&folder, &time));
     assert_eq!((code, said.contains("no one takes the picture")), (5, true), "{said}");
+    let mut command = folder.command(&["render", "-", "-o", "x.png", "--time", "200ms"]);
+    let mut child = command.stdin(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    // To wait for a child closes what it has.
+    let stdin = child.stdin.take();
+    let (code, said) = end_of(child);
+    drop(stdin);
+    assert_eq!((code, said.contains("while reading the scene")), (5, true), "{said}");
 }
 
 #[test]

@@ -70,7 +70,9 @@ fn sixteen_rays_that_go_together_are_answered_as_each_alone() {
         let beside = if i == 5 { DVec3::ZERO } else { 0.3 * random.vector() };
         Ray::new(eye, CENTER + DVec3::new(0.0, 0.0, 2.0) + beside - eye)
     });
-    assert_eq!(batch::shims::answered_by_packet(accel.isa, &accel, &rays), packet::ALL);
+    // The portable path, which an interpreter takes, has no packets.
+    let answered = if cfg!(miri) { 0 } else { packet::ALL };
+    assert_eq!(batch::shims::answered_by_packet(accel.isa, &accel, &rays), answered);
     let (mut hits, mut any) = (vec![None; rays.len()], vec![false; rays.len()]);
     accel.closest_batch(&rays, &mut hits);
     accel.any_batch(&rays, &mut any);
