@@ -88,7 +88,7 @@ pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
                 let copies = instances(file, extension)?;
                 // Few bytes that many nodes share make as many copies as their product.
                 copied += (copies.len() * size_of::<InstanceDesc>()) as u64;
-                super::check_expansion(file, extension, file.buffer_bytes(), copied)?;
+                super::check_expansion(file, extension, "copies of meshes", file.buffer_bytes(), copied)?;
                 copies
             }
             None => vec![DAffine3::IDENTITY],
@@ -122,7 +122,7 @@ pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
         materials: Materials::new(file),
         known: HashMap::new(),
         skins: HashMap::new(),
-        made: 0,
+        bent: 0,
         exposure,
         objects: HashMap::new(),
         next_shape: 0,
@@ -305,8 +305,8 @@ struct Builder<'f> {
     known: HashMap<usize, DAffine3>,
     /// The matrices of each skin.
     skins: HashMap<usize, Arc<Vec<DMat4>>>,
-    /// The bytes of vertices made so far: nodes that bend a mesh each have their own.
-    made: u64,
+    /// The bytes of vertices that bend so far: each of their nodes has its own.
+    bent: u64,
     exposure: Exposure<'f>,
     /// Meshes with several placements: their objects, and their emissive parts.
     objects: HashMap<Key, (Option<ObjectId>, Vec<ShapeDesc>)>,
@@ -438,8 +438,10 @@ impl Builder<'_> {
             let by = dressing.tangents.filter(|_| !has_tangents);
             let wants = |set| sets.is_some_and(|sets| sets.holds(set)) || by == Some(set);
             let count = primitive.attributes.position.as_ref().map_or(0, |position| position.count);
-            self.made += (count * size_of::<Vec3>() * (1 + poses.len())) as u64;
-            super::check_expansion(file, value, file.buffer_bytes(), self.made)?;
+            if place.key.owner.is_some() || !place.key.weights.is_empty() {
+                self.bent += (count * size_of::<Vec3>() * (1 + poses.len())) as u64;
+                super::check_expansion(file, value, "vertices that bend", file.buffer_bytes(), self.bent)?;
+            }
             let mut vertices = mesh::vertices(file, &primitive, pose, wants)?;
             if primitive.mode.is_surface() {
                 for pose in &poses {

@@ -51,6 +51,8 @@ pub(super) struct Converter<'b, 'd> {
     pub media: HashMap<String, ()>,
     pub media_used: Vec<(String, Spot)>,
     pub images: HashMap<ImageKey, Arc<MipMap>>,
+    /// Images that are missing, when lenient.
+    pub missing: HashSet<PathBuf>,
     /// The first pixels of each image file.
     pub bitmaps: HashMap<PathBuf, Arc<Bitmap>>,
     /// Mesh files to be read at the end, and their indices by path.
@@ -165,6 +167,7 @@ impl<'b, 'd> Converter<'b, 'd> {
             media: HashMap::new(),
             media_used: vec![],
             images: HashMap::new(),
+            missing: HashSet::new(),
             bitmaps: HashMap::new(),
             mesh_files: vec![],
             mesh_paths: HashMap::new(),
