@@ -3,30 +3,51 @@
 use lumbre_math::{DVec3, Transform, Vec3};
 use lumbre_scene::MeshDesc;
 
-/// The origin for a list of positions: zero, but for the axes along which the list is far from there as its size
-/// goes, and single precision would move its positions. Positions that are not finite do not count.
-pub(crate) fn origin_of(positions: &[DVec3]) -> DVec3 {
-    const FAR: f64 = 16.0;
-    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    let mut is_exact = [true; 3];
-    for p in positions.iter().filter(|p| p.is_finite()) {
-        (low, high) = (low.min(*p), high.max(*p));
+/// Where positions are, and whether single precision holds them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Spread {
+    low: DVec3,
+    high: DVec3,
+    is_exact: [bool; 3],
+}
+
+impl Spread {
+    pub(crate) const NOTHING: Self =
+        Self { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY, is_exact: [true; 3] };
+
+    /// With another position; one that is not finite does not count.
+    pub(crate) fn with(mut self, p: DVec3) -> Self {
+        if p.is_finite() {
+            (self.low, self.high) = (self.low.min(p), self.high.max(p));
+            for axis in 0..3 {
+                self.is_exact[axis] &= f64::from(p[axis] as f32) == p[axis];
+            }
+        }
+        self
+    }
+
+    /// The origin for these positions: zero, but for the axes along which they are far from there as their extent
+    /// goes, and single precision would move them.
+    pub(crate) fn origin(self) -> DVec3 {
+        const FAR: f64 = 16.0;
+        if self.low.x > self.high.x {
+            return DVec3::ZERO;
+        }
+        let (center, half) = (0.5 * (self.low + self.high), 0.5 * (self.high - self.low).max_element());
+        let mut origin = DVec3::ZERO;
         for axis in 0..3 {
-            is_exact[axis] &= f64::from(p[axis] as f32) == p[axis];
+            if !self.is_exact[axis] && center[axis].abs() > FAR * half {
+                // In few digits, so that what is written in few digits stays so.
+                origin[axis] = f64::from(center[axis] as f32);
+            }
         }
+        origin
     }
-    if low.x > high.x {
-        return DVec3::ZERO;
-    }
-    let (center, half) = (0.5 * (low + high), 0.5 * (high - low).max_element());
-    let mut origin = DVec3::ZERO;
-    for axis in 0..3 {
-        if !is_exact[axis] && center[axis].abs() > FAR * half {
-            // In few digits, so that what is written in few digits stays so.
-            origin[axis] = f64::from(center[axis] as f32);
-        }
-    }
-    origin
+}
+
+/// The origin for a list of positions.
+pub(crate) fn origin_of(positions: &[DVec3]) -> DVec3 {
+    positions.iter().fold(Spread::NOTHING, |spread, &p| spread.with(p)).origin()
 }
 
 /// A position relative to an origin; zero where it is not finite.

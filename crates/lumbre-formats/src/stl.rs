@@ -6,12 +6,13 @@ use std::path::Path;
 use std::sync::Arc;
 
 use lumbre_image::{Rgb, srgb_to_linear};
-use lumbre_math::Vec3;
+use lumbre_math::{DVec3, Vec3};
 use lumbre_scene::{MeshDesc, SceneDesc, UpAxis};
 
 use crate::budget::{Budget, BudgetVec};
 use crate::diagnostic::{Diagnostic, Diagnostics, FormatError, Place, quoted_bytes};
 use crate::input::{Input, refuse_wide};
+use crate::origin::{Spread, placed, relative};
 use crate::ply::scene_of_meshes;
 
 /// A solid of an STL file.
@@ -19,6 +20,8 @@ use crate::ply::scene_of_meshes;
 pub struct StlSolid {
     /// Its name; empty where it has none.
     pub name: String,
+    /// What its positions are relative to: zero, unless all of a text are far from there.
+    pub origin: DVec3,
     /// Its facets. Corners at exactly the same position (and of the same colour) are one vertex.
     pub mesh: MeshDesc,
 }
@@ -42,7 +45,12 @@ pub(crate) fn stl_scene(
     diagnostics: &mut Diagnostics,
 ) -> Result<SceneDesc, FormatError> {
     let solids = read_stl(&input, input.name(), budget, diagnostics)?;
-    Ok(scene_of_meshes(solids.into_iter().map(|solid| solid.mesh), UpAxis::Z))
+    let world_from_object = placed(solids.first().map_or(DVec3::ZERO, |solid| solid.origin));
+    // Solids without facets show nothing.
+    let shown = solids.into_iter().map(|solid| solid.mesh).filter(|mesh| !mesh.triangles.is_empty());
+    let mut scene = scene_of_meshes(shown, UpAxis::Z);
+    scene.shapes.iter_mut().for_each(|shape| shape.world_from_object = world_from_object);
+    Ok(scene)
 }
 
 /// Reads the solids from the bytes of an STL file: one if it is binary, any number if it is text.
@@ -71,7 +79,7 @@ pub fn read_stl(
     // not.
     let is_text = !is_binary_by_size && says_solid && !bytes[..bytes.len().min(1024)].contains(&0);
     let solids = if is_text {
-        Text { bytes, at: 0, name, budget, diagnostics }.read()
+        Text { bytes, at: 0, origin: DVec3::ZERO, name, budget, diagnostics }.read()
     } else {
         binary(bytes, count, is_binary_by_size, name, budget, diagnostics).map(|solid| vec![solid])
     };
@@ -136,7 +144,7 @@ fn binary(
     }
     let title = header.strip_prefix(b"solid").map(|rest| rest.split(|&b| b == 0).next().unwrap_or_default());
     let title = String::from_utf8_lossy(title.unwrap_or_default()).trim().to_owned();
-    Ok(StlSolid { name: title, mesh: mesh.finish()? })
+    Ok(StlSolid { name: title, origin: DVec3::ZERO, mesh: mesh.finish()? })
 }
 
 /// A byte in sRGB as linear light.
@@ -255,6 +263,7 @@ impl<'b> Welded<'b> {
 struct Text<'a> {
     bytes: &'a [u8],
     at: usize,
+    origin: DVec3,
     name: &'a Arc<str>,
     budget: &'a Budget,
     diagnostics: &'a mut Diagnostics,
@@ -287,8 +296,8 @@ impl<'a> Text<'a> {
         })
     }
 
-    fn vector(&mut self) -> Result<(usize, Vec3), FormatError> {
-        let mut numbers = [0f32; 3];
+    fn vector(&mut self) -> Result<(usize, DVec3), FormatError> {
+        let mut numbers = [0f64; 3];
         let mut first = self.at;
         for (i, number) in numbers.iter_mut().enumerate() {
             let Some((at, word)) = self.word() else {
@@ -303,7 +312,7 @@ impl<'a> Text<'a> {
                 )
             })?;
         }
-        Ok((first, Vec3::from(numbers)))
+        Ok((first, DVec3::from(numbers)))
     }
 
     fn rest_of_line(&mut self) -> String {
@@ -317,6 +326,7 @@ impl<'a> Text<'a> {
         if self.bytes.starts_with(b"\xEF\xBB\xBF") {
             self.at = 3;
         }
+        self.origin = self.far_origin();
         let mut solids = vec![];
         while self.bytes[self.at..].iter().any(|b| !b.is_ascii_whitespace()) {
             self.expect(&["solid"])?;
@@ -325,9 +335,29 @@ impl<'a> Text<'a> {
             self.budget.bytes((title.len() + size_of::<StlSolid>()) as u64, "solids")?;
             let mesh = self.solid()?;
             self.rest_of_line();
-            solids.push(StlSolid { name: title, mesh });
+            solids.push(StlSolid { name: title, origin: self.origin, mesh });
         }
         Ok(solids)
+    }
+
+    /// The origin of all vertices, which are looked at ahead where the first is far from zero in many digits.
+    fn far_origin(&mut self) -> DVec3 {
+        const NEAR: f64 = 256.0;
+        let start = self.at;
+        let mut spread = Spread::NOTHING;
+        while let Some((_, word)) = self.word() {
+            if !word.eq_ignore_ascii_case(b"vertex") {
+                continue;
+            }
+            let Ok((_, p)) = self.vector() else { break };
+            spread = spread.with(p);
+            if p.abs().max_element() < NEAR {
+                spread = Spread::NOTHING;
+                break;
+            }
+        }
+        self.at = start;
+        spread.origin()
     }
 
     fn solid(&mut self) -> Result<MeshDesc, FormatError> {
@@ -339,7 +369,7 @@ impl<'a> Text<'a> {
             let (normal_at, normal) = self.vector()?;
             self.expect(&["outer"])?;
             self.expect(&["loop"])?;
-            let mut corners = [Vec3::ZERO; 3];
+            let mut corners = [DVec3::ZERO; 3];
             let mut starts = [0; 3];
             for (corner, start) in corners.iter_mut().zip(&mut starts) {
                 self.expect(&["vertex"])?;
@@ -349,12 +379,14 @@ impl<'a> Text<'a> {
             self.expect(&["endfacet"])?;
             let (name, bytes) = (self.name, self.bytes);
             let place = |at| Place::of_offset(name.clone(), bytes, at);
-            match corners.iter().position(|c| !c.is_finite()) {
+            match corners.iter().position(|c| !c.as_vec3().is_finite()) {
                 Some(i) => {
-                    not_finite(corners[i], format!("facet {index}"), || place(starts[i]), self.diagnostics)?;
+                    let corner = corners[i].as_vec3();
+                    not_finite(corner, format!("facet {index}"), || place(starts[i]), self.diagnostics)?;
                 }
                 None => {
-                    check_normal(normal, corners, || place(normal_at), self.diagnostics);
+                    let corners = corners.map(|corner| relative(corner, self.origin));
+                    check_normal(normal.as_vec3(), corners, || place(normal_at), self.diagnostics);
                     mesh.facet(corners, Rgb::WHITE)?;
                 }
             }

@@ -1156,11 +1156,13 @@ fn a_missing_image_matters_where_it_is_used() {
     // Lenient reading goes on and names all that is missing.
     let many = format!(
         r#"{used} Include "gone.pbrt" Shape "plymesh" "string filename" "gone.ply"
-           LightSource "infinite" "string filename" "gone.exr""#
+           LightSource "infinite" "string filename" "gone.exr"
+           Material "diffuse" "string normalmap" "flat.png" Shape "sphere""#
     );
     let (scene, said) = read(&many, Strictness::Lenient);
-    assert!(scene.is_ok());
-    for name in ["gone.png", "gone.pbrt", "gone.ply", "gone.exr"] {
+    let last = scene.unwrap().materials.pop().unwrap();
+    assert!(last.material.normal_map.is_none());
+    for name in ["gone.png", "gone.pbrt", "gone.ply", "gone.exr", "flat.png"] {
         assert!(said.iter().any(|line| line.contains(name)), "{name}: {said:?}");
     }
 }

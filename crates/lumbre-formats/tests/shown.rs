@@ -105,6 +105,9 @@ fn a_missing_image_leaves_its_material_without_it() {
             "baseColorTexture":{"index":0}}}]"#,
         ),
     ]);
+    // One that is there and damaged is refused.
+    let damaged = json.replace("gone.png", "data:image/png,%89PNG");
+    assert!(read(damaged.as_bytes(), Strictness::Normal).0.unwrap_err().contains("/images/0"));
     let scene = shown(json.as_bytes(), "image that cannot be read was left out");
     let MaterialKind::Principled(params) = &scene.materials[0].material.kind else { panic!() };
     assert_eq!(params.base_color.evaluate(&place()), Rgb::new(0.5, 0.25, 1.0));

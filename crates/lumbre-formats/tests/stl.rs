@@ -6,6 +6,7 @@ use crate::common::{files_below, shared};
 use lumbre_formats::stl::{StlSolid, open_stl, read_stl};
 use lumbre_formats::{Budget, Diagnostics, FormatError, Strictness};
 use lumbre_image::{Rgb, srgb_to_linear};
+use lumbre_math::DVec3;
 use lumbre_scene::UpAxis;
 
 fn name() -> Arc<str> {
@@ -149,4 +150,21 @@ fn files_of_others_are_read() {
         read += 1;
     }
     assert!(read >= 11, "{read}");
+}
+
+#[test]
+fn text_far_from_zero_keeps_its_digits() {
+    let far = DVec3::new(500_000.25, 4_649_781.5, 100.125);
+    let corners = [far, far + DVec3::new(0.01, 0.0, 0.0), far + DVec3::new(0.0, 0.03, 0.0)];
+    let lines: String = corners.iter().map(|p| format!("vertex {} {} {}\n", p.x, p.y, p.z)).collect();
+    let text = format!("solid a\nfacet normal 0 0 1\nouter loop\n{lines}endloop\nendfacet\nendsolid a\n");
+    let solids = read(text.as_bytes()).unwrap();
+    for (found, p) in solids[0].mesh.positions.iter().zip(corners) {
+        assert!((found.as_dvec3() + solids[0].origin - p).abs().max_element() < 1e-8);
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("m.stl");
+    std::fs::write(&path, text).unwrap();
+    let scene = open_stl(&path, &Budget::default(), &mut Diagnostics::new()).unwrap();
+    assert_eq!(scene.shapes[0].world_from_object.point(DVec3::ZERO), solids[0].origin);
 }

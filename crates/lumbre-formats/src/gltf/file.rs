@@ -203,6 +203,11 @@ impl<'a> File<'a> {
         self.used.contains(extension)
     }
 
+    /// Whether unusable parts are dropped with a warning.
+    pub(super) fn is_lenient(&self) -> bool {
+        self.diagnostics.borrow().is_lenient()
+    }
+
     /// Adds a warning of this kind.
     pub(super) fn warn(&self, value: Value<'_>, message: &str) {
         value.warn(&mut self.diagnostics.borrow_mut(), message);

@@ -59,7 +59,7 @@ pub(super) fn unpacked(file: &File<'_>, view: Value<'_>) -> Read<Option<Vec<u8>>
     let Some(packed) = packed else {
         return Err(value.wrong("the buffer of what is needed here has no data").into());
     };
-    super::check_expansion(file, value, length, count as u64 * stride as u64)?;
+    super::check_expansion(file, value, "compressed data", length, count as u64 * stride as u64)?;
     let mut bytes = file.budget.vec(count as u64 * stride as u64, "decompressed buffer view")?;
     let decoded = match &*mode {
         "ATTRIBUTES" => attributes(packed, count, stride, generation, &mut bytes),

@@ -318,17 +318,17 @@ fn place(file: &File<'_>, path: &str, extension: &str, object: Value<'_>) -> Rea
 /// Compressed data may expand to this size at any ratio: a few bytes can represent millions of vertices.
 const FREE_EXPANSION: u64 = 8 << 20;
 
-/// Rejects compressed data of too large an expansion.
-fn check_expansion(file: &File<'_>, value: Value<'_>, packed: u64, unpacked: u64) -> Read<()> {
+/// Rejects what a few bytes make too much of; `what` names it.
+fn check_expansion(file: &File<'_>, value: Value<'_>, what: &str, packed: u64, unpacked: u64) -> Read<()> {
     let limit = file.budget.limits().expansion;
     if unpacked <= FREE_EXPANSION.max(packed.saturating_mul(limit)) {
         return Ok(());
     }
-    Err(crate::LimitError {
-        what: format!("{}: compressed data", value.place()),
+    let source = crate::LimitError {
+        what: what.to_owned(),
         kind: crate::LimitKind::Expansion,
         needed: unpacked.div_ceil(packed.max(1)),
         limit,
-    }
-    .into())
+    };
+    Err(FormatError::Limit { place: Some(value.place()), source })
 }

@@ -88,7 +88,7 @@ pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
                 let copies = instances(file, extension)?;
                 // Few bytes that many nodes share make as many copies as their product.
                 copied += (copies.len() * size_of::<InstanceDesc>()) as u64;
-                super::check_expansion(file, extension, file.buffer_bytes(), copied)?;
+                super::check_expansion(file, extension, "copies of meshes", file.buffer_bytes(), copied)?;
                 copies
             }
             None => vec![DAffine3::IDENTITY],
@@ -121,6 +121,8 @@ pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
         variant,
         materials: Materials::new(file),
         known: HashMap::new(),
+        skins: HashMap::new(),
+        bent: 0,
         exposure,
         objects: HashMap::new(),
         next_shape: 0,
@@ -300,6 +302,10 @@ struct Builder<'f> {
     materials: Materials<'f>,
     /// The transforms of joints.
     known: HashMap<usize, DAffine3>,
+    /// The matrices of each skin.
+    skins: HashMap<usize, Arc<Vec<DMat4>>>,
+    /// The bytes of vertices that bend so far: each of their nodes has its own.
+    bent: u64,
     exposure: Exposure<'f>,
     /// Meshes with several placements: their objects, and their emissive parts.
     objects: HashMap<Key, (Option<ObjectId>, Vec<ShapeDesc>)>,
@@ -365,6 +371,17 @@ impl Builder<'_> {
         Ok(())
     }
 
+    /// The matrices of a skin, found once.
+    fn joints_of(&mut self, skin: usize) -> Read<Arc<Vec<DMat4>>> {
+        if let Some(found) = self.skins.get(&skin) {
+            return Ok(found.clone());
+        }
+        let made = Arc::new(joints(self.file, self.graph, &mut self.known, skin)?);
+        self.file.budget.bytes((made.len() * size_of::<DMat4>()) as u64, "joints of skins")?;
+        self.skins.insert(skin, made.clone());
+        Ok(made)
+    }
+
     fn next_index(&mut self) -> u32 {
         let index = self.next_shape;
         self.next_shape = self.next_shape.saturating_add(1);
@@ -399,10 +416,10 @@ impl Builder<'_> {
     /// The shapes of a mesh in mesh space, or in the world if it is skinned.
     fn shapes(&mut self, place: &Placed) -> Read<Vec<ShapeDesc>> {
         let file = self.file;
-        let joints = place.skin.map(|skin| joints(file, self.graph, &mut self.known, skin)).transpose()?;
+        let joints = place.skin.map(|skin| self.joints_of(skin)).transpose()?;
         let poses = self.exposure.poses(place.node, place.skin)?;
         let weights: Vec<f64> = place.key.weights.iter().map(|&bits| f64::from_bits(bits)).collect();
-        let pose = Pose { weights: &weights, joints: joints.as_deref() };
+        let pose = Pose { weights: &weights, joints: joints.as_ref().map(|joints| &joints[..]) };
         let mesh = file.list(List::Meshes)[place.key.mesh];
         let mut shapes = vec![];
         for value in mesh.need("primitives")?.array()? {
@@ -419,6 +436,11 @@ impl Builder<'_> {
                 primitive.attributes.tangent.is_some() && primitive.attributes.normal.is_some();
             let by = dressing.tangents.filter(|_| !has_tangents);
             let wants = |set| sets.is_some_and(|sets| sets.holds(set)) || by == Some(set);
+            let count = primitive.attributes.position.as_ref().map_or(0, |position| position.count);
+            if place.key.owner.is_some() || !place.key.weights.is_empty() {
+                self.bent += (count * size_of::<Vec3>() * (1 + poses.len())) as u64;
+                super::check_expansion(file, value, "vertices that bend", file.buffer_bytes(), self.bent)?;
+            }
             let mut vertices = mesh::vertices(file, &primitive, pose, wants)?;
             if primitive.mode.is_surface() {
                 for pose in &poses {

@@ -203,8 +203,8 @@ impl<'f> Textures<'f> {
         let value = file.list(List::Images)[index];
         let image = match decoded(file, value) {
             Ok(image) => Some(Arc::new(image)),
-            // As other programs do, the rest is shown without it.
-            Err(error @ crate::FormatError::Input(_)) => {
+            // As in other programs, the rest is shown without an image that is missing.
+            Err(error @ crate::FormatError::Input(_)) if file.is_lenient() || is_absent(file, value)? => {
                 let warning = Diagnostic::warning("image that cannot be read was left out").at(value.place());
                 file.push(warning.found(error));
                 None
@@ -228,6 +228,16 @@ fn image_name(value: Value<'_>, index: usize) -> Read<String> {
         return Ok(uri.into_owned());
     }
     Ok(value.string_at("name")?.map_or_else(|| format!("image {index}"), |name| name.into_owned()))
+}
+
+/// Whether an image is in a file that is not there, or elsewhere.
+fn is_absent(file: &File<'_>, value: Value<'_>) -> Read<bool> {
+    let Some(uri) = value.get("uri")? else { return Ok(false) };
+    Ok(match target(&uri.string()?) {
+        Target::File(path) => !file.folder.join(path).is_file(),
+        Target::Scheme(_) => true,
+        Target::Data(_) | Target::Malformed => false,
+    })
 }
 
 fn decoded(file: &File<'_>, value: Value<'_>) -> Read<Bitmap> {

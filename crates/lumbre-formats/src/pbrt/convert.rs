@@ -51,6 +51,8 @@ pub(super) struct Converter<'b, 'd> {
     pub media: HashMap<String, ()>,
     pub media_used: Vec<(String, Spot)>,
     pub images: HashMap<ImageKey, Arc<MipMap>>,
+    /// Images that are missing, when lenient.
+    pub missing: HashSet<PathBuf>,
     /// The first pixels of each image file.
     pub bitmaps: HashMap<PathBuf, Arc<Bitmap>>,
     /// Mesh files to be read at the end, and their indices by path.
@@ -165,6 +167,7 @@ impl<'b, 'd> Converter<'b, 'd> {
             media: HashMap::new(),
             media_used: vec![],
             images: HashMap::new(),
+            missing: HashSet::new(),
             bitmaps: HashMap::new(),
             mesh_files: vec![],
             mesh_paths: HashMap::new(),
@@ -197,8 +200,13 @@ impl<'b, 'd> Converter<'b, 'd> {
 
     /// Warns of unused parameters.
     pub fn done(&mut self, params: &Params) {
-        for (spot, warning) in params.unused() {
-            self.warn(spot, warning);
+        let (unused, asked) = params.unused();
+        for param in unused {
+            let message = format!("unknown parameter {} of {}", quoted(&param.name), params.owner);
+            let files = &self.files;
+            self.diagnostics.warn(&message, |unknown| {
+                files.locate(param.spot, unknown.suggest(&param.name, asked.iter().copied()))
+            });
         }
     }
 
@@ -519,9 +527,10 @@ impl<'b, 'd> Converter<'b, 'd> {
         }
         for (name, spot) in std::mem::take(&mut self.media_used) {
             if !self.media.contains_key(&name) {
-                let unknown = Diagnostic::warning(format!("medium {} is not defined", quoted(&name)));
-                let unknown = unknown.suggest(&name, self.media.keys().map(String::as_str));
-                self.warn(spot, unknown);
+                let (files, media) = (&self.files, &self.media);
+                self.diagnostics.warn(&format!("medium {} is not defined", quoted(&name)), |unknown| {
+                    files.locate(spot, unknown.suggest(&name, media.keys().map(String::as_str)))
+                });
             }
         }
         Ok(())

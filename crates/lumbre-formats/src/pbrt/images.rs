@@ -68,6 +68,7 @@ impl Converter<'_, '_> {
             {
                 let message = "a grey image takes the place of one that cannot be read";
                 self.warn(at, Diagnostic::warning(message).found(unreadable(name, &error).message));
+                self.missing.insert(path);
                 Ok(ImageFile::grey())
             }
             Err(error) => Err(file_fault(at, error)),

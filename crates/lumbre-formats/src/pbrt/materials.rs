@@ -133,7 +133,9 @@ impl Converter<'_, '_> {
                 let image =
                     self.mip_map(&filename, at, Some(Encoding::Linear), Wrap::Repeat, ImageFilter::Bilinear)?;
                 let mapping = Mapping2d::Uv { scale: Vec2::ONE, delta: Vec2::ZERO };
-                material.normal_map = Some(ImageTexture { mapping, image, scale: 1.0, invert: false });
+                let is_missing = self.missing.contains(&self.resolve(&filename, at)?);
+                material.normal_map =
+                    (!is_missing).then_some(ImageTexture { mapping, image, scale: 1.0, invert: false });
             }
         }
         Ok((material, depth))

@@ -213,7 +213,7 @@ impl Param {
     }
 }
 
-/// Defaults that `Attribute` set for one kind of entity, one of each name.
+/// Defaults that `Attribute` set for one kind of entity, one of each name, in the order of their names.
 pub(super) type Defaults = Rc<Vec<Rc<Param>>>;
 
 /// The parameters of one entity. Each lookup marks the parameter as used and records the name, so that unused
@@ -242,7 +242,12 @@ impl Params {
             param.used.set(true);
             found = Some(param);
         }
-        found.or_else(|| self.defaults.iter().map(|p| &**p).find(|p| *p.name == *name))
+        found.or_else(|| self.default(name))
+    }
+
+    fn default(&self, name: &str) -> Option<&Param> {
+        let at = self.defaults.binary_search_by(|p| (*p.name).cmp(name)).ok()?;
+        Some(&self.defaults[at])
     }
 
     /// All parameters that are in effect.
@@ -257,7 +262,7 @@ impl Params {
 
     /// Whether there is one of this name; does not mark it as used.
     pub fn has(&self, name: &str) -> bool {
-        self.own.iter().any(|p| *p.name == *name) || self.defaults.iter().any(|p| *p.name == *name)
+        self.own.iter().any(|p| *p.name == *name) || self.default(name).is_some()
     }
 
     /// The place of this parameter, else of the entity.
@@ -386,14 +391,8 @@ impl Params {
         }
     }
 
-    /// Warnings for unused parameters.
-    pub fn unused(&self) -> Vec<(Spot, Diagnostic)> {
-        let asked = self.asked.borrow();
-        let left = self.own.iter().filter(|p| !p.used.get());
-        left.map(|p| {
-            let message = format!("unknown parameter {} of {}", quoted(&p.name), self.owner);
-            (p.spot, Diagnostic::warning(message).suggest(&p.name, asked.iter().copied()))
-        })
-        .collect()
+    /// Unused parameters, and the names that were asked for.
+    pub fn unused(&self) -> (impl Iterator<Item = &Param>, Vec<&'static str>) {
+        (self.own.iter().filter(|p| !p.used.get()), self.asked.borrow().clone())
     }
 }

@@ -54,10 +54,10 @@ impl Parser<'_, '_> {
         let defaults = Rc::make_mut(&mut self.state.defaults[*kind as usize]);
         for param in params {
             let param = Rc::new(param);
-            match defaults.iter().position(|p| p.name == param.name) {
-                Some(same) => defaults[same] = param,
-                None if defaults.len() < MAX_DEFAULTS => defaults.push(param),
-                None => {
+            match defaults.binary_search_by(|p| p.name.cmp(&param.name)) {
+                Ok(same) => defaults[same] = param,
+                Err(at) if defaults.len() < MAX_DEFAULTS => defaults.insert(at, param),
+                Err(_) => {
                     let message = format!("more than {MAX_DEFAULTS} different names in Attribute");
                     return Err(spot.error(message));
                 }
