@@ -157,7 +157,7 @@ impl Setting {
                 | LightDesc::Spot { intensity: light, .. }
                 | LightDesc::Goniometric { intensity: light, .. }
                 | LightDesc::Distant { irradiance: light, .. }
-                | LightDesc::Infinite { radiance: light, .. } => *light = *light * factor,
+                | LightDesc::Infinite { radiance: light, .. } => *light *= factor,
                 LightDesc::Moving { .. } => {}
             }
             return Ok(());
@@ -492,7 +492,7 @@ fn scale_emission(shape: &mut ShapeDesc, factor: f32) {
         // With a power, the radiance is only the colour.
         match &mut light.power {
             Some(power) => *power *= factor,
-            None => light.radiance = light.radiance * factor,
+            None => light.radiance *= factor,
         }
     }
     if let GeometryDesc::Csg(csg) = &mut shape.geometry {
