@@ -341,9 +341,10 @@ fn every_broken_file_gets_its_message() {
             png_of_size(0x7FFF_FFFF, 0x7FFF_FFFF),
             "a.png: PNG image of an impossible size (found 2147483647 by 2147483647 pixels in 130 bytes)",
         ),
-        ("a.png", png_of_size(120, 90), "a.png: damaged PNG image (found "),
-        ("a.png", encoded(ImageFormat::Png)[..60].to_vec(), "a.png: damaged PNG image (found "),
-        ("a.exr", encoded(ImageFormat::Exr)[..60].to_vec(), "a.exr: damaged EXR image (found "),
+        // The pixels stand behind the signature, the header and the rendering intent.
+        ("a.png", png_of_size(120, 90), "a.png:byte 46: damaged PNG image (found "),
+        ("a.png", encoded(ImageFormat::Png)[..60].to_vec(), "a.png:byte 46: damaged PNG image (found "),
+        ("a.exr", encoded(ImageFormat::Exr)[..60].to_vec(), "a.exr:byte 60: damaged EXR image (found "),
         (
             "a.pfm",
             b"PF\n0 4\n-1.0\n".to_vec(),

@@ -240,7 +240,7 @@ mod tests {
             (b"\x93NUMPY\x09\x00\x10\x00".to_vec(), 6, "unknown .npy version"),
             (b"\x93NUMPY\x01\x00\xff\xff{".to_vec(), 11, "cut off"),
             (file("{'descr': '<i8', 'fortran_order': False, 'shape': (1, 6), }"), 12, "element type <i8"),
-            (file("{'descr': '<f8', 'fortran_order': False, 'shape': (6,), }"), 51, "two dimensions"),
+            (file("{'descr': '<f8', 'fortran_order': False, 'shape': (6,), }"), 52, "two dimensions"),
             (file("{'fortran_order': False}"), 10, "no 'descr'"),
             ([&b"\x93NUMPY\x02\x00\x00\x00\x20\x00"[..], &[b' '; 3 << 20]].concat(), 8, "2097152 bytes"),
         ] {
