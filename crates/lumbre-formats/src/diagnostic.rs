@@ -623,6 +623,16 @@ mod tests {
     use crate::budget::{Budget, Limits};
 
     #[test]
+    fn places_in_any_order_are_those_of_a_walk_from_the_start() {
+        let text = "é a\r\nb\rc\n\n0123456789 ".repeat(400).into_bytes();
+        let places = TextPlaces::default();
+        let offsets = (0..900).map(|i| i * 7919 % (text.len() + 3)).chain([0, text.len()]);
+        for offset in offsets {
+            assert_eq!(places.place("a", &text, offset), Place::of_offset("a", &text, offset), "{offset}");
+        }
+    }
+
+    #[test]
     fn a_diagnostic_reads_as_the_contract_says() {
         let d = Diagnostic::error("wrong number of values")
             .at(Place::text("a/b.pbrt", 12, 7))

@@ -247,3 +247,46 @@ fn images_of_others_are_read() {
     }
     assert!(read > 30, "{read} of {}", files.len());
 }
+
+#[test]
+fn what_an_image_unpacks_to_is_bounded_before_it_is_unpacked() {
+    // The header of a grey PNG of this size, and bytes after its end.
+    let png = |side: u32, rest: usize| {
+        let mut bytes = std::io::Cursor::new(vec![]);
+        let pixel = image::GrayImage::from_raw(1, 1, vec![9]).unwrap();
+        pixel.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+        let mut bytes = bytes.into_inner();
+        bytes[16..20].copy_from_slice(&side.to_be_bytes());
+        bytes[20..24].copy_from_slice(&side.to_be_bytes());
+        let mut check = flate2::Crc::new();
+        check.update(&bytes[12..29]);
+        bytes[29..33].copy_from_slice(&check.sum().to_be_bytes());
+        bytes.resize(bytes.len() + rest, 0);
+        bytes
+    };
+    let read = |bytes: &[u8]| {
+        let budget = Budget::default();
+        let error = read_image(bytes, &"a.png".into(), &budget, &mut Diagnostics::new()).unwrap_err();
+        (error.to_string(), budget.memory_peak())
+    };
+    // 256 MiB of some 40 kB.
+    let (error, peak) = read(&png(16384, 40_000));
+    assert!(error.contains("--max-expansion") && peak == 0, "{error} {peak}");
+    // 16 MiB are unpacked at any ratio, here to find that their data end early.
+    let (error, _) = read(&png(4096, 40_000));
+    assert!(error.contains("damaged PNG image"), "{error}");
+}
+
+#[test]
+fn nothing_finite_becomes_infinite_in_an_exr_and_a_qoi_keeps_its_bytes() {
+    let bright = Image::filled(3, 2, Rgb::new(70_000.0, 2.0, -0.5));
+    let bytes = encode_image(&bright, ImageFormat::Exr, &WriteOptions::default()).unwrap();
+    let read = |bytes: &[u8], name: &str| {
+        let file = read_image(bytes, &name.into(), &Budget::default(), &mut Diagnostics::new()).unwrap();
+        file.to_image(&Budget::default()).unwrap()
+    };
+    assert_eq!(read(&bytes, "a.exr").pixel(1, 1), Rgb::new(70_000.0, 2.0, -0.5));
+    let shown = Image::filled(5, 3, Rgb::new(1.0, 0.0, srgb_to_linear(51.0 / 255.0)));
+    let bytes = encode_image(&shown, ImageFormat::Qoi, &WriteOptions::default()).unwrap();
+    assert!((read(&bytes, "a.qoi").pixel(4, 2) - shown.pixel(4, 2)).map(f32::abs).max_component() < 1e-6);
+}
