@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use lumbre::description::{Camera, CameraKind, GroundDesc, IntegratorKind};
-use lumbre::formats::image::ImageFormat;
+use lumbre::formats::image::{ExrPrecision, ImageFormat};
 use lumbre::formats::{Diagnostics, probe_writable};
 use lumbre::image::ToneMap;
 use lumbre::{
@@ -486,6 +486,9 @@ fn picture(
     let is_shown = is_of_light && staged.light != StageLight::Own;
     let tone_map = arguments.tonemap.unwrap_or(if is_shown { ToneMap::Neutral } else { ToneMap::None });
     let mut save = SaveOptions::default();
+    if scene.resolved().film().single_precision {
+        save.exr_precision = ExrPrecision::Float;
+    }
     (save.tone_map, save.exposure) = (tone_map, exposure);
     let picture = match behind {
         Behind::Background(background) => picture.over(background),
@@ -594,8 +597,7 @@ fn check_whole(
 fn options(arguments: &Arguments, scene: &Scene) -> Result<RenderOptions, Failure> {
     let mut options = scene.options();
     if let Some((width, height)) = arguments.size {
-        // The scene's own crop is in its own pixels.
-        (options.width, options.height, options.crop) = (width, height, None);
+        options.resize(scene.resolved().film(), width, height);
     }
     options.crop = match arguments.crop {
         None => options.crop,

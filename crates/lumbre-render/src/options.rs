@@ -116,6 +116,18 @@ impl RenderOptions {
         options
     }
 
+    /// Another size, of which the film's crop keeps its share.
+    pub fn resize(&mut self, film: &FilmDesc, width: u32, height: u32) {
+        let before = (f64::from(self.width), f64::from(self.height));
+        (self.width, self.height) = (width, height);
+        let of_pixels = |[x0, x1, y0, y1]: [u32; 4]| {
+            let along = |pixel: u32, count: f64| f64::from(pixel) / count;
+            [along(x0, before.0), along(x1, before.0), along(y0, before.1), along(y1, before.1)]
+        };
+        let windows = film.pixel_bounds.map(of_pixels).into_iter().chain(film.crop_window);
+        self.crop = windows.map(|window| self.pixels_of(window)).reduce(|a, b| a.intersection(&b));
+    }
+
     /// The pixels whose upper left corners lie in a window x0, x1, y0, y1 of the picture, as shares in [0, 1].
     pub fn pixels_of(&self, [x0, x1, y0, y1]: [f64; 4]) -> PixelBounds {
         // A cast from a float saturates; NaN gives 0.
@@ -170,5 +182,39 @@ impl RenderOptions {
             FilterDesc::Triangle { radius } => (FilterShape::Triangle, radius),
         };
         Filter::new(shape, DVec2::new(radius.x.into(), radius.y.into())).ok_or(RenderError::Filter)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lumbre_scene::SceneDesc;
+
+    use super::*;
+
+    #[test]
+    fn another_size_keeps_the_share_of_the_film_s_crop() {
+        let bounds = |film: FilmDesc, size: Option<(u32, u32)>| {
+            let scene = Scene::build(SceneDesc { film: film.clone(), ..SceneDesc::default() }).unwrap();
+            let mut options = RenderOptions::of(&scene);
+            if let Some((width, height)) = size {
+                options.resize(&film, width, height);
+            }
+            let PixelBounds { x0, y0, x1, y1 } = options.bounds().unwrap();
+            [x0, x1, y0, y1]
+        };
+        let film = |crop_window, pixel_bounds| FilmDesc {
+            width: Some(200),
+            height: Some(100),
+            crop_window,
+            pixel_bounds,
+            ..FilmDesc::default()
+        };
+        let window = film(Some([0.25, 0.5, 0.1, 0.9]), None);
+        assert_eq!(bounds(window.clone(), None), [50, 100, 10, 90]);
+        assert_eq!(bounds(window, Some((64, 64))), [16, 32, 7, 58]);
+        let pixels = film(None, Some([50, 150, 20, 100]));
+        assert_eq!(bounds(pixels.clone(), None), [50, 150, 20, 100]);
+        assert_eq!(bounds(pixels, Some((40, 10))), [10, 30, 2, 10]);
+        assert_eq!(bounds(film(None, None), Some((40, 10))), [0, 40, 0, 10]);
     }
 }
