@@ -45,7 +45,9 @@ impl Cone {
         let length = check::positive("p1", (p2 - p1).length())?;
         let (cut1, cut2) = (r1 > 0.0, r2 > 0.0);
         let k = (r2 - r1) / length;
-        Ok(Self { body: Axial { p1, p2, axis, length, r1, r2, k, cut1, cut2, caps, phi_max: TAU, has_ends: true } })
+        Ok(Self {
+            body: Axial { p1, p2, axis, length, r1, r2, k, cut1, cut2, caps, phi_max: TAU, has_ends: true },
+        })
     }
 
     /// The pointed cone that opens from `apex` along `axis` (of any non-zero length), up to `height` along it, which may be

@@ -357,10 +357,7 @@ impl SecondDegree for Hyperboloid {
     #[inline]
     fn along<N: Number>(&self, p: [N; 3], d: [N; 3]) -> [N; 3] {
         let [ax, ay, rise] = std::array::from_fn(|i| N::difference(self.p2[i], self.p1[i]));
-        let reach = [
-            rise * N::from(self.p1.x) + p[2] * ax,
-            rise * N::from(self.p1.y) + p[2] * ay,
-        ];
+        let reach = [rise * N::from(self.p1.x) + p[2] * ax, rise * N::from(self.p1.y) + p[2] * ay];
         let growth = [d[2] * ax, d[2] * ay];
         let flat = |a: &[N], b: &[N]| a[0] * b[0] + a[1] * b[1];
         let square = rise * rise;

@@ -408,9 +408,8 @@ pub(crate) fn crossings(center: DVec3, radius: f64, ray: &Ray) -> Option<(f64, f
     let nearest = w - (h / a) * ray.direction;
     let (square, far) = (radius * radius, w.length_squared());
     let depth = square - nearest.length_squared();
-    // Below a quarter of the radius, half the chord has lost digits; from far away, more.
-    let shallow = 0.06 * square;
-    let is_certain = depth * depth > shallow * shallow + 1e-28 * square * far;
+    // False for a NaN.
+    let is_certain = depth * depth > 1e-28 * square * far;
     if is_certain {
         quadratic(a, h, far - square, a * depth)
     } else {
@@ -420,12 +419,7 @@ pub(crate) fn crossings(center: DVec3, radius: f64, ray: &Ray) -> Option<(f64, f
 
 #[cold]
 #[inline(never)]
-fn exact_crossings(
-    center: DVec3,
-    radius: f64,
-    ray: &Ray,
-    [a, h, c, delta]: [f64; 4],
-) -> Option<(f64, f64)> {
+fn exact_crossings(center: DVec3, radius: f64, ray: &Ray, [a, h, c, delta]: [f64; 4]) -> Option<(f64, f64)> {
     let solution = solution(center, radius, ray, -h / a);
     if solution.is_finite { solution.crossings } else { quadratic(a, h, c, delta) }
 }

@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
 use lumbre_geometry::{
-    Aabb, BilinearPatch, Capsule, Cone, Csg, Cuboid, Cylinder, Disk, Hyperboloid, Paraboloid, PlacedShape, Plane,
-    Quadric, Ray, Roots, Shape, Sphere, Torus, Triangle,
+    Aabb, BilinearPatch, Capsule, Cone, Csg, Cuboid, Cylinder, Disk, Hyperboloid, Paraboloid, PlacedShape,
+    Plane, Quadric, Ray, Roots, Shape, Sphere, Torus, Triangle,
 };
 use lumbre_math::random::RandomStream;
 use lumbre_math::{DVec2, DVec3, Transform};
@@ -261,7 +261,7 @@ fn a_wire_is_hit_wherever_a_line_passes_through_it() {
             let mut found = Roots::new();
             wire.roots(&ray, &mut found);
             let before = found.iter().filter(|root| root.t < 3.0 * major).count();
-            let is_through = before % 2 == 1 && found.len() % 2 == 0;
+            let is_through = before % 2 == 1 && found.len().is_multiple_of(2);
             assert!(is_through, "{thinness} {depth} {ray:?} {found:?}");
             for root in &found {
                 let p = ray.at(root.t);
