@@ -11,7 +11,7 @@ use crate::nearest::{Meridian, under_similarity};
 use crate::shape::{sampled_by_area, two_crossings};
 use crate::sphere::sided;
 use crate::support::{arc_support, azimuth, bounds_from_support, cross_size, dot_size, length, unit};
-use crate::twofold::{Number, Twofold, components, cross, dot, point};
+use crate::twofold::{Number, Twofold, components, cross, dot, exact_point, point};
 use crate::{
     Aabb, BoundingVolume, NearestPoint, NoNearestPoint, Ray, Root, Surface, SurfaceSample, density, measure,
 };
@@ -65,6 +65,30 @@ fn nappe(a: f64, pair: Option<(f64, f64)>, growth: f64, radius: f64) -> Option<S
     Some([(low, LATERAL), (high, LATERAL)])
 }
 
+/// The axis of a body in twice the precision.
+struct Spine {
+    /// The point of it that places are relative to: a pointed end, where there is one.
+    base: DVec3,
+    axis: [Twofold; 3],
+    /// The square of its length.
+    square: Twofold,
+    /// What the radius grows by along it, and the radius at the base times the square.
+    rise: Twofold,
+    radius: Twofold,
+}
+
+impl Spine {
+    /// The signed radius at a place relative to the base, times the square.
+    fn radius_at(&self, p: [Twofold; 3]) -> Twofold {
+        self.radius + self.growth(p)
+    }
+
+    /// What that grows by along `d`.
+    fn growth(&self, d: [Twofold; 3]) -> Twofold {
+        self.rise * dot(d, self.axis)
+    }
+}
+
 impl Axial {
     fn is_whole(&self) -> bool {
         self.phi_max >= TAU
@@ -96,14 +120,34 @@ impl Axial {
 
         let a = across.length_squared() - g * g;
         let start = start(w, d, a, across.dot(offset) - e * g);
-        let (offset, e) = (offset + start * across, e + g * start);
+        let moved = start * d;
+        let p = w + moved;
+        let slack = 2.0 * (w.abs() + moved.abs()).element_sum();
+        if let Some(decided) = self.decided_span(ray, start, p, slack) {
+            return decided;
+        }
+        let p = exact_point(ray.origin, self.p1, start, d, p);
+        if let Some(decided) = self.decided_span(ray, start, p, 0.0) {
+            return decided;
+        }
+        self.exact_lateral_span(ray, start, p)
+    }
+
+    /// The span as far as doubles decide it, with the equation set up at the place `p` relative to p1, which is `slack` units of
+    /// the unit roundoff off.
+    #[inline]
+    fn decided_span(&self, ray: &Ray, start: f64, p: DVec3, slack: f64) -> Option<Option<Span>> {
+        let d = ray.direction;
+        let (across, offset) = (d.cross(self.axis), p.cross(self.axis));
+        let (e, g) = (self.r1 + self.k * p.dot(self.axis), self.k * d.dot(self.axis));
+        let a = across.length_squared() - g * g;
         let (h, c) = (across.dot(offset) - e * g, offset.length_squared() - e * e);
         let delta = h * h - a * c;
 
-        // Bounds on the errors, in units of the unit roundoff.
-        let (speed, slope) = (5.0 * d.length(), self.k.abs());
-        let reach = 5.0 * (w.length() + start.abs() * d.length());
-        let (across, offset) = (across.length(), offset.length());
+        // Bounds on the errors, in units of the unit roundoff, from sums of absolute values.
+        let (speed, slope) = (4.0 * d.abs().element_sum(), self.k.abs());
+        let reach = slack + 4.0 * p.abs().element_sum();
+        let (across, offset) = (across.abs().element_sum(), offset.abs().element_sum());
         let e_error = slope * reach + 2.0 * self.r1;
         let a_error = 2.0 * speed * (across + slope * g.abs());
         let h_error = across * reach + offset * speed + g.abs() * e_error + e.abs() * slope * speed;
@@ -115,38 +159,43 @@ impl Axial {
         let is_certain = a.abs() > f64::EPSILON * a_error
             && delta.abs() > f64::EPSILON * delta_error
             && (g == 0.0 || radius.abs() > 8.0 * f64::EPSILON * (e_error + (h / a).abs() * slope * speed));
-        if is_certain {
-            if delta < 0.0 && a > 0.0 {
-                return None;
-            }
-            if let Some((first, second)) = quadratic(a, h, c, delta)
-                && is_exact(start, [first, second], delta, [a_error, h_error, c_error])
-            {
-                let pair = Some((start + first, start + second));
-                return self.cut_at_apex(ray, nappe(a, pair, g, radius)?);
-            }
+        if !is_certain {
+            return None;
         }
-        self.exact_lateral_span(ray, start, [a, h, c, e, g])
+        if delta < 0.0 && a > 0.0 {
+            return Some(None);
+        }
+        let (first, second) = quadratic(a, h, c, delta)?;
+        // A ray that grazes the surface may lose digits in proportion.
+        let slope_of_f = (2.0 * delta.sqrt()).max(0.06 * across * e.abs());
+        let keeps_digits = is_exact(start, [first, second], slope_of_f, [a_error, h_error, c_error], 60.0);
+        let pair = Some((start + first, start + second));
+        keeps_digits.then(|| nappe(a, pair, g, radius).and_then(|span| self.cut_at_apex(ray, span)))
     }
 
-    /// As [`Axial::lateral_span`], in twice the precision; `rough` are a, h, c, e and g at `start` for want of that.
+    /// As [`Axial::lateral_span`], in twice the precision, and at the place `p` by `start` for want of that.
     #[cold]
     #[inline(never)]
-    fn exact_lateral_span(&self, ray: &Ray, start: f64, rough: [f64; 5]) -> Option<Span> {
-        let solution = self.solution(ray, start);
+    fn exact_lateral_span(&self, ray: &Ray, start: f64, p: DVec3) -> Option<Span> {
+        // Near a pointed end, where everything cancels, from the point nearest to that.
+        let near_tip = self.r1 == 0.0 || self.r2 == 0.0;
+        let from_tip = if near_tip { self.way_to_tip(ray) } else { start };
+        let (spine, solution) = self.solution(ray, from_tip);
+        let (radius, growth) = (spine.radius_at(solution.place), spine.growth(components(ray.direction)));
         let ([a, h, c, e, g], pair) = if solution.is_finite {
-            let (radius, growth) = (self.radius(solution.place), self.radius_growth(ray));
             let numbers = [solution.a, solution.h, solution.c, radius, growth].map(|x| x.high);
             (numbers, solution.crossings)
         } else {
-            let [a, h, c, ..] = rough;
+            let (across, offset) = (ray.direction.cross(self.axis), p.cross(self.axis));
+            let (e, g) = (self.r1 + self.k * p.dot(self.axis), self.k * ray.direction.dot(self.axis));
+            let a = across.length_squared() - g * g;
+            let (h, c) = (across.dot(offset) - e * g, offset.length_squared() - e * e);
             let pair = quadratic(a, h, c, (h * h - a * c).max(0.0));
-            (rough, pair.map(|(first, second)| (start + first, start + second)))
+            ([a, h, c, e, g], pair.map(|(first, second)| (start + first, start + second)))
         };
         if a != 0.0 {
             let middle = if solution.is_finite {
-                let growth = self.radius_growth(ray);
-                (self.radius(solution.place) - growth * (solution.h / solution.a)).high
+                (radius - growth * (solution.h / solution.a)).high
             } else {
                 e - g * (h / a)
             };
@@ -172,6 +221,12 @@ impl Axial {
         self.cut_at_apex(ray, [(low, LATERAL), (high, LATERAL)])
     }
 
+    /// The parameter of the point nearest to the pointed end.
+    fn way_to_tip(&self, ray: &Ray) -> f64 {
+        let tip = if self.r2 == 0.0 { self.p2 } else { self.p1 };
+        (tip - ray.origin).dot(ray.direction) / ray.direction.length_squared()
+    }
+
     /// The part of the interval on the body's side of a pointed end.
     #[inline]
     fn cut_at_apex(&self, ray: &Ray, [near, far]: Span) -> Option<Span> {
@@ -189,49 +244,38 @@ impl Axial {
         Some([cut(near, low, high), cut(far, low, high)])
     }
 
-    /// The axis in twice the precision, of about unit length: between the ends, where there are two.
-    fn spine(&self) -> [Twofold; 3] {
+    /// The axis in twice the precision: between the ends, where there are two.
+    fn spine(&self) -> Spine {
+        // Of about unit length, so that no product over- or underflows.
+        let is_ordinary = 1e-20 < self.length && self.length < 1e20;
+        let scale = if is_ordinary { 1.0 } else { (-self.length.log2().floor()).exp2() };
         if !self.has_ends {
-            return components(self.axis);
+            let axis = components(self.axis);
+            let square = dot(axis, axis);
+            let (rise, radius) = (Twofold::from(self.k) * square, Twofold::from(self.r1) * square);
+            return Spine { base: self.p1, axis, square, rise, radius };
         }
-        let scale = Twofold::from((-self.length.log2().floor()).exp2());
-        std::array::from_fn(|i| Twofold::difference(self.p2[i], self.p1[i]) * scale)
-    }
-
-    /// What the radius grows by along the spine, times the square of its length.
-    fn rise(&self) -> Twofold {
-        if self.has_ends {
-            let scale = Twofold::from((-self.length.log2().floor()).exp2());
-            Twofold::difference(self.r2, self.r1) * scale
-        } else {
-            Twofold::from(self.k) * dot(self.spine(), self.spine())
-        }
-    }
-
-    /// The signed radius at a place relative to p1, times the square of the spine's length.
-    fn radius(&self, p: [Twofold; 3]) -> Twofold {
-        let spine = self.spine();
-        Twofold::from(self.r1) * dot(spine, spine) + self.rise() * dot(p, spine)
-    }
-
-    /// What [`Axial::radius`] grows by with `t`.
-    fn radius_growth(&self, ray: &Ray) -> Twofold {
-        self.rise() * dot(components(ray.direction), self.spine())
+        let scale = Twofold::from(scale);
+        let axis = std::array::from_fn(|i| Twofold::difference(self.p2[i], self.p1[i]) * scale);
+        let square = dot(axis, axis);
+        let rise = Twofold::difference(self.r2, self.r1) * scale;
+        let (base, radius) = if self.r2 == 0.0 { (self.p2, 0.0) } else { (self.p1, self.r1) };
+        Spine { base, axis, square, rise, radius: Twofold::from(radius) * square }
     }
 
     /// The equation of the lateral surface, in twice the precision: F(t) times the fourth power of the spine's length.
-    fn solution(&self, ray: &Ray, start: f64) -> Solution {
+    fn solution(&self, ray: &Ray, start: f64) -> (Spine, Solution) {
         let spine = self.spine();
-        let square = dot(spine, spine);
-        Solution::new(ray.origin, self.p1, ray.direction, start, |p, d| {
-            let (across, offset) = (cross(d, spine), cross(p, spine));
-            let (e, g) = (self.radius(p), self.rise() * dot(d, spine));
+        let solution = Solution::new(ray.origin, spine.base, ray.direction, start, |p, d| {
+            let (across, offset) = (cross(d, spine.axis), cross(p, spine.axis));
+            let (e, g) = (spine.radius_at(p), spine.growth(d));
             [
-                square * dot(across, across) - g * g,
-                square * dot(across, offset) - e * g,
-                square * dot(offset, offset) - e * e,
+                spine.square * dot(across, across) - g * g,
+                spine.square * dot(across, offset) - e * g,
+                spine.square * dot(offset, offset) - e * e,
             ]
-        })
+        });
+        (spine, solution)
     }
 
     /// The interval of the line between the cutting planes.
@@ -322,8 +366,9 @@ impl Axial {
             return (z, arm);
         }
         let start = -(ray.origin - base).dot(ray.direction) / ray.direction.length_squared();
-        let sharp = self.solution(ray, start).point(t, ray.direction);
-        sharp.map_or((z, arm), |w| split(w - (base - self.p1)))
+        let (spine, solution) = self.solution(ray, start);
+        let sharp = solution.point(t, ray.direction);
+        sharp.map_or((z, arm), |w| split(w + (spine.base - base)))
     }
 
     two_crossings!(pub(crate));

@@ -5,7 +5,7 @@ use lumbre_math::quadratic::quadratic;
 use lumbre_math::rounding::gamma;
 
 use crate::support::{length, on_side_of, unit};
-use crate::twofold::{Bounded, Number, Twofold, components, place, point};
+use crate::twofold::{Bounded, Number, Twofold, components, exact_point, place, point};
 use crate::{Ray, Root};
 
 /// A surface F = 0 of the second degree.
@@ -33,27 +33,48 @@ pub(crate) fn crossings(surface: &impl SecondDegree, ray: &Ray) -> Option<(f64, 
     let start = start(ray.origin - surface.center(), d, a, h);
     let moved = start * d;
     let p = w + moved;
-    let slack = w.abs() + moved.abs() + p.abs();
-    let carried = std::array::from_fn(|i| Bounded { value: p[i], error: slack[i] });
-    let [a, h, c] = surface.along(carried, components(d));
-    let delta = h * h - a * c;
-    if delta.is_certain() {
-        if delta.value < 0.0 {
-            return None;
-        }
-        if let Some((first, second)) = quadratic(a.value, h.value, c.value, delta.value)
-            && is_exact(start, [first, second], delta.value, [a.error, h.error, c.error])
-        {
-            return Some((start + first, start + second));
-        }
+    // Twice: errors come nearer to this bound than to the others.
+    let slack = 2.0 * (w.abs() + moved.abs() + p.abs());
+    if let Some(decided) = decided(surface, d, start, p, slack) {
+        return decided;
+    }
+    let p = exact_point(ray.origin, surface.base(), start, d, p);
+    if let Some(decided) = decided(surface, d, start, p, p.abs()) {
+        return decided;
     }
     let exact = Solution::new(ray.origin, surface.base(), d, start, |p, d| surface.along(p, d));
     if exact.is_finite {
         exact.crossings
     } else {
-        let (first, second) = quadratic(a.value, h.value, c.value, delta.value)?;
+        let [a, h, c] = surface.along(p.to_array(), d.to_array());
+        let (first, second) = quadratic(a, h, c, h * h - a * c)?;
         Some((start + first, start + second))
     }
+}
+
+/// The crossings as far as doubles decide them, with the equation set up at the place `p`, which is `slack` units of the unit
+/// roundoff off.
+#[inline]
+fn decided(
+    surface: &impl SecondDegree,
+    d: DVec3,
+    start: f64,
+    p: DVec3,
+    slack: DVec3,
+) -> Option<Option<(f64, f64)>> {
+    let carried = std::array::from_fn(|i| Bounded { value: p[i], error: slack[i] });
+    let [a, h, c] = surface.along(carried, components(d));
+    let delta = h * h - a * c;
+    if !delta.is_certain() {
+        return None;
+    }
+    if delta.value < 0.0 {
+        return Some(None);
+    }
+    let (first, second) = quadratic(a.value, h.value, c.value, delta.value)?;
+    let errors = [a.error, h.error, c.error];
+    let keeps_digits = is_exact(start, [first, second], 2.0 * delta.value.sqrt(), errors, 32.0);
+    keeps_digits.then_some(Some((start + first, start + second)))
 }
 
 /// The parameter to set the equation up at: the middle of the crossings, if that is not much farther from the surface's
@@ -66,19 +87,18 @@ pub(crate) fn start(w: DVec3, d: DVec3, a: f64, h: f64) -> f64 {
     if is_near { middle } else { -w.dot(d) / dd }
 }
 
-/// Whether the errors of the coefficients, in units of the unit roundoff, leave both crossings their digits.
+/// Whether the errors of the coefficients, in units of the unit roundoff, leave both crossings their digits, where F's
+/// derivative is `slope`: the bounds may be `tolerance` units of `t`, for they are sums of absolute values, of which rounding
+/// errors hardly ever reach a tenth.
 #[inline]
-pub(crate) fn is_exact(start: f64, roots: [f64; 2], delta: f64, [a, h, c]: [f64; 3]) -> bool {
-    // The bounds are sums of absolute values, which rounding errors hardly ever reach a tenth of.
-    const TOLERANCE: f64 = 24.0;
-    let slope = 2.0 * delta.sqrt();
+pub(crate) fn is_exact(start: f64, roots: [f64; 2], slope: f64, [a, h, c]: [f64; 3], tolerance: f64) -> bool {
     roots.into_iter().all(|root| {
         let (s, t) = (root.abs(), (start + root).abs());
         // A ray that starts at a crossing has no digits of that one to keep.
         let size = if t > 1e-6 * start.abs() { t } else { start.abs() };
         let error = c + s * (2.0 * h + s * a) + 4.0 * s * slope;
         // False for a NaN, and for a root at infinity.
-        error < TOLERANCE * slope * size
+        error < tolerance * slope * size
     })
 }
 
@@ -213,7 +233,8 @@ pub(crate) fn plane_crossing(ray: &Ray, point: DVec3, normal: DVec3) -> (f64, f6
     let (along, away) = (d.dot(normal), to_point.dot(normal));
     let size = normal.abs();
     // Where much cancels, digits are lost.
-    let keeps_digits = 4.0 * along.abs() >= d.abs().dot(size) && 4.0 * away.abs() >= to_point.abs().dot(size);
+    let keeps_digits =
+        64.0 * along.abs() >= d.abs().dot(size) && 64.0 * away.abs() >= to_point.abs().dot(size);
     if keeps_digits && along != 0.0 {
         (away / along, along)
     } else {
@@ -223,17 +244,25 @@ pub(crate) fn plane_crossing(ray: &Ray, point: DVec3, normal: DVec3) -> (f64, f6
 
 #[inline(never)]
 fn exact_plane_crossing(ray: &Ray, point: DVec3, normal: DVec3) -> (f64, f64) {
-    let (mut along, mut away) = (Twofold::ZERO, Twofold::ZERO);
-    for i in 0..3 {
-        along = along + Twofold::product(ray.direction[i], normal[i]);
-        away = away + Twofold::difference(point[i], ray.origin[i]) * Twofold::from(normal[i]);
-    }
-    let t = (away / along).high;
-    if t.is_finite() || along.high == 0.0 {
-        return (t, along.high);
+    let n = normal.to_array();
+    let along = exact_dot(ray.direction.to_array().map(Twofold::from), n);
+    let away = exact_dot(std::array::from_fn(|i| Twofold::difference(point[i], ray.origin[i])), n);
+    let t = away / along;
+    if t.is_finite() || along == 0.0 {
+        return (t, along);
     }
     let along = ray.direction.dot(normal);
     ((point - ray.origin).dot(normal) / along, along)
+}
+
+/// The dot product, rounded to about a unit in the last place however much cancels.
+///
+/// T. Ogita, S. M. Rump, S. Oishi, "Accurate sum and dot product", SIAM Journal on Scientific Computing, 2005.
+fn exact_dot(a: [Twofold; 3], n: [f64; 3]) -> f64 {
+    let [x, y, z] = std::array::from_fn(|i| a[i].times(n[i]));
+    let first = Twofold::sum(x.high, y.high);
+    let sum = Twofold::sum(first.high, z.high);
+    sum.high + ((x.low + y.low + z.low) + (first.low + sum.low))
 }
 
 /// An implicit function F at a point: its value and derivatives.

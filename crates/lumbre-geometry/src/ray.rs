@@ -53,8 +53,8 @@ impl Ray {
     /// Whether products of the direction with itself and with ordinary lengths neither overflow nor vanish.
     #[inline]
     pub(crate) fn has_ordinary_direction(&self) -> bool {
-        let largest = self.direction.abs().max_element();
-        1e-40 < largest && largest < 1e40
+        let squared = self.direction.length_squared();
+        1e-80 < squared && squared < 1e80
     }
 
     /// The same ray with a direction of about unit length, and the power of two that takes its `t` to the given ray's, in two

@@ -6,6 +6,7 @@ use crate::{Ray, Root, Roots, Surface};
 
 /// The first of the roots that `solve` appends.
 #[cold]
+#[inline(never)]
 pub(crate) fn closest(ray: &Ray, solve: impl FnOnce(&Ray, &mut Roots)) -> Option<Root> {
     let mut found = Roots::new();
     roots(ray, &mut found, solve);
@@ -14,6 +15,7 @@ pub(crate) fn closest(ray: &Ray, solve: impl FnOnce(&Ray, &mut Roots)) -> Option
 
 /// Appends the roots that `solve` finds along the scaled ray, where `t` of the given one is a number in its range.
 #[cold]
+#[inline(never)]
 pub(crate) fn roots(ray: &Ray, out: &mut Roots, solve: impl FnOnce(&Ray, &mut Roots)) {
     let Some((scaled, [one, other])) = ray.with_direction_scaled() else {
         return;
@@ -26,6 +28,7 @@ pub(crate) fn roots(ray: &Ray, out: &mut Roots, solve: impl FnOnce(&Ray, &mut Ro
 
 /// The surface that `solve` finds along the scaled ray.
 #[cold]
+#[inline(never)]
 pub(crate) fn surface(ray: &Ray, root: &Root, solve: impl FnOnce(&Ray, &Root) -> Surface) -> Surface {
     match ray.with_direction_scaled() {
         Some((scaled, [one, other])) => solve(&scaled, &Root { t: root.t * one * other, ..*root }),
@@ -36,6 +39,7 @@ pub(crate) fn surface(ray: &Ray, root: &Root, solve: impl FnOnce(&Ray, &Root) ->
 
 /// The density that `solve` finds along the scaled ray.
 #[cold]
+#[inline(never)]
 pub(crate) fn pdf_direction(ray: &Ray, solve: impl FnOnce(&Ray) -> f64) -> f64 {
     ray.with_direction_scaled().map_or(0.0, |(scaled, _)| solve(&scaled))
 }

@@ -408,9 +408,8 @@ pub(crate) fn crossings(center: DVec3, radius: f64, ray: &Ray) -> Option<(f64, f
     let nearest = w - (h / a) * ray.direction;
     let (square, far) = (radius * radius, w.length_squared());
     let depth = square - nearest.length_squared();
-    // Below a quarter of the radius, half the chord has lost digits; from far away, more.
-    let shallow = 0.06 * square;
-    let is_certain = depth * depth > shallow * shallow + 1e-28 * square * far;
+    // False for a NaN.
+    let is_certain = depth * depth > 1e-28 * square * far;
     if is_certain {
         quadratic(a, h, far - square, a * depth)
     } else {

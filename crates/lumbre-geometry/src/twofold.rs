@@ -108,7 +108,7 @@ impl Mul for Bounded {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Twofold {
     pub(crate) high: f64,
-    low: f64,
+    pub(crate) low: f64,
 }
 
 impl Twofold {
@@ -134,6 +134,13 @@ impl Twofold {
     fn normalized(high: f64, low: f64) -> Self {
         let sum = high + low;
         Self { high: sum, low: low - (sum - high) }
+    }
+
+    /// This times a double, not yet normalised.
+    #[inline]
+    pub(crate) fn times(self, x: f64) -> Self {
+        let product = Self::product(self.high, x);
+        Self { high: product.high, low: product.low + self.low * x }
     }
 
     pub(crate) fn sqrt(self) -> Self {
@@ -184,7 +191,8 @@ impl Sub for Twofold {
     #[inline]
     #[expect(clippy::suspicious_arithmetic_impl, reason = "the negation is exact")]
     fn sub(self, other: Self) -> Self {
-        self + other.negated()
+        let difference = Self::difference(self.high, other.high);
+        Self::normalized(difference.high, difference.low + (self.low - other.low))
     }
 }
 
@@ -215,12 +223,22 @@ pub(crate) fn place(origin: DVec3, base: DVec3, t: f64, direction: DVec3) -> [Tw
     std::array::from_fn(|i| Twofold::difference(origin[i], base[i]) + Twofold::product(t, direction[i]))
 }
 
-/// The same point rounded once, so that nothing of the way there is lost.
+/// The same point rounded, with nothing lost on a long way there.
 #[inline]
 pub(crate) fn point(origin: DVec3, base: DVec3, t: f64, direction: DVec3) -> DVec3 {
+    let moved = t * direction;
+    let near = (origin - base) + moved;
+    // False for a NaN.
+    let is_close = moved.abs().max_element() <= 16.0 * near.abs().max_element();
+    if is_close { near } else { exact_point(origin, base, t, direction, near) }
+}
+
+/// The same point rounded once, or `rough` where a product over- or underflows.
+#[inline(never)]
+pub(crate) fn exact_point(origin: DVec3, base: DVec3, t: f64, direction: DVec3, rough: DVec3) -> DVec3 {
     let exact = DVec3::from_array(place(origin, base, t, direction).map(|x| x.high));
     // Splitting overflows slightly before the product does.
-    if exact.is_finite() { exact } else { (origin - base) + t * direction }
+    if exact.is_finite() { exact } else { rough }
 }
 
 #[cfg(test)]
