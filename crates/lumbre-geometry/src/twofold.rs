@@ -189,7 +189,6 @@ impl Sub for Twofold {
     type Output = Self;
 
     #[inline]
-    #[expect(clippy::suspicious_arithmetic_impl, reason = "the negation is exact")]
     fn sub(self, other: Self) -> Self {
         let difference = Self::difference(self.high, other.high);
         Self::normalized(difference.high, difference.low + (self.low - other.low))
