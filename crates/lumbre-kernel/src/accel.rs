@@ -202,7 +202,7 @@ impl Accel {
         Self {
             bounding_volumes: BoundingVolumes::new(&geometries, &tree.entries, &tree_space),
             queries: Queries::new(isa, single.as_ref()),
-            f32_queries: F32Queries::new(isa, single.as_ref().filter(|_| !summary.has_seams)),
+            f32_queries: F32Queries::new(isa, single.as_ref()),
             single,
             tree_space,
             summary,
@@ -227,7 +227,7 @@ impl Accel {
     pub(crate) fn follow_tree(&mut self) {
         self.single = FilterStart::new(&self.summary, &self.tree_space, self.tree.root);
         self.queries = Queries::new(self.isa, self.single.as_ref());
-        self.f32_queries = self.f32_queries_new(self.isa);
+        self.f32_queries = F32Queries::new(self.isa, self.single.as_ref());
         self.bounding_volumes = BoundingVolumes::new(&self.geometries, &self.tree.entries, &self.tree_space);
         self.moments = OnceLock::new();
     }
@@ -458,13 +458,9 @@ impl Accel {
         if isa == self.isa { self.queries } else { Queries::new(isa, self.single.as_ref()) }
     }
 
-    fn f32_queries_new(&self, isa: Isa) -> Option<F32Queries> {
-        F32Queries::new(isa, self.single.as_ref().filter(|_| !self.summary.has_seams))
-    }
-
     /// The same in single precision; `None` where they are asked in double.
     pub(crate) fn f32_queries_at(&self, isa: Isa) -> Option<F32Queries> {
-        if isa == self.isa { self.f32_queries } else { self.f32_queries_new(isa) }
+        if isa == self.isa { self.f32_queries } else { F32Queries::new(isa, self.single.as_ref()) }
     }
 
     /// The nearest point of all surfaces within `max_distance` (itself included; infinite for anywhere), or `None` where there

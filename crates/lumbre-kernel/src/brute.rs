@@ -2,7 +2,6 @@
 
 use lumbre_geometry::Ray;
 
-use crate::geometry::is_kept;
 use crate::intersect::watertight::{Shear, intersect};
 use crate::trace::edges::{Patch, Triangle, intersect_precise, visit_borders_of_all};
 use crate::trace::exact::{Visitor, visit_primitive};
@@ -39,7 +38,9 @@ fn visit(accel: &Accel, ray: &Ray, visitor: &mut dyn Visitor) {
                     let origin = shear.local_origin(&ray.origin, &mesh.origin);
                     for (primitive, triangle) in mesh.indices.iter().enumerate() {
                         let corners = triangle.map(|vertex| mesh.positions[vertex as usize].to_array());
-                        if !is_kept(&corners.map(lumbre_math::Vec3::from_array)) {
+                        let [a, b, c] =
+                            corners.map(|corner| lumbre_math::Vec3::from_array(corner).as_dvec3());
+                        if (b - a).cross(c - a) == lumbre_math::DVec3::ZERO {
                             continue;
                         }
                         let permuted = corners.map(|corner| {

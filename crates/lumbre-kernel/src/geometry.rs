@@ -144,13 +144,6 @@ pub trait CustomGeometry: Debug + Send + Sync {
     }
 }
 
-/// Whether a triangle stands in a tree: one whose corners are on a line may stitch a mesh, one with two corners in one place cannot.
-#[inline(always)]
-pub(crate) fn is_kept(corners: &[Vec3; 3]) -> bool {
-    let &[a, b, c] = corners;
-    has_area(corners) || (a != b && b != c && c != a)
-}
-
 /// Whether a triangle can be hit at all, as double precision sees it.
 #[inline(always)]
 pub(crate) fn has_area(&[a, b, c]: &[Vec3; 3]) -> bool {

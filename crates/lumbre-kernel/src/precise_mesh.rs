@@ -25,12 +25,6 @@ impl PreciseMesh {
     }
 }
 
-/// Whether a triangle stands in a tree: see [`crate::geometry::is_kept`].
-pub(crate) fn is_kept(corners: &[DVec3; 3]) -> bool {
-    let &[a, b, c] = corners;
-    has_area(corners) || (a != b && b != c && c != a)
-}
-
 /// Whether a triangle can be hit at all: whether its sides, as double precision has them, are not parallel.
 pub(crate) fn has_area(&[a, b, c]: &[DVec3; 3]) -> bool {
     let (e, f) = (b - a, c - a);

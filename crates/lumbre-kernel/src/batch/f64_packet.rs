@@ -593,7 +593,7 @@ impl<G: FilteredGoal, const GENERAL: bool> F64Bundle<'_, '_, G, GENERAL> {
     #[inline(always)]
     fn winner<L: Simd>(&self, decider: &Decider, met: &Met, i: usize, ray: &Ray) -> Option<Winner> {
         let (best, t) = (self.best(i), met.t.0[i]);
-        if t.is_nan() || decider.is_flat(best.block, best.lane) {
+        if t.is_nan() {
             // Uncertain: by itself, and exactly.
             return decider.winner::<L>(ray, self.axes, &best);
         }

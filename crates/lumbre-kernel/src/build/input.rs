@@ -15,7 +15,7 @@ use crate::build::collapse::lay_out;
 use crate::build::open_instances;
 use crate::build::outline::Outline;
 use crate::build::primitive::{Bounds, Kind, Primitive, Traits};
-use crate::geometry::is_kept;
+use crate::geometry::has_area;
 use crate::intersect::{Dispatch, Isa, Simd};
 use crate::precise_mesh;
 use crate::tree::BLOCK;
@@ -129,7 +129,7 @@ pub(crate) struct Parts {
     pub(crate) surveys: Vec<Survey>,
     /// Of all meshes.
     pub(crate) triangles: usize,
-    /// Whether there are others, which have no area and two corners in one place.
+    /// Whether there are others, which have no area.
     pub(crate) has_flat: bool,
     /// Of every cloud of spheres.
     pub(crate) clouds: Vec<CloudSurvey>,
@@ -142,7 +142,7 @@ pub(crate) struct Parts {
 /// What was seen of a mesh.
 pub(crate) struct Survey {
     pub(crate) geometry: u32,
-    /// Triangles that stand in the tree.
+    /// Triangles that have an area.
     pub(crate) triangles: usize,
     /// The same of every [`CHUNK`] triangles.
     pub(crate) chunks: Vec<u32>,
@@ -258,7 +258,7 @@ impl Parts {
         MOST_PRIMITIVES - self.count()
     }
 
-    /// The triangles of a mesh in double precision that stand in the tree.
+    /// The triangles of a mesh in double precision that have an area.
     fn add_precise(&mut self, position: usize, mesh: &PreciseMesh, room: usize) -> Result<(), BuildError> {
         if mesh.indices.len() > room {
             return Err(BuildError::TooMany);
@@ -272,7 +272,7 @@ impl Parts {
         }
         for primitive in 0..mesh.indices.len() as u32 {
             let corners = mesh.corners(primitive);
-            if precise_mesh::is_kept(&corners) {
+            if precise_mesh::has_area(&corners) {
                 let bounds = Aabb::around(corners);
                 self.tree_bounds = self.tree_bounds.union(bounds);
                 self.boxed.push(Boxed { bounds, geometry: position as u32, primitive });
@@ -315,7 +315,7 @@ fn least_chunks(mesh: &TriangleMesh) -> usize {
     if mesh.indices.len() > PARALLEL { 1 } else { usize::MAX }
 }
 
-/// Checks a mesh, and finds the box around its triangles that stand in the tree, and their sizes.
+/// Checks a mesh, and finds the box around its triangles that have an area, and their sizes.
 fn survey_mesh(position: usize, mesh: &TriangleMesh) -> Result<(Survey, Aabb, Sizes), BuildError> {
     if !mesh.origin.is_finite() {
         return Err(BuildError::NotFinite { geometry: position, element: 0 });
@@ -354,7 +354,7 @@ fn survey_mesh(position: usize, mesh: &TriangleMesh) -> Result<(Survey, Aabb, Si
     Ok((survey, bounds, Sizes { largest_corner, longest_side, ..Sizes::default() }))
 }
 
-/// Looks at some triangles: the box around those that stand in the tree, the longest side of a box around one of them, and how many they are;
+/// Looks at some triangles: the box around those that have an area, the longest side of a box around one of them, and how many they are;
 /// or the place of one that lacks a vertex.
 struct SurveyChunk<'a> {
     mesh: &'a TriangleMesh,
@@ -370,7 +370,7 @@ impl Dispatch for SurveyChunk<'_> {
         let (mut bounds, mut sides, mut count) = (MeshBox::EMPTY, [0.0f32; 4], 0);
         for (place, triangle) in triangles.iter().enumerate() {
             let Some(corners) = corners(mesh, triangle) else { return Err(place) };
-            if is_kept(&corners) {
+            if has_area(&corners) {
                 count += 1;
                 let around = MeshBox::around(&corners);
                 bounds.grow(&around);
@@ -491,7 +491,7 @@ impl Boxer {
     }
 }
 
-/// Writes down the boxes of the triangles that stand in the tree.
+/// Writes down the boxes of the triangles that have an area.
 fn box_triangles(mesh: &TriangleMesh, survey: &Survey, tree_space: &TreeSpace, mut places: &mut [Primitive]) {
     let chunks: Vec<(usize, &mut [Primitive])> = survey
         .chunks
@@ -522,12 +522,12 @@ impl Dispatch for BoxChunk<'_> {
         let Self { mesh, boxer, geometry, first, places } = self;
         let rest = &mesh.indices[first..];
         let triangles = &rest[..rest.len().min(CHUNK)];
-        // Where all are kept, none has to be asked again.
-        let all_are_kept = places.len() == triangles.len();
+        // Where all have an area, none has to be asked again.
+        let all_have_area = places.len() == triangles.len();
         let mut places = places.iter_mut();
         for (primitive, triangle) in (first as u32..).zip(triangles) {
             let Some(corners) = corners(mesh, triangle) else { continue };
-            if (all_are_kept || is_kept(&corners))
+            if (all_have_area || has_area(&corners))
                 && let Some(place) = places.next()
             {
                 *place = boxer.around::<L>(&corners, geometry, primitive);

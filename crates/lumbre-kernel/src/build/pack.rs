@@ -3,7 +3,7 @@
 use lumbre_math::Vec3;
 use rayon::prelude::*;
 
-use crate::geometry::is_kept;
+use crate::geometry::has_area;
 use crate::intersect::{Dispatch, Isa, Simd};
 use crate::simd;
 use crate::tree::BLOCK;
@@ -163,7 +163,7 @@ impl PackShare<'_> {
             for lane in 0..names.primitives().count() {
                 let primitive = names.primitives[order.lane_before(lane)];
                 let corners = mesh.indices[primitive as usize].map(|vertex| mesh.positions[vertex as usize]);
-                head.taken |= u32::from(!may_lack_area || is_kept(&corners)) << lane;
+                head.taken |= u32::from(!may_lack_area || has_area(&corners)) << lane;
                 put_corners(words, &head, lane, &corners);
             }
             head.put(words);
@@ -231,7 +231,7 @@ impl Dispatch for MoveShare<'_> {
             head.taken = 0;
             for (lane, primitive) in names.primitives().enumerate() {
                 let corners = mesh.indices[primitive as usize].map(|vertex| mesh.positions[vertex as usize]);
-                head.taken |= u32::from(!may_lack_area || is_kept(&corners)) << lane;
+                head.taken |= u32::from(!may_lack_area || has_area(&corners)) << lane;
                 put_corners(words, &head, lane, &corners);
                 triangles[lane] = corners;
                 len += 1;

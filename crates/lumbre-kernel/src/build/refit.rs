@@ -10,7 +10,7 @@ use crate::build::clouds::box_of;
 use crate::build::input::{Boxer, Parts, take_apart, units_of};
 use crate::build::open_instances::{self, Families};
 use crate::build::primitive::Bounds;
-use crate::geometry::is_kept;
+use crate::geometry::has_area;
 use crate::intersect::Portable;
 use crate::tree::node::{Node, TreeSpace, tag};
 use crate::tree::packed::Entry;
@@ -262,7 +262,7 @@ fn check_triangles(accel: &Accel, geometries: &[Geometry]) -> Result<(), RefitEr
         }
         let missing = (0..mesh.indices.len()).find(|&triangle| {
             let corners = mesh.indices[triangle].map(|vertex| mesh.positions[vertex as usize]);
-            !has_place[triangle] && is_kept(&corners)
+            !has_place[triangle] && has_area(&corners)
         });
         if let Some(element) = missing {
             return Err(RefitError::NeedsBuild { geometry, element });

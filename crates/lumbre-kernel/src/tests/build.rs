@@ -233,8 +233,9 @@ fn boxes_hold_their_children_and_every_primitive_has_one_place() {
         .iter()
         .map(|geometry| match &geometry.kind {
             GeometryKind::Mesh(mesh) => {
-                let corners = |triangle: &[u32; 3]| triangle.map(|i| mesh.positions[i as usize]);
-                mesh.indices.iter().map(corners).filter(crate::geometry::is_kept).count()
+                let corners = |triangle: &[u32; 3]| triangle.map(|i| mesh.positions[i as usize].as_dvec3());
+                let has_area = |&[a, b, c]: &[DVec3; 3]| (b - a).cross(c - a) != DVec3::ZERO;
+                mesh.indices.iter().map(corners).filter(has_area).count()
             }
             GeometryKind::Spheres(cloud) => cloud.spheres.iter().filter(|sphere| sphere[3] > 0.0).count(),
             _ => 0,

@@ -112,8 +112,7 @@ fn has_one_sign(edges: [f64; 3]) -> bool {
 fn by_reference(accel: &Accel, ray: &Ray32) -> (Option<Hit32>, bool) {
     let start = accel.single.as_ref().expect("made for this");
     assert!(start.only_triangles);
-    let plain = PlainRay::new(start, ray).filter(|_| !accel.summary.has_seams);
-    let Some(plain) = plain else { return (widened(accel, ray), false) };
+    let Some(plain) = PlainRay::new(start, ray) else { return (widened(accel, ray), false) };
     let mut nearest: Option<(Hit32, bool)> = None;
     for (geometry, Geometry { id, kind }) in accel.geometries.iter().enumerate() {
         let GeometryKind::Mesh(mesh) = kind else { unreachable!("nothing but meshes") };

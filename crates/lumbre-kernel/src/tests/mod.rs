@@ -27,7 +27,6 @@ mod refit;
 mod ridges;
 mod save;
 pub(crate) mod scenes;
-mod seams;
 mod shims;
 mod single;
 mod small;

@@ -10,12 +10,11 @@ use lumbre_math::DVec3;
 use super::filtered::IN_INSTANCE;
 use super::{Outcome, Winner, edges, meets_front, precedes};
 use crate::intersect::filter_start::FilterStart;
-use crate::intersect::watertight::{self, EdgeTest, Feature, Inside, Meeting, Shear};
+use crate::intersect::watertight::{self, EdgeTest, Inside, Meeting, Shear};
 use crate::intersect::{Axes, Simd};
 use crate::simd;
 use crate::tree::BLOCK;
 use crate::tree::node::Node;
-use crate::tree::seams;
 use crate::tree::triangle_block::{Blocks, TriangleBlock};
 use crate::{Accel, GeometryKind};
 
@@ -316,23 +315,7 @@ impl<'a> Decider<'a> {
         let shear = Shear::new(&ray.direction);
         let origin = shear.local_origin(&ray.origin, &DVec3::from_slice(&self.start.mesh_origin));
         let corners = shear.axes.gather(self.block(block), lane as usize);
-        match watertight::intersect(ray, shear, origin, corners) {
-            // The exact traversal knows whose crossing it is.
-            Meeting::Hit { root, is_front } if self.is_flat(block, lane) => {
-                Meeting::Touch { root, is_owned: true, feature: Feature::EdgeOn, is_front }
-            }
-            meeting => meeting,
-        }
-    }
-
-    /// Whether a triangle has no area.
-    #[inline(always)]
-    pub(crate) fn is_flat(&self, block: u32, lane: u32) -> bool {
-        if !self.accel.summary.has_seams {
-            return false;
-        }
-        let (geometry, primitive) = self.ids(block, lane);
-        seams::is_flat(self.accel, geometry, primitive)
+        watertight::intersect(ray, shear, origin, corners)
     }
 
     /// The crossing of a triangle in the ray's range, if there is one, and whether it meets the front.
@@ -348,7 +331,6 @@ impl<'a> Decider<'a> {
         let corners = self.block(block);
         let found = match L::pass(corners, lane as usize, &shear, &origin) {
             (EdgeTest::Outside, _) => None,
-            (EdgeTest::Inside, _) if self.is_flat(block, lane) => return Outcome::Uncertain,
             (EdgeTest::Inside, inside) => {
                 let t = inside.t(&shear);
                 watertight::is_in_range(ray, t).then(|| (inside.root(t), inside.det > 0.0))
@@ -388,9 +370,6 @@ impl<'a> Decider<'a> {
         axes: &'static Axes,
         &Candidate { block, lane, .. }: &Candidate,
     ) -> Option<Winner> {
-        if self.is_flat(block, lane) {
-            return None;
-        }
         let (shear, origin) = L::shear(simd::opaque(ray), axes, &self.start.mesh_origin);
         let corners = self.block(block);
         let (edge_test, inside) = L::pass(corners, lane as usize, &shear, &origin);

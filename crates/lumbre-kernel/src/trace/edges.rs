@@ -17,8 +17,7 @@ use super::Context;
 use super::exact::{self, Crossing, Visitor, Wanted};
 use crate::intersect::Isa;
 use crate::intersect::watertight::{self, Feature, Meeting, Shear};
-use crate::precise_mesh::is_kept;
-use crate::tree::seams;
+use crate::precise_mesh::has_area;
 use crate::{Accel, GeometryKind};
 
 /// A face, a triangle or a bilinear patch, whose edges or corners a ray hits exactly.
@@ -58,11 +57,6 @@ impl EdgeHit<'_> {
     fn crossing<'c>(&'c self, ray: &'c Ray) -> Crossing<'c> {
         let &Self { root, is_front, geometry, primitive, order, accel, ref context, .. } = self;
         Crossing { root, first: root, geometry, primitive, order, is_front, ray, accel, context }
-    }
-
-    /// Whether the face has no area, and so no crossing of its own.
-    fn is_flat(&self) -> bool {
-        !self.is_patch() && seams::is_flat(self.accel, self.geometry, self.primitive)
     }
 
     fn is_patch(&self) -> bool {
@@ -208,14 +202,6 @@ impl<'a> Triangle<'a> {
                 (root, is_front)
             }
         };
-        let (primitive, root) = if seams::is_flat(accel, geometry, primitive) {
-            match seams::neighbour(accel, geometry, primitive, root) {
-                Some(neighbour) => neighbour,
-                None => return false,
-            }
-        } else {
-            (primitive, root)
-        };
         let is_front = Some(is_front);
         let (first, order) = (root, 0);
         visitor.visit(&Crossing { root, first, geometry, primitive, order, is_front, ray, accel, context })
@@ -227,7 +213,7 @@ pub(crate) fn intersect_precise(accel: &Accel, ray: &Ray, geometry: u32, primiti
     let corners = accel.precise_corners(geometry, primitive);
     let meeting = watertight::intersect_precise(ray, Shear::new(&ray.direction), &corners);
     // After a refit, some in the tree may have lost their area.
-    if matches!(meeting, Meeting::Miss) || is_kept(&corners) { meeting } else { Meeting::Miss }
+    if matches!(meeting, Meeting::Miss) || has_area(&corners) { meeting } else { Meeting::Miss }
 }
 
 /// A corner by position; the two zeros are one.
@@ -306,7 +292,7 @@ fn at_borders(hits: &[EdgeHit]) -> Vec<usize> {
         for &i in group {
             match hits[i].place {
                 Place::Edge(edge) => {
-                    if !hits[i].is_owned && !edges[&edge].is_shared && !hits[i].is_flat() {
+                    if !hits[i].is_owned && !edges[&edge].is_shared {
                         result.push(i);
                     }
                 }
@@ -314,21 +300,13 @@ fn at_borders(hits: &[EdgeHit]) -> Vec<usize> {
                     let mut around = hits[i].edges().filter(|edge| edge.contains(&corner));
                     let is_open = around.any(|edge| !edges[&edge].is_shared);
                     let fan = fans.entry(corner).or_insert(Fan { is_owned: false, is_open: false, first: i });
-                    if hits[fan.first].is_flat() {
-                        fan.first = i;
-                    }
                     fan.is_owned |= hits[i].is_owned;
                     fan.is_open |= is_open;
                 }
                 Place::EdgeOn => {}
             }
         }
-        result.extend(
-            fans.into_values()
-                .filter(|fan| fan.is_open && !fan.is_owned)
-                .map(|fan| fan.first)
-                .filter(|&i| !hits[i].is_flat()),
-        );
+        result.extend(fans.into_values().filter(|fan| fan.is_open && !fan.is_owned).map(|fan| fan.first));
     }
     result
 }

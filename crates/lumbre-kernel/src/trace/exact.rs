@@ -25,7 +25,6 @@ use crate::tree::bounding_block::BoundingVolumeRay;
 use crate::tree::node::tag;
 use crate::tree::packed::Entry;
 use crate::tree::packed::Start;
-use crate::tree::seams;
 use crate::tree::summary::{Sizes, Summary};
 use crate::tree::triangle_block::{Blocks, TriangleBlock};
 use crate::{Accel, GeometryKind, Hit};
@@ -444,17 +443,6 @@ impl<'a, L: Simd> Frame<'a, L> {
                             continue;
                         }
                         let (geometry, primitive) = ids();
-                        if seams::is_flat(self.accel, geometry, primitive) {
-                            let meeting =
-                                watertight::Meeting::Hit { root: inside.root(t), is_front: inside.det > 0.0 };
-                            let corners = block.triangle(lane).map(|corner| corner.map(f64::from));
-                            let ids = (geometry, primitive);
-                            let triangle = edges::Triangle { corners, ids, accel: self.accel };
-                            if triangle.visit(meeting, &self.ray, context, visitor, edge_hits) {
-                                return true;
-                            }
-                            continue;
-                        }
                         let ids = (geometry, primitive, 0);
                         if self.visit(inside.root(t), ids, Some(inside.det > 0.0), context, visitor) {
                             return true;

@@ -21,7 +21,6 @@ use crate::tree::BLOCK;
 use crate::tree::bounding_block::BoundingVolumeRay;
 use crate::tree::node::tag;
 use crate::tree::packed::Entry;
-use crate::tree::seams;
 use crate::tree::sphere_block::SphereRay;
 use crate::tree::triangle_block::TriangleBlock;
 use crate::{Accel, GeometryKind};
@@ -460,9 +459,6 @@ impl<'a, const GENERAL: bool, const FILTERED: bool> FilteredRay<'a, '_, GENERAL,
                 match edges::intersect_precise(accel, ray, geometry, primitive) {
                     Meeting::Miss => {}
                     Meeting::Touch { .. } => return Some(Stop::Uncertain),
-                    Meeting::Hit { .. } if seams::is_flat(accel, geometry, primitive) => {
-                        return Some(Stop::Uncertain);
-                    }
                     Meeting::Hit { root, is_front } => {
                         let winner = Winner { root, geometry, primitive };
                         let takes = |query: &TreeQuery| query.takes_face(is_front) && query.accepts(&winner);

@@ -3,7 +3,6 @@
 pub(crate) mod bounding_block;
 pub(crate) mod node;
 pub(crate) mod packed;
-pub(crate) mod seams;
 pub(crate) mod sphere_block;
 pub(crate) mod storage;
 pub(crate) mod summary;

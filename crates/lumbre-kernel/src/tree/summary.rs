@@ -2,7 +2,6 @@
 
 use lumbre_math::DVec3;
 
-use super::seams::has_seams;
 use crate::{Geometry, GeometryKind, Instance};
 
 /// What is known of all the geometries of a tree.
@@ -22,8 +21,6 @@ pub(crate) struct Summary {
     pub(crate) has_one_cloud_origin: bool,
     /// Whether geometries in instances have masks.
     pub(crate) masks_within: bool,
-    /// Whether meshes have triangles without area that may stitch them.
-    pub(crate) has_seams: bool,
 }
 
 impl Summary {
@@ -49,7 +46,6 @@ impl Summary {
             has_one_origin: origins.all(|origin| origin == first_origin),
             first_origin,
             sizes,
-            has_seams: has_seams(geometries),
             masks_within: geometries.iter().any(|geometry| match &geometry.kind {
                 GeometryKind::Instance(Instance { accel, .. }) => {
                     !accel.masks.is_empty() || accel.summary.masks_within
