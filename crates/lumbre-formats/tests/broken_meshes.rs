@@ -342,7 +342,7 @@ fn every_broken_file_gets_its_message() {
             "a.png: PNG image of an impossible size (found 2147483647 by 2147483647 pixels in 130 bytes)",
         ),
         // The pixels stand behind the signature, the header and the rendering intent.
-        ("a.png", png_of_size(120, 90), "a.png:byte 46: damaged PNG image (found "),
+        ("a.png", png_of_size(120, 90), "a.png:byte 73: damaged PNG image (found "),
         ("a.png", encoded(ImageFormat::Png)[..60].to_vec(), "a.png:byte 46: damaged PNG image (found "),
         ("a.exr", encoded(ImageFormat::Exr)[..60].to_vec(), "a.exr:byte 60: damaged EXR image (found "),
         (
