@@ -242,8 +242,7 @@ fn shading_normals_take_nothing_from_what_absorbs_nothing() {
         }
         desc.cameras = vec![look(CENTER - DVec3::new(0.3, 2.2, 0.4), CENTER, 60.0)];
         // By lights alone a narrow lobe is all noise. What the corners' normals bend stays within for long.
-        let (spp, share) = if is_long() { (64, 3e-3) } else { (24, 5e-3) };
-        let both = Way { spp, bounces: 40, share, ..BOTH };
+        let both = Way { spp: 64, bounces: 40, share: 3e-3, ..BOTH };
         assert_white(desc, name, &[both, Way { strategy: Strategy::Bsdf, ..both }]);
         count += 1;
     }
