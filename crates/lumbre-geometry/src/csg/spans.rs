@@ -1,8 +1,7 @@
 //! Span arithmetic: merges the crossings of all leaves along a line into those of the result.
 
-use std::collections::HashMap;
-
 use lumbre_math::DVec3;
+use rustc_hash::FxHashMap;
 use smallvec::{SmallVec, smallvec};
 
 use super::leaf::shape_contains;
@@ -175,7 +174,7 @@ pub(super) struct Membership<'a> {
 /// A number for each of many things, at first zero: all of them, or those that have changed where a line comes to few of many.
 enum Numbers<T> {
     All(SmallVec<[T; 32]>),
-    Changed(HashMap<u32, T>),
+    Changed(FxHashMap<u32, T>),
 }
 
 /// Things up to which a number for each is made for every ray.
@@ -183,7 +182,7 @@ const FEW: usize = 256;
 
 impl<T: Copy + Default> Numbers<T> {
     fn new(count: usize) -> Self {
-        if count <= FEW { Self::All(smallvec![T::default(); count]) } else { Self::Changed(HashMap::new()) }
+        if count <= FEW { Self::All(smallvec![T::default(); count]) } else { Self::Changed(FxHashMap::default()) }
     }
 
     #[inline]
