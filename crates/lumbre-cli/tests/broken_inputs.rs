@@ -73,8 +73,9 @@ fn cases() -> Vec<Case> {
         ),
         after_head(
             "texture.pbrt",
-            "Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"no.png\"\n",
-            ":7:32: cannot open \"no.png\"",
+            "Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"no.png\"\n\
+             Material \"diffuse\" \"texture reflectance\" \"t\"\nShape \"sphere\"\n",
+            ":7:35: cannot open \"no.png\"",
             3,
         ),
         after_head(
