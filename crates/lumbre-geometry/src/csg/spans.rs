@@ -182,7 +182,11 @@ const FEW: usize = 256;
 
 impl<T: Copy + Default> Numbers<T> {
     fn new(count: usize) -> Self {
-        if count <= FEW { Self::All(smallvec![T::default(); count]) } else { Self::Changed(FxHashMap::default()) }
+        if count <= FEW {
+            Self::All(smallvec![T::default(); count])
+        } else {
+            Self::Changed(FxHashMap::default())
+        }
     }
 
     #[inline]
