@@ -159,16 +159,10 @@ mod tests {
     #[test]
     fn the_picture_is_that_of_the_first_camera() {
         let staged = || SceneDesc {
-            cameras: vec![Camera {
-                name: None,
-                kind: CameraKind::Perspective { fov: 50.0, lens_radius: 0.0, focal_distance: 1.0 },
-                world_from_camera: Transform::IDENTITY,
-                motion: None,
-                frame_aspect: None,
-                screen_window: None,
-                shutter_open: 0.0,
-                shutter_close: 1.0,
-            }],
+            cameras: vec![Camera::new(
+                CameraKind::Perspective { fov: 50.0, lens_radius: 0.0, focal_distance: 1.0 },
+                Transform::IDENTITY,
+            )],
             film: FilmDesc { width: Some(70), height: Some(30), ..FilmDesc::default() },
             without_light: WithoutLight::Dark,
             ..SceneDesc::default()

@@ -8,6 +8,7 @@ use lumbre_math::warp64::{equal_area_square_to_sphere, equal_area_wrap, square_t
 use lumbre_math::{AnimatedTransform, DAffine3, DMat3, DVec2, DVec3, SingularTransformError, Transform};
 
 use crate::Footprint;
+use crate::viewpoint::half_window;
 
 /// The mapping of directions to the picture of a spherical camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -173,7 +174,7 @@ impl View {
     pub fn new(camera: &Camera, width: u32, height: u32) -> Self {
         let pixels = DVec2::new(f64::from(width.max(1)), f64::from(height.max(1)));
         let aspect = camera.frame_aspect.unwrap_or(pixels.x / pixels.y);
-        let half = if aspect > 1.0 { DVec2::new(aspect, 1.0) } else { DVec2::new(1.0, 1.0 / aspect) };
+        let half = half_window(aspect);
         let [x0, x1, y0, y1] = camera.screen_window.unwrap_or([-half.x, half.x, -half.y, half.y]);
         let (corner, opposite) = match camera.kind {
             CameraKind::Perspective { fov, .. } => {
@@ -282,16 +283,7 @@ mod tests {
     use super::*;
 
     fn camera(kind: CameraKind) -> Camera {
-        Camera {
-            name: None,
-            kind,
-            world_from_camera: Transform::translate(DVec3::new(7.0, -2.0, 3.0)),
-            motion: None,
-            frame_aspect: None,
-            screen_window: None,
-            shutter_open: 0.0,
-            shutter_close: 1.0,
-        }
+        Camera::new(kind, Transform::translate(DVec3::new(7.0, -2.0, 3.0)))
     }
 
     fn perspective(fov: f64, lens_radius: f64, focal_distance: f64) -> CameraKind {

@@ -126,16 +126,8 @@ impl Framing<'_> {
         };
         let placement =
             DAffine3::from_mat3_translation(DMat3::from_cols(eye.x, eye.y, eye.forward), place.point);
-        let mut camera = Camera {
-            name: None,
-            kind,
-            world_from_camera: Transform::from_affine(placement).unwrap_or_default(),
-            motion: None,
-            frame_aspect: None,
-            screen_window,
-            shutter_open: 0.0,
-            shutter_close: 1.0,
-        };
+        let world_from_camera = Transform::from_affine(placement).unwrap_or_default();
+        let mut camera = Camera { screen_window, ..Camera::new(kind, world_from_camera) };
         asked.magnify(&mut camera, self.usable_aspect());
         let turned = (direction.azimuth - usual.azimuth) / std::f64::consts::TAU;
         Framed { camera, turns: if self.is_left_handed { -turned } else { turned } }

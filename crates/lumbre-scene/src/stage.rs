@@ -289,16 +289,8 @@ mod tests {
     }
 
     fn camera() -> Camera {
-        Camera {
-            name: Some("own".into()),
-            kind: CameraKind::Perspective { fov: 50.0, lens_radius: 0.0, focal_distance: 1.0 },
-            world_from_camera: Transform::IDENTITY,
-            motion: None,
-            frame_aspect: None,
-            screen_window: None,
-            shutter_open: 0.0,
-            shutter_close: 1.0,
-        }
+        let kind = CameraKind::Perspective { fov: 50.0, lens_radius: 0.0, focal_distance: 1.0 };
+        Camera { name: Some("own".into()), ..Camera::new(kind, Transform::IDENTITY) }
     }
 
     fn lamp() -> LightDesc {

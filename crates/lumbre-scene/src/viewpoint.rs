@@ -96,16 +96,7 @@ mod tests {
     use crate::View;
 
     fn camera(kind: CameraKind) -> Camera {
-        Camera {
-            name: None,
-            kind,
-            world_from_camera: Transform::translate(DVec3::new(7.0, -2.0, 3.0)),
-            motion: None,
-            frame_aspect: None,
-            screen_window: None,
-            shutter_open: 0.0,
-            shutter_close: 1.0,
-        }
+        Camera::new(kind, Transform::translate(DVec3::new(7.0, -2.0, 3.0)))
     }
 
     #[test]

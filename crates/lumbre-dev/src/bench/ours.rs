@@ -42,7 +42,7 @@ pub(crate) enum Precision {
 pub(crate) enum Asked {
     /// One ray at a time.
     Each,
-    /// By batches of [`BATCH`] rays: those that are alike together, and the others in flight.
+    /// By batches of [`BATCH`] rays: those that are alike as packets, and the others interleaved.
     ByBatches,
     /// One ray at a time, each written number by number just before, as by who makes it.
     Fresh,

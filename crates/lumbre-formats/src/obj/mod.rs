@@ -379,24 +379,34 @@ impl<'a> Reader<'a> {
         Ok(number)
     }
 
-    fn face(&mut self, keyword: Word<'a>, words: Words<'a>) -> Result<(), FormatError> {
+    /// Reads the corners of an element into `face`; false where it waits for what comes later, or is passed over with what
+    /// `dropped` says of the reason.
+    fn read_face(
+        &mut self,
+        keyword: Word<'a>,
+        words: Words<'a>,
+        dropped: impl FnOnce(&'static str) -> &'static str,
+    ) -> Result<bool, FormatError> {
         self.face.clear();
         let mut face = std::mem::take(&mut self.face);
         let read = self.corners(words.clone(), &mut face);
         self.face = face;
         match read {
-            Ok(()) => {}
+            Ok(()) => return Ok(true),
             Err(Unusable::No(e)) => return Err(e),
             Err(Unusable::Later) => {
                 let (state, material_at, counts) = (self.state, self.material_at, self.counts());
                 let smoothing = self.smoothing;
-                let later = Later { keyword, words, state, material_at, counts, smoothing };
-                return Ok(self.later.push(later)?);
+                self.later.push(Later { keyword, words, state, material_at, counts, smoothing })?;
             }
-            Err(Unusable::Drop(what)) => {
-                self.pass_over(keyword, what);
-                return Ok(());
-            }
+            Err(Unusable::Drop(what)) => self.pass_over(keyword, dropped(what)),
+        }
+        Ok(false)
+    }
+
+    fn face(&mut self, keyword: Word<'a>, words: Words<'a>) -> Result<(), FormatError> {
+        if !self.read_face(keyword, words, |what| what)? {
+            return Ok(());
         }
         if self.face.len() < 3 {
             self.pass_over(keyword, "face with fewer than three corners, dropped");
@@ -464,23 +474,9 @@ impl<'a> Reader<'a> {
 
     /// `p v …`, a point for each vertex, or `l v …`, a line through all of them.
     fn thin(&mut self, keyword: Word<'a>, words: Words<'a>) -> Result<(), FormatError> {
-        self.face.clear();
-        let mut face = std::mem::take(&mut self.face);
-        let read = self.corners(words.clone(), &mut face);
-        self.face = face;
-        match read {
-            Ok(()) => {}
-            Err(Unusable::No(e)) => return Err(e),
-            Err(Unusable::Later) => {
-                let (state, material_at, counts) = (self.state, self.material_at, self.counts());
-                let smoothing = self.smoothing;
-                let later = Later { keyword, words, state, material_at, counts, smoothing };
-                return Ok(self.later.push(later)?);
-            }
-            Err(Unusable::Drop(_)) => {
-                self.pass_over(keyword, "point or line with a vertex that is not there, dropped");
-                return Ok(());
-            }
+        let dropped = |_| "point or line with a vertex that is not there, dropped";
+        if !self.read_face(keyword, words, dropped)? {
+            return Ok(());
         }
         let is_unusable = |c: &Corner| self.unusable.binary_search(&c[0]).is_ok();
         if !self.unusable.is_empty() && self.face.iter().any(is_unusable) {

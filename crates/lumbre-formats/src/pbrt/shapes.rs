@@ -40,7 +40,7 @@ const KNOWN: &[&str] = &[
     "curve",
 ];
 
-/// The maximal number of leaves of a CSG; every ray tests each of them.
+/// The maximal number of leaves of a CSG.
 const MAX_CSG_LEAVES: u64 = 1 << 16;
 
 /// A geometry, with the number of leaves and the depth of a CSG.

@@ -128,7 +128,7 @@ impl<W: F32x16> Pass<W> {
     }
 }
 
-/// The nearest crossing so far, if there is one. With a ray it takes a cache line, which many rays in flight are to find there.
+/// The nearest crossing so far, if there is one. With a ray it takes a cache line, which interleaved rays are to find there.
 #[derive(Clone, Copy)]
 pub(crate) struct Nearest {
     /// The place of its block, and the lane in the last three bits.
