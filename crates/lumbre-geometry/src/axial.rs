@@ -6,12 +6,12 @@ use lumbre_math::quadratic::quadratic;
 use lumbre_math::rounding::{UNIT_ROUNDOFF, gamma};
 use lumbre_math::{DMat3, DVec2, DVec3, Transform, orthonormal_basis};
 
-use crate::line::{Solution, is_blurred, is_exact, plane_crossing, start};
+use crate::line::{Solution, is_blurred, is_exact, is_nearby, plane_crossing, start};
 use crate::nearest::{Meridian, under_similarity};
 use crate::shape::{sampled_by_area, two_crossings};
 use crate::sphere::sided;
 use crate::support::{arc_support, azimuth, bounds_from_support, cross_size, dot_size, length, unit};
-use crate::twofold::{Number, Twofold, components, cross, dot, exact_point, point};
+use crate::twofold::{Number, Twofold, components, cross, dot, place_near, point};
 use crate::{
     Aabb, BoundingVolume, NearestPoint, NoNearestPoint, Ray, Root, Surface, SurfaceSample, density, measure,
 };
@@ -119,35 +119,30 @@ impl Axial {
         let g = self.k * d.dot(self.axis);
 
         let a = across.length_squared() - g * g;
-        let start = start(w, d, a, across.dot(offset) - e * g);
-        let moved = start * d;
-        let p = w + moved;
-        let slack = 2.0 * (w.abs() + moved.abs()).element_sum();
-        if let Some(decided) = self.decided_span(ray, start, p, slack) {
-            return decided;
-        }
-        let p = exact_point(ray.origin, self.p1, start, d, p);
-        if let Some(decided) = self.decided_span(ray, start, p, 0.0) {
-            return decided;
-        }
-        self.exact_lateral_span(ray, start, p)
+        let (h, c) = (across.dot(offset) - e * g, offset.length_squared() - e * e);
+        let (start, p, slack) = if is_nearby(a, h, c) {
+            (0.0, w, w.abs())
+        } else {
+            place_near(ray.origin, self.p1, start(w, d, a, h), d)
+        };
+        let decided = self.decided_span(d, start, p, length(slack));
+        self.cut_at_apex(ray, decided.unwrap_or_else(|| self.exact_lateral_span(ray, start, p))?)
     }
 
-    /// The span as far as doubles decide it, with the equation set up at the place `p` relative to p1, which is `slack` units of
-    /// the unit roundoff off.
+    /// The span as far as doubles decide it, with the equation set up at the place `p` relative to p1, whose cross
+    /// product with the axis is at most `reach` units of the unit roundoff off.
     #[inline]
-    fn decided_span(&self, ray: &Ray, start: f64, p: DVec3, slack: f64) -> Option<Option<Span>> {
-        let d = ray.direction;
+    fn decided_span(&self, d: DVec3, start: f64, p: DVec3, slack: f64) -> Option<Option<Span>> {
         let (across, offset) = (d.cross(self.axis), p.cross(self.axis));
         let (e, g) = (self.r1 + self.k * p.dot(self.axis), self.k * d.dot(self.axis));
         let a = across.length_squared() - g * g;
         let (h, c) = (across.dot(offset) - e * g, offset.length_squared() - e * e);
         let delta = h * h - a * c;
 
-        // Bounds on the errors, in units of the unit roundoff, from sums of absolute values.
-        let (speed, slope) = (4.0 * d.abs().element_sum(), self.k.abs());
-        let reach = slack + 4.0 * p.abs().element_sum();
-        let (across, offset) = (across.abs().element_sum(), offset.abs().element_sum());
+        // Bounds on the errors in units of the unit roundoff, by the inequality of Cauchy and Schwarz.
+        let (way, across, offset) = (length(p), length(across), length(offset));
+        let (speed, reach) = (4.0 * length(d), 4.0 * way + slack);
+        let slope = self.k.abs();
         let e_error = slope * reach + 2.0 * self.r1;
         let a_error = 2.0 * speed * (across + slope * g.abs());
         let h_error = across * reach + offset * speed + g.abs() * e_error + e.abs() * slope * speed;
@@ -167,10 +162,10 @@ impl Axial {
         }
         let (first, second) = quadratic(a, h, c, delta)?;
         // A ray that grazes the surface may lose digits in proportion.
-        let slope_of_f = (2.0 * delta.sqrt()).max(0.06 * across * e.abs());
+        let slope_of_f = 2.0 * delta.sqrt();
         let keeps_digits = is_exact(start, [first, second], slope_of_f, [a_error, h_error, c_error], 60.0);
         let pair = Some((start + first, start + second));
-        keeps_digits.then(|| nappe(a, pair, g, radius).and_then(|span| self.cut_at_apex(ray, span)))
+        keeps_digits.then(|| nappe(a, pair, g, radius))
     }
 
     /// As [`Axial::lateral_span`], in twice the precision, and at the place `p` by `start` for want of that.
@@ -199,7 +194,7 @@ impl Axial {
             } else {
                 e - g * (h / a)
             };
-            return self.cut_at_apex(ray, nappe(a, pair, g, middle)?);
+            return nappe(a, pair, g, middle);
         }
         let whole = (f64::NEG_INFINITY, f64::INFINITY);
         let (low, high) = if h != 0.0 {
@@ -218,7 +213,7 @@ impl Axial {
             let apex = (self.caps && c <= 0.0).then_some(solution.start - e / g)?;
             if g > 0.0 { (apex, whole.1) } else { (whole.0, apex) }
         };
-        self.cut_at_apex(ray, [(low, LATERAL), (high, LATERAL)])
+        Some([(low, LATERAL), (high, LATERAL)])
     }
 
     /// The parameter of the point nearest to the pointed end.

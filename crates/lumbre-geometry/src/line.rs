@@ -5,7 +5,7 @@ use lumbre_math::quadratic::quadratic;
 use lumbre_math::rounding::gamma;
 
 use crate::support::{length, on_side_of, unit};
-use crate::twofold::{Bounded, Number, Twofold, components, exact_point, place, point};
+use crate::twofold::{Magnitude, Number, Twofold, components, place, place_near, point};
 use crate::{Ray, Root};
 
 /// A surface F = 0 of the second degree.
@@ -29,27 +29,13 @@ pub(crate) trait SecondDegree {
 #[inline]
 pub(crate) fn crossings(surface: &impl SecondDegree, ray: &Ray) -> Option<(f64, f64)> {
     let (w, d) = (ray.origin - surface.base(), ray.direction);
-    let [a, h, _] = surface.along(w.to_array(), d.to_array());
-    let start = start(ray.origin - surface.center(), d, a, h);
-    let moved = start * d;
-    let p = w + moved;
-    // Twice: errors come nearer to this bound than to the others.
-    let slack = 2.0 * (w.abs() + moved.abs() + p.abs());
-    if let Some(decided) = decided(surface, d, start, p, slack) {
-        return decided;
-    }
-    let p = exact_point(ray.origin, surface.base(), start, d, p);
-    if let Some(decided) = decided(surface, d, start, p, p.abs()) {
-        return decided;
-    }
-    let exact = Solution::new(ray.origin, surface.base(), d, start, |p, d| surface.along(p, d));
-    if exact.is_finite {
-        exact.crossings
+    let [a, h, c] = surface.along(w.to_array(), d.to_array());
+    let (start, p, slack) = if is_nearby(a, h, c) {
+        (0.0, w, w.abs())
     } else {
-        let [a, h, c] = surface.along(p.to_array(), d.to_array());
-        let (first, second) = quadratic(a, h, c, h * h - a * c)?;
-        Some((start + first, start + second))
-    }
+        place_near(ray.origin, surface.base(), start(ray.origin - surface.center(), d, a, h), d)
+    };
+    decided(surface, d, start, p, slack).unwrap_or_else(|| exact_crossings(surface, ray, start, p))
 }
 
 /// The crossings as far as doubles decide them, with the equation set up at the place `p`, which is `slack` units of the unit
@@ -62,22 +48,46 @@ fn decided(
     p: DVec3,
     slack: DVec3,
 ) -> Option<Option<(f64, f64)>> {
-    let carried = std::array::from_fn(|i| Bounded { value: p[i], error: slack[i] });
-    let [a, h, c] = surface.along(carried, components(d));
+    let [a, h, c] = surface.along(p.to_array(), d.to_array());
     let delta = h * h - a * c;
-    if !delta.is_certain() {
+    // No coefficient is off by more than this many units of the unit roundoff of its terms.
+    const ROUNDINGS: f64 = 20.0;
+    let sizes = surface.along(components::<Magnitude>(p.abs().max(slack)), components(d));
+    let errors @ [a_error, h_error, c_error] = sizes.map(|size| ROUNDINGS * size.0);
+    let delta_error = 2.0 * h.abs() * h_error + a.abs() * c_error + c.abs() * a_error;
+    // False for a NaN.
+    let is_certain = delta.abs() > f64::EPSILON * delta_error;
+    if !is_certain {
         return None;
     }
-    if delta.value < 0.0 {
+    if delta < 0.0 {
         return Some(None);
     }
-    let (first, second) = quadratic(a.value, h.value, c.value, delta.value)?;
-    let errors = [a.error, h.error, c.error];
-    let keeps_digits = is_exact(start, [first, second], 2.0 * delta.value.sqrt(), errors, 32.0);
+    let (first, second) = quadratic(a, h, c, delta)?;
+    let keeps_digits = is_exact(start, [first, second], 2.0 * delta.sqrt(), errors, 200.0);
     keeps_digits.then_some(Some((start + first, start + second)))
 }
 
-/// The parameter to set the equation up at: the middle of the crossings, if that is not much farther from the surface's
+/// As [`crossings`], in twice the precision, and at the place `p` by `start` for want of that.
+#[cold]
+#[inline(never)]
+fn exact_crossings(surface: &impl SecondDegree, ray: &Ray, start: f64, p: DVec3) -> Option<(f64, f64)> {
+    let exact = Solution::new(ray.origin, surface.base(), ray.direction, start, |p, d| surface.along(p, d));
+    if exact.is_finite {
+        return exact.crossings;
+    }
+    let [a, h, c] = surface.along(p.to_array(), ray.direction.to_array());
+    let (first, second) = quadratic(a, h, c, h * h - a * c)?;
+    Some((start + first, start + second))
+}
+
+/// Whether the ray begins so near to the crossings that the equation keeps its digits there.
+#[inline]
+pub(crate) fn is_nearby(a: f64, h: f64, c: f64) -> bool {
+    h * h <= 4.0 * (h * h - a * c)
+}
+
+/// The parameter to set the equation up at, far away: the middle of the crossings, if that is not much farther from the surface's
 /// centre than the ray's origin, at `w` from there; else the point nearest to the centre.
 #[inline]
 pub(crate) fn start(w: DVec3, d: DVec3, a: f64, h: f64) -> f64 {
@@ -96,9 +106,9 @@ pub(crate) fn is_exact(start: f64, roots: [f64; 2], slope: f64, [a, h, c]: [f64;
         let (s, t) = (root.abs(), (start + root).abs());
         // A ray that starts at a crossing has no digits of that one to keep.
         let size = if t > 1e-6 * start.abs() { t } else { start.abs() };
-        let error = c + s * (2.0 * h + s * a) + 4.0 * s * slope;
+        let error = c + s * (2.0 * h + s * a);
         // False for a NaN, and for a root at infinity.
-        error < tolerance * slope * size
+        error < tolerance * slope * size && s < 4.0 * size
     })
 }
 

@@ -159,17 +159,11 @@ impl Quadric {
 
     /// The first crossing in the ray's range.
     pub fn closest(&self, ray: &Ray) -> Option<Root> {
-        if let Some(ellipsoid) = &self.ellipsoid {
-            return ellipsoid.closest(ray);
-        }
         accepted(ray, DVec3::ZERO, crossings(self, ray), |p| self.keeps(p)).next()
     }
 
     /// Every crossing in the ray's range, appended in ascending order.
     pub fn roots(&self, ray: &Ray, out: &mut Roots) {
-        if let Some(ellipsoid) = &self.ellipsoid {
-            return ellipsoid.roots(ray, out);
-        }
         out.extend(accepted(ray, DVec3::ZERO, crossings(self, ray), |p| self.keeps(p)));
     }
 

@@ -10,7 +10,7 @@ use crate::line::{Solution, is_blurred};
 use crate::nearest::{Meridian, nearest_on_ellipsoid, similarity_factor, under_similarity};
 use crate::shape::check;
 use crate::support::{arc_support, azimuth, bounds_from_support, length, on_side_of, unit};
-use crate::twofold::{Twofold, dot, point};
+use crate::twofold::{Twofold, dot, place_near, point};
 use crate::{
     Aabb, BoundingVolume, DirectionSample, NearestPoint, NoNearestPoint, Ray, Root, Roots, ShapeError,
     Surface, SurfaceSample, density, measure,
@@ -407,20 +407,40 @@ pub(crate) fn crossings(center: DVec3, radius: f64, ray: &Ray) -> Option<(f64, f
     let h = w.dot(ray.direction);
     let nearest = w - (h / a) * ray.direction;
     let (square, far) = (radius * radius, w.length_squared());
-    let depth = square - nearest.length_squared();
-    // False for a NaN.
-    let is_certain = depth * depth > 1e-28 * square * far;
-    if is_certain {
-        quadratic(a, h, far - square, a * depth)
+    let (depth, power) = (square - nearest.length_squared(), far - square);
+    // All false for a NaN.
+    let is_steep = depth > 0.1 * square || (far < 2.0 * square && depth * depth > 1e-28 * square * square);
+    // Next to the surface the nearer crossing would lose digits, of which one that starts there has none.
+    let keeps_digits = power.abs() > 0.2 * square || power.abs() < 1e-6 * square;
+    if is_steep && keeps_digits {
+        quadratic(a, h, power, a * depth)
+    } else if depth < -0.1 * square && depth < -1e-27 * far {
+        None
     } else {
-        exact_crossings(center, radius, ray, [a, h, far - square, a * depth])
+        careful_crossings(center, radius, ray, [a, h, power, a * depth], keeps_digits)
     }
 }
 
-#[cold]
+/// As [`crossings`], with the equation set up next to the point nearest to the centre, or in twice the precision.
 #[inline(never)]
-fn exact_crossings(center: DVec3, radius: f64, ray: &Ray, [a, h, c, delta]: [f64; 4]) -> Option<(f64, f64)> {
-    let solution = solution(center, radius, ray, -h / a);
+fn careful_crossings(
+    center: DVec3,
+    radius: f64,
+    ray: &Ray,
+    [a, h, c, delta]: [f64; 4],
+    is_apart: bool,
+) -> Option<(f64, f64)> {
+    let (start, p, slack) = place_near(ray.origin, center, -h / a, ray.direction);
+    let (h_there, c_there) = (p.dot(ray.direction), p.length_squared() - radius * radius);
+    let delta_there = h_there * h_there - a * c_there;
+    let error = a * radius * (1e-14 * radius + f64::EPSILON * slack.element_sum());
+    // False for a NaN.
+    let is_certain = is_apart && delta_there.abs() > error;
+    if is_certain {
+        let (first, second) = quadratic(a, h_there, c_there, delta_there)?;
+        return Some((start + first, start + second));
+    }
+    let solution = solution(center, radius, ray, start);
     if solution.is_finite { solution.crossings } else { quadratic(a, h, c, delta) }
 }
 

@@ -1,12 +1,11 @@
-//! Numbers of twice the precision, and numbers that carry a bound of their error: what decides where doubles cannot.
+//! Numbers of twice the precision, and the sizes that bound rounding errors: what decides where doubles cannot.
 
 use std::ops::{Add, Div, Mul, Sub};
 
 use lumbre_math::DVec3;
 use lumbre_math::quadratic::two_product;
-use lumbre_math::rounding::UNIT_ROUNDOFF;
 
-/// What the coefficients of an equation can be computed in: doubles, [`Bounded`] or [`Twofold`].
+/// What the coefficients of an equation can be computed in: doubles, [`Magnitude`] or [`Twofold`].
 pub(crate) trait Number:
     Copy + From<f64> + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
 {
@@ -39,66 +38,49 @@ pub(crate) fn components<N: Number>(v: DVec3) -> [N; 3] {
     v.to_array().map(N::from)
 }
 
-/// A double, and a bound on what rounding has made it wrong by, in units of the unit roundoff.
+/// The sum of the absolute values of the terms that a number is computed from: its rounding error is some units of the unit
+/// roundoff of it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Bounded {
-    pub(crate) value: f64,
-    pub(crate) error: f64,
-}
+pub(crate) struct Magnitude(pub(crate) f64);
 
-impl Bounded {
-    /// Whether the sign is that of the exact number.
-    #[inline]
-    pub(crate) fn is_certain(self) -> bool {
-        self.value.abs() > 2.0 * UNIT_ROUNDOFF * self.error
-    }
-}
-
-impl From<f64> for Bounded {
+impl From<f64> for Magnitude {
     #[inline]
     fn from(value: f64) -> Self {
-        Self { value, error: 0.0 }
+        Self(value.abs())
     }
 }
 
-impl Number for Bounded {
+impl Number for Magnitude {
     #[inline]
     fn difference(a: f64, b: f64) -> Self {
-        let value = a - b;
-        Self { value, error: value.abs() }
+        Self((a - b).abs())
     }
 }
 
-impl Add for Bounded {
+impl Add for Magnitude {
     type Output = Self;
 
     #[inline]
     fn add(self, other: Self) -> Self {
-        let value = self.value + other.value;
-        Self { value, error: self.error + other.error + value.abs() }
+        Self(self.0 + other.0)
     }
 }
 
-impl Sub for Bounded {
+impl Sub for Magnitude {
     type Output = Self;
 
     #[inline]
     fn sub(self, other: Self) -> Self {
-        let value = self.value - other.value;
-        Self { value, error: self.error + other.error + value.abs() }
+        self + other
     }
 }
 
-impl Mul for Bounded {
+impl Mul for Magnitude {
     type Output = Self;
 
     #[inline]
     fn mul(self, other: Self) -> Self {
-        let value = self.value * other.value;
-        let carried = self.value.abs() * other.error
-            + other.value.abs() * self.error
-            + UNIT_ROUNDOFF * self.error * other.error;
-        Self { value, error: carried + value.abs() }
+        Self(self.0 * other.0)
     }
 }
 
@@ -240,8 +222,26 @@ pub(crate) fn exact_point(origin: DVec3, base: DVec3, t: f64, direction: DVec3, 
     if exact.is_finite() { exact } else { rough }
 }
 
+/// A parameter next to `t`, the point `origin - base + t direction` there, and a bound on that point's error in units of the
+/// unit roundoff: what is lost on a long way is 2^-26 of what doubles lose.
+#[inline]
+pub(crate) fn place_near(origin: DVec3, base: DVec3, t: f64, direction: DVec3) -> (f64, DVec3, DVec3) {
+    // Halves of the digits, whose products are exact.
+    let half = |x: f64| f64::from_bits(x.to_bits() & (!0 << 27));
+    let t = half(t);
+    let split = direction.map(half);
+    let (moved, rest) = (t * split, t * (direction - split));
+    let way = DVec3::from_array(std::array::from_fn(|i| {
+        let from_base = Twofold::difference(origin[i], base[i]);
+        (from_base.high + moved[i]) + (from_base.low + rest[i])
+    }));
+    (t, way, 2.0 * way.abs() + 2.0 * rest.abs() + f64::EPSILON * moved.abs())
+}
+
 #[cfg(test)]
 mod tests {
+    use lumbre_math::rounding::UNIT_ROUNDOFF;
+
     use super::*;
 
     #[test]
@@ -257,15 +257,14 @@ mod tests {
     }
 
     #[test]
-    fn a_bound_holds_the_error_that_it_bounds() {
-        let [x, y, z] = [0.1, 0.7, -0.3].map(Bounded::from);
-        let computed = (x * y + z * x) * (y - z) - x * x * y;
-        let exact = {
-            let [x, y, z] = [0.1, 0.7, -0.3].map(Twofold::from);
+    fn magnitudes_bound_the_rounding_errors_of_what_they_are_computed_from() {
+        fn expression<N: Number>() -> N {
+            let [x, y, z] = [0.1, 0.7, -0.3].map(N::from);
             (x * y + z * x) * (y - z) - x * x * y
-        };
-        let off = (Twofold::from(computed.value) - exact).high.abs();
-        assert!(off <= UNIT_ROUNDOFF * computed.error && computed.error < 1.0, "{off} {computed:?}");
-        assert!(!(x * y - Bounded::from(0.1 * 0.7)).is_certain() && computed.is_certain());
+        }
+        let off = (Twofold::from(expression::<f64>()) - expression::<Twofold>()).high.abs();
+        let size = expression::<Magnitude>().0;
+        assert!((size - 0.107).abs() < 1e-12, "{size}");
+        assert!(off <= 4.0 * UNIT_ROUNDOFF * size, "{off} {size}");
     }
 }
