@@ -129,8 +129,8 @@ impl Axial {
         self.cut_at_apex(ray, decided.unwrap_or_else(|| self.exact_lateral_span(ray, start, p))?)
     }
 
-    /// The span as far as doubles decide it, with the equation set up at the place `p` relative to p1, whose cross
-    /// product with the axis is at most `reach` units of the unit roundoff off.
+    /// The span as far as doubles decide it, with the equation set up at the place `p` relative to p1, which is `slack` units of
+    /// the unit roundoff off.
     #[inline]
     fn decided_span(&self, d: DVec3, start: f64, p: DVec3, slack: f64) -> Option<Option<Span>> {
         let (across, offset) = (d.cross(self.axis), p.cross(self.axis));

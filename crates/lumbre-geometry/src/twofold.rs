@@ -69,6 +69,7 @@ impl Add for Magnitude {
 impl Sub for Magnitude {
     type Output = Self;
 
+    #[allow(clippy::suspicious_arithmetic_impl, reason = "sizes add up whatever the sign")]
     #[inline]
     fn sub(self, other: Self) -> Self {
         self + other
