@@ -1,6 +1,6 @@
 //! The maps of [`crate::warp`] in double precision.
 
-crate::warp::warps!(f64, DVec2, DVec3);
+crate::warp::warps!(f64, DVec2, DVec3, 9);
 
 #[cfg(test)]
 mod tests {

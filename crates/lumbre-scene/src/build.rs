@@ -8,6 +8,7 @@ use lumbre_math::distribution::AliasTable;
 use lumbre_math::{DVec3, Transform};
 use lumbre_shading::{Material, MaterialKind};
 
+use crate::light::choice::LightChoice;
 use crate::light::{
     DistantLight, Environment, GoniometricLight, Light, LightId, MeshLight, MovingLight, PlacedLight,
     PointLight, ShapeLight, SpotLight, UniformLight, power,
@@ -95,7 +96,8 @@ impl Scene {
         let looks_up = builder.entries.iter().any(SurfaceEntry::looks_up_anywhere);
         Ok(Self {
             accel,
-            light_choice: AliasTable::new(&powers),
+            light_choice: LightChoice::new(&builder.lights, &builder.entries, radius),
+            light_by_power: AliasTable::new(&powers),
             infinite,
             cameras,
             film,
@@ -385,6 +387,8 @@ impl Builder {
             shape: desc.index,
             looks_up: material.as_ref().is_some_and(|material| !material.is_uniform())
                 || desc.alpha.as_ref().is_some_and(|alpha| !alpha.is_constant()),
+            ignores_parameters: material.as_ref().is_none_or(|material| material.ignores_parameters())
+                && desc.alpha.as_ref().is_none_or(|alpha| alpha.is_constant()),
             material,
             emission: None,
             light: None,

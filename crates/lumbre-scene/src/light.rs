@@ -1,13 +1,15 @@
 //! The closed set of lights: sampled from a point, and asked for the density of what a ray found.
 
 mod area;
+pub(crate) mod choice;
 mod delta;
 mod environment;
 mod mesh;
 mod moving;
 mod placed;
+mod tree;
 
-use lumbre_geometry::{Ray, Surface};
+use lumbre_geometry::{Aabb, Ray, Surface};
 use lumbre_math::{DVec2, DVec3};
 use lumbre_shading::{Scatter, Spectrum};
 
@@ -18,6 +20,7 @@ pub use environment::{Environment, UniformLight};
 pub use mesh::MeshLight;
 pub use moving::MovingLight;
 pub use placed::PlacedLight;
+use tree::{Emitter, Facing};
 
 use crate::surface::SurfaceEntry;
 
@@ -106,6 +109,26 @@ impl Light {
             Self::Mesh(light) => light.sample(&entries[light.entry as usize], from, u),
             Self::Placed(light) => light.sample(entries, from, time, u),
             Self::Moving(light) => light.sample(entries, from, time, u),
+        }
+    }
+
+    /// What a tree knows of it, triangle by triangle; nothing for lights that are everywhere, or that move.
+    pub(crate) fn emitters(&self, entries: &[SurfaceEntry]) -> Vec<Emitter> {
+        let mean = |colour: Spectrum| f64::from(colour.average());
+        let at =
+            |from: DVec3, facing, strength| vec![Emitter { bounds: Aabb::around([from]), facing, strength }];
+        match self {
+            Self::Point(light) => at(light.from, Facing::ANY, mean(light.intensity)),
+            Self::Goniometric(light) => at(light.from, Facing::ANY, light.mean()),
+            Self::Spot(light) => at(
+                light.from,
+                Facing::cone(light.axis, light.cos_start, light.cos_end),
+                mean(light.intensity),
+            ),
+            Self::Shape(light) => light.emitter(&entries[light.entry as usize]).into_iter().collect(),
+            Self::Mesh(light) => light.emitters(&entries[light.entry as usize]),
+            Self::Placed(light) => light.emitter(entries).into_iter().collect(),
+            Self::Distant(_) | Self::Uniform(_) | Self::Environment(_) | Self::Moving(_) => Vec::new(),
         }
     }
 

@@ -7,10 +7,11 @@ use lumbre_kernel::{Accel, Hit, Query};
 use lumbre_math::distribution::AliasTable;
 use lumbre_math::random::{combine, hash_dvec3, uniform_f32};
 use lumbre_math::{DVec2, DVec3, Transform};
-use lumbre_shading::{FloatTexture, Scatter, Spectrum};
+use lumbre_shading::{FloatTexture, Spectrum};
 
 use crate::footprint::Spot;
 use crate::interaction::offset;
+use crate::light::choice::LightChoice;
 use crate::light::{Light, LightId, LightSample};
 use crate::surface::{Form, ShadingGeometry, SurfaceEntry};
 use crate::{Camera, FilmDesc, FilterDesc, Footprint, GroundPlane, IntegratorDesc, Interaction, SamplerDesc};
@@ -21,8 +22,9 @@ pub struct Scene {
     pub(crate) accel: Arc<Accel>,
     pub(crate) entries: Vec<SurfaceEntry>,
     pub(crate) lights: Vec<Light>,
+    pub(crate) light_choice: LightChoice,
     // By power; `None` without lights.
-    pub(crate) light_choice: Option<AliasTable>,
+    pub(crate) light_by_power: Option<AliasTable>,
     pub(crate) infinite: Vec<LightId>,
     pub(crate) cameras: Vec<Camera>,
     pub(crate) film: FilmDesc,
@@ -267,18 +269,12 @@ impl Scene {
     /// A light sample for `from` at a time: a light chosen by `choose`, and a direction by `u`. Its density, or
     /// the radiance of a delta light, includes the probability of the light.
     pub fn sample_light(&self, from: DVec3, time: f64, choose: f64, u: DVec2) -> Option<LightSample> {
-        let choice = self.light_choice.as_ref()?.sample(choose);
-        let mut sample = self.lights[choice.index].sample(&self.entries, from, time, u)?;
-        match &mut sample.scatter {
-            Scatter::Density(pdf) => *pdf *= choice.probability as f32,
-            Scatter::Delta => sample.radiance *= (1.0 / choice.probability) as f32,
-        }
-        Some(sample)
+        self.light_choice.sample(&self.lights, &self.entries, from, time, choose, u)
     }
 
     /// A light chosen by power, with its probability; `None` without lights.
     pub fn choose_light(&self, choose: f64) -> Option<(LightId, f64)> {
-        let choice = self.light_choice.as_ref()?.sample(choose);
+        let choice = self.light_by_power.as_ref()?.sample(choose);
         Some((LightId(choice.index as u32), choice.probability))
     }
 
@@ -293,7 +289,7 @@ impl Scene {
         let (Some(light), Some(geometric)) = (hit.light, &hit.geometric) else { return 0.0 };
         let surface = Some((&**geometric, hit.primitive));
         let ray = Ray::new(from, -hit.towards_origin).at_time(hit.time);
-        (self.light_probability(light) * self.lights[light.0 as usize].pdf(&ray, surface)) as f32
+        self.light_choice.pdf(&self.lights, light, &ray, surface) as f32
     }
 
     /// The radiance of each infinite light along a ray that leaves the scene, with the density with which
@@ -301,7 +297,7 @@ impl Scene {
     pub fn escaped<'s>(&'s self, ray: &'s Ray) -> impl Iterator<Item = (Spectrum, f32)> + 's {
         self.infinite.iter().map(move |&id| {
             let light = &self.lights[id.0 as usize];
-            let pdf = self.light_probability(id) * light.pdf(ray, None);
+            let pdf = self.light_choice.pdf(&self.lights, id, ray, None);
             (light.escaped(ray.direction), pdf as f32)
         })
     }
@@ -309,10 +305,6 @@ impl Scene {
     /// The radiance of each infinite light along a ray that leaves the scene.
     pub fn background<'s>(&'s self, ray: &'s Ray) -> impl Iterator<Item = Spectrum> + 's {
         self.infinite.iter().map(move |&id| self.lights[id.0 as usize].escaped(ray.direction))
-    }
-
-    fn light_probability(&self, light: LightId) -> f64 {
-        self.light_choice.as_ref().map_or(0.0, |choice| choice.probability(light.0 as usize))
     }
 
     /// The surface entry of a hit, that of a leaf for a CSG; the primitive; and whether it is flipped because

@@ -11,7 +11,7 @@ use crate::transport::interior::Interiors;
 use crate::transport::{Draw, Integrator, RayCounts, Sight};
 
 /// Kajiya's path tracing: at each surface one sample of a light and one of the BSDF, combined by the power heuristic,
-/// and Russian roulette by throughput from the second bounce on.
+/// and Russian roulette by throughput from the sixth bounce on.
 ///
 /// Light from points and in one direction, which no path finds by chance, is sampled straight through what does not change
 /// its direction ([`lumbre_shading::Bsdf::straight_on`]): smooth panes without thickness. That is no bounce. What is smooth and refracts
@@ -51,6 +51,9 @@ enum Chosen {
     Density(f32),
 }
 
+/// Bounces that every path may take before Russian roulette: fewer cost more error than they save time, in every scene that was
+/// measured.
+const SURE_BOUNCES: u32 = 5;
 /// Collisions inside media that every path may have before Russian roulette.
 const SURE_COLLISIONS: u32 = 4;
 /// Collisions at most: they are not counted as bounces, and where nothing is absorbed a path might stay for ever.
@@ -59,7 +62,7 @@ const MOST_COLLISIONS: u32 = 1 << 14;
 impl Path {
     /// A path tracer of so many bounces.
     pub fn new(max_depth: u32) -> Self {
-        Self { max_depth, regularize: false, strategy: Strategy::Both, sure_bounces: 1 }
+        Self { max_depth, regularize: false, strategy: Strategy::Both, sure_bounces: SURE_BOUNCES }
     }
 
     /// The weight of light that a ray found by itself, against a sample of the light with this density.

@@ -1,10 +1,12 @@
 //! Area lights of one exact shape.
 
-use lumbre_geometry::{PlacedShape, Ray, Surface};
+use lumbre_geometry::{PlacedShape, Ray, Shape, Surface};
 use lumbre_math::{DVec2, DVec3};
 use lumbre_shading::{FloatTexture, Scatter, Spectrum};
 
+use super::tree::{Emitter, Facing};
 use super::{LightPoint, LightSample};
+use crate::Emission;
 use crate::surface::SurfaceEntry;
 
 /// A bounded, emissive exact shape.
@@ -25,6 +27,19 @@ impl ShapeLight {
 
     pub(super) fn pdf(&self, ray: &Ray, surface: &Surface) -> f64 {
         self.shape.pdf_direction(ray, surface)
+    }
+
+    /// What a tree knows of it; `None` if it has no bounds.
+    pub(super) fn emitter(&self, entry: &SurfaceEntry) -> Option<Emitter> {
+        let is_flat = matches!(self.shape.shape(), Shape::Disk(_) | Shape::Triangle(_));
+        let normal =
+            is_flat.then(|| self.shape.sample_area(DVec2::splat(0.5))).flatten().map(|s| s.surface.normal);
+        let facing = match (normal, side(entry)) {
+            (Some(normal), Some(side)) => Facing::side(side * normal),
+            _ => Facing::ANY,
+        };
+        let strength = intensity(self.power, entry.emission.as_ref()?);
+        Some(Emitter { bounds: self.shape.bounds()?, facing, strength })
     }
 }
 
@@ -59,6 +74,17 @@ pub(super) fn arriving(
         radiance,
         scatter,
     })
+}
+
+/// The factor that turns the normal of a geometry to the side that emits, if that is one alone and known.
+pub(super) fn side(entry: &SurfaceEntry) -> Option<f64> {
+    let (emission, outward) = entry.plain_emission()?;
+    (!emission.two_sided).then_some(outward)
+}
+
+/// The greatest radiant intensity of a flat surface of this power.
+pub(super) fn intensity(power: f64, emission: &Emission) -> f64 {
+    power / (std::f64::consts::PI * f64::from(emission.sides()))
 }
 
 /// The power of a surface from its mean emission and its area.

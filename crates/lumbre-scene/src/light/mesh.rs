@@ -1,11 +1,13 @@
 //! Area lights of triangle meshes: a triangle is sampled by area, then a direction to it.
 
-use lumbre_geometry::{DirectionSample, Ray, Surface, Triangle};
+use lumbre_geometry::{Aabb, DirectionSample, Ray, Surface, Triangle};
 use lumbre_kernel::TriangleMesh;
 use lumbre_math::distribution::AliasTable;
 use lumbre_math::{DVec2, DVec3, Vec2};
 use lumbre_shading::{Scatter, Spectrum};
 
+use super::area::{intensity, side};
+use super::tree::{Emitter, Facing};
 use super::{LightPoint, LightSample, area};
 use crate::Emission;
 use crate::surface::SurfaceEntry;
@@ -36,7 +38,7 @@ pub(crate) struct Facet {
 }
 
 /// From this many radii away, sampling by area is as good as by solid angle, and faster.
-const FAR: f64 = 4.0;
+const FAR: f64 = 2.0;
 
 impl MeshLight {
     /// `None` if no triangle has an area. Also returns the total area.
@@ -50,12 +52,27 @@ impl MeshLight {
 
     pub(super) fn sample(&self, entry: &SurfaceEntry, from: DVec3, u: DVec2) -> Option<LightSample> {
         let choice = self.by_area.sample(u.x);
-        let facet = &self.facets[choice.index];
-        let u = DVec2::new(choice.rest, u.y);
+        let mut sample = self.sample_triangle(entry, choice.index, from, DVec2::new(choice.rest, u.y))?;
+        match &mut sample.scatter {
+            Scatter::Density(pdf) => *pdf *= choice.probability as f32,
+            Scatter::Delta => sample.radiance *= (1.0 / choice.probability) as f32,
+        }
+        Some(sample)
+    }
+
+    /// A sample of one triangle.
+    pub(super) fn sample_triangle(
+        &self,
+        entry: &SurfaceEntry,
+        triangle: usize,
+        from: DVec3,
+        u: DVec2,
+    ) -> Option<LightSample> {
+        let facet = &self.facets[triangle];
         if facet.is_far(from)
             && let Some((emission, outward)) = entry.plain_emission()
         {
-            return facet.sample_by_area(emission, outward, choice.probability, from, u);
+            return facet.sample_by_area(emission, outward, from, u);
         }
         let sample = match &facet.shape {
             Some(shape) if !facet.is_far(from) => shape.sample_direction(from, u)?,
@@ -66,18 +83,38 @@ impl MeshLight {
             }
             None => return None,
         };
-        let pdf = choice.probability * sample.pdf;
-        area::arriving(entry, &sample.surface, choice.index as u32, sample.surface.uv, from, pdf)
+        area::arriving(entry, &sample.surface, triangle as u32, sample.surface.uv, from, sample.pdf)
     }
 
     pub(super) fn pdf(&self, ray: &Ray, surface: &Surface, chosen: u32) -> f64 {
+        self.by_area.probability(chosen as usize) * self.triangle_pdf(ray, surface, chosen)
+    }
+
+    /// The density of [`MeshLight::sample_triangle`].
+    pub(super) fn triangle_pdf(&self, ray: &Ray, surface: &Surface, chosen: u32) -> f64 {
         let Some(facet) = self.facets.get(chosen as usize) else { return 0.0 };
-        let pdf = match &facet.shape {
+        match &facet.shape {
             Some(shape) if !facet.is_far(ray.origin) => shape.pdf_direction(ray, surface),
             Some(_) => per_solid_angle(facet.area, surface.point - ray.origin, facet.normal).unwrap_or(0.0),
             None => 0.0,
-        };
-        self.by_area.probability(chosen as usize) * pdf
+        }
+    }
+
+    /// What a tree knows of every triangle.
+    pub(super) fn emitters(&self, entry: &SurfaceEntry) -> Vec<Emitter> {
+        let Some(emission) = &entry.emission else { return Vec::new() };
+        let total: f64 = self.facets.iter().map(|facet| facet.area).sum();
+        let strength = intensity(self.power, emission) / total;
+        let side = side(entry);
+        let facets = self.facets.iter();
+        facets
+            .map(|facet| {
+                let [a, b] = facet.sides;
+                let bounds = Aabb::around([facet.corner, facet.corner + a, facet.corner + b]);
+                let facing = side.map_or(Facing::ANY, |side| Facing::side(side * facet.normal));
+                Emitter { bounds, facing, strength: strength * facet.area }
+            })
+            .collect()
     }
 }
 
@@ -107,7 +144,6 @@ impl Facet {
         &self,
         emission: &Emission,
         outward: f64,
-        probability: f64,
         from: DVec3,
         u: DVec2,
     ) -> Option<LightSample> {
@@ -120,7 +156,7 @@ impl Facet {
         if radiance.is_black() {
             return None;
         }
-        let pdf = probability * per_solid_angle(self.area, arm, self.normal)?;
+        let pdf = per_solid_angle(self.area, arm, self.normal)?;
         Some(LightSample {
             towards: arm.normalize(),
             end: Some(LightPoint { point, error: self.error, normal: outward * self.normal }),

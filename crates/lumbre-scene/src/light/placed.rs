@@ -1,10 +1,11 @@
 //! Area lights of an object with one placement, sampled at the time of the ray.
 
-use lumbre_geometry::{Ray, Surface};
+use lumbre_geometry::{Aabb, Ray, Surface};
 use lumbre_kernel::Placement;
 use lumbre_math::{DVec2, DVec3, Transform};
 use lumbre_shading::Scatter;
 
+use super::tree::{Emitter, Facing};
 use super::{Light, LightPoint, LightSample};
 use crate::surface::SurfaceEntry;
 
@@ -47,6 +48,19 @@ impl PlacedLight {
             Scatter::Delta => sample.radiance *= (1.0 / grown) as f32,
         }
         Some(sample)
+    }
+
+    /// What a tree knows of it; `None` if it moves.
+    pub(super) fn emitter(&self, entries: &[SurfaceEntry]) -> Option<Emitter> {
+        let Placement::Still(map) = &self.placement else { return None };
+        let inner = self.light.emitters(entries);
+        let bounds = inner.iter().fold(Aabb::EMPTY, |bounds, emitter| bounds.union(emitter.bounds));
+        let corner =
+            |i: usize| DVec3::from_array(std::array::from_fn(|k| [bounds.min, bounds.max][i >> k & 1][k]));
+        // By its power, which is that in the world.
+        let strength = self.light.power(0.0) / std::f64::consts::TAU;
+        let bounds = Aabb::around((0..8).map(|i| map.point(corner(i)))).outward(8);
+        (!inner.is_empty()).then_some(Emitter { bounds, facing: Facing::ANY, strength })
     }
 
     /// `surface` is in the space of the object.

@@ -1,0 +1,411 @@
+//! A tree over lights, which chooses one for a place: near and bright ones that shine there are chosen more often.
+//!
+//! After A. Conty Estevez, C. Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", Proceedings of the
+//! ACM on Computer Graphics and Interactive Techniques 1(2), 2018, without the splitting; cosines of bounding cones are
+//! found without angles, as in M. Pharr, W. Jakob, G. Humphreys, "Physically Based Rendering", 4th edition, 2023, 12.6.
+
+use lumbre_geometry::Aabb;
+use lumbre_math::DVec3;
+
+/// What the tree knows of a light, or of a triangle of one.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Emitter {
+    /// Where it is.
+    pub bounds: Aabb,
+    /// How it faces.
+    pub facing: Facing,
+    /// Its greatest radiant intensity, averaged over colours.
+    pub strength: f64,
+}
+
+/// A bound on the directions of light: normals or axes lie within a cone, and light goes out within an angle of them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Facing {
+    /// Unit; zero where all directions are possible.
+    axis: DVec3,
+    /// The cosine of the angle between the axis and the farthest normal; −1 for all directions.
+    cos_normals: f64,
+    /// The cosine of the angle between a normal and the farthest direction of light.
+    cos_light: f64,
+}
+
+/// What is lost by rounding in cosines of bounding cones.
+const SLACK: f64 = 1e-9;
+
+impl Facing {
+    /// Every direction.
+    pub(crate) const ANY: Self = Self { axis: DVec3::ZERO, cos_normals: -1.0, cos_light: 0.0 };
+
+    /// Out of a plane with this unit normal, on its side alone.
+    pub(crate) fn side(normal: DVec3) -> Self {
+        Self { axis: normal, cos_normals: 1.0, cos_light: 0.0 }
+    }
+
+    /// A cone about a unit axis, in which light falls off from the angle with the first cosine to that with the second.
+    pub(crate) fn cone(axis: DVec3, cos_start: f64, cos_end: f64) -> Self {
+        let (sin_start, sin_end) = (sine(cos_start), sine(cos_end));
+        Self { axis, cos_normals: cos_start, cos_light: cos_start * cos_end + sin_start * sin_end - SLACK }
+    }
+
+    /// The bound on all of these, about the mean of their axes.
+    fn around(all: &[(Emitter, u32)]) -> Self {
+        if let [(emitter, _)] = all {
+            return emitter.facing;
+        }
+        let cos_light = all.iter().map(|(emitter, _)| emitter.facing.cos_light).fold(1.0, f64::min);
+        let sum: DVec3 = all.iter().map(|(emitter, _)| emitter.facing.axis).sum();
+        let Some(axis) = sum.try_normalize() else { return Self { cos_light, ..Self::ANY } };
+        let farthest = |facing: &Self| {
+            let cosine = axis.dot(facing.axis);
+            // Beyond a half turn in all, every direction.
+            if facing.cos_normals <= -1.0 || cosine <= -facing.cos_normals {
+                return -1.0;
+            }
+            cosine * facing.cos_normals - sine(cosine) * sine(facing.cos_normals) - SLACK
+        };
+        let cos_normals = all.iter().map(|(emitter, _)| farthest(&emitter.facing)).fold(1.0, f64::min);
+        if cos_normals <= -1.0 {
+            Self { cos_light, ..Self::ANY }
+        } else {
+            Self { axis, cos_normals, cos_light }
+        }
+    }
+}
+
+fn sine(cosine: f64) -> f64 {
+    (1.0 - cosine * cosine).max(0.0).sqrt()
+}
+
+/// A tree over emitters, each in a leaf of its own.
+#[derive(Clone, Debug)]
+pub(crate) struct LightTree {
+    // In depth-first order: a node of n leaves has 2n - 1 nodes, its first child follows it.
+    nodes: Vec<Node>,
+    // The node of each emitter.
+    leaves: Vec<u32>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    center: DVec3,
+    radius_squared: f64,
+    facing: Facing,
+    strength: f64,
+    /// The second child; of a leaf, [`LEAF`] and its emitter.
+    next: u32,
+}
+
+const LEAF: u32 = 1 << 31;
+const BELOW_ONE: f64 = 1.0 - 0.5 * f64::EPSILON;
+
+impl Node {
+    fn emitter(&self) -> Option<u32> {
+        (self.next & LEAF != 0).then_some(self.next & !LEAF)
+    }
+
+    /// What the lights of the node may send to a place, roughly: zero only where they send nothing.
+    #[inline]
+    fn importance(&self, from: DVec3) -> f64 {
+        let way = from - self.center;
+        let squared = way.length_squared();
+        if squared <= self.radius_squared {
+            // Within: it may face any way.
+            return self.strength / self.radius_squared.max(f64::MIN_POSITIVE);
+        }
+        let Facing { axis, cos_normals, cos_light } = self.facing;
+        if cos_normals <= -1.0 {
+            return self.strength / squared;
+        }
+        // The angle between the axis and the way, less that of the cone of normals, less that which the sphere is seen in.
+        let cos_way = axis.dot(way) / squared.sqrt();
+        let sin_seen = (self.radius_squared / squared).min(1.0).sqrt();
+        let (cosine, sin) = angle_less([cos_way, sine(cos_way)], [cos_normals, sine(cos_normals)]);
+        let (cosine, _) = angle_less([cosine, sin], [sine(sin_seen), sin_seen]);
+        if cosine + SLACK <= cos_light { 0.0 } else { self.strength * cosine.max(SLACK) / squared }
+    }
+}
+
+/// The cosine and sine of the difference of two angles, of 0 where it is negative.
+#[inline]
+fn angle_less([cos_a, sin_a]: [f64; 2], [cos_b, sin_b]: [f64; 2]) -> (f64, f64) {
+    if cos_a >= cos_b { (1.0, 0.0) } else { (cos_a * cos_b + sin_a * sin_b, sin_a * cos_b - cos_a * sin_b) }
+}
+
+/// An emitter that was chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Chosen {
+    pub emitter: usize,
+    pub probability: f64,
+}
+
+impl LightTree {
+    /// `None` when there is nothing that emits, or too much.
+    pub(crate) fn new(emitters: &[Emitter]) -> Option<Self> {
+        let is_dark = !emitters.iter().any(|emitter| emitter.strength > 0.0);
+        if is_dark || emitters.len() >= (LEAF / 2) as usize {
+            return None;
+        }
+        let mut order: Vec<(Emitter, u32)> = emitters.iter().copied().zip(0..).collect();
+        let mut nodes = Vec::with_capacity(2 * emitters.len() - 1);
+        build(&mut order, &mut nodes, 0);
+        let mut leaves = vec![0; emitters.len()];
+        for (place, node) in (0..).zip(&nodes) {
+            if let Some(emitter) = node.emitter() {
+                leaves[emitter as usize] = place;
+            }
+        }
+        Some(Self { nodes, leaves })
+    }
+
+    /// The emitter for a place and a uniform `u` of [0, 1); `None` where nothing shines.
+    pub(crate) fn choose(&self, from: DVec3, mut u: f64) -> Option<Chosen> {
+        let (mut place, mut probability) = (0, 1.0);
+        loop {
+            let node = &self.nodes[place];
+            if let Some(emitter) = node.emitter() {
+                return Some(Chosen { emitter: emitter as usize, probability });
+            }
+            let share = self.share_of_first(place, from)?;
+            if u < share {
+                (place, u) = (place + 1, (u / share).min(BELOW_ONE));
+                probability *= share;
+            } else {
+                (place, u) = (node.next as usize, ((u - share) / (1.0 - share)).min(BELOW_ONE));
+                probability *= 1.0 - share;
+            }
+        }
+    }
+
+    /// The probability with which [`LightTree::choose`] chooses an emitter.
+    pub(crate) fn probability(&self, from: DVec3, emitter: usize) -> f64 {
+        let leaf = self.leaves[emitter] as usize;
+        let (mut place, mut probability) = (0, 1.0);
+        while place != leaf {
+            let Some(share) = self.share_of_first(place, from) else { return 0.0 };
+            let second = self.nodes[place].next as usize;
+            if leaf < second {
+                place += 1;
+                probability *= share;
+            } else {
+                place = second;
+                probability *= 1.0 - share;
+            }
+        }
+        probability
+    }
+
+    /// The probability of the first child of a node.
+    #[inline]
+    fn share_of_first(&self, place: usize, from: DVec3) -> Option<f64> {
+        let first = self.nodes[place + 1].importance(from);
+        let second = self.nodes[self.nodes[place].next as usize].importance(from);
+        let share = first / (first + second);
+        if share.is_nan() {
+            // Neither shines there; or both are infinitely strong, for the place is on a light without an extent.
+            return (first > 0.0).then_some(0.5);
+        }
+        Some(share)
+    }
+}
+
+/// Below this depth, halves by number: no tree is much deeper.
+const DEEP: u32 = 64;
+/// Bins along each axis.
+const BINS: usize = 12;
+
+/// Appends the nodes of some emitters, depth first.
+fn build(emitters: &mut [(Emitter, u32)], nodes: &mut Vec<Node>, depth: u32) {
+    let bounds = emitters.iter().fold(Aabb::EMPTY, |bounds, (emitter, _)| bounds.union(emitter.bounds));
+    let radius_squared = 0.25 * bounds.size().length_squared() * (1.0 + SLACK);
+    let place = nodes.len();
+    nodes.push(Node {
+        center: bounds.center(),
+        radius_squared,
+        facing: Facing::around(emitters),
+        strength: emitters.iter().map(|(emitter, _)| emitter.strength).sum(),
+        next: LEAF | emitters[0].1,
+    });
+    if emitters.len() == 1 {
+        return;
+    }
+    let middle = if depth < DEEP { split(emitters, &bounds) } else { None };
+    let middle = middle.unwrap_or(emitters.len() / 2);
+    let (first, second) = emitters.split_at_mut(middle);
+    build(first, nodes, depth + 1);
+    nodes[place].next = nodes.len() as u32;
+    build(second, nodes, depth + 1);
+}
+
+/// What a bin or a side holds.
+#[derive(Clone, Copy)]
+struct Group {
+    bounds: Aabb,
+    axes: DVec3,
+    strength: f64,
+    count: usize,
+}
+
+impl Group {
+    const EMPTY: Self = Self { bounds: Aabb::EMPTY, axes: DVec3::ZERO, strength: 0.0, count: 0 };
+
+    fn of(emitter: &Emitter) -> Self {
+        Self { bounds: emitter.bounds, axes: emitter.facing.axis, strength: emitter.strength, count: 1 }
+    }
+
+    fn union(&self, other: &Self) -> Self {
+        Self {
+            bounds: self.bounds.union(other.bounds),
+            axes: self.axes + other.axes,
+            strength: self.strength + other.strength,
+            count: self.count + other.count,
+        }
+    }
+
+    /// Strength times the extent squared times a measure of the spread of directions, from 1 for one to 2 for all.
+    fn cost(&self) -> f64 {
+        if self.count == 0 {
+            return 0.0;
+        }
+        let spread = 2.0 - self.axes.length() / self.count as f64;
+        self.strength * self.bounds.size().length_squared() * spread
+    }
+}
+
+/// Sorts the emitters into two sides, of the least cost among planes through the centres; the number of the first side, or `None`
+/// where no plane parts them.
+fn split(emitters: &mut [(Emitter, u32)], bounds: &Aabb) -> Option<usize> {
+    let centers = Aabb::around(emitters.iter().map(|(emitter, _)| emitter.bounds.center()));
+    let (size, extent) = (centers.size(), bounds.size());
+    let bin = |emitter: &Emitter, axis: usize| {
+        let part = (emitter.bounds.center()[axis] - centers.min[axis]) / size[axis];
+        ((part * BINS as f64) as usize).min(BINS - 1)
+    };
+    let mut best: Option<(f64, usize, usize)> = None;
+    for axis in 0..3 {
+        // False for a NaN.
+        let is_wide = size[axis] > 0.0;
+        if !is_wide {
+            continue;
+        }
+        let mut bins = [Group::EMPTY; BINS];
+        for (emitter, _) in emitters.iter() {
+            let group = &mut bins[bin(emitter, axis)];
+            *group = group.union(&Group::of(emitter));
+        }
+        let mut after = [Group::EMPTY; BINS + 1];
+        for i in (0..BINS).rev() {
+            after[i] = after[i + 1].union(&bins[i]);
+        }
+        let mut before = Group::EMPTY;
+        // Thin sides are worse than their extent says.
+        let shape = extent.max_element() / extent[axis].max(f64::MIN_POSITIVE);
+        for i in 1..BINS {
+            before = before.union(&bins[i - 1]);
+            let cost = shape * (before.cost() + after[i].cost());
+            if before.count > 0 && after[i].count > 0 && best.is_none_or(|(least, ..)| cost < least) {
+                best = Some((cost, axis, i));
+            }
+        }
+    }
+    let (_, axis, border) = best?;
+    let mut middle = 0;
+    for i in 0..emitters.len() {
+        if bin(&emitters[i].0, axis) < border {
+            emitters.swap(i, middle);
+            middle += 1;
+        }
+    }
+    Some(middle)
+}
+
+#[cfg(test)]
+mod tests {
+    use lumbre_math::random::RandomStream;
+
+    use super::*;
+
+    fn vector(random: &mut RandomStream) -> DVec3 {
+        let mut x = || 2.0 * random.next_f64() - 1.0;
+        DVec3::new(x(), x(), x())
+    }
+
+    fn emitters(count: usize, seed: u64) -> Vec<Emitter> {
+        let mut random = RandomStream::new(seed);
+        (0..count)
+            .map(|i| {
+                let (at, size) = (10.0 * vector(&mut random), 0.3 * vector(&mut random).abs());
+                let axis = vector(&mut random).normalize();
+                let facing = match i % 3 {
+                    0 => Facing::ANY,
+                    1 => Facing::side(axis),
+                    _ => Facing::cone(axis, 0.9, 0.7),
+                };
+                let strength = if i % 7 == 3 { 0.0 } else { random.next_f64() };
+                Emitter { bounds: Aabb { min: at - size, max: at + size }, facing, strength }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn probabilities_sum_to_one_and_are_those_of_the_choice() {
+        let mut random = RandomStream::new(5);
+        for count in [1, 2, 3, 50, 300] {
+            let tree = LightTree::new(&emitters(count, count as u64)).unwrap();
+            assert_eq!(tree.nodes.len(), 2 * count - 1);
+            for _ in 0..20 {
+                let from = 14.0 * vector(&mut random);
+                let sum: f64 = (0..count).map(|emitter| tree.probability(from, emitter)).sum();
+                // A place that no light reaches has no choice.
+                let Some(chosen) = tree.choose(from, random.next_f64()) else {
+                    assert!(sum < 1.0);
+                    continue;
+                };
+                assert!(sum <= 1.0 + 1e-12, "{sum}");
+                assert_eq!(tree.probability(from, chosen.emitter), chosen.probability);
+            }
+        }
+    }
+
+    #[test]
+    fn what_shines_on_a_place_is_never_left_out() {
+        let mut random = RandomStream::new(6);
+        let all = emitters(200, 9);
+        let tree = LightTree::new(&all).unwrap();
+        for _ in 0..200 {
+            let from = 14.0 * vector(&mut random);
+            for (i, emitter) in all.iter().enumerate().filter(|(_, emitter)| emitter.strength > 0.0) {
+                let within = vector(&mut random) * 0.5 * emitter.bounds.size();
+                let way = (from - (emitter.bounds.center() + within)).normalize();
+                let shines = match i % 3 {
+                    0 => true,
+                    1 => emitter.facing.axis.dot(way) > 0.0,
+                    _ => emitter.facing.axis.dot(way) > 0.7,
+                };
+                assert!(!shines || tree.probability(from, i) > 0.0, "{i} {from}");
+            }
+        }
+    }
+
+    #[test]
+    fn near_bright_lights_that_face_a_place_are_chosen_more_often() {
+        let at = |x: f64| Aabb { min: DVec3::new(x, 0.0, 0.0), max: DVec3::new(x, 0.0, 0.0) };
+        let light = |x, facing, strength| Emitter { bounds: at(x), facing, strength };
+        let here = DVec3::ZERO;
+        let first = |lights: &[Emitter]| LightTree::new(lights).unwrap().probability(here, 0);
+        let any = Facing::ANY;
+        assert!((first(&[light(1.0, any, 1.0), light(3.0, any, 1.0)]) - 0.9).abs() < 1e-9);
+        assert!((first(&[light(1.0, any, 1.0), light(-1.0, any, 3.0)]) - 0.25).abs() < 1e-9);
+        let (away, towards) = (Facing::side(DVec3::X), Facing::side(-DVec3::X));
+        assert_eq!(first(&[light(1.0, away, 1.0), light(2.0, towards, 1.0)]), 0.0);
+        let slanted = Facing::side(DVec3::new(-0.6, 0.8, 0.0));
+        assert!((first(&[light(1.0, slanted, 1.0), light(-1.0, any, 1.0)]) - 0.375).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_million_lights_in_one_place_make_a_tree_that_is_not_deep() {
+        let one = Emitter { bounds: Aabb::around([DVec3::ONE]), facing: Facing::ANY, strength: 1.0 };
+        let tree = LightTree::new(&vec![one; 1 << 12]).unwrap();
+        let chosen = tree.choose(DVec3::ZERO, 0.3).unwrap();
+        assert!((chosen.probability * 4096.0 - 1.0).abs() < 1e-9, "{chosen:?}");
+    }
+}
