@@ -387,8 +387,6 @@ impl Builder {
             shape: desc.index,
             looks_up: material.as_ref().is_some_and(|material| !material.is_uniform())
                 || desc.alpha.as_ref().is_some_and(|alpha| !alpha.is_constant()),
-            ignores_parameters: material.as_ref().is_none_or(|material| material.ignores_parameters())
-                && desc.alpha.as_ref().is_none_or(|alpha| alpha.is_constant()),
             material,
             emission: None,
             light: None,

@@ -25,8 +25,6 @@ pub(crate) struct SurfaceEntry {
     pub reverse: bool,
     /// Whether the material has textures, and needs footprints.
     pub looks_up: bool,
-    /// Whether the material and the alpha are the same whatever the parameters of the surface.
-    pub ignores_parameters: bool,
     pub form: Form,
 }
 
@@ -172,11 +170,6 @@ impl SurfaceEntry {
             .then_some((emission, if self.reverse { -1.0 } else { 1.0 }))
     }
 
-    /// Whether the derivatives by its parameters matter: those of a mesh are found by way of its uv.
-    fn needs_parameters(&self) -> bool {
-        !self.ignores_parameters || self.emission.as_ref().is_some_and(|emission| emission.image.is_some())
-    }
-
     /// Whether any part of it has textures.
     pub(crate) fn looks_up_anywhere(&self) -> bool {
         match &self.form {
@@ -243,8 +236,7 @@ impl SurfaceEntry {
                     Some(uvs) => at(uvs, corners),
                     None => mesh.default_uvs(primitive),
                 };
-                let blend = triangle_blend(local);
-                mesh.shading_geometry(surface, corners, uvs, &blend, placement, time, self.needs_parameters())
+                mesh.shading_geometry(surface, corners, uvs, &triangle_blend(local), placement, time)
             }
             Form::Patch { attributes, corners, .. } => {
                 let uvs = match &attributes.rest.uvs {
@@ -252,9 +244,7 @@ impl SurfaceEntry {
                     None if attributes.swapped => [Vec2::ZERO, Vec2::Y, Vec2::X, Vec2::ONE],
                     None => [Vec2::ZERO, Vec2::X, Vec2::Y, Vec2::ONE],
                 };
-                let blend = patch_blend(local);
-                let needs_parameters = self.needs_parameters();
-                attributes.shading_geometry(surface, *corners, uvs, &blend, placement, time, needs_parameters)
+                attributes.shading_geometry(surface, *corners, uvs, &patch_blend(local), placement, time)
             }
         };
         if self.reverse {
@@ -345,11 +335,6 @@ impl ShadingGeometry {
     }
 }
 
-#[inline]
-fn placed_normal(normal: DVec3, placement: Option<&Transform>) -> DVec3 {
-    placement.map_or(normal, |map| map.normal(normal))
-}
-
 fn plain(surface: &Surface) -> ShadingGeometry {
     ShadingGeometry {
         surface: *surface,
@@ -425,9 +410,7 @@ impl MeshAttributes {
         if self.swapped { [a, c, b] } else { [a, b, c] }
     }
 
-    /// Interpolates the vertex attributes over a geometric surface. Derivatives are by the face's coordinates where those by
-    /// parameters are not needed.
-    #[expect(clippy::too_many_arguments, reason = "a place on a face has as many")]
+    /// Interpolates the vertex attributes over a geometric surface.
     fn shading_geometry<const N: usize>(
         &self,
         geometric: &Surface,
@@ -436,13 +419,8 @@ impl MeshAttributes {
         blend: &Blend<N>,
         placement: Option<&Transform>,
         time: f64,
-        needs_parameters: bool,
     ) -> ShadingGeometry {
-        let mut shaded = if needs_parameters {
-            self.shape(geometric, corners, uvs, blend, placement, time)
-        } else {
-            self.bare_shape(geometric, corners, uvs, blend, placement, time)
-        };
+        let mut shaded = self.shape(geometric, corners, uvs, blend, placement, time);
         if let Some(colours) = &self.rest.colours {
             let colour = blend.value(corners.map(|i| {
                 let Spectrum { r, g, b } = colours[i as usize];
@@ -468,32 +446,6 @@ impl MeshAttributes {
             if by_u.is_finite() && by_v.is_finite() {
                 (place.duv_dx, place.duv_dy) = (by_u, by_v);
             }
-        }
-        shaded
-    }
-
-    /// As [`MeshAttributes::shape`], without derivatives by uv, tangents, and the bending of the normal.
-    #[inline]
-    fn bare_shape<const N: usize>(
-        &self,
-        geometric: &Surface,
-        corners: [u32; N],
-        uvs: [Vec2; N],
-        blend: &Blend<N>,
-        placement: Option<&Transform>,
-        time: f64,
-    ) -> ShadingGeometry {
-        let mut surface = *geometric;
-        surface.uv = blend.value(uvs.map(|uv| uv.as_dvec2().extend(0.0))).truncate();
-        let normals = self.corner_normals(corners, time);
-        let normal = normals.map(|normals| placed_normal(blend.value(normals), placement));
-        let normal = normal.filter(|normal| normal.length_squared() > 0.0);
-        if normal.is_some_and(|normal| surface.normal.dot(normal) < 0.0) {
-            surface.normal = -surface.normal;
-        }
-        let mut shaded = plain(&surface);
-        if let Some(normal) = normal {
-            shaded.shading.normal = (normal / normal.length()).as_vec3();
         }
         shaded
     }
@@ -535,7 +487,7 @@ impl MeshAttributes {
             self.align(&mut shaded, corners, blend, placement);
             return shaded;
         };
-        let moved = |n: DVec3| placed_normal(n, placement);
+        let moved = |n: DVec3| placement.map_or(n, |m| m.normal(n));
         let sum = moved(blend.value(normals));
         let length = sum.length();
         if length.is_nan() || length <= 0.0 {

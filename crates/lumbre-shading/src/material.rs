@@ -281,23 +281,6 @@ impl Material {
         false
     }
 
-    /// Whether it is known to look the same however a surface is parametrised: uniform, and isotropic.
-    pub fn ignores_parameters(&self) -> bool {
-        let is_anisotropic = |roughness: &Roughness| match (&*roughness.u, &*roughness.v) {
-            (Texture::Constant(u), Texture::Constant(v)) => u != v,
-            _ => true,
-        };
-        self.is_uniform()
-            && !self.has_part(|kind| match kind {
-                MaterialKind::Conductor { roughness, .. }
-                | MaterialKind::ConductorReflectance { roughness, .. }
-                | MaterialKind::Dielectric { roughness, .. }
-                | MaterialKind::CoatedDiffuse { roughness, .. } => is_anisotropic(roughness),
-                MaterialKind::Principled(params) => !params.is_isotropic(),
-                _ => false,
-            })
-    }
-
     /// Whether light may pass to the other side; of a mixture, through any part.
     pub fn lets_light_through(&self) -> bool {
         self.has_part(|kind| match kind {

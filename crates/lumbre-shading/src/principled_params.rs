@@ -207,11 +207,6 @@ impl PrincipledParams {
             && self.clearcoat_normal.is_none()
     }
 
-    /// Whether it is known to reflect alike along all tangents.
-    pub(crate) fn is_isotropic(&self) -> bool {
-        matches!(*self.anisotropy, Texture::Constant(anisotropy) if anisotropy == 0.0)
-    }
-
     /// The index of refraction inside; see [`crate::Material::interior_index`].
     pub(crate) fn interior_index(&self) -> Option<f32> {
         (self.volume.is_some() && self.lets_light_through())

@@ -6,7 +6,6 @@ use lumbre_geometry::Ray;
 use lumbre_math::{DVec3, Vec2, Vec3};
 use lumbre_scene::{Interaction, LightSample, Scene};
 use lumbre_shading::{Bsdf, LocalDir, Material, Scatter, ShadingFrame, Spectrum};
-use smallvec::SmallVec;
 
 use crate::transport::RayCounts;
 use crate::transport::interior::Interiors;
@@ -183,14 +182,13 @@ impl<'a, 's> Vertex<'a, 's> {
         weigh: impl FnOnce(f32, f32) -> f32,
         rays: &mut RayCounts,
     ) -> Spectrum {
-        let own: SmallVec<[LocalDir; 2]> = self.unfolded(sample.towards.as_vec3()).collect();
-        let scattered = own.iter().map(|&wi| self.bsdf.eval(self.wo, wi)).sum::<Spectrum>() * sample.radiance;
+        let scattered = self.eval(sample.towards) * sample.radiance;
         if scattered.is_black() {
             return Spectrum::BLACK;
         }
         let weight = match sample.scatter {
             Scatter::Delta => 1.0,
-            Scatter::Density(pdf) => weigh(pdf, own.iter().map(|&wi| self.bsdf.pdf(self.wo, wi)).sum()) / pdf,
+            Scatter::Density(pdf) => weigh(pdf, self.pdf(sample.towards)) / pdf,
         };
         if weight <= 0.0 {
             return Spectrum::BLACK;
