@@ -11,6 +11,7 @@ use lumbre::description::{Camera, CameraKind, GroundDesc, IntegratorKind};
 use lumbre::formats::image::{ExrPrecision, ImageFormat};
 use lumbre::formats::{Diagnostics, probe_writable};
 use lumbre::image::ToneMap;
+use lumbre::shading::ShadingNormals;
 use lumbre::{
     CancelToken, DVec3, Feature, Ground, Picture, PixelBounds, RenderOptions, SaveOptions, Scene, SceneDesc,
     Stage, StageLight, Staged,
@@ -100,6 +101,10 @@ pub(crate) struct Arguments {
     /// The maximal number of bounces.
     #[arg(long, value_name = "N")]
     max_depth: Option<u32>,
+    /// What is made of normals of vertices and maps that are not those of the surface: lumbre keeps coarse meshes free of black
+    /// edges and leaks, pbrt takes them as pbrt-v4 does. By default what the scene says, else lumbre.
+    #[arg(long, value_name = "HOW", value_parser = one_of(&SHADING_NORMALS, ShadingNormals::from_name))]
+    shading_normals: Option<ShadingNormals>,
     /// Seed of the random numbers.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
@@ -153,6 +158,8 @@ fn exposure(text: &str) -> Result<f32, String> {
 /// The names of integrators.
 pub(crate) const INTEGRATORS: [&str; 7] =
     ["path", "whitted", "ambientocclusion", "normals", "depth", "albedo", "uv"];
+/// What can be made of shading normals.
+pub(crate) const SHADING_NORMALS: [&str; 2] = ["lumbre", "pbrt"];
 /// The names of tone mappings.
 pub(crate) const TONE_MAPS: [&str; 4] = ["none", "agx", "aces", "neutral"];
 /// The names of formats that are written.
@@ -608,6 +615,8 @@ fn options(arguments: &Arguments, scene: &Scene) -> Result<RenderOptions, Failur
         options.camera = camera(scene, wanted)?;
     }
     options.integrator.kind = arguments.integrator.unwrap_or(options.integrator.kind);
+    options.integrator.shading_normals =
+        arguments.shading_normals.unwrap_or(options.integrator.shading_normals);
     options.integrator.max_depth = arguments.max_depth.unwrap_or(options.integrator.max_depth);
     options.sampler.seed = arguments.seed.unwrap_or(options.sampler.seed);
     options.stop.time = arguments.time;

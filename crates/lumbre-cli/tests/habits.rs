@@ -463,3 +463,37 @@ fn a_damaged_file_is_told_with_its_byte_and_who_named_it() {
         assert_eq!(text.lines().count(), 1 + places.len(), "{text}");
     }
 }
+
+#[test]
+fn shading_normals_are_those_of_the_option_else_of_the_scene() {
+    let desk = Desk::new();
+    let world = "Film \"rgb\" \"integer xresolution\" 12 \"integer yresolution\" 9 \"bool savefp16\" false\n\
+        Sampler \"independent\" \"integer pixelsamples\" 3\n\
+        LookAt 1 -9 3  0 0 0  0 0 1\nCamera \"perspective\" \"float fov\" 20\nWorldBegin\n\
+        LightSource \"point\" \"point3 from\" [ 6 0.5 -0.2 ] \"rgb I\" [ 50 60 70 ]\n\
+        Shape \"trianglemesh\" \"point3 P\" [ -2 -1 0  2 -1 0  0 2 0.5 ] \"normal N\" [ 1 -0.3 1  1 -0.3 1  1 -0.3 1 ]\n";
+    desk.write("ours.pbrt", &format!("Integrator \"path\"\n{world}"));
+    desk.write("pbrt.pbrt", &format!("Integrator \"path\" \"string shadingnormals\" \"pbrt\"\n{world}"));
+    for (scene, normals, picture) in [
+        ("ours.pbrt", None, "default.pfm"),
+        ("ours.pbrt", Some("lumbre"), "lumbre.pfm"),
+        ("ours.pbrt", Some("pbrt"), "pbrt.pfm"),
+        ("pbrt.pbrt", None, "scene.pfm"),
+        ("pbrt.pbrt", Some("lumbre"), "back.pfm"),
+    ] {
+        let mut arguments = vec!["render", scene, "-o", picture, "--quiet"];
+        arguments.extend(normals.iter().flat_map(|normals| ["--shading-normals", normals]));
+        let out = desk.lumbre(&arguments);
+        assert_eq!(code(&out), 0, "{arguments:?}: {}", stderr(&out));
+    }
+    let bytes = |name: &str| fs::read(desk.path(name)).unwrap();
+    assert!(image(&desk, "pbrt.pfm").pixels().iter().any(|pixel| pixel.g > 0.0));
+    for (a, b, same) in [
+        ("default.pfm", "lumbre.pfm", true),
+        ("default.pfm", "back.pfm", true),
+        ("pbrt.pfm", "scene.pfm", true),
+        ("default.pfm", "pbrt.pfm", false),
+    ] {
+        assert_eq!(bytes(a) == bytes(b), same, "{a} {b}");
+    }
+}

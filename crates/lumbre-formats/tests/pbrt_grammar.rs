@@ -9,7 +9,9 @@ use lumbre_geometry::{Ray, Shape};
 use lumbre_image::Rgb;
 use lumbre_math::{DVec3, Transform, Vec2, Vec3};
 use lumbre_scene::*;
-use lumbre_shading::{Convention, Mapping2d, MaterialKind, PrincipledParams, Spectrum, Texture};
+use lumbre_shading::{
+    Convention, Mapping2d, MaterialKind, PrincipledParams, ShadingNormals, Spectrum, Texture,
+};
 
 fn try_read(text: &str) -> (Result<SceneDesc, FormatError>, Diagnostics) {
     let mut diagnostics = Diagnostics::new();
@@ -907,7 +909,7 @@ fn samplers_and_integrators_are_read_and_the_last_wins() {
             "Integrator \"{name}\" \"bool regularize\" true \"integer maxdepth\" 9 Option \"seed\" 42
              Sampler \"independent\" \"integer seed\" 7 \"integer pixelsamples\" 3 WorldBegin"
         ));
-        assert_eq!(scene.integrator, IntegratorDesc { kind, max_depth: 9 });
+        assert_eq!(scene.integrator, IntegratorDesc { kind, max_depth: 9, ..IntegratorDesc::default() });
         assert_eq!(scene.sampler, SamplerDesc { kind: SamplerKind::Independent, spp: Some(3), seed: 42 });
     }
     for (name, kind) in [
@@ -921,6 +923,23 @@ fn samplers_and_integrators_are_read_and_the_last_wins() {
     }
     let scene = read("Integrator \"whitted\" \"integer lightsamples\" 9 \"bool sky\" true WorldBegin");
     assert_eq!(scene.integrator.kind, IntegratorKind::Whitted { light_samples: 9, sky: true });
+}
+
+#[test]
+fn every_integrator_says_what_it_makes_of_shading_normals() {
+    for name in ["path", "whitted", "ambientocclusion"] {
+        for (value, expected) in [
+            ("", ShadingNormals::Lumbre),
+            ("\"string shadingnormals\" \"lumbre\"", ShadingNormals::Lumbre),
+            ("\"string shadingnormals\" \"pbrt\"", ShadingNormals::Pbrt),
+        ] {
+            let scene = read(&format!("Integrator \"{name}\" {value} WorldBegin"));
+            assert_eq!(scene.integrator.shading_normals, expected, "{name} {value}");
+        }
+    }
+    let (refused, _) = try_read("Integrator \"path\" \"string shadingnormals\" \"pbtr\" WorldBegin");
+    let wrong = refused.unwrap_err().to_string();
+    assert!(wrong.contains("one of lumbre, pbrt; did you mean \"pbrt\"?"), "{wrong}");
 }
 
 // Files.

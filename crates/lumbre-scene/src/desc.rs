@@ -6,7 +6,7 @@ use lumbre_geometry::Shape;
 use lumbre_image::Rgb;
 use lumbre_kernel::{CustomGeometry, Placement};
 use lumbre_math::{AnimatedTransform, DVec3, Transform, Vec2, Vec3, Vec4};
-use lumbre_shading::{FURTHER_SETS, FloatTexture, Material, MipMap};
+use lumbre_shading::{FURTHER_SETS, FloatTexture, Material, MipMap, ShadingNormals};
 
 use crate::{Camera, Listing, MaterialId, ObjectId};
 
@@ -431,11 +431,14 @@ pub struct IntegratorDesc {
     pub kind: IntegratorKind,
     /// The maximal number of bounces.
     pub max_depth: u32,
+    /// How light is scattered where shading normals are not those of the surface.
+    pub shading_normals: ShadingNormals,
 }
 
 impl Default for IntegratorDesc {
     fn default() -> Self {
-        Self { kind: IntegratorKind::Path { regularize: false }, max_depth: 5 }
+        let kind = IntegratorKind::Path { regularize: false };
+        Self { kind, max_depth: 5, shading_normals: ShadingNormals::default() }
     }
 }
 

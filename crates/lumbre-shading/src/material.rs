@@ -12,8 +12,8 @@ use crate::dielectric::{Dielectric, ThinDielectric};
 use crate::diffuse::{Diffuse, DiffuseTransmission};
 use crate::microfacet::Microfacets;
 use crate::{
-    Bsdf, FloatTexture, HomogeneousMedium, ImageTexture, PrincipledParams, ShadingFrame, Spectrum,
-    SpectrumTexture, Texture, TextureContext,
+    Bsdf, FloatTexture, HomogeneousMedium, ImageTexture, PrincipledParams, ShadingFrame, ShadingNormals,
+    Spectrum, SpectrumTexture, Texture, TextureContext,
 };
 
 /// The roughness group of parameters.
@@ -374,17 +374,21 @@ impl Material {
     /// [`Material::bsdf`], with a clear coat oriented by its own normal map or, without one, by the surface
     /// without the base's bump map.
     ///
-    /// A normal that faces away from the visible side of the surface is turned back just far enough: otherwise
-    /// the silhouettes of coarse meshes with smooth normals, and steep bumps, would be black.
+    /// With [`ShadingNormals::Lumbre`] a normal that faces away from the visible side of the surface is turned back just
+    /// far enough: otherwise the silhouettes of coarse meshes with smooth normals, and steep bumps, would be black.
     pub fn shading(
         &self,
         at: &TextureContext,
         surface: &LocalSurface,
         towards: Vec3,
+        normals: ShadingNormals,
     ) -> Option<(ShadingFrame, Bsdf)> {
         let mut bsdf = self.bsdf(at)?;
         let mut frame = self.frame(at, surface);
-        let seen = |normal: Vec3| facing(normal, surface.geometric, towards);
+        let seen = |normal: Vec3| match normals {
+            ShadingNormals::Pbrt if ShadingNormals::differ(normal, surface.geometric) => normal,
+            _ => facing(normal, surface.geometric, towards),
+        };
         let normal = seen(frame.n);
         if normal != frame.n {
             frame = ShadingFrame::new(normal, frame.s);
