@@ -1098,9 +1098,9 @@ WorldEnd"#,
     let Texture::Scale { texture, scale } = &**reflectance else { panic!() };
     assert_eq!((constant(texture), constant(scale)), (Rgb::new(0.2, 0.4, 0.6), 0.5));
     assert_eq!(mesh(&scene.shapes[0]).uvs.as_ref().unwrap()[1], Vec2::new(1.0, 0.0));
-    let MaterialKind::CoatedDiffuse { reflectance, roughness, .. } = kind(&scene, 1) else { panic!() };
-    assert_eq!(constant(reflectance), Rgb::new(0.1, 0.2, 0.3));
-    assert!(!roughness.remap && constant(&roughness.u) == 0.2);
+    let MaterialKind::Uber(plastic) = kind(&scene, 1) else { panic!() };
+    assert_eq!(constant(&plastic.kd), Rgb::new(0.1, 0.2, 0.3));
+    assert!(!plastic.roughness.remap && constant(&plastic.roughness.u) == 0.2);
     let MaterialKind::ConductorReflectance { reflectance, .. } = kind(&scene, 2) else { panic!() };
     assert_eq!(constant(reflectance), Rgb::splat(0.9));
     assert!(matches!(kind(&scene, 3), MaterialKind::Dielectric { eta, .. } if *eta == 1.6));
@@ -1196,9 +1196,51 @@ fn what_a_film_and_old_materials_ask_for_is_kept() {
     for old in ["uber", "plastic", "substrate"] {
         let text = format!("WorldBegin Material \"{old}\" \"float index\" 2.5 Shape \"sphere\"");
         let (scene, _) = try_read(&text);
-        let MaterialKind::CoatedDiffuse { eta, .. } = *kind(&scene.unwrap(), 0) else { panic!("{old}") };
+        let eta = match kind(&scene.unwrap(), 0) {
+            MaterialKind::CoatedDiffuse { eta, .. } => *eta,
+            MaterialKind::Uber(params) => constant(&params.eta),
+            _ => panic!("{old}"),
+        };
         assert_eq!(eta, 2.5, "{old}");
     }
+}
+
+#[test]
+fn every_parameter_of_uber_and_plastic_is_kept() {
+    let whole = |text: &str| {
+        let (scene, said) = warned(text);
+        assert_eq!(said.len(), 1, "only that it is of pbrt-v3: {said:?}");
+        scene
+    };
+    let scene = whole(
+        r#"Texture "t" "color" "checkerboard" "color tex1" [.2 .4 .6]
+           Material "uber" "rgb Kd" [.1 .2 .3] "rgb Ks" [.4 .5 .6] "rgb Kr" [.7 .8 .9] "texture Kt" "t" "rgb opacity" [.3 .6 .9]
+             "float uroughness" .2 "float vroughness" .4 "float index" 1.7 "bool remaproughness" "false" Shape "sphere"
+           Material "uber" Shape "sphere"
+           Material "plastic" "color Ks" [.3 .2 .1] Shape "sphere""#,
+    );
+    let uber = |shape: usize| {
+        let MaterialKind::Uber(params) = kind(&scene, shape) else { panic!("{:?}", kind(&scene, shape)) };
+        params
+    };
+    let all = uber(0);
+    assert_eq!(constant(&all.kd), Rgb::new(0.1, 0.2, 0.3));
+    assert_eq!(constant(&all.ks), Rgb::new(0.4, 0.5, 0.6));
+    assert_eq!(constant(&all.kr), Rgb::new(0.7, 0.8, 0.9));
+    assert!(!all.kt.is_constant());
+    assert_eq!(constant(&all.opacity), Rgb::new(0.3, 0.6, 0.9));
+    let roughness = [constant(&all.roughness.u), constant(&all.roughness.v)];
+    assert_eq!((constant(&all.eta), roughness, all.roughness.remap), (1.7, [0.2, 0.4], false));
+    for (shape, ks) in [(1, Rgb::splat(0.25)), (2, Rgb::new(0.3, 0.2, 0.1))] {
+        let params = uber(shape);
+        assert_eq!((constant(&params.kd), constant(&params.ks)), (Rgb::splat(0.25), ks));
+        assert_eq!((constant(&params.kr), constant(&params.kt)), (Rgb::BLACK, Rgb::BLACK));
+        assert_eq!((constant(&params.opacity), constant(&params.eta)), (Rgb::WHITE, 1.5));
+        assert!(params.roughness.remap && constant(&params.roughness.u) == 0.1);
+    }
+    // Plastic has no more than that.
+    let (_, said) = warned(r#"Material "plastic" "rgb Kr" [.5 .5 .5] Shape "sphere""#);
+    assert!(said.iter().any(|line| line.contains("\"Kr\"")), "{said:?}");
 }
 
 #[test]

@@ -23,6 +23,7 @@ mod specular;
 mod stretched;
 mod texture;
 pub mod thin_film;
+pub mod uber;
 
 pub use bsdf::{Bsdf, BsdfSample, Scatter};
 pub use frame::{LocalDir, ShadingFrame, ShadingNormals};
