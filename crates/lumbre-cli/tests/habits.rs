@@ -497,3 +497,53 @@ fn shading_normals_are_those_of_the_option_else_of_the_scene() {
         assert_eq!(bytes(a) == bytes(b), same, "{a} {b}");
     }
 }
+
+#[test]
+fn a_picture_in_which_next_to_nothing_is_lit_comes_with_a_hint() {
+    let desk = Desk::new();
+    let room = |light: &str, eye: &str| {
+        format!(
+            "Film \"rgb\" \"integer xresolution\" 16 \"integer yresolution\" 12\nSampler \"independent\" \"integer pixelsamples\" 4\n\
+             LookAt {eye}  0 0.5 -3  0 1 0\nCamera \"perspective\"\nWorldBegin\n{light}\n\
+             Shape \"box\" \"point3 p0\" [ -3 -2 -3 ] \"point3 p1\" [ 3 2.5 3 ]\n"
+        )
+    };
+    let sky = "LightSource \"infinite\" \"rgb L\" [ 1 2 3 ]";
+    let lamp = "LightSource \"point\" \"rgb I\" [ 9 8 7 ]";
+    let faint = "LightSource \"point\" \"rgb I\" [ 1e-4 1e-4 1e-4 ]";
+    let (inside, outside) = ("0.5 1 2", "0.5 1 12");
+    for (name, light, eye, more, is_hinted) in [
+        ("the sky stays outside", sky, inside, &[][..], true),
+        ("the lamp stays inside", lamp, outside, &[], true),
+        ("a faint lamp", faint, inside, &[], true),
+        ("a faint lamp, exposed for", faint, inside, &["--exposure", "12"], false),
+        ("a lamp", lamp, inside, &[], false),
+        ("no picture of light", sky, inside, &["--integrator", "depth"], false),
+        ("nobody wants to hear it", sky, inside, &["--quiet"], false),
+    ] {
+        desk.write("room.pbrt", &room(light, eye));
+        let out = desk.lumbre(&[&["render", "room.pbrt", "-o", "a.png"], more].concat());
+        assert_eq!(code(&out), 0, "{name}: {}", stderr(&out));
+        let said = stderr(&out);
+        let words = ["hint: ", "--env", "--exposure", "--fit", "a camera inside"];
+        assert_eq!(words.map(|word| said.contains(word)), [is_hinted; 5], "{name}: {said}");
+    }
+}
+
+#[test]
+fn diff_takes_one_of_its_pictures_from_standard_input() {
+    let desk = Desk::new();
+    let grey = |value: f32| lumbre::image::Image::filled(6, 4, lumbre::image::Rgb::splat(value));
+    for (name, value) in [("a.exr", 0.5), ("b.exr", 0.75)] {
+        lumbre::write_image(&desk.path(name), &grey(value), &lumbre::SaveOptions::default()).unwrap();
+    }
+    let bytes = fs::read(desk.path("a.exr")).unwrap();
+    for (arguments, expected) in [(["diff", "-", "b.exr"], "0.25\n"), (["diff", "a.exr", "-"], "0\n")] {
+        let out = with_input(&desk, &arguments, &bytes);
+        assert_eq!((code(&out), stdout(&out)), (0, expected.to_owned()), "{}", stderr(&out));
+    }
+    let out = with_input(&desk, &["diff", "-", "b.exr"], &bytes[..bytes.len() - 9]);
+    assert_eq!(code(&out), 3);
+    assert!(stderr(&out).starts_with("error: standard input:byte "), "{}", stderr(&out));
+    assert_eq!(code(&with_input(&desk, &["diff", "-", "-"], &bytes)), 2);
+}
