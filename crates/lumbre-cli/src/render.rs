@@ -448,6 +448,9 @@ fn picture(
     if staged.framed && scene.resolved().accel().primitive_count() == 0 {
         warn(format!("{}: there is nothing to see", name.display()))?;
     }
+    if staged.guessed_up && is_first && !arguments.quiet {
+        say!("{}: z is taken for up, by the plane that it stands on (--up y takes y)", name.display());
+    }
     if scene.is_dark() && is_of_light {
         warn(format!("{}: the scene has no light, its picture is black", name.display()))?;
     }

@@ -547,3 +547,35 @@ fn diff_takes_one_of_its_pictures_from_standard_input() {
     assert!(stderr(&out).starts_with("error: standard input:byte "), "{}", stderr(&out));
     assert_eq!(code(&with_input(&desk, &["diff", "-", "-"], &bytes)), 2);
 }
+
+#[test]
+fn a_model_that_plainly_stands_on_a_plane_of_z_has_z_up_unless_told() {
+    let desk = Desk::new();
+    // A pole on a wide slab.
+    let box_of = |[x, y, from, to]: [f64; 4], first: usize| {
+        let mut text = String::new();
+        for i in 0..8 {
+            let sign = |bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
+            let z = if i >> 2 & 1 == 1 { to } else { from };
+            text += &format!("v {} {} {z}\n", sign(0) * x, sign(1) * y);
+        }
+        for quad in [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]] {
+            let corners: Vec<String> = quad.iter().map(|corner| (corner + first).to_string()).collect();
+            text += &format!("f {}\n", corners.join(" "));
+        }
+        text
+    };
+    let pole = box_of([3.0, 2.0, 0.0, 0.5], 1) + &box_of([0.4, 0.3, 0.5, 6.0], 9);
+    desk.write("pole.obj", &pole);
+    let render = |more: &[&str], picture: &str| {
+        let out =
+            desk.lumbre(&[&["pole.obj", "-o", picture, "--size", "24x24", "--spp", "1"], more].concat());
+        assert_eq!(code(&out), 0, "{}", stderr(&out));
+        stderr(&out).contains("z is taken for up")
+    };
+    assert!(render(&[], "guessed.pfm"));
+    assert!(!render(&["--up", "z"], "z.pfm") && !render(&["--up", "y"], "y.pfm"));
+    let bytes = |name: &str| fs::read(desk.path(name)).unwrap();
+    assert!(bytes("guessed.pfm") == bytes("z.pfm") && bytes("guessed.pfm") != bytes("y.pfm"));
+    assert!(!render(&["--eye", "9,8,7", "--up", "y"], "eye.pfm"));
+}

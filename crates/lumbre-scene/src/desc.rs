@@ -37,6 +37,8 @@ pub struct SceneDesc {
     pub without_light: WithoutLight,
     /// The up axis of the automatic camera and light.
     pub up: UpAxis,
+    /// Whether that is a guess, by how the model stands.
+    pub up_is_guessed: bool,
     /// The ground plane.
     pub ground: Option<GroundDesc>,
     /// What its files hold by name.

@@ -20,6 +20,7 @@ use crate::image::open_image;
 use crate::input::{Input, refuse_wide};
 use crate::origin::{diagonal, is_without_area, origin_of, placed, relative};
 use crate::polygon;
+use crate::standing::up_of;
 use crate::thin::{INK, Thin};
 use header::{Element, Encoding, Header, Number, Property};
 use values::{Binary, Fault, Source, Text};
@@ -108,7 +109,8 @@ pub(crate) fn ply_scene(
         segments,
     });
     let has_uvs = mesh.uvs.is_some();
-    let mut scene = scene_of_meshes([mesh], UpAxis::Y);
+    let (up, up_is_guessed) = up_of(std::iter::once(&mesh), origin);
+    let mut scene = SceneDesc { up_is_guessed, ..scene_of_meshes([mesh], up) };
     if let Some(thin) = thin {
         push_thin(&mut scene, &thin, size, None, Transform::IDENTITY, budget)?;
     }
