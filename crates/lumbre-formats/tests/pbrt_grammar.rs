@@ -1280,3 +1280,65 @@ fn the_power_of_an_area_light_keeps_the_factor_of_its_colour() {
     let expected = Rgb::new(9.0, 8.0, 7.0) * factor;
     assert!((seen - expected).map(f32::abs).max_component() < 1e-4, "{seen:?} {expected:?}");
 }
+
+#[test]
+fn inline_meshes_far_away_keep_their_digits() {
+    // A metre of a map, with millimetres.
+    let (east, north) = (500_000.125, 4_649_781.25);
+    let corners: Vec<DVec3> = [(0.0, 0.0), (1.003, 0.0), (1.003, 1.007), (0.0, 1.007)]
+        .map(|(x, y)| DVec3::new(east + x, north + y, 12.5))
+        .to_vec();
+    let points: Vec<String> = corners.iter().map(|p| format!("{} {} {}", p.x, p.y, p.z)).collect();
+    let near = |scene: &SceneDesc, shape: &ShapeDesc, by: DVec3| {
+        let (GeometryDesc::Mesh(mesh) | GeometryDesc::BilinearMesh(mesh)) = &shape.geometry else { panic!() };
+        assert_eq!(mesh.positions.len(), 4);
+        for (found, corner) in mesh.positions.iter().zip(&corners) {
+            let found = shape.world_from_object.point(found.as_dvec3());
+            assert!((found - *corner - by).abs().max_element() < 1e-6, "{found}");
+        }
+        assert!(scene.materials.len() < 3);
+    };
+    for (shape, indices) in [("trianglemesh", "0 1 2 0 2 3"), ("bilinearmesh", "0 1 3 2")] {
+        let shape = format!(
+            "Shape \"{shape}\" \"integer indices\" [ {indices} ] \"point3 P\" [ {} ]",
+            points.join(" ")
+        );
+        let scene = world(&shape);
+        near(&scene, &scene.shapes[0], DVec3::ZERO);
+        let scene = world(&format!("Translate -500000 2 3 {shape}"));
+        near(&scene, &scene.shapes[0], DVec3::new(-500_000.0, 2.0, 3.0));
+        // One that moves stands in an object, to which its motion comes.
+        let scene = world(&format!("ActiveTransform EndTime Translate 0 0 9 ActiveTransform All {shape}"));
+        near(&scene, &scene.objects[0].shapes[0], DVec3::ZERO);
+        let Placement::Moving(motion) = &scene.instances[0].world_from_object else { panic!() };
+        assert_eq!(motion.at(1.0).point(DVec3::ZERO), DVec3::new(0.0, 0.0, 9.0));
+    }
+    // What is near stays what it is, and under the transform that is written.
+    let scene = world("Translate 1 2 3 Shape \"trianglemesh\" \"point3 P\" [ 0.1 0.2 0.3  1 0 0  0 1 0 ]");
+    assert_eq!(origin(&scene.shapes[0]), DVec3::new(1.0, 2.0, 3.0));
+    assert_eq!(mesh(&scene.shapes[0]).positions[0], Vec3::new(0.1, 0.2, 0.3));
+    // A loop subdivision of an octahedron is the same far away as near.
+    let octahedron = |at: f64| {
+        let points = [
+            [1.1, 0.0, 0.0],
+            [-1.1, 0.0, 0.0],
+            [0.0, 1.1, 0.0],
+            [0.0, -1.1, 0.0],
+            [0.0, 0.0, 1.1],
+            [0.0, 0.0, -1.1],
+        ];
+        let points: Vec<String> = points.iter().map(|[x, y, z]| format!("{} {y} {z}", at + x)).collect();
+        let scene = world(&format!(
+            "Shape \"loopsubdiv\" \"integer levels\" 2 \"integer indices\" \
+             [ 0 2 4 2 1 4 1 3 4 3 0 4 2 0 5 1 2 5 3 1 5 0 3 5 ] \"point3 P\" [ {} ]",
+            points.join(" ")
+        ));
+        let shape = &scene.shapes[0];
+        let places = mesh(shape).positions.iter().map(|p| shape.world_from_object.point(p.as_dvec3()));
+        places.map(|p| p - DVec3::new(at, 0.0, 0.0)).collect::<Vec<DVec3>>()
+    };
+    let far = octahedron(16_777_217.0);
+    for (a, b) in octahedron(0.0).iter().zip(&far) {
+        assert!((*a - *b).abs().max_element() < 1e-6, "{a} {b}");
+    }
+}
