@@ -514,7 +514,7 @@ fn picture(
     let save_time = save_start.elapsed();
     report_stats(arguments, &picture);
     let is_told = is_first && !arguments.quiet && is_of_light && !scene.is_dark();
-    if is_told && is_nearly_black(picture.image(), exposure) {
+    if is_told && picture.stats().spp > 0 && is_nearly_black(picture.image(), exposure) {
         say!("{DARK_HINT}");
     }
     if let Some(path) = &arguments.stats {

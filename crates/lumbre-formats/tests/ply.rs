@@ -395,6 +395,8 @@ fn the_texture_of_a_comment_is_found_beside_the_file() {
     assert_eq!(said.len(), 0);
     let MaterialKind::Diffuse { reflectance } = &scene.materials[0].material.kind else { panic!() };
     assert!(matches!(**reflectance, Texture::Image(_)));
+    let (_, said) = with("a b.png\ncomment TextureFile b.png");
+    assert!(said.len() == 1 && said[0].contains("m.ply:4:21: a PLY file names several textures"), "{said:?}");
     let (_, said) = with("gone.png");
     assert!(said.len() == 1 && said[0].contains("cannot use the texture of a PLY file"), "{said:?}");
 }
